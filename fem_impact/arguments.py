@@ -5,9 +5,9 @@ import difflib
 import re
 import sys
 import textwrap
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import Any, NoReturn
+from typing import Any, NamedTuple, NoReturn
 
 import fem_impact as fi
 
@@ -72,6 +72,196 @@ class _Help(argparse.HelpFormatter):
         return "\n".join(lines)
 
 
+Option = tuple[str, dict[str, Any]]  # its name, and what argparse makes of it
+
+
+class Command(NamedTuple):
+    """A command: what it does, what runs it, what it works on, and its options."""
+
+    help: str
+    run: Callable[[argparse.Namespace], commands.Answer | None]
+    options: tuple[Option, ...] = ()
+    scene: str = "a TOML file"  # the first argument in words; "" for a command without
+    called: str = "SCENE"
+
+
+def _option(name: str, value: Any, help: str, type: Any = None, **how: Any) -> Option:
+    """An option, or an argument, with a value of that name in the help."""
+    return name, {"metavar": value, "help": help, "type": type, **how}
+
+
+def _flag(name: str, help: str) -> Option:
+    return name, {"action": "store_true", "help": help}
+
+
+def _older(name: str, dest: str, **how: Any) -> Option:
+    """An older spelling of an option, which help does not show."""
+    return name, {"dest": dest, "default": argparse.SUPPRESS, "help": argparse.SUPPRESS, **how}
+
+
+def _out(files: str, default: str, single: str = "") -> Option:
+    """The option --out, which is a folder everywhere; where one file is written, a name with an ending is that file."""
+    named = f"; a name with an ending names the {single} itself" if single else ""
+    return _option("--out", "DIR", f"folder for {files}{named} (default: {default})", _place)
+
+
+def _format(default: str | None = FORMATS[0]) -> Option:
+    """The option that sets the format of all pictures; without a default, the ending of --out sets it."""
+    said = "by the ending of --out" if default is None else default
+    return _option("--format", None, f"format of the pictures (default: {said})", choices=FORMATS, default=default)
+
+
+TOLERANCE = _option("--tolerance", "T", "largest accepted error; overrides the scene's", float)
+MODEL = (
+    TOLERANCE,
+    _option("--quantity", "Q", "what the tolerance is for; repeatable: restitution, contact_time, force ..., "
+            "spectrum=5000 (up to 5 kHz)", action="append"),
+    _option("--target", "KIND",
+            "model the struck body as rigid, infinite, vectors, mixed or modal, whatever the plan would choose"),
+    _option("--model", "MODEL",
+            "auto adds thick theory, air and stretching where the tolerance needs them; stated follows the scene"),
+    _option("--n-modes", "N", "number of modes to keep for the struck body", int),
+    _option("--size", "H", "element size [m]", float),
+)  # fmt: skip
+WORKERS = (
+    _option("--workers", "N", "number of threads (default: one per core)", int),
+    _option("--cluster", "ADDRESS", "run on the Dask cluster whose scheduler has this address"),
+)
+CHANNELS = (
+    _option("--force", "NAME", "name or number of the force channel (default: by its unit or name)"),
+    _option("--response", "NAME", "name or number of a response; repeatable", action="append"),
+    _option("--rate", "HZ", "sampling rate, if the file does not state it; of a scene: 51200", float),
+    _option("--scale", "N", "newtons per unit of the force channel", float),
+)
+TAPS = "measured taps: .lvm, .csv, .npz, .wav, .mat or .uff"
+COMMANDS = {
+    "strike": Command("strike a scene; write force, spectrum, modes and sound", commands.strike, (
+        _out("response.json and .npz, force, modes and sounds", "out/NAME"),
+        *MODEL,
+        _flag("--strict", "write nothing if the tolerance is missed, and exit with 1 instead of 3"),
+        _flag("--verify", "strike again with a finer model and print the differences"),
+        _flag("--pictures", "write 3-D pictures of the mode shapes and the wave, as PNG and GIF"),
+        _flag("--vtk", "write motion.pvd, the motion for ParaView and pyvista"),
+        _option("--listener", ("X", "Y", "Z"), "write radiated.wav, the sound the body radiates to this point [m]; Z "
+                "is the height above its plane; repeatable; of two also stereo.wav", float, nargs=3, action="append"),
+        _format(),
+        _option("--duration", "S", "length of the sounds [s] (default: until they decay)", float),
+        _flag("--normalise", "scale each sound to a peak of 1.0"),
+    ), "a TOML file, such as studies/scenes/drumstick.toml"),
+    "plan": Command("show the model, its reasons, expected errors and cost, without striking", commands.plan, MODEL),
+    "modes": Command("list the modes of the struck body; write their shapes", commands.modes, (
+        _option("--n-modes", "N", "how many, besides rigid motions (default: 12)", int, default=12),
+        _older("--count", "n_modes", type=int),
+        _option("--vtk", "FILE", "write the shapes to a .pvd or .vtu file", _place),
+    )),
+    "map": Command(
+        "strike a scene on the grid of its table [map]; write numbers, borders and pictures", commands.map_of, (
+        _out("map.nc, CSV files and, for two axes, a picture of each layer", "out/NAME"),
+        TOLERANCE,
+        _option("--format", None, "format of the numbers, nc or zarr, or of the pictures, png, pdf or svg; repeatable "
+                "(default: nc and png)", choices=("nc", "zarr", *FORMATS), action="append", default=[]),
+        *WORKERS,
+        _option("--store", "DIR", "keep finished cells there; an interrupted run continues from them", _place),
+        _option("--max-cells", "N", "refuse maps with more cells (default: 1e8)", float, default=1e8),
+        _option("--cells", "N", "values along an axis whose range has no count (default: 400, or 100 if each cell must "
+                "be struck alone)", int),
+        _flag("--borders", "locate where the number of impacts changes, even if all counts are given"),
+        _flag("--every-cell", "compute all cells; by default, a map without counts that would take more than a second "
+              "is computed where its answer changes and interpolated elsewhere, to within the tolerance"),
+    ), "a TOML file, such as studies/scenes/drumstick_map.toml"),
+    "spread": Command(
+        "strike a scene with uncertain inputs: how much the answers scatter, and which input causes it",
+        commands.spread, (
+        _option("--vary", "INPUT=LAW", 'an uncertain number, such as "contact.stiffness=lognormal(695e3, 0.1)"; '
+                "repeatable; also normal(mean, deviation), uniform(low, high), loguniform(low, high), triangular(low, "
+                "mode, high)", action="append", default=[], required=True),
+        _option("--correlate", "INPUT,INPUT=R", "correlation of two; repeatable", action="append", default=[]),
+        _option("--blows", "N", "number of blows (default: 10000)", int, default=10_000),
+        _flag("--no-sobol", "no Sobol indices: all blows go into the distributions"),
+        _option("--seed", "N", "seed of the random points (default: 0)", int, default=0),
+        TOLERANCE,
+        _option("--max-frequency", "HZ", "add the spectral centroid up to this frequency (slow)", float),
+        *WORKERS,
+        _option("--store", "DIR", "keep finished blows there; an interrupted run continues from them", _place),
+        _out("spread.json, .nc, .csv and .png", "out/NAME"),
+        _format(),
+    )),
+    "hammer": Command("find the hammers that reach a bandwidth without a double hit", commands.hammer, (
+        _option("--bandwidth", "F", "bandwidth to reach [Hz]", float, required=True),
+        _option("--drop", "D", "how far the spectrum may fall within the bandwidth [dB] (default: 10)", float,
+                default=10.0),
+        _option("--masses", "KG", "masses of the hammers [kg] (default: 1 g to 1 kg)", float, nargs="+"),
+        _option("--rove", "N", "plan a test of about N points over the body, the sensor at the strike point", int),
+        _out("hammers.png, or rove.png and .csv", "none", "picture"),
+        _format(None),
+    ), "a TOML file; its body and strike point are used"),
+    "report": Command("strike a scene; write one HTML page with everything about the blow", commands.report, (
+        _out("report.html", "out/NAME", "page"),
+        TOLERANCE,
+    ), "a TOML file, or a folder written by `strike`", "SCENE|RESULT"),
+    "explore": Command(
+        "serve a page on this machine where sliders and clicks change the blow", commands.explore, (
+        _option("--port", "N", "port on 127.0.0.1 (default: any free port)", int, default=0),
+        _flag("--no-open", "print the address, but do not open it in a browser"),
+    )),
+    "play": Command(
+        "strike a scene from the keyboard, a MIDI file or a MIDI port, and hear it at once", commands.play, (
+        _option("--midi", "FILE", "play the notes of a MIDI file: middle C is the first point", _place),
+        _option("--midi-port", "NAME", "play from the MIDI input whose name begins with NAME", nargs="?", const=""),
+        _older("--port", "midi_port", nargs="?", const=""),
+        _option("--at", "X", "a point to strike [m]; repeatable (default: ten points, the scene's and others over the "
+                "whole body)", float, nargs="+", action="append"),
+        _option("--n-modes", "N", "number of modes (default: 300)", int, default=300),
+        _older("--modes", "n_modes", type=int),
+        _option("--fastest", "V", "speed of the loudest stroke [m/s] (default: twice the scene's)", float),
+        _option("--duration", "S", "stop after this time at the latest [s] (default: 600)", float, default=600.0),
+        _option("--block", "N", "frames computed at a time, at 48000 per second (default: 64)", int, default=64),
+        _flag("--silent", "play into the file only, and count the deadlines that would be missed"),
+        _out("play.wav", "out/NAME", "sound"),
+    )),
+    "new": Command("write a commented scene to begin with", commands.new, (
+        _option("kind", "KIND", "plate, disk, beam or map (default: plate)", nargs="?", default="plate"),
+        _out("KIND.toml", "here", "scene"),
+    ), ""),
+    "mesh": Command(
+        "list the edges, sizes and units of a mesh, drawing or scene, to state its supports", commands.mesh, (
+        _option("--unit", "U", "unit of the numbers in the file: m, cm, mm, um, in or km (default: the file's)"),
+        _out("elements and named edges, mesh.png", "none", "picture"),
+        _format(None),
+    ), "a mesh file, an .svg or .dxf drawing, or a scene, a .toml file", "FILE"),
+    "show": Command(
+        "show what a folder of results holds, or how much of a store is finished", commands.show, (),
+        "a folder that --out or --store named", "FOLDER"),
+    "schema": Command(
+        "print a JSON schema: of scenes, for editors to check them, or of what a command prints with --json",
+        commands.schema,
+        (_option("of", "COMMAND", "a command (default: scenes)", nargs="?", choices=tuple(answers.KEYS)),), ""),
+    "doctor": Command(
+        "check this installation and suggest a remedy for each failure", commands.doctor, scene=""),
+    "completion": Command(
+        "print a script that completes commands; eval it in ~/.bashrc", lambda options: _complete(options.shell),
+        (_option("shell", None, "default: bash", choices=("bash", "zsh", "tcsh"), nargs="?", default="bash"),), ""),
+    "frf": Command("compute frequency responses of taps, or of a scene as a rig would measure it", commands.frf, (
+        *CHANNELS,
+        _option("--method", None, "H1 for noise in the response, H2 in the force", choices=("H1", "H2"), default="H1"),
+        _option("--force-window", "S", "ignore the force later than this after its onset", float),
+        _option("--response-window", "S", "time constant of an exponential window", float),
+        _out("frf.csv", "none", ".csv or .uff file"),
+    ), f"{TAPS} or frequency responses; or a scene, a TOML file", "TAPS|SCENE"),
+    "fit": Command("find the hammer and the contact that explain measured taps", commands.fit, (
+        _option("body", "SCENE", "the scene struck (default: a wall)", _place, nargs="?"),
+        *CHANNELS,
+        _option("--unknown", "NAME=LOW:HIGH", "a number to find in a range; repeatable (default: stiffness, exponent, "
+                "loss of the contact)", action="append", default=[]),
+        _option("--known", "NAME=VALUE", "a number to hold fixed; repeatable", action="append", default=[]),
+        _option("--per-tap", "NAME", "fit this unknown separately for each tap; repeatable", action="append",
+                default=[]),
+        _option("--mass", "KG", "mass of the hammer (default: the scene's, or 0.1)", float),
+        _out("fit.html, fit.json and scene.toml", "out/NAME"),
+    ), TAPS, "TAPS"),
+}  # fmt: skip
+
+
 def parser() -> argparse.ArgumentParser:
     """The parser of the whole command line."""
     made = Parser(
@@ -80,220 +270,23 @@ def parser() -> argparse.ArgumentParser:
     )  # fmt: skip
     made.add_argument("--version", action=_Version, nargs=0, help="show the version and exit")
     verbs = made.add_subparsers(title="commands", metavar="COMMAND", required=True)
-
-    def verb(run: Any, name: str, help: str, scene: str = "a TOML file", called: str = "SCENE") -> Any:
-        """Add a command and return the function that adds its arguments."""
-        mine = verbs.add_parser(
-            name, help=help, description=f"{help[0].upper()}{help[1:]}.", epilog=answers.epilog(name),
+    for name, command in COMMANDS.items():
+        said = command.help
+        verb = verbs.add_parser(
+            name, help=said, description=f"{said[0].upper()}{said[1:]}.", epilog=answers.epilog(name),
             formatter_class=_Help,
         )  # fmt: skip
-        mine.set_defaults(run=run, command=name)
-        if scene:
-            mine.add_argument("scene", metavar=called, type=_place, help=scene)
+        verb.set_defaults(run=command.run, command=name)
         described = "" if name == "schema" else f"; `fem-impact schema {name}` describes it"
-        mine.add_argument("--json", action="store_true", help=f"print the answer as JSON{described}")
-        mine.add_argument("--quiet", action="store_true", help="write nothing but errors to stderr")
-        return mine.add_argument
-
-    add = verb(
-        commands.strike, "strike", "strike a scene; write force, spectrum, modes and sound",
-        scene="a TOML file, such as studies/scenes/drumstick.toml",
-    )  # fmt: skip
-    _add_out(add, "response.json and .npz, force, modes and sounds", "out/NAME")
-    _add_choices(add)
-    add("--strict", action="store_true", help="write nothing if the tolerance is missed, and exit with 1 instead of 3")
-    add("--verify", action="store_true", help="strike again with a finer model and print the differences")
-    add("--pictures", action="store_true", help="write 3-D pictures of the mode shapes and the wave, as PNG and GIF")
-    add("--vtk", action="store_true", help="write motion.pvd, the motion for ParaView and pyvista")
-    add(
-        "--listener", metavar=("X", "Y", "Z"), nargs=3, type=float, action="append",
-        help="write radiated.wav, the sound the body radiates to this point [m]; Z is the height above its plane; "
-        "repeatable; of two also stereo.wav",
-    )  # fmt: skip
-    _add_format(add)
-    add("--duration", metavar="S", type=float, help="length of the sounds [s] (default: until they decay)")
-    add("--normalise", action="store_true", help="scale each sound to a peak of 1.0")
-
-    add = verb(commands.plan, "plan", "show the model, its reasons, expected errors and cost, without striking")
-    _add_choices(add)
-
-    add = verb(commands.modes, "modes", "list the modes of the struck body; write their shapes")
-    add("--n-modes", metavar="N", type=int, default=12, help="how many, besides rigid motions (default: 12)")
-    _also(add, "--count", "n_modes", type=int)
-    add("--vtk", metavar="FILE", type=_place, help="write the shapes to a .pvd or .vtu file")
-
-    add = verb(
-        commands.map_of, "map", "strike a scene on the grid of its table [map]; write numbers, borders and pictures",
-        scene="a TOML file, such as studies/scenes/drumstick_map.toml",
-    )  # fmt: skip
-    _add_out(add, "map.nc, CSV files and, for two axes, a picture of each layer", "out/NAME")
-    add("--tolerance", metavar="T", type=float, help="largest accepted error; overrides the scene's")
-    add(
-        "--format", choices=("nc", "zarr", *FORMATS), action="append", default=[],
-        help="format of the numbers, nc or zarr, or of the pictures, png, pdf or svg; repeatable (default: nc and png)",
-    )  # fmt: skip
-    add("--workers", metavar="N", type=int, help="number of threads (default: one per core)")
-    add("--cluster", metavar="ADDRESS", help="run on the Dask cluster whose scheduler has this address")
-    add("--store", metavar="DIR", type=_place, help="keep finished cells there; an interrupted run continues from them")
-    add("--max-cells", metavar="N", type=float, default=1e8, help="refuse maps with more cells (default: 1e8)")
-    add(
-        "--cells", metavar="N", type=int,
-        help="values along an axis whose range has no count (default: 400, or 100 if each cell must be struck alone)",
-    )  # fmt: skip
-    add(
-        "--borders",
-        action="store_true",
-        help="locate where the number of impacts changes, even if all counts are given",
-    )
-    add(
-        "--every-cell", action="store_true",
-        help="compute all cells; by default, a map without counts that would take more than a second is computed where "
-        "its answer changes and interpolated elsewhere, to within the tolerance",
-    )  # fmt: skip
-
-    add = verb(
-        commands.spread,
-        "spread",
-        "strike a scene with uncertain inputs: how much the answers scatter, and which input causes it",
-    )
-    add("--vary", metavar="INPUT=LAW", action="append", default=[], required=True,
-        help='an uncertain number, such as "contact.stiffness=lognormal(695e3, 0.1)"; repeatable; also normal(mean, '
-        "deviation), uniform(low, high), loguniform(low, high), triangular(low, mode, high)")  # fmt: skip
-    add("--correlate", metavar="INPUT,INPUT=R", action="append", default=[], help="correlation of two; repeatable")
-    add("--blows", metavar="N", type=int, default=10_000, help="number of blows (default: 10000)")
-    add("--no-sobol", action="store_true", help="no Sobol indices: all blows go into the distributions")
-    add("--seed", metavar="N", type=int, default=0, help="seed of the random points (default: 0)")
-    add("--tolerance", metavar="T", type=float, help="largest accepted error; overrides the scene's")
-    add("--max-frequency", metavar="HZ", type=float, help="add the spectral centroid up to this frequency (slow)")
-    add("--workers", metavar="N", type=int, help="number of threads (default: one per core)")
-    add("--cluster", metavar="ADDRESS", help="run on the Dask cluster whose scheduler has this address")
-    add("--store", metavar="DIR", type=_place, help="keep finished blows there; an interrupted run continues from them")
-    _add_out(add, "spread.json, .nc, .csv and .png", "out/NAME")
-    _add_format(add)
-
-    add = verb(
-        commands.hammer, "hammer", "find the hammers that reach a bandwidth without a double hit",
-        scene="a TOML file; its body and strike point are used",
-    )  # fmt: skip
-    add("--bandwidth", metavar="F", type=float, required=True, help="bandwidth to reach [Hz]")
-    add(
-        "--drop", metavar="D", type=float, default=10.0,
-        help="how far the spectrum may fall within the bandwidth [dB] (default: 10)",
-    )  # fmt: skip
-    add("--masses", metavar="KG", type=float, nargs="+", help="masses of the hammers [kg] (default: 1 g to 1 kg)")
-    add(
-        "--rove", metavar="N", type=int,
-        help="plan a test of about N points over the body, the sensor at the strike point",
-    )  # fmt: skip
-    _add_out(add, "hammers.png, or rove.png and .csv", "none", "picture")
-    _add_format(add, None)
-
-    add = verb(
-        commands.report, "report", "strike a scene; write one HTML page with everything about the blow",
-        scene="a TOML file, or a folder written by `strike`", called="SCENE|RESULT",
-    )  # fmt: skip
-    _add_out(add, "report.html", "out/NAME", "page")
-    add("--tolerance", metavar="T", type=float, help="largest accepted error; overrides the scene's")
-
-    add = verb(commands.explore, "explore", "serve a page on this machine where sliders and clicks change the blow")
-    add("--port", metavar="N", type=int, default=0, help="port on 127.0.0.1 (default: any free port)")
-    add("--no-open", action="store_true", help="print the address, but do not open it in a browser")
-
-    add = verb(
-        commands.play, "play", "strike a scene from the keyboard, a MIDI file or a MIDI port, and hear it at once"
-    )
-    add("--midi", metavar="FILE", type=_place, help="play the notes of a MIDI file: middle C is the first point")
-    add("--midi-port", metavar="NAME", nargs="?", const="", help="play from the MIDI input whose name begins with NAME")
-    _also(add, "--port", "midi_port", nargs="?", const="")
-    add("--at", metavar="X", nargs="+", type=float, action="append", help="a point to strike [m]; repeatable "
-        "(default: ten points, the scene's and others over the whole body)")  # fmt: skip
-    add("--n-modes", metavar="N", type=int, default=300, help="number of modes (default: 300)")
-    _also(add, "--modes", "n_modes", type=int)
-    add("--fastest", metavar="V", type=float, help="speed of the loudest stroke [m/s] (default: twice the scene's)")
-    add(
-        "--duration",
-        metavar="S",
-        type=float,
-        default=600.0,
-        help="stop after this time at the latest [s] (default: 600)",
-    )
-    add(
-        "--block",
-        metavar="N",
-        type=int,
-        default=64,
-        help="frames computed at a time, at 48000 per second (default: 64)",
-    )
-    add("--silent", action="store_true", help="play into the file only, and count the deadlines that would be missed")
-    _add_out(add, "play.wav", "out/NAME", "sound")
-
-    add = verb(commands.new, "new", "write a commented scene to begin with", scene="")
-    add("kind", metavar="KIND", nargs="?", default="plate", help="plate, disk, beam or map (default: plate)")
-    _add_out(add, "KIND.toml", "here", "scene")
-
-    add = verb(
-        commands.mesh, "mesh", "list the edges, sizes and units of a mesh, drawing or scene, to state its supports",
-        scene="a mesh file, an .svg or .dxf drawing, or a scene, a .toml file", called="FILE",
-    )  # fmt: skip
-    add("--unit", metavar="U", help="unit of the numbers in the file: m, cm, mm, um, in or km (default: the file's)")
-    _add_out(add, "elements and named edges, mesh.png", "none", "picture")
-    _add_format(add, None)
-
-    verb(commands.show, "show", "show what a folder of results holds, or how much of a store is finished",
-         scene="a folder that --out or --store named", called="FOLDER")  # fmt: skip
-
-    add = verb(
-        commands.schema, "schema",
-        "print a JSON schema: of scenes, for editors to check them, or of what a command prints with --json", scene="",
-    )  # fmt: skip
-    add("of", metavar="COMMAND", nargs="?", choices=tuple(answers.KEYS), help="a command (default: scenes)")
-
-    verb(commands.doctor, "doctor", "check this installation and suggest a remedy for each failure", scene="")
-
-    add = verb(
-        lambda options: _complete(made, options.shell), "completion",
-        "print a script that completes commands; eval it in ~/.bashrc", scene="",
-    )  # fmt: skip
-    add("shell", choices=("bash", "zsh", "tcsh"), nargs="?", default="bash", help="default: bash")
-    _add_taps(verb)
+        scene = (_option("scene", command.called, command.scene, _place),) if command.scene else ()
+        for option, how in (
+            *scene,
+            _flag("--json", f"print the answer as JSON{described}"),
+            _flag("--quiet", "write nothing but errors to stderr"),
+            *command.options,
+        ):
+            verb.add_argument(option, **how)
     return made
-
-
-def _also(add: Any, old: str, dest: str, **how: Any) -> None:
-    """Take an older spelling of an option, too, which help does not show."""
-    add(old, dest=dest, default=argparse.SUPPRESS, help=argparse.SUPPRESS, **how)
-
-
-def _add_out(add: Any, files: str, default: str, single: str = "") -> None:
-    """Add --out, which is a folder everywhere; where one file is written, a name with an ending is that file."""
-    named = f"; a name with an ending names the {single} itself" if single else ""
-    add("--out", metavar="DIR", type=_place, help=f"folder for {files}{named} (default: {default})")
-
-
-def _add_format(add: Any, default: str | None = FORMATS[0]) -> None:
-    """Add the option that sets the format of all pictures; without a default, the ending of --out sets it."""
-    said = "by the ending of --out" if default is None else default
-    add("--format", choices=FORMATS, default=default, help=f"format of the pictures (default: {said})")
-
-
-def _add_choices(add: Any) -> None:
-    """Add the options that choose the model."""
-    add("--tolerance", metavar="T", type=float, help="largest accepted error; overrides the scene's")
-    add(
-        "--quantity", metavar="Q", action="append",
-        help="what the tolerance is for; repeatable: restitution, contact_time, force ..., spectrum=5000 (up to 5 kHz)",
-    )  # fmt: skip
-    add(
-        "--target",
-        metavar="KIND",
-        help="model the struck body as rigid, infinite, vectors, mixed or modal, whatever the plan would choose",
-    )
-    add(
-        "--model", metavar="MODEL",
-        help="auto adds thick theory, air and stretching where the tolerance needs them; stated follows the scene",
-    )  # fmt: skip
-    add("--n-modes", metavar="N", type=int, help="number of modes to keep for the struck body")
-    add("--size", metavar="H", type=float, help="element size [m]")
 
 
 class _Version(argparse.Action):
@@ -302,8 +295,8 @@ class _Version(argparse.Action):
         parser.exit()
 
 
-def _complete(parser: argparse.ArgumentParser, shell: str) -> commands.Answer:
-    script = completion(parser, shell)
+def _complete(shell: str) -> commands.Answer:
+    script = completion(parser(), shell)
     return commands.answer({"shell": shell, "script": script}, [script])
 
 
@@ -317,36 +310,3 @@ def completion(parser: argparse.ArgumentParser, shell: str) -> str:
         if action.type is _place:
             action.complete = shtab.FILE
     return shtab.complete(parser, shell)
-
-
-def _add_taps(verb: Any) -> None:
-    """Add the commands for measured taps."""
-    files = "measured taps: .lvm, .csv, .npz, .wav, .mat or .uff"
-    add = verb(commands.frf, "frf", "compute frequency responses of taps, or of a scene as a rig would measure it",
-               scene=f"{files} or frequency responses; or a scene, a TOML file", called="TAPS|SCENE")  # fmt: skip
-    _add_channels(add)
-    add("--method", choices=("H1", "H2"), default="H1", help="H1 for noise in the response, H2 in the force")
-    add("--force-window", metavar="S", type=float, help="ignore the force later than this after its onset")
-    add("--response-window", metavar="S", type=float, help="time constant of an exponential window")
-    _add_out(add, "frf.csv", "none", ".csv or .uff file")
-
-    add = verb(
-        commands.fit, "fit", "find the hammer and the contact that explain measured taps", scene=files, called="TAPS"
-    )
-    add("body", metavar="SCENE", type=_place, nargs="?", help="the scene struck (default: a wall)")
-    _add_channels(add)
-    add("--unknown", metavar="NAME=LOW:HIGH", action="append", default=[],
-        help="a number to find in a range; repeatable (default: stiffness, exponent, loss of the contact)")  # fmt: skip
-    add("--known", metavar="NAME=VALUE", action="append", default=[], help="a number to hold fixed; repeatable")
-    add("--per-tap", metavar="NAME", action="append", default=[],
-        help="fit this unknown separately for each tap; repeatable")  # fmt: skip
-    add("--mass", metavar="KG", type=float, help="mass of the hammer (default: the scene's, or 0.1)")
-    _add_out(add, "fit.html, fit.json and scene.toml", "out/NAME")
-
-
-def _add_channels(add: Any) -> None:
-    """Add the options that say what a file of taps holds."""
-    add("--force", metavar="NAME", help="name or number of the force channel (default: by its unit or name)")
-    add("--response", metavar="NAME", action="append", help="name or number of a response; repeatable")
-    add("--rate", metavar="HZ", type=float, help="sampling rate, if the file does not state it; of a scene: 51200")
-    add("--scale", metavar="N", type=float, help="newtons per unit of the force channel")

@@ -19,9 +19,6 @@ from ._base.explained import noted
 from .display import LONG, Display, tell, width
 from .show import FORMATS
 
-MOTION_TIMES = 100  # [-] instants in motion.pvd: four seconds at 25 per second
-SHAPES_WRITTEN = 24  # [-] mode shapes in modes.pvd of a strike; `modes --vtk` writes any number
-
 
 class Answer(NamedTuple):
     """What a command found: as data for programs, and as text for people."""
@@ -36,11 +33,10 @@ def answer(
     data: dict[str, Any], *said: str | Sequence[str], folder: Path | None = None, files: Sequence[str] = (), **ends: Any
 ) -> Answer:
     """An answer with the files that were written to a folder, which are said last."""
-    lines = list(said)
+    lines, where = list(said), None
     if folder is not None and files:
-        one = len(files) == 1
-        lines.append(f"Files: {folder / files[0]}" if one else f"Files in {folder}{os.sep}: {', '.join(files)}")
-    where = None if folder is None or not files else str(folder)
+        where, one = str(folder), len(files) == 1
+        lines.append(f"Files: {folder / files[0]}" if one else f"Files in {where}{os.sep}: {', '.join(files)}")
     return Answer({**data, "folder": where, "files": list(files)}, lines, **ends)
 
 
@@ -61,9 +57,7 @@ def _folder(options: argparse.Namespace) -> Path:
 
 def _file(options: argparse.Namespace, name: str) -> Path | None:
     """The file that --out names: itself if it has an ending, otherwise ``name`` in that folder."""
-    if options.out is None or options.out.suffix:
-        return options.out
-    return options.out / name
+    return options.out if options.out is None or options.out.suffix else options.out / name
 
 
 def strike(options: argparse.Namespace) -> Answer:
@@ -82,11 +76,7 @@ def strike(options: argparse.Namespace) -> Answer:
     with fi.export.staged(folder, "strike") as staging, Painter() if options.pictures else nullcontext() as painter:
         place = folder.resolve()  # "." has no name of its own
         keep = place.parent / f"{place.name}.modes.npz"  # not in the folder: an interrupted run leaves that alone
-        motion = options.pictures or options.vtk
-
-        def before(plan: Any) -> None:
-            _announce(options, display, options.verify, plan, plan.ringing)
-
+        motion, before = options.pictures or options.vtk, partial(_announce, options, display, options.verify, True)
         run = scene.run(display, before=before, verify=options.verify, motion=motion, keep=keep, **_choices(options))
         display.predict(run.plan.ringing or None)
         if options.strict:
@@ -97,9 +87,8 @@ def strike(options: argparse.Namespace) -> Answer:
     seconds = {**run.seconds, **stages.seconds, "total": time.perf_counter() - began}
     said = [_title(scene), run.response.summary()]
     if not run.rings:
-        said.append(
-            f"Model: {run.plan.reasons[0]}; no modes and no sound (use --target modal or --quantity sound=5000)"
-        )
+        why = run.plan.reasons[0]
+        said.append(f"Model: {why}; no modes and no sound (use --target modal or --quantity sound=5000)")
     if run.verified is not None and run.finer is not None:
         coarse = run.finer.target in ("rigid", "infinite")
         tested = f" (which also treats the body as {run.finer.target}: it has too many modes)" if coarse else ""
@@ -110,13 +99,10 @@ def strike(options: argparse.Namespace) -> Answer:
     return answer(data, *said, folder=folder, files=data["files"], missed=not run.response.tolerance_met)
 
 
-def _announce(options: argparse.Namespace, display: Display, verify: bool, plan: Any, ringing: float = 0.0) -> None:
-    """Warn of a long run before it starts, and let its prediction tell the time left.
-
-    ``ringing`` [s] is predicted for the modes that only its files take.
-    """
+def _announce(options: argparse.Namespace, display: Display, verify: bool, files: bool, plan: Any) -> None:
+    """Warn of a long run before it starts, and let its prediction tell the time left; ``files`` may take modes."""
     display.predict(None if verify else plan.seconds)  # the plan of the second, finer run is not known yet
-    more = f", and {ringing:.0f} s for the modes of its files" if ringing > LONG else ""
+    more = f", and {plan.ringing:.0f} s for the modes of its files" if files and plan.ringing > LONG else ""
     if plan.costly or more:
         text = f"{plan.cost}{more}; Ctrl-C stops it, and the same command later reuses the modes already found"
         _tell(options, f"{text} (`fem-impact plan` explains why)")
@@ -126,36 +112,29 @@ def _write(
     folder: Path, scene: Any, run: Any, options: argparse.Namespace, stages: Any, painter: Any
 ) -> dict[str, Any]:
     """Write every file of a strike; return the contents of response.json."""
-    from .scenes import hearing, results  # imported only when needed
-    from .show import sampling
+    from .show import sampling  # imported only when needed
     from .show.canvas import NAMES
 
-    response, files = run.response, ["response.json", results.SAVED, "force.csv", f"force.{options.format}"]
-    extra: dict[str, Any] = {}
+    response = run.response
     if run.plan.target == "vectors" and response.ringing is None:
         with stages("modes"):
             response = response.on(response.target)
     drawn = painter is not None and run.rings
     if drawn:
         painter.begin(folder, response, options.format)
-    with stages("files"):
-        fi.export.write_force(folder / "force.csv", response)
-        fi.figures.save(folder / f"force.{options.format}", fi.figures.force(response))
+    files, sounds = _write_heard(folder, scene, response, options, stages, rings=run.rings)
+    extra: dict[str, Any] = {}
     if run.rings:
-        with stages("files"):
-            fi.export.write_vtk(folder / "modes.pvd", response.target.truncated(n_modes=SHAPES_WRITTEN))
-        with stages("sound"):
-            sounds = hearing.write(folder, scene, response, duration=options.duration, normalise=options.normalise)
         first = {"at": "sound", "listener": "radiated"}  # the keys of the first point and listener
         for heard in reversed(sounds):
             extra.update({first[name]: heard for name in first if name in heard})
         extra["sounds"] = sounds
-        files += ["modes.pvd", *(heard["file"] for heard in sounds)]
         if options.vtk:
             end = sampling.end_of(response)
-            times = [end * i / (MOTION_TIMES - 1) for i in range(MOTION_TIMES)]
-            with stages("motion"):
-                fi.export.write_vtk(folder / "motion.pvd", response.target, response, times)
+            with stages("motion"):  # 100 instants are four seconds at 25 per second
+                fi.export.write_vtk(
+                    folder / "motion.pvd", response.target, response, [end * i / 99 for i in range(100)]
+                )
             files.append("motion.pvd")
         if drawn:
             with stages("pictures"):
@@ -167,17 +146,41 @@ def _write(
         extra["verified"] = run.verified
     changes = {name: value for name, value in run.plan.changes.items() if name in ("tolerance", "quantity")}
     tables, copies = scene.kept(folder, **changes)
-    files += copies
-    data = fi.export.run_data(run, tables) | fi.export.plain({**extra, "files": files})
+    data = fi.export.run_data(run, tables) | fi.export.plain({**extra, "files": files + copies})
+    _save_response(folder, scene, response, data)
+    return data
+
+
+def _write_heard(
+    folder: Path, scene: Any, response: Any, options: argparse.Namespace, stages: Any, rings: bool = True
+) -> tuple[list[str], list[dict[str, Any]]]:
+    """Write the force and, of modes that ring, shapes and sounds; returns the names of all files, and the sounds."""
+    from .scenes import hearing, results  # imported only when needed
+
+    files = ["response.json", results.SAVED, "force.csv", f"force.{options.format}"]
+    with stages("files"):
+        fi.export.write_force(folder / "force.csv", response)
+        fi.figures.save(folder / f"force.{options.format}", fi.figures.force(response))
+        if rings:  # `modes --vtk` writes any number of shapes
+            fi.export.write_vtk(folder / "modes.pvd", response.target.truncated(n_modes=24))
+    if not rings:
+        return files, []
+    with stages("sound"):
+        sounds = hearing.write(folder, scene, response, duration=options.duration, normalise=options.normalise)
+    return [*files, "modes.pvd", *(heard["file"] for heard in sounds)], sounds
+
+
+def _save_response(folder: Path, scene: Any, response: Any, data: dict[str, Any]) -> None:
+    from .scenes import results  # imported only when needed
+
     fi.export.write_json(folder / "response.json", data)
     results.save(folder, response, scene.points)
-    return data
 
 
 def _strike_in_turn(options: argparse.Namespace, scene: Any) -> Answer:
     """Play the strokes of a scene and write what they did."""
     from .model.target import Stages  # imported only when needed
-    from .scenes import hearing, results, sequence
+    from .scenes import sequence
 
     given = {"verify": options.verify, "pictures": options.pictures, "vtk": options.vtk, "target": options.target}
     wrong = next((name for name, value in given.items() if value), None)
@@ -189,22 +192,13 @@ def _strike_in_turn(options: argparse.Namespace, scene: Any) -> Answer:
         warnings.simplefilter("ignore", fi.ToleranceWarning)  # the first line of the summary says it
         stages = Stages(display)
         found = scene.play(watch=display, strict=options.strict, **_choices(options))
-        with stages("files"):
-            fi.export.write_force(staging / "force.csv", found)
-            fi.figures.save(staging / f"force.{options.format}", fi.figures.force(found))
-            fi.export.write_vtk(staging / "modes.pvd", found.target.truncated(n_modes=SHAPES_WRITTEN))
-        with stages("sound"):
-            sounds = hearing.write(staging, scene, found, duration=options.duration, normalise=options.normalise)
+        files, sounds = _write_heard(staging, scene, found, options, stages)
         tables, copies = scene.kept(staging, tolerance=found.tolerance)
-        pictures = [f"force.{options.format}"]
-        names = ["response.json", results.SAVED, "force.csv", *pictures, "modes.pvd"]
-        names += [*(each["file"] for each in sounds), *copies]
         seconds = {**stages.seconds, "total": time.perf_counter() - began}
-        data = {**sequence.numbers(found, tables, seconds), "sounds": sounds, "files": names}
-        fi.export.write_json(staging / "response.json", data)
-        results.save(staging, found, scene.points)
+        data = {**sequence.numbers(found, tables, seconds), "sounds": sounds, "files": files + copies}
+        _save_response(staging, scene, found, data)
     said = [_title(scene), found.summary(), *heard(sounds), f"Time: {seconds['total']:.2f} s"]
-    return answer(data, *said, folder=folder, files=names, missed=not found.tolerance_met)
+    return answer(data, *said, folder=folder, files=data["files"], missed=not found.tolerance_met)
 
 
 def heard(sounds: Sequence[dict[str, Any]]) -> list[str]:
@@ -217,10 +211,8 @@ def heard(sounds: Sequence[dict[str, Any]]) -> list[str]:
         level = each["stated"] if "bound" in each else f"peak {each['stated']}"
         if each["level"] is None or each["level"] == -math.inf:
             level = "silence"
-        other = f"{each['file'].replace('_high', '_low')} and " if "bound" in each else ""
-        lines.append(
-            f"{where}: {level}; full scale of {other}{each['file']} is {each['full_scale']:.4g} {each['unit']}"
-        )
+        files = f"{each['file'].replace('_high', '_low')} and {each['file']}" if "bound" in each else each["file"]
+        lines.append(f"{where}: {level}; full scale of {files} is {each['full_scale']:.4g} {each['unit']}")
     return lines
 
 
@@ -326,24 +318,20 @@ def hammer(options: argparse.Namespace) -> Answer:
             fi.figures.save(drawn, plots.hammers(hammers, options.bandwidth, options.drop))
     notes = (*notes, *hammers[0].notes)
     rows = [
-        (
-            f"{1e3 * hammer.mass:.4g} g",
-            f"{hammer.softest:.3g} N/m" if hammer.softest else "none",
-            f"{'> ' * hammer.unlimited}{hammer.hardest:.3g} N/m" if hammer.hardest else "none",
-            f"{hammer.reach:.4g} Hz" if hammer.reach else "-",
-        )
+        (f"{1e3 * hammer.mass:.4g} g", f"{hammer.softest:.3g} N/m" if hammer.softest else "none",
+         f"{'> ' * hammer.unlimited}{hammer.hardest:.3g} N/m" if hammer.hardest else "none",
+         f"{hammer.reach:.4g} Hz" if hammer.reach else "-")
         for hammer in hammers
-    ]
+    ]  # fmt: skip
     said: list[str | Sequence[str]] = [
         _title(scene),
         *noted(notes),
         f"Linear tips that reach {options.bandwidth:g} Hz (spectrum at most {options.drop:g} dB down) and hit once:",
         _table(rows, ("mass", "softest tip", "hardest tip", "its reach")),
     ]
-    for hammer in hammers:
-        if len(hammer.working) > 1:
-            ranges = ", ".join(f"{low:.3g} to {high:.3g} N/m" for low, high in hammer.working)
-            said.append(f"{1e3 * hammer.mass:.4g} g: every range that works: {ranges}")
+    for hammer in (each for each in hammers if len(each.working) > 1):
+        ranges = ", ".join(f"{low:.3g} to {high:.3g} N/m" for low, high in hammer.working)
+        said.append(f"{1e3 * hammer.mass:.4g} g: every range that works: {ranges}")
     if any(hammer.unlimited for hammer in hammers):
         said.append(">: still a single hit with the hardest tip that the model resolves")
     idle = ", ".join(f"{1e3 * hammer.mass:.4g} g" for hammer in hammers if not hammer.works)
@@ -378,7 +366,7 @@ def report(options: argparse.Namespace) -> Answer:
     changes = {} if options.tolerance is None else {"tolerance": options.tolerance}
     with fi.export.staged(path.parent) as staging:
         display = _display(options, tells=True)
-        before = partial(_announce, options, display, False)
+        before = partial(_announce, options, display, False, False)
         if scene.stroke:
             with warnings.catch_warnings():
                 warnings.simplefilter("ignore", fi.ToleranceWarning)  # the first line of the summary says it
@@ -444,24 +432,21 @@ def modes(options: argparse.Namespace) -> Answer:
 
     check.count("n_modes", options.n_modes)
     scene, display = fi.load_scene(options.scene), _display(options)
-    if options.vtk is None:
+    if options.vtk is not None:
+        fi.export.vtk_ending(options.vtk)
+    with nullcontext() if options.vtk is None else fi.export.staged(options.vtk.parent) as staging:  # or fails early
         with display("modes"):
             modes = scene.modes(options.n_modes, elastic=True)
-    else:
-        fi.export.vtk_ending(options.vtk)
-        with fi.export.staged(options.vtk.parent) as staging:  # a bad folder fails before the work, not after it
-            with display("modes"):
-                modes = scene.modes(options.n_modes, elastic=True)
+        if staging is not None:
             fi.export.write_vtk(staging / options.vtk.name, modes)
     rows = [
         (i, f"{frequency:.5g} Hz", f"{ratio:.3g}")
         for i, (frequency, ratio) in enumerate(zip(modes.frequencies, modes.damping_ratio), 1)
         if i > modes.n_rigid
     ]
+    rigid = f"Modes 1 to {modes.n_rigid} are rigid motions: nothing holds the body there"
     said: list[str | Sequence[str]] = [_title(scene), *noted(modes.notes)]
-    if modes.n_rigid:
-        said.append("Mode 1 is a rigid motion" if modes.n_rigid == 1 else
-                    f"Modes 1 to {modes.n_rigid} are rigid motions: nothing holds the body there")  # fmt: skip
+    said += [rigid if modes.n_rigid > 1 else "Mode 1 is a rigid motion"] if modes.n_rigid else []
     said.append(_table(rows, ("mode", "frequency", "damping ratio")))
     data = {"frequencies": modes.frequencies, "damping_ratios": modes.damping_ratio, "n_rigid": modes.n_rigid}
     return _answer_of_file({**data, "mass": modes.mass, "notes": modes.notes}, said, options.vtk)
@@ -473,10 +458,9 @@ def new(options: argparse.Namespace) -> Answer:
 
     path = _file(options, f"{options.kind}.toml") or Path(f"{options.kind}.toml")
     templates.write(path, options.kind)
+    verb = "map" if options.kind == "map" else "strike"
     found = _answer_of_file({}, [], path)
-    return found._replace(
-        said=[*(found.said or ()), f"Next: fem-impact {'map' if options.kind == 'map' else 'strike'} {path}"]
-    )
+    return found._replace(said=[*(found.said or ()), f"Next: fem-impact {verb} {path}"])
 
 
 def mesh(options: argparse.Namespace) -> Answer:

@@ -18,19 +18,13 @@ from ._base.explained import pointed
 from ._base.files import undoable
 from ._base.progress import heard
 
-WIDE = 60  # [-] columns: a narrower terminal gets no bar
-SOON = 2.0  # [s] time left is not said before a stage has taken this long: the first counts are no guide
 LONG = 10.0  # [s] time left that is announced even if nobody sees the line
 LONGER = 2.0  # [-] over the time announced last, from which on a longer one is announced, too
-LEAST = 0.02  # [-] share of a count that must be done before the rest is estimated from it
-
-
-WIDEST = 88  # [-] columns: printed text is never wider, and narrower on a narrow terminal
 
 
 def width() -> int:
-    """Columns that printed text may take."""
-    return max(20, min(WIDEST, shutil.get_terminal_size().columns))
+    """Columns that printed text may take: at most 88, and fewer on a narrow terminal."""
+    return max(20, min(88, shutil.get_terminal_size().columns))
 
 
 def wrapped(text: str) -> str:
@@ -48,13 +42,10 @@ def tell(text: str) -> None:
 def complain(error: object, status: int) -> int:
     """Print an error on one line of stderr; return the exit status."""
     with suppress(OSError):  # if stderr is closed, the exit status must suffice
-        print(f"fem-impact: {_printable(pointed(str(error)))}", file=sys.stderr, flush=True)
+        text = " ".join(pointed(str(error)).split())
+        escaped = "".join(c if c.isprintable() else repr(c)[1:-1] for c in text)
+        print(f"fem-impact: {escaped}", file=sys.stderr, flush=True)
     return status
-
-
-def _printable(text: str) -> str:
-    """The text on one line, with control characters escaped."""
-    return "".join(c if c.isprintable() else repr(c)[1:-1] for c in " ".join(text.split()))
 
 
 class Count:
@@ -81,8 +72,8 @@ class Count:
         return (self.done - self.first) / seconds if seconds > 0.0 else 0.0
 
     def left(self) -> float | None:
-        """Seconds left, judged by the progress so far."""
-        if not self.rate or self.done - self.first < LEAST * (self.total - self.first):
+        """Seconds left, judged by the progress so far, once that is two per cent."""
+        if not self.rate or self.done - self.first < 0.02 * (self.total - self.first):
             return None
         return max(0.0, (self.total - self.done) / self.rate - (time.monotonic() - self.now))
 
@@ -189,7 +180,7 @@ class Display:
         else:
             count.update(done, total)
             left = count.left()
-            if what == self.running[-1][0] and left is not None:
+            if self.running and what == self.running[-1][0] and left is not None:
                 self._warn(left, f"{total} {what}: about {left:.0f} s more")
         self._draw()
 
@@ -201,7 +192,8 @@ class Display:
         spent, count, parts = time.monotonic() - began, self.count, []
         left = count.left() if count is not None else None if self.end is None else self.end - time.monotonic()
         last = "longer than predicted" if self.late else "soon done"
-        ends = [] if left is None or spent <= SOON else [f"{_clock(left)} left" if left > 0.0 else last]
+        # before two seconds, the first counts are no guide
+        ends = [] if left is None or spent <= 2.0 else [f"{_clock(left)} left" if left > 0.0 else last]
         if count is not None:
             what = "" if count.what == name else f" {count.what}"
             parts.append(f"{count.done}/{count.total}{what}")
@@ -213,7 +205,7 @@ class Display:
     @property
     def wide(self) -> bool:
         """Whether there is room for a bar."""
-        return self.console.width >= WIDE
+        return self.console.width >= 60
 
     @contextmanager
     def _opened(self) -> Iterator[None]:

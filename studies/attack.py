@@ -15,29 +15,18 @@ folder for truths they are kept there, so that the same blows can be struck agai
 blows alone.
 """
 
-import argparse
-import csv
 import sys
-from dataclasses import asdict, fields
 from pathlib import Path
-from typing import Any
 
-HERE = Path(__file__).parent
-sys.path.insert(0, str(HERE.parent / "tests" / "independent"))
-import attack_blows  # noqa: E402  found by the line above
+import shared
 
-
-def read(path: Path) -> list[attack_blows.Verdict]:
-    """The lines of a file."""
-    kinds: dict[Any, Any] = {str: str, int: int, float: float, bool: "True".__eq__}
-    each = fields(attack_blows.Verdict)
-    with path.open(newline="") as file:
-        return [attack_blows.Verdict(*(kinds[x.type](row[x.name]) for x in each)) for row in csv.DictReader(file)]
+sys.path.insert(0, str(shared.STUDIES.parent / "tests" / "independent"))
+import attack_blows
 
 
 def main(arguments: list[str] | None = None) -> list[attack_blows.Verdict]:
     """Run the study from the command line."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser = shared.parser(__doc__)
     parser.add_argument("--area", choices=list(attack_blows.AREAS), default="everyday")
     parser.add_argument("--first", type=int, default=0)
     parser.add_argument("--count", type=int, default=0)
@@ -46,18 +35,13 @@ def main(arguments: list[str] | None = None) -> list[attack_blows.Verdict]:
     parser.add_argument("--truths", type=Path)
     options = parser.parse_args(arguments)
     truths = attack_blows.Truths(options.truths and options.truths / str(options.seed))
-    done = {(x.area, x.number) for x in read(options.file)} if options.file.exists() else set()
+    done = {(x.area, x.number) for x in shared.read_rows(options.file, attack_blows.Verdict)}
     for number in range(options.first, options.first + options.count):
         if (options.area, number) in done:
             continue
         found = list(attack_blows.attack(options.area, number, truths, seed=options.seed))
-        new = not options.file.exists()
-        with options.file.open("a", newline="") as file:
-            writer = csv.DictWriter(file, [x.name for x in fields(attack_blows.Verdict)])
-            if new:
-                writer.writeheader()
-            writer.writerows(map(asdict, found))
-    verdicts = read(options.file) if options.file.exists() else []
+        shared.write_rows(options.file, found, append=True)
+    verdicts = shared.read_rows(options.file, attack_blows.Verdict)
     print(attack_blows.table(verdicts))
     return verdicts
 

@@ -1,6 +1,6 @@
 """Designs a marimba bar's undercut, tuned 1 : 4 : 10 at a given pitch, and the mallet that suits it.
 
-    python studies/design_marimba.py     prints the design and its checks, draws pictures/design_marimba.png
+    python studies/design_marimba.py [FOLDER]     prints the designs and their checks, draws design_marimba.png
 
 Rosewood bars (Timoshenko), 55 mm wide, 22 mm high and free at both ends, are cut from below in their middle. How deep,
 along what curve and how far are free: three numbers, with which the first frequency comes out as the pitch, and the
@@ -10,10 +10,9 @@ a period. Every design is struck again as a blow of its own, and with a finer mo
 
 import time
 from functools import partial
-from pathlib import Path
 
-import drawing
 import numpy as np
+import shared
 
 import fem_impact as fi
 from fem_impact.show import plots
@@ -33,7 +32,6 @@ FREE = {
 START = {"deep": 12e-3, "bow": 0.0, "half": 0.28}
 LINES = {"C4": "-", "F4": "--", "A4": ":"}
 CENT = 1200.0  # [-] cents per octave
-PICTURE = Path(__file__).parent / "pictures" / "design_marimba.png"
 
 
 def height(x, length, values):
@@ -106,7 +104,7 @@ def main():
             f"{1e3 * hit.contact_time:.4f} ms, wanted {500.0 / pitch:.4f} ms, {hit.n_impacts} impact; a finer model "
             f"changes the contact time by {checked.differences['']['contact_time']:.1e} of it"
         )
-    drawing.save(PICTURE, draw(designs))
+    shared.save(shared.folder(shared.PICTURES) / "design_marimba.png", draw(designs))
     return designs
 
 

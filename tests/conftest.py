@@ -1,9 +1,12 @@
-"""What several tests share: which of many cases alike are run, compiled kernels, a real browser."""
+"""What several tests share: which of many cases alike are run, compiled kernels, the prompt, a real browser."""
 
+import json
 import os
+import shlex
 import shutil
 import time
 from contextlib import suppress
+from typing import NamedTuple
 from zlib import crc32
 
 import pytest
@@ -131,6 +134,36 @@ def read_here(monkeypatch):
 
         monkeypatch.setattr(h5py, "File", h5py.File)  # the reader of meshes replaces it
     monkeypatch.setattr(isolated, "run", run)
+
+
+class Said(NamedTuple):
+    """What a command ended with and printed."""
+
+    status: int
+    out: str
+    err: str
+
+    @property
+    def json(self):
+        return json.loads(self.out)
+
+
+@pytest.fixture
+def prompt(tmp_path, monkeypatch, capsys):
+    """Run a command, as typed or word by word, in an empty folder."""
+    from fem_impact import cli
+
+    def run(line, *words):
+        capsys.readouterr()
+        try:
+            status = cli.main([*(shlex.split(line) if isinstance(line, str) else line), *map(str, words)])
+        except SystemExit as end:
+            status = end.code
+        said = capsys.readouterr()
+        return Said(status, said.out, said.err)
+
+    monkeypatch.chdir(tmp_path)
+    return run
 
 
 @pytest.fixture(scope="session")

@@ -1,7 +1,7 @@
 """Mutated inputs for everything that comes from outside, and the judge of what becomes of them.
 
-    python tests/fuzz.py mesh --inputs 10000 --workers 2     # a category of `CATEGORIES`; prints what failed
-    python tests/fuzz.py mesh --only 4711                    # one input again, with its traceback
+    python tests/fuzz.py mesh --inputs 10000     # a category of `CATEGORIES`; prints what failed
+    python tests/fuzz.py mesh --only 4711        # one input again, with its traceback
 
 An input passes where it gives a result or one clear error: ValueError, SimulationError or OSError raised by the
 package itself, in one printable line that names the file, within the time and the memory below, leaving no file.
@@ -16,7 +16,6 @@ import logging
 import os
 import re
 import resource
-import select
 import shutil
 import signal
 import struct
@@ -31,6 +30,8 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import cache
+from multiprocessing import get_context
+from multiprocessing.connection import Connection
 from pathlib import Path
 from random import Random
 
@@ -42,7 +43,8 @@ from fem_impact import cli
 from fem_impact._base import isolated
 from fem_impact.scenes import maps
 from fem_impact.scenes.scene import Scene
-from fem_impact.sweeps import grid
+from fem_impact.sweeps.cases import Cases
+from fem_impact.sweeps.cells import Case
 from fem_impact.sweeps.store import Texts, by_store
 
 PATIENCE = 10.0  # [s] per input
@@ -64,81 +66,54 @@ NESTS = [b"[", b"{a=", b"<g>", b"(", b"<!--", b"\n*INCLUDE, INPUT=", b"a.", b"0\
 def mutated(raw: bytes, random: Random, others: list[bytes]) -> bytes:
     """One to four mutations of a file."""
     for _ in range(random.choice((1, 1, 1, 2, 4))):
-        raw = random.choice(MUTATIONS)(raw, random, others)
+        raw = mutated_once(raw, random.choice(MUTATIONS), random, others)
     return raw
 
 
-def _flip(raw: bytes, random: Random, _: list[bytes]) -> bytes:
-    data = bytearray(raw)
-    for _ in range(random.choice((1, 1, 4, 32)) if data else 0):
-        data[random.randrange(len(data))] ^= 1 << random.randrange(8)
-    return bytes(data)
+MUTATIONS = (
+    "flip", "cut", "double", "insert", "renumber", "renumber", "pack", "swap", "drop", "splice", "nest", "line ends",
+)  # fmt: skip
 
 
-def _cut(raw: bytes, random: Random, _: list[bytes]) -> bytes:
-    a, b = _span(raw, random)
-    return random.choice((raw[:a], raw[a:], raw[:a] + raw[b:], b""))
-
-
-def _double(raw: bytes, random: Random, _: list[bytes]) -> bytes:
-    a, b = _span(raw, random)
-    return raw[:b] + raw[a:b] * random.choice((1, 1, 2, 50)) + raw[b:]
-
-
-def _insert(raw: bytes, random: Random, _: list[bytes]) -> bytes:
-    a, _b = _span(raw, random)
-    odd = random.choice(ODD).encode("utf-8", "surrogatepass")
-    return raw[:a] + random.choice((odd, random.randbytes(8), b"\xff\xfe", odd * 40)) + raw[a:]
-
-
-def _renumber(raw: bytes, random: Random, _: list[bytes]) -> bytes:
-    found = list(NUMBER.finditer(raw))
-    if not found:
-        return raw
-    hit = random.choice(found[: random.choice((12, len(found)))])  # counts stand at the beginning
-    return raw[: hit.start()] + random.choice(NUMBERS) + raw[hit.end() :]
-
-
-def _pack(raw: bytes, random: Random, _: list[bytes]) -> bytes:
-    value = random.choice(PACKED)
-    place = random.randrange(max(1, len(raw) // 4)) * random.choice((1, 4))
-    return raw[:place] + value + raw[place + len(value) :]
-
-
-def _swap(raw: bytes, random: Random, _: list[bytes]) -> bytes:
-    mark = random.choice((b" ", b"\n", b",", b"="))
-    parts = raw.split(mark)
-    i, j = random.randrange(len(parts)), random.randrange(len(parts))
-    parts[i], parts[j] = parts[j], parts[i]
-    return mark.join(parts)
-
-
-def _drop(raw: bytes, random: Random, _: list[bytes]) -> bytes:
-    lines = raw.split(b"\n")
-    i = random.randrange(len(lines))
-    return b"\n".join(lines[:i] + lines[i + random.choice((1, 1, 3)) :])
-
-
-def _splice(raw: bytes, random: Random, others: list[bytes]) -> bytes:
-    other = random.choice(others)
-    return raw[: random.randrange(len(raw) + 1)] + other[random.randrange(len(other) + 1) :]
-
-
-def _nest(raw: bytes, random: Random, _: list[bytes]) -> bytes:
-    a, _b = _span(raw, random)
-    return raw[:a] + random.choice(NESTS) * random.choice((10, 3000)) + raw[a:]
-
-
-def _crlf(raw: bytes, random: Random, _: list[bytes]) -> bytes:
-    return random.choice((raw.replace(b"\n", b"\r\n"), raw.replace(b"\n", b"\r"), b"\xef\xbb\xbf" + raw, raw.upper()))
-
-
-def _span(raw: bytes, random: Random) -> tuple[int, int]:
+def mutated_once(raw: bytes, how: str, random: Random, others: list[bytes]) -> bytes:
+    """One mutation, mostly of a span from ``a`` to ``b``."""
     a = random.randrange(len(raw) + 1)
-    return a, min(len(raw), a + random.choice((1, 2, 8, 64, 4096)))
-
-
-MUTATIONS = (_flip, _cut, _double, _insert, _renumber, _renumber, _pack, _swap, _drop, _splice, _nest, _crlf)
+    b = min(len(raw), a + random.choice((1, 2, 8, 64, 4096)))
+    if how == "flip":
+        data = bytearray(raw)
+        for _ in range(random.choice((1, 1, 4, 32)) if data else 0):
+            data[random.randrange(len(data))] ^= 1 << random.randrange(8)
+        return bytes(data)
+    if how == "cut":
+        return random.choice((raw[:a], raw[a:], raw[:a] + raw[b:], b""))
+    if how == "double":
+        return raw[:b] + raw[a:b] * random.choice((1, 1, 2, 50)) + raw[b:]
+    if how == "insert":
+        odd = random.choice(ODD).encode("utf-8", "surrogatepass")
+        return raw[:a] + random.choice((odd, random.randbytes(8), b"\xff\xfe", odd * 40)) + raw[a:]
+    if how == "renumber" and (found := list(NUMBER.finditer(raw))):
+        hit = random.choice(found[: random.choice((12, len(found)))])  # counts stand at the beginning
+        return raw[: hit.start()] + random.choice(NUMBERS) + raw[hit.end() :]
+    if how == "pack":
+        value = random.choice(PACKED)
+        place = random.randrange(max(1, len(raw) // 4)) * random.choice((1, 4))
+        return raw[:place] + value + raw[place + len(value) :]
+    if how in ("swap", "drop"):
+        mark = random.choice((b" ", b"\n", b",", b"=")) if how == "swap" else b"\n"
+        parts = raw.split(mark)
+        i, j = random.randrange(len(parts)), random.randrange(len(parts))
+        if how == "swap":
+            parts[i], parts[j] = parts[j], parts[i]
+        else:
+            del parts[i : i + random.choice((1, 1, 3))]
+        return mark.join(parts)
+    if how == "splice":
+        other = random.choice(others)
+        return raw[:a] + other[random.randrange(len(other) + 1) :]
+    if how == "nest":
+        return raw[:a] + random.choice(NESTS) * random.choice((10, 3000)) + raw[a:]
+    ends = raw.replace(b"\n", b"\r\n"), raw.replace(b"\n", b"\r")
+    return random.choice((*ends, b"\xef\xbb\xbf" + raw, raw.upper())) if how == "line ends" else raw
 
 
 @dataclass(frozen=True)
@@ -154,58 +129,26 @@ def mesh_samples() -> list[tuple[str, bytes]]:
     import meshio
 
     plate = fi.mesh.rectangle(1.0, 1.0, size=0.5)
-    flat = np.column_stack([plate.points, np.zeros(len(plate.points))])
-    cells = [("triangle", plate.cells)]
-    made = []
-    with tempfile.TemporaryDirectory() as name:
-        folder = Path(name)
-        fi.mesh.save(folder / "saved.msh", fi.mesh.disk(1.0, size=1.0))
-        for file, options in MESH_FORMATS.items():
-            with contextlib.redirect_stdout(io.StringIO()), warnings.catch_warnings():
-                warnings.simplefilter("ignore")
-                meshio.Mesh(flat, cells).write(folder / file, **options)
-        if importlib.util.find_spec("h5py"):  # an optional part of meshio
-            for file in ("plate.med", "plate.hmf"):
-                meshio.Mesh(flat, cells).write(folder / file)
-        made = [(path.name, path.read_bytes()) for path in sorted(folder.iterdir()) if path.is_file()]
-    return made
+    made = meshio.Mesh(np.column_stack([plate.points, np.zeros(len(plate.points))]), [("triangle", plate.cells)])
+    extra = {"plate.med": {}, "plate.hmf": {}} if importlib.util.find_spec("h5py") else {}  # optional in meshio
+    with tempfile.TemporaryDirectory() as name, contextlib.redirect_stdout(io.StringIO()), warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        fi.mesh.save(Path(name) / "saved.msh", fi.mesh.disk(1.0, size=1.0))
+        for file, options in {**MESH_FORMATS, **extra}.items():
+            made.write(Path(name) / file, **options)
+        return [(path.name, path.read_bytes()) for path in sorted(Path(name).iterdir()) if path.is_file()]
 
 
+PLAIN = ("vtu", "vtk", "inp", "bdf", "stl", "obj", "off", "ply", "mesh", "meshb", "vol", "xml", "post", "avs", "mdpa")
 MESH_FORMATS: dict[str, dict] = {
+    **{f"plate.{ending}": {} for ending in (*PLAIN, "dat", "wkt", "nas", "tec", "dato")},
+    **{f"ascii.{ending}": {"binary": False} for ending in ("vtu", "vtk", "ply")},
     "ascii22.msh": {"file_format": "gmsh22", "binary": False},
     "binary41.msh": {"file_format": "gmsh"},
     "ascii41.msh": {"file_format": "gmsh", "binary": False},
-    "plate.vtu": {},
-    "ascii.vtu": {"binary": False},
-    "plate.vtk": {},
-    "ascii.vtk": {"binary": False},
-    "plate.inp": {},
-    "plate.bdf": {},
-    "plate.stl": {},
     "binary.stl": {"binary": True},
-    "plate.obj": {},
-    "plate.off": {},
-    "plate.ply": {},
-    "ascii.ply": {"binary": False},
-    "plate.mesh": {},
-    "plate.meshb": {},
-    "plate.vol": {},
-    "plate.xml": {},
     "plate.xdmf": {"data_format": "XML"},
-    "plate.post": {},
-    "plate.avs": {},
-    "plate.mdpa": {},
-    "plate.dat": {},
-    "plate.wkt": {},
-    "plate.nas": {},
-    "plate.tec": {},
-    "plate.dato": {},
 }
-
-
-def read_mesh(path: Path) -> object:
-    """Load a mesh."""
-    return finite(fi.mesh.load(path))
 
 
 def quick(path: Path, reader: str, arguments: tuple[str, ...], patience: float) -> tuple[int, bytes, bytes]:
@@ -273,11 +216,6 @@ def outline_samples() -> list[tuple[str, bytes]]:
     return drawn
 
 
-def read_outline(path: Path) -> object:
-    """Mesh a drawing."""
-    return finite(fi.mesh.outline(path, unit="mm"))
-
-
 def finite(mesh: object) -> object:
     """The mesh, none of whose numbers may be other than finite."""
     for name in ("points", "middles", "tangents", "curvatures"):
@@ -310,21 +248,11 @@ def scene_samples() -> list[tuple[str, bytes]]:
     return [(path.name, path.read_bytes()) for path in sorted(SCENES.glob("*.toml"))]
 
 
-def read_scene(path: Path) -> object:
-    """Load a scene."""
-    return fi.load_scene(path)
-
-
 def result_samples() -> list[tuple[str, bytes]]:
     """What `fem-impact strike` keeps of a scene, without the numbers that nothing reads back."""
     scenes = [fi.load_scene(path) for path in sorted(SCENES.glob("*.toml"))]
     return [(f"response{i}.json", json.dumps({"scene": fi.export.plain(scene.data())}, indent=1).encode())
             for i, scene in enumerate(scenes)]  # fmt: skip
-
-
-def read_result(path: Path) -> object:
-    """The scene of a result."""
-    return fi.report.read(path)
 
 
 def store_samples() -> list[tuple[str, bytes]]:
@@ -355,16 +283,16 @@ def read_store(path: Path) -> object:
 
 
 @cache
-def small_grid() -> grid.Grid:
+def small_grid() -> Cases:
     """Two blows on a rigid body."""
-    base = grid.Case(fi.Modes.rigid(1.0), fi.Striker.rigid(1.0), fi.Contact.linear(1e5), np.zeros(0), 1.0)
-    return grid.Grid(base, {"mass": np.array([0.1, 0.2])}, 1e-3, True, None, {})
+    base = Case(fi.Modes.rigid(1.0), fi.Striker.rigid(1.0), fi.Contact.linear(1e5), np.zeros(0), 1.0)
+    return Cases(base, {"mass": np.array([0.1, 0.2])}, 1e-3)
 
 
-def solved(grid: grid.Grid, start: int, stop: int) -> tuple[np.ndarray, Texts]:
+def solved(cases: Cases, start: int, stop: int) -> tuple[np.ndarray, Texts]:
     """Stands for the blows themselves, which are of no interest here."""
     texts = {i: "the motion may be chaotic: é" for i in range(start, stop) if i % 2 == 0}
-    return np.ones((len(grid.layers), stop - start)), texts
+    return np.ones((len(cases.layers), stop - start)), texts
 
 
 COMMANDS = """strike SCENE --out OUT --tolerance 1e-2 --json
@@ -390,7 +318,7 @@ def command_samples() -> list[tuple[str, bytes]]:
     fi.figures.save = lambda path, figure: Path(path).write_bytes(b"")
     fi.report.write = lambda path, scene, run: Path(path).write_bytes(b"")
     Scene.run = lambda self, watch=None, **changes: run
-    Scene.modes = lambda self, count=None: modes if count is None else modes.truncated(n_modes=count)
+    Scene.modes = lambda self, count=None, **_: modes if count is None else modes.truncated(n_modes=count)
     shutil.rmtree(path.parent)
     return [(f"{i}.txt", line.encode()) for i, line in enumerate(COMMANDS.splitlines())]
 
@@ -430,7 +358,6 @@ def read_command(path: Path) -> object:
 
 
 REFUSED = "refused"
-BROKEN = 77  # exit status of a worker that failed outside of any input
 
 
 @contextmanager
@@ -487,24 +414,27 @@ def one(category: str, number: int, folder: Path, samples: list[tuple[str, bytes
     return judged(CATEGORIES[category].read, path), path
 
 
-def work(category: str, numbers: range, pipe: int, keep: Path | None, again: bool) -> None:
-    """Judge inputs and write a line of JSON for each; runs in a process of its own, which an input may end.
+def limit_memory() -> None:
+    """Let this process have `MEMORY` more than it has now."""
+    own = int(Path("/proc/self/statm").read_text().split()[0]) * resource.getpagesize()
+    resource.setrlimit(resource.RLIMIT_AS, (own + MEMORY, resource.getrlimit(resource.RLIMIT_AS)[1]))
+
+
+def work(category: str, numbers: range, send: Connection, keep: Path | None, again: bool) -> None:
+    """Judge inputs and send a row for each; runs in a process of its own, which an input may end.
 
     Unless it judges an input ``again``, it does itself what the package leaves to a process apart.
     """
     samples = CATEGORIES[category].samples()
-    own = int(Path("/proc/self/statm").read_text().split()[0]) * resource.getpagesize()
-    resource.setrlimit(resource.RLIMIT_AS, (own + MEMORY, resource.RLIM_INFINITY))
+    limit_memory()
     resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
     if not again:
         isolated.run = quick
-    with tempfile.TemporaryDirectory() as name, open(os.devnull, "w") as null, os.fdopen(pipe, "w") as out:
+    with tempfile.TemporaryDirectory() as name, open(os.devnull, "w") as null:
         os.dup2(null.fileno(), 1)
         os.dup2(null.fileno(), 2)
         folder = Path(name)
         for number in numbers:
-            out.write(json.dumps([number]) + "\n")
-            out.flush()
             began = time.monotonic()
             verdict, path = one(category, number, folder, samples)
             left = sorted(file.name for file in folder.iterdir() if file != path)
@@ -514,98 +444,50 @@ def work(category: str, numbers: range, pipe: int, keep: Path | None, again: boo
                 shutil.copy(path, keep)
             for file in folder.iterdir():
                 shutil.rmtree(file) if file.is_dir() else file.unlink()
-            out.write(json.dumps([number, verdict, path.name, round(time.monotonic() - began, 3)]) + "\n")
-            out.flush()
+            send.send((number, verdict, path.name, round(time.monotonic() - began, 3)))
 
 
-class Worker:
-    """A process that judges every ``step``-th input from ``start`` on."""
-
-    def __init__(self, category: str, numbers: range, keep: Path | None, again: bool = False) -> None:
-        self.numbers, self.again, self.rest = numbers, again, b""
-        read, write = os.pipe()
-        self.pid = os.fork()
-        if not self.pid:
-            try:
-                os.close(read)
-                work(category, numbers, write, keep, again)
-            except BaseException:
-                traceback.print_exc()
-                os._exit(BROKEN)
-            os._exit(0)
-        os.close(write)
-        self.pipe, self.current, self.last = read, numbers.start, time.monotonic()
-
-    def lines(self) -> list[list]:
-        """What has arrived; raises EOFError at the end."""
-        data = os.read(self.pipe, 1 << 16)
-        if not data:
-            raise EOFError
-        self.last = time.monotonic()
-        *whole, self.rest = (self.rest + data).split(b"\n")
-        return [json.loads(line) for line in whole]
-
-    def end(self) -> int:
-        os.close(self.pipe)
-        time.sleep(0.1)  # for one that is ending by itself
-        pid, status = os.waitpid(self.pid, os.WNOHANG)
-        if not pid:
-            os.kill(self.pid, signal.SIGKILL)
-            _, status = os.waitpid(self.pid, 0)
-        return os.waitstatus_to_exitcode(status)
-
-
-def fuzz(category: str, inputs: int, workers: int, keep: Path | None = None) -> tuple[Counter, list[list]]:
-    """Judge many inputs.
+def fuzz(category: str, inputs: int, keep: Path | None = None) -> tuple[Counter, list[tuple]]:
+    """Judge many inputs; one that ends the process is judged again in another, by itself.
 
     Returns
     -------
     tally : Counter of verdicts '', 'refused' and 'failed'
-    failures : list of [number, verdict, file name, seconds]
+    failures : list of (number, verdict, file name, seconds)
     """
-    tally, failures = Counter(), []
-    running = [Worker(category, range(i, inputs, workers), keep) for i in range(workers)]
-    while running:
-        ready, _, _ = select.select([worker.pipe for worker in running], [], [], 1.0)
-        for worker in list(running):
-            end = ""
-            if worker.pipe in ready:
-                try:
-                    for number, *rest in worker.lines():
-                        worker.current = number
-                        if rest:
-                            tally[rest[0] if rest[0] in ("", REFUSED) else "failed"] += 1
-                            worker.current = number + worker.numbers.step
-                            if rest[0] not in ("", REFUSED):
-                                failures.append([number, *rest])
-                except EOFError:
-                    end = "died"
-            elif time.monotonic() - worker.last > 30.0 * PATIENCE:
-                end = "hangs where no signal is heard"
-            if not end:
-                continue
-            running.remove(worker)
-            status, current, step = worker.end(), worker.current, worker.numbers.step
-            if status == BROKEN:
-                raise RuntimeError("the fuzzer itself failed, see above")
-            if current not in worker.numbers:
-                continue
-            if worker.again:
-                tally["failed"] += 1
-                failures.append([current, f"{end} ({status})", "", 0.0])
-            else:
-                running.append(Worker(category, range(current, current + 1), keep, again=True))
-            if current + step in worker.numbers:
-                running.append(Worker(category, range(current + step, worker.numbers.stop, step), keep))
-    return tally, failures
+    rows, waiting, context = [], [(range(inputs), False)], get_context("fork")
+    while waiting:
+        numbers, again = waiting.pop()
+        receive, send = context.Pipe(duplex=False)
+        process = context.Process(target=work, args=(category, numbers, send, keep, again))
+        process.start()
+        send.close()
+        current, end = numbers.start, "hangs where no signal is heard"
+        try:
+            while receive.poll(30.0 * PATIENCE):
+                rows.append(receive.recv())
+                current = rows[-1][0] + 1
+        except EOFError:
+            end = "died"
+            process.join(PATIENCE)
+        process.kill()
+        process.join()
+        if process.exitcode == 1:
+            raise RuntimeError("the fuzzer itself failed outside of any input")
+        if current in numbers and again:
+            rows.append((current, f"{end} ({process.exitcode})", "", 0.0))
+        elif current in numbers:
+            waiting += [(range(current + 1, inputs), False), (range(current, current + 1), True)]
+    failures = [row for row in rows if row[1] not in ("", REFUSED)]
+    return Counter("failed" if row in failures else row[1] for row in rows), failures
 
 
 CATEGORIES = {
-    "scene": Category(scene_samples, read_scene),
-    "mesh": Category(mesh_samples, read_mesh),
-    "outline": Category(outline_samples, read_outline),
+    "scene": Category(scene_samples, fi.load_scene),
+    "mesh": Category(mesh_samples, lambda path: finite(fi.mesh.load(path))),
+    "outline": Category(outline_samples, lambda path: finite(fi.mesh.outline(path, unit="mm"))),
     "uff": Category(uff_samples, read_uff),
-    "result": Category(result_samples, read_result),
+    "result": Category(result_samples, fi.report.read),
     "store": Category(store_samples, read_store),
     "command": Category(command_samples, read_command),
 }
@@ -616,7 +498,6 @@ def main() -> int:
     parser = argparse.ArgumentParser()
     parser.add_argument("category", choices=CATEGORIES)
     parser.add_argument("--inputs", type=int, default=10_000)
-    parser.add_argument("--workers", type=int, default=2)
     parser.add_argument("--only", type=int)
     parser.add_argument("--keep", type=Path)
     options = parser.parse_args()
@@ -633,7 +514,7 @@ def main() -> int:
     if options.keep:
         options.keep.mkdir(exist_ok=True)
     began = time.monotonic()
-    tally, failures = fuzz(options.category, options.inputs, options.workers, options.keep)
+    tally, failures = fuzz(options.category, options.inputs, options.keep)
     print(json.dumps({"category": options.category, "results": tally[""], "refused": tally[REFUSED],
                       "failed": failures, "seconds": round(time.monotonic() - began, 1)}))  # fmt: skip
     return 1 if failures else 0

@@ -37,22 +37,16 @@ def advice(pattern, call, kind=ValueError):
     return float(found[1])
 
 
-def test_a_blow_of_too_many_modes_proposes_a_tolerance_that_is_affordable(tmp_path):
-    found = loaded(tmp_path, SMALL.replace("695e3", "1e8").replace('source = "analytic"', 'source = "fe"'))
-    enough = advice(r"; tolerance = (\S+) is affordable", lambda: found.plan(tolerance=1e-9, target="modal"),
-                    fi.SimulationError)  # fmt: skip
-    assert found.plan(tolerance=enough, target="modal").n_modes <= 2000
+@pytest.mark.parametrize("stiffness, tolerance", [(1e8, 1e-9), (1e16, 1e-4), (1e16, 1.0)])
+def test_a_blow_of_too_many_modes_proposes_a_softer_contact(tmp_path, stiffness, tolerance):
+    def plan(stiffness, tolerance):
+        text = SMALL.replace('source = "analytic"', 'source = "fe"').replace("695e3", str(stiffness))
+        return loaded(tmp_path, text).plan(tolerance=tolerance, target="modal")
 
-
-def test_a_blow_too_hard_for_any_tolerance_proposes_a_softer_contact(tmp_path):
-    text = SMALL.replace('source = "analytic"', 'source = "fe"')
-    found = loaded(tmp_path, text.replace("695e3", "1e16"))
-    for tolerance in (1e-4, 1.0):
-        soft = advice(
-            r"no tolerance is large enough; take a contact with stiffness = (\S+)",
-            lambda tolerance=tolerance: found.plan(tolerance=tolerance, target="modal"), fi.SimulationError,
-        )  # fmt: skip
-    assert loaded(tmp_path, text.replace("695e3", str(soft))).plan(tolerance=1.0, target="modal").n_modes <= 2000
+    words = r"; take a larger tolerance, or a contact with stiffness = (\S+)"
+    soft = advice(words, lambda: plan(stiffness, tolerance), fi.SimulationError)
+    assert plan(soft, tolerance).n_modes <= 2000
+    assert stiffness > 1e8 or plan(stiffness, 1e-2).n_modes <= 2000
 
 
 @pytest.mark.parametrize(
@@ -245,285 +239,152 @@ def mapped(folder, table):
     return maps.map_scene(loaded(folder, SMALL + table), tolerance=1e-1)
 
 
+# fmt: off
 ADVICE = {  # what fails, the message, and what it advises
-    "closed form": (
-        lambda tmp: loaded(tmp, SMALL.replace('"hinged"', '"clamped"')).plan(),
-        "use source = 'fe'",
-        lambda tmp: loaded(tmp, SMALL.replace('"hinged"', '"clamped"').replace('"analytic"', '"fe"')).plan(),
-    ),
+    "closed form": (lambda tmp: loaded(tmp, SMALL.replace('"hinged"', '"clamped"')).plan(), "use source = 'fe'",
+     lambda tmp: loaded(tmp, SMALL.replace('"hinged"', '"clamped"').replace('"analytic"', '"fe"')).plan()),
     "hinge": (lambda _: bar(0.0), "move it off the hinge", lambda _: bar(0.05)),
-    "collocation": (
-        lambda _: struck(fi.Contact.power(1e3, 0.8), scheme="collocation"),
-        "use A4",
-        lambda _: struck(fi.Contact.power(1e3, 0.8), scheme="A4"),
-    ),
+    "collocation": (lambda _: struck(fi.Contact.power(1e3, 0.8), scheme="collocation"), "use A4",
+     lambda _: struck(fi.Contact.power(1e3, 0.8), scheme="A4")),
     "cells": (lambda _: swept(), "raise max_cells, now 2$", lambda _: swept(max_cells=3)),
     "fewer values": (lambda _: swept(), "give fewer values", lambda _: swept(over={"mass": [0.02, 0.03]})),
-    "sound of a beam": (
-        lambda _: fi.sound.radiate(of_a_beam(), (0.0, 0.0, 1.0)),
-        "use radiate_bar",
-        lambda _: fi.sound.radiate_bar(of_a_beam(), (0.0, 0.0, 1.0), width=0.02, height=0.01, duration=0.01),
-    ),
-    "sound of a beam in free air": (
-        lambda _: fi.sound.radiate_free(of_a_beam(), (0.0, 0.0, 1.0)),
-        "use radiate_bar for a beam",
-        lambda _: fi.sound.radiate_bar(of_a_beam(), (0.0, 0.0, 1.0), width=0.02, height=0.01, duration=0.01),
-    ),
-    "sound of a plate as a bar": (
-        lambda _: fi.sound.radiate_bar(struck(), (0.0, 0.0, 1.0), width=0.02, height=0.01),
-        "use radiate$",
-        lambda _: fi.sound.radiate(struck(), (0.0, 0.0, 1.0), duration=0.01),
-    ),
-    "listener": (
-        lambda _: fi.sound.radiate(struck(), (0.1, 0.1, 0.0), duration=0.01),
-        "give a distance",
-        lambda _: fi.sound.radiate(struck(), (0.1, 0.1, 0.5), duration=0.01),
-    ),
-    "gap of a collision": (
-        lambda tmp: fi.pictures.wave(tmp / "a.png", collided()),
-        "use the response of strike",
-        lambda tmp: fi.figures.save(tmp / "a.png", fi.figures.force(struck())),
-    ),
-    "wood": (
-        lambda _: fi.Material(E=1e10, nu=0.3, rho=450.0, E_across=1e9),
-        "give neither",
-        lambda _: fi.Material(E=1e10, nu=0.3, rho=450.0),
-    ),
-    "tension": (
-        lambda _: fi.assemble(SQUARE, fi.Plate(STEEL, 1e-3, tension=10.0), {"left": "hinged"}),
-        "add supports",
-        lambda _: fi.assemble(SQUARE, fi.Plate(STEEL, 1e-3, tension=10.0), {"boundary": "hinged"}),
-    ),
-    "Morley on a disk": (
-        lambda _: fi.assemble(DISK, PLATE, HELD, element="morley"),
-        "use 'argyris', or a polygon",
-        lambda _: (fi.assemble(DISK, PLATE, HELD), fi.assemble(SQUARE, PLATE, HELD, element="morley")),
-    ),
+    "sound of a beam": (lambda _: fi.sound.radiate(of_a_beam(), (0.0, 0.0, 1.0)), "use radiate_bar",
+     lambda _: fi.sound.radiate_bar(of_a_beam(), (0.0, 0.0, 1.0), width=0.02, height=0.01, duration=0.01)),
+    "sound of a beam in free air": (lambda _: fi.sound.radiate_free(of_a_beam(), (0.0, 0.0, 1.0)),
+     "use radiate_bar for a beam",
+     lambda _: fi.sound.radiate_bar(of_a_beam(), (0.0, 0.0, 1.0), width=0.02, height=0.01, duration=0.01)),
+    "sound of a plate as a bar": (lambda _: fi.sound.radiate_bar(struck(), (0.0, 0.0, 1.0), width=0.02, height=0.01),
+     "use radiate$", lambda _: fi.sound.radiate(struck(), (0.0, 0.0, 1.0), duration=0.01)),
+    "listener": (lambda _: fi.sound.radiate(struck(), (0.1, 0.1, 0.0), duration=0.01), "give a distance",
+     lambda _: fi.sound.radiate(struck(), (0.1, 0.1, 0.5), duration=0.01)),
+    "gap of a collision": (lambda tmp: fi.pictures.wave(tmp / "a.png", collided()), "use the response of strike",
+     lambda tmp: fi.figures.save(tmp / "a.png", fi.figures.force(struck()))),
+    "wood": (lambda _: fi.Material(E=1e10, nu=0.3, rho=450.0, E_across=1e9), "give neither",
+     lambda _: fi.Material(E=1e10, nu=0.3, rho=450.0)),
+    "tension": (lambda _: fi.assemble(SQUARE, fi.Plate(STEEL, 1e-3, tension=10.0), {"left": "hinged"}), "add supports",
+     lambda _: fi.assemble(SQUARE, fi.Plate(STEEL, 1e-3, tension=10.0), {"boundary": "hinged"})),
+    "Morley on a disk": (lambda _: fi.assemble(DISK, PLATE, HELD, element="morley"), "use 'argyris', or a polygon",
+     lambda _: (fi.assemble(DISK, PLATE, HELD), fi.assemble(SQUARE, PLATE, HELD, element="morley"))),
     "modes of closed forms": (
-        lambda _: fi.analytic.rectangle(0.4, 0.3, mass=0.2, first_frequency=100.0, max_frequency=1e9),
-        "lower it",
-        lambda _: fi.analytic.rectangle(0.4, 0.3, mass=0.2, first_frequency=100.0, max_frequency=1e4),
-    ),
-    "map": (
-        lambda tmp: mapped(tmp, ""),
-        r'over = \{ "striker.mass" = \[0.01, 0.1\] \}',
-        lambda tmp: mapped(tmp, '[map]\nover = { "striker.mass" = [0.01, 0.1] }\n'),
-    ),
-    "too many modes": (
-        lambda tmp: loaded(tmp, SMALL).modes(10**6),
-        "ask for fewer",
-        lambda tmp: loaded(tmp, SMALL).modes(10),
-    ),
-    "nothing to observe": (
-        lambda tmp: loaded(tmp, SMALL + "[observe]\n"),
-        "leave out the table",
-        lambda tmp: loaded(tmp, SMALL),
-    ),
-    "rigid motion": (
-        lambda tmp: fi.export.write_animation(tmp / "a.pvd", fi.Modes.rigid(1.0), 1, frames=2),
-        "a rigid motion",
-        lambda tmp: fi.export.write_animation(tmp / "a.pvd", CLOSED, 2, frames=2),
-    ),
-    "Morley under tension": (
-        lambda _: fi.assemble(SQUARE, fi.Plate(STEEL, 1e-3, tension=10.0), HELD, element="morley"),
-        "does not allow tension or elastic supports; use 'argyris'",
-        lambda _: fi.assemble(SQUARE, fi.Plate(STEEL, 1e-3, tension=10.0), HELD, element="argyris"),
-    ),
-    "nothing free to move": (
-        lambda _: fi.assemble(ONE, PLATE, HELD, element="morley"),
-        "supports fix every unknown of this mesh; refine it",
-        lambda _: fi.assemble(ONE.refined(4.0), PLATE, HELD, element="morley"),
-    ),
-    "nothing free to move, Argyris": (
-        lambda _: fi.assemble(ONE, PLATE, HELD),
-        "supports fix every unknown of this mesh; refine it",
-        lambda _: fi.assemble(ONE.refined(4.0), PLATE, HELD),
-    ),
-    "a beam of too many steps": (
-        lambda _: fi.assemble(fi.mesh.line(1.0), stepped(5000)),
-        "steps and kinks, got more; make it smoother",
-        lambda _: fi.assemble(fi.mesh.line(1.0), stepped(5)),
-    ),
-    "modes beyond the unknowns": (
-        lambda _: fi.find_modes(fi.assemble(SQUARE, PLATE, HELD), n_modes=20),
-        "elements of 0.02 m suffice",
-        lambda _: fi.find_modes(fi.assemble(fi.mesh.rectangle(0.4, 0.3, size=0.02), PLATE, HELD), n_modes=20),
-    ),
-    "a flat contact far away": (
-        lambda _: chained(gap=1e9),
-        "start nearer to contact",
-        lambda _: chained(gap=1e-3),
-    ),
-    "states of Ritz vectors": (
-        lambda _: swinging(vectors_of(HUNG)),
-        "find its modes with find_modes",
-        lambda _: swinging(fi.find_modes(HUNG, n_modes=20)),
-    ),
-    "a sphere of no one material": (
-        lambda _: fi.Contact.between(fi.Striker.sphere(STEEL, 0.01), 3),
-        r"must have an isotropic material .*; use Contact.hertz",
-        lambda _: fi.Contact.hertz(1e9),
-    ),
-    "a shear modulus of steel": (
-        lambda _: replace(STEEL, G_xz=1e9),
-        "needs an orthotropic material; give E_across and G, or leave it out",
-        lambda _: (replace(SPRUCE, G_xz=1e9), replace(STEEL, G_xz=None)),
-    ),
-    "a force beyond numbers": (
-        lambda _: fi.Contact.hertz(1e9).force(1e300),
-        "check their units, m and m/s",
-        lambda _: fi.Contact.hertz(1e9).force(1e-5),
-    ),
-    "no contact": (
-        lambda _: struck(fi.Contact.linear(1e4, gap=1.0), duration=1e-3).spectral_centroid(1e3),
-        "check gap and speed",
-        lambda _: struck(duration=1e-3).spectral_centroid(1e3),
-    ),
-    "a striker held": (
-        lambda _: fi.Striker.flexible(beam("hinged", "hinged"), at=0.1),
-        "leave it free or support it by one hinge",
-        lambda _: [fi.Striker.flexible(beam(end, "free"), at=0.1) for end in ("free", "hinged")],
-    ),
-    "a point that turns with nothing": (
-        lambda _: beam("hinged", "free").rigid_motion([0.0]),
-        "change at or the supports",
-        lambda _: (beam("hinged", "free").rigid_motion([0.1]), beam("free", "free").rigid_motion([0.0])),
-    ),
+     lambda _: fi.analytic.rectangle(0.4, 0.3, mass=0.2, first_frequency=100.0, max_frequency=1e9), "lower it",
+     lambda _: fi.analytic.rectangle(0.4, 0.3, mass=0.2, first_frequency=100.0, max_frequency=1e4)),
+    "map": (lambda tmp: mapped(tmp, ""), r'over = \{ "striker.mass" = \[0.01, 0.1\] \}',
+     lambda tmp: mapped(tmp, '[map]\nover = { "striker.mass" = [0.01, 0.1] }\n')),
+    "too many modes": (lambda tmp: loaded(tmp, SMALL).modes(10**6), "ask for fewer",
+     lambda tmp: loaded(tmp, SMALL).modes(10)),
+    "nothing to observe": (lambda tmp: loaded(tmp, SMALL + "[observe]\n"), "leave out the table",
+     lambda tmp: loaded(tmp, SMALL)),
+    "rigid motion": (lambda tmp: fi.export.write_animation(tmp / "a.pvd", fi.Modes.rigid(1.0), 1, frames=2),
+     "a rigid motion", lambda tmp: fi.export.write_animation(tmp / "a.pvd", CLOSED, 2, frames=2)),
+    "Morley under tension": (lambda _: fi.assemble(SQUARE, fi.Plate(STEEL, 1e-3, tension=10.0), HELD, element="morley"),
+     "does not allow tension or elastic supports; use 'argyris'",
+     lambda _: fi.assemble(SQUARE, fi.Plate(STEEL, 1e-3, tension=10.0), HELD, element="argyris")),
+    "nothing free to move": (lambda _: fi.assemble(ONE, PLATE, HELD, element="morley"),
+     "supports fix every unknown of this mesh; refine it",
+     lambda _: fi.assemble(ONE.refined(4.0), PLATE, HELD, element="morley")),
+    "nothing free to move, Argyris": (lambda _: fi.assemble(ONE, PLATE, HELD),
+     "supports fix every unknown of this mesh; refine it", lambda _: fi.assemble(ONE.refined(4.0), PLATE, HELD)),
+    "a beam of too many steps": (lambda _: fi.assemble(fi.mesh.line(1.0), stepped(5000)),
+     "steps and kinks, got more; make it smoother", lambda _: fi.assemble(fi.mesh.line(1.0), stepped(5))),
+    "modes beyond the unknowns": (lambda _: fi.find_modes(fi.assemble(SQUARE, PLATE, HELD), n_modes=20),
+     "elements of 0.02 m suffice",
+     lambda _: fi.find_modes(fi.assemble(fi.mesh.rectangle(0.4, 0.3, size=0.02), PLATE, HELD), n_modes=20)),
+    "a flat contact far away": (lambda _: chained(gap=1e9), "start nearer to contact", lambda _: chained(gap=1e-3)),
+    "states of Ritz vectors": (lambda _: swinging(vectors_of(HUNG)), "find its modes with find_modes",
+     lambda _: swinging(fi.find_modes(HUNG, n_modes=20))),
+    "a sphere of no one material": (lambda _: fi.Contact.between(fi.Striker.sphere(STEEL, 0.01), 3),
+     r"must have an isotropic material .*; use Contact.hertz", lambda _: fi.Contact.hertz(1e9)),
+    "a shear modulus of steel": (lambda _: replace(STEEL, G_xz=1e9),
+     "needs an orthotropic material; give E_across and G, or leave it out",
+     lambda _: (replace(SPRUCE, G_xz=1e9), replace(STEEL, G_xz=None))),
+    "a force beyond numbers": (lambda _: fi.Contact.hertz(1e9).force(1e300), "check their units, m and m/s",
+     lambda _: fi.Contact.hertz(1e9).force(1e-5)),
+    "no contact": (lambda _: struck(fi.Contact.linear(1e4, gap=1.0), duration=1e-3).spectral_centroid(1e3),
+     "check gap and speed", lambda _: struck(duration=1e-3).spectral_centroid(1e3)),
+    "a striker held": (lambda _: fi.Striker.flexible(beam("hinged", "hinged"), at=0.1),
+     "leave it free or support it by one hinge",
+     lambda _: [fi.Striker.flexible(beam(end, "free"), at=0.1) for end in ("free", "hinged")]),
+    "a point that turns with nothing": (lambda _: beam("hinged", "free").rigid_motion([0.0]),
+     "change at or the supports",
+     lambda _: (beam("hinged", "free").rigid_motion([0.1]), beam("free", "free").rigid_motion([0.0]))),
     "vectors of a body in closed form": (
-        lambda _: fi.plan(CLOSED, fi.Striker.rigid(0.03), fi.Contact.linear(1e4), **SOFT, target="vectors"),
-        "target must be one of|use target = 'modal'",
-        lambda _: fi.plan(CLOSED, fi.Striker.rigid(0.03), fi.Contact.linear(1e4), **SOFT, target="modal"),
-    ),
-    "vectors with a number of modes": (
-        lambda _: planned(target="vectors", n_modes=9),
-        "target = 'vectors' needs a thin plate in a vacuum .*; use target = 'modal'",
-        lambda _: planned(target="modal", n_modes=9),
-    ),
-    "air around a beam": (
-        lambda _: Target(fi.mesh.line(0.4), BEAM, air="both sides"),
-        "air is known around plates only; leave it out",
-        lambda _: Target(fi.mesh.line(0.4), BEAM),
-    ),
-    "no scale of closed forms": (
-        lambda _: fi.analytic.rectangle(0.4, 0.3, mass=0.2, n_modes=4),
-        r"give either section, or both mass \[kg\]",
-        lambda _: (
-            fi.analytic.rectangle(0.4, 0.3, section=PLATE, n_modes=4),
-            fi.analytic.rectangle(0.4, 0.3, mass=0.2, first_frequency=9.0, n_modes=4),
-        ),
-    ),
-    "no number of closed forms": (
-        lambda _: fi.analytic.rectangle(0.4, 0.3, section=PLATE),
-        "give either n_modes or max_frequency",
-        lambda _: (
-            fi.analytic.rectangle(0.4, 0.3, section=PLATE, n_modes=4),
-            fi.analytic.rectangle(0.4, 0.3, section=PLATE, max_frequency=1e3),
-        ),
-    ),
-    "nu twice": (
-        lambda _: fi.analytic.disk(0.1, section=PLATE, nu=0.2, n_modes=4),
-        "give nu or section, not both",
-        lambda _: (
-            fi.analytic.disk(0.1, section=PLATE, n_modes=4),
-            fi.analytic.disk(0.1, mass=0.1, first_frequency=9.0, nu=0.2, n_modes=4),
-        ),
-    ),
+     lambda _: fi.plan(CLOSED, fi.Striker.rigid(0.03), fi.Contact.linear(1e4), **SOFT, target="vectors"),
+     "target must be one of|use target = 'modal'",
+     lambda _: fi.plan(CLOSED, fi.Striker.rigid(0.03), fi.Contact.linear(1e4), **SOFT, target="modal")),
+    "vectors with a number of modes": (lambda _: planned(target="vectors", n_modes=9),
+     "target = 'vectors' needs a thin plate in a vacuum .*; use target = 'modal'",
+     lambda _: planned(target="modal", n_modes=9)),
+    "air around a beam": (lambda _: Target(fi.mesh.line(0.4), BEAM, air="both sides"),
+     "air is known around plates only; leave it out", lambda _: Target(fi.mesh.line(0.4), BEAM)),
+    "no scale of closed forms": (lambda _: fi.analytic.rectangle(0.4, 0.3, mass=0.2, n_modes=4),
+     r"give either section, or both mass \[kg\]",
+     lambda _: (
+        fi.analytic.rectangle(0.4, 0.3, section=PLATE, n_modes=4),
+        fi.analytic.rectangle(0.4, 0.3, mass=0.2, first_frequency=9.0, n_modes=4),
+    )),
+    "no number of closed forms": (lambda _: fi.analytic.rectangle(0.4, 0.3, section=PLATE),
+     "give either n_modes or max_frequency",
+     lambda _: (
+        fi.analytic.rectangle(0.4, 0.3, section=PLATE, n_modes=4),
+        fi.analytic.rectangle(0.4, 0.3, section=PLATE, max_frequency=1e3),
+    )),
+    "nu twice": (lambda _: fi.analytic.disk(0.1, section=PLATE, nu=0.2, n_modes=4), "give nu or section, not both",
+     lambda _: (
+        fi.analytic.disk(0.1, section=PLATE, n_modes=4),
+        fi.analytic.disk(0.1, mass=0.1, first_frequency=9.0, nu=0.2, n_modes=4),
+    )),
     "a closed form of a tapered beam": (
-        lambda _: fi.analytic.beam(1.0, ends=("free", "free"), section=stepped(2), n_modes=4),
-        "section must be constant along the beam; else use find_modes",
-        lambda _: fi.find_modes(fi.assemble(fi.mesh.line(1.0), stepped(2)), n_modes=4),
-    ),
-    "a closed form of wood": (
-        lambda _: fi.analytic.rectangle(0.4, 0.3, section=fi.Plate(SPRUCE, 3e-3), n_modes=4),
-        "without tension; else use find_modes",
-        lambda _: fi.find_modes(fi.assemble(SQUARE, fi.Plate(SPRUCE, 3e-3), HELD), n_modes=4),
-    ),
-    "bounds of a disk": (
-        lambda _: fi.find_modes(fi.assemble(DISK, PLATE, HELD), n_modes=4, bounds=True),
-        "give a tolerance instead",
-        lambda _: fi.find_modes(fi.assemble(fi.mesh.disk(0.2), PLATE, HELD), n_modes=4, tolerance=1e-3),
-    ),
-    "too much for floats": (
-        lambda tmp: loaded(tmp, MADE.replace("1e-3", "1e-200")).modes(4),
-        "must |check its units|check the units",
-        lambda tmp: loaded(tmp, MADE).modes(4),
-    ),
-    "a file that is no scene": (
-        lambda tmp: loaded(tmp, "#" * (schema.LARGEST_FILE + 1)),
-        "check that it is a scene",
-        lambda tmp: loaded(tmp, SMALL),
-    ),
-    "two times in one file": (
-        lambda tmp: fi.export.write_vtk(tmp / "a.vtu", CLOSED, struck(), [0.0, 1e-3]),
-        "got 2; write a .pvd",
-        lambda tmp: fi.export.write_vtk(tmp / "a.pvd", CLOSED, struck(), [0.0, 1e-3]),
-    ),
-    "louder than a file": (
-        lambda tmp: replace(sound(), samples=np.array([1e39])).wav(),
-        "check the units of its speed",
-        lambda tmp: sound().wav(),
-    ),
+     lambda _: fi.analytic.beam(1.0, ends=("free", "free"), section=stepped(2), n_modes=4),
+     "section must be constant along the beam; else use find_modes",
+     lambda _: fi.find_modes(fi.assemble(fi.mesh.line(1.0), stepped(2)), n_modes=4)),
+    "a closed form of wood": (lambda _: fi.analytic.rectangle(0.4, 0.3, section=fi.Plate(SPRUCE, 3e-3), n_modes=4),
+     "without tension; else use find_modes",
+     lambda _: fi.find_modes(fi.assemble(SQUARE, fi.Plate(SPRUCE, 3e-3), HELD), n_modes=4)),
+    "bounds of a disk": (lambda _: fi.find_modes(fi.assemble(DISK, PLATE, HELD), n_modes=4, bounds=True),
+     "give a tolerance instead",
+     lambda _: fi.find_modes(fi.assemble(fi.mesh.disk(0.2), PLATE, HELD), n_modes=4, tolerance=1e-3)),
+    "too much for floats": (lambda tmp: loaded(tmp, MADE.replace("1e-3", "1e-200")).modes(4),
+     "must |check its units|check the units", lambda tmp: loaded(tmp, MADE).modes(4)),
+    "a file that is no scene": (lambda tmp: loaded(tmp, "#" * (schema.LARGEST_FILE + 1)), "check that it is a scene",
+     lambda tmp: loaded(tmp, SMALL)),
+    "two times in one file": (lambda tmp: fi.export.write_vtk(tmp / "a.vtu", CLOSED, struck(), [0.0, 1e-3]),
+     "got 2; write a .pvd", lambda tmp: fi.export.write_vtk(tmp / "a.pvd", CLOSED, struck(), [0.0, 1e-3])),
+    "louder than a file": (lambda tmp: replace(sound(), samples=np.array([1e39])).wav(), "check the units of its speed",
+     lambda tmp: sound().wav()),
     "a picture of one axis": (
-        lambda tmp: maps.draw(mapped(tmp, '[map]\nover = { "striker.mass" = [0.01, 0.1] }\n'), "contact_time"),
-        "must have two axes to be drawn, got mass; select two",
-        lambda tmp: maps.draw(
-            mapped(tmp, '[map]\nover = { "striker.mass" = [0.01, 0.1], "strike.speed" = [1.0, 2.0] }\n'), "contact_time"
-        ),
-    ),
-    "a map in one file": (
-        lambda tmp: maps.can_write("nc", tmp / "a.nc"),
-        r"give .*a, and --format zarr for map.zarr",
-        lambda tmp: maps.can_write("nc", tmp / "a"),
-    ),
-    "a report of no motion": (
-        lambda tmp: reported(tmp, motion=False),
-        "strike with motion=True",
-        lambda tmp: reported(tmp, motion=True),
-    ),
-    "a report of something else": (
-        lambda tmp: report.read(other_json(tmp)),
-        "give its response.json, or the scene's TOML file",
-        lambda tmp: (report.read(result(tmp)), report.read(tmp / "scene.toml")),
-    ),
-    "a report of a lost body": (
-        lambda tmp: report.read(result(tmp, {"mesh": {"shape": "file", "path": "lost.msh"}})),
-        "the file of the struck body is missing: restore .*, or give the scene's TOML file",
-        lambda tmp: (
-            fi.mesh.save(tmp / "lost.msh", SQUARE),
-            report.read(result(tmp, {"mesh": {"shape": "file", "path": "lost.msh"}})),
-            report.read(tmp / "scene.toml"),
-        ),
-    ),
-    "a damaged store": (
-        lambda tmp: swept(max_cells=3, store=damaged(tmp / "a")),
-        "name a new folder, or delete this one",
-        lambda tmp: (
-            swept(max_cells=3, store=tmp / "b"),
-            shutil.rmtree(tmp / "a"),
-            swept(max_cells=3, store=tmp / "a"),
-        ),
-    ),
-    "rigid motions measured": (
-        lambda _: fi.update(clamped_bar, [0.0, 30.0], {"E": (1e11, 3e11)}),
-        "positive frequencies only; leave out rigid motions",
-        lambda _: fi.update(clamped_bar, [30.0], {"E": (1e11, 3e11)}),
-    ),
-    "functions of no response": (
-        lambda tmp: fi.frf(tap_file(tmp, response=[])),
-        "read them with response=",
-        lambda tmp: fi.frf(tap_file(tmp, response=["a"])),
-    ),
-    "a window that leaves nothing": (
-        lambda tmp: fitted(tap_file(tmp), window=(1e-3, 1e-9)),
-        "got 0; give longer records",
-        lambda tmp: fitted(tap_file(tmp), window=(1e-3, 4e-3)),
-    ),
-    "taps everywhere": (
-        lambda tmp: tap_file(tmp, trigger=0.5, together=1e-4),
-        "give trigger= and together=",
-        lambda tmp: tap_file(tmp, trigger=9.0, together=1e-2),
-    ),
+     lambda tmp: maps.draw(mapped(tmp, '[map]\nover = { "striker.mass" = [0.01, 0.1] }\n'), "contact_time"),
+     "must have two axes to be drawn, got mass; select two",
+     lambda tmp: maps.draw(
+        mapped(tmp, '[map]\nover = { "striker.mass" = [0.01, 0.1], "strike.speed" = [1.0, 2.0] }\n'), "contact_time"
+    )),
+    "a map in one file": (lambda tmp: maps.can_write("nc", tmp / "a.nc"), r"give .*a, and --format zarr for map.zarr",
+     lambda tmp: maps.can_write("nc", tmp / "a")),
+    "a report of no motion": (lambda tmp: reported(tmp, motion=False), "strike with motion=True",
+     lambda tmp: reported(tmp, motion=True)),
+    "a report of something else": (lambda tmp: report.read(other_json(tmp)),
+     "give its response.json, or the scene's TOML file",
+     lambda tmp: (report.read(result(tmp)), report.read(tmp / "scene.toml"))),
+    "a report of a lost body": (lambda tmp: report.read(result(tmp, {"mesh": {"shape": "file", "path": "lost.msh"}})),
+     "the file of the struck body is missing: restore .*, or give the scene's TOML file",
+     lambda tmp: (
+        fi.mesh.save(tmp / "lost.msh", SQUARE),
+        report.read(result(tmp, {"mesh": {"shape": "file", "path": "lost.msh"}})),
+        report.read(tmp / "scene.toml"),
+    )),
+    "a damaged store": (lambda tmp: swept(max_cells=3, store=damaged(tmp / "a")),
+     "name a new folder, or delete this one",
+     lambda tmp: (swept(max_cells=3, store=tmp / "b"), shutil.rmtree(tmp / "a"), swept(max_cells=3, store=tmp / "a"))),
+    "rigid motions measured": (lambda _: fi.update(clamped_bar, [0.0, 30.0], {"E": (1e11, 3e11)}),
+     "positive frequencies only; leave out rigid motions",
+     lambda _: fi.update(clamped_bar, [30.0], {"E": (1e11, 3e11)})),
+    "functions of no response": (lambda tmp: fi.frf(tap_file(tmp, response=[])), "read them with response=",
+     lambda tmp: fi.frf(tap_file(tmp, response=["a"]))),
+    "a window that leaves nothing": (lambda tmp: fitted(tap_file(tmp), window=(1e-3, 1e-9)),
+     "got 0; give longer records", lambda tmp: fitted(tap_file(tmp), window=(1e-3, 4e-3))),
+    "taps everywhere": (lambda tmp: tap_file(tmp, trigger=0.5, together=1e-4), "give trigger= and together=",
+     lambda tmp: tap_file(tmp, trigger=9.0, together=1e-2)),
 }
+# fmt: on
 
 
 ONE = fi.mesh.polygon([(0, 0), (1, 0), (0, 1)], size=2.0)

@@ -41,8 +41,8 @@ def moved(value):
     return points
 
 
-def pieces(shift, weld=()):
-    """A good mesh twice, the second moved; ``weld`` names nodes of the second that lie on nodes of the first."""
+def pieces(shift):
+    """A good mesh twice, the second moved."""
     points = np.concatenate([GOOD.points, GOOD.points + np.array(shift)])
     return {"points": points, "cells": np.concatenate([GOOD.cells, GOOD.cells + len(GOOD.points)])}
 
@@ -57,9 +57,9 @@ def raw(folder, triangles=None, sets=None):
         return fi.mesh.load(folder / "plate.msh")
 
 
-def svg(folder, body=PLATE, head=INCH, unit=None):
+def svg(folder, body=PLATE, head=INCH, unit=None, before=""):
     pytest.importorskip("svgelements", reason="the cad extra is not installed")
-    (folder / "plate.svg").write_text(SVG.format(head=head, body=body))
+    (folder / "plate.svg").write_text(before + SVG.format(head=head, body=body))
     return fi.mesh.outline(folder / "plate.svg", unit=unit)
 
 
@@ -178,265 +178,7 @@ def scene_of(folder, encoding="utf-8"):
 
 TRIANGLES = np.array([[0, 1, 2], [0, 2, 3]])
 SQUARE = [(0, 0), (0.4, 0), (0.4, 0.3), (0, 0.3)]
-
-FILES = {  # what fails, the message, and what it advises
-    "a coordinate that is no number": (
-        lambda f: mesh_of(f, moved(np.nan)),
-        r"not a number at node \S+: .*; correct that node",
-        mesh_of,
-    ),
-    "a coordinate far away": (
-        lambda f: mesh_of(f, moved(1e13)),
-        r"beyond \S+ at node \S+: .*; correct that node",
-        mesh_of,
-    ),
-    "millimetres": (
-        lambda f: mesh_of(f, 1e3 * GOOD.points),
-        "pass unit='mm' to load it, or unit='m' if it is that large",
-        lambda f: (mesh_of(f, 1e3 * GOOD.points, unit="mm"), mesh_of(f, 1e3 * GOOD.points, unit="m")),
-    ),
-    "a beam": (
-        lambda f: mesh_of(f, cells=GOOD.facets, kind="line"),
-        r"mesh the surface with triangles \(make a beam with fi.mesh.line\)",
-        lambda f: (mesh_of(f), fi.mesh.line(0.4)),
-    ),
-    "no surface": (
-        lambda f: mesh_of(f, SQUARE, [[0, 1, 2, 3]], "tetra"),
-        "mesh the surface with triangles",
-        mesh_of,
-    ),
-    "a volume": (
-        lambda f: mesh_of(f, others=[("tetra", np.array([[0, 1, 2, 3]]))]),
-        "export only the flat surface",
-        mesh_of,
-    ),
-    "all at one point": (
-        lambda f: mesh_of(f, 0.0 * GOOD.points),
-        "all its nodes at one point; export it again",
-        mesh_of,
-    ),
-    "crowds": (
-        lambda f: mesh_of(f, np.repeat([(0, 0), (1, 0), (0, 1)], 20, axis=0), np.arange(60).reshape(3, 20).T),
-        "most of its nodes at a few points; export it again",
-        lambda f: mesh_of(f, [(0, 0), (1, 0), (0, 1)], [[0, 1, 2]]),
-    ),
-    "no area": (
-        lambda f: mesh_of(f, [*SQUARE, (0.2, 0)], [*TRIANGLES, [0, 4, 1]]),
-        "remove them or mesh the outline again",
-        lambda f: (mesh_of(f, SQUARE, TRIANGLES), fi.mesh.outline(np.array(SQUARE))),
-    ),
-    "three on a side": (
-        lambda f: mesh_of(f, [*SQUARE, (0.1, 0.2)], [*TRIANGLES, [0, 2, 4]]),
-        "remove the extra one",
-        lambda f: mesh_of(f, SQUARE, TRIANGLES),
-    ),
-    "two pieces": (
-        lambda f: mesh_of(f, **pieces((1.0, 0.0))),
-        "connect them, or export only one piece",
-        lambda f: (mesh_of(f, **pieces((0.4, 0.0))), mesh_of(f)),
-    ),
-    "a fold": (
-        lambda f: mesh_of(f, [(0, 0), (1, 0), (0, 1), (0.5, 0.9)], [[0, 1, 2], [0, 1, 3]]),
-        "on the same side of their common edge; mesh it again",
-        lambda f: mesh_of(f, SQUARE, TRIANGLES),
-    ),
-    "a hinge of one node": (
-        lambda f: mesh_of(f, *bow_tie(joined=False)),
-        "is connected only by the node .*; connect it along a side",
-        lambda f: mesh_of(f, *bow_tie(joined=True)),
-    ),
-    "a spiral": (
-        lambda f: mesh_of(f, *ribbon(2.5)),
-        "overlap at the rim .*; mesh it again",
-        lambda f: mesh_of(f, *ribbon(0.8)),
-    ),
-    "no outline to refine": (
-        lambda f: replace(GOOD, recipe=None).refined(),
-        "make it with fi.mesh, or load a finer file",
-        lambda f: (GOOD.refined(), mesh_of(f, *(lambda m: (m.points, m.cells))(GOOD.refined())).refined()),
-    ),
-    "a tolerance on a mesh of one's own": (
-        lambda f: fi.find_modes(fi.assemble(replace(GOOD, recipe=None), STEEL), n_modes=4, tolerance=1e-3),
-        "make it with fi.mesh or load it with fi.mesh.load",
-        lambda f: [
-            fi.find_modes(fi.assemble(m, STEEL), n_modes=4, tolerance=1e-3)
-            for m in (fi.mesh.rectangle(0.4, 0.3), mesh_of(f))
-        ],
-    ),
-    "a beam saved": (
-        lambda f: fi.mesh.save(f / "a.msh", fi.mesh.line(1.0)),
-        "make a beam with fi.mesh.line",
-        lambda f: fi.mesh.line(1.0),
-    ),
-    "a point twice": (
-        lambda f: fi.mesh.outline([(0, 0), (1, 0), (1, 0), (0, 1)]),
-        "same point twice in a row; remove one",
-        lambda f: fi.mesh.outline([(0, 0), (1, 0), (0, 1)]),
-    ),
-    "a corner twice": (
-        lambda f: fi.mesh.polygon([(0, 0), (1, 0), (1, 0), (0, 1)]),
-        "at the same place; remove one",
-        lambda f: fi.mesh.polygon([(0, 0), (1, 0), (0, 1)]),
-    ),
-    "several polygons": (
-        lambda f: fi.mesh.outline(two_disks()),
-        "mesh its parts one by one",
-        lambda f: [fi.mesh.outline(part) for part in two_disks().geoms],
-    ),
-    "a sliver": (
-        lambda f: fi.mesh.polygon([(0, 0), (1, 0), (1, 1e-5), (0, 1e-5)]),
-        "longer than wide; widen it",
-        lambda f: fi.mesh.polygon([(0, 0), (1, 0), (1, 1e-2), (0, 1e-2)]),
-    ),
-    "a sliver somewhere": (
-        lambda f: fi.mesh.polygon(with_whisker(1e-6)),
-        r"longer than wide near \(.*\) m; widen it there",
-        lambda f: fi.mesh.polygon(with_whisker(1e-1)),
-    ),
-    "entities": (lambda f: entities(f), "save it as plain SVG", svg),
-    "a huge comment": (
-        lambda f: svg(f, PLATE + f"<!--{'a' * (drawings.LONGEST_COMMENT + 1)}-->"),
-        "million characters; remove it",
-        svg,
-    ),
-    "too many shapes": (lambda f: svg(f, PLATE * (drawings.MOST_PIECES + 1)), "simplify the drawing", svg),
-    "too many numbers": (
-        lambda f: svg(f, f'<path d="M0 0{" 1" * (drawings.MOST_NUMBERS + 2)}"/>'),
-        "simplify them",
-        svg,
-    ),
-    "too many curves": (
-        lambda f: svg(f, f'<path d="M0 0{" L1 2" * (drawings.MOST_PIECES + 2)}"/>'),
-        "lines and curves; simplify the drawing",
-        svg,
-    ),
-    "no width": (
-        lambda f: svg(f, head='width="0in" height="0in" viewBox="0 0 4 3"'),
-        "no usable width and viewBox; set both to positive numbers",
-        svg,
-    ),
-    "an infinite drawing": (
-        lambda f: svg(f, '<path d="M0 0 H1e400 V1 Z"/>'),
-        "not finite numbers; correct the drawing",
-        svg,
-    ),
-    "a drawing far away": (
-        lambda f: svg(f, '<path d="M0 0 H1e17 V1 Z"/>'),
-        "coordinates beyond .*; correct the drawing",
-        svg,
-    ),
-    "frequency responses for taps": (
-        functions_as_taps,
-        "no time records; export those, or give the path of frequency responses to fi.frf",
-        lambda f: fi.frf(f / "h.uff"),
-    ),
-    "an empty drawing": (
-        lambda f: svg(f, ""),
-        "draw it with paths, lines, arcs or splines",
-        lambda f: (svg(f), svg(f, '<path d="M0 0 A9 9 0 0 1 20 0 Q 10 30 0 0"/>')),
-    ),
-    "an open path": (
-        lambda f: svg(f, '<path d="M0 0 H400 V300"/>'),
-        r"ends at \(.*\) m, .* close the path there",
-        lambda f: svg(f, '<path d="M0 0 H400 V300 Z"/>'),
-    ),
-    "millimetres drawn": (
-        lambda f: dxf(f, 150.0),
-        "pass unit='mm' to load it, or unit='m' if it is that large",
-        lambda f: (dxf(f, 150.0, unit="mm"), dxf(f, 150.0, unit="m")),
-    ),
-    "shapes without coordinates": (
-        lambda f: modes_of(f, nodes_lost),
-        "which has no coordinates; export it again",
-        modes_of,
-    ),
-    "shapes that are no numbers": (
-        lambda f: modes_of(f, change(freq=-5.0)),
-        "negative, too large or not numbers; export it again",
-        modes_of,
-    ),
-    "modes at other nodes": (
-        lambda f: modes_of(f, lambda sets: sets[-1].update(node_nums=sets[-1]["node_nums"][::-1])),
-        "export all modes at the same nodes",
-        modes_of,
-    ),
-    "no modal mass": (
-        lambda f: modes_of(f, change(modal_m=0.0)),
-        "export mass-normalised shapes with modal mass 1, or use Modes.from_arrays",
-        lambda f: (modes_of(f), fi.Modes.from_arrays([9.0], [[1.0]], points=[[0.0, 0.0]], mass=1.0)),
-    ),
-    "complex modes": (
-        lambda f: modes_of(f, complex_shapes(1.0)),
-        "export real modes",
-        lambda f: modes_of(f, complex_shapes(0.0)),
-    ),
-    "a scene in Latin-1": (
-        lambda f: scene_of(f, "latin-1"),
-        "a scene must be UTF-8 text; save it in that encoding",
-        scene_of,
-    ),
-    "a set of lines that are not there": (
-        lambda f: raw(f, sets={"rim": [None, np.array([7])]}),
-        r"has no line \S+, named by set \S+; export it again",
-        lambda f: raw(f, sets={"rim": [None, np.array([0])]}),
-    ),
-    "triangles of four nodes": (
-        lambda f: raw(f, triangles=np.zeros((2, 4), int)),
-        r"has a \S+ without exactly \S+ nodes; export it again",
-        raw,
-    ),
-    "a cell with a node too many": (
-        lambda f: raw(f, triangles=TRIANGLES + 1),
-        r"has a cell with node \S+ but only \S+ nodes; export it again",
-        raw,
-    ),
-    "a shape cut short": (
-        lambda f: modes_of(f, lambda sets: [one.update(r3=one["r3"][:-1]) for one in sets[3:]], written=False),
-        "but names .*; export it again",
-        modes_of,
-    ),
-    "a function that is no number": (
-        lambda f: functions_of(f, "                 nan"),
-        "no finite numbers; export it again",
-        functions_of,
-    ),
-    "a file of new MATLAB": (
-        lambda f: matlab(f, "-v7.3"),
-        "is a MATLAB 7.3 file; save it with '-v7' and try again",
-        lambda f: matlab(f, "-v7"),
-    ),
-    "no taps": (
-        lambda f: taps_of(f, trigger=900.0),
-        "check scale and trigger",
-        lambda f: (taps_of(f, trigger=9.0), taps_of(f, trigger=900.0, scale={"Force": 1e3})),
-    ),
-    "a value that is missing": (
-        lambda f: taps_of(f, spoiled),
-        "export it again, or cut it out",
-        lambda f: (taps_of(f), taps_of(f, lambda force, time: told(force[8:], time[8:]))),
-    ),
-    "times that go back": (
-        lambda f: taps_of(f, lambda force, time: told(force, time[::-1])),
-        "give the channels without them, and rate=",
-        lambda f: taps_of(f, lambda force, time: told(force), rate=10e3),
-    ),
-    "numbers that are no text": (
-        lambda f: ((f / "taps.dat").write_bytes(b"\0" * 9 + b"ab" * 5000), fi.read_taps(f / "taps.dat")),
-        "give .npy, .npz, .wav, .mat or .uff its own ending",
-        lambda f: saved(f, "taps.npz", hammer_force=tap_of(4000)["force"]),
-    ),
-    "a table called LabVIEW": (lambda f: taps_of(f, name="taps.lvm"), "for a plain table use the ending .csv", taps_of),
-    "channels across": (
-        lambda f: saved(f, "taps.npz", a=np.zeros((readers.MOST_CHANNELS + 1, 4000))),
-        "give channels by time",
-        lambda f: saved(f, "taps.npz", a=np.stack([tap_of(4000)["force"]] * 2), force="a 1"),
-    ),
-    "records too long": (
-        lambda f: taps_of(f, length=9.0),
-        "give a shorter length or before, or check rate",
-        lambda f: (taps_of(f, length=0.05), taps_of(f, lambda force, time: told(force), rate=100.0, length=9.0)),
-    ),
-}
+PLAIN = {"points": SQUARE, "cells": TRIANGLES}
 
 
 def two_disks():
@@ -454,7 +196,7 @@ def bow_tie(joined):
     points = [r * np.column_stack([np.cos(t), np.sin(t)]) for r, t in ((0.5, inner), (1.0, angle))]
     i = np.arange(6)
     cells = np.concatenate([np.column_stack([i, 7 + i, 8 + i]), np.column_stack([i, 8 + i, i + 1])])
-    return np.concatenate(points), cells
+    return {"points": np.concatenate(points), "cells": cells}
 
 
 def ribbon(turns):
@@ -465,21 +207,130 @@ def ribbon(turns):
     rings = [r * rise[:, None] * np.column_stack([np.cos(angle), np.sin(angle)]) for r in (0.6, 1.0)]
     i = np.arange(n - 1)
     cells = np.concatenate([np.column_stack([i, n + i, n + i + 1]), np.column_stack([i, n + i + 1, i + 1])])
-    return np.concatenate(rings), cells
+    return {"points": np.concatenate(rings), "cells": cells}
 
 
-def entities(folder):
-    pytest.importorskip("svgelements", reason="the cad extra is not installed")
-    (folder / "plate.svg").write_text('<!DOCTYPE svg [<!ENTITY a "ha">]>' + SVG.format(head=INCH, body=PLATE))
-    return fi.mesh.outline(folder / "plate.svg")
+def shape(n):
+    """A path of so many numbers or lines, as SVG."""
+    return {"body": f'<path d="M0 0{n}"/>'}
 
 
-@pytest.mark.parametrize("name", FILES)
-def test_following_the_advice_works(tmp_path, name):
-    wrong, words, right = FILES[name]
+def mesh_outline(folder, points):
+    return fi.mesh.outline(points)
+
+
+def mesh_polygon(folder, points):
+    return fi.mesh.polygon(points)
+
+
+def refined_body(folder, recipe=GOOD.recipe):
+    return replace(GOOD, recipe=recipe).refined()
+
+
+def found_to_tolerance(folder, mesh=None):
+    """Modes to a tolerance, of a mesh of one's own or one that can be refined."""
+    return fi.find_modes(fi.assemble(mesh or mesh_of(folder), STEEL), n_modes=4, tolerance=1e-3)
+
+
+CROWD = np.repeat([(0, 0), (1, 0), (0, 1)], 20, axis=0), np.arange(60).reshape(3, 20).T
+OPEN, CLOSED = ({"body": f'<path d="M0 0 H400 V300{end}"/>'} for end in ("", " Z"))
+ARC = {"body": '<path d="M0 0 A9 9 0 0 1 20 0 Q 10 30 0 0"/>'}
+MM, METRES = {"unit": "mm"}, {"unit": "m"}
+# fmt: off
+FILES = [  # what reads the file, of what it is refused, a pattern of the message, and of what it reads it as advised
+    (mesh_of, {"points": moved(np.nan)}, r"not a number at node \S+: .*; correct that node", {}),
+    (mesh_of, {"points": moved(1e13)}, r"beyond \S+ at node \S+: .*; correct that node", {}),
+    (mesh_of, {"points": 1e3 * GOOD.points}, "pass unit='mm' to load it, or unit='m' if it is that large", MM, METRES),
+    (mesh_of, {"cells": GOOD.facets, "kind": "line"},
+     r"mesh the surface with triangles \(make a beam with fi.mesh.line\)", {}),
+    (mesh_of, {"points": SQUARE, "cells": [[0, 1, 2, 3]], "kind": "tetra"}, "mesh the surface with triangles", {}),
+    (mesh_of, {"others": [("tetra", np.array([[0, 1, 2, 3]]))]}, "export only the flat surface", {}),
+    (mesh_of, {"points": 0.0 * GOOD.points}, "all its nodes at one point; export it again", {}),
+    (mesh_of, dict(zip(("points", "cells"), CROWD)), "most of its nodes at a few points; export it again",
+     {"points": [(0, 0), (1, 0), (0, 1)], "cells": [[0, 1, 2]]}),
+    (mesh_of, {"points": [*SQUARE, (0.2, 0)], "cells": [*TRIANGLES, [0, 4, 1]]},
+     "remove them or mesh the outline again", PLAIN),
+    (mesh_of, {"points": [*SQUARE, (0.1, 0.2)], "cells": [*TRIANGLES, [0, 2, 4]]}, "remove the extra one", PLAIN),
+    (mesh_of, pieces((1.0, 0.0)), "connect them, or export only one piece", pieces((0.4, 0.0)), {}),
+    (mesh_of, {"points": [(0, 0), (1, 0), (0, 1), (0.5, 0.9)], "cells": [[0, 1, 2], [0, 1, 3]]},
+     "on the same side of their common edge; mesh it again", PLAIN),
+    (mesh_of, bow_tie(joined=False), "is connected only by the node .*; connect it along a side", bow_tie(joined=True)),
+    (mesh_of, ribbon(2.5), "overlap at the rim .*; mesh it again", ribbon(0.8)),
+    (refined_body, {"recipe": None}, "make it with fi.mesh, or load a finer file", {}),
+    (found_to_tolerance, {"mesh": replace(GOOD, recipe=None)}, "make it with fi.mesh or load it with fi.mesh.load",
+     {"mesh": GOOD}, {}),
+    (mesh_outline, {"points": [(0, 0), (1, 0), (1, 0), (0, 1)]}, "same point twice in a row; remove one",
+     {"points": [(0, 0), (1, 0), (0, 1)]}),
+    (mesh_outline, {"points": two_disks()}, "mesh its parts one by one", *({"points": x} for x in two_disks().geoms)),
+    (mesh_polygon, {"points": [(0, 0), (1, 0), (1, 0), (0, 1)]}, "at the same place; remove one",
+     {"points": [(0, 0), (1, 0), (0, 1)]}),
+    (mesh_polygon, {"points": [(0, 0), (1, 0), (1, 1e-5), (0, 1e-5)]}, "longer than wide; widen it",
+     {"points": [(0, 0), (1, 0), (1, 1e-2), (0, 1e-2)]}),
+    (mesh_polygon, {"points": with_whisker(1e-6)}, r"longer than wide near \(.*\) m; widen it there",
+     {"points": with_whisker(1e-1)}),
+    (svg, {"before": '<!DOCTYPE svg [<!ENTITY a "ha">]>'}, "save it as plain SVG", {}),
+    (svg, {"body": PLATE + f"<!--{'a' * (drawings.LONGEST_COMMENT + 1)}-->"}, "million characters; remove it", {}),
+    (svg, {"body": PLATE * (drawings.MOST_PIECES + 1)}, "simplify the drawing", {}),
+    (svg, shape(" 1" * (drawings.MOST_NUMBERS + 2)), "simplify them", {}),
+    (svg, shape(" L1 2" * (drawings.MOST_PIECES + 2)), "lines and curves; simplify the drawing", {}),
+    (svg, {"head": 'width="0in" height="0in" viewBox="0 0 4 3"'},
+     "no usable width and viewBox; set both to positive numbers", {}),
+    (svg, shape(" H1e400 V1 Z"), "not finite numbers; correct the drawing", {}),
+    (svg, shape(" H1e17 V1 Z"), "coordinates beyond .*; correct the drawing", {}),
+    (svg, {"body": ""}, "draw it with paths, lines, arcs or splines", {}, ARC),
+    (svg, OPEN, r"ends at \(.*\) m, .* close the path there", CLOSED),
+    (dxf, {"radius": 150.0}, "pass unit='mm' to load it, or unit='m' if it is that large",
+     {"radius": 150.0, **MM}, {"radius": 150.0, **METRES}),
+    (modes_of, {"change": nodes_lost}, "which has no coordinates; export it again", {}),
+    (modes_of, {"change": change(freq=-5.0)}, "negative, too large or not numbers; export it again", {}),
+    (modes_of, {"change": lambda sets: sets[-1].update(node_nums=sets[-1]["node_nums"][::-1])},
+     "export all modes at the same nodes", {}),
+    (modes_of, {"change": change(modal_m=0.0)},
+     "export mass-normalised shapes with modal mass 1, or use Modes.from_arrays", {},
+     lambda _: fi.Modes.from_arrays([9.0], [[1.0]], points=[[0.0, 0.0]], mass=1.0)),
+    (modes_of, {"change": complex_shapes(1.0)}, "export real modes", {"change": complex_shapes(0.0)}),
+    (modes_of, {"change": lambda sets: [one.update(r3=one["r3"][:-1]) for one in sets[3:]], "written": False},
+     "but names .*; export it again", {}),
+    (scene_of, {"encoding": "latin-1"}, "a scene must be UTF-8 text; save it in that encoding", {}),
+    (raw, {"sets": {"rim": [None, np.array([7])]}}, r"has no line \S+, named by set \S+; export it again",
+     {"sets": {"rim": [None, np.array([0])]}}),
+    (raw, {"triangles": np.zeros((2, 4), int)}, r"has a \S+ without exactly \S+ nodes; export it again", {}),
+    (raw, {"triangles": TRIANGLES + 1}, r"has a cell with node \S+ but only \S+ nodes; export it again", {}),
+    (functions_of, {"first": "                 nan"}, "no finite numbers; export it again", {}),
+    (functions_as_taps, {}, "no time records; export those, or give the path of frequency responses to fi.frf",
+     lambda f: fi.frf(f / "h.uff")),
+    (matlab, {"version": "-v7.3"}, "is a MATLAB 7.3 file; save it with '-v7' and try again", {"version": "-v7"}),
+    (taps_of, {"trigger": 900.0}, "check scale and trigger", {"trigger": 9.0},
+     {"trigger": 900.0, "scale": {"Force": 1e3}}),
+    (taps_of, {"text": spoiled}, "export it again, or cut it out", {},
+     {"text": lambda force, time: told(force[8:], time[8:])}),
+    (taps_of, {"text": lambda force, time: told(force, time[::-1])}, "give the channels without them, and rate=",
+     {"text": lambda force, time: told(force), "rate": 10e3}),
+    (taps_of, {"text": lambda *_: "\0" * 9 + "ab" * 5000, "name": "taps.dat"},
+     "give .npy, .npz, .wav, .mat or .uff its own ending",
+     lambda f: saved(f, "taps.npz", hammer_force=tap_of(4000)["force"])),
+    (taps_of, {"name": "taps.lvm"}, "for a plain table use the ending .csv", {}),
+    (taps_of, {"length": 9.0}, "give a shorter length or before, or check rate", {"length": 0.05},
+     {"text": lambda force, time: told(force), "rate": 100.0, "length": 9.0}),
+    (saved, {"name": "taps.npz", "a": np.zeros((readers.MOST_CHANNELS + 1, 4000))}, "give channels by time",
+     {"name": "taps.npz", "a": np.stack([tap_of(4000)["force"]] * 2), "force": "a 1"}),
+]
+# fmt: on
+
+
+@pytest.mark.parametrize(
+    "read, bad, words, goods", [pytest.param(*row[:3], row[3:], id=f"{row[0].__name__}-{row[2]}") for row in FILES]
+)
+def test_following_the_advice_works(tmp_path, read, bad, words, goods):
     with pytest.raises(ValueError, match=words):
-        wrong(tmp_path)
-    right(tmp_path)
+        read(tmp_path, **bad)
+    for good in goods:
+        good(tmp_path) if callable(good) else read(tmp_path, **good)
+
+
+def test_no_mesh_of_a_beam_is_saved(tmp_path):
+    with pytest.raises(ValueError, match=r"make a beam with fi\.mesh\.line"):
+        fi.mesh.save(tmp_path / "a.msh", fi.mesh.line(1.0))
 
 
 def test_a_unit_that_was_assumed_can_be_passed(tmp_path):

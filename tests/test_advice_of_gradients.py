@@ -64,68 +64,43 @@ def held(speed=1.0):
     return fi.strike(PLATE, HELD, law, at=(0.13, 0.1), speed=speed, tolerance=1e-8, max_impacts=1)
 
 
+# fmt: off
 GRADIENTS = {  # what fails, the message, and what it advises
-    "energy of vectors": (
-        lambda _: energy(body=system(), target="vectors"),
-        "the modes that ring did not carry the blow; strike modes of find_modes$",
-        lambda _: energy(body=fi.find_modes(system(), n_modes=20)),
-    ),
-    "energy of other modes": (
-        lambda _: struck().on(PLATE).gradient("modal_energy"),
-        "the modes that ring did not carry the blow; strike modes of find_modes$",
-        lambda _: energy(),
-    ),
-    "grazing": (
-        lambda _: grazing(),
-        "grazing contact: .*; take a slightly heavier or lighter striker, or strike elsewhere$",
-        lambda _: (grazing(mass=0.52), grazing(mass=0.48), grazing(at=(0.14, 0.1))),
-    ),
-    "no gap": (
-        lambda _: slopes("peak_time", "contact.gap"),
-        "the bodies touch at the start, and even a small gap would change how they meet; give a gap$",
-        lambda _: slopes("peak_time", "contact.gap", law=fi.Contact.linear(1e4, gap=1e-4)),
-    ),
-    "no loss": (
-        lambda _: in_loss(),
-        "without loss the modes left out act as a spring .*; give the contact a small loss$",
-        lambda _: in_loss(law=fi.Contact.linear(1e4, loss=1e-3)),
-    ),
-    "a rigid target": (
-        lambda _: from_outside("target.mass", target="rigid"),
-        "the target is treated as rigid or infinite; strike its modes, with target = 'modal'$",
-        lambda _: from_outside(("target.mass", "strike.x"), target="modal"),
-    ),
-    "chatter": (
-        lambda _: chatter(dt=1e-3),
-        "the bodies chatter, .*; give max_impacts, a shorter duration or no dt$",
-        lambda _: (chatter(dt=1e-3, max_impacts=1), chatter(dt=1e-3, duration=2e-3), chatter()),
-    ),
-    "runs of other counts": (
-        lambda _: chatter(dt=5e-4),
-        "runs of different steps find .* impacts; give a smaller tolerance and no dt, or max_impacts$",
-        lambda _: (chatter(dt=5e-4, max_impacts=1), chatter()),
-    ),
-    "a hand": (
-        lambda _: held().gradient("impulse"),
-        "take differences of runs with the number changed, at a smaller tolerance$",
-        lambda _: differ(lambda step: held(1.0 + step)),
-    ),
-    "a speed of a body at rest against another": (
-        lambda _: in_chain(0.0).gradient("contact_time", "speeds.2"),
-        "a speed would press or part them; give a gap$",
-        lambda _: in_chain(1e-5).gradient("contact_time", "speeds.2"),
-    ),
+    "energy of vectors": (lambda _: energy(body=system(), target="vectors"),
+     "the modes that ring did not carry the blow; strike modes of find_modes$",
+     lambda _: energy(body=fi.find_modes(system(), n_modes=20))),
+    "energy of other modes": (lambda _: struck().on(PLATE).gradient("modal_energy"),
+     "the modes that ring did not carry the blow; strike modes of find_modes$", lambda _: energy()),
+    "grazing": (lambda _: grazing(),
+     "grazing contact: .*; take a slightly heavier or lighter striker, or strike elsewhere$",
+     lambda _: (grazing(mass=0.52), grazing(mass=0.48), grazing(at=(0.14, 0.1)))),
+    "no gap": (lambda _: slopes("peak_time", "contact.gap"),
+     "the bodies touch at the start, and even a small gap would change how they meet; give a gap$",
+     lambda _: slopes("peak_time", "contact.gap", law=fi.Contact.linear(1e4, gap=1e-4))),
+    "no loss": (lambda _: in_loss(),
+     "without loss the modes left out act as a spring .*; give the contact a small loss$",
+     lambda _: in_loss(law=fi.Contact.linear(1e4, loss=1e-3))),
+    "a rigid target": (lambda _: from_outside("target.mass", target="rigid"),
+     "the target is treated as rigid or infinite; strike its modes, with target = 'modal'$",
+     lambda _: from_outside(("target.mass", "strike.x"), target="modal")),
+    "chatter": (lambda _: chatter(dt=1e-3), "the bodies chatter, .*; give max_impacts, a shorter duration or no dt$",
+     lambda _: (chatter(dt=1e-3, max_impacts=1), chatter(dt=1e-3, duration=2e-3), chatter())),
+    "runs of other counts": (lambda _: chatter(dt=5e-4),
+     "runs of different steps find .* impacts; give a smaller tolerance and no dt, or max_impacts$",
+     lambda _: (chatter(dt=5e-4, max_impacts=1), chatter())),
+    "a hand": (lambda _: held().gradient("impulse"),
+     "take differences of runs with the number changed, at a smaller tolerance$",
+     lambda _: differ(lambda step: held(1.0 + step))),
+    "a speed of a body at rest against another": (lambda _: in_chain(0.0).gradient("contact_time", "speeds.2"),
+     "a speed would press or part them; give a gap$", lambda _: in_chain(1e-5).gradient("contact_time", "speeds.2")),
     "sections of other bodies": (
-        lambda _: in_chain(1e-5).gradient("impulse", sections={"t": (1e-3, lambda t: fi.Plate(STEEL, t))}),
-        "sections are those of the target of `strike`; leave them out$",
-        lambda _: in_chain(1e-5).gradient("impulse"),
-    ),
-    "section of other bodies": (
-        lambda _: in_chain(1e-5).gradient("impulse", "section.thickness"),
-        "only the target of `strike` has one; take the mass and first frequency of the body$",
-        lambda _: in_chain(1e-5).gradient("impulse", "bodies.1.mass"),
-    ),
+     lambda _: in_chain(1e-5).gradient("impulse", sections={"t": (1e-3, lambda t: fi.Plate(STEEL, t))}),
+     "sections are those of the target of `strike`; leave them out$", lambda _: in_chain(1e-5).gradient("impulse")),
+    "section of other bodies": (lambda _: in_chain(1e-5).gradient("impulse", "section.thickness"),
+     "only the target of `strike` has one; take the mass and first frequency of the body$",
+     lambda _: in_chain(1e-5).gradient("impulse", "bodies.1.mass")),
 }
+# fmt: on
 
 
 @pytest.mark.parametrize("name", GRADIENTS)

@@ -62,66 +62,39 @@ def disk(edge):
 
 
 # a blow that is refused, a pattern of its message, and blows that follow it
+# fmt: off
 STRETCHING = {
-    "a mass": (
-        lambda: blow(fi.Modes.rigid(1.0)),
-        r", but (?:a mass has none|\{\}); leave it out$",
-        [lambda: linear(fi.Modes.rigid(1.0))],
-    ),
-    "a scaled plate": (
-        lambda: blow(scaled()),
-        r", but (?:its section is not known|\{\}); leave it out$",
-        [lambda: linear(scaled())],
-    ),
-    "a disk that only moves rigidly": (
-        lambda: blow(disk("free").truncated(n_modes=3)),
-        ", but it has no mode that bends; leave it out$",
-        [lambda: linear(disk("free").truncated(n_modes=3))],
-    ),
-    "modes at points": (
-        lambda: blow(measured()),
-        ", but its shapes are known at points only; leave it out$",
-        [lambda: linear(measured())],
-    ),
-    "a plate on springs": (
-        lambda: blow(elements({"boundary": fi.Elastic(1e6, 0.0)})),
-        r", but (?:its edge is elastic, which does not say how .*|\{\}); hold it, or leave stretching out$",
-        [lambda: blow(elements()), lambda: linear(elements({"boundary": fi.Elastic(1e6, 0.0)}))],
-    ),
-    "elements without slopes": (
-        lambda: blow(elements(element="morley")),
-        "does not work with element 'morley'; take 'argyris', or leave stretching out$",
-        [lambda: blow(elements(element="argyris")), lambda: linear(elements(element="morley"))],
-    ),
-    "a cantilever": (
-        lambda: blow(bar("clamped", "free")),
-        ", but an end is free; hold it, or leave stretching out$",
-        [lambda: blow(bar("clamped", "hinged")), lambda: linear(bar("clamped", "free"))],
-    ),
-    "a cantilever by elements": (
-        lambda: blow(strip("free")),
-        ", but an end is free; hold it, or leave stretching out$",
-        [lambda: blow(strip("hinged")), lambda: linear(strip("free"))],
-    ),
-    "a stout cantilever": (
-        lambda: blow(bar("clamped", "free", theory="timoshenko")),
-        ", but an end is free; hold it, or leave stretching out$",
-        [
-            lambda: blow(bar("clamped", "hinged", theory="timoshenko")),
-            lambda: linear(bar("clamped", "free", theory="timoshenko")),
-        ],
-    ),
-    "several bodies": (
-        lambda: together(replace(plate(), stretches=True)),
-        "can only be struck once, by `fi.strike`; leave stretching out$",
-        [lambda: blow(replace(plate(), stretches=True)), lambda: together(plate())],
-    ),
-    "collocation": (
-        lambda: blow(plate(), scheme="collocation"),
-        "does not support stretching; use A4$",
-        [lambda: blow(plate(), scheme="A4")],
-    ),
+    "a mass": (lambda: blow(fi.Modes.rigid(1.0)), r", but (?:a mass has none|\{\}); leave it out$",
+     [lambda: linear(fi.Modes.rigid(1.0))]),
+    "a scaled plate": (lambda: blow(scaled()), r", but (?:its section is not known|\{\}); leave it out$",
+     [lambda: linear(scaled())]),
+    "a disk that only moves rigidly": (lambda: blow(disk("free").truncated(n_modes=3)),
+     ", but it has no mode that bends; leave it out$", [lambda: linear(disk("free").truncated(n_modes=3))]),
+    "modes at points": (lambda: blow(measured()), ", but its shapes are known at points only; leave it out$",
+     [lambda: linear(measured())]),
+    "a plate on springs": (lambda: blow(elements({"boundary": fi.Elastic(1e6, 0.0)})),
+     r", but (?:its edge is elastic, which does not say how .*|\{\}); hold it, or leave stretching out$",
+     [lambda: blow(elements()), lambda: linear(elements({"boundary": fi.Elastic(1e6, 0.0)}))]),
+    "elements without slopes": (lambda: blow(elements(element="morley")),
+     "does not work with element 'morley'; take 'argyris', or leave stretching out$",
+     [lambda: blow(elements(element="argyris")), lambda: linear(elements(element="morley"))]),
+    "a cantilever": (lambda: blow(bar("clamped", "free")), ", but an end is free; hold it, or leave stretching out$",
+     [lambda: blow(bar("clamped", "hinged")), lambda: linear(bar("clamped", "free"))]),
+    "a cantilever by elements": (lambda: blow(strip("free")), ", but an end is free; hold it, or leave stretching out$",
+     [lambda: blow(strip("hinged")), lambda: linear(strip("free"))]),
+    "a stout cantilever": (lambda: blow(bar("clamped", "free", theory="timoshenko")),
+     ", but an end is free; hold it, or leave stretching out$",
+     [
+        lambda: blow(bar("clamped", "hinged", theory="timoshenko")),
+        lambda: linear(bar("clamped", "free", theory="timoshenko")),
+    ]),
+    "several bodies": (lambda: together(replace(plate(), stretches=True)),
+     "can only be struck once, by `fi.strike`; leave stretching out$",
+     [lambda: blow(replace(plate(), stretches=True)), lambda: together(plate())]),
+    "collocation": (lambda: blow(plate(), scheme="collocation"), "does not support stretching; use A4$",
+     [lambda: blow(plate(), scheme="A4")]),
 }
+# fmt: on
 
 
 @pytest.mark.parametrize("name", STRETCHING)

@@ -1,36 +1,28 @@
 """The list of named numbers: each is told, and what is written of the tests that hold them is true of this tree."""
 
 import ast
-import importlib.util
 from pathlib import Path
 
+import constants as study
 import pytest
 
 ROOT = Path(__file__).parents[1]
 
 
-@pytest.fixture(scope="module")
-def study():
-    spec = importlib.util.spec_from_file_location("constants", ROOT / "studies" / "constants.py")
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
-
-
-def test_every_number_is_told(study):
+def test_every_number_is_told():
     silent = [each.path for each in study.constants() if each.kind != "layout" and len(each.comment.split()) < 3]
     assert not silent, "say in a comment what they are and why they are so large"
 
 
-def test_the_tests_that_hold_constants_exist(study):
+def test_the_tests_that_hold_constants_exist():
     present = {each.path for each in study.constants()}
     for path, row in study.recorded().items():
-        assert path in present, f"{path} is gone: remove its line from studies/constants.csv"
+        assert path in present, f"{path} is gone: remove its line from studies/verification/constants.csv"
         if "::" in row["holder"]:
             file, name = row["holder"].split("::")[:2]
             tests = {node.name for node in ast.walk(ast.parse((ROOT / file).read_text(encoding="utf-8")))
                      if isinstance(node, ast.FunctionDef)}  # fmt: skip
-            assert name.partition("[")[0] in tests, f"python studies/constants.py --hold {path} --again"
+            assert name.partition("[")[0] in tests, f"python studies/verification/constants.py --hold {path} --again"
 
 
 @pytest.mark.parametrize(
@@ -43,12 +35,12 @@ def test_the_tests_that_hold_constants_exist(study):
         ("2.0**0.5", 2.0, 8.0**0.5),
     ],
 )
-def test_a_constant_is_changed_by_a_factor(study, text, factor, value):
+def test_a_constant_is_changed_by_a_factor(text, factor, value):
     new = ast.fix_missing_locations(ast.Expression(study.changed(ast.parse(text, mode="eval").body, factor)))
     assert eval(compile(new, "here", "eval")) == pytest.approx(value, rel=1e-15)
 
 
-def test_kinds_follow_from_comments(study):
+def test_kinds_follow_from_comments():
     def kind(comment, value="0.3", module="fe.here", told=False):
         return study.Constant(module, "HERE", value, comment, told).kind
 

@@ -8,7 +8,7 @@ from rich.console import Console
 from scenes import SMALL
 
 import fem_impact as fi
-from fem_impact import cli, display
+from fem_impact import display
 from fem_impact._base.progress import foresee, heard, report
 from fem_impact.display import Display
 
@@ -154,12 +154,11 @@ def test_hammers_that_take_longer_than_the_first_ones_are_announced_again(clock)
     assert said[1:] == ["longer than predicted: 6 hammers: about 26 s more; Ctrl-C stops it"]
 
 
-def test_nothing_is_written_where_stderr_is_not_a_terminal(tmp_path, capsys):
+def test_nothing_is_written_where_stderr_is_not_a_terminal(tmp_path, prompt):
     (tmp_path / "scene.toml").write_text(SMALL)
-    name = str(tmp_path / "scene.toml")
-    assert cli.main(["strike", name, "--out", str(tmp_path / "o"), "--tolerance", "0.1"]) == 0
-    assert cli.main(["hammer", name, "--bandwidth", "300", "--masses", "0.01"]) == 0
-    assert capsys.readouterr().err == ""
+    for words in ("strike scene.toml --tolerance 0.1", "hammer scene.toml --bandwidth 300 --masses 0.01"):
+        said = prompt(words)
+        assert (said.status, said.err) == (0, "")
 
 
 def test_modes_hammers_and_maps_report_their_counts(tmp_path):
@@ -180,8 +179,7 @@ def test_modes_hammers_and_maps_report_their_counts(tmp_path):
 
 
 def test_a_quiet_display_shows_nothing_even_on_a_terminal():
-    shown = Display(shown=False)
-    shown.console = Console(file=io.StringIO(), force_terminal=True, width=80, legacy_windows=False)
+    shown = on_terminal(80, shown=False)
     with shown("modes"):
         report("modes", 1, 2)
     assert shown.console.file.getvalue() == ""

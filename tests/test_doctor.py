@@ -1,6 +1,6 @@
 """The examination finds this very installation sound, and says so when it is not."""
 
-from fem_impact import cli, doctor
+from fem_impact import doctor
 from fem_impact.show import pictures
 
 
@@ -11,22 +11,17 @@ def test_this_installation_is_sound(monkeypatch):
     assert all(finding.remedy == "" for finding in findings)
 
 
-def test_what_fails_comes_with_its_remedy_and_reason(monkeypatch, capsys):
+def test_what_fails_comes_with_its_remedy_and_reason_and_missing_rendering_is_no_failure(monkeypatch, prompt):
     def fail():
         raise OSError("no font")
 
+    monkeypatch.setattr(pictures, "can_render", lambda: False)
+    said = prompt("doctor")
+    assert said.status == 0 and "3-D rendering          missing" in said.out
     monkeypatch.setattr(doctor, "_picture", fail)
-    monkeypatch.setattr(pictures, "can_render", lambda: False)
-    assert cli.main(["doctor"]) == 1
-    captured = capsys.readouterr()
-    assert "reinstall matplotlib (OSError: no font)" in " ".join(captured.out.split())
-    assert captured.err == "fem-impact: pictures: not working; see above\n"
-
-
-def test_missing_rendering_is_no_failure(monkeypatch, capsys):
-    monkeypatch.setattr(pictures, "can_render", lambda: False)
-    assert cli.main(["doctor"]) == 0
-    assert "3-D rendering          missing" in capsys.readouterr().out
+    said = prompt("doctor")
+    assert said.status == 1 and "reinstall matplotlib (OSError: no font)" in " ".join(said.out.split())
+    assert said.err == "fem-impact: pictures: not working; see above\n"
 
 
 def test_wrong_numbers_are_a_failure(monkeypatch):

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from signatures import everything
 
 import fem_impact as fi
 
@@ -13,23 +14,7 @@ STUDIES = Path(__file__).parents[1] / "studies"
 EXTRAS = {"export.write_uff": "pyuff"}
 
 
-def public():
-    """Name and object of every public function and class, and of their public named constructors."""
-    for name in fi.__all__:
-        thing = getattr(fi, name)
-        if inspect.ismodule(thing):
-            for key, value in inspect.getmembers(thing, inspect.isfunction):
-                if not key.startswith("_") and value.__module__.startswith(thing.__name__):  # not one that it uses
-                    yield f"{name}.{key}", value
-        elif inspect.isclass(thing):
-            yield name, thing
-            yield from ((f"{name}.{key}", getattr(thing, key)) for key, made in vars(thing).items()
-                        if isinstance(made, classmethod) and not key.startswith("_"))  # fmt: skip
-        elif callable(thing):
-            yield name, thing
-
-
-SHOWN = {name: thing.__doc__ for name, thing in public() if ">>>" in (thing.__doc__ or "")}
+SHOWN = {name: item.__doc__ for name, item in everything().items() if ">>>" in (item.__doc__ or "")}
 
 
 @pytest.mark.parametrize("name", SHOWN)
@@ -46,7 +31,8 @@ def test_an_example_prints_what_it_says(name, tmp_path, monkeypatch):
 
 def test_every_function_of_the_first_rank_has_one():
     """All of `fi.name`, every mesh, body, striker and contact there is to make."""
-    constructors = {name for name, _ in public() if name.startswith(("Striker.", "Contact.", "Beam.", "Modes."))}
+    kinds = ("Striker.", "Contact.", "Beam.", "Modes.")
+    constructors = {name for name, item in everything().items() if name.startswith(kinds) and inspect.ismethod(item)}
     made = {f"mesh.{name}" for name in ("rectangle", "disk", "polygon", "line", "outline", "load", "save")}
     made |= {f"analytic.{name}" for name in ("rectangle", "beam", "disk")}
     functions = {name for name in fi.__all__ if inspect.isfunction(getattr(fi, name))}

@@ -6,21 +6,18 @@ from importlib import import_module
 from pathlib import Path
 
 import numpy as np
+import other_choices
 import pytest
+import source_scenes as source
 from numpy.testing import assert_allclose
 
 import fem_impact as fi
 
-STUDIES = Path(__file__).parents[1] / "studies"
-
-
-@pytest.fixture(autouse=True)
-def studies_importable(monkeypatch):
-    monkeypatch.syspath_prepend(str(STUDIES))
+FIGURES = Path(__file__).parents[1] / "studies" / "figures"
 
 
 def study(number):
-    return import_module(f"fig{number:02d}" if isinstance(number, int) else number)
+    return import_module(f"fig{number:02d}")
 
 
 def dips(frequency, level):
@@ -71,7 +68,7 @@ def test_fig06_a_higher_contact_resonance_reaches_higher():
 
 
 def test_fig08_half_sine_and_a_hertz_pulse_of_the_same_duration():
-    source, fig08 = study("source_scenes"), study(8)
+    fig08 = study(8)
     linear, hertz = fig08.compute()
     assert linear.n_impacts == hertz.n_impacts == 1
     duration = np.pi * np.sqrt(source.MARKED[0] / 3.0 / source.MARKED[1])
@@ -108,7 +105,6 @@ def test_fig09_the_hertz_pulse_has_a_wider_low_band_and_lower_lobes():
 
 @pytest.mark.parametrize(("number", "exponent"), [(10, 1.0), (12, 1.5)])
 def test_fig10_fig12_contact_time_follows_the_contact_resonance(number, exponent):
-    source = study("source_scenes")
     stiffnesses = (source.STIFFNESSES if exponent == 1.0 else source.HERTZ_STIFFNESSES)[::6]
     table = study(number).compute(masses=source.MASSES[::6], stiffnesses=stiffnesses, max_frequency=None)
     resonance = table.contact_resonance.values
@@ -124,7 +120,6 @@ def test_fig10_fig12_contact_time_follows_the_contact_resonance(number, exponent
 @pytest.mark.parametrize(("number", "exponent"), [(11, 1.0), (13, 1.5)])
 @pytest.mark.parametrize("band", [2e3, 5e3, 20e3])
 def test_fig11_fig13_the_centroid_follows_the_same_contours_in_any_band(number, exponent, band):
-    source = study("source_scenes")
     stiffnesses = (source.STIFFNESSES if exponent == 1.0 else source.HERTZ_STIFFNESSES)[::9]
     table = study(number).compute(masses=source.MASSES[[1, 7, 19]], stiffnesses=stiffnesses, max_frequency=band)
     order = np.argsort(table.contact_resonance.values.ravel())
@@ -160,7 +155,6 @@ def test_fig17_thresholds_fall_and_the_free_end_is_lowest():
 
 
 def test_fig18_two_kilograms_change_next_to_nothing():
-    source = study("source_scenes")
     few = {"masses": source.MASSES[3::8], "stiffnesses": source.STIFFNESSES[::6], "max_frequency": None}
     heavy, medium = study(10).compute(**few), study(18).compute(**few)
     assert (medium.n_impacts == 1).all()
@@ -168,7 +162,6 @@ def test_fig18_two_kilograms_change_next_to_nothing():
 
 
 def test_fig19_two_hundred_grams_change_the_upper_right():
-    source = study("source_scenes")
     few = {"masses": source.MASSES[[2, 14, 18]], "stiffnesses": source.STIFFNESSES[[0, 4, 16, 19]]}
     heavy, light = study(10).compute(**few, max_frequency=None), study(19).compute(**few, max_frequency=None)
     change = np.abs(light.contact_time / heavy.contact_time - 1.0).values
@@ -178,7 +171,7 @@ def test_fig19_two_hundred_grams_change_the_upper_right():
 
 @pytest.mark.parametrize(("at", "humps"), [("AT", True), ("MIDDLE", False)])
 def test_fig20_the_threshold_lies_inside_the_region_of_several_impacts(at, humps):
-    source, fig20 = study("source_scenes"), study(20)
+    fig20 = study(20)
     few = {"masses": source.MASSES[1::3], "stiffnesses": source.STIFFNESSES[1::2], "max_frequency": None}
     table = fig20.compute(getattr(source, at, None) or fig20.MIDDLE, humps=humps, **few)
     several, beyond = ~table.clean, table.ratio >= 1.0
@@ -188,7 +181,7 @@ def test_fig20_the_threshold_lies_inside_the_region_of_several_impacts(at, humps
 
 
 def test_fig20_marked_cases_lie_where_the_source_has_them():
-    source, fig20 = study("source_scenes"), study(20)
+    fig20 = study(20)
     table = fig20.compute(masses=[source.MARKED[0]], stiffnesses=source.STIFFNESSES[7:], max_frequency=None)
     clean, ratio = table.clean.values[:, 0], table.ratio.values[:, 0]
     assert not clean[2]  # figure 21 is coloured ...
@@ -199,7 +192,6 @@ def test_fig20_marked_cases_lie_where_the_source_has_them():
 
 
 def test_fig19_differs_where_there_are_several_impacts():
-    source = study("source_scenes")
     few = {"masses": source.MASSES[::4], "stiffnesses": source.STIFFNESSES[::3], "max_frequency": None}
     clean = study(20).compute(**few).clean.values
     change = np.abs(study(19).compute(**few).contact_time / study(10).compute(**few).contact_time - 1.0).values
@@ -211,11 +203,11 @@ def test_fig21_two_humps_in_one_contact():
     hits = study(21).compute()
     assert [hit.n_impacts for hit in hits.values()] == [1, 1, 1]
     assert_allclose(hits["200 g"].contact_time, 3.11e-3, atol=0.01e-3)  # printed digits
-    humps = study("source_scenes").humps
-    assert_allclose(humps(hits["200 g"]), [[0.66e-3, 27.1], [2.36e-3, 9.6]], rtol=0.02)  # printed digits, flat tops
+    humps = source.humps(hits["200 g"])
+    assert_allclose(humps, [[0.66e-3, 27.1], [2.36e-3, 9.6]], rtol=0.02)  # printed digits, flat tops
     assert 0.8 < hits["2 kg"].peak_force / hits["500 t"].peak_force < 1.0  # "slightly smaller"
     assert_allclose(hits["2 kg"].contact_time, hits["500 t"].contact_time, rtol=0.02)  # "very similar" otherwise
-    assert len(humps(hits["2 kg"])) == len(humps(hits["500 t"])) == 1
+    assert len(source.humps(hits["2 kg"])) == len(source.humps(hits["500 t"])) == 1
     red = study(8).compute()[0]
     assert_allclose(hits["500 t"].force, red.force, atol=1e-9 * red.peak_force)  # "the same as the red curve in Fig. 8"
 
@@ -245,7 +237,7 @@ def test_fig23_fig24_dips_get_shallower_as_the_plate_gets_lighter(number, reach)
         assert deepest["500 t"][0, 1] < deepest["200 g"][:, 1].min() - 5.0
 
 
-SCRIPTS = sorted(path.stem for name in ("fig", "beyond_") for path in STUDIES.glob(f"{name}*.py"))
+SCRIPTS = sorted(path.stem for name in ("fig", "beyond_") for path in FIGURES.glob(f"{name}*.py"))
 QUICK = ("fig05", "fig07", "fig14", "fig16")
 
 
@@ -254,7 +246,7 @@ QUICK = ("fig05", "fig07", "fig14", "fig16")
 )
 def test_a_script_alone_writes_picture_and_data(name, tmp_path, monkeypatch):
     monkeypatch.setattr("sys.argv", [f"{name}.py", str(tmp_path)])
-    runpy.run_path(str(STUDIES / f"{name}.py"), run_name="__main__")
+    runpy.run_path(str(FIGURES / f"{name}.py"), run_name="__main__")
     assert (tmp_path / f"{name}.png").read_bytes()[:4] == b"\x89PNG"
     with (tmp_path / f"{name}.csv").open(newline="") as file:
         head, *rows = csv.reader(file)
@@ -265,14 +257,13 @@ def test_a_script_alone_writes_picture_and_data(name, tmp_path, monkeypatch):
 
 def claims():
     """What other_choices.py measures, at two choices other than those of the figures."""
-    others = pytest.MonkeyPatch()
-    with others.context() as patch:
-        patch.syspath_prepend(str(STUDIES))
-        script = study("other_choices")
     return [
         pytest.param(claim, choice, id=f"fig{claim.figures}-{claim.text}-{choice.place}")
-        for choice in (script.CHOICES[8], script.CHOICES[16])  # 2 % of damping near the figures' point, 0.5 % away
-        for claim in script.CLAIMS
+        for choice in (
+            other_choices.CHOICES[8],
+            other_choices.CHOICES[16],
+        )  # 2 % of damping near the figures' point, 0.5 % away
+        for claim in other_choices.CLAIMS
         if choice.place in claim.places
     ]
 
@@ -292,7 +283,7 @@ def test_fig17_the_edge_is_lowest_because_it_is_free():
 
 @pytest.mark.parametrize("line", [0.5, 0.3, 0.15])
 def test_fig15_holds_on_other_lines_across_the_plate(line):
-    source, fig14, fig15 = study("source_scenes"), study(14), study(15)
+    fig14, fig15 = study(14), study(15)
     points = {place: (place * source.LENGTH, line * source.WIDTH) for place in fig14.PLACES}
     result = fig15.thresholds(source.plate(0.2), points, HAMMERS)
     heavy = HAMMERS > 4e-3  # "a few grams"

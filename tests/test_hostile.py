@@ -64,7 +64,7 @@ def edited(text, key, value):
 @pytest.mark.parametrize(
     "text, key, status, words",
     [
-        (QUICK, "stiffness", 1, "no tolerance is large enough; take a contact with stiffness"),
+        (QUICK, "stiffness", 1, "take a larger tolerance, or a contact with stiffness"),
         (DISK, "angle", 0, "turns; rad are expected"),
         (TIN, "loss", 2, "[contact] loss must lie between 0 and 1e+12 s/m"),
     ],

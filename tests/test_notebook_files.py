@@ -2,10 +2,10 @@
 
 import json
 import re
+from importlib import import_module
 from pathlib import Path
 
 import pytest
-from test_studies import study
 
 HOME = Path(__file__).parents[1] / "studies" / "notebooks"
 FILES = sorted(HOME.glob("*.ipynb"))
@@ -45,7 +45,7 @@ def test_no_notebook_tells_where_or_when_it_was_run(path):
 def test_the_outputs_are_those_of_a_run(path):
     pytest.importorskip("nbclient", reason="nbclient is not installed")
     pytest.importorskip("ipykernel", reason="ipykernel is not installed")
-    kept, fresh = outputs(json.loads(path.read_text())), outputs(study("notebooks/run").executed(path))
+    kept, fresh = outputs(json.loads(path.read_text())), outputs(import_module("notebooks.run").executed(path))
     assert [kinds for kinds, _ in kept] == [kinds for kinds, _ in fresh]
     for (_, before), (_, after) in zip(kept, fresh):
         # columns are as wide as their numbers

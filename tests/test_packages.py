@@ -15,7 +15,7 @@ ORDER = [
 OWNERS = {
     "numba": ("impact/compiled/",),
     "skfem": ("fe/elements.py", "fe/beam_elements.py", "fe/thick.py", "fe/shear_beam.py"),
-    "matplotlib": ("show/figures.py", "show/plots.py"),
+    "matplotlib": ("show/figures.py", "show/plots.py", "show/style.py"),
 }
 MODULES = sorted(path for path in HOME.rglob("*.py") if path.name != "__init__.py")
 
@@ -61,10 +61,40 @@ def test_a_package_says_what_it_is_for_and_where_to_start(name):
     assert name == "impact/compiled" or any(f"`{module}`" in text for module in modules)
 
 
+MODELS = {"model.planner", "model.target", "modes.modal", "scenes.scene"}
+BLOWS = {f"impact.{name}" for name in ("collision", "contact", "response", "striker")}
+DOORS = {  # what these packages may use of those above: what a user does, and modules that hide how a blow is computed
+    "live": MODELS | BLOWS | {"impact.played", "modes.viewing", "show.sampling", "show.sound"},
+    "taps": MODELS | BLOWS | {
+        "fe.assembly", "impact.accuracy", "impact.engine", "impact.history", "impact.quantities", "impact.reduced_body",
+        "impact.spectra", "scenes.schema", "show.export", "show.plots", "show.sampling", "sweeps.bodies",
+        "sweeps.hammers",
+    },
+    "designs": MODELS | BLOWS | {
+        "fe.assembly", "fe.section", "fe.variation", "impact.clearance", "impact.gradient", "impact.parameters",
+        "impact.promise", "impact.quantities", "mesh.meshes", "model.budget", "modes.varied", "taps.arguments",
+        "taps.solver", "taps.unknowns",
+    },
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", DOORS)
+def test_live_taps_and_designs_reach_into_no_other_package(name):
+    for path in sorted((HOME / name).glob("*.py")):
+        tree, used = ast.parse(path.read_text()), set()
+        for node in (item for item in ast.walk(tree) if isinstance(item, ast.ImportFrom) and item.level == 2):
+            names = [alias.name for alias in node.names]
+            assert not any(each.startswith("_") for each in names), f"{path.name} imports private {names}"
+            used |= {node.module} if "." in node.module else {f"{node.module}.{each}" for each in names}
+        foreign = {each for each in used if not each.startswith("_base.")} - DOORS[name]
+        assert not foreign, f"{path.name} imports from {sorted(foreign)}"
+
+
 NOT_MIRRORED = {  # tested under the name of what uses them
-    "_base/check.py", "mesh/meshio_reader.py", "pages/explore_view.py", "scenes/maps.py", "scenes/schema.py",
-    "show/plots.py", "model/asked.py", "model/by_idealisation.py", "model/by_mixture.py",
-    "model/by_vectors.py",
+    "_base/check.py", "fe/euler.py", "fe/interpolation.py", "fe/kirchhoff.py", "fe/plates.py", "fe/system.py",
+    "impact/played.py", "mesh/meshio_reader.py", "model/asked.py", "model/budget.py", "model/by_idealisation.py",
+    "model/by_mixture.py", "model/by_vectors.py", "pages/explore_server.py", "pages/explore_view.py",
+    "scenes/maps.py", "scenes/schema.py", "show/plots.py", "show/style.py",
 }  # fmt: skip
 
 

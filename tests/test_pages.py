@@ -1,11 +1,13 @@
 """The pages: links and anchors resolve, pages made by scripts are current, what they quote is still said."""
 
-import importlib.util
 import re
 from functools import cache
 from pathlib import Path
 
+import api
+import commands
 import pytest
+import scene_keys
 
 from fem_impact._base import explained
 from fem_impact.impact import assumption
@@ -61,15 +63,17 @@ def test_a_page_has_one_title_and_comes_first(path):
 
 @pytest.mark.parametrize("name", ["README", "studies/README", "studies/guide", "studies/limits", "studies/notes"])
 def test_files_named_in_sentences_exist(name):
-    named = re.findall(r"`((?:studies|tests|meshes)/[\w./]+)`", prose(ROOT / f"{name}.md"))
-    assert all((ROOT / each).exists() for each in named)
+    text = prose(ROOT / f"{name}.md")
+    named = re.findall(r"`((?:studies|tests|meshes)/[\w./]+)`", text)
+    named += [
+        f"studies/{each}" for each in re.findall(r"`((?:figures|tutorials|verification|benchmarks)/[\w.]+)`", text)
+    ]
+    assert [each for each in named if not (ROOT / each).exists()] == []
 
 
-def test_the_page_of_scene_keys_is_current():
-    spec = importlib.util.spec_from_file_location("scene_keys", ROOT / "studies" / "scene_keys.py")
-    script = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(script)
-    assert script.PAGE.read_text(encoding="utf-8") == script.page(), "run python studies/scene_keys.py"
+@pytest.mark.parametrize("script", [api, commands, scene_keys], ids=lambda script: script.__name__)
+def test_pages_made_by_scripts_are_current(script):
+    assert script.PAGE.read_text(encoding="utf-8") == script.page(), f"run python studies/{script.__name__}.py"
 
 
 def sayings():

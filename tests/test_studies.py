@@ -1,33 +1,34 @@
 """The studies still reproduce what they were made to show."""
 
-import importlib.util
 import re
-import sys
 from pathlib import Path
 
+import assumptions
+import attack
+import design_drumstick as drumstick
+import design_hammer as hammer
+import design_marimba as marimba
+import effectivity
+import extremes
+import fit_coverage as coverage
+import frontier
+import is_the_model_right as right
 import numpy as np
 import pytest
+import roll
+import scene_speed as speed
+import sdnl32
+import shared
 
 STUDIES = Path(__file__).parents[1] / "studies"
-sys.path.append(str(STUDIES))  # for what they share
-
-
-def study(name):
-    """A study script as a module."""
-    spec = importlib.util.spec_from_file_location(name, STUDIES / f"{name}.py")
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
 
 
 def test_sdnl32_stays_within_the_published_values():
-    sdnl32 = study("sdnl32")
     difference = sdnl32.tip_displacement() - 1e-3 * sdnl32.PUBLISHED
     assert np.abs(difference).max() < sdnl32.ACCEPTED  # 0.033 mm measured, at 3 ms; the others below 0.01 mm
 
 
 def test_sdnl32_does_not_depend_on_the_modes_kept():
-    sdnl32 = study("sdnl32")
     change = sdnl32.tip_displacement(12) - sdnl32.tip_displacement(40)
     assert np.abs(change).max() < 3e-6  # the dip of the tip under 80 N that modes 13 to 40 make: 1.6e-6 m
 
@@ -36,7 +37,6 @@ def test_sdnl32_does_not_depend_on_the_modes_kept():
 @pytest.mark.xdist_group("stretched")  # one worker compiles its kernels
 @pytest.mark.parametrize("kind", ["stretching", "air", "quasi-static contact", "damping"])
 def test_the_models_own_error_is_told_in_random_scenes(kind):
-    assumptions = study("assumptions")
     chatter = [37, 72] if kind == "stretching" else []  # a first touch so short that few waves have left it
     for seed in [*range(105, 108), *chatter]:  # the first not of the study's table
         assert assumptions.judge(kind, seed)["verdict"] in ("right", "silent", "beyond", "hardly beyond")
@@ -44,7 +44,6 @@ def test_the_models_own_error_is_told_in_random_scenes(kind):
 
 @pytest.mark.slow
 def test_random_scenes_keep_their_promise():
-    effectivity = study("effectivity")
     cases = [effectivity.examine(number) for number in range(1001, 1026) if number % effectivity.SEARCHED]
     judged = [case for case in cases if case.verdict == "judged"]
     assert len(judged) > 15
@@ -56,7 +55,6 @@ def test_random_scenes_keep_their_promise():
 
 def test_effectivity_tells_what_it_could_not_judge(tmp_path, monkeypatch, capsys):
     """Scenes that take too long or rattle are counted, and a run goes on where another stopped."""
-    effectivity = study("effectivity")
     run = ["--by-elements", "--scenes", "1", "--file", str(tmp_path / "cases.csv"), "--out", str(tmp_path)]
     effectivity.main([*run, "--first", "50"])
     told = capsys.readouterr().out
@@ -74,7 +72,6 @@ def test_effectivity_tells_what_it_could_not_judge(tmp_path, monkeypatch, capsys
 
 
 def test_attacks_go_on_where_they_stopped(tmp_path, capsys):
-    attack = study("attack")
     run = ["--file", str(tmp_path / "cases.csv"), "--truths", str(tmp_path / "truths")]
     attack.main([*run, "--count", "2"])
     first = (tmp_path / "cases.csv").read_text()
@@ -89,7 +86,6 @@ def test_attacks_go_on_where_they_stopped(tmp_path, capsys):
 
 @pytest.mark.slow
 def test_extremes_are_right_flagged_or_refused():
-    extremes = study("extremes")
     for axis, values in extremes.AXES.items():
         some = values[:: max(1, len(values) // 6)]
         found = [extremes.judge(axis, float(x), extremes.BASIS | {axis: x}) for x in some]
@@ -98,7 +94,6 @@ def test_extremes_are_right_flagged_or_refused():
 
 
 def test_a_wrong_answer_at_the_extremes_would_be_seen(monkeypatch):
-    extremes = study("extremes")
     exact = extremes.difference
     monkeypatch.setattr(extremes, "difference", lambda hit, other: exact(hit, other) + 2e-3)
     assert extremes.judge("mass", 1.0, dict(extremes.BASIS)).kind == "wrong"
@@ -106,8 +101,6 @@ def test_a_wrong_answer_at_the_extremes_would_be_seen(monkeypatch):
 
 @pytest.mark.slow
 def test_the_tolerance_walks_along_the_edge_of_what_is_possible(tmp_path, monkeypatch):
-    monkeypatch.syspath_prepend(str(STUDIES))
-    frontier = study("frontier")
     monkeypatch.setattr(frontier, "TOLERANCES", [1e-2, 1e-3, 1e-4])
     monkeypatch.setattr(frontier, "REPEATS", 1)
     whole = frontier.scene("fe", tmp_path)
@@ -123,8 +116,7 @@ def test_the_tolerance_walks_along_the_edge_of_what_is_possible(tmp_path, monkey
 
 @pytest.mark.slow
 def test_a_scene_is_measured_within_limits_and_stopped_beyond_them(tmp_path, monkeypatch, capsys):
-    speed = study("scene_speed")
-    path = speed.HERE / "scenes" / "everyday" / "marimba_yarn.toml"
+    path = shared.SCENES / "everyday" / "marimba_yarn.toml"
     assert speed.measured(path, 1e-2, {}, (0.01, 4.0)) == {"verdict": "over time", "seconds": 0.01}
     assert speed.measured(path, 1e-2, {}, (120.0, 1e-6))["verdict"] == "over memory"
     monkeypatch.setattr("sys.argv", ["", "--only", "marimba_yarn", "--ratio", "--out", str(tmp_path / "speed.csv")])
@@ -136,7 +128,6 @@ def test_a_scene_is_measured_within_limits_and_stopped_beyond_them(tmp_path, mon
 
 
 def test_a_scene_that_is_refused_says_so_in_its_row(tmp_path):
-    speed = study("scene_speed")
     path = tmp_path / "scene.toml"
     path.write_text(speed.NAMED["bronze_disk"][0])
     row = speed.strike(path, 1e-2, {"n_modes": 5000})
@@ -144,13 +135,12 @@ def test_a_scene_that_is_refused_says_so_in_its_row(tmp_path):
 
 
 def test_the_blows_of_the_study_are_the_everyday_scenes_and_five_more():
-    names = study("scene_speed").cases()
+    names = speed.cases()
     assert len(names) == 29 and "marimba_yarn" in names and "bronze_disk 0.0001" in names
 
 
 def test_the_coverage_of_intervals_is_what_the_file_says():
-    coverage = study("fit_coverage")
-    found = coverage.judge(coverage.read(STUDIES / "fit_coverage.csv"))
+    found = coverage.judge(coverage.read(STUDIES / "verification" / "fit_coverage.csv"))
     held, called, false = (good / count for good, count in found.values())
     count = next(iter(found.values()))[1]
     assert count > 200
@@ -160,7 +150,6 @@ def test_the_coverage_of_intervals_is_what_the_file_says():
 
 @pytest.mark.slow
 def test_a_new_set_of_taps_is_fitted_as_the_file_says(tmp_path):
-    coverage = study("fit_coverage")
     rows = coverage.examine(7)  # a wall: mass and stiffness cannot be told
     told = {each["name"]: each for each in rows}
     assert told["striker.mass"]["told"] == told["contact.stiffness"]["told"] == "open"
@@ -168,7 +157,6 @@ def test_a_new_set_of_taps_is_fitted_as_the_file_says(tmp_path):
 
 
 def test_the_model_of_a_wooden_bar_struck_fast_fails_first_as_it_yields(tmp_path, capsys, monkeypatch):
-    right = study("is_the_model_right")
     soft, hard = (right.effects(right.scene("wood", 0.02, speed).strike()) for speed in (1e-3, 10.0))
     assert max(soft, key=soft.get) != "no yielding" and soft["no yielding"] == 0.0
     assert max(hard, key=hard.get) == "no yielding" and hard["no yielding"] > 0.2
@@ -183,7 +171,7 @@ def test_the_model_of_a_wooden_bar_struck_fast_fails_first_as_it_yields(tmp_path
 @pytest.mark.slow
 @pytest.mark.xdist_group("stretched")
 def test_a_plate_with_and_without_stretching_is_drawn(tmp_path, capsys):
-    study("is_the_model_right").stretched(tmp_path / "stretching.png")
+    right.stretched(tmp_path / "stretching.png")
     rows = [[float(x) for x in line.split()] for line in capsys.readouterr().out.splitlines()[2:]]
     assert (tmp_path / "stretching.png").stat().st_size > 10_000 and len(rows) == 13
     for _, linear, depth, true, told, left in rows[:8]:  # up to half a thickness
@@ -192,7 +180,6 @@ def test_a_plate_with_and_without_stretching_is_drawn(tmp_path, capsys):
 
 
 def test_what_is_not_known_gets_a_question_mark():
-    right = study("is_the_model_right")
     hit = right.fi.load_scene(STUDIES / "scenes" / "everyday" / "marimba_yarn.toml").strike()
     assert np.isnan(right.effects(hit)["no yielding"])
     assert right.table([{"scene": "a", "still air": "?"}]) == "| scene | still air |\n| --- | --- |\n| a | ? |"
@@ -200,8 +187,6 @@ def test_what_is_not_known_gets_a_question_mark():
 
 @pytest.mark.slow
 def test_a_stiffer_hand_buzzes_faster_and_a_damped_one_stops_sooner(monkeypatch):
-    monkeypatch.syspath_prepend(str(STUDIES))
-    roll = study("roll")
     struck = {name: body for name, body in roll.bodies(highest=600.0).items() if name != "cymbal"}
     found = roll.compute(struck, np.array([10.0, 1000.0]))
     for name in struck:
@@ -214,8 +199,7 @@ def test_a_stiffer_hand_buzzes_faster_and_a_damped_one_stops_sooner(monkeypatch)
 
 
 @pytest.mark.slow
-def test_a_marimba_bar_is_tuned_within_a_cent_and_its_mallet_suits(tmp_path, monkeypatch):
-    marimba = study("design_marimba")
+def test_a_marimba_bar_is_tuned_within_a_cent_and_its_mallet_suits(tmp_path):
     pitch, length = marimba.BARS["F4"]
     found = marimba.designed(pitch, length)
     checked = found.verify()
@@ -223,32 +207,27 @@ def test_a_marimba_bar_is_tuned_within_a_cent_and_its_mallet_suits(tmp_path, mon
     hit = checked.hits[""]
     assert hit.n_impacts == 1
     np.testing.assert_allclose(hit.contact_time, 0.5 / pitch, rtol=1e-5)  # asked to 1e-6, struck again to as much
-    monkeypatch.setattr(marimba, "PICTURE", tmp_path / "bars.png")
-    marimba.drawing.save(marimba.PICTURE, marimba.draw({"F4": found}))
-    assert marimba.PICTURE.stat().st_size > 10_000  # two panels
+    assert shared.save(tmp_path / "bars.png", marimba.draw({"F4": found})).stat().st_size > 10_000  # two panels
 
 
 def test_studies_save_pictures_in_the_format_of_the_command(tmp_path):
-    drawing = study("drawing")
     arguments = ["fig05.py", "--format", "svg", "out"]
-    assert drawing.taken(arguments) == ".svg" and arguments == ["fig05.py", "out"]
+    assert shared.taken(arguments) == ".svg" and arguments == ["fig05.py", "out"]
     arguments = ["fig05.py", "out", "--format=pdf"]
-    assert drawing.taken(arguments) == ".pdf" and arguments == ["fig05.py", "out"]
-    assert drawing.taken(["fig05.py"]) == ".png"
+    assert shared.taken(arguments) == ".pdf" and arguments == ["fig05.py", "out"]
+    assert shared.taken(["fig05.py"]) == ".png"
     with pytest.raises(SystemExit, match="--format must be one of png, pdf, svg, got 'bmp'"):
-        drawing.taken(["fig05.py", "--format", "bmp"])
+        shared.taken(["fig05.py", "--format", "bmp"])
 
 
 def test_every_picture_of_a_study_is_saved_in_one_place():
-    for path in STUDIES.glob("*.py"):
+    for path in STUDIES.rglob("*.py"):
         text = path.read_text(encoding="utf-8")
-        assert path.name == "drawing.py" or not re.search(r"savefig\(|figures\.save\(", text), path.name
+        assert path.name == "shared.py" or not re.search(r"savefig\(|figures\.save\(", text), path.name
 
 
 @pytest.mark.slow
 def test_the_heaviest_hammer_is_held_by_the_corner_and_the_bandwidth(monkeypatch):
-    monkeypatch.syspath_prepend(str(STUDIES))
-    hammer = study("design_hammer")
     monkeypatch.setattr(hammer, "POINTS", {"corner": (0.02, 0.02), "middle": (0.3, 0.2)})  # the two that decide
     monkeypatch.setattr(hammer, "N_MODES", 90)
     found = hammer.designed(hammer.tutorial.plate(), "most")
@@ -264,7 +243,6 @@ def test_the_heaviest_hammer_is_held_by_the_corner_and_the_bandwidth(monkeypatch
 
 @pytest.mark.slow
 def test_a_tip_is_as_bright_as_wanted_at_two_dynamics():
-    drumstick = study("design_drumstick")
     body, wishes = drumstick.plate(80), drumstick.WISHES["dark"]
     found = drumstick.designed(body, *wishes)
     heard = drumstick.brightness(body, found.values, list(drumstick.DYNAMICS.values()))

@@ -45,9 +45,9 @@ def spread_compliance(length, width, h, E, nu, at, radius, n=3000):
 def by_rotations(mesh, h, n_modes, matrices):
     """First omega [rad/s] of a hard-hinged polygon, E = rho = 1: quartic deflection and rotations on graded triangles.
 
-    ``matrices`` of `studies/thick_elements.py` knows neither our elements nor our edges.
+    ``matrices`` of `studies/verification/thick_elements.py` knows neither our elements nor our edges.
     """
-    fine = around_corners(mesh, ["hinged"] * len(mesh.facets), Material(E=1.0, nu=0.3, rho=1.0))[2]
+    fine = around_corners(mesh, ["hinged"] * len(mesh.facets), Material(E=1.0, nu=0.3, rho=1.0))[1]
     plane = MeshTri(np.ascontiguousarray(fine.points.T), np.ascontiguousarray(fine.cells.T))
     deflection, rotation, K, M = matrices(plane, h, (ElementTriP4(), ElementTriP4()), False)
     n_w, across = deflection.N, {}

@@ -18,12 +18,9 @@ import numpy as np
 from .explained import pointed
 
 LONGEST = 500  # [-] characters quoted from a file or another library; longer text is cut
-FEW = 4  # [-] entries of an array that `brief` shows: some 50 characters, which fit on a line
 SHOWN = 80  # [-] characters quoted from a value the user passed; longer text is cut
 REACH = 1e75  # [-] largest number accepted; 1 / REACH is the smallest: the fourth power of both still fits a float
 MOST = 10**9  # [-] largest count accepted: more items would not fit into memory
-LONGEST_NAME = 255  # [byte] longest name of a file or folder on common file systems
-LONGEST_PATH = 4000  # [byte] longest path: Linux allows 4096
 SOURCES = {  # type -> how a user makes one, for error messages
     "Contact": "fi.Contact.hertz, linear or power",
     "Figure": "fi.figures",
@@ -155,10 +152,11 @@ def several(name: str, value: Any, kind: type) -> tuple:
 def path(name: str, value: Any) -> Path:
     """Return ``value`` as a path, or raise ValueError if it cannot be a file name."""
     text = os.fspath(value) if isinstance(value, (str, os.PathLike)) else None
+    # Linux allows 4096 bytes, and file systems 255 in a name
     try:
-        if isinstance(text, str) and "\0" not in text and 0 < len(os.fsencode(text)) <= LONGEST_PATH:
+        if isinstance(text, str) and "\0" not in text and 0 < len(os.fsencode(text)) <= 4000:
             path = Path(text)
-            if all(len(os.fsencode(part)) <= LONGEST_NAME for part in path.parts):
+            if all(len(os.fsencode(part)) <= 255 for part in path.parts):
                 return path
     except UnicodeEncodeError:
         pass
@@ -320,27 +318,23 @@ def nearest(word: Any, known: Iterable[str]) -> str:
     return f"; did you mean {names[close[0]]!r}?" if close else ""
 
 
-def brief(instance: Any) -> str:
-    """``__repr__`` of a dataclass in at most 1000 characters: arrays by their shape, other objects by their class."""
-    parts = []
-    for each in fields(instance):
-        value = getattr(instance, each.name)
-        if not each.repr or value is None:
-            continue
-        if isinstance(value, np.ndarray) and value.size > FEW:
-            text = f"array of shape {value.shape}"
-        elif is_dataclass(value) or callable(value):
-            text = getattr(value, "__name__", type(value).__name__)
-        else:
-            text = " ".join(shown(value).split())
-        parts.append(f"{each.name}={text}")
-    return f"{type(instance).__name__}({', '.join(parts):.900})"
-
-
 class Brief:
-    """A dataclass whose ``repr`` is at most 1000 characters, see `brief`."""
+    """A dataclass whose ``repr`` has at most 1000 characters: arrays by their shape, other objects by their class."""
 
-    __repr__ = brief
+    def __repr__(self) -> str:
+        parts = []
+        for each in fields(self):  # type: ignore[arg-type]
+            value = getattr(self, each.name)
+            if not each.repr or value is None:
+                continue
+            if isinstance(value, np.ndarray) and value.size > 4:  # more would not fit on a line
+                text = f"array of shape {value.shape}"
+            elif is_dataclass(value) or callable(value):
+                text = getattr(value, "__name__", type(value).__name__)
+            else:
+                text = " ".join(shown(value).split())
+            parts.append(f"{each.name}={text}")
+        return f"{type(self).__name__}({', '.join(parts):.900})"
 
 
 class Locked(Brief):

@@ -5,7 +5,9 @@ which an empty part is the working folder, too. A downloaded folder of scenes wi
 """
 
 import os
+import subprocess
 import sys
+from contextlib import suppress
 from pathlib import Path
 
 import numpy as np
@@ -38,3 +40,26 @@ def python(target: str, *arguments: str, **variables: str) -> tuple[list[str], d
     found = [str(PACKAGE / "__init__.py"), str(LIBRARIES), target]
     environment = {name: value for name, value in os.environ.items() if name.upper() != "PYTHONPATH"}
     return [sys.executable, *options, "-c", START, *found, *arguments], {**environment, **variables}
+
+
+def begin(target: str, *, quiet: bool = False, **variables: str) -> "subprocess.Popen[bytes]":
+    """Start a process that calls a function of this package, with pipes to and from it; `end` closes them."""
+    command, environment = python(target, **variables)
+    errors = subprocess.DEVNULL if quiet else None
+    return subprocess.Popen(command, env=environment, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=errors)
+
+
+def end(process: "subprocess.Popen[bytes]") -> int:
+    """Kill what `begin` started, unless it has ended, and close its pipes; its exit status."""
+    process.kill()
+    for pipe in (process.stdin, process.stdout):
+        assert pipe is not None
+        with suppress(OSError):  # what could not be sent is no longer needed
+            pipe.close()
+    return process.wait()
+
+
+def run(target: str, *arguments: str, timeout: float, **variables: str) -> "subprocess.CompletedProcess[bytes]":
+    """Run a function of this package in a process until it ends; raises TimeoutExpired after a time [s]."""
+    command, environment = python(target, *arguments, **variables)
+    return subprocess.run(command, capture_output=True, timeout=timeout, env=environment, check=False)

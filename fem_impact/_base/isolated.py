@@ -18,9 +18,6 @@ import numpy as np
 from . import check, child
 
 PATIENCE = 8.0  # [s] time limit for a small file: a valid file of 1 MB takes less than a tenth of this
-RATE = 2e5  # [byte/s] adds file size / RATE to the time limit: a third of the slowest reader's speed
-MOST_PATIENCE = 30.0  # [s] time limit for the largest file
-HEAD = 4096  # [byte] files whose first HEAD bytes are all zero are refused: parsing 1 GB of zeros takes minutes
 MEMORY = 2 << 30  # [byte] limit on the reader's address space; Python and numpy alone use 0.2 GB
 EXTRAS = {"svgelements": "cad", "ezdxf": "cad", "pyuff": "uff", "h5py": "hdf5"}  # library -> extra
 DONE, REFUSED, TOLD = 0, 1, 3  # exit statuses; any other means the reader crashed
@@ -48,9 +45,9 @@ def read(path: Path, kind: str, reader: str, *arguments: str) -> dict[str, np.nd
     if not path.is_file():
         raise ValueError(f"path must name {kind}, got {str(path)!r}; {check.absent(path)}")
     with path.open("rb") as file:
-        if not file.read(HEAD).strip(b"\0"):
+        if not file.read(4096).strip(b"\0"):  # parsing 1 GB of zeros takes minutes
             raise ValueError(f"{path.name} cannot be read as {kind} (it is empty or begins with zeros only)")
-    patience = min(PATIENCE + path.stat().st_size / RATE, MOST_PATIENCE)
+    patience = min(PATIENCE + path.stat().st_size / 2e5, 30.0)  # a third of the slowest reader's speed in byte/s
     try:
         status, out, said = run(path, reader, arguments, patience)
     except subprocess.TimeoutExpired:
@@ -68,10 +65,8 @@ def read(path: Path, kind: str, reader: str, *arguments: str) -> dict[str, np.nd
 
 def run(path: Path, reader: str, arguments: tuple[str, ...], patience: float) -> tuple[int, bytes, bytes]:
     """Run the reader process: its exit status, the arrays as npz bytes, and the error text if it failed."""
-    command, environment = child.python(
-        "_base.isolated:process", str(path), reader, *arguments, OPENBLAS_NUM_THREADS="1"
-    )
-    done = subprocess.run(command, capture_output=True, timeout=patience, env=environment, check=False)
+    words = str(path), reader, *arguments
+    done = child.run("_base.isolated:process", *words, timeout=patience, OPENBLAS_NUM_THREADS="1")
     return done.returncode, done.stdout, done.stderr
 
 

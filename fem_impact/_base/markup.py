@@ -13,12 +13,8 @@ WIDTH, HEIGHT = 360.0, 210.0  # [px] size of a picture; narrow pages shrink it
 MARGIN = 16.0  # [px] empty border, so that markers on the edge are not cut off
 SAMPLES = 400  # [-] points kept of a curve: about one per pixel
 # Pages set these CSS variables for light and dark themes; notebooks fall back to the colour after the comma.
-INK, BODY, STROKE, STRIKE = (
-    "var(--ink, #333333)",
-    "var(--body, #d6e6f2)",
-    "var(--line-strong, #0072b2)",
-    "var(--strike, #d55e00)",
-)
+INK, BODY = "var(--ink, #333333)", "var(--body, #d6e6f2)"
+STROKE, STRIKE = "var(--line-strong, #0072b2)", "var(--strike, #d55e00)"
 
 
 def literal(text: str) -> str:
@@ -60,8 +56,12 @@ def paragraphs(lines: Iterable[str]) -> str:
 
 def player(wav: bytes, words: str) -> str:
     """A player for the bytes of a WAV file, and what is said about them."""
-    uri = f"data:audio/wav;base64,{base64.b64encode(wav).decode('ascii')}"
-    return f'<audio controls src="{uri}"></audio><p>{html.escape(words)}</p>'
+    return f'<audio controls src="{data_uri("audio/wav", wav)}"></audio><p>{html.escape(words)}</p>'
+
+
+def data_uri(kind: str, raw: bytes) -> str:
+    """An address that holds the bytes of a file of a media type."""
+    return f"data:{kind};base64,{base64.b64encode(raw).decode('ascii')}"
 
 
 def side_by_side(*parts: str) -> str:
@@ -73,26 +73,19 @@ def curve(x: np.ndarray, y: np.ndarray, *, label: str, unit: str, title: str) ->
     """Time history ``y`` [unit] over ``x`` [s], labelled with its peak and duration."""
     x, y = np.asarray(x, float), np.asarray(y, float)
     if len(x) > SAMPLES:
-        x, y = _thinned(x, y)
+        some = np.unique(np.append(np.linspace(0, len(x) - 1, SAMPLES).astype(int), y.argmax()))
+        x, y = x[some], y[some]
     span, top = float(np.ptp(x)) or 1.0, float(y.max(initial=0.0)) or 1.0
     across = MARGIN + (WIDTH - 2 * MARGIN) * (x - x[0]) / span
     up = HEIGHT - 1.5 * MARGIN - (HEIGHT - 3.5 * MARGIN) * y / top
     line = " ".join(f"{a:.1f},{b:.1f}" for a, b in zip(across, up))
-    foot = HEIGHT - 1.5 * MARGIN
-    marks = _text(MARGIN, MARGIN, f"{label}, peak {top:.4g} {unit}") + _text(
-        WIDTH - MARGIN, HEIGHT - 6, f"{span:.4g} s", "end"
+    foot, right = HEIGHT - 1.5 * MARGIN, WIDTH - MARGIN
+    drawn = (
+        f'<line x1="{MARGIN}" x2="{right}" y1="{foot}" y2="{foot}" stroke="{INK}" stroke-width="0.6"/>'
+        f'<polyline points="{line}" fill="none" stroke="{STROKE}" stroke-width="1.6" stroke-linejoin="round"/>'
     )
-    return picture(
-        HEIGHT,
-        title,
-        f'<line x1="{MARGIN}" x2="{WIDTH - MARGIN}" y1="{foot}" y2="{foot}" stroke="{INK}" stroke-width="0.6"/>'
-        f'<polyline points="{line}" fill="none" stroke="{STROKE}" stroke-width="1.6" stroke-linejoin="round"/>{marks}',
-    )
-
-
-def _thinned(x: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    keep = np.unique(np.append(np.linspace(0, len(x) - 1, SAMPLES).astype(int), y.argmax()))
-    return x[keep], y[keep]
+    said = _text(MARGIN, MARGIN, f"{label}, peak {top:.4g} {unit}") + _text(right, HEIGHT - 6, f"{span:.4g} s", "end")
+    return picture(HEIGHT, title, drawn + said)
 
 
 def _text(x: float, y: float, text: str, anchor: str = "start") -> str:

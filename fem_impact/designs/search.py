@@ -1,40 +1,36 @@
 """`design`: the numbers of a body and a blow that make both come out as wanted, by optimisers with gradients."""
 
 import math
-import warnings
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from types import MappingProxyType
 from typing import Any
 
 import numpy as np
-from scipy.optimize import least_squares, minimize
+from scipy.optimize import minimize
 from scipy.stats import qmc
 
 from .._base import check, markup
-from .._base.check import SimulationError, ToleranceWarning
+from .._base.check import SimulationError
 from .._base.rounding import SAME
 from ..fe.variation import SectionChange
-from ..impact import gradient, promise
+from ..impact import clearance, gradient, promise
 from ..impact.quantities import rebound
 from ..impact.response import Response
 from ..model import planner, target
 from ..model.budget import VERIFYING
 from ..modes import varied
 from ..modes.modal import Modes
-from ..taps import arguments, solver
-from ..taps.unknowns import Unknown, bounds
-from . import clearance, goals
+from ..taps import solver
+from ..taps.unknowns import Box
+from . import goals
 from .goals import Goal
 from .objects import Maker, Piece, Rate
 
 TOLERANCE = 1e-3  # [-] default miss of what is wanted: 1.7 cents of a frequency
-STRIKE = 1e-5  # [-] tolerance of the blows of a search, if they state none: small beside what is wanted
 # [-] relative change that ends a search: its last steps gain several digits each, so a looser end hardly saves any
 CLOSE = 1e-10
 LOST = 1e3  # [-] miss of numbers that make no blow: any that is far above the miss of a blow makes the search turn back
-MOST_MODES = 10_000  # [-] of a body in a blow
-MOST_TRIES = 1024  # [-] points where a search begins
 
 
 @dataclass(frozen=True)
@@ -210,36 +206,21 @@ def design(
     >>> found.met, round(1e3 * found.values["height"], 1)  # mm
     (True, 12.4)
     """
-    limits = arguments.ranges("free", free)
-    ranges = tuple(Unknown(name, *bounds(f"free[{name!r}]", ends)) for name, ends in limits.items())
-    names = tuple(each.name for each in ranges)
-    begin = arguments.table("start", start)
-    for name in begin:
-        check.one_of("start", name, names)
+    box = Box.of("free", free)
     for label, sought in (("least", least), ("most", most)):
         if sought is not None:
-            check.one_of(label, sought, names)
+            check.one_of(label, sought, box.names)
     if least is not None and most is not None:
         raise ValueError("most must be left out where least is given")
     tolerance = check.between("tolerance", tolerance, 1e-9, 0.5)
-    maker = Maker.of(objects, names)
-    middle = {each.name: float(each.outside(np.mean(each.bounds))) for each in ranges} | begin
-    for each in ranges:
-        check.between(f"start[{each.name!r}]", middle[each.name], each.low, each.high)
-    wishes = goals.read(wanted, tuple(maker.pieces(middle)))
-    search = _Search(
-        maker,
-        ranges,
-        wishes,
-        least or most,
-        -1.0 if most else 1.0,
-        None if n_modes is None else check.count("n_modes", n_modes, high=MOST_MODES),
-    )
-    first = np.array([float(each.inside(middle[each.name])) for each in ranges])
+    maker, first = Maker.of(objects, box.names), box.start(start)
+    wishes = goals.read(wanted, tuple(maker.pieces(box.values(first))))
+    count = None if n_modes is None else check.count("n_modes", n_modes, high=10_000)  # of a body in a blow
+    search = _Search(maker, box, wishes, least or most, -1.0 if most else 1.0, count)
     found = search.run(first, tolerance)
-    tries = check.count("tries", tries, high=MOST_TRIES)
-    points = qmc.Sobol(len(ranges), seed=0).random_base2(max(1, math.ceil(math.log2(tries))))
-    low, high = search.bounds
+    tries = check.count("tries", tries, high=1024)  # points where a search begins
+    points = qmc.Sobol(len(first), seed=0).random_base2(max(1, math.ceil(math.log2(tries))))
+    low, high = box.bounds
     for point in points[: tries - 1]:
         if found.met and search.least is None:
             break
@@ -250,7 +231,7 @@ def design(
         found = min(found, other, key=search.rank)
     found = replace(found, n_evaluations=len(search.seen))
     if not found.met:
-        warnings.warn(found.verdict, ToleranceWarning, stacklevel=promise._callers_level())
+        promise.warn(found.verdict)
     return found
 
 
@@ -270,7 +251,7 @@ class _Search:
     """Goals over coordinates of the free numbers, remembered by point."""
 
     maker: Maker
-    ranges: tuple[Unknown, ...]
+    box: Box
     goals: tuple[Goal, ...]
     least: str | None  # free number to be made small
     sign: float  # -1.0 if it is to be made large
@@ -280,20 +261,12 @@ class _Search:
     bodies: dict[Any, Modes] = field(default_factory=dict)  # by key of the piece and number of modes
     counts: dict[str, int] = field(default_factory=dict)  # modes of each blow
 
-    @property
-    def bounds(self) -> tuple[np.ndarray, np.ndarray]:
-        low, high = np.array([each.bounds for each in self.ranges]).T
-        return low, high
-
-    def values(self, x: np.ndarray) -> dict[str, float]:
-        return {each.name: float(np.clip(each.outside(z), each.low, each.high)) for each, z in zip(self.ranges, x)}
-
     def state(self, x: np.ndarray) -> _State:
         """What a point makes; raises again the error that it met before."""
         key = x.tobytes()
         if key not in self.seen:
             try:
-                self.seen[key] = self._made(self.values(x))
+                self.seen[key] = self._made(self.box.values(x))
             except (SimulationError, ValueError) as error:
                 self.seen[key] = error
         if isinstance(self.seen[key], Exception):
@@ -315,7 +288,7 @@ class _Search:
                 modes[name] = self._body(piece, count)
             if struck:
                 once = any(goal.name == "clearance" for goal in self.goals if goal.blow == name)
-                hits[name] = piece.strike(modes[name], STRIKE, once)
+                hits[name] = piece.strike(modes[name], 1e-5, once)  # a tolerance small beside what is wanted
         first = next(iter(pieces))
         found = [_of_modes(modes[first], goal) if goal.mode else _of_hit(hits[goal.blow], goal) for goal in self.goals]
         return _State(values, pieces, modes, hits, np.array(found))
@@ -347,8 +320,8 @@ class _Search:
         return self.slopes[key]
 
     def _slopes(self, state: _State) -> np.ndarray:
-        found = np.zeros((len(self.goals), len(self.ranges)))
-        scales = [state.values[each.name] if each.log else each.high - each.low for each in self.ranges]
+        found = np.zeros((len(self.goals), len(self.box.unknowns)))
+        scales = [state.values[each.name] if each.log else each.high - each.low for each in self.box.unknowns]
         rates = {name: self.maker.rates(state.values, name, scale) for name, scale in zip(self.maker.names, scales)}
         first = next(iter(state.pieces))
         tuned = [i for i, goal in enumerate(self.goals) if goal.mode]
@@ -362,10 +335,7 @@ class _Search:
 
     def run(self, first: np.ndarray, tolerance: float) -> Design:
         """One search from one point."""
-        low, high = self.bounds
-        inside = np.clip(first, low + CLOSE * (high - low), high - CLOSE * (high - low))
-        self.state(inside)  # an error at the start is the user's
-        x = self._squares(inside)  # with a number to make least, this finds where the goals are met at all
+        x = self._squares(first)  # with a number to make least, this finds where the goals are met at all
         if self.least is not None:
             x = self._least(x, tolerance)
         state, slopes = self.state(x), self.slope(x)
@@ -373,8 +343,9 @@ class _Search:
             Reached(goal, float(value), dict(zip(self.maker.names, row.tolist())))
             for goal, value, row in zip(self.goals, state.found, slopes)
         )
+        low, high = self.box.bounds
         part = (x - low) / (high - low)
-        ends = tuple(each.name for each, p in zip(self.ranges, part) if min(p, 1.0 - p) < SAME)
+        ends = tuple(each.name for each, p in zip(self.box.unknowns, part) if min(p, 1.0 - p) < SAME)
         return Design(
             MappingProxyType(state.values), reached, tolerance, ends, len(self.seen), self.maker,
             MappingProxyType(state.hits),
@@ -395,27 +366,31 @@ class _Search:
     def _turned(self, x: np.ndarray) -> np.ndarray:
         """Derivatives (n_goals, n_free) of the goals over their scale, in the coordinates."""
         per_value = [1.0 / each.outside(z) if each.log else 1.0 / (each.high - each.low)
-                     for each, z in zip(self.ranges, x)]  # fmt: skip
+                     for each, z in zip(self.box.unknowns, x)]  # fmt: skip
         scale = np.array([goal.scale for goal in self.goals])
         return self.slope(x) / scale[:, None] / np.array(per_value)
 
     def _squares(self, first: np.ndarray) -> np.ndarray:
-        low, high = self.bounds
+        begun = False
+
+        def misses(x: np.ndarray) -> np.ndarray:
+            nonlocal begun
+            if not begun:
+                self.state(x)  # an error at the start is the user's
+                begun = True
+            return self._misses(x)
 
         def slopes(x: np.ndarray) -> np.ndarray:
             return self._turned(x) * (self._misses(x) != 0.0)[:, None]
 
-        found = least_squares(
-            self._misses, first, slopes, (low, high), method="dogbox", x_scale=high - low, xtol=CLOSE, ftol=CLOSE,
-            gtol=CLOSE, max_nfev=solver.ENOUGH,
-        )  # fmt: skip
-        return np.asarray(found.x)
+        bounds, count = self.box.bounds, solver.ENOUGH
+        return solver.least(misses, slopes, first, bounds, close=CLOSE, iterations=count, method="dogbox").x
 
     def _least(self, first: np.ndarray, tolerance: float) -> np.ndarray:
         """Where one number is smallest or largest of all points seen that meet the goals; else where it ends."""
         which = self.maker.names.index(self.least or "")
         unit = np.eye(len(first))[which]
-        low, high = self.bounds
+        low, high = self.box.bounds
         sides = []  # a row each: goal, sign and limit over its scale
         for i, goal in enumerate(self.goals):
             if goal.exact:

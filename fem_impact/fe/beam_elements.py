@@ -9,11 +9,15 @@ from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
+from scipy.sparse import csc_matrix
 from skfem import ElementLineHermite, MeshLine
 
 from .._base.rounding import EPSILON, HALVINGS, SAME
-from .._base.untyped import Cells
+from .._base.untyped import Cells, Sparse
 from ..mesh.facets import powers
+from .section import Elastic
+from .springs import edge_stiffness
+from .theory import Body, Domain, Frame, Points
 
 # [-] polynomial degree of the deflection within an element: errs by 1e-12 of a wave of 30 rad; few elements round less
 DEGREE = 32
@@ -131,18 +135,64 @@ def rounding(space: Any) -> float:
     return float(ROUNDED / max(np.abs(space.length).min(), APART) ** 3)
 
 
-def integrals(space: HermiteSpace, fields: Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]]) -> Any:
-    """Element stiffness and mass (n_cells, n_local, n_local), and the two fields and Gauss weights (n_cells, n_q).
+def domain(body: Body, make_space: Callable[[Cells], Any], names: tuple[str, ...]) -> Domain:
+    """The elements of a beam in its frame, with shape functions and the section's fields ``names``."""
+    mesh, section = body.mesh, body.section
+    low, high = mesh.points.min(axis=0), mesh.points.max(axis=0)
+    box = 0.5 * (low + high), float((high - low).max())
+    bare = Frame(*box, 1.0, 1.0)
 
-    ``fields`` returns bending stiffness and mass per length at places (n,).
-    """
+    def fields(x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        places = bare.places(x)
+        return section.stiffness(places), section.inertia(places)
+
+    points, marked = (bare.local(each)[:, 0] for each in (mesh.points, body.marked))
+    held = [kind in ("clamped", "hinged") for kind in body.held]
+    line = divided(fields, nodes(points, marked, points[mesh.facets[held, 0]]))
+    space = make_space(line)
     x, dx = quadrature(space)
-    stiffness, inertia = (field.reshape(x.shape) for field in fields(x.ravel()))
-    value, bend = space.functions(np.arange(len(x)), x[..., None], (0, 2))
-    K = bend.transpose(0, 2, 1) @ (bend * (stiffness * dx)[..., None])
-    M = value.transpose(0, 2, 1) @ (value * (inertia * dx)[..., None])
-    space.decouple(K, M)
-    return K, M, stiffness, inertia, dx
+    return Domain.of(names, section, box, line, space, Points(np.zeros((1, x.shape[1])), x[..., None], dx))
+
+
+def ends(body: Body) -> list[tuple[bool, str | Elastic]]:
+    """Whether each end of a beam is the left one, and its support."""
+    left = body.mesh.points[body.mesh.facets[:, 0], 0] <= body.mesh.points.min()
+    return list(zip(left.tolist(), body.held))
+
+
+def end_springs(sprung: list[tuple[dict[int, float], int, Elastic]], frame: Frame, n_all: int) -> Sparse:
+    """Stiffness (n_all, n_all) of elastic supports.
+
+    Each comes with the unknowns that add up to the deflection there, the one that is the rotation, and its `Elastic`.
+    """
+    total = csc_matrix((n_all, n_all))
+    for deflection, turned, kind in sprung:
+        for along, stiffness in zip((deflection, {turned: 1.0}), edge_stiffness([kind], frame)[0]):
+            row = csc_matrix((list(along.values()), ([0] * len(along), list(along))), shape=(1, n_all))
+            total = total + stiffness * row.T @ row
+    return total
+
+
+def point_forces(
+    system: Any, vectors: np.ndarray, loads: np.ndarray, forced: np.ndarray | None
+) -> tuple[list[tuple[float, np.ndarray]], list[float]]:
+    """Places and sizes (n,) of the point forces on solutions; places held at rest, by forces that are unknown.
+
+    Arguments are those of `residual.energy_errors`.
+    """
+    frame = system.frame
+
+    def felt(point: np.ndarray, fields: np.ndarray) -> tuple[float, np.ndarray]:
+        return frame.local(point)[0], np.asarray(system.interpolate(point[None]) @ fields)[0]
+
+    found = [(mass / frame.mass, *felt(point, loads)) for point, mass in system.point_masses]
+    hinges = [frame.local(point)[0] for point, spring in system.point_supports if np.isinf(spring)]
+    soft = [(point, spring) for point, spring in system.point_supports if not np.isinf(spring)]
+    found += [(-spring / (frame.mass * frame.rate**2), *felt(point, vectors)) for point, spring in soft]
+    forces = [(place, size * moved) for size, place, moved in found]
+    if forced is not None:
+        forces += list(zip(frame.local(forced)[:, 0], np.eye(len(forced))))
+    return forces, hinges
 
 
 def quadrature(space: Any) -> tuple[np.ndarray, np.ndarray]:
@@ -237,13 +287,8 @@ def energy_errors(
     hinges : sequence of ndarray, shape (n_cells, n_q), distance beyond each point held at rest, by an unknown force
     """
     x, dx = quadrature(space)
-    half, upto = 0.5 * space.length[:, None, None], running_integral()
-    each = np.einsum("eq,eqk->ek", dx, load)
-    before = np.concatenate([np.zeros_like(each[:1]), np.cumsum(each, axis=0)[:-1]])
-    shear = before[:, None] + half * (upto @ load)
-    each = np.einsum("eq,eqk->ek", dx, shear)
-    before = np.concatenate([np.zeros_like(each[:1]), np.cumsum(each, axis=0)[:-1]])
-    missed = stiffness[..., None] * curvature - before[:, None] - half * (upto @ shear) - moments
+    carried = integral_along(space, integral_along(space, load))
+    missed = stiffness[..., None] * curvature - carried - moments
     weight = (dx / stiffness).ravel()
     flat = missed.reshape(weight.size, -1)
     free = np.sqrt(weight)[:, None] * np.column_stack(
@@ -254,7 +299,14 @@ def energy_errors(
     return (rest**2).sum(axis=0)
 
 
-def running_integral() -> np.ndarray:
+def integral_along(space: Any, values: np.ndarray) -> np.ndarray:
+    """Integral from the left end of values (n_cells, n_q, n) at the Gauss points, at the same points."""
+    each = np.einsum("eq,eqk->ek", quadrature(space)[1], values)
+    before = np.concatenate([np.zeros_like(each[:1]), np.cumsum(each, axis=0)[:-1]])
+    return before[:, None] + 0.5 * space.length[:, None, None] * (_running_integral() @ values)
+
+
+def _running_integral() -> np.ndarray:
     """Matrix (n_q, n_q) from values at the Gauss points to the integral of their polynomial from -1 to each point."""
     node, weight = np.polynomial.legendre.leggauss(QUADRATURE)
     values = np.polynomial.legendre.legvander(node, QUADRATURE)

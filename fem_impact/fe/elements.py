@@ -13,10 +13,10 @@ from .._base.rounding import SAME
 from .._base.untyped import Cells
 from ..mesh.facets import CURVE_STEPS, Curves, powers
 from .supports import SIDES
+from .theory import Points
 
 EXPONENTS = np.array([(i, j) for i in range(6) for j in range(6 - i)])  # the 21 monomials of degree 5
 NEAR_CURVE = 1e-5  # [-] the same at curved edges: the mesh is closer to the curve than this share of a triangle
-CHUNK = 256  # [-] triangles whose shapes are computed together, to limit memory
 # [-] nearest triangles searched first: about those around a vertex; if none holds the point, all are searched
 CANDIDATES = 8
 # [-] share of a triangle's size; no curved edge bulges this far: facets bulge by an eighth of their turn, below 0.1
@@ -29,6 +29,11 @@ def monomials(local: np.ndarray, dx: int, dy: int) -> np.ndarray:
     """Derivative of the 21 monomials at local coordinates (..., 2), shape (..., 21)."""
     x, y = powers(local[..., 0], 5, dx), powers(local[..., 1], 5, dy)
     return x[..., EXPONENTS[:, 0]] * y[..., EXPONENTS[:, 1]]
+
+
+def curvatures(hessian: np.ndarray) -> np.ndarray:
+    """Curvatures (xx, yy, 2 xy) of shape functions, (n, n_q, 3, n_local), from (xx, xy, yy), (n, 3, n_q, n_local)."""
+    return hessian[:, [0, 2, 1]].transpose(0, 2, 1, 3) * np.array([1.0, 1.0, 2.0])[:, None]
 
 
 class Bent:
@@ -210,6 +215,7 @@ class ArgyrisSpace:
     """
 
     element: type[Any] = ElementTriArgyris  # scikit-fem's class: it numbers the unknowns
+    order: int = 10  # of the quadrature: exact for products of quintics
     inner: Triangles
     origin: np.ndarray  # these and the next as in `Triangles`
     inverse: np.ndarray
@@ -263,17 +269,17 @@ class ArgyrisSpace:
         """
         return self.inner.derivatives(cells, points, orders, monomials, self.coefficients)
 
-    def rule(self, order: int) -> tuple[np.ndarray, np.ndarray]:
+    def rule(self) -> tuple[np.ndarray, np.ndarray]:
         """Quadrature of the reference triangle: local coordinates (n_q, 2) and weights (n_q,)."""
-        X, weight = get_quadrature(self.element.refdom, order)
+        X, weight = get_quadrature(self.element.refdom, self.order)
         return X.T - 1.0 / 3.0, weight
 
-    def uniform(self, cells: np.ndarray, stiffness: np.ndarray, order: int) -> tuple[np.ndarray, np.ndarray]:
+    def uniform(self, cells: np.ndarray, stiffness: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Bending and mass matrices (n, 21, 21) of straight cells (n,) with uniform stiffness (3, 3) and unit inertia.
 
         The integrals of products of monomials are the same for all triangles, so they are computed once.
         """
-        local, weight = self.rule(order)
+        local, weight = self.rule()
         values = monomials(local, 0, 0)
         bends = np.stack([monomials(local, 2 - k, k) for k in range(3)])  # (3, n_q, 21)
         products = np.einsum("iqa,q,jqb->ijab", bends, weight, bends).reshape(9, 441)
@@ -311,6 +317,7 @@ class MorleySpace:
     """
 
     element: type[Any] = ElementTriMorley
+    order: int = 4  # of the quadrature: exact for products of quadratics
     inner: Triangles
     origin: np.ndarray  # these and the next as in `Triangles`
     inverse: np.ndarray
@@ -320,7 +327,7 @@ class MorleySpace:
     bent: None
     coefficients: np.ndarray  # (n_cells, 6, 6) of the monomials in each shape function
 
-    def __init__(self, mesh: Cells) -> None:
+    def __init__(self, mesh: Cells, bent: Bent | None = None) -> None:
         self.inner = Triangles(mesh)
         self.origin, self.inverse, self.jacobian = self.inner.origin, self.inner.inverse, self.inner.jacobian
         self.vertices, self.normals, self.bent = self.inner.vertices, self.inner.normals, None
@@ -376,11 +383,11 @@ def inverses(space: Any, X: np.ndarray) -> np.ndarray:
     return np.linalg.inv(J)
 
 
-def quadrature(mesh: Any, space: Any, order: int, bent: Bent | None = None) -> tuple[np.ndarray, np.ndarray]:
-    """Quadrature on every cell: points (n_cells, n_q, dimension) and weights (n_cells, n_q)."""
-    X, weight = get_quadrature(space.element.refdom, order)
+def quadrature(mesh: Any, space: Any, bent: Bent | None) -> Points:
+    """The quadrature of a space on every triangle."""
+    X, weight = get_quadrature(space.element.refdom, space.order)
     mapping = mesh._mapping() if bent is None else _BentMapping(mesh, bent)
-    return mapping.F(X).transpose(1, 2, 0), np.abs(mapping.detDF(X)) * weight
+    return Points(X, mapping.F(X).transpose(1, 2, 0), np.abs(mapping.detDF(X)) * weight)
 
 
 def numbering(mesh: Cells, space: Any) -> tuple[np.ndarray, int]:

@@ -24,11 +24,11 @@ from scipy.sparse import csc_matrix
 
 from .._base.untyped import Sparse
 from . import slopes, thick
-from .assembly import System
 from .eigenvalues import factorise
 from .elements import inverses, numbering, triangles
 from .section import Plate, evaluate
 from .supports import SIDES, cells_of_facets
+from .system import System
 
 NODES = 4  # [-] Gauss points in each direction of a triangle: exact for the stiffness of quartic elements
 # [-] lowest modes whose stresses choose the fields that are kept: large swings are those of the lowest modes
@@ -60,11 +60,9 @@ class Sheet:
         space: Any = system.space
         plane = triangles(rim.points, space.vertices)
         own, n = numbering(plane, thick.MindlinSpace)
-        x, dx = slopes.places(system, NODES)
-        X = slopes.reference(NODES)
-        gradient = np.einsum("eqji,jqk->eqik", inverses(space, X.T), thick.reference(X.T)[1])
-        flat = frame.centre + frame.length * x.reshape(-1, 2)
-        h = evaluate("thickness", section.thickness, flat, "m").reshape(dx.shape)
+        X, x, dx = slopes.quadrature(system, NODES)
+        gradient = np.einsum("eqji,jqk->eqik", inverses(space, X), thick.reference(X)[1])
+        h = evaluate("thickness", section.thickness, frame.places(x), "m").reshape(dx.shape)
         moduli = (frame.length**2 * h * dx)[..., None, None] * section.material.plane_stress
         cells, sides = cells_of_facets(rim.facets, space.vertices)
         local = np.column_stack([np.array(SIDES)[sides], 3 + 3 * sides[:, None] + np.arange(3)])

@@ -7,10 +7,11 @@ import numpy as np
 
 from .._base import check
 from ..mesh.meshes import Mesh
-from . import beam_elements, residual
-from .assembly import System, reassemble
+from . import beam_elements
+from .assembly import reassemble
 from .eigenvalues import Flexibility
 from .refinement import CHEAP_CELLS, COARSER
+from .system import System
 
 GOAL = 1e-5  # [-] refinement stops at this relative error of the compliance: a tenth of the default tolerance
 SPREAD = 4e-4  # [-] error of the points that stand for a spread force on a thick plate, times 2 pi the shear stiffness
@@ -48,7 +49,7 @@ def static_deflection(system: System, loads: np.ndarray) -> Deflection:
     A coarse mesh is enough, because the deflection is smooth except for the dip under the force, and there the
     elements shrink. If the estimated error is still too large, finer meshes follow.
     """
-    if system.theory == "mindlin":
+    if system.rules.compared:
         return _compared(system, loads)
     mesh = _coarse(system.mesh)
     best: Any = None
@@ -86,9 +87,8 @@ def _coarse(mesh: Mesh) -> Mesh:
 
 
 def _solved(system: System, mesh: Mesh, loads: np.ndarray) -> Deflection:
-    if system.element == "morley":  # its moments are constant in each triangle: no error could be told
-        system = replace(system, element="argyris")
-    fine = reassemble(system, mesh, loads)
+    morley = system.element == "morley"  # its moments are constant in each triangle: no error could be told
+    fine = reassemble(system, mesh, loads, element="argyris" if morley else None)
     rows = fine.interpolate(loads)
     flexibility = Flexibility.of(fine)
     forces = rows.toarray().T
@@ -97,11 +97,11 @@ def _solved(system: System, mesh: Mesh, loads: np.ndarray) -> Deflection:
     if fine.strain is not None:  # this form is stationary, so the rounding error of K enters squared
         compliance = compliance + compliance.T - fine.strain.products(fine, vectors)
     unit = fine.frame.mass * fine.frame.rate**2
-    if fine.theory == "mindlin":
+    if fine.rules.compared:
         return Deflection(fine, loads.copy(), vectors, 0.5 * (compliance + compliance.T) / unit, np.zeros(len(loads)))
     diagonal = compliance.diagonal()
     inertia = -fine.rigid @ (fine.rigid.T @ forces)
-    error = residual.energy_errors(fine, vectors, inertia, loads).sum(axis=0)
+    error = fine.rules.errors(fine, vectors, inertia, loads).sum(axis=0)
     rounding = ROUNDING if mesh.dimension == 2 else beam_elements.rounding(fine.space)
     moves = diagonal > RESTS
     relative = np.where(moves, error / np.where(moves, diagonal, 1.0), 0.0) + rounding

@@ -13,32 +13,25 @@ from .._base import kept as keeping
 from .._base.rounding import EPSILON, SAME
 from ..mesh import mesh_files
 from ..mesh.meshes import MOST_CELLS, Mesh
-from . import plausible, residual, thick
-from .assembly import THICK, Strain, System, _kinds, assemble, reassemble, support_of_facets
-from .beam_elements import DEGREE
-from .corners import SAY, singular
+from . import plausible
+from .assembly import BY_ELEMENT, assemble, reassemble
+from .corners import SAY
 from .eigenvalues import BLOCK, FIRST_SLICE, RESIDUAL, STRICT, Flexibility, by_slices, count_below, lowest
 from .section import Plate, directional
+from .system import System
 
-ARGYRIS = "argyris", "argyris and shear"
 # [-] ratio of element sizes whose frequencies are compared, and order: less than half the unknowns, errors times five
 COARSER, COMPARED = 1.5, 4.0
-# [rad] largest k h: error 1e-5, 1e-12 on beams
-WAVE_PER_ELEMENT = {
-    "argyris": 1.8, "hermite": 30.0, "morley": 0.2, "argyris and shear": 1.8, "hermite and shear": 30.0,
-}  # fmt: skip
 ERROR_OF_WAVE = (8e-7, 3.3)  # [-] a smooth frequency's error is at most 8e-7 (kh)**8, growing slower above kh = 3.3
 # [-] factor of the edge length in Weyl's law, fact: 1 + Gamma(3/4) / (sqrt(pi) Gamma(5/4)) clamped; free for nu = 0.3
 EDGE_TERM = {"clamped": 1.76, "hinged": 1.0, "soft hinged": 1.0, "free": -1.71}
-# [-] frequency error of Morley elements over (kh)**2: 0.09 to 0.16 on hinged, 0.12 to 0.33 on clamped rectangles
-MORLEY_ERROR = 0.2
 CLAIMED = 2.0  # [-] factor on error estimates, which are 0.3 to 4 times the true error; test_residual.py
 # [-] factor on the rounding error of K, estimated as a random walk: three standard deviations of one
 ROUNDED = 3.0
 MORLEY = 0.2574578  # [-] error constant of Morley interpolation, over h**2 (Carstensen and Gallistl 2014)
 # [-] unknowns of the Morley solution for the lower bounds; cheap beside the modes themselves
 MORLEY_UNKNOWNS = 20_000
-# [rad] as WAVE_PER_ELEMENT, if CHEAP_CELLS triangles suffice: error 2e-7, clamped 1e-5
+# [rad] as `Theory.wave`, if CHEAP_CELLS triangles suffice: error 2e-7, clamped 1e-5
 FINE_WAVE = 1.1
 # [-] triangles that take little time to solve, so that fewer are not worthwhile; point loads start with as many
 CHEAP_CELLS = 700
@@ -48,10 +41,6 @@ LAYERS = 10.0
 FINEST_LAYER = 40.0
 LOOSEST = 0.1  # [-] largest tolerance of frequencies
 MOST_UNKNOWNS = 150_000  # [-] refinement gives up beyond this size
-# [-] unknowns per square, or length, of the element size: counted on plates, 10.4 where netgen meshes, 9 on rectangles
-DOFS_PER_AREA = {
-    "argyris": 10.4, "hermite": DEGREE - 1, "argyris and shear": 47.0, "hermite and shear": 2 * DEGREE - 1,
-}  # fmt: skip
 # [-] fraction of the tolerance that meshes after the first aim at: less makes them finer than needed, more often
 # takes another
 MARGIN = 0.6
@@ -94,7 +83,7 @@ class Spectrum:
 
 def unknowns(element: str, mesh: Mesh, size: float) -> float:
     """Number of unknowns [-] on a mesh of the same outline with another element size [m]."""
-    return DOFS_PER_AREA[element] * mesh.area / size**mesh.dimension
+    return BY_ELEMENT[element].unknowns * mesh.area / size**mesh.dimension
 
 
 def smallest_size(element: str, mesh: Mesh) -> float:
@@ -107,7 +96,7 @@ def _wave(system: System, n_modes: int | None, max_frequency: float | None) -> f
     mesh, frame = system.mesh, system.frame
     if max_frequency is not None:
         rate, softest = 2.0 * np.pi * max_frequency, system.softness * frame.inertia / frame.stiffness
-        if system.theory not in THICK:
+        if not system.rules.thick:
             return float((softest * rate**2) ** 0.25)
         section, points = system.section, mesh.points  # the thick wave is shorter, but not by more than this
         shear = np.linalg.eigvalsh(section.shear(points).reshape(len(points), mesh.dimension, -1)).min(axis=1)
@@ -180,14 +169,9 @@ def _claimed(system: System, omega: np.ndarray, vectors: np.ndarray) -> np.ndarr
     if not flexible.any():
         return parts
     values, vectors = (omega[flexible] / system.frame.rate) ** 2, vectors[:, flexible]
-    if system.element == "argyris and shear":
-        compared = _compared(system, omega) / omega.clip(np.finfo(float).tiny)
-        parts[0, flexible] = compared[flexible] + CLAIMED * 0.5 * thick.missed_by_layers(system, vectors) / values
-    elif system.element == "morley":
-        wave = (system.softness * values) ** 0.25 * np.sqrt(2.0 * system.mesh.area / len(system.mesh.cells))
-        parts[0, flexible] = CLAIMED * MORLEY_ERROR * (wave / system.frame.length) ** 2
-    else:
-        parts[:3, flexible] = CLAIMED * 0.5 * residual.energy_errors(system, vectors, vectors * values) / values
+    parts[:3, flexible] = CLAIMED * 0.5 * system.rules.errors(system, vectors, vectors * values) / values
+    if system.rules.compared:
+        parts[0, flexible] += (_compared(system, omega) / omega.clip(np.finfo(float).tiny))[flexible]
     vectors, squares = Flexibility.of(system).bent(vectors)[0], system.K.multiply(system.K)
     rounding = 0.5 * np.finfo(float).eps * np.sqrt(np.einsum("ij,ij->j", vectors**2, squares @ vectors**2)) / values
     corners = _missed_at_corners(system, vectors, values)
@@ -202,11 +186,10 @@ def _missed_at_corners(system: System, vectors: np.ndarray, values: np.ndarray) 
     ring tells what the innermost triangles, half as far, would hold, and that they hold little of. Frequencies are too
     high by it, so that an error near one over the frequency found is more over the true one.
     """
-    if not isinstance(system.strain, Strain) or not system.graded:
+    if system.strain is None or system.rules.compared or not system.graded:
         return system.unresolved if system.unresolved > SAY else 0.0
-    kinds = _kinds(support_of_facets(system.mesh, system.supports))
     missed = np.zeros(len(values))
-    for vertex, corner in singular(system.mesh, kinds, system.section.material).items():
+    for vertex, corner in system.corners.items():
         own = 0.5 * system.strain.around(system, vectors, vertex) / values / (2.0**corner.power - 1.0)
         if corner.free:
             own = np.minimum(own, corner.left / CLAIMED) if corner.left > SAY else 0.0
@@ -291,16 +274,16 @@ def fine_enough(system: System, n_modes: int | None, max_frequency: float | None
 
 def resolves(system: System, max_frequency: float) -> bool:
     """Whether the mesh is fine enough for waves up to a frequency [Hz]."""
-    return system.mesh.size <= WAVE_PER_ELEMENT[system.element] / _wave(system, None, max_frequency)
+    return system.mesh.size <= system.rules.wave / _wave(system, None, max_frequency)
 
 
 def size_for(system: System, n_modes: int | None, max_frequency: float | None, tolerance: float | None) -> float:
     """Size [m] of elements that resolve the shortest wave wanted."""
     wave = _wave(system, n_modes, max_frequency)
-    size = WAVE_PER_ELEMENT[system.element] / wave
-    if system.element in ARGYRIS and tolerance is not None:
+    size = system.rules.wave / wave
+    if system.rules.graded and tolerance is not None:
         size = _wave_per_element(tolerance) / wave
-    elif system.element in ARGYRIS:  # a few modes cost little, so find them more accurately
+    elif system.rules.graded:  # a few modes cost little, so find them more accurately
         affordable = (2.3 * system.mesh.area / CHEAP_CELLS) ** 0.5
         size = min(size, max(affordable, FINE_WAVE / wave))
     if isinstance(system.section, Plate) and system.section.tension:

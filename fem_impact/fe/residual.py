@@ -18,12 +18,11 @@ from typing import Any
 import numpy as np
 
 from ..mesh.facets import powers
-from . import beam_elements, shear_beam
-from .assembly import MASS_ORDER, System, beam_fields
-from .section import Beam
-from .shear_beam import TimoshenkoSpace
+from .elements import curvatures
 from .springs import along_facets
 from .supports import SIDES, cells_of_facets
+from .system import System
+from .theory import unknowns_of_cells
 
 CALIBRATION = 33.0  # [-] weighted squares over the energy error: 20 to 45 for 20 kinds of plates; test_residual.py
 DEGREE = 5  # polynomial degree of the elements
@@ -57,9 +56,8 @@ class Moments:
         self.space, self.n_cells = space, len(space.origin)
         cells = np.arange(self.n_cells)
         x = space.origin[:, None] + NODES @ space.jacobian.transpose(0, 2, 1)
-        hessian = space.functions(cells, x, (2,))[0][:, [0, 2, 1]] * np.array([1.0, 1.0, 2.0])[:, None, None]
-        self.stiffness = _stiffness(system, x)  # (n_cells, n_q, 3, 3)
-        moment = self.stiffness @ hessian.transpose(0, 2, 1, 3)  # (n_cells, n_q, 3, 21)
+        self.stiffness = system.frame.field(system.section, "stiffness", x)  # (n_cells, n_q, 3, 3)
+        moment = self.stiffness @ curvatures(space.functions(cells, x, (2,))[0])  # (n_cells, n_q, 3, 21)
         self.coefficients = np.einsum("pq,eqrk->erpk", FIT, moment, optimize=True)  # (n_cells, 3, 10, 21)
 
     def derivatives(self, cells: np.ndarray, x: np.ndarray, order: int) -> np.ndarray:
@@ -96,13 +94,6 @@ def _looks() -> np.ndarray:
     up = np.column_stack([i, j])[i + j < n] + 1.0 / 3.0
     down = np.column_stack([i, j])[i + j < n - 1] + 2.0 / 3.0
     return np.vstack([up, down]) / n - 1.0 / 3.0
-
-
-def _stiffness(system: System, x: np.ndarray) -> np.ndarray:
-    """Bending stiffness (n_cells, n_q, 3, 3) at points (n_cells, n_q, 2), in the frame."""
-    frame = system.frame
-    found = system.section.stiffness(frame.centre + frame.length * x.reshape(-1, 2))
-    return found.reshape(*x.shape[:2], 3, 3) / frame.stiffness
 
 
 class Residual:
@@ -142,9 +133,8 @@ class Residual:
         stiffness = self.moments.stiffness.mean(axis=1)
         rigidity = np.sqrt(stiffness[:, 0, 0] * stiffness[:, 1, 1])
         scale = np.sqrt(double[:, None] * share / rigidity[:, None]) * double[:, None] / DEGREE**2
-        inertia = self.system.section.inertia(frame.centre + frame.length * x.reshape(-1, 2)).reshape(scale.shape)
-        value = space.functions(cells, x, (0,))[0]
-        self.inertia = (scale * inertia / frame.inertia)[..., None] * value  # (n_cells, n_q, 21)
+        inertia, value = frame.field(self.system.section, "inertia", x), space.functions(cells, x, (0,))[0]
+        self.inertia = (scale * inertia)[..., None] * value  # (n_cells, n_q, 21)
         balance = second[:, 0, 0] + 2.0 * second[:, 1, 2] + second[:, 2, 1]
         section: Any = self.system.section
         if section.tension:
@@ -205,7 +195,7 @@ class Residual:
         Nor does the quadrature of the matrices place a step exactly.
         """
         space, looks = self.moments.space, _looks()
-        places, weight = space.rule(MASS_ORDER)
+        places, weight = space.rule()
         self.stepped = np.zeros(0, int)
         section: Any = self.system.section
         if callable(section.thickness):
@@ -225,20 +215,18 @@ class Residual:
 
     def _fields(self, cells: np.ndarray, local: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Points (n, n_q, 2) of cells (n,) in the frame, and inertia there."""
-        space, frame = self.moments.space, self.system.frame
+        space = self.moments.space
         x = space.origin[cells, None] + local @ space.jacobian[cells].transpose(0, 2, 1)
-        inertia = self.system.section.inertia(frame.centre + frame.length * x.reshape(-1, 2))
-        return x, inertia.reshape(x.shape[:2]) / frame.inertia
+        return x, self.system.frame.field(self.system.section, "inertia", x)
 
     def _energies(self, local: np.ndarray, weight: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Of stepped cells: roots of strain energy (n, 3 n_q, 21) and stiffness, and both matrices (2, n, 21, 21)."""
         space, cells = self.moments.space, self.stepped
         x, inertia = self._fields(cells, local)
         dx = weight * np.abs(np.linalg.det(space.jacobian[cells]))[:, None]
-        root = np.linalg.cholesky(_stiffness(self.system, x))  # (n, n_q, 3, 3)
+        root = np.linalg.cholesky(self.system.frame.field(self.system.section, "stiffness", x))  # (n, n_q, 3, 3)
         value, second = space.functions(cells, x, (0, 2))
-        hessian = second[:, [0, 2, 1]] * np.array([1.0, 1.0, 2.0])[:, None, None]
-        bent = root.transpose(0, 1, 3, 2) @ hessian.transpose(0, 2, 1, 3) * np.sqrt(dx)[..., None, None]
+        bent = root.transpose(0, 1, 3, 2) @ curvatures(second) * np.sqrt(dx)[..., None, None]
         bent = bent.reshape(len(cells), -1, 21)
         mass = (value * (inertia * dx)[..., None]).transpose(0, 2, 1) @ value
         return bent, root, np.stack([bent.transpose(0, 2, 1) @ bent, mass])
@@ -249,7 +237,7 @@ class Residual:
         return np.concatenate([self._errors(vectors[:, block], loads[:, block]) for block in blocks], axis=1)
 
     def _errors(self, vectors: np.ndarray, loads: np.ndarray) -> np.ndarray:
-        unknowns, pushed = (_of_cells(self.system, field) for field in (vectors, loads))
+        unknowns, pushed = (unknowns_of_cells(self.system, field) for field in (vectors, loads))
         total = _squares(self.inertia @ pushed - self.balance @ unknowns)
         total += _squares(self.jumps @ unknowns[self.beside].reshape(len(self.beside), 42, -1))
         at_rim = unknowns[self.rim_cells]
@@ -262,15 +250,10 @@ class Residual:
         return np.stack([total / CALIBRATION, rim, steps])
 
 
-def _of_cells(system: System, vectors: np.ndarray) -> np.ndarray:
-    """Unknowns (n_cells, n_local, n) of each cell, from those of fields (n_dofs, n)."""
-    return (system.expand @ vectors)[system.element_dofs].transpose(1, 0, 2)
-
-
 def energy_errors(
     system: System, vectors: np.ndarray, loads: np.ndarray, forced: np.ndarray | None = None
 ) -> np.ndarray:
-    """Estimated error of the squared energy norm of finite element solutions, (3, n).
+    """Estimated error of the squared energy norm of solutions for a thin plate, (3, n).
 
     The first row is the error of the elements, which falls with the eighth power of their size if the solution is
     smooth. The second comes from supports on curved edges, which let the plate move between their nodes; it falls with
@@ -284,53 +267,7 @@ def energy_errors(
     forced : ndarray, shape (n, dimension) [m], optional
         Points where an additional unit force acts, one for each solution.
     """
-    if system.mesh.dimension == 2:
-        return Residual(system).errors(vectors, loads)
-    space: Any = system.space
-    frame = system.frame
-    if isinstance(space, TimoshenkoSpace):
-        assert isinstance(system.section, Beam)
-        pushed = [
-            (frame.local(point[None])[0, 0], mass / frame.mass * np.asarray(system.interpolate(point[None]) @ loads)[0])
-            for point, mass in system.point_masses
-        ]
-        hinges = []
-        for point, spring in system.point_supports:
-            place = frame.local(point[None])[0, 0]
-            if np.isinf(spring):
-                hinges.append(place)
-            else:
-                pull = spring / (frame.mass * frame.rate**2)
-                pushed.append((place, -pull * np.asarray(system.interpolate(point[None]) @ vectors)[0]))
-        if forced is not None:
-            pushed += list(zip(frame.local(forced)[:, 0], np.eye(len(forced))))
-        errors = shear_beam.energy_errors(
-            space, beam_fields(system.mesh, system.section, frame), _of_cells(system, vectors),
-            _of_cells(system, loads), pushed, hinges,
-        )  # fmt: skip
-        return np.stack([errors, 0.0 * errors, 0.0 * errors])
-    x, _ = beam_elements.quadrature(space)
-    place = (frame.centre + frame.length * x.reshape(-1, 1)).clip(system.mesh.points.min(), system.mesh.points.max())
-    stiffness = system.section.stiffness(place).reshape(x.shape) / frame.stiffness
-    inertia = system.section.inertia(place).reshape(x.shape) / frame.inertia
-    value, bend = space.functions(np.arange(len(x)), x[..., None], (0, 2))
-    moments = np.zeros((*x.shape, vectors.shape[1]))
-    for point, mass in system.point_masses:
-        beyond = (x - frame.local(point[None])[0, 0]).clip(0.0)
-        moments += mass / frame.mass * beyond[..., None] * (system.interpolate(point[None]) @ loads)
-    hinges = []
-    for point, spring in system.point_supports:
-        beyond = (x - frame.local(point[None])[0, 0]).clip(0.0)
-        if np.isinf(spring):
-            hinges.append(beyond)
-        else:
-            pull = spring / (frame.mass * frame.rate**2)
-            moments -= pull * beyond[..., None] * (system.interpolate(point[None]) @ vectors)
-    if forced is not None:
-        moments += (x[..., None] - frame.local(forced)[:, 0]).clip(0.0)
-    load = inertia[..., None] * (value @ _of_cells(system, loads))
-    errors = beam_elements.energy_errors(space, stiffness, bend @ _of_cells(system, vectors), load, moments, hinges)
-    return np.stack([errors, 0.0 * errors, 0.0 * errors])
+    return Residual(system).errors(vectors, loads)
 
 
 def _squares(values: np.ndarray) -> np.ndarray:

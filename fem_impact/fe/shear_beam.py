@@ -14,19 +14,20 @@ References
 Timoshenko (1921), Phil. Mag. 41, 744-746; Cowper (1966), J. Appl. Mech. 33, 335-340 (kappa).
 """
 
-from collections.abc import Callable
 from typing import Any
 
 import numpy as np
-from scipy.sparse import coo_matrix, csc_matrix, csr_matrix
+from scipy.sparse import csr_matrix
 
 from .._base.untyped import Cells, Sparse
-from .beam_elements import DEGREE, HermiteSpace, quadrature, running_integral
+from . import beam_elements
+from .beam_elements import DEGREE, HermiteSpace, integral_along, quadrature
+from .elements import numbering
 from .section import Elastic
+from .theory import Body, Domain, Held, Points, Term, Theory, unknowns_of_cells
 
 BENT = DEGREE + 1  # shape functions of W on an element
 LOCAL = 2 * BENT  # of both
-Field = Callable[[np.ndarray], np.ndarray]
 
 
 class TimoshenkoSpace:
@@ -77,20 +78,27 @@ class TimoshenkoSpace:
         return np.vstack([dofs, n_bent + self.vertices, inside]), n_bent + n_nodes + inside.size
 
 
-def integrals(space: TimoshenkoSpace, fields: list[Field]) -> tuple[np.ndarray, ...]:
-    """Stiffness by bending, by shear, mass and rotary inertia of each element, (n_cells, LOCAL, LOCAL) each.
+def terms(space: TimoshenkoSpace, points: Points, cells: np.ndarray) -> list[Term]:
+    """Curvature and shear strain, deflection and rotation."""
+    x = points.x[cells]
+    none = np.zeros((*x.shape[:2], BENT))
+    slope, curve = (np.concatenate([b, none], axis=-1) for b in space.bend.functions(cells, x, (1, 2)))
+    strain = np.concatenate([none, space.shears(cells, x, 1)], axis=-1)
+    value = space.functions(cells, x, (0,))[0]
+    named = (
+        ("K", "stiffness", curve), ("K", "shear", strain), ("M", "inertia", value), ("M", "rotary", slope),
+    )  # fmt: skip
+    return [Term(matrix, name, parts[:, :, None]) for matrix, name, parts in named]
 
-    ``fields`` are bending stiffness, shear stiffness, mass and rotary inertia per length at places (n,).
-    """
-    x, dx = quadrature(space)
-    bending, shear, inertia, rotary = (field(x.ravel()).reshape(x.shape) * dx for field in fields)
-    cells = np.arange(len(x))
-    none = np.zeros((*x.shape, BENT))
-    slope, curve = (np.concatenate([b, none], axis=-1) for b in space.bend.functions(cells, x[..., None], (1, 2)))
-    strain = np.concatenate([none, space.shears(cells, x[..., None], 1)], axis=-1)
-    value = space.functions(cells, x[..., None], (0,))[0]
-    pairs = (curve, bending), (strain, shear), (value, inertia), (slope, rotary)
-    return tuple(part.transpose(0, 2, 1) @ (part * weight[..., None]) for part, weight in pairs)
+
+def _domain(body: Body, fields: tuple[str, ...]) -> Domain:
+    return beam_elements.domain(body, TimoshenkoSpace, fields)
+
+
+def _hold(body: Body, domain: Domain) -> Held:
+    dofs, n_all = domain.space.numbering(numbering(domain.cells, domain.space.bend))
+    (expand, project), sprung = constrain(beam_elements.ends(body), dofs, n_all)
+    return Held(expand, project, dofs, beam_elements.end_springs(sprung, domain.frame, n_all))
 
 
 def constrain(
@@ -121,46 +129,23 @@ def constrain(
     return (csr_matrix((values, (rows, columns)), shape=(n_all, len(kept))), project), sprung
 
 
-def springs(sprung: list[tuple[dict[int, float], int, Elastic]], units: np.ndarray, n_all: int) -> Sparse:
-    """Stiffness (n_all, n_all) of elastic supports; ``units`` (2,) turn theirs into those of the frame."""
-    total = csc_matrix((n_all, n_all))
-    for deflection, turned, kind in sprung:
-        for along, stiffness in ((deflection, kind.stiffness * units[0]), ({turned: 1.0}, kind.rotation * units[1])):
-            row = csc_matrix(coo_matrix((list(along.values()), ([0] * len(along), list(along))), shape=(1, n_all)))
-            total = total + stiffness * row.T @ row
-    return total
-
-
-def energy_errors(
-    space: TimoshenkoSpace,
-    fields: list[Field],
-    unknowns: np.ndarray,
-    loads: np.ndarray,
-    forces: list[Any],
-    hinges: list[Any],
-) -> np.ndarray:
-    """Error (n,) of the squared energy norm of solutions, from moments and shear forces in equilibrium with the loads.
+def errors(system: Any, vectors: np.ndarray, loads: np.ndarray, forced: np.ndarray | None = None) -> np.ndarray:
+    """Errors (3, n) of the squared energy norm of solutions, from moments and shear forces in equilibrium.
 
     As `beam_elements.energy_errors`; here the shear force must agree, too.
-
-    Parameters
-    ----------
-    space : TimoshenkoSpace
-    fields : list, as in `integrals`
-    unknowns : ndarray, shape (n_cells, LOCAL, n), of the solutions
-    loads : ndarray, shape (n_cells, LOCAL, n), fields whose inertia drives them
-    forces : list of pairs of place and force (n,)
-    hinges : list of places held at rest, by an unknown force
     """
-    x, dx = quadrature(space)
-    bending, shear, inertia, rotary = (field(x.ravel()).reshape(x.shape)[..., None] for field in fields)
+    space, (x, dx) = system.space, quadrature(system.space)
     cells, at = np.arange(len(x)), x[..., None]
+    unknowns, loads_of_cells = unknowns_of_cells(system, vectors), unknowns_of_cells(system, loads)
+    forces, hinges = beam_elements.point_forces(system, vectors, loads, forced)
+    fields = {name: system.frame.field(system.section, name, at)[..., None] for name in TIMOSHENKO.fields}
+    bending, shear = fields["stiffness"], fields["shear"]
     curve = space.bend.functions(cells, at, (2,))[0] @ unknowns[:, :BENT]
     strain = space.shears(cells, at, 1) @ unknowns[:, BENT:]
-    load = inertia * (space.functions(cells, at, (0,))[0] @ loads)
-    turning = rotary * (space.bend.functions(cells, at, (1,))[0] @ loads[:, :BENT])
-    carried = _integral(space, load)
-    moment, push = _integral(space, carried - turning), -carried
+    load = fields["inertia"] * (space.functions(cells, at, (0,))[0] @ loads_of_cells)
+    turning = fields["rotary"] * (space.bend.functions(cells, at, (1,))[0] @ loads_of_cells[:, :BENT])
+    carried = integral_along(space, load)
+    moment, push = integral_along(space, carried - turning), -carried
     for place, force in forces:
         moment = moment + (at - place).clip(0.0) * force
         push = push - (at > place) * force
@@ -175,11 +160,10 @@ def energy_errors(
         free = np.column_stack([free, beyond])
     free = scale * free
     rest -= free @ np.linalg.lstsq(free, rest, rcond=None)[0]
-    return (rest**2).sum(axis=0)
+    return np.outer([1.0, 0.0, 0.0], (rest**2).sum(axis=0))
 
 
-def _integral(space: TimoshenkoSpace, values: np.ndarray) -> np.ndarray:
-    """Integral from the left end of values (n_cells, n_q, n) at the Gauss points, at the same points."""
-    each = np.einsum("eq,eqk->ek", quadrature(space)[1], values)
-    before = np.concatenate([np.zeros_like(each[:1]), np.cumsum(each, axis=0)[:-1]])
-    return before[:, None] + 0.5 * space.length[:, None, None] * (running_integral() @ values)
+TIMOSHENKO = Theory(
+    "timoshenko", "hermite and shear", 1, _domain, terms, _hold, errors, wave=30.0, unknowns=2 * DEGREE - 1,
+    fields=("stiffness", "inertia", "shear", "rotary"),
+)  # fmt: skip

@@ -4,10 +4,8 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-from scipy.sparse import coo_matrix
 
 from .._base import check
-from .._base.untyped import Sparse
 from .section import Elastic
 
 FACET_POINTS = 8  # [-] Gauss points on a boundary facet; exact for products of quintics
@@ -29,28 +27,10 @@ def at_facets(space: Any, facets: np.ndarray, cells: np.ndarray) -> tuple[np.nda
     return area, x, np.stack([tangent[..., 1], -tangent[..., 0]], axis=-1) * 0.5 * weight[:, None]
 
 
-def edge_springs(supports: Sequence[Any], frame: Any) -> np.ndarray:
-    """Support stiffness (n_facets, 2) against deflection and slope of each facet, in the frame's units."""
+def edge_stiffness(supports: Sequence[Any], frame: Any) -> np.ndarray:
+    """Stiffness (n_facets, 2) of supports against deflection and slope of each facet, in the frame's units."""
     pairs = [(kind.stiffness, kind.rotation) if isinstance(kind, Elastic) else (0.0, 0.0) for kind in supports]
     return np.array(pairs).reshape(-1, 2) * [frame.length**3, frame.length] / frame.stiffness
-
-
-def plate_springs(space: Any, facets: np.ndarray, cells: np.ndarray, springs: np.ndarray) -> np.ndarray:
-    """Stiffness (n, 21, 21) that the springs (n, 2) of facets (n, 2) add to the cells (n,) they belong to."""
-    x, normal = along_facets(space, facets, cells)
-    ds = np.linalg.norm(normal, axis=2)
-    value, slope = space.functions(cells, x, (0, 1))
-    across = np.einsum("nqi,niqk->nqk", normal / ds[..., None], slope)
-    push, turn = springs.T
-    pushed = (value * (push[:, None] * ds)[..., None]).transpose(0, 2, 1) @ value
-    return pushed + (across * (turn[:, None] * ds)[..., None]).transpose(0, 2, 1) @ across
-
-
-def beam_springs(dofs: list[tuple[int, int]], held: list[Elastic], frame: Any, n_all: int) -> Sparse:
-    """Stiffness (n_all, n_all) of elastic supports, on the deflection and slope at the ends of a beam."""
-    numbers = np.array(dofs, int).ravel()
-    values = edge_springs(held, frame).ravel()
-    return coo_matrix((values, (numbers, numbers)), shape=(n_all, n_all)).tocsr()
 
 
 def check_posts(

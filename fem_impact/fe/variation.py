@@ -7,9 +7,9 @@ import numpy as np
 
 from .._base import check
 from . import slopes
-from .assembly import System, curvatures
-from .elements import CHUNK
 from .section import Beam, Plate
+from .system import System
+from .theory import blocks, unknowns_of_cells
 
 # fourth-order differences over values at these multiples of a step: about the value, and to one side of it
 DIFFERENCES = (
@@ -26,10 +26,6 @@ class SectionChange:
 
     sections: tuple[Plate | Beam, ...]
     weights: tuple[float, ...]  # [1 over the unit of the number]
-
-    def of(self, name: str, points: np.ndarray) -> np.ndarray:
-        """Rate of "stiffness", "inertia", "shear" or "rotary" at points (n, dimension) [m]."""
-        return sum(weight * getattr(each, name)(points) for each, weight in zip(self.sections, self.weights))
 
     @classmethod
     def along(cls, name: str, value: Any, made: Any) -> "SectionChange":
@@ -60,42 +56,14 @@ def energies(system: System, change: SectionChange, vectors: np.ndarray) -> tupl
     """
     if system.element == "morley":
         raise ValueError("derivatives are unknown for element 'morley'; take 'argyris'")
-    frame, (x, dx) = system.frame, slopes.places(system)
-    low, high = system.mesh.points.min(axis=0), system.mesh.points.max(axis=0)
-    whole, n = system.expand @ vectors, vectors.shape[1]
-    square = frame.length**2
-    units = {"stiffness": frame.stiffness, "inertia": frame.inertia, "shear": frame.stiffness / square,
-             "rotary": frame.inertia * square}  # fmt: skip
+    points, whole, n = slopes.quadrature(system), unknowns_of_cells(system, vectors), vectors.shape[1]
     found = {"K": np.zeros((n, n)), "M": np.zeros((n, n))}
-    for first in range(0, len(x), CHUNK):
-        cells = np.arange(first, min(first + CHUNK, len(x)))
-        own = whole[system.element_dofs.T[cells]][:, None]  # (n_cells, 1, n_local, n)
-        place = frame.centre + frame.length * x[cells].reshape(-1, x.shape[-1])
-        place = place.clip(low, high) if system.mesh.dimension == 1 else place
-        for matrix, name, parts in _strains(system, cells, x[cells]):
-            rate = change.of(name, place) / units[name]
-            rate = rate.reshape(*dx[cells].shape, *(rate.shape[1:] or (1, 1))) * dx[cells][..., None, None]
+    for cells in blocks(len(points.x)):
+        own, dx = whole[cells][:, None], points.dx[cells][..., None, None]  # (n_cells, 1, n_local, n)
+        for matrix, name, parts in system.rules.terms(system.space, points, cells):
+            fields = (system.frame.field(each, name, points.x[cells]) for each in change.sections)
+            rate: Any = sum(weight * field for weight, field in zip(change.weights, fields))
             moved = parts @ own  # (n_cells, n_q, n_parts, n)
-            pushed = rate @ moved if rate.shape[-1] > 1 else rate * moved
+            pushed = (rate * dx) @ moved if rate.ndim > 2 else rate[..., None, None] * dx * moved
             found[matrix] += moved.reshape(-1, n).T @ pushed.reshape(-1, n)
     return found["K"], found["M"]
-
-
-def _strains(system: System, cells: np.ndarray, x: np.ndarray) -> list[tuple[str, str, np.ndarray]]:
-    """What deforms or moves in cells at points (n, n_q, dimension): matrix, kind of the section, and the operator.
-
-    The operators are (n, n_q, n_parts, n_local).
-    """
-    space: Any = system.space
-    if system.theory == "euler":
-        value, bend = space.functions(cells, x, (0, 2))
-        return [("K", "stiffness", bend[:, :, None]), ("M", "inertia", value[:, :, None])]
-    if system.theory == "timoshenko":
-        none = np.zeros((*x.shape[:2], space.bend.functions(cells, x, (0,))[0].shape[-1]))
-        slope, bend = (np.concatenate([b, none], axis=-1) for b in space.bend.functions(cells, x, (1, 2)))
-        shear = np.concatenate([none, space.shears(cells, x, 1)], axis=-1)
-        value = space.functions(cells, x, (0,))[0]
-        pairs = ("K", "stiffness", bend), ("K", "shear", shear), ("M", "inertia", value), ("M", "rotary", slope)
-        return [(matrix, name, part[:, :, None]) for matrix, name, part in pairs]
-    value, hessian = space.functions(cells, x, (0, 2))
-    return [("K", "stiffness", curvatures(hessian)), ("M", "inertia", value[:, :, None])]

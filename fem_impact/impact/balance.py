@@ -2,12 +2,16 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from .compiled import law, layout
 from .contact import Contact
 from .history import History
+
+if TYPE_CHECKING:
+    from .response import Response
 
 
 @dataclass(frozen=True)
@@ -69,3 +73,10 @@ def momentum_error(h: History) -> float:
     wanted = h.start_p + h.bias * h.end_time - impulses @ h.shape
     scale = max(np.abs(h.start_p[rigid]).max(), np.abs(impulses @ np.abs(h.shape[:, rigid])).max())
     return float(np.abs(h.end_p - wanted)[rigid].max() / scale) if scale else 0.0
+
+
+def of_bodies(hit: "Response", q: np.ndarray, p: np.ndarray) -> dict[str, float]:
+    """Energy [J] of each body of a blow in a state."""
+    n = len(hit.bodies)
+    names = ["striker", "target"] if n == 2 else [f"body {i}" for i in range(n)]
+    return {name: hit.history.energy(q, p, hit.body_slice(i)) for i, name in enumerate(names)}

@@ -17,7 +17,7 @@ from .history import ModalSystem
 from .reduced_body import ReducedBody, ends_of, joined, part_of
 from .response import Response
 from .state import State
-from .stepping import Options, refine_steps
+from .stepping import Options, refine_steps, takes_options
 from .striker import Striker
 
 LOSSY_STRIKER = 30.0  # [-] a lossy contact multiplies the truncation error of a striker by this: its modes are sparse
@@ -44,47 +44,30 @@ class Touch(check.Brief):
                 check.finite(name, check.numbers(name, point, "m"), "m")
 
 
+@takes_options
 @check.typed
 def strike(
-    modes: Modes,
-    striker: Striker,
-    contact: Contact,
-    *,
-    at: Any,
-    speed: float | None,
-    tolerance: float = TOLERANCE,
-    quantity: Any = None,
-    residual: bool = True,
-    duration: float | None = None,
-    max_impacts: int | None = None,
-    scheme: str | None = None,
-    dt: float | None = None,
-    striker_force: float = 0.0,
-    target_force: float = 0.0,
-    start: State | Response | None = None,
-    stretching: bool = False,
-) -> Response:
+    modes: Modes, striker: Striker, contact: Contact, *, at: Any, speed: float | None,
+    start: State | Response | None = None, **options: Any,
+) -> Response:  # fmt: skip
     """Strike a body with known modes; see `fi.strike`."""
     if speed is None and start is None:
         raise ValueError("speed must be given in m/s, or start, which says how the striker moves")
     speed = speed if speed is None else check.non_negative("speed", speed, "m/s")
     before = start.state() if isinstance(start, Response) else start
-    forces = [
-        check.number(name, x, "N") for name, x in (("striker_force", striker_force), ("target_force", target_force))
-    ]
-    point = modes.point("at", at)
-    options = Options.checked(tolerance, duration, max_impacts, scheme, dt, quantity)
+    point, asked = modes.point("at", at), Options(**options)
     rows = modes.shapes.at(point)
-    rest = left_out(modes, point, rows) if residual and modes.dimension else None
-    struck = part_of(modes, ((0, -1.0),), point, rows, rest, forces[1])
+    rest = left_out(modes, point, rows) if asked.residual and modes.dimension else None
+    struck = part_of(modes, ((0, -1.0),), point, rows, rest, asked.target_force)
     if before is not None:
         struck = struck.moving(*before.of(-1, "modes", modes))
-    if check.flag("stretching", stretching) or modes.stretches:
+    if asked.stretching or modes.stretches:
         struck = replace(struck, stretching=stretch(modes))
 
     def blow(striker: Striker, speed: float, own: tuple[np.ndarray, np.ndarray] | None = None) -> Response:
-        rest = striker.left_out if residual and striker.modes.dimension else None
-        arriving = part_of(striker.body, ((0, 1.0),), striker.at[None], striker.shape[None], rest, forces[0])
+        rest = striker.left_out if asked.residual and striker.modes.dimension else None
+        places = striker.at[None], striker.shape[None]
+        arriving = part_of(striker.body, ((0, 1.0),), *places, rest, asked.striker_force)
         arriving = replace(arriving, bias=arriving.bias + striker.push, held=int(striker.hand is not None))
 
         def start(one: float = 1.0, other: float = 1.0) -> list[ReducedBody]:
@@ -97,7 +80,7 @@ def strike(
 
         doubt = 0.0 if before is None else 1.0 + before.error
         others = [start(*factors) for factors in ((doubt, 1.0), (1.0, doubt))[own is None :] if doubt]
-        return _follow((striker.body, modes), (contact,), start(), speed, options, striker, point[0], others)
+        return _follow((striker.body, modes), (contact,), start(), speed, asked, striker, point[0], others)
 
     if speed is None:
         assert before is not None
@@ -109,11 +92,11 @@ def strike(
             "start must be a time when nothing touches, or speed None for the striker to go on; at "
             f"{before.time:.4g} s a force of {before.force[:, 0].max():.3g} N acts"
         )
-    if striker.fixed or not residual or speed == 0.0:
+    if striker.fixed or not asked.residual or speed == 0.0:
         return blow(striker, speed)
-    needed = striker_modes(striker, contact=contact, speed=speed, tolerance=options.tolerance)[0]
+    needed = striker_modes(striker, contact=contact, speed=speed, tolerance=asked.tolerance)[0]
     hit = blow(shortened(striker, needed), speed)
-    return hit if hit.error.truncation <= 0.5 * options.tolerance else blow(striker, speed)
+    return hit if hit.error.truncation <= 0.5 * asked.tolerance else blow(striker, speed)
 
 
 @check.typed
@@ -164,19 +147,21 @@ def collide(
     >>> [round(float(hit.velocity(None, [0.01], body=i)[0, 0]), 3) + 0.0 for i in range(3)]  # m/s
     [0.0, 0.0, 1.0]
     """
-    rule: dict[str, Any] = {"tolerance": tolerance, "quantity": quantity, "residual": residual, "duration": duration}
-    rule |= {"max_impacts": max_impacts, "scheme": scheme, "dt": dt, "forces": forces, "start": start}
-    return promise.kept(met(bodies, contacts, speeds=speeds, states=states, **rule), strict)
+    return promise.kept(
+        met(
+            bodies, contacts, speeds=speeds, states=states, forces=forces, start=start, tolerance=tolerance,
+            quantity=quantity, residual=residual, duration=duration, max_impacts=max_impacts, scheme=scheme, dt=dt,
+        ),
+        strict,
+    )  # fmt: skip
 
 
 def met(
-    bodies: Sequence[Modes], contacts: Sequence[Touch], *, speeds: Any = None, states: Any = None,
-    tolerance: float = TOLERANCE, quantity: Any = None, residual: bool = True, duration: float | None = None,
-    max_impacts: int | None = None, scheme: str | None = None, dt: float | None = None, forces: Any = None,
-    start: State | Response | None = None, pushes: Sequence[np.ndarray] = (),
+    bodies: Sequence[Modes], contacts: Sequence[Touch], *, speeds: Any = None, states: Any = None, forces: Any = None,
+    start: State | Response | None = None, pushes: Sequence[np.ndarray] = (), **options: Any,
 ) -> Response:  # fmt: skip
     """`collide` without a word on its tolerance; ``pushes`` are constant modal forces on the first bodies."""
-    options = Options.checked(tolerance, duration, max_impacts, scheme, dt, quantity)
+    asked = Options(**options)
     bodies, contacts = check.several("bodies", bodies, Modes), check.several("contacts", contacts, Touch)
     if any(body.stretches for body in bodies):
         raise ValueError("a body that stretches can only be struck once, by `fi.strike`; leave stretching out")
@@ -185,7 +170,7 @@ def met(
         if states is not None:
             raise ValueError("states must be left out if start is given, which has the states of all bodies")
         states = before.states(bodies, [touch.law for touch in contacts])
-    parts, arriving = _parts(bodies, contacts, speeds, states, forces, residual)
+    parts, arriving = _parts(bodies, contacts, speeds, states, forces, asked.residual)
     pushed = zip(parts, pushes)
     parts = [
         *(replace(part, bias=part.bias + push, held=int(part.omega[0] > 0.0)) for part, push in pushed),
@@ -197,7 +182,7 @@ def met(
         parts = [replace(part, pressed=before.force[rows].T) for part, rows in zip(parts, ends)]
         doubt = 1.0 + before.error
         others = [[*parts[:i], part.faster(doubt), *parts[i + 1 :]] for i, part in enumerate(parts)]
-    return _follow(bodies, [touch.law for touch in contacts], parts, arriving, options, others=others)
+    return _follow(bodies, [touch.law for touch in contacts], parts, arriving, asked, others=others)
 
 
 def touching(bodies: Sequence[Modes], touch: Touch, speed: float, residual: bool) -> tuple[ModalSystem, float]:
@@ -213,13 +198,16 @@ def _follow(bodies, laws, parts, speed, options, striker=None, at=None, others=(
     ``others`` are the parts as they would move at the start if the blow before erred as estimated.
     """
     system = joined(parts, laws)
-    endless = not np.isfinite(options.horizon) and not options.n_max
+    endless = options.duration is None and options.max_impacts is None
     if endless and (system.bias @ system.shape.T > 0.0).any():
         raise ValueError(
             "duration or max_impacts must be given, because a constant force keeps pressing the bodies together"
         )
-    held = np.concatenate([np.arange(len(part.omega)) < part.held for part in parts])
-    pace = engine.pace_of(system, np.append(held, np.zeros(len(system.omega) - len(held), bool)))
+    held, first = np.zeros(len(system.omega), bool), 0
+    for part in parts:
+        held[first : first + part.held] = True
+        first += len(part.omega)
+    pace = engine.pace_of(system, held)
     _check_way(system, pace[0] * pace[1], options.tolerance)
     found = refine_steps(system, options, pace)
     growth = distance.growth(found.coarse, found.fine)
@@ -230,19 +218,16 @@ def _follow(bodies, laws, parts, speed, options, striker=None, at=None, others=(
     left_out, resolvable = what_if.modes_left_out(blow, told)
     inherited = what_if.Variation("inherited", [[(other, 1.0, 1.0)] for other in others])
     variations = left_out, what_if.unstated(blow, bodies), what_if.mesh(blow, bodies), inherited
-    table = {"step": found.error, **what_if.what_if(blow, variations)}
-    for cause, more in what_if.poorer_descriptions(blow, bodies).items():
-        table[cause] = distance.added(table.get(cause, {}), more)
-    doubts = {cause: error[distance.MARGIN] for cause, error in table.items()}
-    if "n_impacts" in options.quantities and sum(doubts.values()) >= found.fine.margin:
-        doubtful = max(doubts, key=lambda cause: doubts[cause])
-        table[doubtful] = distance.added(table[doubtful], {"n_impacts": 1.0})
+    errors = {"step": found.error, **what_if.what_if(blow, variations)}
+    what_if.add_poorer_descriptions(blow, bodies, errors)
+    margins, rebounds = zip(*[(error.margin, error.rebounds) for error in errors.values()])
+    if "n_impacts" in options.quantities and sum(margins) >= found.fine.margin:
+        list(errors.values())[margins.index(max(margins))].quantities["n_impacts"] += 1.0
     order = np.lexsort(found.fine.contacts[:, (4, 0)].T)  # as `History.impacts`
-    rebounds = np.array([sum(error.get(f"{distance.REBOUND}{i}", 1.0) for error in table.values()) for i in order])
-    error = Error.from_table(table, resolvable, growth)
+    error = Error.of_causes(errors, resolvable, growth)
     return Response(
         tuple(bodies), tuple(laws), found.fine, speed, options.tolerance, found.scheme, error, striker, at,
-        ends_of(parts, system.law), options.quantities, rebounds=rebounds,
+        ends_of(parts, system.law), options.quantities, rebounds=np.sum(rebounds, axis=0)[order],
     )  # fmt: skip
 
 

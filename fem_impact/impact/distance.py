@@ -1,6 +1,8 @@
 """The distance between two blows: every error that the program states is one."""
 
 from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from math import sqrt
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -14,9 +16,44 @@ if TYPE_CHECKING:
     from .response import Response
 
 INSTANTS = ("contact_time", "force")  # quantities that depend on single instants
-MARGIN = "margin"  # the name under which distances of runs hold that of their margins
-REBOUND = "rebound "  # and with the index of an impact that of its restitution
-Distances = dict[str, float]  # [-] by quantity
+
+
+@dataclass(eq=False)
+class Distance:
+    """How far one run is from another [-]."""
+
+    quantities: dict[str, float]  # in each quantity asked for
+    margin: float
+    rebounds: np.ndarray  # (n_impacts,) in the restitution of each impact, in the order of `History.contacts`
+
+    @property
+    def worst(self) -> float:
+        """The largest distance in any quantity."""
+        return max(self.quantities.values(), default=0.0)
+
+    def __add__(self, other: "Distance") -> "Distance":
+        two = other.quantities
+        found = {name: value + two[name] for name, value in self.quantities.items()}
+        return Distance(found, self.margin + other.margin, self.rebounds + other.rebounds)
+
+    def scaled(self, factor: float, parting: float) -> "Distance":
+        """The same times a factor; in the restitutions of impacts times another."""
+        found = {name: factor * value for name, value in self.quantities.items()}
+        return Distance(found, factor * self.margin, parting * self.rebounds)
+
+    @classmethod
+    def uniform(cls, like: "Distance", size: float) -> "Distance":
+        """The same distance in everything that another tells of."""
+        return cls(dict.fromkeys(like.quantities, size), size, np.full(len(like.rebounds), size))
+
+
+def largest(distances: Iterable[Distance]) -> Distance:
+    """The largest of some distances in everything."""
+    first, *others = distances
+    for other in others:
+        found = {name: max(value, other.quantities[name]) for name, value in first.quantities.items()}
+        first = Distance(found, max(first.margin, other.margin), np.maximum(first.rebounds, other.rebounds))
+    return first
 
 
 def distance(one: Mapping[str, Any], two: Mapping[str, Any]) -> dict[str, Any]:
@@ -34,23 +71,23 @@ def distance(one: Mapping[str, Any], two: Mapping[str, Any]) -> dict[str, Any]:
         Absolute for the restitution, relative to the second for all others; 1 if only one of the blows has a
         restitution. Of a spectrum it is the largest difference over the largest value of the second.
     """
-    return {name: _apart(name, one[name], value) for name, value in two.items()}
+    found: dict[str, Any] = {}
+    for name, value in two.items():
+        other = one[name]
+        if other is None or value is None:
+            found[name] = float((other is None) != (value is None))
+        elif name == "restitution":
+            found[name] = abs(other - value)
+        elif name in BANDED:
+            found[name] = float(abs(other - value).max() / (abs(value).max() or 1.0))
+        elif isinstance(value, np.ndarray):
+            found[name] = abs(other - value) / np.where(value == 0.0, 1.0, abs(value))
+        else:
+            found[name] = abs(other - value) / (abs(value) or 1.0)
+    return found
 
 
-def _apart(name: str, one: Any, two: Any) -> Any:
-    if one is None or two is None:
-        return float((one is None) != (two is None))
-    apart = abs(one - two)
-    if name == "restitution" or name.startswith(REBOUND):
-        return apart
-    if name in BANDED:
-        return float(apart.max() / (abs(two).max() or 1.0))
-    if isinstance(two, np.ndarray):
-        return apart / np.where(two == 0.0, 1.0, abs(two))
-    return apart / (abs(two) or 1.0)
-
-
-def of_blows(one: "Response", two: "Response", quantities: Mapping[str, float | None]) -> Distances:
+def of_blows(one: "Response", two: "Response", quantities: Mapping[str, float | None]) -> dict[str, float]:
     """How far one blow is from another in each quantity; the sound counts by the spectrum of the force."""
     return distance(*({name: _value(hit, name, band) for name, band in quantities.items()} for hit in (one, two)))
 
@@ -63,7 +100,7 @@ def _value(hit: "Response", name: str, band: float | None) -> Any:
 
 def of_runs(
     one: History, two: History, quantities: Mapping[str, float | None], over: tuple[float, float] = (1.0, 1.0)
-) -> Distances:
+) -> Distance:
     """How far one run is from another in each quantity asked for, in its margin and in the restitution of each impact.
 
     All are 1 if the runs ended differently. The restitution counts by the speed of every body that moves rigidly, over
@@ -71,39 +108,25 @@ def of_runs(
     contact time and peak force, which depend on an instant; not those of impacts, as points part as fast as the bodies
     ring there, also in modes faster than the step.
     """
-    if len(one.contacts) != len(two.contacts) or one.status != two.status:
-        return dict.fromkeys((*quantities, MARGIN, *_rebounds(two)), 1.0)
+    n_impacts = len(two.contacts)
+    if len(one.contacts) != n_impacts or one.status != two.status:
+        return Distance(dict.fromkeys(quantities, 1.0), 1.0, np.ones(n_impacts))
     rigid = two.omega == 0.0  # a swinging body has much momentum, of which the striker's error is no share
-    momentum = max(float(np.linalg.norm(p[rigid])) for p in (two.start_p, two.end_p))
-    momentum = momentum or float(np.linalg.norm(two.start_p) or np.linalg.norm(two.end_p)) or 1.0
-    speed = np.abs(one.end_p[one.omega == 0.0] - two.end_p[rigid])
-    found = dict.fromkeys(quantities, ROUNDING)
-    found["restitution"] = float(speed.max(initial=0.0)) / momentum
-    if len(two.contacts):
-        found |= distance(_totals(one), _totals(two))
+    start, end = two.start_p[rigid], two.end_p[rigid]
+    momentum = sqrt(max(start.dot(start), end.dot(end)))
+    momentum = momentum or sqrt(two.start_p.dot(two.start_p)) or sqrt(two.end_p.dot(two.end_p)) or 1.0
+    speeds = np.abs(one.end_p[one.omega == 0.0] - end)
+    found: dict[str, float] = {"restitution": max(speeds.tolist(), default=0.0) / momentum}
+    if n_impacts:
+        found |= distance(one.totals, two.totals)
+    error: dict[str, float] = {}
     for name, band in quantities.items():
         if band is not None:
             found |= distance({name: _spectrum(one, band)}, {name: _spectrum(two, band)})
-    error = {name: max(ROUNDING, found[name] / over[name in INSTANTS]) for name in quantities}
-    before, after = _rebounds(one), _rebounds(two)
-    return error | {MARGIN: abs(one.margin - two.margin)} | distance(before, after)
-
-
-def _rebounds(history: History) -> dict[str, float | None]:
-    """Restitution of every impact, in the order of `History.contacts`; None where there is none."""
-    rows = history.contacts[:, 5:7].tolist()
-    found = [left / met if met and left == left else None for met, left in rows]
-    return {f"{REBOUND}{i}": each for i, each in enumerate(found)}
-
-
-def _totals(history: History) -> dict[str, float]:
-    """Impulse [N s], contact time [s] and peak force [N] of a run with impacts."""
-    rows = history.contacts.tolist()
-    return {
-        "impulse": sum(row[3] for row in rows),
-        "contact_time": sum(row[1] - row[0] for row in rows),
-        "force": max(row[2] for row in rows),
-    }
+        error[name] = max(ROUNDING, found.get(name, ROUNDING) / over[name in INSTANTS])
+    apart = np.abs(one.rebounds - two.rebounds)
+    unlike = np.isnan(one.rebounds) != np.isnan(two.rebounds)  # only one of them has a restitution
+    return Distance(error, abs(one.margin - two.margin), np.where(np.isnan(apart), unlike, apart))
 
 
 def _spectrum(history: History, band: float) -> np.ndarray:
@@ -120,31 +143,3 @@ def growth(coarse: History, fine: History) -> float:
     one, two = (np.sort(history.contacts[:, 1]) for history in (coarse, fine))
     least = ROUNDING * two[-1]
     return max(1.0, float((abs(one[-1] - two[-1]) + least) / (abs(one[0] - two[0]) + least)))
-
-
-def largest(distances: Iterable[Distances]) -> Distances:
-    """The largest distance in each quantity; none of no blows."""
-    found: Distances = {}
-    for each in distances:
-        found |= {name: max(found.get(name, 0.0), value) for name, value in each.items()}
-    return found
-
-
-def added(one: Distances, two: Distances) -> Distances:
-    """The sum of two distances in each quantity."""
-    return one | {name: one.get(name, 0.0) + value for name, value in two.items()}
-
-
-def scaled(distances: Distances, factor: float, parting: float = 1.0) -> Distances:
-    """Distances times a factor; those in the restitutions of impacts times another."""
-    return {name: (parting if name.startswith(REBOUND) else factor) * x for name, x in distances.items()}
-
-
-def judged(name: str) -> bool:
-    """Whether a distance is one in a quantity that a tolerance is about."""
-    return name != MARGIN and not name.startswith(REBOUND)
-
-
-def worst(distances: Mapping[str, float]) -> float:
-    """The largest distance in any quantity [-]."""
-    return max((value for name, value in distances.items() if judged(name)), default=0.0)

@@ -104,14 +104,14 @@ def pace_of(system: ModalSystem, held: np.ndarray | bool = False) -> tuple[float
     """
     rate = system.omega * np.maximum(1.0, 2.0 * system.zeta)  # an overdamped mode acts as a dashpot, not as a mass
     rate = np.where(held, 0.0, rate)
-    order = np.argsort(rate, kind="stable")
+    order = rate.argsort(kind="stable")
     omega = rate[order]
     last = np.concatenate([omega[1:] > omega[:-1], [True]])  # the last mode of each distinct frequency
     beyond = np.concatenate([omega[last][1:], [np.inf]])
     shortest, fastest = np.inf, 0.0
     for i, law in enumerate(system.law):
         k, exponent, compliance = law[layout.STIFFNESS], law[layout.EXPONENT], law[layout.COMPLIANCE]
-        mobile = np.cumsum(system.shape[i, order] ** 2)[last]  # [1/kg] sum over the modes up to each
+        mobile = (system.shape[i, order] ** 2).cumsum()[last]  # [1/kg] sum over the modes up to each
         above, mobile = beyond[mobile > 0.0], mobile[mobile > 0.0]
         if not mobile.size:
             continue
@@ -125,7 +125,7 @@ def pace_of(system: ModalSystem, held: np.ndarray | bool = False) -> tuple[float
         if speed == 0.0:
             continue
         free = wall_time(acting_stiffness(law, mobile, speed), exponent, mobile, speed, compliance)
-        shortest = min(shortest, float(free[np.argmax(np.pi / free < above)]))
+        shortest = min(shortest, float(free[(np.pi / free < above).argmax()]))
         fastest = max(fastest, float(speed))
     if not np.isfinite(shortest):
         k, exponent = system.law[0, :2]

@@ -2,8 +2,9 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from functools import cached_property
 
-from . import distance
+from .distance import Distance
 
 CAUSES = {
     "step": "time steps", "truncation": "modes left out", "mesh": "the finite elements",
@@ -26,16 +27,17 @@ class Error:
     table: Mapping[str, Mapping[str, float]] = field(default_factory=dict, repr=False, compare=False)
 
     @classmethod
-    def from_table(cls, table: Mapping[str, Mapping[str, float]], resolvable: bool, sensitivity: float) -> "Error":
-        """The errors of a table by cause and quantity: of each cause the largest."""
-        sizes = {cause: distance.worst(errors) for cause, errors in table.items()}
-        whole = {"step": 0.0, "truncation": 0.0, "mesh": 0.0} | sizes
+    def of_causes(cls, found: Mapping[str, Distance], resolvable: bool, sensitivity: float) -> "Error":
+        """The errors that distances tell by cause: of each the largest in any quantity."""
+        whole, table = {"step": 0.0, "truncation": 0.0, "mesh": 0.0}, {}
+        for cause, apart in found.items():
+            whole[cause], table[cause] = apart.worst, apart.quantities
         return cls(**whole, resolvable=resolvable, sensitivity=sensitivity, table=table)
 
-    @property
+    @cached_property
     def total(self) -> float:
         """The sum [-]; infinite if the modes cannot resolve the contact."""
-        return sum(self.parts().values()) if self.resolvable else float("inf")
+        return sum([getattr(self, cause) for cause in CAUSES]) if self.resolvable else float("inf")
 
     @property
     def dominant(self) -> tuple[str, float]:
@@ -44,10 +46,8 @@ class Error:
 
     def parts(self, quantity: str | None = None) -> dict[str, float]:
         """Size [-] of each part by its name in words; of one quantity, or the largest of all that were asked for."""
-        return {
-            words: self.table.get(cause, {}).get(quantity, getattr(self, cause)) if quantity else getattr(self, cause)
-            for cause, words in CAUSES.items()
-        }
+        largest = {cause: getattr(self, cause) for cause in CAUSES}
+        return {words: self.table.get(cause, {}).get(quantity or "", largest[cause]) for cause, words in CAUSES.items()}
 
     def of_quantity(self, quantity: str) -> float:
         """The estimated error of one quantity [-]; infinite if the modes cannot resolve the contact."""

@@ -10,6 +10,8 @@ from math import factorial
 import numpy as np
 from scipy import fft, special
 
+from .._base import check
+
 LEAST_SAMPLES = 800.0  # [-] per impact: its spectrum errs by less than 1e-3 up to the thirtieth lobe
 FEW = 2**12  # [-] pieces times frequencies up to which the direct sum is faster
 MOST_PERIODS = 2.0**18  # [-] periods of the highest frequency in a blow whose centroid is sought: takes half a second
@@ -135,6 +137,16 @@ def _interpolated(
     value.imag[near < 0] *= -1.0
     quarter = np.array([1.0, 1j, -1.0, -1j])[near % 4]  # exp(2 pi i middle step near)
     return (weight * quarter * value).sum(axis=1) * np.exp(-2j * np.pi * middle * frequencies)
+
+
+def dense_frequencies(max_frequency: float, span: float) -> np.ndarray:
+    """Frequencies [Hz] from zero, dense enough for the spectrum of a blow whose last contact ends at ``span`` [s]."""
+    limit = check.positive("max_frequency", max_frequency, "Hz")
+    if span == 0.0:
+        raise ValueError("spectral_centroid needs a contact, but the bodies never touched; check gap and speed")
+    if limit * span > MOST_PERIODS:
+        raise ValueError(f"max_frequency must be at most {MOST_PERIODS / span:.4g} Hz for a blow of {span:.4g} s")
+    return np.linspace(0.0, limit, int(np.clip(32.0 * limit * span, 512, 65536)))
 
 
 def centroid(frequencies: np.ndarray, spectrum: np.ndarray) -> float:

@@ -95,14 +95,14 @@ class History(ModalSystem):
     miss: float | None = None  # [m] highest approach at which the bodies turned back in flight, if they did
     reached: dict[str, Any] = field(default_factory=dict, init=False, repr=False)  # where its motion goes on
 
-    @property
+    @cached_property
     def n_coefficients(self) -> int:
         """Number of coefficients of each step's force polynomial, per contact."""
-        return (self.steps.shape[1] - layout.HEAD) // self.n_contacts - layout.PUSH - 1
+        return (self.steps.shape[1] - layout.HEAD) // len(self.offset) - layout.PUSH - 1
 
     def _column(self, first: int) -> np.ndarray:
-        width = layout.PUSH + self.n_coefficients
-        return self.steps[:, layout.HEAD + first : layout.HEAD + width * self.n_contacts : width]
+        width, m = layout.PUSH + self.n_coefficients, len(self.offset)
+        return self.steps[:, layout.HEAD + first : layout.HEAD + width * m : width]
 
     @cached_property
     def impulses(self) -> np.ndarray:
@@ -131,8 +131,9 @@ class History(ModalSystem):
         """Contact force [N] and its rate [N/s] at any times, (n_times,) each; zero after the end."""
         if not len(self.steps):
             return np.zeros(len(times)), np.zeros(len(times))
-        rows = np.clip(np.searchsorted(self.steps[:, layout.START], times, side="right") - 1, 0, None)
-        part = np.clip((times - self.steps[rows, layout.START]) / self.steps[rows, layout.LENGTH], 0.0, 1.0)
+        begun, lengths = self.steps[:, layout.START], self.steps[:, layout.LENGTH]
+        rows = np.maximum(begun.searchsorted(times, side="right") - 1, 0)
+        part = np.minimum(np.maximum((times - begun[rows]) / lengths[rows], 0.0), 1.0)
         force, rate = self.force_of(rows, contact, part)
         acts = self.pressed[rows, contact] & (force > 0.0) & (times <= self.end_time)
         return np.where(acts, force, 0.0), np.where(acts, rate, 0.0)
@@ -237,13 +238,27 @@ class History(ModalSystem):
         ]
         return tuple(sorted(found, key=lambda impact: (impact.start, impact.contact)))
 
-    @cached_property
+    @property
     def nearest_turn(self) -> float:
         """How near to zero an approach turns back, over the farthest it ever turns [-]; infinity where none does."""
         miss = -np.inf if self.miss is None else self.miss
         return float(record.nearest_turn(self.steps, self.now, self.law, self.n_coefficients, miss))
 
-    @property
+    @cached_property
+    def totals(self) -> dict[str, float]:
+        """Impulse [N s], contact time [s] and peak force [N] of all impacts, of which there are some."""
+        start, end, peak, impulse = self.contacts.T[:4]
+        return {
+            "impulse": sum(impulse.tolist()), "contact_time": sum((end - start).tolist()), "force": max(peak.tolist()),
+        }  # fmt: skip
+
+    @cached_property
+    def rebounds(self) -> np.ndarray:
+        """Restitution of every impact, in the order of `contacts`; NaN where there is none."""
+        met, left = self.contacts.T[5:]
+        return np.asarray(left / np.where(met == 0.0, np.nan, met))
+
+    @cached_property
     def margin(self) -> float:
         """How near the run is to one impact more or fewer; see `Response.margin`."""
         return CLEAR if self.bias.any() else min(CLEAR, self.nearest_turn)

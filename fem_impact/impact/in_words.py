@@ -7,12 +7,19 @@ import numpy as np
 
 from .._base import markup
 from .._base.explained import below, noted, pointed
+from .compiled import record
 from .history import CLEAR
 from .quantities import rebound, words
 
 if TYPE_CHECKING:
     from .response import Response
 
+OUTCOMES = {
+    record.FINISHED: "proven not to touch again",
+    record.HORIZON: "stopped at the given duration",
+    record.IMPACTS: "stopped after max_impacts",
+    record.SETTLED: "everything came to rest",
+}
 CHAOTIC = 1e3  # [-] a blow is called chaotic if small differences grow by more than this factor: three digits are lost
 
 

@@ -13,6 +13,7 @@ from ..fe.section import Beam, Elastic, Plate
 from ..fe.variation import DIFFERENCES, SectionChange
 from ..modes import varied
 from ..modes.modal import Modes
+from . import motion
 from .compiled import layout
 from .compiled.law import FELT, PLASTIC
 
@@ -366,7 +367,7 @@ class Parameters(check.Brief):
         seen = varied.changed(target, change, hit.at)
         found.omega[i, part] = seen.omega
         found.shape[i, 0, part] = -seen.shape
-        found.bias[i, part] = hit._push * seen.shape
+        found.bias[i, part] = motion.constant_force(hit) * seen.shape
         self._raise(found, i, 1, seen.omega[-1] / max(target.omega[-1], np.finfo(float).tiny))
         flexible = target.omega > 0.0
         row, omega = target.shapes.at(hit.at[None])[0, flexible], target.omega[flexible]
@@ -389,7 +390,7 @@ class Parameters(check.Brief):
         assert striker is not None  # it starts at the surface, which may be displaced
         for i, slope, rest in zip(axes, slopes, rests):
             found.shape[i, 0, part] = -slope
-            found.bias[i, part] = hit._push * slope
+            found.bias[i, part] = motion.constant_force(hit) * slope
             found.start_q[i, self._modes[0]] = float(slope @ hit.history.start_q[part]) * striker.motion
             if rest is not None:
                 self._soften(found, i, 1, np.array([[float(rest[0] - 2.0 * carried @ slope[flexible])]]))

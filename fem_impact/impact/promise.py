@@ -89,8 +89,13 @@ def kept(hit: Any, strict: bool = False) -> Any:
         said = hit.promise
         if strict:
             raise SimulationError(said)
-        warnings.warn(explained.pointed(said), ToleranceWarning, stacklevel=_callers_level())
+        warn(explained.pointed(said))
     return hit
+
+
+def warn(text: str) -> None:
+    """Tell the user that a tolerance was missed, at the line that called this program."""
+    warnings.warn(text, ToleranceWarning, stacklevel=_callers_level())
 
 
 def _callers_level() -> int:

@@ -1,10 +1,12 @@
 """The bodies of a blow, each reduced to its modes and contacts, and the modal system that they make together."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
+from functools import cached_property
 
 import numpy as np
 
+from .._base import check
 from .._base.rounding import ROUNDING
 from ..modes.modal import Modes, left_out
 from ..modes.stretching import Stretching, stretch
@@ -12,7 +14,6 @@ from .compiled import layout
 from .compiled.law import FELT
 from .contact import Contact
 from .history import ModalSystem
-from .response import Ends
 from .stretched import Stretched
 
 # [-] by dimension: frequency of the replacement mode over the last, fact: sqrt(sum u**2/w**2 / sum u**2/w**4) of those
@@ -22,6 +23,20 @@ REST_ABOVE = {1: 1.53, 2: 1.73}
 # spring; it is critically damped
 LOSSY_ABOVE = 30.0
 SLOW = 1e-4  # [-] frequency of a rigid motion that may be missing over that of the first mode: it acts as a mass
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Ends(check.Locked):
+    """Where the contacts of a blow act on a body, and what its kept modes lack of its static compliance there."""
+
+    points: np.ndarray  # (n_ends, dimension) [m]
+    touched: tuple[tuple[int, float], ...]  # contact, and sign: 1 for its first body, -1 for its second
+    force: float  # [N] constant force at the first point
+    rest: np.ndarray  # (n_ends, n_ends) [m/N] compliance of the modes left out; zero if the modes are complete
+    forms: slice = field(default_factory=lambda: slice(0))  # modes of the run that stand for these; empty for a spring
+    dip_force: float = 0.0  # [N] that constant force if it makes a spring that stands for them deflect
+    speed: float = 0.0  # [m/s] with which the body arrives in rigid motion, at its first point
+    doubtful: bool = False  # whether more than rounding is estimated of what is left out there
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,6 +60,11 @@ class ReducedBody:
     speed: float = 0.0  # [m/s] with which it arrives in rigid motion, at its first contact
     held: int = 0  # [-] first modes that only a hand makes swing: within a contact they move like a mass
 
+    @cached_property
+    def yields(self) -> bool:
+        """Whether modes left out yield at its contacts."""
+        return bool(self.rest.any())
+
     def moving(self, q: np.ndarray, p: np.ndarray) -> "ReducedBody":
         """The same body in another state."""
         return replace(self, q=q, p=p)
@@ -53,13 +73,13 @@ class ReducedBody:
         """The same body with all motion larger by a factor, its rigid position as it is."""
         return self.moving(np.where(self.omega == 0.0, 1.0, factor) * self.q, factor * self.p)
 
-    def lower(self, error: np.ndarray) -> "ReducedBody":
+    def lower(self, error: np.ndarray | float) -> "ReducedBody":
         """The body with frequencies lower and compliances higher by their errors, those of frequencies relative."""
         return replace(self, omega=self.omega / (1.0 + error), rest=self.rest + np.diag(self.doubt))
 
     def forms(self, rated: np.ndarray) -> np.ndarray:
         """Forms (n_ends, n_forms) of unit stiffness that stand for the modes left out; none where a spring does."""
-        if not self.rest.any() or (len(self.touched) == 1 and not rated[self.touched[0][0]]):
+        if not self.yields or (len(self.touched) == 1 and not rated[self.touched[0][0]]):
             return np.zeros((len(self.touched), 0))
         size, vectors = np.linalg.eigh(self.rest)
         kept = size > ROUNDING * size[-1]
@@ -68,10 +88,10 @@ class ReducedBody:
     def thinned(self, wanted: float) -> "tuple[ReducedBody, float]":
         """The body with its upper modes replaced by their compliance, and the ratio of old to new highest frequency."""
         flexible = self.omega[self.omega > 0.0]
-        if not self.rest.any() or len(flexible) < 2:
+        if not self.yields or len(flexible) < 2:
             return self, np.inf
         limit = max(flexible[-1] / wanted, flexible[0])
-        n = int(np.searchsorted(self.omega, limit, side="right"))
+        n = int(self.omega.searchsorted(limit, side="right"))
         gone = self.rows[:, n:] / self.omega[n:]
         thin = replace(
             self, omega=self.omega[:n], zeta=self.zeta[:n], rows=self.rows[:, :n], rest=self.rest + gone @ gone.T,
@@ -126,7 +146,7 @@ def part_of(
     rest = 0.5 * (rest + rest.T)
     carried = np.square(rows / np.where(modes.omega > 0.0, modes.omega, np.inf)).sum()
     largest = rest[0, 0] if n_ends == 1 else np.linalg.eigvalsh(rest)[-1] if n_ends else 0.0
-    if largest <= ROUNDING * (np.trace(rest) + carried):
+    if largest <= ROUNDING * (rest.trace() + carried):
         rest = np.zeros_like(rest)
     still = np.zeros(modes.n_modes)
     bias = force * rows[0] if force else still
@@ -147,8 +167,8 @@ def joined(parts: Sequence[ReducedBody], laws: Sequence[Contact]) -> ModalSystem
     law = np.array([each.numbers for each in laws])
     rated = rated_contacts(law)
     offset = np.array([-each.gap for each in laws])
-    n_modes = sum(len(part.omega) for part in parts)
-    shape = np.zeros((len(laws), n_modes))
+    arrays: list[tuple] = [(part.omega, part.zeta, part.bias, part.q, part.p) for part in parts]
+    shape = np.zeros((len(laws), sum([len(part.omega) for part in parts])))
     # frequency, damping ratio, signed shape (n_contacts,), constant force, static deflection and its rate
     extra: list[tuple[float, float, np.ndarray, float, float, float]] = []
     start, stretched = 0, None
@@ -158,7 +178,7 @@ def joined(parts: Sequence[ReducedBody], laws: Sequence[Contact]) -> ModalSystem
         for (i, sign), row in zip(part.touched, part.rows):
             shape[i, start : start + len(row)] += sign * row
         start += len(part.omega)
-        if not part.rest.any():
+        if not part.yields:
             continue
         first, sign = part.touched[0]
         if len(part.touched) == 1 and not rated[first]:
@@ -172,11 +192,10 @@ def joined(parts: Sequence[ReducedBody], laws: Sequence[Contact]) -> ModalSystem
                 column[i] += sign * share * above
             held = -(part.pressed @ column[[i for i, _ in part.touched]]) / above**2
             extra.append((above, damping, column, 0.0, float(held[0]), float(held[1])))
-    lists = [[getattr(part, name) for part in parts] for name in ("omega", "zeta", "bias", "q", "p")]
     if extra:
         shape = np.ascontiguousarray(np.hstack([shape, *(mode[2][:, None] for mode in extra)]))
-        lists = [[*one, np.array([mode[k] for mode in extra])] for one, k in zip(lists, (0, 1, 3, 4, 5))]
-    omega, zeta, bias, q, p = (np.concatenate(one) for one in lists)
+        arrays.append(tuple(np.array(column) for k, column in enumerate(zip(*extra)) if k != 2))
+    omega, zeta, bias, q, p = map(np.concatenate, zip(*arrays))
     return ModalSystem(omega, zeta, shape, offset, bias, law, q, p, stretched=stretched)
 
 
@@ -199,11 +218,11 @@ def rest_mode(dimension: int, omega: float, zeta: float, lossy: bool) -> tuple[f
 def ends_of(parts: Sequence[ReducedBody], law: np.ndarray) -> tuple[Ends, ...]:
     """Where every body is touched; a constant force makes left-out modes dip only if a series spring replaces them."""
     found, rated = [], rated_contacts(law)
-    last = sum(len(part.omega) for part in parts)
+    last = sum([len(part.omega) for part in parts])
     for part in parts:
         forms = slice(last, last + part.forms(rated).shape[1])
         last = forms.stop
-        dips = part.force and forms.start == forms.stop and part.rest.any()
+        dips = part.force and forms.start == forms.stop and part.yields
         doubtful, dip_force = bool(part.loose.size or part.doubt.any()), part.force if dips else 0.0
         found.append(
             Ends(part.points, part.touched, part.force, part.rest, forms, dip_force, part.speed, doubtful=doubtful)

@@ -3,48 +3,24 @@
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from itertools import pairwise
 from typing import Any
 
 import numpy as np
 
 from .._base import check
-from .._base.rounding import SAME
 from ..fe import plausible
-from ..modes.modal import Modes, SampledShapes, at_rest
-from ..modes.stretching import stretch
-from . import assumption, datasets, force_spectrum, gradient, in_words, promise, trust
+from ..modes.modal import Modes, at_rest
+from . import assumption, balance, datasets, force_spectrum, gradient, in_words, motion, promise, rebound, trust
 from .assumption import Assumption
-from .balance import Balance, momentum_error
 from .compiled import record
 from .contact import Contact
 from .error import Error
 from .history import History, Impact, mode_energy
+from .motion import BodyMotion
 from .quantities import USUAL
-from .state import State
+from .reduced_body import Ends
+from .state import State, state_at
 from .striker import Striker
-
-# [-] two descriptions of one body may differ by this in mass and compliance: meshes do by less, other bodies by more
-ONE_BODY = 1e-2
-# [-] largest difference of descriptions up to which Ritz vectors tell a motion: as much as modes err that are found
-# as far as the force reaches
-MOVED = {"displacement": 1e-2, "velocity": 3e-2}
-LASTS = 2.0  # [-] and no longer than this many times the run, as later echoes may be missing from all of them
-LOOKED_AT = 200  # [-] times at which this error is estimated, evenly among those asked for; more only cost time
-
-
-@dataclass(frozen=True, eq=False, repr=False)
-class Ends(check.Locked):
-    """Where the contacts of a blow act on a body, and what its kept modes lack of its static compliance there."""
-
-    points: np.ndarray  # (n_ends, dimension) [m]
-    touched: tuple[tuple[int, float], ...]  # contact, and sign: 1 for its first body, -1 for its second
-    force: float  # [N] constant force at the first point
-    rest: np.ndarray  # (n_ends, n_ends) [m/N] compliance of the modes left out; zero if the modes are complete
-    forms: slice = field(default_factory=lambda: slice(0))  # modes of the run that stand for these; empty for a spring
-    dip_force: float = 0.0  # [N] that constant force if it makes a spring that stands for them deflect
-    speed: float = 0.0  # [m/s] with which the body arrives in rigid motion, at its first point
-    doubtful: bool = False  # whether more than rounding is estimated of what is left out there
 
 
 class Totals:
@@ -114,20 +90,7 @@ class Response(Totals, check.Locked):
         >>> hit.displacement([(0.2, 0.2)], [0.5]).shape  # half a second later
         (1, 1)
         """
-        if self.at is None:
-            raise ValueError("on needs a blow of `strike`, with one strike point")
-        if self.moving:
-            raise ValueError("on needs a blow on a body at rest: only its own modes know how this one moved before")
-        point = modes.point("at", self.at)
-        whole, softness = self.bodies[-1].shapes.compliance(point)[0, 0], modes.shapes.compliance(point)[0, 0]
-        sampled = isinstance(modes.shapes, SampledShapes)  # it may not know the modes left out
-        if not np.isclose(modes.mass, self.bodies[-1].mass, rtol=ONE_BODY) or not (
-            sampled or np.isclose(softness, whole, rtol=ONE_BODY)
-        ):
-            raise ValueError(
-                f"modes must be of the body struck, {self.bodies[-1].mass:g} kg that yield {whole:.4g} m/N, got "
-                f"{modes.mass:g} kg and {softness:.4g} m/N"
-            )
+        motion.check_same_body(self, modes)
         return replace(self, ringing=modes, rings=None, vectors=None)
 
     @cached_property
@@ -224,23 +187,22 @@ class Response(Totals, check.Locked):
     def _ringing(self) -> Modes | None:
         return self.rings(self) if self.ringing is None and self.rings is not None else self.ringing
 
-    def _moved(self, body: int) -> Modes:
-        """The modes whose motion is that of a body."""
-        return self.target if body in (-1, len(self.bodies) - 1) else self.bodies[body]
+    @cached_property
+    def _target(self) -> BodyMotion:
+        if self._ringing is not None:
+            return motion.driven(self, self._ringing)
+        return motion.of_run(self, len(self.bodies) - 1)
 
     @cached_property
-    def _rung(self) -> History:
-        """The history of the modes that ring, under the same force."""
-        modes = self._ringing
-        assert modes is not None and self.at is not None
-        still = np.zeros(modes.n_modes)
-        shape = -modes.shape_at(self.at[None])
-        bias = -self._push * shape[0]
-        rest = {"start_q": still, "start_p": still, "end_q": still, "end_p": still, "bias": bias}
-        driven: dict[str, Any] = {"omega": modes.omega, "zeta": modes.damping_ratio, "shape": shape, **rest}
-        if self.history.stretched is not None:
-            driven["stretched"] = replace(self.history.stretched, forms=stretch(modes).forms, first=0)
-        return replace(self.history, **driven)
+    def _descriptions(self) -> tuple[BodyMotion, ...]:
+        """The motion of the target by its own Ritz vectors, and by each poorer description."""
+        each = () if self.vectors is None else (self.vectors, *self.vectors.poorer.values())
+        return tuple(motion.driven(self, modes) for modes in each)
+
+    def _motion(self, body: int) -> BodyMotion:
+        n = len(self.bodies)
+        check.count("body", body, low=-n, high=n - 1)
+        return self._target if body % n == n - 1 else motion.of_run(self, body % n)
 
     @property
     def contact(self) -> Contact:
@@ -311,19 +273,9 @@ class Response(Totals, check.Locked):
 
     def band_spectrum(self, max_frequency: float) -> tuple[np.ndarray, np.ndarray]:
         """Frequencies [Hz] from zero, dense enough for the spectrum of this blow, and the spectrum there [N s]."""
-        frequencies = self._band(max_frequency)
-        return frequencies, self.spectrum(frequencies)
-
-    def _band(self, max_frequency: float) -> np.ndarray:
-        """Frequencies [Hz] from zero, dense enough for the spectrum of this blow."""
-        limit = check.positive("max_frequency", max_frequency, "Hz")
         span = max((impact.end for impact in self.impacts), default=0.0)
-        if span == 0.0:
-            raise ValueError("spectral_centroid needs a contact, but the bodies never touched; check gap and speed")
-        if limit * span > force_spectrum.MOST_PERIODS:
-            most = force_spectrum.MOST_PERIODS / span
-            raise ValueError(f"max_frequency must be at most {most:.4g} Hz for a blow of {span:.4g} s")
-        return np.linspace(0.0, limit, int(np.clip(32.0 * limit * span, 512, 65536)))
+        frequencies = force_spectrum.dense_frequencies(max_frequency, span)
+        return frequencies, self.spectrum(frequencies)
 
     @check.typed
     def gradient(self, quantity: Any, wrt: Any = None, *, sections: Mapping[str, Any] | None = None) -> Any:
@@ -389,16 +341,7 @@ class Response(Totals, check.Locked):
     @property
     def constant_forces(self) -> np.ndarray:
         """Constant modal forces on the target, (n_modes,) [N kg**-0.5]."""
-        if self._ringing is not None:
-            return self._rung.bias
-        return self.history.bias[self.body_slice(len(self.bodies) - 1)]
-
-    @property
-    def _push(self) -> float:
-        """Constant force [N] on the target at the strike point."""
-        part = self.body_slice(len(self.bodies) - 1)
-        row = self.history.shape[0, part]
-        return -float(self.history.bias[part] @ row) / (float(row @ row) or 1.0)
+        return self._target.history.bias[self._target.part]
 
     def modal_state(self, times: Any, *, body: int = -1) -> tuple[np.ndarray, np.ndarray]:
         """Modal displacements and velocities of the target at any times, in any order.
@@ -414,20 +357,7 @@ class Response(Totals, check.Locked):
         -------
         q, p : ndarray, shape (n_times, n_modes) [m kg**0.5], [m kg**0.5/s]
         """
-        n = len(self.bodies)
-        check.count("body", body, low=-n, high=n - 1)
-        times = check.array("times", times, (None,), "s", lift=True)
-        if times.size and times.min() < 0.0:
-            raise ValueError(f"times must not be before the blow at 0 s, got {times.min():g} s")
-        order = np.argsort(times, kind="stable")
-        rung = self._ringing is not None and self._moved(body) is self._ringing
-        q, p = (self._rung if rung else self.history).states(times[order])
-        part = slice(None) if rung else self.body_slice(body % n)
-        if np.all(order[:-1] < order[1:]):
-            return q[:, part], p[:, part]
-        back = np.empty_like(order)
-        back[order] = np.arange(len(order))
-        return q[:, part][back], p[:, part][back]
+        return self._motion(body).states(_times(times))
 
     def state(self, time: float | None = None) -> State:
         """Where all bodies are at a time and how they move, for another blow to start from.
@@ -446,28 +376,7 @@ class Response(Totals, check.Locked):
         >>> round(float(first.peak_force / second.peak_force), 1) != 1.0  # the head moves
         True
         """
-        end = self.history.end_time
-        time = end if time is None else check.non_negative("time", time, "s")
-        over = self.history.status in (record.FINISHED, record.SETTLED)
-        if time > end and not over:
-            raise ValueError(f"time must be at most {end:g} s, where the run stopped before its end, got {time:g} s")
-        bodies = tuple(self._moved(body) for body in range(len(self.bodies)))
-        found = [self.modal_state([time], body=body) for body in range(len(bodies))]
-        forces = np.array([self.history.force_at(np.array([time]), i) for i in range(len(self.contacts))])[:, :, 0]
-        forces[forces[:, 0] <= SAME * self.peak_force] = 0.0  # the rounding of a release
-        remembers = any(law.remembers for law in self.contacts)
-        return State(
-            time,
-            bodies,
-            tuple(q[0] for q, _ in found),
-            tuple(p[0] for _, p in found),
-            forces,
-            min(self.error.total, 1.0),
-            self.striker,
-            self.contacts,
-            self.at,
-            remembers and any(impact.start < time for impact in self.impacts),
-        )
+        return state_at(self, time)
 
     @property
     def moving(self) -> bool:
@@ -477,8 +386,7 @@ class Response(Totals, check.Locked):
 
     def modal_energy(self, times: Any, *, body: int = -1) -> np.ndarray:
         """Energy [J] of each mode of the target at any times, (n_times, n_modes); parameters as in `modal_state`."""
-        q, p = self.modal_state(times, body=body)
-        return mode_energy(self._moved(body).omega, q, p)
+        return mode_energy(self._motion(body).modes.omega, *self.modal_state(times, body=body))
 
     @check.typed
     def displacement(self, points: Any, times: Any, *, body: int = -1, residual: bool = True) -> np.ndarray:
@@ -497,27 +405,27 @@ class Response(Totals, check.Locked):
             It matters within about one wavelength of the last mode from a contact, and costs one static solution per
             point.
         """
-        if residual and self._told(points, times, body, "displacement"):
-            return self._seen[0].displacement(points, times)
-        q, _ = self.modal_state(times, body=body)
-        motion = q @ self._moved(body).shape_at(points).T  # (n_times, n_modes) @ (n_modes, n_points)
-        return motion + self._dip(points, times, body)[0] if residual else motion
+        return self._moved(points, times, body, residual, "displacement")
 
     @check.typed
     def velocity(self, points: Any, times: Any, *, body: int = -1, residual: bool = True) -> np.ndarray:
         """Velocity [m/s] of the target, (n_times, n_points); parameters as in `displacement`."""
-        if residual and self._told(points, times, body, "velocity"):
-            return self._seen[0].velocity(points, times)
-        _, p = self.modal_state(times, body=body)
-        motion = p @ self._moved(body).shape_at(points).T
-        return motion + self._dip(points, times, body)[1] if residual else motion
+        return self._moved(points, times, body, residual, "velocity")
 
-    @cached_property
-    def _seen(self) -> tuple["Response", ...]:
-        """The same blow with the motion of its own Ritz vectors, and with that of each poorer description."""
-        assert self.vectors is not None
-        each = self.vectors, *self.vectors.poorer.values()
-        return tuple(replace(self, rings=None, ringing=modes, vectors=None) for modes in each)
+    def _moved(self, points: Any, times: Any, body: int, residual: bool, name: str) -> np.ndarray:
+        """A motion by Ritz vectors, if they tell it well enough, or else by modes."""
+        rate, asked, own = name == "velocity", _times(times), self.vectors is not None
+        if (
+            residual
+            and own
+            and body in (-1, len(self.bodies) - 1)
+            and self._apart(points, asked, rate) <= motion.MOVED[name]
+        ):
+            return self._descriptions[0].at(points, asked, rate)
+        return self._motion(body).at(points, asked, rate, residual)
+
+    def _apart(self, points: Any, times: np.ndarray, rate: bool) -> float:
+        return motion.largest_difference(self._descriptions, points, times, rate, self.history.end_time)
 
     @check.typed
     def motion_error(self, points: Any, times: Any, *, velocity: bool = False) -> float:
@@ -533,87 +441,22 @@ class Response(Totals, check.Locked):
         velocity : bool
             Whether the error is that of `velocity`.
         """
-        name = "velocity" if velocity else "displacement"
-        apart = self._largest_difference(points, times, name)
-        return apart + self.error.total if apart <= MOVED[name] else float("inf")
-
-    def _largest_difference(self, points: Any, times: Any, name: str) -> float:
-        """Largest difference [-] of the motions told by the descriptions of the target, over the largest motion."""
-        times = check.array("times", times, (None,), "s", lift=True)
-        lasting = not times.size or times.max() <= LASTS * self.history.end_time
-        if self.vectors is None or not self.vectors.poorer or not lasting:
-            return float("inf")
-        if len(times) > LOOKED_AT:
-            times = times[np.linspace(0, len(times) - 1, LOOKED_AT).astype(int)]
-        told = [getattr(blow, name)(points, times) for blow in self._seen]
-        largest = float(np.abs(told[0]).max(initial=0.0))
-        apart = sum(float(np.abs(one - other).max(initial=0.0)) for one, other in pairwise(told))
-        return apart / largest if largest else 0.0
-
-    def _told(self, points: Any, times: Any, body: int, name: str) -> bool:
-        """Whether Ritz vectors tell a motion well enough."""
-        mine = self.vectors is not None and body in (-1, len(self.bodies) - 1)
-        return mine and self._largest_difference(points, times, name) <= MOVED[name]
-
-    def _dip(self, points: Any, times: Any, body: int) -> tuple[Any, Any]:
-        """Static deflection [m] of the left-out modes and its rate [m/s], (n_times, n_points); 0 if there are none."""
-        ends = self.ends[body] if self.ends and self.ends[body].rest.any() else None
-        if self._moved(body) is self._ringing and self.at is not None:
-            ends = Ends(self.at[None], ((0, -1.0),), self._push, np.zeros((1, 1)), dip_force=self._push)
-        if ends is None:
-            return 0.0, 0.0
-        modes = self._moved(body)
-        times = check.array("times", times, (None,), "s", lift=True)
-        found = [self.history.force_at(times, i) for i, _ in ends.touched]
-        sign = np.array([sign for _, sign in ends.touched])
-        force, rate = (-sign * np.stack([pair[k] for pair in found], axis=1) for k in (0, 1))  # (n_times, n_ends)
-        force[:, 0] += ends.dip_force
-        asked = modes.points("points", points)
-        if not force.any() or not len(asked):
-            return 0.0, 0.0
-        swings = modes.omega > 0.0
-        pushed, moved = (modes.shapes.at(place)[:, swings] / modes.omega[swings] for place in (ends.points, asked))
-        rest = modes.shapes.deflection(ends.points, asked) - moved @ pushed.T  # (n_points, n_ends)
-        return force @ rest.T, rate @ rest.T
+        apart = self._apart(points, _times(times), velocity)
+        return (
+            apart + self.error.total
+            if apart <= motion.MOVED["velocity" if velocity else "displacement"]
+            else float("inf")
+        )
 
     @property
     def speeds(self) -> tuple[float, ...]:
         """Final speed [m/s] of each body's rigid motion at its first contact point."""
-        return tuple(float(row @ self.history.end_p) for row in map(self._rigid_row, range(len(self.bodies))))
-
-    def _rigid_row(self, body: int) -> np.ndarray:
-        """Shape (n_modes,) of a body's rigid motion at its first contact point, zero in all other modes."""
-        h, part, found = self.history, self.body_slice(body), np.zeros(len(self.history.omega))
-        rows = self._touched(body)
-        if rows:
-            n_rigid = 1 if self._held and body == 0 else self.bodies[body].n_rigid
-            rigid = slice(part.start, part.start + n_rigid)
-            found[rigid] = self._sign(body, rows[0]) * h.shape[rows[0], rigid]
-        return found
-
-    def _touched(self, body: int) -> list[int]:
-        """The contacts of a body."""
-        h = self.history
-        return [i for i in range(h.n_contacts) if (h.shape[i, self.body_slice(body)] != 0.0).any()]
-
-    @property
-    def _held(self) -> bool:
-        return self.striker is not None and self.striker.hand is not None
-
-    def _sign(self, body: int, contact: int) -> float:
-        later = any((self.history.shape[contact, self.body_slice(other)] != 0.0).any() for other in range(body))
-        return -1.0 if later else 1.0
+        return tuple(float(rebound.rigid_row(self, i) @ self.history.end_p) for i in range(len(self.bodies)))
 
     @property
     def in_contact(self) -> bool:
         """Whether the striker, or the first body, still presses another at the end of the run."""
-        mine = self._touched(0)
-        return any(each.separation_speed is None for each in self.impacts if each.contact in mine)
-
-    @cached_property
-    def _pushed(self) -> bool:
-        """Whether a constant force or a hand changes the speed of the first body's rigid motion in flight."""
-        return self._held or bool((self._rigid_row(0) * self.history.bias).any())
+        return rebound.in_contact(self)
 
     @cached_property
     def restitution(self) -> float | None:
@@ -623,20 +466,11 @@ class Response(Totals, check.Locked):
         count. On a body that moved before it may exceed 1. None while the striker is still in contact (`in_contact`),
         and for one that did not arrive. See `Impact.restitution` for that of each impact.
         """
-        if self.in_contact:
-            return None
-        before, after = self.speed, self.speeds[0]
-        if self._pushed:
-            mine = [each for each in self.impacts if each.contact in self._touched(0)]
-            if not mine:
-                return -1.0 if before else None
-            times = np.array([mine[0].start, max(each.end for each in mine)])
-            before, after = (self.history.states(times)[1] @ self._rigid_row(0)).tolist()
-        return -after / before if before else None
+        return rebound.restitution(self)
 
     @cached_property
-    def _balance(self) -> Balance:
-        return Balance.of(self.history, self.contacts)
+    def _balance(self) -> balance.Balance:
+        return balance.Balance.of(self.history, self.contacts)
 
     @property
     def energies(self) -> dict[str, float]:
@@ -644,7 +478,7 @@ class Response(Totals, check.Locked):
 
         They add up to the initial energy to within `energy_error`.
         """
-        found = self._of_bodies(self.history.end_q, self.history.end_p)
+        found = balance.of_bodies(self, self.history.end_q, self.history.end_p)
         rest = slice(self.body_slice(len(self.bodies) - 1).stop, None)  # modes that replace the left-out ones
         found["contact"] = self._balance.contact + self.history.energy(self.history.end_q, self.history.end_p, rest)
         return found | {"dissipated": sum(self.dissipated.values())}
@@ -652,13 +486,8 @@ class Response(Totals, check.Locked):
     @property
     def start_energies(self) -> dict[str, float]:
         """Energies [J] at the start, of the same parts: what the blow began with."""
-        found = self._of_bodies(self.history.start_q, self.history.start_p)
+        found = balance.of_bodies(self, self.history.start_q, self.history.start_p)
         return found | {"contact": self._balance.start - sum(found.values()), "dissipated": 0.0}
-
-    def _of_bodies(self, q: np.ndarray, p: np.ndarray) -> dict[str, float]:
-        """Energy [J] of each body in a state."""
-        names = ["striker", "target"] if len(self.bodies) == 2 else [f"body {i}" for i in range(len(self.bodies))]
-        return {name: self.history.energy(q, p, self.body_slice(body)) for body, name in enumerate(names)}
 
     @property
     def energy_gains(self) -> dict[str, float]:
@@ -679,7 +508,7 @@ class Response(Totals, check.Locked):
     @property
     def momentum_error(self) -> float:
         """Largest momentum change of a rigid motion that the forces do not explain, over the largest momentum [-]."""
-        return momentum_error(self.history)
+        return balance.momentum_error(self.history)
 
     @property
     def finished(self) -> bool:
@@ -704,10 +533,12 @@ class Response(Totals, check.Locked):
     @property
     def outcome(self) -> str:
         """How the run ended, in words."""
-        words = {
-            record.FINISHED: "proven not to touch again",
-            record.HORIZON: "stopped at the given duration",
-            record.IMPACTS: "stopped after max_impacts",
-            record.SETTLED: "everything came to rest",
-        }
-        return words[self.history.status]
+        return in_words.OUTCOMES[self.history.status]
+
+
+def _times(times: Any) -> np.ndarray:
+    """Times (n_times,) [s] of a motion, none of them before the blow."""
+    found = check.array("times", times, (None,), "s", lift=True)
+    if found.size and found.min() < 0.0:
+        raise ValueError(f"times must not be before the blow at 0 s, got {found.min():g} s")
+    return found

@@ -2,15 +2,19 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from .._base import check
 from .._base.rounding import SAME
 from ..modes.modal import Modes
+from .compiled import record
 from .contact import Contact
 from .striker import Striker
+
+if TYPE_CHECKING:
+    from .response import Response
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -95,3 +99,19 @@ def _alike(one: Modes, other: Modes) -> bool:
     """Whether both describe the same body, perhaps with another number of modes."""
     n = min(one.n_modes, other.n_modes)
     return bool(np.isclose(one.mass, other.mass, rtol=SAME) and np.allclose(one.omega[:n], other.omega[:n], rtol=SAME))
+
+
+def state_at(hit: "Response", time: float | None) -> State:
+    """The state of a blow, by default at the end of its run; see `Response.state`."""
+    h, end = hit.history, hit.history.end_time
+    time = end if time is None else check.non_negative("time", time, "s")
+    if time > end and h.status not in (record.FINISHED, record.SETTLED):
+        raise ValueError(f"time must be at most {end:g} s, where the run stopped before its end, got {time:g} s")
+    states = [hit.modal_state([time], body=body) for body in range(len(hit.bodies))]
+    forces = np.array([h.force_at(np.array([time]), i) for i in range(len(hit.contacts))])[:, :, 0]
+    forces[forces[:, 0] <= SAME * hit.peak_force] = 0.0  # the rounding of a release
+    remembers = any(law.remembers for law in hit.contacts) and any(impact.start < time for impact in hit.impacts)
+    return State(
+        time, (*hit.bodies[:-1], hit.target), tuple(q[0] for q, _ in states), tuple(p[0] for _, p in states), forces,
+        min(hit.error.total, 1.0), hit.striker, hit.contacts, hit.at, remembers,
+    )  # fmt: skip

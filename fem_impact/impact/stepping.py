@@ -1,9 +1,10 @@
 """Time steps short enough: runs of ever shorter steps until two agree to the tolerance."""
 
-from collections.abc import Mapping
-from dataclasses import dataclass
+import inspect
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
 from itertools import pairwise
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 
@@ -12,10 +13,12 @@ from .._base.check import SimulationError
 from . import distance, engine
 from .compiled import layout
 from .contact import Contact
-from .distance import MARGIN, Distances
+from .distance import Distance
 from .engine import STEP_SHARE, TOLERANCE
 from .history import History, ModalSystem
 from .quantities import asked_for
+
+Function = TypeVar("Function", bound=Callable)
 
 SCHEMES = ("A", "A4", "collocation")
 # [-] tolerance advised over the error reached: steps twice as long, to which it may lead, err 16 times more
@@ -44,29 +47,52 @@ COLLOCATION_BELOW = 1e-7  # [-] below this tolerance, collocation needs less wor
 
 @dataclass(frozen=True)
 class Options:
-    """When to stop, how accurate to be, and which scheme to use."""
+    """How exact a blow is to be, when it stops, by which steps, and what acts besides.
 
-    tolerance: float
-    horizon: float
-    n_max: int
-    scheme: str | None
-    dt: float | None
-    quantities: Mapping[str, float | None]  # that must meet the tolerance, each with its band [Hz]
+    These are arguments of `strike`, of `collide`, of a plan and of [strike] in a scene, each checked here: a function
+    that takes them as keywords is marked by `takes_options`.
+    """
 
-    @classmethod
-    def checked(
-        cls, tolerance: float, duration: float | None, max_impacts: int | None, scheme: str | None, dt: float | None,
-        quantity: Any,
-    ) -> "Options":  # fmt: skip
-        """The options, each of them checked."""
-        return cls(
-            check.tolerance(tolerance),
-            np.inf if duration is None else check.positive("duration", duration, "s"),
-            0 if max_impacts is None else check.count("max_impacts", max_impacts),
-            None if scheme is None else check.one_of("scheme", scheme, SCHEMES),
-            None if dt is None else check.positive("dt", dt, "s"),
-            asked_for(quantity),
+    tolerance: float = TOLERANCE
+    quantity: Any = None  # as the user names them, see `quantities`
+    residual: bool = True  # whether modes left out act by their static compliance
+    duration: float | None = None  # [s]
+    max_impacts: int | None = None
+    scheme: str | None = None
+    dt: float | None = None  # [s]
+    striker_force: float = 0.0  # [N] constant
+    target_force: float = 0.0  # [N]
+    stretching: bool = False
+    quantities: Mapping[str, float | None] = field(init=False)  # that must meet the tolerance, with their bands [Hz]
+
+    def __post_init__(self) -> None:
+        check.flag("residual", self.residual)
+        check.flag("stretching", self.stretching)
+        check.settle(
+            self,
+            tolerance=check.tolerance(self.tolerance),
+            duration=None if self.duration is None else check.positive("duration", self.duration, "s"),
+            max_impacts=None if self.max_impacts is None else check.count("max_impacts", self.max_impacts),
+            scheme=None if self.scheme is None else check.one_of("scheme", self.scheme, SCHEMES),
+            dt=None if self.dt is None else check.positive("dt", self.dt, "s"),
+            quantities=asked_for(self.quantity),
+            striker_force=check.number("striker_force", self.striker_force, "N"),
+            target_force=check.number("target_force", self.target_force, "N"),
         )
+
+    @property
+    def horizon(self) -> float:
+        """Time [s] at which the run stops at the latest."""
+        return np.inf if self.duration is None else self.duration
+
+
+def takes_options(function: Function) -> Function:
+    """Decorator: show the fields of `Options` in the signature of a function that takes them as ``**options``."""
+    own = inspect.signature(function)
+    shared = [each.replace(kind=each.KEYWORD_ONLY) for each in inspect.signature(Options).parameters.values()]
+    given = [each for each in own.parameters.values() if each.kind is not each.VAR_KEYWORD]
+    function.__signature__ = own.replace(parameters=[*given, *shared])  # type: ignore[attr-defined]
+    return function
 
 
 def scheme_for(tolerance: float, exponent: float) -> str:
@@ -103,7 +129,7 @@ class Converged:
     steps: tuple[float, float]  # of the finer and the coarser run, as `engine.follow` takes them
     fine: History
     coarse: History
-    error: Distances  # of the finer run
+    error: Distance  # of the finer run
 
 
 def refine_steps(system: ModalSystem, options: Options, pace: tuple[float, float]) -> Converged:
@@ -141,7 +167,7 @@ class _Control:
 
     def run(self, size: float, chosen_by: str = "tolerance") -> History:
         """One run, see `engine.follow`."""
-        last = self.options.horizon, self.options.n_max
+        last = self.options.horizon, self.options.max_impacts or 0
         return engine.follow(self.system, self.scheme, size, self.pace, *last, chosen_by)
 
     def judged(self, sizes: tuple[float, float], coarse: History, fine: History) -> Converged:
@@ -150,11 +176,13 @@ class _Control:
         if self.scheme != "collocation":  # a strong loss reacts to the rates of modes faster than the step
             over = over[0], over[1] / (1.0 + 2.0 * self.pace[1] * self.system.law[:, layout.LOSS].max())
         error = distance.of_runs(coarse, fine, self.options.quantities, over)
-        if "force" in error:
-            error["force"] = max(error["force"], fine.force_missed)
-        least = CHANCE * distance.worst(error)
-        error = {name: max(least, float(x)) if distance.judged(name) else x for name, x in error.items()}
-        error[MARGIN] = min(1.0, SURELY * error[MARGIN])
+        apart = error.quantities
+        if "force" in apart:
+            apart["force"] = max(apart["force"], fine.force_missed)
+        least = CHANCE * error.worst
+        for name, value in apart.items():
+            apart[name] = max(least, float(value))
+        error.margin = min(1.0, SURELY * error.margin)
         return Converged(self.scheme, sizes, fine, coarse, error)
 
     def refined(self) -> Converged:
@@ -179,12 +207,12 @@ class _Control:
             if i:
                 runs = [runs[1], self.run(size)]
             found = self.judged((size, before), *runs)
-            error = distance.worst(found.error)
+            error = found.error.worst
             best = min(best, error)
             if error <= tolerance:
                 met = found
             if error <= aim:
-                if grazes == GRAZES or found.fine.margin > found.error[MARGIN]:
+                if grazes == GRAZES or found.fine.margin > found.error.margin:
                     break
                 grazes += 1
             if 2 * len(found.fine.steps) > engine.most_steps(self.system):
@@ -238,8 +266,8 @@ def _longest_lossy(system: ModalSystem, pace: tuple[float, float], tolerance: fl
     """
     longest = np.inf
     slow = system.omega <= np.pi / pace[0]
-    fastest = np.argsort(-system.omega, kind="stable")[: np.count_nonzero(system.omega)]
-    order = fastest[system.zeta[fastest] < RINGING]
+    fastest = (-system.omega).argsort(kind="stable")
+    order = fastest[(system.omega[fastest] > 0.0) & (system.zeta[fastest] < RINGING)]
     omega = system.omega[order]
     for shape, loss in zip(system.shape, system.law[:, layout.LOSS]):
         number = loss * pace[1]

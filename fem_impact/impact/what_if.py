@@ -1,5 +1,6 @@
 """What if: a blow struck again with something changed tells what an error of that size does to it."""
 
+import functools
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
@@ -10,7 +11,7 @@ from ..modes.modal import Modes
 from . import accuracy, distance, engine
 from .compiled import record
 from .contact import Contact
-from .distance import Distances
+from .distance import Distance
 from .history import History, ModalSystem
 from .reduced_body import ReducedBody, joined
 from .stepping import RINGING, Converged, Options
@@ -45,9 +46,10 @@ class Followed:
     def again(self, parts: Sequence[ReducedBody], *, finely: bool = False) -> History:
         """The blow with these bodies, in the steps of the coarser run or, on request, of the finer."""
         system, size = joined(parts, self.laws), self.runs.steps[0 if finely else 1]
-        return engine.follow(system, self.runs.scheme, size, self.pace, self.options.horizon, self.options.n_max)
+        last = self.options.horizon, self.options.max_impacts or 0
+        return engine.follow(system, self.runs.scheme, size, self.pace, *last)
 
-    def apart(self, one: History, two: History) -> Distances:
+    def apart(self, one: History, two: History) -> Distance:
         """The distance between two of its runs."""
         return distance.of_runs(one, two, self.options.quantities)
 
@@ -55,11 +57,15 @@ class Followed:
         """The bodies, with one of them changed."""
         return [*self.parts[:body], part, *self.parts[body + 1 :]]
 
-    @property
-    def mobility(self) -> np.ndarray:
+    @functools.cached_property
+    def _mobility(self) -> list[float]:
         """Sum of the squared shapes of the modes slower than the contact [1/kg], (n_contacts,)."""
         slow = self.system.omega <= np.pi / self.pace[0]
-        return np.asarray(np.maximum((self.system.shape**2) @ slow, 1e-300))
+        return np.maximum((self.system.shape**2) @ slow, 1e-300).tolist()
+
+    def stiffness(self, contact: int) -> float:
+        """Of a contact, as its duration tells it [N/m]."""
+        return (np.pi / self.pace[0]) ** 2 / self._mobility[contact]
 
 
 @dataclass(frozen=True)
@@ -74,23 +80,27 @@ class Variation:
     most_by_chance: float = np.inf  # [-] but in quantities at most this many times the error
 
 
-def what_if(blow: Followed, variations: Sequence[Variation]) -> dict[str, Distances]:
-    """Estimated errors of a blow by cause and quantity: what each variation does to it."""
-    errors: dict[str, Distances] = {}
+def what_if(blow: Followed, variations: Sequence[Variation]) -> dict[str, Distance]:
+    """Estimated errors of a blow by cause: what each variation does to it."""
+    errors: dict[str, Distance] = {}
     for each in variations:
         for ways in each.changes:
-            effects = [
-                distance.scaled(blow.apart(blow.again(parts), blow.runs.coarse), *weights) for parts, *weights in ways
-            ]
-            errors[each.cause] = distance.added(errors.get(each.cause, {}), distance.largest(effects))
+            if ways:
+                effects = []
+                for parts, *weights in ways:
+                    effects.append(blow.apart(blow.again(parts), blow.runs.coarse).scaled(*weights))
+                _add(errors, each.cause, distance.largest(effects))
         if each.least:
-            found = errors.get(each.cause, {})
-            least = dict.fromkeys(blow.runs.error, each.least)
-            of_quantities = min(each.least, each.most_by_chance * distance.worst(found))
-            errors[each.cause] = distance.largest(
-                [least | dict.fromkeys(blow.options.quantities, of_quantities), found]
-            )
+            found = errors.get(each.cause) or Distance.uniform(blow.runs.error, 0.0)
+            least = Distance.uniform(blow.runs.error, each.least)
+            of_quantities = min(each.least, each.most_by_chance * found.worst)
+            least.quantities = dict.fromkeys(least.quantities, of_quantities)
+            errors[each.cause] = distance.largest([least, found])
     return errors
+
+
+def _add(errors: dict[str, Distance], cause: str, more: Distance) -> None:
+    errors[cause] = errors[cause] + more if cause in errors else more
 
 
 def modes_left_out(blow: Followed, told: Sequence[bool]) -> tuple[Variation, bool]:
@@ -101,15 +111,16 @@ def modes_left_out(blow: Followed, told: Sequence[bool]) -> tuple[Variation, boo
     found, guard against a change that is small by chance. The bodies ``told`` (n_bodies,) have a poorer description
     with modes above those of their own, whose blow tells the error.
     """
-    if not any(part.rest.any() for part in blow.parts):
+    yields = [part.yields for part in blow.parts]
+    if True not in yields:
         return Variation("truncation", ()), True
     omega_0 = np.pi / blow.pace[0]
     softness, expected = np.zeros(len(blow.laws)), 0.0
     changes: list[list[tuple[Sequence[ReducedBody], float, float]]] = [[] for _ in blow.parts]
     for i, (part, known) in enumerate(zip(blow.parts, told)):
         above = omega_0 / max(omega_0, part.omega[-1])
-        for (k, _), rest in zip(part.touched, np.diag(part.rest)):
-            soft = omega_0**2 / blow.mobility[k] * rest
+        for (k, _), rest in zip(part.touched, part.rest.diagonal()):
+            soft = blow.stiffness(k) * rest
             softness[k] += soft
             expected += float(accuracy.left_out_error(soft, above, blow.laws[k].exponent, part.points.shape[1]))
         for wanted in () if known else THINNED:
@@ -117,9 +128,9 @@ def modes_left_out(blow: Followed, told: Sequence[bool]) -> tuple[Variation, boo
             if 1.0 < ratio < np.inf:
                 weight = 1.0 / (ratio ** FALLING[int(part.zeta[-1] > RINGING)] - 1.0)
                 changes[i].append((blow.changed(i, thin), weight, 1.0 / (ratio**PARTING - 1.0)))
-    seen = all(len(ways) == len(THINNED) or not part.rest.any() for ways, part in zip(changes, blow.parts))
+    seen = all(len(ways) == len(THINNED) or not soft for ways, soft in zip(changes, yields))
     found = Variation("truncation", changes, AT_LEAST * expected, BY_CHANCE if seen else np.inf)
-    return found, bool((softness <= RESOLVABLE).all())
+    return found, max(softness.tolist()) <= RESOLVABLE
 
 
 def unstated(blow: Followed, bodies: Sequence[Modes]) -> Variation:
@@ -147,42 +158,39 @@ def mesh(blow: Followed, bodies: Sequence[Modes]) -> Variation:
 
     Being struck again, the estimate grows over several impacts as the true error does.
     """
-    softer, matters = [], False
-    if not any(modes.frequency_error is not None or part.doubt.any() for modes, part in zip(bodies, blow.parts)):
+    softer, worst = [*blow.parts], 0.0
+    of_elements = [(i, modes) for i, modes in enumerate(bodies) if not modes.unstated]
+    for i, modes in of_elements:
+        part = blow.parts[i]
+        soft = [blow.stiffness(contact) * doubt for (contact, _), doubt in zip(part.touched, part.doubt.tolist())]
+        worst = max([worst, *soft] if modes.frequency_error is None else [worst, modes.frequency_error.max(), *soft])
+    if worst <= NEGLIGIBLE * blow.options.tolerance:
         return Variation("mesh", ())
-    for modes, part in zip(bodies, blow.parts):
-        if modes.unstated:  # no finite elements
-            softer.append(part)
-            continue
-        soft = [
-            (np.pi / blow.pace[0]) ** 2 / blow.mobility[i] * doubt for (i, _), doubt in zip(part.touched, part.doubt)
-        ]
-        error = np.zeros(modes.n_modes) if modes.frequency_error is None else modes.frequency_error
-        matters |= max([error.max(), *soft]) > NEGLIGIBLE * blow.options.tolerance
-        softer.append(part.lower(error))
-    return Variation("mesh", [[(softer, 1.0, 1.0)]] if matters else ())
+    for i, modes in of_elements:
+        softer[i] = softer[i].lower(0.0 if modes.frequency_error is None else modes.frequency_error)
+    return Variation("mesh", [[(softer, 1.0, 1.0)]])
 
 
-def poorer_descriptions(blow: Followed, bodies: Sequence[Modes]) -> dict[str, Distances]:
-    """Errors by cause and quantity that ever poorer descriptions of a body tell, each compared with the one before.
+def add_poorer_descriptions(blow: Followed, bodies: Sequence[Modes], errors: dict[str, Distance]) -> None:
+    """Add the errors that ever poorer descriptions of a body tell, each compared with the one before.
 
     They run in fine steps, because the fastest modes of two descriptions differ, and so do their step errors.
     """
-    errors: dict[str, Distances] = {}
     for i, body in enumerate(bodies):
         before = blow.runs.fine
         for cause, other in body.poorer.items():
-            one_more = dict.fromkeys(blow.runs.error, 1.0)
+            found = one_more = Distance.uniform(blow.runs.error, 1.0)
             try:
                 less = blow.again(blow.changed(i, blow.parts[i].described_by(other)), finely=True)
                 found = blow.apart(less, before)
+                if len(before.contacts) != len(blow.runs.fine.contacts):  # other impacts, of which nothing is known
+                    found.rebounds = one_more.rebounds
                 if _may_touch(before, less, blow.pace[0]):
-                    found = distance.added(found, one_more)
+                    found += one_more
                 before = less
             except SimulationError:  # the poorer body cannot be followed, so it tells nothing
-                found = one_more
-            errors[cause] = distance.added(errors.get(cause, {}), found)
-    return errors
+                pass
+            _add(errors, cause, found)
 
 
 def _may_touch(history: History, other: History, duration: float) -> bool:

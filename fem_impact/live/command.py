@@ -8,18 +8,18 @@ from contextlib import ExitStack, contextmanager
 
 from ..modes.modal import Modes
 from ..scenes.scene import Scene
-from .controllers import KEYS, Hands, Score, Source, keys, port, read_midi, spread
+from .controllers import KEYS, Hands, Source, keys, port, read_midi, spread
 from .devices import Clock, Device, Speaker
-from .player import PlayedStroke, Player
+from .player import PlayedStroke, Player, Score
 
-FASTER = 2.0  # [-] fastest stroke over the speed of the scene, which then is a stroke of half strength
 N_POINTS = len(KEYS[0])  # points to strike, one for each column of keys
 
 
 def player_of(scene: Scene, modes: Modes, options: argparse.Namespace) -> Player:
     """The scene as something to play, with the volume set by one stroke at full speed."""
     blow = scene.blow.values
-    fastest = options.fastest if options.fastest is not None else FASTER * blow["speed"]
+    # the speed of the scene is a stroke of half strength
+    fastest = options.fastest if options.fastest is not None else 2.0 * blow["speed"]
     points = options.at or list(spread(modes, blow["at"], N_POINTS))
     player = Player(
         modes, scene.make_striker(), scene.make_contact(), points=points, fastest=fastest, listen=scene.points[0],

@@ -19,8 +19,6 @@ from .player import AT_ONCE, PlayedStroke
 
 # [-] fact: the MIDI note in the middle of a keyboard; it is the first point, each semitone up the next, round and round
 FIRST_NOTE = 60
-LOUDEST_NOTE = 127  # [-] fact: the MIDI velocity of the fastest stroke; speeds go with it
-LARGEST_FILE = 10_000_000  # [byte] of a MIDI file: days of music
 KEYS = ("zxcvbnm,./", "asdfghjkl;", "qwertyuiop", "1234567890")  # a column strikes one point, a row up twice as fast
 ENDS = ("\x1b", "\x04", "\x03")  # Escape, Ctrl-D and Ctrl-C end the playing
 # [s] between looks whether the playing has ended: nobody notices such a delay at the end, and it costs nothing
@@ -37,27 +35,6 @@ class Source(Protocol):
 
     def over(self, frame: int) -> bool:
         """Whether none follows from a frame on."""
-
-
-class Score:
-    """Strokes known beforehand."""
-
-    live = False
-
-    def __init__(self, strokes: Sequence[PlayedStroke]) -> None:
-        self.strokes: list[PlayedStroke] = sorted(strokes)
-        self._next = 0
-
-    def due(self, begin: int, end: int) -> list[PlayedStroke]:
-        """The strokes of a block, by frames of the block; what is too much at once comes in the next."""
-        first = self._next
-        while self._next < len(self.strokes) and self.strokes[self._next].frame < end and self._next - first < AT_ONCE:
-            self._next += 1
-        return [stroke._replace(frame=max(0, stroke.frame - begin)) for stroke in self.strokes[first : self._next]]
-
-    def over(self, frame: int) -> bool:
-        """Whether none follows."""
-        return self._next == len(self.strokes)
 
 
 class Hands:
@@ -103,7 +80,7 @@ def spread(modes: Modes, first: Any, count: int) -> np.ndarray:
 
 def of_note(note: int, velocity: int, n_points: int, fastest: float) -> tuple[int, float]:
     """Point and speed [m/s] of a MIDI note."""
-    return (note - FIRST_NOTE) % n_points, fastest * velocity / LOUDEST_NOTE
+    return (note - FIRST_NOTE) % n_points, fastest * velocity / 127  # the largest velocity of MIDI
 
 
 def read_midi(path: Path, n_points: int, fastest: float, rate: int) -> list[PlayedStroke]:
@@ -111,8 +88,8 @@ def read_midi(path: Path, n_points: int, fastest: float, rate: int) -> list[Play
     mido = check.extra("mido", "play", "a MIDI file")
     if not path.is_file():
         raise ValueError(f"{path}: {check.absent(path)}")
-    if path.stat().st_size > LARGEST_FILE:
-        raise ValueError(f"{path}: a MIDI file must have at most {LARGEST_FILE / 1e6:g} MB")
+    if path.stat().st_size > 10_000_000:  # days of music
+        raise ValueError(f"{path}: a MIDI file must have at most 10 MB")
     strokes, now = [], 0.0
     try:
         for message in mido.MidiFile(str(path)):

@@ -8,13 +8,10 @@ from typing import Any, Protocol
 import numpy as np
 
 from .._base import check
-from ..show.sound import DECAY, LONGEST, SHORTEST, Sound
+from ..show import sampling
+from ..show.sound import LONGEST, SHORTEST, Sound
 from .controllers import Source
 from .player import Player
-
-# [-] blocks computed ahead of what is played: 5 ms at 48 kHz, which nobody hears; fewer are late on a busy machine
-AHEAD = 4
-SLOW = 0.2  # [-] of a block's length, between looks for room: more often costs time, less often uses up what is ahead
 
 
 class Feed:
@@ -118,15 +115,17 @@ def perform(player: Player, source: Source, longest: float, device: Device | Non
     """
     period = player.block / player.rate
     most = max(1, round(check.positive("longest", longest, "s") / period))
+    look = 0.2 * period  # for room: more often costs time, less often uses up what is ahead
     feed, seconds = Feed(most, player.block), np.zeros(most)
-    ringing = _ringing(player)
+    rings = sampling.ringing(player.modes, player.modes.omega > 0.0, (SHORTEST, LONGEST))
     if device is not None:
         device.start(feed, player.rate)
     try:
         end = most
         while feed.written < end:
-            while device is not None and feed.written - feed.played >= AHEAD:
-                time.sleep(SLOW * period)
+            # four blocks ahead are 5 ms at 48 kHz, which nobody hears; fewer are late on a busy machine
+            while device is not None and feed.written - feed.played >= 4:
+                time.sleep(look)
             first = feed.written * player.block
             strokes = source.due(first, first + player.block)
             begin = time.perf_counter()
@@ -134,9 +133,9 @@ def perform(player: Player, source: Source, longest: float, device: Device | Non
             seconds[feed.written] = time.perf_counter() - begin
             feed.written += 1
             if end == most and source.over(first):
-                end = min(most, feed.written + round(ringing / period))
+                end = min(most, feed.written + round(rings / period))
         while device is not None and feed.played < feed.written:
-            time.sleep(SLOW * period)
+            time.sleep(look)
         missed = feed.missed
     finally:
         if device is not None:
@@ -145,10 +144,3 @@ def perform(player: Player, source: Source, longest: float, device: Device | Non
     if device is None:
         missed = int(np.count_nonzero(seconds > period))
     return Performance(Sound(samples.astype(float), player.rate, 1.0 / player.gain), seconds, missed)
-
-
-def _ringing(player: Player) -> float:
-    """How long the body rings after the last stroke [s], as in `fi.sound.synthesise`."""
-    modes = player.modes
-    slowest = float((modes.damping_ratio * modes.omega)[modes.omega > 0.0].min(initial=np.inf))
-    return float(np.clip(DECAY / slowest, SHORTEST, LONGEST)) if slowest > 0.0 else LONGEST

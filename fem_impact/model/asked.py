@@ -8,8 +8,6 @@ from inspect import signature
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, ClassVar
 
-import numpy as np
-
 from .._base import check
 from ..fe import plausible
 from ..impact import accuracy, collision, stepping
@@ -18,6 +16,7 @@ from ..modes.modal import Modes
 from . import audit, cost, idealisation
 from .budget import Budget
 from .target import MODELS, Stages, Target
+from .vectors import Seen
 
 if TYPE_CHECKING:
     from .planner import Blow
@@ -101,14 +100,11 @@ class Asked:
             for name in values:
                 if name not in ARGUMENTS:
                     raise ValueError(f"{name} is not an argument of a blow{check.nearest(name, [*ARGUMENTS, *PIECES])}")
-            wanted = (values.get(name) for name in ("duration", "max_impacts", "scheme", "dt", "quantity"))
-            options = stepping.Options.checked(values.get("tolerance", collision.TOLERANCE), *wanted)
-            values |= {"dt": options.dt, "duration": options.horizon if np.isfinite(options.horizon) else None}
+            options = stepping.Options(**{name: values[name] for name in values if name not in ("at", "speed")})
+            for name in ("dt", "duration", "residual", "striker_force", "target_force"):
+                values[name] = getattr(options, name)
+            values["stretching"] = options.stretching or blow.target.stretching
             speed = check.positive("speed", values["speed"], "m/s")
-            values["stretching"] = check.flag("stretching", values.get("stretching", False)) or blow.target.stretching
-            values["residual"] = values.get("residual", True)
-            for name in ("striker_force", "target_force"):
-                values[name] = check.number(name, values.get(name, 0.0), "N")
         values["at"] = _struck_at(blow.target, values["at"], changes)
         duration = accuracy.contact_duration(blow.contact, blow.striker.felt_mass, speed)
         budget = Budget(options.tolerance, blow.contact.rated)
@@ -232,7 +228,7 @@ class Description(ABC):
 
     asked: Asked
     forecast: Forecast
-    seen: Any = field(default=None, kw_only=True)  # what a run has computed so far, see `vectors.Seen`
+    seen: Seen | None = field(default=None, kw_only=True)  # the vectors that a run has computed so far
     rings: ClassVar[bool] = False  # whether the motion of the target is known, not only the numbers of the blow
 
     @property

@@ -29,8 +29,8 @@ from .restrike import Struck
 from .target import BOTH, Target
 
 EXAMINERS = (
-    thinness.of_target, thinness.of_striker, deflection.of_target, local_contact.yielding, local_contact.small,
-    local_contact.slow, still_air.of_target, unstated_damping.of_both,
+    thinness.examine_target, thinness.examine_striker, deflection.examine_deflection, local_contact.examine_pressure,
+    local_contact.examine_size, local_contact.examine_time, still_air.examine_air, unstated_damping.examine_damping,
 )  # fmt: skip
 
 # [-] tolerance of blows that only tell what can be foreseen, on a wall or for the cost: estimates err more
@@ -55,7 +55,7 @@ def audited(hit: Response, simplified: Simplified | None = None) -> Response:
 
 def examine(hit: Response, simplified: Simplified | None = None) -> tuple[Assumption, ...]:
     """Every assumption of a blow, in the order of `assumption.ALL`."""
-    struck = _struck(hit, simplified)
+    struck = _struck(hit, (hit.bodies[0], hit.bodies[-1]), simplified, hit.at)
 
     def examined() -> tuple[Assumption, ...]:
         return tuple(examiner(struck) for examiner in EXAMINERS)
@@ -68,17 +68,22 @@ def required(target: Target, hit: Response) -> tuple[Target, str] | None:
     """The target with the better model that the tolerance of a blow requires, and why; None if it requires none."""
     if target.mesh is None:
         return None
+    plate, theory = target.mesh.dimension == 2, THEORIES[target.mesh.dimension][1]
+    better: dict[str, tuple[bool, dict[str, Any], str]] = {  # by assumption: whether it can be had, and what it does
+        "thin target": (
+            target.section is not None and not target.thick, {"theory": theory},
+            f"has shear and rotary inertia ({theory})",
+        ),
+        "still air": (plate and target.air is None, {"air": BOTH}, "moves the air on both sides"),
+        "small deflections": (
+            target.can_stretch and not target.stretching, {"stretching": True}, "stiffens as it stretches",
+        ),
+    }  # fmt: skip
     for each in hit.assumptions:
-        if each.worst <= hit.tolerance:
-            continue
-        because = f"which changes the {each.change()} ({each.reading})"
-        if each.name == "thin target" and target.section is not None and not target.thick:
-            theory = THEORIES[target.mesh.dimension][1]
-            return replace(target, theory=theory), f"the target now has shear and rotary inertia ({theory}), {because}"
-        if each.name == "still air" and target.mesh.dimension == 2 and target.air is None:
-            return replace(target, air=BOTH), f"the target now moves the air on both sides, {because}"
-        if each.name == "small deflections" and target.can_stretch and not target.stretching:
-            return replace(target, stretching=True), f"the target now stiffens as it stretches, {because}"
+        can, changes, does = better.get(each.name, (False, {}, ""))
+        if can and each.worst > hit.tolerance:
+            why = f"the target now {does}, which changes the {each.change()} ({each.reading})"
+            return replace(target, **changes), why
     return None
 
 
@@ -90,43 +95,40 @@ def foresee(
     ``body`` is what is known of the target: modes, its first ones at least, or nothing but mesh and section. ``how``
     are ``speed``, ``quantity`` and ``rings``: whether the damping of the target is part of the model.
     """
-    speed, rings, mesh = how["speed"], how["rings"], None
+    simplified = None if isinstance(body, Modes) else body
     if isinstance(body, Modes):
         modes = replace(body, air=body.air or target.air is not None, stretches=target.stretching)
         place = modes.point("at", at)
-        known, ideal = bending.known(modes), ""
     else:
         place = np.atleast_2d(np.asarray(at, float))
-        ratio, mesh = target.damping_ratio, body.mesh
-        damped = not rings or (ratio is not None and (callable(ratio) or bool(np.any(ratio))))
+        ratio = target.damping_ratio
+        damped = not how["rings"] or (ratio is not None and (callable(ratio) or bool(np.any(ratio))))
         modes = replace(
             unyielding(place[0], body.mass), damping_ratio=np.full(1, float(damped)), thick=target.thick,
             air=target.air is not None, stretches=target.stretching,
         )  # fmt: skip
-        known, ideal = bending.around(modes, body.section, mesh, body.supports), body.kind
     stiff = replace(collision.shortened(striker, striker.modes.n_rigid), hand=None)
     bare, wall = replace(contact, loss=0.0, gap=0.0), unyielding(np.zeros(1), 1.0)
     try:
         with build.uncompiled():
-            hit = collision.strike(wall, stiff, bare, at=np.zeros(1), speed=speed, tolerance=ROUGH)
+            hit = collision.strike(wall, stiff, bare, at=np.zeros(1), speed=how["speed"], tolerance=ROUGH)
     except SimulationError:
         return unexamined(how["quantity"], "the same blow on a wall cannot be computed", "strike")
     hit = replace(hit, striker=striker, contacts=(contact,), quantities=how["quantity"])
-    clearance = _clearance(modes, known, mesh, place[0])
-    struck = Struck(hit, known, bending.known(striker.modes), ideal, clearance, place, (striker.modes, modes))
-    return tuple(replace(examiner(struck), effect={}) for examiner in EXAMINERS)
+    struck = _struck(hit, (striker.modes, modes), simplified, place[0])
+    return tuple(replace(examiner(replace(struck, place=place)), effect={}) for examiner in EXAMINERS)
 
 
-def _struck(hit: Response, simplified: Simplified | None) -> Struck:
-    modes = hit.bodies[-1]
+def _struck(hit: Response, bodies: tuple[Modes, Modes], simplified: Simplified | None, at: np.ndarray | None) -> Struck:
+    """A blow as it is examined: the response, striker and target, and where the target is struck [m]."""
+    modes, mesh, ideal = bodies[1], None, ""
     if simplified is None:
-        target, ideal = bending.known(modes), ""
+        target = bending.known(modes)
     else:
-        whole, ideal = replace(modes, mass=simplified.mass), simplified.kind
-        target = bending.around(whole, simplified.section, simplified.mesh, simplified.supports)
-    known = bending.known(hit.bodies[0]) if hit.striker is not None else None
-    mesh = None if simplified is None else simplified.mesh
-    return Struck(hit, target, known, ideal, _clearance(modes, target, mesh, hit.at))
+        mesh, ideal, whole = simplified.mesh, simplified.kind, replace(modes, mass=simplified.mass)
+        target = bending.around(whole, simplified.section, mesh, simplified.supports)
+    striker = None if hit.striker is None else bending.known(bodies[0])
+    return Struck(hit, bodies, target, striker, ideal, _clearance(modes, target, mesh, at))
 
 
 def _clearance(modes: Modes, known: bending.Known | None, mesh: Mesh | None, at: np.ndarray | None) -> float | None:

@@ -66,6 +66,10 @@ class Bending:
             return None
         return self.rotary + self.shear + self.edge
 
+    def mean_wave(self, energy: np.ndarray) -> float:
+        """Wavenumber [rad/m] of modes with some energies (n_modes,), root of the mean square; zero without energy."""
+        return float(np.sqrt(energy @ self.wave**2 / (energy.sum() or 1.0)))
+
     def heavier(self, rows: np.ndarray) -> np.ndarray:
         """Shapes (n_points, n_modes) of rigid motions whose inertia has the rotary one, too, and elastic ones as given.
 
@@ -121,16 +125,6 @@ def unwrapped(shapes: Shapes) -> tuple[Shapes, float, float]:
     return shapes, amplitude, frequency
 
 
-def _mixture(shapes: Shapes, low: slice) -> np.ndarray:
-    """What air leaves of the amplitude of some modes, (n_low,) [-]: it mixes them little, and makes them heavier."""
-    result = np.ones(low.stop - low.start)
-    while isinstance(shapes, (ScaledShapes, MixedShapes)):
-        if isinstance(shapes, MixedShapes):
-            result = result * np.linalg.norm(shapes.mix[:, low], axis=0)
-        shapes = shapes.base
-    return result
-
-
 def known(modes: Modes) -> Known | None:
     """What the modes of a plate or beam tell of it; None if its shapes are known at points only, or it is rigid."""
     shapes = unwrapped(modes.shapes)[0]
@@ -179,27 +173,22 @@ def bending(body: Known) -> Bending:
     low = slice(n_rigid, min(n_rigid + max(1, min(LOW, few)), modes.n_modes))
     thick = body.section is not None and not quadratic(modes)
     if isinstance(shapes, (FieldShapes, RitzShapes)):
-        system = shapes.system
         if isinstance(shapes, FieldShapes):
             vectors = shapes.vectors[:, low]
         else:
             vectors = shapes.basis.T @ shapes.turn[:, : low.stop - n_rigid]
-        found = (_plate if modes.dimension == 2 else _beam)(system, vectors, thick)
-        found[:2] = found[:2] * amplitude ** np.array([[2.0], [1.0]])
-    elif isinstance(shapes, RectangleShapes):
-        found = _rectangle(shapes.take(low.stop), body, amplitude)
-    elif isinstance(shapes, DiskShapes):
-        found = _disk(shapes, low, body, amplitude)
-    elif isinstance(shapes, TimoshenkoShapes):  # rotary inertia and shear are in its frequencies
-        found = np.zeros((5, low.stop - low.start))
-        node, weight = np.polynomial.legendre.leggauss(ALONG)
-        slope = replace(shapes, p=shapes.p[low], weights=shapes.weights[low]).slopes(0.5 * (node + 1.0))
-        found[0] = 0.5 * weight @ slope**2 * amplitude**2 / shapes.length
+        found = (_plate if modes.dimension == 2 else _beam)(shapes.system, vectors, thick)
     else:
-        assert isinstance(shapes, BeamShapes)
-        found = _beam_shapes(shapes, low, body, amplitude)
-    left = _mixture(modes.shapes, low)
-    found[:3] *= np.stack([left**2, left, left**2])
+        steep, force, volume, edge = _by_formula(shapes, low, body)
+        rotary, shear = _uniform(body)
+        zero = np.zeros(len(steep))
+        found = np.stack([body.extent * steep, volume + zero, rotary * steep, shear * force, edge + zero])
+    left, shapes = np.ones(low.stop - low.start), modes.shapes
+    while isinstance(shapes, (ScaledShapes, MixedShapes)):
+        if isinstance(shapes, MixedShapes):  # air mixes modes little, and makes them heavier
+            left = left * np.linalg.norm(shapes.mix[:, low], axis=0)
+        shapes = shapes.base
+    found[:3] *= np.stack([(amplitude * left) ** 2, amplitude * left, left**2])
     extended = _extended(modes, low, found, body.per_extent, thick)
     return replace(extended, turning=_turning(body)) if thick and n_rigid else extended
 
@@ -315,29 +304,44 @@ def _beam(system: System, vectors: np.ndarray, thick: bool) -> np.ndarray:
 def _uniform(body: Known) -> tuple[float, float]:
     """Rotary inertia and shear [m**2] of a uniform, if a plate isotropic body over its squared wavenumber."""
     section = body.section
-    if section is None:
+    if section is None or body.modes.thick:  # both are in the frequencies of a thick body
         return 0.0, 0.0
     origin = np.zeros((1, body.modes.dimension))
     stiffness, shear = section.stiffness(origin).flat[0], section.shear(origin).flat[0]
     return float(section.rotary(origin)[0] / section.inertia(origin)[0]), float(stiffness / shear)
 
 
-def _rectangle(shapes: RectangleShapes, body: Known, amplitude: float) -> np.ndarray:
-    """The same of a hinged rectangle, exactly."""
-    m, n = shapes.numbers.T
-    k = np.pi**2 * ((m / shapes.length) ** 2 + (n / shapes.width) ** 2)
-    odd = (1.0 - (-1.0) ** m) * (1.0 - (-1.0) ** n)
-    rotary, shear = _uniform(body)
-    area = shapes.length * shapes.width
-    volume = 2.0 * amplitude * area * odd / (np.pi**2 * m * n)
-    return np.stack([amplitude**2 * area * k, volume, rotary * k, shear * k, 0.0 * k])
+def _by_formula(shapes: Shapes, low: slice, body: Known) -> tuple[np.ndarray, np.ndarray, Any, Any]:
+    """Squared wavenumbers [rad**2/m**2] of slopes and of shear forces, volume and edge of closed formulas, (n_low,).
 
-
-def _disk(shapes: DiskShapes, low: slice, body: Known, amplitude: float) -> np.ndarray:
-    """The same of a disk, by quadrature along its radius."""
+    Those of a hinged rectangle are exact; others are by quadrature along the beam or the radius of the disk.
+    """
+    if isinstance(shapes, RectangleShapes):
+        m, n = shapes.numbers[low].T
+        k = np.pi**2 * ((m / shapes.length) ** 2 + (n / shapes.width) ** 2)
+        odd = (1.0 - (-1.0) ** m) * (1.0 - (-1.0) ** n)
+        return k, k, 2.0 * shapes.length * shapes.width * odd / (np.pi**2 * m * n), 0.0
     node, weight = np.polynomial.legendre.leggauss(ALONG)
-    r, dr = 0.5 * (node + 1.0)[:, None], 0.25 * (weight * (node + 1.0))[:, None]  # times r
-    z, n, share = shapes.z[low], shapes.order[low], shapes.weight[low]
+    x, dx = 0.5 * (node + 1.0), 0.5 * weight
+    if isinstance(shapes, DiskShapes):
+        return _disk(shapes, low, body, x[:, None], (dx * x)[:, None])
+    if isinstance(shapes, TimoshenkoShapes):
+        slope = replace(shapes, p=shapes.p[low], weights=shapes.weights[low]).slopes(x)
+        steep = dx @ slope**2 / shapes.length**2
+        return steep, 0.0 * steep, 0.0, 0.0
+    assert isinstance(shapes, BeamShapes)
+    k, (a, b, c, d), x = shapes.k[low], shapes.weights[low].T, x[:, None]
+    sine, cosine, near, far = np.sin(k * x), np.cos(k * x), c * np.exp(-k * x), d * np.exp(k * (x - 1.0))
+    steep = dx @ (k * (b * cosine - a * sine - near + far)) ** 2
+    force = dx @ (k * (a * sine - b * cosine - near + far)) ** 2  # third derivative over k**2
+    return steep / shapes.length**2, force / shapes.length**2, 0.0, 0.0
+
+
+def _disk(
+    shapes: DiskShapes, low: slice, body: Known, r: np.ndarray, dr: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, np.ndarray, Any]:
+    """The same of a disk, from radii (n_r, 1) [-] and their weights, which are times r."""
+    z, n, share, a = shapes.z[low], shapes.order[low], shapes.weight[low], shapes.radius
 
     def parts(r: np.ndarray) -> tuple[np.ndarray, ...]:
         """J and I and their slopes at radii (n_r, 1)."""
@@ -350,31 +354,9 @@ def _disk(shapes: DiskShapes, low: slice, body: Known, amplitude: float) -> np.n
     whole = (dr * (j + i) ** 2).sum(axis=0)
     steep = (dr * ((dj + di) ** 2 + (n * (j + i) / r) ** 2)).sum(axis=0) / whole
     force = (dr * ((di - dj) ** 2 + (n * (i - j) / r) ** 2)).sum(axis=0) / whole  # of the Laplacian, over z**4
-    a = shapes.radius
-    rotary, shear = _uniform(body)
-    result = np.zeros((5, len(z)))
-    result[0] = steep * np.pi * amplitude**2
     mean = 2.0 * np.pi * (dr * (j + i)).sum(axis=0) * shapes.scale[low]
-    result[1] = np.where(n == 0, mean, 0.0) * amplitude * a**2
-    result[2], result[3] = rotary * steep / a**2, shear * force / a**2
+    edge: Any = 0.0
     if shapes.edge == "free" and body.thickness is not None:
         j, dj, i, di = (part[0] for part in parts(np.ones((1, 1))))
-        fades = body.thickness / np.sqrt(12.0 * SHEAR)
-        result[4] = 2.0 * (1.0 - shapes.nu) * fades / a * (n * (dj + di - j - i)) ** 2 / (z**4 * whole)
-    return result
-
-
-def _beam_shapes(shapes: BeamShapes, low: slice, body: Known, amplitude: float) -> np.ndarray:
-    """The same of a uniform beam, by quadrature along it."""
-    node, weight = np.polynomial.legendre.leggauss(ALONG)
-    x, dx = 0.5 * (node + 1.0)[:, None], 0.5 * weight[:, None]
-    k, (a, b, c, d) = shapes.k[low], shapes.weights[low].T
-    sine, cosine, near, far = np.sin(k * x), np.cos(k * x), c * np.exp(-k * x), d * np.exp(k * (x - 1.0))
-    steep = (dx * (k * (b * cosine - a * sine - near + far)) ** 2).sum(axis=0)
-    force = (dx * (k * (a * sine - b * cosine - near + far)) ** 2).sum(axis=0)  # third derivative over k**2
-    rotary, shear = _uniform(body)
-    squared = shapes.length**2
-    zero = 0.0 * k
-    return np.stack(
-        [steep * amplitude**2 / shapes.length, zero, rotary * steep / squared, shear * force / squared, zero]
-    )
+        edge = 2.0 * (1.0 - shapes.nu) * body.thickness * FADES / a * (n * (dj + di - j - i)) ** 2 / (z**4 * whole)
+    return steep / a**2, force / a**2, np.where(n == 0, mean, 0.0) * a**2, edge

@@ -50,7 +50,7 @@ class Mixed(Description):
             return None
         allowed, slow = asked.budget.left_out, asked.mass * seen.mobility
         highest = accuracy.infinite_cutoff(seen.mobility, mass=asked.mass, tolerance=allowed, **asked.law)
-        if not named and mixed.LASTING * slow > mixed.LONGEST * asked.duration:
+        if not named and mixed.LASTING * slow > 1e4 * asked.duration:  # too many steps, some 24 for each contact time
             return None
         few = 0.5 * np.pi * slow < asked.duration or target.count_below(highest / target.stretch) < MANY_MODES
         if few and not (named or anyway):
@@ -148,6 +148,6 @@ def _by_elements(asked: Asked, frequency: float, stages: Stages) -> tuple[Elemen
     lasts = max(asked.duration, mixed.LASTING * asked.mass * asked.seen.mobility)
     phase = 2.0 * np.pi * mixed.REACH * frequency * lasts
     number = target.count_below(mixed.REACH * frequency / target.stretch)
-    count = vectors.FEWEST + min(round(number), round(mixed.PER_RADIAN * phase))
+    count = vectors.FEWEST + min(round(number), round(2.5 * phase))  # eight for each half turn
     n_dofs = target.unknowns(asked.values["at"][None], elements, stages)
     return elements, count, n_dofs, cost.by_vectors([n_dofs, n_dofs / refinement.COARSER**2], count, 1.0)

@@ -11,7 +11,8 @@ from ..fe import refinement
 from ..fe.section import Plate
 from ..impact import accuracy, collision
 from ..impact.compiled import build
-from ..impact.response import LOOKED_AT, Response
+from ..impact.motion import LOOKED_AT
+from ..impact.response import Response
 from ..modes.modal import Modes
 from . import audit, cost, idealisation, vectors
 from .asked import Asked, Description, Unaffordable
@@ -20,10 +21,7 @@ from .by_idealisation import Idealised
 from .by_modes import MOST_MODES, Modal
 from .target import FIRST_LOOK, Elements, Stages
 
-# [Hz], [-] the ear's limit: no mode above is asked for unless a band of the sound is; the force looked at every 10 Hz
-AUDIBLE, AUDIBLE_POINTS = 20e3, 2001
-# [-] modes ring up to the last frequency where the force has this part of its impulse: -60 dB, which is not heard
-FAINT = 1e-3
+AUDIBLE = 20e3  # [Hz] the ear's limit: no mode above is asked for unless a band of the sound is
 MOST_RINGING = 400  # [-] modes for motion and sound if no band is asked for: some seconds
 
 
@@ -66,9 +64,9 @@ class Vectors(Description):
         wanted, at = (0.5 / asked.duration, asked.budget.total), asked.values["at"][None]
         elements = vectors.elements_for(target, size, asked.mass, *wanted)
         n_dofs, count = target.unknowns(at, elements, stages), vectors.first_count(target, *wanted)
-        lasts, impacts = _foreseen(asked)
+        lasts, impacts = _length_foreseen(asked)
         meshes = list(vectors.compared(target, elements, stages))
-        if impacts > cost.MANY and not asked.meshed:
+        if impacts > 2 and not asked.meshed:  # each multiplies the error that a mesh makes before it
             meshes.append(vectors.finer(target, meshes[0], stages))
         work = cost.by_vectors([target.unknowns(at, each, stages) for each in meshes], count, lasts)
         rings = (cost.by_modes(cost.PER_MODE * number, number) for number in (FIRST_LOOK, ringing_count(asked)))
@@ -131,7 +129,7 @@ class Vectors(Description):
         return super().completed(hit, stages)
 
 
-def _foreseen(asked: Asked) -> tuple[float, int]:
+def _length_foreseen(asked: Asked) -> tuple[float, int]:
     """How long the blow lasts on an infinite plate, in undisturbed contacts, and its impacts; (1, 1) if not known."""
     at, seen = asked.values["at"], asked.seen
     if seen is None or not np.isfinite(seen.mobility):
@@ -142,7 +140,7 @@ def _foreseen(asked: Asked) -> tuple[float, int]:
         with build.uncompiled():
             hit = collision.strike(
                 endless, striker, asked.blow.contact, at=at, speed=asked.values["speed"], tolerance=audit.ROUGH,
-                duration=cost.LONGEST * asked.duration,
+                duration=100.0 * asked.duration,  # the cost of longer blows is told too low
             )  # fmt: skip
     except check.SimulationError:
         return 1.0, 1
@@ -168,7 +166,8 @@ def ringing_count(asked: Asked) -> int:
     assert mesh is not None and isinstance(section, Plate)
     stiffness = section.stiffness(mesh.points[mesh.cells].mean(axis=1))
     ratio = float((stiffness[:, 0, 0] / stiffness[:, 1, 1]).mean())  # waves across the grain are shorter
-    below = target.count_below((band or min(AUDIBLE, cost.FAINTEST / asked.duration)) / target.stretch)
+    # frequency times contact time: 16 of a half sine, less of smoother forces
+    below = target.count_below((band or min(AUDIBLE, 8.0 / asked.duration)) / target.stretch)
     number = below * min(ratio, 1.0 / ratio) ** 0.25
     return max(FIRST_LOOK, min(MOST_MODES["fe"] if band else MOST_RINGING, round(number)))
 
@@ -176,9 +175,9 @@ def ringing_count(asked: Asked) -> int:
 def _ringing(asked: Asked, keep: Any, response: Response) -> Modes:
     """The modes that the force found makes ring: up to the band asked for, or as far as the force reaches."""
     target, band = asked.blow.target, asked.quantities.get("sound")
-    frequencies = np.linspace(0.0, AUDIBLE, AUDIBLE_POINTS)
+    frequencies = np.arange(0.0, AUDIBLE + 1.0, 10.0)
     force = np.abs(response.spectrum(frequencies))
-    limit = band or float(frequencies[np.flatnonzero(force >= FAINT * force[0])[-1]])
+    limit = band or float(frequencies[np.flatnonzero(force >= 1e-3 * force[0])[-1]])  # -60 dB are not heard
     first = asked.find(FIRST_LOOK)
     number = round(FIRST_LOOK * target.growth(target.finished(first).frequencies[-1], limit))
     most = MOST_MODES["fe"] if band else MOST_RINGING

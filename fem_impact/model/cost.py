@@ -38,36 +38,10 @@ except ImportError:  # Windows
     resource = None
 
 START = 0.01  # [s] of a strike, besides its time steps
-RUNS = 20.0  # [-] time steps of all runs of a strike, over those of one undisturbed contact
-STEP, MODE_STEP = 2e-7, 3.3e-9  # [s] per time step, and per step and mode
-PLAIN = 1.2e-4  # [s] per time step in plain Python, instead
-ASSEMBLY = 4.6e-5  # [s] per unknown, with the mesh
-FACTORS = 4.5e-6, 1.05e-7  # [s] per unknown of a factorisation, and per unknown times the root of their number
-SOLVE, TURN = 5.7e-7, 6e-10  # [s] per unknown of a solution, and of making it orthogonal to another vector
-DENSE = 4e-9  # [s] of all small eigenvalue problems, over their size cubed
-AIR = 1e-4  # [s] of the air around a plate, per mode squared
-# [-] time steps of collocation per contact at a tolerance of 1e-9, power of 1e-9 / tolerance with which they grow, and
-# work of each over that of another scheme's step
-COLLOCATED = 300.0, 0.2, 10.0
-LANCZOS = 4.0  # [-] work per mode, over that per Ritz vector
-ATTEMPTS = 3.0  # [-] blows on the way to a tolerance
-# As the runs of studies/cost_predictions.py need; it compares the numbers predicted with those done.
-GROWN = 120.0, 0.3  # [-] first vectors up to this number suffice; if more, the number grows by this power of the ratio
-LONG = 4.0, 0.7  # [-] the same over the length of the blow, in undisturbed contacts: later echoes need more vectors
 # [-] unknowns of the elements that shrink towards the blow; triangles of a thick plate have more
 AT_BLOW = {"argyris": 3000, "argyris and shear": 7500}
 PER_MODE = 65.0  # [-] unknowns per mode found for motion and sound: 40 at 1.8 rad per triangle, 108 at 1.1
-# [-] frequency times contact time up to which modes for motion and sound are counted: 16 of a half sine, less of
-# smoother forces
-FAINTEST = 8.0
-LONGEST = 100.0  # [-] a blow is followed up to so many undisturbed contacts; the cost of longer ones is told too low
-MANY = 2  # [-] impacts up to which two meshes suffice; each multiplies the error that a mesh makes before it
-PROCESS, ELEMENTS = 2.1e8, 5e7  # [byte] of the process with its libraries, and of those for elements
-PER_UNKNOWN, PER_PAIR = 1e4, 16.0  # [byte] per unknown with its factors; per unknown and solution
-REPEATS = 3  # [-] times that the benchmark runs; the fastest counts
-GRID, WIDTH, SOLUTIONS = 22, 6, 30  # [-] nodes per side, unknowns per node and solutions of the sparse benchmark
-SQUARE, MODES, STEPS = 700, 300, 4000  # [-] size of the product of the benchmark; modes and time steps of its strike
-BELIEVED = 20.0  # [-] a machine that is so many times faster or slower was disturbed, or its clock is too coarse
+ELEMENTS = 5e7  # [byte] of the libraries for elements
 
 
 @dataclass(frozen=True)
@@ -107,8 +81,8 @@ class Machine:
 
     @property
     def credible(self) -> bool:
-        """Whether it is one that people use."""
-        return all(1.0 / BELIEVED < ratio < BELIEVED for ratio in self.slower.values())
+        """Whether it is one that people use: if 20 times faster or slower, it was disturbed or its clock is coarse."""
+        return all(1.0 / 20.0 < ratio < 20.0 for ratio in self.slower.values())
 
 
 NOTHING = Work()
@@ -117,23 +91,27 @@ REFERENCE = Machine(sparse=0.045, dense=0.02, steps=0.008)  # [s] a virtual mach
 
 def strikes(n_steps: float, n_modes: int) -> Work:
     """All runs of a strike; ``n_steps`` are those of the undisturbed contact, ``n_modes`` those of both bodies."""
-    step = (STEP if build.COMPILED else PLAIN) + MODE_STEP * n_modes
-    return Work(steps=START + RUNS * n_steps * step, memory=PROCESS)
+    step = 2e-7 if build.COMPILED else 1.2e-4  # [s]; each mode takes 3.3 ns more
+    all_runs = 20.0 * n_steps  # time steps, over those of one undisturbed contact
+    return Work(steps=START + all_runs * (step + 3.3e-9 * n_modes), memory=2.1e8)  # the process with its libraries
 
 
 def in_air(n_modes: float) -> Work:
-    """Air around the modes of a plate."""
-    return Work(dense=AIR * n_modes**2)
+    """Air around the modes of a plate: 0.1 ms per mode squared."""
+    return Work(dense=1e-4 * n_modes**2)
 
 
 def collocated(tolerance: float) -> float:
-    """Time steps of an undisturbed contact as `strikes` takes them, by collocation to a tolerance."""
-    return COLLOCATED[0] * (1e-9 / tolerance) ** COLLOCATED[1] * COLLOCATED[2]
+    """Time steps of an undisturbed contact as `strikes` takes them, by collocation to a tolerance.
+
+    They are 300 at 1e-9, and each is ten times the work of another scheme's step.
+    """
+    return 10.0 * 300.0 * (1e-9 / tolerance) ** 0.2
 
 
 def by_modes(n_dofs: float, n_modes: float) -> Work:
-    """Modes on one mesh, their number checked."""
-    return on_mesh(n_dofs, LANCZOS * n_modes, n_modes)
+    """Modes on one mesh, their number checked; each takes four times the work of a Ritz vector."""
+    return on_mesh(n_dofs, 4.0 * n_modes, n_modes)
 
 
 def compliance(n_dofs: float) -> Work:
@@ -142,8 +120,12 @@ def compliance(n_dofs: float) -> Work:
 
 
 def grown(n_vectors: float, lasts: float) -> float:
-    """Number of Ritz vectors that a blow needs which begins with ``n_vectors`` and ``lasts`` so many contacts."""
-    return n_vectors * max(1.0, (n_vectors / GROWN[0]) ** GROWN[1], (lasts / LONG[0]) ** LONG[1])
+    """Number of Ritz vectors that a blow needs which begins with ``n_vectors`` and ``lasts`` so many contacts.
+
+    First vectors up to 120 suffice for a blow of up to four undisturbed contacts: later echoes need more. As the runs
+    of studies/benchmarks/cost_predictions.py need, which compares the numbers predicted with those done.
+    """
+    return n_vectors * max(1.0, (n_vectors / 120.0) ** 0.3, (lasts / 4.0) ** 0.7)
 
 
 def by_vectors(n_dofs: Sequence[float], n_vectors: float, lasts: float) -> Work:
@@ -153,43 +135,45 @@ def by_vectors(n_dofs: Sequence[float], n_vectors: float, lasts: float) -> Work:
     """
     n_vectors = grown(n_vectors, lasts)
     every = sum((on_mesh(n, n_vectors, n_vectors) for n in n_dofs), NOTHING)
-    return every + Work(dense=DENSE * n_vectors**3, steps=ATTEMPTS * START, memory=ELEMENTS)
+    # [s] of all small eigenvalue problems, over their size cubed; three blows on the way to a tolerance
+    return every + Work(dense=4e-9 * n_vectors**3, steps=3.0 * START, memory=ELEMENTS)
 
 
 def on_mesh(n_dofs: float, n_solved: float, n_kept: float) -> Work:
     """Assembly, two factorisations and solutions, each made orthogonal to those before, on one mesh."""
-    factors = 2.0 * (FACTORS[0] + FACTORS[1] * math.sqrt(n_dofs))
-    sparse = n_dofs * (ASSEMBLY + factors + n_solved * (SOLVE + 0.5 * TURN * n_kept))
-    return Work(sparse, memory=n_dofs * (PER_UNKNOWN + PER_PAIR * n_solved))
+    # [s] per unknown: assembly with the mesh, a factorisation, a solution and its product with another vector
+    assembly, factors = 4.6e-5, 4.5e-6 + 1.05e-7 * math.sqrt(n_dofs)
+    solution, product = 5.7e-7, 6e-10
+    seconds = n_dofs * (assembly + 2.0 * factors + n_solved * (solution + 0.5 * product * n_kept))
+    return Work(seconds, memory=n_dofs * (1e4 + 16.0 * n_solved))  # [byte] per unknown with its factors, and solution
 
 
 @one_thread
 def benchmark() -> Machine:
     """Measure this machine with small problems of each kind; takes a third of a second."""
-    line = sp.diags_array([1.0, 1.0, 1.0], offsets=[-1, 0, 1], shape=(GRID, GRID))
-    coupled = sp.kron(sp.kron(line, line), np.ones((WIDTH, WIDTH)))
-    stiff = (coupled + 10.0 * 9.0 * WIDTH * sp.eye_array(coupled.shape[0])).tocsc()
-    full = np.random.default_rng(0).normal(size=(SQUARE, SQUARE))
-    plate = analytic.rectangle(1.55, 1.0, mass=2.0, first_frequency=100.0, n_modes=MODES)
+    line = sp.diags_array([1.0, 1.0, 1.0], offsets=[-1, 0, 1], shape=(22, 22))  # 22 by 22 nodes of 6 unknowns
+    coupled = sp.kron(sp.kron(line, line), np.ones((6, 6)))
+    stiff = (coupled + 10.0 * 9.0 * 6.0 * sp.eye_array(coupled.shape[0])).tocsc()
+    full = np.random.default_rng(0).normal(size=(700, 700))
+    plate = analytic.rectangle(1.55, 1.0, mass=2.0, first_frequency=100.0, n_modes=300)
     mass, law = Striker.rigid(0.1), Contact.linear(1e4)
-    lasts = 0.5e-3  # [s] the contact lasts longer
 
     def sparse() -> None:
         factors, solution = factorise(stiff), np.ones((stiff.shape[0], 1))
-        for _ in range(SOLUTIONS):
+        for _ in range(30):
             solution = factors.solve(solution)
 
-    def steps() -> None:
-        at = (0.465, 0.3)
-        collision.strike(plate, mass, law, at=at, speed=1.0, dt=lasts / STEPS, duration=lasts, residual=False)
+    def steps() -> None:  # 4000 of them; the contact lasts longer
+        at, lasts = (0.465, 0.3), 0.5e-3
+        collision.strike(plate, mass, law, at=at, speed=1.0, dt=lasts / 4000, duration=lasts, residual=False)
 
     return Machine(sparse=_fastest(sparse), dense=_fastest(lambda: full @ full), steps=_fastest(steps))
 
 
 def _fastest(work: Callable[[], object]) -> float:
-    """Shortest processor time [s] of several runs: other programs on the machine only make it longer."""
+    """Shortest processor time [s] of three runs: other programs on the machine only make it longer."""
     times = []
-    for _ in range(REPEATS):
+    for _ in range(3):
         start = time.process_time()
         work()
         times.append(time.process_time() - start)

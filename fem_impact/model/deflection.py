@@ -25,9 +25,9 @@ from ..fe.section import Plate
 from ..impact.assumption import Assumption
 from ..modes.modal import Modes
 from ..modes.stretching import stretch
-from .bending import Bending, Known, known, quadratic
+from .bending import Bending, Known, quadratic
 from .idealisation import Waves
-from .restrike import Struck
+from .restrike import Doubt, Struck
 
 LIMIT = 0.2  # [-] deflection over thickness at which the frequency of a hinged square rises by 2 %
 SLIPS = 0.25  # [-] stretching of a plate whose edge may move in its plane over that of one whose edge may not
@@ -35,87 +35,80 @@ SLIPS = 0.25  # [-] stretching of a plate whose edge may move in its plane over 
 TIMES = 64
 RINGING = 1.5  # [-] tension that acts on a mode swinging alone, over the mean tension, fact: 3/4 and 1/2 of its largest
 FRONT = 2.0 * np.pi  # [-] radius squared of the bent region over rate times time: where Si(r**2 / (4 rate t)) turns
-AHEAD = 1.5  # [-] power of the slopes' share within the bent region: 2 on an endless plate, least errors on others
-# [-] deflection over thickness below which the free edges of a plate are not looked at closely: it stiffens by 1e-3
-# there
-SLIGHT = 0.03
-DENT = 0.7  # [-] stiffening of a wide plate under a point force over (deflection / thickness)**2, from the held disk
 SLOWER = 3.0  # [-] a mode that is slower or faster than bending waves by this rocks or is pulled; wood differs by less
-NUMBER = "deflection over thickness"
 # [-] deflection over thickness beyond which no first-order estimate of the stretching helps
 GONG = 1.0
-# [-] that deflection over what `_held_back` leaves of the linear one, where it nears GONG: 0.74 to 1.07 on six plates
-SURELY = 1.1
-FEWER = 2  # [-] divides the stress fields of a body that stretches for the blow to compare with: half of them
-PERIODS = 2.0  # [-] periods of the first mode after a blow that are searched for its largest deflection
 REMEDY = "take a softer blow or a thicker body: stretching is not modelled"
 BETTER = "let it stretch, stretching = true, or take a softer blow or a thicker body"
 DARING = "take a softer blow or a thicker body: stretching = true holds up to deflections of the thickness"
 OTHER = "take element 'argyris'"
 LOCAL = "take a softer blow or a thicker body: local stretching is not modelled"
-A_GONG = "this is a gong: large deflections are not modelled"
+SMALL = Doubt("small deflections", "deflection over thickness", LIMIT, "give material and section")
+STRETCHED = replace(SMALL, limit=GONG)
 
 
-def of_target(struck: Struck) -> Assumption:
+def examine_deflection(struck: Struck) -> Assumption:
     """The struck body."""
-    body, quantities, hit = struck.target, struck.quantities, struck.hit
-
-    def told(value: float | None, effect: dict, unknown: str = "", held_back: float = 1.0) -> Assumption:
-        remedy, limit = REMEDY, LIMIT
-        if body is not None and (body.held == 1.0 or (body.plate is not None and not body.sprung)):
-            better = DARING if value is not None and SURELY * held_back * value > GONG else BETTER
-            remedy = f"{OTHER} and {better}" if quadratic(body.modes) else better
-        if struck.bodies[1].stretches if struck.foreseen else struck.hit.history.stretched is not None:
-            return Assumption("small deflections", value, GONG, effect, quantities, LOCAL, NUMBER, unknown)
-        remedy = "give material and section" if unknown else remedy
-        return Assumption("small deflections", value, limit, effect, quantities, remedy, NUMBER, unknown)
-
-    if struck.bodies[1].dimension == 0:
-        return told(0.0, dict.fromkeys(quantities, 0.0))
-    if struck.ideal == "rigid" and not struck.foreseen and (body is None or body.thickness is None):
-        return told(None, dict.fromkeys(quantities, hit.error.idealisation))  # if it stretched as much as it bends
-    if body is None or body.section is None or body.thickness is None:
-        return told(None, dict.fromkeys(quantities), "the thickness of the body")
+    body, modes, hit = struck.target, struck.bodies[1], struck.hit
+    if modes.dimension == 0:
+        return SMALL.holds(struck)
+    if body is None or body.thickness is None:
+        if struck.ideal != "rigid" or struck.foreseen:
+            return SMALL.unknown(struck, "the thickness of the body")
+        # if it stretched as much as it bends
+        return SMALL.judged(struck, None, dict.fromkeys(struck.quantities, hit.error.idealisation), REMEDY)
     if struck.ideal:
-        return told(*_simplified(struck, body))
+        return _simplified(struck, body)
     integrals = struck.bending
     assert integrals is not None
     if struck.foreseen:
-        return told(_ahead(struck, body, integrals), {})
+        value = _impulse_deflection(struck, body, integrals)
+        if modes.stretches:
+            return STRETCHED.judged(struck, value, {}, LOCAL)
+        return SMALL.judged(struck, value, {}, _remedy(body, value))
     if hit.history.stretched is not None:
-        return told(*_stretched(struck, body, integrals))
+        return _stretched(struck, body, integrals)
     history, mine = hit.history, struck.mine
-    end = max((impact.end for impact in hit.impacts), default=history.end_time)
-    times = np.linspace(0.0, end, TIMES + 1)[1:]
+    times = np.linspace(0.0, struck.end, TIMES + 1)[1:]
     rocks, pulled = _bends(body, integrals, history.omega[mine])
     moved = history.states(times)[0][:, mine] * rocks
     row = np.abs(history.shape[0, mine])
     largest = float(np.abs(moved @ (pulled * history.shape[0, mine])).max(initial=0.0))
     swing = np.divide(rocks * pulled * row, history.omega[mine], out=np.zeros(len(row)), where=rocks > 0.0)
-    value = max(largest, float(np.sqrt(2.0 * struck.energy @ swing**2))) / body.thickness
-    share = _share(body, integrals, moved) if value > SLIGHT else _crude(body)
+    value = max(largest, float(np.sqrt(2.0 * struck.target_energy @ swing**2))) / body.thickness
+    # free edges are not looked at closely where a plate stiffens by less than 1e-3
+    share = _share(body, integrals, moved) if value > 0.03 else _crude(body)
     slopes = moved**2 @ integrals.slope  # (n_times,) int |grad w|**2
     area = _bent_area(body, integrals, times)
     local = 1.0 + (share - 1.0) * area / body.extent  # before its waves reach the edges, they do not matter
-    tension = _tension(body, slopes, area, local) * _within(body, area) ** AHEAD
+    # power of the slopes' share within the bent region: 2 on an endless plate, least errors on others
+    tension = _tension(body, slopes, area, local) * _within(body, area) ** 1.5
     held = float(tension @ slopes / slopes.sum()) if slopes.any() else 0.0
     omega = np.sqrt(history.omega[mine] ** 2 + held * rocks**2 * integrals.slope)
 
-    def rise(modes: Modes, found: Bending | None) -> np.ndarray | None:
-        of = known(modes)
-        if found is None or of is None or of.section is None:
+    def rise(of: Known, found: Bending) -> np.ndarray | None:
+        if of.section is None:
             return None
-        energy = np.where(modes.omega > 0.0, hit.modal_energy([end])[0], 0.0)
-        soft = np.divide(found.slope, modes.omega**2, out=np.zeros(modes.n_modes), where=modes.omega > 0.0)
+        omega = of.modes.omega
+        energy = np.where(omega > 0.0, hit.modal_energy([struck.end])[0], 0.0)
+        soft = np.divide(found.slope, omega**2, out=np.zeros(len(omega)), where=omega > 0.0)
         mean = RINGING * float(_tension(of, np.array([energy @ soft]), np.array([of.extent]), share)[0])
         return np.sqrt(1.0 + mean * soft) - 1.0
 
-    effect = struck.heard(struck.changes(omega=struck.of_target(omega)), rise)
+    effect = struck.add_sound(struck.changes(omega=struck.with_target(omega)), rise)
     most = int(slopes.argmax())
     bending = 0.5 * float(((moved[most] * history.omega[mine]) ** 2).sum())
     pulling = 0.25 * float(tension[most] * slopes[most])
-    unknown = "the thickness" if effect.get("sound", 0.0) is None else ""
-    return told(value, effect, unknown, _held_back(pulling / bending if bending else 0.0))
+    return SMALL.judged(struck, value, effect, _remedy(body, value * _held_back(pulling / bending if bending else 0.0)))
+
+
+def _remedy(body: Known, deflection: float) -> str:
+    """What makes the answer right, for the deflection over the thickness [-] of a body that stretches."""
+    if body.held < 1.0 and (body.plate is None or body.sprung):
+        return REMEDY
+    # estimated on six plates to 0.74 to 1.07 of that deflection where it nears the thickness
+    better = DARING if 1.1 * deflection > GONG else BETTER
+    return f"{OTHER} and {better}" if quadratic(body.modes) else better
 
 
 def _held_back(share: float) -> float:
@@ -127,7 +120,7 @@ def _held_back(share: float) -> float:
     return float(np.sqrt(2.0 / (1.0 + np.sqrt(1.0 + 4.0 * share))))
 
 
-def _ahead(struck: Struck, body: Known, integrals: Bending) -> float:
+def _impulse_deflection(struck: Struck, body: Known, integrals: Bending) -> float:
     """Deflection over thickness [-] that the impulse of a blow on a wall leaves in the modes."""
     modes, hit = body.modes, struck.hit
     assert struck.place is not None
@@ -141,29 +134,28 @@ def _ahead(struck: Struck, body: Known, integrals: Bending) -> float:
     return found * hit.impulse / body.thickness
 
 
-def _stretched(struck: Struck, body: Known, integrals: Bending) -> tuple[float, dict[str, float | None], str]:
+def _stretched(struck: Struck, body: Known, integrals: Bending) -> Assumption:
     """A blow that has stretching in it: how large it gets, and what stress fields and modes left out would change.
 
-    The fields that are not kept change less than the smaller half of those that are.
+    The fields that are not kept change less than the smaller half of those that are. The largest deflection is
+    searched in two periods of the first mode after the blow.
     """
-    hit, mine, history = struck.hit, struck.mine, struck.hit.history
+    mine, history, end = struck.mine, struck.hit.history, struck.end
     assert history.stretched is not None and body.thickness is not None
-    end = max((impact.end for impact in hit.impacts), default=history.end_time)
     flexible = history.omega[mine] > 0.0
     period = 2.0 * np.pi / float(history.omega[mine][flexible][0])
-    after = PERIODS * period
-    times = np.append(np.linspace(0.0, end, TIMES + 1)[1:], np.linspace(end, end + after, int(PERIODS * TIMES)))
+    times = np.append(np.linspace(0.0, end, TIMES + 1)[1:], np.linspace(end, end + 2.0 * period, 2 * TIMES))
     longest = max(history.stretched.base, period / TIMES)
     states = replace(history, stretched=replace(history.stretched, base=longest)).states(times)[0]
     moved = states[:, mine]
     value = float(np.abs(moved @ (flexible * history.shape[0, mine])).max(initial=0.0)) / body.thickness
     if value > GONG:
-        return value, dict.fromkeys(struck.quantities), A_GONG
+        return STRETCHED.unknown(struck, "this is a gong: large deflections are not modelled", LOCAL, value)
     forms = history.stretched.forms
     if len(forms) < membrane.most(forms.shape[1]):
-        return value, dict.fromkeys(struck.quantities, 0.0), ""
-    n = forms.shape[1] if forms.shape[1] == moved.shape[1] else forms.shape[1] // FEWER
-    fewer = replace(history.stretched, forms=np.ascontiguousarray(forms[: len(forms) // FEWER, :n, :n]))
+        return STRETCHED.judged(struck, value, dict.fromkeys(struck.quantities, 0.0), LOCAL)
+    n = forms.shape[1] if forms.shape[1] == moved.shape[1] else forms.shape[1] // 2
+    fewer = replace(history.stretched, forms=np.ascontiguousarray(forms[: len(forms) // 2, :n, :n]))
     effect = struck.changes(stretched=fewer)
     if "sound" in effect:
         whole, part = (sum(each.energy(q) for q in states[TIMES:]) for each in (history.stretched, fewer))
@@ -172,9 +164,11 @@ def _stretched(struck: Struck, body: Known, integrals: Bending) -> tuple[float, 
         mean = float(np.mean(_tension(body, slopes, np.array([body.extent]), _share(body, integrals, moved))))
         rise = np.sqrt(1.0 + mean * soft) - 1.0
         effect["sound"] = (
-            (1.0 - part / whole) * float(struck.energy @ rise) / (struck.energy.sum() or 1.0) if whole else 0.0
+            (1.0 - part / whole) * float(struck.target_energy @ rise) / (struck.target_energy.sum() or 1.0)
+            if whole
+            else 0.0
         )
-    return value, effect, ""
+    return STRETCHED.judged(struck, value, effect, LOCAL)
 
 
 def _tension(body: Known, slopes: np.ndarray, extent: np.ndarray, share: Any) -> np.ndarray:
@@ -261,15 +255,19 @@ def _within(body: Known, area: np.ndarray) -> np.ndarray:
     return near / far
 
 
-def _simplified(struck: Struck, body: Known) -> tuple[float | None, dict[str, float | None], str]:
+def _simplified(struck: Struck, body: Known) -> Assumption:
     """A body treated as rigid or infinite: its plate gives by its mobility times the impulse."""
     plate, hit = body.plate, struck.hit
     if plate is None or callable(plate.thickness) or body.thickness is None:
-        return None, dict.fromkeys(struck.quantities), "the deflection of a body treated as rigid"
+        return SMALL.unknown(struck, "the deflection of a body treated as rigid")
     waves = Waves.of(plate.material, plate.thickness)
     value = waves.mobility(body.per_extent) * hit.impulse / body.thickness
-    stiffening = DENT * value**2
+    stiffening = 0.7 * value**2  # of a wide plate under a point force, from the held disk
     if struck.ideal == "rigid":  # what the body gives changes the blow by no more than the error of leaving it out
-        return value, dict.fromkeys(struck.quantities, min(1.0, stiffening) * hit.error.idealisation), ""
-    row = hit.history.shape[:, struck.mine] / (1.0 + stiffening) ** 0.25
-    return value, dict(struck.changes(shape=struck.of_target(row, "shape"))), ""
+        effect: dict[str, float | None] = dict.fromkeys(
+            struck.quantities, min(1.0, stiffening) * hit.error.idealisation
+        )
+    else:
+        row = hit.history.shape[:, struck.mine] / (1.0 + stiffening) ** 0.25
+        effect = struck.changes(shape=struck.with_target(row, "shape"))
+    return SMALL.judged(struck, value, effect, _remedy(body, value))

@@ -17,15 +17,9 @@ from .target import FIRST_LOOK, Target
 
 PULSE = 1.77  # [-] fact: peak response of an oscillator to a half sine, over its static response
 SOFTEST = 10.2158  # [-] fact: first eigenvalue (k r)**2 of a clamped disk; a body around the disk has a lower one
-# [-] largest squared shape times mass; fact: 2 for each pair of hinged edges, 4 at a free beam's end, both ways
-LIVELY = {False: 4.0, True: 16.0}
-RIM = 2.0  # [-] factor on Weyl's edge term, an upper bound: free edges need 1.71 (refinement.EDGE_TERM)
 HEAVIEST = 0.3  # [-] damping ratio of the contact with an infinite plate; below it, the striker always rebounds
 NEAREST = 2.0  # [-] least clearance**2 / (rate contact time); below it, the echo returns during the contact
 ECHO = 1.2  # [-] error of one straight edge over ratio / nearness**2; measured 0.1 to 0.4, at a disk's centre 4
-# [-] modes up to this multiple of the contact frequency decide if a body is rigid: one there gives 1 / 400 as much
-LOOK = 20.0
-MOST_LOOKED_AT = 5000  # [-] of these modes at most, to limit the work: a plan should take no time
 
 
 @dataclass(frozen=True)
@@ -215,10 +209,12 @@ def rigid_bound(view: Surroundings, body_mass: float, rate: float, free: bool, m
     omega_0 = np.pi / duration
     ratio = np.geomspace(1e-6, 1e6, 4001)  # omega / omega_0
     omega = ratio * omega_0
-    number = view.area * omega / (4.0 * np.pi * rate) + RIM * view.perimeter * np.sqrt(omega / rate) / (4.0 * np.pi)
+    # the edge term is doubled, as free edges need 1.71 of it (refinement.EDGE_TERM)
+    number = view.area * omega / (4.0 * np.pi * rate) + 2.0 * view.perimeter * np.sqrt(omega / rate) / (4.0 * np.pi)
     yields = np.minimum(np.pi, np.minimum(2.0 / ratio, PULSE / ratio**2))
     total = 3.0 * np.pi + float(np.sum(0.5 * (yields[1:] + yields[:-1]) * np.diff(number)))
-    return LIVELY[free] * mass / body_mass * total
+    lively = 16.0 if free else 4.0  # squared shape times mass: 2 for each pair of hinged edges, 4 at a free beam's end
+    return lively * mass / body_mass * total
 
 
 def slowest_rate(view: Surroundings, first_frequency: float) -> float:
@@ -286,8 +282,10 @@ def from_outside(target: Target, at: Any, mass: float, duration: float) -> Outsi
         modes = target.finished(first)
         stretch = modes.frequencies[-1] / first.frequencies[-1]
         notes = at_rest(modes, at[None])
-        most = modes.frequencies[-1] * (MOST_LOOKED_AT / FIRST_LOOK) ** (2.0 / modes.dimension)
-        limit = min(LOOK * 0.5 / duration, most)
+        # modes up to 20 times the contact frequency decide if it is rigid: one there gives 1 / 400 as much; but a plan
+        # should take no time, and looks at 5000 at most
+        most = modes.frequencies[-1] * (5000 / FIRST_LOOK) ** (2.0 / modes.dimension)
+        limit = min(20.0 * 0.5 / duration, most)
         if limit > modes.frequencies[-1]:
             modes = target.finished(find(max_frequency=limit / stretch))
         rigid = rigid_error(modes, at, mass, duration)

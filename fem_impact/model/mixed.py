@@ -38,20 +38,10 @@ RATIO = ANGLE / 1.5  # [-] between neighbouring frequencies, less one: a ripple 
 REACH = 2.0  # [-] the modes are needed up to this multiple of the frequency, where they keep 1 % of their squared shape
 # [-] finite elements resolve waves of so many times the frequency: room for a second, higher frequency on that mesh
 RESOLVED = 1.25
-CHUNK = 2000  # [-] modes whose shares are found at a time, to limit memory
-# [-] angular frequency tried first, times mass and mobility, the time in which the striker slows down: five times its
-# rate, where a force hardly changes its speed
-SLOWING = 5.0
 # [-] duration of the blow to be expected, over mass times mobility: exp(-15) = 3e-7 of the speed is left then
 LASTING = 15.0
-# [-] that duration over the contact time on a wall at most: longer blows take too many steps, some 24 for each
-LONGEST = 1e4
-# [-] vectors that tell waves up to a frequency, per radian of its phase in that time: eight for each half turn
-PER_RADIAN = 2.5
-# [-] of these vectors at most, a time limit: half a minute on a mesh of 50 000 unknowns
+# [-] of the vectors at most, a time limit: half a minute on a mesh of 50 000 unknowns
 MOST_VECTORS = 1000
-# [rad] phase of the first echo at that frequency at least, a turn and a half: the plate is wider than the wave is long
-NEAR = 10.0
 
 
 def first_frequency(mass: float, mobility: float, echo: float, duration: float) -> float:
@@ -65,9 +55,13 @@ def first_frequency(mass: float, mobility: float, echo: float, duration: float) 
         Squared distance of the nearest edge over sqrt(rigidity / mass per area): times omega, the phase of an echo.
     duration : float [s]
         Contact time on a rigid wall.
+
+    Notes
+    -----
+    Five times the rate at which the striker slows down: above, a force hardly changes its speed. But the first echo
+    turns by 10 rad at least, a turn and a half: the plate is wider than the wave is long.
     """
-    slow = min(SLOWING / (mass * mobility), SLOWING / duration)
-    return max(slow, NEAR / echo) / (2.0 * np.pi)
+    return max(5.0 / max(mass * mobility, duration), 10.0 / echo) / (2.0 * np.pi)
 
 
 def absorbing(mobility: float, frequency: float, highest: float) -> tuple[np.ndarray, np.ndarray, float]:
@@ -81,12 +75,12 @@ def absorbing(mobility: float, frequency: float, highest: float) -> tuple[np.nda
     return omega, np.sqrt(dense * RATIO * omega), float(dense / (omega[-1] * np.exp(0.5 * RATIO)))
 
 
-def kept(omega: np.ndarray, mobility: float, above: np.ndarray, shape: np.ndarray) -> np.ndarray:
+def kept_share(omega: np.ndarray, mobility: float, above: np.ndarray, shape: np.ndarray) -> np.ndarray:
     """Share (n_modes,) of their squared shapes that modes keep beside oscillators of these frequencies and shapes."""
     damped = 2.0 * np.sin(ANGLE) * above  # [rad/s]
     taken = [
         (shape**2 / mobility * damped * x**2 / ((above**2 - x**2) ** 2 + (damped * x) ** 2)).sum(axis=1)
-        for x in np.array_split(omega[:, None], 1 + len(omega) // CHUNK)
+        for x in np.array_split(omega[:, None], 1 + len(omega) // 2000)  # to limit the memory
     ]
     return np.clip(1.0 - np.concatenate(taken), 0.0, 1.0)
 
@@ -120,7 +114,7 @@ def mixed(modes: Modes, at: Any, mobility: float, frequency: float, highest: flo
 def _mixed(modes: Modes, point: np.ndarray, mobility: float, frequency: float, highest: float) -> Modes:
     modes = replace(modes, poorer={}).truncated(max_frequency=max(REACH * frequency, float(modes.frequencies[0])))
     above, shape, rest = absorbing(mobility, frequency, highest)
-    rows = modes.shapes.at(point)[0] * np.sqrt(kept(modes.omega, mobility, above, shape))
+    rows = modes.shapes.at(point)[0] * np.sqrt(kept_share(modes.omega, mobility, above, shape))
     omega, rows = np.append(modes.omega, above), np.append(rows, shape)
     ratio = np.append(modes.damping_ratio, np.full(len(above), np.sin(ANGLE)))
     error = None if modes.frequency_error is None else np.append(modes.frequency_error, np.zeros(len(above)))

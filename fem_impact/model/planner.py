@@ -234,7 +234,7 @@ def choose(asked: Asked, stages: Stages) -> Description:
 def carry_out(plan: Plan, stages: Stages, keep: Any = None) -> Run:
     """Run the plan, and then with the better models of the target that the tolerance requires, if it may choose."""
     with _noted(plan.description.asked):
-        run = solve(plan, stages, keep)
+        run = strike_as_planned(plan, stages, keep)
     chooses = plan.changes.get("model", plan.blow.target.model) == "auto"
     told: tuple[str, ...] = ()
     while chooses and (better := audit.required(plan.blow.target, run.response)) is not None:
@@ -243,14 +243,14 @@ def carry_out(plan: Plan, stages: Stages, keep: Any = None) -> Run:
         try:
             plan = make(replace(plan.blow, target=target), plan.changes, stages)
             progress.foresee(plan.seconds)
-            again = solve(plan, stages, None)
+            again = strike_as_planned(plan, stages, None)
         except (check.SimulationError, ValueError, MemoryError) as error:
             return replace(run, notes=(*told, *run.notes, f"{why}; that was not computed: {error}"))
         told, run = (*told, f"{why}; that took {sum(stages.seconds.values()) - before:.1g} s more"), again
     return replace(run, notes=(*told, *run.notes))
 
 
-def solve(plan: Plan, stages: Stages, keep: Any = None) -> Run:
+def strike_as_planned(plan: Plan, stages: Stages, keep: Any = None) -> Run:
     """Strike the target as planned, and better descriptions of it as long as the errors of the blow require one.
 
     ``keep`` is a file that stores the modes of a costly plan.
@@ -293,6 +293,12 @@ def _strike(found: Description, modes: Modes, stages: Stages) -> tuple[Response,
             with suppress(check.SimulationError):
                 return run(**{**asked.values, "tolerance": steps}), run
         return run(**{**asked.values, "tolerance": asked.budget.half}), run
+
+
+def struck(run: Callable[..., Response], values: Mapping[str, Any]) -> Response:
+    """What a function strikes with some arguments, again with finer time steps where the other errors leave less."""
+    hit = run(**values)
+    return within(hit.tolerance, hit, run, values)
 
 
 def within(tolerance: float, hit: Response, run: Callable[..., Response], values: Mapping[str, Any]) -> Response:
@@ -412,13 +418,8 @@ def strike(
     """
     if isinstance(modes, Modes) and damping_ratio is None and not set(options) & set(PIECES):
         run = partial(collision.strike, modes, striker, contact, at=at, speed=speed)
-
-        def told() -> Response:
-            first = run(**options)
-            return audit.audited(within(first.tolerance, first, run, options))
-
         stretches = bool(options.get("stretching")) or modes.stretches
-        return promise.kept(fresh.answer(told, stretches), strict)
+        return promise.kept(fresh.answer(lambda: audit.audited(struck(run, options)), stretches), strict)
     if options.pop("start", None) is not None or speed is None:
         raise ValueError(
             "start needs modes, taken as they are: give those of the blow before, hit.target, and no part of a plan"

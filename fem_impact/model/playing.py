@@ -1,7 +1,7 @@
 """Blows one after another on a body that goes on moving: rolls, flams, ruffs and ostinati."""
 
 import logging
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property, partial
 from itertools import pairwise
@@ -27,7 +27,6 @@ from .budget import Budget
 
 LOG = logging.getLogger(__name__)
 EACH = 0.5  # [-] of the tolerance for each blow by itself; as much is left for what it inherits from those before
-MOST_BLOWS = 100_000  # [-] above a day of drumming; more are a mistake
 LISTED = 20  # [-] impacts listed in a summary
 
 
@@ -41,6 +40,11 @@ class Stroke(NamedTuple):
     speed: float  # [m/s] of the striker's contact point towards the body
     # [s] after which the striker is lifted, as soon as it does not touch; None: when it has parted for good
     lasts: float | None = None
+
+    @property
+    def lifted(self) -> float:
+        """When the striker is to be lifted [s]."""
+        return np.inf if self.lasts is None else self.when + self.lasts
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -79,20 +83,14 @@ class Strokes(Totals, check.Locked):
         return tuple(sorted(found, key=lambda impact: (impact.start, impact.contact)))
 
     @cached_property
-    def _samples(self) -> tuple[np.ndarray, np.ndarray]:
-        times = [start + hit.time for start, hit in zip(self.starts, self.hits)]
-        forces = [hit.force if hit.force.ndim == 1 else hit.force.sum(axis=1) for hit in self.hits]
-        return np.concatenate(times), np.concatenate(forces)
-
-    @property
     def time(self) -> np.ndarray:
         """Times [s] of `force`, (n_times,)."""
-        return self._samples[0]
+        return np.concatenate([start + hit.time for start, hit in zip(self.starts, self.hits)])
 
-    @property
+    @cached_property
     def force(self) -> np.ndarray:
         """Sum of the contact forces [N] at `time`, (n_times,)."""
-        return self._samples[1]
+        return np.concatenate([hit.force if hit.force.ndim == 1 else hit.force.sum(axis=1) for hit in self.hits])
 
     def spectrum(self, frequencies: Any) -> np.ndarray:
         """Fourier transform of `force` [N s], (n_frequencies,), complex."""
@@ -110,7 +108,7 @@ class Strokes(Totals, check.Locked):
             first = last
         return found
 
-    def _at(self, times: Any) -> tuple[np.ndarray, np.ndarray]:
+    def _ascending(self, times: Any) -> tuple[np.ndarray, np.ndarray]:
         """Times in ascending order, and the order that leads back."""
         asked = check.array("times", times, (None,), "s", lift=True)
         if asked.size and asked.min() < self.starts[0]:
@@ -118,33 +116,33 @@ class Strokes(Totals, check.Locked):
         order = np.argsort(asked, kind="stable")
         return asked[order], np.argsort(order, kind="stable")
 
+    def _moved(self, times: Any, width: int, motion: Callable[[Response, np.ndarray], np.ndarray]) -> np.ndarray:
+        """A motion (n_times, width) put together from those of the blows, each at times from its start."""
+        sorted_times, back = self._ascending(times)
+        found = [motion(hit, part) for hit, _, part in self.parts(sorted_times)]
+        return np.concatenate([np.zeros((0, width)), *found])[back]
+
     def modal_state(self, times: Any) -> tuple[np.ndarray, np.ndarray]:
         """Modal displacements and velocities of the body, (n_times, n_modes); see `Response.modal_state`."""
-        sorted_times, back = self._at(times)
-        found = [hit.modal_state(part) for hit, _, part in self.parts(sorted_times)]
-        empty = np.zeros((0, self.target.n_modes))
-        q, p = (np.concatenate([empty, *(pair[k] for pair in found)])[back] for k in (0, 1))
-        return q, p
+        n = self.target.n_modes
+        both = self._moved(times, 2 * n, lambda hit, part: np.hstack(hit.modal_state(part)))
+        return both[:, :n], both[:, n:]
 
     @check.typed
     def displacement(self, points: Any, times: Any, *, residual: bool = True) -> np.ndarray:
         """Displacement [m] of the body, (n_times, n_points); see `Response.displacement`."""
-        return self._moved("displacement", points, times, residual)
+        place = self.target.points("points", points)
+        return self._moved(times, len(place), lambda hit, part: hit.displacement(place, part, residual=residual))
 
     @check.typed
     def velocity(self, points: Any, times: Any, *, residual: bool = True) -> np.ndarray:
         """Velocity [m/s] of the body, (n_times, n_points); see `Response.displacement`."""
-        return self._moved("velocity", points, times, residual)
-
-    def _moved(self, name: str, points: Any, times: Any, residual: bool) -> np.ndarray:
-        sorted_times, back = self._at(times)
         place = self.target.points("points", points)
-        found = [getattr(hit, name)(place, part, residual=residual) for hit, _, part in self.parts(sorted_times)]
-        return np.concatenate([np.zeros((0, len(place))), *found])[back]
+        return self._moved(times, len(place), lambda hit, part: hit.velocity(place, part, residual=residual))
 
     def state(self, time: float) -> State:
         """Where the body and the strikers then on it are at a time [s]; see `Response.state`."""
-        start, (hit, _, part) = self.starts[0], self.parts(self._at([time])[0])[0]
+        start, (hit, _, part) = self.starts[0], self.parts(self._ascending([time])[0])[0]
         return replace(hit.state(float(part[0])), time=time - start)
 
     @property
@@ -163,9 +161,8 @@ class Strokes(Totals, check.Locked):
         worst = max(range(len(self.hits)), key=lambda i: self.hits[i].error.total)
         hit = self.hits[worst]
         if self.tolerance_met:
-            return (
-                f"tolerance {self.tolerance:g} met by all: estimated error {self.error:.1e} of {words(hit.quantities)}"
-            )
+            wanted = words(hit.quantities)
+            return f"tolerance {self.tolerance:g} met by all: estimated error {self.error:.1e} of {wanted}"
         strokes = " and ".join(str(i) for i in self.strikers[worst])
         return f"stroke {strokes} at {self.starts[worst]:.4g} s: {hit.promise}"
 
@@ -205,13 +202,12 @@ class Strokes(Totals, check.Locked):
 
     def summary(self) -> str:
         """The sequence in a few readable lines."""
-        lines = [
-            self.verdict,
-            *below(self.verdict),
-            f"{len(self.strokes)} strokes, {self.n_impacts} impacts in {self.impacts[-1].end - self.starts[0]:.4g} s"
+        within = (
+            f"{self.n_impacts} impacts in {self.impacts[-1].end - self.starts[0]:.4g} s"
             if self.impacts
-            else f"{len(self.strokes)} strokes, no impact",
-        ]
+            else "no impact"
+        )
+        lines = [self.verdict, *below(self.verdict), f"{len(self.strokes)} strokes, {within}"]
         lines += [
             f"  {each.start * 1e3:10.4f} to {each.end * 1e3:10.4f} ms: stroke {each.contact}, peak "
             f"{each.peak_force:.5g} N, impulse {each.impulse:.5g} N s"
@@ -283,7 +279,7 @@ def strokes(
     >>> len(flam.hits), flam.impacts[-1].contact, flam.peak_force > 20.0
     (2, 1, True)
     """
-    played = tuple(sorted(_checked(modes, strokes), key=lambda stroke: stroke.when))
+    played = tuple(sorted(_check_strokes(modes, strokes), key=lambda stroke: stroke.when))
     tolerance = check.tolerance(tolerance)
     end = np.inf if duration is None else played[0].when + check.positive("duration", duration, "s")
     begun = start.state() if isinstance(start, Response) else start
@@ -294,16 +290,16 @@ def strokes(
             raise ValueError(f"start must be a time when nothing touches; at {begun.time:.4g} s a force acts")
         game.q, game.p = begun.of(-1, "modes", modes)
         game.error = begun.error
-    game.play(end, {"tolerance": EACH * tolerance, "quantity": quantity, "residual": residual})
+    game.play_all(end, {"tolerance": EACH * tolerance, "quantity": quantity, "residual": residual})
     notes = tuple(dict.fromkeys(note for hit in game.hits for note in hit.notes))
     hits = tuple(replace(hit, tolerance=tolerance) for hit in game.hits)
     found = Strokes(modes, played, np.array(game.starts), hits, tuple(game.who), tolerance, notes)
     return promise.kept(found, strict)
 
 
-def _checked(modes: Modes, strokes: Any) -> list[Stroke]:
+def _check_strokes(modes: Modes, strokes: Any) -> list[Stroke]:
     """The strokes, each with every number checked."""
-    if not isinstance(strokes, (list, tuple)) or not 0 < len(strokes) <= MOST_BLOWS:
+    if not isinstance(strokes, (list, tuple)) or not 0 < len(strokes) <= 100_000:  # above a day of drumming
         raise ValueError(
             "strokes must be a list of (when, striker, contact, at, speed) or, to be lifted, with lasts, got "
             f"{check.shown(strokes)}"
@@ -322,11 +318,6 @@ def _checked(modes: Modes, strokes: Any) -> list[Stroke]:
     return found
 
 
-def _lift(stroke: Stroke) -> float:
-    """When a striker is to be lifted [s]."""
-    return np.inf if stroke.lasts is None else stroke.when + stroke.lasts
-
-
 @dataclass(eq=False)
 class _Game:
     """A sequence as it is played: the body and the strikers on it at the time reached, and the blows so far."""
@@ -342,13 +333,14 @@ class _Game:
     hits: list[Response] = field(default_factory=list)
     who: list[tuple[int, ...]] = field(default_factory=list)
 
-    def play(self, end: float, rule: dict[str, Any]) -> None:
+    def play_all(self, end: float, rule: dict[str, Any]) -> None:
         """Follow all strokes until the last has parted for good or ``end`` [s]."""
         n_begun = 0
         while self.now < end:
             fresh = [i for i in range(n_begun, len(self.played)) if self.played[i].when <= self.now]
             n_begun += len(fresh)
-            lifts = [_lift(self.played[i]) for i in (*(stick.number for stick in self.sticks), *fresh)]
+            on = (*(stick.number for stick in self.sticks), *fresh)
+            lifts = [self.played[i].lifted for i in on]
             to_come = [stroke.when for stroke in self.played[n_begun : n_begun + 1]]
             until = min([end, *to_come, *(lift for lift in lifts if lift > self.now)])
             limit = {
@@ -361,8 +353,9 @@ class _Game:
                 try:
                     self._blow(fresh, {**rule, **limit})
                 except SimulationError as problem:
-                    names = " and ".join(str(i) for i in (*(stick.number for stick in self.sticks), *fresh))
-                    raise SimulationError(f"stroke {names} at {self.now:.4g} s: {problem}") from None
+                    raise SimulationError(
+                        f"stroke {' and '.join(map(str, on))} at {self.now:.4g} s: {problem}"
+                    ) from None
             over = self.hits[-1].history.status in (record.FINISHED, record.SETTLED)
             if (over and not to_come) or not self._go_on(until, over):
                 return
@@ -388,7 +381,7 @@ class _Game:
         found = []
         for i, stick in enumerate(self.sticks):
             stroke = self.played[stick.number]
-            if _lift(stroke) <= self.now and not state.force[i].any():
+            if stroke.lifted <= self.now and not state.force[i].any():
                 continue
             if stroke.contact.remembers:
                 raise ValueError(
@@ -400,36 +393,33 @@ class _Game:
 
     def _blow(self, fresh: list[int], rule: dict[str, Any]) -> None:
         """Run the strikers still on the body together with those that arrive now."""
-        moving = bool(self.error or self.q.any() or self.p.any())
         if not self.sticks and len(fresh) == 1:
             one = self.played[fresh[0]]
             start = None
-            if moving:
+            if self.error or self.q.any() or self.p.any():
                 start = State(0.0, (self.modes,), (self.q,), (self.p,), np.zeros((0, 2)), self.error)
             blow = partial(
                 collision.strike, self.modes, one.striker, one.contact, at=one.at, speed=one.speed, start=start
             )
-            hit = planner.within(rule["tolerance"], blow(**rule), blow, rule)
+            hit = audit.audited(planner.struck(blow, rule))
             assert hit.striker is not None
             none = np.zeros(0)
             self.sticks = [_Stick(fresh[0], hit.striker, none, none, np.zeros(2))]
-            self._keep(audit.audited(hit), (fresh[0],))
-            return
-        sticks = [*self.sticks, *(self._arriving(i, rule) for i in fresh)]
-        laws = tuple(self.played[stick.number].contact for stick in sticks)
-        touches = [
-            Touch(law, i, len(sticks), stick.striker.at[None], self.played[stick.number].at[None])
-            for i, (law, stick) in enumerate(zip(laws, sticks))
-        ]
-        bodies = (*(stick.striker.body for stick in sticks), self.modes)
-        q, p = (*(stick.q for stick in sticks), self.q), (*(stick.p for stick in sticks), self.p)
-        forces = np.array([stick.force for stick in sticks])
-        start = State(0.0, bodies, q, p, forces, self.error, None, laws)
-        pushes = [stick.striker.push for stick in sticks]
-        blow = partial(collision.met, bodies, touches, start=start, pushes=pushes)
-        hit = planner.within(rule["tolerance"], blow(**rule), blow, rule)
-        self.sticks = sticks
-        self._keep(hit, tuple(stick.number for stick in sticks))
+        else:
+            sticks = [*self.sticks, *(self._arriving(i, rule) for i in fresh)]
+            laws = tuple(self.played[stick.number].contact for stick in sticks)
+            touches = [
+                Touch(law, i, len(sticks), stick.striker.at[None], self.played[stick.number].at[None])
+                for i, (law, stick) in enumerate(zip(laws, sticks))
+            ]
+            bodies = (*(stick.striker.body for stick in sticks), self.modes)
+            q, p = (*(stick.q for stick in sticks), self.q), (*(stick.p for stick in sticks), self.p)
+            forces = np.array([stick.force for stick in sticks])
+            start = State(0.0, bodies, q, p, forces, self.error, None, laws)
+            pushes = [stick.striker.push for stick in sticks]
+            hit = planner.struck(partial(collision.met, bodies, touches, start=start, pushes=pushes), rule)
+            self.sticks = sticks
+        self._keep(hit, tuple(stick.number for stick in self.sticks))
 
     def _arriving(self, number: int, rule: dict[str, Any]) -> _Stick:
         """A striker at the surface, wherever that is now, with the modes that it needs."""

@@ -1,4 +1,8 @@
-"""Strike again with other frequencies, damping or contact, and say how much each quantity changes."""
+"""Strike again with other frequencies, damping or contact, and say how much each quantity changes.
+
+Every doubt about the model is examined alike: where it does not apply, it `Doubt.holds`; else the blow is struck again
+with the better model, which is `Doubt.judged` to change it so much; what that takes may be `Doubt.unknown`.
+"""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
@@ -10,6 +14,7 @@ import numpy as np
 from .._base.check import SimulationError
 from .._base.rounding import SAME
 from ..impact import accuracy, distance
+from ..impact.assumption import Assumption
 from ..impact.compiled import layout
 from ..impact.engine import again
 from ..impact.history import History
@@ -22,23 +27,18 @@ from .bending import Bending, Known, bending, known
 class Struck:
     """A finished blow, with what is known of its bodies, ready to be struck again."""
 
-    hit: Response
+    hit: Response  # before the blow, that on a wall
+    bodies: tuple[Modes, Modes]  # striker and target
     target: Known | None  # None if its shapes are not known
     striker: Known | None
     ideal: str = ""  # "rigid" or "infinite" if the target was simplified so
     clearance: float | None = None  # [m] from the strike point to the nearest edge; None if it is not known
-    place: np.ndarray | None = None  # (1, dimension) [m] strike point on the target
-    planned: tuple[Modes, Modes] | None = None  # striker and target before their blow: `hit` is one on a wall instead
+    place: np.ndarray | None = None  # (1, dimension) [m] strike point on the target, before the blow
 
     @property
     def foreseen(self) -> bool:
         """Whether the blow is yet to come: nothing is struck again."""
-        return self.planned is not None
-
-    @property
-    def bodies(self) -> tuple[Modes, Modes]:
-        """Striker and target."""
-        return self.planned or (self.hit.bodies[0], self.hit.bodies[-1])
+        return self.place is not None
 
     @cached_property
     def bending(self) -> Bending | None:
@@ -70,12 +70,20 @@ class Struck:
         return self.hit.body_slice(len(self.hit.bodies) - 1)
 
     @cached_property
-    def energy(self) -> np.ndarray:
+    def end(self) -> float:
+        """When the last impact ends [s], or the run where there is none."""
+        return max((impact.end for impact in self.hit.impacts), default=self.hit.history.end_time)
+
+    def energy_in(self, columns: slice) -> np.ndarray:
+        """Energy [J] of some modes after the last impact, without rigid motions."""
+        q, p = (x[0, columns] for x in self.hit.history.states(np.array([self.end])))
+        omega = self.hit.history.omega[columns]
+        return np.where(omega > 0.0, 0.5 * (p**2 + (omega * q) ** 2), 0.0)
+
+    @cached_property
+    def target_energy(self) -> np.ndarray:
         """Energy [J] of each of the target's modes after the last impact, without rigid motions."""
-        h = self.hit.history
-        q, p = h.states(np.array([max((impact.end for impact in self.hit.impacts), default=0.0)]))
-        found = 0.5 * (p[0, self.mine] ** 2 + (h.omega[self.mine] * q[0, self.mine]) ** 2)
-        return np.where(h.omega[self.mine] > 0.0, found, 0.0)
+        return self.energy_in(self.mine)
 
     @cached_property
     def before(self) -> Response:
@@ -83,7 +91,7 @@ class Struck:
         return replace(self.hit, history=again(self.hit.history), audit=None)
 
     def changes(self, **changed: Any) -> dict[str, float | None]:
-        """Change of each quantity, as `distance.of_blows`; None if that blow fails. Of the sound see `heard`, too.
+        """Change of each quantity, as `distance.of_blows`; None if that blow fails. Of the sound see `add_sound`, too.
 
         ``changed`` are fields of the history.
         """
@@ -104,34 +112,62 @@ class Struck:
             return dict.fromkeys(self.quantities)
         return {**distance.of_blows(after, before, self.hit.quantities)}
 
-    def of_target(self, values: np.ndarray, name: str = "omega") -> np.ndarray:
+    def with_target(self, values: np.ndarray, name: str = "omega") -> np.ndarray:
         """A field of the history with the target's part replaced."""
         whole = getattr(self.hit.history, name).copy()
         whole[..., self.mine] = values
         return whole
 
-    def heard(
-        self, effect: dict[str, float | None], shift: Callable[[Modes, Bending | None], Any]
+    def add_sound(
+        self, effect: dict[str, float | None], shift: Callable[[Known, Bending], np.ndarray | None]
     ) -> dict[str, float | None]:
         """The effect with that on the sound: the relative shift of the frequencies heard, weighted by their energy.
 
-        ``shift`` returns it, (n_modes,) [-], for modes and their integrals.
+        ``shift`` returns it, (n_modes,) [-], for a body and the integrals of its shapes; None if it is not known.
         """
-        result = dict(effect)
-        if "sound" not in self.hit.quantities:
-            return result
+        if "sound" not in effect:
+            return effect
         modes = self.hit.target
-        integrals = self.bending
+        body, integrals = self.target, self.bending
         if modes is not self.hit.bodies[-1]:
-            from_modes = known(modes)
-            integrals = None if from_modes is None else bending(from_modes)
-        end = max((impact.end for impact in self.hit.impacts), default=0.0)
-        energy = self.hit.modal_energy([end])[0]
+            body = known(modes)
+            integrals = None if body is None else bending(body)
+        energy = self.hit.modal_energy([self.end])[0]
         band = self.hit.quantities["sound"] or np.inf
         energy = np.where((modes.omega > 0.0) & (modes.frequencies <= band), energy, 0.0)
-        moved = shift(modes, integrals)
-        result["sound"] = None if moved is None else float(energy @ np.abs(moved) / (energy.sum() or 1.0))
-        return result
+        moved = None if body is None or integrals is None else shift(body, integrals)
+        sound = None if moved is None else float(energy @ np.abs(moved) / (energy.sum() or 1.0))
+        return {**effect, "sound": sound}
+
+
+@dataclass(frozen=True)
+class Doubt:
+    """One doubt about the model: the assumption, the number that decides and its limit, and how it is answered."""
+
+    name: str  # one of `assumption.ALL`
+    number: str  # one of `assumption.READINGS`
+    limit: float | None  # from which on the assumption is doubtful
+    missing: str = ""  # remedy where the body is not known well enough
+
+    def holds(self, struck: Struck) -> Assumption:
+        """It does not apply: the blow has the better model, or nothing that could be modelled better."""
+        effect = dict.fromkeys(struck.quantities, 0.0)
+        return Assumption(self.name, None, None, effect, struck.quantities, "", self.number)
+
+    def judged(
+        self, struck: Struck, value: float | None, effect: Mapping[str, float | None], remedy: str, **more: Any
+    ) -> Assumption:
+        """The number that decides, what the better model changes, and the remedy; ``more`` as of `Assumption`."""
+        if effect.get("sound", 0.0) is None and not more:
+            remedy, more = self.missing or remedy, {"unknown": "the section of the modes that are heard"}
+        return Assumption(self.name, value, self.limit, effect, struck.quantities, remedy, self.number, **more)
+
+    def unknown(
+        self, struck: Struck, why: str, remedy: str = "", value: float | None = None, stated: bool = False
+    ) -> Assumption:
+        """What the better model changes is not known; ``stated`` as of `Assumption`."""
+        effect = dict.fromkeys(struck.quantities)
+        return self.judged(struck, value, effect, remedy or self.missing, unknown=why, stated=stated)
 
 
 def softer(history: History, compliance: float) -> dict[str, np.ndarray]:

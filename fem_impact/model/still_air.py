@@ -12,16 +12,16 @@ Cremer, Heckl and Petersson (2005), Structure-Borne Sound, ch. 6; Leppington, Br
 London A 382, 245-271; Wallace (1972), J. Acoust. Soc. Am. 51, 946-952.
 """
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
 from ..impact.assumption import Assumption
 from ..modes.air import DENSITY, SPEED
-from ..modes.modal import Modes
-from .bending import Bending, Known, known
-from .restrike import Struck
-from .thinness import plane_wave, wavenumber
+from .bending import Bending, Known
+from .restrike import Doubt, Struck
+from .thinness import wavenumber
 
 # [-] mass of the air over that of the body at which frequencies drop by 1 %; a damping ratio so large takes a fifth of
 # the energy in each period
@@ -30,72 +30,55 @@ LIMIT = 0.02
 ROUNDED = 0.1
 RIM = 0.5  # [-] of perimeter / (k area): the air that a finite plate moves beside its waves; with SWELL within 11 %
 SWELL = 0.6  # [-] of (int w)**2 / (area int w**2): what its volume adds (`fi.in_air`, five rectangles and two disks)
-NUMBER = "mass of the air moved over that of the body"
-RADIATED = "damping ratio by the sound radiated, beyond that stated"
 IN_AIR = 'take the modes in air: air = "both sides" under [target], or `fi.in_air`'
+CARRIED = Doubt("still air", "mass of the air moved over that of the body", LIMIT, "give material and section")
+RADIATED = replace(CARRIED, number="damping ratio by the sound radiated, beyond that stated")
 
 
-def of_target(struck: Struck) -> Assumption:
+def examine_air(struck: Struck) -> Assumption:
     """The struck body."""
-    body, quantities = struck.target, struck.quantities
-    plate = body is None or body.modes.dimension == 2
-
-    def told(value: float | None, effect: dict, unknown: str = "", number: str = NUMBER) -> Assumption:
-        remedy = "give material and section" if unknown else IN_AIR if plate else "the air around beams is not modelled"
-        return Assumption("still air", value, LIMIT, effect, quantities, remedy, number, unknown)
-
-    if struck.bodies[1].air:
-        return Assumption("still air", None, None, dict.fromkeys(quantities, 0.0), quantities, "", NUMBER)
-    if struck.bodies[1].dimension == 0 or struck.ideal == "rigid":
-        return told(None, dict.fromkeys(quantities, 0.0))
-    if struck.foreseen:
-        return told(*_ahead(struck, body))
-    history, mine = struck.hit.history, struck.mine
-    if struck.ideal:
-        section = None if body is None else body.plate
-        if section is None or body is None:
-            return told(None, dict.fromkeys(quantities), "the waves of the body")
-        mass = 2.0 * DENSITY / (body.per_extent * plane_wave(section, struck.omega))
+    body, modes = struck.target, struck.bodies[1]
+    if modes.air or modes.dimension == 0 or struck.ideal == "rigid":
+        return CARRIED.holds(struck)
+    remedy = IN_AIR if modes.dimension == 2 else "the air around beams is not modelled"
+    history, mine, integrals = struck.hit.history, struck.mine, struck.bending
+    if struck.foreseen or struck.ideal:  # the air along the waves of the contact's own frequency
+        wave = None if body is None else wavenumber(body, integrals, struck.omega)
+        if body is None or wave is None:
+            return CARRIED.unknown(struck, "the waves of the body")
+        mass = _moved_along(body, wave)
+        if mass is None:
+            return CARRIED.unknown(struck, "the width of the body")
         row = history.shape[:, mine] / (1.0 + mass) ** 0.25
-        return told(mass, struck.changes(shape=struck.of_target(row, "shape")))
-    found = None if body is None or struck.bending is None else loading(body, struck.bending)
+        return CARRIED.judged(struck, float(mass), struck.changes(shape=struck.with_target(row, "shape")), remedy)
+    found = None if body is None or integrals is None else loading(body, integrals)
     if found is None:
-        why = "the shapes of the body" if body is None else "the width of the body"
-        return told(None, dict.fromkeys(quantities), why)
+        return CARRIED.unknown(struck, "the shapes of the body" if body is None else "the width of the body")
     carried, sound = found
     changed = {
-        "omega": struck.of_target(history.omega[mine] / np.sqrt(1.0 + carried)),
-        "shape": struck.of_target(history.shape[:, mine] / np.sqrt(1.0 + carried), "shape"),
-        "zeta": struck.of_target(np.maximum(history.zeta[mine], sound), "zeta"),
+        "omega": struck.with_target(history.omega[mine] / np.sqrt(1.0 + carried)),
+        "shape": struck.with_target(history.shape[:, mine] / np.sqrt(1.0 + carried), "shape"),
+        "zeta": struck.with_target(np.maximum(history.zeta[mine], sound), "zeta"),
     }
 
-    def shift(modes: Modes, integrals: Bending | None) -> np.ndarray | None:
-        of = known(modes)
-        loaded = None if of is None or integrals is None else loading(of, integrals)
+    def shift(body: Known, integrals: Bending) -> np.ndarray | None:
+        loaded = loading(body, integrals)
         return None if loaded is None else 1.0 - 1.0 / np.sqrt(1.0 + loaded[0])
 
-    effect = struck.heard(struck.changes(**changed), shift)
-    weight = struck.energy.sum()
-    beyond = np.maximum(sound - history.zeta[mine], 0.0)
-    mass, radiated = (float(struck.energy @ each / weight) if weight else 0.0 for each in (carried, beyond))
-    unknown = "the shapes heard" if effect.get("sound", 0.0) is None else ""
-    return told(mass, effect, unknown) if mass >= radiated else told(radiated, effect, unknown, RADIATED)
+    effect = struck.add_sound(struck.changes(**changed), shift)
+    weight = struck.target_energy / (struck.target_energy.sum() or 1.0)
+    mass, radiated = float(weight @ carried), float(weight @ np.maximum(sound - history.zeta[mine], 0.0))
+    doubt = CARRIED if mass >= radiated else RADIATED
+    return doubt.judged(struck, max(mass, radiated), effect, remedy)
 
 
-def _ahead(struck: Struck, body: Known | None) -> tuple[float | None, dict, str]:
-    """What is known before the blow: the mass of the air along the waves of the contact's own frequency."""
-    wave = None if body is None else wavenumber(body, struck.bending, struck.omega)
-    if body is None or wave is None:
-        return None, {}, "the waves of the body"
+def _moved_along(body: Known, wave: Any) -> Any:
+    """Mass of the air over that of a body with waves of some wavenumbers [rad/m]; None for a beam of unknown width."""
+    both = 2.0 * DENSITY / (body.per_extent * wave)
     if body.modes.dimension == 2:
-        return 2.0 * DENSITY / (body.per_extent * wave), {}, ""
+        return both
     width = width_of(body)
-    return (None, {}, "the width of the body") if width is None else (float(_along(body, width, wave)), {}, "")
-
-
-def _along(body: Known, width: float, wave: Any) -> Any:
-    """Mass of the air over that of a beam of a width [m] whose waves have some wavenumbers [rad/m]."""
-    return np.minimum(0.25 * np.pi * DENSITY * width**2, 2.0 * DENSITY * width / wave) / body.per_extent
+    return None if width is None else np.minimum(0.25 * np.pi * DENSITY * width**2 / body.per_extent, width * both)
 
 
 def loading(body: Known, integrals: Bending) -> tuple[np.ndarray, np.ndarray] | None:
@@ -108,10 +91,9 @@ def loading(body: Known, integrals: Bending) -> tuple[np.ndarray, np.ndarray] | 
     moving = (omega > 0.0) & (integrals.wave > 0.0)
     k, k0 = np.where(moving, integrals.wave, 1.0), np.where(moving, omega, c) / c
     if body.modes.dimension == 1:
-        width = width_of(body)
+        mass, width = _moved_along(body, k), width_of(body)
         if width is None:
             return None
-        mass = _along(body, width, k)
         sound = 0.25 * np.pi * mass * (0.5 * k0 * width) ** 2
         return np.where(moving, mass, 0.0), np.where(moving, sound, 0.0)
     short = np.sqrt(np.maximum(k**2 - k0**2, ROUNDED * k**2))
@@ -134,11 +116,3 @@ def width_of(body: Known) -> float | None:
     if section is None or body.thickness is None:
         return None
     return body.per_extent / section.material.rho / body.thickness
-
-
-def coincidence(body: Known, integrals: Bending) -> float | None:
-    """Frequency [Hz] above which the bending waves are faster than sound, c**2 / (2 pi) k**2 / omega; None if rigid."""
-    moving = (body.modes.omega > 0.0) & (integrals.wave > 0.0)
-    if not moving.any():
-        return None
-    return float(SPEED**2 / (2.0 * np.pi) * np.median(integrals.wave[moving] ** 2 / body.modes.omega[moving]))

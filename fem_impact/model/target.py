@@ -40,7 +40,6 @@ FIRST_LOOK = 20  # [-] modes found first: enough to scale the body and to predic
 RIGID_MOTIONS = 3  # [-] fact: most that a free body has before its first flexible mode
 FIRST_FLEXIBLE = RIGID_MOTIONS + 1  # [-] fact: modes that hold a flexible one
 CLOSE = 1e-6  # [-] error of a frequency to which a body is scaled or designed: far below the tolerance of usual blows
-MESHES = 4  # [-] meshes remembered, to limit the memory: a plan counts the unknowns of two or three, its run uses them
 
 Watch = Callable[[str], AbstractContextManager[Any]]
 # Says where an error comes from; takes "mesh", "supports" or another part of a scene, and the names of what was changed
@@ -231,11 +230,13 @@ class Target:
 
     @cached_property
     def _meshes(self) -> Remembered:
-        return Remembered(MESHES)
+        return Remembered(
+            4
+        )  # to limit the memory: a plan counts the unknowns of two or three meshes, its run uses them
 
     @cached_property
     def _counts(self) -> Remembered:
-        return Remembered(MESHES)
+        return Remembered(4)
 
     def _meshed(self, size: float, stages: Stages) -> Mesh:
         """The mesh with elements of another size [m]."""
@@ -266,13 +267,15 @@ class Target:
 
     def near(self, at: np.ndarray, elements: Elements, stages: Stages) -> System:
         """The body assembled with elements that shrink towards points (n_points, 2) [m]."""
-        assert self.mesh is not None and self.section is not None
-        mesh, graded = self._meshed(elements.size, stages), self.system is None or self.system.graded
+        graded = self.system is None or self.system.graded
+        how = {"near": at, "coarseness": elements.at_blow, "graded": graded}
+        return self._assembled(self._meshed(elements.size, stages), stages, **how)
+
+    def _assembled(self, mesh: Mesh, stages: Stages, **how: Any) -> System:
+        assert self.section is not None
         with stages("assembly"), self.blame("supports"), np.errstate(all="ignore"):
-            return assemble(
-                mesh, self.section, dict(self.supports), point_masses=self.point_masses,
-                point_supports=self.point_supports, near=at, coarseness=elements.at_blow, graded=graded,
-            )  # fmt: skip
+            masses, posts = self.point_masses, self.point_supports
+            return assemble(mesh, self.section, dict(self.supports), point_masses=masses, point_supports=posts, **how)
 
     def find(
         self,
@@ -335,17 +338,14 @@ class Target:
 
     def assembled(self, stages: Stages, size: float | None = None) -> System:
         """The assembled body, with elements of the given size [m] or the mesh's own."""
-        assert self.mesh is not None and self.section is not None
+        assert self.mesh is not None
         mesh = self.mesh
         if size is not None:
             with stages("mesh"), self.blame("mesh"):
                 mesh = mesh.refined(max(SAME, mesh.size / check.positive("size", size, "m")))
         if self.system is not None:
             return self.system if size is None else reassemble(self.system, mesh)
-        with stages("assembly"), self.blame("supports"), np.errstate(all="ignore"):
-            held, posts = dict(self.supports), self.point_supports
-            masses = self.point_masses
-            return assemble(mesh, self.section, held, theory=self.theory, point_masses=masses, point_supports=posts)
+        return self._assembled(mesh, stages, theory=self.theory)
 
 
 def _squared_wave(bending: Any, tension: float, inertia: Any, frequency: float) -> Any:

@@ -17,21 +17,18 @@ from ..impact.assumption import Assumption, allowed
 from ..impact.compiled import layout
 from .bending import Bending, Known
 from .deflection import OTHER
-from .restrike import Struck, softer
+from .restrike import Doubt, Struck, softer
 
 LIMIT = 0.23  # [-] thickness times wavenumber at which a wave is 1 % too fast for nu = 0.3
-# [-] thickness times wavenumber beyond which a force is local to the contact: waves shorter than three thicknesses
-DENT = 2.0
-DOUBT = 0.2  # [-] drop of all frequencies by which a striker of unknown thickness is tried: a choice for a stout one
-# [-] what a plate gives by shear over what it gives by bending, at most: it is thinner than half its side
-SHEARED = 10.0
+# [-] drop of all frequencies by which a striker of unknown thickness is tried: a choice for a stout one
+DOUBT = 0.2
 NEAR = 10  # [-] modes next to a frequency that tell its wavenumber: some of them swing unlike waves, hardly all of ten
-NUMBER = "thickness times wavenumber"
 THICKER = 'take a thick plate, theory = "mindlin", or a softer contact'
 SLENDER = 'take a thick beam, theory = "timoshenko", or a softer contact'
 NO_SECTION = "the thickness is not stated; give material and section instead of mass and first frequency"
-MORLEY = "the shear forces of element 'morley'"
 NO_SLENDERNESS = "give the slenderness of a stick, or material and section of a bar"
+TARGET = Doubt("thin target", "thickness times wavenumber", LIMIT, NO_SECTION)
+STRIKER = Doubt("thin striker", "thickness times wavenumber", LIMIT, NO_SLENDERNESS)
 
 
 def lowered(thick: np.ndarray) -> np.ndarray:
@@ -39,65 +36,61 @@ def lowered(thick: np.ndarray) -> np.ndarray:
     return 1.0 / np.sqrt(1.0 + thick)
 
 
-def of_target(struck: Struck) -> Assumption:
+def examine_target(struck: Struck) -> Assumption:
     """The struck body."""
-    body, quantities = struck.target, struck.quantities
-
-    def told(value: float | None, effect: dict, unknown: str = "") -> Assumption:
-        plate = body is None or body.modes.dimension == 2
-        remedy = OTHER if unknown == MORLEY else NO_SECTION if unknown else THICKER if plate else SLENDER
-        return Assumption("thin target", value, LIMIT, effect, quantities, remedy, NUMBER, unknown)
-
-    if struck.bodies[1].dimension == 0 or struck.bodies[1].thick:
-        return Assumption("thin target", None, None, dict.fromkeys(quantities, 0.0), quantities, "", NUMBER)
-    if struck.ideal == "rigid" and not struck.foreseen and (body is None or body.thickness is None):
-        given = min(1.0, SHEARED * struck.hit.error.idealisation)  # at most
-        return Assumption("thin target", None, LIMIT, dict.fromkeys(quantities, given), quantities, NO_SECTION, NUMBER)
+    body, modes = struck.target, struck.bodies[1]
+    if modes.dimension == 0 or modes.thick:
+        return TARGET.holds(struck)
     if body is None or body.thickness is None:
-        return told(None, dict.fromkeys(quantities), "the thickness of the body")
+        if struck.ideal != "rigid" or struck.foreseen:
+            return TARGET.unknown(struck, "the thickness of the body")
+        # what it gives by shear is at most ten times what it gives by bending: it is thinner than half its side
+        most = min(1.0, 10.0 * struck.hit.error.idealisation)
+        return TARGET.judged(struck, None, dict.fromkeys(struck.quantities, most), NO_SECTION)
+    remedy = THICKER if modes.dimension == 2 else SLENDER
     if struck.foreseen:
-        return told(*_ahead(body, wavenumber(body, struck.bending, struck.omega)))
+        return _judged_by_wave(TARGET, struck, body, struck.bending, remedy)
     if struck.ideal:
-        return told(*_simplified(struck, body))
+        return _simplified(struck, body)
     integrals, history = struck.bending, struck.hit.history
     assert integrals is not None
-    if integrals.thick is None:
-        return told(None, dict.fromkeys(quantities), MORLEY)
-    wave = integrals.wave
-    weight = struck.energy.sum()
-    value = body.thickness * float(np.sqrt(struck.energy @ wave**2 / weight)) if weight else 0.0
-    assert integrals.rotary is not None
+    if integrals.thick is None or integrals.rotary is None:
+        return TARGET.unknown(struck, "the shear forces of element 'morley'", OTHER)
+    row = integrals.heavier(history.shape[:, struck.mine] / np.sqrt(1.0 + integrals.rotary))
     changed = {
-        "omega": struck.of_target(history.omega[struck.mine] * lowered(integrals.thick)),
-        "shape": struck.of_target(
-            integrals.heavier(history.shape[:, struck.mine] / np.sqrt(1.0 + integrals.rotary)), "shape"
-        ),
+        "omega": struck.with_target(history.omega[struck.mine] * lowered(integrals.thick)),
+        "shape": struck.with_target(row, "shape"),
     }
     if body.plate is not None and history.law[0, layout.COMPLIANCE] > 0.0:
-        changed |= softer(history, _give(struck, body, body.plate, integrals))
-    effect = struck.heard(struck.changes(**changed), lambda _, found: _heard(found))
-    unknown = "the thickness of the body" if effect.get("sound", 0.0) is None else ""
-    return told(value, effect, unknown)
+        # the residual compliance of the modes left out lacks their shear
+        changed |= softer(history, _shear_give(body.plate, body.thickness, float(integrals.wave[-1])))
+
+    def drop(_: Known, found: Bending) -> np.ndarray | None:
+        return None if found.thick is None else 1.0 - lowered(found.thick)
+
+    effect = struck.add_sound(struck.changes(**changed), drop)
+    return TARGET.judged(struck, body.thickness * integrals.mean_wave(struck.target_energy), effect, remedy)
 
 
-def _heard(found: Bending | None) -> np.ndarray | None:
-    return None if found is None or found.thick is None else 1.0 - lowered(found.thick)
+def _judged_by_wave(doubt: Doubt, struck: Struck, body: Known, integrals: Bending | None, remedy: str) -> Assumption:
+    """What is known before the blow."""
+    wave = wavenumber(body, integrals, struck.omega)
+    if wave is None or body.thickness is None:
+        return doubt.unknown(struck, "the waves of this body, without its modes")
+    return doubt.judged(struck, body.thickness * wave, {}, remedy)
 
 
 def _shear_give(plate: Plate, thickness: float, low: float) -> float:
-    """Deflection [m/N] by shear under a point force, between a wavenumber [rad/m] and that of a dent."""
-    return max(0.0, np.log(DENT / (thickness * low))) / (2.0 * np.pi * _shear(plate, thickness)) if low > 0.0 else 0.0
+    """Deflection [m/N] by shear under a point force, between a wavenumber [rad/m] and that of a dent.
+
+    Waves shorter than three thicknesses, k h = 2, are local to the contact.
+    """
+    return max(0.0, np.log(2.0 / (thickness * low))) / (2.0 * np.pi * _shear(plate, thickness)) if low > 0.0 else 0.0
 
 
 def _shear(plate: Plate, thickness: float) -> float:
     """Shear stiffness [N/m] for which an isotropic plate sinks under a point force as this one does."""
     return SHEAR * thickness * float(np.sqrt(np.prod(plate.material.transverse)))
-
-
-def _give(struck: Struck, body: Known, plate: Plate, integrals: Bending) -> float:
-    """Compliance [m/N] by shear that the residual compliance of the modes left out lacks."""
-    assert body.thickness is not None
-    return _shear_give(plate, body.thickness, float(integrals.wave[-1]))
 
 
 def plane_wave(section: Plate | Beam, omega: float) -> float:
@@ -121,18 +114,11 @@ def wavenumber(body: Known, integrals: Bending | None, omega: float) -> float | 
     return plane_wave(section, omega)
 
 
-def _ahead(body: Known, wave: float | None) -> tuple[float | None, dict[str, float | None], str]:
-    """What is known before the blow."""
-    if wave is None or body.thickness is None:
-        return None, {}, "the waves of this body, without its modes"
-    return body.thickness * wave, {}, ""
-
-
-def _simplified(struck: Struck, body: Known) -> tuple[float | None, dict[str, float | None], str]:
+def _simplified(struck: Struck, body: Known) -> Assumption:
     """A rigid body gives by shear alone; the mobility of an infinite plate rises as its waves get slower."""
     plate, history = body.plate, struck.hit.history
     if plate is None or body.thickness is None or callable(plate.thickness):
-        return None, dict.fromkeys(struck.quantities), "the waves of this body, without its modes"
+        return TARGET.unknown(struck, "the waves of this body, without its modes")
     wave = plane_wave(plate, struck.omega)
     value = body.thickness * wave
     changed = softer(history, _shear_give(plate, body.thickness, wave))
@@ -140,38 +126,28 @@ def _simplified(struck: Struck, body: Known) -> tuple[float | None, dict[str, fl
         D = plate.stiffness(np.zeros((1, 2)))[0]
         drop = value**2 / 12.0 + float(np.sqrt(D[0, 0] * D[1, 1])) * wave**2 / _shear(plate, body.thickness)
         # the modes of a wide plate get denser by the whole drop of omega**2, and so does the mobility
-        changed["shape"] = struck.of_target(history.shape[:, struck.mine] * np.sqrt(1.0 + drop), "shape")
-    return value, dict(struck.changes(**changed)), ""
+        changed["shape"] = struck.with_target(history.shape[:, struck.mine] * np.sqrt(1.0 + drop), "shape")
+    return TARGET.judged(struck, value, struck.changes(**changed), THICKER)
 
 
-def of_striker(struck: Struck) -> Assumption:
+def examine_striker(struck: Struck) -> Assumption:
     """A flexible striker: its own section, or if that is not known a trial with lower frequencies."""
-    hit, quantities, modes = struck.hit, struck.quantities, struck.bodies[0]
-    flexible = modes.omega > 0.0
-    if not modes.dimension or not flexible.any() or modes.thick:
-        return Assumption("thin striker", None, None, dict.fromkeys(quantities, 0.0), quantities, "", NUMBER)
-    body, omega = struck.striker, hit.history.omega.copy()
-    columns = hit.body_slice(0)
-    integrals = struck.striker_bending
+    hit, history, modes = struck.hit, struck.hit.history, struck.bodies[0]
+    if not modes.dimension or not (modes.omega > 0.0).any() or modes.thick:
+        return STRIKER.holds(struck)
+    body, integrals = struck.striker, struck.striker_bending
+    columns, omega, shape = hit.body_slice(0), history.omega.copy(), history.shape.copy()
     if body is None or body.thickness is None or integrals is None or integrals.thick is None:
         if struck.foreseen:
-            unknown = "the thickness of the striker"
-            return Assumption("thin striker", None, LIMIT, {}, quantities, NO_SLENDERNESS, NUMBER, unknown)
+            return STRIKER.unknown(struck, "the thickness of the striker")
         omega[columns] *= 1.0 - DOUBT
         effect = struck.changes(omega=omega)
         if max(np.inf if x is None else x for x in effect.values()) <= allowed(hit.tolerance):  # at most so much
-            return Assumption("thin striker", None, None, effect, quantities, NO_SLENDERNESS, NUMBER)
-        unknown = "the thickness of the striker, and the blow depends on its bending modes"
-        effect = dict.fromkeys(quantities)
-        return Assumption("thin striker", None, LIMIT, effect, quantities, NO_SLENDERNESS, NUMBER, unknown)
+            return STRIKER.judged(struck, None, effect, NO_SLENDERNESS)
+        return STRIKER.unknown(struck, "the thickness of the striker, and the blow depends on its bending modes")
     if struck.foreseen:
-        value, effect, unknown = _ahead(body, wavenumber(body, integrals, struck.omega))
-        return Assumption("thin striker", value, LIMIT, effect, quantities, SLENDER, NUMBER, unknown)
+        return _judged_by_wave(STRIKER, struck, body, integrals, SLENDER)
     omega[columns] *= lowered(integrals.thick)
-    h, shape = hit.history, hit.history.shape.copy()
     shape[:, columns] = integrals.heavier(shape[:, columns])
-    end = h.states(np.array([max((impact.end for impact in hit.impacts), default=0.0)]))
-    energy = 0.5 * (end[1][0, columns] ** 2 + (h.omega[columns] * end[0][0, columns]) ** 2) * flexible
-    weighed = body.thickness * float(np.sqrt(energy @ integrals.wave**2 / (energy.sum() or 1.0)))
-    effect = dict(struck.changes(omega=omega, shape=shape))
-    return Assumption("thin striker", weighed, LIMIT, effect, quantities, SLENDER, NUMBER)
+    value = body.thickness * integrals.mean_wave(struck.energy_in(columns))
+    return STRIKER.judged(struck, value, struck.changes(omega=omega, shape=shape), SLENDER)

@@ -3,17 +3,16 @@
 import numpy as np
 
 from ..impact.assumption import Assumption
-from .restrike import Struck
+from .restrike import Doubt, Struck
 
 # [-] damping ratio tried, on the side of caution: bare metal has a hundredth of it, wood as much, felt more
 PLAUSIBLE = 0.01
-NUMBER = "damping ratio tried"
+DAMPING = Doubt("stated damping", "damping ratio tried", None)
 
 
-def of_both(struck: Struck) -> Assumption:
+def examine_damping(struck: Struck) -> Assumption:
     """The struck body, unless its damping is stated, and a flexible striker."""
-    hit, quantities = struck.hit, struck.quantities
-    zeta, unstated = hit.history.zeta.copy(), []
+    hit, zeta, unstated = struck.hit, struck.hit.history.zeta.copy(), []
     for name, body, modes in zip(("striker", "struck body"), (0, len(hit.bodies) - 1), struck.bodies):
         flexible = modes.omega > 0.0
         simple = body and struck.ideal and not struck.foreseen
@@ -22,12 +21,11 @@ def of_both(struck: Struck) -> Assumption:
             if not struck.foreseen:
                 zeta[hit.body_slice(body)] = np.where(flexible, PLAUSIBLE, 0.0)
     if not unstated:
-        return Assumption("stated damping", None, None, dict.fromkeys(quantities, 0.0), quantities, "", NUMBER)
+        return DAMPING.holds(struck)
     remedy = f"state the damping ratio of the {' and of the '.join(unstated)}"
     if struck.foreseen:
-        unknown = "what a damping that nobody stated would change"
-        return Assumption("stated damping", PLAUSIBLE, None, {}, quantities, remedy, NUMBER, unknown)
+        return DAMPING.unknown(struck, "what a damping that nobody stated would change", remedy, PLAUSIBLE)
     effect = struck.changes(zeta=zeta)
-    if "sound" in quantities:
-        effect["sound"] = 1.0 if "struck body" in unstated else effect["sound"]  # it would ring for ever
-    return Assumption("stated damping", PLAUSIBLE, None, effect, quantities, remedy, NUMBER)
+    if "sound" in effect and "struck body" in unstated:
+        effect["sound"] = 1.0  # it would ring for ever
+    return DAMPING.judged(struck, PLAUSIBLE, effect, remedy)

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from ..fe import point_load, refinement
+from ..fe.kirchhoff import ARGYRIS
 from ..fe.section import Plate
 from ..fe.splitting import DEPTH
 from ..impact.error import Error
@@ -20,7 +21,7 @@ from . import cost
 from .budget import NOTCH
 from .target import Elements, Stages, Target
 
-# the next five: value at a tolerance of 1e-2 or more, and power of 1e-2 / tolerance with which it grows
+# what follows from a tolerance: value at 1e-2 or more, and power of 1e-2 / tolerance with which it grows
 WAVES = 1.6, 0.37  # [-] highest frequency that the first mesh resolves, over that of the contact
 SHIFT = 6.0, 1.0 / 6.0  # [-] shift over the angular frequency of the contact: half or twice as much tells blows as well
 FIRST = 84, 0.22  # [-] vectors tried first: they resolve one undisturbed contact
@@ -30,22 +31,9 @@ FOLDED = 4.0, 0.6
 EXCITED = 12.0, 0.25
 # [-] vectors besides those that stand for modes: the dip under the load has no wavelength and takes its own
 FEWEST = 30
-MORE = 1.4  # [-] factor on the number of vectors: less gains too little for a run, more may overshoot
-# [-] divides what those of poorer descriptions may err: so little that two blows differ by the error of the poorer
-LESS_FOLDED = 16.0
-# [-] more vectors are given up if so many steps do not divide the error by 1 / 0.7, as one or two may fail by chance;
-# one blow is given twice as many while two descriptions do not agree on its impacts: that error is 1 until they do
-PATIENCE, LEAST_GAIN = 3, 0.7
-TRIES = 4  # [-] smaller sizes tried until a mesh has more elements than before: five times smaller in all
-AT_FAULT = 3.0  # [-] the mesh is refined if it errs so many times more than too few vectors, which its error contains
-# [-] a mesh with more than this part of the elements of another is no coarser: sizes 1.5 apart should leave 0.44
-ALIKE = 0.85
-# [-] ratio of the sizes at the blow of two meshes that are compared, where triangles halve: one halving more
-FLATTER = 2.0
 # [-] largest (size wave)**2 mass wave**2 / inertia of the triangles at the blow over the tolerance, see `elements_for`:
 # a blow on a hinged plate then errs by 2 % of it, whatever its other elements; test_vectors.py
 DIP = 60.0
-FLATTEST = 64.0  # [-] coarsest triangles at a blow; coarser ones were not tried
 MET = 0.9  # [-] of the allowed error, up to which an estimate suffices: some are a tenth too small (effectivity.py)
 MOST_VECTORS = 2000  # [-] to limit the memory: a mesh of 20 000 unknowns takes some 0.3 GB for so many
 
@@ -61,15 +49,15 @@ def usable(target: Target) -> bool:
     return not by_mode and (target.system is None or target.system.element == "argyris")
 
 
-def _strictness(tolerance: float) -> float:
-    return max(1.0, 1e-2 / tolerance)
+def _strict(rule: tuple[float, float], tolerance: float) -> float:
+    """What a rule gives at a tolerance, see `WAVES`."""
+    return rule[0] * max(1.0, 1e-2 / tolerance) ** rule[1]
 
 
 def first_count(target: Target, resonance: float, tolerance: float) -> int:
     """Number of vectors tried first; hardly more than there are modes that the contact may excite."""
-    strict = _strictness(tolerance)
-    modes = target.count_below(EXCITED[0] * strict ** EXCITED[1] * resonance / target.stretch)
-    return round(min(FIRST[0] * strict ** FIRST[1], FEWEST + modes))
+    modes = target.count_below(_strict(EXCITED, tolerance) * resonance / target.stretch)
+    return round(min(_strict(FIRST, tolerance), FEWEST + modes))
 
 
 def size_for(target: Target, resonance: float, tolerance: float) -> float:
@@ -78,8 +66,8 @@ def size_for(target: Target, resonance: float, tolerance: float) -> float:
     assert mesh is not None and isinstance(section, Plate)
     if target.size_stated:
         return mesh.size
-    highest = resonance * WAVES[0] * _strictness(tolerance) ** WAVES[1] / target.stretch
-    size = min(mesh.size, refinement.WAVE_PER_ELEMENT["argyris"] / target.wave(highest))
+    highest = resonance * _strict(WAVES, tolerance) / target.stretch
+    size = min(mesh.size, ARGYRIS.wave / target.wave(highest))
     if section.tension:
         stiffness = float(section.stiffness(mesh.points[mesh.cells].mean(axis=1))[:, 0, 0].max())
         size = min(size, refinement.layer_size(stiffness, section.tension, float(np.ptp(mesh.points, axis=0).max())))
@@ -95,13 +83,20 @@ def elements_for(target: Target, size: float, mass: float, resonance: float, tol
     assert target.mesh is not None
     wave, area = target.wave(resonance / target.stretch, tense=False), target.mesh.area
     allowed = (DIP * min(tolerance, 1e-2) * target.mass / (mass * wave**2 * area)) ** 0.5 / wave
-    return Elements(size, min(allowed / (DEPTH * area / target.mesh.perimeter), FLATTEST))
+    # triangles at a blow that are more than 64 times coarser were not tried
+    return Elements(size, min(allowed / (DEPTH * area / target.mesh.perimeter), 64.0))
+
+
+# [-] a mesh with more than this part of the elements of another is no coarser: sizes 1.5 apart should leave 0.44
+ALIKE = 0.85
+# [-] ratio of the sizes at the blow of two meshes that are compared, where triangles halve: one halving more
+FLATTER = 2.0
 
 
 def finer(target: Target, elements: Elements, stages: Stages) -> Elements:
-    """The next smaller elements: more of them, and smaller at the blow."""
+    """The next smaller elements: more of them, and smaller at the blow; at most five times smaller."""
     size, before = elements.size, target.n_cells(elements.size, stages)
-    for _ in range(TRIES):
+    for _ in range(4):
         size /= refinement.COARSER
         if ALIKE * target.n_cells(size, stages) >= before:
             break
@@ -116,17 +111,21 @@ def compared(target: Target, elements: Elements, stages: Stages) -> tuple[Elemen
     return finer(target, elements, stages), elements
 
 
-def hopeless(tried: list[float], patience: int = PATIENCE) -> bool:
-    """Whether the last ``patience`` steps towards more vectors gained nothing; takes the errors of all steps."""
-    return len(tried) > patience and min(tried[-patience:]) > LEAST_GAIN * min(tried[:-patience])
+def hopeless(tried: list[float], patience: int = 3) -> bool:
+    """Whether the last ``patience`` steps towards more vectors, of the errors of all, did not divide them by 1 / 0.7.
+
+    One or two may fail by chance.
+    """
+    return len(tried) > patience and min(tried[-patience:]) > 0.7 * min(tried[:-patience])
 
 
 def folded(found: Modes, cutoff: Callable[[Modes, float], float], margin: float) -> Modes:
     """The Ritz pairs up to ``cutoff``, as in `Seen.modes`; those above act as a spring.
 
-    The poorer descriptions keep more pairs, so that the difference of their blows tells what the spring costs too.
+    The poorer descriptions keep more pairs, whose spring errs 16 times less, so that the difference of their blows is
+    the error of the poorer one and tells what the spring costs, too.
     """
-    low, high = (cutoff(found, factor * margin) * (1.0 + 1e-9) for factor in (1.0, LESS_FOLDED))
+    low, high = (cutoff(found, factor * margin) * (1.0 + 1e-9) for factor in (1.0, 16.0))
     poorer = {
         cause: other.truncated(max_frequency=max(high, float(other.frequencies[0])))
         for cause, other in found.poorer.items()
@@ -159,10 +158,9 @@ class Seen:
         stages: Stages, shift: float | None = None, count: int | None = None,
     ) -> None:  # fmt: skip
         self.target, self.at, self.fixed, self.stages = target, np.atleast_2d(at), fixed, stages
-        strict = _strictness(tolerance)
-        self.shift = (shift or 2.0 * np.pi * resonance * SHIFT[0] * strict ** SHIFT[1]) / target.stretch
+        self.shift = (shift or 2.0 * np.pi * resonance * _strict(SHIFT, tolerance)) / target.stretch
         self.count = count or first_count(target, resonance, tolerance)
-        self.margin = FOLDED[0] * strict ** FOLDED[1]
+        self.margin = _strict(FOLDED, tolerance)
         self.whole, self.tried, self.spent = None, [], False
         self.elements, other = compared(target, elements, stages)
         if fixed and self.elements != elements:  # there are no larger elements to compare with
@@ -170,9 +168,12 @@ class Seen:
         self.fine, self.coarse = self._krylov(self.elements), self._krylov(other)
 
     def _stuck(self, truncation: float) -> bool:
-        """Whether the last steps towards more vectors gained nothing."""
+        """Whether the last steps towards more vectors gained nothing.
+
+        An error is 1 until two descriptions agree on the impacts of the blow, which may take twice as many steps.
+        """
         self.tried.append(truncation)
-        return hopeless(self.tried, PATIENCE if truncation < 1.0 else 2 * PATIENCE)
+        return hopeless(self.tried, 3 if truncation < 1.0 else 6)
 
     def _krylov(self, elements: Elements) -> Krylov:
         system = self.target.near(self.at, elements, self.stages)
@@ -203,10 +204,12 @@ class Seen:
         much = (error.truncation + error.mesh) / allowed if allowed > 0.0 else np.inf
         if much <= MET:
             return False
-        coarse = error.mesh > max(AT_FAULT * error.truncation, 0.5 * allowed)
+        # the error of the mesh contains that of too few vectors: it is at fault if it is three times as large
+        coarse = error.mesh > max(3.0 * error.truncation, 0.5 * allowed)
         self.spent = self.spent or (not coarse and (self.count >= MOST_VECTORS or self._stuck(error.truncation)))
         if not coarse and not self.spent:
-            self.count, self.margin = min(MOST_VECTORS, round(MORE * self.count)), NOTCH * self.margin
+            # less than 1.4 times as many gain too little for a run, more may overshoot
+            self.count, self.margin = min(MOST_VECTORS, round(1.4 * self.count)), NOTCH * self.margin
             return True
         more = self.fine.system.n_dofs * refinement.COARSER**2
         useless = self.spent and error.truncation > allowed

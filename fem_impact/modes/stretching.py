@@ -8,7 +8,7 @@ integral.
 
 It is the leading term: good for deflections up to about the thickness, where the frequency of a hinged square rises by
 half. Only the first 40 modes of a plate stretch, and 18 or more stress fields count: half as many of both change the
-restitution by 2e-4 at a deflection of one thickness (`studies/is_the_model_right.py`).
+restitution by 2e-4 at a deflection of one thickness (`studies/verification/is_the_model_right.py`).
 
 References
 ----------

@@ -1,5 +1,5 @@
 """HTML pages: a report of one blow, and a live page whose sliders change the blow.
 
-Start with `report`, which writes one self-contained page. `explore` serves the live page: `explore_session`
-answers its hand, with the words and numbers of `explore_numbers`; `explore_worker` computes beside it.
+Start with `report`, which writes one self-contained page. `explore` serves the live page by `explore_server`:
+`explore_session` answers its hand, with the words and numbers of `explore_numbers`; `explore_worker` computes beside.
 """

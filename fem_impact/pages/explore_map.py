@@ -10,13 +10,12 @@ from scipy import ndimage
 from .._base.check import SimulationError
 from ..impact import threshold
 from ..modes.modal import Modes
-from ..sweeps import batches, grid, refined
+from ..sweeps import batches, cases, refined
 from .explore_model import MAP_TOLERANCE, Settings, Setup, quick
 
 FIRST = {False: (25, 17), True: (13, 9)}  # [-] points of mass and stiffness at first, with True where blows take longer
 FINEST = 385  # [-] points of mass at most: about one per pixel of the picture
-CAUTIOUS = 30  # [-] points of mass below which neighbours of these blows are struck, too
-DRAFT = 3e-2  # [-] of the blows that are drawn first: borders move by a fifth of a pixel (studies/explore_speed.py)
+DRAFT = 3e-2  # [-] of the blows drawn first: borders move by a fifth of a pixel (studies/benchmarks/explore_speed.py)
 LIMITS = 97  # [-] hammers whose thresholds are found; their points are among these on the whole map
 MORE = 4  # [-] impacts from which on the map makes no difference
 NARROWEST = 1.001  # [-] ratio of the ends of an axis when zoomed in
@@ -65,23 +64,21 @@ class Mapper:
 
     def __init__(self, setup: Setup) -> None:
         self.setup = setup
-        self.about: tuple[Settings, Modes | None] | None = None  # settings and body that the kernels are of
+        self.about: tuple[Settings, Modes | None] | None = None  # settings and body that what follows is of
+        self.case: cases.Case  # with mass and stiffness of the scene
         self.kernels: batches.Kernels = {}
         self.limits: np.ndarray | None = None  # (LIMITS,) [Hz] threshold of hammers all along the map
 
-    def first(self, settings: Settings, window: Window, seen: Modes | None = None) -> Picture:
-        """The map in its coarsest form; the settings' mass and stiffness do not matter, ``seen`` as in `Setup.case`."""
-        case = self.setup.case(settings, seen=seen)
-        law = case.contact
+    def first(self, settings: Settings, window: Window, body: Modes | None = None) -> Picture:
+        """The map in its coarsest form; the settings' mass and stiffness do not matter, ``body`` as in `Setup.case`."""
+        self._begin(settings, body)
+        law = self.case.contact
         slow = bool(law.lossy or law.hard_stiffness or law.exponent < 1.0)
-        mass, stiffness = (
-            np.geomspace(*ends, count) for ends, count in zip((window.mass, window.stiffness), FIRST[slow])
-        )
+        mass, stiffness = (np.geomspace(*ends, n) for ends, n in zip((window.mass, window.stiffness), FIRST[slow]))
         x, y = (part.ravel() for part in np.meshgrid(mass, stiffness))
-        counts = self._counts(settings, seen, x, y, DRAFT).reshape(len(stiffness), len(mass))
-        felt = case.striker.felt_mass / case.striker.mass
-        found = self._thresholds(settings, seen, felt, mass)
-        there = [self.setup.case(replace(settings, mass=float(one), stiffness=1.0), seen=seen) for one in mass]
+        counts = self._counts(x, y, DRAFT).reshape(len(stiffness), len(mass))
+        found = self._thresholds(mass)
+        there = [self.setup.case(replace(settings, mass=float(one), stiffness=1.0), body=body) for one in mass]
         if law.hard_stiffness or law.remembers:  # as far as the map goes
             reached = [[self.setup.case(replace(settings, mass=float(m), stiffness=float(k))).resonance
                         for k in stiffness] for m in mass]  # fmt: skip
@@ -93,18 +90,19 @@ class Mapper:
         # contact resonance ~ stiffness**(1 / (exponent + 1))
         return Picture(mass, stiffness, counts, found, mass, ratio ** (settings.exponent + 1.0))
 
-    def finer(self, settings: Settings, picture: Picture, seen: Modes | None = None) -> Picture:
+    def finer(self, settings: Settings, picture: Picture, body: Modes | None = None) -> Picture:
         """The same map with twice as many points along each axis; blows are struck only where the counts differ.
 
         A patch smaller than a cell of the first two maps can be missed.
         """
+        self._begin(settings, body)
         coarse = picture.n_impacts
         squares = np.stack([coarse[:-1, :-1], coarse[:-1, 1:], coarse[1:, :-1], coarse[1:, 1:]])
         mixed = squares.min(axis=0) != squares.max(axis=0)
         rows, columns = (2 * n - 1 for n in coarse.shape)
         counts = np.repeat(np.repeat(coarse, 2, axis=0), 2, axis=1)[:rows, :columns]
         asked = np.zeros((rows, columns), bool)
-        if len(picture.mass) < CAUTIOUS:
+        if len(picture.mass) < 30:  # so coarse that neighbours of these blows are struck, too
             mixed = ndimage.binary_dilation(mixed, np.ones((3, 3)))
             for i in range(3):
                 for j in range(3):
@@ -116,11 +114,12 @@ class Mapper:
             asked[1::2, 1::2] = mixed
         mass, stiffness = (np.geomspace(v[0], v[-1], 2 * len(v) - 1) for v in (picture.mass, picture.stiffness))
         y, x = asked.nonzero()
-        counts[y, x] = self._counts(settings, seen, mass[x], stiffness[y], picture.tolerance)
+        counts[y, x] = self._counts(mass[x], stiffness[y], picture.tolerance)
         return replace(picture, mass=mass, stiffness=stiffness, n_impacts=counts)
 
-    def sharp(self, settings: Settings, picture: Picture, seen: Modes | None = None) -> Picture:
+    def sharp(self, settings: Settings, picture: Picture, body: Modes | None = None) -> Picture:
         """The same map up to the pixels, by borders located between neighbours and joined by straight lines."""
+        self._begin(settings, body)
         coarse = picture.n_impacts
         step = (FINEST - 1) // (coarse.shape[1] - 1)  # [pixel]
         rows, columns = (step * (n - 1) + 1 for n in coarse.shape)
@@ -134,7 +133,7 @@ class Mapper:
         for _ in range(step.bit_length() - 1):
             middle = (near + far) // 2
             y, x = (step * start + middle[:, None] * way).T
-            found = self._counts(settings, seen, mass[x], stiffness[y], picture.tolerance)
+            found = self._counts(mass[x], stiffness[y], picture.tolerance)
             same = found == coarse[tuple(start.T)]
             near, far = np.where(same, middle, near), np.where(same, far, middle)
         crossed = step * start + 0.5 * (near + far)[:, None] * way  # (n_crossed, 2) [pixel]
@@ -156,27 +155,27 @@ class Mapper:
             block[:] = np.where(side * side[0, 0] >= 0.0, here, other)
         return replace(picture, mass=mass, stiffness=stiffness, n_impacts=counts)
 
-    def surer(self, settings: Settings, picture: Picture, seen: Modes | None = None) -> Picture:
+    def surer(self, settings: Settings, picture: Picture, body: Modes | None = None) -> Picture:
         """The same map, its points beside another number struck again as all those of finer maps will be."""
+        self._begin(settings, body)
         counts = picture.n_impacts.copy()
         y, x = refined.beside_change(counts).nonzero()
-        counts[y, x] = self._counts(settings, seen, picture.mass[x], picture.stiffness[y], MAP_TOLERANCE)
+        counts[y, x] = self._counts(picture.mass[x], picture.stiffness[y], MAP_TOLERANCE)
         return replace(picture, n_impacts=counts, tolerance=MAP_TOLERANCE)
 
-    def _keep(self, settings: Settings, seen: Modes | None) -> Settings:
-        """The settings without their place on the map; forgets what is kept if they or the body are others."""
+    def _begin(self, settings: Settings, body: Modes | None) -> None:
+        """Forget what is kept if the settings, but for their place on the map, or the body are others."""
         settings = replace(settings, mass=self.setup.start.mass, stiffness=1.0)
-        if self.about is None or self.about[0] != settings or self.about[1] is not seen:
-            self.about, self.kernels, self.limits = (settings, seen), {}, None
-        return settings
+        if self.about is None or self.about[0] != settings or self.about[1] is not body:
+            self.about, self.case = (settings, body), self.setup.case(settings, body=body)
+            self.kernels, self.limits = {}, None
 
-    def _thresholds(self, settings: Settings, seen: Modes | None, felt: float, mass: np.ndarray) -> np.ndarray:
+    def _thresholds(self, mass: np.ndarray) -> np.ndarray:
         """Thresholds (n,) [Hz] of hammers (n,) [kg], interpolated between those found once for the whole map."""
-        settings = self._keep(settings, seen)
         along = np.geomspace(*self.setup.range("mass"), LIMITS)
         if self.limits is None:
-            case = self.setup.case(settings, seen=seen)
-            self.limits = threshold.thresholds(case.modes, case.at, felt * along)
+            felt = self.case.striker.felt_mass / self.case.striker.mass
+            self.limits = threshold.thresholds(self.case.modes, self.case.at, felt * along)
         place = np.interp(np.log(mass), np.log(along), np.arange(LIMITS))
         low, part = place.astype(int), place % 1.0
         near, far = self.limits[low], self.limits[np.minimum(low + 1, LIMITS - 1)]
@@ -184,22 +183,16 @@ class Mapper:
         ratio = np.divide(far, near, out=np.ones(len(mass)), where=some)
         return np.where(some, near * ratio**part, np.where(part < 0.5, near, far))
 
-    def _counts(
-        self, settings: Settings, seen: Modes | None, mass: np.ndarray, stiffness: np.ndarray, tolerance: float
-    ) -> np.ndarray:
+    def _counts(self, mass: np.ndarray, stiffness: np.ndarray, tolerance: float) -> np.ndarray:
         """Impacts (n,) of hammers (n,) with contacts (n,)."""
-        settings = self._keep(settings, seen)
         if not len(mass):
             return np.empty(0, np.int8)
-        case = self.setup.case(settings, seen=seen)
-        law, shared = case.contact, np.ones(len(mass))
+        case, law, shared = self.case, self.case.contact, np.ones(len(mass))
         hard = stiffness * law.stiffness
         lossy = law.loss > 0.0
         counts = np.full(len(mass), np.nan)
-        if (
-            grid.together({name: value * shared for name, value in vars(law).items()}).all()
-            and not case.modes.stretches
-        ):
+        laws = {name: value * shared for name, value in vars(law).items()}
+        if cases.batchable(laws).all() and not case.modes.stretches:
             family = {0: batches.Family.of(case.modes, case.at, case.striker, True, lossy)}
             blows = batches.Blows(
                 family, np.zeros(len(mass), int), case.modes.mass * shared, mass, hard, law.exponent * shared,

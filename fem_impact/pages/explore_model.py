@@ -21,24 +21,13 @@ from ..scenes.scene import Scene
 from ..scenes.schema import PATHS
 from ..sweeps import bodies, grid
 
-QUICK_STEPS, QUICK_IMPACTS = 16.0, 6  # [-] of the first answer to a slider: steps in a contact, and most contacts
 MAP_TOLERANCE = 1e-2  # [-] of the blows on the map, which only counts impacts
 FIRST_LOOK = 30  # [-] modes found first, to estimate the number needed
 MOST_MODES = 100  # [-] largest number; the residual compliance replaces the rest, and the page shows the error
 VECTORS = 1e-2  # [-] error limit of the vectors of a plate by elements: some seconds for each strike point
-MOST_UNKNOWNS = 10_000  # [-] of their mesh, besides the elements that shrink towards the blow
-SHARES = (
-    1.0,
-    0.75,
-    0.5,
-    0.25,
-    0.0,
-)  # [-] of the sliders' logarithmic way to the hardest blow that vectors are made for
 SPANS = {  # [-] slider end over the scene's value
     "thickness": 2.0, "mass": 20.0, "stiffness": 1000.0, "speed": 10.0, "bending": 20.0
 }  # fmt: skip
-MOST_DAMPING = 0.1  # [-] end of the slider
-EXPONENTS = (1.0, 3.0)  # [-] from a linear spring to a felt-covered head
 
 
 @dataclass(frozen=True)
@@ -68,15 +57,15 @@ class Setup:
     def of(cls, scene: Scene) -> "Setup":
         """The setup of a scene, with enough modes for its shortest blow, but at most `MOST_MODES`.
 
-        If vectors can tell the blows (`seen`), the first few modes do: they bridge the seconds until the vectors of a
-        new strike point are found.
+        If vectors can tell the blows, the first few modes do: they bridge the seconds until the vectors of a new strike
+        point are found.
         """
         plan = scene.plan(target="modal", n_modes=FIRST_LOOK)
         _, first = plan.description.found(Stages())
         at = np.atleast_1d(np.asarray(scene.blow.values["at"], float))
         case = grid.Case(first, scene.make_striker(), scene.make_contact(), at, float(scene.blow.values["speed"]))
         setup = cls(scene, scene.body(), case)
-        if setup.told:
+        if setup.by_vectors:
             return setup
         hard = replace(setup.start, stiffness=SPANS["stiffness"] ** 0.5, mass=setup.start.mass / SPANS["mass"] ** 0.5)
         needed = bodies.number_of_modes(first, bodies.needed_frequency(setup.case(hard), setup.tolerance))
@@ -110,9 +99,10 @@ class Setup:
     def range(self, name: str) -> tuple[float, float]:
         """Lowest and highest value of a slider."""
         if name == "exponent":
-            return min(EXPONENTS[0], self.start.exponent), max(EXPONENTS[1], self.start.exponent)
+            # from a linear spring to a felt-covered head
+            return min(1.0, self.start.exponent), max(3.0, self.start.exponent)
         if name == "damping":
-            return 0.0, max(MOST_DAMPING, 2.0 * self.start.damping)
+            return 0.0, max(0.1, 2.0 * self.start.damping)
         if name == "loss":
             return 0.0, max(1.0 / self.start.speed, 2.0 * (self.start.loss or 0.0))
         value = getattr(self.start, name)
@@ -127,17 +117,17 @@ class Setup:
         same = (unit / wanted) ** (settings.exponent + 1.0)  # contact time ~ stiffness**(-1 / (exponent + 1))
         return replace(law, stiffness=settings.stiffness * same, exponent=settings.exponent, loss=settings.loss or 0.0)
 
-    def case(self, settings: Settings, rest: float | None = None, seen: Modes | None = None) -> grid.Case:
+    def case(self, settings: Settings, rest: float | None = None, body: Modes | None = None) -> grid.Case:
         """The arguments of `strike`; raises ValueError if the strike point is not on the body.
 
         ``rest`` [m/N] replaces the residual compliance at the strike point: its static solution would take too long
-        while a slider moves. ``seen`` is the body as `seen` from that point, which replaces its modes.
+        while a slider moves. ``body`` is that of `body_seen` from that point, which replaces its modes.
         """
         case = replace(self.base.changed("mass", settings.mass), contact=self.law(settings))
         if settings.bending is not None:
             case = case.changed("striker_frequency", settings.bending)
-        if seen is not None:
-            case = replace(case, modes=seen)
+        if body is not None:
+            case = replace(case, modes=body)
         elif rest is not None:
             case = replace(case, modes=self._sampled(settings.at, rest))
         modes, ratio = case.modes, settings.thickness
@@ -154,17 +144,17 @@ class Setup:
         return replace(modes, shapes=SampledShapes(point, modes.shape_at(point), static))
 
     @property
-    def told(self) -> bool:
+    def by_vectors(self) -> bool:
         """Whether Ritz vectors can tell the blows, as far as is known without finding them."""
         return vectors.usable(self.scene.built.target) and bool(self.scene.blow.values.get("residual", True))
 
-    def seen(self, at: tuple[float, ...]) -> Modes | None:
+    def body_seen(self, at: tuple[float, ...]) -> Modes | None:
         """The body as blows at a point see it, by Ritz vectors; None if only modes can tell them.
 
         Made for blows between the softest and the hardest of the sliders, unless these ask for too fine a mesh.
         """
         target, start = self.scene.built.target, self.start
-        if not self.told:
+        if not self.by_vectors:
             return None
         point = self.base.modes.point("at", at)[0]
         case, unit = replace(self.base, at=point), self.base.contact.stiffness
@@ -176,10 +166,11 @@ class Setup:
             }  # fmt: skip
 
         assert target.mesh is not None
-        for share in SHARES:
+        # of the sliders' logarithmic way to the hardest blow that vectors are made for
+        for share in (1.0, 0.75, 0.5, 0.25, 0.0):
             hard = harder(share)
             size = vectors.size_for(target, case.with_values(hard).resonance, VECTORS)
-            if refinement.unknowns("argyris", target.mesh, size) <= MOST_UNKNOWNS:
+            if refinement.unknowns("argyris", target.mesh, size) <= 10_000:  # besides those nearest to the blow
                 masses = start.mass, start.mass * SPANS["mass"] ** (0.5 * share)
                 heavier = [{**harder(part * share), "mass": mass} for part in (0.0, 0.5, 1.0) for mass in masses]
                 sized = bodies.Sized(target, case, [hard, harder(-share)], heavier, VECTORS)
@@ -232,13 +223,13 @@ def blow(case: grid.Case, tolerance: float = collision.TOLERANCE) -> Response:
     return audited(hit)
 
 
-def quick(case: grid.Case, most: int = QUICK_IMPACTS) -> Response:
+def quick(case: grid.Case, most: int = 6) -> Response:
     """The same in a few milliseconds, whatever the case: in coarse steps, with few impacts and no mesh error."""
     law, mass = case.contact, case.striker.felt_mass
     wall = float(wall_time(acting_stiffness(law.numbers, 1.0 / mass, case.speed), law.exponent, 1.0 / mass, case.speed))
     return collision.strike(
         replace(case.modes, poorer={}), case.striker, law, at=case.at, speed=case.speed, tolerance=MAP_TOLERANCE,
-        scheme="A4", dt=wall / QUICK_STEPS, max_impacts=most,
+        scheme="A4", dt=wall / 16.0, max_impacts=most,
     )  # fmt: skip
 
 

@@ -3,11 +3,13 @@
 import base64
 import math
 import warnings
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
+from .._base import markup
 from .._base.check import SimulationError, ToleranceWarning
 from ..impact import force_spectrum
 from ..impact.quantities import rebound
@@ -25,7 +27,6 @@ from .explore_model import MAP_TOLERANCE, Settings, Setup, blow, limit_of, quick
 
 BAND = (20.0, 20e3)  # [Hz] of the spectrum: the audible range
 SPECTRUM_POINTS = 240  # [-] more points take time but show no more
-ROLLED = 1.5  # [s] of a roll, which then rings
 PLAYED = 2.0  # [s] of sound: short enough to compute at each press of the button
 KNOWN = 8  # [-] strike points remembered
 Point = tuple[float, ...]
@@ -37,7 +38,7 @@ class View:
     """The body as blows at one strike point see it."""
 
     rest: float  # [m/N] residual compliance of the modes
-    seen: Modes | None  # Ritz vectors, where these tell the blows
+    body: Modes | None  # Ritz vectors, where these tell the blows
 
 
 class Explorer:
@@ -48,7 +49,7 @@ class Explorer:
         self.views: dict[Point, View] = {}
         self.rest = setup.residual(setup.start.at)  # [m/N] of the last point known, good enough for a first answer
         self.limit: tuple[Any, float] = None, 0.0  # [Hz] the last threshold, and what it is of
-        if not setup.told:
+        if not setup.by_vectors:
             self.learn(setup.start.at, View(self.rest, None))
 
     def learn(self, at: Point, view: View) -> None:
@@ -60,13 +61,13 @@ class Explorer:
     def look(self, at: Point) -> View:
         """Find out what blows at a point see: seconds, if these are Ritz vectors."""
         if at not in self.views:
-            self.learn(at, View(self.setup.residual(at), self.setup.seen(at)))
+            self.learn(at, View(self.setup.residual(at), self.setup.body_seen(at)))
         return self.views[at]
 
     def case(self, settings: Settings) -> Case:
         """The blow, on the body as far as it is known."""
         view = self.views.get(settings.at)
-        return self.setup.case(settings, view.rest if view else self.rest, view.seen if view else None)
+        return self.setup.case(settings, view.rest if view else self.rest, view.body if view else None)
 
     def answer(self, settings: Settings) -> tuple[Message, Response | None]:
         """The blow in coarse steps: some 10 ms."""
@@ -86,14 +87,15 @@ class Explorer:
         resonance, limit = case.resonance, self.limit[1]
         message = {
             "resonance": resonance, "limit": limit if 0.0 < limit < math.inf else None,
-            "resonates": _resonates(resonance, limit), "scene": self._scene(settings),
+            "resonates": _resonates(resonance, limit),
+            "scene": markup.data_uri("application/toml", written(self.setup.saved(settings)).encode()),
         }  # fmt: skip
         return message | ({} if hit is None else _spectrum(hit))
 
     def judge(self, settings: Settings) -> Message:
         """The blow to the tolerance, and what the model itself errs by."""
         view = self.look(settings.at)
-        case = self.setup.case(settings, seen=view.seen)
+        case = self.setup.case(settings, body=view.body)
         try:
             hit = blow(case, self.setup.tolerance)
         except SimulationError as error:
@@ -104,26 +106,10 @@ class Explorer:
             "trusted": hit.trusted, "model": hit.model_verdict[1:],
         }  # fmt: skip
 
-    def picture(self, settings: Settings, window: Window) -> Picture:
-        """The map in its coarsest form."""
-        return self.mapper.first(settings, window, self._seen(settings))
-
-    def finer(self, settings: Settings, picture: Picture) -> Picture:
-        """The map with twice as many points."""
-        return self.mapper.finer(settings, picture, self._seen(settings))
-
-    def sharp(self, settings: Settings, picture: Picture) -> Picture:
-        """The map up to the pixels, its borders joined by straight lines."""
-        return self.mapper.sharp(settings, picture, self._seen(settings))
-
-    def surer(self, settings: Settings, picture: Picture) -> Picture:
-        """The map with the points beside its borders struck again by the tolerance of maps."""
-        return self.mapper.surer(settings, picture, self._seen(settings))
-
-    def _seen(self, settings: Settings) -> Modes | None:
-        """Ritz vectors of the strike point, if they are known."""
+    def map(self, settings: Settings, step: Callable[..., Picture], about: Window | Picture) -> Picture:
+        """A step of `Mapper` on the body as far as it is known: the first map of a window, or a better one."""
         view = self.views.get(settings.at)
-        return view.seen if view else None
+        return step(self.mapper, settings, about, view.body if view else None)
 
     def listen(self, settings: Settings, where: Point, height: float, rate: float | None) -> Message:
         """The blow, or ``rate`` [1/s] of them, as heard on the surface or ``height`` [m] above it."""
@@ -161,14 +147,10 @@ class Explorer:
         }
         return said | {letter: si(value, "m", 3) for letter, value in zip("xy", settings.at)}
 
-    def _scene(self, settings: Settings) -> str:
-        text = base64.b64encode(written(self.setup.saved(settings)).encode()).decode("ascii")
-        return f"data:application/toml;base64,{text}"
-
 
 def rolled(case: Case, rate: float) -> Strokes:
-    """A roll: the blow again and again, ``rate`` times a second, on the body as it then moves."""
-    when = np.arange(max(1, round(ROLLED * rate))) / rate
+    """A roll, which then rings: the blow again and again, ``rate`` times a second, on the body as it then moves."""
+    when = np.arange(max(1, round(0.75 * PLAYED * rate))) / rate
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", ToleranceWarning)
         return strokes(

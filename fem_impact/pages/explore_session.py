@@ -8,7 +8,7 @@ from typing import Any, Protocol
 
 from .._base.check import SimulationError
 from ..scenes.sentences import place
-from .explore_map import Picture, Window
+from .explore_map import Mapper, Picture, Window
 from .explore_model import Settings, Setup
 from .explore_numbers import Explorer, Message, Point, View, drawn
 from .explore_view import RATES, checked, ends, pair
@@ -198,8 +198,8 @@ class Session:
     async def _drawn(self, about: tuple[Any, ...], settings: Settings, window: Window) -> None:
         """One map by a rough tolerance: coarse, finer, and with sharp borders; then these are struck pixel by pixel."""
 
-        async def made(function: Callable[..., Picture], *arguments: Any) -> Picture:
-            found: Picture = await self._ask(self.mapper, function, settings, *arguments)
+        async def made(step: Callable[..., Picture], start: Window | Picture) -> Picture:
+            found: Picture = await self._ask(self.mapper, Explorer.map, settings, step, start)
             if about != self._about_map():
                 raise _Superseded
             return found
@@ -208,11 +208,11 @@ class Session:
             self.send({"kind": "map", "computing": not exact, "exact": exact, **drawn(picture)})
             return picture
 
-        picture = sent(await made(Explorer.finer, sent(await made(Explorer.picture, window))))
-        sent(await made(Explorer.sharp, picture))
-        picture = await made(Explorer.surer, picture)
+        picture = sent(await made(Mapper.finer, sent(await made(Mapper.first, window))))
+        sent(await made(Mapper.sharp, picture))
+        picture = await made(Mapper.surer, picture)
         while not picture.finest:
-            picture = await made(Explorer.finer, picture)
+            picture = await made(Mapper.finer, picture)
         sent(picture, exact=True)
 
     def _listen(self, roll: bool) -> None:

@@ -26,7 +26,6 @@ CARDS = {  # which sliders stand beside which picture
 }  # fmt: skip
 LOGARITHMIC = {"mass", "stiffness", "speed", "bending", "thickness"}
 STEPS = 400  # [-] per slider: about one per pixel
-HIGHEST = 3.0  # [m] of the listener above the plate; at zero the sound is the motion of the surface
 Ends = dict[str, tuple[float, float, float]]  # slider: lowest, highest and first value
 RATES = (2.0, 30.0, 12.0)  # [1/s] strokes of a roll: least, most and at first
 
@@ -38,7 +37,7 @@ def ends(setup: Setup) -> Ends:
     for letter, *three in zip("xy", low, high, setup.start.at):
         found[letter] = (float(three[0]), float(three[1]), float(three[2]))
     if setup.mesh.dimension == 2:
-        found["height"] = (0.0, HIGHEST, 0.0)
+        found["height"] = (0.0, 3.0, 0.0)  # [m] of the listener; at zero the sound is the motion of the surface
     for name in SLIDERS:
         value = getattr(setup.start, name, None)
         if name not in found and value is not None:

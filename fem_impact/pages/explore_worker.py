@@ -4,7 +4,6 @@ import logging
 import os
 import pickle
 import signal
-import subprocess
 import sys
 from collections.abc import Callable
 from concurrent.futures import Future, ThreadPoolExecutor
@@ -16,7 +15,6 @@ from .._base import child
 from .._base.check import SimulationError
 
 LOG = logging.getLogger(__name__)
-NICE = 10  # [-] the page and the browser go first where cores are short
 
 
 class Worker:
@@ -30,13 +28,9 @@ class Worker:
         self.held, self.ended, self.stopped = held, 0, False
         self.lock = Lock()  # between a new process and the end of all
         self.thread = ThreadPoolExecutor(1)
-        self._begin()
-        self.thread.submit(self._send, held)
-
-    def _begin(self) -> None:
         # not multiprocessing, which would run the user's script again in the new process
-        command, environment = child.python("pages.explore_worker:main")
-        self.process = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, env=environment)
+        self.process = child.begin("pages.explore_worker:main")
+        self.thread.submit(self._send, held)
 
     def ask(self, function: Callable[..., Any], *arguments: Any) -> "Future[Any]":
         """What ``function(held, *arguments)`` returns there; it raises ValueError and SimulationError here, too."""
@@ -49,13 +43,7 @@ class Worker:
             self.process.kill()
         self.process.wait()
         self.thread.shutdown(cancel_futures=True)
-        self._close()
-
-    def _close(self) -> None:
-        for pipe in (self.process.stdin, self.process.stdout):
-            assert pipe is not None
-            with suppress(BrokenPipeError):  # something was still to be sent
-                pipe.close()
+        child.end(self.process)
 
     def _send(self, message: Any) -> None:
         assert self.process.stdin is not None
@@ -80,10 +68,8 @@ class Worker:
         with self.lock:
             if self.stopped:
                 raise SimulationError("the process that computes beside the page has ended")
-            self.process.kill()  # it may only have lost its voice
-            status = self.process.wait()
-            self._close()
-            self._begin()
+            status = child.end(self.process)  # it may only have lost its voice
+            self.process = child.begin("pages.explore_worker:main")
         self.ended += 1
         LOG.warning("a process beside the page has ended (status %d), another one takes its place", status)
         self._send(self.held)
@@ -93,7 +79,7 @@ def main() -> None:
     """The process itself; ends with its input."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C reaches the whole group; the page's process then ends this
     if hasattr(os, "nice"):
-        os.nice(NICE)
+        os.nice(10)  # the page and the browser go first where cores are short
     # an answer that the page no longer takes is written once more as the pipe is closed
     with suppress(BrokenPipeError), os.fdopen(os.dup(sys.stdout.fileno()), "wb") as out:
         os.dup2(sys.stderr.fileno(), sys.stdout.fileno())  # nothing printed may get between the answers

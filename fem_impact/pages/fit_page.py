@@ -1,6 +1,5 @@
 """One page about a fit: pulses, residuals, profiles of the likelihood, double hits; its pictures alone too."""
 
-import base64
 import io
 from pathlib import Path
 from typing import Any
@@ -8,40 +7,31 @@ from typing import Any
 import numpy as np
 from scipy.stats import t
 
-from .._base import check
+from .._base import check, markup
 from .._base.check import SimulationError
 from .._base.files import replacing
 from ..scenes.sentences import si
 from ..show import export, figures, plots
-from ..show.figures import BLUE, GREEN, SKY, VERMILION
+from ..show.style import BLUE, GREEN, SKY, VERMILION, panels
 from ..taps.found import Found, along, differ, stated
 from ..taps.unknowns import unit_of
 from . import report
 
-TIMES = 10.0  # [-] residuals are drawn this much larger
-MOST_TAPS = 10  # [-] whose records are drawn: a screen holds no more
 MASSES, TIPS = (0.5, 1.0, 2.0), (0.1, 0.3, 1.0, 3.0, 10.0)  # [-] of the double-hit table, over those found
-WIDE = 4.0  # [-] last over first value of a profile from which on its axis is logarithmic
-AROUND = 0.8  # [-] of an interval, shown on either side of it
-SHOWN = 12.0  # [-] highest rise of a profile shown
 
 
 def pulses(found: Found) -> Any:
     """Measured and predicted force of each tap, and ten times the residual: a matplotlib figure."""
-    shown = found.used[:MOST_TAPS]
+    shown = found.used[:10]  # a screen holds no more
     columns = min(3, len(shown))
-    rows = -(-len(shown) // columns)
-    with figures.styled(3.2 * columns, 2.4 * rows) as figure:
-        all_axes = figure.subplots(rows, columns, squeeze=False, sharex=True).ravel()
+    with panels(len(shown), columns, 3.2, 2.4, sharex=True) as (figure, all_axes):
         for axes, tap in zip(all_axes, shown):
             one = found.predict(int(tap))
             axes.plot(1e3 * one.time, one.measured, ".", color=BLUE, ms=4, label="measured")
             axes.plot(1e3 * one.time, one.force, color=VERMILION, lw=1.0, label="model")
-            axes.plot(1e3 * one.time, TIMES * one.residual, color=GREEN, lw=0.9, label=f"residual x {TIMES:g}")
+            axes.plot(1e3 * one.time, 10.0 * one.residual, color=GREEN, lw=0.9, label="residual x 10")
             axes.set_title(f"{found.taps.labels[tap]}: {100 * one.error:.2g} % rms")
-        for axes in all_axes[len(shown) :]:
-            axes.set_visible(False)
-        for axes in all_axes[max(0, len(shown) - columns) : len(shown)]:
+        for axes in all_axes[-columns:]:
             axes.set_xlabel("time [ms]")
         all_axes[0].set_ylabel("force [N]")
         all_axes[0].legend(fontsize=8)
@@ -51,46 +41,36 @@ def pulses(found: Found) -> Any:
 def profiles(found: Found) -> Any:
     """The likelihood profile of every unknown; the level of the 90 % interval is dashed: a matplotlib figure."""
     names = found.names
-    columns = min(3, len(names))
-    rows = -(-len(names) // columns)
-    with figures.styled(3.2 * columns, 2.4 * rows) as figure:
-        all_axes = figure.subplots(rows, columns, squeeze=False, sharey=True).ravel()
+    level = t.ppf(0.95, next(iter(found.profiles.values())).freedom) ** 2  # [-] at the ends of the 90 % interval
+    with panels(len(names), min(3, len(names)), 3.2, 2.4, sharey=True) as (figure, all_axes):
         for axes, name in zip(all_axes, names):
             profile = found.profiles[name]
-            level = float(profile_level(found))
             axes.plot(profile.values, profile.rise, "o", color=BLUE, ms=3)
             axes.plot(*profile.curve(), color=BLUE, lw=1.2)
             axes.axhline(level, color=VERMILION, ls="--", lw=1.0)
             if profile.told != "open":
                 axes.axvspan(*profile.interval(), color=SKY, alpha=0.2, lw=0)
             low, high = _around(profile) if profile.told == "told" else (profile.values[0], profile.values[-1])
-            plots.set_ticks(axes, low, high, profile.log and high > WIDE * low)
+            plots.set_ticks(axes, low, high, profile.log and high > 4.0 * low)
             if high > low:
                 axes.set_xlim(low, high)
-            axes.set_ylim(0.0, SHOWN)
+            axes.set_ylim(0.0, 12.0)
             unit = unit_of(name)
             axes.set_title(f"{name}{f' [{unit}]' if unit else ''}")
             said = {"open": "not determined", "limited": "one limit only"}.get(profile.told)
             if said:
                 axes.text(0.5, 0.85, said, transform=axes.transAxes, ha="center", color=VERMILION)
-        for axes in all_axes[len(names) :]:
-            axes.set_visible(False)
         all_axes[0].set_ylabel("rise over noise variance")
     return figure
 
 
 def _around(profile: Any) -> tuple[float, float]:
-    """The interval of a profile and AROUND of it on either side."""
+    """The interval of a profile and 80 % of it on either side."""
     low, high = profile.interval()
     if profile.log:
-        wide = (high / low) ** AROUND
+        wide = (high / low) ** 0.8
         return low / wide, high * wide
-    return low - AROUND * (high - low), high + AROUND * (high - low)
-
-
-def profile_level(found: Found) -> float:
-    """Rise of a profile at the ends of the 90 % interval [-]."""
-    return float(t.ppf(0.95, next(iter(found.profiles.values())).freedom) ** 2)
+    return low - 0.8 * (high - low), high + 0.8 * (high - low)
 
 
 def spectrum(found: Found) -> Any:
@@ -162,4 +142,4 @@ def write(
 def _uri(figure: Any) -> str:
     file = io.BytesIO()
     figure.savefig(file, format="png", dpi=120, transparent=True)
-    return "data:image/png;base64," + base64.b64encode(file.getvalue()).decode("ascii")
+    return markup.data_uri("image/png", file.getvalue())

@@ -33,17 +33,10 @@ from ..scenes.sequence import Played
 from ..show import export, sampling, sound
 from ..show.figures import SPECTRUM_BAND
 
-LOBES = 3.0  # [-] the spectrum reaches at least LOBES / duration of the shortest impact
 SPECTRUM_POINTS = 1000  # [-] of the spectrum: about one per pixel of a wide page
-ENERGY_TIMES = 400  # [-] times at which the energies are drawn
-FRAMES = 72  # [-] frames of the wave: three seconds at 24 per second
-SHAPES = 12  # [-] mode shapes shown: more would double the size of the page
-DIGITS = 6  # [-] of the numbers in the plots; the downloads have full precision
 QUIET = -20.0  # [dB] re full scale: a quieter sound is offered again, amplified
 DISTANCE = 1.0  # [m] from the plate to the default listener
-PLAYED = 3.0  # [s] longest sound, to keep the page small
-MOST_PLAYED = 12.0  # [s] the same for a sequence
-LISTED = 40  # [-] blows of a sequence whose errors are listed
+PLAYED = 3.0  # [s] longest sound of a blow, to keep the page small; of a sequence it is four times as long
 BOUND = {"low": "estimate from below", "high": "estimate from above"}
 MOST_POINTS = 4  # [-] largest number of observation points with a sound player
 OPTIONS = {  # of `fem-impact strike`, by the argument of `Scene.run` that they stand for
@@ -125,7 +118,8 @@ def write(path: str | Path, scene: Scene, run: Run | Played) -> None:
         modes_end=si(float(response.target.frequencies[-1]), "Hz"),
         command=_command(scene, run),
         force_picture=_force_picture(response),
-        data=_script_text(_plots(response)),
+        # no "<" in the data can close the script element around it
+        data=json.dumps(export.plain(_plots(response)), allow_nan=False, separators=(",", ":")).replace("<", "\\u003c"),
         plotly=plotly.get_plotlyjs(),
         style=(WEB / "report.css").read_text(encoding="utf-8"),
         script=(WEB / "report.js").read_text(encoding="utf-8"),
@@ -180,7 +174,7 @@ def _of_strokes(scene: Scene, run: Played) -> dict[str, Any]:
         "words": (*noted(found.notes), body(scene, found.target), played, *laws),
         "strokes": strokes, "outcome": found.hits[-1].outcome, "error": found.error,
         "energy_error": max(hit.energy_error for hit in found.hits),
-        "budget": budget[:LISTED],
+        "budget": budget[:40],
         "model": f"The hardest, stroke {which}: {tidy(own.model_verdict[0])}",
         "trust": tuple(own.trust),
         "assumptions": [_assumption(each) for each in own.assumptions],
@@ -285,14 +279,10 @@ def _modelled(run: Run | Played, n_steps: int, scheme: str) -> list[tuple[str, s
 def _shares(energies: Mapping[str, float], called: Mapping[str, str]) -> list[dict[str, Any]]:
     total = sum(max(value, 0.0) for value in energies.values()) or 1.0
     return [
-        {
-            "name": called.get(name, name),
-            "key": name.replace("taken away", "striker"),
-            "joule": joule,
-            "part": max(joule, 0.0) / total,
-        }
+        {"name": called.get(name, name), "key": name.replace("taken away", "striker"), "joule": joule,
+         "part": max(joule, 0.0) / total}
         for name, joule in energies.items()
-    ]
+    ]  # fmt: skip
 
 
 def _force_picture(response: Response | Strokes) -> str:
@@ -337,27 +327,21 @@ def _sounds(scene: Scene, response: Response | Strokes) -> list[SoundPlayer]:
         stated = f"peak {samples.said}; full scale {samples.full_scale:g} {samples.unit}, as in every report"
         players.append(SoundPlayer(name, stated, audio(samples.samples, samples.rate)))
         if -math.inf < level < QUIET:
-            raised = samples.samples * 10.0 ** (-level / 20.0)
-            players.append(
-                SoundPlayer(
-                    name, f"the same sound amplified by {-level:.1f} dB to full scale", audio(raised, samples.rate)
-                )
-            )
+            raised = audio(samples.samples * 10.0 ** (-level / 20.0), samples.rate)
+            players.append(SoundPlayer(name, f"the same sound amplified by {-level:.1f} dB to full scale", raised))
     return players
 
 
 def _duration(response: Response | Strokes) -> float:
-    decay = response.target.damping_ratio * response.target.omega
-    slowest = float(decay[response.target.omega > 0.0].min(initial=np.inf))
-    rings = float(np.clip(sound.DECAY / slowest, sound.SHORTEST, PLAYED)) if slowest > 0.0 else PLAYED
-    return rings if isinstance(response, Response) else min(rings + float(np.ptp(response.starts)), MOST_PLAYED)
+    rings = sampling.ringing(response.target, response.target.omega > 0.0, (sound.SHORTEST, PLAYED))
+    return rings if isinstance(response, Response) else min(rings + float(np.ptp(response.starts)), 4.0 * PLAYED)
 
 
 def audio(samples: np.ndarray, rate: int) -> str:
     """A data URI with the samples as a 16-bit WAV file, for the page's player."""
     file = io.BytesIO()
     wavfile.write(file, rate, np.round(32767.0 * np.clip(samples, -1.0, 1.0)).astype(np.int16))
-    return _uri("audio/wav", file.getvalue())
+    return markup.data_uri("audio/wav", file.getvalue())
 
 
 @check.typed
@@ -382,18 +366,9 @@ def _downloads(scene: Scene, run: Run | Played) -> list[dict[str, str]]:
     texts = {"response.json": ("application/json", json.dumps(data, indent=2, allow_nan=False))}
     texts |= {name: ("text/csv", export.csv_text(**columns)) for name, columns in columns.items()}
     return [
-        {"name": name, "size": si(len(text.encode()), "B", 3), "uri": _uri(kind, text.encode())}
+        {"name": name, "size": si(len(text.encode()), "B", 3), "uri": markup.data_uri(kind, text.encode())}
         for name, (kind, text) in texts.items()
     ]
-
-
-def _uri(kind: str, raw: bytes) -> str:
-    return f"data:{kind};base64,{base64.b64encode(raw).decode('ascii')}"
-
-
-def _script_text(data: Mapping[str, Any]) -> str:
-    """JSON with ``<`` escaped, so that it cannot close the script element around it."""
-    return json.dumps(export.plain(data), allow_nan=False, separators=(",", ":")).replace("<", "\\u003c")
 
 
 def _plots(response: Response | Strokes) -> dict[str, Any]:
@@ -405,15 +380,11 @@ def _plots(response: Response | Strokes) -> dict[str, Any]:
     moving = (modes.omega > 0.0) & (modes.frequencies < 2.0 * frequencies[-1])
     own: dict[str, Any] = {}
     if isinstance(response, Response):
-        last, times = response.impacts[-1].end if response.impacts else 0.0, np.linspace(0.0, end, ENERGY_TIMES)
+        last, times = response.impacts[-1].end if response.impacts else 0.0, np.linspace(0.0, end, 400)
         rings = response.modal_energy([last])
-        energy = [response.modal_energy(times, body=body) for body in (0, -1)]
-        own["energy"] = {
-            "x": _short(times),
-            "striker": _short(energy[0].sum(axis=1)),
-            "body": _short(energy[1].sum(axis=1)),
-            "rest": _short(energy[0][0].sum() - energy[0].sum(axis=1) - energy[1].sum(axis=1)),
-        }
+        striker, body = (response.modal_energy(times, body=body).sum(axis=1) for body in (0, -1))
+        parts = {"x": times, "striker": striker, "body": body, "rest": striker[0] - striker - body}
+        own["energy"] = {name: _short(part) for name, part in parts.items()}
     else:
         rings = response.hits[-1].modal_energy([response.hits[-1].history.end_time])
     return own | {
@@ -421,21 +392,16 @@ def _plots(response: Response | Strokes) -> dict[str, Any]:
         "impacts": [[impact.start, impact.end] for impact in response.impacts],
         "spectrum": {"x": _short(frequencies), "y": _short(np.abs(response.spectrum(frequencies)))},
         "natural": _short(modes.frequencies[(modes.omega > 0.0) & (modes.frequencies <= frequencies[-1])]),
-        "mobility": {
-            "x": _short(known),
-            "y": _short(np.abs(spectra.mobility(modes, response.at, response.at, known))),
-        },
-        "modal": {
-            "x": _short(modes.frequencies[moving]),
-            "y": _short(rings[0, moving]),
-        },
+        "mobility": {"x": _short(known), "y": _short(np.abs(spectra.mobility(modes, response.at, response.at, known)))},
+        "modal": {"x": _short(modes.frequencies[moving]), "y": _short(rings[0, moving])},
         "view": _view(response, end),
     }
 
 
 def _frequencies(response: Response | Strokes) -> np.ndarray:
+    # the spectrum reaches at least three lobes of that of the shortest impact
     shortest = min((impact.duration for impact in response.impacts), default=1.0)
-    return np.geomspace(SPECTRUM_BAND[0], max(SPECTRUM_BAND[1], LOBES / shortest), SPECTRUM_POINTS)
+    return np.geomspace(SPECTRUM_BAND[0], max(SPECTRUM_BAND[1], 3.0 / shortest), SPECTRUM_POINTS)
 
 
 def _known(modes: Modes, frequencies: np.ndarray) -> np.ndarray:
@@ -449,10 +415,10 @@ def _view(response: Response | Strokes, end: float) -> dict[str, Any]:
     modes = response.target
     points, cells, surface = sampling.surface(modes)
     rows = modes.shapes.at(points)  # (n_points, n_modes), evaluated once: finding the elements is the slow part
-    times = np.linspace(0.0 if isinstance(response, Response) else float(response.time[0]), end, FRAMES)
+    times = np.linspace(0.0 if isinstance(response, Response) else float(response.time[0]), end, 72)  # three seconds
     wave = response.modal_state(times)[0] @ rows.T  # (n_times, n_points)
     assert response.at is not None
-    count = min(SHAPES, modes.n_modes)
+    count = min(12, modes.n_modes)  # more would double the size of the page
     shapes = rows[:, :count].T / np.maximum(np.abs(rows[:, :count]).max(axis=0), 1e-300)[:, None]
     edge = surface[boundary(cells)]  # (n_sides, 2, 2)
     columns = {
@@ -482,5 +448,5 @@ def _packed(rows: np.ndarray) -> dict[str, Any]:
 
 
 def _short(values: np.ndarray) -> list[float]:
-    """Numbers rounded to `DIGITS` digits, more than a screen can show."""
-    return [float(f"{value:.{DIGITS}g}") for value in np.asarray(values, float).tolist()]
+    """Numbers rounded to six digits, more than a screen can show; the downloads have all."""
+    return [float(f"{value:.6g}") for value in np.asarray(values, float).tolist()]

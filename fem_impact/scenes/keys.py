@@ -1,15 +1,18 @@
-"""What each key of a scene holds, in words and as a JSON type: for editors and for the page of scene keys."""
+"""What each key of a scene holds, in words and as a JSON type: for checks, editors and the page of scene keys."""
 
 from typing import Any
 
+from .._base import check
 from ..fe.assembly import THEORIES
 from ..impact.contact import HIGHEST_EXPONENT, LOWEST_EXPONENT
 from ..impact.quantities import BANDED, QUANTITIES
 from ..impact.stepping import SCHEMES
 from ..mesh.loops import UNITS
 from ..model.target import AIR, MODELS
-from .schema import LOWEST_NU, MOST_LISTENERS, SOURCES
 
+MOST_LISTENERS = 100  # [-] each costs a sound
+LOWEST_NU = -0.99  # [-] closer to -1, the rigidity of a plate is beyond all numbers
+SOURCES = ("auto", "fe", "analytic")
 Form = dict[str, Any]  # of JSON schema
 
 NUMBER: Form = {"type": "number"}
@@ -232,3 +235,16 @@ def form(table: str, kind: str, key: str) -> Form:
     names = (f"{table}.{kind}.{key}", f"{table}.{key}", key)
     words, found = KEYS[next(name for name in names if name in KEYS or name == key)]
     return {"description": words, **found}
+
+
+def checked(table: str, key: str, value: Any) -> Any:
+    """The value of a key that is a number, a word or a flag, if its form allows it; ValueError says what it may be."""
+    found = form(table, "", key)
+    unit = found["description"].partition(",")[0].partition(";")[0].strip("-")
+    if "enum" in found:
+        return check.one_of(key, value, found["enum"])
+    if found["type"] == "boolean":
+        return check.flag(key, value)
+    if "maximum" in found:
+        return check.between(key, value, found["minimum"], found["maximum"], unit)
+    return (check.positive if "exclusiveMinimum" in found else check.number)(key, value, unit)

@@ -17,7 +17,7 @@ from ..impact import accuracy, threshold
 from ..impact.contact import acting_stiffness, wall_time
 from ..model.target import Stages
 from ..show import figures, plots
-from ..sweeps import bodies, grid, hammers, solving
+from ..sweeps import bodies, cases, grid, hammers
 from ..sweeps.borders import PREFIX, read_borders, without_borders
 from ..sweeps.cells import ALIASES, AXES, LAW, Case, Range, laid_out, logarithmic
 from .scene import Scene
@@ -100,7 +100,7 @@ def map_scene(
         wanted, ours = {**wanted, "borders": False}, False
     tell = wanted.pop("tell", None)
     grid.admit(
-        math.prod(len(values) for values in over.values()), len(solving.LAYERS),
+        math.prod(len(values) for values in over.values()), len(cases.LAYERS),
         wanted.pop("max_cells", grid.MOST_CELLS),
         quick=not law.lossy and not law.hard_stiffness and law.exponent >= 1.0 and not SLOW & set(over),
         tell=tell,
@@ -161,7 +161,7 @@ def _quick_map(
         )  # fmt: skip
     except check.SimulationError as error:
         raise check.SimulationError(f"{scene.path}: {error}") from None
-    table = grid.run(case, axes, tolerance=tolerance, max_frequency=band, residual=residual, audit=True, **wanted)
+    table = grid.run(case, axes, grid.Job(tolerance, band, residual=residual, audit=True, **wanted))
     return with_theory(table, case, axes)
 
 

@@ -17,7 +17,8 @@ from ..impact.compiled import layout
 from ..impact.contact import Contact
 from ..impact.error import Error
 from ..impact.history import History
-from ..impact.response import Ends, Response
+from ..impact.reduced_body import Ends
+from ..impact.response import Response
 from ..impact.stretched import Stretched
 from ..impact.striker import Hand, Striker
 from ..model.playing import Stroke, Strokes

@@ -40,7 +40,6 @@ from .schema import (
     read_strokes,
     read_tables,
     supports_of,
-    target_values,
 )  # fmt: skip
 
 # [-] places along a beam where its section is looked at: ten in each hundredth of it, where it may change
@@ -141,7 +140,7 @@ class Scene(check.Brief):
         target = self.built.target
         most = MOST_MODES[target.kind]
         if check.count("count", count) > most:
-            raise fault(self.path, f"count must be at most {most} modes for this scene, got {count}; ask for fewer")
+            raise self.fault(f"count must be at most {most} modes for this scene, got {count}; ask for fewer")
         tolerance = self.blow.values.get("tolerance", collision.TOLERANCE)
         with self.blame("strike"):
             check.tolerance(tolerance)
@@ -230,7 +229,7 @@ class Scene(check.Brief):
     @property
     def baffled(self) -> bool:
         """Whether the body fills a hole in a large rigid wall: plates do unless the scene says otherwise."""
-        return self.mesh.kind != "line" and target_values(**self.target.values)["baffle"]
+        return self.mesh.kind != "line" and self._target["baffle"]
 
     @property
     def girth(self) -> tuple[float, float]:
@@ -359,10 +358,9 @@ class Scene(check.Brief):
         supports = supports_of(self.held)
         with self.blame("supports"):
             support_of_facets(mesh, supports, support_words(self.target.values.get("theory")))
+        told = {name: value for name, value in self._target.items() if name != "nu"}
+        told["point_supports"] = tuple(entry for entry in told["point_supports"] if entry[1] != "clamped")
         with self.blame("target"):
-            told = target_values(**self.target.values)
-            told.pop("nu")
-            told["point_supports"] = tuple(entry for entry in told["point_supports"] if entry[1] != "clamped")
             target = Target(mesh, section, supports, **told, blame=self.blame)
         points = tuple(self.points)
         moving = self.observe is not None
@@ -376,29 +374,30 @@ class Scene(check.Brief):
     def _body(self) -> Mesh:
         mesh = self._make("mesh", self.mesh)
         with self.blame("target"):
-            clamps = check_posts(self._posts, mesh.dimension)[1]
+            clamps = check_posts(self._target["point_supports"], mesh.dimension)[1]
             return pierced(mesh, clamps) if clamps else mesh
 
     @cached_property
-    def _posts(self) -> tuple:
-        return target_values(**self.target.values)["point_supports"]
+    def _target(self) -> dict[str, Any]:
+        return self._make("target", self.target)
 
     @property
     def held(self) -> dict[str, Any]:
         """The supports of the edges as written, with those around clamped points."""
-        return clamped(dict(self.supports.values), sum(entry[1] == "clamped" for entry in self._posts))
+        posts = self._target["point_supports"]
+        return clamped(dict(self.supports.values), sum(entry[1] == "clamped" for entry in posts))
 
     def make_section(self, kind: str) -> Plate | Beam:
         """The section; without a material, any of the right kind, as mass and first frequency set the scale."""
         if self.section is None or self.material is None:
             with self.blame("target"):
-                material = Material(E=1e10, nu=target_values(**self.target.values)["nu"], rho=1e3)
+                material = Material(E=1e10, nu=self._target["nu"], rho=1e3)
                 thin = 1e-9  # [m] thinner than any body is wide
                 return Plate(material, thin) if kind == "plate" else Beam.rectangular(material, width=thin, height=thin)
         material = self._make("material", self.material)
         section = self._make("section", self.section, material=material)
         if self.section.kind != kind:
-            raise fault(self.path, f"[section] kind must be '{kind}' for this mesh, got {self.section.kind!r}")
+            raise self.fault(f"[section] kind must be '{kind}' for this mesh, got {self.section.kind!r}")
         return section
 
     def make_striker(self) -> Striker:
@@ -429,9 +428,9 @@ class Scene(check.Brief):
         except ValueError as error:
             if str(error).partition(" ")[0] in changes:
                 raise
-            raise fault(self.path, f"[{table}] {error}") from None
+            raise self.fault(f"[{table}] {error}") from None
         except (OverflowError, ZeroDivisionError):
-            raise fault(self.path, f"[{table}] has a number too large or too small; check its units") from None
+            raise self.fault(f"[{table}] has a number too large or too small; check its units") from None
 
 
 def _opened(value: Any) -> Any:
@@ -536,42 +535,41 @@ def plan(
 
 def _check_whole(scene: Scene) -> None:
     """Build whatever is cheap, so that a wrong number fails at once, and check that the tables fit together."""
-    target = {} if scene.target is None else scene.target.values
-    with scene.blame("target"):
-        target_values(**target)
-    if (scene.material is None) != (scene.section is None):
-        missing, there = ("material", "section") if scene.material is None else ("section", "material")
-        raise fault(scene.path, f"[{missing}] is missing; [{there}] needs it")
-    if scene.section is None and not {"mass", "first_frequency"} <= set(target):
-        raise fault(scene.path, "[target] needs mass and first_frequency if there is no [material]")
-    if scene.section is None and target.get("theory") in THICK:
-        raise fault(scene.path, "[target] theory needs [material] and [section]: shear depends on the thickness")
+    target, bare, line = scene.target.values, scene.section is None, scene.mesh.kind == "line"
+    _ = scene._target
+    if (scene.material is None) != bare:
+        missing, there = ("section", "material") if bare else ("material", "section")
+        raise scene.fault(f"[{missing}] is missing; [{there}] needs it")
+    thick, other = target.get("theory") in THICK, scene.striker.kind != "sphere" or bare
+    wrong = {
+        "[target] needs mass and first_frequency if there is no [material]": bare
+        and not {"mass", "first_frequency"} <= set(target),
+        "[target] theory needs [material] and [section]: shear depends on the thickness": bare and thick,
+        "[target] baffle must be left out for a beam, which is in free air": line and target.get("baffle") is True,
+        "[contact] kind 'between' needs a striker of kind 'sphere' and a [section]": other
+        and scene.contact.kind == "between",
+        f"[strike] max_impacts must be left out with [[{REPEATED}]]; give a stroke lasts instead": scene.stroke
+        and "max_impacts" in scene.blow.values,
+        "[observe] listener of a beam needs [material] and [section], for its width": bare and line and scene.listeners,
+    }
+    for text, holds in wrong.items():
+        if holds:
+            raise scene.fault(text)
     for table in ("observe", "map"):
         part = getattr(scene, table)
         if part is not None:
             scene._make(table, part)
-    if scene.listeners and scene.mesh.kind == "line":
-        if scene.section is None:
-            raise fault(scene.path, "[observe] listener of a beam needs [material] and [section], for its width")
+    if scene.listeners and line:
         width, height = scene.girth
         if height > width:
-            raise fault(
-                scene.path,
+            raise scene.fault(
                 f"[observe] listener must be left out for a beam higher than wide, here {height:g} and {width:g} m: "
-                "its sound is not known",
+                "its sound is not known"
             )
     if scene.section is not None:
         scene.make_section(scene.section.kind)
-    if target.get("baffle") is True and scene.mesh.kind == "line":
-        raise fault(scene.path, "[target] baffle must be left out for a beam, which is in free air")
-    if scene.contact.kind == "between" and (scene.striker.kind != "sphere" or scene.section is None):
-        raise fault(scene.path, "[contact] kind 'between' needs a striker of kind 'sphere' and a [section]")
     scene.make_striker()
     scene.make_contact()
-    if scene.stroke and "max_impacts" in scene.blow.values:
-        raise fault(
-            scene.path, f"[strike] max_impacts must be left out with [[{REPEATED}]]; give a stroke lasts instead"
-        )
     for i, part in enumerate(scene.stroke):
         if any(name in part.values for name in NESTED):
             _check_whole(scene.alone(i))

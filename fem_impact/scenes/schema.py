@@ -20,11 +20,11 @@ from ..fe.section import KINDS, SOFT, Beam, Elastic, Material, Plate
 from ..impact import collision
 from ..impact.contact import Contact
 from ..impact.striker import STICK_MODES, Hand, Striker
-from ..model.target import AIR, MODELS
 from ..modes.analytic import closed_form
 from ..modes.modal import find_modes
 from ..show import sound
 from ..sweeps.cells import along
+from . import keys
 from .fields import over_frequency, varying
 
 WORD = r"""(?:[\w-]++|"[^"\\\n]*+(?:\\.[^"\\\n]*+)*+"?|'[^'\n]*+'?)"""  # unclosed, too: each is passed once
@@ -61,13 +61,20 @@ def _sphere(*, radius: float, E: float, nu: float, rho: float, yield_strength: f
     return Striker.sphere(Material(E=E, nu=nu, rho=rho, yield_strength=yield_strength), radius)
 
 
+def _with_keys(maker: Any, own: Any, optional: Mapping[str, Any]) -> Any:
+    """A function of ``**values`` that shows, as the keys it takes, the arguments of another and optional ones more."""
+    named = [each for each in inspect.signature(own).parameters.values() if each.kind is not each.VAR_KEYWORD]
+    more = [inspect.Parameter(key, inspect.Parameter.KEYWORD_ONLY, default=value) for key, value in optional.items()]
+    maker.__doc__, maker.__signature__ = own.__doc__, inspect.Signature([*named, *more])
+    return maker
+
+
 def _bar(
-    *, E: float, rho: float, length: float, width: Any = None, height: Any = None, diameter: Any = None,
-    left: str = "free", right: str = "free", at: float, nu: float = 0.3, theory: str = "euler",
-    damping_ratio: float = 0.0,
+    *, E: float, rho: float, length: float, left: str = "free", right: str = "free", at: float, nu: float = 0.3,
+    theory: str = "euler", damping_ratio: float = 0.0, **size: Any,
 ) -> Striker:  # fmt: skip
     """A bar that bends, such as a plectrum or a stick held by one end."""
-    section = _beam(Material(E=E, nu=nu, rho=rho), width=width, height=height, diameter=diameter)
+    section = _beam(Material(E=E, nu=nu, rho=rho), **size)
     body, held = mesh.line(length), {"left": left, "right": right}
     known = closed_form(body, section, held, check.one_of("theory", theory, THEORIES[1]))
     find = known or partial(find_modes, assemble(body, section, held, theory=theory))
@@ -89,50 +96,19 @@ def _held(maker: Any) -> Callable[..., Striker]:
             raise ValueError(f"hand: {error}") from None
         return striker.held(Hand(**hand))
 
-    own = inspect.signature(maker)
-    hand = inspect.Parameter("hand", inspect.Parameter.KEYWORD_ONLY, default=None)
-    make.__doc__ = maker.__doc__
-    make.__signature__ = own.replace(parameters=[*own.parameters.values(), hand])  # type: ignore[attr-defined]
-    return make
+    return _with_keys(make, maker, {"hand": None})
 
 
-def target_values(
-    *,
-    mass: float | None = None,
-    first_frequency: float | None = None,
-    nu: float = 0.3,
-    damping_ratio: Any = 0.0,
-    point_masses: Sequence[Mapping[str, Any]] = (),
-    point_supports: Sequence[Mapping[str, Any]] = (),
-    source: str = "auto",
-    theory: str | None = None,
-    air: str | None = None,
-    baffle: bool = True,
-    stretching: bool = False,
-    model: str = "stated",
-) -> dict[str, Any]:
-    """Check the table [target].
-
-    It has mass and first frequency to scale to, nu without a material, damping, what is attached at points, the
-    source of modes, the theory, the sides in air, whether a rigid wall surrounds it, whether it stretches and whether
-    theory, air and stretching are chosen.
-    """
-    check.between("nu", nu, LOWEST_NU, 0.5)
-    scale = {"mass": (mass, "kg"), "first_frequency": (first_frequency, "Hz")}
-    given = {name: check.positive(name, value, unit) for name, (value, unit) in scale.items() if value is not None}
-    return {
-        "scale": given,
-        "nu": nu,
-        "damping_ratio": over_frequency("damping_ratio", damping_ratio),
-        "point_masses": tuple(_weight(i, entry) for i, entry in enumerate(_listed("point_masses", point_masses))),
-        "point_supports": tuple(_post(i, entry) for i, entry in enumerate(_listed("point_supports", point_supports))),
-        "source": check.one_of("source", source, SOURCES),
-        "model": check.one_of("model", model, MODELS),
-        "stretching": check.flag("stretching", stretching),
-        "air": None if air is None else check.one_of("air", air, list(AIR)),
-        "baffle": check.flag("baffle", baffle),
-        "theory": None if theory is None else check.one_of("theory", theory, [*THEORIES[2], *THEORIES[1]]),
-    }
+def target_values(**values: Any) -> dict[str, Any]:
+    """Check the table [target], of which the scale is one entry; what is left out has its default in TARGET."""
+    given = {**TARGET, **values}
+    for key in set(given) - set(LISTED):
+        given[key] = None if given[key] is None else keys.checked("target", key, given[key])
+    scale = {key: given.pop(key) for key in ("mass", "first_frequency")}
+    given["damping_ratio"] = over_frequency("damping_ratio", given["damping_ratio"])
+    for key, read in (("point_masses", _weight), ("point_supports", _post)):
+        given[key] = tuple(read(i, entry) for i, entry in enumerate(_listed(key, given[key])))
+    return given | {"scale": {key: value for key, value in scale.items() if value is not None}}
 
 
 def _listed(name: str, value: Any) -> Sequence[Any]:
@@ -171,9 +147,9 @@ def _observe(*, points: Any = None, listener: Any = None, listeners: Any = None)
         raise ValueError(f"points must be a list of points such as [[0.1, 0.2]], got {check.shown(points)}")
     if listener is not None and listeners is not None:
         raise ValueError("listener must be left out beside listeners; add it to their list")
-    if listeners is not None and (not isinstance(listeners, list) or not 0 < len(listeners) <= MOST_LISTENERS):
+    if listeners is not None and (not isinstance(listeners, list) or not 0 < len(listeners) <= keys.MOST_LISTENERS):
         raise ValueError(
-            f"listeners must be a list of 1 to {MOST_LISTENERS} places such as [[0.1, 0.2, 1.0]], got "
+            f"listeners must be a list of 1 to {keys.MOST_LISTENERS} places such as [[0.1, 0.2, 1.0]], got "
             f"{check.shown(listeners)}"
         )
     for place in [listener] if listener is not None else listeners or []:
@@ -185,10 +161,9 @@ def stroke_values(
     contact: Any = None,
 ) -> None:  # fmt: skip
     """Check one table [[stroke]]: when [s] the striker is at the surface, and what differs from the other tables."""
-    check.number("when", when, "s")
-    for name, value, unit in (("speed", speed, "m/s"), ("lasts", lasts, "s")):
+    for name, value in (("when", when), ("speed", speed), ("lasts", lasts)):
         if value is not None:
-            check.positive(name, value, unit)
+            keys.checked("stroke", name, value)
     for name, value in (("striker", striker), ("contact", contact)):
         if value is not None and not isinstance(value, Mapping):
             raise ValueError(f"{name} must be a table with the keys of [{name}], got {check.shown(value)}")
@@ -198,13 +173,15 @@ def map_values(*, over: Any, max_frequency: Any = None) -> dict[str, Any]:
     """Check the table [map]: the values along each axis, and the upper end of the centroid's band [Hz]."""
     if not isinstance(over, dict) or not over:
         raise ValueError(f'over must be a table of axes such as "striker.mass" = [0.05, 0.1], got {check.shown(over)}')
-    band = None if max_frequency is None else check.positive("max_frequency", max_frequency, "Hz")
+    band = None if max_frequency is None else keys.checked("map", "max_frequency", max_frequency)
     return {"over": {name: along(name, values) for name, values in over.items()}, "max_frequency": band}
 
 
-MOST_LISTENERS = 100  # [-] each costs a sound
-LOWEST_NU = -0.99  # [-] closer to -1, the rigidity of a plate is beyond all numbers
-SOURCES = ("auto", "fe", "analytic")
+TARGET: dict[str, Any] = {  # keys of [target] and their defaults; None: it says nothing
+    "mass": None, "first_frequency": None, "nu": 0.3, "damping_ratio": 0.0, "point_masses": (), "point_supports": (),
+    "source": "auto", "theory": None, "air": None, "baffle": True, "stretching": False, "model": "stated",
+}  # fmt: skip
+LISTED = ("damping_ratio", "point_masses", "point_supports")  # of these, what is more than a number, a word or a flag
 # Functions that build each part of a scene; their arguments are the keys of its table.
 # The first entry is the key that selects the function, '' if there is only one.
 MAKERS: dict[str, tuple[str, dict[str, Callable[..., Any]]]] = {
@@ -214,10 +191,11 @@ MAKERS: dict[str, tuple[str, dict[str, Callable[..., Any]]]] = {
     }),
     "material": ("", {"": Material}),
     "section": ("kind", {"plate": _plate, "beam": _beam}),
-    "target": ("", {"": target_values}),
+    "target": ("", {"": _with_keys(target_values, target_values, TARGET)}),
     "striker": ("kind", {
         name: _held(maker) for name, maker in {
-            "rigid": Striker.rigid, "sphere": _sphere, "stick": Striker.stick, "hammer": Striker.hammer, "bar": _bar,
+            "rigid": Striker.rigid, "sphere": _sphere, "stick": Striker.stick, "hammer": Striker.hammer,
+            "bar": _with_keys(_bar, _bar, dict.fromkeys(("width", "height", "diameter"))),
         }.items()
     }),
     "contact": ("kind", {

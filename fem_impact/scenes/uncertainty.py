@@ -1,9 +1,10 @@
 """Blows whose inputs are uncertain: from distributions of numbers of a scene to distributions of the answer."""
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+import re
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from contextlib import suppress
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
@@ -22,11 +23,12 @@ from ..model.planner import Blow
 from ..model.target import CLOSE, FIRST_FLEXIBLE, Target
 from ..modes.modal import Damping, Modes
 from ..show import export, figures
-from ..sweeps import bodies, cloud, grid, solving
+from ..sweeps import bodies, grid
+from ..sweeps.cases import LAYERS, Cases, few, solve_all
 from ..sweeps.cells import ALIASES, AXES, LAW, REACH, Case
-from ..sweeps.cloud import Cloud
 from ..sweeps.inputs import Input, crossed, drawn, mixing, read, shares
 from ..sweeps.spreads import DOUBLE, QUANTITIES, Checks, Spread
+from ..sweeps.store import Texts
 from .maps import MOST_ROWS, changed_scene
 from .scene import Scene, load_scene
 
@@ -36,6 +38,7 @@ TAILS = (0.05, 0.95)
 # [-] default limit of a spread, to limit the work to some minutes and 1 GB of numbers
 MOST_BLOWS = 10**7
 PLACES = ("strike.x", "strike.y")  # inputs that move the strike point
+POSITIVE = ("mass", "stiffness", "speed", "target_mass", "target_frequency", "striker_frequency")  # axes above zero
 SIZE = "target.size"  # [-] factor on all lengths in the plane of a plate, or along a beam
 # Inputs of the body's modes by dimension: powers of its mass and of its frequencies; Kirchhoff, Euler and Bernoulli
 BODY: dict[int, dict[str, tuple[float, float]]] = {
@@ -141,11 +144,10 @@ def spread(
     values = drawn(inputs, points, mixer)
     if not np.isfinite(values).all() or np.abs(values).max() > REACH:
         raise ValueError(f"vary must stay finite and below {REACH:g}; choose distributions with shorter tails")
-    asked = _SpreadAsked(blow, told, inputs, values, limit, band, grid.kept_beside(store))
-    base, axes = asked.cases()
-    exact = Cloud(base, axes, limit, blow.arguments.get("residual", True), band)
-    rough = replace(exact, axes=cloud.few(base, axes), kernels={})
-    numbers, texts = cloud.solve_all(rough, workers, client, store, watch)
+    asked = _SpreadAsked(blow, told, inputs, values, limit, grid.kept_beside(store))
+    exact = replace(asked.cases(), band=band)
+    base, rough = exact.base, few(exact)
+    numbers, texts = solve_all(rough, workers, client, store, watch)
     checks, rescaled = _checked(exact, numbers, workers), asked.rescaled(base)
     notes = plausible.together(base.modes.notes, base.striker.notes)
     table = _table(inputs, values, rough.layers, numbers, texts, d + 2 if groups else 1, base, band)
@@ -198,7 +200,6 @@ class _SpreadAsked:
     inputs: Sequence[Input]
     values: np.ndarray  # (n_cases, n_inputs)
     tolerance: float
-    band: float | None
     keep: Path | None
     own: dict[str, np.ndarray] = field(default_factory=dict)  # what `_sort` finds: axis of a map -> values
     body: dict[str, np.ndarray] = field(default_factory=dict)  # input of the body -> value over its own [-]
@@ -262,81 +263,71 @@ class _SpreadAsked:
             raise ValueError(f"vary: {name} varies in space already; vary target.mass and target.first_frequency")
         return float(value)
 
-    def cases(self) -> tuple[Case, dict[str, np.ndarray]]:
-        """The blow that all cases share, on a body that serves all of them, and the axes."""
+    @property
+    def residual(self) -> bool:
+        return self.blow.arguments.get("residual", True)
+
+    def cases(self) -> Cases:
+        """All blows by row, on a body that serves all of them."""
         blow, axes = self.blow, dict(self.own)
         self._add_parts(axes)
-        target, speed = blow.target, blow.arguments["speed"]
-        mass, frequency = self._factors(self.body)
-        given: dict[str, Any] = {"at": blow.arguments["at"], "speed": speed}
-        if target.modes is not None:
-            modes = target.finished(target.modes)
-            base = Case(modes, blow.striker, blow.contact, modes.point("at", given["at"])[0], speed)
-            self._add_body(base, axes, mass, frequency)
-            with self._blamed(axes):
-                bodies.checked_axes(base, self._ends(base, axes))
-            return base, axes
+        target, at, speed = blow.target, blow.arguments["at"], blow.arguments["speed"]
         first = None
         if self.body:
-            first = target.surrounded(target.find(FIRST_FLEXIBLE, tolerance=CLOSE))
-        over = dict(axes)
-        if first is not None:
-            over["target_mass"] = first.mass * mass
-            over["target_frequency"] = float(first.frequencies[first.omega > 0.0][0]) * frequency
-        over = {name: np.unique([column.min(), column.max()]) for name, column in over.items()}
+            first = target.modes or target.surrounded(target.find(FIRST_FLEXIBLE, tolerance=CLOSE))
+        wide = axes | self._of_modes(first)
+        ends: dict[str, Any] = {name: np.unique([column.min(), column.max()]) for name, column in wide.items()}
         if self.places:
-            over["at"] = self._outermost(np.atleast_1d(np.asarray(blow.arguments["at"], float)))
+            points = self._points(at)
+            ends["at"] = points[np.unique([points.argmin(axis=0), points.argmax(axis=0)])]
         with self._blamed(axes):
             base, _ = bodies.body_of(
-                target, blow.striker, blow.contact, **given, over=over or {"speed": np.array([speed])},
-                tolerance=self.tolerance, keep=self.keep,
-                alone=blow.arguments.get("residual", True) and not self.places,
+                target, blow.striker, blow.contact, at=at, speed=speed, over=ends or {"speed": np.array([speed])},
+                tolerance=self.tolerance, keep=self.keep, alone=self.residual and not self.places,
             )  # fmt: skip
-        base = replace(base, speed=speed)
-        self._add_body(base, axes, mass, frequency)
-        return base, axes
-
-    def _blamed(self, axes: Mapping[str, np.ndarray]) -> "_Blame":
-        return _Blame(axes, {ALIASES.get(each.name, each.name): each for each in self.inputs})
-
-    def _factors(self, body: Mapping[str, np.ndarray]) -> tuple[Any, Any]:
-        """Factors of the body's mass and of its frequencies, from those of its inputs."""
-        mass: Any = 1.0
-        frequency: Any = 1.0
-        for name, ratio in body.items():
-            of_mass, of_frequency = self._powers(name)
-            mass, frequency = mass * ratio**of_mass, frequency * ratio**of_frequency
-        return mass, frequency
-
-    def _powers(self, name: str) -> tuple[float, float]:
-        """Powers with which an input enters mass and frequencies; none where the scene states these themselves."""
-        mass, frequency = BODY[self.dimension][name]
-        stated = self.blow.target.scale
-        return 0.0 if "mass" in stated else mass, 0.0 if "first_frequency" in stated else frequency
-
-    def _add_body(self, base: Case, axes: dict[str, np.ndarray], mass: Any, frequency: Any) -> None:
-        """Add what moves the strike point and rescales the body to the axes."""
-        n = len(self.values)
-        if self.body:
-            axes["target_mass"] = np.broadcast_to(base.modes.mass * mass, (n,)).copy()
-            axes["target_frequency"] = np.broadcast_to(base.first_frequency * frequency, (n,)).copy()
+        axes |= self._of_modes(base.modes if self.body else None, base.first)
         if self.places:
-            points = np.tile(base.at, (n, 1))
-            for i, column in self.places.items():
-                points[:, i] = column
-            axes["at"] = base.modes.points("vary: strike point", points)
+            axes["at"] = base.modes.points("vary: strike point", self._points(at))
+        return Cases(replace(base, speed=speed), axes, self.tolerance, self.residual, by_row=True)
 
-    def _outermost(self, at: np.ndarray) -> np.ndarray:
-        """The strike points with the smallest and the largest coordinates, (n_points, dimension) [m]."""
-        points = np.tile(at, (len(self.values), 1))
+    @contextmanager
+    def _blamed(self, axes: Mapping[str, np.ndarray]) -> Iterator[None]:
+        """Turns an error about an axis into one that names the input and its distribution."""
+        for each in self.inputs:
+            axis = ALIASES.get(each.name, each.name)
+            if axis in axes and axis in POSITIVE and axes[axis].min() <= 0.0:
+                raise _below(each.name, axes[axis])
+        try:
+            yield
+        except ValueError as error:
+            if re.split(r"[ \[]", str(error))[0] not in (*AXES, "over", "first_frequency"):
+                raise
+            said = str(error).replace("over['at']", "the strike point")
+            raise ValueError(f"vary reaches values that are not allowed: {said}") from None
+
+    def _factors(self, body: Mapping[str, Any]) -> list[Any]:
+        """Factors of the body's mass and of its frequencies from those of its inputs; 1 where the scene states them."""
+        found: list[Any] = [1.0, 1.0]
+        for i, stated in enumerate(("mass", "first_frequency")):
+            for name, ratio in body.items() if stated not in self.blow.target.scale else ():
+                found[i] = found[i] * ratio ** BODY[self.dimension][name][i]
+        return found
+
+    def _of_modes(self, modes: Modes | None, first: float | None = None) -> dict[str, np.ndarray]:
+        """The axes that rescale a body of which modes are known, and perhaps its first frequency [Hz]."""
+        if modes is None:
+            return {}
+        first = first or float(modes.frequencies[modes.omega > 0.0][0])
+        mass, frequency = self._factors(self.body)
+        one = np.ones(len(self.values))
+        return {"target_mass": modes.mass * mass * one, "target_frequency": first * frequency * one}
+
+    def _points(self, at: Any) -> np.ndarray:
+        """The strike points (n_cases, dimension) [m]."""
+        points = np.tile(np.atleast_1d(np.asarray(at, float)), (len(self.values), 1))
         for i, column in self.places.items():
             points[:, i] = column
-        return points[np.unique([points.argmin(axis=0), points.argmax(axis=0)])]
-
-    def _ends(self, base: Case, axes: Mapping[str, np.ndarray]) -> dict[str, Any]:
-        """Smallest and largest value of each axis."""
-        found: dict[str, Any] = {n: [c.min(), c.max()] for n, c in axes.items() if n != "at"}
-        return found or {"speed": [base.speed]}
+        return points
 
     def _add_parts(self, axes: dict[str, np.ndarray]) -> None:
         """Add the masses of strikers and the laws of contacts that are made anew for each blow."""
@@ -365,57 +356,29 @@ class _SpreadAsked:
 
         `SIZE` is missing, as for the bodies that allow it the rescaled modes are the exact ones.
         """
-        found = {}
-        alone = Cloud(base, {}, self.tolerance, self.blow.arguments.get("residual", True), None)
-        middle = {each.name: each for each in self.inputs}
-        for name in self.body:
-            if name == SIZE:
+        found: dict[str, float] = {}
+        alone = Cases(base, {}, self.tolerance, self.residual)
+        for each in self.inputs:
+            if each.name not in self.body or each.name == SIZE:
                 continue
-            worst = 0.0
-            own = self._of_body(name)
-            for value in middle[name].at(np.array(TAILS)):
-                ratio = float(value) / own
-                of_mass, of_frequency = self._powers(name)
-                mine = base.with_values({
-                    "target_mass": base.modes.mass * ratio**of_mass,
-                    "target_frequency": base.first_frequency * ratio**of_frequency,
-                })  # fmt: skip
+            found[each.name] = 0.0
+            for ratio in (each.at(np.array(TAILS)) / self._of_body(each.name)).tolist():
+                mass, frequency = self._factors({each.name: ratio})
+                changes = {
+                    "target_mass": base.modes.mass * mass, "target_frequency": base.first_frequency * frequency,
+                }  # fmt: skip
                 other, _ = bodies.body_of(
-                    _made(self.blow.target, name, ratio), self.blow.striker, self.blow.contact,
+                    _made(self.blow.target, each.name, ratio), self.blow.striker, self.blow.contact,
                     at=self.blow.arguments["at"], speed=self.blow.arguments["speed"], over={"speed": [base.speed]},
-                    tolerance=self.tolerance, alone=self.blow.arguments.get("residual", True),
+                    tolerance=self.tolerance, alone=self.residual,
                 )  # fmt: skip
                 try:
-                    one, two = (solving.numbers_of(solving.struck_alone(alone, case), None) for case in (mine, other))
+                    one, two = (alone.row(alone.strike(case)) for case in (base.with_values(changes), other))
+                    off = max(_differences(one, two).values()) if one[0] == two[0] else math.inf
                 except check.SimulationError:
-                    worst = math.inf
-                    continue
-                worst = max(worst, *_differences(one, two).values()) if one[0] == two[0] else math.inf
-            found[name] = worst
+                    off = math.inf
+                found[each.name] = max(found[each.name], off)
         return found
-
-
-@dataclass(frozen=True)
-class _Blame:
-    """Turns an error about an axis into one that names the input and its distribution."""
-
-    axes: Mapping[str, np.ndarray]
-    inputs: Mapping[str, Input]
-
-    def __enter__(self) -> None:
-        for name, column in self.axes.items():
-            if name in self.inputs and name in ("mass", "stiffness", "speed", "target_mass", "target_frequency",
-                                                "striker_frequency") and column.min() <= 0.0:  # fmt: skip
-                raise _below(self.inputs[name].name, column)
-
-    def __exit__(self, kind: Any, error: BaseException | None, trace: Any) -> None:
-        if isinstance(error, ValueError) and str(error).split(" ")[0].split("[")[0] in (
-            *AXES,
-            "over",
-            "first_frequency",
-        ):
-            said = str(error).replace("over['at']", "the strike point")
-            raise ValueError(f"vary reaches values that are not allowed: {said}") from None
 
 
 def _below(name: str, column: np.ndarray) -> ValueError:
@@ -454,7 +417,7 @@ def _made(target: Target, name: str, ratio: float) -> Target:
     return Target.of(other, target.damping_ratio)
 
 
-def _checked(exact: Cloud, numbers: np.ndarray, workers: int | None) -> Checks:
+def _checked(exact: Cases, numbers: np.ndarray, workers: int | None) -> Checks:
     """Strike a few blows again one by one, with the values they really have."""
     some = [int(i) for i in np.unique(np.linspace(0, exact.n_cases - 1, CHECKED).astype(int))]
 
@@ -468,7 +431,7 @@ def _checked(exact: Cloud, numbers: np.ndarray, workers: int | None) -> Checks:
     apart: dict[str, float] = {}
     others = 0
     for i, hit in hits.items():
-        row = solving.numbers_of(hit, exact.band)
+        row = exact.row(hit)
         if row[0] != numbers[0, i]:
             others += 1
             continue
@@ -485,7 +448,7 @@ def _checked(exact: Cloud, numbers: np.ndarray, workers: int | None) -> Checks:
 def _differences(one: np.ndarray, two: np.ndarray) -> dict[str, float]:
     """Differences of two blows, relative to the first where they are relative."""
     first, second = (
-        {name: x for name, x in zip(solving.LAYERS, row) if name not in ("n_impacts", "error")} for row in (one, two)
+        {name: x for name, x in zip(LAYERS, row) if name not in ("n_impacts", "error")} for row in (one, two)
     )
     return distance(second, first)
 
@@ -495,7 +458,7 @@ def _table(
     values: np.ndarray,
     layers: Sequence[str],
     numbers: np.ndarray,
-    texts: Mapping[int, str],
+    texts: Texts,
     n_parts: int,
     base: Case,
     band: float | None,
@@ -506,7 +469,7 @@ def _table(
         unit = AXES.get(ALIASES.get(each.name, each.name), ("",))[0].replace("exponent", f"{base.contact.exponent:g}")
         data[each.name] = ("blow", column, {"units": unit or "1", "distribution": each.said})
     for name, row in zip(layers, numbers):
-        unit, meaning = solving.LAYERS[name]
+        unit, meaning = LAYERS[name]
         about: dict[str, Any] = {"units": unit or "1", "long_name": meaning}
         if name == "centroid":
             about["max_frequency"] = band
@@ -516,9 +479,7 @@ def _table(
     part = np.arange(len(counts)) % n_parts
     meaning = "0: all inputs from A, the last: all from B, others: one from B"
     data["part"] = ("blow", part.astype(np.int32), {"long_name": meaning})
-    failures = np.full(len(counts), "", dtype=f"<U{max(map(len, texts.values()), default=1)}")
-    failures[list(texts)] = list(texts.values())
-    data["failure"] = ("blow", failures, {"long_name": "error text of a failed blow"})
+    data["failure"] = ("blow", grid.listed(texts, len(counts)), {"long_name": "error text of a failed blow"})
     return xarray.Dataset(data)
 
 

@@ -22,15 +22,12 @@ NAMES = ("modes", "wave")  # of the pictures of a blow, besides wave.gif
 WINDOW = {"VTK_DEFAULT_OPENGL_WINDOW": "vtkEGLRenderWindow"}
 SIZE = (720, 480)  # [px] size of a frame: a GIF stays below a few megabytes
 FINER = 2  # [-] a frame is drawn with so many pixels for one in each direction, which makes its lines smooth
-TILE = (320, 250)  # [px] size of one mode shape: four side by side on a screen
 RATE = 12  # [1/s] frames per second: enough for a wave, half the size of a film
-PALETTE = 8, 2  # [-] frames from which a GIF takes its colours, and how many of their pixels become one
 HEIGHT = 0.12  # [-] largest drawn deflection over the body's extent
 LIFT = 0.0015  # [-] height of lines above the surface, over their extent
 BALL = 0.03  # [-] drawn radius of the striker over the body's extent
 RIM, VERMILION = "#666666", "#D55E00"  # colours of the body's edge and of the striker
 COLOURS = "PuOr"  # of deflections: symmetric about zero, safe for colour-blind readers
-VIEW = (-0.55, -1.0, 0.75)  # direction to the camera: from the front left, above the plate
 
 
 class Film(NamedTuple):
@@ -53,7 +50,6 @@ class Gallery(NamedTuple):
     cells: np.ndarray  # (n_cells, 3)
     shapes: np.ndarray  # (n_points, n_shapes)
     titles: list[str]
-    rows: int
     columns: int
 
 
@@ -96,7 +92,9 @@ def frames(film: Film) -> Iterator[Image.Image]:
 
 def gallery(shown: Gallery) -> Image.Image:
     """Shapes side by side, as warped surfaces with nodal lines."""
-    plotter = _plotter((TILE[0] * shown.columns, TILE[1] * shown.rows), shape=(shown.rows, shown.columns))
+    rows = -(-len(shown.titles) // shown.columns)
+    # [px] of one mode shape 320 by 250: four side by side on a screen
+    plotter = _plotter((320 * shown.columns, 250 * rows), shape=(rows, shown.columns))
     for i, title in enumerate(shown.titles):
         plotter.subplot(*divmod(i, shown.columns))
         shape = shown.shapes[:, i]
@@ -131,7 +129,7 @@ def write(path: str | Path, picture: Image.Image) -> None:
 
 def write_gif(path: str | Path, pictures: list[Image.Image]) -> None:
     """Write pictures as an animation with one palette, so that its colours do not flicker."""
-    some = [picture.reduce(PALETTE[1]) for picture in pictures[:: max(1, len(pictures) // PALETTE[0])]]
+    some = [picture.reduce(2) for picture in pictures[:: max(1, len(pictures) // 8)]]
     mosaic = Image.new("RGB", (some[0].width, some[0].height * len(some)))
     for i, picture in enumerate(some):
         mosaic.paste(picture, (0, i * picture.height))
@@ -222,7 +220,8 @@ def _look(plotter: Any, plane: np.ndarray, zoom: float = 1.35) -> None:
     """Set the camera, the same for every picture of a body whatever its deflection."""
     low, high = plane.min(axis=0), plane.max(axis=0)
     rise = HEIGHT * _extent(plane)
-    plotter.camera_position = [tuple(VIEW), (0.0, 0.0, 0.0), (0.0, 0.0, 1.0)]
+    # from the front left, above the plate
+    plotter.camera_position = [(-0.55, -1.0, 0.75), (0.0, 0.0, 0.0), (0.0, 0.0, 1.0)]
     plotter.reset_camera(render=False, bounds=(low[0], high[0], low[1], high[1], -rise, rise))
     plotter.camera.zoom(zoom)
 

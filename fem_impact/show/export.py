@@ -31,7 +31,6 @@ __all__ = [
 ]  # fmt: skip
 
 PACKAGES = ("fem-impact", "numpy", "scipy", "scikit-fem", "netgen-mesher", "numba")
-WARP = 0.1  # [-] largest deflection of the warp vector over the body's extent
 CELL_TYPE = {1: 1, 2: 3, 3: 5}  # number of points: VTK's code for a vertex, line or triangle
 KIND = {"f": "Float64", "i": "Int64", "u": "UInt8"}
 
@@ -302,7 +301,8 @@ def _mode_parts(modes: Modes, points: np.ndarray) -> list[tuple[dict, dict]]:
     extent = float(np.ptp(points, axis=0).max(initial=0.0)) or 1.0
     largest = np.abs(shapes).max(axis=0, initial=0.0)
     warp = np.zeros((modes.n_modes, len(points), 3))
-    warp[:, :, 2] = (shapes * (WARP * extent / np.where(largest > 0.0, largest, 1.0))).T
+    # the largest deflection is a tenth of the body's extent
+    warp[:, :, 2] = (shapes * (0.1 * extent / np.where(largest > 0.0, largest, 1.0))).T
     return [
         (
             {"shape": shapes[:, i].copy(), "warp": warp[i]},

@@ -1,14 +1,11 @@
 """Plots of a blow in one style: safe for colour-blind readers, SI units on every axis, no screen needed."""
 
-import io
-from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import AbstractContextManager
 from pathlib import Path
 from typing import Any
 
 import matplotlib
 import numpy as np
-from cycler import cycler
 from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
 from matplotlib.ticker import EngFormatter, MaxNLocator
@@ -20,49 +17,21 @@ from .._base.rounding import SAME
 from ..impact import spectra
 from ..impact.response import Response
 from ..mesh import edge_table
-from ..mesh.mesh_files import boundary, quartered
+from ..mesh.mesh_files import quartered
 from ..mesh.meshes import Mesh
 from ..model.playing import Strokes
 from ..modes.modal import Modes
 from ..sweeps.spreads import DOUBLE, QUANTITIES, Spread, double_hits
 from . import sampling
 from .canvas import COLOURS, VERMILION
+from .style import BLUE, GREEN, GREY, PALETTE, SKY, STYLE, draw_rim, opened, panels, set_units
 
-# Okabe and Ito's palette: distinct for all common kinds of colour vision, and in print.
-BLUE, GREEN, ORANGE, PURPLE, SKY = "#0072B2", "#009E73", "#E69F00", "#CC79A7", "#56B4E9"
-PALETTE = [BLUE, VERMILION, GREEN, ORANGE, PURPLE, SKY]
-STYLE: Any = {
-    "font.family": "DejaVu Sans",
-    "font.size": 10.0,
-    "axes.spines.top": False,
-    "axes.spines.right": False,
-    "axes.grid": True,
-    "axes.axisbelow": True,
-    "axes.titlesize": 10.0,
-    "axes.titlelocation": "left",
-    "axes.prop_cycle": cycler(color=PALETTE),
-    "grid.color": "#DDDDDD",
-    "grid.linewidth": 0.6,
-    "lines.linewidth": 1.5,
-    "legend.frameon": False,
-    "savefig.dpi": 150.0,
-    "text.usetex": False,  # a matplotlibrc in the working folder may say otherwise, with commands of its own
-}
 SPECTRUM_BAND = (10.0, 20e3)  # [Hz] default band: about what people hear
 SPECTRUM_POINTS = 1200  # [-] frequencies in a spectrum: about one per pixel
-SPECTRUM_DEPTH = 1e-4  # [-] bottom of the spectrum axis: 80 dB below the largest value
+SPECTRUM_DEPTH = 1e-4  # [-] bottom of the spectrum axis: 80 dB below the largest value; of energies its square
 MOST_NUMBERS = 20  # [-] with more contacts than this, the numbers would overlap and are left out
-HEADROOM = 1.15  # [-] top of the force axis over the peak force: leaves room for the numbers
-TIMES = 800  # [-] instants in the plot of energies
-SAND = 1e-3  # [-] the same for lines alone: along a clamped edge the elements err by less
-FINER = 1  # [-] times the triangles are split in four to draw nodal lines, which then look smooth
-MODE_DEPTH = 1e-8  # [-] bottom of the energy axis: 80 dB below the most energetic mode
-BINS = 60  # [-] of a histogram
-STRIPES = 16  # [-] groups of equally many blows along an input, whose medians are drawn
+SAND = 1e-3  # [-] of the largest deflection, which nodal lines leave out: along a clamped edge the elements err by less
 TICKS = 4  # [-] most intervals between numbers below a narrow panel
-LARGE = 1e4  # [-] numbers from here on are drawn with SI prefixes
-TAILS = (0.001, 0.999)  # [-] levels between which a histogram is drawn
-LONGEST = 26  # [-] characters of an input's name that fit beside its bar
 NAMES = {  # quantity of a blow: its name in a picture
     "n_impacts": "number of impacts",
     "contact_time": "contact time",
@@ -74,31 +43,9 @@ NAMES = {  # quantity of a blow: its name in a picture
 MARGIN = 0.1  # [-] time shown before and after the blow, over its duration
 
 
-class _Picture(Figure):
-    """A figure that notebooks show as a picture, whatever their backend."""
-
-    def _repr_png_(self) -> bytes:
-        file = io.BytesIO()
-        with matplotlib.rc_context(STYLE):
-            self.savefig(file, format="png")
-        return file.getvalue()
-
-    def __repr__(self) -> str:
-        return f"<Picture of {len(self.axes)} axes; save it with fi.figures.save>"
-
-
-@contextmanager
-def styled(width: float, height: float) -> Iterator[Figure]:
+def styled(width: float, height: float) -> AbstractContextManager[Figure]:
     """A figure of a size [inch], drawn in `STYLE` inside the block."""
-    with matplotlib.rc_context(STYLE):
-        yield _Picture(figsize=(width, height), layout="constrained")
-
-
-def _units(axes: Any, x: str, y: str = "") -> None:
-    """Label the ticks with SI prefixes and units."""
-    axes.xaxis.set_major_formatter(EngFormatter(unit=x, sep=" "))
-    if y:
-        axes.yaxis.set_major_formatter(EngFormatter(unit=y, sep=" "))
+    return opened(width, height)
 
 
 @check.typed
@@ -134,7 +81,7 @@ def force(response: Response | Strokes, *, band: tuple[float, float] = SPECTRUM_
         below.loglog(frequencies, np.maximum(size, 0.1 * SPECTRUM_DEPTH * top))
         below.set(xlim=(low, high), ylim=(SPECTRUM_DEPTH * top, 2.0 * top))
         below.set(xlabel="frequency", ylabel="force spectrum [N s]", title="Spectrum of the force")
-        _units(below, "Hz")
+        set_units(below, "Hz")
         marks: dict[str, Any] = {"color": GREEN, "ms": 9.0, "transform": below.get_xaxis_transform(), "clip_on": True}
         natural = response.target.frequencies
         below.plot(natural, np.zeros(len(natural)), "|", label="modes of the struck body", **marks)
@@ -160,15 +107,15 @@ def _draw_force(axes: Any, response: Response | Strokes) -> None:
                 str(number), place, xycoords=axes.get_xaxis_transform(), ha="center", va="top", color="#555555"
             )
     axes.set(xlim=(start - room, end + room), xlabel="time", ylabel="contact force", title="Contact force")
-    axes.set_ylim(0.0, HEADROOM * (response.peak_force or 1.0))
-    _units(axes, "s", "N")
+    axes.set_ylim(0.0, 1.15 * (response.peak_force or 1.0))  # leaves room for the numbers
+    set_units(axes, "s", "N")
 
 
 @check.typed
 def energies(response: Response) -> Figure:
     """Plot the energy of striker and struck body during the blow, and the rest: in the contact or lost."""
     end = (response.impacts[-1].end if response.impacts else float(response.time[-1])) or 1.0
-    times = np.linspace(0.0, (1.0 + MARGIN) * end, TIMES)
+    times = np.linspace(0.0, (1.0 + MARGIN) * end, 800)
     parts = [response.modal_energy(times, body=body).sum(axis=1) for body in (0, -1)]
     with styled(7.0, 3.6) as figure:
         axes = figure.subplots()
@@ -176,7 +123,7 @@ def energies(response: Response) -> Figure:
         axes.plot(times, parts[1], label="struck body")
         axes.plot(times, parts[0][0] - parts[0] - parts[1], label="contact and losses")
         axes.set(xlim=(0.0, times[-1]), xlabel="time", ylabel="energy", title="Energy during the blow")
-        _units(axes, "s", "J")
+        set_units(axes, "s", "J")
         axes.legend(loc="best")
     return figure
 
@@ -190,10 +137,11 @@ def mode_energies(response: Response) -> Figure:
     top = float(energy[shown].max(initial=0.0)) or 1.0
     with styled(7.0, 3.6) as figure:
         axes = figure.subplots()
-        axes.vlines(response.target.frequencies[shown], MODE_DEPTH * top, energy[shown], lw=2.0, color=BLUE)
-        axes.set(xscale="log", yscale="log", ylim=(MODE_DEPTH * top, 3.0 * top))
+        foot = SPECTRUM_DEPTH**2 * top
+        axes.vlines(response.target.frequencies[shown], foot, energy[shown], lw=2.0, color=BLUE)
+        axes.set(xscale="log", yscale="log", ylim=(foot, 3.0 * top))
         axes.set(xlabel="natural frequency", ylabel="energy", title="Energy of each mode after the blow")
-        _units(axes, "Hz", "J")
+        set_units(axes, "Hz", "J")
     return figure
 
 
@@ -229,7 +177,7 @@ def mobility(modes: Modes, at: Any, to: Any = None, *, band: tuple[float, float]
         above.set(ylabel="mobility [m/(N s)]", title="Mobility", xlim=(low, high))
         below.semilogx(frequencies, np.angle(value, deg=True))
         below.set(ylabel="phase [degrees]", xlabel="frequency", ylim=(-190, 190), yticks=(-180, -90, 0, 90, 180))
-        _units(below, "Hz")
+        set_units(below, "Hz")
     return figure
 
 
@@ -249,26 +197,19 @@ def mode_shapes(modes: Modes, *, count: int = 12, columns: int = 4) -> Figure:
     matplotlib.figure.Figure
     """
     points, cells = sampling.grid(modes)
-    shapes, rows, columns = sampling.gallery(modes, points, count, columns)
-    count = shapes.shape[1]
-    rim = boundary(cells) if modes.dimension == 2 else None
-    with styled(2.2 * columns, 1.9 * rows) as figure:
-        grid = figure.subplots(rows, columns, squeeze=False)
-        for i, axes in enumerate(grid.flat):
-            if i >= count:
-                axes.set_axis_off()
-                continue
+    shapes, columns = sampling.gallery(modes, points, count, columns)
+    with panels(shapes.shape[1], columns, 2.2, 1.9) as (figure, all_axes):
+        for i, (axes, shape) in enumerate(zip(all_axes, shapes.T)):
             if modes.dimension == 1:
                 order = np.argsort(points[:, 0])
-                axes.plot(points[order, 0], shapes[order, i])
-                axes.axhline(0.0, color="#888888", lw=0.6)
-                axes.set(ylim=(-1.1, 1.1), yticks=[], xlabel="x [m]" if i >= count - columns else "")
+                axes.plot(points[order, 0], shape[order])
+                axes.axhline(0.0, color=GREY, lw=0.6)
+                axes.set(ylim=(-1.1, 1.1), yticks=[], xlabel="x [m]" if i >= len(all_axes) - columns else "")
             else:
-                axes.tripcolor(*points.T, cells, shapes[:, i], cmap=COLOURS, vmin=-1, vmax=1, shading="gouraud")
-                nodal = _unflattened(shapes[:, i], cells)
+                axes.tripcolor(*points.T, cells, shape, cmap=COLOURS, vmin=-1, vmax=1, shading="gouraud")
+                nodal = _unflattened(shape, cells)
                 axes.tricontour(*points.T, cells, nodal, levels=[0.0], colors="black", linewidths=0.8)
-                axes.add_collection(LineCollection(list(points[rim]), colors="#888888", linewidths=0.8))
-                axes.set_aspect("equal")
+                draw_rim(axes, points, cells)
                 axes.set_axis_off()
             axes.set_title(f"{i + 1}   {in_hertz(modes.frequencies[i])}")
     return figure
@@ -277,34 +218,21 @@ def mode_shapes(modes: Modes, *, count: int = 12, columns: int = 4) -> Figure:
 def chladni(modes: Modes, count: int, columns: int) -> Figure:
     """Draw the nodal lines as `pictures.chladni` describes."""
     check.between("dimension of modes", modes.dimension, 2, 2)
-    flexible = modes.n_modes - modes.n_rigid
-    if not flexible:
+    if modes.n_rigid == modes.n_modes:
         raise ValueError("modes must have a flexible mode: a rigid motion has no Chladni figure")
-    count = min(check.count("count", count), flexible)
-    columns = min(check.count("columns", columns), count)
     points, cells = sampling.grid(modes)
-    rim = boundary(cells)
-    for _ in range(FINER):
-        cells, sides = quartered(cells, len(points))
-        points = np.concatenate([points, points[sides].mean(axis=1)])
-    numbers = modes.n_rigid + np.arange(count)
-    shapes = modes.truncated(n_modes=int(numbers[-1]) + 1).shapes.at(points)[:, numbers]
-    shapes = shapes / np.abs(shapes).max(axis=0)
-    rows = -(-count // columns)
+    cells, sides = quartered(cells, len(points))  # finer triangles make smooth lines
+    points = np.concatenate([points, points[sides].mean(axis=1)])
+    shapes, columns = sampling.gallery(modes, points, count, columns, first=modes.n_rigid)
     tall = min(1.6, max(0.4, float(np.ptp(points[:, 1]) / np.ptp(points[:, 0]))))
-    with styled(2.0 * columns, rows * (2.0 * tall + 0.35)) as figure:
-        grid = figure.subplots(rows, columns, squeeze=False)
-        for i, axes in enumerate(grid.flat):
+    with panels(shapes.shape[1], columns, 2.0, 2.0 * tall + 0.35) as (figure, all_axes):
+        for i, (axes, shape) in enumerate(zip(all_axes, shapes.T), modes.n_rigid):
+            mesh = Triangulation(points[:, 0], points[:, 1], cells, np.abs(shape[cells]).max(axis=1) < SAND)
+            axes.tricontour(mesh, _unflattened(shape, cells, SAND), levels=[0.0], colors="black")
+            draw_rim(axes, points, cells)
             axes.set_axis_off()
-            if i >= count:
-                continue
-            flat = np.abs(shapes[cells, i]).max(axis=1) < SAND
-            mesh = Triangulation(points[:, 0], points[:, 1], cells, flat)
-            axes.tricontour(mesh, _unflattened(shapes[:, i], cells, SAND), levels=[0.0], colors="black")
-            axes.add_collection(LineCollection(list(points[rim]), colors="#777777", linewidths=1.0))
-            axes.set_aspect("equal")
             axes.autoscale_view()
-            axes.set_title(f"{numbers[i] + 1}   {in_hertz(modes.frequencies[numbers[i]])}")
+            axes.set_title(f"{i + 1}   {in_hertz(modes.frequencies[i])}")
     return figure
 
 
@@ -322,9 +250,9 @@ def snapshot(plane: np.ndarray, cells: np.ndarray, deflection: np.ndarray, at: n
     with styled(7.2, 4.8) as figure:
         axes: Any = figure.subplots()
         axes.tripcolor(*plane.T, cells, deflection, cmap=COLOURS, vmin=-1, vmax=1, shading="gouraud")
-        axes.add_collection(LineCollection(list(plane[boundary(cells)]), colors="#888888", linewidths=0.8))
+        draw_rim(axes, plane, cells)
         axes.plot(at[0], at[1] if len(at) > 1 else 0.0, "o", mfc="none", mec=VERMILION, mew=2.0, ms=9.0)
-        axes.set(aspect="equal", title=title)
+        axes.set_title(title)
         axes.set_axis_off()
     return figure
 
@@ -366,7 +294,7 @@ def edges(mesh: Mesh) -> Figure:
             axes.triplot(x, y, mesh.cells, color="#CCCCCC", lw=0.4)
             axes.set_aspect("equal")
         else:
-            axes.plot(np.sort(x), y, "|-", color="#777777")
+            axes.plot(np.sort(x), y, "|-", color=GREY)
             axes.set_yticks([])
         drawn: set[int] = set()
         for edge in edge_table.edges(mesh):
@@ -388,7 +316,7 @@ def edges(mesh: Mesh) -> Figure:
         axes.set(xlabel="x", ylabel="y" if mesh.dimension == 2 else "")
         axes.set_xlim(low[0] - MARGIN * size[0] / 2, low[0] + (1.0 + MARGIN / 2) * size[0])
         axes.xaxis.set_major_locator(MaxNLocator(TICKS + 1))
-        _units(axes, "m", "m" if mesh.dimension == 2 else "")
+        set_units(axes, "m", "m" if mesh.dimension == 2 else "")
     return figure
 
 
@@ -435,17 +363,16 @@ def _histogram(axes: Any, found: Spread, name: str) -> None:
         axes.bar(counts, [100.0 * (values == count).mean() for count in counts], 0.8, color=BLUE)
         axes.xaxis.set_major_locator(MaxNLocator(TICKS, integer=True))
     else:
-        low, high = np.quantile(values, TAILS)
+        low, high = np.quantile(values, (0.001, 0.999))
         weights = np.full(len(values), 100.0 / len(values))
-        axes.hist(values, BINS, range=(low, high) if low < high else None, color=BLUE, weights=weights)
+        axes.hist(values, 60, range=(low, high) if low < high else None, color=BLUE, weights=weights)
         for level, style in ((0.05, ":"), (0.5, "-"), (0.95, ":")):
             each = found.quantile(name, level)
             axes.axvline(each.value, color=VERMILION, ls=style, lw=1.2)
             axes.axvspan(each.low, each.high, color=VERMILION, alpha=0.25, lw=0)
         axes.xaxis.set_major_locator(MaxNLocator(TICKS))
     axes.set(xlabel=NAMES[name], ylabel="blows [%]")
-    if QUANTITIES[name][0]:
-        _units(axes, QUANTITIES[name][0])
+    set_units(axes, QUANTITIES[name][0])
 
 
 def _leading(axes: Any, found: Spread, name: str) -> None:
@@ -456,7 +383,7 @@ def _leading(axes: Any, found: Spread, name: str) -> None:
         return
     first = order[0][0]
     x, y = found.values(first), found.values(name)
-    parts = np.array_split(np.argsort(x, kind="stable"), min(STRIPES, max(1, len(x) // TICKS)))
+    parts = np.array_split(np.argsort(x, kind="stable"), min(16, max(1, len(x) // 4)))  # of equally many blows
     low, middle, high = np.array([np.quantile(y[part], (0.05, 0.5, 0.95)) for part in parts]).T
     if name == "n_impacts":
         middle = np.array([y[part].mean() for part in parts])
@@ -466,9 +393,8 @@ def _leading(axes: Any, found: Spread, name: str) -> None:
     unit = found.table[first].attrs["units"]
     axes.set(xlabel=first if unit == "1" else f"{first} [{unit}]", ylabel=NAMES[name])
     axes.xaxis.set_major_locator(MaxNLocator(TICKS))
-    axes.xaxis.set_major_formatter(EngFormatter(sep=" ") if np.abs(x).max() >= LARGE else "{x:g}")
-    if QUANTITIES[name][0]:
-        axes.yaxis.set_major_formatter(EngFormatter(unit=QUANTITIES[name][0], sep=" "))
+    axes.xaxis.set_major_formatter(EngFormatter(sep=" ") if np.abs(x).max() >= 1e4 else "{x:g}")
+    set_units(axes, y=QUANTITIES[name][0])
 
 
 def _bars(axes: Any, found: Spread, name: str) -> None:
@@ -483,7 +409,7 @@ def _bars(axes: Any, found: Spread, name: str) -> None:
             axes.barh(place, value, height, color=colour, label=f"{kind} order", **bars)
     else:
         axes.barh(place, [100.0 * share for _, share in order], 0.6, color=BLUE)
-    names = [key if len(key) <= LONGEST else f"{key[:LONGEST]}..." for key, _ in order]
+    names = [key if len(key) <= 26 else f"{key[:26]}..." for key, _ in order]  # so long a name fits beside its bar
     axes.set_yticks(place, names, fontsize=8)
     axes.set(xlim=(0.0, 105.0), xlabel="[%]")
     axes.grid(False, axis="y")

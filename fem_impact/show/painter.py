@@ -37,20 +37,12 @@ class Painter:
         self.process: subprocess.Popen[bytes]
 
     def __enter__(self) -> "Painter":
-        command, environment = child.python("show.canvas:main", **canvas.WINDOW)
-        self.process = subprocess.Popen(
-            command, env=environment, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL
-        )
+        self.process = child.begin("show.canvas:main", quiet=True, **canvas.WINDOW)
         self.stack.enter_context(undoable(self.process.kill))
         return self
 
     def __exit__(self, *_: object) -> None:
-        self.process.kill()
-        for pipe in (self.process.stdin, self.process.stdout):
-            assert pipe is not None
-            with suppress(OSError):  # what could not be sent is no longer needed
-                pipe.close()
-        self.process.wait()
+        child.end(self.process)
         self.stack.close()
 
     def begin(self, folder: Path, response: Response, form: str = "png") -> None:

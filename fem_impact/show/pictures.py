@@ -17,7 +17,6 @@ from ..mesh.mesh_files import boundary
 from ..modes.modal import Modes
 from . import FORMATS, canvas, figures, sampling
 
-PATIENCE = 60.0  # [s] time limit of the rendering test
 REMEDY = "for 3D pictures install libegl1 and libgl1-mesa-dri"
 STILL = tuple(f".{name}" for name in FORMATS)
 FRAMES = 48  # [-] default length of an animation: four seconds
@@ -26,12 +25,10 @@ FRAMES = 48  # [-] default length of an animation: four seconds
 @cache
 def can_render() -> bool:
     """Whether pyvista can render here; tested once, in a process that may die from a signal, as `try` cannot catch."""
-    command, environment = child.python("show.canvas:probe", **canvas.WINDOW)
     try:
-        run = subprocess.run(command, env=environment, capture_output=True, timeout=PATIENCE, check=False)
+        return child.run("show.canvas:probe", timeout=60.0, **canvas.WINDOW).returncode == 0
     except subprocess.TimeoutExpired:
         return False
-    return run.returncode == 0
 
 
 @check.typed
@@ -85,9 +82,9 @@ def chladni(modes: Modes, *, count: int = 12, columns: int = 4) -> figures.Figur
 def gallery(modes: Modes, count: int = 12, columns: int = 4) -> canvas.Gallery:
     """The first mode shapes of a plate or a beam, ready to be drawn."""
     points, cells, plane = sampling.surface(modes)
-    shapes, rows, columns = sampling.gallery(modes, points, count, columns)
+    shapes, columns = sampling.gallery(modes, points, count, columns)
     titles = [f"{i + 1}   {figures.in_hertz(modes.frequencies[i])}" for i in range(shapes.shape[1])]
-    return canvas.Gallery(plane, cells, shapes, titles, rows, columns)
+    return canvas.Gallery(plane, cells, shapes, titles, columns)
 
 
 @check.typed
@@ -181,13 +178,7 @@ def _frames(response: Response, times: np.ndarray) -> Iterator[Image.Image]:
         yield from canvas.frames(shown)
         return
     for i, (deflection, title) in enumerate(zip(shown.motion, shown.titles)):
-        yield _in_plane(response, shown.plane, shown.cells, -deflection, title)
+        file = io.BytesIO()
+        figures.snapshot(shown.plane, shown.cells, -deflection, shown.at, title).savefig(file, format="png", dpi=100)
+        yield Image.open(file).convert("RGB")
         progress.report("frames", i + 1, len(times))
-
-
-def _in_plane(response: Response, plane: Any, cells: Any, deflection: Any, title: str) -> Image.Image:
-    file = io.BytesIO()
-    figures.snapshot(plane, cells, deflection, np.atleast_1d(np.asarray(response.at)), title).savefig(
-        file, format="png", dpi=100
-    )
-    return Image.open(file).convert("RGB")

@@ -16,23 +16,15 @@ from matplotlib.ticker import EngFormatter, LogLocator, MaxNLocator, NullFormatt
 from scipy.interpolate import RegularGridInterpolator
 
 from ..impact import accuracy
-from ..mesh.mesh_files import boundary
 from ..modes.modal import Modes
 from ..sweeps.hammers import Hammer, half_sine_reach
 from . import sampling
-from .figures import BLUE, GREEN, ORANGE, PURPLE, SKY, TICKS, VERMILION, styled
+from .figures import TICKS, styled
+from .style import BLUE, GREEN, GREY, ORANGE, PALETTE, PURPLE, SKY, VERMILION, draw_rim, set_units
 
-BLACK, GREY = "#222222", "#777777"
-PALETTE = "cividis"  # perceptually uniform, also for colour-blind readers
-FINER = 8  # [-] each pixel is split into this many parts to draw contours
-FINEST = 400  # [-] parts along an axis at most, or one for each pixel
-PALETTE_OF_POINTS = (BLUE, VERMILION, GREEN, ORANGE, PURPLE, SKY)
-SAMPLES = 100  # [-] points for each mass of hammers: the end of a range is drawn within a percent of its place
-BORDER = VERMILION  # between numbers of impacts: seen on all colours of the palette
-MOST_NAMES = 5  # [-] most names along an axis: more would overlap
-FEW = 10  # [-] a range of fewer whole numbers gets one colour per number
+BLACK = "#222222"
+SCALE = "cividis"  # perceptually uniform, also for colour-blind readers
 HALO: withStroke = withStroke(linewidth=2.2, foreground=BLACK)  # keeps white lines visible on bright colours
-RIM: withStroke = withStroke(linewidth=4.0, foreground="white")  # keeps circles visible on dark colours
 __all__ = ["BLACK", "BLUE", "GREEN", "GREY", "ORANGE", "PURPLE", "SKY", "VERMILION", "Axis", "Curve", "Mark"]
 
 
@@ -48,20 +40,19 @@ class Axis:
 
     def apply(self, axes: Any, which: str) -> None:
         """Set label, scale, limits and ticks of matplotlib axes along 'x' or 'y'."""
-        setter = {"label": f"set_{which}label", "scale": f"set_{which}scale", "limits": f"set_{which}lim"}
-        getattr(axes, setter["label"])(f"{self.label} [dB]" if self.unit == "dB" else self.label)
+        axes.set(**{f"{which}label": f"{self.label} [dB]" if self.unit == "dB" else self.label})
         axis = getattr(axes, f"{which}axis")
         if self.log:
-            getattr(axes, setter["scale"])("log")
+            axes.set(**{f"{which}scale": "log"})
             axis.set_minor_formatter(NullFormatter())
         if self.unit not in ("", "dB"):
-            axis.set_major_formatter(EngFormatter(unit=self.unit, sep=" "))
+            set_units(axes, **{which: self.unit})
         elif self.log:
             axis.set_major_formatter("{x:g}")
         if self.names:
-            axis.set_major_locator(MaxNLocator(MOST_NAMES, integer=True))
+            axis.set_major_locator(MaxNLocator(5, integer=True))  # more names would overlap
             axis.set_major_formatter(lambda x, _: self.names[int(x)] if x in range(len(self.names)) else "")
-        getattr(axes, setter["limits"])(*self.limits)
+        axes.set(**{f"{which}lim": self.limits})
 
 
 @dataclass(frozen=True, eq=False)
@@ -152,56 +143,37 @@ def colour_map(
     """
     along_y, along_x = (np.asarray(values[dim], float) for dim in values.dims)
     field = np.ma.masked_invalid(np.asarray(values, float))
-    low, high = colour.limits
-    low = float(field.min()) if low is None and field.count() else low
-    high = float(field.max()) if high is None and field.count() else high
-    norm: Any = LogNorm(low, high) if colour.log else Normalize(low, high)
-    whole = field.count() and bool((field == field.round()).all()) and not colour.unit and not colour.log
-    few = whole and low is not None and high is not None and high - low < FEW
-    numbers = [float(n) for n in range(int(low or 0), int(high or 0) + 1)] if few else []
-    if few:  # one colour per number
-        norm = BoundaryNorm([number - 0.5 for number in [*numbers, numbers[-1] + 1.0]], colormaps[PALETTE].N)
     with styled(6.4, 4.6) as figure:
         axes = figure.subplots()
         axes.grid(False)
         edges = _edges(along_x, x.log), _edges(along_y, y.log)
         x.apply(axes, "x")  # scales first: contour labels follow the drawn lines
         y.apply(axes, "y")
-        axes.set(xlim=(edges[0][0], edges[0][-1]), ylim=(edges[1][0], edges[1][-1]))
-        image = axes.pcolormesh(*edges, field, norm=norm, cmap=PALETTE, rasterized=True)
+        axes.set(xlim=edges[0][[0, -1]], ylim=edges[1][[0, -1]])
+        _draw_colours(axes, edges, field, colour)
         handles: list[Any] = []
         for mask, paint, name in shades:
             shown = np.ma.masked_equal(np.asarray(mask, float), 0.0)
             axes.pcolormesh(*edges, shown, cmap=ListedColormap([paint]), vmin=0.0, vmax=1.0, rasterized=True)
             handles.append(Patch(facecolor=paint, edgecolor=GREY, label=name))
-        if borders:
+        if borders:  # in a colour that is seen on all of the palette
             paths = [np.column_stack(line) for line in borders]
-            axes.add_collection(LineCollection(paths, colors=BORDER, linewidths=0.8, label="borders"))
-            handles.append(Line2D([], [], color=BORDER, lw=0.8, label="the number of impacts changes"))
-        for (data, levels, unit, name), (paint, style) in zip(contours, _LINES):
+            axes.add_collection(LineCollection(paths, colors=VERMILION, linewidths=0.8, label="borders"))
+            handles.append(Line2D([], [], color=VERMILION, lw=0.8, label="the number of impacts changes"))
+        for (data, levels, unit, name), style in zip(contours, ("solid", "dashed", "dotted")):
             finer = _finer(along_x, along_y, np.asarray(data, float))
-            lines = axes.contour(*finer, levels=levels, colors=paint, linewidths=1.0, linestyles=style)
+            lines = axes.contour(*finer, levels=levels, colors="white", linewidths=1.0, linestyles=style)
             if unit:
                 axes.clabel(lines, fmt={level: EngFormatter(unit=unit, sep=" ")(level) for level in levels}, fontsize=8)
             for part in (lines, *lines.labelTexts):
                 part.set_path_effects([HALO])
-            handles.append(Line2D([], [], color=paint, ls=style, lw=1.0, label=name, path_effects=[HALO]))
+            handles.append(Line2D([], [], color="white", ls=style, lw=1.0, label=name, path_effects=[HALO]))
         for mark in marks:
             ring: dict[str, Any] = {"ls": "", "marker": "o", "ms": 10, "mfc": "none", "mec": mark.color, "mew": 2.2}
-            ring["path_effects"] = [RIM]
+            ring["path_effects"] = [withStroke(linewidth=4.0, foreground="white")]  # seen on dark colours
             axes.plot([mark.x], [mark.y], clip_on=False, **ring)
             handles.append(Line2D([], [], label=mark.label, **ring))
         axes.set_title(title)
-        bar = figure.colorbar(image, ax=axes, label=colour.label, pad=0.02)
-        if colour.log:
-            bar.ax.yaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
-        bar.ax.yaxis.set_minor_formatter(NullFormatter())
-        bar.ax.yaxis.set_major_formatter(EngFormatter(unit=colour.unit, sep=" ") if colour.unit else "{x:g}")
-        if few:
-            bar.set_ticks(numbers)
-            bar.ax.tick_params(which="both", length=0)
-        elif whole:
-            bar.ax.yaxis.set_major_locator(MaxNLocator(integer=True))
         if handles:
             legend = figure.legend(handles=handles, loc="outside lower center", ncols=2, fontsize=9)
             legend.set_frame_on(True)
@@ -209,7 +181,28 @@ def colour_map(
     return figure
 
 
-_LINES = [("white", style) for style in ("solid", "dashed", "dotted")]  # of each set of contours, in order
+def _draw_colours(axes: Any, edges: tuple[np.ndarray, np.ndarray], field: np.ma.MaskedArray, colour: Axis) -> None:
+    """Draw the pixels between edges and the bar beside them; of fewer than ten whole numbers, each has its colour."""
+    low, high = colour.limits
+    low = float(field.min()) if low is None and field.count() else low
+    high = float(field.max()) if high is None and field.count() else high
+    norm: Any = LogNorm(low, high) if colour.log else Normalize(low, high)
+    whole = field.count() and bool((field == field.round()).all()) and not colour.unit and not colour.log
+    few = whole and low is not None and high is not None and high - low < 10
+    numbers = np.arange(int(low or 0), int(high or 0) + 1.0)
+    if few:
+        norm = BoundaryNorm([*(numbers - 0.5), numbers[-1] + 0.5], colormaps[SCALE].N)
+    image = axes.pcolormesh(*edges, field, norm=norm, cmap=SCALE, rasterized=True)
+    bar = axes.figure.colorbar(image, ax=axes, label=colour.label, pad=0.02)
+    if colour.log:
+        bar.ax.yaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
+    bar.ax.yaxis.set_minor_formatter(NullFormatter())
+    bar.ax.yaxis.set_major_formatter(EngFormatter(unit=colour.unit, sep=" ") if colour.unit else "{x:g}")
+    if few:
+        bar.set_ticks(numbers)
+        bar.ax.tick_params(which="both", length=0)
+    elif whole:
+        bar.ax.yaxis.set_major_locator(MaxNLocator(integer=True))
 
 
 def _finer(x: np.ndarray, y: np.ndarray, data: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -217,7 +210,7 @@ def _finer(x: np.ndarray, y: np.ndarray, data: np.ndarray) -> tuple[np.ndarray, 
     if min(x.min(), y.min(), np.nanmin(data)) <= 0.0 or min(data.shape) < 2:
         return x, y, data
     read = RegularGridInterpolator((np.log(y), np.log(x)), np.log(data))
-    parts = [max(1, min(FINER, FINEST // len(v))) for v in (x, y)]
+    parts = [max(1, min(8, 400 // len(v))) for v in (x, y)]  # of each pixel; some 400 along an axis are fine enough
     x, y = (
         np.interp(np.arange(0, len(v) - 1 + 1e-9, 1 / n), np.arange(len(v)), np.log(v)) for v, n in zip((x, y), parts)
     )
@@ -270,7 +263,7 @@ def _working(
     if not works.any():
         return mass, softest, hardest
     log = np.log(mass)
-    x = np.unique(np.concatenate([log, np.linspace(log[0], log[-1], SAMPLES * len(log))]))
+    x = np.unique(np.concatenate([log, np.linspace(log[0], log[-1], 100 * len(log))]))
     ratio = np.interp(x, log[works], np.log(softest / wanted)[works])
     low, high = np.interp(x, log, np.log(wanted)) + ratio, np.interp(x, log, np.log(hardest))
     idle = ~works & ~(hardest < np.exp(np.interp(log, x, low)))  # some other reason: nothing is known beside it
@@ -291,7 +284,7 @@ def places(
     tall = float(np.ptp(plane[:, 1]) / np.ptp(plane[:, 0]))
     with styled(7.0, 6.0 * min(1.4, max(0.2, tall)) + 1.2) as figure:
         axes = figure.subplots()
-        axes.add_collection(LineCollection(list(plane[boundary(cells)]), colors=GREY, linewidths=1.0))
+        draw_rim(axes, plane, cells)
         flat = {name: np.column_stack([some, np.zeros(len(some))])[:, :2] for name, some in groups.items()}
         painted = [name for name in flat if name not in crossed]
         for name, some in flat.items():
@@ -299,26 +292,17 @@ def places(
                 axes.plot(*some.T, crossed[name], color=BLACK, ms=8, mew=1.8, label=name)
             else:
                 i = painted.index(name)
-                style = PALETTE_OF_POINTS[i % len(PALETTE_OF_POINTS)], "o^sD"[i // len(PALETTE_OF_POINTS) % 4]
-                axes.plot(*some.T, style[1], color=style[0], ms=8, label=name)
+                marker, colour = "o^sD"[i // len(PALETTE) % 4], PALETTE[i % len(PALETTE)]
+                axes.plot(*some.T, marker, color=colour, ms=8, label=name)
         axes.plot(*np.append(sensor, 0.0)[:2], "*", color=BLACK, ms=15, mfc="none", mew=1.2)
-        axes.set_aspect("equal")
         axes.autoscale_view()
         axes.margins(0.05)
-        axes.set_title(title)
-        _coordinates(axes, modes.dimension)
+        axes.set(title=title, xlabel="x", ylabel="y" if modes.dimension == 2 else "")
+        set_units(axes, "m", "m")
+        if modes.dimension == 1:
+            axes.set_yticks([])
         figure.legend(loc="outside lower center", ncols=2)
     return figure
-
-
-def _coordinates(axes: Any, dimension: int) -> None:
-    axes.set_xlabel("x")
-    axes.xaxis.set_major_formatter(EngFormatter(unit="m", sep=" "))
-    axes.yaxis.set_major_formatter(EngFormatter(unit="m", sep=" "))
-    if dimension == 1:
-        axes.set_yticks([])
-    else:
-        axes.set_ylabel("y")
 
 
 def set_ticks(axes: Any, low: float, high: float, log: bool) -> None:

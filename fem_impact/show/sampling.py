@@ -34,13 +34,12 @@ def surface(modes: Modes) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     return plane[:, :1], cells, plane
 
 
-def gallery(modes: Modes, points: np.ndarray, count: int, columns: int) -> tuple[np.ndarray, int, int]:
-    """The first shapes at points, each with largest value 1, (n_points, n); rows and columns to draw them in."""
+def gallery(modes: Modes, points: np.ndarray, count: int, columns: int, first: int = 0) -> tuple[np.ndarray, int]:
+    """The shapes from the ``first`` on at points, each with largest value 1, (n_points, n), and columns to draw."""
     check.between("dimension of modes", modes.dimension, 1, 2)
-    count = min(check.count("count", count), modes.n_modes)
-    columns = min(check.count("columns", columns), count)
-    shapes = modes.truncated(n_modes=count).shapes.at(points)
-    return shapes / np.maximum(np.abs(shapes).max(axis=0), 1e-300), -(-count // columns), columns
+    count = min(check.count("count", count), modes.n_modes - first)
+    shapes = modes.truncated(n_modes=first + count).shapes.at(points)[:, first:]
+    return shapes / np.maximum(np.abs(shapes).max(axis=0), 1e-300), min(check.count("columns", columns), count)
 
 
 def gap(response: Response, times: np.ndarray) -> np.ndarray:
@@ -66,3 +65,9 @@ def telling(response: Response, times: np.ndarray) -> int:
     """Index of the time [s] that shows the wave best: the first with half the largest deflection under the striker."""
     deflection = np.abs(response.displacement(_struck(response)[1][None], times)[:, 0])
     return int(np.argmax(deflection >= 0.5 * deflection.max()))
+
+
+def ringing(modes: Modes, some: np.ndarray, limits: tuple[float, float]) -> float:
+    """How long it takes until the slowest of some modes has lost 60 dB [s], within limits."""
+    slowest = float((modes.damping_ratio * modes.omega)[some].min(initial=np.inf))
+    return float(np.clip(np.log(1e3) / slowest, *limits)) if slowest > 0.0 else limits[1]

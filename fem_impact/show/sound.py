@@ -23,11 +23,7 @@ LOUDEST = 200.0  # [Pa] pressure of sample value 1.0: 140 dB, far louder than an
 REFERENCE = {"m/s": (1e-9, "1 nm/s"), "Pa": (20e-6, "20 µPa")}  # unit: value of 0 dB (ISO 1683) and its name
 OVERSAMPLING = 8  # [-] instants per sample as the first waves arrive: the finite differences err by 0.5 % at 10 kHz
 HIGHEST_RATE = 1_000_000  # [Hz] highest sample rate: far above what any device plays
-MOST_SAMPLES = 10_000_000  # [-] most samples: three minutes at 48 kHz take about ten seconds to compute
 SHORTEST, LONGEST = 0.5, 5.0  # [s] limits of the default duration: long enough to hear a pitch, short enough to compare
-DECAY = np.log(1e3)  # [-] by default the sound ends when its slowest mode has lost 60 dB
-FADE = 0.3  # [s] of a file or player at its end
-NEAREST = 1e-6  # [m] least distance of a listener from the plate
 BLOCK = 4096  # [-] samples computed at a time as the first waves arrive: limits the memory, does not change the result
 COMPACT = 0.5  # [-] half the width of a bar times the wavenumber, up to which a piece of it is a dipole; test_sound.py
 SQUARE = 1.51  # [-] mass of air that a square section drags, over that of a flat strip of its width
@@ -65,8 +61,8 @@ class Sound(check.Locked):
         return replace(self, samples=self.samples / peak, full_scale=self.full_scale * peak)
 
     def faded(self) -> "Sound":
-        """The same sound, ending in a fade of FADE seconds or of a quarter of its length, so that it does not click."""
-        count = min(round(FADE * self.rate), len(self.samples) // 4)
+        """The same sound, ending in a fade of 0.3 seconds or of a quarter of its length, so that it does not click."""
+        count = min(round(0.3 * self.rate), len(self.samples) // 4)
         samples = self.samples.copy()
         fall = np.cos(0.5 * np.pi * np.arange(1, count + 1) / max(count, 1)) ** 2
         samples[len(samples) - count :] *= fall if samples.ndim == 1 else fall[:, None]
@@ -254,7 +250,10 @@ def radiate(
     density, speed = _air(air)
     rate, heard = _audible(response, rate)
     points, cells = sampling.grid(modes)
-    weights = density / (2.0 * np.pi) * np.sign(place[2]) * _areas(points, cells)
+    (ax, ay), (bx, by), (cx, cy) = points[cells].transpose(1, 2, 0)
+    area = 0.5 * np.abs((bx - ax) * (cy - ay) - (by - ay) * (cx - ax))  # a third of it belongs to each corner
+    areas = np.bincount(cells.reshape(-1), np.repeat(area / 3.0, 3), minlength=len(points))
+    weights = density / (2.0 * np.pi) * np.sign(place[2]) * areas
     way = np.sqrt(((points - place[:2]) ** 2).sum(axis=1) + place[2] ** 2)  # (n_points,) [m]
     shapes = modes.shapes.at(points)[:, heard] * (weights / way)[:, None]  # (n_points, n_heard)
     times = _times(response, heard, duration, rate)
@@ -431,7 +430,7 @@ def _pressure(
 def beside(listener: Any) -> np.ndarray:
     """Check the coordinates (3,) [m] of a listener, which must lie off the plate's plane."""
     place = check.array("listener", listener, (3,), "m")
-    if not abs(place[2]) >= NEAREST:
+    if not abs(place[2]) >= 1e-6:
         raise ValueError(
             f"listener must lie off the plate's plane, got a third coordinate of {place[2]:g} m; give a distance"
         )
@@ -452,10 +451,10 @@ def _air(air: Any) -> tuple[float, float]:
 def _times(response: Response | Strokes, heard: np.ndarray, duration: float | None, rate: int) -> np.ndarray:
     """Times [s] of all samples in a duration [s]; without one, chosen from the decay after the last stroke."""
     if duration is None:
-        slowest = float((response.target.damping_ratio * response.target.omega)[heard].min(initial=np.inf))
-        duration = float(np.clip(DECAY / slowest, SHORTEST, LONGEST)) if slowest > 0.0 else LONGEST
+        duration = sampling.ringing(response.target, heard, (SHORTEST, LONGEST))
         duration += 0.0 if isinstance(response, Response) else float(response.starts[-1] - response.starts[0])
-    duration = check.between("duration", check.positive("duration", duration, "s"), 0.0, MOST_SAMPLES / rate, "s")
+    # so many samples take about ten seconds to compute
+    duration = check.between("duration", check.positive("duration", duration, "s"), 0.0, 1e7 / rate, "s")
     return response.time[0] + np.arange(max(1, round(duration * rate))) / rate
 
 
@@ -483,13 +482,6 @@ def _ring(
     modes = response.target
     bias = response.constant_forces[heard]
     return free_motion.swing(modes.omega[heard], modes.damping_ratio[heard], bias, state, times, weights, order)
-
-
-def _areas(points: np.ndarray, cells: np.ndarray) -> np.ndarray:
-    """Area [m^2] of each point, (n_points,): a third of every triangle around it."""
-    a, b, c = (points[cells[:, i]] for i in range(3))
-    area = 0.5 * np.abs((b - a)[:, 0] * (c - a)[:, 1] - (b - a)[:, 1] * (c - a)[:, 0])
-    return np.bincount(cells.reshape(-1), np.repeat(area / 3.0, 3), minlength=len(points))
 
 
 def _arrival(

@@ -53,6 +53,8 @@ def body_of(
 ) -> tuple[Case, dict[str, np.ndarray]]:
     """The blow that all cells of a map share, on a body described as well as its cells need, and the map's axes.
 
+    A body given by its modes keeps them.
+
     Parameters
     ----------
     target : Target
@@ -65,6 +67,9 @@ def body_of(
     """
     stages = stages or Stages()
     speed = check.positive("speed", speed, "m/s", reach=REACH)
+    if target.modes is not None:
+        case = _started(target.finished(target.modes), striker, contact, at, speed)
+        return case, checked_axes(case, over)
     if alone and vectors.usable(target):
         case = _started(outline(target, stages), striker, contact, at, speed)
         axes = checked_axes(case, over)
@@ -196,6 +201,28 @@ def by_vectors(
     if views is None:
         return None
     return replace(case, modes=views[tuple(points[0].tolist())], at=points[0], views=views)
+
+
+def of_hammers(
+    target: Target, at: Any, ends: Sequence[Mapping[str, float]], chance: Sequence[Mapping[str, float]],
+    tolerance: float, n_modes: int, stages: Stages,
+) -> tuple[list[Modes], bool]:  # fmt: skip
+    """The body as blows of rigid hammers with linear tips at each point need it, and whether that is by Ritz vectors.
+
+    ``ends`` and ``chance`` as in `Sized`, of "mass" and "stiffness"; only whether a second impact follows matters.
+    """
+    if target.modes is None and vectors.usable(target):
+        shape = outline(target, stages)
+        points = shape.points("at", at)
+        case = Case(shape, Striker.rigid(ends[0]["mass"]), Contact.linear(1.0), points[0], 1.0)
+        views = Sized(target, case, ends, chance, tolerance, max_impacts=2).views(points, stages)
+        if views is not None:
+            return [views[tuple(point.tolist())] for point in points], True
+    modes = target.modes
+    if modes is None:
+        with stages("modes"):
+            modes = target.find(n_modes, tolerance=tolerance, stages=stages)
+    return [target.surrounded(modes)] * len(np.atleast_2d(at)), False
 
 
 @dataclass(frozen=True, eq=False)

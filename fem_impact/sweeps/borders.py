@@ -11,8 +11,8 @@ from contourpy import LineType, contour_generator
 from .._base import check
 from ..model.budget import FINEST
 from . import batches
+from .cases import Cases
 from .cells import AXES, FAMILY_AXES, logarithmic
-from .cloud import Cloud
 from .refined import beside_change
 
 WIDTH = 1.5e-3  # [-] widest bracket of a border, a share of the axis: half of it and FINER together stay below 1e-3
@@ -26,7 +26,7 @@ MEANINGS = {
     "error": "largest error of a point along the axis on which it was located, as a share of that axis",
 }
 
-Solve = Callable[[Cloud, str], tuple[np.ndarray, dict[int, str]]]  # a cloud, the name of the round: as `cloud.solve`
+Solve = Callable[[Cases, str], tuple[np.ndarray, dict[int, str]]]  # cases, the name of the round: as `cases.solve`
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,7 +51,7 @@ class FoundBorders:
 class Plane:
     """The two axes of a map; a place on it is counted in cells, (n, 2), fractions lie between the cells."""
 
-    grid: Any
+    grid: Cases
     solve: Solve
     kernels: batches.Kernels = field(default_factory=dict)
 
@@ -88,16 +88,14 @@ class Plane:
         }
         shared = not {*FAMILY_AXES, "loss"} & set(axes)  # then all rounds strike the same bodies
         tolerance = min(self.grid.tolerance, max(FINEST, FINER * self.grid.tolerance))
-        cloud = Cloud(
-            self.grid.base, axes, tolerance, self.grid.residual, None, audit=False,
-            kernels=self.kernels if shared else {},
-        )  # fmt: skip
-        numbers, _ = self.solve(cloud, turn)
-        count = numbers[cloud.layers.index("n_impacts")]
+        kernels = self.kernels if shared else {}
+        rows = Cases(self.grid.base, axes, tolerance, self.grid.residual, by_row=True, kernels=kernels)
+        numbers, _ = self.solve(rows, turn)
+        count = numbers[rows.layers.index("n_impacts")]
         return np.where(np.isnan(count), -1, count).astype(int)
 
 
-def why_none(grid: Any) -> str:
+def why_none(grid: Cases) -> str:
     """Why a map has no borders: '' if it has."""
     if len(grid.shape) != 2 or min(grid.shape) < 2:
         return f"a map needs two axes of two values or more, got {_sizes(grid)}"
@@ -111,20 +109,20 @@ def why_none(grid: Any) -> str:
     return ""
 
 
-def _sizes(grid: Any) -> str:
+def _sizes(grid: Cases) -> str:
     return ", ".join(f"{name} ({len(values)})" for name, values in grid.axes.items())
 
 
-def find_borders(grid: Any, count: np.ndarray, solve: Solve) -> FoundBorders:
+def find_borders(grid: Cases, count: np.ndarray, solve: Solve) -> FoundBorders:
     """The borders between numbers of impacts.
 
     Parameters
     ----------
-    grid : grid.Grid, see `why_none`
+    grid : Cases, see `why_none`
     count : ndarray of int, shape of the grid
         Number of impacts in each cell; -1 if it was refused.
     solve : callable
-        Computes a cloud of blows; takes the cloud and a name for the round.
+        Computes cases; takes them and a name for the round.
 
     Notes
     -----

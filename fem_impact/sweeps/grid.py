@@ -5,8 +5,7 @@ import math
 import os
 import time
 from collections.abc import Callable, Mapping
-from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -14,194 +13,106 @@ import numpy as np
 import xarray
 
 from .._base import check
-from .._base.check import SimulationError
 from .._base.files import PARTIAL
-from .._base.rounding import ROUNDING
 from ..fe import plausible
 from ..fe.assembly import System
-from ..impact import accuracy
-from ..impact.collision import strike
-from ..impact.contact import Contact, wall_time
-from ..impact.distance import distance
+from ..impact.contact import Contact
 from ..impact.response import Response
 from ..impact.striker import Striker
-from ..impact.what_if import RESOLVABLE
 from ..model.asked import COSTLY
 from ..model.target import Target
 from ..modes.modal import Damping, Modes
-from . import batches, bodies, cloud, refined
+from . import batches, bodies, cell_errors, refined
 from .borders import add_borders, find_borders, why_none
-from .cells import AXES, FAMILY_AXES, REACH, Case, checked_axes, laid_out
-from .solving import LAYERS, alone, plain, solve_all, struck_alone, together
+from .cases import LAYERS, Cases, solve_all
+from .cells import AXES, Case, laid_out
 from .store import Texts, Watch, not_free
 
 TOLERANCE = 1e-3  # [-] default error limit of a map
-# [-] cells struck again for the error of vectors, in a batch or alone: some 0.1 and 0.2 s
-DOUBTED = {True: 10_000, False: 100}
 MOST_CELLS = 10**8  # [-] default limit of a map: half an hour to two hours of work, 8 GB
-# [s] per blow, in a batch or alone, that foretell the time; the slower plates of studies/map_speed.py. Does not change
-# the result
+# [s] per blow, in a batch or alone, that foretell the time; the slower plates of studies/benchmarks/map_speed.py. Does
+# not change the result
 SECONDS = {True: 1e-5, False: 2e-3}
 # [s] a map with default axes that takes less is computed in all its cells: refining it would gain nothing to notice
 DENSE = 1.0
-MOST_MIDDLES = 4  # [-] axes whose middle is examined, too: 3**4 = 81 blows, where five would take 243
 Tell = Callable[[str], Any]
 
 
-@dataclass(frozen=True, eq=False)
-class Grid:
-    """The blow all cells share, the axes that vary it, and what to compute in each cell."""
+@dataclass(frozen=True)
+class Job:
+    """What to compute of a map, where, where it is kept and who is told: arguments of `sweep`, checked."""
 
-    base: Case
-    axes: Mapping[str, np.ndarray]  # name: (n,) values, for `at` (n, dimension)
     tolerance: float  # [-]
-    residual: bool
-    band: float | None  # [Hz] upper end of the centroid's band
-    extra: Mapping[str, Callable[[Response], float]]  # additional layers
-    audit: bool = False  # whether the model's own error is wanted
-    max_impacts: int | None = None  # what follows does not matter where cells are computed alone
-    kernels: batches.Kernels = field(default_factory=dict)  # computed so far
-    chosen: np.ndarray | None = None  # (n_cases,) cells to compute, numbered with the last axis fastest; all by default
+    max_frequency: float | None = None  # [Hz]
+    layers: Any = None  # mapping of name to function of a Response
+    residual: bool = True
+    workers: int | None = None
+    client: Any = None
+    store: Any = None  # path
+    watch: Watch | None = None
+    tell: Tell | None = None
+    audit: bool = False
+    borders: bool | None = None
+    refine: bool | None = None
+    ours: bool = False  # whether the cells of an axis were chosen by this program
 
-    @property
-    def shape(self) -> tuple[int, ...]:
-        return tuple(len(values) for values in self.axes.values())
-
-    @property
-    def n_cases(self) -> int:
-        return math.prod(self.shape) if self.chosen is None else len(self.chosen)
-
-    def cells(self, start: int, stop: int) -> np.ndarray:
-        """Numbers of some of the cells to compute, (n_cells,)."""
-        return np.arange(start, stop) if self.chosen is None else self.chosen[start:stop]
-
-    @property
-    def lossy(self) -> bool:
-        """Whether any contact loses energy."""
-        return bool(self.base.contact.lossy or {"loss", "yield_approach", "hysteresis"} & set(self.axes))
-
-    @property
-    def quick(self) -> bool:
-        """Whether all cells are computed together."""
-        exponents = self.axes.get("exponent", [self.base.contact.exponent])
-        layered = self.base.contact.hard_stiffness or "hard_stiffness" in self.axes
-        alone = self.lossy or layered or self.extra or self.base.modes.stretches
-        return not alone and min(exponents) >= 1.0
-
-    @property
-    def layers(self) -> list[str]:
-        """Names of the numbers computed in each cell."""
-        return [name for name in LAYERS if name != "centroid" or self.band is not None] + list(self.extra)
-
-    def case(self, index: int) -> Case:
-        """The blow of one cell."""
-        case, cell = self.base, self.cells(index, index + 1)[0]
-        for (name, values), i in zip(self.axes.items(), np.unravel_index(cell, self.shape)):
-            case = case.changed(name, values[i])
-        return case
-
-    def blow(self, index: int) -> Response:
-        """The blow of one cell by the modal engine."""
-        return struck_alone(self, self.case(index))
-
-    def doubt(self, index: int) -> float:
-        """Error [-] of the body's vectors and mesh in one cell struck alone; 0 if that fails."""
-        case = self.case(index)
-        try:
-            error = strike(
-                case.modes, case.striker, case.contact, at=case.at, speed=case.speed, tolerance=self.tolerance
-            ).error
-        except SimulationError:
-            return 0.0
-        return error.truncation + error.mesh
-
-    def left_out(self) -> np.ndarray:
-        """Expected error [-] of leaving out modes, in the shape of the grid; infinite where they govern the contact."""
-        if not self.residual:
-            return np.zeros(self.shape)
-        base, places = self.base, self.axes.get("at", self.base.at[None])
-        seen = [base.changed("at", place).modes for place in places] if base.views else [base.modes] * len(places)
-
-        def along(name: str, values: Any) -> np.ndarray:
-            """Values of an axis, or one that all cells share, shaped to broadcast over the grid."""
-            shape = [-1 if axis == name else 1 for axis in self.axes] if name in self.axes else [1]
-            return np.reshape(np.asarray(values, float), shape)
-
-        def value(name: str, shared: float) -> np.ndarray:
-            return along(name, self.axes.get(name, [shared]))
-
-        stiffness, exponent, loss, share = (
-            value(name, getattr(base.contact, name)) for name in ("stiffness", "exponent", "loss", "hysteresis")
-        )
-        speed = value("speed", base.speed)
-        weight = value("mass", base.striker.mass) / base.striker.mass
-        felt = base.striker.felt_mass * weight
-        omega = np.pi / wall_time(stiffness, exponent, 1.0 / felt, speed)
-        yielding = base.modes.dimension > 0
-        left = [modes.residual_compliance(place)[0, 0] if yielding else 0.0 for modes, place in zip(seen, places)]
-        last = along("at", [modes.omega[-1] for modes in seen])
-        striker = base.striker
-        sides = [
-            (base.modes, along("at", left), last, base.first, "target_mass", "target_frequency"),
-            (striker.modes, striker.left_out[0][0, 0], striker.modes.omega[-1], None, "mass", "striker_frequency"),
-        ]  # fmt: skip
-        total, softness = np.zeros(self.shape), np.zeros(self.shape)
-        for modes, rest, edge, first, mass, frequency in sides:
-            if not modes.dimension or not modes.omega.any():
-                continue
-            first = first or float(modes.frequencies[modes.omega > 0.0][0])
-            ratio = value(frequency, first) / first
-            soft = felt * omega**2 * np.maximum(rest, 0.0) * modes.mass / value(mass, modes.mass) / ratio**2
-            above = np.minimum(1.0, omega / (edge * ratio))
-            total = total + accuracy.left_out_error(soft, above, exponent, modes.dimension)
-            softness = softness + soft
-        return np.where(
-            softness <= RESOLVABLE, total * np.where((loss > 0.0) | (share > 0.0), accuracy.LOSSY, 1.0), np.inf
+    def __post_init__(self) -> None:
+        layers = {} if self.layers is None else self.layers
+        if not isinstance(layers, Mapping) or not all(isinstance(n, str) and callable(f) for n, f in layers.items()):
+            raise ValueError(f"layers must map names to functions of a Response, got {check.shown(layers)}")
+        if self.refine and layers:
+            raise ValueError("layers of one's own are not interpolated: refine is not for them")
+        band = self.max_frequency
+        check.settle(
+            self,
+            tolerance=check.tolerance(self.tolerance),
+            max_frequency=None if band is None else check.positive("max_frequency", band, "Hz"),
+            layers=dict(layers),
+            workers=None if self.workers is None else check.count("workers", self.workers),
+            store=None if self.store is None else Path(self.store),
         )
 
-    def model_error(self) -> tuple[np.ndarray, str]:
-        """The model's own error [-] in the shape of the grid, and what of it is not known.
+    def solved(self, cases: Cases, turn: str = "") -> tuple[np.ndarray, Texts]:
+        """Compute all cases; those of a round with a name are kept in a folder of the store."""
+        place = self.store / turn if self.store is not None and turn else self.store
+        return solve_all(cases, self.workers, self.client, place, None if turn else self.watch)
 
-        Examined at the ends and the middle of every axis, at the ends of more than MOST_MIDDLES, and interpolated in
-        its logarithm; NaN where these fail.
-        """
-        middle = [] if len(self.shape) > MOST_MIDDLES else [0.5]
-        some = [np.unique([0, *(int(share * (n - 1)) for share in middle), n - 1]) for n in self.shape]
-        found = np.empty([len(places) for places in some])
-        unknown: dict[str, None] = {}
-        for at in np.ndindex(*found.shape):
-            index = np.ravel_multi_index([places[i] for places, i in zip(some, at)], self.shape)
-            try:
-                hit = self.blow(int(index))
-            except SimulationError:
-                found[at] = np.nan
-                continue
-            found[at] = max(hit.model_error, ROUNDING)
-            unknown |= {each.name: None for each in hit.assumptions if not each.known}
-        logs = np.log(found)
-        for axis, (places, n) in enumerate(zip(some, self.shape)):
-            logs = np.apply_along_axis(lambda column: np.interp(np.arange(n), places, column), axis, logs)  # noqa: B023
-        return np.exp(logs), ", ".join(unknown)
+    def _held(self) -> set[str]:
+        """Names in the folder of the store, but for what is not finished."""
+        if self.store is None or not self.store.exists():
+            return set()
+        return {name for name in os.listdir(self.store) if not name.startswith(PARTIAL)}
 
-    def scene(self) -> dict[str, Any]:
-        """The blow that all cells share, as plain numbers, and which cells these are if not all."""
-        return plain(self.base) | ({} if self.chosen is None else {"cells": self.chosen.tolist()})
-
-    def sampled(self) -> "Grid":
-        """The same grid with each body reduced to its contact points: small enough to send to a cluster."""
-        if self.base.modes.stretches:
-            return replace(self, kernels={})  # slopes are not known from points
-        return replace(self, base=self.base.sampled(self.axes.get("at", self.base.at[None])), kernels={})
-
-    def without_speed(self) -> "Grid | None":
-        """The grid at one speed if every contact is linear, so that speed only scales the forces; otherwise None."""
-        exponents = self.axes.get("exponent", np.array([self.base.contact.exponent]))
-        law = self.base.contact
-        if "speed" not in self.axes or (exponents != 1.0).any() or self.lossy or law.gap or self.extra:
+    def refined(self, cases: Cases) -> refined.Refined | None:
+        """Compute a map where its answer changes; None if all cells are predicted to be quick, unless asked for."""
+        held = self._held()
+        if "zarr.json" in held and not self.refine:
             return None
-        if law.hard_stiffness or "hard_stiffness" in self.axes or self.base.modes.stretches:
-            return None
-        return replace(self, axes={**self.axes, "speed": self.axes["speed"][:1]})
+        if self.store is not None and held and "round-1" not in held:
+            raise not_free(self.store)
+        first = replace(cases, chosen=np.unique(refined.first_blocks(cases.shape).cells(cases.shape[1])))
+        here = replace(self, store=None, watch=None)
+        here.solved(replace(cases, chosen=first.cells(0, 1)))  # compiles
+        began = time.process_time()
+        start = here.solved(first)
+        seconds = (time.process_time() - began) / first.n_cases * cases.n_cases / (self.workers or os.cpu_count() or 1)
+        if not self.refine and "round-1" not in held and self.client is None:
+            some = seconds > DENSE
+            if self.tell is not None:
+                done = "only those where the answer changes are computed" if some else "all are computed"
+                self.tell(f"all {cases.n_cases} cells are expected to take {seconds:.2g} s: {done}")
+            if not some:
+                return None
+
+        def compute(cells: np.ndarray, turn: str) -> tuple[np.ndarray, Texts]:
+            """Cells of one round; those of the first are known."""
+            return start if turn == "round-0" else self.solved(replace(cases, chosen=cells), turn)
+
+        def settled(done: int) -> None:
+            if self.watch is not None:
+                self.watch(done, cases.n_cases)
+
+        return refined.refine((cases.shape[0], cases.shape[1]), cases.layers, cases.tolerance, compute, settled)
 
 
 @check.typed
@@ -250,8 +161,8 @@ def sweep(
         Damping of a system, which has none of its own.
     layers : mapping of name to function of a Response, optional
         Additional scalars to compute; the functions run in threads. Every cell is then computed alone, which is about
-        a hundred times slower (``studies/map_speed.py``); so are cells with an exponent below 1, and contacts of two
-        layers, that yield or are felt.
+        a hundred times slower (``studies/benchmarks/map_speed.py``); so are cells with an exponent below 1, and
+        contacts of two layers, that yield or are felt.
     residual : bool
         As in `strike`.
     workers : int, optional
@@ -312,38 +223,22 @@ def sweep(
     >>> table.n_impacts.values.tolist()
     [[1, 1, 4], [1, 2, 4]]
     """
-    tolerance = check.tolerance(tolerance)
-    layers = _checked_layers(layers)
     striker.let_go("a map")
-    ours = False
+    job = Job(
+        tolerance, max_frequency, layers, residual, workers, client, store, watch, tell, bool(audit), borders, refine
+    )
     if isinstance(over, Mapping):
-        alone_ = bool(layers) or (isinstance(modes, Modes) and modes.stretches)
-        over, ours = laid_out(over, contact, alone=alone_, cells=cells)
-    if isinstance(modes, Modes):
-        modes = modes if damping_ratio is None else modes.damped(damping_ratio)
-        speed = check.positive("speed", speed, "m/s", reach=REACH)
-        base = Case(modes, striker, contact, modes.point("at", at)[0], speed)
-        axes = checked_axes(base, over)
-    else:
-        base, axes = bodies.body_of(
-            Target.of(modes, damping_ratio), striker, contact, at=at, speed=speed, over=over, tolerance=tolerance,
-            alone=residual and not layers, keep=kept_beside(store),
-        )  # fmt: skip
-    max_cells = check.number("max_cells", max_cells)
-    n_cells = math.prod(map(len, axes.values()))
-    admit(n_cells, len(LAYERS) + len(layers), max_cells, quick=not layers, tell=tell)
-    return run(
-        base, axes, tolerance=tolerance, max_frequency=max_frequency, layers=layers, residual=residual, workers=workers,
-        client=client, store=store, watch=watch, tell=tell, audit=audit, borders=borders, refine=refine, ours=ours,
+        alone = bool(job.layers) or (isinstance(modes, Modes) and modes.stretches)
+        over, ours = laid_out(over, contact, alone=alone, cells=cells)
+        job = replace(job, ours=ours)
+    base, axes = bodies.body_of(
+        Target.of(modes, damping_ratio), striker, contact, at=at, speed=speed, over=over, tolerance=job.tolerance,
+        alone=residual and not job.layers, keep=kept_beside(store),
     )  # fmt: skip
-
-
-def _checked_layers(layers: Any) -> dict[str, Callable[[Response], float]]:
-    """Additional layers of a map, which may be None."""
-    found = {} if layers is None else layers
-    if not isinstance(found, Mapping) or not all(isinstance(name, str) and callable(found[name]) for name in found):
-        raise ValueError(f"layers must map names to functions of a Response, got {check.shown(layers)}")
-    return dict(found)
+    n_cells = math.prod(map(len, axes.values()))
+    max_cells = check.number("max_cells", max_cells)
+    admit(n_cells, len(LAYERS) + len(job.layers), max_cells, quick=not job.layers, tell=tell)
+    return run(base, axes, job)
 
 
 def kept_beside(store: str | Path | None) -> Path | None:
@@ -351,57 +246,40 @@ def kept_beside(store: str | Path | None) -> Path | None:
     return None if store is None else Path(store).with_name(f"{Path(store).name}.modes.npz")
 
 
-def run(
-    base: Case,
-    axes: Mapping[str, np.ndarray],
-    *,
-    tolerance: float,
-    max_frequency: float | None = None,
-    layers: Mapping[str, Callable[[Response], float]] | None = None,
-    residual: bool = True,
-    workers: int | None = None,
-    client: Any = None,
-    store: str | Path | None = None,
-    watch: Watch | None = None,
-    tell: Tell | None = None,
-    audit: bool = False,
-    borders: bool | None = None,
-    refine: bool | None = None,
-    ours: bool = False,
-) -> xarray.Dataset:
-    """The map of a blow over axes that are checked; as `sweep`; ``ours`` if the cells of an axis were chosen here."""
-    band = None if max_frequency is None else check.positive("max_frequency", max_frequency, "Hz")
-    workers = None if workers is None else check.count("workers", workers)
-    layers = _checked_layers(layers)
-    grid = Grid(base, axes, tolerance, residual, band, layers, bool(audit))
-    fewer = grid.without_speed()
-    for name, asked, of in (("borders", borders, grid), ("refine", refine, fewer or grid)):
+def run(base: Case, axes: Mapping[str, np.ndarray], job: Job) -> xarray.Dataset:
+    """The map of a blow over axes that are checked."""
+    cases = Cases(base, axes, job.tolerance, job.residual, job.max_frequency, job.layers)
+    some = cases.without_speed() or cases  # those to compute
+    for name, asked, of in (("borders", job.borders, cases), ("refine", job.refine, some)):
         if asked and why_none(of):
             raise ValueError(f"{name}: {why_none(of)}")
-    if refine and layers:
-        raise ValueError("layers of one's own are not interpolated: refine is not for them")
-    way = Way(workers, client, None if store is None else Path(store), watch)
-    drawn = ours and not layers and not why_none(fewer or grid)
-    computed = way.refined(fewer or grid, refine, tell) if refine or (drawn and refine is None) else None
-    numbers, texts = way.solved(fewer or grid) if computed is None else (computed.numbers, computed.texts)
-    failures = np.full((fewer or grid).n_cases, "", dtype=f"<U{max(map(len, texts.values()), default=1)}")
-    failures[list(texts)] = list(texts.values())
-    doubt = described(fewer or grid, numbers, workers)
-    if fewer is not None:
-        numbers, failures = _with_speed(grid, fewer, numbers, failures)
-    doubt = np.broadcast_to(doubt, grid.shape)
-    table = _dataset(grid, numbers, failures, doubt)
-    gap = 1.0 / max(1, min(grid.shape) - 1)
-    if ours:
-        table.attrs["cells"] = f"all {grid.n_cases} cells computed"
+    drawn = job.ours and not job.layers and not why_none(some)
+    computed = job.refined(some) if job.refine or (drawn and job.refine is None) else None
+    numbers, texts = job.solved(some) if computed is None else (computed.numbers, computed.texts)
+    failures = listed(texts, some.n_cases)
+    doubt = np.broadcast_to(cell_errors.described(some, numbers, job.workers), cases.shape)
+    if some is not cases:
+        numbers, failures = _with_speed(cases, some, numbers, failures)
+    own = cell_errors.model_error(cases) if job.audit else None
+    table = _dataset(cases, numbers, failures, cell_errors.left_out(cases) + doubt, own)
+    gap = 1.0 / max(1, min(cases.shape) - 1)
+    if job.ours:
+        table.attrs["cells"] = f"all {cases.n_cases} cells computed"
     if computed is not None:
         _tell_interpolated(table, computed.computed)
-        gap = refined.widest_gap(grid.shape)
-    if borders or (borders is None and ours and not why_none(grid)):
-        found = find_borders(grid, np.asarray(table.n_impacts), way.solved)
+        gap = refined.widest_gap(cases.shape)
+    if job.borders or (job.borders is None and job.ours and not why_none(cases)):
+        found = find_borders(cases, np.asarray(table.n_impacts), job.solved)
         found.doubtful[doubt >= 1.0] = True
         add_borders(table, found, gap)
     return table
+
+
+def listed(texts: Texts, n_cases: int) -> np.ndarray:
+    """Error texts (n_cases,), '' where there is none."""
+    failures = np.full(n_cases, "", dtype=f"<U{max(map(len, texts.values()), default=1)}")
+    failures[list(texts)] = list(texts.values())
+    return failures
 
 
 def _tell_interpolated(table: xarray.Dataset, computed: np.ndarray) -> None:
@@ -416,102 +294,6 @@ def _tell_interpolated(table: xarray.Dataset, computed: np.ndarray) -> None:
     table["interpolated"] = (table.n_impacts.dims, ~computed, {"units": "1", "long_name": meaning})
 
 
-@dataclass(frozen=True)
-class Way:
-    """Where blows are computed, where they are kept, and who is told."""
-
-    workers: int | None
-    client: Any
-    store: Path | None
-    watch: Watch | None
-
-    def solved(self, blows: Grid | cloud.Cloud, turn: str = "") -> tuple[np.ndarray, Texts]:
-        """Compute all cells of a grid or a cloud; those of a round with a name are kept in a folder of the store."""
-        work = solve if isinstance(blows, Grid) else cloud.solve
-        place = self.store / turn if self.store is not None and turn else self.store
-        return solve_all(blows, work, self.workers, self.client, place, None if turn else self.watch)
-
-    def _held(self) -> set[str]:
-        """Names in the folder of the store, but for what is not finished."""
-        if self.store is None or not self.store.exists():
-            return set()
-        return {name for name in os.listdir(self.store) if not name.startswith(PARTIAL)}
-
-    def refined(self, grid: Grid, refine: bool | None, tell: Tell | None) -> refined.Refined | None:
-        """Compute a map where its answer changes; None if all cells are predicted to be quick, unless ``refine``."""
-        held = self._held()
-        if "zarr.json" in held and not refine:
-            return None
-        if self.store is not None and held and "round-1" not in held:
-            raise not_free(self.store)
-        first = replace(grid, chosen=np.unique(refined.first_blocks(grid.shape).cells(grid.shape[1])))
-        here = replace(self, store=None, watch=None)
-        here.solved(replace(grid, chosen=first.cells(0, 1)))  # compiles
-        began = time.process_time()
-        start = here.solved(first)
-        seconds = (time.process_time() - began) / first.n_cases * grid.n_cases / (self.workers or os.cpu_count() or 1)
-        if not refine and "round-1" not in self._held() and self.client is None:
-            some = seconds > DENSE
-            if tell is not None:
-                cost = f"all {grid.n_cases} cells are expected to take {seconds:.2g} s"
-                tell(
-                    f"{cost}: only those where the answer changes are computed" if some else f"{cost}: all are computed"
-                )
-            if not some:
-                return None
-
-        def compute(cells: np.ndarray, turn: str) -> tuple[np.ndarray, Texts]:
-            """Cells of one round; those of the first are known."""
-            return start if turn == "round-0" else self.solved(replace(grid, chosen=cells), turn)
-
-        def settled(done: int) -> None:
-            if self.watch is not None:
-                self.watch(done, grid.n_cases)
-
-        return refined.refine((grid.shape[0], grid.shape[1]), grid.layers, grid.tolerance, compute, settled)
-
-
-def described(grid: Grid, numbers: np.ndarray, workers: int | None = None) -> np.ndarray:
-    """Error [-] of too few Ritz vectors and of their mesh in each cell, in the shape of the grid; zero for most modes.
-
-    Evenly spaced cells, at most DOUBTED, are struck again on the body described less well (`Modes.poorer`); any other
-    cell has the error of the nearest of them. Too few vectors may agree on a final separation that is none; therefore
-    cells with several impacts are also struck alone, because `strike` looks for that; so are the cells of a body of
-    which something is not stated (`Modes.unstated`).
-    """
-    causes = list(dict.fromkeys(cause for modes in grid.base.views.values() for cause in modes.poorer))
-    unstated = grid.residual and bool(grid.base.modes.unstated or grid.base.striker.modes.unstated)
-    if not causes and not unstated:
-        return np.zeros(grid.shape)
-    most = DOUBTED[grid.quick and not unstated]
-    thinner = max(1.0, (grid.n_cases / most) ** (1.0 / len(grid.shape)))
-    chosen = [np.unique(np.round(np.linspace(0, n - 1, max(1, int(n / thinner)))).astype(int)) for n in grid.shape]
-    axes = {name: values[some] for (name, values), some in zip(grid.axes.items(), chosen)}
-    few = replace(grid, axes=axes, band=None, kernels={})
-    names = [grid.layers.index(name) for name in few.layers]
-    mine = numbers.reshape(-1, *grid.shape)[np.ix_(np.array(names), *chosen)]
-    total = np.zeros(few.shape)
-    before = mine
-    for cause in causes:
-        other, _ = solve(replace(few, base=grid.base.poorer(cause), kernels={}), 0, few.n_cases, workers=workers)
-        before, better = other.reshape(mine.shape), before
-        total += _largest_difference(few.layers, better, before)
-    several = np.flatnonzero((mine[few.layers.index("n_impacts")] > 1) | unstated)
-    several = several[:: max(1, -(-len(several) // DOUBTED[False]))]
-    with ThreadPoolExecutor(workers or os.cpu_count() or 1) as pool:
-        total.flat[several] = np.maximum(total.flat[several], list(pool.map(few.doubt, several)))
-    nearest = [np.abs(np.arange(n)[:, None] - some).argmin(axis=1) for n, some in zip(grid.shape, chosen)]
-    return total[np.ix_(*nearest)]
-
-
-def _largest_difference(names: list[str], one: np.ndarray, other: np.ndarray) -> np.ndarray:
-    """Largest difference of two maps in the quantities under tolerance; 1 if their impacts differ in number."""
-    mine, its = dict(zip(names, one)), dict(zip(names, other))
-    judged = ("restitution", "impulse", "contact_time", "peak_force")
-    apart = distance({name: its[name] for name in judged}, {name: mine[name] for name in judged})
-    return np.where(mine["n_impacts"] == its["n_impacts"], np.fmax.reduce(list(apart.values())), 1.0)
-
-
 def admit(n_cells: int, n_layers: int, max_cells: float, *, quick: bool = True, tell: Tell | None = None) -> None:
     """Refuse a map with too many cells; announce the cost of a large one."""
     seconds = n_cells * SECONDS[quick] / (os.cpu_count() or 1)
@@ -523,92 +305,45 @@ def admit(n_cells: int, n_layers: int, max_cells: float, *, quick: bool = True, 
         tell(cost)
 
 
-def _with_speed(grid: Grid, fewer: Grid, numbers: np.ndarray, failures: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def _with_speed(cases: Cases, fewer: Cases, numbers: np.ndarray, failures: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Blows at all speeds from those at one speed: impulse and peak force scale with it, all else is unchanged."""
-    along = list(grid.axes).index("speed")
-    shape = [1] * len(grid.shape)
+    along = list(cases.axes).index("speed")
+    shape = [1] * len(cases.shape)
     shape[along] = -1
-    ratio = (grid.axes["speed"] / grid.axes["speed"][0]).reshape(shape)
-    whole = np.broadcast_to(numbers.reshape(-1, *fewer.shape), (len(numbers), *grid.shape)).copy()
-    for row, name in enumerate(grid.layers):
+    ratio = (cases.axes["speed"] / cases.axes["speed"][0]).reshape(shape)
+    whole = np.broadcast_to(numbers.reshape(-1, *fewer.shape), (len(numbers), *cases.shape)).copy()
+    for row, name in enumerate(cases.layers):
         if name in ("impulse", "peak_force"):
             whole[row] *= ratio
-    failures = np.broadcast_to(failures.reshape(fewer.shape), grid.shape)
+    failures = np.broadcast_to(failures.reshape(fewer.shape), cases.shape)
     return whole.reshape(len(numbers), -1), failures.reshape(-1)
 
 
-def solve(grid: Grid, start: int, stop: int, *, workers: int | None = None) -> tuple[np.ndarray, Texts]:
-    """Compute the cells from ``start`` up to ``stop``.
-
-    Returns
-    -------
-    numbers : ndarray, shape (n_layers, n_cells)
-    texts : dict of failed cell to its error text
-    """
-    names = grid.layers
-    numbers = np.full((len(names), stop - start), np.nan)
-    place = dict(zip(grid.axes, np.unravel_index(grid.cells(start, stop), grid.shape)))
-    law = grid.base.contact
-    base = {"target_mass": grid.base.modes.mass, "mass": grid.base.striker.mass, "speed": grid.base.speed, **vars(law)}
-    column = {
-        name: grid.axes[name][place[name]] if name in place else np.full(stop - start, value)
-        for name, value in base.items()
-    }
-    quick = together(column) & (not grid.extra) & (not grid.base.modes.stretches)
-    cells = np.flatnonzero(quick)
-    if cells.size:
-        kind = np.zeros(stop - start, int)
-        for name in FAMILY_AXES:
-            if name in place:
-                kind = kind * len(grid.axes[name]) + place[name]
-        kind = 2 * kind + (column["loss"] > 0.0)
-        kinds, first, family = np.unique(kind[cells], return_index=True, return_inverse=True)
-        families = {}
-        for which, i in zip(kinds, cells[first]):
-            chosen = {name: grid.axes[name][place[name][i]] for name in FAMILY_AXES if name in place}
-            case = grid.base.with_values(chosen)  # nothing else of the cell, so that no block is rounded differently
-            families[int(which)] = batches.Family.of(case.modes, case.at, case.striker, grid.residual, bool(which % 2))
-        blows = batches.Blows(
-            families,
-            kinds[family],
-            *(column[name][cells] for name in ("target_mass", "mass", "stiffness", "exponent", "speed", "loss")),
-        )
-        found = batches.bounce(
-            blows, tolerance=grid.tolerance, band=grid.band or 0.0, workers=workers, kernels=grid.kernels
-        )
-        for row, name in enumerate(names):
-            numbers[row, cells] = getattr(found, name)
-        quick[cells] = found.done & ~(np.isnan(found.centroid) & (grid.band is not None))
-    return numbers, alone(grid, start, np.flatnonzero(~quick), numbers, workers)
-
-
-def _dataset(grid: Grid, numbers: np.ndarray, failures: np.ndarray, doubt: np.ndarray) -> xarray.Dataset:
-    """The map as a Dataset, with units on layers and axes."""
-    dims = tuple(grid.axes)
+def _dataset(cases: Cases, numbers: np.ndarray, failures: np.ndarray, left_out: np.ndarray, own: Any) -> xarray.Dataset:
+    """The map as a Dataset, with units on layers and axes; ``own`` is the model's error and what is not known of it."""
+    dims = tuple(cases.axes)
     data: dict[str, Any] = {}
-    for name, values in zip(grid.layers, numbers):
+    for name, values in zip(cases.layers, numbers):
         unit, meaning = LAYERS.get(name, ("", name))
         attributes: dict[str, Any] = {"units": unit or "1", "long_name": meaning}
         if name == "n_impacts":
             values = np.where(np.isnan(values), -1, values).astype(np.int32)
         if name == "centroid":
-            attributes["max_frequency"] = grid.band
-        data[name] = (dims, values.reshape(grid.shape), attributes)
-    left_out = grid.left_out() + doubt
+            attributes["max_frequency"] = cases.band
+        data[name] = (dims, values.reshape(cases.shape), attributes)
     meaning = "expected error of the body's description; infinite where modes left out govern the contact"
     data["truncation"] = (dims, left_out, {"units": "1", "long_name": meaning})
-    met = data["error"][1] + left_out <= grid.tolerance
+    met = data["error"][1] + left_out <= cases.tolerance
     data["tolerance_met"] = (dims, met, {"units": "1", "long_name": "whether both errors together meet the tolerance"})
-    if grid.audit:
-        own, unknown = grid.model_error()
+    if own is not None:
         meaning = "error of the model itself, interpolated between a few blows"
-        data["model_error"] = (dims, own, {"units": "1", "long_name": meaning, "not_known": unknown})
-    data["failure"] = (dims, failures.reshape(grid.shape), {"long_name": "error text of a failed cell"})
+        data["model_error"] = (dims, own[0], {"units": "1", "long_name": meaning, "not_known": own[1]})
+    data["failure"] = (dims, failures.reshape(cases.shape), {"long_name": "error text of a failed cell"})
     places: dict[str, Any] = {}
-    for name, values in grid.axes.items():
+    for name, values in cases.axes.items():
         attributes = {"units": AXES[name][0] or "1", "long_name": AXES[name][1]}
-        if name == "stiffness" and "exponent" not in grid.axes:
-            power = grid.base.contact.exponent
+        if name == "stiffness" and "exponent" not in cases.axes:
+            power = cases.base.contact.exponent
             attributes["units"] = "N/m" if power == 1.0 else f"N/m**{power:g}"
         if name != "at":
             places[name] = (name, values, attributes)
@@ -616,6 +351,6 @@ def _dataset(grid: Grid, numbers: np.ndarray, failures: np.ndarray, doubt: np.nd
             places["at"] = ("at", values[:, 0], attributes)
         else:
             places |= {f"at_{letter}": ("at", column, attributes) for letter, column in zip("xyz", values.T)}
-    notes = plausible.together(grid.base.modes.notes, grid.base.striker.notes)
-    about = {"title": "Map of blows", "scene": json.dumps(grid.scene()), "notes": "\n".join(notes)}
-    return xarray.Dataset(data, places, about | {"tolerance": grid.tolerance, "residual": int(grid.residual)})
+    notes = plausible.together(cases.base.modes.notes, cases.base.striker.notes)
+    about = {"title": "Map of blows", "scene": json.dumps(cases.scene()), "notes": "\n".join(notes)}
+    return xarray.Dataset(data, places, about | {"tolerance": cases.tolerance, "residual": int(cases.residual)})

@@ -16,10 +16,10 @@ from ..impact.contact import Contact
 from ..impact.response import Response
 from ..impact.spectra import half_sine_spectrum
 from ..impact.striker import Striker
-from ..model import vectors
 from ..model.target import Stages, Target
 from ..modes.modal import Damping, Modes
-from . import bodies, grid
+from . import bodies
+from .cases import Cases, solve
 from .cells import Case
 
 # [-] error limit of the blows that are looked at first: only to find where ranges end, which DECIDED then tells
@@ -205,26 +205,15 @@ def choose_on(
 
 def _body(target: Target, at: Any, masses: np.ndarray, centre: float, stages: Stages) -> tuple[Modes, float | None]:
     """The body as the blows of all hammers need it; if by Ritz vectors, their highest contact resonance [Hz], too."""
-    if target.modes is not None:
-        return target.surrounded(target.modes), None
-    if vectors.usable(target):
-        outline = bodies.outline(target, stages)
-        case = Case(outline, Striker.rigid(masses[0]), Contact.linear(1.0), outline.point("at", at)[0], 1.0)
-        hardest = HARDEST**0.5 * centre
+    hardest = HARDEST**0.5 * centre
 
-        def blows(*resonances: float) -> list[dict[str, float]]:
-            pairs = [(mass, accuracy.resonant_stiffness(mass, f)) for mass in masses for f in resonances]
-            return [{"mass": mass, "stiffness": tip} for mass, tip in pairs]
+    def blows(*resonances: float) -> list[dict[str, float]]:
+        pairs = [(mass, accuracy.resonant_stiffness(mass, f)) for mass in masses for f in resonances]
+        return [{"mass": mass, "stiffness": tip} for mass, tip in pairs]
 
-        # only whether a second impact follows matters
-        wanted = bodies.Sized(
-            target, case, blows(hardest, SOFTEST**0.5 * centre), blows(centre), TOLERANCE, max_impacts=2
-        )
-        views = wanted.views(case.at[None], stages)
-        if views is not None:
-            return next(iter(views.values())), hardest
-    with stages("modes"):
-        return target.surrounded(target.find(MOST_MODES, tolerance=TOLERANCE, stages=stages)), None
+    ends, chance = blows(hardest, SOFTEST**0.5 * centre), blows(centre)
+    found, by_vectors = bodies.of_hammers(target, at, ends, chance, TOLERANCE, MOST_MODES, stages)
+    return found[0], hardest if by_vectors else None
 
 
 def _hammer(
@@ -272,8 +261,8 @@ def _hammer(
         return Hammer(float(mass), (), (), high, None, None, modes.notes)
     tips = _series(low, high, PER_DECADE[0])
     case = Case(alone, striker, Contact.linear(1.0), modes.point("at", at)[0], 1.0)  # `once` looks at the others
-    series = grid.Grid(case, {"stiffness": tips}, TOLERANCE, True, None, {}, max_impacts=2)
-    counts = grid.solve(series, 0, len(tips))[0][series.layers.index("n_impacts")]
+    series = Cases(case, {"stiffness": tips}, TOLERANCE, max_impacts=2)
+    counts = solve(series, 0, len(tips))[0][series.layers.index("n_impacts")]
     single = _ranges(tips, counts == 1, once)
     working: Ranges = ()
     for ends in single:

@@ -107,7 +107,7 @@ class MapSheet:
     Parameters
     ----------
     shape : (n, n)
-    layers : list of str, see `solving.LAYERS`
+    layers : list of str, see `cases.LAYERS`
     """
 
     def __init__(self, shape: tuple[int, int], layers: list[str]) -> None:
@@ -182,7 +182,7 @@ def refine(
     Parameters
     ----------
     shape : (n, n)
-    layers : list of str, see `solving.LAYERS`
+    layers : list of str, see `cases.LAYERS`
     tolerance : float [-]
         Of each cell.
     compute : callable

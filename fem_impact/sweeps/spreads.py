@@ -12,8 +12,8 @@ from scipy import stats
 from .._base import check, markup
 from .._base.explained import noted
 from .._base.rounding import SAME
+from .cases import LAYERS
 from .inputs import Input
-from .solving import LAYERS
 
 CONFIDENCE = 0.9  # [-] of every interval: nine of ten cover the truth; a choice
 LEVELS = (0.05, 0.25, 0.5, 0.75, 0.95)  # [-] quantiles told: median, quartiles and the ends of nine tenths of all

@@ -26,17 +26,6 @@ def table(name: str, value: Any) -> dict[str, Any]:
     return dict(value)
 
 
-def ranges(name: str, value: Any) -> dict[str, tuple[float, float]]:
-    """Return ``value`` as a dict of names to (low, high); at least one."""
-    found = table(name, value)
-    if not found:
-        raise ValueError(f'{name} must name at least one range, as in {{"contact.stiffness": (1e5, 1e8)}}')
-    for key, limits in found.items():
-        if not isinstance(limits, (tuple, list)) or len(limits) != 2:
-            raise ValueError(f"{name}[{key!r}] must be a range (low, high), got {check.shown(limits)}")
-    return {key: (limits[0], limits[1]) for key, limits in found.items()}
-
-
 def generator(name: str, value: Any) -> np.random.Generator:
     """A random generator from a seed or a generator."""
     if isinstance(value, np.random.Generator):

@@ -9,10 +9,30 @@ from .._base import check
 from . import arguments, readers, units
 
 
-def kind(unit: str) -> str:
-    """The SI unit of a response's kind; an acceleration if the unit is not known."""
-    found = units.known(unit)
-    return found[0] if found and found[0] != "N" else "m/s^2"
+def in_si(
+    found: readers.Recording, file: str, force: Any, response: Any, scale: Any, given: Mapping[str, str] | None
+) -> tuple[list[tuple[np.ndarray, np.ndarray]], list[str], list[str], list[str]]:
+    """Force (n_samples,) and responses (n_samples, n_responses) of every segment of a file in SI, names and units of
+    the responses, and what was assumed."""
+    unit = stated_units(found, given)
+    struck = force_channel(found, force, unit, file)
+    others = response_channels(found, response, unit, struck)
+    stated = scales(found, scale, struck)
+    factors: list[float] = []
+    kinds: list[str] = []
+    notes: list[str] = []
+    for i in (struck, *others):
+        known = units.known(unit[i])
+        kinds.append("N" if i == struck and not kinds else known[0] if known and known[0] != "N" else "m/s^2")
+        value, said = factor(found.names[i], unit[i], kinds[-1], stated.get(i), file)
+        factors.append(value)
+        notes += said
+    pushed = [segment[:, struck] * factors[0] for segment in found.segments]
+    if max(row.max() for row in pushed) < -min(row.min() for row in pushed):
+        notes.append("the force is mostly negative and was turned around")
+        pushed = [-row for row in pushed]
+    moved = [segment[:, others] * np.array(factors[1:]) for segment in found.segments]
+    return list(zip(pushed, moved)), [found.names[i] for i in others], kinds[1:], notes
 
 
 def stated_units(found: readers.Recording, given: Mapping[str, str] | None) -> list[str]:

@@ -20,17 +20,7 @@ from .rig import Rig
 from .solver import Problem
 from .unknowns import TIME, Setting, Unknown, checked
 
-STARTS = 5  # [-] searches, from the best of `solver.SCREENED` points; where all end poorly, more follow
-# [-] rms of the residual over that of the records, above the noise of usual ones: after a poorer fit the search goes on
-POOR = 0.06
-PATIENCE = 3  # [-] times the number of starts, at most: where fifteen fail, the model is wrong rather than the start
-# [-] a tap that the others predict worse than this times the median of their own errors does not agree: rare by chance
-OUTLIER = 4.0
-# [-] ratio of noise over peak from which taps count differently: less is how well the noise of short rests is known
-UNEQUAL = 1.5
-MOST_OUTLIERS = 0.34  # [-] of the taps may disagree: with more, nobody knows which ones are right
-BETTER = 2.0  # [-] ratio of residuals from which a stiffness for each tap is proposed: the rest may be luck
-PLACES = 0.2, 0.5, 0.8  # [-] of the range of its frequency, where a further mode is sought
+STARTS = 5  # [-] searches, from the best of `solver.starts`; where all end poorly, more follow
 FEWEST = 3  # [-] taps, to tell which one disagrees: of two, either may be wrong
 
 
@@ -126,22 +116,72 @@ def fit(
     """
     striker.let_go("a fit")
     given = windows.joined(taps)
-    taps = windows.levelled(given)
+    levelled = windows.levelled(given)
     laws = [contact] if isinstance(contact, Contact) else list(check.several("contact", contact, Contact))
-    options = {
-        "target": target, "at": at, "striker": striker, "unknown": unknown, "known": arguments.table("known", known),
-        "response_at": response_at, "window": window, "starts": check.count("starts", starts), "robust": robust,
-        "rig": Rig(taps.rate, anti_alias, tip_mass, resonance), "watch": watch,
-        "rng": arguments.generator("rng", rng), "noted": len(given.notes),
-        "per_tap": arguments.texts("per_tap", [per_tap] if isinstance(per_tap, str) else per_tap),
-    }  # fmt: skip
-    found = [_fit(taps, contact=law, **options) for law in laws]
+    held = {name: check.number(name, value) for name, value in arguments.table("known", known).items()}
+    names = [checked(unknown, target, striker, law, held) for law in laws]
+    for name in held:
+        if name in unknown:
+            raise ValueError(f"known and unknown both name {name}")
+    each = arguments.texts("per_tap", [per_tap] if isinstance(per_tap, str) else per_tap)
+    for name in each:
+        check.one_of("per_tap", name, unknown)
+    n_points, points = _measured_at(levelled, target, response_at)
+    cut, noise, notes = _usable(levelled, window)
+    place = None if target is None else target.point("at", at)[0]
+    rig, impulse = Rig(cut.rate, anti_alias, tip_mass, resonance), float(np.mean(cut.impulse))
+    starts, generator = check.count("starts", starts), arguments.generator("rng", rng)
+    settings = [
+        Setting(target, place, striker, law, rig, own, points, n_points, impulse) for law, own in zip(laws, names)
+    ]
+    found = [
+        _fit(
+            setting, cut, noise, [*levelled.notes[len(given.notes) :], *notes], known=held, per_tap=each,
+            starts=starts, robust=robust, rng=generator, watch=watch,
+        )
+        for setting in settings
+    ]  # fmt: skip
     if len(found) > 1:
         scores = [float(np.sqrt(np.mean([one.error**2 for one in each.left_out()]))) for each in found]
         named = {_law_name(law): score for law, score in zip(laws, scores)}
         found = [replace(found[int(np.argmin(scores))], compared=named)]
-    result = found[0]
-    return profiled(result) if profiles else result
+    return profiled(found[0]) if profiles else found[0]
+
+
+def _measured_at(taps: Taps, target: Modes | None, response_at: Any) -> tuple[int, Any]:
+    """Number of responses that are compared, and the points of a known target where they are measured."""
+    if response_at is None:
+        return 0, None
+    n_points = taps.response.shape[2]
+    if not n_points or set(taps.units) != {"m/s^2"}:
+        raise ValueError(f"response_at needs accelerations among the taps, got units {taps.units}")
+    points = None if target is None else target.points("response_at", response_at)
+    if points is not None and len(points) != n_points:
+        raise ValueError(f"response_at must be {n_points} points, one for each response, got {len(points)}")
+    return n_points, points
+
+
+def _usable(taps: Taps, window: Any) -> tuple[Taps, np.ndarray, list[str]]:
+    """The taps that can be compared, cut to the window; their noise over the peak; and why others are left out."""
+    notes = []
+
+    def without(taps: Taps, bad: np.ndarray, why: str, advice: str) -> np.ndarray:
+        if bad.any():
+            notes.append(f"left out, because their {why}: {', '.join(taps.labels[i] for i in np.flatnonzero(bad))}")
+        if bad.all():
+            raise ValueError(f"taps must hold one at least whose {advice}")
+        return ~bad
+
+    good = without(
+        taps, taps.impulse <= 0.0, "force never pushes", "force pushes; a negative one has the wrong sign"
+    )  # fmt: skip
+    good &= without(
+        taps, taps.cut_short, "record begins or ends within a pulse", "record holds its whole pulse; trigger earlier"
+    )  # fmt: skip
+    taps = taps.pick(good)
+    cut, noise = windows.cut(taps, window), taps.noise / taps.peak
+    whole = without(cut, cut.overload, "force is cut off", "force is not cut off")
+    return cut.pick(whole), noise[whole], notes
 
 
 def _law_name(law: Contact) -> str:
@@ -154,87 +194,46 @@ def _law_name(law: Contact) -> str:
 
 
 def _fit(
-    taps, *, target, at, striker, contact, unknown, known, per_tap, response_at, window, starts, robust, rig, watch,
-    rng, noted
-):  # fmt: skip
-    names = checked(unknown, target, striker, contact, known)
-    for name in per_tap:
-        check.one_of("per_tap", name, unknown)
-    notes = list(taps.notes[noted:])
-    points, n_points = None, 0
-    if response_at is not None:
-        n_points = taps.response.shape[2]
-        if not n_points or set(taps.units) != {"m/s^2"}:
-            raise ValueError(f"response_at needs accelerations among the taps, got units {taps.units}")
-        if target is not None:
-            points = target.points("response_at", response_at)
-            if len(points) != n_points:
-                raise ValueError(f"response_at must be {n_points} points, one for each response, got {len(points)}")
-    for bad, why, advice in (
-        (taps.impulse <= 0.0, "their force never pushes", "whose force pushes; a negative one has the wrong sign"),
-        (taps.cut_short, "their record begins or ends within a pulse",
-         "whose record holds its whole pulse; trigger earlier"),
-    ):  # fmt: skip
-        if bad.any():
-            notes.append(f"left out, because {why}: {', '.join(taps.labels[i] for i in np.flatnonzero(bad))}")
-        if bad.all():
-            raise ValueError(f"taps must hold one at least {advice}")
-    taps = taps.pick(~(taps.cut_short | (taps.impulse <= 0.0)))
-    cut, noise = windows.cut(taps, window), taps.noise / taps.peak
-    if cut.overload.any():
-        bad = np.flatnonzero(cut.overload)
-        notes.append(f"left out, because their force is cut off: {', '.join(cut.labels[i] for i in bad)}")
-        if len(bad) == cut.n_taps:
-            raise ValueError("taps must hold one at least whose force is not cut off")
-        noise, cut = noise[~cut.overload], cut.pick(~cut.overload)
-    place = None if target is None else target.point("at", at)[0]
-    setting = Setting(
-        target, place, striker, contact, rig, names, points, n_points, float(np.mean(cut.impulse))
-    )  # fmt: skip
+    setting: Setting, cut: Taps, noise: np.ndarray, notes: list[str], *, known: Mapping[str, float],
+    per_tap: list[str], starts: int, robust: bool, rng: np.random.Generator, watch: Watch | None,
+) -> Found:  # fmt: skip
+    """The fit of one contact law to taps whose noise over the peak is (n_taps,)."""
     length = solver.pulse_length(cut)
     free = tuple(
         Unknown(TIME, length / solver.TIMES, length * solver.TIMES) if each.name == "contact.stiffness" else each
-        for each in names
+        for each in setting.unknown
     )
-    own = tuple(each.name for each, name in zip(free, unknown) if name in per_tap) if cut.n_taps > 1 else ()
-    weights = np.ones((1, 1 + n_points))
-    data = windows.data(cut, n_points, weights)
-    for name in known:
-        if name in unknown:
-            raise ValueError(f"known and unknown both name {name}")
-    problem = Problem(setting, data, free, {name: check.number(name, value) for name, value in known.items()}, own)
+    own = [each.name for each, given in zip(free, setting.unknown) if given.name in per_tap]
+    data = windows.data(cut, setting.n_points, np.ones((1, 1 + setting.n_points)))
+    problem = Problem(setting, data, free, known, tuple(own) if cut.n_taps > 1 else ())
     if data.values.size <= problem.n_values:
         raise ValueError(f"taps hold {data.values.size} samples, too few for {problem.n_values} values")
-    used = list(range(cut.n_taps))
     best, minima = _search(problem, cut, length, starts, rng, watch)
     if len(minima) > 1 and best.cost > min(minima) * (1.0 + solver.NEARLY):
         notes.append(
             f"a model without mode{_modes(problem)} explains the taps better: the search may have missed the best"
         )
     part = problem.residual(best.x).reshape(data.values.shape)
-    if n_points:
-        spread = np.sqrt(np.square(part).mean(axis=(0, 2)))
-        weights = weights * spread[0] / np.maximum(spread, 1e-300)
-    weights = weights * _sureness(part[:, 0], noise)[:, None]
+    spread = np.sqrt(np.square(part).mean(axis=(0, 2)))  # of each channel, the force first
+    weights = _sureness(part[:, 0], noise)[:, None] * spread[0] / np.maximum(spread, 1e-300)
     if (weights != 1.0).any():
-        data = windows.data(cut, n_points, weights)
-        problem = replace(problem, data=data, _last={})
+        problem = replace(problem, data=windows.data(cut, setting.n_points, weights), _last={})
         best = solver.solve(problem, best.x)
         minima = (best.cost,)
     notes += _apart(problem, best)
-    outliers: dict[str, float] = {}
-    while robust and len(used) > max(FEWEST, (1.0 - MOST_OUTLIERS) * cut.n_taps):
+    used, outliers = list(range(cut.n_taps)), {}
+    while robust and len(used) > max(FEWEST, (1.0 - solver.MOST_OUTLIERS) * cut.n_taps):
         each = np.array([one.error for one in predictions.left_out(problem, best.x, cut.pick(used))])
         worst = int(each.argmax())
         others = [i for i in range(len(used)) if i != worst]
-        fewer = [used[i] for i in others]
-        without = replace(problem, data=data.pick(fewer), _last={})
+        without = replace(problem, data=problem.data.pick(others), _last={})
         solved = solver.solve(without, best.x[problem.kept(others)])
-        agree = Found(cut, tuple(fewer), {}, without, solved, (), (), {}).errors
-        if each[worst] <= OUTLIER * float(np.median(agree)):
+        fewer = Found(cut, tuple(used[i] for i in others), {}, without, solved, (solved.cost,), (), {})
+        # rare by chance: a tap that the others predict worse than this times the median of their own errors
+        if each[worst] <= 4.0 * float(np.median(fewer.errors)):
             break
         outliers[cut.labels[used[worst]]] = float(each[worst])
-        used, problem, best, minima = fewer, without, solved, (solved.cost,)
+        used, problem, best, minima = list(fewer.used), without, solved, fewer.minima
     return Found(cut, tuple(used), outliers, problem, best, minima, tuple(notes), {}, watch)
 
 
@@ -244,7 +243,8 @@ def _sureness(residual: np.ndarray, noise: np.ndarray) -> np.ndarray:
     model = max(0.0, float(np.median(np.square(residual).mean(axis=1) - noise**2)))
     weights = 1.0 / np.sqrt(np.maximum(noise**2 + model, 1e-300))
     weights /= np.sqrt(np.mean(weights**2))
-    return weights if weights.max() > UNEQUAL * weights.min() else np.ones(len(noise))
+    unequal = weights.max() > 1.5 * weights.min()  # less is how well the noise of short rests is known
+    return weights if unequal else np.ones(len(noise))
 
 
 def _apart(problem: Problem, best: solver.Solution) -> list[str]:
@@ -256,7 +256,7 @@ def _apart(problem: Problem, best: solver.Solution) -> list[str]:
         return []
     each = replace(problem, own=(TIME,), _last={})
     freed = solver.solve(each, np.append(best.x, np.zeros(problem.data.n_taps)), solver.QUICK, solver.NEARLY)
-    if freed.cost > best.cost / BETTER**2:
+    if freed.cost > best.cost / 4.0:  # half the residual: less may be luck
         return []
     whole = float(np.square(problem.data.values).sum())
     one, own = (100.0 * np.sqrt(cost / whole) for cost in (best.cost, freed.cost))
@@ -284,7 +284,7 @@ def _simpler(problem: Problem, taps: Taps, length: float, rng: Any) -> tuple[lis
     best, _ = _search(less, taps, length, 1, rng, None)
     begun = []
     low, high = (bound[: problem.n_shared] for bound in problem.bounds)
-    for share in PLACES:
+    for share in (0.2, 0.5, 0.8):  # of the range of its frequency
         shared = low + share * (high - low)
         for i, each in enumerate(problem.free):
             if each.name == last + "mass":
@@ -305,8 +305,10 @@ def _search(problem: Problem, taps: Taps, length: float, starts: int, rng: Any, 
     common = replace(problem, own=(), _last={})
     begun = solver.starts(common, length, taps.impulse, rng)
     found: list[solver.Solution] = []
-    poor = POOR**2 * float(np.square(problem.data.values).sum())
-    for i, x in enumerate(begun[: PATIENCE * starts]):
+    # an rms of the residual of 6 % of the records' is above the noise of usual ones: after a poorer fit the search goes
+    # on, up to three times as long; then the model is wrong rather than the start
+    poor = 0.06**2 * float(np.square(problem.data.values).sum())
+    for i, x in enumerate(begun[: 3 * starts]):
         if i >= starts and found and min(one.cost for one in found) < poor:
             break
         try:

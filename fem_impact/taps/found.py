@@ -23,10 +23,6 @@ from .scatter import Scatter, scatter
 from .solver import Problem, Solution
 from .unknowns import changed, unit_of
 
-LUCK = 0.05  # [-] probability of a spread by noise alone, above which taps do not count as different: the usual level
-STEEP = 10.0  # [-] exponent of a ridge above which it says only that the value itself hardly moves
-REPEATS = 3  # [-] times that profiles may find a better fit and begin again; a sound fit needs none
-
 Watch = Callable[[int, int], Any]
 
 
@@ -83,30 +79,29 @@ class Found(check.Brief):
     def profile(self, name: str) -> Profile:
         """The likelihood profile of an unknown, of a tap's own value of it, or of its speed, ``"speed[0]"``."""
         check.one_of("name", name, self.point)
-        if name in self.profiles:
-            return self.profiles[name]
-        if name not in self._later:
-            noise, freedom, _ = self._noise
-            problem, x, j = _coordinate(self.problem, self.best.x, name)
-            best = replace(self.best, x=x)
-            self._later[name] = profiles.follow(problem, best, j, noise, freedom, name)[0]
-        return self._later[name]
+        if name not in self._profiles:
+            self._profiles[name] = self._follow(name)[0]
+        return self._profiles[name]
 
     @cached_property
-    def _later(self) -> dict[str, Profile]:
+    def _profiles(self) -> dict[str, Profile]:
         return {}
+
+    def _follow(self, name: str) -> tuple[Profile, np.ndarray, float]:
+        """A profile, and coordinates and sum of squares of the best fit met on the way."""
+        problem, x, j = _coordinate(self.problem, self.best.x, name)
+        profile, met = profiles.follow(problem, replace(self.best, x=x), j, *self._noise[:2], name)
+        return profile, problem.moved(met.x, self.problem), met.cost
 
     @cached_property
     def profiles(self) -> dict[str, Profile]:
         """The likelihood profiles of all unknowns."""
-        noise, freedom, _ = self._noise
-        found = {}
         for i, name in enumerate(self.names):
-            problem, x, j = _coordinate(self.problem, self.best.x, name)
-            found[name] = profiles.follow(problem, replace(self.best, x=x), j, noise, freedom, name)[0]
-            if self.watch is not None:
+            new = name not in self._profiles
+            self.profile(name)
+            if new and self.watch is not None:
                 self.watch(i + 1, len(self.names))
-        return found
+        return {name: self._profiles[name] for name in self.names}
 
     def interval(self, name: str, level: float = 0.9) -> tuple[float, float]:
         """The range (low, high) that holds a value with a probability; where the data set no limit, that of the range.
@@ -226,7 +221,7 @@ class Found(check.Brief):
             part = {key: values.get(f"striker.{key}") for key in ("mass", "first_frequency")}
             return Striker.flexible(given.modes.scaled(**part), at=given.at)
         modes = Modes.from_arrays(
-            body.omega / (2.0 * np.pi), body.row[None], points=[[0.0]], mass=body.mass, damping_ratio=body.zeta,
+            body.omega / (2.0 * np.pi), body.rows, points=[[0.0]], mass=body.mass, damping_ratio=body.zeta,
             complete=True,
         )  # fmt: skip
         return Striker.flexible(modes, at=[0.0])
@@ -238,11 +233,11 @@ class Found(check.Brief):
         if not len(body.omega):
             return None
         order = np.argsort(body.omega, kind="stable")
-        carried = float(np.square(body.row[body.omega > 0.0] / body.omega[body.omega > 0.0]).sum())
+        carried = float(np.square(body.rows[0, body.omega > 0.0] / body.omega[body.omega > 0.0]).sum())
         return Modes.from_arrays(
-            body.omega[order] / (2.0 * np.pi), body.row[None, order], points=[[0.0]],
-            mass=body.mass if np.isfinite(body.mass) else float(1.0 / np.square(body.row).max()),
-            damping_ratio=body.zeta[order], compliance=[[carried + body.rest]], free=False,
+            body.omega[order] / (2.0 * np.pi), body.rows[:, order], points=[[0.0]],
+            mass=body.mass if np.isfinite(body.mass) else float(1.0 / np.square(body.rows).max()),
+            damping_ratio=body.zeta[order], compliance=[[carried + body.rest[0, 0]]], free=False,
         )  # fmt: skip
 
     @check.typed
@@ -374,7 +369,7 @@ def along(ridge: Mapping[str, float]) -> str:
     said = []
     for name, power in ridge.items():
         way = "grows" if power > 0.0 else "falls"
-        if abs(power) > STEEP:
+        if abs(power) > 10.0:  # says only that the value itself hardly moves
             said.append(f"{name} {way} far faster")
         else:
             said.append(f"{name} {way} with its power {abs(power):.2g}")
@@ -388,7 +383,7 @@ def differ(each: Scatter) -> str:
         else (f"{each.deviation:.3g} {unit_of(each.name)}".strip(), f"{each.by_noise:.3g}")
     )  # fmt: skip
     said = f"differ by {size} (standard deviation); noise alone would make {noise}"
-    return said if each.chance < LUCK else f"{said}: one value for all would do"
+    return said if each.chance < 0.05 else f"{said}: one value for all would do"
 
 
 def _coordinate(problem: Problem, x: np.ndarray, name: str) -> tuple[Problem, np.ndarray, int]:
@@ -407,21 +402,15 @@ def _coordinate(problem: Problem, x: np.ndarray, name: str) -> tuple[Problem, np
 
 def profiled(found: Found) -> Found:
     """The fit with its profiles; a better fit that a profile meets becomes the fit."""
-    for _ in range(REPEATS):
-        noise, freedom, _ = found._noise
-        made, better = {}, None
+    for _ in range(3):  # times that profiles may find a better fit and begin again; a sound fit needs none
         for i, name in enumerate(found.names):
-            problem, x, j = _coordinate(found.problem, found.best.x, name)
-            made[name], met = profiles.follow(problem, replace(found.best, x=x), j, noise, freedom, name)
+            found._profiles[name], x, cost = found._follow(name)
             if found.watch is not None:
                 found.watch(i + 1, len(found.names))
-            if met.cost < found.best.cost - solver.SMALL * noise:
-                better = problem, met
+            if cost < found.best.cost - solver.SMALL * found._noise[0]:
                 break
-        if better is None:
-            found.__dict__["profiles"] = made
+        else:
             return found
-        problem, met = better
-        best = solver.solve(found.problem, problem.moved(met.x, found.problem))
+        best = solver.solve(found.problem, x)
         found = replace(found, best=best if best.cost < found.best.cost else found.best)
     return found

@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -11,27 +12,18 @@ from scipy.stats import chi2, t
 from .._base import check
 from .._base.check import SimulationError
 from .._base.rounding import HALVINGS, SAME
-from .ridges import way
-from .solver import ENOUGH, NEARLY, QUICK, SMALL, Problem, Solution, chord, solve
+from .ridges import RidgePath, way
+from .solver import ENOUGH, NEARLY, QUICK, Problem, Solution, chord, solve
 from .unknowns import Unknown
 
 SURE = 0.95  # [-] the widest interval that a profile is followed to
-# [-] of the distance to that interval's end by curvature: the first step, a little short, as the second tells the rest
-FIRST = 0.8
-FARTHEST = 0.25  # [-] of its range: the first step at most, so that four steps see all of it
 # [-] largest ratio of two steps, where the rise stalls or where it was too steep: not so long as to leap over a bend
 GROWTH = 3.0
 # [-] where the root of the rise over the target is more, a shorter step is tried: the interval's ends then err by 3 %
 # of its half width in likelihoods as bent as an exponential, by 8 % at 1.6
 TOO_STEEP = 1.1
-AT_BOUND = 0.02  # [-] of a range: a value this close to its bound may be held by it
-# [-] of its range (by its coordinate): an interval open at one end and wider than this tells nothing; a choice
-WIDE = 0.5
-LAGS = 10  # [-] of the test for whiteness: filters of rigs ring over some ten samples
 # [-] probability below which residuals do not count as white: one fit of a hundred is doubted without need
 DOUBTED = 0.01
-# [-] smallest exponent of a ridge that is named: twice the one value then moves the other by less than 4 %
-MOVES = 0.05
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -53,31 +45,29 @@ class Profile(check.Brief):
     def _coordinate(self, value: Any) -> Any:
         return np.log(value) if self.log else np.asarray(value, float)
 
+    @cached_property
+    def _climb(self) -> tuple[np.ndarray, np.ndarray]:
+        """Ascending coordinates of the points computed, and signed roots of the rise there, which do not fall."""
+        root = np.sqrt(np.maximum(self.rise, 0.0)) * np.where(self.values < self.value, -1.0, 1.0)
+        x, kept = np.unique(self._coordinate(self.values), return_index=True)
+        return x, np.maximum.accumulate(root[kept])
+
     def interval(self, level: float = 0.9) -> tuple[float, float]:
         """The range (low, high) that holds the value with this probability; an open end is the end of its range."""
         level = check.between("level", level, 0.01, SURE)
-        threshold = float(t.ppf(0.5 + 0.5 * level, self.freedom))
-        root = np.sqrt(np.maximum(self.rise, 0.0)) * np.where(self.values < self.value, -1.0, 1.0)
-        x = self._coordinate(self.values)
-        order = np.argsort(x)
-        x, root = x[order], np.maximum.accumulate(root[order]) + SAME * np.arange(len(x))
-        ends = []
-        for sign, limit in ((-1.0, self.low), (1.0, self.high)):
-            if abs(root[0 if sign < 0 else -1]) <= threshold:
-                ends.append(limit)
-                continue
-            found = float(PchipInterpolator(root, x)(sign * threshold)) if len(x) > 1 else float(x[0])
-            ends.append(float(np.exp(found)) if self.log else found)
-        return ends[0], ends[1]
+        threshold, (x, root) = float(t.ppf(0.5 + 0.5 * level, self.freedom)), self._climb
+        if len(x) < 2:
+            return self.low, self.high
+        rising = root + SAME * np.arange(len(x))
+        ends = PchipInterpolator(rising, x)(np.clip([-threshold, threshold], rising[0], rising[-1]))
+        low, high = (np.exp(ends) if self.log else ends).tolist()
+        return low if -root[0] > threshold else self.low, high if root[-1] > threshold else self.high
 
     def curve(self, n_points: int = 200) -> tuple[np.ndarray, np.ndarray]:
         """Values and rise of the profile, (n_points,) each, smooth between the points computed, for drawing."""
-        root = np.sqrt(np.maximum(self.rise, 0.0)) * np.where(self.values < self.value, -1.0, 1.0)
-        x, keep = np.unique(self._coordinate(self.values), return_index=True)
-        if len(x) < 3:
-            return self.values[keep], np.maximum(self.rise[keep], 0.0)
-        fine = np.linspace(x[0], x[-1], n_points)
-        found = PchipInterpolator(x, np.maximum.accumulate(root[keep]))(fine)
+        x, root = self._climb
+        fine = np.linspace(x[0], x[-1], n_points) if len(x) > 2 else x
+        found = PchipInterpolator(x, root)(fine) if len(x) > 2 else root
         return (np.exp(fine) if self.log else fine), found**2
 
     @property
@@ -89,7 +79,7 @@ class Profile(check.Brief):
             return "told"
         low, high = self._coordinate(np.array(self.interval()))
         whole = self._coordinate(self.high) - self._coordinate(self.low)
-        return "open" if high - low > WIDE * whole else "limited"
+        return "open" if high - low > 0.5 * whole else "limited"  # a choice: wider ones tell nothing
 
     @property
     def ridge(self) -> dict[str, float]:
@@ -104,7 +94,7 @@ class Profile(check.Brief):
         for name, values in self.others.items():
             if (values[flat] > 0.0).all():
                 slope = float(np.polyfit(x, np.log(values[flat]), 1)[0])
-                if abs(slope) > MOVES:
+                if abs(slope) > 0.05:  # otherwise twice the one value moves the other by less than 4 %
                     found[name] = slope
         return found
 
@@ -124,7 +114,7 @@ def variance(residual: np.ndarray, n_values: int) -> tuple[float, int, float]:
     freedom = max(1, n - n_values)
     total = float(np.square(residual).sum())
     n_times = residual.shape[1]
-    lags = min(LAGS, n_times - 2)
+    lags = min(10, n_times - 2)  # filters of rigs ring over some ten samples
     size = np.sqrt(np.square(residual).mean(axis=1, keepdims=True))
     rows = residual / np.maximum(size, 1e-300)  # each counts alike, whatever its noise
     rho = np.array([float((rows[:, k:] * rows[:, :-k]).sum()) / n for k in range(1, lags + 1)])
@@ -138,98 +128,124 @@ def variance(residual: np.ndarray, n_values: int) -> tuple[float, int, float]:
     return total / freedom * factor, max(1, round(freedom / factor)), white
 
 
-def follow(problem: Problem, best: Solution, j: int, noise: float, freedom: int, name: str) -> tuple[Profile, Solution]:
-    """The profile of a coordinate, and the best fit met on the way."""
-    low, high = problem.bounds
-    named = problem.free[j] if j < problem.n_shared else None
-    if named is None:  # a speed: as far as makes sense
-        named = Unknown(name, float(np.exp(best.x[j])) / 1e3, float(np.exp(best.x[j])) * 1e3)
-        low, high = low.copy(), high.copy()
-        low[j], high[j] = named.bounds
-    target = float(t.ppf(0.5 + 0.5 * SURE, freedom))
-    farthest = FARTHEST * (high[j] - low[j])
-    first = way(problem, best.x, j, (low, high), noise, farthest / target)
-    rows: list[tuple[float, float, np.ndarray]] = [(float(best.x[j]), 0.0, best.x)]
-    opened, held, found = [False, False], ["", ""], best
-    for side, (sign, bound) in enumerate(((-1.0, low[j]), (1.0, high[j]))):
-        trail, root, steep, ended = first, 0.0, 0.0, False
-        step = min(FIRST * target * trail.spread, farthest)
+@dataclass(frozen=True, eq=False, repr=False)
+class _Climb:
+    """What stays while one coordinate of a problem is moved away from its best fit."""
+
+    problem: Problem
+    best: Solution
+    j: int
+    noise: float
+    bounds: tuple[np.ndarray, np.ndarray]
+    target: float  # [-] root of the rise at the end of the widest interval
+
+    @property
+    def farthest(self) -> float:
+        """The longest first step: a quarter of the range, so that four steps see all of it."""
+        return 0.25 * float(self.bounds[1][self.j] - self.bounds[0][self.j])
+
+    def way(self, x: np.ndarray, stopped: np.ndarray | None = None) -> RidgePath:
+        """How the other coordinates go along, from a point where they fit best."""
+        return way(self.problem, x, self.j, self.bounds, self.noise, self.farthest / self.target, stopped)
+
+    def first_step(self, trail: RidgePath, root: float) -> float:
+        """Step to the target by curvature, from a point with a root of the rise."""
+        return min((1.02 * self.target - root) * trail.spread, self.farthest)
+
+    def solve(self, trail: RidgePath, last: float) -> tuple[Solution, RidgePath]:
+        """The best fit with the coordinate at ``last``, and the trail with the derivatives that led there."""
+        held = (self.j,)
+        moved, sure = chord(self.problem, trail.to(last), trail.jacobian, held, NEARLY)
+        if not sure:
+            moved = solve(self.problem, moved.x, QUICK, NEARLY, held=held)
+            trail = replace(trail, jacobian=moved.jacobian)
+        if not moved.ended and moved.cost - self.best.cost > self.target**2 * self.noise:
+            moved = solve(self.problem, moved.x, ENOUGH, NEARLY, held=held, method="dogbox")  # quicker along a ridge
+        return moved, trail
+
+    def side(self, trail: RidgePath, sign: float, floor: bool) -> tuple[list[Solution], bool, str]:
+        """Fits up (sign 1) or down (-1) from the best, whether the data set no limit there, and what ended the way."""
+        bound = float(self.bounds[int(sign > 0.0)][self.j])
+        found: list[Solution] = []
+        root, steep, ended = 0.0, 0.0, False
+        # a little short of the target by curvature, as the second step tells the rest
+        step = min(0.8 * self.target * trail.spread, self.farthest)
         for _ in range(HALVINGS):  # most profiles end after two steps
             reach, meets = trail.reach(sign)
-            if touches := reach < step:
-                step = reach
-            at = float(trail.x[j])
-            last = at + sign * step
-            if step < SAME * max(1.0, abs(at)):
+            touches = reach < step
+            step, here = min(step, reach), float(trail.x[self.j])
+            if step < SAME * max(1.0, abs(here)):
                 if not touches:
                     break
-                trail = way(problem, trail.x, j, (low, high), noise, farthest / target, trail.stopped | meets)
-                step = min((1.02 * target - root) * trail.spread, farthest)
+                trail = self.way(trail.x, trail.stopped | meets)
+                step = self.first_step(trail, root)
                 continue
+            last = here + sign * step
             ended = sign * (last - bound) >= -1e-9 * abs(bound)
-            last = float(bound) if ended else last
-            step = abs(last - at)
+            last = bound if ended else last
+            step = abs(last - here)
             try:
-                moved, sure = chord(problem, trail.to(last), trail.jacobian, (j,), NEARLY)
-                if not sure:
-                    moved = solve(problem, moved.x, QUICK, NEARLY, held=(j,))
-                    trail = replace(trail, jacobian=moved.jacobian)
-                if not moved.ended and moved.cost - best.cost > target**2 * noise:
-                    moved = solve(problem, moved.x, ENOUGH, NEARLY, held=(j,), method="dogbox")  # quicker trail a ridge
+                moved, trail = self.solve(trail, last)
             except SimulationError:
-                held[side] = "the simulation"
-                break
-            rise = (moved.cost - best.cost) / noise
-            rows.append((last, rise, moved.x))
-            if moved.cost < found.cost - SMALL * noise:
-                found = moved
-            steep = float(np.sqrt(max(rise, 0.0)))
-            if steep > TOO_STEEP * target:
-                step *= max(1.0 / GROWTH, 1.02 * (target - root) / (steep - root))
+                return found, root < self.target and steep <= TOO_STEEP * self.target, "the simulation"
+            found.append(moved)
+            steep = float(np.sqrt(max(moved.cost - self.best.cost, 0.0) / self.noise))
+            if steep > TOO_STEEP * self.target:
+                step *= max(1.0 / GROWTH, 1.02 * (self.target - root) / (steep - root))
                 continue
             was, root = root, steep
             trail = trail.on(moved.x)
-            if root >= target or ended:
+            if root >= self.target or ended:
                 break
             if touches:
-                trail = way(problem, moved.x, j, (low, high), noise, farthest / target, trail.stopped | meets)
-                step = min((1.02 * target - root) * trail.spread, farthest)
+                trail = self.way(moved.x, trail.stopped | meets)
+                step = self.first_step(trail, root)
                 continue
-            slope = max(root - was, 1e-3) / step
-            step = min((1.02 * target - root) / slope, GROWTH * step)
-        x = trail.x
-        if root < target and steep <= TOO_STEEP * target:
-            opened[side] = not (side == 0 and named.floor and ended)
-        else:
-            bounded = _limiting(problem, x, j, noise)
-            held[side] = bounded[0] if bounded else ""
-            opened[side] = bool(bounded)
-    rows.sort(key=lambda row: row[0])
-    table = [problem.values(row[2]) for row in rows]
-    speeds = np.array([problem.speeds(row[2]) for row in rows])
-    along = {key: np.array([row[key] for row in table]) for key in table[0] if key != name}
-    along |= {f"speed[{i}]": speeds[:, i] for i in range(speeds.shape[1]) if f"speed[{i}]" != name}
-    values = np.array([float(named.outside(row[0])) for row in rows])
+            step = min((1.02 * self.target - root) * step / max(root - was, 1e-3), GROWTH * step)
+        if root < self.target and steep <= TOO_STEEP * self.target:
+            return found, not (sign < 0.0 and floor and ended), ""
+        held = self._limiting(trail.x)
+        return found, bool(held), held
+
+    def _limiting(self, x: np.ndarray) -> str:
+        """An unknown at an end of its range whose release would lower the sum of squares there; "" if there is none.
+
+        An unknown that only drifted there along a flat valley pulls nothing, and a natural limit at zero is none.
+        """
+        n = self.problem.n_shared
+        low, high = (bound[:n] for bound in self.problem.bounds)
+        near = 0.02 * (high - low)  # of a bound, which may then hold the unknown
+        down, up = x[:n] - low < near, high - x[:n] < near
+        touched = up | (down & ~np.array([each.floor for each in self.problem.free], bool))
+        touched[self.j : self.j + 1] = False
+        if not touched.any():
+            return ""
+        slope = 2.0 * (self.problem.jacobian(x).T @ self.problem.residual(x))[:n]
+        pulls = touched & (np.where(up, -slope, slope) * (high - low) > self.noise)
+        return self.problem.free[int(pulls.argmax())].name if pulls.any() else ""
+
+
+def follow(problem: Problem, best: Solution, j: int, noise: float, freedom: int, name: str) -> tuple[Profile, Solution]:
+    """The profile of a coordinate, and the best fit met on the way."""
+    low, high = problem.bounds
+    if j < problem.n_shared:
+        unknown = problem.free[j]
+    else:  # a speed: as far as makes sense
+        unknown = Unknown(name, float(np.exp(best.x[j])) / 1e3, float(np.exp(best.x[j])) * 1e3)
+        low, high = low.copy(), high.copy()
+        low[j], high[j] = unknown.bounds
+    climb = _Climb(problem, best, j, noise, (low, high), float(t.ppf(0.5 + 0.5 * SURE, freedom)))
+    first = climb.way(best.x)
+    sides = [climb.side(first, sign, unknown.floor) for sign in (-1.0, 1.0)]
+    fits = sorted([*sides[0][0], best, *sides[1][0]], key=lambda fit: fit.x[j])
+    table = [problem.values(fit.x) for fit in fits]
+    speeds = np.array([problem.speeds(fit.x) for fit in fits])
+    others = {key: np.array([row[key] for row in table]) for key in table[0] if key != name}
+    others |= {f"speed[{i}]": each for i, each in enumerate(speeds.T) if f"speed[{i}]" != name}
+    values = np.array([float(unknown.outside(fit.x[j])) for fit in fits])
+    rise = np.array([(fit.cost - best.cost) / noise for fit in fits])
     profile = Profile(
-        name, float(named.outside(best.x[j])), values, np.array([row[1] for row in rows]), (opened[0], opened[1]),
-        (held[0], held[1]), along, freedom, named.low, named.high, named.log,
+        name, float(unknown.outside(best.x[j])), values, rise, (sides[0][1], sides[1][1]), (sides[0][2], sides[1][2]),
+        others, freedom, unknown.low, unknown.high, unknown.log,
     )  # fmt: skip
-    return profile, found
-
-
-def _limiting(problem: Problem, x: np.ndarray, j: int, noise: float) -> list[str]:
-    """Unknowns at an end of their range whose release would lower the sum of squares there.
-
-    An unknown that only drifted there along a flat valley pulls nothing, and a natural limit at zero is none.
-    """
-    n = problem.n_shared
-    low, high = (bound[:n] for bound in problem.bounds)
-    span = high - low
-    down, up = x[:n] - low < AT_BOUND * span, high - x[:n] < AT_BOUND * span
-    touched = up | (down & ~np.array([each.floor for each in problem.free], bool))
-    touched[j : j + 1] = False
-    if not touched.any():
-        return []
-    slope = 2.0 * (problem.jacobian(x).T @ problem.residual(x))[:n]
-    gain = np.where(up, -slope, slope) * span
-    return [each.name for i, each in enumerate(problem.free) if touched[i] and gain[i] > noise]
+    return profile, min(fits, key=lambda fit: fit.cost)

@@ -19,12 +19,7 @@ from .found import Found, Watch
 from .records import Taps, read_taps
 from .rig import measure
 
-RATE = 51200.0  # [Hz] at which a scene is measured: 2.56 times 20 kHz, usual for analysers
-HAMMER = 0.1  # [kg] of a hammer of which nothing is said: a usual modal hammer
 UNKNOWN = {"contact.stiffness": (1e2, 1e16), "contact.exponent": (1.0, 4.0), "contact.loss": (0.0, 10.0)}
-STEEP = 1.5  # [-] logarithm of a peak over its surroundings: lower ones, of less than a factor of 4.5, may be noise
-MOST_PEAKS = 20  # [-] listed: more do not fit a screen
-DURATION = 1.0  # [s] of the record of a scene: resolves peaks 1 Hz apart
 
 
 def _taps(options: Any) -> Taps:
@@ -40,8 +35,8 @@ def frf(options: Any) -> tuple[xr.Dataset, tuple[str, ...]]:
     if options.scene.suffix.lower() == ".toml":
         scene = load_scene(options.scene)
         hit = scene.run(target="modal").response
-        rate = RATE if options.rate is None else options.rate
-        taps = measure(hit, rate=rate, at=scene.points, duration=DURATION)
+        rate = 51200.0 if options.rate is None else options.rate  # 2.56 times 20 kHz, usual for analysers
+        taps = measure(hit, rate=rate, at=scene.points, duration=1.0)  # resolves peaks 1 Hz apart
     else:
         try:
             taps = _taps(options)
@@ -60,8 +55,9 @@ def peaks(found: xr.Dataset) -> list[dict[str, Any]]:
     rows = []
     for k, name in enumerate(found["channel"].values):
         size = np.abs(found["H"].values[1:, k])
-        places = find_peaks(np.log(np.maximum(size, 1e-300)), prominence=STEEP)[0]
-        largest = np.sort(places[np.argsort(-size[places])][:MOST_PEAKS])
+        # lower ones, of less than a factor of 4.5 over their surroundings, may be noise
+        places = find_peaks(np.log(np.maximum(size, 1e-300)), prominence=1.5)[0]
+        largest = np.sort(places[np.argsort(-size[places])][:20])  # more do not fit a screen
         for i in largest:
             coherence = float(found["coherence"].values[1 + i, k]) if "coherence" in found else None
             rows.append({
@@ -107,7 +103,8 @@ def fit(options: Any, watch: Watch | None) -> tuple[Found, Scene | None]:
     unknown = {name: tuple(limits) for name, limits in _pairs("unknown", options.unknown).items()} or UNKNOWN
     known = {name: value for name, (value,) in _pairs("known", options.known).items()}
     taps = _taps(options)
-    given: dict[str, Any] = {"striker": Striker.rigid(options.mass or HAMMER), "contact": Contact.hertz(1e7)}
+    # a usual modal hammer, if nothing is said of it
+    given: dict[str, Any] = {"striker": Striker.rigid(options.mass or 0.1), "contact": Contact.hertz(1e7)}
     scene = None
     if options.body is not None:
         scene = load_scene(options.body)

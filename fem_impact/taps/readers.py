@@ -18,8 +18,6 @@ HEADER_LINES = 200  # [-] of a text table at most, before its numbers begin
 # [-] of the step: times may deviate from an even grid by the first, by the second if rounded; a gap does by a whole one
 UNEVEN = 0.02, 0.3
 FEWEST = 8  # [-] samples of a channel
-# [-] a table with fewer rows than this is longer in time, without a doubt: few records have as many taps or channels
-FEW_TAPS = 16
 AGREE = 0.01  # [-] two statements of the rate may differ by this, as written with few digits
 MOST_CHANNELS = 256  # [-] of a file; an array with more rows holds something else
 RATE_NAMES = ("rate", "fs", "sampling_rate", "samplerate", "sample_rate", "sampling_frequency", "frequency")
@@ -387,7 +385,8 @@ def _columns(path: Path, found: dict[str, np.ndarray]) -> Recording:
         if value.ndim > 2 or longest not in value.shape:
             notes.append(f"{name} has shape {value.shape} and was left out")
             continue
-        if value.ndim == 2 and n_times is None and min(value.shape) > FEW_TAPS:
+        # fewer rows are taps or channels without a doubt
+        if value.ndim == 2 and n_times is None and min(value.shape) > 16:
             notes.append(f"the longer side of {name}, {longest} of {value.shape}, was taken as time")
         kept[name] = np.atleast_2d(value if value.shape[-1] == longest else value.T)
     if not kept:

@@ -84,14 +84,7 @@ class Taps:
             check.one_of("units", text, [si for si in channels.units.KINDS if si != "N"])
         tags = [f"tap {i + 1}" for i in range(n_taps)] if labels is None else labels
         tags = arguments.texts("labels", tags, n_taps, "tap of force")
-        said = arguments.texts("notes", tuple(notes) if isinstance(notes, (list, tuple)) else notes)
-        for name, given, wanted in (
-            ("names", names, n_channels),
-            ("units", unit, n_channels),
-            ("labels", tags, n_taps),
-        ):
-            if len(given) != wanted:
-                raise ValueError(f"{name} must have {wanted} entries, got {len(given)}")
+        said = arguments.texts("notes", notes)
         if overload is None:
             cut = [[triggers.clipped(f), *(triggers.clipped(r) for r in each.T)] for f, each in zip(rows, others)]
         else:
@@ -190,7 +183,7 @@ class Taps:
     @property
     def cut_short(self) -> np.ndarray:
         """Whether the record of each tap begins or ends within a pulse, (n_taps,) bool."""
-        return np.maximum(self.force[:, 0], self.force[:, -1]) > triggers.ENDS * self.peak
+        return np.maximum(self.force[:, 0], self.force[:, -1]) > 0.3 * self.peak  # filters leave less
 
     @property
     def noise(self) -> np.ndarray:
@@ -322,34 +315,15 @@ def read_taps(
     """
     found = readers.read(path)
     name = check.path("path", path).name
-    notes = list(found.notes)
     stated = found.rate if rate is None else check.between("rate", rate, *RATES, "Hz")
     if stated is None:
         raise ValueError(f"rate must be given: {name} does not state the sampling rate")
-    if found.rate is not None and rate is not None and abs(found.rate / stated - 1.0) > 1e-3:
+    notes = list(found.notes)
+    if found.rate is not None and abs(found.rate / stated - 1.0) > 1e-3:
         notes.append(f"the file states {found.rate:g} Hz; rate={stated:g} Hz was used")
-    unit = channels.stated_units(found, units)
     if full_scale is not None:
         full_scale = check.positive("full_scale", full_scale, "N")
-    struck = channels.force_channel(found, force, unit, name)
-    others = channels.response_channels(found, response, unit, struck)
-    scales = channels.scales(found, scale, struck)
-    factor, notes_ = channels.factor(found.names[struck], unit[struck], "N", scales.get(struck), name)
-    notes += notes_
-    raw = [segment[:, struck] * factor for segment in found.segments]
-    flip = -1.0 if max(row.max() for row in raw) < -min(row.min() for row in raw) else 1.0
-    if flip < 0.0:
-        notes.append("the force is mostly negative and was turned around")
-    kinds, factors = [], []
-    for i in others:
-        kind = channels.kind(unit[i])
-        value, more = channels.factor(found.names[i], unit[i], kind, scales.get(i), name)
-        kinds.append(kind)
-        factors.append(value)
-        notes += more
-    segments = [
-        (flip * row, segment[:, others] * np.array(factors)) for row, segment in zip(raw, found.segments)
-    ]  # each (n_samples,), (n_samples, n_responses)
+    segments, names, kinds, more = channels.in_si(found, name, force, response, scale, units)
     options = {"trigger": trigger, "before": before, "length": length, "together": together}
     rows, responses, full, labels, said = triggers.cut(segments, stated, name, **options)
     cut = [
@@ -357,13 +331,14 @@ def read_taps(
         for row, other, top in zip(rows, responses, full)
     ]
     taps = Taps.from_arrays(
-        rows, responses, rate=stated, names=[found.names[i] for i in others], units=kinds, overload=cut, labels=labels,
-        pulse=pulse,
+        rows, responses, rate=stated, names=names, units=kinds, overload=cut, labels=labels, pulse=pulse
     )  # fmt: skip
-    double = [label for label, n in zip(taps.labels, taps.n_pulses) if n > 1]
-    said += [f"{', '.join(double)}: more than one pulse, kept as one tap"] if double else []
-    late = [label for label, cut_short in zip(taps.labels, taps.cut_short) if cut_short]
-    said += [f"{', '.join(late)}: the record begins or ends within a pulse"] if late else []
     flat = [f"{label} ({', '.join(taps._cut(i))})" for i, label in enumerate(taps.labels) if any(cut[i])]
-    said += [f"cut off by the range of the channel: {', '.join(flat)}"] if flat else []
-    return Taps(taps.table, tuple(notes + said))
+    for which, what in (
+        ([label for label, n in zip(taps.labels, taps.n_pulses) if n > 1], "{}: more than one pulse, kept as one tap"),
+        ([label for label, late in zip(taps.labels, taps.cut_short) if late],
+         "{}: the record begins or ends within a pulse"),
+        (flat, "cut off by the range of the channel: {}"),
+    ):  # fmt: skip
+        said += [what.format(", ".join(which))] if which else []
+    return Taps(taps.table, (*notes, *more, *said))

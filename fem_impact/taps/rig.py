@@ -6,7 +6,6 @@ from typing import Any
 import numpy as np
 
 from .._base import check
-from ..impact.compiled import propagation
 from ..impact.history import History
 from ..impact.response import Response
 from . import arguments
@@ -24,8 +23,6 @@ FILTERS: dict[str, tuple[float, float] | None] = {
 FINE = 16  # [-] samples of the simulation per sample of the rig: aliasing of a half sine stays below 2e-5
 # [-] samples of the rig around a record, in which its filter may ring: more than twice those of `windows.BEFORE`
 MARGIN = 32
-ORDERS = (1, 20)  # [-] of a Butterworth filter
-MOST_SAMPLES = 4_000_000  # [-] of a simulated record, before it is thinned
 
 
 @dataclass(frozen=True)
@@ -63,7 +60,7 @@ class Rig:
             check.one_of("anti_alias", self.anti_alias, FILTERS)
         elif self.anti_alias is not None:
             order, corner = check.array("anti_alias", self.anti_alias, (2,))
-            check.between("order of anti_alias", order, *ORDERS)
+            check.between("order of anti_alias", order, 1, 20)
             check.positive("corner of anti_alias", corner, "Hz")
 
     def passes(self, frequencies: np.ndarray) -> np.ndarray:
@@ -87,13 +84,6 @@ class Rig:
         return 1.0 / (1.0 - x**2 + 2j * self.resonance_damping * x)
 
 
-def state(history: History, times: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Modal displacements and velocities of all bodies at ascending times, (n_times, n_modes) each."""
-    q, p = np.empty((2, len(times), len(history.omega)))
-    propagation.replay(history.scene, history.steps, history.n_coefficients, times, q, p)
-    return q, p
-
-
 def accelerations(history: History, part: slice, rows: np.ndarray, force: np.ndarray, times: np.ndarray) -> np.ndarray:
     """Acceleration of a body under a contact force, (n_times, n_points) [m/s^2], of its kept modes.
 
@@ -107,14 +97,9 @@ def accelerations(history: History, part: slice, rows: np.ndarray, force: np.nda
     omega, zeta = history.omega[part], history.zeta[part]
     forced = -np.outer(force, history.shape[0, part])  # the force slows the first body and speeds up the second
     if omega.any():
-        q, p = state(history, times)
+        q, p = history.states(times)
         forced -= 2.0 * zeta * omega * p[:, part] + omega**2 * q[:, part]
     return forced @ rows.T
-
-
-def cell_force(history: History, part: slice, tip_mass: float, times: np.ndarray) -> np.ndarray:
-    """Force on a cell behind the striker's tip, (n_times,) [N], as `behind_tip` has it."""
-    return behind_tip(history, part, tip_mass, history.force_at(times, 0)[0], times)
 
 
 def behind_tip(history: History, part: slice, tip_mass: float, force: np.ndarray, times: np.ndarray) -> np.ndarray:
@@ -224,39 +209,44 @@ def measure(
     lead = round(before * rig.rate)
     n_times = lead + max(8, round(span * rig.rate))
     n_fine = FINE * (n_times + 2 * MARGIN)
-    if n_fine > MOST_SAMPLES:
+    if n_fine > 4_000_000:  # a second of computing
         raise ValueError(f"duration must be shorter, or rate lower: the record would need {n_fine:.1g} fine samples")
     times = (np.arange(n_fine) - FINE * (lead + MARGIN)) / (FINE * rig.rate)
     begun = times >= 0.0
     force = np.zeros(n_fine)
-    force[begun] = cell_force(hit.history, hit.body_slice(0), rig.tip_mass, times[begun])
+    pushed = hit.history.force_at(times[begun], 0)[0]
+    force[begun] = behind_tip(hit.history, hit.body_slice(0), rig.tip_mass, pushed, times[begun])
     rows = [sample(force, rig, force=True, shift=onset)]
     if at is not None:
         points = hit.target.points("at", at)
         moved = np.zeros((len(points), n_fine))
         if quantity == "acceleration":
-            pushed = hit.history.force_at(times[begun], 0)[0]
             target = hit.body_slice(len(hit.bodies) - 1)
             rows_at = hit.target.shape_at(points)
             moved[:, begun] = accelerations(hit.history, target, rows_at, pushed, times[begun]).T
         else:
             moved[:, begun] = getattr(hit, quantity)(points, times[begun]).T
         rows += list(sample(moved, rig, force=False, shift=onset))
-    found = np.array(rows)[:, MARGIN : MARGIN + n_times]  # (1 + n_points, n_times)
-    overload = np.zeros(len(found), bool)
-    peak = np.maximum(np.abs(found).max(axis=1), np.finfo(float).tiny)
-    if rig.noise:
-        if rng is None:
-            raise ValueError("rng must be given for noise: a numpy.random.Generator or a seed")
-        found = found + rig.noise * peak[:, None] * arguments.generator("rng", rng).standard_normal(found.shape)
-    for i, top in enumerate([rig.full_scale or 1.25 * peak[0], *1.25 * peak[1:]]):
-        overload[i] = bool((np.abs(found[i]) >= top).any())
-        found[i] = np.clip(found[i], -top, top)
-        if rig.bits is not None:
-            step = top / 2.0 ** (rig.bits - 1)
-            found[i] = np.round(found[i] / step) * step
+    found, overload = _digitised(np.array(rows)[:, MARGIN : MARGIN + n_times], rig, rng)
     unit = {"acceleration": "m/s^2", "velocity": "m/s", "displacement": "m"}[quantity]
     names = [f"{quantity} {i + 1}" for i in range(len(found) - 1)]
     return Taps.from_arrays(
         found[0], found[1:].T[None], rate=rig.rate, names=names, units=[unit] * len(names), overload=overload[None]
     )
+
+
+def _digitised(records: np.ndarray, rig: Rig, rng: Any) -> tuple[np.ndarray, np.ndarray]:
+    """Records (n_channels, n_times) with noise, cut off at the range and rounded to bits; and which were cut off."""
+    peak = np.maximum(np.abs(records).max(axis=1, keepdims=True), np.finfo(float).tiny)
+    if rig.noise:
+        if rng is None:
+            raise ValueError("rng must be given for noise: a numpy.random.Generator or a seed")
+        records = records + rig.noise * peak * arguments.generator("rng", rng).standard_normal(records.shape)
+    top = 1.25 * peak
+    top[0] = rig.full_scale or top[0]
+    overload = (np.abs(records) >= top).any(axis=1)
+    records = np.clip(records, -top, top)
+    if rig.bits is not None:
+        step = top / 2.0 ** (rig.bits - 1)
+        records = np.round(records / step) * step
+    return records, overload

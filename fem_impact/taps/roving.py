@@ -18,25 +18,18 @@ from ..impact.collision import strike
 from ..impact.contact import Contact
 from ..impact.quantities import BAND_POINTS
 from ..impact.striker import Striker
-from ..model import vectors
 from ..model.target import FIRST_LOOK, Stages, Target
 from ..modes.modal import Damping, Modes
 from ..scenes.scene import Scene
-from ..show import export, plots
-from ..show.sound import DECAY
+from ..show import export, plots, sampling
 from ..sweeps import bodies
 from ..sweeps import hammers as chooser
-from ..sweeps.cells import Case
 from . import triggers
 from .rig import Rig
 
 RATE, FILTER = 2.56, "2.56"  # [-] sampling rate over bandwidth, as analysers have it, and their filter
-CLOSE = 1e-3  # [-] tolerance of the frequencies of a system's modes, far below their spacing
-# [-] modes are found up to this many times the bandwidth: fewer bend the top of the band, more only cost time
-BEYOND = 1.5
 # [-] tips of a hammer known by its mass, over that whose half sine has the bandwidth: each twice as stiff, to 5.5 times
 TIPS = np.geomspace(1.0, 30.0, 6)
-SHORTEST = 0.1  # [s] least length of the default record: lines at most 10 Hz apart, to part modes
 MOST_LINES = 100_000  # [-] of a record
 NOISE = 1e-3  # [-] of each channel over its peak, by default: some 60 dB, a choice
 MOST_BLOWS = 20_000  # [-] points times tips: some minutes
@@ -255,11 +248,14 @@ def planned(
         raise ValueError(
             f"points must be at most {MOST_BLOWS // len(masses)} for {len(masses)} tips, got {len(places)}"
         )
-    seen = _views(target, modes, places, masses, stiffnesses, stages)
+    blows = [{"mass": float(mass), "stiffness": float(tip)} for mass, tip in zip(masses, stiffnesses)]
+    seen, _ = bodies.of_hammers(
+        target, places, blows, blows[:2], chooser.TOLERANCE, chooser.MOST_MODES, stages
+    )  # fmt: skip
     inside = (modes.omega > 0.0) & (modes.frequencies <= bandwidth)
     if duration is None:
-        slowest = float((modes.damping_ratio * modes.omega)[inside].min(initial=np.inf))
-        duration = float(np.clip(DECAY / slowest, SHORTEST, triggers.LONGEST)) if slowest > 0.0 else triggers.LONGEST
+        # lines at most 10 Hz apart, to part modes
+        duration = sampling.ringing(modes, inside, (0.1, triggers.LONGEST))
     n_times = round(check.positive("duration", duration, "s") * RATE * bandwidth)
     if not 8 <= n_times <= 2 * MOST_LINES:
         raise ValueError(
@@ -292,10 +288,12 @@ def _modes(target: Target, bandwidth: float, stages: Stages) -> Modes:
     if target.modes is not None:
         return target.surrounded(target.modes)
     with stages("modes"):
-        found = target.find(FIRST_LOOK, tolerance=CLOSE, stages=stages)
-        reach = BEYOND * bandwidth / target.stretch  # modes are found before the body is scaled
+        close = 1e-3  # far below the spacing of frequencies
+        found = target.find(FIRST_LOOK, tolerance=close, stages=stages)
+        # modes up to less than that bend the top of the band, more only cost time
+        reach = 1.5 * bandwidth / target.stretch  # modes are found before the body is scaled
         if found.frequencies[-1] < reach:
-            found = target.find(FIRST_LOOK, reach, tolerance=CLOSE, first=found, stages=stages)
+            found = target.find(FIRST_LOOK, reach, tolerance=close, first=found, stages=stages)
         return target.surrounded(found)
 
 
@@ -325,25 +323,6 @@ def _kit(told: Any, centre: float) -> tuple[tuple[str, ...], tuple[str, ...], np
         raise ValueError("hammers must contain at least one hammer, got none")
     names, tips, masses, stiffnesses = zip(*rows)
     return names, tips, np.array(masses), np.array(stiffnesses)
-
-
-def _views(
-    target: Target, modes: Modes, points: np.ndarray, masses: np.ndarray, stiffnesses: np.ndarray, stages: Stages
-) -> list[Modes]:
-    """The structure as the blows at each point need it: by Ritz vectors if it is assembled of plates, else by modes."""
-    if target.modes is not None:
-        return [modes] * len(points)
-    if vectors.usable(target):
-        outline = bodies.outline(target, stages)
-        case = Case(outline, Striker.rigid(float(masses[0])), Contact.linear(1.0), points[0], 1.0)
-        blows = [{"mass": float(mass), "stiffness": float(tip)} for mass, tip in zip(masses, stiffnesses)]
-        sized = bodies.Sized(target, case, blows, blows[:2], chooser.TOLERANCE, max_impacts=2)
-        seen = sized.views(points, stages)
-        if seen is not None:
-            return [seen[tuple(point.tolist())] for point in points]
-    with stages("modes"):
-        many = target.find(chooser.MOST_MODES, tolerance=chooser.TOLERANCE, stages=stages)
-    return [target.surrounded(many)] * len(points)
 
 
 def _hit(body: Modes, point: np.ndarray, mass: float, tip: float) -> tuple[int, Any]:

@@ -1,6 +1,6 @@
 """Least squares of a fit: residuals of all taps through the rig, their derivatives, and the search for the best."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any, NamedTuple
@@ -11,7 +11,6 @@ from scipy.stats import qmc
 
 from .._base import check
 from .._base.check import SimulationError
-from . import blows
 from .rig import FINE, MARGIN
 from .unknowns import TIME, Setting, Unknown
 
@@ -20,12 +19,9 @@ HALF_LOST = 0.6
 STEP = 1e-4  # [-] of coordinates, for derivatives by differences: blows with a fixed step are smooth to 1e-6
 # [-] the contact time is sought within this factor of the measured one
 TIMES = 30.0
-SCREENED = 64  # [-] starting points that are looked at: four along each of three unknowns
-# [-] of the ranges: starting points nearer than this often lead to the same minimum
-NEIGHBOURS = 0.25
 # [-] frequency times contact time of modes that shape a pulse, where searches begin
 FELT = 0.1, 5.0
-LOOKS = 3  # [-] Gauss-Newton steps in speed and onset while looking: nearly linear in both, so that three find them
+MOST_OUTLIERS = 0.34  # [-] of what is measured may disagree: with more, nobody knows which ones are right
 ENOUGH = 60  # [-] iterations of one search
 # [-] relative change of the sum of squares or of the values that ends a search
 CLOSE = 1e-8
@@ -34,18 +30,11 @@ CLOSE = 1e-8
 QUICK = 12
 # [-] change that ends a search of which only the sum of squares counts: it errs by the square
 NEARLY = 1e-6
-# [-] of the promised gain, with which a step by such derivatives is good enough
-KEPT = 0.3
 # [-] of the noise variance: a gain that is not sought, as luck makes as much
 SMALL = 0.05
-# [-] of the largest singular value of scaled derivatives: flatter directions may be ridges
-FLAT = 3e-5
-# [-] logarithms of speeds in m/s and of momenta over measured impulses are sought this far from zero: all there are
-REACH = 25.0
-# [samples] the onset is sought this far from the trigger, which is set at 5 % of the peak
-LATEST = 60.0
-# [samples] the onset may move by at a single look: pulses are linear in it so far
-SHIFT = 3.0
+
+
+Function = Callable[[np.ndarray], np.ndarray]
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -88,15 +77,16 @@ class Problem(check.Brief):
     def n_shared(self) -> int:
         return len(self.free)
 
-    @property
+    @cached_property
     def bounds(self) -> tuple[np.ndarray, np.ndarray]:
         low, high = map(list, zip(*[each.bounds for each in self.free])) if self.free else ([], [])
         centre = np.log(self.data.impulse) if self.momentum else np.zeros(self.data.n_taps)
-        slide = np.full(self.data.n_taps, LATEST)
+        slide = np.full(self.data.n_taps, 60.0)  # samples from the trigger, which is set at 5 % of the peak
         wide = np.repeat([high[i] - low[i] for i in self._own], self.data.n_taps)
-        return np.concatenate([low, centre - REACH, -slide, -wide]), np.concatenate([high, centre + REACH, slide, wide])
+        # logarithms of speeds in m/s and of momenta over measured impulses within 25: all there are
+        return np.concatenate([low, centre - 25.0, -slide, -wide]), np.concatenate([high, centre + 25.0, slide, wide])
 
-    @property
+    @cached_property
     def _own(self) -> list[int]:
         """Numbers of the coordinates of `own`."""
         return [i for i, each in enumerate(self.free) if each.name in self.own]
@@ -178,12 +168,7 @@ class Problem(check.Brief):
         groups = [(tap, speeds[tap : tap + 1]) for tap in range(self.data.n_taps)] if self.own else [(None, speeds)]
         made = []
         for tap, several in groups:
-            values = self.values(x, tap)
-            bodies, tip_mass, duration = self.setting.blow(values)
-            made.append(blows.records(
-                bodies, several, duration=duration, n_times=self.data.n_times, lead=self.data.lead,
-                rig=self.setting.rig, tip_mass=tip_mass,
-            ))  # fmt: skip
+            made.append(self.setting.records(self.values(x, tap), several, self.data.n_times, self.data.lead))
         fine = np.concatenate(made)
         frequencies, transfer, sensor = self._chain
         spectra = np.fft.rfft(fine)[..., : len(frequencies)] * transfer
@@ -252,7 +237,7 @@ class Problem(check.Brief):
         """The coordinates with speeds and onsets improved, one tap at a time, the unknowns held."""
         n, n_taps = self.n_shared, self.data.n_taps
         x = x.copy()
-        for _ in range(LOOKS):
+        for _ in range(3):  # Gauss-Newton steps: nearly linear in both, so that three find them
             onsets, base = self.onsets(x), self._base(x)
             here, rate = self.sampled(base, onsets), self.sampled(base, onsets, rate=True)
             for tap in range(n_taps):
@@ -260,7 +245,7 @@ class Problem(check.Brief):
                 miss = (self.data.values[tap] - here[tap]).ravel()
                 size, shift = np.linalg.lstsq(columns, miss, rcond=None)[0]
                 x[n + tap] += np.clip(size, -0.5, 1.0)  # the force grows about as the speed
-                x[n + n_taps + tap] += np.clip(shift, -SHIFT, SHIFT)
+                x[n + n_taps + tap] += np.clip(shift, -3.0, 3.0)  # samples: pulses are linear in it so far
             x[n:] = np.clip(x[n:], self.bounds[0][n:], self.bounds[1][n:])
         return x
 
@@ -295,22 +280,34 @@ def solve(
     """Least squares from a start, by a method of scipy; the coordinates ``held`` stay."""
     low, high = problem.bounds
     held = [*held, *problem.needless]
-    inner = 1e-9 + 1e-9 * np.abs(x)
-    start = np.clip(x, np.where(np.isfinite(low), low + inner, low), np.where(np.isfinite(high), high - inner, high))
-    start[list(held)] = x[list(held)]
     free = np.setdiff1d(np.arange(len(x)), held)
 
     def whole(part: np.ndarray) -> np.ndarray:
-        full = start.copy()
+        full = x.copy()
         full[free] = part
         return full
 
-    found = least_squares(
-        lambda part: problem.residual(whole(part)), start[free], lambda part: problem.jacobian(whole(part), held),
-        (low[free], high[free]), x_scale="jac", max_nfev=iterations, ftol=close, xtol=close, gtol=1e-12,
-        method=method,
+    found = least(
+        lambda part: problem.residual(whole(part)), lambda part: problem.jacobian(whole(part), held), x[free],
+        (low[free], high[free]), close=close, iterations=iterations, method=method, x_scale="jac",
     )  # fmt: skip
-    return Solution(whole(found.x), 2.0 * float(found.cost), found.jac, found.status > 0)
+    return replace(found, x=whole(found.x))
+
+
+def least(
+    residual: Function, slopes: Function, x: np.ndarray, bounds: tuple[np.ndarray, np.ndarray], *, close: float,
+    iterations: int, method: str = "trf", x_scale: Any = 1.0,
+) -> Solution:  # fmt: skip
+    """Least squares within a box, by a method of scipy, in parts of its sides: scipy's first step is as long as the
+    start is far from zero, so that a search that begins at zero would end there."""
+    low, high = bounds
+    size = high - low
+    found = least_squares(
+        lambda u: residual(low + u * size), np.clip((x - low) / size, 1e-9, 1.0 - 1e-9),
+        lambda u: slopes(low + u * size) * size, (0.0, 1.0), method=method, x_scale=x_scale, ftol=close, xtol=close,
+        gtol=1e-12, max_nfev=iterations,
+    )  # fmt: skip
+    return Solution(low + found.x * size, 2.0 * float(found.cost), found.jac / size, found.status > 0)
 
 
 def chord(
@@ -318,7 +315,7 @@ def chord(
 ) -> tuple[Solution, bool]:
     """Least squares with the derivatives of a point nearby, (n_residuals, n_coordinates less those held).
 
-    Returns how far they lead, and whether that is the end: not if the sum of squares falls by less than `KEPT` of what
+    Returns how far they lead, and whether that is the end: not if the sum of squares falls by less than 0.3 of what
     they promise, or a bound is in the way. The derivatives then have to be found anew, as by `solve`.
     """
     held = [*held, *problem.needless]
@@ -348,7 +345,7 @@ def chord(
         if not gained > 0.0:
             break
         x, residual, cost = moved, there, cost - gained
-        if gained < KEPT * promised:
+        if gained < 0.3 * promised:
             break
     return Solution(x, cost, jacobian, False), False
 
@@ -367,7 +364,7 @@ def directions(jacobian: np.ndarray) -> Basis:
     """The directions of derivatives (n_residuals, n_coordinates)."""
     columns = np.maximum(np.linalg.norm(jacobian, axis=0), np.finfo(float).tiny)[:, None]
     left, sizes, right = np.linalg.svd(jacobian / columns.T, full_matrices=False)
-    told = sizes > FLAT * sizes[0]
+    told = sizes > 3e-5 * sizes[0]  # flatter directions may be ridges
     return Basis(left, sizes, told, (right[told] / sizes[told, None]).T / columns, right[~told].T / columns)
 
 
@@ -377,7 +374,7 @@ def pulse_length(taps: Any) -> float:
 
 
 def starts(problem: Problem, length: float, momentum: np.ndarray, rng: np.random.Generator) -> list[np.ndarray]:
-    """Starting points in order of their sums of squares, of `SCREENED` that fill the ranges evenly; neighbours last.
+    """Starting points in order of their sums of squares, of 64 that fill the ranges evenly; neighbours last.
 
     Parameters
     ----------
@@ -386,7 +383,7 @@ def starts(problem: Problem, length: float, momentum: np.ndarray, rng: np.random
     """
     n = problem.n_shared
     low, high = (bound[:n] for bound in problem.bounds)
-    points = qmc.Sobol(max(n, 1), rng=rng).random(SCREENED) if n else np.zeros((1, 1))
+    points = qmc.Sobol(max(n, 1), rng=rng).random(64) if n else np.zeros((1, 1))  # four along each of three unknowns
     looked: list[tuple[float, np.ndarray]] = []
     for point in points:
         shared = low + (0.02 + 0.96 * point[:n]) * (high - low)
@@ -409,5 +406,5 @@ def starts(problem: Problem, length: float, momentum: np.ndarray, rng: np.random
     later: list[np.ndarray] = []
     for _, x in looked:
         away = [np.abs((x - other)[:n] / (high - low)).max(initial=0.0) for other in chosen]
-        (later if away and min(away) < NEIGHBOURS else chosen).append(x)
+        (later if away and min(away) < 0.25 else chosen).append(x)  # neighbours often lead to the same minimum
     return chosen + later

@@ -16,8 +16,6 @@ from .records import Taps
 from .windows import joined
 
 METHODS = ("H1", "H2")
-MOST_TIMES = 2**24  # [-] samples of a transform
-TAPER = 0.25  # [-] of the force window that falls as a cosine, so that no edge is heard
 UNITS = {"m/s^2": "accelerance", "m/s": "mobility", "m": "receptance"}
 RESPONSE_CODE = {"m/s^2": readers.ACCELERATION, "m/s": readers.VELOCITY, "m": readers.DISPLACEMENT}
 
@@ -82,7 +80,7 @@ def frf(
         tau = check.positive("response_window", response_window, "s")
         fade = np.exp(-np.maximum(time - onset[:, None], 0.0) / tau)
         force, response = force * fade, response * fade[:, :, None]
-    count = len(time) if n_times is None else check.count("n_times", n_times, low=2, high=MOST_TIMES)
+    count = len(time) if n_times is None else check.count("n_times", n_times, low=2, high=2**24)
     F = np.fft.rfft(force, count, axis=1)[:, :, None] / taps.rate  # (n_taps, n_frequencies, 1)
     X = np.fft.rfft(response, count, axis=1) / taps.rate
     ff, xx, xf = (np.abs(F) ** 2).mean(0), (np.abs(X) ** 2).mean(0), (X * F.conj()).mean(0)
@@ -110,7 +108,7 @@ def frf(
 def _force_window(time: np.ndarray, onset: np.ndarray, length: float) -> np.ndarray:
     """One around every tap, zero elsewhere, (n_taps, n_times)."""
     x = (time - onset[:, None]) / length
-    fall = np.clip((x - (1.0 - TAPER)) / TAPER, 0.0, 1.0)
+    fall = np.clip((x - 0.75) / 0.25, 0.0, 1.0)  # its last quarter falls as a cosine, so that no edge is heard
     return np.where(x < -0.1, 0.0, 0.5 + 0.5 * np.cos(np.pi * fall))
 
 
@@ -180,10 +178,7 @@ def matched(measured: Any, computed: Any, *, points: Any = None, which: Any = No
     >>> [(pair.computed, round(100 * pair.difference, 1)) for pair in pairs]  # number, %
     [(0, -1.0), (2, -3.2)]
     """
-    one, two = (
-        x.frequencies if isinstance(x, Modes) else check.ascending(name, x, "Hz")
-        for name, x in (("measured", measured), ("computed", computed))
-    )
+    one, two = frequencies("measured", measured), frequencies("computed", computed)
     used = np.arange(len(one)) if which is None else np.atleast_1d(np.arange(len(one))[which])
     one = one[used]
     if not len(one) or len(two) < len(one):
@@ -200,6 +195,11 @@ def matched(measured: Any, computed: Any, *, points: Any = None, which: Any = No
     return tuple(
         Pair(int(used[i]), int(j), float(one[i]), float(two[j]), value) for i, j, value in zip(rows, columns, values)
     )
+
+
+def frequencies(name: str, value: Any) -> np.ndarray:
+    """Ascending frequencies [Hz] of `Modes` or of an argument that lists them."""
+    return value.frequencies if isinstance(value, Modes) else check.ascending(name, value, "Hz")
 
 
 def in_order(gap: np.ndarray) -> np.ndarray:

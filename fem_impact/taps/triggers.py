@@ -11,37 +11,27 @@ from .._base.rounding import SAME
 
 # [-] of the largest force: a tap begins where the force rises above this; lower would meet ringing, higher lose taps
 LEVEL = 0.05
-LOW = 0.25  # [-] quantile of a record of one tap that is at rest: no pulse fills three quarters of it
 # [-] standard deviations of the noise that the trigger stays above at least: never by chance, in any record
 NOISE = 8.0
-GAUSS = 1.4826  # [-] fact: standard deviation over median absolute deviation of Gaussian noise
-# [-] of the largest pull: a pulse rises above this, as ringing that decays pushes less than it pulled before
-RINGS = 2.0
 # [-] of a tap's largest force: pulses above this are apart where the force falls below half of it, smaller ones below
 # half of their own
 PULSE = 0.1
 # [-] standard deviations of the noise: the same, if they are larger, and those of its mean that an offset exceeds; two
 # fewer, as a pulse or a tap is already sure
 CLEAR = 6.0
-LUCKY = 4.5  # [-] standard deviations that noise alone pulls: more in a hundred thousand samples is ringing
-MOST = 0.5  # [-] of a tap's largest force: a pulse rises above this at most, so that a tap in strong noise has one
-DRIFT = 0.2  # [-] of the trigger: less drift within a record is not mentioned, as it moves no tap
-# [s] over which the force is at rest for more than half the time: slower changes are drift, a tap lasts some ms
-REST = 0.2
 CLIPPED = 3  # [-] equal largest samples in a row that count as clipped: two may be equal by chance
 BEFORE = 0.02  # [s] longest record before a tap: 20 ms tell the offset, more may reach back to the last tap's ringing
 LONGEST = 10.0  # [s] longest record of one tap: lines 0.1 Hz apart
 FEWEST = 8  # [-] samples before a tap from which an offset is estimated: to a third of the noise, fewer make it worse
 # [samples] before the onset that do not count as rest, as pulses start flat
 GUARD = 3
-MOST_TAPS = 10_000  # [-] of one file: more are noise
-ENDS = 0.3  # [-] of a pulse's peak: a record that begins or ends above this cuts the pulse; less is left by filters
 
 
 def noise(force: np.ndarray) -> float:
     """Standard deviation [N] of the noise, from the differences of neighbours, of which most are no tap."""
     step = np.diff(force)
-    return float(GAUSS * np.median(np.abs(step - np.median(step))) / np.sqrt(2.0))
+    # 1.4826: standard deviation over median absolute deviation of Gaussian noise
+    return float(1.4826 * np.median(np.abs(step - np.median(step))) / np.sqrt(2.0))
 
 
 def level(force: np.ndarray) -> float:
@@ -51,7 +41,7 @@ def level(force: np.ndarray) -> float:
 
 def onset(force: np.ndarray) -> int:
     """First sample of a tap (n_times,) above the trigger, whatever offset the record has; 0 if there is none."""
-    rest = float(np.quantile(force, LOW))
+    rest = float(np.quantile(force, 0.25))  # no pulse fills three quarters of a record
     moved = force - (rest if abs(rest) > 2.0 * noise(force) else 0.0)
     above = moved > level(moved)
     return int(above.argmax())
@@ -65,6 +55,14 @@ def starts(force: np.ndarray, trigger: float, together: int) -> np.ndarray:
     return above[np.concatenate([[True], np.diff(above) > together])]
 
 
+def rooms(force: np.ndarray, trigger: float, together: int) -> list[tuple[int, int, int]]:
+    """Of every tap its first sample above the trigger, and the samples before and after it that are its own."""
+    begun = starts(force, trigger, together)
+    halves = 0.5 * np.diff(begun)
+    before, after = np.append(begun[:1], halves), np.append(halves, len(force) - begun[-1:])
+    return [(int(start), int(free), int(rest)) for start, free, rest in zip(begun, before, after)]
+
+
 def pulses(force: np.ndarray, noise: float = 0.0, least: float | None = None) -> list[tuple[int, int]]:
     """First sample of every pulse of a tap (n_times,), and the one after its last; two of a double hit.
 
@@ -76,8 +74,10 @@ def pulses(force: np.ndarray, noise: float = 0.0, least: float | None = None) ->
         return []
     if least is None:
         ringing, bit = -float(force.min()), float(np.diff(np.unique(force)).min(initial=peak))
-        least = max(CLEAR * max(noise, bit), RINGS * ringing if ringing > LUCKY * noise else 0.0, SAME * peak)
-    up = min(least, MOST * peak)
+        # noise alone pulls 4.5 deviations in a hundred thousand samples; ringing that decays pushes less than twice
+        # what it pulled before
+        least = max(CLEAR * max(noise, bit), 2.0 * ringing if ringing > 4.5 * noise else 0.0, SAME * peak)
+    up = min(least, 0.5 * peak)  # a tap in strong noise has a pulse, too
     edges = np.flatnonzero(np.diff(np.concatenate([[0], force > 0.5 * up, [0]]).astype(int)))
     tops = np.maximum.reduceat(np.append(force, 0.0), edges)[::2]
     found = []
@@ -136,26 +136,18 @@ def cut(
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray, list[str], list[str]]:  # fmt: skip
     """Records of equal length around every tap: force, responses, whether the force is cut off, labels and notes."""
     pause = max(1, round(check.positive("together", together, "s") * rate))
-    rests = [level_of_rest(row, max(1, round(REST * rate))) for row, _ in segments]
+    # in 0.2 s the force is at rest for more than half the time: slower changes are drift, a tap lasts some ms
+    rests = [level_of_rest(row, max(1, round(0.2 * rate))) for row, _ in segments]
     moved = [row - rest for (row, _), rest in zip(segments, rests)]
     whole = np.concatenate(moved)
     limit = level(whole) if trigger is None else check.positive("trigger", trigger, "N")
-    places = []  # segment, first sample above the trigger, samples free before and after
-    for k, (row, _) in enumerate(segments):
-        begun = starts(moved[k], limit, pause)
-        for i, start in enumerate(begun):
-            last = begun[i - 1] if i else 0
-            end = begun[i + 1] if i + 1 < len(begun) else len(row)
-            free = int(start) if not i else min(int(start - last), int(0.5 * (start - last)))
-            after = int(end - start) if i + 1 == len(begun) else int(0.5 * (end - start))
-            places.append((k, int(start), free, after))
+    places = [(k, *place) for k, row in enumerate(moved) for place in rooms(row, limit, pause)]
     if not places:
-        top = float(whole.max())
         raise ValueError(
-            f"no tap was found in {name}: its force reaches {top:.3g} N and the trigger is {limit:.3g} N; check scale "
-            "and trigger"
+            f"no tap was found in {name}: its force reaches {whole.max():.3g} N and the trigger is {limit:.3g} N; "
+            "check scale and trigger"
         )
-    if len(places) > MOST_TAPS:
+    if len(places) > 10_000:  # they are noise
         raise ValueError(f"{name} has {len(places)} places above {limit:.3g} N; give trigger= and together=")
     wanted = BEFORE if before is None else check.positive("before", before, "s")
     frees = [free for _, _, free, _ in places]
@@ -189,7 +181,7 @@ def cut(
     largest = max(offsets, key=abs)
     if largest:
         notes.append(f"offsets before the taps were removed, of the force up to {abs(largest):.2g} N")
-    if drift > DRIFT * limit:
+    if drift > 0.2 * limit:  # less moves no tap
         notes.append(f"drift of the force was removed, up to {drift:.2g} N within a record")
     if lead < FEWEST:
         notes.append(f"only {lead} samples before the taps: offsets are not removed")

@@ -24,7 +24,6 @@ TARGET = ("mass", "first_frequency", "damping", "x", "y")
 MODE = ("frequency", "mass", "damping", "gain")
 MOST_MODES = 6  # [-] of an unknown target: a pulse tells few, and each has several unknowns
 DAMPING = 0.02  # [-] of unknown modes, unless it is unknown too: takes an eighth of each swing; a choice
-RATIO = 1.0  # [-] mode ratio of a striker, unless it is unknown too: two equal masses and a spring, as nothing is known
 # [-] along each unknown coordinate of the strike point at which the compliance is computed: a quartic between
 PLACES = 5
 NAME = re.compile(r"(contact|striker|target|mode\d)\.(\w+)")
@@ -42,14 +41,6 @@ def unit_of(name: str) -> str:
     return "m/s" if name.startswith("speed") else UNITS.get(name.rpartition(".")[2], "s" if name == TIME else "")
 
 
-def bounds(label: str, limits: Any, unit: str = "") -> tuple[float, float]:
-    """Both ends of a range (low, high), low below high."""
-    low, high = check.array(label, limits, (2,), unit).tolist()
-    if not low < high:
-        raise ValueError(f"{label} must be a range (low, high), got ({low:g}, {high:g})")
-    return low, high
-
-
 @dataclass(frozen=True)
 class Unknown:
     """A number to be found between two bounds; by its logarithm if both are positive."""
@@ -57,10 +48,6 @@ class Unknown:
     name: str
     low: float
     high: float
-
-    def __post_init__(self) -> None:
-        low, high = bounds(f"unknown[{self.name!r}]", (self.low, self.high), unit_of(self.name))
-        check.settle(self, low=low, high=high)
 
     @property
     def log(self) -> bool:
@@ -85,6 +72,55 @@ class Unknown:
         return float(self.inside(self.low)), float(self.inside(self.high))
 
 
+@dataclass(frozen=True)
+class Box:
+    """Unknowns, and the box that their coordinates fill."""
+
+    unknowns: tuple[Unknown, ...]
+
+    @classmethod
+    def of(cls, label: str, value: Any) -> "Box":
+        """From a mapping of names to (low, high), at least one."""
+        limits = arguments.table(label, value)
+        if not limits:
+            raise ValueError(f'{label} must name at least one range, as in {{"contact.stiffness": (1e5, 1e8)}}')
+        found = []
+        for name, ends in limits.items():
+            one = f"{label}[{name!r}]"
+            if not isinstance(ends, (tuple, list)) or len(ends) != 2:
+                raise ValueError(f"{one} must be a range (low, high), got {check.shown(ends)}")
+            low, high = check.array(one, ends, (2,), unit_of(name)).tolist()
+            if not low < high:
+                raise ValueError(f"{one} must be a range (low, high), got ({low:g}, {high:g})")
+            found.append(Unknown(name, low, high))
+        return cls(tuple(found))
+
+    @cached_property
+    def names(self) -> tuple[str, ...]:
+        return tuple(each.name for each in self.unknowns)
+
+    @cached_property
+    def bounds(self) -> tuple[np.ndarray, np.ndarray]:
+        """Lower and upper bounds of the coordinates, (n_unknowns,) each."""
+        low, high = np.array([each.bounds for each in self.unknowns]).reshape(-1, 2).T
+        return low, high
+
+    def values(self, x: np.ndarray) -> dict[str, float]:
+        """The unknowns by name at coordinates (n_unknowns,)."""
+        return {each.name: float(np.clip(each.outside(z), each.low, each.high)) for each, z in zip(self.unknowns, x)}
+
+    def start(self, given: Any) -> np.ndarray:
+        """Coordinates (n_unknowns,) of the values given by name; of others the middle of the range."""
+        table, (low, high) = arguments.table("start", given), self.bounds
+        for name in table:
+            check.one_of("start", name, self.names)
+        x = 0.5 * (low + high)
+        for i, each in enumerate(self.unknowns):
+            if each.name in table:
+                x[i] = each.inside(check.between(f"start[{each.name!r}]", table[each.name], each.low, each.high))
+        return x
+
+
 def checked(
     unknown: Mapping[str, Any],
     target: Modes | None,
@@ -93,22 +129,19 @@ def checked(
     known: Mapping[str, float] | None = None,
 ) -> tuple[Unknown, ...]:
     """The unknowns by name; ValueError for a name that nothing here has, and for ranges that make no contact."""
-    given = arguments.ranges("unknown", unknown)
+    found = Box.of("unknown", unknown).unknowns
     contacts = [field.name for field in dataclasses.fields(contact) if field.type in ("float", float)]
     modes = sorted({int(name[4]) for name in unknown if re.match(r"mode\d\.", str(name))})
     contains = [f"contact.{name}" for name in contacts] + [f"striker.{name}" for name in STRIKER]
     contains += [f"target.{name}" for name in TARGET if target is not None or name == "mass"]
     contains += [f"mode{i}.{name}" for i in range(1, MOST_MODES + 1) for name in MODE]
-    found = []
-    for name, limits in given.items():
+    for each in found:
+        name, positive = each.name, (".stiffness", ".exponent", ".frequency", "first_frequency", "r.mass", "t.mass")
         _check_name("unknown", name, contains)
-        found.append(Unknown(name, *limits))
-        if name.endswith((".stiffness", ".exponent", ".frequency", "mass", "first_frequency")) and found[-1].low < 0.0:
-            raise ValueError(f"unknown[{name!r}] must not reach below zero, got {limits[0]:g} {unit_of(name)}")
-        if name.endswith((".stiffness", ".exponent", ".frequency", "first_frequency", "r.mass", "t.mass")) and not (
-            found[-1].log
-        ):
-            raise ValueError(f"unknown[{name!r}] must begin above zero, got {limits[0]:g} {unit_of(name)}")
+        if name.endswith((*positive, "mass")) and each.low < 0.0:
+            raise ValueError(f"unknown[{name!r}] must not reach below zero, got {each.low:g} {unit_of(name)}")
+        if name.endswith(positive) and not each.log:
+            raise ValueError(f"unknown[{name!r}] must begin above zero, got {each.low:g} {unit_of(name)}")
     held = known or {}
     for name in held:
         _check_name("known", name, contains)
@@ -125,7 +158,7 @@ def checked(
                 raise ValueError("unknown striker.mode_ratio is for a rigid striker; this one has modes of its own")
     elif "striker.first_frequency" not in unknown and {"striker.mode_ratio", "striker.damping"} & set(unknown):
         raise ValueError("unknown must hold striker.first_frequency too: the striker given is rigid")
-    return tuple(found)
+    return found
 
 
 def _check_name(label: str, name: str, names: list[str]) -> None:
@@ -141,7 +174,7 @@ def changed(contact: Contact, values: Mapping[str, float]) -> Contact:
     return replace(contact, **{name: float(value) for name, value in own.items()})
 
 
-def _check_contact(contact: Contact, unknown: list[Unknown], known: Mapping[str, float]) -> None:
+def _check_contact(contact: Contact, unknown: tuple[Unknown, ...], known: Mapping[str, float]) -> None:
     """ValueError unless the numbers at the ends of all ranges make a contact."""
     own = [each for each in unknown if each.name.startswith("contact.")]
     for ends in product(*((each.low, each.high) for each in own)):
@@ -173,22 +206,26 @@ class Setting(check.Brief):
     n_points: int
     impulse: float  # [N s] of a typical tap: sets the speed at which the contact time is stated
 
-    def blow(self, values: Mapping[str, float]) -> tuple[blows.StruckPair, float, float]:
-        """Both bodies and the contact that the values make, the mass of the tip [kg], and `duration`."""
+    def records(self, values: Mapping[str, float], speeds: np.ndarray, n_times: int, lead: int) -> np.ndarray:
+        """Fine records of the blows that the values make, see `blows.records`."""
         law = changed(self.contact, values)
-        tip_mass = values.get("striker.tip_mass", self.rig.tip_mass)
-        bodies = blows.pair(self.hammer(values), self.structure(values), law)
-        return bodies, tip_mass, self.duration(values, law)
+        met = replace(law, gap=0.0) if law.gap else law  # the record begins where the bodies touch
+        return blows.records(
+            self.hammer(values), self.structure(values), met, speeds, duration=self.duration(values, law),
+            n_times=n_times, lead=lead, rig=self.rig, tip_mass=values.get("striker.tip_mass", self.rig.tip_mass),
+        )  # fmt: skip
 
     @cached_property
-    def _hammer(self) -> blows.Body:
+    def _hammer(self) -> blows.TappedBody:
         return blows.of_striker(self.striker)
 
     @cached_property
-    def _structure(self) -> blows.Body:
-        return blows.of_target(self.target, self.at, self.points)  # type: ignore[arg-type]
+    def _structure(self) -> blows.TappedBody:
+        if self.target is None:
+            return blows.wall(self.n_points)
+        return blows.of_target(self.target, self.at, self.points)
 
-    def hammer(self, values: Mapping[str, float]) -> blows.Body:
+    def hammer(self, values: Mapping[str, float]) -> blows.TappedBody:
         """The striker with its unknowns."""
         part = {name: values.get(f"striker.{name}") for name in STRIKER}
         body = self._hammer
@@ -197,29 +234,24 @@ class Setting(check.Brief):
         body = body.scaled(part["mass"], None, None)
         if part["first_frequency"] is None:
             return body
-        ratio = RATIO if part["mode_ratio"] is None else part["mode_ratio"]
+        # without a ratio, two equal masses and a spring, as nothing is known
+        ratio = 1.0 if part["mode_ratio"] is None else part["mode_ratio"]
         damping = DAMPING if part["damping"] is None else part["damping"]
         return body.with_mode(part["first_frequency"], body.felt_mass / ratio, damping, np.zeros(0))
 
-    def structure(self, values: Mapping[str, float]) -> blows.Body:
+    def structure(self, values: Mapping[str, float]) -> blows.TappedBody:
         """The struck body with its unknowns."""
         part = {name: values.get(f"target.{name}") for name in TARGET}
+        body = self._structure
         if self.target is None:
-            body = blows.wall(self.n_points)
             if part["mass"] is not None:
-                u = part["mass"] ** -0.5
-                body = blows.Body(
-                    np.zeros(1), np.zeros(1), np.array([u]), np.zeros(1), np.full((self.n_points, 1), u),
-                    mass=part["mass"],
-                )  # fmt: skip
+                body = body.with_mode(0.0, part["mass"], 0.0, np.ones(self.n_points))
         else:
             if part["x"] is not None or part["y"] is not None:
                 moved = np.array(self.at, float).ravel()
                 for i, axis in enumerate("xy"[: len(moved)]):
                     moved[i] = moved[i] if part[axis] is None else part[axis]
                 body = blows.of_target(self.target, moved, self.points, self._softness(moved))
-            else:
-                body = self._structure
             body = body.scaled(part["mass"], part["first_frequency"], part["damping"])
         for i in range(1, MOST_MODES + 1):
             if f"mode{i}.frequency" not in values:

@@ -1,13 +1,12 @@
 """`update`: material constants that give measured frequencies."""
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from itertools import combinations
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from scipy.optimize import least_squares
 from scipy.stats import f, qmc, t
 
 from .._base import check
@@ -15,21 +14,16 @@ from .._base.check import SimulationError
 from ..fe.assembly import System
 from ..modes.modal import Modes, find_modes
 from ..scenes.scene import Scene, load_scene
-from . import arguments, transfer
+from . import transfer
 from .profiles import DOUBTED
-from .solver import CLOSE
-from .transfer import Pair
-from .unknowns import Unknown
+from .solver import CLOSE, ENOUGH, MOST_OUTLIERS, Solution, least
+from .transfer import Pair, frequencies
+from .unknowns import Box
 
 # [-] of logarithms, for derivatives by differences: frequencies go with powers of the constants; errs by 0.3 %
 STEP = 0.01
-MOST_SOLVES = 200  # [-] of the body
-MORE = 2  # [-] modes computed beyond those measured, so that as many may be missed in the measurement
+MOST_SOLVES = 200  # [-] of the body: a search takes some twenty
 TABLES = ("mesh", "material", "section", "target", "supports")  # of a scene: what its modes depend on
-# [-] measured frequencies, and their share, that may belong to no mode: with more, nobody knows which ones are right
-MOST_SPURIOUS, SPURIOUS = 2, 0.34
-LOOKS, STEPS = 16, 4  # [-] starts over the ranges, and steps of each, where frequencies go by powers of the constants
-POOR = 0.1  # [-] half width of an interval, in logarithms: a constant known to no better than 10 % is called not told
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -51,22 +45,18 @@ class Updated(check.Brief):
     @property
     def uncertain(self) -> tuple[str, ...]:
         """Constants that the frequencies tell to no better than 10 %."""
-        return tuple(name for name, spread in self.spread.items() if spread > POOR)
+        return tuple(name for name, spread in self.spread.items() if spread > 0.1)
 
     def summary(self) -> str:
         """The constants and the frequencies in a few lines."""
-        lines = [
-            f"{name} = {value:.4g}"
-            + (
-                " (not told by these frequencies)"
-                if self.spread[name] > 1.0
-                else f" (± {100 * self.spread[name]:.2g} %)"
-            )
-            for name, value in self.values.items()
-        ]
+        lines = []
+        for name, value in self.values.items():
+            spread = self.spread[name]
+            told = " (not told by these frequencies)" if spread > 1.0 else f" (± {100 * spread:.2g} %)"
+            lines.append(f"{name} = {value:.4g}{told}")
         left = ", ".join(f"{frequency:.5g} Hz" for frequency in self.unpaired)
-        told = [f"without a mode of the body, left out: {left}"] if left else []
-        return "\n".join([*lines, transfer.table(self.pairs), *told, f"{self.n_solves} solves"])
+        alone = [f"without a mode of the body, left out: {left}"] if left else []
+        return "\n".join([*lines, transfer.table(self.pairs), *alone, f"{self.n_solves} solves"])
 
 
 def update(
@@ -126,122 +116,120 @@ def update(
         raise ValueError(
             f"build must be a function of a dict of values, a Scene or the path of one, got {check.shown(build)}"
         )
-    ranges = [Unknown(name, *limits) for name, limits in arguments.ranges("unknown", unknown).items()]
-    for each in ranges:
+    box = Box.of("unknown", unknown)
+    for each in box.unknowns:
         if not each.log:
             raise ValueError(f"unknown[{each.name!r}] must begin above zero, got {each.low:g}")
-    target = measured.frequencies if isinstance(measured, Modes) else check.ascending("measured", measured, "Hz")
-    if len(target) < len(ranges) or not ranges:
-        raise ValueError(
-            f"measured must hold at least {len(ranges)} frequencies for as many unknowns, got {len(target)}"
-        )
+    target, n = frequencies("measured", measured), len(box.unknowns)
+    if len(target) < n:
+        raise ValueError(f"measured must hold at least {n} frequencies for as many unknowns, got {len(target)}")
     if (target <= 0.0).any():
         raise ValueError("measured must hold positive frequencies only; leave out rigid motions")
     if isinstance(build, Scene):
-        _check_names(build, ranges)
-    rigid = [0]  # motions of the body, which the measurement does not have
-    kept: dict[bytes, Modes] = {}
-    used = np.arange(len(target))  # numbers of the measured modes that are paired
-
-    def modes_at(x: np.ndarray) -> Modes:
-        key = x.tobytes()
-        if key not in kept:
-            if len(kept) >= MOST_SOLVES:
-                raise SimulationError(f"the search did not end within {MOST_SOLVES} solves; narrow the ranges")
-            values = {each.name: float(each.outside(z)) for each, z in zip(ranges, x)}
-            find = _scene_modes(build, values) if isinstance(build, Scene) else _found(build(values))
-            modes = find(len(target) + MORE + rigid[0])
-            if modes.n_rigid > rigid[0]:
-                rigid[0] = modes.n_rigid
-                modes = find(len(target) + MORE + rigid[0])
-            kept[key] = modes
-        return kept[key]
-
-    def paired(x: np.ndarray) -> tuple[Pair, ...]:
-        modes = modes_at(x)
-        if isinstance(measured, Modes):
-            return transfer.matched(measured, modes, points=points, which=used)
-        return transfer.matched(target, modes.frequencies[modes.omega > 0.0], which=used)
-
-    def misfit(x: np.ndarray) -> np.ndarray:
-        return np.log([1.0 + pair.difference for pair in paired(x)])
-
-    def slopes(x: np.ndarray) -> np.ndarray:
-        here, columns = misfit(x), []
-        for i, each in enumerate(ranges):
-            moved = x.copy()
-            moved[i] += STEP if x[i] + STEP < each.bounds[1] else -STEP
-            columns.append((misfit(moved) - here) / (moved[i] - x[i]))
-        return np.column_stack(columns)
-
-    middle = {each.name: float(np.sqrt(each.low * each.high)) for each in ranges} | arguments.table("start", start)
-    bounds = np.array([each.bounds for each in ranges]).T
-    first = np.array([float(each.inside(check.between(f"start[{each.name!r}]", middle[each.name], each.low, each.high)))
-                      for each in ranges])  # fmt: skip
-    inside = np.clip(first, bounds[0] + 1e-9, bounds[1] - 1e-9)
-    options = {"ftol": CLOSE, "xtol": CLOSE, "gtol": 1e-12, "max_nfev": 40}
-    found = least_squares(misfit, inside, slopes, bounds, **options)
-    every = used
-    for count in range(MOST_SPURIOUS + 1):
-        spare = len(every) - count - len(ranges)
-        if spare < len(ranges) or count > SPURIOUS * len(every):
+        _check_names(build, box)
+    search = _Search(build, box, measured, target, points)
+    used = every = np.arange(len(target))  # numbers of the measured modes that are paired
+    found = search.fit(box.start(start), every)
+    for count in range(3):  # frequencies that belong to no mode: with more, nobody knows which ones are right
+        spare = len(every) - count - n
+        if spare < n or count > MOST_OUTLIERS * len(every):
             break
-        table = _logs(modes_at(found.x))
-        moved = [_logs(modes_at(found.x + step)) for step in STEP * np.eye(len(ranges))]
-        steep = (np.column_stack(moved) - table[:, None]) / STEP
         rests = [np.setdiff1d(every, out) for out in combinations(every, count)]
-        looks = [_look(np.log(target[rest]), table, steep, found.x, bounds) for rest in rests]
-        best = int(np.argmin([cost for cost, _ in looks]))
-        used = rests[best]
-        again = least_squares(misfit, np.clip(looks[best][1], bounds[0] + 1e-9, bounds[1] - 1e-9), slopes, bounds,
-                              **options)  # fmt: skip
+        again, rest = search.look(found.x, rests)
         if not count:  # of all frequencies, from starts all over the ranges
             found = min(found, again, key=lambda one: one.cost)
             continue
         ratio = (found.cost - again.cost) / count / max(again.cost / spare, 1e-300)
         if len(rests) * float(f.sf(ratio, count, spare)) < DOUBTED:  # the best of so many choices by chance
-            found = again
+            found, used = again, rest
             break
-        used = every
-    modes, pairs = modes_at(found.x), paired(found.x)
-    spare = len(used) - len(ranges)
-    spread = {each.name: np.inf for each in ranges}
-    if spare > 0:
-        inverse = np.linalg.pinv(found.jac.T @ found.jac) * 2.0 * found.cost / spare
-        flat = np.linalg.svd(found.jac, compute_uv=False)
-        told = flat[-1] > 1e-6 * flat[0]
-        half = float(t.ppf(0.95, spare)) * np.sqrt(np.diag(inverse))
-        spread = {each.name: float(x) if told else np.inf for each, x in zip(ranges, half)}
-    values = {each.name: float(each.outside(z)) for each, z in zip(ranges, found.x)}
-    unpaired = tuple(float(target[i]) for i in np.setdiff1d(np.arange(len(target)), used))
-    return Updated(values, spread, pairs, modes, len(kept), unpaired)
+    spread = dict(zip(box.names, _half_widths(found, len(used) - n)))
+    unpaired = tuple(target[np.setdiff1d(every, used)].tolist())
+    pairs = search.pairs(found.x, used)
+    return Updated(box.values(found.x), spread, pairs, search.modes(found.x), len(search.solved), unpaired)
 
 
-def _logs(modes: Modes) -> np.ndarray:
-    return np.log(modes.frequencies[modes.omega > 0.0])
+@dataclass(eq=False)
+class _Search:
+    """Misfits of frequencies over coordinates of the constants, and the modes found so far."""
+
+    build: Any
+    box: Box
+    measured: Any
+    target: np.ndarray  # (n_measured,) [Hz]
+    points: Any
+    n_rigid: int = 0  # motions of the body, which the measurement does not have
+    solved: dict[bytes, Modes] = field(default_factory=dict)
+
+    def modes(self, x: np.ndarray) -> Modes:
+        """The modes of the body, two beyond those measured, so that as many may be missed in the measurement."""
+        key = x.tobytes()
+        while key not in self.solved:
+            if len(self.solved) >= MOST_SOLVES:
+                raise SimulationError(f"the search did not end within {MOST_SOLVES} solves; narrow the ranges")
+            modes = _modes_of(self.build, self.box.values(x), len(self.target) + 2 + self.n_rigid)
+            if modes.n_rigid <= self.n_rigid:
+                self.solved[key] = modes
+            self.n_rigid = max(modes.n_rigid, self.n_rigid)
+        return self.solved[key]
+
+    def pairs(self, x: np.ndarray, used: np.ndarray) -> tuple[Pair, ...]:
+        """Measured modes of some numbers with computed ones."""
+        modes = self.modes(x)
+        if isinstance(self.measured, Modes):
+            return transfer.matched(self.measured, modes, points=self.points, which=used)
+        return transfer.matched(self.target, modes.frequencies[modes.omega > 0.0], which=used)
+
+    def _logs(self, x: np.ndarray) -> np.ndarray:
+        modes = self.modes(x)
+        return np.log(modes.frequencies[modes.omega > 0.0])
+
+    def fit(self, x: np.ndarray, used: np.ndarray) -> Solution:
+        """The least squares of some of the measured frequencies, from a start."""
+        low, high = self.box.bounds
+
+        def misfit(x: np.ndarray) -> np.ndarray:
+            return np.log([1.0 + pair.difference for pair in self.pairs(x, used)])
+
+        def slopes(x: np.ndarray) -> np.ndarray:
+            moved = x + np.diag(np.where(x + STEP < high, STEP, -STEP))
+            return np.column_stack([(misfit(one) - misfit(x)) / (one[i] - x[i]) for i, one in enumerate(moved)])
+
+        return least(misfit, slopes, x, (low, high), close=CLOSE, iterations=ENOUGH)
+
+    def look(self, x: np.ndarray, rests: list[np.ndarray]) -> tuple[Solution, np.ndarray]:
+        """The fit of the best of some choices of frequencies, and that choice, by powers of the constants near ``x``;
+        each from 16 starts over the ranges, with four steps."""
+        table, bounds = self._logs(x), self.box.bounds
+        steep = np.column_stack([self._logs(x + step) - table for step in STEP * np.eye(len(x))]) / STEP
+        starts = (x, *qmc.scale(qmc.Sobol(len(x), scramble=False).random(16), *bounds))
+        best = np.inf, x, rests[0]
+        for rest in rests:
+            wanted = np.log(self.target[rest])
+            for here in starts:
+                for _ in range(4):
+                    now = table + steep @ (here - x)
+                    order = np.argsort(now)
+                    columns = order[transfer.in_order(np.abs(now[order] - wanted[:, None]))]
+                    step = np.linalg.lstsq(steep[columns], wanted - table[columns], rcond=None)[0]
+                    here = np.clip(x + step, *bounds)
+                miss = float(np.square(table[columns] + steep[columns] @ (here - x) - wanted).sum())
+                best = min(best, (miss, here, rest), key=lambda one: one[0])
+        return self.fit(*best[1:]), best[2]
 
 
-def _look(
-    target: np.ndarray, table: np.ndarray, steep: np.ndarray, x: np.ndarray, bounds: np.ndarray
-) -> tuple[float, np.ndarray]:
-    """Sum of squares and constants for logarithms of measured frequencies (n,), by those computed at ``x``, (n_modes,),
-    which go along with the constants as ``steep`` (n_modes, n_constants); the best of starts over the bounds."""
-    best = np.inf, x
-    for start in (x, *qmc.scale(qmc.Sobol(len(x), scramble=False).random(LOOKS), *bounds)):
-        here = start
-        for _ in range(STEPS):
-            now = table + steep @ (here - x)
-            order = np.argsort(now)
-            columns = order[transfer.in_order(np.abs(now[order] - target[:, None]))]
-            here = np.clip(x + np.linalg.lstsq(steep[columns], target - table[columns], rcond=None)[0], *bounds)
-        miss = float(np.square(table[columns] + steep[columns] @ (here - x) - target).sum())
-        best = min(best, (miss, here), key=lambda pair: pair[0])
-    return best
+def _half_widths(found: Solution, spare: int) -> np.ndarray:
+    """Half widths (n,) of the 90 % intervals of logarithms; infinite where the frequencies do not tell them."""
+    sizes = np.linalg.svd(found.jacobian, compute_uv=False)
+    if spare < 1 or sizes[-1] <= 1e-6 * sizes[0]:
+        return np.full(len(found.x), np.inf)
+    variance = np.diag(np.linalg.pinv(found.jacobian.T @ found.jacobian)) * found.cost / spare
+    return float(t.ppf(0.95, spare)) * np.sqrt(variance)
 
 
-def _check_names(scene: Scene, ranges: list[Unknown]) -> None:
+def _check_names(scene: Scene, box: Box) -> None:
     """ValueError unless the unknowns are numbers of the scene's body."""
-    for each in ranges:
+    for each in box.unknowns:
         check.one_of(f"the table of unknown[{each.name!r}]", each.name.partition(".")[0], TABLES)
         try:
             scene.changed({each.name: each.low})
@@ -249,14 +237,13 @@ def _check_names(scene: Scene, ranges: list[Unknown]) -> None:
             raise ValueError(f"unknown[{each.name!r}]: {error}") from None
 
 
-def _scene_modes(scene: Scene, values: dict[str, float]) -> Callable[[int], Modes]:
-    return scene.changed(values).modes
-
-
-def _found(body: Any) -> Callable[[int], Modes]:
-    """A function of the number of modes that finds them."""
-    if isinstance(body, Modes):
-        return lambda count: body
+def _modes_of(build: Any, values: dict[str, float], count: int) -> Modes:
+    """The first modes of the body with these constants."""
+    if isinstance(build, Scene):
+        return build.changed(values).modes(count)
+    body = build(values)
     if isinstance(body, System):
-        return lambda count: find_modes(body, n_modes=count)
-    raise ValueError(f"build must return a System of fi.assemble or Modes, got {check.shown(body)}")
+        return find_modes(body, n_modes=count)
+    if not isinstance(body, Modes):
+        raise ValueError(f"build must return a System of fi.assemble or Modes, got {check.shown(body)}")
+    return body

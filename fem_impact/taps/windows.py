@@ -9,10 +9,7 @@ from . import triggers
 from .records import Taps
 from .solver import Data
 
-SLIGHT = 0.002  # [-] of the largest force: a smaller offset is left, as it hardly moves a fit
 BEFORE = 12  # [samples] before the tap that are compared: the filter rings there
-# [-] of the length from the first to the last pulse: what is compared after it, where the body's answer is still heard
-AFTER = 1.5
 
 
 def joined(taps: Any, name: str = "taps") -> Taps:
@@ -44,7 +41,8 @@ def levelled(taps: Taps) -> Taps:
         rest = row[: max(0, round(onset * rates) - triggers.GUARD)]
         rest = rest if len(rest) >= triggers.FEWEST else row[-(len(row) // 3) :]
         middle, sure = float(np.median(rest)), triggers.CLEAR * triggers.noise(row) / np.sqrt(len(rest))
-        if abs(middle) > max(sure, SLIGHT * float(np.ptp(row))):
+        # an offset of less than 0.002 of the largest force hardly moves a fit
+        if abs(middle) > max(sure, 0.002 * float(np.ptp(row))):
             moved[i] = middle
     if not moved.any():
         return taps
@@ -77,7 +75,8 @@ def cut(taps: Taps, window: Any) -> Taps:
             large = max(triggers.PULSE * float(row.max()), triggers.CLEAR * noise)  # a small one is no reason to wait
             later = triggers.pulses(row[begin:], noise, large)
             ends.append(later[-1][1] if later else 1)
-        last = (1.0 + AFTER) * max(max(ends), BEFORE) / taps.rate
+        # 1.5 times the length of the pulses after them, where the body's answer is still heard
+        last = 2.5 * max(max(ends), BEFORE) / taps.rate
     starts = np.round(taps.onset * taps.rate).astype(int)
     before, after = round(float(first) * taps.rate), round(float(last) * taps.rate)
     before, after = min(before, int(starts.min())), min(after, int(len(taps.time) - starts.max()))

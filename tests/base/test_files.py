@@ -17,20 +17,24 @@ def names(folder):
     return sorted(str(path.relative_to(folder)) for path in folder.rglob("*"))
 
 
-def test_replacing_keeps_the_old_file_when_the_block_fails(tmp_path):
-    path = tmp_path / "a.txt"
+def write(folder, command, **files):
+    with staged(folder, command) as staging:
+        for name, text in files.items():
+            (staging / name).parent.mkdir(exist_ok=True)
+            (staging / name).write_text(text)
+
+
+def test_replacing_keeps_the_old_file_when_the_block_fails_and_the_suffix_by_which_writers_choose(tmp_path):
+    path = tmp_path / "a.png"
     path.write_text("old")
     with pytest.raises(RuntimeError, match="half way"), replacing(path) as temporary:
+        assert temporary.suffix == ".png" and temporary.name.startswith(PARTIAL)
         temporary.write_text("ne")
         raise RuntimeError("half way")
-    assert path.read_text() == "old" and names(tmp_path) == ["a.txt"]
-
-
-def test_replacing_keeps_the_suffix_because_writers_choose_a_format_by_it(tmp_path):
-    with replacing(tmp_path / "a.png") as temporary:
-        assert temporary.suffix == ".png" and temporary.name.startswith(PARTIAL)
+    assert path.read_text() == "old" and names(tmp_path) == ["a.png"]
+    with replacing(path) as temporary:
         temporary.write_text("new")
-    assert names(tmp_path) == ["a.png"]
+    assert path.read_text() == "new" and names(tmp_path) == ["a.png"]
 
 
 def test_staged_moves_everything_in_and_leaves_other_files_alone(tmp_path):
@@ -38,9 +42,9 @@ def test_staged_moves_everything_in_and_leaves_other_files_alone(tmp_path):
     (tmp_path / "out" / "mine.txt").write_text("mine")
     (tmp_path / "out" / "a.txt").write_text("old")
     with staged(tmp_path / "out") as staging:
-        (staging / "a.txt").write_text("new")
         (staging / "modes").mkdir()
-        (staging / "modes" / "b.txt").write_text("b")
+        for name in ("a.txt", "modes/b.txt"):
+            (staging / name).write_text("new")
         assert (tmp_path / "out" / "a.txt").read_text() == "old"
     assert names(tmp_path / "out") == ["a.txt", "mine.txt", "modes", "modes/b.txt"]
     assert (tmp_path / "out" / "a.txt").read_text() == "new"
@@ -54,48 +58,32 @@ def test_staged_leaves_nothing_when_the_block_fails(tmp_path, failure):
     assert names(tmp_path) == []
 
 
-def test_staged_moves_nothing_where_a_folder_is_in_the_way(tmp_path):
+def test_staged_moves_nothing_where_a_folder_is_in_the_way_of_a_file_or_a_file_of_a_folder(tmp_path):
     (tmp_path / "b.txt").mkdir()
-    with pytest.raises(IsADirectoryError, match=r"b\.txt"), staged(tmp_path) as staging:
-        (staging / "a.txt").write_text("a")
-        (staging / "b.txt").write_text("b")
-    assert names(tmp_path) == ["b.txt"]
-
-
-def test_staged_moves_nothing_where_a_file_stands_for_a_folder(tmp_path):
+    with pytest.raises(IsADirectoryError, match=r"b\.txt"):
+        write(tmp_path, None, **{"a.txt": "a", "b.txt": "b"})
     (tmp_path / "modes").write_text("mine")
-    with pytest.raises(NotADirectoryError, match="modes"), staged(tmp_path) as staging:
-        (staging / "a.txt").write_text("a")
-        (staging / "modes").mkdir()
-        (staging / "modes" / "b.txt").write_text("b")
-    assert names(tmp_path) == ["modes"]
+    with pytest.raises(NotADirectoryError, match="modes"):
+        write(tmp_path, None, **{"a.txt": "a", "modes/b.txt": "b"})
+    assert names(tmp_path) == ["b.txt", "modes"]
+    with pytest.raises(NotADirectoryError), staged(tmp_path / "modes" / "out"):
+        pytest.fail("the block must not run where nothing can be written")
 
 
 @pytest.mark.parametrize("linked", [True, False])
 def test_staged_puts_everything_back_if_a_file_cannot_be_moved(tmp_path, monkeypatch, linked):
     """The third of three cannot; the first was there, the second is new."""
-    with staged(tmp_path, "strike") as staging:
-        (staging / "a.txt").write_text("old")
-        (staging / "gone.txt").write_text("old")
+    write(tmp_path, "strike", **{"a.txt": "old", "gone.txt": "old"})
     move = os.replace
     monkeypatch.setattr(os, "replace", lambda old, new: move(old, new if Path(new).name != "z.txt" else "/dev/null/z"))
     if not linked:
         monkeypatch.delattr(os, "link")
         monkeypatch.setattr(os, "link", lambda *_: (_ for _ in ()).throw(PermissionError), raising=False)
     before = names(tmp_path)
-    with pytest.raises(NotADirectoryError), staged(tmp_path, "strike") as staging:
-        (staging / "new").mkdir()
-        for name in ("a.txt", "new/b.txt", "z.txt"):
-            (staging / name).write_text("new")
+    with pytest.raises(NotADirectoryError):
+        write(tmp_path, "strike", **dict.fromkeys(("a.txt", "new/b.txt", "z.txt"), "new"))
     assert names(tmp_path) == before and (tmp_path / "a.txt").read_text() == "old"
     assert "gone.txt" in (tmp_path / LIST).read_text()
-
-
-def write(folder, command, **files):
-    with staged(folder, command) as staging:
-        for name, text in files.items():
-            (staging / name).parent.mkdir(exist_ok=True)
-            (staging / name).write_text(text)
 
 
 def test_a_second_run_removes_what_the_first_alone_wrote(tmp_path):
@@ -136,18 +124,8 @@ def test_a_list_names_nothing_outside_its_folder(tmp_path):
     wanted = ["../secret", str(tmp_path / "secret"), "up/secret", "link", "x/../b"]
     (folder / LIST).write_text(json.dumps({"strike": dict.fromkeys(wanted, digest)}))
     write(folder, "strike", c="1")
-    assert names(tmp_path) == [
-        "out",
-        f"out/{LIST}",
-        *(f"out/{name}" for name in ("a", "b", "c", "link", "up")),
-        "secret",
-    ]
-
-
-def test_staged_finds_a_place_that_cannot_be_written_to_before_the_work_begins(tmp_path):
-    (tmp_path / "file").write_text("in the way")
-    with pytest.raises(NotADirectoryError), staged(tmp_path / "file" / "out"):
-        pytest.fail("the block must not run")
+    left = [LIST, "a", "b", "c", "link", "up"]
+    assert names(tmp_path) == ["out", *(f"out/{name}" for name in left), "secret"]
 
 
 def test_anything_but_a_regular_file_is_not_replaced(tmp_path):
@@ -155,10 +133,9 @@ def test_anything_but_a_regular_file_is_not_replaced(tmp_path):
     os.mkfifo(tmp_path / "pipe")
     with pytest.raises(OSError, match="Not a regular file"), replacing(tmp_path / "pipe"):
         pass
-    with pytest.raises(OSError, match="Not a regular file"), staged(tmp_path) as staging:
-        (staging / "pipe").write_text("new")
-    assert names(tmp_path) == ["pipe"]
-    assert (tmp_path / "pipe").is_fifo()
+    with pytest.raises(OSError, match="Not a regular file"):
+        write(tmp_path, None, pipe="new")
+    assert names(tmp_path) == ["pipe"] and (tmp_path / "pipe").is_fifo()
 
 
 KILLED = """
@@ -189,7 +166,9 @@ def test_what_a_killed_process_left_is_removed_by_the_next(tmp_path, again):
 
 
 def test_what_others_are_writing_is_left_alone(tmp_path):
-    """Of a running process, of another machine, of this process, and what only looks alike."""
+    """Of a running process, of another machine, of this process, and what only looks alike; not a dead namesake's."""
+    if os.name == "posix":
+        (tmp_path / f"{PARTIAL}{MACHINE}-{os.getpid()}-0123abcd").mkdir()
     theirs = [f"{PARTIAL}{MACHINE}-{os.getppid()}-0123abcd", f"{PARTIAL}elsewhere-1-0123abcd", f"{PARTIAL}notes"]
     for name in theirs:
         (tmp_path / name).write_text("busy")
@@ -197,11 +176,3 @@ def test_what_others_are_writing_is_left_alone(tmp_path):
         assert outer.is_dir()
         temporary.write_text("a")
     assert names(tmp_path) == sorted([*theirs, "a.txt"])
-
-
-@pytest.mark.skipif(os.name != "posix", reason="signals of POSIX")
-def test_a_namesake_of_the_past_is_not_taken_for_this_process(tmp_path):
-    (tmp_path / f"{PARTIAL}{MACHINE}-{os.getpid()}-0123abcd").mkdir()
-    with staged(tmp_path):
-        pass
-    assert names(tmp_path) == []

@@ -3,6 +3,7 @@
 import os
 import subprocess
 import sys
+from pathlib import Path
 
 import meshio
 import numpy as np
@@ -24,9 +25,8 @@ def test_reader_that_never_ends_is_stopped(tmp_path, monkeypatch):
     monkeypatch.setattr(isolated, "PATIENCE", 1.0)
     path = tmp_path / "plate.mdpa"  # meshio looks for the end of a block beyond the end of the file
     path.write_text("Begin Nodes\n 1 0 0 0\n")
-    with pytest.raises(
-        ValueError, match=r"plate\.mdpa cannot be read as a mesh \(reading took longer than 1 s; export it again"
-    ):
+    said = r"plate\.mdpa cannot be read as a mesh \(reading took longer than 1 s; export it again"
+    with pytest.raises(ValueError, match=said):
         mesh.load(path)
     monkeypatch.undo()
     assert len(mesh.load(written(tmp_path / "again.vtu")).cells) == len(PLATE.cells)  # exported again, another format
@@ -87,13 +87,10 @@ def test_file_that_unpacks_to_more_than_the_memory_is_refused(tmp_path):
         mesh.load(path)
 
 
-def test_a_mesh_may_include_what_lies_beside_it(tmp_path):
+def test_a_mesh_may_include_what_lies_beside_it_and_a_link_to_a_mesh_elsewhere_is_followed(tmp_path):
     written(tmp_path / "part.inp")
     (tmp_path / "whole.inp").write_text("*INCLUDE, INPUT=part.inp\n")
     assert mesh.load(tmp_path / "whole.inp").area == pytest.approx(1.0)
-
-
-def test_a_link_to_a_mesh_elsewhere_is_followed(tmp_path):
     (tmp_path / "in").mkdir()
     written(tmp_path / "plate.vtu")
     os.symlink(tmp_path / "plate.vtu", tmp_path / "in" / "link.vtu")
@@ -104,8 +101,7 @@ def test_a_link_to_a_mesh_elsewhere_is_followed(tmp_path):
 def test_hdf5_that_looks_into_other_files_is_refused(tmp_path, how):
     h5py = pytest.importorskip("h5py", reason="the extra hdf5 is not installed")
     (tmp_path / "in").mkdir()
-    path = tmp_path / "in" / "plate.med"
-    written(path)
+    path = written(tmp_path / "in" / "plate.med")
     (tmp_path / "secret.bin").write_bytes(np.arange(27.0).tobytes())
     if how == "xdmf":
         path = written(tmp_path / "in" / "plate.xdmf")
@@ -130,10 +126,8 @@ def test_every_format_that_hdf5_holds_is_read(tmp_path):
 def test_missing_hdf5_is_named(tmp_path, monkeypatch):
     (tmp_path / "plate.med").write_bytes(b"\x89HDF\r\n\x1a\n")
     monkeypatch.setitem(sys.modules, "h5py", None)
-    assert isolated.main(tmp_path / "plate.med", "mesh.meshio_reader:arrays", []) == (
-        1,
-        b"this needs h5py: pip install 'fem-impact[hdf5]'",
-    )
+    told = 1, b"this needs h5py: pip install 'fem-impact[hdf5]'"
+    assert isolated.main(tmp_path / "plate.med", "mesh.meshio_reader:arrays", []) == told
 
 
 def test_unknown_ending_is_told_with_those_that_are_known(tmp_path):
@@ -145,11 +139,7 @@ def test_unknown_ending_is_told_with_those_that_are_known(tmp_path):
 @pytest.mark.parametrize("kind", ["folder", "pipe", "loop", "empty"])
 def test_what_is_no_file_is_told_at_once(tmp_path, kind):
     path = tmp_path / "plate.msh"
-    {
-        "folder": path.mkdir,
-        "pipe": lambda: os.mkfifo(path),
-        "loop": lambda: os.symlink(path, path),
-        "empty": path.touch,
-    }[kind]()
+    make = {"folder": os.mkdir, "pipe": os.mkfifo, "loop": lambda path: os.symlink(path, path), "empty": Path.touch}
+    make[kind](path)
     with pytest.raises(ValueError, match=r"plate\.msh"):
         mesh.load(path)

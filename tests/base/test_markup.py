@@ -64,6 +64,4 @@ def test_modes_and_meshes_show_themselves():
 
 def test_flat_and_single_histories_are_drawn():
     for x, y in ((np.zeros(1), np.zeros(1)), (np.arange(3.0), np.zeros(3))):
-        assert "NaN" not in markup.curve(x, y, label="force", unit="N", title="none") and "nan" not in markup.curve(
-            x, y, label="force", unit="N", title="none"
-        )
+        assert "nan" not in markup.curve(x, y, label="force", unit="N", title="none").lower()

@@ -3,33 +3,25 @@
 import io
 import logging
 import sys
+from contextlib import suppress
 
 import fem_impact as fi
 from fem_impact._base import progress
 
 
-def test_reports_go_to_the_innermost_listener():
+def test_reports_go_to_the_innermost_listener_until_its_block_ends_or_fails():
     heard = []
     progress.report("modes", 1, 2)  # nobody listens
-    with progress.heard(lambda *told: heard.append(("outer", *told))):
+    with suppress(RuntimeError), progress.heard(lambda *told: heard.append(("outer", *told))):
         progress.report("modes", 1, 2)
         with progress.heard(lambda *told: heard.append(("inner", *told))):
             progress.report("vectors", 3, 4)
         with progress.heard(None):
             progress.report("vectors", 4, 4)
         progress.report("modes", 2, 2)
+        raise RuntimeError
     progress.report("modes", 1, 2)
     assert heard == [("outer", "modes", 1, 2), ("inner", "vectors", 3, 4), ("outer", "modes", 2, 2)]
-
-
-def test_silence_returns_after_a_failure():
-    heard = []
-    try:
-        with progress.heard(lambda *told: heard.append(told)):
-            raise RuntimeError
-    except RuntimeError:
-        progress.report("modes", 1, 2)
-    assert heard == []
 
 
 class Screen(io.StringIO):
@@ -50,21 +42,15 @@ def shown(monkeypatch, text, handlers=(), screen=Screen):
     return seen.getvalue()
 
 
-def test_what_takes_long_is_one_line_on_a_terminal(monkeypatch):
+def test_what_takes_long_is_one_line_on_a_terminal_unless_a_program_has_a_log_or_switches_it_off(monkeypatch):
     assert shown(monkeypatch, "compiling") == "fem_impact: compiling\n"
-
-
-def test_the_line_can_be_switched_off(monkeypatch):
+    assert shown(monkeypatch, "compiling", [logging.NullHandler()]) == ""
+    assert shown(monkeypatch, "compiling", screen=io.StringIO) == ""  # no terminal
     progress.SLOW.setLevel(logging.WARNING)
     try:
         assert shown(monkeypatch, "compiling") == ""
     finally:
         progress.SLOW.setLevel(logging.INFO)
-
-
-def test_a_program_with_a_log_or_without_a_terminal_gets_no_line(monkeypatch):
-    assert shown(monkeypatch, "compiling", [logging.NullHandler()]) == ""
-    assert shown(monkeypatch, "compiling", screen=io.StringIO) == ""
 
 
 def test_a_long_strike_is_announced_with_its_cost(monkeypatch, caplog):

@@ -7,7 +7,7 @@ from numpy.testing import assert_allclose
 import fem_impact as fi
 from fem_impact.designs import goals, search
 from fem_impact.designs.objects import Maker
-from fem_impact.taps.unknowns import Unknown
+from fem_impact.taps.unknowns import Box
 
 WOOD = fi.Material(E=16e9, nu=0.35, rho=900.0)
 WALL = fi.Modes.rigid(1e9)
@@ -82,12 +82,12 @@ FREE = {"height": (0.01, 0.03), "deep": (1e-3, 15e-3), "yarn": (1e6, 1e9)}
 
 
 def test_all_slopes_are_differences():
-    ranges = tuple(Unknown(name, *limits) for name, limits in FREE.items())
+    box = Box.of("free", FREE)
     names = {"mode1.frequency": 1.0, "mode2.ratio": 1.0, "contact_time": 1.0, "restitution": 1.0}
-    run = search._Search(Maker.of(undercut, tuple(FREE)), ranges, goals.read(names, ("",)), None, 1.0, 12)
-    x = np.array([float(each.inside(value)) for each, value in zip(ranges, (0.022, 8e-3, 3e7))])
+    run = search._Search(Maker.of(undercut, tuple(FREE)), box, goals.read(names, ("",)), None, 1.0, 12)
+    x = box.start({"height": 0.022, "deep": 8e-3, "yarn": 3e7})
     slopes = run.slope(x)
-    for j, each in enumerate(ranges):
+    for j, each in enumerate(box.unknowns):
         step = 1e-3 * np.eye(len(x))[j]
         low, high = run.state(x - step), run.state(x + step)
         exact = (high.found - low.found) / (high.values[each.name] - low.values[each.name])
@@ -123,3 +123,11 @@ def test_errors_name_what_is_wrong():
         fi.design(bar, {"impulse": 1.0}, {"height": (5e-3, 40e-3)})
     with pytest.raises(ValueError, match="mode 3 needs more modes, the body has 0 flexible ones"):
         fi.design(lambda values: WALL, {"mode3.frequency": 1.0}, {"mass": (1.0, 2.0)})
+
+
+def test_a_search_may_begin_where_a_number_is_one():
+    """Its logarithm is zero, from which scipy alone would take no step."""
+    found = fi.design(
+        lambda values: ball({**values, "stiffness": 1e5}), {"contact_time": 2e-3}, {"mass": (0.01, 100.0)}
+    )
+    assert_allclose(found.values["mass"], 1e5 * (2e-3 / np.pi) ** 2, rtol=2e-3)

@@ -9,19 +9,28 @@ from skfem import MeshLine
 
 import fem_impact as fi
 from fem_impact.fe import beam_elements
-from fem_impact.fe.beam_elements import DEGREE, HermiteSpace, divided, energy_errors, integrals, nodes
+from fem_impact.fe.beam_elements import DEGREE, HermiteSpace, divided, energy_errors, nodes
 from fem_impact.fe.elements import numbering
+from fem_impact.fe.euler import EULER
+from fem_impact.fe.theory import Domain, Points
 
 
 def uniform(x):
     return np.ones_like(x), np.ones_like(x)
 
 
-def assembled(places):
-    """Space, stiffness and mass (n_dofs, n_dofs) of a uniform beam, unit EI and unit mass per length."""
-    line = MeshLine(np.asarray(places))
+def integrals(line):
+    """Space, stiffness and mass (n_cells, n_local, n_local) of a uniform beam, unit EI and unit mass per length."""
     space = HermiteSpace(line)
-    K, M, *_ = integrals(space, uniform)
+    x, dx = beam_elements.quadrature(space)
+    fields = {"stiffness": dx, "inertia": dx}
+    return space, *EULER.matrices(None, Domain(line, space, None, Points(x[:1], x[..., None], dx), fields, 1.0))
+
+
+def assembled(places):
+    """The same with matrices (n_dofs, n_dofs), and the unknowns of the elements."""
+    line = MeshLine(np.asarray(places))
+    space, K, M = integrals(line)
     dofs, n_dofs = numbering(line, space)
     whole = np.zeros((2, n_dofs, n_dofs))
     for cell, own in enumerate(dofs.T):
@@ -31,8 +40,7 @@ def assembled(places):
 
 
 def test_shapes_hold_every_polynomial_up_to_their_degree():
-    space = HermiteSpace(MeshLine(np.array([-0.3, 1.1])))
-    integrals(space, uniform)  # turns the bubbles
+    space = integrals(MeshLine(np.array([-0.3, 1.1])))[0]  # with turned bubbles
     s = np.linspace(-0.3, 1.1, 200)
     value, slope, bend = (f[0] for f in space.functions(np.zeros(1, int), s[None, :, None], (0, 1, 2)))
     centred = (s - 0.4) / 0.7
@@ -48,8 +56,7 @@ def test_shapes_hold_every_polynomial_up_to_their_degree():
 
 def test_bubbles_are_the_modes_of_the_clamped_beam():
     """Unit stiffness, so their mass is 1 / k**4 of cos k cosh k = 1: ten half waves are resolved to rounding."""
-    space = HermiteSpace(MeshLine(np.array([0.0, 1.0])))
-    K, M, *_ = integrals(space, uniform)
+    _, K, M = integrals(MeshLine(np.array([0.0, 1.0])))
     n = np.arange(1, 11)
     k = np.array([brentq(lambda k: np.cos(k) - 1.0 / np.cosh(k), (i + 0.3) * np.pi, (i + 0.7) * np.pi) for i in n])
     mass = np.sort(np.diag(M[0])[4:])[::-1][:10]
@@ -148,13 +155,8 @@ def test_a_section_of_too_many_steps_is_refused():
 def test_nodes_keep_ends_and_marks_and_no_points_close_to_them():
     points, held = np.array([1.0, 0.0, 0.5, 0.25, 0.75]), np.array([0.0])
     assert nodes(points, np.array([0.6]), held).tolist() == [0.0, 0.25, 0.5, 0.6, 0.75, 1.0]
-    assert nodes(points, np.array([0.503]), held).tolist() == [
-        0.0,
-        0.25,
-        0.503,
-        0.75,
-        1.0,
-    ]  # takes its neighbour's place
+    taken = nodes(points, np.array([0.503]), held)
+    assert taken.tolist() == [0.0, 0.25, 0.503, 0.75, 1.0]  # takes its neighbour's place
     assert nodes(points, np.array([0.998]), held).tolist() == [0.0, 0.25, 0.5, 0.75, 1.0]  # close to a free end: none
     assert nodes(points, np.array([0.002]), held).tolist() == [0.0, 0.002, 0.25, 0.5, 0.75, 1.0]  # to a held end: one
 

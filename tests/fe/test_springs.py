@@ -24,7 +24,7 @@ def test_tension_stiffens_a_hinged_plate_as_the_closed_form_says():
     modes = find_modes(assemble(mesh.rectangle(1.55, 1.0), pulled, {"boundary": "hinged"}), n_modes=4)
     wave2 = np.pi**2 * np.array([1 + 1 / 1.55**2, 1 + 4 / 1.55**2, 1 + 9 / 1.55**2, 4 + 1 / 1.55**2])
     exact = np.sqrt((D * wave2**2 + tension * wave2) / PER_AREA)
-    assert_allclose(modes.omega, np.sort(exact), rtol=1e-5)  # WAVE_PER_ELEMENT's promise
+    assert_allclose(modes.omega, np.sort(exact), rtol=1e-5)  # promised by `Theory.wave`
 
 
 def test_a_drumhead_is_a_membrane():

@@ -1,11 +1,9 @@
 """Mindlin plates against Wang's relation, disks, Navier's series, Ritz, beams and solids; their error estimates."""
 
-from functools import cache
-
 import numpy as np
 import pytest
+import thick_elements  # the study, which has the exact equations
 from numpy.testing import assert_allclose
-from test_studies import study
 from thick_plates import block, by_rotations, navier, ritz, spread_compliance
 
 import fem_impact as fi
@@ -20,12 +18,6 @@ POLYGONS = {
 }  # fmt: skip
 
 
-@cache
-def elements():
-    """The study, which has the exact equations."""
-    return study("thick_elements")
-
-
 def modes_of(mesh, h, supports, n, *, material=UNIT, **options):
     """Modes of a thick plate."""
     plate = h if isinstance(h, fi.Plate) else fi.Plate(material, h)
@@ -38,7 +30,7 @@ def test_hinged_polygons_follow_wangs_relation_from_our_own_thin_frequencies(nam
     mesh, held = fi.mesh.polygon(POLYGONS[name]), {"boundary": "hinged"}
     thin = fi.find_modes(fi.assemble(mesh, fi.Plate(UNIT, h), held), n_modes=5, tolerance=2e-6)
     found = modes_of(mesh, h, held, 5, tolerance=5e-6)
-    assert_allclose(found.omega, elements().hinged_polygon(thin.omega, h), rtol=1e-5)
+    assert_allclose(found.omega, thick_elements.hinged_polygon(thin.omega, h), rtol=1e-5)
     if h == 0.1:  # the thin frequencies themselves are far off
         assert (thin.omega > 1.02 * found.omega).all()
 
@@ -51,20 +43,20 @@ def test_hinged_random_quadrilaterals_follow_wangs_relation():
     mesh, held = fi.mesh.polygon(corners), {"boundary": "hinged"}
     thin = fi.find_modes(fi.assemble(mesh, fi.Plate(UNIT, 0.1), held), n_modes=4, tolerance=1e-5)
     found = modes_of(mesh, 0.1, held, 4, tolerance=1e-5)
-    assert_allclose(found.omega, elements().hinged_polygon(thin.omega, 0.1), rtol=1e-5)  # 5e-7
+    assert_allclose(found.omega, thick_elements.hinged_polygon(thin.omega, 0.1), rtol=1e-5)  # 5e-7
 
 
 @pytest.mark.slow
 def test_a_hinged_l_shape_follows_wangs_relation_where_it_holds():
     """Modes 2, 3 and 4 are at rest at the re-entrant corner; of the others another element tells the truth."""
-    h, mesh = 0.2, fi.mesh.polygon(elements().L_SHAPE, size=0.2)
+    h, mesh = 0.2, fi.mesh.polygon(thick_elements.L_SHAPE, size=0.2)
     system = fi.assemble(mesh, fi.Plate(UNIT, h), {"boundary": "hinged"}, theory="mindlin")
     assert system.space.turned.any()  # around the corner, where shear strains as unknowns made the matrix singular
     found = refinement._pairs(system, 5, None)[1]
-    wang = elements().hinged_polygon(elements().L_MEMBRANE * elements().thin_rate(h), h)
+    wang = thick_elements.hinged_polygon(thick_elements.L_MEMBRANE * thick_elements.thin_rate(h), h)
     assert_allclose(found[1:4], wang[1:4], rtol=1e-5)  # 6e-7
     assert found[0] > 1.1 * wang[0] and found[4] > 1.02 * wang[4]
-    assert_allclose(found, by_rotations(mesh, h, 5, elements().matrices), rtol=1e-5)  # 7e-7
+    assert_allclose(found, by_rotations(mesh, h, 5, thick_elements.matrices), rtol=1e-5)  # 7e-7
 
 
 @pytest.mark.parametrize("supports", [
@@ -87,7 +79,7 @@ def test_nodes_may_hold_rotations_instead_of_shear_strains(supports, monkeypatch
 @pytest.mark.parametrize("edge", ["clamped", "hinged", "soft hinged", "free"])
 def test_disks_follow_their_characteristic_equations(edge, h):
     """Curved edges; the estimated error is neither below half of the true error nor 30 times as large."""
-    exact = elements().disk_frequencies(h, edge, 6)
+    exact = thick_elements.disk_frequencies(h, edge, 6)
     found = modes_of(fi.mesh.disk(1.0), h, {"boundary": edge}, 6 + 3 * (edge == "free"))
     flexible = found.omega > 0.0
     true = np.abs(found.omega[flexible] / exact - 1.0)
@@ -100,7 +92,7 @@ def test_disks_follow_their_characteristic_equations(edge, h):
 @pytest.mark.parametrize("edge", ["clamped", "hinged"])
 def test_the_order_on_thick_curved_plates_is_that_of_the_elements(edge):
     """Held edges once slipped between the vertices: order 3, 3e-4 on the first of these meshes."""
-    exact, errors = elements().disk_frequencies(0.2, edge, 5), []
+    exact, errors = thick_elements.disk_frequencies(0.2, edge, 5), []
     for size in (0.2, 0.1):
         system = fi.assemble(fi.mesh.disk(1.0, size=size), fi.Plate(UNIT, 0.2), {"boundary": edge}, theory="mindlin")
         errors.append(np.abs(refinement.solve(system, 5, None).omega / exact - 1.0).max())
@@ -130,7 +122,9 @@ def test_squares_have_the_digits_of_liews_tables(edge, h):
     printed = np.array(LIEW[edge, h])
     system = fi.assemble(fi.mesh.rectangle(1.0, 1.0), fi.Plate(UNIT, h), {"boundary": edge}, theory="mindlin")
     found = refinement._pairs(system, len(printed), None)[1]
-    assert_allclose(found / elements().thin_rate(h) / np.pi**2, printed, atol=6e-5)  # half a digit, and 1e-5 of each
+    assert_allclose(
+        found / thick_elements.thin_rate(h) / np.pi**2, printed, atol=6e-5
+    )  # half a digit, and 1e-5 of each
 
 
 @pytest.mark.parametrize("ratio", [1e-3, 1e-4, 1e-5])
@@ -140,7 +134,7 @@ def test_thin_plates_become_kirchhoff_plates_on_any_mesh(ratio, size):
     mesh, plate, held = fi.mesh.rectangle(1.55, 1.0, size=size), fi.Plate(UNIT, ratio), {"boundary": "hinged"}
     thin = refinement.solve(fi.assemble(mesh, plate, held), 6, None)
     found = refinement.solve(fi.assemble(mesh, plate, held, theory="mindlin"), 6, None)
-    expected = elements().hinged_polygon(thin.omega, ratio) / thin.omega - 1.0  # -1e-10 ... -6e-6
+    expected = thick_elements.hinged_polygon(thin.omega, ratio) / thin.omega - 1.0  # -1e-10 ... -6e-6
     assert_allclose(found.omega / thin.omega - 1.0, expected, rtol=0.1, atol=3e-11)  # rounding 1e-11
 
 
@@ -153,7 +147,7 @@ def test_thin_curved_plates_become_kirchhoff_plates(edge):
 
 def test_a_layer_too_thin_for_the_mesh_is_told_as_an_error():
     """The layer of a free disk is a hundredth of its radius, a facet a quarter; first-order theory tells its cost."""
-    exact = elements().disk_frequencies(0.02, "free", 5)
+    exact = thick_elements.disk_frequencies(0.02, "free", 5)
     system = fi.assemble(fi.mesh.disk(1.0, size=0.4), fi.Plate(UNIT, 0.02), {}, theory="mindlin")
     found = refinement.solve(reassemble(system, system.mesh, layer=100.0), 8, None)
     true = found.omega[3:] / exact - 1.0

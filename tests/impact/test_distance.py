@@ -49,25 +49,28 @@ def test_runs_are_as_far_apart_as_the_blows_that_they_tell():
     asked = {"restitution": None, "impulse": None, "contact_time": None, "force": None, "spectrum": 5e3}
     runs = distance.of_runs(one.history, two.history, asked)
     blows = distance.of_blows(one, two, asked)
-    assert_allclose([runs[name] for name in blows], list(blows.values()), rtol=1e-3)  # samples of a spectrum differ
-    assert runs[distance.MARGIN] == abs(one.margin - two.margin)
-    halved = distance.of_runs(one.history, two.history, asked, (2.0, 4.0))
-    assert_allclose(halved["impulse"], runs["impulse"] / 2.0, rtol=1e-15)
-    assert_allclose(halved["force"], runs["force"] / 4.0, rtol=1e-15)
+    found = [runs.quantities[name] for name in blows]
+    assert_allclose(found, list(blows.values()), rtol=1e-3)  # samples of a spectrum differ
+    assert runs.margin == abs(one.margin - two.margin)
+    assert_allclose(runs.rebounds, [abs(a.restitution - b.restitution) for a, b in zip(one.impacts, two.impacts)])
+    halved = distance.of_runs(one.history, two.history, asked, (2.0, 4.0)).quantities
+    assert_allclose([halved["impulse"], halved["force"]], [found[1] / 2.0, found[3] / 4.0], rtol=1e-15)
 
 
 def test_runs_that_end_differently_are_one_apart_in_everything():
     one = blow()
     other = blow(duration=0.5 * one.impacts[0].end)
     found = distance.of_runs(one.history, other.history, one.quantities)
-    assert set(found) == {*one.quantities, distance.MARGIN, f"{distance.REBOUND}0"} and set(found.values()) == {1.0}
+    assert found.quantities == dict.fromkeys(one.quantities, 1.0) and found.margin == found.worst == 1.0
+    assert found.rebounds.tolist() == [1.0]
     assert distance.growth(one.history, blow(stiffness=3e8).history) in (1.0, np.inf)
 
 
 def test_distances_add_up_and_the_largest_counts():
-    one, two = {"impulse": 1.0, "margin": 0.5}, {"impulse": 3.0, "margin": 0.1}
-    assert distance.added(one, two) == {"impulse": 4.0, "margin": 0.6}
-    assert distance.added({}, two) == two and distance.added(one, {}) == one
-    assert distance.largest([one, {}, two]) == {"impulse": 3.0, "margin": 0.5} and distance.largest([]) == {}
-    assert distance.scaled(two, 2.0)["impulse"] == 6.0
-    assert distance.worst(two | {"margin": 9.0}) == 3.0 and distance.worst({}) == 0.0
+    one = distance.Distance({"impulse": 1.0, "force": 2.0}, 0.5, np.array([0.0, 4.0]))
+    two = distance.Distance({"impulse": 3.0, "force": 1.0}, 0.1, np.array([1.0, 2.0]))
+    both, larger, more = one + two, distance.largest([one, two]), two.scaled(2.0, 3.0)
+    assert both.quantities == {"impulse": 4.0, "force": 3.0} and both.rebounds.tolist() == [1.0, 6.0]
+    assert larger.quantities == {"impulse": 3.0, "force": 2.0} and larger.rebounds.tolist() == [1.0, 4.0]
+    assert more.quantities == {"impulse": 6.0, "force": 2.0} and more.rebounds.tolist() == [3.0, 6.0]
+    assert (both.margin, larger.margin, more.margin, one.worst) == (0.6, 0.5, 0.2, 2.0)

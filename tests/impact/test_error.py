@@ -1,30 +1,33 @@
 """Estimated errors: a table by cause and quantity, its largest numbers, and their sum."""
 
+import numpy as np
 import pytest
 
+from fem_impact.impact.distance import Distance
 from fem_impact.impact.error import CAUSES, Error
 
-TABLE = {
-    "step": {"restitution": 1e-5, "force": 4e-5, "margin": 9.0, "rebound 0": 9.0},
-    "truncation": {"restitution": 3e-4, "force": 1e-4, "margin": 9.0},
+FOUND = {
+    "step": Distance({"restitution": 1e-5, "force": 4e-5}, 9.0, np.array([9.0])),
+    "truncation": Distance({"restitution": 3e-4, "force": 1e-4}, 9.0, np.array([9.0])),
 }
 
 
 def test_each_cause_counts_by_its_largest_quantity():
-    error = Error.from_table(TABLE, True, 2.0)
+    error = Error.of_causes(FOUND, True, 2.0)
     assert (error.step, error.truncation, error.mesh, error.sensitivity) == (4e-5, 3e-4, 0.0, 2.0)
     assert error.total == float(error) == pytest.approx(3.4e-4) and error.dominant == ("modes left out", 3e-4)
 
 
 def test_each_quantity_has_its_own_sum_and_causes_without_a_table_count_in_full():
-    error = Error.from_table(TABLE, True, 1.0)
+    error = Error.of_causes(FOUND, True, 1.0)
     assert error.of_quantity("force") == pytest.approx(1.4e-4)
     assert error.parts("restitution")["time steps"] == 1e-5
-    more = Error(**{cause: 1e-3 for cause in CAUSES if cause not in TABLE}, step=4e-5, truncation=3e-4, table=TABLE)
+    rest = {cause: 1e-3 for cause in CAUSES if cause not in FOUND}
+    more = Error(**rest, step=4e-5, truncation=3e-4, table=error.table)
     assert more.of_quantity("force") == pytest.approx(3.14e-3)
     assert Error(1e-3, 0.0, 0.0).of_quantity("force") == 1e-3
 
 
 def test_no_estimate_holds_where_modes_left_out_govern_the_contact():
-    error = Error.from_table(TABLE, False, 1.0)
+    error = Error.of_causes(FOUND, False, 1.0)
     assert error.total == error.of_quantity("force") == float("inf")

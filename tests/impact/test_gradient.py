@@ -2,17 +2,16 @@
 
 from dataclasses import replace
 
+import gradient_claims as claims  # random blows and what is told of them, on which both are judged
+import gradient_contacts as several
+import gradient_grazing as grazing
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
-from test_studies import study
 
 import fem_impact as fi
 from fem_impact.impact import gradient
 
-grazing = study("gradient_grazing")
-claims = study("gradient_claims")  # random blows and what is told of them, on which both are judged
-several = study("gradient_contacts")
 STEP, BAND, QUANTITIES = claims.STEP, claims.BAND, claims.QUANTITIES
 random_numbers, strike = claims.random_numbers, claims.strike
 GRAZING = 1.20025666  # [-] times the target's mass of the first family of `gradient_grazing`: where its impact is lost

@@ -3,10 +3,10 @@
 import json
 from dataclasses import replace
 
+import gradient_contacts as contacts
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
-from test_studies import study
 
 import fem_impact as fi
 
@@ -233,7 +233,6 @@ def test_a_near_miss_in_the_flight_that_a_duration_cuts_is_in_the_margin():
 
 def test_contacts_that_part_for_good_at_once_leave_no_margin_behind():
     """A second stick, not yet in contact, has parted when the first look at it is made."""
-    contacts = study("gradient_contacts")
     for seed, kind in ((3, "two sticks"), (10, "buzz"), (13, "buzz"), (14, "over a stop")):
         numbers = contacts.random_numbers(np.random.default_rng(seed), kind)
         assert 0.0 <= contacts.strike(numbers, 1e-4, kind=kind).margin <= 0.05

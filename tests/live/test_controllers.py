@@ -10,17 +10,7 @@ import pytest
 
 import fem_impact as fi
 from fem_impact.live import controllers
-from fem_impact.live.controllers import Hands, PlayedStroke, Score
-
-
-def test_a_score_gives_every_stroke_once_in_its_block():
-    score = Score([PlayedStroke(130, 1, 0.5), PlayedStroke(3, 0, 1.0), PlayedStroke(64, 2, 2.0)])
-    assert score.due(0, 64) == [(3, 0, 1.0)] and not score.over(0)
-    assert score.due(64, 128) == [(0, 2, 2.0)]
-    assert score.due(128, 192) == [(2, 1, 0.5)] and score.over(192)
-    crowd = Score([PlayedStroke(1, 0, 0.1)] * 100)
-    first = crowd.due(0, 64)
-    assert len(first) == controllers.AT_ONCE and len(crowd.due(64, 128)) == 100 - len(first)
+from fem_impact.live.controllers import Hands
 
 
 def test_points_are_spread_over_any_outline():

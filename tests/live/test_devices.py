@@ -7,9 +7,9 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from fem_impact.live import devices
-from fem_impact.live.controllers import PlayedStroke, Score
 from fem_impact.live.devices import Clock, Feed, Speaker, perform
+from fem_impact.live.player import PlayedStroke, Score
+from fem_impact.show import sound
 
 
 class Beeps:
@@ -47,7 +47,7 @@ def test_blocks_are_copied_in_order_and_missed_ones_are_silent():
 def test_without_a_device_the_strokes_stand_at_their_frames_and_late_blocks_are_counted():
     played = perform(Beeps(late=(3,)), Score(SCORE), 60.0)
     assert played.sound.full_scale == 2.0 and np.flatnonzero(played.sound.samples).tolist() == [10, 500]
-    assert len(played.sound.samples) == 64 * (8 + round(devices.SHORTEST * 48_000 / 64))  # rings for half a second
+    assert len(played.sound.samples) == 64 * (8 + round(sound.SHORTEST * 48_000 / 64))  # rings for half a second
     assert played.missed >= 1 and played.seconds[3] >= 0.02
     assert len(perform(Beeps(), Score(SCORE), 0.1).sound.samples) == 64 * 75  # the longest that was asked for
 

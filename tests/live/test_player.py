@@ -10,7 +10,7 @@ import pytest
 
 import fem_impact as fi
 from fem_impact.impact.compiled import build
-from fem_impact.live.player import PlayedStroke, Player
+from fem_impact.live.player import AT_ONCE, PlayedStroke, Player, Score
 
 pytestmark = pytest.mark.xdist_group("live")  # one worker compiles
 POINTS = [(0.1395, 0.09), (0.05, 0.05), (0.2, 0.15)]
@@ -37,6 +37,16 @@ LAWS = {
     "layers": (fi.Striker.rigid(0.02), fi.Contact.layers(1e6, 1.5, depth=5e-5, hard_stiffness=1e8, hard_exponent=1.5)),
     "yielding": (fi.Striker.rigid(0.02), fi.Contact.elastic_plastic(1e8, 1.5, yield_approach=1e-5)),
 }
+
+
+def test_a_score_gives_every_stroke_once_in_its_block():
+    score = Score([PlayedStroke(130, 1, 0.5), PlayedStroke(3, 0, 1.0), PlayedStroke(64, 2, 2.0)])
+    assert score.due(0, 64) == [(3, 0, 1.0)] and not score.over(0)
+    assert score.due(64, 128) == [(0, 2, 2.0)]
+    assert score.due(128, 192) == [(2, 1, 0.5)] and score.over(192)
+    crowd = Score([PlayedStroke(1, 0, 0.1)] * 100)
+    first = crowd.due(0, 64)
+    assert len(first) == AT_ONCE and len(crowd.due(64, 128)) == 100 - len(first)
 
 
 @pytest.mark.slow
@@ -105,7 +115,8 @@ def test_a_stick_too_many_takes_the_place_of_another_and_all_leave_at_last():
     game.play([PlayedStroke(100 * i, i % 3, 0.5) for i in range(6)], 0.05)
     assert game.counted["strokes"] == 6 and game.counted["stolen"] > 0
     game.play([], 1.5)
-    assert game._state.place[0] == 0 and not game._state.q[: game._state.q.size - 30].any()
+    state = game._played.state
+    assert state.place[0] == 0 and not state.q[: state.q.size - 30].any()
 
 
 @pytest.mark.slow
@@ -132,7 +143,7 @@ for n in (64, 48_000):
     before = rtsys.get_allocation_stats().alloc
     game.fill([PlayedStroke(n // 70 * i, i % 3, 1.0) for i in range(60)], out)
     print(rtsys.get_allocation_stats().alloc - before)
-print(len(game._body) + len(game._pads) + len(game._state) + 4)
+print(len(game._played.body) + len(game._played.pads) + len(game._played.state) + 4)
 """
     environment = {**os.environ, "NUMBA_NRT_STATS": "1"}
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, env=environment, check=True)
@@ -153,8 +164,7 @@ def test_what_cannot_be_played_is_refused():
     with pytest.raises(ValueError, match=r"points\[1\] must lie on the body"):
         Player(plate(5), STICK, HERTZ, points=[(0.1, 0.1), (1.0, 0.1)], fastest=1.0)
     with pytest.raises(ValueError, match=r"contact must last at least .* s at 1 m/s to be played, got"):
-        hard = {"points": POINTS, "fastest": 1.0, "residual": False}
-        Player(plate(5), fi.Striker.rigid(1e-9), fi.Contact.linear(1e12), **hard)
+        Player(fi.Modes.rigid(1.0), fi.Striker.rigid(1e-9), fi.Contact.linear(1e12), points=[()], fastest=1.0)
     game = player(n_modes=5)
     with pytest.raises(ValueError, match="speed of a stroke must lie between 0 and 2 m/s, got 3 m/s"):
         game.play([(0, 0, 3.0)], 0.1)

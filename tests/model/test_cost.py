@@ -57,7 +57,7 @@ def test_the_time_of_a_finer_mesh_grows_faster_than_its_unknowns():
 
 
 def test_many_first_vectors_become_more_and_each_costs_more():
-    """The plate of studies/frontier.py at 1e-6 begins with 302 vectors, ends with 592 and takes four times as long."""
+    """The plate of `frontier.py` at 1e-6 begins with 302 vectors, ends with 592 and takes four times as long."""
     meshes = [6676, 4591]
     few, many = (cost.by_vectors(meshes, n, 1.0).on(cost.REFERENCE) for n in (120, 302))
     assert many > 2.5 * few  # 302 vectors that do not grow would cost 2.1 times as much as 120
@@ -115,20 +115,13 @@ def test_what_doctor_kept_of_this_machine_serves_every_later_process(benchmarks)
     assert MUCH.seconds == pytest.approx(24.0) and cost.whose() == "this machine" and len(benchmarks) == 1
 
 
-@pytest.mark.parametrize(
-    "text",
-    [
-        b"",
-        b"{",
-        b"\xff\xfe",
-        b"[1]",
-        b"null",
-        b'{"sparse": 1}',
-        b'{"sparse": [], "dense": 1, "steps": 1}',
-        b"[" * 99999,
-    ],
-    ids=["empty", "cut", "no text", "list", "null", "short", "no number", "deep"],
-)
+DAMAGED = {
+    "empty": b"", "cut": b"{", "no text": b"\xff\xfe", "list": b"[1]", "null": b"null", "short": b'{"sparse": 1}',
+    "no number": b'{"sparse": [], "dense": 1, "steps": 1}', "deep": b"[" * 99999,
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("text", DAMAGED.values(), ids=DAMAGED)
 def test_a_damaged_file_does_not_count_and_is_replaced(place, benchmarks, text):
     place.parent.mkdir()
     place.write_bytes(text)
@@ -175,7 +168,7 @@ def test_the_benchmark_finds_a_machine_that_people_use():
 @pytest.mark.parametrize("name", ["marked_linear", "guitar_top", "drumstick"])
 @pytest.mark.slow
 def test_predicted_time_is_of_the_right_size(name):
-    """Within four, and not two as in studies/cost_predictions.py: a busy machine doubles even the processor time."""
+    """Within four, and not two as in `cost_predictions.py`: a busy machine doubles even the processor time."""
     scene = fi.load_scene(SCENES / f"{name}.toml")
     plan = scene.plan(tolerance=1e-2)
     start = time.process_time()

@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from comparing import difference
 from numpy.testing import assert_allclose
 from scipy import special
 from scipy.optimize import brentq
@@ -27,12 +28,6 @@ LAWS = {"linear": Contact.linear(MASS * (np.pi / DURATION) ** 2), "hertz": Conta
 
 def struck(modes, law, at, tolerance=1e-6):
     return collision.strike(modes, Striker.rigid(MASS), LAWS[law], at=at, speed=1.0, tolerance=tolerance)
-
-
-def difference(hit, other):
-    """What the tolerance speaks of."""
-    relative = (abs(getattr(hit, x) / getattr(other, x) - 1.0) for x in ("impulse", "contact_time", "peak_force"))
-    return max(abs(hit.restitution - other.restitution), *relative)
 
 
 def plate(ratio, rate, shape="rectangle", edge="hinged"):

@@ -1,10 +1,11 @@
 import numpy as np
 import pytest
+from comparing import examined as found
 from scipy.optimize import brentq
 from scipy.special import spherical_jn
 
 import fem_impact as fi
-from fem_impact.model import audit, local_contact
+from fem_impact.model import local_contact
 
 E, NU, RHO, YIELD = 210e9, 0.3, 7850.0, 1e9
 STEEL = fi.Material(E=E, nu=NU, rho=RHO, yield_strength=YIELD)
@@ -16,10 +17,6 @@ def drop(speed, h=0.02, material=STEEL, ball=STEEL, at=(0.12, 0.09), radius=R):
     modes = fi.analytic.rectangle(0.3, 0.2, section=plate, n_modes=200)
     sphere = fi.Striker.sphere(ball, radius)
     return fi.strike(modes, sphere, fi.Contact.between(sphere, plate), at=at, speed=speed)
-
-
-def found(hit, name):
-    return next(each for each in audit.examine(hit) if each.name == name)
 
 
 def first_yield():

@@ -45,7 +45,7 @@ def test_modes_and_what_stands_above_them_are_the_infinite_plate():
     above, shape, rest = mixed.absorbing(wanted, frequency, 1e8)
     edges = 2.0 * np.pi * frequency * np.geomspace(1e-6, 1e3, 9 * density + 1)
     low = np.sqrt(edges[1:] * edges[:-1])
-    squared = 2.0 * wanted / np.pi * np.diff(edges) * mixed.kept(low, wanted, above, shape)
+    squared = 2.0 * wanted / np.pi * np.diff(edges) * mixed.kept_share(low, wanted, above, shape)
     damped = 2e-2  # [-] ratio that makes the sum over the low modes an integral, for frequencies off its edges
     for omega in 2.0 * np.pi * frequency * np.array([1e-2, 0.1, 0.5, 2.0, 10.0, 100.0]):
         low_part = 1j * omega * (squared / (low**2 - omega**2 + 2j * damped * low * omega)).sum()
@@ -58,7 +58,7 @@ def test_modes_and_what_stands_above_them_are_the_infinite_plate():
 def test_share_that_modes_keep_falls_from_one_to_zero():
     above, shape, _ = mixed.absorbing(0.04, 1e4, 1e9)
     ratio = np.array([0.0, 0.01, 0.1, 0.5, 1.0, 2.0, 10.0])
-    share = mixed.kept(2e4 * np.pi * ratio, 0.04, above, shape)
+    share = mixed.kept_share(2e4 * np.pi * ratio, 0.04, above, shape)
     assert (np.diff(share) < 0.0).all() and share[0] == 1.0
     assert share[2] > 0.999 and 0.3 < share[4] < 0.7 and share[5] < 0.02
 

@@ -13,7 +13,7 @@ BLOW = {"at": (0.12, 0.09), "speed": 1.0, "tolerance": 1e-6}
 
 def struck(quantity=None, **how):
     hit = fi.strike(PLATE, HAMMER, LAW, quantity=quantity, **BLOW, **how)
-    return Struck(hit, bending.known(PLATE), None)
+    return Struck(hit, hit.bodies, bending.known(PLATE), None)
 
 
 def test_nothing_changes_if_nothing_is_changed():
@@ -24,7 +24,7 @@ def test_nothing_changes_if_nothing_is_changed():
 @pytest.mark.parametrize("factor", [0.9, 0.99, 1.05])
 def test_changes_are_those_of_a_new_blow(factor):
     case = struck(residual=False)
-    changed = case.changes(omega=case.of_target(factor * PLATE.omega))
+    changed = case.changes(omega=case.with_target(factor * PLATE.omega))
     other = fi.strike(PLATE.scaled(first_frequency=100.0 * factor), HAMMER, LAW, residual=False, **BLOW)
     expected = {
         "restitution": abs(other.restitution - case.hit.restitution),
@@ -44,15 +44,15 @@ def test_more_compliance_is_a_softer_contact():
 
 def test_spectra_are_compared_in_their_band():
     case = struck(quantity="spectrum=1000")
-    effect = case.changes(omega=case.of_target(0.9 * PLATE.omega))
+    effect = case.changes(omega=case.with_target(0.9 * PLATE.omega))
     assert set(effect) == {"spectrum"} and 1e-4 < effect["spectrum"] < 1.0
 
 
 def test_sound_is_the_shift_of_what_rings():
     case = struck(quantity="sound=2000")
-    effect = case.heard({"sound": 0.0}, lambda modes, _: np.full(modes.n_modes, 0.03))
+    effect = case.add_sound({"sound": 0.0}, lambda body, _: np.full(body.modes.n_modes, 0.03))
     assert effect["sound"] == pytest.approx(0.03)
-    assert case.heard({"sound": 0.0}, lambda modes, _: None)["sound"] is None
+    assert case.add_sound({"sound": 0.0}, lambda *_: None)["sound"] is None
 
 
 def test_a_limit_of_the_blow_stays():

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from comparing import difference
 from numpy.testing import assert_allclose
 
 import fem_impact as fi
@@ -11,12 +12,6 @@ from fem_impact.model.target import Target
 ALUMINIUM = fi.Material(E=70e9, nu=0.33, rho=2700.0)
 STICK = fi.Striker.stick(0.1, 1000.0)
 SOFT = fi.Contact.linear(88.6e3)
-QUANTITIES = ("impulse", "contact_time", "peak_force")
-
-
-def difference(hit, other):
-    relative = (abs(getattr(hit, x) / getattr(other, x) - 1.0) for x in QUANTITIES)
-    return max(abs(hit.restitution - other.restitution), *relative)
 
 
 def wedge(points):

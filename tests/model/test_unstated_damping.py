@@ -1,7 +1,9 @@
+from functools import partial
+
 import pytest
+from comparing import examined
 
 import fem_impact as fi
-from fem_impact.model import audit
 from fem_impact.model.unstated_damping import PLAUSIBLE
 
 PLATE = fi.analytic.rectangle(0.4, 0.3, mass=0.2, first_frequency=100.0, n_modes=60)
@@ -9,8 +11,7 @@ BLOW = {"at": (0.12, 0.09), "speed": 1.0}
 LAW = fi.Contact.hertz(1e6)
 
 
-def found(hit):
-    return next(each for each in audit.examine(hit) if each.name == "stated damping")
+found = partial(examined, name="stated damping")
 
 
 @pytest.mark.parametrize("mass", [0.005, 0.02, 0.1])

@@ -344,7 +344,7 @@ def test_a_tolerance_out_of_reach_is_refused():
 
 def test_a_size_left_open_is_chosen_for_the_modes_asked_for():
     found = parameters(mesh.rectangle(1.55, 1.0), {"boundary": "hinged"}, 60)
-    assert_allclose(found, hinged(1.55, 1.0, 60), rtol=5e-5)  # WAVE_PER_ELEMENT promises it
+    assert_allclose(found, hinged(1.55, 1.0, 60), rtol=5e-5)  # `Theory.wave` promises it
 
 
 def test_max_frequency_keeps_every_mode_below_it():

@@ -8,11 +8,11 @@ import signal
 import socket
 import subprocess
 import sys
+from importlib import import_module
 
 import pytest
 from test_cli import TEXT
 from test_interrupt import RUNNER
-from test_studies import study
 
 from fem_impact import cli
 from fem_impact.pages import explore_view
@@ -119,11 +119,11 @@ def test_nothing_fails_and_nothing_is_asked_for_elsewhere(opened, address):
 
 
 def test_sliders_change_the_pictures(opened):
-    shown, turn = opened(), study("explore_speed").TURN
+    shown, turn = opened(), import_module("explore_speed").TURN
     shown.until(MAP)
     for name in SLIDERS:
         before = [shown.tab.locator(f"#{plot}-plot").screenshot() for plot in ("map", "force", "spectrum")]
-        shown.tab.evaluate(turn, name)  # until everything is answered; how fast: studies/explore_speed.py
+        shown.tab.evaluate(turn, name)  # until everything is answered; how fast: studies/benchmarks/explore_speed.py
         after = [shown.tab.locator(f"#{plot}-plot").screenshot() for plot in ("map", "force", "spectrum")]
         assert before[1] != after[1] and before[2] != after[2], name
         assert before[0] != after[0] or name not in ("mass", "stiffness")
@@ -220,7 +220,7 @@ def test_button_plays_the_sound(opened):
     shown.tab.click("#roll")
     shown.until(f"document.getElementById('player').src !== {before!r}")
     before = shown.tab.evaluate("document.getElementById('player').src")
-    shown.tab.evaluate(study("explore_speed").TURN, "height")
+    shown.tab.evaluate(import_module("explore_speed").TURN, "height")
     shown.tab.click("#listen")
     shown.until("document.getElementById('heard').innerText.includes(' above (')")
     assert "Pa; full scale" in shown.tab.inner_text("#heard")

@@ -106,14 +106,14 @@ def test_hard_blows_on_elements_are_resolved_by_vectors(tmp_path):
     """Where the first modes leave the contact unresolved; against a thousand modes in closed form."""
     (tmp_path / "elements.toml").write_text(ELEMENTS)
     setup = explore_model.Setup.of(fi.load_scene(tmp_path / "elements.toml"))
-    seen = setup.seen(setup.start.at)
-    assert setup.told and seen.poorer and setup.base.modes.n_modes == explore_model.FIRST_LOOK
+    seen = setup.body_seen(setup.start.at)
+    assert setup.by_vectors and seen.poorer and setup.base.modes.n_modes == explore_model.FIRST_LOOK
     mesh = setup.mesh
     body = fi.analytic.rectangle(0.465, 0.3, mass=0.2, first_frequency=100.0, n_modes=1000, damping_ratio=0.01)
     assert mesh.points.max() == pytest.approx(0.465)
     for changes in ({"stiffness": 100.0, "mass": 0.01}, {"damping": 0.05, "thickness": 1.5}):
         settings = replace(setup.start, **changes)
-        case = setup.case(settings, seen=seen)
+        case = setup.case(settings, body=seen)
         hit, few = explore_model.blow(case), explore_model.blow(setup.case(settings))
         ratio = settings.thickness
         truth = fi.strike(
@@ -126,7 +126,7 @@ def test_hard_blows_on_elements_are_resolved_by_vectors(tmp_path):
 
 
 def test_bodies_in_closed_form_keep_their_modes(stand):
-    assert not stand.told and stand.seen(stand.start.at) is None
+    assert not stand.by_vectors and stand.body_seen(stand.start.at) is None
 
 
 def test_the_first_answer_to_a_slider_is_the_blow_but_for_small_errors(stand):

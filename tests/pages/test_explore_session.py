@@ -11,7 +11,7 @@ import pytest
 from test_cli import TEXT
 
 import fem_impact as fi
-from fem_impact.pages import explore, explore_map, explore_model, explore_numbers, explore_session
+from fem_impact.pages import explore_map, explore_model, explore_numbers, explore_session
 from fem_impact.scenes.sentences import si
 
 
@@ -48,9 +48,7 @@ def follow(explorer, monkeypatch, *messages, until=lambda said: True, rest=0.0, 
     said, workers = [], (Beside(explorer), Beside(explorer))
 
     async def work():
-        session = explore_session.Session(
-            explorer, *workers, lambda message: said.append(json.loads(json.dumps(message)))
-        )
+        session = explore_session.Session(explorer, *workers, lambda told: said.append(json.loads(json.dumps(told))))
         for message in messages:
             session.take(message)
             while apart and session.asked is not None:
@@ -188,12 +186,9 @@ def test_one_page_that_asks_for_much_does_not_make_another_wait(explorer, monkey
 
     async def work():
         said = []
-        one, other = (
-            explore_session.Session(
-                explorer, Beside(explorer), Beside(explorer), lambda said_, who=who: said.append((who, said_))
-            )
-            for who in ("one", "other")
-        )
+        beside = explorer, Beside(explorer), Beside(explorer)
+        one, other = (explore_session.Session(*beside, lambda told, who=who: said.append((who, told)))
+                      for who in ("one", "other"))  # fmt: skip
         for i in range(1000):
             one.take({"number": i, "turn": {"mass": 0.02 + 1e-6 * i}})
         other.take({"number": 7, "turn": {"mass": 0.05}})
@@ -268,13 +263,15 @@ async def talk(host, text):
 
 def test_pages_that_vanish_or_send_nonsense_are_one_line_each(explorer, caplog, monkeypatch):
     pytest.importorskip("tornado", reason="exploring is an extra: fem-impact[web]")
+    from fem_impact.pages import explore_server
+
     caplog.set_level(logging.INFO)
     monkeypatch.setattr(explore_session, "REST", 60.0)
     bad = []
 
     async def work():
         asyncio.get_running_loop().set_exception_handler(lambda _, context: bad.append(context))
-        server, address = explore._server(explorer, [Beside(explorer), Beside(explorer)], 0)
+        server, address = explore_server.begin(explorer, [Beside(explorer), Beside(explorer)], 0)
         host = address.split("/")[2]
         for _ in range(5):
             _, writer = await talk(host, '{"number": 1, "turn": {"mass": 0.02}}')

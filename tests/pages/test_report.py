@@ -56,17 +56,13 @@ def download(text, name):
     return base64.b64decode(raw).decode()
 
 
-def test_page_is_one_file_with_no_way_out(page):
+def test_page_is_one_file_with_no_way_out_and_texts_of_the_scene_escaped(page):
     text = page.read_text(encoding="utf-8")
     assert [path.name for path in page.parent.iterdir()] == ["report.html"]
     assert page.stat().st_size < 12e6
     own = re.sub(r"<script>.*?</script>", "", text, flags=re.DOTALL)  # plotly's own code names addresses it never asks
     assert not re.findall(r'(?:src|href)="(?!data:|#)', own)
     assert "default-src 'none'" in own and "connect-src" not in own
-
-
-def test_texts_of_the_scene_are_escaped(page):
-    text = page.read_text(encoding="utf-8")
     assert SCRIPT not in text and "&lt;script&gt;document.title" in text
 
 
@@ -151,15 +147,9 @@ def test_result_carries_its_mesh_wherever_it_goes(tmp_path, capsys, monkeypatch)
 
 @pytest.mark.parametrize(
     "text",
-    [
-        "",
-        "[]",
-        '{"scene": 3}',
-        "[" * 100_000,
-        '{"scene": {"mesh": {"x": ' + "[" * 900 + "]" * 900 + "}}}",
-        '{"scene": {"mesh": {}}}',
-    ],
-)
+    ["", "[]", '{"scene": 3}', "[" * 100_000, '{"scene": {"mesh": {"x": ' + "[" * 900 + "]" * 900 + "}}}",
+     '{"scene": {"mesh": {}}}'],
+)  # fmt: skip
 def test_file_that_is_no_result_is_a_sentence(tmp_path, capsys, text):
     path = tmp_path / "response.json"
     path.write_text(text)
@@ -226,18 +216,10 @@ def test_listeners_in_free_air_get_a_player_for_each_bound(tmp_path):
 
 @pytest.mark.parametrize(
     ("value", "unit", "text"),
-    [
-        (0.0041273, "s", "4.127 ms"),
-        (0.1, "kg", "100 g"),
-        (5e5, "kg", "500 t"),
-        (2.5, "kg", "2.5 kg"),
-        (0.0, "N", "0 N"),
-        (-2e-7, "m", "−200 nm"),
-        (1000.0, "Hz", "1 kHz"),
-        (0.00099998, "N s", "1 mN s"),
-        (float("inf"), "Hz", "∞ Hz"),
-    ],
-)
+    [(0.0041273, "s", "4.127 ms"), (0.1, "kg", "100 g"), (5e5, "kg", "500 t"), (2.5, "kg", "2.5 kg"),
+     (0.0, "N", "0 N"), (-2e-7, "m", "−200 nm"), (1000.0, "Hz", "1 kHz"), (0.00099998, "N s", "1 mN s"),
+     (float("inf"), "Hz", "∞ Hz")],
+)  # fmt: skip
 def test_numbers_have_prefixes(value, unit, text):
     assert sentences.si(value, unit).replace(sentences.NBSP, " ") == text
 
@@ -329,15 +311,9 @@ def test_page_fits_a_phone(opened, scheme):
     assert shown.tab.evaluate(cut) == 0  # nothing has to be pushed aside to be read
     small = "[...document.querySelectorAll('button, select')].filter(e => e.getBoundingClientRect().height < 40).length"
     assert shown.tab.evaluate(small) == 0  # 40 px: a finger's width
-    ink, paper = shown.tab.evaluate(
-        "[getComputedStyle(document.body).color, getComputedStyle(document.body).backgroundColor]"
-    )
-    lightness = [sum(map(int, re.findall(r"\d+", colour)[:3])) / 765 for colour in (ink, paper)]
-    assert (
-        (lightness[0] < 0.2 and lightness[1] > 0.9)
-        if scheme == "light"
-        else (lightness[0] > 0.8 and lightness[1] < 0.2)
-    )
+    both = "[getComputedStyle(document.body).color, getComputedStyle(document.body).backgroundColor]"
+    ink, paper = (sum(map(int, re.findall(r"\d+", c)[:3])) / 765 for c in shown.tab.evaluate(both))
+    assert (ink < 0.2 and paper > 0.9) if scheme == "light" else (ink > 0.8 and paper < 0.2)
 
 
 def test_keyboard_reaches_everything_and_shows_where_it_is(desktop):

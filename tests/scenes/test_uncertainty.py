@@ -11,7 +11,7 @@ from scipy import stats
 import fem_impact as fi
 from fem_impact import cli
 from fem_impact.scenes import uncertainty
-from fem_impact.sweeps import cloud, solving
+from fem_impact.sweeps import cases
 
 MASS, STIFFNESS = 0.1, 1e5
 WALL = fi.Modes.rigid(1e12)  # so heavy that it does not move: 1e-13 of the striker's speed
@@ -246,7 +246,7 @@ def test_the_same_seed_gives_the_same_blows():
 
 def test_a_killed_run_resumes_from_its_store(tmp_path, monkeypatch):
     pytest.importorskip("zarr", reason="the cluster extra is not installed")
-    vary, solved, real = {"striker.mass": ("lognormal", MASS, 0.2)}, [], cloud.solve
+    vary, solved, real = {"striker.mass": ("lognormal", MASS, 0.2)}, [], cases.solve
 
     def count(blows, start, stop, **wanted):
         if len(solved) == 20:
@@ -254,7 +254,7 @@ def test_a_killed_run_resumes_from_its_store(tmp_path, monkeypatch):
         solved.append(start)
         return real(blows, start, stop, **wanted)
 
-    monkeypatch.setattr(cloud, "solve", count)
+    monkeypatch.setattr(cases, "solve", count)
     with pytest.raises(KeyboardInterrupt):
         wall(vary, n=128, store=tmp_path / "blows")
     first = list(solved)
@@ -285,7 +285,7 @@ def test_failed_blows_are_told(monkeypatch):
     def fail(blows, index):
         raise fi.SimulationError("no luck")
 
-    monkeypatch.setattr(cloud.Cloud, "blow", fail)
+    monkeypatch.setattr(cases.Cases, "blow", fail)
     felt = fi.Contact.felt(1e6, 2.0, hysteresis=0.3, relaxation=1e-3)
     found = fi.spread(
         WALL, {"speed": "uniform(1, 2)"}, fi.Striker.rigid(0.1), felt, n=16, at=None, speed=1.0, sobol=False
@@ -335,4 +335,4 @@ def test_the_prompt_complains_in_one_line_and_writes_nothing(scene, tmp_path, ca
 
 
 def test_the_numbers_checked_are_those_of_the_layers():
-    assert set(uncertainty._differences(np.ones(7), np.ones(7))) == set(solving.LAYERS) - {"n_impacts", "error"}
+    assert set(uncertainty._differences(np.ones(7), np.ones(7))) == set(cases.LAYERS) - {"n_impacts", "error"}

@@ -54,12 +54,11 @@ def test_pictures_are_drawn_from_arrays_alone(tmp_path):
         pytest.skip(f"nothing renders here: {pictures.REMEDY}")
     plane, cells, rim = square()
     bump = np.sin(np.pi * plane[:, 0]) * np.sin(np.pi * plane[:, 1])
-    film = canvas.Film(
-        plane, cells, rim, np.array([0.5, 0.5]), np.stack([0.0 * bump, bump]), np.zeros(2), ["a", "b"], 1
-    )
+    motion, middle = np.stack([0.0 * bump, bump]), np.array([0.5, 0.5])
+    film = canvas.Film(plane, cells, rim, middle, motion, np.zeros(2), ["a", "b"], 1)
     told = []
     with progress.heard(lambda *each: told.append(each)):
-        canvas.draw(tmp_path, film, canvas.Gallery(plane, cells, bump[:, None], ["1"], 1, 1))
+        canvas.draw(tmp_path, film, canvas.Gallery(plane, cells, bump[:, None], ["1"], 1))
     assert sorted(path.name for path in tmp_path.iterdir()) == ["modes.png", "wave.gif", "wave.png"]
     assert told == [("frames", 1, 2), ("frames", 2, 2)]
     flat, bent = (np.asarray(picture, float) for picture in canvas.frames(film))

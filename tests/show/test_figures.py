@@ -7,40 +7,32 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from fem_impact import mesh
-from fem_impact.impact.collision import strike
-from fem_impact.impact.contact import Contact
-from fem_impact.impact.striker import Striker
-from fem_impact.modes import analytic
-from fem_impact.modes.modal import Modes
+import fem_impact as fi
 from fem_impact.show import figures, plots
 from fem_impact.sweeps.hammers import Hammer
 
 
 @pytest.fixture(scope="module")
 def modes():
-    return analytic.rectangle(0.465, 0.3, mass=0.2, first_frequency=100.0, n_modes=30, damping_ratio=0.005)
+    return fi.analytic.rectangle(0.465, 0.3, mass=0.2, first_frequency=100.0, n_modes=30, damping_ratio=0.005)
 
 
 @pytest.fixture(scope="module")
 def hit(modes):
-    return strike(modes, Striker.rigid(0.03), Contact.hertz(695e3), at=(0.1395, 0.09), speed=2.0, tolerance=1e-3)
+    how = {"at": (0.1395, 0.09), "speed": 2.0, "tolerance": 1e-3}
+    return fi.strike(modes, fi.Striker.rigid(0.03), fi.Contact.hertz(695e3), **how)
 
 
-def test_force_picture_holds_history_and_spectrum(hit):
+def test_force_picture_holds_history_and_spectrum_and_says_its_units(hit):
     above, below = figures.force(hit, band=(20.0, 5e3)).axes
     time, force = above.lines[0].get_data()
     np.testing.assert_array_equal(np.column_stack([time, force]), np.column_stack([hit.time, hit.force]))
     frequencies, size = below.lines[0].get_data()
     top = np.abs(hit.spectrum(frequencies)).max()
     shown = size > 1e-4 * top
-    np.testing.assert_allclose(size[shown], np.abs(hit.spectrum(frequencies))[shown], rtol=1e-12)
+    assert_allclose(size[shown], np.abs(hit.spectrum(frequencies))[shown], rtol=1e-12)
     assert below.get_xlim() == (20.0, 5e3)
     assert len(above.patches) == hit.n_impacts
-
-
-def test_every_axis_says_its_unit(hit, modes):
-    above, below = figures.force(hit).axes
     assert above.xaxis.get_major_formatter().unit == "s" and above.yaxis.get_major_formatter().unit == "N"
     assert below.xaxis.get_major_formatter().unit == "Hz" and "[N s]" in below.get_ylabel()
 
@@ -50,22 +42,17 @@ def test_mode_shapes_draw_as_many_as_there_are(modes, count, drawn):
     axes = figures.mode_shapes(modes, count=count).axes
     titles = [a.get_title(loc="left") for a in axes if a.get_title(loc="left")]
     assert len(titles) == drawn and titles[0] == "1   100 Hz"
-
-
-def test_beam_modes_are_drawn_as_lines():
-    beam = analytic.beam(0.4, mass=0.1, first_frequency=1e3, n_modes=3)
+    # those of a beam are lines
+    beam = fi.analytic.beam(0.4, mass=0.1, first_frequency=1e3, n_modes=3)
     axes = figures.mode_shapes(beam).axes
     assert all(len(a.lines) >= 1 for a in axes) and axes[-1].get_xlabel() == "x [m]"
 
 
-def test_saved_picture_is_an_image_with_ink(tmp_path, hit):
+def test_saved_picture_is_an_image_with_ink_and_other_formats_are_refused(tmp_path, hit):
     figures.save(tmp_path / "force.png", figures.force(hit))
     pixels = matplotlib.image.imread(tmp_path / "force.png")
     assert pixels.shape[1] == 1050 and pixels[:, :, :3].std() > 0.05  # 7 inches at 150 dots; blank is 0
     assert [path.name for path in tmp_path.iterdir()] == ["force.png"]
-
-
-def test_unknown_picture_format_is_refused(tmp_path, hit):
     with pytest.raises(ValueError, match=r"path ending must be one of .*'\.pgn'; did you mean '\.png'"):
         figures.save(tmp_path / "force.pgn", figures.force(hit))
 
@@ -74,7 +61,7 @@ def test_energies_add_up_at_every_instant(hit):
     lines = figures.energies(hit).axes[0].lines
     assert [line.get_label() for line in lines] == ["striker", "struck body", "contact and losses"]
     total = sum(line.get_ydata() for line in lines)
-    np.testing.assert_allclose(total, 0.5 * 0.03 * 2.0**2, rtol=1e-12)  # what the striker brought
+    assert_allclose(total, 0.5 * 0.03 * 2.0**2, rtol=1e-12)  # what the striker brought
     # a contact stores and never lends; between the ends of steps the energy holds to their tolerance of 1e-3
     assert lines[2].get_ydata().min() > -1e-3 * 0.06
 
@@ -83,30 +70,27 @@ def test_mode_energies_are_those_at_the_last_release(hit):
     (bars,) = figures.mode_energies(hit).axes[0].collections
     tops = np.array([segment[1] for segment in bars.get_segments()])
     q, p = hit.modal_state([hit.impacts[-1].end])
-    np.testing.assert_allclose(tops[:, 0], hit.target.frequencies, rtol=1e-12)
-    np.testing.assert_allclose(tops[:, 1], 0.5 * (p**2 + (hit.target.omega * q) ** 2)[0], rtol=1e-12)
+    assert_allclose(tops[:, 0], hit.target.frequencies, rtol=1e-12)
+    assert_allclose(tops[:, 1], 0.5 * (p**2 + (hit.target.omega * q) ** 2)[0], rtol=1e-12)
 
 
-def test_mobility_shows_every_peak(modes):
+def test_mobility_shows_every_peak_and_of_a_rigid_mass_needs_a_band(modes):
     above, below = figures.mobility(modes, (0.1395, 0.09)).axes
     frequency, size = above.lines[0].get_data()
     for i in (0, 1, 10, 20):  # at resonance one mode dominates: u**2 / (2 zeta omega); its neighbours add some percent
         alone = modes.shape_at([(0.1395, 0.09)])[0, i] ** 2 / (2 * 0.005 * modes.omega[i])
         if alone > 0.1:
             at_peak = size[np.argmin(np.abs(frequency - modes.frequencies[i]))]
-            np.testing.assert_allclose(at_peak, alone, rtol=0.1)
+            assert_allclose(at_peak, alone, rtol=0.1)
     phase = below.lines[0].get_ydata()
     assert np.abs(phase).max() <= 90.0 + 1e-9  # power flows in only: the real part of a point mobility is positive
-
-
-def test_mobility_of_a_rigid_mass_needs_a_band():
     with pytest.raises(ValueError, match="band must be given"):
-        figures.mobility(Modes.rigid(1.0), None)
+        figures.mobility(fi.Modes.rigid(1.0), None)
 
 
 def test_names_between_dollar_signs_are_no_formulas(tmp_path, monkeypatch):
     name = r"a$\frac{$b"
-    plate = mesh.rectangle(0.3, 0.2, size=0.1)
+    plate = fi.mesh.rectangle(0.3, 0.2, size=0.1)
     left, right, whole = (plate.edges[each] for each in ("left", "right", "boundary"))
     named = replace(plate, edges={name: left, "x$": right, "boundary": whole})
     monkeypatch.setitem(matplotlib.rcParams, "text.usetex", True)  # as a file in the working folder may say

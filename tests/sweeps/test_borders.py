@@ -8,25 +8,27 @@ import xarray
 from numpy.testing import assert_allclose
 
 import fem_impact as fi
-from fem_impact.sweeps import borders, grid
+from fem_impact.sweeps import borders
+from fem_impact.sweeps.cases import Cases
+from fem_impact.sweeps.cells import Case
 
 AT = (0.465, 0.3)
 
 
 def case():
     plate = fi.analytic.rectangle(1.55, 1.0, mass=0.2, first_frequency=100.0, n_modes=20)
-    return grid.Case(plate, fi.Striker.rigid(0.1), fi.Contact.linear(1e5), np.array(AT), 1.0)
+    return Case(plate, fi.Striker.rigid(0.1), fi.Contact.linear(1e5), np.array(AT), 1.0)
 
 
 def found_of(rule, mass, stiffness):
     """Borders of numbers of impacts told by a rule of mass and stiffness instead of blows."""
-    cells = grid.Grid(case(), {"mass": mass, "stiffness": stiffness}, 1e-3, True, None, {})
+    cells = Cases(case(), {"mass": mass, "stiffness": stiffness}, 1e-3)
     rounds = []
 
-    def solve(cloud, turn):
-        rounds.append((turn, cloud.n_cases, cloud.tolerance))
-        numbers = np.full((len(cloud.layers), cloud.n_cases), np.nan)
-        numbers[0] = rule(cloud.axes["mass"], cloud.axes["stiffness"])
+    def solve(rows, turn):
+        rounds.append((turn, rows.n_cases, rows.tolerance))
+        numbers = np.full((len(rows.layers), rows.n_cases), np.nan)
+        numbers[0] = rule(rows.axes["mass"], rows.axes["stiffness"])
         return numbers, {}
 
     return borders.find_borders(

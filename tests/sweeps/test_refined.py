@@ -6,7 +6,7 @@ import xarray
 from numpy.testing import assert_allclose
 
 import fem_impact as fi
-from fem_impact.sweeps import grid, refined
+from fem_impact.sweeps import cases, grid, refined
 
 AT = (0.465, 0.3)
 LAYERS = ["n_impacts", "contact_time", "restitution", "impulse", "peak_force", "error"]
@@ -120,7 +120,7 @@ def test_the_predicted_cost_decides_and_is_told(monkeypatch, limit, words):
 @pytest.mark.slow
 def test_a_map_that_was_stopped_goes_on(tmp_path, monkeypatch):
     pytest.importorskip("zarr", reason="the cluster extra is not installed")
-    solved, real = [], grid.solve
+    solved, real = [], cases.solve
 
     def count(cells, start, stop, **wanted):
         if len(solved) == 100:
@@ -128,7 +128,7 @@ def test_a_map_that_was_stopped_goes_on(tmp_path, monkeypatch):
         solved.append(tuple(cells.cells(start, stop)))
         return real(cells, start, stop, **wanted)
 
-    monkeypatch.setattr(grid, "solve", count)
+    monkeypatch.setattr(cases, "solve", count)
     wanted = {"refine": True, "borders": False, "store": tmp_path / "map", "cells": 50}
     with pytest.raises(KeyboardInterrupt):
         swept(**wanted)
@@ -137,7 +137,7 @@ def test_a_map_that_was_stopped_goes_on(tmp_path, monkeypatch):
     table = swept(**{**wanted, "refine": None})  # goes on as it began, whatever it would cost
     again = solved[len(first) + 1 :]
     assert "interpolated" in table and not set(first[2:]) & set(again[2:])  # but for the first look
-    monkeypatch.setattr(grid, "solve", real)
+    monkeypatch.setattr(cases, "solve", real)
     alone = swept(refine=True, borders=False, cells=50)
     xarray.testing.assert_allclose(table.drop_vars("failure"), alone.drop_vars("failure"), rtol=1e-9)
     with pytest.raises(ValueError, match="store must be a new folder or the store of this map"):

@@ -16,7 +16,7 @@ import xarray
 
 import fem_impact as fi
 from fem_impact._base import identity
-from fem_impact.sweeps import cells, grid, solving, store
+from fem_impact.sweeps import cases, cells, store
 from fem_impact.sweeps.store import Store
 
 pytest.importorskip("zarr", reason="the cluster extra is not installed")
@@ -61,15 +61,15 @@ def test_a_store_gives_the_same_map(tmp_path, undisturbed):
 
 def test_a_run_that_stopped_goes_on_where_it_was(tmp_path, undisturbed, monkeypatch):
     solved = []
-    real = grid.solve
+    real = cases.solve
 
-    def count(grid, start, stop, **wanted):
+    def count(table, start, stop, **wanted):
         if len(solved) == 20:
             raise KeyboardInterrupt
         solved.append(start)
-        return real(grid, start, stop, **wanted)
+        return real(table, start, stop, **wanted)
 
-    monkeypatch.setattr(grid, "solve", count)
+    monkeypatch.setattr(cases, "solve", count)
     with pytest.raises(KeyboardInterrupt):
         sweep(store=tmp_path / "map")
     first = list(solved)
@@ -85,7 +85,7 @@ def test_error_texts_are_kept(tmp_path, monkeypatch):
     def fail(*_, **wanted):
         raise fi.SimulationError("the motion may be chaotic: é")
 
-    monkeypatch.setattr(solving, "strike", fail)
+    monkeypatch.setattr(cases, "strike", fail)
     table = sweep(over={"exponent": [0.8, 0.9]}, store=tmp_path / "map")
     assert table.failure.values.tolist() == ["the motion may be chaotic: é"] * 2
 
@@ -107,7 +107,7 @@ def test_bodies_that_differ_at_another_strike_point_have_maps_of_their_own():
             shapes = np.array([[1.0], [at_its_end]])
             body = fi.Modes.from_arrays([50.0], shapes, points=places, mass=1.0, compliance=np.diag([3e-5, yields]))
             case = cells.Case(body, fi.Striker.rigid(0.1), fi.Contact.linear(1e5), places[0], 1.0)
-            marks.append(store.fingerprint(grid.Grid(case, {"at": places}, 1e-3, True, None, {}))["map"])
+            marks.append(store.fingerprint(cases.Cases(case, {"at": places}, 1e-3))["map"])
     assert len(set(marks)) == 4 and marks[:2] == marks[4:]
 
 

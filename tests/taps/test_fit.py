@@ -29,7 +29,7 @@ def test_on_a_known_structure_everything_is_told(found):
     assert found.unidentifiable == () and found.limited == ()
     for name, truth in (("contact.stiffness", 5e8), ("contact.exponent", 1.7), ("striker.mass", MASS)):
         low, high = found.interval(name, 0.95)
-        assert low < truth < high  # this seed's noise; `studies/fit_coverage.py` counts how often
+        assert low < truth < high  # this seed's noise; `studies/verification/fit_coverage.py` counts how often
         assert found.interval(name, 0.5)[0] > low
     assert found.interval("striker.mass")[1] / found.interval("striker.mass")[0] < 1.05  # 0.5 % of noise
     low, high = found.interval("speed[1]", 0.95)

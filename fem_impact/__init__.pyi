@@ -1,0 +1,57 @@
+"""Public names and their modules: type checkers read them here, and `__init__.py` imports them at first use."""
+
+from . import mesh as mesh
+from ._base.check import SimulationError as SimulationError
+from ._base.check import ToleranceWarning as ToleranceWarning
+from .designs.search import design as design
+from .fe.assembly import assemble as assemble
+from .fe.section import Beam as Beam
+from .fe.section import Elastic as Elastic
+from .fe.section import Material as Material
+from .fe.section import Plate as Plate
+from .impact import spectra as spectra
+from .impact import threshold as threshold
+from .impact.collision import Touch as Touch
+from .impact.collision import collide as collide
+from .impact.contact import Contact as Contact
+from .impact.gradient import Gradient as Gradient
+from .impact.history import Impact as Impact
+from .impact.response import Response as Response
+from .impact.spectra import mobility as mobility
+from .impact.striker import Hand as Hand
+from .impact.striker import Striker as Striker
+from .impact.threshold import threshold_frequency as threshold_frequency
+from .model.planner import Plan as Plan
+from .model.planner import strike as strike
+from .model.playing import strokes as strokes
+from .modes import analytic as analytic
+from .modes.air import in_air as in_air
+from .modes.modal import Modes as Modes
+from .modes.modal import find_modes as find_modes
+from .modes.modal import rayleigh as rayleigh
+from .modes.ritz import ritz_modes as ritz_modes
+from .pages import explore as explore
+from .pages import report as report
+from .scenes.results import load_response as load_response
+from .scenes.scene import Scene as Scene
+from .scenes.scene import load_scene as load_scene
+from .scenes.scene import plan as plan
+from .scenes.uncertainty import spread as spread
+from .show import export as export
+from .show import figures as figures
+from .show import pictures as pictures
+from .show import sound as sound
+from .sweeps import hammers as hammers
+from .sweeps.borders import read_borders as read_borders
+from .sweeps.grid import sweep as sweep
+from .taps.fit import fit as fit
+from .taps.records import Taps as Taps
+from .taps.records import read_taps as read_taps
+from .taps.rig import measure as measure
+from .taps.roving import plan_test as plan_test
+from .taps.transfer import frf as frf
+from .taps.transfer import mac as mac
+from .taps.transfer import matched as matched
+from .taps.update import update as update
+
+__version__: str

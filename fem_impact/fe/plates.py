@@ -1,0 +1,82 @@
+"""What all theories of plates share: triangles that follow the true edge, springs along edges, and tension."""
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+from scipy.sparse import csc_matrix
+
+from .._base.untyped import Cells, Sparse
+from ..mesh.facets import Curves
+from ..mesh.meshes import Mesh
+from .elements import Bent, quadrature, triangles
+from .springs import at_facets, edge_stiffness
+from .supports import SupportedRim, cells_of_facets
+from .theory import Body, Domain, Frame, blocks, gram, scatter
+
+# [-] smallest triangle over the extent below which eigenvalues come from the strain energy: rounding in K grows as the
+# size to the power -2, and larger triangles leave 1e-11
+TINY = 4e-3
+
+
+def domain(body: Body, make_space: Callable[[Cells, Bent | None], Any], names: tuple[str, ...]) -> Domain:
+    """The triangles of a plate in its frame, with shape functions and the section's fields ``names``."""
+    low, high = body.mesh.points.min(axis=0), body.mesh.points.max(axis=0)
+    box = 0.5 * (low + high), float((high - low).max())
+    cells = triangles((body.mesh.points - box[0]) / box[1], body.mesh.cells)
+    bent = _bent(body.mesh, Frame(*box, 1.0, 1.0), cells)
+    space = make_space(cells, bent)
+    return Domain.of(names, body.section, box, cells, space, quadrature(cells, space, bent))
+
+
+def _bent(mesh: Mesh, frame: Frame, cells: Cells) -> Bent | None:
+    """Bending of the triangles at curved facets onto the true edge; None if every edge is straight."""
+    curved = mesh.curved
+    if not curved.any():
+        return None
+    facets, middles = mesh.facets[curved], frame.local(mesh.middles[curved])
+    curves = Curves(cells.p.T[facets], middles, mesh.tangents[curved], mesh.curvatures[curved] * frame.length)
+    return Bent(curves, facets, *cells_of_facets(facets, cells.t.T), cells.t.T)
+
+
+def rim(body: Body, found: Domain, kinds: list[str]) -> SupportedRim:
+    """The boundary of a plate in its frame, with supports of these kinds (n_facets,)."""
+    mesh, length = body.mesh, found.frame.length
+    springs = edge_stiffness(body.held, found.frame)
+    return SupportedRim(mesh.facets, mesh.tangents, mesh.curvatures * length, found.cells.p.T, kinds, springs)
+
+
+def springs(
+    body: Body, found: Domain, dofs: np.ndarray, n_all: int, slopes: Callable[..., np.ndarray] | None = None
+) -> Sparse:
+    """Stiffness (n_all, n_all) of elastic supports and of tension, on unknowns ``dofs`` (n_local, n_cells).
+
+    Elastic supports turn a normal by ``slopes`` (n, 2, n_q, n_local) of cells (n,) at area coordinates (n, n_q, 3) and
+    places (n, n_q, 2); by default these are the slopes of the deflection.
+    """
+    space, frame = found.space, found.frame
+    total, stiffness = csc_matrix((n_all, n_all)), edge_stiffness(body.held, frame)
+    on = np.flatnonzero(stiffness.any(axis=1))
+    if on.size:
+        facets, (push, turn) = body.mesh.facets[on], stiffness[on].T
+        cells = cells_of_facets(facets, space.vertices)[0]
+        area, x, normal = at_facets(space, facets, cells)
+        ds = np.linalg.norm(normal, axis=2)
+        value, slope = space.functions(cells, x, (0, 1))
+        slope = slope if slopes is None else slopes(cells, area, x)
+        across = np.einsum("nqi,niqk->nqk", normal / ds[..., None], slope)
+        pushed = gram(value[:, :, None], push[:, None] * ds) + gram(across[:, :, None], turn[:, None] * ds)
+        total = total + scatter(pushed, dofs[:, cells], n_all)
+    if body.section.tension:
+        if "free" in body.held:
+            raise ValueError("tension needs every edge supported, because a free edge cannot be pulled; add supports")
+        pull = body.section.tension * frame.length**2 / frame.stiffness
+        for cells in blocks(len(found.points.x)):
+            slope = space.functions(cells, found.points.x[cells], (1,))[0].transpose(0, 2, 1, 3)
+            total = total + scatter(gram(slope, pull * found.points.dx[cells]), dofs[:, cells], n_all)
+    return total
+
+
+def is_tiny(found: Domain) -> bool:
+    """Whether the smallest triangle is so small that the stiffness matrix loses digits."""
+    return bool(np.abs(np.linalg.det(found.space.jacobian)).min() < TINY**2)

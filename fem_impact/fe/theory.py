@@ -1,0 +1,260 @@
+"""What a theory of plates or beams consists of, and the one way from it to matrices and strain energies.
+
+A theory is one file that makes a `Theory`, as `kirchhoff`, `thick`, `euler` and `shear_beam` do, and its name in
+`assembly.EVERY`. It says how the elements of a body look (`Domain`), which strains and motions hold energy (`Term`),
+and how supports hold the unknowns (`Held`). What is common follows from these: matrices, point masses and point
+supports, modes, static deflections, derivatives in the section, and errors by a second mesh where the theory has no
+estimate of its own.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+import numpy as np
+from scipy.sparse import coo_matrix, csc_matrix, csr_matrix, eye_array
+
+from .._base import check
+from .._base.untyped import Cells, Sparse
+from ..mesh.meshes import Mesh
+from .section import KINDS, Elastic, directional
+from .supports import SupportedRim
+
+STIFF = "stiffness", "shear"  # fields of a section that resist; the others are inert
+CHUNK = 256  # [-] cells whose shape functions are computed together, to limit memory
+
+
+@dataclass(frozen=True, eq=False)
+class Frame:
+    """The units used for one body, so that its size, position and stiffness do not affect the accuracy."""
+
+    centre: np.ndarray  # (dimension,) [m]
+    length: float  # [m]
+    stiffness: float  # [N m] on a plate, [N m^2] on a beam
+    inertia: float  # [kg/m^2] on a plate, [kg/m] on a beam
+
+    @property
+    def rate(self) -> float:
+        """Angular frequency [rad/s] of an eigenvalue 1 in the frame."""
+        return float(np.sqrt(self.stiffness / self.inertia) / self.length**2)
+
+    @property
+    def mass(self) -> float:
+        """Mass [kg] of a mass 1 in the frame."""
+        return float(self.inertia * self.length ** len(self.centre))
+
+    def local(self, points: np.ndarray) -> np.ndarray:
+        """Coordinates [-] in the frame of points [m]."""
+        return (points - self.centre) / self.length
+
+    def places(self, local: np.ndarray) -> np.ndarray:
+        """Points (n, dimension) [m] at coordinates (..., dimension) in the frame; on a beam never beyond its ends."""
+        points = self.centre + self.length * local.reshape(-1, len(self.centre))
+        if len(self.centre) > 1:
+            return points
+        return points.clip(self.centre - 0.5 * self.length, self.centre + 0.5 * self.length)
+
+    def field(self, section: Any, name: str, local: np.ndarray) -> np.ndarray:
+        """A section's "stiffness", "shear", "inertia" or "rotary" at coordinates (n, n_q, dimension), in the frame."""
+        unit = self.stiffness if name in STIFF else self.inertia
+        square = {"shear": self.length**-2, "rotary": self.length**2}.get(name, 1.0)
+        found = getattr(section, name)(self.places(local)) / (unit * square)
+        return found.reshape(*local.shape[:2], *found.shape[1:])
+
+
+class Points(NamedTuple):
+    """A quadrature on every cell."""
+
+    reference: np.ndarray  # (dimension, n_q) in the reference cell
+    x: np.ndarray  # (n_cells, n_q, dimension) in the frame
+    dx: np.ndarray  # (n_cells, n_q) weights
+
+
+class Term(NamedTuple):
+    """A part of the energy: half the integral of ``parts . field . parts`` over the body."""
+
+    matrix: str  # "K" if it is strain energy, "M" if kinetic
+    field: str  # of the section: "stiffness", "shear", "inertia" or "rotary"
+    parts: np.ndarray  # (n_cells, n_q, n_parts, n_local) strains or motions by each unknown
+
+
+@dataclass(frozen=True, eq=False)
+class Body:
+    """What a theory is asked to describe."""
+
+    mesh: Mesh
+    section: Any
+    held: Sequence[str | Elastic]  # (n_facets,) supports
+    marked: np.ndarray  # (n, dimension) [m] points where forces act
+
+    @property
+    def kinds(self) -> list[str]:
+        """The kind of support of each facet."""
+        return plain_kinds(self.held)
+
+
+@dataclass(frozen=True, eq=False)
+class Domain:
+    """The elements of a body, their shape functions, and its section at the points of a quadrature."""
+
+    cells: Cells  # scikit-fem's mesh, in the frame
+    space: Any  # shape functions
+    frame: Frame
+    points: Points
+    fields: dict[str, np.ndarray]  # name -> (n_cells, n_q) or (n_cells, n_q, m, m) in the frame, times the weights
+    softness: float  # [-] largest inertia over stiffness in any direction, in the frame
+
+    @classmethod
+    def of(
+        cls, names: Sequence[str], section: Any, box: tuple[np.ndarray, float], cells: Cells, space: Any, points: Points
+    ) -> "Domain":
+        """That of a section, by its fields ``names``; ``box`` are the centre [m] and largest side [m] of the body."""
+        bare = Frame(*box, 1.0, 1.0)
+        fields = {name: bare.field(section, name, points.x) for name in names}
+        frame = Frame(*box, float(fields["stiffness"].max()), float(fields["inertia"].max()))
+        for name, values in fields.items():
+            fields[name] = values / (frame.stiffness if name in STIFF else frame.inertia)
+        stiffness, inertia, soft = fields["stiffness"], fields["inertia"], 1.0
+        if stiffness.ndim > 2:
+            plane = section.material.plane_stress
+            stiffness, soft = stiffness[..., 0, 0], plane[0, 0] / directional(plane).min()
+        softness = float((inertia / stiffness).max() * soft)
+        dx = points.dx
+        weighted = {name: each * dx.reshape(*dx.shape, *[1] * (each.ndim - 2)) for name, each in fields.items()}
+        return cls(cells, space, frame, points, weighted, softness)
+
+
+class Held(NamedTuple):
+    """How supports hold the unknowns; all there are is what the elements have without them."""
+
+    expand: Any  # sparse (n_all, n_dofs) from the unknowns left free to all
+    project: Any  # sparse (n_dofs, n_all) left inverse of that
+    dofs: np.ndarray  # (n_local, n_cells) numbers of the unknowns of each cell, among all
+    springs: Any  # sparse (n_all, n_all) stiffness of elastic supports and tension
+    rim: SupportedRim | None = None  # of a plate
+
+
+@dataclass(frozen=True)
+class Theory:
+    """A theory of plates or beams and the elements for it."""
+
+    name: str
+    element: str
+    dimension: int
+    domain: Callable[[Body, tuple[str, ...]], Domain]  # with these fields of the section
+    terms: Callable[[Any, Points, np.ndarray], list[Term]]  # of a space in some cells (n,)
+    hold: Callable[[Body, Domain], Held]
+    # (3, n) errors of the squared energy norm of solutions: arguments as in `residual.energy_errors`
+    errors: Callable[..., np.ndarray]
+    wave: float  # [rad] largest wavenumber times element size: error 1e-5, 1e-12 on beams
+    unknowns: float  # [-] of an element per square, or length, of its size
+    fields: tuple[str, ...] = ("stiffness", "inertia")  # of the section, that its terms weigh with
+    matrices: Callable[[Body, Domain], tuple[np.ndarray, np.ndarray]] | None = None  # where quicker than by `terms`
+    words: tuple[str, ...] = KINDS  # supports of an edge, besides `Elastic`
+    graded: bool = False  # whether triangles shrink to corners, points and layers
+    compared: bool = False  # whether its errors need a second mesh, in addition to ``errors``
+    patch: float = 0.0  # [-] radius over which a force at a point is spread, over the thickness
+    # whether K is so rounded that the strain energy is computed from strains
+    sharp: Callable[[Domain], bool] | None = None
+    # the mesh with triangles that resolve the layers at edges of these supports (n_facets,), coarser by a factor
+    layered: Callable[[Mesh, Any, list[str], float], Mesh] | None = None
+
+    @property
+    def thick(self) -> bool:
+        """Whether shear and rotary inertia count."""
+        return "shear" in self.fields
+
+
+def plain_kinds(supports: Sequence[str | Elastic]) -> list[str]:
+    """The kind of support of each facet; an elastic support counts as free because it only adds stiffness."""
+    return ["free" if isinstance(kind, Elastic) else kind for kind in supports]
+
+
+def gram(parts: np.ndarray, weight: np.ndarray) -> np.ndarray:
+    """Sum (n, k, k) over the points of a quadrature of ``parts.T @ weight @ parts``, parts (n, n_q, m, k).
+
+    The weight is a number at each point, (n, n_q), or a matrix, (n, n_q, m, m).
+    """
+    weighted = weight @ parts if weight.ndim == parts.ndim else weight[..., None, None] * parts
+    n, k = len(parts), parts.shape[-1]
+    return parts.reshape(n, -1, k).transpose(0, 2, 1) @ weighted.reshape(n, -1, k)
+
+
+def kept_unknowns(fixed: np.ndarray) -> tuple[csr_matrix, csr_matrix]:
+    """Maps of `Held` that leave out the unknowns ``fixed`` (n_all,) bool."""
+    expand = eye_array(len(fixed), format="csr")[:, np.flatnonzero(~fixed)]
+    return csr_matrix(expand), csr_matrix(expand.T)
+
+
+def unknowns_of_cells(system: Any, vectors: np.ndarray) -> np.ndarray:
+    """Unknowns (n_cells, n_local, n) of each cell, from those of fields (n_dofs, n)."""
+    return (system.expand @ vectors)[system.element_dofs].transpose(1, 0, 2)
+
+
+def blocks(n: int) -> list[np.ndarray]:
+    """Numbers of n cells in blocks, to limit memory."""
+    return np.array_split(np.arange(n), max(1, -(-n // CHUNK)))
+
+
+def integrals(theory: Theory, domain: Domain, cells: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Stiffness and mass (n, n_local, n_local) of cells (n,) from the terms of a theory."""
+    found: dict[str, list[np.ndarray]] = {"K": [], "M": []}
+    for block in blocks(len(cells)):
+        local: dict[str, Any] = {"K": 0.0, "M": 0.0}
+        for matrix, name, parts in theory.terms(domain.space, domain.points, cells[block]):
+            local[matrix] = local[matrix] + gram(parts, domain.fields[name][cells[block]])
+        for matrix, values in local.items():
+            found[matrix].append(values)
+    return np.concatenate(found["K"]), np.concatenate(found["M"])
+
+
+def scatter(local: np.ndarray, element_dofs: np.ndarray, n_all: int) -> csc_matrix:
+    """Add element matrices (n_cells, n_local, n_local) into a sparse one (n_all, n_all)."""
+    rows = np.broadcast_to(element_dofs.T[:, :, None], local.shape)
+    columns = np.broadcast_to(element_dofs.T[:, None, :], local.shape)
+    held = local != 0.0  # drop the zeros between bubbles of a beam
+    return coo_matrix((local[held], (rows[held], columns[held])), shape=(n_all, n_all)).tocsc()
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Strain(check.Brief):
+    """Data to compute the strain energy of a plate from strains, where triangles are so small that K loses digits.
+
+    The stiffness of a triangle grows with its size to the power -2, so the rounding of K in the smallest triangles
+    affects the total energy. Curvature squared times area is equally accurate in all triangles.
+    """
+
+    domain: Domain
+    springs: Sparse  # (n_all, n_all) stiffness of elastic supports and tension
+
+    def energy(self, system: Any, vectors: np.ndarray) -> np.ndarray:
+        """Twice the strain energy (n_modes,) of vectors (n_dofs, n_modes)."""
+        return self._sum(system, vectors, "nqik,nqik->k")
+
+    def products(self, system: Any, vectors: np.ndarray) -> np.ndarray:
+        """Twice the mutual strain energy (n, n) of all pairs of vectors (n_dofs, n)."""
+        return self._sum(system, vectors, "nqik,nqil->kl")
+
+    def around(self, system: Any, vectors: np.ndarray, vertex: int) -> np.ndarray:
+        """Twice the strain energy (n_modes,) in the ring of triangles around those that touch a vertex of the mesh."""
+        corners, x = self.domain.space.vertices, self.domain.points.x
+        touching = (corners == vertex).any(axis=1)
+        ring = np.isin(corners, corners[touching]).any(axis=1) & ~touching
+        far = np.linalg.norm(x.mean(axis=1) - x[touching].mean(axis=(0, 1)), axis=1)
+        ring &= far < 4.0 * far[touching].max()  # not the neighbours of its outer vertices, where one ring is all
+        return self._of_cells(system, system.expand @ vectors, np.flatnonzero(ring), "nqik,nqik->k")
+
+    def _of_cells(self, system: Any, moved: np.ndarray, cells: np.ndarray, pairs: str) -> np.ndarray:
+        """The same from all unknowns (n_all, n) of some cells (n_cells,)."""
+        own = moved[system.element_dofs[:, cells].T][:, None]
+        total: Any = 0.0
+        for matrix, name, parts in system.rules.terms(self.domain.space, self.domain.points, cells):
+            if matrix == "K":
+                strained = parts @ own
+                total = total + np.einsum(pairs, self.domain.fields[name][cells] @ strained, strained)
+        return total
+
+    def _sum(self, system: Any, vectors: np.ndarray, pairs: str) -> np.ndarray:
+        moved = system.expand @ vectors
+        total = np.einsum(pairs.replace("nqi", "n"), moved, self.springs @ moved)
+        return total + sum(self._of_cells(system, moved, cells, pairs) for cells in blocks(len(self.domain.points.x)))

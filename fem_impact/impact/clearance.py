@@ -1,0 +1,82 @@
+"""Whether a striker touches a body once: the smallest gap after its first impact, and what changes it.
+
+The bodies fly on from the first release as if they could not touch again. How near they come, or how deep they would
+overlap, is smooth in all numbers, while a count of impacts jumps.
+"""
+
+from collections.abc import Mapping
+from dataclasses import replace
+
+import numpy as np
+from scipy.optimize import brentq
+
+from .._base.check import SimulationError
+from ..fe.variation import SectionChange
+from .compiled import record
+from .engine import LOOKS
+from .gradient import differences
+from .history import History
+from .parameters import Parameters
+from .response import Response
+
+FAR = 1.0  # [-] clearance of bodies that never approach again, and the largest told
+
+
+def nearest(hit: Response) -> tuple[float, float | None]:
+    """Clearance [-] and when it is smallest [s]; None if it is larger than `FAR`.
+
+    The clearance is the smallest gap after the first impact over the way that the striker goes in the time of that
+    impact at the speed of its arrival; below zero the bodies would touch again, and below -1 its logarithm is told.
+    """
+    history = _released(hit)
+    duration = hit.impacts[0].duration
+    scale = hit.speed * duration
+    free = replace(history, start_q=history.end_q, start_p=history.end_p, steps=history.steps[:0])
+    span = _span(history, scale)
+    count = int(np.clip(LOOKS[0] * span / duration, *LOOKS))
+    times = np.linspace(0.0, span, count + 1)
+    d, v = _approach(free, times)
+    turns = np.flatnonzero((v[:-1] > 0.0) & (v[1:] <= 0.0))
+    if not len(turns):
+        return FAR, None
+    first = int(turns[np.argmax(np.maximum(d[turns], d[turns + 1]))])
+    when = float(
+        brentq(lambda time: _approach(free, np.array([time]))[1][0], times[first], times[first + 1], xtol=1e-12 * span)
+    )
+    gap = -float(_approach(free, np.array([when]))[0][0]) / scale
+    if gap >= FAR:
+        return FAR, None
+    return (gap if gap > -1.0 else -1.0 - np.log(-gap)), history.end_time + when
+
+
+def slopes(hit: Response, names: tuple[str, ...], sections: Mapping[str, tuple[float, SectionChange]]) -> np.ndarray:
+    """Derivatives (n,) of the clearance in numbers of the blow."""
+    if nearest(hit)[1] is None:
+        return np.zeros(len(names))
+    return differences(Parameters(hit, sections), names, lambda blow: [nearest(blow)[0]])[0][0]
+
+
+def _released(hit: Response) -> History:
+    """The history of a run that ended with its first impact; SimulationError for others."""
+    if hit.n_impacts != 1 or hit.history.status == record.HORIZON:
+        raise SimulationError("no clearance: the blow must end with its first impact; give max_impacts = 1")
+    return hit.history
+
+
+def _span(history: History, scale: float) -> float:
+    """How long the modes together can bring the surfaces within `FAR` of each other [s]."""
+    rigid, shape = history.omega == 0.0, history.shape[0]
+    size = np.hypot(history.end_q, history.end_p / np.where(rigid, 1.0, history.omega))
+    reach = float(np.abs(shape[~rigid]) @ size[~rigid]) + abs(float(history.offset[0]))
+    reach += abs(float(shape[rigid] @ history.end_q[rigid])) + FAR * scale
+    apart = -float(shape[rigid] @ history.end_p[rigid])  # [m/s]
+    slowest = history.omega[~rigid].min(initial=np.inf)
+    cycles = 2.0 * np.pi / slowest if np.isfinite(slowest) else 0.0
+    duration = float(history.contacts[0, 1] - history.contacts[0, 0])
+    return max(duration, min(reach / apart, 1e3 * duration + cycles)) if apart > 0.0 else 1e3 * duration + cycles
+
+
+def _approach(free: History, times: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Approach [m] and its rate [m/s] of free bodies at times, (n_times,) each."""
+    q, p = free.states(times)
+    return free.offset[0] + q @ free.shape[0], p @ free.shape[0]

@@ -1,0 +1,125 @@
+"""How a body moves in and after a blow: by its modes in the run, or by others that the force found makes ring."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from itertools import pairwise
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ..modes.modal import Modes, SampledShapes
+from ..modes.stretching import stretch
+from .history import History
+from .reduced_body import Ends
+
+if TYPE_CHECKING:
+    from .response import Response
+
+# [-] two descriptions of one body may differ by this in mass and compliance: meshes do by less, other bodies by more
+ONE_BODY = 1e-2
+# [-] largest difference of descriptions up to which Ritz vectors tell a motion: as much as modes err that are found
+# as far as the force reaches
+MOVED = {"displacement": 1e-2, "velocity": 3e-2}
+LASTS = 2.0  # [-] and no longer than this many times the run, as later echoes may be missing from all of them
+LOOKED_AT = 200  # [-] times at which this error is estimated, evenly among those asked for; more only cost time
+
+
+@dataclass(frozen=True, eq=False)
+class BodyMotion:
+    """The motion of one body of a blow."""
+
+    modes: Modes
+    history: History  # that holds the motion of these modes
+    part: slice  # their columns in it
+    ends: Ends | None  # where forces act on it; None if nothing is left out there that yields
+
+    def states(self, times: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Modal displacements and velocities (n_times, n_modes) at times (n_times,) in any order."""
+        order = np.argsort(times, kind="stable")
+        q, p = (state[:, self.part] for state in self.history.states(times[order]))
+        if np.all(order[:-1] < order[1:]):
+            return q, p
+        back = np.argsort(order)
+        return q[back], p[back]
+
+    def at(self, points: Any, times: np.ndarray, rate: bool = False, residual: bool = True) -> np.ndarray:
+        """Displacement [m], or its rate [m/s], (n_times, n_points)."""
+        motion = self.states(times)[rate] @ self.modes.shape_at(points).T  # (n_times, n_modes) @ (n_modes, n_points)
+        if self.ends is None or not residual:
+            return np.asarray(motion)
+        return np.asarray(motion + self._dip(self.ends, points, times, rate))
+
+    def _dip(self, ends: Ends, points: Any, times: np.ndarray, rate: bool) -> Any:
+        """Static deflection [m] of the left-out modes, or its rate [m/s], (n_times, n_points); 0 without a force."""
+        modes, asked = self.modes, self.modes.points("points", points)
+        force = np.stack([-sign * self.history.force_at(times, i)[rate] for i, sign in ends.touched], axis=1)
+        if not rate:
+            force[:, 0] += ends.dip_force
+        if not force.any() or not len(asked):
+            return 0.0
+        swings = modes.omega > 0.0
+        pushed, moved = (modes.shapes.at(place)[:, swings] / modes.omega[swings] for place in (ends.points, asked))
+        rest = modes.shapes.deflection(ends.points, asked) - moved @ pushed.T  # (n_points, n_ends)
+        return force @ rest.T
+
+
+def of_run(hit: "Response", body: int) -> BodyMotion:
+    """The motion of a body by the modes that carried the blow."""
+    ends = hit.ends[body] if hit.ends and hit.ends[body].rest.any() else None
+    return BodyMotion(hit.bodies[body], hit.history, hit.body_slice(body), ends)
+
+
+def driven(hit: "Response", modes: Modes) -> BodyMotion:
+    """The motion of the target, at rest before the blow, by other modes under the force found."""
+    assert hit.at is not None
+    still, push, history = np.zeros(modes.n_modes), constant_force(hit), hit.history
+    shape = -modes.shape_at(hit.at[None])
+    start = {"start_q": still, "start_p": still, "end_q": still, "end_p": still, "bias": -push * shape[0]}
+    if history.stretched is not None:
+        history = replace(history, stretched=replace(history.stretched, forms=stretch(modes).forms, first=0))
+    history = replace(history, omega=modes.omega, zeta=modes.damping_ratio, shape=shape, **start)
+    ends = Ends(hit.at[None], ((0, -1.0),), push, np.zeros((1, 1)), dip_force=push)
+    return BodyMotion(modes, history, slice(None), ends)
+
+
+def constant_force(hit: "Response") -> float:
+    """Constant force [N] on the target at the strike point."""
+    part = hit.body_slice(len(hit.bodies) - 1)
+    row = hit.history.shape[0, part]
+    return -float(hit.history.bias[part] @ row) / (float(row @ row) or 1.0)
+
+
+def check_same_body(hit: "Response", modes: Modes) -> None:
+    """Raise ValueError unless modes may tell the motion of the target of a blow."""
+    if hit.at is None:
+        raise ValueError("on needs a blow of `strike`, with one strike point")
+    if hit.moving:
+        raise ValueError("on needs a blow on a body at rest: only its own modes know how this one moved before")
+    point = modes.point("at", hit.at)
+    struck = hit.bodies[-1]
+    whole, softness = struck.shapes.compliance(point)[0, 0], modes.shapes.compliance(point)[0, 0]
+    sampled = isinstance(modes.shapes, SampledShapes)  # it may not know the modes left out
+    if not np.isclose(modes.mass, struck.mass, rtol=ONE_BODY) or not (
+        sampled or np.isclose(softness, whole, rtol=ONE_BODY)
+    ):
+        raise ValueError(
+            f"modes must be of the body struck, {struck.mass:g} kg that yield {whole:.4g} m/N, got "
+            f"{modes.mass:g} kg and {softness:.4g} m/N"
+        )
+
+
+def largest_difference(
+    descriptions: Sequence[BodyMotion], points: Any, times: np.ndarray, rate: bool, until: float
+) -> float:
+    """Largest difference [-] of the motions that descriptions of a body tell, over the largest motion.
+
+    Infinite for a single description, and long after the end of the run, ``until`` [s].
+    """
+    if len(descriptions) < 2 or (times.size and times.max() > LASTS * until):
+        return float("inf")
+    if len(times) > LOOKED_AT:
+        times = times[np.linspace(0, len(times) - 1, LOOKED_AT).astype(int)]
+    motions = [each.at(points, times, rate) for each in descriptions]
+    largest = float(np.abs(motions[0]).max(initial=0.0))
+    apart = sum(float(np.abs(one - other).max(initial=0.0)) for one, other in pairwise(motions))
+    return apart / largest if largest else 0.0

@@ -1,0 +1,114 @@
+"""Serves the live page on this machine only, by tornado, which is loaded where a page is served."""
+
+import json
+import logging
+import socket
+from contextlib import suppress
+from typing import Any
+
+from tornado.httpserver import HTTPServer
+from tornado.routing import Router
+from tornado.web import Application, RequestHandler
+from tornado.websocket import WebSocketClosedError, WebSocketHandler
+
+from .._base import check
+from . import report
+from .explore_numbers import Explorer
+from .explore_session import Session
+from .explore_view import page, parsed
+from .explore_worker import Worker
+
+LOG = logging.getLogger(__name__)
+LOCAL = "127.0.0.1"
+LARGEST_REQUEST = 64 * 1024  # [byte] of a request or a message: a slider's value takes a few hundred, headers 2 000
+POLICY = {  # what the page may load and where it may send: nothing but its own parts, pictures and sounds made here
+    "default-src": "'none'", "script-src": "'self'", "style-src": "'self'", "connect-src": "'self'",
+    "img-src": "data:", "media-src": "data:", "base-uri": "'none'", "form-action": "'none'",
+    "frame-ancestors": "'none'",
+}  # fmt: skip
+
+
+class Text(RequestHandler):
+    """One of the three files of the page."""
+
+    def initialize(self, kind: str, text: str) -> None:
+        self.kind, self.text = kind, text
+
+    def get(self) -> None:
+        self.set_header("Content-Type", f"text/{self.kind}; charset=utf-8")
+        self.set_header("Content-Security-Policy", "; ".join(map(" ".join, POLICY.items())))
+        self.set_header("Cache-Control", "no-store")
+        self.finish(self.text)
+
+
+class Talk(WebSocketHandler):
+    """The connection that an open page keeps."""
+
+    def initialize(self, hosts: set[str], explorer: Explorer, workers: list[Worker]) -> None:
+        self.hosts, self.explorer, self.workers = hosts, explorer, workers
+
+    def check_origin(self, origin: str) -> bool:
+        return origin.lower() in {f"http://{host}" for host in self.hosts}
+
+    def open(self, *_: str, **__: str) -> None:
+        self.set_nodelay(True)
+        self.session = Session(self.explorer, self.workers[0], self.workers[1], self._say)
+
+    def on_message(self, message: str | bytes) -> None:
+        if self.session.closed:
+            return
+        try:
+            self.session.take(parsed(message))
+        except ValueError as error:  # no page of ours sends this
+            LOG.warning("a page is refused: %s", check.line(str(error)))
+            self.session.close()
+            self.close(1003, str(error)[:120])
+
+    def on_close(self) -> None:
+        if not self.session.closed:
+            LOG.info("a page has gone")
+        self.session.close()
+
+    def _say(self, message: dict[str, Any]) -> None:
+        with suppress(WebSocketClosedError):
+            sent: Any = self.write_message(json.dumps(message))
+            sent.add_done_callback(lambda sent: sent.cancelled() or sent.exception())  # it may go before it listens
+
+
+class Refused(RequestHandler):
+    """Refuses other host names: with one of its own, a foreign site could make the browser read this page."""
+
+    def prepare(self) -> None:
+        self.set_status(403)
+        self.finish("This page is served to 127.0.0.1 and localhost only.\n")
+
+
+class Guard(Router):
+    """Leads to the page those who ask for this machine by its name."""
+
+    def __init__(self, application: Application, hosts: set[str]) -> None:
+        self.application, self.hosts = application, hosts
+
+    def find_handler(self, request: Any, **kwargs: Any) -> Any:
+        if request.headers.get("Host", "").lower() in self.hosts:
+            return self.application.find_handler(request, **kwargs)
+        return self.application.get_handler_delegate(request, Refused)
+
+
+def begin(explorer: Explorer, workers: list[Worker], port: int) -> tuple[HTTPServer, str]:
+    """A server on the loopback address, and its address; port 0 is any free one."""
+    listening = socket.create_server((LOCAL, port))
+    listening.setblocking(False)
+    port = listening.getsockname()[1]
+    hosts = {f"{name}:{port}" for name in (LOCAL, "localhost")}
+    parts = {"/": ("html", page(explorer.setup))}
+    for name, kind in (("explore.css", "css"), ("explore.js", "javascript")):
+        parts[f"/{name}"] = kind, (report.WEB / name).read_text(encoding="utf-8")
+    application = Application(
+        [*((path, Text, {"kind": kind, "text": text}) for path, (kind, text) in parts.items()),
+         ("/talk", Talk, {"hosts": hosts, "explorer": explorer, "workers": workers})],
+        websocket_max_message_size=LARGEST_REQUEST,
+    )  # fmt: skip
+    http = HTTPServer(Guard(application, hosts), max_body_size=LARGEST_REQUEST, max_header_size=LARGEST_REQUEST // 4)
+    http.add_socket(listening)
+    return http, f"http://{LOCAL}:{port}/"

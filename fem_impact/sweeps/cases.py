@@ -1,0 +1,353 @@
+"""A table of blows: maps, spreads, borders and choices of a hammer are rows of changes of one blow, solved alike."""
+
+import logging
+import math
+import os
+from collections.abc import Callable, Mapping
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, field, replace
+from functools import cached_property, partial
+from typing import Any
+
+import numpy as np
+
+from .._base.check import SimulationError
+from .._base.rounding import ROUNDING
+from ..impact.collision import strike
+from ..impact.response import Response
+from ..model.audit import audited
+from ..modes.modal import Modes
+from . import batches
+from .cells import ALONE, FAMILY_AXES, Case
+from .store import LARGEST_BLOCK, Texts, Watch, block_size, by_cluster, by_store
+
+LOG = logging.getLogger(__name__)
+LAYERS: dict[str, tuple[str, str]] = {  # name: unit, what it is
+    "n_impacts": ("", "number of separate contacts"),
+    "contact_time": ("s", "total contact time"),
+    "restitution": ("", "minus the speed after the blow over the speed before, at the contact point; NaN in contact"),
+    "impulse": ("N s", "total impulse of the contact force"),
+    "peak_force": ("N", "largest contact force"),
+    "error": ("", "estimated time-step error: absolute for restitution, relative for the others"),
+    "centroid": ("Hz", "mean frequency, weighted by the magnitude of the force spectrum"),
+}
+POWERS = {"contact_time": -1.0, "impulse": 1.0, "peak_force": 2.0, "centroid": 1.0}  # of a unit of time, see `Cases`
+FAMILIES = 256  # [-] most pairs of bodies of rows that need kernels of their own: some 5 ms each
+BANDS = 64  # [-] most upper ends of the centroid's band; rows between share them, so that few kernels are needed
+
+
+@dataclass(frozen=True, eq=False)
+class Cases:
+    """The blow that all cases share, and what is different in each: every combination of values, or row by row.
+
+    Of rows, the numbers that need kernels of their own (strike point, damping, and the frequency of a flexible striker
+    over that of the body) must take few values, see `few`. The body's frequency is free there: with time in units of
+    its period the blow on a body r times as high is that on the body itself, of stiffness over r squared and speed
+    over r.
+    """
+
+    base: Case
+    axes: Mapping[str, np.ndarray]  # name in `cells.AXES`: (n,) values, for `at` (n, dimension)
+    tolerance: float  # [-]
+    residual: bool = True
+    band: float | None = None  # [Hz] upper end of the centroid's band
+    extra: Mapping[str, Callable[[Response], float]] = field(default_factory=dict)  # additional layers
+    by_row: bool = False  # whether all axes are columns of one table, as long as each other, and not to be combined
+    max_impacts: int | None = None  # what follows does not matter where cases are computed alone
+    chosen: np.ndarray | None = None  # (n_cases,) combinations to compute, numbered with the last axis fastest
+    kernels: batches.Kernels = field(default_factory=dict)  # computed so far
+
+    @property
+    def shape(self) -> tuple[int, ...]:
+        sizes = tuple(len(values) for values in self.axes.values())
+        return sizes[:1] if self.by_row else sizes
+
+    @property
+    def n_cases(self) -> int:
+        return math.prod(self.shape) if self.chosen is None else len(self.chosen)
+
+    @property
+    def lossy(self) -> bool:
+        """Whether any contact loses energy."""
+        return bool(self.base.contact.lossy or {"loss", "yield_approach", "hysteresis"} & set(self.axes))
+
+    @property
+    def quick(self) -> bool:
+        """Whether all cases are computed together."""
+        exponents = self.axes.get("exponent", [self.base.contact.exponent])
+        layered = self.base.contact.hard_stiffness or "hard_stiffness" in self.axes
+        alone = self.lossy or layered or self.extra or self.base.modes.stretches
+        return not alone and min(exponents) >= 1.0
+
+    @property
+    def layers(self) -> list[str]:
+        """Names of the numbers computed of each case."""
+        return [name for name in LAYERS if name != "centroid" or self.band is not None] + list(self.extra)
+
+    @property
+    def places(self) -> np.ndarray:
+        """The strike points that occur, (n_points, dimension) [m]."""
+        return np.unique(self.axes["at"], axis=0) if "at" in self.axes else self.base.at[None]
+
+    def cells(self, start: int, stop: int) -> np.ndarray:
+        """Numbers of some of the cases to compute, (n_cells,)."""
+        return np.arange(start, stop) if self.chosen is None else self.chosen[start:stop]
+
+    def numbered(self, start: int, stop: int) -> dict[str, np.ndarray]:
+        """Which value of each axis some of the cases have, (n_cells,) each."""
+        cells = self.cells(start, stop)
+        return dict(zip(self.axes, [cells] * len(self.axes) if self.by_row else np.unravel_index(cells, self.shape)))
+
+    def case(self, index: int) -> Case:
+        """One blow."""
+        numbered = self.numbered(index, index + 1)
+        return self.base.with_values({name: self.axes[name][i[0]] for name, i in numbered.items()})
+
+    def blow(self, index: int) -> Response:
+        """One blow by the modal engine."""
+        return self.strike(self.case(index))
+
+    def strike(self, case: Case) -> Response:
+        """A blow by the modal engine, to the tolerance of the table."""
+        hit = strike(
+            case.modes, case.striker, case.contact, at=case.at, speed=case.speed,
+            tolerance=self.tolerance, residual=self.residual, max_impacts=self.max_impacts,
+        )  # fmt: skip
+        return audited(hit)
+
+    def row(self, hit: Response) -> np.ndarray:
+        """The layers (n_layers,) of one blow."""
+        row = [hit.n_impacts, hit.contact_time, hit.restitution, hit.impulse, hit.peak_force, hit.error.step]
+        row += [hit.spectral_centroid(self.band)] if self.band is not None else []
+        return np.array(row + [function(hit) for function in self.extra.values()], float)
+
+    def scene(self) -> dict[str, Any]:
+        """The blow that all cases share, as plain numbers, and which cells these are if not all."""
+        case = self.base
+        return {
+            "target": _plain(case.modes, case.at),
+            "striker": _plain(case.striker.modes, case.striker.at),
+            "contact": dict(vars(case.contact)),
+            "speed": case.speed,
+        } | ({} if self.chosen is None else {"cells": self.chosen.tolist()})
+
+    def sampled(self) -> "Cases":
+        """The same cases with each body reduced to its contact points: small enough to send to a cluster."""
+        if self.base.modes.stretches:
+            return replace(self, kernels={})  # slopes are not known from points
+        return replace(self, base=self.base.sampled(self.places), kernels={})
+
+    def without_speed(self) -> "Cases | None":
+        """The cases at one speed if every contact is linear, so that speed only scales the forces; otherwise None."""
+        exponents = self.axes.get("exponent", np.array([self.base.contact.exponent]))
+        preloaded = self.base.contact.gap or "gap" in self.axes
+        if "speed" not in self.axes or (exponents != 1.0).any() or not self.quick or preloaded:
+            return None
+        return replace(self, axes={**self.axes, "speed": self.axes["speed"][:1]})
+
+    @cached_property
+    def ratio(self) -> np.ndarray:
+        """Factor (n_rows,) [-] by which the frequencies of the struck body are raised: its period is the unit."""
+        if "target_frequency" not in self.axes:
+            return np.ones(self.n_cases)
+        return self.axes["target_frequency"] / self.base.first_frequency
+
+    @cached_property
+    def pairs(self) -> tuple[np.ndarray, np.ndarray]:
+        """Number of the pair of bodies of each row (n_rows,), and one row of each pair (n_pairs,)."""
+        columns: list[Any] = [np.zeros(self.n_cases)]
+        if self.base.striker.modes.omega.any():
+            columns.append(np.log(self.axes.get("striker_frequency", 1.0) / self.ratio))
+        columns += [*self.axes["at"].T] if "at" in self.axes else []
+        columns += [self.axes["damping_ratio"]] if "damping_ratio" in self.axes else []
+        columns += [self.axes["loss"] > 0.0] if "loss" in self.axes else []
+        numbers = [_ranks(np.asarray(column, float)) for column in columns]
+        _, one, which = np.unique(np.column_stack(numbers), axis=0, return_index=True, return_inverse=True)
+        return which.reshape(-1), one
+
+    def families(
+        self, numbered: Mapping[str, np.ndarray], loss: np.ndarray
+    ) -> tuple[dict[int, batches.Family], np.ndarray]:
+        """The pairs of bodies of some cases by number, and that of each case (n_cells,)."""
+        if self.by_row:
+            which, one = self.pairs
+            kind = which[next(iter(numbered.values()))]
+        else:
+            kind = np.zeros(len(loss), int)
+            for name in FAMILY_AXES:
+                if name in numbered:
+                    kind = kind * len(self.axes[name]) + numbered[name]
+            kind = 2 * kind + (loss > 0.0)
+        found = {}
+        for number, i in zip(*np.unique(kind, return_index=True)):
+            # nothing else of the case, so that no block is rounded differently
+            some = {name: index[i] for name, index in numbered.items() if name in FAMILY_AXES}
+            some = dict.fromkeys(some, one[number]) if self.by_row else some
+            found[int(number)] = self._family(some, bool(loss[i] > 0.0))
+        return found, kind
+
+    def _family(self, numbered: Mapping[str, int], lossy: bool) -> batches.Family:
+        """The pair of bodies with some values, of rows with time in units of the struck body's period."""
+        values = {name: self.axes[name][i] for name, i in numbered.items()}
+        raised = 1.0
+        if self.by_row and values.pop("target_frequency", None) is not None:
+            raised = float(self.ratio[numbered["target_frequency"]])
+        case = self.base.with_values(values)
+        striker = case.striker
+        if raised != 1.0 and striker.modes.omega.any():
+            striker = replace(striker, modes=striker.modes.stretched(1.0, 1.0 / raised))
+        return batches.Family.of(case.modes, case.at, striker, self.residual, lossy)
+
+    def bands(self, ratio: np.ndarray) -> np.ndarray:
+        """Upper end of the centroid's band in units of the period of each body (n_cells,) [Hz]; few different ones."""
+        if self.band is None:
+            return np.zeros(len(ratio))
+        log = np.log(ratio)
+        width = np.ptp(log) / BANDS
+        return self.band / np.exp(width * np.round(log / width) if width > ROUNDING else log)
+
+
+def _plain(modes: Modes, at: np.ndarray) -> dict[str, Any]:
+    """A body and its contact point as plain numbers."""
+    place = at[None]
+    return {
+        "mass": modes.mass,
+        "frequencies": modes.frequencies.tolist(),
+        "damping_ratios": modes.damping_ratio.tolist(),
+        "at": at.tolist(),
+        "shape": modes.shape_at(place)[0].tolist(),
+        "residual_compliance": float(modes.residual_compliance(place)[0, 0]),
+    }
+
+
+def _ranks(column: np.ndarray) -> np.ndarray:
+    """Whole numbers (n,) that are equal where values are, up to rounding."""
+    order = np.argsort(column, kind="stable")
+    ascending = column[order]
+    steps = np.diff(ascending) > ROUNDING * np.maximum(1.0, np.abs(ascending[1:]))
+    ranks = np.empty(len(column), int)
+    ranks[order] = np.concatenate([[0], np.cumsum(steps)])
+    return ranks
+
+
+def few(cases: Cases) -> Cases:
+    """The same rows with few values of what needs kernels of its own: each value becomes the nearest level.
+
+    All dimensions that need kernels get equally many levels, each for as many rows as any other, at most `FAMILIES`
+    together. The levels are means of their rows, so that means over all rows stay what they were.
+    """
+    base, axes = cases.base, cases.axes
+    columns: dict[tuple[str, int], np.ndarray] = {}
+    if base.striker.modes.omega.any() and {"striker_frequency", "target_frequency"} & set(axes):
+        first = base.striker.modes.frequencies[base.striker.modes.omega > 0.0][0]
+        columns["striker_frequency", 0] = axes.get("striker_frequency", first) / cases.ratio
+    if "at" in axes:
+        columns |= {("at", i): column for i, column in enumerate(axes["at"].T) if np.ptp(column) > 0.0}
+    if "damping_ratio" in axes:
+        columns["damping_ratio", 0] = axes["damping_ratio"]
+    found = {name: np.array(values) for name, values in axes.items()}
+    for (name, i), column in columns.items():
+        levels = _levelled(column, int(FAMILIES ** (1.0 / len(columns))))
+        if name == "at":
+            found["at"][:, i] = levels
+        else:
+            found[name] = levels * cases.ratio if name == "striker_frequency" else levels
+    return replace(cases, axes=found, kernels={})
+
+
+def _levelled(values: np.ndarray, number: int) -> np.ndarray:
+    """Each value (n,) replaced by the mean of its group; groups of neighbours, equally many in each."""
+    if len(np.unique(values)) <= number:
+        return np.array(values)
+    order = np.argsort(values, kind="stable")
+    levels = np.empty(len(values))
+    for part in np.array_split(order, number):
+        levels[part] = values[part].mean()
+    return levels
+
+
+def batchable(column: Mapping[str, np.ndarray]) -> np.ndarray:
+    """Which blows (n_cells,) can be followed together, by their parameters, (n_cells,) each."""
+    found = (column["exponent"] >= 1.0) & (column["gap"] >= 0.0)
+    for name in ALONE:
+        found &= column[name] == 0.0
+    return found
+
+
+def solve_all(
+    cases: Cases, workers: int | None = None, client: Any = None, store: Any = None, watch: Watch | None = None
+) -> tuple[np.ndarray, Texts]:
+    """Compute all cases, block by block, on a cluster or in threads of this process; as `solve`."""
+    LOG.info("%d blows at the tolerance %g", cases.n_cases, cases.tolerance)
+    if client is not None:
+        return by_cluster(cases, client, store, partial(solve, workers=1), watch)
+    if store is not None:
+        return by_store(cases, store, partial(solve, workers=workers), watch)
+    numbers = np.empty((len(cases.layers), cases.n_cases))
+    texts: Texts = {}
+    size = block_size(cases.n_cases) if cases.lossy or cases.extra else LARGEST_BLOCK  # slow ones are told more often
+    for start in range(0, cases.n_cases, size):
+        stop = min(start + size, cases.n_cases)
+        numbers[:, start:stop], new = solve(cases, start, stop, workers=workers)
+        texts |= new
+        if watch is not None:
+            watch(stop, cases.n_cases)
+    return numbers, texts
+
+
+def solve(cases: Cases, start: int, stop: int, *, workers: int | None = None) -> tuple[np.ndarray, Texts]:
+    """Compute the cases from ``start`` up to ``stop``.
+
+    Returns
+    -------
+    numbers : ndarray, shape (n_layers, n_cells)
+    texts : dict of failed case to its error text
+    """
+    names, base, count = cases.layers, cases.base, stop - start
+    numbers = np.full((len(names), count), np.nan)
+    numbered = cases.numbered(start, stop)
+    shared = {"target_mass": base.modes.mass, "mass": base.striker.mass, "speed": base.speed, **vars(base.contact)}
+    column = {
+        name: cases.axes[name][numbered[name]] if name in numbered else np.full(count, value)
+        for name, value in shared.items()
+    }
+    quick = batchable(column) & (not cases.extra) & (not base.modes.stretches)
+    ratio = cases.ratio[cases.cells(start, stop)] if cases.by_row else np.ones(count)
+    bands = cases.bands(ratio)
+    for band in np.unique(bands[quick]):
+        cells = np.flatnonzero(quick & (bands == band))
+        r = ratio[cells]
+        families, kind = cases.families({name: i[cells] for name, i in numbered.items()}, column["loss"][cells])
+        blows = batches.Blows(
+            families, kind, column["target_mass"][cells], column["mass"][cells], column["stiffness"][cells] / r**2,
+            column["exponent"][cells], column["speed"][cells] / r, column["loss"][cells] * r,
+        )  # fmt: skip
+        found = batches.bounce(
+            blows, tolerance=cases.tolerance, band=float(band), workers=workers, kernels=cases.kernels
+        )
+        for row, name in enumerate(names):
+            numbers[row, cells] = getattr(found, name) * r ** POWERS.get(name, 0.0)
+        quick[cells] = found.done & ~(np.isnan(found.centroid) & (cases.band is not None))
+    return numbers, _strike_alone(cases, start, np.flatnonzero(~quick), numbers, workers)
+
+
+def _strike_alone(cases: Cases, start: int, cells: np.ndarray, numbers: np.ndarray, workers: int | None) -> Texts:
+    """Strike cases of a block one by one; fill ``numbers`` (n_layers, n_cells) and return the error texts."""
+
+    def row(index: int) -> tuple[np.ndarray | float, str]:
+        try:
+            return cases.row(cases.blow(index)), ""
+        except SimulationError as error:
+            return math.nan, str(error)
+
+    texts = {}
+    with ThreadPoolExecutor(workers or os.cpu_count() or 1) as pool:
+        rows = [pool.submit(row, start + int(i)) for i in cells]
+        try:
+            for i, found in zip(cells, rows):
+                numbers[:, i], text = found.result()
+                if text:
+                    texts[start + int(i)] = text
+        finally:
+            pool.shutdown(cancel_futures=True)
+    return texts

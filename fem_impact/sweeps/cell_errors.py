@@ -1,0 +1,142 @@
+"""How far the cells of a map may be off besides their time steps: the body's description, and the model itself."""
+
+import os
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from .._base.check import SimulationError
+from .._base.rounding import ROUNDING
+from ..impact import accuracy
+from ..impact.collision import strike
+from ..impact.contact import wall_time
+from ..impact.distance import distance
+from ..impact.what_if import RESOLVABLE
+from .cases import Cases, solve
+
+# [-] cells struck again for the error of vectors, in a batch or alone: some 0.1 and 0.2 s
+DOUBTED = {True: 10_000, False: 100}
+MOST_MIDDLES = 4  # [-] axes whose middle is examined, too: 3**4 = 81 blows, where five would take 243
+
+
+def left_out(cases: Cases) -> np.ndarray:
+    """Expected error [-] of leaving out modes, in the shape of a map; infinite where they govern the contact."""
+    if not cases.residual:
+        return np.zeros(cases.shape)
+    base, places = cases.base, cases.axes.get("at", cases.base.at[None])
+    seen = [base.changed("at", place).modes for place in places] if base.views else [base.modes] * len(places)
+
+    def along(name: str, values: Any) -> np.ndarray:
+        """Values of an axis, or one that all cells share, shaped to broadcast over the map."""
+        shape = [-1 if axis == name else 1 for axis in cases.axes] if name in cases.axes else [1]
+        return np.reshape(np.asarray(values, float), shape)
+
+    def value(name: str, shared: float) -> np.ndarray:
+        return along(name, cases.axes.get(name, [shared]))
+
+    stiffness, exponent, loss, share = (
+        value(name, getattr(base.contact, name)) for name in ("stiffness", "exponent", "loss", "hysteresis")
+    )
+    striker = base.striker
+    felt = striker.felt_mass * (value("mass", striker.mass) / striker.mass)
+    omega = np.pi / wall_time(stiffness, exponent, 1.0 / felt, value("speed", base.speed))
+    yielding = base.modes.dimension > 0
+    left = [modes.residual_compliance(place)[0, 0] if yielding else 0.0 for modes, place in zip(seen, places)]
+    last = along("at", [modes.omega[-1] for modes in seen])
+    sides = [
+        (base.modes, along("at", left), last, base.first, "target_mass", "target_frequency"),
+        (striker.modes, striker.left_out[0][0, 0], striker.modes.omega[-1], None, "mass", "striker_frequency"),
+    ]  # fmt: skip
+    total, softness = np.zeros(cases.shape), np.zeros(cases.shape)
+    for modes, rest, edge, first, mass, frequency in sides:
+        if not modes.dimension or not modes.omega.any():
+            continue
+        first = first or float(modes.frequencies[modes.omega > 0.0][0])
+        ratio = value(frequency, first) / first
+        soft = felt * omega**2 * np.maximum(rest, 0.0) * modes.mass / value(mass, modes.mass) / ratio**2
+        above = np.minimum(1.0, omega / (edge * ratio))
+        total = total + accuracy.left_out_error(soft, above, exponent, modes.dimension)
+        softness = softness + soft
+    lossy = np.where((loss > 0.0) | (share > 0.0), accuracy.LOSSY, 1.0)
+    return np.where(softness <= RESOLVABLE, total * lossy, np.inf)
+
+
+def model_error(cases: Cases) -> tuple[np.ndarray, str]:
+    """The model's own error [-] in the shape of a map, and what of it is not known.
+
+    Examined at the ends and the middle of every axis, at the ends of more than MOST_MIDDLES, and interpolated in
+    its logarithm; NaN where these fail.
+    """
+    middle = [] if len(cases.shape) > MOST_MIDDLES else [0.5]
+    some = [np.unique([0, *(int(share * (n - 1)) for share in middle), n - 1]) for n in cases.shape]
+    found = np.empty([len(places) for places in some])
+    unknown: dict[str, None] = {}
+    for at in np.ndindex(*found.shape):
+        index = np.ravel_multi_index([places[i] for places, i in zip(some, at)], cases.shape)
+        try:
+            hit = cases.blow(int(index))
+        except SimulationError:
+            found[at] = np.nan
+            continue
+        found[at] = max(hit.model_error, ROUNDING)
+        unknown |= {each.name: None for each in hit.assumptions if not each.known}
+    logs = np.log(found)
+    for axis, (places, n) in enumerate(zip(some, cases.shape)):
+        logs = np.apply_along_axis(lambda column: np.interp(np.arange(n), places, column), axis, logs)  # noqa: B023
+    return np.exp(logs), ", ".join(unknown)
+
+
+def described(cases: Cases, numbers: np.ndarray, workers: int | None = None) -> np.ndarray:
+    """Error [-] of too few Ritz vectors and of their mesh in each cell, in the shape of a map; zero for most modes.
+
+    Evenly spaced cells, at most DOUBTED, are struck again on the body described less well (`Modes.poorer`); any other
+    cell has the error of the nearest of them. Too few vectors may agree on a final separation that is none; therefore
+    cells with several impacts are also struck alone, because `strike` looks for that; so are the cells of a body of
+    which something is not stated (`Modes.unstated`).
+    """
+    base = cases.base
+    causes = list(dict.fromkeys(cause for modes in base.views.values() for cause in modes.poorer))
+    unstated = cases.residual and bool(base.modes.unstated or base.striker.modes.unstated)
+    if not causes and not unstated:
+        return np.zeros(cases.shape)
+    most = DOUBTED[cases.quick and not unstated]
+    thinner = max(1.0, (cases.n_cases / most) ** (1.0 / len(cases.shape)))
+    chosen = [np.unique(np.round(np.linspace(0, n - 1, max(1, int(n / thinner)))).astype(int)) for n in cases.shape]
+    axes = {name: values[some] for (name, values), some in zip(cases.axes.items(), chosen)}
+    few = replace(cases, axes=axes, band=None, kernels={})
+    names = [cases.layers.index(name) for name in few.layers]
+    mine = numbers.reshape(-1, *cases.shape)[np.ix_(np.array(names), *chosen)]
+    total = np.zeros(few.shape)
+    before = mine
+    for cause in causes:
+        other, _ = solve(replace(few, base=base.poorer(cause), kernels={}), 0, few.n_cases, workers=workers)
+        before, better = other.reshape(mine.shape), before
+        total += _largest_difference(few.layers, better, before)
+    several = np.flatnonzero((mine[few.layers.index("n_impacts")] > 1) | unstated)
+    several = several[:: max(1, -(-len(several) // DOUBTED[False]))]
+
+    def alone(index: int) -> float:
+        """Error [-] of the body's vectors and mesh in one cell struck alone; 0 if that fails."""
+        case = few.case(index)
+        try:
+            error = strike(
+                case.modes, case.striker, case.contact, at=case.at, speed=case.speed, tolerance=cases.tolerance
+            ).error
+        except SimulationError:
+            return 0.0
+        return error.truncation + error.mesh
+
+    with ThreadPoolExecutor(workers or os.cpu_count() or 1) as pool:
+        total.flat[several] = np.maximum(total.flat[several], list(pool.map(alone, several)))
+    nearest = [np.abs(np.arange(n)[:, None] - some).argmin(axis=1) for n, some in zip(cases.shape, chosen)]
+    return total[np.ix_(*nearest)]
+
+
+def _largest_difference(names: list[str], one: np.ndarray, other: np.ndarray) -> np.ndarray:
+    """Largest difference of two maps in the quantities under tolerance; 1 if their impacts differ in number."""
+    mine, its = dict(zip(names, one)), dict(zip(names, other))
+    judged = ("restitution", "impulse", "contact_time", "peak_force")
+    apart = distance({name: its[name] for name in judged}, {name: mine[name] for name in judged})
+    return np.where(mine["n_impacts"] == its["n_impacts"], np.fmax.reduce(list(apart.values())), 1.0)
