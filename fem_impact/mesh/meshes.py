@@ -87,7 +87,8 @@ class Mesh(check.Locked):
             raise ValueError(
                 "this mesh has no outline and cannot be refined; make it with fi.mesh, or load a finer file"
             )
-        finer = self.recipe(size=self.size / check.positive("factor", factor))
+        size = self.size / check.positive("factor", factor)
+        finer = self.recipe(size=float(f"{size:.11g}"))  # the mesher would amplify the rounding of an error estimate
         return replace(finer, notes=self.notes)
 
 
