@@ -16,6 +16,7 @@ import fem_impact as fi
 
 from . import answers
 from ._base.explained import noted
+from ._base.files import staged
 from .display import LONG, Display, tell, width
 from .show import FORMATS
 
@@ -73,7 +74,7 @@ def strike(options: argparse.Namespace) -> Answer:
     if scene.stroke:
         return _strike_in_turn(options, scene)
     folder, display = _folder(options), _display(options, tells=True)
-    with fi.export.staged(folder, "strike") as staging, Painter() if options.pictures else nullcontext() as painter:
+    with staged(folder, "strike") as staging, Painter() if options.pictures else nullcontext() as painter:
         place = folder.resolve()  # "." has no name of its own
         keep = place.parent / f"{place.name}.modes.npz"  # not in the folder: an interrupted run leaves that alone
         motion, before = options.pictures or options.vtk, partial(_announce, options, display, options.verify, True)
@@ -188,7 +189,7 @@ def _strike_in_turn(options: argparse.Namespace, scene: Any) -> Answer:
         raise ValueError(f"--{wrong} must be left out for a scene with strokes")
     began = time.perf_counter()
     folder, display = _folder(options), _display(options)
-    with fi.export.staged(folder, "strike") as staging, warnings.catch_warnings():
+    with staged(folder, "strike") as staging, warnings.catch_warnings():
         warnings.simplefilter("ignore", fi.ToleranceWarning)  # the first line of the summary says it
         stages = Stages(display)
         found = scene.play(watch=display, strict=options.strict, **_choices(options))
@@ -232,7 +233,7 @@ def map_of(options: argparse.Namespace) -> Answer:
     form, picture = maps.can_write(chosen.get(False, "nc"), options.out), chosen.get(True, FORMATS[0])
     scene = fi.load_scene(options.scene)
     folder = _folder(options)
-    with fi.export.staged(folder, "map") as staging:
+    with staged(folder, "map") as staging:
         display = _display(options)
         with display("cells"):
             table = maps.map_scene(
@@ -276,7 +277,7 @@ def spread(options: argparse.Namespace) -> Answer:
         correlation = {tuple(name.strip() for name in names.split(",")): float(value) for names, value in pairs}
     except ValueError:
         raise ValueError("--correlate must look like contact.stiffness,striker.mass=0.5") from None
-    with fi.export.staged(folder, "spread") as staging:
+    with staged(folder, "spread") as staging:
         display = _display(options)
         with display("blows"):
             found = uncertainty.spread(
@@ -350,7 +351,7 @@ def _rove(options: argparse.Namespace, scene: Any, masses: Sequence[float], note
     with _display(options, tells=True)("points"):
         plan = roving.of_scene(scene, masses, options.bandwidth, options.drop, number)
         if drawn is not None:
-            with fi.export.staged(drawn.parent) as staging:
+            with staged(drawn.parent) as staging:
                 fi.figures.save(staging / drawn.name, plan.figure())
                 plan.write_csv((staging / drawn.name).with_suffix(".csv"))
     data = {"table": plan.table(), "verdicts": plan.verdicts, "resolution": plan.resolution}
@@ -364,7 +365,7 @@ def report(options: argparse.Namespace) -> Answer:
     scene = fi.report.read(options.scene)
     path = _file(options, "report.html") or Path("out") / options.scene.stem / "report.html"
     changes = {} if options.tolerance is None else {"tolerance": options.tolerance}
-    with fi.export.staged(path.parent) as staging:
+    with staged(path.parent) as staging:
         display = _display(options, tells=True)
         before = partial(_announce, options, display, False, False)
         if scene.stroke:
@@ -399,7 +400,7 @@ def play(options: argparse.Namespace) -> Answer:
 
     scene = fi.load_scene(options.scene)
     path = _file(options, "play.wav") or Path("out") / options.scene.stem / "play.wav"
-    with fi.export.staged(path.parent) as staging:
+    with staged(path.parent) as staging:
         with _display(options)("modes"):
             modes = scene.modes(options.n_modes)
         with _display(options)("preparing, and compiling if not yet done"):
@@ -434,7 +435,7 @@ def modes(options: argparse.Namespace) -> Answer:
     scene, display = fi.load_scene(options.scene), _display(options)
     if options.vtk is not None:
         fi.export.vtk_ending(options.vtk)
-    with nullcontext() if options.vtk is None else fi.export.staged(options.vtk.parent) as staging:  # or fails early
+    with nullcontext() if options.vtk is None else staged(options.vtk.parent) as staging:  # or fails early
         with display("modes"):
             modes = scene.modes(options.n_modes, elastic=True)
         if staging is not None:
@@ -585,7 +586,7 @@ def fit(options: argparse.Namespace) -> Answer:
     from .taps import prompt  # imported only when needed
 
     folder, display = _folder(options), _display(options)
-    with fi.export.staged(folder, "fit") as staging:
+    with staged(folder, "fit") as staging:
         with display("fit"):
             found, scene = prompt.fit(options, partial(display.report, "fits"))
         data, files = prompt.write(staging, found, scene)

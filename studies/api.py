@@ -80,7 +80,7 @@ def page():
             for key, item in inspect.getmembers(home)
             if not key.startswith("_")
             and inspect.isfunction(item)
-            and f"{item.__module__}.".startswith(f"{home.__name__}.")
+            and (f"{item.__module__}.".startswith(f"{home.__name__}.") or key in getattr(home, "__all__", ()))
         }
         parts.append(f"## fi.{name}\n\n{first(home)}\n")
         parts += [entry(f"{name}.{key}", own[key]) for key in sorted(own)]

@@ -51,7 +51,6 @@ INNER = {
     "Gradient", "Gradient.change", "Response.band_spectrum",  # made by Response.gradient; its arguments are any words
     "Plan.data", "Plan.run", "Plan.strike", "Response.body_slice", "Response.summary", "Scene.picture",
     "mesh.Mesh", "mesh.straight", "mesh.fill", "Modes.points", "Modes.stretched",
-    "analytic.RectangleShapes", "analytic.BeamShapes", "analytic.DiskShapes",  # behind the checks of Modes
     "export.plain", "export.versions", "export.csv_text", "export.run_data", "export.vtk_ending", "figures.snapshot",
     "figures.in_hertz", "figures.styled", "sound.Sound",
     "hammers.Hammer", "hammers.bandwidth_of", "hammers.half_sine_reach",
@@ -87,15 +86,15 @@ def everything() -> dict[str, Callable[..., Any]]:
     for name, home in homes.items():
         if inspect.ismodule(home):
             for key, item in inspect.getmembers(home):
-                if not key.startswith("_") and f"{getattr(item, '__module__', '')}.".startswith(f"{home.__name__}."):
+                own = f"{getattr(item, '__module__', '')}.".startswith(f"{home.__name__}.")
+                if not key.startswith("_") and (own or key in getattr(home, "__all__", ())):
                     add(f"{name}.{key}", item)
     return found
 
 
 def public() -> dict[str, Callable[..., Any]]:
     """Those that users call."""
-    shapes = tuple(f"analytic.{kind}Shapes." for kind in ("Rectangle", "Beam", "Disk"))
-    return {name: item for name, item in everything().items() if name not in INNER and not name.startswith(shapes)}
+    return {name: item for name, item in everything().items() if name not in INNER}
 
 
 # --- one valid call of each ------------------------------------------------------------------------------------------

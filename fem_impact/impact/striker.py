@@ -9,8 +9,8 @@ import numpy as np
 from .._base import check
 from ..fe import plausible
 from ..fe.section import Material
-from ..modes.analytic import SHEAR_RATIO, beam
 from ..modes.modal import Modes, Shapes, left_out
+from ..modes.slender import SHEAR_RATIO, beam
 
 SPHERES = 1e-9, 1e9  # [m] radius, from a few atoms to a star
 STICK_MODES = 96  # [-] bending modes of a stick, known in closed form; each blow keeps as many of them as it needs

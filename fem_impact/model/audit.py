@@ -20,8 +20,9 @@ from ..impact.contact import Contact
 from ..impact.response import Response
 from ..impact.striker import Striker
 from ..mesh.meshes import Mesh
-from ..modes.analytic import DiskShapes, RectangleShapes
+from ..modes.disk import DiskShapes
 from ..modes.modal import FieldShapes, Modes
+from ..modes.rectangle import RectangleShapes
 from ..modes.ritz import RitzShapes
 from . import bending, deflection, fresh, local_contact, still_air, thinness, unstated_damping
 from .idealisation import Surroundings, unyielding

@@ -32,9 +32,11 @@ from ..fe.springs import along_facets
 from ..fe.supports import cells_of_facets
 from ..mesh.meshes import Mesh
 from ..modes.air import MixedShapes
-from ..modes.analytic import BeamShapes, DiskShapes, RectangleShapes
+from ..modes.disk import DiskShapes
 from ..modes.modal import FieldShapes, Modes, ScaledShapes, Shapes
+from ..modes.rectangle import RectangleShapes
 from ..modes.ritz import RitzShapes
+from ..modes.slender import BeamShapes
 from ..modes.timoshenko import TimoshenkoShapes
 from ..modes.unstated import lumps
 

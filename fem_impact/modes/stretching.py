@@ -27,9 +27,11 @@ from ..fe.assembly import System, assemble, support_of_facets, support_words
 from ..fe.section import SOFT, Beam, Plate
 from ..mesh import meshes
 from .air import MixedShapes
-from .analytic import BeamShapes, DiskShapes, RectangleShapes
+from .disk import DiskShapes
 from .modal import FieldShapes, Modes, ScaledShapes, Shapes
+from .rectangle import RectangleShapes
 from .ritz import RitzShapes
+from .slender import BeamShapes
 from .timoshenko import TimoshenkoShapes
 
 HELD = "clamped", "hinged", SOFT  # supports that hold an edge in the plane, too

@@ -14,7 +14,7 @@ from xml.sax.saxutils import quoteattr
 import numpy as np
 
 from .._base import check
-from .._base.files import replacing, staged
+from .._base.files import replacing
 from .._base.rounding import SAME
 from ..impact.assumption import table
 from ..impact.response import Response
@@ -26,7 +26,7 @@ from ..modes.modal import Modes
 from . import sampling, sound
 
 __all__ = [
-    "csv_text", "numbers", "plain", "run_data", "staged", "versions", "vtk_ending", "write_animation", "write_force",
+    "csv_text", "numbers", "plain", "run_data", "versions", "vtk_ending", "write_animation", "write_force",
     "write_json", "write_sound", "write_uff", "write_vtk", "write_wav",
 ]  # fmt: skip
 

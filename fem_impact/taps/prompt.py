@@ -9,6 +9,7 @@ import xarray as xr
 from scipy.signal import find_peaks
 
 from .._base import check
+from .._base.files import staged
 from ..impact.contact import Contact
 from ..impact.striker import Striker
 from ..scenes.scene import Scene, load_scene
@@ -70,7 +71,7 @@ def peaks(found: xr.Dataset) -> list[dict[str, Any]]:
 def write_frf(path: Path, found: xr.Dataset) -> None:
     """Write frequency responses as .csv (real and imaginary parts, coherence) or .uff (data set 58)."""
     ending = check.one_of("path ending", path.suffix.lower(), (".csv", ".uff"))
-    with export.staged(path.parent) as staging:
+    with staged(path.parent) as staging:
         if ending == ".uff":
             transfer.write_uff(staging / path.name, found)
             return

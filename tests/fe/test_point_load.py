@@ -8,6 +8,7 @@ from numpy.testing import assert_allclose
 
 import fem_impact as fi
 from fem_impact.fe import point_load
+from fem_impact.fe.section import KINDS
 from fem_impact.modes import analytic
 
 PLATE = fi.Plate(fi.Material(E=70e9, nu=0.33, rho=2700.0), thickness=2e-3)
@@ -30,7 +31,7 @@ RARE = [pytest.param(place, marks=pytest.mark.slow) for place in (0.97, 0.99, 0.
 
 
 @pytest.mark.xdist_group("disks")
-@pytest.mark.parametrize("edge", analytic.KINDS)
+@pytest.mark.parametrize("edge", KINDS)
 @pytest.mark.parametrize("place", [0.0, 0.5, 0.999, 1.0, *RARE])
 def test_disk(edge, place):
     exact, modes = disk_of(edge)
@@ -54,7 +55,7 @@ def test_disk(edge, place):
 @pytest.mark.xdist_group("disks")
 def test_deflection_elsewhere():
     points = 0.2 * np.array([[0.3, 0.2], [0.62, 0.45], [-0.1, -0.4], [0.0, 1.0]])
-    for edge in analytic.KINDS:
+    for edge in KINDS:
         exact, modes = disk_of(edge)
         exact = exact.shapes
         expected = exact.deflection(points[:1], points)
