@@ -94,8 +94,8 @@ NOT_MIRRORED = {  # tested under the name of what uses them
     "_base/check.py", "fe/euler.py", "fe/interpolation.py", "fe/kirchhoff.py", "fe/plates.py", "fe/system.py",
     "impact/played.py", "mesh/meshio_reader.py", "model/asked.py", "model/budget.py", "model/by_idealisation.py",
     "model/by_mixture.py", "model/by_vectors.py", "modes/disk.py", "modes/rectangle.py", "modes/request.py",
-    "modes/slender.py", "pages/explore_server.py", "pages/explore_view.py", "scenes/maps.py", "scenes/schema.py",
-    "show/plots.py", "show/style.py",
+    "modes/shapes.py", "modes/slender.py", "pages/explore_server.py", "pages/explore_view.py", "scenes/maps.py",
+    "scenes/schema.py", "show/plots.py", "show/style.py",
 }  # fmt: skip
 
 

@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..modes.modal import Modes, SampledShapes
+from ..modes.modal import Modes
+from ..modes.shapes import SampledShapes
 from ..modes.stretching import stretch
 from .history import History
 from .reduced_body import Ends

@@ -13,7 +13,8 @@ import numpy as np
 
 from .._base import explained
 from .._base.check import SimulationError, ToleranceWarning
-from ..modes.modal import FieldShapes, Modes
+from ..modes.modal import Modes
+from ..modes.shapes import FieldShapes
 from . import accuracy
 from .quantities import words
 

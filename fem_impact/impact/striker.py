@@ -9,7 +9,8 @@ import numpy as np
 from .._base import check
 from ..fe import plausible
 from ..fe.section import Material
-from ..modes.modal import Modes, Shapes, left_out
+from ..modes.modal import Modes, left_out
+from ..modes.shapes import Shapes
 from ..modes.slender import SHEAR_RATIO, beam
 
 SPHERES = 1e-9, 1e9  # [m] radius, from a few atoms to a star

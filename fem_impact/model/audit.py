@@ -21,9 +21,10 @@ from ..impact.response import Response
 from ..impact.striker import Striker
 from ..mesh.meshes import Mesh
 from ..modes.disk import DiskShapes
-from ..modes.modal import FieldShapes, Modes
+from ..modes.modal import Modes
 from ..modes.rectangle import RectangleShapes
 from ..modes.ritz import RitzShapes
+from ..modes.shapes import FieldShapes
 from . import bending, deflection, fresh, local_contact, still_air, thinness, unstated_damping
 from .idealisation import Surroundings, unyielding
 from .restrike import Struck

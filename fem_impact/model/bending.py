@@ -33,9 +33,10 @@ from ..fe.supports import cells_of_facets
 from ..mesh.meshes import Mesh
 from ..modes.air import MixedShapes
 from ..modes.disk import DiskShapes
-from ..modes.modal import FieldShapes, Modes, ScaledShapes, Shapes
+from ..modes.modal import Modes
 from ..modes.rectangle import RectangleShapes
 from ..modes.ritz import RitzShapes
+from ..modes.shapes import FieldShapes, ScaledShapes, Shapes
 from ..modes.slender import BeamShapes
 from ..modes.timoshenko import TimoshenkoShapes
 from ..modes.unstated import lumps

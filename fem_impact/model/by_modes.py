@@ -7,7 +7,8 @@ from .._base import check, progress
 from ..fe import plausible, refinement
 from ..impact import accuracy
 from ..impact.response import Response
-from ..modes.modal import FieldShapes, Modes, at_rest
+from ..modes.modal import Modes, at_rest
+from ..modes.shapes import FieldShapes
 from . import cost, vectors
 from .asked import Asked, Description, Forecast, Unaffordable
 from .budget import NOTCH

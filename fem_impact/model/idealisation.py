@@ -12,7 +12,8 @@ from ..fe.section import Material, Plate
 from ..fe.splitting import distance
 from ..impact import threshold
 from ..mesh.meshes import Mesh
-from ..modes.modal import Modes, SampledShapes, at_rest
+from ..modes.modal import Modes, at_rest
+from ..modes.shapes import SampledShapes
 from .target import FIRST_LOOK, Target
 
 PULSE = 1.77  # [-] fact: peak response of an oscillator to a half sine, over its static response

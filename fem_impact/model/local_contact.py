@@ -19,7 +19,7 @@ from ..impact.assumption import Assumption
 from ..impact.compiled import layout
 from ..impact.contact import YIELDS, Contact, loss_number
 from ..impact.history import History
-from ..modes.modal import SampledShapes
+from ..modes.shapes import SampledShapes
 from .restrike import Doubt, Struck, softer
 from .thinness import wavenumber
 

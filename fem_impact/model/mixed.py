@@ -30,7 +30,8 @@ from typing import Any
 
 import numpy as np
 
-from ..modes.modal import Modes, SampledShapes
+from ..modes.modal import Modes
+from ..modes.shapes import SampledShapes
 
 # [rad] its sine is the damping ratio above the frequency; modes fade over so much: half takes twice the oscillators
 ANGLE = 0.05

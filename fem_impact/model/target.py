@@ -29,7 +29,8 @@ from ..fe.section import Beam, Plate
 from ..mesh.meshes import Mesh
 from ..modes import analytic, modal
 from ..modes.air import in_air
-from ..modes.modal import Damping, FieldShapes, Modes
+from ..modes.modal import Damping, Modes
+from ..modes.shapes import FieldShapes
 from ..modes.stretching import HELD
 
 LOG = logging.getLogger(__name__)

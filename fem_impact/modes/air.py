@@ -38,7 +38,8 @@ from .._base import check
 from .._base.rounding import EPSILON, HALVINGS, SAME
 from ..fe import plausible
 from ..mesh.meshes import measure
-from .modal import Modes, Shapes
+from .modal import Modes
+from .shapes import Shapes
 
 DENSITY, SPEED = 1.204, 343.2  # [kg/m^3], [m/s] fact: of air at 20 degrees C and 1013 hPa
 # [-] cells per wavelength of the highest mode and, in `free_air`, of its sound; two sizes are extrapolated

@@ -11,8 +11,9 @@ from .._base import check
 from .._base.rounding import EPSILON
 from ..fe import plausible
 from ..fe.section import KINDS, Plate
-from .modal import Damping, Modes, Shapes
+from .modal import Damping, Modes
 from .request import check_number, request
+from .shapes import Shapes
 
 DISK_TERMS = 100_000  # [-] most terms summed at the edge of a disk, where they only fall as n**-3; error 5e-11
 MOST_OF_DISK = 50_000  # [-] largest number of modes of a disk; each needs a root search

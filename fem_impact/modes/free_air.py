@@ -31,7 +31,8 @@ from scipy.sparse.linalg import LinearOperator, gmres
 from .._base.check import SimulationError
 from ..mesh.meshes import measure
 from .air import PER_WAVE, mean_inverse_distance
-from .modal import Modes, Shapes
+from .modal import Modes
+from .shapes import Shapes
 
 LOG = logging.getLogger(__name__)
 # [-] cells across a square as large as the plate, in the lattices to choose of: next ones are 1.8 to 2.3 times as large

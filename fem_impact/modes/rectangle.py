@@ -12,8 +12,9 @@ from .._base import check
 from .._base.rounding import EPSILON
 from ..fe import plausible
 from ..fe.section import Plate
-from .modal import Damping, Modes, Shapes
+from .modal import Damping, Modes
 from .request import check_number, request
+from .shapes import Shapes
 
 # [-] fact: image forces beyond each shorter side of a hinged plate until rounding, as the n-th gives exp(-2 pi n)
 IMAGES = math.ceil(-math.log(EPSILON) / (2.0 * np.pi))

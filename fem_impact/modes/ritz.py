@@ -23,7 +23,8 @@ from .._base.rounding import SAME
 from ..fe import point_load
 from ..fe.assembly import System
 from ..fe.eigenvalues import Flexibility, factorise, one_thread
-from .modal import Damping, Modes, Shapes, damping_notes, damping_ratios
+from .modal import Damping, Modes, damping_notes, damping_ratios
+from .shapes import Shapes
 
 PIECE = 2**20  # [byte] of earlier vectors taken at a time: fits into the cache of a core
 LOST = 1e-8  # [-] overlap above which all vectors since the last look at it are made again

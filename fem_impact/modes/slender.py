@@ -11,9 +11,10 @@ from .._base import check
 from ..fe import plausible
 from ..fe.section import KINDS, Beam
 from . import timoshenko
-from .modal import BeamlikeShapes, Damping, Modes
+from .modal import Damping, Modes
 from .rectangle import MOST_MODES
 from .request import Request, check_number, request
+from .shapes import BeamlikeShapes
 from .timoshenko import ENDS
 
 SHEAR_RATIO = 2.6  # [-] fact: E / G of an isotropic material with nu = 0.3

@@ -28,9 +28,10 @@ from ..fe.section import SOFT, Beam, Plate
 from ..mesh import meshes
 from .air import MixedShapes
 from .disk import DiskShapes
-from .modal import FieldShapes, Modes, ScaledShapes, Shapes
+from .modal import Modes
 from .rectangle import RectangleShapes
 from .ritz import RitzShapes
+from .shapes import FieldShapes, ScaledShapes, Shapes
 from .slender import BeamShapes
 from .timoshenko import TimoshenkoShapes
 

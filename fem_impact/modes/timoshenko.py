@@ -22,7 +22,7 @@ import numpy as np
 
 from .._base import check
 from .._base.rounding import HALVINGS
-from .modal import BeamlikeShapes
+from .shapes import BeamlikeShapes
 
 STEEP = 1.0  # [-] q above which exponentials replace cosh and sinh, which are bounded below
 ENDS = {"clamped": (0, 1), "hinged": (0, 2), "free": (2, 3)}  # what vanishes there: w, beta, moment, shear force

@@ -8,7 +8,8 @@ from .._base import check
 from .._base.check import SimulationError
 from ..fe.eigenvalues import CLUSTER
 from ..fe.variation import SectionChange, energies
-from .modal import FieldShapes, Modes
+from .modal import Modes
+from .shapes import FieldShapes
 
 # [-] static solutions that stand for the modes left out; the error falls as (f / f_left_out)**20, 1e-6 at a half
 TERMS = 10

@@ -16,7 +16,8 @@ from ..mesh.meshes import Mesh
 from ..model import vectors
 from ..model.audit import audited
 from ..model.target import Stages
-from ..modes.modal import Modes, SampledShapes
+from ..modes.modal import Modes
+from ..modes.shapes import SampledShapes
 from ..scenes.scene import Scene
 from ..scenes.schema import PATHS
 from ..sweeps import bodies, grid

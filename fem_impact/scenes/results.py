@@ -23,7 +23,8 @@ from ..impact.stretched import Stretched
 from ..impact.striker import Hand, Striker
 from ..model.playing import Stroke, Strokes
 from ..modes import unstated
-from ..modes.modal import Modes, RigidShapes, SampledShapes
+from ..modes.modal import Modes
+from ..modes.shapes import RigidShapes, SampledShapes
 from ..sweeps import store
 from .schema import fault
 from .sentences import si

@@ -25,7 +25,8 @@ from ..model.budget import FINEST, Budget
 from ..model.by_modes import MOST_MODES
 from ..model.target import CLOSE, FIRST_FLEXIBLE, FIRST_LOOK, Elements, Stages, Target
 from ..model.views import TOGETHER, Views
-from ..modes.modal import FieldShapes, Modes, SampledShapes, damping_ratios
+from ..modes.modal import Modes, damping_ratios
+from ..modes.shapes import FieldShapes, SampledShapes
 from .batches import allowed
 from .cells import REACH, Case, checked_axes, sampled
 

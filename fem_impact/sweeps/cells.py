@@ -11,7 +11,8 @@ from .._base import check
 from ..impact import accuracy
 from ..impact.contact import Contact
 from ..impact.striker import Striker
-from ..modes.modal import Modes, SampledShapes
+from ..modes.modal import Modes
+from ..modes.shapes import SampledShapes
 
 AXES = {  # name: unit, what it is, its name in a scene file
     "mass": ("kg", "mass of the striker", "striker.mass"),

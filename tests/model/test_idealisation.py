@@ -19,7 +19,8 @@ from fem_impact.model import idealisation, planner
 from fem_impact.model.idealisation import Surroundings, Waves
 from fem_impact.model.target import Target
 from fem_impact.modes import analytic
-from fem_impact.modes.modal import Modes, SampledShapes
+from fem_impact.modes.modal import Modes
+from fem_impact.modes.shapes import SampledShapes
 
 MASS, DURATION = 1.0, 1e-3  # [kg], [s] of every blow here, at 1 m/s
 HERTZ = MASS * (3.2180654597 / DURATION) ** 2.5  # [N/m**1.5], from T = 3.218 (m**2 / (k**2 v))**(1/5)

@@ -7,7 +7,7 @@ import pytest
 from numpy.testing import assert_allclose
 
 import fem_impact as fi
-from fem_impact.modes.modal import SampledShapes
+from fem_impact.modes.shapes import SampledShapes
 from fem_impact.sweeps import cells
 from fem_impact.sweeps.cells import Case, sampled
 

@@ -1,0 +1,278 @@
+"""Shapes of modes: where a body is, how it deflects under a force, and the rest of it that moves on its own."""
+
+from abc import abstractmethod
+from dataclasses import dataclass, field, replace
+from typing import Any, Protocol
+
+import numpy as np
+
+from .._base import check
+from .._base.remembered import Remembered
+from ..fe import point_load
+from ..fe.assembly import System
+from ..fe.eigenvalues import Flexibility
+from . import unstated
+
+REMEMBERED = 16  # [-] points whose shapes and static deflections a body keeps, because one blow needs them many times
+# [-] error of a mode's compliance over that of its frequency, cautious: 2 by omega**-2, the rest for its shape
+SHAPE_ERROR = 10.0
+
+
+class Shapes(Protocol):
+    """What every source of mode shapes offers: FE solutions, closed formulas and measured points."""
+
+    @property
+    def dimension(self) -> int:
+        """Number of coordinates of a point: 2 on a plate, 1 on a beam, 0 for a rigid mass."""
+
+    def at(self, points: np.ndarray) -> np.ndarray:
+        """Mass-normalised shapes (n_points, n_modes) [kg**-0.5] at points (n_points, dimension) [m]."""
+
+    def contains(self, points: np.ndarray) -> np.ndarray:
+        """Whether each point lies on the body, (n_points,) bool."""
+
+    def compliance(self, points: np.ndarray) -> np.ndarray:
+        """Static compliance (n_points, n_points) [m/N] of the complete body, with inertia relief if it is free."""
+        return self.deflection(points, points)
+
+    def compliance_error(self, points: np.ndarray) -> np.ndarray:
+        """Estimated relative error (n_points,) [-] of the diagonal of `compliance`; closed formulas have none."""
+        return np.zeros(len(points))
+
+    def deflection(self, loads: np.ndarray, points: np.ndarray) -> np.ndarray:
+        """Static deflection (n_points, n_loads) [m/N] of the complete body under unit forces at ``loads``."""
+
+    def loose(self, points: np.ndarray) -> np.ndarray:
+        """Shapes (n_points, n) [kg**-0.5] of rigid motions that the modes lack if nothing holds the body."""
+        return np.zeros((len(points), 0))
+
+    def take(self, n_modes: int) -> "Shapes":
+        """The same body with its first ``n_modes`` modes only."""
+
+    def grid(self) -> tuple[np.ndarray, np.ndarray]:
+        """Points (n_points, dimension) [m] and cells (n_cells, dimension + 1) for drawing the body."""
+
+
+@dataclass(frozen=True, eq=False)
+class BeamlikeShapes(Shapes):
+    """What the closed forms of all beams share; each array of theirs has one row per mode."""
+
+    length: float  # [m]
+    ends: tuple[str, str]
+
+    @property
+    def dimension(self) -> int:
+        return 1
+
+    def contains(self, points: np.ndarray) -> np.ndarray:
+        return np.all((points >= -1e-9 * self.length) & (points <= (1 + 1e-9) * self.length), axis=1)
+
+    def compliance(self, points: np.ndarray) -> np.ndarray:
+        result = self.deflection(points, points)
+        return 0.5 * (result + result.T)
+
+    def deflection(self, loads: np.ndarray, points: np.ndarray) -> np.ndarray:
+        """Exact static deflection under each load; a beam that can move rigidly gets inertia relief."""
+        x = points[:, 0] / self.length
+        return np.column_stack([self.green(load, x) for load in loads[:, 0] / self.length])
+
+    @abstractmethod
+    def green(self, load: float, x: np.ndarray) -> np.ndarray:
+        """Deflection (n,) of the unit beam at x (n,) under a unit force at ``load``, without its rigid motion."""
+
+    def take(self, n_modes: int) -> Any:
+        arrays: dict[str, Any] = {
+            name: value[:n_modes] for name, value in vars(self).items() if isinstance(value, np.ndarray)
+        }
+        return replace(self, **arrays)
+
+    def grid(self) -> tuple[np.ndarray, np.ndarray]:
+        node = np.arange(129)
+        return self.length * node[:, None] / 128.0, np.column_stack([node[:-1], node[1:]])
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class ScaledShapes(Shapes, check.Brief):
+    """The shapes of the same body with another mass and stiffness, see `Modes.scaled`."""
+
+    base: Shapes
+    amplitude: float  # [-] new shape divided by old
+    frequency: float  # [-] new frequency divided by old
+
+    @property
+    def dimension(self) -> int:
+        return self.base.dimension
+
+    def at(self, points: np.ndarray) -> np.ndarray:
+        return self.amplitude * self.base.at(points)
+
+    def contains(self, points: np.ndarray) -> np.ndarray:
+        return self.base.contains(points)
+
+    def compliance(self, points: np.ndarray) -> np.ndarray:
+        return (self.amplitude / self.frequency) ** 2 * self.base.compliance(points)
+
+    def compliance_error(self, points: np.ndarray) -> np.ndarray:
+        return self.base.compliance_error(points)
+
+    def deflection(self, loads: np.ndarray, points: np.ndarray) -> np.ndarray:
+        return (self.amplitude / self.frequency) ** 2 * self.base.deflection(loads, points)
+
+    def loose(self, points: np.ndarray) -> np.ndarray:
+        return self.amplitude * self.base.loose(points)
+
+    def take(self, n_modes: int) -> "ScaledShapes":
+        return replace(self, base=self.base.take(n_modes))
+
+    def grid(self) -> tuple[np.ndarray, np.ndarray]:
+        return self.base.grid()
+
+
+@dataclass(frozen=True, eq=False)
+class RigidShapes(Shapes):
+    """A rigid mass that can only translate: one mode of frequency zero, with the same shape everywhere."""
+
+    mass: float  # [kg]
+    n_modes: int = 1
+    dimension: int = 0
+
+    def at(self, points: np.ndarray) -> np.ndarray:
+        return np.full((len(points), self.n_modes), self.mass**-0.5)
+
+    def contains(self, points: np.ndarray) -> np.ndarray:
+        return np.ones(len(points), bool)
+
+    def deflection(self, loads: np.ndarray, points: np.ndarray) -> np.ndarray:
+        return np.zeros((len(points), len(loads)))
+
+    def take(self, n_modes: int) -> "RigidShapes":
+        return replace(self, n_modes=n_modes)
+
+    def grid(self) -> tuple[np.ndarray, np.ndarray]:
+        return np.zeros((1, 0)), np.zeros((1, 1), int)
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class SampledShapes(Shapes, check.Locked):
+    """Shapes known only at points, as from a modal test; the striker must hit one of these points."""
+
+    points: np.ndarray  # (n_points, dimension) [m]
+    values: np.ndarray  # (n_points, n_modes) [kg**-0.5]
+    static: np.ndarray  # (n_points, n_points) [m/N] static compliance of the complete body
+    cells: np.ndarray | None = None  # (n_cells, dimension + 1) lines or triangles between the points, for drawing
+    # (n_points, 2) [m/N] what the modes left out yield if that is estimated, with its error; nothing between the points
+    rest: np.ndarray | None = None
+    rigid: np.ndarray | None = None  # (n_points, n) [kg**-0.5] see `loose`
+
+    @property
+    def dimension(self) -> int:
+        return self.points.shape[1]
+
+    def _index(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        distance = np.linalg.norm(points[:, None] - self.points[None], axis=2)  # (n, n_points)
+        index = distance.argmin(axis=1)
+        span = float(np.ptp(self.points, axis=0).max(initial=0.0))
+        return index, distance[np.arange(len(points)), index] <= 1e-6 * (span or 1.0)
+
+    def at(self, points: np.ndarray) -> np.ndarray:
+        return self.values[self._index(points)[0]]
+
+    def contains(self, points: np.ndarray) -> np.ndarray:
+        return self._index(points)[1]
+
+    def deflection(self, loads: np.ndarray, points: np.ndarray) -> np.ndarray:
+        return self.static[np.ix_(self._index(points)[0], self._index(loads)[0])]
+
+    def compliance_error(self, points: np.ndarray) -> np.ndarray:
+        """Of an estimate; between two points the modes left out yield at most the geometric mean of both."""
+        index = self._index(points)[0]
+        if self.rest is None:
+            return np.zeros(len(index))
+        middle, error = self.rest[index].T
+        root = np.sqrt(middle)
+        doubt = error + root * (root.sum() - root)
+        return doubt / np.maximum(self.static[index, index], np.finfo(float).tiny)
+
+    def loose(self, points: np.ndarray) -> np.ndarray:
+        return super().loose(points) if self.rigid is None else self.rigid[self._index(points)[0]]
+
+    def take(self, n_modes: int) -> "SampledShapes":
+        return replace(self, values=self.values[:, :n_modes].copy())
+
+    def grid(self) -> tuple[np.ndarray, np.ndarray]:
+        return self.points, np.arange(len(self.points))[:, None] if self.cells is None else self.cells
+
+
+def loose_motions(points: np.ndarray, cells: np.ndarray | None, values: np.ndarray, mass: float, free: Any) -> Any:
+    """Rigid motions (n_points, n) that modes without any may lack; None if these are the modes of a held body."""
+    share, rigid = unstated.carried(points, cells, values, mass), unstated.rigid(points, cells, mass)
+    if free:
+        if share >= unstated.HELD:
+            raise ValueError(
+                f"free must be False: one of the modes carries {share:.0%} of the mass along, as only those of a held "
+                "body do; leave it out, or check mass and the scale of shapes"
+            )
+        if rigid is None:
+            raise ValueError(
+                "free needs points that span the body, to find its rigid motions; give these as modes of 0 Hz instead"
+            )
+        return rigid
+    if share >= unstated.HELD:
+        return None
+    return np.full((len(points), 1), mass**-0.5) if rigid is None else rigid
+
+
+def connected_cells(cells: Any, points: np.ndarray) -> np.ndarray | None:
+    """The cells as numbers of points, (n_cells, dimension + 1), checked."""
+    if cells is None:
+        return None
+    array = check.array("cells", cells, (None, points.shape[1] + 1))
+    if (array != np.round(array)).any() or array.min() < 0 or array.max() >= len(points):
+        raise ValueError(f"cells must be numbers of points from 0 to {len(points) - 1}, got {check.shown(cells)}")
+    return array.astype(int)
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class FieldShapes(Shapes, check.Locked):
+    """Shapes of an FE solution, evaluated anywhere on the body with the shape functions of its elements."""
+
+    system: System
+    vectors: np.ndarray  # (n_dofs, n_modes) [-] mass-normalised in the frame of the system
+    flexibility: Flexibility
+    _under: Remembered = field(default_factory=lambda: Remembered(REMEMBERED), repr=False)  # deflections, by loads
+    _at: Remembered = field(default_factory=lambda: Remembered(REMEMBERED), init=False, repr=False)  # shapes, by point
+
+    @property
+    def dimension(self) -> int:
+        return self.system.mesh.dimension
+
+    def at(self, points: np.ndarray) -> np.ndarray:
+        if len(points) != 1:
+            return self._shapes(points)
+        shapes = self._at.found(points, self._shapes)
+        shapes.flags.writeable = False
+        return shapes
+
+    def _shapes(self, points: np.ndarray) -> np.ndarray:
+        return self.system.interpolate(points) @ self.vectors * self.system.frame.mass**-0.5
+
+    def contains(self, points: np.ndarray) -> np.ndarray:
+        return self.system.contains(points)
+
+    def _deflection(self, loads: np.ndarray) -> point_load.Deflection:
+        return self._under.found(loads, lambda loads: point_load.static_deflection(self.system, loads))
+
+    def compliance(self, points: np.ndarray) -> np.ndarray:
+        return self._deflection(points).compliance
+
+    def compliance_error(self, points: np.ndarray) -> np.ndarray:
+        return self._deflection(points).error
+
+    def deflection(self, loads: np.ndarray, points: np.ndarray) -> np.ndarray:
+        return self._deflection(loads).at(points)
+
+    def take(self, n_modes: int) -> "FieldShapes":
+        return replace(self, vectors=self.vectors[:, :n_modes].copy())
+
+    def grid(self) -> tuple[np.ndarray, np.ndarray]:
+        return self.system.mesh.points, self.system.mesh.cells
