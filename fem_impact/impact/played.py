@@ -20,7 +20,7 @@ SHORTEST = 12  # [-] halvings of a frame that a step in contact may need: 5 ns a
 AT_ONCE = 64  # [-] strokes in one block, far more than hands or a keyboard make; what comes on top waits for the next
 
 
-class Played:
+class StruckBody:
     """A body with sticks, at rest at first; `fill` computes what is heard, block by block."""
 
     def __init__(

@@ -8,7 +8,7 @@ import numpy as np
 from .._base import check
 from ..impact import collision
 from ..impact.contact import Contact
-from ..impact.played import AT_ONCE, Played
+from ..impact.played import AT_ONCE, StruckBody
 from ..impact.striker import Striker
 from ..modes.modal import Modes
 from ..show.sound import FULL_SCALE, HIGHEST_RATE, RATE, Sound
@@ -96,7 +96,7 @@ class Player:
         needed = collision.striker_modes(striker, contact=contact, speed=fastest, tolerance=collision.TOLERANCE)[0]
         self.striker = striker if striker.fixed else collision.shortened(striker, needed)
         place = modes.point("listen", self.points[0] if listen is None else listen)
-        self._played = Played(
+        self._played = StruckBody(
             modes, self.striker, contact, points=self.points, listen=place, fastest=self.fastest, rate=self.rate,
             sticks=sticks, n_trace=n_trace,
         )  # fmt: skip
@@ -126,12 +126,12 @@ class Player:
 
     @property
     def counted(self) -> dict[str, int]:
-        """What happened so far, see `Played.counted`."""
+        """What happened so far, see `StruckBody.counted`."""
         return self._played.counted
 
     @property
     def trace(self) -> np.ndarray:
-        """Steps in contact so far, up to ``n_trace``, see `Played.trace`."""
+        """Steps in contact so far, up to ``n_trace``, see `StruckBody.trace`."""
         return self._played.trace
 
 

@@ -127,7 +127,7 @@ def update(
         raise ValueError("measured must hold positive frequencies only; leave out rigid motions")
     if isinstance(build, Scene):
         _check_names(build, box)
-    search = _Search(build, box, measured, target, points)
+    search = _Misfit(build, box, measured, target, points)
     used = every = np.arange(len(target))  # numbers of the measured modes that are paired
     found = search.fit(box.start(start), every)
     for count in range(3):  # frequencies that belong to no mode: with more, nobody knows which ones are right
@@ -150,7 +150,7 @@ def update(
 
 
 @dataclass(eq=False)
-class _Search:
+class _Misfit:
     """Misfits of frequencies over coordinates of the constants, and the modes found so far."""
 
     build: Any
