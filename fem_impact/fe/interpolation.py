@@ -43,7 +43,7 @@ class Interpolation:
         found = [rows[still]]  # on a support, so at rest
         for some in blocks(len(moving)):
             if some.size:
-                places, weights = spread(self.space, local[moving[some]], radius[moving[some]])
+                places, weights = spread_forces(self.space, local[moving[some]], radius[moving[some]])
                 found.append(weights @ self._exactly(places, expand.shape[0]))
         return vstack(found, format="csr")[np.argsort(np.concatenate([still, moving]))]
 
@@ -56,7 +56,7 @@ class Interpolation:
         return csr_matrix((values.ravel(), (rows, dofs.ravel())), shape=(len(local), n_all))
 
 
-def spread(space: Any, points: np.ndarray, radius: np.ndarray) -> tuple[np.ndarray, Sparse]:
+def spread_forces(space: Any, points: np.ndarray, radius: np.ndarray) -> tuple[np.ndarray, Sparse]:
     """Places (n, 2) over which forces at points (n_points, 2) are spread, and their weights (n_points, n).
 
     Each disk, of its ``radius`` (n_points,), is cut at the edge of the body. A weight linear in the place moves its

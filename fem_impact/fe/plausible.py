@@ -75,7 +75,7 @@ def material(given: Any) -> tuple[str, ...]:
     return tuple(notes)
 
 
-def body(sides: Sequence[float], section: Any = None) -> tuple[str, ...]:
+def doubted_sizes(sides: Sequence[float], section: Any = None) -> tuple[str, ...]:
     """Notes on a body with sides [m] in its plane, or along its line, and a section."""
     notes = list(number("length", max(sides)))
     if section is None:

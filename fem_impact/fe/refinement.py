@@ -116,7 +116,7 @@ def _wave(system: System, n_modes: int | None, max_frequency: float | None) -> f
     return mean * float((np.mean(stiffness**-0.5) ** -2 / stiffness.min()) ** 0.25)
 
 
-def solve(system: System, n_modes: int | None, max_frequency: float | None) -> Spectrum:
+def solve_on_mesh(system: System, n_modes: int | None, max_frequency: float | None) -> Spectrum:
     """Find the lowest modes on the mesh as it is: a given number, or all below a frequency [Hz], counted by inertia."""
     flexibility, omega, vectors = _pairs(system, n_modes, max_frequency)
     return Spectrum(system, flexibility, omega, vectors, _claimed(system, omega, vectors))
@@ -146,8 +146,8 @@ def _pairs(
     return flexibility, omega, vectors
 
 
-def kept(system: System, n_modes: int | None, max_frequency: float | None, path: Path) -> Spectrum:
-    """Call `solve` and save the result in a file; a later call for the same modes of the same body reads it."""
+def solve_or_read(system: System, n_modes: int | None, max_frequency: float | None, path: Path) -> Spectrum:
+    """Call `solve_on_mesh` and save the result in a file; a later call for the same modes of the same body reads it."""
     frame = system.frame  # the matrices are the same for every size, thickness and material
     sizes = frame.length, frame.stiffness, frame.inertia
     asked = repr((n_modes, max_frequency, system.element, *sizes, identity.program())).encode()
@@ -158,7 +158,7 @@ def kept(system: System, n_modes: int | None, max_frequency: float | None, path:
     arrays = keeping.read(path, key)
     if arrays is not None:
         return Spectrum(system, Flexibility.of(system), *(arrays[name] for name in names))
-    found = solve(system, n_modes, max_frequency)
+    found = solve_on_mesh(system, n_modes, max_frequency)
     keeping.write(path, key, {name: getattr(found, name) for name in names})
     return found
 
@@ -319,7 +319,7 @@ def refine(system: System, n_modes: int | None, max_frequency: float | None, tol
         raise ValueError(
             "tolerance needs a mesh that can be refined; make it with fi.mesh or load it with fi.mesh.load"
         )
-    found, size = solve(_start(system, n_modes, max_frequency, tolerance), n_modes, max_frequency), np.inf
+    found, size = solve_on_mesh(_start(system, n_modes, max_frequency, tolerance), n_modes, max_frequency), np.inf
     seen: list[tuple[float, float]] = []
     for left in reversed(range(MOST_MESHES + 1)):
         if float(found.error.max()) <= tolerance:
@@ -337,10 +337,10 @@ def refine(system: System, n_modes: int | None, max_frequency: float | None, tol
             break
         size = mesh.size
         finer = reassemble(system, mesh.refined(step), layer=found.system.layer / step)
-        found = solve(finer, n_modes, max_frequency)
+        found = solve_on_mesh(finer, n_modes, max_frequency)
     mode = int(found.error.argmax())
     least = float(f"{2.0 * found.error[mode]:.1e}")  # where corners hold the error, it differs from mesh to mesh
-    slips = plausible.body(np.ptp(found.system.mesh.points, axis=0), found.system.section)
+    slips = plausible.doubted_sizes(np.ptp(found.system.mesh.points, axis=0), found.system.section)
     none = f"no tolerance is: check the units, as {slips[0]}" if slips else f"no tolerance up to {LOOSEST:g} is"
     advice = f"a tolerance of {least:g} is met" if least <= LOOSEST else none
     advice += ", or ask for fewer modes"
@@ -433,4 +433,4 @@ def _second_opinion(system: System, plate: Plate, n_modes: int) -> Spectrum:
         factor = (MORLEY_UNKNOWNS / morley.n_dofs) ** 0.5
         if abs(factor - 1.0) > 0.1:
             morley = reassemble(morley, mesh.refined(factor))
-    return solve(morley, n_modes, None)
+    return solve_on_mesh(morley, n_modes, None)

@@ -129,7 +129,9 @@ def constrain(
     return (csr_matrix((values, (rows, columns)), shape=(n_all, len(kept))), project), sprung
 
 
-def errors(system: Any, vectors: np.ndarray, loads: np.ndarray, forced: np.ndarray | None = None) -> np.ndarray:
+def balanced_errors(
+    system: Any, vectors: np.ndarray, loads: np.ndarray, forced: np.ndarray | None = None
+) -> np.ndarray:
     """Errors (3, n) of the squared energy norm of solutions, from moments and shear forces in equilibrium.
 
     As `beam_elements.energy_errors`; here the shear force must agree, too.
@@ -164,6 +166,6 @@ def errors(system: Any, vectors: np.ndarray, loads: np.ndarray, forced: np.ndarr
 
 
 TIMOSHENKO = Theory(
-    "timoshenko", "hermite and shear", 1, _domain, terms, _hold, errors, wave=30.0, unknowns=2 * DEGREE - 1,
+    "timoshenko", "hermite and shear", 1, _domain, terms, _hold, balanced_errors, wave=30.0, unknowns=2 * DEGREE - 1,
     fields=("stiffness", "inertia", "shear", "rotary"),
 )  # fmt: skip

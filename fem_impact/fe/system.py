@@ -55,7 +55,9 @@ class System(check.Brief):
         """Notebook view: the body with its supports, and a table of its size."""
         held = ", ".join(f"{name} {kind}" for name, kind in self.supports.items())
         rows = [("theory", self.theory), ("mass", f"{self.mass:.4g} kg"), ("supports", held), ("unknowns", self.n_dofs)]
-        drawn = sketch.body(self.mesh, supports=self.supports, title=f"Outline of a body of {self.mass:.4g} kg: {held}")
+        drawn = sketch.draw_body(
+            self.mesh, supports=self.supports, title=f"Outline of a body of {self.mass:.4g} kg: {held}"
+        )
         return markup.side_by_side(drawn, markup.table(rows))
 
     @property
@@ -102,4 +104,4 @@ class System(check.Brief):
 
 def notes_on(mesh: Mesh, section: Plate | Beam) -> tuple[str, ...]:
     """What a mesh assumed, and numbers of the body that are probably a slip of a unit."""
-    return plausible.together(mesh.notes, plausible.body(np.ptp(mesh.points, axis=0), section))
+    return plausible.together(mesh.notes, plausible.doubted_sizes(np.ptp(mesh.points, axis=0), section))

@@ -116,7 +116,7 @@ class MindlinSpace:
         small = np.setdiff1d(dofs[(longest < SMALL * thickness) & ~bends], dofs[bends])
         self.turned = np.isin(dofs, small)
 
-    def kept(self, cells: np.ndarray, *shapes: np.ndarray) -> list[np.ndarray]:
+    def slopes_in_rotations(self, cells: np.ndarray, *shapes: np.ndarray) -> list[np.ndarray]:
         """Part of grad w in the rotations of cells (n,): at nodes that hold shear strains; (.., n_q, 2, 21) each.
 
         ``shapes`` (n, .., n_q, 15) are the quartic functions or their derivatives. For straight triangles.
@@ -140,7 +140,7 @@ class MindlinSpace:
         slope[:, 0, :, 21 : 21 + SHEAR] = slope[:, 1, :, 21 + SHEAR :] = own
         small = np.flatnonzero(self.turned[cells].any(axis=1))
         if small.size:
-            slope[small, ..., :21] = self.kept(cells[small], shape[small])[0].transpose(0, 2, 1, 3)
+            slope[small, ..., :21] = self.slopes_in_rotations(cells[small], shape[small])[0].transpose(0, 2, 1, 3)
         return slope
 
     def locate(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -178,7 +178,7 @@ def terms(space: MindlinSpace, points: Points, cells: np.ndarray) -> list[Term]:
     small = np.flatnonzero(space.turned[cells].any(axis=1))
     if small.size:
         values = np.broadcast_to(shape, (len(small), *shape.shape))
-        tilt, bend = space.kept(cells[small], values, gradient[small])
+        tilt, bend = space.slopes_in_rotations(cells[small], values, gradient[small])
         shear[small, ..., :21] = rotation[small, ..., :21] - tilt
         rotation[small, ..., :21] = tilt
         curvature[small, ..., :21] = np.stack(
@@ -357,13 +357,13 @@ def missed_by_layers(system: Any, vectors: np.ndarray) -> np.ndarray:
     return np.einsum("fqk,fq->k", moment**2, share * width / rigidity * ds)
 
 
-def errors(system: Any, vectors: np.ndarray, loads: np.ndarray, forced: Any = None) -> np.ndarray:
+def errors_by_layers(system: Any, vectors: np.ndarray, loads: np.ndarray, forced: Any = None) -> np.ndarray:
     """Errors (3, n) of the squared energy norm that vectors have by edge layers; the rest is told by a second mesh."""
     return np.outer([1.0, 0.0, 0.0], missed_by_layers(system, vectors))
 
 
 MINDLIN = Theory(
-    "mindlin", "argyris and shear", 2, _domain, terms, _hold, errors, wave=1.8, unknowns=47.0,
+    "mindlin", "argyris and shear", 2, _domain, terms, _hold, errors_by_layers, wave=1.8, unknowns=47.0,
     fields=("stiffness", "inertia", "shear", "rotary"), words=(*KINDS, SOFT), graded=True, compared=True,
     patch=PATCH, sharp=plates.is_tiny, layered=layered,
 )  # fmt: skip

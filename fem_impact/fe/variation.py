@@ -28,7 +28,7 @@ class SectionChange:
     weights: tuple[float, ...]  # [1 over the unit of the number]
 
     @classmethod
-    def along(cls, name: str, value: Any, made: Any) -> "SectionChange":
+    def by_differences(cls, name: str, value: Any, made: Any) -> "SectionChange":
         """How a section changes with a number, at a value of it, from a function that makes it; ValueError names it."""
         value = check.number(name, value)
         if not callable(made):
@@ -45,7 +45,7 @@ class SectionChange:
         raise ValueError(f"{name}: no section can be made on either side of {value:g}; change the value")
 
 
-def energies(system: System, change: SectionChange, vectors: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def energy_changes(system: System, change: SectionChange, vectors: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Changes ``v_i' dK v_j`` and ``v_i' dM v_j`` (n, n) per unit of a number, in the frame of the system.
 
     Parameters

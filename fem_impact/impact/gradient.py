@@ -334,7 +334,8 @@ def section_changes(sections: Any) -> dict[str, tuple[float, SectionChange]]:
     ):
         raise ValueError(f"sections must be a dict of names to (value, function), got {check.shown(sections)}")
     return {
-        name: (float(pair[0]), SectionChange.along(f"sections[{name!r}]", *pair)) for name, pair in sections.items()
+        name: (float(pair[0]), SectionChange.by_differences(f"sections[{name!r}]", *pair))
+        for name, pair in sections.items()
     }
 
 

@@ -364,7 +364,7 @@ class Parameters(check.Brief):
             raise check.SimulationError(
                 f"no gradient in the section: {self.why_no_target or 'the target moved before the blow'}"
             )
-        seen = varied.changed(target, change, hit.at)
+        seen = varied.changed_modes(target, change, hit.at)
         found.omega[i, part] = seen.omega
         found.shape[i, 0, part] = -seen.shape
         found.bias[i, part] = motion.constant_force(hit) * seen.shape

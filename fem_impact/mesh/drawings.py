@@ -143,7 +143,7 @@ def _refuse_entities(path: Path) -> None:
 
     numbers = shapes = 0
 
-    def count(element: str, attributes: dict[str, str]) -> None:
+    def count_shape(element: str, attributes: dict[str, str]) -> None:
         nonlocal numbers, shapes
         shapes += element.rpartition(":")[2] in SHAPES
         if shapes > MOST_PIECES:
@@ -158,7 +158,7 @@ def _refuse_entities(path: Path) -> None:
             raise ValueError(f"it contains a comment of {len(text) / 1e6:.3g} million characters; remove it")
 
     parser = expat.ParserCreate()
-    parser.EntityDeclHandler, parser.StartElementHandler, parser.CommentHandler = refuse, count, comment
+    parser.EntityDeclHandler, parser.StartElementHandler, parser.CommentHandler = refuse, count_shape, comment
     with open(path, "rb") as file:
         parser.Parse(file.read(), True)  # ParseFile would read a huge comment again and again
 

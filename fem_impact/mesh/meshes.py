@@ -79,7 +79,7 @@ class Mesh(check.Locked):
         edges = ", ".join(name for name in self.edges if name != "boundary")
         extent = " x ".join(f"{size:.4g} m" for size in np.ptp(self.points, axis=0))
         rows = [("extent", extent), ("points", len(self.points)), (kind, len(self.cells)), ("edges", edges)]
-        return markup.side_by_side(sketch.body(self, title=f"Outline of a body of {extent}"), markup.table(rows))
+        return markup.side_by_side(sketch.draw_body(self, title=f"Outline of a body of {extent}"), markup.table(rows))
 
     def refined(self, factor: float = 2.0) -> "Mesh":
         """The same body with elements smaller by ``factor``, fitted to the exact outline if it is known."""
@@ -307,7 +307,7 @@ def load(path: Any, *, unit: str | None = None) -> Mesh:
     loops.sort(key=lambda loop: -float(np.ptp(points[loop[:, 0]], axis=0).max()))
     facets = np.concatenate(loops)
     number = {(min(a, b), max(a, b)): i for i, (a, b) in enumerate(facets.tolist())}
-    curve = smooth_edges.follow(points, loops, {number[pair]: at for pair, at in given.items() if pair in number})
+    curve = smooth_edges.recover_rim(points, loops, {number[pair]: at for pair, at in given.items() if pair in number})
     if curve.n_curved and not given:
         notes.append(f"{curve.n_curved} sides of the rim were replaced by smooth curves through their ends")
     edges = {name: np.array(sorted(number[p] for p in found if p in number), int) for name, found in pairs.items()}

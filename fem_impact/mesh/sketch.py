@@ -18,7 +18,7 @@ EDGES = {  # support -> line width [px] and dash pattern; free edges keep the th
 }
 
 
-def body(
+def draw_body(
     mesh: "Mesh", *, supports: Mapping[str, Any] | None = None, at: Any = None, points: Any = (), title: str
 ) -> str:
     """A plate from above or a beam from the side, with its supports, strike point and observation points.

@@ -25,7 +25,7 @@ class SmoothRim:
     n_curved: int  # number of curved facets
 
 
-def follow(points: np.ndarray, loops: list[np.ndarray], given: dict[int, np.ndarray]) -> SmoothRim:
+def recover_rim(points: np.ndarray, loops: list[np.ndarray], given: dict[int, np.ndarray]) -> SmoothRim:
     """Recover the curve that a rim was drawn with.
 
     Parameters

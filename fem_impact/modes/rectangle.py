@@ -197,7 +197,7 @@ def rectangle(
         raise ValueError(f"max_frequency must reach the first mode, got {max_frequency:g} Hz")
     numbers = np.column_stack([m[order], n[order]])
     values = omega(*numbers.T) ** 2
-    notes = plausible.body((length, width), section)
+    notes = plausible.doubted_sizes((length, width), section)
     shapes = RectangleShapes(length, width, numbers)
     return asked.modes(shapes, values, notes)
 

@@ -172,7 +172,7 @@ def beam(
         n_modes=n_modes, max_frequency=max_frequency, damping_ratio=damping_ratio,
     )  # fmt: skip
     stout = _stoutness(theory, section, length, slenderness, shear_ratio)
-    notes = plausible.body((length,), section)
+    notes = plausible.doubted_sizes((length,), section)
     if stout is not None:
         return replace(asked.modes(*_timoshenko(stout, pair, length, asked), notes), thick=True)
     rigid = _rigid(pair)
@@ -218,7 +218,7 @@ def _timoshenko(
     stout: timoshenko.Stoutness, ends: tuple[str, str], length: float, asked: Request
 ) -> tuple[timoshenko.TimoshenkoShapes, np.ndarray]:
     """Shapes and omega**2 of a Timoshenko beam at unit mass and rigidity."""
-    rigid = timoshenko.rigid(ends, stout)
+    rigid = timoshenko.rigid_motions(ends, stout)
     first = float(np.sqrt(stout.values(ends, len(rigid), 1)[0]))
     count, reach = asked.count(first, timoshenko.MOST)
     if np.isfinite(reach):

@@ -92,7 +92,7 @@ def _unwrapped(shapes: Shapes) -> tuple[Shapes, float, np.ndarray | None]:
     return shapes, 1.0, None
 
 
-def _checked(system: System) -> None:
+def _check_supports(system: System) -> None:
     """Raise ValueError unless it is known what holds the plane of a body of elements, and its slopes are known."""
     kinds = support_of_facets(system.mesh, dict(system.supports), support_words(system.theory))
     if not all(isinstance(kind, str) for kind in kinds):
@@ -107,7 +107,7 @@ def _sheet(shapes: Shapes, section: Plate) -> tuple[membrane.Sheet, membrane.Ste
     """The plane of a plate, and the slopes of its shapes."""
     if isinstance(shapes, (FieldShapes, RitzShapes)):
         system = shapes.system
-        _checked(system)
+        _check_supports(system)
         moved, unit = system.expand @ _vectors(shapes), system.frame.mass**-0.5 / system.frame.length
 
         def by_elements(cells: np.ndarray, x: np.ndarray) -> np.ndarray:
@@ -132,7 +132,7 @@ def _sheet(shapes: Shapes, section: Plate) -> tuple[membrane.Sheet, membrane.Ste
 def _tension(shapes: Shapes, section: Beam) -> tuple[np.ndarray, float]:
     """``int w_i' w_j'`` (n, n) of a beam, and its length over E A."""
     if isinstance(shapes, (FieldShapes, RitzShapes)):
-        _checked(shapes.system)
+        _check_supports(shapes.system)
         return slopes.products(shapes.system, _vectors(shapes), np.eye(1)), slopes.softness(shapes.system)
     if isinstance(shapes, (BeamShapes, TimoshenkoShapes)):
         if not set(shapes.ends) <= set(HELD):

@@ -138,7 +138,7 @@ def _negative(matrices: np.ndarray) -> np.ndarray:
     return (np.linalg.eigvalsh(0.5 * (matrices + matrices.transpose(0, 2, 1))) < 0.0).sum(axis=1)
 
 
-def rigid(ends: tuple[str, str], stoutness: Stoutness) -> np.ndarray:
+def rigid_motions(ends: tuple[str, str], stoutness: Stoutness) -> np.ndarray:
     """Rigid shapes c0 + c1 x of a beam of unit mass and length, (n_rigid, 2)."""
     if ends == ("free", "free"):
         turn = (1.0 / 12.0 + stoutness.R) ** -0.5
@@ -186,7 +186,7 @@ def _green(ends: tuple[str, str], stoutness: Stoutness, load: float, x: np.ndarr
     beyond its place and what the inertia of the rigid motion adds, which balances it.
     """
     R, S = stoutness.R, stoutness.S
-    moving = rigid(ends, stoutness)
+    moving = rigid_motions(ends, stoutness)
     c0, c1 = -moving.T @ (moving @ [1.0, load])  # inertia force c0 + c1 x and moment R c1 per length
 
     def constants(x: np.ndarray) -> np.ndarray:

@@ -56,7 +56,7 @@ def left_out(omega: np.ndarray, rows: np.ndarray, mass: float, dimension: int) -
     return 0.5 * (low + high), 0.5 * (high - low)
 
 
-def rigid(points: np.ndarray, cells: np.ndarray | None, mass: float) -> np.ndarray | None:
+def rigid_motions(points: np.ndarray, cells: np.ndarray | None, mass: float) -> np.ndarray | None:
     """Shapes of the rigid motions of a uniform body over its points, (n_points, 1 + dimension) [kg**-0.5].
 
     None if the points span no line or area.

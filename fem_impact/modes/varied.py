@@ -7,7 +7,7 @@ import numpy as np
 from .._base import check
 from .._base.check import SimulationError
 from ..fe.eigenvalues import CLUSTER
-from ..fe.variation import SectionChange, energies
+from ..fe.variation import SectionChange, energy_changes
 from .modal import Modes
 from .shapes import FieldShapes
 
@@ -43,7 +43,7 @@ def frequency_slopes(modes: Modes, change: SectionChange, which: np.ndarray) -> 
     rate = shapes.system.frame.rate
     groups = [np.flatnonzero(_alike(modes)[i]) for i in which]
     used = np.unique(np.concatenate(groups)) if len(groups) else np.zeros(0, int)
-    stiffer, heavier = energies(shapes.system, change, shapes.vectors[:, used])
+    stiffer, heavier = energy_changes(shapes.system, change, shapes.vectors[:, used])
     found = np.zeros(len(which))
     for k, (i, group) in enumerate(zip(which, groups)):
         own = np.searchsorted(used, group)
@@ -66,7 +66,7 @@ def _alike(modes: Modes) -> np.ndarray:
     return np.abs(omega - omega[:, None]) <= np.maximum(unsure, np.reshape(unsure, (-1, 1)))
 
 
-def changed(modes: Modes, change: SectionChange, at: np.ndarray) -> ModesChange:
+def changed_modes(modes: Modes, change: SectionChange, at: np.ndarray) -> ModesChange:
     """Changes of modes as seen from a point ``at`` (dimension,) [m], exact but for the elements.
 
     Modes that share a frequency are changed together: only what the point sees of them counts, and that is smooth.
@@ -78,7 +78,7 @@ def changed(modes: Modes, change: SectionChange, at: np.ndarray) -> ModesChange:
     seen = (load.T @ shapes.vectors)[0]  # (n_modes,) in the frame
     square = (modes.omega / frame.rate) ** 2
     rest = _left_out(shapes, seen, square, load)
-    stiffer, heavier = energies(system, change, np.column_stack([shapes.vectors, *rest]))
+    stiffer, heavier = energy_changes(system, change, np.column_stack([shapes.vectors, *rest]))
     force = stiffer[:, :n] - heavier[:, :n] * square  # (n + TERMS, n) what a change of each mode is pushed with
     slope = np.diag(force[:n]).copy()  # of the eigenvalues
     apart, alike = square - square[:, None], _alike(modes)
@@ -127,6 +127,6 @@ def _softer(shapes: FieldShapes, change: SectionChange, at: np.ndarray) -> float
     system, dip = found.system, found.vectors[:, 0]
     load = np.asarray(system.interpolate(at[None]).todense())[0]
     drift = system.rigid @ (system.rigid.T @ load)  # acceleration of a body that can move rigidly
-    stiffer, heavier = energies(system, change, np.column_stack([dip, drift]))
+    stiffer, heavier = energy_changes(system, change, np.column_stack([dip, drift]))
     unit = system.frame.mass * system.frame.rate**2
     return -float(stiffer[0, 0] + 2.0 * heavier[0, 1]) / unit

@@ -40,7 +40,7 @@ def serve(
         check.extra(module, "web", "exploring")
     from tornado.ioloop import IOLoop
 
-    from .explore_server import begin
+    from .explore_server import open_server
 
     if not 0 <= port < 65536:
         raise ValueError(f"port must lie between 0 and 65535, got {port}")
@@ -53,7 +53,7 @@ def serve(
             explorer.answer(explorer.setup.start)  # compile the kernels before the page opens
         gc.collect()
         gc.freeze()  # the modes outlive every answer, and looking through them takes longer than one
-        server, address = begin(explorer, workers, port)
+        server, address = open_server(explorer, workers, port)
         if ready is not None:
             ready(address)
         try:

@@ -179,7 +179,7 @@ class Setup:
                 return None if views is None else next(iter(views.values()))
         return None
 
-    def residual(self, at: tuple[float, ...]) -> float:
+    def residual_at(self, at: tuple[float, ...]) -> float:
         """The residual compliance [m/N] at a strike point."""
         return float(self.base.modes.residual_compliance([at])[0, 0])
 

@@ -47,7 +47,7 @@ class Explorer:
     def __init__(self, setup: Setup) -> None:
         self.setup, self.mapper = setup, Mapper(setup)
         self.views: dict[Point, View] = {}
-        self.rest = setup.residual(setup.start.at)  # [m/N] of the last point known, good enough for a first answer
+        self.rest = setup.residual_at(setup.start.at)  # [m/N] of the last point known, good enough for a first answer
         self.limit: tuple[Any, float] = None, 0.0  # [Hz] the last threshold, and what it is of
         if not setup.by_vectors:
             self.learn(setup.start.at, View(self.rest, None))
@@ -61,7 +61,7 @@ class Explorer:
     def look(self, at: Point) -> View:
         """Find out what blows at a point see: seconds, if these are Ritz vectors."""
         if at not in self.views:
-            self.learn(at, View(self.setup.residual(at), self.setup.body_seen(at)))
+            self.learn(at, View(self.setup.residual_at(at), self.setup.body_seen(at)))
         return self.views[at]
 
     def case(self, settings: Settings) -> Case:
@@ -76,7 +76,7 @@ class Explorer:
             hit = quick(case)
         except SimulationError as error:
             return {"failed": str(error)}, None
-        return {**_force(hit), "cells": _told(hit, False), "what": _described(case.modes)}, hit
+        return {**_force(hit), "cells": _numbers(hit, False), "what": _described(case.modes)}, hit
 
     def rest_of(self, settings: Settings, hit: Response | None) -> Message:
         """What follows the answer: spectrum, threshold and the scene file."""
@@ -101,7 +101,7 @@ class Explorer:
         except SimulationError as error:
             return {"failed": str(error)}
         return {
-            **_force(hit), **_spectrum(hit), "cells": [*_told(hit, True), ("model's error", power(hit.model_error))],
+            **_force(hit), **_spectrum(hit), "cells": [*_numbers(hit, True), ("model's error", power(hit.model_error))],
             "what": _described(case.modes), "verdict": hit.verdict, "missed": not hit.tolerance_met,
             "trusted": hit.trusted, "model": hit.model_verdict[1:],
         }  # fmt: skip
@@ -185,7 +185,7 @@ def _spectrum(hit: Response) -> Message:
     return {"spectrum": packed(np.maximum(size, 0.1 * SPECTRUM_DEPTH * top)), "top": top}
 
 
-def _told(hit: Response, exact: bool) -> list[tuple[str, str]]:
+def _numbers(hit: Response, exact: bool) -> list[tuple[str, str]]:
     """The blow in names and values; without an error until the hand rests and the strike point is known."""
     error = "refining …" if not exact else power(hit.error.total) if hit.error.resolvable else "not resolvable"
     return [

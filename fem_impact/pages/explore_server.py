@@ -95,7 +95,7 @@ class Guard(Router):
         return self.application.get_handler_delegate(request, Refused)
 
 
-def begin(explorer: Explorer, workers: list[Worker], port: int) -> tuple[HTTPServer, str]:
+def open_server(explorer: Explorer, workers: list[Worker], port: int) -> tuple[HTTPServer, str]:
     """A server on the loopback address, and its address; port 0 is any free one."""
     listening = socket.create_server((LOCAL, port))
     listening.setblocking(False)

@@ -11,7 +11,7 @@ from ..scenes.sentences import place
 from .explore_map import Mapper, Picture, Window
 from .explore_model import Settings, Setup
 from .explore_numbers import Explorer, Message, Point, View, drawn
-from .explore_view import RATES, checked, ends, pair
+from .explore_view import RATES, check_sliders, ends, pair
 
 REST = 0.15  # [s] without a change before the blow is judged and the map drawn again
 
@@ -65,7 +65,7 @@ class Session:
         """Do what the page asks for; ValueError if that makes no sense."""
         if not isinstance(message, dict):
             raise ValueError("a message must be a table")
-        turned = checked(self.ends, message.get("turn", {}))
+        turned = check_sliders(self.ends, message.get("turn", {}))
         if "play" in message:
             self._listen(bool(message["play"] == "roll"))
         elif "view" in message:

@@ -99,7 +99,7 @@ def parsed(message: str | bytes) -> Any:
         raise ValueError("a message must not be nested so deeply") from None
 
 
-def checked(known: Ends, turned: Any) -> dict[str, float]:
+def check_sliders(known: Ends, turned: Any) -> dict[str, float]:
     """What a page says of its sliders: finite numbers within their ends; ValueError if it is anything else.
 
     A click may lie beyond the ends of x and y: then it is beside the body, and no other point is meant.

@@ -83,10 +83,10 @@ def main() -> None:
     # an answer that the page no longer takes is written once more as the pipe is closed
     with suppress(BrokenPipeError), os.fdopen(os.dup(sys.stdout.fileno()), "wb") as out:
         os.dup2(sys.stderr.fileno(), sys.stdout.fileno())  # nothing printed may get between the answers
-        follow(sys.stdin.buffer, out)
+        answer_questions(sys.stdin.buffer, out)
 
 
-def follow(questions: BinaryIO, answers: BinaryIO) -> None:
+def answer_questions(questions: BinaryIO, answers: BinaryIO) -> None:
     """Answer the questions about the object that comes first."""
     try:
         held = pickle.load(questions)

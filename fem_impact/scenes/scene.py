@@ -287,7 +287,7 @@ class Scene(check.Brief):
         points = [np.atleast_1d(np.asarray(point, float)) for point in self.watched]
         title = f"Outline of the struck body, struck at {at} m"
         title += f", observed at {len(points)} point{'s' * (len(points) > 1)}" if points else ""
-        return sketch.body(self.body(), supports=self.held, at=list(places), points=points, title=title)
+        return sketch.draw_body(self.body(), supports=self.held, at=list(places), points=points, title=title)
 
     def _repr_html_(self) -> str:
         """For notebooks: the picture and the contents of each table."""

@@ -248,7 +248,7 @@ def frequencies(name: str, shape: str, edge: str, h: float, size: float) -> tupl
     if name not in CANDIDATES:
         section = fi.Plate(fi.Material(E=1.0, nu=NU, rho=1.0), h)
         system = fi.assemble(mesh, section, {"boundary": edge}, theory="mindlin")
-        return system.n_dofs, refinement.solve(system, N_MODES, None).omega
+        return system.n_dofs, refinement.solve_on_mesh(system, N_MODES, None).omega
     *elements, reduced = CANDIDATES[name]()
     deflection, rotation, K, M = matrices(curved(mesh), h, (elements[0], elements[1]), reduced)
     expand = held(deflection, rotation, edge, shape == "disk")
@@ -277,7 +277,7 @@ def l_shape() -> None:
     for h in (0.2, 0.05, 0.01):
         section = fi.Plate(fi.Material(E=1.0, nu=NU, rho=1.0), h)
         systems = (fi.assemble(mesh, section, edge, theory=theory) for theory in ("kirchhoff", "mindlin"))
-        thin, found = (refinement.solve(system, len(L_MEMBRANE), None).omega for system in systems)
+        thin, found = (refinement.solve_on_mesh(system, len(L_MEMBRANE), None).omega for system in systems)
         membrane = L_MEMBRANE * thin_rate(h)
         for name, ratio in (
             ("thin", thin / membrane), ("membrane", found / hinged_polygon(membrane, h)),

@@ -99,6 +99,6 @@ def test_modes_that_stay_missing_are_found_by_asking_for_more(monkeypatch):
     monkeypatch.setattr(eigenvalues, "DENSE", 10)
     monkeypatch.setattr(eigenvalues, "_krylov", lambda *arguments: np.delete(whole(*arguments), 2, axis=1))
     with pytest.raises(SimulationError, match=r"flexible modes lie below .* were found; ask for a few more modes"):
-        refinement.solve(system, 12, None)
+        refinement.solve_on_mesh(system, 12, None)
     many = system.n_dofs // 3
-    assert len(refinement.solve(system, many, None).omega) == many
+    assert len(refinement.solve_on_mesh(system, many, None).omega) == many

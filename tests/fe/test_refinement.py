@@ -47,7 +47,7 @@ def test_elements_of_the_size_for_a_tolerance_meet_it_on_a_smooth_plate(toleranc
     system = fi.assemble(fi.mesh.rectangle(0.5, 0.3), PLATE, {"boundary": "hinged"})
     size = refinement.size_for(system, 30, None, tolerance)
     fine = fi.assemble(fi.mesh.rectangle(0.5, 0.3, size=size), PLATE, {"boundary": "hinged"})
-    found = refinement.solve(fine, 30, None)
+    found = refinement.solve_on_mesh(fine, 30, None)
     exact = 2.0 * np.pi * fi.analytic.rectangle(0.5, 0.3, section=PLATE, n_modes=30).frequencies
     error = np.abs(found.omega / exact - 1.0)
     assert 1e-3 * tolerance < error.max() <= tolerance
@@ -84,9 +84,9 @@ def test_a_frequency_limit_counts_by_inertia_and_below_the_first_mode_is_told():
     system = fi.assemble(fi.mesh.rectangle(0.5, 0.5, size=0.125), PLATE, {"boundary": "hinged"})
     first = fi.analytic.rectangle(0.5, 0.5, section=PLATE, n_modes=1).frequencies[0]
     # m**2 + n**2 < 10.5: (1,1), (1,2) twice, (2,2), (1,3) twice
-    assert len(refinement.solve(system, None, 10.5 / 2.0 * first).omega) == 6
+    assert len(refinement.solve_on_mesh(system, None, 10.5 / 2.0 * first).omega) == 6
     with pytest.raises(ValueError, match="max_frequency must reach the first mode; there is none below"):
-        refinement.solve(system, None, 0.9 * first)
+        refinement.solve_on_mesh(system, None, 0.9 * first)
 
 
 def test_resolved_frequencies_grow_with_the_square_of_the_mesh():
@@ -101,19 +101,19 @@ def test_resolved_frequencies_grow_with_the_square_of_the_mesh():
 def test_a_kept_spectrum_is_read_and_a_damaged_or_foreign_one_replaced(tmp_path, monkeypatch):
     system = fi.assemble(fi.mesh.rectangle(0.5, 0.3, size=0.1), PLATE, {"left": "clamped"})
     path = tmp_path / "modes.npz"
-    solved, real = [], refinement.solve
-    monkeypatch.setattr(refinement, "solve", lambda *what: solved.append(what) or real(*what))
-    first, second = (refinement.kept(system, 6, None, path) for _ in range(2))
+    solved, real = [], refinement.solve_on_mesh
+    monkeypatch.setattr(refinement, "solve_on_mesh", lambda *what: solved.append(what) or real(*what))
+    first, second = (refinement.solve_or_read(system, 6, None, path) for _ in range(2))
     assert len(solved) == 1
     assert (first.omega == second.omega).all() and (first.vectors == second.vectors).all()
-    refinement.kept(system, 7, None, path)  # other modes
+    refinement.solve_or_read(system, 7, None, path)  # other modes
     path.write_bytes(path.read_bytes()[:1000])  # cut off
-    again = refinement.kept(system, 7, None, path)
+    again = refinement.solve_or_read(system, 7, None, path)
     other = fi.assemble(fi.mesh.rectangle(0.5, 0.3, size=0.1), PLATE, {"left": "hinged"})
-    assert refinement.kept(other, 7, None, path).omega[0] < again.omega[0]  # another body
+    assert refinement.solve_or_read(other, 7, None, path).omega[0] < again.omega[0]  # another body
     assert len(solved) == 4
     monkeypatch.setattr(identity, "program", lambda: "another version")
-    refinement.kept(other, 7, None, path)
+    refinement.solve_or_read(other, 7, None, path)
     assert len(solved) == 5
 
 
@@ -136,7 +136,7 @@ def test_stated_errors_are_those_of_a_smooth_plate_within_a_factor(element, size
     """Stated over true: 0.8 to 2.5 for quintics, 2.4 to 3.3 for Morley elements, whose clamped plates err more."""
     system = fi.assemble(fi.mesh.rectangle(0.5, 0.3, size=size), PLATE, {"boundary": "hinged"}, element=element)
     exact = 2.0 * np.pi * fi.analytic.rectangle(0.5, 0.3, section=PLATE, n_modes=20).frequencies
-    found = refinement.solve(system, 20, None)
+    found = refinement.solve_on_mesh(system, 20, None)
     low, high = median
     assert low < np.median(found.error / np.abs(found.omega / exact - 1.0)) < high
 
@@ -156,7 +156,7 @@ def test_the_number_of_unknowns_is_foretold(theory):
 def test_some_modes_are_found_to_a_few_millionths_if_nothing_is_asked(n_modes):
     """Elements are finer than the wave of the last mode asks, as few of them cost little."""
     system = fi.assemble(fi.mesh.rectangle(0.5, 0.3), PLATE, {"boundary": "hinged"})
-    found = refinement.solve(refinement.fine_enough(system, n_modes, None, None), n_modes, None)
+    found = refinement.solve_on_mesh(refinement.fine_enough(system, n_modes, None, None), n_modes, None)
     exact = 2.0 * np.pi * fi.analytic.rectangle(0.5, 0.3, section=PLATE, n_modes=n_modes).frequencies
     assert np.abs(found.omega / exact - 1.0).max() < 4e-6  # 2e-7 and 2.3e-6 were measured
 
@@ -165,7 +165,7 @@ def test_the_edge_layer_of_a_stretched_plate_is_resolved():
     """A clamped disk under so much tension that its edge bends over a hundredth of its radius."""
     plate = fi.Plate(PLATE.material, thickness=5e-4, tension=2e4)
     coarse, fine = (
-        refinement.solve(refinement.reassemble(system, system.mesh.refined(factor)), 4, None).omega
+        refinement.solve_on_mesh(refinement.reassemble(system, system.mesh.refined(factor)), 4, None).omega
         for system in [fi.assemble(fi.mesh.disk(0.3), plate, {"boundary": "clamped"})]
         for factor in [system.mesh.size / refinement.size_for(system, 4, None, None) * k for k in (1.0, 1.7)]
     )
@@ -175,10 +175,10 @@ def test_the_edge_layer_of_a_stretched_plate_is_resolved():
 @pytest.mark.parametrize("mesh", [fi.mesh.rectangle(0.5, 0.3, size=0.1), fi.mesh.disk(0.3, size=0.06)])
 def test_errors_fall_as_the_step_of_refinement_assumes(mesh):
     """A mesh made to have a fiftieth of the error has that, or up to three times as much: then a third one follows."""
-    found = refinement.solve(fi.assemble(mesh, PLATE, {"boundary": "hinged"}), 12, None)
+    found = refinement.solve_on_mesh(fi.assemble(mesh, PLATE, {"boundary": "hinged"}), 12, None)
     goal = found.error.max() / 50.0
     step = refinement._needed(found.parts, goal)
-    finer = refinement.solve(refinement.reassemble(found.system, mesh.refined(step)), 12, None)
+    finer = refinement.solve_on_mesh(refinement.reassemble(found.system, mesh.refined(step)), 12, None)
 
     assert 0.3 * goal < finer.error.max() < 3.0 * goal
 
@@ -194,8 +194,10 @@ def test_what_is_to_come_is_foretold_by_the_faster_of_the_rates_seen():
 def test_a_tolerance_that_corners_do_not_allow_is_refused_after_few_meshes(monkeypatch):
     """Errors at a free notch do not fall; five more meshes up to 125 000 unknowns took twenty seconds to say so."""
     notched = fi.mesh.polygon([(0, 0), (1, 0), (1, 0.5), (0.5, 0.5), (0.5, 1), (0, 1)])
-    seen, solve = [], refinement.solve
-    monkeypatch.setattr(refinement, "solve", lambda system, *how: seen.append(system.n_dofs) or solve(system, *how))
+    seen, solve = [], refinement.solve_on_mesh
+    monkeypatch.setattr(
+        refinement, "solve_on_mesh", lambda system, *how: seen.append(system.n_dofs) or solve(system, *how)
+    )
     with pytest.raises(fi.SimulationError, match=r"uncertain by .* a tolerance of .* is met, or ask for fewer modes$"):
         fi.find_modes(fi.assemble(notched, PLATE), n_modes=8, tolerance=1e-7)
     assert len(seen) <= 3 and seen[-1] < 0.1 * refinement.MOST_UNKNOWNS

@@ -95,7 +95,7 @@ def test_the_order_on_thick_curved_plates_is_that_of_the_elements(edge):
     exact, errors = thick_elements.disk_frequencies(0.2, edge, 5), []
     for size in (0.2, 0.1):
         system = fi.assemble(fi.mesh.disk(1.0, size=size), fi.Plate(UNIT, 0.2), {"boundary": edge}, theory="mindlin")
-        errors.append(np.abs(refinement.solve(system, 5, None).omega / exact - 1.0).max())
+        errors.append(np.abs(refinement.solve_on_mesh(system, 5, None).omega / exact - 1.0).max())
     assert errors[0] < 1e-5  # 6e-6 if clamped
     assert np.log2(errors[0] / errors[1]) > 4.0  # 4.5 clamped; the size at the edge shrinks by less than 2
 
@@ -132,8 +132,8 @@ def test_squares_have_the_digits_of_liews_tables(edge, h):
 def test_thin_plates_become_kirchhoff_plates_on_any_mesh(ratio, size):
     """Nothing locks: on the same coarse triangles, both differ by what Wang's relation says, for each mode."""
     mesh, plate, held = fi.mesh.rectangle(1.55, 1.0, size=size), fi.Plate(UNIT, ratio), {"boundary": "hinged"}
-    thin = refinement.solve(fi.assemble(mesh, plate, held), 6, None)
-    found = refinement.solve(fi.assemble(mesh, plate, held, theory="mindlin"), 6, None)
+    thin = refinement.solve_on_mesh(fi.assemble(mesh, plate, held), 6, None)
+    found = refinement.solve_on_mesh(fi.assemble(mesh, plate, held, theory="mindlin"), 6, None)
     expected = thick_elements.hinged_polygon(thin.omega, ratio) / thin.omega - 1.0  # -1e-10 ... -6e-6
     assert_allclose(found.omega / thin.omega - 1.0, expected, rtol=0.1, atol=3e-11)  # rounding 1e-11
 
@@ -149,7 +149,7 @@ def test_a_layer_too_thin_for_the_mesh_is_told_as_an_error():
     """The layer of a free disk is a hundredth of its radius, a facet a quarter; first-order theory tells its cost."""
     exact = thick_elements.disk_frequencies(0.02, "free", 5)
     system = fi.assemble(fi.mesh.disk(1.0, size=0.4), fi.Plate(UNIT, 0.02), {}, theory="mindlin")
-    found = refinement.solve(reassemble(system, system.mesh, layer=100.0), 8, None)
+    found = refinement.solve_on_mesh(reassemble(system, system.mesh, layer=100.0), 8, None)
     true = found.omega[3:] / exact - 1.0
     assert true.max() > 1e-4
     assert (found.error[3:] > 0.5 * np.abs(true)).all() and found.error.max() < 30.0 * np.abs(true).max()

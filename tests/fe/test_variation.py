@@ -6,7 +6,7 @@ from numpy.testing import assert_allclose
 
 import fem_impact as fi
 from fem_impact.fe.assembly import System
-from fem_impact.fe.variation import DIFFERENCES, SectionChange, energies
+from fem_impact.fe.variation import DIFFERENCES, SectionChange, energy_changes
 
 WOOD = fi.Material(E=10e9, nu=0.3, rho=450.0)
 
@@ -40,12 +40,12 @@ def test_energies_are_differences_of_the_matrices(mesh, made, theory):
     system = fi.assemble(mesh, made(value), {next(iter(mesh.edges)): "clamped"}, theory=theory)
     vectors = fi.find_modes(system, n_modes=5).shapes
     system, vectors = vectors.system, vectors.vectors
-    stiffer, heavier = energies(system, along(made, value, 1e-2), vectors)
+    stiffer, heavier = energy_changes(system, along(made, value, 1e-2), vectors)
     for matrix, kinds in ((stiffer, ("stiffness", "shear")), (heavier, ("inertia", "rotary"))):
         exact = 0.0
         for side in (-1.0, 1.0):  # the same forms with the whole section instead of its rate
             whole = SectionChange((made(value + side * step),), (side / (2.0 * step),))
-            exact = exact + energies(system, whole, vectors)[kinds[0] == "inertia"]
+            exact = exact + energy_changes(system, whole, vectors)[kinds[0] == "inertia"]
         # differences of second order of cubes of the thickness
         assert_allclose(matrix, exact, rtol=1e-6, atol=1e-7 * np.abs(matrix).max())
 
@@ -58,7 +58,7 @@ def test_the_whole_section_gives_the_assembled_matrices(mesh, made, theory):
     system: System = fi.assemble(mesh, made(0.2), {next(iter(mesh.edges)): "clamped"}, theory=theory)
     modes = fi.find_modes(system, n_modes=5)
     found = modes.shapes.system
-    stiff, heavy = energies(found, SectionChange((made(0.2),), (1.0,)), modes.shapes.vectors)
+    stiff, heavy = energy_changes(found, SectionChange((made(0.2),), (1.0,)), modes.shapes.vectors)
     assert_allclose(heavy, np.eye(5), atol=1e-9)  # elements are integrated to rounding
     assert_allclose(np.diag(stiff), (modes.omega / found.frame.rate) ** 2, rtol=1e-9)
 
@@ -66,6 +66,6 @@ def test_the_whole_section_gives_the_assembled_matrices(mesh, made, theory):
 def test_morley_elements_have_none():
     system = fi.assemble(fi.mesh.rectangle(0.4, 0.3, size=0.2), fi.Plate(WOOD, 3e-3), element="morley")
     with pytest.raises(ValueError, match="unknown for element 'morley'; take 'argyris'"):
-        energies(system, SectionChange((), ()), np.zeros((system.n_dofs, 1)))
+        energy_changes(system, SectionChange((), ()), np.zeros((system.n_dofs, 1)))
     system = fi.assemble(fi.mesh.rectangle(0.4, 0.3, size=0.2), fi.Plate(WOOD, 3e-3), {"boundary": "hinged"})
-    energies(system, SectionChange((fi.Plate(WOOD, 3e-3),), (1.0,)), np.zeros((system.n_dofs, 1)))
+    energy_changes(system, SectionChange((fi.Plate(WOOD, 3e-3),), (1.0,)), np.zeros((system.n_dofs, 1)))

@@ -19,7 +19,7 @@ def parsed(html):
 @pytest.mark.parametrize("mesh", [fi.mesh.disk(0.1, hole=0.02), fi.mesh.line(1.0), fi.mesh.rectangle(1.0, 2.0)])
 def test_every_edge_can_be_drawn_in_every_way(mesh):
     for kind in ("clamped", "hinged", "free", fi.Elastic(1e4)):
-        picture = sketch.body(mesh, supports={"boundary": kind}, title="a < b")
+        picture = sketch.draw_body(mesh, supports={"boundary": kind}, title="a < b")
         tree = parsed(picture)
         assert tree[0].get("aria-label") == "a < b"
         box = [float(x) for x in tree[0].get("viewBox").split()]
@@ -28,10 +28,10 @@ def test_every_edge_can_be_drawn_in_every_way(mesh):
 
 def test_curved_outline_is_drawn_as_round_as_it_is():
     disk = fi.mesh.disk(0.1)
-    path = next(parsed(sketch.body(disk, title="disk")).iter(f"{SVG}path")).get("d")
+    path = next(parsed(sketch.draw_body(disk, title="disk")).iter(f"{SVG}path")).get("d")
     assert path.count("Z") == 1
     ring = fi.mesh.disk(0.1, hole=0.03)
-    assert next(parsed(sketch.body(ring, title="ring")).iter(f"{SVG}path")).get("d").count("Z") == 2
+    assert next(parsed(sketch.draw_body(ring, title="ring")).iter(f"{SVG}path")).get("d").count("Z") == 2
 
 
 def test_named_edge_overrules_the_whole():

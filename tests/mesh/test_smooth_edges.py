@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from fem_impact.mesh.smooth_edges import _corners, follow, join, smooth_runs
+from fem_impact.mesh.smooth_edges import _corners, join, recover_rim, smooth_runs
 
 
 def loop_of(place):
@@ -20,7 +20,7 @@ def n_corners_of(place):
 def test_points_of_a_circle_are_a_circle_wherever_they_lie(turn):
     angle = turn * np.sort(np.random.default_rng(2).uniform(0.0, 2.0 * np.pi, 60))
     place = np.array([5.0, -3.0]) + 2.0 * np.column_stack([np.cos(angle), np.sin(angle)])
-    rim = follow(place, loop_of(place), {})
+    rim = recover_rim(place, loop_of(place), {})
     assert (rim.n_curved, n_corners_of(place)) == (60, 0)
     assert_allclose(np.linalg.norm(rim.middles - [5.0, -3.0], axis=1), 2.0, rtol=1e-12)
     assert_allclose(rim.curvatures, turn / 2.0, rtol=1e-10)
@@ -40,7 +40,7 @@ def test_fit_to_an_ellipse_converges():
     errors = []
     for n in (40, 80):
         place, tangent, curvature = ellipse(n)
-        rim = follow(place, loop_of(place), {})
+        rim = recover_rim(place, loop_of(place), {})
         assert (rim.n_curved, n_corners_of(place)) == (n, 0)
         off = np.abs((rim.middles / [2.0, 1.0]) ** 2 @ [1.0, 1.0] - 1.0)
         bend = np.abs(rim.curvatures[:, 0] - curvature)
@@ -53,8 +53,8 @@ def test_middles_from_the_file_are_kept_and_make_the_fit_finer():
     place, tangent, _ = ellipse(40)
     t = np.linspace(0.0, 2.0 * np.pi, 40, endpoint=False) + np.pi / 40
     known = np.column_stack([2.0 * np.cos(t), np.sin(t)])
-    coarse = follow(place, loop_of(place), {})
-    fine = follow(place, loop_of(place), dict(enumerate(known)))
+    coarse = recover_rim(place, loop_of(place), {})
+    fine = recover_rim(place, loop_of(place), dict(enumerate(known)))
     assert_allclose(fine.middles, known, atol=0.0)
     missed = [np.abs(rim.tangents[:, 0] - tangent).max() for rim in (coarse, fine)]
     assert missed[1] < missed[0] / 8.0  # half the distance between points: a sixteenth
@@ -70,7 +70,7 @@ def stadium(n):
 
 def test_half_circles_and_straight_sides_meet_smoothly():
     place = stadium(20)
-    rim = follow(place, loop_of(place), {})
+    rim = recover_rim(place, loop_of(place), {})
     assert (rim.n_curved, n_corners_of(place)) == (40, 4)
     curved = rim.curvatures[:, 0] > 0.0
     assert_allclose(rim.curvatures[curved], 1.0, rtol=1e-9)
@@ -86,7 +86,7 @@ def test_a_square_has_four_corners_and_no_curve():
     side = np.linspace(0.0, 1.0, 5)[:-1]
     place = np.concatenate([np.column_stack(x) for x in ((side, 0 * side), (1 + 0 * side, side))])
     place = np.concatenate([place, 1.0 - place])
-    rim = follow(place, loop_of(place), {})
+    rim = recover_rim(place, loop_of(place), {})
     assert (rim.n_curved, n_corners_of(place)) == (0, 4)
     assert_allclose(rim.curvatures, 0.0, atol=0.0)
 

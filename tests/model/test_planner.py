@@ -269,8 +269,8 @@ def test_modes_of_a_costly_plan_are_kept_and_taken_up_again(tmp_path, monkeypatc
     monkeypatch.setattr(asked, "COSTLY", (0.0, 0.0))
     scene, keep = fi.load_scene(SCENES / "marked_linear.toml"), tmp_path / "modes.npz"
     solved = []
-    solve = refinement.solve
-    monkeypatch.setattr(refinement, "solve", lambda *args: solved.append(args[2]) or solve(*args))
+    solve = refinement.solve_on_mesh
+    monkeypatch.setattr(refinement, "solve_on_mesh", lambda *args: solved.append(args[2]) or solve(*args))
 
     def broken_off(*args, **kwargs):
         raise KeyboardInterrupt

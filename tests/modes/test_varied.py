@@ -37,7 +37,7 @@ def modes_of(section, theory=None, ends=None, count=10):
 def test_a_uniform_bar_changes_by_powers(ends):
     height = 0.02
     modes = modes_of(uniform(height), ends=ends)
-    found = varied.changed(modes, along(uniform, height, 1e-4), AT)
+    found = varied.changed_modes(modes, along(uniform, height, 1e-4), AT)
     assert_allclose(found.omega, modes.omega / height, rtol=1e-8)
     row = modes.shapes.at(AT[None])[0]
     assert_allclose(found.shape, -0.5 * row / height, rtol=1e-8, atol=1e-8 * np.abs(row).max() / height)
@@ -50,7 +50,7 @@ def test_a_uniform_bar_changes_by_powers(ends):
 @pytest.mark.parametrize("theory", ["euler", pytest.param("timoshenko", marks=pytest.mark.slow)])
 def test_an_undercut_changes_modes_by_differences(theory):
     value, step = 9e-3, 2e-5
-    change = varied.changed(modes_of(undercut(value), theory), along(undercut, value, 1e-5), AT)
+    change = varied.changed_modes(modes_of(undercut(value), theory), along(undercut, value, 1e-5), AT)
     sides = [modes_of(undercut(value + k * step), theory) for k in DIFFERENCES[0][0]]
     weights = np.array(DIFFERENCES[0][1]) / step
 
@@ -79,13 +79,13 @@ def test_modes_that_share_a_frequency_answer_a_blow_smoothly_and_have_no_single_
     square = fi.mesh.rectangle(0.3, 0.3, size=0.06)
     modes = fi.find_modes(fi.assemble(square, square_plate(0.0), {"boundary": "hinged"}), n_modes=6)
     change, at = along(square_plate, 0.0, 1e-3), np.array([0.07, 0.11])
-    found = varied.changed(modes, change, at)
+    found = varied.changed_modes(modes, change, at)
     angle = 0.4
     turn = np.eye(6)
     turn[1:3, 1:3] = [[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]]
     shapes = modes.shapes
     other = type(shapes)(shapes.system, shapes.vectors @ turn, shapes.flexibility)
-    turned = varied.changed(fi.Modes(modes.omega, modes.damping_ratio, other, modes.mass), change, at)
+    turned = varied.changed_modes(fi.Modes(modes.omega, modes.damping_ratio, other, modes.mass), change, at)
     rows = modes.shapes.at(at[None])[0], turned_row(shapes, turn, at)
     for one, row in zip((found, turned), rows):  # elements split the pair by 1e-7
         felt = float((row[1:3] ** 2) @ one.omega[1:3]), float(row[1:3] @ one.shape[1:3])

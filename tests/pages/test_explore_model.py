@@ -60,7 +60,7 @@ def test_contacts_that_lose_start_as_the_scene_has_them(stand, kind):
 
 def test_guessed_compliance_gives_the_same_blow_where_it_is_right(stand):
     exact = explore_model.blow(stand.case(stand.start))
-    guessed = explore_model.blow(stand.case(stand.start, stand.residual(stand.start.at)))
+    guessed = explore_model.blow(stand.case(stand.start, stand.residual_at(stand.start.at)))
     assert guessed.impulse == pytest.approx(exact.impulse, rel=1e-9)  # the same numbers by another way
     assert explore_model.blow(stand.case(stand.start, 0.0)).impulse != exact.impulse
 

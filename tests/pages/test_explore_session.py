@@ -271,7 +271,7 @@ def test_pages_that_vanish_or_send_nonsense_are_one_line_each(explorer, caplog, 
 
     async def work():
         asyncio.get_running_loop().set_exception_handler(lambda _, context: bad.append(context))
-        server, address = explore_server.begin(explorer, [Beside(explorer), Beside(explorer)], 0)
+        server, address = explore_server.open_server(explorer, [Beside(explorer), Beside(explorer)], 0)
         host = address.split("/")[2]
         for _ in range(5):
             _, writer = await talk(host, '{"number": 1, "turn": {"mass": 0.02}}')

@@ -22,7 +22,7 @@ def add(held, *values):
 def exchanged(*messages):
     """The answers to some messages, by the loop of the process itself."""
     questions, answers = io.BytesIO(b"".join(map(pickle.dumps, messages))), io.BytesIO()
-    explore_worker.follow(questions, answers)
+    explore_worker.answer_questions(questions, answers)
     answers.seek(0)
     found = []
     while answers.tell() < len(answers.getvalue()):

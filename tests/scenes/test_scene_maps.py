@@ -336,8 +336,8 @@ def test_a_map_with_a_store_keeps_its_body_too(tmp_path, monkeypatch, residual):
     text = text.replace("speed = 2.0", f"speed = 2.0\nresidual = {str(residual).lower()}")
     (tmp_path / "scene.toml").write_text(text.replace("stiffness = 1e4", "stiffness = 1e6"))
     scene, solved, stages = fi.load_scene(tmp_path / "scene.toml"), [], []
-    solve, grow = refinement.solve, ritz.Krylov.grow
-    monkeypatch.setattr(refinement, "solve", lambda *args: solved.append(args[1]) or solve(*args))
+    solve, grow = refinement.solve_on_mesh, ritz.Krylov.grow
+    monkeypatch.setattr(refinement, "solve_on_mesh", lambda *args: solved.append(args[1]) or solve(*args))
     monkeypatch.setattr(ritz.Krylov, "grow", lambda *args: solved.append(args[1]) or grow(*args))
 
     def stage(name):
