@@ -78,8 +78,10 @@ def parser(about: str, out: Path | None = None) -> argparse.ArgumentParser:
 
 
 def write_rows(path: Path, rows: Iterable[Any], *, append: bool = False) -> None:
-    """Write dictionaries or dataclasses as CSV; with ``append`` after the lines that are there."""
+    """Write dictionaries or dataclasses as CSV; with ``append`` after the lines that are there, and nothing where there are none."""
     tables = [asdict(row) if is_dataclass(row) and not isinstance(row, type) else row for row in rows]
+    if not tables:
+        return
     path.parent.mkdir(parents=True, exist_ok=True)
     new = not (append and path.exists())
     with path.open("w" if new else "a", newline="", encoding="utf-8") as file:
