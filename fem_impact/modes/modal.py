@@ -4,6 +4,7 @@ import logging
 from abc import abstractmethod
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from pathlib import Path
 from typing import Any, Protocol
 
@@ -406,7 +407,12 @@ class Modes(check.Brief):
             found["cells"] = None
         return cls.from_arrays(**found, mass=mass, compliance=compliance, free=free)
 
-    @property
+    @cached_property
+    def known(self) -> Remembered:
+        """What was found of these modes at points where they were struck."""
+        return Remembered(REMEMBERED)
+
+    @cached_property
     def n_modes(self) -> int:
         return len(self.omega)
 
@@ -415,12 +421,12 @@ class Modes(check.Brief):
         """Natural frequencies, (n_modes,) [Hz]."""
         return self.omega / (2.0 * np.pi)
 
-    @property
+    @cached_property
     def n_rigid(self) -> int:
         """Number of rigid motions (modes of frequency zero)."""
         return int(np.count_nonzero(self.omega == 0.0))
 
-    @property
+    @cached_property
     def dimension(self) -> int:
         """Number of coordinates of a point on the body: 2 on a plate, 1 on a beam, 0 for a rigid mass."""
         return self.shapes.dimension
@@ -665,7 +671,7 @@ class FieldShapes(Shapes, check.Locked):
     def at(self, points: np.ndarray) -> np.ndarray:
         if len(points) != 1:
             return self._shapes(points)
-        shapes = self._at.found(points, self._shapes)
+        shapes = self._at.found(points.tobytes(), lambda: self._shapes(points))
         shapes.flags.writeable = False
         return shapes
 
@@ -676,7 +682,7 @@ class FieldShapes(Shapes, check.Locked):
         return self.system.contains(points)
 
     def _deflection(self, loads: np.ndarray) -> point_load.Deflection:
-        return self._under.found(loads, lambda loads: point_load.static_deflection(self.system, loads))
+        return self._under.found(loads.tobytes(), lambda: point_load.static_deflection(self.system, loads))
 
     def compliance(self, points: np.ndarray) -> np.ndarray:
         return self._deflection(points).compliance
