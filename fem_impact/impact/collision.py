@@ -226,7 +226,7 @@ def _follow(bodies, laws, parts, speed, options, striker=None, at=None, others=(
     error = Error.of_causes(errors, options.quantities, resolvable, growth)
     return Response(
         tuple(bodies), tuple(laws), found.fine, speed, options.tolerance, found.scheme, error, striker, at,
-        ends_of(parts, system.law), options.quantities, rebounds=whole[n + 1 :][order],
+        ends_of(parts, laws), options.quantities, rebounds=whole[n + 1 :][order],
     )  # fmt: skip
 
 

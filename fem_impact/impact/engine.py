@@ -112,9 +112,11 @@ def pace_of(system: KernelSystem, held: Sequence[int] = ()) -> tuple[float, floa
     if held:
         rate[held] = 0.0
     order = rate.argsort(kind="stable")
-    omega = rate[order]
-    last = np.concatenate([omega[1:] > omega[:-1], [True]])  # the last mode of each distinct frequency
-    beyond = np.concatenate([omega[last][1:], [np.inf]])
+    beyond = rate[order]
+    beyond[:-1] = beyond[1:]
+    beyond[-1] = np.inf
+    last = beyond > rate[order]  # the last mode of each distinct frequency
+    beyond = beyond[last]
     shortest, fastest = np.inf, 0.0
     for i, law in enumerate(system.law):
         k, exponent, compliance = law[layout.STIFFNESS], law[layout.EXPONENT], law[layout.COMPLIANCE]

@@ -12,7 +12,6 @@ from ..modes.modal import Modes, left_out
 from ..modes.stretching import Stretching, stretch
 from .compiled import layout
 from .compiled.bundles import KernelSystem
-from .compiled.law import FELT
 from .contact import Contact
 from .stretched import Stretched
 
@@ -81,7 +80,7 @@ class ReducedBody:
         """The body with frequencies lower and compliances higher by their errors, those of frequencies relative."""
         return replace(self, omega=self.omega / (1.0 + error), rest=self.rest + np.diag(self.doubt))
 
-    def forms(self, rated: np.ndarray) -> np.ndarray:
+    def forms(self, rated: Sequence[bool]) -> np.ndarray:
         """Forms (n_ends, n_forms) of unit stiffness that stand for the modes left out; none where a spring does."""
         if not self.yields or (len(self.touched) == 1 and not rated[self.touched[0][0]]):
             return np.zeros((len(self.touched), 0))
@@ -198,12 +197,12 @@ def joined(parts: Sequence[ReducedBody], laws: Sequence[Contact]) -> KernelSyste
     compliance becomes a mode above the last kept one, so that loss and other contacts act on it too.
     """
     law, offset = np.array([each.numbers for each in laws]), np.array([-each.gap for each in laws])
-    rated, forms, n = rated_contacts(law), [], 0
+    rated, forms, n = [each.rated for each in laws], [], 0
     for part in parts:
         forms.append(part.forms(rated) if part.yields else NO_FORMS)
         n += len(part.omega) + forms[-1].shape[1]
     table, shape = np.zeros((5, n)), np.zeros((len(laws), n))  # frequency, damping, constant force, state; shapes
-    start, lossy = 0, bool(rated.any())
+    start, lossy = 0, True in rated
     for part, form in zip(parts, forms):
         own = slice(start, start + len(part.omega))
         start = own.stop
@@ -229,11 +228,6 @@ def joined(parts: Sequence[ReducedBody], laws: Sequence[Contact]) -> KernelSyste
     return found
 
 
-def rated_contacts(law: np.ndarray) -> np.ndarray:
-    """Whether the force of each contact depends on more than the approach itself, (n_contacts,)."""
-    return (law[:, layout.LOSS] > 0.0) | (law[:, layout.KIND] == FELT)
-
-
 def rest_mode(dimension: int, omega: float, zeta: float, lossy: bool) -> tuple[float, float]:
     """Frequency [rad/s] and damping ratio [-] of the mode that replaces those above the last kept one.
 
@@ -245,9 +239,9 @@ def rest_mode(dimension: int, omega: float, zeta: float, lossy: bool) -> tuple[f
     return REST_ABOVE[min(dimension, 2)] * omega, float(zeta)
 
 
-def ends_of(parts: Sequence[ReducedBody], law: np.ndarray) -> tuple[Ends, ...]:
+def ends_of(parts: Sequence[ReducedBody], laws: Sequence[Contact]) -> tuple[Ends, ...]:
     """Where every body is touched; a constant force makes left-out modes dip only if a series spring replaces them."""
-    found, rated, last = [], rated_contacts(law), 0
+    found, rated, last = [], [each.rated for each in laws], 0
     for part in parts:
         last += len(part.omega)
     for part in parts:

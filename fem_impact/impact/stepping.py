@@ -265,13 +265,14 @@ def _longest_lossy(system: KernelSystem, pace: tuple[float, float], tolerance: f
     A lossy force depends on the approach rate. A force that rises like a spring's makes each mode ring in that rate,
     with stiffness times u**2 / omega**2 of the approach speed.
     """
-    longest = np.inf
+    longest, numbers = np.inf, (pace[1] * system.law[:, layout.LOSS]).tolist()
+    if not any(numbers):
+        return longest
     slow = system.omega <= np.pi / pace[0]
     fastest = (-system.omega).argsort(kind="stable")
     order = fastest[(system.omega[fastest] > 0.0) & (system.zeta[fastest] < RINGING)]
     omega = system.omega[order]
-    for shape, loss in zip(system.shape, system.law[:, layout.LOSS]):
-        number = loss * pace[1]
+    for shape, number in zip(system.shape, numbers):
         if number > 0.0 and len(omega):
             stiffness = (1.0 + number) * (np.pi / pace[0]) ** 2 / max(float(shape[slow] @ shape[slow]), 1e-300)
             ringing = number / (1.0 + number) * stiffness * np.cumsum((shape[order] / omega) ** 2)

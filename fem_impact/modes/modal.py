@@ -461,7 +461,14 @@ class Modes(check.Brief):
             n_points = 1 if points is None else len(np.atleast_2d(check.numbers(name, points, "m")))
             return np.zeros((max(1, n_points), 0))
         array = check.places(name, points, self.dimension)
-        check.on_body(name, array, self.shapes.contains(array), self.shapes.grid()[0])
+
+        def inside() -> None:
+            check.on_body(name, array, self.shapes.contains(array), self.shapes.grid()[0])
+
+        if len(array) == 1:
+            self.known.found(("inside", array.tobytes()), inside)
+        else:
+            inside()
         return array
 
     def shape_at(self, points: Any) -> np.ndarray:
