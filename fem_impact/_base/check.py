@@ -190,7 +190,7 @@ def typed(function: Function) -> Function:
     @functools.wraps(function)
     def tested(*given: Any, **named: Any) -> Any:
         for name, value in chain(zip(parameters, given), named.items()):
-            if name in checked:
+            if name in checked and not isinstance(value, checked[name][1]):
                 _of_kind(name, value, *checked[name])
         return function(*given, **named)
 
@@ -199,7 +199,7 @@ def typed(function: Function) -> Function:
 
 def _of_kind(name: str, value: Any, kinds: tuple[Any, ...], ours: tuple[type, ...]) -> None:
     """Raise ValueError unless ``value`` has one of the annotated ``kinds``, of which ``ours`` are in `SOURCES`."""
-    if (value is None and NoneType in kinds) or isinstance(value, ours):
+    if value is None and NoneType in kinds:
         return
     if Path in kinds:
         path(name, value)

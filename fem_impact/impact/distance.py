@@ -84,7 +84,12 @@ def of_runs(
     speeds = np.abs(one.end_p[one.omega == 0.0] - end)
     found: dict[str, float] = {"restitution": max(speeds.tolist(), default=0.0) / momentum}
     if len(impacts):
-        found |= distance(one.totals, two.totals)
+        totals = []
+        for run in one, two:
+            start, end, peak, impulse = run.contacts.T[:4]
+            times = sum((end - start).tolist())
+            totals.append({"impulse": sum(impulse.tolist()), "contact_time": times, "force": max(peak.tolist())})
+        found |= distance(*totals)
     apart = []
     for name, band in quantities.items():
         if band is not None:

@@ -78,6 +78,12 @@ class History(check.Locked):
     miss: float | None = None  # [m] highest approach at which the bodies turned back in flight, if they did
     stretched: Stretched | None = None  # if one of the bodies stretches
     reached: dict[str, Any] = field(default_factory=dict, init=False, repr=False)  # where its motion goes on
+    n_coefficients: int = field(init=False)  # [-] of each step's force polynomial, per contact
+
+    def __post_init__(self) -> None:
+        check.lock_arrays(self)
+        width = (self.steps.shape[1] - layout.HEAD) // len(self.offset)
+        object.__setattr__(self, "n_coefficients", width - layout.PUSH - 1)
 
     @property
     def n_contacts(self) -> int:
@@ -88,11 +94,6 @@ class History(check.Locked):
         """What the run followed, as its kernel takes it."""
         bodies = self.omega, self.zeta, self.shape, self.offset, self.bias
         return KernelSystem(*bodies, self.law, self.start_q, self.start_p)
-
-    @cached_property
-    def n_coefficients(self) -> int:
-        """Number of coefficients of each step's force polynomial, per contact."""
-        return (self.steps.shape[1] - layout.HEAD) // len(self.offset) - layout.PUSH - 1
 
     def _column(self, first: int) -> np.ndarray:
         width, m = layout.PUSH + self.n_coefficients, len(self.offset)
@@ -197,10 +198,11 @@ class History(check.Locked):
         Columns are start, end, peak force, impulse, contact index, with what speed the bodies meet and part, and the
         restitution, the second of these over the first; NaN where there is none.
         """
-        size, largest = np.abs(self.shape), np.maximum.reduce
-        rate = largest(np.abs(self._column(1)), axis=None, initial=0.0)
+        size, largest, width = np.abs(self.shape), np.maximum.reduce, layout.PUSH + self.n_coefficients
+        pushes = self.steps[:, layout.HEAD : layout.HEAD + width * self.shape.shape[0]]
+        rate = largest(np.abs(pushes[:, layout.SPEED :: width]), axis=None, initial=0.0)
         way = max((size @ (np.abs(self.start_q) + self.end_time * np.abs(self.start_p))).tolist())
-        slack = float(max(ROUNDING * way, TOUCH * largest(self._column(0), axis=None, initial=0.0)))
+        slack = float(max(ROUNDING * way, TOUCH * largest(pushes[:, ::width], axis=None, initial=0.0)))
         found = record.find_impacts(
             self.steps, self.now, self.law, self.n_coefficients, PEAK_LOOKS, ROUNDING * rate, slack
         )
@@ -243,17 +245,9 @@ class History(check.Locked):
         return float(record.nearest_turn(self.steps, self.now, self.law, self.n_coefficients, miss))
 
     @cached_property
-    def totals(self) -> dict[str, float]:
-        """Impulse [N s], contact time [s] and peak force [N] of all impacts, of which there are some."""
-        start, end, peak, impulse = self.contacts.T[:4]
-        return {
-            "impulse": sum(impulse.tolist()), "contact_time": sum((end - start).tolist()), "force": max(peak.tolist()),
-        }  # fmt: skip
-
-    @cached_property
     def margin(self) -> float:
         """How near the run is to one impact more or fewer; see `Response.margin`."""
-        return CLEAR if self.bias.any() else min(CLEAR, self.nearest_turn)
+        return CLEAR if len(self.bias.nonzero()[0]) else min(CLEAR, self.nearest_turn)
 
     @cached_property
     def force_missed(self) -> float:

@@ -66,7 +66,7 @@ class ReducedBody:
     @cached_property
     def yields(self) -> bool:
         """Whether modes left out yield at its contacts."""
-        return bool(self.rest.any())
+        return len(self.rest.nonzero()[0]) > 0
 
     def faster(self, factor: float) -> "ReducedBody":
         """The same body with all motion larger by a factor, its rigid position as it is."""
@@ -97,8 +97,12 @@ class ReducedBody:
         flexible = self.omega[self.omega > 0.0]
         if not self.yields or len(flexible) < 2:
             return []
-        each = [self._up_to(max(flexible[-1] / wanted, flexible[0])) for wanted in THINNED]
-        return [(thin, ratio) for thin, ratio in each if ratio > 1.0]
+        found = []
+        for wanted in THINNED:
+            thin, ratio = self._up_to(max(flexible[-1] / wanted, flexible[0]))
+            if ratio > 1.0:
+                found.append((thin, ratio))
+        return found
 
     def _up_to(self, limit: float) -> "tuple[ReducedBody, float]":
         """The body with the compliance of its modes above a frequency [rad/s] in their place, and the ratio."""
@@ -196,11 +200,15 @@ def joined(parts: Sequence[ReducedBody], laws: Sequence[Contact]) -> KernelSyste
     A series spring is exact only for a body with one lossless contact. Otherwise each eigenvector of the residual
     compliance becomes a mode above the last kept one, so that loss and other contacts act on it too.
     """
-    law, offset = np.array([each.numbers for each in laws]), np.array([-each.gap for each in laws])
-    rated, forms, n = [each.rated for each in laws], [], 0
+    numbers, gaps, rated, forms, n = [], [], [], [], 0
+    for each in laws:
+        numbers.append(each.numbers)
+        gaps.append(-each.gap)
+        rated.append(each.rated)
     for part in parts:
         forms.append(part.forms(rated) if part.yields else NO_FORMS)
         n += len(part.omega) + forms[-1].shape[1]
+    law, offset = np.array(numbers), np.array(gaps)
     table, shape = np.zeros((5, n)), np.zeros((len(laws), n))  # frequency, damping, constant force, state; shapes
     start, lossy = 0, True in rated
     for part, form in zip(parts, forms):
@@ -216,9 +224,9 @@ def joined(parts: Sequence[ReducedBody], laws: Sequence[Contact]) -> KernelSyste
     for part, form in zip(parts, forms):
         if form.size:
             above, damping = rest_mode(part.points.shape[1], part.omega[-1], part.zeta[-1], lossy)
-            for share in form.T:
-                for (i, sign), each in zip(part.touched, share):
-                    shape[i, start] += sign * each * above
+            for shares in form.T:
+                for (i, sign), share in zip(part.touched, shares):
+                    shape[i, start] += sign * share * above
                 held = -(part.pressed @ shape[[i for i, _ in part.touched], start]) / above**2
                 table[:, start] = above, damping, 0.0, *held
                 start += 1

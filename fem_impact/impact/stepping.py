@@ -82,8 +82,8 @@ class Options:
             striker_force=check.number("striker_force", self.striker_force, "N"),
             target_force=check.number("target_force", self.target_force, "N"),
         )
-        last = np.inf if self.duration is None else self.duration, self.max_impacts or 0
-        check.settle(self, last=last, n_quantities=len(self.quantities))
+        object.__setattr__(self, "n_quantities", len(self.quantities))
+        object.__setattr__(self, "last", (np.inf if self.duration is None else self.duration, self.max_impacts or 0))
 
 
 def takes_options(function: Function) -> Function:
