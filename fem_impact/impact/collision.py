@@ -277,9 +277,9 @@ def _parts(bodies, contacts, speeds, states, forces, residual) -> tuple[list[Red
 
 
 def striker_modes(striker: Striker, *, contact: Contact, speed: float, tolerance: float) -> tuple[int, float]:
-    """How many striker modes a blow needs, and what leaving out the others may err [-].
+    """How many striker modes a blow needs, and the error [-] allowed of leaving out the others.
 
-    That is only STRIKER_SHARE of the tolerance, because striker modes cost little; `striker_error` expects less.
+    That is only STRIKER_SHARE of the tolerance, because striker modes cost little; zero if there are no others.
     """
     modes, mass = striker.modes, striker.felt_mass
     if modes.n_modes == modes.n_rigid:
