@@ -286,10 +286,10 @@ def striker_modes(striker: Striker, *, contact: Contact, speed: float, tolerance
         return modes.n_rigid, 0.0
     allowed = STRIKER_SHARE * tolerance / (LOSSY_STRIKER if contact.rated else 1.0)
     omega_0 = 2.0 * np.pi * accuracy.contact_resonance(contact, mass, speed)
-    # what replaces modes under loss needs one below
-    if not contact.rated and mass * omega_0**2 * striker.bending <= allowed:
+    whole, density, s = striker.bending
+    if not contact.rated and mass * omega_0**2 * whole <= allowed:  # what replaces modes under loss needs one below
         return modes.n_rigid, allowed
-    limit = accuracy.cutoff(*striker.density, omega_0, contact.exponent, mass, allowed)
+    limit = accuracy.cutoff(density, s, omega_0, contact.exponent, mass, allowed)
     return min(modes.n_modes, max(modes.n_rigid + 2, int(modes.frequencies.searchsorted(limit, side="right")))), allowed
 
 

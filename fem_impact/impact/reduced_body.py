@@ -24,7 +24,6 @@ LOSSY_ABOVE = 30.0
 # [-] two extra runs divide the highest kept frequency by these: near enough to foretell, far enough to differ
 THINNED = 1.4, 2.0
 Touched = tuple[tuple[int, float], ...]  # contact, and sign: 1 for its first body, -1 for its second
-NO_FORMS = np.zeros((0, 0))
 SLOW = 1e-4  # [-] frequency of a rigid motion that may be missing over that of the first mode: it acts as a mass
 
 
@@ -92,28 +91,21 @@ class ReducedBody:
     def thinner(self) -> "list[tuple[ReducedBody, float]]":
         """The body with its upper modes replaced by their compliance, and the ratio of old to new highest frequency.
 
-        Two such bodies, as of THINNED; none where the ratio would be one.
+        One for each of THINNED that leaves modes out.
         """
-        flexible = self.omega[self.omega > 0.0]
-        if not self.yields or len(flexible) < 2:
-            return []
-        found = []
-        for wanted in THINNED:
-            thin, ratio = self._up_to(max(flexible[-1] / wanted, flexible[0]))
-            if ratio > 1.0:
-                found.append((thin, ratio))
+        flexible, found = self.omega[self.omega > 0.0], []
+        for wanted in THINNED if self.yields and len(flexible) > 1 else ():
+            n = int(self.omega.searchsorted(max(flexible[-1] / wanted, flexible[0]), side="right"))
+            if n == len(self.omega):
+                continue
+            gone = self.rows[:, n:] / self.omega[n:]
+            thin = replace(
+                self, omega=self.omega[:n], zeta=self.zeta[:n], rows=self.rows[:, :n], rest=self.rest + gone @ gone.T,
+                q=self.q[:n], p=self.p[:n], bias=self.bias[:n],
+                stretching=None if self.stretching is None else self.stretching.truncated(n),
+            )  # fmt: skip
+            found.append((thin, float(flexible[-1] / self.omega[n - 1])))
         return found
-
-    def _up_to(self, limit: float) -> "tuple[ReducedBody, float]":
-        """The body with the compliance of its modes above a frequency [rad/s] in their place, and the ratio."""
-        n = int(self.omega.searchsorted(limit, side="right"))
-        gone = self.rows[:, n:] / self.omega[n:]
-        thin = replace(
-            self, omega=self.omega[:n], zeta=self.zeta[:n], rows=self.rows[:, :n], rest=self.rest + gone @ gone.T,
-            q=self.q[:n], p=self.p[:n], bias=self.bias[:n],
-            stretching=None if self.stretching is None else self.stretching.truncated(n),
-        )  # fmt: skip
-        return thin, float(self.omega[-1] / self.omega[n - 1])
 
     def loosened(self) -> "ReducedBody":
         """The body with the rigid motions that it may have besides, as its first modes."""
@@ -206,7 +198,7 @@ def joined(parts: Sequence[ReducedBody], laws: Sequence[Contact]) -> KernelSyste
         gaps.append(-each.gap)
         rated.append(each.rated)
     for part in parts:
-        forms.append(part.forms(rated) if part.yields else NO_FORMS)
+        forms.append(part.forms(rated) if part.yields else np.zeros((0, 0)))
         n += len(part.omega) + forms[-1].shape[1]
     law, offset = np.array(numbers), np.array(gaps)
     table, shape = np.zeros((5, n)), np.zeros((len(laws), n))  # frequency, damping, constant force, state; shapes

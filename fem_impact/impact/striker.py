@@ -310,15 +310,11 @@ class Striker(check.Brief):
         return left_out(self.modes, self.at[None], self.shape[None])
 
     @cached_property
-    def density(self) -> tuple[float, float]:
-        """That of the modes left out at the contact point, see `accuracy.left_out_density`."""
-        return left_out_density(self.modes, self.at[None])
-
-    @cached_property
-    def bending(self) -> float:
-        """Compliance of all bending at the contact point [m/N]."""
+    def bending(self) -> tuple[float, float, float]:
+        """Compliance of all bending at the contact point [m/N], and `accuracy.left_out_density` there."""
         rigid = self.modes.truncated(n_modes=self.modes.n_rigid)
-        return float(rigid.residual_compliance(self.at[None])[0, 0])
+        whole = rigid.residual_compliance(self.at[None])[0, 0]
+        return float(whole), *left_out_density(self.modes, self.at[None])
 
     @cached_property
     def known(self) -> Remembered:
