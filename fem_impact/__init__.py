@@ -29,8 +29,11 @@ def __getattr__(name: str) -> Any:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
     home = import_module(_HOME[name], __name__) if _HOME[name] != "." else None
     if home is not None and hasattr(home, name):
-        return getattr(home, name)
-    return import_module(f"{_HOME[name].rstrip('.')}.{name}", __name__)  # a module
+        found = getattr(home, name)
+    else:
+        found = import_module(f"{_HOME[name].rstrip('.')}.{name}", __name__)  # a module
+    globals()[name] = found
+    return found
 
 
 def __dir__() -> list[str]:

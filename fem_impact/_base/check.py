@@ -190,7 +190,7 @@ def typed(function: Function) -> Function:
     @functools.wraps(function)
     def tested(*given: Any, **named: Any) -> Any:
         for name, value in chain(zip(parameters, given), named.items()):
-            if name in checked:
+            if name in checked and not isinstance(value, checked[name][1]):
                 _of_kind(name, value, *checked[name])
         return function(*given, **named)
 
@@ -199,7 +199,7 @@ def typed(function: Function) -> Function:
 
 def _of_kind(name: str, value: Any, kinds: tuple[Any, ...], ours: tuple[type, ...]) -> None:
     """Raise ValueError unless ``value`` has one of the annotated ``kinds``, of which ``ours`` are in `SOURCES`."""
-    if (value is None and NoneType in kinds) or isinstance(value, ours):
+    if value is None and NoneType in kinds:
         return
     if Path in kinds:
         path(name, value)
@@ -230,10 +230,12 @@ def places(name: str, value: Any, dimension: int) -> np.ndarray:
     raw = numbers(name, value, "m")
     if dimension == 1 and (raw.ndim < 2 or raw.shape[-1] != 1):
         raw = raw.reshape(-1, 1)
-    if raw.ndim < 2 and raw.shape != (dimension,):
-        point = "(x, y)" if dimension == 2 else f"of {dimension} coordinates"
-        raise ValueError(f"{name} must be a point {point} in m, got {shown(value)}")
-    return array(name, raw, (None, dimension), "m", lift=True)
+    if raw.ndim < 2:
+        if raw.shape != (dimension,):
+            point = "(x, y)" if dimension == 2 else f"of {dimension} coordinates"
+            raise ValueError(f"{name} must be a point {point} in m, got {shown(value)}")
+        raw = raw[None]
+    return finite(name, raw, "m") if raw.shape[1:] == (dimension,) else array(name, raw, (None, dimension), "m")
 
 
 def on_body(name: str, points: np.ndarray, inside: np.ndarray, corners: np.ndarray) -> None:

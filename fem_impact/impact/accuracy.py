@@ -59,17 +59,19 @@ def cutoff_frequency(modes: Modes, at: Any, *, contact: Contact, mass: float, sp
     """
     tolerance = check.positive("tolerance", tolerance)
     density, s = left_out_density(modes, modes.point("at", at))
-    return _cutoff(density, s, contact, mass, speed, tolerance)
+    omega_0 = 2.0 * np.pi * contact_resonance(contact, mass, speed)
+    return cutoff(density, s, omega_0, contact.exponent, mass, tolerance)
 
 
 def infinite_cutoff(mobility: float, *, contact: Contact, mass: float, speed: float, tolerance: float) -> float:
     """As `cutoff_frequency`, for the modes of an infinite plate of a mobility [m/(N s)]."""
-    return _cutoff(2.0 * mobility / np.pi, 0.0, contact, mass, speed, tolerance)
-
-
-def _cutoff(density: float, s: float, contact: Contact, mass: float, speed: float, tolerance: float) -> float:
     omega_0 = 2.0 * np.pi * contact_resonance(contact, mass, speed)
-    power, factor = _order(contact.exponent)
+    return cutoff(2.0 * mobility / np.pi, 0.0, omega_0, contact.exponent, mass, tolerance)
+
+
+def cutoff(density: float, s: float, omega_0: float, exponent: float, mass: float, tolerance: float) -> float:
+    """As `cutoff_frequency`, for a contact frequency [rad/s] and a density as of `left_out_density`."""
+    power, factor = _order(exponent)
     # compliance beyond omega_0 over the contact's
     soft = mass * omega_0**2 * density / ((1.0 + s) * omega_0 ** (1.0 + s))
     by_error = omega_0 * (factor * (1.0 + s) * soft / tolerance) ** (1.0 / (power + s))

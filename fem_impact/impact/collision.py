@@ -7,14 +7,15 @@ from typing import Any
 import numpy as np
 
 from .._base import check
-from ..modes.modal import Modes, left_out
+from .._base.rounding import EPSILON
+from ..modes.modal import Modes
 from ..modes.stretching import stretch
 from . import accuracy, distance, engine, promise, what_if
+from .compiled.bundles import KernelSystem
 from .contact import Contact
 from .engine import TOLERANCE
 from .error import Error
-from .history import ModalSystem
-from .reduced_body import ReducedBody, ends_of, joined, part_of
+from .reduced_body import ReducedBody, ends_of, joined, part_of, stretched_in
 from .response import Response
 from .state import State
 from .stepping import Options, refine_steps, takes_options
@@ -56,27 +57,25 @@ def strike(
     speed = speed if speed is None else check.non_negative("speed", speed, "m/s")
     before = start.state() if isinstance(start, Response) else start
     point, asked = modes.point("at", at), Options(**options)
-    rows = modes.shapes.at(point)
-    rest = left_out(modes, point, rows) if asked.residual and modes.dimension else None
-    struck = part_of(modes, ((0, -1.0),), point, rows, rest, asked.target_force)
+    struck = part_of(modes, ((0, -1.0),), point, asked.residual).pushed(asked.target_force)
     if before is not None:
-        struck = struck.moving(*before.of(-1, "modes", modes))
+        q, p = before.of(-1, "modes", modes)
+        struck = replace(struck, q=q, p=p)
     if asked.stretching or modes.stretches:
         struck = replace(struck, stretching=stretch(modes))
 
     def blow(striker: Striker, speed: float, own: tuple[np.ndarray, np.ndarray] | None = None) -> Response:
-        rest = striker.left_out if asked.residual and striker.modes.dimension else None
-        places = striker.at[None], striker.shape[None]
-        arriving = part_of(striker.body, ((0, 1.0),), *places, rest, asked.striker_force)
-        arriving = replace(arriving, bias=arriving.bias + striker.push, held=int(striker.hand is not None))
+        arriving = striker.reduced(asked.residual).pushed(asked.striker_force)
 
         def start(one: float = 1.0, other: float = 1.0) -> list[ReducedBody]:
             """Both bodies at the start, each as fast as it is known times a factor."""
-            target = struck.faster(other)
+            target = struck if other == 1.0 else struck.faster(other)
             if own is None:  # the striker arrives at the surface, wherever that is
-                return [arriving.moving(float(rows[0] @ target.q) * striker.motion, speed * striker.motion), target]
+                surface = float(struck.rows[0] @ target.q) * striker.motion
+                return [replace(arriving, q=surface, p=speed * striker.motion), target]
             pressed = np.zeros((2, 1)) if before is None else before.force.T
-            return [replace(arriving.moving(*own).faster(one), pressed=pressed), replace(target, pressed=pressed)]
+            moving = replace(arriving, q=own[0], p=own[1], pressed=pressed)
+            return [moving.faster(one), replace(target, pressed=pressed)]
 
         doubt = 0.0 if before is None else 1.0 + before.error
         others = [start(*factors) for factors in ((doubt, 1.0), (1.0, doubt))[own is None :] if doubt]
@@ -185,7 +184,7 @@ def met(
     return _follow(bodies, [touch.law for touch in contacts], parts, arriving, asked, others=others)
 
 
-def touching(bodies: Sequence[Modes], touch: Touch, speed: float, residual: bool) -> tuple[ModalSystem, float]:
+def touching(bodies: Sequence[Modes], touch: Touch, speed: float, residual: bool) -> tuple[KernelSystem, float]:
     """Two bodies that are to touch, the first moving, as the kernels take them, and how long the contact may last."""
     parts, _ = _parts(bodies, [touch], [speed, 0.0], None, None, residual)
     system = joined(parts, [touch.law])
@@ -197,44 +196,44 @@ def _follow(bodies, laws, parts, speed, options, striker=None, at=None, others=(
 
     ``others`` are the parts as they would move at the start if the blow before erred as estimated.
     """
-    system = joined(parts, laws)
-    endless = options.duration is None and options.max_impacts is None
-    if endless and (system.bias @ system.shape.T > 0.0).any():
+    system, stretched = joined(parts, laws), stretched_in(parts)
+    if options.last == (np.inf, 0) and max((system.bias @ system.shape.T).tolist()) > 0.0:
         raise ValueError(
             "duration or max_impacts must be given, because a constant force keeps pressing the bodies together"
         )
-    held, first = np.zeros(len(system.omega), bool), 0
+    held: list[int] = []
+    first = 0
     for part in parts:
-        held[first : first + part.held] = True
+        held += range(first, first + part.held)
         first += len(part.omega)
     pace = engine.pace_of(system, held)
     _check_way(system, pace[0] * pace[1], options.tolerance)
-    found = refine_steps(system, options, pace)
+    found = refine_steps(system, options, pace, stretched)
     growth = distance.growth(found.coarse, found.fine)
     if len(found.coarse.contacts) != len(found.fine.contacts):  # a given step was too long
         found = replace(found, coarse=found.fine, steps=(found.steps[0],) * 2)
     blow = what_if.Followed(parts, laws, system, options, pace, found)
-    told = [any(other.omega[-1] > body.omega[-1] for other in body.poorer.values()) for body in bodies]
-    left_out, resolvable = what_if.modes_left_out(blow, told)
+    left_out, resolvable = what_if.modes_left_out(blow, bodies)
     inherited = what_if.Variation("inherited", [[(other, 1.0, 1.0)] for other in others])
     variations = left_out, what_if.unstated(blow, bodies), what_if.mesh(blow, bodies), inherited
     errors = {"step": found.error, **what_if.what_if(blow, variations)}
     what_if.add_poorer_descriptions(blow, bodies, errors)
-    margins, rebounds = zip(*[(error.margin, error.rebounds) for error in errors.values()])
-    if "n_impacts" in options.quantities and sum(margins) >= found.fine.margin:
-        list(errors.values())[margins.index(max(margins))].quantities["n_impacts"] += 1.0
+    whole, n = np.add.reduce([*errors.values()]), options.n_quantities
+    if "n_impacts" in options.quantities and whole[n] >= found.fine.margin:
+        doubted = max(errors.values(), key=lambda error: error[n])
+        doubted[[*options.quantities].index("n_impacts")] += 1.0
     order = np.lexsort(found.fine.contacts[:, (4, 0)].T)  # as `History.impacts`
-    error = Error.of_causes(errors, resolvable, growth)
+    error = Error.of_causes(errors, options.quantities, resolvable, growth)
     return Response(
         tuple(bodies), tuple(laws), found.fine, speed, options.tolerance, found.scheme, error, striker, at,
-        ends_of(parts, system.law), options.quantities, rebounds=np.sum(rebounds, axis=0)[order],
+        ends_of(parts, laws), options.quantities, rebounds=whole[n + 1 :][order],
     )  # fmt: skip
 
 
-def _check_way(system: ModalSystem, depth: float, tolerance: float) -> None:
+def _check_way(system: KernelSystem, depth: float, tolerance: float) -> None:
     """Raise ValueError if rounding of a large offset would spoil the approach in contact, about ``depth`` [m]."""
-    way = float(np.abs(system.offset).max())
-    if np.finfo(float).eps * way > tolerance * depth:
+    way = max(np.abs(system.offset).tolist())
+    if EPSILON * way > tolerance * depth:
         raise ValueError(
             f"gap and constant forces must be smaller: with an offset of {way:.3g} m, rounding spoils an approach of "
             f"{depth:.3g} m beyond the tolerance of {tolerance:g}; start nearer to contact"
@@ -262,15 +261,14 @@ def _parts(bodies, contacts, speeds, states, forces, residual) -> tuple[list[Red
     parts, arriving = [], 0.0
     for body, modes in enumerate(bodies):
         points = np.vstack([point for _, _, point in ends[body]] or [np.zeros((0, modes.dimension))])
-        rows = np.atleast_2d(modes.shapes.at(points)) if ends[body] else np.zeros((0, modes.n_modes))
-        rest = left_out(modes, points, rows) if residual and modes.dimension and ends[body] else None
-        part = part_of(modes, tuple((i, sign) for i, sign, _ in ends[body]), points, rows, rest, float(forces[body]))
+        touched = tuple((i, sign) for i, sign, _ in ends[body])
+        part = part_of(modes, touched, points, residual).pushed(float(forces[body]))
         if states is not None:
             q, p = (check.array(f"states[{body}]", value, (modes.n_modes,)) for value in states[body])
             part = replace(part, q=q, p=p)
         speed = float(speeds[body])
         if speed != 0.0:
-            if not ends[body] or not rows[0, modes.omega == 0.0].any():
+            if not touched or not part.rows[0, modes.omega == 0.0].any():
                 raise ValueError(f"speeds must be zero for a body that cannot move rigidly, got {speed:g} m/s")
             part = replace(part, p=part.p + speed * modes.rigid_motion(points[:1]), speed=speed)
         arriving = arriving or speed
@@ -279,22 +277,20 @@ def _parts(bodies, contacts, speeds, states, forces, residual) -> tuple[list[Red
 
 
 def striker_modes(striker: Striker, *, contact: Contact, speed: float, tolerance: float) -> tuple[int, float]:
-    """How many striker modes a blow needs, and the expected error [-] of leaving out the others.
+    """How many striker modes a blow needs, and the error [-] allowed of leaving out the others.
 
-    That error may take only STRIKER_SHARE of the tolerance, because striker modes cost little.
+    That is only STRIKER_SHARE of the tolerance, because striker modes cost little; zero if there are no others.
     """
-    modes = striker.modes
+    modes, mass = striker.modes, striker.felt_mass
     if modes.n_modes == modes.n_rigid:
         return modes.n_rigid, 0.0
-    law: dict[str, Any] = {"contact": contact, "mass": striker.felt_mass, "speed": speed}
     allowed = STRIKER_SHARE * tolerance / (LOSSY_STRIKER if contact.rated else 1.0)
-    omega_0 = 2.0 * np.pi * accuracy.contact_resonance(**law)
-    whole = modes.truncated(n_modes=modes.n_rigid).residual_compliance(striker.at[None])[0, 0]
-    if striker.felt_mass * omega_0**2 * whole <= allowed and not contact.rated:  # what replaces modes needs one below
+    omega_0 = 2.0 * np.pi * accuracy.contact_resonance(contact, mass, speed)
+    whole, density, s = striker.bending
+    if not contact.rated and mass * omega_0**2 * whole <= allowed:  # what replaces modes under loss needs one below
         return modes.n_rigid, allowed
-    limit = accuracy.cutoff_frequency(modes, striker.at, tolerance=allowed, **law)
-    kept = min(modes.n_modes, max(modes.n_rigid + 2, int(np.searchsorted(modes.frequencies, limit, side="right"))))
-    return kept, striker_error(striker, kept, contact=contact, speed=speed)
+    limit = accuracy.cutoff(density, s, omega_0, contact.exponent, mass, allowed)
+    return min(modes.n_modes, max(modes.n_rigid + 2, int(modes.frequencies.searchsorted(limit, side="right")))), allowed
 
 
 def striker_error(striker: Striker, n_modes: int, *, contact: Contact, speed: float) -> float:
@@ -310,4 +306,9 @@ def shortened(striker: Striker, n_modes: int) -> Striker:
     """The striker with its first modes only; the others act as a spring."""
     if n_modes >= striker.modes.n_modes:
         return striker
-    return replace(striker, modes=striker.modes.truncated(n_modes=n_modes), fixed=True)
+
+    def short() -> Striker:
+        return replace(striker, modes=striker.modes.truncated(n_modes=n_modes), fixed=True)
+
+    found: Striker = striker.known.found(("shortened", n_modes), short)
+    return found

@@ -1,7 +1,6 @@
 """The distance between two blows: every error that the program states is one."""
 
-from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
+from collections.abc import Mapping
 from math import sqrt
 from typing import TYPE_CHECKING, Any
 
@@ -16,44 +15,6 @@ if TYPE_CHECKING:
     from .response import Response
 
 INSTANTS = ("contact_time", "force")  # quantities that depend on single instants
-
-
-@dataclass(eq=False)
-class Distance:
-    """How far one run is from another [-]."""
-
-    quantities: dict[str, float]  # in each quantity asked for
-    margin: float
-    rebounds: np.ndarray  # (n_impacts,) in the restitution of each impact, in the order of `History.contacts`
-
-    @property
-    def worst(self) -> float:
-        """The largest distance in any quantity."""
-        return max(self.quantities.values(), default=0.0)
-
-    def __add__(self, other: "Distance") -> "Distance":
-        two = other.quantities
-        found = {name: value + two[name] for name, value in self.quantities.items()}
-        return Distance(found, self.margin + other.margin, self.rebounds + other.rebounds)
-
-    def scaled(self, factor: float, parting: float) -> "Distance":
-        """The same times a factor; in the restitutions of impacts times another."""
-        found = {name: factor * value for name, value in self.quantities.items()}
-        return Distance(found, factor * self.margin, parting * self.rebounds)
-
-    @classmethod
-    def uniform(cls, like: "Distance", size: float) -> "Distance":
-        """The same distance in everything that another tells of."""
-        return cls(dict.fromkeys(like.quantities, size), size, np.full(len(like.rebounds), size))
-
-
-def largest(distances: Iterable[Distance]) -> Distance:
-    """The largest of some distances in everything."""
-    first, *others = distances
-    for other in others:
-        found = {name: max(value, other.quantities[name]) for name, value in first.quantities.items()}
-        first = Distance(found, max(first.margin, other.margin), np.maximum(first.rebounds, other.rebounds))
-    return first
 
 
 def distance(one: Mapping[str, Any], two: Mapping[str, Any]) -> dict[str, Any]:
@@ -100,33 +61,45 @@ def _value(hit: "Response", name: str, band: float | None) -> Any:
 
 def of_runs(
     one: History, two: History, quantities: Mapping[str, float | None], over: tuple[float, float] = (1.0, 1.0)
-) -> Distance:
-    """How far one run is from another in each quantity asked for, in its margin and in the restitution of each impact.
+) -> np.ndarray:
+    """How far one run is from another [-]: in each quantity asked for, in its margin and in each impact's restitution.
 
     All are 1 if the runs ended differently. The restitution counts by the speed of every body that moves rigidly, over
     the momentum of all. ``over`` divides the distances in quantities that depend on the whole blow, and those in
     contact time and peak force, which depend on an instant; not those of impacts, as points part as fast as the bodies
     ring there, also in modes faster than the step.
+
+    Returns
+    -------
+    ndarray, shape (n_quantities + 1 + n_impacts,)
+        Impacts are in the order of `History.contacts`.
     """
-    n_impacts = len(two.contacts)
-    if len(one.contacts) != n_impacts or one.status != two.status:
-        return Distance(dict.fromkeys(quantities, 1.0), 1.0, np.ones(n_impacts))
+    impacts = two.contacts
+    if len(one.contacts) != len(impacts) or one.status != two.status:
+        return np.ones(len(quantities) + 1 + len(impacts))
     rigid = two.omega == 0.0  # a swinging body has much momentum, of which the striker's error is no share
     start, end = two.start_p[rigid], two.end_p[rigid]
     momentum = sqrt(max(start.dot(start), end.dot(end)))
     momentum = momentum or sqrt(two.start_p.dot(two.start_p)) or sqrt(two.end_p.dot(two.end_p)) or 1.0
     speeds = np.abs(one.end_p[one.omega == 0.0] - end)
     found: dict[str, float] = {"restitution": max(speeds.tolist(), default=0.0) / momentum}
-    if n_impacts:
-        found |= distance(one.totals, two.totals)
-    error: dict[str, float] = {}
+    if len(impacts):
+        totals = []
+        for run in one, two:
+            start, end, peak, impulse = run.contacts.T[:4]
+            times = sum((end - start).tolist())
+            totals.append({"impulse": sum(impulse.tolist()), "contact_time": times, "force": max(peak.tolist())})
+        found |= distance(*totals)
+    apart = []
     for name, band in quantities.items():
         if band is not None:
             found |= distance({name: _spectrum(one, band)}, {name: _spectrum(two, band)})
-        error[name] = max(ROUNDING, found.get(name, ROUNDING) / over[name in INSTANTS])
-    apart = np.abs(one.rebounds - two.rebounds)
-    unlike = np.isnan(one.rebounds) != np.isnan(two.rebounds)  # only one of them has a restitution
-    return Distance(error, abs(one.margin - two.margin), np.where(np.isnan(apart), unlike, apart))
+        apart.append(max(ROUNDING, found.get(name, ROUNDING) / over[name in INSTANTS]))
+    rebounds, others = one.contacts[:, 7], impacts[:, 7]
+    parted = np.abs(rebounds - others)
+    lacking = np.isnan(parted)
+    parted[lacking] = (np.isnan(rebounds) != np.isnan(others))[lacking]  # 1 if only one of them has a restitution
+    return np.array([*apart, abs(one.margin - two.margin), *parted.tolist()])
 
 
 def _spectrum(history: History, band: float) -> np.ndarray:

@@ -1,5 +1,6 @@
 """One run of a system through the kernels."""
 
+from collections.abc import Sequence
 from dataclasses import replace
 from functools import cache
 from typing import Any
@@ -9,12 +10,13 @@ import numpy as np
 from .._base.check import SimulationError
 from .._base.rounding import EPSILON, ROUNDING
 from .compiled import build, layout, record
-from .compiled.bundles import Limits
+from .compiled.bundles import KernelSystem, Limits
 from .compiled.collocation import run_collocation
 from .compiled.energy import run_energy
 from .compiled.stretched import Stretch
 from .contact import acting_stiffness, wall_time
-from .history import History, ModalSystem
+from .history import History
+from .stretched import Stretched
 
 TOLERANCE = 1e-4  # [-] default tolerance: below what contact laws and materials are known to
 # [-] of the tolerance, what steps may err: two coarse runs agree by chance, and a single blow gains little by them
@@ -45,22 +47,24 @@ def steps_per_contact(tolerance: float, power: float = 0.25) -> float:
 
 
 def follow(
-    system: ModalSystem, scheme: str, size: float, pace: tuple[float, float], horizon: float, n_max: int,
-    chosen_by: str = "tolerance",
+    system: KernelSystem, scheme: str, size: float, pace: tuple[float, float], last: tuple[float, int],
+    stretched: Stretched | None = None, chosen_by: str = "tolerance",
 ) -> History:  # fmt: skip
-    """One run; ``size`` is the step in contact [s], for collocation the allowed misfit [-]; and what it comes from."""
-    most = most_steps(system)
-    limits = Limits(float(EPSILON * pace[0] * pace[1]), float(ROUNDING * pace[1]), float(horizon), n_max, most)
-    stretched, stretch = system.stretched, None
+    """One run up to the ``last`` time [s] and number of impacts, 0 for any.
+
+    ``size`` is the step in contact [s], for collocation the allowed misfit [-]; ``chosen_by`` is what it comes from.
+    """
+    most, stretch = most_steps(system, stretched), None
+    limits = Limits(float(EPSILON * pace[0] * pace[1]), float(ROUNDING * pace[1]), float(last[0]), last[1], most)
     if stretched is not None:
         stretched = replace(stretched, base=float(size), ramp=scheme == "A4")
         stretch = Stretch(stretched.forms, stretched.first)
     if scheme == "collocation":
         nodes, powers = gauss(NODES)
-        result = run_collocation(system.scene, nodes, powers, pace[0] / 2.0, float(size) * pace[1], limits)
+        result = run_collocation(system, nodes, powers, pace[0] / 2.0, float(size) * pace[1], limits)
     else:
-        result = run_energy(system.scene, stretch, int(scheme == "A4"), float(size), limits)
-    history = History(*system.scene, *result, stretched=stretched)
+        result = run_energy(system, stretch, int(scheme == "A4"), float(size), limits)
+    history = History(*system, *(*result, stretched))
     time, status = result[5], result[6]
     if status == record.EXHAUSTED:
         raise SimulationError(
@@ -89,25 +93,30 @@ def again(history: History, step: float | None = None, **changed: Any) -> Histor
     ``changed`` are fields of the history; without any, it is the blow to compare with. Steps are by default those of a
     first run.
     """
-    before = ModalSystem(*history.scene, stretched=history.stretched)
-    system = replace(before, **changed)
-    pace = pace_of(before)
+    before, pace = history.system, pace_of(history.system)
+    stretched = changed.pop("stretched", history.stretched)
+    system = before._replace(**{name.removeprefix("start_"): array for name, array in changed.items()})
     horizon = history.end_time if history.status == record.HORIZON else np.inf
     most = int(np.isfinite(history.contacts[:, 6]).sum()) if history.status == record.IMPACTS else 0
-    return follow(system, "A4", pace[0] / FIRST_STEPS if step is None else step, pace, horizon, most)
+    for array in system:
+        array.setflags(write=False)  # or numba would compile the kernels again for writable arrays
+    return follow(system, "A4", pace[0] / FIRST_STEPS if step is None else step, pace, (horizon, most), stretched)
 
 
-def pace_of(system: ModalSystem, held: np.ndarray | bool = False) -> tuple[float, float]:
+def pace_of(system: KernelSystem, held: Sequence[int] = ()) -> tuple[float, float]:
     """Shortest expected duration [s] of an undisturbed contact, and its approach speed [m/s].
 
-    ``held`` (n_modes,) says which modes count as masses, though a hand makes them swing.
+    ``held`` are numbers of modes that count as masses, though a hand makes them swing.
     """
     rate = system.omega * np.maximum(1.0, 2.0 * system.zeta)  # an overdamped mode acts as a dashpot, not as a mass
-    rate = np.where(held, 0.0, rate)
+    if held:
+        rate[held] = 0.0
     order = rate.argsort(kind="stable")
-    omega = rate[order]
-    last = np.concatenate([omega[1:] > omega[:-1], [True]])  # the last mode of each distinct frequency
-    beyond = np.concatenate([omega[last][1:], [np.inf]])
+    beyond = rate[order]
+    beyond[:-1] = beyond[1:]
+    beyond[-1] = np.inf
+    last = beyond > rate[order]  # the last mode of each distinct frequency
+    beyond = beyond[last]
     shortest, fastest = np.inf, 0.0
     for i, law in enumerate(system.law):
         k, exponent, compliance = law[layout.STIFFNESS], law[layout.EXPONENT], law[layout.COMPLIANCE]
@@ -115,9 +124,9 @@ def pace_of(system: ModalSystem, held: np.ndarray | bool = False) -> tuple[float
         above, mobile = beyond[mobile > 0.0], mobile[mobile > 0.0]
         if not mobile.size:
             continue
-        approach = system.offset[i] + float(system.shape[i] @ system.start_q)
+        approach = system.offset[i] + float(system.shape[i] @ system.q)
         pull = max(0.0, float(system.shape[i] @ system.bias))  # [m/s**2]
-        speed = float(np.abs(system.shape[i]) @ np.abs(system.start_p))
+        speed = float(np.abs(system.shape[i]) @ np.abs(system.p))
         speed = max(speed, np.sqrt(2.0 * pull * max(0.0, -approach)))
         speed = max(speed, np.sqrt(pull * (pull / (k * mobile[-1])) ** (1.0 / exponent)))
         if approach > 0.0:
@@ -133,10 +142,9 @@ def pace_of(system: ModalSystem, held: np.ndarray | bool = False) -> tuple[float
     return shortest, fastest
 
 
-def most_steps(system: ModalSystem) -> int:
+def most_steps(system: KernelSystem, stretched: Stretched | None) -> int:
     """Steps after which a run gives up."""
     if build.limited():
         return build.most_steps(max(100, PLAIN_WORK // len(system.omega)))
-    if system.stretched is not None:
-        return min(MAX_STEPS, max(1000, MAX_WORK // system.stretched.forms.size))
-    return min(MAX_STEPS, max(1000, MAX_WORK // len(system.omega)))
+    work = len(system.omega) if stretched is None else stretched.forms.size
+    return min(MAX_STEPS, max(1000, MAX_WORK // work))

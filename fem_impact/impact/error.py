@@ -1,10 +1,10 @@
 """The estimated errors of a blow, by cause and quantity."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 
-from .distance import Distance
+import numpy as np
 
 CAUSES = {
     "step": "time steps", "truncation": "modes left out", "mesh": "the finite elements",
@@ -27,11 +27,14 @@ class Error:
     table: Mapping[str, Mapping[str, float]] = field(default_factory=dict, repr=False, compare=False)
 
     @classmethod
-    def of_causes(cls, found: Mapping[str, Distance], resolvable: bool, sensitivity: float) -> "Error":
-        """The errors that distances tell by cause: of each the largest in any quantity."""
+    def of_causes(
+        cls, found: Mapping[str, np.ndarray], quantities: Sequence[str], resolvable: bool, sensitivity: float
+    ) -> "Error":
+        """The errors that distances, as of `distance.of_runs`, tell by cause: of each the largest in any quantity."""
         whole, table = {"step": 0.0, "truncation": 0.0, "mesh": 0.0}, {}
         for cause, apart in found.items():
-            whole[cause], table[cause] = apart.worst, apart.quantities
+            table[cause] = dict(zip(quantities, apart.tolist()))
+            whole[cause] = max(table[cause].values())
         return cls(**whole, resolvable=resolvable, sensitivity=sensitivity, table=table)
 
     @cached_property

@@ -55,8 +55,8 @@ class Impact:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class ModalSystem(check.Locked):
-    """The modes of all bodies in one list, and their contacts: what a run follows."""
+class History(check.Locked):
+    """A run: the system, its start and every step."""
 
     omega: np.ndarray  # (n_modes,) [rad/s] modes of all bodies
     zeta: np.ndarray  # (n_modes,) [-]
@@ -66,23 +66,6 @@ class ModalSystem(check.Locked):
     law: np.ndarray  # (n_contacts, 9 or 4) stiffness, exponent, loss, series compliance, .. as `law.spring_of` reads it
     start_q: np.ndarray  # (n_modes,) [m kg**0.5]
     start_p: np.ndarray  # (n_modes,) [m kg**0.5/s]
-    stretched: Stretched | None = field(default=None, kw_only=True)  # if one of the bodies stretches
-
-    @property
-    def n_contacts(self) -> int:
-        return len(self.offset)
-
-    @property
-    def scene(self) -> KernelSystem:
-        """The input of a kernel."""
-        bodies = self.omega, self.zeta, self.shape, self.offset, self.bias
-        return KernelSystem(*bodies, self.law, self.start_q, self.start_p)
-
-
-@dataclass(frozen=True, eq=False, repr=False)
-class History(ModalSystem):
-    """A run: the system, its start and every step."""
-
     steps: np.ndarray  # (n_steps, 3 + (4 + n_coefficients) n_contacts), see `energy.run_energy`
     end_q: np.ndarray  # (n_modes,)
     end_p: np.ndarray  # (n_modes,)
@@ -93,12 +76,24 @@ class History(ModalSystem):
     n_fallback: int  # [-] steps in which scheme A4 fell back to A
     n_blind: int  # [-] steps that passed over contact events without locating them
     miss: float | None = None  # [m] highest approach at which the bodies turned back in flight, if they did
+    stretched: Stretched | None = None  # if one of the bodies stretches
     reached: dict[str, Any] = field(default_factory=dict, init=False, repr=False)  # where its motion goes on
+    n_coefficients: int = field(init=False)  # [-] of each step's force polynomial, per contact
 
-    @cached_property
-    def n_coefficients(self) -> int:
-        """Number of coefficients of each step's force polynomial, per contact."""
-        return (self.steps.shape[1] - layout.HEAD) // len(self.offset) - layout.PUSH - 1
+    def __post_init__(self) -> None:
+        check.lock_arrays(self)
+        width = (self.steps.shape[1] - layout.HEAD) // len(self.offset)
+        object.__setattr__(self, "n_coefficients", width - layout.PUSH - 1)
+
+    @property
+    def n_contacts(self) -> int:
+        return len(self.offset)
+
+    @property
+    def system(self) -> KernelSystem:
+        """What the run followed, as its kernel takes it."""
+        bodies = self.omega, self.zeta, self.shape, self.offset, self.bias
+        return KernelSystem(*bodies, self.law, self.start_q, self.start_p)
 
     def _column(self, first: int) -> np.ndarray:
         width, m = layout.PUSH + self.n_coefficients, len(self.offset)
@@ -152,7 +147,7 @@ class History(ModalSystem):
         if self.stretched is not None:
             return self.stretched.states(self, times)
         q, p = np.empty((len(times), len(self.omega))), np.empty((len(times), len(self.omega)))
-        propagation.replay(self.scene, self.steps, self.n_coefficients, times, q, p)
+        propagation.replay(self.system, self.steps, self.n_coefficients, times, q, p)
         return q, p
 
     def motion(self, times: np.ndarray) -> np.ndarray:
@@ -198,21 +193,26 @@ class History(ModalSystem):
 
     @cached_property
     def contacts(self) -> np.ndarray:
-        """All impacts, (n_impacts, 7), sorted by contact.
+        """All impacts, (n_impacts, 8), sorted by contact.
 
-        Columns are start, end, peak force, impulse, contact index, and with what speed the bodies meet and part.
+        Columns are start, end, peak force, impulse, contact index, with what speed the bodies meet and part, and the
+        restitution, the second of these over the first; NaN where there is none.
         """
-        size = np.abs(self.shape)
-        rate = np.abs(self._column(1)).max(initial=0.0)
-        way = (size @ (np.abs(self.start_q) + self.end_time * np.abs(self.start_p))).max()
-        slack = float(max(ROUNDING * way, TOUCH * self._column(0).max(initial=0.0)))
+        size, largest, width = np.abs(self.shape), np.maximum.reduce, layout.PUSH + self.n_coefficients
+        pushes = self.steps[:, layout.HEAD : layout.HEAD + width * self.shape.shape[0]]
+        rate = largest(np.abs(pushes[:, layout.SPEED :: width]), axis=None, initial=0.0)
+        way = max((size @ (np.abs(self.start_q) + self.end_time * np.abs(self.start_p))).tolist())
+        slack = float(max(ROUNDING * way, TOUCH * largest(pushes[:, ::width], axis=None, initial=0.0)))
         found = record.find_impacts(
             self.steps, self.now, self.law, self.n_coefficients, PEAK_LOOKS, ROUNDING * rate, slack
         )
-        found = found[found[:, 2] > FAINT * found[:, 2].max(initial=0.0)]
-        if (found[:, 7] < np.inf).any():
+        found = found[found[:, 2] > FAINT * largest(found[:, 2], initial=0.0)]
+        if min(found[:, 7].tolist(), default=np.inf) < np.inf:
             found[:, 0] = self._force_begins(found, size)
-        return found[:, :7]
+        met = found[:, 5].copy()
+        met[met == 0.0] = np.nan
+        found[:, 7] = found[:, 6] / met
+        return found
 
     def _force_begins(self, pushes: np.ndarray, size: np.ndarray) -> np.ndarray:
         """When the force of each push begins [s], (n,), for those of `record.find_impacts`.
@@ -234,7 +234,7 @@ class History(ModalSystem):
         rows = self.contacts.tolist()
         found = [
             Impact(start, end, peak, impulse, int(i), met, None if np.isnan(left) else left)
-            for start, end, peak, impulse, i, met, left in rows
+            for start, end, peak, impulse, i, met, left, _ in rows
         ]
         return tuple(sorted(found, key=lambda impact: (impact.start, impact.contact)))
 
@@ -245,23 +245,9 @@ class History(ModalSystem):
         return float(record.nearest_turn(self.steps, self.now, self.law, self.n_coefficients, miss))
 
     @cached_property
-    def totals(self) -> dict[str, float]:
-        """Impulse [N s], contact time [s] and peak force [N] of all impacts, of which there are some."""
-        start, end, peak, impulse = self.contacts.T[:4]
-        return {
-            "impulse": sum(impulse.tolist()), "contact_time": sum((end - start).tolist()), "force": max(peak.tolist()),
-        }  # fmt: skip
-
-    @cached_property
-    def rebounds(self) -> np.ndarray:
-        """Restitution of every impact, in the order of `contacts`; NaN where there is none."""
-        met, left = self.contacts.T[5:]
-        return np.asarray(left / np.where(met == 0.0, np.nan, met))
-
-    @cached_property
     def margin(self) -> float:
         """How near the run is to one impact more or fewer; see `Response.margin`."""
-        return CLEAR if self.bias.any() else min(CLEAR, self.nearest_turn)
+        return CLEAR if len(self.bias.nonzero()[0]) else min(CLEAR, self.nearest_turn)
 
     @cached_property
     def force_missed(self) -> float:

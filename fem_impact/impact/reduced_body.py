@@ -11,9 +11,8 @@ from .._base.rounding import ROUNDING
 from ..modes.modal import Modes, left_out
 from ..modes.stretching import Stretching, stretch
 from .compiled import layout
-from .compiled.law import FELT
+from .compiled.bundles import KernelSystem
 from .contact import Contact
-from .history import ModalSystem
 from .stretched import Stretched
 
 # [-] by dimension: frequency of the replacement mode over the last, fact: sqrt(sum u**2/w**2 / sum u**2/w**4) of those
@@ -22,15 +21,18 @@ REST_ABOVE = {1: 1.53, 2: 1.73}
 # [-] frequency of the replacement mode under a lossy contact over the last mode's: so far above that it follows as a
 # spring; it is critically damped
 LOSSY_ABOVE = 30.0
+# [-] two extra runs divide the highest kept frequency by these: near enough to foretell, far enough to differ
+THINNED = 1.4, 2.0
+Touched = tuple[tuple[int, float], ...]  # contact, and sign: 1 for its first body, -1 for its second
 SLOW = 1e-4  # [-] frequency of a rigid motion that may be missing over that of the first mode: it acts as a mass
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Ends(check.Locked):
+class Ends(check.Brief):
     """Where the contacts of a blow act on a body, and what its kept modes lack of its static compliance there."""
 
     points: np.ndarray  # (n_ends, dimension) [m]
-    touched: tuple[tuple[int, float], ...]  # contact, and sign: 1 for its first body, -1 for its second
+    touched: Touched
     force: float  # [N] constant force at the first point
     rest: np.ndarray  # (n_ends, n_ends) [m/N] compliance of the modes left out; zero if the modes are complete
     forms: slice = field(default_factory=lambda: slice(0))  # modes of the run that stand for these; empty for a spring
@@ -46,7 +48,7 @@ class ReducedBody:
     omega: np.ndarray  # (n_modes,) [rad/s]
     zeta: np.ndarray  # (n_modes,) [-]
     rows: np.ndarray  # (n_ends, n_modes) [kg**-0.5] shapes at its contacts
-    touched: tuple[tuple[int, float], ...]  # contact, and sign: 1 for its first body, -1 for its second
+    touched: Touched
     rest: np.ndarray  # (n_ends, n_ends) [m/N] residual compliance of the left-out modes
     doubt: np.ndarray  # (n_ends,) [m/N] estimated error of its diagonal
     q: np.ndarray  # (n_modes,) [m kg**0.5]
@@ -63,21 +65,21 @@ class ReducedBody:
     @cached_property
     def yields(self) -> bool:
         """Whether modes left out yield at its contacts."""
-        return bool(self.rest.any())
-
-    def moving(self, q: np.ndarray, p: np.ndarray) -> "ReducedBody":
-        """The same body in another state."""
-        return replace(self, q=q, p=p)
+        return len(self.rest.nonzero()[0]) > 0
 
     def faster(self, factor: float) -> "ReducedBody":
         """The same body with all motion larger by a factor, its rigid position as it is."""
-        return self.moving(np.where(self.omega == 0.0, 1.0, factor) * self.q, factor * self.p)
+        return replace(self, q=np.where(self.omega == 0.0, 1.0, factor) * self.q, p=factor * self.p)
+
+    def pushed(self, force: float) -> "ReducedBody":
+        """The same body under a constant force [N] at its first contact."""
+        return replace(self, force=force, bias=self.bias + force * self.rows[0]) if force else self
 
     def lower(self, error: np.ndarray | float) -> "ReducedBody":
         """The body with frequencies lower and compliances higher by their errors, those of frequencies relative."""
         return replace(self, omega=self.omega / (1.0 + error), rest=self.rest + np.diag(self.doubt))
 
-    def forms(self, rated: np.ndarray) -> np.ndarray:
+    def forms(self, rated: Sequence[bool]) -> np.ndarray:
         """Forms (n_ends, n_forms) of unit stiffness that stand for the modes left out; none where a spring does."""
         if not self.yields or (len(self.touched) == 1 and not rated[self.touched[0][0]]):
             return np.zeros((len(self.touched), 0))
@@ -85,20 +87,25 @@ class ReducedBody:
         kept = size > ROUNDING * size[-1]
         return np.asarray(vectors[:, kept] * np.sqrt(size[kept]))
 
-    def thinned(self, wanted: float) -> "tuple[ReducedBody, float]":
-        """The body with its upper modes replaced by their compliance, and the ratio of old to new highest frequency."""
-        flexible = self.omega[self.omega > 0.0]
-        if not self.yields or len(flexible) < 2:
-            return self, np.inf
-        limit = max(flexible[-1] / wanted, flexible[0])
-        n = int(self.omega.searchsorted(limit, side="right"))
-        gone = self.rows[:, n:] / self.omega[n:]
-        thin = replace(
-            self, omega=self.omega[:n], zeta=self.zeta[:n], rows=self.rows[:, :n], rest=self.rest + gone @ gone.T,
-            q=self.q[:n], p=self.p[:n], bias=self.bias[:n],
-            stretching=None if self.stretching is None else self.stretching.truncated(n),
-        )  # fmt: skip
-        return thin, float(flexible[-1] / self.omega[n - 1])
+    @cached_property
+    def thinner(self) -> "list[tuple[ReducedBody, float]]":
+        """The body with its upper modes replaced by their compliance, and the ratio of old to new highest frequency.
+
+        One for each of THINNED that leaves modes out.
+        """
+        flexible, found = self.omega[self.omega > 0.0], []
+        for wanted in THINNED if self.yields and len(flexible) > 1 else ():
+            n = int(self.omega.searchsorted(max(flexible[-1] / wanted, flexible[0]), side="right"))
+            if n == len(self.omega):
+                continue
+            gone = self.rows[:, n:] / self.omega[n:]
+            thin = replace(
+                self, omega=self.omega[:n], zeta=self.zeta[:n], rows=self.rows[:, :n], rest=self.rest + gone @ gone.T,
+                q=self.q[:n], p=self.p[:n], bias=self.bias[:n],
+                stretching=None if self.stretching is None else self.stretching.truncated(n),
+            )  # fmt: skip
+            found.append((thin, float(flexible[-1] / self.omega[n - 1])))
+        return found
 
     def loosened(self) -> "ReducedBody":
         """The body with the rigid motions that it may have besides, as its first modes."""
@@ -113,34 +120,46 @@ class ReducedBody:
 
     def described_by(self, modes: Modes) -> "ReducedBody":
         """The same body in the same motion, described by other modes."""
-        rows, still = modes.shapes.at(self.points), np.zeros(modes.n_modes)
         moving = self.omega == 0.0
         if self.q.any() or self.p[~moving].any():
             raise ValueError("a body of Ritz vectors must start at rest; find its modes with find_modes")
-        velocity = still
+        other, rigid = part_of(modes, self.touched, self.points).pushed(self.force), modes.omega == 0.0
+        rows, velocity = other.rows, other.p
         if self.p.any():
             velocity = float(self.rows[0] @ self.p) * modes.rigid_motion(self.points[:1])
-        rest, rigid = left_out(modes, self.points, rows), modes.omega == 0.0
         # rigid motions are known up to a rotation among them, which would look like a difference of speeds
         here, there = np.vstack([rows, velocity])[:, rigid], np.vstack([self.rows, self.p])[:, moving]
         left, _, right = np.linalg.svd(here.T @ there)
         turned = here @ left @ right
         rows, velocity = rows.copy(), velocity.copy()
         rows[:, rigid], velocity[rigid] = turned[:-1], turned[-1]
-        other = part_of(modes, self.touched, self.points, rows, rest, self.force, velocity)
+        other = replace(other, rows=rows, p=velocity, bias=self.force * rows[0] if self.force else other.bias)
         return replace(other, stretching=None if self.stretching is None else stretch(modes))
 
 
-def part_of(
+def part_of(modes: Modes, touched: Touched, points: np.ndarray, residual: bool = True) -> ReducedBody:
+    """An undeformed body at rest, as it is touched at points; its modes remember it.
+
+    ``touched`` as of `ReducedBody`; ``residual`` says whether the modes left out yield.
+    """
+
+    def reduced() -> ReducedBody:
+        rows = np.atleast_2d(modes.shapes.at(points)) if touched else np.zeros((0, modes.n_modes))
+        rest = left_out(modes, points, rows) if residual and modes.dimension and touched else None
+        return reduce_body(modes, touched, points, rows, rest)
+
+    found: ReducedBody = modes.known.found((points.tobytes(), touched, residual), reduced)
+    return found
+
+
+def reduce_body(
     modes: Modes,
-    touched: tuple,
+    touched: Touched,
     points: np.ndarray,
     rows: np.ndarray,
     left_out: tuple[np.ndarray, np.ndarray] | None,
-    force: float,
-    motion: np.ndarray | None = None,
 ) -> ReducedBody:
-    """One undeformed body, at rest or moving, with its shapes and residual compliance at its contacts."""
+    """An undeformed body at rest, with its shapes and residual compliance at its contacts."""
     n_ends = len(touched)
     rest, doubt = (np.zeros((n_ends, n_ends)), np.zeros(n_ends)) if left_out is None else left_out
     rest = 0.5 * (rest + rest.T)
@@ -148,60 +167,65 @@ def part_of(
     largest = rest[0, 0] if n_ends == 1 else np.linalg.eigvalsh(rest)[-1] if n_ends else 0.0
     if largest <= ROUNDING * (rest.trace() + carried):
         rest = np.zeros_like(rest)
-    still = np.zeros(modes.n_modes)
-    bias = force * rows[0] if force else still
-    velocity = still if motion is None else motion
-    pressed = np.zeros((2, n_ends))
-    return ReducedBody(
-        modes.omega, modes.damping_ratio, rows, touched, rest, doubt, still, velocity, bias, force, points, pressed,
+    still, pressed = np.zeros(modes.n_modes), np.zeros((2, n_ends))
+    part = ReducedBody(
+        modes.omega, modes.damping_ratio, rows, touched, rest, doubt, still, still, still, 0.0, points, pressed,
         np.zeros((n_ends, 0)) if left_out is None else modes.shapes.loose(points),
     )  # fmt: skip
+    check.lock_arrays(part)
+    return part
 
 
-def joined(parts: Sequence[ReducedBody], laws: Sequence[Contact]) -> ModalSystem:
+def stretched_in(parts: Sequence[ReducedBody]) -> Stretched | None:
+    """How one of some bodies stretches, if it does."""
+    first, found = 0, None
+    for part in parts:
+        if part.stretching is not None:
+            found = Stretched(part.stretching.forms, first)
+        first += len(part.omega)
+    return found
+
+
+def joined(parts: Sequence[ReducedBody], laws: Sequence[Contact]) -> KernelSystem:
     """Join the modes of all bodies; series springs or replacement modes stand in for the left-out modes.
 
     A series spring is exact only for a body with one lossless contact. Otherwise each eigenvector of the residual
     compliance becomes a mode above the last kept one, so that loss and other contacts act on it too.
     """
-    law = np.array([each.numbers for each in laws])
-    rated = rated_contacts(law)
-    offset = np.array([-each.gap for each in laws])
-    arrays: list[tuple] = [(part.omega, part.zeta, part.bias, part.q, part.p) for part in parts]
-    shape = np.zeros((len(laws), sum([len(part.omega) for part in parts])))
-    # frequency, damping ratio, signed shape (n_contacts,), constant force, static deflection and its rate
-    extra: list[tuple[float, float, np.ndarray, float, float, float]] = []
-    start, stretched = 0, None
+    numbers, gaps, rated, forms, n = [], [], [], [], 0
+    for each in laws:
+        numbers.append(each.numbers)
+        gaps.append(-each.gap)
+        rated.append(each.rated)
     for part in parts:
-        if part.stretching is not None:
-            stretched = Stretched(part.stretching.forms, start)
+        forms.append(part.forms(rated) if part.yields else np.zeros((0, 0)))
+        n += len(part.omega) + forms[-1].shape[1]
+    law, offset = np.array(numbers), np.array(gaps)
+    table, shape = np.zeros((5, n)), np.zeros((len(laws), n))  # frequency, damping, constant force, state; shapes
+    start, lossy = 0, True in rated
+    for part, form in zip(parts, forms):
+        own = slice(start, start + len(part.omega))
+        start = own.stop
+        table[:, own] = part.omega, part.zeta, part.bias, part.q, part.p
         for (i, sign), row in zip(part.touched, part.rows):
-            shape[i, start : start + len(row)] += sign * row
-        start += len(part.omega)
-        if not part.yields:
-            continue
-        first, sign = part.touched[0]
-        if len(part.touched) == 1 and not rated[first]:
+            shape[i, own] += sign * row
+        if part.yields and not form.size:
+            first, sign = part.touched[0]
             law[first, layout.COMPLIANCE] += part.rest[0, 0]
             offset[first] += sign * part.rest[0, 0] * part.force
-            continue
-        above, damping = rest_mode(part.points.shape[1], part.omega[-1], part.zeta[-1], bool(rated.any()))
-        for form in part.forms(rated).T:
-            column = np.zeros(len(law))
-            for (i, sign), share in zip(part.touched, form):
-                column[i] += sign * share * above
-            held = -(part.pressed @ column[[i for i, _ in part.touched]]) / above**2
-            extra.append((above, damping, column, 0.0, float(held[0]), float(held[1])))
-    if extra:
-        shape = np.ascontiguousarray(np.hstack([shape, *(mode[2][:, None] for mode in extra)]))
-        arrays.append(tuple(np.array(column) for k, column in enumerate(zip(*extra)) if k != 2))
-    omega, zeta, bias, q, p = map(np.concatenate, zip(*arrays))
-    return ModalSystem(omega, zeta, shape, offset, bias, law, q, p, stretched=stretched)
-
-
-def rated_contacts(law: np.ndarray) -> np.ndarray:
-    """Whether the force of each contact depends on more than the approach itself, (n_contacts,)."""
-    return (law[:, layout.LOSS] > 0.0) | (law[:, layout.KIND] == FELT)
+    for part, form in zip(parts, forms):
+        if form.size:
+            above, damping = rest_mode(part.points.shape[1], part.omega[-1], part.zeta[-1], lossy)
+            for shares in form.T:
+                for (i, sign), share in zip(part.touched, shares):
+                    shape[i, start] += sign * share * above
+                held = -(part.pressed @ shape[[i for i, _ in part.touched], start]) / above**2
+                table[:, start] = above, damping, 0.0, *held
+                start += 1
+    found = KernelSystem(table[0], table[1], shape, offset, table[2], law, table[3], table[4])
+    for array in found:
+        array.setflags(write=False)
+    return found
 
 
 def rest_mode(dimension: int, omega: float, zeta: float, lossy: bool) -> tuple[float, float]:
@@ -215,16 +239,15 @@ def rest_mode(dimension: int, omega: float, zeta: float, lossy: bool) -> tuple[f
     return REST_ABOVE[min(dimension, 2)] * omega, float(zeta)
 
 
-def ends_of(parts: Sequence[ReducedBody], law: np.ndarray) -> tuple[Ends, ...]:
+def ends_of(parts: Sequence[ReducedBody], laws: Sequence[Contact]) -> tuple[Ends, ...]:
     """Where every body is touched; a constant force makes left-out modes dip only if a series spring replaces them."""
-    found, rated = [], rated_contacts(law)
-    last = sum([len(part.omega) for part in parts])
+    found, rated, last = [], [each.rated for each in laws], 0
     for part in parts:
-        forms = slice(last, last + part.forms(rated).shape[1])
+        last += len(part.omega)
+    for part in parts:
+        forms = slice(last, last + (part.forms(rated).shape[1] if part.yields else 0))
         last = forms.stop
-        dips = part.force and forms.start == forms.stop and part.yields
-        doubtful, dip_force = bool(part.loose.size or part.doubt.any()), part.force if dips else 0.0
-        found.append(
-            Ends(part.points, part.touched, part.force, part.rest, forms, dip_force, part.speed, doubtful=doubtful)
-        )
+        dips = part.force if part.yields and forms.start == forms.stop else 0.0
+        doubtful = bool(part.loose.size) or any(part.doubt.tolist())
+        found.append(Ends(part.points, part.touched, part.force, part.rest, forms, dips, part.speed, doubtful))
     return tuple(found)

@@ -12,11 +12,12 @@ from .._base import check
 from .._base.check import SimulationError
 from . import distance, engine
 from .compiled import layout
+from .compiled.bundles import KernelSystem
 from .contact import Contact
-from .distance import Distance
 from .engine import STEP_SHARE, TOLERANCE
-from .history import History, ModalSystem
+from .history import History
 from .quantities import asked_for
+from .stretched import Stretched
 
 Function = TypeVar("Function", bound=Callable)
 
@@ -64,6 +65,8 @@ class Options:
     target_force: float = 0.0  # [N]
     stretching: bool = False
     quantities: Mapping[str, float | None] = field(init=False)  # that must meet the tolerance, with their bands [Hz]
+    n_quantities: int = field(init=False)
+    last: tuple[float, int] = field(init=False)  # [s] time, and number of impacts, 0 for any, up to which to follow
 
     def __post_init__(self) -> None:
         check.flag("residual", self.residual)
@@ -79,11 +82,8 @@ class Options:
             striker_force=check.number("striker_force", self.striker_force, "N"),
             target_force=check.number("target_force", self.target_force, "N"),
         )
-
-    @property
-    def horizon(self) -> float:
-        """Time [s] at which the run stops at the latest."""
-        return np.inf if self.duration is None else self.duration
+        object.__setattr__(self, "n_quantities", len(self.quantities))
+        object.__setattr__(self, "last", (np.inf if self.duration is None else self.duration, self.max_impacts or 0))
 
 
 def takes_options(function: Function) -> Function:
@@ -129,13 +129,15 @@ class Converged:
     steps: tuple[float, float]  # of the finer and the coarser run, as `engine.follow` takes them
     fine: History
     coarse: History
-    error: Distance  # of the finer run
+    error: np.ndarray  # [-] of the finer run, as of `distance.of_runs`
 
 
-def refine_steps(system: ModalSystem, options: Options, pace: tuple[float, float]) -> Converged:
+def refine_steps(
+    system: KernelSystem, options: Options, pace: tuple[float, float], stretched: Stretched | None = None
+) -> Converged:
     """Refine until two successive runs agree to the tolerance; ``pace`` as of `engine.pace_of`."""
-    scheme, least = options.scheme, float(system.law[:, layout.EXPONENT].min())
-    if system.stretched is not None:
+    scheme, least = options.scheme, min(system.law[:, layout.EXPONENT].tolist())
+    if stretched is not None:
         if scheme == "collocation":
             raise ValueError("scheme collocation does not support stretching; use A4")
         scheme = scheme or "A4"
@@ -144,11 +146,11 @@ def refine_steps(system: ModalSystem, options: Options, pace: tuple[float, float
         raise ValueError(f"scheme collocation needs exponents of at least 1, got {least:g}; use A4")
     free = options.scheme is None and options.dt is None
     try:
-        return _Control(system, options, pace, scheme, free).refined()
+        return _Control(system, options, pace, scheme, free, stretched).refined()
     except _NotMet:
-        if not free or scheme != "A4" or least < 1.0 or system.stretched is not None:
+        if not free or scheme != "A4" or least < 1.0 or stretched is not None:
             raise
-    return _Control(system, options, pace, "collocation", free).refined()
+    return _Control(system, options, pace, "collocation", free, stretched).refined()
 
 
 class _NotMet(SimulationError):
@@ -159,37 +161,36 @@ class _NotMet(SimulationError):
 class _Control:
     """What a blow is followed with while its steps are refined."""
 
-    system: ModalSystem
+    system: KernelSystem
     options: Options
     pace: tuple[float, float]
     scheme: str
     free: bool  # whether scheme and steps are our choice
+    stretched: Stretched | None
 
     def run(self, size: float, chosen_by: str = "tolerance") -> History:
         """One run, see `engine.follow`."""
-        last = self.options.horizon, self.options.max_impacts or 0
-        return engine.follow(self.system, self.scheme, size, self.pace, *last, chosen_by)
+        how = self.scheme, size, self.pace, self.options.last, self.stretched
+        return engine.follow(self.system, *how, chosen_by)
 
     def judged(self, sizes: tuple[float, float], coarse: History, fine: History) -> Converged:
         """Two runs of a finer and a coarser size, and the errors of the finer one."""
-        over = RICHARDSON[self.scheme]
+        over, quantities, n = RICHARDSON[self.scheme], self.options.quantities, self.options.n_quantities
         if self.scheme != "collocation":  # a strong loss reacts to the rates of modes faster than the step
-            over = over[0], over[1] / (1.0 + 2.0 * self.pace[1] * self.system.law[:, layout.LOSS].max())
-        error = distance.of_runs(coarse, fine, self.options.quantities, over)
-        apart = error.quantities
-        if "force" in apart:
-            apart["force"] = max(apart["force"], fine.force_missed)
-        least = CHANCE * error.worst
-        for name, value in apart.items():
-            apart[name] = max(least, float(value))
-        error.margin = min(1.0, SURELY * error.margin)
+            over = over[0], over[1] / (1.0 + 2.0 * self.pace[1] * max(self.system.law[:, layout.LOSS].tolist()))
+        error = distance.of_runs(coarse, fine, quantities, over)
+        if "force" in quantities:
+            i = [*quantities].index("force")
+            error[i] = max(error[i], fine.force_missed)
+        error[:n] = np.maximum(error[:n], CHANCE * max(error[:n].tolist()))
+        error[n] = min(1.0, SURELY * error[n])
         return Converged(self.scheme, sizes, fine, coarse, error)
 
     def refined(self) -> Converged:
         """The first pair of runs that agrees."""
         options, tolerance = self.options, self.options.tolerance
         if options.dt is not None:
-            size = min(options.dt, 0.5 * options.horizon)
+            size = min(options.dt, 0.5 * options.last[0])
             fine, coarse = (self.run(each, "dt") for each in (size, 2.0 * size))
             return self.judged((size, 2.0 * size), coarse, fine)
         sizes, aim = self.sizes()
@@ -207,15 +208,15 @@ class _Control:
             if i:
                 runs = [runs[1], self.run(size)]
             found = self.judged((size, before), *runs)
-            error = found.error.worst
+            error = max(found.error[: options.n_quantities].tolist())
             best = min(best, error)
             if error <= tolerance:
                 met = found
             if error <= aim:
-                if grazes == GRAZES or found.fine.margin > found.error.margin:
+                if grazes == GRAZES or found.fine.margin > found.error[options.n_quantities]:
                     break
                 grazes += 1
-            if 2 * len(found.fine.steps) > engine.most_steps(self.system):
+            if 2 * len(found.fine.steps) > engine.most_steps(self.system, self.stretched):
                 break  # the next run would exceed the step limit
         if met is None:
             raise _NotMet(self.told(best, *runs))
@@ -229,7 +230,7 @@ class _Control:
                 options.tolerance
             )
         # or the horizon could cut both runs to one step, and they would always agree
-        shortest = min(self.pace[0], options.horizon)
+        shortest = min(self.pace[0], options.last[0])
         count = _first_count(self.scheme, min(STEP_SHARE * options.tolerance, TOLERANCE), options.quantities)
         first = min(2.0 * shortest / count, _longest_lossy(self.system, self.pace, options.tolerance))
         return [first * 0.5**n for n in range(DOUBLINGS + 1)], STEP_SHARE * options.tolerance
@@ -258,19 +259,20 @@ def _agreed(coarse: History, fine: History, apart: float) -> int:
     return n if same.all() else int(same.argmin())
 
 
-def _longest_lossy(system: ModalSystem, pace: tuple[float, float], tolerance: float) -> float:
+def _longest_lossy(system: KernelSystem, pace: tuple[float, float], tolerance: float) -> float:
     """Longest step [s] that resolves the modes whose ringing shows in a lossy contact force; infinite without loss.
 
     A lossy force depends on the approach rate. A force that rises like a spring's makes each mode ring in that rate,
     with stiffness times u**2 / omega**2 of the approach speed.
     """
-    longest = np.inf
+    longest, numbers = np.inf, (pace[1] * system.law[:, layout.LOSS]).tolist()
+    if not any(numbers):
+        return longest
     slow = system.omega <= np.pi / pace[0]
     fastest = (-system.omega).argsort(kind="stable")
     order = fastest[(system.omega[fastest] > 0.0) & (system.zeta[fastest] < RINGING)]
     omega = system.omega[order]
-    for shape, loss in zip(system.shape, system.law[:, layout.LOSS]):
-        number = loss * pace[1]
+    for shape, number in zip(system.shape, numbers):
         if number > 0.0 and len(omega):
             stiffness = (1.0 + number) * (np.pi / pace[0]) ** 2 / max(float(shape[slow] @ shape[slow]), 1e-300)
             ringing = number / (1.0 + number) * stiffness * np.cumsum((shape[order] / omega) ** 2)

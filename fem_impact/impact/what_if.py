@@ -10,10 +10,10 @@ from .._base.check import SimulationError
 from ..modes.modal import Modes
 from . import accuracy, distance, engine
 from .compiled import record
+from .compiled.bundles import KernelSystem
 from .contact import Contact
-from .distance import Distance
-from .history import History, ModalSystem
-from .reduced_body import ReducedBody, joined
+from .history import History
+from .reduced_body import THINNED, ReducedBody, joined, stretched_in
 from .stepping import RINGING, Converged, Options
 
 # [-] the error in the restitution of an impact falls with this power: on average it is 1, but it is not steady; with 1,
@@ -26,8 +26,6 @@ AT_LEAST = 0.3
 # [-] But by no more than this times the larger of two extra runs: where both differ by less, the prediction does not
 # apply, as to contacts that outlast many periods of the modes left out. The truth was more in 2 of 715 random blows.
 BY_CHANCE = 10.0
-# [-] two extra runs divide the highest kept frequency by these: near enough to foretell, far enough to differ
-THINNED = 1.4, 2.0
 FALLING = 2.0, 1.0  # [-] the truncation error falls at least with this power of the highest kept frequency; overdamped
 NEGLIGIBLE = 1e-4  # [-] mesh errors below this fraction of the tolerance need no extra run; the blow errs by as little
 
@@ -38,34 +36,26 @@ class Followed:
 
     parts: Sequence[ReducedBody]
     laws: Sequence[Contact]
-    system: ModalSystem
+    system: KernelSystem
     options: Options
     pace: tuple[float, float]  # as of `engine.pace_of`
     runs: Converged
 
     def again(self, parts: Sequence[ReducedBody], *, finely: bool = False) -> History:
         """The blow with these bodies, in the steps of the coarser run or, on request, of the finer."""
-        system, size = joined(parts, self.laws), self.runs.steps[0 if finely else 1]
-        last = self.options.horizon, self.options.max_impacts or 0
-        return engine.follow(system, self.runs.scheme, size, self.pace, *last)
-
-    def apart(self, one: History, two: History) -> Distance:
-        """The distance between two of its runs."""
-        return distance.of_runs(one, two, self.options.quantities)
+        how = self.runs.scheme, self.runs.steps[0 if finely else 1], self.pace, self.options.last
+        return engine.follow(joined(parts, self.laws), *how, stretched_in(parts))
 
     def changed(self, body: int, part: ReducedBody) -> list[ReducedBody]:
         """The bodies, with one of them changed."""
         return [*self.parts[:body], part, *self.parts[body + 1 :]]
 
     @functools.cached_property
-    def _mobility(self) -> list[float]:
-        """Sum of the squared shapes of the modes slower than the contact [1/kg], (n_contacts,)."""
-        slow = self.system.omega <= np.pi / self.pace[0]
-        return np.maximum((self.system.shape**2) @ slow, 1e-300).tolist()
-
-    def stiffness(self, contact: int) -> float:
-        """Of a contact, as its duration tells it [N/m]."""
-        return (np.pi / self.pace[0]) ** 2 / self._mobility[contact]
+    def stiffness(self) -> list[float]:
+        """Of every contact, as its duration tells it, and the modes that are slower [N/m]."""
+        omega = np.pi / self.pace[0]
+        mobility = np.maximum((self.system.shape**2) @ (self.system.omega <= omega), 1e-300)
+        return (omega**2 / mobility).tolist()
 
 
 @dataclass(frozen=True)
@@ -80,57 +70,54 @@ class Variation:
     most_by_chance: float = np.inf  # [-] but in quantities at most this many times the error
 
 
-def what_if(blow: Followed, variations: Sequence[Variation]) -> dict[str, Distance]:
-    """Estimated errors of a blow by cause: what each variation does to it."""
-    errors: dict[str, Distance] = {}
+def what_if(blow: Followed, variations: Sequence[Variation]) -> dict[str, np.ndarray]:
+    """Estimated errors of a blow by cause, as of `distance.of_runs`: what each variation does to it."""
+    quantities, n = blow.options.quantities, blow.options.n_quantities
+    none = np.zeros(len(blow.runs.error))
+    errors: dict[str, np.ndarray] = {}
     for each in variations:
         for ways in each.changes:
-            if ways:
-                effects = []
-                for parts, *weights in ways:
-                    effects.append(blow.apart(blow.again(parts), blow.runs.coarse).scaled(*weights))
-                _add(errors, each.cause, distance.largest(effects))
+            effects = []
+            for parts, weight, parting in ways:
+                effects.append(distance.of_runs(blow.again(parts), blow.runs.coarse, quantities))
+                effects[-1][: n + 1] *= weight
+                effects[-1][n + 1 :] *= parting
+            if effects:
+                errors[each.cause] = errors.get(each.cause, none) + np.maximum.reduce(effects)
         if each.least:
-            found = errors.get(each.cause) or Distance.uniform(blow.runs.error, 0.0)
-            least = Distance.uniform(blow.runs.error, each.least)
-            of_quantities = min(each.least, each.most_by_chance * found.worst)
-            least.quantities = dict.fromkeys(least.quantities, of_quantities)
-            errors[each.cause] = distance.largest([least, found])
+            found = errors.get(each.cause, none)
+            least = none + each.least
+            least[:n] = min(each.least, each.most_by_chance * max(found[:n].tolist()))
+            errors[each.cause] = np.maximum(least, found)
     return errors
 
 
-def _add(errors: dict[str, Distance], cause: str, more: Distance) -> None:
-    errors[cause] = errors[cause] + more if cause in errors else more
-
-
-def modes_left_out(blow: Followed, told: Sequence[bool]) -> tuple[Variation, bool]:
+def modes_left_out(blow: Followed, bodies: Sequence[Modes]) -> tuple[Variation, bool]:
     """Upper modes replaced by their compliance, and whether what that does tells the error.
 
     The error falls at least with the power FALLING of the highest kept frequency, so the change bounds the error of the
     modes already left out. Two such runs and a minimum, AT_LEAST of the predicted error up to BY_CHANCE times what they
-    found, guard against a change that is small by chance. The bodies ``told`` (n_bodies,) have a poorer description
-    with modes above those of their own, whose blow tells the error.
+    found, guard against a change that is small by chance. The blow with a poorer description of a body that has modes
+    above those of its own tells the error, too.
     """
-    yields = [part.yields for part in blow.parts]
-    if True not in yields:
-        return Variation("truncation", ()), True
-    omega_0 = np.pi / blow.pace[0]
-    softness, expected = np.zeros(len(blow.laws)), 0.0
-    changes: list[list[tuple[Sequence[ReducedBody], float, float]]] = [[] for _ in blow.parts]
-    for i, (part, known) in enumerate(zip(blow.parts, told)):
+    omega_0, softness, expected, looked = np.pi / blow.pace[0], [0.0] * len(blow.laws), 0.0, True
+    changes: list[list[tuple[Sequence[ReducedBody], float, float]]] = []
+    for i, (part, modes) in enumerate(zip(blow.parts, bodies)):
+        if not part.yields:
+            continue
         above = omega_0 / max(omega_0, part.omega[-1])
-        for (k, _), rest in zip(part.touched, part.rest.diagonal()):
-            soft = blow.stiffness(k) * rest
+        for (k, _), rest in zip(part.touched, part.rest.diagonal().tolist()):
+            soft = blow.stiffness[k] * rest
             softness[k] += soft
             expected += float(accuracy.left_out_error(soft, above, blow.laws[k].exponent, part.points.shape[1]))
-        for wanted in () if known else THINNED:
-            thin, ratio = part.thinned(wanted)
-            if 1.0 < ratio < np.inf:
-                weight = 1.0 / (ratio ** FALLING[int(part.zeta[-1] > RINGING)] - 1.0)
-                changes[i].append((blow.changed(i, thin), weight, 1.0 / (ratio**PARTING - 1.0)))
-    seen = all(len(ways) == len(THINNED) or not soft for ways, soft in zip(changes, yields))
-    found = Variation("truncation", changes, AT_LEAST * expected, BY_CHANCE if seen else np.inf)
-    return found, max(softness.tolist()) <= RESOLVABLE
+        known = modes.poorer and any(other.omega[-1] > modes.omega[-1] for other in modes.poorer.values())
+        changes.append([])
+        for thin, ratio in () if known else part.thinner:
+            weight = 1.0 / (ratio ** FALLING[int(part.zeta[-1] > RINGING)] - 1.0)
+            changes[-1].append((blow.changed(i, thin), weight, 1.0 / (ratio**PARTING - 1.0)))
+        looked &= len(changes[-1]) == len(THINNED)
+    found = Variation("truncation", changes, AT_LEAST * expected, BY_CHANCE if looked else np.inf)
+    return found, max(softness) <= RESOLVABLE
 
 
 def unstated(blow: Followed, bodies: Sequence[Modes]) -> Variation:
@@ -162,8 +149,9 @@ def mesh(blow: Followed, bodies: Sequence[Modes]) -> Variation:
     of_elements = [(i, modes) for i, modes in enumerate(bodies) if not modes.unstated]
     for i, modes in of_elements:
         part = blow.parts[i]
-        soft = [blow.stiffness(contact) * doubt for (contact, _), doubt in zip(part.touched, part.doubt.tolist())]
-        worst = max([worst, *soft] if modes.frequency_error is None else [worst, modes.frequency_error.max(), *soft])
+        for (contact, _), doubt in zip(part.touched, part.doubt.tolist()):
+            worst = max(worst, blow.stiffness[contact] * doubt)
+        worst = worst if modes.frequency_error is None else max(worst, modes.frequency_error.max())
     if worst <= NEGLIGIBLE * blow.options.tolerance:
         return Variation("mesh", ())
     for i, modes in of_elements:
@@ -171,26 +159,27 @@ def mesh(blow: Followed, bodies: Sequence[Modes]) -> Variation:
     return Variation("mesh", [[(softer, 1.0, 1.0)]])
 
 
-def add_poorer_descriptions(blow: Followed, bodies: Sequence[Modes], errors: dict[str, Distance]) -> None:
+def add_poorer_descriptions(blow: Followed, bodies: Sequence[Modes], errors: dict[str, np.ndarray]) -> None:
     """Add the errors that ever poorer descriptions of a body tell, each compared with the one before.
 
     They run in fine steps, because the fastest modes of two descriptions differ, and so do their step errors.
     """
+    quantities, n = blow.options.quantities, blow.options.n_quantities
     for i, body in enumerate(bodies):
         before = blow.runs.fine
         for cause, other in body.poorer.items():
-            found = one_more = Distance.uniform(blow.runs.error, 1.0)
+            found = one_more = np.ones(len(blow.runs.error))
             try:
                 less = blow.again(blow.changed(i, blow.parts[i].described_by(other)), finely=True)
-                found = blow.apart(less, before)
+                found = distance.of_runs(less, before, quantities)
                 if len(before.contacts) != len(blow.runs.fine.contacts):  # other impacts, of which nothing is known
-                    found.rebounds = one_more.rebounds
+                    found = np.append(found[: n + 1], one_more[n + 1 :])
                 if _may_touch(before, less, blow.pace[0]):
-                    found += one_more
+                    found = found + one_more
                 before = less
             except SimulationError:  # the poorer body cannot be followed, so it tells nothing
                 pass
-            _add(errors, cause, found)
+            errors[cause] = errors.get(cause, 0.0) + found
 
 
 def _may_touch(history: History, other: History, duration: float) -> bool:

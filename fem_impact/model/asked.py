@@ -176,8 +176,11 @@ class Asked:
         if not modes.dimension:
             return modes.n_modes, 0.0
         if kept is None and self.values["residual"]:
-            return collision.striker_modes(self.blow.striker, tolerance=self.budget.total / margin, **self.law)
-        kept = max(modes.n_rigid, min(kept or modes.n_modes, modes.n_modes))
+            kept, allowed = collision.striker_modes(self.blow.striker, tolerance=self.budget.total / margin, **self.law)
+            if kept == modes.n_rigid:
+                return kept, allowed
+        else:
+            kept = max(modes.n_rigid, min(kept or modes.n_modes, modes.n_modes))
         return kept, collision.striker_error(self.blow.striker, kept, **self.law)
 
     def from_outside(self, kind: str, mass: float) -> audit.Simplified | None:

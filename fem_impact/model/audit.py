@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from .._base import check
 from .._base.check import SimulationError
 from ..fe.assembly import THEORIES
 from ..fe.section import Beam, Plate
@@ -51,8 +52,9 @@ class Simplified:
 
 
 def audited(hit: Response, simplified: Simplified | None = None) -> Response:
-    """The response of a blow with its examiner."""
-    return replace(hit, audit=partial(examine, simplified=simplified))
+    """The response of a blow that was just struck, given its examiner."""
+    check.settle(hit, audit=partial(examine, simplified=simplified))
+    return hit
 
 
 def examine(hit: Response, simplified: Simplified | None = None) -> tuple[Assumption, ...]:

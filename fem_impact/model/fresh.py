@@ -40,7 +40,7 @@ def soon(compute: Callable[[], Answer], most: float = np.inf, holds: Callable[[A
 
     Runs as plain Python give up after ``most`` steps.
     """
-    if not build.COMPILED or SWITCH in os.environ or not places.lasting(os.environ):
+    if not build.COMPILED:
         return compute()
     lacking: tuple[Any, ...] = ()
     try:
@@ -48,7 +48,7 @@ def soon(compute: Callable[[], Answer], most: float = np.inf, holds: Callable[[A
             return compute()
     except build.Uncompiled as error:
         lacking = error.args
-    if _under_way(lacking):
+    if SWITCH not in os.environ and places.lasting(os.environ) and _under_way(lacking):
         with suppress(check.SimulationError), build.uncompiled(most):
             found = compute()
             if holds(found):

@@ -246,7 +246,7 @@ class Target:
         if np.isclose(size, mesh.size, rtol=1e-9):
             return mesh
         with stages("mesh"), self.blame("mesh"):
-            return self._meshes.found(np.array(size), lambda _: mesh.refined(mesh.size / size))
+            return self._meshes.found(size, lambda: mesh.refined(mesh.size / size))
 
     def n_cells(self, size: float, stages: Stages) -> int:
         """Number of triangles of a size [m], before they shrink towards a blow."""
@@ -255,7 +255,7 @@ class Target:
     def unknowns(self, at: np.ndarray, elements: Elements, stages: Stages) -> int:
         """About how many unknowns `near` makes; it takes a tenth of the time."""
 
-        def count(_: np.ndarray) -> int:
+        def count() -> int:
             assert isinstance(self.section, Plate)
             mesh, graded = self._meshed(elements.size, stages), self.system is None or self.system.graded
             with stages("mesh"), self.blame("supports"), np.errstate(all="ignore"):
@@ -264,7 +264,7 @@ class Target:
                 coarseness[: len(at)] = elements.at_blow
                 return unknowns_near(mesh, self.section, dict(self.supports), points, graded, coarseness)
 
-        return self._counts.found(np.append(elements, at), count)
+        return self._counts.found(np.append(elements, at).tobytes(), count)
 
     def near(self, at: np.ndarray, elements: Elements, stages: Stages) -> System:
         """The body assembled with elements that shrink towards points (n_points, 2) [m]."""

@@ -3,6 +3,7 @@
 import logging
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
@@ -10,6 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from .._base import check, markup
+from .._base.remembered import Remembered
 from .._base.rounding import ROUNDING, SAME
 from ..fe import plausible, refinement
 from ..fe.assembly import THICK, System
@@ -196,7 +198,12 @@ class Modes(check.Brief):
             found["cells"] = None
         return cls.from_arrays(**found, mass=mass, compliance=compliance, free=free)
 
-    @property
+    @cached_property
+    def known(self) -> Remembered:
+        """What was found of these modes at points where they were struck."""
+        return Remembered(REMEMBERED)
+
+    @cached_property
     def n_modes(self) -> int:
         return len(self.omega)
 
@@ -205,12 +212,12 @@ class Modes(check.Brief):
         """Natural frequencies, (n_modes,) [Hz]."""
         return self.omega / (2.0 * np.pi)
 
-    @property
+    @cached_property
     def n_rigid(self) -> int:
         """Number of rigid motions (modes of frequency zero)."""
         return int(np.count_nonzero(self.omega == 0.0))
 
-    @property
+    @cached_property
     def dimension(self) -> int:
         """Number of coordinates of a point on the body: 2 on a plate, 1 on a beam, 0 for a rigid mass."""
         return self.shapes.dimension
@@ -245,7 +252,14 @@ class Modes(check.Brief):
             n_points = 1 if points is None else len(np.atleast_2d(check.numbers(name, points, "m")))
             return np.zeros((max(1, n_points), 0))
         array = check.places(name, points, self.dimension)
-        check.on_body(name, array, self.shapes.contains(array), self.shapes.grid()[0])
+
+        def inside() -> None:
+            check.on_body(name, array, self.shapes.contains(array), self.shapes.grid()[0])
+
+        if len(array) == 1:
+            self.known.found(("inside", array.tobytes()), inside)
+        else:
+            inside()
         return array
 
     def shape_at(self, points: Any) -> np.ndarray:

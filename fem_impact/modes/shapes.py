@@ -249,7 +249,7 @@ class FieldShapes(Shapes, check.Locked):
     def at(self, points: np.ndarray) -> np.ndarray:
         if len(points) != 1:
             return self._shapes(points)
-        shapes = self._at.found(points, self._shapes)
+        shapes = self._at.found(points.tobytes(), lambda: self._shapes(points))
         shapes.flags.writeable = False
         return shapes
 
@@ -260,7 +260,7 @@ class FieldShapes(Shapes, check.Locked):
         return self.system.contains(points)
 
     def _deflection(self, loads: np.ndarray) -> point_load.Deflection:
-        return self._under.found(loads, lambda loads: point_load.static_deflection(self.system, loads))
+        return self._under.found(loads.tobytes(), lambda: point_load.static_deflection(self.system, loads))
 
     def compliance(self, points: np.ndarray) -> np.ndarray:
         return self._deflection(points).compliance

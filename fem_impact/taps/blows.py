@@ -12,8 +12,8 @@ import numpy as np
 
 from ..impact import engine
 from ..impact.contact import Contact
-from ..impact.history import History, ModalSystem
-from ..impact.reduced_body import ReducedBody, joined, part_of
+from ..impact.history import History
+from ..impact.reduced_body import ReducedBody, joined, reduce_body
 from ..impact.striker import Striker
 from ..modes.modal import Modes, left_out
 from .rig import FINE, MARGIN, Rig, accelerations, behind_tip
@@ -66,7 +66,7 @@ def tapped(part: ReducedBody, seen: np.ndarray, mass: float) -> TappedBody:
 
 def wall(n_points: int = 0) -> TappedBody:
     """A body that cannot move."""
-    part = part_of(Modes.rigid(1.0), ((0, -1.0),), np.zeros((1, 0)), np.zeros((1, 1)), None, 0.0)
+    part = reduce_body(Modes.rigid(1.0), ((0, -1.0),), np.zeros((1, 0)), np.zeros((1, 1)), None)
     none = {name: getattr(part, name)[..., :0] for name in ("omega", "zeta", "rows", "q", "p", "bias")}
     return tapped(replace(part, **none), np.zeros((n_points, 0)), np.inf)
 
@@ -74,8 +74,8 @@ def wall(n_points: int = 0) -> TappedBody:
 def of_striker(striker: Striker) -> TappedBody:
     """A striker at its contact point."""
     modes, rest = striker.modes, striker.left_out if striker.modes.dimension else None
-    part = part_of(modes, ((0, 1.0),), striker.at[None], striker.shape[None], rest, 0.0, striker.motion)
-    return tapped(part, np.zeros((0, modes.n_modes)), modes.mass)
+    part = reduce_body(modes, ((0, 1.0),), striker.at[None], striker.shape[None], rest)
+    return tapped(replace(part, p=striker.motion), np.zeros((0, modes.n_modes)), modes.mass)
 
 
 def of_target(modes: Modes, at: Any, points: Any = None, softness: float | None = None) -> TappedBody:
@@ -90,16 +90,18 @@ def of_target(modes: Modes, at: Any, points: Any = None, softness: float | None 
     elif modes.dimension:
         rest = left_out(modes, place, rows)
     seen = np.zeros((0, modes.n_modes)) if points is None else modes.shape_at(points)
-    return tapped(part_of(modes, ((0, -1.0),), place, rows, rest, 0.0), seen, modes.mass)
+    return tapped(reduce_body(modes, ((0, -1.0),), place, rows, rest), seen, modes.mass)
 
 
-def run(system: ModalSystem, speed: float, step: float, horizon: float) -> History:
+def run(system: engine.KernelSystem, speed: float, step: float, horizon: float) -> History:
     """One blow of a system that moves at unit speed, at a speed [m/s] with a step in contact [s], up to a time [s]."""
-    struck = replace(system, start_p=speed * system.start_p)
-    return engine.follow(struck, "A4", step, (STEPS * step, speed), horizon, 0, "the lower ends of unknown")
+    struck = system._replace(p=speed * system.p)
+    struck.p.setflags(write=False)  # or numba would compile the kernels again for writable arrays
+    last = horizon, 0
+    return engine.follow(struck, "A4", step, (STEPS * step, speed), last, chosen_by="the lower ends of unknown")
 
 
-def longest_step(system: ModalSystem, contact: Contact, duration: float) -> float:
+def longest_step(system: engine.KernelSystem, contact: Contact, duration: float) -> float:
     """Step [s] for contacts of about ``duration`` [s], short enough for the modes that the contact feels."""
     step = duration / STEPS
     if contact.rated:
