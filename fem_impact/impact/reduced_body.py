@@ -10,8 +10,7 @@ from .._base import check
 from .._base.rounding import ROUNDING
 from ..modes.modal import Modes, left_out
 from ..modes.stretching import Stretching, stretch
-from .compiled import layout
-from .compiled.law import FELT
+from .compiled.law import table
 from .contact import Contact
 from .history import ModalSystem
 from .stretched import Stretched
@@ -164,7 +163,7 @@ def joined(parts: Sequence[ReducedBody], laws: Sequence[Contact]) -> ModalSystem
     A series spring is exact only for a body with one lossless contact. Otherwise each eigenvector of the residual
     compliance becomes a mode above the last kept one, so that loss and other contacts act on it too.
     """
-    law = np.array([each.numbers for each in laws])
+    law = table([each.numbers for each in laws])
     rated = rated_contacts(law)
     offset = np.array([-each.gap for each in laws])
     arrays: list[tuple] = [(part.omega, part.zeta, part.bias, part.q, part.p) for part in parts]
@@ -182,7 +181,7 @@ def joined(parts: Sequence[ReducedBody], laws: Sequence[Contact]) -> ModalSystem
             continue
         first, sign = part.touched[0]
         if len(part.touched) == 1 and not rated[first]:
-            law[first, layout.COMPLIANCE] += part.rest[0, 0]
+            law["compliance"][first] += part.rest[0, 0]
             offset[first] += sign * part.rest[0, 0] * part.force
             continue
         above, damping = rest_mode(part.points.shape[1], part.omega[-1], part.zeta[-1], bool(rated.any()))
@@ -201,7 +200,7 @@ def joined(parts: Sequence[ReducedBody], laws: Sequence[Contact]) -> ModalSystem
 
 def rated_contacts(law: np.ndarray) -> np.ndarray:
     """Whether the force of each contact depends on more than the approach itself, (n_contacts,)."""
-    return (law[:, layout.LOSS] > 0.0) | (law[:, layout.KIND] == FELT)
+    return (law["loss"] > 0.0) | (law["relaxation"] > 0.0)
 
 
 def rest_mode(dimension: int, omega: float, zeta: float, lossy: bool) -> tuple[float, float]:

@@ -11,7 +11,6 @@ import numpy as np
 from .._base import check
 from .._base.check import SimulationError
 from . import distance, engine
-from .compiled import layout
 from .contact import Contact
 from .distance import Distance
 from .engine import STEP_SHARE, TOLERANCE
@@ -134,7 +133,7 @@ class Converged:
 
 def refine_steps(system: ModalSystem, options: Options, pace: tuple[float, float]) -> Converged:
     """Refine until two successive runs agree to the tolerance; ``pace`` as of `engine.pace_of`."""
-    scheme, least = options.scheme, float(system.law[:, layout.EXPONENT].min())
+    scheme, least = options.scheme, float(system.law["exponent"].min())
     if system.stretched is not None:
         if scheme == "collocation":
             raise ValueError("scheme collocation does not support stretching; use A4")
@@ -174,7 +173,7 @@ class _Control:
         """Two runs of a finer and a coarser size, and the errors of the finer one."""
         over = RICHARDSON[self.scheme]
         if self.scheme != "collocation":  # a strong loss reacts to the rates of modes faster than the step
-            over = over[0], over[1] / (1.0 + 2.0 * self.pace[1] * self.system.law[:, layout.LOSS].max())
+            over = over[0], over[1] / (1.0 + 2.0 * self.pace[1] * self.system.law["loss"].max())
         error = distance.of_runs(coarse, fine, self.options.quantities, over)
         apart = error.quantities
         if "force" in apart:
@@ -269,7 +268,7 @@ def _longest_lossy(system: ModalSystem, pace: tuple[float, float], tolerance: fl
     fastest = (-system.omega).argsort(kind="stable")
     order = fastest[(system.omega[fastest] > 0.0) & (system.zeta[fastest] < RINGING)]
     omega = system.omega[order]
-    for shape, loss in zip(system.shape, system.law[:, layout.LOSS]):
+    for shape, loss in zip(system.shape, system.law["loss"]):
         number = loss * pace[1]
         if number > 0.0 and len(omega):
             stiffness = (1.0 + number) * (np.pi / pace[0]) ** 2 / max(float(shape[slow] @ shape[slow]), 1e-300)

@@ -277,7 +277,7 @@ class Found(check.Brief):
         hammer, law = self.striker, self.contact
         if tip is not None:
             factor = check.positive("tip", tip)
-            law = replace(law, stiffness=law.stiffness * factor, hard_stiffness=law.hard_stiffness * factor)
+            law = law.stiffened(factor)
         typical = float(np.mean(self.problem.speeds(self.best.x)))
         if mass is not None:
             mass = check.positive("mass", mass, "kg")
