@@ -160,11 +160,6 @@ class Contact(Numbers):
         """The law as the compiled loops read it, by name; see `compiled.law`."""
         return row_of(self)
 
-    def stiffened(self, factor: float) -> "Contact":
-        """The same law with all its stiffnesses times a factor."""
-        names = ["stiffness", *(name for name, number in NUMBERS.items() if number.unit.startswith("N/m"))]
-        return replace(self, **{name: getattr(self, name) * factor for name in names})
-
     def force(self, approach: Any, rate: Any = 0.0) -> np.ndarray:
         """Contact force [N] for an approach [m] and its rate [m/s]; never negative.
 

@@ -82,15 +82,12 @@ class PlasticLaw(Law):
     kind = KIND
     name = "elastic_plastic"
     mark = "yield_approach"
-    numbers: ClassVar = {
-        "yield_approach": LawNumber(
-            "m", "approach at first yield", "approach at first yield, in place of yield_speed and mass"
-        ),
-    }
+    numbers: ClassVar = {"yield_approach": LawNumber("m", "approach at first yield", "")}
     keys: ClassVar = {
         "exponent": LawNumber("", "", "1.5 for round bodies; with 1 nothing yields", 1.0, 100.0),
         "yield_speed": LawNumber("m/s", "", "at which a mass on a rigid wall first yields; with mass", None),
         "mass": LawNumber("kg", "", "of that mass", None),
+        "yield_approach": LawNumber("m", "", "approach at first yield, in place of yield_speed and mass", None),
     }
     remembers = True
     hertzian = True
