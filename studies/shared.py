@@ -78,7 +78,7 @@ def parser(about: str, out: Path | None = None) -> argparse.ArgumentParser:
 
 
 def write_rows(path: Path, rows: Iterable[Any], *, append: bool = False) -> None:
-    """Write dictionaries or dataclasses as CSV; with ``append`` after the lines that are there, and nothing where there are none."""
+    """Write dictionaries or dataclasses as CSV, if there are any; with ``append`` after the lines that are there."""
     tables = [asdict(row) if is_dataclass(row) and not isinstance(row, type) else row for row in rows]
     if not tables:
         return

@@ -21,8 +21,8 @@ MODULES = sorted(path for path in HOME.rglob("*.py") if path.name != "__init__.p
 
 
 def package(path):
-    """The package of a module as a path from `HOME`."""
-    return "" if path.parent == HOME else path.parent.relative_to(HOME).as_posix()
+    """The package of a module as a path from `HOME`; the folder of laws is part of that above it."""
+    return "" if path.parent == HOME else path.parent.relative_to(HOME).as_posix().removesuffix("/laws")
 
 
 def imports(path):
@@ -34,7 +34,7 @@ def imports(path):
             for name in node.names:
                 target = base / name.name
                 found = target if target.is_dir() else base.parent if base.with_suffix(".py").exists() else base
-                own.add(found.relative_to(HOME).as_posix().removeprefix("."))
+                own.add(found.relative_to(HOME).as_posix().removeprefix(".").removesuffix("/laws"))
         elif isinstance(node, ast.ImportFrom):
             outside.add(node.module.split(".")[0])
         elif isinstance(node, ast.Import):

@@ -49,7 +49,7 @@ def compile_all(tasks):
 
 def locked(*arrays):
     """Copies that cannot be written to, as a blow's own arrays: for others the kernels would be compiled once more."""
-    copies = [np.array(array, float, order="C") for array in arrays]
+    copies = [np.array(each, each.dtype if isinstance(each, np.ndarray) else float, order="C") for each in arrays]
     for copy in copies:
         copy.setflags(write=False)
     return copies

@@ -9,10 +9,11 @@ import numpy as np
 
 from .._base.check import SimulationError
 from .._base.rounding import EPSILON, ROUNDING
-from .compiled import build, layout, record
+from .compiled import build, record
 from .compiled.bundles import KernelSystem, Limits
 from .compiled.collocation import run_collocation
 from .compiled.energy import run_energy
+from .compiled.law import Row
 from .compiled.stretched import Stretch
 from .contact import acting_stiffness, wall_time
 from .history import History
@@ -118,8 +119,8 @@ def pace_of(system: KernelSystem, held: Sequence[int] = ()) -> tuple[float, floa
     last = beyond > rate[order]  # the last mode of each distinct frequency
     beyond = beyond[last]
     shortest, fastest = np.inf, 0.0
-    for i, law in enumerate(system.law):
-        k, exponent, compliance = law[layout.STIFFNESS], law[layout.EXPONENT], law[layout.COMPLIANCE]
+    for i, law in enumerate(map(Row._make, system.law.tolist())):
+        k, exponent, compliance = law.stiffness, law.exponent, law.compliance
         mobile = (system.shape[i, order] ** 2).cumsum()[last]  # [1/kg] sum over the modes up to each
         above, mobile = beyond[mobile > 0.0], mobile[mobile > 0.0]
         if not mobile.size:
@@ -137,7 +138,7 @@ def pace_of(system: KernelSystem, held: Sequence[int] = ()) -> tuple[float, floa
         shortest = min(shortest, float(free[(np.pi / free < above).argmax()]))
         fastest = max(fastest, float(speed))
     if not np.isfinite(shortest):
-        k, exponent = system.law[0, :2]
+        k = system.law["stiffness"][0]
         return float(np.sqrt(1.0 / (k * max(1e-300, (system.shape[0] ** 2).sum())))), 1.0
     return shortest, fastest
 

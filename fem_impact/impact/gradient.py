@@ -16,6 +16,7 @@ from .._base.check import SimulationError
 from ..fe.variation import SectionChange
 from . import engine, force_spectrum
 from .compiled import layout
+from .compiled.law import columns
 from .history import History, mode_energy
 from .parameters import ONE_SIDED, Change, Parameters, unit
 from .quantities import rebound
@@ -218,7 +219,10 @@ class Again:
     def __call__(self, i: int = 0, by: float = 0.0) -> list[Any]:
         """The quantities with number i larger by so much."""
         h = self.hit.history
-        changed = {name: getattr(h, name) + by * getattr(self.change, name)[i] for name in Change._fields} if by else {}
+        changed = {
+            name: (columns(each) + by * columns(getattr(self.change, name)[i])).view(each.dtype).reshape(each.shape)
+            for name, each in ((name, getattr(h, name)) for name in Change._fields if by)
+        }
         history = engine.again(h, self.step, **changed)
         if len(history.contacts) != len(h.contacts):
             raise SimulationError(

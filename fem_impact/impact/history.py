@@ -9,7 +9,7 @@ import numpy as np
 from .._base import check
 from .._base.rounding import ROUNDING, SAME
 from . import force_spectrum
-from .compiled import law, layout, propagation, record
+from .compiled import layout, propagation, record
 from .compiled.bundles import KernelSystem
 from .contact import sunk
 from .free_motion import swing
@@ -63,7 +63,7 @@ class History(check.Locked):
     shape: np.ndarray  # (n_contacts, n_modes) [kg**-0.5] signed: the approach is offset + shape @ q
     offset: np.ndarray  # (n_contacts,) [m]
     bias: np.ndarray  # (n_modes,) [N kg**-0.5] constant modal forces
-    law: np.ndarray  # (n_contacts, 9 or 4) stiffness, exponent, loss, series compliance, .. as `law.spring_of` reads it
+    law: np.ndarray  # (n_contacts,) stiffness, exponent, loss, series compliance, .. see `compiled.law.LAW`
     start_q: np.ndarray  # (n_modes,) [m kg**0.5]
     start_p: np.ndarray  # (n_modes,) [m kg**0.5/s]
     steps: np.ndarray  # (n_steps, 3 + (4 + n_coefficients) n_contacts), see `energy.run_energy`
@@ -136,9 +136,8 @@ class History(check.Locked):
     @cached_property
     def end_law(self) -> np.ndarray:
         """The law with what the contacts remember at the end."""
-        if self.law.shape[1] < layout.WIDTH:
-            return self.law
-        found = np.column_stack([self.law[:, : layout.MEMORY], self.now[layout.REMEMBERED]])
+        found = self.law.copy()
+        found["memory"] = self.now[layout.REMEMBERED]
         found.setflags(write=False)  # or numba would compile the kernels again for writable arrays
         return found
 
@@ -180,16 +179,10 @@ class History(check.Locked):
         rows = np.searchsorted(self.steps[:, layout.START], times, side="right") - 1
         ended = times >= self.end_time
         closed = self.pressed[rows] & ~ended[:, None]
-        if self.law.shape[1] < layout.WIDTH:
-            return np.zeros(closed.shape), ~closed
         since = np.where(ended, times - self.end_time, times - self.steps[rows, layout.START])
         memory = np.where(ended[:, None], self.now[layout.REMEMBERED], self.steps[rows, -self.n_contacts :])
         closed &= memory >= 0.0  # felt from which the body has parted
-        felt = self.law[:, layout.KIND] == law.FELT
-        rate = np.where(
-            felt, (1.0 - self.law[:, layout.SHARE]) / np.where(felt, self.law[:, layout.RELAXATION], 1.0), 0.0
-        )
-        return sunk(self.law, memory * np.where(closed, 1.0, np.exp(-rate * since[:, None]))), ~closed
+        return sunk(self.law, memory, np.where(closed, 0.0, since[:, None])), ~closed
 
     @cached_property
     def contacts(self) -> np.ndarray:

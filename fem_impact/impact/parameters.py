@@ -14,18 +14,15 @@ from ..fe.variation import DIFFERENCES, SectionChange
 from ..modes import varied
 from ..modes.modal import Modes
 from . import motion
-from .compiled import layout
-from .compiled.law import FELT, PLASTIC
+from .compiled.law import LAWS, NUMBERS, Row, law_of
 
 if TYPE_CHECKING:
     from .response import Response
 
-LAW = {  # columns
-    "stiffness": 0, "exponent": 1, "loss": 2, "depth": 5, "hard_stiffness": 6, "hard_exponent": 7, "yield_approach": 5,
-}  # fmt: skip
+LAW = tuple(dict.fromkeys(name for law in LAWS for name in law.slopes))  # numbers of a contact with a gradient
 UNITS = {
-    "contact.stiffness": "N/m**exponent", "contact.loss": "s/m", "contact.gap": "m", "contact.depth": "m",
-    "contact.hard_stiffness": "N/m**hard_exponent", "contact.yield_approach": "m",
+    "contact.stiffness": "N/m**exponent", "contact.loss": "s/m", "contact.gap": "m",
+    **{f"contact.{name}": number.unit for name, number in NUMBERS.items() if number.unit and name in LAW},
     "strike.speed": "m/s", "strike.x": "m", "strike.y": "m",
     "striker.mass": "kg", "striker.first_frequency": "Hz", "target.mass": "kg", "target.first_frequency": "Hz",
     "section.thickness": "m", "section.height": "m", "section.width": "m", "section.diameter": "m",
@@ -57,7 +54,7 @@ class Change(NamedTuple):
     start_q: np.ndarray  # (n, n_modes)
     start_p: np.ndarray  # (n, n_modes)
     offset: np.ndarray  # (n, n_contacts)
-    law: np.ndarray  # (n, n_contacts, 9 or 4)
+    law: np.ndarray  # (n, n_contacts) of `compiled.law.LAW`
 
 
 def unit(name: str) -> str:
@@ -99,12 +96,8 @@ class Parameters(check.Brief):
         hit = self.hit
         found: dict[str, float] = {}
         for name, c in self.laws.items():
-            law = hit.contacts[c]
-            parts = list(LAW)[: 6 if law.hard_stiffness else 3]
-            kind = hit.history.law[c, layout.KIND] if hit.history.law.shape[1] == layout.WIDTH else None
-            if kind in (PLASTIC, FELT):  # they have no loss
-                parts = ["stiffness", "exponent", *(["yield_approach"] if kind == PLASTIC else [])]
-            found |= {f"{name}.{part}": float(getattr(law, part)) for part in (*parts, "gap")}
+            parts = law_of(Row._make(hit.history.law[c].item())).slopes
+            found |= {f"{name}.{part}": float(getattr(hit.contacts[c], part)) for part in (*parts, "gap")}
         if self.struck:
             found["strike.speed"] = hit.speed
             if not self.why_still:
@@ -147,7 +140,7 @@ class Parameters(check.Brief):
                 barred[f"{name}.gap"] = (
                     "the bodies touch at the start, and even a small gap would change how they meet; give a gap"
                 )
-            sprung = hit.history.law[c, layout.COMPLIANCE] > 0.0 or self._ringing_alone
+            sprung = hit.history.law["compliance"][c] > 0.0 or self._ringing_alone
             if hit.contacts[c].loss == 0.0 and sprung:
                 barred[f"{name}.loss"] = (
                     "without loss the modes left out act as a spring in series, with loss they cannot; give the "
@@ -177,7 +170,7 @@ class Parameters(check.Brief):
     @property
     def _lossy(self) -> bool:
         """Whether any contact has a loss."""
-        return bool((self.hit.history.law[:, layout.LOSS] > 0.0).any())
+        return bool((self.hit.history.law["loss"] > 0.0).any())
 
     @cached_property
     def why_no_target(self) -> str:
@@ -256,7 +249,8 @@ class Parameters(check.Brief):
     def change(self, names: tuple[str, ...]) -> Change:
         """What a unit of each number changes in the run."""
         h = self.hit.history
-        found = Change(*(np.zeros((len(names), *getattr(h, name).shape)) for name in Change._fields))
+        whole = (getattr(h, name) for name in Change._fields)
+        found = Change(*(np.zeros((len(names), *each.shape), each.dtype) for each in whole))
         axes = {}
         for i, name in enumerate(names):
             if name in self.sections:
@@ -293,7 +287,7 @@ class Parameters(check.Brief):
         if home in self.laws and part == "gap":
             found.offset[i, self.laws[home]] = -1.0
         elif home in self.laws:
-            found.law[i, self.laws[home], LAW[part]] = 1.0
+            found.law[part][i, self.laws[home]] = 1.0
         elif name == "strike.speed":
             striker = self.hit.striker
             assert striker is not None
@@ -329,7 +323,7 @@ class Parameters(check.Brief):
             return
         contacts, signs = (list(column) for column in zip(*ends.touched))
         if ends.forms.start == ends.forms.stop:
-            found.law[i, contacts[0], layout.COMPLIANCE] += change[0, 0]
+            found.law["compliance"][i, contacts[0]] += change[0, 0]
             found.offset[i, contacts[0]] += signs[0] * ends.dip_force * change[0, 0]
             return
         above = h.omega[ends.forms.start]

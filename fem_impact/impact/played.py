@@ -10,7 +10,7 @@ from ..modes.modal import Modes
 from . import stepping
 from .collision import Touch, touching
 from .compiled import live
-from .compiled.layout import WIDTH
+from .compiled.law import LAW
 from .compiled.propagation import N_LANE, N_TABLE, step_table
 from .contact import Contact
 from .striker import Striker
@@ -122,7 +122,7 @@ def _state(n_modes: int, sticks: int, n_trace: int) -> live.PlayState:
     """A body at rest, and no stick."""
     size = max(4, 2 * sticks)
     numbers: dict[str, Any] = {
-        "rows": (sticks, n_modes), "law": (sticks, WIDTH), "offset": sticks, "now": (6, sticks), "end": (3, sticks),
+        "rows": (sticks, n_modes), "offset": sticks, "now": (6, sticks), "end": (3, sticks),
         "found": (5, sticks), "bounds": (sticks, 6), "sums": (live.LEVELS, 6, sticks, sticks), "work": (5, size, size),
         "trace": (n_trace, 6), **dict.fromkeys(("q", "p", "free_q", "free_p", "bias"), n_modes),
     }  # fmt: skip
@@ -130,4 +130,5 @@ def _state(n_modes: int, sticks: int, n_trace: int) -> live.PlayState:
     counts |= dict.fromkeys(("slot", "pad", "until"), sticks)
     made = {name: np.zeros(shape) for name, shape in numbers.items()}
     made |= {name: np.zeros(shape, np.int64) for name, shape in counts.items()}
+    made["law"] = np.zeros(sticks, LAW)
     return live.PlayState(pressed=np.zeros(sticks, np.bool_), **made)

@@ -10,8 +10,8 @@ from .._base import check
 from .._base.rounding import ROUNDING
 from ..modes.modal import Modes, left_out
 from ..modes.stretching import Stretching, stretch
-from .compiled import layout
 from .compiled.bundles import KernelSystem
+from .compiled.law import table
 from .contact import Contact
 from .stretched import Stretched
 
@@ -200,18 +200,18 @@ def joined(parts: Sequence[ReducedBody], laws: Sequence[Contact]) -> KernelSyste
     for part in parts:
         forms.append(part.forms(rated) if part.yields else np.zeros((0, 0)))
         n += len(part.omega) + forms[-1].shape[1]
-    law, offset = np.array(numbers), np.array(gaps)
-    table, shape = np.zeros((5, n)), np.zeros((len(laws), n))  # frequency, damping, constant force, state; shapes
+    law, offset = table(numbers), np.array(gaps)
+    columns, shape = np.zeros((5, n)), np.zeros((len(laws), n))  # frequency, damping, constant force, state; shapes
     start, lossy = 0, True in rated
     for part, form in zip(parts, forms):
         own = slice(start, start + len(part.omega))
         start = own.stop
-        table[:, own] = part.omega, part.zeta, part.bias, part.q, part.p
+        columns[:, own] = part.omega, part.zeta, part.bias, part.q, part.p
         for (i, sign), row in zip(part.touched, part.rows):
             shape[i, own] += sign * row
         if part.yields and not form.size:
             first, sign = part.touched[0]
-            law[first, layout.COMPLIANCE] += part.rest[0, 0]
+            law["compliance"][first] += part.rest[0, 0]
             offset[first] += sign * part.rest[0, 0] * part.force
     for part, form in zip(parts, forms):
         if form.size:
@@ -220,9 +220,9 @@ def joined(parts: Sequence[ReducedBody], laws: Sequence[Contact]) -> KernelSyste
                 for (i, sign), share in zip(part.touched, shares):
                     shape[i, start] += sign * share * above
                 held = -(part.pressed @ shape[[i for i, _ in part.touched], start]) / above**2
-                table[:, start] = above, damping, 0.0, *held
+                columns[:, start] = above, damping, 0.0, *held
                 start += 1
-    found = KernelSystem(table[0], table[1], shape, offset, table[2], law, table[3], table[4])
+    found = KernelSystem(columns[0], columns[1], shape, offset, columns[2], law, columns[3], columns[4])
     for array in found:
         array.setflags(write=False)
     return found

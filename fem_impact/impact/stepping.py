@@ -11,7 +11,6 @@ import numpy as np
 from .._base import check
 from .._base.check import SimulationError
 from . import distance, engine
-from .compiled import layout
 from .compiled.bundles import KernelSystem
 from .contact import Contact
 from .engine import STEP_SHARE, TOLERANCE
@@ -136,7 +135,7 @@ def refine_steps(
     system: KernelSystem, options: Options, pace: tuple[float, float], stretched: Stretched | None = None
 ) -> Converged:
     """Refine until two successive runs agree to the tolerance; ``pace`` as of `engine.pace_of`."""
-    scheme, least = options.scheme, min(system.law[:, layout.EXPONENT].tolist())
+    scheme, least = options.scheme, min(system.law["exponent"].tolist())
     if stretched is not None:
         if scheme == "collocation":
             raise ValueError("scheme collocation does not support stretching; use A4")
@@ -177,7 +176,7 @@ class _Control:
         """Two runs of a finer and a coarser size, and the errors of the finer one."""
         over, quantities, n = RICHARDSON[self.scheme], self.options.quantities, self.options.n_quantities
         if self.scheme != "collocation":  # a strong loss reacts to the rates of modes faster than the step
-            over = over[0], over[1] / (1.0 + 2.0 * self.pace[1] * max(self.system.law[:, layout.LOSS].tolist()))
+            over = over[0], over[1] / (1.0 + 2.0 * self.pace[1] * max(self.system.law["loss"].tolist()))
         error = distance.of_runs(coarse, fine, quantities, over)
         if "force" in quantities:
             i = [*quantities].index("force")
@@ -265,7 +264,7 @@ def _longest_lossy(system: KernelSystem, pace: tuple[float, float], tolerance: f
     A lossy force depends on the approach rate. A force that rises like a spring's makes each mode ring in that rate,
     with stiffness times u**2 / omega**2 of the approach speed.
     """
-    longest, numbers = np.inf, (pace[1] * system.law[:, layout.LOSS]).tolist()
+    longest, numbers = np.inf, (pace[1] * system.law["loss"]).tolist()
     if not any(numbers):
         return longest
     slow = system.omega <= np.pi / pace[0]

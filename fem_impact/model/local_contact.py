@@ -16,7 +16,6 @@ import numpy as np
 
 from .._base.rounding import SAME
 from ..impact.assumption import Assumption
-from ..impact.compiled import layout
 from ..impact.contact import YIELDS, Contact, loss_number
 from ..impact.history import History
 from ..modes.shapes import SampledShapes
@@ -40,27 +39,21 @@ SLOW = Doubt(
 
 def _hertz(struck: Struck) -> tuple[float, float] | None:
     """Radius R [m] of the sphere and the modulus E* [Pa] of its contact; None if these are not known."""
-    striker, law = struck.hit.striker, struck.hit.contact
-    if striker is None or striker.radius is None or law.exponent != 1.5 or law.hard_stiffness or law.hysteresis:
+    striker, contact = struck.hit.striker, struck.hit.contact
+    if striker is None or striker.radius is None or contact.exponent != 1.5 or not contact.law.hertzian:
         return None
-    return striker.radius, 0.75 * law.stiffness / striker.radius**0.5
+    return striker.radius, 0.75 * contact.stiffness / striker.radius**0.5
 
 
-def contact_radius(law: Contact, radius: float, force: float) -> float:
+def contact_radius(contact: Contact, radius: float, force: float) -> float:
     """Radius [m] of the contact of a sphere under a force [N], also beyond first yield."""
-    first = law.yield_approach
-    beyond = force - law.stiffness * first**1.5
-    if first and beyond > 0.0:
-        approach = first + beyond / (1.5 * law.stiffness * first**0.5)
-    else:
-        approach = (force / law.stiffness) ** (2.0 / 3.0)
-    return (radius * approach) ** 0.5
+    return float((radius * contact.law.approach(contact, force)) ** 0.5)
 
 
 def examine_pressure(struck: Struck) -> Assumption:
     """Whether the contact stays elastic."""
     hit = struck.hit
-    if hit.contact.yield_approach and hit.contact.exponent > 1.0:
+    if hit.history.law["yield_approach"][0] > 0.0:
         return YIELDING.holds(struck)
     round_body = _hertz(struck)
     materials = {
@@ -80,14 +73,13 @@ def examine_pressure(struck: Struck) -> Assumption:
         return YIELDING.unknown(struck, f"yield strength of the {missing[0]}", "state its yield_strength", value)
     if value <= 1.0:
         return YIELDING.judged(struck, value, dict.fromkeys(struck.quantities, 0.0), PLASTIC)
-    law = hit.history.law.copy()
-    bare = law.copy()
-    k, a = law[0, layout.STIFFNESS], law[0, layout.EXPONENT]
+    lossy, bare = hit.history.law.copy(), hit.history.law.copy()
+    k, a = bare["stiffness"][0], bare["exponent"][0]
     stored = hit.peak_force * (hit.peak_force / k) ** (1.0 / a) / (a + 1.0)  # [J]
     speed = abs(hit.speed) or np.sqrt(2.0 * stored / hit.bodies[0].mass)  # at rest, a constant force presses it
-    bare[0, 2] += SAME / speed  # a lossy contact has no compliance in series: both blows are to lack it
-    law[0, layout.LOSS] += loss_number(restitution(value ** (-2.5))) / speed  # pressure goes as speed**0.4 on a wall
-    return YIELDING.judged(struck, value, struck.between({"law": bare}, {"law": law}), PLASTIC)
+    bare["loss"][0] += SAME / speed  # a lossy contact has no compliance in series: both blows are to lack it
+    lossy["loss"][0] += loss_number(restitution(value ** (-2.5))) / speed  # pressure goes as speed**0.4 on a wall
+    return YIELDING.judged(struck, value, struck.between({"law": bare}, {"law": lossy}), PLASTIC)
 
 
 def restitution(ratio: float) -> float:

@@ -15,7 +15,7 @@ from .._base.check import SimulationError
 from .._base.rounding import SAME
 from ..impact import accuracy, distance
 from ..impact.assumption import Assumption
-from ..impact.compiled import layout
+from ..impact.compiled.law import columns
 from ..impact.engine import again
 from ..impact.history import History
 from ..impact.response import Response
@@ -101,7 +101,8 @@ class Struck:
         """As `changes`, between two blows with other fields of the history, if the first is not the one found."""
         h = self.hit.history
         same = (
-            name != "stretched" and np.allclose(x, getattr(h, name), rtol=SAME, atol=0.0) for name, x in end.items()
+            name != "stretched" and np.allclose(columns(x), columns(getattr(h, name)), rtol=SAME, atol=0.0)
+            for name, x in end.items()
         )
         if self.foreseen or (not start and all(same)):
             return dict.fromkeys(self.quantities, 0.0)
@@ -173,5 +174,5 @@ class Doubt:
 def softer(history: History, compliance: float) -> dict[str, np.ndarray]:
     """The fields that change if the contact gets more compliance [m/N] in series."""
     law = history.law.copy()
-    law[:, layout.COMPLIANCE] = np.maximum(0.0, law[:, layout.COMPLIANCE] + compliance)
+    law["compliance"] = np.maximum(0.0, law["compliance"] + compliance)
     return {"law": law}

@@ -14,7 +14,6 @@ import numpy as np
 
 from ..fe.section import SHEAR, Beam, Plate
 from ..impact.assumption import Assumption, allowed
-from ..impact.compiled import layout
 from .bending import Bending, Known
 from .deflection import OTHER
 from .restrike import Doubt, Struck, softer
@@ -61,7 +60,7 @@ def examine_target(struck: Struck) -> Assumption:
         "omega": struck.with_target(history.omega[struck.mine] * lowered(integrals.thick)),
         "shape": struck.with_target(row, "shape"),
     }
-    if body.plate is not None and history.law[0, layout.COMPLIANCE] > 0.0:
+    if body.plate is not None and history.law["compliance"][0] > 0.0:
         # the residual compliance of the modes left out lacks their shear
         changed |= softer(history, _shear_give(body.plate, body.thickness, float(integrals.wave[-1])))
 

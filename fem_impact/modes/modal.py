@@ -18,6 +18,7 @@ from ..fe.assembly import THICK, System
 from ..fe.section import Beam, Plate
 from . import universal_files, unstated, viewing
 from .shapes import (
+    REMEMBERED,
     SHAPE_ERROR,
     FieldShapes,
     RigidShapes,

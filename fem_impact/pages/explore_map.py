@@ -73,13 +73,13 @@ class Mapper:
         """The map in its coarsest form; the settings' mass and stiffness do not matter, ``body`` as in `Setup.case`."""
         self._begin(settings, body)
         law = self.case.contact
-        slow = bool(law.lossy or law.hard_stiffness or law.exponent < 1.0)
+        slow = law.lossy or law.special or law.exponent < 1.0
         mass, stiffness = (np.geomspace(*ends, n) for ends, n in zip((window.mass, window.stiffness), FIRST[slow]))
         x, y = (part.ravel() for part in np.meshgrid(mass, stiffness))
         counts = self._counts(x, y, DRAFT).reshape(len(stiffness), len(mass))
         found = self._thresholds(mass)
         there = [self.setup.case(replace(settings, mass=float(one), stiffness=1.0), body=body) for one in mass]
-        if law.hard_stiffness or law.remembers:  # as far as the map goes
+        if law.special:  # as far as the map goes
             reached = [[self.setup.case(replace(settings, mass=float(m), stiffness=float(k))).resonance
                         for k in stiffness] for m in mass]  # fmt: skip
             rising = np.maximum.accumulate(reached, axis=1)

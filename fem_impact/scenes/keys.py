@@ -4,7 +4,8 @@ from typing import Any
 
 from .._base import check
 from ..fe.assembly import THEORIES
-from ..impact.contact import HIGHEST_EXPONENT, LOWEST_EXPONENT
+from ..impact.compiled.laws.base import LawNumber
+from ..impact.contact import HIGHEST_EXPONENT, LOWEST_EXPONENT, MARKS
 from ..impact.quantities import BANDED, QUANTITIES
 from ..impact.stepping import SCHEMES
 from ..mesh.loops import UNITS
@@ -32,6 +33,13 @@ def one_of(words: Any) -> Form:
 def within(low: float, high: float) -> Form:
     """A number between two others, both allowed."""
     return NUMBER | {"minimum": low, "maximum": high}
+
+
+def _of_law(number: LawNumber) -> tuple[str, Form]:
+    """Words and form of a number of a contact law."""
+    limits = within(number.least or 0.0, number.most) if number.most <= HIGHEST_EXPONENT else NOT_NEGATIVE
+    words = ", ".join(filter(None, [number.unit.replace("**", "^") or "-", number.key]))
+    return words, POSITIVE if number.least is None else limits
 
 
 def rows(item: Form, low: int = 1, high: int | None = None) -> Form:
@@ -175,23 +183,15 @@ KEYS: dict[str, tuple[str, Form]] = {
     # contact
     "contact.stiffness": ("N/m^exponent: force = stiffness * approach^exponent", POSITIVE),
     "exponent": ("-, 1.5 for round bodies", within(LOWEST_EXPONENT, HIGHEST_EXPONENT)),
-    "contact.elastic_plastic.exponent": (
-        "-, 1.5 for round bodies; with 1 nothing yields",
-        within(1.0, HIGHEST_EXPONENT),
-    ),
-    "contact.felt.exponent": ("-", within(1.0, HIGHEST_EXPONENT)),
     "loss": ("s/m; the force is multiplied by 1 + loss * rate of approach", NOT_NEGATIVE),
     "gap": ("m, travelled before contact", NUMBER),
     "restitution": ("-, of a mass on a rigid wall", within(1e-6, 1.0)),
     "contact.speed": ("m/s, at which this restitution holds", POSITIVE),
-    "depth": ("m, approach at which the soft layer bottoms", NOT_NEGATIVE),
-    "hard_stiffness": ("N/m^hard_exponent, of the layer below", NOT_NEGATIVE),
-    "hard_exponent": ("-, of the layer below", within(1.0, HIGHEST_EXPONENT)),
-    "yield_speed": ("m/s, at which a mass on a rigid wall first yields; with mass", POSITIVE),
-    "contact.mass": ("kg, of that mass", POSITIVE),
-    "yield_approach": ("m, approach at first yield, in place of yield_speed and mass", POSITIVE),
-    "hysteresis": ("-, share of the force that a slow blow loses", within(0.0, 1.0)),
-    "relaxation": ("s, time in which the felt relaxes", NOT_NEGATIVE),
+    **{
+        f"contact.{law.name}.{key}": _of_law(number)
+        for law in MARKS.values()
+        for key, number in (law.numbers | law.keys).items()
+    },
     # strike and stroke
     "at": ("m, where the striker hits the body", POINT),
     "speed": ("m/s, of the striker's contact point towards the body", NOT_NEGATIVE),

@@ -14,7 +14,7 @@ import xarray
 from .._base import check, markup
 from ..fe import plausible
 from ..impact import accuracy, threshold
-from ..impact.contact import acting_stiffness, wall_time
+from ..impact.contact import MARKS, acting_stiffness, wall_time
 from ..model.target import Stages
 from ..show import figures, plots
 from ..sweeps import bodies, cases, grid, hammers
@@ -23,7 +23,7 @@ from ..sweeps.cells import ALIASES, AXES, LAW, Case, Range, laid_out, logarithmi
 from .scene import Scene
 from .schema import MAKERS, Part
 
-SLOW = {"loss", "hard_stiffness", "yield_approach", "hysteresis"}  # axes of the contact that take longer per blow
+SLOW = {"loss", *MARKS}  # axes of the contact that take longer per blow
 SLOW |= {f"contact.{name}" for name in SLOW}
 FORMATS = ("nc", "zarr")
 FILES = (".nc", ".zarr", ".csv", ".png", ".pdf", ".svg")  # a folder name must not end like this
@@ -102,7 +102,7 @@ def map_scene(
     grid.admit(
         math.prod(len(values) for values in over.values()), len(cases.LAYERS),
         wanted.pop("max_cells", grid.MOST_CELLS),
-        quick=not law.lossy and not law.hard_stiffness and law.exponent >= 1.0 and not SLOW & set(over),
+        quick=not law.lossy and not law.special and law.exponent >= 1.0 and not SLOW & set(over),
         tell=tell,
     )  # fmt: skip
     pieces = []

@@ -14,6 +14,7 @@ from .._base import check, kept
 from ..fe.section import Material
 from ..impact.assumption import Assumption
 from ..impact.compiled import layout
+from ..impact.compiled.law import LAW
 from ..impact.contact import Contact
 from ..impact.error import Error
 from ..impact.history import History
@@ -206,11 +207,11 @@ def _checked(response: Any, assumptions: Any) -> Response:
     c, n = h.shape.shape
     shapes = {
         "omega": (n,), "zeta": (n,), "bias": (n,), "start_q": (n,), "start_p": (n,), "end_q": (n,), "end_p": (n,),
-        "offset": (c,), "work": (c,), "now": (6, c), "law": (c, h.law.shape[1]),
+        "offset": (c,), "work": (c,), "now": (6, c),
         "steps": (len(h.steps), layout.HEAD + (layout.PUSH + 1 + h.n_coefficients) * c),
     }  # fmt: skip
     good = all(getattr(h, name).shape == shape and getattr(h, name).dtype == float for name, shape in shapes.items())
-    good &= h.law.shape[1] in (layout.KIND, layout.WIDTH) and h.n_coefficients in (1, 2, 3, 4)
+    good &= h.law.shape == (c,) and h.law.dtype == LAW and h.n_coefficients in (1, 2, 3, 4)
     good &= 0 < sum(modes.n_modes for modes in response.bodies) <= n and len(response.ends) in (0, len(response.bodies))
     if h.stretched is not None:
         m = h.stretched.forms.shape[1]

@@ -18,7 +18,7 @@ from .._base import check
 from ..fe.assembly import THEORIES, assemble
 from ..fe.section import KINDS, SOFT, Beam, Elastic, Material, Plate
 from ..impact import collision
-from ..impact.contact import Contact
+from ..impact.contact import MARKS, Contact
 from ..impact.striker import STICK_MODES, Hand, Striker
 from ..modes.analytic import closed_form
 from ..modes.modal import find_modes
@@ -200,8 +200,8 @@ MAKERS: dict[str, tuple[str, dict[str, Callable[..., Any]]]] = {
     }),
     "contact": ("kind", {
         "linear": Contact.linear, "hertz": Contact.hertz, "power": Contact.power,
-        "restituting": Contact.restituting, "layers": Contact.layers, "elastic_plastic": Contact.elastic_plastic,
-        "felt": Contact.felt, "between": Contact.between,
+        "restituting": Contact.restituting, **{law.name: getattr(Contact, law.name) for law in MARKS.values()},
+        "between": Contact.between,
     }),
     "strike": ("", {"": collision.strike}),
     "stroke": ("", {"": stroke_values}),

@@ -114,15 +114,7 @@ def contact(law: Contact) -> str:
     stiffness = si(law.stiffness, "N/m") + raised
     told = f"The contact is a spring that only pushes, with a force of {stiffness} × indentation{raised}"
     told += f", with loss {law.loss:.3g} s/m." if law.loss else "."
-    if law.hard_stiffness:
-        told += f" Beyond {si(law.depth, 'm')} it meets a hard layer."
-    if law.yield_approach:
-        told += f" Beyond {si(law.yield_approach, 'm')} it yields and keeps a dent."
-    if law.hysteresis:
-        told += (
-            f" It is felt: held pressed, it loses {law.hysteresis:.0%} of its force in some {si(law.relaxation, 's')}."
-        )
-    return told
+    return told + law.law.sentence(law, si)
 
 
 def _single_or_multiple(response: Response, law: Contact) -> str:

@@ -10,6 +10,7 @@ from functools import partial
 import numpy as np
 
 from ..impact.compiled import bundles, convolution, many_blows, propagation
+from ..impact.compiled.law import LAW
 from ..impact.contact import wall_time
 from ..impact.distance import distance
 from ..impact.reduced_body import rest_mode
@@ -337,7 +338,9 @@ class _Engine:
         )
         self.own_rigid, self.rigid, self.static = rigid[1], rigid.sum(axis=0), static.sum(axis=0)
         stiffness = blows.stiffness * blows.speed ** (blows.exponent - 1.0)
-        self.law = np.array([stiffness, blows.exponent, blows.loss * blows.speed, rest.sum(axis=0)])
+        self.law = np.zeros(len(stiffness), LAW)
+        self.law["stiffness"], self.law["exponent"] = stiffness, blows.exponent
+        self.law["loss"], self.law["compliance"] = blows.loss * blows.speed, rest.sum(axis=0)
 
     def of_family(self, number: Callable[[Family, int], float], body: int) -> np.ndarray:
         """One number of one body for every blow, (n_cases,)."""
@@ -348,8 +351,8 @@ class _Engine:
 
         A contact with loss needs shorter ones: its force depends on the rate of approach, so that more modes ring.
         """
-        stiffness, exponent, loss, rest = self.law
-        duration = wall_time(stiffness, exponent, self.rigid, 1.0, rest)
+        law, loss = self.law, self.law["loss"]
+        duration = wall_time(law["stiffness"], law["exponent"], self.rigid, 1.0, law["compliance"])
         count = STEPS * (1e-3 / tolerance) ** (1.0 / STEP_ORDER)
         step = np.ceil(2.0 * np.log2(np.maximum(count / duration, PER_PERIOD * self.band))).astype(int)
         for body in (0, 1) if loss.any() else ():

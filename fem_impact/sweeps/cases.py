@@ -18,7 +18,7 @@ from ..impact.response import Response
 from ..model.audit import audited
 from ..modes.modal import Modes
 from . import batches
-from .cells import ALONE, FAMILY_AXES, Case
+from .cells import ALONE, FAMILY_AXES, LOSSY, Case
 from .store import LARGEST_BLOCK, Texts, Watch, block_size, by_cluster, by_store
 
 LOG = logging.getLogger(__name__)
@@ -69,14 +69,14 @@ class Cases:
     @property
     def lossy(self) -> bool:
         """Whether any contact loses energy."""
-        return bool(self.base.contact.lossy or {"loss", "yield_approach", "hysteresis"} & set(self.axes))
+        return bool(self.base.contact.lossy or LOSSY & set(self.axes))
 
     @property
     def quick(self) -> bool:
         """Whether all cases are computed together."""
         exponents = self.axes.get("exponent", [self.base.contact.exponent])
-        layered = self.base.contact.hard_stiffness or "hard_stiffness" in self.axes
-        alone = self.lossy or layered or self.extra or self.base.modes.stretches
+        special = self.base.contact.special or ALONE & set(self.axes)
+        alone = self.lossy or special or self.extra or self.base.modes.stretches
         return not alone and min(exponents) >= 1.0
 
     @property

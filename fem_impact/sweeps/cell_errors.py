@@ -15,6 +15,7 @@ from ..impact.contact import wall_time
 from ..impact.distance import distance
 from ..impact.what_if import RESOLVABLE
 from .cases import Cases, solve
+from .cells import RATED
 
 # [-] cells struck again for the error of vectors, in a batch or alone: some 0.1 and 0.2 s
 DOUBTED = {True: 10_000, False: 100}
@@ -36,9 +37,10 @@ def left_out(cases: Cases) -> np.ndarray:
     def value(name: str, shared: float) -> np.ndarray:
         return along(name, cases.axes.get(name, [shared]))
 
-    stiffness, exponent, loss, share = (
-        value(name, getattr(base.contact, name)) for name in ("stiffness", "exponent", "loss", "hysteresis")
-    )
+    def own(name: str) -> np.ndarray:
+        return value(name, getattr(base.contact, name))
+
+    stiffness, exponent = own("stiffness"), own("exponent")
     striker = base.striker
     felt = striker.felt_mass * (value("mass", striker.mass) / striker.mass)
     omega = np.pi / wall_time(stiffness, exponent, 1.0 / felt, value("speed", base.speed))
@@ -59,7 +61,7 @@ def left_out(cases: Cases) -> np.ndarray:
         above = np.minimum(1.0, omega / (edge * ratio))
         total = total + accuracy.left_out_error(soft, above, exponent, modes.dimension)
         softness = softness + soft
-    lossy = np.where((loss > 0.0) | (share > 0.0), accuracy.LOSSY, 1.0)
+    lossy = np.where(sum(own(name) for name in RATED) > 0.0, accuracy.LOSSY, 1.0)
     return np.where(softness <= RESOLVABLE, total * lossy, np.inf)
 
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from .._base import check
 from ..impact import accuracy
-from ..impact.contact import Contact
+from ..impact.contact import MARKS, NUMBERS, Contact
 from ..impact.striker import Striker
 from ..modes.modal import Modes
 from ..modes.shapes import SampledShapes
@@ -21,12 +21,7 @@ AXES = {  # name: unit, what it is, its name in a scene file
     "exponent": ("", "exponent of the contact", "contact.exponent"),
     "loss": ("s/m", "loss factor of the contact", "contact.loss"),
     "gap": ("m", "distance the striker travels before contact", "contact.gap"),
-    "depth": ("m", "approach at which the hard layer is reached", "contact.depth"),
-    "hard_stiffness": ("N/m**hard_exponent", "stiffness of the hard layer", "contact.hard_stiffness"),
-    "hard_exponent": ("", "exponent of the hard layer", "contact.hard_exponent"),
-    "yield_approach": ("m", "approach at first yield", "contact.yield_approach"),
-    "hysteresis": ("", "share of the force that felt loses", "contact.hysteresis"),
-    "relaxation": ("s", "relaxation time of felt", "contact.relaxation"),
+    **{name: (number.unit, number.axis, f"contact.{name}") for name, number in NUMBERS.items()},
     "speed": ("m/s", "speed of the striker's contact point", "strike.speed"),
     "at": ("m", "strike point", "strike.at"),
     "target_mass": ("kg", "mass of the struck body", "target.mass"),
@@ -35,7 +30,9 @@ AXES = {  # name: unit, what it is, its name in a scene file
 }
 LAW = [field.name for field in fields(Contact)]  # the axes that change the contact
 ALIASES = {alias: name for name, (_, _, alias) in AXES.items()}
-ALONE = {"hard_stiffness", "yield_approach", "hysteresis"}  # axes of contacts whose cells are computed alone
+ALONE = set(MARKS)  # axes of contacts whose cells are computed alone
+RATED = "loss", *(mark for mark, law in MARKS.items() if law.rated)  # those of contacts whose force depends on the rate
+LOSSY = {"loss", *(mark for mark, law in MARKS.items() if law.remembers)}  # and of those that take energy
 FAMILY_AXES = ("at", "target_frequency", "striker_frequency", "damping_ratio")  # each value needs new kernels
 # [-] values along an axis that has no count: 160 000 cells together take some 2 s, 10 000 alone some 20 s
 SIDE = {True: 400, False: 100}
@@ -99,7 +96,7 @@ def laid_out(
     names = {ALIASES.get(name, name): values for name, values in found.items()}
     powers = names.get("exponent", [contact.exponent])
     least = powers.low if isinstance(powers, Range) else check.array("over['exponent']", powers, (None,)).min()
-    alone = alone or least < 1.0 or bool(contact.hard_stiffness or contact.remembers)
+    alone = alone or least < 1.0 or contact.special
     side = SIDE[not (alone or ALONE & set(names))]
     given = math.prod(len(np.atleast_1d(values)) for values in found.values() if not isinstance(values, Range))
     most = int((side**2 / given) ** (1.0 / len(free)))

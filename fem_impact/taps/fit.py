@@ -186,11 +186,7 @@ def _usable(taps: Taps, window: Any) -> tuple[Taps, np.ndarray, list[str]]:
 
 def _law_name(law: Contact) -> str:
     kinds = {1.0: "linear", 1.5: "Hertz"}
-    words = {"loss": " with loss", "hard_stiffness": " over a hard layer", "yield_approach": " that yields",
-             "hysteresis": " felt"}  # fmt: skip
-    return kinds.get(law.exponent, f"power {law.exponent:g}") + "".join(
-        word for name, word in words.items() if getattr(law, name)
-    )
+    return kinds.get(law.exponent, f"power {law.exponent:g}") + " with loss" * bool(law.loss) + law.law.words
 
 
 def _fit(

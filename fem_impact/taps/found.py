@@ -21,7 +21,7 @@ from .profiles import Profile
 from .records import Taps
 from .scatter import Scatter, scatter
 from .solver import Problem, Solution
-from .unknowns import changed, unit_of
+from .unknowns import UNITS, changed, unit_of
 
 Watch = Callable[[int, int], Any]
 
@@ -277,7 +277,8 @@ class Found(check.Brief):
         hammer, law = self.striker, self.contact
         if tip is not None:
             factor = check.positive("tip", tip)
-            law = replace(law, stiffness=law.stiffness * factor, hard_stiffness=law.hard_stiffness * factor)
+            stiff = [name for name, unit in UNITS.items() if unit.startswith("N/m")]
+            law = replace(law, **{name: getattr(law, name) * factor for name in stiff})
         typical = float(np.mean(self.problem.speeds(self.best.x)))
         if mass is not None:
             mass = check.positive("mass", mass, "kg")

@@ -13,7 +13,7 @@ from numpy.polynomial import chebyshev
 from scipy.special import gamma
 
 from .._base import check
-from ..impact.contact import Contact, acting_stiffness, wall_time
+from ..impact.contact import NUMBERS, Contact, acting_stiffness, wall_time
 from ..impact.striker import Striker
 from ..modes.modal import Modes
 from . import arguments, blows
@@ -30,8 +30,7 @@ NAME = re.compile(r"(contact|striker|target|mode\d)\.(\w+)")
 UNITS = {
     "stiffness": "N/m**exponent", "exponent": "", "loss": "s/m", "mass": "kg", "first_frequency": "Hz",
     "mode_ratio": "", "damping": "", "tip_mass": "kg", "x": "m", "y": "m", "frequency": "Hz", "gain": "", "gap": "m",
-    "depth": "m", "hard_stiffness": "N/m**hard_exponent", "hard_exponent": "", "yield_approach": "m", "hysteresis": "",
-    "relaxation": "s",
+    **{name: number.unit for name, number in NUMBERS.items()},
 }  # fmt: skip
 TIME = "contact.time"  # the coordinate that stands for the stiffness while fitting [s]
 
@@ -296,7 +295,7 @@ class Setting(check.Brief):
         law = law or changed(self.contact, values)
         mass = self.felt_mass(values)
         speed = 0.5 * self.impulse / mass
-        acting = acting_stiffness(np.array(law.numbers), 1.0 / mass, speed)
+        acting = acting_stiffness(law.numbers, 1.0 / mass, speed)
         return float(wall_time(acting, law.exponent, 1.0 / mass, speed))
 
     def stiffness(self, values: Mapping[str, float], time: float) -> float:

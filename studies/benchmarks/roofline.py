@@ -20,6 +20,7 @@ import numpy as np
 import fem_impact as fi
 from fem_impact.impact.compiled import energy
 from fem_impact.impact.compiled.bundles import KernelSystem, Limits
+from fem_impact.impact.compiled.law import table
 from fem_impact.sweeps import batches
 
 sys.path.append(str(Path(__file__).parents[1]))  # of `shared`
@@ -94,7 +95,7 @@ def step_time(n_modes: int, compliance: float = 0.0) -> float:
     rng = np.random.default_rng(0)
     omega = np.append(0.0, np.sort(rng.uniform(1e2, 1e5, n_modes - 1)))
     shape = np.append(1.0, -rng.normal(0.0, 1.0, n_modes - 1) * n_modes**-0.5)[None]
-    zeros, law = np.zeros(n_modes), np.array([[1e4, 1.5, 0.0, compliance]])
+    zeros, law = np.zeros(n_modes), table([[1e4, 1.5, 0.0, compliance]])
     p = zeros.copy()
     p[0] = 1.0
     scene = KernelSystem(omega, zeros, shape, np.zeros(1), zeros, law, zeros, p)

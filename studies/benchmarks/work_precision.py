@@ -33,6 +33,7 @@ import fem_impact as fi
 from fem_impact.impact import engine
 from fem_impact.impact.compiled import collocation, energy
 from fem_impact.impact.compiled.bundles import KernelSystem, Limits
+from fem_impact.impact.compiled.law import table
 
 sys.path.append(str(Path(__file__).parents[1]))  # of `shared`
 import shared
@@ -111,7 +112,7 @@ def kernel(blow: Blow, scheme: str, size: float) -> Callable[[], Answer]:
     n = len(blow.omega)
     scene = KernelSystem(
         blow.omega, np.zeros(n), blow.shape[None], np.zeros(1), np.zeros(n),
-        np.array([[blow.stiffness, 1.0, 0.0, 0.0]]),
+        table([[blow.stiffness, 1.0]]),
         np.zeros(n), blow.start[n:].copy(),
     )  # fmt: skip
     nodes, contact = engine.gauss(engine.NODES), np.pi * np.sqrt(MASS / blow.stiffness)

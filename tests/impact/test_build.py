@@ -46,7 +46,7 @@ def test_a_plan_compiles_nothing(tmp_path):
 
 @pytest.mark.skipif(not build.COMPILED, reason="nothing is compiled anyway")
 def test_what_is_not_compiled_runs_as_plain_python_and_says_the_same():
-    table, approach = np.array([[1e6, 1.5, 0.1, 0.0]]), np.array([1e-3], np.float32)  # a type nothing is compiled for
+    table, approach = law.table([[1e6, 1.5, 0.1]]), np.array([1e-3], np.float32)  # a type nothing is compiled for
     known = len(law.stored.overloads)
     with build.uncompiled():
         found = law.stored(approach, table)
@@ -60,7 +60,7 @@ import numpy as np
 logging.basicConfig(level=logging.INFO, format="%(name)s: %(message)s", stream=sys.stdout)
 from fem_impact.impact.compiled import build, law, places
 
-print(law.dents(np.array([[1.0, 1.0, 0.0, 0.0]])), sum(law.dents.stats.cache_hits.values()), build.folder(law.dents))
+print(law.dents(law.table([[1.0, 1.0]])), sum(law.dents.stats.cache_hits.values()), build.folder(law.dents))
 """
 
 

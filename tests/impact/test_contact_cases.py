@@ -25,7 +25,7 @@ def run(omega, shape, p, *, k, exponent=1.0, scheme="A4", h, q=None, bias=None, 
     """One lossless contact between undamped modes, followed by a fixed step: what `run_energy` returns."""
     still = np.zeros(len(omega))
     scene = locked(
-        omega, still, np.atleast_2d(shape), [offset], still if bias is None else bias, [[k, exponent, 0.0, 0.0]],
+        omega, still, np.atleast_2d(shape), [offset], still if bias is None else bias, laws.table([[k, exponent]]),
         still if q is None else q, p,
     )  # fmt: skip
     limits = Limits(0.0, 0.0, float(horizon), n_max, 400_000)
@@ -268,7 +268,7 @@ def test_kernel_form_is_the_modal_form(exponent, n_steps, damping_ratio):
     family = batches.Family.of(plate, np.array([0.465, 0.3]), fi.Striker.rigid(mass), False)
     out = np.empty((layout.N_FOUND, 1))
     column = np.ones(1)
-    shares, law = np.array([column / 2.0, column / mass]), np.array([[stiffness], [exponent], [0.0], [0.0]])
+    shares, law = np.array([column / 2.0, column / mass]), laws.table([[stiffness, exponent]])
     pairs = bundles.Pairs(shares, law, column / mass, column * family.static(0) / 2.0, 0.0 * column)
     target, striker, *bounds = family.kernels(h, 512)
     kernels = bundles.Kernels((target, striker), (bounds[0], bounds[1]), family.later(h, 512))
@@ -364,14 +364,14 @@ def chaotic(nudge=0.0, n_max=100, h=2e-5):
 def contacts(result):
     """Start, end, peak force, impulse, contact of every contact of a run."""
     steps, now = result[0], result[3]
-    law = np.array([[1e6, 1.5, 0.0, 0.0]])
+    law = laws.table([[1e6, 1.5]])
     return record.find_impacts(steps, np.atleast_2d(now), law, 2, 16, 0.0, 0.0)
 
 
 def energy_of(result):
     omega, _, _ = struck(30)
     q, p, now = result[1], result[2], result[3]
-    law = np.array([[1e6, 1.5, 0.0, 0.0]])
+    law = laws.table([[1e6, 1.5]])
     return 0.5 * (p @ p + (omega * q) @ (omega * q)) - 5.0 * q[0] + laws.stored(now[0], law)
 
 

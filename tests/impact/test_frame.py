@@ -12,6 +12,7 @@ from fem_impact.impact.compiled import frame
 from fem_impact.impact.compiled.bundles import KernelSystem, Limits
 from fem_impact.impact.compiled.collocation import run_collocation
 from fem_impact.impact.compiled.energy import run_energy
+from fem_impact.impact.compiled.law import table
 from fem_impact.impact.compiled.stretched import Stretch
 from fem_impact.impact.engine import gauss
 
@@ -26,7 +27,7 @@ def test_a_record_that_grows_is_the_same(scheme, stretch, monkeypatch):
     scene = KernelSystem(
         *locked(
             np.array([0.0, 3e3, 9e3]), np.array([0.0, 0.01, 0.02]), np.array([[1.0, -1.3, 0.8]]), np.zeros(1),
-            np.zeros(3), np.array([[1e5, 1.5, 0.0, 0.0]]), np.zeros(3), np.array([1.0, 0.0, 0.0]),
+            np.zeros(3), table([[1e5, 1.5]]), np.zeros(3), np.array([1.0, 0.0, 0.0]),
         )
     )  # fmt: skip
     limits = Limits(0.0, 0.0, 1e-2, 0, 2000)

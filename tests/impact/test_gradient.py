@@ -11,6 +11,7 @@ from numpy.testing import assert_allclose
 
 import fem_impact as fi
 from fem_impact.impact import gradient
+from fem_impact.impact.compiled.law import table
 
 STEP, BAND, QUANTITIES = claims.STEP, claims.BAND, claims.QUANTITIES
 random_numbers, strike = claims.random_numbers, claims.strike
@@ -311,7 +312,7 @@ def test_the_largest_force_is_the_largest_of_many_samples(loss, tolerance):
 def test_a_peak_just_before_the_end_of_a_long_step_is_found(before):
     """Of a half sine of pi seconds, whose look nearest to the peak is the start of the short step after it."""
     ends = np.array([0.0, 0.8 - before, 0.8, 0.5 * np.pi + 0.01, 0.5 * np.pi + 0.02, np.pi])
-    steps, now, law = np.zeros((5, 8)), np.zeros((6, 1)), np.array([[1e3, 1.0, 0.0, 0.0]])
+    steps, now, law = np.zeros((5, 8)), np.zeros((6, 1)), table([[1e3, 1.0]])
     steps[:, 0], steps[:, 1], steps[:, 5] = ends[:-1], np.diff(ends), 1.0
     steps[:, 3], steps[:, 4] = np.sin(ends[:-1]), np.cos(ends[:-1])
     now[4] = -1.0

@@ -20,6 +20,7 @@ from warming import locked
 from fem_impact.impact.compiled import arrays, build, collocation, energy, propagation, record, schemes
 from fem_impact.impact.compiled import law as laws
 from fem_impact.impact.compiled.bundles import KernelSystem, Limits
+from fem_impact.impact.compiled.laws.base import Spring
 from fem_impact.impact.engine import gauss
 
 EPS = np.finfo(float).eps
@@ -61,7 +62,7 @@ def run(
     zeta = np.zeros_like(omega) if zeta is None else np.broadcast_to(np.asarray(zeta, float), omega.shape).copy()
     offset = np.broadcast_to(np.asarray(offset, float), (m,)).copy()
     bias = np.zeros_like(omega) if bias is None else np.asarray(bias, float)
-    law = np.stack([np.broadcast_to(np.asarray(x, float), (m,)) for x in (k, exponent, loss, compliance)], axis=1)
+    law = laws.table(list(zip(*(np.broadcast_to(x, (m,)) for x in (k, exponent, loss, compliance)))))
     q = np.zeros_like(omega) if q is None else np.asarray(q, float)
     if p is None:
         p = np.zeros_like(omega)
@@ -255,7 +256,7 @@ def test_long_free_flight_keeps_energy_and_phase():
     t = np.linspace(0.0, 100.0, 1001)
     out_q, out_p = np.empty((1001, 3)), np.empty((1001, 3))
     nothing = np.zeros((0, 3 + 5))
-    law = np.zeros((1, 4))
+    law = laws.table([[0.0]])
     scene = KernelSystem(omega, np.zeros(3), np.ones((1, 3)), np.zeros(1), np.zeros(3), law, q, p)
     propagation.replay(scene, nothing, 2, t, out_q, out_p)
     sine = np.where(omega > 0.0, np.sin(omega * t[:, None]) / np.maximum(omega, 1.0), t[:, None])
@@ -317,7 +318,8 @@ def test_modal_damping_takes_what_its_integral_says():
     x, weight = np.polynomial.legendre.leggauss(20)
     times = (r.steps[:, :1] + 0.5 * (x + 1.0) * r.steps[:, 1:2]).ravel()
     q, p = np.empty((len(times), 2)), np.empty((len(times), 2))
-    scene = KernelSystem(omega, zeta, u, np.zeros(1), np.zeros(2), np.zeros((1, 4)), np.zeros(2), np.array([0.1, 0.0]))
+    law, start = laws.table([[0.0]]), np.array([0.1, 0.0])
+    scene = KernelSystem(omega, zeta, u, np.zeros(1), np.zeros(2), law, np.zeros(2), start)
     propagation.replay(scene, r.steps, 2, times, q, p)
     taken = (0.5 * r.steps[:, 1:2] * weight * (2.0 * 0.2 * 3000.0 * p[:, 1] ** 2).reshape(len(r.steps), -1)).sum()
     assert_allclose(taken, r.before - r.after, rtol=1e-12)  # quadrature exact to rounding
@@ -362,7 +364,7 @@ def test_grazing_touch_is_continuous_and_keeps_energy(depth, scheme):
 
 
 def test_release_branch_meets_the_smooth_one():
-    spring = laws.Spring(1e5, 1.5, 0.0, 0.0, laws.POWER, np.inf, 0.0, 1.0, 0.0, 0.0)
+    spring = Spring(1e5, 1.5, 0.0, 0.0, laws.POWER, np.inf, 0.0, 1.0, 0.0, 0.0)
     start = spring_at(1e-4, spring)
     b = 1e-9
     edge = b * start.energy / start.approach  # free end approach at which the step ends with the contact just open
@@ -694,6 +696,7 @@ from warming import locked
 from fem_impact.impact.compiled.bundles import KernelSystem, Limits
 from fem_impact.impact.compiled.collocation import run_collocation
 from fem_impact.impact.compiled.energy import run_energy
+from fem_impact.impact.compiled.law import table
 from fem_impact.impact.compiled.propagation import replay
 from fem_impact.impact.engine import gauss
 
@@ -706,7 +709,7 @@ def after(run, n_coefficients):
 w, z = np.array([0.0, 4e3, 9e3]), np.zeros(3)
 start = np.array([0.1, 0.0, 0.0])
 shapes = np.array([[10.0, -2.0, 1.0], [10.0, 1.0, -2.0]])
-law = np.array([[1e6, 1.5, 0.0, 1e-9], [1e6, 1.2, 0.1, 0.0]])
+law = table([[1e6, 1.5, 0.0, 1e-9], [1e6, 1.2, 0.1]])
 found, limits = [], Limits(0.0, 0.0, 3e-3, 0, 500)
 for m, zeta, bias in (
     (1, z, z), (1, np.array([0.0, 0.95, 1.3]), z), (2, np.array([0.0, 0.01, 0.2]), np.array([0.1, 1.0, -2.0]))
@@ -756,7 +759,7 @@ def test_forces_of_a_stiff_contact_are_found_however_slowly(exponent):
     room = SimpleNamespace(
         matrix=np.zeros((2, 1)), nodes=nodes, active=np.zeros(1, int), free=free, contacts=np.zeros((8, 1))
     )
-    contacts = SimpleNamespace(law=np.array([[k, exponent, 0.0, 0.0]]), pressed=np.ones(1, bool))
+    contacts = SimpleNamespace(law=laws.table([[k, exponent]]), pressed=np.ones(1, bool))
     assert build.plain(collocation.solve_collocation)(contacts, room, inner)
     force = nodes[collocation.FORCES, 0, 0]
     exact = brentq(lambda f: f - k * (d - c * f) ** exponent, 0.0, d / c, xtol=1e-12)

@@ -95,9 +95,9 @@ def test_a_lossy_contact_never_pulls():
 
 
 @pytest.mark.parametrize("loss", [0.0, 0.1])
-@pytest.mark.parametrize("kind", [law.POWER, law.LAYERS, law.PLASTIC, law.FELT])
-def test_forces_with_corners_are_told_from_smooth_ones(kind, loss):
+@pytest.mark.parametrize("each", law.LAWS, ids=lambda each: each.name)
+def test_forces_with_corners_are_told_from_smooth_ones(each, loss):
     """A corner is where a head's second layer is reached, a contact yields or turns back, or a lossy one lets go."""
-    table = np.array([[1e6, 1.5, 0.0, 0.0, law.POWER, 0, 0, 0, 0], [1e6, 1.5, loss, 0.0, kind, 1e-3, 1e7, 1.5, 0.0]])
-    special = kind != law.POWER
-    assert build.plain(law.special_of)(table) == (special, special or loss > 0.0)
+    rows = law.table([[1e6, 1.5], [1e6, 1.5, loss, 0.0, each.kind]])
+    special = each is not law.LAWS[0]
+    assert build.plain(law.special_of)(rows) == (special, special or loss > 0.0)

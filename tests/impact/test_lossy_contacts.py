@@ -11,7 +11,7 @@ from numpy.testing import assert_allclose
 import fem_impact as fi
 from fem_impact.impact.accuracy import contact_duration
 from fem_impact.impact.compiled import build, events, layout
-from fem_impact.impact.compiled import law as laws
+from fem_impact.impact.compiled.law import table
 
 PLATE = fi.analytic.rectangle(1.55, 1.0, mass=0.2, first_frequency=100.0, n_modes=20)
 WALL, AT = fi.Modes.rigid(1e6), (0.45, 0.3)
@@ -214,10 +214,10 @@ def test_a_stick_that_bends_too_little_to_matter_still_meets_a_lossy_contact():
 def test_felt_is_left_within_a_step_where_it_comes_back_too_slowly(depth, left):
     """Felt at rest keeps half of what pressed it: the body leaves it at 1 - 0.5**(2/3) = 0.37 of its indentation."""
     pressed, h, exponent = 1e-3, 1e-4, 1.5
-    law, now, rate = np.zeros((1, layout.WIDTH)), np.zeros((6, 1)), 4.0 * depth * pressed / h  # there and back
+    now, rate = np.zeros((6, 1)), 4.0 * depth * pressed / h  # there and back
     memory = pressed**exponent
-    law[0, [layout.STIFFNESS, layout.EXPONENT, layout.KIND]] = 1e6, exponent, laws.FELT
-    law[0, [layout.SHARE, layout.RELAXATION, layout.MEMORY]] = 0.5, 1e3 * h, memory
+    felt = fi.Contact.felt(1e6, exponent, hysteresis=0.5, relaxation=1e3 * h)
+    law = table([felt.numbers._replace(memory=memory)])
     now[layout.APPROACH], now[layout.RATE] = pressed, -rate
     contacts = SimpleNamespace(
         law=law, now=now, end=np.array([pressed]), rate=np.array([rate]), after=np.array([memory])

@@ -14,6 +14,7 @@ from fem_impact.impact import engine
 from fem_impact.impact.compiled import record
 from fem_impact.impact.compiled.bundles import KernelSystem, Limits
 from fem_impact.impact.compiled.energy import run_energy
+from fem_impact.impact.compiled.law import table
 from fem_impact.impact.compiled.stretched import Stretch, energies_of_stretching
 from fem_impact.modes.stretching import stretch
 
@@ -144,7 +145,7 @@ def test_energy_is_kept_over_ten_thousand_steps():
     n, form = modes.n_modes, stretch(modes).forms
     omega, shape = np.append(0.0, modes.omega), np.append(HAMMER.mass**-0.5, -modes.shape_at([AT])[0])[None]
     bias, start_p = np.append(40.0 * HAMMER.mass**-0.5, np.zeros(n)), np.append(2.0 * HAMMER.mass**0.5, np.zeros(n))
-    law = np.array([[1e7, 1.5, 0.0, 0.0]])
+    law = table([[1e7, 1.5]])
     arrays = [omega, np.zeros(n + 1), shape, np.zeros(1), bias, law, np.zeros(n + 1), start_p, np.array(form)]
     for array in arrays:
         array.setflags(write=False)

@@ -65,7 +65,7 @@ ZERO, ONE, TRUE, FALSE = np.int64(0), np.int64(1), np.bool_(True), np.bool_(Fals
 
 def _stamp() -> str:
     """A digest of every file of this package."""
-    files = sorted(Path(__file__).parent.glob("*.py"))
+    files = sorted(Path(__file__).parent.rglob("*.py"))
     return hashlib.sha256(b"".join(file.read_bytes() for file in files)).hexdigest()
 
 
@@ -101,7 +101,7 @@ def plain(kernel: Any) -> Any:
     if not COMPILED:
         return kernel
     package, _, module = kernel.__module__.rpartition(".")
-    copy = f"{package}.{PLAIN}"
+    copy = f"{package.rpartition('.')[0]}.{PLAIN}"  # as deep as this package, for imports of what stands before it
     if copy not in sys.modules:
         folder = Path(__file__).parent
         spec = util.spec_from_file_location(copy, folder / "__init__.py", submodule_search_locations=[str(folder)])

@@ -13,7 +13,7 @@ class KernelSystem(NamedTuple):
     shape: np.ndarray  # (n_contacts, n_modes) [kg**-0.5] signed shapes at the contacts
     offset: np.ndarray  # (n_contacts,) [m] approach at zero state
     bias: np.ndarray  # (n_modes,) [N kg**-0.5] constant modal forces
-    law: np.ndarray  # (n_contacts, 9 or 4), see `law.spring_of`
+    law: np.ndarray  # (n_contacts,) of `law.LAW`
     q: np.ndarray  # (n_modes,) state at the start
     p: np.ndarray  # (n_modes,)
 
@@ -35,7 +35,7 @@ class KernelRun(NamedTuple):
     p: np.ndarray  # (n_modes,)
     modes: np.ndarray  # (3, n_modes)
     contacts: np.ndarray  # (CONTACT_ROWS, n_contacts)
-    law: np.ndarray  # (n_contacts, 9 or 4), see `law.spring_of`
+    law: np.ndarray  # (n_contacts,) of `law.LAW`
     clock: np.ndarray  # (CLOCKS + 6,)
     counts: np.ndarray  # (COUNTERS,)
 
@@ -57,7 +57,7 @@ class Bodies(NamedTuple):
 class Contacts(NamedTuple):
     """All contacts, each (n_contacts,): at the start of a step, and as a try of it found them at its end."""
 
-    law: np.ndarray  # (n_contacts, 9 or 4), see `law.spring_of`
+    law: np.ndarray  # (n_contacts,) of `law.LAW`
     offset: np.ndarray  # [m] grows less as a contact is dented
     now: np.ndarray  # (6, n_contacts) where they stand
     pressed: np.ndarray  # whether they are
@@ -105,7 +105,7 @@ class Pairs(NamedTuple):
     """Many blows at unit speed, each between two bodies."""
 
     shares: np.ndarray  # (2, n_cells) [-] of the kernels of target and striker
-    law: np.ndarray  # (4, n_cells) rows as the columns of a power law
+    law: np.ndarray  # (n_cells,) of `law.LAW`, power laws
     rigid: np.ndarray  # (n_cells,) [1/kg] squared shapes of all rigid motions
     static: np.ndarray  # (n_cells,) [m/N] static compliance of all flexible ones
     slack: np.ndarray  # (n_cells,) [-] part of the deepest approach that a touch or a gap must exceed to be sure

@@ -14,7 +14,8 @@ from .bundles import KernelSystem, Limits
 from .events import EVENT_LIMIT, dipped, strayed
 from .exact import freshen
 from .flight import NEVER, ONSET, SLOW, UNPROVED, made_flights
-from .law import FELT, PLASTIC, at, corner_approach, lags, near_side, power, smooth_force, special_of, spring_of
+from .law import at, corner_approach, near_side, power, relaxes, smooth_force, special_of, spring_of, yields
+from .laws.felt import faded, lags
 from .one_mode import mode_moments
 from .propagation import any_of, restore
 from .record import EXHAUSTED, FAILED, FINISHED, FULL, SETTLED, total_energy
@@ -26,8 +27,8 @@ from .frame import (  # isort: skip
     remembered, step_length, take_over, touching,
 )  # fmt: skip
 from .layout import (  # isort: skip
-    A11, A12, A21, A22, APPROACH, BEGUN, CLOSED, COMPLIANCE, CORNERED, EVENTS, FAILURES, FAINT, FRESH, HEAD, KIND,
-    LENGTH, LEVEL, LOOKS, MEMORY, PUSH, RATE, RELAXATION, SEEKS, SHARE, START, STEPS, TARGET, TIME, TRIES, WIDTH,
+    A11, A12, A21, A22, APPROACH, BEGUN, CLOSED, CORNERED, EVENTS, FAILURES, FAINT, FRESH, HEAD,
+    LENGTH, LEVEL, LOOKS, PUSH, RATE, SEEKS, START, STEPS, TARGET, TIME, TRIES,
 )  # fmt: skip
 
 MOBILITY, BEYOND = 0, 1  # rows of `CollocationRoom.contacts`
@@ -150,7 +151,7 @@ def sides(law, now, out_beyond):
         spring = spring_of(law, i)
         bend = corner_approach(spring)
         d, rate = now[APPROACH, i], now[RATE, i]
-        if spring.kind == PLASTIC:
+        if yields(law, i):
             out_beyond[i] = d >= (1.0 - NEAR) * bend and rate > 0.0
         else:
             out_beyond[i] = d > (1.0 + NEAR) * bend or (d >= (1.0 - NEAR) * bend and rate >= 0.0)
@@ -169,7 +170,7 @@ def lag_table(law, i, grid, h, out_lag):
     nodes, powers = grid.nodes, grid.powers
     s = nodes.size - 1
     for a in range(s + 1):
-        x = nodes[a] * h / law[i, RELAXATION]
+        x = nodes[a] * h / law["relaxation"][i]
         j0, j1, j2, j3, j4 = lags(x)
         weights = j0, j1, j2, j3, j4
         out_lag[a, s] = 1.0 - j0
@@ -223,7 +224,7 @@ def solve_collocation(contacts, room, inner):
                         j = active[c]
                         d -= inner[MOVED, a, b, i, j] * out_f[b, j]
                         v -= inner[SPED, a, b, i, j] * out_f[b, j]
-                x = d - law[i, COMPLIANCE] * out_f[a, i]
+                x = d - law["compliance"][i] * out_f[a, i]
                 f, fx, fv = smooth_force(x, v, side_of(law, i, room.contacts[BEYOND]))
                 out_x[a, i] = x
                 row = a * count + r
@@ -232,12 +233,12 @@ def solve_collocation(contacts, room, inner):
                     for c in range(count):
                         j = active[c]
                         matrix[row, b * count + c] = fx * inner[MOVED, a, b, i, j] + fv * inner[SPED, a, b, i, j]
-                matrix[row, row] += 1.0 + fx * law[i, COMPLIANCE]
+                matrix[row, row] += 1.0 + fx * law["compliance"][i]
                 scale = max(scale, abs(out_f[a, i]), abs(f))
         for r in range(count):
             i = active[r]
             spring = spring_of(law, i)
-            if spring.kind != FELT:
+            if spring.relaxation == 0.0:
                 continue
             for a in range(s):
                 row = a * count + r
@@ -305,12 +306,12 @@ def collocate(bodies, contacts, grid, room, slot, h):
         for i in range(m):
             f[a, i] = room.nodes[GUESS, a, i]
     for i in range(m):
-        after[i] = law[i, MEMORY] if law.shape[1] == WIDTH else 0.0
-        if law.shape[1] == WIDTH and law[i, KIND] == FELT:
-            if contacts.pressed[i] and law[i, MEMORY] >= 0.0:
+        after[i] = law["memory"][i]
+        if relaxes(law, i):
+            if contacts.pressed[i] and law["memory"][i] >= 0.0:
                 lag_table(law, i, grid, h, lag[i])
             else:
-                after[i] = -abs(law[i, MEMORY]) * np.exp(-(1.0 - law[i, SHARE]) * h / law[i, RELAXATION])
+                after[i] = faded(law, i, h)
     if not solve_collocation(contacts, room, inner):
         return np.inf
     collocation_end(bodies, contacts, f, grid.free[slot], grid.last[slot])
@@ -322,7 +323,7 @@ def collocate(bodies, contacts, grid, room, slot, h):
             spring = side_of(law, i, room.contacts[BEYOND])
             f0, _, _ = smooth_force(max(0.0, at(now[APPROACH, i], spring).compression), now[RATE, i], spring)
             f1, _, _ = smooth_force(max(0.0, at(y[i], spring).compression), rate[i], spring)
-            if spring.kind == FELT:
+            if spring.relaxation > 0.0:
                 after[i] = memory_at(lag[i], s, room.nodes[SQUEEZE], f, i, spring)
                 f0 -= spring.hard * spring.memory
                 f1 -= spring.hard * after[i]

@@ -12,11 +12,12 @@ ever before. These corners of the force are located by secants. Events that pile
 import numpy as np
 
 from .build import inner
-from .law import FELT, LAYERS, PLASTIC, POWER, corner_approach, parting, parting_rate, spring_of
+from .law import corner_approach, relaxes, spring_of, yields
+from .laws.felt import parting, parting_rate
 from .rounding import NEAR, REPEATED
 
 from .layout import (  # isort: skip
-    APPROACH, HIGH, KIND, LOSS, LOW, MEMORY, MISSED, RATE, SHARE, SIZE, SLOPE, TRIED, WIDTH,
+    APPROACH, HIGH, LOW, MISSED, RATE, SIZE, SLOPE, TRIED,
 )  # fmt: skip
 
 LOCATED = 1e-11  # [-] of the approach about an event: a stored energy of 1e-22 of the step's is left out there
@@ -174,7 +175,7 @@ def corner_value(law, i, which, d, v, memory):
     0 it lets go or pushes again by its rate, 1 the bend, 2 the turn, 3 it parts from its felt or meets it.
     """
     if which == 0:
-        return 1.0 + law[i, LOSS] * v
+        return 1.0 + law["loss"][i] * v
     if which == 3:
         return parting(law, i, d, memory)
     return -v if which == 2 else d - corner_approach(spring_of(law, i))
@@ -202,7 +203,7 @@ def first_corner(contacts, h, lossy, out_bracket):
     at = h
     for i in range(y.size):
         d0, v0, d1, v1 = now[APPROACH, i], now[RATE, i], y[i], rate[i]
-        loss = law[i, LOSS]
+        loss = law["loss"][i]
         if lossy and loss > 0.0 and d0 > 0.0:
             start = 1.0 + loss * v0
             end = 1.0 + loss * v1
@@ -211,17 +212,15 @@ def first_corner(contacts, h, lossy, out_bracket):
                 if 0.0 < root < at:
                     at, target, kind = root, i, 0
                     last_try(h, end, start, out_bracket)
-        if law.shape[1] < WIDTH or law[i, KIND] == POWER:
-            continue
-        if law[i, KIND] == FELT:
-            apart = law[i, MEMORY] < 0.0
-            start = parting(law, i, d0, law[i, MEMORY])
+        if relaxes(law, i):
+            apart = law["memory"][i] < 0.0
+            start = parting(law, i, d0, law["memory"][i])
             end = parting(law, i, d1, after[i])
-            least = NEAR * law[i, SHARE] * abs(after[i])
+            least = NEAR * law["hysteresis"][i] * abs(after[i])
             if least > 0.0 and (end > least if apart else end < -least):
                 start = min(start, -least) if apart else max(start, least)
                 root = h * start / (start - end)
-                leaves = parting_rate(law, i, d0, v0, law[i, MEMORY]) if apart and d0 > 0.0 else 0.0
+                leaves = parting_rate(law, i, d0, v0, law["memory"][i]) if apart and d0 > 0.0 else 0.0
                 if leaves < 0.0:  # and comes back: no straight line
                     root = hermite_root(start, leaves, end, parting_rate(law, i, d1, v1, after[i]), h)
                 if root < AT_ONCE * h:
@@ -238,7 +237,7 @@ def first_corner(contacts, h, lossy, out_bracket):
         late, high = h, d1
         if v1 < 0.0 < v0:
             late, high = turn_of(d0, v0, d1, v1, h)
-        if law[i, KIND] == PLASTIC and d0 >= bend - near:
+        if yields(law, i) and d0 >= bend - near:
             if v1 < 0.0 < v0 and high > bend + near and 0.0 < late < at:
                 at, target, kind = late, i, 2
                 last_try(h, -v1, -v0, out_bracket)
@@ -254,7 +253,7 @@ def first_corner(contacts, h, lossy, out_bracket):
                     high - bend,
                     d0 - bend,
                 )
-        elif law[i, KIND] != PLASTIC and d0 > bend + near and d1 < bend - near:
+        elif not yields(law, i) and d0 > bend + near and d1 < bend - near:
             root = hermite_root(d0 - bend, v0, d1 - bend, v1, h)
             if root < at:
                 at, target, kind = root, i, 1
@@ -272,7 +271,7 @@ def first_corner(contacts, h, lossy, out_bracket):
 def dipped_felt(contacts, h, i):
     """Whether a body left its felt and met it again within a step, by the cubic of what makes it push."""
     law, now, y, rate, after = contacts.law, contacts.now, contacts.end, contacts.rate, contacts.after
-    z0, z1 = law[i, MEMORY], after[i]
+    z0, z1 = law["memory"][i], after[i]
     if z0 < 0.0 or y[i] <= 0.0 or now[APPROACH, i] <= 0.0:
         return False
     g0, g1 = parting(law, i, now[APPROACH, i], z0), parting(law, i, y[i], z1)
@@ -288,23 +287,20 @@ def strayed(contacts, h, i, side):
     0 it stayed, 1 it left the side at once, 2 after a way in which the step must be shorter.
     """
     law, now, y, rate = contacts.law, contacts.now, contacts.end, contacts.rate
-    if law.shape[1] == WIDTH and law[i, KIND] == FELT:
+    if relaxes(law, i):
         return 2 if dipped_felt(contacts, h, i) else 0
-    if law.shape[1] < WIDTH or (law[i, KIND] != LAYERS and law[i, KIND] != PLASTIC):
-        return 0
-    spring = spring_of(law, i)
-    bend = corner_approach(spring)
+    bend = corner_approach(spring_of(law, i))
     near = NEAR * bend
     d0, v0, d1, v1 = side * (now[APPROACH, i] - bend), side * now[RATE, i], side * (y[i] - bend), side * rate[i]
-    yields = spring.kind == PLASTIC and side > 0.0
-    if bend == np.inf or abs(d0) > near or (d1 >= -near and not (yields and v1 < 0.0)):
+    deepens = yields(law, i) and side > 0.0
+    if bend == np.inf or abs(d0) > near or (d1 >= -near and not (deepens and v1 < 0.0)):
         return 0
     high = 0.0
     if v0 > 0.0 and (v1 < 0.0 or d1 < d0):
         _, high = turn_of(d0, v0, d1, v1, h)
     if high <= near:
         return 1
-    return 0 if yields and v1 < 0.0 else 2
+    return 0 if deepens and v1 < 0.0 else 2
 
 
 @inner()
@@ -319,7 +315,7 @@ def nearer(contacts, i, which, h, bracket):
     if which == 1:
         good = 0.1 * NEAR * corner_approach(spring_of(law, i))
     elif which == 3:
-        good = 0.1 * NEAR * law[i, SHARE] * abs(memory)
+        good = 0.1 * NEAR * law["hysteresis"][i] * abs(memory)
     elif which == 2:
         good = TURNED * (abs(bracket[MISSED]) + abs(bracket[SLOPE]))
     if abs(miss) <= good or bracket[HIGH] - bracket[LOW] <= NEAR * bracket[HIGH]:

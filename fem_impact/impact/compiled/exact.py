@@ -11,14 +11,15 @@ from .build import LOOSE, TRUE, inner
 from .bundles import Tables
 from .flight import GLIDES
 from .frame import LEVELS, remember
-from .law import FELT, at, harden, meet, spring_of
+from .law import at, harden, relaxes, spring_of
+from .laws.felt import faded, meet
 from .propagation import N_LANE, any_of, lane_table
 from .schemes import Free, Own, linear_guess, point_of, remembers, solve_constants, solve_ramp, solve_ramps
 
 from .layout import (  # isort: skip
-    A11, A12, A21, A22, APPROACH, BLIND, CLOSED, COMPRESSION, ENERGY, FORCE, FREE_END, FREE_MEAN, FREE_RATE, KIND,
-    LENGTH, M1, M2, M3, MEMORY, OWN_END, OWN_END_RAMP, OWN_MEAN, OWN_MEAN_RAMP, OWN_RATE, OWN_RATE_RAMP, PUSH, RATE,
-    RELAXATION, SHARE, START, TIME,
+    A11, A12, A21, A22, APPROACH, BLIND, CLOSED, COMPRESSION, ENERGY, FORCE, FREE_END, FREE_MEAN, FREE_RATE,
+    LENGTH, M1, M2, M3, OWN_END, OWN_END_RAMP, OWN_MEAN, OWN_MEAN_RAMP, OWN_RATE, OWN_RATE_RAMP, PUSH, RATE,
+    START, TIME,
 )  # fmt: skip
 
 
@@ -198,10 +199,10 @@ def keep_in_mind(contacts, h, ramped):
     """What every contact remembers after a step of A4 (ramped) or A."""
     law, f, s = contacts.law, contacts.force, contacts.slope
     for i in range(f.size):
-        contacts.after[i] = law[i, MEMORY]
-        if law[i, KIND] == FELT:
-            if law[i, MEMORY] < 0.0:
-                contacts.after[i] *= np.exp(-(1.0 - law[i, SHARE]) * h / law[i, RELAXATION])
+        contacts.after[i] = law["memory"][i]
+        if relaxes(law, i):
+            if law["memory"][i] < 0.0:
+                contacts.after[i] = faded(law, i, h)
             else:
                 spring, start = spring_of(law, i), point_of(contacts.now, i)
                 smooth = ramped and (f[i] != 0.0 or s[i] != 0.0)

@@ -14,7 +14,8 @@ import numpy as np
 from .build import inner
 from .bundles import Bodies, Contacts, Course, KernelRun, KernelSystem
 from .flight import NEVER, ONSET, SLOW, approach, find_onset
-from .law import FELT, dent, harden, rest_of
+from .law import dent, harden, relaxes
+from .laws.felt import rest_of
 from .record import EXHAUSTED, FULL, HORIZON, IMPACTS, total_energy
 from .rounding import ITERATIONS, NEAR
 
@@ -23,8 +24,8 @@ from .events import (  # isort: skip
 )  # fmt: skip
 from .layout import (  # isort: skip
     APPROACH, BEGUN, BLINDS, CLOCKS, CONTACT_ROWS, CORNERED, COUNTERS, EVENTS, FAINT, FALLBACKS, FLYING, FRESH, HEAD,
-    KIND, LENGTH, LEVEL, LOOKS, MEMORY, MISS, RATE, READY, RELEASED, REMEMBERED, RESET, RESPITE, SEEKS, SIZE, SPEED,
-    START, STEPS, TARGET, TIME, TRIES, WHICH, WIDTH,
+    LENGTH, LEVEL, LOOKS, MISS, RATE, READY, RELEASED, REMEMBERED, RESET, RESPITE, SEEKS, SIZE, SPEED,
+    START, STEPS, TARGET, TIME, TRIES, WHICH,
 )  # fmt: skip
 
 LEVELS = 40  # [-] halvings of the step that may be cached, and where the table of a step of any other length is kept
@@ -112,7 +113,7 @@ def remember(contacts, i, row):
     Returns the column where what the row tells of the contact begins.
     """
     law, m = contacts.law, contacts.end.size
-    memory = law[i, MEMORY] if law.shape[1] == WIDTH else 0.0
+    memory = law["memory"][i]
     stride = (row.size - HEAD) // m - 1
     first = HEAD + stride * i
     row[first] = contacts.now[APPROACH, i] + dent(law, i, memory)
@@ -125,12 +126,11 @@ def remember(contacts, i, row):
 def remembered(contacts):
     """Count the approaches at the end of a run from no dent, and add the memory to where the contacts stand."""
     law, now = contacts.law, contacts.now
-    if law.shape[1] == WIDTH:
-        for i in range(now.shape[1]):
-            low = dent(law, i, law[i, MEMORY])  # as long as the last step: what it pressed deeper is not yet counted
-            harden(law, i, now[APPROACH, i])
-            now[REMEMBERED, i] = law[i, MEMORY]
-            now[APPROACH, i] += low
+    for i in range(now.shape[1]):
+        low = dent(law, i, law["memory"][i])  # as long as the last step: what it pressed deeper is not yet counted
+        harden(law, i, now[APPROACH, i])
+        now[REMEMBERED, i] = law["memory"][i]
+        now[APPROACH, i] += low
 
 
 @inner(part=True)
@@ -208,7 +208,7 @@ def locate(contacts, course, limits, h, cornered, lossy):
         count[CORNERED], count[WHICH], guess = first_corner(contacts, h, lossy, bracket)
         if count[CORNERED] >= 0:
             if count[WHICH] == AGAIN:
-                contacts.law[count[CORNERED], MEMORY] = abs(contacts.law[count[CORNERED], MEMORY])
+                contacts.law["memory"][count[CORNERED]] = abs(contacts.law["memory"][count[CORNERED]])
                 return AFRESH, guess
             count[TARGET] = -1
             count[SEEKS] = CORNER
@@ -240,7 +240,7 @@ def settle(contacts, target, limits, base):
             pressed[i] = rate[i] > limits.still or (was and rate[i] >= -limits.still)
         else:
             pressed[i] = y[i] > 0.0
-        if was and not pressed[i] and not (law.shape[1] == WIDTH and law[i, KIND] == FELT and law[i, MEMORY] < 0.0):
+        if was and not pressed[i] and not (relaxes(law, i) and law["memory"][i] < 0.0):
             opened += 1
     return opened
 
@@ -251,10 +251,10 @@ def take_over(contacts, course, limits, h, base, special):
     law, clock, count = contacts.law, course.clock, course.counts
     if special:
         for i in range(contacts.end.size):
-            law[i, MEMORY] = contacts.after[i]
+            law["memory"][i] = contacts.after[i]
     clock[TIME] += h
     corner = count[CORNERED]
-    if corner >= 0 and count[WHICH] == 3 and law[corner, MEMORY] > 0.0:
+    if corner >= 0 and count[WHICH] == 3 and law["memory"][corner] > 0.0:
         count[RELEASED] += 1
     count[RELEASED] += settle(contacts, count[TARGET], limits, base)
     if clock[TIME] - clock[RESET] > base:

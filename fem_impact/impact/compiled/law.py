@@ -1,80 +1,78 @@
-"""The contact law: force and stored energy over the approach, and their average slopes between two approaches.
+"""All contact laws, and what kernels ask of any: force and stored energy over the approach, and their average slopes.
 
 A contact pushes with ``F = k x**a (1 + loss d')`` while its spring is compressed by ``x > 0``. A residual compliance
 ``c`` in series takes the rest of the approach, ``d = x + c F``. The stored energy is that of both springs,
-``V = k x**(a+1) / (a+1) + c F**2 / 2``, so that ``V' = F`` along d without loss. Three kinds differ beyond a corner or
-remember (one number each, ``memory``):
+``V = k x**(a+1) / (a+1) + c F**2 / 2``, so that ``V' = F`` along d without loss. The other laws of the folder `laws`
+differ beyond a corner or remember (one number each, ``memory``); which kind of spring takes which course is said here.
 
-* LAYERS: beyond ``depth`` a second, harder spring adds ``k2 (x - depth)**a2``. Nothing is lost.
-* PLASTIC: beyond first yield, or beyond the deepest compression so far, the force goes on along the tangent of the
-  elastic curve at first yield. The memory is that deepest compression ``m``. From there the contact unloads along
-  ``F = F_m ((x - dent) / x_e)**a`` with ``x_e = F_m / (k m**(a-1))`` and ``dent = m - x_e``. That is Thornton's law
-  (1997, J. Appl. Mech. 64, 383) for a = 1.5. At each moment it is the potential of a spring with a corner, at rest at
-  the dent: what yielding takes is the difference of two such potentials.
-* FELT: ``F = k (x**a - share z)`` with the memory ``tau z' = x**a - z`` (Stulov 1995, J. Acoust. Soc. Am. 97, 2577).
-  It stores ``k (x**(a+1) / (a+1) - share z x + share a / (a+1) z**(1 + 1/a))`` and loses
-  ``k share (x - z**(1/a)) z'``, never less than nothing. Where the force would pull, body and felt part, and the felt
-  recovers on its own along ``x**a = share z``.
-
-The energy-exact schemes need the average slopes ``G = (V1 - V0) / (d1 - d0)`` and ``D = (F1 - F0) / (d1 - d0)`` to full
-precision for close approaches, where the differences cancel: `slopes` forms them from x without subtracting.
+A law is added by a file in that folder, a line in `LAWS` and in `Numbers`, and, where its force has a course of its own
+beyond a corner, a branch in `spring_with`, `pushed`, `steepness`, `cornered_slopes` and `smooth_force`.
 """
 
-from typing import NamedTuple
+from collections import namedtuple
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import partial
+from typing import Any
 
 import numpy as np
 
 from .build import inner, outer
-from .rounding import NEAR
+from .laws import felt, layers, plastic
+from .laws.base import POWER, Law, LawNumber, Point
+from .laws.felt import memory_energy, relaxes
+from .laws.plastic import dent, yields
+from .laws.power import PowerLaw, continued, power, power_slopes, simple
 
-from .layout import (  # isort: skip
-    COMPLIANCE, DEPTH, EXPONENT, FIRST_YIELD, HARD, HARD_EXPONENT, KIND, LOSS, MEMORY, RELAXATION, SHARE, STIFFNESS,
-    WIDTH,
-)  # fmt: skip
-
-POWER, LAYERS, PLASTIC, FELT = 0.0, 1.0, 2.0, 3.0  # kinds of law
-
-
-class Spring(NamedTuple):
-    """One contact as it is now; a plastic one measured from its dent."""
-
-    stiffness: float  # [N/m**exponent]
-    exponent: float  # [-]
-    loss: float  # [s/m]
-    compliance: float  # [m/N] in series
-    kind: float  # [-]
-    corner: float  # [m] compression from which the force takes another course; infinite if none
-    hard: float  # [N/m**hard_exponent] stiffness of what the force gains from there; of felt, what the memory takes
-    hard_exponent: float  # [-]
-    relaxation: float  # [s] of felt
-    memory: float  # [m**exponent] of felt
+LAWS: tuple[Law, ...] = (PowerLaw(), layers.LayersLaw(), plastic.PlasticLaw(), felt.FeltLaw())
+NUMBERS: dict[str, LawNumber] = {name: number for law in LAWS for name, number in law.numbers.items()}
+MARKS = {law.mark: law for law in LAWS if law.mark}
+# what kernels know of a contact: where a law has nothing of the kind, 0; the compliance in series [m/N], the kind, and
+# what it remembers
+NAMES = ("stiffness", "exponent", "loss", "compliance", "kind", *NUMBERS, "memory")
+LAW = np.dtype([(name, float) for name in NAMES])
+Row: Any = partial(namedtuple, "Row")(NAMES)  # one contact of such an array, in Python
 
 
-class Point(NamedTuple):
-    """A contact's spring at one approach."""
-
-    approach: float  # [m]
-    compression: float  # [m]
-    force: float  # [N] elastic
-    energy: float  # [J]
+@dataclass(frozen=True)
+class Numbers(felt.FeltNumbers, plastic.PlasticNumbers, layers.LayersNumbers):
+    """The numbers of all laws and their methods; bases last to first, as fields come in the order of `LAWS`."""
 
 
-@inner()
-def simple(k, a, loss, c):
-    """The spring of a power law."""
-    return Spring(k, a, loss, c, POWER, np.inf, 0.0, 1.0, 0.0, 0.0)
+def law_of(contact: Any) -> Law:
+    """The law that a `Contact` or a row follows."""
+    for mark, law in MARKS.items():
+        if getattr(contact, mark):
+            return law
+    return LAWS[0]
+
+
+def row_of(contact: Any) -> Any:
+    """The `Row` of a `Contact`: of the numbers of laws, those of its own if it is more than a power law."""
+    law = law_of(contact)
+    own = law.numbers if law.acts(contact) else {}
+    kind = law.kind if own else POWER
+    first = contact.stiffness, contact.exponent, contact.loss, 0.0, kind
+    return Row(*first, *[getattr(contact, name) if name in own else 0.0 for name in NUMBERS], 0.0)
+
+
+def columns(values: np.ndarray) -> np.ndarray:
+    """The numbers of contacts as a plain array (..., n_numbers) that shares their memory; any other array as it is."""
+    return values.view(float).reshape(*values.shape, -1) if values.dtype == LAW else values
+
+
+def table(rows: Sequence[Sequence[float]]) -> np.ndarray:
+    """Contacts (n_contacts,) as kernels read them; rows may end early, with zeros to follow."""
+    found = np.zeros(len(rows), LAW)
+    for i, row in enumerate(rows):
+        found[i] = (*row, *[0.0] * (len(NAMES) - len(row)))
+    return found
 
 
 @inner()
 def spring_of(law, i):
-    """Contact i of a law (n_contacts, 9 or 4): stiffness, exponent, loss, compliance, kind, three numbers, memory.
-
-    The three are depth, stiffness and exponent of the hard layer; compression at first yield; share and time of felt.
-    Felt from which the body has parted carries a minus before its memory: a spring without stiffness.
-    """
-    if law.shape[1] < WIDTH or law[i, KIND] == POWER:
-        return simple(law[i, STIFFNESS], law[i, EXPONENT], law[i, LOSS], law[i, COMPLIANCE])
-    return spring_with(law, i, law[i, MEMORY])
+    """The spring of contact i of a law (n_contacts,) with the numbers `NAMES`, as it is now."""
+    return spring_with(law, i, law["memory"][i])
 
 
 @inner()
@@ -83,9 +81,9 @@ def special_of(law):
     special = False
     cornered = False
     for i in range(law.shape[0]):
-        if law.shape[1] == WIDTH and law[i, KIND] != POWER:
+        if law["kind"][i] != POWER:
             special = True
-        if law[i, LOSS] > 0.0:
+        if law["loss"][i] > 0.0:
             cornered = True
     return special, special or cornered
 
@@ -93,59 +91,23 @@ def special_of(law):
 @inner()
 def spring_with(law, i, memory):
     """The same if it remembers another number."""
-    k, a, loss, c = law[i, STIFFNESS], law[i, EXPONENT], law[i, LOSS], law[i, COMPLIANCE]
-    if law.shape[1] < WIDTH or law[i, KIND] == POWER:
-        return simple(k, a, loss, c)
-    if law[i, KIND] == FELT:
-        if memory < 0.0:
-            return simple(0.0, a, 0.0, c)
-        return Spring(k, a, loss, c, FELT, np.inf, k * law[i, SHARE], 1.0, law[i, RELAXATION], memory)
-    if law[i, KIND] == LAYERS:
-        return Spring(k, a, loss, c, LAYERS, law[i, DEPTH], law[i, HARD], law[i, HARD_EXPONENT], 0.0, 0.0)
-    first = law[i, FIRST_YIELD]
-    steep = a * k * power(first, a - 1.0)
-    deepest = max(memory, first)
-    if deepest == first:
-        return Spring(k, a, loss, c, PLASTIC, first, steep, 1.0, 0.0, 0.0)
-    force = k * power(first, a) + steep * (deepest - first)
-    back = force / (k * power(deepest, a - 1.0))
-    return Spring(force / power(back, a), a, loss, c, PLASTIC, back, steep, 1.0, 0.0, 0.0)
-
-
-@inner()
-def dent(law, i, memory):
-    """How far the surface of contact i is lower than at first [m], from what it remembers."""
-    if law.shape[1] < WIDTH or law[i, KIND] != PLASTIC or memory <= law[i, FIRST_YIELD]:
-        return 0.0
-    a, first = law[i, EXPONENT], law[i, FIRST_YIELD]
-    return memory - power(first / memory, a - 1.0) * (a * memory - (a - 1.0) * first)
-
-
-@inner()
-def power(x, exponent):
-    """x**exponent for x > 0 without the general power where a root will do."""
-    if exponent == 1.0:
-        return x
-    if exponent == 1.5:
-        return x * np.sqrt(x)
-    return x**exponent
+    kind = law["kind"][i]
+    if kind == felt.KIND:
+        return felt.spring(law, i, memory)
+    if kind == layers.KIND:
+        return layers.spring(law, i)
+    if kind == plastic.KIND:
+        return plastic.spring(law, i, memory)
+    return simple(law["stiffness"][i], law["exponent"][i], law["loss"][i], law["compliance"][i])
 
 
 @inner()
 def pushed(x, spring):
     """Force and stored energy at a compression x > 0, without the compliance in series."""
-    k, a, corner = spring.stiffness, spring.exponent, spring.corner
-    if x <= corner:
-        f = k * power(x, a)
-        return f, f * x / (a + 1.0)
-    further = x - corner
-    if spring.kind == PLASTIC:
-        f = k * power(corner, a)
-        more = spring.hard * further
-        return f + more, f * corner / (a + 1.0) + further * (f + 0.5 * more)
-    f = k * power(x, a)
-    more = spring.hard * power(further, spring.hard_exponent)
-    return f + more, f * x / (a + 1.0) + more * further / (spring.hard_exponent + 1.0)
+    if x <= spring.corner:
+        f = spring.stiffness * power(x, spring.exponent)
+        return f, f * x / (spring.exponent + 1.0)
+    return plastic.pushed(x, spring) if spring.kind == plastic.KIND else layers.pushed(x, spring)
 
 
 @inner()
@@ -153,11 +115,7 @@ def steepness(x, f, spring):
     """Slope of the force f over the compression x > 0."""
     if x <= spring.corner:
         return spring.exponent * f / x
-    if spring.kind == PLASTIC:
-        return spring.hard
-    further = x - spring.corner
-    more = spring.hard * power(further, spring.hard_exponent)
-    return spring.exponent * (f - more) / x + spring.hard_exponent * more / further
+    return spring.hard if spring.kind == plastic.KIND else layers.steepness(x, f, spring)
 
 
 @inner()
@@ -206,51 +164,11 @@ def at(d, spring):
 
 
 @inner()
-def power_slopes(k, a, x0, x1):
-    """Average slopes of ``k x**(a+1) / (a+1)`` and ``k x**a`` between two compressions > 0."""
-    if a == 1.0:
-        return 0.5 * k * (x0 + x1), k
-    if a == 1.5:
-        r0 = np.sqrt(x0)
-        r1 = np.sqrt(x1)
-        g = 0.4 * k * (x1 * x1 + x1 * r1 * r0 + x1 * x0 + r1 * r0 * x0 + x0 * x0) / (r0 + r1)
-        return g, k * (x0 + r0 * r1 + x1) / (r0 + r1)
-    small = min(x0, x1)
-    large = max(x0, x1)
-    r = (large - small) / (large + small)
-    if r < 1e-4:
-        mid = 0.5 * (large + small)
-        f = k * mid**a
-        g = f * (1.0 + a * (a - 1.0) / 6.0 * r * r)
-        return g, a * f / mid * (1.0 + (a - 1.0) * (a - 2.0) / 6.0 * r * r)
-    f = k * large**a
-    if small < 1e-17 * large:
-        return f / (a + 1.0), f / large
-    log = np.log1p((small - large) / large)
-    return f / (a + 1.0) * np.expm1((a + 1.0) * log) / np.expm1(log), f / large * np.expm1(a * log) / np.expm1(log)
-
-
-@inner()
 def cornered_slopes(x0, x1, spring):
     """Average slopes between two compressions > 0, of which at least one is beyond the corner."""
-    k, a, corner, hard = spring.stiffness, spring.exponent, spring.corner, spring.hard
     small = min(x0, x1)
     large = max(x0, x1)
-    further = large - corner
-    if spring.kind == PLASTIC:
-        f = k * power(corner, a)
-        if small >= corner:
-            return f + 0.5 * hard * (further + small - corner), hard
-        g, d = power_slopes(k, a, small, corner)
-        span = large - small
-        g = (g * (corner - small) + (f + 0.5 * hard * further) * further) / span
-        return g, (d * (corner - small) + hard * further) / span
-    g, d = power_slopes(k, a, small, large)
-    if small > corner:
-        more, steeper = power_slopes(hard, spring.hard_exponent, small - corner, further)
-        return g + more, d + steeper
-    more = hard * power(further, spring.hard_exponent)
-    return g + more * further / ((spring.hard_exponent + 1.0) * (large - small)), d + more / (large - small)
+    return plastic.slopes(small, large, spring) if spring.kind == plastic.KIND else layers.slopes(small, large, spring)
 
 
 @inner()
@@ -276,21 +194,12 @@ def smooth_force(x, v, spring):
 
     A spring with a corner is taken on the far side of it, also continued; see `near_side`.
     """
-    a = spring.exponent
-    size = abs(x)
-    f = spring.stiffness * power(size, a) if size > 0.0 else 0.0
-    slope = spring.stiffness if a == 1.0 else (a * f / size if size > 0.0 else 0.0)
-    if x < 0.0:
-        f = -f
-    if spring.kind == PLASTIC:
-        f = spring.stiffness * power(spring.corner, a) + spring.hard * (x - spring.corner)
-        slope = spring.hard
-    elif spring.kind == LAYERS:
-        further = abs(x - spring.corner)
-        if further > 0.0:
-            more = spring.hard * power(further, spring.hard_exponent)
-            f += more if x > spring.corner else -more
-            slope += spring.hard_exponent * more / further
+    if spring.kind == plastic.KIND:
+        f, slope = plastic.far_side(x, spring)
+    elif spring.kind == layers.KIND:
+        f, slope = layers.far_side(x, spring)
+    else:
+        f, slope = continued(x, spring)
     factor = 1.0 + spring.loss * v
     if factor < 0.0:
         return 0.0, 0.0, 0.0
@@ -314,129 +223,26 @@ def corner_approach(spring):
 @inner()
 def harden(law, i, approach):
     """Remember how deep a plastic contact is pressed at an approach [m] from its dent; how much the dent grows [m]."""
-    if law.shape[1] < WIDTH or law[i, KIND] != PLASTIC or approach <= 0.0:
+    if not yields(law, i) or approach <= 0.0:
         return 0.0
     spring = spring_of(law, i)
     x = compression(approach, spring)
     if x <= spring.corner:
         return 0.0
-    before = dent(law, i, law[i, MEMORY])
-    law[i, MEMORY] = before + x
-    return dent(law, i, law[i, MEMORY]) - before
-
-
-@inner()
-def lags(x):
-    """Weights J_k, k = 0 .. 4, of time**k in a memory after x of its times: ``x int_0^1 s**k exp(-x (1-s)) ds``."""
-    if x > 4.0:
-        j0 = -np.expm1(-x)
-        j1 = 1.0 - j0 / x
-        j2 = 1.0 - 2.0 * j1 / x
-        j3 = 1.0 - 3.0 * j2 / x
-        return j0, j1, j2, j3, 1.0 - 4.0 * j3 / x
-    term = 0.2 * x
-    j4 = 0.0
-    for j in range(6, 60):
-        j4 += term
-        term *= -x / j
-        if abs(term) < 1e-18 * j4:
-            break
-    j3 = 0.25 * x * (1.0 - j4)
-    j2 = x / 3.0 * (1.0 - j3)
-    j1 = 0.5 * x * (1.0 - j2)
-    return x * (1.0 - j1), j1, j2, j3, j4
-
-
-@inner()
-def soaked(h, part, g0, g1, r0, r1, spring):
-    """What felt remembers at a part of a step in which ``x**a`` is the cubic with these ends and rates.
-
-    Returns it at that time and in the mean until then, each with what a unit of r1 adds.
-    """
-    x = part * h / spring.relaxation
-    j0, j1, j2, j3, j4 = lags(x)
-    z0 = spring.memory
-    b = part * h * r0
-    c = part * part * (3.0 * (g1 - g0) - 2.0 * h * r0)
-    d = part**3 * (2.0 * (g0 - g1) + h * r0)
-    per_c = -h * part * part
-    per_d = h * part**3
-    gone = j0 / x if x > 0.0 else 1.0
-    end = z0 * (1.0 - j0) + g0 * j0 + b * j1 + c * j2 + d * j3
-    mean = z0 * gone + g0 * j1 + b * j2 / 2.0 + c * j3 / 3.0 + d * j4 / 4.0
-    per_end = per_c * j2 + per_d * j3
-    per_mean = per_c * j3 / 3.0 + per_d * j4 / 4.0
-    return end + per_end * r1, mean + per_mean * r1, per_end, per_mean
-
-
-@inner()
-def growth(point, rate, spring):
-    """``x**a`` of a felt's point, its rate, and that per rate of approach."""
-    if point.compression <= 0.0:
-        return 0.0, 0.0, 0.0
-    g = point.force / spring.stiffness
-    per = spring.exponent * g / point.compression
-    return g, per * rate, per
-
-
-@inner()
-def memory_energy(x, z, spring):
-    """What its memory adds to the elastic energy of felt at a compression [J]."""
-    if z <= 0.0:
-        return 0.0
-    a = spring.exponent
-    return spring.hard * (a / (a + 1.0) * z ** (1.0 + 1.0 / a) - z * x)
+    before = dent(law, i, law["memory"][i])
+    law["memory"][i] = before + x
+    return dent(law, i, law["memory"][i]) - before
 
 
 @inner()
 def held(approach, law, i):
     """Energy that contact i stores at an approach from its dent [m]; felt never less than left to itself."""
-    if law.shape[1] < WIDTH or law[i, KIND] != FELT:
+    if not relaxes(law, i):
         return at(approach, spring_of(law, i)).energy
-    z = abs(law[i, MEMORY])
+    z = abs(law["memory"][i])
     spring = spring_with(law, i, z)
-    x = max(0.0, approach)
-    left = (law[i, SHARE] * z) ** (1.0 / spring.exponent) if z > 0.0 else 0.0
-    x = max(x, left)
+    x = max(max(0.0, approach), felt.surface(law, i, z))
     return at(x, spring).energy + memory_energy(x, z, spring)
-
-
-@inner()
-def rest_of(law, i, time):
-    """Let the memory of felt fade for a time without force."""
-    if law.shape[1] == WIDTH and law[i, KIND] == FELT:
-        law[i, MEMORY] = -abs(law[i, MEMORY]) * np.exp(-(1.0 - law[i, SHARE]) * time / law[i, RELAXATION])
-
-
-@inner()
-def parting(law, i, approach, memory):
-    """``x**a - share z`` of felt: positive where it pushes."""
-    g = power(approach, law[i, EXPONENT]) if approach > 0.0 else 0.0
-    return g - law[i, SHARE] * abs(memory)
-
-
-@inner()
-def parting_rate(law, i, approach, rate, memory):
-    """How fast that changes at an approach > 0 [m**a/s]; a minus before the memory is of a body that has parted."""
-    share, g = law[i, SHARE], power(approach, law[i, EXPONENT])
-    grows = (share - 1.0) * -memory if memory < 0.0 else g - memory
-    return law[i, EXPONENT] * g / approach * rate - share * grows / law[i, RELAXATION]
-
-
-@inner()
-def meet(law, i, approach, rate):
-    """Decide whether a body pushes felt i at the start of a step or has parted from it."""
-    if law.shape[1] < WIDTH or law[i, KIND] != FELT:
-        return
-    z = abs(law[i, MEMORY])
-    over = parting(law, i, approach, z)
-    rises = over > 0.0
-    if abs(over) <= NEAR * law[i, SHARE] * z:
-        grows = law[i, EXPONENT] * power(approach, law[i, EXPONENT]) / approach * rate if approach > 0.0 else 0.0
-        rises = (
-            grows >= -(1.0 - law[i, SHARE]) * law[i, SHARE] * z / law[i, RELAXATION]
-        )  # how the felt recovers on its own
-    law[i, MEMORY] = z if rises else -z
 
 
 @outer()
@@ -453,7 +259,7 @@ def dents(law):
     """Dent of every contact as it is now, (n_contacts,) [m]."""
     result = np.empty(law.shape[0])
     for i in range(law.shape[0]):
-        result[i] = dent(law, i, law[i, MEMORY]) if law.shape[1] == WIDTH else 0.0
+        result[i] = dent(law, i, law["memory"][i])
     return result
 
 
@@ -462,8 +268,8 @@ def yielded(law):
     """Energy that yielding took from all contacts so far [J]: what it cost to press them, less what comes back."""
     total = 0.0
     for i in range(law.shape[0]):
-        if law.shape[1] == WIDTH and law[i, KIND] == PLASTIC and law[i, MEMORY] > law[i, FIRST_YIELD]:
-            deepest = law[i, MEMORY]
+        deepest = law["memory"][i]
+        if yields(law, i) and deepest > law["yield_approach"][i]:
             whole = pushed(deepest, spring_with(law, i, 0.0))[1]
             total += whole - pushed(deepest - dent(law, i, deepest), spring_of(law, i))[1]
     return total

@@ -1,12 +1,5 @@
 """What the rows and columns of the arrays mean that the kernels share."""
 
-# columns of a law (n_contacts, 9), see `law.spring_of`; 5 to 7 by kind
-STIFFNESS, EXPONENT, LOSS, COMPLIANCE, KIND = range(5)
-DEPTH, HARD, HARD_EXPONENT = range(5, 8)  # of layers
-FIRST_YIELD = 5  # of a plastic one
-SHARE, RELAXATION = range(5, 7)  # of felt
-MEMORY, WIDTH = 8, 9  # a law of four columns is a power law
-
 # rows of where every contact stands (6, n_contacts)
 APPROACH, COMPRESSION, FORCE, ENERGY, RATE, REMEMBERED = range(6)
 

@@ -16,12 +16,13 @@ from .bundles import Bodies, Contacts, Tables
 from .events import dipped
 from .exact import contact_sums, freshen, keep_in_mind, predict, solve_step
 from .flight import approach, motion_bounds, quadratic_wait
-from .law import at, rest_of, special_of, spring_of
+from .law import at, special_of, spring_of
+from .laws.felt import rest_of
 from .propagation import any_of, commit, glide, product, restore
 from .rounding import OVERFLOW
 
 from .layout import (  # isort: skip
-    APPROACH, FASTEST, FREE_END, FREE_RATE, HARDEST, MEMORY, RATE, REACH, RIGID, RIGID_ACCELERATION, RIGID_RATE,
+    APPROACH, FASTEST, FREE_END, FREE_RATE, HARDEST, RATE, REACH, RIGID, RIGID_ACCELERATION, RIGID_RATE,
 )  # fmt: skip
 
 FULL = 1 << 20  # [-] ticks of a frame: the shortest step is one, 2e-11 s at 48 kHz
@@ -48,7 +49,7 @@ class Pads(NamedTuple):
 
     rows: np.ndarray  # (n_pads, n_body) signed shapes of the body
     own: np.ndarray  # (n_pads, n_own) those of a stick, with what stands for the modes left out
-    laws: np.ndarray  # (n_pads, 9) see `law.spring_of`
+    laws: np.ndarray  # (n_pads,) see `law.spring_of`
     offsets: np.ndarray  # (n_pads,) [m] approach at zero state
     motion: np.ndarray  # (n_own,) modal velocities of a stick per unit speed
     push: np.ndarray  # (n_own,) constant modal forces on a stick
@@ -84,7 +85,7 @@ class PlayState(NamedTuple):
     free_p: np.ndarray  # (n_modes,)
     bias: np.ndarray  # (n_modes,)
     rows: np.ndarray  # (n_sticks, n_modes)
-    law: np.ndarray  # (n_sticks, 9)
+    law: np.ndarray  # (n_sticks,)
     offset: np.ndarray  # (n_sticks,)
     slot: np.ndarray  # (n_sticks,) which part of the modes is this stick's
     pad: np.ndarray  # (n_sticks,) which point it strikes
@@ -115,8 +116,7 @@ def take_off(pads, state, i):
     for k in range(i, m):
         for n in range(state.q.size):
             state.rows[k, n] = state.rows[k + 1, n]
-        for n in range(state.law.shape[1]):
-            state.law[k, n] = state.law[k + 1, n]
+        state.law[k] = state.law[k + 1]
         for n in range(state.now.shape[0]):
             state.now[n, k] = state.now[n, k + 1]
         state.offset[k] = state.offset[k + 1]
@@ -175,8 +175,7 @@ def put_on(body, pads, limits, state, pad, speed):
         state.q[k] = surface * pads.motion[n]
         state.p[k] = speed * pads.motion[n]
         state.bias[k] = pads.push[n]
-    for n in range(state.law.shape[1]):
-        state.law[m, n] = pads.laws[pad, n]
+    state.law[m] = pads.laws[pad]
     state.offset[m] = pads.offsets[pad]
     state.slot[m] = slot
     state.pad[m] = pad
@@ -316,7 +315,7 @@ def step(body, limits, state, level, time):
         contacts.now[APPROACH, i] = contacts.end[i]
         contacts.now[RATE, i] = contacts.rate[i]
         if special:
-            contacts.law[i, MEMORY] = contacts.after[i]
+            contacts.law["memory"][i] = contacts.after[i]
         if contacts.pressed[i] and contacts.end[i] <= 0.0:
             state.counted[TOUCHED] += 1
         contacts.pressed[i] = contacts.end[i] > 0.0

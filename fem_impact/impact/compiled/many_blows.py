@@ -15,7 +15,8 @@ from .build import ZERO, inner, outer
 from .bundles import Track
 from .centroids import centroid
 from .cubics import LOOKS, crossing, cubic, parted, turning
-from .law import Point, Spring, at, simple
+from .law import Point, at, simple, spring_of
+from .laws.base import Spring
 from .misfit import misfit
 from .schemes import Free, Own, solve_constant, solve_ramp
 
@@ -24,10 +25,10 @@ from .convolution import (  # isort: skip
 )  # fmt: skip
 from .convolution import RATE as RATE_ROW  # isort: skip
 from .layout import (  # isort: skip
-    APPROACH, BEGAN, BENDS, BLOW_COUNTS, BLOW_STATES, COMPLIANCE, COMPRESSION, DEEPEST, END_AHEAD, ENDING, ENERGY,
-    EXPONENT, FORCE, FOUND_CENTROID, FOUND_IMPACTS, FOUND_IMPULSE, FOUND_MISFIT, FOUND_PEAK, FOUND_STATUS, FOUND_STEPS,
-    FOUND_SWING, FOUND_TIME, HELD, HIGHEST, IMPULSE, JUMPS, KNOWN, LOSS, LOWEST, MARGIN, MEAN_AHEAD, MOMENT,
-    N_CONTACTS, N_SEGMENTS, NEEDED, PEAK, PRESSED, RATE, RATE_AHEAD, SLOPED, STIFFNESS, SWING, TOUCHED,
+    APPROACH, BEGAN, BENDS, BLOW_COUNTS, BLOW_STATES, COMPRESSION, DEEPEST, END_AHEAD, ENDING, ENERGY,
+    FORCE, FOUND_CENTROID, FOUND_IMPACTS, FOUND_IMPULSE, FOUND_MISFIT, FOUND_PEAK, FOUND_STATUS, FOUND_STEPS,
+    FOUND_SWING, FOUND_TIME, HELD, HIGHEST, IMPULSE, JUMPS, KNOWN, LOWEST, MARGIN, MEAN_AHEAD, MOMENT,
+    N_CONTACTS, N_SEGMENTS, NEEDED, PEAK, PRESSED, RATE, RATE_AHEAD, SLOPED, SWING, TOUCHED,
 )  # fmt: skip
 
 DONE, DOUBTFUL, AWKWARD, LONG = 0, 1, 2, 3  # how a blow ended: proved apart; with something that the steps may have
@@ -108,8 +109,7 @@ def own_of(rows, column):
 @inner(part=True)
 def blow_of(pairs, cell, h, certify, rows):
     """The numbers of one blow."""
-    law = pairs.law
-    spring = simple(law[STIFFNESS, cell], law[EXPONENT, cell], law[LOSS, cell], law[COMPLIANCE, cell])
+    spring = spring_of(pairs.law, cell)
     last = rows.shape[1] - 1
     own, once = own_of(rows, last), own_of(rows, last - 1)
     k = spring.stiffness / (1.0 + spring.stiffness * spring.compliance)

@@ -1,7 +1,8 @@
 """How far the force of a step is from its law: two runs may agree on a ripple of the force that both miss."""
 
 from .build import inner
-from .law import FELT, POWER, at, growth, soaked, steepness
+from .law import POWER, at, steepness
+from .laws.felt import growth, soaked
 
 # [-] error of the peak force over what steps near it miss, for a power law and for one with loss, layers or memory
 MISFIT = 1.5, 5.0
@@ -29,7 +30,7 @@ def force_on(d0, v0, d1, v1, h, part, spring):
         return 0.0, 0.0
     turn = (2.0 * b + 6.0 * a * part) / (h * h)
     steep = steepness(point.compression, point.force, spring)
-    if spring.kind == FELT:
+    if spring.relaxation > 0.0:
         g0, r0, _ = growth(at(d0, spring), v0, spring)
         g1, r1, _ = growth(at(d1, spring), v1, spring)
         z = soaked(h, part, g0, g1, r0, r1, spring)[0]

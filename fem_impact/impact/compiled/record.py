@@ -11,13 +11,12 @@ import numpy as np
 
 from .build import ZERO, inner, outer
 from .events import hermite_root, letting_go, lowest
-from .law import FELT, LAYERS, PLASTIC, dent, power, spring_with, stored
+from .law import dent, power, relaxes, spring_of, spring_with, stored
 from .misfit import force_on, misfit
 from .rounding import NEAR
 
 from .layout import (  # isort: skip
-    APPROACH, CLOSED, EXPONENT, HEAD, KIND, LENGTH, LOSS, PUSH, RATE, RELAXATION, REMEMBERED, SHARE, SPEED, START,
-    WIDTH,
+    APPROACH, CLOSED, HEAD, LENGTH, PUSH, RATE, REMEMBERED, SPEED, START,
 )  # fmt: skip
 
 HIGH = 0.9  # [-] of the largest mean force of a step: only steps with so much are searched for the peak
@@ -112,12 +111,12 @@ def pushing(steps, now, law, n_coefficients, row, i):
         lower = hermite_root(d0, v0, d1, v1, h) / h
     elif d1 < 0.0 < d0:
         upper = hermite_root(d0, v0, d1, v1, h) / h
-    if law.shape[1] == WIDTH and law[i, KIND] == FELT:  # steps end where the body parts from the felt or meets it
+    if relaxes(law, i):  # steps end where the body parts from the felt or meets it
         for k in range(n_coefficients):
             if steps[row, first + PUSH + k] != 0.0:
                 return lower, upper
         return 0.0, 0.0
-    loss = law[i, LOSS]
+    loss = law["loss"][i]
     start = 1.0 + loss * v0
     end = 1.0 + loss * v1
     if start <= 0.0 and end <= 0.0:
@@ -146,10 +145,10 @@ def above_felt(law, i, d, v, memory, parted):
     z = abs(memory)
     if z == 0.0:
         return d, v
-    a, share = law[i, EXPONENT], law[i, SHARE]
+    a, share = law["exponent"][i], law["hysteresis"][i]
     surface = (share * z) ** (1.0 / a)
     grows = -(1.0 - share) * z if parted else (power(d, a) if d > 0.0 else 0.0) - z
-    return d - surface, v - surface * grows / (a * z * law[i, RELAXATION])
+    return d - surface, v - surface * grows / (a * z * law["relaxation"][i])
 
 
 @outer()
@@ -162,7 +161,7 @@ def nearest_turn(steps, now, law, n_coefficients, miss):
     nearest = -miss
     farthest = 0.0
     for i in range(now.shape[1]):
-        felt = law.shape[1] == WIDTH and law[i, KIND] == FELT
+        felt = relaxes(law, i)
         for row in range(steps.shape[0]):
             d0, v0, d1, v1 = ends_of(steps, now, law, n_coefficients, row, i)
             turn = turn_within(d0, v0, d1, v1, steps[row, LENGTH])
@@ -196,7 +195,7 @@ def force_missed(steps, now, law, n_coefficients, peak):
     """
     worst = 0.0
     for i in range(law.shape[0]):
-        corner = law.shape[1] == WIDTH and (law[i, KIND] == LAYERS or law[i, KIND] == PLASTIC)
+        corner = spring_of(law, i).corner < np.inf
         before = 0.0
         for row in range(steps.shape[0]):
             first = HEAD + (PUSH + n_coefficients) * i
@@ -260,7 +259,7 @@ def still_pressed(steps, now, law, n_coefficients, i, d):
 
     Felt lets go while the body is still in its dent: where its force ends.
     """
-    if law.shape[1] == WIDTH and law[i, KIND] == FELT:
+    if relaxes(law, i):
         first = HEAD + (PUSH + n_coefficients) * i + PUSH
         end = 0.0
         for k in range(n_coefficients):

@@ -20,13 +20,12 @@ from typing import NamedTuple
 import numpy as np
 
 from .build import inner
+from .law import Point, at, compressed, memory_energy, power, slopes, spring_of, steepness
+from .laws.felt import growth, soaked
 from .rounding import CHORD, ITERATIONS, OVERFLOW, REPEATED, SOLVED, STALLED
 
-from .law import (  # isort: skip
-    FELT, Point, at, compressed, growth, memory_energy, power, slopes, soaked, spring_of, steepness,
-)  # fmt: skip
 from .layout import (  # isort: skip
-    APPROACH, COMPRESSION, ENERGY, FORCE, FREE_END, FREE_MEAN, FREE_RATE, LOSS, OWN_END, OWN_END_RAMP, OWN_MEAN,
+    APPROACH, COMPRESSION, ENERGY, FORCE, FREE_END, FREE_MEAN, FREE_RATE, OWN_END, OWN_END_RAMP, OWN_MEAN,
     OWN_MEAN_RAMP, OWN_RATE, OWN_RATE_RAMP, RATE,
 )  # fmt: skip
 
@@ -175,7 +174,7 @@ def solve_felt(start, e, b, h, spring):
 @inner()
 def lossy_terms(h, start, end, rate0, free_rate, spring):
     """What loss or memory adds to mean force and slope at the free end rate, and takes of each per unit less of it."""
-    if spring.kind == FELT:
+    if spring.relaxation > 0.0:
         g0, r0, _ = growth(start, rate0, spring)
         g1, r1, per = growth(end, free_rate, spring)
         z, mean, per_end, per_mean = soaked(h, 1.0, g0, g1, r0, r1, spring)
@@ -200,7 +199,7 @@ def remembers(h, start, end, rate0, rate1, ramped, spring):
 def gained(start, end, memory, spring):
     """What a contact stores more at the end of a step [J]."""
     more = end.energy - start.energy
-    if spring.kind == FELT:
+    if spring.relaxation > 0.0:
         more += memory_energy(max(0.0, end.compression), memory, spring)
         more -= memory_energy(max(0.0, start.compression), spring.memory, spring)
     return more
@@ -209,7 +208,7 @@ def gained(start, end, memory, spring):
 @inner()
 def fair(lost, start, end, spring):
     """Whether a step loses neither less than nothing nor, without loss, more than its rounding."""
-    if spring.kind == FELT:
+    if spring.relaxation > 0.0:
         return lost >= -ROUNDED * (start.energy + end.energy)
     slack = WORK_ERROR * (start.energy + end.energy)
     return lost >= 0.0 if spring.loss > 0.0 else -slack <= lost <= slack
@@ -237,7 +236,7 @@ def solve_ramp(guess, h, start, rate0, free, own, spring):
     where that fails, the force would pull or the contact would give energy.
     """
     d0, c = start.approach, spring.compliance
-    lossy = spring.loss > 0.0 or spring.kind == FELT
+    lossy = spring.loss > 0.0 or spring.relaxation > 0.0
     scale = max(abs(free.end), abs(d0))
     x = guess if guess > -scale else 0.5 * free.end
     old_x = 0.0
@@ -270,7 +269,7 @@ def solve_ramp(guess, h, start, rate0, free, own, spring):
         if last or r == 0.0 or (close and abs(r) <= SOLVED * max(scale, abs(y))):
             work = f * (y - d0) + s * (middle - (free.mean - own.mean * f - own.mean_ramp * s))
             memory = 0.0
-            if spring.kind == FELT:
+            if spring.relaxation > 0.0:
                 memory = remembers(h, start, end, rate0, free.rate - own.rate * f - own.rate_ramp * s, True, spring)
             lost = work - gained(start, end, memory, spring)
             return f >= 0.0 and fair(lost, start, end, spring), end, f, s
@@ -332,7 +331,7 @@ def solve_linear(matrix, vector, n):
 def mean_force(h, y, now, law, i):
     """Mean force of scheme A for one contact ending at approach y, and its slope; the force never pulls."""
     spring = spring_of(law, i)
-    if spring.kind == FELT:
+    if spring.relaxation > 0.0:
         f, slope, _ = felt_mean(point_of(now, i), y, h, spring)
         return f, slope
     start, end = point_of(now, i), at(y, spring)
@@ -358,10 +357,10 @@ def sweep_constants(h, now, law, e, sums, out_y, out_f):
                 rest -= sums[OWN_END, i, j] * out_f[j]
         old = out_f[i]
         spring = spring_of(law, i)
-        if spring.kind == FELT:
+        if spring.relaxation > 0.0:
             end, out_f[i] = solve_felt(point_of(now, i), rest, sums[OWN_END, i, i], h, spring)
         else:
-            end, out_f[i] = solve_constant(point_of(now, i), rest, sums[OWN_END, i, i], law[i, LOSS] / h, spring)
+            end, out_f[i] = solve_constant(point_of(now, i), rest, sums[OWN_END, i, i], law["loss"][i] / h, spring)
         out_y[i] = end.approach
         if out_f[i] != old:
             change = max(change, abs(out_f[i] - old) / max(abs(out_f[i]), abs(old)))
@@ -524,7 +523,7 @@ def solve_ramps(h, contacts, sums, work):
         for j in range(m):
             mean -= sums[OWN_MEAN, i, j] * out_f[j] + sums[OWN_MEAN_RAMP, i, j] * out_s[j]
             v1 -= sums[OWN_RATE, i, j] * out_f[j] + sums[OWN_RATE_RAMP, i, j] * out_s[j]
-        memory = remembers(h, start, end, now[RATE, i], v1, True, spring) if spring.kind == FELT else 0.0
+        memory = remembers(h, start, end, now[RATE, i], v1, True, spring) if spring.relaxation > 0.0 else 0.0
         work_done = out_f[i] * (out_y[i] - now[APPROACH, i]) + out_s[i] * (0.5 * (now[APPROACH, i] + out_y[i]) - mean)
         if not fair(work_done - gained(start, end, memory, spring), start, end, spring):
             return False

@@ -1,0 +1,97 @@
+"""What the program asks of a contact law, and the spring and the point that its kernels pass on."""
+
+from typing import Any, ClassVar, NamedTuple
+
+import numpy as np
+
+POWER = 0.0  # kind of a law that is a power of the approach and nothing else
+
+
+class Spring(NamedTuple):
+    """One contact as it is now; a plastic one measured from its dent."""
+
+    stiffness: float  # [N/m**exponent]
+    exponent: float  # [-]
+    loss: float  # [s/m]
+    compliance: float  # [m/N] in series
+    kind: float  # [-]
+    corner: float  # [m] compression from which the force takes another course; infinite if none
+    hard: float  # [N/m**hard_exponent] stiffness of what the force gains from there; of felt, what the memory takes
+    hard_exponent: float  # [-]
+    relaxation: float  # [s] of a memory that fades; 0: there is none
+    memory: float  # [m**exponent] of felt
+
+
+class Point(NamedTuple):
+    """A contact's spring at one approach."""
+
+    approach: float  # [m]
+    compression: float  # [m]
+    force: float  # [N] elastic
+    energy: float  # [J]
+
+
+class LawNumber(NamedTuple):
+    """A number of a law: a field of `Contact`, of the compiled rows and of the table [contact] of a scene."""
+
+    unit: str
+    axis: str  # what it is, on the axis of a map
+    key: str  # what it is, in a scene file
+    least: float | None = 0.0  # None: more than 0
+    most: float = np.inf
+
+
+class Law:
+    """A contact law; those of `law.LAWS` say what differs.
+
+    Its numbers as it is asked are a `Contact` or a `law.Row`: both have the fields by name.
+    """
+
+    kind = POWER  # of its rows
+    name = ""  # of the method of `Contact` that makes one, and of its kind in a scene
+    mark = ""  # field that is positive for this law alone
+    numbers: ClassVar[dict[str, LawNumber]] = {}  # its own
+    keys: ClassVar[dict[str, LawNumber]] = {}  # further arguments of the method, or with other words in a scene
+    damped = False  # whether a loss factor may go with it
+    remembers = False  # whether the force depends on what was before
+    rated = False  # whether it depends on how fast the contact is pressed, even without a loss factor
+    hertzian = False  # whether with exponent 1.5 the area of the contact is that of round bodies
+    slopes: tuple[str, ...] = ("stiffness", "exponent")  # numbers in which gradients are taken
+    words = ""  # what follows the name of a power law in a report of fitted taps
+
+    def check(self, contact: Any) -> None:
+        """ValueError where numbers that are good alone do not go together."""
+        if self.remembers and contact.exponent < 1.0:
+            raise ValueError(
+                f"exponent must be at least 1 for a contact that yields or is felt, got {contact.exponent:g}"
+            )
+
+    def acts(self, contact: Any) -> bool:
+        """Whether these numbers make it more than a power law."""
+        return True
+
+    def force(self, contact: Any, pressed: np.ndarray) -> np.ndarray:
+        """Force [N] at approaches >= 0 [m], first pressed, so fast that nothing relaxes, without the loss factor."""
+        return np.asarray(contact.stiffness * pressed**contact.exponent)
+
+    def acting(self, row: Any, mobility: Any, speed: Any) -> np.ndarray:
+        """See `contact.acting_stiffness`."""
+        return np.full(np.broadcast_shapes(np.shape(mobility), np.shape(speed)), row.stiffness, float)
+
+    def sunk(self, row: Any, memory: np.ndarray, left: np.ndarray) -> np.ndarray:
+        """How much lower than at first the surface lies [m], by its memory and the time it has been ``left`` [s]."""
+        return np.zeros(memory.shape)
+
+    def approach(self, contact: Any, force: float) -> float:
+        """Approach [m] at which it first has a force [N]."""
+        return float((force / contact.stiffness) ** (1.0 / contact.exponent))
+
+    def sentence(self, contact: Any, si: Any) -> str:
+        """What a report adds to the sentence on a power law; ``si`` writes a number with its unit."""
+        return ""
+
+
+def standing_in(row: Any, energy: np.ndarray, deepest: np.ndarray) -> np.ndarray:
+    """Stiffness of the power law that stores an energy [J] at the same deepest approach [m]."""
+    a = row.exponent
+    return np.where(deepest > 0.0, (a + 1.0) * energy / np.maximum(deepest, 1e-300) ** (a + 1.0), row.stiffness)

@@ -1,0 +1,135 @@
+"""A soft layer over a hard one: ``F = k x**a``, and beyond ``depth`` ``k2 (x - depth)**a2`` more. Nothing is lost."""
+
+from dataclasses import dataclass
+from typing import Any, ClassVar, Self
+
+import numpy as np
+
+from ...._base.rounding import HALVINGS
+from ..build import inner
+from .base import Law, LawNumber, Spring, standing_in
+from .power import PowerNumbers, continued, power, power_slopes
+
+KIND = 1.0
+
+
+@dataclass(frozen=True)
+class LayersNumbers(PowerNumbers):
+    """The numbers of the hard layer."""
+
+    depth: float = 0.0  # [m] approach at which a hard layer is reached
+    hard_stiffness: float = 0.0  # [N/m**hard_exponent] of the hard layer; 0: there is none
+    hard_exponent: float = 1.5  # [-] of the hard layer
+
+    @classmethod
+    def layers(
+        cls,
+        stiffness: float,
+        exponent: float,
+        *,
+        depth: float,
+        hard_stiffness: float,
+        hard_exponent: float = 1.5,
+        loss: float = 0.0,
+        gap: float = 0.0,
+    ) -> Self:
+        """A soft layer over a hard one: ``F = stiffness d**exponent + hard_stiffness (d - depth)**hard_exponent``.
+
+        The second term acts where the approach d exceeds ``depth`` [m], at which the soft layer bottoms.
+
+        Examples
+        --------
+        >>> tip = fi.Contact.layers(1e5, 1.0, depth=1e-3, hard_stiffness=1e9)
+        >>> tip.force([1e-3, 2e-3]).round(3).tolist()
+        [100.0, 31822.777]
+        """
+        return cls(stiffness, exponent, loss, gap, depth, hard_stiffness, hard_exponent)
+
+
+class LayersLaw(Law):
+    """A soft layer over a hard one."""
+
+    kind = KIND
+    name = "layers"
+    mark = "hard_stiffness"
+    numbers: ClassVar = {
+        "depth": LawNumber(
+            "m", "approach at which the hard layer is reached", "approach at which the soft layer bottoms"
+        ),
+        "hard_stiffness": LawNumber(
+            "N/m**hard_exponent", "stiffness of the hard layer", "of the layer below", most=1e200
+        ),
+        "hard_exponent": LawNumber("", "exponent of the hard layer", "of the layer below", 1.0, 100.0),
+    }
+    damped = True
+    slopes = ("stiffness", "exponent", "loss", *numbers)
+    words = " over a hard layer"
+
+    def force(self, contact: Any, pressed: np.ndarray) -> np.ndarray:
+        further = np.maximum(pressed - contact.depth, 0.0)
+        return super().force(contact, pressed) + contact.hard_stiffness * further**contact.hard_exponent
+
+    def acting(self, row: Any, mobility: Any, speed: Any) -> np.ndarray:
+        k, a, hard, b = row.stiffness, row.exponent, row.hard_stiffness, row.hard_exponent
+        energy = 0.5 * np.asarray(speed) ** 2 / np.asarray(mobility)  # [J]
+        deepest = ((a + 1.0) * energy / k) ** (1.0 / (a + 1.0))  # [m] by the power law alone
+        low, high = np.zeros_like(deepest), deepest
+        for _ in range(HALVINGS):
+            middle = 0.5 * (low + high)
+            over = np.maximum(middle - row.depth, 0.0)
+            stored = k * middle ** (a + 1.0) / (a + 1.0) + hard * over ** (b + 1.0) / (b + 1.0)
+            low, high = np.where(stored < energy, middle, low), np.where(stored < energy, high, middle)
+        return standing_in(row, energy, np.where(deepest > row.depth, high, deepest))
+
+    def sentence(self, contact: Any, si: Any) -> str:
+        return f" Beyond {si(contact.depth, 'm')} it meets a hard layer."
+
+
+@inner()
+def spring(law, i):
+    """The spring of contact i."""
+    return Spring(
+        law["stiffness"][i], law["exponent"][i], law["loss"][i], law["compliance"][i], KIND,
+        law["depth"][i], law["hard_stiffness"][i], law["hard_exponent"][i], 0.0, 0.0,
+    )  # fmt: skip
+
+
+@inner()
+def pushed(x, spring):
+    """Force and stored energy at a compression beyond the corner."""
+    a, further = spring.exponent, x - spring.corner
+    f = spring.stiffness * power(x, a)
+    more = spring.hard * power(further, spring.hard_exponent)
+    return f + more, f * x / (a + 1.0) + more * further / (spring.hard_exponent + 1.0)
+
+
+@inner()
+def steepness(x, f, spring):
+    """Slope of the force f there."""
+    further = x - spring.corner
+    more = spring.hard * power(further, spring.hard_exponent)
+    return spring.exponent * (f - more) / x + spring.hard_exponent * more / further
+
+
+@inner()
+def slopes(small, large, spring):
+    """Average slopes between two compressions > 0, of which at least one is beyond the corner."""
+    further = large - spring.corner
+    g, d = power_slopes(spring.stiffness, spring.exponent, small, large)
+    if small > spring.corner:
+        more, steeper = power_slopes(spring.hard, spring.hard_exponent, small - spring.corner, further)
+        return g + more, d + steeper
+    more = spring.hard * power(further, spring.hard_exponent)
+    return g + more * further / ((spring.hard_exponent + 1.0) * (large - small)), d + more / (large - small)
+
+
+@inner()
+def far_side(x, spring):
+    """Force and its slope beyond the corner, continued smoothly to the near side of it."""
+    f, slope = continued(x, spring)
+    further = abs(x - spring.corner)
+    if further > 0.0:
+        more = spring.hard * power(further, spring.hard_exponent)
+        f += more if x > spring.corner else -more
+        slope += spring.hard_exponent * more / further
+    return f, slope
