@@ -506,7 +506,7 @@ def test_a_step_error_that_stays_too_large_proposes_what_is_met(monkeypatch, tol
 @pytest.mark.parametrize("ends", [{}, {"max_impacts": 17}, {"duration": 1.0}])
 def test_a_run_without_end_is_ended_by_each_of_what_is_told(monkeypatch, given, ends):
     """A hammer that touches the plate 18 times; whoever gave an end already gets one that is soon enough."""
-    monkeypatch.setattr(engine, "most_steps", lambda _: 400)
+    monkeypatch.setattr(engine, "most_steps", lambda *_: 400)
     words = rf"raise {next(iter(given))}, or give a duration of at most \S+ s or max_impacts of at most \d+ \(notes"
     blow = {"residual": False, **ends}
     with pytest.raises(fi.SimulationError, match=words) as caught:
