@@ -13,7 +13,6 @@ from ..fe.section import Material
 from ..modes.analytic import SHEAR_RATIO, beam
 from ..modes.modal import Modes, Shapes, left_out
 from .accuracy import left_out_density
-from .reduced_body import ReducedBody, reduce_body
 
 SPHERES = 1e-9, 1e9  # [m] radius, from a few atoms to a star
 STICK_MODES = 96  # [-] bending modes of a stick, known in closed form; each blow keeps as many of them as it needs
@@ -320,17 +319,6 @@ class Striker(check.Brief):
     def known(self) -> Remembered:
         """The striker with fewer modes, and as blows take it."""
         return Remembered(KEPT)
-
-    def reduced(self, residual: bool = True) -> ReducedBody:
-        """The striker as it is held, undeformed and at rest; ``residual`` says whether the modes left out yield."""
-
-        def found() -> ReducedBody:
-            rest = self.left_out if residual and self.modes.dimension else None
-            part = reduce_body(self.body, ((0, 1.0),), self.at[None], self.shape[None], rest)
-            return replace(part, bias=part.bias + self.push, held=int(self.hand is not None))
-
-        reduced: ReducedBody = self.known.found(("reduced", residual), found)
-        return reduced
 
     @property
     def notes(self) -> tuple[str, ...]:
