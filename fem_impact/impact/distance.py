@@ -65,15 +65,11 @@ def of_runs(
 ) -> np.ndarray:
     """How far one run is from another [-]: in each quantity asked for, in its margin and in each impact's restitution.
 
-    All are 1 if the runs ended differently. The restitution counts by the speed of every body that moves rigidly, over
-    the momentum of all. ``over`` divides the distances in quantities that depend on the whole blow, and those in
-    contact time and peak force, which depend on an instant; not those of impacts, as points part as fast as the bodies
-    ring there, also in modes faster than the step.
-
-    Returns
-    -------
-    ndarray, shape (n_quantities + 1 + n_impacts,)
-        Impacts are in the order of `History.contacts`.
+    (n_quantities + 1 + n_impacts,), impacts in the order of `History.contacts`. All are 1 if the runs ended
+    differently. The restitution counts by the speed of every body that moves rigidly, over the momentum of all.
+    ``over`` divides the distances in quantities that depend on the whole blow, and those in contact time and peak
+    force, which depend on an instant; not those of impacts, as points part as fast as the bodies ring there, also in
+    modes faster than the step.
     """
     each, n_impacts = (one.contacts.T.tolist(), two.contacts.T.tolist()), len(two.contacts)
     if len(one.contacts) != n_impacts or one.status != two.status:

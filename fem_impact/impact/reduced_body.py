@@ -139,10 +139,7 @@ class ReducedBody:
 
 
 def part_of(modes: Modes, touched: Touched, points: np.ndarray, residual: bool = True) -> ReducedBody:
-    """An undeformed body at rest, as it is touched at points; its modes remember it.
-
-    ``touched`` as of `ReducedBody`; ``residual`` says whether the modes left out yield.
-    """
+    """An undeformed body at rest touched at points; ``residual``: modes left out yield. Its modes remember it."""
 
     def reduced() -> ReducedBody:
         rows = np.atleast_2d(modes.shapes.at(points)) if touched else np.zeros((0, modes.n_modes))

@@ -11,7 +11,7 @@ from .._base.remembered import Remembered
 from ..fe import plausible
 from ..fe.section import Material
 from ..modes.analytic import SHEAR_RATIO, beam
-from ..modes.modal import Modes, Shapes, left_out
+from ..modes.modal import REMEMBERED, Modes, Shapes, left_out
 from .accuracy import left_out_density
 
 SPHERES = 1e-9, 1e9  # [m] radius, from a few atoms to a star
@@ -19,7 +19,6 @@ STICK_MODES = 96  # [-] bending modes of a stick, known in closed form; each blo
 MOST_MODES = 1000  # [-] of a stick: higher modes have wavelengths as short as its thickness, where beam theory fails
 
 
-KEPT = 8  # [-] numbers of modes for which a striker is remembered: sweeps of speeds need a few
 STIFF_HAND = 0.3  # [-] highest frequency in the hand over the first bending frequency: the squares add to some 10 %
 
 
@@ -318,7 +317,7 @@ class Striker(check.Brief):
     @cached_property
     def known(self) -> Remembered:
         """The striker with fewer modes, and as blows take it."""
-        return Remembered(KEPT)
+        return Remembered(REMEMBERED)
 
     @property
     def notes(self) -> tuple[str, ...]:
