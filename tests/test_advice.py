@@ -489,7 +489,7 @@ def test_following_the_advice_works(tmp_path, name):
     "tolerance, mass, stiffness", [(3e-7, 0.5, 1e4), (1e-6, 2.0, 1e4), (1e-3, 5.0, 1e5), (1e-6, 5.0, 1e5)]
 )
 def test_a_step_error_that_stays_too_large_proposes_what_is_met(monkeypatch, tolerance, mass, stiffness):
-    monkeypatch.setattr(engine, "most_steps", lambda _: 300)
+    monkeypatch.setattr(engine, "most_steps", lambda *_: 300)
     law = fi.Contact.power(stiffness, 0.8)  # collocation, which would take over, needs an exponent of 1
     wanted = {"mass": mass, "tolerance": tolerance, "residual": False}
     with pytest.raises(
@@ -506,7 +506,7 @@ def test_a_step_error_that_stays_too_large_proposes_what_is_met(monkeypatch, tol
 @pytest.mark.parametrize("ends", [{}, {"max_impacts": 17}, {"duration": 1.0}])
 def test_a_run_without_end_is_ended_by_each_of_what_is_told(monkeypatch, given, ends):
     """A hammer that touches the plate 18 times; whoever gave an end already gets one that is soon enough."""
-    monkeypatch.setattr(engine, "most_steps", lambda _: 400)
+    monkeypatch.setattr(engine, "most_steps", lambda *_: 400)
     words = rf"raise {next(iter(given))}, or give a duration of at most \S+ s or max_impacts of at most \d+ \(notes"
     blow = {"residual": False, **ends}
     with pytest.raises(fi.SimulationError, match=words) as caught:

@@ -15,7 +15,7 @@ from .compiled.bundles import KernelSystem
 from .contact import Contact
 from .engine import TOLERANCE
 from .error import Error
-from .reduced_body import ReducedBody, ends_of, joined, part_of, stretched_in
+from .reduced_body import ReducedBody, ends_of, joined, part_of, part_of_striker, stretched_in
 from .response import Response
 from .state import State
 from .stepping import Options, refine_steps, takes_options
@@ -65,7 +65,7 @@ def strike(
         struck = replace(struck, stretching=stretch(modes))
 
     def blow(striker: Striker, speed: float, own: tuple[np.ndarray, np.ndarray] | None = None) -> Response:
-        arriving = striker.reduced(asked.residual).pushed(asked.striker_force)
+        arriving = part_of_striker(striker, asked.residual).pushed(asked.striker_force)
 
         def start(one: float = 1.0, other: float = 1.0) -> list[ReducedBody]:
             """Both bodies at the start, each as fast as it is known times a factor."""

@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping
 from math import sqrt
+from operator import sub
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -64,42 +65,35 @@ def of_runs(
 ) -> np.ndarray:
     """How far one run is from another [-]: in each quantity asked for, in its margin and in each impact's restitution.
 
-    All are 1 if the runs ended differently. The restitution counts by the speed of every body that moves rigidly, over
-    the momentum of all. ``over`` divides the distances in quantities that depend on the whole blow, and those in
-    contact time and peak force, which depend on an instant; not those of impacts, as points part as fast as the bodies
-    ring there, also in modes faster than the step.
-
-    Returns
-    -------
-    ndarray, shape (n_quantities + 1 + n_impacts,)
-        Impacts are in the order of `History.contacts`.
+    (n_quantities + 1 + n_impacts,), impacts in the order of `History.contacts`. All are 1 if the runs ended
+    differently. The restitution counts by the speed of every body that moves rigidly, over the momentum of all.
+    ``over`` divides the distances in quantities that depend on the whole blow, and those in contact time and peak
+    force, which depend on an instant; not those of impacts, as points part as fast as the bodies ring there, also in
+    modes faster than the step.
     """
-    impacts = two.contacts
-    if len(one.contacts) != len(impacts) or one.status != two.status:
-        return np.ones(len(quantities) + 1 + len(impacts))
+    each, n_impacts = (one.contacts.T.tolist(), two.contacts.T.tolist()), len(two.contacts)
+    if len(one.contacts) != n_impacts or one.status != two.status:
+        return np.ones(len(quantities) + 1 + n_impacts)
     rigid = two.omega == 0.0  # a swinging body has much momentum, of which the striker's error is no share
     start, end = two.start_p[rigid], two.end_p[rigid]
     momentum = sqrt(max(start.dot(start), end.dot(end)))
     momentum = momentum or sqrt(two.start_p.dot(two.start_p)) or sqrt(two.end_p.dot(two.end_p)) or 1.0
     speeds = np.abs(one.end_p[one.omega == 0.0] - end)
     found: dict[str, float] = {"restitution": max(speeds.tolist(), default=0.0) / momentum}
-    if len(impacts):
-        totals = []
-        for run in one, two:
-            start, end, peak, impulse = run.contacts.T[:4]
-            times = sum((end - start).tolist())
-            totals.append({"impulse": sum(impulse.tolist()), "contact_time": times, "force": max(peak.tolist())})
-        found |= distance(*totals)
+    totals = []
+    for start, end, peak, impulse, *_ in each if n_impacts else ():
+        totals.append({"impulse": sum(impulse), "contact_time": sum(map(sub, end, start)), "force": max(peak)})
+    found |= distance(*totals) if n_impacts else {}
     apart = []
     for name, band in quantities.items():
         if band is not None:
             found |= distance({name: _spectrum(one, band)}, {name: _spectrum(two, band)})
         apart.append(max(ROUNDING, found.get(name, ROUNDING) / over[name in INSTANTS]))
-    rebounds, others = one.contacts[:, 7], impacts[:, 7]
-    parted = np.abs(rebounds - others)
-    lacking = np.isnan(parted)
-    parted[lacking] = (np.isnan(rebounds) != np.isnan(others))[lacking]  # 1 if only one of them has a restitution
-    return np.array([*apart, abs(one.margin - two.margin), *parted.tolist()])
+    apart.append(abs(one.margin - two.margin))
+    for rebound, other in zip(each[0][7], each[1][7]):
+        none, no_other = rebound != rebound, other != other  # NaN: no restitution
+        apart.append(float(none != no_other) if none or no_other else abs(rebound - other))
+    return np.array(apart)
 
 
 def _spectrum(history: History, band: float) -> np.ndarray:

@@ -128,8 +128,9 @@ def pace_of(system: KernelSystem, held: Sequence[int] = ()) -> tuple[float, floa
         approach = system.offset[i] + float(system.shape[i] @ system.q)
         pull = max(0.0, float(system.shape[i] @ system.bias))  # [m/s**2]
         speed = float(np.abs(system.shape[i]) @ np.abs(system.p))
-        speed = max(speed, np.sqrt(2.0 * pull * max(0.0, -approach)))
-        speed = max(speed, np.sqrt(pull * (pull / (k * mobile[-1])) ** (1.0 / exponent)))
+        if pull:
+            speed = max(speed, np.sqrt(2.0 * pull * max(0.0, -approach)))
+            speed = max(speed, np.sqrt(pull * (pull / (k * mobile[-1])) ** (1.0 / exponent)))
         if approach > 0.0:
             speed = max(speed, approach * np.sqrt(k * approach ** (exponent - 1.0) * mobile[-1]))
         if speed == 0.0:

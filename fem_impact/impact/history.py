@@ -191,15 +191,16 @@ class History(check.Locked):
         Columns are start, end, peak force, impulse, contact index, with what speed the bodies meet and part, and the
         restitution, the second of these over the first; NaN where there is none.
         """
-        size, largest, width = np.abs(self.shape), np.maximum.reduce, layout.PUSH + self.n_coefficients
-        pushes = self.steps[:, layout.HEAD : layout.HEAD + width * self.shape.shape[0]]
-        rate = largest(np.abs(pushes[:, layout.SPEED :: width]), axis=None, initial=0.0)
+        size, width = np.abs(self.shape), layout.PUSH + self.n_coefficients
+        pushes = self.steps[:, layout.HEAD : layout.HEAD + width * len(size)]
+        rate = np.maximum.reduce(np.abs(pushes[:, layout.SPEED :: width]), axis=None, initial=0.0)
+        deepest = np.maximum.reduce(pushes[:, ::width], axis=None, initial=0.0)
         way = max((size @ (np.abs(self.start_q) + self.end_time * np.abs(self.start_p))).tolist())
-        slack = float(max(ROUNDING * way, TOUCH * largest(pushes[:, ::width], axis=None, initial=0.0)))
+        slack = float(max(ROUNDING * way, TOUCH * deepest))
         found = record.find_impacts(
             self.steps, self.now, self.law, self.n_coefficients, PEAK_LOOKS, ROUNDING * rate, slack
         )
-        found = found[found[:, 2] > FAINT * largest(found[:, 2], initial=0.0)]
+        found = found[found[:, 2] > FAINT * max(found[:, 2].tolist(), default=0.0)]
         if min(found[:, 7].tolist(), default=np.inf) < np.inf:
             found[:, 0] = self._force_begins(found, size)
         met = found[:, 5].copy()

@@ -14,6 +14,7 @@ from .compiled.bundles import KernelSystem
 from .compiled.law import table
 from .contact import Contact
 from .stretched import Stretched
+from .striker import Striker
 
 # [-] by dimension: frequency of the replacement mode over the last, fact: sqrt(sum u**2/w**2 / sum u**2/w**4) of those
 # above is sqrt(7/3) on a beam, whose n-th frequency goes as n**2, and sqrt(3) on a plate, where it goes as n
@@ -138,10 +139,7 @@ class ReducedBody:
 
 
 def part_of(modes: Modes, touched: Touched, points: np.ndarray, residual: bool = True) -> ReducedBody:
-    """An undeformed body at rest, as it is touched at points; its modes remember it.
-
-    ``touched`` as of `ReducedBody`; ``residual`` says whether the modes left out yield.
-    """
+    """An undeformed body at rest touched at points; ``residual``: modes left out yield. Its modes remember it."""
 
     def reduced() -> ReducedBody:
         rows = np.atleast_2d(modes.shapes.at(points)) if touched else np.zeros((0, modes.n_modes))
@@ -149,6 +147,18 @@ def part_of(modes: Modes, touched: Touched, points: np.ndarray, residual: bool =
         return reduce_body(modes, touched, points, rows, rest)
 
     found: ReducedBody = modes.known.found((points.tobytes(), touched, residual), reduced)
+    return found
+
+
+def part_of_striker(striker: Striker, residual: bool = True) -> ReducedBody:
+    """A striker as it is held, undeformed and at rest, as `part_of`; it remembers it."""
+
+    def reduced() -> ReducedBody:
+        rest = striker.left_out if residual and striker.modes.dimension else None
+        part = reduce_body(striker.body, ((0, 1.0),), striker.at[None], striker.shape[None], rest)
+        return replace(part, bias=part.bias + striker.push, held=int(striker.hand is not None))
+
+    found: ReducedBody = striker.known.found(("reduced", residual), reduced)
     return found
 
 

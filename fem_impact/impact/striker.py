@@ -11,17 +11,15 @@ from .._base.remembered import Remembered
 from ..fe import plausible
 from ..fe.section import Material
 from ..modes.modal import Modes, left_out
-from ..modes.shapes import Shapes
+from ..modes.shapes import REMEMBERED, Shapes
 from ..modes.slender import SHEAR_RATIO, beam
 from .accuracy import left_out_density
-from .reduced_body import ReducedBody, reduce_body
 
 SPHERES = 1e-9, 1e9  # [m] radius, from a few atoms to a star
 STICK_MODES = 96  # [-] bending modes of a stick, known in closed form; each blow keeps as many of them as it needs
 MOST_MODES = 1000  # [-] of a stick: higher modes have wavelengths as short as its thickness, where beam theory fails
 
 
-KEPT = 8  # [-] numbers of modes for which a striker is remembered: sweeps of speeds need a few
 STIFF_HAND = 0.3  # [-] highest frequency in the hand over the first bending frequency: the squares add to some 10 %
 
 
@@ -320,18 +318,7 @@ class Striker(check.Brief):
     @cached_property
     def known(self) -> Remembered:
         """The striker with fewer modes, and as blows take it."""
-        return Remembered(KEPT)
-
-    def reduced(self, residual: bool = True) -> ReducedBody:
-        """The striker as it is held, undeformed and at rest; ``residual`` says whether the modes left out yield."""
-
-        def found() -> ReducedBody:
-            rest = self.left_out if residual and self.modes.dimension else None
-            part = reduce_body(self.body, ((0, 1.0),), self.at[None], self.shape[None], rest)
-            return replace(part, bias=part.bias + self.push, held=int(self.hand is not None))
-
-        reduced: ReducedBody = self.known.found(("reduced", residual), found)
-        return reduced
+        return Remembered(REMEMBERED)
 
     @property
     def notes(self) -> tuple[str, ...]:
