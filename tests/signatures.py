@@ -75,7 +75,8 @@ def everything() -> dict[str, Callable[..., Any]]:
         seen.add(id(item))
         found[name] = item
         if inspect.isclass(item) and not issubclass(item, Exception):
-            for key in vars(item):
+            own = [each for each in reversed(item.__mro__) if each.__module__.startswith(fi.__name__)]
+            for key in dict.fromkeys(key for each in own for key in vars(each)):
                 inner = inspect.getattr_static(item, key)
                 if not key.startswith("_") and isinstance(inner, (classmethod, staticmethod, type(add))):
                     found[f"{name}.{key}"] = getattr(item, key)

@@ -1,5 +1,6 @@
 """Contact laws: the force between two bodies as a function of how far they are pressed together."""
 
+import inspect
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -151,9 +152,9 @@ class Contact(Numbers):
     @property
     def table(self) -> dict[str, Any]:
         """The table [contact] of a scene with this law."""
-        law = self.law
-        names = "stiffness", "exponent", *law.numbers, *(["loss"] if law.damped else [])
-        return {"kind": law.name, **{name: getattr(self, name) for name in names}}
+        taken = inspect.signature(getattr(Contact, self.law.name)).parameters
+        names = [name for name in taken if hasattr(self, name) and name != "gap"]
+        return {"kind": self.law.name, **{name: getattr(self, name) for name in names}}
 
     @property
     def numbers(self) -> Any:

@@ -104,18 +104,6 @@ def test_first_yield_is_told_in_one_way(told):
 
 
 @pytest.mark.parametrize("law", [
-    fi.Contact.power(1e6, 2.0, loss=0.1),
-    fi.Contact.layers(1e5, 1.2, depth=1e-3, hard_stiffness=1e9, loss=0.2),
-    fi.Contact.elastic_plastic(1e9, yield_approach=1e-4),
-    fi.Contact.felt(1e9, 2.5, hysteresis=0.4, relaxation=1e-3),
-])  # fmt: skip
-def test_a_scenes_table_makes_the_law_again(law):
-    table = dict(law.table)
-    kind = table.pop("kind")
-    assert getattr(fi.Contact, kind)(**table) == law
-
-
-@pytest.mark.parametrize("law", [
     fi.Contact.layers(1e5, 1.2, depth=2e-4, hard_stiffness=1e9),
     fi.Contact.elastic_plastic(1e9, yield_speed=0.1, mass=0.02),
 ])  # fmt: skip

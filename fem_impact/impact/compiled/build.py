@@ -100,14 +100,14 @@ def plain(kernel: Any) -> Any:
     """A kernel as plain Python, with all that it calls."""
     if not COMPILED:
         return kernel
-    package, _, module = kernel.__module__.rpartition(".")
-    copy = f"{package.rpartition('.')[0]}.{PLAIN}"  # as deep as this package, for imports of what stands before it
+    home = __name__.rpartition(".")[0]
+    copy = f"{home.rpartition('.')[0]}.{PLAIN}"  # as deep as this package, for imports of what stands before it
     if copy not in sys.modules:
         folder = Path(__file__).parent
         spec = util.spec_from_file_location(copy, folder / "__init__.py", submodule_search_locations=[str(folder)])
         assert spec is not None
         sys.modules[copy] = util.module_from_spec(spec)
-    return getattr(import_module(f"{copy}.{module}"), kernel.__name__)
+    return getattr(import_module(copy + kernel.__module__.removeprefix(home)), kernel.__name__)
 
 
 if COMPILED:

@@ -31,6 +31,7 @@ MARKS = {law.mark: law for law in LAWS if law.mark}
 # what it remembers
 NAMES = ("stiffness", "exponent", "loss", "compliance", "kind", *NUMBERS, "memory")
 LAW = np.dtype([(name, float) for name in NAMES])
+NOTHING = (0.0,) * (len(NAMES) - 3)  # of a power law, behind stiffness, exponent and loss
 Row: Any = partial(namedtuple, "Row")(NAMES)  # one contact of such an array, in Python
 
 
@@ -50,10 +51,10 @@ def law_of(contact: Any) -> Law:
 def row_of(contact: Any) -> Any:
     """The `Row` of a `Contact`: of the numbers of laws, those of its own if it is more than a power law."""
     law = law_of(contact)
-    own = law.numbers if law.acts(contact) else {}
-    kind = law.kind if own else POWER
-    first = contact.stiffness, contact.exponent, contact.loss, 0.0, kind
-    return Row(*first, *[getattr(contact, name) if name in own else 0.0 for name in NUMBERS], 0.0)
+    if not law.acts(contact):
+        return Row(contact.stiffness, contact.exponent, contact.loss, *NOTHING)
+    own = [getattr(contact, name) if name in law.numbers else 0.0 for name in NUMBERS]
+    return Row(contact.stiffness, contact.exponent, contact.loss, 0.0, law.kind, *own, 0.0)
 
 
 def columns(values: np.ndarray) -> np.ndarray:

@@ -49,7 +49,7 @@ class Pads(NamedTuple):
 
     rows: np.ndarray  # (n_pads, n_body) signed shapes of the body
     own: np.ndarray  # (n_pads, n_own) those of a stick, with what stands for the modes left out
-    laws: np.ndarray  # (n_pads,) see `law.spring_of`
+    laws: np.ndarray  # (n_pads,) of `law.LAW`
     offsets: np.ndarray  # (n_pads,) [m] approach at zero state
     motion: np.ndarray  # (n_own,) modal velocities of a stick per unit speed
     push: np.ndarray  # (n_own,) constant modal forces on a stick
@@ -85,7 +85,7 @@ class PlayState(NamedTuple):
     free_p: np.ndarray  # (n_modes,)
     bias: np.ndarray  # (n_modes,)
     rows: np.ndarray  # (n_sticks, n_modes)
-    law: np.ndarray  # (n_sticks,)
+    law: np.ndarray  # (n_sticks,) of `law.LAW`
     offset: np.ndarray  # (n_sticks,)
     slot: np.ndarray  # (n_sticks,) which part of the modes is this stick's
     pad: np.ndarray  # (n_sticks,) which point it strikes
