@@ -33,7 +33,7 @@ COUNTED = 1e-2  # [-] largest tolerance used: looser ones save no time and misco
 PER_PERIOD = 2.0  # [-] steps per period of the highest frequency in the centroid's band
 # [-] an error below this many times the accepted one cuts the step by sqrt(2) instead of 2: always 2 leaves 13 % of
 # stiff blows at 3e-5 undone instead of 8 %, always sqrt(2) a third of those with loss
-MILD = 8.0
+MILD = 3.0
 HEARD = 3.0  # [-] ringing left unresolved, over tolerance times force: only part of it becomes an error
 LENGTHS = (48, 192, 768, 3072)  # [-] kernel lengths in steps, tried in turn until the blow fits
 SLACK = 2.0  # [-] a touch or gap counts only above this many times tolerance times deepest approach
@@ -280,10 +280,12 @@ def _refined(engine: "_Engine", tolerance: float) -> tuple[np.ndarray, np.ndarra
     Neither are they of a blow too long for the longest kernel: shorter steps only make it longer.
     """
     n = engine.blows.n_cases
-    first = step = engine.first_step(tolerance)
-    finer = np.full(n, 2)  # [half-octaves]
+    first = engine.first_step(tolerance)
     todo = np.arange(n)
-    coarse = engine.run(todo, step - finer)
+    coarse = engine.run(todo, first - 2)
+    lossy, long = engine.blows.loss > 0.0, 4.0 * coarse[FOUND_STEPS] > LENGTHS[-1]
+    finer = np.where(lossy | long, 2, 4)  # [half-octaves]
+    step = first - 2 + finer
     error = np.full(n, np.nan)
     final = np.full_like(coarse, np.nan)
     for _ in range(REFINEMENTS):
