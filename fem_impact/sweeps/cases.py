@@ -285,7 +285,8 @@ def solve_all(
         return by_store(cases, store, partial(solve, workers=workers), watch)
     numbers = np.empty((len(cases.layers), cases.n_cases))
     texts: Texts = {}
-    size = block_size(cases.n_cases) if cases.lossy or cases.extra else LARGEST_BLOCK  # slow ones are told more often
+    often = cases.lossy or cases.extra  # slow ones are told more often
+    size = max(batches.FEW, block_size(cases.n_cases)) if often else LARGEST_BLOCK
     for start in range(0, cases.n_cases, size):
         stop = min(start + size, cases.n_cases)
         numbers[:, start:stop], new = solve(cases, start, stop, workers=workers)
