@@ -314,15 +314,9 @@ def _with_speed(cases: Cases, fewer: Cases, numbers: np.ndarray, failures: np.nd
 def _dataset(cases: Cases, numbers: np.ndarray, failures: np.ndarray, left_out: np.ndarray, own: Any) -> xarray.Dataset:
     """The map as a Dataset, with units on layers and axes; ``own`` is the model's error and what is not known of it."""
     dims = tuple(cases.axes)
-    data: dict[str, Any] = {}
-    for name, values in zip(cases.layers, numbers):
-        unit, meaning = LAYERS.get(name, ("", name))
-        attributes: dict[str, Any] = {"units": unit or "1", "long_name": meaning}
-        if name == "n_impacts":
-            values = np.where(np.isnan(values), -1, values).astype(np.int32)
-        if name == "centroid":
-            attributes["max_frequency"] = cases.band
-        data[name] = (dims, values.reshape(cases.shape), attributes)
+    data: dict[str, Any] = {
+        name: (dims, values.reshape(cases.shape), about) for name, (values, about) in cases.told(numbers).items()
+    }
     meaning = "expected error of the body's description; infinite where modes left out govern the contact"
     data["truncation"] = (dims, left_out, {"units": "1", "long_name": meaning})
     met = data["error"][1] + left_out <= cases.tolerance
