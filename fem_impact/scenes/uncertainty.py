@@ -3,8 +3,7 @@
 import math
 import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from concurrent.futures import ThreadPoolExecutor
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
@@ -17,14 +16,13 @@ from ..fe import plausible
 from ..fe.assembly import System, reassemble
 from ..fe.section import Beam, Elastic, Plate
 from ..impact.contact import Contact
-from ..impact.distance import distance
 from ..impact.striker import Striker
 from ..model.planner import Blow
 from ..model.target import CLOSE, FIRST_FLEXIBLE, Target
 from ..modes.modal import Damping, Modes
 from ..show import export, figures
 from ..sweeps import bodies, grid
-from ..sweeps.cases import LAYERS, Cases, few, solve_all
+from ..sweeps.cases import Cases, few, solve_all, try_each
 from ..sweeps.cells import ALIASES, AXES, LAW, REACH, Case
 from ..sweeps.inputs import Input, crossed, drawn, mixing, read, shares
 from ..sweeps.spreads import DOUBLE, QUANTITIES, Checks, Spread
@@ -150,7 +148,7 @@ def spread(
     numbers, texts = solve_all(rough, workers, client, store, watch)
     checks, rescaled = _checked(exact, numbers, workers), asked.rescaled(base)
     notes = plausible.together(base.modes.notes, base.striker.notes)
-    table = _table(inputs, values, rough.layers, numbers, texts, d + 2 if groups else 1, base, band)
+    table = _table(inputs, values, rough, numbers, texts, d + 2 if groups else 1)
     title = told.title or told.path.name if told is not None else ""
     return Spread(inputs, table, limit, groups, mixer, seed, checks=checks, rescaled=rescaled, title=title, notes=notes,
                   why_no_shares=why)  # fmt: skip
@@ -374,7 +372,7 @@ class _SpreadAsked:
                 )  # fmt: skip
                 try:
                     one, two = (alone.row(alone.strike(case)) for case in (base.with_values(changes), other))
-                    off = max(_differences(one, two).values()) if one[0] == two[0] else math.inf
+                    off = max(alone.apart(one, two).values()) if one[0] == two[0] else math.inf
                 except check.SimulationError:
                     off = math.inf
                 found[each.name] = max(found[each.name], off)
@@ -421,13 +419,7 @@ def _checked(exact: Cases, numbers: np.ndarray, workers: int | None) -> Checks:
     """Strike a few blows again one by one, with the values they really have."""
     some = [int(i) for i in np.unique(np.linspace(0, exact.n_cases - 1, CHECKED).astype(int))]
 
-    def again(index: int) -> Any:
-        with suppress(check.SimulationError):
-            return exact.blow(index)
-        return None
-
-    with ThreadPoolExecutor(workers) as pool:
-        hits = {i: hit for i, hit in zip(some, pool.map(again, some)) if hit is not None}
+    hits = {i: hit for i, (hit, _) in zip(some, try_each(some, exact.blow, workers)) if hit is not None}
     apart: dict[str, float] = {}
     others = 0
     for i, hit in hits.items():
@@ -435,7 +427,7 @@ def _checked(exact: Cases, numbers: np.ndarray, workers: int | None) -> Checks:
         if row[0] != numbers[0, i]:
             others += 1
             continue
-        for name, value in _differences(row, numbers[:, i]).items():
+        for name, value in exact.apart(row, numbers[:, i]).items():
             apart[name] = max(apart.get(name, 0.0), value)
     unknown = {each.name: None for hit in hits.values() for each in hit.assumptions if not each.known}
     return Checks(
@@ -445,35 +437,21 @@ def _checked(exact: Cases, numbers: np.ndarray, workers: int | None) -> Checks:
     )  # fmt: skip
 
 
-def _differences(one: np.ndarray, two: np.ndarray) -> dict[str, float]:
-    """Differences of two blows, relative to the first where they are relative."""
-    first, second = (
-        {name: x for name, x in zip(LAYERS, row) if name not in ("n_impacts", "error")} for row in (one, two)
-    )
-    return distance(second, first)
-
-
 def _table(
     inputs: Sequence[Input],
     values: np.ndarray,
-    layers: Sequence[str],
+    cases: Cases,
     numbers: np.ndarray,
     texts: Texts,
     n_parts: int,
-    base: Case,
-    band: float | None,
 ) -> xarray.Dataset:
     """All blows as a Dataset along one dimension."""
     data: dict[str, Any] = {}
+    power = cases.base.contact.exponent
     for each, column in zip(inputs, values.T):
-        unit = AXES.get(ALIASES.get(each.name, each.name), ("",))[0].replace("exponent", f"{base.contact.exponent:g}")
+        unit = AXES.get(ALIASES.get(each.name, each.name), ("",))[0].replace("exponent", f"{power:g}")
         data[each.name] = ("blow", column, {"units": unit or "1", "distribution": each.said})
-    for name, row in zip(layers, numbers):
-        unit, meaning = LAYERS[name]
-        about: dict[str, Any] = {"units": unit or "1", "long_name": meaning}
-        if name == "centroid":
-            about["max_frequency"] = band
-        data[name] = ("blow", np.where(np.isnan(row), -1, row).astype(np.int32) if name == "n_impacts" else row, about)
+    data |= {name: ("blow", *told) for name, told in cases.told(numbers).items()}
     counts = data["n_impacts"][1]
     data[DOUBLE] = ("blow", (counts > 1).astype(np.int8), {"units": "1", "long_name": QUANTITIES[DOUBLE][1]})
     part = np.arange(len(counts)) % n_parts

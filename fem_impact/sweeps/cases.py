@@ -3,17 +3,18 @@
 import logging
 import math
 import os
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field, replace
 from functools import cached_property, partial
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 
 from .._base.check import SimulationError
 from .._base.rounding import ROUNDING
 from ..impact.collision import strike
+from ..impact.distance import distance
 from ..impact.response import Response
 from ..model.audit import audited
 from ..modes.modal import Modes
@@ -22,6 +23,7 @@ from .cells import ALONE, FAMILY_AXES, LOSSY, Case
 from .store import LARGEST_BLOCK, Texts, Watch, block_size, by_cluster, by_store
 
 LOG = logging.getLogger(__name__)
+Result = TypeVar("Result")
 LAYERS: dict[str, tuple[str, str]] = {  # name: unit, what it is
     "n_impacts": ("", "number of separate contacts"),
     "contact_time": ("s", "total contact time"),
@@ -120,6 +122,27 @@ class Cases:
         row = [hit.n_impacts, hit.contact_time, hit.restitution, hit.impulse, hit.peak_force, hit.error.step]
         row += [hit.spectral_centroid(self.band)] if self.band is not None else []
         return np.array(row + [function(hit) for function in self.extra.values()], float)
+
+    def apart(self, one: np.ndarray, two: np.ndarray) -> dict[str, Any]:
+        """Differences of two results (n_layers, ...) in each quantity, relative to the first where these are."""
+        first, second = (
+            {name: x for name, x in zip(self.layers, rows) if name in LAYERS and name not in ("n_impacts", "error")}
+            for rows in (one, two)
+        )
+        return distance(second, first)
+
+    def told(self, numbers: np.ndarray) -> dict[str, tuple[np.ndarray, dict[str, Any]]]:
+        """Values and attributes of each layer of a result (n_layers, ...); n_impacts is -1 where a blow failed."""
+        found = {}
+        for name, values in zip(self.layers, numbers):
+            unit, meaning = LAYERS.get(name, ("", name))
+            about: dict[str, Any] = {"units": unit or "1", "long_name": meaning}
+            if name == "n_impacts":
+                values = np.where(np.isnan(values), -1, values).astype(np.int32)
+            if name == "centroid":
+                about["max_frequency"] = self.band
+            found[name] = values, about
+        return found
 
     def scene(self) -> dict[str, Any]:
         """The blow that all cases share, as plain numbers, and which cells these are if not all."""
@@ -285,7 +308,8 @@ def solve_all(
         return by_store(cases, store, partial(solve, workers=workers), watch)
     numbers = np.empty((len(cases.layers), cases.n_cases))
     texts: Texts = {}
-    size = block_size(cases.n_cases) if cases.lossy or cases.extra else LARGEST_BLOCK  # slow ones are told more often
+    often = cases.lossy or cases.extra  # slow ones are told more often
+    size = max(batches.FEW, block_size(cases.n_cases)) if often else LARGEST_BLOCK
     for start in range(0, cases.n_cases, size):
         stop = min(start + size, cases.n_cases)
         numbers[:, start:stop], new = solve(cases, start, stop, workers=workers)
@@ -328,26 +352,29 @@ def solve(cases: Cases, start: int, stop: int, *, workers: int | None = None) ->
         for row, name in enumerate(names):
             numbers[row, cells] = getattr(found, name) * r ** POWERS.get(name, 0.0)
         quick[cells] = found.done & ~(np.isnan(found.centroid) & (cases.band is not None))
-    return numbers, _strike_alone(cases, start, np.flatnonzero(~quick), numbers, workers)
+    texts: Texts = {}
+    alone = np.flatnonzero(~quick)
+    for i, (layers, text) in zip(alone, try_each(start + alone, lambda cell: cases.row(cases.blow(cell)), workers)):
+        numbers[:, i] = math.nan if layers is None else layers
+        if text:
+            texts[start + int(i)] = text
+    return numbers, texts
 
 
-def _strike_alone(cases: Cases, start: int, cells: np.ndarray, numbers: np.ndarray, workers: int | None) -> Texts:
-    """Strike cases of a block one by one; fill ``numbers`` (n_layers, n_cells) and return the error texts."""
+def try_each(
+    cells: Iterable[int], act: Callable[[int], Result], workers: int | None
+) -> list[tuple[Result | None, str]]:
+    """What a function finds of some cases, in threads; None and the error text where it fails."""
 
-    def row(index: int) -> tuple[np.ndarray | float, str]:
+    def tried(cell: int) -> tuple[Result | None, str]:
         try:
-            return cases.row(cases.blow(index)), ""
+            return act(cell), ""
         except SimulationError as error:
-            return math.nan, str(error)
+            return None, str(error)
 
-    texts = {}
     with ThreadPoolExecutor(workers or os.cpu_count() or 1) as pool:
-        rows = [pool.submit(row, start + int(i)) for i in cells]
+        found = [pool.submit(tried, int(cell)) for cell in cells]
         try:
-            for i, found in zip(cells, rows):
-                numbers[:, i], text = found.result()
-                if text:
-                    texts[start + int(i)] = text
+            return [one.result() for one in found]
         finally:
             pool.shutdown(cancel_futures=True)
-    return texts

@@ -1,7 +1,5 @@
 """How far the cells of a map may be off besides their time steps: the body's description, and the model itself."""
 
-import os
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from typing import Any
 
@@ -10,11 +8,9 @@ import numpy as np
 from .._base.check import SimulationError
 from .._base.rounding import ROUNDING
 from ..impact import accuracy
-from ..impact.collision import strike
 from ..impact.contact import wall_time
-from ..impact.distance import distance
 from ..impact.what_if import RESOLVABLE
-from .cases import Cases, solve
+from .cases import Cases, solve, try_each
 from .cells import RATED
 
 # [-] cells struck again for the error of vectors, in a batch or alone: some 0.1 and 0.2 s
@@ -110,35 +106,17 @@ def described(cases: Cases, numbers: np.ndarray, workers: int | None = None) -> 
     few = replace(cases, axes=axes, band=None, kernels={})
     names = [cases.layers.index(name) for name in few.layers]
     mine = numbers.reshape(-1, *cases.shape)[np.ix_(np.array(names), *chosen)]
-    total = np.zeros(few.shape)
+    total, count = np.zeros(few.shape), few.layers.index("n_impacts")
     before = mine
     for cause in causes:
         other, _ = solve(replace(few, base=base.poorer(cause), kernels={}), 0, few.n_cases, workers=workers)
         before, better = other.reshape(mine.shape), before
-        total += _largest_difference(few.layers, better, before)
-    several = np.flatnonzero((mine[few.layers.index("n_impacts")] > 1) | unstated)
+        change = np.fmax.reduce(list(few.apart(better, before).values()))
+        total += np.where(better[count] == before[count], change, 1.0)
+    several = np.flatnonzero((mine[count] > 1) | unstated)
     several = several[:: max(1, -(-len(several) // DOUBTED[False]))]
-
-    def alone(index: int) -> float:
-        """Error [-] of the body's vectors and mesh in one cell struck alone; 0 if that fails."""
-        case = few.case(index)
-        try:
-            error = strike(
-                case.modes, case.striker, case.contact, at=case.at, speed=case.speed, tolerance=cases.tolerance
-            ).error
-        except SimulationError:
-            return 0.0
-        return error.truncation + error.mesh
-
-    with ThreadPoolExecutor(workers or os.cpu_count() or 1) as pool:
-        total.flat[several] = np.maximum(total.flat[several], list(pool.map(alone, several)))
+    for i, (hit, _) in zip(several, try_each(several, few.blow, workers)):
+        if hit is not None:
+            total.flat[i] = max(total.flat[i], hit.error.truncation + hit.error.mesh)
     nearest = [np.abs(np.arange(n)[:, None] - some).argmin(axis=1) for n, some in zip(cases.shape, chosen)]
     return total[np.ix_(*nearest)]
-
-
-def _largest_difference(names: list[str], one: np.ndarray, other: np.ndarray) -> np.ndarray:
-    """Largest difference of two maps in the quantities under tolerance; 1 if their impacts differ in number."""
-    mine, its = dict(zip(names, one)), dict(zip(names, other))
-    judged = ("restitution", "impulse", "contact_time", "peak_force")
-    apart = distance({name: its[name] for name in judged}, {name: mine[name] for name in judged})
-    return np.where(mine["n_impacts"] == its["n_impacts"], np.fmax.reduce(list(apart.values())), 1.0)

@@ -3,7 +3,6 @@
 import json
 import math
 import os
-import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -30,8 +29,7 @@ from .store import Texts, Watch, not_free
 
 TOLERANCE = 1e-3  # [-] default error limit of a map
 MOST_CELLS = 10**8  # [-] default limit of a map: half an hour to two hours of work, 8 GB
-# [s] per blow, in a batch or alone, that foretell the time; the slower plates of studies/benchmarks/map_speed.py. Does
-# not change the result
+# [s] per blow, in a batch or alone, that foretell the time: the plates of studies/benchmarks/map_speed.py on one core
 SECONDS = {True: 1e-5, False: 2e-3}
 # [s] a map with default axes that takes less is computed in all its cells: refining it would gain nothing to notice
 DENSE = 1.0
@@ -84,29 +82,23 @@ class Job:
         return {name for name in os.listdir(self.store) if not name.startswith(PARTIAL)}
 
     def refined(self, cases: Cases) -> refined.Refined | None:
-        """Compute a map where its answer changes; None if all cells are predicted to be quick, unless asked for."""
+        """Compute a map where its answer changes; None if it has few cells, unless asked for."""
         held = self._held()
         if "zarr.json" in held and not self.refine:
             return None
-        if self.store is not None and held and "round-1" not in held:
+        if self.store is not None and held and "round-0" not in held:
             raise not_free(self.store)
-        first = replace(cases, chosen=np.unique(refined.first_blocks(cases.shape).cells(cases.shape[1])))
-        here = replace(self, store=None, watch=None)
-        here.solved(replace(cases, chosen=first.cells(0, 1)))  # compiles
-        began = time.process_time()
-        start = here.solved(first)
-        seconds = (time.process_time() - began) / first.n_cases * cases.n_cases / (self.workers or os.cpu_count() or 1)
-        if not self.refine and "round-1" not in held and self.client is None:
-            some = seconds > DENSE
+        if not self.refine and not held and self.client is None:
+            seconds = cases.n_cases * SECONDS[cases.quick]  # on any machine, however busy: the answer must be the same
             if self.tell is not None:
-                done = "only those where the answer changes are computed" if some else "all are computed"
+                done = "only those where the answer changes are computed" if seconds > DENSE else "all are computed"
                 self.tell(f"all {cases.n_cases} cells are expected to take {seconds:.2g} s: {done}")
-            if not some:
+            if seconds <= DENSE:
                 return None
 
         def compute(cells: np.ndarray, turn: str) -> tuple[np.ndarray, Texts]:
-            """Cells of one round; those of the first are known."""
-            return start if turn == "round-0" else self.solved(replace(cases, chosen=cells), turn)
+            """Cells of one round."""
+            return self.solved(replace(cases, chosen=cells), turn)
 
         def settled(done: int) -> None:
             if self.watch is not None:
@@ -192,8 +184,8 @@ def sweep(
         struck alone; fewer if further axes would make more cells than two such axes have.
     refine : bool, optional
         Whether to compute only cells where the answer changes and to interpolate the others to within the tolerance,
-        in a map with two axes. By default only if a range has no count and all cells would take more than about a
-        second, predicted from the first few.
+        in a map with two axes. By default only if a range has no count and there are more than 100 000 cells, or more
+        than 500 of which each must be struck alone or loses energy: all of these would take about a second.
 
     Returns
     -------
@@ -322,15 +314,9 @@ def _with_speed(cases: Cases, fewer: Cases, numbers: np.ndarray, failures: np.nd
 def _dataset(cases: Cases, numbers: np.ndarray, failures: np.ndarray, left_out: np.ndarray, own: Any) -> xarray.Dataset:
     """The map as a Dataset, with units on layers and axes; ``own`` is the model's error and what is not known of it."""
     dims = tuple(cases.axes)
-    data: dict[str, Any] = {}
-    for name, values in zip(cases.layers, numbers):
-        unit, meaning = LAYERS.get(name, ("", name))
-        attributes: dict[str, Any] = {"units": unit or "1", "long_name": meaning}
-        if name == "n_impacts":
-            values = np.where(np.isnan(values), -1, values).astype(np.int32)
-        if name == "centroid":
-            attributes["max_frequency"] = cases.band
-        data[name] = (dims, values.reshape(cases.shape), attributes)
+    data: dict[str, Any] = {
+        name: (dims, values.reshape(cases.shape), about) for name, (values, about) in cases.told(numbers).items()
+    }
     meaning = "expected error of the body's description; infinite where modes left out govern the contact"
     data["truncation"] = (dims, left_out, {"units": "1", "long_name": meaning})
     met = data["error"][1] + left_out <= cases.tolerance
