@@ -10,7 +10,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 LEVELS = (0.05, 0.95)  # [-] ends of a band: nine tenths lie between them
-SEED = 0  # of the errors drawn
+SEED, DRAWS = 0, 20_000  # of the errors drawn, and how many at least
 
 
 @dataclass(frozen=True)
@@ -34,9 +34,10 @@ class Predicted:
     def bands(self, errors: np.ndarray) -> np.ndarray:
         """Ends of the bands, (2, n_points), for measurements with these errors, (n_points,)."""
         rng = np.random.default_rng(SEED)
-        shape = self.values.shape
+        values = np.tile(self.values, (-(-DRAWS // len(self.values)), 1))
+        shape = values.shape
         off = rng.uniform(-self.computation, self.computation, shape) + self.model * rng.standard_normal(shape)
-        read = self.values * (1.0 + off) + errors / 1.645 * rng.standard_normal(shape)
+        read = values * (1.0 + off) + errors / 1.645 * rng.standard_normal(shape)
         return np.quantile(read, LEVELS, axis=0)
 
 
