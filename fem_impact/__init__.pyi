@@ -9,6 +9,7 @@ from .fe.section import Beam as Beam
 from .fe.section import Elastic as Elastic
 from .fe.section import Material as Material
 from .fe.section import Plate as Plate
+from .fe.section import yield_strength as yield_strength
 from .impact import spectra as spectra
 from .impact import threshold as threshold
 from .impact.collision import Touch as Touch
@@ -32,6 +33,7 @@ from .modes.modal import rayleigh as rayleigh
 from .modes.ritz import ritz_modes as ritz_modes
 from .pages import explore as explore
 from .pages import report as report
+from .scenes.band import band as band
 from .scenes.results import load_response as load_response
 from .scenes.scene import Scene as Scene
 from .scenes.scene import load_scene as load_scene

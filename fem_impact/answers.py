@@ -42,6 +42,7 @@ KEYS: dict[str, Keys] = {
         "sounds": ("array?", "of each sound file, place, full_scale, unit, levels [dB] and their reference"),
         "sound": ("object?", "the first of the sounds at a point"),
         "radiated": ("object?", "the first of the sounds at a listener"),
+        "band": ("object?", "with --band: inputs, blows, and of each quantity value, errors, low, high and ends"),
         "verified": ("object?", "with --verify: differences [-] from a finer run"),
     },
     "plan": {

@@ -140,6 +140,8 @@ COMMANDS = {
         *MODEL,
         _flag("--strict", "write nothing if the tolerance is missed, and exit with 1 instead of 3"),
         _flag("--verify", "strike again with a finer model and print the differences"),
+        _flag("--band", "also strike with numbers as well as the scene says they are known, { value, about }, and "
+              "print what they leave open"),
         _flag("--pictures", "write 3-D pictures of the mode shapes and the wave, as PNG and GIF"),
         _flag("--vtk", "write motion.pvd, the motion for ParaView and pyvista"),
         _option("--listener", ("X", "Y", "Z"), "write radiated.wav, the sound the body radiates to this point [m]; Z "

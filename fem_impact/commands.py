@@ -71,6 +71,10 @@ def strike(options: argparse.Namespace) -> Answer:
     scene = fi.load_scene(options.scene)
     if options.listener is not None:
         scene = scene.heard_from(*options.listener)
+    if options.band:
+        from .scenes import band
+
+        band.check_known(scene)
     if scene.stroke:
         return _strike_in_turn(options, scene)
     folder, display = _folder(options), _display(options, tells=True)
@@ -85,8 +89,12 @@ def strike(options: argparse.Namespace) -> Answer:
         stages = Stages(display)
         data = _write(staging, scene, run, options, stages, painter)
     keep.unlink(missing_ok=True)
+    found = _band(scene, run.response, display) if options.band else None
     seconds = {**run.seconds, **stages.seconds, "total": time.perf_counter() - began}
     said = [_title(scene), run.response.summary()]
+    if found is not None:
+        data |= {"band": found.data()}
+        said.append(found.summary().splitlines())
     if not run.rings:
         why = run.plan.reasons[0]
         said.append(f"Model: {why}; no modes and no sound (use --target modal or --quantity sound=5000)")
@@ -98,6 +106,14 @@ def strike(options: argparse.Namespace) -> Answer:
     said += heard(data.get("sounds", ()))
     said.append("Time: " + ", ".join(f"{name} {value:.2f} s" for name, value in seconds.items()))
     return answer(data, *said, folder=folder, files=data["files"], missed=not run.response.tolerance_met)
+
+
+def _band(scene: Any, response: Any, display: Display) -> Any:
+    """What the inputs leave open."""
+    from .scenes import band  # imported only when needed
+
+    with display("blows"):
+        return band.around(scene, response, watch=partial(display.report, "blows"))
 
 
 def _announce(options: argparse.Namespace, display: Display, verify: bool, files: bool, plan: Any) -> None:

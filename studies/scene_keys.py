@@ -31,6 +31,15 @@ From Python, `fi.load_scene(path)` reads a scene, and `.plan()`, `.strike()` and
 - tables `{ x = [...], y = [...], values = [[...], ...] }` (no `y` on a beam) with one row of values for each x, linear
   in between and constant beyond; or
 - cases `{ cases = [{ value, centre, radius }, { value, from, to }], otherwise }`, of which the first that holds counts.
+
+## Numbers that are known only so well
+
+Any single number of `mesh`, `material`, `section`, `target`, `striker`, `contact` and `strike` may say how well it is
+known; the scene strikes with its `value`, and `fem-impact strike SCENE --band` or `fi.band` tells what the rest leaves
+open:
+
+- `{ value = 70e9, about = 0.03 }`: nine tenths of what it may be lie within 3 % (lognormal, for numbers above zero); or
+- `{ value = 70e9, low = 68e9, high = 71e9 }`: anything between the two, alike (uniform).
 """
 
 
@@ -40,6 +49,8 @@ def words(form):
         return "a table with a kind"
     if "title" in form:
         return form["title"].replace("a size that varies", "a [size that varies](#sizes-that-vary)")
+    if "anyOf" in form:  # a number, or how well it is known
+        return words(form["anyOf"][0])
     if "enum" in form:
         return ", ".join(f'`"{each}"`' for each in form["enum"])
     kind = {"integer": "whole number", "boolean": "`true` or `false`", "string": "text"}

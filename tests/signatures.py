@@ -116,6 +116,8 @@ def things() -> dict[str, Any]:
     scene = fi.load_scene(path)
     several = folder / "sequence.toml"
     several.write_text(f"{QUICK}[[stroke]]\nwhen = 0.0\n")
+    known = folder / "known.toml"
+    known.write_text(QUICK.replace("mass = 0.03", "mass = { value = 0.03, about = 0.1 }"))
     uff = folder / "modes.uff"
     fi.export.write_uff(uff, modes)
     mesh = folder / "plate.msh"
@@ -136,7 +138,8 @@ def things() -> dict[str, Any]:
         "metal": metal, "plate": plate, "beam": beam, "square": square, "modes": modes, "striker": striker, "law": law,
         "sphere": fi.Striker.sphere(metal, 0.01), "free": fi.Modes.rigid(1.0), "folder": folder, "path": path,
         "system": fi.assemble(square, plate, {"boundary": "hinged"}), "scene": scene, "uff": uff, "mesh": mesh,
-        "sequence": fi.load_scene(several), "tone": fi.sound.Sound(np.ones(100), 8000, 1.0),
+        "sequence": fi.load_scene(several), "known": fi.load_scene(known),
+        "tone": fi.sound.Sound(np.ones(100), 8000, 1.0),
         "bar hit": fi.strike(
             fi.analytic.beam(0.4, ends=("free", "free"), mass=0.2, first_frequency=100.0, n_modes=12), striker, law,
             at=0.15, speed=1.0, tolerance=1e-2,
@@ -292,11 +295,13 @@ def stated() -> dict[str, dict[str, Any]]:
             "over": {"mass": {"from": 0.02, "to": 0.03}, "speed": {"from": 1.0, "to": 2.0, "scale": "log"}},
             "tolerance": 1e-1, "max_frequency": 1e3, "workers": 1, "cells": 3, "refine": True, "borders": True},
         "read_borders": {"table": t["map"]},
+        "yield_strength": {"hardness": 300.0}, "Striker.dropped": {"self": t["sphere"], "height": 0.3},
         "spread": {"scene": t["scene"], "vary": {"striker.mass": ("lognormal", 0.03, 0.1)}, "n": 8, "sobol": False,
             "seed": 1, "tolerance": 1e-1, "max_frequency": 1e3, "workers": 1, "max_blows": 100.0},
         "spread body": {"scene": t["modes"], "vary": {"mass": "lognormal(0.03, 0.1)", "speed": "uniform(1, 2)"},
             "n": 8, "striker": t["striker"], "contact": t["law"], "at": at, "speed": 1.0, "damping_ratio": 0.01,
             "correlation": {("mass", "speed"): 0.5}, "tolerance": 1e-1, "max_blows": 100.0},
+        "band": {"scene": t["known"], "n": 8, "seed": 1, "tolerance": 1e-1},
         "design": {"objects": t["path"], "wanted": {"contact_time": (1e-6, 1.0)},
             "free": {"striker.mass": (0.02, 0.05)}, "least": "striker.mass", "start": {"striker.mass": 0.03},
             "tolerance": 1e-2, "n_modes": 5},

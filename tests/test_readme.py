@@ -80,9 +80,18 @@ def test_python_example_of_uncertain_inputs_runs(monkeypatch, tmp_path, capsys):
     assert names["found"].n_failed == 0 and (tmp_path / "spread.png").is_file()
 
 
-def test_python_example_of_a_design_runs(capsys):
+@pytest.mark.slow
+def test_python_example_of_a_scene_as_known_runs(monkeypatch, capsys):
+    monkeypatch.chdir(ROOT)
     names = {"fi": fi}
     exec(compile(blocks(GUIDE, "python")[3], "guide.md", "exec"), names)
+    assert "inputs leave open" in capsys.readouterr().out
+    assert names["known"]["restitution"].mostly == "section.thickness"
+
+
+def test_python_example_of_a_design_runs(capsys):
+    names = {"fi": fi}
+    exec(compile(blocks(GUIDE, "python")[4], "guide.md", "exec"), names)
     assert "design found" in capsys.readouterr().out
     assert abs(names["found"].verify().values["mode1.frequency"] / 440.0 - 1.0) < 1e-3  # its tolerance
 
@@ -91,7 +100,7 @@ def test_python_example_of_a_design_runs(capsys):
 def test_python_example_of_a_fit_runs(monkeypatch, capsys):
     monkeypatch.chdir(ROOT)
     names = {"fi": fi}
-    exec(compile(blocks(GUIDE, "python")[4], "guide.md", "exec"), names)
+    exec(compile(blocks(GUIDE, "python")[5], "guide.md", "exec"), names)
     assert "4 taps explained to 2.5 % rms" in capsys.readouterr().out
     low, high = names["found"].interval("contact.exponent")
     assert 1.5 < low < high < 1.9

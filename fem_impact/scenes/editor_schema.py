@@ -9,6 +9,12 @@ from ..impact.striker import Hand
 from . import keys
 from .schema import MAKERS, NESTED, OF_TARGET, REPEATED, REQUIRED, SUPPLIED
 
+# How well a number is known, see `known`; any number of a table but [map], [observe] and [[stroke]] may be one
+INTERVAL = (
+    keys.table({"value": keys.POSITIVE, "about": keys.POSITIVE}, ("value", "about")),
+    keys.table(dict.fromkeys(("value", "low", "high"), keys.NUMBER), ("value", "low", "high")),
+)
+KNOWN = ("mesh", "material", "section", "target", "striker", "contact", "strike")
 DRAFT = "http://json-schema.org/draft-07/schema#"  # what taplo and VS Code read
 
 
@@ -72,4 +78,9 @@ def _keys(table: str, kind: str, maker: Callable[..., Any]) -> dict[str, Any]:
 def _key(table: str, kind: str, name: str, default: Any) -> dict[str, Any]:
     """The schema of one key, with its default."""
     found = _keys(name, "", Hand) if name == "hand" else keys.form(table, kind, name)
+    if table in KNOWN and found.get("type") == "number":
+        words = found.pop("description")
+        found = {"description": words, "anyOf": [found, *INTERVAL]}
+    elif table in KNOWN and any(each.get("type") == "number" for each in found.get("anyOf", ())):
+        found = found | {"anyOf": [*found["anyOf"], *INTERVAL]}
     return found | ({"default": default} if isinstance(default, (float, int, str)) else {})

@@ -3,7 +3,7 @@
 import shutil
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -26,7 +26,7 @@ from ..model.planner import Blow, Plan, Run
 from ..model.playing import Strokes
 from ..model.target import FIRST_LOOK, Stages, Target, Watch
 from ..modes.modal import Modes
-from . import sequence
+from . import known, sequence
 from .schema import (
     MAKERS,
     NESTED,
@@ -65,6 +65,7 @@ class Scene(check.Brief):
     observe: Part | None = None
     map: Part | None = None
     stroke: tuple[Part, ...] = ()  # blows one after another, for `sequence.play`; [strike] says what they share
+    known: Mapping[str, Any] = field(default_factory=dict)  # table.key -> distribution of a number with an interval
 
     def strike(self, *, strict: bool = False, **changes: Any) -> Response:
         """Build everything and strike.
@@ -275,7 +276,8 @@ class Scene(check.Brief):
                 raise ValueError(f"values must name numbers in tables of the scene, got {check.shown(name)}")
             table[key] = check.number(f"values[{check.shown(name)}]", value)
         try:
-            return scene_of(tables, self.path, folder=Path())
+            made = scene_of(tables, self.path, folder=Path())
+            return replace(made, known={name: how for name, how in self.known.items() if name not in values})
         except ValueError as error:
             raise ValueError(f"values must be numbers of the scene: {error}") from None
 
@@ -485,8 +487,15 @@ def scene_of(tables: Mapping[str, Any], path: Path, *, folder: Path) -> Scene:
         if name not in tables:
             raise fault(path, f"[{name}] is missing")
     strokes = read_strokes(path, tables.pop(REPEATED, []), folder)
+    intervals: dict[str, Any] = {}
+    for name, table in tables.items():
+        try:
+            tables[name], found = known.taken(name, table)
+        except ValueError as error:
+            raise fault(path, f"[{name}] {error}") from None
+        intervals |= found
     parts = {name: read_part(path, name, table, folder) for name, table in tables.items()}
-    scene = Scene(path, title, blow=parts.pop("strike"), stroke=strokes, **parts)
+    scene = Scene(path, title, blow=parts.pop("strike"), stroke=strokes, known=intervals, **parts)
     _check_whole(scene)
     return scene
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from fem_impact.fe.section import Beam, Material, Plate
+from fem_impact.fe.section import Beam, Material, Plate, yield_strength
 
 STEEL = Material(E=210e9, nu=0.3, rho=7850.0)
 POINT = np.zeros((1, 2))
@@ -68,3 +68,9 @@ def test_a_yield_strength_may_be_stated():
     assert Material.orthotropic(**wood, yield_strength=5e6).yield_strength == 5e6
     with pytest.raises(ValueError, match="yield_strength must be positive, got -1 Pa"):
         Material(E=210e9, nu=0.3, rho=7850.0, yield_strength=-1.0)
+
+
+def test_yield_strength_is_that_of_a_dent_of_the_pyramid():
+    """Vickers' number is over the slanted faces of a pyramid of 136 degrees between them; here of 120 HV."""
+    pressure = 120.0 * 9.80665e6 * (2.0 / (2.0 * np.sin(np.radians(68.0))))
+    assert yield_strength(120.0) == pytest.approx(pressure / 2.8, rel=1e-12)

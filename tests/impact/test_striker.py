@@ -226,3 +226,21 @@ def test_a_contact_is_resolved_though_the_body_swings_more_slowly_than_the_hand(
     steps = [np.count_nonzero(hit.history.steps[:, 1] < 0.2 * first.duration) for hit in (one, other)]
     assert 0.5 < steps[1] / steps[0] < 2.0
     assert other.error.truncation < 10.0 * one.error.truncation + 1e-3
+
+
+def test_a_dropped_ball_has_the_energy_of_its_height():
+    ball = fi.Striker.sphere(fi.Material(E=210e9, nu=0.3, rho=7850.0), radius=5e-3)
+    assert 0.5 * ball.dropped(0.3) ** 2 == pytest.approx(9.80665 * 0.3, rel=1e-12)
+    assert ball.dropped(1.2) == pytest.approx(2.0 * ball.dropped(0.3), rel=1e-12)
+    bar = fi.analytic.beam(0.2, ends=("free", "free"), mass=0.1, first_frequency=2e3, n_modes=4)
+    assert fi.Striker.flexible(bar, at=[0.0]).dropped(0.3) == ball.dropped(0.3)
+
+
+@pytest.mark.parametrize(
+    "striker",
+    [fi.Striker.stick(mass=0.1, first_frequency=1e3), fi.Striker.rigid(0.1).held(fi.Hand(stiffness=100.0))],
+    ids=["hinged", "held"],
+)
+def test_what_is_held_does_not_fall(striker):
+    with pytest.raises(ValueError, match="striker must"):
+        striker.dropped(0.3)

@@ -1,0 +1,188 @@
+"""A blow as well as its inputs are known: beside the errors of computation and model, what the inputs leave open."""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from scipy import stats
+
+from .._base import check, markup
+from ..impact.response import Response
+from ..sweeps.inputs import drawn, read, shares
+from .scene import Scene, load_scene
+from .uncertainty import MOST_BLOWS, spread
+
+BLOWS = 1024  # [-] where one body serves all blows: the ends of a band are then good to a tenth of its width
+ANEW = 48  # [-] where each blow needs a body of its own: two of them lie beyond each end
+ENDS = (0.05, 0.95)  # [-] nine tenths of all blows lie between them
+NAMES = {name: name for name in ("n_impacts", "contact_time", "restitution", "impulse")} | {"force": "peak_force"}
+
+
+@dataclass(frozen=True)
+class Quantity:
+    """One quantity of a blow and how well it is known."""
+
+    name: str
+    value: float  # in SI units, with the values of the scene
+    computation: float | None  # [-] estimated error, as in `Response.trust`
+    model: float  # [-] as far as it is known
+    unknown: tuple[str, ...]  # assumptions whose effect is not known and may matter
+    low: float  # what the inputs leave open: nine tenths of all blows lie between low and high
+    high: float
+    mostly: str  # the input it depends on most, "" if on none by itself
+
+    @property
+    def ends(self) -> tuple[float, float]:
+        """Low and high, further apart by the errors of the computation and, where it is known, of the model."""
+        size = 1.0 if self.name == "restitution" else abs(self.value)
+        error = size * ((self.computation or 0.0) + self.model)
+        return self.low - error, self.high + error
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Band(check.Brief):
+    """A blow as well as its inputs are known; from `fem_impact.band`."""
+
+    hit: Response  # with the values of the scene
+    inputs: Mapping[str, str]  # name -> distribution
+    values: Mapping[str, np.ndarray]  # inputs and quantities of the blows drawn at random, (n_blows,)
+    failed: int  # blows without a result
+    anew: bool  # whether every blow had a body of its own
+
+    @cached_property
+    def quantities(self) -> tuple[Quantity, ...]:
+        """Every quantity that the scene asks for, but sound and spectra."""
+        found = []
+        for each in self.hit.trust:
+            name = NAMES.get(each.quantity)
+            if name is None or each.value is None:
+                continue
+            low, high = np.quantile(self.values[name], ENDS)
+            found.append(
+                Quantity(
+                    name, each.value, each.computation, each.known, each.unknown, float(low), float(high),
+                    self._mostly(name),
+                )
+            )  # fmt: skip
+        return tuple(found)
+
+    def __getitem__(self, name: str) -> Quantity:
+        found = {each.name: each for each in self.quantities}
+        return found[check.one_of("quantity", name, found)]
+
+    def _mostly(self, name: str) -> str:
+        if np.ptp(self.values[name]) == 0.0:
+            return ""
+        shares_of = {key: float(stats.spearmanr(self.values[key], self.values[name])[0] ** 2) for key in self.inputs}
+        best = max(shares_of, key=shares_of.__getitem__)
+        return best if shares_of[best] > 1.0 / len(self.values[name]) ** 0.5 else ""
+
+    def summary(self) -> str:
+        """The quantities in a table, and the inputs."""
+        rows = [
+            (
+                each.name, f"{each.value:.4g}", "not known" if each.computation is None else f"{each.computation:.1g}",
+                f"{each.model:.1g}{' and what is not known' if each.unknown else ''}",
+                f"{each.low:.4g} to {each.high:.4g}", each.mostly,
+            )
+            for each in self.quantities
+        ]  # fmt: skip
+        head = "quantity", "value", "computation errs by", "model errs by", "inputs leave open", "mostly by"
+        lines = markup.columns(rows, head)
+        lines += [f"{name}: {said}" for name, said in self.inputs.items()]
+        count = len(next(iter(self.values.values())))
+        how = ", each with a body of its own" if self.anew else ""
+        lost = f", {self.failed} more failed" if self.failed else ""
+        return "\n".join([*lines, f"Nine tenths of {count} blows lie within what the inputs leave open{how}{lost}."])
+
+    def data(self) -> dict[str, Any]:
+        """The quantities and inputs as plain data."""
+        return {
+            "inputs": dict(self.inputs), "blows": len(next(iter(self.values.values()))), "failed": self.failed,
+            "quantities": {each.name: vars(each) | {"ends": list(each.ends)} for each in self.quantities},
+        }  # fmt: skip
+
+
+@check.typed
+def band(scene: Scene | str | Path, *, n: int | None = None, seed: int = 0, **changes: Any) -> Band:
+    """Strike a scene as well as its inputs are known.
+
+    Parameters
+    ----------
+    scene : Scene or path of a scene file
+        At least one of its numbers is written as ``{ value = 70e9, about = 0.03 }``, which nine tenths of all values
+        lie within (lognormal), or as ``{ value = 70e9, low = 68e9, high = 72e9 }`` (uniform).
+    n : int, optional
+        Number of blows drawn at random: by default 1024 where one body serves all of them, as in `spread`, and 48 where
+        every blow needs a body of its own.
+    seed : int
+        Of the random numbers.
+    **changes
+        As in `Scene.strike`: ``tolerance``, ``quantity``, ...
+
+    Returns
+    -------
+    Band
+
+    Raises
+    ------
+    ValueError
+        If no number of the scene has an interval, or one reaches values that are not allowed.
+
+    Examples
+    --------
+    >>> known = fi.load_scene("studies/scenes/ball_as_known.toml")
+    >>> found = fi.band(known, n=256)
+    >>> found["contact_time"].low < found.hit.contact_time < found["contact_time"].high
+    True
+    """
+    told = scene if isinstance(scene, Scene) else load_scene(scene)
+    check_known(told)
+    return around(told, told.strike(**changes), n=n, seed=seed)
+
+
+def check_known(scene: Scene) -> None:
+    """ValueError unless the scene is a single blow and says of at least one number how well it is known."""
+    scene.check_single()
+    if not scene.known:
+        raise scene.fault(
+            "no number says how well it is known; write one as { value = 70e9, about = 0.03 } or { value, low, high }"
+        )
+
+
+def around(
+    scene: Scene, hit: Response, *, n: int | None = None, seed: int = 0, watch: Callable[[int, int], Any] | None = None
+) -> Band:
+    """The band around a blow of a scene."""
+    count, seed = (None if n is None else check.count("n", n, high=MOST_BLOWS)), check.count("seed", seed, low=0)
+    said = {each.name: each.said for each in read(scene.known)}
+    try:
+        found = spread(scene, scene.known, n=count or BLOWS, sobol=False, seed=seed, tolerance=hit.tolerance)
+    except ValueError:  # an input that needs a body of its own, or a wrong one, which the scenes below refuse
+        return _anew(scene, hit, said, count or ANEW, seed, watch)
+    values = {name: found.values(name) for name in (*said, *NAMES.values())}
+    return Band(hit, said, values, found.n_failed, anew=False)
+
+
+def _anew(
+    scene: Scene, hit: Response, said: Mapping[str, str], n: int, seed: int, watch: Callable[[int, int], Any] | None
+) -> Band:
+    """The band with a scene of its own for each blow."""
+    inputs = read(scene.known)
+    rows, failed = [], 0
+    for done, row in enumerate(drawn(inputs, shares(n, len(inputs), seed), None)):
+        given = {each.name: float(value) for each, value in zip(inputs, row)}
+        try:
+            one = scene.changed(given).strike(tolerance=hit.tolerance)
+            rows.append({**given, **{name: float(getattr(one, name) or 0.0) for name in NAMES.values()}})
+        except check.SimulationError:
+            failed += 1
+        if watch is not None:
+            watch(done + 1, n)
+    if not rows:
+        raise check.SimulationError("no blow succeeded, so nothing has a band; narrow the intervals")
+    values = {name: np.array([row[name] for row in rows]) for name in rows[0]}
+    return Band(hit, said, values, failed, anew=True)
