@@ -55,7 +55,7 @@ def members(name, kind):
         if key.startswith("_") or not said or not (callable(raw) or isinstance(raw, (property, classmethod)) or
                                                    hasattr(raw, "func")):  # fmt: skip
             continue
-        call = f"({parameters(getattr(kind, key))})" if inspect.isroutine(getattr(kind, key)) else ""
+        call = f"({parameters(getattr(kind, key))})" if callable(getattr(kind, key)) else ""
         place = f"fi.{name}" if isinstance(raw, (classmethod, staticmethod)) else f".{key}"
         lines.append(f"- `{place}{f'.{key}' if place != f'.{key}' else ''}{call}`: {said}")
     return "\n".join(lines) + "\n" if lines else ""

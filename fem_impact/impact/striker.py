@@ -340,8 +340,7 @@ class Striker(check.Brief):
         return float(whole), *left_out_density(self.modes, self.at[None])
 
     @cached_property
-    def known(self) -> Remembered:
-        """The striker with fewer modes, and as blows take it."""
+    def known(self) -> Remembered:  # the striker with fewer modes, and as blows take it
         return Remembered(REMEMBERED)
 
     @property

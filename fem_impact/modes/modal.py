@@ -200,8 +200,7 @@ class Modes(check.Brief):
         return cls.from_arrays(**found, mass=mass, compliance=compliance, free=free)
 
     @cached_property
-    def known(self) -> Remembered:
-        """What was found of these modes at points where they were struck."""
+    def known(self) -> Remembered:  # what was found of these modes at points where they were struck
         return Remembered(REMEMBERED)
 
     @cached_property
