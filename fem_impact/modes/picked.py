@@ -89,7 +89,7 @@ def pick(name: str, found: Any, about: Any = None) -> Picked:
         wanted = 2.0 * np.pi * check.ascending("frequencies", about, "Hz")
         if wanted.size and not (len(omega) and omega[0] <= wanted[0] and wanted[-1] <= omega[-1]):
             raise ValueError(f"frequencies must lie within those of {name}, where its force has power")
-        places = np.unique([int(np.abs(omega - one).argmin()) for one in wanted])
+        places = np.unique([int(np.abs(omega - one).argmin()) for one in wanted]).astype(int)
     data = np.vstack([(values * weight[:, None]).real, (values * weight[:, None]).imag])
     start = np.log(np.stack([omega[places], [_damping(omega, size, i) for i in places]])).reshape(2, -1)
     found_modes = _fit(omega, data, weight, start)
