@@ -362,6 +362,7 @@ def stated() -> dict[str, dict[str, Any]]:
         "fit": {"taps": t["taps"], "target": t["bar"], "at": [0.0], "striker": t["striker"], "contact": t["law"],
             "unknown": {"contact.stiffness": (1e5, 1e8)}, "known": {"striker.mass": 0.03}, "window": (3e-4, 3e-3),
             "starts": 1, "profiles": False},
+        "propose": {"taps": [t["taps"], t["taps"]], "striker": t["striker"], "starts": 1, "profiles": False},
         "update": {"build": lambda values: t["bar"].scaled(first_frequency=values["f"]), "measured": [110.0, 330.0],
             "unknown": {"f": (50.0, 200.0)}, "start": {"f": 90.0}},
         "update scene": {"build": t["scene"], "measured": [110.0, 330.0],
