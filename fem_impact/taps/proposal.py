@@ -22,6 +22,7 @@ STIFFNESS = {"contact.stiffness": (1e2, 1e16)}  # of a law of unknown exponent, 
 EXPONENT = {"contact.exponent": (1.0, 4.0)}
 LOSS = {"contact.loss": (0.0, 20.0)}
 GAIN = 0.9  # [-] of the error at taps left out that a larger model must come below: less is luck of a few taps
+PER_TAP = "stiffness per tap"
 MOST_MODES = 2  # [-] that are tried: a pulse of few samples tells no more
 MASSES = 1e-1, 1e4  # [-] modal masses tried, over that of the hammer: more do not move
 FREQUENCIES = 0.05, 5.0  # [-] of modes tried, times the contact time: below and above they do not shape the pulse
@@ -72,9 +73,13 @@ def propose(
 ) -> Proposal:
     """Find a model of taps: from a wall upwards, as long as taps left out are predicted better.
 
-    A linear and a Hertz contact on a wall, then a free exponent, loss, a springy head, and modes of the structure one
-    by one are tried; each is kept only if it predicts the taps left out with less than 0.9 of the error. A larger model
-    whose search ends above the smaller one inside it goes on from there, so that it never fits worse.
+    A linear and a Hertz contact on a wall, then a free exponent, loss, a springy head, a stiffness for each tap, and
+    modes of the structure one by one are tried, and those that did not serve again after each gain. An addition is kept
+    only if it predicts the taps left out with less than 0.9 of the error. A larger model whose search ends above the
+    smaller one inside it goes on from there, so that it never fits worse.
+
+    The force alone cannot tell a mode of the hammer from one of the structure: a springy head, tried first, may stand
+    for either.
 
     Parameters
     ----------
@@ -123,17 +128,25 @@ def propose(
         raise SimulationError("no blow of a contact on a wall ends as these taps do; read the taps again")
     law, name = best.problem.setting.contact, "linear" if best.problem.setting.contact.exponent == 1.0 else "Hertz"
     tried = [replace(one, taken=one.name == name) for one in tried]
-    ranges, length = dict(STIFFNESS), solver.pulse_length(best.taps)
-    for word, more, neutral in _steps(striker, length, law.exponent):
-        one = _fitted(joined, law, ranges | more, given)
-        one, rescued = _never_worse(one, best, neutral) if one is not None else (None, False)
-        if one is None:
-            continue
-        taken = _left_out(one) < GAIN * _left_out(best)
-        tried.append(_trial(f"{name} + {word}", name, one, rescued, taken))
-        if taken:
-            best, ranges, name = one, ranges | more, f"{name} + {word}"
-        elif word.startswith("mode"):
+    ranges, waiting = dict(STIFFNESS), _steps(striker, solver.pulse_length(best.taps), law.exponent)
+    while True:  # what one addition hid may show after another
+        done = {one.name for one in tried}
+        for step in list(waiting):
+            word, more, neutral = step
+            label = f"{name} + {word}"
+            if label in done or (word == "mode 2" and any(each[0] == "mode 1" for each in waiting)):
+                continue
+            own = {"per_tap": "contact.stiffness"} if PER_TAP in label else {}
+            one = _fitted(joined, law, ranges | more, given | own)
+            if one is None:
+                continue
+            one, rescued = _never_worse(one, best, neutral)
+            taken = _left_out(one) < GAIN * _left_out(best)
+            tried.append(_trial(label, name, one, rescued, taken))
+            if taken:
+                best, ranges, name = one, ranges | more, label
+                waiting.remove(step)
+        if len(tried) == len(done):
             break
     whole = replace(best, compared={one.name: one.left_out for one in tried}, watch=watch)
     return Proposal(profiled(whole) if profiles else whole, tuple(tried))
@@ -144,10 +157,11 @@ def _steps(striker: Striker, length: float, exponent: float) -> list[tuple[str, 
     band = FREQUENCIES[0] / length, FREQUENCIES[1] / length
     heavy = MASSES[0] * striker.mass, MASSES[1] * striker.mass
     head: Ranges = {"striker.first_frequency": band, "striker.mode_ratio": (1e-4, 10.0)}
-    steps = [
+    steps: list[tuple[str, Ranges, Mapping[str, float]]] = [
         ("exponent", EXPONENT, {"contact.exponent": exponent}),
         ("loss", LOSS, {"contact.loss": 0.0}),
         ("springy head", head, {"striker.first_frequency": band[1], "striker.mode_ratio": 1e-4}),
+        (PER_TAP, {}, {}),
     ]
     for i in range(1, MOST_MODES + 1):
         mode: Ranges = {f"mode{i}.frequency": band, f"mode{i}.mass": heavy, f"mode{i}.damping": (0.0, 0.5)}
@@ -159,7 +173,9 @@ def _steps(striker: Striker, length: float, exponent: float) -> list[tuple[str, 
 def _fitted(taps: Taps, law: Contact, ranges: Ranges, given: Mapping[str, Any]) -> Found | None:
     """The fit of one model; None if its blows do not end."""
     try:
-        return fit(taps, contact=law, unknown=ranges, **given)
+        found = fit(taps, contact=law, unknown=ranges, **given)
+        found.left_out()  # what no others predict is no model either
+        return found
     except SimulationError:
         return None
 
@@ -175,8 +191,9 @@ def _never_worse(one: Found, smaller: Found, neutral: Mapping[str, float]) -> tu
             bound[: one.problem.n_shared] for bound in one.problem.bounds
         )
     )  # fmt: skip
-    rest = smaller.best.x[smaller.problem.n_shared :]  # momenta and onsets of the same taps
-    best: Solution = solver.solve(one.problem, np.append(shared, rest))
+    rest = smaller.best.x[smaller.problem.n_shared :]  # momenta, onsets and own values of the same taps
+    apart = np.zeros(len(one.best.x) - len(shared) - len(rest))
+    best: Solution = solver.solve(one.problem, np.concatenate([shared, rest, apart]))
     return (replace(one, best=best), True) if best.cost < one.best.cost else (one, False)
 
 
@@ -185,4 +202,6 @@ def _left_out(found: Found) -> float:
 
 
 def _trial(name: str, inside: str, found: Found, rescued: bool, taken: bool) -> Trial:
-    return Trial(name, inside, len(found.names), found.error, _left_out(found), rescued, taken)
+    return Trial(
+        name, inside, found.problem.n_values - 2 * len(found.used), found.error, _left_out(found), rescued, taken
+    )
