@@ -47,6 +47,7 @@ from .sweeps import hammers as hammers
 from .sweeps.borders import read_borders as read_borders
 from .sweeps.grid import sweep as sweep
 from .taps.fit import fit as fit
+from .taps.proposal import propose as propose
 from .taps.records import Taps as Taps
 from .taps.records import read_taps as read_taps
 from .taps.rig import measure as measure

@@ -29,6 +29,7 @@ from typing import Any
 from zlib import crc32
 
 import numpy as np
+import xarray
 from fuzz import PACKAGE, Hang, limit_memory, limited
 from scenes import QUICK
 
@@ -133,8 +134,14 @@ def things() -> dict[str, Any]:
     run = scene.run()
     fi.export.write_json(folder / "response.json", fi.export.run_data(run, scene.data()))
     results.save(folder, run.response, scene.points)
+    frequency = np.arange(1.0, 301.0)
+    H = fi.mobility(bar.damped(0.02), [0.0], [0.0], frequency, "accelerance")
+    responses = xarray.Dataset(
+        {"H": (("frequency", "channel"), H[:, None])},
+        {"frequency": frequency, "channel": ["a"], "units": ("channel", ["m/s^2/N"])},
+    )
     return {
-        "map": few, "taps": taps, "file of taps": folder / "taps.npz", "bar": bar,
+        "map": few, "taps": taps, "responses": responses, "file of taps": folder / "taps.npz", "bar": bar,
         "metal": metal, "plate": plate, "beam": beam, "square": square, "modes": modes, "striker": striker, "law": law,
         "sphere": fi.Striker.sphere(metal, 0.01), "free": fi.Modes.rigid(1.0), "folder": folder, "path": path,
         "system": fi.assemble(square, plate, {"boundary": "hinged"}), "scene": scene, "uff": uff, "mesh": mesh,
@@ -218,6 +225,8 @@ def stated() -> dict[str, dict[str, Any]]:
         "Modes.from_arrays": {"frequencies": [0.0, 10.0], "shapes": [[1.0, 0.5], [1.0, -0.5]],
             "points": [[0.0, 0.0], [0.1, 0.1]], "mass": 1.0, "damping_ratio": 0.01,
             "compliance": [[1e-3, 0.0], [0.0, 1e-3]], "cells": [[0, 1, 1]], "free": False},
+        "Modes.from_frf": {"frf": t["responses"], "mass": 1.0, "points": [[0.0]], "driving": 0, "frequencies": [100.0],
+            "free": False},
         "Modes.from_uff": {"path": t["uff"], "mass": 0.2, "free": False},
         "Modes.rigid": {"mass": 1.0},
         **alike("Modes.shape_at Modes.modal_compliance Modes.residual_compliance", {"self": t["modes"],
@@ -359,6 +368,7 @@ def stated() -> dict[str, dict[str, Any]]:
         "fit": {"taps": t["taps"], "target": t["bar"], "at": [0.0], "striker": t["striker"], "contact": t["law"],
             "unknown": {"contact.stiffness": (1e5, 1e8)}, "known": {"striker.mass": 0.03}, "window": (3e-4, 3e-3),
             "starts": 1, "profiles": False},
+        "propose": {"taps": [t["taps"], t["taps"]], "striker": t["striker"], "starts": 1, "profiles": False},
         "update": {"build": lambda values: t["bar"].scaled(first_frequency=values["f"]), "measured": [110.0, 330.0],
             "unknown": {"f": (50.0, 200.0)}, "start": {"f": 90.0}},
         "update scene": {"build": t["scene"], "measured": [110.0, 330.0],

@@ -16,7 +16,7 @@ from .._base.rounding import ROUNDING, SAME
 from ..fe import plausible, refinement
 from ..fe.assembly import THICK, System
 from ..fe.section import Beam, Plate
-from . import universal_files, unstated, viewing
+from . import picked, universal_files, unstated, viewing
 from .shapes import (
     REMEMBERED,
     SHAPE_ERROR,
@@ -198,6 +198,67 @@ class Modes(check.Brief):
         if not len(found["cells"]):
             found["cells"] = None
         return cls.from_arrays(**found, mass=mass, compliance=compliance, free=free)
+
+    @classmethod
+    def from_frf(
+        cls,
+        frf: Any,
+        *,
+        mass: float,
+        points: ArrayLike | None = None,
+        driving: Any = None,
+        frequencies: ArrayLike | None = None,
+        compliance: ArrayLike | None = None,
+        free: bool | None = None,
+    ) -> "Modes":
+        """Modes at the peaks of measured frequency responses.
+
+        Parameters
+        ----------
+        frf : xarray.Dataset
+            As `fi.frf` returns it, of taps or of a universal file; one of its channels must be measured where the body
+            is struck. A roving hammer and a roving sensor serve alike.
+        mass : float [kg] of the whole body
+        points : array_like, shape (n_channels, dimension) [m], optional
+            Where each channel is measured (with a roving hammer, struck); by default as the file states it. Channels
+            across the direction of the blow are left out.
+        driving : int or str, optional
+            The channel at the point struck; by default as the nodes of the file tell.
+        frequencies : array_like, shape (n_modes,) [Hz], optional
+            About where modes are; by default at the peaks.
+        compliance, free : optional
+            As in `from_arrays`. Without ``compliance`` what the modes left out yield is not known: it is estimated, and
+            a blow counts the error of that estimate.
+
+        Returns
+        -------
+        Modes
+            Known only at the points, with frequencies and damping ratios refined together with the shapes; its notes
+            tell what share of the responses they leave unexplained.
+
+        Raises
+        ------
+        ValueError
+            If ``frf`` has no peaks, no channel at the point struck or no points, or that channel has the wrong sign.
+
+        References
+        ----------
+        Ewins (2000), Modal Testing, chapter 4.
+
+        Examples
+        --------
+        >>> bar = fi.Modes.from_arrays(
+        ...     [120.0, 410.0], [[1.2, 0.9], [0.7, -1.1]], points=[[0.0], [1.0]], mass=1.0, damping_ratio=0.02
+        ... )
+        >>> hit = fi.strike(bar, fi.Striker.rigid(0.02), fi.Contact.linear(1e5), at=[0.0], speed=1.0)
+        >>> tap = fi.measure(hit, rate=12800.0, at=[[0.0], [1.0]], duration=1.0)
+        >>> found = fi.Modes.from_frf(fi.frf(tap), mass=1.0, points=[[0.0], [1.0]], driving=0)
+        >>> found.frequencies.round().tolist(), found.damping_ratio.round(3).tolist()
+        ([120.0, 410.0], [0.02, 0.02])
+        """
+        told, notes = picked.modes_of(frf, driving, points, frequencies)
+        made = cls.from_arrays(**told, mass=mass, compliance=compliance, free=free)
+        return replace(made, notes=(*made.notes, *notes))
 
     @cached_property
     def known(self) -> Remembered:  # what was found of these modes at points where they were struck

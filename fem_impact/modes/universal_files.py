@@ -94,25 +94,21 @@ def arrays(path: Path, direction: str) -> dict[str, np.ndarray]:
     file = pyuff.UFF(str(path))
     kinds = [int(kind) for kind in file.get_set_types()]
     sets = [file.read_sets(i) for i, kind in enumerate(kinds) if kind in WANTED]
-    nodes = [s for s in sets if s["type"] == 2411] or [s for s in sets if s["type"] == 15]
+    numbers, place = places(sets)
     modes = [s for s in sets if s["type"] == 55 and s.get("analysis_type") in (2, 3)]
-    if not nodes or not modes:
+    if not len(numbers) or not modes:
         found = ", ".join(str(kind) for kind in sorted(set(kinds))) or "none"
         functions = ", of which 58 are time records or frequency responses, no modes" if 58 in kinds else ""
         raise ValueError(
             f"{path.name} must hold nodes (15 or 2411) and mode shapes (55); its data sets are {found}{functions}"
         )
-    numbers = np.concatenate([np.asarray(s["node_nums"], int) for s in nodes])
-    place = np.concatenate([np.column_stack([s["x"], s["y"], s["z"]]) for s in nodes]).astype(float)
     measured = np.asarray(modes[0]["node_nums"], int)
     lost = np.setdiff1d(measured, numbers)
     if lost.size:
         raise ValueError(f"{path.name} has shapes at node {lost[0]}, which has no coordinates; export it again")
     row = {int(number): i for i, number in enumerate(numbers)}
     points = place[[row[int(n)] for n in measured]]
-    others = [i for i, axis in enumerate("xyz") if axis != direction]
-    spread = np.ptp(points[:, others], axis=0)
-    keep = [i for i, wide in zip(others, spread) if wide > 1e-9 * max(spread.max(), 1e-300)] or others[:1]
+    keep = across(points, direction)
     table = [_mode(path.name, i, mode, component, measured) for i, mode in enumerate(modes)]
     frequencies, damping, shapes = zip(*sorted(table, key=lambda entry: entry[0]))
     result = {"frequencies": np.array(frequencies), "damping_ratio": np.array(damping)}
@@ -127,6 +123,21 @@ def arrays(path: Path, direction: str) -> dict[str, np.ndarray]:
         if not (np.abs(values) <= check.REACH).all() or (what == "frequencies" and values.min() < 0.0):
             raise ValueError(f"{path.name} has {what} that are negative, too large or not numbers; export it again")
     return result | {"cells": cells}
+
+
+def across(points: np.ndarray, direction: str) -> list[int]:
+    """The axes across a direction along which points (n_points, 3) differ; one at least."""
+    others = [i for i, axis in enumerate("xyz") if axis != direction]
+    spread = np.ptp(points[:, others], axis=0)
+    return [i for i, wide in zip(others, spread) if wide > 1e-9 * max(spread.max(), 1e-300)] or others[:1]
+
+
+def places(sets: list[dict]) -> tuple[np.ndarray, np.ndarray]:
+    """Numbers (n_nodes,) and places (n_nodes, 3) of the nodes in data sets 2411 or, without them, 15."""
+    nodes = [s for s in sets if s["type"] == 2411] or [s for s in sets if s["type"] == 15]
+    numbers = [np.asarray(s["node_nums"], int) for s in nodes]
+    place = [np.column_stack([s["x"], s["y"], s["z"]]).astype(float) for s in nodes]
+    return np.concatenate([np.zeros(0, int), *numbers]), np.concatenate([np.zeros((0, 3)), *place])
 
 
 def _elements(file: Any, i: int) -> list[dict]:

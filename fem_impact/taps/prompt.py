@@ -6,12 +6,12 @@ from typing import Any
 
 import numpy as np
 import xarray as xr
-from scipy.signal import find_peaks
 
 from .._base import check
 from .._base.files import staged
 from ..impact.contact import Contact
 from ..impact.striker import Striker
+from ..modes import picked
 from ..scenes.scene import Scene, load_scene
 from ..show import export
 from . import found_scene, transfer
@@ -56,8 +56,7 @@ def peaks(found: xr.Dataset) -> list[dict[str, Any]]:
     rows = []
     for k, name in enumerate(found["channel"].values):
         size = np.abs(found["H"].values[1:, k])
-        # lower ones, of less than a factor of 4.5 over their surroundings, may be noise
-        places = find_peaks(np.log(np.maximum(size, 1e-300)), prominence=1.5)[0]
+        places = picked.peaks(size)
         largest = np.sort(places[np.argsort(-size[places])][:20])  # more do not fit a screen
         for i in largest:
             coherence = float(found["coherence"].values[1 + i, k]) if "coherence" in found else None

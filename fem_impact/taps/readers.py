@@ -464,13 +464,7 @@ def _universal(head: bytes) -> bool:
 
 def universal(path: Path) -> Recording:
     """Time records in data set 58 of a universal file; the second record of a channel begins a new segment."""
-    import pyuff
-
-    raw = path.read_bytes()
-    if len(UFF_END.findall(raw)) % 2:
-        raise ValueError(f"{path.name} ends within a data set; it may be cut off")
-    file = pyuff.UFF(str(path))
-    kinds = [int(kind) for kind in file.get_set_types()]
+    file, kinds, raw = uff_file(path)
     sets = [file.read_sets(i) for i, kind in enumerate(kinds) if kind == 58]
     if not any(int(one.get("func_type", 0)) == TIME_RESPONSE for one in sets):
         raise ValueError(
@@ -484,7 +478,7 @@ def universal(path: Path) -> Recording:
         if int(one.get("func_type", 0)) != TIME_RESPONSE:
             continue
         data = np.real(np.asarray(one["data"])).astype(float)
-        _check_uff(path, one, raw[block[0] : block[1] + 1])
+        check_uff(path, one, raw[block[0] : block[1] + 1])
         code = int(one.get("ordinate_spec_data_type", 0))
         stated = str(one.get("ordinate_axis_units_lab") or "").strip()
         stated, kind = "" if stated == "NONE" else stated, UFF_UNITS.get(code)
@@ -518,6 +512,17 @@ def universal(path: Path) -> Recording:
     )
 
 
+def uff_file(path: Path) -> tuple[Any, list[int], bytes]:
+    """A universal file as pyuff opens it, the kinds of its data sets, and its bytes."""
+    import pyuff
+
+    raw = path.read_bytes()
+    if len(UFF_END.findall(raw)) % 2:
+        raise ValueError(f"{path.name} ends within a data set; it may be cut off")
+    file = pyuff.UFF(str(path))
+    return file, [int(kind) for kind in file.get_set_types()], raw
+
+
 def uff_holds(kinds: list[int], sets: list[dict]) -> str:
     """What a universal file of data sets ``kinds`` holds, in words; ``sets`` are those of kind 58."""
     types = sorted({int(one.get("func_type", 0)) for one in sets})
@@ -540,7 +545,7 @@ def uff_factors(sets: list[dict]) -> dict[str, float]:
     return {kind: factor for kind, factor in found.items() if factor > 0.0 and factor != 1.0}
 
 
-def _check_uff(path: Path, one: dict, raw: bytes) -> None:
+def check_uff(path: Path, one: dict, raw: bytes) -> None:
     """ValueError if a data set 58 holds fewer samples than stated, or numbers that its reader would replace by zero."""
     count, name = int(one["num_pts"]), uff_name(one)
     if len(one["data"]) != count:

@@ -10,13 +10,18 @@ from scipy.optimize import linear_sum_assignment
 
 from .._base import check, isolated, markup
 from .._base.files import replacing
+from ..modes import picked, universal_files
 from ..modes.modal import Modes
 from . import readers
 from .records import Taps
+from .units import known as known_unit
 from .windows import joined
 
 METHODS = ("H1", "H2")
 UNITS = {"m/s^2": "accelerance", "m/s": "mobility", "m": "receptance"}
+WAY = ("node", "direction", "reference", "reference_direction")  # of a response in data set 58
+ENDS = ("place", "struck")  # where it is measured and struck
+FREQUENCY = 18  # code of the abscissa in data set 58
 RESPONSE_CODE = {"m/s^2": readers.ACCELERATION, "m/s": readers.VELOCITY, "m": readers.DISPLACEMENT}
 
 
@@ -34,7 +39,7 @@ def frf(
     ----------
     records : Taps or sequence of Taps, with responses, or path of a universal file
         With the path of a file that holds frequency responses (data set 58, function type 4) they are read as they
-        stand; the other arguments are for taps.
+        stand, in SI units; the other arguments are for taps.
     method : "H1" or "H2"
         H1 holds for noise in the response, H2 for noise in the force.
     force_window : float [s], optional
@@ -50,7 +55,15 @@ def frf(
     xarray.Dataset
         ``H`` (frequency, channel), complex, in the response's unit per N; ``coherence`` (frequency, channel);
         ``force`` (frequency), the mean amplitude spectrum [N s]; attributes ``averages``, ``method``, ``rate``. Of a
-        file ``H``, and ``coherence`` if it holds one for each.
+        file ``H``, and ``coherence`` if it holds one for each; of each channel ``node`` and ``direction``,
+        ``reference`` and ``reference_direction`` (where it is struck), and, if the file has nodes, ``place`` and
+        ``struck`` (channel, axis) [m]; attribute ``notes``. `fi.Modes.from_frf`, `fi.update` and `fi.matched` take it.
+
+    Raises
+    ------
+    ValueError
+        If taps have no response, or a file is cut off, holds no complex responses of a motion to a force at the same
+        ascending frequencies, values that are no finite numbers, or units that contradict its codes.
 
     References
     ----------
@@ -198,7 +211,9 @@ def matched(measured: Any, computed: Any, *, points: Any = None, which: Any = No
 
 
 def frequencies(name: str, value: Any) -> np.ndarray:
-    """Ascending frequencies [Hz] of `Modes` or of an argument that lists them."""
+    """Ascending frequencies [Hz] of `Modes`, of the peaks of frequency responses, or of an argument that lists them."""
+    if picked.is_frf(value):
+        return picked.pick(name, value).frequencies
     return value.frequencies if isinstance(value, Modes) else check.ascending(name, value, "Hz")
 
 
@@ -267,52 +282,109 @@ def _function_sets(data: xr.Dataset) -> list[dict[str, Any]]:
         made = _set(
             str(name), k + 2, frequency, data["H"].values[:, k], ordinate_spec_data_type=RESPONSE_CODE[unit], **codes
         )
-        sets.append(made | {"orddenom_spec_data_type": 13})
+        ends = zip(("rsp_node", "rsp_dir", "ref_node", "ref_dir"), WAY)
+        way = {key: int(data[name].values[k]) for key, name in ends if name in data.coords}
+        sets.append(made | {"orddenom_spec_data_type": 13} | way)
+        if "coherence" in data:
+            sure = {"func_type": readers.COHERENCE, "ord_data_type": 4, "data": data["coherence"].values[:, k]}
+            sets.append(sets[-1] | sure)
     return sets
 
 
 def read_frf(path: Any) -> xr.Dataset:
     """Read the frequency responses (data set 58, function type 4) of a universal file, as `frf` returns them."""
     found = isolated.read(check.path("path", path), "frequency responses", "taps.transfer:arrays")
-    coords = {"frequency": ("frequency", found["frequency"], {"units": "Hz"}), "channel": found["names"].astype(str)}
-    coords["units"] = ("channel", found["units"].astype(str))
+    coords: dict[str, Any] = {"frequency": ("frequency", found["frequency"], {"units": "Hz"})}
+    coords |= {name: ("channel", found[f"{name}s"].astype(str)) for name in ("channel", "unit")}
+    coords["units"] = coords.pop("unit")
+    coords |= {name: ("channel", each) for name, each in zip(WAY, found["ways"].T)}
+    coords |= {name: (("channel", "axis"), found[name], {"units": "m"}) for name in ENDS if name in found}
     kept = [name for name in ("H", "coherence") if name in found]
-    return xr.Dataset({name: (("frequency", "channel"), found[name]) for name in kept}, coords)
+    attributes = {"notes": [str(note) for note in found["notes"]]}
+    return xr.Dataset({name: (("frequency", "channel"), found[name]) for name in kept}, coords, attributes)
 
 
 def arrays(path: Path) -> dict[str, np.ndarray]:
     """The result of `read_frf` as arrays, for the separate process."""
-    import pyuff
-
-    file = pyuff.UFF(str(path))
-    kinds = [int(kind) for kind in file.get_set_types()]
-    functions = [file.read_sets(i) for i, kind in enumerate(kinds) if kind == 58]
-    sets = [one for one in functions if int(one.get("func_type", 0)) == readers.FREQUENCY_RESPONSE]
+    file, kinds, raw = readers.uff_file(path)
+    functions = [(file.read_sets(i), file._block_ind[i]) for i, kind in enumerate(kinds) if kind == 58]
+    sets = [(one, block) for one, block in functions if int(one.get("func_type", 0)) == readers.FREQUENCY_RESPONSE]
     if not sets:
-        raise ValueError(f"{path.name} holds {readers.uff_holds(kinds, functions)}, no frequency responses")
+        holds = readers.uff_holds(kinds, [one for one, _ in functions])
+        raise ValueError(f"{path.name} holds {holds}, no frequency responses")
     factors = readers.uff_factors([file.read_sets(i) for i, kind in enumerate(kinds) if kind == 164])
-    frequency = np.asarray(sets[0]["x"], float)
+    frequency = np.asarray(sets[0][0]["x"], float)
     names: list[str] = []
     units: list[str] = []
     columns: list[np.ndarray] = []
-    for one in sets:
-        name, code = readers.uff_name(one), int(one.get("ordinate_spec_data_type", 0))
-        unit = readers.UFF_UNITS.get(code)
-        if unit not in RESPONSE_CODE or int(one.get("orddenom_spec_data_type", 0)) not in (0, 9, readers.EXCITATION):
-            raise ValueError(f"{path.name} has a response {name!r} that is no motion per force (quantity code {code})")
+    notes: list[str] = []
+    for one, block in sets:
+        name = readers.uff_name(one)
+        readers.check_uff(path, one, raw[block[0] : block[1] + 1])
+        if not np.iscomplexobj(one["data"]):
+            raise ValueError(f"{path.name} has magnitudes only of {name!r}; export complex responses")
+        if int(one.get("abscissa_spec_data_type") or 0) not in (0, FREQUENCY):
+            raise ValueError(f"{path.name} has a response {name!r} over something else than frequency; export it again")
         x = np.asarray(one["x"], float)
+        if not (len(x) and x[0] >= 0.0 and (np.diff(x) > 0.0).all() and x[-1] <= check.REACH):
+            raise ValueError(f"{path.name} has frequencies of {name!r} that do not ascend from zero; export it again")
         if len(x) != len(frequency) or not np.allclose(x, frequency, rtol=1e-5, atol=0.0):
             raise ValueError(f"{path.name} has responses at other frequencies for {name!r} than for {names[0]!r}")
+        unit, factor, note = _per_force(path, name, one, factors)
         names.append(check.line(name))
         units.append(f"{unit}/N")
-        columns.append(np.asarray(one["data"], complex) * (factors.get("N", 1.0) / factors.get(str(unit), 1.0)))
-    found = {"frequency": frequency, "H": np.column_stack(columns), "names": np.array(names, dtype=str)}
-    sure = {_way(one): np.real(one["data"]) for one in functions if one.get("func_type") == readers.COHERENCE}
-    if all(_way(one) in sure and len(sure[_way(one)]) == len(frequency) for one in sets):
-        found["coherence"] = np.column_stack([sure[_way(one)] for one in sets]).astype(float)
-    if not all(np.isfinite(found[name]).all() for name in found if name != "names"):
+        columns.append(np.asarray(one["data"], complex) * factor)
+        notes += note
+    ways = np.array([_way(one) for one, _ in sets])
+    found = {"frequency": frequency, "H": np.column_stack(columns), "channels": np.array(names, dtype=str)}
+    found |= {"units": np.array(units), "ways": ways, "notes": np.array(list(dict.fromkeys(notes)), dtype=str)}
+    sure = {_way(one): np.real(one["data"]) for one, _ in functions if one.get("func_type") == readers.COHERENCE}
+    if all(way in sure and len(sure[way]) == len(frequency) for way in map(tuple, ways.tolist())):
+        found["coherence"] = np.column_stack([sure[tuple(way)] for way in ways.tolist()]).astype(float)
+        if not ((found["coherence"] >= 0.0) & (found["coherence"] <= 1.0 + 1e-6)).all():
+            raise ValueError(f"{path.name} has a coherence that is not between 0 and 1; export it again")
+    found |= _places(file, kinds, ways, factors.get("m", 1.0))
+    if not (np.abs(found["H"]) <= check.REACH).all():
         raise ValueError(f"{path.name} holds values that are no finite numbers; export it again")
-    return found | {"units": np.array(units)}
+    return found
+
+
+def _per_force(path: Path, name: str, one: dict[str, Any], factors: dict[str, float]) -> tuple[str, float, list[str]]:
+    """SI unit of the motion in a response per force, the factor to it, and notes: by codes, or by labels without."""
+    parts: list[tuple[str, float]] = []
+    notes = []
+    for what, default in (("ordinate", ""), ("orddenom", "N")):
+        code = int(one.get(f"{what}_spec_data_type") or 0)
+        label = str(one.get(f"{what}_axis_units_lab") or "").strip()
+        stated, kind = (
+            known_unit(label.partition("/N")[0] if what == "ordinate" else label),
+            readers.UFF_UNITS.get(code),
+        )
+        if stated and kind and stated[0] != kind:
+            raise ValueError(
+                f"{path.name} states the unit {label!r} for {name!r}, whose code {code} means {kind}; export it again"
+            )
+        if stated is None and kind is None and not code and default:
+            notes.append(f"{name}: what it is divided by is not stated, N assumed")
+            kind = default
+        si = stated[0] if stated else kind or ""
+        if si not in (RESPONSE_CODE if what == "ordinate" else ("N",)):
+            raise ValueError(f"{path.name} has a response {name!r} that is no motion per force (quantity code {code})")
+        parts.append((si, stated[1] if stated else 1.0 / factors.get(si, 1.0)))
+    return parts[0][0], parts[0][1] / parts[1][1], notes
+
+
+def _places(file: Any, kinds: list[int], ways: np.ndarray, factor: float) -> dict[str, np.ndarray]:
+    """Coordinates (n_channels, 3) [m] of both ends of responses, if the file has those of a node; NaN without."""
+    nodes = [file.read_sets(i) for i, kind in enumerate(kinds) if kind in (15, 2411)]
+    numbers, place = universal_files.places(nodes)
+    row = {int(number): i for i, number in enumerate(numbers)}
+    found = {}
+    for name, column in zip(ENDS, (0, 2)):
+        here = [row.get(int(node)) for node in ways[:, column]]
+        if any(i is not None for i in here):
+            found[name] = np.array([np.full(3, np.nan) if i is None else place[i] / factor for i in here])
+    return found
 
 
 def _way(one: dict[str, Any]) -> tuple[int, ...]:

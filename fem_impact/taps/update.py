@@ -75,10 +75,10 @@ def update(
         The body. Of a scene, the unknowns are numbers of its tables by their names, such as ``material.E``,
         ``section.thickness`` or ``supports.left.stiffness``; its modes are found to the tolerance of its strike. A
         function takes a dict of values and returns the assembled `System` or its `Modes`.
-    measured : array_like, (n_modes,) [Hz], or Modes
-        Ascending frequencies; `Modes` of a measurement are paired with the computed ones by their shapes too. Up to two
-        that belong to no mode of the body are left out and told, if as many frequencies as unknowns are spare without
-        them and chance hardly meets the others so well.
+    measured : array_like, (n_modes,) [Hz], Modes, or xarray.Dataset of fi.frf
+        Ascending frequencies, or frequency responses whose peaks are picked; `Modes` of a measurement are paired with
+        the computed ones by their shapes too. Up to two that belong to no mode of the body are left out and told, if as
+        many frequencies as unknowns are spare without them and chance hardly meets the others so well.
     unknown : mapping of name to (low, high), both positive
     start : mapping of name to value, optional
         By default the middle of each range.

@@ -1,0 +1,286 @@
+"""Modes picked from measured frequency responses: a pole at each peak, all refined together, and what moves with it.
+
+The accelerance of channel k is ``H_k = L_k - omega**2 (R_k + sum over r of A_kr / (omega_r**2 - omega**2 + 2 i zeta_r
+omega_r omega))``: L and R stand for the modes below and above the band, and ``A_kr`` is the product of the
+mass-normalised deflections [kg**-0.5] at both ends. With real A, those of normal modes, the sum is linear in all but
+the poles (least squares frequency domain; Ewins, Modal Testing, chapter 4).
+"""
+
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from .._base import check
+from . import universal_files
+
+PER_FORCE = {"m/s^2/N": 2, "m/s/N": 1, "m/N": 0}  # unit of a response -> times that it was differentiated
+PROMINENCE = 1.5  # [-] of logarithms: peaks of less than a factor of 4.5 over their surroundings may be noise
+FELT = 0.1  # [-] of the largest force spectrum: 20 dB below it a hammer tells little (ISO 7626-5)
+DAMPING = 1e-6, 0.5  # [-] damping ratios of a peak that is sought
+GAIN = 10.0  # [-] of the noise variance: what each value of one more mode must explain, where luck explains one
+CLOSE = 1e-6  # [-] relative change of the sum of squares that ends a search
+SURE = 3.0  # [-] standard errors by which the point struck must move in a mode, for its deflections to have a scale
+ENDS = ("node", "direction"), ("reference", "reference_direction")
+
+
+class Picked(NamedTuple):
+    """Poles at peaks, and the products of deflections, with their standard errors."""
+
+    frequencies: np.ndarray  # (n_modes,) [Hz], undamped
+    damping_ratio: np.ndarray  # (n_modes,)
+    products: np.ndarray  # (n_channels, n_modes) [1/kg]
+    errors: np.ndarray  # (n_channels, n_modes) [1/kg]
+    left: float  # [-] root mean square that they leave of the responses, each frequency by its weight
+
+
+def peaks(size: np.ndarray) -> np.ndarray:
+    """Numbers of the peaks of magnitudes (n_frequencies,) that noise does not make."""
+    found, rising, top, bottom = [], False, 0, 0
+    heights = np.log(np.maximum(size, 1e-300)).tolist()
+    for i, height in enumerate(heights):
+        top = i if height > heights[top] else top
+        bottom = i if height < heights[bottom] else bottom
+        if rising and height <= heights[top] - PROMINENCE:
+            found.append(top)
+            rising, bottom = False, i
+        elif not rising and height >= heights[bottom] + PROMINENCE:
+            rising, top = True, i
+    return np.array(found, int)
+
+
+def is_frf(value: Any) -> bool:
+    """Whether something is a table as `fi.frf` returns it."""
+    names = getattr(value, "coords", ())
+    return "H" in getattr(value, "data_vars", ()) and all(name in names for name in ("frequency", "channel", "units"))
+
+
+def _responses(name: str, found: Any) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Angular frequencies (n,) [rad/s], accelerances (n, n_channels) [1/kg] and weights (n,), where there is force."""
+    if not is_frf(found) or found["H"].dims != ("frequency", "channel") or not found["H"].size:
+        raise ValueError(f"{name} must be frequency responses as fi.frf returns them, got {check.shown(found)}")
+    units = [str(unit) for unit in found["units"].values]
+    for unit in units:
+        check.one_of(f"{name}.units", unit, PER_FORCE)
+    omega = 2.0 * np.pi * check.ascending(f"{name}.frequency", found["frequency"].values, "Hz")
+    values = np.asarray(found["H"].values, complex)
+    if not (np.abs(values) <= check.REACH).all():
+        raise ValueError(f"{name}.H must be finite")
+    used = omega > 0.0
+    if "force" in found:
+        used &= found["force"].values >= FELT * found["force"].values.max()
+    sure = found["coherence"].values.mean(axis=1)[used] if "coherence" in found else 1.0
+    omega = omega[used]
+    values = values[used] * (1j * omega[:, None]) ** (2 - np.array([PER_FORCE[unit] for unit in units]))
+    size = np.sqrt(np.square(np.abs(values)).mean(axis=1))
+    # errors go with the response where it is large, and are noise where it is small
+    return omega, values, sure / np.hypot(size, max(np.median(size) if size.size else 0.0, 1e-300))
+
+
+def pick(name: str, found: Any, about: Any = None) -> Picked:
+    """The modes at the peaks of frequency responses, or near the frequencies ``about`` (n_modes,) [Hz].
+
+    Peaks whose pole runs away in the search are no modes and are left out.
+    """
+    omega, values, weight = _responses(name, found)
+    size = np.sqrt(np.square(np.abs(values)).mean(axis=1)) / np.maximum(omega, 1e-300)
+    if about is None:
+        places = peaks(size)
+    else:
+        wanted = 2.0 * np.pi * check.ascending("frequencies", about, "Hz")
+        if wanted.size and not (len(omega) and omega[0] <= wanted[0] and wanted[-1] <= omega[-1]):
+            raise ValueError(f"frequencies must lie within those of {name}, where its force has power")
+        places = np.unique([int(np.abs(omega - one).argmin()) for one in wanted]).astype(int)
+    data = np.vstack([(values * weight[:, None]).real, (values * weight[:, None]).imag])
+    start = np.log(np.stack([omega[places], [_damping(omega, size, i) for i in places]])).reshape(2, -1)
+    found_modes = _fit(omega, data, weight, start)
+    while about is None:  # peaks hidden beside others show in what is left
+        more = _with_one_more(omega, data, weight, found_modes)
+        if more is None:
+            break
+        found_modes = more
+    poles, basis, constants, rest = _fit(omega, data, weight, found_modes.poles)
+    n = poles.shape[1]
+    if not n:
+        raise ValueError(f"{name} has no peaks that are modes; give frequencies= near which they are sought")
+    spread = np.sqrt(np.diag(np.linalg.pinv(basis.T @ basis))[:, None] * np.square(rest).sum(axis=0) / _spare(basis))
+    natural, damping = np.exp(poles)
+    damping = np.maximum(damping - float(found.attrs.get("added_damping", 0.0)) / natural, 0.0)  # that of a window
+    left = float(np.linalg.norm(rest) / max(float(np.linalg.norm(data)), 1e-300))
+    return Picked(natural / (2.0 * np.pi), damping, constants[:n].T, spread[:n].T, left)
+
+
+class _Modes(NamedTuple):
+    poles: np.ndarray  # (2, n_modes) logarithms of natural frequencies [rad/s] and damping ratios
+    basis: np.ndarray  # (2 n_frequencies, n_modes + 2)
+    constants: np.ndarray  # (n_modes + 2, n_channels)
+    rest: np.ndarray  # (2 n_frequencies, n_channels) weighted residual
+
+
+def _spare(basis: np.ndarray) -> int:
+    return max(1, len(basis) - basis.shape[1])
+
+
+def _fit(omega: np.ndarray, data: np.ndarray, weight: np.ndarray, start: np.ndarray, steps: int = 60) -> _Modes:
+    """The modes near poles (2, n_modes); those whose pole runs away are none."""
+    poles, ran = start, np.ones(start.shape[1], bool)
+    while ran.any() and len(data) > 4 * poles.shape[1] + 4:
+        poles, ran = _refined(omega, data, weight, poles, steps)
+        poles = poles[:, ~ran]
+    basis = _basis(omega, weight, poles)[0]
+    constants = np.linalg.lstsq(basis, data, rcond=None)[0]
+    return _Modes(poles, basis, constants, data - basis @ constants)
+
+
+def _with_one_more(omega: np.ndarray, data: np.ndarray, weight: np.ndarray, before: _Modes) -> _Modes | None:
+    """The modes and one where they leave most; None if that is noise, or a peak too near another to be told apart."""
+    n = before.poles.shape[1]
+    size = np.linalg.norm(before.rest.reshape(2, len(omega), -1), axis=(0, 2))
+    natural, damping = np.exp(before.poles)
+    apart = (np.abs(omega[:, None] - natural) > damping * natural).all(axis=1)  # half a half-power width
+    place = int(np.where(apart, size, 0.0).argmax())
+    width = np.median(before.poles[1]) if n else np.log(_damping(omega, size, place))
+    start = np.column_stack([before.poles, [np.log(omega[place]), width]])
+    after = _fit(omega, data, weight, start[:, np.argsort(start[0])], 5)
+    if after.poles.shape[1] != n + 1:
+        return None
+    natural, damping = np.exp(after.poles)
+    gain = np.square(before.rest).sum() - np.square(after.rest).sum()
+    noise = np.square(after.rest).sum() / (_spare(after.basis) * data.shape[1])
+    near = np.diff(natural) < (damping * natural)[1:]
+    return None if near.any() or gain < GAIN * (2 + data.shape[1]) * noise else after
+
+
+def _basis(omega: np.ndarray, weight: np.ndarray, poles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Weighted columns of modes, of those below and of those above, real over imaginary parts, (2 n, n_modes + 2); and
+    slopes (2, 2 n, n_modes) of the first by logarithms of frequencies and damping ratios, ``poles`` (2, n_modes)."""
+    natural, damping = np.exp(poles)
+    swing = 2j * damping * natural * omega[:, None]
+    under = weight[:, None] / (natural**2 - omega[:, None] ** 2 + swing)
+    modes = -(omega[:, None] ** 2) * under
+    steep = -modes * under / weight[:, None]
+    rest = np.column_stack([weight, -weight * (omega / omega[-1]) ** 2])
+    columns = np.hstack([modes, rest])
+    slopes = np.stack([steep * (2.0 * natural**2 + swing), steep * swing])
+    return np.vstack([columns.real, columns.imag]), np.concatenate([slopes.real, slopes.imag], axis=1)
+
+
+def _refined(omega: np.ndarray, data: np.ndarray, weight: np.ndarray, start: np.ndarray, steps: int):
+    """Logarithms (2, n_modes) of natural frequencies and damping ratios near some, and which of them ran away.
+
+    The products are eliminated (variable projection; Kaufman 1975, BIT 15, 49-57), the rest is a Levenberg-Marquardt
+    search.
+    """
+    n = start.shape[1]
+    middle = 0.5 * (start[0, 1:] + start[0, :-1])
+    low = np.concatenate([[np.log(omega[0])], middle, np.full(n, np.log(DAMPING[0]))])[: 2 * n]
+    high = np.concatenate([middle, [np.log(omega[-1])], np.full(n, np.log(DAMPING[1]))])[-2 * n :]
+    edge = 1e-3 * (high - low)
+    x, caution, cost = np.clip(start.ravel(), low + edge, high - edge), 1e-3, np.inf
+    best = x
+    for _ in range(steps):
+        basis, slopes = _basis(omega, weight, x.reshape(2, n))
+        q, r = np.linalg.qr(basis)
+        products = np.tile(np.linalg.lstsq(r, q.T @ data, rcond=None)[0][:n], (2, 1))  # (2 n_modes, n_channels)
+        rest = data - q @ (q.T @ data)
+        before, cost = cost, float(np.square(rest).sum())
+        if cost >= before:
+            x, cost, caution = best, before, 10.0 * caution
+        else:
+            columns = np.concatenate(list(slopes), axis=1)
+            columns -= q @ (q.T @ columns)
+            square = (columns.T @ columns) * (products @ products.T)
+            slope = ((columns.T @ rest) * products).sum(axis=1)
+            best, caution = x, 0.1 * caution
+            if cost > (1.0 - CLOSE) * before:
+                break
+        step = np.linalg.lstsq(square + caution * np.diag(np.diag(square)), slope, rcond=None)[0]
+        x = np.clip(best + step, low, high)
+    near = (best - low < edge) | (high - best < edge)
+    return best.reshape(2, n), near.reshape(2, n).any(axis=0)
+
+
+def _damping(omega: np.ndarray, size: np.ndarray, i: int) -> float:
+    """Damping ratio [-] by the half-power width of a peak."""
+    below = size < np.sqrt(0.5) * size[i]
+    left = i - int(below[i::-1].argmax()) if below[: i + 1].any() else 0
+    right = i + int(below[i:].argmax()) if below[i:].any() else len(size) - 1
+    return float(np.clip(0.5 * (omega[right] - omega[left]) / omega[i], 10.0 * DAMPING[0], 0.1 * DAMPING[1]))
+
+
+def modes_of(found: Any, driving: Any, points: Any, about: Any) -> tuple[dict[str, Any], list[str]]:
+    """Frequencies, damping ratios, mass-normalised shapes and points of `Modes.from_frf`, and notes."""
+    picked = pick("frf", found, about)
+    drive, used, sign, end = _ends(found, driving)
+    products = sign[:, None] * picked.products[used]
+    own, doubt = products[used.index(drive)], picked.errors[drive]
+    if (own < 0.0).sum() > (own > 0.0).sum():
+        raise ValueError(
+            f"frf has a response at the point struck, {_label(found, drive)}, that moves against the force; change the "
+            "sign of its direction"
+        )
+    told = own > SURE * doubt
+    if not told.any():
+        raise ValueError(f"frf must have a response {_label(found, drive)} at the point struck that moves in its modes")
+    notes = [f"picked from frequency responses, of which {100.0 * picked.left:.2g} % rms are left unexplained"]
+    if not told.all():
+        lost = ", ".join(f"{one:.5g} Hz" for one in picked.frequencies[~told])
+        notes.append(f"modes at {lost} are left out: the point struck hardly moves in them, so that they have no scale")
+    return {
+        "frequencies": picked.frequencies[told], "damping_ratio": picked.damping_ratio[told],
+        "shapes": products[:, told] / np.sqrt(own[told]), "points": _points(found, points, used, end),
+    }, notes  # fmt: skip
+
+
+def _label(found: Any, i: int) -> str:
+    return repr(str(found["channel"].values[i]))
+
+
+def _ends(found: Any, driving: Any) -> tuple[int, list[int], np.ndarray, str]:
+    """The channel at the point struck, the channels along its direction, their signs, and which end moves."""
+    count, names = found.sizes["channel"], [str(name) for name in found["channel"].values]
+    if driving is not None:
+        drive = names.index(check.one_of("driving", driving, names)) if isinstance(driving, str) else check.count(
+            "driving", driving, low=0, high=count - 1
+        )  # fmt: skip
+    if not all(name in found.coords for pair in ENDS for name in pair):
+        if driving is None:
+            raise ValueError("driving must name the channel at the point struck: these responses state no nodes")
+        return drive, list(range(count)), np.ones(count), "place"
+    ways = np.stack([found[name].values.astype(int) for pair in ENDS for name in pair])  # (4, n_channels)
+    if driving is None:
+        same = np.flatnonzero((ways[0] == ways[2]) & (np.abs(ways[1]) == np.abs(ways[3])))
+        if not same.size:
+            raise ValueError(
+                "frf holds no response at the point struck, without which shapes have no scale; measure it, or name it "
+                "by driving="
+            )
+        drive = int(same[0])
+    used = np.flatnonzero((np.abs(ways[1]) == abs(ways[1, drive])) & (np.abs(ways[3]) == abs(ways[3, drive])))
+    moves = [len(set(ways[i, used])) > 1 for i in (0, 2)]
+    if all(moves):
+        raise ValueError(
+            "frf holds responses from several points to several points; pick those of one point struck, or of one "
+            "response, as by frf.isel(channel=[...])"
+        )
+    end = ways[2 if moves[1] else 0, used]
+    if len(set(end)) < len(end):
+        twice = next(int(node) for node in end if (end == node).sum() > 1)
+        raise ValueError(f"frf holds two responses for node {twice}; pick one of them by frf.isel(channel=[...])")
+    sign = np.where(ways[1, used] * ways[3, used] < 0, -1.0, 1.0)
+    return drive, used.tolist(), sign, "struck" if moves[1] else "place"
+
+
+def _points(found: Any, points: Any, used: list[int], end: str) -> np.ndarray:
+    """Points (n_used, dimension) [m], given for all channels or stated in the file."""
+    if points is not None:
+        given = check.array("points", points, (None, None), "m")
+        if len(given) != found.sizes["channel"]:
+            raise ValueError(f"points must be {found.sizes['channel']} points, one for each channel, got {len(given)}")
+        return given[used]
+    if end not in found.coords:
+        raise ValueError("points must be given: these responses state no coordinates (data set 15 or 2411 of a file)")
+    place = np.asarray(found[end].values, float)[used]
+    if not np.isfinite(place).all():
+        raise ValueError("points must be given: a node of these responses has no coordinates")
+    along = abs(int(found["direction"].values[used[0]]))
+    return place[:, universal_files.across(place, "xyz"[along - 1] if 1 <= along <= 3 else "z")]

@@ -1,0 +1,207 @@
+"""`propose`: the model of taps, built up from a wall as long as it predicts taps left out better."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from .._base import check, markup
+from .._base.check import SimulationError
+from ..impact.contact import Contact
+from ..impact.striker import Striker
+from . import solver, windows
+from .fit import fit
+from .found import Found, Watch, profiled
+from .records import Taps
+from .solver import Solution
+from .unknowns import TIME
+
+Ranges = dict[str, tuple[float, float]]
+STIFFNESS = {"contact.stiffness": (1e2, 1e16)}  # of a law of unknown exponent, N/m**exponent: from felt to steel
+EXPONENT = {"contact.exponent": (1.0, 4.0)}
+LOSS = {"contact.loss": (0.0, 20.0)}
+GAIN = 0.9  # [-] of the error at taps left out that a larger model must come below: less is luck of a few taps
+PER_TAP = "stiffness per tap"
+MOST_MODES = 2  # [-] that are tried: a pulse of few samples tells no more
+MASSES = 1e-1, 1e4  # [-] modal masses tried, over that of the hammer: more do not move
+FREQUENCIES = 0.05, 5.0  # [-] of modes tried, times the contact time: below and above they do not shape the pulse
+
+
+@dataclass(frozen=True)
+class Trial:
+    """A model that was tried."""
+
+    name: str
+    inside: str  # the smaller model that it was compared with; "" for the first ones
+    n_unknowns: int  # besides speed and onset of each tap
+    error: float  # [-] rms of the residual over that of the force
+    left_out: float  # [-] the same of taps predicted from the others
+    rescued: bool  # its own search ended above the smaller model, and went on from there
+    taken: bool
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Proposal(check.Brief):
+    """The model proposed, and what was tried on the way to it."""
+
+    found: Found
+    tried: tuple[Trial, ...]
+
+    def summary(self) -> str:
+        """The table of what was tried, and the fit proposed."""
+        head = ("model", "unknowns", "residual", "left out", "")
+        rows = [
+            (one.name, str(one.n_unknowns), f"{100.0 * one.error:.3g} %", f"{100.0 * one.left_out:.3g} %",
+             ", ".join(word for word, said in (("taken", one.taken), ("went on from the smaller one", one.rescued))
+                       if said))
+            for one in self.tried
+        ]  # fmt: skip
+        return "\n".join([*markup.columns(rows, head), self.found.summary()])
+
+
+@check.typed
+def propose(
+    taps: Any,
+    *,
+    striker: Striker,
+    window: Any = None,
+    starts: int = 2,
+    profiles: bool = True,
+    rng: Any = 0,
+    watch: Watch | None = None,
+) -> Proposal:
+    """Find a model of taps: from a wall upwards, as long as taps left out are predicted better.
+
+    A linear and a Hertz contact on a wall, then a free exponent, loss, a springy head, a stiffness for each tap, and
+    modes of the structure one by one are tried, and those that did not serve again after each gain. An addition is kept
+    only if it predicts the taps left out with less than 0.9 of the error. A larger model whose search ends above the
+    smaller one inside it goes on from there, so that it never fits worse.
+
+    The force alone cannot tell a mode of the hammer from one of the structure: a springy head, tried first, may stand
+    for either.
+
+    Parameters
+    ----------
+    taps : Taps, two at least
+        Of `fi.read_taps` or `fi.measure`; their forces are compared.
+    striker : Striker
+        The hammer, rigid.
+    window, starts, profiles, rng, watch
+        As in `fi.fit`; no tap is left out as an outlier.
+
+    Returns
+    -------
+    Proposal
+        ``found`` is as `fi.fit` returns it; ``tried`` lists every model with its errors.
+
+    Raises
+    ------
+    ValueError
+        If there are fewer than two taps, or the striker is not rigid.
+    SimulationError
+        If no model makes a blow that ends.
+
+    Examples
+    --------
+    >>> wall, hammer = fi.Modes.rigid(1e4), fi.Striker.rigid(0.1)
+    >>> hits = [fi.strike(wall, hammer, fi.Contact.hertz(2e8), at=None, speed=v) for v in (0.5, 1.0, 1.5)]
+    >>> taps = [fi.measure(hit, rate=25600.0, noise=5e-3, rng=i) for i, hit in enumerate(hits)]
+    >>> found = fi.propose(taps, striker=hammer)
+    >>> [trial.name for trial in found.tried if trial.taken][-1]
+    'Hertz'
+    """
+    joined = windows.joined(taps)
+    if joined.n_taps < 2:
+        raise ValueError("taps must be two at least, to predict one from the others")
+    if striker.modes.n_modes > 1:
+        raise ValueError("striker must be rigid; a springy head is among what is tried")
+    given = {"striker": striker, "window": window, "starts": starts, "rng": rng, "robust": False, "profiles": False}
+    tried: list[Trial] = []
+    best: Found | None = None
+    for name, law in (("linear", Contact.linear(1e7)), ("Hertz", Contact.hertz(1e7))):
+        one = _fitted(joined, law, dict(STIFFNESS), given)
+        if one is not None:
+            tried.append(_trial(name, "", one, False, False))
+            best = one if best is None or _left_out(one) < GAIN * _left_out(best) else best
+    if best is None:
+        raise SimulationError("no blow of a contact on a wall ends as these taps do; read the taps again")
+    law, name = best.problem.setting.contact, "linear" if best.problem.setting.contact.exponent == 1.0 else "Hertz"
+    tried = [replace(one, taken=one.name == name) for one in tried]
+    ranges, waiting = dict(STIFFNESS), _steps(striker, solver.pulse_length(best.taps), law.exponent)
+    while True:  # what one addition hid may show after another
+        done = {one.name for one in tried}
+        for step in list(waiting):
+            word, more, neutral = step
+            label = f"{name} + {word}"
+            if label in done or (word == "mode 2" and any(each[0] == "mode 1" for each in waiting)):
+                continue
+            own = {"per_tap": "contact.stiffness"} if PER_TAP in label else {}
+            one = _fitted(joined, law, ranges | more, given | own)
+            if one is None:
+                continue
+            one, rescued = _never_worse(one, best, neutral)
+            taken = _left_out(one) < GAIN * _left_out(best)
+            tried.append(_trial(label, name, one, rescued, taken))
+            if taken:
+                best, ranges, name = one, ranges | more, label
+                waiting.remove(step)
+        if len(tried) == len(done):
+            break
+    whole = replace(best, compared={one.name: one.left_out for one in tried}, watch=watch)
+    return Proposal(profiled(whole) if profiles else whole, tuple(tried))
+
+
+def _steps(striker: Striker, length: float, exponent: float) -> list[tuple[str, Ranges, Mapping[str, float]]]:
+    """What is added one after another: its name, its ranges, and the values with which it changes nothing."""
+    band = FREQUENCIES[0] / length, FREQUENCIES[1] / length
+    heavy = MASSES[0] * striker.mass, MASSES[1] * striker.mass
+    head: Ranges = {"striker.first_frequency": band, "striker.mode_ratio": (1e-4, 10.0)}
+    steps: list[tuple[str, Ranges, Mapping[str, float]]] = [
+        ("exponent", EXPONENT, {"contact.exponent": exponent}),
+        ("loss", LOSS, {"contact.loss": 0.0}),
+        ("springy head", head, {"striker.first_frequency": band[1], "striker.mode_ratio": 1e-4}),
+        (PER_TAP, {}, {}),
+    ]
+    for i in range(1, MOST_MODES + 1):
+        mode: Ranges = {f"mode{i}.frequency": band, f"mode{i}.mass": heavy, f"mode{i}.damping": (0.0, 0.5)}
+        still = {f"mode{i}.frequency": band[1], f"mode{i}.mass": heavy[1], f"mode{i}.damping": 0.02}
+        steps.append((f"mode {i}", mode, still))
+    return steps
+
+
+def _fitted(taps: Taps, law: Contact, ranges: Ranges, given: Mapping[str, Any]) -> Found | None:
+    """The fit of one model; None if its blows do not end."""
+    try:
+        found = fit(taps, contact=law, unknown=ranges, **given)
+        found.left_out()  # what no others predict is no model either
+        return found
+    except SimulationError:
+        return None
+
+
+def _never_worse(one: Found, smaller: Found, neutral: Mapping[str, float]) -> tuple[Found, bool]:
+    """A larger model at least as good as the smaller one inside it, and whether it had to go on from that."""
+    if one.error <= smaller.error:
+        return one, False
+    values = smaller.problem.values(smaller.best.x) | dict(neutral)
+    values[TIME] = one.problem.setting.contact_time(values)
+    shared = np.clip(
+        [float(each.inside(values[each.name])) for each in one.problem.free], *(
+            bound[: one.problem.n_shared] for bound in one.problem.bounds
+        )
+    )  # fmt: skip
+    rest = smaller.best.x[smaller.problem.n_shared :]  # momenta, onsets and own values of the same taps
+    apart = np.zeros(len(one.best.x) - len(shared) - len(rest))
+    best: Solution = solver.solve(one.problem, np.concatenate([shared, rest, apart]))
+    return (replace(one, best=best), True) if best.cost < one.best.cost else (one, False)
+
+
+def _left_out(found: Found) -> float:
+    return float(np.sqrt(np.mean([each.error**2 for each in found.left_out()])))
+
+
+def _trial(name: str, inside: str, found: Found, rescued: bool, taken: bool) -> Trial:
+    return Trial(
+        name, inside, found.problem.n_values - 2 * len(found.used), found.error, _left_out(found), rescued, taken
+    )

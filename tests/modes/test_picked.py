@@ -1,0 +1,123 @@
+"""Modes picked from frequency responses of known modes: frequencies, damping, shapes, and what is refused."""
+
+import numpy as np
+import pytest
+import xarray as xr
+from scipy.signal import find_peaks
+
+import fem_impact as fi
+from fem_impact.modes import picked
+
+POINTS = np.array([[0.1, 0.09], [0.2, 0.1], [0.3, 0.2], [0.37, 0.11]])  # m
+FREQUENCY = np.arange(0.0, 600.0, 1.0)  # Hz
+
+
+@pytest.fixture(scope="module")
+def plate():
+    return fi.analytic.rectangle(0.465, 0.3, mass=0.188, first_frequency=100.0, n_modes=40, damping_ratio=0.01)
+
+
+def responses(modes, points=POINTS, noise=1e-3, unit="m/s^2/N", kind="accelerance", **coords):
+    rng = np.random.default_rng(0)
+    H = np.zeros((len(FREQUENCY), len(points)), complex)
+    for k, point in enumerate(points):
+        H[1:, k] = fi.mobility(modes, points[0], point, FREQUENCY[1:], kind)
+    H += noise * np.abs(H).max() * (rng.standard_normal(H.shape) + 1j * rng.standard_normal(H.shape))
+    given = {"frequency": FREQUENCY, "channel": [f"p{k}" for k in range(len(points))]}
+    given |= {"units": ("channel", [unit] * len(points))} | {name: ("channel", each) for name, each in coords.items()}
+    return xr.Dataset({"H": (("frequency", "channel"), H)}, given)
+
+
+def nodes(count, signs=1):
+    """A roving sensor along z, the first at the point struck."""
+    return {"node": np.arange(count), "direction": 3 * signs * np.ones(count, int), "reference": np.zeros(count, int),
+            "reference_direction": np.full(count, 3)}  # fmt: skip
+
+
+@pytest.mark.parametrize(("unit", "kind"), [("m/s^2/N", "accelerance"), ("m/s/N", "mobility"), ("m/N", "receptance")])
+def test_known_modes_are_found_again(plate, unit, kind):
+    found = fi.Modes.from_frf(responses(plate, unit=unit, kind=kind), mass=0.188, points=POINTS, driving="p0")
+    for wanted in (0, 1, 2, 3, 4):  # the next two, 6 Hz apart, are one peak of one row of responses
+        i = int(np.abs(found.frequencies - plate.frequencies[wanted]).argmin())
+        assert found.frequencies[i] == pytest.approx(plate.frequencies[wanted], rel=1e-3)
+        assert found.damping_ratio[i] == pytest.approx(0.01, rel=0.06)
+        assert fi.mac(found.shape_at(POINTS)[:, [i]], plate.shape_at(POINTS)[:, [wanted]])[0, 0] > 0.99
+        assert np.abs(found.shape_at(POINTS)[0, i]) == pytest.approx(abs(plate.shape_at(POINTS)[0, wanted]), rel=0.05)
+
+
+def test_what_modes_left_out_yield_is_told_as_unknown(plate):
+    found = fi.Modes.from_frf(responses(plate), mass=0.188, points=POINTS, driving=0)
+    assert "compliance" in found.unstated
+    assert any("static compliance is not given" in note for note in found.notes)
+    assert any("% rms are left unexplained" in note for note in found.notes)
+
+
+def test_nodes_tell_the_point_struck_and_signs_of_directions(plate):
+    signs = np.array([1, -1, 1, -1])
+    given = responses(plate, **nodes(4, signs))
+    given["H"] = given["H"] * xr.DataArray(signs, dims="channel")
+    found = fi.Modes.from_frf(given, mass=0.188, points=POINTS)
+    plain = fi.Modes.from_frf(responses(plate), mass=0.188, points=POINTS, driving=0)
+    assert np.allclose(found.shape_at(POINTS), plain.shape_at(POINTS))
+    hammer = nodes(4)
+    hammer["node"], hammer["reference"] = hammer["reference"], hammer["node"]  # by reciprocity
+    roving = fi.Modes.from_frf(responses(plate, **hammer), mass=0.188, points=POINTS)
+    assert np.allclose(roving.shape_at(POINTS), plain.shape_at(POINTS))
+
+
+def test_modes_are_sought_where_told(plate):
+    found = fi.Modes.from_frf(responses(plate), mass=0.188, points=POINTS, driving=0, frequencies=[101.0, 190.0])
+    assert found.frequencies == pytest.approx(plate.frequencies[:2], rel=5e-3)
+
+
+def test_frequency_responses_serve_update_and_matched(plate):
+    given = responses(plate)
+    found = fi.update(lambda values: plate.scaled(first_frequency=values["f"]), given, {"f": (90.0, 115.0)})
+    assert found.values["f"] == pytest.approx(100.0, rel=2e-3)
+    assert fi.matched(given, plate)[0].measured_frequency == pytest.approx(100.0, rel=1e-3)
+
+
+def test_damping_of_a_window_is_taken_off(plate):
+    tau = 0.5  # s
+    given = responses(plate.damped(plate.damping_ratio + 1.0 / (tau * plate.omega)))
+    given.attrs["added_damping"] = 1.0 / tau
+    found = fi.Modes.from_frf(given, mass=0.188, points=POINTS, driving=0)
+    assert found.damping_ratio[0] == pytest.approx(0.01, rel=0.05)
+
+
+def test_peaks_are_those_that_stand_out():
+    x = np.exp(np.cumsum(np.random.default_rng(0).standard_normal(2000)) * 0.5)
+    assert np.array_equal(picked.peaks(x), find_peaks(np.log(x), prominence=picked.PROMINENCE)[0])
+
+
+@pytest.mark.parametrize(
+    ("change", "arguments", "text"),
+    [
+        ({}, {}, "driving must name the channel at the point struck"),
+        ({}, {"driving": "p9"}, "driving must be one of"),
+        ({}, {"driving": 0, "points": POINTS[:2]}, "points must be 4 points"),
+        ({}, {"driving": 0, "points": None}, "points must be given"),
+        ({}, {"driving": 0, "frequencies": [700.0]}, "frequencies must lie within"),
+        ({"unit": "g/N"}, {"driving": 0}, "frf.units must be one of"),
+        (nodes(4) | {"reference": np.full(4, 9)}, {}, "no response at the point struck"),
+        (nodes(4) | {"reference": np.array([0, 0, 1, 1])}, {}, "from several points to several points"),
+        (nodes(4) | {"node": np.array([0, 1, 1, 2])}, {}, "two responses for node 1"),
+        (nodes(4) | {"direction": np.array([-3, 3, 3, 3])}, {}, "moves against the force"),
+    ],
+)
+def test_what_gives_no_modes_is_refused(plate, change, arguments, text):
+    given = {"mass": 0.188, "points": POINTS, **arguments}
+    with pytest.raises(ValueError, match=text):
+        fi.Modes.from_frf(responses(plate, **change), **given)
+
+
+@pytest.mark.parametrize("wrong", [3, None, np.zeros(4), xr.Dataset()])
+def test_other_things_are_refused(wrong):
+    with pytest.raises(ValueError, match="frf must be frequency responses as"):
+        fi.Modes.from_frf(wrong, mass=1.0)
+
+
+def test_flat_responses_have_no_modes():
+    flat = responses(fi.Modes.rigid(1.0), points=np.zeros((1, 0)), noise=0.0)
+    with pytest.raises(ValueError, match="frf has no peaks that are modes"):
+        fi.Modes.from_frf(flat, mass=1.0, points=[[0.0]], driving=0)

@@ -1,0 +1,122 @@
+"""Universal files of frequency responses, as pyuff and others write them: read whole, or refused with what is wrong."""
+
+import struct
+
+import numpy as np
+import pytest
+
+import fem_impact as fi
+from fem_impact.taps import transfer
+
+pyuff = pytest.importorskip("pyuff")
+# its writer leaves binary files open
+pytestmark = pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionWarning")
+X = np.arange(1.0, 201.0)  # Hz
+H = -(X**2) / (100.0**2 - X**2 + 2j * X)  # 1/kg
+
+
+def response(node, data=H, **codes):
+    return {
+        "type": 58, "binary": 0, "func_type": 4, "rsp_node": node, "rsp_dir": 3, "ref_node": 1, "ref_dir": 3,
+        "ord_data_type": 6, "abscissa_spacing": 1, "abscissa_min": 1.0, "abscissa_inc": 1.0, "num_pts": len(data),
+        "abscissa_spec_data_type": 18, "ordinate_spec_data_type": 12, "orddenom_spec_data_type": 13, "x": X,
+        "data": data, "id1": f"point {node}", "id2": "NONE", "id3": "NONE", "id4": "NONE", "id5": "NONE",
+        "rsp_ent_name": "NONE", "ref_ent_name": "NONE", "z_axis_value": 0.0, "ver_num": 0, "load_case_id": 0, **codes,
+    }  # fmt: skip
+
+
+NODES = {"type": 15, "node_nums": [1, 2], "def_cs": [0, 0], "disp_cs": [0, 0], "color": [1, 1], "x": [0.1, 0.3],
+         "y": [0.0, 0.0], "z": [0.0, 0.0]}  # fmt: skip
+
+
+def written(path, *sets):
+    pyuff.UFF(str(path)).write_sets(list(sets), mode="overwrite")
+    return path
+
+
+def by_hand(values, code=12, units="g", kind=5):
+    """A data set 58 as the format has it, single precision: six columns of 13 characters."""
+    numbers = "".join(f"{x:13.5e}" for x in np.column_stack([values.real, values.imag]).ravel())
+    rows = "\n".join(numbers[i : i + 78] for i in range(0, len(numbers), 78))
+    axis = "{:10d}    0    0    0 {:<20} {:<20}"
+    head = [
+        "    -1", "    58", "FRF by hand", "NONE", "24-NOV-20 10:00:00", "NONE", "NONE",
+        f"{4:5d}{0:10d}{0:5d}{0:10d} {'NONE':<10}{2:10d}{3:4d} {'NONE':<10}{1:10d}{-3:4d}",
+        f"{kind:10d}{len(values):10d}{1:10d}{1.0:13.5e}{1.0:13.5e}{0.0:13.5e}",
+        axis.format(18, "Frequency", "Hz"), axis.format(code, "Acceleration", units), axis.format(13, "Force", "N"),
+        axis.format(0, "NONE", "NONE"),
+    ]  # fmt: skip
+    return "\n".join([*head, rows, "    -1", ""])
+
+
+def test_a_file_tells_ends_coordinates_and_coherence(tmp_path):
+    sure = [response(k, np.full(200, 0.9), func_type=6, ord_data_type=4) for k in (1, 2)]
+    found = transfer.arrays(written(tmp_path / "a.uff", NODES, response(1), response(2, 0.5 * H, binary=1), *sure))
+    assert np.allclose(found["H"], np.column_stack([H, 0.5 * H]), rtol=1e-9)
+    assert found["ways"].tolist() == [[1, 3, 1, 3], [2, 3, 1, 3]] and (found["coherence"] == 0.9).all()
+    assert found["place"].tolist() == [[0.1, 0.0, 0.0], [0.3, 0.0, 0.0]]
+    assert found["struck"].tolist() == [[0.1, 0.0, 0.0]] * 2
+
+
+def test_a_file_gives_modes_as_it_stands_and_after_writing_again(tmp_path):
+    given = fi.frf(written(tmp_path / "a.uff", NODES, response(1), response(2, 0.5 * H)))
+    modes = fi.Modes.from_frf(given, mass=2.0)
+    assert modes.frequencies == pytest.approx([100.0], rel=1e-6) and modes.damping_ratio == pytest.approx([0.01])
+    assert modes.shape_at([[0.1], [0.3]]).ravel() == pytest.approx([1.0, 0.5], rel=1e-4)
+    assert modes.unstated and "node" in given.coords
+    transfer.write_uff(tmp_path / "b.uff", given)
+    again = transfer.arrays(tmp_path / "b.uff")
+    assert again["ways"].tolist() == [[1, 3, 1, 3], [2, 3, 1, 3]] and np.allclose(again["H"], given.H, rtol=1e-4)
+
+
+def test_a_file_by_hand_with_its_own_units(tmp_path):
+    path = tmp_path / "hand.uff"
+    path.write_text(by_hand(H))
+    found = transfer.arrays(path)
+    assert np.allclose(found["H"][:, 0], 9.80665 * H, rtol=1e-4) and found["units"] == ["m/s^2/N"]
+    assert found["ways"].tolist() == [[2, 3, 1, -3]] and "place" not in found
+    path.write_text(by_hand(H, code=0, units="mm/s/N"))
+    assert np.allclose(transfer.arrays(path)["H"][:, 0], 1e-3 * H, rtol=1e-4)
+
+
+def test_without_a_code_of_the_denominator_force_is_assumed_and_told(tmp_path):
+    found = transfer.arrays(written(tmp_path / "a.uff", response(1, orddenom_spec_data_type=0)))
+    assert found["notes"].tolist() == ["point 1: what it is divided by is not stated, N assumed"]
+
+
+@pytest.mark.parametrize(
+    ("sets", "text"),
+    [
+        ([response(1, np.abs(H), ord_data_type=4)], "magnitudes only of 'point 1'"),
+        ([response(1, abscissa_spec_data_type=17)], "over something else than frequency"),
+        ([response(1, x=X[::-1])], "frequencies of 'point 1' that do not ascend"),
+        ([response(1, orddenom_spec_data_type=12)], "no motion per force"),
+        ([response(1, ordinate_spec_data_type=13)], "no motion per force"),
+        ([response(1), response(1, np.full(200, 2.0), func_type=6, ord_data_type=4)], "coherence that is not between"),
+        ([response(1, np.where(X == 50.0, np.inf, H))], "no finite number"),
+        ([NODES], "holds data sets 15, no frequency responses"),
+    ],
+)
+def test_a_wrong_file_is_refused(tmp_path, sets, text):
+    with pytest.raises(ValueError, match=text) as caught:
+        transfer.arrays(written(tmp_path / "a.uff", *sets))
+    assert "\n" not in str(caught.value)
+
+
+def test_a_spoiled_file_is_refused(tmp_path):
+    cut = tmp_path / "cut.uff"
+    cut.write_text(by_hand(H)[:-3000])
+    with pytest.raises(ValueError, match="ends within a data set; it may be cut off"):
+        transfer.arrays(cut)
+    fewer = tmp_path / "fewer.uff"
+    fewer.write_text(by_hand(H).replace(f"{200:10d}", f"{250:10d}"))
+    with pytest.raises(ValueError, match="states 250 samples of 'FRF by hand' and holds 200"):
+        transfer.arrays(fewer)
+    worn = written(tmp_path / "worn.uff", NODES, response(1, binary=1))
+    worn.write_bytes(worn.read_bytes().replace(struct.pack("<d", H[49].real), struct.pack("<d", np.nan)))
+    with pytest.raises(ValueError, match="has a value of 'point 1' that is no finite number"):
+        transfer.arrays(worn)
+    other = tmp_path / "other.uff"
+    other.write_text(by_hand(H, code=8))
+    with pytest.raises(ValueError, match="states the unit 'g' for 'FRF by hand', whose code 8 means m"):
+        transfer.arrays(other)
