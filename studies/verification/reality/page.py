@@ -72,6 +72,7 @@ def drawn(experiment: Experiment, verdicts: Sequence[Verdict]) -> Any:
         axes.grid(axis="y", visible=False)
         axes.use_sticky_edges = False
         axes.margins(x=0.05)
+        axes.locator_params(axis="x", nbins=6)
         axes.legend(loc="upper left", bbox_to_anchor=(1.0, 1.0))
     return figure
 
