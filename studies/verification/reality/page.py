@@ -15,10 +15,10 @@ from fem_impact.show.style import BLUE, SKY, VERMILION, opened
 sys.path.append(str(Path(__file__).parents[1]))  # of this package
 sys.path.append(str(Path(__file__).parents[2]))  # of `shared`
 import shared
-from reality import copper, leeb, small_ball, spruce, steel_cantilever, taps
+from reality import copper, kettledrum, leeb, small_ball, spruce, steel_cantilever, taps
 from reality.record import Experiment, Verdict, judge
 
-EXPERIMENTS = tuple(each for part in (taps, small_ball, leeb, copper, steel_cantilever, spruce)
+EXPERIMENTS = tuple(each for part in (taps, small_ball, leeb, kettledrum, copper, steel_cantilever, spruce)
                     for each in part.EXPERIMENTS)  # fmt: skip
 PAGE = Path(__file__).parent / "README.md"
 LINE = 120  # [-] characters
@@ -46,10 +46,6 @@ Their numbers could not be read in a text at hand, only abstracts or first pages
   1941; Raman 1920), spheres on free and clamped beams (arXiv 2207.00795) and on a membrane (arXiv 2208.11089), bars of
   xylophones (Chaigne and Doutaut 1997, Rucz 2021), a splash cymbal (Vibration 2024, 7, 146): no number without the
   tables.
-- Ratios of a kettledrum's frequencies without its kettle, 1.48, 1.92, 2.36 and 2.78 (T. Rossing 1982, quoted at
-  wtt.pauken.org): 1.47, 1.93, 2.37 and 2.81 with the head in a wall at 4 kN/m, 1.43, 1.83, 2.23 and 2.61
-  without one, where
-  `fi.in_air` states an error of 10 to 25 %. Its tension and its rim are not known.
 """
 
 
@@ -76,6 +72,7 @@ def drawn(experiment: Experiment, verdicts: Sequence[Verdict]) -> Any:
         axes.grid(axis="y", visible=False)
         axes.use_sticky_edges = False
         axes.margins(x=0.05)
+        axes.locator_params(axis="x", nbins=6)
         axes.legend(loc="upper left", bbox_to_anchor=(1.0, 1.0))
     return figure
 

@@ -35,7 +35,7 @@ EXPERIMENTS = (
         licence="page of a university; one number",
         rig="steel plate of 50 mm, steel ball of 1.58 mm diameter, contact from the width of the first wave to arrive",
         known={
-            "speed": "0.3 to 2 m/s: dropped by hand, second bounce", "contact stiffness": "within 3 %",
+            "speed": "0.3 to 2 m/s, assumed: a fall of 5 to 200 mm", "contact stiffness": "within 3 %",
             "yield strength": "0.6 to 2 GPa, taken as error of the model",
         },
         left_open="the height of the drop, the steels",
