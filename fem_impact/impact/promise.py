@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from .._base import explained
-from .._base.check import SimulationError, ToleranceWarning
+from .._base.check import REACH, SimulationError, ToleranceWarning
 from ..modes.modal import Modes
 from ..modes.shapes import FieldShapes
 from . import accuracy
@@ -154,7 +154,7 @@ def _modes_needed(hit: "Response", body: int, tolerance: float, softer: float = 
     for point, (i, _) in zip(ends.points, ends.touched):
         law = replace(hit.contacts[i], stiffness=softer * hit.contacts[i].stiffness)
         inverse = float((h.shape[i, (h.omega == 0.0) & ~own] ** 2).sum())  # of the mass that the body feels
-        speed = float(np.abs(h._column(1)[:, i]).max(initial=0.0))
+        speed = min(REACH, float(np.abs(h._column(1)[:, i]).max(initial=0.0)))
         if not inverse or not speed:
             continue
         share = allowed * CAUTION[not hit.error.resolvable] / (accuracy.LOSSY if law.rated else 1.0)
