@@ -37,8 +37,8 @@ def first_zero(value, step, end, falling):
 
 def exact(history, *, wait):
     """Follow a history's blow from its start; no new impact is looked for later than ``wait`` [s] after a release."""
-    w, u, k = history.omega, history.shape[0], history.law["stiffness"][0]
-    k = k / (1.0 + k * history.law["compliance"][0])
+    w, u, (k, _, _, compliance, *_) = history.omega, history.shape[0], history.law.tolist()[0]
+    k = k / (1.0 + k * compliance)
     square, vectors = np.linalg.eigh(np.diag(w**2) + k * np.outer(u, u))
     rate = np.sqrt(square.clip(0.0))
     seen = vectors.T @ u

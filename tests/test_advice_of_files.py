@@ -296,7 +296,7 @@ FILES = [  # what reads the file, of what it is refused, a pattern of the messag
      {"sets": {"rim": [None, np.array([0])]}}),
     (raw, {"triangles": np.zeros((2, 4), int)}, r"has a \S+ without exactly \S+ nodes; export it again", {}),
     (raw, {"triangles": TRIANGLES + 1}, r"has a cell with node \S+ but only \S+ nodes; export it again", {}),
-    (functions_of, {"first": "                 nan"}, "no finite numbers; export it again", {}),
+    (functions_of, {"first": "                 nan"}, "is no finite number; export it again, or cut it out", {}),
     (functions_as_taps, {}, "no time records; export those, or give the path of frequency responses to fi.frf",
      lambda f: fi.frf(f / "h.uff")),
     (matlab, {"version": "-v7.3"}, "is a MATLAB 7.3 file; save it with '-v7' and try again", {"version": "-v7"}),

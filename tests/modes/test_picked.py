@@ -119,5 +119,7 @@ def test_other_things_are_refused(wrong):
 
 def test_flat_responses_have_no_modes():
     flat = responses(fi.Modes.rigid(1.0), points=np.zeros((1, 0)), noise=0.0)
-    with pytest.raises(ValueError, match="frf has no peaks that are modes"):
+    with pytest.raises(
+        ValueError, match="frf has no peaks that are modes; give frequencies= near which they are sought"
+    ):
         fi.Modes.from_frf(flat, mass=1.0, points=[[0.0]], driving=0)

@@ -87,7 +87,7 @@ def test_without_a_code_of_the_denominator_force_is_assumed_and_told(tmp_path):
 @pytest.mark.parametrize(
     ("sets", "text"),
     [
-        ([response(1, np.abs(H), ord_data_type=4)], "magnitudes only of 'point 1'"),
+        ([response(1, np.abs(H), ord_data_type=4)], "magnitudes only of 'point 1'; export complex responses"),
         ([response(1, abscissa_spec_data_type=17)], "over something else than frequency"),
         ([response(1, x=X[::-1])], "frequencies of 'point 1' that do not ascend"),
         ([response(1, orddenom_spec_data_type=12)], "no motion per force"),
