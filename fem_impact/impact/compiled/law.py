@@ -129,7 +129,7 @@ def compression(d, spring):
         return d / (1.0 + k * c)
     low = 0.0
     high = d
-    x = min(d, (d / (k * c)) ** (1.0 / a)) if c > 0.0 else d  # rounding may leave a compliance just below zero
+    x = min(d, (d / (k * c)) ** (1.0 / a))
     for _ in range(200):
         f, _ = pushed(x, spring)
         r = x + c * f - d

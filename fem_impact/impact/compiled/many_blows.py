@@ -353,7 +353,8 @@ def opening(d0, free, own, spring, loss):
 
     The step's own force is integrated against the law, not held to one slope: the struck surface answers at once, so
     that the way the force ends sets the moment to second order. Free motion and kernel within the step are parabolas
-    but for the fastest modes, whose static compliance joins that of the contact. ``loss`` is over the step [1/m].
+    but for the fastest modes, whose static compliance joins that of the contact; extrapolated, it may come out below
+    zero, and is none then. ``loss`` is over the step [1/m].
     """
     swift = own.end + 12.0 * own.mean_ramp
     start = d0 + swift * at(d0, spring).force
@@ -362,7 +363,7 @@ def opening(d0, free, own, spring, loss):
     k, c = spring.stiffness, spring.compliance + swift
     if spring.exponent == 1.0:  # the two springs in series as one: no division below
         k, c = k / (1.0 + k * c), 0.0
-    soft = simple(k, spring.exponent, 0.0, c)
+    soft = simple(k, spring.exponent, 0.0, max(0.0, c))
     fast = 6.0 * (own.mean - swift) - 2.0 * (own.end - swift)
     slow = 3.0 * (own.end - swift) - 6.0 * (own.mean - swift)
     dt = 1.0 / PIECES
