@@ -12,7 +12,7 @@ from .._base.rounding import EPSILON
 from ..fe import plausible
 from ..fe.section import KINDS, Plate
 from .modal import Damping, Modes
-from .request import check_number, request
+from .request import check_beyond_rigid, check_number, request
 from .shapes import Shapes
 
 DISK_TERMS = 100_000  # [-] most terms summed at the edge of a disk, where they only fall as n**-3; error 5e-11
@@ -236,8 +236,7 @@ def disk(
         while n_rigid + _count(z, n) < count:
             limit *= 1.2
             z, n, weight = _roots(edge, ratio, limit)
-    if count <= n_rigid:
-        raise ValueError(f"n_modes must exceed the {n_rigid} rigid motions; max_frequency must reach a flexible mode")
+    check_beyond_rigid(count, n_rigid, "flexible")
     rigid = np.array([(0.0, 0, 0.0, 0.0), (0.0, 1, 0.0, 0.0), (0.0, 1, 0.0, np.pi / 2)][:n_rigid]).reshape(-1, 4)
     twice = np.repeat(np.arange(len(z)), np.where(n == 0, 1, 2))
     second = np.append(False, twice[1:] == twice[:-1])

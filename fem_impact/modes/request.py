@@ -91,3 +91,9 @@ def check_number(about: float, most: int) -> None:
     """Raise ValueError if more than ``most`` modes lie below max_frequency."""
     if about > most:
         raise ValueError(f"max_frequency must give at most {most} modes of this body, got about {about:.2g}; lower it")
+
+
+def check_beyond_rigid(count: int, n_rigid: int, kind: str) -> None:
+    """Raise ValueError if so many modes hold rigid motions only, and none of a kind."""
+    if count <= n_rigid:
+        raise ValueError(f"n_modes must exceed the {n_rigid} rigid motions; max_frequency must reach a {kind} mode")

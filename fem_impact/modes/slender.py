@@ -13,7 +13,7 @@ from ..fe.section import KINDS, Beam
 from . import timoshenko
 from .modal import Damping, Modes
 from .rectangle import MOST_MODES
-from .request import Request, check_number, request
+from .request import Request, check_beyond_rigid, check_number, request
 from .shapes import BeamlikeShapes
 from .timoshenko import ENDS
 
@@ -181,8 +181,7 @@ def beam(
     if np.isfinite(reach):
         check_number(np.sqrt(reach) / np.pi, MOST_MODES)
         count = len(rigid) + int(np.count_nonzero(_roots(pair, int(np.sqrt(reach) / np.pi) + 2) ** 2 <= reach))
-    if count <= len(rigid):
-        raise ValueError(f"n_modes must exceed the {len(rigid)} rigid motions; max_frequency must reach a bending mode")
+    check_beyond_rigid(count, len(rigid), "bending")
     k = _roots(pair, count - len(rigid))
     weights = np.vstack([np.column_stack([rigid, np.zeros_like(rigid)]), _weights(pair, k)])
     shapes = BeamShapes(length, pair, np.concatenate([np.zeros(len(rigid)), k]), weights)
@@ -224,8 +223,7 @@ def _timoshenko(
     if np.isfinite(reach):
         count = int(stout.count(ends, np.array([reach**2]))[0])
         check_number(count, timoshenko.MOST)
-    if count <= len(rigid):
-        raise ValueError(f"n_modes must exceed the {len(rigid)} rigid motions; max_frequency must reach a bending mode")
+    check_beyond_rigid(count, len(rigid), "bending")
     p = stout.values(ends, len(rigid), count - len(rigid))
     weights = np.vstack([np.column_stack([rigid, np.zeros_like(rigid)]), stout.weights(ends, p)])
     values = np.concatenate([np.zeros(len(rigid)), p])

@@ -75,7 +75,7 @@ class Cases:
 
     @property
     def quick(self) -> bool:
-        """Whether all cases are computed together."""
+        """Whether all cases are computed together, and none with loss, which takes longer."""
         exponents = self.axes.get("exponent", [self.base.contact.exponent])
         special = self.base.contact.special or ALONE & set(self.axes)
         alone = self.lossy or special or self.extra or self.base.modes.stretches

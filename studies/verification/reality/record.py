@@ -9,7 +9,8 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-LEVELS = (0.05, 0.95)  # [-] ends of a band: nine tenths lie between them
+from fem_impact.scenes.band import ENDS
+
 SEED, DRAWS = 0, 20_000  # of the errors drawn, and how many at least
 
 
@@ -38,7 +39,7 @@ class Predicted:
         shape = values.shape
         off = rng.uniform(-self.computation, self.computation, shape) + self.model * rng.standard_normal(shape)
         read = values * (1.0 + off) + errors / 1.645 * rng.standard_normal(shape)
-        return np.quantile(read, LEVELS, axis=0)
+        return np.quantile(read, ENDS, axis=0)
 
 
 @dataclass(frozen=True)
