@@ -1,6 +1,7 @@
 """Assemble the stiffness and mass matrices of a body from its mesh, section and supports."""
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -14,9 +15,11 @@ from .euler import EULER
 from .interpolation import Interpolation
 from .kirchhoff import ARGYRIS, MORLEY
 from .section import KINDS, Beam, Elastic, Plate, evaluate
+from .shallow import SHALLOW
 from .shear_beam import TIMOSHENKO
 from .splitting import towards_points
 from .springs import check_masses, check_posts
+from .supports import support_of_facets
 from .system import System, notes_on
 from .theory import Body, Strain, Theory, integrals, plain_kinds, scatter
 from .thick import MINDLIN
@@ -27,7 +30,7 @@ __all__ = [
 ]  # fmt: skip
 
 # the first of a dimension, and of a theory, is the default
-EVERY: tuple[Theory, ...] = ARGYRIS, MORLEY, MINDLIN, EULER, TIMOSHENKO
+EVERY: tuple[Theory, ...] = ARGYRIS, MORLEY, MINDLIN, SHALLOW, EULER, TIMOSHENKO
 BY_ELEMENT = {each.element: each for each in EVERY}
 THEORIES = {n: tuple(dict.fromkeys(each.name for each in EVERY if each.dimension == n)) for n in (2, 1)}
 THICK = tuple(each.name for each in EVERY if each.thick)  # theories with shear and rotary inertia
@@ -48,6 +51,8 @@ def assemble(
     near: Any = None,
     coarseness: float = 1.0,
     graded: bool = True,
+    rise: Any = None,
+    in_plane: Mapping[str, str] | None = None,
 ) -> System:
     """Assemble stiffness and mass of a body supported at its named edges.
 
@@ -78,6 +83,12 @@ def assemble(
         times its square.
     graded : bool
         Whether to put rings of shrinking triangles at corners where the supports make the solution singular.
+    rise : function of points (n, 2) [m] returning (n,) [m], optional
+        Height of the unloaded surface of a curved plate above its outline, towards the striker: your own, or one of
+        `fi.rise`. Such a shell must be shallow, with slopes below some 0.1.
+    in_plane : dict, name of an edge -> "held", "free" or "sliding", optional
+        How edges are held in the plane of a plate, for curved and stretched ones; sliding is held along the edge and
+        free across it. By default hinged and clamped edges are held, others are free.
 
     Returns
     -------
@@ -95,7 +106,18 @@ def assemble(
     >>> round(system.mass, 6)  # kg
     0.188325
     """
-    theory = check.one_of("theory", THEORIES[mesh.dimension][0] if theory is None else theory, THEORIES[mesh.dimension])
+    shaped: dict[str, Any] = {"rise": rise, "in_plane": in_plane}
+    shaped = {name: value for name, value in shaped.items() if value is not None}
+    if shaped:
+        if not isinstance(section, Plate):
+            raise ValueError(f"section must be a Plate for {', '.join(shaped)}, got {check.shown(section)}")
+        section = replace(section, **shaped)
+    plane = isinstance(section, Plate) and not section.plain
+    usual = SHALLOW.name if plane else THEORIES[mesh.dimension][0]
+    theory = check.one_of("theory", usual if theory is None else theory, THEORIES[mesh.dimension])
+    if plane and theory != usual:
+        why = "a plate that is curved, ribbed or unevenly layered"
+        raise ValueError(f"theory must be {usual!r} for {why}, got {theory!r}")
     known = {each.element: each for each in EVERY if each.name == theory}
     rules = known[check.one_of("element", next(iter(known)) if element is None else element, tuple(known))]
     supports = {} if supports is None else supports
@@ -205,30 +227,3 @@ def clamped(supports: Any, n_clamps: int) -> dict[str, Any]:
 def support_words(theory: str | None) -> tuple[str, ...]:
     """Words for the support of an edge, besides `Elastic`."""
     return next((each.words for each in EVERY if each.name == theory), KINDS)
-
-
-def support_of_facets(mesh: Mesh, supports: dict[str, Any], allowed: tuple[str, ...] = KINDS) -> list[str | Elastic]:
-    """The support of each facet; ``allowed`` are the words besides `Elastic`."""
-    if not isinstance(supports, dict):
-        raise ValueError(f"supports must be a dict of edge name -> support, got {check.shown(supports)}")
-    for name, kind in supports.items():
-        if name not in mesh.edges:
-            raise ValueError(
-                f"supports names edge {name!r}, but the mesh has the edges {', '.join(sorted(mesh.edges)):.300}"
-                + check.nearest(name, mesh.edges)
-            )
-        if not isinstance(kind, Elastic):
-            check.one_of(f"supports[{name!r}]", kind, allowed)
-    kinds: list[str | Elastic] = ["free"] * len(mesh.facets)
-    stated: dict[int, str] = {}
-    for name in sorted(supports, key=lambda name: -len(mesh.edges[name])):
-        mine = mesh.edges[name].tolist()
-        for facet in mine:
-            before = stated.get(facet)
-            nested = before is not None and set(mine) < set(mesh.edges[before].tolist())
-            if before is not None and not nested and kinds[facet] != supports[name]:
-                raise ValueError(
-                    f"supports must agree where edges overlap; edge {before!r} and edge {name!r} overlap but differ"
-                )
-            kinds[facet], stated[facet] = supports[name], name
-    return kinds

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 from scipy.linalg import eigh, solve_triangular
-from scipy.sparse import csc_matrix
+from scipy.sparse import csc_matrix, eye_array
 from scipy.sparse.linalg import splu
 from threadpoolctl import ThreadpoolController
 
@@ -84,6 +84,11 @@ class Flexibility:
         return Flexibility, (self.K, self.M, self.rigid, self.sprung, self.pull, self.held)
 
     @cached_property
+    def moving(self) -> np.ndarray:
+        """Unknowns that have inertia."""
+        return np.flatnonzero(self.M.diagonal())
+
+    @cached_property
     def _factors(self) -> tuple[Any, Any, np.ndarray]:
         """Unknowns kept, the factorisation of their stiffness, and their answer to the springs' forces."""
         if not len(self.held):
@@ -141,15 +146,20 @@ def lowest(flexibility: Flexibility, n: int, residual: float = RESIDUAL) -> tupl
     if flexibility.sprung.size:  # one, the scale of bending, keeps K definite and the lowest modes within some decades
         K = K + M
         solve = flexibility.shifted
-    if n > size - n_rigid:
-        raise ValueError(f"n_modes must not exceed the {size} unknowns of this mesh; refine it")
+    moving = flexibility.moving
+    if n > len(moving) - n_rigid:
+        raise ValueError(f"n_modes must not exceed the {len(moving)} unknowns of this mesh; refine it")
     if size <= DENSE or 3 * (n + n_rigid) >= size:
         # solve M x = mu K x: K stays definite even if tiny triangles make M singular to rounding
-        moving = M @ flexibility.rigid
-        rest = moving @ moving.T
+        heavy = M @ flexibility.rigid
+        rest = heavy @ heavy.T
         vectors = eigh(M.toarray() - rest, K.toarray() + rest, subset_by_index=[size - n, size - 1])[1][:, ::-1]
-    else:
+    elif len(moving) == size:
         vectors = _krylov(solve, M, n, size - n_rigid, residual)
+    else:  # the unknowns without inertia follow from the others
+        place = eye_array(size, format="csc")[:, moving]
+        own = _krylov(lambda loads: place.T @ solve(place @ loads), M[moving][:, moving], n, len(moving), residual)
+        vectors = solve(M @ (place @ own))
     few = min(n, flexibility.sprung.shape[1])
     if few:  # bending left in these by an inexact search would be far stiffer than their springs
         answer = flexibility.solve(M @ vectors[:, :few])

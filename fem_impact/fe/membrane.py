@@ -21,13 +21,13 @@ from typing import Any
 
 import numpy as np
 from scipy.sparse import csc_matrix
+from skfem import Dofs, ElementTriP4
 
 from .._base.untyped import Sparse
-from . import slopes, thick
+from . import plane, slopes
 from .eigenvalues import factorise
-from .elements import inverses, numbering, triangles
+from .elements import inverses, triangles
 from .section import Plate, evaluate
-from .supports import SIDES, cells_of_facets
 from .system import System
 
 NODES = 4  # [-] Gauss points in each direction of a triangle: exact for the stiffness of quartic elements
@@ -50,34 +50,25 @@ class Sheet:
     moduli: np.ndarray  # (n_cells, n_q, 3, 3) [N m] A times the weights, on strains xx, yy, 2 xy
     gradient: np.ndarray  # (n_cells, n_q, 2, 15) of the shape functions, in the frame
     dofs: np.ndarray  # (n_cells, 30) numbers of u, then v
-    held: np.ndarray  # unknowns that supports hold
+    loose: Sparse  # (n_dofs, n_left) map to these unknowns that supports leave
 
     @classmethod
     def of(cls, system: System) -> "Sheet":
-        """That of a plate whose hinged and clamped edges hold the plane; free ones do not."""
+        """That of a plate, held in its plane as stated."""
         rim, section, frame = system.rim, system.section, system.frame
         assert rim is not None and isinstance(section, Plate)
         space: Any = system.space
-        plane = triangles(rim.points, space.vertices)
-        own, n = numbering(plane, thick.MindlinSpace)
         X, x, dx = slopes.quadrature(system, NODES)
-        gradient = np.einsum("eqji,jqk->eqik", inverses(space, X), thick.reference(X)[1])
+        gradient = np.einsum("eqji,jqk->eqik", inverses(space, X), plane.reference(X)[1])
         h = evaluate("thickness", section.thickness, frame.places(x), "m").reshape(dx.shape)
         moduli = (frame.length**2 * h * dx)[..., None, None] * section.material.plane_stress
-        cells, sides = cells_of_facets(rim.facets, space.vertices)
-        local = np.column_stack([np.array(SIDES)[sides], 3 + 3 * sides[:, None] + np.arange(3)])
-        holds = np.array([kind != "free" for kind in rim.kinds])
-        held = np.unique(own[local[holds], cells[holds, None]])
-        held = np.concatenate([held, n + held]) if len(held) else _still(space, rim.points, own, n)
-        return cls(x, moduli, gradient, np.vstack([own, n + own]).T, held)
+        own = Dofs(triangles(rim.points, space.vertices), ElementTriP4())
+        dofs = np.vstack([own.element_dofs, own.N + own.element_dofs]).T
+        return cls(x, moduli, gradient, dofs, plane.loosened(space.inner, rim, own))
 
     def strains(self, cells: np.ndarray) -> np.ndarray:
         """Strains (n, n_q, 3, 30) of the unknowns of cells (n,)."""
-        gradient = self.gradient[cells]
-        result = np.zeros((*gradient.shape[:2], 3, 30))
-        result[:, :, 0, :15] = result[:, :, 2, 15:] = gradient[:, :, 0]
-        result[:, :, 1, 15:] = result[:, :, 2, :15] = gradient[:, :, 1]
-        return result
+        return plane.strains(self.gradient[cells])
 
     def blocks(self, n_pairs: int) -> list[np.ndarray]:
         """Numbers of the cells in blocks, to limit the memory that pairs of modes take."""
@@ -95,14 +86,6 @@ class Sheet:
             place = (np.broadcast_to(each, local.shape).ravel() for each in (dofs[:, :, None], dofs[:, None]))
             result = result + csc_matrix((local.ravel(), tuple(place)), shape=result.shape)
         return result
-
-
-def _still(space: Any, points: np.ndarray, own: np.ndarray, n: int) -> np.ndarray:
-    """Three of the unknowns u and v that keep a plane from moving rigidly, at the ends of its longer side."""
-    long = int(np.ptp(points[:, 1]) > np.ptp(points[:, 0]))
-    ends = points[:, long].argmin(), points[:, long].argmax()
-    first, last = (own[:3].T[space.vertices == end][0] for end in ends)
-    return np.array([first, first + n, last + (1 - long) * n])
 
 
 def most(n_modes: int) -> int:
@@ -129,9 +112,8 @@ def forms(sheet: Sheet, steep: Steep, omega: np.ndarray) -> np.ndarray:
         products += _flat(pair).reshape(-1, len(i)).T @ stress.reshape(-1, len(i))
         pushed = _flat(sheet.strains(cells)).transpose(0, 2, 1) @ stress  # (n_cells, 30, n_pairs)
         np.add.at(load, sheet.dofs[cells], pushed)
-    free = np.setdiff1d(np.arange(len(load)), sheet.held)
-    settled = np.zeros_like(load)
-    settled[free] = -factorise(sheet.stiffness[free][:, free]).solve(load[free])
+    loose: Any = sheet.loose
+    settled = -loose @ factorise(loose.T @ sheet.stiffness @ loose).solve(loose.T @ load)
     # 1/2 of both slopes, and pairs of different modes count twice in the energy; equal energies
     weight = np.where(i == j, 0.5, np.sqrt(0.5)) / (omega[i] * omega[j])
     size, kept = (each[..., ::-1] for each in np.linalg.eigh((products + load.T @ settled) * weight[:, None] * weight))

@@ -10,8 +10,9 @@ from .._base.untyped import Cells, Sparse
 from ..mesh.facets import Curves
 from ..mesh.meshes import Mesh
 from .elements import Bent, quadrature, triangles
+from .section import PLANE
 from .springs import at_facets, edge_stiffness
-from .supports import SupportedRim, cells_of_facets
+from .supports import SupportedRim, cells_of_facets, support_of_facets
 from .theory import Body, Domain, Frame, blocks, gram, scatter
 
 # [-] smallest triangle over the extent below which eigenvalues come from the strain energy: rounding in K grows as the
@@ -43,7 +44,10 @@ def rim(body: Body, found: Domain, kinds: list[str]) -> SupportedRim:
     """The boundary of a plate in its frame, with supports of these kinds (n_facets,)."""
     mesh, length = body.mesh, found.frame.length
     springs = edge_stiffness(body.held, found.frame)
-    return SupportedRim(mesh.facets, mesh.tangents, mesh.curvatures * length, found.cells.p.T, kinds, springs)
+    curves = mesh.facets, mesh.tangents, mesh.curvatures * length
+    held = ["free" if kind == "free" else "held" for kind in body.kinds]
+    plane = support_of_facets(mesh, dict(body.section.in_plane), PLANE, "in_plane", held)
+    return SupportedRim(*curves, found.cells.p.T, kinds, springs, [str(word) for word in plane])
 
 
 def springs(

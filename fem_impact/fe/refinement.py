@@ -222,14 +222,15 @@ def _counted(system: System, flexibility: Flexibility, n: int, limit: float | No
     stricter residual, twice at most.
     """
     n_rigid = flexibility.rigid.shape[1]
-    available = system.n_dofs - n_rigid
+    moving = len(flexibility.moving)
+    available = moving - n_rigid
     if n > available:
         size = size_for(system, n + n_rigid, None, None)
         advice = f"elements of {size:.1g} m suffice"
         if len(system.mesh.cells) * (system.mesh.size / size) ** system.mesh.dimension > MOST_CELLS:
             advice = "no mesh allowed has enough"
         raise ValueError(
-            f"size must be smaller or n_modes lower: elements of {system.mesh.size:g} m have {system.n_dofs} unknowns "
+            f"size must be smaller or n_modes lower: elements of {system.mesh.size:g} m have {moving} unknowns "
             f"for {n + n_rigid} modes; {advice}"
         )
     more = min(n + (BLOCK if limit is None else 0), available)

@@ -1,7 +1,7 @@
 """Materials, plate and beam sections, and elastic supports."""
 
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -10,6 +10,7 @@ from .._base import check
 from . import plausible
 
 KINDS = ("clamped", "hinged", "free")  # supports of an edge besides `Elastic`
+PLANE = ("held", "free", "sliding")  # how an edge is held in the plane of a plate; sliding: along itself only
 SOFT = "soft hinged"  # support of a thick plate that leaves the rotation along the edge free
 SHEAR = 5.0 / 6.0  # [-] shear coefficient of plates: shear stress is parabolic over the thickness (Reissner 1945)
 DIRECTIONS = 36  # [-] directions in which waves in wood are looked at: the softest is then known to a hundredth
@@ -219,6 +220,10 @@ class Plate:
     thickness : float or function of points (n_points, 2) returning (n_points,) [m]
     tension : float [N/m]
         Uniform in-plane tension, as in a drumhead; the whole edge must be supported.
+    layers : tuple of Layer
+        Made by `Plate.laminate`.
+    rise, ribs, in_plane
+        As in `assemble`.
 
     Examples
     --------
@@ -230,12 +235,31 @@ class Plate:
     material: Material
     thickness: Varying
     tension: float = 0.0
+    layers: tuple[Any, ...] = ()
+    rise: Callable[[np.ndarray], Any] | None = None
+    ribs: tuple[Any, ...] = ()
+    in_plane: Mapping[str, str] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         check.instance("material", self.material, Material)
         if not callable(self.thickness):
             check.settle(self, thickness=check.positive("thickness", self.thickness, "m"))
         check.settle(self, tension=check.non_negative("tension", self.tension, "N/m"))
+        if self.rise is not None and not callable(self.rise):
+            raise ValueError(f"rise must be a function of points, or one of fi.rise, got {check.shown(self.rise)}")
+
+    @property
+    def plain(self) -> bool:
+        """Whether it is flat, without ribs, and bending does not stretch it: its plane need not be computed."""
+        return self.rise is None and not self.ribs
+
+    def walls(self, points: np.ndarray) -> np.ndarray:
+        """Stiffness (n_points, 6, 6) on strains xx, yy, 2 xy and changes of curvature: [N/m], [N] and [N m]."""
+        thickness = evaluate("thickness", self.thickness, points, "m")[:, None, None]
+        result = np.zeros((len(points), 6, 6))
+        result[:, :3, :3] = thickness * self.material.plane_stress
+        result[:, 3:, 3:] = self.stiffness(points)
+        return result
 
     def stiffness(self, points: np.ndarray) -> np.ndarray:
         """Bending stiffness (n_points, 3, 3) [N m] on curvatures (xx, yy, 2 xy)."""

@@ -1,12 +1,17 @@
 """Apply supports to a plate's unknowns, by one rule for straight and curved edges, corners and mixed supports."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from scipy.linalg import null_space
 from scipy.sparse import csr_matrix
 
+from .._base import check
 from .._base.untyped import Sparse
+from ..mesh.meshes import Mesh
+from .section import KINDS, Elastic
 
 # [-] two facets join smoothly if tangents [rad] and curvatures times length differ by less: arcs from files do
 SMOOTH = 1e-5
@@ -24,6 +29,7 @@ class SupportedRim:
     points: np.ndarray  # (n_points, 2)
     kinds: list[str]  # (n_facets,) clamped, hinged or free
     springs: np.ndarray  # (n_facets, 2) [-] stiffness of elastic supports against deflection and slope
+    plane: Sequence[str] = ()  # (n_facets,) free, sliding or held in the plane
 
     def is_special(self, at: list[tuple[int, int]]) -> bool:
         """Whether the plate's curvature may jump at a vertex; ``at`` lists its (facet, end) pairs."""
@@ -38,6 +44,39 @@ class SupportedRim:
         length = float(np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1).max())
         jump = abs(self.curvatures[f, i] - self.curvatures[g, j]) * length > SMOOTH
         return corner or (jump and self.kinds[f] == "hinged")
+
+
+def support_of_facets(
+    mesh: Mesh, supports: dict[str, Any], allowed: tuple[str, ...] = KINDS, name: str = "supports",
+    otherwise: Sequence[str] = (),
+) -> list[str | Elastic]:  # fmt: skip
+    """The support of each facet; ``allowed`` are the words besides `Elastic`.
+
+    ``otherwise`` (n_facets,) are those of edges that the argument ``name`` does not name; free if it is empty.
+    """
+    if not isinstance(supports, dict):
+        raise ValueError(f"{name} must be a dict of edge name -> support, got {check.shown(supports)}")
+    for edge, kind in supports.items():
+        if edge not in mesh.edges:
+            raise ValueError(
+                f"{name} names edge {edge!r}, but the mesh has the edges {', '.join(sorted(mesh.edges)):.300}"
+                + check.nearest(edge, mesh.edges)
+            )
+        if not isinstance(kind, Elastic):
+            check.one_of(f"{name}[{edge!r}]", kind, allowed)
+    kinds: list[str | Elastic] = list(otherwise) or ["free"] * len(mesh.facets)
+    stated: dict[int, str] = {}
+    for edge in sorted(supports, key=lambda edge: -len(mesh.edges[edge])):
+        mine = mesh.edges[edge].tolist()
+        for facet in mine:
+            before = stated.get(facet)
+            nested = before is not None and set(mine) < set(mesh.edges[before].tolist())
+            if before is not None and not nested and kinds[facet] != supports[edge]:
+                raise ValueError(
+                    f"{name} must agree where edges overlap; edge {before!r} and edge {edge!r} overlap but differ"
+                )
+            kinds[facet], stated[facet] = supports[edge], edge
+    return kinds
 
 
 def _conditions(kind: str, tangent: np.ndarray, curvature: float) -> np.ndarray:

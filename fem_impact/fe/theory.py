@@ -20,7 +20,7 @@ from ..mesh.meshes import Mesh
 from .section import KINDS, Elastic, directional
 from .supports import SupportedRim
 
-STIFF = "stiffness", "shear"  # fields of a section that resist; the others are inert
+STIFF = "stiffness", "shear", "walls"  # fields of a section that resist; the others are inert
 CHUNK = 256  # [-] cells whose shape functions are computed together, to limit memory
 
 
@@ -55,9 +55,11 @@ class Frame:
         return points.clip(self.centre - 0.5 * self.length, self.centre + 0.5 * self.length)
 
     def field(self, section: Any, name: str, local: np.ndarray) -> np.ndarray:
-        """A section's "stiffness", "shear", "inertia" or "rotary" at coordinates (n, n_q, dimension), in the frame."""
+        """A field of a section, see `Term`, at coordinates (n, n_q, dimension), in the frame."""
         unit = self.stiffness if name in STIFF else self.inertia
-        square = {"shear": self.length**-2, "rotary": self.length**2}.get(name, 1.0)
+        square: Any = {"shear": self.length**-2, "rotary": self.length**2}.get(name, 1.0)
+        if name == "walls":
+            square = np.outer(*[np.repeat([1.0 / self.length, 1.0], 3)] * 2)
         found = getattr(section, name)(self.places(local)) / (unit * square)
         return found.reshape(*local.shape[:2], *found.shape[1:])
 
@@ -74,7 +76,7 @@ class Term(NamedTuple):
     """A part of the energy: half the integral of ``parts . field . parts`` over the body."""
 
     matrix: str  # "K" if it is strain energy, "M" if kinetic
-    field: str  # of the section: "stiffness", "shear", "inertia" or "rotary"
+    field: str  # of the section: "stiffness", "shear", "walls", "inertia" or "rotary"
     parts: np.ndarray  # (n_cells, n_q, n_parts, n_local) strains or motions by each unknown
 
 

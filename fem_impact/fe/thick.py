@@ -58,14 +58,13 @@ from skfem import Dofs, ElementTriP4
 
 from .._base.untyped import Cells, Sparse
 from ..mesh.meshes import LONGEST, Mesh
-from . import plates, splitting, supports
-from .elements import ArgyrisSpace, Bent, Triangles, curvatures, inverses, numbering
+from . import plane, plates, splitting, supports
+from .elements import Bent, curvatures, inverses, numbering
+from .plane import FIRST, LOCAL, QUARTIC, SECOND, PlaneSpace, reference
 from .section import KINDS, SOFT, Plate, evaluate
 from .springs import at_facets
 from .theory import Body, Domain, Held, Points, Term, Theory
 
-SHEAR = 15  # shape functions of one component of the shear strain on a triangle
-LOCAL = 21 + 2 * SHEAR  # unknowns of a triangle: w, gamma_x, gamma_y
 # [-] radius over which a point force is spread, over the thickness: right stress below a small load (Westergaard 1926)
 PATCH = 0.325
 LOOSE = "free", SOFT  # supports with a layer
@@ -77,33 +76,12 @@ SEEN, UNSEEN = 4.0, 9.0
 SMALL = 0.1  # [-] longest side over the thickness below which nodes hold rotations: either choice loses two digits here
 
 
-def reference(X: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Quartic shape functions (n_q, 15) and their gradients (2, n_q, 15) at points (2, n_q) of the unit triangle."""
-    element = ElementTriP4()
-    found = [element.lbasis(X, i) for i in range(SHEAR)]
-    values = np.stack([np.broadcast_to(value, X[0].shape) for value, _ in found], axis=-1)
-    gradients = [np.stack([np.broadcast_to(part, X[0].shape) for part in gradient]) for _, gradient in found]
-    return values, np.stack(gradients, axis=-1)
-
-
-class MindlinSpace:
+class MindlinSpace(PlaneSpace):
     """Shape functions of one mesh: 21 of the deflection, then 15 for each component of the shear strain."""
 
-    element: type[Any] = ElementTriP4
-    order: int = ArgyrisSpace.order
-    flat: ArgyrisSpace
-    origin: np.ndarray  # these and the next as in `Triangles`
-    jacobian: np.ndarray
-    inverse: np.ndarray
-    vertices: np.ndarray
-    bent: Bent | None
-    inner: Triangles
-
     def __init__(self, mesh: Cells, bent: Bent | None = None) -> None:
-        self.flat = ArgyrisSpace(mesh, bent)
-        self.origin, self.jacobian, self.inverse = self.flat.origin, self.flat.jacobian, self.flat.inverse
-        self.vertices, self.bent, self.inner = self.flat.vertices, bent, self.flat.inner
-        self.turned = np.zeros((len(self.vertices), SHEAR), bool)  # nodes that hold rotations, not shear strains
+        super().__init__(mesh, bent)
+        self.turned = np.zeros((len(self.vertices), QUARTIC), bool)  # nodes that hold rotations, not shear strains
 
     def turn(self, mesh: Cells, thickness: np.ndarray) -> None:
         """Let the nodes of straight triangles much smaller than their ``thickness`` (n_cells,) hold rotations."""
@@ -127,31 +105,22 @@ class MindlinSpace:
         slope = slope * ~self.turned[cells][:, :, None, None]
         return [np.einsum("n...k,nkis->n...is", shape, slope, optimize=True) for shape in shapes]
 
-    def functions(self, cells: np.ndarray, points: np.ndarray, orders: tuple[int, ...]) -> list[np.ndarray]:
-        """The same as `ArgyrisSpace.functions`, with zeros for the shear strain, which moves no point."""
-        found = self.flat.functions(cells, points, orders)
-        return [np.concatenate([f, np.zeros((*f.shape[:-1], 2 * SHEAR))], axis=-1) for f in found]
-
     def rotations(self, cells: np.ndarray, area: np.ndarray, points: np.ndarray) -> np.ndarray:
         """Rotations (n, 2, n_q, 51) by each unknown of cells (n,) at area coordinates and places (n, n_q, 3 and 2)."""
         slope = self.functions(cells, points, (1,))[0]
-        shape = reference(area[..., 1:].reshape(-1, 2).T)[0].reshape(*points.shape[:2], SHEAR)
+        shape = reference(area[..., 1:].reshape(-1, 2).T)[0].reshape(*points.shape[:2], QUARTIC)
         own = np.where(self.turned[cells], 1.0, -1.0)[:, None] * shape
-        slope[:, 0, :, 21 : 21 + SHEAR] = slope[:, 1, :, 21 + SHEAR :] = own
+        slope[:, 0, :, FIRST] = slope[:, 1, :, SECOND] = own
         small = np.flatnonzero(self.turned[cells].any(axis=1))
         if small.size:
             slope[small, ..., :21] = self.slopes_in_rotations(cells[small], shape[small])[0].transpose(0, 2, 1, 3)
         return slope
 
-    def locate(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """The cell that holds each point (n, 2), or else the nearest one, and whether the point lies in it."""
-        return self.flat.locate(points)
-
     def linear(self, element_dofs: np.ndarray, n_all: int) -> np.ndarray:
         """Unknowns (n_all, 3) of the deflections 1, x and y, which have no shear strain."""
         found = self.flat.linear(element_dofs, n_all)
         for i in range(2):
-            rows = element_dofs[21 + i * SHEAR : 21 + (i + 1) * SHEAR].T[self.turned]
+            rows = element_dofs[(FIRST, SECOND)[i]].T[self.turned]
             found[rows, 1 + i] = 1.0
         return found
 
@@ -165,16 +134,15 @@ def terms(space: MindlinSpace, points: Points, cells: np.ndarray) -> list[Term]:
     gradient = np.einsum("eqji,jqk->eiqk", inverse, gradient)  # of gamma's shapes in x and y
     deflection, rotation = np.zeros((n, n_q, 1, LOCAL)), np.zeros((n, n_q, 2, LOCAL))
     shear, curvature = np.zeros((n, n_q, 2, LOCAL)), np.zeros((n, n_q, 3, LOCAL))
-    first, second = slice(21, 21 + SHEAR), slice(21 + SHEAR, LOCAL)
     deflection[:, :, 0, :21] = value
     sign = np.where(space.turned[cells], -1.0, 1.0)[:, None]  # of the shear strains in the unknowns
-    shear[:, :, 0, first] = shear[:, :, 1, second] = sign * shape
+    shear[:, :, 0, FIRST] = shear[:, :, 1, SECOND] = sign * shape
     rotation[..., :21] = slope.transpose(0, 2, 1, 3)
     rotation -= shear
     own = gradient * sign[:, None]
     curvature[..., :21] = curvatures(hessian)
-    curvature[:, :, 0, first] = curvature[:, :, 2, second] = -own[:, 0]
-    curvature[:, :, 1, second] = curvature[:, :, 2, first] = -own[:, 1]
+    curvature[:, :, 0, FIRST] = curvature[:, :, 2, SECOND] = -own[:, 0]
+    curvature[:, :, 1, SECOND] = curvature[:, :, 2, FIRST] = -own[:, 1]
     small = np.flatnonzero(space.turned[cells].any(axis=1))
     if small.size:
         values = np.broadcast_to(shape, (len(small), *shape.shape))
@@ -221,45 +189,28 @@ def constrain(
         if slips.size:
             expand, project = _without_slip(space, rim, slips, cells[slips], sides[slips], dofs, expand, project)
     n_flat, own = expand.shape[0], Dofs(mesh, ElementTriP4())
-    n_shear = own.N
-    dofs = np.vstack([dofs, n_flat + own.element_dofs, n_flat + n_shear + own.element_dofs])
-    local, x, normal = _nodes(space, rim.facets, cells, sides)
+    dofs = np.vstack([dofs, n_flat + own.element_dofs, n_flat + own.N + own.element_dofs])
+    words = [{"hinged": "sliding", "clamped": "held"}.get(kind, "free") for kind in kinds]
+    loose, at = plane.held_at(space.inner, rim.facets, words, own)
+    local, x, normal = plane.at_rim(space.inner, rim.facets, cells, sides)
     slope = space.flat.functions(cells, x, (1,))[0].transpose(0, 2, 1, 3)  # (n_facets, 5, 2, 21)
-    at: dict[int, list[tuple[int, int]]] = {}
-    for facet, kind in enumerate(kinds):
-        if kind in ("hinged", "clamped"):
-            for k in range(local.shape[1]):
-                at.setdefault(int(own.element_dofs[local[facet, k], cells[facet]]), []).append((facet, k))
     tied: list[tuple[np.ndarray, np.ndarray, np.ndarray]] = []  # rows, columns and values of gamma_n = w_n
-    single = []  # nodes where gamma has only a normal part, and the normal
     for node, facets in at.items():
-        clamped = next((place for place in facets if kinds[place[0]] == "clamped"), None)
-        if clamped is not None:
-            if space.turned[cells[clamped[0]], local[clamped]]:
-                continue
-            n = normal[clamped]
-            row = n @ slope[clamped]  # (21,)
-            mine = dofs[:21, cells[clamped[0]]]
-            for i in range(2):
-                tied.append((np.full(21, node + i * n_shear), mine, n[i] * row))
+        facet, k = next((place for place in facets if kinds[place[0]] == "clamped"), (-1, -1))
+        if facet < 0 or space.turned[cells[facet], local[facet, k]]:
             continue
-        first = normal[facets[0]]
-        turn = max(abs(first[0] * normal[other][1] - first[1] * normal[other][0]) for other in facets)
-        if turn < supports.SMOOTH:
-            single.append((node, first))
-    free = np.setdiff1d(np.arange(n_shear), list(at))
-    rows = np.concatenate([free, free + n_shear, *[[node, node + n_shear] for node, _ in single]]).astype(int)
-    columns = np.concatenate([np.arange(2 * len(free)), np.repeat(2 * len(free) + np.arange(len(single)), 2)])
-    entries = np.concatenate([np.ones(2 * len(free)), *[n for _, n in single]])
-    loose = csr_matrix((entries, (rows, columns)), shape=(2 * n_shear, 2 * len(free) + len(single)))
-    whole = block_diag([expand, loose], format="csr")
+        n = normal[facet, k]
+        row = n @ slope[facet, k]  # (21,)
+        for i in range(2):
+            tied.append((np.full(21, node + i * own.N), dofs[:21, cells[facet]], n[i] * row))
+    whole = plane.beside(expand, loose)
     if tied:
         row, column, value = (np.concatenate(part) for part in zip(*tied))
-        tie = coo_matrix((value, (row, column)), shape=(2 * n_shear, n_flat)).tocsr() @ expand
+        tie = coo_matrix((value, (row, column)), shape=(2 * own.N, n_flat)).tocsr() @ expand
         lower = block_diag([csr_matrix((n_flat, 0)), tie], format="csr")
         lower.resize(whole.shape)
         whole = (whole + lower).tocsr()
-    return whole, block_diag([project, loose.T], format="csr"), dofs
+    return whole, plane.beside(project, loose.T), dofs
 
 
 def _without_slip(
@@ -272,7 +223,7 @@ def _without_slip(
     fourth degree of this slope times the height over the chord. A thin plate is too stiff to use that; a thick one
     would slip there, and its error would only fall as size**3.
     """
-    x, normal = _nodes(space, rim.facets[slips], cells, sides)[1:]
+    x, normal = plane.at_rim(space.inner, rim.facets[slips], cells, sides)[1:]
     slope = space.flat.functions(cells, x, (1,))[0]  # (n, 2, 5, 21)
     fourth = np.einsum("ni,niqk,q->nk", normal[:, 3], slope, np.array([1.0, 1.0, -4.0, 6.0, -4.0]))
     rows = np.repeat(np.arange(len(slips)), 21)
@@ -284,22 +235,6 @@ def _without_slip(
     solved = csr_matrix(spsolve(whole[:, middle], csc_matrix(-whole @ expand)))
     place = csr_matrix((np.ones(len(middle)), (middle, np.arange(len(middle)))), shape=(expand.shape[0], len(middle)))
     return (expand + place @ solved).tocsr(), project.tocsr()
-
-
-def _nodes(
-    space: MindlinSpace, facets: np.ndarray, cells: np.ndarray, sides: np.ndarray
-) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """The nodes of the shear strain on facets: local numbers (n, 5), places and outward normals (n, 5, 2)."""
-    pairs = np.array(supports.SIDES)[sides]  # (n, 2) corners
-    local = np.column_stack([pairs, 3 + 3 * sides[:, None] + np.arange(3)])
-    s = np.array([0.0, 1.0, 0.25, 0.5, 0.75])[:, None]
-    first, last = (np.eye(3)[pairs[:, end]][:, None] for end in range(2))  # (n, 1, 3)
-    area = (1.0 - s) * first + s * last
-    x, step = space.flat.inner.along(cells, area, last - first)
-    backward = space.vertices[cells, pairs[:, 0]] != facets[:, 0]
-    step = np.where(backward[:, None, None], -step, step)
-    normal = np.stack([step[..., 1], -step[..., 0]], axis=-1)
-    return local, x, normal / np.linalg.norm(normal, axis=2)[..., None]
 
 
 def towards_edges(mesh: Mesh, loose: np.ndarray, size: float) -> Mesh:

@@ -1,0 +1,143 @@
+"""A field of two components in the plane of a plate, by quartic triangles beside those of the deflection.
+
+Thick plates have their shear strains there, shells and stretched plates the displacements in their plane.
+"""
+
+from typing import Any
+
+import numpy as np
+from scipy.linalg import qr
+from scipy.sparse import block_diag, csr_matrix
+from skfem import Dofs, ElementTriP4
+
+from .._base.rounding import SAME
+from .._base.untyped import Cells, Sparse
+from . import supports
+from .elements import ArgyrisSpace, Bent, Triangles
+
+QUARTIC = 15  # shape functions of one component on a triangle
+FIRST, SECOND = slice(21, 21 + QUARTIC), slice(21 + QUARTIC, 21 + 2 * QUARTIC)  # unknowns of both components
+LOCAL = 21 + 2 * QUARTIC  # unknowns of a triangle, those of the deflection first
+
+
+def reference(X: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Quartic shape functions (n_q, 15) and their gradients (2, n_q, 15) at points (2, n_q) of the unit triangle."""
+    element = ElementTriP4()
+    found = [element.lbasis(X, i) for i in range(QUARTIC)]
+    values = np.stack([np.broadcast_to(value, X[0].shape) for value, _ in found], axis=-1)
+    gradients = [np.stack([np.broadcast_to(part, X[0].shape) for part in gradient]) for _, gradient in found]
+    return values, np.stack(gradients, axis=-1)
+
+
+class PlaneSpace:
+    """Shape functions of one mesh: 21 of the deflection, then 15 for each component in the plane."""
+
+    element: type[Any] = ElementTriP4
+    order: int = ArgyrisSpace.order
+    flat: ArgyrisSpace
+    origin: np.ndarray  # these and the next as in `Triangles`
+    jacobian: np.ndarray
+    inverse: np.ndarray
+    vertices: np.ndarray
+    bent: Bent | None
+    inner: Triangles
+
+    def __init__(self, mesh: Cells, bent: Bent | None = None) -> None:
+        self.flat = ArgyrisSpace(mesh, bent)
+        self.origin, self.jacobian, self.inverse = self.flat.origin, self.flat.jacobian, self.flat.inverse
+        self.vertices, self.bent, self.inner = self.flat.vertices, bent, self.flat.inner
+
+    def functions(self, cells: np.ndarray, points: np.ndarray, orders: tuple[int, ...]) -> list[np.ndarray]:
+        """The same as `ArgyrisSpace.functions`, with zeros for the plane, which moves no point across it."""
+        found = self.flat.functions(cells, points, orders)
+        return [np.concatenate([f, np.zeros((*f.shape[:-1], 2 * QUARTIC))], axis=-1) for f in found]
+
+    def locate(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """The cell that holds each point (n, 2), or else the nearest one, and whether the point lies in it."""
+        return self.flat.locate(points)
+
+
+def nodes(inner: Triangles) -> np.ndarray:
+    """Where the nodes (n_cells, 15, 2) of both components lie, on the true edge."""
+    area = np.column_stack([1.0 - ElementTriP4.doflocs.sum(axis=1), ElementTriP4.doflocs])
+    cells, none = np.arange(len(inner.origin)), np.zeros((1, 1, 3))
+    return inner.along(cells, np.broadcast_to(area, (len(cells), QUARTIC, 3)), none)[0]
+
+
+def strains(gradient: np.ndarray) -> np.ndarray:
+    """Strains xx, yy and 2 xy (..., 3, 30) by both components, from the gradients (..., 2, 15) of their functions."""
+    result = np.zeros((*gradient.shape[:-2], 3, 2 * QUARTIC))
+    result[..., 0, :QUARTIC] = result[..., 2, QUARTIC:] = gradient[..., 0, :]
+    result[..., 1, QUARTIC:] = result[..., 2, :QUARTIC] = gradient[..., 1, :]
+    return result
+
+
+def at_rim(
+    inner: Triangles, facets: np.ndarray, cells: np.ndarray, sides: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Nodes on boundary facets: their local numbers (n, 5), places and outward normals (n, 5, 2)."""
+    pairs = np.array(supports.SIDES)[sides]  # (n, 2) corners
+    local = np.column_stack([pairs, 3 + 3 * sides[:, None] + np.arange(3)])
+    s = np.array([0.0, 1.0, 0.25, 0.5, 0.75])[:, None]
+    first, last = (np.eye(3)[pairs[:, end]][:, None] for end in range(2))  # (n, 1, 3)
+    area = (1.0 - s) * first + s * last
+    x, step = inner.along(cells, area, last - first)
+    backward = inner.vertices[cells, pairs[:, 0]] != facets[:, 0]
+    step = np.where(backward[:, None, None], -step, step)
+    normal = np.stack([step[..., 1], -step[..., 0]], axis=-1)
+    return local, x, normal / np.linalg.norm(normal, axis=2)[..., None]
+
+
+def held_at(
+    inner: Triangles, facets: np.ndarray, words: list[str], own: Dofs
+) -> tuple[csr_matrix, dict[int, list[tuple[int, int]]]]:
+    """What boundary facets leave of a field: the map (2 n, n_left) to both components, and where facets have nodes.
+
+    ``words`` (n_facets,) are "free", "sliding" (held along the facet, free across it) or "held". The second result
+    lists, for each node that is not free, the facets and their nodes that it belongs to.
+    """
+    cells, sides = supports.cells_of_facets(facets, inner.vertices)
+    local, _, normal = at_rim(inner, facets, cells, sides)
+    at: dict[int, list[tuple[int, int]]] = {}
+    for facet, word in enumerate(words):
+        if word != "free":
+            for k in range(local.shape[1]):
+                at.setdefault(int(own.element_dofs[local[facet, k], cells[facet]]), []).append((facet, k))
+    single = []  # nodes free across the edge only, and the normal
+    for node, places in at.items():
+        normals = np.array([normal[place] for place in places])
+        turn = np.abs(normals[0, 0] * normals[:, 1] - normals[0, 1] * normals[:, 0]).max()
+        if turn < supports.SMOOTH and all(words[facet] == "sliding" for facet, _ in places):
+            single.append((node, normals[0]))
+    n, free = own.N, np.setdiff1d(np.arange(own.N), list(at))
+    rows = np.concatenate([free, free + n, *[[node, node + n] for node, _ in single]]).astype(int)
+    columns = np.concatenate([np.arange(2 * len(free)), np.repeat(2 * len(free) + np.arange(len(single)), 2)])
+    entries = np.concatenate([np.ones(2 * len(free)), *[normal for _, normal in single]])
+    return csr_matrix((entries, (rows, columns)), shape=(2 * n, 2 * len(free) + len(single))), at
+
+
+def rigid(places: np.ndarray) -> np.ndarray:
+    """Values (2 n, 3) at nodes (n, 2) of the rigid motions in the plane: along x, along y, and turning."""
+    one, none = np.ones(len(places)), np.zeros(len(places))
+    return np.vstack([np.column_stack([one, none, -places[:, 1]]), np.column_stack([none, one, places[:, 0]])])
+
+
+def loosened(inner: Triangles, rim: supports.SupportedRim, own: Dofs) -> csr_matrix:
+    """The map (2 n, n_left) that the edges leave of the displacements in a plane, and that cannot move rigidly.
+
+    If no edge prevents a rigid motion, some unknowns are left out that, when fixed, just do.
+    """
+    loose, places = held_at(inner, rim.facets, list(rim.plane), own)[0], np.zeros((own.N, 2))
+    places[own.element_dofs.T] = nodes(inner)
+    motions = rigid(places)
+    left = loose.T @ motions  # the columns of the map are orthonormal
+    lost = motions - loose @ left
+    lengths, turn = np.linalg.svd(lost.T @ lost)[1:]
+    still = left @ turn[np.sqrt(lengths) < SAME * np.sqrt(len(places))].T
+    pinned = qr(still.T, pivoting=True, mode="economic")[2][: still.shape[1]] if still.size else []
+    return loose[:, np.setdiff1d(np.arange(loose.shape[1]), pinned)]
+
+
+def beside(first: Sparse, second: Sparse) -> csr_matrix:
+    """Block diagonal of a map of the deflection's unknowns and one of the plane's."""
+    return block_diag([first, second], format="csr")
