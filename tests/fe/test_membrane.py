@@ -2,9 +2,10 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.sparse import eye_array
 
 import fem_impact as fi
-from fem_impact.fe import membrane
+from fem_impact.fe import membrane, plane
 
 E, NU, H, SIDE = 210e9, 0.3, 1e-3, 0.2
 PLATE = fi.Plate(fi.Material(E=E, nu=NU, rho=7850.0), H)
@@ -36,26 +37,15 @@ def over_berger(energy):
 
 def test_a_square_whose_edges_slide_along_themselves_is_that_of_chu_and_herrmann():
     # their energy is the mean stress's 3/4 (1 + nu) and Airy's 12 (1 - nu**2) / 32, where Berger has 3/2
-    whole = sheet()
-    n = (whole.dofs.max() + 1) // 2
-    x = np.zeros((2 * n, 2))
     system = fi.assemble(fi.mesh.rectangle(SIDE, SIDE, size=0.05), PLATE, {"boundary": "clamped"})
-    place = nodes(system)
-    x[whole.dofs[:, :15]] = x[whole.dofs[:, 15:]] = place
-    ends = np.abs(x) > 0.5 - 1e-9
-    slides = replace(whole, held=np.flatnonzero(np.concatenate([ends[:n, 0], ends[n:, 1]])))
+    whole = membrane.Sheet.of(system)
+    x = np.zeros((whole.dofs.max() + 1, 2))
+    x[whole.dofs[:, :15]] = x[whole.dofs[:, 15:]] = plane.nodes(system.space.inner)
+    n, ends = len(x) // 2, np.abs(x) > 0.5 - 1e-9
+    slides = replace(whole, loose=eye_array(2 * n, format="csr")[:, ~np.concatenate([ends[:n, 0], ends[n:, 1]])])
     found = membrane.forms(slides, sines([(1, 1)]), np.ones(1))
     wanted = (0.75 * (1.0 + NU) + 12.0 * (1.0 - NU**2) / 32.0) / 1.5
     assert over_berger(energies(found, np.ones(1)).sum()) == pytest.approx(wanted, rel=3e-5)  # 2e-6 with half the size
-
-
-def nodes(system):
-    """Places (n_cells, 15, 2) of the nodes of quartic triangles in the frame: corners, sides, inside."""
-    corner = system.space.inner.corners
-    part = np.array([0.25, 0.5, 0.75])[:, None]
-    sides = [(1.0 - part) * corner[:, None, p] + part * corner[:, None, q] for p, q in membrane.SIDES]
-    inside = np.array([[2, 1, 1], [1, 2, 1], [1, 1, 2]]) / 4.0
-    return np.concatenate([corner, *sides, inside @ corner], axis=1)
 
 
 def test_a_square_held_all_round_is_a_little_stiffer():
