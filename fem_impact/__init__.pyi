@@ -5,11 +5,12 @@ from ._base.check import SimulationError as SimulationError
 from ._base.check import ToleranceWarning as ToleranceWarning
 from .designs.search import design as design
 from .fe.assembly import assemble as assemble
+from .fe.material import Material as Material
+from .fe.material import yield_strength as yield_strength
+from .fe.ribs import Rib as Rib
 from .fe.section import Beam as Beam
 from .fe.section import Elastic as Elastic
-from .fe.section import Material as Material
 from .fe.section import Plate as Plate
-from .fe.section import yield_strength as yield_strength
 from .impact import spectra as spectra
 from .impact import threshold as threshold
 from .impact.collision import Touch as Touch

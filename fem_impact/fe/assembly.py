@@ -8,12 +8,13 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from .._base import check
-from ..mesh.meshes import Mesh, aligned, pierced
+from ..mesh.meshes import Mesh, aligned, lined, pierced
 from .constraints import Attached, load_and_release
 from .corners import Singular, around_corners
 from .euler import EULER
 from .interpolation import Interpolation
 from .kirchhoff import ARGYRIS, MORLEY
+from .ribs import Rib
 from .section import KINDS, Beam, Elastic, Plate, evaluate
 from .shallow import SHALLOW
 from .shear_beam import TIMOSHENKO
@@ -52,6 +53,7 @@ def assemble(
     coarseness: float = 1.0,
     graded: bool = True,
     rise: Any = None,
+    ribs: Sequence[Rib] | None = None,
     in_plane: Mapping[str, str] | None = None,
 ) -> System:
     """Assemble stiffness and mass of a body supported at its named edges.
@@ -86,6 +88,8 @@ def assemble(
     rise : function of points (n, 2) [m] returning (n,) [m], optional
         Height of the unloaded surface of a curved plate above its outline, towards the striker: your own, or one of
         `fi.rise`. Such a shell must be shallow, with slopes below some 0.1.
+    ribs : sequence of Rib, optional
+        Bars, stiffeners or joists; sides of triangles follow them.
     in_plane : dict, name of an edge -> "held", "free" or "sliding", optional
         How edges are held in the plane of a plate, for curved and stretched ones; sliding is held along the edge and
         free across it. By default hinged and clamped edges are held, others are free.
@@ -106,7 +110,7 @@ def assemble(
     >>> round(system.mass, 6)  # kg
     0.188325
     """
-    shaped: dict[str, Any] = {"rise": rise, "in_plane": in_plane}
+    shaped: dict[str, Any] = {"rise": rise, "ribs": ribs, "in_plane": in_plane}
     shaped = {name: value for name, value in shaped.items() if value is not None}
     if shaped:
         if not isinstance(section, Plate):
@@ -126,6 +130,8 @@ def assemble(
     posts, clamps = check_posts(point_supports, mesh.dimension)
     if clamps:
         mesh, supports = pierced(mesh, clamps), clamped(supports, len(clamps))
+    paths = [rib.path for rib in getattr(section, "ribs", ()) if not isinstance(rib.path, str)]
+    mesh = lined(mesh, paths) if paths else mesh
     attached = Attached(check_masses(point_masses, mesh.dimension), posts)
     near = None if near is None else check.places("near", near, mesh.dimension)
     near, coarseness = None if near is None or not len(near) else near, check.number("coarseness", coarseness)
@@ -153,11 +159,16 @@ def _assembled(
     held = rules.hold(body, domain)
     make = rules.matrices or (lambda _, domain: integrals(rules, domain, np.arange(len(domain.points.x))))
     K, M = (scatter(each, held.dofs, held.expand.shape[0]) for each in make(body, domain))
+    if held.ribs is not None:
+        K, M = K + held.ribs[0], M + held.ribs[1]
     rows = Interpolation(rules, section, domain.space, domain.frame, held.dofs)
     if near is not None:
         rows.check("near", near)
     matrices, springs = load_and_release(K, M, held, domain, attached, rows)
     mass = float(domain.fields["inertia"].sum()) * domain.frame.mass + sum(mass for _, mass in attached.masses)
+    if held.ribs is not None:
+        lifted = domain.space.linear(held.dofs, held.expand.shape[0])[:, 0]
+        springs, mass = springs + held.ribs[0], mass + float(lifted @ (held.ribs[1] @ lifted)) * domain.frame.mass
     strain = Strain(domain, springs) if rules.sharp is not None and rules.sharp(domain) else None
     return System(
         mesh, section, supports, rules, mass, domain.frame, **matrices, element_dofs=held.dofs, space=domain.space,

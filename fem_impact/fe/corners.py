@@ -8,7 +8,7 @@ import numpy as np
 
 from .._base.rounding import HALVINGS
 from ..mesh.meshes import Mesh
-from .section import Material, turned
+from .material import Material, turned
 from .splitting import Rim, bisected, strip
 
 # [-] size of each ring of triangles over that of the ring around it: 0.7 takes twice the rings, 0.35 slimmer cells

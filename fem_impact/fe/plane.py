@@ -64,6 +64,20 @@ def nodes(inner: Triangles) -> np.ndarray:
     return inner.along(cells, np.broadcast_to(area, (len(cells), QUARTIC, 3)), none)[0]
 
 
+def gradients(inner: Triangles, cells: np.ndarray, area: np.ndarray) -> np.ndarray:
+    """Gradients (n, n_q, 2, 15) of the functions of cells (n,) at area coordinates (n, n_q, 3), on the true edge.
+
+    The area coordinates may be the same for all cells, (1, n_q, 3).
+    """
+    n_q = area.shape[1]
+    own = reference(area[..., 1:].reshape(-1, 2).T)[1].reshape(2, len(area), n_q, QUARTIC)
+    J = np.broadcast_to(inner.jacobian[cells][:, None], (len(cells), n_q, 2, 2))
+    if inner.bent is not None:
+        turned = inner.bent.shift(cells, np.broadcast_to(area, (len(cells), n_q, 3)))[1]
+        J = J + turned[..., 1:] - turned[..., :1]
+    return np.einsum("eqji,jeqk->eqik", np.linalg.inv(J), np.broadcast_to(own, (2, len(cells), n_q, QUARTIC)))
+
+
 def strains(gradient: np.ndarray) -> np.ndarray:
     """Strains xx, yy and 2 xy (..., 3, 30) by both components, from the gradients (..., 2, 15) of their functions."""
     result = np.zeros((*gradient.shape[:-2], 3, 2 * QUARTIC))

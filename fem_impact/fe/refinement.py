@@ -17,7 +17,8 @@ from . import plausible
 from .assembly import BY_ELEMENT, assemble, reassemble
 from .corners import SAY
 from .eigenvalues import BLOCK, FIRST_SLICE, RESIDUAL, STRICT, Flexibility, by_slices, count_below, lowest
-from .section import Plate, directional
+from .material import directional
+from .section import Plate
 from .system import System
 
 # [-] ratio of element sizes whose frequencies are compared, and order: less than half the unknowns, errors times five

@@ -1,199 +1,22 @@
-"""Materials, plate and beam sections, and elastic supports."""
+"""Sections of plates and beams, and elastic supports."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 
 from .._base import check
-from . import plausible
+from .._base.rounding import SAME
+from . import layers as layering
+from .layers import SHEAR
+from .material import Material
 
 KINDS = ("clamped", "hinged", "free")  # supports of an edge besides `Elastic`
 PLANE = ("held", "free", "sliding")  # how an edge is held in the plane of a plate; sliding: along itself only
 SOFT = "soft hinged"  # support of a thick plate that leaves the rotation along the edge free
-SHEAR = 5.0 / 6.0  # [-] shear coefficient of plates: shear stress is parabolic over the thickness (Reissner 1945)
-DIRECTIONS = 36  # [-] directions in which waves in wood are looked at: the softest is then known to a hundredth
-# [Pa] mean pressure under the pyramid of 136 degrees for a Vickers number of 1: kgf/mm^2, but of its slanted faces
-VICKERS = float(9.80665e6 / np.sin(np.radians(68.0)))
-TABOR = 2.8  # [-] mean pressure under a deep dent over the yield strength (Tabor 1951)
+TWISTS = 8  # [-] terms of the series of the torsion of a rectangle: the next is 1e-6 of the first
 Varying = float | Callable[[np.ndarray], Any]
-
-
-def turned(stiffness: np.ndarray, angle: float) -> np.ndarray:
-    """The stiffness (3, 3) on strains (xx, yy, 2 xy) of a material turned anticlockwise by an angle [rad]."""
-    c, s = np.cos(angle), np.sin(angle)
-    turn = np.array([[c * c, s * s, c * s], [s * s, c * c, -c * s], [-2 * c * s, 2 * c * s, c * c - s * s]])
-    return turn.T @ stiffness @ turn
-
-
-def directional(stiffness: np.ndarray) -> np.ndarray:
-    """What a stiffness (3, 3) on strains (xx, yy, 2 xy) opposes to a wave in each of DIRECTIONS directions."""
-    angle = np.pi * np.arange(DIRECTIONS) / DIRECTIONS
-    wave = np.stack([np.cos(angle) ** 2, np.sin(angle) ** 2, np.sin(2.0 * angle)])
-    return np.asarray(np.einsum("in,ij,jn->n", wave, stiffness, wave))
-
-
-def yield_strength(hardness: float) -> float:
-    """Yield strength [Pa] of a metal from its Vickers hardness number, such as 300 for 300 HV.
-
-    The mean pressure under the pyramid, ``hardness * 9.81 MPa / sin(68 deg)``, over 2.8. It is the stress at a strain
-    of some 8 %: first yield of metals that harden no more, above it of those that harden when they are worked.
-
-    References
-    ----------
-    Tabor (1951), The Hardness of Metals; Johnson (1985), Contact Mechanics, 6.4.
-
-    Examples
-    --------
-    >>> round(fi.yield_strength(300.0) / 1e6)  # MPa
-    1133
-    """
-    return check.positive("hardness", hardness) * VICKERS / TABOR
-
-
-@dataclass(frozen=True)
-class Material:
-    """Linear elastic material; `Material.orthotropic` makes wood and composites.
-
-    Parameters
-    ----------
-    E : float [Pa]
-        Young's modulus; along the grain if orthotropic.
-    nu : float [-]
-        Poisson's ratio: contraction across the grain divided by stretch along it. If isotropic, above -1 and at most
-        0.5.
-    rho : float [kg/m^3]
-    E_across, G : float [Pa], optional
-        Young's modulus across the grain and shear modulus; the material is isotropic without them.
-    angle : float [rad]
-        Direction of the grain, anticlockwise from the x axis.
-    yield_strength : float [Pa], optional
-        Stress at which it yields in tension; tells whether a contact dents it (`Response.assumptions`).
-    G_xz, G_yz : float [Pa], optional
-        Shear moduli of an orthotropic material through the thickness, along and across the grain; only thick plates
-        and beams use them, and the estimate of what a thin one lacks. By default both are G.
-
-    Examples
-    --------
-    >>> steel = fi.Material(E=210e9, nu=0.3, rho=7850.0)
-    >>> steel.plane_stress.round(-8).tolist()
-    [[230800000000.0, 69200000000.0, 0.0], [69200000000.0, 230800000000.0, 0.0], [0.0, 0.0, 80800000000.0]]
-    """
-
-    E: float
-    nu: float
-    rho: float
-    E_across: float | None = None
-    G: float | None = None
-    angle: float = 0.0
-    yield_strength: float | None = None
-    G_xz: float | None = None
-    G_yz: float | None = None
-
-    def __post_init__(self) -> None:
-        nu = check.number("nu", self.nu)
-        check.settle(
-            self,
-            E=check.positive("E", self.E, "Pa"),
-            nu=nu,
-            rho=check.positive("rho", self.rho, "kg/m^3"),
-            angle=check.number("angle", self.angle, "rad"),
-        )
-        if self.yield_strength is not None:
-            check.settle(self, yield_strength=check.positive("yield_strength", self.yield_strength, "Pa"))
-        if (self.E_across is None) != (self.G is None):
-            raise ValueError("E_across and G must be given together; use Material.orthotropic, or give neither")
-        for name in ("G_xz", "G_yz"):
-            if getattr(self, name) is not None:
-                if self.G is None:
-                    raise ValueError(f"{name} needs an orthotropic material; give E_across and G, or leave it out")
-                check.settle(self, **{name: check.positive(name, getattr(self, name), "Pa")})
-        if self.E_across is None or self.G is None:
-            if not -1.0 < nu < 0.5 and nu != 0.5:
-                raise ValueError(f"nu must be above -1 and at most 0.5, got {nu:g}")
-            return
-        check.settle(
-            self, E_across=check.positive("E_across", self.E_across, "Pa"), G=check.positive("G", self.G, "Pa")
-        )
-        if nu**2 * self.E_across >= self.E:
-            raise ValueError(
-                f"nu must be below sqrt(E/E_across) = {(self.E / self.E_across) ** 0.5:g}, got {nu:g}: "
-                "otherwise deforming the material would release energy"
-            )
-
-    @classmethod
-    def orthotropic(
-        cls,
-        *,
-        E_along: float,
-        E_across: float,
-        nu: float,
-        G: float,
-        rho: float,
-        angle: float = 0.0,
-        yield_strength: float | None = None,
-        G_xz: float | None = None,
-        G_yz: float | None = None,
-    ) -> "Material":
-        """Orthotropic material such as tonewood.
-
-        Parameters
-        ----------
-        E_along, E_across : float [Pa]
-            Young's moduli along and across the grain.
-        nu : float [-]
-            Contraction across the grain divided by stretch along it (nu_LR for wood); nu**2 < E_along / E_across.
-        G : float [Pa]
-            Shear modulus in the plane of the plate.
-        rho : float [kg/m^3]
-        angle : float [rad]
-            Direction of the grain, anticlockwise from the x axis.
-        yield_strength : float [Pa], optional
-            Across the thickness.
-        G_xz, G_yz : float [Pa], optional
-            Shear moduli through the thickness, along and across the grain, for thick plates and beams. By default both
-            are G; spruce cut on the quarter has about G_xz = G, but G_yz (rolling shear) only G / 10 or less.
-
-        Examples
-        --------
-        >>> spruce = fi.Material.orthotropic(E_along=11e9, E_across=0.8e9, nu=0.37, G=0.7e9, rho=430.0, angle=0.1)
-        >>> spruce.E_across, spruce.angle
-        (800000000.0, 0.1)
-        """
-        for name, value in (("E_along", E_along), ("E_across", E_across), ("G", G)):
-            check.positive(name, value, "Pa")
-        return cls(E_along, nu, rho, E_across, G, angle, yield_strength, G_xz, G_yz)
-
-    @property
-    def notes(self) -> tuple[str, ...]:
-        """Numbers that are allowed but probably a slip of a unit, in plain words."""
-        return plausible.material(self)
-
-    @property
-    def plane_stress(self) -> np.ndarray:
-        """Plane-stress stiffness (3, 3) [Pa] on strains (xx, yy, 2 xy), in the axes of the plate."""
-        E, nu = self.E, self.nu
-        across = E if self.E_across is None else self.E_across
-        G = E / (2.0 * (1.0 + nu)) if self.G is None else self.G
-        inner = 1.0 - nu**2 * across / E
-        local = np.array([[E, nu * across, 0.0], [nu * across, across, 0.0], [0.0, 0.0, G * inner]]) / inner
-        if self.E_across is None:
-            return local
-        return turned(local, self.angle)
-
-    @property
-    def transverse(self) -> tuple[float, float]:
-        """Shear moduli [Pa] through the thickness, along and across the grain: as stated, else that in the plane."""
-        plain = self.E / (2.0 * (1.0 + self.nu)) if self.G is None else self.G
-        return (plain if self.G_xz is None else self.G_xz, plain if self.G_yz is None else self.G_yz)
-
-    @property
-    def through(self) -> np.ndarray:
-        """Shear stiffness through the thickness (2, 2) [Pa] on shear strains (xz, yz), in the axes of the plate."""
-        c, s = np.cos(self.angle), np.sin(self.angle)
-        turn = np.array([[c, s], [-s, c]])
-        return turn.T @ np.diag(self.transverse) @ turn
 
 
 def evaluate(name: str, value: Varying, points: np.ndarray, unit: str) -> np.ndarray:
@@ -235,7 +58,7 @@ class Plate:
     material: Material
     thickness: Varying
     tension: float = 0.0
-    layers: tuple[Any, ...] = ()
+    layers: tuple[layering.Layer, ...] = ()
     rise: Callable[[np.ndarray], Any] | None = None
     ribs: tuple[Any, ...] = ()
     in_plane: Mapping[str, str] = field(default_factory=dict)
@@ -247,14 +70,50 @@ class Plate:
         check.settle(self, tension=check.non_negative("tension", self.tension, "N/m"))
         if self.rise is not None and not callable(self.rise):
             raise ValueError(f"rise must be a function of points, or one of fi.rise, got {check.shown(self.rise)}")
+        check.settle(self, ribs=tuple(self.ribs), in_plane=dict(self.in_plane))
+
+    @classmethod
+    def laminate(cls, layers: Sequence[tuple[Material, float, float]], *, tension: float = 0.0) -> "Plate":
+        """Plate of layers glued to each other: plywood, carbon, a sandwich, laminated glass with a stiff interlayer.
+
+        Parameters
+        ----------
+        layers : sequence of (material, thickness [m], angle [rad])
+            From the struck side; the angle turns the grain anticlockwise, besides that of the material.
+        tension : float [N/m]
+
+        Where the layers are not symmetric, bending stretches the plate; `assemble` then computes its plane, too. The
+        softest shear, as of a sandwich's core, counts with ``theory="mindlin"``. An interlayer so soft that the panes
+        slide on each other would need a displacement of each pane.
+
+        Examples
+        --------
+        >>> birch = fi.Material.orthotropic(E_along=13e9, E_across=0.7e9, nu=0.4, G=0.8e9, rho=640.0)
+        >>> plywood = fi.Plate.laminate([(birch, 1e-3, 0.0), (birch, 1e-3, np.pi / 2), (birch, 1e-3, 0.0)])
+        >>> round(plywood.thickness, 6), plywood.stiffness(np.zeros((1, 2)))[0].diagonal().round(2).tolist()
+        (0.003, [28.41, 2.63, 1.8])
+        """
+        found = layering.stacked(layers)
+        return cls(layering.together(found), sum(layer.thickness for layer in found), tension, found)
 
     @property
     def plain(self) -> bool:
         """Whether it is flat, without ribs, and bending does not stretch it: its plane need not be computed."""
-        return self.rise is None and not self.ribs
+        return self.rise is None and not self.ribs and not self.coupled
+
+    @property
+    def coupled(self) -> bool:
+        """Whether it is layered so that bending stretches it."""
+        if not self.layers:
+            return False
+        walls = layering.moments(self.layers)
+        size = np.sqrt(np.abs(walls[:3, :3]).max() * np.abs(walls[3:, 3:]).max())
+        return bool(np.abs(walls[:3, 3:]).max() > SAME * size)
 
     def walls(self, points: np.ndarray) -> np.ndarray:
-        """Stiffness (n_points, 6, 6) on strains xx, yy, 2 xy and changes of curvature: [N/m], [N] and [N m]."""
+        """Stiffness (n_points, 6, 6) on strains xx, yy, 2 xy and negative curvatures: [N/m], [N] and [N m]."""
+        if self.layers:
+            return np.broadcast_to(layering.moments(self.layers), (len(points), 6, 6))
         thickness = evaluate("thickness", self.thickness, points, "m")[:, None, None]
         result = np.zeros((len(points), 6, 6))
         result[:, :3, :3] = thickness * self.material.plane_stress
@@ -276,6 +135,9 @@ class Plate:
 
     def rotary(self, points: np.ndarray) -> np.ndarray:
         """Rotary inertia per area (n_points,) [kg], for a thick plate."""
+        if self.layers:
+            each = [rho * h * (z**2 + h**2 / 12.0) for (rho, h, z) in ((m.rho, h, z) for m, h, z in self.layers)]
+            return np.full(len(points), sum(each))
         return self.material.rho * evaluate("thickness", self.thickness, points, "m") ** 3 / 12.0
 
 
@@ -386,6 +248,17 @@ class Beam:
         """
         nu = self.material.nu if self.material.E_across is None else 0.0
         return 6.0 * (1.0 + nu) / (7.0 + 6.0 * nu) if self.round else 10.0 * (1.0 + nu) / (12.0 + 11.0 * nu)
+
+    def torsion(self, points: np.ndarray) -> np.ndarray:
+        """Torsional stiffness (n_points,) [N m^2] by Saint-Venant, for a rib."""
+        height, width = (evaluate(name, getattr(self, name), points, "m") for name in ("height", "width"))
+        shear = self.material.transverse[0]
+        if self.round:
+            return shear * np.pi / 32.0 * height**4
+        thin, n = np.minimum(height, width), np.arange(1, 2 * TWISTS, 2)[:, None]
+        ratio = np.maximum(height, width) / thin
+        missing = (np.tanh(0.5 * n * np.pi * ratio) / n**5).sum(axis=0) / ratio
+        return shear * thin**4 * ratio * (1.0 / 3.0 - 64.0 / np.pi**5 * missing)
 
     def shear(self, points: np.ndarray) -> np.ndarray:
         """Shear stiffness (n_points,) [N] on the mean shear strain, for a Timoshenko beam."""

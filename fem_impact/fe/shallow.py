@@ -25,9 +25,9 @@ import numpy as np
 from skfem import Dofs, ElementTriP4
 
 from .._base import check
-from . import plane, plates
-from .elements import curvatures, inverses, numbering
-from .plane import FIRST, LOCAL, SECOND, PlaneSpace, reference
+from . import plane, plates, ribs
+from .elements import curvatures, numbering
+from .plane import FIRST, LOCAL, SECOND, PlaneSpace
 from .supports import constrain
 from .theory import Body, Domain, Held, Points, Term, Theory
 
@@ -48,20 +48,28 @@ class ShallowSpace(PlaneSpace):
         return np.hstack([flat, within])
 
 
-def terms(space: ShallowSpace, points: Points, cells: np.ndarray) -> list[Term]:
-    """Strains and changes of curvature; the deflection moves."""
-    value, slope, hessian = space.flat.functions(cells, points.x[cells], (0, 1, 2))
-    inverse = inverses(space, points.reference)[cells]
-    gradient = np.einsum("eqji,jqk->eqik", inverse, reference(points.reference)[1])
+def strained(space: ShallowSpace, cells: np.ndarray, area: np.ndarray, x: np.ndarray) -> np.ndarray:
+    """Strains and negative curvatures (n, n_q, 6, 51) of cells (n,) at area coordinates and places (n, n_q, 3 and 2).
+
+    The area coordinates may be the same for all cells, (1, n_q, 3).
+    """
+    slope, hessian = space.flat.functions(cells, x, (1, 2))
+    gradient = plane.gradients(space.inner, cells, area)
     steep = (gradient @ space.heights[cells][:, None, :, None])[..., 0]  # (n, n_q, 2) of the rise
-    n, n_q = value.shape[:2]
-    parts, moved = np.zeros((n, n_q, 6, LOCAL)), np.zeros((n, n_q, 1, LOCAL))
+    parts = np.zeros((*x.shape[:2], 6, LOCAL))
     parts[:, :, :3, 21:] = plane.strains(gradient)
     parts[:, :, 0, :21], parts[:, :, 1, :21] = (steep[..., i, None] * slope[:, i] for i in range(2))
     parts[:, :, 2, :21] = steep[..., :1] * slope[:, 1] + steep[..., 1:] * slope[:, 0]
     parts[:, :, 3:, :21] = -curvatures(hessian)
-    moved[:, :, 0, :21] = value
-    return [Term("K", "walls", parts), Term("M", "inertia", moved)]
+    return parts
+
+
+def terms(space: ShallowSpace, points: Points, cells: np.ndarray) -> list[Term]:
+    """Strains and changes of curvature; the deflection moves."""
+    X = points.reference
+    area = np.stack([1.0 - X[0] - X[1], *X], axis=1)[None]
+    moved = space.functions(cells, points.x[cells], (0,))[0][:, :, None]
+    return [Term("K", "walls", strained(space, cells, area, points.x[cells])), Term("M", "inertia", moved)]
 
 
 def _domain(body: Body, fields: tuple[str, ...]) -> Domain:
@@ -81,7 +89,9 @@ def _hold(body: Body, domain: Domain) -> Held:
     loose = plane.loosened(space.inner, rim, own)
     dofs = np.vstack([dofs, n_flat + own.element_dofs, n_flat + own.N + own.element_dofs])
     expand, project = plane.beside(expand, loose), plane.beside(project, loose.T)
-    return Held(expand, project, dofs, plates.springs(body, domain, dofs, expand.shape[0]), rim)
+    n_all = expand.shape[0]
+    held = ribs.attached(body, domain, dofs, n_all, strained) if body.section.ribs else None
+    return Held(expand, project, dofs, plates.springs(body, domain, dofs, n_all), rim, held)
 
 
 def _errors(system: Any, vectors: np.ndarray, loads: np.ndarray, forced: Any = None) -> np.ndarray:

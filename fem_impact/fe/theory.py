@@ -17,7 +17,8 @@ from scipy.sparse import coo_matrix, csc_matrix, csr_matrix, eye_array
 from .._base import check
 from .._base.untyped import Cells, Sparse
 from ..mesh.meshes import Mesh
-from .section import KINDS, Elastic, directional
+from .material import directional
+from .section import KINDS, Elastic
 from .supports import SupportedRim
 
 STIFF = "stiffness", "shear", "walls"  # fields of a section that resist; the others are inert
@@ -134,6 +135,7 @@ class Held(NamedTuple):
     dofs: np.ndarray  # (n_local, n_cells) numbers of the unknowns of each cell, among all
     springs: Any  # sparse (n_all, n_all) stiffness of elastic supports and tension
     rim: SupportedRim | None = None  # of a plate
+    ribs: tuple[Any, Any] | None = None  # sparse (n_all, n_all) stiffness and mass of its ribs
 
 
 @dataclass(frozen=True)

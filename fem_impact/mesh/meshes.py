@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from .._base import check, markup
-from . import drawings, mesh_files, sketch, smooth_edges
+from . import drawings, lines, mesh_files, sketch, smooth_edges
 from .facets import Curves, divided
 from .loops import Bezier, Outline, circle, crossed, extent, polyline, segment, signed_area, straight_loop
 from .triangulation import triangulate
@@ -373,23 +373,39 @@ def pierced(mesh: Mesh, holes: Sequence[tuple[np.ndarray, float]], *, size: floa
                 f"{radius:g} m"
             )
     inner = tuple(circle(centre, radius, f"clamp{i}") for i, (centre, radius) in enumerate(holes))
-    known = _outline(mesh)
-    around = _facets_outline(mesh) if known is None else known
+    around = _outline(mesh) or _facets_outline(mesh)
     whole = Outline.around(around.outer, (*around.holes, *inner))
     problem = crossed(whole)
     if problem:
         raise ValueError(f"point_supports must leave room for each clamp, inside the body and apart: {problem}")
+    return _filled(mesh, whole, size, recipe=partial(pierced, mesh, holes))
+
+
+def lined(mesh: Mesh, paths: Sequence[np.ndarray], *, size: float | None = None) -> Mesh:
+    """The mesh of a plate in which sides of triangles follow paths (n_points, 2) [m], straight between their points.
+
+    Edges keep their names and curves; a mesh from a file keeps its own vertices on the rim, not inside.
+    """
+    before = mesh.recipe.args[1] if isinstance(mesh.recipe, partial) and mesh.recipe.func is lined else ()
+    if size is None and all(any(np.array_equal(path, other) for other in before) for path in paths):
+        return mesh  # it follows them already
+    around = _outline(mesh) or _facets_outline(mesh)
+    return _filled(mesh, around, size, lines.inside(around, paths), recipe=partial(lined, mesh, paths))
+
+
+def _filled(
+    mesh: Mesh, whole: Outline, size: float | None, within: lines.Lines | None = None, *, recipe: Callable[..., Mesh]
+) -> Mesh:
+    """A new mesh of an outline made of that of another mesh, whose edges keep their names."""
     size, stated = (mesh.size, mesh.size_stated) if size is None else (size, True)
     _check_affordable(2.0 * mesh.area / size / size, size, MOST_CELLS)
-    arrays = triangulate(whole, size)
+    arrays = triangulate(whole, size, within)
     parts = arrays["edges"]
-    if known is None:
-        arrays["edges"] = {
-            name: np.concatenate([parts[str(i)] for i in numbers]) for name, numbers in mesh.edges.items()
-        }
-    arrays["edges"] |= {f"clamp{i}": parts[f"clamp{i}"] for i in range(len(holes))}
+    if _outline(mesh) is None:
+        rim = {name: np.concatenate([parts[str(i)] for i in numbers]) for name, numbers in mesh.edges.items()}
+        added = {name: numbers for name, numbers in parts.items() if not name.isdigit() and name not in rim}
+        arrays["edges"] = added | rim
     arrays["edges"]["boundary"] = np.arange(len(arrays["facets"]))
-    recipe = partial(pierced, mesh, holes)
     return Mesh(**arrays, recipe=recipe, size=size, size_stated=stated, notes=mesh.notes)
 
 

@@ -6,15 +6,19 @@ from typing import Any
 import numpy as np
 
 from .._base import check
+from .._base.rounding import SAME
+from .lines import Lines
 from .loops import Outline, Piece, crossing, curvature, divide, extent, is_straight, tangent
 from .smooth_edges import join
 
 SPREAD = 1.3  # [-] inner sides may be this much longer than the requested size before the mesher divides them
 REMEDY = "remove very thin necks or spikes, or pass another size"
+CROWDED = 0.3  # [-] of the longest facet of a piece: ends of facets nearer to the end of a line give way to it
+TOUCHING = 1e-8  # [-] of the extent: ends of lines nearer to another point are that point
 GRADING = 0.35  # [-] netgen's growth rate of elements away from small ones, close to its own default of 0.3
 
 
-def triangulate(outline: Outline, size: float) -> dict[str, Any]:
+def triangulate(outline: Outline, size: float, lines: Lines | None = None) -> dict[str, Any]:
     """Fill an outline with triangles.
 
     Parameters
@@ -23,6 +27,8 @@ def triangulate(outline: Outline, size: float) -> dict[str, Any]:
         Must have passed `loops.crossed`.
     size : float [m]
         Approximate longest side of a triangle; triangles are smaller where the outline turns quickly.
+    lines : Lines, optional
+        Sides of triangles follow them.
 
     Returns
     -------
@@ -39,24 +45,54 @@ def triangulate(outline: Outline, size: float) -> dict[str, Any]:
     for loop in outline.loops:
         first, start = len(chords), len(chords)
         for piece in loop:
-            t = divide(piece, size)
+            t = _ending(divide(piece, size), lines.cuts[id(piece)] if lines else [])
             chords += [(piece, a, b) for a, b in pairwise(t)]
         places = np.array([piece.at(np.array([a]))[0] for piece, a, _ in chords[first:]])
         numbers = [geometry.AppendPoint(*point) for point in (places - centre) / span]
         for i, number in enumerate(numbers):
             line = ["line", number, numbers[(i + 1) % len(numbers)]]
             geometry.Append(line, leftdomain=1, rightdomain=0, bc=start + i + 1)
+    if lines is not None and len(lines.ends):
+        rim = np.array([piece.at(np.array([a]))[0] for piece, a, _ in chords])
+        _append(geometry, (lines.ends - centre) / span, (rim - centre) / span)
     try:
         made = geometry.GenerateMesh(maxh=SPREAD * size / span, grading=GRADING, quad_dominated=False)
     except NgException as error:
         raise check.SimulationError(f"the mesher could not fill the outline ({error}); {REMEDY}") from None
     points = np.array([p.p for p in made.Points()])[:, :2] * span + centre
     cells = made.Elements2D().NumPy()["nodes"][:, :3].astype(int) - 1
-    facets = np.array([[e.points[0].nr - 1, e.points[1].nr - 1] for e in made.Elements1D()])
-    owner = np.array([e.index - 1 for e in made.Elements1D()])
+    sides = [side for side in made.Elements1D() if side.index <= len(chords)]
+    facets = np.array([[e.points[0].nr - 1, e.points[1].nr - 1] for e in sides])
+    owner = np.array([e.index - 1 for e in sides])
     if not len(cells) or set(owner.tolist()) != set(range(len(chords))):
         raise check.SimulationError(f"the mesher could not fill the outline; {REMEDY}")
     return _follow(points, cells, facets, owner, chords, outline.outer)
+
+
+def _ending(t: np.ndarray, cuts: list[float]) -> np.ndarray:
+    """Parameters (n,) of the facets of a piece that end at ``cuts``, too; others too near to one give way."""
+    for cut in cuts:
+        inner = t[1:-1]
+        if min(cut, 1.0 - cut) > SAME:
+            near = np.abs(inner - cut) < CROWDED * np.diff(t).max()
+            t = np.sort([0.0, *inner[~near | np.isin(inner, cuts)], cut, 1.0])
+    return np.unique(t)
+
+
+def _append(geometry: Any, ends: np.ndarray, rim: np.ndarray) -> None:
+    """Add lines (n, 2, 2) to netgen's geometry, whose points so far are those of the ``rim`` (n_points, 2)."""
+    known = list(rim)
+    for line in ends:
+        numbers = []
+        for place in line:
+            away = np.linalg.norm(np.array(known) - place, axis=1)
+            if away.min() > TOUCHING:
+                geometry.AppendPoint(*place)
+                known.append(place)
+                numbers.append(len(known) - 1)
+            else:
+                numbers.append(int(away.argmin()))
+        geometry.Append(["line", *numbers], leftdomain=1, rightdomain=1, bc=len(rim) + 1)
 
 
 def _follow(

@@ -9,7 +9,7 @@ from scipy.special import ivp, jvp
 import fem_impact as fi
 from fem_impact.fe import corners
 from fem_impact.fe.corners import around_corners
-from fem_impact.fe.section import turned
+from fem_impact.fe.material import turned
 from fem_impact.mesh.loops import Arc, Outline, segment
 from fem_impact.mesh.meshes import fill
 

@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from fem_impact.fe.section import Beam, Material, Plate, yield_strength
+from fem_impact.fe.material import Material, yield_strength
+from fem_impact.fe.section import Beam, Plate
 
 STEEL = Material(E=210e9, nu=0.3, rho=7850.0)
 POINT = np.zeros((1, 2))

@@ -1,0 +1,162 @@
+"""Ribs along lines of a plate: bars, stiffeners and joists, eccentric as built.
+
+A rib bends, twists and stretches with the plate. At the height of its centroid over the middle of the plate, z, its
+strain is that of the plate there, e - z k along the rib, so that it and the plate share the load of a T beam. It is
+slender: its section stays plane, its sideways bending is left out, and where ribs cross each goes through.
+
+References
+----------
+Mukherjee and Mukhopadhyay (1986), Shock Vib. Digest 18(5), 1-9; Timoshenko and Goodier (1951), Theory of elasticity,
+art. 109 (torsion of a bar of rectangular section).
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+
+from .._base import check
+from .._base.untyped import Sparse
+from ..mesh.meshes import Mesh
+from .section import Beam, Varying, evaluate
+from .splitting import distance
+from .springs import at_facets
+from .supports import SIDES, cells_of_facets
+from .theory import Body, Domain, gram, scatter
+
+ON = 1e-8  # [-] of the extent: vertices of a mesh nearer to a path lie on it; the mesher leaves 1e-12
+
+
+@dataclass(frozen=True, eq=False)
+class Rib:
+    """Rib of a plate for `assemble`.
+
+    Parameters
+    ----------
+    path : array_like, shape (n_points, 2) [m], or str
+        Where it runs, straight from point to point; parts beyond the edge count for nothing. Or the name of an edge
+        that it follows.
+    section : Beam
+        Its height is across the plate. Where it varies, it is a function of the distance along the path.
+    offset : float or function of points (n, 2) [m], optional
+        Height of its centroid over the middle of the plate, towards the striker. By default it is glued to the other
+        side: minus half of both thicknesses.
+
+    Examples
+    --------
+    >>> spruce = fi.Material(E=11e9, nu=0.3, rho=430.0)
+    >>> bar = fi.Rib([(0.1, 0.0), (0.1, 0.3)], fi.Beam.rectangular(spruce, width=8e-3, height=12e-3))
+    >>> system = fi.assemble(fi.mesh.rectangle(0.4, 0.3), fi.Plate(spruce, 3e-3), {"boundary": "hinged"}, ribs=[bar])
+    >>> fi.find_modes(system, n_modes=2).frequencies.round(1).tolist()
+    [0.0, 0.0]
+    """
+
+    path: Any
+    section: Beam
+    offset: Varying | None = None
+
+    def __post_init__(self) -> None:
+        check.instance("section", self.section, Beam)
+        if not isinstance(self.path, str):
+            path = check.array("path", self.path, (None, 2), "m")
+            if len(path) < 2 or (np.linalg.norm(np.diff(path, axis=0), axis=1) == 0.0).any():
+                raise ValueError("path must have two points or more, and none twice in a row")
+            check.settle(self, path=path)
+        elif any(callable(value) for value in (self.section.width, self.section.height)):
+            raise ValueError("section must not vary along a rib that follows an edge; give the path as points")
+        if self.offset is not None and not callable(self.offset):
+            check.settle(self, offset=check.number("offset", self.offset, "m"))
+
+    def along(self, points: np.ndarray) -> np.ndarray:
+        """Distance (n, 1) [m] along the path of points (n, 2) [m] on it."""
+        if isinstance(self.path, str):
+            return np.zeros((len(points), 1))
+        pairs = [np.array(pair) for pair in pairwise(self.path)]
+        lengths = [float(np.linalg.norm(end - start)) for start, end in pairs]
+        away = np.array([[distance(point, start, end) for start, end in pairs] for point in points])
+        nearest, before = away.argmin(axis=1), np.concatenate([[0.0], np.cumsum(lengths)])
+        start = np.array([pair[0] for pair in pairs])[nearest]
+        far = before[nearest] + np.linalg.norm(points - start, axis=1)
+        return np.minimum(far, before[-1])[:, None]
+
+    def rigidity(self, points: np.ndarray, thickness: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Stiffness (n, 3, 3) and mass per length (n,) [kg/m] at points (n, 2) [m] on a plate of ``thickness`` (n,).
+
+        The stiffness is that on the strain of the plate along the rib [N], its curvature along the rib, negative
+        [N m^2], and its twist [N m^2].
+        """
+        place, beam = self.along(points), self.section
+        inertia = beam.inertia(place)
+        if self.offset is None:
+            z = -0.5 * (thickness + evaluate("height", beam.height, place, "m"))
+        else:
+            z = (
+                check.field("offset", self.offset, points, "m")
+                if callable(self.offset)
+                else np.full(len(points), self.offset)
+            )
+        stretch = beam.material.E * inertia / beam.material.rho
+        result = np.zeros((len(points), 3, 3))
+        result[:, 0, 0] = stretch
+        result[:, 0, 1] = result[:, 1, 0] = stretch * z
+        result[:, 1, 1] = beam.stiffness(place) + stretch * z**2
+        result[:, 2, 2] = beam.torsion(place)
+        return result, inertia
+
+
+def sides_on(mesh: Mesh, path: Any) -> np.ndarray:
+    """Vertices (n, 2) of the sides of triangles that lie on a path (n_points, 2) [m], or on a named edge."""
+    if isinstance(path, str):
+        if path not in mesh.edges:
+            raise ValueError(f"path names edge {path!r}, but the mesh has {', '.join(sorted(mesh.edges)):.300}")
+        return mesh.facets[mesh.edges[path]]
+    sides = np.unique(np.sort(np.concatenate([mesh.cells[:, side] for side in SIDES]), axis=1), axis=0)
+    on, close = np.zeros(len(sides), bool), ON * float(np.ptp(mesh.points, axis=0).max())
+    for start, end in pairwise(path):
+        near = distance(mesh.points, start, end) < close
+        on |= near[sides].all(axis=1)
+    if not on.any():
+        raise ValueError("path of a rib must cross the plate; none of it lies on the body")
+    return sides[on]
+
+
+def attached(
+    body: Body, domain: Domain, dofs: np.ndarray, n_all: int, strained: Callable[..., np.ndarray]
+) -> tuple[Sparse, Sparse]:
+    """Stiffness and mass (n_all, n_all) of the ribs of a plate, on unknowns ``dofs`` (n_local, n_cells).
+
+    ``strained`` gives strains and negative curvatures (n, n_q, 6, n_local) of cells (n,) at area coordinates and
+    places.
+    """
+    frame, space = domain.frame, domain.space
+    K, M = (np.zeros((0, len(dofs), len(dofs))) for _ in range(2))
+    where = np.zeros(0, int)
+    for rib in body.section.ribs:
+        facets = sides_on(body.mesh, rib.path)
+        cells = cells_of_facets(facets, space.vertices)[0]
+        area, x, normal = at_facets(space, facets, cells)
+        ds = np.linalg.norm(normal, axis=2)
+        nx, ny = np.moveaxis(normal / ds[..., None], 2, 0)
+        along = np.stack([ny**2, nx**2, -nx * ny], axis=-1)  # of strains xx, yy, 2 xy, for the tangent (-ny, nx)
+        twist = np.stack([-nx * ny, nx * ny, 0.5 * (nx**2 - ny**2)], axis=-1)
+        parts = strained(space, cells, area, x)
+        own = np.stack(
+            [np.einsum("nqi,nqik->nqk", turn, parts[:, :, half])
+             for turn, half in ((along, slice(3)), (along, slice(3, 6)), (twist, slice(3, 6)))], axis=2,
+        )  # fmt: skip
+        place = frame.places(x)
+        thickness = evaluate("thickness", body.section.thickness, place, "m")
+        stiffness, inertia = rib.rigidity(place, thickness)
+        size = np.array([1.0, 1.0 / frame.length, 1.0 / frame.length])
+        stiffness = stiffness * np.outer(size, size) * frame.length / frame.stiffness
+        stiffness = stiffness.reshape(*ds.shape, 3, 3) * ds[..., None, None]
+        inertia = inertia.reshape(ds.shape) * ds / (frame.inertia * frame.length)
+        value = space.functions(cells, x, (0,))[0][:, :, None]
+        K, M, where = (
+            np.concatenate([K, gram(own, stiffness)]),
+            np.concatenate([M, gram(value, inertia)]),
+            np.append(where, cells),
+        )
+    return scatter(K, dofs[:, where], n_all), scatter(M, dofs[:, where], n_all)
