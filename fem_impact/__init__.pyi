@@ -23,6 +23,7 @@ from .impact.spectra import mobility as mobility
 from .impact.striker import Hand as Hand
 from .impact.striker import Striker as Striker
 from .impact.threshold import threshold_frequency as threshold_frequency
+from .mesh import rise as rise
 from .model.planner import Plan as Plan
 from .model.planner import strike as strike
 from .model.playing import strokes as strokes

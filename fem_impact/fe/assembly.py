@@ -71,7 +71,8 @@ def assemble(
     theory : str, optional
         For a plate "kirchhoff" (the default; thin) or "mindlin" (with shear and rotary inertia); for a beam "euler" or
         "timoshenko". A thick plate takes some five times as long. A force, a mass or an observed point acts on it over
-        a disk of radius 0.325 times the thickness, because under a point it would give way without limit.
+        a disk of radius 0.325 times the thickness, because under a point it would give way without limit. A plate that
+        is curved, ribbed or unevenly layered is "shallow", see `fe.shallow`: thin, with displacements in its plane.
     point_masses : sequence of (point [m], mass [kg])
         Masses without extent that move with the plate or beam.
     point_supports : sequence of (point [m], "hinged" or stiffness [N/m]) or (point [m], "clamped", radius [m])

@@ -1,0 +1,106 @@
+"""Rises of usual curved bodies: the height of the unloaded surface above the outline, towards the striker.
+
+Each function returns a function of points (n, 2) [m] that gives heights (n,) [m], for ``rise`` of `assemble`. Yours
+may be any such function.
+"""
+
+from functools import partial
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+from scipy.interpolate import CloughTocher2DInterpolator, NearestNDInterpolator
+
+from .._base import check
+
+Rise = partial[np.ndarray]
+
+
+def _local(points: np.ndarray, centre: np.ndarray, angle: float = 0.0) -> tuple[np.ndarray, np.ndarray]:
+    """Coordinates (n,) along and across a direction, from a centre."""
+    (x, y), c, s = (points - centre).T, np.cos(angle), np.sin(angle)
+    return c * x + s * y, c * y - s * x
+
+
+def _round(away: np.ndarray, radius: float) -> np.ndarray:
+    """Height of a circle of a radius at distances from its top; negative radii are hollow."""
+    if (away >= abs(radius)).any():
+        raise ValueError(f"radius must be larger than the body, got {radius:g} m at {away.max():g} m from the top")
+    return np.sign(radius) * -(away**2) / (abs(radius) + np.sqrt(radius**2 - away**2))
+
+
+def _cap(points: np.ndarray, radius: float, centre: np.ndarray) -> np.ndarray:
+    return _round(np.hypot(*_local(points, centre)), radius)
+
+
+def _cylinder(points: np.ndarray, radius: float, angle: float, centre: np.ndarray) -> np.ndarray:
+    return _round(np.abs(_local(points, centre, angle)[1]), radius)
+
+
+def _saddle(points: np.ndarray, radius: float, angle: float, centre: np.ndarray) -> np.ndarray:
+    along, across = _local(points, centre, angle)
+    return _round(np.abs(along), radius) - _round(np.abs(across), radius)
+
+
+def _cymbal(points: np.ndarray, radius: float, bow: float, cup_radius: float, cup: float) -> np.ndarray:
+    away = np.hypot(*points.T)
+    return bow * (1.0 - (away / radius) ** 2) + cup * np.maximum(1.0 - (away / cup_radius) ** 2, 0.0) ** 2
+
+
+def _between(points: np.ndarray, smooth: Any, nearest: Any) -> np.ndarray:
+    found = smooth(points)
+    return np.where(np.isnan(found), nearest(points), found)
+
+
+def _radius(radius: float) -> float:
+    if check.number("radius", radius, "m") == 0.0:
+        raise ValueError("radius must not be zero; a flat plate needs no rise")
+    return float(radius)
+
+
+def cap(radius: float, *, centre: ArrayLike = (0.0, 0.0)) -> Rise:
+    """A sphere of a radius [m], highest at ``centre`` (2,) [m]; lowest there if the radius is negative.
+
+    Examples
+    --------
+    >>> fi.rise.cap(2.0)(np.array([[0.1, 0.0]])).round(6).tolist()  # m
+    [-0.002502]
+    """
+    return partial(_cap, radius=_radius(radius), centre=check.array("centre", centre, (2,), "m"))
+
+
+def cylinder(radius: float, *, angle: float = 0.0, centre: ArrayLike = (0.0, 0.0)) -> Rise:
+    """A cylinder of a radius [m] whose straight top runs through ``centre`` at an angle [rad] from the x axis."""
+    place = check.array("centre", centre, (2,), "m")
+    return partial(_cylinder, radius=_radius(radius), angle=check.number("angle", angle, "rad"), centre=place)
+
+
+def saddle(radius: float, *, angle: float = 0.0, centre: ArrayLike = (0.0, 0.0)) -> Rise:
+    """A saddle that falls with a radius [m] along a direction ``angle`` [rad] and rises as much across it."""
+    place = check.array("centre", centre, (2,), "m")
+    return partial(_saddle, radius=_radius(radius), angle=check.number("angle", angle, "rad"), centre=place)
+
+
+def cymbal(radius: float, bow: float, cup_radius: float, cup: float) -> Rise:
+    """A cymbal around the origin: a bow of a height [m] over its whole radius [m], and a cup of a height [m] on top.
+
+    The bow is a paraboloid that is zero at the edge. The cup of ``cup_radius`` [m] joins it without a kink.
+
+    Examples
+    --------
+    >>> fi.rise.cymbal(0.2, bow=0.02, cup_radius=0.05, cup=0.015)(np.array([[0.0, 0.0], [0.05, 0.0]])).tolist()
+    [0.035, 0.01875]
+    """
+    sizes: dict[str, Any] = {"radius": check.positive("radius", radius, "m"), "bow": check.number("bow", bow, "m")}
+    sizes |= {"cup_radius": check.positive("cup_radius", cup_radius, "m"), "cup": check.number("cup", cup, "m")}
+    return partial(_cymbal, **sizes)
+
+
+def table(points: ArrayLike, heights: ArrayLike) -> Rise:
+    """A smooth surface through heights (n,) [m] at points (n, 2) [m]; beyond them, that of the nearest point counts."""
+    place = check.array("points", points, (None, 2), "m")
+    height = check.array("heights", heights, (len(place),), "m")
+    if len(place) < 4:
+        raise ValueError(f"points must be four or more, got {len(place)}")
+    smooth, nearest = (kind(place, height) for kind in (CloughTocher2DInterpolator, NearestNDInterpolator))
+    return partial(_between, smooth=smooth, nearest=nearest)
