@@ -117,12 +117,11 @@ def assemble(
         if not isinstance(section, Plate):
             raise ValueError(f"section must be a Plate for {', '.join(shaped)}, got {check.shown(section)}")
         section = replace(section, **shaped)
-    plane = isinstance(section, Plate) and not section.plain
-    usual = SHALLOW.name if plane else THEORIES[mesh.dimension][0]
-    theory = check.one_of("theory", usual if theory is None else theory, THEORIES[mesh.dimension])
-    if plane and theory != usual:
+    usual = usual_theory(section, mesh.dimension)
+    theory = check.one_of("theory", usual.name if theory is None else theory, THEORIES[mesh.dimension])
+    if usual is SHALLOW and theory != usual.name:
         why = "a plate that is curved, ribbed or unevenly layered"
-        raise ValueError(f"theory must be {usual!r} for {why}, got {theory!r}")
+        raise ValueError(f"theory must be {usual.name!r} for {why}, got {theory!r}")
     known = {each.element: each for each in EVERY if each.name == theory}
     rules = known[check.one_of("element", next(iter(known)) if element is None else element, tuple(known))]
     supports = {} if supports is None else supports
@@ -131,14 +130,26 @@ def assemble(
     posts, clamps = check_posts(point_supports, mesh.dimension)
     if clamps:
         mesh, supports = pierced(mesh, clamps), clamped(supports, len(clamps))
-    paths = [rib.path for rib in getattr(section, "ribs", ()) if not isinstance(rib.path, str)]
-    mesh = lined(mesh, paths) if paths else mesh
+    mesh = ribbed(mesh, section)
     attached = Attached(check_masses(point_masses, mesh.dimension), posts)
     near = None if near is None else check.places("near", near, mesh.dimension)
     near, coarseness = None if near is None or not len(near) else near, check.number("coarseness", coarseness)
     if coarseness < 1.0:
         raise ValueError(f"coarseness must be at least 1, got {coarseness:g}")
     return _assembled(rules, mesh, section, supports, attached, near, graded, coarseness=coarseness)
+
+
+def usual_theory(section: Any, dimension: int) -> Theory:
+    """The theory of a thin body of a section, on a mesh of a dimension."""
+    if dimension == 2 and isinstance(section, Plate) and not section.plain:
+        return SHALLOW
+    return ARGYRIS if dimension == 2 else EULER
+
+
+def ribbed(mesh: Mesh, section: Any) -> Mesh:
+    """The mesh, of whose triangles sides follow the ribs of a plate."""
+    paths = [rib.path for rib in getattr(section, "ribs", ()) if not isinstance(rib.path, str)]
+    return lined(mesh, paths) if paths else mesh
 
 
 def _assembled(
@@ -204,10 +215,12 @@ def unknowns_near(
     mesh: Mesh, section: Plate, supports: dict[str, Any], points: np.ndarray, graded: bool = True, coarseness: Any = 1.0
 ) -> int:
     """About how many unknowns `assemble` makes of a thin plate with elements that shrink towards points; 1 % more."""
-    fine = _graded(ARGYRIS, mesh, section, supports, points, graded, 1.0, coarseness)[1]
+    rules = usual_theory(section, 2)
+    fine = _graded(rules, mesh, section, supports, points, graded, 1.0, coarseness)[1]
     held = [HOLDS.get(kind, 0) for kind in plain_kinds(support_of_facets(fine, supports))]
     sides = (3 * len(fine.cells) + len(fine.facets)) // 2
-    return 6 * len(fine.points) + sides - sum(held)
+    within = 2 * (len(fine.points) + 3 * sides + 3 * len(fine.cells)) if rules is SHALLOW else 0
+    return 6 * len(fine.points) + sides - sum(held) + within
 
 
 def reassemble(

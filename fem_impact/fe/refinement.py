@@ -401,7 +401,7 @@ def enclosure(found: Spectrum) -> np.ndarray | None:
     """
     system = found.system
     plate, mesh = system.section, system.mesh
-    if not isinstance(plate, Plate) or callable(plate.thickness) or plate.material.E_across is not None:
+    if not isinstance(plate, Plate) or not plate.uniform or plate.material.E_across is not None:
         return None
     if (
         mesh.curved.any()

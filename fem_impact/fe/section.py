@@ -68,6 +68,10 @@ class Plate:
         if not callable(self.thickness):
             check.settle(self, thickness=check.positive("thickness", self.thickness, "m"))
         check.settle(self, tension=check.non_negative("tension", self.tension, "N/m"))
+        if self.layers and self.material != layering.together(self.layers):
+            raise ValueError("material must be that of the layers; make a plate of layers by Plate.laminate")
+        if self.layers and self.thickness != sum(layer.thickness for layer in self.layers):
+            raise ValueError("thickness must be that of the layers; make a plate of layers by Plate.laminate")
         if self.rise is not None and not callable(self.rise):
             raise ValueError(f"rise must be a function of points, or one of fi.rise, got {check.shown(self.rise)}")
         check.settle(self, ribs=tuple(self.ribs), in_plane=dict(self.in_plane))
@@ -95,6 +99,11 @@ class Plate:
         """
         found = layering.stacked(layers)
         return cls(layering.together(found), sum(layer.thickness for layer in found), tension, found)
+
+    @property
+    def uniform(self) -> bool:
+        """Whether it is plain, of one material and the same everywhere, as formulas of plates ask."""
+        return self.plain and not self.layers and not callable(self.thickness)
 
     @property
     def plain(self) -> bool:

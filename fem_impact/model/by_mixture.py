@@ -75,7 +75,7 @@ class Mixed(Description):
                 if named:
                     raise
                 return None
-            chosen = {"element": "argyris", "size": elements.size, "n_dofs": n_dofs, "work": work}
+            chosen = {"element": target.element, "size": elements.size, "n_dofs": n_dofs, "work": work}
         forecast = asked.foretell(
             "mixed", errors={"echoes left out": asked.budget.half}, reasons=(why, kept), mass=seen.mass,
             mobility=seen.mobility, n_modes=number, max_frequency=frequency,
@@ -142,7 +142,7 @@ def _by_elements(asked: Asked, frequency: float, stages: Stages) -> tuple[Elemen
     target, reach, tolerance = asked.blow.target, mixed.RESOLVED * frequency, asked.budget.total
     assert target.mesh is not None and asked.seen is not None
     size = vectors.size_for(target, reach, tolerance)
-    if size < refinement.smallest_size("argyris", target.mesh):
+    if size < refinement.smallest_size(target.element, target.mesh):
         raise check.SimulationError(f"{asked.blow.name}{NO_MESH}")
     elements = vectors.elements_for(target, size, asked.mass, reach, tolerance)
     lasts = max(asked.duration, mixed.LASTING * asked.mass * asked.seen.mobility)

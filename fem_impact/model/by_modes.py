@@ -22,7 +22,7 @@ MOST_MODES = {"fe": 2000, "analytic": 50_000, "modes": 50_000}  # [-] limit by s
 MANY_MODES = 10_000
 # [-] frequency error of the shortest waves that the mesh resolves by `Theory.wave`; beams also round
 SHORT_WAVES = {
-    "argyris": 1e-5, "hermite": 1e-9, "argyris and shear": 1e-5, "hermite and shear": 1e-9,
+    "argyris": 1e-5, "argyris and quartic": 1e-5, "hermite": 1e-9, "argyris and shear": 1e-5, "hermite and shear": 1e-9,
 }  # fmt: skip
 
 
@@ -137,11 +137,11 @@ def _with_mesh(asked: Asked, told: Forecast, shapes: FieldShapes, limit: float) 
     reason = f"{system.element} elements of {size:.3g} m, about {n_dofs} unknowns, resolve the shortest wave"
     work = cost.NOTHING  # if the plan has found all modes, and their compliance
     if told.n_modes > first.n_modes:
-        thick = system.element == "argyris and shear"  # its errors come from a second mesh
-        coarser = [n_dofs / refinement.COARSER**2] if thick else []
+        compared = system.rules.compared
+        coarser = [n_dofs / refinement.COARSER**2] if compared else []
         each = [cost.by_modes(n, told.n_modes) for n in [n_dofs, *coarser]]
         if mesh.dimension == 2:
-            finer = [n_dofs * refinement.COARSER**2] if thick else []
+            finer = [n_dofs * refinement.COARSER**2] if compared else []
             at_blow = cost.AT_BLOW[system.element]
             each += [cost.compliance(n + at_blow) for n in [n_dofs, *finer]]
         work = replace(sum(each, cost.NOTHING), memory=max(part.memory for part in each))  # one mesh after another

@@ -53,10 +53,10 @@ class Vectors(Description):
         with stages("modes"):
             size = asked.pieces.get("size") or vectors.size_for(target, 0.5 / asked.duration, asked.budget.total)
         assert target.mesh is not None
-        smallest = refinement.smallest_size("argyris", target.mesh)
+        smallest = refinement.smallest_size(target.element, target.mesh)
         if size < smallest and not asked.meshed:
             soft = blow.contact.stiffness * (size / smallest) ** (2.0 * (blow.contact.exponent + 1.0))
-            needs = refinement.unknowns("argyris", target.mesh, size)
+            needs = refinement.unknowns(target.element, target.mesh, size)
             raise Unaffordable(
                 f"{blow.name}this blow needs about {needs:.2g} unknowns, elements of {size:.2g} m, more than the limit "
                 f"of {refinement.MOST_UNKNOWNS}; take a contact with stiffness = {float(f'{0.9 * soft:.1e}'):g}"
@@ -73,14 +73,14 @@ class Vectors(Description):
         ringing = sum(rings, cost.NOTHING)
         why = f"the contact lasts about {asked.duration:.3g} s"
         kept = f"the target is described by about {count} Ritz vectors, more if the error demands it"
-        reason = f"argyris elements of {size:.3g} m, smaller towards the blow, about {n_dofs} unknowns"
+        reason = f"{target.element} elements of {size:.3g} m, smaller towards the blow, about {n_dofs} unknowns"
         if asked.moving:
             reason += "; the vectors give the early motion, modes driven by the computed force the rest and the sound"
             work, ringing = work + ringing, cost.NOTHING
         shares = dict.fromkeys(("Ritz vectors", "mesh"), asked.budget.half * (1.0 - CHEAP))
         forecast = asked.foretell(
             "vectors", errors=shares, reasons=(why, kept, reason), n_modes=count, size=size, n_dofs=n_dofs,
-            element="argyris", steps=asked.budget.cheap, mass=target.mass, notes=target.notes, work=work,
+            element=target.element, steps=asked.budget.cheap, mass=target.mass, notes=target.notes, work=work,
             ringing=ringing.seconds,
         )  # fmt: skip
         return cls(asked, forecast, elements)

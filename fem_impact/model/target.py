@@ -21,9 +21,11 @@ from ..fe.assembly import (
     assemble,
     notes_on,
     reassemble,
+    ribbed,
     support_of_facets,
     support_words,
     unknowns_near,
+    usual_theory,
 )  # fmt: skip
 from ..fe.section import Beam, Plate
 from ..mesh.meshes import Mesh
@@ -106,6 +108,8 @@ class Target:
     def __post_init__(self) -> None:
         if self.theory is not None and self.mesh is not None:
             check.one_of("theory", self.theory, THEORIES[self.mesh.dimension])
+        if self.mesh is not None:
+            check.settle(self, mesh=ribbed(self.mesh, self.section))
         if self.air is not None and self.mesh is not None and self.mesh.dimension != 2:
             raise ValueError("air is known around plates only; leave it out")
         if self.source == "analytic" and self.closed is None:
@@ -140,6 +144,11 @@ class Target:
     def thick(self) -> bool:
         """Whether shear and rotary inertia count."""
         return self.theory in THICK
+
+    @property
+    def element(self) -> str:
+        """The elements of a thin plate, as `near` assembles it."""
+        return usual_theory(self.section, 2).element
 
     @property
     def can_stretch(self) -> bool:

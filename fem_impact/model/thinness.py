@@ -116,7 +116,7 @@ def wavenumber(body: Known, integrals: Bending | None, omega: float) -> float | 
 def _simplified(struck: Struck, body: Known) -> Assumption:
     """A rigid body gives by shear alone; the mobility of an infinite plate rises as its waves get slower."""
     plate, history = body.plate, struck.hit.history
-    if plate is None or body.thickness is None or callable(plate.thickness):
+    if plate is None or body.thickness is None or not plate.uniform:
         return TARGET.unknown(struck, "the waves of this body, without its modes")
     wave = plane_wave(plate, struck.omega)
     value = body.thickness * wave

@@ -46,7 +46,7 @@ def usable(target: Target) -> bool:
         return False
     ratio = target.damping_ratio
     by_mode = not callable(ratio) and np.ndim(ratio if ratio is not None else 0.0) > 0
-    return not by_mode and (target.system is None or target.system.element == "argyris")
+    return not by_mode and (target.system is None or target.system.element == target.element)
 
 
 def _strict(rule: tuple[float, float], tolerance: float) -> float:

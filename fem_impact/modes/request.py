@@ -77,9 +77,9 @@ def request(
         point = np.zeros((1, 1))
         rigidity = section.stiffness(point)[0] / size**3
     else:
-        if callable(section.thickness) or section.material.E_across is not None or section.tension:
+        if not section.uniform or section.material.E_across is not None or section.tension:
             raise ValueError(
-                "section must be isotropic, of constant thickness and without tension; else use find_modes"
+                "section must be flat, isotropic, of constant thickness and without tension; else use find_modes"
             )
         point = np.zeros((1, 2))
         rigidity = section.stiffness(point)[0, 0, 0]

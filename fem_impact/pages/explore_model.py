@@ -171,7 +171,7 @@ class Setup:
         for share in (1.0, 0.75, 0.5, 0.25, 0.0):
             hard = harder(share)
             size = vectors.size_for(target, case.with_values(hard).resonance, VECTORS)
-            if refinement.unknowns("argyris", target.mesh, size) <= 10_000:  # besides those nearest to the blow
+            if refinement.unknowns(target.element, target.mesh, size) <= 10_000:  # besides those nearest to the blow
                 masses = start.mass, start.mass * SPANS["mass"] ** (0.5 * share)
                 heavier = [{**harder(part * share), "mass": mass} for part in (0.0, 0.5, 1.0) for mass in masses]
                 sized = bodies.Sized(target, case, [hard, harder(-share)], heavier, VECTORS)

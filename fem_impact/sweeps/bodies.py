@@ -274,7 +274,7 @@ class Sized:
         target = self.target
         size = vectors.size_for(target, resonance, self.tolerance)
         assert target.mesh is not None
-        allowed = target.size_stated or size >= refinement.smallest_size("argyris", target.mesh)
+        allowed = target.size_stated or size >= refinement.smallest_size(target.element, target.mesh)
         return size if allowed else None
 
     def found(self, stages: Stages, keep: Any = None) -> "tuple[Sized, list[Modes]]":
