@@ -52,6 +52,7 @@ def assemble(
     near: Any = None,
     coarseness: float = 1.0,
     graded: bool = True,
+    layer: float = 1.0,
     rise: Any = None,
     ribs: Sequence[Rib] | None = None,
     in_plane: Mapping[str, str] | None = None,
@@ -86,6 +87,9 @@ def assemble(
         times its square.
     graded : bool
         Whether to put rings of shrinking triangles at corners where the supports make the solution singular.
+    layer : float [-]
+        Size of the triangles along free edges of a thick plate, and where the rise of a curved one bends much, over the
+        usual one.
     rise : function of points (n, 2) [m] returning (n,) [m], optional
         Height of the unloaded surface of a curved plate above its outline, towards the striker: your own, or one of
         `fi.rise`. Such a shell must be shallow, with slopes below some 0.1.
@@ -136,7 +140,8 @@ def assemble(
     near, coarseness = None if near is None or not len(near) else near, check.number("coarseness", coarseness)
     if coarseness < 1.0:
         raise ValueError(f"coarseness must be at least 1, got {coarseness:g}")
-    return _assembled(rules, mesh, section, supports, attached, near, graded, coarseness=coarseness)
+    layer = check.positive("layer", layer)
+    return _assembled(rules, mesh, section, supports, attached, near, graded, layer, coarseness)
 
 
 def usual_theory(section: Any, dimension: int) -> Theory:
@@ -212,11 +217,12 @@ def _graded(
 
 
 def unknowns_near(
-    mesh: Mesh, section: Plate, supports: dict[str, Any], points: np.ndarray, graded: bool = True, coarseness: Any = 1.0
-) -> int:
+    mesh: Mesh, section: Plate, supports: dict[str, Any], points: np.ndarray, graded: bool = True,
+    coarseness: Any = 1.0, layer: float = 1.0,
+) -> int:  # fmt: skip
     """About how many unknowns `assemble` makes of a thin plate with elements that shrink towards points; 1 % more."""
     rules = usual_theory(section, 2)
-    fine = _graded(rules, mesh, section, supports, points, graded, 1.0, coarseness)[1]
+    fine = _graded(rules, mesh, section, supports, points, graded, layer, coarseness)[1]
     held = [HOLDS.get(kind, 0) for kind in plain_kinds(support_of_facets(fine, supports))]
     sides = (3 * len(fine.cells) + len(fine.facets)) // 2
     within = 2 * (len(fine.points) + 3 * sides + 3 * len(fine.cells)) if rules is SHALLOW else 0

@@ -49,7 +49,7 @@ class System(check.Brief):
     strain: Strain | None = field(default=None, repr=False)  # where K loses digits
     near: np.ndarray | None = None  # (n_points, 2) [m] points towards which the triangles shrink
     coarseness: float = 1.0  # [-] size of the triangles there, over the usual one
-    layer: float = 1.0  # [-] size of triangles along free edges of a thick plate, over the usual one
+    layer: float = 1.0  # [-] size of triangles along free edges of a thick plate and at bends, over the usual one
 
     def _repr_html_(self) -> str:
         """Notebook view: the body with its supports, and a table of its size."""

@@ -160,7 +160,8 @@ class Theory:
     patch: float = 0.0  # [-] radius over which a force at a point is spread, over the thickness
     # whether K is so rounded that the strain energy is computed from strains
     sharp: Callable[[Domain], bool] | None = None
-    # the mesh with triangles that resolve the layers at edges of these supports (n_facets,), coarser by a factor
+    # the mesh with triangles that resolve the layers at edges of these supports (n_facets,), or sharp bends, coarser by
+    # a factor
     layered: Callable[[Mesh, Any, list[str], float], Mesh] | None = None
 
     @property

@@ -44,7 +44,7 @@ def _saddle(points: np.ndarray, radius: float, angle: float, centre: np.ndarray)
 
 def _cymbal(points: np.ndarray, radius: float, bow: float, cup_radius: float, cup: float) -> np.ndarray:
     away = np.hypot(*points.T)
-    return bow * (1.0 - (away / radius) ** 2) + cup * np.maximum(1.0 - (away / cup_radius) ** 2, 0.0) ** 2
+    return bow * (1.0 - (away / radius) ** 2) + cup * np.maximum(1.0 - (away / cup_radius) ** 2, 0.0) ** 3
 
 
 def _between(points: np.ndarray, smooth: Any, nearest: Any) -> np.ndarray:
@@ -84,7 +84,7 @@ def saddle(radius: float, *, angle: float = 0.0, centre: ArrayLike = (0.0, 0.0))
 def cymbal(radius: float, bow: float, cup_radius: float, cup: float) -> Rise:
     """A cymbal around the origin: a bow of a height [m] over its whole radius [m], and a cup of a height [m] on top.
 
-    The bow is a paraboloid that is zero at the edge. The cup of ``cup_radius`` [m] joins it without a kink.
+    The bow is a paraboloid that is zero at the edge. The cup of ``cup_radius`` [m] joins it with the curvature of the bow.
 
     Examples
     --------

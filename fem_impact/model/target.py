@@ -54,6 +54,7 @@ class Elements(NamedTuple):
 
     size: float  # [m]
     coarseness: float = 0.0  # [-] of those at the blow, see `assemble`; stands for 1 if it is less
+    layer: float = 1.0  # [-] of those where it is curved, see `assemble`
 
     @property
     def at_blow(self) -> float:
@@ -271,14 +272,15 @@ class Target:
                 masses = np.reshape([place for place, _ in self.point_masses], (-1, 2))
                 points, coarseness = np.vstack([at, masses]), np.ones(len(at) + len(masses))
                 coarseness[: len(at)] = elements.at_blow
-                return unknowns_near(mesh, self.section, dict(self.supports), points, graded, coarseness)
+                each = coarseness, elements.layer
+                return unknowns_near(mesh, self.section, dict(self.supports), points, graded, *each)
 
         return self._counts.found(np.append(elements, at).tobytes(), count)
 
     def near(self, at: np.ndarray, elements: Elements, stages: Stages) -> System:
         """The body assembled with elements that shrink towards points (n_points, 2) [m]."""
         graded = self.system is None or self.system.graded
-        how = {"near": at, "coarseness": elements.at_blow, "graded": graded}
+        how = {"near": at, "coarseness": elements.at_blow, "graded": graded, "layer": elements.layer}
         return self._assembled(self._meshed(elements.size, stages), stages, **how)
 
     def _assembled(self, mesh: Mesh, stages: Stages, **how: Any) -> System:

@@ -84,9 +84,11 @@ def elements_for(target: Target, size: float, mass: float, resonance: float, tol
     wave, area = target.wave(resonance / target.stretch, tense=False), target.mesh.area
     allowed = (DIP * min(tolerance, 1e-2) * target.mass / (mass * wave**2 * area)) ** 0.5 / wave
     # triangles at a blow that are more than 64 times coarser were not tried
-    return Elements(size, min(allowed / (DEPTH * area / target.mesh.perimeter), 64.0))
+    coarseness = min(allowed / (DEPTH * area / target.mesh.perimeter), 64.0)
+    return Elements(size, coarseness, min(1.0, tolerance / 1e-2) ** BENT)
 
 
+BENT = 1.0 / 6.0  # [-] power of the tolerance with which triangles shrink where a plate is curved: order six
 # [-] a mesh with more than this part of the elements of another is no coarser: sizes 1.5 apart should leave 0.44
 ALIKE = 0.85
 # [-] ratio of the sizes at the blow of two meshes that are compared, where triangles halve: one halving more
@@ -100,12 +102,13 @@ def finer(target: Target, elements: Elements, stages: Stages) -> Elements:
         size /= refinement.COARSER
         if ALIKE * target.n_cells(size, stages) >= before:
             break
-    return Elements(size, elements.coarseness / FLATTER)
+    return Elements(size, elements.coarseness / FLATTER, elements.layer / refinement.COARSER)
 
 
 def compared(target: Target, elements: Elements, stages: Stages) -> tuple[Elements, Elements]:
     """Elements of the first two meshes that are compared: finer ones if the outline allows no larger ones."""
-    coarser = Elements(refinement.COARSER * elements.size, FLATTER * elements.coarseness)
+    times = refinement.COARSER
+    coarser = Elements(times * elements.size, FLATTER * elements.coarseness, times * elements.layer)
     if target.n_cells(coarser.size, stages) <= ALIKE * target.n_cells(elements.size, stages):
         return elements, coarser
     return finer(target, elements, stages), elements
