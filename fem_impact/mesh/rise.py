@@ -84,7 +84,8 @@ def saddle(radius: float, *, angle: float = 0.0, centre: ArrayLike = (0.0, 0.0))
 def cymbal(radius: float, bow: float, cup_radius: float, cup: float) -> Rise:
     """A cymbal around the origin: a bow of a height [m] over its whole radius [m], and a cup of a height [m] on top.
 
-    The bow is a paraboloid that is zero at the edge. The cup of ``cup_radius`` [m] joins it with the curvature of the bow.
+    The bow is a paraboloid that is zero at the edge. The cup of ``cup_radius`` [m] joins it without a jump of slope or
+    curvature.
 
     Examples
     --------
