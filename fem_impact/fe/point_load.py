@@ -10,7 +10,7 @@ from ..mesh.meshes import Mesh
 from . import beam_elements
 from .assembly import reassemble
 from .eigenvalues import Flexibility
-from .refinement import CHEAP_CELLS, COARSER
+from .refinement import CHEAP_CELLS, COARSER, FLATTER
 from .system import System
 
 GOAL = 1e-5  # [-] refinement stops at this relative error of the compliance: a tenth of the default tolerance
@@ -69,7 +69,7 @@ def _compared(system: System, loads: np.ndarray) -> Deflection:
     finer = mesh.refined(COARSER)
     if len(mesh.cells) > CHEAP_CELLS and len(mesh.refined(1.0 / COARSER).cells) < len(mesh.cells):
         mesh, finer = mesh.refined(1.0 / COARSER), mesh
-    with_fewer = _solved(replace(system, layer=COARSER * system.layer), mesh, loads).compliance.diagonal()
+    with_fewer = _solved(replace(system, layer=FLATTER * system.layer), mesh, loads).compliance.diagonal()
     found = _solved(system, finer, loads)
     diagonal = found.compliance.diagonal()
     error = np.abs(diagonal - with_fewer)

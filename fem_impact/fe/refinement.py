@@ -23,6 +23,8 @@ from .system import System
 
 # [-] ratio of element sizes whose frequencies are compared, and order: less than half the unknowns, errors times five
 COARSER, COMPARED = 1.5, 4.0
+# [-] the same ratio where triangles are halved, at the blow and where a plate is curved: one halving more
+FLATTER = 2.0
 ERROR_OF_WAVE = (8e-7, 3.3)  # [-] a smooth frequency's error is at most 8e-7 (kh)**8, growing slower above kh = 3.3
 # [-] factor of the edge length in Weyl's law, fact: 1 + Gamma(3/4) / (sqrt(pi) Gamma(5/4)) clamped; free for nu = 0.3
 EDGE_TERM = {"clamped": 1.76, "hinged": 1.0, "soft hinged": 1.0, "free": -1.71}
@@ -199,19 +201,24 @@ def _missed_at_corners(system: System, vectors: np.ndarray, values: np.ndarray) 
 
 
 def _compared(system: System, omega: np.ndarray) -> np.ndarray:
-    """Estimated errors (n_modes,) [rad/s] of frequencies of a thick plate, from those on larger or smaller triangles.
+    """Estimated errors (n_modes,) [rad/s] of frequencies of a thick plate or a shell, from those on larger or smaller triangles.
 
     The order assumed is less than that of smooth plates, whose errors are stated some three times too large.
     """
     mesh, n_modes = system.mesh, len(omega)
     if mesh.recipe is None:
-        raise ValueError("mesh must be made with fi.mesh or loaded with fi.mesh.load for a thick plate")
+        raise ValueError("mesh must be made with fi.mesh or loaded with fi.mesh.load for a thick or curved plate")
     for factor in (1.0 / COARSER, COARSER, COARSER**2):  # where edges curve, coarser meshes may be no coarser there
         other = mesh.refined(factor)
         ratio = (len(other.cells) / len(mesh.cells)) ** 0.5
         if max(ratio, 1.0 / ratio) > COARSER**0.5 and (factor > 1.0 or len(other.cells) > n_modes):
             break
-    again = _pairs(reassemble(system, other, layer=system.layer / factor), n_modes, None)[1]
+    bent = not system.rules.thick
+    layer = system.layer / (factor if not bent else FLATTER if factor > 1.0 else 1.0 / FLATTER)
+    body = reassemble(system, other, layer=layer)
+    if bent:  # the rise divides triangles, too
+        ratio = (len(body.space.origin) / len(system.space.origin)) ** 0.5
+    again = _pairs(body, n_modes, None)[1]
     return np.abs(again - omega) / np.abs(ratio**-COMPARED - 1.0)
 
 
@@ -338,7 +345,8 @@ def refine(system: System, n_modes: int | None, max_frequency: float | None, tol
         ):
             break
         size = mesh.size
-        finer = reassemble(system, mesh.refined(step), layer=found.system.layer / step)
+        closer = step if found.system.rules.thick else max(step, FLATTER**0.5)  # halves some triangles
+        finer = reassemble(system, mesh.refined(step), layer=found.system.layer / closer)
         found = solve_on_mesh(finer, n_modes, max_frequency)
     mode = int(found.error.argmax())
     least = float(f"{2.0 * found.error[mode]:.1e}")  # where corners hold the error, it differs from mesh to mesh

@@ -84,8 +84,11 @@ def _domain(body: Body, fields: tuple[str, ...]) -> Domain:
     space, rise = found.space, body.section.rise
     space.heights = np.zeros((len(space.origin), plane.QUARTIC))
     if rise is not None:
-        places = found.frame.places(plane.nodes(space.inner))
-        space.heights[:] = check.field("rise", rise, places, "m").reshape(space.heights.shape) / found.frame.length
+        local = plane.nodes(space.inner).reshape(-1, 2)
+        heights = check.field("rise", rise, found.frame.places(local), "m") / found.frame.length
+        tilt = np.column_stack([np.ones(len(local)), local])  # it stretches nothing, but would cost digits
+        heights -= tilt @ np.linalg.lstsq(tilt, heights, rcond=None)[0]
+        space.heights[:] = heights.reshape(space.heights.shape)
     return found
 
 

@@ -12,6 +12,7 @@ import numpy as np
 
 from ..fe import point_load, refinement
 from ..fe.kirchhoff import ARGYRIS
+from ..fe.refinement import FLATTER
 from ..fe.section import Plate
 from ..fe.splitting import DEPTH
 from ..impact.error import Error
@@ -91,8 +92,6 @@ def elements_for(target: Target, size: float, mass: float, resonance: float, tol
 BENT = 1.0 / 6.0  # [-] power of the tolerance with which triangles shrink where a plate is curved: order six
 # [-] a mesh with more than this part of the elements of another is no coarser: sizes 1.5 apart should leave 0.44
 ALIKE = 0.85
-# [-] ratio of the sizes at the blow of two meshes that are compared, where triangles halve: one halving more
-FLATTER = 2.0
 
 
 def finer(target: Target, elements: Elements, stages: Stages) -> Elements:
@@ -102,13 +101,12 @@ def finer(target: Target, elements: Elements, stages: Stages) -> Elements:
         size /= refinement.COARSER
         if ALIKE * target.n_cells(size, stages) >= before:
             break
-    return Elements(size, elements.coarseness / FLATTER, elements.layer / refinement.COARSER)
+    return Elements(size, elements.coarseness / FLATTER, elements.layer / FLATTER)
 
 
 def compared(target: Target, elements: Elements, stages: Stages) -> tuple[Elements, Elements]:
     """Elements of the first two meshes that are compared: finer ones if the outline allows no larger ones."""
-    times = refinement.COARSER
-    coarser = Elements(times * elements.size, FLATTER * elements.coarseness, times * elements.layer)
+    coarser = Elements(refinement.COARSER * elements.size, FLATTER * elements.coarseness, FLATTER * elements.layer)
     if target.n_cells(coarser.size, stages) <= ALIKE * target.n_cells(elements.size, stages):
         return elements, coarser
     return finer(target, elements, stages), elements

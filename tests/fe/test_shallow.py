@@ -1,0 +1,144 @@
+"""Shells held to formulas that share nothing with the program (`independent/references_shells.py`)."""
+
+import numpy as np
+import pytest
+from independent import references_shells as reference
+
+import fem_impact as fi
+
+E, NU, RHO = 70e9, 0.3, 2700.0
+ALUMINIUM = fi.Material(E=E, nu=NU, rho=RHO)
+SIDES = 0.4, 0.3
+SLIDING = {"boundary": "sliding"}
+
+
+def panel(thickness, curvature, plate=None, **how):
+    def rise(points):
+        return 0.5 * (points - np.array(SIDES) / 2.0) ** 2 @ np.array(curvature)
+
+    plate = fi.Plate(ALUMINIUM, thickness) if plate is None else plate
+    mesh = fi.mesh.rectangle(*SIDES, **how)
+    return fi.assemble(mesh, plate, {"boundary": "hinged"}, rise=rise, in_plane=SLIDING)
+
+
+def exact(thickness, curvature, n):
+    waves = [(i, j) for i in range(1, 30) for j in range(1, 30)]
+    every = [reference.isotropic_panel(SIDES, E, NU, RHO, thickness, each, curvature) for each in waves]
+    return np.sort(every)[:n] / (2.0 * np.pi)
+
+
+def cap(chi, edge, radius=0.2, thickness=1e-3):
+    """A spherical cap, and what squared angular frequencies are in units of D / (rho h a**4)."""
+    curvature = thickness / radius**2 * np.sqrt(chi / 12.0 / (1.0 - NU**2))
+    supports = {} if edge == "free" else {"boundary": edge}
+    plate = fi.Plate(ALUMINIUM, thickness)
+    system = fi.assemble(
+        fi.mesh.disk(radius), plate, supports, rise=lambda points: -0.5 * curvature * (points**2).sum(axis=1)
+    )
+    return system, (2.0 * np.pi) ** 2 * RHO * thickness * radius**4 / float(plate.stiffness(np.zeros((1, 2)))[0, 0, 0])
+
+
+@pytest.mark.parametrize(
+    "thickness, curvature",
+    [
+        (2e-3, (-0.5, -0.5)), (2e-3, (0.0, -0.5)), (2e-3, (-0.5, 0.5)), (2e-3, (-0.3, 0.1)),
+        pytest.param(4e-5, (-0.2, 0.0), marks=pytest.mark.slow), (4e-5, (-0.2, -0.2)),
+        pytest.param(4e-5, (-0.2, 0.2), marks=pytest.mark.slow),
+    ],
+)  # fmt: skip
+def test_panels_on_shear_diaphragms_are_those_of_the_closed_form(thickness, curvature):
+    # rises of 5 thicknesses, and of 100 on panels whose thickness is 1e-4 of their size
+    found = fi.find_modes(panel(thickness, curvature), n_modes=10, tolerance=1e-5)
+    error = np.abs(found.frequencies / exact(thickness, curvature, 10) - 1.0)
+    assert error.max() < 1e-5
+    assert (error < np.maximum(found.frequency_error, 1e-7)).all()  # 1e-7: what the second mesh cannot tell
+
+
+def test_coarse_meshes_of_deep_thin_panels_state_their_error():
+    thickness, curvature = 4e-4, (0.0, -1.0)  # a rise of 50 thicknesses
+    found = fi.find_modes(panel(thickness, curvature), n_modes=10, tolerance=1e-3)
+    error = np.abs(found.frequencies / exact(thickness, curvature, 10) - 1.0)
+    assert (error < found.frequency_error).all()
+    assert found.frequency_error.max() < 1e-3
+
+
+def test_frequencies_of_panels_converge_at_sixth_order_at_least():
+    errors = []
+    for size in (0.1, 0.05):  # 0.05 to 0.02 m before the rise divides triangles
+        found = fi.find_modes(panel(4e-3, (-0.5, -0.5), size=size), n_modes=6)
+        errors.append(np.abs(found.frequencies / exact(4e-3, (-0.5, -0.5), 6) - 1.0).max())
+    assert np.log2(errors[0] / errors[1]) > 6.0  # theory 8, twice the order of quartic strains
+
+
+@pytest.mark.parametrize("edge", ["free", "clamped"])
+@pytest.mark.parametrize("chi", [10.0, 1e3, pytest.param(1e5, marks=pytest.mark.slow)])
+def test_caps_have_the_roots_of_reissners_equations(edge, chi):
+    system, unit = cap(chi, edge)
+    found = fi.find_modes(system, n_modes=13, tolerance=1e-4)
+    squared = found.frequencies[found.n_rigid :] ** 2 * unit
+    every = [reference.cap_roots(k, chi, NU, edge, 1.01 * squared.max()) for k in range(12)]
+    roots = np.sort(np.concatenate([every[0], *every[1:], *every[1:]]))[: len(squared)]
+    assert found.n_rigid == (3 if edge == "free" else 0)
+    assert np.abs(np.sqrt(squared / roots) - 1.0).max() < 1e-4
+
+
+def test_a_rise_that_is_almost_nothing_leaves_the_plate():
+    flat = fi.find_modes(fi.assemble(fi.mesh.disk(0.2), fi.Plate(ALUMINIUM, 1e-3)), n_modes=9, tolerance=1e-6)
+    system = fi.assemble(fi.mesh.disk(0.2), fi.Plate(ALUMINIUM, 1e-3), rise=fi.rise.cap(1e5))
+    found = fi.find_modes(system, n_modes=9, tolerance=1e-6)
+    assert system.theory == "shallow" and flat.shapes.system.theory == "kirchhoff"
+    np.testing.assert_allclose(found.frequencies, flat.frequencies, rtol=2e-6)  # both within their tolerance
+
+
+def test_a_shell_does_not_care_where_it_is_or_how_high():
+    def rise(points):
+        return 0.1 * points[:, 0] + 2.0 - 0.25 * ((points - 3.0) ** 2).sum(axis=1)
+
+    plate = fi.Plate(ALUMINIUM, 1e-3)
+    moved = fi.mesh.polygon([(3.0, 3.0), (3.3, 3.0), (3.2, 3.3)])
+    here = fi.mesh.polygon([(0.0, 0.0), (0.3, 0.0), (0.2, 0.3)])
+    one = fi.find_modes(fi.assemble(moved, plate, rise=lambda p: -0.25 * ((p - 3.0) ** 2).sum(axis=1)), n_modes=8)
+    two = fi.find_modes(fi.assemble(here, plate, rise=lambda p: -0.25 * (p**2).sum(axis=1)), n_modes=8)
+    tilted = fi.find_modes(fi.assemble(moved, plate, rise=rise), n_modes=8)
+    np.testing.assert_allclose(one.frequencies, two.frequencies, rtol=1e-8, atol=1e-9)
+    # a tilt stretches nothing: displacements in the plane follow it
+    np.testing.assert_allclose(tilted.frequencies, one.frequencies, rtol=1e-8, atol=1e-9)
+
+
+def test_edges_held_in_the_plane_stiffen_a_cap_and_free_ones_do_not():
+    plate, mesh, rise = fi.Plate(ALUMINIUM, 1e-3), fi.mesh.disk(0.2), fi.rise.cap(2.0)
+    first = {}
+    for word in ("held", "sliding", "free"):
+        system = fi.assemble(mesh, plate, {"boundary": "hinged"}, rise=rise, in_plane={"boundary": word})
+        first[word] = fi.find_modes(system, n_modes=1).frequencies[0]
+    usual = fi.find_modes(fi.assemble(mesh, plate, {"boundary": "hinged"}, rise=rise), n_modes=1).frequencies[0]
+    assert usual == pytest.approx(first["held"], rel=1e-12)
+    assert first["free"] < first["sliding"] < 0.9 * first["held"]
+
+
+def test_the_compliance_is_that_of_all_modes():
+    system = panel(2e-3, (-0.5, -0.5), size=0.03)
+    modes = fi.find_modes(system, n_modes=100)
+    at = np.array([[0.13, 0.11]])
+    summed = float(((modes.shapes.at(at)[0] / modes.omega) ** 2).sum())
+    whole = float(modes.shapes.deflection(at, at)[0, 0])
+    # modes above k give some 1 / (4 pi D k**2) on a plate: Weyl's law
+    D = float(fi.Plate(ALUMINIUM, 2e-3).stiffness(np.zeros((1, 2)))[0, 0, 0])
+    left = 1.0 / (4.0 * np.pi * D) / (modes.omega[-1] * np.sqrt(RHO * 2e-3 / D))
+    assert whole - summed == pytest.approx(left, rel=0.3)
+
+
+def test_what_cannot_be_is_refused_by_name():
+    plate, mesh = fi.Plate(ALUMINIUM, 1e-3), fi.mesh.rectangle(0.4, 0.3)
+    with pytest.raises(ValueError, match=r"theory must be 'shallow' .* got 'mindlin'"):
+        fi.assemble(mesh, plate, {"boundary": "hinged"}, theory="mindlin", rise=fi.rise.cap(2.0))
+    with pytest.raises(ValueError, match="rise must be a function of points"):
+        fi.assemble(mesh, plate, rise=0.01)
+    with pytest.raises(ValueError, match=r"rise must be a function that returns numbers of shape"):
+        fi.assemble(mesh, plate, rise=lambda points: np.zeros(3))
+    with pytest.raises(ValueError, match=r"in_plane\['left'\] must be .*held"):
+        fi.assemble(mesh, plate, {"left": "hinged"}, in_plane={"left": "loose"})
+    with pytest.raises(ValueError, match="in_plane names edge 'lefty'"):
+        fi.assemble(mesh, plate, {"left": "hinged"}, in_plane={"lefty": "held"})
+    with pytest.raises(ValueError, match="section must be a Plate for rise"):
+        fi.assemble(fi.mesh.line(1.0), fi.Beam.circular(ALUMINIUM, diameter=0.01), rise=fi.rise.cap(2.0))
