@@ -11,6 +11,7 @@ HEADINGS: dict[str, tuple[str, ...]] = {
     "no-final-separation": ("no final separation was reached",),
     "step-error-stays": ("the step error stays at",),
     "thin-target": ("thin target: ",),
+    "shallow-target": ("shallow target: ",),
     "thin-striker": ("thin striker: ",),
     "small-deflections": ("small deflections: ",),
     "no-yielding": ("no yielding: ",),

@@ -17,6 +17,7 @@ from .elements import ArgyrisSpace, Bent, Triangles
 
 QUARTIC = 15  # shape functions of one component on a triangle
 FIRST, SECOND = slice(21, 21 + QUARTIC), slice(21 + QUARTIC, 21 + 2 * QUARTIC)  # unknowns of both components
+NODES = ElementTriP4.doflocs  # (15, 2) where those of a component lie in the unit triangle
 LOCAL = 21 + 2 * QUARTIC  # unknowns of a triangle, those of the deflection first
 
 
@@ -59,7 +60,7 @@ class PlaneSpace:
 
 def nodes(inner: Triangles) -> np.ndarray:
     """Where the nodes (n_cells, 15, 2) of both components lie, on the true edge."""
-    area = np.column_stack([1.0 - ElementTriP4.doflocs.sum(axis=1), ElementTriP4.doflocs])
+    area = np.column_stack([1.0 - NODES.sum(axis=1), NODES])
     cells, none = np.arange(len(inner.origin)), np.zeros((1, 1, 3))
     return inner.along(cells, np.broadcast_to(area, (len(cells), QUARTIC, 3)), none)[0]
 

@@ -201,7 +201,7 @@ def _missed_at_corners(system: System, vectors: np.ndarray, values: np.ndarray) 
 
 
 def _compared(system: System, omega: np.ndarray) -> np.ndarray:
-    """Estimated errors (n_modes,) [rad/s] of frequencies of a thick plate or a shell, from those on larger or smaller triangles.
+    """Estimated errors (n_modes,) [rad/s] of frequencies of a thick or curved plate, from those on other triangles.
 
     The order assumed is less than that of smooth plates, whose errors are stated some three times too large.
     """

@@ -13,7 +13,7 @@ art. 109 (torsion of a bar of rectangular section).
 from collections.abc import Callable
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -105,6 +105,10 @@ class Rib:
         result[:, 2, 2] = beam.torsion(place)
         return result, inertia
 
+    def turning(self, points: np.ndarray) -> np.ndarray:
+        """Rotary inertia per length (n,) [kg m] at points (n, 2) [m]."""
+        return self.section.rotary(self.along(points))
+
 
 def sides_on(mesh: Mesh, path: Any) -> np.ndarray:
     """Vertices (n, 2) of the sides of triangles that lie on a path (n_points, 2) [m], or on a named edge."""
@@ -122,41 +126,52 @@ def sides_on(mesh: Mesh, path: Any) -> np.ndarray:
     return sides[on]
 
 
+class Line(NamedTuple):
+    """A rib at the Gauss points of the sides of triangles that it follows."""
+
+    rib: Rib
+    cells: np.ndarray  # (n,)
+    area: np.ndarray  # (n, n_q, 3) area coordinates
+    x: np.ndarray  # (n, n_q, 2) in the frame
+    normal: np.ndarray  # (n, n_q, 2)
+    ds: np.ndarray  # (n, n_q) weights
+    stiffness: np.ndarray  # (n, n_q, 3, 3) [N], [N m] and [N m^2], see `Rib.rigidity`
+    inertia: np.ndarray  # (n, n_q) [kg/m]
+
+    @classmethod
+    def of(cls, rib: Rib, body: Body, domain: Domain) -> "Line":
+        """That of a rib of a body."""
+        facets, space = sides_on(body.mesh, rib.path), domain.space
+        cells = cells_of_facets(facets, space.vertices)[0]
+        area, x, normal = at_facets(space, facets, cells)
+        ds, place = np.linalg.norm(normal, axis=2), domain.frame.places(x)
+        stiffness, inertia = rib.rigidity(place, evaluate("thickness", body.section.thickness, place, "m"))
+        shaped = stiffness.reshape(*ds.shape, 3, 3), inertia.reshape(ds.shape)
+        return cls(rib, cells, area, x, normal / ds[..., None], ds, *shaped)
+
+
 def attached(
-    body: Body, domain: Domain, dofs: np.ndarray, n_all: int, strained: Callable[..., np.ndarray]
+    lines: list[Line], domain: Domain, dofs: np.ndarray, n_all: int, strained: Callable[..., np.ndarray]
 ) -> tuple[Sparse, Sparse]:
-    """Stiffness and mass (n_all, n_all) of the ribs of a plate, on unknowns ``dofs`` (n_local, n_cells).
+    """Stiffness and mass (n_all, n_all) of ribs, on unknowns ``dofs`` (n_local, n_cells).
 
     ``strained`` gives strains and negative curvatures (n, n_q, 6, n_local) of cells (n,) at area coordinates and
     places.
     """
     frame, space = domain.frame, domain.space
-    K, M = (np.zeros((0, len(dofs), len(dofs))) for _ in range(2))
-    where = np.zeros(0, int)
-    for rib in body.section.ribs:
-        facets = sides_on(body.mesh, rib.path)
-        cells = cells_of_facets(facets, space.vertices)[0]
-        area, x, normal = at_facets(space, facets, cells)
-        ds = np.linalg.norm(normal, axis=2)
-        nx, ny = np.moveaxis(normal / ds[..., None], 2, 0)
+    size = np.array([1.0, 1.0 / frame.length, 1.0 / frame.length])
+    unit = np.outer(size, size) * frame.length / frame.stiffness
+    pairs = []
+    for line in lines:
+        nx, ny = np.moveaxis(line.normal, 2, 0)
         along = np.stack([ny**2, nx**2, -nx * ny], axis=-1)  # of strains xx, yy, 2 xy, for the tangent (-ny, nx)
         twist = np.stack([-nx * ny, nx * ny, 0.5 * (nx**2 - ny**2)], axis=-1)
-        parts = strained(space, cells, area, x)
-        own = np.stack(
-            [np.einsum("nqi,nqik->nqk", turn, parts[:, :, half])
-             for turn, half in ((along, slice(3)), (along, slice(3, 6)), (twist, slice(3, 6)))], axis=2,
-        )  # fmt: skip
-        place = frame.places(x)
-        thickness = evaluate("thickness", body.section.thickness, place, "m")
-        stiffness, inertia = rib.rigidity(place, thickness)
-        size = np.array([1.0, 1.0 / frame.length, 1.0 / frame.length])
-        stiffness = stiffness * np.outer(size, size) * frame.length / frame.stiffness
-        stiffness = stiffness.reshape(*ds.shape, 3, 3) * ds[..., None, None]
-        inertia = inertia.reshape(ds.shape) * ds / (frame.inertia * frame.length)
-        value = space.functions(cells, x, (0,))[0][:, :, None]
-        K, M, where = (
-            np.concatenate([K, gram(own, stiffness)]),
-            np.concatenate([M, gram(value, inertia)]),
-            np.append(where, cells),
-        )
-    return scatter(K, dofs[:, where], n_all), scatter(M, dofs[:, where], n_all)
+        parts = strained(space, line.cells, line.area, line.x)
+        turns = (along, slice(3)), (along, slice(3, 6)), (twist, slice(3, 6))
+        own = np.stack([np.einsum("nqi,nqik->nqk", turn, parts[:, :, half]) for turn, half in turns], axis=2)
+        value = space.functions(line.cells, line.x, (0,))[0][:, :, None]
+        stiff = gram(own, unit * line.stiffness * line.ds[..., None, None])
+        pairs.append((stiff, gram(value, line.inertia * line.ds / (frame.inertia * frame.length))))
+    where = np.concatenate([line.cells for line in lines])
+    K, M = (scatter(np.concatenate(each), dofs[:, where], n_all) for each in zip(*pairs))
+    return K, M

@@ -19,6 +19,7 @@ Marguerre (1938), Proc. 5th Int. Congr. Appl. Mech., 93-101; Leissa (1973), Vibr
 3; Soedel (2004), Vibrations of shells and plates, ch. 6.8.
 """
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -26,12 +27,12 @@ from skfem import Dofs, ElementTriP4
 
 from .._base import check
 from ..mesh.meshes import Mesh
-from . import plane, plates, ribs, splitting
+from . import plane, plates, ribs, slopes, splitting
 from .elements import curvatures, numbering
 from .plane import FIRST, LOCAL, SECOND, PlaneSpace
 from .section import evaluate
 from .supports import constrain
-from .theory import Body, Domain, Held, Points, Term, Theory
+from .theory import Body, Domain, Held, Points, Term, Theory, blocks, gram, unknowns_of_cells
 
 # [-] rise of the middle of a side over its chord, over the thickness, above which triangles are divided: bending that
 # does not stretch a curved plate needs displacements beyond quartics there. Ten modes of a cymbal then err by 2e-3
@@ -43,6 +44,7 @@ class ShallowSpace(PlaneSpace):
     """Shape functions of one mesh: 21 of the deflection, then 15 for each displacement in the plane."""
 
     heights: np.ndarray  # (n_cells, 15) rise at the nodes of the plane, in the frame
+    lines: Sequence[ribs.Line] = ()
 
     def linear(self, element_dofs: np.ndarray, n_all: int) -> np.ndarray:
         """Unknowns (n_all, 6) of the deflections 1, x and y, and of the rigid motions in the plane."""
@@ -100,7 +102,8 @@ def _hold(body: Body, domain: Domain) -> Held:
     dofs = np.vstack([dofs, n_flat + own.element_dofs, n_flat + own.N + own.element_dofs])
     expand, project = plane.beside(expand, loose), plane.beside(project, loose.T)
     n_all = expand.shape[0]
-    held = ribs.attached(body, domain, dofs, n_all, strained) if body.section.ribs else None
+    space.lines = [ribs.Line.of(rib, body, domain) for rib in body.section.ribs]
+    held = ribs.attached(space.lines, domain, dofs, n_all, strained) if space.lines else None
     return Held(expand, project, dofs, plates.springs(body, domain, dofs, n_all), rim, held)
 
 
@@ -119,6 +122,47 @@ def towards_bends(mesh: Mesh, section: Any, kinds: list[str], coarser: float) ->
             break
         mesh = splitting.divided_across(mesh, sagging)[0]
     return mesh
+
+
+def beside(system: Any, vectors: np.ndarray) -> np.ndarray:
+    """Twice the mutual kinetic energy (n, n) that vectors (n_dofs, n) would have besides that of M, over M's unit.
+
+    It is that of the displacements in the plane, of ribs at the height of their centroids and as they turn, and of what
+    the slope of the rise makes the surface larger.
+    """
+    space, frame = system.space, system.frame
+    X, x, dx = slopes.quadrature(system)
+    shape = plane.reference(X)[0]
+    every = unknowns_of_cells(system, vectors)
+    result = np.zeros((vectors.shape[1],) * 2)
+    area = np.stack([1.0 - X[0] - X[1], *X], axis=1)[None]
+    for cells in blocks(len(x)):
+        within = np.stack([shape @ every[cells][:, part] for part in (FIRST, SECOND)], axis=2)  # (n, n_q, 2, n_modes)
+        value = space.flat.functions(cells, x[cells], (0,))[0] @ every[cells][:, :21]
+        steep = (plane.gradients(space.inner, cells, area) @ space.heights[cells][:, None, :, None])[..., 0]
+        weight = frame.field(system.section, "inertia", x[cells]) * dx[cells]
+        larger = 0.5 * weight * (steep**2).sum(axis=2)
+        result += gram(within, weight).sum(axis=0) + gram(value[:, :, None], larger).sum(axis=0)
+    for line in space.lines:
+        own, place = every[line.cells], frame.places(line.x)
+        shape = plane.reference(line.area[..., 1:].reshape(-1, 2).T)[0].reshape(*line.ds.shape, plane.QUARTIC)
+        slope = space.flat.functions(line.cells, line.x, (1,))[0].transpose(0, 2, 1, 3) @ own[:, None, :21]
+        z = (line.stiffness[..., 0, 1] / line.stiffness[..., 0, 0])[..., None, None] / frame.length
+        within = np.stack([shape @ own[:, part] for part in (FIRST, SECOND)], axis=2) - z * slope
+        weight, turns = (
+            line.inertia * line.ds,
+            line.rib.turning(place).reshape(line.ds.shape) * line.ds / frame.length**2,
+        )
+        result += (gram(within, weight) + gram(slope, turns)).sum(axis=0) / (frame.inertia * frame.length)
+    return result
+
+
+def steepest(system: Any) -> float:
+    """The steepest slope [-] of the rise of a shell."""
+    space = system.space
+    area = np.stack([1.0 - plane.NODES.sum(axis=1), *plane.NODES.T], axis=1)[None]
+    slope = plane.gradients(space.inner, np.arange(len(space.origin)), area) @ space.heights[:, None, :, None]
+    return float(np.linalg.norm(slope[..., 0], axis=2).max())
 
 
 def _errors(system: Any, vectors: np.ndarray, loads: np.ndarray, forced: Any = None) -> np.ndarray:

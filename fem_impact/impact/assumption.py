@@ -13,8 +13,8 @@ SILENT = 1e-4  # [-] effects that are never worth a line of their own
 # [-] of the tolerance: an assumption that changes the blow by less gets no line, as several may still add up
 SHARE = 0.1
 ALL = (
-    "thin target", "thin striker", "small deflections", "no yielding", "local contact", "quasi-static contact",
-    "still air", "stated damping",
+    "thin target", "shallow target", "thin striker", "small deflections", "no yielding", "local contact",
+    "quasi-static contact", "still air", "stated damping",
 )  # fmt: skip
 # [-] errors of the model up to this count as right, whatever the tolerance: stiffness, contact law and the speed of a
 # hand are seldom known better, and a blow by hand repeats no better
@@ -22,6 +22,7 @@ ENOUGH = 0.05
 # how each number that decides reads with its value, "{}%" as a percentage up to 100 %
 READINGS = {
     "thickness times wavenumber": "thickness times wavenumber is {}",
+    "steepest slope": "the steepest slope of the rise is {}",
     "deflection over thickness": "the deflection is {} times the thickness",
     "contact pressure over that at first yield": "the contact pressure is {} times that at first yield",
     "contact radius over half the thickness": "the contact radius is {} times half the thickness",
