@@ -95,9 +95,10 @@ def assemble(
         `fi.rise`. Such a shell must be shallow, with slopes below some 0.1.
     ribs : sequence of Rib, optional
         Bars, stiffeners or joists; sides of triangles follow them.
-    in_plane : dict, name of an edge -> "held", "free" or "sliding", optional
-        How edges are held in the plane of a plate, for curved and stretched ones; sliding is held along the edge and
-        free across it. By default hinged and clamped edges are held, others are free.
+    in_plane : dict, name of an edge -> "held", "free", "sliding" or "across", optional
+        How edges are held in the plane of a plate, for curved and stretched ones. A sliding edge is held along itself
+        and free across itself, and the reverse is "across". By default hinged and clamped edges are held, others are
+        free.
 
     Returns
     -------

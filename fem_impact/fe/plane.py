@@ -108,8 +108,7 @@ def held_at(
 ) -> tuple[csr_matrix, dict[int, list[tuple[int, int]]]]:
     """What boundary facets leave of a field: the map (2 n, n_left) to both components, and where facets have nodes.
 
-    ``words`` (n_facets,) are "free", "sliding" (held along the facet, free across it) or "held". The second result
-    lists, for each node that is not free, the facets and their nodes that it belongs to.
+    ``words`` (n_facets,) are those of `section.PLANE`. The second result lists, for each node that is not free, the facets and their nodes that it belongs to.
     """
     cells, sides = supports.cells_of_facets(facets, inner.vertices)
     local, _, normal = at_rim(inner, facets, cells, sides)
@@ -118,16 +117,16 @@ def held_at(
         if word != "free":
             for k in range(local.shape[1]):
                 at.setdefault(int(own.element_dofs[local[facet, k], cells[facet]]), []).append((facet, k))
-    single = []  # nodes free across the edge only, and the normal
+    single = []  # nodes free in one direction only, and that direction
     for node, places in at.items():
-        normals = np.array([normal[place] for place in places])
-        turn = np.abs(normals[0, 0] * normals[:, 1] - normals[0, 1] * normals[:, 0]).max()
-        if turn < supports.SMOOTH and all(words[facet] == "sliding" for facet, _ in places):
-            single.append((node, normals[0]))
+        (x, y), kinds = normal[places[0]], {words[facet] for facet, _ in places}
+        turn = max(abs(x * normal[place][1] - y * normal[place][0]) for place in places)
+        if turn < supports.SMOOTH and kinds in ({"sliding"}, {"across"}):
+            single.append((node, np.array([x, y] if kinds == {"sliding"} else [-y, x])))
     n, free = own.N, np.setdiff1d(np.arange(own.N), list(at))
     rows = np.concatenate([free, free + n, *[[node, node + n] for node, _ in single]]).astype(int)
     columns = np.concatenate([np.arange(2 * len(free)), np.repeat(2 * len(free) + np.arange(len(single)), 2)])
-    entries = np.concatenate([np.ones(2 * len(free)), *[normal for _, normal in single]])
+    entries = np.concatenate([np.ones(2 * len(free)), *[way for _, way in single]])
     return csr_matrix((entries, (rows, columns)), shape=(2 * n, 2 * len(free) + len(single))), at
 
 

@@ -10,7 +10,7 @@ Mukherjee and Mukhopadhyay (1986), Shock Vib. Digest 18(5), 1-9; Timoshenko and 
 art. 109 (torsion of a bar of rectangular section).
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 from typing import Any, NamedTuple
@@ -20,12 +20,16 @@ import numpy as np
 from .._base import check
 from .._base.untyped import Sparse
 from ..mesh.meshes import Mesh
+from .corners import towards
 from .section import Beam, Varying, evaluate
 from .splitting import distance
 from .springs import at_facets
 from .supports import SIDES, cells_of_facets
 from .theory import Body, Domain, gram, scatter
 
+CROSSINGS = 2  # [-] rings of triangles around crossings of ribs: as much error as between them
+# [-] longest side at the end of a rib inside, over its width: it acts there like a point, which would turn endlessly
+END = 2.0
 ON = 1e-8  # [-] of the extent: vertices of a mesh nearer to a path lie on it; the mesher leaves 1e-12
 
 
@@ -126,10 +130,32 @@ def sides_on(mesh: Mesh, path: Any) -> np.ndarray:
     return sides[on]
 
 
+def around_ends(mesh: Mesh, ribs: Sequence[Rib]) -> Mesh:
+    """The mesh with rings of triangles that shrink to ends and crossings of ribs inside the plate."""
+    counts: dict[int, list[int]] = {}
+    width: dict[int, float] = {}
+    for rib in ribs:
+        if not isinstance(rib.path, str):
+            for vertex, count in zip(*np.unique(sides_on(mesh, rib.path), return_counts=True)):
+                counts.setdefault(int(vertex), []).append(int(count))
+                place = rib.along(mesh.points[[vertex]])
+                width[int(vertex)] = float(evaluate("width", rib.section.width, place, "m")[0])
+    rings = {}
+    for vertex in set(counts) - set(np.unique(mesh.facets).tolist()):
+        around = mesh.points[mesh.cells[(mesh.cells == vertex).any(axis=1)]]
+        longest = float(np.linalg.norm(around - mesh.points[vertex], axis=2).max())
+        if 1 in counts[vertex]:
+            rings[vertex] = max(0, int(np.ceil(np.log2(longest / (END * width[vertex])))))
+        elif counts[vertex] != [2]:
+            rings[vertex] = CROSSINGS
+    return towards(mesh, {vertex: number for vertex, number in rings.items() if number})
+
+
 class Line(NamedTuple):
     """A rib at the Gauss points of the sides of triangles that it follows."""
 
     rib: Rib
+    facets: np.ndarray  # (n, 2) vertices of the sides
     cells: np.ndarray  # (n,)
     area: np.ndarray  # (n, n_q, 3) area coordinates
     x: np.ndarray  # (n, n_q, 2) in the frame
@@ -147,7 +173,7 @@ class Line(NamedTuple):
         ds, place = np.linalg.norm(normal, axis=2), domain.frame.places(x)
         stiffness, inertia = rib.rigidity(place, evaluate("thickness", body.section.thickness, place, "m"))
         shaped = stiffness.reshape(*ds.shape, 3, 3), inertia.reshape(ds.shape)
-        return cls(rib, cells, area, x, normal / ds[..., None], ds, *shaped)
+        return cls(rib, facets, cells, area, x, normal / ds[..., None], ds, *shaped)
 
 
 def attached(

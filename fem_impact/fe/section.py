@@ -13,7 +13,8 @@ from .layers import SHEAR
 from .material import Material
 
 KINDS = ("clamped", "hinged", "free")  # supports of an edge besides `Elastic`
-PLANE = ("held", "free", "sliding")  # how an edge is held in the plane of a plate; sliding: along itself only
+# how an edge is held in the plane of a plate: sliding only along itself, across only across itself
+PLANE = ("held", "free", "sliding", "across")
 SOFT = "soft hinged"  # support of a thick plate that leaves the rotation along the edge free
 TWISTS = 8  # [-] terms of the series of the torsion of a rectangle: the next is 1e-6 of the first
 Varying = float | Callable[[np.ndarray], Any]

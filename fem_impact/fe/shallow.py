@@ -96,22 +96,25 @@ def _domain(body: Body, fields: tuple[str, ...]) -> Domain:
 
 def _hold(body: Body, domain: Domain) -> Held:
     rim, space = plates.rim(body, domain, body.kinds), domain.space
-    expand, project, dofs = constrain(rim, space.vertices, *numbering(domain.cells, space.flat))
+    space.lines = [ribs.Line.of(rib, body, domain) for rib in body.section.ribs]
+    creased = np.unique(np.concatenate([np.zeros(0, int), *(line.facets.ravel() for line in space.lines)]))
+    expand, project, dofs = constrain(rim, space.vertices, *numbering(domain.cells, space.flat), creased)
     n_flat, own = expand.shape[0], Dofs(domain.cells, ElementTriP4())
     loose = plane.loosened(space.inner, rim, own)
     dofs = np.vstack([dofs, n_flat + own.element_dofs, n_flat + own.N + own.element_dofs])
     expand, project = plane.beside(expand, loose), plane.beside(project, loose.T)
     n_all = expand.shape[0]
-    space.lines = [ribs.Line.of(rib, body, domain) for rib in body.section.ribs]
     held = ribs.attached(space.lines, domain, dofs, n_all, strained) if space.lines else None
     return Held(expand, project, dofs, plates.springs(body, domain, dofs, n_all), rim, held)
 
 
 def towards_bends(mesh: Mesh, section: Any, kinds: list[str], coarser: float) -> Mesh:
-    """The mesh with triangles divided where the rise bends much within them; ``coarser`` multiplies their size."""
-    if section.rise is None:
-        return mesh
-    while len(mesh.cells) < MOST_BENT:
+    """The mesh with smaller triangles at ends and crossings of ribs, and where the rise bends much within them.
+
+    ``coarser`` multiplies their size.
+    """
+    mesh = ribs.around_ends(mesh, section.ribs) if section.ribs else mesh
+    while section.rise is not None and len(mesh.cells) < MOST_BENT:
         corner = mesh.points[mesh.cells]
         after = np.roll(corner, -1, axis=1)
         places = np.stack([corner, 0.5 * (corner + after), after]).reshape(-1, 2)

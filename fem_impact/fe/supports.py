@@ -1,6 +1,6 @@
 """Apply supports to a plate's unknowns, by one rule for straight and curved edges, corners and mixed supports."""
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -29,7 +29,7 @@ class SupportedRim:
     points: np.ndarray  # (n_points, 2)
     kinds: list[str]  # (n_facets,) clamped, hinged or free
     springs: np.ndarray  # (n_facets, 2) [-] stiffness of elastic supports against deflection and slope
-    plane: Sequence[str] = ()  # (n_facets,) free, sliding or held in the plane
+    plane: Sequence[str] = ()  # (n_facets,) how they are held in the plane, of `section.PLANE`
 
     def is_special(self, at: list[tuple[int, int]]) -> bool:
         """Whether the plate's curvature may jump at a vertex; ``at`` lists its (facet, end) pairs."""
@@ -148,7 +148,9 @@ def cells_of_facets(facets: np.ndarray, cells: np.ndarray) -> tuple[np.ndarray, 
     return found // 3, found % 3
 
 
-def constrain(rim: SupportedRim, cells: np.ndarray, dofs: np.ndarray, n_all: int) -> tuple[Sparse, Sparse, np.ndarray]:
+def constrain(
+    rim: SupportedRim, cells: np.ndarray, dofs: np.ndarray, n_all: int, creased: Iterable[int] = ()
+) -> tuple[Sparse, Sparse, np.ndarray]:
     """Remove from the Argyris unknowns those that the supports fix.
 
     Each boundary vertex keeps the null space of the conditions of its two facets. At a corner, at a change of support
@@ -161,6 +163,8 @@ def constrain(rim: SupportedRim, cells: np.ndarray, dofs: np.ndarray, n_all: int
     cells : ndarray, shape (n_cells, 3), vertices of the triangles
     dofs : ndarray, shape (21, n_cells), numbers of their unknowns
     n_all : int, number of unknowns
+    creased : iterable of int
+        More vertices where the curvature of the plate may jump, as along a rib that twists.
 
     Returns
     -------
@@ -175,13 +179,17 @@ def constrain(rim: SupportedRim, cells: np.ndarray, dofs: np.ndarray, n_all: int
         for end, vertex in enumerate(pair):
             ends.setdefault(vertex, []).append((facet, end))
     blocks: list[tuple[np.ndarray, np.ndarray, np.ndarray]] = []
+    creases = {int(vertex) for vertex in creased}
+    for vertex in creases:
+        ends.setdefault(vertex, [])
     for vertex, at in ends.items():
-        if not rim.is_special(at) and rim.kinds[at[0][0]] == "free":
+        special = vertex in creases or rim.is_special(at)
+        if not special and rim.kinds[at[0][0]] == "free":
             continue
         around, corner = np.nonzero(cells == vertex)
         length = float(np.linalg.norm(rim.points[cells[around]] - rim.points[vertex], axis=2).max())
         first = dofs[6 * corner[0] : 6 * corner[0] + 6, around[0]].copy()
-        if not rim.is_special(at):
+        if not special:
             facet, end = at[0]
             conditions = _conditions(rim.kinds[facet], rim.tangents[facet, end], rim.curvatures[facet, end])
             blocks.append((first, *_left(conditions, length)))
