@@ -64,13 +64,13 @@ def test_plane_disk_by_ritz_has_the_roots_of_bessel_functions():
 @pytest.mark.parametrize("edge", [("free", "free"), ("clamped", "held")])
 @pytest.mark.parametrize("rise", [1e-4, 1e-3, 5e-3, 2e-2])
 def test_spherical_cap_by_bessel_and_kelvin_functions_and_by_ritz(rise, edge):
-    """No step is common: stress function and determinant there, displacements and energy here. 4e-12 was measured."""
+    """No step is common: stress function and determinant there, displacements and energy here. 5e-11 was measured."""
     body, chi = disk(rise, edge), 12.0 * (1.0 - NU**2) * (2.0 * rise / H) ** 2
     for k in range(5):
-        omega = round_modes(body, k, 4, Order(6, 13))[0]
+        omega = round_modes(body, k, 4, Order(4, 13))[0]
         squares = omega[omega > 0.0][:2] ** 2 * body.per_area / body.bending
         roots = cap_roots(k, chi, NU, edge[0], squares[-1] + 50.0)
-        np.testing.assert_allclose(roots[:2], squares, rtol=2e-11)
+        np.testing.assert_allclose(roots[:2], squares, rtol=1e-10)
 
 
 def test_circles_of_a_free_cap_rise_as_its_curvature_squared():
@@ -196,7 +196,7 @@ def test_eccentric_rib_makes_a_t_beam_of_a_narrow_plate():
     exact = levy_modes(strip, 1, 1)[0]
     np.testing.assert_allclose(exact / t_beam(length, 1, E, RHO, (width, thickness), section), 1.0, atol=1e-3)
     np.testing.assert_allclose(exact / (2.0 * np.pi), 53.082557782, rtol=1e-10)  # 4.6 Hz without the rib
-    np.testing.assert_allclose(panel_modes(strip, 1, Order(1, 10))[0][0], exact, rtol=1e-8)
+    np.testing.assert_allclose(panel_modes(strip, 1, Order(1, 8))[0][0], exact, rtol=1e-7)
 
 
 @pytest.mark.slow
