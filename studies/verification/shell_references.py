@@ -2,7 +2,9 @@
 
 No theory of plates or shells enters: the bodies are elastic solids of finite elements of high degree, by NGSolve.
 Cymbals are bodies of revolution, solved in their cross-section for each number of nodal diameters; the others consist
-of bricks. Each is solved with two degrees; the difference of both is in the table and bounds the error of the finer.
+of bricks. Each is solved with two degrees; the difference of both, which is in the table, bounds the error of the
+finer. Ribs let it fall slowly: with degree 6 the frequencies of the ribbed plate are another 1.2e-4 to 3.5e-4 lower,
+so that 1e-3 is to be allowed for.
 
     python studies/verification/shell_references.py            # prints and writes shell_references.csv
     python studies/verification/shell_references.py cymbal     # those alone whose names begin so
@@ -294,7 +296,7 @@ def ribbed(body: Ribbed, fine: bool) -> Any:
     def domain(px: float, py: float, pz: float) -> int:
         return int(pz > -h / 2.0 or abs(px - body.rib_x) < width / 2.0 or abs(py - body.rib_y) < width / 2.0)
 
-    mesh, degree = brick_mesh(x, y, z, domain), 6 if fine else 5
+    mesh, degree = brick_mesh(x, y, z, domain), 5 if fine else 4
     zx, zy = body.zxx * (ng.x - a / 2.0), body.zyy * (ng.y - b / 2.0)
     rise = 0.5 * (zx * (ng.x - a / 2.0) + zy * (ng.y - b / 2.0))
     stretch = ng.sqrt(1.0 + zx**2 + zy**2)
