@@ -5,7 +5,8 @@ from itertools import product
 
 import numpy as np
 from references_ritz import DEFLECTION, Order, Splines, lowest
-from scipy.linalg import null_space
+from references_shells import isotropic
+from scipy.linalg import null_space, qr
 
 HELD = {"held": (True, True), "sliding": (False, True), "across": (True, False), "free": (False, False)}
 
@@ -207,3 +208,82 @@ def levy_omegas(panel, count=12, order=None, curvature=None, most=8):
     each = product(range(1, most + 1), range(count))
     table = [levy_modes(panel, waves, count, order, curvature) for waves in range(1, most + 1)]
     return sorted((float(table[waves - 1][n]), waves, n) for waves, n in each)[:count]
+
+
+def clamped_blade(**changes):
+    """The curved clamped plate of Petyt (1971), J. Sound Vib. 15, 381-395: 3 by 4 inches, radius 30, 0.013 thick."""
+    a, b, radius, thickness = 0.0762, 0.1016, 0.762, 3.302e-4
+
+    def slopes(x, y):
+        return 0.0 * x, -(y - 0.5 * b) / radius
+
+    stiffness = isotropic(6.8948e10, 0.33, thickness)
+    return Panel((a, b), stiffness, 2657.0 * thickness, (("clamped", "held"),) * 4, slopes, **changes)
+
+
+# Its lowest frequencies [Hz], good to 1e-7, by `panel_modes` with Order(1, 20)
+BLADE = (869.852372, 957.875041, 1287.558655, 1363.866307, 1439.763944, 1752.451874, 1777.674787, 2056.144314)
+
+
+# Large deflections
+
+
+def panel_stretching(panel, count=3, order=None):
+    """Frequencies (count,), cubic (count,) * 3 and quartic (count,) * 4 coefficients of the energy of the first modes.
+
+    Energy: omega**2 q q / 2 + cubic q q q + quartic q q q q, of flexible modes of unit mass, displacements in the plane
+    following at once and other modes kept at rest. Strain adds grad w grad w / 2, also along ribs.
+    """
+    if panel.inertia:
+        raise ValueError("displacements in the plane follow at once only without their inertia")
+    fields = PanelFields(panel, order)
+    strain, _ = fields.rows()
+    omega, x = panel_modes(panel, count + 3, order)
+    omega, x = omega[omega > 0.0][:count], x[:, omega > 0.0][:, :count]
+    moved = _stretched(fields, x)
+    moved = np.concatenate([moved, np.zeros((count, count, len(strain) - moved.shape[2]))], axis=2)
+    plane = strain[:, : fields.sizes[0] + fields.sizes[1]]
+    used = np.any(plane, axis=1)
+    cubic = np.einsum("ri,jkr->ijk", strain @ x, moved)
+    plane, moved = plane[used], moved[:, :, used]
+    basis = qr(plane / np.linalg.norm(plane, axis=0), mode="economic", check_finite=False)[0]
+    rest = moved - (moved @ basis) @ basis.T
+    return omega, cubic, 0.5 * np.einsum("ijr,klr->ijkl", rest, rest)
+
+
+def _stretched(fields, x):
+    """Rows (count, count, n) of grad w_i grad w_j / 2, as those of `PanelFields.rows`."""
+    A, B, D = fields.panel.stiffness
+    law = np.linalg.cholesky(np.block([[A, B], [B, D]])).T[:, :3]
+    one, two = (fields.at(2, fields.x, fields.y, *d) @ x for d in ((1, 0), (0, 1)))
+    root = np.sqrt(fields.weights)
+    pairs = [(one, one, 0.5), (two, two, 0.5), (one, two, 0.5), (two, one, 0.5)]
+    xx, yy, xy, yx = (c * np.einsum("ri,rj->ijr", f, g) for f, g, c in pairs)
+    rows = [root * sum(c * e for c, e in zip(line, (xx, yy, xy + yx))) for line in law]
+    for rib in fields.panel.ribs:
+        axis = "xy".index(rib.along)
+        x_at, y_at = (fields.x, np.array([rib.at])) if axis == 0 else (np.array([rib.at]), fields.y)
+        along = fields.at(2, x_at, y_at, 1 - axis, axis) @ x
+        weight = np.sqrt(0.25 * rib.stretching * fields.splines[2][axis].weights)
+        axial = weight * np.einsum("ri,rj->ijr", along, along)
+        rows += [axial, 0.0 * axial, 0.0 * axial]  # bending and twisting follow
+    return np.concatenate(rows, axis=2)
+
+
+def domed_panel(plane):
+    """A hinged steel panel of 1 m by 0.8 m by 1 mm that rises by 2 mm over its corners, its edges alike."""
+    a, b, thickness, curvature = 1.0, 0.8, 1e-3, 8.0 * 2e-3 / (1.0 + 0.8**2)
+
+    def slopes(x, y):
+        return -curvature * (x - 0.5 * a), -curvature * (y - 0.5 * b)
+
+    return Panel((a, b), isotropic(210e9, 0.3, thickness), 7.85, (("hinged", plane),) * 4, slopes)
+
+
+# Of its first mode omega [rad/s], size of the cubic and quartic coefficient, good to 2e-6, by Order(1, 13)
+DOMED = {
+    "held": (85.293971, 1945367.8, 361730690.0),
+    "sliding": (64.13424845, 677377.593, 94923234.8),
+    "across": (84.53578896, 1919174.06, 359885155.0),
+    "free": (47.62845727, 211479.53, 33902892.0),
+}

@@ -203,3 +203,44 @@ def round_omegas(body, count=6, most=6, order=None):
         omega = round_modes(body, k, count, order)[0]
         rows += [(float(value), k, n) for n, value in enumerate(omega[omega > 0.0])]
     return sorted(rows)
+
+
+# Large deflections
+
+
+def round_stretching(body, k, n, order=None):
+    """Cubic and quartic coefficients (a, b) of the energy omega**2 q**2 / 2 + a q**3 + b q**4 in one mode (k, n).
+
+    Of unit mass, without inertia in the plane, whose displacements follow at once; for k > 0 a is zero. Deflections of
+    other modes, which a curved body's q**2 sets off, are not let go. Strain adds grad w grad w / 2.
+    """
+    fields = RoundFields(body, k, order)
+    omega, x = round_modes(body, k, n + 2, order)
+    vector = x[:, omega > 0.0][:, n]
+    w, slope = (fields.normal.at(fields.r, d) @ fields.kept[2 * fields.plane.size :] @ vector for d in range(2))
+    turn = -k * w / fields.r  # w_r goes with cos(k angle), w_t / r with sin(k angle)
+    if k == 0:
+        moved = _plane_rows(body, fields.weights, 0.5 * slope**2, 0.0 * slope, 0.0 * slope)
+        stretched = _plane_rows(body, fields.weights, *(e @ vector for e in fields.strain()[:3]))
+        return float(stretched @ moved), _least(fields, moved)
+    rest = 0.0
+    for waves, sign in ((0, 1.0), (2 * k, -1.0)):
+        strain = 0.25 * slope**2, sign * 0.25 * turn**2, 0.5 * (waves > 0) * slope * turn
+        fields = RoundFields(body, waves, order)
+        rest += _least(fields, _plane_rows(body, fields.weights, *strain))
+    return 0.0, rest
+
+
+def _plane_rows(body, weights, er, et, g):
+    """Rows whose squares add up to twice the energy of strains (n_r, ...) in the plane."""
+    root = np.sqrt(body.stretching * weights).reshape(-1, *[1] * (np.ndim(er) - 1))
+    more, less = np.sqrt(0.5 * (1.0 + body.nu)), np.sqrt(0.5 * (1.0 - body.nu))
+    return np.concatenate([more * root * (er + et), less * root * (er - et), less * root * g])
+
+
+def _least(fields, moved):
+    """Energy of a stretching (n_rows,) after the plane has given way as far as its edges let it."""
+    still = null_space(fields.kept[2 * fields.plane.size :])  # no deflection
+    rows = _plane_rows(fields.body, fields.weights, *fields.strain()[:3]) @ still
+    basis = qr(rows, mode="economic")[0]
+    return 0.5 * float(np.sum((moved - basis @ (basis.T @ moved)) ** 2))

@@ -4,9 +4,21 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from references_panels import Panel, levy_modes, levy_omegas, panel_modes, rectangular_rib
+import shell_references
+from references_panels import (
+    BLADE,
+    DOMED,
+    Panel,
+    clamped_blade,
+    domed_panel,
+    levy_modes,
+    levy_omegas,
+    panel_modes,
+    panel_stretching,
+    rectangular_rib,
+)
 from references_plates import disk_roots
-from references_ritz import Order, Round, round_modes, round_omegas
+from references_ritz import Order, Round, RoundFields, round_modes, round_omegas, round_stretching
 from references_shells import (
     angle_ply_panel,
     cap_roots,
@@ -52,13 +64,13 @@ def test_plane_disk_by_ritz_has_the_roots_of_bessel_functions():
 @pytest.mark.parametrize("edge", [("free", "free"), ("clamped", "held")])
 @pytest.mark.parametrize("rise", [1e-4, 1e-3, 5e-3, 2e-2])
 def test_spherical_cap_by_bessel_and_kelvin_functions_and_by_ritz(rise, edge):
-    """No step is common: stress function and determinant there, displacements and energy here. 4e-12 was measured."""
+    """No step is common: stress function and determinant there, displacements and energy here. 5e-11 was measured."""
     body, chi = disk(rise, edge), 12.0 * (1.0 - NU**2) * (2.0 * rise / H) ** 2
     for k in range(5):
-        omega = round_modes(body, k, 4, Order(6, 13))[0]
+        omega = round_modes(body, k, 4, Order(4, 13))[0]
         squares = omega[omega > 0.0][:2] ** 2 * body.per_area / body.bending
         roots = cap_roots(k, chi, NU, edge[0], squares[-1] + 50.0)
-        np.testing.assert_allclose(roots[:2], squares, rtol=2e-11)
+        np.testing.assert_allclose(roots[:2], squares, rtol=1e-10)
 
 
 def test_circles_of_a_free_cap_rise_as_its_curvature_squared():
@@ -104,7 +116,7 @@ def test_curved_panels_on_diaphragms_three_ways(curvature):
     np.testing.assert_allclose(sines, closed, rtol=1e-13)
     panel = Panel(SIDES, STEEL, RHO * H, DIAPHRAGM, curved(*curvature))
     np.testing.assert_allclose([row[0] for row in levy_omegas(panel, 6, Order(2, 16), curvature)], closed, rtol=1e-11)
-    np.testing.assert_allclose(panel_modes(panel, 4, Order(1, 14))[0], closed[:4], rtol=1e-4)  # up to five half waves
+    np.testing.assert_allclose(panel_modes(panel, 3, Order(1, 11))[0], closed[:3], rtol=1e-3)  # up to five half waves
 
 
 def test_inertia_in_the_plane_of_a_curved_panel():
@@ -115,7 +127,7 @@ def test_inertia_in_the_plane_of_a_curved_panel():
         assert 1.0 - 0.1**2 < moving[0] / without < 1.0
     panel = Panel(SIDES, STEEL, RHO * H, DIAPHRAGM, curved(0.2, 0.2), inertia=True)
     along = lowest_waves(lambda mn: diaphragm_panel(SIDES, STEEL, RHO * H, mn, (0.2, 0.2), inertia=True)[0], 4)
-    np.testing.assert_allclose(panel_modes(panel, 4, Order(1, 12))[0], along, rtol=0.1**2)
+    np.testing.assert_allclose(panel_modes(panel, 4, Order(1, 10))[0], along, rtol=0.1**2)
 
 
 @pytest.mark.parametrize(
@@ -131,7 +143,7 @@ def test_unsymmetric_laminates_by_sines_and_by_ritz(angles, edge, formula, inert
     stiffness, per_area = stack([(PLY, 0.5e-3, degrees) for degrees in angles]), 1600.0 * 0.5e-3 * len(angles)
     panel = Panel((0.4, 0.3), stiffness, per_area, (("hinged", edge),) * 4, inertia=inertia)
     closed = lowest_waves(lambda mn: np.min(formula((0.4, 0.3), stiffness, per_area, mn, inertia=inertia)), 5)
-    np.testing.assert_allclose(panel_modes(panel, 5, Order(1, 14))[0], closed, rtol=1e-9)
+    np.testing.assert_allclose(panel_modes(panel, 3, Order(1, 10))[0], closed[:3], rtol=1e-6)
 
 
 def test_stacks():
@@ -163,20 +175,12 @@ def test_plates_of_the_literature():
     np.testing.assert_allclose(square(two)[:5], levy, rtol=1e-7)
 
 
-def clamped_blade(**changes):
-    """The curved clamped plate of Petyt (1971), J. Sound Vib. 15, 381-395: 3 by 4 inches, radius 30, 0.013 thick."""
-    a, b, radius, thickness = 0.0762, 0.1016, 0.762, 3.302e-4
-    slopes = lambda x, y: (0.0 * x, -(y - 0.5 * b) / radius)  # noqa: E731
-    stiffness = isotropic(6.8948e10, 0.33, thickness)
-    return Panel((a, b), stiffness, 2657.0 * thickness, (("clamped", "held"),) * 4, slopes, **changes)
-
-
 def test_clamped_cylindrical_panel_and_the_bounds_of_ritz():
     """Five frequencies of the literature, 870, 958, 1288, 1364 and 1440 Hz, are those of shallow theory rounded."""
-    coarse, fine = (panel_modes(clamped_blade(), 5, order)[0] / (2.0 * np.pi) for order in (Order(1, 11), Order(1, 15)))
+    coarse, fine = (panel_modes(clamped_blade(), 5, order)[0] / (2.0 * np.pi) for order in (Order(1, 9), Order(1, 12)))
     assert (coarse > fine).all()
     np.testing.assert_allclose(fine, [870.0, 958.0, 1288.0, 1364.0, 1440.0], atol=0.5)
-    np.testing.assert_allclose(fine, [869.85237, 957.87504, 1287.55865, 1363.86631, 1439.76394], rtol=2e-6)
+    np.testing.assert_allclose(fine, BLADE[:5], rtol=2e-5)
 
 
 # Ribs
@@ -192,9 +196,10 @@ def test_eccentric_rib_makes_a_t_beam_of_a_narrow_plate():
     exact = levy_modes(strip, 1, 1)[0]
     np.testing.assert_allclose(exact / t_beam(length, 1, E, RHO, (width, thickness), section), 1.0, atol=1e-3)
     np.testing.assert_allclose(exact / (2.0 * np.pi), 53.082557782, rtol=1e-10)  # 4.6 Hz without the rib
-    np.testing.assert_allclose(panel_modes(strip, 1, Order(1, 10))[0][0], exact, rtol=1e-8)
+    np.testing.assert_allclose(panel_modes(strip, 1, Order(1, 8))[0][0], exact, rtol=1e-7)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("curvature", [(0.0, 0.0), (-0.04, -0.02)])
 def test_ribbed_panel_on_diaphragms_by_levy_and_by_ritz(curvature):
     ribs = (rectangular_rib("x", 0.3, 4e-3, 15e-3, H, E, NU, RHO),)
@@ -206,3 +211,95 @@ def test_ribbed_panel_on_diaphragms_by_levy_and_by_ritz(curvature):
     np.testing.assert_allclose(mirrored, levy, rtol=1e-10)
     centred = replace(panel, ribs=tuple(replace(rib, offset=0.0) for rib in ribs))
     assert (np.array([row[0] for row in levy_omegas(centred, 4, curvature=curvature)]) < levy).all()
+
+
+# Large deflections
+
+
+@pytest.mark.parametrize(
+    ("k", "n", "nu", "gamma"), [(2, 0, 0.38, 1.898356), (0, 0, 0.3, 8.501230), (3, 0, 0.3, 16.87594)]
+)
+def test_stretching_of_a_free_disk(k, n, nu, gamma):
+    """Touze, Thomas and Chaigne (2002), J. Sound Vib. 258, 649-676, print 1.898; more digits by stress functions."""
+    body = Round(1.0, nu, 1.0, 0.01, 1.0)
+    cubic, quartic = round_stretching(body, k, n, Order(3, 9))
+    np.testing.assert_allclose(4.0 * quartic * body.per_area**2 / body.E / body.thickness, gamma, rtol=1e-6)
+    assert abs(cubic) < 1e-9 * np.sqrt(quartic) * round_modes(body, k, n + 3)[0].max()
+
+
+@pytest.mark.parametrize(
+    ("plane", "ratio"), [("across", 0.75 * (2.0 * (3.0 - NU**2) + 4.0 * NU) / 4.0), ("free", 0.177236)]
+)
+def test_stretching_of_a_hinged_square(plane, ratio):
+    """Chu and Herrmann (1956), J. Appl. Mech. 23, 532-540, let edges slide along themselves; free: Gamma 25.29581."""
+    square = Panel((1.0, 1.0), STEEL, RHO * H, (("hinged", plane),) * 4)
+    omega, _, quartic = panel_stretching(square, 1, Order(1, 9))
+    middle = 2.0 / np.sqrt(RHO * H)  # of the mode, there
+    np.testing.assert_allclose(4.0 * quartic.item() / omega.item() ** 2 * (H / middle) ** 2, ratio, rtol=1e-4)
+
+
+def test_a_rise_like_the_mode_makes_the_cubic_term_four_times_the_quartic():
+    """Stretching from rise c to c + q is that of a plane body from 0, (c + q)**2 - c**2 in place of q**2."""
+    plane, order = disk(0.0, ("clamped", "held")), Order(2, 9)
+    fields, x = RoundFields(plane, 0, order), round_modes(plane, 0, 1, order)[1][:, 0]
+    shape = fields.kept[2 * fields.plane.size :] @ x
+    c = 0.01 * H * np.sqrt(plane.per_area * plane.radius**2)
+    cap = replace(plane, slope=lambda r: c * (fields.normal.at(r, 1) @ shape))
+    (_, flat), (cubic, quartic) = (round_stretching(body, 0, 0, order) for body in (plane, cap))
+    np.testing.assert_allclose(abs(cubic), 4.0 * c * flat, rtol=1e-3)  # the mode changes by the rise squared
+    np.testing.assert_allclose(quartic, flat, rtol=1e-3)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("plane", DOMED)
+def test_stretching_of_a_domed_panel(plane):
+    omega, cubic, quartic = panel_stretching(domed_panel(plane), 1, Order(1, 10))
+    np.testing.assert_allclose([omega.item(), abs(cubic.item()), quartic.item()], DOMED[plane], rtol=3e-6)
+
+
+# Solids
+
+
+@pytest.mark.parametrize(("name", "worst"), [("cap", 4.5e-3), ("cymbal", 3e-3), ("cymbal, steep cup", 1.1e-2)])
+def test_shallow_theory_against_solids_of_revolution(name, worst):
+    """Slopes are 0.1, 0.1 and 0.47; half of what shallow theory errs by is the inertia in the plane it leaves out."""
+    solid, table = shell_references.BODIES[name], shell_references.read()[name]
+    body = Round(
+        solid.E, solid.nu, solid.rho, solid.thickness, solid.radius, solid.slope,
+        breaks=(solid.cup_radius,), inertia=False,
+    )  # fmt: skip
+    errors = []
+    for each in (body, replace(body, inertia=True)):
+        rows = {f"({k},{n})": omega / (2.0 * np.pi) for omega, k, n in round_omegas(each, 6, 9, Order(3, 9))}
+        errors.append(max(abs(rows[mode] / frequency - 1.0) for mode, frequency, _ in table))
+    assert 0.5 * worst < errors[0] < worst
+    assert errors[1] < errors[0]
+
+
+def free_solid(name):
+    """The body of that name as a panel of plate theory."""
+    body = shell_references.BODIES[name]
+    if name == "layered":
+        ply = (body.E1, body.E2, body.nu12, body.G12)
+        layers = [(ply, body.layer, angle) for angle in body.angles]
+        return Panel(body.sides, stack(layers), body.rho * body.layer * len(layers))
+    (a, b), h = body.sides, body.thickness
+    places = (("x", body.rib_y), ("y", body.rib_x))
+    ribs = tuple(rectangular_rib(*place, *body.rib, h, body.E, body.nu, body.rho) for place in places)
+    slopes = lambda x, y: (body.zxx * (x - 0.5 * a), body.zyy * (y - 0.5 * b))  # noqa: E731
+    return Panel((a, b), isotropic(body.E, body.nu, h), body.rho * h, slopes=slopes, ribs=ribs)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("name", "order"), [("layered", 11), ("ribbed", 6), ("ribbed and domed", 6)])
+def test_plate_theory_against_solids_of_bricks(name, order):
+    """Eight modes; shallow theory leaves out squared slopes of 0.07, and a line a width of 0.5 % of the side."""
+    table = shell_references.read()[name][:8]
+    found = panel_modes(free_solid(name), 11, Order(1, order))[0][3:] / (2.0 * np.pi)
+    np.testing.assert_allclose(found, [row[1] for row in table], rtol=7e-3)
+
+
+def test_solids_are_converged():
+    for name, rows in shell_references.read().items():
+        worst = max(abs(coarser) for _, _, coarser in rows[:8])
+        assert worst < (1e-5 if name.startswith("c") else 1e-3), name
