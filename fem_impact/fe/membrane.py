@@ -64,7 +64,7 @@ class Sheet:
         moduli = (frame.length**2 * h * dx)[..., None, None] * section.material.plane_stress
         own = Dofs(triangles(rim.points, space.vertices), ElementTriP4())
         dofs = np.vstack([own.element_dofs, own.N + own.element_dofs]).T
-        return cls(x, moduli, gradient, dofs, plane.loosened(space.inner, rim, own))
+        return cls(x, moduli, gradient, dofs, plane.loosened(space.inner, rim, own)[0])
 
     def strains(self, cells: np.ndarray) -> np.ndarray:
         """Strains (n, n_q, 3, 30) of the unknowns of cells (n,)."""

@@ -108,7 +108,8 @@ def held_at(
 ) -> tuple[csr_matrix, dict[int, list[tuple[int, int]]]]:
     """What boundary facets leave of a field: the map (2 n, n_left) to both components, and where facets have nodes.
 
-    ``words`` (n_facets,) are those of `section.PLANE`. The second result lists, for each node that is not free, the facets and their nodes that it belongs to.
+    ``words`` (n_facets,) are those of `section.PLANE`. The second result lists, for each node that is not free, the
+    facets and their nodes that it belongs to.
     """
     cells, sides = supports.cells_of_facets(facets, inner.vertices)
     local, _, normal = at_rim(inner, facets, cells, sides)
@@ -136,10 +137,11 @@ def rigid(places: np.ndarray) -> np.ndarray:
     return np.vstack([np.column_stack([one, none, -places[:, 1]]), np.column_stack([none, one, places[:, 0]])])
 
 
-def loosened(inner: Triangles, rim: supports.SupportedRim, own: Dofs) -> csr_matrix:
+def loosened(inner: Triangles, rim: supports.SupportedRim, own: Dofs) -> tuple[csr_matrix, np.ndarray]:
     """The map (2 n, n_left) that the edges leave of the displacements in a plane, and that cannot move rigidly.
 
-    If no edge prevents a rigid motion, some unknowns are left out that, when fixed, just do.
+    If no edge prevents a rigid motion, some unknowns are left out that, when fixed, just do. The second result are
+    these motions (2 n, n_motions).
     """
     loose, places = held_at(inner, rim.facets, list(rim.plane), own)[0], np.zeros((own.N, 2))
     places[own.element_dofs.T] = nodes(inner)
@@ -147,11 +149,12 @@ def loosened(inner: Triangles, rim: supports.SupportedRim, own: Dofs) -> csr_mat
     left = loose.T @ motions  # the columns of the map are orthonormal
     lost = motions - loose @ left
     lengths, turn = np.linalg.svd(lost.T @ lost)[1:]
-    still = left @ turn[np.sqrt(lengths) < SAME * np.sqrt(len(places))].T
+    free = turn[np.sqrt(lengths) < SAME * np.sqrt(len(places))].T
+    still = left @ free
     pinned = qr(still.T, pivoting=True, mode="economic")[2][: still.shape[1]] if still.size else []
-    return loose[:, np.setdiff1d(np.arange(loose.shape[1]), pinned)]
+    return loose[:, np.setdiff1d(np.arange(loose.shape[1]), pinned)], motions @ free
 
 
-def beside(first: Sparse, second: Sparse) -> csr_matrix:
+def together(first: Sparse, second: Sparse) -> csr_matrix:
     """Block diagonal of a map of the deflection's unknowns and one of the plane's."""
     return block_diag([first, second], format="csr")

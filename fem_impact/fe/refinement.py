@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from scipy.linalg import eigh
 from scipy.optimize import brentq
 
 from .._base import check, identity
@@ -144,6 +145,8 @@ def _pairs(
         many = system.mesh.dimension == 1 and n > FIRST_SLICE
         values, vectors = by_slices(flexibility, n) if many else _counted(system, flexibility, n, limit)
         values, vectors = sharpened(system, values, vectors)
+        values, turn = heavier(system, values, vectors)
+        vectors = vectors @ turn
     omega = np.concatenate([np.zeros(n_rigid), np.sqrt(values) * rate])[:n_modes]
     vectors = np.column_stack([system.rigid, vectors])[:, :n_modes]
     return flexibility, omega, vectors
@@ -269,6 +272,18 @@ def sharpened(system: System, values: np.ndarray, vectors: np.ndarray) -> tuple[
     mass = np.einsum("ij,ij->j", vectors, system.M @ vectors)
     order = np.argsort(energy / mass, kind="stable")
     return (energy / mass)[order], vectors[:, order]
+
+
+def heavier(system: System, values: np.ndarray, vectors: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Eigenvalues (n,) with the mass that the theory leaves out of M, and how the vectors (n_dofs, n) combine (n, n).
+
+    The inverse problem keeps the digits of the lowest.
+    """
+    if system.rules.plane_mass is None or not len(values):
+        return values, np.eye(len(values))
+    more, soft = system.rules.plane_mass(system, vectors), values**-0.5
+    size, turn = eigh(soft[:, None] * (np.eye(len(values)) + 0.5 * (more + more.T)) * soft)
+    return 1.0 / size[::-1], (soft[:, None] * turn / np.sqrt(size))[:, ::-1]
 
 
 def fine_enough(system: System, n_modes: int | None, max_frequency: float | None, tolerance: float | None) -> System:

@@ -7,8 +7,10 @@ rise z(x, y) of the unloaded surface, the strains are Marguerre's:
     U = 1/2 int (e A e - 2 e B k + k D k),      T = 1/2 int rho h w'^2
 
 where A, B and D are the moments of the stiffness over the thickness, and both z and the height in a layer count towards
-the striker. The inertia of motions in the plane is left out: `plane_inertia` tells what it would do. Rigid motions are
-exact: a tilt w = x comes with u = -z, which the quartic elements hold, as the rise is quartic itself in each triangle.
+the striker. The inertia of what moves in the plane is left out where modes are searched, so that the plane follows at
+once and has no modes of its own, and counts in the space of the modes found, where it lowers them: `plane_mass`. Rigid
+motions are exact: a tilt w = x comes with u = -z, which the quartic elements hold, as the rise is quartic itself in
+each triangle; their inertia is that of the deflection.
 
 Shallow means slopes of the rise below a tenth or so: the area of the surface, and so its mass, is larger than that of
 its outline by half the square of the slope.
@@ -32,11 +34,13 @@ from .elements import curvatures, numbering
 from .plane import FIRST, LOCAL, SECOND, PlaneSpace
 from .section import evaluate
 from .supports import constrain
-from .theory import Body, Domain, Held, Points, Term, Theory, blocks, gram, unknowns_of_cells
+from .theory import Body, Domain, Held, Points, Term, Theory, blocks, gram, scatter
 
 # [-] rise of the middle of a side over its chord, over the thickness, above which triangles are divided: bending that
 # does not stretch a curved plate needs displacements beyond quartics there. Ten modes of a cymbal then err by 2e-3
 SAG = 0.5
+# [-] the same of what the rise differs from a quartic along a side: where its curvature jumps
+KINK = 0.005
 MOST_BENT = 20_000  # [-] triangles after which none is divided for its sag, as beside a kink of the rise
 
 
@@ -45,6 +49,7 @@ class ShallowSpace(PlaneSpace):
 
     heights: np.ndarray  # (n_cells, 15) rise at the nodes of the plane, in the frame
     lines: Sequence[ribs.Line] = ()
+    drifts: np.ndarray  # (n_all, n) rigid motions in the plane that no edge prevents
 
     def linear(self, element_dofs: np.ndarray, n_all: int) -> np.ndarray:
         """Unknowns (n_all, 6) of the deflections 1, x and y, and of the rigid motions in the plane."""
@@ -100,9 +105,10 @@ def _hold(body: Body, domain: Domain) -> Held:
     creased = np.unique(np.concatenate([np.zeros(0, int), *(line.facets.ravel() for line in space.lines)]))
     expand, project, dofs = constrain(rim, space.vertices, *numbering(domain.cells, space.flat), creased)
     n_flat, own = expand.shape[0], Dofs(domain.cells, ElementTriP4())
-    loose = plane.loosened(space.inner, rim, own)
+    loose, drifts = plane.loosened(space.inner, rim, own)
+    space.drifts = np.vstack([np.zeros((n_flat, drifts.shape[1])), drifts])
     dofs = np.vstack([dofs, n_flat + own.element_dofs, n_flat + own.N + own.element_dofs])
-    expand, project = plane.beside(expand, loose), plane.beside(project, loose.T)
+    expand, project = plane.together(expand, loose), plane.together(project, loose.T)
     n_all = expand.shape[0]
     held = ribs.attached(space.lines, domain, dofs, n_all, strained) if space.lines else None
     return Held(expand, project, dofs, plates.springs(body, domain, dofs, n_all), rim, held)
@@ -114,50 +120,55 @@ def towards_bends(mesh: Mesh, section: Any, kinds: list[str], coarser: float) ->
     ``coarser`` multiplies their size.
     """
     mesh = ribs.around_ends(mesh, section.ribs) if section.ribs else mesh
+    share = np.linspace(0.0, 1.0, 9)[:, None, None, None]
+    between = np.vander(share[1::2].ravel(), 5) @ np.linalg.inv(np.vander(share[::2].ravel(), 5))  # of a quartic
     while section.rise is not None and len(mesh.cells) < MOST_BENT:
         corner = mesh.points[mesh.cells]
-        after = np.roll(corner, -1, axis=1)
-        places = np.stack([corner, 0.5 * (corner + after), after]).reshape(-1, 2)
-        first, middle, last = check.field("rise", section.rise, places, "m").reshape(3, -1, 3)
-        least = evaluate("thickness", section.thickness, corner.mean(axis=1), "m") * SAG * coarser**2
-        sagging = np.abs(middle - 0.5 * (first + last)).max(axis=1) > least
-        if not sagging.any():
+        places = corner + share * (np.roll(corner, -1, axis=1) - corner)
+        z = check.field("rise", section.rise, places.reshape(-1, 2), "m").reshape(9, -1, 3)
+        sag = np.abs(z[4] - 0.5 * (z[0] + z[8])).max(axis=1)
+        kink = np.abs(z[1::2] - np.tensordot(between, z[::2], 1)).max(axis=(0, 2))
+        least = evaluate("thickness", section.thickness, corner.mean(axis=1), "m") * coarser**2
+        uneven = (sag > SAG * least) | (kink > KINK * least)
+        if not uneven.any():
             break
-        mesh = splitting.divided_across(mesh, sagging)[0]
+        mesh = splitting.divided_across(mesh, uneven)[0]
     return mesh
 
 
-def beside(system: Any, vectors: np.ndarray) -> np.ndarray:
-    """Twice the mutual kinetic energy (n, n) that vectors (n_dofs, n) would have besides that of M, over M's unit.
+def plane_mass(system: Any, vectors: np.ndarray) -> np.ndarray:
+    """Mutual mass (n, n) of what moves besides the deflection in vectors (n_dofs, n), in the frame.
 
     It is that of the displacements in the plane, of ribs at the height of their centroids and as they turn, and of what
     the slope of the rise makes the surface larger.
     """
-    space, frame = system.space, system.frame
+    space, frame, dofs = system.space, system.frame, system.element_dofs
     X, x, dx = slopes.quadrature(system)
-    shape = plane.reference(X)[0]
-    every = unknowns_of_cells(system, vectors)
-    result = np.zeros((vectors.shape[1],) * 2)
-    area = np.stack([1.0 - X[0] - X[1], *X], axis=1)[None]
+    shape, area = plane.reference(X)[0], np.stack([1.0 - X[0] - X[1], *X], axis=1)[None]
+    local, where = [], [np.arange(len(x))]
     for cells in blocks(len(x)):
-        within = np.stack([shape @ every[cells][:, part] for part in (FIRST, SECOND)], axis=2)  # (n, n_q, 2, n_modes)
-        value = space.flat.functions(cells, x[cells], (0,))[0] @ every[cells][:, :21]
+        moved = np.zeros((*dx[cells].shape, 3, LOCAL))
+        moved[:, :, 0, FIRST] = moved[:, :, 1, SECOND] = shape
         steep = (plane.gradients(space.inner, cells, area) @ space.heights[cells][:, None, :, None])[..., 0]
-        weight = frame.field(system.section, "inertia", x[cells]) * dx[cells]
-        larger = 0.5 * weight * (steep**2).sum(axis=2)
-        result += gram(within, weight).sum(axis=0) + gram(value[:, :, None], larger).sum(axis=0)
+        larger = np.sqrt(0.5 * (steep**2).sum(axis=2))
+        moved[:, :, 2, :21] = larger[..., None] * space.flat.functions(cells, x[cells], (0,))[0]
+        local.append(gram(moved, frame.field(system.section, "inertia", x[cells]) * dx[cells]))
     for line in space.lines:
-        own, place = every[line.cells], frame.places(line.x)
         shape = plane.reference(line.area[..., 1:].reshape(-1, 2).T)[0].reshape(*line.ds.shape, plane.QUARTIC)
-        slope = space.flat.functions(line.cells, line.x, (1,))[0].transpose(0, 2, 1, 3) @ own[:, None, :21]
-        z = (line.stiffness[..., 0, 1] / line.stiffness[..., 0, 0])[..., None, None] / frame.length
-        within = np.stack([shape @ own[:, part] for part in (FIRST, SECOND)], axis=2) - z * slope
-        weight, turns = (
-            line.inertia * line.ds,
-            line.rib.turning(place).reshape(line.ds.shape) * line.ds / frame.length**2,
-        )
-        result += (gram(within, weight) + gram(slope, turns)).sum(axis=0) / (frame.inertia * frame.length)
-    return result
+        slope = space.functions(line.cells, line.x, (1,))[0].transpose(0, 2, 1, 3)
+        moved = -(line.stiffness[..., 0, 1] / line.stiffness[..., 0, 0] / frame.length)[..., None, None] * slope
+        moved[:, :, 0, FIRST] = moved[:, :, 1, SECOND] = shape
+        turns = line.rib.turning(frame.places(line.x)).reshape(line.ds.shape) / frame.length**2
+        each = gram(moved, line.inertia * line.ds) + gram(slope, turns * line.ds)
+        local.append(each / (frame.inertia * frame.length))
+        where.append(line.cells)
+    whole = scatter(np.concatenate(local), dofs[:, np.concatenate(where)], system.expand.shape[0])
+    moved = system.expand @ vectors
+    heavy = whole @ moved
+    if space.drifts.size:  # a free body stays where it is in its plane
+        lost = space.drifts.T @ heavy
+        return moved.T @ heavy - lost.T @ np.linalg.solve(space.drifts.T @ (whole @ space.drifts), lost)
+    return moved.T @ heavy
 
 
 def steepest(system: Any) -> float:
@@ -176,5 +187,5 @@ def _errors(system: Any, vectors: np.ndarray, loads: np.ndarray, forced: Any = N
 SHALLOW = Theory(
     "shallow", "argyris and quartic", 2, _domain, terms, _hold, _errors, wave=1.8, unknowns=47.0,
     fields=("stiffness", "inertia", "walls"), graded=True, compared=True, sharp=plates.is_tiny,
-    layered=towards_bends,
+    layered=towards_bends, plane_mass=plane_mass,
 )  # fmt: skip

@@ -203,14 +203,14 @@ def constrain(
         row = n @ slope[facet, k]  # (21,)
         for i in range(2):
             tied.append((np.full(21, node + i * own.N), dofs[:21, cells[facet]], n[i] * row))
-    whole = plane.beside(expand, loose)
+    whole = plane.together(expand, loose)
     if tied:
         row, column, value = (np.concatenate(part) for part in zip(*tied))
         tie = coo_matrix((value, (row, column)), shape=(2 * own.N, n_flat)).tocsr() @ expand
         lower = block_diag([csr_matrix((n_flat, 0)), tie], format="csr")
         lower.resize(whole.shape)
         whole = (whole + lower).tocsr()
-    return whole, plane.beside(project, loose.T), dofs
+    return whole, plane.together(project, loose.T), dofs
 
 
 def _without_slip(

@@ -23,6 +23,7 @@ from .._base.rounding import SAME
 from ..fe import point_load
 from ..fe.assembly import System
 from ..fe.eigenvalues import Flexibility, factorise, one_thread
+from ..fe.refinement import heavier
 from .modal import Damping, Modes, damping_notes, damping_ratios
 from .shapes import Shapes
 
@@ -269,6 +270,9 @@ class Krylov:
         count = min(count, self.count)
         frame, rigid = self.system.frame, self.system.rigid
         value, turn = self._eigenpairs(count)
+        if self.system.rules.plane_mass is not None:
+            value, mix = heavier(self.system, value, self.vectors[:count].T @ turn)
+            turn = turn @ mix
         omega = np.concatenate([np.zeros(rigid.shape[1]), np.sqrt(np.maximum(value, 0.0)) * frame.rate])
         basis = self.vectors[:count]
         rows = np.hstack([self.loads.T @ rigid, (basis @ self.loads).T @ turn]) * frame.mass**-0.5
