@@ -14,7 +14,7 @@ from .._base import kept as keeping
 from .._base.rounding import EPSILON, SAME
 from ..mesh import mesh_files
 from ..mesh.meshes import MOST_CELLS, Mesh
-from . import plausible
+from . import plausible, shallow
 from .assembly import BY_ELEMENT, assemble, reassemble
 from .corners import SAY
 from .eigenvalues import BLOCK, FIRST_SLICE, RESIDUAL, STRICT, Flexibility, by_slices, count_below, lowest
@@ -146,7 +146,7 @@ def _pairs(
         values, vectors = by_slices(flexibility, n) if many else _counted(system, flexibility, n, limit)
         values, vectors = sharpened(system, values, vectors)
         values, turn = heavier(system, values, vectors)
-        vectors = vectors @ turn
+        vectors = vectors if turn is None else vectors @ turn
     omega = np.concatenate([np.zeros(n_rigid), np.sqrt(values) * rate])[:n_modes]
     vectors = np.column_stack([system.rigid, vectors])[:, :n_modes]
     return flexibility, omega, vectors
@@ -274,14 +274,15 @@ def sharpened(system: System, values: np.ndarray, vectors: np.ndarray) -> tuple[
     return (energy / mass)[order], vectors[:, order]
 
 
-def heavier(system: System, values: np.ndarray, vectors: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Eigenvalues (n,) with the mass that the theory leaves out of M, and how the vectors (n_dofs, n) combine (n, n).
+def heavier(system: System, values: np.ndarray, vectors: np.ndarray) -> tuple[np.ndarray, np.ndarray | None]:
+    """Eigenvalues (n,) with the mass in the plane of a ribbed plate, and how vectors (n_dofs, n) combine, if not as is.
 
-    The inverse problem keeps the digits of the lowest.
+    Ribs hang far below the middle; without them it is left out, as formulas of shells do. The inverse problem keeps the
+    digits of the lowest.
     """
-    if system.rules.plane_mass is None or not len(values):
-        return values, np.eye(len(values))
-    more, soft = system.rules.plane_mass(system, vectors), values**-0.5
+    if not (isinstance(system.section, Plate) and system.section.ribs and len(values)):
+        return values, None
+    more, soft = shallow.plane_mass(system, vectors), values**-0.5
     size, turn = eigh(soft[:, None] * (np.eye(len(values)) + 0.5 * (more + more.T)) * soft)
     return 1.0 / size[::-1], (soft[:, None] * turn / np.sqrt(size))[:, ::-1]
 

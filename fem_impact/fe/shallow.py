@@ -7,10 +7,10 @@ rise z(x, y) of the unloaded surface, the strains are Marguerre's:
     U = 1/2 int (e A e - 2 e B k + k D k),      T = 1/2 int rho h w'^2
 
 where A, B and D are the moments of the stiffness over the thickness, and both z and the height in a layer count towards
-the striker. The inertia of what moves in the plane is left out where modes are searched, so that the plane follows at
-once and has no modes of its own, and counts in the space of the modes found, where it lowers them: `plane_mass`. Rigid
-motions are exact: a tilt w = x comes with u = -z, which the quartic elements hold, as the rise is quartic itself in
-each triangle; their inertia is that of the deflection.
+the striker. The inertia of what moves in the plane (`plane_mass`) is left out, as in Reissner's formulas, so that the
+plane follows at once and has no modes of its own. With ribs, which hang far below the middle, it counts in the space of
+the modes found. Rigid motions are exact: a tilt w = x comes with u = -z, which the quartic elements hold, as the rise
+is quartic itself in each triangle; their inertia is that of the deflection.
 
 Shallow means slopes of the rise below a tenth or so: the area of the surface, and so its mass, is larger than that of
 its outline by half the square of the slope.
@@ -187,5 +187,5 @@ def _errors(system: Any, vectors: np.ndarray, loads: np.ndarray, forced: Any = N
 SHALLOW = Theory(
     "shallow", "argyris and quartic", 2, _domain, terms, _hold, _errors, wave=1.8, unknowns=47.0,
     fields=("stiffness", "inertia", "walls"), graded=True, compared=True, sharp=plates.is_tiny,
-    layered=towards_bends, plane_mass=plane_mass,
+    layered=towards_bends,
 )  # fmt: skip

@@ -164,9 +164,6 @@ class Theory:
     # a factor
     layered: Callable[[Mesh, Any, list[str], float], Mesh] | None = None
 
-    # mutual mass (n, n) of vectors (n_dofs, n) besides that of M, which counts in the space of the modes found
-    plane_mass: Callable[[Any, np.ndarray], np.ndarray] | None = None
-
     @property
     def thick(self) -> bool:
         """Whether shear and rotary inertia count."""

@@ -270,9 +270,8 @@ class Krylov:
         count = min(count, self.count)
         frame, rigid = self.system.frame, self.system.rigid
         value, turn = self._eigenpairs(count)
-        if self.system.rules.plane_mass is not None:
-            value, mix = heavier(self.system, value, self.vectors[:count].T @ turn)
-            turn = turn @ mix
+        value, mix = heavier(self.system, value, self.vectors[:count].T @ turn)
+        turn = turn if mix is None else turn @ mix
         omega = np.concatenate([np.zeros(rigid.shape[1]), np.sqrt(np.maximum(value, 0.0)) * frame.rate])
         basis = self.vectors[:count]
         rows = np.hstack([self.loads.T @ rigid, (basis @ self.loads).T @ turn]) * frame.mass**-0.5

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from independent import references_shells as reference
+import references_shells as reference
 
 import fem_impact as fi
 
@@ -116,6 +116,7 @@ def test_edges_held_in_the_plane_stiffen_a_cap_and_free_ones_do_not():
     assert first["free"] < first["sliding"] < 0.9 * first["held"]
 
 
+@pytest.mark.slow
 def test_the_compliance_is_that_of_all_modes():
     system = panel(2e-3, (-0.5, -0.5), size=0.03)
     modes = fi.find_modes(system, n_modes=100)
