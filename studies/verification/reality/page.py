@@ -39,6 +39,9 @@ Their numbers could not be read in a text at hand, only abstracts or first pages
   10.1177/1687814016683351). They say that most falls had several contacts; this program has 3 to 12 of them in each of
   256 falls over speeds of 0.2 to 3 m/s and places from a sixth to the middle of the span. The table of durations is
   missing.
+- Balls of rubber, tennis balls and marbles on floors (repositories of student experiments): restitution measured, but
+  neither ball nor floor is described. A free aluminium plate with holes (github.com/permas4edu/permas4edu,
+  ema/examples/006): size and pictures, no frequencies. Bars of rosewood (supermediocre.org): two lengths in one text.
 - The drumstick on a drum (A. Wagner, KTH 2006): 3 to 6 ms over all strokes, tensions and places. This program has 6 to
   10 ms for five heads of 14 inches drawn at random; stick, head and tension are not in the abstract.
 - Contact times of falling spheres over the thickness of plates (Appl. Sci. 2026, 16, 89), restitution over diameter to
