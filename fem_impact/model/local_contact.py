@@ -86,7 +86,7 @@ def examine_pressure(struck: Struck) -> Assumption:
 
 def restitution(ratio: float) -> float:
     """Restitution [-] of a sphere that yields on a rigid wall, for the speed of first yield over its speed."""
-    return 1.0 if ratio >= 1.0 else PlasticLaw().restitution(UNIT, 0.4 / ratio**2)  # first yield takes 2/5
+    return 1.0 if ratio >= 1.0 else PlasticLaw().rebound(UNIT, 0.4 / ratio**2)  # first yield takes 2/5
 
 
 def examine_size(struck: Struck) -> Assumption:

@@ -137,7 +137,7 @@ class PlasticLaw(Law):
     def wide(self, contact: Any, approach: float) -> float:
         return float(_course(contact, approach)[3])
 
-    def restitution(self, contact: Any, energy: float) -> float:
+    def rebound(self, contact: Any, energy: float) -> float:
         """Restitution [-] of a body with this energy [J] on a rigid wall."""
         force, _, stored, wide = _course(contact, self._deepest(contact, np.asarray(energy)))
         back = force / (contact.stiffness * wide ** (contact.exponent - 1.0))
