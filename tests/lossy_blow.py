@@ -24,7 +24,7 @@ class Found:
 def blow(omega, zeta, row, start_p, law, until, rtol=1e-12):
     """Follow modes (n_modes,) with the shapes ``row`` at the contact: the approach is row @ q; no gap, no forces.
 
-    ``law`` holds a kind and its numbers: ("layers", k, a, depth, k2, a2), ("plastic", k, a, first) or
+    ``law`` holds a kind and its numbers: ("layers", k, a, depth, k2, a2), ("plastic", k, a, first, reach, steeper) or
     ("felt", k, a, share, time). The state is q, p, impulse and, for felt, its memory.
     """
     omega, zeta, row = (np.asarray(x, float) for x in (omega, zeta, row))
@@ -32,15 +32,17 @@ def blow(omega, zeta, row, start_p, law, until, rtol=1e-12):
     kind, k, a, *more = law
     deepest = more[0] if kind == "plastic" else 0.0  # [m]
 
-    def first_yield():
-        x = more[0]
-        return k * x**a, a * k * x ** (a - 1.0)
+    def yielding(d):
+        """Force beyond first yield: its slope falls short of the last one as exp(-approach / reach)."""
+        x, reach = more[0], more[1] * more[0]
+        over = max(d - x, 0.0)
+        short = reach * (1.0 - np.exp(-over / reach))
+        return k * x**a + a * k * x ** (a - 1.0) * (more[2] * over - (more[2] - 1.0) * short), over - short
 
     def unloading():
         """Force at the deepest approach, and the approach taken back from there."""
-        force, steep = first_yield()
-        force += steep * (deepest - more[0])
-        return force, force / (k * deepest ** (a - 1.0))
+        force, wider = yielding(deepest)
+        return force, force / (k * (deepest + wider) ** (a - 1.0))
 
     def force(state, phase):
         d = row @ state[:n]
@@ -51,8 +53,7 @@ def blow(omega, zeta, row, start_p, law, until, rtol=1e-12):
         if kind == "felt":
             return k * (abs(d) ** a * np.sign(d) - more[0] * state[-1])
         if phase == "yields":
-            at, steep = first_yield()
-            return at + steep * (d - more[0])
+            return yielding(d)[0]
         at, back = unloading()
         x = (d - deepest + back) / back
         return at * abs(x) ** a * np.sign(x)

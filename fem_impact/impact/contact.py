@@ -97,8 +97,8 @@ class Contact(Numbers):
         plate : Plate or Material
             The flat body; isotropic. For wood, give an isotropic `Material` with its stiffness across the thickness.
         yield_strength : float [Pa], optional
-            Of the softer body. The contact then yields as soon as its largest pressure is 1.6 times this; see
-            `elastic_plastic`.
+            Of the softer body. The contact then yields as soon as its largest pressure is 1.6 times this; far beyond,
+            its mean pressure is 2.8 times this. See `elastic_plastic`.
 
         References
         ----------

@@ -2,12 +2,12 @@
 
 The contact of a sphere of radius R under the force F has the radius a = (3 F R / (4 E*))**(1/3) and the largest
 pressure p = (6 F E*^2 / (pi^3 R^2))**(1/3). The softer body begins to yield at p = 1.6 Y. From there the restitution
-falls as Thornton's model says, towards V**(-1/4).
+falls as the law of a contact that yields says, towards V**(-1/4).
 
 References
 ----------
-Johnson (1985), Contact mechanics, sections 3.4 (point force), 4.2 and 11.5; Thornton (1997), J. Appl. Mech. 64, 383;
-Lamb (1882), Proc. London Math. Soc. 13, 189-212 (modes of a sphere).
+Johnson (1985), Contact mechanics, sections 3.4 (point force), 4.2, 6.3 and 11.5; Lamb (1882), Proc. London Math. Soc.
+13, 189-212 (modes of a sphere).
 """
 
 from dataclasses import replace
@@ -16,6 +16,7 @@ import numpy as np
 
 from .._base.rounding import SAME
 from ..impact.assumption import Assumption
+from ..impact.compiled.laws.plastic import PlasticLaw
 from ..impact.contact import YIELDS, Contact, loss_number
 from ..impact.history import History
 from ..modes.shapes import SampledShapes
@@ -26,6 +27,7 @@ LAMB = 2.64  # [-] fact: lowest spheroidal mode of a sphere, omega R / c_s, for 
 LIVELY = 2.5  # [-] fact: squared shape of that mode at its pole times the mass of the sphere
 SPHERE = "give the striker as a sphere with its material, and the contact between the two"
 PLASTIC = "take a contact that yields (yield_strength of `Contact.between`, or elastic_plastic), or a slower blow"
+UNIT = Contact.elastic_plastic(1.0, yield_approach=1.0)
 YIELDING = Doubt("no yielding", "contact pressure over that at first yield", 1.0)
 # small beside half the thickness, a wavelength / (2 pi) and the edge's distance, of which one decides: a choice
 SMALL = Doubt("local contact", "contact radius over half the thickness", 0.5, "give material and section of the body")
@@ -47,7 +49,7 @@ def _hertz(struck: Struck) -> tuple[float, float] | None:
 
 def contact_radius(contact: Contact, radius: float, force: float) -> float:
     """Radius [m] of the contact of a sphere under a force [N], also beyond first yield."""
-    return float((radius * contact.law.approach(contact, force)) ** 0.5)
+    return float((radius * contact.law.wide(contact, contact.law.approach(contact, force))) ** 0.5)
 
 
 def examine_pressure(struck: Struck) -> Assumption:
@@ -83,11 +85,8 @@ def examine_pressure(struck: Struck) -> Assumption:
 
 
 def restitution(ratio: float) -> float:
-    """Restitution [-] of an elastic, ideally plastic sphere for the speed of first yield over its speed (Thornton)."""
-    if ratio >= 1.0:
-        return 1.0
-    tail = ratio / (ratio + 2.0 * np.sqrt(1.2 - 0.2 * ratio**2))
-    return float(np.sqrt(1.2 * np.sqrt(3.0) * (1.0 - ratio**2 / 6.0)) * tail**0.25)
+    """Restitution [-] of a sphere that yields on a rigid wall, for the speed of first yield over its speed."""
+    return 1.0 if ratio >= 1.0 else PlasticLaw().rebound(UNIT, 0.4 / ratio**2)  # first yield takes 2/5
 
 
 def examine_size(struck: Struck) -> Assumption:

@@ -496,7 +496,7 @@ def test_a_push_that_barely_yields_further_has_no_gradient():
         first, *later = (impact.peak_force for impact in yielding(numbers | {"striker.mass": mass}, 1e-4).impacts)
         return max(later) - first
 
-    low, high = 0.07, 0.08
+    low, high = 0.085, 0.095
     assert deeper(low) < 0.0 < deeper(high)
     for _ in range(14):
         middle = 0.5 * (low + high)

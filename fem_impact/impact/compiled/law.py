@@ -116,7 +116,7 @@ def steepness(x, f, spring):
     """Slope of the force f over the compression x > 0."""
     if x <= spring.corner:
         return spring.exponent * f / x
-    return spring.hard if spring.kind == plastic.KIND else layers.steepness(x, f, spring)
+    return plastic.steepness(x, spring) if spring.kind == plastic.KIND else layers.steepness(x, f, spring)
 
 
 @inner()

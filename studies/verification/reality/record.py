@@ -57,6 +57,7 @@ class Experiment:
     predict: Callable[[], Predicted]
     reasons: Mapping[str, str] = field(default_factory=dict)  # point outside its band -> the reason found
     found: str = ""  # what else the comparison tells
+    before: Callable[[], Predicted] | None = None  # the same without what was assumed after a first look
 
 
 @dataclass(frozen=True)
@@ -83,6 +84,11 @@ class Verdict:
     def own_width(self) -> float:
         """Half width of the measurement's own interval over the measured number [-]."""
         return self.point.error / abs(self.point.value)
+
+
+def at_first_look(experiment: Experiment, verdicts: tuple[Verdict, ...]) -> tuple[Verdict, ...]:
+    """The verdicts without what was assumed after a first look; those given where nothing was."""
+    return verdicts if experiment.before is None else judge(experiment, experiment.before())
 
 
 def judge(experiment: Experiment, predicted: Predicted | None = None) -> tuple[Verdict, ...]:

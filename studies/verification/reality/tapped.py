@@ -30,6 +30,7 @@ def from_the_others(
     error: float,
     prior: Sequence[float] = (),
     use: Sequence[int] = (),
+    rounds: int = ROUNDS,
 ) -> np.ndarray:
     """Each frequency predicted from all others, (DRAWS, n) [Hz].
 
@@ -49,6 +50,8 @@ def from_the_others(
         Standard deviation with which each constant is known beforehand; infinite if left out.
     use : indices, optional
         Frequencies that the constants are found from, of which each is still predicted without itself.
+    rounds : int
+        Of the robust fit; 1 for plain least squares.
 
     References
     ----------
@@ -63,7 +66,7 @@ def from_the_others(
         rest = np.setdiff1d(use if len(use) else np.arange(n), [i])
         rows = slope[rest]
         trust = np.ones(len(rest))
-        for _ in range(ROUNDS):
+        for _ in range(rounds):
             weighted = rows.T * trust
             normal = weighted @ rows + np.diag(weights)
             found = np.linalg.solve(normal, weighted @ away[rest])

@@ -20,6 +20,8 @@ class Spring(NamedTuple):
     hard_exponent: float  # [-]
     relaxation: float  # [s] of a memory that fades; 0: there is none
     memory: float  # [m**exponent] of felt
+    steeper: float  # [N/m] of one that yields: how much steeper its force becomes far beyond the corner
+    reach: float  # [m] over which it does
 
 
 class Point(NamedTuple):
@@ -85,6 +87,10 @@ class Law:
     def approach(self, contact: Any, force: float) -> float:
         """Approach [m] at which it first has a force [N]."""
         return float((force / contact.stiffness) ** (1.0 / contact.exponent))
+
+    def wide(self, contact: Any, approach: float) -> float:
+        """Approach [m] at which round bodies that do not yield have a contact as wide as these at an approach [m]."""
+        return approach
 
     def sentence(self, contact: Any, si: Any) -> str:
         """What a report adds to the sentence on a power law; ``si`` writes a number with its unit."""

@@ -98,7 +98,7 @@ def spring(law, i, memory):
     k, a, loss, c = law["stiffness"][i], law["exponent"][i], law["loss"][i], law["compliance"][i]
     if memory < 0.0:
         return simple(0.0, a, 0.0, c)
-    return Spring(k, a, loss, c, KIND, np.inf, k * law["hysteresis"][i], 1.0, law["relaxation"][i], memory)
+    return Spring(k, a, loss, c, KIND, np.inf, k * law["hysteresis"][i], 1.0, law["relaxation"][i], memory, 0.0, 0.0)
 
 
 @inner()

@@ -90,7 +90,7 @@ def spring(law, i):
     """The spring of contact i."""
     return Spring(
         law["stiffness"][i], law["exponent"][i], law["loss"][i], law["compliance"][i], KIND,
-        law["depth"][i], law["hard_stiffness"][i], law["hard_exponent"][i], 0.0, 0.0,
+        law["depth"][i], law["hard_stiffness"][i], law["hard_exponent"][i], 0.0, 0.0, 0.0, 0.0,
     )  # fmt: skip
 
 

@@ -90,7 +90,7 @@ def wall_time(stiffness: Any, exponent: Any, mobility: Any, speed: Any, complian
 @inner()
 def simple(k, a, loss, c):
     """The spring of a power law."""
-    return Spring(k, a, loss, c, POWER, np.inf, 0.0, 1.0, 0.0, 0.0)
+    return Spring(k, a, loss, c, POWER, np.inf, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0)
 
 
 @inner()
