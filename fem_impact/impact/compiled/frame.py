@@ -97,13 +97,16 @@ def begin(scene, bodies, contacts, course, base):
 
 
 @inner(part=True)
-def over(course, limits):
-    """Why a run ends before its next step; EXHAUSTED, which it will be after the last one, where it goes on."""
+def over(course, limits, steps):
+    """Why a run ends before its next step; EXHAUSTED, which it will be after the last one, where it goes on.
+
+    FULL where the record of its steps is.
+    """
     if course.clock[TIME] >= limits.horizon:
         return HORIZON
     if 0 < limits.max_impacts <= course.counts[RELEASED]:
         return IMPACTS
-    return EXHAUSTED
+    return FULL if course.counts[STEPS] + 1 >= steps.shape[0] else EXHAUSTED
 
 
 @inner(part=True)
@@ -215,6 +218,12 @@ def locate(contacts, course, limits, h, cornered, lossy):
             count[TRIES] = 0
             return TRY, guess
     return TAKEN, guess
+
+
+@inner(part=True)
+def at_rest(bodies, contacts, course):
+    """Whether the bodies are, asked at every 512th step in contact."""
+    return course.counts[LOOKS] % 512 == 0 and total_energy(bodies, contacts) <= course.clock[FAINT]
 
 
 @inner(part=True)
