@@ -137,18 +137,7 @@ def in_air(
         return modes
     how: dict[str, Any] = {"density": density, "speed": speed, "sides": sides, "baffled": baffled}
     poorer = {cause: in_air(other, **how) for cause, other in modes.poorer.items()}
-    area = measure(points, cells)
-    # [1/m] of the highest mode, by Weyl's law, or of its sound
-    wave = max(np.sqrt(4.0 * np.pi * modes.n_modes / area), modes.omega[-1] / speed)
-    size = min(2.0 * np.pi / wave / PER_WAVE, np.sqrt(area) / FEWEST)
-    share = 1.0 if baffled else 0.5
-    spacing = size / SAMPLES[0]
-    if not modes.n_modes * area / spacing**2 <= MOST_SAMPLES:
-        raise ValueError(
-            f"speed of sound in the air must be higher or modes fewer, got {speed:g} m/s: {modes.n_modes} modes on a "
-            f"grid for waves of {2.0 * np.pi / wave:.2g} m, the shortest of plate or sound, take more than "
-            f"{MOST_SAMPLES:.0e} numbers"
-        )
+    share, spacing = 1.0 if baffled else 0.5, _spacing(modes, measure(points, cells), speed)
     samples, missed = _sampled(modes.shapes, spacing)
     weight = density * sides * share / (2.0 * np.pi)
     found, other = (_Air(modes, _strengths(samples, spacing, n), n * spacing, weight, speed) for n in SAMPLES)
@@ -187,6 +176,20 @@ def in_air(
         air=True,
         damping_error=np.concatenate([rest, unsure[order]]),
     )
+
+
+def _spacing(modes: Modes, area: float, speed: float) -> float:
+    """Distance [m] of the points at which shapes are sampled on a plate of an area [m^2]."""
+    # [1/m] of the highest mode, by Weyl's law, or of its sound
+    wave = max(np.sqrt(4.0 * np.pi * modes.n_modes / area), modes.omega[-1] / speed)
+    spacing = min(2.0 * np.pi / wave / PER_WAVE, np.sqrt(area) / FEWEST) / SAMPLES[0]
+    if not modes.n_modes * area / spacing**2 <= MOST_SAMPLES:
+        raise ValueError(
+            f"speed of sound in the air must be higher or modes fewer, got {speed:g} m/s: {modes.n_modes} modes on a "
+            f"grid for waves of {2.0 * np.pi / wave:.2g} m, the shortest of plate or sound, take more than "
+            f"{MOST_SAMPLES:.0e} numbers"
+        )
+    return float(spacing)
 
 
 def _extrapolated(
