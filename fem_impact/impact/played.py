@@ -79,7 +79,7 @@ class StruckBody:
         now = live.PlayStrokes(*(array[:count] for array in self._strokes))
         for i in range(count):
             now.when[i], now.pad[i], now.speed[i] = strokes[i]
-        live.play(self.body, self.pads, self.limits, self.state, now, gain, out)
+        live.play_block(self.body, self.pads, self.limits, self.state, now, gain, out)
 
     @property
     def counted(self) -> dict[str, int]:

@@ -110,7 +110,7 @@ def examine(hit: "Response") -> Trust:
     return Trust(tuple(_judged(hit, name, band, cure) for name, band in hit.quantities.items()))
 
 
-def verdict(hit: "Response") -> str:
+def in_one_line(hit: "Response") -> str:
     """The answer in one line: what was asked for first, how well it is computed, and whether the model holds."""
     first = hit.trust.judged[0]
     if first.quantity == "restitution":

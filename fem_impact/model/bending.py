@@ -128,7 +128,7 @@ def unwrapped(shapes: Shapes) -> tuple[Shapes, float, float]:
     return shapes, amplitude, frequency
 
 
-def known(modes: Modes) -> Known | None:
+def known_of(modes: Modes) -> Known | None:
     """What the modes of a plate or beam tell of it; None if its shapes are known at points only, or it is rigid."""
     shapes = unwrapped(modes.shapes)[0]
     if isinstance(shapes, (FieldShapes, RitzShapes)):

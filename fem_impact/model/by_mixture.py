@@ -79,7 +79,7 @@ class Mixed(Description):
         forecast = asked.foretell(
             "mixed", errors={"echoes left out": asked.budget.half}, reasons=(why, kept), mass=seen.mass,
             mobility=seen.mobility, n_modes=number, max_frequency=frequency,
-            notes=plausible.together(target.notes, seen.notes), **chosen,
+            notes=plausible.together(target.assumed, seen.notes), **chosen,
         )  # fmt: skip
         return cls(asked, forecast, frequency, highest)
 
@@ -98,7 +98,7 @@ class Mixed(Description):
                 seen = vectors.Seen(
                     target, at, resolved, asked.budget.total, elements, target.size_stated, stages, shift, count
                 )
-            seen.modes(lambda found, _: float(found.frequencies[-1]))
+            seen.needed_modes(lambda found, _: float(found.frequencies[-1]))
             assert seen.whole is not None
             modes = seen.whole
         body = mixed.mixed(modes, at, told.mobility, frequency, self.highest)

@@ -20,7 +20,7 @@ from ..impact.engine import again
 from ..impact.history import History
 from ..impact.response import Response
 from ..modes.modal import Modes
-from .bending import Bending, Known, bending, known
+from .bending import Bending, Known, bending, known_of
 
 
 @dataclass(frozen=True, eq=False)
@@ -131,7 +131,7 @@ class Struck:
         modes = self.hit.target
         body, integrals = self.target, self.bending
         if modes is not self.hit.bodies[-1]:
-            body = known(modes)
+            body = known_of(modes)
             integrals = None if body is None else bending(body)
         energy = self.hit.modal_energy([self.end])[0]
         band = self.hit.quantities["sound"] or np.inf

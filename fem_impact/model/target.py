@@ -166,7 +166,7 @@ class Target:
         return self.mesh is not None and self.mesh.size_stated
 
     @property
-    def notes(self) -> tuple[str, ...]:
+    def assumed(self) -> tuple[str, ...]:
         """What the mesh assumed, and numbers of the body that are probably a slip of a unit."""
         if self.mesh is None or self.section is None:
             return () if self.modes is None else self.modes.notes

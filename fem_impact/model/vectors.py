@@ -185,7 +185,7 @@ class Seen:
         """Whether the point struck lies on a support, where no vector can start."""
         return bool((self.fine.compliance.diagonal() <= point_load.RESTS).any())
 
-    def modes(self, cutoff: Callable[[Modes, float], float]) -> Modes:
+    def needed_modes(self, cutoff: Callable[[Modes, float], float]) -> Modes:
         """The target as struck; Ritz pairs above ``cutoff`` [Hz], of them and a safety factor, act as a spring."""
         self.whole, kept = self._struck(self.fine, self.coarse, cutoff)
         return kept

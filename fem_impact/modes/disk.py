@@ -245,7 +245,7 @@ def disk(
     scale = np.concatenate([[1.0, 2.0, 2.0][:n_rigid], _norm(*(x[n_rigid:] for x in (wavenumber, order, weights)))])
     shapes = DiskShapes(radius, edge, ratio, wavenumber, order, weights, phases, scale)
     notes = plausible.doubted_sizes((2.0 * radius, 2.0 * radius), section)
-    return asked.modes(shapes, (wavenumber**2 * root_area) ** 2, notes)
+    return asked.answered(shapes, (wavenumber**2 * root_area) ** 2, notes)
 
 
 def _norm(z: np.ndarray, n: np.ndarray, weight: np.ndarray) -> np.ndarray:

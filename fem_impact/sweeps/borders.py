@@ -26,7 +26,7 @@ MEANINGS = {
     "error": "largest error of a point along the axis on which it was located, as a share of that axis",
 }
 
-Solve = Callable[[Cases, str], tuple[np.ndarray, dict[int, str]]]  # cases, the name of the round: as `cases.solve`
+Solve = Callable[[Cases, str], tuple[np.ndarray, dict[int, str]]]  # cases, the name of the round: as `solve_cases`
 
 
 @dataclass(frozen=True, eq=False)

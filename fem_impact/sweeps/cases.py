@@ -87,7 +87,7 @@ class Cases:
         return [name for name in LAYERS if name != "centroid" or self.band is not None] + list(self.extra)
 
     @property
-    def places(self) -> np.ndarray:
+    def strike_points(self) -> np.ndarray:
         """The strike points that occur, (n_points, dimension) [m]."""
         return np.unique(self.axes["at"], axis=0) if "at" in self.axes else self.base.at[None]
 
@@ -158,7 +158,7 @@ class Cases:
         """The same cases with each body reduced to its contact points: small enough to send to a cluster."""
         if self.base.modes.stretches:
             return replace(self, kernels={})  # slopes are not known from points
-        return replace(self, base=self.base.sampled(self.places), kernels={})
+        return replace(self, base=self.base.sampled(self.strike_points), kernels={})
 
     def without_speed(self) -> "Cases | None":
         """The cases at one speed if every contact is linear, so that speed only scales the forces; otherwise None."""
@@ -300,26 +300,26 @@ def batchable(column: Mapping[str, np.ndarray]) -> np.ndarray:
 def solve_all(
     cases: Cases, workers: int | None = None, client: Any = None, store: Any = None, watch: Watch | None = None
 ) -> tuple[np.ndarray, Texts]:
-    """Compute all cases, block by block, on a cluster or in threads of this process; as `solve`."""
+    """Compute all cases, block by block, on a cluster or in threads of this process; as `solve_cases`."""
     LOG.info("%d blows at the tolerance %g", cases.n_cases, cases.tolerance)
     if client is not None:
-        return by_cluster(cases, client, store, partial(solve, workers=1), watch)
+        return by_cluster(cases, client, store, partial(solve_cases, workers=1), watch)
     if store is not None:
-        return by_store(cases, store, partial(solve, workers=workers), watch)
+        return by_store(cases, store, partial(solve_cases, workers=workers), watch)
     numbers = np.empty((len(cases.layers), cases.n_cases))
     texts: Texts = {}
     often = cases.lossy or cases.extra  # slow ones are told more often
     size = max(batches.FEW, block_size(cases.n_cases)) if often else LARGEST_BLOCK
     for start in range(0, cases.n_cases, size):
         stop = min(start + size, cases.n_cases)
-        numbers[:, start:stop], new = solve(cases, start, stop, workers=workers)
+        numbers[:, start:stop], new = solve_cases(cases, start, stop, workers=workers)
         texts |= new
         if watch is not None:
             watch(stop, cases.n_cases)
     return numbers, texts
 
 
-def solve(cases: Cases, start: int, stop: int, *, workers: int | None = None) -> tuple[np.ndarray, Texts]:
+def solve_cases(cases: Cases, start: int, stop: int, *, workers: int | None = None) -> tuple[np.ndarray, Texts]:
     """Compute the cases from ``start`` up to ``stop``.
 
     Returns

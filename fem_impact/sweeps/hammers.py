@@ -19,7 +19,7 @@ from ..impact.striker import Striker
 from ..model.target import Stages, Target
 from ..modes.modal import Damping, Modes
 from . import bodies
-from .cases import Cases, solve
+from .cases import Cases, solve_cases
 from .cells import Case
 
 # [-] error limit of the blows that are looked at first: only to find where ranges end, which DECIDED then tells
@@ -262,7 +262,7 @@ def _hammer(
     tips = _series(low, high, PER_DECADE[0])
     case = Case(alone, striker, Contact.linear(1.0), modes.point("at", at)[0], 1.0)  # `once` looks at the others
     series = Cases(case, {"stiffness": tips}, TOLERANCE, max_impacts=2)
-    counts = solve(series, 0, len(tips))[0][series.layers.index("n_impacts")]
+    counts = solve_cases(series, 0, len(tips))[0][series.layers.index("n_impacts")]
     single = _ranges(tips, counts == 1, once)
     working: Ranges = ()
     for ends in single:

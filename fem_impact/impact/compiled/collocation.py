@@ -23,7 +23,7 @@ from .rounding import NEAR, OVERFLOW, SOLVED, STALLED
 from .schemes import solve_linear
 
 from .frame import (  # isort: skip
-    LEVELS, LOST, NOTHING, TAKEN, TRY, at_rest, begin, course_of, fly, followed, locate, made_run, moving, over,
+    LEVELS, LOST, NOTHING, TAKEN, TRY, at_rest, begin, course_of, fly, followed, locate_event, made_run, moving, over,
     remember, remembered, step_length, take_over, touching,
 )  # fmt: skip
 from .layout import (  # isort: skip
@@ -447,7 +447,7 @@ def judged(contacts, course, grid, room, misfit, h, special, limits):
             room.nodes[GUESS] = 0.0
         if look != WELL:
             return False, 0.0
-    answer, guess = locate(contacts, course, limits, h, special, FALSE)
+    answer, guess = locate_event(contacts, course, limits, h, special, FALSE)
     if answer == TRY and count[TRIES] == 0 and coarse and 0.25 * h < guess < 0.9 * h:
         count[SEEKS] = NOTHING
         count[LEVEL] += 1

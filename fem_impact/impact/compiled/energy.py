@@ -21,8 +21,8 @@ from .rounding import OVERFLOW
 from .stretched import Stretch, attempt, finish, flown, made_room, stretching_energy, unseen
 
 from .frame import (  # isort: skip
-    LEVELS, LOST, NOTHING, TAKEN, at_rest, begin, course_of, fly, followed, locate, made_run, moving, over, remembered,
-    step_length, take_over, touching,
+    LEVELS, LOST, NOTHING, TAKEN, at_rest, begin, course_of, fly, followed, locate_event, made_run, moving, over,
+    remembered, step_length, take_over, touching,
 )  # fmt: skip
 from .layout import (  # isort: skip
     APPROACH, BEGUN, BLINDS, CORNERED, EVENTS, FAINT, FALLBACKS, FRESH, HEAD, LEAST, LEVEL, PAUSE, RATE, READY,
@@ -68,7 +68,7 @@ def located(contacts, course, limits, h, base, cornered, blind):
         course.counts[TARGET] = -1
         course.counts[CORNERED] = -1
         return True, True, 0.0
-    answer, guess = locate(contacts, course, limits, h, cornered, TRUE)
+    answer, guess = locate_event(contacts, course, limits, h, cornered, TRUE)
     blind = answer == LOST and h >= 1e-3 * base
     if blind:
         course.counts[TARGET] = -1

@@ -179,7 +179,7 @@ def step_length(course, base, horizon):
 
 
 @inner(part=True)
-def locate(contacts, course, limits, h, cornered, lossy):
+def locate_event(contacts, course, limits, h, cornered, lossy):
     """After a try of length h: what to do next, and the length of the next try where the end of the step is sought.
 
     The first crossing is sought first, then the first corner before it, if some force has any (``cornered``).

@@ -345,7 +345,7 @@ def tidied(body, pads, state):
 
 
 @outer()
-def play(body, pads, limits, state, strokes, gain, out):
+def play_block(body, pads, limits, state, strokes, gain, out):
     """Fill a block of sound (n_frames,), and leave the state at its end; ``gain`` multiplies what is heard."""
     event = 0
     for k in range(out.size):

@@ -448,7 +448,7 @@ def press(blow, track, n, free):
 
 
 @inner()
-def follow(kernels, blow, track):
+def follow_blow(kernels, blow, track):
     """Follow one blow step by step; how it ended, and after how many steps."""
     counts = track.counts
     level = -1  # of the look ahead in flight, not yet chosen
@@ -530,7 +530,7 @@ def run(cells, pairs, kernels, h, certify, band, track, out_found):
         begin(track)
         extend(kernels, (pairs.shares[0, cell], pairs.shares[1, cell]), track, ZERO + 2)
         blow = blow_of(pairs, cell, h, certify, track.rows)
-        status, n = follow(kernels, blow, track)
+        status, n = follow_blow(kernels, blow, track)
         write(blow, track, status, n, cell, out_found)
         if band > 0.0 and status in (DONE, DOUBTFUL):
             out_found[FOUND_CENTROID, cell] = centroid(
