@@ -11,7 +11,8 @@ from . import stepping
 from .collision import Touch, touching
 from .compiled import live
 from .compiled.law import LAW
-from .compiled.propagation import N_LANE, N_TABLE, step_table
+from .compiled.layout import N_LANE
+from .compiled.propagation import N_TABLE, step_table
 from .contact import Contact
 from .striker import Striker
 

@@ -31,11 +31,11 @@ from .layout import (  # isort: skip
     LENGTH, LEVEL, PUSH, RATE, SEEKS, START, STEPS, TARGET, TIME, TRIES,
 )  # fmt: skip
 
-MOBILITY, BEYOND = 0, 1  # rows of `CollocationRoom.contacts`
+MOBILITY, BEYOND = range(2)  # rows of `CollocationRoom.contacts`
 GUESS, FORCES, SQUEEZE = range(3)  # and of `CollocationRoom.nodes`
 BEGINS, ENDS, MOMENTS = range(3)  # and of `NodeGrid.work`
 PUSHED = 4  # row after those of free motion: displacement by a constant force
-MOVED, SPED = 0, 1  # rows of what force polynomials do: to the approach and to its rate
+MOVED, SPED = range(2)  # rows of what force polynomials do: to the approach and to its rate
 WELL, TURNED, LONG = range(3)  # how a step looks: take it so, take it again otherwise pressed, take a shorter one
 
 

@@ -13,8 +13,8 @@ from . import arrays
 from .build import LOOSE, inner
 from .bundles import Flights
 from .events import lowest
-from .layout import FASTEST, HARDEST, REACH, RIGID, RIGID_ACCELERATION, RIGID_RATE
-from .propagation import N_LANE, any_of, glide, lane_table, restore
+from .layout import FASTEST, HARDEST, N_LANE, REACH, RIGID, RIGID_ACCELERATION, RIGID_RATE
+from .propagation import any_of, glide, lane_table, restore
 from .rounding import REPEATED
 
 PATIENT = 4  # [-] looks of a flight that make do with the table of a step up to four times shorter than allowed

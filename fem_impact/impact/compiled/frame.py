@@ -30,7 +30,7 @@ from .layout import (  # isort: skip
 
 LEVELS = 40  # [-] halvings of the step that may be cached, and where the table of a step of any other length is kept
 FIRST_ROWS = 256  # [-] of a record that grows as needed, which does not change the result; few runs have more
-NOTHING, CROSSING, CORNER = 0, 1, 2  # what a step is to end at: a contact that opens or closes, a corner of its force
+NOTHING, CROSSING, CORNER = range(3)  # what a step is to end at: a contact that opens or closes, a corner of its force
 TAKEN, TRY, AFRESH, LOST = range(4)  # a try is good; another length is sought; start again; there was nothing to find
 
 

@@ -31,7 +31,7 @@ from .layout import (  # isort: skip
     N_CONTACTS, N_SEGMENTS, NEEDED, PEAK, PRESSED, RATE, RATE_AHEAD, SLOPED, SWING, TOUCHED,
 )  # fmt: skip
 
-DONE, DOUBTFUL, AWKWARD, LONG = 0, 1, 2, 3  # how a blow ended: proved apart; with something that the steps may have
+DONE, DOUBTFUL, AWKWARD, LONG = range(4)  # how a blow ended: proved apart; with something that the steps may have
 # missed; in a way not followed here; longer than the kernel
 NEARER, UNPROVED, APART, TOUCH = range(4)  # what a look ahead in flight found: a shorter one is needed, or kernels of
 # parts of a step; no touch; a touch
