@@ -49,7 +49,9 @@ class Mixed(Description):
             asked.refuse(why)
             return None
         allowed, slow = asked.budget.left_out, asked.mass * seen.mobility
-        highest = accuracy.infinite_cutoff(seen.mobility, mass=asked.mass, tolerance=allowed, **asked.law)
+        resonance = accuracy.contact_resonance(mass=asked.mass, **asked.law)  # [Hz]; of an infinite plate's modes:
+        density, omega_0 = 2.0 * seen.mobility / np.pi, 2.0 * np.pi * resonance
+        highest = accuracy.cutoff(density, 0.0, omega_0, blow.contact.exponent, asked.mass, allowed)
         if not named and mixed.LASTING * slow > 1e4 * asked.duration:  # too many steps, some 24 for each contact time
             return None
         few = 0.5 * np.pi * slow < asked.duration or target.count_below(highest / target.stretch) < MANY_MODES

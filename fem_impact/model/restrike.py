@@ -45,11 +45,6 @@ class Struck:
         """Integrals of the target's shapes; None if they are not known or the target was simplified."""
         return None if self.target is None or self.ideal else bending(self.target)
 
-    @cached_property
-    def striker_bending(self) -> Bending | None:
-        """Integrals of the striker's shapes, if it is a flexible body that is known."""
-        return None if self.striker is None else bending(self.striker)
-
     @property
     def quantities(self) -> tuple[str, ...]:
         """The quantities asked for."""

@@ -291,18 +291,9 @@ class Target:
     ) -> Modes:
         """Modes before `finished`: the first ``n_modes``, or those up to a frequency [Hz] if it is given.
 
-        Parameters
-        ----------
-        tolerance : float [-]
-            Largest error of the first modes' frequencies.
-        size : float [m], optional
-            Element size that replaces the mesh's own.
-        first : Modes, optional
-            Modes found before; their mesh is refined if it cannot resolve the frequency.
-        stages : Stages, optional
-            Measures meshing and assembly.
-        keep : path of an .npz file, optional
-            As in `find_modes`.
+        ``tolerance`` [-] is the largest error of the first modes' frequencies; an element ``size`` [m] replaces the
+        mesh's own. The mesh of modes found ``first`` is refined if it cannot resolve the frequency. ``stages`` measure
+        meshing and assembly; ``keep`` as in `find_modes`.
         """
         reach: dict[str, Any] = {"n_modes": n_modes} if max_frequency is None else {"max_frequency": max_frequency}
         if self.modes is not None:

@@ -149,7 +149,10 @@ def in_air(
         found.damping(own, omega), sparse.damping(own, omega), other.damping(mixed, lower), missed[modes.n_rigid :]
     )
     better = 1.0 - shift / GAIN  # the error of square cells shrinks with their area
-    mix = _complete(own, modes.omega[modes.n_rigid :], omega) * better
+    # the nearest mixtures (n, n) that together give the static deflections of the old modes
+    stiff = modes.omega[modes.n_rigid :, None] / omega
+    turned, _, back = np.linalg.svd(own * stiff, full_matrices=False)
+    mix = (turned @ back) / modes.omega[modes.n_rigid :, None] * omega * better
     omega *= better
     # the two grids agree by chance where the shift changes its sign, so that no mode is surer than those below it
     heavier = modes.omega[modes.n_rigid :] / omega - 1.0
@@ -246,12 +249,8 @@ class _Air:
         nearest = mean_inverse_distance(*(n // 2 + 1 for n in self.padded))
         self.inverse = nearest[steps[0], steps[1]] / size  # (padded) [1/m] mean of 1 / R between two cells
 
-    def added_mass(self, modes: slice, omega: float) -> np.ndarray:
-        """Mass [-] that air adds between some modes at a frequency [rad/s]."""
-        return self._added(self.strength[modes], rfft2(self.strength[modes], self.padded), omega)
-
     def _added(self, strength: np.ndarray, spectrum: np.ndarray, omega: float) -> np.ndarray:
-        """The same between sources (n, nx, ny) with a known spectrum."""
+        """Mass [-] that air adds between sources (n, nx, ny) with a known spectrum, at a frequency [rad/s]."""
         matrix = self._product(strength, spectrum, self._pressing(omega))
         return 0.5 * self.weight * (matrix + matrix.T)
 
@@ -331,12 +330,6 @@ class _Air:
                     break
             own = vector[:, 0]
             vectors[window, i] = own if own[np.abs(own).argmax()] > 0.0 else -own
-
-
-def _complete(vectors: np.ndarray, old: np.ndarray, omega: np.ndarray) -> np.ndarray:
-    """The nearest mixtures (n, n) that together give the static deflections of the old modes."""
-    turned, _, back = np.linalg.svd(vectors * (old[:, None] / omega), full_matrices=False)
-    return (turned @ back) / old[:, None] * omega
 
 
 def _sampled(shapes: Shapes, spacing: float) -> tuple[np.ndarray, np.ndarray]:

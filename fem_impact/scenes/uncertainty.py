@@ -23,16 +23,15 @@ from ..modes.modal import Damping, Modes
 from ..show import export, figures
 from ..sweeps import bodies, grid
 from ..sweeps.cases import Cases, few, solve_all, try_each
-from ..sweeps.cells import ALIASES, AXES, LAW, REACH, Case
-from ..sweeps.inputs import Input, crossed, drawn, mixing, read, shares
+from ..sweeps.cells import ALIASES, AXES, LAW, Case
+from ..sweeps.inputs import REACH, Input, crossed, drawn, mixing, read, shares
 from ..sweeps.spreads import DOUBLE, QUANTITIES, Checks, Spread
 from ..sweeps.store import Texts
+from .known import ENDS
 from .maps import MOST_ROWS, changed_scene
 from .scene import Scene, load_scene
 
 CHECKED = 16  # [-] blows struck again one by one, as a sample: their worst shows an error that many have
-# [-] levels of an input of the body at which the body is made anew: nine tenths of its values lie between
-TAILS = (0.05, 0.95)
 # [-] default limit of a spread, to limit the work to some minutes and 1 GB of numbers
 MOST_BLOWS = 10**7
 PLACES = ("strike.x", "strike.y")  # inputs that move the strike point
@@ -222,7 +221,7 @@ class _SpreadAsked:
             if axis in self.own:
                 raise ValueError(f"vary names {axis} twice")
             self.own[axis] = column
-        elif self.scene is not None and self._numeric(name):
+        elif self._numeric(name):
             self.parts[name] = column
         else:
             known = [*ALIASES, *AXES, *PLACES[:dimension], *BODY.get(dimension, {})]
@@ -360,7 +359,7 @@ class _SpreadAsked:
             if each.name not in self.body or each.name == SIZE:
                 continue
             found[each.name] = 0.0
-            for ratio in (each.at(np.array(TAILS)) / self._of_body(each.name)).tolist():
+            for ratio in (each.at(np.array(ENDS)) / self._of_body(each.name)).tolist():
                 mass, frequency = self._factors({each.name: ratio})
                 changes = {
                     "target_mass": base.modes.mass * mass, "target_frequency": base.first_frequency * frequency,
@@ -438,12 +437,7 @@ def _checked(exact: Cases, numbers: np.ndarray, workers: int | None) -> Checks:
 
 
 def _table(
-    inputs: Sequence[Input],
-    values: np.ndarray,
-    cases: Cases,
-    numbers: np.ndarray,
-    texts: Texts,
-    n_parts: int,
+    inputs: Sequence[Input], values: np.ndarray, cases: Cases, numbers: np.ndarray, texts: Texts, n_parts: int
 ) -> xarray.Dataset:
     """All blows as a Dataset along one dimension."""
     data: dict[str, Any] = {}

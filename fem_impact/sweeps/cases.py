@@ -13,10 +13,8 @@ import numpy as np
 
 from .._base.check import SimulationError
 from .._base.rounding import ROUNDING
-from ..impact.collision import strike
 from ..impact.distance import distance
 from ..impact.response import Response
-from ..model.audit import audited
 from ..modes.modal import Modes
 from . import batches
 from .cells import ALONE, FAMILY_AXES, LOSSY, Case
@@ -86,11 +84,6 @@ class Cases:
         """Names of the numbers computed of each case."""
         return [name for name in LAYERS if name != "centroid" or self.band is not None] + list(self.extra)
 
-    @property
-    def strike_points(self) -> np.ndarray:
-        """The strike points that occur, (n_points, dimension) [m]."""
-        return np.unique(self.axes["at"], axis=0) if "at" in self.axes else self.base.at[None]
-
     def cells(self, start: int, stop: int) -> np.ndarray:
         """Numbers of some of the cases to compute, (n_cells,)."""
         return np.arange(start, stop) if self.chosen is None else self.chosen[start:stop]
@@ -111,11 +104,7 @@ class Cases:
 
     def strike(self, case: Case) -> Response:
         """A blow by the modal engine, to the tolerance of the table."""
-        hit = strike(
-            case.modes, case.striker, case.contact, at=case.at, speed=case.speed,
-            tolerance=self.tolerance, residual=self.residual, max_impacts=self.max_impacts,
-        )  # fmt: skip
-        return audited(hit)
+        return case.blow(tolerance=self.tolerance, residual=self.residual, max_impacts=self.max_impacts)
 
     def row(self, hit: Response) -> np.ndarray:
         """The layers (n_layers,) of one blow."""
@@ -158,7 +147,8 @@ class Cases:
         """The same cases with each body reduced to its contact points: small enough to send to a cluster."""
         if self.base.modes.stretches:
             return replace(self, kernels={})  # slopes are not known from points
-        return replace(self, base=self.base.sampled(self.strike_points), kernels={})
+        places = np.unique(self.axes["at"], axis=0) if "at" in self.axes else self.base.at[None]
+        return replace(self, base=self.base.sampled(places), kernels={})
 
     def without_speed(self) -> "Cases | None":
         """The cases at one speed if every contact is linear, so that speed only scales the forces; otherwise None."""
@@ -234,13 +224,10 @@ def _plain(modes: Modes, at: np.ndarray) -> dict[str, Any]:
     """A body and its contact point as plain numbers."""
     place = at[None]
     return {
-        "mass": modes.mass,
-        "frequencies": modes.frequencies.tolist(),
-        "damping_ratios": modes.damping_ratio.tolist(),
-        "at": at.tolist(),
-        "shape": modes.shape_at(place)[0].tolist(),
+        "mass": modes.mass, "frequencies": modes.frequencies.tolist(), "damping_ratios": modes.damping_ratio.tolist(),
+        "at": at.tolist(), "shape": modes.shape_at(place)[0].tolist(),
         "residual_compliance": float(modes.residual_compliance(place)[0, 0]),
-    }
+    }  # fmt: skip
 
 
 def _ranks(column: np.ndarray) -> np.ndarray:

@@ -106,13 +106,6 @@ def bandwidth_of(hit: Response, drop: float) -> float:
     return float(frequencies[first - 1] + share * (frequencies[first] - frequencies[first - 1]))
 
 
-def _reaches(hit: Response, bandwidth: float, drop: float) -> bool:
-    """Whether the force spectrum stays within ``drop`` [dB] of its value at 0 Hz up to a bandwidth [Hz]."""
-    looks = int(np.clip(LOOKS / 4.0 * bandwidth * hit.contact_time, 16, LOOKS))
-    size = np.abs(hit.spectrum(np.linspace(0.0, bandwidth, looks)))
-    return bool(size.min() >= size[0] * 10.0 ** (-drop / 20.0))
-
-
 @check.typed
 def highest_frequency(modes: Modes, at: Any, bandwidth: float, masses: Any, *, drop: float = 10.0) -> float:
     """Frequency [Hz] up to which modes are needed to choose a hammer, estimated from the first few modes."""
@@ -217,13 +210,7 @@ def _body(target: Target, at: Any, masses: np.ndarray, centre: float, stages: St
 
 
 def _hammer(
-    modes: Modes,
-    at: Any,
-    mass: float,
-    bandwidth: float,
-    drop: float,
-    tuned: tuple[float, float],
-    limit: float | None,
+    modes: Modes, at: Any, mass: float, bandwidth: float, drop: float, tuned: tuple[float, float], limit: float | None
 ) -> Hammer:
     """What one hammer can do.
 
@@ -248,7 +235,11 @@ def _hammer(
         return error.truncation < 1.0 and error.mesh < 1.0
 
     def reaches(tip: float, tolerance: float = DECIDED) -> bool:
-        return _reaches(hit(tip, tolerance), bandwidth, drop)
+        """Whether the force spectrum stays within ``drop`` of its value at 0 Hz up to the bandwidth."""
+        found = hit(tip, tolerance)
+        looks = int(np.clip(LOOKS / 4.0 * bandwidth * found.contact_time, 16, LOOKS))
+        size = np.abs(found.spectrum(np.linspace(0.0, bandwidth, looks)))
+        return bool(size.min() >= size[0] * 10.0 ** (-drop / 20.0))
 
     low = SOFTEST * mass * (2.0 * np.pi * min(tuned)) ** 2
     if limit is not None:
@@ -282,10 +273,8 @@ def _last_resolved(modes: Modes, at: Any, mass: float) -> float:
         return needed - float(modes.frequencies[-1])
 
     def resolved(tip: float) -> bool:
-        law = Contact.linear(tip)
-        return strike(
-            modes, Striker.rigid(mass), law, at=at, speed=1.0, tolerance=TOLERANCE, max_impacts=1
-        ).error.resolvable
+        how: dict[str, Any] = {"at": at, "speed": 1.0, "tolerance": TOLERANCE, "max_impacts": 1}
+        return strike(modes, Striker.rigid(mass), Contact.linear(tip), **how).error.resolvable
 
     centre = np.log(mass * float(modes.omega[-1]) ** 2)
     first = float(np.exp(brentq(complete, centre - 40.0, centre + 40.0)))

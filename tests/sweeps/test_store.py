@@ -85,7 +85,7 @@ def test_error_texts_are_kept(tmp_path, monkeypatch):
     def fail(*_, **wanted):
         raise fi.SimulationError("the motion may be chaotic: é")
 
-    monkeypatch.setattr(cases, "strike", fail)
+    monkeypatch.setattr(cells, "strike", fail)
     table = sweep(over={"exponent": [0.8, 0.9]}, store=tmp_path / "map")
     assert table.failure.values.tolist() == ["the motion may be chaotic: é"] * 2
 
