@@ -3,11 +3,9 @@
 from collections.abc import Mapping
 from typing import Any
 
-from scipy.special import ndtri
-
 from .._base import check
 
-ENDS = (0.05, 0.95)  # [-] nine tenths of all values lie between them
+NINETY = 1.6448536269514722  # [-] deviations of a normal distribution between which nine tenths lie
 FORMS = ({"value", "about"}, {"value", "low", "high"})
 
 
@@ -34,7 +32,7 @@ def distribution(key: str, interval: Mapping[str, Any]) -> tuple[str, float, flo
             raise ValueError(
                 f"{key}.about must be a share below 1 of a positive value, got {share:g} of {value:g}; give low, high"
             )
-        return "lognormal", value, share / float(ndtri(ENDS[1]))
+        return "lognormal", value, share / NINETY
     low, high = (check.number(f"{key}.{end}", interval[end]) for end in ("low", "high"))
     if not low <= value <= high or low == high:
         raise ValueError(f"{key}.value must lie between low and high, got {value:g}, {low:g} and {high:g}")

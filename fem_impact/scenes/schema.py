@@ -5,7 +5,7 @@ import json
 import math
 import re
 import tomllib
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
 from itertools import islice
@@ -41,6 +41,7 @@ class Part:
 
 
 def _plate(material: Material, *, thickness: Any, tension: float = 0.0) -> Plate:
+    """A plate."""
     return Plate(material, varying("thickness", thickness, 2), tension)
 
 
@@ -56,6 +57,7 @@ def _beam(material: Material, *, width: Any = None, height: Any = None, diameter
 
 
 def _sphere(*, radius: float, E: float, nu: float, rho: float, yield_strength: float | None = None) -> Striker:
+    """A solid ball, which does not vibrate itself."""
     return Striker.sphere(Material(E=E, nu=nu, rho=rho, yield_strength=yield_strength), radius)
 
 
@@ -105,11 +107,14 @@ def target_values(**values: Any) -> dict[str, Any]:
     scale = {key: given.pop(key) for key in ("mass", "first_frequency")}
     given["damping_ratio"] = over_frequency("damping_ratio", given["damping_ratio"])
     for key, read in (("point_masses", _weight), ("point_supports", _post)):
-        if not isinstance(given[key], (list, tuple)):
-            shown = check.shown(given[key])
-            raise ValueError(f"{key} must be a list of tables such as [{{ at = [0.1, 0.2] }}], got {shown}")
-        given[key] = tuple(read(i, entry) for i, entry in enumerate(given[key]))
+        given[key] = tuple(read(i, entry) for i, entry in enumerate(_listed(key, given[key])))
     return given | {"scale": {key: value for key, value in scale.items() if value is not None}}
+
+
+def _listed(name: str, value: Any) -> Sequence[Any]:
+    if not isinstance(value, (list, tuple)):
+        raise ValueError(f"{name} must be a list of tables such as [{{ at = [0.1, 0.2] }}], got {check.shown(value)}")
+    return value
 
 
 def _weight(i: int, entry: Any) -> tuple[Any, float]:
@@ -337,8 +342,11 @@ def _check_keys(selector: str, kind: str, values: dict[str, Any], maker: Callabl
     known = [selector, *arguments] if selector else list(arguments)
     for key in values:
         if key not in arguments:
-            owners = {name: any(key in _arguments(m) for m in makers.values()) for name, (_, makers) in MAKERS.items()}
-            homes = [f"[{name}]" for name, owns in owners.items() if owns]
+            homes = [
+                f"[{name}]"
+                for name, (_, makers) in MAKERS.items()
+                if any(key in _arguments(m) for m in makers.values())
+            ]
             elsewhere = f"; it is one of {' and '.join(homes)}" if homes else f"; it has {', '.join(known)}"
             raise ValueError(f"{key} is not a key of this table{check.nearest(key, known) or elsewhere}")
     for key, argument in arguments.items():

@@ -27,11 +27,12 @@ from ..sweeps.cells import ALIASES, AXES, LAW, Case
 from ..sweeps.inputs import REACH, Input, crossed, drawn, mixing, read, shares
 from ..sweeps.spreads import DOUBLE, QUANTITIES, Checks, Spread
 from ..sweeps.store import Texts
-from .known import ENDS
 from .maps import MOST_ROWS, changed_scene
 from .scene import Scene, load_scene
 
 CHECKED = 16  # [-] blows struck again one by one, as a sample: their worst shows an error that many have
+# [-] levels of an input of the body at which the body is made anew: nine tenths of its values lie between
+TAILS = (0.05, 0.95)
 # [-] default limit of a spread, to limit the work to some minutes and 1 GB of numbers
 MOST_BLOWS = 10**7
 PLACES = ("strike.x", "strike.y")  # inputs that move the strike point
@@ -359,7 +360,7 @@ class _SpreadAsked:
             if each.name not in self.body or each.name == SIZE:
                 continue
             found[each.name] = 0.0
-            for ratio in (each.at(np.array(ENDS)) / self._of_body(each.name)).tolist():
+            for ratio in (each.at(np.array(TAILS)) / self._of_body(each.name)).tolist():
                 mass, frequency = self._factors({each.name: ratio})
                 changes = {
                     "target_mass": base.modes.mass * mass, "target_frequency": base.first_frequency * frequency,
