@@ -70,8 +70,7 @@ def map_scene(
     if not isinstance(over, Mapping) or not all(isinstance(name, str) for name in over):
         raise ValueError(f"over must map the names of axes to their values, got {check.shown(over)}")
     band = table.get("max_frequency") if max_frequency is None else max_frequency
-    limit = scene.blow.values.get("tolerance", grid.TOLERANCE) if tolerance is None else tolerance
-    limit = check.tolerance(limit)
+    limit = check.tolerance(scene.blow.values.get("tolerance", grid.TOLERANCE) if tolerance is None else tolerance)
     if not over:
         raise ValueError(
             f'{scene.path}: [map] is missing; add it and name the axes, as in over = {{ "striker.mass" = [0.01, 0.1] }}'
