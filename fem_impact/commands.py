@@ -65,6 +65,7 @@ def strike(options: argparse.Namespace) -> Answer:
     """Strike and write."""
     from .impact import promise  # imported only when needed
     from .model.target import Stages
+    from .scenes import band
     from .show.painter import Painter
 
     began = time.perf_counter()
@@ -72,8 +73,6 @@ def strike(options: argparse.Namespace) -> Answer:
     if options.listener is not None:
         scene = scene.heard_from(*options.listener)
     if options.band:
-        from .scenes import band
-
         band.check_known(scene)
     if scene.stroke:
         return _strike_in_turn(options, scene)
@@ -89,10 +88,12 @@ def strike(options: argparse.Namespace) -> Answer:
         stages = Stages(display)
         data = _write(staging, scene, run, options, stages, painter)
     keep.unlink(missing_ok=True)
-    found = _band(scene, run.response, display) if options.band else None
+    if options.band:
+        with display("blows"):
+            found = band.around(scene, run.response, watch=partial(display.report, "blows"))
     seconds = {**run.seconds, **stages.seconds, "total": time.perf_counter() - began}
-    said = [_title(scene), run.response.summary()]
-    if found is not None:
+    said: list[str | Sequence[str]] = [_title(scene), run.response.summary()]
+    if options.band:
         data |= {"band": found.data()}
         said.append(found.summary().splitlines())
     if not run.rings:
@@ -106,14 +107,6 @@ def strike(options: argparse.Namespace) -> Answer:
     said += heard(data.get("sounds", ()))
     said.append("Time: " + ", ".join(f"{name} {value:.2f} s" for name, value in seconds.items()))
     return answer(data, *said, folder=folder, files=data["files"], missed=not run.response.tolerance_met)
-
-
-def _band(scene: Any, response: Any, display: Display) -> Any:
-    """What the inputs leave open."""
-    from .scenes import band  # imported only when needed
-
-    with display("blows"):
-        return band.around(scene, response, watch=partial(display.report, "blows"))
 
 
 def _announce(options: argparse.Namespace, display: Display, verify: bool, files: bool, plan: Any) -> None:
@@ -149,9 +142,8 @@ def _write(
         if options.vtk:
             end = sampling.end_of(response)
             with stages("motion"):  # 100 instants are four seconds at 25 per second
-                fi.export.write_vtk(
-                    folder / "motion.pvd", response.target, response, [end * i / 99 for i in range(100)]
-                )
+                times = [end * i / 99 for i in range(100)]
+                fi.export.write_vtk(folder / "motion.pvd", response.target, response, times)
             files.append("motion.pvd")
         if drawn:
             with stages("pictures"):

@@ -159,7 +159,7 @@ class Display:
                 self._arm()
             with heard(self.report, self.foresee):
                 if self.bar is None and self.shown and self.console.is_terminal:
-                    with undoable(_show_cursor), self._opened():
+                    with undoable(lambda: os.write(2, b"\r\x1b[2K\x1b[?25h")), self._opened():
                         yield
                 else:
                     self._draw()
@@ -241,8 +241,3 @@ def _clock(seconds: float) -> str:
     """Minutes and seconds."""
     minutes, rest = divmod(round(seconds), 60)
     return f"{minutes // 60}:{minutes % 60:02}:{rest:02}" if minutes >= 60 else f"{minutes}:{rest:02}"
-
-
-def _show_cursor() -> None:
-    """Clear the progress line and show the cursor again."""
-    os.write(2, b"\r\x1b[2K\x1b[?25h")

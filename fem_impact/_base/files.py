@@ -218,7 +218,10 @@ def _move(staging: Path, folder: Path, stale: list[Path]) -> None:
             (old / name).parent.mkdir(parents=True, exist_ok=True)
             (folder / name).parent.mkdir(parents=True, exist_ok=True)
             if (folder / name).exists():
-                _copy(folder / name, old / name)
+                try:
+                    os.link(folder / name, old / name)
+                except OSError:  # files can have only one name there
+                    shutil.copy2(folder / name, old / name)
             moved.append(name)
             if name in files:
                 os.replace(staging / name, folder / name)
@@ -237,11 +240,3 @@ def _move(staging: Path, folder: Path, stale: list[Path]) -> None:
     for name in stale:
         with suppress(OSError):  # it holds something else
             (folder / name).parent.rmdir()
-
-
-def _copy(path: Path, copy: Path) -> None:
-    """A second name of a file, or a copy where files can have only one."""
-    try:
-        os.link(path, copy)
-    except OSError:
-        shutil.copy2(path, copy)

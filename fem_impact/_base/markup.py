@@ -44,7 +44,7 @@ def columns(rows: Iterable[Sequence[Any]], head: Sequence[str] = ()) -> list[str
     ]
 
 
-def notes(lines: Iterable[str]) -> str:
+def note_list(lines: Iterable[str]) -> str:
     """Notes, each a paragraph; all text is escaped."""
     return "".join(f"<p>{html.escape(line)}</p>" for line in noted(lines))
 

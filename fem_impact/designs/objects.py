@@ -175,13 +175,15 @@ def _differ(one: Piece, two: Piece) -> bool:
 def _check_alike(name: str, now: Piece, side: Piece) -> None:
     """Raise SimulationError if a number changes what no derivative follows."""
     one, two = now.target, side.target
-    meshes = [each.mesh for each in (one, two)]
-    if (meshes[0] is None) != (meshes[1] is None) or (
-        meshes[0] is not None and meshes[1] is not None and not _same_mesh(meshes[0], meshes[1])
-    ):
+    if one.mesh is None or two.mesh is None:
+        same = one.mesh is two.mesh
+    else:
+        a, b = one.mesh.points, two.mesh.points
+        same = a.shape == b.shape and bool(np.allclose(a, b, rtol=0.0, atol=1e-12 * np.ptp(a)))
+    if not same:
         raise SimulationError(f"no derivative in {name}: it changes the mesh; free numbers of the section instead")
     for what in ("supports", "point_masses", "point_supports", "theory", "air", "source"):
-        if not _equal(getattr(one, what), getattr(two, what)):
+        if repr(getattr(one, what)) != repr(getattr(two, what)):
             raise SimulationError(
                 f"no derivative in {name}: it changes the {what.replace('_', ' ')} of the body; keep them"
             )
@@ -194,17 +196,6 @@ def _check_alike(name: str, now: Piece, side: Piece) -> None:
         for each in fields(now.contact):
             if each.name not in CONTACT and getattr(now.contact, each.name) != getattr(side.contact, each.name):
                 raise SimulationError(f"no derivative in {name}: it changes the contact's {each.name}; keep that")
-
-
-def _same_mesh(one: Mesh, two: Mesh) -> bool:
-    return one is two or (
-        one.points.shape == two.points.shape
-        and bool(np.allclose(one.points, two.points, rtol=0.0, atol=1e-12 * np.ptp(one.points)))
-    )
-
-
-def _equal(one: Any, two: Any) -> bool:
-    return one is two or repr(one) == repr(two)
 
 
 def _check_scaled(name: str, body: str, one: Modes, two: Modes) -> None:

@@ -285,7 +285,9 @@ class _Search:
                 raise ValueError("wanted: a quantity of a blow needs striker, contact, at and speed; objects has none")
             if struck or name == next(iter(pieces)):
                 count = max(self._count(name, piece) if struck else 0, highest + target.RIGID_MOTIONS if highest else 0)
-                modes[name] = self._body(piece, count)
+                if piece.key is None or (piece.key, count) not in self.bodies:
+                    self.bodies[piece.key, count] = _modes_of(piece, count, target.CLOSE)
+                modes[name] = self.bodies[piece.key, count]
             if struck:
                 once = any(goal.name == "clearance" for goal in self.goals if goal.blow == name)
                 hits[name] = piece.strike(modes[name], 1e-5, once)  # a tolerance small beside what is wanted
@@ -302,15 +304,6 @@ class _Search:
         if name not in self.counts:
             self.counts[name] = piece.blow.plan(target="modal").n_modes
         return self.counts[name]
-
-    def _body(self, piece: Piece, count: int) -> Modes:
-        key = (piece.key, count)
-        if piece.key is None or key not in self.bodies:
-            modes = _modes_of(piece, count, target.CLOSE)
-            if piece.key is None:
-                return modes
-            self.bodies[key] = modes
-        return self.bodies[key]
 
     def slope(self, x: np.ndarray) -> np.ndarray:
         """Derivatives (n_goals, n_free) of all goals in the values of the free numbers."""

@@ -39,34 +39,16 @@ def resonant_stiffness(mass: Any, resonance: Any) -> Any:
 
 @check.typed
 def cutoff_frequency(modes: Modes, at: Any, *, contact: Contact, mass: float, speed: float, tolerance: float) -> float:
-    """Frequency [Hz] up to which modes must be kept so that the truncation error stays below a tolerance.
+    """Frequency [Hz] up to which modes must be kept so that the force errs by less than a share of its peak.
 
-    Parameters
-    ----------
-    modes : Modes
-        A few modes of the body; their residual compliance at the point gives the density of the others.
-    at : strike point, (dimension,) [m]
-    contact : Contact
-    mass : float [kg]
-        Mass of the other body felt at its contact point.
-    speed : float [m/s]
-    tolerance : float [-]
-        Error of the force relative to its peak.
-
-    Notes
-    -----
-    Meets three limits: `left_out_error`, SERIES_SHARE for the residual compliance, and BAND.
+    The residual compliance of a few ``modes`` at the point struck gives the density of the others; ``mass`` [kg] is
+    that of the other body felt at its contact point. Meets three limits: `left_out_error`, SERIES_SHARE for the
+    residual compliance, and BAND.
     """
     tolerance = check.positive("tolerance", tolerance)
     density, s = left_out_density(modes, modes.point("at", at))
     omega_0 = 2.0 * np.pi * contact_resonance(contact, mass, speed)
     return cutoff(density, s, omega_0, contact.exponent, mass, tolerance)
-
-
-def infinite_cutoff(mobility: float, *, contact: Contact, mass: float, speed: float, tolerance: float) -> float:
-    """As `cutoff_frequency`, for the modes of an infinite plate of a mobility [m/(N s)]."""
-    omega_0 = 2.0 * np.pi * contact_resonance(contact, mass, speed)
-    return cutoff(2.0 * mobility / np.pi, 0.0, omega_0, contact.exponent, mass, tolerance)
 
 
 def cutoff(density: float, s: float, omega_0: float, exponent: float, mass: float, tolerance: float) -> float:
@@ -111,25 +93,13 @@ def least_tolerance(suffices: Callable[[float], bool]) -> float | None:
 
 
 def left_out_error(softness: Any, ratio: Any, exponent: Any, dimension: int) -> Any:
-    """Expected error [-] of one blow if a residual compliance replaces the left-out modes.
+    """Expected error [-] of one blow on a beam (1) or plate (2) if a residual compliance replaces the left-out modes.
 
-    Parameters
-    ----------
-    softness : float or ndarray [-]
-        Residual compliance times contact stiffness.
-    ratio : float or ndarray [-]
-        Contact frequency over highest kept frequency.
-    exponent : float or ndarray [-]
-        Exponent of the contact law.
-    dimension : int
-        1 for a beam, 2 for a plate.
-
-    Notes
-    -----
-    The error goes as ``softness ratio**min(exponent + 1/2, 2)``: a higher exponent makes the force rise more smoothly
-    and excites the left-out modes less. The power was fitted to 175 random blows; it lies between that of the force
-    ripple and that of the energy these modes take. Squared shapes per unit omega fall as omega**-s, with s = 0 on
-    plates and 1/2 on beams.
+    ``softness`` [-] is that compliance times the contact stiffness, ``ratio`` [-] the contact frequency over the
+    highest kept one, ``exponent`` that of the contact law: floats or arrays. The error goes as
+    ``softness ratio**min(exponent + 1/2, 2)``: a higher exponent makes the force rise more smoothly and excites the
+    left-out modes less. The power was fitted to 175 random blows; it lies between that of the force ripple and that of
+    the energy these modes take. Squared shapes per unit omega fall as omega**-s, with s = 0 on plates and 1/2 on beams.
     """
     power, factor = _order(exponent)
     return factor * (1.5 if dimension == 1 else 1.0) * softness * ratio ** (power - 1.0)

@@ -95,17 +95,19 @@ class Assumption:
     @property
     def reading(self) -> str:
         """The number that decides in words; "" if it is not known."""
-        return "" if self.value is None else self._read(self.value)
-
-    def _read(self, value: float) -> str:
+        if self.value is None:
+            return ""
+        share = f"{100.0 * self.value:.2g} % of" if self.value < 1.0 else f"{self.value:.2g} times"
         phrase = READINGS.get(self.number, f"{self.number} {{}}")
-        share = f"{100.0 * value:.2g} % of" if value < 1.0 else f"{value:.2g} times"
-        return phrase.replace("{}% of", share).replace("{}", f"{value:.2g}")
+        return phrase.replace("{}% of", share).replace("{}", f"{self.value:.2g}")
 
     @property
     def sentence(self) -> str:
         """The assumption in one line."""
-        said = [self._measured] if self.value is not None else []
+        said = [] if self.value is None else [self.reading]
+        if said and self.limit is not None:
+            share = "%" in READINGS.get(self.number, "")
+            said[0] += f"; above {f'{100.0 * self.limit:g} %' if share else f'{self.limit:g}'} it matters"
         if self.worst > 0.0:
             said.append(f"it changes the {self.change()}" + (", beyond this estimate" if self.beyond else ""))
         if not self.known:
@@ -120,14 +122,6 @@ class Assumption:
         name = next((each for each in changes if changes[each] > more_than), most)
         size = f"{changes[name]:.1g}" if name == "restitution" else f"{100.0 * float(f'{changes[name]:.1g}'):g} %"
         return f"{QUANTITY_NAMES.get(name, name)} by about {size}"
-
-    @property
-    def _measured(self) -> str:
-        """The number that decides, and the limit from which on it matters."""
-        if self.limit is None:
-            return self.reading
-        limit = f"{100.0 * self.limit:g} %" if "%" in READINGS.get(self.number, "") else f"{self.limit:g}"
-        return f"{self.reading}; above {limit} it matters"
 
 
 def unexamined(
@@ -167,7 +161,11 @@ def head(assumptions: Sequence[Assumption], tolerance: float) -> str:
     """Whether the model holds, in one clause: by how much at most, or what is wrong or not known, and what helps."""
     unsure = [each for each in assumptions if each.open]
     if not any(each.effect for each in assumptions):
-        return _foreseen(assumptions, unsure)
+        doubtful = ", ".join(each.name for each in assumptions if each.doubtful)
+        first = (
+            f"the model is doubtful here: {doubtful}" if doubtful else "no assumption of the model is expected to fail"
+        )
+        return first + (f"; not known before the blow: {', '.join(each.name for each in unsure)}" if unsure else "")
     if len(unsure) == len(assumptions) and len({each.unknown for each in unsure}) == 1:
         return f"the model is not examined, as {unsure[0].unknown}: {unsure[0].remedy}"
     error, said = total(assumptions), []
@@ -183,20 +181,11 @@ def head(assumptions: Sequence[Assumption], tolerance: float) -> str:
         said.append(f"it is not known whether the model holds: {names} ({', '.join(remedies)}): {cures}")
     if said:
         return "; ".join(said)
-    holds = f"to better than {_above(error)}" if error <= max(SILENT, SHARE * tolerance) else f"to {error:.1g}"
+    holds = f"to {error:.1g}"
+    if error <= max(SILENT, SHARE * tolerance):
+        holds = f"to better than 1e{max(round(math.log10(SILENT)), math.ceil(math.log10(error or SILENT)))}"
     taken = ", with the contact as stated" if any(not each.known for each in assumptions) else ""
     return f"the model holds {holds}{taken}"
-
-
-def _foreseen(assumptions: Sequence[Assumption], unsure: Sequence[Assumption]) -> str:
-    doubtful = ", ".join(each.name for each in assumptions if each.doubtful)
-    first = f"the model is doubtful here: {doubtful}" if doubtful else "no assumption of the model is expected to fail"
-    return first + (f"; not known before the blow: {', '.join(each.name for each in unsure)}" if unsure else "")
-
-
-def _above(error: float) -> str:
-    """The power of ten above an error [-], but at least SILENT, in words."""
-    return f"1e{max(round(math.log10(SILENT)), math.ceil(math.log10(error)) if error > 0.0 else -99)}"
 
 
 def table(assumptions: Sequence[Assumption]) -> list[dict[str, Any]]:

@@ -28,7 +28,9 @@ def nearest(hit: Response) -> tuple[float, float | None]:
     The clearance is the smallest gap after the first impact over the way that the striker goes in the time of that
     impact at the speed of its arrival; below zero the bodies would touch again, and below -1 its logarithm is told.
     """
-    history = _released(hit)
+    if hit.n_impacts != 1 or hit.history.status == record.HORIZON:
+        raise SimulationError("no clearance: the blow must end with its first impact; give max_impacts = 1")
+    history = hit.history
     duration = hit.impacts[0].duration
     scale = hit.speed * duration
     free = replace(history, start_q=history.end_q, start_p=history.end_p, steps=history.steps[:0])
@@ -54,13 +56,6 @@ def slopes(hit: Response, names: tuple[str, ...], sections: Mapping[str, tuple[f
     if nearest(hit)[1] is None:
         return np.zeros(len(names))
     return differences(Parameters(hit, sections), names, lambda blow: [nearest(blow)[0]])[0][0]
-
-
-def _released(hit: Response) -> History:
-    """The history of a run that ended with its first impact; SimulationError for others."""
-    if hit.n_impacts != 1 or hit.history.status == record.HORIZON:
-        raise SimulationError("no clearance: the blow must end with its first impact; give max_impacts = 1")
-    return hit.history
 
 
 def _span(history: History, scale: float) -> float:

@@ -19,19 +19,10 @@ INSTANTS = ("contact_time", "force")  # quantities that depend on single instant
 
 
 def distance(one: Mapping[str, Any], two: Mapping[str, Any]) -> dict[str, Any]:
-    """How far one blow is from another in every number of the other [-].
+    """How far one blow is from another in every number of the other [-]; also of many blows, as arrays of equal shape.
 
-    Parameters
-    ----------
-    one, two : mapping of str to number, None or array
-        Numbers of two blows by name, or of two times many blows as arrays of equal shape. Spectra, (n_frequencies,),
-        have the names of their quantities.
-
-    Returns
-    -------
-    dict of str to float or array
-        Absolute for the restitution, relative to the second for all others; 1 if only one of the blows has a
-        restitution. Of a spectrum it is the largest difference over the largest value of the second.
+    Absolute for the restitution, relative to the second for all others; 1 if only one of the blows has a restitution.
+    Of a spectrum (n_frequencies,), named as its quantity, it is the largest difference over the second's largest value.
     """
     found: dict[str, Any] = {}
     for name, value in two.items():
@@ -51,10 +42,11 @@ def distance(one: Mapping[str, Any], two: Mapping[str, Any]) -> dict[str, Any]:
 
 def of_blows(one: "Response", two: "Response", quantities: Mapping[str, float | None]) -> dict[str, float]:
     """How far one blow is from another in each quantity; the sound counts by the spectrum of the force."""
-    return distance(*({name: _value(hit, name, band) for name, band in quantities.items()} for hit in (one, two)))
+    return distance(*({name: value_of(hit, name, band) for name, band in quantities.items()} for hit in (one, two)))
 
 
-def _value(hit: "Response", name: str, band: float | None) -> Any:
+def value_of(hit: "Response", name: str, band: float | None) -> Any:
+    """A quantity of a blow; of one with a band [Hz] the spectrum at BAND_POINTS frequencies."""
     if band is not None:
         return hit.spectrum(np.linspace(0.0, band, BAND_POINTS))
     return getattr(hit, "peak_force" if name == "force" else name)

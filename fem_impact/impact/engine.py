@@ -68,24 +68,17 @@ def follow(
     history = History(*system, *(*result, stretched))
     time, status = result[5], result[6]
     if status == record.EXHAUSTED:
+        ended = int(SOONER * np.count_nonzero(history.contacts[:, 1] < time))
         raise SimulationError(
-            f"no final separation was reached in {most} steps, up to {time:.4g} s; raise {chosen_by}, or give "
-            f"{_sooner(history)}"
+            f"no final separation was reached in {most} steps, up to {time:.4g} s; raise {chosen_by}, or give a "
+            f"duration of at most {float(f'{SOONER * time:.1e}'):g} s"
+            + (f" or max_impacts of at most {ended}" if ended else "")
         )
     if status == record.FAILED:
         if scheme == "collocation":
             raise SimulationError(f"scheme collocation found no valid next step at {time:.4g} s; use A4")
         raise SimulationError(f"scheme {scheme} found no valid next step at {time:.4g} s; check the units of the scene")
     return history
-
-
-def _sooner(history: History) -> str:
-    """A duration, and a number of impacts if some ended, that leave steps for runs of half the step."""
-    time = SOONER * history.end_time
-    ended = int(SOONER * np.count_nonzero(history.contacts[:, 1] < history.end_time))
-    return f"a duration of at most {float(f'{time:.1e}'):g} s" + (
-        f" or max_impacts of at most {ended}" if ended else ""
-    )
 
 
 def again(history: History, step: float | None = None, **changed: Any) -> History:

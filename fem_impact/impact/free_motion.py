@@ -22,14 +22,9 @@ def swing(
     About its rest a mode moves as ``a exp(r t) + b exp(s t)``, or twice the real part of one of the two. An exponential
     of a time is one of the start of its block times one of the time since: the sum over the modes is a matrix product.
 
-    Parameters
-    ----------
-    omega, zeta, bias : (n_modes,) [rad/s], [-], constant modal forces
-    state : displacements and velocities of the modes at the first time, (n_modes,) each
-    times : (n_times,) [s]
-    weights : (1, n_modes), or (2, n_modes) with one for each of `roots`
-    order : int
-        Of the derivative; the rest position counts for none.
+    ``bias`` (n_modes,) are constant modal forces; ``state`` the displacements and velocities (n_modes,) at the first
+    time; ``weights`` (1, n_modes), or (2, n_modes) with one for each of `roots`. In a derivative of any ``order`` but
+    zero the rest position does not count.
     """
     both, (q, p) = roots(omega, zeta), state
     q = q - bias / omega**2

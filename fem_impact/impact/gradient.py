@@ -19,7 +19,7 @@ from .compiled import layout
 from .compiled.law import columns
 from .history import History, mode_energy
 from .parameters import ONE_SIDED, Change, Parameters, unit
-from .quantities import rebound
+from .quantities import checked_band, name_and_band, rebound
 
 if TYPE_CHECKING:
     from .response import Response
@@ -107,11 +107,10 @@ class Gradient(check.Locked):
         """Table for notebooks."""
         if self.slopes.ndim > 1:
             return f"<p>{html.escape(str(self))}</p>"
+        columns = zip(self.names, self.numbers, self.slopes, self.error, self.relative)
         rows = [
             (name, f"{number:.5g} {unit(name)}", f"{slope:.5g}", f"{error:.0e}", f"{part:.4f}")
-            for name, number, slope, error, part in zip(
-                self.names, self.numbers, self.slopes, self.error, self.relative
-            )
+            for name, number, slope, error, part in columns
         ]
         head = ["number", "value", f"slope of {self.quantity}", "error", "% per %"]
         return markup.table(rows, head)
@@ -345,20 +344,9 @@ def section_changes(sections: Any) -> dict[str, tuple[float, SectionChange]]:
 
 def _asked(item: Any) -> tuple[str, float | None]:
     """A quantity and its band [Hz]."""
-    name, equals, band = str(item).partition("=")
-    name = {"force": "peak_force"}.get(name.strip(), name.strip())
-    check.one_of("quantity", name, QUANTITIES)
-    if name.startswith("spectral") != bool(equals):
-        rule = f"needs a frequency, such as '{name}=5000'" if not equals else f"has no frequency, write {name!r}"
-        raise ValueError(f"quantity {name} {rule}")
-    if not equals:
-        return name, None
-    try:
-        return name, check.positive(f"frequency of {name}", float(band), "Hz")
-    except ValueError:
-        raise ValueError(
-            f"frequency of {name} must be a positive number in Hz, got {check.shown(band.strip())}"
-        ) from None
+    name, band = name_and_band(item)
+    name = check.one_of("quantity", {"force": "peak_force"}.get(name, name), QUANTITIES)
+    return name, checked_band(name, band, name.startswith("spectral"))
 
 
 def level_of(spectrum: np.ndarray) -> float:

@@ -87,5 +87,5 @@ def page(hit: "Response") -> str:
         + markup.side_by_side(
             markup.curve(hit.time[shown], force[shown], label="force", unit="N", title=said), markup.table(rows)
         )
-        + markup.notes(hit.notes)
+        + markup.note_list(hit.notes)
     )

@@ -103,8 +103,10 @@ class Parameters(check.Brief):
             if not self.why_still:
                 found |= {f"strike.{name}": float(x) for name, x in zip("xy", hit.at if hit.at is not None else ())}
         else:
-            moving = [b for b, ends in enumerate(hit.ends) if ends.touched and self._carried(b)]
-            found |= {f"speeds.{b}": hit.ends[b].speed for b in moving}
+            for b, ends in enumerate(hit.ends):  # of bodies that can move rigidly at their first contact
+                row = hit.history.shape[ends.touched[0][0], hit.body_slice(b)] if ends.touched else np.zeros(0)
+                if row.size and row[hit.bodies[b].omega == 0.0].any():
+                    found[f"speeds.{b}"] = ends.speed
         for name, b in self.bodies.items():
             if name == "target" and self.why_no_target:
                 continue
@@ -126,11 +128,6 @@ class Parameters(check.Brief):
             found["target.scale"] = 1.0
         return {name: value for name, value in found.items() if name not in self._barred}
 
-    def _carried(self, b: int) -> bool:
-        """Whether a body can move rigidly at its first contact."""
-        hit, part = self.hit, self.hit.body_slice(b)
-        return bool(hit.history.shape[hit.ends[b].touched[0][0], part][hit.bodies[b].omega == 0.0].any())
-
     @cached_property
     def _barred(self) -> dict[str, str]:
         """Numbers in which this blow has no gradient although it has them, and why."""
@@ -140,7 +137,9 @@ class Parameters(check.Brief):
                 barred[f"{name}.gap"] = (
                     "the bodies touch at the start, and even a small gap would change how they meet; give a gap"
                 )
-            sprung = hit.history.law["compliance"][c] > 0.0 or self._ringing_alone
+            # modes may stand for those left out that would be others if any contact had a loss
+            alone = not self._lossy and any(ends.forms.start < ends.forms.stop for ends in hit.ends)
+            sprung = alone or hit.history.law["compliance"][c] > 0.0
             if hit.contacts[c].loss == 0.0 and sprung:
                 barred[f"{name}.loss"] = (
                     "without loss the modes left out act as a spring in series, with loss they cannot; give the "
@@ -161,11 +160,6 @@ class Parameters(check.Brief):
         sizes = [np.abs(h.shape[c]) @ np.abs(x) for x in (h.start_q, h.start_p)]
         d, v = float(h.offset[c] + h.shape[c] @ h.start_q), float(h.shape[c] @ h.start_p)
         return abs(d) <= ROUNDING * (sizes[0] + abs(h.offset[c])) and abs(v) <= ROUNDING * sizes[1]
-
-    @cached_property
-    def _ringing_alone(self) -> bool:
-        """Whether modes stand for those left out that would be others if any contact had a loss."""
-        return not self._lossy and any(ends.forms.start < ends.forms.stop for ends in self.hit.ends)
 
     @property
     def _lossy(self) -> bool:
@@ -379,7 +373,11 @@ class Parameters(check.Brief):
         carried = target.shapes.at(hit.at[None])[0, flexible] / target.omega[flexible] ** 2
         rests = [None] * len(axes)
         if hit.ends[1].rest.any():
-            rests = _slopes(target, hit.at, axes.values(), SHIFT * span, _softness(target, hit.at))
+            rests = _slopes(
+                target, hit.at, axes.values(), SHIFT * span,
+                # twice the deflection under a force at a fixed point changes as the compliance there
+                lambda points: 2.0 * target.shapes.deflection(hit.at[None], points),
+            )  # fmt: skip
         striker = hit.striker
         assert striker is not None  # it starts at the surface, which may be displaced
         for i, slope, rest in zip(axes, slopes, rests):
@@ -388,11 +386,6 @@ class Parameters(check.Brief):
             found.start_q[i, self._modes[0]] = float(slope @ hit.history.start_q[part]) * striker.motion
             if rest is not None:
                 self._soften(found, i, 1, np.array([[float(rest[0] - 2.0 * carried @ slope[flexible])]]))
-
-
-def _softness(target: Modes, at: np.ndarray) -> Any:
-    """Twice the deflection of a body at points under a force at a fixed one: it changes as the compliance there."""
-    return lambda points: 2.0 * target.shapes.deflection(at[None], points)
 
 
 def _slopes(target: Modes, at: np.ndarray, axes: Iterable[int], distance: float, function: Any) -> list[Any]:

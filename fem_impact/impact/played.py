@@ -11,7 +11,8 @@ from . import stepping
 from .collision import Touch, touching
 from .compiled import live
 from .compiled.law import LAW
-from .compiled.propagation import N_LANE, N_TABLE, step_table
+from .compiled.layout import N_LANE
+from .compiled.propagation import N_TABLE, step_table
 from .contact import Contact
 from .striker import Striker
 
@@ -79,7 +80,7 @@ class StruckBody:
         now = live.PlayStrokes(*(array[:count] for array in self._strokes))
         for i in range(count):
             now.when[i], now.pad[i], now.speed[i] = strokes[i]
-        live.play(self.body, self.pads, self.limits, self.state, now, gain, out)
+        live.play_block(self.body, self.pads, self.limits, self.state, now, gain, out)
 
     @property
     def counted(self) -> dict[str, int]:

@@ -3,7 +3,7 @@
 import os
 import sys
 import warnings
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
@@ -81,7 +81,7 @@ def remedy(hit: "Response") -> str:
         advice.append("leave dt and scheme to the program, or give a smaller dt")
     if not advice and error.total >= UNSURE:
         return "the number of impacts cannot be determined: give max_impacts = 1 for the first impact alone"
-    return "; ".join(advice) or f"take a tolerance of {_above(error.total):g}"
+    return "; ".join(advice) or f"take a tolerance of {float(f'{1.06 * error.total:.1e}'):g}"  # just above it
 
 
 def kept(hit: Any, strict: bool = False) -> Any:
@@ -107,11 +107,6 @@ def _callers_level() -> int:
     return level
 
 
-def _above(error: float) -> float:
-    """A number just above an error, with two digits."""
-    return float(f"{1.06 * error:.1e}")
-
-
 def _names(hit: "Response") -> list[str]:
     return ["the striker", "the target"] if len(hit.bodies) == 2 else [f"body {i}" for i in range(len(hit.bodies))]
 
@@ -130,17 +125,13 @@ def _more_modes(hit: "Response") -> Iterator[str]:
         needs = partial(_modes_needed, hit, body)
         number = needs(hit.tolerance)
         if number > MOST_ADVISED:
-            loose = accuracy.least_tolerance(partial(_few_enough, needs))
+            loose = accuracy.least_tolerance(lambda tolerance: needs(tolerance) <= MOST_ADVISED)  # noqa: B023
             soft = next((s for s in 10.0 ** -np.arange(1.0, 31.0) if needs(hit.tolerance, s) <= MOST_ADVISED), None)
             ways = [] if loose is None or loose <= hit.tolerance else [f"take a tolerance of {loose:g}"]
             ways += [] if soft is None else [f"divide the stiffness of its contacts by {1.0 / soft:.0e}"]
             yield f"{name} would have to keep some {number:.1e} modes; {', or '.join(ways) or 'strike it more softly'}"
         elif number > modes.n_modes + 1:
             yield f"keep {int(np.ceil(number))} modes of {name} instead of {modes.n_modes}"
-
-
-def _few_enough(needs: Callable[[float], float], tolerance: float) -> bool:
-    return needs(tolerance) <= MOST_ADVISED
 
 
 def _modes_needed(hit: "Response", body: int, tolerance: float, softer: float = 1.0) -> float:
@@ -170,10 +161,7 @@ def _modes_needed(hit: "Response", body: int, tolerance: float, softer: float = 
 def _finer_modes(hit: "Response") -> Iterator[tuple[str, float]]:
     """Name and largest frequency error allowed of every body found on a mesh."""
     for name, modes in zip(_names(hit), hit.bodies):
-        if modes.frequency_error is not None and modes.frequency_error.any() and _on_a_mesh(modes.shapes):
+        meshed = isinstance(getattr(modes.shapes, "base", modes.shapes), FieldShapes)
+        if meshed and modes.frequency_error is not None and modes.frequency_error.any():
             worst = float(modes.frequency_error.max())
             yield name, max(1e-9, 0.5 * SHARE * hit.tolerance / hit.error.mesh * worst)
-
-
-def _on_a_mesh(shapes: object) -> bool:
-    return isinstance(getattr(shapes, "base", shapes), FieldShapes)

@@ -18,11 +18,8 @@ def _locked(values: dict) -> MappingProxyType:
     return MappingProxyType(values)
 
 
-def _reduced(mapping: MappingProxyType) -> tuple:
-    return _locked, (dict(mapping),)
-
-
-copyreg.pickle(MappingProxyType, _reduced)  # so that plans and responses, which hold such mappings, can be pickled
+# so that plans and responses, which hold such mappings, can be pickled
+copyreg.pickle(MappingProxyType, lambda mapping: (_locked, (dict(mapping),)))
 
 
 def asked_for(quantity: Any) -> Mapping[str, float | None]:
@@ -37,14 +34,13 @@ def asked_for(quantity: Any) -> Mapping[str, float | None]:
         return USUAL
     if isinstance(quantity, str):
         quantity = (quantity,)
-    pairs = quantity.items() if isinstance(quantity, Mapping) else (_pair(item) for item in _listed(quantity))
+    if not isinstance(quantity, (Mapping, Sequence)):
+        raise ValueError(f"quantity must be names of {', '.join(QUANTITIES)}, got {check.shown(quantity)}")
+    pairs = quantity.items() if isinstance(quantity, Mapping) else map(name_and_band, quantity)
     found: dict[str, float | None] = {}
     for name, limit in pairs:
         check.one_of("quantity", name, QUANTITIES)
-        if (name in BANDED) != (limit is not None):
-            rule = "needs a frequency, such as" if name in BANDED else "has no frequency, write"
-            raise ValueError(f"quantity {name} {rule} '{name}{'=5000' if name in BANDED else ''}'")
-        found[name] = None if limit is None else check.positive(f"frequency of {name}", limit, "Hz")
+        found[name] = checked_band(name, limit, name in BANDED)
     if not found:
         raise ValueError(f"quantity must name one of {', '.join(QUANTITIES)}, got none")
     return MappingProxyType(found)
@@ -67,13 +63,16 @@ def words(quantities: Mapping[str, float | None]) -> str:
     return said[0] if len(said) == 1 else f"{', '.join(said[:-1])} and {said[-1]}"
 
 
-def _listed(quantity: Any) -> Sequence[Any]:
-    if not isinstance(quantity, Sequence):
-        raise ValueError(f"quantity must be names of {', '.join(QUANTITIES)}, got {check.shown(quantity)}")
-    return quantity
+def checked_band(name: str, limit: Any, banded: bool) -> float | None:
+    """The band [Hz] of a quantity, which must have one if it is ``banded``, and else none."""
+    if banded != (limit is not None):
+        rule = "needs a frequency, such as" if banded else "has no frequency, write"
+        raise ValueError(f"quantity {name} {rule} '{name}{'=5000' if banded else ''}'")
+    return None if limit is None else check.positive(f"frequency of {name}", limit, "Hz")
 
 
-def _pair(item: Any) -> tuple[str, float | None]:
+def name_and_band(item: Any) -> tuple[str, float | None]:
+    """The name of a quantity and its band [Hz], from "spectrum=5000" and the like."""
     if not isinstance(item, str):
         raise ValueError(f"quantity must be names of {', '.join(QUANTITIES)}, got {check.shown(item)}")
     name, equals, limit = item.partition("=")

@@ -148,7 +148,7 @@ class Response(Totals, check.Locked):
     @property
     def verdict(self) -> str:
         """The answer in one line: how well it is computed, whether the model holds, and what would help."""
-        return trust.verdict(self)
+        return trust.in_one_line(self)
 
     @cached_property
     def assumptions(self) -> tuple[Assumption, ...]:

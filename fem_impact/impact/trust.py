@@ -8,7 +8,8 @@ import numpy as np
 
 from .._base import markup
 from . import assumption, promise
-from .quantities import BAND_POINTS, rebound, words
+from .distance import value_of
+from .quantities import rebound, words
 
 if TYPE_CHECKING:
     from .response import Response
@@ -110,7 +111,7 @@ def examine(hit: "Response") -> Trust:
     return Trust(tuple(_judged(hit, name, band, cure) for name, band in hit.quantities.items()))
 
 
-def verdict(hit: "Response") -> str:
+def in_one_line(hit: "Response") -> str:
     """The answer in one line: what was asked for first, how well it is computed, and whether the model holds."""
     first = hit.trust.judged[0]
     if first.quantity == "restitution":
@@ -152,17 +153,11 @@ def _judged(hit: "Response", name: str, band: float | None, cure: str) -> Judged
     elif unsure:
         dominant = unsure[0].name if hit.tolerance_met else dominant
         remedies.append(unsure[0].remedy)
+    value = None if name == "sound" else value_of(hit, name, band)
+    if band is not None and value is not None:
+        value = np.abs(value).max()
     return Judged(
-        name, band, _value(hit, name, band), own if error.resolvable else None, None if unsure else known,
+        name, band, None if value is None else float(value), own if error.resolvable else None,
+        None if unsure else known,
         known, tuple(each.name for each in unsure), dominant, "; ".join(remedies), limit, hit.tolerance,
     )  # fmt: skip
-
-
-def _value(hit: "Response", name: str, band: float | None) -> float | None:
-    if name == "sound":
-        return None
-    if name == "spectrum":
-        assert band is not None
-        return float(np.abs(hit.spectrum(np.linspace(0.0, band, BAND_POINTS))).max())
-    found = getattr(hit, {"force": "peak_force"}.get(name, name))
-    return None if found is None else float(found)

@@ -128,7 +128,17 @@ def port(name: str, hands: Hands, n_points: int, fastest: float) -> Iterator[str
 @contextmanager
 def keys(hands: Hands, n_points: int, fastest: float) -> Iterator[None]:
     """Listen to the keys of the terminal, or to what is piped in; Escape or the end of the input end the playing."""
-    thread = threading.Thread(target=_listen, args=(hands, n_points, fastest), daemon=True)
+
+    def listen() -> None:
+        for key in _pressed(hands):
+            if key in ENDS:
+                break
+            struck = of_key(key, n_points, fastest)
+            if struck is not None:
+                hands.strike(*struck)
+        hands.stop()
+
+    thread = threading.Thread(target=listen, daemon=True)
     with _raw(sys.stdin):
         thread.start()
         try:
@@ -144,16 +154,6 @@ def of_key(key: str, n_points: int, fastest: float) -> tuple[int, float] | None:
         if key.lower() in keys:
             return keys.index(key.lower()) % n_points, fastest * 2.0 ** (row + 1 - len(KEYS))
     return None
-
-
-def _listen(hands: Hands, n_points: int, fastest: float) -> None:
-    for key in _pressed(hands):
-        if key in ENDS:
-            break
-        struck = of_key(key, n_points, fastest)
-        if struck is not None:
-            hands.strike(*struck)
-    hands.stop()
 
 
 def _pressed(hands: Hands) -> Iterator[str]:

@@ -89,7 +89,10 @@ class Player:
             Steps in contact that `trace` keeps.
         """
         self.modes, self.contact = modes, contact
-        self.points = modes.point("points", points[0]) if modes.dimension == 0 else _points(modes, points)
+        if modes.dimension and not (isinstance(points, (list, tuple, np.ndarray)) and len(points)):
+            raise ValueError(f"points must be a list of points of the body, got {check.shown(points)}")
+        named = {f"points[{i}]": point for i, point in enumerate(points)} if modes.dimension else {"points": points[0]}
+        self.points = np.vstack([modes.point(name, point) for name, point in named.items()])
         self.rate = check.count("rate", rate, high=HIGHEST_RATE)
         self.block, self.fastest = check.count("block", block), check.positive("fastest", fastest, "m/s")
         self.sticks = check.count("sticks", sticks, high=16)
@@ -133,9 +136,3 @@ class Player:
     def trace(self) -> np.ndarray:
         """Steps in contact so far, up to ``n_trace``, see `StruckBody.trace`."""
         return self._played.trace
-
-
-def _points(modes: Modes, points: Any) -> np.ndarray:
-    if not isinstance(points, (list, tuple, np.ndarray)) or not len(points):
-        raise ValueError(f"points must be a list of points of the body, got {check.shown(points)}")
-    return np.vstack([modes.point(f"points[{i}]", point) for i, point in enumerate(points)])

@@ -128,11 +128,11 @@ def _struck(hit: Response, bodies: tuple[Modes, Modes], simplified: Simplified |
     """A blow as it is examined: the response, striker and target, and where the target is struck [m]."""
     modes, mesh, ideal = bodies[1], None, ""
     if simplified is None:
-        target = bending.known(modes)
+        target = bending.known_of(modes)
     else:
         mesh, ideal, whole = simplified.mesh, simplified.kind, replace(modes, mass=simplified.mass)
         target = bending.around(whole, simplified.section, mesh, simplified.supports)
-    striker = None if hit.striker is None else bending.known(bodies[0])
+    striker = None if hit.striker is None else bending.known_of(bodies[0])
     return Struck(hit, bodies, target, striker, ideal, _clearance(modes, target, mesh, at))
 
 

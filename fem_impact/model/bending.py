@@ -128,7 +128,7 @@ def unwrapped(shapes: Shapes) -> tuple[Shapes, float, float]:
     return shapes, amplitude, frequency
 
 
-def known(modes: Modes) -> Known | None:
+def known_of(modes: Modes) -> Known | None:
     """What the modes of a plate or beam tell of it; None if its shapes are known at points only, or it is rigid."""
     shapes = unwrapped(modes.shapes)[0]
     if isinstance(shapes, (FieldShapes, RitzShapes)):
@@ -183,7 +183,11 @@ def bending(body: Known) -> Bending:
         found = (_plate if modes.dimension == 2 else _beam)(shapes.system, vectors, thick)
     else:
         steep, force, volume, edge = _by_formula(shapes, low, body)
-        rotary, shear = _uniform(body)
+        rotary = shear = 0.0  # of a uniform, if a plate isotropic body, over its squared wavenumber [m**2]
+        if body.section is not None and not modes.thick:  # both are in the frequencies of a thick body
+            section, origin = body.section, np.zeros((1, modes.dimension))
+            rotary = float(section.rotary(origin)[0] / section.inertia(origin)[0])
+            shear = float(section.stiffness(origin).flat[0] / section.shear(origin).flat[0])
         zero = np.zeros(len(steep))
         found = np.stack([body.extent * steep, volume + zero, rotary * steep, shear * force, edge + zero])
     left, shapes = np.ones(low.stop - low.start), modes.shapes
@@ -302,16 +306,6 @@ def _beam(system: System, vectors: np.ndarray, thick: bool) -> np.ndarray:
     soft = frame.stiffness / frame.length**2 / section.shear(place).reshape(x.shape)
     result[3] = np.einsum("eq,eqk->k", dx * soft, Q**2) / (vectors * (system.K @ vectors)).sum(axis=0)
     return result
-
-
-def _uniform(body: Known) -> tuple[float, float]:
-    """Rotary inertia and shear [m**2] of a uniform, if a plate isotropic body over its squared wavenumber."""
-    section = body.section
-    if section is None or body.modes.thick:  # both are in the frequencies of a thick body
-        return 0.0, 0.0
-    origin = np.zeros((1, body.modes.dimension))
-    stiffness, shear = section.stiffness(origin).flat[0], section.shear(origin).flat[0]
-    return float(section.rotary(origin)[0] / section.inertia(origin)[0]), float(stiffness / shear)
 
 
 def _by_formula(shapes: Shapes, low: slice, body: Known) -> tuple[np.ndarray, np.ndarray, Any, Any]:

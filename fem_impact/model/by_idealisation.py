@@ -54,7 +54,7 @@ class Idealised(Description):
         dropped = "no mesh and no modes are needed; the target's sound is not computed"
         forecast = asked.foretell(
             kind, errors={cause: error}, reasons=(kept, dropped), mass=seen.mass, mobility=mobility,
-            notes=plausible.together(blow.target.notes, seen.notes),
+            notes=plausible.together(blow.target.assumed, seen.notes),
         )  # fmt: skip
         return cls(asked, forecast, error)
 

@@ -49,7 +49,9 @@ class Mixed(Description):
             asked.refuse(why)
             return None
         allowed, slow = asked.budget.left_out, asked.mass * seen.mobility
-        highest = accuracy.infinite_cutoff(seen.mobility, mass=asked.mass, tolerance=allowed, **asked.law)
+        resonance = accuracy.contact_resonance(mass=asked.mass, **asked.law)  # [Hz]; of an infinite plate's modes:
+        density, omega_0 = 2.0 * seen.mobility / np.pi, 2.0 * np.pi * resonance
+        highest = accuracy.cutoff(density, 0.0, omega_0, blow.contact.exponent, asked.mass, allowed)
         if not named and mixed.LASTING * slow > 1e4 * asked.duration:  # too many steps, some 24 for each contact time
             return None
         few = 0.5 * np.pi * slow < asked.duration or target.count_below(highest / target.stretch) < MANY_MODES
@@ -79,7 +81,7 @@ class Mixed(Description):
         forecast = asked.foretell(
             "mixed", errors={"echoes left out": asked.budget.half}, reasons=(why, kept), mass=seen.mass,
             mobility=seen.mobility, n_modes=number, max_frequency=frequency,
-            notes=plausible.together(target.notes, seen.notes), **chosen,
+            notes=plausible.together(target.assumed, seen.notes), **chosen,
         )  # fmt: skip
         return cls(asked, forecast, frequency, highest)
 
@@ -98,7 +100,7 @@ class Mixed(Description):
                 seen = vectors.Seen(
                     target, at, resolved, asked.budget.total, elements, target.size_stated, stages, shift, count
                 )
-            seen.modes(lambda found, _: float(found.frequencies[-1]))
+            seen.needed_modes(lambda found, _: float(found.frequencies[-1]))
             assert seen.whole is not None
             modes = seen.whole
         body = mixed.mixed(modes, at, told.mobility, frequency, self.highest)

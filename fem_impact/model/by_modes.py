@@ -60,7 +60,7 @@ class Modal(Description):
         forecast = asked.foretell(
             "modal", errors={"target modes left out": left}, reasons=(why, kept), mass=modes.mass, n_modes=number,
             max_frequency=limit, first=first, element="closed form" if target.kind == "analytic" else None,
-            notes=plausible.together(target.notes, modes.notes, at_rest(modes, modes.point("at", at))),
+            notes=plausible.together(target.assumed, modes.notes, at_rest(modes, modes.point("at", at))),
         )  # fmt: skip
         if isinstance(first.shapes, FieldShapes):
             forecast = _with_mesh(asked, forecast, first.shapes, limit * first.frequencies[-1] / modes.frequencies[-1])

@@ -80,7 +80,7 @@ class Vectors(Description):
         shares = dict.fromkeys(("Ritz vectors", "mesh"), asked.budget.half * (1.0 - CHEAP))
         forecast = asked.foretell(
             "vectors", errors=shares, reasons=(why, kept, reason), n_modes=count, size=size, n_dofs=n_dofs,
-            element=target.element, steps=asked.budget.cheap, mass=target.mass, notes=target.notes, work=work,
+            element=target.element, steps=asked.budget.cheap, mass=target.mass, notes=target.assumed, work=work,
             ringing=ringing.seconds,
         )  # fmt: skip
         return cls(asked, forecast, elements)
@@ -98,7 +98,7 @@ class Vectors(Description):
             allowed = replace(asked.budget, margin=margin).left_out
             return accuracy.tail_cutoff(modes, seen.at, mass=asked.mass, tolerance=allowed, **asked.law)
 
-        modes = seen.modes(cutoff)
+        modes = seen.needed_modes(cutoff)
         elements, n_dofs = seen.elements, seen.fine.system.n_dofs
         forecast = replace(self.forecast, n_modes=seen.count, size=elements.size, n_dofs=n_dofs)
         return replace(self, forecast=forecast, elements=elements, seen=seen, whole=seen.whole), modes

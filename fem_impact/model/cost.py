@@ -59,7 +59,7 @@ class Work:
     @property
     def seconds(self) -> float:
         """Processor time [s] on this machine if it has been measured, else on a typical one."""
-        return self.on(known() or REFERENCE)
+        return self.on(this_machine() or REFERENCE)
 
     def on(self, machine: "Machine") -> float:
         """Processor time [s] on a machine."""
@@ -181,14 +181,14 @@ def _fastest(work: Callable[[], object]) -> float:
 
 
 @cache
-def known() -> Machine | None:
+def this_machine() -> Machine | None:
     """This machine as measured before, None if it was not; the same as long as the process lives."""
     return read()
 
 
 def whose() -> str:
     """The machine that predicted seconds belong to, in words."""
-    return "a typical machine (`fem-impact doctor` measures yours)" if known() is None else "this machine"
+    return "a typical machine (`fem-impact doctor` measures yours)" if this_machine() is None else "this machine"
 
 
 def installed() -> float:

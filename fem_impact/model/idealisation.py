@@ -108,8 +108,10 @@ class Surroundings:
         """
         corners = mesh.points[mesh.cells]
         sides = np.roll(corners, -1, axis=1) - corners
+        turns = np.sign(sides[:, 0, 0] * sides[:, 1, 1] - sides[:, 0, 1] * sides[:, 1, 0])  # which way round they go
+        turns = np.sign(sides[:, 0, 0] * sides[:, 1, 1] - sides[:, 0, 1] * sides[:, 1, 0])  # which way round they go
         off = at - corners
-        inside = (sides[..., 0] * off[..., 1] - sides[..., 1] * off[..., 0]) * np.sign(_turn(corners))[:, None] >= 0.0
+        inside = (sides[..., 0] * off[..., 1] - sides[..., 1] * off[..., 0]) * turns[:, None] >= 0.0
         if not inside.all(axis=1).any():
             return None
         ends = np.stack([mesh.points[mesh.facets[:, 0]], mesh.middles, mesh.points[mesh.facets[:, 1]]], axis=1)
@@ -130,11 +132,6 @@ class Surroundings:
         return max(1.0, float(self.edges[self.edges[:, 0] <= zone, 1].sum()) / straight)
 
 
-def _turn(corners: np.ndarray) -> np.ndarray:
-    a, b = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
-    return a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]
-
-
 def unyielding(point: np.ndarray, mass: float) -> Modes:
     """A rigid, fixed body of a mass [kg], struck at a point (dimension,) [m]: one mode that is zero there."""
     nothing = np.zeros((1, 1))
@@ -144,15 +141,10 @@ def unyielding(point: np.ndarray, mass: float) -> Modes:
 def endless(point: np.ndarray, mass: float, mobility: float, duration: float) -> Modes:
     """An infinite plate struck at a point (2,) [m]: the velocity there is mobility [m/(N s)] times force.
 
-    Notes
-    -----
     One strongly overdamped mode, which follows the force at once and does not spring back. The displacement of an
     infinite Kirchhoff plate after a unit impulse is a step, the mobility: 1 / (8 sqrt(rigidity mass-per-area)), or
-    `Waves.mobility` if orthotropic.
-
-    References
-    ----------
-    Cremer, Heckl and Petersson, Structure-Borne Sound, 3rd ed. (2005), section 5.3; Zener (1941), Phys. Rev. 59, 669.
+    `Waves.mobility` if orthotropic. Cremer, Heckl and Petersson, Structure-Borne Sound, 3rd ed. (2005), section 5.3;
+    Zener (1941), Phys. Rev. 59, 669.
     """
     rate = 1.0 / (SAME * duration)  # 2 zeta omega
     omega = np.sqrt(ROUNDING / duration * rate)
@@ -162,23 +154,13 @@ def endless(point: np.ndarray, mass: float, mobility: float, duration: float) ->
 
 
 def rigid_error(modes: Modes, at: np.ndarray, mass: float, duration: float) -> float:
-    """Error [-] of treating a body with known modes as rigid.
+    """Error [-] of treating a body with known modes, up to several times the contact frequency, as rigid.
 
-    Parameters
-    ----------
-    modes : Modes
-        Modes of the body up to several times the contact frequency.
-    at : strike point, (dimension,) [m]
-    mass : float [kg]
-        Mass of the striker felt at its contact point.
-    duration : float [s]
-        Contact time on a rigid wall.
-
-    Notes
-    -----
-    The larger of two errors: the energy left in the body changes the restitution, and the body's deflection changes
-    contact time and peak force. Each mode responds to a half-sine force with the least of its impulsive, quasi-static
-    and drift responses. The result is 0.9 to 3 times the measured error, for Hertz and linear contacts.
+    Struck at a point (dimension,) [m] by a striker whose ``mass`` [kg] is felt at its contact point; ``duration`` [s]
+    is the contact time on a rigid wall. The larger of two errors: the energy left in the body changes the restitution,
+    and the body's deflection changes contact time and peak force. Each mode responds to a half-sine force with the
+    least of its impulsive, quasi-static and drift responses. The result is 0.9 to 3 times the measured error, for Hertz
+    and linear contacts.
     """
     omega_0 = np.pi / duration
     point = at[None]
@@ -190,22 +172,10 @@ def rigid_error(modes: Modes, at: np.ndarray, mass: float, duration: float) -> f
 
 
 def rigid_bound(view: Surroundings, body_mass: float, rate: float, free: bool, mass: float, duration: float) -> float:
-    """Upper bound [-] of `rigid_error` for a plate without known modes.
+    """Upper bound [-] of `rigid_error` for a plate of a mass [kg] without known modes; ``free``: some edge is.
 
-    Parameters
-    ----------
-    view : Surroundings
-    body_mass : float [kg]
-    rate : float [m**2/s]
-        sqrt(rigidity / mass per area), in the softest direction, or less.
-    free : bool
-        Whether some edge is free.
-    mass, duration : as in `rigid_error`
-
-    Notes
-    -----
-    Weyl's mode count with twice its edge term, plus three rigid motions; every mode has the largest possible shape at
-    the strike point.
+    ``rate`` [m**2/s] is sqrt(rigidity / mass per area), in the softest direction, or less. Weyl's mode count with twice
+    its edge term, plus three rigid motions; every mode has the largest possible shape at the strike point.
     """
     omega_0 = np.pi / duration
     ratio = np.geomspace(1e-6, 1e6, 4001)  # omega / omega_0
@@ -229,24 +199,13 @@ def slowest_rate(view: Surroundings, first_frequency: float) -> float:
 def endless_error(
     view: Surroundings, mobility: float, rate: float, mass: float, duration: float, *, slowest: float | None = None
 ) -> float:
-    """Error [-] of treating a plate as infinite; inf if the echo may reach the striker.
+    """Error [-] of treating a plate as infinite, of that mobility [m/(N s)]; inf if the echo may reach the striker.
 
-    Parameters
-    ----------
-    view : Surroundings
-    mobility : float [m/(N s)]
-        Mobility of the infinite plate.
-    rate : float [m**2/s]
-        sqrt(rigidity / mass per area); of an orthotropic plate `Waves.fastest`, with the view in its stretched plane.
-    mass, duration : as in `rigid_error`
-    slowest : float [m**2/s], optional
-        `Waves.slowest` of an orthotropic plate.
-
-    Notes
-    -----
-    An edge at distance d adds the ``Si(d**2 / (rate t))`` term of its image to the displacement. The smooth pulse
-    averages the ripple of this term down to the inverse square of ``d**2 / (rate T)``. The striker cannot touch again
-    if, when the echo returns, it is farther away than all modes in phase could lift the plate.
+    ``rate`` [m**2/s] is sqrt(rigidity / mass per area); of an orthotropic plate `Waves.fastest`, with the view in its
+    stretched plane, and ``slowest`` its `Waves.slowest`; mass and duration as in `rigid_error`. An edge at distance d
+    adds the ``Si(d**2 / (rate t))`` term of its image to the displacement. The smooth pulse averages the ripple of this
+    term down to the inverse square of ``d**2 / (rate T)``. The striker cannot touch again if, when the echo returns, it
+    is farther away than all modes in phase could lift the plate.
     """
     ratio = 0.5 * mass * mobility * np.pi / duration  # damping ratio of a linear contact
     if ratio > HEAVIEST:
@@ -265,13 +224,9 @@ def endless_error(
 
 
 def from_outside(target: Target, at: Any, mass: float, duration: float) -> Outside | None:
-    """What is known of a target without finite elements; None if that is not enough.
+    """What is known of a target struck at a point on it without finite elements; None if that is not enough.
 
-    Parameters
-    ----------
-    target : Target
-    at : strike point on the body, (dimension,) [m]
-    mass, duration : as in `rigid_error`
+    Mass and duration as in `rigid_error`.
     """
     mesh, section, find, at = target.mesh, target.section, target.closed, np.asarray(at, float)
     if mesh is None or section is None:

@@ -46,21 +46,11 @@ MOST_VECTORS = 1000
 
 
 def first_frequency(mass: float, mobility: float, echo: float, duration: float) -> float:
-    """Frequency [Hz] to begin with.
+    """Frequency [Hz] to begin with, for a striker [kg], a plate's mobility [m/(N s)] and contact time on a wall [s].
 
-    Parameters
-    ----------
-    mass : float [kg] of the striker
-    mobility : float [m/(N s)] of the infinite plate
-    echo : float [s]
-        Squared distance of the nearest edge over sqrt(rigidity / mass per area): times omega, the phase of an echo.
-    duration : float [s]
-        Contact time on a rigid wall.
-
-    Notes
-    -----
-    Five times the rate at which the striker slows down: above, a force hardly changes its speed. But the first echo
-    turns by 10 rad at least, a turn and a half: the plate is wider than the wave is long.
+    ``echo`` [s] is the squared distance of the nearest edge over sqrt(rigidity / mass per area): times omega, the phase
+    of an echo. Five times the rate at which the striker slows down: above, a force hardly changes its speed. But the
+    first echo turns by 10 rad at least, a turn and a half: the plate is wider than the wave is long.
     """
     return max(5.0 / max(mass * mobility, duration), 10.0 / echo) / (2.0 * np.pi)
 
@@ -87,23 +77,12 @@ def kept_share(omega: np.ndarray, mobility: float, above: np.ndarray, shape: np.
 
 
 def mixed(modes: Modes, at: Any, mobility: float, frequency: float, highest: float) -> Modes:
-    """A plate by its modes below a frequency and as an infinite one above it, as seen from one point.
+    """A plate by its modes below a frequency [Hz] and as an infinite one above it, as seen from a point (2,) [m].
 
-    Parameters
-    ----------
-    modes : Modes
-        All modes up to `REACH` times the frequency; those above are not used.
-    at : strike point, (2,) [m]
-    mobility : float [m/(N s)] of the infinite plate
-    frequency : float [Hz]
-        Above it, echoes are left out.
-    highest : float [Hz]
-        Above it, the infinite plate acts as a spring.
-
-    Notes
-    -----
-    `Modes.poorer` holds the same of poorer descriptions, and last for half the frequency, so that a blow states the
-    error of the echoes left out.
+    ``modes`` are all up to `REACH` times the frequency, ``mobility`` [m/(N s)] is that of the infinite plate, which
+    acts as a spring above a ``highest`` frequency [Hz]; echoes are left out above the first one. `Modes.poorer` holds
+    the same of poorer descriptions, and last for half the frequency, so that a blow states the error of the echoes left
+    out.
     """
     point = modes.point("at", at)
     poorer = {cause: _mixed(other, point, mobility, frequency, highest) for cause, other in modes.poorer.items()}

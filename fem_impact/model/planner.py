@@ -202,7 +202,7 @@ def _noted(asked: Asked) -> Iterator[None]:
     except check.SimulationError as error:
         target = asked.blow.target
         assumed = () if target.mesh is None else target.mesh.notes
-        slips = [note for note in (*target.notes, *asked.slips) if note not in assumed]
+        slips = [note for note in (*target.assumed, *asked.slips) if note not in assumed]
         if not slips or str(error).startswith(slips[0]):
             raise
         raise check.SimulationError(f"{'; '.join(slips)}: {error}") from None

@@ -20,7 +20,7 @@ from ..impact.engine import again
 from ..impact.history import History
 from ..impact.response import Response
 from ..modes.modal import Modes
-from .bending import Bending, Known, bending, known
+from .bending import Bending, Known, bending, known_of
 
 
 @dataclass(frozen=True, eq=False)
@@ -44,11 +44,6 @@ class Struck:
     def bending(self) -> Bending | None:
         """Integrals of the target's shapes; None if they are not known or the target was simplified."""
         return None if self.target is None or self.ideal else bending(self.target)
-
-    @cached_property
-    def striker_bending(self) -> Bending | None:
-        """Integrals of the striker's shapes, if it is a flexible body that is known."""
-        return None if self.striker is None else bending(self.striker)
 
     @property
     def quantities(self) -> tuple[str, ...]:
@@ -131,7 +126,7 @@ class Struck:
         modes = self.hit.target
         body, integrals = self.target, self.bending
         if modes is not self.hit.bodies[-1]:
-            body = known(modes)
+            body = known_of(modes)
             integrals = None if body is None else bending(body)
         energy = self.hit.modal_energy([self.end])[0]
         band = self.hit.quantities["sound"] or np.inf

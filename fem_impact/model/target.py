@@ -176,7 +176,7 @@ class Target:
         return self.mesh is not None and self.mesh.size_stated
 
     @property
-    def notes(self) -> tuple[str, ...]:
+    def assumed(self) -> tuple[str, ...]:
         """What the mesh assumed, and numbers of the body that are probably a slip of a unit."""
         if self.mesh is None or self.section is None:
             return () if self.modes is None else self.modes.notes
@@ -302,18 +302,9 @@ class Target:
     ) -> Modes:
         """Modes before `finished`: the first ``n_modes``, or those up to a frequency [Hz] if it is given.
 
-        Parameters
-        ----------
-        tolerance : float [-]
-            Largest error of the first modes' frequencies.
-        size : float [m], optional
-            Element size that replaces the mesh's own.
-        first : Modes, optional
-            Modes found before; their mesh is refined if it cannot resolve the frequency.
-        stages : Stages, optional
-            Measures meshing and assembly.
-        keep : path of an .npz file, optional
-            As in `find_modes`.
+        ``tolerance`` [-] is the largest error of the first modes' frequencies; an element ``size`` [m] replaces the
+        mesh's own. The mesh of modes found ``first`` is refined if it cannot resolve the frequency. ``stages`` measure
+        meshing and assembly; ``keep`` as in `find_modes`.
         """
         reach: dict[str, Any] = {"n_modes": n_modes} if max_frequency is None else {"max_frequency": max_frequency}
         if self.modes is not None:

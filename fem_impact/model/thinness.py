@@ -14,7 +14,7 @@ import numpy as np
 
 from ..fe.section import SHEAR, Beam, Plate
 from ..impact.assumption import Assumption, allowed
-from .bending import Bending, Known
+from .bending import Bending, Known, bending
 from .deflection import OTHER
 from .restrike import Doubt, Struck, softer
 
@@ -134,7 +134,7 @@ def examine_striker(struck: Struck) -> Assumption:
     hit, history, modes = struck.hit, struck.hit.history, struck.bodies[0]
     if not modes.dimension or not (modes.omega > 0.0).any() or modes.thick:
         return STRIKER.holds(struck)
-    body, integrals = struck.striker, struck.striker_bending
+    body, integrals = struck.striker, None if struck.striker is None else bending(struck.striker)
     columns, omega, shape = hit.body_slice(0), history.omega.copy(), history.shape.copy()
     if body is None or body.thickness is None or integrals is None or integrals.thick is None:
         if struck.foreseen:

@@ -153,6 +153,7 @@ class Seen:
     spent: bool  # whether more vectors no longer help
     fine: Krylov
     coarse: Krylov  # on larger elements; on smaller ones if the user insists on a size and the outline allows no larger
+    kind: type[Krylov] = Krylov
 
     def __init__(
         self, target: Target, at: Any, resonance: float, tolerance: float, elements: Elements, fixed: bool,
@@ -168,25 +169,17 @@ class Seen:
             self.elements, other = other, self.elements
         self.fine, self.coarse = self._krylov(self.elements), self._krylov(other)
 
-    def _stuck(self, truncation: float) -> bool:
-        """Whether the last steps towards more vectors gained nothing.
-
-        An error is 1 until two descriptions agree on the impacts of the blow, which may take twice as many steps.
-        """
-        self.tried.append(truncation)
-        return hopeless(self.tried, 3 if truncation < 1.0 else 6)
-
     def _krylov(self, elements: Elements) -> Krylov:
         system = self.target.near(self.at, elements, self.stages)
         with self.stages("vectors"):
-            return Krylov(system, self.at, self.shift)
+            return self.kind(system, self.at, self.shift)
 
     @property
     def at_rest(self) -> bool:
         """Whether the point struck lies on a support, where no vector can start."""
         return bool((self.fine.compliance.diagonal() <= point_load.RESTS).any())
 
-    def modes(self, cutoff: Callable[[Modes, float], float]) -> Modes:
+    def needed_modes(self, cutoff: Callable[[Modes, float], float]) -> Modes:
         """The target as struck; Ritz pairs above ``cutoff`` [Hz], of them and a safety factor, act as a spring."""
         self.whole, kept = self._struck(self.fine, self.coarse, cutoff)
         return kept
@@ -207,7 +200,11 @@ class Seen:
             return False
         # the error of the mesh contains that of too few vectors: it is at fault if it is three times as large
         coarse = error.mesh > max(3.0 * error.truncation, 0.5 * allowed)
-        self.spent = self.spent or (not coarse and (self.count >= MOST_VECTORS or self._stuck(error.truncation)))
+        if not self.spent and not coarse:
+            self.tried += [error.truncation] * (self.count < MOST_VECTORS)
+            # it is 1 until two descriptions agree on the impacts of the blow, which may take twice as many steps
+            patience = 3 if error.truncation < 1.0 else 6
+            self.spent = self.count >= MOST_VECTORS or hopeless(self.tried, patience)
         if not coarse and not self.spent:
             # less than 1.4 times as many gain too little for a run, more may overshoot
             self.count, self.margin = min(MOST_VECTORS, round(1.4 * self.count)), NOTCH * self.margin
@@ -216,7 +213,8 @@ class Seen:
         useless = self.spent and error.truncation > allowed
         if error.mesh <= 0.5 * allowed or self.fixed or useless or more > refinement.MOST_UNKNOWNS:
             return False
-        self._refine()
+        self.elements = finer(self.target, self.elements, self.stages)
+        self.fine, self.coarse = self._krylov(self.elements), self.fine
         return True
 
     def work(self, before: int) -> cost.Work:
@@ -225,8 +223,3 @@ class Seen:
         if not new:
             return cost.on_mesh(fine, self.count, self.count)
         return cost.on_mesh(fine, new, self.count) + cost.on_mesh(self.coarse.system.n_dofs, new, self.count)
-
-    def _refine(self) -> None:
-        """Take a finer mesh; the last one is then the coarser."""
-        self.elements = finer(self.target, self.elements, self.stages)
-        self.fine, self.coarse = self._krylov(self.elements), self.fine

@@ -11,7 +11,6 @@ import numpy as np
 from ..fe.assembly import System
 from ..modes.modal import Modes
 from ..modes.ritz import Krylov
-from .target import Elements
 from .vectors import Seen
 
 # [-] points that share a mesh, to limit the work: each adds elements that shrink towards it; fewer make more meshes
@@ -35,11 +34,7 @@ class Views(Seen):
 
     fine: Krylovs
     coarse: Krylovs
-
-    def _krylov(self, elements: Elements) -> Krylovs:
-        system = self.target.near(self.at, elements, self.stages)
-        with self.stages("vectors"):
-            return Krylovs(system, self.at, self.shift)
+    kind = Krylovs
 
     def of(self, point: int, cutoff: Callable[[Modes, float], float]) -> Modes:
         """The target as seen from one of the points; ``cutoff`` as in `Seen.modes`."""

@@ -137,18 +137,7 @@ def in_air(
         return modes
     how: dict[str, Any] = {"density": density, "speed": speed, "sides": sides, "baffled": baffled}
     poorer = {cause: in_air(other, **how) for cause, other in modes.poorer.items()}
-    area = measure(points, cells)
-    # [1/m] of the highest mode, by Weyl's law, or of its sound
-    wave = max(np.sqrt(4.0 * np.pi * modes.n_modes / area), modes.omega[-1] / speed)
-    size = min(2.0 * np.pi / wave / PER_WAVE, np.sqrt(area) / FEWEST)
-    share = 1.0 if baffled else 0.5
-    spacing = size / SAMPLES[0]
-    if not modes.n_modes * area / spacing**2 <= MOST_SAMPLES:
-        raise ValueError(
-            f"speed of sound in the air must be higher or modes fewer, got {speed:g} m/s: {modes.n_modes} modes on a "
-            f"grid for waves of {2.0 * np.pi / wave:.2g} m, the shortest of plate or sound, take more than "
-            f"{MOST_SAMPLES:.0e} numbers"
-        )
+    share, spacing = 1.0 if baffled else 0.5, _spacing(modes, measure(points, cells), speed)
     samples, missed = _sampled(modes.shapes, spacing)
     weight = density * sides * share / (2.0 * np.pi)
     found, other = (_Air(modes, _strengths(samples, spacing, n), n * spacing, weight, speed) for n in SAMPLES)
@@ -160,7 +149,10 @@ def in_air(
         found.damping(own, omega), sparse.damping(own, omega), other.damping(mixed, lower), missed[modes.n_rigid :]
     )
     better = 1.0 - shift / GAIN  # the error of square cells shrinks with their area
-    mix = _complete(own, modes.omega[modes.n_rigid :], omega) * better
+    # the nearest mixtures (n, n) that together give the static deflections of the old modes
+    stiff = modes.omega[modes.n_rigid :, None] / omega
+    turned, _, back = np.linalg.svd(own * stiff, full_matrices=False)
+    mix = (turned @ back) / modes.omega[modes.n_rigid :, None] * omega * better
     omega *= better
     # the two grids agree by chance where the shift changes its sign, so that no mode is surer than those below it
     heavier = modes.omega[modes.n_rigid :] / omega - 1.0
@@ -187,6 +179,20 @@ def in_air(
         air=True,
         damping_error=np.concatenate([rest, unsure[order]]),
     )
+
+
+def _spacing(modes: Modes, area: float, speed: float) -> float:
+    """Distance [m] of the points at which shapes are sampled on a plate of an area [m^2]."""
+    # [1/m] of the highest mode, by Weyl's law, or of its sound
+    wave = max(np.sqrt(4.0 * np.pi * modes.n_modes / area), modes.omega[-1] / speed)
+    spacing = min(2.0 * np.pi / wave / PER_WAVE, np.sqrt(area) / FEWEST) / SAMPLES[0]
+    if not modes.n_modes * area / spacing**2 <= MOST_SAMPLES:
+        raise ValueError(
+            f"speed of sound in the air must be higher or modes fewer, got {speed:g} m/s: {modes.n_modes} modes on a "
+            f"grid for waves of {2.0 * np.pi / wave:.2g} m, the shortest of plate or sound, take more than "
+            f"{MOST_SAMPLES:.0e} numbers"
+        )
+    return float(spacing)
 
 
 def _extrapolated(
@@ -243,12 +249,8 @@ class _Air:
         nearest = mean_inverse_distance(*(n // 2 + 1 for n in self.padded))
         self.inverse = nearest[steps[0], steps[1]] / size  # (padded) [1/m] mean of 1 / R between two cells
 
-    def added_mass(self, modes: slice, omega: float) -> np.ndarray:
-        """Mass [-] that air adds between some modes at a frequency [rad/s]."""
-        return self._added(self.strength[modes], rfft2(self.strength[modes], self.padded), omega)
-
     def _added(self, strength: np.ndarray, spectrum: np.ndarray, omega: float) -> np.ndarray:
-        """The same between sources (n, nx, ny) with a known spectrum."""
+        """Mass [-] that air adds between sources (n, nx, ny) with a known spectrum, at a frequency [rad/s]."""
         matrix = self._product(strength, spectrum, self._pressing(omega))
         return 0.5 * self.weight * (matrix + matrix.T)
 
@@ -328,12 +330,6 @@ class _Air:
                     break
             own = vector[:, 0]
             vectors[window, i] = own if own[np.abs(own).argmax()] > 0.0 else -own
-
-
-def _complete(vectors: np.ndarray, old: np.ndarray, omega: np.ndarray) -> np.ndarray:
-    """The nearest mixtures (n, n) that together give the static deflections of the old modes."""
-    turned, _, back = np.linalg.svd(vectors * (old[:, None] / omega), full_matrices=False)
-    return (turned @ back) / old[:, None] * omega
 
 
 def _sampled(shapes: Shapes, spacing: float) -> tuple[np.ndarray, np.ndarray]:

@@ -157,14 +157,10 @@ def _green(edge: str, nu: float, place: np.ndarray, load: np.ndarray) -> float:
     # remove the rigid motion: project `bent` on 1 and on r cos; reciprocity gives the clamped parts
     mean = q**2 / 64.0 + uniform * 2.0 * np.pi / (64.0 * 6.0) + b[0] * 2.0 * np.pi / 4.0
     turn = (rho**5 - 2.0 * rho**3 + rho) / 192.0 + linear * np.pi / (192.0 * 8.0)
-    turn += _first_order(nu, rho) * np.pi / 6.0
+    # coefficient of r**3 cos(gamma) in the correction
+    first = 8.0 * (1.0 - rho**2) * rho / (16.0 * np.pi) - 4.0 * rho / np.pi * (20.0 + 4.0 * nu) / 192.0
+    turn += -first / (6.0 + 2.0 * nu) * np.pi / 6.0
     return bent - mean / np.pi - 4.0 * turn * r * cosine / np.pi
-
-
-def _first_order(nu: float, rho: float) -> float:
-    """Coefficient of r**3 cos(gamma) in the free disk's correction."""
-    moment = 8.0 * (1.0 - rho**2) * rho / (16.0 * np.pi) - 4.0 * rho / np.pi * (20.0 + 4.0 * nu) / 192.0
-    return -moment / (6.0 + 2.0 * nu)
 
 
 def disk(
@@ -245,7 +241,7 @@ def disk(
     scale = np.concatenate([[1.0, 2.0, 2.0][:n_rigid], _norm(*(x[n_rigid:] for x in (wavenumber, order, weights)))])
     shapes = DiskShapes(radius, edge, ratio, wavenumber, order, weights, phases, scale)
     notes = plausible.doubted_sizes((2.0 * radius, 2.0 * radius), section)
-    return asked.modes(shapes, (wavenumber**2 * root_area) ** 2, notes)
+    return asked.answered(shapes, (wavenumber**2 * root_area) ** 2, notes)
 
 
 def _norm(z: np.ndarray, n: np.ndarray, weight: np.ndarray) -> np.ndarray:

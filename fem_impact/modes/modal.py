@@ -298,7 +298,7 @@ class Modes(check.Brief):
         rows = [(i, *map(str.format, forms, row)) for i, row in enumerate(zip(*columns), 1)]
         more = f" The first {SHOWN}:" if self.n_modes > SHOWN else ""
         span = f"{self.n_modes} modes up to {self.frequencies[-1]:.5g} Hz of a body of {self.mass:.4g} kg."
-        return f"<p>{span}{more}</p>{markup.table(rows, head)}{markup.notes(self.notes)}"
+        return f"<p>{span}{more}</p>{markup.table(rows, head)}{markup.note_list(self.notes)}"
 
     def to_pyvista(self) -> Any:
         """The body as a `pyvista.UnstructuredGrid`, refined until smooth to the eye.

@@ -199,7 +199,7 @@ def rectangle(
     values = omega(*numbers.T) ** 2
     notes = plausible.doubted_sizes((length, width), section)
     shapes = RectangleShapes(length, width, numbers)
-    return asked.modes(shapes, values, notes)
+    return asked.answered(shapes, values, notes)
 
 
 def _lattice(length: float, width: float, wavenumber_squared: float, most: int) -> tuple[np.ndarray, np.ndarray]:

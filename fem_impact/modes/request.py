@@ -36,7 +36,7 @@ class Request:
             return check.MOST, 2.0 * np.pi * frequency / self.rate
         return check.MOST, frequency / check.positive("first_frequency", self.first_frequency, "Hz") * first
 
-    def modes(self, shapes: Any, values: np.ndarray, notes: tuple[str, ...]) -> Modes:
+    def answered(self, shapes: Any, values: np.ndarray, notes: tuple[str, ...]) -> Modes:
         """The modes of this body from their shapes and omega**2, both at unit mass and rigidity."""
         if self.rate is not None:
             factor = self.rate

@@ -174,7 +174,7 @@ def beam(
     stout = _stoutness(theory, section, length, slenderness, shear_ratio)
     notes = plausible.doubted_sizes((length,), section)
     if stout is not None:
-        return replace(asked.modes(*_timoshenko(stout, pair, length, asked), notes), thick=True)
+        return replace(asked.answered(*_timoshenko(stout, pair, length, asked), notes), thick=True)
     rigid = _rigid(pair)
     first = float(_roots(pair, 1)[0] ** 2)
     count, reach = asked.count(first, MOST_MODES)
@@ -186,7 +186,7 @@ def beam(
     weights = np.vstack([np.column_stack([rigid, np.zeros_like(rigid)]), _weights(pair, k)])
     shapes = BeamShapes(length, pair, np.concatenate([np.zeros(len(rigid)), k]), weights)
     values = np.concatenate([np.zeros(len(rigid)), k**4])
-    return asked.modes(shapes, values, notes)
+    return asked.answered(shapes, values, notes)
 
 
 def _stoutness(

@@ -14,7 +14,6 @@ from ..impact.contact import Contact, acting_stiffness, wall_time
 from ..impact.response import Response
 from ..mesh.meshes import Mesh
 from ..model import vectors
-from ..model.audit import audited
 from ..model.target import Stages
 from ..modes.modal import Modes
 from ..modes.shapes import SampledShapes
@@ -86,16 +85,9 @@ class Setup:
         striker, law = self.base.striker, self.base.contact
         flexible = striker.modes.frequencies[striker.modes.omega > 0.0]
         bending = float(flexible[0]) if self.scene.striker.kind == "stick" else None
-        return Settings(
-            striker.mass,
-            1.0,
-            law.exponent,
-            self.base.speed,
-            bending,
-            tuple(self.base.at.tolist()),
-            float(np.median(self.base.modes.damping_ratio)),
-            None if law.remembers else law.loss,
-        )
+        damping = float(np.median(self.base.modes.damping_ratio))
+        at, loss = tuple(self.base.at.tolist()), None if law.remembers else law.loss
+        return Settings(striker.mass, 1.0, law.exponent, self.base.speed, bending, at, damping, loss)
 
     def range(self, name: str) -> tuple[float, float]:
         """Lowest and highest value of a slider."""
@@ -130,7 +122,9 @@ class Setup:
         if body is not None:
             case = replace(case, modes=body)
         elif rest is not None:
-            case = replace(case, modes=self._sampled(settings.at, rest))
+            known, point = self.base.modes, np.array([settings.at])
+            shapes = SampledShapes(point, known.shape_at(point), known.modal_compliance(point) + rest)
+            case = replace(case, modes=replace(known, shapes=shapes))
         modes, ratio = case.modes, settings.thickness
         if settings.damping != self.start.damping:
             modes = modes.damped(settings.damping)
@@ -138,11 +132,6 @@ class Setup:
             modes = modes.stretched(ratio, ratio)
         case = replace(case, modes=modes)
         return case.changed("speed", settings.speed).changed("at", settings.at)
-
-    def _sampled(self, at: tuple[float, ...], rest: float) -> Modes:
-        modes, point = self.base.modes, np.array([at])
-        static = modes.modal_compliance(point) + rest
-        return replace(modes, shapes=SampledShapes(point, modes.shape_at(point), static))
 
     @property
     def by_vectors(self) -> bool:
@@ -218,20 +207,12 @@ class Setup:
             return None
 
 
-def blow(case: grid.Case, tolerance: float = collision.TOLERANCE) -> Response:
-    """The blow of a case; raises SimulationError if the integration fails."""
-    hit = collision.strike(case.modes, case.striker, case.contact, at=case.at, speed=case.speed, tolerance=tolerance)
-    return audited(hit)
-
-
 def quick(case: grid.Case, most: int = 6) -> Response:
     """The same in a few milliseconds, whatever the case: in coarse steps, with few impacts and no mesh error."""
     law, mass = case.contact, case.striker.felt_mass
     wall = float(wall_time(acting_stiffness(law.numbers, 1.0 / mass, case.speed), law.exponent, 1.0 / mass, case.speed))
-    return collision.strike(
-        replace(case.modes, poorer={}), case.striker, law, at=case.at, speed=case.speed, tolerance=MAP_TOLERANCE,
-        scheme="A4", dt=wall / 16.0, max_impacts=most,
-    )  # fmt: skip
+    alone = replace(case, modes=replace(case.modes, poorer={}))
+    return alone.blow(tolerance=MAP_TOLERANCE, scheme="A4", dt=wall / 16.0, max_impacts=most)
 
 
 def limit_of(case: grid.Case) -> float:

@@ -23,7 +23,7 @@ from ..show.figures import SPECTRUM_DEPTH
 from ..sweeps.grid import Case
 from . import report
 from .explore_map import Mapper, Picture, Window
-from .explore_model import MAP_TOLERANCE, Settings, Setup, blow, limit_of, quick
+from .explore_model import MAP_TOLERANCE, Settings, Setup, limit_of, quick
 
 BAND = (20.0, 20e3)  # [Hz] of the spectrum: the audible range
 SPECTRUM_POINTS = 240  # [-] more points take time but show no more
@@ -85,9 +85,12 @@ class Explorer:
         if self.limit[0] != about:  # contact, speed and damping do not change it
             self.limit = about, limit_of(case)
         resonance, limit = case.resonance, self.limit[1]
+        ratio = f"body {'never' if limit else 'always'} stops it"
+        if 0.0 < limit < math.inf:
+            ratio = f"{resonance / limit:.2g} × threshold"
         message = {
             "resonance": resonance, "limit": limit if 0.0 < limit < math.inf else None,
-            "resonates": _resonates(resonance, limit),
+            "resonates": f"{si(resonance, 'Hz', 3)}, {ratio}",
             "scene": markup.data_uri("application/toml", written(self.setup.saved(settings)).encode()),
         }  # fmt: skip
         return message | ({} if hit is None else _spectrum(hit))
@@ -97,7 +100,7 @@ class Explorer:
         view = self.look(settings.at)
         case = self.setup.case(settings, body=view.body)
         try:
-            hit = blow(case, self.setup.tolerance)
+            hit = case.blow(tolerance=self.setup.tolerance)
         except SimulationError as error:
             return {"failed": str(error)}
         return {
@@ -118,14 +121,18 @@ class Explorer:
             if self.setup.at_rest(point):
                 return {"uri": "", "note": f"Silent: the body does not move at {place(point)}."}
         try:
-            rung = blow(case, self.setup.tolerance) if rate is None else rolled(case, rate)
+            rung = case.blow(tolerance=self.setup.tolerance) if rate is None else rolled(case, rate)
             if height > 0.0:
                 heard = sound.radiate(rung, (*where, height), duration=PLAYED)
             else:
                 heard = sound.synthesise(rung, where, duration=PLAYED)
         except (SimulationError, ValueError) as error:
             return {"uri": "", "note": str(error)}
-        uri, note = _sounding(heard)
+        level = heard.peak_level
+        raised = max(0.0, report.QUIET - level) if math.isfinite(level) else 0.0  # of a sound that is quiet
+        note = f"Peak {heard.said}; full scale {heard.full_scale:g} {heard.unit}"
+        note = (note + (f", raised here by {raised:.1f} dB." if raised else ".")).replace("-", "−")
+        uri = report.audio(heard.samples * 10.0 ** (raised / 20.0), heard.rate)
         place_of = f"{si(height, 'm', 3)} above {place(where)}" if height > 0.0 else f"the surface at {place(where)}"
         return {"uri": uri, "note": f"Heard from {place_of}. {note}"}
 
@@ -197,24 +204,8 @@ def _numbers(hit: Response, exact: bool) -> list[tuple[str, str]]:
     ]
 
 
-def _resonates(resonance: float, limit: float) -> str:
-    ratio = f"body {'never' if limit else 'always'} stops it"
-    if 0.0 < limit < math.inf:
-        ratio = f"{resonance / limit:.2g} × threshold"
-    return f"{si(resonance, 'Hz', 3)}, {ratio}"
-
-
 def _described(modes: Modes) -> str:
     """What carries the blow, in words."""
     if modes.poorer:
         return f"{modes.n_modes} Ritz vectors started from the strike point"
     return f"the first {modes.n_modes} modes"
-
-
-def _sounding(heard: sound.Sound) -> tuple[str, str]:
-    """The sound as a data URI, raised if it is quiet, and its level in words."""
-    level = heard.peak_level
-    raised = max(0.0, report.QUIET - level) if math.isfinite(level) else 0.0
-    note = f"Peak {heard.said}; full scale {heard.full_scale:g} {heard.unit}"
-    note += f", raised here by {raised:.1f} dB." if raised else "."
-    return report.audio(heard.samples * 10.0 ** (raised / 20.0), heard.rate), note.replace("-", "−")

@@ -67,7 +67,9 @@ class Session:
             raise ValueError("a message must be a table")
         turned = check_sliders(self.ends, message.get("turn", {}))
         if "play" in message:
-            self._listen(bool(message["play"] == "roll"))
+            self.roll = bool(message["play"] == "roll")
+            self.send({"kind": "sound", "uri": "", "note": "Computing the sound …"})
+            self._start("listen", self._play)
         elif "view" in message:
             view = message["view"]
             if view is not None and not isinstance(view, dict):
@@ -155,9 +157,8 @@ class Session:
         ended = worker.ended
         answer = await asyncio.wrap_future(worker.ask(function, *arguments))
         if worker.ended > ended:
-            self.send(
-                {"kind": "note", "text": "A process beside this page had ended; another one has taken its place."}
-            )
+            note = "A process beside this page had ended; another one has taken its place."
+            self.send({"kind": "note", "text": note})
         return answer
 
     async def _judge(self) -> None:
@@ -214,11 +215,6 @@ class Session:
         while not picture.finest:
             picture = await made(Mapper.finer, picture)
         sent(picture, exact=True)
-
-    def _listen(self, roll: bool) -> None:
-        self.roll = roll
-        self.send({"kind": "sound", "uri": "", "note": "Computing the sound …"})
-        self._start("listen", self._play)
 
     async def _play(self) -> None:
         """The sound that was asked for last."""

@@ -50,7 +50,11 @@ def profiles(found: Found) -> Any:
             axes.axhline(level, color=VERMILION, ls="--", lw=1.0)
             if profile.told != "open":
                 axes.axvspan(*profile.interval(), color=SKY, alpha=0.2, lw=0)
-            low, high = _around(profile) if profile.told == "told" else (profile.values[0], profile.values[-1])
+            low, high = profile.values[0], profile.values[-1]
+            if profile.told == "told":  # the interval and 80 % of it on either side
+                low, high = profile.interval()
+                wide = (high / low) ** 0.8 if profile.log else 0.8 * (high - low)
+                low, high = (low / wide, high * wide) if profile.log else (low - wide, high + wide)
             plots.set_ticks(axes, low, high, profile.log and high > 4.0 * low)
             if high > low:
                 axes.set_xlim(low, high)
@@ -62,15 +66,6 @@ def profiles(found: Found) -> Any:
                 axes.text(0.5, 0.85, said, transform=axes.transAxes, ha="center", color=VERMILION)
         all_axes[0].set_ylabel("rise over noise variance")
     return figure
-
-
-def _around(profile: Any) -> tuple[float, float]:
-    """The interval of a profile and 80 % of it on either side."""
-    low, high = profile.interval()
-    if profile.log:
-        wide = (high / low) ** 0.8
-        return low / wide, high * wide
-    return low - 0.8 * (high - low), high + 0.8 * (high - low)
 
 
 def spectrum(found: Found) -> Any:
@@ -109,11 +104,7 @@ def write(
     """Write the page; needs the extra ``web``. Double hits are predicted for ``target`` or the structure found."""
     check.extra("jinja2", "web", "a page")
     struck = target is not None or found.target is not None
-    told = []
-    for name in found.names:
-        profile = found.profiles[name]
-        value, interval = stated(profile)
-        told.append((name, value, interval, unit_of(name)))
+    told = [(name, *stated(found.profiles[name]), unit_of(name)) for name in found.names]
     left_out = [f"{100 * one.error:.2g} %" for one in found.left_out()] if len(found.used) > 1 else []
     page = report.template("fit.html").render(
         title=title,

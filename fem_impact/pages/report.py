@@ -24,7 +24,6 @@ from ..impact.quantities import rebound
 from ..impact.response import Response
 from ..mesh.mesh_files import boundary
 from ..model.playing import Strokes
-from ..modes.modal import Modes
 from ..scenes import hearing, sequence
 from ..scenes.scene import Run, Scene, load_scene, scene_of
 from ..scenes.schema import PATHS, fault, read_bytes
@@ -104,6 +103,8 @@ def write(path: str | Path, scene: Scene, run: Run | Played) -> None:
     if isinstance(run, Run) and not run.rings:
         raise ValueError("run must have modes, because a report shows motion; strike with motion=True")
     response, told = run.response, _of_blow(scene, run) if isinstance(run, Run) else _of_strokes(scene, run)
+    said = f"Contact force over time: {response.n_impacts} impacts, peak {si(response.peak_force, 'N')}"
+    shown = response.time <= _end(response)
     page = template("report.html").render(
         told,
         title=scene.title or scene.path.stem,
@@ -117,7 +118,7 @@ def write(path: str | Path, scene: Scene, run: Run | Played) -> None:
         versions=export.versions(),
         modes_end=si(float(response.target.frequencies[-1]), "Hz"),
         command=_command(scene, run),
-        force_picture=_force_picture(response),
+        force_picture=markup.curve(response.time[shown], response.force[shown], label="force", unit="N", title=said),
         # no "<" in the data can close the script element around it
         data=json.dumps(export.plain(_plots(response)), allow_nan=False, separators=(",", ":")).replace("<", "\\u003c"),
         plotly=plotly.get_plotlyjs(),
@@ -241,7 +242,10 @@ def _budget(response: Response) -> list[tuple[str, str, float, float]]:
 
 def _assumption(each: Assumption) -> dict[str, Any]:
     """One row of the table of assumptions: its number, what it changes, and what helps."""
-    changes = [f"{QUANTITY_NAMES.get(name, name)} {_share(size)}" for name, size in each.effect.items() if size]
+    changes = [  # in percent or as a power of ten
+        f"{QUANTITY_NAMES.get(name, name)} {f'{100.0 * size:.2g} %' if size >= 1e-3 else _rough(size)}"
+        for name, size in each.effect.items() if size
+    ]  # fmt: skip
     changes += [f"not known: {each.why}"] if not each.known else []
     changes += ["beyond this estimate"] if each.beyond else []
     return {
@@ -255,11 +259,6 @@ def _assumption(each: Assumption) -> dict[str, Any]:
 
 def _sentence(clause: str) -> str:
     return clause[:1].upper() + clause[1:]
-
-
-def _share(size: float) -> str:
-    """A relative change in percent or as a power of ten."""
-    return f"{100.0 * size:.2g} %" if size >= 1e-3 else _rough(size)
 
 
 def _rough(size: float) -> str:
@@ -283,12 +282,6 @@ def _shares(energies: Mapping[str, float], called: Mapping[str, str]) -> list[di
          "part": max(joule, 0.0) / total}
         for name, joule in energies.items()
     ]  # fmt: skip
-
-
-def _force_picture(response: Response | Strokes) -> str:
-    said = f"Contact force over time: {response.n_impacts} impacts, peak {si(response.peak_force, 'N')}"
-    shown = response.time <= _end(response)
-    return markup.curve(response.time[shown], response.force[shown], label="force", unit="N", title=said)
 
 
 @dataclass(frozen=True)
@@ -376,7 +369,9 @@ def _plots(response: Response | Strokes) -> dict[str, Any]:
     modes, end = response.target, _end(response)
     shown = response.time <= end
     frequencies = _frequencies(response)
-    known = _known(modes, frequencies)
+    # for the mobility: as far as the modes reach, beyond which there are no resonances in it
+    last = min(float(modes.frequencies[-1]) or np.inf, float(frequencies[-1]))
+    known = np.geomspace(min(float(frequencies[0]), 0.5 * last), last, SPECTRUM_POINTS)
     moving = (modes.omega > 0.0) & (modes.frequencies < 2.0 * frequencies[-1])
     own: dict[str, Any] = {}
     if isinstance(response, Response):
@@ -402,12 +397,6 @@ def _frequencies(response: Response | Strokes) -> np.ndarray:
     # the spectrum reaches at least three lobes of that of the shortest impact
     shortest = min((impact.duration for impact in response.impacts), default=1.0)
     return np.geomspace(SPECTRUM_BAND[0], max(SPECTRUM_BAND[1], 3.0 / shortest), SPECTRUM_POINTS)
-
-
-def _known(modes: Modes, frequencies: np.ndarray) -> np.ndarray:
-    """Frequencies [Hz] for the mobility: as far as the modes reach, beyond which there are no resonances in it."""
-    last = min(float(modes.frequencies[-1]) or np.inf, float(frequencies[-1]))
-    return np.geomspace(min(float(frequencies[0]), 0.5 * last), last, SPECTRUM_POINTS)
 
 
 def _view(response: Response | Strokes, end: float) -> dict[str, Any]:

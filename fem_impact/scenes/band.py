@@ -60,13 +60,9 @@ class Band(check.Brief):
             name = NAMES.get(each.quantity)
             if name is None or each.value is None:
                 continue
-            low, high = np.quantile(self.values[name], ENDS)
-            found.append(
-                Quantity(
-                    name, each.value, each.computation, each.known, each.unknown, float(low), float(high),
-                    self._mostly(name),
-                )
-            )  # fmt: skip
+            low, high = np.quantile(self.values[name], ENDS).tolist()
+            known = name, each.value, each.computation, each.known, each.unknown
+            found.append(Quantity(*known, low, high, self._mostly(name)))
         return tuple(found)
 
     def __getitem__(self, name: str) -> Quantity:

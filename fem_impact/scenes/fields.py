@@ -15,16 +15,10 @@ SHAPES = ({"value", "centre", "radius"}, {"value", "from", "to"})
 def varying(name: str, value: Any, dimension: int) -> Any:
     """A number, or a function of points (n_points, dimension) [m], from what a scene says.
 
-    Parameters
-    ----------
-    name : str
-    value : float or dict
-        A number; a table ``{x = [...], values = [...]}``, on a plate ``{x = [...], y = [...], values = [[...], ...]}``
-        with one row of values for each x, linear in between and constant beyond; or
-        ``{cases = [...], otherwise = 3e-3}``, where each case is ``{value, centre, radius}`` or ``{value, from, to}``
-        (opposite corners) and the first that holds counts.
-    dimension : int
-        2 on a plate, 1 on a beam.
+    That is a number; a table ``{x = [...], values = [...]}``, on a plate ``{x = [...], y = [...], values = [[...],
+    ...]}`` with one row of values for each x, linear in between and constant beyond; or ``{cases = [...], otherwise =
+    3e-3}``, where each case is ``{value, centre, radius}`` or ``{value, from, to}`` (opposite corners) and the first
+    that holds counts.
     """
     if not isinstance(value, dict):
         return value

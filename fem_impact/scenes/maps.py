@@ -28,13 +28,7 @@ SLOW |= {f"contact.{name}" for name in SLOW}
 FORMATS = ("nc", "zarr")
 FILES = (".nc", ".zarr", ".csv", ".png", ".pdf", ".svg")  # a folder name must not end like this
 MOST_ROWS = 10**6  # [-] a larger map gets no CSV file: spreadsheets end there, and it would have a hundred megabytes
-PICTURED = {  # layers drawn for a map with two axes: name in the picture
-    "n_impacts": "number of impacts",
-    "contact_time": "contact time",
-    "restitution": "restitution",
-    "peak_force": "peak force",
-    "centroid": "spectral centroid",
-}
+PICTURED = {name: words for name, words in figures.NAMES.items() if name != "impulse"}  # layers drawn with two axes
 
 
 @check.typed
@@ -76,20 +70,22 @@ def map_scene(
     if not isinstance(over, Mapping) or not all(isinstance(name, str) for name in over):
         raise ValueError(f"over must map the names of axes to their values, got {check.shown(over)}")
     band = table.get("max_frequency") if max_frequency is None else max_frequency
-    limit = scene.blow.values.get("tolerance", grid.TOLERANCE) if tolerance is None else tolerance
-    limit = check.tolerance(limit)
+    limit = check.tolerance(scene.blow.values.get("tolerance", grid.TOLERANCE) if tolerance is None else tolerance)
     if not over:
         raise ValueError(
             f'{scene.path}: [map] is missing; add it and name the axes, as in over = {{ "striker.mass" = [0.01, 0.1] }}'
         )
-    law = scene.make_contact()
+    law, stretches = scene.make_contact(), bool(scene.target.values.get("stretching"))
     quick = {name: values for name, values in over.items() if ALIASES.get(name, name) in AXES}
     slow = {name: values for name, values in over.items() if name not in quick}
     for name, values in slow.items():
-        _check_key(scene, name)
+        known = [f"{t}.{k}" for t in MAKERS for k in getattr(getattr(scene, t, None), "values", {})]
+        if name not in known:
+            near = check.nearest(name, [*AXES, *ALIASES, *known])
+            raise ValueError(f"{scene.path}: [map] over: {name} is not an axis{near}")
         if isinstance(values, Range) or (isinstance(values, Mapping) and "count" not in values):
             raise ValueError(f"{scene.path}: [map] over: {name} needs a count, because each value needs another body")
-    over, ours = laid_out(over, law, alone=_stretches(scene), cells=wanted.pop("cells", None))
+    over, ours = laid_out(over, law, alone=stretches, cells=wanted.pop("cells", None))
     slow, quick = {name: list(over[name]) for name in slow}, {name: over[name] for name in quick}
     if not quick:
         quick = {"strike.speed": [scene.blow.values["speed"]]}
@@ -122,11 +118,6 @@ def map_scene(
     return result
 
 
-def _stretches(scene: Scene) -> bool:
-    """Whether the struck body stretches, so that each cell is computed alone."""
-    return bool(scene.target is not None and scene.target.values.get("stretching"))
-
-
 def changed_scene(scene: Scene, key: str, value: Any) -> Scene:
     """The scene with one number replaced; ``key`` is table.key."""
     table, name = key.split(".", 1)
@@ -138,13 +129,6 @@ def changed_scene(scene: Scene, key: str, value: Any) -> Scene:
 
 def _plain(value: Any) -> Any:
     return value.tolist() if isinstance(value, (np.ndarray, np.generic)) else value
-
-
-def _check_key(scene: Scene, key: str) -> None:
-    known = [f"{t}.{k}" for t in MAKERS for k in getattr(getattr(scene, t, None), "values", {})]
-    if key not in known:
-        names = [*AXES, *ALIASES, *known]
-        raise ValueError(f"{scene.path}: [map] over: {key} is not an axis{check.nearest(key, names)}")
 
 
 def _quick_map(
@@ -178,13 +162,9 @@ def with_theory(table: xarray.Dataset, case: Case, axes: Mapping[str, np.ndarray
     ]
     limit = np.array([threshold.thresholds(cell.modes, cell.at, felt) for cell in _cells(case, body)])
     limit[~((limit > 0.0) & np.isfinite(limit))] = math.nan
+    on_a_wall = "one over twice the contact time on a rigid wall"
     for name, found, mine, meaning in (
-        (
-            "contact_resonance",
-            resonance,
-            {**law, **striker, **speed},
-            "one over twice the contact time on a rigid wall",
-        ),
+        ("contact_resonance", resonance, {**law, **striker, **speed}, on_a_wall),
         ("threshold", limit, {**body, **striker}, "contact resonance above which the struck body stops the striker"),
     ):
         values = np.reshape(found, [len(values) for values in mine.values()])
@@ -258,11 +238,16 @@ def draw(
         "colour": plots.Axis(markup.literal(label), _unit(values), log=bool(log), limits=limits),
         "contours": _contours(table, values),
         "borders": _borders(table, values),
-        "shades": _shades(table, values),
+        "shades": [],
         "marks": marks,
         "title": markup.literal(str(table.attrs.get("title", ""))),
     }
-    return plots.colour_map(_in_grams(values.where(table.n_impacts >= 0)), **{**chosen, **wanted})
+    if "doubtful" in table and layer == "n_impacts" and bool(table.doubtful.any()):
+        chosen["shades"] = [(table.doubtful, plots.PURPLE, "number in doubt")]
+    shown = values.where(table.n_impacts >= 0)
+    # in grams along axes, because SI prefixes do not go with kg
+    heavy = {name: 1e3 * shown[name] for name in shown.dims if name in shown.coords and _unit(shown[name]) == "g"}
+    return plots.colour_map(shown.assign_coords(heavy), **{**chosen, **wanted})
 
 
 def _contours(table: xarray.Dataset, values: xarray.DataArray) -> list[Any]:
@@ -288,13 +273,6 @@ def _borders(table: xarray.Dataset, values: xarray.DataArray) -> list[tuple[np.n
     return [(heavy[1] * border.points[:, 1], heavy[0] * border.points[:, 0]) for border in read_borders(table)]
 
 
-def _shades(table: xarray.Dataset, values: xarray.DataArray) -> list[tuple[Any, str, str]]:
-    """Cells to paint over: those whose number of impacts is in doubt."""
-    if "doubtful" not in table or values.name != "n_impacts" or not bool(table.doubtful.any()):
-        return []
-    return [(table.doubtful, plots.PURPLE, "number in doubt")]
-
-
 def _axis(table: xarray.Dataset, name: Any) -> plots.Axis:
     """How to draw an axis: logarithmic if its values are evenly spaced in the logarithm."""
     if name not in table.coords:  # points of a plate have two coordinates each
@@ -304,12 +282,6 @@ def _axis(table: xarray.Dataset, name: Any) -> plots.Axis:
     place = table[name]
     values = np.asarray(place, float)
     return plots.Axis(str(place.attrs.get("long_name", name)), _unit(place), log=logarithmic(values))
-
-
-def _in_grams(values: xarray.DataArray) -> xarray.DataArray:
-    """Convert masses along axes to grams, because SI prefixes do not go with kg."""
-    heavy = {name: 1e3 * values[name] for name in values.dims if name in values.coords and _unit(values[name]) == "g"}
-    return values.assign_coords(heavy)
 
 
 def _unit(values: xarray.DataArray) -> str:

@@ -48,22 +48,18 @@ def save(folder: Path, found: Response | Strokes, points: Any) -> str:
     judged: Response
     whole: Response | Strokes
     if isinstance(found, Strokes):
-        judged, whole = found.hits[found.hardest], _sequence(found, points)
+        # its body is known at the points and where it was struck
+        struck = np.array([np.atleast_1d(each.at) for each in found.strokes])
+        places = np.unique(np.vstack([struck, *([points] if len(points) else [])]), axis=0)
+        strokes = tuple(each._replace(striker=_alone(each.striker)) for each in found.strokes)
+        hits, target = tuple(_known_at(hit, places) for hit in found.hits), _at_points(found.target, struck[:1], places)
+        judged, whole = found.hits[found.hardest], replace(found, target=target, strokes=strokes, hits=hits)
     else:
         judged, whole = found, _known_at(found, points)
     arrays: dict[str, np.ndarray] = {}
     told = {"response": _packed(whole, arrays), "assumptions": _packed(judged.assumptions, arrays)}
     kept.write(folder / SAVED, _key(folder), {**arrays, "told": np.array(json.dumps(told))})
     return SAVED
-
-
-def _sequence(found: Strokes, points: Any) -> Strokes:
-    """A sequence whose body is known at some points and where it was struck."""
-    struck = np.array([np.atleast_1d(each.at) for each in found.strokes])
-    places = np.unique(np.vstack([struck, *([points] if len(points) else [])]), axis=0)
-    strokes = tuple(each._replace(striker=_alone(each.striker)) for each in found.strokes)
-    hits = tuple(_known_at(hit, places) for hit in found.hits)
-    return replace(found, target=_at_points(found.target, struck[:1], places), strokes=strokes, hits=hits)
 
 
 def _alone(striker: Striker) -> Striker:
@@ -299,10 +295,8 @@ def _of_map(path: Path) -> tuple[dict[str, Any], list[str]]:
 
 def _of_spread(path: Path) -> tuple[dict[str, Any], list[str]]:
     data = _json(path)
-    return {}, [
-        f"{data.get('title') or 'a scene without title'}",
-        f"{data.get('blows')} blows, {data.get('failed')} failed",
-    ]
+    title = data.get("title") or "a scene without title"
+    return {}, [f"{title}", f"{data.get('blows')} blows, {data.get('failed')} failed"]
 
 
 def _of_fit(path: Path) -> tuple[dict[str, Any], list[str]]:
@@ -310,13 +304,10 @@ def _of_fit(path: Path) -> tuple[dict[str, Any], list[str]]:
     return {}, [str(line) for line in found] if isinstance(found, list) and found else ["a fit of measured taps"]
 
 
-def _of_page(path: Path) -> tuple[dict[str, Any], list[str]]:
-    return {}, [f"{path} is a page to open in a browser"]
-
-
 NUMBERS = {"contact_time": ("contact time", "s"), "peak_force": ("peak force", "N"), "impulse": ("impulse", "N s")}
 Reader = Callable[[Path], tuple[dict[str, Any], list[str]]]
 READERS: dict[str, tuple[str, Reader]] = {  # file: the command that wrote it, and what tells what is in it
     "response.json": ("strike", _of_strike), "map.nc": ("map", _of_map), "map.zarr": ("map", _of_map),
-    "spread.json": ("spread", _of_spread), "fit.json": ("fit", _of_fit), "report.html": ("report", _of_page),
+    "spread.json": ("spread", _of_spread), "fit.json": ("fit", _of_fit),
+    "report.html": ("report", lambda path: ({}, [f"{path} is a page to open in a browser"])),
 }  # fmt: skip

@@ -78,24 +78,14 @@ class SequencePlan(check.Brief):
         body, count = self.body, len(self.plans)
         shared, *reasons = self.reasons
         rows = [
-            (
-                i,
-                f"{stroke['when']:.4g} s",
-                f"{stroke['speed']:.4g} m/s",
-                f"{plan.error:.1e}",
-                f"{plan.max_frequency:.4g} Hz",
-            )
+            (i, f"{stroke['when']:.4g} s", f"{stroke['speed']:.4g} m/s", f"{plan.error:.1e}",
+             f"{plan.max_frequency:.4g} Hz")
             for i, (stroke, plan) in enumerate(zip(self.strokes, self.plans))
-        ]
-        table = markup.columns(
-            rows[: playing.LISTED], ("stroke", "when", "speed", "predicted error", "modes needed to")
-        )
+        ]  # fmt: skip
+        head = "stroke", "when", "speed", "predicted error", "modes needed to"
         more = [f"... and {count - playing.LISTED} more"] if count > playing.LISTED else []
-        lines = [
-            shared,
-            *below(shared),
-            *(f"  {line}" for line in (*table, *more, *reasons)),
-        ]
+        told = (*markup.columns(rows[: playing.LISTED], head), *more, *reasons)
+        lines = [shared, *below(shared), *(f"  {line}" for line in told)]
         if body.assumptions:
             said = assumption.lines(body.assumptions, self.tolerance)
             lines += [f"Model of stroke {self.needed}: {pointed(line)}" for line in said]

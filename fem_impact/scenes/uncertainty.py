@@ -23,8 +23,8 @@ from ..modes.modal import Damping, Modes
 from ..show import export, figures
 from ..sweeps import bodies, grid
 from ..sweeps.cases import Cases, few, solve_all, try_each
-from ..sweeps.cells import ALIASES, AXES, LAW, REACH, Case
-from ..sweeps.inputs import Input, crossed, drawn, mixing, read, shares
+from ..sweeps.cells import ALIASES, AXES, LAW, Case
+from ..sweeps.inputs import REACH, Input, crossed, drawn, mixing, read, shares
 from ..sweeps.spreads import DOUBLE, QUANTITIES, Checks, Spread
 from ..sweeps.store import Texts
 from .maps import MOST_ROWS, changed_scene
@@ -222,7 +222,7 @@ class _SpreadAsked:
             if axis in self.own:
                 raise ValueError(f"vary names {axis} twice")
             self.own[axis] = column
-        elif self.scene is not None and self._numeric(name):
+        elif self._numeric(name):
             self.parts[name] = column
         else:
             known = [*ALIASES, *AXES, *PLACES[:dimension], *BODY.get(dimension, {})]
@@ -438,12 +438,7 @@ def _checked(exact: Cases, numbers: np.ndarray, workers: int | None) -> Checks:
 
 
 def _table(
-    inputs: Sequence[Input],
-    values: np.ndarray,
-    cases: Cases,
-    numbers: np.ndarray,
-    texts: Texts,
-    n_parts: int,
+    inputs: Sequence[Input], values: np.ndarray, cases: Cases, numbers: np.ndarray, texts: Texts, n_parts: int
 ) -> xarray.Dataset:
     """All blows as a Dataset along one dimension."""
     data: dict[str, Any] = {}

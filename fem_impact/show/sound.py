@@ -3,6 +3,7 @@
 import io
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -41,8 +42,11 @@ class Sound(check.Locked):
     @property
     def peak_level(self) -> float:
         """Largest sample in dB relative to full scale; minus infinity for silence."""
-        peak = float(np.abs(self.samples).max(initial=0.0))
-        return 20.0 * float(np.log10(peak)) if peak else -np.inf
+        return 20.0 * float(np.log10(self._peak)) if self._peak else -np.inf
+
+    @cached_property
+    def _peak(self) -> float:
+        return float(np.abs(self.samples).max(initial=0.0))
 
     @property
     def level(self) -> float:
@@ -51,13 +55,12 @@ class Sound(check.Locked):
 
     def audible(self) -> "Sound":
         """The same sound with the smallest full scale that is a power of ten times the present one and holds it."""
-        peak = float(np.abs(self.samples).max(initial=0.0))
-        factor = 10.0 ** np.ceil(np.log10(peak) - 1e-12) if peak else 1.0
+        factor = 10.0 ** np.ceil(np.log10(self._peak) - 1e-12) if self._peak else 1.0
         return replace(self, samples=self.samples / factor, full_scale=self.full_scale * float(factor))
 
     def normalised(self) -> "Sound":
         """The same sound with its peak as full scale."""
-        peak = float(np.abs(self.samples).max(initial=0.0)) or 1.0
+        peak = self._peak or 1.0
         return replace(self, samples=self.samples / peak, full_scale=self.full_scale * peak)
 
     def faded(self) -> "Sound":
@@ -75,7 +78,7 @@ class Sound(check.Locked):
 
     def wav(self) -> bytes:
         """The samples as a 32-bit float WAV file, with `stated` as its comment."""
-        if np.abs(self.samples).max(initial=0.0) > np.finfo(np.float32).max:
+        if self._peak > np.finfo(np.float32).max:
             raise ValueError("response is louder than a WAV file can hold; check the units of its speed")
         file = io.BytesIO()
         wavfile.write(file, self.rate, self.samples.astype(np.float32))
@@ -94,7 +97,7 @@ class Sound(check.Locked):
     def said(self) -> str:
         """The level in words: of a pressure with its reference, of a motion its peak."""
         if self.unit == "m/s":
-            return f"{self.full_scale * float(np.abs(self.samples).max(initial=0.0)):.3g} m/s"
+            return f"{self.full_scale * self._peak:.3g} m/s"
         return f"{self.level:.1f} dB re {REFERENCE[self.unit][1]}".replace("-", "−")
 
 

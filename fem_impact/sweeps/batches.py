@@ -105,27 +105,13 @@ class Family:
 def kernel_rows(
     omega: np.ndarray, zeta: np.ndarray, squared: np.ndarray, h: float, n_steps: int, parts: np.ndarray | None = None
 ) -> np.ndarray:
-    """Approach of a body of unit mass when a unit force acts on it for one step: in that step and all later ones.
+    """Approach of a body of unit mass when a unit force acts on it for one step h [s]: in that and all later ones.
 
-    Parameters
-    ----------
-    omega, zeta, squared : ndarray, shape (n_modes,)
-        Frequencies [rad/s], damping ratios and squared shapes of the modes.
-    h : float [s]
-    n_steps : int
-    parts : ndarray, shape (n_parts,) [-], optional
-        Also at these fractions of a step after the end of each step.
-
-    Returns
-    -------
-    ndarray, shape (1, 6, n_steps) or (n_parts, 4, n_steps)
-        Approach at the ends of the steps, its rate there and its mean over each step, each for a constant force and for
-        the ramp t/h - 1/2. With ``parts`` there are no means.
-
-    Notes
-    -----
-    The output after ``i stride + j`` steps is the output row advanced by j steps times the state after ``i stride``
-    steps: one matrix product replaces the loop over all steps.
+    Of modes (n_modes,) with frequencies [rad/s], damping ratios and squared shapes. Returns approach at the ends of the
+    steps, its rate there and its mean over each step, each for a constant force and for the ramp t/h - 1/2, (1, 6,
+    n_steps); or the same without means at fractions ``parts`` (n_parts,) [-] of a step after the end of each, (n_parts,
+    4, n_steps). The output after ``i stride + j`` steps is the output row advanced by j steps times the state after ``i
+    stride`` steps: one matrix product replaces the loop over all steps.
     """
     stride = 2 ** math.ceil(0.5 * math.log2(n_steps))
     n_strides = -(-n_steps // stride)
@@ -203,28 +189,12 @@ NO_KERNELS = (np.empty((0, 4, 0)),) * 2
 def bounce(
     blows: Blows, *, tolerance: float, band: float = 0.0, workers: int | None = None, kernels: Kernels | None = None
 ) -> Bounces:
-    """Compute blows in kernel form at unit speed, with shorter steps until each meets the tolerance.
+    """Compute blows in kernel form at unit speed, with shorter steps until each meets the tolerance, as in `strike`.
 
-    Parameters
-    ----------
-    blows : Blows
-    tolerance : float [-]
-        Largest error accepted, as in `strike`.
-    band : float [Hz]
-        Upper end of the centroid's band; 0 for no centroid.
-    workers : int, optional
-        Number of threads; one per core by default.
-    kernels : dict, optional
-        Kernels computed so far for the same families; this call adds new ones.
-
-    Returns
-    -------
-    Bounces
-
-    Notes
-    -----
-    With ``d = v x`` the blow depends on stiffness and speed only through ``k v**(exponent - 1)``; times do not change,
-    and forces scale with v.
+    ``band`` [Hz] is the upper end of the centroid's, 0 for no centroid; ``workers`` the number of threads, by default
+    one per core; ``kernels`` are those computed so far for the same families, to which this call adds new ones. With
+    ``d = v x`` the blow depends on stiffness and speed only through ``k v**(exponent - 1)``; times do not change, and
+    forces scale with v.
     """
     kernels = {} if kernels is None else kernels
     follow = partial(_follow, tolerance=tolerance, band=band, kernels=kernels)
@@ -337,8 +307,9 @@ class _Engine:
         self.blows, self.band, self.kernels = blows, band, kernels
         self.keys, self.which = np.unique(blows.family, return_inverse=True)
         self.shares = np.array([1.0 / blows.target_mass, 1.0 / blows.striker_mass])
+        families = [blows.families[int(key)] for key in self.keys]
         rigid, static, rest = (
-            np.array([self.of_family(number, body) for body in (0, 1)]) * self.shares
+            np.array([[number(family, body) for family in families] for body in (0, 1)])[:, self.which] * self.shares
             for number in (Family.rigid, Family.static, lambda family, body: family.rest[body])
         )
         self.own_rigid, self.rigid, self.static = rigid[1], rigid.sum(axis=0), static.sum(axis=0)
@@ -346,10 +317,6 @@ class _Engine:
         self.law = np.zeros(len(stiffness), LAW)
         self.law["stiffness"], self.law["exponent"] = stiffness, blows.exponent
         self.law["loss"], self.law["compliance"] = blows.loss * blows.speed, rest.sum(axis=0)
-
-    def of_family(self, number: Callable[[Family, int], float], body: int) -> np.ndarray:
-        """One number of one body for every blow, (n_cases,)."""
-        return np.array([number(self.blows.families[int(key)], body) for key in self.keys])[self.which]
 
     def first_step(self, tolerance: float) -> np.ndarray:
         """Step of each blow in half-octaves, h = 2**(-step / 2): at least STEPS per contact with a rigid wall.

@@ -15,7 +15,7 @@ from .._base import check, identity, kept
 from .._base.rounding import HALVINGS
 from ..fe import refinement
 from ..fe.eigenvalues import Flexibility
-from ..impact import accuracy, collision
+from ..impact import accuracy
 from ..impact.contact import Contact
 from ..impact.error import Error
 from ..impact.striker import Striker
@@ -28,7 +28,8 @@ from ..model.views import TOGETHER, Views
 from ..modes.modal import Modes, damping_ratios
 from ..modes.shapes import FieldShapes, SampledShapes
 from .batches import allowed
-from .cells import REACH, Case, checked_axes, sampled
+from .cells import Case, checked_axes, sampled
+from .inputs import REACH
 
 # [-] cells in all, and at each strike point at least, by which vectors are judged: each costs several whole blows
 STRUCK = 10, 4
@@ -54,17 +55,9 @@ def body_of(
 ) -> tuple[Case, dict[str, np.ndarray]]:
     """The blow that all cells of a map share, on a body described as well as its cells need, and the map's axes.
 
-    A body given by its modes keeps them.
-
-    Parameters
-    ----------
-    target : Target
-    striker, contact, at, speed, over, tolerance
-        As in `sweep`.
-    alone : bool
-        Whether only the numbers of the blows are wanted, with the residual compliance; otherwise modes are found.
-    keep : path of an .npz file, optional
-        Saves the vectors or the modes; the same map later reads them from there.
+    A body given by its modes keeps them. Striker to tolerance as in `sweep`. ``alone``: only the numbers of the blows
+    are wanted, with the residual compliance; otherwise modes are found. ``keep`` is an .npz file that saves the vectors
+    or the modes; the same map later reads them from there.
     """
     stages = stages or Stages()
     speed = check.positive("speed", speed, "m/s", reach=REACH)
@@ -127,23 +120,17 @@ def _by_modes(target: Target, case: Case, axes: Axes, tolerance: float, keep: Pa
         fits = (
             k for k in softer if number_of_modes(modes, reach(tolerance, {**axes, "stiffness": np.array([k])})) <= most
         )
+        soft = next(fits, None)
         raise check.SimulationError(
             f"the shortest blow of the map needs about {number} modes, at most {most} are allowed; "
-            f"{_affordable(enough, next(fits, None))}"
+            f"{'no tolerance is large enough' if enough is None else f'tolerance = {enough:g} is affordable'}; or "
+            f"leave out the {'lightest strikers' if soft is None else f'contacts stiffer than {soft:g}'}"
         )
     first = None
     if keep is not None and target.kind == "fe":
         first = target.find(FIRST_LOOK, tolerance=tolerance)  # what is kept starts from its mesh
     more = target.find(number, tolerance=tolerance, first=first, keep=keep)
     return replace(case, modes=target.surrounded(more))
-
-
-def _affordable(enough: float | None, softest: float | None) -> str:
-    """What a user can change of a map that needs too much: its tolerance, or its largest contact stiffness."""
-    said = "no tolerance is large enough" if enough is None else f"tolerance = {enough:g} is affordable"
-    return (
-        f"{said}; or leave out the {'lightest strikers' if softest is None else f'contacts stiffer than {softest:g}'}"
-    )
 
 
 def needed_frequency(case: Case, tolerance: float) -> float:
@@ -168,22 +155,11 @@ def by_vectors(
 ) -> Case | None:
     """The blow on Ritz vectors that carry every cell of a map; None if no mesh allowed or a point struck forbids it.
 
-    Parameters
-    ----------
-    target : Target, see `vectors.usable`
-    case : Case
-        On any `Modes` of the target.
-    axes : mapping of axis name to values, see `cells.checked_axes`
-    tolerance : float [-]
-        Of every cell; vectors and mesh may take what the time steps leave of it.
-    keep : path of an .npz file, optional
-        Saves the vectors at the strike points; the same map later reads them from there.
-
-    Notes
-    -----
-    The shortest contact of all cells chooses shift and first mesh. A few cells, those of the shortest and the longest
-    contact among them, are struck with all vectors, with fewer and on a coarser mesh; the errors decide on more vectors
-    or a finer mesh, as that of a single blow does.
+    ``target`` as of `vectors.usable`, ``case`` on any modes of it, ``axes`` as of `cells.checked_axes`, ``keep`` as of
+    `body_of`. Vectors and mesh may take what the time steps leave of the tolerance of every cell. The shortest contact
+    of all cells chooses shift and first mesh. A few cells, those of the shortest and the longest contact among them,
+    are struck with all vectors, with fewer and on a coarser mesh; the errors decide on more vectors or a finer mesh, as
+    that of a single blow does.
     """
     if "target_frequency" in axes:
         first = target.finished(target.find(FIRST_FLEXIBLE, tolerance=CLOSE))
@@ -324,10 +300,7 @@ class Sized:
     def _error(self, case: Case) -> tuple[float, float]:
         """Errors of vectors and of the mesh in a blow; nothing if it fails."""
         try:
-            hit = collision.strike(
-                case.modes, case.striker, case.contact, at=case.at, speed=case.speed,
-                tolerance=max(FINEST, Budget(self.tolerance).cheap), max_impacts=self.max_impacts,
-            )  # fmt: skip
+            hit = case.blow(tolerance=max(FINEST, Budget(self.tolerance).cheap), max_impacts=self.max_impacts)
         except check.SimulationError:
             return 0.0, 0.0
         return hit.error.truncation, hit.error.mesh

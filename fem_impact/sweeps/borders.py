@@ -26,7 +26,7 @@ MEANINGS = {
     "error": "largest error of a point along the axis on which it was located, as a share of that axis",
 }
 
-Solve = Callable[[Cases, str], tuple[np.ndarray, dict[int, str]]]  # cases, the name of the round: as `cases.solve`
+Solve = Callable[[Cases, str], tuple[np.ndarray, dict[int, str]]]  # cases, the name of the round: as `solve_cases`
 
 
 @dataclass(frozen=True, eq=False)
@@ -98,7 +98,8 @@ class Plane:
 def why_none(grid: Cases) -> str:
     """Why a map has no borders: '' if it has."""
     if len(grid.shape) != 2 or min(grid.shape) < 2:
-        return f"a map needs two axes of two values or more, got {_sizes(grid)}"
+        sizes = ", ".join(f"{name} ({len(values)})" for name, values in grid.axes.items())
+        return f"a map needs two axes of two values or more, got {sizes}"
     for name, values in grid.axes.items():
         values = np.asarray(values, float)
         if values.ndim == 2 and values.shape[1] > 1:
@@ -109,23 +110,11 @@ def why_none(grid: Cases) -> str:
     return ""
 
 
-def _sizes(grid: Cases) -> str:
-    return ", ".join(f"{name} ({len(values)})" for name, values in grid.axes.items())
-
-
 def find_borders(grid: Cases, count: np.ndarray, solve: Solve) -> FoundBorders:
-    """The borders between numbers of impacts.
+    """The borders between numbers of impacts on a grid, see `why_none`, and what is in doubt.
 
-    Parameters
-    ----------
-    grid : Cases, see `why_none`
-    count : ndarray of int, shape of the grid
-        Number of impacts in each cell; -1 if it was refused.
-    solve : callable
-        Computes cases; takes them and a name for the round.
+    ``count`` is the number in each cell, -1 if it was refused; ``solve`` computes cases and takes a name for the round.
 
-    Notes
-    -----
     Cells beside a border are counted again by a finer tolerance, until none is left that was not. Then each edge
     between two cells that a border crosses is halved until the crossing is known to WIDTH: all edges of one round are
     one call of the engine. Curves join the crossings cell by cell (marching squares). More than one crossing of an edge

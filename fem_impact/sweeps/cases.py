@@ -13,10 +13,8 @@ import numpy as np
 
 from .._base.check import SimulationError
 from .._base.rounding import ROUNDING
-from ..impact.collision import strike
 from ..impact.distance import distance
 from ..impact.response import Response
-from ..model.audit import audited
 from ..modes.modal import Modes
 from . import batches
 from .cells import ALONE, FAMILY_AXES, LOSSY, Case
@@ -86,11 +84,6 @@ class Cases:
         """Names of the numbers computed of each case."""
         return [name for name in LAYERS if name != "centroid" or self.band is not None] + list(self.extra)
 
-    @property
-    def places(self) -> np.ndarray:
-        """The strike points that occur, (n_points, dimension) [m]."""
-        return np.unique(self.axes["at"], axis=0) if "at" in self.axes else self.base.at[None]
-
     def cells(self, start: int, stop: int) -> np.ndarray:
         """Numbers of some of the cases to compute, (n_cells,)."""
         return np.arange(start, stop) if self.chosen is None else self.chosen[start:stop]
@@ -111,11 +104,7 @@ class Cases:
 
     def strike(self, case: Case) -> Response:
         """A blow by the modal engine, to the tolerance of the table."""
-        hit = strike(
-            case.modes, case.striker, case.contact, at=case.at, speed=case.speed,
-            tolerance=self.tolerance, residual=self.residual, max_impacts=self.max_impacts,
-        )  # fmt: skip
-        return audited(hit)
+        return case.blow(tolerance=self.tolerance, residual=self.residual, max_impacts=self.max_impacts)
 
     def row(self, hit: Response) -> np.ndarray:
         """The layers (n_layers,) of one blow."""
@@ -158,7 +147,8 @@ class Cases:
         """The same cases with each body reduced to its contact points: small enough to send to a cluster."""
         if self.base.modes.stretches:
             return replace(self, kernels={})  # slopes are not known from points
-        return replace(self, base=self.base.sampled(self.places), kernels={})
+        places = np.unique(self.axes["at"], axis=0) if "at" in self.axes else self.base.at[None]
+        return replace(self, base=self.base.sampled(places), kernels={})
 
     def without_speed(self) -> "Cases | None":
         """The cases at one speed if every contact is linear, so that speed only scales the forces; otherwise None."""
@@ -234,13 +224,10 @@ def _plain(modes: Modes, at: np.ndarray) -> dict[str, Any]:
     """A body and its contact point as plain numbers."""
     place = at[None]
     return {
-        "mass": modes.mass,
-        "frequencies": modes.frequencies.tolist(),
-        "damping_ratios": modes.damping_ratio.tolist(),
-        "at": at.tolist(),
-        "shape": modes.shape_at(place)[0].tolist(),
+        "mass": modes.mass, "frequencies": modes.frequencies.tolist(), "damping_ratios": modes.damping_ratio.tolist(),
+        "at": at.tolist(), "shape": modes.shape_at(place)[0].tolist(),
         "residual_compliance": float(modes.residual_compliance(place)[0, 0]),
-    }
+    }  # fmt: skip
 
 
 def _ranks(column: np.ndarray) -> np.ndarray:
@@ -300,26 +287,26 @@ def batchable(column: Mapping[str, np.ndarray]) -> np.ndarray:
 def solve_all(
     cases: Cases, workers: int | None = None, client: Any = None, store: Any = None, watch: Watch | None = None
 ) -> tuple[np.ndarray, Texts]:
-    """Compute all cases, block by block, on a cluster or in threads of this process; as `solve`."""
+    """Compute all cases, block by block, on a cluster or in threads of this process; as `solve_cases`."""
     LOG.info("%d blows at the tolerance %g", cases.n_cases, cases.tolerance)
     if client is not None:
-        return by_cluster(cases, client, store, partial(solve, workers=1), watch)
+        return by_cluster(cases, client, store, partial(solve_cases, workers=1), watch)
     if store is not None:
-        return by_store(cases, store, partial(solve, workers=workers), watch)
+        return by_store(cases, store, partial(solve_cases, workers=workers), watch)
     numbers = np.empty((len(cases.layers), cases.n_cases))
     texts: Texts = {}
     often = cases.lossy or cases.extra  # slow ones are told more often
     size = max(batches.FEW, block_size(cases.n_cases)) if often else LARGEST_BLOCK
     for start in range(0, cases.n_cases, size):
         stop = min(start + size, cases.n_cases)
-        numbers[:, start:stop], new = solve(cases, start, stop, workers=workers)
+        numbers[:, start:stop], new = solve_cases(cases, start, stop, workers=workers)
         texts |= new
         if watch is not None:
             watch(stop, cases.n_cases)
     return numbers, texts
 
 
-def solve(cases: Cases, start: int, stop: int, *, workers: int | None = None) -> tuple[np.ndarray, Texts]:
+def solve_cases(cases: Cases, start: int, stop: int, *, workers: int | None = None) -> tuple[np.ndarray, Texts]:
     """Compute the cases from ``start`` up to ``stop``.
 
     Returns

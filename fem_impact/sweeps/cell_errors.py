@@ -10,7 +10,7 @@ from .._base.rounding import ROUNDING
 from ..impact import accuracy
 from ..impact.contact import wall_time
 from ..impact.what_if import RESOLVABLE
-from .cases import Cases, solve, try_each
+from .cases import Cases, solve_cases, try_each
 from .cells import RATED
 
 # [-] cells struck again for the error of vectors, in a batch or alone: some 0.1 and 0.2 s
@@ -109,7 +109,7 @@ def described(cases: Cases, numbers: np.ndarray, workers: int | None = None) -> 
     total, count = np.zeros(few.shape), few.layers.index("n_impacts")
     before = mine
     for cause in causes:
-        other, _ = solve(replace(few, base=base.poorer(cause), kernels={}), 0, few.n_cases, workers=workers)
+        other, _ = solve_cases(replace(few, base=base.poorer(cause), kernels={}), 0, few.n_cases, workers=workers)
         before, better = other.reshape(mine.shape), before
         change = np.fmax.reduce(list(few.apart(better, before).values()))
         total += np.where(better[count] == before[count], change, 1.0)

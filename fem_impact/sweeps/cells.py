@@ -9,10 +9,14 @@ import numpy as np
 
 from .._base import check
 from ..impact import accuracy
+from ..impact.collision import strike
 from ..impact.contact import MARKS, NUMBERS, Contact
+from ..impact.response import Response
 from ..impact.striker import Striker
+from ..model.audit import audited
 from ..modes.modal import Modes
 from ..modes.shapes import SampledShapes
+from .inputs import REACH
 
 AXES = {  # name: unit, what it is, its name in a scene file
     "mass": ("kg", "mass of the striker", "striker.mass"),
@@ -38,7 +42,6 @@ FAMILY_AXES = ("at", "target_frequency", "striker_frequency", "damping_ratio")  
 SIDE = {True: 400, False: 100}
 MOST_VALUES = 10**6  # [-] most values along one axis of a map
 EVEN = 1e-3  # [-] of a value, off even spacing in the logarithm: less counts as even, as what is typed with four digits
-REACH = 1e30  # [SI] speeds, masses and frequencies lie between 1/REACH and REACH: beyond, the kernels never finish
 
 
 @dataclass(frozen=True)
@@ -77,17 +80,10 @@ def along(name: str, values: Any) -> Any:
 def laid_out(
     over: Mapping[str, Any], contact: Contact, *, alone: bool = False, cells: int | None = None
 ) -> tuple[dict[str, Any], bool]:
-    """The values along all axes of a map, and whether any of them are ours.
+    """The values along all axes of a map, from values, range or `Range` by name, and whether any of them are ours.
 
-    Parameters
-    ----------
-    over : mapping of axis name to values, range or `Range`
-    contact : Contact
-    alone : bool
-        Whether all cells are computed alone, whatever the contact.
-    cells : int, optional
-        Values along an axis that is a range without a count; by default those of SIDE for a map of two such axes, and
-        as many cells in all whatever the axes.
+    ``alone``: all cells are computed alone, whatever the contact. ``cells`` is the number of values along an axis that
+    is a range without a count; by default those of SIDE for two such axes, and as many cells in all whatever the axes.
     """
     found = {name: along(name, values) if isinstance(values, Mapping) else values for name, values in over.items()}
     free = [name for name, values in found.items() if isinstance(values, Range)]
@@ -160,6 +156,11 @@ class Case:
         return replace(
             self, modes=change(self.modes), views={place: change(modes) for place, modes in self.views.items()}
         )
+
+    def blow(self, **options: Any) -> Response:
+        """The blow by the modal engine; ``options`` as of `strike`."""
+        hit = strike(self.modes, self.striker, self.contact, at=self.at, speed=self.speed, **options)
+        return audited(hit)
 
     def poorer(self, cause: str) -> "Case":
         """The same blow on the body described less well (`Modes.poorer`)."""

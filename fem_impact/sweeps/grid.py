@@ -75,15 +75,10 @@ class Job:
         place = self.store / turn if self.store is not None and turn else self.store
         return solve_all(cases, self.workers, self.client, place, None if turn else self.watch)
 
-    def _held(self) -> set[str]:
-        """Names in the folder of the store, but for what is not finished."""
-        if self.store is None or not self.store.exists():
-            return set()
-        return {name for name in os.listdir(self.store) if not name.startswith(PARTIAL)}
-
     def refined(self, cases: Cases) -> refined.Refined | None:
         """Compute a map where its answer changes; None if it has few cells, unless asked for."""
-        held = self._held()
+        there = os.listdir(self.store) if self.store is not None and self.store.exists() else ()
+        held = {name for name in there if not name.startswith(PARTIAL)}  # but for what is not finished
         if "zarr.json" in held and not self.refine:
             return None
         if self.store is not None and held and "round-0" not in held:

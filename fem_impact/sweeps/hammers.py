@@ -19,7 +19,7 @@ from ..impact.striker import Striker
 from ..model.target import Stages, Target
 from ..modes.modal import Damping, Modes
 from . import bodies
-from .cases import Cases, solve
+from .cases import Cases, solve_cases
 from .cells import Case
 
 # [-] error limit of the blows that are looked at first: only to find where ranges end, which DECIDED then tells
@@ -104,13 +104,6 @@ def bandwidth_of(hit: Response, drop: float) -> float:
         return float(frequencies[-1])
     share = level[first - 1] / (level[first - 1] - level[first])
     return float(frequencies[first - 1] + share * (frequencies[first] - frequencies[first - 1]))
-
-
-def _reaches(hit: Response, bandwidth: float, drop: float) -> bool:
-    """Whether the force spectrum stays within ``drop`` [dB] of its value at 0 Hz up to a bandwidth [Hz]."""
-    looks = int(np.clip(LOOKS / 4.0 * bandwidth * hit.contact_time, 16, LOOKS))
-    size = np.abs(hit.spectrum(np.linspace(0.0, bandwidth, looks)))
-    return bool(size.min() >= size[0] * 10.0 ** (-drop / 20.0))
 
 
 @check.typed
@@ -217,13 +210,7 @@ def _body(target: Target, at: Any, masses: np.ndarray, centre: float, stages: St
 
 
 def _hammer(
-    modes: Modes,
-    at: Any,
-    mass: float,
-    bandwidth: float,
-    drop: float,
-    tuned: tuple[float, float],
-    limit: float | None,
+    modes: Modes, at: Any, mass: float, bandwidth: float, drop: float, tuned: tuple[float, float], limit: float | None
 ) -> Hammer:
     """What one hammer can do.
 
@@ -248,7 +235,11 @@ def _hammer(
         return error.truncation < 1.0 and error.mesh < 1.0
 
     def reaches(tip: float, tolerance: float = DECIDED) -> bool:
-        return _reaches(hit(tip, tolerance), bandwidth, drop)
+        """Whether the force spectrum stays within ``drop`` of its value at 0 Hz up to the bandwidth."""
+        found = hit(tip, tolerance)
+        looks = int(np.clip(LOOKS / 4.0 * bandwidth * found.contact_time, 16, LOOKS))
+        size = np.abs(found.spectrum(np.linspace(0.0, bandwidth, looks)))
+        return bool(size.min() >= size[0] * 10.0 ** (-drop / 20.0))
 
     low = SOFTEST * mass * (2.0 * np.pi * min(tuned)) ** 2
     if limit is not None:
@@ -262,7 +253,7 @@ def _hammer(
     tips = _series(low, high, PER_DECADE[0])
     case = Case(alone, striker, Contact.linear(1.0), modes.point("at", at)[0], 1.0)  # `once` looks at the others
     series = Cases(case, {"stiffness": tips}, TOLERANCE, max_impacts=2)
-    counts = solve(series, 0, len(tips))[0][series.layers.index("n_impacts")]
+    counts = solve_cases(series, 0, len(tips))[0][series.layers.index("n_impacts")]
     single = _ranges(tips, counts == 1, once)
     working: Ranges = ()
     for ends in single:
@@ -282,10 +273,8 @@ def _last_resolved(modes: Modes, at: Any, mass: float) -> float:
         return needed - float(modes.frequencies[-1])
 
     def resolved(tip: float) -> bool:
-        law = Contact.linear(tip)
-        return strike(
-            modes, Striker.rigid(mass), law, at=at, speed=1.0, tolerance=TOLERANCE, max_impacts=1
-        ).error.resolvable
+        how: dict[str, Any] = {"at": at, "speed": 1.0, "tolerance": TOLERANCE, "max_impacts": 1}
+        return strike(modes, Striker.rigid(mass), Contact.linear(tip), **how).error.resolvable
 
     centre = np.log(mass * float(modes.omega[-1]) ** 2)
     first = float(np.exp(brentq(complete, centre - 40.0, centre + 40.0)))

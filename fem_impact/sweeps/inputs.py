@@ -12,7 +12,7 @@ from scipy.stats import qmc
 from .._base import check
 
 MOST_INPUTS = 64  # [-] inputs that may vary together
-REACH = 1e30  # [SI] largest number in a distribution, and largest value
+REACH = 1e30  # [SI] numbers of a blow lie between 1/REACH and REACH: beyond, the kernels never finish
 
 # kind: the names of its numbers, and the distribution they make
 KINDS: dict[str, tuple[tuple[str, ...], Callable[..., Any]]] = {
@@ -104,12 +104,9 @@ def read(vary: Any) -> tuple[Input, ...]:
 def mixing(inputs: Sequence[Input], correlation: Any) -> np.ndarray | None:
     """Lower triangular matrix (n_inputs, n_inputs) that correlates independent normal numbers; None if none are.
 
-    Parameters
-    ----------
-    inputs : sequence of Input
-    correlation : None, matrix (n_inputs, n_inputs) or mapping of pairs of names to numbers from -1 to 1
-        Correlations of the inputs' normal scores (a Gaussian copula); pairs that a mapping leaves out have none. Of
-        normal inputs these are the correlations themselves, of lognormal ones those of the logarithms.
+    ``correlation`` has those of the inputs' normal scores (a Gaussian copula), as such a matrix or by pairs of names;
+    pairs left out have none. Of normal inputs they are the correlations themselves, of lognormal ones of the
+    logarithms.
     """
     if correlation is None:
         return None

@@ -168,30 +168,19 @@ class MapSheet:
             new = ~self.computed[cells]
             self.numbers[self.smooth[:, None], cells[new]] = found[:, new]
             self.numbers[self.error, cells[new]] = np.broadcast_to(error[:, None, None], cells.shape)[new]
-            self.numbers[self.count, cells[new]] = np.broadcast_to(
-                self.numbers[self.count][first][:, None, None], cells.shape
-            )[new]
+            count = self.numbers[self.count][first][:, None, None]
+            self.numbers[self.count, cells[new]] = np.broadcast_to(count, cells.shape)[new]
             self.settled[cells] = True
 
 
 def refine(
     shape: tuple[int, int], layers: list[str], tolerance: float, compute: Compute, tell: Tell | None = None
 ) -> Refined:
-    """Compute a map where its answer changes, and interpolate elsewhere to within the tolerance.
+    """Compute a map (n, n) where its answer changes, and interpolate elsewhere to within the tolerance of each cell.
 
-    Parameters
-    ----------
-    shape : (n, n)
-    layers : list of str, see `cases.LAYERS`
-    tolerance : float [-]
-        Of each cell.
-    compute : callable
-        Computes cells, numbered with the last axis fastest, and takes a name for the round.
-    tell : callable, optional
-        Called after each round with the number of cells computed or interpolated so far.
+    ``layers`` as of `cases.LAYERS`; ``compute`` computes cells, numbered with the last axis fastest, and takes a name
+    for the round, after which ``tell`` hears how many cells are computed or interpolated so far.
 
-    Notes
-    -----
     Each block of cells has parabolas through its 3 x 3 nodes. Its quarters are computed at theirs; where these differ
     from the parabolas by more than the time steps leave of the tolerance, have another number of impacts or failed, the
     quarters become blocks. Otherwise the parabolas of the quarters fill them. The whole difference is added to the

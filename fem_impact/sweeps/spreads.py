@@ -209,13 +209,8 @@ class Spread(check.Brief):
             lines.append("The inputs are correlated (Gaussian copula).")
         if not len(self.own):
             return "\n".join([*lines, "No blow succeeded."])
-        lines += [
-            "",
-            *markup.columns(
-                self._rows(),
-                ("quantity", "5 %", "median", "95 %", f"{100 * self.confidence:g} % interval of the median"),
-            ),
-        ]
+        head = "quantity", "5 %", "median", "95 %", f"{100 * self.confidence:g} % interval of the median"
+        lines += ["", *markup.columns(self._rows(), head)]
         lines += ["", f"Chance of a double hit: {double_hits(self)}"]
         if self.chaotic:
             counts = self.values("n_impacts")
@@ -285,7 +280,7 @@ class Spread(check.Brief):
                 "quantiles": {str(level): self.quantile(name, level)._asdict() for level in LEVELS},
                 "rank_correlation": self.correlations.get(name, {}),
                 "sobol": {
-                    key: {"first": share.first._asdict(), "total": share.total._asdict()}
+                    key: {kind: each._asdict() for kind, each in share._asdict().items()}
                     for key, share in self.shares.get(name, {}).items()
                 },
             }

@@ -52,13 +52,8 @@ class Store:
     """Results of a map on disk, block by block.
 
     Each block has a proof: a digest of its results, its place, and all that determines them, see `fingerprint`. What
-    does not match its proof, because it was lost, damaged or moved, is computed again.
-
-    Parameters
-    ----------
-    path : folder, under the same path on every machine that works on the map
-    mark : dict, from `fingerprint`
-    n_layers, n_cases : int
+    does not match its proof, because it was lost, damaged or moved, is computed again. Its folder has the same path on
+    every machine that works on the map.
     """
 
     def __init__(self, path: Path, mark: Mark, n_layers: int, n_cases: int) -> None:
@@ -181,7 +176,8 @@ def fingerprint(grid: Any) -> Mark:
     striker = grid.base.striker
     told = grid.tolerance, grid.residual, grid.band, grid.layers, grid.max_impacts, striker.hand, grid.base.first
     body.update(repr(told).encode())
-    for modes, places in _seen(grid.base, grid.axes.get("at", grid.base.at[None])):
+    seen = [(modes, np.array([place])) for place, modes in grid.base.views.items()]
+    for modes, places in seen or [(grid.base.modes, grid.axes.get("at", grid.base.at[None]))]:
         for each in (modes, *modes.poorer.values()):
             yields = [float(each.shapes.compliance(place[None])[0, 0]) for place in places]
             body.update(repr((each.n_modes, each.stretches, each.thick, each.air, each.unstated, yields)).encode())
@@ -196,14 +192,6 @@ def fingerprint(grid: Any) -> Mark:
                 "them up; leave out store, or pass a function that does not use it"
             ) from None
     return {"map": body.hexdigest(), "functions": identity.of(functions), "program": identity.program()}
-
-
-def _seen(base: Any, places: np.ndarray) -> Iterator[tuple[Any, np.ndarray]]:
-    """Each description of the struck body, and the strike points (n_points, dimension) [m] that it is for."""
-    for place, modes in base.views.items():
-        yield modes, np.array([place])
-    if not base.views:
-        yield base.modes, places
 
 
 def by_store(grid: Any, path: str | Path, solve: Solve, watch: Watch | None) -> tuple[np.ndarray, Texts]:
@@ -304,13 +292,10 @@ def _intact(path: Path) -> Iterator[None]:
     try:
         yield
     except Exception as error:  # zarr and its codecs raise many kinds of error
-        raise _damaged(path, str(error)) from None
+        why = check.line(str(error))
+        raise ValueError(f"store {path} is damaged ({why}); name a new folder, or delete this one") from None
 
 
 def not_free(path: Path) -> ValueError:
     """Error about a store that holds something else."""
     return ValueError(f"store must be a new folder or the store of this map, got {path}; name a new folder")
-
-
-def _damaged(path: Path, reason: str) -> ValueError:
-    return ValueError(f"store {path} is damaged ({check.line(reason)}); name a new folder, or delete this one")

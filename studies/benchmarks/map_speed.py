@@ -214,7 +214,7 @@ def by_elements(only):
         )
         for stiffness in (1.0, 100.0):
             settings = replace(setup.start, stiffness=stiffness)
-            exact, quick = (explore_model.blow(setup.case(settings, seen=modes)).error.total for modes in (seen, None))
+            exact, quick = (setup.case(settings, seen=modes).blow().error.total for modes in (seen, None))
             print(
                 f"    {stiffness:g} times the stiffness: error {exact:.1e} by vectors, {quick:.1e} by the first modes"
             )

@@ -8,7 +8,7 @@ from numba import njit
 from numpy.testing import assert_allclose
 from scipy.optimize import brentq
 
-from fem_impact.impact.compiled import build, flight, propagation, stretched
+from fem_impact.impact.compiled import build, flight, layout, stretched
 from fem_impact.impact.compiled.bundles import Bodies, Flights, Limits
 from fem_impact.impact.compiled.flight import LATER, NEVER, ONSET
 
@@ -25,7 +25,7 @@ def fly(omega, shape, q, p, *, offset=0.0, bias=None, left=np.inf, zeta=0.0, bas
     omega, q, p = (np.array(x, float) for x in (omega, q, p))
     n = len(omega)
     bias = np.zeros(n) if bias is None else np.array(bias, float)
-    tables = np.empty((flight.GLIDES + 1, propagation.N_LANE, n))
+    tables = np.empty((flight.GLIDES + 1, layout.N_LANE, n))
     flights = Flights(tables, np.zeros(flight.GLIDES + 1), base, 1e-3 * base)
     shape, offset = np.atleast_2d(np.array(shape, float)), np.array([offset])
     bodies = Bodies(omega, np.full(n, zeta), 2.0 * zeta * omega, shape, bias, q, p, np.empty(n), np.empty(n))

@@ -17,7 +17,7 @@ from numpy.testing import assert_allclose
 from scipy.optimize import brentq
 from warming import locked
 
-from fem_impact.impact.compiled import arrays, build, collocation, energy, propagation, record, schemes
+from fem_impact.impact.compiled import arrays, build, collocation, energy, layout, propagation, record, schemes
 from fem_impact.impact.compiled import law as laws
 from fem_impact.impact.compiled.bundles import KernelSystem, Limits
 from fem_impact.impact.compiled.laws.base import Spring
@@ -176,7 +176,7 @@ def test_fast_lanes_agree_with_the_single_mode(zeta, h):
 def test_tables_by_arrays_agree_with_the_fast_lanes(zeta, h):
     omega = np.append(0.0, np.geomspace(1.0, 1.2e5, 60))
     damping = np.append(0.0, np.full(60, zeta))
-    table, lanes = np.empty((propagation.N_TABLE, 61)), np.empty((propagation.N_LANE, 61))
+    table, lanes = np.empty((propagation.N_TABLE, 61)), np.empty((layout.N_LANE, 61))
     propagation.step_table(omega, damping, h, table)
     arrays.lane_table(omega, damping, h, True, lanes)
     slack = 8.0 * EPS * (1.0 + omega * h)  # rounding of the phase

@@ -186,7 +186,7 @@ def test_a_beam_struck_near_its_end_is_no_half_space():
     away = [named(fi.strike(modes, BALL, law, at=(x,), speed=0.1).assumptions)["local contact"] for x in (0.15, 1e-4)]
     assert away[0].number == "contact radius over half the thickness" and not away[0].doubtful
     assert away[1].number == "contact radius over the distance to the edge" and away[1].doubtful
-    known = bending.known(modes)
+    known = bending.known_of(modes)
     assert audit._clearance(modes, known, None, np.array([0.15])) == pytest.approx(0.015)  # half the width
     assert audit._clearance(modes, known, None, np.array([0.29])) == pytest.approx(0.01)
 

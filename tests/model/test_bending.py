@@ -13,7 +13,7 @@ SIDE = 0.1
 
 
 def integrals(modes):
-    return module.bending(module.known(modes))
+    return module.bending(module.known_of(modes))
 
 
 def flexible(modes, values):
@@ -164,7 +164,7 @@ def test_bodies_without_shapes_are_not_known(body):
     modes = fi.Modes.rigid(1.0)
     if body == "measured":
         modes = fi.Modes.from_arrays([100.0], [[1.0]], points=[(0.1, 0.1)], mass=0.5, complete=True)
-    assert module.known(modes) is None
+    assert module.known_of(modes) is None
 
 
 @pytest.mark.slow
@@ -181,12 +181,12 @@ def test_a_stout_beam_by_formulas_has_the_slopes_of_one_by_elements(ends):
     supports = {"left": ends[0], "right": ends[1]}
     found = fi.find_modes(fi.assemble(fi.mesh.line(0.3), section, supports, theory="timoshenko"), n_modes=8)
     np.testing.assert_allclose(integrals(closed).slope, integrals(found).slope, rtol=1e-6, atol=1e-6)
-    assert module.known(closed).held == float(ends[0] == "hinged")
+    assert module.known_of(closed).held == float(ends[0] == "hinged")
 
 
 def test_slopes_of_shapes_by_elements_are_those_of_closed_forms():
     mesh, plate, hinged = fi.mesh.rectangle(0.5, 0.3), fi.Plate(STEEL, 3e-3), {"boundary": "hinged"}
-    by_elements = module.bending(module.known(fi.find_modes(fi.assemble(mesh, plate, hinged), n_modes=30)))
-    exact = module.bending(module.known(fi.analytic.closed_form(mesh, plate, hinged)(n_modes=30)))
+    by_elements = module.bending(module.known_of(fi.find_modes(fi.assemble(mesh, plate, hinged), n_modes=30)))
+    exact = module.bending(module.known_of(fi.analytic.closed_form(mesh, plate, hinged)(n_modes=30)))
     np.testing.assert_allclose(by_elements.slope, exact.slope, rtol=2e-5)  # three Gauss points a side leave 9e-6
     np.testing.assert_allclose(by_elements.shear, exact.shear, rtol=1e-3)  # third derivatives of quintics: 7e-4

@@ -22,9 +22,9 @@ def place(tmp_path, monkeypatch):
     """A file of its own for every test; what the process has read is forgotten before and after."""
     path = tmp_path / "kernels" / "speed.json"
     monkeypatch.setattr(cost, "place", lambda: path)
-    cost.known.cache_clear()
+    cost.this_machine.cache_clear()
     yield path
-    cost.known.cache_clear()
+    cost.this_machine.cache_clear()
 
 
 @pytest.fixture

@@ -25,7 +25,7 @@ def square(n_modes=1, h=H):
 
 def rise(body, amplitude):
     """Estimated rise of the first frequency of a body that swings in it with an amplitude [m] at its middle."""
-    known = bending.known(body)
+    known = bending.known_of(body)
     slope, omega = bending.bending(known).slope[0], body.omega[0]
     middle = float(np.abs(body.shape_at(body.shapes.grid()[0])[:, 0]).max())
     mean = 0.5 * slope * (amplitude / middle) ** 2  # of int |grad w|**2 over a period
@@ -61,7 +61,7 @@ def test_early_stretching_is_that_of_an_endless_plate():
         return np.sin(x) ** 2 / x + 0.5 * np.pi - sici(2.0 * x)[0]
 
     energy = 2.0 / np.pi**3 * quad(lambda x: g(x) ** 2, 1e-9, 200.0, limit=400)[0]
-    body = bending.known(square())
+    body = bending.known_of(square())
     for edge in (1e3, 1e5):  # x at the edge of the plate; the slopes ahead of the bent region grow without end
         slopes = 8.0 / np.pi * (np.euler_gamma + np.log(2.0 * edge))  # int |grad w|**2
         area = body.extent * np.pi / (2.0 * edge)
@@ -100,7 +100,7 @@ def direct(speed, mass=0.05):
     """Restitution, contact time and peak force of the same blow on the plate of one mode, with Berger's cubic term."""
     modes = square()
     phi, omega = modes.shape_at([(0.1, 0.1)])[0, 0], modes.omega[0]
-    slope = bending.bending(bending.known(modes)).slope[0]
+    slope = bending.bending(bending.known_of(modes)).slope[0]
     cubic = E * H / (1.0 - NU**2) / (2.0 * SIDE**2) * slope**2
 
     def rates(_, y):
@@ -243,7 +243,7 @@ def test_without_a_thickness_it_is_not_known():
 def shares(mesh, section, supports, n_modes):
     """Shares of the motion that bend the body and of the stiffness that is not from tension, of its flexible modes."""
     modes = fi.find_modes(fi.assemble(mesh, section, supports), n_modes=n_modes)
-    known = bending.known(modes)
+    known = bending.known_of(modes)
     return _bends(known, bending.bending(known), modes.omega)
 
 

@@ -13,7 +13,7 @@ BLOW = {"at": (0.12, 0.09), "speed": 1.0, "tolerance": 1e-6}
 
 def struck(quantity=None, **how):
     hit = fi.strike(PLATE, HAMMER, LAW, quantity=quantity, **BLOW, **how)
-    return Struck(hit, hit.bodies, bending.known(PLATE), None)
+    return Struck(hit, hit.bodies, bending.known_of(PLATE), None)
 
 
 def test_nothing_changes_if_nothing_is_changed():

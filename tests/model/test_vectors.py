@@ -137,7 +137,7 @@ def test_meshes_are_compared_with_all_vectors():
     """Each description is poorer than the one before in one respect only."""
     blow = np.array([0.2, 0.11]), 200.0, 1e-3, Elements(0.06)
     seen = vectors.Seen(Target.of(plate({"boundary": "hinged"}), None), *blow, False, Stages(None))
-    found = seen.modes(lambda modes, margin: 1e9)
+    found = seen.needed_modes(lambda modes, margin: 1e9)
     mesh, truncation = found.poorer["mesh"], found.poorer["truncation"]
     assert list(found.poorer) == ["mesh", "truncation"] and found.n_modes == mesh.n_modes > truncation.n_modes
     few = seen.coarse.pairs(int(ritz.FEWER * seen.count))

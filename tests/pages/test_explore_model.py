@@ -22,7 +22,7 @@ def stand(tmp_path_factory):
 
 
 def test_start_is_the_scene(stand):
-    hit, scene = explore_model.blow(stand.case(stand.start)), stand.scene.strike(target="modal")
+    hit, scene = stand.case(stand.start).blow(), stand.scene.strike(target="modal")
     # both promise 1e-2 or better
     assert hit.n_impacts == scene.n_impacts and hit.impulse == pytest.approx(scene.impulse, rel=1e-2)
 
@@ -59,14 +59,14 @@ def test_contacts_that_lose_start_as_the_scene_has_them(stand, kind):
 
 
 def test_guessed_compliance_gives_the_same_blow_where_it_is_right(stand):
-    exact = explore_model.blow(stand.case(stand.start))
-    guessed = explore_model.blow(stand.case(stand.start, stand.residual_at(stand.start.at)))
+    exact = stand.case(stand.start).blow()
+    guessed = stand.case(stand.start, stand.residual_at(stand.start.at)).blow()
     assert guessed.impulse == pytest.approx(exact.impulse, rel=1e-9)  # the same numbers by another way
-    assert explore_model.blow(stand.case(stand.start, 0.0)).impulse != exact.impulse
+    assert stand.case(stand.start, 0.0).blow().impulse != exact.impulse
 
 
 def test_quick_spectrum_is_the_exact_one_to_the_eye(stand):
-    hit = explore_model.blow(stand.case(stand.start))
+    hit = stand.case(stand.start).blow()
     frequencies = np.geomspace(20.0, 5e3, 50)
     exact = np.abs(hit.spectrum(frequencies))
     np.testing.assert_allclose(
@@ -86,14 +86,14 @@ def test_damping_loss_and_thickness_change_the_blow_as_a_new_body_would(stand):
     assert (stand.case(replace(stand.start, damping=0.07)).modes.damping_ratio == 0.07).all()
     lossy = stand.case(replace(stand.start, loss=1.0))
     assert lossy.contact.loss == 1.0
-    assert explore_model.blow(lossy).restitution != explore_model.blow(stand.case(stand.start)).restitution
+    assert lossy.blow().restitution != stand.case(stand.start).blow().restitution
 
 
 def test_a_saved_scene_strikes_as_the_page_does(stand, tmp_path):
     settings = replace(stand.start, mass=1.2 * stand.start.mass, damping=0.02, thickness=1.1, exponent=1.3)
     (tmp_path / "saved.toml").write_text(written(stand.saved(settings)))
     saved = fi.load_scene(tmp_path / "saved.toml").strike(target="modal", tolerance=1e-3)
-    shown = explore_model.blow(stand.case(settings))
+    shown = stand.case(settings).blow()
     assert saved.n_impacts == shown.n_impacts
     assert saved.impulse == pytest.approx(shown.impulse, rel=5e-3)  # both promise 1e-3
 
@@ -114,7 +114,7 @@ def test_hard_blows_on_elements_are_resolved_by_vectors(tmp_path):
     for changes in ({"stiffness": 100.0, "mass": 0.01}, {"damping": 0.05, "thickness": 1.5}):
         settings = replace(setup.start, **changes)
         case = setup.case(settings, body=seen)
-        hit, few = explore_model.blow(case), explore_model.blow(setup.case(settings))
+        hit, few = case.blow(), setup.case(settings).blow()
         ratio = settings.thickness
         truth = fi.strike(
             body.scaled(mass=0.2 * ratio, first_frequency=100.0 * ratio).damped(settings.damping),
@@ -138,7 +138,7 @@ def test_the_first_answer_to_a_slider_is_the_blow_but_for_small_errors(stand):
         case = stand.case(settings)
         fast = explore_model.quick(case)
         assert len(fast.history.steps) < 5_000  # some 5 ms
-        slow = explore_model.blow(case)
+        slow = case.blow()
         if slow.n_impacts <= 2:  # more of them are sensitive to everything
             compared += 1
             assert fast.n_impacts == slow.n_impacts

@@ -24,7 +24,7 @@ def unpacked(text):
 
 def test_judged_blow_is_sent_whole(explorer):
     setup = explorer.setup
-    told, hit = explorer.judge(setup.start), explore_model.blow(setup.case(setup.start), setup.tolerance)
+    told, hit = explorer.judge(setup.start), setup.case(setup.start).blow(tolerance=setup.tolerance)
     assert hit.tolerance == setup.scene.blow.values["tolerance"] == 1e-2  # the scene's own
     cells = dict(told["cells"])
     assert cells["impacts"] == str(hit.n_impacts) and cells["restitution"] == f"{hit.restitution:.3f}"

@@ -245,7 +245,7 @@ def test_the_same_seed_gives_the_same_blows():
 
 def test_a_killed_run_resumes_from_its_store(tmp_path, monkeypatch):
     pytest.importorskip("zarr", reason="the cluster extra is not installed")
-    vary, solved, real = {"striker.mass": ("lognormal", MASS, 0.2)}, [], cases.solve
+    vary, solved, real = {"striker.mass": ("lognormal", MASS, 0.2)}, [], cases.solve_cases
 
     def count(blows, start, stop, **wanted):
         if len(solved) == 20:
@@ -253,7 +253,7 @@ def test_a_killed_run_resumes_from_its_store(tmp_path, monkeypatch):
         solved.append(start)
         return real(blows, start, stop, **wanted)
 
-    monkeypatch.setattr(cases, "solve", count)
+    monkeypatch.setattr(cases, "solve_cases", count)
     with pytest.raises(KeyboardInterrupt):
         wall(vary, n=128, store=tmp_path / "blows")
     first = list(solved)

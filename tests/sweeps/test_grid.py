@@ -43,9 +43,9 @@ def test_a_cell_has_the_same_bits_whatever_is_computed_with_it(also):
     base = cells.Case(plate(), stick(), fi.Contact.linear(1e5), np.array(AT), 1.0)
     axes = cells.checked_axes(base, {"mass": np.geomspace(0.01, 0.2, 8), **also})
     whole = cases.Cases(base, axes, 1e-3, band=5e3)
-    expected, _ = cases.solve(whole, 0, whole.n_cases)
+    expected, _ = cases.solve_cases(whole, 0, whole.n_cases)
     starts = range(0, whole.n_cases, 3)
-    parts = [cases.solve(replace(whole, kernels={}), i, min(i + 3, whole.n_cases))[0] for i in starts]
+    parts = [cases.solve_cases(replace(whole, kernels={}), i, min(i + 3, whole.n_cases))[0] for i in starts]
     assert np.hstack(parts).tobytes() == expected.tobytes()
 
 
@@ -174,7 +174,7 @@ def test_points_are_an_axis_with_coordinates():
 def test_bodies_known_at_their_points_only_give_the_same():
     case = cells.Case(plate(), stick(), fi.Contact.linear(4e5), np.array(AT), 1.0)
     table = cases.Cases(case, {"mass": np.array([0.05, 0.1])}, 1e-3)
-    whole, few = cases.solve(table, 0, 2)[0], cases.solve(table.sampled(), 0, 2)[0]
+    whole, few = cases.solve_cases(table, 0, 2)[0], cases.solve_cases(table.sampled(), 0, 2)[0]
     assert_allclose(few, whole, rtol=1e-9)  # the same numbers but for rounding in the compliance
     one, two = (each.row(each.blow(1)) for each in (table.sampled(), table))
     assert_allclose(one, two, rtol=1e-9)

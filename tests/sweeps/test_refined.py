@@ -120,7 +120,7 @@ def test_the_predicted_cost_decides_and_is_told(monkeypatch, limit, words):
 @pytest.mark.slow
 def test_a_map_that_was_stopped_goes_on(tmp_path, monkeypatch):
     pytest.importorskip("zarr", reason="the cluster extra is not installed")
-    solved, real = [], cases.solve
+    solved, real = [], cases.solve_cases
 
     def count(cells, start, stop, **wanted):
         if len(solved) == 100:
@@ -128,7 +128,7 @@ def test_a_map_that_was_stopped_goes_on(tmp_path, monkeypatch):
         solved.append(tuple(cells.cells(start, stop)))
         return real(cells, start, stop, **wanted)
 
-    monkeypatch.setattr(cases, "solve", count)
+    monkeypatch.setattr(cases, "solve_cases", count)
     wanted = {"refine": True, "borders": False, "store": tmp_path / "map", "cells": 50}
     with pytest.raises(KeyboardInterrupt):
         swept(**wanted)
@@ -137,7 +137,7 @@ def test_a_map_that_was_stopped_goes_on(tmp_path, monkeypatch):
     table = swept(**{**wanted, "refine": None})  # goes on as it began, whatever it would cost
     again = solved[len(first) + 1 :]
     assert "interpolated" in table and not set(first[2:]) & set(again[2:])  # but for the first look
-    monkeypatch.setattr(cases, "solve", real)
+    monkeypatch.setattr(cases, "solve_cases", real)
     alone = swept(refine=True, borders=False, cells=50)
     xarray.testing.assert_allclose(table.drop_vars("failure"), alone.drop_vars("failure"), rtol=1e-9)
     with pytest.raises(ValueError, match="store must be a new folder or the store of this map"):

@@ -61,7 +61,7 @@ def test_a_store_gives_the_same_map(tmp_path, undisturbed):
 
 def test_a_run_that_stopped_goes_on_where_it_was(tmp_path, undisturbed, monkeypatch):
     solved = []
-    real = cases.solve
+    real = cases.solve_cases
 
     def count(table, start, stop, **wanted):
         if len(solved) == 20:
@@ -69,7 +69,7 @@ def test_a_run_that_stopped_goes_on_where_it_was(tmp_path, undisturbed, monkeypa
         solved.append(start)
         return real(table, start, stop, **wanted)
 
-    monkeypatch.setattr(cases, "solve", count)
+    monkeypatch.setattr(cases, "solve_cases", count)
     with pytest.raises(KeyboardInterrupt):
         sweep(store=tmp_path / "map")
     first = list(solved)
@@ -85,7 +85,7 @@ def test_error_texts_are_kept(tmp_path, monkeypatch):
     def fail(*_, **wanted):
         raise fi.SimulationError("the motion may be chaotic: é")
 
-    monkeypatch.setattr(cases, "strike", fail)
+    monkeypatch.setattr(cells, "strike", fail)
     table = sweep(over={"exponent": [0.8, 0.9]}, store=tmp_path / "map")
     assert table.failure.values.tolist() == ["the motion may be chaotic: é"] * 2
 

@@ -23,10 +23,10 @@ from typing import Any
 
 import numpy as np
 
+from ..._base.progress import LONG
 from . import places
 
 LOG = logging.getLogger("fem_impact.slow")
-LONG = 2.0  # [s] what takes longer is announced
 # what numba raises where a file of its cache cannot be read or written, or was cut short
 SPOILT = (OSError, EOFError, pickle.UnpicklingError, AttributeError, ImportError, IndexError, KeyError, ValueError)
 PLAIN = "plain"  # name of the copy in which nothing is compiled

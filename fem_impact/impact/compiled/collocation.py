@@ -18,24 +18,24 @@ from .law import at, corner_approach, near_side, power, relaxes, smooth_force, s
 from .laws.felt import faded, lags
 from .one_mode import mode_moments
 from .propagation import any_of, restore
-from .record import EXHAUSTED, FAILED, FINISHED, FULL, SETTLED, total_energy
+from .record import EXHAUSTED, FAILED, FINISHED, FULL, SETTLED
 from .rounding import NEAR, OVERFLOW, SOLVED, STALLED
 from .schemes import solve_linear
 
 from .frame import (  # isort: skip
-    LEVELS, LOST, NOTHING, TAKEN, TRY, begin, course_of, fly, followed, locate, made_run, moving, over, remember,
-    remembered, step_length, take_over, touching,
+    LEVELS, LOST, NOTHING, TAKEN, TRY, at_rest, begin, course_of, fly, followed, locate_event, made_run, moving, over,
+    remember, remembered, step_length, take_over, touching,
 )  # fmt: skip
 from .layout import (  # isort: skip
-    A11, A12, A21, A22, APPROACH, BEGUN, CLOSED, CORNERED, EVENTS, FAILURES, FAINT, FRESH, HEAD,
-    LENGTH, LEVEL, LOOKS, PUSH, RATE, SEEKS, START, STEPS, TARGET, TIME, TRIES,
+    A11, A12, A21, A22, APPROACH, BEGUN, CLOSED, CORNERED, EVENTS, FAILURES, FRESH, HEAD,
+    LENGTH, LEVEL, PUSH, RATE, SEEKS, START, STEPS, TARGET, TIME, TRIES,
 )  # fmt: skip
 
-MOBILITY, BEYOND = 0, 1  # rows of `CollocationRoom.contacts`
+MOBILITY, BEYOND = range(2)  # rows of `CollocationRoom.contacts`
 GUESS, FORCES, SQUEEZE = range(3)  # and of `CollocationRoom.nodes`
 BEGINS, ENDS, MOMENTS = range(3)  # and of `NodeGrid.work`
 PUSHED = 4  # row after those of free motion: displacement by a constant force
-MOVED, SPED = 0, 1  # rows of what force polynomials do: to the approach and to its rate
+MOVED, SPED = range(2)  # rows of what force polynomials do: to the approach and to its rate
 WELL, TURNED, LONG = range(3)  # how a step looks: take it so, take it again otherwise pressed, take a shorter one
 
 
@@ -197,6 +197,22 @@ def memory_at(lag, a, x, f, i, spring):
 
 
 @inner()
+def add_memory(spring, room, inner, r, count):
+    """Add what felt remembers to its equations, those of the active contact number r of ``count``."""
+    matrix, active, f, x, i = room.matrix, room.active, room.nodes[FORCES], room.nodes[SQUEEZE], room.active[r]
+    s, m = f.shape
+    for a in range(s):
+        row = a * count + r
+        matrix[s * m, row] += spring.hard * memory_at(room.lag[i], a, x, f, i, spring)
+        for e in range(s):
+            _, fx, _ = smooth_force(x[e, i], 0.0, spring)
+            share = room.lag[i, a, e] * fx * spring.hard / spring.stiffness
+            for b in range(s):
+                for c in range(count):
+                    matrix[row, b * count + c] -= share * inner[MOVED, e, b, i, active[c]]
+
+
+@inner()
 def solve_collocation(contacts, room, inner):
     """Forces at the nodes by Newton's method from those in the room, and the compressions there; whether it settles."""
     law, matrix, out_f, out_x = contacts.law, room.matrix, room.nodes[FORCES], room.nodes[SQUEEZE]
@@ -236,22 +252,10 @@ def solve_collocation(contacts, room, inner):
                 matrix[row, row] += 1.0 + fx * law["compliance"][i]
                 scale = max(scale, abs(out_f[a, i]), abs(f))
         for r in range(count):
-            i = active[r]
-            spring = spring_of(law, i)
-            if spring.relaxation == 0.0:
-                continue
-            for a in range(s):
-                row = a * count + r
-                vector[row] += spring.hard * memory_at(room.lag[i], a, out_x, out_f, i, spring)
-                for e in range(s):
-                    _, fx, _ = smooth_force(out_x[e, i], 0.0, spring)
-                    share = room.lag[i, a, e] * fx * spring.hard / spring.stiffness
-                    for b in range(s):
-                        for c in range(count):
-                            matrix[row, b * count + c] -= share * inner[MOVED, e, b, i, active[c]]
-        if not scale < OVERFLOW:
-            return False
-        if not solve_linear(matrix, vector, s * count):
+            spring = spring_of(law, active[r])
+            if spring.relaxation > 0.0:
+                add_memory(spring, room, inner, r, count)
+        if not scale < OVERFLOW or not solve_linear(matrix, vector, s * count):
             return False
         change = 0.0
         for a in range(s):
@@ -419,6 +423,44 @@ def prepare(shape, grid, room):
             room.contacts[MOBILITY, i] += shape[i, n] * shape[i, n]
 
 
+@inner()
+def guess_again(room):
+    """Begin the next try from the forces of the last."""
+    for a in range(room.nodes.shape[1]):
+        for i in range(room.nodes.shape[2]):
+            room.nodes[GUESS, a, i] = max(0.0, room.nodes[FORCES, a, i])
+
+
+@inner(part=True)
+def judged(contacts, course, grid, room, misfit, h, special, limits):
+    """Whether to take a step of length h; if not, the next is shorter, of other contacts, or of the length returned."""
+    count = course.counts
+    coarse = misfit > grid.limit and count[LEVEL] < LEVELS - 2
+    if misfit == np.inf and count[SEEKS] != NOTHING:
+        count[SEEKS] = NOTHING
+        count[LEVEL] += 1
+        return False, 0.0
+    if count[SEEKS] == NOTHING:
+        look = LONG if misfit == np.inf else seen(contacts, room, special, count[LEVEL], h, limits)
+        if look == LONG:
+            count[LEVEL] += 1
+            room.nodes[GUESS] = 0.0
+        if look != WELL:
+            return False, 0.0
+    answer, guess = locate_event(contacts, course, limits, h, special, FALSE)
+    if answer == TRY and count[TRIES] == 0 and coarse and 0.25 * h < guess < 0.9 * h:
+        count[SEEKS] = NOTHING
+        count[LEVEL] += 1
+    if answer == LOST:
+        count[LEVEL] += 1
+    if answer == TAKEN and coarse and h > NEAR * grid.base:
+        count[LEVEL] += 1
+        while count[LEVEL] < LEVELS - 2 and grid.base * 0.5 ** count[LEVEL] > 0.6 * h:
+            count[LEVEL] += 1
+        return False, guess
+    return answer == TAKEN, guess
+
+
 @outer(allocates=False, seconds=10.0)
 def follow(scene, grid, room, flights, limits, run, steps):
     """Step by step until the run ends, or until its record is FULL."""
@@ -426,7 +468,7 @@ def follow(scene, grid, room, flights, limits, run, steps):
     if course.counts[BEGUN] == 0:
         begin(scene, bodies, contacts, course, grid.base)
         prepare(scene.shape, grid, room)
-    clock, count = course.clock, course.counts
+    count = course.counts
     special, _ = special_of(contacts.law)
     quiet = not any_of(bodies.bias)
     guess = 0.0
@@ -436,9 +478,7 @@ def follow(scene, grid, room, flights, limits, run, steps):
             status = FAILED
             break
         if count[SEEKS] == NOTHING:
-            status = over(course, limits)
-            if status == EXHAUSTED and count[STEPS] + 1 >= steps.shape[0]:
-                return FULL
+            status = over(course, limits, steps)
             if status != EXHAUSTED:
                 break
             if not any_of(contacts.pressed):
@@ -461,36 +501,12 @@ def follow(scene, grid, room, flights, limits, run, steps):
             h, slot = step_length(course, grid.base, limits.horizon)
         else:
             h, slot = guess, LEVELS
-            for i in range(contacts.end.size):
-                for a in range(room.nodes.shape[1]):
-                    room.nodes[GUESS, a, i] = max(0.0, room.nodes[FORCES, a, i])
+            guess_again(room)
         if slot == LEVELS or grid.known[slot] == 0.0:
             tabulate(bodies, grid, slot, h)
         misfit = collocate(bodies, contacts, grid, room, slot, h)
-        coarse = misfit > grid.limit and count[LEVEL] < LEVELS - 2
-        if misfit == np.inf and count[SEEKS] != NOTHING:
-            count[SEEKS] = NOTHING
-            count[LEVEL] += 1
-            continue
-        if count[SEEKS] == NOTHING:
-            look = LONG if misfit == np.inf else seen(contacts, room, special, count[LEVEL], h, limits)
-            if look == LONG:
-                count[LEVEL] += 1
-                room.nodes[GUESS] = 0.0
-            if look != WELL:
-                continue
-        answer, guess = locate(contacts, course, limits, h, special, FALSE)
-        if answer == TRY and count[TRIES] == 0 and coarse and 0.25 * h < guess < 0.9 * h:
-            count[SEEKS] = NOTHING
-            count[LEVEL] += 1
-        if answer == LOST:
-            count[LEVEL] += 1
-        if answer != TAKEN:
-            continue
-        if coarse and h > NEAR * grid.base:
-            count[LEVEL] += 1
-            while count[LEVEL] < LEVELS - 2 and grid.base * 0.5 ** count[LEVEL] > 0.6 * h:
-                count[LEVEL] += 1
+        taken, guess = judged(contacts, course, grid, room, misfit, h, special, limits)
+        if not taken:
             continue
         smooth = count[TARGET] < 0 and count[CORNERED] < 0
         row = steps[count[STEPS]]
@@ -501,10 +517,11 @@ def follow(scene, grid, room, flights, limits, run, steps):
         take_over(contacts, course, limits, h, grid.base, special)
         if smooth and count[LEVEL] > 0 and misfit < grid.limit * 0.25 * 0.5 ** (grid.nodes.size - 1):
             count[LEVEL] -= 1
-        if quiet and count[LOOKS] % 512 == 0 and total_energy(bodies, contacts) <= clock[FAINT]:
+        if quiet and at_rest(bodies, contacts, course):
             status = SETTLED
             break
-    remembered(contacts)
+    if status != FULL:
+        remembered(contacts)
     return status
 
 

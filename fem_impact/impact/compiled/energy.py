@@ -16,16 +16,16 @@ from .exact import advance, freshen, keep_in_mind, made_tables, predict, record,
 from .flight import NEVER, SLOW, UNPROVED
 from .law import special_of
 from .propagation import any_of, commit, restore
-from .record import EXHAUSTED, FAILED, FINISHED, FULL, SETTLED, total_energy
+from .record import EXHAUSTED, FAILED, FINISHED, FULL, SETTLED
 from .rounding import OVERFLOW
 from .stretched import Stretch, attempt, finish, flown, made_room, stretching_energy, unseen
 
 from .frame import (  # isort: skip
-    LEVELS, LOST, NOTHING, TAKEN, begin, course_of, fly, followed, locate, made_run, moving, over, remembered,
-    step_length, take_over, touching,
+    LEVELS, LOST, NOTHING, TAKEN, at_rest, begin, course_of, fly, followed, locate_event, made_run, moving, over,
+    remembered, step_length, take_over, touching,
 )  # fmt: skip
 from .layout import (  # isort: skip
-    APPROACH, BEGUN, BLINDS, CORNERED, EVENTS, FAINT, FALLBACKS, FRESH, HEAD, LEAST, LEVEL, LOOKS, PAUSE, RATE, READY,
+    APPROACH, BEGUN, BLINDS, CORNERED, EVENTS, FAINT, FALLBACKS, FRESH, HEAD, LEAST, LEVEL, PAUSE, RATE, READY,
     RESPITE, SEEKS, STEPS, TARGET, TIME,
 )  # fmt: skip
 
@@ -41,6 +41,54 @@ def pass_events(course):
     blind = clock[TIME] < clock[PAUSE]
     count[LEVEL] = count[LEAST] if blind else max(count[LEVEL], count[LEAST])
     return blind
+
+
+@inner(part=True, fastmath=False)  # typed by itself, as room may be None
+def fly_if_free(bodies, contacts, course, flights, room, limits, row):
+    """How a flight ends, see `find_onset`; SLOW where there is none, or bodies that stretch fly in steps."""
+    if room is not None:
+        return NEVER if flown(bodies, contacts, course, room, limits) else SLOW
+    if course.clock[TIME] < course.clock[PAUSE] or any_of(contacts.pressed):
+        return SLOW
+    return fly(bodies, contacts, course, flights, limits, row)
+
+
+@inner(part=True, fastmath=False)
+def solved(bodies, contacts, room, tables, slot, h):
+    """Whether the forces of a step were found, and what `solve_step` tells of them."""
+    if room is None:
+        return True, solve_step(contacts, tables, slot, h)
+    return attempt(bodies, contacts, room, tables, slot, h, FALSE)
+
+
+@inner(part=True)
+def located(contacts, course, limits, h, base, cornered, blind):
+    """Whether to take a step of length h, whether blind, as its event was not found, and the next length to try."""
+    if blind:
+        course.counts[TARGET] = -1
+        course.counts[CORNERED] = -1
+        return True, True, 0.0
+    answer, guess = locate_event(contacts, course, limits, h, cornered, TRUE)
+    blind = answer == LOST and h >= 1e-3 * base
+    if blind:
+        course.counts[TARGET] = -1
+    elif answer == LOST:  # in a tiny step: pass the events that follow
+        course.counts[EVENTS] = EVENT_LIMIT + 1
+    return blind or answer == TAKEN, blind, guess
+
+
+@inner(part=True)
+def make_ready(bodies, contacts, course, tables, slot, h, special):
+    """Where a step would end if nothing pushed, and what the contacts remember now."""
+    count = course.counts
+    if slot == LEVELS or tables.known[slot] == 0.0:
+        tabulate(bodies, tables, slot, h)
+    if count[READY] != slot:
+        predict(bodies, contacts, tables, slot, h)
+    count[READY] = -1
+    if count[SEEKS] == NOTHING:
+        freshen(contacts, special and count[FRESH] == 1)
+        count[FRESH] = 0
 
 
 @inner(part=True)
@@ -59,14 +107,25 @@ def too_long(contacts, special, level, h, still):
     return shorter
 
 
-@inner(part=True)
-def shortened(course, shorter):
-    """Whether to take a step again, halved so often; steps that cannot be halved any more pass the events."""
+@inner(part=True, fastmath=False)
+def shortened(bodies, contacts, course, room, special, h, still):
+    """Whether to take a step again, halved; steps that cannot be halved any more pass the events."""
+    shorter = too_long(contacts, special, course.counts[LEVEL], h, still)
+    if room is not None:
+        shorter = max(shorter, unseen(bodies, contacts, h, course.counts[LEVEL]))
     course.counts[LEVEL] += shorter
     if course.counts[LEVEL] >= LEVELS:
         course.counts[LEVEL] = course.counts[LEAST]
         course.counts[EVENTS] = EVENT_LIMIT + 1
     return shorter > 0
+
+
+@inner(part=True)
+def lengthen(count):
+    """Halve the next step less often after one that ended at no event."""
+    if count[TARGET] < 0 and count[CORNERED] < 0:
+        count[LEVEL] = max(0, count[LEVEL] - 1)
+        count[LEAST] = max(0, count[LEAST] - 1)
 
 
 @inner(part=True)
@@ -78,9 +137,12 @@ def finite(contacts):
     return total < OVERFLOW
 
 
-@inner(part=True)
-def move_on(bodies, contacts, course, tables, slot, h, horizon):
+@inner(part=True, fastmath=False)
+def move_on(bodies, contacts, course, room, tables, slot, h, horizon):
     """Move the modes to the end of a step, and predict the next one at once if it is alike."""
+    if room is not None:
+        finish(bodies, contacts, room, tables.lanes[slot], h)
+        return
     count = course.counts
     alike = slot == count[LEVEL] and course.clock[TIME] + h <= horizon
     if contacts.end.size == 1 and alike and contacts.pressed[0]:
@@ -100,7 +162,7 @@ def follow(scene, tables, room, limits, run, steps):
         begin(scene, bodies, contacts, course, tables.base)
         if room is not None:
             course.clock[FAINT] += 1e-24 * stretching_energy(room, bodies.q)
-    clock, count = course.clock, course.counts
+    count = course.counts
     special, cornered = special_of(contacts.law)
     quiet = not any_of(bodies.bias)
     blind = False
@@ -108,86 +170,50 @@ def follow(scene, tables, room, limits, run, steps):
     status = EXHAUSTED
     while count[STEPS] < limits.max_steps:
         if count[SEEKS] == NOTHING:
-            status = over(course, limits)
-            if status == EXHAUSTED and count[STEPS] + 1 >= steps.shape[0]:
-                return FULL
+            status = over(course, limits, steps)
             if status != EXHAUSTED:
                 break
-            if room is not None:
-                if flown(bodies, contacts, course, room, limits):
-                    status = FINISHED
-                    break
-            elif clock[TIME] >= clock[PAUSE] and not any_of(contacts.pressed):
-                found = fly(bodies, contacts, course, flights, limits, steps[count[STEPS]])
-                if found in (NEVER, UNPROVED):
-                    status = FINISHED if found == NEVER else EXHAUSTED
-                    break
-                if found != SLOW:
-                    continue
+            found = fly_if_free(bodies, contacts, course, flights, room, limits, steps[count[STEPS]])
+            if found in (NEVER, UNPROVED):
+                status = FINISHED if found == NEVER else EXHAUSTED
+                break
+            if found != SLOW:
+                continue
             blind = pass_events(course)
             h, slot = step_length(course, tables.base, limits.horizon)
         else:
             h, slot = guess, LEVELS
-        if slot == LEVELS or tables.known[slot] == 0.0:
-            tabulate(bodies, tables, slot, h)
-        if count[READY] != slot:
-            predict(bodies, contacts, tables, slot, h)
-        count[READY] = -1
-        if count[SEEKS] == NOTHING:
-            freshen(contacts, special and count[FRESH] == 1)
-            count[FRESH] = 0
-        if room is None:
-            fine = solve_step(contacts, tables, slot, h)
-        else:
-            good, fine = attempt(bodies, contacts, room, tables, slot, h, FALSE)
-            if not good:
-                count[SEEKS] = NOTHING
-                count[LEAST] = count[LEVEL] + 1
-                room.hint[:] = 0.0
-                if count[LEAST] >= LEVELS:
-                    status = FAILED
-                    break
-                continue
+        make_ready(bodies, contacts, course, tables, slot, h, special)
+        good, fine = solved(bodies, contacts, room, tables, slot, h)
+        if not good:
+            count[SEEKS] = NOTHING
+            count[LEAST] = count[LEVEL] + 1
+            if count[LEAST] >= LEVELS:
+                status = FAILED
+                break
+            continue
         if special:
             keep_in_mind(contacts, h, tables.ramp and fine)
-        if blind:
-            count[TARGET] = -1
-            count[CORNERED] = -1
-        else:
-            if count[SEEKS] == NOTHING:
-                shorter = too_long(contacts, special, count[LEVEL], h, limits.still)
-                if room is not None:
-                    shorter = max(shorter, unseen(bodies, contacts, h, count[LEVEL]))
-                if shortened(course, shorter):
-                    continue
-            answer, guess = locate(contacts, course, limits, h, cornered, TRUE)
-            if answer == LOST and h >= 1e-3 * tables.base:
-                blind = True
-                count[TARGET] = -1
-            elif answer != TAKEN:
-                if answer == LOST:  # in a tiny step: pass the events that follow
-                    count[EVENTS] = EVENT_LIMIT + 1
-                continue
+        fresh = not blind and count[SEEKS] == NOTHING
+        if fresh and shortened(bodies, contacts, course, room, special, h, limits.still):
+            continue
+        taken, blind, guess = located(contacts, course, limits, h, tables.base, cornered, blind)
+        if not taken:
+            continue
         if not finite(contacts):
             status = FAILED
             break
         record(contacts, course, steps[count[STEPS]], tables.sums[slot], h, blind)
-        if tables.ramp and fine == 0 and any_of(contacts.force):
-            count[FALLBACKS] += 1
-        if blind:
-            count[BLINDS] += 1
+        count[FALLBACKS] += tables.ramp and fine == 0 and any_of(contacts.force)
+        count[BLINDS] += blind
         take_over(contacts, course, limits, h, tables.base, special)
-        if count[TARGET] < 0 and count[CORNERED] < 0:
-            count[LEVEL] = max(0, count[LEVEL] - 1)
-            count[LEAST] = max(0, count[LEAST] - 1)
-        if room is None:
-            move_on(bodies, contacts, course, tables, slot, h, limits.horizon)
-        else:
-            finish(bodies, contacts, room, tables.lanes[slot], h)
-        if quiet and count[LOOKS] % 512 == 0 and total_energy(bodies, contacts) <= clock[FAINT]:
+        lengthen(count)
+        move_on(bodies, contacts, course, room, tables, slot, h, limits.horizon)
+        if quiet and at_rest(bodies, contacts, course):
             status = SETTLED
             break
-    remembered(contacts)
+    if status != FULL:
+        remembered(contacts)
     return status
 
 

@@ -247,22 +247,12 @@ def first_corner(contacts, h, lossy, out_bracket):
                 root = late * (bend - d0) / (high - d0)
             if root < at:
                 at, target, kind = root, i, 1
-                out_bracket[HIGH], out_bracket[TRIED], out_bracket[MISSED], out_bracket[SLOPE] = (
-                    late,
-                    late,
-                    high - bend,
-                    d0 - bend,
-                )
+                last_try(late, high - bend, d0 - bend, out_bracket)
         elif not yields(law, i) and d0 > bend + near and d1 < bend - near:
             root = hermite_root(d0 - bend, v0, d1 - bend, v1, h)
             if root < at:
                 at, target, kind = root, i, 1
-                out_bracket[HIGH], out_bracket[TRIED], out_bracket[MISSED], out_bracket[SLOPE] = (
-                    h,
-                    h,
-                    d1 - bend,
-                    d0 - bend,
-                )
+                last_try(h, d1 - bend, d0 - bend, out_bracket)
     out_bracket[LOW] = 0.0
     return target, kind, at
 

@@ -13,12 +13,12 @@ from .flight import GLIDES
 from .frame import LEVELS, remember
 from .law import at, harden, relaxes, spring_of
 from .laws.felt import faded, meet
-from .propagation import N_LANE, any_of, lane_table
+from .propagation import any_of, lane_table
 from .schemes import Free, Own, linear_guess, point_of, remembers, solve_constants, solve_ramp, solve_ramps
 
 from .layout import (  # isort: skip
     A11, A12, A21, A22, APPROACH, BLIND, CLOSED, COMPRESSION, ENERGY, FORCE, FREE_END, FREE_MEAN, FREE_RATE,
-    LENGTH, M1, M2, M3, OWN_END, OWN_END_RAMP, OWN_MEAN, OWN_MEAN_RAMP, OWN_RATE, OWN_RATE_RAMP, PUSH, RATE,
+    LENGTH, M1, M2, M3, N_LANE, OWN_END, OWN_END_RAMP, OWN_MEAN, OWN_MEAN_RAMP, OWN_RATE, OWN_RATE_RAMP, PUSH, RATE,
     START, TIME,
 )  # fmt: skip
 

@@ -13,8 +13,8 @@ from . import arrays
 from .build import LOOSE, inner
 from .bundles import Flights
 from .events import lowest
-from .layout import FASTEST, HARDEST, REACH, RIGID, RIGID_ACCELERATION, RIGID_RATE
-from .propagation import N_LANE, any_of, glide, lane_table, restore
+from .layout import FASTEST, HARDEST, N_LANE, REACH, RIGID, RIGID_ACCELERATION, RIGID_RATE
+from .propagation import any_of, glide, lane_table, restore
 from .rounding import REPEATED
 
 PATIENT = 4  # [-] looks of a flight that make do with the table of a step up to four times shorter than allowed
@@ -93,10 +93,70 @@ def made_flights(n_modes: int, base: float, shortest: float) -> Flights:
 
 
 @inner()
-def turned_back(d0, v0, d1, v1, h, out_miss):
-    """Raise ``out_miss`` (1,) to where an approach turned back in a time h, by the cubic through both ends."""
-    if v1 < 0.0 < v0:
-        out_miss[0] = max(out_miss[0], -lowest(-d0, -v0, -d1, -v1, h))
+def watched(bodies, offset, i, before, h, out_miss):
+    """Approach of contact i and its rate; ``before`` (n_contacts, 2) has those of a time h ago, zero at first.
+
+    ``out_miss`` (1,) is raised to where it turned back meanwhile, by the cubic through both ends.
+    """
+    d, v = approach(bodies.shape, offset, i, bodies.q, bodies.p)
+    if v < 0.0 < before[i, 1]:
+        out_miss[0] = max(out_miss[0], -lowest(-before[i, 0], -before[i, 1], -d, -v, h))
+    before[i, 0] = d
+    before[i, 1] = v
+    return d, v
+
+
+@inner()
+def safe_wait(bounds, i, d, v):
+    """How long contact i surely does not touch from an approach d <= 0 and its rate v on, by its bounds."""
+    ahead, rate, reach, hardest = bounds[i, RIGID], bounds[i, RIGID_RATE], bounds[i, REACH], bounds[i, HARDEST]
+    pull = max(bounds[i, RIGID_ACCELERATION], 0.0)
+    wait = quadratic_wait(d, v, hardest + pull)
+    wait = max(wait, quadratic_wait(d, max(0.0, rate + bounds[i, FASTEST]), pull))
+    if bounds[i, RIGID_ACCELERATION] <= 0.0 and ahead + reach <= 0.0:
+        wait = max(wait, quadratic_wait(ahead + reach, max(0.0, rate), 0.0))
+        if hardest > 0.0:  # it cannot touch, but turns back near enough to be told
+            wait = min(wait, TURNS * bounds[i, FASTEST] / hardest)
+    return wait
+
+
+@inner()
+def recedes(bounds, i, limits, look):
+    """Whether contact i surely never touches again, by its bounds; first only if it stays well away, see `AWAY`."""
+    still = bounds[i, RIGID_RATE] <= limits.still and bounds[i, RIGID_ACCELERATION] <= 0.0
+    return still and bounds[i, RIGID] + bounds[i, REACH] <= (limits.depth if look > LASTING else -AWAY * limits.depth)
+
+
+@inner()
+def meets(bounds, offset, i, d, v, elapsed, still):
+    """Whether contact i closes now, at an approach d <= 0 and its rate v."""
+    pull = bounds[i, RIGID_ACCELERATION]
+    driven = bounds[i, HARDEST] > 0.0 or pull > 0.0
+    rises = v > still or (driven and (v > 0.0 or (v == 0.0 and elapsed + pull > 0.0)))
+    return rises and -d <= REPEATED * (abs(bounds[i, RIGID]) + bounds[i, REACH] + abs(offset[i]))
+
+
+@inner()
+def kept_slot(flights, wait, look):
+    """Which of the kept step lengths a look ahead takes: the longest up to ``wait``, a known one, or GLIDES."""
+    slot = int(np.floor(np.log2(wait / flights.base))) + GLIDES // 2
+    if not 2 <= slot < GLIDES:
+        return GLIDES
+    if look < PATIENT and flights.known[slot] == 0.0:
+        slot -= 1 if flights.known[slot - 1] != 0.0 else (2 if flights.known[slot - 2] != 0.0 else 0)
+    return slot
+
+
+@inner()
+def fly_on(bodies, flights, slot, wait, pushed, bounds):
+    """Advance a state, and the rigid parts of its approaches, by a look ahead."""
+    if slot == GLIDES or flights.known[slot] == 0.0:
+        lane_table(bodies.omega, bodies.zeta, wait, pushed, flights.lanes[slot])
+        flights.known[slot] = 1.0
+    glide(flights.lanes[slot], wait, bodies.bias, bodies.q, bodies.p)
+    for i in range(bounds.shape[0]):
+        bounds[i, RIGID] += wait * (bounds[i, RIGID_RATE] + 0.5 * bounds[i, RIGID_ACCELERATION] * wait)
+        bounds[i, RIGID_RATE] += wait * bounds[i, RIGID_ACCELERATION]
 
 
 @inner(allocates=True)
@@ -110,63 +170,42 @@ def find_onset(bodies, offset, flights, limits, limit, out_miss):
     Returns (elapsed, contact, status): ONSET at `contact`; NEVER any contact again (proved); LATER than the limit;
     SLOW, looks shorter than `shortest`: hand over to a stepping scheme; UNPROVED within LOOK_LIMIT.
     """
-    omega, shape, bias, q, p = bodies.omega, bodies.shape, bodies.bias, bodies.q, bodies.p
-    m = shape.shape[0]
-    elapsed = 0.0
+    q, p, m = bodies.q, bodies.p, bodies.shape.shape[0]
+    elapsed = wait = 0.0
     slow = 0
-    pushed = any_of(bias)
+    pushed = any_of(bodies.bias)
     bounds = np.empty((m, 6))
     before = np.zeros((m, 2))
-    wait = 0.0
-    away = AWAY * limits.depth
     old_q = q.copy()
     old_p = p.copy()
     for look in range(LOOK_LIMIT // (q.size + 50)):
         last = wait
         wait = np.inf
         first = -1
-        final = True
         close = True
         leading = 0.0
         for i in range(m):
             if look % 64 == 0:
                 motion_bounds(bodies, offset, i, bounds)
-            r0 = bounds[i, RIGID]
-            r1 = bounds[i, RIGID_RATE]
-            r2 = bounds[i, RIGID_ACCELERATION]
-            reach = bounds[i, REACH]
-            hardest = bounds[i, HARDEST]
-            parted = r1 <= limits.still and r2 <= 0.0 and r0 + reach <= (limits.depth if look > LASTING else -away)
+            parted = recedes(bounds, i, limits, look)
             if parted and (look == 0 or before[i, 1] <= 0.0):
                 continue
-            d, v = approach(shape, offset, i, q, p)
-            if look > 0:
-                turned_back(before[i, 0], before[i, 1], d, v, last, out_miss)
-            before[i, 0] = d
-            before[i, 1] = v
+            d, v = watched(bodies, offset, i, before, last, out_miss)
             if parted:
-                if v > 0.0 and r0 + reach > -away:  # it turns back later, at most from there
-                    out_miss[0] = max(out_miss[0], r0 + reach)
+                beyond = bounds[i, RIGID] + bounds[i, REACH]
+                if v > 0.0 and beyond > -AWAY * limits.depth:  # it turns back later, at most from there
+                    out_miss[0] = max(out_miss[0], beyond)
                 continue
-            final = False
-            scale = abs(r0) + reach + abs(offset[i])
             d = min(d, 0.0)
-            driven = hardest > 0.0 or r2 > 0.0
-            rises = v > limits.still or (driven and (v > 0.0 or (v == 0.0 and elapsed + r2 > 0.0)))
-            if -d <= REPEATED * scale and rises:
+            if meets(bounds, offset, i, d, v, elapsed, limits.still):
                 return elapsed, i, ONSET
-            bound = quadratic_wait(d, v, hardest + max(r2, 0.0))
-            bound = max(bound, quadratic_wait(d, max(0.0, r1 + bounds[i, FASTEST]), max(r2, 0.0)))
-            if r2 <= 0.0 and r0 + reach <= 0.0:
-                bound = max(bound, quadratic_wait(r0 + reach, max(0.0, r1), 0.0))
-                if hardest > 0.0:  # it cannot touch, but turns back near enough to be told
-                    bound = min(bound, TURNS * bounds[i, FASTEST] / hardest)
+            bound = safe_wait(bounds, i, d, v)
             if bound < wait:
                 wait = bound
                 first = i
                 leading = v
                 close = v > 0.0 and -d < 2.0 * v * bound
-        if final or wait == np.inf:
+        if wait == np.inf:
             restore(old_q, old_p, q, p)
             return 0.0, -1, NEVER
         slot = GLIDES
@@ -180,23 +219,13 @@ def find_onset(bodies, offset, flights, limits, limit, out_miss):
                 slow += 1
                 if slow > SLOW_LOOKS:
                     return elapsed, first, SLOW
-            power_of_two = int(np.floor(np.log2(wait / flights.base))) + GLIDES // 2
-            if not close and bounds[first, HARDEST] != 0.0 and 2 <= power_of_two < GLIDES:
-                slot = power_of_two
-                if look < PATIENT and flights.known[slot] == 0.0:
-                    slot -= 1 if flights.known[slot - 1] != 0.0 else (2 if flights.known[slot - 2] != 0.0 else 0)
-                wait = flights.base * 2.0 ** (slot - GLIDES // 2)
-        if slot == GLIDES or flights.known[slot] == 0.0:
-            lane_table(omega, bodies.zeta, wait, pushed, flights.lanes[slot])
-            flights.known[slot] = 1.0
-        glide(flights.lanes[slot], wait, bias, q, p)
+            if not close and bounds[first, HARDEST] != 0.0:
+                slot = kept_slot(flights, wait, look)
+                wait = wait if slot == GLIDES else flights.base * 2.0 ** (slot - GLIDES // 2)
+        fly_on(bodies, flights, slot, wait, pushed, bounds)
         if over:
             for i in range(m):
-                d, v = approach(shape, offset, i, q, p)
-                turned_back(before[i, 0], before[i, 1], d, v, wait, out_miss)
+                watched(bodies, offset, i, before, wait, out_miss)
             return limit, -1, LATER
         elapsed += wait
-        for i in range(m):
-            bounds[i, RIGID] += wait * (bounds[i, RIGID_RATE] + 0.5 * bounds[i, RIGID_ACCELERATION] * wait)
-            bounds[i, RIGID_RATE] += wait * bounds[i, RIGID_ACCELERATION]
     return elapsed, -1, UNPROVED

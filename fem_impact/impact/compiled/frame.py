@@ -30,7 +30,7 @@ from .layout import (  # isort: skip
 
 LEVELS = 40  # [-] halvings of the step that may be cached, and where the table of a step of any other length is kept
 FIRST_ROWS = 256  # [-] of a record that grows as needed, which does not change the result; few runs have more
-NOTHING, CROSSING, CORNER = 0, 1, 2  # what a step is to end at: a contact that opens or closes, a corner of its force
+NOTHING, CROSSING, CORNER = range(3)  # what a step is to end at: a contact that opens or closes, a corner of its force
 TAKEN, TRY, AFRESH, LOST = range(4)  # a try is good; another length is sought; start again; there was nothing to find
 
 
@@ -97,13 +97,16 @@ def begin(scene, bodies, contacts, course, base):
 
 
 @inner(part=True)
-def over(course, limits):
-    """Why a run ends before its next step; EXHAUSTED, which it will be after the last one, where it goes on."""
+def over(course, limits, steps):
+    """Why a run ends before its next step; EXHAUSTED, which it will be after the last one, where it goes on.
+
+    FULL where the record of its steps is.
+    """
     if course.clock[TIME] >= limits.horizon:
         return HORIZON
     if 0 < limits.max_impacts <= course.counts[RELEASED]:
         return IMPACTS
-    return EXHAUSTED
+    return FULL if course.counts[STEPS] + 1 >= steps.shape[0] else EXHAUSTED
 
 
 @inner(part=True)
@@ -176,7 +179,7 @@ def step_length(course, base, horizon):
 
 
 @inner(part=True)
-def locate(contacts, course, limits, h, cornered, lossy):
+def locate_event(contacts, course, limits, h, cornered, lossy):
     """After a try of length h: what to do next, and the length of the next try where the end of the step is sought.
 
     The first crossing is sought first, then the first corner before it, if some force has any (``cornered``).
@@ -215,6 +218,12 @@ def locate(contacts, course, limits, h, cornered, lossy):
             count[TRIES] = 0
             return TRY, guess
     return TAKEN, guess
+
+
+@inner(part=True)
+def at_rest(bodies, contacts, course):
+    """Whether the bodies are, asked at every 512th step in contact."""
+    return course.counts[LOOKS] % 512 == 0 and total_energy(bodies, contacts) <= course.clock[FAINT]
 
 
 @inner(part=True)

@@ -12,8 +12,8 @@ CONTACT_ROWS = 17
 # rows of what unit forces take from that (6, n_contacts, n_contacts), see `schemes.Own`
 OWN_END, OWN_END_RAMP, OWN_MEAN, OWN_MEAN_RAMP, OWN_RATE, OWN_RATE_RAMP = range(6)
 
-# rows of a step of every mode (7, n_modes), see `propagation.lane_table`
-A11, A12, A21, A22, M1, M2, M3 = range(7)
+# rows of a step of every mode (N_LANE, n_modes), see `propagation.lane_table`
+A11, A12, A21, A22, M1, M2, M3, N_LANE = range(8)
 
 # columns of a recorded step (n_steps, HEAD + ...), and from the first of a contact's on; see `record`
 START, LENGTH, BLIND, HEAD = range(4)

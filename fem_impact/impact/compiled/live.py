@@ -31,7 +31,7 @@ N_ON, N_LOOKS, FRAME, FORCED = range(4)  # places of `PlayState.place`
 LOOKS = 64  # [-] looks of a flight after which its bounds are drawn anew, as they loosen
 FAINT = 1e-140  # [-] of sqrt(J): a mode with less is at rest, before its numbers get slow to calculate with
 SWEEP = 1024  # [-] frames after which modes are looked at for that, to limit the work
-STRUCK, STOLEN, TOUCHED, TRACED, STEPS, LOST, COUNTERS = 0, 1, 2, 3, 4, 5, 6  # what is counted; how many counters
+STRUCK, STOLEN, TOUCHED, TRACED, STEPS, LOST, COUNTERS = range(7)  # what is counted; how many counters
 
 
 class PlayedBody(NamedTuple):
@@ -242,7 +242,7 @@ def flight(body, pads, limits, state, level):
 
 
 @inner()
-def glided(limits, state, h, end):
+def glided(state, h, end):
     """Take over a step in which nothing touched."""
     restore(state.free_q, state.free_p, state.q, state.p)
     for i in range(state.place[N_ON]):
@@ -286,7 +286,7 @@ def step(body, limits, state, level, time):
             for i in range(contacts.end.size):
                 meets = meets or contacts.free[FREE_END, i] > 0.0
             if not meets:
-                glided(limits, state, h, contacts.free)
+                glided(state, h, contacts.free)
                 return level
             if level < limits.closing:
                 level += 1
@@ -345,7 +345,7 @@ def tidied(body, pads, state):
 
 
 @outer()
-def play(body, pads, limits, state, strokes, gain, out):
+def play_block(body, pads, limits, state, strokes, gain, out):
     """Fill a block of sound (n_frames,), and leave the state at its end; ``gain`` multiplies what is heard."""
     event = 0
     for k in range(out.size):

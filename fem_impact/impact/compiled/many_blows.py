@@ -31,7 +31,7 @@ from .layout import (  # isort: skip
     N_CONTACTS, N_SEGMENTS, NEEDED, PEAK, PRESSED, RATE, RATE_AHEAD, SLOPED, SWING, TOUCHED,
 )  # fmt: skip
 
-DONE, DOUBTFUL, AWKWARD, LONG = 0, 1, 2, 3  # how a blow ended: proved apart; with something that the steps may have
+DONE, DOUBTFUL, AWKWARD, LONG = range(4)  # how a blow ended: proved apart; with something that the steps may have
 # missed; in a way not followed here; longer than the kernel
 NEARER, UNPROVED, APART, TOUCH = range(4)  # what a look ahead in flight found: a shorter one is needed, or kernels of
 # parts of a step; no touch; a touch
@@ -448,7 +448,7 @@ def press(blow, track, n, free):
 
 
 @inner()
-def follow(kernels, blow, track):
+def follow_blow(kernels, blow, track):
     """Follow one blow step by step; how it ended, and after how many steps."""
     counts = track.counts
     level = -1  # of the look ahead in flight, not yet chosen
@@ -530,7 +530,7 @@ def run(cells, pairs, kernels, h, certify, band, track, out_found):
         begin(track)
         extend(kernels, (pairs.shares[0, cell], pairs.shares[1, cell]), track, ZERO + 2)
         blow = blow_of(pairs, cell, h, certify, track.rows)
-        status, n = follow(kernels, blow, track)
+        status, n = follow_blow(kernels, blow, track)
         write(blow, track, status, n, cell, out_found)
         if band > 0.0 and status in (DONE, DOUBTFUL):
             out_found[FOUND_CENTROID, cell] = centroid(

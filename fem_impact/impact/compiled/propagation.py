@@ -15,11 +15,10 @@ import numpy as np
 from . import arrays
 from .arrays import ANGLE_LIMIT, LIGHT, SERIES_END
 from .build import LOOSE, TRUE, inner, outer
-from .layout import A11, A12, A21, A22, HEAD, LENGTH, M1, M2, M3, PUSH, START
+from .layout import A11, A12, A21, A22, HEAD, LENGTH, M1, M2, M3, N_LANE, PUSH, START
 from .one_mode import mode_matrix, mode_moments
 
 N_TABLE = 12  # rows of a step table, in the order of `step_table`
-N_LANE = 7  # rows of what a run keeps of it, in the order of `lane_table`
 
 
 @inner(fastmath={"contract"})
@@ -149,31 +148,14 @@ def near_moments(omega, h, double, n_damped, out_moments):
     if n_damped == 0:
         for n in range(n_modes):
             t2 = square[n]
-            odd = 1.0 - t2 * (1.0 / 812.0)
-            odd = 1.0 - t2 * (1.0 / 702.0) * odd
-            odd = 1.0 - t2 * (1.0 / 600.0) * odd
-            odd = 1.0 - t2 * (1.0 / 506.0) * odd
-            odd = 1.0 - t2 * (1.0 / 420.0) * odd
-            odd = 1.0 - t2 * (1.0 / 342.0) * odd
-            odd = 1.0 - t2 * (1.0 / 272.0) * odd
-            odd = 1.0 - t2 * (1.0 / 210.0) * odd
-            odd = 1.0 - t2 * (1.0 / 156.0) * odd
-            odd = 1.0 - t2 * (1.0 / 110.0) * odd
-            odd = 1.0 - t2 * (1.0 / 72.0) * odd
-            odd = 1.0 - t2 * (1.0 / 42.0) * odd
-            out_moments[M2, n] = (1.0 / 6.0) * (1.0 - t2 * (1.0 / 20.0) * odd)
-            even = 1.0 - t2 * (1.0 / 756.0)
-            even = 1.0 - t2 * (1.0 / 650.0) * even
-            even = 1.0 - t2 * (1.0 / 552.0) * even
-            even = 1.0 - t2 * (1.0 / 462.0) * even
-            even = 1.0 - t2 * (1.0 / 380.0) * even
-            even = 1.0 - t2 * (1.0 / 306.0) * even
-            even = 1.0 - t2 * (1.0 / 240.0) * even
-            even = 1.0 - t2 * (1.0 / 182.0) * even
-            even = 1.0 - t2 * (1.0 / 132.0) * even
-            even = 1.0 - t2 * (1.0 / 90.0) * even
-            even = 1.0 - t2 * (1.0 / 56.0) * even
-            out_moments[M3, n] = (1.0 / 24.0) * (1.0 - t2 * (1.0 / 30.0) * even)
+            odd = 1.0
+            for k in range(28, 3, -2):
+                odd = 1.0 - t2 * (1.0 / (k * (k + 1))) * odd
+            out_moments[M2, n] = (1.0 / 6.0) * odd
+            even = 1.0
+            for k in range(27, 4, -2):
+                even = 1.0 - t2 * (1.0 / (k * (k + 1))) * even
+            out_moments[M3, n] = (1.0 / 24.0) * even
         return
     now = np.empty(n_modes)
     last = np.empty(n_modes)

@@ -248,6 +248,31 @@ def rate_within(steps, now, law, n_coefficients, row, i, part):
 
 
 @inner()
+def peak_between(steps, now, law, n_coefficients, begin, end, i, looks):
+    """Largest force of contact i in the steps of a push.
+
+    It is sought with ``looks`` per step in the step with the largest of a few and in those beside it: where it lies at
+    the end of a step, rounding decides which holds the larger look.
+    """
+    first = HEAD + (PUSH + n_coefficients) * i
+    most = 0.0
+    for row in range(begin, end):
+        most = max(most, mean_push(steps, n_coefficients, row, first))
+    peak = 0.0
+    peak_row = begin
+    for row in range(begin, end):
+        if mean_push(steps, n_coefficients, row, first) >= HIGH * most:
+            for look in range(n_coefficients):
+                f = force_within(steps, now, law, n_coefficients, row, i, look / n_coefficients)
+                if f > peak:
+                    peak = f
+                    peak_row = row
+    for row in range(max(begin, peak_row - 1), min(end - 1, peak_row + 1) + 1):
+        peak = max(peak, peak_in(steps, now, law, n_coefficients, row, i, looks))
+    return peak
+
+
+@inner()
 def stays(steps, row, first, slack):
     """Whether two bodies touch at the start of a step, within ``slack`` [m], and stay there."""
     return abs(steps[row, first]) <= slack and abs(steps[row, first + SPEED]) * steps[row, LENGTH] <= slack
@@ -275,9 +300,7 @@ def find_impacts(steps, now, law, n_coefficients, looks, still, slack):
     Its start, end, peak force, impulse and contact; how fast the bodies approach at its start and part at its end; and
     since when they have touched at rest, infinity if they met. A rate up to ``still`` [m/s] is rest, an approach up to
     ``slack`` [m] either way a touch. They approach with 0 where they touched before or press each other as the run
-    begins; where they do as it ends, they part with NaN. The peak is sought with ``looks`` per step in the step with
-    the largest of a few and in those beside it: where it lies at the end of a step, rounding decides which holds the
-    larger look.
+    begins; where they do as it ends, they part with NaN. ``looks`` as in `peak_between`.
     """
     n_steps = steps.shape[0]
     m = law.shape[0]
@@ -309,13 +332,8 @@ def find_impacts(steps, now, law, n_coefficients, looks, still, slack):
             end = start
             part = 0.0
             impulse = 0.0
-            peak = 0.0
-            most = 0.0
-            peak_row = begin
             while upper > lower:
-                mean = mean_push(steps, n_coefficients, row, first)
-                impulse += steps[row, LENGTH] * mean
-                most = max(most, mean)
+                impulse += steps[row, LENGTH] * mean_push(steps, n_coefficients, row, first)
                 end = steps[row, START] + upper * steps[row, LENGTH]
                 part = upper
                 row += 1
@@ -324,22 +342,13 @@ def find_impacts(steps, now, law, n_coefficients, looks, still, slack):
                 lower, upper = pushing(steps, now, law, n_coefficients, row, i)
                 if lower > 0.0:
                     break
-            for near in range(begin, row):
-                if mean_push(steps, n_coefficients, near, first) >= HIGH * most:
-                    for look in range(n_coefficients):
-                        f = force_within(steps, now, law, n_coefficients, near, i, look / n_coefficients)
-                        if f > peak:
-                            peak = f
-                            peak_row = near
-            for near in range(max(begin, peak_row - 1), min(row - 1, peak_row + 1) + 1):
-                peak = max(peak, peak_in(steps, now, law, n_coefficients, near, i, looks))
             left = -rate_within(steps, now, law, n_coefficients, row - 1, i, part)
             deep = now[APPROACH, i] - dent(law, i, memory_of(steps, law, n_coefficients, row - 1, i))
             if row == n_steps and part >= 1.0 and still_pressed(steps, now, law, n_coefficients, i, deep):
                 left = np.nan
             result[count, 0] = start
             result[count, 1] = end
-            result[count, 2] = peak
+            result[count, 2] = peak_between(steps, now, law, n_coefficients, begin, row, i, looks)
             result[count, 3] = impulse
             result[count, 4] = i
             result[count, 5] = met

@@ -239,13 +239,9 @@ def solve_ramp(guess, h, start, rate0, free, own, spring):
     lossy = spring.loss > 0.0 or spring.relaxation > 0.0
     scale = max(abs(free.end), abs(d0))
     x = guess if guess > -scale else 0.5 * free.end
-    old_x = 0.0
-    old_r = 0.0
-    f = 0.0
-    s = 0.0
+    old_x = old_r = f = s = 0.0
     end = start
-    close = False
-    last = False
+    close = last = False
     for iteration in range(ITERATIONS):
         end = compressed(x, spring)
         y = end.approach

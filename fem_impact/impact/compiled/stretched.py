@@ -179,6 +179,7 @@ def attempt(bodies, contacts, room, tables, slot, h, given):
     prepare(bodies, contacts, room, lanes, h)
     fine = 1
     best = np.inf
+    settled = False
     for _ in range(ITERATIONS):
         apply_pull(bodies, contacts, room, lanes, h)
         if not given:
@@ -204,12 +205,13 @@ def attempt(bodies, contacts, room, tables, slot, h, given):
         for i in range(room.pull.shape[1]):
             change += abs(room.pull[0, i] - room.pull[2, i]) + abs(room.pull[1, i] - room.pull[3, i])
             size += abs(room.pull[0, i]) + abs(room.pull[1, i])
-        if not change < OVERFLOW:  # a sum keeps what is no number; a maximum may drop it
-            return False, fine
-        if change <= SOLVED * size or (change <= STALLED * size and change >= 0.5 * best):
-            return True, fine
+        settled = change <= SOLVED * size or (change <= STALLED * size and change >= 0.5 * best)
+        if settled or not change < OVERFLOW:  # a sum keeps what is no number; a maximum may drop it
+            break
         best = min(best, change)
-    return False, fine
+    if not settled:
+        room.hint[:] = 0.0
+    return settled, fine
 
 
 @inner()
@@ -380,7 +382,6 @@ def follow_record(scene, run, room, tables, steps, start, times, out):
         good, _ = attempt(bodies, contacts, room, tables, ZERO, h, TRUE)
         if not good:
             halved += 1
-            room.hint[:] = 0.0
             continue
         halved = max(0, halved - 1)
         while k < times.size and times[k] < ends:
