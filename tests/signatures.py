@@ -282,6 +282,8 @@ def stated() -> dict[str, dict[str, Any]]:
         "strike moving": {**blow, "speed": 0.5, "tolerance": 1e-1, "start": t["hit"].state(0.05)},
         "collide moving": {"bodies": [t["free"], t["free"]], "contacts": [fi.Touch(t["law"], 0, 1)], "tolerance": 1e-1,
             "start": fi.collide([t["free"]] * 2, [fi.Touch(t["law"], 0, 1)], speeds=[1.0, 0.0], tolerance=1e-1)},
+        "Response.against": {"self": t["hit"], "measured": {"contact_time": (1e-3, 1e-4)}},
+        "figures.against": {"found": t["hit"].against({"contact_time": 1e-3})},
         "Response.state": {"self": t["hit"], "time": 1e-3},
         "Response.gradient": {"self": t["hit"], "quantity": "impulse", "wrt": ("striker.mass", "contact.stiffness")},
         "strokes": {"modes": t["modes"], "strokes": [(0.0, t["striker"], t["law"], at, 1.0, 0.1)], "tolerance": 1e-1,
