@@ -20,7 +20,12 @@ STEPS = 1e-3  # [-] error of the computation: fixed steps and aliasing, see `blo
 def widths(force: np.ndarray, rate: float) -> np.ndarray:
     """Time [s] for which records (n, n_times) exceed half their peak, of their band-limited interpolation."""
     fine = resample(force, FINE * force.shape[1], axis=1)
-    return np.count_nonzero(fine > 0.5 * fine.max(axis=1, keepdims=True), axis=1) / (FINE * rate)
+    above = fine - 0.5 * fine.max(axis=1, keepdims=True)
+    up = np.maximum(above, 0.0)
+    size = np.abs(above[:, :-1]) + np.abs(above[:, 1:])
+    return ((up[:, :-1] + up[:, 1:]) / np.maximum(size, np.finfo(float).tiny)).sum(axis=1) / (
+        FINE * rate
+    )  # straight lines between the fine samples
 
 
 def compared(found: "Found", taps: Taps, predictions: tuple[Prediction, ...], calibration: float) -> Comparison:
