@@ -307,6 +307,7 @@ def stated() -> dict[str, dict[str, Any]]:
             "tolerance": 1e-1, "max_frequency": 1e3, "workers": 1, "cells": 3, "refine": True, "borders": True},
         "read_borders": {"table": t["map"]},
         "yield_strength": {"hardness": 300.0}, "Striker.dropped": {"self": t["sphere"], "height": 0.3},
+        "Striker.falling": {"self": t["sphere"], "gravity": 9.8},
         "spread": {"scene": t["scene"], "vary": {"striker.mass": ("lognormal", 0.03, 0.1)}, "n": 8, "sobol": False,
             "seed": 1, "tolerance": 1e-1, "max_frequency": 1e3, "workers": 1, "max_blows": 100.0},
         "spread body": {"scene": t["modes"], "vary": {"mass": "lognormal(0.03, 0.1)", "speed": "uniform(1, 2)"},

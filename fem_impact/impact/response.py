@@ -482,6 +482,14 @@ class Response(Totals, check.Locked):
         """Whether the striker, or the first body, still presses another at the end of the run."""
         return rebound.in_contact(self)
 
+    @property
+    def striker_speeds(self) -> np.ndarray:
+        """Speed [m/s] of the striker's rigid motion at its contact point before and after each impact, (n_impacts, 2).
+
+        Positive towards the struck body; a falling striker rises by the square of the second over twice the gravity.
+        """
+        return rebound.speeds(self)
+
     @cached_property
     def restitution(self) -> float | None:
         """Minus the striker's speed after its last separation over that before its first contact [-].
