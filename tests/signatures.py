@@ -48,6 +48,7 @@ INNER = {
     "Scene.blame", "Scene.heard_from", "Scene.kept", "Modes.point", "sound.beside", "mesh.aligned", "mesh.pierced",
      "Scene.body", "Scene.closed_form", "Scene.fault", "Scene.finder", "Scene.make_contact",
     "Scene.make_section", "Scene.make_striker", "Scene.data", "Scene.alone", "Scene.check_single",
+    "Scene.check_unpushed",
     "Response.to_xarray", "Modes.to_pyvista",  # no arguments
     "Gradient", "Gradient.change", "Response.band_spectrum",  # made by Response.gradient; its arguments are any words
     "Plan.data", "Plan.run", "Plan.strike", "Response.body_slice", "Response.summary", "Scene.picture",
