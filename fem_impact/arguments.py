@@ -259,6 +259,7 @@ COMMANDS = {
         _option("--per-tap", "NAME", "fit this unknown separately for each tap; repeatable", action="append",
                 default=[]),
         _option("--mass", "KG", "mass of the hammer (default: the scene's, or 0.1)", float),
+        _flag("--propose", "find the model, too: a wall, then what predicts taps left out better"),
         _out("fit.html, fit.json and scene.toml", "out/NAME"),
     ), TAPS, "TAPS"),
 }  # fmt: skip

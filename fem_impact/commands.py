@@ -604,9 +604,9 @@ def fit(options: argparse.Namespace) -> Answer:
     folder, display = _folder(options), _display(options)
     with staged(folder, "fit") as staging:
         with display("fit"):
-            found, scene = prompt.fit(options, partial(display.report, "fits"))
-        data, files = prompt.write(staging, found, scene)
+            found, scene, proposal = prompt.fit(options, partial(display.report, "fits"))
+        data, files = prompt.write(staging, found, scene, proposal)
         with display("page"):
             target, at = (None, None) if scene is None else (scene.modes(), scene.blow.values["at"])
             fit_page.write(staging / "fit.html", found, title=f"Taps of {options.scene.name}", target=target, at=at)
-    return answer(data, found.summary(), folder=folder, files=["fit.html", *files])
+    return answer(data, (proposal or found).summary(), folder=folder, files=["fit.html", *files])

@@ -36,11 +36,12 @@ class Found(check.Brief):
     outliers: Mapping[str, float]  # label of a tap that disagrees -> its error when predicted from the others [-]
     problem: Problem
     best: Solution
-    # [-] sums of squares at the ends of all searches, and of the best without the last of the unknown modes
+    # [-] sums of squares at the ends of all searches
     minima: tuple[float, ...]
     notes: tuple[str, ...]
     compared: Mapping[str, float]  # contact law -> root mean square of its errors at left-out taps [-]; if several
     watch: Watch | None = None
+    stuck: bool = False  # its own searches ended above a smaller model inside it
 
     @cached_property
     def _noise(self) -> tuple[float, int, float]:

@@ -1,6 +1,7 @@
 """What `fem-impact frf` and `fem-impact fit` do, apart from printing."""
 
 from contextlib import suppress
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
@@ -17,6 +18,7 @@ from ..show import export
 from . import found_scene, transfer
 from .fit import fit as fit_taps
 from .found import Found, Watch
+from .proposal import Proposal, propose
 from .records import Taps, read_taps
 from .rig import measure
 
@@ -98,8 +100,15 @@ def _pairs(name: str, texts: list[str]) -> dict[str, list[float]]:
     return found
 
 
-def fit(options: Any, watch: Watch | None) -> tuple[Found, Scene | None]:
-    """The fit of a file of taps, and the scene struck; None for a wall."""
+def fit(options: Any, watch: Watch | None) -> tuple[Found, Scene | None, Proposal | None]:
+    """The fit of a file of taps; the scene struck, None for a wall; and what was tried if the model is asked for."""
+    if options.propose:
+        for name in ("unknown", "known", "per_tap", "body"):
+            if getattr(options, name):
+                name = "SCENE" if name == "body" else f"--{name.replace('_', '-')}"
+                raise ValueError(f"{name} must be left out beside --propose, which tries unknowns and laws itself")
+        proposal = propose(_taps(options), striker=Striker.rigid(options.mass or 0.1), watch=watch)
+        return proposal.found, None, proposal
     unknown = {name: tuple(limits) for name, limits in _pairs("unknown", options.unknown).items()} or UNKNOWN
     known = {name: value for name, (value,) in _pairs("known", options.known).items()}
     taps = _taps(options)
@@ -111,12 +120,16 @@ def fit(options: Any, watch: Watch | None) -> tuple[Found, Scene | None]:
         given |= {"target": scene.modes(), "at": scene.blow.values["at"], "contact": scene.make_contact()}
         if options.mass is None:
             given["striker"] = scene.make_striker()
-    return fit_taps(taps, unknown=unknown, known=known, per_tap=options.per_tap, watch=watch, **given), scene
+    return fit_taps(taps, unknown=unknown, known=known, per_tap=options.per_tap, watch=watch, **given), scene, None
 
 
-def write(folder: Path, found: Found, scene: Scene | None) -> tuple[dict[str, Any], list[str]]:
+def write(
+    folder: Path, found: Found, scene: Scene | None, proposal: Proposal | None
+) -> tuple[dict[str, Any], list[str]]:
     """Write fit.json and, if the body struck is known, scene.toml; return the data and the names of the files."""
-    data = export.plain(found.data() | {"summary": found.summary().splitlines(), "versions": export.versions()})
+    said: dict[str, Any] = {"summary": (proposal or found).summary().splitlines(), "versions": export.versions()}
+    said |= {} if proposal is None else {"tried": [asdict(each) for each in proposal.tried]}
+    data = export.plain(found.data() | said)
     export.write_json(folder / "fit.json", data)
     files = ["fit.json"]
     modes = [name for name in found.names if name.startswith("mode")]
