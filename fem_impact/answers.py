@@ -113,7 +113,7 @@ KEYS: dict[str, Keys] = {
     "doctor": {"findings": ("array", "of each check name, works, vital, seconds [s] and remedy")},
     "completion": {"shell": ("string", "the shell"), "script": ("string", "its script")},
     "frf": {
-        "peaks": ("array", "of each peak response, frequency [Hz], magnitude, unit and coherence (null if not known)"),
+        "peaks": ("array", "of each response, frequency [Hz], magnitude, unit, coherence, error (null: not known)"),
     },
     "fit": _alike(
         "see `Found.data` of `fi.fit`",

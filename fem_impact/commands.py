@@ -587,10 +587,11 @@ def frf(options: argparse.Namespace) -> Answer:
     peaks = prompt.peaks(found)
     rows = [
         (each["response"], f"{each['frequency']:.5g} Hz", f"{each['magnitude']:.4g} {each['unit']}",
-         "" if each["coherence"] is None else f"{each['coherence']:.3f}")
+         "" if each["coherence"] is None else f"{each['coherence']:.3f}",
+         "" if each["error"] is None else f"{100.0 * each['error'] / each['magnitude']:.2g} %")
         for each in peaks
     ]  # fmt: skip
-    said = [*noted(notes), _table(rows, ("response", "peak at", "magnitude", "coherence"))]
+    said = [*noted(notes), _table(rows, ("response", "peak at", "magnitude", "coherence", "within"))]
     if path is not None:
         prompt.write_frf(path, found)
     return _answer_of_file({"peaks": peaks, "notes": notes}, said, path)

@@ -267,10 +267,11 @@ class Striker(check.Brief):
     def falling(self, gravity: float = GRAVITY) -> "Striker":
         """The same striker with its weight, which brings it back after each bounce.
 
-        Flights are exact. Such a blow may never end by itself: give it a number of impacts, or a duration. Each impact
-        has its ``restitution``, `Response.restitution_errors` says how exact it is, and `Response.striker_speeds` how
-        fast the striker itself came and left, which decides how high it rises. Where the struck body still moves, each
-        bounce depends on when it comes: small errors grow from bounce to bounce, and the blow says so.
+        Flights are exact. Such a blow may never end by itself: give it a number of impacts, or a duration, in which it
+        may come to rest; the last impact then goes on, and has no restitution. Each other has its ``restitution``,
+        `Response.restitution_errors` says how exact it is, and `Response.striker_speeds` how fast the striker itself
+        came and left, which decides how high it rises. Where the struck body still moves, each bounce depends on when
+        it comes: small errors grow from bounce to bounce, and the blow says so.
 
         Parameters
         ----------

@@ -1,6 +1,7 @@
 """`fit`: the hammer, contact and structure that explain measured taps."""
 
 from collections.abc import Mapping
+from contextlib import suppress
 from dataclasses import replace
 from typing import Any
 
@@ -234,7 +235,7 @@ def _fit(
         used, problem, best, minima = list(fewer.used), without, solved, fewer.minima
     stuck = False
     if inner is not None:
-        problem, best, stuck = _no_larger(problem, best, inner, used, notes)
+        problem, best, stuck = nested.never_worse(problem, best, inner.among(used, problem.data), notes)
     if not best.ended and solver.promised(problem, best) > solver.PROMISED * best.cost:
         notes.append(f"the search had not ended after {solver.ENOUGH} steps: narrow the ranges, or raise starts")
     return Found(cut, tuple(used), outliers, problem, best, minima, tuple(notes), {}, watch, stuck)
@@ -249,22 +250,6 @@ def _inner(smaller: Found, cut: Taps) -> Inner:
             f"{len(smaller.used)} of {whole[2]}; fit it with robust=False and the same window"
         )
     return Inner("what smaller lacks", smaller.problem, smaller.best.x)
-
-
-def _no_larger(
-    problem: Problem, best: solver.Solution, inner: Inner, used: list[int], notes: list[str]
-) -> tuple[Problem, solver.Solution, bool]:
-    """The larger model, from the smaller one inside it if its own searches stuck; the smaller one if that is better."""
-    best, stuck = nested.no_worse(problem, best, inner, used)
-    if not stuck:
-        return problem, best, False
-    cost = inner.cost(problem, used)
-    if best.cost <= cost * (1.0 + solver.NEARLY):
-        notes.append(f"the searches stuck above the model without {inner.name}, and went on from that")
-        return problem, best, True
-    notes.append(f"{inner.name}: left out, as its ranges allow no better fit than without; widen them")
-    small = replace(inner.problem, data=problem.data, _last={})
-    return small, solver.solve(small, inner.x[inner.problem.kept(used)]), True
 
 
 def _sureness(residual: np.ndarray, noise: np.ndarray) -> np.ndarray:
@@ -325,8 +310,9 @@ def _search(
     if less is not None:
         best, _, _ = _search(less[1], taps, length, 1, rng, None, None)
         inner = Inner(*less, best.x)
-    if inner is not None:
-        found += nested.quick(problem, inner)
+    for x in [] if inner is None else nested.embedded(problem, inner):
+        with suppress(SimulationError):
+            found.append(solver.solve(problem, x, solver.QUICK, solver.NEARLY))
     if not found:
         raise SimulationError("no search ended: blows in the ranges of unknown do not end; narrow the ranges")
     found.sort(key=lambda one: one.cost)

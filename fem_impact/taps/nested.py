@@ -1,6 +1,5 @@
 """Smaller models inside a larger one: the larger one begins where they end, too, and is never worse."""
 
-from collections.abc import Mapping
 from contextlib import suppress
 from dataclasses import replace
 from typing import NamedTuple
@@ -9,16 +8,14 @@ import numpy as np
 
 from .._base.check import SimulationError
 from . import solver
-from .solver import NEARLY, QUICK, Problem, Solution
+from .solver import NEARLY, Data, Problem, Solution
 from .unknowns import DAMPING, TIME
 
 SHARES = 0.2, 0.5, 0.8  # [-] of the frequencies that shape a pulse, where a mode that does not move yet begins
-# values with which an unknown changes nothing, or which are usual; infinity and zero are the ends of its range
+# values with which unknowns of the hammer and of modes change nothing; infinity and zero are the ends of their ranges
 NEUTRAL = {
-    "contact.loss": 0.0, "striker.first_frequency": np.inf, "striker.mode_ratio": 0.0, "striker.damping": DAMPING,
-    "striker.tip_mass": 0.0,
+    "first_frequency": np.inf, "mode_ratio": 0.0, "tip_mass": 0.0, "mass": np.inf, "damping": DAMPING, "gain": 1.0,
 }  # fmt: skip
-NEUTRAL_MODE = {"mass": np.inf, "damping": DAMPING, "gain": 1.0}
 
 
 class Inner(NamedTuple):
@@ -28,10 +25,9 @@ class Inner(NamedTuple):
     problem: Problem
     x: np.ndarray
 
-    def cost(self, problem: Problem, taps: list[int] | None = None) -> float:
-        """Its sum of squares for the records of a larger problem, which are some of the ``taps`` it was fitted to."""
-        x = self.x if taps is None else self.x[self.problem.kept(taps)]
-        return float(np.square(replace(self.problem, data=problem.data, _last={}).residual(x)).sum())
+    def among(self, taps: list[int], data: Data) -> "Inner":
+        """The same for some of its taps, as a larger problem holds and weighs them."""
+        return self._replace(problem=replace(self.problem, data=data, _last={}), x=self.x[self.problem.kept(taps)])
 
 
 def without(problem: Problem) -> tuple[str, Problem] | None:
@@ -59,26 +55,23 @@ def without(problem: Problem) -> tuple[str, Problem] | None:
 def embedded(problem: Problem, inner: Inner) -> list[np.ndarray]:
     """Coordinates of a larger problem for the same taps at the best fit of a smaller one; several if a mode is new."""
     small, x, n_taps = inner.problem, inner.x, problem.data.n_taps
-    values = small.values(x)
-    values[TIME] = problem.setting.contact_time(values | _given(problem, small, values))
+    values = _neutral(small, [each.name for each in problem.setting.unknown]) | small.values(x)
+    values[TIME] = problem.setting.contact_time(values)
     low, high = (bound[: problem.n_shared] for bound in problem.bounds)
-    length = values[TIME]
-    found = []
-    new = any(each.name.endswith("frequency") and each.name not in values for each in problem.free)
-    for share in SHARES if new else SHARES[:1]:
+    begun = []
+    for share in SHARES if any(each.name not in values for each in problem.free) else SHARES[:1]:
         shared = low + share * (high - low)
         for i, each in enumerate(problem.free):
-            value = {**_given(problem, small, values), **values}.get(each.name)
-            if value is not None:
+            if each.name in values:
                 with np.errstate(divide="ignore"):
-                    shared[i] = np.clip(each.inside(value), low[i], high[i])
-            elif each.name.startswith("mode") and each.name.endswith("frequency"):
-                ends = np.clip(np.log(np.array(solver.FELT) / length), low[i], high[i])
+                    shared[i] = np.clip(each.inside(values[each.name]), low[i], high[i])
+            elif each.name.endswith(".frequency"):
+                ends = np.clip(np.log(np.array(solver.FELT) / values[TIME]), low[i], high[i])
                 shared[i] = ends[0] + share * (ends[1] - ends[0])
         apart = dict(zip(_owners(small), small.apart(x)))
         rest = [apart.get(name, np.zeros(n_taps)) for name in _owners(problem)]
-        found.append(np.concatenate([shared, x[small.n_shared : small.n_shared + 2 * n_taps], *rest]))
-    return found
+        begun.append(np.concatenate([shared, x[small.n_shared : small.n_shared + 2 * n_taps], *rest]))
+    return begun
 
 
 def _owners(problem: Problem) -> list[str]:
@@ -86,43 +79,33 @@ def _owners(problem: Problem) -> list[str]:
     return [each.name for each in problem.free if each.name in problem.own]
 
 
-def _given(problem: Problem, small: Problem, values: Mapping[str, float]) -> dict[str, float]:
-    """Values for the unknowns that the smaller model does not have, with which they change nothing."""
+def _neutral(small: Problem, names: list[str]) -> dict[str, float]:
+    """Values of names with which they change nothing in a smaller model that does not have them, if there are any."""
     found = {}
-    for each in problem.setting.unknown:
-        home, _, part = each.name.partition(".")
-        if each.name in values:
-            continue
-        if each.name in NEUTRAL:
-            found[each.name] = NEUTRAL[each.name]
-        elif home == "contact":
-            found[each.name] = float(getattr(small.setting.contact, part))
-        elif each.name == "striker.mass":
-            found[each.name] = small.setting.striker.mass
-        elif home.startswith("mode") and part in NEUTRAL_MODE:
-            found[each.name] = NEUTRAL_MODE[part]
+    for name in names:
+        home, _, part = name.partition(".")
+        if home == "contact":
+            found[name] = float(getattr(small.setting.contact, part))
+        elif name == "striker.mass":
+            found[name] = small.setting.striker.mass
+        elif home != "target" and part in NEUTRAL:
+            found[name] = NEUTRAL[part]
     return found
 
 
-def no_worse(problem: Problem, best: Solution, inner: Inner, taps: list[int] | None = None) -> tuple[Solution, bool]:
-    """A fit at least as good as a smaller model's, as far as the ranges allow, and whether it had to go on from it."""
-    cost = inner.cost(problem, taps)
-    if best.cost <= cost * (1.0 + NEARLY):
-        return best, False
-    x = inner.x if taps is None else inner.x[inner.problem.kept(taps)]
-    part = inner._replace(problem=replace(inner.problem, data=problem.data, _last={}), x=x)
-    for begun in embedded(problem, part):
-        with suppress(SimulationError):
-            best = min(best, solver.solve(problem, begun), key=lambda one: one.cost)
-        if best.cost <= cost * (1.0 + NEARLY):
-            break
-    return best, True
-
-
-def quick(problem: Problem, inner: Inner) -> list[Solution]:
-    """Searches that begin at the best fit of a smaller model."""
-    found = []
+def never_worse(
+    problem: Problem, best: Solution, inner: Inner, notes: list[str]
+) -> tuple[Problem, Solution, bool]:  # fmt: skip
+    """The larger model, from the best fit of the smaller one if its own searches ended above that; the smaller one if
+    that is no better; and whether they did. ``notes`` say so."""
+    cost = (1.0 + NEARLY) * float(np.square(inner.problem.residual(inner.x)).sum())
+    if best.cost <= cost:
+        return problem, best, False
     for begun in embedded(problem, inner):
         with suppress(SimulationError):
-            found.append(solver.solve(problem, begun, QUICK, NEARLY))
-    return found
+            best = min(best, solver.solve(problem, begun), key=lambda one: one.cost)
+        if best.cost <= cost:
+            notes.append(f"the searches stuck above the model without {inner.name}, and went on from that")
+            return problem, best, True
+    notes.append(f"{inner.name}: left out, as its ranges allow no better fit than without; widen them")
+    return inner.problem, solver.solve(inner.problem, inner.x), True

@@ -54,17 +54,18 @@ def frf(options: Any) -> tuple[xr.Dataset, tuple[str, ...]]:
 
 
 def peaks(found: xr.Dataset) -> list[dict[str, Any]]:
-    """The largest peaks of each response: frequency [Hz], magnitude with its unit, and coherence if it is known."""
+    """The largest peaks of each response: frequency [Hz], magnitude, unit; coherence and error, None if not known."""
     rows = []
     for k, name in enumerate(found["channel"].values):
         size = np.abs(found["H"].values[1:, k])
         places = picked.peaks(size)
         largest = np.sort(places[np.argsort(-size[places])][:20])  # more do not fit a screen
         for i in largest:
-            coherence = float(found["coherence"].values[1 + i, k]) if "coherence" in found else None
+            sure = [float(found[x].values[1 + i, k]) if x in found else None for x in ("coherence", "error")]
             rows.append({
                 "response": str(name), "frequency": float(found["frequency"].values[1 + i]),
-                "magnitude": float(size[i]), "unit": str(found["units"].values[k]), "coherence": coherence,
+                "magnitude": float(size[i]), "unit": str(found["units"].values[k]), "coherence": sure[0],
+                "error": None if sure[1] is None or np.isnan(sure[1]) else sure[1],
             })  # fmt: skip
     return rows
 
@@ -80,8 +81,8 @@ def write_frf(path: Path, found: xr.Dataset) -> None:
         for k, name in enumerate(found["channel"].values):
             values, unit = found["H"].values[:, k], found["units"].values[k]
             columns |= {f"{name} real [{unit}]": values.real, f"{name} imaginary [{unit}]": values.imag}
-            if "coherence" in found:
-                columns[f"{name} coherence"] = found["coherence"].values[:, k]
+            sure = {"coherence": "coherence", "error": f"error [{unit}]"}
+            columns |= {f"{name} {said}": found[x].values[:, k] for x, said in sure.items() if x in found}
         (staging / path.name).write_text(export.csv_text(**columns), encoding="utf-8")
 
 

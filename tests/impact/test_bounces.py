@@ -90,6 +90,19 @@ def test_bounces_that_depend_on_when_they_come_are_called_chaotic():
     assert "chaotic: small differences grow" in hits[0].summary()
 
 
+def test_a_ball_on_a_damped_body_comes_to_rest():
+    """It then rests in its dent, pressed by its weight, and all energy of the fall is lost."""
+    body = fi.Modes.from_arrays([60.0], [[2.0]], points=[[0.0]], mass=1.0, damping_ratio=0.2, complete=True)
+    ball, law = fi.Striker.rigid(0.05).falling(), fi.Contact.linear(1e5)
+    rules = {"at": [0.0], "speed": ball.dropped(0.05), "tolerance": 1e-3}
+    short, long = (fi.strike(body, ball, law, duration=time, **rules) for time in (1.0, 2.0))
+    assert short.n_impacts == long.n_impacts > 20 and long.in_contact and long.impacts[-1].restitution is None
+    assert_allclose(long.force[-1], 0.05 * GRAVITY, rtol=1e-6)
+    assert_allclose(
+        sum(long.dissipated.values()), 0.05 * GRAVITY * 0.05, rtol=1e-3
+    )  # a sag of 5 and 2 micrometres more
+
+
 def test_a_flexible_ball_falls_as_a_whole():
     """The weight moves it rigidly: it does not bend in flight, and falls as a mass does."""
     bar = fi.analytic.beam(0.2, ends=("free", "free"), mass=MASS, first_frequency=2e3, n_modes=4)

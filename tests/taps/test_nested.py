@@ -62,23 +62,26 @@ def test_a_search_that_stuck_goes_on_from_the_smaller_model(small, taps):
     stuck = replace(large.best, x=x, cost=float(np.square(large.problem.residual(x)).sum()))
     inner = Inner("loss", small.problem, small.best.x)
     assert stuck.cost > 2.0 * cost(small)
-    best, went_on = nested.no_worse(large.problem, stuck, inner)
-    assert went_on and best.cost <= cost(small) * (1.0 + 1e-6)
-    same, went_on = nested.no_worse(large.problem, large.best, inner)
-    assert same is large.best and not went_on
+    _, best, went_on = nested.never_worse(large.problem, stuck, inner, notes := [])
+    assert went_on and best.cost <= cost(small) * (1.0 + 1e-6) and "stuck above the model without loss" in notes[0]
+    _, same, went_on = nested.never_worse(large.problem, large.best, inner, notes)
+    assert same is large.best and not went_on and len(notes) == 1
 
 
 def test_a_fit_whose_own_searches_stick_says_so(taps, monkeypatch):
     """Searches with two modes that do not leave their start: the model with one is not lost."""
     one = fitted(taps, STIFFNESS | EXPONENT | MODE)
-    real = solver.solve
+    real, starts = solver.solve, nested.embedded
 
     def lame(problem, x, iterations=solver.ENOUGH, *rest, **more):
-        return real(problem, x, 1 if problem.n_shared == 6 and lame.count else iterations, *rest, **more)
+        return real(problem, x, 1 if problem.n_shared == 6 else iterations, *rest, **more)
 
-    lame.count = 1
+    def later(problem, inner):  # not in the first searches
+        monkeypatch.setattr(nested, "embedded", starts)
+        return []
+
     monkeypatch.setattr(solver, "solve", lame)
-    monkeypatch.setattr(nested, "quick", lambda problem, inner: [])
+    monkeypatch.setattr(nested, "embedded", later)
     two = fitted(taps, STIFFNESS | EXPONENT | MODES, smaller=one)
     assert two.stuck and any("stuck above the model" in note for note in two.notes)
     assert cost(two) <= cost(one) * (1.0 + 1e-4)

@@ -32,7 +32,7 @@ def test_frf_of_a_file_lists_peaks_and_writes_a_table(tmp_path, capsys):
     assert cli.main(["frf", str(TAPS), "--out", str(tmp_path / "h.csv")]) == 0
     assert "m/s^2/N" in capsys.readouterr().out
     rows = np.genfromtxt(tmp_path / "h.csv", delimiter=",", skip_header=1)
-    assert rows.shape[1] == 4 and rows[-1, 0] == pytest.approx(12800.0, rel=0.01)
+    assert rows.shape[1] == 5 and rows[-1, 0] == pytest.approx(12800.0, rel=0.01)
 
 
 @pytest.mark.slow
