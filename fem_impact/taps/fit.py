@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 from contextlib import suppress
 from dataclasses import replace
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -23,6 +23,15 @@ from .unknowns import TIME, Setting, Unknown, checked
 
 STARTS = 5  # [-] searches, from the best of `solver.starts`; where all end poorly, more follow
 FEWEST = 3  # [-] taps, to tell which one disagrees: of two, either may be wrong
+
+
+class Starts(NamedTuple):
+    """Where the searches of a fit begin, and who is told."""
+
+    most: int
+    rng: np.random.Generator
+    watch: Watch | None
+    inner: Inner | None  # a smaller model, where they begin, too
 
 
 @check.typed
@@ -136,15 +145,15 @@ def fit(
     cut, noise, notes = _usable(levelled, window)
     place = None if target is None else target.point("at", at)[0]
     rig, impulse = Rig(cut.rate, anti_alias, tip_mass, resonance), float(np.mean(cut.impulse))
-    starts, generator = check.count("starts", starts), arguments.generator("rng", rng)
     inner = None if smaller is None else _inner(smaller, cut)
+    begin = Starts(check.count("starts", starts), arguments.generator("rng", rng), watch, inner)
     settings = [
         Setting(target, place, striker, law, rig, own, points, n_points, impulse) for law, own in zip(laws, names)
     ]
     found = [
         _fit(
             setting, cut, noise, [*levelled.notes[len(given.notes) :], *notes], known=held, per_tap=each,
-            starts=starts, robust=robust, rng=generator, watch=watch, inner=inner,
+            robust=robust, begin=begin,
         )
         for setting in settings
     ]  # fmt: skip
@@ -198,7 +207,7 @@ def _law_name(law: Contact) -> str:
 
 def _fit(
     setting: Setting, cut: Taps, noise: np.ndarray, notes: list[str], *, known: Mapping[str, float],
-    per_tap: list[str], starts: int, robust: bool, rng: np.random.Generator, watch: Watch | None, inner: Inner | None,
+    per_tap: list[str], robust: bool, begin: Starts,
 ) -> Found:  # fmt: skip
     """The fit of one contact law to taps whose noise over the peak is (n_taps,)."""
     length = solver.pulse_length(cut)
@@ -211,7 +220,7 @@ def _fit(
     problem = Problem(setting, data, free, known, tuple(own) if cut.n_taps > 1 else ())
     if data.values.size <= problem.n_values:
         raise ValueError(f"taps hold {data.values.size} samples, too few for {problem.n_values} values")
-    best, minima, inner = _search(problem, cut, length, starts, rng, watch, inner)
+    best, minima, inner = _search(problem, cut, length, begin)
     part = problem.residual(best.x).reshape(data.values.shape)
     spread = np.sqrt(np.square(part).mean(axis=(0, 2)))  # of each channel, the force first
     weights = _sureness(part[:, 0], noise)[:, None] * spread[0] / np.maximum(spread, 1e-300)
@@ -238,7 +247,7 @@ def _fit(
         problem, best, stuck = nested.never_worse(problem, best, inner.among(used, problem.data), notes)
     if not best.ended and solver.promised(problem, best) > solver.PROMISED * best.cost:
         notes.append(f"the search had not ended after {solver.ENOUGH} steps: narrow the ranges, or raise starts")
-    return Found(cut, tuple(used), outliers, problem, best, minima, tuple(notes), {}, watch, stuck)
+    return Found(cut, tuple(used), outliers, problem, best, minima, tuple(notes), {}, begin.watch, stuck)
 
 
 def _inner(smaller: Found, cut: Taps) -> Inner:
@@ -281,7 +290,7 @@ def _apart(problem: Problem, best: solver.Solution) -> list[str]:
 
 
 def _search(
-    problem: Problem, taps: Taps, length: float, starts: int, rng: Any, watch: Watch | None, inner: Inner | None
+    problem: Problem, taps: Taps, length: float, begin: Starts
 ) -> tuple[solver.Solution, tuple[float, ...], Inner | None]:
     """The best of several searches, the sums of squares of all, and the smaller model that some of them began with.
 
@@ -289,27 +298,26 @@ def _search(
     mode ends, too.
     """
     common = replace(problem, own=(), _last={})
-    begun = solver.starts(common, length, taps.impulse, rng)
+    begun = solver.starts(common, length, taps.impulse, begin.rng)
     found: list[solver.Solution] = []
     # an rms of the residual of 6 % of the records' is above the noise of usual ones: after a poorer fit the search goes
     # on, up to three times as long; then the model is wrong rather than the start
     poor = 0.06**2 * float(np.square(problem.data.values).sum())
-    for i, x in enumerate(begun[: 3 * starts]):
-        if i >= starts and found and min(one.cost for one in found) < poor:
+    for i, x in enumerate(begun[: 3 * begin.most]):
+        if i >= begin.most and found and min(one.cost for one in found) < poor:
             break
         try:
             found.append(solver.solve(common, x, solver.QUICK, solver.NEARLY))
         except SimulationError:
             continue
         finally:
-            if watch is not None:
-                watch(min(i + 1, starts), starts)
+            if begin.watch is not None:
+                begin.watch(min(i + 1, begin.most), begin.most)
     apart = np.zeros(len(problem.own) * taps.n_taps)
     found = [replace(one, x=np.append(one.x, apart)) for one in found]
-    less = nested.without(common) if inner is None else None
+    inner, less = begin.inner, nested.without(common) if begin.inner is None else None
     if less is not None:
-        best, _, _ = _search(less[1], taps, length, 1, rng, None, None)
-        inner = Inner(*less, best.x)
+        inner = Inner(*less, _search(less[1], taps, length, Starts(1, begin.rng, None, None))[0].x)
     for x in [] if inner is None else nested.embedded(problem, inner):
         with suppress(SimulationError):
             found.append(solver.solve(problem, x, solver.QUICK, solver.NEARLY))
