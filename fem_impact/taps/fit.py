@@ -9,6 +9,7 @@ import numpy as np
 
 from .._base import check
 from .._base.check import SimulationError
+from .._base.rounding import SAME
 from ..impact.contact import Contact
 from ..impact.striker import Striker
 from ..modes.modal import Modes
@@ -145,7 +146,7 @@ def fit(
     cut, noise, notes = _usable(levelled, window)
     place = None if target is None else target.point("at", at)[0]
     rig, impulse = Rig(cut.rate, anti_alias, tip_mass, resonance), float(np.mean(cut.impulse))
-    inner = None if smaller is None else _inner(smaller, cut)
+    inner = None if smaller is None else _inner(smaller, cut, n_points)
     begin = Starts(check.count("starts", starts), arguments.generator("rng", rng), watch, inner)
     settings = [
         Setting(target, place, striker, law, rig, own, points, n_points, impulse) for law, own in zip(laws, names)
@@ -250,13 +251,13 @@ def _fit(
     return Found(cut, tuple(used), outliers, problem, best, minima, tuple(notes), {}, begin.watch, stuck)
 
 
-def _inner(smaller: Found, cut: Taps) -> Inner:
+def _inner(smaller: Found, cut: Taps, n_points: int) -> Inner:
     """The model of another fit; ValueError if that is of other taps."""
-    whole = smaller.problem.data.values.shape
-    if len(smaller.used) != cut.n_taps or whole[2] != len(cut.time):
+    data, shape = smaller.problem.data, (cut.n_taps, 1 + n_points, len(cut.time))
+    if data.values.shape != shape or not np.allclose(data.impulse, cut.impulse, rtol=SAME, atol=0.0):
         raise ValueError(
-            f"smaller must be a fit to the same {cut.n_taps} taps of {len(cut.time)} samples, without outliers, got "
-            f"{len(smaller.used)} of {whole[2]}; fit it with robust=False and the same window"
+            f"smaller must be a fit to the same {cut.n_taps} taps, none of them left out, in the same window and with "
+            "the same responses; fit it anew with robust=False"
         )
     return Inner("what smaller lacks", smaller.problem, smaller.best.x)
 

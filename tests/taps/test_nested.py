@@ -100,6 +100,8 @@ def test_a_mode_that_its_range_forces_to_move_is_left_out(taps):
 def test_a_smaller_fit_of_other_taps_is_refused(taps, small):
     with pytest.raises(ValueError, match="smaller must be a fit to the same 2 taps"):
         fitted(taps[:2], STIFFNESS | LOSS, smaller=small)
+    with pytest.raises(ValueError, match="smaller must be a fit to the same 3 taps"):
+        fitted(taps[::-1], STIFFNESS | LOSS, smaller=small)
 
 
 def test_a_search_that_did_not_end_says_so_where_it_would_gain(taps, small, monkeypatch):
