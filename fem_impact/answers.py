@@ -113,13 +113,13 @@ KEYS: dict[str, Keys] = {
     "doctor": {"findings": ("array", "of each check name, works, vital, seconds [s] and remedy")},
     "completion": {"shell": ("string", "the shell"), "script": ("string", "its script")},
     "frf": {
-        "peaks": ("array", "of each peak response, frequency [Hz], magnitude, unit and coherence (null if not known)"),
+        "peaks": ("array", "of each response, frequency [Hz], magnitude, unit, coherence, error (null: not known)"),
     },
     "fit": _alike(
         "see `Found.data` of `fi.fit`",
         "values unidentifiable limited ridges intervals point per_tap errors left_out outliers whiteness compared "
         "summary",
-    ),
+    ) | {"tried": ("array?", "with --propose: of each model name, inside, n_unknowns, error, left_out, taken")},
 }  # fmt: skip
 
 EXAMPLES: dict[str, tuple[str, ...]] = {
@@ -149,7 +149,10 @@ EXAMPLES: dict[str, tuple[str, ...]] = {
     "doctor": ("fem-impact doctor",),
     "completion": ('eval "$(fem-impact completion bash)"',),
     "frf": ("fem-impact frf studies/measured/acceleration.lvm --out out/frf.csv",),
-    "fit": ("fem-impact fit taps.lvm scene.toml --unknown contact.stiffness=1e4:1e9 --mass 0.1",),
+    "fit": (
+        "fem-impact fit taps.lvm scene.toml --unknown contact.stiffness=1e4:1e9 --mass 0.1",
+        "fem-impact fit studies/measured/acceleration_multi.lvm --propose --mass 0.15",
+    ),
 }  # fmt: skip
 
 

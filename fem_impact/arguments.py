@@ -246,7 +246,7 @@ COMMANDS = {
     "frf": Command("compute frequency responses of taps, or of a scene as a rig would measure it", commands.frf, (
         *CHANNELS,
         _option("--method", None, "H1 for noise in the response, H2 in the force", choices=("H1", "H2"), default="H1"),
-        _option("--force-window", "S", "ignore the force later than this after its onset", float),
+        _option("--force-window", "S", "ignore the force later than this after each pulse begins", float),
         _option("--response-window", "S", "time constant of an exponential window", float),
         _out("frf.csv", "none", ".csv or .uff file"),
     ), f"{TAPS} or frequency responses; or a scene, a TOML file", "TAPS|SCENE"),
@@ -259,6 +259,7 @@ COMMANDS = {
         _option("--per-tap", "NAME", "fit this unknown separately for each tap; repeatable", action="append",
                 default=[]),
         _option("--mass", "KG", "mass of the hammer (default: the scene's, or 0.1)", float),
+        _flag("--propose", "find the model, too: a wall, then what predicts taps left out better"),
         _out("fit.html, fit.json and scene.toml", "out/NAME"),
     ), TAPS, "TAPS"),
 }  # fmt: skip

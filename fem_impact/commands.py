@@ -579,10 +579,11 @@ def frf(options: argparse.Namespace) -> Answer:
     peaks = prompt.peaks(found)
     rows = [
         (each["response"], f"{each['frequency']:.5g} Hz", f"{each['magnitude']:.4g} {each['unit']}",
-         "" if each["coherence"] is None else f"{each['coherence']:.3f}")
+         "" if each["coherence"] is None else f"{each['coherence']:.3f}",
+         "" if each["error"] is None else f"{100.0 * each['error'] / each['magnitude']:.2g} %")
         for each in peaks
     ]  # fmt: skip
-    said = [*noted(notes), _table(rows, ("response", "peak at", "magnitude", "coherence"))]
+    said = [*noted(notes), _table(rows, ("response", "peak at", "magnitude", "coherence", "within"))]
     if path is not None:
         prompt.write_frf(path, found)
     return _answer_of_file({"peaks": peaks, "notes": notes}, said, path)
@@ -596,9 +597,9 @@ def fit(options: argparse.Namespace) -> Answer:
     folder, display = _folder(options), _display(options)
     with staged(folder, "fit") as staging:
         with display("fit"):
-            found, scene = prompt.fit(options, partial(display.report, "fits"))
-        data, files = prompt.write(staging, found, scene)
+            found, scene, proposal = prompt.fit(options, partial(display.report, "fits"))
+        data, files = prompt.write(staging, found, scene, proposal)
         with display("page"):
             target, at = (None, None) if scene is None else (scene.modes(), scene.blow.values["at"])
             fit_page.write(staging / "fit.html", found, title=f"Taps of {options.scene.name}", target=target, at=at)
-    return answer(data, found.summary(), folder=folder, files=["fit.html", *files])
+    return answer(data, (proposal or found).summary(), folder=folder, files=["fit.html", *files])

@@ -48,6 +48,7 @@ INNER = {
     "Scene.blame", "Scene.heard_from", "Scene.kept", "Modes.point", "sound.beside", "mesh.aligned", "mesh.pierced",
      "Scene.body", "Scene.closed_form", "Scene.fault", "Scene.finder", "Scene.make_contact",
     "Scene.make_section", "Scene.make_striker", "Scene.data", "Scene.alone", "Scene.check_single",
+    "Scene.check_unpushed",
     "Response.to_xarray", "Modes.to_pyvista",  # no arguments
     "Gradient", "Gradient.change", "Response.band_spectrum",  # made by Response.gradient; its arguments are any words
     "Plan.data", "Plan.run", "Plan.strike", "Response.body_slice", "Response.summary", "Scene.picture",
@@ -282,6 +283,8 @@ def stated() -> dict[str, dict[str, Any]]:
         "strike moving": {**blow, "speed": 0.5, "tolerance": 1e-1, "start": t["hit"].state(0.05)},
         "collide moving": {"bodies": [t["free"], t["free"]], "contacts": [fi.Touch(t["law"], 0, 1)], "tolerance": 1e-1,
             "start": fi.collide([t["free"]] * 2, [fi.Touch(t["law"], 0, 1)], speeds=[1.0, 0.0], tolerance=1e-1)},
+        "Response.against": {"self": t["hit"], "measured": {"contact_time": (1e-3, 1e-4)}},
+        "figures.against": {"found": t["hit"].against({"contact_time": 1e-3})},
         "Response.state": {"self": t["hit"], "time": 1e-3},
         "Response.gradient": {"self": t["hit"], "quantity": "impulse", "wrt": ("striker.mass", "contact.stiffness")},
         "strokes": {"modes": t["modes"], "strokes": [(0.0, t["striker"], t["law"], at, 1.0, 0.1)], "tolerance": 1e-1,
@@ -305,6 +308,7 @@ def stated() -> dict[str, dict[str, Any]]:
             "tolerance": 1e-1, "max_frequency": 1e3, "workers": 1, "cells": 3, "refine": True, "borders": True},
         "read_borders": {"table": t["map"]},
         "yield_strength": {"hardness": 300.0}, "Striker.dropped": {"self": t["sphere"], "height": 0.3},
+        "Striker.falling": {"self": t["sphere"], "gravity": 9.8},
         "spread": {"scene": t["scene"], "vary": {"striker.mass": ("lognormal", 0.03, 0.1)}, "n": 8, "sobol": False,
             "seed": 1, "tolerance": 1e-1, "max_frequency": 1e3, "workers": 1, "max_blows": 100.0},
         "spread body": {"scene": t["modes"], "vary": {"mass": "lognormal(0.03, 0.1)", "speed": "uniform(1, 2)"},

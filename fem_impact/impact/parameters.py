@@ -342,6 +342,9 @@ class Parameters(check.Brief):
         for name in ("bias", "start_q", "start_p"):  # displacement and velocity at the start stay
             power = 0.5 if name.startswith("start") else -0.5
             getattr(found, name)[i, part] = power * heavier / value * getattr(h, name)[part]
+        striker = self.hit.striker
+        if b == 0 and striker is not None:  # its weight grows, where other constant forces stay
+            found.bias[i, part] += heavier / value * striker.gravity * striker.motion[: part.stop - part.start]
         self._raise(found, i, b, faster / value)
         self._soften(found, i, b, -(heavier + 2.0 * faster) / value * self.hit.ends[b].rest)
 

@@ -16,6 +16,7 @@ from .compiled import record
 from .contact import Contact
 from .error import Error
 from .history import History, Impact, mode_energy
+from .measured import Comparison, of_blow
 from .motion import BodyMotion
 from .quantities import USUAL
 from .reduced_body import Ends
@@ -144,6 +145,29 @@ class Response(Totals, check.Locked):
         law given by its numbers is taken as stated, as material and damping are.
         """
         return self.trust.trusted
+
+    def against(self, measured: Any) -> Comparison:
+        """Measured quantities of this blow beside the bands that the program states for them; `fi.figures.against`
+        draws both.
+
+        A band holds the errors of computation and model, as of `trust`, and that of the measurement. What the inputs
+        leave open is in `fi.band`, which compares alike.
+
+        Parameters
+        ----------
+        measured : mapping of quantity to value or (value, error)
+            Of the quantities asked for: ``{"contact_time": (5.1e-3, 0.1e-3)}``. The error is half the width of the
+            measurement's own interval of 90 %, in its unit.
+
+        Examples
+        --------
+        >>> wall, ball = fi.Modes.rigid(1e3), fi.Striker.rigid(0.1)
+        >>> hit = fi.strike(wall, ball, fi.Contact.linear(4e6), at=None, speed=1.0)
+        >>> found = hit.against({"contact_time": (5e-4, 5e-6), "force": (700.0, 7.0)})
+        >>> [(each.point.name, each.said) for each in found.verdicts]
+        [('contact time', 'inside'), ('peak force', 'outside: 8.7 % above the band')]
+        """
+        return of_blow(self.trust, measured)
 
     @property
     def verdict(self) -> str:
@@ -457,6 +481,14 @@ class Response(Totals, check.Locked):
     def in_contact(self) -> bool:
         """Whether the striker, or the first body, still presses another at the end of the run."""
         return rebound.in_contact(self)
+
+    @property
+    def striker_speeds(self) -> np.ndarray:
+        """Speed [m/s] of the striker's rigid motion at its contact point before and after each impact, (n_impacts, 2).
+
+        Positive towards the struck body; a falling striker rises by the square of the second over twice the gravity.
+        """
+        return rebound.speeds(self)
 
     @cached_property
     def restitution(self) -> float | None:

@@ -60,7 +60,11 @@ class State(check.Brief):
     def same_striker(self, striker: Striker, law: Contact, modes: Modes, at: Any) -> Striker:
         """The striker that goes on; ValueError if it, its contact or the strike point is another than before."""
         mine = self.striker
-        same = mine is not None and _alike(mine.modes, striker.modes) and mine.hand == striker.hand
+        same = (
+            mine is not None
+            and _alike(mine.modes, striker.modes)
+            and (mine.hand, mine.gravity) == (striker.hand, striker.gravity)
+        )
         if mine is None or not same or not np.array_equal(mine.at, striker.at):
             raise ValueError("striker must be the one of the blow before if speed is None; give its speed")
         if law != self.contacts[0] or self.at is None or not np.array_equal(self.at, at[0]):

@@ -98,6 +98,7 @@ class Striker(check.Brief):
     radius: float | None = None  # [m] of a sphere
     fixed: bool = True  # True: a blow keeps all modes; False: only those its tolerance needs
     hand: Hand | None = None  # what holds it, see `held`
+    gravity: float = 0.0  # [m/s^2] that pulls it towards the struck body, see `falling`
 
     def __post_init__(self) -> None:
         check.instance("modes", self.modes, Modes)
@@ -118,6 +119,9 @@ class Striker(check.Brief):
                 "at must be a point that moves when the striker moves rigidly, got one at rest; move it off the hinge"
             )
         check.lock_arrays(self)
+        check.settle(self, gravity=check.non_negative("gravity", self.gravity, "m/s^2"))
+        if self.gravity:
+            replace(self, gravity=0.0)._check_free("fall")
         if self.hand is not None:
             check.instance("hand", self.hand, Hand)
             if self.modes.n_rigid != 1:
@@ -260,11 +264,43 @@ class Striker(check.Brief):
         """
         return replace(self, hand=hand)
 
+    def falling(self, gravity: float = GRAVITY) -> "Striker":
+        """The same striker with its weight, which brings it back after each bounce.
+
+        Flights are exact. Such a blow may never end by itself: give it a number of impacts, or a duration, in which it
+        may come to rest; the last impact then goes on, and has no restitution. Each other has its ``restitution``,
+        `Response.restitution_errors` says how exact it is, and `Response.striker_speeds` how fast the striker itself
+        came and left, which decides how high it rises. Where the struck body still moves, each bounce depends on when
+        it comes: small errors grow from bounce to bounce, and the blow says so.
+
+        Parameters
+        ----------
+        gravity : float [m/s^2]
+            Towards the struck body; of an inclined one, its part along the blow.
+
+        Examples
+        --------
+        >>> ball = fi.Striker.rigid(0.02).falling()
+        >>> law = fi.Contact.restituting(1e8, 1.5, restitution=0.8, speed=2.0)
+        >>> hit = fi.strike(fi.Modes.rigid(1e6), ball, law, at=None, speed=ball.dropped(0.2), max_impacts=3)
+        >>> [round(impact.restitution, 2) for impact in hit.impacts]
+        [0.8, 0.83, 0.86]
+        >>> (hit.striker_speeds[:, 1] ** 2 / (2 * 9.80665)).round(3).tolist()  # m
+        [0.128, 0.089, 0.066]
+        """
+        return replace(self, gravity=gravity)
+
+    @property
+    def returns(self) -> bool:
+        """Whether a hand or its weight brings the striker back after each bounce."""
+        return self.hand is not None or self.gravity > 0.0
+
     def dropped(self, height: float) -> float:
         """Speed [m/s] with which the striker arrives after a fall from rest, for the ``speed`` of a blow.
 
         ``sqrt(2 g h)``: the air slows a steel ball of 1 cm by 0.3 % over the first metre, a hollow or light one by far
-        more. A striker that turns about a hinge or is held by a hand does not fall freely.
+        more. A striker that turns about a hinge or is held by a hand does not fall freely. For what the weight does
+        after the first impact see `falling`.
 
         Parameters
         ----------
@@ -278,15 +314,21 @@ class Striker(check.Brief):
         2.426
         """
         height = check.positive("height", height, "m")
-        self.let_go("a drop")
+        self._check_free("be dropped")
+        return float(np.sqrt(2.0 * (self.gravity or GRAVITY) * height))
+
+    def _check_free(self, what: str) -> None:
+        """Raise ValueError if the striker does not fall freely."""
+        if self.hand is not None:
+            raise ValueError(f"striker must fall freely to {what}, but a hand holds this one; leave it free")
         if self.modes.n_rigid == 1 and self.felt_mass < (1.0 - 1e-9) * self.mass:
-            raise ValueError("striker must fall freely to be dropped, but this one turns about a hinge; give its speed")
-        return float(np.sqrt(2.0 * GRAVITY * height))
+            raise ValueError(f"striker must fall freely to {what}, but this one turns about a hinge; give its speed")
 
     def let_go(self, what: str) -> None:
-        """Raise ValueError if a hand holds the striker, for ``what`` cannot follow it."""
-        if self.hand is not None:
-            raise ValueError(f"striker must not be held by a hand in {what}, which follows single blows; leave it free")
+        """Raise ValueError if a hand or the weight brings the striker back, for ``what`` cannot follow it."""
+        if self.returns:
+            how = "be held by a hand" if self.hand is not None else "fall"
+            raise ValueError(f"striker must not {how} in {what}, which follows single blows; leave it free")
 
     @cached_property
     def body(self) -> Modes:
@@ -306,8 +348,8 @@ class Striker(check.Brief):
 
     @cached_property
     def push(self) -> np.ndarray:
-        """Constant modal forces of the hand, (n_modes,) [N kg**-0.5]."""
-        push = np.zeros(self.modes.n_modes)
+        """Constant modal forces of the hand, or of the weight, (n_modes,) [N kg**-0.5]."""
+        push = self.gravity * self.motion
         if self.hand is not None:
             push[0] = self.hand.force * self.shape[0]
         return push

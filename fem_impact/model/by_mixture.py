@@ -39,7 +39,7 @@ class Mixed(Description):
         """
         blow, target, named = asked.blow, asked.blow.target, "target" in asked.pieces
         pressed = asked.values["striker_force"] or asked.values["target_force"] or blow.contact.gap < 0.0
-        stated = pressed or asked.counted or blow.striker.hand or not asked.values["residual"]
+        stated = pressed or asked.counted or blow.striker.returns or not asked.values["residual"]
         fits = asked.plain and not (stated or asked.moving)
         with stages("modes"):
             seen = asked.seen if fits else None

@@ -211,7 +211,7 @@ def _noted(asked: Asked) -> Iterator[None]:
 def choose(asked: Asked, stages: Stages) -> Description:
     """The cheapest description of the target that will do, or the one asked for."""
     blow, named = asked.blow, asked.pieces.get("target")
-    held = blow.striker.hand is not None  # it comes back when the body has long answered
+    held = blow.striker.returns  # it comes back when the body has long answered
     stated = blow.target.modes is not None or "size" in asked.pieces or asked.counted
     names = [name for name in DESCRIPTIONS if blow.target.kind == "fe" or name != "mixed"]
     for name in [named] if named else ["modal"] if held or stated else names:

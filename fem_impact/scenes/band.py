@@ -10,6 +10,7 @@ import numpy as np
 from scipy import stats
 
 from .._base import check, markup
+from ..impact.measured import ENDS, Comparison, of_blow
 from ..impact.response import Response
 from ..sweeps.inputs import drawn, read, shares
 from .scene import Scene, load_scene
@@ -17,7 +18,6 @@ from .uncertainty import MOST_BLOWS, spread
 
 BLOWS = 1024  # [-] where one body serves all blows: the ends of a band are then good to a tenth of its width
 ANEW = 48  # [-] where each blow needs a body of its own: two of them lie beyond each end
-ENDS = (0.05, 0.95)  # [-] nine tenths of all blows lie between them
 NAMES = {name: name for name in ("n_impacts", "contact_time", "restitution", "impulse")} | {"force": "peak_force"}
 
 
@@ -68,6 +68,12 @@ class Band(check.Brief):
     def __getitem__(self, name: str) -> Quantity:
         found = {each.name: each for each in self.quantities}
         return found[check.one_of("quantity", name, found)]
+
+    def against(self, measured: Any) -> Comparison:
+        """Measured quantities beside their bands, as of `Response.against`, which here hold what the inputs leave open,
+        too."""
+        values = {quantity: self.values[name] for quantity, name in NAMES.items()}
+        return of_blow(self.hit.trust, measured, values)
 
     def _mostly(self, name: str) -> str:
         if np.ptp(self.values[name]) == 0.0:

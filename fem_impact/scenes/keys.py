@@ -176,6 +176,7 @@ KEYS: dict[str, tuple[str, Form]] = {
     "head": ("kg", POSITIVE),
     "handle": ("kg", POSITIVE),
     "damping": ("N s/m", NOT_NEGATIVE),
+    "gravity": ("m/s^2, that brings a free striker back after each bounce; 9.80665 onto a level body", NOT_NEGATIVE),
     "hand.force": ("N, with which the hand presses", NUMBER),
     "left": ("how this end is held; at most one end may be", one_of(TURNING)),
     "right": ("how this end is held; at most one end may be", one_of(TURNING)),

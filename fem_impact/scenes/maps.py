@@ -65,6 +65,7 @@ def map_scene(
         by the kinetic-energy criterion (NaN if the striker never rebounds or is never stopped).
     """
     scene.check_single()
+    scene.check_unpushed()
     table = {} if scene.map is None else scene._make("map", scene.map)
     over = table.get("over", {}) if over is None else over
     if not isinstance(over, Mapping) or not all(isinstance(name, str) for name in over):

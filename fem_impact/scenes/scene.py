@@ -346,6 +346,13 @@ class Scene(check.Brief):
                 "strike, plan and report take strokes)"
             )
 
+    def check_unpushed(self) -> None:
+        """Raise ValueError if something pushes the bodies besides their contact: maps and spreads do not follow it."""
+        for name in ("striker_force", "target_force"):
+            if self.blow.values.get(name):
+                raise self.fault(f"[strike] {name} must be left out here: maps and spreads follow blows without it")
+        self.make_striker().let_go("a map or spread")
+
     def _staged(self, stages: Stages) -> Blow:
         """`built`, with its time."""
         self.check_single()

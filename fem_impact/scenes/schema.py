@@ -82,10 +82,10 @@ def _bar(
 
 
 def _held(maker: Any) -> Callable[..., Striker]:
-    """The same maker of strikers, with a table {stiffness, damping, force} of the hand as another argument."""
+    """The same maker of strikers, with gravity and a table {stiffness, damping, force} of the hand as arguments."""
 
-    def make(*, hand: Any = None, **values: Any) -> Striker:
-        striker = maker(**values)
+    def make(*, hand: Any = None, gravity: float = 0.0, **values: Any) -> Striker:
+        striker = maker(**values).falling(gravity)
         if hand is None:
             return striker
         if not isinstance(hand, Mapping):
@@ -96,7 +96,7 @@ def _held(maker: Any) -> Callable[..., Striker]:
             raise ValueError(f"hand: {error}") from None
         return striker.held(Hand(**hand))
 
-    return _with_keys(make, maker, {"hand": None})
+    return _with_keys(make, maker, {"hand": None, "gravity": 0.0})
 
 
 def target_values(**values: Any) -> dict[str, Any]:

@@ -105,6 +105,8 @@ def arriving(kind: str, striker: Striker) -> str:
         arrives += f" (effective mass {si(striker.felt_mass, 'kg')} at the tip; first bending mode {si(bending, 'Hz')})"
     if striker.hand is not None:
         arrives += f", held by a hand in which it swings at {si(striker.hand_frequency, 'Hz')}"
+    if striker.gravity:
+        arrives += f", which falls back at {si(striker.gravity, 'm/s²')}"
     return arrives
 
 

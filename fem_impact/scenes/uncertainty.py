@@ -167,6 +167,7 @@ def _told(scene: Any, striker: Any, contact: Any, at: Any, speed: Any, damping_r
             raise ValueError(f"{name} must be left out for a scene, which has its own")
     told = scene if isinstance(scene, Scene) else load_scene(scene)
     told.check_single()
+    told.check_unpushed()
     return told, told.built
 
 

@@ -15,6 +15,7 @@ from .._base import check, markup
 from .._base.files import replacing
 from .._base.rounding import SAME
 from ..impact import spectra
+from ..impact.measured import Comparison
 from ..impact.response import Response
 from ..mesh import edge_table
 from ..mesh.mesh_files import quartered
@@ -413,3 +414,54 @@ def _bars(axes: Any, found: Spread, name: str) -> None:
     axes.set_yticks(place, names, fontsize=8)
     axes.set(xlim=(0.0, 105.0), xlabel="[%]")
     axes.grid(False, axis="y")
+
+
+@check.typed
+def against(found: Comparison) -> Figure:
+    """Plot measured numbers, and forces less their predictions, beside the bands; what is outside is red.
+
+    Parameters
+    ----------
+    found : Comparison, of `Response.against`, `fi.band` or a fit
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+    """
+    columns = min(3, len(found.traces))
+    rows = -(-len(found.traces) // columns) if columns else 0
+    tall = 1.1 + 0.3 * len(found.verdicts)
+    with styled(6.4 if columns < 3 else 9.0, tall + 2.2 * rows) as figure:
+        grid = figure.add_gridspec(rows + 1, columns or 1, height_ratios=[*[2.2] * rows, tall])
+        for i, trace in enumerate(found.traces):
+            axes = figure.add_subplot(grid[i // columns, i % columns])
+            axes.fill_between(trace.time, -trace.band, trace.band, color=SKY, lw=0)
+            for some, colour in ((trace.inside, "black"), (~trace.inside, VERMILION)):
+                own: dict[str, Any] = {"yerr": trace.error[some], "fmt": ".", "ms": 3.0, "elinewidth": 0.4}
+                axes.errorbar(trace.time[some], trace.residual[some], color=colour, **own)
+            axes.set_title(f"{markup.literal(trace.name)}: {100.0 * trace.inside.mean():.0f} % inside")
+            if i % columns == 0:
+                axes.set_ylabel("measured less predicted")
+            axes.xaxis.set_major_locator(MaxNLocator(TICKS))
+            set_units(axes, "s", "N")
+        _bands(figure.add_subplot(grid[rows, :]), found)
+    return figure
+
+
+def _bands(axes: Any, found: Comparison) -> None:
+    """Bands and measured numbers, a row for each, over the measured number."""
+    for row, each in enumerate(found.verdicts):
+        value, place = each.point.value, len(found.verdicts) - 1 - row
+        low, middle, high = (100.0 * (x / value - 1.0) for x in (each.low, each.middle, each.high))
+        names = ("predicted band", "predicted", "measured") if not row else (None, None, None)
+        axes.barh(place, high - low, left=low, height=0.55, color=SKY, label=names[0])
+        axes.plot([middle] * 2, [place - 0.27, place + 0.27], color=BLUE, label=names[1])
+        own: dict[str, Any] = {"xerr": 100.0 * each.own_width, "color": "black" if each.inside else VERMILION}
+        axes.errorbar(0.0, place, fmt="o", markersize=4.0, capsize=3.0, label=names[2], **own)
+    axes.set_yticks(range(len(found.verdicts)), [markup.literal(each.point.name) for each in reversed(found.verdicts)])
+    axes.set(xlabel="difference from the measured number [%]", title=markup.literal(found.title))
+    axes.grid(axis="y", visible=False)
+    axes.use_sticky_edges = False
+    axes.margins(x=0.05)
+    axes.locator_params(axis="x", nbins=6)
+    axes.legend(loc="upper left", bbox_to_anchor=(1.0, 1.0))

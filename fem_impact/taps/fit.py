@@ -3,17 +3,19 @@
 from collections.abc import Mapping
 from contextlib import suppress
 from dataclasses import replace
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from .._base import check
 from .._base.check import SimulationError
+from .._base.rounding import SAME
 from ..impact.contact import Contact
 from ..impact.striker import Striker
 from ..modes.modal import Modes
-from . import arguments, predictions, solver, windows
+from . import arguments, nested, predictions, solver, windows
 from .found import Found, Watch, profiled
+from .nested import Inner
 from .profiles import DOUBTED, variance
 from .records import Taps
 from .rig import Rig
@@ -22,6 +24,15 @@ from .unknowns import TIME, Setting, Unknown, checked
 
 STARTS = 5  # [-] searches, from the best of `solver.starts`; where all end poorly, more follow
 FEWEST = 3  # [-] taps, to tell which one disagrees: of two, either may be wrong
+
+
+class Starts(NamedTuple):
+    """Where the searches of a fit begin, and who is told."""
+
+    most: int
+    rng: np.random.Generator
+    watch: Watch | None
+    inner: Inner | None  # a smaller model, where they begin, too
 
 
 @check.typed
@@ -41,6 +52,7 @@ def fit(
     resonance: float | None = None,
     window: Any = None,
     starts: int = STARTS,
+    smaller: Found | None = None,
     robust: bool = True,
     profiles: bool = True,
     rng: Any = 0,
@@ -83,7 +95,11 @@ def fit(
     window : (before, after) [s], optional
         What is compared around each onset; by default the pulses and 1.5 times their length after them.
     starts : int
-        Searches from different points of the ranges; up to three times as many if all of them end poorly.
+        Searches from different points of the ranges; up to three times as many if all of them end poorly. Further ones
+        begin where the model without the last unknown mode, or without that of a springy head, ends.
+    smaller : Found, optional
+        The fit of a model inside this one to the same taps, where searches begin, too; in place of the former. If none
+        of them gets below its sum of squares, it is what is returned, with a note.
     robust : bool
         Whether a tap that the others predict badly is left out and named.
     profiles : bool
@@ -130,14 +146,15 @@ def fit(
     cut, noise, notes = _usable(levelled, window)
     place = None if target is None else target.point("at", at)[0]
     rig, impulse = Rig(cut.rate, anti_alias, tip_mass, resonance), float(np.mean(cut.impulse))
-    starts, generator = check.count("starts", starts), arguments.generator("rng", rng)
+    inner = None if smaller is None else _inner(smaller, cut, n_points)
+    begin = Starts(check.count("starts", starts), arguments.generator("rng", rng), watch, inner)
     settings = [
         Setting(target, place, striker, law, rig, own, points, n_points, impulse) for law, own in zip(laws, names)
     ]
     found = [
         _fit(
             setting, cut, noise, [*levelled.notes[len(given.notes) :], *notes], known=held, per_tap=each,
-            starts=starts, robust=robust, rng=generator, watch=watch,
+            robust=robust, begin=begin,
         )
         for setting in settings
     ]  # fmt: skip
@@ -191,7 +208,7 @@ def _law_name(law: Contact) -> str:
 
 def _fit(
     setting: Setting, cut: Taps, noise: np.ndarray, notes: list[str], *, known: Mapping[str, float],
-    per_tap: list[str], starts: int, robust: bool, rng: np.random.Generator, watch: Watch | None,
+    per_tap: list[str], robust: bool, begin: Starts,
 ) -> Found:  # fmt: skip
     """The fit of one contact law to taps whose noise over the peak is (n_taps,)."""
     length = solver.pulse_length(cut)
@@ -204,11 +221,7 @@ def _fit(
     problem = Problem(setting, data, free, known, tuple(own) if cut.n_taps > 1 else ())
     if data.values.size <= problem.n_values:
         raise ValueError(f"taps hold {data.values.size} samples, too few for {problem.n_values} values")
-    best, minima = _search(problem, cut, length, starts, rng, watch)
-    if len(minima) > 1 and best.cost > min(minima) * (1.0 + solver.NEARLY):
-        notes.append(
-            f"a model without mode{_modes(problem)} explains the taps better: the search may have missed the best"
-        )
+    best, minima, inner = _search(problem, cut, length, begin)
     part = problem.residual(best.x).reshape(data.values.shape)
     spread = np.sqrt(np.square(part).mean(axis=(0, 2)))  # of each channel, the force first
     weights = _sureness(part[:, 0], noise)[:, None] * spread[0] / np.maximum(spread, 1e-300)
@@ -230,7 +243,23 @@ def _fit(
             break
         outliers[cut.labels[used[worst]]] = float(each[worst])
         used, problem, best, minima = list(fewer.used), without, solved, fewer.minima
-    return Found(cut, tuple(used), outliers, problem, best, minima, tuple(notes), {}, watch)
+    stuck = False
+    if inner is not None:
+        problem, best, stuck = nested.never_worse(problem, best, inner.among(used, problem.data), notes)
+    if not best.ended and solver.promised(problem, best) > solver.PROMISED * best.cost:
+        notes.append(f"the search had not ended after {solver.ENOUGH} steps: narrow the ranges, or raise starts")
+    return Found(cut, tuple(used), outliers, problem, best, minima, tuple(notes), {}, begin.watch, stuck)
+
+
+def _inner(smaller: Found, cut: Taps, n_points: int) -> Inner:
+    """The model of another fit; ValueError if that is of other taps."""
+    data, shape = smaller.problem.data, (cut.n_taps, 1 + n_points, len(cut.time))
+    if data.values.shape != shape or not np.allclose(data.impulse, cut.impulse, rtol=SAME, atol=0.0):
+        raise ValueError(
+            f"smaller must be a fit to the same {cut.n_taps} taps, none of them left out, in the same window and with "
+            "the same responses; fit it anew with robust=False"
+        )
+    return Inner("what smaller lacks", smaller.problem, smaller.best.x)
 
 
 def _sureness(residual: np.ndarray, noise: np.ndarray) -> np.ndarray:
@@ -261,68 +290,42 @@ def _apart(problem: Problem, best: solver.Solution) -> list[str]:
     ]
 
 
-def _modes(problem: Problem) -> int:
-    """Number of unknown modes of the structure."""
-    return max((int(each.name[4]) for each in problem.free if each.name.startswith("mode")), default=0)
+def _search(
+    problem: Problem, taps: Taps, length: float, begin: Starts
+) -> tuple[solver.Solution, tuple[float, ...], Inner | None]:
+    """The best of several searches, the sums of squares of all, and the smaller model that some of them began with.
 
-
-def _simpler(problem: Problem, taps: Taps, length: float, rng: Any) -> tuple[list[np.ndarray], tuple[float, ...]]:
-    """Starting points at the best fit without the last mode, which begins too heavy to move; and its sum of squares."""
-    last = f"mode{_modes(problem)}."
-    if last == "mode0.":
-        return [], ()
-    kept = [i for i, each in enumerate(problem.free) if not each.name.startswith(last)]
-    names = tuple(each for each in problem.setting.unknown if not each.name.startswith(last))
-    less = replace(
-        problem, setting=replace(problem.setting, unknown=names), free=tuple(problem.free[i] for i in kept),
-        fixed={name: value for name, value in problem.fixed.items() if not name.startswith(last)}, _last={},
-    )  # fmt: skip
-    best, _ = _search(less, taps, length, 1, rng, None)
-    begun = []
-    low, high = (bound[: problem.n_shared] for bound in problem.bounds)
-    for share in (0.2, 0.5, 0.8):  # of the range of its frequency
-        shared = low + share * (high - low)
-        for i, each in enumerate(problem.free):
-            if each.name == last + "mass":
-                shared[i] = high[i]
-            elif each.name == last + "frequency":
-                ends = np.clip(np.log(np.array(solver.FELT) / length), low[i], high[i])
-                shared[i] = ends[0] + share * (ends[1] - ends[0])
-        shared[kept] = best.x[: less.n_shared]
-        begun.append(np.append(shared, best.x[less.n_shared :]))
-    return begun, (best.cost,)
-
-
-def _search(problem: Problem, taps: Taps, length: float, starts: int, rng: Any, watch: Watch | None):
-    """The best of several searches, and the sums of squares of all; they begin with what all taps share.
-
-    A mode more never fits worse: searches begin where the model without the last mode ends, too.
+    They begin with what all taps share. A mode more never fits worse: searches begin where the model without the last
+    mode ends, too.
     """
     common = replace(problem, own=(), _last={})
-    begun = solver.starts(common, length, taps.impulse, rng)
+    begun = solver.starts(common, length, taps.impulse, begin.rng)
     found: list[solver.Solution] = []
     # an rms of the residual of 6 % of the records' is above the noise of usual ones: after a poorer fit the search goes
     # on, up to three times as long; then the model is wrong rather than the start
     poor = 0.06**2 * float(np.square(problem.data.values).sum())
-    for i, x in enumerate(begun[: 3 * starts]):
-        if i >= starts and found and min(one.cost for one in found) < poor:
+    for i, x in enumerate(begun[: 3 * begin.most]):
+        if i >= begin.most and found and min(one.cost for one in found) < poor:
             break
         try:
             found.append(solver.solve(common, x, solver.QUICK, solver.NEARLY))
         except SimulationError:
             continue
         finally:
-            if watch is not None:
-                watch(min(i + 1, starts), starts)
-    nested, without = _simpler(common, taps, length, rng)
-    for x in nested:
+            if begin.watch is not None:
+                begin.watch(min(i + 1, begin.most), begin.most)
+    apart = np.zeros(len(problem.own) * taps.n_taps)
+    found = [replace(one, x=np.append(one.x, apart)) for one in found]
+    inner, less = begin.inner, nested.without(common) if begin.inner is None else None
+    if less is not None:
+        inner = Inner(*less, _search(less[1], taps, length, Starts(1, begin.rng, None, None))[0].x)
+    for x in [] if inner is None else nested.embedded(problem, inner):
         with suppress(SimulationError):
-            found.append(solver.solve(common, x, solver.QUICK, solver.NEARLY))
+            found.append(solver.solve(problem, x, solver.QUICK, solver.NEARLY))
     if not found:
         raise SimulationError("no search ended: blows in the ranges of unknown do not end; narrow the ranges")
     found.sort(key=lambda one: one.cost)
-    apart = np.zeros(len(problem.own) * taps.n_taps)
     going = found[:1] + [one for one in found[1:2] if not one.ended]
-    finished = [solver.solve(problem, np.append(one.x, apart)) for one in going]
+    finished = [solver.solve(problem, one.x) for one in going]
     best = min(finished, key=lambda one: one.cost)
-    return best, (*(one.cost for one in [*finished, *found[len(finished) :]]), *without)
+    return best, tuple(one.cost for one in [*finished, *found[len(finished) :]]), inner

@@ -12,10 +12,11 @@ from .._base.explained import noted
 from .._base.rounding import SAME
 from ..impact.collision import strike
 from ..impact.contact import Contact
+from ..impact.measured import Comparison
 from ..impact.response import Response
 from ..impact.striker import Striker
 from ..modes.modal import Modes
-from . import predictions, profiles, solver, windows
+from . import against, predictions, profiles, solver, windows
 from .predictions import Prediction
 from .profiles import Profile
 from .records import Taps
@@ -35,11 +36,12 @@ class Found(check.Brief):
     outliers: Mapping[str, float]  # label of a tap that disagrees -> its error when predicted from the others [-]
     problem: Problem
     best: Solution
-    # [-] sums of squares at the ends of all searches, and of the best without the last of the unknown modes
+    # [-] sums of squares at the ends of all searches
     minima: tuple[float, ...]
     notes: tuple[str, ...]
     compared: Mapping[str, float]  # contact law -> root mean square of its errors at left-out taps [-]; if several
     watch: Watch | None = None
+    stuck: bool = False  # its own searches ended above a smaller model inside it
 
     @cached_property
     def _noise(self) -> tuple[float, int, float]:
@@ -184,7 +186,7 @@ class Found(check.Brief):
         else:
             check.count("tap", tap, low=0, high=self.taps.n_taps - 1)
             cut = self.taps.pick(int(tap))
-        return predictions.predicted(self.problem, self.problem.values(self.best.x), cut)
+        return predictions.predicted(self.problem, self.best, cut)
 
     @check.typed
     def left_out(self, *, rise_only: bool = False) -> tuple[Prediction, ...]:
@@ -199,6 +201,44 @@ class Found(check.Brief):
             used = self.taps.pick(list(self.used))
             self._left_out[rise_only] = predictions.left_out(self.problem, self.best.x, used, rise_only)
         return self._left_out[rise_only]
+
+    @property
+    def misfit(self) -> float:
+        """What the model lacks: root mean square over the force, as `error`, without the noise of the taps [-]."""
+        used = self.taps.pick(list(self.used))
+        noise = np.square(used.noise) / np.square(used.force).mean(axis=1)
+        return float(np.sqrt(max(0.0, np.mean(self.errors**2 - noise))))
+
+    @check.typed
+    def against(self, measured: Taps | None = None, *, calibration: float = 0.0) -> Comparison:
+        """Measured taps beside the bands of their predictions, and a verdict on each; `fi.figures.against` draws it.
+
+        A band holds what the data leave open of the values, what the model lacks (`misfit`), an error of the
+        computation of 0.001, and noise and calibration of the measurement. Only speed and onset of a tap, and its own
+        values of unknowns freed for each tap, are found from itself.
+
+        Parameters
+        ----------
+        measured : Taps, optional
+            Taps that the fit did not use; by default those used, each predicted from the others.
+        calibration : float [-]
+            Standard deviation of the scale of a measured force over that of the taps fitted.
+
+        Examples
+        --------
+        >>> wall, hammer = fi.Modes.rigid(1e4), fi.Striker.rigid(0.1)
+        >>> hits = [fi.strike(wall, hammer, fi.Contact.hertz(2e8), at=None, speed=v) for v in (0.5, 1.0, 1.5)]
+        >>> taps = [fi.measure(hit, rate=25600.0, noise=2e-3, rng=i) for i, hit in enumerate(hits)]
+        >>> law, ranges = fi.Contact.hertz(1e8), {"contact.stiffness": (1e6, 1e10)}
+        >>> found = fi.fit(taps, striker=hammer, contact=law, unknown=ranges, profiles=False)
+        >>> [found.against()[f"tap {i}, width"].said for i in (1, 2, 3)]
+        ['inside', 'inside', 'inside']
+        """
+        calibration = check.non_negative("calibration", calibration)
+        if measured is None:
+            return against.compared(self, self.taps.pick(list(self.used)), self.left_out(), calibration)
+        each = tuple(self.predict(measured.pick(i)) for i in range(measured.n_taps))
+        return against.compared(self, measured, each, calibration)
 
     @cached_property
     def _left_out(self) -> dict[bool, tuple[Prediction, ...]]:

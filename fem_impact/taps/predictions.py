@@ -1,14 +1,15 @@
 """Taps as a model has them, with all held that taps have in common; and each from a fit to the others."""
 
-from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field, replace
+from functools import cached_property, partial
 
 import numpy as np
 
 from .._base import check
-from . import solver, windows
+from . import profiles, solver, windows
 from .records import Taps
-from .solver import HALF_LOST, Problem
+from .solver import HALF_LOST, Problem, Solution
 from .unknowns import TIME
 
 
@@ -22,6 +23,12 @@ class Prediction(check.Brief):
     speed: float  # [m/s]
     onset: float  # [s]
     own: Mapping[str, float]  # unknown freed for each tap -> its value here
+    spreads: Callable[[], np.ndarray] = field(repr=False)  # finds `spread`
+
+    @cached_property
+    def spread(self) -> np.ndarray:
+        """How the force moves with what the fit leaves open of its values, (n_times, n) [N], each by one deviation."""
+        return self.spreads()
 
     @property
     def residual(self) -> np.ndarray:
@@ -39,11 +46,12 @@ class Prediction(check.Brief):
         return float(np.sqrt(np.mean(self.residual**2)) / np.abs(self.measured).max())
 
 
-def predicted(problem: Problem, values: Mapping[str, float], tap: Taps, rise_only: bool = False) -> Prediction:
-    """One tap with all unknowns held at ``values``, but those that each tap has of its own.
+def predicted(problem: Problem, best: Solution, tap: Taps, rise_only: bool = False) -> Prediction:
+    """One tap with all unknowns held as a fit found them, but those that each tap has of its own.
 
     They, its speed and its onset are found from the whole record or, with ``rise_only``, until the largest force.
     """
+    values = problem.values(best.x)
     n_points = problem.data.values.shape[1] - 1
     data = windows.data(tap, n_points, np.ones(1 + n_points))
     free = tuple(each for each in problem.free if each.name in problem.own)
@@ -64,7 +72,26 @@ def predicted(problem: Problem, values: Mapping[str, float], tap: Taps, rise_onl
     onset = (data.lead + float(single.onsets(x)[0])) / tap.rate
     found = single.values(x)
     freed = {name: found[name] for name in (each.name.replace(TIME, "contact.stiffness") for each in free)}
-    return Prediction(tap.time, tap.force[0], made, float(single.speeds(x)[0]), onset, freed)
+    spreads = partial(_spread, problem, best, single, x)
+    return Prediction(tap.time, tap.force[0], made, float(single.speeds(x)[0]), onset, freed, spreads)
+
+
+def _spread(problem: Problem, best: Solution, single: Problem, x: np.ndarray) -> np.ndarray:
+    """`Prediction.spread` of a tap alone at ``x``, by the derivatives of the fit and of the tap.
+
+    What the values move is lessened by what speed, onset and own values of the tap, found from itself, take back.
+    """
+    whole = replace(single, free=problem.free, fixed=problem.fixed, _last={})
+    table = single.values(x)
+    table[TIME] = single.setting.contact_time(table)
+    shared = [float(each.inside(table[each.name])) for each in problem.free]
+    slopes = whole.jacobian(np.append(shared, x[single.n_shared :]))
+    own = [i for i in range(slopes.shape[1]) if i >= len(shared) or problem.free[i].name in problem.own]
+    held = np.setdiff1d(np.arange(len(shared)), own)
+    moved = slopes[:, held] - slopes[:, own] @ np.linalg.lstsq(slopes[:, own], slopes[:, held], rcond=None)[0]
+    residual = problem.residual(best.x).reshape(-1, problem.data.n_times)
+    noise = profiles.variance(residual, problem.n_values)[0]
+    return float(np.sqrt(noise) * single.data.scale[0, 0]) * moved @ solver.directions(best.jacobian).inverse[held]
 
 
 def _force_only(problem: Problem) -> Problem:
@@ -80,5 +107,5 @@ def left_out(problem: Problem, x: np.ndarray, taps: Taps, rise_only: bool = Fals
         others = [i for i in range(n_taps) if i != tap]
         part = replace(problem, data=problem.data.pick(others), _last={})
         without = solver.solve(part, x[problem.kept(others)], close=solver.NEARLY)
-        found.append(predicted(part, part.values(without.x), taps.pick(tap), rise_only))
+        found.append(predicted(part, without, taps.pick(tap), rise_only))
     return tuple(found)

@@ -1,6 +1,7 @@
 """What `fem-impact frf` and `fem-impact fit` do, apart from printing."""
 
 from contextlib import suppress
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
@@ -17,6 +18,7 @@ from ..show import export
 from . import found_scene, transfer
 from .fit import fit as fit_taps
 from .found import Found, Watch
+from .proposal import Proposal, propose
 from .records import Taps, read_taps
 from .rig import measure
 
@@ -52,17 +54,18 @@ def frf(options: Any) -> tuple[xr.Dataset, tuple[str, ...]]:
 
 
 def peaks(found: xr.Dataset) -> list[dict[str, Any]]:
-    """The largest peaks of each response: frequency [Hz], magnitude with its unit, and coherence if it is known."""
+    """The largest peaks of each response: frequency [Hz], magnitude, unit; coherence and error, None if not known."""
     rows = []
     for k, name in enumerate(found["channel"].values):
         size = np.abs(found["H"].values[1:, k])
         places = picked.peaks(size)
         largest = np.sort(places[np.argsort(-size[places])][:20])  # more do not fit a screen
         for i in largest:
-            coherence = float(found["coherence"].values[1 + i, k]) if "coherence" in found else None
+            sure = [float(found[x].values[1 + i, k]) if x in found else None for x in ("coherence", "error")]
             rows.append({
                 "response": str(name), "frequency": float(found["frequency"].values[1 + i]),
-                "magnitude": float(size[i]), "unit": str(found["units"].values[k]), "coherence": coherence,
+                "magnitude": float(size[i]), "unit": str(found["units"].values[k]), "coherence": sure[0],
+                "error": None if sure[1] is None or np.isnan(sure[1]) else sure[1],
             })  # fmt: skip
     return rows
 
@@ -78,8 +81,8 @@ def write_frf(path: Path, found: xr.Dataset) -> None:
         for k, name in enumerate(found["channel"].values):
             values, unit = found["H"].values[:, k], found["units"].values[k]
             columns |= {f"{name} real [{unit}]": values.real, f"{name} imaginary [{unit}]": values.imag}
-            if "coherence" in found:
-                columns[f"{name} coherence"] = found["coherence"].values[:, k]
+            sure = {"coherence": "coherence", "error": f"error [{unit}]"}
+            columns |= {f"{name} {said}": found[x].values[:, k] for x, said in sure.items() if x in found}
         (staging / path.name).write_text(export.csv_text(**columns), encoding="utf-8")
 
 
@@ -98,8 +101,15 @@ def _pairs(name: str, texts: list[str]) -> dict[str, list[float]]:
     return found
 
 
-def fit(options: Any, watch: Watch | None) -> tuple[Found, Scene | None]:
-    """The fit of a file of taps, and the scene struck; None for a wall."""
+def fit(options: Any, watch: Watch | None) -> tuple[Found, Scene | None, Proposal | None]:
+    """The fit of a file of taps; the scene struck, None for a wall; and what was tried if the model is asked for."""
+    if options.propose:
+        for name in ("unknown", "known", "per_tap", "body"):
+            if getattr(options, name):
+                name = "SCENE" if name == "body" else f"--{name.replace('_', '-')}"
+                raise ValueError(f"{name} must be left out beside --propose, which tries unknowns and laws itself")
+        proposal = propose(_taps(options), striker=Striker.rigid(options.mass or 0.1), watch=watch)
+        return proposal.found, None, proposal
     unknown = {name: tuple(limits) for name, limits in _pairs("unknown", options.unknown).items()} or UNKNOWN
     known = {name: value for name, (value,) in _pairs("known", options.known).items()}
     taps = _taps(options)
@@ -111,12 +121,16 @@ def fit(options: Any, watch: Watch | None) -> tuple[Found, Scene | None]:
         given |= {"target": scene.modes(), "at": scene.blow.values["at"], "contact": scene.make_contact()}
         if options.mass is None:
             given["striker"] = scene.make_striker()
-    return fit_taps(taps, unknown=unknown, known=known, per_tap=options.per_tap, watch=watch, **given), scene
+    return fit_taps(taps, unknown=unknown, known=known, per_tap=options.per_tap, watch=watch, **given), scene, None
 
 
-def write(folder: Path, found: Found, scene: Scene | None) -> tuple[dict[str, Any], list[str]]:
+def write(
+    folder: Path, found: Found, scene: Scene | None, proposal: Proposal | None
+) -> tuple[dict[str, Any], list[str]]:
     """Write fit.json and, if the body struck is known, scene.toml; return the data and the names of the files."""
-    data = export.plain(found.data() | {"summary": found.summary().splitlines(), "versions": export.versions()})
+    said: dict[str, Any] = {"summary": (proposal or found).summary().splitlines(), "versions": export.versions()}
+    said |= {} if proposal is None else {"tried": [asdict(each) for each in proposal.tried]}
+    data = export.plain(found.data() | said)
     export.write_json(folder / "fit.json", data)
     files = ["fit.json"]
     modes = [name for name in found.names if name.startswith("mode")]

@@ -14,8 +14,6 @@ from . import solver, windows
 from .fit import fit
 from .found import Found, Watch, profiled
 from .records import Taps
-from .solver import Solution
-from .unknowns import TIME
 
 Ranges = dict[str, tuple[float, float]]
 STIFFNESS = {"contact.stiffness": (1e2, 1e16)}  # of a law of unknown exponent, N/m**exponent: from felt to steel
@@ -122,27 +120,26 @@ def propose(
     for name, law in (("linear", Contact.linear(1e7)), ("Hertz", Contact.hertz(1e7))):
         one = _fitted(joined, law, dict(STIFFNESS), given)
         if one is not None:
-            tried.append(_trial(name, "", one, False, False))
+            tried.append(_trial(name, "", one, False))
             best = one if best is None or _left_out(one) < GAIN * _left_out(best) else best
     if best is None:
         raise SimulationError("no blow of a contact on a wall ends as these taps do; read the taps again")
     law, name = best.problem.setting.contact, "linear" if best.problem.setting.contact.exponent == 1.0 else "Hertz"
     tried = [replace(one, taken=one.name == name) for one in tried]
-    ranges, waiting = dict(STIFFNESS), _steps(striker, solver.pulse_length(best.taps), law.exponent)
+    ranges, waiting = dict(STIFFNESS), _steps(striker, solver.pulse_length(best.taps))
     while True:  # what one addition hid may show after another
         done = {one.name for one in tried}
         for step in list(waiting):
-            word, more, neutral = step
+            word, more = step
             label = f"{name} + {word}"
             if label in done or (word == "mode 2" and any(each[0] == "mode 1" for each in waiting)):
                 continue
             own = {"per_tap": "contact.stiffness"} if PER_TAP in label else {}
-            one = _fitted(joined, law, ranges | more, given | own)
+            one = _fitted(joined, law, ranges | more, given | own | {"smaller": best})
             if one is None:
                 continue
-            one, rescued = _never_worse(one, best, neutral)
             taken = _left_out(one) < GAIN * _left_out(best)
-            tried.append(_trial(label, name, one, rescued, taken))
+            tried.append(_trial(label, name, one, taken))
             if taken:
                 best, ranges, name = one, ranges | more, label
                 waiting.remove(step)
@@ -152,21 +149,17 @@ def propose(
     return Proposal(profiled(whole) if profiles else whole, tuple(tried))
 
 
-def _steps(striker: Striker, length: float, exponent: float) -> list[tuple[str, Ranges, Mapping[str, float]]]:
-    """What is added one after another: its name, its ranges, and the values with which it changes nothing."""
+def _steps(striker: Striker, length: float) -> list[tuple[str, Ranges]]:
+    """What is added one after another: its name and its ranges."""
     band = FREQUENCIES[0] / length, FREQUENCIES[1] / length
     heavy = MASSES[0] * striker.mass, MASSES[1] * striker.mass
     head: Ranges = {"striker.first_frequency": band, "striker.mode_ratio": (1e-4, 10.0)}
-    steps: list[tuple[str, Ranges, Mapping[str, float]]] = [
-        ("exponent", EXPONENT, {"contact.exponent": exponent}),
-        ("loss", LOSS, {"contact.loss": 0.0}),
-        ("springy head", head, {"striker.first_frequency": band[1], "striker.mode_ratio": 1e-4}),
-        (PER_TAP, {}, {}),
-    ]
+    steps: list[tuple[str, Ranges]] = [
+        ("exponent", EXPONENT), ("loss", LOSS), ("springy head", head), (PER_TAP, {}),
+    ]  # fmt: skip
     for i in range(1, MOST_MODES + 1):
         mode: Ranges = {f"mode{i}.frequency": band, f"mode{i}.mass": heavy, f"mode{i}.damping": (0.0, 0.5)}
-        still = {f"mode{i}.frequency": band[1], f"mode{i}.mass": heavy[1], f"mode{i}.damping": 0.02}
-        steps.append((f"mode {i}", mode, still))
+        steps.append((f"mode {i}", mode))
     return steps
 
 
@@ -180,28 +173,10 @@ def _fitted(taps: Taps, law: Contact, ranges: Ranges, given: Mapping[str, Any]) 
         return None
 
 
-def _never_worse(one: Found, smaller: Found, neutral: Mapping[str, float]) -> tuple[Found, bool]:
-    """A larger model at least as good as the smaller one inside it, and whether it had to go on from that."""
-    if one.error <= smaller.error:
-        return one, False
-    values = smaller.problem.values(smaller.best.x) | dict(neutral)
-    values[TIME] = one.problem.setting.contact_time(values)
-    shared = np.clip(
-        [float(each.inside(values[each.name])) for each in one.problem.free], *(
-            bound[: one.problem.n_shared] for bound in one.problem.bounds
-        )
-    )  # fmt: skip
-    rest = smaller.best.x[smaller.problem.n_shared :]  # momenta, onsets and own values of the same taps
-    apart = np.zeros(len(one.best.x) - len(shared) - len(rest))
-    best: Solution = solver.solve(one.problem, np.concatenate([shared, rest, apart]))
-    return (replace(one, best=best), True) if best.cost < one.best.cost else (one, False)
-
-
 def _left_out(found: Found) -> float:
     return float(np.sqrt(np.mean([each.error**2 for each in found.left_out()])))
 
 
-def _trial(name: str, inside: str, found: Found, rescued: bool, taken: bool) -> Trial:
-    return Trial(
-        name, inside, found.problem.n_values - 2 * len(found.used), found.error, _left_out(found), rescued, taken
-    )
+def _trial(name: str, inside: str, found: Found, taken: bool) -> Trial:
+    n_unknowns = found.problem.n_values - 2 * len(found.used)
+    return Trial(name, inside, n_unknowns, found.error, _left_out(found), found.stuck, taken)

@@ -32,6 +32,8 @@ QUICK = 12
 NEARLY = 1e-6
 # [-] of the noise variance: a gain that is not sought, as luck makes as much
 SMALL = 0.05
+# [-] of the sum of squares: what a search that used up its iterations may still promise without a word, as ridges do
+PROMISED = 0.01
 
 
 Function = Callable[[np.ndarray], np.ndarray]
@@ -348,6 +350,14 @@ def chord(
         if gained < 0.3 * promised:
             break
     return Solution(x, cost, jacobian, False), False
+
+
+def promised(problem: Problem, found: Solution) -> float:
+    """By how much the sum of squares would fall by its derivatives, within the bounds and apart from ridges."""
+    low, high = problem.bounds
+    inside = (found.x > low + STEP) & (found.x < high - STEP)
+    basis = directions(found.jacobian[:, np.delete(inside, problem.needless)])
+    return float(np.square(basis.left.T @ problem.residual(found.x))[basis.told].sum())
 
 
 class Basis(NamedTuple):

@@ -7,17 +7,19 @@ from typing import Any
 import numpy as np
 import xarray as xr
 from scipy.optimize import linear_sum_assignment
+from scipy.stats import f
 
 from .._base import check, isolated, markup
 from .._base.files import replacing
 from ..modes import picked, universal_files
 from ..modes.modal import Modes
-from . import readers
+from . import readers, triggers
 from .records import Taps
 from .units import known as known_unit
 from .windows import joined
 
 METHODS = ("H1", "H2")
+SURE = 0.9  # [-] probability that the true response lies within the error stated
 UNITS = {"m/s^2": "accelerance", "m/s": "mobility", "m": "receptance"}
 WAY = ("node", "direction", "reference", "reference_direction")  # of a response in data set 58
 ENDS = ("place", "struck")  # where it is measured and struck
@@ -35,6 +37,10 @@ def frf(
 ) -> xr.Dataset:
     """Frequency responses of a structure from taps, averaged, or as a universal file holds them.
 
+    Every tap counts by the spectrum of its whole force. A double hit serves as well as a single one: only where its
+    spectrum nearly vanishes it tells little, and there another tap, of another delay, tells more. It costs where the
+    noise of the force fills these holes, and where the record ends before what the second pulse excites has died.
+
     Parameters
     ----------
     records : Taps or sequence of Taps, with responses, or path of a universal file
@@ -43,7 +49,7 @@ def frf(
     method : "H1" or "H2"
         H1 holds for noise in the response, H2 for noise in the force.
     force_window : float [s], optional
-        The force counts for this time from a tenth of it before the tap on; its last quarter falls as a cosine.
+        The force counts for this time from a tenth of it before each pulse on; its last quarter falls as a cosine.
     response_window : float [s], optional
         Time constant of an exponential window over force and response; it adds 1 / (omega time) to the damping ratio
         of every mode, which the caller takes off.
@@ -53,7 +59,10 @@ def frf(
     Returns
     -------
     xarray.Dataset
-        ``H`` (frequency, channel), complex, in the response's unit per N; ``coherence`` (frequency, channel);
+        ``H`` (frequency, channel), complex, in the response's unit per N; ``coherence`` (frequency, channel); ``error``
+        (frequency, channel), the radius around ``H`` that holds the true response with a probability of 0.9, from how
+        far the taps differ or, of one tap, from the noise before it, and from what the noise of the force takes off H1
+        (what all taps share, such as a record that ends too early, is not in it; NaN if the noise is not known);
         ``force`` (frequency), the mean amplitude spectrum [N s]; attributes ``averages``, ``method``, ``rate``. Of a
         file ``H``, and ``coherence`` if it holds one for each; of each channel ``node`` and ``direction``,
         ``reference`` and ``reference_direction`` (where it is struck), and, if the file has nodes, ``place`` and
@@ -67,7 +76,7 @@ def frf(
 
     References
     ----------
-    ISO 7626-5; Bendat and Piersol, Random Data, chapter 6.
+    ISO 7626-5; Bendat and Piersol, Random Data, chapters 6 and 9.
 
     Examples
     --------
@@ -85,25 +94,33 @@ def frf(
     check.one_of("method", method, METHODS)
     if not taps.response.shape[2]:
         raise ValueError("records must have a response channel; read them with response=")
-    force, response = taps.force.copy(), taps.response.copy()
-    time, onset = taps.time, taps.onset
+    shade = np.ones(taps.force.shape)  # (n_taps, n_times), of the force
     if force_window is not None:
-        force *= _force_window(time, onset, check.positive("force_window", force_window, "s"))
+        shade = _force_window(taps, check.positive("force_window", force_window, "s"))
+    fade = np.ones(taps.force.shape)
     if response_window is not None:
         tau = check.positive("response_window", response_window, "s")
-        fade = np.exp(-np.maximum(time - onset[:, None], 0.0) / tau)
-        force, response = force * fade, response * fade[:, :, None]
-    count = len(time) if n_times is None else check.count("n_times", n_times, low=2, high=2**24)
-    F = np.fft.rfft(force, count, axis=1)[:, :, None] / taps.rate  # (n_taps, n_frequencies, 1)
-    X = np.fft.rfft(response, count, axis=1) / taps.rate
+        fade = np.exp(-np.maximum(taps.time - taps.onset[:, None], 0.0) / tau)
+    count = len(taps.time) if n_times is None else check.count("n_times", n_times, low=2, high=2**24)
+    windows = shade * fade, fade
+    F, X = (
+        np.fft.rfft(rows * window[:, :, None], count, axis=1) / taps.rate  # (n_taps, n_frequencies, 1 or n_channels)
+        for rows, window in zip((taps.force[:, :, None], taps.response), windows)
+    )
     ff, xx, xf = (np.abs(F) ** 2).mean(0), (np.abs(X) ** 2).mean(0), (X * F.conj()).mean(0)
     tiny = np.finfo(float).tiny
     H = xf / np.maximum(ff, tiny) if method == "H1" else xx / np.where(xf == 0.0, tiny, xf.conj())
-    coherence = np.abs(xf) ** 2 / np.maximum(ff * xx, tiny)
+    coherence = np.clip(np.abs(xf) ** 2 / np.maximum(ff * xx, tiny), 0.0, 1.0)
+    rests = np.column_stack([taps.noise, _rest(taps)])  # (n_taps, 1 + n_channels)
+    noise = [(rest**2 * np.square(window).sum(axis=1, keepdims=True)).mean(axis=0) / taps.rate**2  # in every line
+             for rest, window in zip((rests[:, :1], rests[:, 1:]), windows)]  # fmt: skip
+    shares = [power / np.maximum(whole, tiny) for power, whole in zip(noise, (ff, xx))]  # of noise in force, response
+    error = np.abs(H) * (_scatter(taps.n_taps, coherence, shares) + shares[METHODS.index(method)])
     return xr.Dataset(
         {
             "H": (("frequency", "channel"), H),
-            "coherence": (("frequency", "channel"), np.clip(coherence, 0.0, 1.0)),
+            "coherence": (("frequency", "channel"), coherence),
+            "error": (("frequency", "channel"), error),
             "force": ("frequency", np.sqrt(ff[:, 0]), {"units": "N s"}),
         },
         {
@@ -118,11 +135,31 @@ def frf(
     )  # fmt: skip
 
 
-def _force_window(time: np.ndarray, onset: np.ndarray, length: float) -> np.ndarray:
-    """One around every tap, zero elsewhere, (n_taps, n_times)."""
-    x = (time - onset[:, None]) / length
-    fall = np.clip((x - 0.75) / 0.25, 0.0, 1.0)  # its last quarter falls as a cosine, so that no edge is heard
-    return np.where(x < -0.1, 0.0, 0.5 + 0.5 * np.cos(np.pi * fall))
+def _force_window(taps: Taps, length: float) -> np.ndarray:
+    """One around every pulse of every tap, zero elsewhere, (n_taps, n_times)."""
+    found = np.zeros(taps.force.shape)
+    for row, onset, pulses in zip(found, taps.onset, taps._pulses):
+        for start in (onset, *(first / taps.rate for first, _ in pulses if first > onset * taps.rate)):
+            x = (taps.time - start) / length
+            fall = np.clip((x - 0.75) / 0.25, 0.0, 1.0)  # its last quarter falls as a cosine, so that no edge is heard
+            np.maximum(row, np.where(x < -0.1, 0.0, 0.5 + 0.5 * np.cos(np.pi * fall)), out=row)
+    return found
+
+
+def _rest(taps: Taps) -> np.ndarray:
+    """Standard deviation of each response before its tap, (n_taps, n_channels); NaN where that is too short."""
+    ends = (taps.onset * taps.rate).astype(int) - triggers.GUARD
+    short = np.full(taps.response.shape[2], np.nan)
+    return np.array([rows[:n].std(axis=0) if n >= triggers.FEWEST else short for rows, n in zip(taps.response, ends)])
+
+
+def _scatter(n_taps: int, coherence: np.ndarray, shares: list[np.ndarray]) -> np.ndarray:
+    """Radius over the response, by how far the taps differ or, of one tap, by the shares of its noise."""
+    if n_taps == 1:
+        return np.sqrt(-np.log(1.0 - SURE) * (shares[0] + shares[1]))
+    freedom = 2 * n_taps - 2
+    apart = (1.0 - coherence) / np.maximum(coherence, np.finfo(float).tiny)
+    return np.sqrt(f.ppf(SURE, 2, freedom) * 2.0 / freedom * apart)
 
 
 def mac(first: Any, second: Any) -> np.ndarray:

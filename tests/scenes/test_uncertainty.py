@@ -6,10 +6,12 @@ import numpy as np
 import pytest
 import xarray
 from numpy.testing import assert_allclose
+from scenes import SMALL
 from scipy import stats
 
 import fem_impact as fi
 from fem_impact import cli
+from fem_impact.scenes.maps import map_scene
 from fem_impact.sweeps import cases
 
 MASS, STIFFNESS = 0.1, 1e5
@@ -336,3 +338,17 @@ def test_the_prompt_complains_in_one_line_and_writes_nothing(scene, tmp_path, ca
 def test_the_numbers_checked_are_those_of_the_layers():
     table = cases.Cases(None, {}, 1e-3, band=1e3)
     assert set(table.apart(np.ones(7), np.ones(7))) == set(cases.LAYERS) - {"n_impacts", "error"}
+
+
+def test_a_spread_or_map_does_not_leave_out_what_pushes(tmp_path):
+    """A ball that its weight brings back four times would be told to hit once."""
+    pushed = SMALL.replace("[strike]", "[strike]\nmax_impacts = 4\nstriker_force = 0.05")
+    falling = SMALL.replace("[striker]", "[striker]\ngravity = 9.8").replace("[strike]", "[strike]\nmax_impacts = 4")
+    left_out, falls = r"\[strike\] striker_force must be left out here", "striker must not fall in"
+    for text, words in ((pushed, left_out), (falling, falls)):
+        path = tmp_path / "scene.toml"
+        path.write_text(text)
+        for wanted in (lambda scene: fi.spread(scene, {"striker.mass": ("lognormal", 0.03, 0.1)}, n=8),
+                       lambda scene: map_scene(scene, over={"striker.mass": [0.02, 0.03]})):  # fmt: skip
+            with pytest.raises(ValueError, match=words):
+                wanted(fi.load_scene(path))

@@ -32,7 +32,7 @@ def test_frf_of_a_file_lists_peaks_and_writes_a_table(tmp_path, capsys):
     assert cli.main(["frf", str(TAPS), "--out", str(tmp_path / "h.csv")]) == 0
     assert "m/s^2/N" in capsys.readouterr().out
     rows = np.genfromtxt(tmp_path / "h.csv", delimiter=",", skip_header=1)
-    assert rows.shape[1] == 4 and rows[-1, 0] == pytest.approx(12800.0, rel=0.01)
+    assert rows.shape[1] == 5 and rows[-1, 0] == pytest.approx(12800.0, rel=0.01)
 
 
 @pytest.mark.slow
@@ -44,9 +44,23 @@ def test_frf_of_a_scene_finds_its_modes(tmp_path, capsys):
     assert min(abs(peak - first) for peak in peaks) < 2.0  # 1 s of record resolves 1 Hz
 
 
+@pytest.mark.slow
+def test_fit_proposes_the_model_and_lists_what_was_tried(tmp_path, capsys):
+    assert cli.main(["fit", str(TAPS), "--propose", "--mass", "0.15", "--out", str(tmp_path), "--json"]) == 0
+    data = json.loads(capsys.readouterr().out)
+    assert {"linear", "Hertz"} < {each["name"] for each in data["tried"]} == set(data["compared"])
+    best = [each for each in data["tried"] if each["taken"]][-1]
+    errors = np.sqrt(np.mean(np.square(data["left_out"])))
+    assert best["left_out"] == pytest.approx(errors, rel=1e-6) and errors < 0.01  # 0.73 % measured
+    assert data["summary"][0].split()[:2] == ["model", "unknowns"] and (tmp_path / "fit.html").is_file()
+
+
 @pytest.mark.parametrize(
     "words, said",
-    [(["--unknown", "contact.stiffness=3"], "must read NAME=LOW:HIGH"), (["--unknown", "tip=1:2"], "must be one of"),
+    [(["--unknown", "contact.stiffness=3"], "must read NAME=LOW:HIGH"),
+     (["--propose", "--known", "striker.mass=0.1"], "--known must be left out beside --propose"),
+     (["--propose", "--per-tap", "striker.mass"], "--per-tap must be left out"),
+     (["--unknown", "tip=1:2"], "must be one of"),
      (["--known", "striker.mass=x"], "must read NAME=VALUE"), (["--force", "hammer"], "is no channel")],
 )  # fmt: skip
 def test_wrong_commands_say_what_is_wrong(words, said, tmp_path, capsys):

@@ -8,9 +8,8 @@ import sys
 import textwrap
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
 
-from fem_impact.show.style import BLUE, SKY, VERMILION, opened
+import fem_impact as fi
 
 sys.path.append(str(Path(__file__).parents[1]))  # of this package
 sys.path.append(str(Path(__file__).parents[2]))  # of `shared`
@@ -58,29 +57,6 @@ def percent(value: float) -> str:
     return f"{100.0 * value:.2g} %"
 
 
-def drawn(experiment: Experiment, verdicts: Sequence[Verdict]) -> Any:
-    """The picture of an experiment: bands and measurements over the measured number."""
-    with opened(6.4, 1.1 + 0.3 * len(verdicts)) as figure:
-        axes = figure.subplots()
-        for row, each in enumerate(verdicts):
-            value, place = each.point.value, len(verdicts) - 1 - row
-            low, middle, high = (100.0 * (x / value - 1.0) for x in (each.low, each.middle, each.high))
-            axes.barh(place, high - low, left=low, height=0.55, color=SKY, label="predicted band" if not row else None)
-            axes.plot([middle] * 2, [place - 0.27, place + 0.27], color=BLUE, label="predicted" if not row else None)
-            colour = "black" if each.inside else VERMILION
-            axes.errorbar(0.0, place, xerr=100.0 * each.own_width, fmt="o", color=colour, markersize=4.0, capsize=3.0,
-                          label="measured" if not row else None)  # fmt: skip
-        axes.set_yticks(range(len(verdicts)), [each.point.name for each in reversed(verdicts)])
-        axes.set_xlabel("difference from the measured number [%]")
-        axes.set_title(experiment.title)
-        axes.grid(axis="y", visible=False)
-        axes.use_sticky_edges = False
-        axes.margins(x=0.05)
-        axes.locator_params(axis="x", nbins=6)
-        axes.legend(loc="upper left", bbox_to_anchor=(1.0, 1.0))
-    return figure
-
-
 def inside(verdicts: Sequence[Verdict]) -> int:
     """How many points their bands hold."""
     return sum(each.inside for each in verdicts)
@@ -105,13 +81,7 @@ def section(experiment: Experiment, verdicts: Sequence[Verdict]) -> str:
     if experiment.found:
         said.append(experiment.found)
     rows = ["| | measured | predicted | band of 90 % | |", "|---|---|---|---|---|"]
-    for each in verdicts:
-        point = each.point
-        unit = f" {point.unit}" if point.unit else ""
-        rows.append(
-            f"| {point.name} | {point.value:.4g} ± {point.error:.2g}{unit} | {each.middle:.4g} | {each.low:.4g} to "
-            f"{each.high:.4g} | {'inside' if each.inside else 'outside'} |"
-        )
+    rows += [f"| {' | '.join(each.row())} |" for each in verdicts]
     text = "\n\n".join(textwrap.fill(line, LINE, break_long_words=False, break_on_hyphens=False) for line in said)
     picture = f"![{experiment.key}](../../pictures/reality_{experiment.key}.png)"
     return f"## {experiment.key.replace('_', ' ')}\n\n{text}\n\n{picture}\n\n" + "\n".join(rows) + "\n"
@@ -139,10 +109,10 @@ def main() -> None:
     judged = []
     for experiment in EXPERIMENTS:
         if not wanted or any(experiment.key.startswith(name) for name in wanted):
-            verdicts = judge(experiment)
-            judged.append((experiment, verdicts, at_first_look(experiment, verdicts)))
+            found = judge(experiment)
+            judged.append((experiment, found.verdicts, at_first_look(experiment, found.verdicts)))
             print(counted(*judged[-1]), flush=True)
-            shared.save(shared.PICTURES / f"reality_{experiment.key}.png", drawn(experiment, verdicts), dpi=100)
+            shared.save(shared.PICTURES / f"reality_{experiment.key}.png", fi.figures.against(found), dpi=100)
     if not wanted:
         PAGE.write_text(written(judged), encoding="utf-8")
 

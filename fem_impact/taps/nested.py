@@ -1,0 +1,111 @@
+"""Smaller models inside a larger one: the larger one begins where they end, too, and is never worse."""
+
+from contextlib import suppress
+from dataclasses import replace
+from typing import NamedTuple
+
+import numpy as np
+
+from .._base.check import SimulationError
+from . import solver
+from .solver import NEARLY, Data, Problem, Solution
+from .unknowns import DAMPING, TIME
+
+SHARES = 0.2, 0.5, 0.8  # [-] of the frequencies that shape a pulse, where a mode that does not move yet begins
+# values with which unknowns of the hammer and of modes change nothing; infinity and zero are the ends of their ranges
+NEUTRAL = {
+    "first_frequency": np.inf, "mode_ratio": 0.0, "tip_mass": 0.0, "mass": np.inf, "damping": DAMPING, "gain": 1.0,
+}  # fmt: skip
+
+
+class Inner(NamedTuple):
+    """A smaller model and its best fit."""
+
+    name: str  # what it lacks
+    problem: Problem
+    x: np.ndarray
+
+    def among(self, taps: list[int], data: Data) -> "Inner":
+        """The same for some of its taps, as a larger problem holds and weighs them."""
+        return self._replace(problem=replace(self.problem, data=data, _last={}), x=self.x[self.problem.kept(taps)])
+
+
+def without(problem: Problem) -> tuple[str, Problem] | None:
+    """The problem without its last unknown mode or, if there is none, without the mode of a rigid hammer; its name."""
+    modes = [each.name.partition(".")[0] for each in problem.setting.unknown if each.name.startswith("mode")]
+    springy = any(each.name == "striker.first_frequency" for each in problem.setting.unknown)
+    if modes:
+        last = max(modes)
+        lost = [each.name for each in problem.setting.unknown if each.name.startswith(last)]
+    elif springy and problem.setting.striker.modes.n_modes == 1:
+        last, lost = "springy head", [f"striker.{part}" for part in ("first_frequency", "mode_ratio", "damping")]
+    else:
+        return None
+    names = tuple(each for each in problem.setting.unknown if each.name not in lost)
+    free = tuple(each for each in problem.free if each.name not in lost)
+    fixed = {name: value for name, value in problem.fixed.items() if not name.startswith(last)}
+    own = tuple(name for name in problem.own if name not in lost)
+    if not free:
+        return None
+    return last, replace(
+        problem, setting=replace(problem.setting, unknown=names), free=free, fixed=fixed, own=own, _last={}
+    )
+
+
+def embedded(problem: Problem, inner: Inner) -> list[np.ndarray]:
+    """Coordinates of a larger problem for the same taps at the best fit of a smaller one; several if a mode is new."""
+    small, x, n_taps = inner.problem, inner.x, problem.data.n_taps
+    values = _neutral(small, [each.name for each in problem.setting.unknown]) | small.values(x)
+    values[TIME] = problem.setting.contact_time(values)
+    low, high = (bound[: problem.n_shared] for bound in problem.bounds)
+    begun = []
+    for share in SHARES if any(each.name not in values for each in problem.free) else SHARES[:1]:
+        shared = low + share * (high - low)
+        for i, each in enumerate(problem.free):
+            if each.name in values:
+                with np.errstate(divide="ignore"):
+                    shared[i] = np.clip(each.inside(values[each.name]), low[i], high[i])
+            elif each.name.endswith(".frequency"):
+                ends = np.clip(np.log(np.array(solver.FELT) / values[TIME]), low[i], high[i])
+                shared[i] = ends[0] + share * (ends[1] - ends[0])
+        apart = dict(zip(_owners(small), small.apart(x)))
+        rest = [apart.get(name, np.zeros(n_taps)) for name in _owners(problem)]
+        begun.append(np.concatenate([shared, x[small.n_shared : small.n_shared + 2 * n_taps], *rest]))
+    return begun
+
+
+def _owners(problem: Problem) -> list[str]:
+    """The names of `Problem.own` in the order of the coordinates."""
+    return [each.name for each in problem.free if each.name in problem.own]
+
+
+def _neutral(small: Problem, names: list[str]) -> dict[str, float]:
+    """Values of names with which they change nothing in a smaller model that does not have them, if there are any."""
+    found = {}
+    for name in names:
+        home, _, part = name.partition(".")
+        if home == "contact":
+            found[name] = float(getattr(small.setting.contact, part))
+        elif name == "striker.mass":
+            found[name] = small.setting.striker.mass
+        elif home != "target" and part in NEUTRAL:
+            found[name] = NEUTRAL[part]
+    return found
+
+
+def never_worse(
+    problem: Problem, best: Solution, inner: Inner, notes: list[str]
+) -> tuple[Problem, Solution, bool]:  # fmt: skip
+    """The larger model, from the best fit of the smaller one if its own searches ended above that; the smaller one if
+    that is no better; and whether they did. ``notes`` say so."""
+    cost = (1.0 + NEARLY) * float(np.square(inner.problem.residual(inner.x)).sum())
+    if best.cost <= cost:
+        return problem, best, False
+    for begun in embedded(problem, inner):
+        with suppress(SimulationError):
+            best = min(best, solver.solve(problem, begun), key=lambda one: one.cost)
+        if best.cost <= cost:
+            notes.append(f"the searches stuck above the model without {inner.name}, and went on from that")
+            return problem, best, True
+    notes.append(f"{inner.name}: left out, as its ranges allow no better fit than without; widen them")
+    return inner.problem, solver.solve(inner.problem, inner.x), True

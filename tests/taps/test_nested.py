@@ -1,0 +1,114 @@
+"""A larger model begins where the smaller one inside it ends, and is never worse."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hammer_taps import LAW, STRUCTURE, taps_of
+
+import fem_impact as fi
+from fem_impact.taps import nested, solver
+from fem_impact.taps.nested import Inner
+from fem_impact.taps.proposal import LOSS, STIFFNESS
+
+HAMMER = fi.Striker.rigid(0.2)
+EXPONENT = {"contact.exponent": (1.0, 4.0)}
+MODE = {"mode1.frequency": (100.0, 5e3), "mode1.mass": (0.02, 2e3)}
+MODES = {**MODE, "mode2.frequency": (100.0, 5e3), "mode2.mass": (0.02, 2e3)}
+
+
+@pytest.fixture(scope="module")
+def taps():
+    return taps_of(STRUCTURE, [0.0], noise=0.003)
+
+
+def fitted(taps, unknown, **changes):
+    return fi.fit(taps, **{"striker": HAMMER, "contact": LAW, "unknown": unknown, "starts": 1, "robust": False,
+                           "profiles": False, **changes})  # fmt: skip
+
+
+def cost(found):
+    return float(np.square(found.problem.residual(found.best.x)).sum())
+
+
+@pytest.fixture(scope="module")
+def small(taps):
+    return fitted(taps, STIFFNESS | EXPONENT)
+
+
+@pytest.mark.parametrize(
+    "more", [LOSS, MODE, {"striker.first_frequency": (500.0, 1e5), "striker.mode_ratio": (1e-4, 9)}]
+)
+def test_at_the_best_fit_of_the_smaller_model_a_larger_one_is_the_same_blow(taps, small, more):
+    """A mode of 2 tonnes, or one of a ten-thousandth at 100 kHz, moves the force by less than a thousandth."""
+    large = fitted(taps, STIFFNESS | EXPONENT | more, smaller=small)
+    inner = Inner("", small.problem, small.best.x)
+    for x in nested.embedded(large.problem, inner):
+        assert np.square(large.problem.residual(x)).sum() == pytest.approx(cost(small), rel=0.02)
+    assert cost(large) <= cost(small) * (1.0 + 1e-5)
+
+
+def test_what_one_tap_has_of_its_own_goes_along(taps):
+    small = fitted(taps, STIFFNESS, per_tap="contact.stiffness")
+    large = fitted(taps, STIFFNESS | LOSS, per_tap="contact.stiffness", smaller=small)
+    (x,) = nested.embedded(large.problem, Inner("", small.problem, small.best.x))
+    assert np.square(large.problem.residual(x)).sum() == pytest.approx(cost(small), rel=1e-6)
+
+
+def test_a_search_that_stuck_goes_on_from_the_smaller_model(small, taps):
+    large = fitted(taps, STIFFNESS | EXPONENT | LOSS)
+    x = large.best.x.copy()
+    x[0] += 0.3  # the contact time
+    stuck = replace(large.best, x=x, cost=float(np.square(large.problem.residual(x)).sum()))
+    inner = Inner("loss", small.problem, small.best.x)
+    assert stuck.cost > 2.0 * cost(small)
+    _, best, went_on = nested.never_worse(large.problem, stuck, inner, notes := [])
+    assert went_on and best.cost <= cost(small) * (1.0 + 1e-6) and "stuck above the model without loss" in notes[0]
+    _, same, went_on = nested.never_worse(large.problem, large.best, inner, notes)
+    assert same is large.best and not went_on and len(notes) == 1
+
+
+def test_a_fit_whose_own_searches_stick_says_so(taps, monkeypatch):
+    """Searches with two modes that do not leave their start: the model with one is not lost."""
+    one = fitted(taps, STIFFNESS | EXPONENT | MODE)
+    real, starts = solver.solve, nested.embedded
+
+    def lame(problem, x, iterations=solver.ENOUGH, *rest, **more):
+        return real(problem, x, 1 if problem.n_shared == 6 else iterations, *rest, **more)
+
+    def later(problem, inner):  # not in the first searches
+        monkeypatch.setattr(nested, "embedded", starts)
+        return []
+
+    monkeypatch.setattr(solver, "solve", lame)
+    monkeypatch.setattr(nested, "embedded", later)
+    two = fitted(taps, STIFFNESS | EXPONENT | MODES, smaller=one)
+    assert two.stuck and any("stuck above the model" in note for note in two.notes)
+    assert cost(two) <= cost(one) * (1.0 + 1e-4)
+
+
+@pytest.mark.slow
+def test_a_mode_that_its_range_forces_to_move_is_left_out(taps):
+    """A mode of ten times the mass of the hammer that must be where there is none."""
+    one = fitted(taps, STIFFNESS | EXPONENT | MODE)
+    forced = {"mode2.frequency": (300.0, 400.0), "mode2.mass": (0.2, 0.3)}
+    two = fitted(taps, STIFFNESS | EXPONENT | MODE | forced)
+    assert cost(two) <= cost(one) * (1.0 + 1e-3) and two.names == one.names
+    assert any(note.startswith("mode2: left out, as its ranges allow no better fit") for note in two.notes)
+
+
+def test_a_smaller_fit_of_other_taps_is_refused(taps, small):
+    with pytest.raises(ValueError, match="smaller must be a fit to the same 2 taps"):
+        fitted(taps[:2], STIFFNESS | LOSS, smaller=small)
+    with pytest.raises(ValueError, match="smaller must be a fit to the same 3 taps"):
+        fitted(taps[::-1], STIFFNESS | LOSS, smaller=small)
+
+
+def test_a_search_that_did_not_end_says_so_where_it_would_gain(taps, small, monkeypatch):
+    real = solver.solve
+    monkeypatch.setattr(solver, "solve", lambda problem, x, iterations=2, *rest, **more: real(problem, x, 2))
+    cut = fitted(taps, STIFFNESS | EXPONENT | MODE)
+    monkeypatch.undo()
+    assert any(note.startswith("the search had not ended") for note in cut.notes) and not small.notes
+    assert solver.promised(cut.problem, cut.best) > solver.PROMISED * cut.best.cost
+    assert solver.promised(small.problem, small.best) < 1e-3 * small.best.cost
