@@ -62,7 +62,7 @@ from . import plates, splitting, supports
 from .elements import ArgyrisSpace, Bent, Triangles, curvatures, inverses, numbering
 from .section import KINDS, SOFT, Plate, evaluate
 from .springs import at_facets
-from .theory import Body, Domain, Held, Points, Term, Theory
+from .theory import Domain, Held, Points, Subject, Term, Theory
 
 SHEAR = 15  # shape functions of one component of the shear strain on a triangle
 LOCAL = 21 + 2 * SHEAR  # unknowns of a triangle: w, gamma_x, gamma_y
@@ -190,14 +190,14 @@ def terms(space: MindlinSpace, points: Points, cells: np.ndarray) -> list[Term]:
     ]  # fmt: skip
 
 
-def _domain(body: Body, fields: tuple[str, ...]) -> Domain:
+def _domain(body: Subject, fields: tuple[str, ...]) -> Domain:
     found = plates.domain(body, MindlinSpace, fields)
     h = evaluate("thickness", body.section.thickness, found.frame.places(found.space.origin), "m")
     found.space.turn(found.cells, h / found.frame.length)
     return found
 
 
-def _hold(body: Body, domain: Domain) -> Held:
+def _hold(body: Subject, domain: Domain) -> Held:
     kinds = body.kinds
     thin = ["free" if kind == "free" else "hinged" for kind in kinds]  # rotations are held apart
     rim = plates.rim(body, domain, thin)
