@@ -78,24 +78,28 @@ class Body(check.Brief):
         numbers = check.array("numbers", given, (n,)).astype(int)
         if len(np.unique(numbers)) < n:
             raise ValueError("numbers must differ from node to node")
-        cells = np.zeros((0, 3), int) if self.cells is None else np.asarray(self.cells).astype(int)
-        if cells.ndim != 2 or cells.shape[1] not in (2, 3) or (cells < 0).any() or (cells >= n).any():
+        cells = np.zeros((0, 3)) if self.cells is None else check.array("cells", self.cells, (None, None))
+        if cells.shape[1] not in (2, 3) or (cells < 0).any() or (cells >= n).any() or (cells % 1.0).any():
             raise ValueError(f"cells must be rows of nodes from 0 to {n - 1}, two or three each, got {cells.shape}")
-        loads = [np.hstack([np.atleast_1d(part) for part in each]) for each in self.loads]
         static = np.zeros((n, 3, 0)) if self.static is None else self.static
         check.settle(
-            self, frequencies=frequencies, nodes=nodes, numbers=numbers, cells=cells,
+            self, frequencies=frequencies, nodes=nodes, numbers=numbers, cells=cells.astype(int),
             shapes=check.array("shapes", self.shapes, (n, 3, len(frequencies)), "kg**-0.5"),
             mass=check.positive("mass", self.mass, "kg"), damping_ratio=damping_ratios(self.damping_ratio, omega),
-            loads=check.array("loads", loads if loads else np.zeros((0, 4)), (None, 4)),
+            loads=_forces(self.loads), names=_named(self.names),
             normals=None if self.normals is None else check.array("normals", self.normals, (n, 3)),
         )  # fmt: skip
-        check.settle(self, static=check.array("static", static, (n, 3, len(self.loads)), "m"))
+        check.settle(self, static=check.array("static", static, (n, 3, None), "m"))
+        if len(self.loads) != self.static.shape[2]:
+            raise ValueError(
+                f"loads must be given as (node number, force) for each of {self.static.shape[2]} static solutions, got "
+                f"{len(self.loads)}"
+            )
         for name, number in (*self.names.items(), *(("loads", number) for number in self.loads[:, 0].tolist())):
             if number not in self._row:
                 raise ValueError(f"{name!r} must be a node of the body, got {number:g}; {self._known}")
         if self.normals is None:
-            check.settle(self, normals=_normals(nodes, cells))
+            check.settle(self, normals=_normals(nodes, self.cells))
         check.lock_arrays(self)
 
     @classmethod
@@ -138,7 +142,7 @@ class Body(check.Brief):
             static = [each["static"] for each in (told, found) if "static" in each]
             found = {name: value for name, value in found.items() if value.size or name not in told}
             told |= found | ({"static": np.concatenate(static, axis=2)} if static else {})
-        scale = np.asarray(told.pop("modal_mass", 1.0) if modal_mass is None else modal_mass, float)
+        scale = told.pop("modal_mass", None) if modal_mass is None else modal_mass
         if "names" in told:
             told["names"] = dict(zip(told["names"].tolist(), told.pop("named").tolist()))
         if "cells" not in told:
@@ -146,9 +150,13 @@ class Body(check.Brief):
         given = {"mass": mass, "loads": loads, "damping_ratio": damping_ratio, "names": names, "normals": normals}
         told |= {name: value for name, value in given.items() if value is not None}
         _complete(told)
-        frequencies = _without_rounding(np.asarray(told["frequencies"], float))
-        order = np.argsort(frequencies, kind="stable")
-        told |= {"frequencies": frequencies[order], "shapes": (told["shapes"] / np.sqrt(scale))[:, :, order]}
+        order = np.argsort(told["frequencies"], kind="stable")
+        if scale is not None:
+            scale = check.array("modal_mass", scale, (len(order),), "kg")
+            if scale.min() <= 0.0:
+                raise ValueError(f"modal_mass must be positive, got {scale.min():g} kg")
+            told["shapes"] = told["shapes"] / np.sqrt(scale)
+        told |= {"frequencies": _without_rounding(told["frequencies"][order]), "shapes": told["shapes"][:, :, order]}
         return cls(**{name: told[name] for name in (each.name for each in fields(cls)) if name in told})
 
     def save(self, path: Any) -> Path:
@@ -177,7 +185,7 @@ class Body(check.Brief):
         """Row of a node given by its number, its name or a point (3,) [m] within a thousandth of the body's size."""
         if isinstance(where, str):
             where = self.names[check.one_of("where", where, self.names)]
-        if np.ndim(where) == 0:
+        if isinstance(where, (int, float, np.number)) or where is None:
             if where not in self._row:
                 raise ValueError(f"where must be a node of the body, got {check.shown(where)}; {self._known}")
             return self._row[int(where)]
@@ -268,18 +276,34 @@ class Body(check.Brief):
         return np.einsum("tm,ndm->tnd", moved[:, moved.shape[1] - n :], self.shapes[rows])  # added rigid motions first
 
 
+def _forces(loads: Any) -> np.ndarray:
+    """Loads as (n_loads, 4), node number and force [N]."""
+    given = list(loads) if isinstance(loads, (list, tuple, np.ndarray)) else [loads]
+    found = np.zeros((len(given), 4))
+    for row, each in zip(found, given):
+        pair = each if isinstance(each, (list, tuple, np.ndarray)) else ()
+        if len(pair) not in (2, 4):
+            raise ValueError(f"loads must be pairs (node number, force (3,) in N), got {check.shown(each)}")
+        force = check.array("loads", pair[1] if len(pair) == 2 else pair[1:], (3,), "N")
+        row[0], row[1:] = check.count("loads", pair[0], low=-(10**9)) if len(pair) == 2 else pair[0], force
+        if not force.any():
+            raise ValueError("loads must not be forces of zero")
+    return found
+
+
+def _named(names: Any) -> dict[str, int]:
+    """Names of nodes, checked."""
+    if not isinstance(names, Mapping) or not all(isinstance(name, str) for name in names):
+        raise ValueError(f"names must map names to node numbers, as {{'rim': 17}}, got {check.shown(names)}")
+    return {name: check.count(f"names[{name!r}]", number, low=-(10**9)) for name, number in names.items()}
+
+
 def _complete(told: dict[str, Any]) -> None:
     """Raise ValueError if files told too little of a body."""
     if not len(told.get("frequencies", ())):
         raise ValueError("files must hold modes; ask the other program for its eigenvectors, too")
     if told.get("mass") is None:
         raise ValueError("mass must be given in kg: these files do not hold it")
-    n_static = np.asarray(told["static"]).shape[2] if "static" in told else 0
-    if n_static != len(told.get("loads", ())):
-        raise ValueError(
-            f"loads must be given as (node number, force) for each of {n_static} static solutions in the files, got "
-            f"{len(told.get('loads', ()))}"
-        )
 
 
 def _without_rounding(frequencies: np.ndarray) -> np.ndarray:

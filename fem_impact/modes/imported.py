@@ -3,6 +3,7 @@
 import contextlib
 import tempfile
 import warnings
+import zipfile
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -18,7 +19,7 @@ KINDS = {
     ".unv": ("a universal file", "modes.universal_files:arrays"),
     ".op2": ("results of Nastran", "modes.imported:nastran"),
     ".frd": ("results of CalculiX", "modes.imported:calculix"),
-    ".npz": ("arrays of NumPy", "modes.imported:archive"),
+    ".npz": ("arrays of NumPy", ""),
 }
 LINE = 3  # vtk's code
 # vtk's codes of Nastran's elements, corners alone: their surface is drawn and struck, not computed with
@@ -50,6 +51,8 @@ def read(files: Any) -> list[dict[str, Any]]:
 def _one(path: Path, decks: Sequence[Path]) -> dict[str, np.ndarray]:
     ending = path.suffix.lower()
     kind, reader = KINDS[ending]
+    if not reader:
+        return archive(path)
     path = path.resolve()
     own = [str(deck.resolve()) for deck in decks if deck.suffix.lower() in DECKS.get(ending, ())]
     return isolated.read(path, kind, reader, *own[:1])
@@ -57,8 +60,11 @@ def _one(path: Path, decks: Sequence[Path]) -> dict[str, np.ndarray]:
 
 def archive(path: Path) -> dict[str, np.ndarray]:
     """A body saved by `Body.save`, or arrays under the names of its fields."""
-    with np.load(path, allow_pickle=False) as found:
-        return {name: found[name] for name in (*FIELDS, "names", "named") if name in found}
+    try:
+        with np.load(path, allow_pickle=False) as found:
+            return {name: found[name] for name in (*FIELDS, "names", "named") if name in found}
+    except (OSError, ValueError, TypeError, EOFError, zipfile.BadZipFile) as error:
+        raise ValueError(f"{path.name} cannot be read as arrays of NumPy ({check.line(str(error))})") from None
 
 
 def nastran(path: Path, deck: str = "") -> dict[str, np.ndarray]:

@@ -144,7 +144,9 @@ def test_rounding_of_rigid_motions_is_none(tmp_path):
         ({"numbers": np.ones(63)}, "numbers must differ"),
         ({"cells": [[0, 1, 63]]}, "cells must be rows of nodes from 0 to 62"),
         ({"names": {"rim": 99}}, "'rim' must be a node of the body, got 99"),
-        ({"loads": [(1, (0.0, 0.0, 1.0))]}, r"static must have shape \(63, 3, 1\)"),
+        ({"loads": [(1, (0.0, 0.0, 1.0))]}, "loads must be given as .* for each of 0 static solutions, got 1"),
+        ({"loads": [(1, 2.0)]}, r"loads must have shape \(3\)"),
+        ({"names": {"rim": "a"}}, r"names\['rim'\] must be"),
     ],
 )
 def test_what_is_no_body_is_refused(change, text):
