@@ -147,7 +147,8 @@ def things() -> dict[str, Any]:
     triangle = fi.Body(**known_body)
     triangle.save(folder / "body")
     return {
-        "body": known_body, "triangle": triangle, "map": few, "taps": taps, "responses": responses, "file of taps": folder / "taps.npz", "bar": bar,
+        "body": known_body, "triangle": triangle,
+        "map": few, "taps": taps, "responses": responses, "file of taps": folder / "taps.npz", "bar": bar,
         "metal": metal, "plate": plate, "beam": beam, "square": square, "modes": modes, "striker": striker, "law": law,
         "sphere": fi.Striker.sphere(metal, 0.01), "free": fi.Modes.rigid(1.0), "folder": folder, "path": path,
         "system": fi.assemble(square, plate, {"boundary": "hinged"}), "scene": scene, "uff": uff, "mesh": mesh,
