@@ -220,6 +220,11 @@ class Body(check.Brief):
             modes left out yield is estimated, and a blow there counts the error of that estimate and says so.
         """
         ways = self._ways(direction)
+        if free and ways[:, self.axes].any():
+            raise ValueError(
+                "free must be False or left out: nothing but a flat body struck across tells its rigid motions; give "
+                "them as modes of 0 Hz instead"
+            )
         kept = np.flatnonzero(ways.any(axis=1))
         place = np.full(len(self.nodes), -1)
         place[kept] = np.arange(len(kept))

@@ -163,7 +163,7 @@ class Modes(check.Brief):
         if compliance is not None:
             static = check.array("compliance", compliance, (len(points), len(known)), "m/N")
         if len(known) < len(points) and not complete and omega[-1] > 0.0:
-            rest = np.column_stack(unstated.left_out(omega, values, mass, points.shape[1]))
+            rest = np.column_stack(unstated.left_out(omega, values, mass, unstated.unfolded(points).shape[1]))
             rest[known] = 0.0
         flexible = omega > 0.0
         yields = values[:, flexible] / omega[flexible]

@@ -236,7 +236,9 @@ class SampledShapes(Shapes, check.Locked):
 
 def loose_motions(points: np.ndarray, cells: np.ndarray | None, values: np.ndarray, mass: float, free: Any) -> Any:
     """Rigid motions (n_points, n) that modes without any may lack; None if these are the modes of a held body."""
-    share, rigid = unstated.carried(points, cells, values, mass), unstated.rigid_motions(points, cells, mass)
+    flat = unstated.unfolded(points)
+    own = cells if flat is points else None
+    share, rigid = unstated.carried(flat, own, values, mass), unstated.rigid_motions(points, cells, mass)
     if free:
         if share >= unstated.HELD:
             raise ValueError(

@@ -16,6 +16,7 @@ SPREAD = 2.0
 # [-] where an edge is near, the estimates differ, and the truth may lie outside by as much, but not by more than this:
 # shapes that go over to those of the middle of the body overshoot them by at most two
 OUTSIDE = 2.0
+FLAT = 1e-6  # [-] of their extent, by which points may be off a line or a plane: as many digits as files keep
 HELD = (
     0.25  # [-] of the mass that moves along in one mode of a held body: at least 0.48 in the first of a clamped plate
 )
@@ -54,6 +55,15 @@ def left_out(omega: np.ndarray, rows: np.ndarray, mass: float, dimension: int) -
     low, high = low / outside * max(0.0, 1.0 - spread), high * outside * (1.0 + spread)
     low[still] = high[still] = 0.0
     return 0.5 * (low + high), 0.5 * (high - low)
+
+
+def unfolded(points: np.ndarray) -> np.ndarray:
+    """Coordinates of points along the line or in the plane on which they lie; the points themselves if on none."""
+    if points.shape[1] < 2 or len(points) < 2:
+        return points
+    _, size, axes = np.linalg.svd(points - points.mean(axis=0), full_matrices=False)
+    n = max(1, int((size > FLAT * size[0]).sum()))
+    return points if n == points.shape[1] else points @ axes[:n].T
 
 
 def rigid_motions(points: np.ndarray, cells: np.ndarray | None, mass: float) -> np.ndarray | None:

@@ -3,10 +3,11 @@
     python studies/verification/from_elsewhere.py [--blows 40] [--out DIR]
 
 Free steel bars and hinged steel plates of random size are cut to a few of their own modes and come back by each road:
-arrays, a universal file, and frequency responses of a tap on the bench. Each is struck at a random point by a random
-mass, in contacts from a fifth of the period of the fifth mode to six of its periods. The truth is the same body with
-many modes and its static compliance, by closed forms. "Covered": the error stated is at least the true one. "Silent":
-the truth is off by more than the tolerance, which was said to be met. Prints a table and writes a CSV.
+arrays, a universal file, a `Body` turned in space, and frequency responses of a tap on the bench. Each is struck at a
+random point by a random mass, in contacts from a fifth of the period of the fifth mode to six of its periods. The truth
+is the same body with many modes and its static compliance, by closed forms. "Covered": the error stated is at least the
+true one. "Silent": the truth is off by more than the tolerance, which was said to be met. Prints a table and writes a
+CSV.
 """
 
 import sys
@@ -16,6 +17,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 import fem_impact as fi
 
@@ -26,7 +28,7 @@ TOLERANCE = 1e-2
 MANY = {"bar": 300, "plate": 1500}  # modes of the truth
 STEEL = fi.Material(E=210e9, nu=0.3, rho=7850.0)
 COUNTS = 5, 8, 20, 100  # modes that come back, the rigid motions of a bar not counted
-ROADS = "arrays", "unsaid", "static", "file", "responses"
+ROADS = "arrays", "unsaid", "static", "file", "turned", "responses"
 NOISE = 1e-4  # [-] of the largest value of each channel
 DAMPING = {"responses": 0.01}  # [-] damping ratio of the body on the bench; without any it would ring on
 
@@ -66,12 +68,22 @@ def brought_back(road: str, whole: fi.Modes, few: fi.Modes, points: np.ndarray, 
         with tempfile.TemporaryDirectory() as folder:
             fi.export.write_uff(Path(folder) / "body.uff", few)
             return fi.Modes.from_uff(Path(folder) / "body.uff", mass=few.mass)
+    if road == "turned":
+        return turned(few, points).modes("z" if few.dimension == 1 else "normal")
     if road == "responses":
         return tapped(whole, few, points, at)
     first = few.n_rigid if road == "unsaid" else 0
     static = {"compliance": whole.shapes.compliance(points)} if road == "static" else {}
     shapes = few.shape_at(points)[:, first:]
     return fi.Modes.from_arrays(few.frequencies[first:], shapes, points=points, mass=few.mass, **static)
+
+
+def turned(few: fi.Modes, points: np.ndarray) -> fi.Body:
+    """The body in three dimensions, turned about all axes if it is a plate, and about the blow if it is a bar."""
+    turn = Rotation.from_euler("zyx", [0.4, *([0.0, 0.0] if few.dimension == 1 else [1.1, -0.3])]).as_matrix()
+    nodes = np.column_stack([points, np.zeros((len(points), 3 - points.shape[1]))])
+    shapes = np.einsum("i,nm->nim", turn[:, 2], few.shape_at(points))
+    return fi.Body(few.frequencies, shapes, nodes @ turn.T, few.mass)
 
 
 def tapped(whole: fi.Modes, few: fi.Modes, points: np.ndarray, at: np.ndarray) -> fi.Modes:
@@ -98,10 +110,12 @@ def blow(seed: int, kind: str, n_modes: int, road: str) -> tuple[fi.Response, fl
     if road == "file":  # a file holds the nodes of a mesh of its own
         nodes = few.shapes.grid()[0]
         at = nodes[np.linalg.norm(nodes - at, axis=1).argmin()]
+    known = brought_back(road, whole, few, points, at)
+    place = at if road != "turned" else known.shapes.grid()[0][np.linalg.norm(points - at, axis=1).argmin()]
     striker = fi.Striker.rigid(whole.mass * 10.0 ** rng.uniform(-1.5, 0.0))
     duration = 10.0 ** rng.uniform(-0.7, 0.8) / whole.frequencies[whole.n_rigid + 4]
     law = fi.Contact.linear(striker.mass * (np.pi / duration) ** 2)
-    found = struck(brought_back(road, whole, few, points, at), striker, law, at)
+    found = struck(known, striker, law, place)
     truth = struck(whole, striker, law, at, 1e-4)
     return found, max(0.0, apart(found, truth) - truth.error.total)
 

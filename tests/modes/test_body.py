@@ -99,6 +99,23 @@ def test_unit_loads_count_along_their_direction_alone():
     assert_allclose(between, known.shapes.deflection(at, np.array([body.at(18)])).T)  # reciprocity
 
 
+def test_a_flat_body_turned_in_space_is_known_as_well_as_before():
+    """The same interval of what is left out, and the same sign that it is held."""
+    plate, points = hinged(12)
+    turn = Rotation.from_euler("xyz", [0.3, -1.1, 2.0]).as_matrix()
+    flat, turned = (body_of(plate, points, turn=each) for each in (None, turn))
+    one, two = flat.modes("normal"), turned.modes("normal")
+    assert one.unstated == two.unstated == ("compliance",)
+    for number in (10, 20):
+        here, there = np.array([flat.at(number)]), np.array([turned.at(number)])
+        assert_allclose(one.shapes.compliance_error(here), two.shapes.compliance_error(there), rtol=1e-9)
+    bar, points = free_bar(5)
+    elastic = fi.Body(bar.frequencies[2:], body_of(bar, points).shapes[:, :, 2:], body_of(bar, points).nodes, bar.mass)
+    assert elastic.modes("z", free=True).n_rigid == 2
+    with pytest.raises(ValueError, match="give them as modes of 0 Hz"):
+        elastic.modes("x", free=True)
+
+
 def test_strike_points_by_number_name_and_place():
     plate, points = hinged(5)
     body = body_of(plate, points, names={"corner": 623}, numbers=np.arange(1, 64) * 10 - 7)
