@@ -29,6 +29,7 @@ from .model.planner import strike as strike
 from .model.playing import strokes as strokes
 from .modes import analytic as analytic
 from .modes.air import in_air as in_air
+from .modes.body import Body as Body
 from .modes.modal import Modes as Modes
 from .modes.modal import find_modes as find_modes
 from .modes.modal import rayleigh as rayleigh

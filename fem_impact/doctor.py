@@ -35,6 +35,8 @@ EXTRAS: dict[str, tuple[str, ...]] = {  # extra: its purpose and the modules it 
     "cad": ("drawings", "svgelements", "ezdxf"),
     "film": ("films as MP4 files", "imageio_ffmpeg"),
     "uff": ("universal files", "pyuff"),
+    "nastran": ("results of Nastran", "pyNastran"),
+    "calculix": ("results of CalculiX", "pyvista_frd"),
     "cluster": ("clusters and stores", "distributed", "zarr"),
     "hdf5": ("meshes in HDF5", "h5py"),
     "completion": ("shell completion", "shtab"),

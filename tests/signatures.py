@@ -141,7 +141,14 @@ def things() -> dict[str, Any]:
         {"H": (("frequency", "channel"), H[:, None])},
         {"frequency": frequency, "channel": ["a"], "units": ("channel", ["m/s^2/N"])},
     )
+    corners = [(0.0, 0.0, 0.0), (0.3, 0.0, 0.0), (0.0, 0.2, 0.0)]
+    known_body = {"frequencies": [110.0], "shapes": np.ones((3, 3, 1)), "nodes": corners, "mass": 1.0,
+        "damping_ratio": 0.01, "numbers": [1, 2, 3], "cells": [[0, 1, 2]], "normals": [[0.0, 0.0, 1.0]] * 3,
+        "names": {"corner": 1}, "static": np.full((3, 3, 1), 1e-5), "loads": [(1, (0.0, 0.0, 1.0))]}  # fmt: skip
+    triangle = fi.Body(**known_body)
+    triangle.save(folder / "body")
     return {
+        "body": known_body, "triangle": triangle,
         "map": few, "taps": taps, "responses": responses, "file of taps": folder / "taps.npz", "bar": bar,
         "metal": metal, "plate": plate, "beam": beam, "square": square, "modes": modes, "striker": striker, "law": law,
         "sphere": fi.Striker.sphere(metal, 0.01), "free": fi.Modes.rigid(1.0), "folder": folder, "path": path,
@@ -223,9 +230,16 @@ def stated() -> dict[str, dict[str, Any]]:
         "ritz_modes": {"system": t["system"], "points": [at], "max_frequency": 2e3, "n_vectors": 20,
             "damping_ratio": 0.01},
         "Response.on": {"self": t["hit"], "modes": t["modes"]},
+        "Body": t["body"],
+        "Body.load": {"files": t["folder"] / "body.npz", "mass": 1.0, "loads": [(1, (0.0, 0.0, 1.0))],
+            "damping_ratio": 0.01, "modal_mass": [1.0], "names": {"a": 1}, "normals": [[0.0, 0.0, 1.0]] * 3},
+        "Body.save": {"self": t["triangle"], "path": t["folder"] / "again"},
+        **alike("Body.node Body.at", {"self": t["triangle"], "where": 1}),
+        "Body.modes": {"self": t["triangle"], "direction": (0.0, 0.0, 1.0), "free": False},
+        "Body.displacement": {"self": t["triangle"], "q": [[1.0]], "where": [(0.0, 0.0, 0.0)]},
         "Modes.from_arrays": {"frequencies": [0.0, 10.0], "shapes": [[1.0, 0.5], [1.0, -0.5]],
             "points": [[0.0, 0.0], [0.1, 0.1]], "mass": 1.0, "damping_ratio": 0.01,
-            "compliance": [[1e-3, 0.0], [0.0, 1e-3]], "cells": [[0, 1, 1]], "free": False},
+            "compliance": [[1e-3, 0.0], [0.0, 1e-3]], "cells": [[0, 1, 1]], "free": False, "loads": [0, 1]},
         "Modes.from_frf": {"frf": t["responses"], "mass": 1.0, "points": [[0.0]], "driving": 0, "frequencies": [100.0],
             "free": False},
         "Modes.from_uff": {"path": t["uff"], "mass": 0.2, "free": False},

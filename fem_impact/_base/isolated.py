@@ -19,7 +19,10 @@ from . import check, child
 
 PATIENCE = 8.0  # [s] time limit for a small file: a valid file of 1 MB takes less than a tenth of this
 MEMORY = 2 << 30  # [byte] limit on the reader's address space; Python and numpy alone use 0.2 GB
-EXTRAS = {"svgelements": "cad", "ezdxf": "cad", "pyuff": "uff", "h5py": "hdf5"}  # library -> extra
+EXTRAS = {  # library -> extra
+    "svgelements": "cad", "ezdxf": "cad", "pyuff": "uff", "h5py": "hdf5", "pyNastran": "nastran",
+    "pyvista_frd": "calculix",
+}  # fmt: skip
 DONE, REFUSED, TOLD = 0, 1, 3  # exit statuses; any other means the reader crashed
 
 

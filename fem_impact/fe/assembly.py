@@ -22,7 +22,7 @@ from .splitting import towards_points
 from .springs import check_masses, check_posts
 from .supports import support_of_facets
 from .system import System, notes_on
-from .theory import Body, Strain, Theory, integrals, plain_kinds, scatter
+from .theory import Strain, Subject, Theory, integrals, plain_kinds, scatter
 from .thick import MINDLIN
 
 __all__ = [
@@ -172,7 +172,7 @@ def _assembled(
     marked = np.reshape([*given, *attached.points], (-1, mesh.dimension))  # forces act here
     size = np.append(np.full(len(given), coarseness), np.ones(len(attached.points)))
     corners, fine = _graded(rules, mesh, section, supports, marked, graded, layer, size)
-    body = Body(fine, section, support_of_facets(fine, supports, rules.words), marked)
+    body = Subject(fine, section, support_of_facets(fine, supports, rules.words), marked)
     domain = rules.domain(body, rules.fields)
     held = rules.hold(body, domain)
     make = rules.matrices or (lambda _, domain: integrals(rules, domain, np.arange(len(domain.points.x))))

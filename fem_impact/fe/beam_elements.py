@@ -17,7 +17,7 @@ from .._base.untyped import Cells, Sparse
 from ..mesh.facets import powers
 from .section import Elastic
 from .springs import edge_stiffness
-from .theory import Body, Domain, Frame, Points
+from .theory import Domain, Frame, Points, Subject
 
 # [-] polynomial degree of the deflection within an element: errs by 1e-12 of a wave of 30 rad; few elements round less
 DEGREE = 32
@@ -135,7 +135,7 @@ def rounding(space: Any) -> float:
     return float(ROUNDED / max(np.abs(space.length).min(), APART) ** 3)
 
 
-def domain(body: Body, make_space: Callable[[Cells], Any], names: tuple[str, ...]) -> Domain:
+def domain(body: Subject, make_space: Callable[[Cells], Any], names: tuple[str, ...]) -> Domain:
     """The elements of a beam in its frame, with shape functions and the section's fields ``names``."""
     mesh, section = body.mesh, body.section
     low, high = mesh.points.min(axis=0), mesh.points.max(axis=0)
@@ -154,7 +154,7 @@ def domain(body: Body, make_space: Callable[[Cells], Any], names: tuple[str, ...
     return Domain.of(names, section, box, line, space, Points(np.zeros((1, x.shape[1])), x[..., None], dx))
 
 
-def ends(body: Body) -> list[tuple[bool, str | Elastic]]:
+def ends(body: Subject) -> list[tuple[bool, str | Elastic]]:
     """Whether each end of a beam is the left one, and its support."""
     left = body.mesh.points[body.mesh.facets[:, 0], 0] <= body.mesh.points.min()
     return list(zip(left.tolist(), body.held))

@@ -8,7 +8,7 @@ from . import beam_elements
 from .beam_elements import DEGREE, HermiteSpace
 from .elements import numbering
 from .section import Elastic
-from .theory import Body, Domain, Held, Points, Term, Theory, integrals, kept_unknowns, unknowns_of_cells
+from .theory import Domain, Held, Points, Subject, Term, Theory, integrals, kept_unknowns, unknowns_of_cells
 
 
 def terms(space: HermiteSpace, points: Points, cells: np.ndarray) -> list[Term]:
@@ -17,17 +17,17 @@ def terms(space: HermiteSpace, points: Points, cells: np.ndarray) -> list[Term]:
     return [Term("K", "stiffness", bend[:, :, None]), Term("M", "inertia", value[:, :, None])]
 
 
-def _domain(body: Body, fields: tuple[str, ...]) -> Domain:
+def _domain(body: Subject, fields: tuple[str, ...]) -> Domain:
     return beam_elements.domain(body, HermiteSpace, fields)
 
 
-def _matrices(body: Body, domain: Domain) -> tuple[np.ndarray, np.ndarray]:
+def _matrices(body: Subject, domain: Domain) -> tuple[np.ndarray, np.ndarray]:
     K, M = integrals(EULER, domain, np.arange(len(domain.points.x)))
     domain.space.decouple(K, M)
     return K, M
 
 
-def _hold(body: Body, domain: Domain) -> Held:
+def _hold(body: Subject, domain: Domain) -> Held:
     dofs, n_all = numbering(domain.cells, domain.space)
     fixed, sprung = np.zeros(n_all, bool), []
     for at_left, kind in beam_elements.ends(body):

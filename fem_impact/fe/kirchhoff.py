@@ -11,7 +11,7 @@ from scipy.sparse import csc_matrix
 from . import plates, residual
 from .elements import ArgyrisSpace, MorleySpace, curvatures, numbering
 from .supports import cells_of_facets, constrain
-from .theory import Body, Domain, Held, Points, Term, Theory, integrals, kept_unknowns
+from .theory import Domain, Held, Points, Subject, Term, Theory, integrals, kept_unknowns
 
 # [-] frequency error of Morley elements over (kh)**2: 0.09 to 0.16 on hinged, 0.12 to 0.33 on clamped rectangles
 MORLEY_ERROR = 0.2
@@ -23,11 +23,11 @@ def terms(space: Any, points: Points, cells: np.ndarray) -> list[Term]:
     return [Term("K", "stiffness", curvatures(hessian)), Term("M", "inertia", value[:, :, None])]
 
 
-def _domain(body: Body, fields: tuple[str, ...]) -> Domain:
+def _domain(body: Subject, fields: tuple[str, ...]) -> Domain:
     return plates.domain(body, ArgyrisSpace, fields)
 
 
-def _matrices(body: Body, domain: Domain) -> tuple[np.ndarray, np.ndarray]:
+def _matrices(body: Subject, domain: Domain) -> tuple[np.ndarray, np.ndarray]:
     """Stiffness and mass of the triangles: in closed form where the section is uniform and no side is curved."""
     space, n = domain.space, len(domain.points.x)
     K, M = np.empty((n, 21, 21)), np.empty((n, 21, 21))
@@ -40,19 +40,19 @@ def _matrices(body: Body, domain: Domain) -> tuple[np.ndarray, np.ndarray]:
     return K, M
 
 
-def _hold(body: Body, domain: Domain) -> Held:
+def _hold(body: Subject, domain: Domain) -> Held:
     rim = plates.rim(body, domain, body.kinds)
     expand, project, dofs = constrain(rim, domain.space.vertices, *numbering(domain.cells, domain.space))
     return Held(expand, project, dofs, plates.springs(body, domain, dofs, expand.shape[0]), rim)
 
 
-def _morley_domain(body: Body, fields: tuple[str, ...]) -> Domain:
+def _morley_domain(body: Subject, fields: tuple[str, ...]) -> Domain:
     if body.mesh.curved.any():
         raise ValueError("element 'morley' needs straight edges; use 'argyris', or a polygon")
     return plates.domain(body, MorleySpace, fields)
 
 
-def _hold_morley(body: Body, domain: Domain) -> Held:
+def _hold_morley(body: Subject, domain: Domain) -> Held:
     """A held facet fixes the deflection at its ends, a clamped one also the slope at its middle."""
     if body.section.tension or not all(isinstance(kind, str) for kind in body.held):
         raise ValueError("element 'morley' does not allow tension or elastic supports; use 'argyris'")

@@ -13,14 +13,14 @@ from .elements import Bent, quadrature, triangles
 from .section import PLANE
 from .springs import at_facets, edge_stiffness
 from .supports import SupportedRim, cells_of_facets, support_of_facets
-from .theory import Body, Domain, Frame, blocks, gram, scatter
+from .theory import Domain, Frame, Subject, blocks, gram, scatter
 
 # [-] smallest triangle over the extent below which eigenvalues come from the strain energy: rounding in K grows as the
 # size to the power -2, and larger triangles leave 1e-11
 TINY = 4e-3
 
 
-def domain(body: Body, make_space: Callable[[Cells, Bent | None], Any], names: tuple[str, ...]) -> Domain:
+def domain(body: Subject, make_space: Callable[[Cells, Bent | None], Any], names: tuple[str, ...]) -> Domain:
     """The triangles of a plate in its frame, with shape functions and the section's fields ``names``."""
     low, high = body.mesh.points.min(axis=0), body.mesh.points.max(axis=0)
     box = 0.5 * (low + high), float((high - low).max())
@@ -40,7 +40,7 @@ def _bent(mesh: Mesh, frame: Frame, cells: Cells) -> Bent | None:
     return Bent(curves, facets, *cells_of_facets(facets, cells.t.T), cells.t.T)
 
 
-def rim(body: Body, found: Domain, kinds: list[str]) -> SupportedRim:
+def rim(body: Subject, found: Domain, kinds: list[str]) -> SupportedRim:
     """The boundary of a plate in its frame, with supports of these kinds (n_facets,)."""
     mesh, length = body.mesh, found.frame.length
     springs = edge_stiffness(body.held, found.frame)
@@ -51,7 +51,7 @@ def rim(body: Body, found: Domain, kinds: list[str]) -> SupportedRim:
 
 
 def springs(
-    body: Body, found: Domain, dofs: np.ndarray, n_all: int, slopes: Callable[..., np.ndarray] | None = None
+    body: Subject, found: Domain, dofs: np.ndarray, n_all: int, slopes: Callable[..., np.ndarray] | None = None
 ) -> Sparse:
     """Stiffness (n_all, n_all) of elastic supports and of tension, on unknowns ``dofs`` (n_local, n_cells).
 

@@ -25,7 +25,7 @@ from .section import Beam, Varying, evaluate
 from .splitting import distance
 from .springs import at_facets
 from .supports import SIDES, cells_of_facets
-from .theory import Body, Domain, gram, scatter
+from .theory import Domain, Subject, gram, scatter
 
 CROSSINGS = 2  # [-] rings of triangles around crossings of ribs: as much error as between them
 # [-] longest side at the end of a rib inside, over its width: it acts there like a point, which would turn endlessly
@@ -165,7 +165,7 @@ class Line(NamedTuple):
     inertia: np.ndarray  # (n, n_q) [kg/m]
 
     @classmethod
-    def of(cls, rib: Rib, body: Body, domain: Domain) -> "Line":
+    def of(cls, rib: Rib, body: Subject, domain: Domain) -> "Line":
         """That of a rib of a body."""
         facets, space = sides_on(body.mesh, rib.path), domain.space
         cells = cells_of_facets(facets, space.vertices)[0]

@@ -34,7 +34,7 @@ from .elements import curvatures, numbering
 from .plane import FIRST, LOCAL, SECOND, PlaneSpace
 from .section import evaluate
 from .supports import constrain
-from .theory import Body, Domain, Held, Points, Term, Theory, blocks, gram, scatter
+from .theory import Domain, Held, Points, Subject, Term, Theory, blocks, gram, scatter
 
 # [-] rise of the middle of a side over its chord, over the thickness, above which triangles are divided: bending that
 # does not stretch a curved plate needs displacements beyond quartics there. Ten modes of a cymbal then err by 2e-3
@@ -86,7 +86,7 @@ def terms(space: ShallowSpace, points: Points, cells: np.ndarray) -> list[Term]:
     return [Term("K", "walls", strained(space, cells, area, points.x[cells])), Term("M", "inertia", moved)]
 
 
-def _domain(body: Body, fields: tuple[str, ...]) -> Domain:
+def _domain(body: Subject, fields: tuple[str, ...]) -> Domain:
     found = plates.domain(body, ShallowSpace, fields)
     space, rise = found.space, body.section.rise
     space.heights = np.zeros((len(space.origin), plane.QUARTIC))
@@ -99,7 +99,7 @@ def _domain(body: Body, fields: tuple[str, ...]) -> Domain:
     return found
 
 
-def _hold(body: Body, domain: Domain) -> Held:
+def _hold(body: Subject, domain: Domain) -> Held:
     rim, space = plates.rim(body, domain, body.kinds), domain.space
     space.lines = [ribs.Line.of(rib, body, domain) for rib in body.section.ribs]
     creased = np.unique(np.concatenate([np.zeros(0, int), *(line.facets.ravel() for line in space.lines)]))

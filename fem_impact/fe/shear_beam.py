@@ -24,7 +24,7 @@ from . import beam_elements
 from .beam_elements import DEGREE, HermiteSpace, integral_along, quadrature
 from .elements import numbering
 from .section import Elastic
-from .theory import Body, Domain, Held, Points, Term, Theory, unknowns_of_cells
+from .theory import Domain, Held, Points, Subject, Term, Theory, unknowns_of_cells
 
 BENT = DEGREE + 1  # shape functions of W on an element
 LOCAL = 2 * BENT  # of both
@@ -91,11 +91,11 @@ def terms(space: TimoshenkoSpace, points: Points, cells: np.ndarray) -> list[Ter
     return [Term(matrix, name, parts[:, :, None]) for matrix, name, parts in named]
 
 
-def _domain(body: Body, fields: tuple[str, ...]) -> Domain:
+def _domain(body: Subject, fields: tuple[str, ...]) -> Domain:
     return beam_elements.domain(body, TimoshenkoSpace, fields)
 
 
-def _hold(body: Body, domain: Domain) -> Held:
+def _hold(body: Subject, domain: Domain) -> Held:
     dofs, n_all = domain.space.numbering(numbering(domain.cells, domain.space.bend))
     (expand, project), sprung = constrain(beam_elements.ends(body), dofs, n_all)
     return Held(expand, project, dofs, beam_elements.end_springs(sprung, domain.frame, n_all))

@@ -82,7 +82,7 @@ class Term(NamedTuple):
 
 
 @dataclass(frozen=True, eq=False)
-class Body:
+class Subject:
     """What a theory is asked to describe."""
 
     mesh: Mesh
@@ -145,15 +145,15 @@ class Theory:
     name: str
     element: str
     dimension: int
-    domain: Callable[[Body, tuple[str, ...]], Domain]  # with these fields of the section
+    domain: Callable[[Subject, tuple[str, ...]], Domain]  # with these fields of the section
     terms: Callable[[Any, Points, np.ndarray], list[Term]]  # of a space in some cells (n,)
-    hold: Callable[[Body, Domain], Held]
+    hold: Callable[[Subject, Domain], Held]
     # (3, n) errors of the squared energy norm of solutions: arguments as in `residual.energy_errors`
     errors: Callable[..., np.ndarray]
     wave: float  # [rad] largest wavenumber times element size: error 1e-5, 1e-12 on beams
     unknowns: float  # [-] of an element per square, or length, of its size
     fields: tuple[str, ...] = ("stiffness", "inertia")  # of the section, that its terms weigh with
-    matrices: Callable[[Body, Domain], tuple[np.ndarray, np.ndarray]] | None = None  # where quicker than by `terms`
+    matrices: Callable[[Subject, Domain], tuple[np.ndarray, np.ndarray]] | None = None  # where quicker than by `terms`
     words: tuple[str, ...] = KINDS  # supports of an edge, besides `Elastic`
     graded: bool = False  # whether triangles shrink to corners, points and layers
     compared: bool = False  # whether its errors need a second mesh, in addition to ``errors``

@@ -63,7 +63,7 @@ from .elements import Bent, curvatures, inverses, numbering
 from .plane import FIRST, LOCAL, QUARTIC, SECOND, PlaneSpace, reference
 from .section import KINDS, SOFT, Plate, evaluate
 from .springs import at_facets
-from .theory import Body, Domain, Held, Points, Term, Theory
+from .theory import Domain, Held, Points, Subject, Term, Theory
 
 # [-] radius over which a point force is spread, over the thickness: right stress below a small load (Westergaard 1926)
 PATCH = 0.325
@@ -158,14 +158,14 @@ def terms(space: MindlinSpace, points: Points, cells: np.ndarray) -> list[Term]:
     ]  # fmt: skip
 
 
-def _domain(body: Body, fields: tuple[str, ...]) -> Domain:
+def _domain(body: Subject, fields: tuple[str, ...]) -> Domain:
     found = plates.domain(body, MindlinSpace, fields)
     h = evaluate("thickness", body.section.thickness, found.frame.places(found.space.origin), "m")
     found.space.turn(found.cells, h / found.frame.length)
     return found
 
 
-def _hold(body: Body, domain: Domain) -> Held:
+def _hold(body: Subject, domain: Domain) -> Held:
     kinds = body.kinds
     thin = ["free" if kind == "free" else "hinged" for kind in kinds]  # rotations are held apart
     rim = plates.rim(body, domain, thin)

@@ -30,7 +30,9 @@ SPARE = 1.1  # [-] modes advised over modes estimated: Weyl's law counts them on
 CAUTION = 0.5, 0.05
 # [-] modes above which other ways out are told: ten times as many as the planner finds by elements
 MOST_ADVISED = 20_000
-UNSTATED = {"compliance": "static compliance", "free": "whether it moves freely"}  # see `Modes.unstated`
+# see `Modes.unstated`
+UNSTATED = {"compliance": "static compliance", "free": "whether it moves freely", "shapes": "shapes but as picked"}
+ADVICE = {"compliance": "give the compliance", "shapes": "pick the modes from longer or cleaner responses"}
 
 
 def sentence(hit: "Response") -> str:
@@ -67,7 +69,9 @@ def remedy(hit: "Response") -> str:
     if error.truncation > allowed or not error.resolvable:
         loose = [name for name, modes in _unstated(hit) if "free" in modes.unstated]
         advice += [f"make {name} with free = True or False, as it is" for name in loose] or _more_modes(hit)
-        advice += [f"give the compliance of {name}" for name, modes in _unstated(hit) if "compliance" in modes.unstated]
+        advice += [
+            f"{ADVICE[each]} of {name}" for name, modes in _unstated(hit) for each in ADVICE if each in modes.unstated
+        ]
     if error.idealisation > allowed:
         advice.append("give target = 'modal'")
     if error.mesh > allowed:

@@ -39,7 +39,7 @@ class Ends(check.Brief):
     forms: slice = field(default_factory=lambda: slice(0))  # modes of the run that stand for these; empty for a spring
     dip_force: float = 0.0  # [N] that constant force if it makes a spring that stands for them deflect
     speed: float = 0.0  # [m/s] with which the body arrives in rigid motion, at its first point
-    doubtful: bool = False  # whether more than rounding is estimated of what is left out there
+    doubtful: bool = False  # whether more than rounding is not known of the body there
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,9 +59,17 @@ class ReducedBody:
     points: np.ndarray  # (n_ends, dimension) [m] contact points
     pressed: np.ndarray  # (2, n_ends) [N], [N/s] contact forces at the start and their rates
     loose: np.ndarray  # (n_ends, n) shapes of rigid motions that it may have besides
+    spread: np.ndarray | None = None  # (n_ends, n_modes) [-] relative error of squared shapes that were measured
     stretching: Stretching | None = None
     speed: float = 0.0  # [m/s] with which it arrives in rigid motion, at its first contact
     held: int = 0  # [-] first modes that only a hand makes swing: within a contact they move like a mass
+
+    @cached_property
+    def doubtful(self) -> bool:
+        """Whether more than rounding is not known of it."""
+        whole = self.rest.diagonal() + np.square(self.rows / np.where(self.omega > 0.0, self.omega, np.inf)).sum(axis=1)
+        estimated = (self.doubt > 2.0 * ROUNDING * whole).any()
+        return bool(self.loose.size or estimated or self.spread is not None)
 
     @cached_property
     def yields(self) -> bool:
@@ -181,6 +189,7 @@ def reduce_body(
     part = ReducedBody(
         modes.omega, modes.damping_ratio, rows, touched, rest, doubt, still, still, still, 0.0, points, pressed,
         np.zeros((n_ends, 0)) if left_out is None else modes.shapes.loose(points),
+        modes.shapes.spread(points) if n_ends else None,
     )  # fmt: skip
     check.lock_arrays(part)
     return part
@@ -258,6 +267,5 @@ def ends_of(parts: Sequence[ReducedBody], laws: Sequence[Contact]) -> tuple[Ends
         forms = slice(last, last + (part.forms(rated).shape[1] if part.yields else 0))
         last = forms.stop
         dips = part.force if part.yields and forms.start == forms.stop else 0.0
-        doubtful = bool(part.loose.size) or any(part.doubt.tolist())
-        found.append(Ends(part.points, part.touched, part.force, part.rest, forms, dips, part.speed, doubtful))
+        found.append(Ends(part.points, part.touched, part.force, part.rest, forms, dips, part.speed, part.doubtful))
     return tuple(found)

@@ -64,7 +64,8 @@ class Modes(check.Brief):
     thick: bool = field(default=False, repr=False)  # whether shear and rotary inertia are in them
     air: bool = field(default=False, repr=False)  # whether the air around the body is in them
     stretches: bool = field(default=False, repr=False)  # whether a blow lets them stretch the body, see `stretching`
-    unstated: tuple[str, ...] = field(default=(), repr=False)  # of "compliance" and "free": what nobody said of it
+    # what nobody said of it, of "compliance", "free" and, of modes that were picked, exact "shapes"
+    unstated: tuple[str, ...] = field(default=(), repr=False)
     # (n_modes,) [-] estimated error of damping ratios that were computed, by the sound radiated; None if all are stated
     damping_error: np.ndarray | None = None
 
@@ -99,6 +100,7 @@ class Modes(check.Brief):
         mass: float,
         damping_ratio: Any = 0.0,
         compliance: ArrayLike | None = None,
+        loads: ArrayLike | None = None,
         cells: ArrayLike | None = None,
         free: bool | None = None,
         complete: bool = False,
@@ -115,6 +117,9 @@ class Modes(check.Brief):
         compliance : array_like, shape (n_points, n_points) [m/N], optional
             Static compliance of the complete body, with inertia relief if it is free. Without it, what the modes left
             out yield is estimated from those given, and a blow counts the error of that estimate.
+        loads : array_like, shape (n_loads,), optional
+            Numbers of the points, from 0, of which ``compliance`` has columns, (n_points, n_loads): it is then
+            estimated at the others.
         cells : array_like, shape (n_cells, dimension + 1), optional
             Numbers of the points that lines or triangles connect, from 0; pictures need them.
         free : bool, optional
@@ -153,14 +158,16 @@ class Modes(check.Brief):
         if free and loose is not None:
             omega, damping = (np.append(np.zeros(loose.shape[1]), each) for each in (omega, damping))
             values, loose = np.hstack([loose, values]), None
-        rest = None
-        static = _carried(omega, values)
+        rest, known = None, _numbers_of_points(loads, len(points), compliance is not None)
+        static = np.zeros((len(points), 0))
         if compliance is not None:
-            static = check.array("compliance", compliance, (len(points), len(points)), "m/N")
-        elif not complete and omega[-1] > 0.0:
-            rest = np.column_stack(unstated.left_out(omega, values, mass, points.shape[1]))
-            static = static + np.diag(rest[:, 0])
-        sampled = SampledShapes(points, values, static, connected, rest, loose)
+            static = check.array("compliance", compliance, (len(points), len(known)), "m/N")
+        if len(known) < len(points) and not complete and omega[-1] > 0.0:
+            rest = np.column_stack(unstated.left_out(omega, values, mass, unstated.unfolded(points).shape[1]))
+            rest[known] = 0.0
+        flexible = omega > 0.0
+        yields = values[:, flexible] / omega[flexible]
+        sampled = SampledShapes(points, values, static, connected, rest, loose, known, yields)
         gaps = {"compliance": rest, "free": loose}
         missing = tuple(name for name, what in gaps.items() if what is not None)
         notes = damping_notes(damping, omega) + tuple(UNSTATED[name] for name in missing)
@@ -256,9 +263,12 @@ class Modes(check.Brief):
         >>> found.frequencies.round().tolist(), found.damping_ratio.round(3).tolist()
         ([120.0, 410.0], [0.02, 0.02])
         """
-        told, notes = picked.modes_of(frf, driving, points, frequencies)
+        told, errors, notes = picked.modes_of(frf, driving, points, frequencies)
         made = cls.from_arrays(**told, mass=mass, compliance=compliance, free=free)
-        return replace(made, notes=(*made.notes, *notes))
+        rigid = np.zeros((len(errors), made.n_modes - errors.shape[1]))
+        sampled: Any = made.shapes
+        shapes = replace(sampled, doubt=np.hstack([rigid, errors]))
+        return replace(made, shapes=shapes, notes=(*made.notes, *notes), unstated=(*made.unstated, "shapes"))
 
     @cached_property
     def known(self) -> Remembered:  # what was found of these modes at points where they were struck
@@ -444,6 +454,20 @@ def _carried(omega: np.ndarray, rows: np.ndarray, weight: Any = 1.0) -> np.ndarr
     flexible = omega > 0.0
     scaled = rows[:, flexible] / omega[flexible]
     return (weight * scaled) @ scaled.T
+
+
+def _numbers_of_points(loads: Any, n_points: int, given: bool) -> np.ndarray:
+    """Numbers of the points under the loads of a given compliance."""
+    if loads is None:
+        return np.arange(n_points if given else 0)
+    numbers = check.array("loads", loads, (None,)).astype(int)
+    wrong = not len(numbers) or (numbers < 0).any() or (numbers >= n_points).any()
+    if wrong or not given or len(np.unique(numbers)) < len(numbers):
+        raise ValueError(
+            f"loads must be different numbers of points from 0 to {n_points - 1} with a column of compliance each, got "
+            f"{check.shown(loads)}"
+        )
+    return numbers
 
 
 def left_out(modes: "Modes", place: np.ndarray, rows: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

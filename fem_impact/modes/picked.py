@@ -30,6 +30,7 @@ class Picked(NamedTuple):
     damping_ratio: np.ndarray  # (n_modes,)
     products: np.ndarray  # (n_channels, n_modes) [1/kg]
     errors: np.ndarray  # (n_channels, n_modes) [1/kg]
+    misfit: np.ndarray  # (n_channels, n_modes) [-] what is left of the responses at each peak, over the mode's share
     left: float  # [-] root mean square that they leave of the responses, each frequency by its weight
 
 
@@ -106,7 +107,23 @@ def pick(name: str, found: Any, about: Any = None) -> Picked:
     natural, damping = np.exp(poles)
     damping = np.maximum(damping - float(found.attrs.get("added_damping", 0.0)) / natural, 0.0)  # that of a window
     left = float(np.linalg.norm(rest) / max(float(np.linalg.norm(data)), 1e-300))
-    return Picked(natural / (2.0 * np.pi), damping, constants[:n].T, spread[:n].T, left)
+    misfit = _misfit(omega, np.exp(poles), basis[:, :n], constants[:n], rest)
+    return Picked(natural / (2.0 * np.pi), damping, constants[:n].T, spread[:n].T, misfit, left)
+
+
+def _misfit(
+    omega: np.ndarray, poles: np.ndarray, basis: np.ndarray, products: np.ndarray, rest: np.ndarray
+) -> np.ndarray:
+    """What is left within half a half-power width of each peak over the mode's own share, (n_channels, n_modes) [-].
+
+    It errs in step over a peak, where noise would not, so that it does not average out.
+    """
+    found = np.zeros((rest.shape[1], len(products)))
+    for k, (natural, damping) in enumerate(poles.T):
+        near = np.tile(np.abs(omega - natural) <= max(damping * natural, np.abs(omega - natural).min()), 2)
+        own = np.linalg.norm(basis[near, k]) * np.abs(products[k])
+        found[:, k] = np.linalg.norm(rest[near], axis=0) / np.maximum(own, 1e-300)
+    return found
 
 
 class _Modes(NamedTuple):
@@ -207,8 +224,11 @@ def _damping(omega: np.ndarray, size: np.ndarray, i: int) -> float:
     return float(np.clip(0.5 * (omega[right] - omega[left]) / omega[i], 10.0 * DAMPING[0], 0.1 * DAMPING[1]))
 
 
-def modes_of(found: Any, driving: Any, points: Any, about: Any) -> tuple[dict[str, Any], list[str]]:
-    """Frequencies, damping ratios, mass-normalised shapes and points of `Modes.from_frf`, and notes."""
+def modes_of(found: Any, driving: Any, points: Any, about: Any) -> tuple[dict[str, Any], np.ndarray, list[str]]:
+    """Frequencies, damping ratios, mass-normalised shapes and points of `Modes.from_frf`; errors of shapes; notes.
+
+    The errors (n_points, n_modes) are relative, of squared shapes.
+    """
     picked = pick("frf", found, about)
     drive, used, sign, end = _ends(found, driving)
     products = sign[:, None] * picked.products[used]
@@ -225,10 +245,11 @@ def modes_of(found: Any, driving: Any, points: Any, about: Any) -> tuple[dict[st
     if not told.all():
         lost = ", ".join(f"{one:.5g} Hz" for one in picked.frequencies[~told])
         notes.append(f"modes at {lost} are left out: the point struck hardly moves in them, so that they have no scale")
+    errors = np.hypot(picked.errors[used] / np.maximum(np.abs(products), 1e-300), picked.misfit[used])
     return {
         "frequencies": picked.frequencies[told], "damping_ratio": picked.damping_ratio[told],
         "shapes": products[:, told] / np.sqrt(own[told]), "points": _points(found, points, used, end),
-    }, notes  # fmt: skip
+    }, errors[:, told], notes  # fmt: skip
 
 
 def _label(found: Any, i: int) -> str:

@@ -2,9 +2,11 @@
 
 from abc import abstractmethod
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from typing import Any, Protocol
 
 import numpy as np
+from scipy.spatial import KDTree
 
 from .._base import check
 from .._base.remembered import Remembered
@@ -45,6 +47,10 @@ class Shapes(Protocol):
     def loose(self, points: np.ndarray) -> np.ndarray:
         """Shapes (n_points, n) [kg**-0.5] of rigid motions that the modes lack if nothing holds the body."""
         return np.zeros((len(points), 0))
+
+    def spread(self, points: np.ndarray) -> np.ndarray | None:
+        """Relative error (n_points, n_modes) [-] of squared shapes that were measured; None if it is not known."""
+        return None
 
     def take(self, n_modes: int) -> "Shapes":
         """The same body with its first ``n_modes`` modes only."""
@@ -121,6 +127,9 @@ class ScaledShapes(Shapes, check.Brief):
     def loose(self, points: np.ndarray) -> np.ndarray:
         return self.amplitude * self.base.loose(points)
 
+    def spread(self, points: np.ndarray) -> np.ndarray | None:
+        return self.base.spread(points)
+
     def take(self, n_modes: int) -> "ScaledShapes":
         return replace(self, base=self.base.take(n_modes))
 
@@ -158,21 +167,27 @@ class SampledShapes(Shapes, check.Locked):
 
     points: np.ndarray  # (n_points, dimension) [m]
     values: np.ndarray  # (n_points, n_modes) [kg**-0.5]
-    static: np.ndarray  # (n_points, n_points) [m/N] static compliance of the complete body
+    static: np.ndarray  # (n_points, n_loads) [m/N] static deflection of the complete body under unit loads
     cells: np.ndarray | None = None  # (n_cells, dimension + 1) lines or triangles between the points, for drawing
     # (n_points, 2) [m/N] what the modes left out yield if that is estimated, with its error; nothing between the points
     rest: np.ndarray | None = None
     rigid: np.ndarray | None = None  # (n_points, n) [kg**-0.5] see `loose`
+    loads: np.ndarray | None = None  # (n_loads,) points of these loads; None if every point has one
+    carried: np.ndarray | None = None  # (n_points, n) [(m/N)**0.5] shapes by frequency: what yields under other loads
+    doubt: np.ndarray | None = None  # (n_points, n_modes) [-] see `spread`
 
     @property
     def dimension(self) -> int:
         return self.points.shape[1]
 
+    @cached_property
+    def _tree(self) -> KDTree:
+        return KDTree(self.points)
+
     def _index(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        distance = np.linalg.norm(points[:, None] - self.points[None], axis=2)  # (n, n_points)
-        index = distance.argmin(axis=1)
+        distance, index = self._tree.query(points)
         span = float(np.ptp(self.points, axis=0).max(initial=0.0))
-        return index, distance[np.arange(len(points)), index] <= 1e-6 * (span or 1.0)
+        return index, distance <= 1e-6 * (span or 1.0)
 
     def at(self, points: np.ndarray) -> np.ndarray:
         return self.values[self._index(points)[0]]
@@ -181,23 +196,39 @@ class SampledShapes(Shapes, check.Locked):
         return self._index(points)[1]
 
     def deflection(self, loads: np.ndarray, points: np.ndarray) -> np.ndarray:
-        return self.static[np.ix_(self._index(points)[0], self._index(loads)[0])]
+        i, j = self._index(points)[0], self._index(loads)[0]
+        if self.loads is None or self.carried is None:
+            return self.static[np.ix_(i, j)]
+        found = self.carried[i] @ self.carried[j].T
+        if self.rest is not None:
+            found += np.where(i[:, None] == j, self.rest[j, 0], 0.0)
+        column = {int(point): k for k, point in enumerate(self.loads)}
+        for k, point in enumerate(i.tolist()):  # by reciprocity
+            if point in column:
+                found[k] = self.static[j, column[point]]
+        for k, point in enumerate(j.tolist()):
+            if point in column:
+                found[:, k] = self.static[i, column[point]]
+        return found
 
     def compliance_error(self, points: np.ndarray) -> np.ndarray:
         """Of an estimate; between two points the modes left out yield at most the geometric mean of both."""
-        index = self._index(points)[0]
         if self.rest is None:
-            return np.zeros(len(index))
-        middle, error = self.rest[index].T
+            return np.zeros(len(points))
+        middle, error = self.rest[self._index(points)[0]].T
         root = np.sqrt(middle)
-        doubt = error + root * (root.sum() - root)
-        return doubt / np.maximum(self.static[index, index], np.finfo(float).tiny)
+        doubt = error + np.where(error > 0.0, root * (root.sum() - root), 0.0)
+        return doubt / np.maximum(self.compliance(points).diagonal(), np.finfo(float).tiny)
 
     def loose(self, points: np.ndarray) -> np.ndarray:
         return super().loose(points) if self.rigid is None else self.rigid[self._index(points)[0]]
 
+    def spread(self, points: np.ndarray) -> np.ndarray | None:
+        return None if self.doubt is None else self.doubt[self._index(points)[0]]
+
     def take(self, n_modes: int) -> "SampledShapes":
-        return replace(self, values=self.values[:, :n_modes].copy())
+        doubt = None if self.doubt is None else self.doubt[:, :n_modes].copy()
+        return replace(self, values=self.values[:, :n_modes].copy(), doubt=doubt)
 
     def grid(self) -> tuple[np.ndarray, np.ndarray]:
         return self.points, np.arange(len(self.points))[:, None] if self.cells is None else self.cells
@@ -205,7 +236,9 @@ class SampledShapes(Shapes, check.Locked):
 
 def loose_motions(points: np.ndarray, cells: np.ndarray | None, values: np.ndarray, mass: float, free: Any) -> Any:
     """Rigid motions (n_points, n) that modes without any may lack; None if these are the modes of a held body."""
-    share, rigid = unstated.carried(points, cells, values, mass), unstated.rigid_motions(points, cells, mass)
+    flat = unstated.unfolded(points)
+    own = cells if flat is points else None
+    share, rigid = unstated.carried(flat, own, values, mass), unstated.rigid_motions(points, cells, mass)
     if free:
         if share >= unstated.HELD:
             raise ValueError(

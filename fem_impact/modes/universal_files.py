@@ -1,4 +1,7 @@
-"""Read and write modes as universal files, the format of modal testing (data sets 15, 55, 2411, 2412; needs pyuff)."""
+"""Read and write modes as universal files, the format of modal testing; needs pyuff.
+
+Data sets 15, 55, 2411, 2412, and 2414 to read.
+"""
 
 from pathlib import Path
 from typing import Any
@@ -7,14 +10,14 @@ import numpy as np
 
 from .._base import check, isolated
 
-NORMAL_MODE, DISPLACEMENT, STRUCTURAL, REAL = 2, 8, 1, 2  # codes of data set 55
+NORMAL_MODE, DISPLACEMENT, STRUCTURAL, REAL, STATIC = 2, 8, 1, 2, 1  # codes of data sets 55 and 2414
 CELL_CODE = {2: 11, 3: 91, 4: 94}  # nodes of a cell -> rod, thin shell triangle, thin shell quadrilateral
-WANTED = (15, 55, 2411)  # data sets to read: nodes, shapes, nodes in double precision
+WANTED = (15, 55, 2411, 2414)  # data sets to read: nodes, shapes, nodes in double precision, results
 LINES, SHELLS = (11, 21, 22), range(41, 97)  # codes of elements: rods and beams, plane and shell elements
 # nodes of a shell element -> its corners
 CORNERS: dict[int, tuple[int, ...]] = {3: (0, 1, 2), 4: (0, 1, 2, 3), 6: (0, 2, 4), 8: (0, 2, 4, 6)}
 PHASE = 0.3  # [-] imaginary over real part, at the best phase, up to which a complex shape is taken as real: 17 degrees
-DIRECTIONS = {"x": "r1", "y": "r2", "z": "r3"}
+COMPONENTS = "r1", "r2", "r3"  # along x, y and z
 
 
 def _pyuff() -> Any:
@@ -82,47 +85,53 @@ def read(path: Any, direction: str) -> dict[str, np.ndarray]:
         cells (n_cells, 2 or 3), point numbers: lines between the points of a beam, triangles of a plate; quadrilaterals
         are halved, and elements with nodes that were not measured are left out
     """
-    path, direction = check.path("path", path), check.one_of("direction", direction, DIRECTIONS)
-    return isolated.read(path, "a universal file", "modes.universal_files:arrays", direction)
+    path, direction = check.path("path", path), check.one_of("direction", direction, "xyz")
+    found = isolated.read(path, "a universal file", "modes.universal_files:arrays")
+    keep = across(found["nodes"], direction)
+    names = "frequencies", "damping_ratio"
+    told = {"shapes": found["shapes"][:, "xyz".index(direction)], "points": found["nodes"][:, keep]}
+    return {name: found[name] for name in names} | told | {"cells": found["lines" if len(keep) == 1 else "triangles"]}
 
 
-def arrays(path: Path, direction: str) -> dict[str, np.ndarray]:
-    """The result of `read`, computed in a separate process (see `isolated`)."""
+def arrays(path: Path) -> dict[str, np.ndarray]:
+    """What a file holds of a body, as `Body` takes it; runs in a separate process (see `isolated`).
+
+    Static deflections under a load are data sets 55 or 2414 of static analysis.
+    """
     import pyuff
 
-    component = DIRECTIONS[direction]
     file = pyuff.UFF(str(path))
     kinds = [int(kind) for kind in file.get_set_types()]
     sets = [file.read_sets(i) for i, kind in enumerate(kinds) if kind in WANTED]
     numbers, place = places(sets)
-    modes = [s for s in sets if s["type"] == 55 and s.get("analysis_type") in (2, 3)]
-    if not len(numbers) or not modes:
+    results = [_result(s) for s in sets if s["type"] in (55, 2414)]
+    modes = [s for s in results if s.get("analysis_type") in (NORMAL_MODE, 3)]
+    static = [s for s in results if s.get("analysis_type") == STATIC]
+    if not len(numbers) or not (modes or static):
         found = ", ".join(str(kind) for kind in sorted(set(kinds))) or "none"
         functions = ", of which 58 are time records or frequency responses, no modes" if 58 in kinds else ""
         raise ValueError(
             f"{path.name} must hold nodes (15 or 2411) and mode shapes (55); its data sets are {found}{functions}"
         )
-    measured = np.asarray(modes[0]["node_nums"], int)
+    measured = np.asarray((modes + static)[0]["node_nums"], int)
     lost = np.setdiff1d(measured, numbers)
     if lost.size:
         raise ValueError(f"{path.name} has shapes at node {lost[0]}, which has no coordinates; export it again")
     row = {int(number): i for i, number in enumerate(numbers)}
-    points = place[[row[int(n)] for n in measured]]
-    keep = across(points, direction)
-    table = [_mode(path.name, i, mode, component, measured) for i, mode in enumerate(modes)]
-    frequencies, damping, shapes = zip(*sorted(table, key=lambda entry: entry[0]))
-    result = {"frequencies": np.array(frequencies), "damping_ratio": np.array(damping)}
-    result |= {"shapes": np.column_stack(shapes), "points": points[:, keep]}
-    elements = [element for i, kind in enumerate(kinds) if kind == 2412 for element in _elements(file, i)]
-    cells = _cells(elements, {int(n): i for i, n in enumerate(measured)}, len(keep))
-    if len(result["shapes"]) != len(points):
-        raise ValueError(
-            f"{path.name} has shapes at {len(result['shapes'])} nodes but names {len(points)}; export it again"
-        )
+    nodes = place[[row[int(n)] for n in measured]]
+    table = [_mode(path.name, i, mode, measured) for i, mode in enumerate(modes)]
+    frequencies, damping, shapes = zip(*sorted(table, key=lambda entry: entry[0])) if table else ((), (), ())
+    result = {"frequencies": np.array(frequencies), "damping_ratio": np.array(damping), "nodes": nodes}
+    deflections = [_moved(path.name, i, one, measured) for i, one in enumerate(static)]
+    for name, each in (("shapes", shapes), ("static", deflections)):
+        result[name] = np.stack(each, axis=2) if len(each) else np.zeros((*nodes.shape, 0))
     for what, values in result.items():
-        if not (np.abs(values) <= check.REACH).all() or (what == "frequencies" and values.min() < 0.0):
+        if not (np.abs(values) <= check.REACH).all() or (what == "frequencies" and (values < 0.0).any()):
             raise ValueError(f"{path.name} has {what} that are negative, too large or not numbers; export it again")
-    return result | {"cells": cells}
+    elements = [element for i, kind in enumerate(kinds) if kind == 2412 for element in _elements(file, i)]
+    row = {int(n): i for i, n in enumerate(measured)}
+    cells = {name: _cells(elements, row, i + 1) for i, name in enumerate(("lines", "triangles"))}
+    return result | cells | {"numbers": measured}
 
 
 def across(points: np.ndarray, direction: str) -> list[int]:
@@ -164,11 +173,29 @@ def _cells(elements: list[dict], row: dict[int, int], dimension: int) -> np.ndar
     return np.array(found, int).reshape(-1, dimension + 1)
 
 
-def _mode(name: str, i: int, mode: dict, component: str, measured: np.ndarray) -> tuple[float, float, np.ndarray]:
-    """Frequency [Hz], damping ratio and mass-normalised shape of one data set 55."""
-    if not np.array_equal(np.asarray(mode["node_nums"], int), measured):
+def _result(one: dict) -> dict:
+    """A data set 2414 as one 55 says the same; others as they are."""
+    if one["type"] != 2414 or one.get("dataset_location") != 1 or one.get("result_type") != DISPLACEMENT:
+        return one if one["type"] != 2414 else {}
+    values = np.array([row[:3] for row in one["data_at_node"]])
+    told = {"freq": one.get("record12_field2"), "modal_m": one.get("record12_field4")}
+    told |= {"modal_damp_vis": one.get("record12_field5")}
+    return one | told | dict(zip(COMPONENTS, values.T))
+
+
+def _moved(name: str, i: int, one: dict, measured: np.ndarray) -> np.ndarray:
+    """Displacements (n_nodes, 3) of one data set, at the nodes of the first."""
+    if not np.array_equal(np.asarray(one["node_nums"], int), measured):
         raise ValueError(f"{name} has mode {i + 1} at other nodes than mode 1; export all modes at the same nodes")
-    shape = np.asarray(mode[component])
+    columns = [np.asarray(one.get(component, np.zeros(len(measured)))) for component in COMPONENTS]
+    if any(len(column) != len(measured) for column in columns):
+        raise ValueError(f"{name} has shapes at {len(columns[0])} nodes but names {len(measured)}; export it again")
+    return np.column_stack(columns)
+
+
+def _mode(name: str, i: int, mode: dict, measured: np.ndarray) -> tuple[float, float, np.ndarray]:
+    """Frequency [Hz], damping ratio and mass-normalised shape (n_nodes, 3) of one data set."""
+    shape = _moved(name, i, mode, measured)
     if mode["analysis_type"] == 3:
         pole, scale = complex(mode["eig"]), complex(mode.get("modal_a") or 0.0)
         frequency, damping = abs(pole) / (2.0 * np.pi), -pole.real / abs(pole)

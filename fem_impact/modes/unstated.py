@@ -1,7 +1,8 @@
 """What modes from elsewhere leave unsaid, as far as they tell it themselves: modes left out, and rigid motions.
 
 The squared shapes of all modes up to omega at one point add up to ``S = A omega**p``, rigid motions included: p is 1 on
-a plate and 1/2 on a beam, in their middle without any correction for the edge. The modes left out above omega_c yield
+a plate and 1/2 on a beam, in their middle without any correction for the edge; a body in three dimensions may be
+either, and counts as both. The modes left out above omega_c yield
 ``integral of dS / omega**2 = 2 A omega_c**(p - 2) / (2 - p) - S(omega_c) / omega_c**2``.
 """
 
@@ -15,6 +16,7 @@ SPREAD = 2.0
 # [-] where an edge is near, the estimates differ, and the truth may lie outside by as much, but not by more than this:
 # shapes that go over to those of the middle of the body overshoot them by at most two
 OUTSIDE = 2.0
+FLAT = 1e-6  # [-] of their extent, by which points may be off a line or a plane: as many digits as files keep
 HELD = (
     0.25  # [-] of the mass that moves along in one mode of a held body: at least 0.48 in the first of a clamped plate
 )
@@ -38,22 +40,30 @@ def left_out(omega: np.ndarray, rows: np.ndarray, mass: float, dimension: int) -
     still = ~(np.abs(rows) > SAME * mass**-0.5).any(axis=1)
     if not n:
         return np.zeros(len(rows)), np.zeros(len(rows))
-    power = 0.5 if dimension == 1 else 1.0
     squares, upper = rows[:, moving] ** 2, omega[moving]
     total = (rows[:, ~moving] ** 2).sum(axis=1)[:, None] + np.cumsum(squares, axis=1)  # S just above each mode
-    last = upper[-1] * (1.0 + 0.5 / (power * n))  # half way to the next one
-    course = ((total - 0.5 * squares) / upper**power)[:, n // 2 :].mean(axis=1)
-    reached, share = total[:, -1], 2.0 / (2.0 - power)
-    body = np.full(len(rows), len(omega) / mass)
-    guesses = (
-        np.stack([(share - 1.0) * reached, share * course * last**power - reached, (share - 1.0) * body]) / last**2
-    )
-    low, high = np.maximum(guesses.min(axis=0), 0.0), guesses.max(axis=0)
+    course_from, reached, guesses = slice(n // 2, None), total[:, -1], []
+    body = np.full(len(rows), len(omega) / mass if dimension < 3 else reached.mean())  # only a part moves along a line
+    for power in {1: (0.5,), 2: (1.0,)}.get(dimension, (0.5, 1.0)):
+        last, share = upper[-1] * (1.0 + 0.5 / (power * n)), 2.0 / (2.0 - power)  # half way to the next one
+        course = ((total - 0.5 * squares) / upper**power)[:, course_from].mean(axis=1)
+        ways = (share - 1.0) * reached, share * course * last**power - reached, (share - 1.0) * body
+        guesses += [each / last**2 for each in ways]
+    low, high = np.maximum(np.min(guesses, axis=0), 0.0), np.max(guesses, axis=0)
     outside = np.minimum(high / np.maximum(low, high / OUTSIDE), OUTSIDE)
     spread = SPREAD / n**0.5 if dimension > 1 else 2.0 * SPREAD / n  # shapes of a beam are periodic, not random
     low, high = low / outside * max(0.0, 1.0 - spread), high * outside * (1.0 + spread)
     low[still] = high[still] = 0.0
     return 0.5 * (low + high), 0.5 * (high - low)
+
+
+def unfolded(points: np.ndarray) -> np.ndarray:
+    """Coordinates of points along the line or in the plane on which they lie; the points themselves if on none."""
+    if points.shape[1] < 2 or len(points) < 2:
+        return points
+    _, size, axes = np.linalg.svd(points - points.mean(axis=0), full_matrices=False)
+    n = max(1, int((size > FLAT * size[0]).sum()))
+    return points if n == points.shape[1] else points @ axes[:n].T
 
 
 def rigid_motions(points: np.ndarray, cells: np.ndarray | None, mass: float) -> np.ndarray | None:

@@ -92,10 +92,10 @@ def _at_points(modes: Modes, touched: np.ndarray, points: Any) -> Modes:
     places, n = np.vstack([touched, more[new]]), len(touched)
     values = modes.shapes.at(places)
     rest = np.column_stack(unstated.left_out(modes.omega, values, modes.mass, modes.dimension))
-    static = modes.modal_compliance(places) + np.diag(rest[:, 0])
-    static[:, :n] = modes.shapes.deflection(touched, places)  # known from the blow
-    static[:n], rest[:n] = static[:, :n].T, 0.0
-    return replace(modes, shapes=SampledShapes(places, values, static, rest=rest))
+    rest[:n] = 0.0  # known from the blow
+    static, flexible = modes.shapes.deflection(touched, places), modes.omega > 0.0
+    known = {"loads": np.arange(n), "carried": values[:, flexible] / modes.omega[flexible]}
+    return replace(modes, shapes=SampledShapes(places, values, static, rest=rest, **known))
 
 
 def _key(folder: Path) -> str:

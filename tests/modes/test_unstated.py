@@ -8,6 +8,7 @@ import pytest
 from numpy.testing import assert_allclose
 
 import fem_impact as fi
+from fem_impact.modes import unstated
 
 STEEL = fi.Material(E=210e9, nu=0.3, rho=7850.0)
 BAR = fi.Beam.rectangular(STEEL, width=0.03, height=0.01)
@@ -80,6 +81,27 @@ def test_the_estimate_holds_the_compliance_left_out(n_modes):
              for s, p, m in ((modes.shapes, p[None], modes.modal_compliance(p[None])[0, 0]) for p in points)]
         )  # fmt: skip
         assert (np.abs(guess - truth) <= doubt + 1e-9 * truth.max()).mean() >= 0.9
+
+
+def test_where_a_unit_load_is_known_nothing_is_estimated():
+    """The bar's compliance at one of its 41 points is stated: there the blow is that of the whole of it."""
+    whole = bar(12, compliance=True)
+    modes = bar(12, compliance=whole.shapes.deflection(POINTS[[10]], POINTS), loads=[10])
+    assert_allclose(modes.residual_compliance(POINTS[[10]]), whole.residual_compliance(POINTS[[10]]), rtol=1e-9)
+    here, there = struck(modes, at=(0.1,)), struck(modes, at=(0.2,))
+    assert here.restitution == struck(whole, at=(0.1,)).restitution and "not stated" not in here.verdict
+    assert "not stated of the target: static compliance" in there.verdict
+    with pytest.raises(ValueError, match="loads must be different numbers of points from 0 to 40"):
+        bar(12, compliance=whole.shapes.deflection(POINTS[[10]], POINTS), loads=[41])
+
+
+def test_a_body_in_three_dimensions_may_be_a_bar_or_a_plate():
+    """The interval holds both, so it holds each."""
+    omega, rows = 2.0 * np.pi * np.arange(1.0, 11.0) * 100.0, np.full((1, 10), 1.3)
+    both = unstated.left_out(omega, rows, 0.5, 3)
+    for dimension in (1, 2):
+        mean, error = unstated.left_out(omega, rows, 1.0 / 1.3**2, dimension)  # the mean squared shape is one over it
+        assert both[0] + both[1] >= 0.9 * mean and both[0] - both[1] <= mean + error
 
 
 def test_two_contacts_on_an_estimated_body_count_what_is_between_them():

@@ -1,0 +1,339 @@
+"""A body known elsewhere: modes at the nodes of another program's model, or of a modal test, in three dimensions."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, fields
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from .._base import check
+from . import imported
+from .modal import Modes, damping_ratios
+
+RIGID = 0.01, 6  # [-] frequencies this far below the next are rounding, of at most so many rigid motions
+NEAR = 1e-3  # [-] of the size of the body: a point this near a node is that node
+ALONG = 1e-6  # [-] one minus the cosine up to which a unit load acts along a direction: a twelfth of a degree
+NOTE = "the error of the mesh on which modes were found elsewhere is not known, and no blow counts it"
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Body(check.Brief):
+    """Modes at the nodes of a body in three dimensions, struck at any node in any direction by way of `modes`.
+
+    Parameters
+    ----------
+    frequencies : array_like, shape (n_modes,) [Hz], ascending; 0 for rigid motions
+    shapes : array_like, shape (n_nodes, 3, n_modes) [kg**-0.5], mass-normalised
+    nodes : array_like, shape (n_nodes, 3) [m]
+    mass : float [kg] of the whole body
+    damping_ratio : float, array (n_modes,) or function of frequency [Hz]
+    numbers : array_like of int, shape (n_nodes,), optional
+        What the other program calls the nodes; by default from 1.
+    cells : array_like, shape (n_cells, 3 or 2), optional
+        Triangles of the surface, or lines, by rows of ``nodes``.
+    normals : array_like, shape (n_nodes, 3), optional
+        By default those of the triangles, or of the plane of a flat body; zero at nodes inside.
+    names : mapping of str to node number, optional
+    static : array_like, shape (n_nodes, 3, n_loads) [m], optional
+        Static deflections of the whole body, each under one of ``loads``; of a free body with inertia relief, and
+        without any rigid motion.
+    loads : sequence of (node number, force), optional
+        The forces (3,) [N].
+
+    Raises
+    ------
+    ValueError
+        If lengths disagree, a number is not finite or frequencies do not ascend; or if a node is named that is none.
+
+    Examples
+    --------
+    >>> nodes = [(0.0, 0.0, 0.0), (0.3, 0.0, 0.0), (0.0, 0.2, 0.0)]
+    >>> shapes = np.zeros((3, 3, 1))
+    >>> shapes[:, 2, 0] = [1.2, -0.9, 0.4]  # kg**-0.5, along z
+    >>> body = fi.Body([110.0], shapes, nodes, mass=0.5, names={"corner": 2})
+    >>> body.at("corner"), body.modes("z").shape_at(body.at("corner")).tolist()
+    ((0.3, 0.0), [[-0.9]])
+    """
+
+    frequencies: np.ndarray  # (n_modes,) [Hz]
+    shapes: np.ndarray  # (n_nodes, 3, n_modes) [kg**-0.5]
+    nodes: np.ndarray  # (n_nodes, 3) [m]
+    mass: float  # [kg]
+    damping_ratio: Any = 0.0  # (n_modes,) [-]
+    numbers: Any = None  # (n_nodes,)
+    cells: Any = None  # (n_cells, 3 or 2)
+    normals: Any = None  # (n_nodes, 3) [-], or None if nothing tells them
+    names: Mapping[str, int] = field(default_factory=dict)
+    static: Any = None  # (n_nodes, 3, n_loads) [m]
+    loads: Any = ()  # (n_loads, 4) node number and force [N]
+
+    def __post_init__(self) -> None:
+        frequencies = check.ascending("frequencies", self.frequencies, "Hz")
+        nodes = check.array("nodes", self.nodes, (None, 3), "m")
+        n, omega = len(nodes), 2.0 * np.pi * frequencies
+        given = np.arange(1, n + 1) if self.numbers is None else self.numbers
+        numbers = check.array("numbers", given, (n,)).astype(int)
+        if len(np.unique(numbers)) < n:
+            raise ValueError("numbers must differ from node to node")
+        cells = np.zeros((0, 3)) if self.cells is None else check.array("cells", self.cells, (None, None))
+        if cells.shape[1] not in (2, 3) or (cells < 0).any() or (cells >= n).any() or (cells % 1.0).any():
+            raise ValueError(f"cells must be rows of nodes from 0 to {n - 1}, two or three each, got {cells.shape}")
+        static = np.zeros((n, 3, 0)) if self.static is None else self.static
+        check.settle(
+            self, frequencies=frequencies, nodes=nodes, numbers=numbers, cells=cells.astype(int),
+            shapes=check.array("shapes", self.shapes, (n, 3, len(frequencies)), "kg**-0.5"),
+            mass=check.positive("mass", self.mass, "kg"), damping_ratio=damping_ratios(self.damping_ratio, omega),
+            loads=_forces(self.loads), names=_named(self.names),
+            normals=None if self.normals is None else check.array("normals", self.normals, (n, 3)),
+        )  # fmt: skip
+        check.settle(self, static=check.array("static", static, (n, 3, None), "m"))
+        if len(self.loads) != self.static.shape[2]:
+            raise ValueError(
+                f"loads must be given as (node number, force) for each of {self.static.shape[2]} static solutions, got "
+                f"{len(self.loads)}"
+            )
+        for name, number in (*self.names.items(), *(("loads", number) for number in self.loads[:, 0].tolist())):
+            if number not in self._row:
+                raise ValueError(f"{name!r} must be a node of the body, got {number:g}; {self._known}")
+        if self.normals is None:
+            check.settle(self, normals=_normals(nodes, self.cells))
+        check.lock_arrays(self)
+
+    @classmethod
+    def load(
+        cls, files: Any, *, mass: float | None = None, loads: Any = None, damping_ratio: Any = None,
+        modal_mass: ArrayLike | None = None, names: Mapping[str, int] | None = None, normals: ArrayLike | None = None,
+    ) -> "Body":  # fmt: skip
+        """Read a body from files of other programs.
+
+        Universal files (``.uff``, ``.unv``: data sets 15, 55, 2411, 2412, 2414; needs pyuff), results of Nastran
+        (``.op2``, with its ``.bdf`` beside it unless the nodes are in the results; needs pyNastran) and of CalculiX
+        (``.frd``, with its ``.inp`` for names of nodes; needs pyvista-frd-reader), ``.npz`` files as `save` writes
+        them, or an ``xarray.Dataset`` with the fields of a body as variables.
+
+        Parameters
+        ----------
+        files : path, sequence of paths, or xarray.Dataset
+            Modes are in one of them; static solutions may be in the same or in others.
+        mass : float [kg], optional
+            Of the whole body; only NumPy's files and xarray hold it.
+        loads : sequence of (node number, force (3,) [N]), optional
+            Of the static solutions, in the order in which the files hold them; these do not say it.
+        damping_ratio : float, array (n_modes,) or function of frequency [Hz], optional
+            Instead of what the files hold, which is zero where they hold none.
+        modal_mass : array_like, shape (n_modes,) [kg], optional
+            If shapes are not mass-normalised and the files do not say how large their modal masses are.
+        names : mapping of str to node number, optional
+        normals : array_like, shape (n_nodes, 3), optional
+
+        Raises
+        ------
+        ValueError
+            If a file cannot be read or a library is missing; if nothing tells the mass, the modes or the loads; or if
+            two files are about different nodes.
+        """
+        told: dict[str, Any] = {}
+        for found in imported.read(files):
+            if "nodes" in told and "nodes" in found and not np.array_equal(told["numbers"], found["numbers"]):
+                raise ValueError("files must be about the same nodes; export all results of one model")
+            static = [each["static"] for each in (told, found) if "static" in each]
+            found = {name: value for name, value in found.items() if value.size or name not in told}
+            told |= found | ({"static": np.concatenate(static, axis=2)} if static else {})
+        scale = told.pop("modal_mass", None) if modal_mass is None else modal_mass
+        if "names" in told:
+            told["names"] = dict(zip(told["names"].tolist(), told.pop("named").tolist()))
+        if "cells" not in told:
+            told["cells"] = told.get("triangles") if len(told.get("triangles", ())) else told.get("lines")
+        given = {"mass": mass, "loads": loads, "damping_ratio": damping_ratio, "names": names, "normals": normals}
+        told |= {name: value for name, value in given.items() if value is not None}
+        _complete(told)
+        order = np.argsort(told["frequencies"], kind="stable")
+        if scale is not None:
+            scale = check.array("modal_mass", scale, (len(order),), "kg")
+            if scale.min() <= 0.0:
+                raise ValueError(f"modal_mass must be positive, got {scale.min():g} kg")
+            told["shapes"] = told["shapes"] / np.sqrt(scale)
+        told |= {"frequencies": _without_rounding(told["frequencies"][order]), "shapes": told["shapes"][:, :, order]}
+        return cls(**{name: told[name] for name in (each.name for each in fields(cls)) if name in told})
+
+    def save(self, path: Any) -> Path:
+        """Write a ``.npz`` file that `load` reads."""
+        path = check.path("path", path).with_suffix(".npz")
+        told = {name: getattr(self, name) for name in imported.FIELDS if getattr(self, name) is not None}
+        names = np.array(list(self.names), str), np.array(list(self.names.values()), int)
+        np.savez_compressed(path, **told, names=names[0], named=names[1])
+        return path
+
+    @cached_property
+    def _row(self) -> dict[int, int]:
+        return {int(number): row for row, number in enumerate(self.numbers)}
+
+    @property
+    def _known(self) -> str:
+        return f"nodes are {self.numbers.min()} to {self.numbers.max()}, names {', '.join(self.names) or 'none'}"
+
+    @cached_property
+    def axes(self) -> list[int]:
+        """The axes along which nodes differ: points of `modes` have these coordinates alone."""
+        spread = np.ptp(self.nodes, axis=0)
+        return [i for i in range(3) if spread[i] > 1e-9 * max(spread.max(), 1e-300)] or [0]
+
+    def node(self, where: Any) -> int:
+        """Row of a node given by its number, its name or a point (3,) [m] within a thousandth of the body's size."""
+        if isinstance(where, str):
+            where = self.names[check.one_of("where", where, self.names)]
+        if isinstance(where, (int, float, np.number)) or where is None:
+            if where not in self._row:
+                raise ValueError(f"where must be a node of the body, got {check.shown(where)}; {self._known}")
+            return self._row[int(where)]
+        apart = np.linalg.norm(self.nodes - check.array("where", where, (3,), "m"), axis=1)
+        row = int(apart.argmin())
+        if apart[row] > NEAR * float(np.ptp(self.nodes, axis=0).max()):
+            place = ", ".join(f"{x:g}" for x in self.nodes[row])
+            raise ValueError(
+                f"where must be a node of the body, got one {apart[row]:.3g} m away from the nearest, node "
+                f"{self.numbers[row]} at ({place}) m; give that one"
+            )
+        return row
+
+    def at(self, where: Any) -> tuple[float, ...]:
+        """Coordinates of a node, as blows on `modes` take them: those that differ from node to node [m]."""
+        return tuple(self.nodes[self.node(where), self.axes].tolist())
+
+    def modes(self, direction: Any = "normal", *, free: bool | None = None) -> Modes:
+        """The body as it is struck and heard along a direction.
+
+        Parameters
+        ----------
+        direction : "normal", "x", "y", "z" or a vector (3,)
+            Of the blow and of all responses; along normals, nodes inside the body are left out.
+        free : bool, optional
+            As in `Modes.from_arrays`.
+
+        Returns
+        -------
+        Modes
+            Where a unit load of ``loads`` acts along the direction, its static compliance is known; elsewhere what the
+            modes left out yield is estimated, and a blow there counts the error of that estimate and says so.
+        """
+        ways = self._ways(direction)
+        if free and ways[:, self.axes].any():
+            raise ValueError(
+                "free must be False or left out: nothing but a flat body struck across tells its rigid motions; give "
+                "them as modes of 0 Hz instead"
+            )
+        kept = np.flatnonzero(ways.any(axis=1))
+        place = np.full(len(self.nodes), -1)
+        place[kept] = np.arange(len(kept))
+        cells = place[self.cells]
+        cells = cells[(cells >= 0).all(axis=1)]
+        columns, loads = self._unit_loads(ways, place)
+        points, flat = self.nodes[kept][:, self.axes], len(self.axes) + 1 == cells.shape[1]
+        made = Modes.from_arrays(
+            self.frequencies, np.einsum("ndm,nd->nm", self.shapes[kept], ways[kept]), points=points, mass=self.mass,
+            damping_ratio=self.damping_ratio, compliance=columns[kept] if len(loads) else None,
+            loads=loads if len(loads) else None, cells=cells if flat and len(cells) else None, free=free,
+        )  # fmt: skip
+        check.settle(made, notes=(*made.notes, NOTE))
+        return made
+
+    def _ways(self, direction: Any) -> np.ndarray:
+        """Unit vector (n_nodes, 3) along which each node is struck; zero where it cannot be."""
+        if isinstance(direction, str) and check.one_of("direction", direction, ("normal", *"xyz")) == "normal":
+            if self.normals is None:
+                raise ValueError("direction must be x, y, z or a vector: neither cells nor a plane tell the normals")
+            size = np.linalg.norm(self.normals, axis=1, keepdims=True)
+            return np.divide(self.normals, size, out=np.zeros_like(self.normals), where=size > 0.0)
+        vector = np.eye(3)["xyz".index(direction)] if isinstance(direction, str) else direction
+        vector = check.array("direction", vector, (3,))
+        if not vector.any():
+            raise ValueError("direction must not be zero")
+        return np.tile(vector / np.linalg.norm(vector), (len(self.nodes), 1))
+
+    def _unit_loads(self, ways: np.ndarray, place: np.ndarray) -> tuple[np.ndarray, list[int]]:
+        """Deflections (n_nodes, n) [m/N] along the ways under unit loads along them, and the points of these loads."""
+        columns, points = [], []
+        for k, (number, *force) in enumerate(self.loads.tolist()):
+            row, size = self._row[int(number)], float(np.linalg.norm(force))
+            cosine = float(ways[row] @ force) / size if size else 0.0
+            if abs(cosine) >= 1.0 - ALONG and place[row] not in points:
+                columns.append(np.einsum("nd,nd->n", self.static[:, :, k], ways) / (np.sign(cosine) * size))
+                points.append(int(place[row]))
+        return np.column_stack(columns) if columns else np.zeros((len(ways), 0)), points
+
+    def displacement(self, q: ArrayLike, where: Any) -> np.ndarray:
+        """Displacements (n_times, n_points, 3) [m] at nodes, of the kept modes alone.
+
+        Parameters
+        ----------
+        q : array_like, shape (n_times, n_modes) [m kg**0.5]
+            Modal displacements after a blow on `modes`, ``hit.modal_state(times)[0]``.
+        where : a node, by number, name or point, or a list of names or points
+        """
+        several = isinstance(where, (list, tuple)) and any(np.ndim(each) or isinstance(each, str) for each in where)
+        rows = [self.node(each) for each in where] if several else [self.node(where)]
+        n, moved = len(self.frequencies), check.array("q", q, (None, None))
+        if moved.shape[1] < n:
+            raise ValueError(f"q must be of modes of this body, {n} of them, got {moved.shape[1]}")
+        return np.einsum("tm,ndm->tnd", moved[:, moved.shape[1] - n :], self.shapes[rows])  # added rigid motions first
+
+
+def _forces(loads: Any) -> np.ndarray:
+    """Loads as (n_loads, 4), node number and force [N]."""
+    given = list(loads) if isinstance(loads, (list, tuple, np.ndarray)) else [loads]
+    found = np.zeros((len(given), 4))
+    for row, each in zip(found, given):
+        pair = each if isinstance(each, (list, tuple, np.ndarray)) else ()
+        if len(pair) not in (2, 4):
+            raise ValueError(f"loads must be pairs (node number, force (3,) in N), got {check.shown(each)}")
+        force = check.array("loads", pair[1] if len(pair) == 2 else pair[1:], (3,), "N")
+        row[0], row[1:] = check.count("loads", pair[0], low=-(10**9)) if len(pair) == 2 else pair[0], force
+        if not force.any():
+            raise ValueError("loads must not be forces of zero")
+    return found
+
+
+def _named(names: Any) -> dict[str, int]:
+    """Names of nodes, checked."""
+    if not isinstance(names, Mapping) or not all(isinstance(name, str) for name in names):
+        raise ValueError(f"names must map names to node numbers, as {{'rim': 17}}, got {check.shown(names)}")
+    return {name: check.count(f"names[{name!r}]", number, low=-(10**9)) for name, number in names.items()}
+
+
+def _complete(told: dict[str, Any]) -> None:
+    """Raise ValueError if files told too little of a body."""
+    if not len(told.get("frequencies", ())):
+        raise ValueError("files must hold modes; ask the other program for its eigenvectors, too")
+    if told.get("mass") is None:
+        raise ValueError("mass must be given in kg: these files do not hold it")
+
+
+def _without_rounding(frequencies: np.ndarray) -> np.ndarray:
+    """Frequencies with those of rigid motions, which an eigensolver leaves at its rounding, set to zero."""
+    found = frequencies.copy()
+    few = min(RIGID[1], len(found) - 1)
+    n = max((k for k in range(1, few + 1) if found[k - 1] < RIGID[0] * found[k]), default=0)
+    found[:n] = 0.0
+    return found
+
+
+def _normals(nodes: np.ndarray, cells: np.ndarray) -> np.ndarray | None:
+    """Unit normals (n_nodes, 3) of triangles, by their areas, or of a flat body; None if nothing tells them."""
+    result = np.zeros(nodes.shape)
+    if cells.shape[1] == 3 and len(cells):
+        corners = nodes[cells]
+        areas = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+        for corner in cells.T:
+            np.add.at(result, corner, areas)
+    elif len(nodes) > 2:
+        _, size, axes = np.linalg.svd(nodes - nodes.mean(axis=0), full_matrices=False)
+        if size[1] <= 1e-6 * size[0] or size[2] > 1e-6 * size[0]:
+            return None
+        result += axes[2]
+    else:
+        return None
+    size = np.linalg.norm(result, axis=1, keepdims=True)
+    return np.divide(result, size, out=np.zeros_like(result), where=size > 0.0)
