@@ -17,6 +17,7 @@ Chu and Herrmann (1956), J. Appl. Mech. 23, 532-540; Woinowsky-Krieger (1950), J
 
 from dataclasses import dataclass
 from functools import partial
+from typing import Any
 
 import numpy as np
 from scipy import special
@@ -24,7 +25,8 @@ from scipy import special
 from .._base import check
 from ..fe import membrane, slopes
 from ..fe.assembly import System, assemble, support_of_facets, support_words
-from ..fe.section import SOFT, Beam, Plate
+from ..fe.section import PLANE, SOFT, Beam, Plate
+from ..fe.shallow import SHALLOW
 from ..mesh import meshes
 from .air import MixedShapes
 from .disk import DiskShapes
@@ -94,9 +96,11 @@ def _unwrapped(shapes: Shapes) -> tuple[Shapes, float, np.ndarray | None]:
 
 def _check_supports(system: System) -> None:
     """Raise ValueError unless it is known what holds the plane of a body of elements, and its slopes are known."""
-    kinds = support_of_facets(system.mesh, dict(system.supports), support_words(system.theory))
-    if not all(isinstance(kind, str) for kind in kinds):
-        raise ValueError(f"{CANNOT}, but {ELASTIC}; hold it, or leave stretching out")
+    kinds: Any = support_of_facets(system.mesh, dict(system.supports), support_words(system.theory))
+    if isinstance(system.section, Plate) and system.theory != SHALLOW.name:  # whose linear motion has the same plane
+        kinds = support_of_facets(system.mesh, dict(system.section.in_plane), PLANE, "in_plane", kinds)
+    if system.theory != SHALLOW.name and not all(isinstance(kind, str) for kind in kinds):
+        raise ValueError(f"{CANNOT}, but {ELASTIC}; say so with in_plane, hold it, or leave stretching out")
     if system.mesh.dimension == 1 and not set(kinds) <= set(HELD):
         raise ValueError(f"{CANNOT}, but an end is free; hold it, or leave stretching out")
     if system.element == "morley":

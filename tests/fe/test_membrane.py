@@ -12,8 +12,9 @@ PLATE = fi.Plate(fi.Material(E=E, nu=NU, rho=7850.0), H)
 SQUARE = np.pi**2 / 2.0  # int |grad w|**2 of w = sin sin on any square
 
 
-def sheet(size=0.05, sides=(SIDE, SIDE), section=PLATE):
-    return membrane.Sheet.of(fi.assemble(fi.mesh.rectangle(*sides, size=size), section, {"boundary": "clamped"}))
+def sheet(size=0.05, sides=(SIDE, SIDE), section=PLATE, plane="held"):
+    mesh = fi.mesh.rectangle(*sides, size=size)
+    return membrane.Sheet.of(fi.assemble(mesh, section, {"boundary": "clamped"}, in_plane={"boundary": plane}))
 
 
 def sines(numbers, side=SIDE):
@@ -53,6 +54,19 @@ def test_a_square_held_all_round_is_a_little_stiffer():
     coarse, fine = (over_berger(energies(each, np.ones(1)).sum()) for each in found)
     assert 0.877 < fine < 0.883  # 1.316 / 1.5 where the edges slide, 1.323 / 1.5 computed on twice as many triangles
     assert fine < coarse < (1.0 + 1e-4) * fine  # the plane settles where its energy is least: always from above
+
+
+# of unit square and unit norm, E h / 4 times the fourth power of the amplitude: spectra of Airy's function (VK-Gong)
+FREE = {(1, 1): 25.29581, (1, 2): 143.0341, (2, 2): 559.480}
+
+
+@pytest.mark.parametrize("numbers", list(FREE))
+def test_a_square_that_may_move_in_its_plane_is_that_of_airys_function(numbers):
+    wanted = 0.25 * E * H * FREE[numbers] * (0.5 / SIDE**0.5) ** 4  # of sines of amplitude one
+    found = [membrane.forms(sheet(size, plane="free"), sines([numbers]), np.ones(1)) for size in (0.05, 0.02)]
+    coarse, fine = (energies(each, np.ones(1)).sum() / wanted for each in found)
+    assert fine == pytest.approx(1.0, rel=2e-5)  # of the triangles: 1e-6 in the first mode
+    assert fine < coarse < 1.01  # from above, as ever
 
 
 def test_fields_of_stress_are_kept_in_order_and_each_adds_energy():

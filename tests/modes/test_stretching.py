@@ -80,6 +80,37 @@ def test_a_free_disk_stretches_as_its_radial_equation_says():
     assert energy(modes, tilted) == energy(modes, saucer)  # the plane follows a disk that tilts
 
 
+def cubic(modes, mode):
+    """Force of a mode over its cube, as Airy's function gives it of unit norm: over E / rho and mass per area."""
+    return float((stretch(modes).forms[:, mode, mode] ** 2).sum()) * RHO**2 * H / E
+
+
+# free disks: Poisson's ratio -> modes (2, 0), (0, 1), (3, 0) (Touze, Thomas and Chaigne 2002; spectra of VK-Gong)
+DISKS = {
+    0.38: [1.898356, 8.574675, 17.03105],
+    0.33: [1.896553, 8.528755, 16.93346],
+    0.3: [1.895421, 8.501230, 16.87594],
+}
+
+
+@pytest.mark.parametrize("nu", list(DISKS))
+def test_a_free_disk_has_the_cubic_coefficients_of_airys_function(nu):
+    section = fi.Plate(fi.Material(E=E, nu=nu, rho=RHO), H)
+    modes = fi.analytic.disk(1.0, edge="free", section=section, n_modes=8)
+    found = [cubic(modes, mode) for mode in (3, 5, 6)]
+    assert found == pytest.approx(DISKS[nu], rel=1e-5)  # of the triangles
+
+
+def test_a_rectangle_that_may_move_in_its_plane_has_the_cubic_coefficients_of_airys_function():
+    system = fi.assemble(
+        fi.mesh.rectangle(1.0, 2.0 / 3.0, size=0.1), PLATE, {"boundary": "hinged"}, in_plane={"boundary": "free"}
+    )
+    modes = fi.find_modes(system, n_modes=3)
+    # (1, 1), (2, 1), (1, 2) of VK-Gong, from above as the plane settles where its energy is least
+    for mode, wanted in enumerate([67.61315, 462.974, 372.080]):
+        assert wanted < cubic(modes, mode) < (1.0 + 5e-5) * wanted
+
+
 @pytest.mark.slow
 def test_a_strip_that_rolls_up_does_not_stretch():
     """A cantilever's first mode is all but a cylinder; between walls a strip stretches as a beam."""

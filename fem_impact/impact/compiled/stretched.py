@@ -244,8 +244,8 @@ def parted(bodies, contacts, room, limits):
     q, p = bodies.q, bodies.p
     energy = stretching_energy(room, q)
     for n in range(q.size):
-        if stretches(room, n):
-            w = bodies.omega[n]
+        w = bodies.omega[n]
+        if stretches(room, n) and w > 0.0:
             energy += 0.5 * (p[n] ** 2 + (w * q[n] - bodies.bias[n] / w) ** 2)
     for i in range(contacts.end.size):
         position = contacts.offset[i]
