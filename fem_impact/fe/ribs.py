@@ -13,7 +13,7 @@ art. 109 (torsion of a bar of rectangular section).
 from collections.abc import Callable
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -122,8 +122,39 @@ def sides_on(mesh: Mesh, path: Any) -> np.ndarray:
     return sides[on]
 
 
+class Piece(NamedTuple):
+    """The sides of triangles on which a rib lies, at Gauss points."""
+
+    cells: np.ndarray  # (n,)
+    area: np.ndarray  # (n, n_q, 3) coordinates in the cells
+    x: np.ndarray  # (n, n_q, 2) in the frame
+    ds: np.ndarray  # (n, n_q) weights, in the frame
+    along: np.ndarray  # (n, n_q, 3) what strains xx, yy and 2 xy are along it
+    twist: np.ndarray  # (n, n_q, 3) what curvatures xx, yy and 2 xy are as a twist
+    stiffness: np.ndarray  # (n, n_q, 3, 3) as of `Rib.rigidity`
+    inertia: np.ndarray  # (n, n_q) [kg/m]
+
+
+def pieces(body: Body, domain: Domain) -> list[Piece]:
+    """Where the ribs of a plate lie, one for each."""
+    found = []
+    for rib in body.section.ribs:
+        facets = sides_on(body.mesh, rib.path)
+        cells = cells_of_facets(facets, domain.space.vertices)[0]
+        area, x, normal = at_facets(domain.space, facets, cells)
+        ds = np.linalg.norm(normal, axis=2)
+        nx, ny = np.moveaxis(normal / ds[..., None], 2, 0)
+        along = np.stack([ny**2, nx**2, -nx * ny], axis=-1)  # for the tangent (-ny, nx)
+        twist = np.stack([-nx * ny, nx * ny, 0.5 * (nx**2 - ny**2)], axis=-1)
+        place = domain.frame.places(x)
+        stiffness, inertia = rib.rigidity(place, evaluate("thickness", body.section.thickness, place, "m"))
+        stiffness = stiffness.reshape(*ds.shape, 3, 3)
+        found.append(Piece(cells, area, x, ds, along, twist, stiffness, inertia.reshape(ds.shape)))
+    return found
+
+
 def attached(
-    body: Body, domain: Domain, dofs: np.ndarray, n_all: int, strained: Callable[..., np.ndarray]
+    domain: Domain, dofs: np.ndarray, n_all: int, strained: Callable[..., np.ndarray]
 ) -> tuple[Sparse, Sparse]:
     """Stiffness and mass (n_all, n_all) of the ribs of a plate, on unknowns ``dofs`` (n_local, n_cells).
 
@@ -133,30 +164,18 @@ def attached(
     frame, space = domain.frame, domain.space
     K, M = (np.zeros((0, len(dofs), len(dofs))) for _ in range(2))
     where = np.zeros(0, int)
-    for rib in body.section.ribs:
-        facets = sides_on(body.mesh, rib.path)
-        cells = cells_of_facets(facets, space.vertices)[0]
-        area, x, normal = at_facets(space, facets, cells)
-        ds = np.linalg.norm(normal, axis=2)
-        nx, ny = np.moveaxis(normal / ds[..., None], 2, 0)
-        along = np.stack([ny**2, nx**2, -nx * ny], axis=-1)  # of strains xx, yy, 2 xy, for the tangent (-ny, nx)
-        twist = np.stack([-nx * ny, nx * ny, 0.5 * (nx**2 - ny**2)], axis=-1)
+    size = np.array([1.0, 1.0 / frame.length, 1.0 / frame.length])
+    for cells, area, x, ds, along, twist, stiffness, inertia in space.ribs:
         parts = strained(space, cells, area, x)
         own = np.stack(
             [np.einsum("nqi,nqik->nqk", turn, parts[:, :, half])
              for turn, half in ((along, slice(3)), (along, slice(3, 6)), (twist, slice(3, 6)))], axis=2,
         )  # fmt: skip
-        place = frame.places(x)
-        thickness = evaluate("thickness", body.section.thickness, place, "m")
-        stiffness, inertia = rib.rigidity(place, thickness)
-        size = np.array([1.0, 1.0 / frame.length, 1.0 / frame.length])
-        stiffness = stiffness * np.outer(size, size) * frame.length / frame.stiffness
-        stiffness = stiffness.reshape(*ds.shape, 3, 3) * ds[..., None, None]
-        inertia = inertia.reshape(ds.shape) * ds / (frame.inertia * frame.length)
+        stiff = stiffness * np.outer(size, size) * frame.length / frame.stiffness * ds[..., None, None]
         value = space.functions(cells, x, (0,))[0][:, :, None]
         K, M, where = (
-            np.concatenate([K, gram(own, stiffness)]),
-            np.concatenate([M, gram(value, inertia)]),
+            np.concatenate([K, gram(own, stiff)]),
+            np.concatenate([M, gram(value, inertia * ds / (frame.inertia * frame.length))]),
             np.append(where, cells),
         )
     return scatter(K, dofs[:, where], n_all), scatter(M, dofs[:, where], n_all)

@@ -36,6 +36,7 @@ class ShallowSpace(PlaneSpace):
     """Shape functions of one mesh: 21 of the deflection, then 15 for each displacement in the plane."""
 
     heights: np.ndarray  # (n_cells, 15) rise at the nodes of the plane, in the frame
+    ribs: list[ribs.Piece]
 
     def linear(self, element_dofs: np.ndarray, n_all: int) -> np.ndarray:
         """Unknowns (n_all, 6) of the deflections 1, x and y, and of the rigid motions in the plane."""
@@ -90,7 +91,8 @@ def _hold(body: Body, domain: Domain) -> Held:
     dofs = np.vstack([dofs, n_flat + own.element_dofs, n_flat + own.N + own.element_dofs])
     expand, project = plane.beside(expand, loose), plane.beside(project, loose.T)
     n_all = expand.shape[0]
-    held = ribs.attached(body, domain, dofs, n_all, strained) if body.section.ribs else None
+    space.ribs = ribs.pieces(body, domain)
+    held = ribs.attached(domain, dofs, n_all, strained) if space.ribs else None
     return Held(expand, project, dofs, plates.springs(body, domain, dofs, n_all), rim, held)
 
 

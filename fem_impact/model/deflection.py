@@ -155,7 +155,7 @@ def _stretched(struck: Struck, body: Known, integrals: Bending) -> Assumption:
     if len(forms) < membrane.most(forms.shape[1]):
         return STRETCHED.judged(struck, value, dict.fromkeys(struck.quantities, 0.0), LOCAL)
     n = forms.shape[1] if forms.shape[1] == moved.shape[1] else forms.shape[1] // 2
-    fewer = replace(history.stretched, forms=np.ascontiguousarray(forms[: len(forms) // 2, :n, :n]))
+    fewer = history.stretched.part(len(forms) // 2, n)
     effect = struck.changes(stretched=fewer)
     if "sound" in effect:
         whole, part = (sum(each.energy(q) for q in states[TIMES:]) for each in (history.stretched, fewer))

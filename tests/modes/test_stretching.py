@@ -111,6 +111,99 @@ def test_a_rectangle_that_may_move_in_its_plane_has_the_cubic_coefficients_of_ai
         assert wanted < cubic(modes, mode) < (1.0 + 5e-5) * wanted
 
 
+def panel(radius, n_modes=1, in_plane="sliding", sides=(0.3, 0.2), size=0.05):
+    """A paraboloid on hinged edges."""
+    middle = 0.5 * np.array(sides)
+    system = fi.assemble(
+        fi.mesh.rectangle(*sides, size=size), PLATE, {"boundary": "hinged"}, in_plane={"boundary": in_plane},
+        rise=lambda x: -((x - middle) ** 2).sum(axis=1) / (2.0 * radius),
+    )  # fmt: skip
+    return fi.find_modes(system, n_modes=n_modes)
+
+
+def energies(modes, q):
+    """Quadratic, cubic and quartic energy of stretching."""
+    found = stretch(modes)
+    lead, bent = found.linear @ q, np.einsum("kij,i,j->k", found.forms, q, q)
+    return 0.25 * lead @ lead, 0.5 * lead @ bent, 0.25 * bent @ bent
+
+
+# of the triangles, and of fields left out
+@pytest.mark.parametrize("n_modes, rel", [(1, 2e-5), (4, 2e-5), pytest.param(24, 1e-3, marks=pytest.mark.slow)])
+def test_a_spherical_panel_on_shear_diaphragms_is_that_of_its_closed_form(n_modes, rel):
+    """Airy's function of w = a sin sin is -E h w / (R k**2): its stresses stretch by E / (rho R**2), and work on w'**2.
+
+    The blow's deflection is away from the striker, into the dome: it shortens it first.
+    """
+    sides, radius = (0.3, 0.2), 2.0
+    modes = panel(radius, n_modes)
+    middle = modes.shape_at([(0.15, 0.1)])[0]
+    wave = np.pi / np.array(sides)
+    top = 2.0 / np.sqrt(RHO * H * sides[0] * sides[1])
+    assert abs(middle[0]) == pytest.approx(top, rel=2e-5)
+    q = np.eye(n_modes)[0] * np.sign(middle[0])
+    square, cube, _ = energies(modes, q)
+    assert square == pytest.approx(0.5 * E / (RHO * radius**2), rel=rel)
+    assert cube == pytest.approx(-4.0 / 3.0 * E * H * wave.prod() * top**3 / (radius * (wave @ wave)), rel=rel)
+
+
+def settled(sides, radius, top, n=10):
+    """Energies of the same panel with w = top sin sin, by displacements in its plane that are polynomials of degree n.
+
+    Each is zero along the edges that hold it; across those that do not, the stress vanishes as the energy is least.
+    """
+    node, weight = np.polynomial.legendre.leggauss(2 * n + 8)
+    power = np.polynomial.legendre.legvander(node, n)
+    slope = np.stack([np.polynomial.legendre.Legendre.basis(i).deriv()(node) for i in range(n + 1)], axis=1)
+    bow = (1.0 - node**2)[:, None]
+    free, tied = (power, slope), (bow * power, bow * slope - 2.0 * node[:, None] * power)
+    half = 0.5 * np.array(sides)
+
+    def flat(along_x, along_y):
+        return np.einsum("x...,y...->xy...", along_x, along_y).ravel()
+
+    def strains(u, v):
+        """Strains xx, yy and 2 xy (n_q, 3, n_terms) of products in u, then in v."""
+        parts = [
+            [np.einsum("xi,yj->xyij", f[i == 0], g[i == 1]).reshape(len(node) ** 2, -1) / half[i] for i in (0, 1)]
+            for f, g in (u, v)
+        ]
+        (ux, uy), (vx, vy) = parts
+        rows = np.hstack([ux, 0.0 * vx]), np.hstack([0.0 * ux, vy]), np.hstack([uy, vx])
+        return np.stack(rows, axis=1)
+
+    strain = strains((free, tied), (tied, free))  # u is held on the edges along x, v on those along y
+    turn, one = 0.5 * np.pi * (node + 1.0), np.ones(len(node))
+    wx, wy = (
+        top * np.pi / sides[0] * flat(np.cos(turn), np.sin(turn)),
+        top * np.pi / sides[1] * flat(np.sin(turn), np.cos(turn)),
+    )
+    zx, zy = -flat(half[0] * node, one) / radius, -flat(one, half[1] * node) / radius
+    rows = [zx * wx, zy * wy, zx * wy + zy * wx], [0.5 * wx**2, 0.5 * wy**2, wx * wy]
+    loads = np.stack([np.stack(row, axis=1) for row in rows], axis=-1)  # (n_q, 3, 2)
+    stiff = E * H / (1.0 - NU**2) * np.array([[1.0, NU, 0.0], [NU, 1.0, 0.0], [0.0, 0.0, 0.5 * (1.0 - NU)]])
+    dx = half.prod() * flat(weight, weight)
+
+    def works(one, two):
+        return np.einsum("q,qik,ij,qjl->kl", dx, one, stiff, two, optimize=True)
+
+    found = np.linalg.lstsq(works(strain, strain), works(strain, loads), rcond=1e-13)[0]
+    left = loads - strain @ found
+    both = works(left, left)
+    return 0.5 * both[0, 0], -both[0, 1], 0.5 * both[1, 1]  # the blow goes the other way
+
+
+@pytest.mark.slow
+def test_energies_of_a_panel_are_those_of_polynomials_in_its_plane():
+    sides, radius = (0.3, 0.2), 1.5
+    dome, bowl = panel(radius, size=0.03), panel(-radius, size=0.03)
+    tops = [modes.shape_at([(0.15, 0.1)])[0, 0] for modes in (dome, bowl)]
+    wanted = np.array(settled(sides, radius, abs(tops[0])))
+    # of the triangles: 2e-5 to 1e-4 at size 0.05; polynomials of degree 8 give the same to 1e-5, of degree 12 to 1e-8
+    assert energies(dome, np.sign(tops[:1])) == pytest.approx(wanted, rel=2e-6)
+    assert energies(bowl, np.sign(tops[1:])) == pytest.approx(wanted * [1.0, -1.0, 1.0], rel=2e-6)  # struck from below
+
+
 @pytest.mark.slow
 def test_a_strip_that_rolls_up_does_not_stretch():
     """A cantilever's first mode is all but a cylinder; between walls a strip stretches as a beam."""
