@@ -10,11 +10,12 @@ exactly if there are enough of them, and less with fewer: each adds to it. The f
 most when the low modes swing with equal energies; quartic elements on the triangles of the plate find u.
 
 A plate that is curved, ribbed or unevenly layered has stresses in its plane from its linear motion, too, see `shallow`.
-They are in equilibrium, with the share ``l_k`` of field k, and their work on ``1/2 w' w'`` comes in addition:
+They are in equilibrium, with the share ``l_k`` of field k, and their work on ``1/2 w' w'`` comes in addition,
 
-    V = 1/2 sum_k ((l_k + 1/2 int w' . N_k w')**2 - l_k**2),
+    V = 1/2 sum_k ((l_k + 1/2 int w' . N_k w')**2 - l_k**2).
 
-Such stresses count among those that choose the fields, with as much weight in all. A rib stretches along its line.
+Such stresses count among those that choose the fields, with as much weight in all at most. A rib stretches along its
+line.
 
 References
 ----------
@@ -150,10 +151,9 @@ def forms(sheet: Sheet, steep: Steep, omega: np.ndarray, taut: Taut | None = Non
     # 1/2 of both slopes, and pairs of different modes count twice in the energy; equal energies
     weight = np.where(i == j, 0.5, np.sqrt(0.5)) / (omega[i] * omega[j])
     if more:
-        sizes = [
-            w**2 @ np.diag(products)[part] for w, part in ((weight, slice(len(i))), (1.0 / omega, slice(-n, None)))
-        ]
-        weight = np.append(weight, np.sqrt(sizes[0] / (sizes[1] or np.inf)) / omega)
+        own = np.diag(products)
+        pairs, motions = weight**2 @ own[:-n], omega**-2.0 @ own[-n:]  # the second: shares of their energies
+        weight = np.append(weight, np.sqrt(pairs / max(1.0, motions)) / omega)
     size, kept = (each[..., ::-1] for each in np.linalg.eigh(products * weight[:, None] * weight))
     missing = 1.0 - np.cumsum(size) / size.sum()
     count = min(most(n), 1 + int(np.count_nonzero(missing > LEFT_OUT)))

@@ -124,7 +124,10 @@ def panel(radius, n_modes=1, in_plane="sliding", sides=(0.3, 0.2), size=0.05):
 def energies(modes, q):
     """Quadratic, cubic and quartic energy of stretching."""
     found = stretch(modes)
-    lead, bent = found.linear @ q, np.einsum("kij,i,j->k", found.forms, q, q)
+    lead, bent = (
+        found.linear @ q if len(found.linear) else np.zeros(len(found.forms)),
+        np.einsum("kij,i,j->k", found.forms, q, q),
+    )
     return 0.25 * lead @ lead, 0.5 * lead @ bent, 0.25 * bent @ bent
 
 
@@ -202,6 +205,54 @@ def test_energies_of_a_panel_are_those_of_polynomials_in_its_plane():
     # of the triangles: 2e-5 to 1e-4 at size 0.05; polynomials of degree 8 give the same to 1e-5, of degree 12 to 1e-8
     assert energies(dome, np.sign(tops[:1])) == pytest.approx(wanted, rel=2e-6)
     assert energies(bowl, np.sign(tops[1:])) == pytest.approx(wanted * [1.0, -1.0, 1.0], rel=2e-6)  # struck from below
+
+
+@pytest.mark.parametrize("supports", [{}, {"left": "clamped"}])
+def test_where_a_layer_weighs_and_bears_nothing_the_plate_is_as_without_it(supports):
+    """Only the plane that its displacements count in lies elsewhere, which no edge holds."""
+    ghost = fi.Material(E=1e-3, nu=NU, rho=1e-6)
+    sections = PLATE, fi.Plate.laminate([(ghost, 2e-3, 0.0), (STEEL, H, 0.0)])
+    flat, offset = (
+        fi.find_modes(
+            fi.assemble(fi.mesh.rectangle(0.3, 0.2, size=0.05), section, supports, in_plane={"boundary": "free"}),
+            n_modes=9,
+        )
+        for section in sections
+    )
+    found = []
+    for modes in (flat, offset):
+        soft = np.divide(1.0, modes.omega**2, out=np.zeros(9), where=modes.omega > 0.0)
+        found.append(energies(modes, modes.shape_at([(0.07, 0.03)])[0] * soft))
+    square, cube, fourth = found[1]
+    assert fourth == pytest.approx(found[0][2], rel=1e-6, abs=0.0)  # P4 holds the slopes that the other plane adds
+    assert abs(square) < 1e-9 * fourth and abs(cube) < 1e-9 * fourth
+
+
+@pytest.mark.parametrize("offset", [4e-3, None])
+def test_a_ribbed_strip_between_walls_stretches_as_a_t_beam(offset):
+    """Along the common centroid, z above the middle that the walls hold: E A (mean of w'**2 / 2 - z w'')**2 / 2.
+
+    The blow's deflection is -w: a rib on the struck side is shortened first, as a dome is.
+    """
+    length, wide, deep = 0.3, 0.01, 5e-3
+    steel = fi.Material(E=E, nu=0.0, rho=RHO)
+    rib = fi.Rib([(0.0, 0.5 * wide), (length, 0.5 * wide)], fi.Beam.rectangular(steel, width=2e-3, height=deep), offset)
+    system = fi.assemble(
+        fi.mesh.rectangle(length, wide, size=0.02), fi.Plate(steel, H), {"left": "hinged", "right": "hinged"},
+        ribs=[rib],
+    )  # fmt: skip
+    modes = fi.find_modes(system, n_modes=1)
+    x = np.linspace(0.0, length, 2001)
+    w = modes.shape_at(np.column_stack([x, np.full(2001, 0.5 * wide)]))[:, 0]
+    sign = np.sign(w[1000])
+    slope = np.gradient(sign * w, x, edge_order=2)
+    area, own = H * wide, 2e-3 * deep
+    z = own * (-0.5 * (H + deep) if offset is None else offset) / (area + own)
+    lead, mean = -z * (slope[-1] - slope[0]) / length, 0.5 * np.trapezoid(slope**2, x) / length
+    _, cube, fourth = energies(modes, np.array([sign]))
+    stiff = E * (area + own) * length
+    # across a strip of a thirtieth of its length stresses are all but even
+    assert (cube, fourth) == pytest.approx((-stiff * lead * mean, 0.5 * stiff * mean**2), rel=2e-4)
 
 
 @pytest.mark.slow
