@@ -6,6 +6,9 @@ and a plate that is free all round stretches where its bent surface cannot be un
 is ``N = E A s / (2 L)`` with ``s = int w'**2``, and the energy ``N s / 4``; if it is not uniform, L / (E A) becomes an
 integral.
 
+A curved, ribbed or unevenly layered plate, whose plane answers to its linear motion, has quadratic forces besides:
+pressed on its top a dome softens, and may snap through, and from below it hardens.
+
 It is the leading term: good for deflections up to about the thickness, where the frequency of a hinged square rises by
 half. Only the first 40 modes of a plate stretch, and 18 or more stress fields count: half as many of both change the
 restitution by 2e-4 at a deflection of one thickness (`studies/verification/is_the_model_right.py`).

@@ -297,7 +297,14 @@ def uneven():
     return fi.find_modes(system, n_modes=24, damping_ratio=0.01)
 
 
+def cymbal():
+    rise = fi.rise.cymbal(0.2, bow=0.02, cup_radius=0.05, cup=0.01)
+    system = fi.assemble(fi.mesh.disk(0.2, size=0.06), fi.Plate(STEEL, H), rise=rise)
+    return fi.find_modes(system, n_modes=40, damping_ratio=0.003)
+
+
 BODIES = {
+    "cymbal, free": (cymbal, 0.8),
     "dome": (partial(shell, 4.0), 0.5),
     "bowl": (partial(shell, -4.0), 0.5),
     "deep dome": (partial(shell, 1.0), 2.0),
@@ -314,16 +321,17 @@ BODIES = {
 def test_effect_on_curved_and_ribbed_bodies_is_that_of_a_blow_with_stretching(name):
     body, speed = BODIES[name]
     modes = body()
-    how = {"at": (0.14, 0.09), "speed": speed, "residual": False, "max_impacts": 1, "tolerance": 1e-5}
+    how = {"at": (0.14, 0.09), "speed": speed, "residual": False, "max_impacts": 1, "tolerance": 1e-4}
     plain, better = (
         fi.strike(modes, fi.Striker.rigid(0.05), fi.Contact.linear(1e5), stretching=on, **how) for on in (False, True)
     )
     numbers = [np.array([hit.contact_time, hit.impulse, hit.peak_force]) for hit in (plain, better)]
     true = max(abs(better.restitution - plain.restitution), np.abs(numbers[1] / numbers[0] - 1.0).max())
     told = found(plain)
-    # flat ones by a mean tension, others by sixteen of the modes
-    assert true > 1e-3 and true / 3.0 < told.worst < 3.0 * true, (true, told.worst, told.value)
-    assert found(better).known and found(better).worst < 0.1 * told.worst and better.energy_error < 1e-12
+    # flat ones by a mean tension, others by their stretching in the steps of a first run
+    allowed = 3.0 if name.startswith("flat") else 1.1
+    assert true > 1e-3 and true / allowed < told.worst < allowed * true, (true, told.worst, told.value)
+    assert found(better).known and found(better).worst < 0.5 * told.worst and better.energy_error < 1e-12
 
 
 @pytest.mark.slow
