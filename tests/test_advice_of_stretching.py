@@ -43,8 +43,8 @@ def measured():
     return replace(known, section=PLATE)
 
 
-def elements(supports=ALL_ROUND, element=None):
-    system = fi.assemble(fi.mesh.rectangle(*SIDES, size=0.1), PLATE, supports, element)
+def elements(supports=ALL_ROUND, element=None, in_plane=None):
+    system = fi.assemble(fi.mesh.rectangle(*SIDES, size=0.1), PLATE, supports, element, in_plane=in_plane)
     return fi.find_modes(system, n_modes=8)
 
 
@@ -73,8 +73,9 @@ STRETCHING = {
     "modes at points": (lambda: blow(measured()), ", but its shapes are known at points only; leave it out$",
      [lambda: linear(measured())]),
     "a plate on springs": (lambda: blow(elements({"boundary": fi.Elastic(1e6, 0.0)})),
-     r", but (?:its edge is elastic, which does not say how .*|\{\}); hold it, or leave stretching out$",
-     [lambda: blow(elements()), lambda: linear(elements({"boundary": fi.Elastic(1e6, 0.0)}))]),
+     r"(?:its edge is elastic, which does not say how .*|\{\}); say so with in_plane, hold it, or leave .* out$",
+     [lambda: blow(elements({"boundary": fi.Elastic(1e6, 0.0)}, in_plane={"boundary": "free"})),
+      lambda: blow(elements()), lambda: linear(elements({"boundary": fi.Elastic(1e6, 0.0)}))]),
     "elements without slopes": (lambda: blow(elements(element="morley")),
      "does not work with element 'morley'; take 'argyris', or leave stretching out$",
      [lambda: blow(elements(element="argyris")), lambda: linear(elements(element="morley"))]),

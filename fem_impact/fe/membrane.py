@@ -9,8 +9,17 @@ equilibrium that are normalised as ``int N_k . A^-1 N_l = 1`` if k = l and 0 oth
 exactly if there are enough of them, and less with fewer: each adds to it. The fields kept here are those that matter
 most when the low modes swing with equal energies; quartic elements on the triangles of the plate find u.
 
+A plate that is curved, ribbed or unevenly layered has stresses in its plane from its linear motion, too, see `shallow`.
+They are in equilibrium, with the share ``l_k`` of field k, and their work on ``1/2 w' w'`` comes in addition,
+
+    V = 1/2 sum_k ((l_k + 1/2 int w' . N_k w')**2 - l_k**2).
+
+Such stresses count among those that choose the fields, with as much weight in all at most. A rib stretches along its
+line.
+
 References
 ----------
+Marguerre (1938), Proc. 5th Int. Congr. Appl. Mech., 93-101;
 von Karman (1910), Encyklopaedie der mathematischen Wissenschaften IV/4, 349; Chu and Herrmann (1956), J. Appl. Mech.
 23, 532-540.
 """
@@ -40,17 +49,21 @@ WORK = 30_000  # [-] entries of all forms together, to limit the work of a step:
 LEFT_OUT = 1e-6
 
 Steep = Callable[[np.ndarray, np.ndarray], np.ndarray]
+Taut = Callable[[np.ndarray], np.ndarray]
 
 
 @dataclass(frozen=True, eq=False)
 class Sheet:
-    """The plane of a plate at the quadrature points of its triangles."""
+    """The plane of a plate at the quadrature points of its triangles, and then of their sides along ribs."""
 
-    x: np.ndarray  # (n_cells, n_q, 2) in the frame
-    moduli: np.ndarray  # (n_cells, n_q, 3, 3) [N m] A times the weights, on strains xx, yy, 2 xy
-    gradient: np.ndarray  # (n_cells, n_q, 2, 15) of the shape functions, in the frame
-    dofs: np.ndarray  # (n_cells, 30) numbers of u, then v
+    cells: np.ndarray  # (n,) the triangle of each piece
+    area: np.ndarray  # (n, n_q, 3) coordinates in it
+    x: np.ndarray  # (n, n_q, 2) in the frame
+    moduli: np.ndarray  # (n, n_q, 3, 3) [N m] A times the weights, on strains xx, yy, 2 xy
+    gradient: np.ndarray  # (n, n_q, 2, 15) of the shape functions, in the frame
+    dofs: np.ndarray  # (n, 30) numbers of u, then v
     loose: Sparse  # (n_dofs, n_left) map to these unknowns that supports leave
+    neutral: np.ndarray  # (n, n_q, 3, 3) [-] strain by which a negative curvature acts, where bending stretches it
 
     @classmethod
     def of(cls, system: System) -> "Sheet":
@@ -61,17 +74,25 @@ class Sheet:
         X, x, dx = slopes.quadrature(system, NODES)
         gradient = np.einsum("eqji,jqk->eqik", inverses(space, X), plane.reference(X)[1])
         h = evaluate("thickness", section.thickness, frame.places(x), "m").reshape(dx.shape)
-        moduli = (frame.length**2 * h * dx)[..., None, None] * section.material.plane_stress
+        moduli = (frame.length**2 * h * dx)[..., None, None] * section.stretched
         own = Dofs(triangles(rim.points, space.vertices), ElementTriP4())
         dofs = np.vstack([own.element_dofs, own.N + own.element_dofs]).T
-        return cls(x, moduli, gradient, dofs, plane.loosened(space.inner, rim, own)[0])
+        area = np.broadcast_to(np.stack([1.0 - X[0] - X[1], *X], axis=1), (*dx.shape, 3))
+        neutral = np.zeros((*dx.shape, 3, 3))
+        if section.coupled:
+            walls = section.walls(frame.centre[None])[0]
+            neutral[:] = np.linalg.solve(walls[:3, :3], walls[:3, 3:]) / frame.length
+        plate = np.arange(len(x)), area, x, moduli, gradient, neutral
+        parts = [plate, *(_along(space, rib, frame.length, x.shape[1]) for rib in getattr(space, "ribs", ()))]
+        cells, area, x, moduli, gradient, neutral = (np.concatenate(each) for each in zip(*parts))
+        return cls(cells, area, x, moduli, gradient, dofs[cells], plane.loosened(space.inner, rim, own)[0], neutral)
 
-    def strains(self, cells: np.ndarray) -> np.ndarray:
-        """Strains (n, n_q, 3, 30) of the unknowns of cells (n,)."""
-        return plane.strains(self.gradient[cells])
+    def strains(self, pieces: np.ndarray) -> np.ndarray:
+        """Strains (n, n_q, 3, 30) of the unknowns of pieces (n,)."""
+        return plane.strains(self.gradient[pieces])
 
     def blocks(self, n_pairs: int) -> list[np.ndarray]:
-        """Numbers of the cells in blocks, to limit the memory that pairs of modes take."""
+        """Numbers of the pieces in blocks, to limit the memory that pairs of modes take."""
         most = max(1, ENTRIES // (3 * n_pairs * self.x.shape[1]))
         return np.array_split(np.arange(len(self.x)), -(-len(self.x) // most))
 
@@ -93,8 +114,10 @@ def most(n_modes: int) -> int:
     return max(1, min(MOST, WORK // n_modes**2))
 
 
-def forms(sheet: Sheet, steep: Steep, omega: np.ndarray) -> np.ndarray:
-    """Forms S (n_forms, n_modes, n_modes) of the energy ``V = 1/2 sum_k (q' S_k q)**2`` of modes q.
+def forms(sheet: Sheet, steep: Steep, omega: np.ndarray, taut: Taut | None = None) -> tuple[np.ndarray, np.ndarray]:
+    """Forms S (n_forms, n_modes, n_modes) and rows l (n_forms, n_modes) of the energy of modes q.
+
+    It is ``V = 1/2 sum_k ((l_k q + q' S_k q)**2 - (l_k q)**2)``; without ``taut``, there are no rows l.
 
     Parameters
     ----------
@@ -102,34 +125,65 @@ def forms(sheet: Sheet, steep: Steep, omega: np.ndarray) -> np.ndarray:
     steep : callable
         Slopes (n, n_q, 2, n_modes) [m**-1 kg**-0.5] of the modes at points (n, n_q, 2) of cells (n,), in the frame.
     omega : ndarray, shape (n_modes,) [rad/s]
+    taut : callable, optional
+        Strains (n, n_q, 3, n_modes) [m**-1 kg**-0.5] at the points of pieces (n,), whose stress is that by the linear
+        motion of the modes.
     """
     n, low = len(omega), min(SWINGING, len(omega))
+
+    def strained(pieces: np.ndarray, i: np.ndarray, j: np.ndarray) -> np.ndarray:
+        pair = _pairs(steep(sheet.cells[pieces], sheet.x[pieces]), i, j)
+        return pair if taut is None else np.concatenate([pair, taut(pieces)], axis=-1)
+
     i, j = np.triu_indices(low)
-    products, load = np.zeros((len(i), len(i))), np.zeros((sheet.dofs.max() + 1, len(i)))
-    for cells in sheet.blocks(len(i)):
-        pair = _pairs(steep(cells, sheet.x[cells]), i, j)
-        stress = _flat(sheet.moduli[cells] @ pair)
-        products += _flat(pair).reshape(-1, len(i)).T @ stress.reshape(-1, len(i))
-        pushed = _flat(sheet.strains(cells)).transpose(0, 2, 1) @ stress  # (n_cells, 30, n_pairs)
-        np.add.at(load, sheet.dofs[cells], pushed)
+    more = 0 if taut is None else n
+    width = len(i) + more
+    products, load = np.zeros((width, width)), np.zeros((sheet.dofs.max() + 1, width))
+    for pieces in sheet.blocks(width):
+        strain = strained(pieces, i, j)
+        stress = _flat(sheet.moduli[pieces] @ strain)
+        products += _flat(strain).reshape(-1, width).T @ stress.reshape(-1, width)
+        pushed = _flat(sheet.strains(pieces)).transpose(0, 2, 1) @ stress  # (n_pieces, 30, width)
+        np.add.at(load, sheet.dofs[pieces], pushed)
     loose: Any = sheet.loose
     settled = -loose @ factorise(loose.T @ sheet.stiffness @ loose).solve(loose.T @ load)
+    products = products + load.T @ settled
     # 1/2 of both slopes, and pairs of different modes count twice in the energy; equal energies
     weight = np.where(i == j, 0.5, np.sqrt(0.5)) / (omega[i] * omega[j])
-    size, kept = (each[..., ::-1] for each in np.linalg.eigh((products + load.T @ settled) * weight[:, None] * weight))
+    if more:
+        own = np.diag(products)
+        pairs, motions = weight**2 @ own[:-n], omega**-2.0 @ own[-n:]  # the second: shares of their energies
+        weight = np.append(weight, np.sqrt(pairs / max(1.0, motions)) / omega)
+    size, kept = (each[..., ::-1] for each in np.linalg.eigh(products * weight[:, None] * weight))
     missing = 1.0 - np.cumsum(size) / size.sum()
     count = min(most(n), 1 + int(np.count_nonzero(missing > LEFT_OUT)))
     mixed = weight[:, None] * kept[:, :count] / np.sqrt(size[:count])
     moved = settled @ mixed
     every = np.triu_indices(n)
+    width = len(every[0]) + more
+    work = np.zeros((count, width))
+    for pieces in sheet.blocks(width):
+        strain = strained(pieces, i, j) @ mixed + sheet.strains(pieces) @ moved[sheet.dofs[pieces]][:, None]
+        stress = sheet.moduli[pieces] @ strain
+        work += stress.reshape(-1, count).T @ strained(pieces, *every).reshape(-1, width)
     result = np.zeros((count, n, n))
-    for cells in sheet.blocks(len(every[0])):
-        slope = steep(cells, sheet.x[cells])
-        strain = _pairs(slope, i, j) @ mixed + sheet.strains(cells) @ moved[sheet.dofs[cells]][:, None]
-        stress = sheet.moduli[cells] @ strain
-        result[:, *every] += 0.5 * stress.reshape(-1, count).T @ _pairs(slope, *every).reshape(-1, len(every[0]))
+    result[:, *every] = 0.5 * work[:, : len(every[0])]
     upper = np.triu(result, 1)
-    return result + upper.transpose(0, 2, 1)
+    return result + upper.transpose(0, 2, 1), work[:, len(every[0]) :]
+
+
+def _along(space: Any, rib: Any, length: float, n_q: int) -> tuple[np.ndarray, ...]:
+    """Pieces of `Sheet` along a rib, with points without weight up to n_q, in a frame of a length [m]."""
+    cells, area, x, ds, along = rib.cells, rib.area, rib.x, rib.ds, rib.along
+    stretch, bent = (rib.stiffness[..., 0, i] for i in (0, 1))
+    moduli = (length * stretch * ds)[..., None, None] * along[..., None] * along[..., None, :]
+    neutral = (bent / (stretch * length))[..., None, None] * np.eye(3)
+
+    def padded(values: np.ndarray, mode: Any = "edge") -> np.ndarray:
+        return np.pad(values, [(0, 0), (0, n_q - ds.shape[1]), *[(0, 0)] * (values.ndim - 2)], mode=mode)
+
+    gradient = plane.gradients(space.inner, cells, area)
+    return cells, padded(area), padded(x), padded(moduli, "constant"), padded(gradient), padded(neutral)
 
 
 def _pairs(slope: np.ndarray, i: np.ndarray, j: np.ndarray) -> np.ndarray:

@@ -151,35 +151,39 @@ def around_ends(mesh: Mesh, ribs: Sequence[Rib]) -> Mesh:
     return towards(mesh, {vertex: number for vertex, number in rings.items() if number})
 
 
-class Line(NamedTuple):
-    """A rib at the Gauss points of the sides of triangles that it follows."""
+class Piece(NamedTuple):
+    """The sides of triangles on which a rib lies, at Gauss points."""
 
     rib: Rib
     facets: np.ndarray  # (n, 2) vertices of the sides
     cells: np.ndarray  # (n,)
-    area: np.ndarray  # (n, n_q, 3) area coordinates
+    area: np.ndarray  # (n, n_q, 3) coordinates in the cells
     x: np.ndarray  # (n, n_q, 2) in the frame
-    normal: np.ndarray  # (n, n_q, 2)
-    ds: np.ndarray  # (n, n_q) weights
-    stiffness: np.ndarray  # (n, n_q, 3, 3) [N], [N m] and [N m^2], see `Rib.rigidity`
+    ds: np.ndarray  # (n, n_q) weights, in the frame
+    along: np.ndarray  # (n, n_q, 3) what strains xx, yy and 2 xy are along it
+    twist: np.ndarray  # (n, n_q, 3) what curvatures xx, yy and 2 xy are as a twist
+    stiffness: np.ndarray  # (n, n_q, 3, 3) as of `Rib.rigidity`
     inertia: np.ndarray  # (n, n_q) [kg/m]
 
     @classmethod
-    def of(cls, rib: Rib, body: Subject, domain: Domain) -> "Line":
-        """That of a rib of a body."""
-        facets, space = sides_on(body.mesh, rib.path), domain.space
-        cells = cells_of_facets(facets, space.vertices)[0]
-        area, x, normal = at_facets(space, facets, cells)
+    def of(cls, rib: Rib, body: Subject, domain: Domain) -> "Piece":
+        """Where a rib of a plate lies."""
+        facets = sides_on(body.mesh, rib.path)
+        cells = cells_of_facets(facets, domain.space.vertices)[0]
+        area, x, normal = at_facets(domain.space, facets, cells)
         ds, place = np.linalg.norm(normal, axis=2), domain.frame.places(x)
+        nx, ny = np.moveaxis(normal / ds[..., None], 2, 0)
+        along = np.stack([ny**2, nx**2, -nx * ny], axis=-1)  # for the tangent (-ny, nx)
+        twist = np.stack([-nx * ny, nx * ny, 0.5 * (nx**2 - ny**2)], axis=-1)
         stiffness, inertia = rib.rigidity(place, evaluate("thickness", body.section.thickness, place, "m"))
         shaped = stiffness.reshape(*ds.shape, 3, 3), inertia.reshape(ds.shape)
-        return cls(rib, facets, cells, area, x, normal / ds[..., None], ds, *shaped)
+        return cls(rib, facets, cells, area, x, ds, along, twist, *shaped)
 
 
 def attached(
-    lines: list[Line], domain: Domain, dofs: np.ndarray, n_all: int, strained: Callable[..., np.ndarray]
+    domain: Domain, dofs: np.ndarray, n_all: int, strained: Callable[..., np.ndarray]
 ) -> tuple[Sparse, Sparse]:
-    """Stiffness and mass (n_all, n_all) of ribs, on unknowns ``dofs`` (n_local, n_cells).
+    """Stiffness and mass (n_all, n_all) of the ribs of a plate, on unknowns ``dofs`` (n_local, n_cells).
 
     ``strained`` gives strains and negative curvatures (n, n_q, 6, n_local) of cells (n,) at area coordinates and
     places.
@@ -188,16 +192,13 @@ def attached(
     size = np.array([1.0, 1.0 / frame.length, 1.0 / frame.length])
     unit = np.outer(size, size) * frame.length / frame.stiffness
     pairs = []
-    for line in lines:
-        nx, ny = np.moveaxis(line.normal, 2, 0)
-        along = np.stack([ny**2, nx**2, -nx * ny], axis=-1)  # of strains xx, yy, 2 xy, for the tangent (-ny, nx)
-        twist = np.stack([-nx * ny, nx * ny, 0.5 * (nx**2 - ny**2)], axis=-1)
-        parts = strained(space, line.cells, line.area, line.x)
-        turns = (along, slice(3)), (along, slice(3, 6)), (twist, slice(3, 6))
+    for rib in space.ribs:
+        parts = strained(space, rib.cells, rib.area, rib.x)
+        turns = (rib.along, slice(3)), (rib.along, slice(3, 6)), (rib.twist, slice(3, 6))
         own = np.stack([np.einsum("nqi,nqik->nqk", turn, parts[:, :, half]) for turn, half in turns], axis=2)
-        value = space.functions(line.cells, line.x, (0,))[0][:, :, None]
-        stiff = gram(own, unit * line.stiffness * line.ds[..., None, None])
-        pairs.append((stiff, gram(value, line.inertia * line.ds / (frame.inertia * frame.length))))
-    where = np.concatenate([line.cells for line in lines])
+        value = space.functions(rib.cells, rib.x, (0,))[0][:, :, None]
+        stiff = gram(own, unit * rib.stiffness * rib.ds[..., None, None])
+        pairs.append((stiff, gram(value, rib.inertia * rib.ds / (frame.inertia * frame.length))))
+    where = np.concatenate([rib.cells for rib in space.ribs])
     K, M = (scatter(np.concatenate(each), dofs[:, where], n_all) for each in zip(*pairs))
     return K, M

@@ -130,6 +130,13 @@ class Plate:
         result[:, 3:, 3:] = self.stiffness(points)
         return result
 
+    @property
+    def stretched(self) -> np.ndarray:
+        """Mean stiffness (3, 3) [Pa] on strains xx, yy, 2 xy of the plane."""
+        if self.layers:
+            return np.asarray(layering.moments(self.layers)[:3, :3] / self.thickness)
+        return self.material.plane_stress
+
     def stiffness(self, points: np.ndarray) -> np.ndarray:
         """Bending stiffness (n_points, 3, 3) [N m] on curvatures (xx, yy, 2 xy)."""
         thickness = evaluate("thickness", self.thickness, points, "m")

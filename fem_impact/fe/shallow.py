@@ -48,7 +48,7 @@ class ShallowSpace(PlaneSpace):
     """Shape functions of one mesh: 21 of the deflection, then 15 for each displacement in the plane."""
 
     heights: np.ndarray  # (n_cells, 15) rise at the nodes of the plane, in the frame
-    lines: Sequence[ribs.Line] = ()
+    ribs: Sequence[ribs.Piece] = ()
     drifts: np.ndarray  # (n_all, n) rigid motions in the plane that no edge prevents
 
     def linear(self, element_dofs: np.ndarray, n_all: int) -> np.ndarray:
@@ -101,8 +101,8 @@ def _domain(body: Subject, fields: tuple[str, ...]) -> Domain:
 
 def _hold(body: Subject, domain: Domain) -> Held:
     rim, space = plates.rim(body, domain, body.kinds), domain.space
-    space.lines = [ribs.Line.of(rib, body, domain) for rib in body.section.ribs]
-    creased = np.unique(np.concatenate([np.zeros(0, int), *(line.facets.ravel() for line in space.lines)]))
+    space.ribs = [ribs.Piece.of(rib, body, domain) for rib in body.section.ribs]
+    creased = np.unique(np.concatenate([np.zeros(0, int), *(rib.facets.ravel() for rib in space.ribs)]))
     expand, project, dofs = constrain(rim, space.vertices, *numbering(domain.cells, space.flat), creased)
     n_flat, own = expand.shape[0], Dofs(domain.cells, ElementTriP4())
     loose, drifts = plane.loosened(space.inner, rim, own)
@@ -110,7 +110,7 @@ def _hold(body: Subject, domain: Domain) -> Held:
     dofs = np.vstack([dofs, n_flat + own.element_dofs, n_flat + own.N + own.element_dofs])
     expand, project = plane.together(expand, loose), plane.together(project, loose.T)
     n_all = expand.shape[0]
-    held = ribs.attached(space.lines, domain, dofs, n_all, strained) if space.lines else None
+    held = ribs.attached(domain, dofs, n_all, strained) if space.ribs else None
     return Held(expand, project, dofs, plates.springs(body, domain, dofs, n_all), rim, held)
 
 
@@ -153,15 +153,15 @@ def plane_mass(system: Any, vectors: np.ndarray) -> np.ndarray:
         larger = np.sqrt(0.5 * (steep**2).sum(axis=2))
         moved[:, :, 2, :21] = larger[..., None] * space.flat.functions(cells, x[cells], (0,))[0]
         local.append(gram(moved, frame.field(system.section, "inertia", x[cells]) * dx[cells]))
-    for line in space.lines:
-        shape = plane.reference(line.area[..., 1:].reshape(-1, 2).T)[0].reshape(*line.ds.shape, plane.QUARTIC)
-        slope = space.functions(line.cells, line.x, (1,))[0].transpose(0, 2, 1, 3)
-        moved = -(line.stiffness[..., 0, 1] / line.stiffness[..., 0, 0] / frame.length)[..., None, None] * slope
+    for piece in space.ribs:
+        shape = plane.reference(piece.area[..., 1:].reshape(-1, 2).T)[0].reshape(*piece.ds.shape, plane.QUARTIC)
+        slope = space.functions(piece.cells, piece.x, (1,))[0].transpose(0, 2, 1, 3)
+        moved = -(piece.stiffness[..., 0, 1] / piece.stiffness[..., 0, 0] / frame.length)[..., None, None] * slope
         moved[:, :, 0, FIRST] = moved[:, :, 1, SECOND] = shape
-        turns = line.rib.turning(frame.places(line.x)).reshape(line.ds.shape) / frame.length**2
-        each = gram(moved, line.inertia * line.ds) + gram(slope, turns * line.ds)
+        turns = piece.rib.turning(frame.places(piece.x)).reshape(piece.ds.shape) / frame.length**2
+        each = gram(moved, piece.inertia * piece.ds) + gram(slope, turns * piece.ds)
         local.append(each / (frame.inertia * frame.length))
-        where.append(line.cells)
+        where.append(piece.cells)
     whole = scatter(np.concatenate(local), dofs[:, np.concatenate(where)], system.expand.shape[0])
     moved = system.expand @ vectors
     heavy = whole @ moved

@@ -14,7 +14,6 @@ from .compiled.bundles import KernelSystem, Limits
 from .compiled.collocation import run_collocation
 from .compiled.energy import run_energy
 from .compiled.law import Row
-from .compiled.stretched import Stretch
 from .contact import acting_stiffness, wall_time
 from .history import History
 from .stretched import Stretched
@@ -59,7 +58,7 @@ def follow(
     limits = Limits(float(EPSILON * pace[0] * pace[1]), float(ROUNDING * pace[1]), float(last[0]), last[1], most)
     if stretched is not None:
         stretched = replace(stretched, base=float(size), ramp=scheme == "A4")
-        stretch = Stretch(stretched.forms, stretched.first)
+        stretch = stretched.kernel
     if scheme == "collocation":
         nodes, powers = gauss(NODES)
         result = run_collocation(system, nodes, powers, pace[0] / 2.0, float(size) * pace[1], limits)

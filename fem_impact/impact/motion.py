@@ -77,7 +77,9 @@ def driven(hit: "Response", modes: Modes) -> BodyMotion:
     shape = -modes.shape_at(hit.at[None])
     start = {"start_q": still, "start_p": still, "end_q": still, "end_p": still, "bias": -push * shape[0]}
     if history.stretched is not None:
-        history = replace(history, stretched=replace(history.stretched, forms=stretch(modes).forms, first=0))
+        found = stretch(modes)
+        own = replace(history.stretched, forms=found.forms, linear=found.linear, first=0)
+        history = replace(history, stretched=own)
     history = replace(history, omega=modes.omega, zeta=modes.damping_ratio, shape=shape, **start)
     ends = Ends(hit.at[None], ((0, -1.0),), push, np.zeros((1, 1)), dip_force=push)
     return BodyMotion(modes, history, slice(None), ends)

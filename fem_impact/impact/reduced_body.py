@@ -200,7 +200,7 @@ def stretched_in(parts: Sequence[ReducedBody]) -> Stretched | None:
     first, found = 0, None
     for part in parts:
         if part.stretching is not None:
-            found = Stretched(part.stretching.forms, first)
+            found = Stretched(part.stretching.forms, part.stretching.linear, first)
         first += len(part.omega)
     return found
 

@@ -27,7 +27,7 @@ from ..fe import beam_elements
 from ..fe.assembly import System, support_of_facets
 from ..fe.corners import meetings
 from ..fe.residual import Moments
-from ..fe.section import SHEAR, Beam, Plate, evaluate
+from ..fe.section import PLANE, SHEAR, Beam, Plate, evaluate
 from ..fe.springs import along_facets
 from ..fe.supports import cells_of_facets
 from ..mesh.meshes import Mesh
@@ -92,7 +92,7 @@ class Known:
     modes: Modes
     section: Plate | Beam | None
     extent: float  # [m**2] area of a plate, [m] length of a beam
-    held: float  # [-] share of its edge that supports hold
+    held: float  # [-] share of its edge that is held in the plane, too
     perimeter: float  # [m] of a plate
     sprung: bool = False  # whether an edge is elastic, so that it is not known what holds its plane
 
@@ -157,8 +157,10 @@ def around(modes: Modes, section: Plate | Beam | None, mesh: Mesh, supports: Any
         return Known(modes, section, float(np.ptp(mesh.points)), _held(kinds), 0.0)
     ends = mesh.points[mesh.facets]
     length = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)
-    holds = np.array([kind in ("clamped", "hinged") for kind in kinds])
-    sprung = not all(isinstance(kind, str) for kind in kinds)
+    stated = dict(section.in_plane) if isinstance(section, Plate) else {}
+    plane: Any = support_of_facets(mesh, stated, PLANE, "in_plane", kinds)  # type: ignore[arg-type]
+    holds = np.array([kind in ("clamped", "hinged", "held") for kind in plane])
+    sprung = not all(isinstance(kind, str) for kind in plane)
     return Known(modes, section, mesh.area, float(length[holds].sum() / length.sum()), float(length.sum()), sprung)
 
 

@@ -6,6 +6,9 @@ and a plate that is free all round stretches where its bent surface cannot be un
 is ``N = E A s / (2 L)`` with ``s = int w'**2``, and the energy ``N s / 4``; if it is not uniform, L / (E A) becomes an
 integral.
 
+A curved, ribbed or unevenly layered plate, whose plane answers to its linear motion, has quadratic forces besides:
+pressed on its top a dome softens, and may snap through, and from below it hardens.
+
 It is the leading term: good for deflections up to about the thickness, where the frequency of a hinged square rises by
 half. Only the first 40 modes of a plate stretch, and 18 or more stress fields count: half as many of both change the
 restitution by 2e-4 at a deflection of one thickness (`studies/verification/is_the_model_right.py`).
@@ -17,6 +20,7 @@ Chu and Herrmann (1956), J. Appl. Mech. 23, 532-540; Woinowsky-Krieger (1950), J
 
 from dataclasses import dataclass
 from functools import partial
+from typing import Any
 
 import numpy as np
 from scipy import special
@@ -24,7 +28,8 @@ from scipy import special
 from .._base import check
 from ..fe import membrane, slopes
 from ..fe.assembly import System, assemble, support_of_facets, support_words
-from ..fe.section import SOFT, Beam, Plate
+from ..fe.section import PLANE, SOFT, Beam, Plate
+from ..fe.shallow import SHALLOW, strained
 from ..mesh import meshes
 from .air import MixedShapes
 from .disk import DiskShapes
@@ -46,16 +51,22 @@ ELASTIC = "its edge is elastic, which does not say how its plane is held"
 
 @dataclass(frozen=True, eq=False)
 class Stretching:
-    """The energy ``V = 1/4 sum_k (q' B_k q)**2`` [J] that stretching adds to modes q [m kg**0.5]."""
+    """The energy ``V = 1/4 sum_k ((a_k q + q' B_k q)**2 - (a_k q)**2)`` [J] that stretching adds to modes q.
+
+    The rows a are there if the plane answers to the linear motion; q [m kg**0.5] counts along the blow, away
+    from the striker.
+    """
 
     forms: np.ndarray  # (n_forms, n_modes, n_modes) [kg**-0.5 m**-1 s**-1] the matrices B, symmetric
+    linear: np.ndarray  # (n_forms, n_modes) [s**-1] the rows a, or (0, n_modes)
 
     def __post_init__(self) -> None:
         check.lock_arrays(self)
 
     def truncated(self, n_modes: int) -> "Stretching":
         """That of the first modes only."""
-        return Stretching(np.ascontiguousarray(self.forms[:, :n_modes, :n_modes]))
+        forms, linear = self.forms[:, :n_modes, :n_modes], self.linear[:, :n_modes]
+        return Stretching(np.ascontiguousarray(forms), np.ascontiguousarray(linear))
 
 
 def stretch(modes: Modes) -> Stretching:
@@ -69,17 +80,23 @@ def stretch(modes: Modes) -> Stretching:
         n = min(MOST + rigid, modes.n_modes)
         if n == rigid:
             raise ValueError(f"{CANNOT}, but it has no mode that bends; leave it out")
-        sheet, steep = _sheet(base if mix is not None else base.take(n), section)
+        sheet, steep, taut = _sheet(base if mix is not None else base.take(n), section)
 
-        def every(cells: np.ndarray, x: np.ndarray) -> np.ndarray:
-            slope = amplitude * steep(cells, x)
-            return (slope if mix is None else slope @ mix[:, :n])[..., rigid:]
+        def mixed(values: np.ndarray) -> np.ndarray:
+            values = amplitude * values
+            return (values if mix is None else values @ mix[:, :n])[..., rigid:]
 
-        found = np.sqrt(2.0) * membrane.forms(sheet, every, modes.omega[rigid:n])
-        return Stretching(np.pad(found, ((0, 0), (rigid, 0), (rigid, 0))))  # the plane follows a plate that tilts
+        found, linear = membrane.forms(
+            sheet, lambda cells, x: mixed(steep(cells, x)), modes.omega[rigid:n],
+            None if taut is None else lambda pieces: mixed(taut(pieces)),
+        )  # fmt: skip
+        still = rigid, 0  # the plane follows a plate that tilts
+        found = np.pad(np.sqrt(2.0) * found, ((0, 0), still, still))
+        # rises and heights in layers count towards the striker, the deflection of a blow away from it
+        return Stretching(found, np.zeros((0, n)) if taut is None else np.pad(-np.sqrt(2.0) * linear, ((0, 0), still)))
     gram, soft = _tension(base, section)
     gram = amplitude**2 * (gram if mix is None else mix.T @ gram @ mix)
-    return Stretching((gram / np.sqrt(2.0 * soft))[None])
+    return Stretching((gram / np.sqrt(2.0 * soft))[None], np.zeros((0, len(gram))))
 
 
 def _unwrapped(shapes: Shapes) -> tuple[Shapes, float, np.ndarray | None]:
@@ -94,17 +111,19 @@ def _unwrapped(shapes: Shapes) -> tuple[Shapes, float, np.ndarray | None]:
 
 def _check_supports(system: System) -> None:
     """Raise ValueError unless it is known what holds the plane of a body of elements, and its slopes are known."""
-    kinds = support_of_facets(system.mesh, dict(system.supports), support_words(system.theory))
-    if not all(isinstance(kind, str) for kind in kinds):
-        raise ValueError(f"{CANNOT}, but {ELASTIC}; hold it, or leave stretching out")
+    kinds: Any = support_of_facets(system.mesh, dict(system.supports), support_words(system.theory))
+    if isinstance(system.section, Plate) and system.theory != SHALLOW.name:  # whose linear motion has the same plane
+        kinds = support_of_facets(system.mesh, dict(system.section.in_plane), PLANE, "in_plane", kinds)
+    if system.theory != SHALLOW.name and not all(isinstance(kind, str) for kind in kinds):
+        raise ValueError(f"{CANNOT}, but {ELASTIC}; say so with in_plane, hold it, or leave stretching out")
     if system.mesh.dimension == 1 and not set(kinds) <= set(HELD):
         raise ValueError(f"{CANNOT}, but an end is free; hold it, or leave stretching out")
     if system.element == "morley":
         raise ValueError("stretching=True does not work with element 'morley'; take 'argyris', or leave stretching out")
 
 
-def _sheet(shapes: Shapes, section: Plate) -> tuple[membrane.Sheet, membrane.Steep]:
-    """The plane of a plate, and the slopes of its shapes."""
+def _sheet(shapes: Shapes, section: Plate) -> tuple[membrane.Sheet, membrane.Steep, membrane.Taut | None]:
+    """The plane of a plate, the slopes of its shapes, and the strains by their linear motion, if its plane answers."""
     if isinstance(shapes, (FieldShapes, RitzShapes)):
         system = shapes.system
         _check_supports(system)
@@ -114,7 +133,15 @@ def _sheet(shapes: Shapes, section: Plate) -> tuple[membrane.Sheet, membrane.Ste
             slope = system.space.functions(cells, x, (1,))[0]  # (n, 2, n_q, n_local)
             return unit * (slope @ moved[system.element_dofs.T[cells]][:, None]).transpose(0, 2, 1, 3)
 
-        return membrane.Sheet.of(system), by_elements
+        sheet = membrane.Sheet.of(system)
+
+        def taut(pieces: np.ndarray) -> np.ndarray:
+            cells = sheet.cells[pieces]
+            parts = strained(system.space, cells, sheet.area[pieces], sheet.x[pieces])
+            found = unit * (parts @ moved[system.element_dofs.T[cells]][:, None])  # (n, n_q, 6, n_modes)
+            return np.asarray(found[:, :, :3] + sheet.neutral[pieces] @ found[:, :, 3:])
+
+        return sheet, by_elements, taut if system.theory == SHALLOW.name else None
     if isinstance(shapes, RectangleShapes):
         shortest = np.pi / (np.pi * shapes.numbers / (shapes.length, shapes.width)).max()
         size = min(shortest, COARSEST * min(shapes.length, shapes.width))
@@ -126,7 +153,7 @@ def _sheet(shapes: Shapes, section: Plate) -> tuple[membrane.Sheet, membrane.Ste
         raise ValueError(f"{CANNOT}, but its shapes are known at points only; leave it out")
     system = assemble(mesh, section, {} if getattr(shapes, "edge", "") == "free" else {"boundary": "clamped"})
     frame = system.frame
-    return membrane.Sheet.of(system), lambda _, x: steep(frame.centre + frame.length * x)
+    return membrane.Sheet.of(system), lambda _, x: steep(frame.centre + frame.length * x), None
 
 
 def _tension(shapes: Shapes, section: Beam) -> tuple[np.ndarray, float]:

@@ -100,5 +100,6 @@ def test_a_mode_that_stretches_may_swing_as_far_as_its_energy(phase, reach, over
     q, p = np.array([-1e-3, 0.5 * reach * np.cos(phase)]), np.array([-0.1, 0.5e3 * reach * np.sin(phase)])
     bodies = SimpleNamespace(omega=omega, shape=shape, q=q, p=p, bias=np.zeros(2))
     contacts, still = SimpleNamespace(end=np.zeros(1), offset=np.zeros(1)), SimpleNamespace(still=0.0, depth=0.0)
-    parted = build.plain(stretched.parted)(bodies, contacts, stretched.Stretch(np.zeros((1, 1, 1)), 1), still)
+    room = stretched.made_room(stretched.Stretch(np.zeros((1, 1, 1)), np.zeros((0, 1)), 1), omega, 1)
+    parted = build.plain(stretched.parted)(bodies, contacts, room, still)
     assert parted == over

@@ -20,7 +20,8 @@ LINES, PARAMETERS = 100, 8  # of a kernel: what fits on two pages, and what a re
 
 
 @pytest.mark.parametrize(
-    "scheme, stretch", [(0, None), (1, None), (1, Stretch(*locked(np.array([[[4e3]]])), 1)), ("collocation", None)]
+    "scheme, stretch",
+    [(0, None), (1, None), (1, Stretch(*locked(np.array([[[4e3]]]), np.zeros((0, 1))), 1)), ("collocation", None)],
 )
 def test_a_record_that_grows_is_the_same(scheme, stretch, monkeypatch):
     """A run that stops at each full record and goes on, against one whose record has room for all: bit for bit."""

@@ -80,6 +80,181 @@ def test_a_free_disk_stretches_as_its_radial_equation_says():
     assert energy(modes, tilted) == energy(modes, saucer)  # the plane follows a disk that tilts
 
 
+def cubic(modes, mode):
+    """Force of a mode over its cube, as Airy's function gives it of unit norm: over E / rho and mass per area."""
+    return float((stretch(modes).forms[:, mode, mode] ** 2).sum()) * RHO**2 * H / E
+
+
+# free disks: Poisson's ratio -> modes (2, 0), (0, 1), (3, 0) (Touze, Thomas and Chaigne 2002; spectra of VK-Gong)
+DISKS = {
+    0.38: [1.898356, 8.574675, 17.03105],
+    0.33: [1.896553, 8.528755, 16.93346],
+    0.3: [1.895421, 8.501230, 16.87594],
+}
+
+
+@pytest.mark.parametrize("nu", list(DISKS))
+def test_a_free_disk_has_the_cubic_coefficients_of_airys_function(nu):
+    section = fi.Plate(fi.Material(E=E, nu=nu, rho=RHO), H)
+    modes = fi.analytic.disk(1.0, edge="free", section=section, n_modes=8)
+    found = [cubic(modes, mode) for mode in (3, 5, 6)]
+    assert found == pytest.approx(DISKS[nu], rel=1e-5)  # of the triangles
+
+
+def test_a_rectangle_that_may_move_in_its_plane_has_the_cubic_coefficients_of_airys_function():
+    system = fi.assemble(
+        fi.mesh.rectangle(1.0, 2.0 / 3.0, size=0.1), PLATE, {"boundary": "hinged"}, in_plane={"boundary": "free"}
+    )
+    modes = fi.find_modes(system, n_modes=3)
+    # (1, 1), (2, 1), (1, 2) of VK-Gong, from above as the plane settles where its energy is least
+    for mode, wanted in enumerate([67.61315, 462.974, 372.080]):
+        assert wanted < cubic(modes, mode) < (1.0 + 5e-5) * wanted
+
+
+def panel(radius, n_modes=1, in_plane="sliding", sides=(0.3, 0.2), size=0.05):
+    """A paraboloid on hinged edges."""
+    middle = 0.5 * np.array(sides)
+    system = fi.assemble(
+        fi.mesh.rectangle(*sides, size=size), PLATE, {"boundary": "hinged"}, in_plane={"boundary": in_plane},
+        rise=lambda x: -((x - middle) ** 2).sum(axis=1) / (2.0 * radius),
+    )  # fmt: skip
+    return fi.find_modes(system, n_modes=n_modes)
+
+
+def energies(modes, q):
+    """Quadratic, cubic and quartic energy of stretching."""
+    found = stretch(modes)
+    lead, bent = (
+        found.linear @ q if len(found.linear) else np.zeros(len(found.forms)),
+        np.einsum("kij,i,j->k", found.forms, q, q),
+    )
+    return 0.25 * lead @ lead, 0.5 * lead @ bent, 0.25 * bent @ bent
+
+
+# of the triangles, and of fields left out
+@pytest.mark.parametrize("n_modes, rel", [(1, 2e-5), (4, 2e-5), pytest.param(24, 1e-3, marks=pytest.mark.slow)])
+def test_a_spherical_panel_on_shear_diaphragms_is_that_of_its_closed_form(n_modes, rel):
+    """Airy's function of w = a sin sin is -E h w / (R k**2): its stresses stretch by E / (rho R**2), and work on w'**2.
+
+    The blow's deflection is away from the striker, into the dome: it shortens it first.
+    """
+    sides, radius = (0.3, 0.2), 2.0
+    modes = panel(radius, n_modes)
+    middle = modes.shape_at([(0.15, 0.1)])[0]
+    wave = np.pi / np.array(sides)
+    top = 2.0 / np.sqrt(RHO * H * sides[0] * sides[1])
+    assert abs(middle[0]) == pytest.approx(top, rel=2e-5)
+    q = np.eye(n_modes)[0] * np.sign(middle[0])
+    square, cube, _ = energies(modes, q)
+    assert square == pytest.approx(0.5 * E / (RHO * radius**2), rel=rel)
+    assert cube == pytest.approx(-4.0 / 3.0 * E * H * wave.prod() * top**3 / (radius * (wave @ wave)), rel=rel)
+
+
+def settled(sides, radius, top, n=10):
+    """Energies of the same panel with w = top sin sin, by displacements in its plane that are polynomials of degree n.
+
+    Each is zero along the edges that hold it; across those that do not, the stress vanishes as the energy is least.
+    """
+    node, weight = np.polynomial.legendre.leggauss(2 * n + 8)
+    power = np.polynomial.legendre.legvander(node, n)
+    slope = np.stack([np.polynomial.legendre.Legendre.basis(i).deriv()(node) for i in range(n + 1)], axis=1)
+    bow = (1.0 - node**2)[:, None]
+    free, tied = (power, slope), (bow * power, bow * slope - 2.0 * node[:, None] * power)
+    half = 0.5 * np.array(sides)
+
+    def flat(along_x, along_y):
+        return np.einsum("x...,y...->xy...", along_x, along_y).ravel()
+
+    def strains(u, v):
+        """Strains xx, yy and 2 xy (n_q, 3, n_terms) of products in u, then in v."""
+        parts = [
+            [np.einsum("xi,yj->xyij", f[i == 0], g[i == 1]).reshape(len(node) ** 2, -1) / half[i] for i in (0, 1)]
+            for f, g in (u, v)
+        ]
+        (ux, uy), (vx, vy) = parts
+        rows = np.hstack([ux, 0.0 * vx]), np.hstack([0.0 * ux, vy]), np.hstack([uy, vx])
+        return np.stack(rows, axis=1)
+
+    strain = strains((free, tied), (tied, free))  # u is held on the edges along x, v on those along y
+    turn, one = 0.5 * np.pi * (node + 1.0), np.ones(len(node))
+    wx, wy = (
+        top * np.pi / sides[0] * flat(np.cos(turn), np.sin(turn)),
+        top * np.pi / sides[1] * flat(np.sin(turn), np.cos(turn)),
+    )
+    zx, zy = -flat(half[0] * node, one) / radius, -flat(one, half[1] * node) / radius
+    rows = [zx * wx, zy * wy, zx * wy + zy * wx], [0.5 * wx**2, 0.5 * wy**2, wx * wy]
+    loads = np.stack([np.stack(row, axis=1) for row in rows], axis=-1)  # (n_q, 3, 2)
+    stiff = E * H / (1.0 - NU**2) * np.array([[1.0, NU, 0.0], [NU, 1.0, 0.0], [0.0, 0.0, 0.5 * (1.0 - NU)]])
+    dx = half.prod() * flat(weight, weight)
+
+    def works(one, two):
+        return np.einsum("q,qik,ij,qjl->kl", dx, one, stiff, two, optimize=True)
+
+    found = np.linalg.lstsq(works(strain, strain), works(strain, loads), rcond=1e-13)[0]
+    left = loads - strain @ found
+    both = works(left, left)
+    return 0.5 * both[0, 0], -both[0, 1], 0.5 * both[1, 1]  # the blow goes the other way
+
+
+@pytest.mark.slow
+def test_energies_of_a_panel_are_those_of_polynomials_in_its_plane():
+    sides, radius = (0.3, 0.2), 1.5
+    dome, bowl = panel(radius, size=0.03), panel(-radius, size=0.03)
+    tops = [modes.shape_at([(0.15, 0.1)])[0, 0] for modes in (dome, bowl)]
+    wanted = np.array(settled(sides, radius, abs(tops[0])))
+    # of the triangles: 2e-5 to 1e-4 at size 0.05; polynomials of degree 8 give the same to 1e-5, of degree 12 to 1e-8
+    assert energies(dome, np.sign(tops[:1])) == pytest.approx(wanted, rel=2e-6)
+    assert energies(bowl, np.sign(tops[1:])) == pytest.approx(wanted * [1.0, -1.0, 1.0], rel=2e-6)  # struck from below
+
+
+@pytest.mark.parametrize("supports", [{}, {"left": "clamped"}])
+def test_where_a_layer_weighs_and_bears_nothing_the_plate_is_as_without_it(supports):
+    """Only the plane that its displacements count in lies elsewhere, which no edge holds."""
+    ghost = fi.Material(E=1e-3, nu=NU, rho=1e-6)
+    sections = PLATE, fi.Plate.laminate([(ghost, 2e-3, 0.0), (STEEL, H, 0.0)])
+    flat, offset = (
+        fi.find_modes(
+            fi.assemble(fi.mesh.rectangle(0.3, 0.2, size=0.05), section, supports, in_plane={"boundary": "free"}),
+            n_modes=9,
+        )
+        for section in sections
+    )
+    found = []
+    for modes in (flat, offset):
+        soft = np.divide(1.0, modes.omega**2, out=np.zeros(9), where=modes.omega > 0.0)
+        found.append(energies(modes, modes.shape_at([(0.07, 0.03)])[0] * soft))
+    square, cube, fourth = found[1]
+    assert fourth == pytest.approx(found[0][2], rel=1e-6, abs=0.0)  # P4 holds the slopes that the other plane adds
+    assert abs(square) < 1e-9 * fourth and abs(cube) < 1e-9 * fourth
+
+
+@pytest.mark.parametrize("offset", [4e-3, None])
+def test_a_ribbed_strip_between_walls_stretches_as_a_t_beam(offset):
+    """Along the common centroid, z above the middle that the walls hold: E A (mean of w'**2 / 2 - z w'')**2 / 2.
+
+    The blow's deflection is -w: a rib on the struck side is shortened first, as a dome is.
+    """
+    length, wide, deep = 0.3, 0.01, 5e-3
+    steel = fi.Material(E=E, nu=0.0, rho=RHO)
+    rib = fi.Rib([(0.0, 0.5 * wide), (length, 0.5 * wide)], fi.Beam.rectangular(steel, width=2e-3, height=deep), offset)
+    system = fi.assemble(
+        fi.mesh.rectangle(length, wide, size=0.02), fi.Plate(steel, H), {"left": "hinged", "right": "hinged"},
+        ribs=[rib],
+    )  # fmt: skip
+    modes = fi.find_modes(system, n_modes=1)
+    x = np.linspace(0.0, length, 2001)
+    w = modes.shape_at(np.column_stack([x, np.full(2001, 0.5 * wide)]))[:, 0]
+    sign = np.sign(w[1000])
+    slope = np.gradient(sign * w, x, edge_order=2)
+    area, own = H * wide, 2e-3 * deep
+    z = own * (-0.5 * (H + deep) if offset is None else offset) / (area + own)
+    lead, mean = -z * (slope[-1] - slope[0]) / length, 0.5 * np.trapezoid(slope**2, x) / length
+    _, cube, fourth = energies(modes, np.array([sign]))
+    stiff = E * (area + own) * length
+    # across a strip of a thirtieth of its length stresses are all but even
+    assert (cube, fourth) == pytest.approx((-stiff * lead * mean, 0.5 * stiff * mean**2), rel=2e-4)
+
+
 @pytest.mark.slow
 def test_a_strip_that_rolls_up_does_not_stretch():
     """A cantilever's first mode is all but a cylinder; between walls a strip stretches as a beam."""

@@ -229,5 +229,5 @@ def run_energy(scene: KernelSystem, stretch: Stretch | None, ramp: int, base: fl
     """
     m, n_modes = scene.shape.shape
     run, tables = made_run(scene), made_tables(n_modes, m, base, ramp)
-    room = None if stretch is None else made_room(stretch, n_modes, m)
+    room = None if stretch is None else made_room(stretch, scene.omega, m)
     return followed(follow, (scene, tables, room, limits), run, HEAD + 6 * m)

@@ -11,8 +11,14 @@ x, and without x the work of ``g`` is the difference of V at both ends, so that 
 proof of scheme A4 with the mean Hessian in place of its mean slope. Scheme A leaves out x and the slope. Both are
 solved by iteration with the contacts' equations inside; a step in which that does not settle is halved.
 
+Where the linear motion strains the plane, too, by rows l, it is ``V = 1/4 sum_k ((l q + q' B q)**2 - (l q)**2)``. The
+additional part ``1/2 l q q' B q`` has a mean slope and a mean Hessian in closed form, too, with which
+
+    e += l m B d + l d B m + b l,    g += l m B m + l d/12 B d + (a + c/12) l/2 + l m B x + l x B m + m' B x l.
+
 A free flight takes the same steps. It is over for good once the rigid motion recedes and the energy of the swinging
-modes, which never grows, cannot bring the surface back: |u' q|**2 <= 2 E sum u**2 / omega**2.
+modes, which never grows, cannot bring the surface back: |u' q|**2 <= 2 E u' S u. S is the inverse of the stiffness
+without the squares of l q / 2**0.5, as those of l q + q' B q are not negative; on a flat plate it is 1 / omega**2.
 """
 
 from typing import NamedTuple
@@ -31,15 +37,17 @@ from .layout import (  # isort: skip
     STEPS, TAKEOFF, TIME,
 )  # fmt: skip
 
+LEAST = 1e-6  # [-] of the stiffness against any motion of a shell, that is from bending: less is lost in rounding
 UNSEEN = 1.0  # [rad] modes that turn further in a step than this are not seen by the cubic through its ends
 SHORTEST = 8  # [-] halvings of the step to see them
 RIPPLE = 1e-3  # [-] of the way of a contact in a step: such modes may close it unseen where they move it farther
 
 
 class Stretch(NamedTuple):
-    """The forms B of the modes that stretch a body: `count` of them from `first` on."""
+    """The forms B and rows l of the modes that stretch a body: `count` of them from `first` on."""
 
     forms: np.ndarray  # (n_forms, count, count)
+    linear: np.ndarray  # (n_forms, count), or (0, count) if the linear motion does not strain the plane
     first: int
 
 
@@ -47,7 +55,9 @@ class StretchRoom(NamedTuple):
     """The same, and where a step is worked out."""
 
     forms: np.ndarray
+    linear: np.ndarray
     first: int
+    soft: np.ndarray  # (count, count) the inverse S
     free: np.ndarray  # (3, n_contacts) where the contacts would end without the stretching forces
     ends: np.ndarray  # (3, count) of the modes that stretch: mean of the free motion, end and mean
     bent: np.ndarray  # (3, n_forms, count) B times start, end and mean
@@ -75,6 +85,16 @@ def bend(forms, q, out):
 
 
 @inner()
+def led(linear, k, q, first):
+    """Row k of the linear part times some modes, zero without one."""
+    total = 0.0
+    if linear.shape[0] > 0:
+        for i in range(linear.shape[1]):
+            total += linear[k, i] * q[first + i]
+    return total
+
+
+@inner()
 def stretching_energy(stretch, q):
     """The energy V [J] of a state."""
     forms, first = stretch.forms, stretch.first
@@ -86,7 +106,7 @@ def stretching_energy(stretch, q):
             for j in range(forms.shape[1]):
                 bent += forms[k, i, j] * q[first + j]
             s += bent * q[first + i]
-        total += 0.25 * s * s
+        total += 0.25 * s * (s + 2.0 * led(stretch.linear, k, q, first))
     return total
 
 
@@ -110,13 +130,23 @@ def pulls(room, q, ramp):
             b += middle * more
             c += (ends[1, i] - q[first + i]) * more
             d += whole * (ends[2, i] - middle)
+        start = led(room.linear, k, q, first)
+        end = led(room.linear, k, ends[1], 0)
+        middle = 0.5 * (start + end)
+        mean = led(room.linear, k, ends[2], 0) - middle
         for i in range(out.shape[1]):
             whole = 0.5 * (bent[0, k, i] + bent[1, k, i])
             more = bent[1, k, i] - bent[0, k, i]
-            out[0, i] -= (a + c / 12.0) * whole + b / 6.0 * more
+            out[0, i] -= (a + c / 12.0 + middle) * whole + (b / 6.0 + (end - start) / 12.0) * more
             if ramp:
-                out[0, i] -= (a + 0.25 * c) * (bent[2, k, i] - whole) + 2.0 * d * whole
-                out[1, i] -= (a + 0.25 * c) * more + 2.0 * b * whole
+                out[0, i] -= (a + 0.25 * c + middle) * (bent[2, k, i] - whole) + (2.0 * d + mean) * whole
+                out[1, i] -= (a + 0.25 * c + middle) * more + (2.0 * b + end - start) * whole
+        if room.linear.shape[0] > 0:
+            for i in range(out.shape[1]):
+                out[0, i] -= 0.5 * (a + c / 12.0) * room.linear[k, i]
+                if ramp:
+                    out[0, i] -= d * room.linear[k, i]
+                    out[1, i] -= b * room.linear[k, i]
 
 
 @inner()
@@ -137,8 +167,11 @@ def prepare(bodies, contacts, room, lanes, h):
         s = 0.0
         for i in range(count):
             s += q[first + i] * room.bent[0, k, i]
+        lead = led(room.linear, k, q, first)
         for i in range(count):
-            room.pull[0, i] -= s * room.bent[0, k, i]
+            room.pull[0, i] -= (s + lead) * room.bent[0, k, i]
+            if room.linear.shape[0] > 0:
+                room.pull[0, i] -= 0.5 * s * room.linear[k, i]
     for i in range(count):
         room.pull[1, i] = h * room.hint[i]
         room.pull[0, i] += 0.5 * room.pull[1, i]
@@ -225,12 +258,17 @@ def finish(bodies, contacts, room, lanes, h):
         room.hint[i] = room.pull[1, i] / h
 
 
-def made_room(stretch: Stretch, n_modes: int, n_contacts: int) -> StretchRoom:
-    """Arrays for the work of a step."""
-    n_forms, count = stretch.forms.shape[:2]
+def made_room(stretch: Stretch, omega: np.ndarray, n_contacts: int) -> StretchRoom:
+    """Arrays for the work of a step, for all modes (n_modes,)."""
+    (n_forms, count), n_modes, first = stretch.forms.shape[:2], len(omega), stretch.first
+    own = omega[first : first + count]
+    weight = np.divide(1.0, own, out=np.zeros(count), where=own > 0.0)
+    share, turn = np.linalg.eigh(np.eye(count) - 0.5 * (stretch.linear * weight).T @ (stretch.linear * weight))
+    half = weight[:, None] * turn / np.sqrt(np.maximum(share, LEAST))
     return StretchRoom(
-        stretch.forms, stretch.first, np.zeros((3, n_contacts)), np.zeros((3, count)), np.zeros((3, n_forms, count)),
-        np.zeros((4, count)), np.zeros((3, count)), np.zeros(count), np.zeros((2, n_modes)), np.zeros((2, n_contacts)),
+        stretch.forms, stretch.linear, first, half @ half.T, np.zeros((3, n_contacts)), np.zeros((3, count)),
+        np.zeros((3, n_forms, count)), np.zeros((4, count)), np.zeros((3, count)), np.zeros(count),
+        np.zeros((2, n_modes)), np.zeros((2, n_contacts)),
     )  # fmt: skip
 
 
@@ -243,18 +281,20 @@ def stretches(room, n):
 @inner()
 def parted(bodies, contacts, room, limits):
     """Whether no contact ever closes again: the rigid parts recede, and the energy left cannot bring them back."""
-    q, p = bodies.q, bodies.p
+    q, p, first, soft = bodies.q, bodies.p, room.first, room.soft
     energy = stretching_energy(room, q)
     for n in range(q.size):
-        if stretches(room, n):
-            w = bodies.omega[n]
-            energy += 0.5 * (p[n] ** 2 + (w * q[n] - bodies.bias[n] / w) ** 2)
+        w = bodies.omega[n]
+        if stretches(room, n) and w > 0.0:
+            energy += 0.5 * (p[n] ** 2 + (w * q[n]) ** 2) - bodies.bias[n] * q[n]
+            for i in range(soft.shape[0]):
+                energy += 0.5 * bodies.bias[n] * soft[n - first, i] * bodies.bias[first + i]
     for i in range(contacts.end.size):
         position = contacts.offset[i]
         rate = 0.0
         acceleration = 0.0
         reach = 0.0
-        soft = 0.0
+        give = 0.0
         for n in range(q.size):
             u = bodies.shape[i, n]
             w = bodies.omega[n]
@@ -262,14 +302,15 @@ def parted(bodies, contacts, room, limits):
                 position += u * q[n]
                 rate += u * p[n]
                 acceleration += u * bodies.bias[n]
-                continue
-            rest = bodies.bias[n] / (w * w)
-            position += u * rest
-            if stretches(room, n):
-                soft += (u / w) ** 2
+            elif stretches(room, n):
+                for j in range(soft.shape[0]):
+                    give += u * soft[n - first, j] * bodies.shape[i, first + j]
+                    position += u * soft[n - first, j] * bodies.bias[first + j]
             else:
+                rest = bodies.bias[n] / (w * w)
+                position += u * rest
                 reach += abs(u) * np.sqrt((q[n] - rest) ** 2 + (p[n] / w) ** 2)
-        reach += np.sqrt(2.0 * energy * soft)
+        reach += np.sqrt(2.0 * max(0.0, energy) * give)
         if rate > limits.still or acceleration > 0.0 or position + reach > limits.depth:
             return False
     return True
@@ -411,7 +452,7 @@ def replay_stretched(
     failed, and the same of the last time: time, step, rate and state.
     """
     m, n_modes = scene.shape.shape
-    run, room = made_run(scene), made_room(stretch, n_modes, m)
+    run, room = made_run(scene), made_room(stretch, scene.omega, m)
     room.hint[:] = start[2]
     failed, time, j = follow_record(scene, run, room, made_tables(n_modes, m, base, ramp), steps, start[:2], times, out)
     return failed, time, j, room.hint, run.q, run.p
