@@ -117,6 +117,7 @@ def assemble(
         if not isinstance(section, Plate):
             raise ValueError(f"section must be a Plate for {', '.join(shaped)}, got {check.shown(section)}")
         section = replace(section, **shaped)
+    section = mesh.shaped(section) if isinstance(section, Plate) else section
     plane = isinstance(section, Plate) and not section.plain
     usual = SHALLOW.name if plane else THEORIES[mesh.dimension][0]
     theory = check.one_of("theory", usual if theory is None else theory, THEORIES[mesh.dimension])

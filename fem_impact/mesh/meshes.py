@@ -48,6 +48,9 @@ class Mesh(check.Locked):
     notes: tuple[str, ...] = ()  # what was repaired or assumed
     # ("rectangle", length, width), ("disk", radius) or ("line", length) [m]; empty for any other body
     form: tuple[Any, ...] = ()
+    # height [m] of the unloaded surface at points (n, 2), as for `assemble`; of a mesh file with three coordinates
+    rise: Callable[[np.ndarray], Any] | None = field(default=None, repr=False)
+    lines: dict[str, np.ndarray] = field(default_factory=dict, repr=False)  # name -> (n, 2) [m], of a drawing; for ribs
 
     @property
     def dimension(self) -> int:
@@ -73,6 +76,12 @@ class Mesh(check.Locked):
         """Area [m^2] of a plate, up to the chords of curved edges; length [m] of a beam."""
         return measure(self.points, self.cells)
 
+    def pieces(self, path: Any) -> np.ndarray:
+        """Straight pieces (n, 2, 2) [m] of a path (n_points, 2) [m] or, given a name, of that edge."""
+        if isinstance(path, str):
+            return self.points[self.facets[self.edges[path]]]
+        return np.stack([path[:-1], path[1:]], axis=1)
+
     def _repr_html_(self) -> str:
         """Notebook view: the outline and a table of its size and edges."""
         kind = "triangles" if self.dimension == 2 else "elements"
@@ -89,7 +98,15 @@ class Mesh(check.Locked):
             )
         size = self.size / check.positive("factor", factor)
         finer = self.recipe(size=float(f"{size:.11g}"))  # the mesher would amplify the rounding of an error estimate
-        return replace(finer, notes=self.notes)
+        return replace(finer, notes=self.notes, rise=self.rise, lines=self.lines)
+
+    def shaped(self, section: Any) -> Any:
+        """A plate's section with the mesh's rise, if it has none, and with the lines that its ribs name."""
+        if self.rise is not None and section.rise is None:
+            section = replace(section, rise=self.rise)
+        paths = [self.lines.get(rib.path) if isinstance(rib.path, str) else None for rib in section.ribs]
+        ribs = [rib if path is None else replace(rib, path=path) for rib, path in zip(section.ribs, paths)]
+        return replace(section, ribs=ribs) if ribs else section
 
 
 def straight(
@@ -406,7 +423,8 @@ def _filled(
         added = {name: numbers for name, numbers in parts.items() if not name.isdigit() and name not in rim}
         arrays["edges"] = added | rim
     arrays["edges"]["boundary"] = np.arange(len(arrays["facets"]))
-    return Mesh(**arrays, recipe=recipe, size=size, size_stated=stated, notes=mesh.notes)
+    kept: dict[str, Any] = {"notes": mesh.notes, "rise": mesh.rise, "lines": mesh.lines}
+    return Mesh(**arrays, recipe=recipe, size=size, size_stated=stated, **kept)
 
 
 def _outline(mesh: Mesh) -> Outline | None:

@@ -20,8 +20,8 @@ def closed_form(
 ) -> Callable[..., Modes] | None:
     """Function of ``n_modes`` or ``max_frequency`` [Hz] that finds the modes of this body; None if no formula does.
 
-    There are formulas for beams of constant section, and for thin isotropic plates of constant thickness without
-    tension that are rectangles hinged all round or disks with the same support all round.
+    There are formulas for beams of constant section, and for thin flat isotropic plates of constant thickness without
+    tension, ribs and uneven layers that are rectangles hinged all round or disks with the same support all round.
     """
     if theory == "mindlin":
         return None
@@ -33,7 +33,9 @@ def closed_form(
         uniform = form == "line" and not callable(section.width) and not callable(section.height)
         ends = str(kinds[0]), str(kinds[-1])
         return partial(beam, *sizes, ends=ends, section=section, theory=theory or "euler") if uniform else None
-    if callable(section.thickness) or section.material.E_across is not None or section.tension or len(held) > 1:
+    if not mesh.shaped(section).plain or callable(section.thickness) or section.material.E_across is not None:
+        return None
+    if section.tension or len(held) > 1:
         return None
     if form == "rectangle" and held == {"hinged"}:
         return partial(rectangle, *sizes, section=section)
