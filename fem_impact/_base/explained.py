@@ -23,6 +23,7 @@ HEADINGS: dict[str, tuple[str, ...]] = {
     "slips-of-units": ("softer than rubber", "are expected"),
     "drawings": (
         "states no unit", "y points down in an SVG file", "points along gentle bends were joined", "was closed",
+        "are lines for ribs",
     ),
     "mesh-files": (
         "duplicate nodes were merged", "inverted triangles were flipped", "triangles were split at hanging nodes",

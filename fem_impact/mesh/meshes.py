@@ -268,7 +268,8 @@ def outline(source: Any, *, size: float | None = None, unit: str | None = None) 
     -------
     Mesh
         Edges take their name from the id of an SVG shape or the layer of a DXF entity. Otherwise they are called
-        "edge0", "edge1" ... from corner to corner, and "hole0" ... for holes. `Mesh.notes` says what was assumed.
+        "edge0", "edge1" ... from corner to corner, and "hole0" ... for holes. Open paths with a name are `Mesh.lines`
+        by that name, for ribs. `Mesh.notes` says what was assumed.
 
     Raises
     ------
@@ -282,8 +283,8 @@ def outline(source: Any, *, size: float | None = None, unit: str | None = None) 
     >>> sorted(egg.edges), bool(egg.curved.all())
     (['boundary', 'edge0', 'outer'], True)
     """
-    curve, notes = drawings.read(source, unit)
-    return replace(fill(curve, size=size), notes=tuple(notes))
+    curve, lines, notes = drawings.read(source, unit)
+    return replace(fill(curve, size=size), notes=tuple(notes), lines=lines)
 
 
 def load(path: Any, *, unit: str | None = None) -> Mesh:

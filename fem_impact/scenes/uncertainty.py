@@ -397,8 +397,8 @@ def _scalable(target: Target) -> None:
     pulled = isinstance(target.section, Plate) and (target.section.tension or not target.section.plain)
     if target.mesh is None or springs or pulled or target.point_masses or target.thick or target.air or target.scale:
         raise ValueError(
-            f"vary: {SIZE} needs a thin flat body of stated size, without springs, tension, ribs, point masses or air; "
-            "vary target.mass and target.first_frequency"
+            f"vary: {SIZE} needs a thin body of stated size, flat, without springs, tension, ribs, point masses or "
+            "air; vary target.mass and target.first_frequency"
         )
 
 

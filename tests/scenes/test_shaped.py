@@ -108,6 +108,20 @@ def test_ribs_tapered_along_edges_and_of_another_material(tmp_path):
     assert scene.picture().count('stroke-linecap="round"') == 1 + 3  # one straight rib, and the edge in three facets
 
 
+def test_a_rib_along_a_line_of_a_drawing(tmp_path):
+    pytest.importorskip("svgelements", reason="the cad extra is not installed")
+    shapes = '<rect id="rim" width="400" height="300"/><path id="bar" d="M50 -50 L350 -200" transform="scale(1 -1)"/>'
+    head = 'xmlns="http://www.w3.org/2000/svg" width="400mm" height="300mm" viewBox="0 0 400 300"'
+    (tmp_path / "plate.svg").write_text(f"<svg {head}>{shapes}</svg>")
+    text = PLATE.replace('shape = "rectangle"\nlength = 0.4\nwidth = 0.3', 'shape = "outline"\nsource = "plate.svg"')
+    rest = RIB.replace("path = [[0.1, 0.0], [0.2, 0.3]]", 'line = "bar"')
+    scene = load(tmp_path, rest=rest, text=text.replace("at = [0.13, 0.1]", "at = [0.13, -0.1]"))
+    np.testing.assert_allclose(scene.ribs[0].path, [(0.05, -0.05), (0.35, -0.2)], atol=1e-12)
+    assert any("bar are lines for ribs" in note for note in scene.built.target.notes)
+    with pytest.raises(ValueError, match=r"\[\[rib\]\] 0 line must be one of bar, .* did you mean 'bar'"):
+        _ = load(tmp_path, rest=rest.replace('"bar"', '"baar"'), text=text).built
+
+
 def test_layers_stand_for_the_thickness_and_edges_slide(tmp_path):
     text = PLATE.replace('[section]\nkind = "plate"\nthickness = 3e-3\n', "")
     layers = "[in_plane]\nboundary = 'sliding'\n[[layer]]\nthickness = 2e-3\n[[layer]]\nthickness = 1e-3\n"
@@ -134,7 +148,7 @@ def test_a_band_makes_a_body_anew_where_the_modes_of_flat_plates_do_not_scale(tm
     with pytest.raises(ValueError, match=r"section\.thickness rescales the modes of flat plates"):
         fi.spread(scene, {"section.thickness": ("uniform", 2e-3, 3e-3)}, n=16)
     curved = load(tmp_path, mesh='rise = { shape = "saddle", radius = 3.0 }')
-    with pytest.raises(ValueError, match=r"target\.size needs a thin flat body"):
+    with pytest.raises(ValueError, match=r"target\.size needs a thin body of stated size, flat"):
         fi.spread(curved, {"target.size": ("uniform", 0.9, 1.1)}, n=16)
 
 
