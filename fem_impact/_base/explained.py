@@ -28,6 +28,7 @@ HEADINGS: dict[str, tuple[str, ...]] = {
     "mesh-files": (
         "duplicate nodes were merged", "inverted triangles were flipped", "triangles were split at hanging nodes",
         "sides of the rim were replaced by smooth curves", "not on the rim, so it cannot be supported",
+        "the surface is curved", "and was levelled",
     ),
     "strike-points-that-cannot-move": ("it lies on a support",),
     "rolling-shear": ("G_yz is not stated",),

@@ -12,6 +12,7 @@ from .._base import check, markup
 from . import drawings, lines, mesh_files, sketch, smooth_edges
 from .facets import Curves, divided
 from .loops import Bezier, Outline, circle, crossed, extent, polyline, segment, signed_area, straight_loop
+from .rise import table
 from .triangulation import triangulate
 
 # [-] at most this many along a rectangle, however slender: the default mesh then has 1 200 triangles at most
@@ -301,7 +302,8 @@ def load(path: Any, *, unit: str | None = None) -> Mesh:
     Mesh
         Physical groups of lines, cell sets, sets of nodes and numbered line cells become named edges ("edge7" for
         number 7 without a name); "outer", "hole0" ... are the loops of the rim and "boundary" is all of it. A rim with
-        only small turns at its vertices becomes a smooth curve. `Mesh.notes` says what was repaired or assumed.
+        only small turns at its vertices becomes a smooth curve. A curved surface is projected on its mean plane, with
+        its heights over it as `Mesh.rise`. `Mesh.notes` says what was repaired or assumed.
 
         If the modes need another element size, `find_modes` splits each triangle in four or meshes the inside of the
         rim anew, whichever takes fewer triangles. If the thickness varies, it only splits: the triangles of the file
@@ -310,7 +312,8 @@ def load(path: Any, *, unit: str | None = None) -> Mesh:
     Raises
     ------
     ValueError
-        If the file cannot be read, is not one flat connected set of triangles, or looks like millimetres.
+        If the file cannot be read, is not one connected set of triangles, slopes by 45 degrees or more, or looks like
+        millimetres.
 
     Examples
     --------
@@ -318,7 +321,7 @@ def load(path: Any, *, unit: str | None = None) -> Mesh:
     >>> round(fi.mesh.load("plate.msh").area, 6)  # m^2
     0.12
     """
-    points, cells, given, pairs, notes = mesh_files.read(path, unit)
+    points, cells, given, pairs, notes, heights = mesh_files.read(path, unit)
     rim = mesh_files.boundary(cells)
     follower = {int(a): int(b) for a, b in rim}
     loops = [np.array([(a, follower[a]) for a in loop]) for loop in mesh_files.loops_of(rim)]
@@ -342,6 +345,7 @@ def load(path: Any, *, unit: str | None = None) -> Mesh:
         points, cells, facets, edges, curve.middles, curve.tangents, curve.curvatures,
         size=mesh_files.longest(points, cells) / LONGEST, size_stated=False,
         notes=tuple(f"{Path(path).name}: {note}" for note in notes),
+        rise=None if heights is None else table(*heights),
     )  # fmt: skip
     return replace(made, recipe=partial(_resized, made))
 
@@ -372,7 +376,7 @@ def save(path: Any, mesh: Mesh) -> None:
     """
     if not isinstance(mesh, Mesh) or mesh.dimension != 2:
         raise ValueError("mesh must be the mesh of a plate, got a beam; make a beam with fi.mesh.line")
-    mesh_files.write(path, mesh.points, mesh.cells, mesh.facets, mesh.middles, mesh.curved, mesh.edges)
+    mesh_files.write(path, mesh.points, mesh.cells, mesh.facets, mesh.middles, mesh.curved, mesh.edges, mesh.rise)
 
 
 def pierced(mesh: Mesh, holes: Sequence[tuple[np.ndarray, float]], *, size: float | None = None) -> Mesh:

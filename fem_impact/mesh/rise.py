@@ -9,7 +9,8 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.interpolate import CloughTocher2DInterpolator, NearestNDInterpolator
+from scipy.interpolate import CloughTocher2DInterpolator
+from scipy.spatial import cKDTree
 
 from .._base import check
 
@@ -47,9 +48,14 @@ def _cymbal(points: np.ndarray, radius: float, bow: float, cup_radius: float, cu
     return bow * (1.0 - (away / radius) ** 2) + cup * np.maximum(1.0 - (away / cup_radius) ** 2, 0.0) ** 2
 
 
-def _between(points: np.ndarray, smooth: Any, nearest: Any) -> np.ndarray:
+def _between(points: np.ndarray, smooth: Any, known: cKDTree, height: np.ndarray) -> np.ndarray:
     found = smooth(points)
-    return np.where(np.isnan(found), nearest(points), found)
+    beyond = np.isnan(found)
+    if beyond.any():
+        nearest = known.query(points[beyond])[1]
+        step = points[beyond] - known.data[nearest]
+        found[beyond] = height[nearest] + (smooth.grad[nearest, 0] * step).sum(axis=1)
+    return found
 
 
 def _radius(radius: float) -> float:
@@ -97,10 +103,9 @@ def cymbal(radius: float, bow: float, cup_radius: float, cup: float) -> Rise:
 
 
 def table(points: ArrayLike, heights: ArrayLike) -> Rise:
-    """A smooth surface through heights (n,) [m] at points (n, 2) [m]; beyond them, that of the nearest point counts."""
+    """A smooth surface through heights (n,) [m] at points (n, 2) [m]; beyond them, it goes on straight."""
     place = check.array("points", points, (None, 2), "m")
     height = check.array("heights", heights, (len(place),), "m")
     if len(place) < 4:
         raise ValueError(f"points must be four or more, got {len(place)}")
-    smooth, nearest = (kind(place, height) for kind in (CloughTocher2DInterpolator, NearestNDInterpolator))
-    return partial(_between, smooth=smooth, nearest=nearest)
+    return partial(_between, smooth=CloughTocher2DInterpolator(place, height), known=cKDTree(place), height=height)
