@@ -117,7 +117,9 @@ def assemble(
         if not isinstance(section, Plate):
             raise ValueError(f"section must be a Plate for {', '.join(shaped)}, got {check.shown(section)}")
         section = replace(section, **shaped)
-    section = mesh.shaped(section) if isinstance(section, Plate) else section
+    if isinstance(section, Plate) and (mesh.rise or section.ribs):
+        ribs = [replace(rib, path=mesh.line(rib.path)) for rib in section.ribs]
+        section = replace(section, rise=section.rise or mesh.rise, ribs=tuple(ribs))
     plane = isinstance(section, Plate) and not section.plain
     usual = SHALLOW.name if plane else THEORIES[mesh.dimension][0]
     theory = check.one_of("theory", usual if theory is None else theory, THEORIES[mesh.dimension])

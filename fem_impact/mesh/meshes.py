@@ -101,13 +101,9 @@ class Mesh(check.Locked):
         finer = self.recipe(size=float(f"{size:.11g}"))  # the mesher would amplify the rounding of an error estimate
         return replace(finer, notes=self.notes, rise=self.rise, lines=self.lines)
 
-    def shaped(self, section: Any) -> Any:
-        """A plate's section with the mesh's rise, if it has none, and with the lines that its ribs name."""
-        if self.rise is not None and section.rise is None:
-            section = replace(section, rise=self.rise)
-        paths = [self.lines.get(rib.path) if isinstance(rib.path, str) else None for rib in section.ribs]
-        ribs = [rib if path is None else replace(rib, path=path) for rib, path in zip(section.ribs, paths)]
-        return replace(section, ribs=ribs) if ribs else section
+    def line(self, path: Any) -> Any:
+        """A path as it is, or the points (n, 2) [m] of the line of that name, if there is one."""
+        return self.lines.get(path, path) if isinstance(path, str) else path
 
 
 def straight(

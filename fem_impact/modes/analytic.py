@@ -33,9 +33,9 @@ def closed_form(
         uniform = form == "line" and not callable(section.width) and not callable(section.height)
         ends = str(kinds[0]), str(kinds[-1])
         return partial(beam, *sizes, ends=ends, section=section, theory=theory or "euler") if uniform else None
-    if not mesh.shaped(section).plain or callable(section.thickness) or section.material.E_across is not None:
+    if not section.plain or mesh.rise is not None or callable(section.thickness) or section.tension:
         return None
-    if section.tension or len(held) > 1:
+    if section.material.E_across is not None or len(held) > 1:
         return None
     if form == "rectangle" and held == {"hinged"}:
         return partial(rectangle, *sizes, section=section)

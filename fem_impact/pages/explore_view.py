@@ -65,7 +65,8 @@ def page(setup: Setup) -> str:
         for card, names in CARDS.items()
     }  # fmt: skip
     facts = {
-        "loops": loops(setup.mesh), "band": BAND, "points": SPECTRUM_POINTS, "at": setup.start.at,
+        "loops": loops(setup.mesh), "ribs": [setup.mesh.pieces(rib.path).tolist() for rib in setup.scene.ribs],
+        "band": BAND, "points": SPECTRUM_POINTS, "at": setup.start.at,
         "depth": SPECTRUM_DEPTH, "narrowest": NARROWEST,
         "mass": setup.range("mass"), "stiffness": setup.range("stiffness"),
     }  # fmt: skip

@@ -369,7 +369,7 @@ class Scene(check.Brief):
         """The scene as objects."""
         mesh = self.body()
         section = self.make_section("beam" if mesh.dimension == 1 else "plate")
-        section = mesh.shaped(replace(section, ribs=self.ribs)) if isinstance(section, Plate) else section
+        section = replace(section, rise=mesh.rise, ribs=self.ribs) if isinstance(section, Plate) else section
         supports = supports_of(self.held)
         with self.blame("supports"):
             support_of_facets(mesh, supports, support_words(self.target.values.get("theory")))
