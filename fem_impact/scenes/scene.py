@@ -379,6 +379,10 @@ class Scene(check.Brief):
         told = {name: value for name, value in self._target.items() if name != "nu"}
         told["point_supports"] = tuple(entry for entry in told["point_supports"] if entry[1] != "clamped")
         with self.blame("target"):
+            if isinstance(section, Plate) and not section.plain and told["theory"] not in (None, "shallow"):
+                raise ValueError(
+                    f"theory must be left out for a curved, ribbed or coupled plate, got {told['theory']!r}"
+                )
             target = Target(mesh, section, supports, **told, blame=self.blame)
         points = tuple(self.points)
         moving = self.observe is not None

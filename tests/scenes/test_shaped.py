@@ -173,6 +173,7 @@ def test_a_band_makes_a_body_anew_where_the_modes_of_flat_plates_do_not_scale(tm
         ("", RIB.replace("[[rib]]", "[rib]"), r"rib must be tables, each written \[\[rib\]\]"),
         ("", "[[layer]]\nthickness = 1e-3\n", r"\[section\] thickness must be left out beside \[\[layer\]\]"),
         ("", "[in_plane]\nleft = 'slidng'\n", r"\[in_plane\] left must be one of held, .* did you mean 'sliding'"),
+        ("", RIB + "[target]\ntheory = 'mindlin'\n", r"\[target\] theory must be left out for a curved, ribbed"),
         ("", "[in_plane]\nlft = 'held'\n", r"\[in_plane\] edge must be one of .* did you mean 'left'"),
     ],
 )  # fmt: skip
