@@ -23,7 +23,7 @@ def closed_form(
     There are formulas for beams of constant section, and for thin flat isotropic plates of constant thickness without
     tension, ribs and uneven layers that are rectangles hinged all round or disks with the same support all round.
     """
-    if theory == "mindlin":
+    if theory == "mindlin" or mesh.rise is not None or not getattr(section, "plain", True):
         return None
     kinds, (form, *sizes) = support_of_facets(mesh, supports), mesh.form or ("",)
     held = {kind if isinstance(kind, str) else "elastic" for kind in kinds}
@@ -33,9 +33,7 @@ def closed_form(
         uniform = form == "line" and not callable(section.width) and not callable(section.height)
         ends = str(kinds[0]), str(kinds[-1])
         return partial(beam, *sizes, ends=ends, section=section, theory=theory or "euler") if uniform else None
-    if not section.plain or mesh.rise is not None or callable(section.thickness) or section.tension:
-        return None
-    if section.material.E_across is not None or len(held) > 1:
+    if callable(section.thickness) or section.material.E_across is not None or section.tension or len(held) > 1:
         return None
     if form == "rectangle" and held == {"hinged"}:
         return partial(rectangle, *sizes, section=section)
