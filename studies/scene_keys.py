@@ -7,7 +7,7 @@
 
 from pathlib import Path
 
-from fem_impact.scenes import editor_schema
+from fem_impact.scenes import editor_schema, keys
 
 PAGE = Path(__file__).parent / "scene_keys.md"
 HEAD = """# Keys of a scene
@@ -34,9 +34,9 @@ From Python, `fi.load_scene(path)` reads a scene, and `.plan()`, `.strike()` and
 
 ## Numbers that are known only so well
 
-Any single number of `mesh`, `material`, `section`, `target`, `striker`, `contact` and `strike` may say how well it is
-known; the scene strikes with its `value`, and `fem-impact strike SCENE --band` or `fi.band` tells what the rest leaves
-open:
+Any single number of `mesh`, `material`, `section`, `layer`, `rib`, `target`, `striker`, `contact` and `strike` may say
+how well it is known; the scene strikes with its `value`, and `fem-impact strike SCENE --band` or `fi.band` tells what
+the rest leaves open:
 
 - `{ value = 70e9, about = 0.03 }`: nine tenths of what it may be lie within 3 % (lognormal, for numbers above zero); or
 - `{ value = 70e9, low = 68e9, high = 71e9 }`: anything between the two, alike (uniform).
@@ -82,17 +82,25 @@ def rows(form):
     return "\n".join(lines) + "\n" if len(lines) > 2 else "It has no keys of its own.\n"
 
 
+def kinds(choices):
+    """The parts about each kind of a table."""
+    parts = []
+    for choice in choices:
+        key, kind = next((key, each["const"]) for key, each in choice["properties"].items() if "const" in each)
+        parts += [f'### {key} = "{kind}"\n', f"{choice['description']}\n", rows(choice)]
+    return parts
+
+
 def entry(name, form):
     """The part of the page about one table."""
     parts = [f"## [{name}]\n" if form["type"] == "object" else f"## [[{name}]]\n"]
     form = form.get("items", form)
-    parts.append(f"{form['description']}\n")
-    for choice in form.get("oneOf", ()):
-        key, kind = next((key, each["const"]) for key, each in choice["properties"].items() if "const" in each)
-        parts += [f'### {key} = "{kind}"\n', f"{choice['description']}\n", rows(choice)]
+    parts += [f"{form['description']}\n", *kinds(form.get("oneOf", ()))]
     if name == "supports":
-        kinds, spring = form["additionalProperties"]["anyOf"]
-        parts += [f"Each edge is {words(kinds)}, or springs:\n", rows(spring)]
+        held, spring = form["additionalProperties"]["anyOf"]
+        parts += [f"Each edge is {words(held)}, or springs:\n", rows(spring)]
+    elif name == "in_plane":
+        parts.append(f"Each edge is {words(form['additionalProperties'])}.\n")
     elif "oneOf" not in form:
         parts.append(rows(form))
     return "\n".join(parts)
@@ -102,8 +110,11 @@ def page():
     """The whole page."""
     tables = {name: form for name, form in editor_schema.schema()["properties"].items() if name != "title"}
     hand = tables["striker"]["oneOf"][0]["properties"]["hand"]
+    *shapes, table = tables["mesh"]["oneOf"][0]["properties"]["rise"]["anyOf"]
+    rise = f"## rise\n\n{keys.TABLES['rise']} A key of `[mesh]`: one of these, or `{words(table)}`.\n"
     own = [entry(name, form) for name, form in tables.items()]
-    return "\n".join([HEAD, *own, f"## hand\n\n{hand['description']} A key of `[striker]`.\n", rows(hand)])
+    own += [f"## hand\n\n{hand['description']} A key of `[striker]`.\n", rows(hand), rise, *kinds(shapes)]
+    return "\n".join([HEAD, *own])
 
 
 if __name__ == "__main__":

@@ -52,7 +52,8 @@ INNER = {
     "Response.to_xarray", "Modes.to_pyvista",  # no arguments
     "Gradient", "Gradient.change", "Response.band_spectrum",  # made by Response.gradient; its arguments are any words
     "Plan.data", "Plan.run", "Plan.strike", "Response.body_slice", "Response.summary", "Scene.picture",
-    "mesh.Mesh", "mesh.straight", "mesh.fill", "Modes.points", "Modes.stretched",
+    "mesh.Mesh", "mesh.Mesh.line", "mesh.Mesh.pieces", "mesh.straight", "mesh.fill", "Modes.points",
+    "Modes.stretched",
     "export.plain", "export.versions", "export.csv_text", "export.run_data", "export.vtk_ending", "figures.snapshot",
     "figures.in_hertz", "figures.styled", "sound.Sound",
     "hammers.Hammer", "hammers.bandwidth_of", "hammers.half_sine_reach",

@@ -24,10 +24,12 @@ HEADINGS: dict[str, tuple[str, ...]] = {
     "slips-of-units": ("softer than rubber", "are expected"),
     "drawings": (
         "states no unit", "y points down in an SVG file", "points along gentle bends were joined", "was closed",
+        "are lines for ribs",
     ),
     "mesh-files": (
         "duplicate nodes were merged", "inverted triangles were flipped", "triangles were split at hanging nodes",
         "sides of the rim were replaced by smooth curves", "not on the rim, so it cannot be supported",
+        "the surface is curved", "and was levelled",
     ),
     "strike-points-that-cannot-move": ("it lies on a support",),
     "rolling-shear": ("G_yz is not stated",),

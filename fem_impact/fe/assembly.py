@@ -122,6 +122,9 @@ def assemble(
         if not isinstance(section, Plate):
             raise ValueError(f"section must be a Plate for {', '.join(shaped)}, got {check.shown(section)}")
         section = replace(section, **shaped)
+    if isinstance(section, Plate) and (mesh.rise or section.ribs):
+        ribs = [replace(rib, path=mesh.line(rib.path)) for rib in section.ribs]
+        section = replace(section, rise=section.rise or mesh.rise, ribs=tuple(ribs))
     usual = usual_theory(section, mesh.dimension)
     theory = check.one_of("theory", usual.name if theory is None else theory, THEORIES[mesh.dimension])
     if usual is SHALLOW and theory != usual.name:

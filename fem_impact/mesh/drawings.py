@@ -12,6 +12,7 @@ import numpy as np
 
 from .._base import check, isolated
 from .._base.rounding import SAME
+from . import open_paths
 from .loops import (
     FARTHEST,
     LARGEST,
@@ -45,8 +46,11 @@ LONGEST_COMMENT = 1_000_000  # [-] characters of a comment in a drawing: longer 
 CORNER = 0.1
 
 
-def read(source: Any, unit: str | None) -> tuple[Outline, list[str]]:
-    """Outline [m] from a file name, a shapely polygon or points (n, 2), and notes on what was assumed."""
+Drawn = tuple[list[Loop], dict[str, np.ndarray]]  # closed loops, and named open paths (n, 2) [m]
+
+
+def read(source: Any, unit: str | None) -> tuple[Outline, dict[str, np.ndarray], list[str]]:
+    """Outline [m] from a file name, a shapely polygon or points (n, 2), named open paths, and notes on assumptions."""
     notes: list[str] = []
     if isinstance(source, (str, Path)):
         path = check.path("source", source)
@@ -55,7 +59,8 @@ def read(source: Any, unit: str | None) -> tuple[Outline, list[str]]:
         readers = {".svg": _svg, ".dxf": _dxf}
         if path.suffix.lower() not in readers:
             raise ValueError(f"source must be an .svg or .dxf file, got {path.name!r}; meshes are read by fi.mesh.load")
-        return _nested(path.name, readers[path.suffix.lower()](path, unit, notes)), notes
+        found, lines = readers[path.suffix.lower()](path, unit, notes)
+        return _nested(path.name, found), lines, notes
     scale = 1.0 if unit is None else UNITS[check.one_of("unit", unit, UNITS)]
     if hasattr(source, "geom_type"):
         if source.geom_type != "Polygon":
@@ -65,7 +70,7 @@ def read(source: Any, unit: str | None) -> tuple[Outline, list[str]]:
         rings = [source]
     rings = [check.array("source", ring, (None, None), "m") for ring in rings]
     loops = [_smoothed(ring[:, :2] * scale, notes) for ring in rings]
-    return _nested("source", loops), notes
+    return _nested("source", loops), {}, notes
 
 
 def _smoothed(points: np.ndarray, notes: list[str]) -> Loop:
@@ -163,8 +168,8 @@ def _refuse_entities(path: Path) -> None:
         parser.Parse(file.read(), True)  # ParseFile would read a huge comment again and again
 
 
-def _svg(path: Path, unit: str | None, notes: list[str]) -> list[Loop]:
-    """Closed loops [m] of all shapes in an SVG file, y upward."""
+def _svg(path: Path, unit: str | None, notes: list[str]) -> Drawn:
+    """Closed loops and named open paths [m] of all shapes in an SVG file, y upward."""
     drawn = isolated.read(path, "SVG", "mesh.drawings:svg_arrays")
     box, pixels, width = drawn["size"].tolist()
     scale = PIXEL
@@ -211,8 +216,8 @@ def dxf_arrays(path: Path) -> dict[str, np.ndarray]:
     return {**_packed(found), "unit": np.array(int(drawing.header.get("$INSUNITS", 0)))}
 
 
-def _dxf(path: Path, unit: str | None, notes: list[str]) -> list[Loop]:
-    """Closed loops [m] of the lines, arcs, ellipses, polylines and splines in a DXF file's model space."""
+def _dxf(path: Path, unit: str | None, notes: list[str]) -> Drawn:
+    """Closed loops, and open paths on named layers, of the lines, arcs and splines in a DXF file's model space [m]."""
     drawn = isolated.read(path, "DXF", "mesh.drawings:dxf_arrays")
     if unit is not None:
         scale = UNITS[check.one_of("unit", unit, UNITS)]
@@ -221,14 +226,14 @@ def _dxf(path: Path, unit: str | None, notes: list[str]) -> list[Loop]:
         if not scale:
             scale = 1.0
             notes.append(f"{path.name} states no unit; assumed metres, pass unit= to change that")
-    loops = _chained(path.name, _unpacked(path.name, drawn, scale * np.eye(2)), notes)
+    loops, lines = _chained(path.name, _unpacked(path.name, drawn, scale * np.eye(2)), notes)
     size = max(extent(loop) for loop in loops)
     if unit is None and size > LARGEST:
         raise ValueError(
             f"{path.name} extends over {size:g} m, which looks like millimetres read as metres; "
             "pass unit='mm' to load it, or unit='m' if it is that large"
         )
-    return loops
+    return loops, lines
 
 
 def _dxf_pieces(entity: Any) -> list[Piece]:
@@ -297,8 +302,8 @@ def _unpacked(name: str, drawn: dict[str, np.ndarray], matrix: np.ndarray) -> li
     return [piece.moved(matrix, np.zeros(2)) for piece in pieces]
 
 
-def _chained(name: str, pieces: list[Piece], notes: list[str]) -> list[Loop]:
-    """Join pieces end to end into closed loops."""
+def _chained(name: str, pieces: list[Piece], notes: list[str]) -> Drawn:
+    """Join pieces end to end into closed loops; what has a name and cannot belong to one is a line."""
     corners = np.array([piece.at(np.linspace(0.0, 1.0, 5)) for piece in pieces]).reshape(-1, 2)
     if not (np.abs(corners) < FARTHEST).all():
         raise ValueError(f"{name} has coordinates beyond {FARTHEST:g} m; correct the drawing")
@@ -306,6 +311,35 @@ def _chained(name: str, pieces: list[Piece], notes: list[str]) -> list[Loop]:
     left = [piece for piece in pieces if extent((piece,)) > SHORT * span]
     if not left:
         raise ValueError(f"{name} has no outline; draw it with paths, lines, arcs or splines")
+    lines = open_paths.lines(left, span, BRIDGED * span)
+    used = {i for chain in lines for i in chain}
+    rest = [piece for i, piece in enumerate(left) if i not in used]
+    loops = _loops(name, rest or left, span, notes)
+    largest = max(extent(loop) for loop in loops)
+    for chain in lines:
+        if extent(tuple(left[i] for i in chain)) > (1.0 + BRIDGED) * largest:
+            raise _open(name, *open_paths.flattened([left[i] for i in chain], np.inf)[[0, -1]])
+    size = span / open_paths.PARTS
+    paths = [(left[chain[0]].name, open_paths.flattened([left[i] for i in chain], size)) for chain in lines]
+    named = open_paths.named(paths, {piece.name for loop in loops for piece in loop})
+    if named:
+        beside = max(open_paths.sag(left[i], size) for chain in lines for i in chain)
+        curved = f"; their curves become straight parts, at most {beside:.1g} m beside them" if beside else ""
+        notes.append(f"{name}: the open paths {', '.join(named)} are lines for ribs{curved}")
+    return loops, named
+
+
+def _open(name: str, start: np.ndarray, stop: np.ndarray) -> ValueError:
+    """What to say of an outline that is not closed."""
+    return ValueError(
+        f"{name} has an open outline: it ends at ({stop[0]:g}, {stop[1]:g}) m, "
+        f"{np.linalg.norm(stop - start):g} m from its start; close the path there, or give it a name (in SVG an id, in "
+        "DXF a layer) if it is the line of a rib"
+    )
+
+
+def _loops(name: str, left: list[Piece], span: float, notes: list[str]) -> list[Loop]:
+    """Join pieces end to end into closed loops."""
     starts, stops = (np.array([end(piece) for piece in left]) for end in (_start, _stop))
     free = np.ones(len(left), bool)
     loops: list[Loop] = []
@@ -317,6 +351,10 @@ def _chained(name: str, pieces: list[Piece], notes: list[str]) -> list[Loop]:
             onward, back = (np.where(free, np.hypot(*(ends - stop).T), np.inf) for ends in (starts, stops))
             gaps = np.minimum(onward, back)
             best, home = int(gaps.argmin()), float(np.linalg.norm(start - stop))
+            if np.count_nonzero(gaps <= SAME * span) > 1:
+                raise ValueError(
+                    f"{name} has three lines that meet at ({stop[0]:g}, {stop[1]:g}) m; draw the outline as one path"
+                )
             if gaps[best] <= min(BRIDGED * span, home):
                 ahead = onward[best] <= gaps[best]
                 chain.append(left[best] if ahead else left[best].reversed())
@@ -325,10 +363,7 @@ def _chained(name: str, pieces: list[Piece], notes: list[str]) -> list[Loop]:
                 notes.append(f"{name}: a gap of {home:g} m was closed")
                 break
             else:
-                raise ValueError(
-                    f"{name} has an open outline: it ends at ({stop[0]:g}, {stop[1]:g}) m, "
-                    f"{home:g} m from its start; close the path there"
-                )
+                raise _open(name, start, stop)
         loops.append(tuple(chain))
     return loops
 

@@ -20,11 +20,16 @@ from .loops import FARTHEST, LARGEST, UNITS
 # [-] nodes per point on average above which a file is refused as damaged: parts that touch share a point by few
 CROWD = 16
 PLANE = ("triangle", "triangle6", "quad")
+FLAT = 1e-5  # [-] of its extent, across the plane of a mesh: less is noise, as of coordinates with six digits
+# [-] slope of the mean plane from one of two axes up to which that one counts, as half its square in lengths is 5e-4
+TILTED = 0.03
+STEEP = 1.0  # [-] slope above which a surface is no shallow shell by any measure: its area is 1.4 times its outline's
 NODES = {"line": 2, "line3": 3, "triangle": 3, "triangle6": 6, "quad": 4}  # nodes per cell of the types read here
 
 
 def read(path: Any, unit: str | None) -> tuple[
-    np.ndarray, np.ndarray, dict[tuple[int, int], np.ndarray], dict[str, set[tuple[int, int]]], list[str]
+    np.ndarray, np.ndarray, dict[tuple[int, int], np.ndarray], dict[str, set[tuple[int, int]]], list[str],
+    tuple[np.ndarray, np.ndarray] | None,
 ]:  # fmt: skip
     """Read and repair a mesh file.
 
@@ -35,28 +40,35 @@ def read(path: Any, unit: str | None) -> tuple[
     middles : dict, sorted pair of vertices -> middle of their side (2,) [m]; empty if all sides are straight
     names : dict, edge name -> set of sorted pairs of vertices
     notes : list of str, what was repaired
+    heights : None if it is flat, else all its points (n, 2) [m] in its mean plane, and their heights (n,) [m] over it
     """
     path = check.path("path", path)
     data = meshio_reader.read(path)
-    raw, notes = _plane_points(path, data, unit)
+    raw, height, notes = _plane_points(path, data, unit)
     cells, nodes = _triangles(path, data)
+    if height is not None:
+        notes.append(_sloping(path, raw, height, cells))
+        used = np.unique(np.append(cells, list(nodes.values())).astype(int))
+    heights = None if height is None else (raw[used], height[used])
     names = _named_pairs(path, data, cells)
     points, cells, number = _mend(path, raw, cells, notes)
     middles = {_pair(number[a], number[b]): raw[node] for (a, b), node in nodes.items()}
     pairs = {name: {_pair(number[a], number[b]) for a, b in found} for name, found in names.items()}
     cells = _hanging(points, cells, pairs, notes)
     _refuse_overlap(path, points, cells)
-    return points, cells, middles, pairs, notes
+    return points, cells, middles, pairs, notes, heights
 
 
 def _pair(a: int, b: int) -> tuple[int, int]:
     return (int(a), int(b)) if a < b else (int(b), int(a))
 
 
-def _plane_points(path: Path, data: meshio_reader.Raw, unit: str | None) -> tuple[np.ndarray, list[str]]:
-    """Coordinates (n_points, 2) [m] in the plane of the mesh, and notes."""
-    name, notes = path.name, []
-    points = data.points
+def _plane_points(
+    path: Path, data: meshio_reader.Raw, unit: str | None
+) -> tuple[np.ndarray, np.ndarray | None, list[str]]:
+    """Coordinates (n_points, 2) [m] in the plane of the mesh, heights (n_points,) [m] if it is curved, and notes."""
+    name, points = path.name, data.points
+    notes: list[str] = []
     if points.ndim != 2 or points.shape[1] not in (2, 3):
         raise ValueError(f"{name} must have points with two or three coordinates, got shape {points.shape}")
     used = np.unique(np.concatenate([np.zeros(0, int), *(nodes.ravel() for _, nodes, _ in data.blocks)]))
@@ -73,28 +85,66 @@ def _plane_points(path: Path, data: meshio_reader.Raw, unit: str | None) -> tupl
         raise ValueError(
             f"{name} has a coordinate beyond {FARTHEST:g} at node {far[0]}: {points[far[0]]}; correct that node"
         )
+    height = None
     if points.shape[1] == 3:
+        points, flat = _levelled(points, used, notes)
         spread = np.ptp(points[used], axis=0) if used.size else np.zeros(3)
-        flat = int(spread.argmin())
-        if spread[flat] > 1e-5 * spread.max():  # less is noise, as of coordinates with six digits
-            raise ValueError(
-                f"{name} is not flat: it extends over {spread[0]:g} x {spread[1]:g} x {spread[2]:g}; "
-                "a plate needs triangles in one plane z = constant"
-            )
-        if spread[flat] > SAME * spread.max():
+        if spread[flat] > FLAT * spread.max():
+            height = points[:, flat] - points[used, flat].mean()
+        elif spread[flat] > SAME * spread.max():
             notes.append(f"the nodes lie up to {spread[flat]:.1g} apart across the plane of the mesh, which is ignored")
         if flat != 2:
             notes.append(f"the mesh lies in the plane {'xyz'[flat]} = constant; its other two coordinates are used")
         points = np.delete(points, flat, axis=1)
     if unit is not None:
-        points = points * UNITS[check.one_of("unit", unit, UNITS)]
+        scale = UNITS[check.one_of("unit", unit, UNITS)]
+        points, height = points * scale, None if height is None else height * scale
     elif used.size and np.ptp(points[used], axis=0).max() > LARGEST:
         x, y = np.ptp(points[used], axis=0)
         raise ValueError(
             f"{name} extends over {x:g} x {y:g} m, which looks like millimetres read as metres; "
             "pass unit='mm' to load it, or unit='m' if it is that large"
         )
-    return points, notes
+    return points, height, notes
+
+
+def _levelled(points: np.ndarray, used: np.ndarray, notes: list[str]) -> tuple[np.ndarray, int]:
+    """Points (n_points, 3) turned so that their mean plane is that of two axes, and the number of the third axis."""
+    if not used.size:
+        return points, 2
+    centre = points[used].mean(axis=0)
+    _, size, axes = np.linalg.svd(points[used] - centre, full_matrices=False)
+    normal = axes[-1]
+    axis = int(np.abs(normal).argmax())
+    normal = normal * np.sign(normal[axis])
+    tilt = float(np.linalg.norm(np.delete(normal, axis))) / float(normal[axis])
+    if tilt <= (FLAT if size[-1] <= FLAT * size[0] else TILTED):
+        return points, axis
+    notes.append(f"the mean plane of the mesh is tilted by {np.degrees(np.arctan(tilt)):.3g} degrees and was levelled")
+    # the smallest turn to the axis: half turns about the line halfway to the normal, and about the axis
+    upward = np.eye(3)[axis]
+    turns = [2.0 * np.outer(a, a) / (a @ a) - np.eye(3) for a in (upward, normal + upward)]
+    return (points - centre) @ (turns[0] @ turns[1]).T + centre, axis
+
+
+def _sloping(path: Path, points: np.ndarray, height: np.ndarray, cells: np.ndarray) -> str:
+    """What to say of a curved surface; ValueError if it is too steep."""
+    corner = np.column_stack([points, height])[cells]
+    across = np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0])
+    size, level = np.hypot(across[:, 0], across[:, 1]), np.abs(across[:, 2])
+    slope = np.divide(size, level, out=np.where(size > SAME * size.max(), np.inf, 0.0), where=level > SAME * size)
+    worst = int(slope.argmax())
+    if slope[worst] > STEEP:
+        x, y, z = corner[worst].mean(axis=0)
+        raise ValueError(
+            f"{path.name} is too steep for a plate: near ({x:g}, {y:g}) m, {z:g} m above its mean plane, it slopes by "
+            f"{np.degrees(np.arctan(slope[worst])):.3g} degrees; shallow theory needs less than 45, and is good "
+            "below some 6 degrees; leave out walls and folds"
+        )
+    return (
+        "the surface is curved: its third coordinate is the rise towards the striker, with slopes up to "
+        f"{slope[worst]:.2g}, where shallow theory errs by some {50.0 * slope[worst] ** 2:.2g} %"
+    )
 
 
 def _triangles(path: Path, data: meshio_reader.Raw) -> tuple[np.ndarray, dict]:
@@ -326,14 +376,14 @@ def loops_of(rim: np.ndarray) -> list[list[int]]:
 
 def write(
     path: str | Path, points: np.ndarray, cells: np.ndarray, facets: np.ndarray, middles: np.ndarray,
-    curved: np.ndarray, edges: Mapping[str, np.ndarray],
+    curved: np.ndarray, edges: Mapping[str, np.ndarray], rise: Any = None,
 ) -> None:  # fmt: skip
     """Write triangles and named edges as binary Gmsh 2.2; a curved rim makes all triangles quadratic.
 
     Parameters
     ----------
     path : str or Path ending in .msh
-    points, cells, facets, middles, edges : as in a `Mesh`
+    points, cells, facets, middles, edges, rise : as in a `Mesh`
     curved : ndarray, shape (n_facets,), bool
     """
     path = check.path("path", path)
@@ -363,6 +413,7 @@ def write(
     flat = np.concatenate(place)
     tags = [tag, np.full(len(cells), len(own) + 1)]
     data = {"gmsh:physical": tags, "gmsh:geometrical": tags}
-    made = meshio.Mesh(np.column_stack([flat, np.zeros(len(flat))]), blocks, cell_data=data, field_data=names)
+    height = np.zeros(len(flat)) if rise is None else check.field("rise", rise, flat, "m")
+    made = meshio.Mesh(np.column_stack([flat, height]), blocks, cell_data=data, field_data=names)
     with redirect_stdout(StringIO()), redirect_stderr(StringIO()):
         made.write(path, file_format="gmsh22", binary=True)

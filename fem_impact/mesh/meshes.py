@@ -12,6 +12,7 @@ from .._base import check, markup
 from . import drawings, lines, mesh_files, sketch, smooth_edges
 from .facets import Curves, divided
 from .loops import Bezier, Outline, circle, crossed, extent, polyline, segment, signed_area, straight_loop
+from .rise import table
 from .triangulation import triangulate
 
 # [-] at most this many along a rectangle, however slender: the default mesh then has 1 200 triangles at most
@@ -48,6 +49,9 @@ class Mesh(check.Locked):
     notes: tuple[str, ...] = ()  # what was repaired or assumed
     # ("rectangle", length, width), ("disk", radius) or ("line", length) [m]; empty for any other body
     form: tuple[Any, ...] = ()
+    # height [m] of the unloaded surface at points (n, 2), as for `assemble`; of a mesh file with three coordinates
+    rise: Callable[[np.ndarray], Any] | None = field(default=None, repr=False)
+    lines: dict[str, np.ndarray] = field(default_factory=dict, repr=False)  # name -> (n, 2) [m], of a drawing; for ribs
 
     @property
     def dimension(self) -> int:
@@ -73,6 +77,12 @@ class Mesh(check.Locked):
         """Area [m^2] of a plate, up to the chords of curved edges; length [m] of a beam."""
         return measure(self.points, self.cells)
 
+    def pieces(self, path: Any) -> np.ndarray:
+        """Straight pieces (n, 2, 2) [m] of a path (n_points, 2) [m] or, given a name, of that edge."""
+        if isinstance(path, str):
+            return self.points[self.facets[self.edges[path]]]
+        return np.stack([path[:-1], path[1:]], axis=1)
+
     def _repr_html_(self) -> str:
         """Notebook view: the outline and a table of its size and edges."""
         kind = "triangles" if self.dimension == 2 else "elements"
@@ -89,7 +99,11 @@ class Mesh(check.Locked):
             )
         size = self.size / check.positive("factor", factor)
         finer = self.recipe(size=float(f"{size:.11g}"))  # the mesher would amplify the rounding of an error estimate
-        return replace(finer, notes=self.notes)
+        return replace(finer, notes=self.notes, rise=self.rise, lines=self.lines)
+
+    def line(self, path: Any) -> Any:
+        """A path as it is, or the points (n, 2) [m] of the line of that name, if there is one."""
+        return self.lines.get(path, path) if isinstance(path, str) else path
 
 
 def straight(
@@ -251,7 +265,8 @@ def outline(source: Any, *, size: float | None = None, unit: str | None = None) 
     -------
     Mesh
         Edges take their name from the id of an SVG shape or the layer of a DXF entity. Otherwise they are called
-        "edge0", "edge1" ... from corner to corner, and "hole0" ... for holes. `Mesh.notes` says what was assumed.
+        "edge0", "edge1" ... from corner to corner, and "hole0" ... for holes. Open paths with a name are `Mesh.lines`
+        by that name, for ribs. `Mesh.notes` says what was assumed.
 
     Raises
     ------
@@ -265,8 +280,8 @@ def outline(source: Any, *, size: float | None = None, unit: str | None = None) 
     >>> sorted(egg.edges), bool(egg.curved.all())
     (['boundary', 'edge0', 'outer'], True)
     """
-    curve, notes = drawings.read(source, unit)
-    return replace(fill(curve, size=size), notes=tuple(notes))
+    curve, lines, notes = drawings.read(source, unit)
+    return replace(fill(curve, size=size), notes=tuple(notes), lines=lines)
 
 
 def load(path: Any, *, unit: str | None = None) -> Mesh:
@@ -283,7 +298,8 @@ def load(path: Any, *, unit: str | None = None) -> Mesh:
     Mesh
         Physical groups of lines, cell sets, sets of nodes and numbered line cells become named edges ("edge7" for
         number 7 without a name); "outer", "hole0" ... are the loops of the rim and "boundary" is all of it. A rim with
-        only small turns at its vertices becomes a smooth curve. `Mesh.notes` says what was repaired or assumed.
+        only small turns at its vertices becomes a smooth curve. A curved surface is projected on its mean plane, with
+        its heights over it as `Mesh.rise`. `Mesh.notes` says what was repaired or assumed.
 
         If the modes need another element size, `find_modes` splits each triangle in four or meshes the inside of the
         rim anew, whichever takes fewer triangles. If the thickness varies, it only splits: the triangles of the file
@@ -292,7 +308,8 @@ def load(path: Any, *, unit: str | None = None) -> Mesh:
     Raises
     ------
     ValueError
-        If the file cannot be read, is not one flat connected set of triangles, or looks like millimetres.
+        If the file cannot be read, is not one connected set of triangles, slopes by 45 degrees or more, or looks like
+        millimetres.
 
     Examples
     --------
@@ -300,7 +317,7 @@ def load(path: Any, *, unit: str | None = None) -> Mesh:
     >>> round(fi.mesh.load("plate.msh").area, 6)  # m^2
     0.12
     """
-    points, cells, given, pairs, notes = mesh_files.read(path, unit)
+    points, cells, given, pairs, notes, heights = mesh_files.read(path, unit)
     rim = mesh_files.boundary(cells)
     follower = {int(a): int(b) for a, b in rim}
     loops = [np.array([(a, follower[a]) for a in loop]) for loop in mesh_files.loops_of(rim)]
@@ -324,6 +341,7 @@ def load(path: Any, *, unit: str | None = None) -> Mesh:
         points, cells, facets, edges, curve.middles, curve.tangents, curve.curvatures,
         size=mesh_files.longest(points, cells) / LONGEST, size_stated=False,
         notes=tuple(f"{Path(path).name}: {note}" for note in notes),
+        rise=None if heights is None else table(*heights),
     )  # fmt: skip
     return replace(made, recipe=partial(_resized, made))
 
@@ -354,7 +372,7 @@ def save(path: Any, mesh: Mesh) -> None:
     """
     if not isinstance(mesh, Mesh) or mesh.dimension != 2:
         raise ValueError("mesh must be the mesh of a plate, got a beam; make a beam with fi.mesh.line")
-    mesh_files.write(path, mesh.points, mesh.cells, mesh.facets, mesh.middles, mesh.curved, mesh.edges)
+    mesh_files.write(path, mesh.points, mesh.cells, mesh.facets, mesh.middles, mesh.curved, mesh.edges, mesh.rise)
 
 
 def pierced(mesh: Mesh, holes: Sequence[tuple[np.ndarray, float]], *, size: float | None = None) -> Mesh:
@@ -406,7 +424,8 @@ def _filled(
         added = {name: numbers for name, numbers in parts.items() if not name.isdigit() and name not in rim}
         arrays["edges"] = added | rim
     arrays["edges"]["boundary"] = np.arange(len(arrays["facets"]))
-    return Mesh(**arrays, recipe=recipe, size=size, size_stated=stated, notes=mesh.notes)
+    kept: dict[str, Any] = {"notes": mesh.notes, "rise": mesh.rise, "lines": mesh.lines}
+    return Mesh(**arrays, recipe=recipe, size=size, size_stated=stated, **kept)
 
 
 def _outline(mesh: Mesh) -> Outline | None:

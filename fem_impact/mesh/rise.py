@@ -4,14 +4,17 @@ Each function returns a function of points (n, 2) [m] that gives heights (n,) [m
 may be any such function.
 """
 
-from functools import partial
+from dataclasses import dataclass
+from functools import cached_property, partial
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.interpolate import CloughTocher2DInterpolator, NearestNDInterpolator
+from scipy.interpolate import CloughTocher2DInterpolator
+from scipy.spatial import cKDTree
 
 from .._base import check
+from .._base.rounding import SAME
 
 Rise = partial[np.ndarray]
 
@@ -47,9 +50,25 @@ def _cymbal(points: np.ndarray, radius: float, bow: float, cup_radius: float, cu
     return bow * (1.0 - (away / radius) ** 2) + cup * np.maximum(1.0 - (away / cup_radius) ** 2, 0.0) ** 3
 
 
-def _between(points: np.ndarray, smooth: Any, nearest: Any) -> np.ndarray:
-    found = smooth(points)
-    return np.where(np.isnan(found), nearest(points), found)
+@dataclass(frozen=True, eq=False)
+class Heights:
+    """A smooth surface through points; it is told from others by these alone."""
+
+    points: np.ndarray  # (n, 2) [m]
+    heights: np.ndarray  # (n,) [m]
+
+    @cached_property
+    def _smooth(self) -> Any:
+        return CloughTocher2DInterpolator(self.points, self.heights)
+
+    def __call__(self, points: np.ndarray) -> np.ndarray:
+        found = self._smooth(points)
+        beyond = np.isnan(found)
+        if beyond.any():
+            nearest = cKDTree(self.points).query(points[beyond])[1]
+            step = points[beyond] - self.points[nearest]
+            found[beyond] = self.heights[nearest] + (self._smooth.grad[nearest, 0] * step).sum(axis=1)
+        return found
 
 
 def _radius(radius: float) -> float:
@@ -97,11 +116,13 @@ def cymbal(radius: float, bow: float, cup_radius: float, cup: float) -> Rise:
     return partial(_cymbal, **sizes)
 
 
-def table(points: ArrayLike, heights: ArrayLike) -> Rise:
-    """A smooth surface through heights (n,) [m] at points (n, 2) [m]; beyond them, that of the nearest point counts."""
+def table(points: ArrayLike, heights: ArrayLike) -> Heights:
+    """A smooth surface through heights (n,) [m] at points (n, 2) [m]; beyond them, it goes on straight."""
     place = check.array("points", points, (None, 2), "m")
     height = check.array("heights", heights, (len(place),), "m")
     if len(place) < 4:
         raise ValueError(f"points must be four or more, got {len(place)}")
-    smooth, nearest = (kind(place, height) for kind in (CloughTocher2DInterpolator, NearestNDInterpolator))
-    return partial(_between, smooth=smooth, nearest=nearest)
+    size = np.linalg.svd(place - place.mean(axis=0), compute_uv=False)
+    if size[1] <= SAME * size[0]:
+        raise ValueError("points must not all lie on one line; give some beside it")
+    return Heights(place, height)

@@ -19,8 +19,9 @@ EDGES = {  # support -> line width [px] and dash pattern; free edges keep the th
 
 
 def draw_body(
-    mesh: "Mesh", *, supports: Mapping[str, Any] | None = None, at: Any = None, points: Any = (), title: str
-) -> str:
+    mesh: "Mesh", *, supports: Mapping[str, Any] | None = None, at: Any = None, points: Any = (), ribs: Any = (),
+    title: str,
+) -> str:  # fmt: skip
     """A plate from above or a beam from the side, with its supports, strike point and observation points.
 
     Parameters
@@ -29,6 +30,7 @@ def draw_body(
     supports : mapping of edge name to "clamped", "hinged", "free" or an elastic support, optional
     at : strike point, (dimension,) [m], or several, (n, dimension), optional
     points : observation points, (n_points, dimension) [m]
+    ribs : paths (n, 2) [m] or names of edges
     title : str, description for screen readers
     """
     held = held_edges(mesh, supports or {})
@@ -43,6 +45,7 @@ def draw_body(
 
     if mesh.dimension == 2:
         drawn = _outline(mesh, held, place)
+        drawn += "".join(_line(piece, place) for path in ribs for piece in mesh.pieces(path))
     else:
         (x0, y0), (x1, y1) = place(low), place(low + size)
         box = f'x="{x0:.1f}" y="{y1:.1f}" width="{x1 - x0:.1f}" height="{y0 - y1:.1f}"'
@@ -59,6 +62,12 @@ def draw_body(
             f'<circle cx="{a:.1f}" cy="{b:.1f}" r="10" fill="none" stroke="{STRIKE}" stroke-width="1.5"/>'
         )
     return picture(height, title, drawn)
+
+
+def _line(ends: np.ndarray, place: Any) -> str:
+    """A straight piece of a rib between ends (2, 2) [m]."""
+    path = "L".join("{:.1f} {:.1f}".format(*place(end)) for end in ends)
+    return f'<path d="M{path}" fill="none" stroke="{INK}" stroke-width="2" stroke-linecap="round"/>'
 
 
 def held_edges(mesh: "Mesh", supports: Mapping[str, Any]) -> dict[int, str]:

@@ -20,10 +20,10 @@ def closed_form(
 ) -> Callable[..., Modes] | None:
     """Function of ``n_modes`` or ``max_frequency`` [Hz] that finds the modes of this body; None if no formula does.
 
-    There are formulas for beams of constant section, and for thin isotropic plates of constant thickness without
-    tension that are rectangles hinged all round or disks with the same support all round.
+    There are formulas for beams of constant section, and for thin flat isotropic plates of constant thickness without
+    tension, ribs and uneven layers that are rectangles hinged all round or disks with the same support all round.
     """
-    if theory == "mindlin":
+    if theory == "mindlin" or mesh.rise is not None or not getattr(section, "plain", True):
         return None
     kinds, (form, *sizes) = support_of_facets(mesh, supports), mesh.form or ("",)
     held = {kind if isinstance(kind, str) else "elastic" for kind in kinds}

@@ -4,7 +4,11 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..mesh.mesh_files import quartered
+from .._base import check
+from ..fe.ribs import ON
+from ..fe.splitting import distance
+from ..fe.system import System
+from ..mesh.mesh_files import quartered, sides_of
 
 if TYPE_CHECKING:
     from .modal import Modes
@@ -25,15 +29,47 @@ def grid(modes: "Modes") -> tuple[np.ndarray, np.ndarray]:
     return points, cells
 
 
+def body_of(modes: "Modes") -> System | None:
+    """The body of finite elements that has these modes; None of others."""
+    shapes: Any = modes.shapes
+    while hasattr(shapes, "base"):
+        shapes = shapes.base
+    return getattr(shapes, "system", None)
+
+
+def heights(modes: "Modes", points: np.ndarray) -> np.ndarray | None:
+    """Rise (n_points,) [m] of a curved plate at points (n_points, 2) [m]; None of a flat body."""
+    system = body_of(modes)
+    rise = None if system is None else getattr(system.section, "rise", None)
+    return None if rise is None else check.field("rise", rise, points, "m")
+
+
+def placed(modes: "Modes", points: np.ndarray) -> np.ndarray:
+    """Places (n_points, 3) [m] of points (n_points, dimension) [m] of the unloaded body, z towards the striker."""
+    rise = heights(modes, points)
+    places = np.zeros((len(points), 3))
+    places[:, : points.shape[1]] = points
+    places[:, 2] = 0.0 if rise is None else rise
+    return places
+
+
+def rib_sides(modes: "Modes", points: np.ndarray, cells: np.ndarray) -> np.ndarray:
+    """Sides (n, 2) of drawn triangles that lie on the ribs of a plate, point numbers."""
+    system, sides = body_of(modes), sides_of(cells)[0] if cells.shape[1] == 3 else np.zeros((0, 2), int)
+    on, close = np.zeros(len(sides), bool), ON * float(np.ptp(points, axis=0).max(initial=0.0))
+    for rib in getattr(system.section, "ribs", ()) if system is not None else ():
+        for start, end in system.mesh.pieces(rib.path):  # type: ignore[union-attr]
+            on |= (distance(points, start, end) <= close)[sides].all(axis=1)
+    return sides[on]
+
+
 def pyvista_grid(modes: "Modes") -> Any:
     """The body as a `pyvista.UnstructuredGrid` with its mode shapes, see `Modes.to_pyvista`."""
     import pyvista  # loads all of VTK, which few need
 
     points, cells = grid(modes)
-    places = np.zeros((len(points), 3))
-    places[:, : points.shape[1]] = points
     kind = {1: pyvista.CellType.VERTEX, 2: pyvista.CellType.LINE, 3: pyvista.CellType.TRIANGLE}[cells.shape[1]]
-    made = pyvista.UnstructuredGrid({kind: cells}, places)
+    made = pyvista.UnstructuredGrid({kind: cells}, placed(modes, points))
     for i, shape in enumerate(modes.shapes.at(points).T, 1):
         made.point_data[f"mode_{i:03d}"] = shape
     made.field_data["frequency"], made.field_data["damping_ratio"] = modes.frequencies, modes.damping_ratio

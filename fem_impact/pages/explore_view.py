@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from .._base.rounding import SAME
+from ..fe.section import Plate
 from ..mesh.meshes import Mesh
 from ..show.figures import SPECTRUM_DEPTH
 from .explore_map import NARROWEST
@@ -38,8 +39,12 @@ def ends(setup: Setup) -> Ends:
         found[letter] = (float(three[0]), float(three[1]), float(three[2]))
     if setup.mesh.dimension == 2:
         found["height"] = (0.0, 3.0, 0.0)  # [m] of the listener; at zero the sound is the motion of the surface
+    section = setup.scene.built.target.section
+    shaped = isinstance(section, Plate) and bool(section.rise or section.ribs or section.layers)
     for name in SLIDERS:
         value = getattr(setup.start, name, None)
+        if name == "thickness" and shaped:  # only of a flat plate it rescales all frequencies alike
+            continue
         if name not in found and value is not None:
             found[name] = (*setup.range(name), value)
     return found
@@ -60,7 +65,8 @@ def page(setup: Setup) -> str:
         for card, names in CARDS.items()
     }  # fmt: skip
     facts = {
-        "loops": loops(setup.mesh), "band": BAND, "points": SPECTRUM_POINTS, "at": setup.start.at,
+        "loops": loops(setup.mesh), "ribs": [setup.mesh.pieces(rib.path).tolist() for rib in setup.scene.ribs],
+        "band": BAND, "points": SPECTRUM_POINTS, "at": setup.start.at,
         "depth": SPECTRUM_DEPTH, "narrowest": NARROWEST,
         "mass": setup.range("mass"), "stiffness": setup.range("stiffness"),
     }  # fmt: skip

@@ -24,6 +24,7 @@ from ..impact.quantities import rebound
 from ..impact.response import Response
 from ..mesh.mesh_files import boundary
 from ..model.playing import Strokes
+from ..modes import viewing
 from ..scenes import hearing, sequence
 from ..scenes.scene import Run, Scene, load_scene, scene_of
 from ..scenes.schema import PATHS, fault, read_bytes
@@ -409,7 +410,9 @@ def _view(response: Response | Strokes, end: float) -> dict[str, Any]:
     assert response.at is not None
     count = min(12, modes.n_modes)  # more would double the size of the page
     shapes = rows[:, :count].T / np.maximum(np.abs(rows[:, :count]).max(axis=0), 1e-300)[:, None]
-    edge = surface[boundary(cells)]  # (n_sides, 2, 2)
+    rise, ribs = viewing.heights(modes, points), viewing.rib_sides(modes, points, cells)
+    place = np.column_stack([surface, np.zeros(len(surface)) if rise is None else rise])
+    under = viewing.placed(modes, np.atleast_2d(response.at))[0, 2]
     columns = {
         "x": surface[:, 0], "y": surface[:, 1], "times": times, "frequencies": modes.frequencies[:count],
         "damping": modes.damping_ratio[:count],
@@ -421,12 +424,19 @@ def _view(response: Response | Strokes, end: float) -> dict[str, Any]:
         columns["gap"] = sampling.gap(response, times)
     return {name: _short(values) for name, values in columns.items()} | {
         "cells": cells.T.tolist(),
-        "rim": [[x for a, b in edge[:, :, i].tolist() for x in (a, b, None)] for i in (0, 1)],
+        "rim": _lines(place[boundary(cells)]),
+        **({"ribs": _lines(place[ribs])} if len(ribs) else {}),
+        **({} if rise is None else {"rise": _short(rise), "under": float(under)}),
         "at": [float(response.at[0]), float(response.at[1]) if modes.dimension == 2 else 0.0],
         "first": first,
         "wave": _packed(wave),
         "shapes": _packed(shapes),
     }
+
+
+def _lines(ends: np.ndarray) -> list[list[float | None]]:
+    """Coordinates of separate lines with these ends (n, 2, 3) [m]."""
+    return [[x for a, b in ends[:, :, i].tolist() for x in (a, b, None)] for i in range(3)]
 
 
 def _packed(rows: np.ndarray) -> dict[str, Any]:

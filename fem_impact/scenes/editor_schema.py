@@ -4,17 +4,18 @@ import inspect
 from collections.abc import Callable
 from typing import Any
 
-from ..fe.section import KINDS, SOFT, Elastic
+from ..fe.section import PLANE, Elastic, Material
 from ..impact.striker import Hand
 from . import keys
-from .schema import MAKERS, NESTED, OF_TARGET, REPEATED, REQUIRED, SUPPLIED
+from .schema import HOLDS, MAKERS, NESTED, PARTS, REPEATED, REQUIRED, RISES, keys_of
 
 # How well a number is known, see `known`; any number of a table but [map], [observe] and [[stroke]] may be one
 INTERVAL = (
     keys.table({"value": keys.POSITIVE, "about": keys.POSITIVE}, ("value", "about")),
     keys.table(dict.fromkeys(("value", "low", "high"), keys.NUMBER), ("value", "low", "high")),
 )
-KNOWN = ("mesh", "material", "section", "target", "striker", "contact", "strike")
+KNOWN = ("mesh", "material", "section", "target", "striker", "contact", "strike", "rib", "layer", "rise", "hand")
+WITHIN = {"hand": Hand, "material": Material}  # keys that are tables themselves
 DRAFT = "http://json-schema.org/draft-07/schema#"  # what taplo and VS Code read
 
 
@@ -24,15 +25,15 @@ def schema() -> dict[str, Any]:
     Every scene that loads satisfies it; it leaves everything between keys and tables to `load_scene`.
     """
     tables = {name: _table(name, selector, makers) for name, (selector, makers) in MAKERS.items()}
-    for name in OF_TARGET:
-        del tables["strike"]["properties"][name]
     tables[REPEATED]["properties"] |= {name: tables[name] for name in NESTED}
-    tables[REPEATED] = {"type": "array", "items": tables[REPEATED]}
+    tables |= {name: {"type": "array", "items": tables[name]} for name in (REPEATED, *PARTS)}
     tables["supports"] = {
         "type": "object",
         "description": keys.TABLES["supports"],
-        "additionalProperties": {"anyOf": [{"enum": [*KINDS, SOFT]}, _keys("supports", "", Elastic)]},
+        "additionalProperties": {"anyOf": [{"enum": [*HOLDS["supports"]]}, _keys("supports", "", Elastic)]},
     }
+    words = keys.TABLES["in_plane"]
+    tables["in_plane"] = {"type": "object", "description": words, "additionalProperties": {"enum": [*PLANE]}}
     return {
         "$schema": DRAFT,
         "title": "A scene of fem_impact",
@@ -48,28 +49,33 @@ def _table(name: str, selector: str, makers: dict[str, Callable[..., Any]]) -> d
     """The schema of one table: that of its only kind, or a choice by the key ``selector``."""
     if not selector:
         return _keys(name, "", makers[""])
+    return {
+        "type": "object",
+        "description": keys.TABLES[name],
+        "properties": {selector: {"enum": list(makers)}},  # so that editors offer the kinds first
+        "required": [selector],
+        "oneOf": _choices(name, selector, makers),
+    }
+
+
+def _choices(name: str, selector: str, makers: dict[str, Callable[..., Any]]) -> list[dict[str, Any]]:
+    """The schemas of a table of each kind."""
     choices = []
     for kind, maker in makers.items():
         found = _keys(name, kind, maker)
         found["properties"] = {selector: {"const": kind}, **found["properties"]}
         found["required"] = [selector, *found["required"]]
         choices.append(found)
-    return {
-        "type": "object",
-        "description": keys.TABLES[name],
-        "properties": {selector: {"enum": list(makers)}},  # so that editors offer the kinds first
-        "required": [selector],
-        "oneOf": choices,
-    }
+    return choices
 
 
 def _keys(table: str, kind: str, maker: Callable[..., Any]) -> dict[str, Any]:
     """The schema of the keys that become arguments of a function."""
-    arguments = {n: p for n, p in inspect.signature(maker).parameters.items() if n not in SUPPLIED}
+    arguments = {n: p for n, p in keys_of(maker).items() if n not in NESTED}
     found: dict[str, Any] = {
         "type": "object",
         "properties": {name: _key(table, kind, name, argument.default) for name, argument in arguments.items()},
-        "required": [n for n, p in arguments.items() if p.default is inspect.Parameter.empty],
+        "required": [n for n, p in arguments.items() if p.default is p.empty],
         "additionalProperties": False,
     }
     return {"description": (inspect.getdoc(maker) or "").partition("\n")[0] if kind else keys.TABLES[table], **found}
@@ -77,7 +83,12 @@ def _keys(table: str, kind: str, maker: Callable[..., Any]) -> dict[str, Any]:
 
 def _key(table: str, kind: str, name: str, default: Any) -> dict[str, Any]:
     """The schema of one key, with its default."""
-    found = _keys(name, "", Hand) if name == "hand" else keys.form(table, kind, name)
+    if name == "rise":
+        one = keys.table({"table": keys.form("rise", "", "table")}, ("table",))
+        return keys.form(table, kind, name) | keys.named("a [rise](#rise)", *_choices("rise", "shape", RISES), one)
+    if name in WITHIN:
+        return _keys(name, "", WITHIN[name]) | {"description": keys.KEYS.get(name, (keys.TABLES[name],))[0]}
+    found = keys.form(table, kind, name)
     if table in KNOWN and found.get("type") == "number":
         words = found.pop("description")
         found = {"description": words, "anyOf": [found, *INTERVAL]}

@@ -1,12 +1,14 @@
 """What varies in space or over frequency, as a scene file can write it: a table of values or a list of cases."""
 
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 from scipy.interpolate import RegularGridInterpolator
 
 from .._base import check
+from ..mesh.rise import table
 
 AXES = ("x", "y")
 SHAPES = ({"value", "centre", "radius"}, {"value", "from", "to"})
@@ -73,6 +75,35 @@ def _cases(name: str, value: dict, dimension: int) -> Callable[[np.ndarray], np.
         return result
 
     return at
+
+
+def tapered(name: str, value: Any) -> Any:
+    """A size, or a function of the distance (n, 1) [m] along a rib from ``[[distance, size], ...]``, linear between."""
+    if not isinstance(value, list):
+        return value
+    distance, size = check.array(name, value, (None, 2), "m").T
+    if len(distance) < 2 or (np.diff(distance) <= 0.0).any():
+        raise ValueError(f"{name} must be two or more [distance, size], distances ascending, got {check.shown(value)}")
+    check.positive(f"smallest {name}", float(size.min()), "m")
+    return lambda along: np.interp(along[:, 0], distance, size)
+
+
+def heights(path: str) -> Any:
+    """The rise through the points of a CSV file with columns x, y, z [m]; a first line of words is skipped."""
+    file = Path(path)
+    if not file.is_file():
+        raise ValueError(f"table must name a CSV file with columns x, y, z, got {path!r}; {check.absent(file)}")
+    rows = []
+    for number, line in enumerate(file.read_text(encoding="utf-8", errors="replace").splitlines(), 1):
+        try:
+            rows += [[float(word) for word in line.split(",")]] if line.strip() else []
+        except ValueError:
+            if number > 1:
+                raise ValueError(f"table {file.name} must hold numbers; line {number} is {check.shown(line)}") from None
+    if any(len(row) != 3 for row in rows):
+        raise ValueError(f"table {file.name} must have three columns, x, y and z in m, divided by commas")
+    *plane, z = check.array(f"table {file.name}", rows, (None, 3), "m").T if rows else np.zeros((3, 0))
+    return table(np.column_stack(plane), z)
 
 
 def over_frequency(name: str, value: Any) -> Any:

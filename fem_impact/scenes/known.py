@@ -6,16 +6,28 @@ from typing import Any
 from .._base import check
 
 NINETY = 1.6448536269514722  # [-] deviations of a normal distribution between which nine tenths lie
+WITHIN = ("rise", "hand", "material")  # tables within others whose numbers may have intervals, too
 FORMS = ({"value", "about"}, {"value", "low", "high"})
 
 
-def taken(table: str, values: Mapping[str, Any]) -> tuple[dict[str, Any], dict[str, Any]]:
-    """The values of a table as single numbers, and the distributions of those that have an interval, by table.key."""
+def taken(table: str, values: Any) -> tuple[Any, dict[str, Any]]:
+    """The values of a table as single numbers, and the distributions of those that have an interval, by table.key.
+
+    Tables in a list have their number before the key.
+    """
+    if isinstance(values, list):
+        pairs = [taken(f"{table}.{i}", each) for i, each in enumerate(values)]
+        return [pair[0] for pair in pairs], {name: how for pair in pairs for name, how in pair[1].items()}
+    if not isinstance(values, Mapping):
+        return values, {}
     plain, known = dict(values), {}
     for key, value in values.items():
         if isinstance(value, Mapping) and set(value) in FORMS:
             known[f"{table}.{key}"] = distribution(key, value)
             plain[key] = value["value"]
+        elif isinstance(value, Mapping) and key in WITHIN:
+            plain[key], within = taken(f"{table}.{key}", value)
+            known |= within
     return plain, known
 
 

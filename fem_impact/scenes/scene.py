@@ -12,6 +12,7 @@ import numpy as np
 
 from .._base import check, markup
 from ..fe.assembly import THICK, System, clamped, support_of_facets, support_words
+from ..fe.ribs import Rib, sides_on
 from ..fe.section import Beam, Material, Plate, evaluate
 from ..fe.springs import check_posts
 from ..impact import collision, promise
@@ -19,7 +20,7 @@ from ..impact.contact import Contact
 from ..impact.response import Response
 from ..impact.striker import Striker
 from ..mesh import sketch
-from ..mesh.meshes import Mesh, pierced
+from ..mesh.meshes import Mesh, lined, pierced
 from ..model import planner
 from ..model.by_modes import MOST_MODES
 from ..model.planner import Blow, Plan, Run
@@ -30,15 +31,18 @@ from . import known, sequence
 from .schema import (
     MAKERS,
     NESTED,
+    PARTS,
     PATHS,
     REPEATED,
     REQUIRED,
     TABLES,
     Part,
     fault,
+    read_list,
     read_part,
     read_strokes,
     read_tables,
+    rise_of,
     supports_of,
 )  # fmt: skip
 
@@ -62,6 +66,9 @@ class Scene(check.Brief):
     section: Part | None = None
     target: Part = NOTHING
     supports: Part = NOTHING
+    in_plane: Part = NOTHING
+    rib: tuple[Part, ...] = ()
+    layer: tuple[Part, ...] = ()
     observe: Part | None = None
     map: Part | None = None
     stroke: tuple[Part, ...] = ()  # blows one after another, for `sequence.play`; [strike] says what they share
@@ -271,7 +278,8 @@ class Scene(check.Brief):
             *path, key = str(name).split(".")
             table: Any = tables
             for part in path:
-                table = table.get(part) if isinstance(table, dict) else None
+                inner = dict(zip(map(str, range(len(table))), table)) if isinstance(table, list) else table
+                table = inner.get(part) if isinstance(inner, dict) else None
             if not path or not isinstance(table, dict) or not isinstance(table.get(key, 0.0), (int, float)):
                 raise ValueError(f"values must name numbers in tables of the scene, got {check.shown(name)}")
             table[key] = check.number(f"values[{check.shown(name)}]", value)
@@ -289,7 +297,8 @@ class Scene(check.Brief):
         points = [np.atleast_1d(np.asarray(point, float)) for point in self.watched]
         title = f"Outline of the struck body, struck at {at} m"
         title += f", observed at {len(points)} point{'s' * (len(points) > 1)}" if points else ""
-        return sketch.draw_body(self.body(), supports=self.held, at=list(places), points=points, title=title)
+        ribs = [rib.path for rib in self.ribs]
+        return sketch.draw_body(self.body(), supports=self.held, at=list(places), points=points, title=title, ribs=ribs)
 
     def _repr_html_(self) -> str:
         """For notebooks: the picture and the contents of each table."""
@@ -316,11 +325,14 @@ class Scene(check.Brief):
     def kept(self, folder: str | Path, **changes: Any) -> tuple[dict[str, Any], list[str]]:
         """Copy the scene's mesh or drawing into a folder; return `data` with the new paths, and the file names."""
         tables, names = self.data(**changes), []
-        for key in PATHS:
-            if key in self.mesh.values:
-                source = Path(self.mesh.values[key])
+        mesh = tables["mesh"]
+        if "table" in mesh.get("rise", ()):
+            mesh["rise"] = dict(mesh["rise"])
+        for table, key in [*((mesh, key) for key in PATHS), (mesh.get("rise", {}), "table")]:
+            if key in table:
+                source = Path(table[key])
                 shutil.copyfile(source, Path(folder) / source.name)
-                tables["mesh"][key] = source.name
+                table[key] = source.name
                 names.append(source.name)
         return tables, names
 
@@ -364,12 +376,20 @@ class Scene(check.Brief):
         """The scene as objects."""
         mesh = self.body()
         section = self.make_section("beam" if mesh.dimension == 1 else "plate")
+        section = replace(section, rise=mesh.rise, ribs=self.ribs) if isinstance(section, Plate) else section
         supports = supports_of(self.held)
         with self.blame("supports"):
             support_of_facets(mesh, supports, support_words(self.target.values.get("theory")))
+        for edge in self.in_plane.values:
+            with self.blame("in_plane"):
+                check.one_of("edge", edge, mesh.edges)
         told = {name: value for name, value in self._target.items() if name != "nu"}
         told["point_supports"] = tuple(entry for entry in told["point_supports"] if entry[1] != "clamped")
         with self.blame("target"):
+            if isinstance(section, Plate) and not section.plain and told["theory"] not in (None, "shallow"):
+                raise ValueError(
+                    f"theory must be left out for a curved, ribbed or coupled plate, got {told['theory']!r}"
+                )
             target = Target(mesh, section, supports, **told, blame=self.blame)
         points = tuple(self.points)
         moving = self.observe is not None
@@ -384,7 +404,30 @@ class Scene(check.Brief):
         mesh = self._make("mesh", self.mesh)
         with self.blame("target"):
             clamps = check_posts(self._target["point_supports"], mesh.dimension)[1]
-            return pierced(mesh, clamps) if clamps else mesh
+            mesh = pierced(mesh, clamps) if clamps else mesh
+        ribs = self._ribs(mesh)
+        paths = [rib.path for rib in ribs if not isinstance(rib.path, str)]
+        with self.blame("rib"):
+            mesh = lined(mesh, paths) if paths else mesh
+        for i, rib in enumerate(ribs):
+            with self.blame(f"[[rib]] {i}"):
+                sides_on(mesh, rib.path)
+        return mesh
+
+    @property
+    def ribs(self) -> tuple[Rib, ...]:
+        """The ribs of a plate."""
+        return self._ribs(self.body())
+
+    def _ribs(self, mesh: Mesh | None) -> tuple[Rib, ...]:
+        return tuple(self._listed("rib", within=mesh))
+
+    def _listed(self, table: str, **supplied: Any) -> Iterator[Any]:
+        """What the tables that may stand several times make, with the material of the body where they state none."""
+        base = None if self.material is None else self._make("material", self.material)
+        for i, part in enumerate(getattr(self, table)):
+            with self.blame(f"[[{table}]] {i}"), np.errstate(all="ignore"):
+                yield MAKERS[table][1][""](base=base, **supplied, **part.values)
 
     @cached_property
     def _target(self) -> dict[str, Any]:
@@ -398,16 +441,19 @@ class Scene(check.Brief):
 
     def make_section(self, kind: str) -> Plate | Beam:
         """The section; without a material, any of the right kind, as mass and first frequency set the scale."""
-        if self.section is None or self.material is None:
+        layers = tuple(self._listed("layer"))
+        if not layers and (self.section is None or self.material is None):
             with self.blame("target"):
                 material = Material(E=1e10, nu=self._target["nu"], rho=1e3)
                 thin = 1e-9  # [m] thinner than any body is wide
                 return Plate(material, thin) if kind == "plate" else Beam.rectangular(material, width=thin, height=thin)
-        material = self._make("material", self.material)
-        section = self._make("section", self.section, material=material)
-        if self.section.kind != kind:
-            raise self.fault(f"[section] kind must be '{kind}' for this mesh, got {self.section.kind!r}")
-        return section
+        part = self.section or Part("plate")
+        if part.kind != kind or (layers and kind != "plate"):
+            raise self.fault(f"[section] kind must be '{kind}' for this mesh, got {part.kind!r}")
+        material = layers[0][0] if self.material is None else self._make("material", self.material)
+        supplied = {"layers": layers} if layers else {}
+        section = self._make("section", part, material=material, **supplied)
+        return replace(section, in_plane=dict(self.in_plane.values)) if kind == "plate" else section
 
     def make_striker(self) -> Striker:
         return self._striker
@@ -432,18 +478,21 @@ class Scene(check.Brief):
     @contextmanager
     def blame(self, table: str, changes: Iterable[str] = ()) -> Iterator[None]:
         """Put the file and the table in front of an error about a table's numbers, unless ``changes`` set them."""
+        called = table if table.startswith("[") else f"[{table}]"
         try:
             yield
         except ValueError as error:
             if str(error).partition(" ")[0] in changes:
                 raise
-            raise self.fault(f"[{table}] {error}") from None
+            raise self.fault(f"{called} {error}") from None
         except (OverflowError, ZeroDivisionError):
-            raise self.fault(f"[{table}] has a number too large or too small; check its units") from None
+            raise self.fault(f"{called} has a number too large or too small; check its units") from None
 
 
 def _opened(value: Any) -> Any:
-    """A table with the tables in it, as dicts of their own."""
+    """A table with the tables in it, as dicts and lists of their own."""
+    if isinstance(value, (list, tuple)):
+        return [_opened(item) for item in value]
     return {key: _opened(item) for key, item in value.items()} if isinstance(value, Mapping) else value
 
 
@@ -488,7 +537,7 @@ def scene_of(tables: Mapping[str, Any], path: Path, *, folder: Path) -> Scene:
     for name, table in tables.items():
         if name not in TABLES:
             raise fault(path, f"[{name}] is not a table of a scene{check.nearest(name, TABLES)}")
-        if not isinstance(table, dict) and name != REPEATED:
+        if not isinstance(table, dict) and name not in (REPEATED, *PARTS):
             raise fault(path, f"{name} must be a table, written [{name}]")
     for name in REQUIRED:
         if name not in tables:
@@ -501,7 +550,8 @@ def scene_of(tables: Mapping[str, Any], path: Path, *, folder: Path) -> Scene:
         except ValueError as error:
             raise fault(path, f"[{name}] {error}") from None
         intervals |= found
-    parts = {name: read_part(path, name, table, folder) for name, table in tables.items()}
+    parts: dict[str, Any] = {name: read_list(path, name, tables.pop(name)) for name in PARTS if name in tables}
+    parts |= {name: read_part(path, name, table, folder) for name, table in tables.items()}
     scene = Scene(path, title, blow=parts.pop("strike"), stroke=strokes, known=intervals, **parts)
     _check_whole(scene)
     return scene
@@ -551,15 +601,22 @@ def plan(
 
 def _check_whole(scene: Scene) -> None:
     """Build whatever is cheap, so that a wrong number fails at once, and check that the tables fit together."""
-    target, bare, line = scene.target.values, scene.section is None, scene.mesh.kind == "line"
+    target, line = scene.target.values, scene.mesh.kind == "line"
+    bare = scene.section is None and not scene.layer
     _ = scene._target
-    if (scene.material is None) != bare:
+    if "rise" in scene.mesh.values:
+        with scene.blame("mesh"):
+            rise_of(scene.mesh.values["rise"])
+    scene._ribs(None)
+    if not scene.layer and (scene.material is None) != bare:
         missing, there = ("section", "material") if bare else ("material", "section")
         raise scene.fault(f"[{missing}] is missing; [{there}] needs it")
     thick, other = target.get("theory") in THICK, scene.striker.kind != "sphere" or bare
     wrong = {
         "[target] needs mass and first_frequency if there is no [material]": bare
         and not {"mass", "first_frequency"} <= set(target),
+        "[[rib]] needs [material] and [section] of a plate, and [in_plane] too": (bare or line)
+        and (scene.rib or scene.in_plane.values),
         "[target] theory needs [material] and [section]: shear depends on the thickness": bare and thick,
         "[target] baffle must be left out for a beam, which is in free air": line and target.get("baffle") is True,
         "[contact] kind 'between' needs a striker of kind 'sphere' and a [section]": other
@@ -582,8 +639,8 @@ def _check_whole(scene: Scene) -> None:
                 f"[observe] listener must be left out for a beam higher than wide, here {height:g} and {width:g} m: "
                 "its sound is not known"
             )
-    if scene.section is not None:
-        scene.make_section(scene.section.kind)
+    if not bare:
+        scene.make_section("plate" if scene.section is None else scene.section.kind)
     scene.make_striker()
     scene.make_contact()
     for i, part in enumerate(scene.stroke):

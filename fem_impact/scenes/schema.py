@@ -16,16 +16,18 @@ from typing import Any
 from .. import mesh
 from .._base import check
 from ..fe.assembly import THEORIES, assemble
-from ..fe.section import KINDS, SOFT, Beam, Elastic, Material, Plate
+from ..fe.ribs import Rib
+from ..fe.section import KINDS, PLANE, SOFT, Beam, Elastic, Material, Plate
 from ..impact import collision
 from ..impact.contact import MARKS, Contact
 from ..impact.striker import STICK_MODES, Hand, Striker
+from ..mesh import rise as rises
 from ..modes.analytic import closed_form
 from ..modes.modal import find_modes
 from ..show import sound
 from ..sweeps.cells import along
 from . import keys
-from .fields import over_frequency, varying
+from .fields import heights, over_frequency, tapered, varying
 
 WORD = r"""(?:[\w-]++|"[^"\\\n]*+(?:\\.[^"\\\n]*+)*+"?|'[^'\n]*+'?)"""  # unclosed, too: each is passed once
 DOTTED = re.compile(rf"{WORD}(?:[ \t]*+\.[ \t]*+{WORD}){{0,15}}+(?P<more>[ \t]*+\.[ \t]*+{WORD})?")  # a scene has two
@@ -40,9 +42,93 @@ class Part:
     values: Mapping[str, Any] = field(default_factory=lambda: MappingProxyType({}))
 
 
-def _plate(material: Material, *, thickness: Any, tension: float = 0.0) -> Plate:
+def _plate(material: Material, layers: Sequence[Any] = (), *, thickness: Any = None, tension: float = 0.0) -> Plate:
     """A plate."""
+    if layers and thickness is not None:
+        raise ValueError("thickness must be left out beside [[layer]] tables, whose thicknesses add up")
+    if layers:
+        return Plate.laminate(layers, tension=tension)
+    if thickness is None:
+        raise ValueError("thickness is missing; give it here, or write the plate's layers as [[layer]] tables")
     return Plate(material, varying("thickness", thickness, 2), tension)
+
+
+def _within(name: str, value: Any, maker: Callable[..., Any]) -> Any:
+    """What a table within another table makes; errors name it."""
+    if not isinstance(value, Mapping):
+        raise ValueError(f"{name} must be a table {{ {', '.join(keys_of(maker))} }}, got {check.shown(value)}")
+    try:
+        _check_keys("", "", dict(value), maker)
+        return maker(**value)
+    except ValueError as error:
+        raise ValueError(f"{name}: {error}") from None
+
+
+def rise_of(value: Any) -> Callable[..., Any]:
+    """The rise of a body: one of `RISES`, or a table of heights."""
+    if not isinstance(value, Mapping) or ("table" in value) == ("shape" in value):
+        words = "{ shape = ... } with the keys of the shape, or { table = a CSV file }"
+        raise ValueError(f"rise must be a table {words}, got {check.shown(value)}")
+    key = "table" if "table" in value else "shape"
+    rest = {name: item for name, item in value.items() if name != key}
+    if key == "table":
+        return _within("rise", value, _heights)
+    return _within("rise", rest, RISES[check.one_of("rise.shape", value[key], RISES)])
+
+
+def _heights(*, table: str) -> Any:
+    """A smooth surface through heights in a CSV file."""
+    if not isinstance(table, str):
+        raise ValueError(f"table must be the name of a file, got {check.shown(table)}")
+    return heights(table)
+
+
+def _risen(maker: Callable[..., Any]) -> Callable[..., Any]:
+    """The same maker of meshes, with the rise of the unloaded surface as another argument."""
+
+    def make(*, rise: Any = None, **values: Any) -> mesh.Mesh:
+        made: mesh.Mesh = maker(**values)
+        if rise is None:
+            return made
+        function = rise_of(rise)
+        check.field("rise", function, made.points, "m")
+        return replace(made, rise=function)
+
+    return _with_keys(make, maker, {"rise": None})
+
+
+def _own_material(material: Any, base: Material | None) -> Material:
+    if material is None and base is None:
+        raise ValueError("material is missing: give it here or as [material]")
+    return base if material is None else _within("material", material, Material)  # type: ignore[return-value]
+
+
+def _rib(
+    base: Material | None = None, within: mesh.Mesh | None = None, *, path: Any = None, edge: str | None = None,
+    line: str | None = None, offset: float | None = None, material: Any = None, **size: Any,
+) -> Rib:  # fmt: skip
+    """A bar along a line of a plate."""
+    if [path, edge, line].count(None) != 2:
+        raise ValueError("path, edge or line must be given, one of them: where the rib runs")
+    for name, word, known in (("edge", edge, "edges"), ("line", line, "lines")):
+        if word is not None and not isinstance(word, str):
+            raise ValueError(f"{name} must be a name, got {check.shown(word)}")
+        if word is not None and within is not None:
+            check.one_of(name, word, getattr(within, known) or ["none: only drawings have lines"])
+    if isinstance(path, str):
+        raise ValueError(f"path must be a list of points, got {path!r}; an edge or a line has a key of its own")
+    if line is not None:
+        path = [[0.0, 0.0], [1.0, 0.0]] if within is None else within.lines[line]  # a stand-in, until there is a mesh
+    section = _beam(_own_material(material, base), **{name: tapered(name, value) for name, value in size.items()})
+    return Rib(path if edge is None else edge, section, offset)
+
+
+def _layer(
+    base: Material | None = None, *, thickness: float, angle: float = 0.0, material: Any = None
+) -> tuple[Material, float, float]:
+    """A layer of a plate."""
+    angle = check.number("angle", angle, "rad")
+    return _own_material(material, base), check.positive("thickness", thickness, "m"), angle
 
 
 def _beam(material: Material, *, width: Any = None, height: Any = None, diameter: Any = None) -> Beam:
@@ -88,13 +174,7 @@ def _held(maker: Any) -> Callable[..., Striker]:
         striker = maker(**values).falling(gravity)
         if hand is None:
             return striker
-        if not isinstance(hand, Mapping):
-            raise ValueError(f"hand must be a table {{ stiffness, damping, force }}, got {check.shown(hand)}")
-        try:
-            _check_keys("", "", dict(hand), Hand)
-        except ValueError as error:
-            raise ValueError(f"hand: {error}") from None
-        return striker.held(Hand(**hand))
+        return striker.held(_within("hand", hand, Hand))
 
     return _with_keys(make, maker, {"hand": None, "gravity": 0.0})
 
@@ -182,20 +262,24 @@ TARGET: dict[str, Any] = {  # keys of [target] and their defaults; None: it says
     "source": "auto", "theory": None, "air": None, "baffle": True, "stretching": False, "model": "stated",
 }  # fmt: skip
 LISTED = ("damping_ratio", "point_masses", "point_supports")  # of these, what is more than a number, a word or a flag
+RISES = {name: getattr(rises, name) for name in ("cap", "cylinder", "saddle", "cymbal")}
+SIZES = dict.fromkeys(("width", "height", "diameter"))
 # Functions that build each part of a scene; their arguments are the keys of its table.
 # The first entry is the key that selects the function, '' if there is only one.
 MAKERS: dict[str, tuple[str, dict[str, Callable[..., Any]]]] = {
     "mesh": ("shape", {
-        "rectangle": mesh.rectangle, "disk": mesh.disk, "polygon": mesh.polygon, "outline": mesh.outline,
-        "line": mesh.line, "file": mesh.load,
+        "rectangle": _risen(mesh.rectangle), "disk": _risen(mesh.disk), "polygon": _risen(mesh.polygon),
+        "outline": _risen(mesh.outline), "line": mesh.line, "file": _risen(mesh.load),
     }),
     "material": ("", {"": Material}),
     "section": ("kind", {"plate": _plate, "beam": _beam}),
+    "layer": ("", {"": _layer}),
+    "rib": ("", {"": _with_keys(_rib, _rib, SIZES)}),
     "target": ("", {"": _with_keys(target_values, target_values, TARGET)}),
     "striker": ("kind", {
         name: _held(maker) for name, maker in {
             "rigid": Striker.rigid, "sphere": _sphere, "stick": Striker.stick, "hammer": Striker.hammer,
-            "bar": _with_keys(_bar, _bar, dict.fromkeys(("width", "height", "diameter"))),
+            "bar": _with_keys(_bar, _bar, SIZES),
         }.items()
     }),
     "contact": ("kind", {
@@ -208,12 +292,15 @@ MAKERS: dict[str, tuple[str, dict[str, Callable[..., Any]]]] = {
     "observe": ("", {"": _observe}),
     "map": ("", {"": map_values}),
 }  # fmt: skip
-TABLES = [*MAKERS, "supports"]
+HOLDS = {"supports": (*KINDS, SOFT), "in_plane": PLANE}  # tables whose keys are edges, and how these may be held
+TABLES = [*MAKERS, *HOLDS]
 REQUIRED = ("mesh", "striker", "contact", "strike")
 # arguments that come from other tables
-SUPPLIED = {"material", "modes", "striker", "contact", "sphere", "plate", "start"}
+SUPPLIED = {"material", "modes", "striker", "contact", "sphere", "plate", "start", "layers", "base", "within"}
 REPEATED = "stroke"  # the table that may stand several times, written [[stroke]]
+PARTS = ("layer", "rib")  # those of the body that may
 NESTED = ("striker", "contact")  # tables that may stand within a stroke too
+KEPT = {stroke_values: {*NESTED}, _rib: {"material"}, _layer: {"material"}}  # arguments that are keys nevertheless
 OF_TARGET = {"stretching"}  # arguments of the strike that are keys of the table [target]
 PATHS = ("source", "path")  # keys that name a file, relative to the scene file
 
@@ -269,14 +356,18 @@ def read_bytes(path: Path) -> bytes:
     return raw
 
 
+def read_list(path: Path, name: str, tables: Any) -> tuple[Part, ...]:
+    """Read tables that may stand several times."""
+    if not isinstance(tables, list) or not all(isinstance(table, dict) for table in tables):
+        raise fault(path, f"{name} must be tables, each written [[{name}]]")
+    return tuple(read_part(path, name, table, Path(), f"[[{name}]] {i}") for i, table in enumerate(tables))
+
+
 def read_strokes(path: Path, tables: Any, folder: Path) -> tuple[Part, ...]:
     """Read the tables [[stroke]]; what they say of striker and contact stays as it is written."""
-    if not isinstance(tables, list) or not all(isinstance(table, dict) for table in tables):
-        raise fault(path, f"{REPEATED} must be tables, each written [[{REPEATED}]]")
-    parts = []
-    for i, table in enumerate(tables):
+    parts = read_list(path, REPEATED, tables)
+    for i, (part, table) in enumerate(zip(parts, tables)):
         called = f"[[{REPEATED}]] {i}"
-        part = read_part(path, REPEATED, table, folder, called)
         try:
             stroke_values(**part.values)
         except ValueError as error:
@@ -284,8 +375,7 @@ def read_strokes(path: Path, tables: Any, folder: Path) -> tuple[Part, ...]:
         for name in NESTED:
             if name in table:
                 read_part(path, name, table[name], folder, f"{called} {name}:")
-        parts.append(part)
-    return tuple(parts)
+    return parts
 
 
 def read_part(path: Path, table: str, values: dict[str, Any], folder: Path, called: str = "") -> Part:
@@ -303,17 +393,19 @@ def read_part(path: Path, table: str, values: dict[str, Any], folder: Path, call
         raise wrong("is nested too deeply") from None
     if bad:
         raise wrong(f"{bad[0]} must be finite, got {bad[1]}")
-    if table == "supports":
+    if table in HOLDS:
+        words = HOLDS[table]
         for edge, support in values.items():
-            if isinstance(support, dict):
+            if isinstance(support, dict) and table == "supports":
                 try:
                     _check_keys("", "", support, Elastic)
                     Elastic(**support)
                 except ValueError as error:
                     raise wrong(f"{edge}: {error}") from None
-            elif support not in (*KINDS, SOFT):
-                words = ", ".join((*KINDS, SOFT))
-                raise wrong(f"{edge} must be one of {words} or {{ stiffness, rotation }}, got {check.shown(support)}")
+            elif support not in words:
+                springs = " or { stiffness, rotation }" * (table == "supports")
+                near = check.nearest(support, words)
+                raise wrong(f"{edge} must be one of {', '.join(words)}{springs}, got {check.shown(support)}{near}")
         return Part("", MappingProxyType(values))
     selector, makers = MAKERS[table]
     values = dict(values)
@@ -327,25 +419,24 @@ def read_part(path: Path, table: str, values: dict[str, Any], folder: Path, call
         raise wrong(str(error)) from None
     if table == "mesh":
         values.update({key: str(folder / values[key]) for key in PATHS if key in values})
+        if isinstance(rise := values.get("rise"), Mapping) and isinstance(rise.get("table"), str):
+            values["rise"] = {**rise, "table": str(folder / rise["table"])}
     return Part(kind, MappingProxyType(values))
 
 
-def _arguments(maker: Callable[..., Any]) -> dict[str, inspect.Parameter]:
+def keys_of(maker: Callable[..., Any]) -> dict[str, inspect.Parameter]:
     """The arguments of a function that are keys of its table."""
-    supplied = SUPPLIED | OF_TARGET if maker is collision.strike else SUPPLIED
-    supplied = supplied - set(NESTED) if maker is stroke_values else supplied
+    supplied = SUPPLIED | OF_TARGET if maker is collision.strike else SUPPLIED - KEPT.get(maker, set())
     return {n: p for n, p in inspect.signature(maker).parameters.items() if n not in supplied}
 
 
 def _check_keys(selector: str, kind: str, values: dict[str, Any], maker: Callable[..., Any]) -> None:
-    arguments = _arguments(maker)
+    arguments = keys_of(maker)
     known = [selector, *arguments] if selector else list(arguments)
     for key in values:
         if key not in arguments:
             homes = [
-                f"[{name}]"
-                for name, (_, makers) in MAKERS.items()
-                if any(key in _arguments(m) for m in makers.values())
+                f"[{name}]" for name, (_, makers) in MAKERS.items() if any(key in keys_of(m) for m in makers.values())
             ]
             elsewhere = f"; it is one of {' and '.join(homes)}" if homes else f"; it has {', '.join(known)}"
             raise ValueError(f"{key} is not a key of this table{check.nearest(key, known) or elsewhere}")

@@ -76,6 +76,8 @@ def body(scene: Scene, modes: Modes) -> str:
     kind = {1: "beam", 2: "plate"}[modes.dimension]
     if scene.mesh.kind == "disk":
         kind, extent = "disk", f"{si(2.0 * scene.mesh.values['radius'], 'm')} diameter"
+    kind = f"curved {kind}" if getattr(modes.section, "rise", None) else kind
+    ribs = f", with {len(scene.rib)} rib{'s' * (len(scene.rib) > 1)}" if scene.rib else ""
     flexible = modes.frequencies[modes.omega > 0.0]
     told = scene.held or {"boundary": "free"}
     held = {edge: how if isinstance(how, str) else "held by springs" for edge, how in told.items()}
@@ -86,7 +88,7 @@ def body(scene: Scene, modes: Modes) -> str:
     ratio = modes.damping_ratio[modes.omega > 0.0]
     damping = "without damping" if not ratio.any() else f"damped by {100 * ratio[0]:.3g} % of critical"
     return (
-        f"A {kind} of {extent}, {si(modes.mass, 'kg')}, {edges}; its first flexible mode is at "
+        f"A {kind} of {extent}{ribs}, {si(modes.mass, 'kg')}, {edges}; its first flexible mode is at "
         f"{si(flexible[0], 'Hz')}, {damping}."
     )
 

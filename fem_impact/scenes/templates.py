@@ -12,6 +12,7 @@ BODIES = {
 shape = "rectangle"       # also "disk", "polygon", "outline" (an SVG or DXF file), "file" (a mesh), "line" (a beam)
 length = 0.4              # m, along x from 0
 width = 0.3               # m, along y from 0
+# rise = { shape = "cap", radius = 2.0, centre = [0.2, 0.15] }      # m, if curved; also "cylinder", "saddle", "cymbal"
 
 [material]
 E = 10e9                  # Pa; for wood along the grain, with E_across [Pa], G [Pa] and angle [rad]
@@ -20,10 +21,15 @@ rho = 450.0               # kg/m^3
 
 [section]
 kind = "plate"
-thickness = 4e-3          # m; also a table over x and y, or a list of cases
+thickness = 4e-3          # m; also a table over x and y, or a list of cases; or layers as tables [[layer]]
 
 [supports]                # edges not named are free; boundary means all of them
 boundary = "hinged"       # "clamped", "hinged", "free" or springs { stiffness, rotation }
+
+# [[rib]]                 # a bar on the side that is not struck, and any number more
+# path = [[0.1, 0.0], [0.1, 0.3]]   # m; or edge = "left"
+# width = 8e-3            # m, along the plate
+# height = 12e-3          # m, across it; also [[distance, height], ...] along the rib
 """,
     "disk": """title = "A steel ball taps a steel disk"
 

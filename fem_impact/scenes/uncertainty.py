@@ -253,6 +253,11 @@ class _SpreadAsked:
         if section is None:
             raise ValueError(f"vary: {name} needs a body with a section; vary target.mass and target.first_frequency")
         table, key = name.split(".")
+        if isinstance(section, Plate) and (section.ribs or section.layers or (section.rise and table == "section")):
+            raise ValueError(
+                f"vary: {name} rescales the modes of flat plates of one material, which this is not; write it in the "
+                "scene as { value, about } for `fi.band`, or vary target.mass and target.first_frequency"
+            )
         round_ = isinstance(section, Beam) and section.round
         if (key == "diameter") != round_ and key in ("diameter", "width", "height"):
             raise ValueError(f"vary: {name} is not a number of this section")
@@ -390,11 +395,11 @@ def _below(name: str, column: np.ndarray) -> ValueError:
 def _scalable(target: Target) -> None:
     """ValueError unless all lengths of the body can be scaled exactly."""
     springs = any(isinstance(held, Elastic) for held in target.supports.values())
-    pulled = isinstance(target.section, Plate) and target.section.tension
+    pulled = isinstance(target.section, Plate) and (target.section.tension or not target.section.plain)
     if target.mesh is None or springs or pulled or target.point_masses or target.thick or target.air or target.scale:
         raise ValueError(
-            f"vary: {SIZE} needs a thin body of stated size, without springs, tension, point masses or air; "
-            "vary target.mass and target.first_frequency"
+            f"vary: {SIZE} needs a thin body of stated size, flat, without springs, tension, ribs, point masses or "
+            "air; vary target.mass and target.first_frequency"
         )
 
 

@@ -26,7 +26,7 @@ RATE = 12  # [1/s] frames per second: enough for a wave, half the size of a film
 HEIGHT = 0.12  # [-] largest drawn deflection over the body's extent
 LIFT = 0.0015  # [-] height of lines above the surface, over their extent
 BALL = 0.03  # [-] drawn radius of the striker over the body's extent
-RIM, VERMILION = "#666666", "#D55E00"  # colours of the body's edge and of the striker
+RIM, VERMILION, RIB = "#666666", "#D55E00", "#009E73"  # colours of the body's edge, of the striker and of ribs
 COLOURS = "PuOr"  # of deflections: symmetric about zero, safe for colour-blind readers
 
 
@@ -41,6 +41,8 @@ class Film(NamedTuple):
     gap: np.ndarray  # (n_times,) [-] distance of the striker over the largest deflection
     titles: list[str]
     telling: int  # number of the frame that shows the wave best
+    rise: Any = 0.0  # (n_points,) [m] of a curved plate
+    ribs: Any = ()  # (n_sides, 2) sides along ribs
 
 
 class Gallery(NamedTuple):
@@ -51,6 +53,8 @@ class Gallery(NamedTuple):
     shapes: np.ndarray  # (n_points, n_shapes)
     titles: list[str]
     columns: int
+    rise: Any = 0.0  # (n_points,) [m] of a curved plate
+    ribs: Any = ()  # (n_sides, 2) sides along ribs
 
 
 def probe() -> None:
@@ -98,13 +102,14 @@ def gallery(shown: Gallery) -> Image.Image:
     for i, title in enumerate(shown.titles):
         plotter.subplot(*divmod(i, shown.columns))
         shape = shown.shapes[:, i]
-        mesh = _mesh(shown.plane, shown.cells, HEIGHT * _extent(shown.plane) * shape, shape)
+        mesh = _mesh(shown.plane, shown.cells, shown.rise + HEIGHT * _extent(shown.plane) * shape, shape)
         _add_surface(plotter, mesh)
         rim = mesh.extract_feature_edges(feature_edges=False, manifold_edges=False, non_manifold_edges=False)
         _add_line(plotter, rim, RIM)
+        _add_line(plotter, _sides(mesh.points, shown.ribs), RIB)
         _add_line(plotter, mesh.contour([0.0]), "black")
         plotter.add_text(title, font_size=9, position="upper_left")
-        _look(plotter, shown.plane, zoom=1.15)
+        _look(plotter, shown.plane, shown.rise, zoom=1.15)
     picture = Image.fromarray(plotter.screenshot(None))
     plotter.close()
     return picture
@@ -146,25 +151,28 @@ class _Space:
         import pyvista
 
         self.plane, self.cells, self.at, self.extent = film.plane, film.cells, film.at, _extent(film.plane)
+        self.rise = film.rise + np.zeros(len(film.plane))
         self.under = int(np.argmin(((self.plane - self.at) ** 2).sum(axis=1)))  # the striker
         self.plotter = _plotter((FINER * SIZE[0], FINER * SIZE[1]))
         self.plotter.disable_anti_aliasing()  # several pixels become one, in half the time
-        self.mesh = _mesh(self.plane, self.cells, np.zeros(len(self.plane)), np.zeros(len(self.plane)))
+        self.mesh = _mesh(self.plane, self.cells, self.rise, np.zeros(len(self.plane)))
         _add_surface(self.plotter, self.mesh)
-        lines = np.column_stack([np.full(len(film.rim), 2), film.rim]).ravel()
-        self.rim = pyvista.PolyData(self.mesh.points, lines=lines)
-        self.plotter.add_mesh(self.rim, color=RIM, line_width=2 * FINER, render=False)
+        self.lines = [_sides(self.mesh.points, sides) for sides in (film.rim, film.ribs)]
+        for line, colour in zip(self.lines, (RIM, RIB)):
+            if line.n_cells:
+                self.plotter.add_mesh(line, color=colour, line_width=2 * FINER, render=False)
         ball = pyvista.Sphere(radius=BALL * self.extent)
         self.ball = self.plotter.add_mesh(ball, color=VERMILION, smooth_shading=True, render=False)
-        _look(self.plotter, self.plane)
+        _look(self.plotter, self.plane, self.rise)
 
     def picture(self, deflection: np.ndarray, distance: float, title: str) -> Image.Image:
         """One frame; deflection (n_points,) and distance of the striker in units of the largest deflection."""
-        height = -HEIGHT * self.extent * deflection
+        height = self.rise - HEIGHT * self.extent * deflection
         points = np.column_stack([self.plane, height])
         self.mesh.points, self.mesh["deflection"] = points, -deflection
         self.mesh.point_data["Normals"] = _normals(points, self.cells)
-        self.rim.points = points + np.array([0.0, 0.0, LIFT * self.mesh.length])
+        for line in self.lines:
+            line.points = points + np.array([0.0, 0.0, LIFT * self.mesh.length])
         above = self.extent * (BALL + min(HEIGHT * distance, 2.0 * HEIGHT))
         self.ball.position = (*self.at, height[self.under] + above)
         self.plotter.add_text(title, font_size=10 * FINER, position="upper_left", name="title", render=False)
@@ -201,6 +209,14 @@ def _mesh(plane: np.ndarray, cells: np.ndarray, height: np.ndarray, value: np.nd
     return mesh
 
 
+def _sides(points: np.ndarray, sides: Any) -> Any:
+    """Lines between numbered points."""
+    import pyvista
+
+    pairs = np.reshape(sides, (-1, 2)).astype(int)
+    return pyvista.PolyData(points, lines=np.column_stack([np.full(len(pairs), 2), pairs]).ravel())
+
+
 def _add_surface(plotter: Any, mesh: Any) -> None:
     shown = plotter.add_mesh(
         mesh, scalars="deflection", cmap=COLOURS, clim=(-1.0, 1.0), show_scalar_bar=False, ambient=0.4, diffuse=0.6,
@@ -211,18 +227,19 @@ def _add_surface(plotter: Any, mesh: Any) -> None:
 
 def _add_line(plotter: Any, line: Any, colour: str) -> None:
     """Draw a line on the surface, raised a little so that the surface does not hide it."""
-    if line.n_points:
+    if line.n_points and line.n_cells:
         raised = line.translate((0.0, 0.0, LIFT * line.length))
         plotter.add_mesh(raised, color=colour, line_width=2, render=False)
 
 
-def _look(plotter: Any, plane: np.ndarray, zoom: float = 1.35) -> None:
+def _look(plotter: Any, plane: np.ndarray, rise: Any = 0.0, zoom: float = 1.35) -> None:
     """Set the camera, the same for every picture of a body whatever its deflection."""
     low, high = plane.min(axis=0), plane.max(axis=0)
-    rise = HEIGHT * _extent(plane)
+    room = HEIGHT * _extent(plane)
+    bottom, top = float(np.min(rise)) - room, float(np.max(rise)) + room
     # from the front left, above the plate
     plotter.camera_position = [(-0.55, -1.0, 0.75), (0.0, 0.0, 0.0), (0.0, 0.0, 1.0)]
-    plotter.reset_camera(render=False, bounds=(low[0], high[0], low[1], high[1], -rise, rise))
+    plotter.reset_camera(render=False, bounds=(low[0], high[0], low[1], high[1], bottom, top))
     plotter.camera.zoom(zoom)
 
 

@@ -46,7 +46,8 @@ def write_vtk(path: str | Path, modes: Modes, response: Response | None = None, 
         .pvd: one part per mode, with its frequency as time value and field data, ``shape`` [kg**-0.5] and a ``warp``
         vector for display. Motion: one part per time (a .vtu takes only one time), with ``displacement`` [m] and
         ``velocity`` [m/s] of the kept modes; the contact ``force`` [N] and, for a strike, the position of the
-        ``striker`` [m] as field data.
+        ``striker`` [m] as field data. They point along the blow in z. On a curved plate z is the rise, towards the
+        striker, so that their z is negative along the blow.
     modes : Modes
     response : Response, optional
         Write its motion instead of the mode shapes; ``modes`` must then be those of the struck body.
@@ -66,6 +67,7 @@ def write_vtk(path: str | Path, modes: Modes, response: Response | None = None, 
     path = check.path("path", path)
     suffix = vtk_ending(path)
     points, cells = viewing.grid(modes)
+    places = viewing.placed(modes, points)
     if response is None:
         parts = _mode_parts(modes, points)
         stamps = _distinct(modes.frequencies)
@@ -75,12 +77,12 @@ def write_vtk(path: str | Path, modes: Modes, response: Response | None = None, 
         stamps = check.array("times", times, (None,), "s", lift=True)
         parts = _motion_parts(response, points, stamps)
     if suffix == ".pvd":
-        _write_collection(path, points, cells, parts, stamps)
+        _write_collection(path, places, cells, parts, stamps)
     elif response is None:
         arrays = {f"mode_{i + 1:03d}": part[0]["shape"] for i, part in enumerate(parts)}
-        _write_vtu(path, points, cells, arrays, {"frequency": modes.frequencies, "damping_ratio": modes.damping_ratio})
+        _write_vtu(path, places, cells, arrays, {"frequency": modes.frequencies, "damping_ratio": modes.damping_ratio})
     elif len(parts) == 1:
-        _write_vtu(path, points, cells, *parts[0])
+        _write_vtu(path, places, cells, *parts[0])
     else:
         raise ValueError(f"times must be one time for a .vtu, got {len(parts)}; write a .pvd")
 
@@ -115,7 +117,7 @@ def write_animation(path: str | Path, modes: Modes, mode: int, *, frames: int = 
     points, cells = viewing.grid(modes)
     arrays, fields = _mode_parts(modes, points)[mode - 1]
     parts = [({"warp": np.cos(2.0 * np.pi * turn) * arrays["warp"]}, fields) for turn in turns]
-    _write_collection(path, points, cells, parts, turns / frequency)
+    _write_collection(path, viewing.placed(modes, points), cells, parts, turns / frequency)
 
 
 def vtk_ending(path: str | Path) -> str:
@@ -127,9 +129,9 @@ def vtk_ending(path: str | Path) -> str:
 def write_uff(path: str | Path, modes: Modes) -> None:
     """Write mode shapes as a universal file for modal-test programs: nodes (15, 2411), cells (2412), shapes (55).
 
-    The deflection is in z, normalised to modal mass 1; numbers have six digits. Needs pyuff:
-    ``pip install 'fem-impact[uff]'``. `Modes.from_uff` reads the file back, without the static compliance, which has no
-    place in it: a blow then counts the error of an estimate.
+    Nodes of a curved plate have its rise as z. The deflection is in z, normalised to modal mass 1; numbers have six
+    digits. Needs pyuff: ``pip install 'fem-impact[uff]'``. `Modes.from_uff` reads the file back, without the static
+    compliance, which has no place in it: a blow then counts the error of an estimate.
 
     Examples
     --------
@@ -142,7 +144,8 @@ def write_uff(path: str | Path, modes: Modes) -> None:
         raise ValueError("modes must be those of a plate or beam, got a rigid mass, which has no shape to write")
     points, cells = modes.shapes.grid()
     with replacing(path) as temporary:
-        universal_files.write(temporary, modes.frequencies, modes.damping_ratio, modes.shape_at(points), points, cells)
+        shapes, places = modes.shape_at(points), viewing.placed(modes, points)
+        universal_files.write(temporary, modes.frequencies, modes.damping_ratio, shapes, places, cells)
 
 
 @check.typed
@@ -317,22 +320,22 @@ def _motion_parts(response: Response, points: np.ndarray, times: np.ndarray) -> 
     # Kept modes only: the residual dip would need a static solution for every grid point. `shapes.at` also accepts the
     # midpoints of chords along a hole, which lie just off the body.
     rows = response.target.shapes.at(points)  # (n_points, n_modes)
+    at = None if response.at is None else viewing.placed(response.target, np.atleast_2d(response.at))
+    along = 1.0 if viewing.heights(response.target, points[:1]) is None else -1.0  # the blow, in z
     for state in response.modal_state(times):
         vector = np.zeros((len(times), len(points), 3))
-        vector[:, :, 2] = state @ rows.T  # (n_times, n_points)
+        vector[:, :, 2] = along * state @ rows.T  # (n_times, n_points)
         moves.append(vector)
     fields: list[dict[str, Any]] = [{"time": t} for t in times]
     for i in range(response.history.n_contacts):
         name = "force" if response.history.n_contacts == 1 else f"force_{i + 1}"
         for field, force in zip(fields, response.history.force_at(times, i)[0]):
             field[name] = force
-    if response.striker is not None and response.at is not None:
+    if response.striker is not None and at is not None:
         striker = response.striker
         tip = response.displacement(striker.at[None], times, body=0)[:, 0]
         for field, way in zip(fields, tip):
-            place = np.zeros((1, 3))
-            place[0, : len(response.at)], place[0, 2] = response.at, way
-            field["striker"] = place
+            field["striker"] = at + np.array([0.0, 0.0, along * way])
     return [({"displacement": d, "velocity": v}, field) for d, v, field in zip(*moves, fields)]
 
 
@@ -360,14 +363,15 @@ def _write_collection(path: Path, points, cells, parts: list[tuple[dict, dict]],
 
 
 def _write_vtu(path: Path, points: np.ndarray, cells: np.ndarray, arrays: dict, fields: dict) -> None:
-    """Write a binary VTK XML unstructured grid; meshio would drop the field data, and pyvista would load all of VTK."""
-    spatial = np.zeros((len(points), 3))
-    spatial[:, : points.shape[1]] = points
+    """Write points (n_points, 3) and cells as binary VTK XML.
+
+    Written here, as meshio would drop the field data and pyvista would load all of VTK.
+    """
     offsets = np.arange(1, len(cells) + 1) * cells.shape[1]
     types = np.full(len(cells), CELL_TYPE[cells.shape[1]], np.uint8)
     field_data = "".join(_data_array(k, np.atleast_1d(v), tuples=True) for k, v in fields.items())
     point_data = "".join(_data_array(k, v) for k, v in arrays.items())
-    geometry = _data_array("Points", spatial)
+    geometry = _data_array("Points", points)
     cell_data = "".join(
         _data_array(name, array)
         for name, array in (("connectivity", cells.reshape(-1)), ("offsets", offsets), ("types", types))

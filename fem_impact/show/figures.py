@@ -22,6 +22,7 @@ from ..mesh.mesh_files import quartered
 from ..mesh.meshes import Mesh
 from ..model.playing import Strokes
 from ..modes.modal import Modes
+from ..modes.viewing import rib_sides
 from ..sweeps.spreads import DOUBLE, QUANTITIES, Spread, double_hits
 from . import sampling
 from .canvas import COLOURS, VERMILION
@@ -211,6 +212,7 @@ def mode_shapes(modes: Modes, *, count: int = 12, columns: int = 4) -> Figure:
                 nodal = _unflattened(shape, cells)
                 axes.tricontour(*points.T, cells, nodal, levels=[0.0], colors="black", linewidths=0.8)
                 draw_rim(axes, points, cells)
+                _draw_ribs(axes, modes, points, cells)
                 axes.set_axis_off()
             axes.set_title(f"{i + 1}   {in_hertz(modes.frequencies[i])}")
     return figure
@@ -231,10 +233,16 @@ def chladni(modes: Modes, count: int, columns: int) -> Figure:
             mesh = Triangulation(points[:, 0], points[:, 1], cells, np.abs(shape[cells]).max(axis=1) < SAND)
             axes.tricontour(mesh, _unflattened(shape, cells, SAND), levels=[0.0], colors="black")
             draw_rim(axes, points, cells)
+            _draw_ribs(axes, modes, points, cells)
             axes.set_axis_off()
             axes.autoscale_view()
             axes.set_title(f"{i + 1}   {in_hertz(modes.frequencies[i])}")
     return figure
+
+
+def _draw_ribs(axes: Any, modes: Modes, points: np.ndarray, cells: np.ndarray) -> None:
+    """Draw the ribs of a plate as lines."""
+    axes.add_collection(LineCollection(points[rib_sides(modes, points, cells)], colors=GREEN, linewidths=1.2))
 
 
 def snapshot(plane: np.ndarray, cells: np.ndarray, deflection: np.ndarray, at: np.ndarray, title: str) -> Figure:

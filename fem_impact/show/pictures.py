@@ -14,6 +14,7 @@ from .._base import check, child, progress
 from .._base.files import replacing
 from ..impact.response import Response
 from ..mesh.mesh_files import boundary
+from ..modes import viewing
 from ..modes.modal import Modes
 from . import FORMATS, canvas, figures, sampling
 
@@ -84,7 +85,13 @@ def gallery(modes: Modes, count: int = 12, columns: int = 4) -> canvas.Gallery:
     points, cells, plane = sampling.surface(modes)
     shapes, columns = sampling.gallery(modes, points, count, columns)
     titles = [f"{i + 1}   {figures.in_hertz(modes.frequencies[i])}" for i in range(shapes.shape[1])]
-    return canvas.Gallery(plane, cells, shapes, titles, columns)
+    return canvas.Gallery(plane, cells, shapes, titles, columns, *_shape(modes, points, cells))
+
+
+def _shape(modes: Modes, points: np.ndarray, cells: np.ndarray) -> tuple[Any, np.ndarray]:
+    """Rise of a body at points, and the sides along its ribs."""
+    rise = viewing.heights(modes, points)
+    return 0.0 if rise is None else rise, viewing.rib_sides(modes, points, cells)
 
 
 @check.typed
@@ -168,7 +175,8 @@ def film(response: Response, times: np.ndarray | None = None) -> canvas.Film:
     titles = [f"{1e3 * time:.3f} ms, deflection up to {1e3 * largest:.3g} mm" for time in times]
     at = np.append(np.atleast_1d(np.asarray(response.at)), [0.0])[:2]
     telling = sampling.telling(response, times)
-    return canvas.Film(plane, cells, boundary(cells), at, motion / largest, gap / largest, titles, telling)
+    shape = _shape(modes, points, cells)
+    return canvas.Film(plane, cells, boundary(cells), at, motion / largest, gap / largest, titles, telling, *shape)
 
 
 def _frames(response: Response, times: np.ndarray) -> Iterator[Image.Image]:

@@ -8,7 +8,8 @@ from numpy.testing import assert_allclose
 from fem_impact import mesh
 from fem_impact._base import isolated
 from fem_impact.fe.assembly import assemble
-from fem_impact.fe.section import Material, Plate
+from fem_impact.fe.ribs import Rib
+from fem_impact.fe.section import Beam, Material, Plate
 from fem_impact.modes.modal import find_modes
 
 PLATE = Plate(Material(E=210e9, nu=0.3, rho=7850.0), 2e-3)
@@ -191,3 +192,66 @@ def test_a_plate_of_thirty_metres_was_drawn_in_millimetres(tmp_path, size, plaus
     else:
         with pytest.raises(ValueError, match="looks like millimetres"):
             mesh.outline(drawn)
+
+
+RIM = '<rect id="rim" x="0" y="0" width="400" height="300"/>'
+PAPER = 'width="400mm" height="300mm" viewBox="0 0 400 300"'
+
+
+def test_named_open_paths_are_lines(tmp_path):
+    body = RIM + '<path id="bar" d="M50 20 L200 20 L300 100"/><circle id="hole" cx="80" cy="200" r="20"/>'
+    body += '<path id="brace" d="M0 0 L400 300"/>'  # from corner to corner
+    shape = mesh.outline(svg(tmp_path, body, PAPER))
+    assert set(shape.edges) == {"rim", "hole", "outer", "boundary"} and list(shape.lines) == ["bar", "brace"]
+    assert_allclose(shape.lines["bar"], [(0.05, -0.02), (0.2, -0.02), (0.3, -0.1)], atol=1e-12)
+    assert_allclose(shape.lines["brace"], [(0.0, 0.0), (0.4, -0.3)], atol=1e-12)
+    assert "the open paths bar, brace are lines for ribs" in shape.notes[-1]
+    assert shape.refined(2.0).lines is shape.lines
+
+
+def test_a_line_may_touch_an_outline_of_several_named_edges_and_another_line(tmp_path):
+    sides = {"top": "M0 0 H400", "right": "M400 0 V300", "bottom": "M400 300 H0", "left": "M0 300 V0"}
+    lines = {"bar": "M400 0 L300 100", "strut": "M300 100 L200 100", "far": "M200 100 L300 100.2 V200"}
+    body = "".join(f'<path id="{name}" d="{d}"/>' for name, d in (sides | lines).items())
+    shape = mesh.outline(svg(tmp_path, body, PAPER))
+    assert set(shape.edges) == {*sides, "outer", "boundary"} and set(shape.lines) == set(lines)
+    with pytest.raises(ValueError, match=r"three lines that meet at .*; draw the outline as one path"):
+        mesh.outline(svg(tmp_path, body + '<path id="brace" d="M0 0 L400 300"/>', PAPER))
+
+
+def test_lines_of_one_layer_get_numbers_and_curves_become_straight_parts(tmp_path):
+    def draw(space):
+        space.add_lwpolyline([(0, 0), (4, 0), (4, 3), (0, 3)], close=True)
+        space.add_line((1, 0), (1, 3), dxfattribs={"layer": "bars"})
+        space.add_arc((2, 1), 1.0, 0.0, 90.0, dxfattribs={"layer": "bars"})
+        space.add_line((2, 2), (1.5, 2), dxfattribs={"layer": "bars"})  # goes on where the arc ends
+
+    shape = mesh.outline(dxf(tmp_path, draw))
+    assert list(shape.lines) == ["bars0", "bars1"]
+    path = shape.lines["bars1"]
+    assert_allclose(path[[0, -1]], [(3, 1), (1.5, 2)], atol=1e-12)
+    length = np.linalg.norm(np.diff(path, axis=0), axis=1).sum()
+    # chords of at most a twentieth of 4 m on a radius of 1 m: shorter than the arc by a 24th of 0.2**2
+    assert 0.0 < 1.0 - length / (0.5 * np.pi + 0.5) < 0.2**2 / 24
+    assert "their curves become straight parts, at most 0.00" in shape.notes[-1]
+
+
+def test_an_open_outline_is_no_line(tmp_path):
+    hole = '<circle id="hole" cx="80" cy="200" r="20"/>'
+    with pytest.raises(ValueError, match=r"open outline: it ends at \(0, -0.3\) m, 0.3 m from its start; .* a name"):
+        mesh.outline(svg(tmp_path, '<path id="rim" d="M0 0 H400 V300 H0"/>' + hole, PAPER))
+    with pytest.raises(ValueError, match="has an open outline"):
+        mesh.outline(svg(tmp_path, RIM + '<path d="M50 20 L200 20"/>', PAPER))
+
+
+def test_a_rib_along_a_line_of_a_drawing_is_that_along_its_points(tmp_path):
+    plate = Plate(Material(E=10e9, nu=0.3, rho=450.0), 3e-3)
+    bar = Beam.rectangular(plate.material, width=8e-3, height=12e-3)
+    shape = mesh.outline(svg(tmp_path, RIM + '<path id="bar" d="M50 50 L350 200"/>', PAPER), size=0.1)
+    one, two = (
+        find_modes(assemble(shape, plate, {"rim": "hinged"}, ribs=[Rib(path, bar)]), n_modes=3).omega
+        for path in ("bar", [(0.05, -0.05), (0.35, -0.2)])
+    )
+    assert_allclose(one, two, rtol=1e-9)  # the same body, but for rounding
+    flat = find_modes(assemble(shape, plate, {"rim": "hinged"}), n_modes=3).omega
+    assert one[0] > 1.05 * flat[0]

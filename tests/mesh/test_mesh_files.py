@@ -1,6 +1,8 @@
 """Mesh files: what is read, what is mended and said, what is refused and why; and the meshes shipped."""
 
+import re
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import meshio
@@ -8,7 +10,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from fem_impact import mesh
+from fem_impact import mesh, rise
 from fem_impact._base.check import SimulationError
 from fem_impact.fe.assembly import assemble
 from fem_impact.fe.section import Material, Plate
@@ -233,7 +235,11 @@ def bad_nan():
 
 REFUSED = [
     (bad_nan, "not a number at node 7.*correct that node"),
-    (lambda: (np.column_stack([GOOD.points, 0.3 * GOOD.points[:, 0]]), GOOD.cells), "is not flat"),
+    (
+        lambda: (np.column_stack([GOOD.points, (GOOD.points[:, 0] - 0.8) ** 2]), GOOD.cells),
+        r"too steep for a plate: near .* slopes by 5\d.* degrees; .* leave out walls and folds",
+    ),
+    (lambda: ([(0, 0, 0), (1, 0, 0), (0, 1, 0), (0.5, 0.9, 0.1)], [[0, 1, 2], [0, 1, 3]]), "overlap"),  # folded
     (
         lambda: (
             np.concatenate([GOOD.points, GOOD.points + np.array([3, 0])]),
@@ -285,6 +291,61 @@ def test_marimba_bar_is_tuned_to_two_octaves(monkeypatch):
 
     modes = find_modes(assemble(*marimba_bar.bar()), n_modes=4)
     assert_allclose(modes.frequencies[3] / modes.frequencies[2], 4.0, rtol=0.02)  # what its script promises
+
+
+BENT = 4.0  # [m] radius
+DOME = replace(GOOD, rise=rise.cap(BENT, centre=(0.775, 0.5)))
+
+
+def test_a_saved_curved_mesh_comes_back_with_its_rise(tmp_path):
+    mesh.save(tmp_path / "dome.msh", DOME)
+    shape = mesh.load(tmp_path / "dome.msh")
+    assert_allclose(shape.points, DOME.points, atol=1e-12)
+    away = shape.rise(DOME.points) - DOME.rise(DOME.points)
+    assert_allclose(away, away.mean(), atol=1e-12)  # heights over the mean plane
+    said = re.search(r"slopes up to ([\d.]+), where shallow theory errs by some ([\d.]+) %", shape.notes[-1])
+    slope, error = (float(number) for number in said.groups())
+    furthest = np.linalg.norm(GOOD.points[GOOD.cells].mean(axis=1) - [0.775, 0.5], axis=1).max()
+    assert slope == pytest.approx(np.tan(np.arcsin(furthest / BENT)), rel=0.05)  # of a triangle, told in two digits
+    assert error == pytest.approx(50.0 * slope**2, rel=0.1)
+    assert shape.refined(2.0).rise is shape.rise
+    system = assemble(shape, PLATE, {"boundary": "hinged"})
+    assert system.section.rise is shape.rise and system.theory == "shallow"
+    stated = assemble(shape, PLATE, {"boundary": "hinged"}, rise=rise.saddle(9.0))
+    assert stated.section.rise is not shape.rise
+
+
+@pytest.mark.slow
+def test_frequencies_of_a_curved_mesh_file_converge_to_those_of_its_surface(tmp_path):
+    """Through heights at vertices the surface errs with the square of their distance."""
+    errors = []
+    plate = Plate(PLATE.material, 2e-2)
+    for size in (0.25, 0.125):
+        dome = replace(mesh.rectangle(1.55, 1.0, size=size), rise=DOME.rise)
+        mesh.save(tmp_path / "dome.msh", dome)
+        one, two = (
+            find_modes(assemble(shape, plate, {"boundary": "hinged"}), n_modes=3).omega
+            for shape in (dome, mesh.load(tmp_path / "dome.msh"))
+        )
+        errors.append(np.abs(two / one - 1.0).max())
+    assert errors[1] < 2e-3 and np.log2(errors[0] / errors[1]) > 1.5  # measured: 2.0 and 2.3
+
+
+def test_a_tilted_mesh_is_levelled(tmp_path):
+    around, angle = np.array([1.0, 2.0, 0.5]) / np.linalg.norm([1.0, 2.0, 0.5]), 0.4
+    cross = np.cross(np.eye(3), around)
+    turn = np.eye(3) + np.sin(angle) * cross + (1.0 - np.cos(angle)) * cross @ cross
+    for height in (np.zeros(len(GOOD.points)), DOME.rise(GOOD.points)):
+        path = written(tmp_path, np.column_stack([GOOD.points, height]) @ turn.T, GOOD.cells)
+        shape = mesh.load(path)
+        assert any("is tilted by" in note for note in shape.notes)
+        assert shape.area == pytest.approx(GOOD.area, rel=1e-12 if not height.any() else 1e-3)
+        assert (shape.rise is None) == (not height.any())
+        if height.any():  # the sides of triangles keep their true lengths
+            place = np.column_stack([shape.points, shape.rise(shape.points)])
+            sides = [np.linalg.norm(each[GOOD.cells[:, 0]] - each[GOOD.cells[:, 1]], axis=1)
+                     for each in (place, np.column_stack([GOOD.points, height]))]  # fmt: skip
+            assert_allclose(*sides, rtol=1e-9)
 
 
 def test_noise_across_the_plane_is_ignored_and_told(tmp_path):

@@ -9,7 +9,7 @@ import pytest
 import fem_impact as fi
 from fem_impact.fe.section import Elastic
 from fem_impact.scenes import editor_schema, keys
-from fem_impact.scenes.schema import MAKERS, SUPPLIED
+from fem_impact.scenes.schema import MAKERS, NESTED, RISES, SUPPLIED, keys_of
 
 METAL = {"E": 210e9, "nu": 0.3, "rho": 7850.0}
 STEEL = fi.Material(**METAL)
@@ -23,6 +23,8 @@ VALID = {  # what each function needs besides the key that is tried
     "material.": METAL | {"E_across": 1e9, "G": 1e9},
     "section.plate": {"material": STEEL, "thickness": 2e-3},
     "section.beam": {"material": STEEL, "width": 0.02, "height": 0.01},
+    "layer.": {"base": STEEL, "thickness": 1e-3},
+    "rib.": {"base": STEEL, "path": [[0.0, 0.0], [1.0, 0.0]], "width": 0.02, "height": 0.01},
     "target.": {},
     "striker.rigid": {"mass": 0.02},
     "striker.sphere": METAL | {"radius": 0.01},
@@ -116,12 +118,12 @@ def test_the_limits_of_a_form_are_accepted(name):
 
 def test_every_key_of_a_scene_is_explained_and_every_explanation_is_used():
     found = set()
-    for table, (_, makers) in MAKERS.items():
+    for table, makers in {**{name: makers for name, (_, makers) in MAKERS.items()}, "rise": RISES}.items():
         for kind, function in makers.items():
-            for key in set(inspect.signature(function).parameters) - SUPPLIED - {"hand"}:
+            for key in set(keys_of(function)) - {"hand", *NESTED}:
                 names = (f"{table}.{kind}.{key}", f"{table}.{key}", key)
                 found.add(next(name for name in names if name in keys.KEYS))
-    found |= {"supports.stiffness", "supports.rotation", "hand.force"}
+    found |= {"supports.stiffness", "supports.rotation", "hand.force", "rise.table"}
     assert found == set(keys.KEYS)
 
 
@@ -132,7 +134,8 @@ def test_words_are_plain_and_short():
 
 def test_the_numbers_of_a_hand_have_their_limits():
     hand = editor_schema.schema()["properties"]["striker"]["oneOf"][0]["properties"]["hand"]["properties"]
-    assert hand["stiffness"]["exclusiveMinimum"] == 0 and hand["damping"]["minimum"] == 0
+    least = hand["stiffness"]["anyOf"][0]["exclusiveMinimum"], hand["damping"]["anyOf"][0]["minimum"]
+    assert least == (0, 0)
     with pytest.raises(ValueError, match="stiffness"):
         fi.Hand(stiffness=0.0, damping=0.0, force=1.0)
     assert np.isfinite(fi.Hand(stiffness=1.0, damping=0.0, force=-1.0).force)

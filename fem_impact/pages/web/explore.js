@@ -160,6 +160,12 @@
     c.lineWidth = flat ? 2 : 8;
     c.fill("evenodd");
     c.stroke();
+    c.beginPath();
+    for (const [from, to] of facts.ribs.flat()) {
+      c.moveTo(body.px(from[0]), body.py(from[1]));
+      c.lineTo(body.px(to[0]), body.py(to[1]));
+    }
+    c.stroke();
     const [ear, at] = [shown.ear, shown.at].map(([x, y]) => [body.px(x), body.py(y ?? 0)]);
     body.mark(...ear, look.heard, 4);
     body.mark(...at, look.struck);

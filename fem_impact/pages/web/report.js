@@ -119,20 +119,25 @@
   // narrow screens and broad bodies need a camera farther away
   const far = (matchMedia("(max-width: 30rem)").matches ? 1.3 : 1) * (1 + 0.25 * Math.min(side(view.x), side(view.y)));
   const camera = () => ({ eye: { x: 0.75 * far, y: -1.2 * far, z: 0.75 * far }, center: { x: 0, y: 0, z: -0.08 } });
-  const surface = (z, limit, unit) => ({  // with a unit, hovering shows the deflection
-    type: "mesh3d", x: view.x, y: view.y, z, i: view.cells[0], j: view.cells[1], k: view.cells[2], intensity: z,
-    cmin: -limit, cmax: limit, flatshading: false, hoverinfo: unit ? "z" : "skip", showscale: false,
-    hovertemplate: unit ? `%{z:.3s}${unit}<extra></extra>` : undefined,
+  const limits = { wave: 1.8 * largest, mode: 1.8 };
+  // a curved body's rise is drawn to scale with its length and breadth, see `stage`; deflections are not
+  const scaled = (rise, limit) => 4 * limit * rise / span;
+  const raised = (values, limit) => (view.rise ? values.map((v, i) => v + scaled(view.rise[i], limit)) : values);
+  const surface = (values, limit, unit) => ({  // with a unit, hovering shows the deflection of a flat body
+    type: "mesh3d", x: view.x, y: view.y, z: raised(values, 1.8 * limit), i: view.cells[0], j: view.cells[1], k: view.cells[2], intensity: values,
+    cmin: -limit, cmax: limit, flatshading: false, hoverinfo: unit && !view.rise ? "z" : "skip", showscale: false,
+    hovertemplate: unit && !view.rise ? `%{z:.3s}${unit}<extra></extra>` : undefined,
     colorscale: [[0, "#b35806"], [0.25, "#f1a340"], [0.5, "#e9e6e2"], [0.75, "#998ec3"], [1, "#542788"]],
     lighting: { ambient: 0.62, diffuse: 0.7, specular: 0.12, roughness: 0.8 }, lightposition: { x: -2e4, y: 3e4, z: 6e4 },
   });
   const stage = (limit, was) => {
+    const [low, high] = [Math.min, Math.max].map((end) => scaled(view.rise ? end(...view.rise) : 0, limit));
     const hide = { visible: false, showspikes: false };
     return layout("", undefined, undefined, {
       margin: { l: 0, r: 0, t: 0, b: 0 },
       scene: {
-        xaxis: hide, yaxis: hide, zaxis: { ...hide, range: [-limit, limit] }, aspectmode: "manual",
-        aspectratio: { x: 1.4 * side(view.x), y: 1.4 * side(view.y), z: 0.7 }, camera: was || camera(), dragmode: "orbit",
+        xaxis: hide, yaxis: hide, zaxis: { ...hide, range: [low - limit, high + limit] }, aspectmode: "manual",
+        aspectratio: { x: 1.4 * side(view.x), y: 1.4 * side(view.y), z: 0.7 * (1 + 0.5 * (high - low) / limit) }, camera: was || camera(), dragmode: "orbit",
       },
     });
   };
@@ -140,16 +145,17 @@
   // The tip sits on the surface during contact and at its true distance otherwise.
   const striker = () => ({
     type: "scatter3d", mode: "markers", x: [view.at[0]], y: [view.at[1]],
-    z: [Math.min(0.17 * largest - view.surface[instant] + view.gap[instant], 1.75 * largest)],
+    z: [Math.min(0.17 * largest - view.surface[instant] + view.gap[instant], 1.75 * largest) + scaled(view.under || 0, limits.wave)],
     marker: { size: 8, color: colour("strike") }, hovertemplate: "striker<extra></extra>",
   });
-  const atRest = () => ({
-    type: "scatter3d", mode: "lines", x: view.rim[0], y: view.rim[1], z: view.rim[0].map((v) => (v === null ? null : 0)),
-    line: { color: colour("grey"), width: 2 }, hoverinfo: "skip",
+  const atRest = (limit, [x, y, z], tone = "grey", width = 2) => ({
+    type: "scatter3d", mode: "lines", x, y, z: z.map((v) => (v === null ? null : scaled(v, limit))),
+    line: { color: colour(tone), width }, hoverinfo: "skip",
   });
+  const lines = (limit, ...between) => [atRest(limit, view.rim), ...between, ...(view.ribs ? [atRest(limit, view.ribs, "strike", 3)] : [])];
   const solid = {
-    "plot-wave": (was) => [[surface(down(wave[instant]), largest, "m"), atRest(), ...(view.gap ? [striker()] : [])], stage(1.8 * largest, was)],
-    "plot-mode": (was) => [[surface(shapes[picked].map((v) => phase * v), 1, ""), atRest()], stage(1.8, was)],
+    "plot-wave": (was) => [[surface(down(wave[instant]), largest, "m"), ...lines(limits.wave, ...(view.gap ? [striker()] : []))], stage(limits.wave, was)],
+    "plot-mode": (was) => [[surface(shapes[picked].map((v) => phase * v), 1, ""), ...lines(limits.mode)], stage(limits.mode, was)],
   };
 
   const draw = () => {
@@ -181,14 +187,14 @@
     $("wave-time").setAttribute("aria-valuetext", text);
     $("wave-out").textContent = text;
     if (!canTurn) return;
-    const z = down(wave[n]);
-    Plotly.restyle("plot-wave", { z: [z], intensity: [z] }, [0]);
+    const values = down(wave[n]);
+    Plotly.restyle("plot-wave", { z: [raised(values, limits.wave)], intensity: [values] }, [0]);
     if (view.gap) Plotly.restyle("plot-wave", { z: [striker().z] }, [2]);
   };
   const setMode = () => {
     if (!canTurn) return;
-    const z = shapes[picked].map((v) => phase * v);
-    Plotly.restyle("plot-mode", { z: [z], intensity: [z] }, [0]);
+    const values = shapes[picked].map((v) => phase * v);
+    Plotly.restyle("plot-mode", { z: [raised(values, limits.mode)], intensity: [values] }, [0]);
   };
 
   // One timer per Play button; it never starts by itself.
