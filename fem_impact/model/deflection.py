@@ -163,8 +163,11 @@ def _stretched(struck: Struck, body: Known, integrals: Bending) -> Assumption:
         slopes = moved[TIMES:] ** 2 @ integrals.slope
         mean = float(np.mean(_tension(body, slopes, np.array([body.extent]), _share(body, integrals, moved))))
         rise = np.sqrt(1.0 + mean * soft) - 1.0
-        heard = float(struck.target_energy @ rise) / (struck.target_energy.sum() or 1.0)
-        effect["sound"] = (1.0 - part / whole) * heard if whole else 0.0
+        effect["sound"] = (
+            (1.0 - part / whole) * float(struck.target_energy @ rise) / (struck.target_energy.sum() or 1.0)
+            if whole
+            else 0.0
+        )
     return STRETCHED.judged(struck, value, effect, LOCAL)
 
 
