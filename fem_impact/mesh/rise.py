@@ -4,6 +4,7 @@ Each function returns a function of points (n, 2) [m] that gives heights (n,) [m
 may be any such function.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property, partial
 from typing import Any
@@ -51,7 +52,7 @@ def _cymbal(points: np.ndarray, radius: float, bow: float, cup_radius: float, cu
 
 
 @dataclass(frozen=True, eq=False)
-class Heights:
+class _Heights:
     """A smooth surface through points; it is told from others by these alone."""
 
     points: np.ndarray  # (n, 2) [m]
@@ -116,7 +117,7 @@ def cymbal(radius: float, bow: float, cup_radius: float, cup: float) -> Rise:
     return partial(_cymbal, **sizes)
 
 
-def table(points: ArrayLike, heights: ArrayLike) -> Heights:
+def table(points: ArrayLike, heights: ArrayLike) -> Callable[[np.ndarray], np.ndarray]:
     """A smooth surface through heights (n,) [m] at points (n, 2) [m]; beyond them, it goes on straight."""
     place = check.array("points", points, (None, 2), "m")
     height = check.array("heights", heights, (len(place),), "m")
@@ -125,4 +126,4 @@ def table(points: ArrayLike, heights: ArrayLike) -> Heights:
     size = np.linalg.svd(place - place.mean(axis=0), compute_uv=False)
     if size[1] <= SAME * size[0]:
         raise ValueError("points must not all lie on one line; give some beside it")
-    return Heights(place, height)
+    return _Heights(place, height)
