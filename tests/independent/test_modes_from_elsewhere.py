@@ -37,9 +37,7 @@ def test_modes_picked_from_a_tap_say_how_well_they_are_known(kind):
 @pytest.mark.parametrize(("kind", "road"), ROADS)
 def test_claims_cover_the_truth_in_a_whole_family(kind, road, n_modes):
     told = [judged(*blow(seed, kind, n_modes, road)) for seed in range(20)]
-    assert (
-        sum(each["covered"] for each in told) >= 17
-    )  # of 20: if 95 % of all are, four outside are seen in 2 of 100 runs
+    assert sum(each["covered"] for each in told) >= 17  # with 95 % of all, 4 outside are seen in 2 of 100 runs
     assert not any(each["silent"] for each in told)
     ratios = np.array([each["ratio"] for each in told])
     assert np.median(ratios[np.isfinite(ratios)]) < 0.5 * LARGE
