@@ -30,7 +30,6 @@ from typing import Any
 
 import numpy as np
 from scipy.sparse import csc_matrix
-from skfem import Dofs, ElementTriP4
 
 from .._base.untyped import Sparse
 from . import plane, slopes
@@ -75,7 +74,7 @@ class Sheet:
         gradient = np.einsum("eqji,jqk->eqik", inverses(space, X), plane.reference(X)[1])
         h = evaluate("thickness", section.thickness, frame.places(x), "m").reshape(dx.shape)
         moduli = (frame.length**2 * h * dx)[..., None, None] * section.stretched
-        own = Dofs(triangles(rim.points, space.vertices), ElementTriP4())
+        own = plane.numbered(triangles(rim.points, space.vertices))
         dofs = np.vstack([own.element_dofs, own.N + own.element_dofs]).T
         area = np.broadcast_to(np.stack([1.0 - X[0] - X[1], *X], axis=1), (*dx.shape, 3))
         neutral = np.zeros((*dx.shape, 3, 3))

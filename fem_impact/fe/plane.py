@@ -21,6 +21,11 @@ NODES = ElementTriP4.doflocs  # (15, 2) where those of a component lie in the un
 LOCAL = 21 + 2 * QUARTIC  # unknowns of a triangle, those of the deflection first
 
 
+def numbered(mesh: Cells) -> Dofs:
+    """Numbers of the unknowns of one component on a mesh."""
+    return Dofs(mesh, ElementTriP4())
+
+
 def reference(X: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Quartic shape functions (n_q, 15) and their gradients (2, n_q, 15) at points (2, n_q) of the unit triangle."""
     element = ElementTriP4()

@@ -69,13 +69,18 @@ class Plate:
         if not callable(self.thickness):
             check.settle(self, thickness=check.positive("thickness", self.thickness, "m"))
         check.settle(self, tension=check.non_negative("tension", self.tension, "N/m"))
-        if self.layers and self.material != layering.together(self.layers):
+        layers = check.several("layers", self.layers, layering.Layer) if self.layers else ()
+        if layers and self.material != layering.together(layers):
             raise ValueError("material must be that of the layers; make a plate of layers by Plate.laminate")
-        if self.layers and self.thickness != sum(layer.thickness for layer in self.layers):
+        if layers and self.thickness != sum(layer.thickness for layer in layers):
             raise ValueError("thickness must be that of the layers; make a plate of layers by Plate.laminate")
         if self.rise is not None and not callable(self.rise):
             raise ValueError(f"rise must be a function of points, or one of fi.rise, got {check.shown(self.rise)}")
-        check.settle(self, ribs=tuple(self.ribs), in_plane=dict(self.in_plane))
+        if not isinstance(self.ribs, Sequence) or not all(hasattr(rib, "rigidity") for rib in self.ribs):
+            raise ValueError(f"ribs must be a list of fi.Rib, got {check.shown(self.ribs)}")
+        if not isinstance(self.in_plane, Mapping):
+            raise ValueError(f"in_plane must be a dict of edge name -> word, got {check.shown(self.in_plane)}")
+        check.settle(self, layers=layers, ribs=tuple(self.ribs), in_plane=dict(self.in_plane))
 
     @classmethod
     def laminate(cls, layers: Sequence[tuple[Material, float, float]], *, tension: float = 0.0) -> "Plate":

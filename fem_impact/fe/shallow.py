@@ -25,7 +25,6 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-from skfem import Dofs, ElementTriP4
 
 from .._base import check
 from ..mesh.meshes import Mesh
@@ -95,7 +94,8 @@ def _domain(body: Subject, fields: tuple[str, ...]) -> Domain:
         local = plane.nodes(space.inner).reshape(-1, 2)
         heights = check.field("rise", rise, found.frame.places(local), "m") / found.frame.length
         tilt = np.column_stack([np.ones(len(local)), local])  # it stretches nothing, but would cost digits
-        heights -= tilt @ np.linalg.lstsq(tilt, heights, rcond=None)[0]
+        weight = np.repeat(np.sqrt(found.points.dx.sum(axis=1)), plane.QUARTIC)
+        heights -= tilt @ np.linalg.lstsq(weight[:, None] * tilt, weight * heights, rcond=None)[0]
         space.heights[:] = heights.reshape(space.heights.shape)
     return found
 
@@ -105,7 +105,7 @@ def _hold(body: Subject, domain: Domain) -> Held:
     space.ribs = [Piece.of(rib, body, domain) for rib in body.section.ribs]
     creased = np.unique(np.concatenate([np.zeros(0, int), *(rib.facets.ravel() for rib in space.ribs)]))
     expand, project, dofs = constrain(rim, space.vertices, *numbering(domain.cells, space.flat), creased)
-    n_flat, own = expand.shape[0], Dofs(domain.cells, ElementTriP4())
+    n_flat, own = expand.shape[0], plane.numbered(domain.cells)
     loose, drifts = plane.loosened(space.inner, rim, own)
     space.drifts = np.vstack([np.zeros((n_flat, drifts.shape[1])), drifts])
     dofs = np.vstack([dofs, n_flat + own.element_dofs, n_flat + own.N + own.element_dofs])

@@ -54,7 +54,6 @@ import numpy as np
 from scipy.sparse import block_diag, coo_matrix, csc_matrix, csr_matrix
 from scipy.sparse.linalg import spsolve
 from scipy.spatial import cKDTree
-from skfem import Dofs, ElementTriP4
 
 from .._base.untyped import Cells, Sparse
 from ..mesh.meshes import LONGEST, Mesh
@@ -90,7 +89,7 @@ class MindlinSpace(PlaneSpace):
         bends = np.zeros(len(longest), bool)
         if self.bent is not None:
             bends[self.bent.cells] = True
-        dofs = Dofs(mesh, ElementTriP4()).element_dofs.T  # (n_cells, 15)
+        dofs = plane.numbered(mesh).element_dofs.T  # (n_cells, 15)
         small = np.setdiff1d(dofs[(longest < SMALL * thickness) & ~bends], dofs[bends])
         self.turned = np.isin(dofs, small)
 
@@ -99,7 +98,7 @@ class MindlinSpace(PlaneSpace):
 
         ``shapes`` (n, .., n_q, 15) are the quartic functions or their derivatives. For straight triangles.
         """
-        node = ElementTriP4.doflocs - 1.0 / 3.0
+        node = plane.NODES - 1.0 / 3.0
         x = self.origin[cells][:, None] + node @ self.jacobian[cells].transpose(0, 2, 1)
         slope = self.flat.functions(cells, x, (1,))[0].transpose(0, 2, 1, 3)  # (n, 15, 2, 21)
         slope = slope * ~self.turned[cells][:, :, None, None]
@@ -188,7 +187,7 @@ def constrain(
         slips = np.flatnonzero(held & (space.bent.of_side[cells, sides] >= 0))
         if slips.size:
             expand, project = _without_slip(space, rim, slips, cells[slips], sides[slips], dofs, expand, project)
-    n_flat, own = expand.shape[0], Dofs(mesh, ElementTriP4())
+    n_flat, own = expand.shape[0], plane.numbered(mesh)
     dofs = np.vstack([dofs, n_flat + own.element_dofs, n_flat + own.N + own.element_dofs])
     words = [{"hinged": "sliding", "clamped": "held"}.get(kind, "free") for kind in kinds]
     loose, at = plane.held_at(space.inner, rim.facets, words, own)

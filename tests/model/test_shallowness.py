@@ -1,0 +1,52 @@
+"""How steep a shell is, and what the inertia in its plane does, against exact panels."""
+
+import numpy as np
+import pytest
+import references_shells as reference
+from references_panels import Order, Panel, panel_modes
+
+import fem_impact as fi
+from fem_impact.fe import shallow
+
+E, NU, RHO, H = 70e9, 0.3, 2700.0, 2e-3
+SIDES, CURVATURE = (0.4, 0.3), -0.5
+PLATE = fi.Plate(fi.Material(E=E, nu=NU, rho=RHO), H)
+
+
+def panel(curvature=CURVATURE):
+    def rise(points):
+        return 0.5 * curvature * ((points - np.array(SIDES) / 2.0) ** 2).sum(axis=1)
+
+    mesh = fi.mesh.rectangle(*SIDES)
+    return fi.assemble(mesh, PLATE, {"boundary": "hinged"}, rise=rise, in_plane={"boundary": "sliding"})
+
+
+def sloped(x, y):
+    return CURVATURE * (x - SIDES[0] / 2.0), CURVATURE * (y - SIDES[1] / 2.0)
+
+
+def test_the_mass_in_the_plane_lowers_frequencies_as_the_exact_panel_has_it():
+    modes = fi.find_modes(panel(), n_modes=1)
+    share = shallow.plane_mass(modes.shapes.system, modes.shapes.vectors)[0, 0]
+    # half the square of the slope c (x - a / 2), over sin**2: c**2 a**2 (1 / 12 - 1 / (2 pi**2)) / 2
+    surface = 0.5 * CURVATURE**2 * (1.0 / 12.0 - 0.5 / np.pi**2) * (SIDES[0] ** 2 + SIDES[1] ** 2)
+    stiffness, edges = reference.isotropic(E, NU, H), (("hinged", "sliding"),) * 4
+    bodies = (Panel(SIDES, stiffness, RHO * H, edges, sloped, inertia=inertia) for inertia in (False, True))
+    still, heavy = (panel_modes(body, 1, Order(1, 12))[0][0] for body in bodies)
+    # first order of a share of 2e-3
+    assert share - surface == pytest.approx((still / heavy) ** 2 - 1.0, rel=0.02)
+
+
+def test_a_blow_says_how_steep_its_target_is_and_a_flat_one_does_not():
+    striker, contact = fi.Striker.rigid(5e-3), fi.Contact.hertz(1e7)
+    how = {"at": (0.13, 0.1), "speed": 0.1, "tolerance": 1e-2, "damping_ratio": 0.01}
+
+    def found(system):
+        hit = fi.strike(system, striker, contact, **how)
+        return next(each for each in hit.assumptions if each.name == "shallow target")
+
+    steep, flat = found(panel()), found(fi.assemble(fi.mesh.rectangle(*SIDES), PLATE, {"boundary": "hinged"}))
+    assert steep.value == pytest.approx(-CURVATURE * 0.5 * np.hypot(*SIDES), rel=1e-3)  # of a plane through triangles
+    assert steep.doubtful and 0.0 < steep.worst < 0.05
+    assert "steepest slope of the rise is 0.13" in steep.sentence
+    assert flat.value is None and flat.worst == 0.0
