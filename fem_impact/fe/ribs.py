@@ -151,7 +151,7 @@ def around_ends(mesh: Mesh, ribs: Sequence[Rib]) -> Mesh:
     return towards(mesh, {vertex: number for vertex, number in rings.items() if number})
 
 
-class Piece(NamedTuple):
+class RibLine(NamedTuple):
     """The sides of triangles on which a rib lies, at Gauss points."""
 
     rib: Rib
@@ -166,7 +166,7 @@ class Piece(NamedTuple):
     inertia: np.ndarray  # (n, n_q) [kg/m]
 
     @classmethod
-    def of(cls, rib: Rib, body: Subject, domain: Domain) -> "Piece":
+    def of(cls, rib: Rib, body: Subject, domain: Domain) -> "RibLine":
         """Where a rib of a plate lies."""
         facets = sides_on(body.mesh, rib.path)
         cells = cells_of_facets(facets, domain.space.vertices)[0]

@@ -31,7 +31,7 @@ from ..mesh.meshes import Mesh
 from . import plane, plates, ribs, slopes, splitting
 from .elements import curvatures, numbering
 from .plane import FIRST, LOCAL, SECOND, PlaneSpace
-from .ribs import Piece
+from .ribs import RibLine
 from .section import evaluate
 from .supports import constrain
 from .theory import Domain, Held, Points, Subject, Term, Theory, blocks, gram, scatter
@@ -48,7 +48,7 @@ class ShallowSpace(PlaneSpace):
     """Shape functions of one mesh: 21 of the deflection, then 15 for each displacement in the plane."""
 
     heights: np.ndarray  # (n_cells, 15) rise at the nodes of the plane, in the frame
-    ribs: Sequence[Piece] = ()
+    ribs: Sequence[RibLine] = ()
     drifts: np.ndarray  # (n_all, n) rigid motions in the plane that no edge prevents
 
     def linear(self, element_dofs: np.ndarray, n_all: int) -> np.ndarray:
@@ -102,7 +102,7 @@ def _domain(body: Subject, fields: tuple[str, ...]) -> Domain:
 
 def _hold(body: Subject, domain: Domain) -> Held:
     rim, space = plates.rim(body, domain, body.kinds), domain.space
-    space.ribs = [Piece.of(rib, body, domain) for rib in body.section.ribs]
+    space.ribs = [RibLine.of(rib, body, domain) for rib in body.section.ribs]
     creased = np.unique(np.concatenate([np.zeros(0, int), *(rib.facets.ravel() for rib in space.ribs)]))
     expand, project, dofs = constrain(rim, space.vertices, *numbering(domain.cells, space.flat), creased)
     n_flat, own = expand.shape[0], plane.numbered(domain.cells)
