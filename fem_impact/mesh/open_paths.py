@@ -1,9 +1,7 @@
 """Named open paths of a drawing, such as lines of ribs: told from pieces of an outline, and flattened."""
 
 import numpy as np
-from scipy.sparse import coo_matrix
-from scipy.sparse.csgraph import connected_components
-from scipy.spatial import cKDTree
+import shapely
 
 from .._base.rounding import SAME
 from .loops import Piece, divide, is_straight
@@ -14,9 +12,13 @@ PARTS = 20.0  # [-] straight parts of a curve over the drawing's extent, at leas
 def chains(pieces: list[Piece], span: float) -> list[list[int]]:
     """Numbers of pieces that follow each other under one name, from an open end or a branch to the next."""
     ends = np.array([piece.at(np.array([0.0, 1.0])) for piece in pieces]).reshape(-1, 2)
-    pairs = cKDTree(ends).query_pairs(SAME * span, output_type="ndarray")
-    links = coo_matrix((np.ones(len(pairs)), pairs.T), shape=(len(ends), len(ends)))
-    node = connected_components(links, directed=False)[1].reshape(-1, 2)
+    places = shapely.points(ends)
+    one, other = shapely.STRtree(places).query(places, "dwithin", SAME * span)
+    node, before = np.arange(len(ends)), np.full(len(ends), -1)
+    while not np.array_equal(node, before):  # ends at one place get the smallest of their numbers
+        before = node.copy()
+        np.minimum.at(node, one, node[other])
+    node = node.reshape(-1, 2)
     at: dict[tuple[str, int], list[int]] = {}
     for i, piece in enumerate(pieces):
         for each in node[i].tolist():

@@ -133,7 +133,7 @@ def calculix(path: Path, deck: str = "") -> dict[str, np.ndarray]:
     with path.open("rb") as file:
         heads = [line for line in file if line.lstrip().startswith(b"100CL")]
     modal = {float(head[12:24]): b"MODAL" in head for head in heads}  # steps are those of different values
-    if len(modal) != len(reader.time_values) or not modal:
+    if len(set(heads)) != len(reader.time_values) or not modal:
         raise ValueError(
             f"{path.name} must hold steps of different times or frequencies; write each load to its own file"
         )

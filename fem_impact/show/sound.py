@@ -78,7 +78,7 @@ class Sound(check.Locked):
 
     def wav(self) -> bytes:
         """The samples as a 32-bit float WAV file, with `stated` as its comment."""
-        if self._peak > np.finfo(np.float32).max:
+        if self._peak > float(np.finfo(np.float32).max):
             raise ValueError("response is louder than a WAV file can hold; check the units of its speed")
         file = io.BytesIO()
         wavfile.write(file, self.rate, self.samples.astype(np.float32))

@@ -73,6 +73,8 @@ def test_what_no_layers_can_be_is_refused_by_name():
         fi.Plate.laminate([(ALUMINIUM, 1e-3, 0.0), (ALUMINIUM, 1e-3)])
     with pytest.raises(ValueError, match=r"thickness of layers\[0\] must be positive"):
         fi.Plate.laminate([(ALUMINIUM, -1e-3, 0.0)])
-    with pytest.raises(ValueError, match="thickness must be that of the layers"):
-        plate = fi.Plate.laminate([(ALUMINIUM, 1e-3, 0.0), (CARBON, 1e-3, 0.0)])
+    plate = fi.Plate.laminate([(ALUMINIUM, 1e-3, 0.0), (CARBON, 1e-3, 0.0)])
+    with pytest.raises(ValueError, match="thickness must be that of the layers; make a plate of layers by"):
         fi.Plate(plate.material, 1e-3, layers=plate.layers)
+    with pytest.raises(ValueError, match="material must be that of the layers"):
+        fi.Plate(ALUMINIUM, 2e-3, layers=plate.layers)

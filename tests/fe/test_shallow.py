@@ -1,5 +1,7 @@
 """Shells held to formulas that share nothing with the program (`independent/references_shells.py`)."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 import references_shells as reference
@@ -141,5 +143,8 @@ def test_what_cannot_be_is_refused_by_name():
         fi.assemble(mesh, plate, {"left": "hinged"}, in_plane={"left": "loose"})
     with pytest.raises(ValueError, match="in_plane names edge 'lefty'"):
         fi.assemble(mesh, plate, {"left": "hinged"}, in_plane={"lefty": "held"})
+    bare = fi.assemble(replace(mesh, recipe=None), plate, rise=fi.rise.cap(2.0))
+    with pytest.raises(ValueError, match=r"mesh must be made with fi\.mesh or loaded"):
+        fi.find_modes(bare, n_modes=4)
     with pytest.raises(ValueError, match="section must be a Plate for rise"):
         fi.assemble(fi.mesh.line(1.0), fi.Beam.circular(ALUMINIUM, diameter=0.01), rise=fi.rise.cap(2.0))

@@ -364,7 +364,7 @@ def test_grazing_touch_is_continuous_and_keeps_energy(depth, scheme):
 
 
 def test_release_branch_meets_the_smooth_one():
-    spring = Spring(1e5, 1.5, 0.0, 0.0, laws.POWER, np.inf, 0.0, 1.0, 0.0, 0.0)
+    spring = Spring(1e5, 1.5, 0.0, 0.0, laws.POWER, np.inf, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0)
     start = spring_at(1e-4, spring)
     b = 1e-9
     edge = b * start.energy / start.approach  # free end approach at which the step ends with the contact just open

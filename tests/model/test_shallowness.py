@@ -49,4 +49,5 @@ def test_a_blow_says_how_steep_its_target_is_and_a_flat_one_does_not():
     assert steep.value == pytest.approx(-CURVATURE * 0.5 * np.hypot(*SIDES), rel=1e-3)  # of a plane through triangles
     assert steep.doubtful and 0.0 < steep.worst < 0.05
     assert "steepest slope of the rise is 0.13" in steep.sentence
+    assert "take its modes from a program for shells" in steep.sentence
     assert flat.value is None and flat.worst == 0.0

@@ -73,6 +73,14 @@ def test_a_plate_of_calculix():
     assert "not stated of the target: static compliance" in struck(modes, body.at((0.15, 0.1, 0.0)), law).verdict
 
 
+def test_steps_of_calculix_that_cannot_be_told_apart_are_refused(tmp_path):
+    pytest.importorskip("pyvista_frd", reason="the calculix extra is not installed")
+    text = (FILES / "plate.frd").read_bytes().replace(b" 95.76123372", b" 29.12784664")  # the second step as the first
+    (tmp_path / "plate.frd").write_bytes(text)
+    with pytest.raises(ValueError, match="steps of different times or frequencies; write each load to its own file"):
+        fi.Body.load(tmp_path / "plate.frd", mass=1.0)
+
+
 def test_a_rod_of_nastran():
     """Ten bars with lumped masses, and a mass at the tip; along the rod there is a closed form: k tan k = m / M."""
     pytest.importorskip("pyNastran", reason="the nastran extra is not installed")
@@ -112,6 +120,8 @@ def test_static_results_of_nastran_in_frames_of_their_own(tmp_path):
     results.eigenvectors[1] = RealEigenvectorArray.add_modal_case("OUGV1", numbers, 2.0 * moved, 1, *modal)
     results.eigenvectors[1].table_code = 7  # not that of displacements
     results.write_op2(str(tmp_path / "bar.op2"))
+    with pytest.raises(ValueError, match=r"bar\.op2 holds no nodes; give the deck \(\.bdf\) beside it"):
+        fi.Body.load(tmp_path / "bar.op2", mass=1.0)
     body = fi.Body.load(
         [tmp_path / "bar.op2", tmp_path / "bar.bdf"], mass=1.0, loads=[(2, (-1.0, 3.0, 2.0))], modal_mass=[4.0]
     )
@@ -134,6 +144,11 @@ def test_what_files_lack_is_said(tmp_path):
         fi.Body.load(tmp_path / "body.med", mass=1.0)
     with pytest.raises(ValueError, match="files must hold results"):
         fi.Body.load(FILES / "plate.inp", mass=1.0)
+    paths = [tmp_path / "one.npz", tmp_path / "two.npz"]
+    body.save(paths[0])
+    fi.Body(body.frequencies, body.shapes[:-1], body.nodes[:-1], mass=1.0, cells=np.zeros((0, 3), int)).save(paths[1])
+    with pytest.raises(ValueError, match="files must be about the same nodes; export all results of one"):
+        fi.Body.load(paths)
     told = {"shapes": (("n", "x", "m"), body.shapes), "nodes": (("n", "x"), body.nodes)}
     with pytest.raises(ValueError, match="files must hold modes"):
         fi.Body.load(xr.Dataset(told), mass=1.0)

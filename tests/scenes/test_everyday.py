@@ -73,7 +73,7 @@ QUICK = {
     "ball_glass_table": (0.84384, 1),
     "ball_toughened_pane": (0.67987, 3),
     "ball_window_pane": (0.36343, 1),
-    "glockenspiel_brass": (0.19679, 1),
+    "glockenspiel_brass": (0.36219, 1),
     "glockenspiel_plastic": (0.77170, 1),
     "guitar_fingertip": (0.49839, 1),
     "hammer_concrete_floor": (0.99281, 1),

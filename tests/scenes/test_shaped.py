@@ -117,7 +117,7 @@ def test_a_rib_along_a_line_of_a_drawing(tmp_path):
     rest = RIB.replace("path = [[0.1, 0.0], [0.2, 0.3]]", 'line = "bar"')
     scene = load(tmp_path, rest=rest, text=text.replace("at = [0.13, 0.1]", "at = [0.13, -0.1]"))
     np.testing.assert_allclose(scene.ribs[0].path, [(0.05, -0.05), (0.35, -0.2)], atol=1e-12)
-    assert any("bar are lines for ribs" in note for note in scene.built.target.notes)
+    assert any("bar are lines for ribs" in note for note in scene.built.target.assumed)
     with pytest.raises(ValueError, match=r"\[\[rib\]\] 0 line must be one of bar, .* did you mean 'bar'"):
         _ = load(tmp_path, rest=rest.replace('"bar"', '"baar"'), text=text).built
 
@@ -145,7 +145,9 @@ def test_numbers_within_ribs_layers_and_rises_have_intervals(tmp_path):
 
 def test_a_band_makes_a_body_anew_where_the_modes_of_flat_plates_do_not_scale(tmp_path):
     scene = load(tmp_path, rest=RIB)
-    with pytest.raises(ValueError, match=r"section\.thickness rescales the modes of flat plates"):
+    with pytest.raises(
+        ValueError, match=r"section\.thickness rescales the modes of flat plates .*; write it in the scene as"
+    ):
         fi.spread(scene, {"section.thickness": ("uniform", 2e-3, 3e-3)}, n=16)
     curved = load(tmp_path, mesh='rise = { shape = "saddle", radius = 3.0 }')
     with pytest.raises(ValueError, match=r"target\.size needs a thin body of stated size, flat"):
@@ -182,6 +184,11 @@ def test_wrong_shapes_name_file_table_and_key(tmp_path, mesh, rest, match):
     path.write_text(PLATE.replace("{mesh}", mesh).replace("{rest}", rest))
     with pytest.raises(ValueError, match=rf"scene\.toml: {match}"):
         _ = fi.load_scene(path).built
+
+
+def test_a_plate_without_thickness_or_layers_says_what_to_write(tmp_path):
+    with pytest.raises(ValueError, match="thickness is missing; give it here, or write the plate's layers as"):
+        load(tmp_path, text=PLATE.replace("thickness = 3e-3\n", ""))
 
 
 @pytest.mark.parametrize(

@@ -183,7 +183,7 @@ def test_frequency_responses_of_a_universal_file_are_read_or_named(tmp_path):
     ):
         readers.arrays(path)
     with pytest.raises(ValueError, match="58, of which 58 are time records or frequency responses"):
-        universal_files.arrays(path, "z")
+        universal_files.arrays(path)
     feet = {"type": 164, "units_code": 2, "units_description": "foot", "temp_mode": 1, "length": 2.0, "force": 0.5,
             "temp": 1.0, "temp_offset": 1.0}  # fmt: skip
     sure = one | {"func_type": 6, "ord_data_type": 4, "data": np.full(400, 0.75)}
