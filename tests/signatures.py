@@ -60,7 +60,7 @@ INNER = {
     "report.SoundPlayer", "report.audio", "report.template",
     "explore.serve",  # ends at an interruption only, see test_explore
     "ToleranceWarning", "analytic.closed_form", "Striker.let_go",
-    "Rib.along", "Rib.rigidity", "Rib.turning",
+    "Rib.distances", "Rib.rigidity", "Rib.turning",
     "Taps", "Taps.summary",  # made by read_taps and Taps.from_arrays
     "pictures.gallery", "pictures.film", "figures.chladni", "hammers.choose_on",
     "Modes", "sound.Sound.audible", "sound.Sound.normalised", "sound.Sound.faded", "sound.Sound.wav",

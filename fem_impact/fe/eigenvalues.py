@@ -84,7 +84,7 @@ class Flexibility:
         return Flexibility, (self.K, self.M, self.rigid, self.sprung, self.pull, self.held)
 
     @cached_property
-    def moving(self) -> np.ndarray:
+    def inertial(self) -> np.ndarray:
         """Unknowns that have inertia."""
         return np.flatnonzero(self.M.diagonal())
 
@@ -146,7 +146,7 @@ def lowest(flexibility: Flexibility, n: int, residual: float = RESIDUAL) -> tupl
     if flexibility.sprung.size:  # one, the scale of bending, keeps K definite and the lowest modes within some decades
         K = K + M
         solve = flexibility.shifted
-    moving = flexibility.moving
+    moving = flexibility.inertial
     if n > len(moving) - n_rigid:
         raise ValueError(f"n_modes must not exceed the {len(moving)} unknowns of this mesh; refine it")
     if size <= DENSE or 3 * (n + n_rigid) >= size:

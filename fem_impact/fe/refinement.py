@@ -233,7 +233,7 @@ def _counted(system: System, flexibility: Flexibility, n: int, limit: float | No
     stricter residual, twice at most.
     """
     n_rigid = flexibility.rigid.shape[1]
-    moving = len(flexibility.moving)
+    moving = len(flexibility.inertial)
     available = moving - n_rigid
     if n > available:
         size = size_for(system, n + n_rigid, None, None)

@@ -73,7 +73,7 @@ class Rib:
         if self.offset is not None and not callable(self.offset):
             check.settle(self, offset=check.number("offset", self.offset, "m"))
 
-    def along(self, points: np.ndarray) -> np.ndarray:
+    def distances(self, points: np.ndarray) -> np.ndarray:
         """Distance (n, 1) [m] along the path of points (n, 2) [m] on it."""
         if isinstance(self.path, str):
             return np.zeros((len(points), 1))
@@ -91,7 +91,7 @@ class Rib:
         The stiffness is that on the strain of the plate along the rib [N], its curvature along the rib, negative
         [N m^2], and its twist [N m^2].
         """
-        place, beam = self.along(points), self.section
+        place, beam = self.distances(points), self.section
         inertia = beam.inertia(place)
         if self.offset is None:
             z = -0.5 * (thickness + evaluate("height", beam.height, place, "m"))
@@ -111,7 +111,7 @@ class Rib:
 
     def turning(self, points: np.ndarray) -> np.ndarray:
         """Rotary inertia per length (n,) [kg m] at points (n, 2) [m]."""
-        return self.section.rotary(self.along(points))
+        return self.section.rotary(self.distances(points))
 
 
 def sides_on(mesh: Mesh, path: Any) -> np.ndarray:
@@ -138,7 +138,7 @@ def around_ends(mesh: Mesh, ribs: Sequence[Rib]) -> Mesh:
         if not isinstance(rib.path, str):
             for vertex, count in zip(*np.unique(sides_on(mesh, rib.path), return_counts=True)):
                 counts.setdefault(int(vertex), []).append(int(count))
-                place = rib.along(mesh.points[[vertex]])
+                place = rib.distances(mesh.points[[vertex]])
                 width[int(vertex)] = float(evaluate("width", rib.section.width, place, "m")[0])
     rings = {}
     for vertex in set(counts) - set(np.unique(mesh.facets).tolist()):

@@ -78,7 +78,7 @@ def strained(space: ShallowSpace, cells: np.ndarray, area: np.ndarray, x: np.nda
     return parts
 
 
-def terms(space: ShallowSpace, points: Points, cells: np.ndarray) -> list[Term]:
+def strains_and_motion(space: ShallowSpace, points: Points, cells: np.ndarray) -> list[Term]:
     """Strains and changes of curvature; the deflection moves."""
     X = points.reference
     area = np.stack([1.0 - X[0] - X[1], *X], axis=1)[None]
@@ -86,7 +86,7 @@ def terms(space: ShallowSpace, points: Points, cells: np.ndarray) -> list[Term]:
     return [Term("K", "walls", strained(space, cells, area, points.x[cells])), Term("M", "inertia", moved)]
 
 
-def _domain(body: Subject, fields: tuple[str, ...]) -> Domain:
+def _curved_domain(body: Subject, fields: tuple[str, ...]) -> Domain:
     found = plates.domain(body, ShallowSpace, fields)
     space, rise = found.space, body.section.rise
     space.heights = np.zeros((len(space.origin), plane.QUARTIC))
@@ -100,7 +100,7 @@ def _domain(body: Subject, fields: tuple[str, ...]) -> Domain:
     return found
 
 
-def _hold(body: Subject, domain: Domain) -> Held:
+def _hold_shell(body: Subject, domain: Domain) -> Held:
     rim, space = plates.rim(body, domain, body.kinds), domain.space
     space.ribs = [RibLine.of(rib, body, domain) for rib in body.section.ribs]
     creased = np.unique(np.concatenate([np.zeros(0, int), *(rib.facets.ravel() for rib in space.ribs)]))
@@ -186,7 +186,7 @@ def _errors(system: Any, vectors: np.ndarray, loads: np.ndarray, forced: Any = N
 
 
 SHALLOW = Theory(
-    "shallow", "argyris and quartic", 2, _domain, terms, _hold, _errors, wave=1.8, unknowns=47.0,
+    "shallow", "argyris and quartic", 2, _curved_domain, strains_and_motion, _hold_shell, _errors, wave=1.8, unknowns=47.0,
     fields=("stiffness", "inertia", "walls"), graded=True, compared=True, sharp=plates.is_tiny,
     layered=towards_bends,
 )  # fmt: skip

@@ -14,11 +14,11 @@ def chains(pieces: list[Piece], span: float) -> list[list[int]]:
     ends = np.array([piece.at(np.array([0.0, 1.0])) for piece in pieces]).reshape(-1, 2)
     places = shapely.points(ends)
     one, other = shapely.STRtree(places).query(places, "dwithin", SAME * span)
-    node, before = np.arange(len(ends)), np.full(len(ends), -1)
-    while not np.array_equal(node, before):  # ends at one place get the smallest of their numbers
-        before = node.copy()
-        np.minimum.at(node, one, node[other])
-    node = node.reshape(-1, 2)
+    place, before = np.arange(len(ends)), np.full(len(ends), -1)
+    while not np.array_equal(place, before):  # ends at one place get the smallest of their numbers
+        before = place.copy()
+        np.minimum.at(place, one, place[other])
+    node = place.reshape(-1, 2)
     at: dict[tuple[str, int], list[int]] = {}
     for i, piece in enumerate(pieces):
         for each in node[i].tolist():
