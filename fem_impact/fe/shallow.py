@@ -186,7 +186,7 @@ def _errors(system: Any, vectors: np.ndarray, loads: np.ndarray, forced: Any = N
 
 
 SHALLOW = Theory(
-    "shallow", "argyris and quartic", 2, _curved_domain, strains_and_motion, _hold_shell, _errors, wave=1.8, unknowns=47.0,
-    fields=("stiffness", "inertia", "walls"), graded=True, compared=True, sharp=plates.is_tiny,
+    "shallow", "argyris and quartic", 2, _curved_domain, strains_and_motion, _hold_shell, _errors, wave=1.8,
+    unknowns=47.0, fields=("stiffness", "inertia", "walls"), graded=True, compared=True, sharp=plates.is_tiny,
     layered=towards_bends,
 )  # fmt: skip
