@@ -18,14 +18,13 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from .._base import check
-from .._base.untyped import Sparse
 from ..mesh.meshes import Mesh
 from .corners import towards
-from .section import Beam, Varying, evaluate
+from .section import Beam, Plate, Varying, evaluate
 from .splitting import distance
 from .springs import at_facets
 from .supports import SIDES, cells_of_facets
-from .theory import Domain, Subject, gram, scatter
+from .theory import Frame, gram
 
 CROSSINGS = 2  # [-] rings of triangles around crossings of ribs: as much error as between them
 # [-] longest side at the end of a rib inside, over its width: it acts there like a point, which would turn endlessly
@@ -166,29 +165,27 @@ class RibLine(NamedTuple):
     inertia: np.ndarray  # (n, n_q) [kg/m]
 
     @classmethod
-    def of(cls, rib: Rib, body: Subject, domain: Domain) -> "RibLine":
-        """Where a rib of a plate lies."""
-        facets = sides_on(body.mesh, rib.path)
-        cells = cells_of_facets(facets, domain.space.vertices)[0]
-        area, x, normal = at_facets(domain.space, facets, cells)
-        ds, place = np.linalg.norm(normal, axis=2), domain.frame.places(x)
+    def of(cls, rib: Rib, facets: np.ndarray, section: Plate, space: Any, frame: Frame) -> "RibLine":
+        """Where a rib of a plate lies: on the sides ``facets`` (n, 2)."""
+        cells = cells_of_facets(facets, space.vertices)[0]
+        area, x, normal = at_facets(space, facets, cells)
+        ds, place = np.linalg.norm(normal, axis=2), frame.places(x)
         nx, ny = np.moveaxis(normal / ds[..., None], 2, 0)
         along = np.stack([ny**2, nx**2, -nx * ny], axis=-1)  # for the tangent (-ny, nx)
         twist = np.stack([-nx * ny, nx * ny, 0.5 * (nx**2 - ny**2)], axis=-1)
-        stiffness, inertia = rib.rigidity(place, evaluate("thickness", body.section.thickness, place, "m"))
+        stiffness, inertia = rib.rigidity(place, evaluate("thickness", section.thickness, place, "m"))
         shaped = stiffness.reshape(*ds.shape, 3, 3), inertia.reshape(ds.shape)
         return cls(rib, facets, cells, area, x, ds, along, twist, *shaped)
 
 
 def attached(
-    domain: Domain, dofs: np.ndarray, n_all: int, strained: Callable[..., np.ndarray]
-) -> tuple[Sparse, Sparse]:
-    """Stiffness and mass (n_all, n_all) of the ribs of a plate, on unknowns ``dofs`` (n_local, n_cells).
+    space: Any, frame: Frame, strained: Callable[..., np.ndarray]
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Stiffness and mass (n, n_local, n_local) that the ribs of a plate add to cells, and these cells (n,).
 
     ``strained`` gives strains and negative curvatures (n, n_q, 6, n_local) of cells (n,) at area coordinates and
     places.
     """
-    frame, space = domain.frame, domain.space
     size = np.array([1.0, 1.0 / frame.length, 1.0 / frame.length])
     unit = np.outer(size, size) * frame.length / frame.stiffness
     pairs = []
@@ -199,6 +196,5 @@ def attached(
         value = space.functions(rib.cells, rib.x, (0,))[0][:, :, None]
         stiff = gram(own, unit * rib.stiffness * rib.ds[..., None, None])
         pairs.append((stiff, gram(value, rib.inertia * rib.ds / (frame.inertia * frame.length))))
-    where = np.concatenate([rib.cells for rib in space.ribs])
-    K, M = (scatter(np.concatenate(each), dofs[:, where], n_all) for each in zip(*pairs))
-    return K, M
+    K, M = (np.concatenate(each) for each in zip(*pairs))
+    return K, M, np.concatenate([rib.cells for rib in space.ribs])

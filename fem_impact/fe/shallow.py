@@ -22,6 +22,7 @@ Marguerre (1938), Proc. 5th Int. Congr. Appl. Mech., 93-101; Leissa (1973), Vibr
 """
 
 from collections.abc import Sequence
+from copy import copy
 from typing import Any
 
 import numpy as np
@@ -34,7 +35,7 @@ from .plane import FIRST, LOCAL, SECOND, PlaneSpace
 from .ribs import RibLine
 from .section import evaluate
 from .supports import constrain
-from .theory import Domain, Held, Points, Subject, Term, Theory, blocks, gram, scatter
+from .theory import Domain, Frame, Held, Points, Subject, Term, Theory, blocks, gram, scatter, unknowns_of_cells
 
 # [-] rise of the middle of a side over its chord, over the thickness, above which triangles are divided: bending that
 # does not stretch a curved plate needs displacements beyond quartics there. Ten modes of a cymbal then err by 2e-3
@@ -88,21 +89,26 @@ def strains_and_motion(space: ShallowSpace, points: Points, cells: np.ndarray) -
 
 def _curved_domain(body: Subject, fields: tuple[str, ...]) -> Domain:
     found = plates.domain(body, ShallowSpace, fields)
-    space, rise = found.space, body.section.rise
-    space.heights = np.zeros((len(space.origin), plane.QUARTIC))
-    if rise is not None:
-        local = plane.nodes(space.inner).reshape(-1, 2)
-        heights = check.field("rise", rise, found.frame.places(local), "m") / found.frame.length
-        tilt = np.column_stack([np.ones(len(local)), local])  # it stretches nothing, but would cost digits
-        weight = np.repeat(np.sqrt(found.points.dx.sum(axis=1)), plane.QUARTIC)
-        heights -= tilt @ np.linalg.lstsq(weight[:, None] * tilt, weight * heights, rcond=None)[0]
-        space.heights[:] = heights.reshape(space.heights.shape)
+    found.space.heights = _heights(found.space, body.section, found.frame)
     return found
+
+
+def _heights(space: ShallowSpace, section: Any, frame: Frame) -> np.ndarray:
+    """Rise (n_cells, 15) at the nodes of the plane over the mean plane, in the frame."""
+    local = plane.nodes(space.inner).reshape(-1, 2)
+    if section.rise is None:
+        return np.zeros((len(space.origin), plane.QUARTIC))
+    heights = check.field("rise", section.rise, frame.places(local), "m") / frame.length
+    tilt = np.column_stack([np.ones(len(local)), local])  # it stretches nothing, but would cost digits
+    weight = np.repeat(np.sqrt(np.abs(np.linalg.det(space.jacobian))), plane.QUARTIC)
+    heights -= tilt @ np.linalg.lstsq(weight[:, None] * tilt, weight * heights, rcond=None)[0]
+    return heights.reshape(-1, plane.QUARTIC)
 
 
 def _hold_shell(body: Subject, domain: Domain) -> Held:
     rim, space = plates.rim(body, domain, body.kinds), domain.space
-    space.ribs = [RibLine.of(rib, body, domain) for rib in body.section.ribs]
+    known = body.section, space, domain.frame
+    space.ribs = [RibLine.of(rib, ribs.sides_on(body.mesh, rib.path), *known) for rib in body.section.ribs]
     creased = np.unique(np.concatenate([np.zeros(0, int), *(rib.facets.ravel() for rib in space.ribs)]))
     expand, project, dofs = constrain(rim, space.vertices, *numbering(domain.cells, space.flat), creased)
     n_flat, own = expand.shape[0], plane.numbered(domain.cells)
@@ -111,7 +117,10 @@ def _hold_shell(body: Subject, domain: Domain) -> Held:
     dofs = np.vstack([dofs, n_flat + own.element_dofs, n_flat + own.N + own.element_dofs])
     expand, project = plane.together(expand, loose), plane.together(project, loose.T)
     n_all = expand.shape[0]
-    held = ribs.attached(domain, dofs, n_all, strained) if space.ribs else None
+    held = None
+    if space.ribs:
+        K, M, cells = ribs.attached(space, domain.frame, strained)
+        held = scatter(K, dofs[:, cells], n_all), scatter(M, dofs[:, cells], n_all)
     return Held(expand, project, dofs, plates.springs(body, domain, dofs, n_all), rim, held)
 
 
@@ -172,6 +181,23 @@ def plane_mass(system: Any, vectors: np.ndarray) -> np.ndarray:
     return moved.T @ heavy
 
 
+def energies(system: Any, section: Any, vectors: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Twice the mutual strain energy, and the mutual mass (n, n) of vectors (n_dofs, n), with another section.
+
+    Neither has ribs: of these, the plane is heavy and answers to a change.
+    """
+    space, frame = copy(system.space), system.frame
+    space.heights = _heights(space, section, frame)
+    points, whole = slopes.quadrature(system), unknowns_of_cells(system, vectors)
+    K, M = np.zeros((2, vectors.shape[1], vectors.shape[1]))
+    for cells in blocks(len(points.x)):
+        own, dx = whole[cells][:, None], points.dx[cells]
+        for (_, name, parts), total in zip(strains_and_motion(space, points, cells), (K, M)):
+            field = frame.field(section, name, points.x[cells])
+            total += gram(parts @ own, field * dx.reshape(*dx.shape, *[1] * (field.ndim - 2))).sum(axis=0)
+    return K, M
+
+
 def steepest(system: Any) -> float:
     """The steepest slope [-] of the rise of a shell."""
     space = system.space
@@ -188,5 +214,5 @@ def _errors(system: Any, vectors: np.ndarray, loads: np.ndarray, forced: Any = N
 SHALLOW = Theory(
     "shallow", "argyris and quartic", 2, _curved_domain, strains_and_motion, _hold_shell, _errors, wave=1.8,
     unknowns=47.0, fields=("stiffness", "inertia", "walls"), graded=True, compared=True, sharp=plates.is_tiny,
-    layered=towards_bends,
+    layered=towards_bends, energies=energies,
 )  # fmt: skip

@@ -163,6 +163,9 @@ class Theory:
     # the mesh with triangles that resolve the layers at edges of these supports (n_facets,), or sharp bends, coarser by
     # a factor
     layered: Callable[[Mesh, Any, list[str], float], Mesh] | None = None
+    # twice the mutual strain energy, and the mutual mass (n, n) of vectors (n_dofs, n) of a system if it had another
+    # section, where its terms depend on that
+    energies: Callable[[Any, Any, np.ndarray], tuple[np.ndarray, np.ndarray]] | None = None
 
     @property
     def thick(self) -> bool:

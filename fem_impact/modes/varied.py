@@ -7,6 +7,7 @@ import numpy as np
 from .._base import check
 from .._base.check import SimulationError
 from ..fe.eigenvalues import CLUSTER
+from ..fe.section import Plate
 from ..fe.variation import SectionChange, energy_changes
 from .modal import Modes
 from .shapes import FieldShapes
@@ -30,6 +31,8 @@ def solution(modes: Modes) -> FieldShapes:
         raise SimulationError("no derivative in the section: it needs modes of finite elements, of find_modes")
     if modes.thick and modes.dimension == 2:
         raise SimulationError("no derivative in the section: it is not available for a thick plate; take a thin one")
+    if isinstance(modes.section, Plate) and modes.section.ribs:
+        raise SimulationError("no derivative in the section: it is not available with ribs; compare two blows")
     return modes.shapes
 
 

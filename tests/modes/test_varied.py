@@ -1,5 +1,6 @@
 """What a changed section changes in modes: powers of uniform bodies, and differences of modes found again."""
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -126,3 +127,59 @@ def test_terms_beyond_the_last_add_up_as_a_geometric_series(square):
     last = varied._tail(shapes, [9.0 * term, 3.0 * term, term], np.array([square]))
     assert_allclose(last, 1.0 / (1.0 - square / 3.0), rtol=1e-12)
     assert_allclose(varied._tail(shapes, [0.0 * term, 0.0 * term], np.array([square])), 1.0)
+
+
+def test_a_spherical_panel_follows_its_radius_and_thickness():
+    # sliding edges: omega**2 = D k**4 / (rho h) + E / (rho R**2), with k of the half waves
+    E, nu, rho, sides, at_rest = 70e9, 0.3, 2700.0, (0.4, 0.3), {"radius": -2.0, "thickness": 1e-3}
+
+    def plate(radius, thickness):
+        def rise(points):
+            return 0.5 * ((points - np.array(sides) / 2.0) ** 2).sum(axis=1) / radius
+
+        return fi.Plate(fi.Material(E=E, nu=nu, rho=rho), thickness, rise=rise, in_plane={"boundary": "sliding"})
+
+    modes = fi.find_modes(
+        fi.assemble(fi.mesh.rectangle(*sides), plate(**at_rest), {"boundary": "hinged"}), n_modes=4, tolerance=1e-6
+    )
+    k = np.pi**2 * np.sort([(i / sides[0]) ** 2 + (j / sides[1]) ** 2 for i in range(1, 9) for j in range(1, 9)])[:4]
+    h, R = at_rest["thickness"], at_rest["radius"]
+    per_omega = 1.0 / (2.0 * modes.omega) / (2.0 * np.pi)
+    exact = {
+        "radius": -2.0 * E / (rho * R**3) * per_omega,
+        "thickness": E * h / (6.0 * rho * (1.0 - nu**2)) * k**2 * per_omega,
+    }
+    for name, slopes in exact.items():
+        change = SectionChange.by_differences(
+            name, at_rest[name], lambda value, name=name: plate(**(at_rest | {name: value}))
+        )
+        found = varied.frequency_slopes(modes, change, np.arange(4))
+        assert_allclose(found, slopes, rtol=1e-5)  # the tolerance of the modes, and differences of 1e-6
+
+
+@pytest.mark.slow
+def test_a_blow_on_a_shell_has_slopes_in_its_rise_and_none_by_scaling():
+    plate = fi.Plate(fi.Material(E=70e9, nu=0.3, rho=2700.0), 2e-3)
+
+    def curved(radius):
+        return replace(plate, rise=fi.rise.cap(radius, centre=(0.2, 0.15)))
+
+    def struck(radius, tolerance):
+        system = fi.assemble(fi.mesh.rectangle(0.4, 0.3, size=0.05), curved(radius), {"boundary": "hinged"})
+        modes = fi.find_modes(system, n_modes=30, damping_ratio=0.01)
+        return fi.strike(
+            modes, fi.Striker.rigid(0.02), fi.Contact.hertz(1e6), at=(0.13, 0.1), speed=1.0, tolerance=tolerance,
+            max_impacts=1,
+        )  # fmt: skip
+
+    hit, step = struck(2.0, 1e-6), 1e-3
+    found = hit.gradient("contact_time", "radius", sections={"radius": (2.0, curved)})
+    each = [struck(2.0 + sign * step, 1e-8).contact_time for sign in (1.0, -1.0)]
+    assert found["radius"] == pytest.approx((each[0] - each[1]) / (2.0 * step), rel=1e-3)  # differences err by 1e-4
+    with pytest.raises(fi.SimulationError, match="plate does not scale by powers of its numbers; give"):
+        hit.gradient("contact_time", "section.thickness")
+    ribbed = replace(plate, ribs=(fi.Rib([(0.0, 0.1), (0.4, 0.1)], fi.Beam.circular(plate.material, diameter=5e-3)),))
+    modes = fi.find_modes(fi.assemble(fi.mesh.rectangle(0.4, 0.3), ribbed, {"boundary": "hinged"}), n_modes=3)
+    change = SectionChange.by_differences("thickness", 2e-3, lambda h: replace(ribbed, thickness=h))
+    with pytest.raises(fi.SimulationError, match="not available with ribs; compare two blows"):
+        varied.frequency_slopes(modes, change, np.arange(2))
