@@ -34,7 +34,7 @@ def modes(path: Path, n_modes: int, tolerance: float, repeats: int) -> tuple[flo
     """Processor time [s] of modes, their unknowns, and the largest estimated error of a frequency [-]."""
     target = fi.load_scene(path).built.target
     seconds, found = shared.timed(lambda: target.find(n_modes, tolerance=tolerance), repeats)
-    return seconds, found.shapes.system.n_dofs, float(found.errors.max())
+    return seconds, found.shapes.system.n_dofs, float(found.frequency_error.max())
 
 
 def blow(path: Path, repeats: int) -> tuple[float, fi.Response]:

@@ -78,13 +78,15 @@ def line(row: Row) -> str:
 
 def draw(out: Path) -> None:
     """Modes of the cymbal and of the guitar top with their rise, one picture above the other."""
-    figure, axes = plt.subplots(len(DRAWN), 1, figsize=(10.0, 8.0), layout="constrained")
+    figure, axes = plt.subplots(len(DRAWN), 1, figsize=(10.0, 8.6), layout="constrained")
     for ax, name in zip(axes, DRAWN):
         path = out / f"modes_{name}.png"
         said = fi.pictures.mode_shapes(path, fi.load_scene(EVERYDAY / f"{name}.toml").modes(SHOWN), count=SHOWN)
         if said:
             print(said)
-        ax.imshow(plt.imread(path))
+        picture = plt.imread(path)
+        inked = (picture[..., :3] < 1.0).any(axis=2).any(axis=1).nonzero()[0]
+        ax.imshow(picture[max(0, inked[0] - 20) : inked[-1] + 20])
         ax.set_axis_off()
         path.unlink()
     print(shared.save(out / "flatness.png", figure, dpi=150))

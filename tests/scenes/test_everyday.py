@@ -77,7 +77,7 @@ QUICK = {
     "ball_glass_table": (0.84384, 1),
     "ball_toughened_pane": (0.67987, 3),
     "ball_window_pane": (0.36343, 1),
-    "glockenspiel_brass": (0.19679, 1),
+    "glockenspiel_brass": (0.36238, 1),
     "glockenspiel_plastic": (0.77170, 1),
     "hammer_thick_steel": (0.93611, 1),
     "marimba_bar_on_cords": (0.74806, 1),
