@@ -136,7 +136,7 @@ def test_a_scene_that_is_refused_says_so_in_its_row(tmp_path):
 
 def test_the_blows_of_the_study_are_the_everyday_scenes_and_five_more():
     names = speed.cases()
-    assert len(names) == 29 and "marimba_yarn" in names and "bronze_disk 0.0001" in names
+    assert len(names) == 30 and "marimba_yarn" in names and "bronze_disk 0.0001" in names
 
 
 def test_the_coverage_of_intervals_is_what_the_file_says():

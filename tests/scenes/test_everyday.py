@@ -16,7 +16,7 @@ from fem_impact.scenes import scene, schema
 FOLDER = Path(__file__).parents[2] / "studies" / "scenes" / "everyday"
 NAMES = sorted(path.stem for path in FOLDER.glob("*.toml"))
 FAMILIES = {
-    "ball": 3, "cymbal": 5, "drumhead": 1, "glockenspiel": 2, "guitar": 4, "hammer": 4, "marimba": 3, "panel": 1,
+    "ball": 3, "cymbal": 5, "drumhead": 1, "glockenspiel": 2, "guitar": 4, "hammer": 5, "marimba": 3, "panel": 1,
     "timpano": 1,
 }  # fmt: skip
 
@@ -27,7 +27,7 @@ def text(name):
 
 def test_there_are_scenes_of_nine_kinds():
     kinds = [name.partition("_")[0] for name in NAMES]
-    assert {kind: kinds.count(kind) for kind in kinds} == FAMILIES and len(NAMES) == 24
+    assert {kind: kinds.count(kind) for kind in kinds} == FAMILIES and len(NAMES) == 25
 
 
 @pytest.mark.parametrize("name", NAMES)
@@ -39,17 +39,21 @@ def test_scene_says_where_its_numbers_come_from(name):
     assert re.search(r"\((19|20)\d\d\)|, (19|20)\d\d\)|ASTM B22|EN 572-1", said), said  # and what one does
 
 
-ALIKE = "guitar_fingernail", "guitar_plectrum_celluloid", "guitar_plectrum_nylon", "hammer_car_door"  # bodies alike
+HEAVY = (  # bodies that take seconds to mesh, because of their ribs, or are like others
+    "guitar_fingernail", "guitar_fingertip", "guitar_plectrum_celluloid", "hammer_car_bonnet", "hammer_car_door",
+    "hammer_piano_soundboard",
+)  # fmt: skip
+SAID = "y points down in an SVG file", "are lines for ribs"  # of a drawing, and no slip
 
 
 @pytest.mark.parametrize(
-    "name", [pytest.param(name, marks=pytest.mark.slow) if name in ALIKE else name for name in NAMES]
+    "name", [pytest.param(name, marks=pytest.mark.slow) if name in HEAVY else name for name in NAMES]
 )
 def test_scene_loads_and_strikes_its_body_at_the_tolerance_of_all(name):
     found = scene.load_scene(FOLDER / f"{name}.toml")
     built, at = found.built, np.atleast_1d(np.asarray(found.blow.values["at"], float))
     assert found.title and found.blow.values["tolerance"] == 1e-2
-    slips = [note for note in built.target.assumed if "y points down in an SVG file" not in note]
+    slips = [note for note in built.target.assumed if not any(said in note for said in SAID)]
     assert slips == [] and built.striker.notes == ()  # no slip of a unit
     if built.target.mesh.dimension == 1:
         assert 0.0 <= at[0] <= built.target.mesh.points.max()
@@ -73,10 +77,8 @@ QUICK = {
     "ball_glass_table": (0.84384, 1),
     "ball_toughened_pane": (0.67987, 3),
     "ball_window_pane": (0.36343, 1),
-    "glockenspiel_brass": (0.36219, 1),
+    "glockenspiel_brass": (0.36238, 1),
     "glockenspiel_plastic": (0.77170, 1),
-    "guitar_fingertip": (0.49839, 1),
-    "hammer_concrete_floor": (0.99281, 1),
     "hammer_thick_steel": (0.93611, 1),
     "marimba_bar_on_cords": (0.74806, 1),
     "marimba_rubber": (0.33829, 1),

@@ -42,7 +42,10 @@ def test_the_scene_that_is_not_trusted_names_its_cure(tmp_path):
     assert sum("that took" in note for note in chosen.notes) == 2
 
 
-UNTRUSTED = "ball_toughened_pane", "ball_window_pane", "drumhead_buzz", "timpano_felt"
+UNTRUSTED = (
+    "ball_toughened_pane", "ball_window_pane", "drumhead_buzz", "guitar_fingernail", "guitar_plectrum_celluloid",
+    "timpano_felt",
+)  # fmt: skip
 EVERYDAY = sorted((FOLDER / "everyday").glob("*.toml"))
 
 
