@@ -164,3 +164,10 @@ def test_what_cannot_be_is_refused_by_name():
         fi.assemble(mesh, plate, {"left": "hinged"}, in_plane={"lefty": "held"})
     with pytest.raises(ValueError, match="section must be a Plate for rise"):
         fi.assemble(fi.mesh.line(1.0), fi.Beam.circular(ALUMINIUM, diameter=0.01), rise=fi.rise.cap(2.0))
+
+
+def test_rises_that_jump_are_refused_before_they_take_minutes():
+    plate, mesh = fi.Plate(ALUMINIUM, 2e-3), fi.mesh.rectangle(0.4, 0.3)
+    for rise in (lambda p: 1e-3 * (p[:, 0] > 0.13), lambda p: 1e10 * p[:, 0] ** 2):
+        with pytest.raises(ValueError, match=r"rise must be smoother, or the plate thicker.* round off jumps"):
+            fi.assemble(mesh, plate, {"boundary": "hinged"}, rise=rise)
