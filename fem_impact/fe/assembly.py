@@ -14,7 +14,7 @@ from .corners import Singular, around_corners
 from .euler import EULER
 from .interpolation import Interpolation
 from .kirchhoff import ARGYRIS, MORLEY
-from .ribs import Rib
+from .ribs import Rib, check_apart
 from .section import KINDS, Beam, Elastic, Plate, evaluate
 from .shallow import SHALLOW
 from .shear_beam import TIMOSHENKO
@@ -158,7 +158,10 @@ def usual_theory(section: Any, dimension: int) -> Theory:
 def ribbed(mesh: Mesh, section: Any) -> Mesh:
     """The mesh, of whose triangles sides follow the ribs of a plate."""
     paths = [rib.path for rib in getattr(section, "ribs", ()) if not isinstance(rib.path, str)]
-    return lined(mesh, paths) if paths else mesh
+    if paths:
+        mesh = lined(mesh, paths)
+        check_apart(mesh, [rib for rib in section.ribs if not isinstance(rib.path, str)])
+    return mesh
 
 
 def _assembled(

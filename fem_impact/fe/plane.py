@@ -125,10 +125,11 @@ def held_at(
                 at.setdefault(int(own.element_dofs[local[facet, k], cells[facet]]), []).append((facet, k))
     single = []  # nodes free in one direction only, and that direction
     for node, places in at.items():
-        (x, y), kinds = normal[places[0]], {words[facet] for facet, _ in places}
-        turn = max(abs(x * normal[place][1] - y * normal[place][0]) for place in places)
-        if turn < supports.SMOOTH and kinds in ({"sliding"}, {"across"}):
-            single.append((node, np.array([x, y] if kinds == {"sliding"} else [-y, x])))
+        if not any(words[facet] == "held" for facet, _ in places):  # the direction that each facet leaves free
+            left = [normal[p] if words[p[0]] == "sliding" else np.array([-normal[p][1], normal[p][0]]) for p in places]
+            (x, y), turn = left[0], max(abs(left[0][0] * b - left[0][1] * a) for a, b in left)
+            if turn < supports.SMOOTH:  # edges that meet may leave the same one, as one slides and one is held across
+                single.append((node, np.array([x, y])))
     n, free = own.N, np.setdiff1d(np.arange(own.N), list(at))
     rows = np.concatenate([free, free + n, *[[node, node + n] for node, _ in single]]).astype(int)
     columns = np.concatenate([np.arange(2 * len(free)), np.repeat(2 * len(free) + np.arange(len(single)), 2)])

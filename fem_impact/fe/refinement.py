@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 from scipy.linalg import eigh
+from scipy.ndimage import maximum_filter1d
 from scipy.optimize import brentq
 
 from .._base import check, identity
@@ -14,7 +15,7 @@ from .._base import kept as keeping
 from .._base.rounding import EPSILON, SAME
 from ..mesh import mesh_files
 from ..mesh.meshes import MOST_CELLS, Mesh
-from . import plausible, shallow
+from . import plausible, ribs, shallow
 from .assembly import BY_ELEMENT, assemble, reassemble
 from .corners import SAY
 from .eigenvalues import BLOCK, FIRST_SLICE, RESIDUAL, STRICT, Flexibility, by_slices, count_below, lowest
@@ -24,6 +25,10 @@ from .system import System
 
 # [-] ratio of element sizes whose frequencies are compared, and order: less than half the unknowns, errors times five
 COARSER, COMPARED = 1.5, 4.0
+# [-] modes in a row of waves much alike, whose largest error each is stated to have: two meshes may agree by chance
+ALIKE = 5
+# [-] the order assumed if ribs end inside or cross, where stresses in the plane are singular; measured: 1 to 2
+RIBBED = 1.5
 # [-] the same ratio where triangles are halved, at the blow and where a plate is curved: one halving more
 FLATTER = 2.0
 ERROR_OF_WAVE = (8e-7, 3.3)  # [-] a smooth frequency's error is at most 8e-7 (kh)**8, growing slower above kh = 3.3
@@ -177,7 +182,7 @@ def _claimed(system: System, omega: np.ndarray, vectors: np.ndarray) -> np.ndarr
     values, vectors = (omega[flexible] / system.frame.rate) ** 2, vectors[:, flexible]
     parts[:3, flexible] = CLAIMED * 0.5 * system.rules.errors(system, vectors, vectors * values) / values
     if system.rules.compared:
-        parts[0, flexible] += (_compared(system, omega) / omega.clip(np.finfo(float).tiny))[flexible]
+        parts[0, flexible] += maximum_filter1d(_compared(system, omega)[flexible] / omega[flexible], ALIKE)
     vectors, squares = Flexibility.of(system).bent(vectors)[0], system.K.multiply(system.K)
     rounding = 0.5 * np.finfo(float).eps * np.sqrt(np.einsum("ij,ij->j", vectors**2, squares @ vectors**2)) / values
     corners = _missed_at_corners(system, vectors, values)
@@ -222,7 +227,8 @@ def _compared(system: System, omega: np.ndarray) -> np.ndarray:
     if bent:  # the rise divides triangles, too
         ratio = (len(body.space.origin) / len(system.space.origin)) ** 0.5
     again = _pairs(body, n_modes, None)[1]
-    return np.abs(again - omega) / np.abs(ratio**-COMPARED - 1.0)
+    order = RIBBED if ribs.singular(system.mesh, getattr(system.section, "ribs", ()))[0] else COMPARED
+    return np.abs(again - omega) / np.abs(ratio**-order - 1.0)
 
 
 def _counted(system: System, flexibility: Flexibility, n: int, limit: float | None) -> tuple[np.ndarray, np.ndarray]:

@@ -29,6 +29,8 @@ from .theory import Frame, gram
 CROSSINGS = 2  # [-] rings of triangles around crossings of ribs: as much error as between them
 # [-] longest side at the end of a rib inside, over its width: it acts there like a point, which would turn endlessly
 END = 2.0
+# [-] least height of triangles on ribs, over the extent: up to 2.5e-4 they lost the digits of K, at 2.5e-3 they did not
+FINEST = 3e-4
 ON = 1e-8  # [-] of the extent: vertices of a mesh nearer to a path lie on it; the mesher leaves 1e-12
 
 
@@ -129,8 +131,24 @@ def sides_on(mesh: Mesh, path: Any) -> np.ndarray:
     return sides[on]
 
 
-def around_ends(mesh: Mesh, ribs: Sequence[Rib]) -> Mesh:
-    """The mesh with rings of triangles that shrink to ends and crossings of ribs inside the plate."""
+def check_apart(mesh: Mesh, ribs: Sequence[Rib]) -> None:
+    """Raise ValueError if a rib makes triangles so small that the digits of the stiffness are lost."""
+    extent = float(np.ptp(mesh.points, axis=0).max())
+    for rib in ribs:
+        on = np.isin(mesh.cells, sides_on(mesh, rib.path)).any(axis=1)
+        corner = mesh.points[mesh.cells[on]]
+        side = np.roll(corner, -1, axis=1) - corner
+        twice = np.abs(side[:, 0, 0] * side[:, 1, 1] - side[:, 0, 1] * side[:, 1, 0])
+        least = float((twice / np.linalg.norm(side, axis=2).max(axis=1)).min())  # height of a triangle
+        if least < FINEST * extent:
+            raise ValueError(
+                f"path of a rib must lie on edges, ribs and its own points or {FINEST:g} of the plate's size away from "
+                f"them, got {least:.2g} m beside {extent:.3g} m; move its points"
+            )
+
+
+def singular(mesh: Mesh, ribs: Sequence[Rib]) -> tuple[dict[int, list[int]], dict[int, float]]:
+    """Vertices inside a plate where ribs end or cross, with how many sides each has there, and widths [m]."""
     counts: dict[int, list[int]] = {}
     width: dict[int, float] = {}
     for rib in ribs:
@@ -139,14 +157,18 @@ def around_ends(mesh: Mesh, ribs: Sequence[Rib]) -> Mesh:
                 counts.setdefault(int(vertex), []).append(int(count))
                 place = rib.distances(mesh.points[[vertex]])
                 width[int(vertex)] = float(evaluate("width", rib.section.width, place, "m")[0])
-    rings = {}
-    for vertex in set(counts) - set(np.unique(mesh.facets).tolist()):
+    rim = set(np.unique(mesh.facets).tolist())
+    return {vertex: each for vertex, each in counts.items() if each != [2] and vertex not in rim}, width
+
+
+def around_ends(mesh: Mesh, ribs: Sequence[Rib]) -> Mesh:
+    """The mesh with rings of triangles that shrink to ends and crossings of ribs inside the plate."""
+    rings, (counts, width) = {}, singular(mesh, ribs)
+    for vertex in counts:
         around = mesh.points[mesh.cells[(mesh.cells == vertex).any(axis=1)]]
         longest = float(np.linalg.norm(around - mesh.points[vertex], axis=2).max())
-        if 1 in counts[vertex]:
-            rings[vertex] = max(0, int(np.ceil(np.log2(longest / (END * width[vertex])))))
-        elif counts[vertex] != [2]:
-            rings[vertex] = CROSSINGS
+        ends = max(0, int(np.ceil(np.log2(longest / (END * width[vertex])))))
+        rings[vertex] = ends if 1 in counts[vertex] else CROSSINGS
     return towards(mesh, {vertex: number for vertex, number in rings.items() if number})
 
 

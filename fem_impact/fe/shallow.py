@@ -42,7 +42,7 @@ from .theory import Domain, Frame, Held, Points, Subject, Term, Theory, blocks, 
 SAG = 0.5
 # [-] the same of what the rise differs from a quartic along a side: where its curvature jumps
 KINK = 0.005
-MOST_BENT = 20_000  # [-] triangles after which none is divided for its sag, as beside a kink of the rise
+MOST_BENT = 20_000  # [-] triangles from which on a rise is refused, as one that jumps, and finer meshes divide no more
 
 
 class ShallowSpace(PlaneSpace):
@@ -141,8 +141,14 @@ def towards_bends(mesh: Mesh, section: Any, kinds: list[str], coarser: float) ->
         least = evaluate("thickness", section.thickness, corner.mean(axis=1), "m") * coarser**2
         uneven = (sag > SAG * least) | (kink > KINK * least)
         if not uneven.any():
-            break
+            return mesh
         mesh = splitting.divided_across(mesh, uneven)[0]
+    if section.rise is not None and coarser >= 1.0:
+        where = ", ".join(f"{x:.3g}" for x in corner.mean(axis=1)[uneven][0])
+        raise ValueError(
+            f"rise must be smoother, or the plate thicker: triangles that follow it are more than {MOST_BENT}, as at "
+            f"({where}) m; round off jumps and kinks, and check the unit"
+        )
     return mesh
 
 

@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import references_shells as reference
+from references_panels import Order, Panel, levy_omegas
 
 import fem_impact as fi
 
@@ -118,6 +119,26 @@ def test_edges_held_in_the_plane_stiffen_a_cap_and_free_ones_do_not():
     assert first["free"] < first["sliding"] < 0.9 * first["held"]
 
 
+@pytest.mark.parametrize("edge", ["across", "free"])
+def test_edges_that_slide_meet_others_at_corners(edge):
+    """A corner that both edges leave free in one direction is free there: pinned, modes would be higher by 2 %."""
+    thickness, curvature = 1e-3, (0.5, -0.3)
+    edges = (("hinged", "sliding"),) * 2 + (("hinged", edge),) * 2
+    body = Panel(SIDES, reference.isotropic(E, NU, thickness), RHO * thickness, edges)
+    rows = levy_omegas(body, 4, Order(2, 14), curvature)
+
+    def rise(points):
+        return 0.5 * (points - np.array(SIDES) / 2.0) ** 2 @ np.array(curvature)
+
+    words = {"left": "sliding", "right": "sliding", "bottom": edge, "top": edge}
+    system = fi.assemble(
+        fi.mesh.rectangle(*SIDES), fi.Plate(ALUMINIUM, thickness), {"boundary": "hinged"}, rise=rise, in_plane=words
+    )
+    found = fi.find_modes(system, n_modes=4, tolerance=1e-4)
+    error = np.abs(found.omega / np.array([row[0] for row in rows]) - 1.0)
+    assert (error < np.maximum(found.frequency_error, 1e-7)).all()  # 1e-7: what the second mesh cannot tell
+
+
 @pytest.mark.slow
 def test_the_compliance_is_that_of_all_modes():
     system = panel(2e-3, (-0.5, -0.5), size=0.03)
@@ -148,3 +169,10 @@ def test_what_cannot_be_is_refused_by_name():
         fi.find_modes(bare, n_modes=4)
     with pytest.raises(ValueError, match="section must be a Plate for rise"):
         fi.assemble(fi.mesh.line(1.0), fi.Beam.circular(ALUMINIUM, diameter=0.01), rise=fi.rise.cap(2.0))
+
+
+def test_rises_that_jump_are_refused_before_they_take_minutes():
+    plate, mesh = fi.Plate(ALUMINIUM, 2e-3), fi.mesh.rectangle(0.4, 0.3)
+    for rise in (lambda p: 1e-3 * (p[:, 0] > 0.13), lambda p: 1e10 * p[:, 0] ** 2):
+        with pytest.raises(ValueError, match=r"rise must be smoother, or the plate thicker.* round off jumps"):
+            fi.assemble(mesh, plate, {"boundary": "hinged"}, rise=rise)
