@@ -27,8 +27,8 @@ from .system import System
 COARSER, COMPARED = 1.5, 4.0
 # [-] modes in a row of waves much alike, whose largest error each is stated to have: two meshes may agree by chance
 ALIKE = 5
-# [-] the order assumed if ribs end inside or cross, where stresses in the plane are singular; measured: 1 to 2
-RIBBED = 1.5
+# [-] the order assumed if ribs end inside, where stresses in the plane are singular; measured: 1 to 2
+ENDING = 1.5
 # [-] the same ratio where triangles are halved, at the blow and where a plate is curved: one halving more
 FLATTER = 2.0
 ERROR_OF_WAVE = (8e-7, 3.3)  # [-] a smooth frequency's error is at most 8e-7 (kh)**8, growing slower above kh = 3.3
@@ -227,7 +227,8 @@ def _compared(system: System, omega: np.ndarray) -> np.ndarray:
     if bent:  # the rise divides triangles, too
         ratio = (len(body.space.origin) / len(system.space.origin)) ** 0.5
     again = _pairs(body, n_modes, None)[1]
-    order = RIBBED if ribs.singular(system.mesh, getattr(system.section, "ribs", ()))[0] else COMPARED
+    ends = ribs.singular(system.mesh, getattr(system.section, "ribs", ()))[0].values()
+    order = ENDING if any(1 in each for each in ends) else COMPARED
     return np.abs(again - omega) / np.abs(ratio**-order - 1.0)
 
 

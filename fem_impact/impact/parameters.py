@@ -195,8 +195,8 @@ class Parameters(check.Brief):
             return "section and material of the target are not known"
         if target.thick or target.air:
             return "a thick target, or one in air, does not scale by powers of its numbers"
-        if isinstance(section, Plate) and (section.rise or section.ribs or section.layers):
-            return "a curved, ribbed or layered plate does not scale by powers of its numbers; give sections"
+        if isinstance(section, Plate) and not section.plain:
+            return "a curved, ribbed or unevenly layered plate does not scale by powers of its numbers; give sections"
         if isinstance(section, Plate) and (section.tension or section.material.E_across is not None):
             return "the effect of E cannot be separated from that of tension or grain; rescale modes instead"
         held = () if system is None else system.supports.values()
