@@ -58,6 +58,9 @@ MARGIN = 0.6
 ORDERS = 7.5, 5.0, 1.0
 # [-] smallest ratio of element sizes between two meshes: a tenth more triangles; with less the mesh may not change
 LEAST_STEP = 1.05
+# [-] the same where a plate is curved or ribbed, whose estimates scatter by a factor of two or three from mesh to mesh;
+# for the same reason two meshes tell nothing of more of them
+BENT_STEP = 1.2
 # [-] meshes tried to meet a tolerance, each finer: where eight do not suffice, rounding or corners hold the error
 MOST_MESHES = 8
 # [-] unknowns foretold from the rate at which errors fell, over those allowed, from which on nobody waits for more
@@ -353,22 +356,23 @@ def refine(system: System, n_modes: int | None, max_frequency: float | None, tol
         )
     found, size = solve_on_mesh(_start(system, n_modes, max_frequency, tolerance), n_modes, max_frequency), np.inf
     seen: list[tuple[float, float]] = []
+    bent = found.system.rules.compared and not found.system.rules.thick
     for left in reversed(range(MOST_MESHES + 1)):
         if float(found.error.max()) <= tolerance:
             return found
         mesh = found.system.mesh
-        step = _needed(found.parts, MARGIN * tolerance)
+        step = max(_needed(found.parts, MARGIN * tolerance), BENT_STEP if bent else 0.0)
         seen.append((mesh.size, float(found.error.max())))
         if (
             not left
-            or found.system.n_dofs * _foreseen(seen, tolerance) ** mesh.dimension > BEYOND * MOST_UNKNOWNS
+            or found.system.n_dofs * _foreseen(seen[2 * bent :], tolerance) ** mesh.dimension > BEYOND * MOST_UNKNOWNS
             or not step < np.inf
             or found.system.n_dofs * step**mesh.dimension > MOST_UNKNOWNS
             or mesh.size >= size
         ):
             break
         size = mesh.size
-        closer = step if found.system.rules.thick else max(step, FLATTER**0.5)  # halves some triangles
+        closer = max(step, FLATTER**0.5) if bent else step  # halves some triangles
         finer = reassemble(system, mesh.refined(step), layer=found.system.layer / closer)
         found = solve_on_mesh(finer, n_modes, max_frequency)
     mode = int(found.error.argmax())

@@ -26,7 +26,7 @@ from .springs import at_facets
 from .supports import SIDES, cells_of_facets
 from .theory import Frame, gram
 
-CROSSINGS = 2  # [-] rings of triangles around crossings of ribs: as much error as between them
+CROSSINGS = 3  # [-] rings of triangles around crossings of ribs: as much error as between them
 # [-] longest side at the end of a rib inside, over its width: it acts there like a point, which would turn endlessly
 END = 2.0
 # [-] least height of triangles on ribs, over the extent: up to 2.5e-4 they lost the digits of K, at 2.5e-3 they did not
