@@ -84,7 +84,7 @@ def test_the_plan_counts_the_unknowns_and_vectors_that_its_run_has(name, meshes,
     fi.load_scene(next(SCENES.rglob(f"{name}.toml"))).plan()
     unknowns, first, lasts = counted[0]
     assert_allclose(unknowns, meshes, rtol=0.02)  # 1 %, and what splitting at ribs adds
-    assert vectors / 1.4**2 <= cost.grown(first, lasts) <= 1.7 * vectors
+    assert vectors / 2.0 <= cost.grown(first, lasts) <= 1.7 * vectors  # two steps of growth, rounded
 
 
 @pytest.mark.slow
