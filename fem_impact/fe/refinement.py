@@ -292,7 +292,7 @@ def heavier(system: System, values: np.ndarray, vectors: np.ndarray) -> tuple[np
     """
     if not (isinstance(system.section, Plate) and system.section.ribs and len(values)):
         return values, None
-    more, soft = shallow.plane_mass(system, vectors), values**-0.5
+    more, soft = vectors.T @ shallow.plane_mass(system, vectors), values**-0.5
     size, turn = eigh(soft[:, None] * (np.eye(len(values)) + 0.5 * (more + more.T)) * soft)
     return 1.0 / size[::-1], (soft[:, None] * turn / np.sqrt(size))[:, ::-1]
 

@@ -23,6 +23,7 @@ Marguerre (1938), Proc. 5th Int. Congr. Appl. Mech., 93-101; Leissa (1973), Vibr
 
 from collections.abc import Sequence
 from copy import copy
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -153,7 +154,7 @@ def towards_bends(mesh: Mesh, section: Any, kinds: list[str], coarser: float) ->
 
 
 def plane_mass(system: Any, vectors: np.ndarray) -> np.ndarray:
-    """Mutual mass (n, n) of what moves besides the deflection in vectors (n_dofs, n), in the frame.
+    """What moves besides the deflection in vectors (n_dofs, n), times its mass (n_dofs, n), in the frame.
 
     It is that of the displacements in the plane, of ribs at the height of their centroids and as they turn, and of what
     the slope of the rise makes the surface larger.
@@ -182,18 +183,21 @@ def plane_mass(system: Any, vectors: np.ndarray) -> np.ndarray:
     moved = system.expand @ vectors
     heavy = whole @ moved
     if space.drifts.size:  # a free body stays where it is in its plane
-        lost = space.drifts.T @ heavy
-        return moved.T @ heavy - lost.T @ np.linalg.solve(space.drifts.T @ (whole @ space.drifts), lost)
-    return moved.T @ heavy
+        drifting = whole @ space.drifts
+        heavy -= drifting @ np.linalg.solve(space.drifts.T @ drifting, space.drifts.T @ heavy)
+    return system.expand.T @ heavy
 
 
 def energies(system: Any, section: Any, vectors: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Twice the mutual strain energy, and the mutual mass (n, n) of vectors (n_dofs, n), with another section.
 
-    Neither has ribs: of these, the plane is heavy and answers to a change.
+    Its ribs, if any, lie where those of the system do.
     """
     space, frame = copy(system.space), system.frame
+    if len(section.ribs) != len(space.ribs):
+        raise ValueError(f"a section must keep the {len(space.ribs)} ribs of the body, got {len(section.ribs)}")
     space.heights = _heights(space, section, frame)
+    space.ribs = [RibLine.of(rib, line.facets, section, space, frame) for rib, line in zip(section.ribs, space.ribs)]
     points, whole = slopes.quadrature(system), unknowns_of_cells(system, vectors)
     K, M = np.zeros((2, vectors.shape[1], vectors.shape[1]))
     for cells in blocks(len(points.x)):
@@ -201,6 +205,11 @@ def energies(system: Any, section: Any, vectors: np.ndarray) -> tuple[np.ndarray
         for (_, name, parts), total in zip(strains_and_motion(space, points, cells), (K, M)):
             field = frame.field(section, name, points.x[cells])
             total += gram(parts @ own, field * dx.reshape(*dx.shape, *[1] * (field.ndim - 2))).sum(axis=0)
+    if space.ribs:
+        *each, cells = ribs.attached(space, frame, strained)
+        for part, total in zip(each, (K, M)):
+            total += np.einsum("nki,nkl,nlj->ij", whole[cells], part, whole[cells], optimize=True)
+        M += vectors.T @ plane_mass(replace(system, space=space, section=section), vectors)
     return K, M
 
 

@@ -50,7 +50,7 @@ def _drop(struck: Struck, system: Any, shapes: FieldShapes | RitzShapes) -> np.n
         vectors = shapes.vectors[:, modes.n_rigid : modes.n_rigid + n]
     else:
         vectors = shapes.basis.T @ shapes.turn[:, :n]
-    found = np.diag(shallow.plane_mass(system, vectors))  # of a whole mass of one
+    found = np.einsum("ij,ij->j", vectors, shallow.plane_mass(system, vectors))  # of a whole mass of one
     every = np.full(modes.n_modes, np.median(found[-max(1, n // 4) :]))
     every[: modes.n_rigid], every[modes.n_rigid : modes.n_rigid + n] = 0.0, found
     return every

@@ -1,6 +1,7 @@
 """What a small change of a body's section changes in its modes: frequencies, shapes at a point, and its compliance."""
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -8,6 +9,7 @@ from .._base import check
 from .._base.check import SimulationError
 from ..fe.eigenvalues import CLUSTER
 from ..fe.section import Plate
+from ..fe.shallow import plane_mass
 from ..fe.variation import SectionChange, energy_changes
 from .modal import Modes
 from .shapes import FieldShapes
@@ -31,8 +33,6 @@ def solution(modes: Modes) -> FieldShapes:
         raise SimulationError("no derivative in the section: it needs modes of finite elements, of find_modes")
     if modes.thick and modes.dimension == 2:
         raise SimulationError("no derivative in the section: it is not available for a thick plate; take a thin one")
-    if isinstance(modes.section, Plate) and modes.section.ribs:
-        raise SimulationError("no derivative in the section: it is not available with ribs; compare two blows")
     return modes.shapes
 
 
@@ -46,7 +46,7 @@ def frequency_slopes(modes: Modes, change: SectionChange, which: np.ndarray) -> 
     rate = shapes.system.frame.rate
     groups = [np.flatnonzero(_alike(modes)[i]) for i in which]
     used = np.unique(np.concatenate(groups)) if len(groups) else np.zeros(0, int)
-    stiffer, heavier = energy_changes(shapes.system, change, shapes.vectors[:, used])
+    stiffer, heavier = _changes(shapes, change, used, [])
     found = np.zeros(len(which))
     for k, (i, group) in enumerate(zip(which, groups)):
         own = np.searchsorted(used, group)
@@ -70,7 +70,7 @@ def _alike(modes: Modes) -> np.ndarray:
 
 
 def changed_modes(modes: Modes, change: SectionChange, at: np.ndarray) -> ModesChange:
-    """Changes of modes as seen from a point ``at`` (dimension,) [m], exact but for the elements.
+    """Changes of modes as seen from a point ``at`` (dimension,) [m], exact but for the elements and the plane of ribs.
 
     Modes that share a frequency are changed together: only what the point sees of them counts, and that is smooth.
     """
@@ -81,7 +81,7 @@ def changed_modes(modes: Modes, change: SectionChange, at: np.ndarray) -> ModesC
     seen = (load.T @ shapes.vectors)[0]  # (n_modes,) in the frame
     square = (modes.omega / frame.rate) ** 2
     rest = _left_out(shapes, seen, square, load)
-    stiffer, heavier = energy_changes(system, change, np.column_stack([shapes.vectors, *rest]))
+    stiffer, heavier = _changes(shapes, change, np.arange(n), rest)
     force = stiffer[:, :n] - heavier[:, :n] * square  # (n + TERMS, n) what a change of each mode is pushed with
     slope = np.diag(force[:n]).copy()  # of the eigenvalues
     apart, alike = square - square[:, None], _alike(modes)
@@ -100,6 +100,26 @@ def changed_modes(modes: Modes, change: SectionChange, at: np.ndarray) -> ModesC
     return ModesChange(omega, shape * frame.mass**-0.5, _softer(shapes, change, at))
 
 
+def _changes(shapes: FieldShapes, change: SectionChange, which: np.ndarray, rest: Any) -> tuple[np.ndarray, np.ndarray]:
+    """Changes of the energies of some modes and of vectors after them, as `energy_changes`.
+
+    The modes of a ribbed plate are combinations of those without the mass in its plane. A change takes them to modes
+    left out of these, most of all to what moves in the plane only, whose mass then moves with them. Slopes of the lower
+    half of the modes then err by less than 2e-3, of the highest by 2e-2.
+    """
+    system, kept, n = shapes.system, shapes.vectors, len(which)
+    if not (isinstance(system.section, Plate) and system.section.ribs):
+        return energy_changes(system, change, np.column_stack([kept[:, which], *rest]))
+    square = np.einsum("ij,ij->j", kept, system.K @ kept)
+    heavy, flexible = plane_mass(system, kept[:, which]), square > CLUSTER * square.max()
+    own = kept[:, flexible]
+    drawn = shapes.flexibility.solve(heavy) - own @ ((own.T @ heavy) / square[flexible, None])
+    stiffer, heavier = energy_changes(system, change, np.column_stack([kept[:, which], *rest, drawn]))
+    moved = stiffer[-n:, :n] - heavier[-n:, :n] * square[which]
+    heavier[:n, :n] -= moved + moved.T
+    return stiffer[:-n, :-n], heavier[:-n, :-n]
+
+
 def _left_out(shapes: FieldShapes, seen: np.ndarray, square: np.ndarray, load: np.ndarray) -> list[np.ndarray]:
     """Vectors r_k (n_dofs,): the sum over all modes left out of their shape at the load over square**(k+1), times them.
 
@@ -108,10 +128,11 @@ def _left_out(shapes: FieldShapes, seen: np.ndarray, square: np.ndarray, load: n
     flexible = square > 0.0
     M = shapes.system.M
     kept = shapes.vectors
+    light = M @ kept
     found = [shapes.flexibility.solve(load)[:, 0] - kept[:, flexible] @ (seen[flexible] / square[flexible])]
     for _ in range(TERMS - 1):
         heavy = M @ found[-1]
-        heavy -= M @ (kept @ (kept.T @ heavy))  # rounding of the kept modes would grow
+        heavy -= light @ np.linalg.solve(kept.T @ light, kept.T @ heavy)  # rounding of the kept modes would grow
         found.append(shapes.flexibility.solve(heavy[:, None])[:, 0])
     return found
 
