@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import references_shells as reference
-from references_panels import Order, Panel, levy_omegas
+from references_panels import BLADE, Order, Panel, levy_omegas
 
 import fem_impact as fi
 
@@ -55,6 +55,19 @@ def test_panels_on_shear_diaphragms_are_those_of_the_closed_form(thickness, curv
     error = np.abs(found.frequencies / exact(thickness, curvature, 10) - 1.0)
     assert error.max() < 1e-5
     assert (error < np.maximum(found.frequency_error, 1e-7)).all()  # 1e-7: what the second mesh cannot tell
+
+
+def test_the_clamped_cylindrical_panel_of_the_literature():
+    """Petyt (1971), J. Sound Vib. 15, 381-395: 870, 958, 1288, 1364 and 1440 Hz, in whole numbers; ours are Ritz's."""
+
+    def rise(points):
+        return -0.5 * (points[:, 1] - 0.0508) ** 2 / 0.762
+
+    body = fi.Plate(fi.Material(E=6.8948e10, nu=0.33, rho=2657.0), 3.302e-4)
+    system = fi.assemble(fi.mesh.rectangle(0.0762, 0.1016), body, {"boundary": "clamped"}, rise=rise)
+    found = fi.find_modes(system, n_modes=5, tolerance=1e-5)
+    np.testing.assert_allclose(found.frequencies, [870.0, 958.0, 1288.0, 1364.0, 1440.0], atol=0.5)
+    np.testing.assert_allclose(found.frequencies, BLADE[:5], rtol=1e-5)  # the tolerance
 
 
 def test_coarse_meshes_of_deep_thin_panels_state_their_error():
