@@ -69,7 +69,8 @@ class Plate:
         if not callable(self.thickness):
             check.settle(self, thickness=check.positive("thickness", self.thickness, "m"))
         check.settle(self, tension=check.non_negative("tension", self.tension, "N/m"))
-        layers = check.several("layers", self.layers, layering.Layer) if self.layers else ()
+        bare = isinstance(self.layers, Sequence) and not len(self.layers)
+        layers = () if bare else check.several("layers", self.layers, layering.Layer)
         if layers and self.material != layering.together(layers):
             raise ValueError("material must be that of the layers; make a plate of layers by Plate.laminate")
         if layers and self.thickness != sum(layer.thickness for layer in layers):

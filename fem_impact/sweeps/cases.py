@@ -28,7 +28,7 @@ LAYERS: dict[str, tuple[str, str]] = {  # name: unit, what it is
     "restitution": ("", "minus the speed after the blow over the speed before, at the contact point; NaN in contact"),
     "impulse": ("N s", "total impulse of the contact force"),
     "peak_force": ("N", "largest contact force"),
-    "error": ("", "estimated time-step error: absolute for restitution, relative for the others"),
+    "error": ("", "estimated time-step error, of chaos all of it: absolute for restitution, relative for the others"),
     "centroid": ("Hz", "mean frequency, weighted by the magnitude of the force spectrum"),
 }
 POWERS = {"contact_time": -1.0, "impulse": 1.0, "peak_force": 2.0, "centroid": 1.0}  # of a unit of time, see `Cases`
@@ -107,8 +107,9 @@ class Cases:
         return case.blow(tolerance=self.tolerance, residual=self.residual, max_impacts=self.max_impacts)
 
     def row(self, hit: Response) -> np.ndarray:
-        """The layers (n_layers,) of one blow."""
-        row = [hit.n_impacts, hit.contact_time, hit.restitution, hit.impulse, hit.peak_force, hit.error.step]
+        """The layers (n_layers,) of one blow; one that misses its tolerance, as a chaotic one, has its whole error."""
+        error = hit.error.step if hit.tolerance_met else hit.error.total
+        row = [hit.n_impacts, hit.contact_time, hit.restitution, hit.impulse, hit.peak_force, error]
         row += [hit.spectral_centroid(self.band)] if self.band is not None else []
         return np.array(row + [function(hit) for function in self.extra.values()], float)
 

@@ -9,6 +9,7 @@ from scipy.optimize import brentq
 from scipy.special import sici
 
 import fem_impact as fi
+from fem_impact.fe import membrane
 from fem_impact.model import bending, curved
 from fem_impact.model.deflection import FRONT, LIMIT, RINGING, SLIPS, _bends, _crude, _held_back, _tension, _within
 from fem_impact.modes.stretching import Stretching
@@ -330,10 +331,27 @@ def test_effect_on_curved_and_ribbed_bodies_is_that_of_a_blow_with_stretching(na
     told = found(plain)
     # flat ones by a mean tension, others by their stretching in the steps of a first run
     allowed = 3.0 if name.startswith("flat") else 1.1
-    assert true > 1e-3 and true / allowed < told.worst < allowed * true, (true, told.worst, told.value)
-    # of a free cymbal, 18 stress fields lack a third of it (64 for comparison), and half of them most
-    share = 1.0 if name == "cymbal, free" else 0.5
-    assert found(better).known and found(better).worst < share * told.worst and better.energy_error < 1e-12
+    assert true > 3e-4 and true / allowed < told.worst < allowed * true, (true, told.worst, told.value)
+    assert found(better).known and better.energy_error < 1e-12
+    if name != "cymbal, free":  # of which 18 stress fields lack half of the effect
+        assert found(better).worst < 0.5 * told.worst
+
+
+@pytest.mark.slow
+@pytest.mark.xdist_group("stretched")
+def test_too_few_stress_fields_of_a_free_cymbal_are_said(monkeypatch):
+    """Twice as many and more change the restitution no further than is told."""
+    body, speed = BODIES["cymbal, free"]
+    how = {"at": (0.14, 0.09), "speed": speed, "residual": False, "max_impacts": 1, "tolerance": 1e-4}
+
+    def struck():
+        return fi.strike(body(), fi.Striker.rigid(0.05), fi.Contact.linear(1e5), stretching=True, **how)
+
+    usual = struck()
+    monkeypatch.setattr(membrane, "MOST", 64)
+    monkeypatch.setattr(membrane, "WORK", 1600 * 64)
+    apart = abs(struck().restitution - usual.restitution)
+    assert 1e-4 < apart < found(usual).worst < 5.0 * apart
 
 
 @pytest.mark.slow

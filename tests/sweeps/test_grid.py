@@ -275,11 +275,12 @@ def test_cells_on_finite_element_modes_are_single_strikes(body, exponent):
         try:
             hit = fi.strike(modes, striker, spring, at=at, speed=1.0, tolerance=tolerance)
         except fi.SimulationError as error:
-            assert "the step error stays" in str(error) and str(cell.failure.values)
+            assert "the step error stays" in str(error) and (str(cell.failure.values) or not cell.tolerance_met)
             continue
-        if str(cell.failure.values):  # chatter whose digits are lost; the strike says so too
-            assert hit.error.total > 100.0 * tolerance
+        if hit.error.total > 100.0 * tolerance:  # chatter whose small errors grow; the cell says so too
+            assert not cell.tolerance_met
             continue
+        assert not str(cell.failure.values)
         assert int(cell.n_impacts) == hit.n_impacts
         layers = ("contact_time", "peak_force", "impulse")
         relative = [float(cell[layer]) / getattr(hit, layer) - 1.0 for layer in layers]
