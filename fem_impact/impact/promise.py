@@ -72,7 +72,9 @@ def remedy(hit: "Response") -> str:
     advice: list[str] = []
     if error.truncation > allowed or not error.resolvable:
         loose = [name for name, missing in _unstated(hit) if "free" in missing]
-        advice += [f"make {name} with free = True or False, as it is" for name in loose] or _more_modes(hit)
+        dented = any("dent" in missing for _, missing in _unstated(hit))
+        more = [] if dented else _more_modes(hit)
+        advice += [f"make {name} with free = True or False, as it is" for name in loose] or more
         advice += [
             f"{ADVICE[each]} of {name}" for name, missing in _unstated(hit) for each in ADVICE if each in missing
         ]
@@ -124,7 +126,7 @@ def _unstated(hit: "Response") -> list[tuple[str, tuple[str, ...]]]:
     found = []
     for name, modes, ends in zip(_names(hit), hit.bodies, hit.ends):
         if modes.unstated and ends.doubtful:
-            idle = {name for name, error in estimated(modes.shapes, ends.points).items() if not error.any()}
+            idle = {each for each, error in estimated(modes.shapes, ends.points).items() if not error.any()}
             found.append((name, tuple(each for each in modes.unstated if each not in idle)))
     return [(name, missing) for name, missing in found if missing]
 

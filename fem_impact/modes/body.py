@@ -44,8 +44,8 @@ class Body(check.Brief):
         The forces (3,) [N].
     solid : Material, (E [Pa], nu) or False, optional
         Material of a solid mesh, isotropic: its static deflections contain the dent under each load, which a contact
-        law has, too. It is taken out where a load acts along the normal. False if there is none, as of shells. Without
-        it, loads that dent the body as they would a solid count that as an error.
+        law has, too. It is taken out where a load acts on one node along the normal. False if there is none, as of
+        shells. Without it, loads that dent the body as they would a solid count that as an error.
 
     Raises
     ------

@@ -27,7 +27,7 @@ SQUARE = 0.97  # [-] cosine up to which a load acts along the normal: 14 degrees
 # solids of three meshes each 15 to 40, closed forms of plates and beams at most 5
 CLEAR = 8.0
 HIDDEN = 2.5  # [-] the whole dent over what is seen of it so: 1.3 to 1.82 of tetrahedra; its rest reaches the others
-ROUNDING = 1e-6  # [-] of a deflection in single precision
+SINGLE = 1e-6  # [-] of a deflection in single precision
 KNOWN = "the dent of a half space was taken out of {} unit loads, because the contact law has it"
 UNKNOWN = (
     "{} unit loads dent the mesh as they would a solid, and a contact law has that dent already: give solid=, the "
@@ -131,7 +131,7 @@ def rest(load: Load, E: float, nu: float) -> tuple[float, float] | None:
             return None
         terms, _ = _smooth(load.apart[chosen])
         values.append(float(np.linalg.lstsq(terms, (load.deflection - space)[chosen], rcond=None)[0][0]))
-    return float(np.mean(values)), float(np.ptp(values) + ROUNDING * abs(load.own))
+    return float(np.mean(values)), float(np.ptp(values) + SINGLE * abs(load.own))
 
 
 def hidden(load: Load) -> float | None:
@@ -148,7 +148,7 @@ def hidden(load: Load) -> float | None:
     variance = np.square(around - terms @ found).sum() / (len(chosen) - terms.shape[1])
     doubt = float(np.sqrt(variance * np.linalg.pinv(terms.T @ terms)[0, 0]))
     deeper = load.own - float(found[0])
-    return HIDDEN * deeper if deeper > CLEAR * doubt + ROUNDING * abs(load.own) else 0.0
+    return HIDDEN * deeper if deeper > CLEAR * doubt + SINGLE * abs(load.own) else 0.0
 
 
 def _smooth(apart: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

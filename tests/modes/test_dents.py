@@ -96,3 +96,26 @@ def test_the_solid_is_kept_in_files(tmp_path):
     for solid in (solids.STEEL, False, None):
         path = fi.Body.load(body.save(tmp_path / "bar"), solid=solid).save(tmp_path / "again")
         assert fi.Body.load(path).solid == dents.stated(solid) or solid is None  # None: as the file says
+
+
+@pytest.mark.slow
+def test_maps_count_what_a_blow_counts():
+    """Of a dent taken out, and of one that nobody stated."""
+    for solid in (solids.STEEL, None):
+        body = solids.known("bar", 0, solid)
+        blow = body.modes("z"), solids.BALL, fi.Contact.between(solids.BALL, solids.STEEL)
+        where = {"at": body.at(1), "speed": 0.1}
+        hit, table = solids.struck(blow[0], body.at(1)), fi.sweep(*blow, over={"speed": [0.05, solids.SPEED]}, **where)
+        assert_allclose(table.restitution[1], hit.restitution, atol=1e-4)
+        assert_allclose(table.truncation[1], hit.error.total, rtol=0.02)
+
+
+def test_fewer_modes_hold_less_of_the_dent():
+    """What modes of short waves yield more than the rest is an error, and none if they are left out."""
+    body = solids.known("bar", 2, solids.STEEL)
+    modes, at = body.modes("z"), body.at(1)
+    few = modes.truncated(n_modes=16)
+    assert few.residual_compliance(at)[0, 0] > 0.0 == modes.residual_compliance(at)[0, 0]
+    many, less = solids.struck(modes, at), solids.struck(few, at)
+    assert many.bodies[1].shapes.dent(np.array([at]))[0, 0] > 0.0
+    assert solids.apart(many, less) < many.error.total + less.error.total
