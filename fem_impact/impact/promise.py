@@ -13,8 +13,7 @@ import numpy as np
 
 from .._base import explained
 from .._base.check import REACH, SimulationError, ToleranceWarning
-from ..modes.modal import Modes
-from ..modes.shapes import FieldShapes
+from ..modes.shapes import FieldShapes, estimated
 from . import accuracy
 from .quantities import words
 
@@ -31,8 +30,14 @@ CAUTION = 0.5, 0.05
 # [-] modes above which other ways out are told: ten times as many as the planner finds by elements
 MOST_ADVISED = 20_000
 # see `Modes.unstated`
-UNSTATED = {"compliance": "static compliance", "free": "whether it moves freely", "shapes": "shapes but as picked"}
-ADVICE = {"compliance": "give the compliance", "shapes": "pick the modes from longer or cleaner responses"}
+UNSTATED = {
+    "compliance": "static compliance", "free": "whether it moves freely", "shapes": "shapes but as picked",
+    "dent": "whether unit loads dent it",
+}  # fmt: skip
+ADVICE = {
+    "compliance": "give the compliance", "shapes": "pick the modes from longer or cleaner responses",
+    "dent": "give solid = the material, or False for a shell,",
+}  # fmt: skip
 
 
 def sentence(hit: "Response") -> str:
@@ -56,8 +61,7 @@ def met(hit: "Response") -> str:
 def _missing(hit: "Response") -> str:
     """What is not stated of the bodies, in brackets."""
     return "".join(
-        f" (not stated of {name}: {', '.join(UNSTATED[each] for each in modes.unstated)})"
-        for name, modes in _unstated(hit)
+        f" (not stated of {name}: {', '.join(UNSTATED[each] for each in missing)})" for name, missing in _unstated(hit)
     )
 
 
@@ -67,10 +71,12 @@ def remedy(hit: "Response") -> str:
     allowed = SHARE * hit.tolerance
     advice: list[str] = []
     if error.truncation > allowed or not error.resolvable:
-        loose = [name for name, modes in _unstated(hit) if "free" in modes.unstated]
-        advice += [f"make {name} with free = True or False, as it is" for name in loose] or _more_modes(hit)
+        loose = [name for name, missing in _unstated(hit) if "free" in missing]
+        dented = any("dent" in missing for _, missing in _unstated(hit))
+        more = [] if dented else _more_modes(hit)
+        advice += [f"make {name} with free = True or False, as it is" for name in loose] or more
         advice += [
-            f"{ADVICE[each]} of {name}" for name, modes in _unstated(hit) for each in ADVICE if each in modes.unstated
+            f"{ADVICE[each]} of {name}" for name, missing in _unstated(hit) for each in ADVICE if each in missing
         ]
     if error.idealisation > allowed:
         advice.append("give target = 'modal'")
@@ -115,10 +121,14 @@ def _names(hit: "Response") -> list[str]:
     return ["the striker", "the target"] if len(hit.bodies) == 2 else [f"body {i}" for i in range(len(hit.bodies))]
 
 
-def _unstated(hit: "Response") -> list[tuple[str, Modes]]:
-    """Name and modes of every body of which something is not stated that the blow may depend on."""
-    found = zip(_names(hit), hit.bodies, hit.ends)
-    return [(name, modes) for name, modes, ends in found if modes.unstated and ends.doubtful]
+def _unstated(hit: "Response") -> list[tuple[str, tuple[str, ...]]]:
+    """Name of every body of which something is not stated that the blow may depend on, and what that is."""
+    found = []
+    for name, modes, ends in zip(_names(hit), hit.bodies, hit.ends):
+        if modes.unstated and ends.doubtful:
+            idle = {each for each, error in estimated(modes.shapes, ends.points).items() if not error.any()}
+            found.append((name, tuple(each for each in modes.unstated if each not in idle)))
+    return [(name, missing) for name, missing in found if missing]
 
 
 def _more_modes(hit: "Response") -> Iterator[str]:

@@ -77,6 +77,9 @@ class HeldShapes(Shapes, check.Brief):
     def compliance_error(self, points: np.ndarray) -> np.ndarray:
         return self.base.compliance_error(points)
 
+    def dent(self, points: np.ndarray) -> np.ndarray:
+        return self.base.dent(points)
+
     def take(self, n_modes: int) -> "HeldShapes":
         return replace(self, base=self.base.take(n_modes))
 

@@ -83,6 +83,9 @@ class MixedShapes(Shapes, check.Brief):
     def compliance_error(self, points: np.ndarray) -> np.ndarray:
         return self.base.compliance_error(points)
 
+    def dent(self, points: np.ndarray) -> np.ndarray:
+        return self.base.dent(points)
+
     def deflection(self, loads: np.ndarray, points: np.ndarray) -> np.ndarray:
         return self.base.deflection(loads, points)
 

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from .._base import check
-from . import imported
+from . import dents, imported
 from .modal import Modes, damping_ratios
 
 RIGID = 0.01, 6  # [-] frequencies this far below the next are rounding, of at most so many rigid motions
@@ -42,6 +42,10 @@ class Body(check.Brief):
         without any rigid motion.
     loads : sequence of (node number, force), optional
         The forces (3,) [N].
+    solid : Material, (E [Pa], nu) or False, optional
+        Material of a solid mesh, isotropic: its static deflections contain the dent under each load, which a contact
+        law has, too. It is taken out where a load acts on one node along the normal. False if there is none, as of
+        shells. Without it, loads that dent the body as they would a solid count that as an error.
 
     Raises
     ------
@@ -69,6 +73,7 @@ class Body(check.Brief):
     names: Mapping[str, int] = field(default_factory=dict)
     static: Any = None  # (n_nodes, 3, n_loads) [m]
     loads: Any = ()  # (n_loads, 4) node number and force [N]
+    solid: Any = None  # E [Pa] and nu of a solid mesh, () of a shell, None if that is not known
 
     def __post_init__(self) -> None:
         frequencies = check.ascending("frequencies", self.frequencies, "Hz")
@@ -86,7 +91,7 @@ class Body(check.Brief):
             self, frequencies=frequencies, nodes=nodes, numbers=numbers, cells=cells.astype(int),
             shapes=check.array("shapes", self.shapes, (n, 3, len(frequencies)), "kg**-0.5"),
             mass=check.positive("mass", self.mass, "kg"), damping_ratio=damping_ratios(self.damping_ratio, omega),
-            loads=_forces(self.loads), names=_named(self.names),
+            loads=_forces(self.loads), names=_named(self.names), solid=dents.stated(self.solid),
             normals=None if self.normals is None else check.array("normals", self.normals, (n, 3)),
         )  # fmt: skip
         check.settle(self, static=check.array("static", static, (n, 3, None), "m"))
@@ -106,6 +111,7 @@ class Body(check.Brief):
     def load(
         cls, files: Any, *, mass: float | None = None, loads: Any = None, damping_ratio: Any = None,
         modal_mass: ArrayLike | None = None, names: Mapping[str, int] | None = None, normals: ArrayLike | None = None,
+        solid: Any = None,
     ) -> "Body":  # fmt: skip
         """Read a body from files of other programs.
 
@@ -128,6 +134,8 @@ class Body(check.Brief):
             If shapes are not mass-normalised and the files do not say how large their modal masses are.
         names : mapping of str to node number, optional
         normals : array_like, shape (n_nodes, 3), optional
+        solid : Material, (E [Pa], nu) or False, optional
+            Whether loads dent the mesh, see `Body`.
 
         Raises
         ------
@@ -148,6 +156,7 @@ class Body(check.Brief):
         if "cells" not in told:
             told["cells"] = told.get("triangles") if len(told.get("triangles", ())) else told.get("lines")
         given = {"mass": mass, "loads": loads, "damping_ratio": damping_ratio, "names": names, "normals": normals}
+        given["solid"] = solid
         told |= {name: value for name, value in given.items() if value is not None}
         _complete(told)
         order = np.argsort(told["frequencies"], kind="stable")
@@ -230,13 +239,15 @@ class Body(check.Brief):
         place[kept] = np.arange(len(kept))
         cells = place[self.cells]
         cells = cells[(cells >= 0).all(axis=1)]
-        columns, loads = self._unit_loads(ways, place)
+        columns, loads, seen = self._unit_loads(ways, place)
         points, flat = self.nodes[kept][:, self.axes], len(self.axes) + 1 == cells.shape[1]
         made = Modes.from_arrays(
             self.frequencies, np.einsum("ndm,nd->nm", self.shapes[kept], ways[kept]), points=points, mass=self.mass,
             damping_ratio=self.damping_ratio, compliance=columns[kept] if len(loads) else None,
             loads=loads if len(loads) else None, cells=cells if flat and len(cells) else None, free=free,
+            solid=False,
         )  # fmt: skip
+        made = dents.settled(made, seen, self.solid)
         check.settle(made, notes=(*made.notes, NOTE))
         return made
 
@@ -253,16 +264,21 @@ class Body(check.Brief):
             raise ValueError("direction must not be zero")
         return np.tile(vector / np.linalg.norm(vector), (len(self.nodes), 1))
 
-    def _unit_loads(self, ways: np.ndarray, place: np.ndarray) -> tuple[np.ndarray, list[int]]:
+    def _unit_loads(self, ways: np.ndarray, place: np.ndarray) -> tuple[np.ndarray, list[int], list[dents.Load]]:
         """Deflections (n_nodes, n) [m/N] along the ways under unit loads along them, and the points of these loads."""
-        columns, points = [], []
+        columns, points, seen = [], [], []
         for k, (number, *force) in enumerate(self.loads.tolist()):
             row, size = self._row[int(number)], float(np.linalg.norm(force))
             cosine = float(ways[row] @ force) / size if size else 0.0
             if abs(cosine) >= 1.0 - ALONG and place[row] not in points:
-                columns.append(np.einsum("nd,nd->n", self.static[:, :, k], ways) / (np.sign(cosine) * size))
+                static, others = self.static[:, :, k] / (np.sign(cosine) * size), self.numbers != number
+                columns.append(np.einsum("nd,nd->n", static, ways))
                 points.append(int(place[row]))
-        return np.column_stack(columns) if columns else np.zeros((len(ways), 0)), points
+                normal = ways[row] if self.normals is None else self.normals[row]
+                square = abs(normal @ ways[row]) >= dents.SQUARE * np.linalg.norm(normal)
+                apart, under = dents.along(self.nodes[others] - self.nodes[row], ways[row]), static @ ways[row]
+                seen.append(dents.Load(points[-1], apart, under[others], float(under[row]), square))
+        return np.column_stack(columns) if columns else np.zeros((len(ways), 0)), points, seen
 
     def displacement(self, q: ArrayLike, where: Any) -> np.ndarray:
         """Displacements (n_times, n_points, 3) [m] at nodes, of the kept modes alone.

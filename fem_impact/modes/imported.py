@@ -12,7 +12,10 @@ import numpy as np
 
 from .._base import check, isolated
 
-FIELDS = ("frequencies", "damping_ratio", "shapes", "nodes", "numbers", "cells", "normals", "static", "mass", "loads")
+FIELDS = (
+    "frequencies", "damping_ratio", "shapes", "nodes", "numbers", "cells", "normals", "static", "mass", "loads",
+    "solid",
+)  # fmt: skip
 DECKS = {".op2": (".bdf", ".nas", ".dat"), ".frd": (".inp",)}  # files of a model that lie beside those of its results
 KINDS = {
     ".uff": ("a universal file", "modes.universal_files:arrays"),

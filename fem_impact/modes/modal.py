@@ -16,7 +16,7 @@ from .._base.rounding import ROUNDING, SAME
 from ..fe import plausible, refinement
 from ..fe.assembly import THICK, System
 from ..fe.section import Beam, Plate
-from . import picked, universal_files, unstated, viewing
+from . import dents, picked, universal_files, unstated, viewing
 from .shapes import (
     REMEMBERED,
     SHAPE_ERROR,
@@ -104,6 +104,7 @@ class Modes(check.Brief):
         cells: ArrayLike | None = None,
         free: bool | None = None,
         complete: bool = False,
+        solid: Any = None,
     ) -> "Modes":
         """Modes known only at points, as from a modal test.
 
@@ -128,6 +129,10 @@ class Modes(check.Brief):
             along a quarter of its mass; otherwise a blow counts what rigid motions would change as an error.
         complete : bool
             Whether these modes are all there is, as of masses on springs: nothing is left out, nothing else is free.
+        solid : Material, (E [Pa], nu) or False, optional
+            Of a solid mesh, isotropic: its ``compliance`` contains the dent of each load, which a contact law has,
+            too. It is taken out by the deflections around, on a surface flat there. False if there is none, as of
+            shells and beams. Without it, a compliance that shows a dent counts it as an error.
 
         Raises
         ------
@@ -171,7 +176,8 @@ class Modes(check.Brief):
         gaps = {"compliance": rest, "free": loose}
         missing = tuple(name for name, what in gaps.items() if what is not None)
         notes = damping_notes(damping, omega) + tuple(UNSTATED[name] for name in missing)
-        return cls(omega, damping, sampled, mass, notes=notes, unstated=missing)
+        made, said = cls(omega, damping, sampled, mass, notes=notes, unstated=missing), dents.stated(solid)
+        return made if said == () else dents.settled(made, dents.of_points(points, static, known), said)
 
     @classmethod
     def from_uff(
@@ -477,10 +483,14 @@ def left_out(modes: "Modes", place: np.ndarray, rows: np.ndarray) -> tuple[np.nd
     """
     whole = modes.shapes.compliance(place)
     rest = whole - _carried(modes.omega, rows)
-    doubt = np.diag(whole) * (modes.shapes.compliance_error(place) + ROUNDING)
+    doubt = np.abs(np.diag(whole)) * (modes.shapes.compliance_error(place) + ROUNDING)
     if modes.frequency_error is not None:
         doubt = doubt + np.diag(_carried(modes.omega, rows, SHAPE_ERROR * modes.frequency_error[modes.omega > 0.0]))
     allowed = doubt.copy()
+    dent = modes.shapes.dent(place)[:, 0]
+    if dent.any():  # short waves dent a solid, too: modes may hold more of the dent than was left of the compliance
+        beyond = np.minimum(np.maximum(-np.diag(rest), 0.0), np.maximum(dent, 0.0))
+        doubt, rest = doubt + beyond, rest + np.diag(beyond)
     if modes.omega[-1] > 0.0:  # at a support both compliances are pure rounding
         allowed += ROUNDING / (modes.mass * modes.omega[modes.omega > 0.0][0] ** 2)
     for i in np.flatnonzero(np.diag(rest) < -allowed):

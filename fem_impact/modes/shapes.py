@@ -10,6 +10,7 @@ from scipy.spatial import KDTree
 
 from .._base import check
 from .._base.remembered import Remembered
+from .._base.rounding import SAME
 from ..fe import point_load
 from ..fe.assembly import System
 from ..fe.eigenvalues import Flexibility
@@ -43,6 +44,10 @@ class Shapes(Protocol):
 
     def deflection(self, loads: np.ndarray, points: np.ndarray) -> np.ndarray:
         """Static deflection (n_points, n_loads) [m/N] of the complete body under unit forces at ``loads``."""
+
+    def dent(self, points: np.ndarray) -> np.ndarray:
+        """Dents taken out of the diagonal of `compliance`, and the part of its error due to dents, (n_points, 2)."""
+        return np.zeros((len(points), 2))
 
     def loose(self, points: np.ndarray) -> np.ndarray:
         """Shapes (n_points, n) [kg**-0.5] of rigid motions that the modes lack if nothing holds the body."""
@@ -121,6 +126,9 @@ class ScaledShapes(Shapes, check.Brief):
     def compliance_error(self, points: np.ndarray) -> np.ndarray:
         return self.base.compliance_error(points)
 
+    def dent(self, points: np.ndarray) -> np.ndarray:
+        return (self.amplitude / self.frequency) ** 2 * self.base.dent(points)
+
     def deflection(self, loads: np.ndarray, points: np.ndarray) -> np.ndarray:
         return (self.amplitude / self.frequency) ** 2 * self.base.deflection(loads, points)
 
@@ -175,6 +183,7 @@ class SampledShapes(Shapes, check.Locked):
     loads: np.ndarray | None = None  # (n_loads,) points of these loads; None if every point has one
     carried: np.ndarray | None = None  # (n_points, n) [(m/N)**0.5] shapes by frequency: what yields under other loads
     doubt: np.ndarray | None = None  # (n_points, n_modes) [-] see `spread`
+    dents: np.ndarray | None = None  # (n_points, 2) [m/N] see `dent`
 
     @property
     def dimension(self) -> int:
@@ -213,12 +222,17 @@ class SampledShapes(Shapes, check.Locked):
 
     def compliance_error(self, points: np.ndarray) -> np.ndarray:
         """Of an estimate; between two points the modes left out yield at most the geometric mean of both."""
-        if self.rest is None:
-            return np.zeros(len(points))
-        middle, error = self.rest[self._index(points)[0]].T
-        root = np.sqrt(middle)
-        doubt = error + np.where(error > 0.0, root * (root.sum() - root), 0.0)
-        return doubt / np.maximum(self.compliance(points).diagonal(), np.finfo(float).tiny)
+        doubt = self.dent(points)[:, 1]
+        if self.rest is not None:
+            middle, error = self.rest[self._index(points)[0]].T
+            root = np.sqrt(middle)
+            doubt = doubt + error + np.where(error > 0.0, root * (root.sum() - root), 0.0)
+        if not doubt.any():
+            return doubt
+        return doubt / np.maximum(np.abs(self.compliance(points).diagonal()), np.finfo(float).tiny)
+
+    def dent(self, points: np.ndarray) -> np.ndarray:
+        return super().dent(points) if self.dents is None else self.dents[self._index(points)[0]]
 
     def loose(self, points: np.ndarray) -> np.ndarray:
         return super().loose(points) if self.rigid is None else self.rigid[self._index(points)[0]]
@@ -232,6 +246,13 @@ class SampledShapes(Shapes, check.Locked):
 
     def grid(self) -> tuple[np.ndarray, np.ndarray]:
         return self.points, np.arange(len(self.points))[:, None] if self.cells is None else self.cells
+
+
+def estimated(shapes: Shapes, points: np.ndarray) -> dict[str, np.ndarray]:
+    """Errors (n_points,) [m/N] of the compliance at points, by what was not stated or had to be found, see `Modes`."""
+    whole, dent = np.abs(shapes.compliance(points).diagonal()), shapes.dent(points)[:, 1]
+    other = shapes.compliance_error(points) * whole - dent
+    return {"compliance": np.where(other > SAME * whole, other, 0.0), "dent": dent}
 
 
 def loose_motions(points: np.ndarray, cells: np.ndarray | None, values: np.ndarray, mass: float, free: Any) -> Any:

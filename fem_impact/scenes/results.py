@@ -25,7 +25,7 @@ from ..impact.striker import Hand, Striker
 from ..model.playing import Stroke, Strokes
 from ..modes import unstated
 from ..modes.modal import Modes
-from ..modes.shapes import RigidShapes, SampledShapes
+from ..modes.shapes import RigidShapes, SampledShapes, estimated
 from ..sweeps import store
 from .schema import fault
 from .sentences import si
@@ -92,10 +92,11 @@ def _at_points(modes: Modes, touched: np.ndarray, points: Any) -> Modes:
     places, n = np.vstack([touched, more[new]]), len(touched)
     values = modes.shapes.at(places)
     rest = np.column_stack(unstated.left_out(modes.omega, values, modes.mass, modes.dimension))
-    rest[:n] = 0.0  # known from the blow
+    known_errors, dents = estimated(modes.shapes, touched), np.zeros((len(places), 2))
+    rest[:n], rest[:n, 1], dents[:n] = 0.0, known_errors["compliance"], modes.shapes.dent(touched)
     static, flexible = modes.shapes.deflection(touched, places), modes.omega > 0.0
     known = {"loads": np.arange(n), "carried": values[:, flexible] / modes.omega[flexible]}
-    return replace(modes, shapes=SampledShapes(places, values, static, rest=rest, **known))
+    return replace(modes, shapes=SampledShapes(places, values, static, rest=rest, dents=dents, **known))
 
 
 def _key(folder: Path) -> str:

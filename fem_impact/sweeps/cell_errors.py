@@ -96,7 +96,8 @@ def described(cases: Cases, numbers: np.ndarray, workers: int | None = None) -> 
     """
     base = cases.base
     causes = list(dict.fromkeys(cause for modes in base.views.values() for cause in modes.poorer))
-    unstated = cases.residual and bool(base.modes.unstated or base.striker.modes.unstated)
+    bodies = base.modes, base.striker.modes
+    unstated = cases.residual and any(each.unstated or each.shapes.dent(each.shapes.grid()[0]).any() for each in bodies)
     if not causes and not unstated:
         return np.zeros(cases.shape)
     most = DOUBTED[cases.quick and not unstated]

@@ -15,7 +15,7 @@ from ..impact.response import Response
 from ..impact.striker import Striker
 from ..model.audit import audited
 from ..modes.modal import Modes
-from ..modes.shapes import SampledShapes
+from ..modes.shapes import SampledShapes, estimated
 from .inputs import REACH
 
 AXES = {  # name: unit, what it is, its name in a scene file
@@ -182,11 +182,12 @@ def sampled(modes: Modes, points: np.ndarray) -> Modes:
     """Modes at the given points only; leaves out the compliance between different points, which no blow needs."""
     static = np.array([float(modes.shapes.compliance(point[None])[0, 0]) for point in points])
     poorer = {cause: sampled(other, points) for cause, other in modes.poorer.items()}
-    rest = None
+    rest, dents = None, modes.shapes.dent(points)
     if modes.unstated:
-        error = static * np.concatenate([modes.shapes.compliance_error(point[None]) for point in points])
+        error = np.concatenate([estimated(modes.shapes, point[None])["compliance"] for point in points])
         rest = np.column_stack([np.zeros(len(points)), error])  # nothing between the points, as in the compliance
     known = SampledShapes(points, modes.shape_at(points), np.diag(static), None, rest, modes.shapes.loose(points))
+    known = replace(known, dents=dents) if dents.any() else known
     return replace(modes, shapes=known, poorer=poorer)
 
 

@@ -1,0 +1,161 @@
+"""The dent of a solid's unit load: what of a static deflection a contact law has already, so that it counts once.
+
+Under a unit load on a half space the surface sinks by ``w(r) = (1 - nu**2) / (pi E r)``, without limit at the load; on
+a mesh by what the size of its elements or the patch of the load allows. Around the load, some elements away, a body's
+deflection is the same for all meshes and patches: w(r) and a smooth rest. This rest, continued to the load, is what
+the body yields there if a contact law has the half space, as Hertz's has. Thin shells have no w(r).
+
+References
+----------
+Johnson (1985), Contact mechanics, sections 3.2 (point force on a half space) and 4.2 (approach of distant points).
+"""
+
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from .._base import check
+from ..fe.material import Material
+from .unstated import unfolded
+
+RINGS = (1.5, 24), (1.5, 48), (2.5, 24), (2.5, 48)  # [-] first distance over that of the nearest node, and nodes: fits
+FEWEST = 12  # [-] nodes of a fit, which finds at most seven numbers
+FLAT = 0.2  # [-] depth over distance up to which a node lies on the surface around the load
+SQUARE = 0.97  # [-] cosine up to which a load acts along the normal: 14 degrees
+# [-] standard errors by which a node sinks deeper under its load than the others around it tell, of a plate or beam:
+# solids of three meshes each 15 to 40, closed forms of plates and beams at most 5
+CLEAR = 8.0
+HIDDEN = 2.5  # [-] the whole dent over what is seen of it so: 1.3 to 1.82 of tetrahedra; its rest reaches the others
+SINGLE = 1e-6  # [-] of a deflection in single precision
+KNOWN = "the dent of a half space was taken out of {} unit loads, because the contact law has it"
+UNKNOWN = (
+    "{} unit loads dent the mesh as they would a solid, and a contact law has that dent already: give solid=, the "
+    "material, or False for a shell; until then the dent counts as an error"
+)
+UNTOLD = "around {} unit loads too few nodes of a smooth surface tell their dent: all that yields there is an error"
+
+
+@dataclass(frozen=True)
+class Load:
+    """A unit load and the static deflection along it around it."""
+
+    point: int  # of the modes
+    apart: np.ndarray  # (n, 3) [m] nodes seen from it, the third coordinate along it
+    deflection: np.ndarray  # (n,) [m/N]
+    own: float  # [m/N] at the load
+    square: bool = True  # whether it acts along the normal
+
+    def on_surface(self) -> "Load":
+        """The same, seen by nodes of the surface around it alone, if it acts along the normal."""
+        near = np.abs(self.apart[:, 2]) <= FLAT * np.linalg.norm(self.apart, axis=1)
+        return replace(self, apart=self.apart[near], deflection=self.deflection[near]) if self.square else self
+
+
+def stated(solid: Any) -> Any:
+    """What was said of the mesh: (E, nu) of a solid, () of a shell, None if nothing."""
+    if solid is None or solid is False:
+        return () if solid is False else None
+    if isinstance(solid, Material):
+        if solid.E_across is not None:
+            raise ValueError("solid must be an isotropic material; the dent of an orthotropic half space is not known")
+        return float(solid.E), float(solid.nu)
+    if isinstance(solid, (bool, str)) or np.ndim(solid) != 1 or len(solid) not in (0, 2):
+        raise ValueError(f"solid must be a Material or (E in Pa, nu), or False for a shell, got {check.shown(solid)}")
+    if not len(solid):
+        return ()
+    return check.positive("solid", solid[0], "Pa"), check.between("solid", solid[1], -1.0, 0.5)
+
+
+def settled(modes: Any, loads: list[Load], solid: Any) -> Any:
+    """Modes known at points whose unit loads leave no dent, or whose dent is an error; they say so in their notes.
+
+    ``solid`` is as of `stated`.
+    """
+    if solid == () or not loads:
+        return modes
+    shapes = modes.shapes
+    static, dent = shapes.static.copy(), np.zeros((len(shapes.points), 2))
+    counts, flat = dict.fromkeys((KNOWN, UNKNOWN, UNTOLD), 0), unfolded(shapes.points).shape[1] < 3
+    for column, load in enumerate(loads):
+        if solid is None:
+            found = hidden(load.on_surface())
+            size = (0.0 if flat else abs(load.own)) if found is None else found
+            counts[UNTOLD if found is None else UNKNOWN] += size > 0.0
+            dent[load.point, 1] = size
+            continue
+        bare = rest(load.on_surface(), *solid) if load.square else None
+        counts[UNTOLD if bare is None else KNOWN] += 1
+        dent[load.point] = (0.0, abs(load.own)) if bare is None else (load.own - bare[0], bare[1])
+        static[load.point, column] -= dent[load.point, 0]
+    notes = tuple(text.format(f"{n} of {len(loads)}") for text, n in counts.items() if n)
+    if not notes:
+        return modes
+    unstated = (*modes.unstated, "dent") if solid is None else modes.unstated
+    return replace(
+        modes, shapes=replace(shapes, static=static, dents=dent), notes=(*modes.notes, *notes), unstated=unstated
+    )
+
+
+def along(points: np.ndarray, way: np.ndarray) -> np.ndarray:
+    """Points (n, 3) in a frame whose third axis is a unit vector."""
+    axes = np.linalg.svd(way[None])[2]
+    return np.asarray(points @ np.vstack([axes[1:], axes[:1]]).T)
+
+
+def of_points(points: np.ndarray, static: np.ndarray, known: np.ndarray) -> list[Load]:
+    """Unit loads at points (n, 1 to 3) [m] that lie on a surface which is flat around each."""
+    found = []
+    for column, row in enumerate(known.tolist()):
+        others = np.delete(np.arange(len(points)), row)
+        apart = np.zeros((len(others), 3))
+        apart[:, : points.shape[1]] = points[others] - points[row]
+        if points.shape[1] == 3:
+            nearest = apart[np.argsort(np.linalg.norm(apart, axis=1))[: RINGS[-1][1]]]
+            apart = apart @ np.linalg.svd(nearest)[2].T
+        found.append(Load(row, apart, static[others, column], float(static[row, column])))
+    return found
+
+
+def rest(load: Load, E: float, nu: float) -> tuple[float, float] | None:
+    """What a body yields at a load without the dent of a half space, and its error [m/N]; None if too few nodes tell.
+
+    The error is the difference of four fits, with few and many nodes, nearer to the load and farther off.
+    """
+    distance = np.linalg.norm(load.apart, axis=1)
+    space = (1.0 + nu) / (2.0 * np.pi * E) * (load.apart[:, 2] ** 2 / distance**3 + 2.0 * (1.0 - nu) / distance)
+    order, values = np.argsort(distance, kind="stable"), []
+    for first, n in RINGS:
+        chosen = order[distance[order] > first * distance[order[:1]].sum()][:n]
+        if len(chosen) < FEWEST:
+            return None
+        terms, _ = _smooth(load.apart[chosen])
+        values.append(float(np.linalg.lstsq(terms, (load.deflection - space)[chosen], rcond=None)[0][0]))
+    return float(np.mean(values)), float(np.ptp(values) + SINGLE * abs(load.own))
+
+
+def hidden(load: Load) -> float | None:
+    """How large [m/N] the dent in a deflection may be, by the deflections around; None if too few nodes tell.
+
+    Zero if the load sinks no deeper than on a thin plate, ``r**2 log r``, or on a beam, ``r**3``.
+    """
+    chosen = np.argsort(np.linalg.norm(load.apart, axis=1), kind="stable")[: RINGS[0][1]]
+    if len(chosen) < FEWEST:
+        return None
+    terms, r = _smooth(load.apart[chosen])
+    terms = np.column_stack([terms, r**2 * np.log(r) if terms.shape[1] > 3 else r**3])
+    found, around = np.linalg.lstsq(terms, load.deflection[chosen], rcond=None)[0], load.deflection[chosen]
+    variance = np.square(around - terms @ found).sum() / (len(chosen) - terms.shape[1])
+    doubt = float(np.sqrt(variance * np.linalg.pinv(terms.T @ terms)[0, 0]))
+    deeper = load.own - float(found[0])
+    return HIDDEN * deeper if deeper > CLEAR * doubt + SINGLE * abs(load.own) else 0.0
+
+
+def _smooth(apart: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Quadratics (n, 6) at nodes around a load, (n, 3) if they lie on a line, and their distances (n,), at most 1."""
+    size = float(np.linalg.norm(apart, axis=1).max())
+    spread, axes = np.linalg.svd(apart[:, :2], full_matrices=False)[1:]
+    x = apart[:, :2] @ axes[spread > 1e-3 * spread[0]].T / size
+    pairs = [(i, j) for i in range(x.shape[1]) for j in range(i + 1)]
+    products = [x[:, i] * x[:, j] for i, j in pairs]
+    return np.column_stack([np.ones(len(x)), x, *products]), np.linalg.norm(apart, axis=1) / size

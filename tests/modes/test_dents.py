@@ -1,0 +1,121 @@
+"""The dent of unit loads on solid meshes: counted once if the solid is stated, an error if not, and never silent."""
+
+import dents_of_solids as solids
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+import fem_impact as fi
+from fem_impact.modes import dents
+
+E, NU = solids.STEEL.E, solids.STEEL.nu
+
+
+def half_space(spacing=1e-3, patch=0.4e-3, slope=2e-7):
+    """Points on a half space, and its deflection [m/N] under a unit load, plus a plane."""
+    x, y = np.meshgrid(*2 * [np.arange(-8, 9) * spacing], indexing="ij")
+    points = np.column_stack([x.ravel(), y.ravel()])
+    r = np.maximum(np.linalg.norm(points, axis=1), patch)
+    return points, (1.0 - NU**2) / (np.pi * E * r) + 3e-9 + slope * points[:, 0]
+
+
+def known(points, column, **more):
+    """A body with one mode and one unit load, at the middle."""
+    middle = len(points) // 2
+    told = {"points": points, "mass": 1.0, "compliance": column[:, None], "loads": [middle]} | more
+    return fi.Modes.from_arrays([900.0], np.full((len(points), 1), 0.1), **told), points[[middle]]
+
+
+@pytest.mark.parametrize("patch", [0.9e-3, 0.1e-3])
+def test_what_is_left_of_a_half_space_is_nothing(patch):
+    """However large the load's patch is: 3e-9 m/N was added, a plane and rounding do not count."""
+    points, column = half_space(patch=patch)
+    modes, at = known(points, column, solid=solids.STEEL)
+    assert_allclose(modes.shapes.compliance(at), 3e-9, rtol=1e-6)
+    assert modes.shapes.compliance_error(at)[0] < 1e-4  # rounding of files in single precision, 1e-6 of the dent
+    assert "dent of a half space was taken out of 1 of 1 unit loads" in modes.notes[-1]
+    turned = np.column_stack([points[:, 0], 0.6 * points[:, 1], 0.8 * points[:, 1]])
+    assert_allclose(known(turned, column, solid=(E, NU))[0].shapes.dents, modes.shapes.dents, rtol=1e-9)
+
+
+def test_a_dent_that_nobody_stated_is_an_error():
+    points, column = half_space()
+    modes, at = known(points, column)
+    dent = column[len(points) // 2] - 3e-9
+    assert_allclose(modes.shapes.compliance(at), dent + 3e-9)
+    assert modes.shapes.dent(at)[0, 1] > dent and "dent" in modes.unstated
+    assert "1 of 1 unit loads dent the mesh as they would a solid" in modes.notes[-1]
+    shell, _ = known(points, column, solid=False)
+    assert not shell.shapes.dent(at).any() and not any("dent" in note for note in shell.notes)
+
+
+def test_plates_and_beams_have_no_dent():
+    """At any of their points, near edges too: closed forms."""
+    x, y = np.meshgrid(np.linspace(0.0, 0.4, 15), np.linspace(0.0, 0.3, 12), indexing="ij")
+    plate = fi.analytic.rectangle(0.4, 0.3, section=fi.Plate(solids.STEEL, 2e-3), n_modes=8)
+    beam = fi.Beam.rectangular(solids.STEEL, width=0.03, height=0.01)
+    bar = fi.analytic.beam(0.4, ends=("clamped", "free"), section=beam, n_modes=8)
+    for modes, points in ((plate, np.column_stack([x.ravel(), y.ravel()])), (bar, np.linspace(0.0, 0.4, 41)[:, None])):
+        loads = dents.of_points(points, modes.shapes.compliance(points), np.arange(len(points)))
+        assert all(dents.hidden(each.on_surface()) == 0.0 for each in loads)
+
+
+def test_where_nothing_tells_the_dent_all_is_an_error():
+    """A load on a slant, and one among too few nodes."""
+    body = solids.known("bar", 0, solids.STEEL)
+    slanted = fi.Body(body.frequencies, body.shapes, body.nodes, body.mass, static=body.static, loads=body.loads,
+                      solid=solids.STEEL, normals=np.tile([0.6, 0.0, 0.8], (len(body.nodes), 1)))  # fmt: skip
+    few = np.arange(9)
+    alone = fi.Body(body.frequencies, body.shapes[few], body.nodes[few], body.mass, static=body.static[few],
+                    loads=body.loads, solid=solids.STEEL)  # fmt: skip
+    for each in (slanted, alone):
+        hit = solids.struck(each.modes("z"), each.at(1))
+        assert "around 1 of 1 unit loads too few nodes" in hit.summary()
+        assert not hit.tolerance_met and hit.error.total > 0.1
+
+
+def test_a_wrong_modulus_is_an_error():
+    """Ten times too stiff: nine tenths of the dent stay, and the fits disagree."""
+    right, wrong = (solids.of_solid("block", 2, (stiff * E, NU)) for stiff in (1.0, 10.0))
+    assert right.tolerance_met and not wrong.tolerance_met
+    assert solids.apart(wrong, right) < wrong.error.total
+
+
+@pytest.mark.parametrize("solid", ["steel", (E,), (E, 0.7), (-E, NU), True])
+def test_what_is_no_solid_is_refused(solid):
+    points, column = half_space()
+    with pytest.raises(ValueError, match="solid must"):
+        known(points, column, solid=solid)
+    wood = fi.Material.orthotropic(E_along=11e9, E_across=0.85e9, nu=0.37, G=0.7e9, rho=450.0)
+    with pytest.raises(ValueError, match="solid must be an isotropic material"):
+        known(points, column, solid=wood)
+
+
+def test_the_solid_is_kept_in_files(tmp_path):
+    body = solids.known("bar", 0, solids.STEEL)
+    for solid in (solids.STEEL, False, None):
+        path = fi.Body.load(body.save(tmp_path / "bar"), solid=solid).save(tmp_path / "again")
+        assert fi.Body.load(path).solid == dents.stated(solid) or solid is None  # None: as the file says
+
+
+@pytest.mark.slow
+def test_maps_count_what_a_blow_counts():
+    """Of a dent taken out, and of one that nobody stated."""
+    for solid in (solids.STEEL, None):
+        body = solids.known("bar", 0, solid)
+        blow = body.modes("z"), solids.BALL, fi.Contact.between(solids.BALL, solids.STEEL)
+        where = {"at": body.at(1), "speed": 0.1}
+        hit, table = solids.struck(blow[0], body.at(1)), fi.sweep(*blow, over={"speed": [0.05, solids.SPEED]}, **where)
+        assert_allclose(table.restitution[1], hit.restitution, atol=1e-4)
+        assert_allclose(table.truncation[1], hit.error.total, rtol=0.02)
+
+
+def test_fewer_modes_hold_less_of_the_dent():
+    """What modes of short waves yield more than the rest is an error, and none if they are left out."""
+    body = solids.known("bar", 2, solids.STEEL)
+    modes, at = body.modes("z"), body.at(1)
+    few = modes.truncated(n_modes=16)
+    assert few.residual_compliance(at)[0, 0] > 0.0 == modes.residual_compliance(at)[0, 0]
+    many, less = solids.struck(modes, at), solids.struck(few, at)
+    assert many.bodies[1].shapes.dent(np.array([at]))[0, 0] > 0.0
+    assert solids.apart(many, less) < many.error.total + less.error.total
