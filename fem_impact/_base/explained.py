@@ -21,7 +21,7 @@ HEADINGS: dict[str, tuple[str, ...]] = {
     "stated-damping": ("stated damping: ",),
     "not-known": ("it is not known whether the model holds", "the model is not examined"),
     "beyond-this-estimate": ("beyond this estimate",),
-    "slips-of-units": ("softer than rubber", "are expected"),
+    "slips-of-units": ("softer than rubber", "are expected", "and both count"),
     "drawings": (
         "states no unit", "y points down in an SVG file", "points along gentle bends were joined", "was closed",
         "are lines for ribs",

@@ -80,7 +80,8 @@ def doubted_sizes(sides: Sequence[float], section: Any = None) -> tuple[str, ...
     notes = list(number("length", max(sides)))
     if section is None:
         return tuple(notes)
-    notes += section.material.notes
+    layers = getattr(section, "layers", ())
+    notes += [note for made in (section, *layers) for note in made.material.notes]
     name = "thickness" if hasattr(section, "thickness") else "height"
     thickness = getattr(section, name)
     if not callable(thickness) and thickness > THICK * min(sides):
@@ -90,6 +91,20 @@ def doubted_sizes(sides: Sequence[float], section: Any = None) -> tuple[str, ...
             "thin bodies, and 3 mm is 0.003"
         )
     return tuple(notes)
+
+
+def ribs(given: Sequence[Any], sides: Sequence[float]) -> Iterator[str]:
+    """Notes on ribs of a plate with sides [m]: sizes that are probably a slip of a unit, and a rib that comes twice."""
+    for i, rib in enumerate(given):
+        for name, size in (("width", rib.section.width), ("height", rib.section.height), ("offset", rib.offset or 0.0)):
+            if not callable(size) and abs(size) > THICK * min(sides):
+                yield (
+                    f"{name} {size:g} m of ribs[{i}] is {abs(size) / min(sides):.3g} times the shortest side, "
+                    f"{min(sides):g} m; m are expected, and 8 mm is 0.008"
+                )
+        for j, other in enumerate(given[:i]):
+            if np.array_equal(rib.path, other.path) and rib.offset == other.offset:
+                yield f"ribs[{i}] lies where ribs[{j}] does, and both count"
 
 
 def rolling(given: Any) -> tuple[str, ...]:

@@ -37,8 +37,8 @@ def inside(outline: Outline, paths: Sequence[np.ndarray]) -> Lines:
             for t, share in _meetings(line, piece, SAME * span):
                 cuts[id(piece)].append(t)
                 shares.append(share)
-        met = (_share(line, other, SAME * span) for j, other in enumerate(segments) if i != j)
-        places = np.unique(np.clip([*shares, *(share for share in met if share is not None)], 0.0, 1.0))
+        shares += [share for j, other in enumerate(segments) if i != j for share in _shares(line, other, SAME * span)]
+        places = np.unique(np.clip(shares, 0.0, 1.0))
         length = float(np.linalg.norm(line[1] - line[0]))
         places = places[np.append(True, np.diff(places) * length > SAME * span)]
         for a, b in pairwise(places):
@@ -67,14 +67,16 @@ def _meetings(line: np.ndarray, piece: Piece, close: float) -> list[tuple[float,
     return [(float(root), share) for root, share in zip(roots, shares) if -close < share * length < length + close]
 
 
-def _share(line: np.ndarray, other: np.ndarray, close: float) -> float | None:
-    """The share of a line (2, 2) at which another line meets it; None if it does not, or both are parallel."""
+def _shares(line: np.ndarray, other: np.ndarray, close: float) -> list[float]:
+    """The shares of a line (2, 2) at which another line meets it: both ends of one that runs along it."""
     along, beside = line[1] - line[0], other[1] - other[0]
     turn = along[0] * beside[1] - along[1] * beside[0]
     sizes = float(np.linalg.norm(along)), float(np.linalg.norm(beside))
+    gap = other - line[0]  # of both ends
+    away = along[0] * gap[:, 1] - along[1] * gap[:, 0]
     if abs(turn) < SAME * sizes[0] * sizes[1]:
-        return None
-    gap = other[0] - line[0]
-    mine, its = (gap[0] * beside[1] - gap[1] * beside[0]) / turn, (gap[0] * along[1] - gap[1] * along[0]) / turn
+        shares = gap @ along / sizes[0] ** 2
+        return [float(share) for share in shares[np.abs(away) < close * sizes[0]] if 0.0 < share < 1.0]
+    mine, its = (gap[0, 0] * beside[1] - gap[0, 1] * beside[0]) / turn, -away[0] / turn
     meets = all(-close < share * size < size + close for share, size in zip((mine, its), sizes))
-    return float(mine) if meets else None
+    return [float(mine)] if meets else []

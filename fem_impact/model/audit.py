@@ -74,9 +74,10 @@ def required(target: Target, hit: Response) -> tuple[Target, str] | None:
     if target.mesh is None:
         return None
     plate, theory = target.mesh.dimension == 2, THEORIES[target.mesh.dimension][1]
+    plain = getattr(target.section, "plain", True)
     better: dict[str, tuple[bool, dict[str, Any], str]] = {  # by assumption: whether it can be had, and what it does
         "thin target": (
-            target.section is not None and not target.thick, {"theory": theory},
+            target.section is not None and plain and not target.thick, {"theory": theory},
             f"has shear and rotary inertia ({theory})",
         ),
         "still air": (plate and target.air is None, {"air": BOTH}, "moves the air on both sides"),

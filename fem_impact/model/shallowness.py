@@ -26,6 +26,7 @@ from .thinness import lowered
 LIMIT = 0.1  # [-] slope whose square, 1 %, is what frequencies may be off
 SHALLOW = Doubt("shallow target", "steepest slope", LIMIT)
 FLATTER = "the body is too steep for shallow theory; take its modes from a program for shells, `fi.Modes.from_arrays`"
+FLAT = "ribs and layers move in the plane, too; take modes of a program for shells or solids, `fi.Modes.from_arrays`"
 
 
 def examine(struck: Struck) -> Assumption:
@@ -34,12 +35,13 @@ def examine(struck: Struck) -> Assumption:
     system = getattr(shapes, "system", None)
     if system is None or system.rules is not shallow.SHALLOW or not isinstance(shapes, (FieldShapes, RitzShapes)):
         return SHALLOW.holds(struck)
-    value = shallow.steepest(system)
+    curved = system.section.rise is not None
+    value, remedy = (shallow.steepest(system), FLATTER) if curved else (None, FLAT)
     if struck.foreseen:
-        return SHALLOW.judged(struck, value, {}, FLATTER)
+        return SHALLOW.judged(struck, value, {}, remedy)
     drop = _drop(struck, system, shapes)
     omega = struck.hit.history.omega[struck.mine]
-    return SHALLOW.judged(struck, value, struck.changes(omega=struck.with_target(omega * lowered(drop))), FLATTER)
+    return SHALLOW.judged(struck, value, struck.changes(omega=struck.with_target(omega * lowered(drop))), remedy)
 
 
 def _drop(struck: Struck, system: Any, shapes: FieldShapes | RitzShapes) -> np.ndarray:

@@ -23,6 +23,7 @@ LIMIT = 0.23  # [-] thickness times wavenumber at which a wave is 1 % too fast f
 DOUBT = 0.2
 NEAR = 10  # [-] modes next to a frequency that tell its wavenumber: some of them swing unlike waves, hardly all of ten
 THICKER = 'take a thick plate, theory = "mindlin", or a softer contact'
+SOFTER = "take a softer contact, or modes of a program for thick shells or solids, `fi.Modes.from_arrays`"
 SLENDER = 'take a thick beam, theory = "timoshenko", or a softer contact'
 NO_SECTION = "the thickness is not stated; give material and section instead of mass and first frequency"
 NO_SLENDERNESS = "give the slenderness of a stick, or material and section of a bar"
@@ -46,7 +47,8 @@ def examine_target(struck: Struck) -> Assumption:
         # what it gives by shear is at most ten times what it gives by bending: it is thinner than half its side
         most = min(1.0, 10.0 * struck.hit.error.idealisation)
         return TARGET.judged(struck, None, dict.fromkeys(struck.quantities, most), NO_SECTION)
-    remedy = THICKER if modes.dimension == 2 else SLENDER
+    shaped = body.plate is not None and not body.plate.plain  # no thick theory of curved and ribbed plates
+    remedy = SLENDER if modes.dimension == 1 else SOFTER if shaped else THICKER
     if struck.foreseen:
         return _judged_by_wave(TARGET, struck, body, struck.bending, remedy)
     if struck.ideal:

@@ -105,7 +105,8 @@ def in_air(
     Parameters
     ----------
     modes : Modes
-        In vacuum, with shapes known everywhere on a plate. Air mixes them; those left out get no air.
+        In vacuum, with shapes known everywhere on a plate. Air mixes them; those left out get no air. To the air, a
+        curved plate is flat.
     density : float [kg/m^3]
     speed : float [m/s]
         Of sound.

@@ -115,3 +115,31 @@ def test_a_plate_of_nearly_half_its_side_is_noted_as_thick(share, thick):
     assert (
         "times the shortest side" in " ".join(elements(fi.mesh.rectangle(0.3, 0.2), plate(0.2 * share)).notes)
     ) == thick
+
+
+@pytest.mark.parametrize(
+    "slip, words",
+    [
+        ({"height": 8.0}, r"height 8 m of ribs\[1\] is 26.7 times the shortest side, 0.3 m; m are expected"),
+        ({"width": 3.0}, r"width 3 m of ribs\[1\]"),
+        ({"offset": -5.0}, r"offset -5 m of ribs\[1\] is 16.7 times"),
+        ({"y": 0.1}, r"ribs\[1\] lies where ribs\[0\] does, and both count"),
+    ],
+)
+def test_a_slip_in_a_rib_is_noted(slip, words):
+    steel = fi.Material(**STEEL)
+
+    def rib(y=0.2, width=3e-3, height=8e-3, offset=None):
+        return fi.Rib([(0.0, y), (0.4, y)], fi.Beam.rectangular(steel, width=width, height=height), offset)
+
+    mesh, plate = fi.mesh.rectangle(0.4, 0.3), fi.Plate(steel, 2e-3)
+    (note,) = fi.assemble(mesh, plate, {"boundary": "hinged"}, ribs=[rib(y=0.1), rib(**slip)]).notes
+    assert re.search(words, note)
+    assert fi.assemble(mesh, plate, {"boundary": "hinged"}, ribs=[rib(y=0.1), rib(y=0.1, offset=5e-3)]).notes == ()
+
+
+def test_a_slip_in_a_layer_is_noted():
+    oak = fi.Material.orthotropic(E_along=12e9, E_across=1e9, nu=0.3, G=0.8e9, rho=700.0)
+    crossed = fi.Plate.laminate([(oak, 1e-3, 0.0), (oak, 1e-3, 90.0), (oak, 1e-3, 0.0)])
+    (note,) = fi.assemble(fi.mesh.rectangle(0.4, 0.3), crossed, {"boundary": "hinged"}).notes
+    assert "90 degrees are 1.571" in note

@@ -22,6 +22,17 @@ def test_triangles_follow_lines_that_cross_end_inside_or_stick_out():
     assert len(mesh.refined(2.0).cells) > 2 * len(mesh.cells)
 
 
+def test_lines_that_share_a_part_of_their_way_are_followed_once():
+    """The mesher failed on two bars that overlap."""
+    paths = [np.array([[0.1, 0.0], [0.1, 0.2]]), np.array([[0.1, 0.3], [0.1, 0.1]])]
+    found = lines.inside(meshes._outline(fi.mesh.rectangle(0.4, 0.3)), paths)
+    assert np.sort(found.ends[..., 1], axis=1).tolist() == pytest.approx(np.array([[0.0, 0.1], [0.1, 0.2], [0.2, 0.3]]))
+    mesh = meshes.lined(fi.mesh.rectangle(0.4, 0.3), paths)
+    for path in paths:
+        sides = mesh.points[ribs.sides_on(mesh, path)]
+        assert np.linalg.norm(sides[:, 1] - sides[:, 0], axis=1).sum() == pytest.approx(0.2, rel=1e-9)
+
+
 def test_lines_along_an_edge_and_beyond_it_are_left_out():
     outline = meshes._outline(fi.mesh.rectangle(1.0, 0.5))
     found = lines.inside(outline, [np.array([[0.0, 0.0], [1.0, 0.0]]), np.array([[1.2, 0.1], [2.0, 0.1]])])

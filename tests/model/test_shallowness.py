@@ -1,12 +1,17 @@
 """How steep a shell is, and what the inertia in its plane does, against exact panels."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 import references_shells as reference
+from comparing import examined
 from references_panels import Order, Panel, panel_modes
 
 import fem_impact as fi
 from fem_impact.fe import shallow
+from fem_impact.model import audit
+from fem_impact.model.target import Target
 
 E, NU, RHO, H = 70e9, 0.3, 2700.0, 2e-3
 SIDES, CURVATURE = (0.4, 0.3), -0.5
@@ -52,3 +57,20 @@ def test_a_blow_says_how_steep_its_target_is_and_a_flat_one_does_not():
     assert "steepest slope of the rise is 0.13" in steep.sentence
     assert "take its modes from a program for shells" in steep.sentence
     assert flat.value is None and flat.worst == 0.0
+
+
+@pytest.mark.slow
+def test_advice_on_bodies_without_thick_theory_is_not_to_take_it():
+    """Blows on curved and ribbed plates named theory = "mindlin", which is refused, and called flat ones too steep."""
+    rib = fi.Rib([(0.1, 0.0), (0.1, 0.3)], fi.Beam.rectangular(PLATE.material, width=3e-3, height=8e-3))
+    ribbed = fi.assemble(fi.mesh.rectangle(*SIDES), PLATE, {"boundary": "hinged"}, ribs=[rib])
+    ball, contact = fi.Striker.rigid(5e-3), fi.Contact.hertz(1e9)
+    for system, curved in ((panel(), True), (ribbed, False)):
+        hit = fi.strike(system, ball, contact, at=(0.13, 0.1), speed=0.3, tolerance=1e-2, damping_ratio=0.01)
+        thin, steep = (examined(hit, name) for name in ("thin target", "shallow target"))
+        assert "take a softer contact" in thin.remedy and "mindlin" not in hit.summary()
+        assert ("too steep" in steep.remedy) == curved == (steep.value is not None)
+        assert curved or "ribs and layers move in the plane" in steep.sentence
+        target = Target.of(system)
+        better = audit.required(target, replace(hit, tolerance=1e-9))
+        assert better is not None and better[0].theory == target.theory  # air or stretching are next
