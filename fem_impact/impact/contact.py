@@ -121,7 +121,7 @@ class Contact(Numbers):
         law = cls(4.0 / 3.0 / compliance * float(np.sqrt(sphere.radius)), 1.5, loss, gap)
         if yield_strength is None:
             return law
-        pressure = YIELDS * check.positive("yield_strength", yield_strength, "Pa")
+        pressure = YIELDS * check.positive("yield_strength", yield_strength, "Pa", reach=1e20)  # its square counts
         return replace(law, yield_approach=float((0.5 * np.pi * pressure * compliance) ** 2 * sphere.radius))
 
     @property

@@ -28,7 +28,7 @@ SQUARE = 0.97  # [-] cosine up to which a load acts along the normal: 14 degrees
 CLEAR = 8.0
 HIDDEN = 2.5  # [-] the whole dent over what is seen of it so: 1.3 to 1.82 of tetrahedra; its rest reaches the others
 # [-] mean of the nearest nodes over the farthest of them: in a grid at most 0.1, a row off its edge 0.14, on it 0.36
-ASIDE = 0.2
+ASIDE = 0.12
 SINGLE = 1e-6  # [-] of a deflection in single precision
 KNOWN = "the dent of a half space was taken out of {} unit loads, because the contact law has it"
 UNKNOWN = (
@@ -139,15 +139,24 @@ def rest(load: Load, E: float, nu: float) -> tuple[float, float] | None:
 def hidden(load: Load) -> float | None:
     """How large [m/N] the dent in a deflection may be, by the deflections around; None if too few nodes tell.
 
-    Zero if the load sinks no deeper than on a thin plate, ``r**2 log r``, or on a beam, ``r**3``.
+    Zero if the load sinks no deeper than on a thin plate, ``r**2 log r``, or on a beam, ``r**3``; or if the others are
+    rather those of a membrane, ``log r``, than of a solid, ``1 / r``.
     """
     chosen = np.argsort(np.linalg.norm(load.apart, axis=1), kind="stable")[: RINGS[0][1]]
     if len(chosen) < FEWEST:
         return None
-    terms, r = _smooth(load.apart[chosen])
-    terms = np.column_stack([terms, r**2 * np.log(r) if terms.shape[1] > 3 else r**3])
-    found, around = np.linalg.lstsq(terms, load.deflection[chosen], rcond=None)[0], load.deflection[chosen]
-    variance = np.square(around - terms @ found).sum() / (len(chosen) - terms.shape[1])
+    smooth, r = _smooth(load.apart[chosen])
+    around = load.deflection[chosen]
+
+    def fitted(shape: np.ndarray) -> tuple[np.ndarray, np.ndarray, float]:
+        terms = np.column_stack([smooth, shape])
+        found = np.linalg.lstsq(terms, around, rcond=None)[0]
+        return terms, found, float(np.square(around - terms @ found).sum())
+
+    if fitted(np.log(r))[2] < fitted(1.0 / r)[2]:
+        return 0.0
+    terms, found, square = fitted(r**2 * np.log(r) if smooth.shape[1] > 3 else r**3)
+    variance = square / (len(chosen) - terms.shape[1])
     doubt = float(np.sqrt(variance * np.linalg.pinv(terms.T @ terms)[0, 0]))
     deeper = load.own - float(found[0])
     return HIDDEN * deeper if deeper > CLEAR * doubt + SINGLE * abs(load.own) else 0.0
@@ -156,8 +165,8 @@ def hidden(load: Load) -> float | None:
 def _surrounded(load: Load) -> bool:
     """Whether nodes lie all around a load; beside the edge of a plate its deflection ends at no smooth field."""
     nearest = load.apart[np.argsort(np.linalg.norm(load.apart, axis=1), kind="stable")[: RINGS[0][1]]]
-    middle = np.linalg.norm(nearest.mean(axis=0))
-    return bool(middle < ASIDE * np.linalg.norm(nearest, axis=1).max(initial=0.0))
+    off = np.linalg.norm(nearest.sum(axis=0))
+    return bool(off < ASIDE * len(nearest) * np.linalg.norm(nearest, axis=1).max(initial=0.0))
 
 
 def _smooth(apart: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
