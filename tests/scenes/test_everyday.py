@@ -119,3 +119,10 @@ def test_buzz_begins_with_bounces_each_shorter_than_the_one_before():
     hit = scene.load_scene(FOLDER / "drumhead_buzz.toml").strike(strict=True, max_impacts=5)
     gaps = np.diff([impact.start for impact in hit.impacts])
     assert hit.n_impacts == 5 and (np.diff(gaps) < 0.0).all() and hit.outcome == "stopped after max_impacts"
+
+
+@pytest.mark.slow
+def test_modes_of_the_barred_guitar_top_are_found_though_their_estimates_scatter():
+    """Errors stated on six meshes, as first 2.8e-2, rise to 3.3e-2 before they fall below the 1e-2 that is wanted."""
+    found = scene.load_scene(FOLDER / "guitar_fingertip.toml").modes(8)
+    assert found.frequency_error.max() < 1e-2
