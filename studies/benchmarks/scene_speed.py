@@ -1,6 +1,6 @@
 """Measures what a user waits for: time and memory from a scene to the numbers of its blow, each in a new process.
 
-    python studies/benchmarks/scene_speed.py [--only NAME ...] [--seconds 120] [--memory 4] [--ratio] [--repeats 1]
+    python studies/benchmarks/scene_speed.py [--only NAME ...] [--seconds 120] [--memory 16] [--ratio] [--repeats 1]
 
 Runs the everyday scenes (`scenes/everyday/`) at a tolerance of 1e-2 and five more blows that ask for many short waves.
 The time includes reading the scene, planning and striking, not the import and not writing files. A run that takes more
@@ -266,7 +266,7 @@ def main() -> None:
     parser = shared.parser(__doc__, shared.OUT / "scene_speed.csv")
     parser.add_argument("--seconds", type=float, default=120.0, help="limit of one run [s]")
     parser.add_argument(
-        "--memory", type=float, default=4.0, help="limit of one run's address space, besides libraries [GB]"
+        "--memory", type=float, default=16.0, help="limit of one run's address space, besides libraries [GB]"
     )
     parser.add_argument("--only", nargs="+", default=[], help="names, or parts of names, of the blows to run")
     parser.add_argument("--ratio", action="store_true", help="compute every blow again through modes")
