@@ -363,9 +363,10 @@ def refine(system: System, n_modes: int | None, max_frequency: float | None, tol
         mesh = found.system.mesh
         step = max(_needed(found.parts, MARGIN * tolerance), BENT_STEP if bent else 0.0)
         seen.append((mesh.size, float(found.error.max())))
+        foreseen = 1.0 if bent else _foreseen(seen, tolerance)
         if (
             not left
-            or found.system.n_dofs * (bent or _foreseen(seen, tolerance)) ** mesh.dimension > BEYOND * MOST_UNKNOWNS
+            or found.system.n_dofs * foreseen**mesh.dimension > BEYOND * MOST_UNKNOWNS
             or not step < np.inf
             or found.system.n_dofs * step**mesh.dimension > MOST_UNKNOWNS
             or mesh.size >= size

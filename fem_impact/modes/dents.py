@@ -51,7 +51,14 @@ class Load:
     def on_surface(self) -> "Load":
         """The same, seen by nodes of the surface around it alone, if it acts along the normal."""
         near = np.abs(self.apart[:, 2]) <= FLAT * np.linalg.norm(self.apart, axis=1)
-        return replace(self, apart=self.apart[near], deflection=self.deflection[near]) if self.square else self
+        return self._seen_by(near) if self.square else self
+
+    def nearest(self) -> "Load":
+        """The same, seen by the nodes of the smallest fit."""
+        return self._seen_by(np.argsort(np.linalg.norm(self.apart, axis=1), kind="stable")[: RINGS[0][1]])
+
+    def _seen_by(self, nodes: np.ndarray) -> "Load":
+        return replace(self, apart=self.apart[nodes], deflection=self.deflection[nodes])
 
 
 def stated(solid: Any) -> Any:
@@ -142,11 +149,11 @@ def hidden(load: Load) -> float | None:
     Zero if the load sinks no deeper than on a thin plate, ``r**2 log r``, or on a beam, ``r**3``; or if the others are
     rather those of a membrane, ``log r``, than of a solid, ``1 / r``.
     """
-    chosen = np.argsort(np.linalg.norm(load.apart, axis=1), kind="stable")[: RINGS[0][1]]
-    if len(chosen) < FEWEST:
+    few = load.nearest()
+    around = few.deflection
+    if len(around) < FEWEST:
         return None
-    smooth, r = _smooth(load.apart[chosen])
-    around = load.deflection[chosen]
+    smooth, r = _smooth(few.apart)
 
     def fitted(shape: np.ndarray) -> tuple[np.ndarray, np.ndarray, float]:
         terms = np.column_stack([smooth, shape])
@@ -156,7 +163,7 @@ def hidden(load: Load) -> float | None:
     if fitted(np.log(r))[2] < fitted(1.0 / r)[2]:
         return 0.0
     terms, found, square = fitted(r**2 * np.log(r) if smooth.shape[1] > 3 else r**3)
-    variance = square / (len(chosen) - terms.shape[1])
+    variance = square / (len(around) - terms.shape[1])
     doubt = float(np.sqrt(variance * np.linalg.pinv(terms.T @ terms)[0, 0]))
     deeper = load.own - float(found[0])
     return HIDDEN * deeper if deeper > CLEAR * doubt + SINGLE * abs(load.own) else 0.0
@@ -164,7 +171,7 @@ def hidden(load: Load) -> float | None:
 
 def _surrounded(load: Load) -> bool:
     """Whether nodes lie all around a load; beside the edge of a plate its deflection ends at no smooth field."""
-    nearest = load.apart[np.argsort(np.linalg.norm(load.apart, axis=1), kind="stable")[: RINGS[0][1]]]
+    nearest = load.nearest().apart
     off = np.linalg.norm(nearest.sum(axis=0))
     return bool(off < ASIDE * len(nearest) * np.linalg.norm(nearest, axis=1).max(initial=0.0))
 
