@@ -36,6 +36,11 @@ def curvatures(hessian: np.ndarray) -> np.ndarray:
     return hessian[:, [0, 2, 1]].transpose(0, 2, 1, 3) * np.array([1.0, 1.0, 2.0])[:, None]
 
 
+def area_coordinates(local: np.ndarray) -> np.ndarray:
+    """Shares (n, 3) of the corners of a triangle in points (n, 2) of the reference triangle."""
+    return np.column_stack([1.0 - local[:, 0] - local[:, 1], local])
+
+
 class Bent:
     """Map that bends the triangles at curved facets onto the true curve and leaves the others straight."""
 
@@ -81,7 +86,7 @@ class _BentMapping(MappingAffine):
     def _shift(self, X: np.ndarray, tind: np.ndarray | None) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         cells = np.arange(self.mesh.t.shape[1]) if tind is None else tind
         X = np.broadcast_to(X, (2, X.shape[-1]))
-        area = np.broadcast_to(np.stack([1.0 - X[0] - X[1], X[0], X[1]], axis=1), (len(cells), X.shape[1], 3))
+        area = np.broadcast_to(area_coordinates(X.T), (len(cells), X.shape[1], 3))
         return cells, *self.bent.shift(cells, area)
 
     def F(self, X: np.ndarray, tind: np.ndarray | None = None) -> np.ndarray:
@@ -195,8 +200,7 @@ class Triangles:
             which, away = cells[bent], offset[bent]
             place = local[bent]
             for _ in range(CURVE_STEPS):
-                area = np.column_stack([1.0 - place.sum(axis=1), place])
-                moved = self.bent.shift(which, area[:, None])[0][:, 0]
+                moved = self.bent.shift(which, area_coordinates(place)[:, None])[0][:, 0]
                 place = np.einsum("nij,nj->ni", self.inverse[which], away - moved) + 1.0 / 3.0
                 place = np.clip(place, -1.0, 2.0)  # points far away are outside anyway
             local[bent] = place
@@ -376,7 +380,7 @@ def inverses(space: Any, X: np.ndarray) -> np.ndarray:
     J = np.broadcast_to(space.jacobian[:, None], (len(space.origin), X.shape[1], 2, 2)).copy()
     if space.bent is not None:
         cells = space.bent.cells
-        area = np.broadcast_to(np.stack([1.0 - X[0] - X[1], *X], axis=1), (len(cells), X.shape[1], 3))
+        area = np.broadcast_to(area_coordinates(X.T), (len(cells), X.shape[1], 3))
         gradient = space.bent.shift(cells, area)[1]
         # a triangle with two curved sides is listed twice, each time with the whole shift
         J[cells] = space.jacobian[cells][:, None] + gradient[..., 1:] - gradient[..., :1]

@@ -34,7 +34,7 @@ from scipy.sparse import csc_matrix
 from .._base.untyped import Sparse
 from . import plane, slopes
 from .eigenvalues import factorise
-from .elements import inverses, triangles
+from .elements import area_coordinates, inverses, triangles
 from .section import Plate, evaluate
 from .system import System
 
@@ -76,7 +76,7 @@ class Sheet:
         moduli = (frame.length**2 * h * dx)[..., None, None] * section.stretched
         own = plane.numbered(triangles(rim.points, space.vertices))
         dofs = np.vstack([own.element_dofs, own.N + own.element_dofs]).T
-        area = np.broadcast_to(np.stack([1.0 - X[0] - X[1], *X], axis=1), (*dx.shape, 3))
+        area = np.broadcast_to(area_coordinates(X.T), (*dx.shape, 3))
         neutral = np.zeros((*dx.shape, 3, 3))
         if section.coupled:
             walls = section.walls(frame.centre[None])[0]

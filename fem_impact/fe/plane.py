@@ -13,7 +13,7 @@ from skfem import Dofs, ElementTriP4
 from .._base.rounding import SAME
 from .._base.untyped import Cells, Sparse
 from . import supports
-from .elements import ArgyrisSpace, Bent, Triangles
+from .elements import ArgyrisSpace, Bent, Triangles, area_coordinates
 
 QUARTIC = 15  # shape functions of one component on a triangle
 FIRST, SECOND = slice(21, 21 + QUARTIC), slice(21 + QUARTIC, 21 + 2 * QUARTIC)  # unknowns of both components
@@ -65,9 +65,8 @@ class PlaneSpace:
 
 def nodes(inner: Triangles) -> np.ndarray:
     """Where the nodes (n_cells, 15, 2) of both components lie, on the true edge."""
-    area = np.column_stack([1.0 - NODES.sum(axis=1), NODES])
     cells, none = np.arange(len(inner.origin)), np.zeros((1, 1, 3))
-    return inner.along(cells, np.broadcast_to(area, (len(cells), QUARTIC, 3)), none)[0]
+    return inner.along(cells, np.broadcast_to(area_coordinates(NODES), (len(cells), QUARTIC, 3)), none)[0]
 
 
 def gradients(inner: Triangles, cells: np.ndarray, area: np.ndarray) -> np.ndarray:

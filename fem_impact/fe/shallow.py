@@ -31,7 +31,7 @@ import numpy as np
 from .._base import check
 from ..mesh.meshes import Mesh
 from . import plane, plates, ribs, slopes, splitting
-from .elements import curvatures, numbering
+from .elements import area_coordinates, curvatures, numbering
 from .plane import FIRST, LOCAL, SECOND, PlaneSpace
 from .ribs import RibLine
 from .section import evaluate
@@ -53,6 +53,11 @@ class ShallowSpace(PlaneSpace):
     ribs: Sequence[RibLine] = ()
     drifts: np.ndarray  # (n_all, n) rigid motions in the plane that no edge prevents
 
+    def sloping(self, cells: np.ndarray, gradient: np.ndarray) -> np.ndarray:
+        """Slopes (n, n_q, 2) of the rise in cells (n,), by gradients of their functions as of `plane.gradients`."""
+        found: np.ndarray = (gradient @ self.heights[cells][:, None, :, None])[..., 0]
+        return found
+
     def linear(self, element_dofs: np.ndarray, n_all: int) -> np.ndarray:
         """Unknowns (n_all, 6) of the deflections 1, x and y, and of the rigid motions in the plane."""
         flat = self.flat.linear(element_dofs[:21], n_all)
@@ -71,7 +76,7 @@ def strained(space: ShallowSpace, cells: np.ndarray, area: np.ndarray, x: np.nda
     """
     slope, hessian = space.flat.functions(cells, x, (1, 2))
     gradient = plane.gradients(space.inner, cells, area)
-    steep = (gradient @ space.heights[cells][:, None, :, None])[..., 0]  # (n, n_q, 2) of the rise
+    steep = space.sloping(cells, gradient)
     parts = np.zeros((*x.shape[:2], 6, LOCAL))
     parts[:, :, :3, 21:] = plane.strains(gradient)
     parts[:, :, 0, :21], parts[:, :, 1, :21] = (steep[..., i, None] * slope[:, i] for i in range(2))
@@ -82,10 +87,8 @@ def strained(space: ShallowSpace, cells: np.ndarray, area: np.ndarray, x: np.nda
 
 def strains_and_motion(space: ShallowSpace, points: Points, cells: np.ndarray) -> list[Term]:
     """Strains and changes of curvature; the deflection moves."""
-    X = points.reference
-    area = np.stack([1.0 - X[0] - X[1], *X], axis=1)[None]
-    moved = space.functions(cells, points.x[cells], (0,))[0][:, :, None]
-    return [Term("K", "walls", strained(space, cells, area, points.x[cells])), Term("M", "inertia", moved)]
+    area, moved = area_coordinates(points.reference.T)[None], space.functions(cells, points.x[cells], (0,))[0]
+    return [Term("K", "walls", strained(space, cells, area, points.x[cells])), Term("M", "inertia", moved[:, :, None])]
 
 
 def _curved_domain(body: Subject, fields: tuple[str, ...]) -> Domain:
@@ -161,12 +164,12 @@ def plane_mass(system: Any, vectors: np.ndarray) -> np.ndarray:
     """
     space, frame, dofs = system.space, system.frame, system.element_dofs
     X, x, dx = slopes.quadrature(system)
-    shape, area = plane.reference(X)[0], np.stack([1.0 - X[0] - X[1], *X], axis=1)[None]
+    shape, area = plane.reference(X)[0], area_coordinates(X.T)[None]
     local, where = [], [np.arange(len(x))]
     for cells in blocks(len(x)):
         moved = np.zeros((*dx[cells].shape, 3, LOCAL))
         moved[:, :, 0, FIRST] = moved[:, :, 1, SECOND] = shape
-        steep = (plane.gradients(space.inner, cells, area) @ space.heights[cells][:, None, :, None])[..., 0]
+        steep = space.sloping(cells, plane.gradients(space.inner, cells, area))
         larger = np.sqrt(0.5 * (steep**2).sum(axis=2))
         moved[:, :, 2, :21] = larger[..., None] * space.flat.functions(cells, x[cells], (0,))[0]
         local.append(gram(moved, frame.field(system.section, "inertia", x[cells]) * dx[cells]))
@@ -216,9 +219,8 @@ def energies(system: Any, section: Any, vectors: np.ndarray) -> tuple[np.ndarray
 def steepest(system: Any) -> float:
     """The steepest slope [-] of the rise of a shell."""
     space = system.space
-    area = np.stack([1.0 - plane.NODES.sum(axis=1), *plane.NODES.T], axis=1)[None]
-    slope = plane.gradients(space.inner, np.arange(len(space.origin)), area) @ space.heights[:, None, :, None]
-    return float(np.linalg.norm(slope[..., 0], axis=2).max())
+    cells, area = np.arange(len(space.origin)), area_coordinates(plane.NODES)[None]
+    return float(np.linalg.norm(space.sloping(cells, plane.gradients(space.inner, cells, area)), axis=2).max())
 
 
 def _errors(system: Any, vectors: np.ndarray, loads: np.ndarray, forced: Any = None) -> np.ndarray:

@@ -5,6 +5,7 @@ from typing import Any
 import numpy as np
 
 from . import beam_elements
+from .elements import area_coordinates
 from .section import Plate, evaluate
 from .system import System
 from .theory import Points, blocks, unknowns_of_cells
@@ -46,7 +47,7 @@ def quadrature(system: System, nodes: int = NODES) -> Points:
     dx = np.abs(np.linalg.det(space.jacobian))[:, None] * share
     if space.bent is not None:
         cells = space.bent.cells
-        area = np.broadcast_to(np.column_stack([1.0 - local.sum(axis=1), local]), (len(cells), len(local), 3))
+        area = np.broadcast_to(area_coordinates(local), (len(cells), len(local), 3))
         moved, gradient = space.bent.shift(cells, area)
         x[cells] = x[cells] + moved  # a triangle with two curved sides is listed twice, each time with the whole shift
         steep = space.jacobian[cells][:, None] + gradient[..., 1:] - gradient[..., :1]
