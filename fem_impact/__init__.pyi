@@ -36,6 +36,7 @@ from .modes.modal import rayleigh as rayleigh
 from .modes.ritz import ritz_modes as ritz_modes
 from .pages import explore as explore
 from .pages import report as report
+from .references import verify as verify
 from .scenes.band import band as band
 from .scenes.results import load_response as load_response
 from .scenes.scene import Scene as Scene

@@ -111,6 +111,11 @@ KEYS: dict[str, Keys] = {
         "summary": ("array", "what is in it, as sentences"),
     },
     "doctor": {"findings": ("array", "of each check name, works, vital, seconds [s] and remedy")},
+    "verify": {
+        "cases": ("array", "of each name, title, kind, source, seconds, lines (quantity, unit, reference, within, "
+                  "ours, error, difference, holds) and holds; with --list what is known of each"),
+        "n_failed": ("integer?", "cases whose numbers differ by more than both errors allow"),
+    },
     "completion": {"shell": ("string", "the shell"), "script": ("string", "its script")},
     "frf": {
         "peaks": ("array", "of each response, frequency [Hz], magnitude, unit, coherence, error (null: not known)"),
@@ -147,6 +152,7 @@ EXAMPLES: dict[str, tuple[str, ...]] = {
     "show": ("fem-impact show out",),
     "schema": ("fem-impact schema", "fem-impact schema strike"),
     "doctor": ("fem-impact doctor",),
+    "verify": ("fem-impact verify square beam", "fem-impact verify --out verify.png"),
     "completion": ('eval "$(fem-impact completion bash)"',),
     "frf": ("fem-impact frf studies/measured/acceleration.lvm --out out/frf.csv",),
     "fit": (

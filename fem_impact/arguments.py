@@ -240,6 +240,14 @@ COMMANDS = {
         (_option("of", "COMMAND", "a command (default: scenes)", nargs="?", choices=tuple(answers.KEYS)),), ""),
     "doctor": Command(
         "check this installation and suggest a remedy for each failure", commands.doctor, scene=""),
+    "verify": Command(
+        "compute reference cases and say whether our stated errors hold on this machine", commands.verify, (
+        _option("names", "NAME", "a case, or how its name begins, as square (default: all)", nargs="*"),
+        _flag("--list", "list the cases, compute none"),
+        _flag("--all", "show every number, not only the worst of each case"),
+        _out("verify.png", "none", "picture"),
+        _format(),
+    ), ""),
     "completion": Command(
         "print a script that completes commands; eval it in ~/.bashrc", lambda options: _complete(options.shell),
         (_option("shell", None, "default: bash", choices=("bash", "zsh", "tcsh"), nargs="?", default="bash"),), ""),

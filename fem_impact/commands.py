@@ -533,6 +533,38 @@ def doctor(options: argparse.Namespace) -> Answer:
     return answer({"findings": [vars(finding) for finding in findings]}, *said, fault=fault)
 
 
+def verify(options: argparse.Namespace) -> Answer:
+    """Compute the reference cases on this machine."""
+    from . import references  # imported only when needed
+    from .show import figures, plots
+
+    if options.list:
+        known = [{"name": case.name, **case.about} for case in references.select(options.names or "all")]
+        told = [(case["name"], case["title"], case["source"]) for case in known]
+        return answer({"cases": known}, _table(told, ("case", "what it is", "source")))
+    display = _display(options)
+    with display("cases"):
+        found = references.verify(options.names or "all", watch=partial(display.report, "cases"))
+    rows = [
+        (each.name, line.quantity, f"{line.reference:.7g} {line.unit}", f"{line.ours:.7g}", f"{line.allowed:.0e}",
+         "holds" if line.holds else "FAILS")
+        for each in found for line in (each.lines if options.all else (each.worst,))
+    ]  # fmt: skip
+    failed = [each.name for each in found if not each.holds]
+    said = (
+        f"{len(found) - len(failed)} of {len(found)} cases hold, with {sum(len(each.lines) for each in found)} numbers"
+    )
+    said += "" if options.all else "; the one nearest to what errors allow is shown of each (--all: every one)"
+    fault = f"{', '.join(failed)}: ours differs by more than both errors allow; see above" if failed else ""
+    picture = _drawn(options, "verify.png")
+    if picture is not None:
+        with staged(picture.parent, "verify") as staging:
+            figures.save(staging / picture.name, plots.verdicts(found))
+    data = {"cases": [each.data for each in found], "n_failed": len(failed)}
+    head = ("case", "quantity", "reference", "ours", "allowed", "so it")
+    return _answer_of_file(data, (_table(rows, head), said), picture)._replace(fault=fault)
+
+
 def _title(scene: Any) -> str:
     return scene.title or str(scene.path)
 

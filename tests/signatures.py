@@ -321,6 +321,7 @@ def stated() -> dict[str, dict[str, Any]]:
         **alike("load_scene report.read", {"path": t["path"]}),
         "load_response": {"folder": t["folder"]},
         "plan": {"scene": t["scene"], "tolerance": 1e-1},
+        "verify": {"names": "two-masses", "watch": None},
         "plan system": {"scene": t["system"], **told, "target": "modal", "n_striker_modes": 1, "watch": None},
         "plan modes": {"scene": t["modes"], **told, "n_modes": 10},
         "Plan.but": {"self": t["plan"], "tolerance": 1e-1, "target": "modal", "n_modes": 10},

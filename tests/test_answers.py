@@ -32,6 +32,7 @@ RUNS = {  # words that run each command in a second or two
     "mesh": "mesh small.toml --out edges.svg",
     "show": "show out",
     "doctor": "doctor",
+    "verify": "verify beam two --out verify.png",
     "completion": "completion bash",
     "frf": f"frf {TAPS} --response Acceleration --out frf",
     "fit": f"fit {TAPS} --response Acceleration --unknown contact.stiffness=1e5:1e13 --out fit",

@@ -9,8 +9,8 @@ from scipy.sparse import coo_matrix
 
 HOME = Path(__file__).parents[1] / "fem_impact"
 ORDER = [
-    "_base", "mesh", "fe", "modes", "impact/compiled", "impact", "model", "sweeps", "show", "scenes", "live", "taps",
-    "designs", "pages", "",
+    "_base", "mesh", "fe", "modes", "impact/compiled", "impact", "references", "model", "sweeps", "show", "scenes",
+    "live", "taps", "designs", "pages", "",
 ]  # fmt: skip
 OWNERS = {
     "numba": ("impact/compiled/",),
@@ -95,7 +95,9 @@ NOT_MIRRORED = {  # tested under the name of what uses them
     "fe/plates.py", "fe/system.py", "impact/played.py", "mesh/meshio_reader.py", "model/asked.py", "model/budget.py",
     "model/by_idealisation.py", "model/by_mixture.py", "model/by_vectors.py", "model/curved.py", "modes/disk.py",
     "modes/rectangle.py", "modes/request.py", "modes/shapes.py", "modes/slender.py", "pages/explore_server.py",
-    "pages/explore_view.py", "scenes/maps.py", "scenes/schema.py", "show/plots.py", "show/style.py",
+    "pages/explore_view.py", "references/blows.py", "references/contacts.py", "references/plates.py",
+    "references/shells.py", "references/slender.py", "scenes/maps.py", "scenes/schema.py",
+    "show/plots.py", "show/style.py",
 }  # fmt: skip
 
 

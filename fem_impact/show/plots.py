@@ -17,6 +17,7 @@ from scipy.interpolate import RegularGridInterpolator
 
 from ..impact import accuracy
 from ..modes.modal import Modes
+from ..references.case import Verdict
 from ..sweeps.hammers import Hammer, half_sine_reach
 from . import sampling
 from .figures import TICKS, styled
@@ -302,6 +303,22 @@ def places(
         if modes.dimension == 1:
             axes.set_yticks([])
         figure.legend(loc="outside lower center", ncols=2)
+    return figure
+
+
+def verdicts(found: Sequence[Verdict]) -> Figure:
+    """Draw how much of what it may differ each number of the reference cases does, a row for each case."""
+    with styled(7.0, 1.2 + 0.19 * len(found)) as figure:
+        axes = figure.subplots()
+        for row, each in enumerate(found):
+            share = [abs(line.difference) / max(line.allowed, np.finfo(float).tiny) for line in each.lines]
+            paint = [BLUE if line.holds else VERMILION for line in each.lines]
+            axes.scatter(np.maximum(share, 1e-4), np.full(len(share), row), s=14, c=paint, zorder=3)
+        axes.axvline(1.0, color=VERMILION, lw=1.0)
+        axes.set(xscale="log", xlim=(7e-5, max(2.0, 1.5 * axes.get_xlim()[1])), ylim=(len(found) - 0.5, -0.5))
+        axes.set_yticks(range(len(found)), [each.name for each in found], fontsize=8)
+        axes.set(xlabel="difference from the reference over what both may err (least shown 1e-4)")
+        axes.set_title(f"{sum(each.holds for each in found)} of {len(found)} reference cases hold")
     return figure
 
 

@@ -1,0 +1,129 @@
+"""Blows on bodies that bend: published ones, and the same modes followed by SciPy's integrator."""
+
+from functools import partial
+
+import numpy as np
+from scipy.integrate import solve_ivp
+
+from .. import mesh
+from ..fe.assembly import assemble
+from ..fe.section import Beam, Material
+from ..impact import threshold
+from ..impact.collision import Touch, collide, strike
+from ..impact.contact import Contact
+from ..impact.response import Response
+from ..impact.striker import Striker
+from ..modes import analytic
+from ..modes.modal import Modes, find_modes
+from .case import TABLE, Case, Line, of_blow
+
+HAMMERS = (1e-3, 2e-3, 5e-3, 10e-3, 20e-3, 50e-3, 100e-3, 200e-3)  # [kg] those of the figures
+DIGITS = 1e-3  # [-] fact: of the thresholds, three or four digits are known
+
+
+def tip_displacement(n_modes: int = 40) -> np.ndarray:
+    """Displacement of the tip of SDNL32 [mm] at 1 ... 12 ms, positive away from the stop, (12,)."""
+    length, side, spin, stop = 0.783, 14e-3, 3.8, 18e3
+    beam = Beam.rectangular(Material(E=67e9, nu=0.0, rho=2400.0), width=side, height=side)
+    stick = find_modes(assemble(mesh.line(length), beam, {"left": "hinged"}), n_modes=n_modes, damping_ratio=0.01)
+    touch = Touch(Contact.linear(stop), first=0, second=None, first_at=length)
+    times = 1e-3 * np.arange(1, 13)
+    hit = collide([stick], [touch], speeds=[spin * length], tolerance=1e-6, duration=times[-1])
+    return -1e3 * hit.displacement([length], times, body=0)[:, 0]
+
+
+def _sdnl32() -> list[Line]:
+    about = TABLE["sdnl32"]
+    rows = enumerate(zip(about["values"], tip_displacement().tolist()), 1)
+    return [Line(f"tip at {i} ms", "mm", there, 0.5 * about["digit"], ours, 0.0) for i, (there, ours) in rows]
+
+
+def _timoshenko() -> list[Line]:
+    steel, length = Material(E=215.75e9, nu=0.3, rho=7960.0), 0.1535
+    beam = Beam.rectangular(steel, width=0.01, height=0.01)
+    modes = analytic.beam(length, ends=("hinged", "hinged"), section=beam, n_modes=60)
+    ball, contact = Striker.sphere(steel, 0.01), Contact.hertz(1.581e10)
+    hit = strike(modes, ball, contact, at=0.5 * length, speed=0.01, max_impacts=1, tolerance=1e-4)
+    about = TABLE["timoshenko-ball"]
+    return of_blow(hit, about["values"], {name: 0.5 * digit for name, digit in about["digit"].items()})
+
+
+def followed(hit: Response, end: float) -> dict[str, float]:
+    """The same blow of a rigid striker up to ``end`` [s] by SciPy's DOP853; each change of contact ends a run."""
+    modes, contact, mass = hit.bodies[-1], hit.contacts[0], hit.bodies[0].mass
+    u, omega, n = modes.shape_at([hit.at])[0], modes.omega, modes.n_modes
+    damping = 2.0 * modes.damping_ratio * omega
+    state, now, touching = np.zeros(2 * n + 3), 0.0, True
+    state[-2] = hit.speed  # modal displacements and speeds, place and speed of the striker, impulse
+    changes, peak = [0.0], 0.0  # [s] when contacts begin and end, by turns; [N]
+
+    def depth(_: float, y: np.ndarray) -> float:
+        return float(y[-3] - u @ y[:n])
+
+    def closing(_: float, y: np.ndarray) -> float:
+        return float(y[-2] - u @ y[n : 2 * n])
+
+    def flow(_: float, y: np.ndarray) -> np.ndarray:
+        force = contact.stiffness * max(depth(0.0, y), 0.0) ** contact.exponent if touching else 0.0
+        p = y[n : 2 * n]
+        return np.concatenate([p, u * force - omega**2 * y[:n] - damping * p, [y[-2], -force / mass, force]])
+
+    depth.terminal = True  # type: ignore[attr-defined]
+    while now < end:
+        depth.direction = -1.0 if touching else 1.0  # type: ignore[attr-defined]
+        step = np.inf if touching else 0.1 / omega[-1]  # in flight two crossings in one step would be missed
+        run = solve_ivp(
+            flow, (now, end), state, "DOP853", events=(depth, closing), max_step=step, rtol=1e-11, atol=1e-15
+        )
+        now, state = float(run.t[-1]), run.y[:, -1]
+        if touching:
+            deepest = max(depth(0.0, y) for y in (*run.y.T, *run.y_events[1]))
+            peak = max(peak, contact.stiffness * deepest**contact.exponent)
+        if run.status:
+            changes.append(now)
+            touching = not touching
+    impacts = np.reshape(changes[: len(changes) // 2 * 2], (-1, 2))
+    return {
+        "n_impacts": float(len(impacts)),
+        "contact_time": float(np.diff(impacts).sum()),
+        "peak_force": peak,
+        "impulse": float(state[-1]),
+        "restitution": -float(state[-2]) / hit.speed,
+    }
+
+
+def _followed(contact: Contact, mass: float) -> list[Line]:
+    at, end = (0.465, 0.3), 0.02
+    plate = analytic.rectangle(1.55, 1.0, mass=0.2, first_frequency=100.0, n_modes=20, damping_ratio=0.01)
+    alone = Modes.from_arrays(
+        plate.frequencies, plate.shape_at([at]), points=[at], mass=plate.mass, damping_ratio=plate.damping_ratio,
+        complete=True,
+    )  # fmt: skip
+    hit = strike(alone, Striker.rigid(mass), contact, at=at, speed=1.0, tolerance=1e-7, duration=end)
+    wanted = followed(hit, end)
+    return of_blow(hit, wanted, {name: 1e-8 * value for name, value in wanted.items()})  # 1e-11 a step, over some 1e3
+
+
+def _thresholds(name: str) -> list[Line]:
+    _, body, place = name.split("-")
+    if body == "plate":
+        modes = analytic.rectangle(1.55, 1.0, mass=0.2, first_frequency=100.0, n_modes=3000)
+        at = np.array([1.55 * float(place), 0.5])
+    else:
+        modes = analytic.beam(1.0, ends=("free", "free"), mass=0.2, first_frequency=100.0, n_modes=1000)
+        at = np.array([float(place)])
+    lines = []
+    for mass, there in zip(HAMMERS, TABLE[name]["values"]):
+        ours = threshold.threshold_frequency(modes, at, mass) or 0.0
+        lines.append(Line(f"{1e3 * mass:g} g hammer", "Hz", there, DIGITS * there, ours, 0.0))
+    return lines
+
+
+CASES = (
+    Case("sdnl32", _sdnl32),
+    Case("timoshenko-ball", _timoshenko),
+    Case("dop853-linear", partial(_followed, Contact.linear(1e6), 0.1 / 3.0)),
+    Case("dop853-hertz", partial(_followed, Contact.hertz(695e3), 0.1 / 3.0)),
+    Case("dop853-light", partial(_followed, Contact.hertz(1e7), 5e-3)),
+    *(Case(name, partial(_thresholds, name)) for name in TABLE if name.startswith("threshold-")),
+)
