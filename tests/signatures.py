@@ -49,7 +49,7 @@ INNER = {
      "Scene.body", "Scene.closed_form", "Scene.fault", "Scene.finder", "Scene.make_contact",
     "Scene.make_section", "Scene.make_striker", "Scene.data", "Scene.alone", "Scene.check_single",
     "Scene.check_unpushed",
-    "Response.to_xarray", "Modes.to_pyvista",  # no arguments
+    "Modes.to_pyvista",  # no arguments
     "Gradient", "Gradient.change", "Response.band_spectrum",  # made by Response.gradient; its arguments are any words
     "Plan.data", "Plan.run", "Plan.strike", "Response.body_slice", "Response.summary", "Scene.picture",
     "mesh.Mesh", "mesh.Mesh.line", "mesh.Mesh.pieces", "mesh.straight", "mesh.fill", "Modes.points",
@@ -288,6 +288,7 @@ def stated() -> dict[str, dict[str, Any]]:
         **alike("Response.displacement Response.velocity Response.motion_error", {"self": t["hit"], "points": [at],
             "times": [0.0, 1e-3]}),
         **alike("Response.modal_state Response.modal_energy", {"self": t["hit"], "times": [0.0, 1e-3]}),
+        "Response.to_xarray": {"self": t["hit"], "points": [at], "times": [0.0, 1e-3], "max_frequency": 5e3},
         "Response.spectral_centroid": {"self": t["hit"], "max_frequency": 5e3},
         "Response.spectrum": {"self": t["hit"], "frequencies": [0.0, 1e3]},
         "mobility": {"modes": t["modes"], "at": at, "to": (0.2, 0.2), "frequencies": [50.0, 60.0]},

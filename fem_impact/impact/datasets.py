@@ -4,6 +4,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from .._base import check
+
 if TYPE_CHECKING:
     from .response import Response
 
@@ -22,7 +24,7 @@ PARTS = {  # of an impact: unit
 }  # fmt: skip
 
 
-def dataset(hit: "Response") -> Any:
+def dataset(hit: "Response", points: Any = None, times: Any = None, max_frequency: float | None = None) -> Any:
     """The response as an `xarray.Dataset`, see `Response.to_xarray`; NaN where there is no restitution."""
     import xarray  # takes as long to load as a blow to compute
 
@@ -40,7 +42,17 @@ def dataset(hit: "Response") -> Any:
     for part in ("step", "truncation", "mesh", "idealisation", "total"):
         data[f"error_{part}"] = ((), getattr(hit.error, part), {"units": "1"})
     data |= {f"energy_{name}": ((), value, {"units": "J"}) for name, value in hit.energies.items()}
-    places = {"time": ("time", hit.time, {"units": "s"})}
+    places: dict[str, Any] = {"time": ("time", hit.time, {"units": "s", "long_name": "time"})}
+    if points is not None:
+        moved, where = _motion(hit, points, hit.time if times is None else times)
+        data, places = data | moved, places | where
+    elif times is not None:
+        raise ValueError("times must come with points, where the motion is wanted")
+    if max_frequency is not None:
+        highest = check.positive("max_frequency", max_frequency, "Hz")
+        frequencies, spectrum = hit.band_spectrum(highest)
+        places["frequency"] = "frequency", frequencies, {"units": "Hz", "long_name": "frequency"}
+        data["spectrum"] = "frequency", abs(spectrum), {"units": "N s", "long_name": "spectrum of the force"}
     told = {"tolerance": hit.tolerance, "tolerance_met": int(hit.tolerance_met), "verdict": hit.verdict}
     ended = {
         "trusted": int(hit.trusted),
@@ -49,3 +61,15 @@ def dataset(hit: "Response") -> Any:
         "notes": "\n".join(hit.notes),
     }
     return xarray.Dataset(data, places, told | ended)
+
+
+def _motion(hit: "Response", points: Any, times: Any) -> tuple[dict[str, Any], dict[str, Any]]:
+    """Displacement and velocity at points over moments, and their coordinates."""
+    moments, target = np.atleast_1d(np.asarray(times)), hit.bodies[-1]
+    points = check.places("points", points, target.dimension)
+    places: dict[str, Any] = {"moment": ("moment", moments, {"units": "s", "long_name": "time"})}
+    places |= {axis: ("point", column, {"units": "m", "long_name": axis}) for axis, column in zip("xy", points.T)}
+    dims, moved = ("moment", "point"), {}
+    for name, unit in (("displacement", "m"), ("velocity", "m/s")):
+        moved[name] = dims, getattr(hit, name)(points, moments), {"units": unit, "long_name": name}
+    return moved, places

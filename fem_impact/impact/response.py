@@ -555,12 +555,30 @@ class Response(Totals, check.Locked):
         """The blow in a few readable lines."""
         return in_words.lines(self)
 
-    def to_xarray(self) -> Any:
+    def to_xarray(self, points: Any = None, times: Any = None, *, max_frequency: float | None = None) -> Any:
         """The response as an `xarray.Dataset`: force [N] over time [s], impacts, scalars, errors and energies.
 
-        For several contacts the force has a column for each; units are in the attributes of every variable.
+        For several contacts the force has a column for each. Every variable has its unit and name in its attributes, so
+        that ``found.force.plot()`` and its like label their axes.
+
+        Parameters
+        ----------
+        points : array_like, shape (n_points, dimension) [m], optional
+            Where ``displacement`` [m] and ``velocity`` [m/s] of the target are wanted, over ``moment`` and ``point``.
+        times : array_like, shape (n_times,) [s], optional
+            The moments of the motion; by default those of the force.
+        max_frequency : float [Hz], optional
+            With it there is ``spectrum``, the magnitude of the force's Fourier transform [N s] over ``frequency`` [Hz].
+
+        Examples
+        --------
+        >>> plate = fi.analytic.rectangle(0.4, 0.3, mass=0.2, first_frequency=100.0, n_modes=40)
+        >>> hit = fi.strike(plate, fi.Striker.rigid(0.05), fi.Contact.linear(1e6), at=(0.13, 0.1), speed=1.0)
+        >>> found = hit.to_xarray([(0.3, 0.2)], [1e-3, 2e-3], max_frequency=5e3)
+        >>> found.velocity.dims, found.spectrum.attrs["units"]
+        (('moment', 'point'), 'N s')
         """
-        return datasets.dataset(self)
+        return datasets.dataset(self, points, times, max_frequency)
 
     @property
     def outcome(self) -> str:

@@ -1,7 +1,9 @@
 """A response as labelled arrays: the same numbers as its own, and a file that reads back."""
 
 import numpy as np
+import pytest
 import xarray
+from matplotlib.figure import Figure
 
 import fem_impact as fi
 
@@ -40,3 +42,30 @@ def test_several_contacts_have_a_column_each():
     assert found.sizes["impact"] == hit.n_impacts
     assert hit.restitution_errors[0] > 0.0
     np.testing.assert_array_equal(found.impact_restitution_error, np.array(hit.restitution_errors, float))
+
+
+def test_motion_and_spectrum_where_they_are_asked_for():
+    hit, points, times = blow(), [(0.3, 0.2), (0.13, 0.1)], [0.0, 1e-3, 5e-3]
+    found = hit.to_xarray(points, times, max_frequency=4e3)
+    np.testing.assert_array_equal(found.displacement, hit.displacement(points, times))
+    np.testing.assert_allclose(found.velocity.sel(moment=1e-3), hit.velocity(points, [1e-3])[0], rtol=1e-12)
+    np.testing.assert_array_equal(np.column_stack([found.x, found.y]), points)
+    np.testing.assert_allclose(found.spectrum, abs(hit.spectrum(found.frequency.to_numpy())), rtol=1e-12)
+    assert float(found.spectrum[0]) == pytest.approx(hit.impulse, rel=1e-6)  # at 0 Hz; force linear between samples
+    assert hit.to_xarray(points).sizes["moment"] == len(hit.time)
+    with pytest.raises(ValueError, match="times must come with points"):
+        hit.to_xarray(times=times)
+    with pytest.raises(ValueError, match="max_frequency must be positive, got -1 Hz"):
+        hit.to_xarray(max_frequency=-1.0)
+
+
+def test_plots_label_their_axes():
+    found = blow().to_xarray([(0.3, 0.2)], max_frequency=4e3)
+    for name, labels in {
+        "force": ("time [s]", "contact force [N]"),
+        "spectrum": ("frequency [Hz]", "spectrum of the force [N s]"),
+        "velocity": ("time [s]", "velocity [m/s]"),
+    }.items():
+        axes = Figure().subplots()
+        found[name].squeeze().plot(ax=axes)
+        assert (axes.get_xlabel(), axes.get_ylabel()) == labels
