@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from .._base import check, markup
+from .._base import check, known, markup
 from ..fe.assembly import THICK, System, clamped, support_of_facets, support_words
 from ..fe.ribs import Rib, sides_on
 from ..fe.section import Beam, Material, Plate, evaluate
@@ -27,7 +27,7 @@ from ..model.planner import Blow, Plan, Run
 from ..model.playing import Strokes
 from ..model.target import FIRST_LOOK, Stages, Target, Watch
 from ..modes.modal import Modes
-from . import known, sequence
+from . import sequence
 from .schema import (
     MAKERS,
     NESTED,
