@@ -33,6 +33,9 @@ OF_STRIKER = {
     "rigid": ("mass",), "stick": ("mass", "first_frequency"),
     "sphere": ("radius", "E", "nu", "rho", "yield_strength"),
 }  # fmt: skip
+# numbers that scenes take without their intervals: nu changes plates less than E does, by a tenth at most, and bodies
+# with another nu need modes of their own; a yield strength changes no blow of an elastic body
+SINGLE = ("nu", "yield_strength")
 ACROSS_NU = 0.3  # [-] Poisson's ratio that stands for those of wood pressed across its grain: 0.5 makes it 18 % stiffer
 # [-] by how much wood, pressed across its grain through a point, may differ from a body that is as soft in every way
 ACROSS = 0.5
@@ -84,9 +87,8 @@ class Entry:
     def table(self) -> dict[str, Any]:
         """The table [material] or [striker] of a scene, its numbers with their intervals."""
         keys = OF_STRIKER[self.kind] if self.kind else OF_MATERIAL
-        found = {key: self.facts[key].table for key in keys if key in self.facts}
-        if "yield_strength" in found:
-            found["yield_strength"] = self.facts["yield_strength"].value  # it decides, but changes no blow
+        told = {key: self.facts[key] for key in keys if key in self.facts}
+        found = {key: fact.value if key in SINGLE else fact.table for key, fact in told.items()}
         return {"kind": self.kind, **found} if self.kind else found
 
     def vary(self, table: str) -> dict[str, Any]:

@@ -28,6 +28,7 @@ from ..model.playing import Strokes
 from ..model.target import FIRST_LOOK, Stages, Target, Watch
 from ..modes.modal import Modes
 from . import sequence
+from .named import filled
 from .schema import (
     MAKERS,
     NESTED,
@@ -539,6 +540,10 @@ def scene_of(tables: Mapping[str, Any], path: Path, *, folder: Path) -> Scene:
             raise fault(path, f"[{name}] is not a table of a scene{check.nearest(name, TABLES)}")
         if not isinstance(table, dict) and name not in (REPEATED, *PARTS):
             raise fault(path, f"{name} must be a table, written [{name}]")
+    try:
+        tables = filled(tables)
+    except ValueError as error:
+        raise fault(path, str(error)) from None
     for name in REQUIRED:
         if name not in tables:
             raise fault(path, f"[{name}] is missing")
