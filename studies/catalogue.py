@@ -33,19 +33,19 @@ for what its interval says, and measure where it matters.
 
 Hard and round tips follow Hertz's law, exponent p = 1.5, with the stiffness of tip and body together: here on a rigid
 wall, on wood it may be a hundredth of that. Wound and felted heads get harder as they are pressed: p of 2 to 3,
-whatever they strike. Hollow and gas-filled balls are nearly linear, p = 1. The damping is a loss (Hunt and Crossley: the force is
-multiplied by 1 + loss times the rate of approach), or the restitution on a rigid wall at a speed, from which the loss
-follows (`Contact.restituting`). "None published": take none, as what is lost elsewhere, in the vibration of the bodies,
-is computed; dents need a law that yields (`Contact.elastic_plastic`), and felt that relaxes one that remembers
-(`Contact.felt`). The time is that of a contact on a rigid wall at 1 m/s without loss; half of its inverse is about the
-frequency up to which the blow excites. Sticks bend, which shortens their contacts.
+whatever they strike. Hollow and gas-filled balls are nearly linear, p = 1. The damping is a loss (Hunt and Crossley:
+the force is multiplied by 1 + loss times the rate of approach), or the restitution on a rigid wall at a speed, from
+which the loss follows (`Contact.restituting`). "None published": take none, as what is lost in the vibration of the
+bodies is computed; dents need a law that yields (`Contact.elastic_plastic`), and felt that relaxes one that remembers
+(`Contact.felt`). The time is that of a contact on a rigid wall at 1 m/s without loss; at its inverse the spectrum of
+the force has fallen by 10 dB, with p = 3 at 1.6 times that. Sticks bend, which shortens their contacts.
 
 """
 GROUPS = {"wood": "Woods", "metal": "Metals", "glass": "Glasses and ceramics", "stone": "Stone and concrete",
           "plastic": "Plastics", "skin": "Skins", "board": "Boards", "laminate": "Laminates"}  # fmt: skip
-CUT = """`fi.materials["spruce, Sitka"]` is quarter-sawn, with the radial direction R across the grain in the plane
-of the plate; `"spruce, Sitka, flat-sawn"` has the tangential direction T there. Woods that lack G_RT, which is not listed,
-leave rolling shear unstated.
+CUT = """`fi.materials["spruce, Sitka"]` is quarter-sawn: the radial direction R lies across the grain in the plane of
+the plate; in `"spruce, Sitka, flat-sawn"` the tangential direction T does. Where no source has G_RT, rolling shear is
+left unstated.
 
 """
 
