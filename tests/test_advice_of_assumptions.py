@@ -51,6 +51,11 @@ def blow(target=None, striker=BALL, law=None, *, speed=0.05, at=(0.12, 0.1), **h
     return fi.strike(target, striker, law, at=at, speed=speed, tolerance=1e-2, **how)
 
 
+def club(across):
+    """A rigid body whose contact point lies beside its centre of mass, and ahead of it."""
+    return fi.Striker.turning(0.1, 5e-5, (across, 0.03))
+
+
 @cache
 def flapping():
     """A plate on springs that do not say how they hold its plane."""
@@ -139,6 +144,9 @@ REMEDIES = {
     "quasi-static contact, a head and its handle": (
      lambda: blow(striker=fi.Striker.hammer(0.03, 0.06, stiffness=2e4, damping=5.0), law=fi.Contact.hertz(1e9)),
      "^give it as a sphere or a bar$", [lambda: blow(), lambda: by_rod(striker=rod())]),
+    "no friction, beside the centre of mass": (lambda: blow(striker=club(0.02), law=fi.Contact.hertz(1e8), speed=0.5),
+     "^strike square to the surface, in line with the centre of mass: contacts here have no friction$",
+     [lambda: blow(striker=club(0.0), law=fi.Contact.hertz(1e8), speed=0.5)]),
     "still air, a light plate": (lambda: blow(plate(1e-3, SPRUCE, 20), law=fi.Contact.hertz(1e7)),
      r'^take the modes in air: air = "both sides" under \[target\], or `fi\.in_air`$',
      [lambda: blow(fi.in_air(plate(1e-3, SPRUCE, 20)), law=fi.Contact.hertz(1e7))]),

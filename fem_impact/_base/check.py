@@ -142,12 +142,12 @@ def instance(name: str, value: Any, *kinds: type) -> None:
         raise ValueError(f"{name} must be {wanted}, got {shown(value)}")
 
 
-def several(name: str, value: Any, kind: type) -> tuple:
-    """Return ``value`` as a tuple, or raise ValueError unless it is a non-empty list or tuple of ``kind``."""
+def several(name: str, value: Any, *kinds: type) -> tuple:
+    """Return ``value`` as a tuple, or raise ValueError unless it is a non-empty list or tuple of these types."""
     if not isinstance(value, (list, tuple)) or not value:
-        raise ValueError(f"{name} must be a list of {kind.__name__}, got {shown(value)}")
+        raise ValueError(f"{name} must be a list of {' or '.join(kind.__name__ for kind in kinds)}, got {shown(value)}")
     for i, item in enumerate(value):
-        instance(f"{name}[{i}]", item, kind)
+        instance(f"{name}[{i}]", item, *kinds)
     return tuple(value)
 
 

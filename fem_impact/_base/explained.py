@@ -17,6 +17,7 @@ HEADINGS: dict[str, tuple[str, ...]] = {
     "no-yielding": ("no yielding: ",),
     "local-contact": ("local contact: ",),
     "quasi-static-contact": ("quasi-static contact: ",),
+    "no-friction": ("no friction: ",),
     "still-air": ("still air: ",),
     "stated-damping": ("stated damping: ",),
     "not-known": ("it is not known whether the model holds", "the model is not examined"),

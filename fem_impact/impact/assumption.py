@@ -14,8 +14,10 @@ SILENT = 1e-4  # [-] effects that are never worth a line of their own
 SHARE = 0.1
 ALL = (
     "thin target", "shallow target", "thin striker", "small deflections", "no yielding", "local contact",
-    "quasi-static contact", "still air", "stated damping",
+    "quasi-static contact", "no friction", "still air", "stated damping",
 )  # fmt: skip
+# [-] coefficient of friction tried: dry metals, woods and plastics on each other lie between 0.15 and 0.6
+FRICTION = 0.3
 # [-] errors of the model up to this count as right, whatever the tolerance: stiffness, contact law and the speed of a
 # hand are seldom known better, and a blow by hand repeats no better
 ENOUGH = 0.05
@@ -29,6 +31,10 @@ READINGS = {
     "contact radius over the distance to the edge": "the contact radius is {} times the distance to the edge",
     "contact radius times wavenumber": "contact radius times wavenumber is {}",
     "own period of the striker over the contact time": "the striker's own period is {}% of the contact time",
+    "tangential over normal impulse, sticking": "the contact ends sticking, by {}% of the normal impulse",
+    "tangential over normal impulse that would stick": (
+        f"the contact slides to its end with a friction of {FRICTION:g}; sticking takes {{}}% of the normal impulse"
+    ),
     "mass of the air moved over that of the body": "the air carried along weighs {}% of the body",
     "damping ratio by the sound radiated, beyond that stated": "sound adds a damping ratio of {} to that stated",
     "damping ratio tried": "no damping is stated, and a ratio of {} was tried",

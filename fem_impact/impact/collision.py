@@ -100,7 +100,7 @@ def strike(
 
 @check.typed
 def collide(
-    bodies: Sequence[Modes],
+    bodies: Sequence[Modes | Striker],
     contacts: Sequence[Touch],
     *,
     speeds: Sequence[float] | None = None,
@@ -120,8 +120,11 @@ def collide(
 
     Parameters
     ----------
-    bodies : sequence of Modes
+    bodies : sequence of Modes or Striker
+        A striker arrives as it is made to, turning or straight, and touches with its own point unless told otherwise;
+        neither a hand nor its weight may bring it back.
     contacts : sequence of Touch
+        Two bodies may touch at several points.
     speeds : sequence of float [m/s], (n_bodies,)
         Speed of each body's first contact point; the body arrives in rigid motion. Positive from the first body of a
         touch towards the second.
@@ -146,6 +149,9 @@ def collide(
     >>> [round(float(hit.velocity(None, [0.01], body=i)[0, 0]), 3) + 0.0 for i in range(3)]  # m/s
     [0.0, 0.0, 1.0]
     """
+    for each in bodies if isinstance(bodies, (list, tuple)) else ():
+        if isinstance(each, Striker):
+            each.let_go("a collision")
     return promise.kept(
         met(
             bodies, contacts, speeds=speeds, states=states, forces=forces, start=start, tolerance=tolerance,
@@ -156,12 +162,14 @@ def collide(
 
 
 def met(
-    bodies: Sequence[Modes], contacts: Sequence[Touch], *, speeds: Any = None, states: Any = None, forces: Any = None,
-    start: State | Response | None = None, pushes: Sequence[np.ndarray] = (), **options: Any,
+    bodies: Sequence[Any], contacts: Sequence[Touch], *, speeds: Any = None, states: Any = None, forces: Any = None,
+    start: State | Response | None = None, **options: Any,
 ) -> Response:  # fmt: skip
-    """`collide` without a word on its tolerance; ``pushes`` are constant modal forces on the first bodies."""
+    """`collide` without a word on its tolerance; hands and their weight push strikers on."""
     asked = Options(**options)
-    bodies, contacts = check.several("bodies", bodies, Modes), check.several("contacts", contacts, Touch)
+    given, contacts = check.several("bodies", bodies, Modes, Striker), check.several("contacts", contacts, Touch)
+    strikers = {i: each for i, each in enumerate(given) if isinstance(each, Striker)}
+    bodies = tuple(strikers[i].body if i in strikers else each for i, each in enumerate(given))
     if any(body.stretches for body in bodies):
         raise ValueError("a body that stretches can only be struck once, by `fi.strike`; leave stretching out")
     before = start.state() if isinstance(start, Response) else start
@@ -169,12 +177,9 @@ def met(
         if states is not None:
             raise ValueError("states must be left out if start is given, which has the states of all bodies")
         states = before.states(bodies, [touch.law for touch in contacts])
-    parts, arriving = _parts(bodies, contacts, speeds, states, forces, asked.residual)
-    pushed = zip(parts, pushes)
-    parts = [
-        *(replace(part, bias=part.bias + push, held=int(part.omega[0] > 0.0)) for part, push in pushed),
-        *parts[len(pushes) :],
-    ]
+    parts, arriving = _parts(bodies, contacts, speeds, states, forces, asked.residual, strikers)
+    for i, each in strikers.items():
+        parts[i] = replace(parts[i], bias=parts[i].bias + each.push, held=int(each.hand is not None))
     others = []
     if before is not None:
         ends = [[i for i, _ in part.touched] for part in parts]
@@ -240,8 +245,8 @@ def _check_way(system: KernelSystem, depth: float, tolerance: float) -> None:
         )
 
 
-def _parts(bodies, contacts, speeds, states, forces, residual) -> tuple[list[ReducedBody], float]:
-    """Every body as a `ReducedBody`, and the speed of the first body that moves."""
+def _parts(bodies, contacts, speeds, states, forces, residual, strikers=None) -> tuple[list[ReducedBody], float]:
+    """Every body as a `ReducedBody`, and the speed of the first body that moves; ``strikers`` by their number."""
     if states is not None:
         wrong = not isinstance(states, (list, tuple)) or len(states) != len(bodies)
         if wrong or any(not isinstance(pair, (list, tuple)) or len(pair) != 2 for pair in states):
@@ -257,6 +262,7 @@ def _parts(bodies, contacts, speeds, states, forces, residual) -> tuple[list[Red
                 continue
             if not 0 <= body < len(bodies):
                 raise ValueError(f"contacts must name bodies from 0 to {len(bodies) - 1}, got {body}")
+            at = strikers[body].at if strikers and at is None and body in strikers else at
             ends[body].append((i, sign, bodies[body].point("at", at)))
     parts, arriving = [], 0.0
     for body, modes in enumerate(bodies):
@@ -270,7 +276,8 @@ def _parts(bodies, contacts, speeds, states, forces, residual) -> tuple[list[Red
         if speed != 0.0:
             if not touched or not part.rows[0, modes.omega == 0.0].any():
                 raise ValueError(f"speeds must be zero for a body that cannot move rigidly, got {speed:g} m/s")
-            part = replace(part, p=part.p + speed * modes.rigid_motion(points[:1]), speed=speed)
+            own = strikers[body].motion if strikers and body in strikers else modes.rigid_motion(points[:1])
+            part = replace(part, p=part.p + speed / float(part.rows[0] @ own) * own, speed=speed)
         arriving = arriving or speed
         parts.append(part)
     return parts, arriving

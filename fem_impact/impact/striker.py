@@ -10,6 +10,8 @@ from .._base import check
 from .._base.remembered import Remembered
 from ..fe import plausible
 from ..fe.section import Material
+from ..modes import free_body
+from ..modes.body import Body
 from ..modes.modal import Modes, left_out
 from ..modes.shapes import REMEMBERED, Shapes
 from ..modes.slender import SHEAR_RATIO, beam
@@ -80,6 +82,9 @@ class HeldShapes(Shapes, check.Brief):
     def dent(self, points: np.ndarray) -> np.ndarray:
         return self.base.dent(points)
 
+    def across(self, points: np.ndarray) -> np.ndarray | None:
+        return self.base.across(points)
+
     def take(self, n_modes: int) -> "HeldShapes":
         return replace(self, base=self.base.take(n_modes))
 
@@ -92,7 +97,7 @@ class Striker(check.Brief):
     """A body and the point it strikes with; it arrives in rigid motion, undeformed.
 
     Its speed is the speed of its contact point: a body hinged at its far end turns about the hinge, a free body moves
-    in a straight line.
+    in a straight line unless it is said to turn (`of`, `turning`).
     """
 
     modes: Modes
@@ -102,6 +107,8 @@ class Striker(check.Brief):
     fixed: bool = True  # True: a blow keeps all modes; False: only those its tolerance needs
     hand: Hand | None = None  # what holds it, see `held`
     gravity: float = 0.0  # [m/s^2] that pulls it towards the struck body, see `falling`
+    arrival: np.ndarray | None = None  # (n_rigid,) modal velocities on arrival, of any size; None: as said above
+    aslant: bool = False  # whether it comes turning, or not along the blow
 
     def __post_init__(self) -> None:
         check.instance("modes", self.modes, Modes)
@@ -121,6 +128,11 @@ class Striker(check.Brief):
             raise ValueError(
                 "at must be a point that moves when the striker moves rigidly, got one at rest; move it off the hinge"
             )
+        if self.arrival is not None:
+            coming = check.array("arrival", self.arrival, (self.modes.n_rigid,))
+            check.settle(self, arrival=coming)
+            if shape[: self.modes.n_rigid] @ coming <= 0.0:
+                raise ValueError("arrival must move the contact point towards the struck body")
         check.lock_arrays(self)
         check.settle(self, gravity=check.non_negative("gravity", self.gravity, "m/s^2"))
         if self.gravity:
@@ -251,6 +263,77 @@ class Striker(check.Brief):
         """
         return cls(modes, at)
 
+    @classmethod
+    def of(
+        cls, body: Body, at: Any, *, direction: Any = "normal", along: Any = None, pivot: Any = None,
+        material: Material | None = None, radius: float | None = None,
+    ) -> "Striker":  # fmt: skip
+        """A body of another program, such as a bat or a hammer; its rigid motions are among its modes.
+
+        Parameters
+        ----------
+        body : Body
+        at : node, by number, name or point (3,) [m], that strikes
+        direction : "normal", "x", "y", "z" or a vector (3,)
+            From this body into the struck one, square to both at their contact.
+        along : vector (3,), optional
+            In which it moves if that is not the direction: an oblique blow. Its speed is that along the direction.
+        pivot : array_like, shape (3,) [m], optional
+            Point about which it turns as it arrives; from then on it is free. About a hinge that goes on holding it
+            turn modes of a body hinged there.
+        material, radius : Material, float [m], optional
+            Of a round tip, for `Contact.between`.
+
+        Raises
+        ------
+        ValueError
+            If the rigid motions do not allow this arrival, or move another mass than that of the body.
+
+        Examples
+        --------
+        >>> nodes = [(x, 0.0, 0.0) for x in (-0.3, 0.0, 0.3)]
+        >>> rod = fi.Body.rigid(0.12, (0.0, 3.6e-3, 3.6e-3), nodes, names={"tip": 3})
+        >>> swung = fi.Striker.of(rod, "tip", direction="z", pivot=(-0.3, 0.0, 0.0))
+        >>> hit = fi.strike(fi.Modes.rigid(0.03), swung, fi.Contact.linear(1e5), at=None, speed=2.0)
+        >>> rod.displacement(hit.modal_state([0.0], body=0)[1], 1)[0, 0].round(9).tolist()  # m/s, of the other end
+        [0.0, 0.0, 0.0]
+        """
+        check.instance("body", body, Body)
+        way, row = body.way(at, direction), body.node(at)
+        coming = free_body.arrival(body, row, way, along, pivot)
+        aslant = along is not None or pivot is not None
+        return cls(body.modes(way), body.nodes[row, body.axes], material, radius, arrival=coming, aslant=aslant)
+
+    @classmethod
+    def turning(cls, mass: float, inertia: float, arm: Any, *, pivot: Any = None) -> "Striker":
+        """A free rigid body that strikes beside its centre of mass, and so begins to turn.
+
+        It is felt as ``1 / (1 / mass + across**2 / inertia)``.
+
+        Parameters
+        ----------
+        mass : float [kg]
+        inertia : float [kg m^2]
+            About the centre of mass, around the axis at right angles to the blow and to its arm.
+        arm : (across, ahead) [m]
+            The contact point from the centre of mass: beside the line of the blow, and towards the struck body.
+        pivot : (across, ahead) [m], optional
+            The point, from the centre of mass, about which it turns as it arrives: the grip of a hammer. By default it
+            moves straight.
+
+        Examples
+        --------
+        >>> club = fi.Striker.turning(0.3, inertia=2e-4, arm=(0.02, 0.05), pivot=(-0.9, 0.0))
+        >>> round(club.felt_mass, 4), round(1.0 / (1.0 / 0.3 + 0.02**2 / 2e-4), 4)  # kg
+        (0.1875, 0.1875)
+        """
+        inertia = check.positive("inertia", inertia, "kg m^2")
+        places = {"arm": arm} if pivot is None else {"arm": arm, "pivot": pivot}
+        nodes = np.zeros((1 + len(places), 3))
+        nodes[1:, [0, 2]] = [check.array(name, place, (2,), "m") for name, place in places.items()]
+        body = Body.rigid(mass, inertia, nodes)
+        return cls.of(body, 2, direction="z", pivot=None if pivot is None else nodes[2])
+
     def held(self, hand: Hand) -> "Striker":
         """The same striker held by a hand, which brings it back after each bounce.
 
@@ -324,8 +407,8 @@ class Striker(check.Brief):
         """Raise ValueError if the striker does not fall freely."""
         if self.hand is not None:
             raise ValueError(f"striker must fall freely to {what}, but a hand holds this one; leave it free")
-        if self.modes.n_rigid == 1 and self.felt_mass < (1.0 - 1e-9) * self.mass:
-            raise ValueError(f"striker must fall freely to {what}, but this one turns about a hinge; give its speed")
+        if self.aslant or (self.modes.n_rigid == 1 and self.felt_mass < (1.0 - 1e-9) * self.mass):
+            raise ValueError(f"striker must fall freely to {what}, but this one turns or comes aslant; give its speed")
 
     def let_go(self, what: str) -> None:
         """Raise ValueError if a hand or the weight brings the striker back, for ``what`` cannot follow it."""
@@ -370,7 +453,10 @@ class Striker(check.Brief):
     @cached_property
     def motion(self) -> np.ndarray:
         """Modal velocities per unit speed of the contact point on arrival, (n_modes,) [kg**0.5]."""
-        return self.modes.rigid_motion(self.at[None])
+        if self.arrival is None:
+            return self.modes.rigid_motion(self.at[None])
+        n = self.modes.n_rigid
+        return np.append(self.arrival / (self.shape[:n] @ self.arrival), np.zeros(self.modes.n_modes - n))
 
     @cached_property
     def left_out(self) -> tuple[np.ndarray, np.ndarray]:

@@ -131,7 +131,7 @@ def examine_time(struck: Struck) -> Assumption:
     """Whether the contact lasts much longer than the striker's own vibration."""
     striker = struck.hit.striker
     lumps = striker is not None and striker.modes.thick and isinstance(striker.modes.shapes, SampledShapes)
-    if striker is not None and striker.modes.dimension and not lumps:
+    if striker is not None and striker.modes.dimension and striker.modes.omega.any() and not lumps:
         return SLOW.holds(struck)  # its modes are part of the blow
     if striker is None or striker.radius is None or striker.material is None:
         return SLOW.unknown(struck, "size and material of the striker", stated=_hertz(struck) is None)

@@ -416,8 +416,8 @@ class _Game:
             q, p = (*(stick.q for stick in sticks), self.q), (*(stick.p for stick in sticks), self.p)
             forces = np.array([stick.force for stick in sticks])
             start = State(0.0, bodies, q, p, forces, self.error, None, laws)
-            pushes = [stick.striker.push for stick in sticks]
-            hit = planner.struck(partial(collision.met, bodies, touches, start=start, pushes=pushes), rule)
+            movers = (*(stick.striker for stick in sticks), self.modes)
+            hit = planner.struck(partial(collision.met, movers, touches, start=start), rule)
             self.sticks = sticks
         self._keep(hit, tuple(stick.number for stick in self.sticks))
 

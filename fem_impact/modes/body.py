@@ -1,7 +1,7 @@
 """A body known elsewhere: modes at the nodes of another program's model, or of a modal test, in three dimensions."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field, fields, replace
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from .._base import check
-from . import dents, imported
+from . import dents, free_body, imported
 from .modal import Modes, damping_ratios
 
 RIGID = 0.01, 6  # [-] frequencies this far below the next are rounding, of at most so many rigid motions
@@ -168,6 +168,52 @@ class Body(check.Brief):
         told |= {"frequencies": _without_rounding(told["frequencies"][order]), "shapes": told["shapes"][:, :, order]}
         return cls(**{name: told[name] for name in (each.name for each in fields(cls)) if name in told})
 
+    @classmethod
+    def rigid(
+        cls, mass: float, inertia: Any, nodes: ArrayLike, *, centre: ArrayLike = (0.0, 0.0, 0.0), **more: Any
+    ) -> "Body":
+        """A rigid body, free to move and to turn: six modes of 0 Hz.
+
+        A blow at a lever arm r along n feels it as ``1 / (1 / mass + (r x n) . inertia**-1 (r x n))``.
+
+        Parameters
+        ----------
+        mass : float [kg]
+        inertia : float, (3,) or (3, 3) [kg m^2]
+            About the centre of mass: of a sphere, along the axes, or the tensor.
+        nodes : array_like, shape (n_nodes, 3) [m]
+            Points that are struck or looked at.
+        centre : array_like, shape (3,) [m] of mass
+        **more
+            ``names``, ``numbers``, ``cells`` and ``normals`` as of `Body`.
+
+        Examples
+        --------
+        >>> block = fi.Body.rigid(0.6, (4e-4, 4e-4, 2e-4), [(0, 0, 0), (0.03, 0, 0.05)], names={"corner": 2})
+        >>> 0.6 / (1.0 + 0.6 * 0.03**2 / 4e-4), fi.Striker.of(block, "corner", direction="z").felt_mass
+        (0.25531914893617025, 0.25531914893617025)
+        """
+        mass, nodes = check.positive("mass", mass, "kg"), check.array("nodes", nodes, (None, 3), "m")
+        shapes = free_body.six(nodes, mass, inertia, centre)
+        return cls(np.zeros(shapes.shape[2]), shapes, nodes, mass, **more)
+
+    def freed(self, inertia: Any, centre: ArrayLike) -> "Body":
+        """The same body with its rigid motions, which its modes lack: as of a free one, tested on soft springs.
+
+        Parameters
+        ----------
+        inertia : float, (3,) or (3, 3) [kg m^2] about the centre of mass, along the axes of the nodes
+        centre : array_like, shape (3,) [m] of mass
+        """
+        if not self.frequencies.all():
+            raise ValueError("body must have no rigid motions yet, but its first modes are at 0 Hz; it is free already")
+        moving = free_body.six(self.nodes, self.mass, inertia, centre)
+        still = np.zeros(moving.shape[2])
+        return replace(
+            self, frequencies=np.append(still, self.frequencies), shapes=np.concatenate([moving, self.shapes], axis=2),
+            damping_ratio=np.append(still, self.damping_ratio),
+        )  # fmt: skip
+
     def save(self, path: Any) -> Path:
         """Write a ``.npz`` file that `load` reads."""
         path = check.path("path", path).with_suffix(".npz")
@@ -248,8 +294,16 @@ class Body(check.Brief):
             solid=False,
         )  # fmt: skip
         made = dents.settled(made, seen, self.solid)
-        check.settle(made, notes=(*made.notes, NOTE))
-        return made
+        sideways = free_body.across(self.shapes[kept], ways[kept], made.n_modes)
+        return replace(made, shapes=replace(made.shapes, sideways=sideways), notes=(*made.notes, NOTE))
+
+    def way(self, where: Any, direction: Any = "normal") -> np.ndarray:
+        """Unit vector (3,) of a direction, as of `modes`, at a node."""
+        row = self.node(where)
+        way = self._ways(direction)[row]
+        if not way.any():
+            raise ValueError(f"direction must be x, y, z or a vector: node {self.numbers[row]} has no normal")
+        return np.array(way)
 
     def _ways(self, direction: Any) -> np.ndarray:
         """Unit vector (n_nodes, 3) along which each node is struck; zero where it cannot be."""

@@ -366,6 +366,11 @@ class Modes(check.Brief):
         everywhere = rigid.at(corners)  # (n_points, n_rigid)
         straight = np.linalg.lstsq(everywhere, np.ones(len(corners)), rcond=None)[0]
         if np.abs(everywhere @ straight - 1.0).max() > 1e-6:
+            if self.n_rigid > 1 and self.dimension > 2:
+                raise ValueError(
+                    "speed needs a body whose points all move along one direction, as of `Body.modes` with a vector; "
+                    "along normals nothing tells how it arrives: give `Striker.of`"
+                )
             row = rigid.at(point)[0]
             straight = row / (row @ row)
         result[: self.n_rigid] = straight / (rigid.at(point)[0] @ straight)

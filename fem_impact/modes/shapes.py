@@ -57,6 +57,10 @@ class Shapes(Protocol):
         """Relative error (n_points, n_modes) [-] of squared shapes that were measured; None if it is not known."""
         return None
 
+    def across(self, points: np.ndarray) -> np.ndarray | None:
+        """Shapes (n_points, 2, n_modes) [kg**-0.5] at right angles to the blow; None if they are not known."""
+        return None
+
     def take(self, n_modes: int) -> "Shapes":
         """The same body with its first ``n_modes`` modes only."""
 
@@ -138,6 +142,10 @@ class ScaledShapes(Shapes, check.Brief):
     def spread(self, points: np.ndarray) -> np.ndarray | None:
         return self.base.spread(points)
 
+    def across(self, points: np.ndarray) -> np.ndarray | None:
+        found = self.base.across(points)
+        return None if found is None else self.amplitude * found
+
     def take(self, n_modes: int) -> "ScaledShapes":
         return replace(self, base=self.base.take(n_modes))
 
@@ -184,6 +192,7 @@ class SampledShapes(Shapes, check.Locked):
     carried: np.ndarray | None = None  # (n_points, n) [(m/N)**0.5] shapes by frequency: what yields under other loads
     doubt: np.ndarray | None = None  # (n_points, n_modes) [-] see `spread`
     dents: np.ndarray | None = None  # (n_points, 2) [m/N] see `dent`
+    sideways: np.ndarray | None = None  # (n_points, 2, n_modes) [kg**-0.5] see `across`
 
     @property
     def dimension(self) -> int:
@@ -240,9 +249,15 @@ class SampledShapes(Shapes, check.Locked):
     def spread(self, points: np.ndarray) -> np.ndarray | None:
         return None if self.doubt is None else self.doubt[self._index(points)[0]]
 
+    def across(self, points: np.ndarray) -> np.ndarray | None:
+        return None if self.sideways is None else self.sideways[self._index(points)[0]]
+
     def take(self, n_modes: int) -> "SampledShapes":
-        doubt = None if self.doubt is None else self.doubt[:, :n_modes].copy()
-        return replace(self, values=self.values[:, :n_modes].copy(), doubt=doubt)
+        others = {"doubt": self.doubt, "sideways": self.sideways}
+        fewer: dict[str, Any] = {
+            name: each if each is None else each[..., :n_modes].copy() for name, each in others.items()
+        }
+        return replace(self, values=self.values[:, :n_modes].copy(), **fewer)
 
     def grid(self) -> tuple[np.ndarray, np.ndarray]:
         return self.points, np.arange(len(self.points))[:, None] if self.cells is None else self.cells

@@ -95,7 +95,8 @@ def _at_points(modes: Modes, touched: np.ndarray, points: Any) -> Modes:
     known_errors, dents = estimated(modes.shapes, touched), np.zeros((len(places), 2))
     rest[:n], rest[:n, 1], dents[:n] = 0.0, known_errors["compliance"], modes.shapes.dent(touched)
     static, flexible = modes.shapes.deflection(touched, places), modes.omega > 0.0
-    known = {"loads": np.arange(n), "carried": values[:, flexible] / modes.omega[flexible]}
+    known: dict[str, Any] = {"loads": np.arange(n), "carried": values[:, flexible] / modes.omega[flexible]}
+    known["sideways"] = modes.shapes.across(places)
     return replace(modes, shapes=SampledShapes(places, values, static, rest=rest, dents=dents, **known))
 
 

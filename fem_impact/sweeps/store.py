@@ -175,7 +175,7 @@ def fingerprint(grid: Any) -> Mark:
         body.update(f"{name} {values.shape}".encode() + np.ascontiguousarray(values, float).tobytes())
     striker = grid.base.striker
     told = grid.tolerance, grid.residual, grid.band, grid.layers, grid.max_impacts, striker.hand, grid.base.first
-    body.update(repr(told).encode())
+    body.update(repr(told).encode() + striker.motion.tobytes())
     seen = [(modes, np.array([place])) for place, modes in grid.base.views.items()]
     for modes, places in seen or [(grid.base.modes, grid.axes.get("at", grid.base.at[None]))]:
         for each in (modes, *modes.poorer.values()):

@@ -40,6 +40,8 @@ COLOURS = [
     "#e69f00",
     "#f0e442",
     "#cc79a7",
+    "#332288",
+    "#117733",
     "#999999",
 ]  # one for each of ALL
 BALL = {"kind": "sphere", "radius": 0.015, "E": 1.5e9, "nu": 0.3, "rho": 700.0, "yield_strength": 1e7}  # maple

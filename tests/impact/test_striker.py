@@ -239,7 +239,7 @@ def test_a_dropped_ball_has_the_energy_of_its_height():
 @pytest.mark.parametrize(
     "striker, words",
     [
-        (fi.Striker.stick(mass=0.1, first_frequency=1e3), "turns about a hinge; give its speed"),
+        (fi.Striker.stick(mass=0.1, first_frequency=1e3), "turns or comes aslant; give its speed"),
         (fi.Striker.rigid(0.1).held(fi.Hand(stiffness=100.0)), "but a hand holds this one"),
     ],
     ids=["hinged", "held"],
