@@ -59,7 +59,7 @@ class ReducedBody:
     points: np.ndarray  # (n_ends, dimension) [m] contact points
     pressed: np.ndarray  # (2, n_ends) [N], [N/s] contact forces at the start and their rates
     loose: np.ndarray  # (n_ends, n) shapes of rigid motions that it may have besides
-    spread: np.ndarray | None = None  # (n_ends, n_modes) [-] relative error of squared shapes that were measured
+    spread: np.ndarray | None = None  # (n_ways, n_ends, n_modes) [-] relative errors of squared shapes
     stretching: Stretching | None = None
     speed: float = 0.0  # [m/s] with which it arrives in rigid motion, at its first contact
     held: int = 0  # [-] first modes that only a hand makes swing: within a contact they move like a mass

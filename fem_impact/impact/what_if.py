@@ -124,7 +124,8 @@ def unstated(blow: Followed, bodies: Sequence[Modes]) -> Variation:
     """What nobody said of the bodies, see `Modes.unstated`.
 
     That is the most and the least that the modes left out of a body may yield, and the rigid motions that it may have,
-    on springs too soft to matter; and shapes that were picked, larger or smaller by their errors.
+    on springs too soft to matter; and shapes that were measured, larger or smaller by their errors, in each of the ways
+    that these may go together.
     """
     changes = []
     for i, (modes, part) in enumerate(zip(bodies, blow.parts)):
@@ -136,8 +137,9 @@ def unstated(blow: Followed, bodies: Sequence[Modes]) -> Variation:
             most, fewest = part.rest + np.diag(part.doubt), part.rest * np.outer(kept, kept)
             changes.append([(blow.changed(i, replace(part, rest=rest)), 1.0, 1.0) for rest in (most, fewest)])
         if part.spread is not None:
-            larger, smaller = (part.rows * np.sqrt(np.maximum(0.0, 1.0 + sign * part.spread)) for sign in (1.0, -1.0))
-            changes.append([(blow.changed(i, replace(part, rows=rows)), 1.0, 1.0) for rows in (larger, smaller)])
+            either = np.concatenate([1.0 + part.spread, 1.0 - part.spread])
+            others = part.rows * np.sqrt(np.maximum(0.0, either))
+            changes.append([(blow.changed(i, replace(part, rows=rows)), 1.0, 1.0) for rows in others])
         if part.loose.size:
             changes.append([(blow.changed(i, part.loosened()), 1.0, 1.0)])
     return Variation("truncation", changes)

@@ -16,7 +16,7 @@ from .._base.rounding import ROUNDING, SAME
 from ..fe import plausible, refinement
 from ..fe.assembly import THICK, System
 from ..fe.section import Beam, Plate
-from . import dents, picked, universal_files, unstated, viewing
+from . import dents, followed, picked, universal_files, unstated, viewing
 from .shapes import (
     REMEMBERED,
     SHAPE_ERROR,
@@ -223,8 +223,9 @@ class Modes(check.Brief):
         frequencies: ArrayLike | None = None,
         compliance: ArrayLike | None = None,
         free: bool | None = None,
+        pick: bool = True,
     ) -> "Modes":
-        """Modes at the peaks of measured frequency responses.
+        """Modes at the peaks of measured frequency responses, or modes that follow these as they are.
 
         Parameters
         ----------
@@ -242,6 +243,12 @@ class Modes(check.Brief):
         compliance, free : optional
             As in `from_arrays`. Without ``compliance`` what the modes left out yield is not known: it is estimated, and
             a blow counts the error of that estimate.
+        pick : bool
+            Whether modes are those at peaks. False takes as many as it needs to follow the response at the point
+            struck, none with a negative amplitude, so that the body is causal and passive; what this changed of the
+            response, noise (by the errors or coherence in ``frf``) and a record that ends too early are errors of its
+            shapes. What is left out above the band is measured, too, and below the band it moves rigidly if the lowest
+            lines do. ``frequencies`` and ``compliance`` are then left out.
 
         Returns
         -------
@@ -269,12 +276,30 @@ class Modes(check.Brief):
         >>> found.frequencies.round().tolist(), found.damping_ratio.round(3).tolist()
         ([120.0, 410.0], [0.02, 0.02])
         """
+        if not check.flag("pick", pick):
+            return cls._following(frf, mass, points, driving, free, frequencies is None and compliance is None)
         told, errors, notes = picked.modes_of(frf, driving, points, frequencies)
         made = cls.from_arrays(**told, mass=mass, compliance=compliance, free=free)
         rigid = np.zeros((len(errors), made.n_modes - errors.shape[1]))
         sampled: Any = made.shapes
-        shapes = replace(sampled, doubt=np.hstack([rigid, errors]))
+        shapes = replace(sampled, doubt=np.hstack([rigid, errors])[None])
         return replace(made, shapes=shapes, notes=(*made.notes, *notes), unstated=(*made.unstated, "shapes"))
+
+    @classmethod
+    def _following(cls, frf: Any, mass: float, points: Any, driving: Any, free: Any, plain: bool) -> "Modes":
+        """`from_frf` without picking."""
+        if not plain:
+            raise ValueError("frequencies and compliance must be left out if pick is False: the responses tell them")
+        body = followed.body_of(frf, driving, points)
+        arrays: dict[str, Any] = body.arrays
+        made = cls.from_arrays(**arrays, mass=mass, free=False)
+        sampled: Any = made.shapes
+        rest = np.zeros((len(arrays["points"]), 2)) if sampled.rest is None else sampled.rest.copy()
+        rest[body.driving] = body.rest
+        loose = body.loose if free is None else 0.0
+        known = replace(sampled, rest=rest, doubt=body.doubt, rigid=np.full((len(rest), 1), loose) if loose else None)
+        said = ("shapes", "compliance", *(("free",) if loose else ()))
+        return replace(made, shapes=known, notes=tuple(body.notes), unstated=said)
 
     @cached_property
     def known(self) -> Remembered:  # what was found of these modes at points where they were struck

@@ -55,8 +55,11 @@ def is_frf(value: Any) -> bool:
     return "H" in getattr(value, "data_vars", ()) and all(name in names for name in ("frequency", "channel", "units"))
 
 
-def _responses(name: str, found: Any) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Angular frequencies (n,) [rad/s], accelerances (n, n_channels) [1/kg] and weights (n,), where there is force."""
+def responses(name: str, found: Any) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    """Where there is force: s (n,) [rad/s], accelerances (n, n_channels) [1/kg], weights (n,), which lines.
+
+    An exponential window over force and response moves s = i omega by the damping that it adds, and does nothing else.
+    """
     if not is_frf(found) or found["H"].dims != ("frequency", "channel") or not found["H"].size:
         raise ValueError(f"{name} must be frequency responses as fi.frf returns them, got {check.shown(found)}")
     units = [str(unit) for unit in found["units"].values]
@@ -71,10 +74,11 @@ def _responses(name: str, found: Any) -> tuple[np.ndarray, np.ndarray, np.ndarra
         used &= found["force"].values >= FELT * found["force"].values.max()
     sure = found["coherence"].values.mean(axis=1)[used] if "coherence" in found else 1.0
     omega = omega[used]
-    values = values[used] * (1j * omega[:, None]) ** (2 - np.array([PER_FORCE[unit] for unit in units]))
+    s = 1j * omega + float(found.attrs.get("added_damping", 0.0))
+    values = values[used] * s[:, None] ** (2 - np.array([PER_FORCE[unit] for unit in units]))
     size = np.sqrt(np.square(np.abs(values)).mean(axis=1))
     # errors go with the response where it is large, and are noise where it is small
-    return omega, values, sure / np.hypot(size, max(np.median(size) if size.size else 0.0, 1e-300))
+    return s, values, sure / np.hypot(size, max(np.median(size) if size.size else 0.0, 1e-300)), used
 
 
 def pick(name: str, found: Any, about: Any = None) -> Picked:
@@ -82,17 +86,18 @@ def pick(name: str, found: Any, about: Any = None) -> Picked:
 
     Peaks whose pole runs away in the search are no modes and are left out.
     """
-    omega, values, weight = _responses(name, found)
+    s, values, weight, _ = responses(name, found)
+    omega = s.imag
     size = np.sqrt(np.square(np.abs(values)).mean(axis=1)) / np.maximum(omega, 1e-300)
     if about is None:
-        places = peaks(size)
+        summits = peaks(size)
     else:
         wanted = 2.0 * np.pi * check.ascending("frequencies", about, "Hz")
         if wanted.size and not (len(omega) and omega[0] <= wanted[0] and wanted[-1] <= omega[-1]):
             raise ValueError(f"frequencies must lie within those of {name}, where its force has power")
-        places = np.unique([int(np.abs(omega - one).argmin()) for one in wanted]).astype(int)
+        summits = np.unique([int(np.abs(omega - one).argmin()) for one in wanted]).astype(int)
     data = np.vstack([(values * weight[:, None]).real, (values * weight[:, None]).imag])
-    start = np.log(np.stack([omega[places], [_damping(omega, size, i) for i in places]])).reshape(2, -1)
+    start = np.log(np.stack([omega[summits], [_damping(omega, size, i) for i in summits]])).reshape(2, -1)
     found_modes = _fit(omega, data, weight, start)
     while about is None:  # peaks hidden beside others show in what is left
         more = _with_one_more(omega, data, weight, found_modes)
@@ -230,17 +235,17 @@ def modes_of(found: Any, driving: Any, points: Any, about: Any) -> tuple[dict[st
     The errors (n_points, n_modes) are relative, of squared shapes.
     """
     picked = pick("frf", found, about)
-    drive, used, sign, end = _ends(found, driving)
+    drive, used, sign, end = ends(found, driving)
     products = sign[:, None] * picked.products[used]
     own, doubt = products[used.index(drive)], picked.errors[drive]
     if (own < 0.0).sum() > (own > 0.0).sum():
         raise ValueError(
-            f"frf has a response at the point struck, {_label(found, drive)}, that moves against the force; change the "
+            f"frf has a response at the point struck, {label(found, drive)}, that moves against the force; change the "
             "sign of its direction"
         )
     told = own > SURE * doubt
     if not told.any():
-        raise ValueError(f"frf must have a response {_label(found, drive)} at the point struck that moves in its modes")
+        raise ValueError(f"frf must have a response {label(found, drive)} at the point struck that moves in its modes")
     notes = [f"picked from frequency responses, of which {100.0 * picked.left:.2g} % rms are left unexplained"]
     if not told.all():
         lost = ", ".join(f"{one:.5g} Hz" for one in picked.frequencies[~told])
@@ -248,15 +253,15 @@ def modes_of(found: Any, driving: Any, points: Any, about: Any) -> tuple[dict[st
     errors = np.hypot(picked.errors[used] / np.maximum(np.abs(products), 1e-300), picked.misfit[used])
     return {
         "frequencies": picked.frequencies[told], "damping_ratio": picked.damping_ratio[told],
-        "shapes": products[:, told] / np.sqrt(own[told]), "points": _points(found, points, used, end),
+        "shapes": products[:, told] / np.sqrt(own[told]), "points": places(found, points, used, end),
     }, errors[:, told], notes  # fmt: skip
 
 
-def _label(found: Any, i: int) -> str:
+def label(found: Any, i: int) -> str:
     return repr(str(found["channel"].values[i]))
 
 
-def _ends(found: Any, driving: Any) -> tuple[int, list[int], np.ndarray, str]:
+def ends(found: Any, driving: Any) -> tuple[int, list[int], np.ndarray, str]:
     """The channel at the point struck, the channels along its direction, their signs, and which end moves."""
     count, names = found.sizes["channel"], [str(name) for name in found["channel"].values]
     if driving is not None:
@@ -291,7 +296,7 @@ def _ends(found: Any, driving: Any) -> tuple[int, list[int], np.ndarray, str]:
     return drive, used.tolist(), sign, "struck" if moves[1] else "place"
 
 
-def _points(found: Any, points: Any, used: list[int], end: str) -> np.ndarray:
+def places(found: Any, points: Any, used: list[int], end: str) -> np.ndarray:
     """Points (n_used, dimension) [m], given for all channels or stated in the file."""
     if points is not None:
         given = check.array("points", points, (None, None), "m")

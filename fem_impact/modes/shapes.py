@@ -54,7 +54,10 @@ class Shapes(Protocol):
         return np.zeros((len(points), 0))
 
     def spread(self, points: np.ndarray) -> np.ndarray | None:
-        """Relative error (n_points, n_modes) [-] of squared shapes that were measured; None if it is not known."""
+        """Relative errors (n_ways, n_points, n_modes) [-] of squared shapes that were measured; None if not known.
+
+        Each way is one that errors may go together, with either sign.
+        """
         return None
 
     def across(self, points: np.ndarray) -> np.ndarray | None:
@@ -190,7 +193,7 @@ class SampledShapes(Shapes, check.Locked):
     rigid: np.ndarray | None = None  # (n_points, n) [kg**-0.5] see `loose`
     loads: np.ndarray | None = None  # (n_loads,) points of these loads; None if every point has one
     carried: np.ndarray | None = None  # (n_points, n) [(m/N)**0.5] shapes by frequency: what yields under other loads
-    doubt: np.ndarray | None = None  # (n_points, n_modes) [-] see `spread`
+    doubt: np.ndarray | None = None  # (n_ways, n_points, n_modes) [-] see `spread`
     dents: np.ndarray | None = None  # (n_points, 2) [m/N] see `dent`
     sideways: np.ndarray | None = None  # (n_points, 2, n_modes) [kg**-0.5] see `across`
 
@@ -247,7 +250,7 @@ class SampledShapes(Shapes, check.Locked):
         return super().loose(points) if self.rigid is None else self.rigid[self._index(points)[0]]
 
     def spread(self, points: np.ndarray) -> np.ndarray | None:
-        return None if self.doubt is None else self.doubt[self._index(points)[0]]
+        return None if self.doubt is None else self.doubt[:, self._index(points)[0]]
 
     def across(self, points: np.ndarray) -> np.ndarray | None:
         return None if self.sideways is None else self.sideways[self._index(points)[0]]

@@ -55,7 +55,7 @@ def test_what_modes_left_out_yield_is_told_as_unknown(plate):
 def test_errors_of_picked_shapes_cover_them_and_reach_the_blow(plate):
     """Twenty times the noise of the other tests; the truth within three times the error stated of each mode."""
     found = fi.Modes.from_frf(responses(plate, noise=2e-2), mass=0.188, points=POINTS, driving="p0")
-    spread, rows = found.shapes.spread(POINTS[:1])[0], found.shape_at(POINTS[:1])[0]
+    spread, rows = found.shapes.spread(POINTS[:1])[0, 0], found.shape_at(POINTS[:1])[0]
     for wanted in (0, 1, 2):
         i = int(np.abs(found.frequencies - plate.frequencies[wanted]).argmin())
         true = plate.shape_at(POINTS[:1])[0, wanted] ** 2
@@ -65,7 +65,7 @@ def test_errors_of_picked_shapes_cover_them_and_reach_the_blow(plate):
     hits = [fi.strike(modes, fi.Striker.rigid(0.02), fi.Contact.linear(1e4), **blow) for modes in (found, plate)]
     assert "shapes but as picked" in hits[0].verdict
     assert abs(hits[0].restitution - hits[1].restitution) <= hits[0].error.total + hits[1].error.total
-    assert found.scaled(mass=0.3).shapes.spread(POINTS[:1]) == pytest.approx(spread[None])
+    assert found.scaled(mass=0.3).shapes.spread(POINTS[:1]) == pytest.approx(spread[None, None])
 
 
 def test_nodes_tell_the_point_struck_and_signs_of_directions(plate):

@@ -1,0 +1,115 @@
+"""Bodies that follow a frequency response: passive, as good as the response, with errors that hold."""
+
+import numpy as np
+import pytest
+import xarray as xr
+
+import fem_impact as fi
+from fem_impact.modes import followed
+
+AT = [0.0]
+FREQUENCY = np.arange(0.0, 1500.0, 5.0)  # Hz
+KNOWN = np.array([0.0, 210.0, 530.0, 545.0, 900.0, 1380.0, 2200.0, 3100.0])  # Hz
+
+
+def known(first=0):
+    """A body of a rigid motion, or none, and modes, two of them close together, three above the band."""
+    rows = np.array([1.1, 1.4, -0.9, 1.2, 1.0, 1.3, -0.8, 1.1])  # kg**-0.5
+    shapes = np.stack([rows, 0.7 * rows[::-1]])[:, first:]
+    return fi.Modes.from_arrays(
+        KNOWN[first:], shapes, points=[[0.0], [1.0]], mass=1.0, damping_ratio=np.where(KNOWN[first:] > 0.0, 0.01, 0.0),
+        complete=True,
+    )  # fmt: skip
+
+
+def measured(modes, noise=1e-3, sigma=20.0, scale=1.0):
+    """Its accelerance at both points with noise and an exponential window, as `fi.frf` tells them."""
+    s = 2j * np.pi * FREQUENCY[:, None] + sigma
+    unit = s**2 / (s**2 + 2.0 * modes.damping_ratio * modes.omega * s + modes.omega**2)
+    exact = unit @ (modes.shape_at([[0.0]]) * modes.shape_at([[0.0], [1.0]])).T * scale
+    size = noise * np.sqrt(np.square(np.abs(exact)).mean())
+    H = exact + size * (np.random.default_rng(0).standard_normal((*exact.shape, 2)) @ [1.0, 1j]) / np.sqrt(2.0)
+    dims = ("frequency", "channel")
+    table = {"H": (dims, H), "error": (dims, np.full(H.shape, size * np.sqrt(-np.log(0.1))))}
+    coords = {"frequency": FREQUENCY, "channel": ["a", "b"], "units": ("channel", ["m/s^2/N"] * 2)}
+    return xr.Dataset(table, coords, {"added_damping": sigma})
+
+
+def followed_body(frf):
+    return fi.Modes.from_frf(frf, mass=1.0, points=[[0.0], [1.0]], driving=0, pick=False)
+
+
+@pytest.fixture(scope="module")
+def body():
+    return followed_body(measured(known()))
+
+
+def test_what_is_left_out_and_the_rigid_motion_are_measured(body):
+    rest = sum(known().shape_at([AT])[0, 6:] ** 2 / known().omega[6:] ** 2)
+    assert body.n_rigid == 1
+    assert body.shape_at([AT])[0, 0] == pytest.approx(1.1, rel=2e-3)  # the noise is 1e-3 of 300 lines
+    middle, error = body.shapes.rest[0]
+    assert abs(middle - rest) <= error < 0.1 * rest
+
+
+def test_a_blow_errs_less_than_it_states(body):
+    for mass, duration in ((0.02, 1e-3), (0.3, 4e-3), (0.1, 2e-2)):
+        striker, law = fi.Striker.rigid(mass), fi.Contact.linear(mass * (np.pi / duration) ** 2)
+        hits = [fi.strike(modes, striker, law, at=AT, speed=1.0, tolerance=0.1) for modes in (body, known())]
+        for quantity in ("peak_force", "contact_time", "impulse"):
+            one, two = (getattr(hit, quantity) for hit in hits)
+            allowed = hits[0].error.of_quantity(quantity) + hits[1].error.of_quantity(quantity)
+            assert abs(one / two - 1.0) <= allowed < 0.1
+        assert "shapes" in hits[0].verdict
+
+
+def test_another_point_moves_as_measured_there(body):
+    """Its share of each mode errs with the noise of lines near the peak, a hundredth of it."""
+    striker, law = fi.Striker.rigid(0.02), fi.Contact.linear(0.02 * (np.pi / 1e-3) ** 2)
+    time = np.linspace(2e-3, 2e-2, 50)
+    moved = [
+        fi.strike(modes, striker, law, at=AT, speed=1.0, tolerance=0.1).velocity([[1.0]], time)
+        for modes in (body, known())
+    ]
+    assert np.abs(moved[0] - moved[1]).max() < 0.03 * np.abs(moved[1]).max()
+
+
+def test_a_held_body_may_move_rigidly_only_as_far_as_noise_hides():
+    body = followed_body(measured(known(first=1)))
+    assert body.n_rigid == 0 or body.shape_at([AT])[0, 0] < 0.1
+    assert body.shapes.loose(np.array([AT])).size <= 1
+
+
+def test_sums_are_passive_whatever_the_response():
+    """A response that turns the wrong way by half a radian everywhere: what remains is told, and reaches the blow."""
+    body = followed_body(measured(known(), scale=np.exp(0.5j)))
+    assert (body.damping_ratio >= 0.0).all()
+    left = [float(note.split("leaves ")[1].split(" %")[0]) for note in body.notes if "leaves" in note]
+    assert left[0] > 20.0
+    assert body.shapes.spread(np.array([AT])).max() > 0.2
+
+
+def test_slopes_of_columns_are_their_derivatives():
+    lines = followed.MeasuredLines(2j * np.pi * np.array([50.0, 220.0, 700.0]) + 3.0, np.zeros(6), np.ones(3))
+    poles, step = np.log([[1300.0, 4000.0], [0.02, 0.1]]), 1e-6
+    found = followed.slopes(lines, poles)
+    for row in (0, 1):
+        for mode in (0, 1):
+            apart = np.zeros((2, 2))
+            apart[row, mode] = step
+            change = followed.columns(lines, poles + apart) - followed.columns(lines, poles - apart)
+            expected = change[:, 2 + mode] / (2.0 * step)
+            assert found[:, 2 * row + mode] == pytest.approx(expected, rel=1e-6, abs=1e-8)
+
+
+@pytest.mark.parametrize(
+    ("change", "text"),
+    [
+        ({"frequencies": [100.0]}, "must be left out if pick is False"),
+        ({"frf": measured(known()).isel(frequency=slice(0, 9))}, "at least 20 lines"),
+    ],
+)
+def test_what_cannot_be_followed_is_refused(change, text):
+    arguments = {"frf": measured(known()), "points": [[0.0], [1.0]], "driving": 0} | change
+    with pytest.raises(ValueError, match=text):
+        fi.Modes.from_frf(**arguments, mass=1.0, pick=False)
