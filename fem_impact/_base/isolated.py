@@ -25,7 +25,7 @@ WAITING = 20.0  # [-] limit on the time by the clock over that: ends what only w
 MEMORY = 2 << 30  # [byte] limit on the reader's address space; Python and numpy alone use 0.2 GB
 EXTRAS = {  # library -> extra
     "svgelements": "cad", "ezdxf": "cad", "pyuff": "uff", "h5py": "hdf5", "pyNastran": "nastran",
-    "pyvista_frd": "calculix",
+    "pyvista_frd": "calculix", "ansys": "ansys",
 }  # fmt: skip
 DONE, REFUSED, TOLD = 0, 1, 3  # exit statuses; any other means the reader crashed
 
@@ -95,8 +95,9 @@ def main(path: Path, reader: str, arguments: list[str]) -> tuple[int, bytes]:
             np.savez(out, **arrays)
             return DONE, out.getvalue()
     except ImportError as error:
-        extra = f"'fem-impact[{EXTRAS[error.name]}]'" if error.name in EXTRAS else error.name
-        return REFUSED, f"this needs {error.name}: pip install {extra}".encode()
+        library = (error.name or "").split(".")[0]
+        extra = f"'fem-impact[{EXTRAS[library]}]'" if library in EXTRAS else library
+        return REFUSED, f"this needs {library}: pip install {extra}".encode()
     except MemoryError:
         return 2, b""
     except (Exception, SystemExit) as error:  # parsers raise anything, even SystemExit
