@@ -36,6 +36,7 @@ EXTRAS: dict[str, tuple[str, ...]] = {  # extra: its purpose and the modules it 
     "film": ("films as MP4 files", "imageio_ffmpeg"),
     "uff": ("universal files", "pyuff"),
     "nastran": ("results of Nastran", "pyNastran"),
+    "ansys": ("results and matrices of Ansys", "ansys"),
     "calculix": ("results of CalculiX", "pyvista_frd"),
     "cluster": ("clusters and stores", "distributed", "zarr"),
     "hdf5": ("meshes in HDF5", "h5py"),

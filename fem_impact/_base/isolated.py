@@ -8,6 +8,8 @@ files, as the includes of an Abaqus deck do. Read files of unknown origin in a c
 import importlib
 import io
 import logging
+import math
+import signal
 import subprocess
 import sys
 from contextlib import redirect_stderr, redirect_stdout, suppress
@@ -17,11 +19,13 @@ import numpy as np
 
 from . import check, child
 
-PATIENCE = 8.0  # [s] time limit for a small file: a valid file of 1 MB takes less than a tenth of this
+# [s] of processor time for a small file: a valid file of 1 MB takes less than a tenth of this
+PATIENCE = 8.0
+WAITING = 20.0  # [-] limit on the time by the clock over that: ends what only waits, not what a busy machine delays
 MEMORY = 2 << 30  # [byte] limit on the reader's address space; Python and numpy alone use 0.2 GB
 EXTRAS = {  # library -> extra
     "svgelements": "cad", "ezdxf": "cad", "pyuff": "uff", "h5py": "hdf5", "pyNastran": "nastran",
-    "pyvista_frd": "calculix",
+    "pyvista_frd": "calculix", "ansys": "ansys",
 }  # fmt: skip
 DONE, REFUSED, TOLD = 0, 1, 3  # exit statuses; any other means the reader crashed
 
@@ -67,9 +71,14 @@ def read(path: Path, kind: str, reader: str, *arguments: str) -> dict[str, np.nd
 
 
 def run(path: Path, reader: str, arguments: tuple[str, ...], patience: float) -> tuple[int, bytes, bytes]:
-    """Run the reader process: its exit status, the arrays as npz bytes, and the error text if it failed."""
-    words = str(path), reader, *arguments
-    done = child.run("_base.isolated:process", *words, timeout=patience, OPENBLAS_NUM_THREADS="1")
+    """Run the reader process: its exit status, the arrays as npz bytes, and the error text if it failed.
+
+    Raises TimeoutExpired if it computes longer than ``patience`` [s], or takes `WAITING` times as long by the clock.
+    """
+    words = str(math.ceil(patience)), str(path), reader, *arguments
+    done = child.run("_base.isolated:process", *words, timeout=WAITING * patience, OPENBLAS_NUM_THREADS="1")
+    if done.returncode == -getattr(signal, "SIGXCPU", 0) != 0:
+        raise subprocess.TimeoutExpired(reader, patience)
     return done.returncode, done.stdout, done.stderr
 
 
@@ -86,8 +95,9 @@ def main(path: Path, reader: str, arguments: list[str]) -> tuple[int, bytes]:
             np.savez(out, **arrays)
             return DONE, out.getvalue()
     except ImportError as error:
-        extra = f"'fem-impact[{EXTRAS[error.name]}]'" if error.name in EXTRAS else error.name
-        return REFUSED, f"this needs {error.name}: pip install {extra}".encode()
+        library = (error.name or "").split(".")[0]
+        extra = f"'fem-impact[{EXTRAS[library]}]'" if library in EXTRAS else library
+        return REFUSED, f"this needs {library}: pip install {extra}".encode()
     except MemoryError:
         return 2, b""
     except (Exception, SystemExit) as error:  # parsers raise anything, even SystemExit
@@ -97,11 +107,14 @@ def main(path: Path, reader: str, arguments: list[str]) -> tuple[int, bytes]:
         return REFUSED, (said.getvalue().strip() or text or type(error).__name__).encode("utf-8", "replace")
 
 
-def limit_memory() -> None:
-    """Limit the address space of this process to `MEMORY` and disable core files."""
-    with suppress(ImportError):  # Windows has no such limit; only the time limit remains there
+def limit(seconds: int) -> None:
+    """Limit this process's processor time [s] and its address space to `MEMORY`, and disable core files."""
+    with suppress(ImportError):  # Windows has no such limits; only that by the clock remains there
         import resource
 
+        most = resource.getrlimit(resource.RLIMIT_CPU)[1]
+        own = seconds if most == resource.RLIM_INFINITY else min(seconds, most)
+        resource.setrlimit(resource.RLIMIT_CPU, (own, most))
         resource.setrlimit(resource.RLIMIT_AS, (MEMORY, MEMORY))
         resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
 
@@ -109,7 +122,7 @@ def limit_memory() -> None:
 def process() -> int:
     """The reader process itself."""
     logging.disable()
-    limit_memory()
-    status, answer = main(Path(sys.argv[1]), sys.argv[2], sys.argv[3:])
+    limit(int(sys.argv[1]))
+    status, answer = main(Path(sys.argv[2]), sys.argv[3], sys.argv[4:])
     (sys.stderr if status else sys.stdout).buffer.write(answer)
     return status

@@ -42,7 +42,7 @@ def arrays(path: Path) -> dict[str, np.ndarray]:
     with suppress(ImportError):
         import h5py
 
-        h5py.File = _closed_file(h5py, path)
+        h5py.File = closed_hdf5(h5py, path)
     known = sorted(meshio.extension_to_filetypes)
     if not set(path.suffixes) & set(known):
         raise ValueError(f"its ending is {path.suffix!r}, but meshio reads {', '.join(known)}")
@@ -67,7 +67,7 @@ def arrays(path: Path) -> dict[str, np.ndarray]:
     return found
 
 
-def _closed_file(h5py: Any, path: Path) -> Any:
+def closed_hdf5(h5py: Any, path: Path) -> Any:
     """A read-only h5py.File that opens only files in the folder of ``path`` and refuses references to other files.
 
     Without it, an HDF5 file could link to any file on the disk or map its bytes.

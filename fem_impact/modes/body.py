@@ -1,7 +1,7 @@
 """A body known elsewhere: modes at the nodes of another program's model, or of a modal test, in three dimensions."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field, fields, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -10,12 +10,11 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from .._base import check
-from . import dents, free_body, imported
+from . import dents, free_body, imported, matrices
 from .modal import Modes, damping_ratios
 
-RIGID = 0.01, 6  # [-] frequencies this far below the next are rounding, of at most so many rigid motions
 NEAR = 1e-3  # [-] of the size of the body: a point this near a node is that node
-ALONG = 1e-6  # [-] one minus the cosine up to which a unit load acts along a direction: a twelfth of a degree
+ALONG = 1.4e-3  # [-] sine of the angle up to which a unit load acts along a direction: a twelfth of a degree
 NOTE = "the error of the mesh on which modes were found elsewhere is not known, and no blow counts it"
 
 
@@ -42,10 +41,11 @@ class Body(check.Brief):
         without any rigid motion.
     loads : sequence of (node number, force), optional
         The forces (3,) [N].
-    solid : Material, (E [Pa], nu) or False, optional
+    solid : Material, (E [Pa], nu), True or False, optional
         Material of a solid mesh, isotropic: its static deflections contain the dent under each load, which a contact
-        law has, too. It is taken out where a load acts on one node along the normal. False if there is none, as of
-        shells. Without it, loads that dent the body as they would a solid count that as an error.
+        law has, too. It is taken out where a load acts on one node along the normal. True if the mesh is solid, of a
+        material not known: the dent counts as an error. False if there is none, as of shells. Without it, loads that
+        dent the body as they would a solid count that as an error.
 
     Raises
     ------
@@ -73,7 +73,7 @@ class Body(check.Brief):
     names: Mapping[str, int] = field(default_factory=dict)
     static: Any = None  # (n_nodes, 3, n_loads) [m]
     loads: Any = ()  # (n_loads, 4) node number and force [N]
-    solid: Any = None  # E [Pa] and nu of a solid mesh, () of a shell, None if that is not known
+    solid: Any = None  # E [Pa] and nu of a solid mesh, True if they are not known, () of a shell, None if nothing is
 
     def __post_init__(self) -> None:
         frequencies = check.ascending("frequencies", self.frequencies, "Hz")
@@ -111,21 +111,32 @@ class Body(check.Brief):
     def load(
         cls, files: Any, *, mass: float | None = None, loads: Any = None, damping_ratio: Any = None,
         modal_mass: ArrayLike | None = None, names: Mapping[str, int] | None = None, normals: ArrayLike | None = None,
-        solid: Any = None,
+        solid: Any = None, n_modes: int | None = None,
     ) -> "Body":  # fmt: skip
-        """Read a body from files of other programs.
+        """Read a body from files of other programs, or objects of other packages.
 
-        Universal files (``.uff``, ``.unv``: data sets 15, 55, 2411, 2412, 2414; needs pyuff), results of Nastran
-        (``.op2``, with its ``.bdf`` beside it unless the nodes are in the results; needs pyNastran) and of CalculiX
-        (``.frd``, with its ``.inp`` for names of nodes; needs pyvista-frd-reader), ``.npz`` files as `save` writes
-        them, or an ``xarray.Dataset`` with the fields of a body as variables.
+        - universal files: ``.uff``, ``.unv``, data sets 15, 55, 2411, 2412, 2414 (needs pyuff)
+        - Nastran: results ``.op2``, with the ``.bdf`` beside them unless the nodes are in them; matrices ``.op4``, or
+          DMIG in a ``.bdf`` or ``.pch`` (needs pyNastran)
+        - CalculiX: ``.frd``, with its ``.inp`` for names of nodes (needs pyvista-frd-reader)
+        - Code_Aster: ``.med`` (needs h5py); displacements at times other than zero are modes, by their frequencies
+        - Ansys: ``.rst``, ``.full``, ``.cdb`` (needs ansys-mapdl-reader)
+        - Abaqus: a mesh ``.inp``, matrices as text ``.mtx``
+        - NumPy and SciPy: ``.npz`` as `save` writes it, or a sparse matrix; MatrixMarket ``.mtx``
+        - ``xarray.Dataset`` or a dict with the fields of a body by name, or with ``dofs``, ``recovery``,
+          ``mass_matrix``, ``stiffness_matrix`` as of `from_matrices`, ``modal_mass``, ``direction``
+        - a model of pyFBS with its modes, or of sdypy-EMA or pyEMA with its driving point, and
+          ``{"nodes": ..., "direction": "z"}`` of what was measured
+
+        Matrices make `from_matrices` of it; their names, or those of their files, begin with K, M and R or hold STIF
+        and MASS. Elements tell whether a mesh is ``solid``.
 
         Parameters
         ----------
-        files : path, sequence of paths, or xarray.Dataset
+        files : path or object, or a sequence of both
             Modes are in one of them; static solutions may be in the same or in others.
         mass : float [kg], optional
-            Of the whole body; only NumPy's files and xarray hold it.
+            Of the whole body; only NumPy's files, xarray and matrices of free bodies hold it.
         loads : sequence of (node number, force (3,) [N]), optional
             Of the static solutions, in the order in which the files hold them; these do not say it.
         damping_ratio : float, array (n_modes,) or function of frequency [Hz], optional
@@ -134,8 +145,10 @@ class Body(check.Brief):
             If shapes are not mass-normalised and the files do not say how large their modal masses are.
         names : mapping of str to node number, optional
         normals : array_like, shape (n_nodes, 3), optional
-        solid : Material, (E [Pa], nu) or False, optional
+        solid : Material, (E [Pa], nu), True or False, optional
             Whether loads dent the mesh, see `Body`.
+        n_modes : int, optional
+            Of matrices, see `from_matrices`.
 
         Raises
         ------
@@ -145,28 +158,72 @@ class Body(check.Brief):
         """
         told: dict[str, Any] = {}
         for found in imported.read(files):
-            if "nodes" in told and "nodes" in found and not np.array_equal(told["numbers"], found["numbers"]):
+            numbers = [each["numbers"] for each in (told, found) if "numbers" in each]
+            if len(numbers) == 2 and not np.array_equal(numbers[0], numbers[1]):
                 raise ValueError("files must be about the same nodes; export all results of one model")
             static = [each["static"] for each in (told, found) if "static" in each]
-            found = {name: value for name, value in found.items() if value.size or name not in told}
+            found = {name: value for name, value in found.items() if np.size(value) or name not in told}
             told |= found | ({"static": np.concatenate(static, axis=2)} if static else {})
-        scale = told.pop("modal_mass", None) if modal_mass is None else modal_mass
-        if "names" in told:
+        if "names" in told and not isinstance(told["names"], Mapping):
             told["names"] = dict(zip(told["names"].tolist(), told.pop("named").tolist()))
         if "cells" not in told:
             told["cells"] = told.get("triangles") if len(told.get("triangles", ())) else told.get("lines")
         given = {"mass": mass, "loads": loads, "damping_ratio": damping_ratio, "names": names, "normals": normals}
-        given["solid"] = solid
+        given |= {"solid": solid, "modal_mass": modal_mass}
         told |= {name: value for name, value in given.items() if value is not None}
-        _complete(told)
-        order = np.argsort(told["frequencies"], kind="stable")
-        if scale is not None:
-            scale = check.array("modal_mass", scale, (len(order),), "kg")
-            if scale.min() <= 0.0:
-                raise ValueError(f"modal_mass must be positive, got {scale.min():g} kg")
-            told["shapes"] = told["shapes"] / np.sqrt(scale)
-        told |= {"frequencies": _without_rounding(told["frequencies"][order]), "shapes": told["shapes"][:, :, order]}
-        return cls(**{name: told[name] for name in (each.name for each in fields(cls)) if name in told})
+        return cls(**imported.complete(told, n_modes))
+
+    @classmethod
+    def from_matrices(
+        cls, mass: Any, stiffness: Any, nodes: ArrayLike, *, dofs: Any = None, recovery: Any = None,
+        total_mass: float | None = None, loads: Any = None, n_modes: int | None = None, **fields: Any,
+    ) -> "Body":  # fmt: skip
+        """A body from its matrices, of a whole model or of a reduced one, as of Craig and Bampton.
+
+        Parameters
+        ----------
+        mass, stiffness : array_like or sparse matrix, shape (n_unknowns, n_unknowns) [kg, N/m]
+            Symmetric. Of a free body stiffness resists no rigid motion; loads are then balanced by inertia.
+        nodes : array_like, shape (n_nodes, 3) [m]
+        dofs : array_like of int, shape (n_unknowns, 2), optional
+            Node number and direction of each unknown: 1 to 3 along x, y and z, 4 to 6 turns about them; direction 0 is
+            no motion of a node, such as a mode of a reduction. By default all three or all six of each node.
+        recovery : array_like or sparse matrix, shape (3 n_nodes, n_unknowns), optional
+            Displacements of the nodes, x, y and z of each in turn, by unknowns; by default nodes move by their own
+            unknowns, and those that have none are left out.
+        total_mass : float [kg], optional
+            Of a body that is held; that of a free body follows from the matrices.
+        loads : sequence of (node number, force (3,) [N]), optional
+            Static solutions are found for them: by default unit loads along x, y and z on all nodes that have unknowns
+            of their own, if there are at most 600 unknowns. On nodes that move by ``recovery`` alone they are as exact
+            as the reduction.
+        n_modes : int, optional
+            By default all of at most 600 unknowns, else 100.
+        **fields
+            Other fields of a body: numbers, damping_ratio, cells, normals, names, solid.
+
+        Raises
+        ------
+        ValueError
+            If matrices are not symmetric or not positive, apart from rigid motions, or shapes disagree.
+
+        Examples
+        --------
+        >>> springs = 1e4 * np.array([[1.0, -1.0], [-1.0, 1.0]])  # two masses and a spring along x, free
+        >>> dofs = [(1, 1), (2, 1)]
+        >>> body = fi.Body.from_matrices(
+        ...     np.diag([0.1, 0.3]), springs, [(0, 0, 0), (0.2, 0, 0)], dofs=dofs, loads=[(1, (1, 0, 0))]
+        ... )
+        >>> round(body.mass, 6), body.frequencies.round(2).tolist(), round(float(body.static[0, 0, 0] * 1e6), 3)
+        (0.4, [0.0, 58.12], 56.25)
+        """
+        allowed = "numbers", "damping_ratio", "cells", "normals", "names", "solid"
+        for name in fields:
+            check.one_of("fields", name, allowed)
+        told = fields | {"mass_matrix": mass, "stiffness_matrix": stiffness, "nodes": nodes, "dofs": dofs}
+        told |= {"recovery": recovery, "mass": total_mass}
+        found = told | matrices.solved(told, loads, n_modes)
+        return cls(**{name: found[name] for name in imported.OWN if found.get(name) is not None})
 
     @classmethod
     def rigid(
@@ -319,13 +376,17 @@ class Body(check.Brief):
         return np.tile(vector / np.linalg.norm(vector), (len(self.nodes), 1))
 
     def _unit_loads(self, ways: np.ndarray, place: np.ndarray) -> tuple[np.ndarray, list[int], list[dents.Load]]:
-        """Deflections (n_nodes, n) [m/N] along the ways under unit loads along them, and the points of these loads."""
+        """Deflections (n_nodes, n) [m/N] along the ways under unit loads along them, and the points of these loads.
+
+        Several loads on a node are added up to one along its way.
+        """
         columns, points, seen = [], [], []
-        for k, (number, *force) in enumerate(self.loads.tolist()):
-            row, size = self._row[int(number)], float(np.linalg.norm(force))
-            cosine = float(ways[row] @ force) / size if size else 0.0
-            if abs(cosine) >= 1.0 - ALONG and place[row] not in points:
-                static, others = self.static[:, :, k] / (np.sign(cosine) * size), self.numbers != number
+        for number in dict.fromkeys(self.loads[:, 0].astype(int).tolist()):
+            row, given = self._row[number], np.flatnonzero(self.loads[:, 0] == number)
+            force = self.loads[given, 1:]
+            share = np.linalg.lstsq(force.T, ways[row], rcond=None)[0]
+            if place[row] >= 0 and np.linalg.norm(share @ force - ways[row]) <= ALONG:
+                static, others = self.static[:, :, given] @ share, self.numbers != number
                 columns.append(np.einsum("nd,nd->n", static, ways))
                 points.append(int(place[row]))
                 normal = ways[row] if self.normals is None else self.normals[row]
@@ -371,23 +432,6 @@ def _named(names: Any) -> dict[str, int]:
     if not isinstance(names, Mapping) or not all(isinstance(name, str) for name in names):
         raise ValueError(f"names must map names to node numbers, as {{'rim': 17}}, got {check.shown(names)}")
     return {name: check.count(f"names[{name!r}]", number, low=-(10**9)) for name, number in names.items()}
-
-
-def _complete(told: dict[str, Any]) -> None:
-    """Raise ValueError if files told too little of a body."""
-    if not len(told.get("frequencies", ())):
-        raise ValueError("files must hold modes; ask the other program for its eigenvectors, too")
-    if told.get("mass") is None:
-        raise ValueError("mass must be given in kg: these files do not hold it")
-
-
-def _without_rounding(frequencies: np.ndarray) -> np.ndarray:
-    """Frequencies with those of rigid motions, which an eigensolver leaves at its rounding, set to zero."""
-    found = frequencies.copy()
-    few = min(RIGID[1], len(found) - 1)
-    n = max((k for k in range(1, few + 1) if found[k - 1] < RIGID[0] * found[k]), default=0)
-    found[:n] = 0.0
-    return found
 
 
 def _normals(nodes: np.ndarray, cells: np.ndarray) -> np.ndarray | None:

@@ -1,175 +1,188 @@
-"""What other programs' files hold of a body, as `Body` takes it: Nastran, CalculiX, universal files, NumPy, xarray."""
+"""What other programs' files and objects hold of a body, as `Body` takes it."""
 
-import contextlib
-import tempfile
-import warnings
 import zipfile
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from scipy.sparse import csc_array, load_npz
 
 from .._base import check, isolated
+from . import elements, matrices
+from .universal_files import PHASE
 
 FIELDS = (
     "frequencies", "damping_ratio", "shapes", "nodes", "numbers", "cells", "normals", "static", "mass", "loads",
     "solid",
 )  # fmt: skip
-DECKS = {".op2": (".bdf", ".nas", ".dat"), ".frd": (".inp",)}  # files of a model that lie beside those of its results
+OWN = (*FIELDS, "names")  # fields of a `Body`
+MORE = "modal_mass", "direction", "dofs", "mass_matrix", "stiffness_matrix", "recovery"  # what mappings may hold, too
+RIGID = 0.01, 6  # [-] frequencies this far below the next are rounding, of at most so many rigid motions
+NASTRAN, CALCULIX = (".bdf", ".nas", ".dat", ".pch"), (".inp",)
+DECKS = {".op2": NASTRAN[:3], ".frd": CALCULIX}  # files of a model that lie beside those of its results
 KINDS = {
     ".uff": ("a universal file", "modes.universal_files:arrays"),
     ".unv": ("a universal file", "modes.universal_files:arrays"),
-    ".op2": ("results of Nastran", "modes.imported:nastran"),
-    ".frd": ("results of CalculiX", "modes.imported:calculix"),
+    ".op2": ("results of Nastran", "modes.nastran_files:results"),
+    ".op4": ("matrices of Nastran", "modes.nastran_files:matrices"),
+    ".frd": ("results of CalculiX", "modes.solver_files:calculix"),
+    ".med": ("a MED file", "modes.solver_files:med"),
+    ".rst": ("results of Ansys", "modes.solver_files:ansys"),
+    ".full": ("matrices of Ansys", "modes.solver_files:ansys"),
+    ".cdb": ("a mesh of Ansys", "modes.solver_files:ansys"),
+    ".mtx": ("a matrix", "modes.solver_files:matrix"),
     ".npz": ("arrays of NumPy", ""),
-}
-LINE = 3  # vtk's code
-# vtk's codes of Nastran's elements, corners alone: their surface is drawn and struck, not computed with
-ELEMENTS = {
-    "CBAR": (3, 2), "CBEAM": (3, 2), "CROD": (3, 2), "CTRIA3": (5, 3), "CTRIA6": (5, 3), "CTRIAR": (5, 3),
-    "CQUAD4": (9, 4), "CQUAD8": (9, 4), "CQUADR": (9, 4), "CTETRA": (10, 4), "CHEXA": (12, 8), "CPENTA": (13, 6),
+} | {
+    **dict.fromkeys(NASTRAN, ("a deck of Nastran", "modes.nastran_files:deck")),
+    ".inp": ("a deck of Abaqus", "modes.solver_files:mesh"),
 }  # fmt: skip
 
 
 def read(files: Any) -> list[dict[str, Any]]:
-    """What each file of results holds; decks among the files belong to those of their program."""
-    if hasattr(files, "data_vars"):
-        return [{name: np.asarray(files[name].values) for name in FIELDS if name in files}]
-    given = files if isinstance(files, (list, tuple)) else [files]
-    paths = [check.path("files", each) for each in given]
-    results = [path for path in paths if path.suffix.lower() in KINDS]
-    decks = [path for path in paths if path.suffix.lower() in {name for names in DECKS.values() for name in names}]
+    """What each file or object holds; decks beside results of their program are read with these."""
+    alone = not isinstance(files, (list, tuple))
+    given = [files] if alone else list(files)
+    found = [_object(each) for each in given]
+    paths = [check.path("files", each) for each, known in zip(given, found) if known is None]
     for path in paths:
-        if path not in results and path not in decks:
+        if path.suffix.lower() not in KINDS:
             raise ValueError(
-                f"files must be one of {', '.join(KINDS)} (with {', '.join(sum(DECKS.values(), ()))} beside them), got "
-                f"{path.name!r}; convert it, or give arrays to fi.Body"
+                f"files must be one of {', '.join(KINDS)}, got {path.name!r}; convert it, or give arrays to fi.Body"
             )
-    if not results:
-        raise ValueError(f"files must hold results, {', '.join(KINDS)}, got {check.shown(files)}")
-    return [_one(path, decks) for path in results]
+    if not given:
+        raise ValueError("files must hold a body, got none")
+    decks = {path for path in paths for each in paths if path.suffix.lower() in DECKS.get(each.suffix.lower(), ())}
+    return [each for each in found if each is not None] + [_one(path, decks) for path in paths if path not in decks]
 
 
-def _one(path: Path, decks: Sequence[Path]) -> dict[str, np.ndarray]:
+def _one(path: Path, decks: Sequence[Path] | set[Path]) -> dict[str, Any]:
     ending = path.suffix.lower()
     kind, reader = KINDS[ending]
     if not reader:
         return archive(path)
     path = path.resolve()
-    own = [str(deck.resolve()) for deck in decks if deck.suffix.lower() in DECKS.get(ending, ())]
-    return isolated.read(path, kind, reader, *own[:1])
+    own = sorted(str(deck.resolve()) for deck in decks if deck.suffix.lower() in DECKS.get(ending, ()))
+    found: dict[str, Any] = isolated.read(path, kind, reader, *own[:1])
+    for kind in (name[:-9] for name in list(found) if name.endswith("_triplets")):
+        rows, columns, values = found.pop(f"{kind}_triplets").T
+        shape, at = found.pop(f"{kind}_shape"), (rows.astype(int), columns.astype(int))
+        square = kind != "recovery"
+        found[f"{kind}_matrix" if square else kind] = (
+            matrices.whole(*at, values, int(shape[0])) if square else csc_array((values, at), shape=tuple(shape))
+        )
+    return found
 
 
-def archive(path: Path) -> dict[str, np.ndarray]:
-    """A body saved by `Body.save`, or arrays under the names of its fields."""
+def complete(told: dict[str, Any], n_modes: int | None) -> dict[str, Any]:
+    """Fields of a `Body` from what files hold of it."""
+    told = matrices.labelled(told)
+    if "mass_matrix" in told or "stiffness_matrix" in told:
+        told |= matrices.solved(told, told.get("loads"), n_modes)
+        told.pop("modal_mass", None)
+    if not len(told.get("frequencies", ())):
+        raise ValueError("files must hold modes; ask the other program for its eigenvectors, too, or for its matrices")
+    if told.get("mass") is None:
+        raise ValueError("mass must be given in kg: these files do not hold it")
+    shapes = np.asarray(told.get("shapes", ()))
+    if shapes.ndim == 2:
+        way = told.get("direction")
+        if way is None:
+            raise ValueError("files must hold the direction of what was measured: add {'direction': 'z'} to them")
+        way = np.eye(3)["xyz".index(check.one_of("direction", str(way), "xyz"))] if np.ndim(way) == 0 else way
+        way = np.broadcast_to(np.asarray(way, float), (len(shapes), 3))
+        shapes = np.einsum("nm,nd->ndm", shapes, way / np.linalg.norm(way, axis=1, keepdims=True))
+    scale = told.get("modal_mass")
+    if scale is not None:
+        scale = check.array("modal_mass", scale, (len(told["frequencies"]),), "kg")
+        if scale.min() <= 0.0:
+            raise ValueError(f"modal_mass must be positive, got {scale.min():g} kg")
+        shapes = shapes / np.sqrt(scale)
+    order = np.argsort(told["frequencies"], kind="stable")
+    told |= {"frequencies": without_rounding(np.asarray(told["frequencies"])[order]), "shapes": shapes[..., order]}
+    damping = told.get("damping_ratio", 0.0)
+    if not callable(damping) and np.shape(damping) == order.shape:
+        told["damping_ratio"] = np.asarray(damping)[order]
+    return {name: told[name] for name in OWN if told.get(name) is not None}
+
+
+def without_rounding(frequencies: np.ndarray) -> np.ndarray:
+    """Frequencies with those of rigid motions, which an eigensolver leaves at its rounding, set to zero."""
+    found = frequencies.copy()
+    few = min(RIGID[1], len(found) - 1)
+    n = max((k for k in range(1, few + 1) if found[k - 1] < RIGID[0] * found[k]), default=0)
+    found[:n] = 0.0
+    return found
+
+
+def archive(path: Path) -> dict[str, Any]:
+    """A body saved by `Body.save`, arrays under the names of its fields, or a sparse matrix of SciPy."""
     try:
         with np.load(path, allow_pickle=False) as found:
-            return {name: found[name] for name in (*FIELDS, "names", "named") if name in found}
+            if "format" not in found:
+                return {name: found[name] for name in (*OWN, *MORE, "named") if name in found}
+        kind = elements.kind_of_matrix(path.stem)
+        if not kind:
+            raise ValueError("name the matrix K..., M... or R..., to say what it is")
+        return {kind if kind == "recovery" else f"{kind}_matrix": load_npz(path)}
     except (OSError, ValueError, TypeError, EOFError, zipfile.BadZipFile) as error:
         raise ValueError(f"{path.name} cannot be read as arrays of NumPy ({check.line(str(error))})") from None
 
 
-def nastran(path: Path, deck: str = "") -> dict[str, np.ndarray]:
-    """Eigenvectors and static displacements of an OP2 file; its nodes and elements are in it, or in the deck."""
-    with (
-        tempfile.TemporaryDirectory() as folder,
-        contextlib.chdir(folder),
-    ):  # where pyNastran leaves what it could not read
-        return _nastran(path, deck)
+def _object(given: Any) -> dict[str, Any] | None:
+    """What an object of another package, a mapping or an xarray.Dataset holds; None if it is a path."""
+    if hasattr(given, "data_vars"):
+        return {name: np.asarray(given[name].values) for name in (*OWN, *MORE) if name in given}
+    if isinstance(given, Mapping):
+        for name in given:
+            check.one_of("files", name, (*OWN, *MORE))
+        return {
+            name: value if hasattr(value, "tocoo") or isinstance(value, (str, Mapping)) else np.asarray(value)
+            for name, value in given.items()
+        }
+    if hasattr(given, "eig_vec") and hasattr(given, "dof_ref"):
+        return _pyfbs(given)
+    return _sdypy(given) if hasattr(given, "nat_freq") and hasattr(given, "nat_xi") else None
 
 
-def _nastran(path: Path, deck: str) -> dict[str, np.ndarray]:
-    if not hasattr(np, "in1d"):  # numpy 2.4 lacks it, and pyNastran 1.3 asks for it
-        setattr(np, "in1d", np.isin)  # noqa: B010
-    warnings.simplefilter("ignore")  # of its own use of numpy
-    from cpylog import SimpleLogger
-    from pyNastran.bdf.bdf import read_bdf
-    from pyNastran.op2.op2 import read_op2
-    from pyNastran.op2.op2_geom import read_op2_geom
-
-    quiet: dict[str, Any] = {"debug": False, "log": SimpleLogger("critical")}
-    results = read_op2(str(path), **quiet) if deck else read_op2_geom(str(path), xref=False, validate=False, **quiet)
-    bulk = bool(deck) and "BEGIN BULK" not in Path(deck).read_text("utf-8", "replace").upper()
-    model = read_bdf(deck, xref=False, validate=False, punch=bulk, **quiet) if deck else results
-    if not model.nodes:
-        raise ValueError(f"{path.name} holds no nodes; give the deck (.bdf) beside it: files=[{path.name!r}, 'it.bdf']")
-    model.cross_reference(xref=False, xref_nodes=True)
-    moved, placed, places, numbers = model.get_displacement_index_xyz_cp_cd()
-    at = numbers[:, 0].astype(int)
-    xyz = model.transform_xyzcp_to_xyz_cid(places, at, placed, cid=0)
-    if numbers[:, 2].any():
-        results.transform_displacements_to_global(moved, model.coords, xyz_cid0=xyz)
-    row = {int(number): i for i, number in enumerate(at)}
-    table = list(results.eigenvectors.values())
-    tables = {"shapes": table, "static": list(results.displacements.values())}
-    found: dict[str, np.ndarray] = {"numbers": at, "nodes": xyz}
-    for name, each in tables.items():
-        moved = [_at_nodes(one, row) for one in each]
-        found[name] = np.concatenate(moved, axis=2) if moved else np.zeros((len(at), 3, 0))
-    cycles = [np.asarray(one.mode_cycles if hasattr(one, "mode_cycles") else one.freqs, float) for one in table]
-    found["frequencies"] = np.abs(np.concatenate(cycles)) if cycles else np.zeros(0)
-    masses = [np.asarray(one.generalized_mass, float) for one in results.eigenvalues.values()]
-    if masses and sum(map(len, masses)) >= len(found["frequencies"]):
-        found["modal_mass"] = np.concatenate(masses)[: len(found["frequencies"])]
-    blocks: dict[int, list[list[int]]] = {}
-    for element in model.elements.values():
-        code, corners = ELEMENTS.get(element.type, (0, 0))
-        if code:
-            blocks.setdefault(code, []).append([row[int(node)] for node in element.node_ids[:corners]])
-    return found | {"cells": surface(xyz, {code: np.array(each) for code, each in blocks.items()})}
-
-
-def _at_nodes(table: Any, row: dict[int, int]) -> np.ndarray:
-    """Translations (n_nodes, 3, n_cases) of a Nastran table of displacements."""
-    found = np.zeros((len(row), 3, len(table.data)))
-    rows = [row[int(number)] for number in table.node_gridtype[:, 0]]
-    found[rows] = np.moveaxis(np.asarray(table.data[:, :, :3], float), 0, 2)
+def _pyfbs(model: Any) -> dict[str, Any]:
+    """Modes of a numerical model of pyFBS (``pyfbs.Model``), mass-normalised as it solves them."""
+    if model.eig_vec is None or np.iscomplexobj(model.eig_vec) or model.eig_freq is None:
+        raise ValueError("files must hold real modes; solve the pyFBS model undamped")
+    nodes, dofs = np.asarray(model.nodes, float), np.asarray(model.dof_ref, int)
+    vectors, moving = np.asarray(model.eig_vec, float), np.flatnonzero(dofs[:, 1] < 3)
+    shapes = np.zeros((len(nodes), 3, vectors.shape[1]))
+    shapes[dofs[moving, 0] - 1, dofs[moving, 1]] = vectors[moving]
+    frequencies = np.nan_to_num(np.abs(np.asarray(model.eig_freq, float)))[: vectors.shape[1]]
+    found = {"frequencies": frequencies, "shapes": shapes, "nodes": nodes, "numbers": np.arange(1, len(nodes) + 1)}
+    grid = model.mesh
+    if grid is not None and len(grid.points) == len(nodes):
+        found |= elements.told(nodes, grid.cells_dict)
     return found
 
 
-def calculix(path: Path, deck: str = "") -> dict[str, np.ndarray]:
-    """Modes and static displacements of an FRD file; node sets of one node in the deck are names."""
-    import pyvista_frd
+def _sdypy(model: Any) -> dict[str, Any]:
+    """Modes identified by sdypy-EMA or pyEMA, scaled by their driving point, at places measured along a direction.
 
-    reader = pyvista_frd.FRDReader(str(path), inp_path=deck or None)
-    with path.open("rb") as file:
-        heads = [line for line in file if line.lstrip().startswith(b"100CL")]
-    modal = {float(head[12:24]): b"MODAL" in head for head in heads}  # steps are those of different values
-    if len(set(heads)) != len(reader.time_values) or not modal:
+    Its constants A are those of a receptance ``A / (i omega - pole) + conjugate``, of real modes ``shape * (shape at
+    the driving point) / (2 i omega_d)``; for proportional damping they are real, without the denominator.
+    """
+    constants, drive = getattr(model, "A", None), getattr(model, "driving_point", None)
+    if constants is None or drive is None:
         raise ValueError(
-            f"{path.name} must hold steps of different times or frequencies; write each load to its own file"
+            "files must hold scaled modes: give the model of sdypy-EMA its driving_point and call get_constants()"
         )
-    shapes, static, frequencies = [], [], []
-    for i, value in enumerate(reader.time_values):
-        reader.set_active_time_point(i)
-        grid = reader.read()
-        if "DISP" not in grid.point_data:
-            continue
-        moved = np.asarray(grid.point_data["DISP"], float)[:, :3]
-        if modal[min(modal, key=lambda known: abs(known - value))]:
-            shapes.append(moved)
-            frequencies.append(float(value))
-        else:
-            static.append(moved)
-    found = {"frequencies": np.array(frequencies), "nodes": np.asarray(grid.points, float)}
-    found |= {"numbers": np.asarray(grid.point_data["original_node_ids"], int)}
-    for name, each in (("shapes", shapes), ("static", static)):
-        found[name] = np.stack(each, axis=2) if each else np.zeros((*found["nodes"].shape, 0))
-    sets = {key[5:]: np.flatnonzero(grid.point_data[key]) for key in grid.point_data if key[:5] == "NSET:"}
-    single = {name: found["numbers"][rows[0]] for name, rows in sets.items() if len(rows) == 1}
-    found |= {"names": np.array(list(single), str), "named": np.array(list(single.values()), int)}
-    return found | {"cells": surface(found["nodes"], grid.cells_dict)}
-
-
-def surface(points: np.ndarray, blocks: dict[int, np.ndarray]) -> np.ndarray:
-    """Triangles (n, 3) on the surface of elements by vtk's codes, or lines (n, 2) if they have none."""
-    import pyvista
-
-    wide = {code: each for code, each in blocks.items() if code != LINE}
-    if not wide:
-        return blocks.get(LINE, np.zeros((0, 3), int))
-    grid = pyvista.UnstructuredGrid(wide, points)
-    grid.point_data["row"] = np.arange(len(points))
-    skin = grid.extract_surface(nonlinear_subdivision=0, algorithm="dataset_surface").triangulate()
-    return np.asarray(skin.point_data["row"], int)[skin.faces.reshape(-1, 4)[:, 1:]]
+    frequencies, damping = np.asarray(model.nat_freq, float), np.asarray(model.nat_xi, float)
+    residues = np.asarray(constants)
+    if np.iscomplexobj(residues):
+        residues = residues * (4j * np.pi * frequencies * np.sqrt(1.0 - damping**2))
+    turned = residues / (residues[drive] / np.abs(residues[drive])) / np.sqrt(np.abs(residues[drive]))
+    wrong = (np.abs(turned.imag).max(axis=0) > PHASE * np.abs(turned.real).max(axis=0)) | (
+        np.abs(np.angle(residues[drive])) > np.arctan(PHASE)
+    )
+    if wrong.any():
+        raise ValueError(
+            f"files must hold real modes, positive at their driving point; that at {frequencies[wrong][0]:g} Hz has "
+            "phases far from 0 and 180 degrees"
+        )
+    return {"frequencies": frequencies, "damping_ratio": damping, "shapes": turned.real}

@@ -129,10 +129,11 @@ class Modes(check.Brief):
             along a quarter of its mass; otherwise a blow counts what rigid motions would change as an error.
         complete : bool
             Whether these modes are all there is, as of masses on springs: nothing is left out, nothing else is free.
-        solid : Material, (E [Pa], nu) or False, optional
+        solid : Material, (E [Pa], nu), True or False, optional
             Of a solid mesh, isotropic: its ``compliance`` contains the dent of each load, which a contact law has,
-            too. It is taken out by the deflections around, on a surface flat there. False if there is none, as of
-            shells and beams. Without it, a compliance that shows a dent counts it as an error.
+            too. It is taken out by the deflections around, on a surface flat there. True if the material is not
+            known: the dent is an error. False if there is none, as of shells and beams. Without it, a compliance that
+            shows a dent counts it as an error.
 
         Raises
         ------

@@ -13,7 +13,8 @@ from .._base import check, isolated
 NORMAL_MODE, DISPLACEMENT, STRUCTURAL, REAL, STATIC = 2, 8, 1, 2, 1  # codes of data sets 55 and 2414
 CELL_CODE = {2: 11, 3: 91, 4: 94}  # nodes of a cell -> rod, thin shell triangle, thin shell quadrilateral
 WANTED = (15, 55, 2411, 2414)  # data sets to read: nodes, shapes, nodes in double precision, results
-LINES, SHELLS = (11, 21, 22), range(41, 97)  # codes of elements: rods and beams, plane and shell elements
+# codes of elements: rods and beams, plane and shell elements, solids
+LINES, SHELLS, SOLIDS = (11, 21, 22), range(41, 97), range(111, 119)
 # nodes of a shell element -> its corners
 CORNERS: dict[int, tuple[int, ...]] = {3: (0, 1, 2), 4: (0, 1, 2, 3), 6: (0, 2, 4), 8: (0, 2, 4, 6)}
 PHASE = 0.3  # [-] imaginary over real part, at the best phase, up to which a complex shape is taken as real: 17 degrees
@@ -131,7 +132,9 @@ def arrays(path: Path) -> dict[str, np.ndarray]:
     elements = [element for i, kind in enumerate(kinds) if kind == 2412 for element in _elements(file, i)]
     row = {int(n): i for i, n in enumerate(measured)}
     cells = {name: _cells(elements, row, i + 1) for i, name in enumerate(("lines", "triangles"))}
-    return result | cells | {"numbers": measured}
+    codes = {int(element["fe_descriptor"]) for element in elements}
+    solid = {} if not codes else {"solid": np.array(True) if codes & set(SOLIDS) else np.zeros(0)}
+    return result | cells | {"numbers": measured} | solid
 
 
 def across(points: np.ndarray, direction: str) -> list[int]:

@@ -1,8 +1,10 @@
 """A mesh file is read apart: what never ends, fills the memory or dies becomes one sentence."""
 
 import os
+import signal
 import subprocess
 import sys
+import time
 from pathlib import Path
 
 import meshio
@@ -10,7 +12,7 @@ import numpy as np
 import pytest
 
 from fem_impact import mesh
-from fem_impact._base import isolated
+from fem_impact._base import child, isolated
 
 PLATE = mesh.rectangle(1.0, 1.0, size=0.5)
 
@@ -30,6 +32,30 @@ def test_reader_that_never_ends_is_stopped(tmp_path, monkeypatch):
         mesh.load(path)
     monkeypatch.undo()
     assert len(mesh.load(written(tmp_path / "again.vtu")).cells) == len(PLATE.cells)  # exported again, another format
+
+
+def test_reader_that_only_waits_is_stopped_by_the_clock(tmp_path, monkeypatch):
+    monkeypatch.setattr(isolated, "WAITING", 1e-3)  # 8 ms, in which no process starts
+    with pytest.raises(ValueError, match=r"plate\.vtu cannot be read as a mesh \(reading took longer"):
+        mesh.load(written(tmp_path / "plate.vtu"))
+
+
+@pytest.mark.slow
+def test_reader_that_a_busy_machine_delays_ends(tmp_path, monkeypatch):
+    """It is stopped for longer than its limit, as a process that gets no turn, and still reads the file."""
+
+    def delayed(target, *words, timeout, **variables):
+        command, environment = child.python(target, *words, **variables)
+        process = subprocess.Popen(command, env=environment, stdout=subprocess.PIPE, stderr=subprocess.PIPE)
+        process.send_signal(signal.SIGSTOP)
+        time.sleep(1.1 * isolated.PATIENCE)
+        process.send_signal(signal.SIGCONT)
+        out, said = process.communicate(timeout=timeout)
+        return subprocess.CompletedProcess(command, process.returncode, out, said)
+
+    monkeypatch.setattr(child, "run", delayed)
+    monkeypatch.setattr(isolated, "PATIENCE", 4.0)
+    assert len(mesh.load(written(tmp_path / "plate.vtu")).cells) == len(PLATE.cells)
 
 
 def test_header_that_claims_more_than_the_memory_is_refused(tmp_path):
@@ -69,7 +95,7 @@ def test_the_process_that_reads_loads_no_mesher_and_no_solver(reader):
 
 
 def test_memory_of_the_reader_is_limited():
-    script = "from fem_impact._base import isolated; isolated.limit_memory(); bytearray(3 << 30)"
+    script = "from fem_impact._base import isolated; isolated.limit(60); bytearray(3 << 30)"
     run = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True)
     assert run.returncode == 1 and "MemoryError" in run.stderr
 

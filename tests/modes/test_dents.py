@@ -4,6 +4,7 @@ import dents_of_solids as solids
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
+from scipy.special import ellipe, ellipk
 
 import fem_impact as fi
 from fem_impact.modes import dents
@@ -81,7 +82,44 @@ def test_a_wrong_modulus_is_an_error():
     assert solids.apart(wrong, right) < wrong.error.total
 
 
-@pytest.mark.parametrize("solid", ["steel", (E,), (E, 0.7), (-E, NU), True])
+def spread(r, patch):
+    """Deflection [m/N] of a half space under a uniform pressure on a disk; Johnson, equation 3.29."""
+    inside, k = r <= patch, patch / np.maximum(r, patch * (1.0 + 1e-9))
+    ways = 2.0 * ellipe(np.minimum(r / patch, 1.0) ** 2), 2.0 * (ellipe(k**2) - (1.0 - k**2) * ellipk(k**2)) / k
+    ways = ways[0], np.where(inside, 0.0, ways[1])
+    return 2.0 * (1.0 - NU**2) / (np.pi**2 * patch * E) * np.where(inside, *ways)
+
+
+@pytest.mark.parametrize("beside", [False, True])
+@pytest.mark.parametrize("patch", [0.5e-3, 1.2e-3, 2.2e-3, 3.2e-3, 4.2e-3])
+def test_a_dent_in_solid_elements_is_an_error_where_deflections_hide_it(patch, beside):
+    """Loads spread over up to four elements, and at the side of a flat cloud of points, by elements alone."""
+    points, _ = half_space()
+    at = len(points) // 2
+    column = spread(np.linalg.norm(points - points[at], axis=1), patch) + 3e-9 + 2e-7 * points[:, 0]
+    if beside:
+        kept = points[:, 0] >= -1e-3
+        points, column, at = points[kept], column[kept], int(np.count_nonzero(kept[:at]))
+    told = {"points": points, "mass": 1.0, "compliance": column[:, None], "loads": [at]}
+    shapes = np.full((len(points), 1), 0.1)
+    modes, blind = (fi.Modes.from_arrays([900.0], shapes, solid=each, **told) for each in (True, None))
+    dent = column[at] - 3e-9 - 2e-7 * points[at, 0]
+    assert dent <= modes.shapes.dent(points[[at]])[0, 1] <= column[at] and "dent" in modes.unstated
+    assert "1 of 1 unit loads dent the mesh, whose elements are solid" in modes.notes[-1]
+    assert bool(blind.shapes.dent(points[[at]])[0, 1] > 0.0) is (
+        patch < 1e-3 and not beside
+    )  # without it, nothing is seen
+
+
+def test_a_solid_of_unknown_material_counts_the_dent_that_it_has():
+    """On three meshes each; on the coarsest twice as much, as the bar is not wide enough for the farthest fit."""
+    for name in solids.BRICKS:
+        for mesh in range(3):
+            dents_of = [solids.known(name, mesh, each).modes("z").shapes.dents[0] for each in (solids.STEEL, True)]
+            assert 0.98 * dents_of[0][0] <= dents_of[1][1] <= 2.2 * dents_of[0][0]
+
+
+@pytest.mark.parametrize("solid", ["steel", (E,), (E, 0.7), (-E, NU), 1.0])
 def test_what_is_no_solid_is_refused(solid):
     points, column = half_space()
     with pytest.raises(ValueError, match="solid must"):
@@ -93,7 +131,7 @@ def test_what_is_no_solid_is_refused(solid):
 
 def test_the_solid_is_kept_in_files(tmp_path):
     body = solids.known("bar", 0, solids.STEEL)
-    for solid in (solids.STEEL, False, None):
+    for solid in (solids.STEEL, True, False, None):
         path = fi.Body.load(body.save(tmp_path / "bar"), solid=solid).save(tmp_path / "again")
         assert fi.Body.load(path).solid == dents.stated(solid) or solid is None  # None: as the file says
 

@@ -1,0 +1,70 @@
+"""What the elements of another program's mesh tell: its surface, and whether it is solid; and names of its matrices."""
+
+import re
+from typing import Any
+
+import numpy as np
+
+LINES, SHELLS = {3, 21, 35}, {5, 7, 9, 22, 23, 28, 34}  # codes of vtk
+SOLIDS = {10, 11, 12, 13, 14, 24, 25, 26, 27, 29, 32, 33}
+# codes and corners of meshio's kinds of cells, without their numbers of nodes
+BASIC = {
+    "line": (3, 2), "triangle": (5, 3), "quad": (9, 4), "tetra": (10, 4), "hexahedron": (12, 8), "wedge": (13, 6),
+    "pyramid": (14, 5),
+}  # fmt: skip
+# names of matrices and of their files: Nastran's KAA, K2GG, Abaqus's job_STIF1.mtx
+NAMES = (("stiffness", r"^K|STIF"), ("mass", r"^M|MASS"), ("recovery", r"^R"))
+
+
+def told(points: np.ndarray, blocks: dict[int, np.ndarray]) -> dict[str, np.ndarray]:
+    """Cells of the surface of elements by vtk's codes, and `Body.solid`, as far as they tell it.
+
+    A mesh with any solid element is taken as solid, because it may be struck there.
+    """
+    codes = {code for code, each in blocks.items() if len(each)}
+    found = {"cells": surface(points, blocks)}
+    if codes & SOLIDS:
+        return found | {"solid": np.array(True)}
+    return found | ({"solid": np.zeros(0)} if codes & (SHELLS | LINES) else {})
+
+
+def surface(points: np.ndarray, blocks: dict[int, np.ndarray]) -> np.ndarray:
+    """Triangles (n, 3) on the surface of elements by vtk's codes, or lines (n, 2) if they have none."""
+    import pyvista
+
+    wide = {code: each for code, each in blocks.items() if code not in LINES and len(each)}
+    if not wide:
+        return blocks.get(3, np.zeros((0, 3), int))
+    grid = pyvista.UnstructuredGrid(wide, points)
+    grid.point_data["row"] = np.arange(len(points))
+    skin = grid.extract_surface(nonlinear_subdivision=0, algorithm="dataset_surface").triangulate()
+    return np.asarray(skin.point_data["row"], int)[skin.faces.reshape(-1, 4)[:, 1:]]
+
+
+def of_meshio(cells: Any) -> dict[int, np.ndarray]:
+    """Elements of meshio's blocks by vtk's codes, by their corners; of a solid mesh no shells, which name its faces."""
+    blocks: dict[int, list[np.ndarray]] = {}
+    for block in cells:
+        code, corners = BASIC.get(re.sub(r"\d+$", "", block.type), (0, 0))
+        if code:
+            blocks.setdefault(code, []).append(np.asarray(block.data, int)[:, :corners])
+    kept = {code: np.vstack(each) for code, each in blocks.items()}
+    return {code: each for code, each in kept.items() if code in SOLIDS} or kept
+
+
+def kind_of_matrix(name: str) -> str:
+    """Mass, stiffness or recovery, by the name of a matrix; an empty text if neither."""
+    return next((kind for kind, pattern in NAMES if re.search(pattern, name.upper())), "")
+
+
+def triplets(kind: str, matrix: Any) -> dict[str, np.ndarray]:
+    """A matrix as arrays of numbers: rows, columns and values (n, 3), and its shape."""
+    if hasattr(matrix, "tocoo"):
+        coo = matrix.tocoo()
+        rows, columns, values = coo.row, coo.col, coo.data
+    else:
+        rows, columns = np.nonzero(matrix)
+        values = np.asarray(matrix)[rows, columns]
+    if np.iscomplexobj(values):
+        raise ValueError(f"{kind} must be real")
+    return {f"{kind}_triplets": np.column_stack([rows, columns, values]), f"{kind}_shape": np.array(matrix.shape)}

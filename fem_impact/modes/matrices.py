@@ -1,0 +1,261 @@
+"""A body given by its matrices, whole or reduced: its modes, its mass, and its deflections under static loads.
+
+Unknowns are motions of nodes or anything else that moves the body, such as the modes of a Craig-Bampton reduction. The
+recovery R turns them into displacements of nodes, so a force F at nodes acts on them as R.T F, and rigid motions r of a
+free body are those for which R r is one of a rigid body and K r vanishes.
+
+References
+----------
+Craig and Bampton (1968), AIAA J. 6, 1313-1319.
+"""
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+from scipy.linalg import eigh, qr
+from scipy.sparse import coo_array, csc_array, csc_matrix, issparse
+
+from .._base import check
+from ..fe.eigenvalues import Flexibility, lowest
+
+ALL = 600  # [-] unknowns up to which all modes are found, and all unit loads on nodes solved: a second together
+MANY = 100  # [-] modes of larger systems
+ROUNDING = 1e-7  # [-] of the terms of a sum that cancel: files keep at least nine digits
+LOPSIDED = 1e-6  # [-] of the largest entry, by which entries and those across the diagonal may differ
+UNEQUAL = 1e-3  # [-] by which the mass may differ that moves along x, y and z
+SLOW = 1e-6  # [-] of stiffness over mass, which makes a free body stiff while its rigid motions are looked for
+KINDS = "mass", "stiffness"
+INDEFINITE = (
+    "stiffness must be positive, mass not negative, apart from rigid motions of the whole body ({}); write more "
+    "digits, or leave out unknowns that nothing holds"
+)
+
+
+def solved(told: Mapping[str, Any], loads: Any = None, n_modes: int | None = None) -> dict[str, Any]:
+    """Fields of a `Body` of which ``mass_matrix``, ``stiffness_matrix`` and ``nodes`` are told.
+
+    Parameters
+    ----------
+    told : dict
+        With ``dofs``, ``recovery``, ``numbers`` and ``mass`` as of `Body.from_matrices`. ``frames`` (n_nodes, 3, 3) are
+        axes of nodes, by rows, where directions are along others than x, y and z.
+    loads : as of `Body`
+    n_modes : int, optional
+    """
+    M, K = _symmetric(told)
+    nodes = check.array("nodes", told.get("nodes", ()), (None, 3), "m")
+    given = told.get("numbers")
+    numbers = np.arange(1, len(nodes) + 1) if given is None else np.asarray(given, int)
+    turned = _directions(told, numbers, M.shape[0])
+    R = _recovery(told, turned, len(nodes), M.shape[0])
+    kept = np.flatnonzero(np.asarray(abs(R).sum(axis=1)).reshape(-1, 3).any(axis=1))
+    used = np.flatnonzero(np.asarray(abs(M).sum(axis=0) + abs(K).sum(axis=0)))  # nothing resists or moves the others
+    M, K, R = M[used][:, used], K[used][:, used], R[(3 * kept[:, None] + np.arange(3)).ravel()][:, used].tocsc()
+    if turned is not None:
+        turned = turned[(6 * kept[:, None] + np.arange(6)).ravel()][:, used]
+    flexibility = _flexibility(M, K, turned, nodes[kept])
+    rigid, most = flexibility.rigid, len(flexibility.inertial) - flexibility.rigid.shape[1]
+    wanted = (most if len(used) <= ALL else MANY) if n_modes is None else check.count("n_modes", n_modes)
+    wanted -= 0 if n_modes is None else rigid.shape[1]
+    if loads is None:
+        loads = _unit_loads(turned, numbers[kept]) if len(used) <= ALL else []
+    try:
+        values, vectors = lowest(flexibility, min(max(wanted, 0), most))
+        forces = R.T @ _forces(numbers[kept], loads)
+        if len(values) + rigid.shape[1] == len(used):  # then modes tell it, with the rounding of what they carry
+            static = (vectors / values) @ (vectors.T @ forces)
+        else:
+            static = flexibility.solve(forces) if len(loads) else forces
+    except (np.linalg.LinAlgError, RuntimeError) as error:
+        raise ValueError(INDEFINITE.format(check.line(str(error)))) from None
+    if len(values) and values[0] <= 0.0:
+        raise ValueError(INDEFINITE.format(f"an eigenvalue is {values[0]:.3g} 1/s^2"))
+    found = {
+        "frequencies": np.concatenate([np.zeros(rigid.shape[1]), np.sqrt(values) / (2.0 * np.pi)]),
+        "shapes": (R @ np.column_stack([rigid, vectors])).reshape(len(kept), 3, -1),
+        "static": (R @ static).reshape(len(kept), 3, -1), "loads": loads,
+        "nodes": nodes[kept], "numbers": numbers[kept],
+    }  # fmt: skip
+    if told.get("mass") is None:
+        found["mass"] = _mass(R, rigid, nodes[kept])
+    return found | _at_kept(told, kept, len(nodes))
+
+
+def labelled(told: dict[str, Any]) -> dict[str, Any]:
+    """The same with matrices for their ``..._entries``, (n, 5) node, direction, node, direction and value."""
+    names = [f"{kind}_entries" for kind in KINDS if f"{kind}_entries" in told]
+    if not names:
+        return told
+    entries = [np.asarray(told[name], float) for name in names]
+    every = np.vstack([each[:, k : k + 2] for each in entries for k in (0, 2)]).astype(int)
+    dofs, place = np.unique(every, axis=0, return_inverse=True)
+    places, start, found = place.ravel(), 0, {}
+    for name, each in zip(names, entries):
+        rows, columns = places[start : start + len(each)], places[start + len(each) : start + 2 * len(each)]
+        found[name.replace("entries", "matrix")] = whole(rows, columns, each[:, 4], len(dofs))
+        start += 2 * len(each)
+    return {name: value for name, value in told.items() if name not in names} | found | {"dofs": dofs}
+
+
+def whole(rows: np.ndarray, columns: np.ndarray, values: np.ndarray, size: int) -> Any:
+    """A symmetric matrix of which all entries or those of one triangle are given."""
+    if (rows > columns).any() != (rows < columns).any():
+        off = rows != columns
+        rows, columns = np.concatenate([rows, columns[off]]), np.concatenate([columns, rows[off]])
+        values = np.concatenate([values, values[off]])
+    return csc_array(coo_array((values, (rows, columns)), shape=(size, size)))
+
+
+def _symmetric(told: Mapping[str, Any]) -> list[Any]:
+    """Mass and stiffness, checked."""
+    found = []
+    for kind in KINDS:
+        matrix = told.get(f"{kind}_matrix")
+        if matrix is None:
+            raise ValueError(f"{kind} must be given as a matrix, too; modes need both mass and stiffness")
+        matrix = matrix if issparse(matrix) else np.asarray(matrix)
+        if matrix.ndim != 2 or matrix.shape[0] != matrix.shape[1] or not matrix.shape[0]:
+            raise ValueError(f"{kind} must be a square matrix, got shape {matrix.shape}")
+        if np.iscomplexobj(matrix):
+            raise ValueError(f"{kind} must be real; give damping as damping_ratio")
+        matrix = csc_matrix(matrix, dtype=float)
+        check.array(kind, matrix.data, (None,))
+        across = float(abs(matrix - matrix.T).max())
+        if across > LOPSIDED * float(abs(matrix).max()):
+            raise ValueError(f"{kind} must be symmetric, but entries across its diagonal differ by {across:.3g}")
+        found.append((0.5 * (matrix + matrix.T)).tocsc())
+    if found[0].shape != found[1].shape:
+        raise ValueError(f"mass must be as large as stiffness, got {found[0].shape} and {found[1].shape}")
+    return found
+
+
+def _directions(told: Mapping[str, Any], numbers: np.ndarray, size: int) -> Any:
+    """Shifts and turns of nodes by unknowns, (6 n_nodes, size); None if nothing tells them."""
+    dofs, n = told.get("dofs"), len(numbers)
+    if dofs is None:
+        if told.get("recovery") is not None:
+            return None
+        each = size // n if n and size % n == 0 else 0
+        if each not in (3, 6):
+            raise ValueError(
+                f"dofs must be given, node and direction (1 to 6, or 0) of each of the {size} unknowns, or recovery: "
+                f"they are not three or six of each of the {n} nodes"
+            )
+        dofs = np.column_stack([np.repeat(numbers, each), np.tile(np.arange(1, each + 1), n)])
+    dofs = check.array("dofs", dofs, (size, 2)).astype(int)
+    moving = np.flatnonzero((dofs[:, 1] >= 1) & (dofs[:, 1] <= 6))
+    row = {int(number): i for i, number in enumerate(numbers)}
+    lost = [int(number) for number in dofs[moving, 0] if int(number) not in row]
+    if lost:
+        raise ValueError(f"dofs must be of the nodes given, got node {lost[0]}, which has no coordinates")
+    rows, way = np.array([row[int(number)] for number in dofs[moving, 0]], int), dofs[moving, 1] - 1
+    frames = np.tile(np.eye(3), (n, 1, 1)) if told.get("frames") is None else np.asarray(told["frames"], float)
+    into = 6 * rows[:, None] + 3 * (way[:, None] // 3) + np.arange(3)
+    axes = frames[rows, way % 3]  # (n_moving, 3)
+    return csc_matrix((axes.ravel(), (into.ravel(), np.repeat(moving, 3))), shape=(6 * n, size))
+
+
+def _recovery(told: Mapping[str, Any], turned: Any, n: int, size: int) -> Any:
+    """Displacements of nodes by unknowns, (3 n_nodes, size)."""
+    given = told.get("recovery")
+    if given is None:
+        return turned[(6 * np.arange(n)[:, None] + np.arange(3)).ravel()]
+    given = given if issparse(given) else check.array("recovery", given, (None, None))
+    if given.shape != (3 * n, size):
+        raise ValueError(
+            f"recovery must be ({3 * n}, {size}), x, y and z of each node in turn by unknowns, got {given.shape}"
+        )
+    return csc_matrix(given, dtype=float)
+
+
+def _motions(nodes: np.ndarray) -> np.ndarray:
+    """Shifts along x, y, z and turns about them, (n_nodes, shift and turn, 3, 6)."""
+    place = nodes - nodes.mean(axis=0)
+    turns = np.eye(3) / (float(np.abs(place).max()) or 1.0)
+    found = np.zeros((len(nodes), 2, 3, 6))
+    found[:, 0, :, :3] = np.eye(3)
+    for i in range(3):
+        found[:, 0, :, 3 + i], found[:, 1, :, 3 + i] = np.cross(turns[i], place), turns[i]
+    return found
+
+
+def _candidates(M: Any, K: Any, turned: Any, nodes: np.ndarray) -> np.ndarray:
+    """Unknowns (n, 6) among which are all rigid motions: those of nodes, and what follows; or the slowest."""
+    if turned is None:
+        stiff, heavy = K.toarray(), M.toarray()
+        slow = SLOW * float(np.median(K.diagonal()) / M.diagonal().max())
+        return np.asarray(eigh(heavy, stiff + slow * heavy)[1][:, ::-1][:, :6])
+    found, known = turned.T @ _motions(nodes).reshape(-1, 6), np.diff(turned.tocsc().indptr) > 0
+    if not known.all():
+        inner = K[~known]
+        found[~known] = -np.linalg.lstsq(inner[:, ~known].toarray(), inner[:, known] @ found[known], rcond=None)[0]
+    return found
+
+
+def _flexibility(M: Any, K: Any, turned: Any, nodes: np.ndarray) -> Flexibility:
+    """The body with the motions that nothing resists."""
+    try:
+        moved = _candidates(M, K, turned, nodes)
+        size, turn = np.linalg.eigh(moved.T @ (M @ moved))
+        basis = moved @ (turn / np.sqrt(np.maximum(size, 1e-300)))[:, size > ROUNDING * size.max()]
+        _, resisted, way = np.linalg.svd(_resisted(K, basis), full_matrices=len(basis) < basis.shape[1])
+        rigid = basis @ way[int((resisted > ROUNDING * len(moved) ** 0.5).sum()) :].T
+    except np.linalg.LinAlgError as error:
+        raise ValueError(INDEFINITE.format(error)) from None
+    held = qr(rigid.T, pivoting=True, mode="r")[1][: rigid.shape[1]] if rigid.shape[1] else np.zeros(0, int)
+    none = np.zeros((M.shape[0], 0))
+    return Flexibility(K, M, rigid, none, none, np.sort(held))
+
+
+def _resisted(K: Any, motions: np.ndarray) -> np.ndarray:
+    """Forces (n, n_motions) on unknowns over the largest that can cancel in them, as K[i, j]**2 <= K[i, i] K[j, j]."""
+    stiff = np.sqrt(np.maximum(K.diagonal(), 0.0))[:, None]
+    size = stiff * (stiff * np.abs(motions)).max(axis=0, initial=0.0).max(initial=0.0)
+    return np.divide(K @ motions, size, out=np.zeros(motions.shape), where=size > 0.0)
+
+
+def _mass(R: Any, rigid: np.ndarray, nodes: np.ndarray) -> float:
+    """Mass [kg] that shifts move, of mass-normalised rigid motions."""
+    moved, wanted = R @ rigid, _motions(nodes)[:, 0, :, :3].reshape(-1, 3)
+    share = np.linalg.lstsq(moved, wanted, rcond=None)[0]
+    shifts = np.abs(moved @ share - wanted).max(axis=0) < UNEQUAL
+    masses = np.square(share[:, shifts]).sum(axis=0)
+    if not shifts.any() or np.ptp(masses) > UNEQUAL * masses.max():
+        raise ValueError(
+            "total_mass (of files: mass) must be given in kg: the matrices of a body that is held do not tell the mass "
+            "of its supports"
+        )
+    return float(masses.mean())
+
+
+def _unit_loads(turned: Any, numbers: np.ndarray) -> list[tuple[int, np.ndarray]]:
+    """Loads along x, y and z on the nodes that have unknowns of their own in all of these."""
+    if turned is None:
+        return []
+    own = np.diff(turned.tocsr().indptr).reshape(-1, 6)[:, :3].astype(bool).all(axis=1)
+    return [(int(number), force) for number in numbers[own] for force in np.eye(3)]
+
+
+def _forces(numbers: np.ndarray, loads: Any) -> np.ndarray:
+    """Forces (3 n_nodes, n_loads) [N] on nodes."""
+    row = {int(number): i for i, number in enumerate(numbers)}
+    found = np.zeros((len(numbers), 3, len(loads)))
+    for k, (number, *force) in enumerate(loads):
+        if number not in row:
+            raise ValueError(f"loads must be on nodes that can move, got node {number:g}")
+        found[row[number], :, k] = np.ravel(force)
+    return found.reshape(3 * len(numbers), len(loads))
+
+
+def _at_kept(told: Mapping[str, Any], kept: np.ndarray, n: int) -> dict[str, Any]:
+    """Cells and normals of the nodes kept."""
+    place = np.full(n, -1)
+    place[kept] = np.arange(len(kept))
+    found: dict[str, Any] = {}
+    if told.get("cells") is not None and len(told["cells"]):
+        cells = place[np.asarray(told["cells"], int)]
+        found["cells"] = cells[(cells >= 0).all(axis=1)]
+    if told.get("normals") is not None:
+        found["normals"] = np.asarray(told["normals"])[kept]
+    return found

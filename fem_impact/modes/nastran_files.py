@@ -1,0 +1,149 @@
+"""Read what Nastran wrote of a body: results (.op2), matrices (.op4), and decks with nodes, elements and DMIG (.bdf).
+
+Needs pyNastran; runs in the reader process (see `isolated`).
+"""
+
+import contextlib
+import tempfile
+import warnings
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from . import elements
+
+# vtk's codes of Nastran's elements, corners alone: their surface is drawn and struck, not computed with
+ELEMENTS = {
+    "CBAR": (3, 2), "CBEAM": (3, 2), "CROD": (3, 2), "CTRIA3": (5, 3), "CTRIA6": (5, 3), "CTRIAR": (5, 3),
+    "CQUAD4": (9, 4), "CQUAD8": (9, 4), "CQUADR": (9, 4), "CTETRA": (10, 4), "CHEXA": (12, 8), "CPENTA": (13, 6),
+    "CPYRAM": (14, 5),
+}  # fmt: skip
+FREE = "BEGIN BULK"  # line of a deck above which other sections are
+
+
+def results(path: Path, deck: str = "") -> dict[str, np.ndarray]:
+    """Eigenvectors and static displacements of an OP2 file; its nodes and elements are in it, or in the deck."""
+    with _quiet() as quiet:
+        from pyNastran.op2.op2 import read_op2
+        from pyNastran.op2.op2_geom import read_op2_geom
+
+        found = read_op2(str(path), **quiet) if deck else read_op2_geom(str(path), xref=False, validate=False, **quiet)
+        model = _deck(Path(deck), quiet) if deck else found
+        if not model.nodes:
+            raise ValueError(
+                f"{path.name} holds no nodes; give the deck (.bdf) beside it: files=[{path.name!r}, 'it.bdf']"
+            )
+        model.cross_reference(xref=False, xref_nodes=True)
+        told, (moved, frames) = _nodes(model)
+        if frames.any():
+            found.transform_displacements_to_global(moved, model.coords, xyz_cid0=told["nodes"])
+        return told | _elements(model.elements, told) | _fields(found, told["numbers"])
+
+
+def deck(path: Path) -> dict[str, np.ndarray]:
+    """Nodes, elements and matrices (DMIG) of a deck, and the unknowns of a reduction that it names."""
+    with _quiet() as quiet:
+        model = _deck(path, quiet)
+        told: dict[str, np.ndarray] = {}
+        if model.nodes:
+            model.cross_reference(xref=False, xref_nodes=True)
+            told, (_, frames) = _nodes(model)
+            told |= _elements(model.elements, told)
+            if frames.any():
+                wrong = [number for number in set(frames.tolist()) if model.coords[number].type[-1:] != "R"]
+                if wrong:
+                    raise ValueError(f"{path.name} has displacements in frame {wrong[0]}, which is not rectangular")
+                told["frames"] = np.array([model.coords[number].beta() for number in frames.tolist()])
+    for name, matrix in model.dmig.items():
+        kind = elements.kind_of_matrix(name)
+        if kind in ("mass", "stiffness"):
+            pair = np.asarray(matrix.GCj), np.asarray(matrix.GCi)
+            told[f"{kind}_entries"] = np.column_stack([*pair, np.asarray(matrix.Real, float)])
+    kept = [card for cards in (model.asets, model.bsets, model.csets) for card in cards]
+    dofs = [(int(node), int(way)) for card in kept for node, ways in _components(card) for way in ways]
+    dofs += [(int(node), 0) for card in model.qsets for node, _ in _components(card)]
+    if dofs:
+        told["dofs"] = np.array(sorted(set(dofs)), int)  # as Nastran orders the rows of matrices of its a-set
+    return told
+
+
+def matrices(path: Path) -> dict[str, np.ndarray]:
+    """Mass, stiffness and recovery in an OP4 file, by the first letters of their names."""
+    with _quiet() as quiet:
+        from pyNastran.op4.op4 import read_op4
+
+        found = read_op4(str(path), **quiet)
+    told: dict[str, np.ndarray] = {}
+    for name, matrix in found.items():
+        kind, values = elements.kind_of_matrix(name), matrix[1] if isinstance(matrix, tuple) else matrix.data
+        if kind:
+            told |= elements.triplets(kind, values)
+    if not told:
+        raise ValueError(f"{path.name} must hold matrices named K... and M..., got {', '.join(found) or 'none'}")
+    return told
+
+
+@contextlib.contextmanager
+def _quiet() -> Any:
+    """In a folder where pyNastran leaves what it could not read, without its warnings."""
+    if not hasattr(np, "in1d"):  # numpy 2.4 lacks it, and pyNastran 1.3 asks for it
+        setattr(np, "in1d", np.isin)  # noqa: B010
+    with tempfile.TemporaryDirectory() as folder, contextlib.chdir(folder), warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # of its own use of numpy
+        from cpylog import SimpleLogger
+
+        yield {"debug": False, "log": SimpleLogger("critical")}
+
+
+def _deck(path: Path, quiet: dict[str, Any]) -> Any:
+    from pyNastran.bdf.bdf import read_bdf
+
+    bulk = FREE not in path.read_text("utf-8", "replace").upper()
+    return read_bdf(str(path), xref=False, validate=False, punch=bulk, **quiet)
+
+
+def _components(card: Any) -> list[tuple[int, str]]:
+    ways = card.components if isinstance(card.components, list) else [card.components] * len(card.node_ids)
+    return list(zip(card.node_ids, map(str, ways)))
+
+
+def _nodes(read: Any) -> tuple[dict[str, np.ndarray], tuple[Any, np.ndarray]]:
+    """Numbers and places of nodes; what pyNastran knows of their frames, and the numbers of these."""
+    moved, placed, places, numbers = read.get_displacement_index_xyz_cp_cd()
+    at = numbers[:, 0].astype(int)
+    return {"numbers": at, "nodes": read.transform_xyzcp_to_xyz_cid(places, at, placed, cid=0)}, (moved, numbers[:, 2])
+
+
+def _elements(cards: Any, told: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
+    row = {int(number): i for i, number in enumerate(told["numbers"])}
+    blocks: dict[int, list[list[int]]] = {}
+    for element in cards.values():
+        code, corners = ELEMENTS.get(element.type, (0, 0))
+        if code:
+            blocks.setdefault(code, []).append([row[int(node)] for node in element.node_ids[:corners]])
+    return elements.told(told["nodes"], {code: np.array(each) for code, each in blocks.items()})
+
+
+def _fields(results: Any, numbers: np.ndarray) -> dict[str, np.ndarray]:
+    """Modes and static displacements."""
+    row = {int(number): i for i, number in enumerate(numbers)}
+    table = list(results.eigenvectors.values())
+    found: dict[str, np.ndarray] = {}
+    for name, each in {"shapes": table, "static": list(results.displacements.values())}.items():
+        moved = [_at_nodes(one, row) for one in each]
+        found[name] = np.concatenate(moved, axis=2) if moved else np.zeros((len(numbers), 3, 0))
+    cycles = [np.asarray(one.mode_cycles if hasattr(one, "mode_cycles") else one.freqs, float) for one in table]
+    found["frequencies"] = np.abs(np.concatenate(cycles)) if cycles else np.zeros(0)
+    masses = [np.asarray(one.generalized_mass, float) for one in results.eigenvalues.values()]
+    if masses and sum(map(len, masses)) >= len(found["frequencies"]):
+        found["modal_mass"] = np.concatenate(masses)[: len(found["frequencies"])]
+    return found
+
+
+def _at_nodes(table: Any, row: dict[int, int]) -> np.ndarray:
+    """Translations (n_nodes, 3, n_cases) of a Nastran table of displacements."""
+    found = np.zeros((len(row), 3, len(table.data)))
+    rows = [row[int(number)] for number in table.node_gridtype[:, 0]]
+    found[rows] = np.moveaxis(np.asarray(table.data[:, :, :3], float), 0, 2)
+    return found

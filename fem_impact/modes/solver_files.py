@@ -1,0 +1,195 @@
+"""Read what other programs wrote of a body: CalculiX, Code_Aster (MED), Ansys, Abaqus, and matrices as text.
+
+Each needs its own library; runs in the reader process (see `isolated`).
+"""
+
+import re
+import warnings
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ..mesh.meshio_reader import closed_hdf5
+from . import elements
+
+MODAL, STATIC = 2, 0  # Ansys's kinds of analysis
+MARKET = "%%MatrixMarket"
+ALONG = {"DX": 0, "DY": 1, "DZ": 2}  # components of Code_Aster's displacements
+
+
+def calculix(path: Path, deck: str = "") -> dict[str, np.ndarray]:
+    """Modes and static displacements of an FRD file; node sets of one node in the deck are names."""
+    import pyvista_frd
+
+    reader = pyvista_frd.FRDReader(str(path), inp_path=deck or None)
+    with path.open("rb") as file:
+        heads = [line for line in file if line.lstrip().startswith(b"100CL")]
+    modal = {float(head[12:24]): b"MODAL" in head for head in heads}  # steps are those of different values
+    if len(set(heads)) != len(reader.time_values) or not modal:
+        raise ValueError(
+            f"{path.name} must hold steps of different times or frequencies; write each load to its own file"
+        )
+    shapes, static, frequencies = [], [], []
+    for i, value in enumerate(reader.time_values):
+        reader.set_active_time_point(i)
+        grid = reader.read()
+        if "DISP" not in grid.point_data:
+            continue
+        moved = np.asarray(grid.point_data["DISP"], float)[:, :3]
+        if modal[min(modal, key=lambda known: abs(known - value))]:
+            shapes.append(moved)
+            frequencies.append(float(value))
+        else:
+            static.append(moved)
+    found = {"nodes": np.asarray(grid.points, float)} | _steps(len(grid.points), frequencies, shapes, static)
+    found |= {"numbers": np.asarray(grid.point_data["original_node_ids"], int)}
+    sets = {key[5:]: np.flatnonzero(grid.point_data[key]) for key in grid.point_data if key[:5] == "NSET:"}
+    return found | _names(sets, found["numbers"]) | elements.told(found["nodes"], grid.cells_dict)
+
+
+def mesh(path: Path) -> dict[str, np.ndarray]:
+    """Nodes, elements and names of single nodes of an Abaqus deck."""
+    import meshio
+
+    read = meshio.read(path)
+    points = np.asarray(read.points, float)
+    numbers = _labels(path.read_text("utf-8", "replace"))
+    if len(numbers) != len(points):
+        raise ValueError(f"{path.name} must hold its nodes itself, not in files that it includes")
+    found = {"nodes": _spatial(points), "numbers": numbers}
+    return found | _names(read.point_sets, numbers) | elements.told(found["nodes"], elements.of_meshio(read.cells))
+
+
+def med(path: Path) -> dict[str, np.ndarray]:
+    """Nodes, elements, and displacements of a MED file: modes by their frequencies, static ones at time zero."""
+    import h5py
+    import meshio
+
+    h5py.File = closed_hdf5(h5py, path)
+    read = meshio.read(path)
+    nodes = _spatial(np.asarray(read.points, float))
+    shapes: list[np.ndarray] = []
+    static: list[np.ndarray] = []
+    frequencies: list[float] = []
+    with h5py.File(path, "r") as file:
+        for _, field in sorted(file["CHA"].items() if "CHA" in file else ()):
+            columns = _components(field)
+            steps = sorted(field.values(), key=lambda step: (step.attrs["NDT"], step.attrs["NOR"]))
+            values = [float(step.attrs["PDT"]) for step in steps]
+            for step, value in zip(steps, values):
+                if not columns or "NOE" not in step:
+                    continue
+                moved = _nodal(step["NOE"], file.get("PROFILS"), columns, len(nodes))
+                (shapes if any(values) else static).append(moved)
+                frequencies += [value] if any(values) else []
+    names = {name: np.flatnonzero(read.point_data["point_tags"] == tag) for name, tag in _families(read)}
+    numbers = np.arange(1, len(nodes) + 1)
+    found = {"nodes": nodes, "numbers": numbers} | _steps(len(nodes), frequencies, shapes, static)
+    return found | _names(names, numbers) | elements.told(nodes, elements.of_meshio(read.cells))
+
+
+def ansys(path: Path) -> dict[str, np.ndarray]:
+    """Modes or static displacements (.rst), matrices (.full), or nodes and elements (.cdb) of Ansys."""
+    warnings.simplefilter("ignore")  # of its own use of numpy
+    from ansys.mapdl import reader
+
+    if path.suffix.lower() == ".full":
+        dofs, *both = reader.read_binary(str(path)).load_km(sort=True)
+        found = {}
+        for kind, matrix in zip(("stiffness", "mass"), (each.tocoo() for each in both)):
+            pair = (dofs[at] + [0, 1] for at in (matrix.row, matrix.col))  # directions from 1
+            found[f"{kind}_entries"] = np.column_stack([*pair, matrix.data])
+        return found
+    own = reader.Archive(str(path)) if path.suffix.lower() == ".cdb" else reader.read_binary(str(path))
+    grid = own.grid
+    numbers = np.asarray(grid.point_data["ansys_node_num"], int)
+    found = {"nodes": np.asarray(grid.points, float), "numbers": numbers}
+    found |= elements.told(found["nodes"], grid.cells_dict)
+    if isinstance(own, reader.Archive):
+        return found
+    analysis, row = own._resultheader["kan"], {int(number): i for i, number in enumerate(numbers)}
+    if analysis not in (MODAL, STATIC) or own._resultheader["cpxrst"]:
+        raise ValueError(f"{path.name} must hold real modes or static results")
+    fields = []
+    for i in range(own.nsets):
+        at, values = own.nodal_solution(i)
+        ways = own.result_dof(i)
+        field, kept = np.zeros((len(numbers), 3)), [k for k, number in enumerate(at) if int(number) in row]
+        for way, name in enumerate(("UX", "UY", "UZ")):
+            if name in ways:
+                field[[row[int(number)] for number in at[kept]], way] = values[kept, ways.index(name)]
+        fields.append(field)
+    modal = analysis == MODAL
+    parts = (list(own.time_values), fields, []) if modal else ([], [], fields)
+    return found | _steps(len(numbers), *parts)
+
+
+def matrix(path: Path) -> dict[str, np.ndarray]:
+    """A matrix of text: of MatrixMarket, or Abaqus's by nodes and directions; its name tells which."""
+    kind = elements.kind_of_matrix(path.stem)
+    if not kind:
+        raise ValueError(f"{path.name} must say what it is: name it K... or ...STIF..., M... or ...MASS..., or R...")
+    text = path.read_text("ascii", "replace")
+    if text.startswith(MARKET):
+        from scipy.io import mmread
+
+        return elements.triplets(kind, mmread(path))
+    lines = [line for line in text.splitlines() if line.strip() and not line.lstrip().startswith("*")]
+    table = np.array([re.split(r"[,\s]+", line.strip().rstrip(",")) for line in lines], float)
+    if table.ndim != 2 or table.shape[1] != 5:
+        raise ValueError(f"{path.name} must have rows of node, direction, node, direction and value")
+    return {f"{kind}_entries": table}
+
+
+def _steps(n: int, frequencies: list[float], shapes: list[np.ndarray], static: list[np.ndarray]) -> dict[str, Any]:
+    found = {"frequencies": np.array(frequencies, float)}
+    for name, each in (("shapes", shapes), ("static", static)):
+        found[name] = np.stack(each, axis=2) if each else np.zeros((n, 3, 0))
+    return found
+
+
+def _names(sets: Any, numbers: np.ndarray) -> dict[str, np.ndarray]:
+    """Sets of one node are names."""
+    single = {str(name): int(numbers[rows[0]]) for name, rows in sets.items() if len(rows) == 1}
+    return {"names": np.array(list(single), str), "named": np.array(list(single.values()), int)}
+
+
+def _spatial(points: np.ndarray) -> np.ndarray:
+    return np.column_stack([points, np.zeros((len(points), 3 - points.shape[1]))])
+
+
+def _labels(text: str) -> np.ndarray:
+    """Numbers of nodes of an Abaqus deck, in its order, which meshio drops."""
+    found, within = [], False
+    for line in text.splitlines():
+        if line.startswith("*"):
+            within = within if line.startswith("**") else bool(re.match(r"\*NODE\s*(,|$)", line.strip(), re.IGNORECASE))
+        elif within and line.strip():
+            found.append(int(line.split(",")[0]))
+    return np.array(found, int)
+
+
+def _components(field: Any) -> dict[int, int]:
+    """Columns of a field by axis: of displacements alone, by their names."""
+    names = field.attrs["NOM"]
+    names = names.decode() if isinstance(names, bytes) else str(names)
+    each = [names[i : i + 16].strip() for i in range(0, len(names), 16)]
+    return {ALONG[name]: column for column, name in enumerate(each) if name in ALONG}
+
+
+def _nodal(data: Any, profiles: Any, columns: dict[int, int], n: int) -> np.ndarray:
+    """Displacements (n, 3) of one step, zero at nodes outside its profile."""
+    profile = data.attrs["PFL"].decode() if isinstance(data.attrs["PFL"], bytes) else str(data.attrs["PFL"])
+    values = np.asarray(data[profile]["CO"][()], float)
+    rows = np.arange(n) if profile == "MED_NO_PROFILE_INTERNAL" else np.asarray(profiles[profile]["PFL"][()]) - 1
+    values, found = values.reshape(len(rows), -1, order="F"), np.zeros((n, 3))
+    for axis, column in columns.items():
+        found[rows, axis] = values[:, column]
+    return found
+
+
+def _families(read: Any) -> list[tuple[str, int]]:
+    """Names of groups of nodes and their tags."""
+    tags = getattr(read, "point_tags", {}) if "point_tags" in read.point_data else {}
+    return [(name, tag) for tag, names in tags.items() for name in names]

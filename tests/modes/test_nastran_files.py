@@ -1,0 +1,109 @@
+"""Results, decks and matrices of Nastran."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+from test_matrices import KEPT, LENGTH, N, held_to_truth, reduced
+
+import fem_impact as fi
+
+FILES = Path(__file__).parents[1] / "bodies"
+pytestmark = pytest.mark.usefixtures("read_here")
+
+
+def test_a_rod_of_nastran():
+    """Ten bars with lumped masses, and a mass at the tip; along the rod there is a closed form: k tan k = m / M."""
+    pytest.importorskip("pyNastran", reason="the nastran extra is not installed")
+    area, length, E, rho, tip = np.pi, 10.0, 3e7, 7.4851e-4, 2.59e-3
+    mass = rho * area * length
+    body = fi.Body.load(FILES / "beam.op2", mass=mass + tip)
+    along = body.modes("x")
+    i = int(np.abs(along.shape_at([body.at(11)])).argmax())
+    k = 1.4166
+    for _ in range(50):
+        k = np.arctan2(mass, tip * k)
+    scale = (mass / 2.0 * (1.0 - np.sin(2.0 * k) / (2.0 * k)) + tip * np.sin(k) ** 2) ** -0.5
+    assert body.frequencies[i] == pytest.approx(k * np.sqrt(E / rho) / length / (2.0 * np.pi), rel=5e-3)
+    assert abs(along.shape_at([body.at(11)])[0, i]) == pytest.approx(scale * np.sin(k), rel=2e-3)
+
+
+def test_static_results_of_nastran_in_frames_of_their_own(tmp_path):
+    """Node 2 gives its displacement in a frame turned by 90 degrees about z."""
+    pytest.importorskip("pyNastran", reason="the nastran extra is not installed")
+    if not hasattr(np, "in1d"):
+        pytest.MonkeyPatch().setattr(np, "in1d", np.isin, raising=False)
+    from pyNastran.op2.op2 import OP2
+    from pyNastran.op2.tables.oug.oug_displacements import RealDisplacementArray
+    from pyNastran.op2.tables.oug.oug_eigenvectors import RealEigenvectorArray
+
+    (tmp_path / "bar.bdf").write_text(
+        "GRID,1,,0.,0.,0.\nGRID,2,,1.,0.,0.,7\nCORD2R,7,,0.,0.,0.,0.,0.,1.\n,0.,1.,0.\nCBAR,1,1,1,2,0.,0.,1.\n"
+        "PBAR,1,1,1.,1.,1.,1.\nMAT1,1,1.,,.3,1.\n"
+    )
+    numbers = np.array([[1, 1], [2, 1]], "int32")
+    moved = np.zeros((1, 2, 6), "float32")
+    moved[0, 1, :3] = 3.0, 1.0, 2.0
+    results = OP2(debug=False)
+    results.is_nx = False
+    results.displacements[1] = RealDisplacementArray.add_static_case("OUGV1", numbers, moved, 1)
+    modal = [1], [16.0], [4.0 / (2.0 * np.pi)]
+    results.eigenvectors[1] = RealEigenvectorArray.add_modal_case("OUGV1", numbers, 2.0 * moved, 1, *modal)
+    results.eigenvectors[1].table_code = 7  # not that of displacements
+    results.write_op2(str(tmp_path / "bar.op2"))
+    with pytest.raises(ValueError, match=r"bar\.op2 holds no nodes; give the deck \(\.bdf\) beside it"):
+        fi.Body.load(tmp_path / "bar.op2", mass=1.0)
+    body = fi.Body.load(
+        [tmp_path / "bar.op2", tmp_path / "bar.bdf"], mass=1.0, loads=[(2, (-1.0, 3.0, 2.0))], modal_mass=[4.0]
+    )
+    assert_allclose(body.static[1, :, 0], [-1.0, 3.0, 2.0], atol=1e-6)
+    assert_allclose(body.shapes[1, :, 0], [-1.0, 3.0, 2.0], atol=1e-6)
+    assert body.frequencies[0] == pytest.approx(4.0 / (2.0 * np.pi), rel=1e-6) and body.cells.tolist() == [[0, 1]]
+
+
+def written_op4(path, matrices):
+    if not hasattr(np, "in1d"):
+        pytest.MonkeyPatch().setattr(np, "in1d", np.isin, raising=False)
+    from pyNastran.op4.op4 import OP4
+
+    OP4(debug=False).write_op4(str(path), {name: (6, each) for name, each in matrices.items()}, is_binary=False)
+
+
+def written_deck(path, dofs, sets=True, entries=None):
+    """Nodes, and a reduction's sets or its matrices as DMIG, in large fields."""
+    lines = [f"GRID,{i + 1},,{x:.6f},0.,0." for i, x in enumerate(np.linspace(0.0, LENGTH, N + 1))]
+    modal = dofs[dofs[:, 1] == 0, 0]
+    lines += [f"SPOINT,{number}" for number in modal]
+    lines += [f"CBAR,{i},1,{i},{i + 1},0.,0.,1." for i in range(1, N + 1)] + [
+        "PBAR,1,1,1.,1.,1.,1.",
+        "MAT1,1,1.,,.3,1.",
+    ]
+    if sets:
+        lines += [f"ASET1,123456,{i + 1}" for i in KEPT] + [f"QSET1,0,{number}" for number in modal]
+    for name, matrix in (entries or {}).items():
+        lines.append(f"DMIG,{name},0,6,2,0")
+        for column, (node, way) in enumerate(dofs):
+            rows = [row for row in range(column, len(dofs)) if matrix[row, column]]
+            for k, row in enumerate(rows):
+                start = f"DMIG*   {name:<16}{node:>16}{way:>16}{'':16}*\n" if k == 0 else ""
+                value = f"{matrix[row, column]:.9E}".replace("E", "D")
+                lines.append(f"{start}*       {dofs[row][0]:>16}{dofs[row][1]:>16}{value:>16}")
+    path.write_text("\n".join([*lines, ""]))
+    return path
+
+
+def test_matrices_of_nastran_with_the_sets_of_their_deck(tmp_path):
+    pytest.importorskip("pyNastran", reason="the nastran extra is not installed")
+    M, K, _, dofs = reduced()
+    written_op4(tmp_path / "bar.op4", {"MAA": M, "KAA": K})
+    deck = written_deck(tmp_path / "bar.bdf", dofs)
+    held_to_truth(fi.Body.load([tmp_path / "bar.op4", deck]))
+
+
+def test_matrices_of_nastran_as_dmig(tmp_path):
+    """Ten digits are kept: rigid motions of the reduction resist by 1e-9 of what cancels in them."""
+    pytest.importorskip("pyNastran", reason="the nastran extra is not installed")
+    M, K, _, dofs = reduced()
+    deck = written_deck(tmp_path / "bar.pch", dofs, sets=False, entries={"KAAX": K, "MAAX": M})
+    held_to_truth(fi.Body.load(deck))
