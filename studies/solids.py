@@ -19,7 +19,6 @@ from scipy.sparse.linalg import LinearOperator, eigsh
 import fem_impact as fi
 
 SLOW = (2.0 * np.pi * 20.0) ** 2  # [1/s^2] springs on all the mass that make a free body stiff, and are taken out again
-MOVED = 0.12  # [-] of a body's size: how far the largest motion is drawn
 APART = 0.02  # [-] of a frequency, in which the sound is searched for it
 PLACE = 1e-6  # [-] of a body's size: how far a load may be from a node
 
@@ -138,7 +137,7 @@ def body(solved: Solved, loads: Sequence[tuple[Any, Any]] = (), **more: Any) -> 
     Nodes are numbered as NGSolve does, from 1.
     """
     mesh = solved.space.mesh
-    skin = mesh.ngmesh.Elements2D().NumPy()["nodes"][:, :3].astype(int) - 1
+    skin = _skin(mesh)
     kept, flat = np.unique(skin, return_inverse=True)
     points = np.array([mesh[each].point for each in mesh.vertices])[kept]
     at = solved.columns.reshape(3, -1, solved.columns.shape[1])[:, kept].transpose(1, 0, 2)
@@ -156,14 +155,27 @@ def body(solved: Solved, loads: Sequence[tuple[Any, Any]] = (), **more: Any) -> 
     )  # fmt: skip
 
 
+def _skin(mesh: Any) -> np.ndarray:
+    """Triangles (n, 3) of corners that belong to one tetrahedron only, counted so that normals point outwards."""
+    tets = mesh.ngmesh.Elements3D().NumPy()["nodes"][:, :4].astype(int) - 1
+    faces, others = np.vstack([np.delete(tets, i, axis=1) for i in range(4)]), tets.T.ravel()
+    _, first, count = np.unique(np.sort(faces, axis=1), axis=0, return_index=True, return_counts=True)
+    faces, others = faces[first[count == 1]], others[first[count == 1]]
+    corners, inside = (np.array([mesh[each].point for each in mesh.vertices])[each] for each in (faces, others))
+    across = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    turned = np.einsum("ni,ni->n", across, inside - corners[:, 0]) > 0.0
+    faces[turned] = faces[turned][:, ::-1]
+    return faces
+
+
 def listened(
-    hit: fi.Response, at: Any, name: str, near: np.ndarray, seconds: float, rate: int = 48_000
+    hit: fi.Response, body: fi.Body, where: Any, way: Any, name: str, near: np.ndarray, seconds: float
 ) -> tuple[Path, np.ndarray]:
-    """Write the velocity of a node along the blow as a WAV file; its path, and the peaks [Hz] of its spectrum.
+    """Write the velocity of a node along a direction as a WAV file; its path, and the peaks [Hz] of its spectrum.
 
     Each peak is the largest within `APART` of one of ``near``, between the lines by the parabola of its logarithm.
     """
-    sound = fi.sound.synthesise(hit, at, duration=seconds, rate=rate).audible().faded()
+    sound = fi.sound.of_node(hit, body, where, way, duration=seconds).audible().faded()
     path = shared.folder() / f"{name}.wav"
     path.write_bytes(sound.wav())
     rate, samples = wavfile.read(path)
@@ -179,9 +191,13 @@ def listened(
 
 
 def drawn(
-    body: fi.Body, panels: Sequence[tuple[str, np.ndarray]], title: str, view: tuple[float, float] = (12.0, -60.0)
-) -> Any:
-    """A figure of the body's surface, moved (n_nodes, 3) as each panel says and coloured by how far."""
+    body: fi.Body, panels: Sequence[tuple[str, np.ndarray]], title: str, view: tuple[float, float] = (12.0, -60.0),
+    most: float | None = 0.12,
+) -> Any:  # fmt: skip
+    """A figure of the body's surface, moved (n_nodes, 3) as each panel says and coloured by how far.
+
+    The largest motion is drawn as the part ``most`` of the body's size; None draws all motions as large as they are.
+    """
     figure = plt.figure(figsize=(3.1 * len(panels), 4.0), layout="constrained")
     figure.suptitle(title)
     middle = 0.5 * (body.nodes.min(axis=0) + body.nodes.max(axis=0))
@@ -189,7 +205,7 @@ def drawn(
     for i, (name, moved) in enumerate(panels, 1):
         far = np.linalg.norm(moved, axis=1)
         largest = max(float(far.max()), 1e-300)
-        nodes = body.nodes + MOVED * size / largest * moved
+        nodes = body.nodes + (1.0 if most is None else most * size / largest) * moved
         colours = plt.get_cmap("viridis")(far[body.cells].mean(axis=1) / largest)
         corners = nodes[body.cells]
         across = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])

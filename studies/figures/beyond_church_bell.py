@@ -134,7 +134,7 @@ def main():
     print(hit.verdict)
     print(f"clapper {hit.striker.mass:.2f} kg, bell {bell.mass:.1f} kg: contact {1e3 * hit.contact_time:.3f} ms, peak "
           f"{hit.peak_force:.0f} N, restitution {hit.restitution:.3f}, error {hit.error.total:.1e}")  # fmt: skip
-    path, heard = solids.listened(hit, bell.at(outside), "church_bell", of_section, SECONDS)
+    path, heard = solids.listened(hit, bell, outside, "normal", "church_bell", of_section, SECONDS)
     kept = np.array([bell.frequencies[np.abs(bell.frequencies - each).argmin()] for each in of_section])
     print(f"{'partial':10}{'ideal':>6}{'section':>12}{'cents':>8}{'solid':>12}{'cents':>8}{path.name:>18}{'cents':>8}")
     rows = zip(NAMES, IDEAL, *(each for f in (of_section, kept, heard) for each in (f, cents(f))))
