@@ -395,6 +395,11 @@ class Body(check.Brief):
                 seen.append(dents.Load(points[-1], apart, under[others], float(under[row]), square))
         return np.column_stack(columns) if columns else np.zeros((len(ways), 0)), points, seen
 
+    def along(self, where: Any, direction: Any = "normal") -> np.ndarray:
+        """Shapes (n_modes,) [kg**-0.5] of a node along a direction, both as `node` and `modes` take them."""
+        row = self.node(where)
+        return np.asarray(self._ways(direction)[row] @ self.shapes[row])
+
     def displacement(self, q: ArrayLike, where: Any) -> np.ndarray:
         """Displacements (n_times, n_points, 3) [m] at nodes, of the kept modes alone.
 

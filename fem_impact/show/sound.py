@@ -16,6 +16,7 @@ from ..impact.response import Response
 from ..model.playing import Strokes
 from ..modes import free_air
 from ..modes.air import DENSITY, SPEED
+from ..modes.body import Body
 from . import sampling
 
 RATE = 48_000  # [Hz] sample rate: all audible modes are below half of it
@@ -171,9 +172,63 @@ def synthesise(
     """
     modes = response.target
     point: Any = modes.point("at", response.at if at is None else at)
+    return _moving(response, modes.shape_at(point)[0], duration, rate, normalise)
+
+
+@check.typed
+def of_node(
+    response: Response | Strokes,
+    body: Body,
+    where: Any,
+    direction: Any = "normal",
+    *,
+    duration: float | None = None,
+    rate: int = RATE,
+    normalise: bool = False,
+) -> Sound:
+    """Turn the velocity of a node of a body from elsewhere, along any direction, into sound.
+
+    Parameters
+    ----------
+    response : Response or Strokes
+        Of a blow on ``body.modes(...)``, along whatever direction.
+    body : Body
+    where : node of the body, by number, name or point (3,) [m]
+    direction : "normal", "x", "y", "z" or a vector (3,)
+    duration, rate, normalise
+        As in `synthesise`, whose notes hold here, too.
+
+    Notes
+    -----
+    This is how the surface moves there, with nothing said of the air. A mode pushes it the better the longer its waves
+    are beside those in the air, and both sides of a thin wall push against each other: low modes are too loud in it.
+
+    Examples
+    --------
+    >>> nodes = [(0.0, 0.0, 0.0), (0.3, 0.0, 0.0), (0.0, 0.2, 0.0)]
+    >>> shapes = np.zeros((3, 3, 1))
+    >>> shapes[:, 2, 0], shapes[:, 0, 0] = [1.2, -0.9, 0.4], 0.1
+    >>> body = fi.Body([110.0], shapes, nodes, mass=0.5)
+    >>> hit = fi.strike(body.modes("z"), fi.Striker.rigid(0.1), fi.Contact.linear(1e4), at=body.at(2), speed=0.2,
+    ...                 tolerance=1.0)
+    >>> along, across = (fi.sound.of_node(hit, body, 1, way, duration=0.2) for way in "zx")
+    >>> round(float(np.abs(along.samples).max() / np.abs(across.samples).max()), 3)
+    12.0
+    """
+    shape = np.zeros(response.target.n_modes)
+    own = body.along(where, direction)
+    if len(own) > len(shape):
+        raise ValueError(f"response must be of a blow on this body of {len(own)} modes, got one on {len(shape)}")
+    shape[len(shape) - len(own) :] = own  # rigid motions that were added come first
+    return _moving(response, shape, duration, rate, normalise)
+
+
+def _moving(
+    response: Response | Strokes, shape: np.ndarray, duration: float | None, rate: int, normalise: bool
+) -> Sound:
+    """Sound of the velocity of a point at which modes have these values (n_modes,) [kg**-0.5]."""
     rate, heard = _audible(response, rate)
     times = _times(response, heard, duration, rate)
-    shape = modes.shape_at(point)[0]  # (n_modes,)
     velocity = np.concatenate([_velocity(hit, heard, shape, part) for hit, _, part in _parts(response, times)])
     return _scaled(velocity, rate, FULL_SCALE, "m/s", normalise)
 

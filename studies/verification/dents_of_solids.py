@@ -22,18 +22,17 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from scipy.sparse.linalg import LinearOperator, eigsh
 
 import fem_impact as fi
 
 sys.path.append(str(Path(__file__).parents[1]))  # of `shared`
 import shared
+import solids
 
 TABLE = Path(__file__).with_suffix(".npz")
 STEEL = fi.Material(E=210e9, nu=0.3, rho=7850.0)
 BALL = fi.Striker.sphere(STEEL, radius=0.01)
 SPEED = 0.2  # [m/s] contacts of 90 us, whose radius is 0.11 mm
-SLOW = (2.0 * np.pi * 20.0) ** 2  # [1/s^2] springs on all the mass that make a free body stiff, and are taken out again
 KEPT = 96, 32  # nodes of the top and others nearest to the load that are in the file
 
 
@@ -60,76 +59,21 @@ BRICKS = {
 # Solving them
 
 
-def meshed(body: Brick, size: float, near: float) -> Any:
-    """Tetrahedra with a node at the load."""
+def solved(body: Brick, size: float, near: float) -> dict[str, np.ndarray]:
+    """Frequencies [Hz], and shapes and unit load's deflection along z at nodes around the load."""
     import ngsolve as ng
-    from netgen.occ import Box, Glue, OCCGeometry, Pnt
+    from netgen.occ import Box, Glue, Pnt
 
     (a, b, h), (x, y) = body.sides, body.at
     pairs = [((0.0, x), (0.0, y)), ((x, a), (0.0, y)), ((0.0, x), (y, b)), ((x, a), (y, b))]
     shape = Glue([Box(Pnt(x0, y0, 0.0), Pnt(x1, y1, h)) for (x0, x1), (y0, y1) in pairs])
-    for corner in shape.vertices:
-        if np.allclose([corner.p.x, corner.p.y, corner.p.z], body.struck):
-            corner.maxh = near
-    return ng.Mesh(OCCGeometry(shape).GenerateMesh(maxh=size, grading=0.5))
-
-
-def solved(body: Brick, size: float, near: float) -> dict[str, np.ndarray]:
-    """Frequencies [Hz], and shapes and unit load's deflection along z at nodes around the load."""
-    import ngsolve as ng
-
-    mesh = meshed(body, size, near)
-    space = ng.VectorH1(mesh, order=2)
-    u, v = space.TnT()
-    mu = STEEL.E / 2.0 / (1.0 + STEEL.nu)
-    lame = 2.0 * mu * STEEL.nu / (1.0 - 2.0 * STEEL.nu)
-    strain = ng.Sym(ng.Grad(u))
-    stress = lame * ng.Trace(strain) * ng.Id(3) + 2.0 * mu * strain
-    a, m, load = ng.BilinearForm(space), ng.BilinearForm(space), ng.LinearForm(space)
-    a += (ng.InnerProduct(stress, ng.Sym(ng.Grad(v))) + SLOW * STEEL.rho * u * v) * ng.dx
-    m += STEEL.rho * u * v * ng.dx
-    load += v[2](*body.struck)
-    for form in (a, m, load):
-        form.Assemble()
-    force, field = load.vec.FV().NumPy().copy(), ng.GridFunction(space)
-    given, answer = a.mat.CreateColVector(), a.mat.CreateColVector()
-
-    def product(matrix: Any) -> LinearOperator:
-        def through(values: np.ndarray) -> np.ndarray:
-            given.FV().NumPy()[:] = values.ravel()
-            answer.data = matrix * given
-            return answer.FV().NumPy().copy()
-
-        return LinearOperator((space.ndof, space.ndof), through, dtype=float)
-
-    stiff, mass = product(a.mat), product(m.mat)
-    inverse = product(a.mat.Inverse(space.FreeDofs(), inverse="sparsecholesky"))
-    turns = (0, -ng.z, ng.y), (ng.z, 0, -ng.x), (-ng.y, ng.x, 0)
-    rigid = np.zeros((space.ndof, 6))
-    for column, motion in zip(rigid.T, ((1, 0, 0), (0, 1, 0), (0, 0, 1), *turns)):
-        field.Set(ng.CF(motion))
-        column[:] = field.vec.FV().NumPy()
-    rigid = np.linalg.solve(np.linalg.cholesky(rigid.T @ (mass @ rigid)), rigid.T).T
-    held = mass @ rigid
-
-    def elastic(values: np.ndarray) -> np.ndarray:  # with inertia relief, and without any rigid motion
-        found = inverse @ (values - held @ (rigid.T @ values))
-        return np.asarray(found - rigid @ (held.T @ found))
-
-    start = elastic(np.random.default_rng(0).standard_normal(space.ndof))
-    back = LinearOperator(stiff.shape, elastic, dtype=float)
-    values, vectors = eigsh(stiff, body.n_modes - 6, mass, sigma=0.0, OPinv=back, v0=start)
-    static = elastic(force)
-    for _ in range(3):
-        static = elastic(force + SLOW * (mass @ static))
-    columns = np.column_stack([rigid, vectors, static])
-    nodes, found = at_nodes(mesh, field, columns, body.struck)
-    frequencies = np.concatenate([np.zeros(6), np.sqrt(values - SLOW) / 2.0 / np.pi])
-    print(
-        f"{space.ndof} unknowns, {size:g} m, {near:g} m at the load: {frequencies[6]:.6g} to {frequencies[-1]:.6g} Hz"
-    )
+    mesh = solids.meshed(shape, size, [(body.struck, near)])
+    found = solids.solve(mesh, STEEL, body.n_modes, [(body.struck, (0.0, 0.0, 1.0))])
+    nodes, moved = at_nodes(mesh, ng.GridFunction(found.space), found.columns, body.struck)
+    values = found.frequencies
+    print(f"{len(found.columns)} unknowns, {size:g} m, {near:g} m at the load: {values[6]:.6g} to {values[-1]:.6g} Hz")
     return {
-        "frequencies": frequencies, "nodes": nodes, "shapes": found[:, :-1].astype(np.float32), "static": found[:, -1],
+        "frequencies": values, "nodes": nodes, "shapes": moved[:, :-1].astype(np.float32), "static": moved[:, -1],
     }  # fmt: skip
 
 
