@@ -197,6 +197,14 @@ COMMANDS = {
         _out("hammers.png, or rove.png and .csv", "none", "picture"),
         _format(None),
     ), "a TOML file; its body and strike point are used"),
+    "watch": Command("judge every record of taps that a folder gets: good, or what to do", commands.watch, (
+        _option("--bandwidth", "F", "bandwidth that taps must reach [Hz]", float, required=True),
+        _option("--drop", "D", "how far the spectrum may fall within the bandwidth [dB] (default: 10)", float,
+                default=10.0),
+        _flag("--once", "judge the records that are there, and end"),
+        *CHANNELS,
+        _out("watch.png", "out/NAME", "picture"),
+    ), f"the folder that gets {TAPS}", "FOLDER"),
     "report": Command("strike a scene; write one HTML page with everything about the blow", commands.report, (
         _out("report.html", "out/NAME", "page"),
         TOLERANCE,

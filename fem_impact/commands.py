@@ -316,6 +316,13 @@ def hammer(options: argparse.Namespace) -> Answer:
     return hammer_commands.hammer(options)
 
 
+def watch(options: argparse.Namespace) -> Answer | None:
+    """Judge the records of taps that a folder gets."""
+    from . import hammer_commands  # imported only when needed
+
+    return hammer_commands.watch(options)
+
+
 def report(options: argparse.Namespace) -> Answer:
     """Strike and write a page."""
     scene = fi.report.read(options.scene)

@@ -1,7 +1,9 @@
-"""What the commands of a test with a hammer do: choose one, and plan where it taps."""
+"""What the commands of a test with a hammer do: choose one, plan where it taps, and judge each tap."""
 
 import argparse
+import time
 from collections.abc import Sequence
+from pathlib import Path
 from typing import Any
 
 import fem_impact as fi
@@ -13,6 +15,7 @@ from ._base.files import staged
 from .scenes import tips
 
 MASSES = [m * 10.0**e for e in (-3, -2, -1) for m in (1.0, 2.0, 5.0)] + [1.0]  # [kg] of hammers from 1 g to 1 kg
+PAUSE = 0.5  # [s] between two looks at a folder: a file that nobody wrote to for so long is complete
 
 
 def hammer(options: argparse.Namespace) -> commands.Answer:
@@ -72,3 +75,73 @@ def _rove(options: argparse.Namespace, scene: Any, masses: Sequence[float], note
     files = [] if drawn is None else [drawn.name, drawn.with_suffix(".csv").name]
     said = [commands._title(scene), *noted(notes), plan.summary()]
     return commands.answer({**data, "notes": [*notes, *plan.notes]}, *said, folder=drawn and drawn.parent, files=files)
+
+
+def watch(options: argparse.Namespace) -> commands.Answer | None:
+    """Judge the records of a folder, and new ones until the program is stopped."""
+    from .taps.watch import Folder  # imported only when needed
+
+    folder, seen = Folder(options.scene), _Watched(options)
+    if not options.once:
+        commands._tell(options, f"watching {folder.path}; Ctrl-C stops it")
+    while True:
+        new = seen.judged(folder.look())
+        if new and not options.once:
+            options.show(seen.answer(new))
+        if options.once and not folder.waiting:
+            return seen.answer([one for each in seen.every.values() for one in each])
+        time.sleep(PAUSE)
+
+
+class _Watched:
+    """What the records of a folder have told so far."""
+
+    def __init__(self, options: argparse.Namespace) -> None:
+        self.options = options
+        self.bandwidth = check.positive("--bandwidth", options.bandwidth, "Hz")
+        self.drop = check.between("--drop", options.drop, 1.0, 40.0, "dB")
+        self.path = commands._file(options, "watch.png") or Path("out") / options.scene.resolve().name / "watch.png"
+        self.every: dict[str, list[Any]] = {}  # name of a file: `Advice` of each of its taps
+        self.good: dict[str, Any] = {}  # the same: its good taps
+
+    def judged(self, paths: Sequence[Path]) -> list[Any]:
+        """Advice on every tap of some files; the picture shows the last of them."""
+        from .taps import prompt  # imported only when needed
+        from .taps.watch import Advice, advice
+
+        new, last = [], None
+        for path in paths:
+            self.good.pop(path.name, None)  # it may have been written again
+            try:
+                taps = prompt.taps_of(self.options, path)
+                found = [advice(path.name, taps, i, self.bandwidth, self.drop) for i in range(taps.n_taps)]
+            except ValueError as error:
+                found = [Advice(path.name, "", False, f"cannot be judged: {error}", None, None)]
+            else:
+                last = taps, found[-1]
+                if any(each.good for each in found):
+                    self.good[path.name] = taps.pick([each.good for each in found])
+            self.every[path.name] = found
+            new += found
+        if last is not None:
+            self._draw(*last)
+        return new
+
+    def _draw(self, last: Any, told: Any) -> None:
+        """Write the picture; of good taps those count that are sampled as the last ones are."""
+        from .pages import tap_pictures  # imported only when needed
+        from .taps.windows import joined
+
+        alike = [each for each in self.good.values() if (each.rate, each.units) == (last.rate, last.units)]
+        good = joined(alike) if alike else None
+        self.path.parent.mkdir(parents=True, exist_ok=True)
+        said = f"{told.file}, {told.tap}: {told.said}"
+        fi.figures.save(self.path, tap_pictures.watched(last, good, self.bandwidth, self.drop, said))
+
+    def answer(self, records: Sequence[Any]) -> commands.Answer:
+        """The answer that tells some records."""
+        lines = [f"{one.file}{', ' * bool(one.tap)}{one.tap}: {one.said}" for one in records]
+        n_good = sum(each.n_taps for each in self.good.values())
+        data = {"records": [each._asdict() for each in records], "n_good": n_good}
+        drawn = self.path if self.path.is_file() and records else None
+        return commands._answer_of_file(data, lines or ["no records yet"], drawn)
