@@ -13,6 +13,8 @@ from .fe.section import Elastic as Elastic
 from .fe.section import Plate as Plate
 from .impact import spectra as spectra
 from .impact import threshold as threshold
+from .impact.catalogue import materials as materials
+from .impact.catalogue import strikers as strikers
 from .impact.collision import Touch as Touch
 from .impact.collision import collide as collide
 from .impact.contact import Contact as Contact

@@ -6,6 +6,7 @@
 """
 
 import inspect
+from collections.abc import Mapping
 from pathlib import Path
 from types import ModuleType
 
@@ -63,9 +64,11 @@ def members(name, kind):
 
 def entry(name, item):
     """The part of the page about one name."""
-    call = "" if name in MADE else f"({parameters(item)})"
+    things = isinstance(item, Mapping)
+    call = "" if name in MADE else "[name]" if things else f"({parameters(item)})"
     text = f"### fi.{name}\n\n`fi.{name}{call}`\n\n" + fenced(inspect.getdoc(item) or "")
-    return text + ("\n" + members(name, item) if inspect.isclass(item) and not issubclass(item, Exception) else "")
+    kind = type(item) if things else item
+    return text + ("\n" + members(name, kind) if inspect.isclass(kind) and not issubclass(kind, Exception) else "")
 
 
 def page():
@@ -79,8 +82,13 @@ def page():
             key: item
             for key, item in inspect.getmembers(home)
             if not key.startswith("_")
-            and inspect.isfunction(item)
-            and (f"{item.__module__}.".startswith(f"{home.__name__}.") or key in getattr(home, "__all__", ()))
+            and (
+                (
+                    inspect.isfunction(item)
+                    and (f"{item.__module__}.".startswith(f"{home.__name__}.") or key in getattr(home, "__all__", ()))
+                )
+                or (type(item).__module__.startswith(fi.__name__) and isinstance(item, Mapping))
+            )
         }
         parts.append(f"## fi.{name}\n\n{first(home)}\n")
         parts += [entry(f"{name}.{key}", own[key]) for key in sorted(own)]

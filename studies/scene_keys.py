@@ -20,7 +20,7 @@ A scene is a TOML file with one table per part, in SI units. `fem-impact new` wr
 what they mean and mark mistakes.
 
 Besides its tables a scene has a `title`. The tables `mesh`, `striker`, `contact` and `strike` are required, and so are
-the keys in **bold**.
+the keys in **bold**, unless a [name](#names-in-place-of-numbers) stands for them.
 
 From Python, `fi.load_scene(path)` reads a scene, and `.plan()`, `.strike()` and `.play()` run it.
 
@@ -40,6 +40,13 @@ the rest leaves open:
 
 - `{ value = 70e9, about = 0.03 }`: nine tenths of what it may be lie within 3 % (lognormal, for numbers above zero); or
 - `{ value = 70e9, low = 68e9, high = 71e9 }`: anything between the two, alike (uniform).
+
+## Names in place of numbers
+
+`[material] name = "brass"` and `[striker] name = "yarn, medium"` stand for the numbers, with their intervals, of the
+[catalogue](catalogue.md). Other keys beside a name replace what it says. A scene whose striker has a name may leave out
+`[contact]`. In layers, ribs and strokes names work alike. `[target] damping_ratio` stays to be stated: what is lost in
+a body is also lost at its supports.
 """
 
 
@@ -49,7 +56,7 @@ def words(form):
         return "a table with a kind"
     if "title" in form:
         return form["title"].replace("a size that varies", "a [size that varies](#sizes-that-vary)")
-    if "anyOf" in form:  # a number, or how well it is known
+    if "anyOf" in form and form.get("type") != "object":  # a number, or how well it is known
         return words(form["anyOf"][0])
     if "enum" in form:
         return ", ".join(f'`"{each}"`' for each in form["enum"])
@@ -75,9 +82,10 @@ def default(form):
 def rows(form):
     """The table of one kind of table: its keys, what they may be, their defaults and meaning."""
     lines = ["| key | value | default | meaning |", "|---|---|---|---|"]
+    required = form["required"] or next((each["required"] for each in form.get("anyOf", ())), ())
     for key, each in form["properties"].items():
         if "const" not in each:
-            name = f"**{key}**" if key in form["required"] else key
+            name = f"**{key}**" if key in required else key
             lines.append(f"| {name} | {words(each)} | {default(each)} | {each['description']} |")
     return "\n".join(lines) + "\n" if len(lines) > 2 else "It has no keys of its own.\n"
 
@@ -86,8 +94,10 @@ def kinds(choices):
     """The parts about each kind of a table."""
     parts = []
     for choice in choices:
-        key, kind = next((key, each["const"]) for key, each in choice["properties"].items() if "const" in each)
-        parts += [f'### {key} = "{kind}"\n', f"{choice['description']}\n", rows(choice)]
+        found = [(key, each["const"]) for key, each in choice["properties"].items() if "const" in each]
+        key, kind = found[0] if found else ("name", "...")
+        shown = choice if found else {**choice, "properties": {key: choice["properties"][key]}}
+        parts += [f'### {key} = "{kind}"\n', f"{choice['description']}\n", rows(shown)]
     return parts
 
 

@@ -16,6 +16,7 @@ INTERVAL = (
 )
 KNOWN = ("mesh", "material", "section", "target", "striker", "contact", "strike", "rib", "layer", "rise", "hand")
 WITHIN = {"hand": Hand, "material": Material}  # keys that are tables themselves
+NAMES = ("material", "striker")  # tables that may have a name of the catalogue
 DRAFT = "http://json-schema.org/draft-07/schema#"  # what taplo and VS Code read
 
 
@@ -40,7 +41,7 @@ def schema() -> dict[str, Any]:
         "type": "object",
         "properties": {"title": {"type": "string", "description": "what the scene is, for pictures and reports"}}
         | tables,
-        "required": list(REQUIRED),
+        "required": [name for name in REQUIRED if name != "contact"],  # a striker with a name has one of its own
         "additionalProperties": False,
     }
 
@@ -48,13 +49,37 @@ def schema() -> dict[str, Any]:
 def _table(name: str, selector: str, makers: dict[str, Callable[..., Any]]) -> dict[str, Any]:
     """The schema of one table: that of its only kind, or a choice by the key ``selector``."""
     if not selector:
-        return _keys(name, "", makers[""])
+        return _one(name, makers[""])
     return {
         "type": "object",
         "description": keys.TABLES[name],
         "properties": {selector: {"enum": list(makers)}},  # so that editors offer the kinds first
-        "required": [selector],
-        "oneOf": _choices(name, selector, makers),
+        "required": [] if name in NAMES else [selector],
+        "oneOf": _choices(name, selector, makers) + ([_named(name, makers)] if name in NAMES else []),
+    }
+
+
+def _one(name: str, maker: Callable[..., Any]) -> dict[str, Any]:
+    """The schema of a table that has one kind; where a name may stand for all its keys, either is required."""
+    found = _keys(name, "", maker)
+    if name not in NAMES:
+        return found
+    either = [{"required": found["required"]}, {"required": ["name"]}]
+    own = {"name": keys.form(name, "", "name"), **found["properties"]}
+    return found | {"properties": own, "required": [], "anyOf": either}
+
+
+def _named(table: str, makers: dict[str, Callable[..., Any]]) -> dict[str, Any]:
+    """The schema of a table with a name of the catalogue, and of keys that replace what it says."""
+    keys_of_kinds: dict[str, Any] = {}
+    for kind, maker in makers.items():
+        keys_of_kinds = {**_keys(table, kind, maker)["properties"], **keys_of_kinds}
+    return {
+        "description": "One of the catalogue; other keys replace what its name says.",
+        "type": "object",
+        "properties": {"name": keys.form(table, "", "name"), **keys_of_kinds},
+        "required": ["name"],
+        "additionalProperties": False,
     }
 
 
@@ -87,7 +112,7 @@ def _key(table: str, kind: str, name: str, default: Any) -> dict[str, Any]:
         one = keys.table({"table": keys.form("rise", "", "table")}, ("table",))
         return keys.form(table, kind, name) | keys.named("a [rise](#rise)", *_choices("rise", "shape", RISES), one)
     if name in WITHIN:
-        return _keys(name, "", WITHIN[name]) | {"description": keys.KEYS.get(name, (keys.TABLES[name],))[0]}
+        return _one(name, WITHIN[name]) | {"description": keys.KEYS.get(name, (keys.TABLES[name],))[0]}
     found = keys.form(table, kind, name)
     if table in KNOWN and found.get("type") == "number":
         words = found.pop("description")

@@ -4,6 +4,7 @@ from typing import Any
 
 from .._base import check
 from ..fe.assembly import THEORIES
+from ..impact.catalogue import materials, strikers
 from ..impact.compiled.laws.base import LawNumber
 from ..impact.contact import HIGHEST_EXPONENT, LOWEST_EXPONENT, MARKS
 from ..impact.quantities import BANDED, QUANTITIES
@@ -23,6 +24,7 @@ COUNT: Form = {"type": "integer", "minimum": 1}
 TEXT: Form = {"type": "string"}
 TURNING = ("free", "hinged")  # how an end may be held while the body can still move rigidly
 FLAG: Form = {"type": "boolean"}
+LISTED: Form = {"title": "a name"}  # of the catalogue: pages do not list them all
 
 
 def one_of(words: Any) -> Form:
@@ -142,6 +144,7 @@ KEYS: dict[str, tuple[str, Form]] = {
     "cup": ("m, height of the cup over the bow", NUMBER),
     "rise.table": ("a CSV file of heights, columns x, y and z in m, relative to the scene", TEXT),
     # material and section
+    "material.name": ("of the [catalogue](catalogue.md); other keys replace what it says", LISTED | one_of(materials)),
     "E": ("Pa, Young's modulus", POSITIVE),
     "material.E": ("Pa, Young's modulus; of wood along the grain", POSITIVE),
     "nu": ("-, Poisson's ratio", NUMBER | {"exclusiveMinimum": -1, "maximum": 0.5}),
@@ -195,6 +198,10 @@ KEYS: dict[str, tuple[str, Form]] = {
     "supports.stiffness": ("N/m^2, of springs along a plate's edge; N/m at a beam's end", NOT_NEGATIVE),
     "supports.rotation": ("N, of springs against turning along a plate's edge; N m at a beam's end", NOT_NEGATIVE),
     # striker
+    "striker.name": (
+        "of the [catalogue](catalogue.md), in place of the kind; also says the contact",
+        LISTED | one_of(strikers),
+    ),
     "radius": ("m", POSITIVE),
     "n_modes": ("bending modes of the stick; left out, as many as the blow needs", COUNT),
     "slenderness": ("-, length of the stick over its diameter; with it shear counts", POSITIVE),

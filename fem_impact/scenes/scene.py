@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from .._base import check, markup
+from .._base import check, known, markup
 from ..fe.assembly import THICK, System, clamped, support_of_facets, support_words
 from ..fe.ribs import Rib, sides_on
 from ..fe.section import Beam, Material, Plate, evaluate
@@ -27,7 +27,8 @@ from ..model.planner import Blow, Plan, Run
 from ..model.playing import Strokes
 from ..model.target import FIRST_LOOK, Stages, Target, Watch
 from ..modes.modal import Modes
-from . import known, sequence
+from . import sequence
+from .named import filled
 from .schema import (
     MAKERS,
     NESTED,
@@ -539,6 +540,10 @@ def scene_of(tables: Mapping[str, Any], path: Path, *, folder: Path) -> Scene:
             raise fault(path, f"[{name}] is not a table of a scene{check.nearest(name, TABLES)}")
         if not isinstance(table, dict) and name not in (REPEATED, *PARTS):
             raise fault(path, f"{name} must be a table, written [{name}]")
+    try:
+        tables = filled(tables)
+    except ValueError as error:
+        raise fault(path, str(error)) from None
     for name in REQUIRED:
         if name not in tables:
             raise fault(path, f"[{name}] is missing")

@@ -12,6 +12,7 @@ from scipy.optimize import brentq
 from .._base import check, progress
 from ..fe.assembly import System
 from ..impact import accuracy
+from ..impact.catalogue import hammers as listed
 from ..impact.collision import strike
 from ..impact.contact import Contact
 from ..impact.response import Response
@@ -39,6 +40,8 @@ MASSES = (1e-6, 1e4)  # [kg] allowed: outside, a blow takes too long to compute 
 BANDWIDTHS = (1e-3, 1e9)  # [Hz] allowed, for the same reason as the masses
 # [-] frequencies where the spectrum is evaluated to find where it falls: 100 per inverse of the contact time
 LOOKS = 400
+
+catalogue = listed  # impact hammers as their data sheets describe them, by name
 
 
 Ranges = tuple[tuple[float, float], ...]  # [N/m] softest and hardest tip of each

@@ -123,7 +123,7 @@ def test_every_key_of_a_scene_is_explained_and_every_explanation_is_used():
             for key in set(keys_of(function)) - {"hand", *NESTED}:
                 names = (f"{table}.{kind}.{key}", f"{table}.{key}", key)
                 found.add(next(name for name in names if name in keys.KEYS))
-    found |= {"supports.stiffness", "supports.rotation", "hand.force", "rise.table"}
+    found |= {"material.name", "striker.name", "supports.stiffness", "supports.rotation", "hand.force", "rise.table"}
     assert found == set(keys.KEYS)
 
 

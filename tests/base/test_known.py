@@ -7,7 +7,7 @@ from scenes import QUICK
 from scipy import stats
 
 import fem_impact as fi
-from fem_impact.scenes import known
+from fem_impact._base import known
 
 
 def load(tmp_path, text):

@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 from typing import Any
 
-from .._base import check
+from . import check
 
 NINETY = 1.6448536269514722  # [-] deviations of a normal distribution between which nine tenths lie
 WITHIN = ("rise", "hand", "material")  # tables within others whose numbers may have intervals, too

@@ -1,0 +1,90 @@
+"""Materials and strikers of a scene by name: what ``[material] name = "brass"`` stands for."""
+
+from collections.abc import Mapping
+from typing import Any
+
+from .._base import known
+from ..fe.material import Material
+from ..impact.catalogue import Catalogue, Entry, materials, strikers
+
+
+def filled(tables: Mapping[str, Any]) -> dict[str, Any]:
+    """The tables of a scene with the numbers, and their intervals, that its names stand for.
+
+    Other keys beside a name replace what it says. Without a table [contact], the striker's name says how it strikes the
+    material of the scene. A ValueError begins with the table.
+    """
+    found = dict(tables)
+    if isinstance(found.get("material"), Mapping):
+        found["material"] = _material("[material]", found["material"])
+    for part in ("layer", "rib"):
+        if isinstance(found.get(part), list):
+            found[part] = [_within(f"[[{part}]] {i}", each) for i, each in enumerate(found[part])]
+    found = _striker("[striker]", found, found)
+    if isinstance(found.get("stroke"), list):
+        stated = {"contact": tables["contact"]} if "contact" in tables else {}
+        found["stroke"] = [
+            _stroke(f"[[stroke]] {i} striker:", each, found, stated) for i, each in enumerate(found["stroke"])
+        ]
+    return found
+
+
+def _material(called: str, table: Mapping[str, Any]) -> dict[str, Any]:
+    if "name" not in table:
+        return dict(table)
+    stands = _entry(called, materials, table["name"]).table
+    return {**stands, **{key: value for key, value in table.items() if key != "name"}}
+
+
+def _entry(called: str, names: Catalogue[Any], name: Any) -> Entry:
+    try:
+        return names.entry(name)
+    except ValueError as error:
+        raise ValueError(f"{called} name: {error}") from None
+
+
+def _within(called: str, table: Any) -> Any:
+    """A layer or rib, whose own material may have a name."""
+    if not isinstance(table, Mapping) or not isinstance(table.get("material"), Mapping):
+        return table
+    return {**table, "material": _material(f"{called} material:", table["material"])}
+
+
+def _striker(called: str, table: Mapping[str, Any], scene: Mapping[str, Any]) -> dict[str, Any]:
+    """A table with those of the striker and the contact that the striker's name stands for, if it has one."""
+    told = table.get("striker")
+    if not isinstance(told, Mapping) or "name" not in told:
+        return dict(table)
+    if "kind" in told:
+        raise ValueError(f"{called} kind must be left out beside name, which has one")
+    entry = _entry(called, strikers, told["name"])
+    own = {key: value for key, value in told.items() if key != "name"}
+    found = {**table, "striker": {**entry.table, **own}}
+    return found if "contact" in table else {**found, "contact": entry.contact_table(_struck(called, entry, scene))}
+
+
+def _stroke(called: str, table: Any, scene: Mapping[str, Any], stated: Mapping[str, Any]) -> Any:
+    """A stroke, whose striker may have a name; its numbers have no intervals. A [contact] of the scene holds for it."""
+    if not isinstance(table, Mapping) or "name" not in (table.get("striker") or ()):
+        return table
+    found = _striker(called, {**stated, **table}, scene)
+    parts = {key: known.taken("", found[key])[0] for key in ("striker", "contact")}
+    return {**found, **parts}
+
+
+def _struck(called: str, entry: Entry, scene: Mapping[str, Any]) -> Material | None:
+    """The material that a tip strikes: of the layer on the struck side, or the scene's; None if it does not matter."""
+    if "stiffness" in entry.facts:
+        return None
+    first = next(iter(scene.get("layer") or ()), None)
+    own = first.get("material") if isinstance(first, Mapping) else None
+    table = own or scene.get("material")
+    if not isinstance(table, Mapping):
+        raise ValueError(
+            f"{called} name: the contact of {entry.name!r} depends on what it strikes; write a table [material], or "
+            "[contact]"
+        )
+    try:
+        return Material(**known.taken("material", table)[0])
+    except (TypeError, ValueError):  # the material is wrong: whoever builds it says how
+        return None
