@@ -253,7 +253,8 @@ COMMANDS = {
         (_option("shell", None, "default: bash", choices=("bash", "zsh", "tcsh"), nargs="?", default="bash"),), ""),
     "frf": Command("compute frequency responses of taps, or of a scene as a rig would measure it", commands.frf, (
         *CHANNELS,
-        _option("--method", None, "H1 for noise in the response, H2 in the force", choices=("H1", "H2"), default="H1"),
+        _option("--method", None, "H1 for noise in the response, H2 in the force, Hv in both", default="H1",
+                choices=("H1", "H2", "Hv")),
         _option("--force-window", "S", "ignore the force later than this after each pulse begins", float),
         _option("--response-window", "S", "time constant of an exponential window", float),
         _out("frf.csv", "none", ".csv or .uff file"),
