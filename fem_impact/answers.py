@@ -89,6 +89,10 @@ KEYS: dict[str, Keys] = {
         "verdicts": ("array?", "with --rove: of every point whether a tip works, or why none does"),
         "resolution": ("number?", "with --rove: frequency resolution [Hz]"),
     },
+    "watch": {
+        "records": ("array", "of each tap file, tap, good, said, peak [N], reach [Hz] (null: beyond half the rate)"),
+        "n_good": ("integer", "good taps so far"),
+    },
     "report": BLOW | SCENE | SECONDS,
     "explore": {"address": ("string", "address of the page, printed as soon as it is served")},
     "play": {
@@ -142,6 +146,7 @@ EXAMPLES: dict[str, tuple[str, ...]] = {
         "fem-impact hammer studies/scenes/drumstick.toml --bandwidth 800",
         "fem-impact hammer studies/scenes/drumstick.toml --bandwidth 800 --rove 12 --out out",
     ),
+    "watch": ("fem-impact watch records --bandwidth 2000", "fem-impact watch records --bandwidth 2000 --once",),
     "report": ("fem-impact report studies/scenes/drumstick.toml", "fem-impact report out --out page.html"),
     "explore": ("fem-impact explore studies/scenes/drumstick.toml",),
     "play": (

@@ -197,6 +197,14 @@ COMMANDS = {
         _out("hammers.png, or rove.png and .csv", "none", "picture"),
         _format(None),
     ), "a TOML file; its body and strike point are used"),
+    "watch": Command("judge every record of taps that a folder gets: good, or what to do", commands.watch, (
+        _option("--bandwidth", "F", "bandwidth that taps must reach [Hz]", float, required=True),
+        _option("--drop", "D", "how far the spectrum may fall within the bandwidth [dB] (default: 10)", float,
+                default=10.0),
+        _flag("--once", "judge the records that are there, and end"),
+        *CHANNELS,
+        _out("watch.png", "out/NAME", "picture"),
+    ), f"the folder that gets {TAPS}", "FOLDER"),
     "report": Command("strike a scene; write one HTML page with everything about the blow", commands.report, (
         _out("report.html", "out/NAME", "page"),
         TOLERANCE,
@@ -253,7 +261,8 @@ COMMANDS = {
         (_option("shell", None, "default: bash", choices=("bash", "zsh", "tcsh"), nargs="?", default="bash"),), ""),
     "frf": Command("compute frequency responses of taps, or of a scene as a rig would measure it", commands.frf, (
         *CHANNELS,
-        _option("--method", None, "H1 for noise in the response, H2 in the force", choices=("H1", "H2"), default="H1"),
+        _option("--method", None, "H1 for noise in the response, H2 in the force, Hv in both", default="H1",
+                choices=("H1", "H2", "Hv")),
         _option("--force-window", "S", "ignore the force later than this after each pulse begins", float),
         _option("--response-window", "S", "time constant of an exponential window", float),
         _out("frf.csv", "none", ".csv or .uff file"),

@@ -102,8 +102,9 @@ def _interruptible(options: argparse.Namespace) -> Iterator[None]:
     def end(number: int, _: Any) -> None:
         for each in before:
             signal.signal(each, signal.SIG_IGN)
-        if options.command == "explore" and number == signal.SIGINT:
-            os._exit(0)  # Ctrl-C is the normal way to stop the server
+        if options.command in ("explore", "watch") and number == signal.SIGINT:
+            undo_all()
+            os._exit(0)  # Ctrl-C is the normal way to stop them
         if undo_all():
             word = "interrupted" if number == signal.SIGINT else "terminated"
             with suppress(OSError):

@@ -311,61 +311,16 @@ def _split(option: str, text: str) -> tuple[str, str]:
 
 def hammer(options: argparse.Namespace) -> Answer:
     """Find hammers for a bandwidth, or plan a test with one that roves."""
-    from .scenes import maps  # imported only when needed
-    from .show import plots  # imported only when needed
+    from . import hammer_commands  # imported only when needed
 
-    scene = fi.load_scene(options.scene)
-    masses = options.masses or [m * 10.0**e for e in (-3, -2, -1) for m in (1.0, 2.0, 5.0)] + [1.0]
-    notes = maps.tips_for(scene)
-    if options.rove is not None:
-        return _rove(options, scene, masses, notes)
-    drawn = _drawn(options, "hammers.png")
-    with _display(options, tells=True)("hammers"):
-        hammers = maps.hammers_for(scene, options.bandwidth, masses, drop=options.drop)
-        if drawn is not None:
-            drawn.parent.mkdir(parents=True, exist_ok=True)
-            fi.figures.save(drawn, plots.hammers(hammers, options.bandwidth, options.drop))
-    notes = (*notes, *hammers[0].notes)
-    rows = [
-        (f"{1e3 * hammer.mass:.4g} g", f"{hammer.softest:.3g} N/m" if hammer.softest else "none",
-         f"{'> ' * hammer.unlimited}{hammer.hardest:.3g} N/m" if hammer.hardest else "none",
-         f"{hammer.reach:.4g} Hz" if hammer.reach else "-")
-        for hammer in hammers
-    ]  # fmt: skip
-    said: list[str | Sequence[str]] = [
-        _title(scene),
-        *noted(notes),
-        f"Linear tips that reach {options.bandwidth:g} Hz (spectrum at most {options.drop:g} dB down) and hit once:",
-        _table(rows, ("mass", "softest tip", "hardest tip", "its reach")),
-    ]
-    for hammer in (each for each in hammers if len(each.working) > 1):
-        ranges = ", ".join(f"{low:.3g} to {high:.3g} N/m" for low, high in hammer.working)
-        said.append(f"{1e3 * hammer.mass:.4g} g: every range that works: {ranges}")
-    if any(hammer.unlimited for hammer in hammers):
-        said.append(">: still a single hit with the hardest tip that the model resolves")
-    idle = ", ".join(f"{1e3 * hammer.mass:.4g} g" for hammer in hammers if not hammer.works)
-    if idle:
-        said.append(f"{idle}: no tip reaches {options.bandwidth:g} Hz and hits once; try lighter hammers")
-    data = {"bandwidth": options.bandwidth, "drop": options.drop, "hammers": [hammer.data() for hammer in hammers]}
-    return _answer_of_file({**data, "notes": notes}, said, drawn)
+    return hammer_commands.hammer(options)
 
 
-def _rove(options: argparse.Namespace, scene: Any, masses: Sequence[float], notes: Sequence[str]) -> Answer:
-    """Plan a test with a roving hammer."""
-    from ._base import check  # imported only when needed
-    from .taps import roving
+def watch(options: argparse.Namespace) -> Answer | None:
+    """Judge the records of taps that a folder gets."""
+    from . import hammer_commands  # imported only when needed
 
-    number, drawn = check.count("--rove", options.rove), _drawn(options, "rove.png")
-    with _display(options, tells=True)("points"):
-        plan = roving.of_scene(scene, masses, options.bandwidth, options.drop, number)
-        if drawn is not None:
-            with staged(drawn.parent) as staging:
-                fi.figures.save(staging / drawn.name, plan.figure())
-                plan.write_csv((staging / drawn.name).with_suffix(".csv"))
-    data = {"table": plan.table(), "verdicts": plan.verdicts, "resolution": plan.resolution}
-    files = [] if drawn is None else [drawn.name, drawn.with_suffix(".csv").name]
-    said = [_title(scene), *noted(notes), plan.summary()]
-    return answer({**data, "notes": [*notes, *plan.notes]}, *said, folder=drawn and drawn.parent, files=files)
+    return hammer_commands.watch(options)
 
 
 def report(options: argparse.Namespace) -> Answer:

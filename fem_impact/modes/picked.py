@@ -32,6 +32,8 @@ class Picked(NamedTuple):
     errors: np.ndarray  # (n_channels, n_modes) [1/kg]
     misfit: np.ndarray  # (n_channels, n_modes) [-] what is left of the responses at each peak, over the mode's share
     left: float  # [-] root mean square that they leave of the responses, each frequency by its weight
+    frequency_errors: np.ndarray  # (n_modes,) [Hz] standard errors
+    damping_errors: np.ndarray  # (n_modes,) [-] the same
 
 
 def peaks(size: np.ndarray) -> np.ndarray:
@@ -110,10 +112,42 @@ def pick(name: str, found: Any, about: Any = None) -> Picked:
         raise ValueError(f"{name} has no peaks that are modes; give frequencies= near which they are sought")
     spread = np.sqrt(np.diag(np.linalg.pinv(basis.T @ basis))[:, None] * np.square(rest).sum(axis=0) / _spare(basis))
     natural, damping = np.exp(poles)
+    doubt = _pole_errors(omega, weight, poles, constants[:n], rest) * np.stack([natural / (2.0 * np.pi), damping])
     damping = np.maximum(damping - float(found.attrs.get("added_damping", 0.0)) / natural, 0.0)  # that of a window
     left = float(np.linalg.norm(rest) / max(float(np.linalg.norm(data)), 1e-300))
     misfit = _misfit(omega, np.exp(poles), basis[:, :n], constants[:n], rest)
-    return Picked(natural / (2.0 * np.pi), damping, constants[:n].T, spread[:n].T, misfit, left)
+    return Picked(natural / (2.0 * np.pi), damping, constants[:n].T, spread[:n].T, misfit, left, *doubt)
+
+
+def _pole_errors(
+    omega: np.ndarray, weight: np.ndarray, poles: np.ndarray, products: np.ndarray, rest: np.ndarray
+) -> np.ndarray:
+    """Standard errors (2, n_modes) [-] of the logarithms of poles, from what the modes leave of the responses.
+
+    The noise may differ from line to line and from channel to channel: what is left counts where it is left (White
+    1980, Econometrica 48, 817-838), more where a line has much to say (MacKinnon and White 1985, HC2).
+    """
+    basis, slopes = _basis(omega, weight, poles)
+    q = np.linalg.qr(basis)[0]
+    columns, square = _curvature(q, slopes, np.tile(products, (2, 1)))
+    inner = np.zeros(square.shape)
+    for own, left in zip(products.T, rest.T):
+        moved = columns * np.tile(own, 2)  # (2 n_frequencies, 2 n_modes)
+        lever = np.square(q).sum(axis=1) + np.square(np.linalg.qr(moved)[0]).sum(axis=1) / rest.shape[1]
+        felt = moved * (left / np.sqrt(np.maximum(1.0 - lever, 1e-3)))[:, None]
+        inner += felt.T @ felt
+    back = np.linalg.pinv(square)
+    return np.sqrt(np.diag(back @ inner @ back)).reshape(2, -1)
+
+
+def _curvature(q: np.ndarray, slopes: np.ndarray, products: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Slopes by logarithms of poles that products cannot make up for, and half the curvature of the sum of squares.
+
+    ``q`` (2 n_frequencies, n_modes + 2) spans the basis, ``products`` are (2 n_modes, n_channels).
+    """
+    columns = np.concatenate(list(slopes), axis=1)
+    columns -= q @ (q.T @ columns)
+    return columns, (columns.T @ columns) * (products @ products.T)
 
 
 def _misfit(
@@ -208,9 +242,7 @@ def _refined(omega: np.ndarray, data: np.ndarray, weight: np.ndarray, start: np.
         if cost >= before:
             x, cost, caution = best, before, 10.0 * caution
         else:
-            columns = np.concatenate(list(slopes), axis=1)
-            columns -= q @ (q.T @ columns)
-            square = (columns.T @ columns) * (products @ products.T)
+            columns, square = _curvature(q, slopes, products)
             slope = ((columns.T @ rest) * products).sum(axis=1)
             best, caution = x, 0.1 * caution
             if cost > (1.0 - CLOSE) * before:

@@ -13,11 +13,11 @@ import xarray
 
 from .._base import check, markup
 from ..fe import plausible
-from ..impact import accuracy, threshold
+from ..impact import threshold
 from ..impact.contact import MARKS, acting_stiffness, wall_time
 from ..model.target import Stages
 from ..show import figures, plots
-from ..sweeps import bodies, cases, grid, hammers
+from ..sweeps import bodies, cases, grid
 from ..sweeps.borders import PREFIX, read_borders, without_borders
 from ..sweeps.cells import ALIASES, AXES, LAW, Case, Range, laid_out, logarithmic
 from .scene import Scene
@@ -328,21 +328,3 @@ def write(folder: Path, table: xarray.Dataset, form: str = "nc", picture: str = 
                 figures.save(folder / f"{layer}.{picture}", draw(table, layer))
                 names.append(f"{layer}.{picture}")
     return names
-
-
-@check.typed
-def hammers_for(scene: Scene, bandwidth: float, masses: Any, *, drop: float = 10.0) -> tuple[hammers.Hammer, ...]:
-    """What each hammer can do at the strike point of a scene; its own striker and contact are ignored (`tips_for`)."""
-    return hammers.choose_on(scene.built.target, scene.blow.values["at"], bandwidth, masses, drop=drop)
-
-
-def tips_for(scene: Scene) -> tuple[str, ...]:
-    """A note if the scene's own contact is not a linear spring, as the tips of hammers are: what it amounts to."""
-    if scene.contact.kind == "linear":
-        return ()
-    law, mass, speed = scene.make_contact(), scene.make_striker().felt_mass, float(scene.blow.values["speed"])
-    alike = accuracy.resonant_stiffness(mass, accuracy.contact_resonance(law, mass, speed))
-    return (
-        f"tips are linear springs [N/m]; the scene's contact is of another kind ({scene.contact.kind}) and not used: "
-        f"under {1e3 * mass:.4g} g at {speed:g} m/s it acts as long as a tip of {alike:.3g} N/m",
-    )

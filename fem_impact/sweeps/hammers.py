@@ -3,6 +3,7 @@
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cache
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -19,14 +20,13 @@ from ..impact.spectra import half_sine_spectrum
 from ..impact.striker import Striker
 from ..model.target import Stages, Target
 from ..modes.modal import Damping, Modes
-from . import bodies
-from .cases import Cases, solve_cases
-from .cells import Case
+from . import batches, bodies
 
 # [-] error limit of the blows that are looked at first: only to find where ranges end, which DECIDED then tells
 TOLERANCE = 1e-2
 DECIDED = 1e-4  # [-] error limit of the blows that decide where a range of tips ends, a tenth of its WIDTH
 WIDTH = 1e-3  # [-] relative width to which the ends of a range are found: finer than any tip is known
+WEIGHED = 5e-3  # [-] the same of the mass at which tips that work end: finer than a hammer in a hand is known
 # [-] hardest tip on a body of Ritz vectors, over that whose half sine has the bandwidth: three times its frequency
 HARDEST = 10.0
 # [-] modes used otherwise, whatever the bandwidth, to bound the time; residual compliance replaces the others
@@ -58,6 +58,7 @@ class Hammer:
     reach: float | None  # [Hz] bandwidth with the hardest tip; None: no tip hits once
     error: float | None  # [-] estimated error of the blow with that tip
     notes: tuple[str, ...] = ()  # what the body assumed, and numbers that are probably a slip of a unit
+    border: bool = False  # whether it is not one of those asked for, but the last that works beside one that does not
 
     @property
     def works(self) -> bool:
@@ -100,11 +101,16 @@ def bandwidth_of(hit: Response, drop: float) -> float:
     1026
     """
     frequencies = np.linspace(0.0, 4.0 / hit.contact_time, LOOKS)
-    size = np.abs(hit.spectrum(frequencies))
+    found = falls(frequencies, np.abs(hit.spectrum(frequencies)), drop)
+    return float(frequencies[-1]) if found is None else found
+
+
+def falls(frequencies: np.ndarray, size: np.ndarray, drop: float) -> float | None:
+    """Frequency [Hz] at which amplitudes (n_frequencies,) first fall ``drop`` [dB] below the first; None: nowhere."""
     level = 20.0 * np.log10(np.maximum(size, 1e-12 * size[0]) / size[0]) + drop
     first = int(np.argmax(level < 0.0))
     if level[first] >= 0.0:
-        return float(frequencies[-1])
+        return None
     share = level[first - 1] / (level[first - 1] - level[first])
     return float(frequencies[first - 1] + share * (frequencies[first] - frequencies[first - 1]))
 
@@ -144,6 +150,7 @@ def choose(
     *,
     drop: float = 10.0,
     damping_ratio: Damping | None = None,
+    between: bool = False,
 ) -> tuple[Hammer, ...]:
     """Find the tips that suit each rigid hammer, by striking with linear tips from soft to hard.
 
@@ -160,11 +167,15 @@ def choose(
     drop : float [dB]
     damping_ratio : float or function of frequency [Hz], optional
         Damping of a system, which has none of its own.
+    between : bool
+        Whether masses are searched, too: where of two neighbours only one works, the last mass that does.
 
     Returns
     -------
     tuple of Hammer, in the order of the masses
-        The ends of each range are found to the relative width WIDTH and belong to it.
+        The ends of each range are found to the relative width WIDTH and belong to it. With ``between`` the hammers
+        ascend in mass, and those found between them are a `border`, to the relative width WEIGHED; neighbours that both
+        work or both do not are taken to have no other hammers in between.
 
     Notes
     -----
@@ -174,29 +185,62 @@ def choose(
     Examples
     --------
     >>> plate = fi.analytic.rectangle(1.55, 1.0, mass=0.2, first_frequency=100.0, n_modes=300)
-    >>> light, heavy = fi.hammers.choose(plate, (0.45, 0.3), 500.0, masses=[2e-3, 0.2])
-    >>> light.works, heavy.works
-    (True, False)
+    >>> light, border, heavy = fi.hammers.choose(plate, (0.45, 0.3), 500.0, masses=[0.02, 0.05], between=True)
+    >>> light.works, heavy.works, round(border.mass, 3)  # kg
+    (True, False, 0.031)
     """
-    return choose_on(Target.of(modes, damping_ratio), at, bandwidth, masses, drop=drop)
+    return choose_on(Target.of(modes, damping_ratio), at, bandwidth, masses, drop=drop, between=between)
 
 
 def choose_on(
-    target: Target, at: Any, bandwidth: float, masses: Any, *, drop: float = 10.0, stages: Stages | None = None
-) -> tuple[Hammer, ...]:
+    target: Target, at: Any, bandwidth: float, masses: Any, *, drop: float = 10.0, stages: Stages | None = None,
+    between: bool = False,
+) -> tuple[Hammer, ...]:  # fmt: skip
     """As `choose`, on a body however it is known."""
     target = replace(target, stretching=False)  # hammers are chosen for small blows
     masses, centre = _checked(masses), _centre(bandwidth, drop)
     modes, hardest = _body(target, at, masses, centre, stages or Stages())
     flexible = modes.frequencies[modes.omega > 0.0]
     lowest = float(flexible[0]) if len(flexible) else centre
-    found: list[Hammer] = []
-    for mass in masses:
-        progress.report("hammers", len(found), len(masses))
+
+    def hammer(mass: float, border: bool = False) -> Hammer:
         limit = None if hardest is None else float(accuracy.resonant_stiffness(mass, hardest))
-        found.append(_hammer(modes, at, mass, bandwidth, drop, (centre, lowest), limit))
+        return replace(_hammer(modes, at, mass, bandwidth, drop, (centre, lowest), limit), border=border)
+
+    found: dict[int, Hammer] = {}
+    for i in _mixed(masses):
+        progress.report("hammers", len(found), len(masses))
+        found[i] = hammer(float(masses[i]))
     progress.report("hammers", len(found), len(masses))
-    return tuple(found)
+    chosen = tuple(found[i] for i in range(len(masses)))
+    return _with_borders(chosen, hammer) if between else chosen
+
+
+def _mixed(masses: np.ndarray) -> list[int]:
+    """An order of the masses whose first ones have the mean of all: heavy ones take longer, and the time left is told.
+
+    The bits of the ranks are turned round, so that halves, quarters, ... of the order spread over all.
+    """
+    bits = max(1, int(np.ceil(np.log2(len(masses)))))
+    turned = [int(f"{rank:0{bits}b}"[::-1], 2) for rank in range(2**bits)]
+    order = np.argsort(masses, kind="stable")
+    return [int(order[rank]) for rank in turned if rank < len(masses)]
+
+
+def _with_borders(chosen: tuple[Hammer, ...], hammer: Callable[[float, bool], Hammer]) -> tuple[Hammer, ...]:
+    """Hammers in ascending mass, and of neighbours of which one works the last mass in between that does, too."""
+    chosen = tuple(sorted(chosen, key=lambda one: one.mass))
+    pairs = [pair for pair in pairwise(chosen) if pair[0].works != pair[1].works]
+    for done, pair in enumerate(pairs):
+        progress.report("masses between", done, len(pairs))
+        good, bad = sorted(pair, key=lambda one: not one.works)
+        last, edge = good, bad.mass
+        while abs(np.log(edge / last.mass)) > WEIGHED:
+            middle = hammer(float(np.sqrt(edge * last.mass)), True)
+            last, edge = (middle, edge) if middle.works else (last, middle.mass)
+        chosen += (last,) if last.border else ()
+    progress.report("masses between", len(pairs), len(pairs))
+    return tuple(sorted(chosen, key=lambda one: one.mass))
 
 
 def _body(target: Target, at: Any, masses: np.ndarray, centre: float, stages: Stages) -> tuple[Modes, float | None]:
@@ -224,11 +268,11 @@ def _hammer(
 
     @cache
     def whole(tip: float) -> Response:
-        return strike(modes, striker, Contact.linear(tip), at=at, speed=1.0, tolerance=DECIDED)
+        return strike(modes, striker, Contact.linear(tip), at=at, speed=1.0, tolerance=DECIDED, max_impacts=2)
 
     @cache
     def hit(tip: float, tolerance: float = DECIDED) -> Response:
-        return strike(alone, striker, Contact.linear(tip), at=at, speed=1.0, tolerance=tolerance)
+        return strike(alone, striker, Contact.linear(tip), at=at, speed=1.0, tolerance=tolerance, max_impacts=2)
 
     def once(tip: float) -> bool:
         """Whether a tip hits once, as told by all descriptions of the body."""
@@ -254,9 +298,9 @@ def _hammer(
     if high <= low:
         return Hammer(float(mass), (), (), high, None, None, modes.notes)
     tips = _series(low, high, PER_DECADE[0])
-    case = Case(alone, striker, Contact.linear(1.0), modes.point("at", at)[0], 1.0)  # `once` looks at the others
-    series = Cases(case, {"stiffness": tips}, TOLERANCE, max_impacts=2)
-    counts = solve_cases(series, 0, len(tips))[0][series.layers.index("n_impacts")]
+    counts = _counted(alone, striker, modes.point("at", at)[0], tips)
+    doubtful = np.flatnonzero(np.isnan(counts))
+    counts[doubtful] = [hit(float(tip)).n_impacts for tip in tips[doubtful]]
     single = _ranges(tips, counts == 1, once)
     working: Ranges = ()
     for ends in single:
@@ -265,6 +309,17 @@ def _hammer(
     last = _widest(working or single)[1] if single else None
     reach, error = (bandwidth_of(hit(last), drop), whole(last).error.total) if last else (None, None)
     return Hammer(float(mass), single, working, high, reach, error, modes.notes)
+
+
+def _counted(modes: Modes, striker: Striker, at: np.ndarray, tips: np.ndarray) -> np.ndarray:
+    """Number of impacts (n_tips,) of one hammer, 2 for several; NaN where the modal engine must count."""
+    if modes.stretches:
+        return np.full(len(tips), np.nan)
+    family, one = batches.Family.of(modes, at, striker, residual=True), np.ones(len(tips))
+    blows = batches.Blows(
+        {0: family}, np.zeros(len(tips), int), modes.mass * one, striker.mass * one, tips, one, one, 0.0 * one
+    )
+    return batches.count_impacts(blows, tolerance=DECIDED, most=2)
 
 
 def _last_resolved(modes: Modes, at: Any, mass: float) -> float:

@@ -25,12 +25,13 @@ from .rig import measure
 UNKNOWN = {"contact.stiffness": (1e2, 1e16), "contact.exponent": (1.0, 4.0), "contact.loss": (0.0, 10.0)}
 
 
-def _taps(options: Any) -> Taps:
+def taps_of(options: Any, path: Path | None = None) -> Taps:
+    """The taps of a file, by default the one named first, read as the options say."""
     names: Any = options.response
     if names is not None:
         names = [int(name) if name.isdigit() else name for name in names]
     force = int(options.force) if options.force is not None and options.force.isdigit() else options.force
-    return read_taps(options.scene, force=force, response=names, rate=options.rate, scale=options.scale)
+    return read_taps(path or options.scene, force=force, response=names, rate=options.rate, scale=options.scale)
 
 
 def frf(options: Any) -> tuple[xr.Dataset, tuple[str, ...]]:
@@ -42,7 +43,7 @@ def frf(options: Any) -> tuple[xr.Dataset, tuple[str, ...]]:
         taps = measure(hit, rate=rate, at=scene.points, duration=1.0)  # resolves peaks 1 Hz apart
     else:
         try:
-            taps = _taps(options)
+            taps = taps_of(options)
         except ValueError:  # a universal file may hold frequency responses already
             with suppress(ValueError):
                 return transfer.frf(options.scene), ()
@@ -108,11 +109,11 @@ def fit(options: Any, watch: Watch | None) -> tuple[Found, Scene | None, Proposa
             if getattr(options, name):
                 name = "SCENE" if name == "body" else f"--{name.replace('_', '-')}"
                 raise ValueError(f"{name} must be left out beside --propose, which tries unknowns and laws itself")
-        proposal = propose(_taps(options), striker=Striker.rigid(options.mass or 0.1), watch=watch)
+        proposal = propose(taps_of(options), striker=Striker.rigid(options.mass or 0.1), watch=watch)
         return proposal.found, None, proposal
     unknown = {name: tuple(limits) for name, limits in _pairs("unknown", options.unknown).items()} or UNKNOWN
     known = {name: value for name, (value,) in _pairs("known", options.known).items()}
-    taps = _taps(options)
+    taps = taps_of(options)
     # a usual modal hammer, if nothing is said of it
     given: dict[str, Any] = {"striker": Striker.rigid(options.mass or 0.1), "contact": Contact.hertz(1e7)}
     scene = None

@@ -18,7 +18,7 @@ from .records import Taps
 from .units import known as known_unit
 from .windows import joined
 
-METHODS = ("H1", "H2")
+METHODS = ("H1", "H2", "Hv")
 SURE = 0.9  # [-] probability that the true response lies within the error stated
 UNITS = {"m/s^2": "accelerance", "m/s": "mobility", "m": "receptance"}
 WAY = ("node", "direction", "reference", "reference_direction")  # of a response in data set 58
@@ -46,8 +46,9 @@ def frf(
     records : Taps or sequence of Taps, with responses, or path of a universal file
         With the path of a file that holds frequency responses (data set 58, function type 4) they are read as they
         stand, in SI units; the other arguments are for taps.
-    method : "H1" or "H2"
-        H1 holds for noise in the response, H2 for noise in the force.
+    method : "H1", "H2" or "Hv"
+        H1 holds for noise in the response, H2 for noise in the force; Hv, their geometric mean, for equal shares of
+        noise in both.
     force_window : float [s], optional
         The force counts for this time from a tenth of it before each pulse on; its last quarter falls as a cosine.
     response_window : float [s], optional
@@ -61,7 +62,7 @@ def frf(
     xarray.Dataset
         ``H`` (frequency, channel), complex, in the response's unit per N; ``coherence`` (frequency, channel); ``error``
         (frequency, channel), the radius around ``H`` that holds the true response with a probability of 0.9, from how
-        far the taps differ or, of one tap, from the noise before it, and from what the noise of the force takes off H1
+        far the taps differ or, of one tap, from the noise before it, and from what noise takes off H1 or adds to H2
         (what all taps share, such as a record that ends too early, is not in it; NaN if the noise is not known);
         ``force`` (frequency), the mean amplitude spectrum [N s]; attributes ``averages``, ``method``, ``rate``. Of a
         file ``H``, and ``coherence`` if it holds one for each; of each channel ``node`` and ``direction``,
@@ -109,13 +110,15 @@ def frf(
     )
     ff, xx, xf = (np.abs(F) ** 2).mean(0), (np.abs(X) ** 2).mean(0), (X * F.conj()).mean(0)
     tiny = np.finfo(float).tiny
-    H = xf / np.maximum(ff, tiny) if method == "H1" else xx / np.where(xf == 0.0, tiny, xf.conj())
+    H1, H2 = xf / np.maximum(ff, tiny), xx / np.where(xf == 0.0, tiny, xf.conj())
+    H = {"H1": H1, "H2": H2, "Hv": np.sqrt(np.abs(H1) * np.abs(H2)) * np.exp(1j * np.angle(xf))}[method]
     coherence = np.clip(np.abs(xf) ** 2 / np.maximum(ff * xx, tiny), 0.0, 1.0)
     rests = np.column_stack([taps.noise, _rest(taps)])  # (n_taps, 1 + n_channels)
     noise = [(rest**2 * np.square(window).sum(axis=1, keepdims=True)).mean(axis=0) / taps.rate**2  # in every line
              for rest, window in zip((rests[:, :1], rests[:, 1:]), windows)]  # fmt: skip
     shares = [power / np.maximum(whole, tiny) for power, whole in zip(noise, (ff, xx))]  # of noise in force, response
-    error = np.abs(H) * (_scatter(taps.n_taps, coherence, shares) + shares[METHODS.index(method)])
+    bias = {"H1": shares[0], "H2": shares[1], "Hv": 0.5 * np.abs(shares[0] - shares[1])}[method]
+    error = np.abs(H) * (_scatter(taps.n_taps, coherence, shares) + bias)
     return xr.Dataset(
         {
             "H": (("frequency", "channel"), H),

@@ -45,6 +45,33 @@ def test_which_tips_hit_once_does_not_depend_on_the_bandwidth():
     assert one.softest < other.softest
 
 
+@pytest.mark.slow
+def test_the_last_mass_that_works_is_found_between_two():
+    """As computed with single blows: it works, a hammer 2 % heavier has no tip that does (both ends are to 0.5 %)."""
+    light, border, heavy = hammers.choose(PLATE, AT, 500.0, [0.05, 0.02], between=True)
+    assert (light.border, border.border, heavy.border) == (False, True, False)
+    assert light.mass < border.mass < heavy.mass
+    assert border.works and not heavy.works
+
+    def working(mass):
+        tips = np.geomspace(0.95 * border.softest, 1.05 * border.hardest, 25)  # 0.5 % apart
+        hits = [fi.strike(PLATE, fi.Striker.rigid(mass), fi.Contact.linear(tip), at=AT, speed=1.0) for tip in tips]
+        return any(hit.n_impacts == 1 and hammers.bandwidth_of(hit, 10.0) >= 500.0 for hit in hits)
+
+    assert working(0.98 * border.mass) and not working(1.02 * border.mass)
+    assert hammers.choose(PLATE, AT, 500.0, [0.02, 0.01], between=True)[0].mass == 0.01  # ascending, without a border
+
+
+@pytest.mark.parametrize("number", [1, 2, 5, 10, 37])
+def test_hammers_are_tried_in_an_order_that_tells_the_time_left(number):
+    """If each takes longer than the last lighter one, the mean of the first few is that of all: within a third."""
+    order = hammers._mixed(np.geomspace(1e-3, 1.0, number)[::-1])
+    assert sorted(order) == list(range(number))
+    seconds = 1.0 + np.arange(number)[::-1][order]
+    told = np.cumsum(seconds) / np.arange(1, number + 1)
+    assert_allclose(told[3:], seconds.mean(), rtol=0.34)  # in ascending order the first four would tell a quarter of 37
+
+
 def test_without_a_limit_the_answer_ends_where_the_modes_no_longer_resolve_the_contact():
     (hammer,) = hammers.choose(PLATE, AT, 500.0, [1e-3])
     assert hammer.unlimited and hammer.hardest == hammer.limit

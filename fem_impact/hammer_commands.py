@@ -1,0 +1,147 @@
+"""What the commands of a test with a hammer do: choose one, plan where it taps, and judge each tap."""
+
+import argparse
+import time
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import fem_impact as fi
+
+from . import commands
+from ._base import check
+from ._base.explained import noted
+from ._base.files import staged
+from .scenes import tips
+
+MASSES = [m * 10.0**e for e in (-3, -2, -1) for m in (1.0, 2.0, 5.0)] + [1.0]  # [kg] of hammers from 1 g to 1 kg
+PAUSE = 0.5  # [s] between two looks at a folder: a file that nobody wrote to for so long is complete
+
+
+def hammer(options: argparse.Namespace) -> commands.Answer:
+    """Find hammers for a bandwidth, or plan a test with one that roves."""
+    scene = fi.load_scene(options.scene)
+    masses = options.masses or MASSES
+    notes = tips.said_of(scene)
+    if options.rove is not None:
+        return _rove(options, scene, masses, notes)
+    drawn = commands._drawn(options, "hammers.png")
+    with commands._display(options, tells=True)("hammers"):
+        hammers = tips.hammers_for(scene, options.bandwidth, masses, drop=options.drop, between=True)
+        if drawn is not None:
+            from .show import plots  # imported only when needed, as matplotlib takes a second
+
+            drawn.parent.mkdir(parents=True, exist_ok=True)
+            fi.figures.save(drawn, plots.hammers(hammers, options.bandwidth, options.drop))
+    notes = (*notes, *hammers[0].notes)
+    rows = [
+        (f"{1e3 * hammer.mass:.4g} g{' *' * hammer.border}", f"{hammer.softest:.3g} N/m" if hammer.softest else "none",
+         f"{'> ' * hammer.unlimited}{hammer.hardest:.3g} N/m" if hammer.hardest else "none",
+         f"{hammer.reach:.4g} Hz" if hammer.reach else "-")
+        for hammer in hammers
+    ]  # fmt: skip
+    said: list[str | Sequence[str]] = [
+        commands._title(scene),
+        *noted(notes),
+        f"Linear tips that reach {options.bandwidth:g} Hz (spectrum at most {options.drop:g} dB down) and hit once:",
+        commands._table(rows, ("mass", "softest tip", "hardest tip", "its reach")),
+    ]
+    for hammer in (each for each in hammers if len(each.working) > 1):
+        ranges = ", ".join(f"{low:.3g} to {high:.3g} N/m" for low, high in hammer.working)
+        said.append(f"{1e3 * hammer.mass:.4g} g: every range that works: {ranges}")
+    if any(hammer.unlimited for hammer in hammers):
+        said.append(">: still a single hit with the hardest tip that the model resolves")
+    if any(hammer.border for hammer in hammers):
+        said.append("*: the last mass that works between two that were asked for, found to half a per cent")
+    idle = ", ".join(f"{1e3 * hammer.mass:.4g} g" for hammer in hammers if not hammer.works)
+    if idle:
+        said.append(f"{idle}: no tip reaches {options.bandwidth:g} Hz and hits once; try lighter hammers")
+    data = {"bandwidth": options.bandwidth, "drop": options.drop, "hammers": [hammer.data() for hammer in hammers]}
+    return commands._answer_of_file({**data, "notes": notes}, said, drawn)
+
+
+def _rove(options: argparse.Namespace, scene: Any, masses: Sequence[float], notes: Sequence[str]) -> commands.Answer:
+    """Plan a test with a roving hammer."""
+    from .taps import roving  # imported only when needed
+
+    number, drawn = check.count("--rove", options.rove), commands._drawn(options, "rove.png")
+    with commands._display(options, tells=True)("points"):
+        plan = roving.of_scene(scene, masses, options.bandwidth, options.drop, number)
+        if drawn is not None:
+            with staged(drawn.parent) as staging:
+                fi.figures.save(staging / drawn.name, plan.figure())
+                plan.write_csv((staging / drawn.name).with_suffix(".csv"))
+    data = {"table": plan.table(), "verdicts": plan.verdicts, "resolution": plan.resolution}
+    files = [] if drawn is None else [drawn.name, drawn.with_suffix(".csv").name]
+    said = [commands._title(scene), *noted(notes), plan.summary()]
+    return commands.answer({**data, "notes": [*notes, *plan.notes]}, *said, folder=drawn and drawn.parent, files=files)
+
+
+def watch(options: argparse.Namespace) -> commands.Answer | None:
+    """Judge the records of a folder, and new ones until the program is stopped."""
+    from .taps.watch import Folder  # imported only when needed
+
+    folder, seen = Folder(options.scene), _Watched(options)
+    if not options.once:
+        commands._tell(options, f"watching {folder.path}; Ctrl-C stops it")
+    while True:
+        new = seen.judged(folder.look())
+        if new and not options.once:
+            options.show(seen.answer(new))
+        if options.once and not folder.waiting:
+            return seen.answer([one for each in seen.every.values() for one in each])
+        time.sleep(PAUSE)
+
+
+class _Watched:
+    """What the records of a folder have told so far."""
+
+    def __init__(self, options: argparse.Namespace) -> None:
+        self.options = options
+        self.bandwidth = check.positive("--bandwidth", options.bandwidth, "Hz")
+        self.drop = check.between("--drop", options.drop, 1.0, 40.0, "dB")
+        self.path = commands._file(options, "watch.png") or Path("out") / options.scene.resolve().name / "watch.png"
+        self.every: dict[str, list[Any]] = {}  # name of a file: `Advice` of each of its taps
+        self.good: dict[str, Any] = {}  # the same: its good taps
+
+    def judged(self, paths: Sequence[Path]) -> list[Any]:
+        """Advice on every tap of some files; the picture shows the last of them."""
+        from .taps import prompt  # imported only when needed
+        from .taps.watch import Advice, advice
+
+        new, last = [], None
+        for path in paths:
+            self.good.pop(path.name, None)  # it may have been written again
+            try:
+                taps = prompt.taps_of(self.options, path)
+                found = [advice(path.name, taps, i, self.bandwidth, self.drop) for i in range(taps.n_taps)]
+            except ValueError as error:
+                found = [Advice(path.name, "", False, f"cannot be judged: {error}", None, None)]
+            else:
+                last = taps, found[-1]
+                if any(each.good for each in found):
+                    self.good[path.name] = taps.pick([each.good for each in found])
+            self.every[path.name] = found
+            new += found
+        if last is not None:
+            self._draw(*last)
+        return new
+
+    def _draw(self, last: Any, told: Any) -> None:
+        """Write the picture; of good taps those count that are sampled as the last ones are."""
+        from .pages import tap_pictures  # imported only when needed
+        from .taps.windows import joined
+
+        alike = [each for each in self.good.values() if (each.rate, each.units) == (last.rate, last.units)]
+        good = joined(alike) if alike else None
+        self.path.parent.mkdir(parents=True, exist_ok=True)
+        said = f"{told.file}, {told.tap}: {told.said}"
+        fi.figures.save(self.path, tap_pictures.watched(last, good, self.bandwidth, self.drop, said))
+
+    def answer(self, records: Sequence[Any]) -> commands.Answer:
+        """The answer that tells some records."""
+        lines = [f"{one.file}{', ' * bool(one.tap)}{one.tap}: {one.said}" for one in records]
+        n_good = sum(each.n_taps for each in self.good.values())
+        data = {"records": [each._asdict() for each in records], "n_good": n_good}
+        drawn = self.path if self.path.is_file() and records else None
+        return commands._answer_of_file(data, lines or ["no records yet"], drawn)

@@ -1,0 +1,99 @@
+"""Pictures of measured taps: pulses, spectra, frequency responses and coherence, for pages and for a watched folder."""
+
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any
+
+import numpy as np
+import xarray as xr
+
+from ..show.style import BLUE, GREEN, GREY, PALETTE, SKY, VERMILION, panels, set_units
+from ..taps.records import Taps
+from ..taps.transfer import METHODS, frf
+
+SHOWN = 10  # [-] taps, or responses, of a picture at most: a screen holds no more
+AFTER = 3.0  # [-] of its pulses' length that is drawn of a record after them
+
+
+def draw_pulses(axes: Any, taps: Taps, which: Sequence[int]) -> None:
+    """The force of some taps, from just before to some time after their pulses; pulses of double hits are marked."""
+    for n, i in enumerate(which):
+        pulses = taps._pulses[i]
+        if not pulses:
+            continue
+        first, last = pulses[0][0], pulses[-1][1]
+        span = slice(max(0, first - (last - first)), last + int(AFTER * (last - first)))
+        axes.plot(taps.time[span] - taps.time[first], taps.force[i, span], color=PALETTE[n % len(PALETTE)], lw=1.0,
+                  label=f"{taps.labels[i]}{': double hit' * (len(pulses) > 1)}")  # fmt: skip
+        for begin, end in pulses if len(pulses) > 1 else ():
+            top = begin + int(taps.force[i, begin:end].argmax())
+            axes.plot(taps.time[top] - taps.time[first], taps.force[i, top], "v", color=VERMILION, ms=7)
+    axes.set_xlabel("time after the tap begins")
+    axes.set_ylabel("force")
+    set_units(axes, "s", "N")
+    axes.legend(fontsize=8)
+
+
+def draw_spectra(axes: Any, taps: Taps, which: Sequence[int], bandwidth: float | None, drop: float) -> None:
+    """Force spectra of some taps over their values at 0 Hz; those of double hits are dashed."""
+    frequency = np.fft.rfftfreq(taps.force.shape[1], 1.0 / taps.rate)
+    for n, i in enumerate(which):
+        size = np.abs(np.fft.rfft(taps.force[i]))
+        level = 20.0 * np.log10(np.maximum(size, 1e-9 * size.max()) / max(size[0], 1e-300))
+        axes.plot(frequency, level, "--" if taps.n_pulses[i] > 1 else "-", color=PALETTE[n % len(PALETTE)], lw=0.9,
+                  label=taps.labels[i])  # fmt: skip
+    if bandwidth is not None:
+        axes.plot([0.0, bandwidth, bandwidth], [-drop, -drop, 6.0], color=GREY, lw=1.2)
+        axes.set_xlim(0.0, min(0.5 * taps.rate, 2.5 * bandwidth))
+    axes.set_ylim(-50.0, 6.0)
+    axes.set_xlabel("frequency")
+    axes.set_ylabel("force spectrum [dB]")
+    set_units(axes, "Hz")
+
+
+def draw_responses(axes: Any, found: Mapping[str, xr.Dataset], channel: int) -> None:
+    """Magnitudes of one channel by several estimators; the last one with the radius of its error."""
+    colours = dict(zip(METHODS, (BLUE, VERMILION, GREEN)))
+    for method, each in found.items():
+        size, frequency = np.abs(each.H.values[1:, channel]), each.frequency.values[1:]
+        axes.semilogy(frequency, np.maximum(size, 1e-300), color=colours[method], lw=0.9, label=method)
+    if "error" in each and np.isfinite(each.error.values[1:, channel]).any():
+        error = each.error.values[1:, channel]
+        low, high = np.maximum(size - error, 0.03 * size), size + error
+        axes.fill_between(frequency, low, high, color=SKY, alpha=0.3, lw=0, label="90 % of the last")
+    axes.set_xlabel("frequency")
+    axes.set_ylabel(f"response [{each.units.values[channel]}]")
+    axes.set_title(str(each.channel.values[channel]))
+    set_units(axes, "Hz")
+    axes.legend(fontsize=8)
+
+
+def draw_coherence(axes: Any, found: xr.Dataset, channels: Sequence[int]) -> None:
+    """Coherence of some channels."""
+    for n, k in enumerate(channels):
+        axes.plot(found.frequency.values, found.coherence.values[:, k], color=PALETTE[n % len(PALETTE)], lw=0.9,
+                  label=str(found.channel.values[k]))  # fmt: skip
+    axes.set_ylim(0.0, 1.03)
+    axes.set_xlabel("frequency")
+    axes.set_ylabel("coherence")
+    set_units(axes, "Hz")
+    axes.legend(fontsize=8)
+
+
+def watched(last: Taps, good: Taps | None, bandwidth: float, drop: float, said: str) -> Any:
+    """The last record beside what the good ones tell so far: a matplotlib figure."""
+    found = frf(good) if good is not None and good.response.shape[2] else None
+    parts: list[Callable[[Any], None]] = [
+        lambda axes: draw_pulses(axes, last, range(min(SHOWN, last.n_taps))),
+        lambda axes: draw_spectra(axes, last, range(min(SHOWN, last.n_taps)), bandwidth, drop),
+    ]
+    if found is not None:
+        parts.append(lambda axes: draw_responses(axes, {"H1": found}, 0))
+        if found.averages > 1:  # of one tap it is 1 everywhere
+            parts.append(lambda axes: draw_coherence(axes, found, [0]))
+    with panels(len(parts), 2, 5.0, 3.2) as (figure, all_axes):
+        for axes, draw in zip(all_axes, parts):
+            draw(axes)
+        for axes in all_axes[2:]:
+            axes.set_xlim(0.0, 1.25 * bandwidth)
+        figure.suptitle(said if found is None else f"{said}; responses of {found.averages} good taps", fontsize=10)
+    return figure

@@ -1,0 +1,120 @@
+"""Judge every record of taps that a folder gets: good, or what to do before the next one."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from .._base import check
+from .._base.files import PARTIAL
+from ..sweeps.hammers import falls
+from . import triggers
+from .records import Taps
+
+ENDINGS = (".lvm", ".csv", ".tsv", ".txt", ".npy", ".npz", ".wav", ".mat", ".uff", ".unv", ".58")  # of records
+# [-] lines of a spectrum per inverse of the pulse's length: finer ones move where it falls by less than 0.1 %
+LINES = 64
+
+
+class Advice(NamedTuple):
+    """What is wrong with one tap, and what to do about it."""
+
+    file: str
+    tap: str
+    good: bool
+    said: str
+    peak: float | None  # [N]
+    reach: float | None  # [Hz] where the force spectrum first falls by the drop; None: not below half the rate
+
+
+def reach_of(taps: Taps, i: int, drop: float = 10.0) -> float | None:
+    """Frequency [Hz] at which the spectrum of a tap's pulses first falls ``drop`` [dB] below its value at 0 Hz.
+
+    None if it stays above that up to half the rate. Only the samples of the pulses count, as noise beside them hides
+    how a spectrum falls.
+    """
+    pulses = taps._pulses[i]
+    if not pulses:
+        return None
+    first, last = max(0, pulses[0][0] - triggers.GUARD), pulses[-1][1] + triggers.GUARD
+    row = taps.force[i, first:last]
+    size = np.abs(np.fft.rfft(row, LINES * len(row)))
+    return falls(np.fft.rfftfreq(LINES * len(row), 1.0 / taps.rate), size, drop)
+
+
+def advice(file: str, taps: Taps, i: int, bandwidth: float, drop: float = 10.0) -> Advice:
+    """Judge one tap for a test up to ``bandwidth`` [Hz], where its spectrum may be ``drop`` [dB] down.
+
+    Raises
+    ------
+    ValueError
+        If the taps are sampled too slowly for the bandwidth.
+    """
+    drop = check.between("drop", drop, 1.0, 40.0, "dB")
+    if not 0.0 < bandwidth < 0.5 * taps.rate:
+        raise ValueError(
+            f"bandwidth must be below half the rate of {file}, {0.5 * taps.rate:g} Hz, got {bandwidth:g} Hz; sample "
+            "faster, or ask for less"
+        )
+    reach, wrong = reach_of(taps, i, drop), []
+    cut = taps._cut(i)
+    if cut:
+        wrong.append(f"overload of {', '.join(cut)}, repeat softer or with a larger range")
+    lead = round(taps.onset[i] * taps.rate)
+    if lead < triggers.FEWEST:
+        wrong.append(f"trigger too late, only {lead} samples before the pulse: start records earlier")
+    elif taps.cut_short[i]:
+        wrong.append("the record ends within the pulse: record longer")
+    if taps.n_pulses[i] > 1:
+        wrong.append("double hit, repeat")
+    if not wrong and reach is not None and reach < bandwidth:
+        wrong.append(
+            f"too soft for {_hertz(bandwidth)}: take the next tip (this one reaches {_hertz(reach)}; the tip must be "
+            f"{(bandwidth / reach) ** 2:.2g} times as stiff)"  # the time of contact goes with one over its root
+        )
+    far = f"beyond {_hertz(0.5 * taps.rate)}" if reach is None else _hertz(reach)
+    peak = float(taps.peak[i])
+    said = "; ".join(wrong) or f"good: {peak:.3g} N, reaches {far}"
+    return Advice(file, taps.labels[i], not wrong, said, peak, reach)
+
+
+def _hertz(value: float) -> str:
+    return f"{value / 1e3:.3g} kHz" if value >= 1e3 else f"{value:.3g} Hz"
+
+
+@dataclass(eq=False)
+class Folder:
+    """The records in a folder, and which of them were handed out."""
+
+    path: Path
+    last: dict[str, tuple[int, int]] = field(default_factory=dict)  # size and time of each file at the last look
+    told: dict[str, tuple[int, int]] = field(default_factory=dict)  # the same, when it was handed out
+
+    def __post_init__(self) -> None:
+        if not self.path.is_dir():
+            raise ValueError(f"FOLDER must be a folder that receives records, got {self.path}")
+
+    def look(self) -> list[Path]:
+        """Records that are new or changed and that nobody wrote to since the last look, the oldest first."""
+        now = {path.name: (stat.st_size, stat.st_mtime_ns) for path, stat in self._records()}
+        settled = [name for name, state in now.items() if state == self.last.get(name) != self.told.get(name)]
+        self.last = now
+        self.told |= {name: now[name] for name in settled}
+        return [self.path / name for name in sorted(settled, key=lambda name: (now[name][1], name))]
+
+    @property
+    def waiting(self) -> bool:
+        """Whether records are there that were not handed out."""
+        return any(self.told.get(name) != state for name, state in self.last.items())
+
+    def _records(self) -> Iterator[tuple[Path, Any]]:
+        for path in self.path.iterdir():
+            if path.suffix.lower() in ENDINGS and not path.name.startswith((PARTIAL, ".", "~")):
+                try:
+                    stat = path.stat()
+                except FileNotFoundError:  # renamed since it was listed
+                    continue
+                if path.is_file() and stat.st_size:
+                    yield path, stat

@@ -1,0 +1,90 @@
+"""What a watched folder says of each record: written by a simulated rig with the faults that it must tell."""
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+import fem_impact as fi
+from fem_impact.sweeps import hammers
+from fem_impact.taps import watch
+
+RATE, BANDWIDTH = 51200.0, 2000.0  # [Hz]
+HEAVY = fi.Modes.rigid(1e3)
+PLATE = fi.analytic.rectangle(1.55, 1.0, mass=0.2, first_frequency=100.0, n_modes=200)
+
+
+def tip(reach, mass=0.1):
+    """Stiffness [N/m] of the tip whose half sine on a wall is 10 dB down there."""
+    return mass * (2.0 * np.pi * reach / hammers.half_sine_reach(10.0)) ** 2
+
+
+def tap(stiffness, body=HEAVY, at=None, mass=0.1, before=2e-3, **rig):
+    hit = fi.strike(body, fi.Striker.rigid(mass), fi.Contact.linear(stiffness), at=at, speed=1.0)
+    return fi.measure(hit, rate=RATE, noise=1e-3, rng=1, before=before, **rig)
+
+
+def judged(taps):
+    return watch.advice("a.npz", taps, 0, BANDWIDTH)
+
+
+@pytest.mark.parametrize("reach", [500.0, 1500.0, 6000.0])
+def test_the_reach_of_a_pulse_is_that_of_its_half_sine(reach):
+    """To 2 %: the noise of the record moves where its spectrum falls."""
+    assert_allclose(judged(tap(tip(reach))).reach, reach, rtol=0.02)
+
+
+def test_a_tap_that_hits_once_and_reaches_the_bandwidth_is_good():
+    found = judged(tap(tip(2500.0)))
+    assert found.good and found.said.startswith("good: ") and "reaches 2.5" in found.said
+
+
+def test_a_soft_tip_is_told_and_one_as_stiff_as_advised_is_good():
+    found = judged(tap(tip(1000.0)))
+    assert not found.good and found.said.startswith("too soft for 2 kHz: take the next tip")
+    factor = float(found.said.rsplit("must be ", 1)[1].split()[0])
+    assert_allclose(factor, 4.0, rtol=0.05)  # twice the bandwidth; two digits, of a reach to 2 %
+    assert judged(tap(1.1 * factor * tip(1000.0))).good
+
+
+def test_a_double_hit_is_repeated():
+    taps = tap(1e5, PLATE, (0.465, 0.3))
+    assert taps.n_pulses[0] > 1
+    assert judged(taps).said == "double hit, repeat"
+
+
+def test_an_overload_names_its_sensor():
+    taps = tap(tip(3000.0), full_scale=20.0, bits=16)
+    assert judged(taps).said.startswith("overload of force, repeat softer")
+
+
+def test_a_late_trigger_is_told_and_a_record_that_ends_in_the_pulse():
+    whole = tap(tip(3000.0), before=5e-3)
+    late = whole.between(5e-3, 20e-3)  # from the moment of touch on
+    assert judged(late).said.startswith("trigger too late, only 1 samples")
+    top = whole.time[whole.force[0].argmax()]
+    assert judged(whole.between(0.0, top)).said == "the record ends within the pulse: record longer"
+
+
+def test_a_bandwidth_that_the_rate_cannot_show_is_refused():
+    with pytest.raises(ValueError, match=r"bandwidth must be below half the rate of a\.npz, 25600 Hz, got 30000 Hz"):
+        watch.advice("a.npz", tap(tip(3000.0)), 0, 30e3)
+
+
+def test_files_are_handed_out_once_nobody_writes_to_them_and_again_when_they_change(tmp_path):
+    folder = watch.Folder(tmp_path)
+    file = tmp_path / "a.csv"
+    file.write_text("t,Force [N]\n")
+    assert folder.look() == [] and folder.waiting
+    file.write_text("t,Force [N]\n0,1\n")  # still being written
+    assert folder.look() == [] and folder.waiting
+    assert folder.look() == [file] and not folder.waiting
+    assert folder.look() == []
+    file.write_text("t,Force [N]\n0,1\n1,2\n")
+    (tmp_path / "picture.png").write_bytes(b"no record")
+    (tmp_path / "empty.csv").touch()  # its writer has only begun
+    assert folder.look() == [] and folder.look() == [file] and folder.look() == []
+
+
+def test_what_is_no_folder_is_refused(tmp_path):
+    with pytest.raises(ValueError, match="FOLDER must be a folder that receives records, got"):
+        watch.Folder(tmp_path / "none")
