@@ -68,6 +68,17 @@ def entry(name, item):
     return text + ("\n" + members(name, item) if inspect.isclass(item) and not issubclass(item, Exception) else "")
 
 
+def functions(home):
+    """The public functions of a module by name, sorted."""
+    return {
+        key: item
+        for key, item in inspect.getmembers(home)
+        if not key.startswith("_")
+        and inspect.isfunction(item)
+        and (f"{item.__module__}.".startswith(f"{home.__name__}.") or key in getattr(home, "__all__", ()))
+    }
+
+
 def page():
     """The whole page."""
     names = [name for name in fi.__all__ if name != "__version__"]
@@ -75,13 +86,7 @@ def page():
     parts = [HEAD, "## Functions and classes\n", *(entry(name, alone[name]) for name in sorted(alone))]
     for name in sorted(set(names) - set(alone)):
         home = getattr(fi, name)
-        own = {
-            key: item
-            for key, item in inspect.getmembers(home)
-            if not key.startswith("_")
-            and inspect.isfunction(item)
-            and (f"{item.__module__}.".startswith(f"{home.__name__}.") or key in getattr(home, "__all__", ()))
-        }
+        own = functions(home)
         parts.append(f"## fi.{name}\n\n{first(home)}\n")
         parts += [entry(f"{name}.{key}", own[key]) for key in sorted(own)]
     return "\n".join(parts)
