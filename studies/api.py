@@ -71,6 +71,18 @@ def entry(name, item):
     return text + ("\n" + members(name, kind) if inspect.isclass(kind) and not issubclass(kind, Exception) else "")
 
 
+def functions(home):
+    """The public functions of a module, and what it holds by name, sorted."""
+
+    def own(key, item):
+        if isinstance(item, Mapping):
+            return type(item).__module__.startswith(fi.__name__)
+        ours = f"{item.__module__}.".startswith(f"{home.__name__}.") if inspect.isfunction(item) else False
+        return ours or inspect.isfunction(item) and key in getattr(home, "__all__", ())
+
+    return {key: item for key, item in inspect.getmembers(home) if not key.startswith("_") and own(key, item)}
+
+
 def page():
     """The whole page."""
     names = [name for name in fi.__all__ if name != "__version__"]
@@ -78,18 +90,7 @@ def page():
     parts = [HEAD, "## Functions and classes\n", *(entry(name, alone[name]) for name in sorted(alone))]
     for name in sorted(set(names) - set(alone)):
         home = getattr(fi, name)
-        own = {
-            key: item
-            for key, item in inspect.getmembers(home)
-            if not key.startswith("_")
-            and (
-                (
-                    inspect.isfunction(item)
-                    and (f"{item.__module__}.".startswith(f"{home.__name__}.") or key in getattr(home, "__all__", ()))
-                )
-                or (type(item).__module__.startswith(fi.__name__) and isinstance(item, Mapping))
-            )
-        }
+        own = functions(home)
         parts.append(f"## fi.{name}\n\n{first(home)}\n")
         parts += [entry(f"{name}.{key}", own[key]) for key in sorted(own)]
     return "\n".join(parts)

@@ -65,7 +65,7 @@ def test_command_that_needs_an_extra_names_it(bare, scene, tmp_path, prompt, wor
 
 def test_doctor_knows_the_extras_there_are(monkeypatch):
     known = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]["optional-dependencies"]
-    assert set(doctor.EXTRAS) == set(known) - {"all", "test", "peers"}  # peers are for one study
+    assert set(doctor.EXTRAS) == set(known) - {"all", "test", "peers", "site"}  # peers are for one study
     assert known["all"] == [f"fem-impact[{','.join(sorted(doctor.EXTRAS))}]"]
     monkeypatch.setattr(doctor.importlib.util, "find_spec", lambda name: None)
     finding = doctor._extra("web", "report and explore", ["plotly"])
