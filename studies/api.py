@@ -78,7 +78,7 @@ def functions(home):
         if isinstance(item, Mapping):
             return type(item).__module__.startswith(fi.__name__)
         ours = f"{item.__module__}.".startswith(f"{home.__name__}.") if inspect.isfunction(item) else False
-        return ours or inspect.isfunction(item) and key in getattr(home, "__all__", ())
+        return ours or (inspect.isfunction(item) and key in getattr(home, "__all__", ()))
 
     return {key: item for key, item in inspect.getmembers(home) if not key.startswith("_") and own(key, item)}
 

@@ -33,7 +33,8 @@ class Chart(NamedTuple):
 
 def chart(found: Any, orders: int = ORDERS) -> Chart:
     """The poles of frequency responses, as `fi.frf` returns them, by models of even orders up to ``orders``."""
-    omega, values, _ = picked._responses("frf", found)  # all lines count alike: noise is in all, modes are in few
+    s, values, *_ = picked.responses("frf", found)  # all lines count alike: noise is in all, modes are in few
+    omega, window = s.imag, float(s.real.max(initial=0.0))
     orders = min(orders, len(omega) // 4)
     dt = np.pi / omega[-1]
     powers = np.exp(1j * dt * np.outer(omega, np.arange(orders + 1)))  # (n_frequencies, orders + 1)
@@ -51,7 +52,7 @@ def chart(found: Any, orders: int = ORDERS) -> Chart:
                     for s, t in zip(S, T)], axis=0)  # fmt: skip
         # with the lowest coefficient held, the poles that noise makes grow in time, and are dropped
         free = np.linalg.lstsq(A[1:, 1:], -A[1:, 0], rcond=None)[0]
-        now = _decaying(np.roots(np.concatenate([[1.0], free])[::-1]), dt, omega)
+        now = _decaying(np.roots(np.concatenate([[1.0], free])[::-1]), dt, omega, window)
         for natural, damping in now.T:
             near = np.abs(before[0] / natural - 1.0) < ALIKE[0]
             stable = bool((near & (np.abs(before[1] / damping - 1.0) < ALIKE[1])).any())
@@ -61,9 +62,12 @@ def chart(found: Any, orders: int = ORDERS) -> Chart:
     return Chart(columns[0].astype(int), columns[1], columns[2], columns[3].astype(bool))
 
 
-def _decaying(z: np.ndarray, dt: float, omega: np.ndarray) -> np.ndarray:
-    """Natural frequencies [rad/s] and damping ratios (2, n_poles) of those that decay, within the band."""
-    s = np.log(np.where(z == 0.0, 1e-300, z).astype(complex)) / dt
+def _decaying(z: np.ndarray, dt: float, omega: np.ndarray, window: float) -> np.ndarray:
+    """Natural frequencies [rad/s] and damping ratios (2, n_poles) of those that decay, within the band.
+
+    Of the decay, ``window`` [1/s] is that of an exponential window.
+    """
+    s = np.log(np.where(z == 0.0, 1e-300, z).astype(complex)) / dt + window
     natural = np.abs(s)
     damping = -s.real / np.maximum(natural, 1e-300)
     kept = (s.imag > 0.0) & (damping > 0.0) & (damping < SEEN) & (natural >= omega[0]) & (natural <= omega[-1])

@@ -187,8 +187,8 @@ def sampled(modes: Modes, points: np.ndarray) -> Modes:
         error = np.concatenate([estimated(modes.shapes, point[None])["compliance"] for point in points])
         rest = np.column_stack([np.zeros(len(points)), error])  # nothing between the points, as in the compliance
     known = SampledShapes(points, modes.shape_at(points), np.diag(static), None, rest, modes.shapes.loose(points))
-    about = {"sideways": modes.shapes.across(points), "doubt": modes.shapes.spread(points)}
-    known = replace(known, dents=dents if dents.any() else None, **about)
+    known = replace(known, sideways=modes.shapes.across(points), doubt=modes.shapes.spread(points))
+    known = replace(known, dents=dents if dents.any() else None)
     return replace(modes, shapes=known, poorer=poorer)
 
 

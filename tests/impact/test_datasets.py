@@ -51,7 +51,9 @@ def test_motion_and_spectrum_where_they_are_asked_for():
     np.testing.assert_allclose(found.velocity.sel(moment=1e-3), hit.velocity(points, [1e-3])[0], rtol=1e-12)
     np.testing.assert_array_equal(np.column_stack([found.x, found.y]), points)
     np.testing.assert_allclose(found.spectrum, abs(hit.spectrum(found.frequency.to_numpy())), rtol=1e-12)
-    assert float(found.spectrum[0]) == pytest.approx(hit.impulse, rel=1e-4)  # at 0 Hz; a parabola taken as straight between samples
+    assert float(found.spectrum[0]) == pytest.approx(
+        hit.impulse, rel=1e-4
+    )  # at 0 Hz; a parabola taken as straight between samples
     assert hit.to_xarray(points).sizes["moment"] == len(hit.time)
     with pytest.raises(ValueError, match="times must come with points"):
         hit.to_xarray(times=times)
