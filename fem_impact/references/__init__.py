@@ -8,15 +8,15 @@ from collections.abc import Callable, Mapping, Sequence
 
 from .._base import check
 from . import blows, contacts, plates, shells, slender
-from .case import Case, Line, Verdict
+from .case import Reference, ReferenceLine, ReferenceVerdict
 
-CASES: Mapping[str, Case] = {
+CASES: Mapping[str, Reference] = {
     each.name: each for room in (plates, slender, shells, contacts, blows) for each in room.CASES
 }
-__all__ = ["CASES", "Case", "Line", "Verdict", "select", "verify"]
+__all__ = ["CASES", "Reference", "ReferenceLine", "ReferenceVerdict", "select", "verify"]
 
 
-def select(names: str | Sequence[str] = "all") -> list[Case]:
+def select(names: str | Sequence[str] = "all") -> list[Reference]:
     """The cases called so, or whose names begin so; "all" for all.
 
     Raises
@@ -39,7 +39,9 @@ def select(names: str | Sequence[str] = "all") -> list[Case]:
 
 
 @check.typed
-def verify(names: str | Sequence[str] = "all", watch: Callable[[int, int], None] | None = None) -> list[Verdict]:
+def verify(
+    names: str | Sequence[str] = "all", watch: Callable[[int, int], None] | None = None
+) -> list[ReferenceVerdict]:
     """Compute reference cases on this machine.
 
     Parameters
@@ -51,7 +53,7 @@ def verify(names: str | Sequence[str] = "all", watch: Callable[[int, int], None]
 
     Returns
     -------
-    list of Verdict
+    list of ReferenceVerdict
         Each with its numbers, their source, ours, our stated errors, and whether these hold.
 
     Raises

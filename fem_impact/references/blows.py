@@ -15,7 +15,7 @@ from ..impact.response import Response
 from ..impact.striker import Striker
 from ..modes import analytic
 from ..modes.modal import Modes, find_modes
-from .case import TABLE, Case, Line, of_blow
+from .case import TABLE, Reference, ReferenceLine, of_blow
 
 HAMMERS = (1e-3, 2e-3, 5e-3, 10e-3, 20e-3, 50e-3, 100e-3, 200e-3)  # [kg] those of the figures
 DIGITS = 1e-3  # [-] fact: of the thresholds, three or four digits are known
@@ -32,13 +32,13 @@ def tip_displacement(n_modes: int = 40) -> np.ndarray:
     return -1e3 * hit.displacement([length], times, body=0)[:, 0]
 
 
-def _sdnl32() -> list[Line]:
+def _sdnl32() -> list[ReferenceLine]:
     about = TABLE["sdnl32"]
     rows = enumerate(zip(about["values"], tip_displacement().tolist()), 1)
-    return [Line(f"tip at {i} ms", "mm", there, 0.5 * about["digit"], ours, 0.0) for i, (there, ours) in rows]
+    return [ReferenceLine(f"tip at {i} ms", "mm", there, 0.5 * about["digit"], ours, 0.0) for i, (there, ours) in rows]
 
 
-def _timoshenko() -> list[Line]:
+def _timoshenko() -> list[ReferenceLine]:
     steel, length = Material(E=215.75e9, nu=0.3, rho=7960.0), 0.1535
     beam = Beam.rectangular(steel, width=0.01, height=0.01)
     modes = analytic.beam(length, ends=("hinged", "hinged"), section=beam, n_modes=60)
@@ -92,7 +92,7 @@ def followed(hit: Response, end: float) -> dict[str, float]:
     }
 
 
-def _followed(contact: Contact, mass: float) -> list[Line]:
+def _followed(contact: Contact, mass: float) -> list[ReferenceLine]:
     at, end = (0.465, 0.3), 0.02
     plate = analytic.rectangle(1.55, 1.0, mass=0.2, first_frequency=100.0, n_modes=20, damping_ratio=0.01)
     alone = Modes.from_arrays(
@@ -104,7 +104,7 @@ def _followed(contact: Contact, mass: float) -> list[Line]:
     return of_blow(hit, wanted, {name: 1e-8 * value for name, value in wanted.items()})  # 1e-11 a step, over some 1e3
 
 
-def _thresholds(name: str) -> list[Line]:
+def _thresholds(name: str) -> list[ReferenceLine]:
     _, body, place = name.split("-")
     if body == "plate":
         modes = analytic.rectangle(1.55, 1.0, mass=0.2, first_frequency=100.0, n_modes=3000)
@@ -115,15 +115,15 @@ def _thresholds(name: str) -> list[Line]:
     lines = []
     for mass, there in zip(HAMMERS, TABLE[name]["values"]):
         ours = threshold.threshold_frequency(modes, at, mass) or 0.0
-        lines.append(Line(f"{1e3 * mass:g} g hammer", "Hz", there, DIGITS * there, ours, 0.0))
+        lines.append(ReferenceLine(f"{1e3 * mass:g} g hammer", "Hz", there, DIGITS * there, ours, 0.0))
     return lines
 
 
 CASES = (
-    Case("sdnl32", _sdnl32),
-    Case("timoshenko-ball", _timoshenko),
-    Case("dop853-linear", partial(_followed, Contact.linear(1e6), 0.1 / 3.0)),
-    Case("dop853-hertz", partial(_followed, Contact.hertz(695e3), 0.1 / 3.0)),
-    Case("dop853-light", partial(_followed, Contact.hertz(1e7), 5e-3)),
-    *(Case(name, partial(_thresholds, name)) for name in TABLE if name.startswith("threshold-")),
+    Reference("sdnl32", _sdnl32),
+    Reference("timoshenko-ball", _timoshenko),
+    Reference("dop853-linear", partial(_followed, Contact.linear(1e6), 0.1 / 3.0)),
+    Reference("dop853-hertz", partial(_followed, Contact.hertz(695e3), 0.1 / 3.0)),
+    Reference("dop853-light", partial(_followed, Contact.hertz(1e7), 5e-3)),
+    *(Reference(name, partial(_thresholds, name)) for name in TABLE if name.startswith("threshold-")),
 )

@@ -22,7 +22,7 @@ QUANTITIES = {
 
 
 @dataclass(frozen=True)
-class Line:
+class ReferenceLine:
     """One number: the reference, ours, and how far each may be wrong."""
 
     quantity: str
@@ -49,14 +49,14 @@ class Line:
 
 
 @dataclass(frozen=True)
-class Verdict:
+class ReferenceVerdict:
     """What a case says on this machine."""
 
     name: str
     title: str
     kind: str  # "closed form", "published", "independent integrator" or "independent computation"
     source: str
-    lines: Sequence[Line]
+    lines: Sequence[ReferenceLine]
     seconds: float  # [s] wall time
 
     @property
@@ -65,7 +65,7 @@ class Verdict:
         return all(line.holds for line in self.lines)
 
     @property
-    def worst(self) -> Line:
+    def worst(self) -> ReferenceLine:
         """The number that takes the largest share of what it is allowed."""
         return max(self.lines, key=lambda line: abs(line.difference) / max(line.allowed, np.finfo(float).tiny))
 
@@ -77,37 +77,39 @@ class Verdict:
 
 
 @dataclass(frozen=True)
-class Case:
+class Reference:
     """A reference case of `cases.toml`, computed when it is asked for."""
 
     name: str
-    lines: Callable[[], Iterable[Line]]
+    lines: Callable[[], Iterable[ReferenceLine]]
 
     @property
     def about(self) -> Mapping[str, Any]:
         """Its title, kind and source; its values and the unit of their last digit, unless a formula gives them."""
         return TABLE[self.name]
 
-    def compute(self) -> Verdict:
+    def compute(self) -> ReferenceVerdict:
         """What it says on this machine."""
         start, about = time.perf_counter(), self.about
         lines = tuple(self.lines())
-        return Verdict(
+        return ReferenceVerdict(
             self.name, about["title"], about["kind"], about["source"], lines, time.perf_counter() - start
         )  # fmt: skip
 
 
-def of_modes(modes: Modes, wanted: ArrayLike, digit: float = 0.0, unit: str = "Hz", per: float = 1.0) -> list[Line]:
+def of_modes(
+    modes: Modes, wanted: ArrayLike, digit: float = 0.0, unit: str = "Hz", per: float = 1.0
+) -> list[ReferenceLine]:
     """Lines of the frequencies of the flexible modes, each multiplied by ``per`` to the unit of the reference."""
     wanted = np.atleast_1d(np.asarray(wanted, dtype=float))
     flexible = slice(modes.n_rigid, modes.n_rigid + len(wanted))
     assert modes.frequency_error is not None  # `find_modes` always gives it
     ours = modes.frequencies[flexible] * per
     rows = zip(wanted.tolist(), ours.tolist(), (ours * modes.frequency_error[flexible]).tolist())
-    return [Line(f"mode {i}", unit, there, 0.5 * digit, *row) for i, (there, *row) in enumerate(rows, 1)]
+    return [ReferenceLine(f"mode {i}", unit, there, 0.5 * digit, *row) for i, (there, *row) in enumerate(rows, 1)]
 
 
-def of_blow(hit: Response, wanted: Mapping[str, float], within: Mapping[str, float]) -> list[Line]:
+def of_blow(hit: Response, wanted: Mapping[str, float], within: Mapping[str, float]) -> list[ReferenceLine]:
     """Lines of the numbers of a blow with the errors that it states; ``within`` by name, in the unit of each."""
     lines = []
     for name, reference in wanted.items():
@@ -115,5 +117,5 @@ def of_blow(hit: Response, wanted: Mapping[str, float], within: Mapping[str, flo
         ours = float(getattr(hit, name))
         relative = 0.0 if name == "n_impacts" else hit.error.of_quantity("force" if name == "peak_force" else name)
         error = relative * (1.0 if name == "restitution" else abs(ours))
-        lines.append(Line(words, unit, reference, within.get(name, 0.0), ours, error))
+        lines.append(ReferenceLine(words, unit, reference, within.get(name, 0.0), ours, error))
     return lines

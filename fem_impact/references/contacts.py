@@ -11,7 +11,7 @@ from ..impact.contact import Contact
 from ..impact.striker import Striker
 from ..modes import analytic
 from ..modes.modal import Modes
-from .case import Case, Line, of_blow
+from .case import Reference, ReferenceLine, of_blow
 
 
 def wall(contact: Contact, mass: float, speed: float) -> dict[str, float]:
@@ -26,19 +26,19 @@ def wall(contact: Contact, mass: float, speed: float) -> dict[str, float]:
     return {"contact_time": float(duration), "peak_force": k * deepest**contact.exponent, "restitution": 1.0}
 
 
-def _wall(contact: Contact, mass: float = 0.1, speed: float = 1.0) -> list[Line]:
+def _wall(contact: Contact, mass: float = 0.1, speed: float = 1.0) -> list[ReferenceLine]:
     touch = Touch(contact, first=0, second=None)
     hit = collide([Modes.rigid(mass)], [touch], speeds=[speed], tolerance=1e-6)
     return of_blow(hit, wall(contact, mass, speed), {})
 
 
-def _masses(one: float = 0.1, other: float = 0.3, speed: float = 1.0) -> list[Line]:
+def _masses(one: float = 0.1, other: float = 0.3, speed: float = 1.0) -> list[ReferenceLine]:
     hit = strike(Modes.rigid(other), Striker.rigid(one), Contact.hertz(1e7), at=None, speed=speed, tolerance=1e-6)
     both = one + other
     return of_blow(hit, {"restitution": (other - one) / both, "impulse": 2.0 * speed * one * other / both}, {})
 
 
-def _endless(stiffness: float, mass: float = 0.002) -> list[Line]:
+def _endless(stiffness: float, mass: float = 0.002) -> list[ReferenceLine]:
     sides, total, first = (3.1, 2.0), 2.0, 10.0  # so large that the echo of the edges comes after the blow
     plate = analytic.rectangle(*sides, mass=total, first_frequency=first, n_modes=6000)
     root = 2.0 * first / (np.pi * (sides[0] ** -2 + sides[1] ** -2))  # [m**2/s] sqrt(D / m''), of a hinged plate
@@ -55,11 +55,11 @@ def _endless(stiffness: float, mass: float = 0.002) -> list[Line]:
 
 
 CASES = (
-    Case("wall-linear", partial(_wall, Contact.linear(88.6e3))),
-    Case("wall-hertz", partial(_wall, Contact.hertz(695e3))),
-    Case("wall-felt", partial(_wall, Contact(1e8, 2.5))),
-    Case("wall-hunt-crossley", partial(_wall, Contact.hertz(695e3, loss=0.3))),
-    Case("two-masses", _masses),
-    Case("endless-plate-soft", partial(_endless, 2.2e4)),
-    Case("endless-plate-hard", partial(_endless, 4.1e5)),
+    Reference("wall-linear", partial(_wall, Contact.linear(88.6e3))),
+    Reference("wall-hertz", partial(_wall, Contact.hertz(695e3))),
+    Reference("wall-felt", partial(_wall, Contact(1e8, 2.5))),
+    Reference("wall-hunt-crossley", partial(_wall, Contact.hertz(695e3, loss=0.3))),
+    Reference("two-masses", _masses),
+    Reference("endless-plate-soft", partial(_endless, 2.2e4)),
+    Reference("endless-plate-hard", partial(_endless, 4.1e5)),
 )

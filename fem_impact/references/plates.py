@@ -11,7 +11,7 @@ from .. import mesh
 from ..fe.assembly import assemble
 from ..fe.section import Material, Plate
 from ..modes.modal import find_modes
-from .case import TABLE, Case, Line, of_modes
+from .case import TABLE, Reference, ReferenceLine, of_modes
 
 STEEL = Material(E=210e9, nu=0.3, rho=7850.0)
 THICKNESS = 2e-3  # [m] any, as the numbers do not depend on it
@@ -40,7 +40,7 @@ def wanted(name: str) -> ArrayLike:
     return FORMULAS[name]() if name in FORMULAS else TABLE[name]["values"]
 
 
-def _lines(name: str) -> list[Line]:
+def _lines(name: str) -> list[ReferenceLine]:
     shape, held = name.split("-")
     supports = {"free": {}, "cantilever": {"left": "clamped"}}.get(held, {"boundary": held})
     values = np.asarray(wanted(name), dtype=float)
@@ -52,4 +52,4 @@ def _lines(name: str) -> list[Line]:
     return of_modes(modes, values, TABLE[name].get("digit", 0.0), "1/m^2", per)
 
 
-CASES = tuple(Case(name, partial(_lines, name)) for name in TABLE if name.split("-")[0] in SHAPES)
+CASES = tuple(Reference(name, partial(_lines, name)) for name in TABLE if name.split("-")[0] in SHAPES)

@@ -6,7 +6,7 @@ from .. import mesh
 from ..fe.assembly import assemble
 from ..fe.section import Material, Plate
 from ..modes.modal import find_modes
-from .case import TABLE, Case, Line, of_modes
+from .case import TABLE, Reference, ReferenceLine, of_modes
 
 
 def panel(
@@ -22,7 +22,7 @@ def panel(
     return np.sort(np.sqrt((bending + stretching) / (rho * h)), axis=None)[:n_modes] / (2.0 * np.pi)
 
 
-def _diaphragms() -> list[Line]:
+def _diaphragms() -> list[ReferenceLine]:
     sides, curvature, thickness = (0.4, 0.3), (-0.3, 0.1), 2e-3
     alloy = Material(E=70e9, nu=0.3, rho=2700.0)
 
@@ -35,7 +35,7 @@ def _diaphragms() -> list[Line]:
     return of_modes(find_modes(system, n_modes=8, tolerance=1e-5), panel(sides, curvature, alloy, thickness, 8))
 
 
-def _clamped() -> list[Line]:
+def _clamped() -> list[ReferenceLine]:
     def rise(points: np.ndarray) -> np.ndarray:
         return -0.5 * (points[:, 1] - 0.0508) ** 2 / 0.762
 
@@ -44,4 +44,4 @@ def _clamped() -> list[Line]:
     return of_modes(find_modes(system, n_modes=5, tolerance=1e-5), about["values"], about["digit"])
 
 
-CASES = (Case("panel-diaphragms", _diaphragms), Case("panel-clamped", _clamped))
+CASES = (Reference("panel-diaphragms", _diaphragms), Reference("panel-clamped", _clamped))

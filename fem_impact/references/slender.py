@@ -9,7 +9,7 @@ from .. import mesh
 from ..fe.assembly import assemble
 from ..fe.section import Beam, Material
 from ..modes.modal import find_modes
-from .case import Case, Line, of_modes
+from .case import Reference, ReferenceLine, of_modes
 
 STEEL = Material(E=210e9, nu=0.3, rho=7850.0)
 EQUATIONS = {  # of z = k length by supports, and the half wave that holds the first root
@@ -28,7 +28,7 @@ def roots(ends: str, n_modes: int) -> np.ndarray:
     return np.array([brentq(equation, start, start + np.pi, xtol=1e-14, rtol=1e-15) for start in starts])
 
 
-def _lines(ends: str, n_modes: int = 6) -> list[Line]:
+def _lines(ends: str, n_modes: int = 6) -> list[ReferenceLine]:
     beam = Beam.rectangular(STEEL, width=0.02, height=0.01)
     held = {side: how for side, how in zip(("left", "right"), ends.split("-")) if how != "free"}
     n_rigid = {"free-free": 2, "hinged-free": 1}.get(ends, 0)
@@ -37,4 +37,4 @@ def _lines(ends: str, n_modes: int = 6) -> list[Line]:
     return of_modes(modes, roots(ends, n_modes) ** 2, unit="k^2", per=per)
 
 
-CASES = tuple(Case(f"beam-{ends}", partial(_lines, ends)) for ends in EQUATIONS)
+CASES = tuple(Reference(f"beam-{ends}", partial(_lines, ends)) for ends in EQUATIONS)

@@ -79,13 +79,7 @@ def map_scene(
     law, stretches = scene.make_contact(), bool(scene.target.values.get("stretching"))
     quick = {name: values for name, values in over.items() if ALIASES.get(name, name) in AXES}
     slow = {name: values for name, values in over.items() if name not in quick}
-    for name, values in slow.items():
-        known = [f"{t}.{k}" for t in MAKERS for k in getattr(getattr(scene, t, None), "values", {})]
-        if name not in known:
-            near = check.nearest(name, [*AXES, *ALIASES, *known])
-            raise ValueError(f"{scene.path}: [map] over: {name} is not an axis{near}")
-        if isinstance(values, Range) or (isinstance(values, Mapping) and "count" not in values):
-            raise ValueError(f"{scene.path}: [map] over: {name} needs a count, because each value needs another body")
+    _check_slow(scene, slow)
     over, ours = laid_out(over, law, alone=stretches, cells=wanted.pop("cells", None))
     slow, quick = {name: list(over[name]) for name in slow}, {name: over[name] for name in quick}
     if not quick:
@@ -117,6 +111,17 @@ def map_scene(
     result.attrs["notes"] = "\n".join(plausible.together(*(piece.attrs["notes"].splitlines() for piece in pieces)))
     result.attrs["title"] = scene.title or str(scene.path.name)
     return result
+
+
+def _check_slow(scene: Scene, slow: Mapping[str, Any]) -> None:
+    """Raise ValueError unless the axes that need another body are numbers of the scene, each with values."""
+    known = [f"{t}.{k}" for t in MAKERS for k in getattr(getattr(scene, t, None), "values", {})]
+    for name, values in slow.items():
+        if name not in known:
+            near = check.nearest(name, [*AXES, *ALIASES, *known])
+            raise ValueError(f"{scene.path}: [map] over: {name} is not an axis{near}")
+        if isinstance(values, Range) or (isinstance(values, Mapping) and "count" not in values):
+            raise ValueError(f"{scene.path}: [map] over: {name} needs a count, because each value needs another body")
 
 
 def changed_scene(scene: Scene, key: str, value: Any) -> Scene:

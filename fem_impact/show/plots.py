@@ -17,7 +17,7 @@ from scipy.interpolate import RegularGridInterpolator
 
 from ..impact import accuracy
 from ..modes.modal import Modes
-from ..references.case import Verdict
+from ..references.case import ReferenceVerdict
 from ..sweeps.hammers import Hammer, half_sine_reach
 from . import sampling
 from .figures import TICKS, styled
@@ -306,7 +306,7 @@ def places(
     return figure
 
 
-def verdicts(found: Sequence[Verdict]) -> Figure:
+def verdicts(found: Sequence[ReferenceVerdict]) -> Figure:
     """Draw how much of what it may differ each number of the reference cases does, a row for each case."""
     with styled(7.0, 1.2 + 0.19 * len(found)) as figure:
         axes = figure.subplots()
