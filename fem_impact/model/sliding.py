@@ -1,11 +1,11 @@
 """Does friction matter? An oblique blow slides, and one beside a centre of mass begins to; contacts here have none.
 
 A body that comes with the speed v_t across the normal impulse J slips at ``v_t + W_tn J + W_tt T`` under a tangential
-impulse T; W are the motions of its rigid and slow modes per impulse. By Coulomb and Routh it slides with T = mu J until
-it stops, then sticks if that takes no more, or slides the other way. The mean of both stages goes with the normal force
-and drives the modes by their shapes across: ``s_n (s_n + g s_t)`` stands for ``s_n**2`` where g = T / J. That the
-stages differ makes the parting speed another: the spring gives back in the second what it took in the first. The other
-body is taken as fixed across.
+impulse T; W are the motions of its rigid and slow modes per impulse. By Coulomb and Routh it slides with dT = mu dJ
+until it stops, then sticks if that takes no more, or slides another way; that is followed through the impulse. The mean
+g = T / J goes with the normal force and drives the modes by their shapes across: ``s_n (s_n + g s_t)`` stands for
+``s_n**2``. That dT / dJ changes on the way makes the parting speed another: the spring gives back under one what it
+took under another. The other body is taken as fixed across.
 
 References
 ----------
@@ -23,6 +23,7 @@ from .restrike import Doubt, Struck
 
 STICKS = Doubt("no friction", "tangential over normal impulse, sticking", None)
 SLIDES = Doubt("no friction", "tangential over normal impulse that would stick", None)
+STEPS = 64  # [-] parts of the impulse: the stages begin and end to some 1 %, which estimates may err by
 SQUARE = "strike square to the surface, in line with the centre of mass: contacts here have no friction"
 
 
@@ -32,7 +33,7 @@ class Dragged(NamedTuple):
     needed: float  # [-] tangential over normal impulse, or that which would stick
     slides: bool  # to the end
     squares: np.ndarray  # (n_modes,) [-] factors of squared shapes that stand for friction
-    parting: float  # [-] relative change of the parting speed by the order of sliding and sticking
+    parting: float  # [-] relative change of the parting speed as sliding and sticking follow each other
 
 
 def examine(struck: Struck) -> Assumption:
@@ -104,45 +105,39 @@ def _dragged(
         return Dragged(0.0, False, np.ones(len(along)), 0.0)
     comes = aside[:, : len(p)] @ p / impulse  # all in units of the impulse: [1/kg]
     drawn = aside[:, slow] @ along[slow]
-    wanted = -np.linalg.pinv(mobile, rcond=SAME) @ (comes + drawn)
-    first, until, then = _stages(comes, drawn, mobile, wanted)
-    pull = until * first + (1.0 - until) * then
-    slides = until >= 1.0 or bool(np.linalg.norm(then) >= FRICTION)
-    needed = float(np.linalg.norm(wanted if slides else pull))
-    stages = [others + float(along[slow] @ (along + each @ aside)[slow]) for each in (first, then)]
-    jams = min(stages) <= 0.0
+    pulls = _pulls(comes, drawn, mobile)
+    pull, slides = pulls.mean(axis=0), bool(np.linalg.norm(pulls[-1]) >= (1.0 - SAME) * FRICTION)
+    wanted = np.linalg.pinv(mobile, rcond=SAME) @ (comes + drawn) if slides else pull
+    slowing = others + own + pulls @ drawn
+    jams = slowing.min() <= 0.0
     product, square = along * (along + pull @ aside), along**2
     rigid, squares = modes.omega == 0.0, np.ones(len(along))
     if square[rigid].any():  # of rigid motions only their sum tells, whatever they are split into
         squares[rigid] = 0.0 if jams else product[rigid].sum() / square[rigid].sum()
     bends = ~rigid & (square > SAME * square.max(initial=0.0))
     squares[bends] = np.maximum(product[bends] / square[bends], SAME)
-    return Dragged(needed, slides, squares, 0.0 if jams else _parting(stages, until * 2.0 / (others + own)))
+    parting = 0.0 if jams else abs(_parting(slowing / (others + own)) - 1.0)
+    return Dragged(float(np.linalg.norm(wanted)), slides, squares, parting)
 
 
-def _stages(
-    comes: np.ndarray, drawn: np.ndarray, mobile: np.ndarray, wanted: np.ndarray
-) -> tuple[np.ndarray, float, np.ndarray]:
-    """Tangential over normal impulse (2,) as the body slides first, the share of the blow that lasts, and then."""
-    speed, first, until = float(np.linalg.norm(comes)), np.zeros(2), 0.0
-    if speed > SAME * np.trace(mobile):
-        way = comes / speed
-        first = -FRICTION * way
-        slows = float(-way @ (drawn + mobile @ first))
-        until = min(1.0, speed / slows) if slows > 0.0 else 1.0
-    then = (wanted - until * first) / (1.0 - until) if until < 1.0 else first
-    return first, until, then * min(1.0, FRICTION / max(float(np.linalg.norm(then)), SAME))
+def _pulls(comes: np.ndarray, drawn: np.ndarray, mobile: np.ndarray) -> np.ndarray:
+    """Tangential over normal impulse (STEPS, 2) in parts of the normal one: what sticks, as far as Coulomb allows."""
+    inverse, slips, found = np.linalg.pinv(mobile, rcond=SAME), comes, np.zeros((STEPS, 2))
+    for i in range(STEPS):
+        slips = slips + drawn / STEPS
+        stops = -STEPS * inverse @ slips
+        found[i] = stops * min(1.0, FRICTION / max(float(np.linalg.norm(stops)), SAME))
+        slips = slips + mobile @ found[i] / STEPS
+    return found
 
 
-def _parting(stages: list[float], until: float) -> float:
-    """Change of the speed at which bodies part that came at unit speed, slowed by each of two stages per impulse.
+def _parting(slowing: np.ndarray) -> float:
+    """Speed over that of arrival at which bodies part on a spring.
 
-    The second begins after the impulse ``until``.
+    ``slowing`` (STEPS,) [-] is how much each part of the impulse slows them, 1 without friction.
     """
-    one, two = stages
-    if one * until >= 1.0:  # the spring is pressed in before the first stage ends
-        left = 1.0 / one - one * (until - 1.0 / one) ** 2  # twice the energy that it still holds then
-        speed = one * until - 1.0
-        return abs(1.0 - float(np.sqrt(speed**2 + two * left))) if left > 0.0 else 0.0
-    pressed = until * (2.0 - one * until) + (1.0 - one * until) ** 2 / two
-    return abs(1.0 - float(np.sqrt(two * pressed)))
+    speeds = 1.0 - 2.0 * np.append(0.0, np.cumsum(slowing)) / STEPS
+    held = 2.0 * np.cumsum(speeds[:-1] + speeds[1:]) / STEPS  # in the spring, over the energy on arrival
+    let_go = np.flatnonzero((held <= 0.0) & (speeds[1:] < 0.0))
+    last = int(let_go[0]) if len(let_go) else STEPS - 1
+    return float(np.sqrt(max(0.0, speeds[last + 1] ** 2 + slowing[last] * held[last])))

@@ -4,11 +4,13 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 from scipy.integrate import solve_ivp
+from tumblers import tumbler
 
 import fem_impact as fi
 from fem_impact.impact.assumption import FRICTION
 
 MASS, STIFFNESS = 0.3, 1e6
+SLOW = 1e-3  # [-] what friction that falls off slowly leaves of its impulse; in space, speed below which it falls off
 ABRUPT = 1e-4  # [-] of the arrival's speed, below which friction falls off in the integration: 1e-3 of its impulse
 
 
@@ -47,30 +49,97 @@ def told(hit):
     return {each.name: each for each in hit.assumptions}["no friction"]
 
 
-def clubs():
-    rng = np.random.default_rng(0)
-    for i in range(14):
+def clubs(seed=0, n=14):
+    rng = np.random.default_rng(seed)
+    for i in range(n):
         inertia = MASS * rng.uniform(0.02, 0.08) ** 2
         arm = rng.uniform(-0.04, 0.04), rng.uniform(0.0, 0.06)
         pivot = None if i % 2 else (rng.uniform(-0.5, -0.2), rng.uniform(-0.1, 0.1))
         yield inertia, arm, pivot, float(rng.choice([0.3, 1e4]))
 
 
-@pytest.mark.parametrize("club", list(clubs()))
-def test_what_friction_changes_is_told_within_a_factor_of_three(club):
-    """Straight and turning, on a wall and on a mass as light: sticking, sliding, and sliding before sticking."""
+def apart(changes, found):
+    """Whether an estimate of the largest change is below a third of it, or above three times that."""
+    guess = max(found.effect[name] for name in ("restitution", "contact_time", "impulse"))
+    return not changes.max() / 3.0 - SLOW <= guess <= 3.0 * changes.max() + SLOW
+
+
+def of_club(club):
+    """What friction changes of a blow, and what is told of it."""
     inertia, arm, pivot, other = club
     striker = fi.Striker.turning(MASS, inertia, arm, pivot=pivot)
     law = fi.Contact.linear(STIFFNESS)
     hit = fi.strike(fi.Modes.rigid(other), striker, law, at=None, speed=1.0, max_impacts=1)
     smooth, rough = (with_friction(*club, each) for each in (0.0, FRICTION))
     assert_allclose([hit.restitution, hit.contact_time, hit.impulse], smooth, atol=2e-4)  # the tolerance, and theirs
-    changes = np.abs(rough - smooth) / np.append(1.0, smooth[1:])
-    found = told(hit)
-    guesses = np.array([found.effect[name] for name in ("restitution", "contact_time", "impulse")])
-    assert (changes / 3.0 - 1e-3 <= guesses).all()  # 1e-3: what friction that falls off slowly leaves of its impulse
-    assert guesses.max() <= 3.0 * changes.max() + 1e-3  # in one alone, two effects may cancel
+    return np.abs(rough - smooth) / np.append(1.0, smooth[1:]), told(hit)
+
+
+@pytest.mark.parametrize("club", list(clubs()))
+def test_what_friction_changes_is_told_within_a_factor_of_three(club):
+    """Straight and turning, on a wall and on a mass as light: sticking, sliding, and sliding before sticking."""
+    changes, found = of_club(club)
+    assert not apart(changes, found), (changes, found.effect)
     assert found.known and ("slides" in found.reading or "sticking" in found.reading)
+
+
+@pytest.mark.slow
+def test_so_it_is_for_sixty_random_clubs():
+    assert not [club for club in clubs(11, 60) if apart(*of_club(club))]
+
+
+@pytest.mark.slow
+def test_so_it_is_for_most_random_bodies_that_bend():
+    """In space, straight, aslant or turning; while a contact sticks, the motion across swings, which is left out."""
+    missed = 0
+    for seed in range(24):
+        rng = np.random.default_rng(seed)
+        body, way, other = tumbler(rng, 6), rng.normal(size=3), float(10.0 ** rng.uniform(-1.0, 1.0))
+        way /= np.linalg.norm(way)
+        along, pivot = ((way + 0.3 * rng.normal(size=3), None), (None, rng.uniform(-0.3, 0.3, 3)))[seed % 2]
+        striker = fi.Striker.of(body["body"], 1, direction=way, along=along, pivot=pivot)
+        law = fi.Contact.linear(10.0 ** rng.uniform(5.0, 7.0) / (1.0 / striker.felt_mass + 1.0 / other))
+        hit = fi.strike(fi.Modes.rigid(other), striker, law, at=None, speed=1.0, max_impacts=1, residual=False)
+        smooth, rough = (in_space(body, way, along, pivot, law.stiffness, other, each) for each in (0.0, FRICTION))
+        assert_allclose([hit.restitution, hit.contact_time, hit.impulse], smooth, atol=SLOW)
+        missed += apart(np.abs(rough - smooth) / np.append(1.0, smooth[1:]), told(hit))
+    assert missed <= 1  # none was measured, and 7 of 210 others
+
+
+def in_space(body, way, along, pivot, stiffness, other, friction):
+    """As `with_friction`, of a body that bends, struck at its first node."""
+    place, frame, n = body["nodes"][0], np.linalg.svd(way[None])[2][1:], 6 + len(body["omega"])
+    normal, *aside = (np.concatenate([each, np.cross(place, each), each @ body["shapes"][0]]) for each in (way, *frame))
+    aside, inverse = np.array(aside), np.eye(n)
+    inverse[:3, :3] /= body["m"]
+    inverse[3:6, 3:6] = np.linalg.inv(body["I"])
+    omega, zeta = (np.append(np.zeros(6), body[name]) for name in ("omega", "zeta"))
+
+    def rates(t, s):
+        q, p = s[:n], s[n : 2 * n]
+        force = stiffness * max(normal @ q - s[2 * n], 0.0)
+        slips = aside @ p
+        size = np.hypot(*slips)
+        drag = friction * force * np.tanh(size / SLOW) / max(size, 1e-30) * slips
+        pushed = -inverse @ (normal * force + drag @ aside) - 2.0 * zeta * omega * p - omega**2 * q
+        return np.concatenate([p, pushed, [s[2 * n + 1], force / other, force]])
+
+    def parted(t, s):
+        return normal @ s[:n] - s[2 * n]
+
+    parted.terminal, parted.direction = True, -1.0
+    start = np.zeros(2 * n + 3)
+    if pivot is None:
+        start[n : n + 3] = along / (along @ way)
+    else:
+        axis = np.cross(place - pivot, way)
+        start[n + 3 : n + 6] = axis / (axis @ axis)
+        start[n : n + 3] = np.cross(start[n + 3 : n + 6], -pivot)
+    felt = normal[:6] @ inverse[:6, :6] @ normal[:6] + 1.0 / other
+    last = 6.0 * np.pi / np.sqrt(stiffness * felt)
+    found = solve_ivp(rates, (0.0, last), start, "LSODA", rtol=1e-8, atol=1e-12, events=parted, max_step=last / 600)
+    end = found.y[:, -1]
+    return np.array([-normal[:6] @ end[n : n + 6], found.t[-1], end[-1]])
 
 
 def test_an_oblique_blow_slides_and_says_so():
