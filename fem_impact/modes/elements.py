@@ -32,7 +32,8 @@ def surface(points: np.ndarray, blocks: dict[int, np.ndarray]) -> np.ndarray:
     """Triangles (n, 3) on the surface of elements by vtk's codes, or lines (n, 2) if they have none."""
     import pyvista
 
-    wide = {code: each for code, each in blocks.items() if code not in LINES and len(each)}
+    corners = dict(BASIC.values())  # some programs' quadratic elements come under the codes of linear ones
+    wide = {code: each[:, : corners.get(code)] for code, each in blocks.items() if code not in LINES and len(each)}
     if not wide:
         return blocks.get(3, np.zeros((0, 3), int))
     grid = pyvista.UnstructuredGrid(wide, points)

@@ -24,10 +24,11 @@ from ..model.playing import Strokes
 from ..modes import universal_files, viewing
 from ..modes.modal import Modes
 from . import sampling, sound
+from .histories import write_history
 
 __all__ = [
     "csv_text", "numbers", "plain", "run_data", "versions", "vtk_ending", "write_animation", "write_force",
-    "write_json", "write_sound", "write_uff", "write_vtk", "write_wav",
+    "write_history", "write_json", "write_sound", "write_uff", "write_vtk", "write_wav",
 ]  # fmt: skip
 
 PACKAGES = ("fem-impact", "numpy", "scipy", "scikit-fem", "netgen-mesher", "numba")

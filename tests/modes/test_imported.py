@@ -1,6 +1,7 @@
 """Files of other programs are read as bodies, and what they lack is said."""
 
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -61,3 +62,51 @@ def test_what_files_lack_is_said(tmp_path):
         fi.Body.load(xr.Dataset(told), mass=1.0)
     with pytest.raises(ValueError, match="mass must be given in kg"):
         fi.Body.load(xr.Dataset(told | {"frequencies": ("m", body.frequencies)}))
+
+
+def test_models_of_sdypy_are_bodies():
+    """Receptances of three modes of a hinged plate from a driving point: shapes to 1 % of the largest."""
+    ema = pytest.importorskip("sdypy.EMA", reason="sdypy-EMA is not installed")
+    plate, points = hinged(3, (5, 5))
+    drive, frequencies = 6, 0.5 * np.arange(1401)
+    omega, own = 2.0 * np.pi * frequencies[:, None], plate.omega
+    below = own**2 - omega**2 + 2j * plate.damping_ratio * own * omega  # (n_frequencies, n_modes)
+    rows = plate.shape_at(points)
+    for form, factor in (("receptance", 1.0), ("accelerance", -(omega[:, 0] ** 2))):
+        responses = (rows * rows[drive]) @ (1.0 / below).T * factor
+        model = ema.Model(responses, frequencies, lower=20, upper=600, pol_order_high=40, driving_point=drive,
+                          frf_form=form)  # fmt: skip
+        with pytest.raises(ValueError, match=r"scaled modes: give .* driving_point and call get_constants\(\)"):
+            fi.Body.load(SimpleNamespace(nat_freq=[1.0], nat_xi=[0.0]), mass=1.0)
+        model.get_poles(show_progress=False)
+        model.select_closest_poles(list(plate.frequencies[:3]))
+        model.get_constants(f_upper=590)  # its own limit is out of its range by a line
+        places = {"nodes": np.column_stack([points, np.zeros(len(points))]), "direction": "z"}
+        body = fi.Body.load([model, places], mass=plate.mass)
+        assert_allclose(body.frequencies, plate.frequencies[:3], rtol=1e-3)
+        assert_allclose(body.damping_ratio, 0.01, rtol=0.02)
+        found, wanted = body.shapes[:, 2], rows[:, :3] * np.sign(rows[drive, :3])
+        assert_allclose(found, wanted, atol=0.01 * np.abs(wanted).max())
+    with pytest.raises(ValueError, match=r"direction of what was measured: add {'direction': 'z'}"):
+        fi.Body.load([model, {"nodes": places["nodes"]}], mass=1.0)
+    model.A = model.A * np.exp(1j)
+    with pytest.raises(ValueError, match=r"files must hold real modes, positive at their driving point; that at"):
+        fi.Body.load([model, places], mass=1.0)
+
+
+def test_models_of_pyfbs_are_bodies():
+    """By the attributes of `pyfbs.Model` 1.0: unknowns by node from 1 and axis from 0, frequencies in Hz."""
+    plate, points = hinged(5)
+    want = body_of(plate, points)
+    nodes, n = want.nodes, len(points)
+    dofs = np.column_stack([np.repeat(np.arange(1, n + 1), 6), np.tile(np.arange(6), n)])
+    vectors = np.zeros((6 * n, 5))
+    for axis in range(3):
+        vectors[axis::6] = want.shapes[:, axis]
+    model = SimpleNamespace(nodes=nodes, dof_ref=dofs, eig_vec=vectors, eig_freq=plate.frequencies, mesh=None)
+    body = fi.Body.load(model, mass=plate.mass)
+    assert_allclose(body.shapes, want.shapes)
+    assert_allclose(body.frequencies, plate.frequencies)
+    model.eig_vec = vectors * 1j
+    with pytest.raises(ValueError, match="files must hold real modes; solve the pyFBS model undamped"):
+        fi.Body.load(model, mass=1.0)

@@ -66,3 +66,100 @@ def test_matrices_of_ansys():
     body = fi.Body.load([examples.fullfile, examples.hexarchivefile], mass=2.3e-3, n_modes=4)
     assert_allclose(body.frequencies, [1283.200, 1283.200, 5781.975, 6919.399], atol=1e-3)
     assert body.solid is True and len(body.cells)
+
+
+def block(n=(3, 2, 2), sides=(0.3, 0.2, 0.1)):
+    """Corners of a block, its hexahedra and the quadrilaterals of its top."""
+    grids = [np.linspace(0.0, side, count + 1) for side, count in zip(sides, n)]
+    points = np.stack(np.meshgrid(*grids, indexing="ij"), axis=-1).reshape(-1, 3)
+    number = np.arange(len(points)).reshape([count + 1 for count in n])
+    corners = [(0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0), (0, 0, 1), (1, 0, 1), (1, 1, 1), (0, 1, 1)]
+    cells = np.array([[number[tuple(np.add(low, each))] for each in corners] for low in np.ndindex(*n)])
+    top = np.array([[number[i, j, -1], number[i + 1, j, -1], number[i + 1, j + 1, -1], number[i, j + 1, -1]]
+                    for i, j in np.ndindex(*n[:2])])  # fmt: skip
+    return points, cells, top
+
+
+def written_med(path, fields, rows=None):
+    """A block, and displacements in the layout of MED: field (time, values) by name, at nodes of a profile."""
+    h5py, meshio = pytest.importorskip("h5py", reason="the hdf5 extra is not installed"), pytest.importorskip("meshio")
+    points, cells, top = block()
+    tags = np.zeros(len(points), int)
+    tags[-1] = 1
+    mesh = meshio.Mesh(points, [("hexahedron", cells), ("quad", top)], point_data={"point_tags": tags})
+    mesh.point_tags = {1: ["corner"]}
+    mesh.write(path)
+    names = b"".join(name.ljust(16).encode() for name in ("DX", "DY", "DZ", "DRX"))
+    with h5py.File(path, "r+") as file:
+        for name, steps in fields.items():
+            field = file["CHA"].create_group(name)
+            field.attrs.update({"MAI": np.bytes_("mesh"), "NCO": 4, "NOM": np.bytes_(names), "TYP": 6})
+            for k, (time, values) in enumerate(steps):
+                step = field.create_group(f"{k + 1:020d}{k + 1:020d}")
+                step.attrs.update({"NDT": k + 1, "NOR": k + 1, "PDT": float(time)})
+                profile = "MED_NO_PROFILE_INTERNAL" if rows is None else "SOME"
+                nodal = step.create_group("NOE")
+                nodal.attrs["PFL"] = np.bytes_(profile)
+                kept = values if rows is None else values[rows]
+                data = nodal.create_group(profile)
+                data.attrs["NBR"] = len(points) if rows is not None else len(kept)
+                data.create_dataset("CO", data=np.column_stack([kept, np.zeros(len(kept))]).ravel(order="F"))
+        if rows is not None:
+            place = file.create_group("PROFILS").create_group("SOME")
+            place.attrs["NBR"] = len(rows)
+            place.create_dataset("PFL", data=rows + 1)
+    return path
+
+
+@pytest.mark.parametrize("partly", [False, True])
+def test_modes_and_static_solutions_of_code_aster(tmp_path, partly):
+    """In a profile of the nodes above the lowest layer, or at all of them."""
+    points, rng = block()[0], np.random.default_rng(0)
+    values = rng.standard_normal((4, len(points), 3))
+    rows = np.flatnonzero(points[:, 2] > 0.0) if partly else None
+    fields = {
+        "MODES___DEPL": [(150.0, values[0]), (90.0, values[1]), (400.0, values[2])],
+        "STAT____DEPL": [(0.0, values[3])],
+    }
+    path, corner = written_med(tmp_path / "block.med", fields, rows), (0.3, 0.2, 0.1)
+    body = fi.Body.load(path, mass=3.0, loads=[(len(points), (0.0, 0.0, 1.0))])
+    wanted = np.where((points[:, 2:] > 0.0) | (not partly), values, 0.0)
+    assert_allclose(body.frequencies, [90.0, 150.0, 400.0])
+    assert_allclose(body.shapes, np.moveaxis(wanted[[1, 0, 2]], 0, 2))
+    assert_allclose(body.static[:, :, 0], wanted[3])
+    assert body.solid is True and body.at("corner") == pytest.approx(corner)
+    assert len(body.cells) == 2 * 2 * (3 * 2 + 3 * 2 + 2 * 2)  # two triangles a face, each once
+
+
+def test_meshes_of_abaqus_tell_shells_from_solids(tmp_path):
+    """Labels of nodes are their own; a set of one node is a name."""
+    points, cells, top = block()
+    for kind, name, rows, solid in (("C3D8", "solid", cells, True), ("S4R", "shell", top, ())):
+        used = np.unique(rows)
+        lines = ["*Heading", "** written by hand", "*Node, nset=all"]
+        lines += [f"{100 + i}, " + ", ".join(f"{x:.6g}" for x in points[i]) for i in used]
+        lines += [f"*Element, type={kind}"]
+        lines += [f"{k + 1}, " + ", ".join(str(100 + i) for i in row) for k, row in enumerate(rows)]
+        lines += ["*Nset, nset=corner", f"{100 + used[-1]},", ""]
+        (tmp_path / f"{name}.inp").write_text("\n".join(lines))
+        shapes = np.random.default_rng(0).standard_normal((len(used), 3, 2))
+        modes = {"frequencies": [50.0, 80.0], "shapes": shapes}
+        body = fi.Body.load([tmp_path / f"{name}.inp", modes], mass=1.0)
+        assert body.solid == solid and body.names["corner"] == body.numbers[-1] == 100 + used[-1]
+        assert_allclose(body.nodes, points[used], rtol=1e-5)
+        upwards = abs(body.normals[body.node("corner")][2])
+        assert upwards == pytest.approx(1.0) if name == "shell" else 0.3 < upwards < 0.9
+
+
+def test_modes_of_ansys():
+    """The file that ansys-mapdl-reader ships: a free-free pair of bending modes first; and a mesh of solids."""
+    examples = pytest.importorskip("ansys.mapdl.reader.examples", reason="the ansys extra is not installed")
+    from ansys.mapdl import reader
+
+    body, read = fi.Body.load(examples.rstfile, mass=2.3e-3), reader.read_binary(examples.rstfile)
+    assert_allclose(body.frequencies, read.time_values, rtol=1e-12)
+    numbers, moved = read.nodal_solution(2)
+    assert_allclose(body.shapes[[body.node(int(number)) for number in numbers], :, 2], moved)
+    assert body.solid is True
+    hit = struck(body.modes("normal"), body.at(int(body.numbers[body.normals.any(axis=1)][0])))
+    assert "not stated of the target" in hit.verdict
