@@ -3,6 +3,7 @@
 from collections.abc import Iterable, Sequence
 from typing import Any
 
+from .._base import check
 from .catalogue import CUTS, Catalogue, Entry, Fact, hammers, materials, strikers
 from .contact import wall_time
 
@@ -13,7 +14,6 @@ HEADS: dict[str, tuple[str, ...]] = {
     "strikers": ("striker", "felt mass [kg]", "law", "stiffness [N/m^p]", "p", "damping", "contact [s]"),
     "hammers": ("hammer", "mass [kg]", "up to [N]", "gives [V/N]", "tips"),
 }
-FACTS = ("number", "value", "unit", "from", "to", "source")
 
 
 def found(words: str) -> dict[str, list[Entry]]:
@@ -21,17 +21,36 @@ def found(words: str) -> dict[str, list[Entry]]:
     return {name: [section.entry(each) for each in section.find(words)] for name, section in SECTIONS.items()}
 
 
+def told(words: str) -> tuple[dict[str, Any], list[Any]]:
+    """What the prompt answers to some words: data, and sentences or tables (rows, head); of one entry its numbers."""
+    entries = [(section, entry) for section, each in found(words).items() for entry in each]
+    exact = [pair for pair in entries if pair[1].name.lower() == words.lower()]
+    entries = exact or entries
+    if not entries:
+        near = check.nearest(words, [name for section in SECTIONS.values() for name in section])
+        raise ValueError(f"WORD must be part of a name or group of the catalogue, got {check.shown(words)}{near}")
+    said: list[Any] = []
+    if len(entries) == 1:
+        entry = entries[0][1]
+        said += [f"{entry.name} ({entry.group})", *facts(entry), *filter(None, [entry.note])]
+    else:
+        for section in dict.fromkeys(section for section, _ in entries):
+            said.append((rows(section, [entry for name, entry in entries if name == section]), HEADS[section]))
+    return {"entries": [data(section, entry) for section, entry in entries]}, said
+
+
 def rows(section: str, entries: Iterable[Entry]) -> Rows:
     """A row for each entry of a section, under its `HEADS`."""
     return [{"materials": _material, "strikers": _striker, "hammers": _hammer}[section](each) for each in entries]
 
 
-def facts(entry: Entry) -> Rows:
-    """A row for each number of an entry, under `FACTS`; of wood those in every direction, whatever the cut."""
-    return [
-        (key, f"{fact.value:.3g}", fact.unit, *_ends(fact), fact.source + ("" if fact.read else " (not read here)"))
-        for key, fact in distinct(entry).items()
-    ]
+def facts(entry: Entry) -> list[str]:
+    """A sentence for each number of an entry; of wood those in every direction, whatever the cut."""
+    said = []
+    for key, fact in distinct(entry).items():
+        ends = f", {fact.ends[0]:.3g} to {fact.ends[1]:.3g}" if fact.interval else ""
+        said.append(f"{key} {fact.value:.4g} {fact.unit}{ends}: {fact.source}{'' if fact.read else ' (not read here)'}")
+    return said
 
 
 def distinct(entry: Entry) -> dict[str, Fact]:
@@ -64,10 +83,6 @@ def damping(entry: Entry) -> str:
     if "restitution" in told:
         return f"restitution {told['restitution']:g} at {told['speed']:g} m/s"
     return f"loss {told['loss']:g} s/m" if "loss" in told else "none published"
-
-
-def _ends(fact: Fact) -> tuple[str, str]:
-    return (f"{fact.ends[0]:.3g}", f"{fact.ends[1]:.3g}") if fact.interval else ("", "")
 
 
 def _number(entry: Entry, key: str) -> str:

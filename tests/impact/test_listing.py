@@ -38,11 +38,22 @@ def test_where_the_force_has_fallen_by_10_dB(exponent, ratio):
 
 def test_wood_lists_its_constants_once():
     entry = fi.materials.entry("spruce, Sitka")
-    rows = listing.facts(entry)
-    assert [row[0] for row in rows] == [
+    said = listing.facts(entry)
+    assert [line.split()[0] for line in said] == [
         "E_L", "E_R", "E_T", "G_LR", "G_LT", "G_RT", "nu_LR", "nu_LT", "nu_RT", "rho", "loss_factor",
     ]  # fmt: skip
-    assert all(len(row) == len(listing.FACTS) for row in rows)
-    assert rows[-1][5].endswith("(not read here)") and not rows[0][5].endswith("(not read here)")
+    assert said[0].startswith("E_L 1.09e+10 Pa, 7.6e+09 to 1.56e+10: ")
+    assert said[-1].endswith("(not read here)") and not said[0].endswith("(not read here)")
     told = listing.data("materials", entry)["numbers"]["E"]
     assert told["low"] < told["value"] < told["high"] and told["unit"] == "Pa"
+
+
+def test_the_prompt_is_told_the_numbers_of_one_and_the_rows_of_several():
+    data, said = listing.told("brass")  # a whole name counts before a part of others, such as of a brass mallet
+    assert [each["name"] for each in data["entries"]] == ["brass"] and said[0] == "brass (metal)"
+    data, said = listing.told("yarn")
+    ((rows, head),) = said
+    assert [row[0] for row in rows] == ["yarn, soft", "yarn, medium", "yarn, hard"] and head[0] == "striker"
+    assert [each["section"] for each in data["entries"]] == ["strikers"] * 3
+    with pytest.raises(ValueError, match="got 'brss'; did you mean 'brass'"):
+        listing.told("brss")
