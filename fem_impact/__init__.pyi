@@ -35,6 +35,7 @@ from .modes.modal import find_modes as find_modes
 from .modes.modal import rayleigh as rayleigh
 from .modes.ritz import ritz_modes as ritz_modes
 from .pages import explore as explore
+from .pages import lesson as lesson
 from .pages import report as report
 from .scenes.band import band as band
 from .scenes.results import load_response as load_response

@@ -26,7 +26,8 @@ RUNS = {  # words that run each command in a second or two
     "spread": "spread small.toml --vary striker.mass=uniform(0.02,0.03) --blows 64 --no-sobol --out spread",
     "hammer": "hammer small.toml --bandwidth 300 --masses 0.01",
     "hammer, rove": "hammer small.toml --bandwidth 300 --masses 0.01 --rove 2 --out rove",
-    "report": "report small.toml --out page.html",
+    "report": "report small.toml --out report.html",
+    "page": "page small.toml --out page.html",
     "play": "play small.toml --n-modes 3 --midi score.mid --silent --out played",
     "new": "new disk --out new",
     "mesh": "mesh small.toml --out edges.svg",
@@ -36,7 +37,7 @@ RUNS = {  # words that run each command in a second or two
     "frf": f"frf {TAPS} --response Acceleration --out frf",
     "fit": f"fit {TAPS} --response Acceleration --unknown contact.stiffness=1e5:1e13 --out fit",
 }
-SLOW = {"spread", "hammer, rove", "fit", "doctor", "report"}
+SLOW = {"spread", "hammer, rove", "fit", "doctor", "report", "page"}
 
 
 def commands():
