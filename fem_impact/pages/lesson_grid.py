@@ -214,5 +214,12 @@ def shown(case: Case, tolerance: float) -> Shown:
     # no spectrum errs by more than the area between the curves
     missed = float(apart.max() / top), float(np.trapezoid(apart, time) / hit.impulse) if hit.impacts else 0.0
     error = hit.error.total if hit.error.resolvable else math.inf
-    numbers = hit.n_impacts, hit.peak_force, hit.contact_time, math.nan if hit.restitution is None else hit.restitution, error, hit.model_error
+    numbers = (
+        hit.n_impacts,
+        hit.peak_force,
+        hit.contact_time,
+        math.nan if hit.restitution is None else hit.restitution,
+        error,
+        hit.model_error,
+    )
     return Shown(tuple(map(float, numbers)), hit.tolerance_met, *kept, last, top, *missed)
