@@ -37,6 +37,7 @@ from .modes.modal import find_modes as find_modes
 from .modes.modal import rayleigh as rayleigh
 from .modes.ritz import ritz_modes as ritz_modes
 from .pages import explore as explore
+from .pages import lesson as lesson
 from .pages import report as report
 from .references import verify as verify
 from .scenes.band import band as band

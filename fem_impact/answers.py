@@ -94,6 +94,17 @@ KEYS: dict[str, Keys] = {
         "n_good": ("integer", "good taps so far"),
     },
     "report": BLOW | SCENE | SECONDS,
+    "page": {
+        "n_blows": ("integer", "number of blows on the page"),
+        "n_missed": ("integer", "blows that miss their tolerance"),
+        "n_failed": ("integer", "blows without an answer"),
+        "n_unlike": ("integer", "blows that the map behind them counts otherwise"),
+        "tolerance": ("number", "of the blows [-]"),
+        "force_error": ("number", "by which curves shown miss the force, over its peak [-]"),
+        "spectrum_error": ("number", "by which spectra shown miss that of the force, over the impulse [-]"),
+        "questions": ("integer", "number of questions"),
+        "bytes": ("integer", "size of the page"),
+    },
     "explore": {"address": ("string", "address of the page, printed as soon as it is served")},
     "play": {
         "played": ("object", "number of strokes, contacts ... by name"),
@@ -152,6 +163,7 @@ EXAMPLES: dict[str, tuple[str, ...]] = {
     ),
     "watch": ("fem-impact watch records --bandwidth 2000", "fem-impact watch records --bandwidth 2000 --once",),
     "report": ("fem-impact report studies/scenes/drumstick.toml", "fem-impact report out --out page.html"),
+    "page": ("fem-impact page studies/scenes/drumstick.toml --out drumstick.html",),
     "explore": ("fem-impact explore studies/scenes/drumstick.toml",),
     "play": (
         "fem-impact play studies/scenes/drumstick.toml --n-modes 100", "fem-impact play scene.toml --midi song.mid",

@@ -209,6 +209,10 @@ COMMANDS = {
         _out("report.html", "out/NAME", "page"),
         TOLERANCE,
     ), "a TOML file, or a folder written by `strike`", "SCENE|RESULT"),
+    "page": Command(
+        "strike a scene on a grid; write one HTML page with sliders, sound and questions", commands.page, (
+        _out("page.html", "out/NAME", "page"),
+    )),
     "explore": Command(
         "serve a page on this machine where sliders and clicks change the blow", commands.explore, (
         _option("--port", "N", "port on 127.0.0.1 (default: any free port)", int, default=0),

@@ -345,6 +345,15 @@ def report(options: argparse.Namespace) -> Answer:
     return _answer_of_file(fi.report.numbers(scene, run), said, path, missed=missed)
 
 
+def page(options: argparse.Namespace) -> Answer:
+    """Strike the grid of a page without a server."""
+    scene, display = fi.load_scene(options.scene), _display(options)
+    path = _file(options, "page.html") or Path("out") / options.scene.stem / "page.html"
+    with staged(path.parent) as staging:
+        found = fi.lesson.write(staging / path.name, scene, watch=display, told=partial(display.report, "blows"))
+    return _answer_of_file(found.data(), [_title(scene), f"{found.summary()}."], path)
+
+
 def explore(options: argparse.Namespace) -> None:
     """Serve a page until the program is stopped."""
     scene = fi.load_scene(options.scene)

@@ -58,6 +58,7 @@ INNER = {
     "figures.in_hertz", "figures.styled", "sound.Sound",
     "hammers.Hammer", "hammers.bandwidth_of", "hammers.half_sine_reach",
     "report.SoundPlayer", "report.audio", "report.template",
+    "lesson.write", "lesson.Written", "lesson.Written.data", "lesson.Written.summary",  # many blows, see test_lesson
     "explore.serve",  # ends at an interruption only, see test_explore
     "ToleranceWarning", "analytic.closed_form", "Striker.let_go",
     "Rib.distances", "Rib.rigidity", "Rib.turning",

@@ -27,7 +27,8 @@ RUNS = {  # words that run each command in a second or two
     "hammer": "hammer small.toml --bandwidth 300 --masses 0.01",
     "hammer, rove": "hammer small.toml --bandwidth 300 --masses 0.01 --rove 2 --out rove",
     "watch": f"watch {TAPS.parent} --bandwidth 2000 --once --response Acceleration --out seen.png",
-    "report": "report small.toml --out page.html",
+    "report": "report small.toml --out report.html",
+    "page": "page small.toml --out page.html",
     "play": "play small.toml --n-modes 3 --midi score.mid --silent --out played",
     "new": "new disk --out new",
     "catalogue": "catalogue yarn",
@@ -39,7 +40,7 @@ RUNS = {  # words that run each command in a second or two
     "frf": f"frf {TAPS} --response Acceleration --out frf",
     "fit": f"fit {TAPS} --response Acceleration --unknown contact.stiffness=1e5:1e13 --out fit",
 }
-SLOW = {"spread", "watch", "hammer, rove", "fit", "doctor", "report"}
+SLOW = {"spread", "watch", "hammer, rove", "fit", "doctor", "report", "page"}
 
 
 def commands():

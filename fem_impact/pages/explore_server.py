@@ -29,7 +29,7 @@ POLICY = {  # what the page may load and where it may send: nothing but its own 
 
 
 class Text(RequestHandler):
-    """One of the three files of the page."""
+    """One of the files of the page."""
 
     def initialize(self, kind: str, text: str) -> None:
         self.kind, self.text = kind, text
@@ -102,7 +102,7 @@ def open_server(explorer: Explorer, workers: list[Worker], port: int) -> tuple[H
     port = listening.getsockname()[1]
     hosts = {f"{name}:{port}" for name in (LOCAL, "localhost")}
     parts = {"/": ("html", page(explorer.setup))}
-    for name, kind in (("explore.css", "css"), ("explore.js", "javascript")):
+    for name, kind in (("explore.css", "css"), ("plots.js", "javascript"), ("explore.js", "javascript")):
         parts[f"/{name}"] = kind, (report.WEB / name).read_text(encoding="utf-8")
     application = Application(
         [*((path, Text, {"kind": kind, "text": text}) for path, (kind, text) in parts.items()),

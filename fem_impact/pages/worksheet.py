@@ -1,0 +1,216 @@
+"""Questions on the blows of a page, with the answers that these blows give."""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..impact import force_spectrum
+from ..scenes.sentences import place, si
+from .explore_numbers import BAND, SPECTRUM_POINTS
+from .lesson_grid import STEPS, Lesson
+
+Position = tuple[int, int, int, int]  # of place, speed, stiffness and mass
+FALLEN = 0.1  # [-] of its largest value, where a spectrum is said to end
+
+
+@dataclass(frozen=True)
+class Question:
+    """A question, what is expected for an answer, and where the sliders stand to look for it."""
+
+    asked: str
+    answer: str
+    position: Position
+
+
+def questions(lesson: Lesson) -> list[Question]:
+    """All questions that the blows of a page can answer."""
+    asked = [_first(lesson), _impulse(lesson), _stiffer(lesson), _faster(lesson)]
+    asked += [_heavier(lesson), _harder(lesson), _spectrum(lesson), _elsewhere(lesson)]
+    return [each for each in asked if each is not None]
+
+
+def _told(lesson: Lesson, position: Position) -> dict[str, str]:
+    """The numbers of a blow in words."""
+    count, force, time, rebound = (
+        float(lesson.number(name)[position]) for name in ("n_impacts", "peak_force", "contact_time", "restitution")
+    )
+    return {
+        "impacts": "not known" if math.isnan(count) else f"{count:.0f} impact{'s' * (count != 1)}",
+        "force": si(force, "N", 3), "time": si(time, "s", 3), "restitution": f"{rebound:.3g}".replace("-", "−"),
+    }  # fmt: skip
+
+
+def _mass(lesson: Lesson, i: int) -> str:
+    return si(float(lesson.axes["mass"][i]), "kg", 3)
+
+
+def _times(value: float) -> str:
+    return f"{value:.3g} times"
+
+
+def _first(lesson: Lesson) -> Question | None:
+    told = _told(lesson, lesson.start)
+    return Question(
+        "Strike as the scene does. How many impacts are there, how long are they together, and how large is the force?",
+        f"{told['impacts']}, {told['time']} in contact, at most {told['force']}.", lesson.start,
+    )  # fmt: skip
+
+
+def _impulse(lesson: Lesson) -> Question | None:
+    settings, start = lesson.settings(*lesson.start), lesson.start
+    felt = lesson.setup.case(settings).striker.felt_mass
+    rebound = float(lesson.number("restitution")[start])
+    if math.isnan(rebound):
+        return None
+    momentum = felt * settings.speed * (1.0 + rebound)
+    low = float(spectrum(lesson, start)[0])
+    return Question(
+        f"The contact point feels {si(felt, 'kg', 3)} of the striker, which arrives with "
+        f"{si(settings.speed, 'm/s', 3)} and leaves with {rebound:.3g} of that. What "
+        "is the area under the force? Where does the spectrum show it?",
+        f"Mass times the change of speed, {si(momentum, 'N s', 3)}, unless the striker goes on vibrating itself. The "
+        f"spectrum shows it at its left end: {si(low, 'N s', 3)}.", start,
+    )  # fmt: skip
+
+
+def _single(lesson: Lesson, axis: int) -> tuple[Position, Position] | None:
+    """Two neighbours along an axis that hit once each, as near to the scene's blow as there are."""
+    counts, start = lesson.number("n_impacts"), lesson.start
+
+    def at(i: int) -> Position:
+        place_, speed, stiffness, mass = (i if k == axis else start[k] for k in range(4))
+        return place_, speed, stiffness, mass
+
+    nearest = sorted(range(lesson.shape[axis] - 1), key=lambda step: abs(step + 0.5 - start[axis]))
+    pairs = ((at(step), at(step + 1)) for step in nearest)
+    return next((pair for pair in pairs if counts[pair[0]] == counts[pair[1]] == 1), None)
+
+
+def _stiffer(lesson: Lesson) -> Question | None:
+    pair = _single(lesson, 2)
+    if pair is None:
+        return None
+    one, two = pair
+    ratio = float(lesson.axes["stiffness"][two[2]] / lesson.axes["stiffness"][one[2]])
+    power = lesson.setup.start.exponent
+    time = lesson.number("contact_time")
+    return Question(
+        f"Make the contact {_times(ratio)} stiffer, from {_stiffness(lesson, one[2])} to {_stiffness(lesson, two[2])} "
+        "the scene's stiffness. By which factor does the contact get shorter? What would a rigid wall do?",
+        f"{float(time[two] / time[one]):.3g}. On a rigid wall the contact time goes with the stiffness to the power "
+        f"−1/(n + 1), n being the exponent {power:.3g}: {ratio ** (-1.0 / (power + 1.0)):.3g}.", two,
+    )  # fmt: skip
+
+
+def _stiffness(lesson: Lesson, i: int) -> str:
+    return _times(float(lesson.axes["stiffness"][i]))
+
+
+def _faster(lesson: Lesson) -> Question | None:
+    pair = _single(lesson, 1)
+    if pair is None:
+        return None
+    one, two = pair
+    slow, fast = (float(lesson.axes["speed"][each[1]]) for each in pair)
+    power, force = lesson.setup.start.exponent, lesson.number("peak_force")
+    wall = (fast / slow) ** (2.0 * power / (power + 1.0))
+    return Question(
+        f"Strike with {si(fast, 'm/s', 3)} instead of {si(slow, 'm/s', 3)}. By which factor does the force grow?",
+        f"{float(force[two] / force[one]):.3g}; on a rigid wall by the ratio of the speeds to the power 2n/(n + 1), "
+        f"{wall:.3g}. Only a linear contact, n = 1, makes the force grow as the speed does, and its pulse keep its "
+        "shape.", two,
+    )  # fmt: skip
+
+
+def _change(counts: np.ndarray) -> int | None:
+    """The first position along an axis before which a blow hits once and after which it does not."""
+    found = np.flatnonzero((counts[:-1] == 1) != (counts[1:] == 1))
+    return int(found[0]) if len(found) else None
+
+
+def _heavier(lesson: Lesson) -> Question | None:
+    place_, speed, stiffness, mass = lesson.start
+    counts = lesson.number("n_impacts")[place_, speed, stiffness]
+    here = _change(counts)
+    if here is None:
+        always = counts[mass]
+        return Question(
+            "Move the mass from its lowest to its highest value. Does the number of impacts change?",
+            f"It does not: {_told(lesson, lesson.start)['impacts']} at "
+            f"{'each' if (counts == always).all() else 'most'} of them.", lesson.start,
+        )  # fmt: skip
+    lower, upper = (
+        f"{_told(lesson, (place_, speed, stiffness, i))['impacts']} at {_mass(lesson, i)}" for i in (here, here + 1)
+    )
+    return Question(
+        "Move the mass from its lowest to its highest value. Between which positions does the number of impacts first "
+        "change between one and another? Find the same border on the map.",
+        f"{lower}, and {upper}.", (place_, speed, stiffness, here + 1),
+    )  # fmt: skip
+
+
+def _harder(lesson: Lesson) -> Question | None:
+    place_, speed, _, mass = lesson.start
+    limit = float(lesson.limits[place_, mass])
+    if not 0.0 < limit < math.inf:
+        return None
+    soft, hard = ((place_, speed, i, mass) for i in (0, lesson.shape[2] - 1))
+    below, above = (lesson.setup.case(lesson.settings(*each)).resonance for each in (soft, hard))
+    return Question(
+        f"The body stops a striker of {_mass(lesson, mass)} once the contact resonance, {si(below, 'Hz', 3)} with the "
+        f"softest and {si(above, 'Hz', 3)} with the hardest contact, is above a threshold: the dashed line. How many "
+        "impacts are there with the softest and with the hardest contact?",
+        f"{_told(lesson, soft)['impacts']} and {_told(lesson, hard)['impacts']}; the threshold lies at "
+        f"{si(limit, 'Hz', 3)}.", hard,
+    )  # fmt: skip
+
+
+def spectrum(lesson: Lesson, position: Position) -> np.ndarray:
+    """Magnitude of the spectrum [N s] of a blow as the page holds it, (SPECTRUM_POINTS,) over BAND."""
+    blow = lesson.blows[int(np.ravel_multi_index(position, lesson.shape))]
+    band = np.geomspace(*BAND, SPECTRUM_POINTS)
+    return force_spectrum.magnitude(blow.end / STEPS * blow.time, blow.top / STEPS * blow.force, band)
+
+
+def _ends(lesson: Lesson, position: Position) -> float | None:
+    """Frequency [Hz] at which the spectrum first falls to FALLEN of its largest value; None if it does not."""
+    found = spectrum(lesson, position)
+    below = np.flatnonzero(found < FALLEN * found.max())
+    below = below[below > found.argmax()]
+    return float(np.geomspace(*BAND, SPECTRUM_POINTS)[below[0]]) if len(below) else None
+
+
+def _spectrum(lesson: Lesson) -> Question | None:
+    pair = _single(lesson, 2)
+    if pair is None:
+        return None
+    reach = [_ends(lesson, each) for each in pair]
+    if reach[0] is None or reach[1] is None:
+        return None
+    times = [float(lesson.number("contact_time")[each]) for each in pair]
+    return Question(
+        f"At which frequency has the spectrum first fallen to a tenth, with {_stiffness(lesson, pair[0][2])} and with "
+        f"{_stiffness(lesson, pair[1][2])} the scene's stiffness? What is that frequency times the contact time?",
+        f"{si(reach[0], 'Hz', 3)} and {si(reach[1], 'Hz', 3)}; times the contact time {reach[0] * times[0]:.2g} and "
+        f"{reach[1] * times[1]:.2g}. A shorter pulse excites higher modes, and the blow sounds brighter.", pair[1],
+    )  # fmt: skip
+
+
+def _elsewhere(lesson: Lesson) -> Question | None:
+    if len(lesson.places) < 2:
+        return None
+    _, *rest = lesson.start
+    positions = [(i, rest[0], rest[1], rest[2]) for i in range(len(lesson.places))]
+    rebounds = [float(lesson.number("restitution")[each]) for each in positions]
+    if any(map(math.isnan, rebounds)):
+        return None
+    best = int(np.argmax(rebounds))
+    listed = ", ".join(
+        f"{value:.3g} at {place(where)}".replace("-", "−") for value, where in zip(rebounds, lesson.places)
+    )
+    return Question(
+        "Strike at each place, as the scene does otherwise. Where does the striker rebound best? Why there?",
+        f"At {place(lesson.places[best])}. The share of the speed that is left is {listed}. Where the body moves less, "
+        "less of the energy stays in it.", positions[best],
+    )  # fmt: skip
