@@ -17,6 +17,7 @@ sys.path[:0] = [str(ROOT)]
 
 project, author, release = "fem_impact", ABOUT["authors"][0]["name"], ABOUT["version"]
 copyright = author
+root_doc = "README"
 extensions = ["myst_nb", "sphinx.ext.autodoc", "sphinx.ext.napoleon"]
 myst_enable_extensions = ["dollarmath", "colon_fence"]
 myst_dmath_double_inline = True

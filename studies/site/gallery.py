@@ -4,6 +4,7 @@ import ast
 import re
 from functools import cache
 
+import scenes
 from shared import PICTURES, STUDIES
 
 ROOT = STUDIES.parent
@@ -17,7 +18,6 @@ SECTIONS = {
 }
 CHECKS = ("Are numbers and their errors right?", "Held against reality", "What does it cost?")
 SHARED = {"sketches", "source_scenes", "page", "record", "tapped"}  # used by other studies, and not one themselves
-SOUNDS = {"beyond_sounds": "figures", "roll": "figures", "tutorial_outline_to_sound": "tutorials"}
 
 
 @cache
@@ -98,6 +98,7 @@ def write(folder, sounds):
         for path in paths:
             (folder / f"{path.stem}.md").write_text(page(path, sounds.get(path.stem, [])), encoding="utf-8")
     (folder / "index.md").write_text(text, encoding="utf-8")
+    (folder / "scenes.md").write_text(scenes.page(player, sounds), encoding="utf-8")
     (folder / "checks.md").write_text(checks(), encoding="utf-8")
 
 
