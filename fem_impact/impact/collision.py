@@ -272,12 +272,18 @@ def _parts(bodies, contacts, speeds, states, forces, residual, strikers=None) ->
         if states is not None:
             q, p = (check.array(f"states[{body}]", value, (modes.n_modes,)) for value in states[body])
             part = replace(part, q=q, p=p)
-        speed = float(speeds[body])
+        speed, own = float(speeds[body]), None
+        if strikers and body in strikers and touched:
+            own, comes = strikers[body].motion, float(part.rows[0] @ strikers[body].motion)
+            if comes <= 0.0 and speed:
+                raise ValueError(f"first_at of body {body} must come towards the other body as the striker arrives")
+            own = own / comes if comes > 0.0 else None
+            part = replace(part, coming=own)
         if speed != 0.0:
             if not touched or not part.rows[0, modes.omega == 0.0].any():
                 raise ValueError(f"speeds must be zero for a body that cannot move rigidly, got {speed:g} m/s")
-            own = strikers[body].motion if strikers and body in strikers else modes.rigid_motion(points[:1])
-            part = replace(part, p=part.p + speed / float(part.rows[0] @ own) * own, speed=speed)
+            own = modes.rigid_motion(points[:1]) if own is None else own
+            part = replace(part, p=part.p + speed * own, speed=speed)
         arriving = arriving or speed
         parts.append(part)
     return parts, arriving

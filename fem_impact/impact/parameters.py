@@ -290,7 +290,10 @@ class Parameters(check.Brief):
             found.start_p[i, self._modes[0]] = striker.motion  # the target may move already, whatever that speed
         elif home == "speeds":
             b = int(part)
-            found.start_p[i, self._modes[b]] = self.hit.bodies[b].rigid_motion(self.hit.ends[b].points[:1])
+            modes, ends = self.hit.bodies[b], self.hit.ends[b]
+            found.start_p[i, self._modes[b]] = (
+                modes.rigid_motion(ends.points[:1]) if ends.coming is None else ends.coming
+            )
         elif part == "damping_ratio":
             b = self.bodies[home]
             found.zeta[i, self._modes[b]] = self.hit.history.omega[self._modes[b]] > 0.0

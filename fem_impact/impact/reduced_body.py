@@ -40,6 +40,7 @@ class Ends(check.Brief):
     dip_force: float = 0.0  # [N] that constant force if it makes a spring that stands for them deflect
     speed: float = 0.0  # [m/s] with which the body arrives in rigid motion, at its first point
     doubtful: bool = False  # whether more than rounding is not known of the body there
+    coming: np.ndarray | None = None  # (n_modes,) [kg**0.5] per unit speed, of a striker in `collide`
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,6 +63,7 @@ class ReducedBody:
     spread: np.ndarray | None = None  # (n_ways, n_ends, n_modes) [-] relative errors of squared shapes
     stretching: Stretching | None = None
     speed: float = 0.0  # [m/s] with which it arrives in rigid motion, at its first contact
+    coming: np.ndarray | None = None  # (n_modes,) modal velocities per unit of that speed, of a striker in `collide`
     held: int = 0  # [-] first modes that only a hand makes swing: within a contact they move like a mass
 
     @cached_property
@@ -267,5 +269,6 @@ def ends_of(parts: Sequence[ReducedBody], laws: Sequence[Contact]) -> tuple[Ends
         forms = slice(last, last + (part.forms(rated).shape[1] if part.yields else 0))
         last = forms.stop
         dips = part.force if part.yields and forms.start == forms.stop else 0.0
-        found.append(Ends(part.points, part.touched, part.force, part.rest, forms, dips, part.speed, part.doubtful))
+        there = part.points, part.touched, part.force, part.rest
+        found.append(Ends(*there, forms, dips, part.speed, part.doubtful, part.coming))
     return tuple(found)

@@ -308,7 +308,8 @@ class Striker(check.Brief):
     def turning(cls, mass: float, inertia: float, arm: Any, *, pivot: Any = None) -> "Striker":
         """A free rigid body that strikes beside its centre of mass, and so begins to turn.
 
-        It is felt as ``1 / (1 / mass + across**2 / inertia)``.
+        It is felt as ``1 / (1 / mass + across**2 / inertia)``. Its points are the centre of mass, the contact point and
+        the pivot, as (across, ahead), without a coordinate in which none of them differ.
 
         Parameters
         ----------

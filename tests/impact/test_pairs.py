@@ -237,6 +237,19 @@ def test_two_contacts_between_the_same_two_bodies_feel_all_that_yields():
     assert_allclose(found[0].error.total, found[1].error.total, rtol=1e-2)
 
 
+def test_gradients_in_the_speed_of_a_striker_that_turns_follow_its_motion():
+    """Two strikers meet; the slope of the impulse in a speed is the impulse per speed where contacts are linear."""
+    one, other = (
+        fi.Striker.turning(0.3, 2e-4, (0.02, 0.05), pivot=(-0.9, 0.0)),
+        fi.Striker.turning(0.1, 1e-4, (0.01, 0.02)),
+    )
+    hit = fi.collide([one, other], [fi.Touch(LAW, 0, 1)], speeds=[2.0, 0.5])
+    slopes = [hit.gradient("impulse", wrt=f"speeds.{i}").slopes[0] for i in (0, 1)]
+    push = 2.0 / (1.0 / one.felt_mass + 1.0 / other.felt_mass)
+    assert_allclose(hit.impulse, 1.5 * push, rtol=1e-9)
+    assert_allclose(slopes, [push, -push], rtol=1e-4)
+
+
 @pytest.mark.slow
 def test_a_striker_that_turns_is_mapped():
     plate = fi.analytic.rectangle(0.6, 0.4, section=fi.Plate(STEEL, 2e-3), n_modes=60, damping_ratio=0.01)
@@ -262,6 +275,8 @@ def test_a_striker_that_turns_is_mapped():
     (lambda: fi.Striker.of(fi.Body([10.0], np.ones((3, 3, 1)), np.eye(3), 1.0), 1, direction="z"),
      "give its rigid motions as modes of"),
     (lambda: fi.Striker.turning(1.0, 1.0, 0.1), "arm must"),
+    (lambda: onto(fi.Striker.turning(1.0, 1e-3, (0.02, 0.0), pivot=(-0.2, 0.0)), -0.2),
+     "first_at of body 0 must come towards"),
     (lambda: onto(fi.Striker.rigid(1.0).falling()), "striker must not fall in a collision"),
     (lambda: onto(curved().modes("normal"), curved().at(1)), "along normals nothing tells how it arrives"),
 ])  # fmt: skip
