@@ -22,6 +22,7 @@ SHOWN = 80  # [-] characters quoted from a value the user passed; longer text is
 REACH = 1e75  # [-] largest number accepted; 1 / REACH is the smallest: the fourth power of both still fits a float
 MOST = 10**9  # [-] largest count accepted: more items would not fit into memory
 SOURCES = {  # type -> how a user makes one, for error messages
+    "Body": "fi.Body or fi.Body.load",
     "Comparison": "Response.against, Found.against or fi.band",
     "Contact": "fi.Contact.hertz, linear or power",
     "Figure": "fi.figures",

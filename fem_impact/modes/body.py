@@ -400,17 +400,18 @@ class Body(check.Brief):
         row = self.node(where)
         return np.asarray(self._ways(direction)[row] @ self.shapes[row])
 
-    def displacement(self, q: ArrayLike, where: Any) -> np.ndarray:
+    def displacement(self, q: ArrayLike, where: Any = None) -> np.ndarray:
         """Displacements (n_times, n_points, 3) [m] at nodes, of the kept modes alone.
 
         Parameters
         ----------
         q : array_like, shape (n_times, n_modes) [m kg**0.5]
             Modal displacements after a blow on `modes`, ``hit.modal_state(times)[0]``.
-        where : a node, by number, name or point, or a list of names or points
+        where : a node, by number, name or point, or a list of names or points; by default all nodes
         """
         several = isinstance(where, (list, tuple)) and any(np.ndim(each) or isinstance(each, str) for each in where)
-        rows = [self.node(each) for each in where] if several else [self.node(where)]
+        rows: Any = [self.node(each) for each in where] if several else slice(None)
+        rows = rows if several or where is None else [self.node(where)]
         n, moved = len(self.frequencies), check.array("q", q, (None, None))
         if moved.shape[1] < n:
             raise ValueError(f"q must be of modes of this body, {n} of them, got {moved.shape[1]}")

@@ -22,6 +22,7 @@ from ..model.by_vectors import AUDIBLE
 from ..model.planner import Run
 from ..model.playing import Strokes
 from ..modes import universal_files, viewing
+from ..modes.body import Body
 from ..modes.modal import Modes
 from . import sampling, sound
 from .histories import write_history
@@ -37,7 +38,7 @@ KIND = {"f": "Float64", "i": "Int64", "u": "UInt8"}
 
 
 @check.typed
-def write_vtk(path: str | Path, modes: Modes, response: Response | None = None, times: Any = None) -> None:
+def write_vtk(path: str | Path, modes: Modes | Body, response: Response | None = None, times: Any = None) -> None:
     """Write mode shapes, or the motion after a strike, for ParaView and pyvista.
 
     Parameters
@@ -49,9 +50,11 @@ def write_vtk(path: str | Path, modes: Modes, response: Response | None = None, 
         ``velocity`` [m/s] of the kept modes; the contact ``force`` [N] and, for a strike, the position of the
         ``striker`` [m] as field data. They point along the blow in z. On a curved plate z is the rise, towards the
         striker, so that their z is negative along the blow.
-    modes : Modes
+    modes : Modes or Body
+        Of a body of another program, shapes and motion are vectors at its nodes, on the cells of its surface.
     response : Response, optional
-        Write its motion instead of the mode shapes; ``modes`` must then be those of the struck body.
+        Write its motion instead of the mode shapes; ``modes`` must then be those of the struck body, or the `Body` of
+        which they are.
     times : array_like, shape (n_times,) [s], optional
         Times of the motion; required with response.
 
@@ -67,8 +70,12 @@ def write_vtk(path: str | Path, modes: Modes, response: Response | None = None, 
     """
     path = check.path("path", path)
     suffix = vtk_ending(path)
-    points, cells = viewing.grid(modes)
-    places = viewing.placed(modes, points)
+    if isinstance(modes, Body):
+        points = places = modes.nodes
+        cells = modes.cells if len(modes.cells) else np.arange(len(points))[:, None]
+    else:
+        points, cells = viewing.grid(modes)
+        places = viewing.placed(modes, points)
     if response is None:
         parts = _mode_parts(modes, points)
         stamps = _distinct(modes.frequencies)
@@ -76,7 +83,7 @@ def write_vtk(path: str | Path, modes: Modes, response: Response | None = None, 
         if times is None:
             raise ValueError("times must be given with response, as an array in s")
         stamps = check.array("times", times, (None,), "s", lift=True)
-        parts = _motion_parts(response, points, stamps)
+        parts = _motion_parts(response, points, stamps, modes if isinstance(modes, Body) else None)
     if suffix == ".pvd":
         _write_collection(path, places, cells, parts, stamps)
     elif response is None:
@@ -300,23 +307,30 @@ def plain(value: Any) -> Any:
     return str(value)
 
 
-def _mode_parts(modes: Modes, points: np.ndarray) -> list[tuple[dict, dict]]:
-    shapes = modes.shapes.at(points)  # (n_points, n_modes)
+def _mode_parts(modes: Modes | Body, points: np.ndarray) -> list[tuple[dict, dict]]:
+    own = isinstance(modes, Modes)
+    shapes = modes.shapes.at(points) if isinstance(modes, Modes) else modes.shapes  # (n_points, n_modes) or (, 3, )
     extent = float(np.ptp(points, axis=0).max(initial=0.0)) or 1.0
-    largest = np.abs(shapes).max(axis=0, initial=0.0)
-    warp = np.zeros((modes.n_modes, len(points), 3))
+    largest = np.abs(shapes).max(axis=tuple(range(shapes.ndim - 1)), initial=0.0)
+    warp = np.zeros((len(modes.frequencies), len(points), 3))
     # the largest deflection is a tenth of the body's extent
-    warp[:, :, 2] = (shapes * (0.1 * extent / np.where(largest > 0.0, largest, 1.0))).T
+    drawn = np.moveaxis(shapes * (0.1 * extent / np.where(largest > 0.0, largest, 1.0)), -1, 0)
+    warp[:, :, 2 if own else slice(None)] = drawn
     return [
         (
-            {"shape": shapes[:, i].copy(), "warp": warp[i]},
+            {"shape": shapes[..., i].copy(), "warp": warp[i]},
             {"mode": i + 1, "frequency": modes.frequencies[i], "damping_ratio": modes.damping_ratio[i]},
         )
-        for i in range(modes.n_modes)
+        for i in range(len(modes.frequencies))
     ]
 
 
-def _motion_parts(response: Response, points: np.ndarray, times: np.ndarray) -> list[tuple[dict, dict]]:
+def _motion_parts(
+    response: Response, points: np.ndarray, times: np.ndarray, body: Body | None = None
+) -> list[tuple[dict, dict]]:
+    if body is not None:
+        moves = [body.displacement(state) for state in response.modal_state(times)]
+        return _with_forces(response, times, moves)
     moves = []
     # Kept modes only: the residual dip would need a static solution for every grid point. `shapes.at` also accepts the
     # midpoints of chords along a hole, which lie just off the body.
@@ -327,16 +341,22 @@ def _motion_parts(response: Response, points: np.ndarray, times: np.ndarray) -> 
         vector = np.zeros((len(times), len(points), 3))
         vector[:, :, 2] = along * state @ rows.T  # (n_times, n_points)
         moves.append(vector)
+    parts = _with_forces(response, times, moves)
+    if response.striker is not None and at is not None:
+        striker = response.striker
+        tip = response.displacement(striker.at[None], times, body=0)[:, 0]
+        for (_, field), way in zip(parts, tip):
+            field["striker"] = at + np.array([0.0, 0.0, along * way])
+    return parts
+
+
+def _with_forces(response: Response, times: np.ndarray, moves: list[np.ndarray]) -> list[tuple[dict, dict]]:
+    """Displacements and velocities (n_times, n_points, 3), one part per time, with the forces then."""
     fields: list[dict[str, Any]] = [{"time": t} for t in times]
     for i in range(response.history.n_contacts):
         name = "force" if response.history.n_contacts == 1 else f"force_{i + 1}"
         for field, force in zip(fields, response.history.force_at(times, i)[0]):
             field[name] = force
-    if response.striker is not None and at is not None:
-        striker = response.striker
-        tip = response.displacement(striker.at[None], times, body=0)[:, 0]
-        for field, way in zip(fields, tip):
-            field["striker"] = at + np.array([0.0, 0.0, along * way])
     return [({"displacement": d, "velocity": v}, field) for d, v, field in zip(*moves, fields)]
 
 

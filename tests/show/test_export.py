@@ -222,3 +222,28 @@ def test_animation_that_cannot_be_written_says_why(tmp_path, modes, name, mode, 
     with pytest.raises(ValueError, match=text):
         export.write_animation(tmp_path / name, modes, mode)
     assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize("meshed", [True, False])
+def test_a_body_of_another_program_moves_on_its_own_mesh(tmp_path, modes, hit, meshed):
+    """A plate turned by 30 degrees about x: modes and motion are along its normal, at its nodes."""
+    points, cells = modes.shapes.grid()
+    turn = np.array([[1.0, 0.0, 0.0], [0.0, 0.75**0.5, -0.5], [0.0, 0.5, 0.75**0.5]])
+    normal, shapes = turn[:, 2], modes.shape_at(points)[:, None] * turn[None, :, 2, None]
+    nodes = np.column_stack([points, np.zeros(len(points))]) @ turn.T
+    numbers = np.arange(len(points)) + 101
+    body = fi.Body(modes.frequencies, shapes, nodes, modes.mass, numbers=numbers, cells=cells if meshed else None)
+    path = tmp_path / "motion.pvd"
+    export.write_vtk(path, body, hit, [0.0, 1e-4, 2e-3])
+    reader = pyvista.get_reader(path)
+    for i, time in enumerate(reader.time_values):
+        reader.set_active_time_point(i)
+        grid = reader.read()[0]
+        assert_allclose(grid.points, nodes, atol=1e-7)
+        assert grid.n_cells == (len(cells) if meshed else len(nodes))
+        for name, said in (("displacement", hit.displacement), ("velocity", hit.velocity)):
+            wanted = said(points, [time], residual=False)[0][:, None] * normal
+            assert_allclose(grid.point_data[name], wanted, rtol=0, atol=1e-9 * max(np.abs(wanted).max(), 1e-9))
+        assert_allclose(grid.field_data["force"], hit.history.force_at(np.array([time]), 0)[0])
+    export.write_vtk(tmp_path / "modes.vtu", body)
+    assert_allclose(pyvista.read(tmp_path / "modes.vtu").point_data["mode_003"], shapes[..., 2])
