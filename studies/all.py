@@ -20,7 +20,7 @@ def main() -> None:
     ):
         subprocess.run([sys.executable, str(script), str(folder)], check=True)
     shared.PICTURES.mkdir(exist_ok=True)
-    shown = ("fig*", "beyond_*", "ukulele_modes", "ukulele_wave", "hammer_test", "fit_*", "roll")
+    shown = ("fig*", "beyond_*", "ukulele_modes", "ukulele_wave", "nastran_door", "hammer_test", "fit_*", "roll")
     for path in sorted(path for name in shown for path in folder.glob(f"{name}.png")):
         picture = Image.open(path).convert("RGB")
         picture = picture.resize((WIDTH, round(WIDTH * picture.height / picture.width)), Image.Resampling.LANCZOS)

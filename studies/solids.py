@@ -169,14 +169,15 @@ def _skin(mesh: Any) -> np.ndarray:
 
 
 def listened(
-    hit: fi.Response, body: fi.Body, where: Any, way: Any, name: str, near: np.ndarray, seconds: float
-) -> tuple[Path, np.ndarray]:
+    hit: fi.Response, body: fi.Body, where: Any, way: Any, name: str, near: np.ndarray, seconds: float,
+    folder: Path | None = None,
+) -> tuple[Path, np.ndarray]:  # fmt: skip
     """Write the velocity of a node along a direction as a WAV file; its path, and the peaks [Hz] of its spectrum.
 
     Each peak is the largest within `APART` of one of ``near``, between the lines by the parabola of its logarithm.
     """
     sound = fi.sound.of_node(hit, body, where, way, duration=seconds).audible().faded()
-    path = shared.folder() / f"{name}.wav"
+    path = (folder or shared.folder()) / f"{name}.wav"
     path.write_bytes(sound.wav())
     rate, samples = wavfile.read(path)
     level = np.log(np.abs(np.fft.rfft(samples * np.hanning(len(samples)))) + 1e-30)

@@ -5,6 +5,7 @@ import numpy as np
 import pytest
 import tutorial_fit
 import tutorial_hammer_test as tutorial
+import tutorial_nastran
 import tutorial_outline_to_sound
 from scipy.io import wavfile
 
@@ -19,6 +20,18 @@ def test_from_the_outline_to_the_sound(tmp_path, capsys, monkeypatch):
     assert {path.name for path in tmp_path.iterdir()} >= {"ukulele_modes.png", "ukulele_fingertip.wav"}
     said = capsys.readouterr().out
     assert "edges rim, hole" in said and "dB SPL" in said
+
+
+@pytest.mark.slow
+@pytest.mark.usefixtures("read_here")
+def test_from_nastran_to_the_sound(tmp_path, capsys):
+    """Nastran's files hold single precision, which no number of a blow notices."""
+    pytest.importorskip("pyNastran", reason="the nastran extra is not installed")
+    hit, truth = tutorial_nastran.main(tmp_path, max_frequency=150.0)
+    for name in ("restitution", "contact_time", "peak_force"):
+        assert getattr(hit, name) == pytest.approx(getattr(truth, name), rel=1e-4)
+    assert {path.name for path in tmp_path.iterdir()} >= {"door.op2", "door.bdf", "door.wav", "nastran_door.png"}
+    assert "for a mode at" in capsys.readouterr().out
 
 
 def test_hammer_test_warns_of_double_hits(tmp_path, capsys):

@@ -1,5 +1,6 @@
 """Bodies from other programs: read, struck anywhere in any direction, and what is missing told."""
 
+import functools
 import warnings
 from pathlib import Path
 
@@ -10,6 +11,7 @@ from numpy.testing import assert_allclose
 from scipy.spatial.transform import Rotation
 
 import fem_impact as fi
+from fem_impact.modes import viewing
 
 FILES = Path(__file__).parents[1] / "bodies"
 pytestmark = pytest.mark.usefixtures("read_here")
@@ -69,6 +71,45 @@ def test_a_body_of_our_own_comes_back_with_its_blow(make, n_modes):
         if loads:
             place = points[[number - 1]]
             assert_allclose(modes.residual_compliance(at), few.residual_compliance(place), rtol=1e-9)
+
+
+@functools.cache
+def shell():
+    """A shallow cap of steel by our own elements: the system, 100 of its modes, its nodes in space and triangles."""
+    system = fi.assemble(
+        fi.mesh.rectangle(0.4, 0.3), fi.Plate(STEEL, 2e-3), {"boundary": "hinged"}, rise=fi.rise.cap(2.0)
+    )
+    modes = fi.find_modes(system, n_modes=100, damping_ratio=0.01)
+    points, cells = modes.shapes.grid()
+    return system, modes, viewing.placed(modes, points), cells
+
+
+@pytest.mark.slow
+@pytest.mark.xdist_group("shell")  # one worker finds its modes
+@pytest.mark.parametrize("n_modes", [5, 20, 100])
+def test_a_shell_of_our_own_comes_back_with_its_blow(n_modes):
+    """The truth is the blow on the shell itself, which finds its own modes and compliance."""
+    system, many, nodes, cells = shell()
+    few = many.truncated(n_modes=n_modes)
+    row = int(np.linalg.norm(nodes[:, :2] - (0.13, 0.11), axis=1).argmin())
+    shapes, static = np.zeros((len(nodes), 3, n_modes)), np.zeros((len(nodes), 3, 1))
+    shapes[:, 2] = few.shape_at(nodes[:, :2])
+    static[:, 2, 0] = few.shapes.deflection(nodes[[row], :2], nodes[:, :2])[:, 0]
+    law = fi.Contact.linear(2e4)
+    truth = fi.strike(
+        system, fi.Striker.rigid(0.05), law, at=nodes[row, :2], speed=1.0, tolerance=1e-3, damping_ratio=0.01
+    )
+    assert truth.tolerance_met
+    for known in (False, True):
+        told = {"static": static, "loads": [(row + 1, (0.0, 0.0, 1.0))]} if known else {}
+        body = fi.Body(
+            few.frequencies, shapes, nodes, system.mass, damping_ratio=0.01, cells=cells, solid=False, **told
+        )
+        found = struck(body.modes("z", free=False), body.at(row + 1), law)
+        for name in ("restitution", "contact_time", "peak_force"):
+            one, two = getattr(found, name), getattr(truth, name)
+            assert abs(one - two) <= (found.error.total + truth.error.total) * (1.0 if name == "restitution" else two)
+        assert ("not stated of the target: static compliance" in found.verdict) is not known
 
 
 def test_the_same_body_turned_in_space_has_the_same_blow():

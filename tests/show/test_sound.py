@@ -269,3 +269,23 @@ def test_only_plates_far_enough_are_heard_without_a_baffle(disk_hit, bar_hit):
         sound.radiate_free(bar_hit, (0.0, 0.0, 1.0))
     with pytest.raises(ValueError, match=r"listener must be at least 0\.0148 m from a plate in free air, got 0\.01 m"):
         sound.radiate_free(disk_hit, (0.0, 0.0, 0.01))
+
+
+def test_any_node_of_a_body_is_heard_along_any_direction():
+    """Along the blow as the point itself; across it by its own shapes; rigid motions that were added are silent."""
+    bar = fi.analytic.beam(0.4, ends=("free", "free"), mass=0.5, first_frequency=200.0, n_modes=8, damping_ratio=0.01)
+    x = np.linspace(0.0, 0.4, 9)
+    shapes = np.zeros((9, 3, 6))
+    shapes[:, 2] = bar.shape_at(x[:, None])[:, 2:]
+    shapes[:, 0] = 0.5 * shapes[::-1, 2]
+    nodes = np.column_stack([x, np.zeros((9, 2))])
+    body = fi.Body(bar.frequencies[2:], shapes, nodes, 0.5, damping_ratio=0.01)
+    law = fi.Contact.linear(1e5)
+    hit = fi.strike(body.modes("z", free=True), fi.Striker.rigid(0.03), law, at=body.at(3), speed=1.0, tolerance=1.0)
+    along, across = (fi.sound.of_node(hit, body, 2, way, duration=0.02).samples for way in "zx")
+    assert_allclose(along, fi.sound.synthesise(hit, body.at(2), duration=0.02).samples, atol=1e-12)
+    mirrored = fi.sound.of_node(hit, body, 8, "z", duration=0.02).samples
+    assert_allclose(across, 0.5 * mirrored, atol=1e-12)
+    with pytest.raises(ValueError, match="response must be of a blow on this body of 6 modes, got one on 2"):
+        few = fi.strike(body.modes("z").truncated(n_modes=2), hit.striker, law, at=body.at(3), speed=1.0, tolerance=1.0)
+        fi.sound.of_node(few, body, 2, "z")
