@@ -24,10 +24,11 @@ hammers have names. `fi.materials["brass"]` is a material, `fi.strikers["yarn, m
 medium"` writes such a scene. `fem-impact catalogue WORD` shows the numbers of one.
 
 Each number has an interval. Nine tenths of what it may be lie within ± so many per cent, or it lies between two ends;
-`fem-impact strike SCENE --band` and `fi.band` use it. A number without one is exact or goes with that beside it. The
-figure in brackets is its [source](#sources). **{unread} of {numbers} numbers come from sources that were not at hand
-when they were entered** (marked ° here and *not read* below): they are from memory, or estimates. Take such a number
-for what its interval says, and measure where it matters.
+`fem-impact strike SCENE --band` and `fi.band` use it. Where a source prints a single number, the interval is our
+judgement of how much specimens differ. A number without one is exact or goes with that beside it. The figure in
+brackets is its [source](#sources). **{unread} of {numbers} numbers come from sources that were not at hand when they
+were entered** (marked ° here and *not read* below): they are from memory, or estimates. Take such a number for what its
+interval says, and measure where it matters.
 
 ## Which law, which exponent, which damping for my mallet?
 
@@ -48,6 +49,20 @@ the plate; in `"spruce, Sitka, flat-sawn"` the tangential direction T does. Wher
 left unstated.
 
 """
+
+
+HAMMERS = """## Impact hammers
+
+`fi.hammers.catalogue["PCB 086C03"]` has the mass, the largest force, the sensitivity and the stiffness of each tip. Of
+the data sheets only parts of those of PCB 086D20 and 086D50 and of B&K 8202 could be read; makes whose masses were not
+known for sure are left out.
+
+"""
+
+
+def sort(entry):
+    """What numbers say of a striker: its law, then its kind."""
+    return "stiffness" not in entry.facts, entry.kind
 
 
 def entries():
@@ -72,7 +87,7 @@ def cell(fact, sources):
         ends = f" ± {100 * known['about']:.2g} %"
     else:
         ends = f" ({known['low']:.3g} to {known['high']:.3g})" if known else ""
-    return f"{fact.value:.3g}{ends} [{sources.index(fact.source) + 1}]{'' if fact.read else '°'}"
+    return f"{fact.value:.4g}{ends} [{sources.index(fact.source) + 1}]{'' if fact.read else '°'}"
 
 
 def wide(group, sources):
@@ -102,14 +117,12 @@ def page():
         if woods and len(woods) < len(group):
             parts.append(wide([entry for entry in group if entry not in woods], sources))
     for name, group in groupby(found["strikers"], lambda entry: entry.group):
-        parts.append(f"## Strikers: {name}\n\n" + wide(list(group), sources))
-    parts.append(
-        '## Impact hammers\n\n`fi.hammers.catalogue["PCB 086C03"]` has the mass, the largest force, the '
-        "sensitivity and the stiffness of each tip.\n\n" + table(*hammers(found["hammers"], sources))
-    )
+        parts.append(f"## Strikers: {name}\n")
+        parts += [wide(list(alike), sources) for _, alike in groupby(sorted(group, key=sort), sort)]
+    parts.append(HAMMERS + table(*hammers(found["hammers"], sources)))
     parts.append(
         "## Tips of impact hammers\n\nThe linear spring with the contact time of the tip on a rigid wall. Makers "
-        "show spectra, not stiffnesses: the intervals are wide.\n\n" + wide(found["tips"], sources)
+        "show\nspectra, not stiffnesses: the intervals are wide.\n\n" + wide(found["tips"], sources)
     )
     read = [words for words, known in catalogue.sources().values() if known]
     listed = "".join(f"{i}. {words}{'' if words in read else ' (*not read*)'}\n" for i, words in enumerate(sources, 1))

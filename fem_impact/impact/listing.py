@@ -16,14 +16,14 @@ HEADS: dict[str, tuple[str, ...]] = {
 }
 
 
-def found(words: str) -> dict[str, list[Entry]]:
+def matching(words: str) -> dict[str, list[Entry]]:
     """Entries of each section whose names or groups contain all of some words; all entries if there are none."""
     return {name: [section.entry(each) for each in section.find(words)] for name, section in SECTIONS.items()}
 
 
 def told(words: str) -> tuple[dict[str, Any], list[Any]]:
     """What the prompt answers to some words: data, and sentences or tables (rows, head); of one entry its numbers."""
-    entries = [(section, entry) for section, each in found(words).items() for entry in each]
+    entries = [(section, entry) for section, each in matching(words).items() for entry in each]
     exact = [pair for pair in entries if pair[1].name.lower() == words.lower()]
     entries = exact or entries
     if not entries:
@@ -36,7 +36,7 @@ def told(words: str) -> tuple[dict[str, Any], list[Any]]:
     else:
         for section in dict.fromkeys(section for section, _ in entries):
             said.append((rows(section, [entry for name, entry in entries if name == section]), HEADS[section]))
-    return {"entries": [data(section, entry) for section, entry in entries]}, said
+    return {"entries": [record(section, entry) for section, entry in entries]}, said
 
 
 def rows(section: str, entries: Iterable[Entry]) -> Rows:
@@ -59,7 +59,7 @@ def distinct(entry: Entry) -> dict[str, Fact]:
     return {key: fact for key, fact in entry.facts.items() if key not in again}
 
 
-def data(section: str, entry: Entry) -> dict[str, Any]:
+def record(section: str, entry: Entry) -> dict[str, Any]:
     """An entry as plain data."""
     numbers = {
         key: {"value": fact.value, "low": fact.ends[0], "high": fact.ends[1], "unit": fact.unit,

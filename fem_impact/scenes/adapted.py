@@ -50,14 +50,14 @@ def text(
         whole, notes = _drawn(whole, drawing, unit, folder)
     if material is not None:
         facts = materials.entry(material).facts
-        whole = _with(whole, "[material]", _named("material", material))
+        whole = _with(whole, "[material]", _listed_as("material", material))
         if "loss_factor" in facts:
             ratio = f"damping_ratio = {0.5 * facts['loss_factor'].value:.2g}"
             line = next(each for each in whole.splitlines() if each.startswith("damping_ratio"))
             whole = whole.replace(line, f"{ratio.ljust(26)}{LOST}")
     if mallet is not None:
         strikers.entry(mallet)
-        whole = _with(whole, "[striker]", _named("striker", mallet))
+        whole = _with(whole, "[striker]", _listed_as("striker", mallet))
         whole = _with(whole, "[contact]", "# [contact]               # left out: the name of the striker says it\n")
     if (drawing, material, mallet) != (None, None, None):
         body = kind if drawing is None else drawing.stem
@@ -87,7 +87,7 @@ def _drawn(whole: str, drawing: Path, unit: str | None, folder: Path) -> tuple[s
     return whole.replace(usual.ljust(20), place.ljust(20)).replace(usual, place), body.notes
 
 
-def _named(table: str, name: str) -> str:
+def _listed_as(table: str, name: str) -> str:
     """A table of the scene with a name of the catalogue."""
     line = f"name = {json.dumps(name)}".ljust(26)
     return f"[{table}]\n{line}# `fem-impact catalogue` tells its numbers; other keys here replace them\n"

@@ -7,22 +7,22 @@ from fem_impact.impact import listing
 
 
 def test_words_find_entries_by_name_and_group():
-    found = listing.found("")
+    found = listing.matching("")
     assert {name: len(entries) for name, entries in found.items()} == {
         "materials": len(fi.materials), "strikers": len(fi.strikers), "hammers": len(fi.hammers.catalogue),
     }  # fmt: skip
-    assert [entry.name for entry in listing.found("5a nylon")["strikers"]] == ["hickory 5A, nylon tip"]
-    assert {entry.group for entry in listing.found("kistler")["hammers"]} == {"Kistler"}
+    assert [entry.name for entry in listing.matching("5a nylon")["strikers"]] == ["hickory 5A, nylon tip"]
+    assert {entry.group for entry in listing.matching("kistler")["hammers"]} == {"Kistler"}
 
 
 @pytest.mark.parametrize("section", listing.SECTIONS)
 def test_every_row_fits_under_its_head(section):
-    rows = listing.rows(section, listing.found("")[section])
+    rows = listing.rows(section, listing.matching("")[section])
     assert rows and {len(row) for row in rows} == {len(listing.HEADS[section])}
 
 
 def test_a_row_of_a_striker_says_its_law_and_its_damping():
-    rows = {row[0]: row for row in listing.rows("strikers", listing.found("")["strikers"])}
+    rows = {row[0]: row for row in listing.rows("strikers", listing.matching("")["strikers"])}
     assert rows["yarn, medium"][2:6] == ("power", "2e+07", "2", "loss 0.1 s/m")
     assert rows["table tennis"][2:6] == ("linear", "4.5e+04", "1", "restitution 0.905 at 2.45 m/s")
     assert rows["steel, 10 mm"][2:6] == ("Hertz", "2.13e+10", "1.5", "none published")
@@ -44,7 +44,7 @@ def test_wood_lists_its_constants_once():
     ]  # fmt: skip
     assert said[0].startswith("E_L 1.09e+10 Pa, 7.6e+09 to 1.56e+10: ")
     assert said[-1].endswith("(not read here)") and not said[0].endswith("(not read here)")
-    told = listing.data("materials", entry)["numbers"]["E"]
+    told = listing.record("materials", entry)["numbers"]["E"]
     assert told["low"] < told["value"] < told["high"] and told["unit"] == "Pa"
 
 
