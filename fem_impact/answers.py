@@ -104,6 +104,10 @@ KEYS: dict[str, Keys] = {
         "missed": ("integer", "blocks that missed their deadline"),
     },
     "new": {},
+    "catalogue": {
+        "entries": ("array", "of each section, group, name, kind, note, tips, and numbers with value, low, high, unit, "
+                    "source, and whether that was read"),
+    },
     "mesh": {
         "mesh": ("object", "what the mesh is, by name, in words"),
         "edges": ("array", "of each edge name, length [m], n_facets, curved, middle [m], twins"),
@@ -147,7 +151,11 @@ EXAMPLES: dict[str, tuple[str, ...]] = {
     "play": (
         "fem-impact play studies/scenes/drumstick.toml --n-modes 100", "fem-impact play scene.toml --midi song.mid",
     ),
-    "new": ("fem-impact new disk --out gong.toml",),
+    "new": (
+        "fem-impact new disk --out gong.toml",
+        'fem-impact new --from leaf.svg --material brass --mallet "yarn, medium"',
+    ),
+    "catalogue": ("fem-impact catalogue spruce", 'fem-impact catalogue "yarn, medium"'),
     "mesh": ("fem-impact mesh drawing.svg --unit mm --out edges.png",),
     "show": ("fem-impact show out",),
     "schema": ("fem-impact schema", "fem-impact schema strike"),

@@ -231,7 +231,16 @@ COMMANDS = {
     )),
     "new": Command("write a commented scene to begin with", commands.new, (
         _option("kind", "KIND", "plate, disk, beam or map (default: plate)", nargs="?", default="plate"),
+        _option("--from", "FILE", "the outline of the plate, an .svg or .dxf drawing or a mesh file", _place,
+                dest="drawing"),
+        _option("--unit", "U", "unit of the numbers in that file: m, cm, mm, um, in or km (default: the file's)"),
+        _option("--material", "NAME", "what the body is made of, a name of the catalogue such as brass"),
+        _option("--mallet", "NAME", 'what strikes it, a name of the catalogue such as "yarn, medium"'),
         _out("KIND.toml", "here", "scene"),
+    ), ""),
+    "catalogue": Command(
+        "list materials, strikers and impact hammers that have a name, or all numbers of one", commands.catalogue, (
+        _option("words", "WORD", "part of a name or group, such as spruce (default: all)", nargs="*"),
     ), ""),
     "mesh": Command(
         "list the edges, sizes and units of a mesh, drawing or scene, to state its supports", commands.mesh, (

@@ -418,13 +418,26 @@ def modes(options: argparse.Namespace) -> Answer:
 
 def new(options: argparse.Namespace) -> Answer:
     """Write a scene to begin with."""
-    from .scenes import templates  # imported only when needed
+    from .scenes import adapted, templates  # imported only when needed
 
-    path = _file(options, f"{options.kind}.toml") or Path(f"{options.kind}.toml")
-    templates.write(path, options.kind)
+    name = f"{options.kind if options.drawing is None else options.drawing.stem}.toml"
+    path = _file(options, name) or Path(name)
+    whole, notes = adapted.text(
+        options.kind, path.parent, drawing=options.drawing, unit=options.unit, material=options.material,
+        mallet=options.mallet,
+    )  # fmt: skip
+    templates.write(path, options.kind, whole)
     verb = "map" if options.kind == "map" else "strike"
-    found = _answer_of_file({}, [], path)
+    found = _answer_of_file({"notes": notes}, noted(notes), path)
     return found._replace(said=[*(found.said or ()), f"Next: fem-impact {verb} {path}"])
+
+
+def catalogue(options: argparse.Namespace) -> Answer:
+    """List what has a name, or all that is known of one."""
+    from .impact import listing  # imported only when needed
+
+    data, said = listing.told(" ".join(options.words))
+    return answer(data, *(part if isinstance(part, str) else _table(*part) for part in said))
 
 
 def mesh(options: argparse.Namespace) -> Answer:

@@ -30,6 +30,7 @@ RUNS = {  # words that run each command in a second or two
     "report": "report small.toml --out page.html",
     "play": "play small.toml --n-modes 3 --midi score.mid --silent --out played",
     "new": "new disk --out new",
+    "catalogue": "catalogue yarn",
     "mesh": "mesh small.toml --out edges.svg",
     "show": "show out",
     "doctor": "doctor",

@@ -5,6 +5,7 @@ from functools import cache
 from pathlib import Path
 
 import api
+import catalogue
 import commands
 import pytest
 import scene_keys
@@ -71,7 +72,7 @@ def test_files_named_in_sentences_exist(name):
     assert [each for each in named if not (ROOT / each).exists()] == []
 
 
-@pytest.mark.parametrize("script", [api, commands, scene_keys], ids=lambda script: script.__name__)
+@pytest.mark.parametrize("script", [api, catalogue, commands, scene_keys], ids=lambda script: script.__name__)
 def test_pages_made_by_scripts_are_current(script):
     assert script.PAGE.read_text(encoding="utf-8") == script.page(), f"run python studies/{script.__name__}.py"
 

@@ -182,7 +182,7 @@ class Catalogue(Mapping[str, T], Generic[T]):
     101000000000.0
     >>> spruce = fi.materials["spruce, Sitka"]  # quarter-sawn; "spruce, Sitka, flat-sawn" has T across
     >>> round(spruce.E_across / 1e6)
-    927
+    849
     >>> mallet = fi.strikers.entry("yarn, medium")
     >>> fi.strikers["yarn, medium"].mass, mallet.contact(on=spruce).exponent
     (0.03, 2.0)

@@ -55,7 +55,7 @@ def _table(name: str, selector: str, makers: dict[str, Callable[..., Any]]) -> d
         "description": keys.TABLES[name],
         "properties": {selector: {"enum": list(makers)}},  # so that editors offer the kinds first
         "required": [] if name in NAMES else [selector],
-        "oneOf": _choices(name, selector, makers) + ([_named(name, makers)] if name in NAMES else []),
+        "oneOf": _choices(name, selector, makers) + ([_by_name(name, makers)] if name in NAMES else []),
     }
 
 
@@ -69,7 +69,7 @@ def _one(name: str, maker: Callable[..., Any]) -> dict[str, Any]:
     return found | {"properties": own, "required": [], "anyOf": either}
 
 
-def _named(table: str, makers: dict[str, Callable[..., Any]]) -> dict[str, Any]:
+def _by_name(table: str, makers: dict[str, Callable[..., Any]]) -> dict[str, Any]:
     """The schema of a table with a name of the catalogue, and of keys that replace what it says."""
     keys_of_kinds: dict[str, Any] = {}
     for kind, maker in makers.items():

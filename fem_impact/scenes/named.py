@@ -65,7 +65,11 @@ def _striker(called: str, table: Mapping[str, Any], scene: Mapping[str, Any]) ->
 
 def _stroke(called: str, table: Any, scene: Mapping[str, Any], stated: Mapping[str, Any]) -> Any:
     """A stroke, whose striker may have a name; its numbers have no intervals. A [contact] of the scene holds for it."""
-    if not isinstance(table, Mapping) or "name" not in (table.get("striker") or ()):
+    if (
+        not isinstance(table, Mapping)
+        or not isinstance(table.get("striker"), Mapping)
+        or "name" not in table["striker"]
+    ):
         return table
     found = _striker(called, {**stated, **table}, scene)
     parts = {key: known.taken("", found[key])[0] for key in ("striker", "contact")}

@@ -115,12 +115,12 @@ def text(kind: str) -> str:
     return whole + MAP if kind == "map" else whole
 
 
-def write(path: Path, kind: str) -> None:
-    """Write the scene of a kind; refuses to replace a file."""
+def write(path: Path, kind: str, whole: str | None = None) -> None:
+    """Write the scene of a kind, or another text; refuses to replace a file."""
     if path.suffix.lower() != ".toml":
         raise ValueError(f"a scene must be a .toml file, got {path}")
     if path.exists():
         raise ValueError(f"{path} exists already; name another file with --out, or remove it")
     path.parent.mkdir(parents=True, exist_ok=True)
     with replacing(path) as temporary:
-        temporary.write_text(text(kind), encoding="utf-8")
+        temporary.write_text(text(kind) if whole is None else whole, encoding="utf-8")

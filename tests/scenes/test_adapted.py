@@ -1,0 +1,92 @@
+"""Scenes to begin with for one's own drawing, and a material and a mallet by name."""
+
+import re
+import shutil
+from pathlib import Path
+
+import pytest
+
+import fem_impact as fi
+from fem_impact import cli
+from fem_impact.scenes import templates
+
+MESHES = Path(__file__).parents[2] / "meshes"
+LEAF = """<svg xmlns="http://www.w3.org/2000/svg" width="90mm" height="60mm" viewBox="0 0 90 60">
+<path d="M 5 30 C 25 0, 65 0, 85 30 C 65 60, 25 60, 5 30 Z"/></svg>"""
+
+
+@pytest.fixture
+def leaf(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    Path("leaf.svg").write_text(LEAF)
+    return tmp_path
+
+
+@pytest.mark.slow  # a process of its own reads the drawing
+def test_a_drawing_becomes_a_scene_of_brass_and_yarn(leaf, capsys):
+    pytest.importorskip("svgelements", reason="the extra cad is not installed")
+    words = ["new", "--from", "leaf.svg", "--material", "brass", "--mallet", "yarn, medium"]
+    assert cli.main(words) == 0
+    said = " ".join(capsys.readouterr().out.split())
+    assert "y points down" in said and "Files: leaf.toml Next: fem-impact strike leaf.toml" in said
+    scene = fi.load_scene("leaf.toml")
+    assert scene.title == "Leaf of brass struck by yarn, medium"
+    assert scene.make_section("plate").material == fi.materials["brass"]
+    assert scene.make_contact() == fi.strikers.entry("yarn, medium").contact()
+    assert scene.make_striker().mass == 0.03 and {"material.E", "contact.stiffness"} <= set(scene.known)
+    assert scene.target.values["damping_ratio"] == 0.5 * fi.materials.entry("brass").facts["loss_factor"].value
+    x, y = scene.blow.values["at"]
+    assert 0.005 < x < 0.085 and -0.06 < y < 0.0  # inside, with y upwards
+
+
+@pytest.mark.slow
+def test_the_scene_of_a_drawing_strikes(leaf):
+    pytest.importorskip("svgelements", reason="the extra cad is not installed")
+    assert cli.main(["new", "--from", "leaf.svg", "--material", "brass", "--mallet", "yarn, medium"]) == 0
+    hit = fi.load_scene("leaf.toml").strike(tolerance=1e-2)
+    assert hit.tolerance_met and hit.n_impacts >= 1
+
+
+@pytest.mark.slow
+def test_a_mesh_file_becomes_a_scene_elsewhere(leaf):
+    shutil.copy(MESHES / "l_shape.msh", leaf)
+    assert cli.main(["new", "--from", "l_shape.msh", "--out", "deep/mine.toml", "--mallet", "steel, 10 mm"]) == 0
+    text = Path("deep/mine.toml").read_text()
+    assert 'path = "../l_shape.msh"' in text and "# [contact]" in text
+    scene = fi.load_scene("deep/mine.toml")
+    assert scene.make_striker().radius == 5e-3 and scene.body().dimension == 2
+    wood = scene.make_section("plate").material
+    assert scene.make_contact() == fi.strikers.entry("steel, 10 mm").contact(on=wood)
+
+
+@pytest.mark.parametrize("kind", templates.KINDS)
+def test_every_kind_takes_a_material(kind, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    assert cli.main(["new", kind, "--material", "glass, float"]) == 0
+    made = fi.load_scene(f"{kind}.toml")
+    assert made.make_section("beam" if kind == "beam" else "plate").material == fi.materials["glass, float"]
+
+
+@pytest.mark.parametrize(
+    ("words", "text"),
+    [
+        (["--material", "bras"], "the catalogue of materials has no 'bras'; did you mean 'brass'"),
+        (["--mallet", "yarn medum"], "the catalogue of strikers has no 'yarn medum'; did you mean 'yarn, medium'"),
+        (["map", "--mallet", "yarn, medium"], "--mallet must be left out for a map"),
+        (["disk", "--from", "leaf.svg"], "--from must be left out for a disk"),
+        (["--unit", "mm"], "--unit must be left out without --from"),
+        (["--from", "laef.svg"], "laef.svg"),
+    ],
+)
+def test_what_does_not_fit_is_refused_and_nothing_written(leaf, capsys, words, text):
+    assert cli.main(["new", *words]) == 2
+    assert text in capsys.readouterr().err and not list(leaf.glob("*.toml"))
+
+
+def test_the_catalogue_at_the_prompt(capsys):
+    assert cli.main(["catalogue", "yarn"]) == 0
+    assert re.search(r"yarn, medium\s", capsys.readouterr().out)
+    assert cli.main(["catalogue", "PCB", "086C03"]) == 0
+    assert "mass 0.16 kg" in capsys.readouterr().out
+    assert cli.main(["catalogue", "brss"]) == 2
+    assert "did you mean 'brass'" in capsys.readouterr().err
