@@ -179,7 +179,10 @@ EXAMPLES: dict[str, tuple[str, ...]] = {
     "doctor": ("fem-impact doctor",),
     "verify": ("fem-impact verify square beam", "fem-impact verify --out verify.png"),
     "completion": ('eval "$(fem-impact completion bash)"',),
-    "frf": ("fem-impact frf studies/measured/acceleration.lvm --out out/frf.csv",),
+    "frf": (
+        "fem-impact frf studies/measured/acceleration.lvm --out out/frf.csv",
+        "fem-impact frf studies/measured/acceleration_multi.lvm --out out",
+    ),
     "fit": (
         "fem-impact fit taps.lvm scene.toml --unknown contact.stiffness=1e4:1e9 --mass 0.1",
         "fem-impact fit studies/measured/acceleration_multi.lvm --propose --mass 0.15",

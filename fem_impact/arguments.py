@@ -278,7 +278,9 @@ COMMANDS = {
                 choices=("H1", "H2", "Hv")),
         _option("--force-window", "S", "ignore the force later than this after each pulse begins", float),
         _option("--response-window", "S", "time constant of an exponential window", float),
-        _out("frf.csv", "none", ".csv or .uff file"),
+        _option("--against", "SCENE", "compare with the modes of this scene; [observe] has a point for each response",
+                _place),
+        _out("frf.csv and frf.html", "none", ".csv, .uff or .html file"),
     ), f"{TAPS} or frequency responses; or a scene, a TOML file", "TAPS|SCENE"),
     "fit": Command("find the hammer and the contact that explain measured taps", commands.fit, (
         _option("body", "SCENE", "the scene struck (default: a wall)", _place, nargs="?"),

@@ -579,23 +579,10 @@ def _choices(options: argparse.Namespace) -> dict[str, Any]:
 
 
 def frf(options: argparse.Namespace) -> Answer:
-    """List the peaks of frequency responses."""
-    from .taps import prompt  # imported only when needed
+    """List the peaks of frequency responses, and write them and a page about them."""
+    from . import hammer_commands  # imported only when needed
 
-    path = _file(options, "frf.csv")
-    with _display(options)("frequency responses"):
-        found, notes = prompt.frf(options)
-    peaks = prompt.peaks(found)
-    rows = [
-        (each["response"], f"{each['frequency']:.5g} Hz", f"{each['magnitude']:.4g} {each['unit']}",
-         "" if each["coherence"] is None else f"{each['coherence']:.3f}",
-         "" if each["error"] is None else f"{100.0 * each['error'] / each['magnitude']:.2g} %")
-        for each in peaks
-    ]  # fmt: skip
-    said = [*noted(notes), _table(rows, ("response", "peak at", "magnitude", "coherence", "within"))]
-    if path is not None:
-        prompt.write_frf(path, found)
-    return _answer_of_file({"peaks": peaks, "notes": notes}, said, path)
+    return hammer_commands.frf(options)
 
 
 def fit(options: argparse.Namespace) -> Answer:

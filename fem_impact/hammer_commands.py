@@ -6,6 +6,8 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 import fem_impact as fi
 
 from . import commands
@@ -75,6 +77,61 @@ def _rove(options: argparse.Namespace, scene: Any, masses: Sequence[float], note
     files = [] if drawn is None else [drawn.name, drawn.with_suffix(".csv").name]
     said = [commands._title(scene), *noted(notes), plan.summary()]
     return commands.answer({**data, "notes": [*notes, *plan.notes]}, *said, folder=drawn and drawn.parent, files=files)
+
+
+def frf(options: argparse.Namespace) -> commands.Answer:
+    """List the peaks of frequency responses, and write them and a page about them."""
+    from .taps import prompt  # imported only when needed
+
+    files = _files(options.out)
+    with commands._display(options)("frequency responses"):
+        heard = prompt.frf(options)
+    peaks = prompt.peaks(heard.found)
+    rows = [
+        (each["response"], f"{each['frequency']:.5g} Hz", f"{each['magnitude']:.4g} {each['unit']}",
+         "" if each["coherence"] is None else f"{each['coherence']:.3f}",
+         "" if each["error"] is None else f"{100.0 * each['error'] / each['magnitude']:.2g} %")
+        for each in peaks
+    ]  # fmt: skip
+    said = [
+        *noted(heard.notes),
+        commands._table(rows, ("response", "peak at", "magnitude", "coherence", "within")),
+    ]
+    data = {"peaks": peaks, "notes": heard.notes}
+    if not files:
+        return commands.answer(data, *said)
+    with staged(files[0].parent) as staging:
+        for path in files:
+            if path.suffix.lower() == ".html":
+                _write_page(staging / path.name, options, heard)
+            else:
+                prompt.write_frf(staging / path.name, heard.found)
+    return commands.answer(data, *said, folder=files[0].parent, files=[path.name for path in files])
+
+
+def _files(out: Path | None) -> list[Path]:
+    """The files that --out names: of a folder the table and the page."""
+    if out is None:
+        return []
+    return [out] if out.suffix else [out / "frf.csv", out / "frf.html"]
+
+
+def _write_page(path: Path, options: argparse.Namespace, heard: Any) -> None:
+    """The page about frequency responses, beside the modes of the scene measured or of the one to compare with."""
+    from .pages import frf_page  # imported only when needed
+
+    scene = heard.scene if options.against is None else fi.load_scene(options.against)
+    with commands._display(options)("page"):
+        computed = points = None
+        if scene is not None and len(scene.points) == heard.found.sizes["channel"]:
+            points, computed = np.array(scene.points, float), scene.modes(frf_page.COMPARED)
+        elif options.against is not None:
+            raise ValueError(
+                f"--against must be a scene with one observation point for each of {heard.found.sizes['channel']} "
+                f"responses, got {len(scene.points)}; list them in [observe]"
+            )
+        frf_page.write(path, heard.found, title=f"Taps of {options.scene.name}", taps=heard.taps, computed=computed,
+                       points=points)  # fmt: skip
 
 
 def watch(options: argparse.Namespace) -> commands.Answer | None:

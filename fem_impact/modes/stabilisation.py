@@ -15,7 +15,7 @@ import numpy as np
 
 from . import picked
 
-ORDERS = 40  # [-] poles of the largest model: twenty modes, more do not fit a picture
+ORDERS = 100  # [-] poles of the largest model: noise takes most, and 20 modes need 80
 # [-] a pole is stable if one of the order below differs by less, in frequency and in damping ratio: as usual in
 # modal analysis
 ALIKE = 0.01, 0.05
@@ -33,7 +33,7 @@ class Chart(NamedTuple):
 
 def chart(found: Any, orders: int = ORDERS) -> Chart:
     """The poles of frequency responses, as `fi.frf` returns them, by models of even orders up to ``orders``."""
-    s, values, *_ = picked.responses("frf", found)  # all lines count alike: noise is in all, modes are in few
+    s, values, *_ = picked.responses("frf", found)  # all lines count alike: weights by their errors did no better
     omega, window = s.imag, float(s.real.max(initial=0.0))
     orders = min(orders, len(omega) // 4)
     dt = np.pi / omega[-1]

@@ -119,7 +119,7 @@ def write(
             ("whiteness", f"{found.whiteness:.2g}"), ("not determined", str(len(found.unidentifiable))),
             ("taps that disagree", ", ".join(found.outliers) or "none"),
         ],
-        pictures={name: _uri(draw(found)) for name, draw in
+        pictures={name: uri(draw(found)) for name, draw in
                   (("pulses", pulses), ("profiles", profiles), ("spectrum", spectrum))},
         double=double_hits(found, target, at) if struck else [],
         compared={law: f"{100 * error:.2g} %" for law, error in found.compared.items()},
@@ -130,7 +130,8 @@ def write(
         temporary.write_text(page, encoding="utf-8")
 
 
-def _uri(figure: Any) -> str:
+def uri(figure: Any) -> str:
+    """A figure as the address of a picture within a page."""
     file = io.BytesIO()
     figure.savefig(file, format="png", dpi=120, transparent=True)
     return markup.data_uri("image/png", file.getvalue())

@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
+from ..modes.picked import FELT
 from ..show.style import BLUE, GREEN, GREY, PALETTE, SKY, VERMILION, panels, set_units
 from ..taps.records import Taps
 from ..taps.transfer import METHODS, frf
@@ -62,9 +63,19 @@ def draw_responses(axes: Any, found: Mapping[str, xr.Dataset], channel: int) -> 
         axes.fill_between(frequency, low, high, color=SKY, alpha=0.3, lw=0, label="90 % of the last")
     axes.set_xlabel("frequency")
     axes.set_ylabel(f"response [{each.units.values[channel]}]")
+    axes.set_xlim(0.0, felt(each))
     axes.set_title(str(each.channel.values[channel]))
     set_units(axes, "Hz")
     axes.legend(fontsize=8)
+
+
+def felt(found: xr.Dataset) -> float:
+    """Frequency [Hz] up to which responses are drawn: a little beyond where the force is felt."""
+    last = float(found.frequency.values[-1])
+    if "force" not in found:
+        return last
+    force = found.force.values
+    return min(last, 1.25 * float(found.frequency.values[np.flatnonzero(force >= FELT * force.max())[-1]]))
 
 
 def draw_coherence(axes: Any, found: xr.Dataset, channels: Sequence[int]) -> None:
@@ -73,6 +84,7 @@ def draw_coherence(axes: Any, found: xr.Dataset, channels: Sequence[int]) -> Non
         axes.plot(found.frequency.values, found.coherence.values[:, k], color=PALETTE[n % len(PALETTE)], lw=0.9,
                   label=str(found.channel.values[k]))  # fmt: skip
     axes.set_ylim(0.0, 1.03)
+    axes.set_xlim(0.0, felt(found))
     axes.set_xlabel("frequency")
     axes.set_ylabel("coherence")
     set_units(axes, "Hz")
@@ -93,7 +105,5 @@ def watched(last: Taps, good: Taps | None, bandwidth: float, drop: float, said: 
     with panels(len(parts), 2, 5.0, 3.2) as (figure, all_axes):
         for axes, draw in zip(all_axes, parts):
             draw(axes)
-        for axes in all_axes[2:]:
-            axes.set_xlim(0.0, 1.25 * bandwidth)
         figure.suptitle(said if found is None else f"{said}; responses of {found.averages} good taps", fontsize=10)
     return figure

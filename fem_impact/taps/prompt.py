@@ -3,7 +3,7 @@
 from contextlib import suppress
 from dataclasses import asdict
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import xarray as xr
@@ -34,8 +34,18 @@ def taps_of(options: Any, path: Path | None = None) -> Taps:
     return read_taps(path or options.scene, force=force, response=names, rate=options.rate, scale=options.scale)
 
 
-def frf(options: Any) -> tuple[xr.Dataset, tuple[str, ...]]:
-    """Frequency responses of a file of taps, or of a scene measured at its observation points; and notes."""
+class Heard(NamedTuple):
+    """Frequency responses, and what they come from."""
+
+    found: xr.Dataset
+    notes: tuple[str, ...] = ()
+    taps: Taps | None = None
+    scene: Scene | None = None  # that was measured
+
+
+def frf(options: Any) -> Heard:
+    """Frequency responses of a file of taps, or of a scene measured at its observation points."""
+    scene = None
     if options.scene.suffix.lower() == ".toml":
         scene = load_scene(options.scene)
         hit = scene.run(target="modal").response
@@ -46,12 +56,12 @@ def frf(options: Any) -> tuple[xr.Dataset, tuple[str, ...]]:
             taps = taps_of(options)
         except ValueError:  # a universal file may hold frequency responses already
             with suppress(ValueError):
-                return transfer.frf(options.scene), ()
+                return Heard(transfer.frf(options.scene))
             raise
     found = transfer.frf(
         taps, method=options.method, force_window=options.force_window, response_window=options.response_window
     )
-    return found, taps.notes
+    return Heard(found, taps.notes, taps, scene)
 
 
 def peaks(found: xr.Dataset) -> list[dict[str, Any]]:

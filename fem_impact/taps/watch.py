@@ -44,6 +44,22 @@ def reach_of(taps: Taps, i: int, drop: float = 10.0) -> float | None:
     return falls(np.fft.rfftfreq(LINES * len(row), 1.0 / taps.rate), size, drop)
 
 
+def faults(taps: Taps, i: int) -> list[str]:
+    """What is wrong with one tap, whatever the bandwidth."""
+    wrong = []
+    cut = taps._cut(i)
+    if cut:
+        wrong.append(f"overload of {', '.join(cut)}, repeat softer or with a larger range")
+    lead = round(taps.onset[i] * taps.rate)
+    if lead < triggers.FEWEST:
+        wrong.append(f"trigger too late, only {lead} samples before the pulse: start records earlier")
+    elif taps.cut_short[i]:
+        wrong.append("the record ends within the pulse: record longer")
+    if taps.n_pulses[i] > 1:
+        wrong.append("double hit, repeat")
+    return wrong
+
+
 def advice(file: str, taps: Taps, i: int, bandwidth: float, drop: float = 10.0) -> Advice:
     """Judge one tap for a test up to ``bandwidth`` [Hz], where its spectrum may be ``drop`` [dB] down.
 
@@ -58,29 +74,19 @@ def advice(file: str, taps: Taps, i: int, bandwidth: float, drop: float = 10.0) 
             f"bandwidth must be below half the rate of {file}, {0.5 * taps.rate:g} Hz, got {bandwidth:g} Hz; sample "
             "faster, or ask for less"
         )
-    reach, wrong = reach_of(taps, i, drop), []
-    cut = taps._cut(i)
-    if cut:
-        wrong.append(f"overload of {', '.join(cut)}, repeat softer or with a larger range")
-    lead = round(taps.onset[i] * taps.rate)
-    if lead < triggers.FEWEST:
-        wrong.append(f"trigger too late, only {lead} samples before the pulse: start records earlier")
-    elif taps.cut_short[i]:
-        wrong.append("the record ends within the pulse: record longer")
-    if taps.n_pulses[i] > 1:
-        wrong.append("double hit, repeat")
+    reach, wrong = reach_of(taps, i, drop), faults(taps, i)
     if not wrong and reach is not None and reach < bandwidth:
         wrong.append(
-            f"too soft for {_hertz(bandwidth)}: take the next tip (this one reaches {_hertz(reach)}; the tip must be "
-            f"{(bandwidth / reach) ** 2:.2g} times as stiff)"  # the time of contact goes with one over its root
+            f"too soft for {in_hertz(bandwidth)}: take the next tip (this one reaches {in_hertz(reach)}; the tip must "
+            f"be {(bandwidth / reach) ** 2:.2g} times as stiff)"  # the time of contact goes with one over its root
         )
-    far = f"beyond {_hertz(0.5 * taps.rate)}" if reach is None else _hertz(reach)
+    far = f"beyond {in_hertz(0.5 * taps.rate)}" if reach is None else in_hertz(reach)
     peak = float(taps.peak[i])
     said = "; ".join(wrong) or f"good: {peak:.3g} N, reaches {far}"
     return Advice(file, taps.labels[i], not wrong, said, peak, reach)
 
 
-def _hertz(value: float) -> str:
+def in_hertz(value: float) -> str:
     return f"{value / 1e3:.3g} kHz" if value >= 1e3 else f"{value:.3g} Hz"
 
 

@@ -24,14 +24,14 @@ def responses(noise, seed=0):
 
 
 def test_without_noise_the_poles_are_those_of_the_modes():
-    chart = stabilisation.chart(responses(0.0))
+    chart = stabilisation.chart(responses(0.0), 40)
     last = (chart.order == chart.order.max()) & chart.stable
     assert_allclose(chart.frequency[last], FREQUENCIES, rtol=1e-6)  # rounding of models of order 40
     assert_allclose(chart.damping_ratio[last], DAMPING, rtol=1e-4)
 
 
 def test_with_noise_every_mode_is_stable_at_many_orders_and_few_other_poles_are():
-    chart = stabilisation.chart(responses(0.003))
+    chart = stabilisation.chart(responses(0.003), 40)
     near = np.abs(chart.frequency[chart.stable, None] / FREQUENCIES - 1.0) < 2e-3
     assert (near.sum(axis=0) >= 5).all()  # of 20 orders; 15, but 5 of the mode within the peak of its neighbour
     assert near.any(axis=1).mean() > 0.9  # all measured

@@ -49,7 +49,7 @@ def test_labels_of_axes_keep_apart_and_pictures_have_no_background(found):
         boxes = [label.get_window_extent() for label in axes.get_xticklabels(which="both") if label.get_text()]
         boxes = sorted(box.extents[[0, 2]].tolist() for box in boxes)
         assert all(one[1] < next[0] for one, next in pairwise(boxes))
-    pixels = plt.imread(io.BytesIO(base64.b64decode(fit_page._uri(figure).partition(",")[2])))
+    pixels = plt.imread(io.BytesIO(base64.b64decode(fit_page.uri(figure).partition(",")[2])))
     assert pixels[0, 0, 3] == 0.0
 
 

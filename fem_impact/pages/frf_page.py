@@ -1,0 +1,217 @@
+"""One page about frequency responses: taps, H1, H2, Hv, coherence, poles and residues, stabilisation, MAC, shapes."""
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import xarray as xr
+from scipy.spatial import Delaunay, QhullError
+
+from .._base import check
+from .._base.explained import noted
+from .._base.files import replacing
+from ..modes import picked, stabilisation
+from ..modes.modal import Modes
+from ..show import export
+from ..show.style import BLUE, GREY, VERMILION, panels, set_units
+from ..taps import transfer, watch
+from ..taps.records import Taps
+from . import report, tap_pictures
+from .fit_page import uri
+
+COMPARED = 40  # [-] computed modes that measured ones may belong to: twice as many as fit a picture
+CHANNELS = 6  # [-] channels that have a picture and a column of residues: more do not fit a screen
+DRAWN = 14, 18  # [-] measured and computed modes of the MAC picture at most: its numbers are to be read
+NINE_TENTHS = 1.645  # [-] standard errors on either side of an interval that holds nine tenths
+
+
+def stabilised(chart: stabilisation.Chart, found: xr.Dataset, modes: picked.Picked) -> Any:
+    """Poles over frequency and order of the model, the mean response behind them: a matplotlib figure."""
+    with panels(1, 1, 7.2, 3.8) as (figure, (axes,)):
+        for some, colour, label in ((~chart.stable, GREY, "new"), (chart.stable, BLUE, "stable")):
+            axes.plot(chart.frequency[some], chart.order[some], "o" if label == "stable" else "x", color=colour, ms=3.5,
+                      label=label)  # fmt: skip
+        for n, one in enumerate(modes.frequencies):
+            axes.axvline(one, color=VERMILION, lw=0.8, ls="--", label="modes of the table" if n == 0 else None)
+        axes.set(xlabel="frequency", ylabel="order of the model")
+        behind = axes.twinx()
+        size = np.sqrt(np.square(np.abs(found.H.values[1:])).mean(axis=1))
+        behind.semilogy(found.frequency.values[1:], np.maximum(size, 1e-300), color=GREY, lw=0.7, alpha=0.7)
+        behind.set_yticks([])
+        behind.minorticks_off()
+        axes.set_xlim(0.0, 1.1 * float(chart.frequency.max(initial=modes.frequencies.max())))
+        set_units(axes, "Hz")
+        axes.legend(fontsize=8, loc="upper right")
+    return figure
+
+
+def likeness(values: np.ndarray, measured: np.ndarray, computed: np.ndarray) -> Any:
+    """MAC (n_measured, n_computed) of measured and computed shapes as a table of colours: a matplotlib figure."""
+    with panels(1, 1, 1.8 + 0.42 * len(computed), 1.4 + 0.36 * len(measured)) as (figure, (axes,)):
+        shown = axes.imshow(values, vmin=0.0, vmax=1.0, cmap="Blues", aspect="auto")
+        for (i, j), value in np.ndenumerate(values):
+            if value >= 0.1:
+                axes.text(j, i, f"{value:.2f}", ha="center", va="center", fontsize=7,
+                          color="white" if value > 0.6 else "black")  # fmt: skip
+        axes.set_xticks(range(len(computed)), [f"{one:.4g}" for one in computed], rotation=90, fontsize=8)
+        axes.set_yticks(range(len(measured)), [f"{one:.4g}" for one in measured], fontsize=8)
+        axes.set(xlabel="computed modes [Hz]", ylabel="measured [Hz]")
+        axes.grid(False)
+        figure.colorbar(shown, label="MAC")
+    return figure
+
+
+def _responses(estimates: dict[str, xr.Dataset], count: int) -> Any:
+    with panels(count, 1, 7.2, 2.6) as (figure, all_axes):
+        for channel, axes in enumerate(all_axes):
+            tap_pictures.draw_responses(axes, estimates, channel)
+    return figure
+
+
+def _one(width: float, height: float, draw: Callable[[Any], None]) -> Any:
+    with panels(1, 1, width, height) as (figure, (axes,)):
+        draw(axes)
+    return figure
+
+
+def _tap_rows(taps: Taps) -> list[tuple[str, str, str, str, str]]:
+    rows = []
+    for i, name in enumerate(taps.labels):
+        reach = watch.reach_of(taps, i)
+        far = f"beyond {watch.in_hertz(0.5 * taps.rate)}" if reach is None else watch.in_hertz(reach)
+        rows.append((name, f"{taps.peak[i]:.4g} N", str(taps.n_pulses[i]), far,
+                     "; ".join(watch.faults(taps, i)) or "good"))  # fmt: skip
+    return rows
+
+
+def _pole_rows(modes: picked.Picked, channels: int) -> list[list[str]]:
+    """Of each mode frequency, damping ratio and residues, with 90 % intervals."""
+    rows = []
+    for n, natural in enumerate(modes.frequencies):
+        told = [(natural, modes.frequency_errors[n]), (100.0 * modes.damping_ratio[n], 100.0 * modes.damping_errors[n])]
+        told += list(zip(modes.products[:channels, n], modes.errors[:channels, n]))
+        rows.append([_within(float(value), NINE_TENTHS * float(error)) for value, error in told])
+    return rows
+
+
+def _within(value: float, half: float) -> str:
+    """A number and half of its interval, to two digits of that."""
+    digits = max(0, 1 - int(np.floor(np.log10(half)))) if half > 0.0 else 3
+    return f"{value:.{min(digits, 9)}f} ± {half:.2g}"
+
+
+def edges(points: np.ndarray) -> list[list[int]]:
+    """Pairs of points (n_points, dimension) that are joined in a drawing: neighbours along a line or in triangles."""
+    flat = points if points.shape[1] > 1 else np.column_stack([points, np.zeros(len(points))])
+    try:
+        triangles = Delaunay(flat[:, :2]).simplices
+    except (QhullError, ValueError):  # along a line, or too few
+        along = np.argsort(flat @ np.linalg.svd(flat - flat.mean(axis=0))[2][0])
+        return np.column_stack([along[:-1], along[1:]]).tolist()
+    pairs = np.sort(np.concatenate([triangles[:, [0, 1]], triangles[:, [1, 2]], triangles[:, [0, 2]]]), axis=1)
+    return np.unique(pairs, axis=0).tolist()
+
+
+def _moving(modes: picked.Picked, points: np.ndarray) -> str:
+    """What the page needs to move measured shapes, as JSON."""
+    middle, size = 0.5 * (points.max(axis=0) + points.min(axis=0)), max(float(np.ptp(points, axis=0).max()), 1e-300)
+    place = (points - middle) / size
+    place = np.column_stack([place, np.zeros((len(place), 2))])[:, :2]
+    shapes = modes.products / np.maximum(np.abs(modes.products).max(axis=0), 1e-300)
+    names = [f"{one:.5g} Hz" for one in modes.frequencies]
+    data = {"points": place, "edges": edges(points), "shapes": shapes.T, "names": names}
+    return json.dumps(export.plain(data)).replace("<", "\\u003c")
+
+
+@check.typed
+def write(
+    path: str | Path, found: xr.Dataset, *, title: str = "Frequency responses", taps: Taps | None = None,
+    computed: Modes | None = None, points: Any = None,
+) -> None:  # fmt: skip
+    """Write the page; needs the extra ``web``.
+
+    Parameters
+    ----------
+    found : xarray.Dataset, as `fi.frf` returns it
+    taps : Taps, optional
+        Those that it comes from: the page shows them, and all three estimators.
+    computed : Modes, optional
+        What the measured modes are compared with, at ``points``.
+    points : array_like, (n_channels, dimension) [m], optional
+        Where each channel is measured, by default as a universal file states it; the page moves the shapes there.
+    """
+    check.extra("jinja2", "web", "a page")
+    names, trouble, modes, compared = [str(name) for name in found.channel.values], "", None, {}
+    shown = min(CHANNELS, len(names))
+    try:
+        modes = picked.pick("found", found)
+    except ValueError as error:
+        trouble = str(error)
+    if points is None and "place" in found.coords and np.isfinite(found.place.values).all():
+        points = found.place.values
+    place = None if points is None else check.array("points", points, (len(names), None), "m")
+    pictures = _pictures(found, taps, modes, shown)
+    if modes is not None and computed is not None and place is not None:
+        compared = _compared(modes, computed, place)
+        pictures["mac"] = compared.pop("picture")
+    double = [] if taps is None else [taps.labels[i] for i in np.flatnonzero(taps.n_pulses > 1)]
+    page = report.template("frf.html").render(
+        title=title, trouble=trouble, pictures=pictures, channels=names[:shown], n_channels=len(names), double=double,
+        taps=[] if taps is None else _tap_rows(taps), notes=noted(() if taps is None else taps.notes),
+        poles=[] if modes is None else _pole_rows(modes, shown), pairs=compared.get("pairs", []),
+        moving=_moving(modes, place) if modes is not None and place is not None and len(names) > 1 else "",
+        tiles=[
+            ("taps averaged", str(found.attrs.get("averages", "not stated"))), ("responses", str(len(names))),
+            ("estimator", str(found.attrs.get("method", "as in the file"))),
+            ("double hits", ", ".join(double) or "none"),
+            ("modes", "0" if modes is None else str(len(modes.frequencies))),
+            ("left unexplained", "-" if modes is None else f"{100.0 * modes.left:.2g} % rms"),
+        ],
+        versions=export.versions(), style=(report.WEB / "report.css").read_text(encoding="utf-8"),
+        script=(report.WEB / "shapes.js").read_text(encoding="utf-8"),
+    )  # fmt: skip
+    with replacing(path) as temporary:
+        temporary.write_text(page, encoding="utf-8")
+
+
+def _pictures(found: xr.Dataset, taps: Taps | None, modes: picked.Picked | None, shown: int) -> dict[str, str]:
+    """The pictures of the page by name, but for those of computed modes."""
+    pictures = {"responses": uri(_responses(_estimates(found, taps), shown))}
+    if "coherence" in found and found.attrs.get("averages", 2) > 1:  # of one tap it is 1 everywhere
+        pictures["coherence"] = uri(_one(7.2, 3.0, lambda axes: tap_pictures.draw_coherence(axes, found, range(shown))))
+    if taps is not None:
+        some = range(min(tap_pictures.SHOWN, taps.n_taps))
+        pictures["pulses"] = uri(_one(7.2, 3.0, lambda axes: tap_pictures.draw_pulses(axes, taps, some)))
+        pictures["spectra"] = uri(_one(7.2, 3.0, lambda axes: tap_pictures.draw_spectra(axes, taps, some, None, 10.0)))
+    if modes is not None:
+        pictures["stable"] = uri(stabilised(stabilisation.chart(found), found, modes))
+    return pictures
+
+
+def _estimates(found: xr.Dataset, taps: Taps | None) -> dict[str, xr.Dataset]:
+    """The responses by every estimator, the one asked for last; as they stand without taps."""
+    own = str(found.attrs.get("method", "H1"))
+    if taps is None or found.attrs.get("added_damping"):
+        return {own: found}
+    others = {method: transfer.frf(taps, method=method) for method in transfer.METHODS if method != own}
+    return others | {own: found}
+
+
+def _compared(modes: picked.Picked, computed: Modes, points: np.ndarray) -> dict[str, Any]:
+    """Pairs of measured and computed modes, and the picture of the MAC of the first ones."""
+    measured = Modes.from_arrays(modes.frequencies, modes.products, points=points, mass=1.0)
+    near = np.flatnonzero(computed.omega > 0.0)
+    near = near[computed.frequencies[near] <= 1.3 * modes.frequencies[-1]]
+    rows = []
+    if len(near) >= len(modes.frequencies):
+        rows = [
+            (f"{pair.measured_frequency:.5g} Hz", f"{pair.computed_frequency:.5g} Hz",
+             f"{100 * pair.difference:+.2f} %", f"{pair.mac:.3f}")
+            for pair in transfer.matched(measured, computed, points=points)
+        ]  # fmt: skip
+    some = modes.frequencies[: DRAWN[0]]
+    near = near[computed.frequencies[near] <= 1.1 * some[-1]][: DRAWN[1]]
+    values = transfer.mac(modes.products[:, : len(some)], computed.shape_at(points)[:, near])
+    return {"pairs": rows, "picture": uri(likeness(values, some, computed.frequencies[near]))}

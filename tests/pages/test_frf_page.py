@@ -1,0 +1,94 @@
+"""The page about frequency responses shows taps, poles, stabilisation, computed modes and moving shapes."""
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+import fem_impact as fi
+from fem_impact import cli
+from fem_impact.pages import frf_page
+from fem_impact.taps.windows import joined
+
+PLATE = fi.analytic.rectangle(0.4, 0.3, mass=1.0, first_frequency=100.0, n_modes=12, damping_ratio=0.01)
+POINTS = np.array([(x, y) for x in (0.06, 0.2, 0.34) for y in (0.05, 0.15)])
+
+
+@pytest.fixture(scope="module")
+def taps():
+    hits = [fi.strike(PLATE, fi.Striker.rigid(0.01), fi.Contact.linear(1e5), at=POINTS[0], speed=v, tolerance=0.1)
+            for v in (0.5, 1.0)]  # fmt: skip
+    made = joined([fi.measure(hit, rate=4096.0, at=POINTS, duration=1.0, noise=1e-3, rng=i, before=5e-3)
+                   for i, hit in enumerate(hits)])  # fmt: skip
+    force = made.force.copy()
+    force[1] += 0.3 * np.roll(force[1], 100)  # a second pulse
+    return fi.Taps.from_arrays(force, made.response, rate=made.rate)
+
+
+@pytest.fixture(scope="module")
+def written(taps, tmp_path_factory):
+    path = tmp_path_factory.mktemp("page") / "frf.html"
+    frf_page.write(path, fi.frf(taps.pick([0])), title="A <plate>", taps=taps, computed=PLATE, points=POINTS)
+    return path
+
+
+@pytest.mark.slow
+def test_the_page_tells_double_hits_poles_and_computed_modes(written):
+    page = written.read_text()
+    assert "A &lt;plate&gt;" in page and "Double hits: tap 2" in page and "double hit, repeat" in page
+    for name in ("taps", "responses", "poles", "stable", "mac", "shapes"):
+        assert f'<section id="{name}"' in page
+    assert page.count("data:image/png;base64,") == 5 and "±" in page  # no coherence of one tap
+    assert "http" not in page.replace("http-equiv", "")
+
+
+@pytest.mark.slow
+def test_without_points_nothing_moves_and_without_peaks_it_says_so(taps, tmp_path):
+    found = fi.frf(taps)
+    frf_page.write(tmp_path / "a.html", found)
+    assert "<canvas" not in (tmp_path / "a.html").read_text()
+    flat = found.assign(H=found.H * 0.0 + 1.0)
+    frf_page.write(tmp_path / "b.html", flat)
+    assert "No modes were picked: found has no peaks that are modes" in (tmp_path / "b.html").read_text()
+
+
+def test_points_are_joined_in_triangles_or_along_a_line():
+    square = np.array([(0.0, 0.0), (1.0, 0.0), (0.0, 1.0), (1.0, 1.0)])
+    assert len(frf_page.edges(square)) == 5
+    assert sorted(map(sorted, frf_page.edges(np.array([[0.3], [0.1], [0.2]])))) == [[0, 2], [1, 2]]
+
+
+@pytest.mark.parametrize("value, half, said", [(387.81, 0.26, "387.81 ± 0.26"), (0.5, 0.0123, "0.500 ± 0.012"),
+                                               (1234.5, 15.0, "1234 ± 15"), (2.0, 0.0, "2.000 ± 0")])  # fmt: skip
+def test_numbers_have_the_digits_of_their_intervals(value, half, said):
+    assert frf_page._within(value, half) == said
+
+
+def test_likeness_of_shapes_is_a_picture_of_all_pairs():
+    figure = frf_page.likeness(np.eye(3), np.array([1.0, 2.0, 3.0]), np.array([1.1, 2.1, 3.1]))
+    assert_allclose(figure.axes[0].images[0].get_array(), np.eye(3))
+    assert [text.get_text() for text in figure.axes[0].texts] == ["1.00"] * 3
+
+
+@pytest.mark.slow
+def test_the_page_in_a_browser_moves_shapes_and_fits_three_widths(written, visit):
+    for width in (360, 768, 1280):
+        page = visit(written.as_uri(), width=width, height=800)
+        tab = page.tab
+        assert tab.evaluate("document.documentElement.scrollWidth") <= width
+        drawn = "document.getElementById('shape').toDataURL()"
+        tab.evaluate(f"window.before = {drawn}")
+        tab.evaluate("document.getElementById('phase').value = 0.75")
+        tab.dispatch_event("#phase", "input")
+        page.until(f"window.before !== {drawn}")
+        assert tab.inner_text("#play") == "Play" and not page.errors
+
+
+@pytest.mark.slow
+def test_the_prompt_writes_table_and_page_and_compares_with_a_scene(taps, tmp_path, capsys):
+    taps.save(tmp_path / "taps.npz")
+    assert cli.main(["frf", str(tmp_path / "taps.npz"), "--out", str(tmp_path / "out"), "--quiet"]) == 0
+    assert sorted(path.suffix for path in (tmp_path / "out").iterdir()) == [".csv", ".html"]
+    scene = "studies/scenes/drumstick.toml"
+    words = ["frf", str(tmp_path / "taps.npz"), "--out", str(tmp_path / "x.html"), "--against", scene]
+    assert cli.main(words) == 2
+    assert "--against must be a scene with one observation point for each of 6 responses" in capsys.readouterr().err
