@@ -4,6 +4,7 @@ import os
 import re
 import subprocess
 import sys
+import tomllib
 from pathlib import Path
 
 import gallery
@@ -11,6 +12,7 @@ import links
 import names
 import pytest
 import quoted
+import yaml
 
 import fem_impact as fi
 
@@ -108,3 +110,21 @@ def test_the_lines_of_python_on_choosing_print_what_the_page_says(capsys):
     for lines, said in zip(code, printed, strict=True):
         exec(compile(lines, "choosing.md", "exec"), {})
         assert capsys.readouterr().out == said
+
+
+def test_the_recipe_asks_for_what_the_project_asks_for():
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
+    recipe = yaml.safe_load((ROOT / "studies" / "site" / "recipe.yaml").read_text(encoding="utf-8"))
+    about = project["project"]
+    wanted = [re.sub(r"^matplotlib\b", "matplotlib-base", each) for each in about["dependencies"]]
+    wanted = ["python" + about["requires-python"], *wanted]
+    assert [each.replace(" ", "") for each in recipe["requirements"]["run"]] == wanted
+    assert recipe["requirements"]["host"][2].replace(" ", "") == project["build-system"]["requires"][0]
+    assert recipe["context"]["version"] == about["version"] and recipe["about"]["license"] == about["license"]
+    assert recipe["build"]["python"]["entry_points"] == [f"fem-impact = {about['scripts']['fem-impact']}"]
+
+
+def test_binder_installs_the_repository_with_extras_that_exist():
+    (line,) = (ROOT / ".binder" / "requirements.txt").read_text(encoding="utf-8").splitlines()
+    extras = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]["optional-dependencies"]
+    assert set(re.fullmatch(r"\.\[(.+)\]", line)[1].split(",")) <= set(extras)

@@ -112,7 +112,9 @@ Each study below says in its first sentence what it checks; its numbers are in [
     for section in CHECKS:
         text += f"\n## {section}\n\n| study | what it does | kept data |\n|---|---|---|\n"
         for path in studies()[section]:
-            kept = path.with_suffix(".csv")
-            lines = f"{len(kept.read_text(encoding='utf-8').splitlines()) - 1} lines" if kept.exists() else "-"
+            kept = [
+                len(each.read_text(encoding="utf-8").splitlines()) - 1 for each in path.parent.glob(f"{path.stem}*.csv")
+            ]
+            lines = f"{sum(kept)} lines" if kept else "-"
             text += f"| [{path.stem}]({path.stem}.md) | {about(path)[0]} | {lines} |\n"
     return text
