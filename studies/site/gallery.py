@@ -66,15 +66,15 @@ def page(path, sounds):
     place = path.relative_to(ROOT).as_posix()
     text = f"---\norphan: true\n---\n\n# {name(path)}\n\n{title}\n\n"
     text += "".join(f"![{title}](../studies/pictures/{each.name})\n\n" for each in pictures(path))
-    text += "".join(player(each) for each in sounds)
+    text += "".join(player(each, each.stem.removeprefix(f"{path.stem}_")) for each in sounds)
     text += f"{words(rest)}\n\n```sh\npython {place}\n```\n\n"
     return text + f"```{{literalinclude}} ../{place}\n:language: python\n```\n"
 
 
-def player(path):
+def player(path, called="its sound"):
     """A sound with its name and a player."""
     return f"""
-<figure class="sound"><figcaption>{path.stem.replace("_", " ")}</figcaption>
+<figure class="sound"><figcaption>{called.replace("_", " ")}</figcaption>
 <audio controls preload="none" src="../sounds/{path.name}"></audio></figure>
 
 """
