@@ -23,8 +23,8 @@ def outputs(notebook):
     return found
 
 
-def test_there_are_four_and_all_cells_were_run():
-    assert len(FILES) == 4
+def test_there_are_five_and_all_cells_were_run():
+    assert len(FILES) == 5
     for path in FILES:
         code = [cell for cell in json.loads(path.read_text())["cells"] if cell["cell_type"] == "code"]
         assert [cell["execution_count"] for cell in code] == list(range(1, len(code) + 1)), path.name

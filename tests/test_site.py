@@ -4,12 +4,15 @@ import os
 import re
 import subprocess
 import sys
+import tomllib
 from pathlib import Path
 
 import gallery
 import links
 import names
 import pytest
+import quoted
+import yaml
 
 import fem_impact as fi
 
@@ -73,3 +76,55 @@ def test_links_that_lead_nowhere_and_files_from_elsewhere_are_found(tmp_path):
         "a.html leads to ../x.html, which does not exist",
         "a.html loads https://far/s.js",
     ]
+
+
+def test_numbers_of_the_theory_are_found_again():
+    text = quoted.PAGE.read_text(encoding="utf-8")
+    told = quoted.theory(text)
+    assert told.count("<details>") >= 12 and told.count("\n| ") >= len(quoted.again(quoted.QUOTES, text)) > 40
+    assert quoted.again(quoted.CHOOSING, (ROOT / "studies" / "site" / "choosing.md").read_text(encoding="utf-8"))
+
+
+def test_a_number_that_is_no_longer_right_ends_the_build():
+    text = quoted.PAGE.read_text(encoding="utf-8")
+    with pytest.raises(ValueError, match=r"says 34, but fe\.residual\.CALIBRATION is 33: mend the page"):
+        quoted.theory(text.replace("The constant 33 is", "The constant 34 is"))
+    with pytest.raises(ValueError, match="the page does not say 'ends at"):
+        quoted.theory(text.replace("So the restitution of a ball ends at", "It has"))
+
+
+@pytest.mark.parametrize(
+    ("written", "value", "right"),
+    [("2.18", 2.1802, True), ("2.18", 2.1751, True), ("2.18", 2.1749, False), ("3e-4", 3.4e-4, True),
+     ("1e-7", 2e-7, False), ("7/3", 2.3333333, True), ("7/3", 2.34, False), ("-8", -8.0, True)],
+)  # fmt: skip
+def test_a_number_is_right_as_it_is_rounded(written, value, right):
+    assert quoted.same(written, value) == right
+
+
+def test_the_lines_of_python_on_choosing_print_what_the_page_says(capsys):
+    text = (ROOT / "studies" / "site" / "choosing.md").read_text(encoding="utf-8")
+    code, printed = (
+        re.findall(rf"^```{kind}\n(.*?)^```", text, re.MULTILINE | re.DOTALL) for kind in ("python", "text")
+    )
+    for lines, said in zip(code, printed, strict=True):
+        exec(compile(lines, "choosing.md", "exec"), {})
+        assert capsys.readouterr().out == said
+
+
+def test_the_recipe_asks_for_what_the_project_asks_for():
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
+    recipe = yaml.safe_load((ROOT / "studies" / "site" / "recipe.yaml").read_text(encoding="utf-8"))
+    about = project["project"]
+    wanted = [re.sub(r"^matplotlib\b", "matplotlib-base", each) for each in about["dependencies"]]
+    wanted = ["python" + about["requires-python"], *wanted]
+    assert [each.replace(" ", "") for each in recipe["requirements"]["run"]] == wanted
+    assert recipe["requirements"]["host"][2].replace(" ", "") == project["build-system"]["requires"][0]
+    assert recipe["context"]["version"] == about["version"] and recipe["about"]["license"] == about["license"]
+    assert recipe["build"]["python"]["entry_points"] == [f"fem-impact = {about['scripts']['fem-impact']}"]
+
+
+def test_binder_installs_the_repository_with_extras_that_exist():
+    (line,) = (ROOT / ".binder" / "requirements.txt").read_text(encoding="utf-8").splitlines()
+    extras = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]["optional-dependencies"]
+    assert set(re.fullmatch(r"\.\[(.+)\]", line)[1].split(",")) <= set(extras)

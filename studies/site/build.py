@@ -18,6 +18,7 @@ sys.path.append(str(Path(__file__).parents[1]))  # of `shared`
 import gallery
 import links
 import names
+import quoted
 import scenes
 import shared
 
@@ -54,7 +55,11 @@ def lay_out(folder, sounds):
     front = folder / "README.md"
     front.write_text(front.read_text(encoding="utf-8") + tree(folder), encoding="utf-8")
     choosing = folder / "studies" / "site" / "choosing.md"
-    choosing.write_text(choosing.read_text(encoding="utf-8") + scenes.table(), encoding="utf-8")
+    text = choosing.read_text(encoding="utf-8")
+    quoted.again(quoted.CHOOSING, text)
+    choosing.write_text(text + scenes.table(), encoding="utf-8")
+    theory = folder / "studies" / "theory.md"
+    theory.write_text(quoted.theory(theory.read_text(encoding="utf-8")), encoding="utf-8")
     notebooks(folder / "studies" / "notebooks")
     names.write(folder / "studies")
     gallery.write(folder / "gallery", sounds)

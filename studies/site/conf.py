@@ -36,6 +36,7 @@ html_static_path = ["static"]
 html_css_files = ["site.css"]
 html_math_renderer = "mathml"
 html_copy_source = html_show_sourcelink = html_show_sphinx = False
+html_show_search_summary = False  # they are fetched, which a browser refuses to pages from a disk
 pygments_style, pygments_dark_style = "a11y-high-contrast-light", "github-dark"
 html_theme_options = {"navigation_with_keys": True}
 

@@ -66,15 +66,15 @@ def page(path, sounds):
     place = path.relative_to(ROOT).as_posix()
     text = f"---\norphan: true\n---\n\n# {name(path)}\n\n{title}\n\n"
     text += "".join(f"![{title}](../studies/pictures/{each.name})\n\n" for each in pictures(path))
-    text += "".join(player(each) for each in sounds)
+    text += "".join(player(each, each.stem.removeprefix(f"{path.stem}_")) for each in sounds)
     text += f"{words(rest)}\n\n```sh\npython {place}\n```\n\n"
     return text + f"```{{literalinclude}} ../{place}\n:language: python\n```\n"
 
 
-def player(path):
+def player(path, called="its sound"):
     """A sound with its name and a player."""
     return f"""
-<figure class="sound"><figcaption>{path.stem.replace("_", " ")}</figcaption>
+<figure class="sound"><figcaption>{called.replace("_", " ")}</figcaption>
 <audio controls preload="none" src="../sounds/{path.name}"></audio></figure>
 
 """
@@ -112,7 +112,9 @@ Each study below says in its first sentence what it checks; its numbers are in [
     for section in CHECKS:
         text += f"\n## {section}\n\n| study | what it does | kept data |\n|---|---|---|\n"
         for path in studies()[section]:
-            kept = path.with_suffix(".csv")
-            lines = f"{len(kept.read_text(encoding='utf-8').splitlines()) - 1} lines" if kept.exists() else "-"
+            kept = [
+                len(each.read_text(encoding="utf-8").splitlines()) - 1 for each in path.parent.glob(f"{path.stem}*.csv")
+            ]
+            lines = f"{sum(kept)} lines" if kept else "-"
             text += f"| [{path.stem}]({path.stem}.md) | {about(path)[0]} | {lines} |\n"
     return text
