@@ -410,7 +410,8 @@ def read_part(path: Path, table: str, values: dict[str, Any], folder: Path, call
     selector, makers = MAKERS[table]
     values = dict(values)
     if selector and selector not in values:
-        raise wrong(f"{selector} is missing; it is one of {', '.join(makers)}")
+        named = ", or give a name of the catalogue" if table == "striker" else ""
+        raise wrong(f"{selector} is missing; it is one of {', '.join(makers)}{named}")
     kind = values.pop(selector) if selector else ""
     try:
         check.one_of(selector, kind, makers)

@@ -96,6 +96,10 @@ def test_bands_and_spreads_use_the_intervals_of_names(tmp_path):
         ({"striker": {"name": "yarn, medium", "kind": "rigid"}}, "[striker] kind must be left out beside name"),
         ({"striker": {"name": "yarn, medium", "radius": 1.0}}, "[striker] radius is not a key of this table"),
         ({"striker": {"kind": "rigid", "mass": 0.1}}, "[contact] is missing"),
+        (
+            {"striker": {"mass": 0.1}, "contact": {"kind": "linear", "stiffness": 1e5}},
+            "[striker] kind is missing; it is one of rigid, sphere, stick, hammer, bar, or give a name of the",
+        ),
         ({"material": {"E": 1e9, "nu": 0.3}, "striker": {"name": "steel, 10 mm"}}, "[material] rho is missing"),
         (
             {"material": None, "section": None, "target": {"mass": 0.2, "first_frequency": 90.0},
