@@ -61,6 +61,7 @@ def named(words: str, *forms: Form) -> Form:
 
 POINT = named("a point [x, y]; on a beam [x] or x", NUMBER, rows(NUMBER, 1, 2))
 CORNERS = {"title": "a list of points [x, y]"} | rows(rows(NUMBER, 2, 2), 3)
+ASIDE = {"title": "a point [across, ahead] of the blow"} | rows(NUMBER, 2, 2)
 PLACE = {"title": "a point [x, y, z]"} | rows(NUMBER, 3, 3)
 SIZE = named(
     "number > 0, or a size that varies",
@@ -209,6 +210,9 @@ KEYS: dict[str, tuple[str, Form]] = {
     "head": ("kg", POSITIVE),
     "handle": ("kg", POSITIVE),
     "damping": ("N s/m", NOT_NEGATIVE),
+    "inertia": ("kg m^2 about the centre of mass, around the axis across blow and arm", POSITIVE),
+    "arm": ("m, the contact point, from the centre of mass", ASIDE),
+    "pivot": ("m, about which it turns as it arrives, from the centre of mass; left out, it comes straight", ASIDE),
     "gravity": ("m/s^2, that brings a free striker back after each bounce; 9.80665 onto a level body", NOT_NEGATIVE),
     "hand.force": ("N, with which the hand presses", NUMBER),
     "left": ("how this end is held; at most one end may be", one_of(TURNING)),

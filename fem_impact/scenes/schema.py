@@ -279,6 +279,7 @@ MAKERS: dict[str, tuple[str, dict[str, Callable[..., Any]]]] = {
     "striker": ("kind", {
         name: _held(maker) for name, maker in {
             "rigid": Striker.rigid, "sphere": _sphere, "stick": Striker.stick, "hammer": Striker.hammer,
+            "turning": Striker.turning,
             "bar": _with_keys(_bar, _bar, SIZES),
         }.items()
     }),

@@ -101,6 +101,7 @@ def arriving(kind: str, striker: Striker) -> str:
         "rigid": f"a rigid mass of {si(striker.mass, 'kg')}",
         "hammer": f"a hammer of {si(striker.mass, 'kg')} in two parts",
         "bar": f"a flexible bar of {si(striker.mass, 'kg')}",
+        "turning": f"a rigid body of {si(striker.mass, 'kg')}, felt as {si(striker.felt_mass, 'kg')} off its centre",
     }[kind]
     if kind == "stick":
         bending = striker.modes.frequencies[striker.modes.omega > 0.0][0]

@@ -79,7 +79,7 @@ damping_ratio = 0.005     # - of critical, every mode; or { frequency = [...], r
 """
 BLOW = """
 [striker]
-kind = "rigid"            # also "sphere" (with its material), "stick", "hammer", "bar"
+kind = "rigid"            # also "sphere" (with its material), "stick", "hammer", "turning", "bar"
 mass = 0.02               # kg
 
 [contact]

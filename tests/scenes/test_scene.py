@@ -122,6 +122,21 @@ def test_contacts_that_lose_and_a_hammer_in_a_scene(tmp_path, text, law):
     assert float(table.restitution[1]) == pytest.approx(hit.restitution, abs=2e-2)
 
 
+def test_a_striker_that_turns_in_a_scene(tmp_path):
+    """It is the one of `Striker.turning`; the answer tells the mass felt, and what friction would do."""
+    turning = 'kind = "turning"\nmass = 0.08\ninertia = 2e-5\narm = [0.01, 0.03]\npivot = [-0.2, 0.0]'
+    loaded = scene.load_scene(write(tmp_path, TEXT.replace('kind = "rigid"\nmass = 0.03', turning)))
+    hit = loaded.strike()
+    same = Striker.turning(0.08, 2e-5, (0.01, 0.03), pivot=(-0.2, 0.0))
+    assert_allclose(hit.striker.motion, same.motion)
+    assert "felt as 57.14\xa0g off its centre" in words(loaded, hit)[1]
+    assert {each.name: each for each in hit.assumptions}["no friction"].worst > 0.0
+    with pytest.raises(ValueError, match="hand needs a striker with one rigid motion, got 6"):
+        scene.load_scene(
+            write(tmp_path, TEXT.replace('kind = "rigid"\nmass = 0.03', turning + "\nhand = { stiffness = 1.0 }"))
+        ).strike()
+
+
 def test_a_panel_on_posts_in_a_scene(tmp_path):
     posts = "point_supports = [{ at = [0.1, 0.1] }, { at = [0.3, 0.2], stiffness = 1e4 }]"
     told = TEXT.replace('source = "analytic"', posts)
