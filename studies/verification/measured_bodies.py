@@ -131,7 +131,7 @@ def told(rows: list[dict[str, Any]]) -> None:
             if not mine:
                 continue
             held = np.array([[row[q] <= row[f"{q}_stated"] for q in QUANTITIES] for row in mine]).reshape(-1, 4)
-            sizes = np.median([(row["force_stated"], row["force"]) for row in mine] ], axis=0)
+            sizes = np.median([(row["force_stated"], row["force"]) for row in mine], axis=0)
             shares = [f"{100.0 * share:.1f} %" for share in [*held.mean(axis=0), held.all(axis=1).mean()]]
             met = sum(row["met"] for row in mine)
             name = f"{way}{', hit again' if again else ''}"
