@@ -220,7 +220,7 @@ def _follow(bodies, laws, parts, speed, options, striker=None, at=None, others=(
     blow = what_if.Followed(parts, laws, system, options, pace, found)
     left_out, resolvable = what_if.modes_left_out(blow, bodies)
     inherited = what_if.Variation("inherited", [[(other, 1.0, 1.0)] for other in others])
-    variations = left_out, what_if.unstated(blow, bodies), what_if.mesh(blow, bodies), inherited
+    variations = left_out, *what_if.unstated(blow, bodies), what_if.mesh(blow, bodies), inherited
     errors = {"step": found.error, **what_if.what_if(blow, variations)}
     what_if.add_poorer_descriptions(blow, bodies, errors)
     whole, n = np.add.reduce([*errors.values()]), options.n_quantities

@@ -39,7 +39,7 @@ def dataset(hit: "Response", points: Any = None, times: Any = None, max_frequenc
         data[f"impact_{name}"] = (("impact",), values, {"units": unit})
     errors = np.array(hit.restitution_errors, float)
     data["impact_restitution_error"] = (("impact",), errors, {"units": "1"})
-    for part in ("step", "truncation", "mesh", "idealisation", "total"):
+    for part in ("step", "truncation", "mesh", "idealisation", "measurement", "total"):
         data[f"error_{part}"] = ((), getattr(hit.error, part), {"units": "1"})
     data |= {f"energy_{name}": ((), value, {"units": "J"}) for name, value in hit.energies.items()}
     places: dict[str, Any] = {"time": ("time", hit.time, {"units": "s", "long_name": "time"})}

@@ -9,6 +9,7 @@ import numpy as np
 CAUSES = {
     "step": "time steps", "truncation": "modes left out", "mesh": "the finite elements",
     "idealisation": "the simplified target", "inherited": "the blow before",
+    "measurement": "the measured responses",
 }  # fmt: skip
 
 
@@ -23,6 +24,7 @@ class Error:
     idealisation: float = 0.0  # [-] of treating the target as rigid or infinite
     sensitivity: float = 1.0  # [-] growth of a small difference from first to last impact
     inherited: float = 0.0  # [-] of the motion at the start, from the blow before
+    measurement: float = 0.0  # [-] of shapes from measured responses: noise, ends of records, what no body would do
     # [-] by cause, named as above, and quantity; a cause that is not here errs as much in every quantity
     table: Mapping[str, Mapping[str, float]] = field(default_factory=dict, repr=False, compare=False)
 

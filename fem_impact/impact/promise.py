@@ -31,13 +31,10 @@ CAUTION = 0.5, 0.05
 MOST_ADVISED = 20_000
 # see `Modes.unstated`
 UNSTATED = {
-    "compliance": "static compliance", "free": "whether it moves freely", "shapes": "shapes but as picked",
+    "compliance": "static compliance", "free": "whether it moves freely", "shapes": "shapes but as measured",
     "dent": "whether unit loads dent it",
 }  # fmt: skip
-ADVICE = {
-    "compliance": "give the compliance", "shapes": "pick the modes from longer or cleaner responses",
-    "dent": "give solid = the material, or False for a shell,",
-}  # fmt: skip
+ADVICE = {"compliance": "give the compliance", "dent": "give solid = the material, or False for a shell,"}
 
 
 def sentence(hit: "Response") -> str:
@@ -77,6 +74,10 @@ def remedy(hit: "Response") -> str:
         advice += [f"make {name} with free = True or False, as it is" for name in loose] or more
         advice += [
             f"{ADVICE[each]} of {name}" for name, missing in _unstated(hit) for each in ADVICE if each in missing
+        ]
+    if error.measurement > allowed:
+        advice += [
+            f"measure longer or cleaner responses of {name}" for name, told in _unstated(hit) if "shapes" in told
         ]
     if error.idealisation > allowed:
         advice.append("give target = 'modal'")

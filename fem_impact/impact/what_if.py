@@ -120,14 +120,14 @@ def modes_left_out(blow: Followed, bodies: Sequence[Modes]) -> tuple[Variation, 
     return found, max(softness) <= RESOLVABLE
 
 
-def unstated(blow: Followed, bodies: Sequence[Modes]) -> Variation:
+def unstated(blow: Followed, bodies: Sequence[Modes]) -> tuple[Variation, Variation]:
     """What nobody said of the bodies, see `Modes.unstated`.
 
     That is the most and the least that the modes left out of a body may yield, and the rigid motions that it may have,
     on springs too soft to matter; and shapes that were measured, larger or smaller by their errors, in each of the ways
     that these may go together.
     """
-    changes = []
+    changes, measured = [], []
     for i, (modes, part) in enumerate(zip(bodies, blow.parts)):
         if not modes.unstated or not len(part.touched):
             continue
@@ -139,10 +139,10 @@ def unstated(blow: Followed, bodies: Sequence[Modes]) -> Variation:
         if part.spread is not None:
             either = np.concatenate([1.0 + part.spread, 1.0 - part.spread])
             others = part.rows * np.sqrt(np.maximum(0.0, either))
-            changes.append([(blow.changed(i, replace(part, rows=rows)), 1.0, 1.0) for rows in others])
+            measured.append([(blow.changed(i, replace(part, rows=rows)), 1.0, 1.0) for rows in others])
         if part.loose.size:
             changes.append([(blow.changed(i, part.loosened()), 1.0, 1.0)])
-    return Variation("truncation", changes)
+    return Variation("truncation", changes), Variation("measurement", measured)
 
 
 def mesh(blow: Followed, bodies: Sequence[Modes]) -> Variation:

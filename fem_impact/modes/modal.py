@@ -299,7 +299,7 @@ class Modes(check.Brief):
         rest[body.driving] = body.rest
         loose = body.loose if free is None else 0.0
         known = replace(sampled, rest=rest, doubt=body.doubt, rigid=np.full((len(rest), 1), loose) if loose else None)
-        said = ("shapes", "compliance", *(("free",) if loose else ()))
+        said = ("shapes", *(("free",) if loose else ()))
         return replace(made, shapes=known, notes=tuple(body.notes), unstated=said)
 
     @cached_property

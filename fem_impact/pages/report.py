@@ -237,6 +237,8 @@ def _budget(response: Response) -> list[tuple[str, str, float, float]]:
         ("modes left out", "from a run with fewer modes", error.truncation),
         ("finite elements", "from the frequency errors, weighted by energy", error.mesh),
     ]
+    if error.measurement:
+        rows.append(("measured responses", "from runs with shapes changed by their errors", error.measurement))
     scale = max(response.tolerance, *(value for _, _, value in rows))
     return [(name, how, value, max(0.0, min(1.0, value / scale))) for name, how, value in rows]
 

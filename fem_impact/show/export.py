@@ -233,7 +233,17 @@ SCALARS = (
     "energy_error", "momentum_error", "tolerance", "tolerance_met", "trusted", "verdict", "finished", "in_contact",
     "scheme",
 )  # fmt: skip
-ERROR_PARTS = ("step", "truncation", "mesh", "idealisation", "inherited", "sensitivity", "total", "resolvable")
+ERROR_PARTS = (
+    "step",
+    "truncation",
+    "mesh",
+    "idealisation",
+    "inherited",
+    "measurement",
+    "sensitivity",
+    "total",
+    "resolvable",
+)
 IMPACT_PARTS = ("start", "end", "peak_force", "impulse", "contact", "restitution")
 
 

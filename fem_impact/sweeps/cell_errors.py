@@ -118,6 +118,6 @@ def described(cases: Cases, numbers: np.ndarray, workers: int | None = None) -> 
     several = several[:: max(1, -(-len(several) // DOUBTED[False]))]
     for i, (hit, _) in zip(several, try_each(several, few.blow, workers)):
         if hit is not None:
-            total.flat[i] = max(total.flat[i], hit.error.truncation + hit.error.mesh)
+            total.flat[i] = max(total.flat[i], hit.error.truncation + hit.error.mesh + hit.error.measurement)
     nearest = [np.abs(np.arange(n)[:, None] - some).argmin(axis=1) for n, some in zip(cases.shape, chosen)]
     return total[np.ix_(*nearest)]

@@ -182,6 +182,8 @@ def fingerprint(grid: Any) -> Mark:
             yields = [float(each.shapes.compliance(place[None])[0, 0]) for place in places]
             body.update(repr((each.n_modes, each.stretches, each.thick, each.air, each.unstated, yields)).encode())
             body.update(each.omega.tobytes() + each.shape_at(places).tobytes())
+            if (spread := each.shapes.spread(places)) is not None:
+                body.update(spread.tobytes())
     functions = {}
     for name, function in grid.extra.items():
         try:

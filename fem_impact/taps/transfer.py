@@ -64,10 +64,12 @@ def frf(
         (frequency, channel), the radius around ``H`` that holds the true response with a probability of 0.9, from how
         far the taps differ or, of one tap, from the noise before it, and from what noise takes off H1 or adds to H2
         (what all taps share, such as a record that ends too early, is not in it; NaN if the noise is not known);
-        ``force`` (frequency), the mean amplitude spectrum [N s]; attributes ``averages``, ``method``, ``rate``. Of a
-        file ``H``, and ``coherence`` if it holds one for each; of each channel ``node`` and ``direction``,
-        ``reference`` and ``reference_direction`` (where it is struck), and, if the file has nodes, ``place`` and
-        ``struck`` (channel, axis) [m]; attribute ``notes``. `fi.Modes.from_frf`, `fi.update` and `fi.matched` take it.
+        ``force`` (frequency), the mean amplitude spectrum [N s], and ``force_error`` (frequency), the part of the
+        relative error that is noise of the force, which a force window makes alike in neighbouring lines; attributes
+        ``averages``, ``method``, ``rate``. Of a file ``H``, and ``coherence`` if it holds one for each; of each channel
+        ``node`` and ``direction``, ``reference`` and ``reference_direction`` (where it is struck), and, if the file has
+        nodes, ``place`` and ``struck`` (channel, axis) [m]; attribute ``notes``. `fi.Modes.from_frf`, `fi.update` and
+        `fi.matched` take it.
 
     Raises
     ------
@@ -125,6 +127,7 @@ def frf(
             "coherence": (("frequency", "channel"), coherence),
             "error": (("frequency", "channel"), error),
             "force": ("frequency", np.sqrt(ff[:, 0]), {"units": "N s"}),
+            "force_error": ("frequency", np.sqrt(shares[0][:, 0] / taps.n_taps)),
         },
         {
             "frequency": ("frequency", np.fft.rfftfreq(count, 1.0 / taps.rate), {"units": "Hz"}),
@@ -134,6 +137,7 @@ def frf(
         {
             "averages": taps.n_taps, "method": method, "rate": taps.rate,
             "added_damping": 0.0 if response_window is None else 1.0 / response_window,
+            "force_window": 0.0 if force_window is None else force_window,
         },
     )  # fmt: skip
 

@@ -2,7 +2,7 @@
 
     python studies/verification/measured_bodies.py [--bodies 30] [--blows 10] [--first 0] [--out DIR]
 
-Steel bars (free, clamped, hinged), disks (free, clamped, hinged) and hinged plates of random size and damping are tapped
+Steel bars and disks (free, clamped or hinged) and hinged plates, of random size and damping, are tapped
 five times at a random point by a light hammer; `fi.measure` records force and acceleration at 25.6 kHz with 24 bits and
 noise of 1e-3 of the peaks, `fi.frf` makes a response of them, and `fi.Modes.from_frf` a body, once without picking and
 once of the modes at its peaks. Random strikers meet the two bodies and the true one, of all its modes, at that point.
@@ -33,6 +33,7 @@ STEEL = fi.Material(E=210e9, nu=0.3, rho=7850.0)
 QUANTITIES = "force", "contact_time", "impulse", "n_impacts"
 WAYS = "followed", "picked"
 TOLERANCE = 1e-2
+MOST_IMPACTS = 5  # a light bar and its striker may go on hitting each other for half a minute
 
 
 def known(rng: np.random.Generator, seed: int) -> tuple[str, fi.Modes]:
@@ -83,7 +84,8 @@ def struck(body: fi.Modes, striker: fi.Striker, law: fi.Contact, tolerance: floa
     """A blow at 1 m/s, without a warning if its tolerance is missed."""
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", fi.ToleranceWarning)
-        return fi.strike(body, striker, law, at=[0.0], speed=1.0, tolerance=tolerance, quantity=QUANTITIES)
+        asked = {"tolerance": tolerance, "quantity": QUANTITIES, "max_impacts": MOST_IMPACTS}
+        return fi.strike(body, striker, law, at=[0.0], speed=1.0, **asked)
 
 
 def judged(found: fi.Response, truth: fi.Response) -> Iterator[tuple[str, float]]:
@@ -103,10 +105,7 @@ def rows_of(seed: int, n_blows: int) -> Iterator[dict[str, Any]]:
     for way in WAYS:
         start = time.process_time()
         try:
-            bodies[way] = fi.Modes.from_frf(
-                frf, mass=body.mass, points=[[0.0]], driving=0, pick=way == "picked",
-                free=True if way == "picked" and body.n_rigid else None,
-            )  # fmt: skip
+            bodies[way] = fi.Modes.from_frf(frf, mass=body.mass, points=[[0.0]], driving=0, pick=way == "picked")
         except ValueError as refused:
             print(f"  {seed} {way}: {str(refused)[:110]}")
         print(f"  {seed} {kind} {way} {time.process_time() - start:.1f} s", flush=True)
@@ -129,8 +128,10 @@ def told(rows: list[dict[str, Any]]) -> None:
     for way in WAYS:
         for again in (False, True):
             mine = [row for row in rows if row["way"] == way and (row["impacts"] > 1 or not again)]
+            if not mine:
+                continue
             held = np.array([[row[q] <= row[f"{q}_stated"] for q in QUANTITIES] for row in mine]).reshape(-1, 4)
-            sizes = np.median([(row["force_stated"], row["force"]) for row in mine] or [(np.nan,) * 2], axis=0)
+            sizes = np.median([(row["force_stated"], row["force"]) for row in mine], axis=0)
             shares = [f"{100.0 * share:.1f} %" for share in [*held.mean(axis=0), held.all(axis=1).mean()]]
             met = sum(row["met"] for row in mine)
             name = f"{way}{', hit again' if again else ''}"

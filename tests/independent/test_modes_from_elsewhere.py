@@ -29,7 +29,7 @@ def test_modes_picked_from_a_tap_say_how_well_they_are_known(kind):
         found, error = blow(seed, kind, 5, "responses")
         told = judged(found, error)
         assert told["covered"] and not told["silent"], (seed, found.verdict, error)
-        assert "shapes but as picked" in found.verdict
+        assert "shapes but as measured" in found.verdict
 
 
 @pytest.mark.slow

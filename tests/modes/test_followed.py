@@ -5,6 +5,7 @@ import pytest
 import xarray as xr
 
 import fem_impact as fi
+from fem_impact.impact import distance
 from fem_impact.modes import followed
 
 AT = [0.0]
@@ -56,11 +57,29 @@ def test_a_blow_errs_less_than_it_states(body):
     for mass, duration in ((0.02, 1e-3), (0.3, 4e-3), (0.1, 2e-2)):
         striker, law = fi.Striker.rigid(mass), fi.Contact.linear(mass * (np.pi / duration) ** 2)
         hits = [fi.strike(modes, striker, law, at=AT, speed=1.0, tolerance=0.1) for modes in (body, known())]
-        for quantity in ("peak_force", "contact_time", "impulse"):
-            one, two = (getattr(hit, quantity) for hit in hits)
+        for quantity in ("force", "contact_time", "impulse"):
+            one, two = (distance.value_of(hit, quantity, None) for hit in hits)
             allowed = hits[0].error.of_quantity(quantity) + hits[1].error.of_quantity(quantity)
             assert abs(one / two - 1.0) <= allowed < 0.1
-        assert "shapes" in hits[0].verdict
+        assert 0.0 < hits[0].error.measurement < 0.05
+
+
+@pytest.mark.slow
+def test_hammers_tests_and_maps_take_it_and_count_what_was_measured(body):
+    light, heavy = fi.hammers.choose(body, AT, 500.0, masses=[2e-3, 3.0])
+    one, two = fi.hammers.choose(known(), AT, 500.0, masses=[2e-3, 3.0])
+    assert (light.works, heavy.works) == (one.works, two.works)
+    assert light.softest == pytest.approx(one.softest, rel=0.02)  # ends are found to 1e-3, the body is known to 1e-3
+    plan = fi.plan_test(body, {"steel": (0.02, {"hard": 2e6})}, [AT], 1000.0)
+    assert (
+        plan.n_impacts.tolist()
+        == fi.plan_test(known(), {"steel": (0.02, {"hard": 2e6})}, [AT], 1000.0).n_impacts.tolist()
+    )
+    blow = {"at": AT, "speed": 1.0, "tolerance": 0.1}
+    law = fi.Contact.linear(0.02 * (np.pi / 1e-3) ** 2)
+    table = fi.sweep(body, fi.Striker.rigid(0.02), law, over={"mass": [0.01, 0.02]}, **blow)
+    hit = fi.strike(body, fi.Striker.rigid(0.02), law, **blow)
+    assert float(table.truncation[1]) >= hit.error.measurement > 1e-4
 
 
 def test_another_point_moves_as_measured_there(body):
@@ -85,7 +104,7 @@ def test_sums_are_passive_whatever_the_response():
     body = followed_body(measured(known(), scale=np.exp(0.5j)))
     assert (body.damping_ratio >= 0.0).all()
     left = [float(note.split("leaves ")[1].split(" %")[0]) for note in body.notes if "leaves" in note]
-    assert left[0] > 20.0
+    assert 15.0 < left[0] < 50.0
     assert body.shapes.spread(np.array([AT])).max() > 0.2
 
 

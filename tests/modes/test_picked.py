@@ -63,7 +63,7 @@ def test_errors_of_picked_shapes_cover_them_and_reach_the_blow(plate):
         assert spread[i] < 0.5
     blow = {"at": POINTS[0], "speed": 1.0, "tolerance": 1e-1}
     hits = [fi.strike(modes, fi.Striker.rigid(0.02), fi.Contact.linear(1e4), **blow) for modes in (found, plate)]
-    assert "shapes but as picked" in hits[0].verdict
+    assert "shapes but as measured" in hits[0].verdict
     assert abs(hits[0].restitution - hits[1].restitution) <= hits[0].error.total + hits[1].error.total
     assert found.scaled(mass=0.3).shapes.spread(POINTS[:1]) == pytest.approx(spread[None, None])
 
