@@ -95,7 +95,7 @@ def test_a_shell_of_our_own_comes_back_with_its_blow(n_modes):
     shapes, static = np.zeros((len(nodes), 3, n_modes)), np.zeros((len(nodes), 3, 1))
     shapes[:, 2] = few.shape_at(nodes[:, :2])
     static[:, 2, 0] = few.shapes.deflection(nodes[[row], :2], nodes[:, :2])[:, 0]
-    law = fi.Contact.linear(2e4)
+    law = fi.Contact.linear(5e5)
     truth = fi.strike(
         system, fi.Striker.rigid(0.05), law, at=nodes[row, :2], speed=1.0, tolerance=1e-3, damping_ratio=0.01
     )
@@ -110,6 +110,8 @@ def test_a_shell_of_our_own_comes_back_with_its_blow(n_modes):
             one, two = getattr(found, name), getattr(truth, name)
             assert abs(one - two) <= (found.error.total + truth.error.total) * (1.0 if name == "restitution" else two)
         assert ("not stated of the target: static compliance" in found.verdict) is not known
+        # measured: 0.39, 0.079 and 0.012 without the static solution, 0.37, 0.026 and 2.7e-4 with it
+        assert found.error.total < {5: 0.5, 20: 0.1, 100: 1e-3 if known else 0.02}[n_modes]
 
 
 def test_the_same_body_turned_in_space_has_the_same_blow():
