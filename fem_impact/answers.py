@@ -85,7 +85,7 @@ KEYS: dict[str, Keys] = {
         "bandwidth": ("number?", "bandwidth to reach [Hz]"),
         "drop": ("number?", "how far the spectrum may fall within it [dB]"),
         "hammers": ("array?", "of each its mass [kg], reach [Hz], and tips [N/m] that hit once, or that also reach it"),
-        "table": ("object?", "with --rove: columns with a row for every point and tip"),
+        "table": ("object?", "with --rove or --catalogue: columns with a row for every point and tip"),
         "verdicts": ("array?", "with --rove: of every point whether a tip works, or why none does"),
         "resolution": ("number?", "with --rove: frequency resolution [Hz]"),
     },
@@ -160,6 +160,7 @@ EXAMPLES: dict[str, tuple[str, ...]] = {
     "hammer": (
         "fem-impact hammer studies/scenes/drumstick.toml --bandwidth 800",
         "fem-impact hammer studies/scenes/drumstick.toml --bandwidth 800 --rove 12 --out out",
+        "fem-impact hammer studies/scenes/drumstick.toml --bandwidth 300 --catalogue --out out",
     ),
     "watch": ("fem-impact watch records --bandwidth 2000", "fem-impact watch records --bandwidth 2000 --once",),
     "report": ("fem-impact report studies/scenes/drumstick.toml", "fem-impact report out --out page.html"),

@@ -194,7 +194,9 @@ COMMANDS = {
                 default=10.0),
         _option("--masses", "KG", "masses of the hammers [kg] (default: 1 g to 1 kg)", float, nargs="+"),
         _option("--rove", "N", "plan a test of about N points over the body, the sensor at the strike point", int),
-        _out("hammers.png, or rove.png and .csv", "none", "picture"),
+        _option("--catalogue", "WORDS", "which hammer and tip of the catalogue, of those with WORDS in their names: "
+                "one printable sheet per point", nargs="?", const=""),
+        _out("hammers.png, or rove.png and .csv, or hammers.html", "none", "picture or page"),
         _format(None),
     ), "a TOML file; its body and strike point are used"),
     "watch": Command("judge every record of taps that a folder gets: good, or what to do", commands.watch, (

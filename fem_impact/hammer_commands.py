@@ -25,6 +25,8 @@ def hammer(options: argparse.Namespace) -> commands.Answer:
     scene = fi.load_scene(options.scene)
     masses = options.masses or MASSES
     notes = tips.said_of(scene)
+    if options.catalogue is not None:
+        return _sheets(options, scene, notes)
     if options.rove is not None:
         return _rove(options, scene, masses, notes)
     drawn = commands._drawn(options, "hammers.png")
@@ -77,6 +79,26 @@ def _rove(options: argparse.Namespace, scene: Any, masses: Sequence[float], note
     files = [] if drawn is None else [drawn.name, drawn.with_suffix(".csv").name]
     said = [commands._title(scene), *noted(notes), plan.summary()]
     return commands.answer({**data, "notes": [*notes, *plan.notes]}, *said, folder=drawn and drawn.parent, files=files)
+
+
+def _sheets(options: argparse.Namespace, scene: Any, notes: Sequence[str]) -> commands.Answer:
+    """Which hammers of the catalogue suit a scene, as one sheet per point."""
+    from .pages import hammer_sheet  # imported only when needed
+    from .taps import roving
+
+    if options.masses:
+        raise ValueError("--masses must be left out beside --catalogue, whose hammers have their own")
+    number = None if options.rove is None else check.count("--rove", options.rove)
+    path = commands._file(options, "hammers.html") or Path("out") / options.scene.stem / "hammers.html"
+    with commands._display(options, tells=True)("points"):
+        heaviest = scene.built.target.mass  # heavier ones load a panel so that its modes are others
+        kit = roving.catalogued(options.catalogue, options.bandwidth, options.drop, heaviest)
+        plan = roving.of_scene(scene, kit, options.bandwidth, options.drop, number)
+    with staged(path.parent) as staging:
+        hammer_sheet.write(staging / path.name, plan, title=commands._title(scene), notes=tuple(notes))
+    data = {"table": plan.table(), "verdicts": plan.verdicts, "resolution": plan.resolution}
+    said = [commands._title(scene), *noted(notes), plan.summary()]
+    return commands._answer_of_file({**data, "notes": [*notes, *plan.notes]}, said, path)
 
 
 def frf(options: argparse.Namespace) -> commands.Answer:

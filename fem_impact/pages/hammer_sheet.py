@@ -1,0 +1,86 @@
+"""Which hammer and tip of the catalogue suit a panel: one printable sheet for each point."""
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from .._base import check
+from .._base.explained import noted
+from .._base.files import replacing
+from ..show import export, plots
+from ..sweeps.hammers import catalogue
+from ..taps.roving import Roving
+from ..taps.watch import in_hertz
+from . import report
+from .fit_page import uri
+
+ROWS = 18  # [-] hammers with their tips on a sheet at most: more do not fit a page
+
+
+def verdict(plan: Roving, i: int, j: int) -> str:
+    """What one hammer and tip do at one point."""
+    if plan.n_impacts[i, j] == 0:
+        return "too hard to tell"
+    if plan.n_impacts[i, j] > 1:
+        return "double hit"
+    return "works" if plan.works[i, j] else f"too soft for {in_hertz(plan.bandwidth)}"
+
+
+def overload(plan: Roving, i: int, j: int) -> float | None:
+    """Speed [m/s] from which the force is beyond the range of a hammer of the catalogue; None: neither is known."""
+    force = catalogue[plan.hammers[j]].force if plan.hammers[j] in catalogue else None
+    peak = None if plan.peaks is None else float(plan.peaks[i, j])
+    return None if force is None or peak is None or not peak > 0.0 else force / peak
+
+
+def order(plan: Roving, i: int) -> np.ndarray:
+    """The blows at one point: those that work by their coherence, then single hits by reach, then the others."""
+    works, single = plan.works[i], plan.n_impacts[i] == 1
+    value = np.nan_to_num(np.where(works, plan.coherence[i], plan.reach[i] / plan.bandwidth - 1.0))
+    return np.lexsort((-value, np.where(works, 0, np.where(single, 1, 2))))
+
+
+def _sheet(plan: Roving, i: int) -> dict[str, Any]:
+    """One point: what to take, the table and the picture."""
+    place = f"({', '.join(f'{x:.4g}' for x in plan.points[i])}) m"
+    best, rows = int(plan.best[i]), []
+    for j in order(plan, i)[:ROWS]:
+        limit, sure = overload(plan, i, j), plan.coherence[i, j]
+        rows.append((
+            plan.hammers[j], plan.tips[j], f"{1e3 * plan.masses[j]:.4g} g",
+            "" if np.isnan(plan.reach[i, j]) else in_hertz(float(plan.reach[i, j])),
+            "" if np.isnan(sure) else f"{sure:.3f}", "" if limit is None else f"{limit:.2g} m/s", verdict(plan, i, j),
+        ))  # fmt: skip
+    words = []
+    if best >= 0:
+        take = f"Take {plan.hammers[best]} with its {plan.tips[best]} tip"
+        limit = overload(plan, i, best)
+        reach, sure = in_hertz(float(plan.reach[i, best])), plan.coherence[i, best]
+        words.append(f"It hits once, reaches {reach} at {plan.drop:g} dB down; expected mean coherence {sure:.3f}.")
+        words += [f"Its range is exceeded above {limit:.2g} m/s."] if limit is not None else []
+    else:
+        take = f"None of these: {plan.verdicts[i]}"
+    double = sum(plan.n_impacts[i] > 1)
+    words.append(f"{int(plan.works[i].sum())} of {len(plan.tips)} pairs of hammer and tip work; {double} hit twice.")
+    words.append(f"Records of {plan.duration:.3g} s resolve {plan.resolution:.3g} Hz.")
+    figure = plots.places(plan.modes, {"struck here": plan.points[i : i + 1]}, {}, plan.sensor, place)
+    return {"at": place, "take": take, "words": words, "rows": rows, "picture": uri(figure)}
+
+
+@check.typed
+def write(path: str | Path, plan: Roving, *, title: str, notes: tuple[str, ...] = ()) -> None:
+    """Write the sheets of a plan; needs the extra ``web``. Printed, each point has a page of its own."""
+    check.extra("jinja2", "web", "a page")
+    tiles: Mapping[str, str] = {
+        "bandwidth": in_hertz(plan.bandwidth), "drop": f"{plan.drop:g} dB", "points": str(len(plan.points)),
+        "points that work": str(sum(each >= 0 for each in plan.best)), "pairs tried": str(len(plan.tips)),
+    }  # fmt: skip
+    page = report.template("sheet.html").render(
+        title=title, notes=noted((*notes, *plan.notes)), tiles=list(tiles.items()), versions=export.versions(),
+        sheets=[_sheet(plan, i) for i in range(len(plan.points))],
+        style=(report.WEB / "report.css").read_text(encoding="utf-8"),
+    )  # fmt: skip
+    with replacing(path) as temporary:
+        temporary.write_text(page, encoding="utf-8")
