@@ -49,6 +49,7 @@ from .scenes.uncertainty import spread as spread
 from .show import export as export
 from .show import figures as figures
 from .show import pictures as pictures
+from .show import slow_motion as slow_motion
 from .show import sound as sound
 from .sweeps import hammers as hammers
 from .sweeps.borders import read_borders as read_borders

@@ -143,6 +143,7 @@ COMMANDS = {
         _flag("--band", "also strike with numbers as well as the scene says they are known, { value, about }, and "
               "print what they leave open"),
         _flag("--pictures", "write 3-D pictures of the mode shapes and the wave, as PNG and GIF"),
+        _flag("--film", "write slow_motion.mp4, body and striker beside the force, and its captions"),
         _flag("--vtk", "write motion.pvd, the motion for ParaView and pyvista"),
         _option("--listener", ("X", "Y", "Z"), "write radiated.wav, the sound the body radiates to this point [m]; Z "
                 "is the height above its plane; repeatable; of two also stereo.wav", float, nargs=3, action="append"),

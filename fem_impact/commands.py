@@ -63,7 +63,8 @@ def _file(options: argparse.Namespace, name: str) -> Path | None:
 
 def strike(options: argparse.Namespace) -> Answer:
     """Strike and write."""
-    from .impact import promise  # imported only when needed
+    from ._base import check  # imported only when needed
+    from .impact import promise
     from .model.target import Stages
     from .scenes import band
     from .show.painter import Painter
@@ -74,13 +75,16 @@ def strike(options: argparse.Namespace) -> Answer:
         scene = scene.heard_from(*options.listener)
     if options.band:
         band.check_known(scene)
+    if options.film:
+        check.extra("imageio_ffmpeg", "film", "an MP4 file")
     if scene.stroke:
         return _strike_in_turn(options, scene)
     folder, display = _folder(options), _display(options, tells=True)
     with staged(folder, "strike") as staging, Painter() if options.pictures else nullcontext() as painter:
         place = folder.resolve()  # "." has no name of its own
         keep = place.parent / f"{place.name}.modes.npz"  # not in the folder: an interrupted run leaves that alone
-        motion, before = options.pictures or options.vtk, partial(_announce, options, display, options.verify, True)
+        motion = options.pictures or options.vtk or options.film
+        before = partial(_announce, options, display, options.verify, True)
         run = scene.run(display, before=before, verify=options.verify, motion=motion, keep=keep, **_choices(options))
         display.predict(run.plan.ringing or None)
         if options.strict:
@@ -145,6 +149,10 @@ def _write(
                 times = [end * i / 99 for i in range(100)]
                 fi.export.write_vtk(folder / "motion.pvd", response.target, response, times)
             files.append("motion.pvd")
+        if options.film:
+            with stages("film"):
+                fi.slow_motion.write(folder / "slow_motion.mp4", response)
+            files += ["slow_motion.mp4", "slow_motion.vtt"]
         if drawn:
             with stages("pictures"):
                 missing = painter.finish()
@@ -191,7 +199,7 @@ def _strike_in_turn(options: argparse.Namespace, scene: Any) -> Answer:
     from .model.target import Stages  # imported only when needed
     from .scenes import sequence
 
-    given = {"verify": options.verify, "pictures": options.pictures, "vtk": options.vtk, "target": options.target}
+    given = {name: getattr(options, name) for name in ("verify", "pictures", "film", "vtk", "target")}
     wrong = next((name for name, value in given.items() if value), None)
     if wrong:
         raise ValueError(f"--{wrong} must be left out for a scene with strokes")

@@ -63,7 +63,8 @@ INNER = {
     "ToleranceWarning", "analytic.closed_form", "Striker.let_go",
     "Rib.distances", "Rib.rigidity", "Rib.turning",
     "Taps", "Taps.summary",  # made by read_taps and Taps.from_arrays
-    "pictures.gallery", "pictures.film", "figures.chladni", "hammers.choose_on",
+    "pictures.gallery", "pictures.film", "pictures.encode", "pictures.frames_at", "slow_motion.Caption",
+    "slow_motion.subtitles", "slow_motion.write", "figures.chladni", "hammers.choose_on",
     "Modes", "sound.Sound.audible", "sound.Sound.normalised", "sound.Sound.faded", "sound.Sound.wav",
     "hammers.Hammer.data",
 }  # fmt: skip
@@ -407,6 +408,7 @@ def stated() -> dict[str, dict[str, Any]]:
         "report.write": {"path": folder / "report.html", "scene": t["scene"], "run": t["run"]},
         "pictures.mode_shapes": {"path": folder / "modes.png", "modes": t["modes"], "count": 2, "columns": 2},
         "pictures.wave": {"path": folder / "wave.png", **hit, "time": 1e-3},
+        "slow_motion.captions": hit,
         "pictures.animation": {"path": folder / "wave.gif", **hit, "frames": 2},
     }  # fmt: skip
 

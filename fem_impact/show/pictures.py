@@ -113,7 +113,7 @@ def wave(path: str | Path, response: Response, *, time: float | None = None) -> 
     _ending(path, *STILL)
     times = np.linspace(0.0, sampling.end_of(response), FRAMES)
     instant = times[sampling.telling(response, times)] if time is None else check.non_negative("time", time, "s")
-    (frame,) = _frames(response, np.array([instant]))
+    (frame,) = frames_at(response, np.array([instant]))
     canvas.write(path, frame)
     return "" if can_render() else REMEDY
 
@@ -139,13 +139,13 @@ def animation(path: str | Path, response: Response, *, frames: int = FRAMES) -> 
     times = np.linspace(0.0, sampling.end_of(response), check.count("frames", frames, low=2, high=sampling.MOST_FRAMES))
     if encoder is not None:
         with replacing(path) as temporary:
-            _encode(encoder, temporary, _frames(response, times))
+            encode(encoder, temporary, frames_at(response, times))
         return "" if can_render() else REMEDY
-    canvas.write_gif(path, list(_frames(response, times)))
+    canvas.write_gif(path, list(frames_at(response, times)))
     return "" if can_render() else REMEDY
 
 
-def _encode(encoder: Any, path: Path, pictures: Iterator[Image.Image]) -> None:
+def encode(encoder: Any, path: Path, pictures: Iterator[Image.Image]) -> None:
     """Write H.264, which every browser and slide program plays; it needs even numbers of pixels."""
     first = next(pictures)
     size = first.width // 2 * 2, first.height // 2 * 2
@@ -179,7 +179,7 @@ def film(response: Response, times: np.ndarray | None = None) -> canvas.Film:
     return canvas.Film(plane, cells, boundary(cells), at, motion / largest, gap / largest, titles, telling, *shape)
 
 
-def _frames(response: Response, times: np.ndarray) -> Iterator[Image.Image]:
+def frames_at(response: Response, times: np.ndarray) -> Iterator[Image.Image]:
     """Pictures of the body at the given times [s], all on the same scale."""
     shown = film(response, times)
     if can_render():

@@ -8,6 +8,8 @@ from typing import Any
 import matplotlib
 import numpy as np
 from cycler import cycler
+from matplotlib import font_manager
+from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
 from matplotlib.ticker import EngFormatter
@@ -80,3 +82,16 @@ def draw_rim(axes: Any, plane: np.ndarray, cells: np.ndarray) -> None:
     """Draw the outline of triangles, to scale."""
     axes.add_collection(LineCollection(list(plane[boundary(cells)]), colors=GREY, linewidths=1.0))
     axes.set_aspect("equal")
+
+
+def pixels(figure: Figure, dpi: float) -> np.ndarray:
+    """A figure as it would be saved, (height, width, 3) from the upper left; its axes are laid out afterwards."""
+    figure.set_dpi(dpi)
+    canvas = FigureCanvasAgg(figure)
+    canvas.draw()
+    return np.asarray(canvas.buffer_rgba())[..., :3].copy()
+
+
+def font_file() -> str:
+    """The file of the letters of all figures, for text in pictures by other means."""
+    return str(font_manager.findfont("DejaVu Sans"))
