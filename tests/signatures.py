@@ -153,6 +153,9 @@ def things() -> dict[str, Any]:
     triangle.save(folder / "body")
     return {
         "body": known_body, "triangle": triangle,
+        "rung": fi.strike(
+            triangle.modes("z", free=False), striker, fi.Contact.linear(1e4), at=triangle.at(1), speed=0.2,
+            tolerance=1.0),
         "map": few, "taps": taps, "responses": responses, "file of taps": folder / "taps.npz", "bar": bar,
         "metal": metal, "plate": plate, "beam": beam, "square": square, "modes": modes, "striker": striker, "law": law,
         "sphere": fi.Striker.sphere(metal, 0.01), "free": fi.Modes.rigid(1.0), "folder": folder, "path": path,
@@ -246,6 +249,7 @@ def stated() -> dict[str, dict[str, Any]]:
             "damping_ratio": 0.01, "modal_mass": [1.0], "names": {"a": 1}, "normals": [[0.0, 0.0, 1.0]] * 3},
         "Body.save": {"self": t["triangle"], "path": t["folder"] / "again"},
         **alike("Body.node Body.at", {"self": t["triangle"], "where": 1}),
+        "Body.along": {"self": t["triangle"], "where": 1, "direction": "z"},
         "Body.modes": {"self": t["triangle"], "direction": (0.0, 0.0, 1.0), "free": False},
         "Body.displacement": {"self": t["triangle"], "q": [[1.0]], "where": [(0.0, 0.0, 0.0)]},
         "Modes.from_arrays": {"frequencies": [0.0, 10.0], "shapes": [[1.0, 0.5], [1.0, -0.5]],
@@ -372,6 +376,8 @@ def stated() -> dict[str, dict[str, Any]]:
         "figures.force": {**hit, "band": (10.0, 1e3)},
         **alike("pictures.chladni figures.mode_shapes", {"modes": t["modes"], "count": 2, "columns": 2}),
         "figures.mobility": {"modes": t["modes"], "at": at, "to": at, "band": (10.0, 1e3)},
+        "sound.of_node": {"response": t["rung"], "body": t["triangle"], "where": 1, "direction": "z", "duration": 0.01,
+                          "rate": 8000},
         "sound.synthesise": {**hit, "at": at, "duration": 0.01, "rate": 8000},
         "sound.together": {"sounds": [t["tone"], t["tone"]]},
         **alike("sound.radiate sound.radiate_free", {**hit, "listener": (0.1, 0.1, 1.0), "duration": 0.01,

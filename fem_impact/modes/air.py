@@ -320,7 +320,9 @@ class _Air:
         middle, half = 0.5 * (band[0] + band[1]), 0.5 * (band[1] - band[0])
         # interpolated from n Chebyshev nodes, cos(k R) errs by 4 Bessel functions J_n(k R) and less, k of half the band
         reach = half / self.speed * self.distance.max()
-        count = int(np.flatnonzero(jv(np.arange(2.0 * reach + 20.0), reach) > SAME)[-1]) + 1
+        count = max(
+            2, int(np.flatnonzero(jv(np.arange(2.0 * reach + 20.0), reach) > SAME)[-1]) + 1
+        )  # one alone has no span
         nodes = middle + half * np.cos(np.pi * (np.arange(count) + 0.5) / count)
         spectrum = rfft2(self.strength[window], self.padded)
         added = BarycentricInterpolator(nodes, [self._added(self.strength[window], spectrum, node) for node in nodes])

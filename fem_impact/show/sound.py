@@ -215,11 +215,14 @@ def of_node(
     >>> round(float(np.abs(along.samples).max() / np.abs(across.samples).max()), 3)
     12.0
     """
-    shape = np.zeros(response.target.n_modes)
-    own = body.along(where, direction)
-    if len(own) > len(shape):
-        raise ValueError(f"response must be of a blow on this body of {len(own)} modes, got one on {len(shape)}")
-    shape[len(shape) - len(own) :] = own  # rigid motions that were added come first
+    own, known = body.along(where, direction), response.target.frequencies
+    shape = np.zeros(len(known))
+    first = len(shape) - len(own)  # rigid motions that were added come first
+    if first < 0 or not np.allclose(known[first:], body.frequencies):
+        raise ValueError(
+            f"response must be of a blow on this body of {len(own)} modes, got one on {len(shape)}; strike body.modes()"
+        )
+    shape[first:] = own
     return _moving(response, shape, duration, rate, normalise)
 
 
