@@ -66,9 +66,8 @@ def test_a_blow_errs_less_than_it_states(body):
 
 @pytest.mark.slow
 def test_hammers_tests_and_maps_take_it_and_count_what_was_measured(body):
-    light, heavy = fi.hammers.choose(body, AT, 500.0, masses=[2e-3, 3.0])
-    one, two = fi.hammers.choose(known(), AT, 500.0, masses=[2e-3, 3.0])
-    assert (light.works, heavy.works) == (one.works, two.works)
+    (light,), (one,) = (fi.hammers.choose(modes, AT, 500.0, masses=[2e-3]) for modes in (body, known()))
+    assert light.works and one.works
     assert light.softest == pytest.approx(one.softest, rel=0.02)  # ends are found to 1e-3, the body is known to 1e-3
     plan = fi.plan_test(body, {"steel": (0.02, {"hard": 2e6})}, [AT], 1000.0)
     assert (
