@@ -66,9 +66,8 @@ def test_a_blow_errs_less_than_it_states(body):
 
 @pytest.mark.slow
 def test_hammers_tests_and_maps_take_it_and_count_what_was_measured(body):
-    light, heavy = fi.hammers.choose(body, AT, 500.0, masses=[2e-3, 3.0])
-    one, two = fi.hammers.choose(known(), AT, 500.0, masses=[2e-3, 3.0])
-    assert (light.works, heavy.works) == (one.works, two.works)
+    (light,), (one,) = (fi.hammers.choose(modes, AT, 500.0, masses=[2e-3]) for modes in (body, known()))
+    assert light.works and one.works
     assert light.softest == pytest.approx(one.softest, rel=0.02)  # ends are found to 1e-3, the body is known to 1e-3
     plan = fi.plan_test(body, {"steel": (0.02, {"hard": 2e6})}, [AT], 1000.0)
     assert (
@@ -77,7 +76,7 @@ def test_hammers_tests_and_maps_take_it_and_count_what_was_measured(body):
     )
     blow = {"at": AT, "speed": 1.0, "tolerance": 0.1}
     law = fi.Contact.linear(0.02 * (np.pi / 1e-3) ** 2)
-    table = fi.sweep(body, fi.Striker.rigid(0.02), law, over={"mass": [0.01, 0.02]}, **blow)
+    table = fi.sweep(body, fi.Striker.rigid(0.02), law, over={"mass": [0.01, 0.02]}, workers=1, **blow)
     hit = fi.strike(body, fi.Striker.rigid(0.02), law, **blow)
     assert float(table.truncation[1]) >= hit.error.measurement > 1e-4
 
