@@ -83,6 +83,8 @@ def notebooks(folder):
 def build(out, *, heard=False):
     """Build the site into a folder; return what Sphinx and the links have to complain about."""
     names.lend()
+    if (out / ".buildinfo").exists():  # an earlier site, whose pages may be gone
+        shutil.rmtree(out)
     with tempfile.TemporaryDirectory() as room:
         pages = Path(room) / "pages"
         pages.mkdir()

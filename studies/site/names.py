@@ -2,6 +2,8 @@
 
 import inspect
 import sys
+from operator import attrgetter
+from textwrap import indent
 from types import ModuleType
 
 import api
@@ -9,16 +11,16 @@ import api
 import fem_impact as fi
 
 TASKS = {
-    "Make a body": "Material Plate Beam Rib Elastic assemble yield_strength mesh rise",
+    "Make a body": "Material Plate Beam Rib Elastic assemble yield_strength mesh rise materials",
     "Find its modes": "find_modes ritz_modes Modes Body analytic rayleigh in_air mobility mac matched",
-    "Choose what strikes it": "Striker Hand Contact Touch",
+    "Choose what strikes it": "Striker strikers Hand Contact Touch",
     "Strike": "strike collide strokes plan Plan Response Impact Gradient load_response threshold "
-    "threshold_frequency SimulationError ToleranceWarning",
+    "threshold_frequency verify SimulationError ToleranceWarning",
     "Scenes, maps, uncertain inputs": "Scene load_scene sweep read_borders spread band",
     "Hammers and measured taps": "hammers plan_test Taps read_taps measure fit propose frf update",
     "Design": "design",
     "See and hear": "figures pictures sound spectra",
-    "Pages and files": "report explore export",
+    "Pages and files": "report lesson explore export",
 }
 REST = "More"  # what no task names yet
 HEAD = """# Public names
@@ -46,8 +48,10 @@ def entries(name):
 
 def told(path):
     """What Sphinx is to read for one function or class."""
-    kind = "autofunction"
-    if inspect.isclass(item := getattr(fi, path, None)):
+    kind, item = "autofunction", attrgetter(path)(fi)
+    if not callable(item):  # a table by name
+        return f"```{{eval-rst}}\n.. py:data:: fi.{path}\n\n{indent(inspect.getdoc(item) or '', '   ')}\n```\n"
+    if inspect.isclass(item):
         kind = "autoexception" if issubclass(item, Exception) else "autoclass"
     members = "   :members:\n" if kind == "autoclass" else ""
     return f"```{{eval-rst}}\n.. {kind}:: fi.{path}\n{members}```\n"
