@@ -265,7 +265,7 @@ class Striker(check.Brief):
 
     @classmethod
     def of(
-        cls, body: Body, at: Any, *, direction: Any = "normal", along: Any = None, pivot: Any = None,
+        cls, body: Body, where: Any, *, direction: Any = "normal", along: Any = None, pivot: Any = None,
         material: Material | None = None, radius: float | None = None,
     ) -> "Striker":  # fmt: skip
         """A body of another program, such as a bat or a hammer; its rigid motions are among its modes.
@@ -273,7 +273,7 @@ class Striker(check.Brief):
         Parameters
         ----------
         body : Body
-        at : node, by number, name or point (3,) [m], that strikes
+        where : node, by number, name or point (3,) [m], that strikes
         direction : "normal", "x", "y", "z" or a vector (3,)
             From this body into the struck one, square to both at their contact.
         along : vector (3,), optional
@@ -299,7 +299,7 @@ class Striker(check.Brief):
         [0.0, 0.0, 0.0]
         """
         check.instance("body", body, Body)
-        way, row = body.way(at, direction), body.node(at)
+        way, row = body.way(where, direction), body.node(where)
         coming = free_body.arrival(body, row, way, along, pivot)
         aslant = along is not None or pivot is not None
         return cls(body.modes(way), body.nodes[row, body.axes], material, radius, arrival=coming, aslant=aslant)

@@ -11,6 +11,7 @@ if TYPE_CHECKING:
 
 FITS = 1e-2  # [-] misfit of a rigid motion, or of the mass it moves: as many digits as programs and tests agree to
 ALLOWED = 1e-6  # [-] by which the largest moment of inertia may exceed the sum of the others: a plate's does not
+GYRATION = 1e-18, 1e18  # [m^2] inertia over mass, of bodies from some atoms to a star
 THIN = 1e-9  # [-] moment of inertia over the largest: less is none, as of a rod about its own axis
 
 
@@ -36,6 +37,7 @@ def six(nodes: np.ndarray, mass: float, inertia: Any, centre: Any) -> np.ndarray
             "inertia must be that of a body, symmetric and positive and none of its principal moments larger than the "
             f"sum of the others, got {', '.join(f'{each:.4g}' for each in size)} kg m^2"
         )
+    check.between("inertia over mass", float(size[2] / mass), *GYRATION, "m^2")
     apart = nodes - check.array("centre", centre, (3,), "m")
     turns = [np.cross(axis, apart) / np.sqrt(each) for each, axis in zip(size, axes.T) if each > THIN * size[2]]
     straight = np.broadcast_to(np.eye(3) / np.sqrt(mass), (len(nodes), 3, 3))
@@ -88,7 +90,10 @@ def arrival(body: "Body", row: int, way: np.ndarray, along: Any, pivot: Any) -> 
 
 def _fitted(shapes: np.ndarray, field: np.ndarray) -> tuple[np.ndarray, float]:
     """Modal velocities (n,) that move nodes as a field (n_nodes, 3), and the misfit [-]."""
-    found = np.linalg.lstsq(shapes.reshape(-1, shapes.shape[2]), field.ravel(), rcond=1e-9)[0]
+    columns = shapes.reshape(-1, shapes.shape[2])
+    size = np.linalg.norm(columns, axis=0)
+    size[size == 0.0] = 1.0
+    found = np.linalg.lstsq(columns / size, field.ravel(), rcond=1e-9)[0] / size
     return found, float(np.abs(shapes @ found - field).max() / np.abs(field).max())
 
 
