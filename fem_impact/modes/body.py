@@ -168,6 +168,7 @@ class Body(check.Brief):
             told["names"] = dict(zip(told["names"].tolist(), told.pop("named").tolist()))
         if "cells" not in told:
             told["cells"] = told.get("triangles") if len(told.get("triangles", ())) else told.get("lines")
+        loads = None if loads is None else _forces(loads)
         given = {"mass": mass, "loads": loads, "damping_ratio": damping_ratio, "names": names, "normals": normals}
         given |= {"solid": solid, "modal_mass": modal_mass}
         told |= {name: value for name, value in given.items() if value is not None}
@@ -221,8 +222,10 @@ class Body(check.Brief):
         for name in fields:
             check.one_of("fields", name, allowed)
         told = fields | {"mass_matrix": mass, "stiffness_matrix": stiffness, "nodes": nodes, "dofs": dofs}
-        told |= {"recovery": recovery, "mass": total_mass}
-        found = told | matrices.solved(told, loads, n_modes)
+        told |= {"recovery": recovery}
+        if total_mass is not None:
+            told["mass"] = check.positive("total_mass", total_mass, "kg")
+        found = told | matrices.solved(told, None if loads is None else _forces(loads), n_modes)
         return cls(**{name: found[name] for name in imported.OWN if found.get(name) is not None})
 
     @classmethod

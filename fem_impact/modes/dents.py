@@ -68,13 +68,15 @@ class Load:
 
 def stated(solid: Any) -> Any:
     """What was said of the mesh: (E, nu) of a solid, True if its material was not, () of a shell, None if nothing."""
-    if solid is None or (np.asarray(solid).dtype == bool and np.ndim(solid) == 0):
+    truth = isinstance(solid, (bool, np.bool_)) or (isinstance(solid, np.ndarray) and solid.shape == ())
+    if solid is None or (truth and np.asarray(solid).dtype == bool):
         return None if solid is None else bool(solid) or ()
     if isinstance(solid, Material):
         if solid.E_across is not None:
             raise ValueError("solid must be an isotropic material; the dent of an orthotropic half space is not known")
         return float(solid.E), float(solid.nu)
-    if isinstance(solid, str) or np.ndim(solid) != 1 or len(solid) not in (0, 2):
+    pair = isinstance(solid, (list, tuple, np.ndarray)) and getattr(solid, "ndim", 1) == 1
+    if not pair or len(solid) not in (0, 2):
         raise ValueError(f"solid must be a Material, (E in Pa, nu), True or False (a shell), got {check.shown(solid)}")
     if not len(solid):
         return ()

@@ -101,8 +101,8 @@ def complete(told: dict[str, Any], n_modes: int | None) -> dict[str, Any]:
     order = np.argsort(told["frequencies"], kind="stable")
     told |= {"frequencies": without_rounding(np.asarray(told["frequencies"])[order]), "shapes": shapes[..., order]}
     damping = told.get("damping_ratio", 0.0)
-    if not callable(damping) and np.shape(damping) == order.shape:
-        told["damping_ratio"] = np.asarray(damping)[order]
+    if isinstance(damping, (list, tuple, np.ndarray)):
+        told["damping_ratio"] = check.array("damping_ratio", damping, order.shape)[order]
     return {name: told[name] for name in OWN if told.get(name) is not None}
 
 

@@ -46,7 +46,9 @@ def solved(told: Mapping[str, Any], loads: Any = None, n_modes: int | None = Non
     M, K = _symmetric(told)
     nodes = check.array("nodes", told.get("nodes", ()), (None, 3), "m")
     given = told.get("numbers")
-    numbers = np.arange(1, len(nodes) + 1) if given is None else np.asarray(given, int)
+    numbers = (
+        np.arange(1, len(nodes) + 1) if given is None else check.array("numbers", given, (len(nodes),)).astype(int)
+    )
     turned = _directions(told, numbers, M.shape[0])
     R = _recovery(told, turned, len(nodes), M.shape[0])
     kept = np.flatnonzero(np.asarray(abs(R).sum(axis=1)).reshape(-1, 3).any(axis=1))
@@ -111,16 +113,16 @@ def _symmetric(told: Mapping[str, Any]) -> list[Any]:
     """Mass and stiffness, checked."""
     found = []
     for kind in KINDS:
-        matrix = told.get(f"{kind}_matrix")
+        matrix: Any = told.get(f"{kind}_matrix")
         if matrix is None:
             raise ValueError(f"{kind} must be given as a matrix, too; modes need both mass and stiffness")
-        matrix = matrix if issparse(matrix) else np.asarray(matrix)
+        if hasattr(matrix, "dtype") and np.iscomplexobj(matrix):
+            raise ValueError(f"{kind} must be real; give damping as damping_ratio")
+        matrix = matrix if issparse(matrix) else check.array(kind, matrix, (None, None))
         if matrix.ndim != 2 or matrix.shape[0] != matrix.shape[1] or not matrix.shape[0]:
             raise ValueError(f"{kind} must be a square matrix, got shape {matrix.shape}")
-        if np.iscomplexobj(matrix):
-            raise ValueError(f"{kind} must be real; give damping as damping_ratio")
+        check.array(kind, matrix.tocoo().data if issparse(matrix) else matrix.ravel(), (None,))
         matrix = csc_matrix(matrix, dtype=float)
-        check.array(kind, matrix.data, (None,))
         across = float(abs(matrix - matrix.T).max())
         if across > LOPSIDED * float(abs(matrix).max()):
             raise ValueError(f"{kind} must be symmetric, but entries across its diagonal differ by {across:.3g}")
@@ -250,12 +252,15 @@ def _forces(numbers: np.ndarray, loads: Any) -> np.ndarray:
 
 def _at_kept(told: Mapping[str, Any], kept: np.ndarray, n: int) -> dict[str, Any]:
     """Cells and normals of the nodes kept."""
+    if len(kept) == n:
+        return {}
     place = np.full(n, -1)
     place[kept] = np.arange(len(kept))
     found: dict[str, Any] = {}
     if told.get("cells") is not None and len(told["cells"]):
-        cells = place[np.asarray(told["cells"], int)]
+        given = check.array("cells", told["cells"], (None, None)).astype(int)
+        cells = place[given[(given >= 0).all(axis=1) & (given < n).all(axis=1)]]
         found["cells"] = cells[(cells >= 0).all(axis=1)]
     if told.get("normals") is not None:
-        found["normals"] = np.asarray(told["normals"])[kept]
+        found["normals"] = check.array("normals", told["normals"], (n, 3))[kept]
     return found

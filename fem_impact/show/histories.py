@@ -13,7 +13,7 @@ ENDINGS = (".op4", ".uff", ".unv", ".bdf", ".inp")
 MODAL = ".uff", ".unv"
 FORCE, DISPLACEMENT, VELOCITY = 13, 8, 11  # kinds of data of universal files
 EVEN = 1e-9  # [-] of the step between times by which they may differ from even ones
-ALONG = "xyz"
+ALONG, WAYS = "xyz", ("x", "y", "z", "-x", "-y", "-z")
 DIGITS = 9  # of Nastran's and Abaqus's numbers: what sixteen characters hold
 
 
@@ -57,7 +57,7 @@ def write_history(
     stamps = response.time if times is None else check.array("times", times, (None,), "s")
     if not (np.diff(stamps) > 0.0).all():
         stamps = np.unique(stamps)
-    check.one_of("direction", direction.lstrip("-"), ALONG)
+    check.one_of("direction", direction, WAYS)
     check.count("node", node)
     force = np.column_stack([response.history.force_at(stamps, i)[0] for i in range(response.history.n_contacts)])
     with replacing(path) as temporary:
@@ -66,7 +66,8 @@ def write_history(
             if ending == ".op4":
                 temporary.write_text(_op4({"TIME": stamps[:, None], "FORCE": force, **moved}), encoding="ascii")
             else:
-                names = np.arange(1, 1 + len(np.atleast_2d(at))) if numbers is None and at is not None else numbers
+                n = moved["MOVE"].shape[1] if moved else 0
+                names = np.arange(1, n + 1) if numbers is None else check.array("numbers", numbers, (n,)).astype(int)
                 _universal(temporary, stamps, force, moved, [node, direction, names])
         else:
             write = _nastran if ending == ".bdf" else _abaqus
@@ -76,7 +77,8 @@ def write_history(
 def _moved(response: Response, at: Any, times: np.ndarray) -> dict[str, np.ndarray]:
     if at is None:
         return {}
-    return {"MOVE": response.displacement(at, times), "VELO": response.velocity(at, times)}
+    points = response.target.points("at", at)
+    return {"MOVE": response.displacement(points, times), "VELO": response.velocity(points, times)}
 
 
 def _op4(matrices: dict[str, np.ndarray]) -> str:
