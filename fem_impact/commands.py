@@ -453,7 +453,7 @@ def catalogue(options: argparse.Namespace) -> Answer:
     """List what has a name, or all that is known of one."""
     from .impact import listing  # imported only when needed
 
-    data, said = listing.told(" ".join(options.words))
+    data, said = listing.listed(" ".join(options.words))
     return answer(data, *(part if isinstance(part, str) else _table(*part) for part in said))
 
 

@@ -166,9 +166,9 @@ def watch(options: argparse.Namespace) -> commands.Answer | None:
     while True:
         new = seen.judged(folder.look())
         if new and not options.once:
-            options.show(seen.answer(new))
+            options.show(seen.report_on(new))
         if options.once and not folder.waiting:
-            return seen.answer([one for each in seen.every.values() for one in each])
+            return seen.report_on([one for each in seen.every.values() for one in each])
         time.sleep(PAUSE)
 
 
@@ -217,7 +217,7 @@ class _Watched:
         said = f"{told.file}, {told.tap}: {told.said}"
         fi.figures.save(self.path, tap_pictures.watched(last, good, self.bandwidth, self.drop, said))
 
-    def answer(self, records: Sequence[Any]) -> commands.Answer:
+    def report_on(self, records: Sequence[Any]) -> commands.Answer:
         """The answer that tells some records."""
         lines = [f"{one.file}{', ' * bool(one.tap)}{one.tap}: {one.said}" for one in records]
         n_good = sum(each.n_taps for each in self.good.values())

@@ -21,7 +21,7 @@ def matching(words: str) -> dict[str, list[Entry]]:
     return {name: [section.entry(each) for each in section.find(words)] for name, section in SECTIONS.items()}
 
 
-def told(words: str) -> tuple[dict[str, Any], list[Any]]:
+def listed(words: str) -> tuple[dict[str, Any], list[Any]]:
     """What the prompt answers to some words: data, and sentences or tables (rows, head); of one entry its numbers."""
     entries = [(section, entry) for section, each in matching(words).items() for entry in each]
     exact = [pair for pair in entries if pair[1].name.lower() == words.lower()]

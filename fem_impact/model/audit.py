@@ -33,7 +33,7 @@ from .target import BOTH, Target
 
 EXAMINERS = (
     thinness.examine_target, shallowness.examine, thinness.examine_striker, deflection.examine_deflection,
-    local_contact.examine_pressure, local_contact.examine_size, local_contact.examine_time, sliding.examine,
+    local_contact.examine_pressure, local_contact.examine_size, local_contact.examine_time, sliding.examine_friction,
     still_air.examine_air, unstated_damping.examine_damping,
 )  # fmt: skip
 

@@ -36,7 +36,7 @@ class Dragged(NamedTuple):
     parting: float  # [-] relative change of the parting speed as sliding and sticking follow each other
 
 
-def examine(struck: Struck) -> Assumption:
+def examine_friction(struck: Struck) -> Assumption:
     """Striker and target, as far as their motion across the blow is known."""
     hit, history = struck.hit, struck.hit.history
     found = []

@@ -9,7 +9,7 @@ import numpy as np
 from scipy.sparse import csc_array, load_npz
 
 from .._base import check, isolated
-from . import elements, matrices
+from . import cell_kinds, matrices
 from .universal_files import PHASE
 
 FIELDS = (
@@ -121,7 +121,7 @@ def archive(path: Path) -> dict[str, Any]:
         with np.load(path, allow_pickle=False) as found:
             if "format" not in found:
                 return {name: found[name] for name in (*OWN, *MORE, "named") if name in found}
-        kind = elements.kind_of_matrix(path.stem)
+        kind = cell_kinds.kind_of_matrix(path.stem)
         if not kind:
             raise ValueError("name the matrix K..., M... or R..., to say what it is")
         return {kind if kind == "recovery" else f"{kind}_matrix": load_npz(path)}
@@ -157,7 +157,7 @@ def _pyfbs(model: Any) -> dict[str, Any]:
     found = {"frequencies": frequencies, "shapes": shapes, "nodes": nodes, "numbers": np.arange(1, len(nodes) + 1)}
     grid = model.mesh
     if grid is not None and len(grid.points) == len(nodes):
-        found |= elements.told(nodes, grid.cells_dict)
+        found |= cell_kinds.surface_and_kind(nodes, grid.cells_dict)
     return found
 
 

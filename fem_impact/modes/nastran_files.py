@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from . import elements
+from . import cell_kinds
 
 # vtk's codes of Nastran's elements, corners alone: their surface is drawn and struck, not computed with
 ELEMENTS = {
@@ -56,7 +56,7 @@ def deck(path: Path) -> dict[str, np.ndarray]:
                     raise ValueError(f"{path.name} has displacements in frame {wrong[0]}, which is not rectangular")
                 told["frames"] = np.array([model.coords[number].beta() for number in frames.tolist()])
     for name, matrix in model.dmig.items():
-        kind = elements.kind_of_matrix(name)
+        kind = cell_kinds.kind_of_matrix(name)
         if kind in ("mass", "stiffness"):
             pair = np.asarray(matrix.GCj), np.asarray(matrix.GCi)
             told[f"{kind}_entries"] = np.column_stack([*pair, np.asarray(matrix.Real, float)])
@@ -76,9 +76,9 @@ def matrices(path: Path) -> dict[str, np.ndarray]:
         found = read_op4(str(path), **quiet)
     told: dict[str, np.ndarray] = {}
     for name, matrix in found.items():
-        kind, values = elements.kind_of_matrix(name), matrix[1] if isinstance(matrix, tuple) else matrix.data
+        kind, values = cell_kinds.kind_of_matrix(name), matrix[1] if isinstance(matrix, tuple) else matrix.data
         if kind:
-            told |= elements.triplets(kind, values)
+            told |= cell_kinds.triplets(kind, values)
     if not told:
         raise ValueError(f"{path.name} must hold matrices named K... and M..., got {', '.join(found) or 'none'}")
     return told
@@ -122,7 +122,7 @@ def _elements(cards: Any, told: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
         code, corners = ELEMENTS.get(element.type, (0, 0))
         if code:
             blocks.setdefault(code, []).append([row[int(node)] for node in element.node_ids[:corners]])
-    return elements.told(told["nodes"], {code: np.array(each) for code, each in blocks.items()})
+    return cell_kinds.surface_and_kind(told["nodes"], {code: np.array(each) for code, each in blocks.items()})
 
 
 def _fields(results: Any, numbers: np.ndarray) -> dict[str, np.ndarray]:

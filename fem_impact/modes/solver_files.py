@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from ..mesh.meshio_reader import closed_hdf5
-from . import elements
+from . import cell_kinds
 
 MODAL, STATIC = 2, 0  # Ansys's kinds of analysis
 MARKET = "%%MatrixMarket"
@@ -45,7 +45,7 @@ def calculix(path: Path, deck: str = "") -> dict[str, np.ndarray]:
     found = {"nodes": np.asarray(grid.points, float)} | _steps(len(grid.points), frequencies, shapes, static)
     found |= {"numbers": np.asarray(grid.point_data["original_node_ids"], int)}
     sets = {key[5:]: np.flatnonzero(grid.point_data[key]) for key in grid.point_data if key[:5] == "NSET:"}
-    return found | _names(sets, found["numbers"]) | elements.told(found["nodes"], grid.cells_dict)
+    return found | _names(sets, found["numbers"]) | cell_kinds.surface_and_kind(found["nodes"], grid.cells_dict)
 
 
 def mesh(path: Path) -> dict[str, np.ndarray]:
@@ -58,7 +58,11 @@ def mesh(path: Path) -> dict[str, np.ndarray]:
     if len(numbers) != len(points):
         raise ValueError(f"{path.name} must hold its nodes itself, not in files that it includes")
     found = {"nodes": _spatial(points), "numbers": numbers}
-    return found | _names(read.point_sets, numbers) | elements.told(found["nodes"], elements.of_meshio(read.cells))
+    return (
+        found
+        | _names(read.point_sets, numbers)
+        | cell_kinds.surface_and_kind(found["nodes"], cell_kinds.of_meshio(read.cells))
+    )
 
 
 def med(path: Path) -> dict[str, np.ndarray]:
@@ -86,7 +90,7 @@ def med(path: Path) -> dict[str, np.ndarray]:
     names = {name: np.flatnonzero(read.point_data["point_tags"] == tag) for name, tag in _families(read)}
     numbers = np.arange(1, len(nodes) + 1)
     found = {"nodes": nodes, "numbers": numbers} | _steps(len(nodes), frequencies, shapes, static)
-    return found | _names(names, numbers) | elements.told(nodes, elements.of_meshio(read.cells))
+    return found | _names(names, numbers) | cell_kinds.surface_and_kind(nodes, cell_kinds.of_meshio(read.cells))
 
 
 def ansys(path: Path) -> dict[str, np.ndarray]:
@@ -105,7 +109,7 @@ def ansys(path: Path) -> dict[str, np.ndarray]:
     grid = own.grid
     numbers = np.asarray(grid.point_data["ansys_node_num"], int)
     found = {"nodes": np.asarray(grid.points, float), "numbers": numbers}
-    found |= elements.told(found["nodes"], grid.cells_dict)
+    found |= cell_kinds.surface_and_kind(found["nodes"], grid.cells_dict)
     if isinstance(own, reader.Archive):
         return found
     analysis, row = own._resultheader["kan"], {int(number): i for i, number in enumerate(numbers)}
@@ -127,14 +131,14 @@ def ansys(path: Path) -> dict[str, np.ndarray]:
 
 def matrix(path: Path) -> dict[str, np.ndarray]:
     """A matrix of text: of MatrixMarket, or Abaqus's by nodes and directions; its name tells which."""
-    kind = elements.kind_of_matrix(path.stem)
+    kind = cell_kinds.kind_of_matrix(path.stem)
     if not kind:
         raise ValueError(f"{path.name} must say what it is: name it K... or ...STIF..., M... or ...MASS..., or R...")
     text = path.read_text("ascii", "replace")
     if text.startswith(MARKET):
         from scipy.io import mmread
 
-        return elements.triplets(kind, mmread(path))
+        return cell_kinds.triplets(kind, mmread(path))
     lines = [line for line in text.splitlines() if line.strip() and not line.lstrip().startswith("*")]
     table = np.array([re.split(r"[,\s]+", line.strip().rstrip(",")) for line in lines], float)
     if table.ndim != 2 or table.shape[1] != 5:

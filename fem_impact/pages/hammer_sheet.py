@@ -19,7 +19,7 @@ from .fit_page import uri
 ROWS = 18  # [-] hammers with their tips on a sheet at most: more do not fit a page
 
 
-def verdict(plan: Roving, i: int, j: int) -> str:
+def tip_verdict(plan: Roving, i: int, j: int) -> str:
     """What one hammer and tip do at one point."""
     if plan.n_impacts[i, j] == 0:
         return "too hard to tell"
@@ -51,7 +51,8 @@ def _sheet(plan: Roving, i: int) -> dict[str, Any]:
         rows.append((
             plan.hammers[j], plan.tips[j], f"{1e3 * plan.masses[j]:.4g} g",
             "" if np.isnan(plan.reach[i, j]) else in_hertz(float(plan.reach[i, j])),
-            "" if np.isnan(sure) else f"{sure:.3f}", "" if limit is None else f"{limit:.2g} m/s", verdict(plan, i, j),
+            "" if np.isnan(sure) else f"{sure:.3f}", "" if limit is None else f"{limit:.2g} m/s",
+            tip_verdict(plan, i, j),
         ))  # fmt: skip
     words = []
     if best >= 0:

@@ -30,7 +30,7 @@ def questions(lesson: Lesson) -> list[Question]:
     return [each for each in asked if each is not None]
 
 
-def _told(lesson: Lesson, position: Position) -> dict[str, str]:
+def _phrases(lesson: Lesson, position: Position) -> dict[str, str]:
     """The numbers of a blow in words."""
     count, force, time, rebound = (
         float(lesson.number(name)[position]) for name in ("n_impacts", "peak_force", "contact_time", "restitution")
@@ -50,7 +50,7 @@ def _times(value: float) -> str:
 
 
 def _first(lesson: Lesson) -> Question | None:
-    told = _told(lesson, lesson.start)
+    told = _phrases(lesson, lesson.start)
     return Question(
         "Strike as the scene does. How many impacts are there, how long are they together, and how large is the force?",
         f"{told['impacts']}, {told['time']} in contact, at most {told['force']}.", lesson.start,
@@ -137,11 +137,11 @@ def _heavier(lesson: Lesson) -> Question | None:
         always = counts[mass]
         return Question(
             "Move the mass from its lowest to its highest value. Does the number of impacts change?",
-            f"It does not: {_told(lesson, lesson.start)['impacts']} at "
+            f"It does not: {_phrases(lesson, lesson.start)['impacts']} at "
             f"{'each' if (counts == always).all() else 'most'} of them.", lesson.start,
         )  # fmt: skip
     lower, upper = (
-        f"{_told(lesson, (place_, speed, stiffness, i))['impacts']} at {_mass(lesson, i)}" for i in (here, here + 1)
+        f"{_phrases(lesson, (place_, speed, stiffness, i))['impacts']} at {_mass(lesson, i)}" for i in (here, here + 1)
     )
     return Question(
         "Move the mass from its lowest to its highest value. Between which positions does the number of impacts first "
@@ -161,7 +161,7 @@ def _harder(lesson: Lesson) -> Question | None:
         f"The body stops a striker of {_mass(lesson, mass)} once the contact resonance, {si(below, 'Hz', 3)} with the "
         f"softest and {si(above, 'Hz', 3)} with the hardest contact, is above a threshold: the dashed line. How many "
         "impacts are there with the softest and with the hardest contact?",
-        f"{_told(lesson, soft)['impacts']} and {_told(lesson, hard)['impacts']}; the threshold lies at "
+        f"{_phrases(lesson, soft)['impacts']} and {_phrases(lesson, hard)['impacts']}; the threshold lies at "
         f"{si(limit, 'Hz', 3)}.", hard,
     )  # fmt: skip
 

@@ -62,7 +62,7 @@ def write_history(
     force = np.column_stack([response.history.force_at(stamps, i)[0] for i in range(response.history.n_contacts)])
     with replacing(path) as temporary:
         if ending in (".op4", *MODAL):
-            moved = _moved(response, at, stamps)
+            moved = _motion_at(response, at, stamps)
             if ending == ".op4":
                 temporary.write_text(_op4({"TIME": stamps[:, None], "FORCE": force, **moved}), encoding="ascii")
             else:
@@ -74,7 +74,7 @@ def write_history(
             temporary.write_text(write(stamps, force, node, direction), encoding="ascii")
 
 
-def _moved(response: Response, at: Any, times: np.ndarray) -> dict[str, np.ndarray]:
+def _motion_at(response: Response, at: Any, times: np.ndarray) -> dict[str, np.ndarray]:
     if at is None:
         return {}
     points = response.target.points("at", at)

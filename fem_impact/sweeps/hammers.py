@@ -298,7 +298,7 @@ def _hammer(
     if high <= low:
         return Hammer(float(mass), (), (), high, None, None, modes.notes)
     tips = _series(low, high, PER_DECADE[0])
-    counts = counted(alone, striker, modes.point("at", at)[0], tips)
+    counts = impacts_of_tips(alone, striker, modes.point("at", at)[0], tips)
     doubtful = np.flatnonzero(np.isnan(counts))
     counts[doubtful] = [hit(float(tip)).n_impacts for tip in tips[doubtful]]
     single = _ranges(tips, counts == 1, once)
@@ -311,7 +311,7 @@ def _hammer(
     return Hammer(float(mass), single, working, high, reach, error, modes.notes)
 
 
-def counted(modes: Modes, striker: Striker, at: np.ndarray, tips: np.ndarray) -> np.ndarray:
+def impacts_of_tips(modes: Modes, striker: Striker, at: np.ndarray, tips: np.ndarray) -> np.ndarray:
     """Number of impacts (n_tips,) of one hammer, 2 for several; NaN where the modal engine must count."""
     if modes.stretches:
         return np.full(len(tips), np.nan)

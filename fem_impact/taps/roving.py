@@ -335,7 +335,7 @@ def _hit(body: Modes, point: np.ndarray, mass: float, tip: float) -> tuple[int, 
 
     Double hits are counted first: that takes a hundredth of the time.
     """
-    if chooser.counted(replace(body, poorer={}), Striker.rigid(mass), point, np.array([tip]))[0] > 1.0:
+    if chooser.impacts_of_tips(replace(body, poorer={}), Striker.rigid(mass), point, np.array([tip]))[0] > 1.0:
         return 2, None
     try:
         hit = strike(

@@ -114,6 +114,14 @@ def test_what_this_process_found_by_pythonpath_is_found(tmp_path, monkeypatch):
     path = os.pathsep.join([str(HOME.parent), str(child.LIBRARIES)])
     monkeypatch.setenv("PYTHONPATH", path)
     code = "from fem_impact._base import child; import sys, os; os.execve(sys.executable, *child.python(*sys.argv[1:]))"
-    words = [getattr(sys, "_base_executable", sys.executable), "-c", code, "_base.isolated:process", "none", "no:no"]
+    words = [
+        getattr(sys, "_base_executable", sys.executable),
+        "-c",
+        code,
+        "_base.isolated:process",
+        "60",
+        "none",
+        "no:no",
+    ]
     done = subprocess.run(words, cwd=tmp_path, capture_output=True, text=True)
-    assert done.returncode == 1 and done.stderr == "this needs fem_impact.no: pip install fem_impact.no"
+    assert done.returncode == 1 and done.stderr == "this needs fem_impact: pip install fem_impact"

@@ -49,11 +49,11 @@ def test_wood_lists_its_constants_once():
 
 
 def test_the_prompt_is_told_the_numbers_of_one_and_the_rows_of_several():
-    data, said = listing.told("brass")  # a whole name counts before a part of others, such as of a brass mallet
+    data, said = listing.listed("brass")  # a whole name counts before a part of others, such as of a brass mallet
     assert [each["name"] for each in data["entries"]] == ["brass"] and said[0] == "brass (metal)"
-    data, said = listing.told("yarn")
+    data, said = listing.listed("yarn")
     ((rows, head),) = said
     assert [row[0] for row in rows] == ["yarn, soft", "yarn, medium", "yarn, hard"] and head[0] == "striker"
     assert [each["section"] for each in data["entries"]] == ["strikers"] * 3
     with pytest.raises(ValueError, match="got 'brss'; did you mean 'brass'"):
-        listing.told("brss")
+        listing.listed("brss")

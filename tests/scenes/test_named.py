@@ -98,7 +98,7 @@ def test_bands_and_spreads_use_the_intervals_of_names(tmp_path):
         ({"striker": {"kind": "rigid", "mass": 0.1}}, "[contact] is missing"),
         (
             {"striker": {"mass": 0.1}, "contact": {"kind": "linear", "stiffness": 1e5}},
-            "[striker] kind is missing; it is one of rigid, sphere, stick, hammer, bar, or give a name of the",
+            "[striker] kind is missing; it is one of rigid, sphere, stick, hammer, turning, bar, or give a name of the",
         ),
         ({"material": {"E": 1e9, "nu": 0.3}, "striker": {"name": "steel, 10 mm"}}, "[material] rho is missing"),
         (

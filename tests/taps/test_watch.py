@@ -66,8 +66,11 @@ def test_a_late_trigger_is_told_and_a_record_that_ends_in_the_pulse():
 
 
 def test_a_bandwidth_that_the_rate_cannot_show_is_refused():
-    with pytest.raises(ValueError, match=r"bandwidth must be below half the rate of a\.npz, 25600 Hz, got 30000 Hz"):
+    with pytest.raises(
+        ValueError, match=r"below half the rate of a\.npz, 25600 Hz, got 30000 Hz; sample faster, or ask for less"
+    ):
         watch.advice("a.npz", tap(tip(3000.0)), 0, 30e3)
+    assert "too soft" in watch.advice("a.npz", tap(tip(3000.0)), 0, 20e3).said  # asked for less
 
 
 def test_files_are_handed_out_once_nobody_writes_to_them_and_again_when_they_change(tmp_path):

@@ -5,7 +5,7 @@ import pytest
 from numpy.testing import assert_allclose
 
 import fem_impact as fi
-from fem_impact.modes import elements
+from fem_impact.modes import cell_kinds
 
 
 def test_the_inside_of_a_solid_has_no_normal():
@@ -13,7 +13,7 @@ def test_the_inside_of_a_solid_has_no_normal():
     row = {tuple(place): i for i, place in enumerate(grid.tolist())}
     corners = np.array([(0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0), (0, 0, 1), (1, 0, 1), (1, 1, 1), (0, 1, 1)])
     cells = np.array([[row[tuple(map(float, np.add(low, each)))] for each in corners] for low in np.ndindex(2, 2, 2)])
-    skin = elements.surface(grid, {12: cells})
+    skin = cell_kinds.surface(grid, {12: cells})
     assert len(skin) == 48  # 24 squares
     shapes = np.random.default_rng(0).standard_normal((27, 3, 4))
     body = fi.Body([10.0, 20.0, 30.0, 40.0], shapes, grid, mass=1.0, cells=skin)
@@ -29,7 +29,7 @@ def test_the_inside_of_a_solid_has_no_normal():
 def test_any_solid_element_makes_a_mesh_solid_and_shells_or_lines_alone_do_not(codes, solid):
     """A face of a solid block is a shell in many files."""
     points, corners = np.random.default_rng(0).random((8, 3)), {10: 4, 5: 3, 12: 8, 9: 4, 3: 2}
-    told = elements.told(points, {code: np.arange(corners[code])[None] for code in codes})
+    told = cell_kinds.surface_and_kind(points, {code: np.arange(corners[code])[None] for code in codes})
     body = fi.Body([9.0], np.ones((8, 3, 1)), points, mass=1.0, solid=told.get("solid"))
     assert body.solid is None if solid is None else body.solid == (solid or ())
 
@@ -37,4 +37,4 @@ def test_any_solid_element_makes_a_mesh_solid_and_shells_or_lines_alone_do_not(c
 def test_names_of_matrices_say_what_they_are():
     names = {"KAA": "stiffness", "K2GG": "stiffness", "job_STIF2": "stiffness", "m": "mass", "job_MASS2": "mass",
              "RECOV": "recovery", "BAA": "", "what": ""}  # fmt: skip
-    assert {name: elements.kind_of_matrix(name) for name in names} == names
+    assert {name: cell_kinds.kind_of_matrix(name) for name in names} == names

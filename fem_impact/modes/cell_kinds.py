@@ -16,7 +16,7 @@ BASIC = {
 NAMES = (("stiffness", r"^K|STIF"), ("mass", r"^M|MASS"), ("recovery", r"^R"))
 
 
-def told(points: np.ndarray, blocks: dict[int, np.ndarray]) -> dict[str, np.ndarray]:
+def surface_and_kind(points: np.ndarray, blocks: dict[int, np.ndarray]) -> dict[str, np.ndarray]:
     """Cells of the surface of elements by vtk's codes, and `Body.solid`, as far as they tell it.
 
     A mesh with any solid element is taken as solid, because it may be struck there.
