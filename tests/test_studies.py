@@ -13,6 +13,7 @@ import extremes
 import fit_coverage as coverage
 import frontier
 import is_the_model_right as right
+import measured_bodies as measured
 import numpy as np
 import pytest
 import roll
@@ -20,6 +21,15 @@ import scene_speed as speed
 import shared
 
 STUDIES = Path(__file__).parents[1] / "studies"
+
+
+@pytest.mark.slow
+def test_measured_bodies_answer_within_their_stated_errors():
+    """Three bodies, one of them among the few that miss: of the study's 300 blows 19 of 20 hold."""
+    rows = [row for seed in (102, 103, 104) for row in measured.rows_of(seed, 6) if row["way"] == "followed"]
+    shares = np.array([row[name] / row[f"{name}_stated"] for row in rows for name in measured.QUANTITIES])
+    assert len(shares) == 72 and np.mean(shares <= 1.0) >= 0.9 and shares.max() < 3.0  # 2.2 was the worst of 150 blows
+    assert np.median([row["force_stated"] for row in rows]) < 1e-2  # and these are not large
 
 
 @pytest.mark.slow
