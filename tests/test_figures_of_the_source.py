@@ -250,7 +250,7 @@ def test_a_script_alone_writes_picture_and_data(name, tmp_path, monkeypatch):
     assert (tmp_path / f"{name}.png").read_bytes()[:4] == b"\x89PNG"
     with (tmp_path / f"{name}.csv").open(newline="") as file:
         head, *rows = csv.reader(file)
-    assert len(rows) > 3
+    assert len(rows) > 1
     assert {len(row) for row in rows} == {len(head)}
     assert any(value for row in rows for value in row)
 

@@ -30,6 +30,7 @@ class Caption:
     text: str
 
 
+@check.typed
 def captions(response: Response) -> list[Caption]:
     """What happens in a blow, in the order of time.
 

@@ -112,9 +112,10 @@ def frf(
     )
     ff, xx, xf = (np.abs(F) ** 2).mean(0), (np.abs(X) ** 2).mean(0), (X * F.conj()).mean(0)
     tiny = np.finfo(float).tiny
-    H1, H2 = xf / np.maximum(ff, tiny), xx / np.where(xf == 0.0, tiny, xf.conj())
-    H = {"H1": H1, "H2": H2, "Hv": np.sqrt(np.abs(H1) * np.abs(H2)) * np.exp(1j * np.angle(xf))}[method]
     coherence = np.clip(np.abs(xf) ** 2 / np.maximum(ff * xx, tiny), 0.0, 1.0)
+    H1 = xf / np.maximum(ff, tiny)
+    H2 = np.divide(H1, coherence, out=np.array(H1), where=coherence > np.finfo(float).eps ** 2)  # below it is rounding
+    H = {"H1": H1, "H2": H2, "Hv": np.sqrt(np.abs(H1) * np.abs(H2)) * np.exp(1j * np.angle(xf))}[method]
     rests = np.column_stack([taps.noise, _rest(taps)])  # (n_taps, 1 + n_channels)
     noise = [(rest**2 * np.square(window).sum(axis=1, keepdims=True)).mean(axis=0) / taps.rate**2  # in every line
              for rest, window in zip((rests[:, :1], rests[:, 1:]), windows)]  # fmt: skip

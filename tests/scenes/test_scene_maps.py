@@ -252,7 +252,8 @@ def test_hammer_at_the_prompt(capsys):
     arguments = ["hammer", str(SCENES / "drumstick_map.toml"), "--bandwidth", "400", "--masses", "0.002", "0.2"]
     assert cli.main([*arguments, "--json"]) == 0
     data = json.loads(capsys.readouterr().out)
-    assert [hammer["softest"] is not None for hammer in data["hammers"]] == [True, False]
+    works = [hammer["softest"] is not None for hammer in data["hammers"]]
+    assert works == [True, True, False]  # the second is the last that does
     assert cli.main(arguments) == 0
     assert "200 g: no tip reaches 400 Hz and hits once" in " ".join(capsys.readouterr().out.split())
 
