@@ -144,8 +144,8 @@ def collide(
             each.let_go("a collision")
     if foreign := [name for name in OF_STRIKE if name in options]:
         raise TypeError(f"collide() got an unexpected keyword argument {foreign[0]!r}")
-    how = {"speeds": speeds, "states": states, "forces": forces, "start": start}
-    return promise.kept(met(bodies, contacts, **how, **options), strict)
+    hit = met(bodies, contacts, speeds=speeds, states=states, forces=forces, start=start, **options)
+    return promise.kept(hit, strict)
 
 
 def met(

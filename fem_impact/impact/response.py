@@ -10,7 +10,7 @@ import numpy as np
 from .._base import check
 from ..fe import plausible
 from ..modes.modal import Modes, at_rest
-from . import assumption, balance, datasets, force_spectrum, gradient, in_words, motion, promise, rebound, trust
+from . import assumption, balance, datasets, force_spectrum, gradient, in_words, motion, promise, trust
 from .assumption import Assumption
 from .compiled import record
 from .contact import Contact
@@ -475,12 +475,12 @@ class Response(Totals, check.Locked):
     @property
     def speeds(self) -> tuple[float, ...]:
         """Final speed [m/s] of each body's rigid motion at its first contact point."""
-        return tuple(float(rebound.rigid_row(self, i) @ self.history.end_p) for i in range(len(self.bodies)))
+        return tuple(float(balance.rigid_row(self, i) @ self.history.end_p) for i in range(len(self.bodies)))
 
     @property
     def in_contact(self) -> bool:
         """Whether the striker, or the first body, still presses another at the end of the run."""
-        return rebound.in_contact(self)
+        return balance.in_contact(self)
 
     @property
     def striker_speeds(self) -> np.ndarray:
@@ -488,7 +488,7 @@ class Response(Totals, check.Locked):
 
         Positive towards the struck body; a falling striker rises by the square of the second over twice the gravity.
         """
-        return rebound.speeds(self)
+        return balance.speeds(self)
 
     @cached_property
     def restitution(self) -> float | None:
@@ -498,7 +498,7 @@ class Response(Totals, check.Locked):
         count. On a body that moved before it may exceed 1. None while the striker is still in contact (`in_contact`),
         and for one that did not arrive. See `Impact.restitution` for that of each impact.
         """
-        return rebound.restitution(self)
+        return balance.restitution(self)
 
     @cached_property
     def _balance(self) -> balance.Balance:

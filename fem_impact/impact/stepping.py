@@ -86,7 +86,7 @@ class Options:
 
 
 def takes_options(*but: str) -> Callable[[Function], Function]:
-    """Decorator: show the fields of `Options`, ``but`` some, in the signature of a function that takes ``**options``."""
+    """Decorator: show fields of `Options`, ``but`` some, in the signature of a function that takes ``**options``."""
 
     def shown(function: Function) -> Function:
         own, shared = inspect.signature(function), inspect.signature(Options).parameters
@@ -110,18 +110,13 @@ def _first_count(scheme: str, tolerance: float, quantities: Mapping[str, float |
 
 
 def steps_for(
-    contact: Contact,
-    duration: float,
-    tolerance: float,
-    quantities: Mapping[str, float | None],
-    scheme: str | None = None,
-    dt: float | None = None,
-) -> tuple[str, float]:
+    contact: Contact, duration: float, tolerance: float, quantities: Mapping[str, float | None],
+    scheme: str | None = None, dt: float | None = None,
+) -> tuple[str, float]:  # fmt: skip
     """Scheme and first time step [s] of `strike`; ``duration`` is the contact time on a rigid wall [s]."""
     scheme = scheme or scheme_for(tolerance, contact.exponent)
-    if scheme in ("A", "A4"):
-        return scheme, dt or duration / _first_count(scheme, tolerance, quantities)
-    return scheme, dt or duration / (2.0 if scheme == "collocation" else 1.0)
+    count = 2.0 if scheme == "collocation" else _first_count(scheme, tolerance, quantities)
+    return scheme, dt or duration / count
 
 
 @dataclass(frozen=True, eq=False)

@@ -153,8 +153,8 @@ def test_late_impact_is_not_overlooked():
     assert missed(run.response, truth) <= float(run.response.error) <= 8.8e-2
 
 
-def plate(supports, **more):
-    return fi.assemble(fi.mesh.rectangle(0.465, 0.3), fi.Plate(WOOD, thickness=3e-3, **more), supports)
+def plate(supports, near=None):
+    return fi.assemble(fi.mesh.rectangle(0.465, 0.3), fi.Plate(WOOD, thickness=3e-3), supports, near=near)
 
 
 BALL, WOODEN = fi.Striker.rigid(0.03), fi.Contact.hertz(1e6)
@@ -330,3 +330,35 @@ def test_observed_points_need_no_modes_if_vectors_tell_their_motion():
     run = planner.Blow(target, BALL, WOODEN, arguments, ((0.2, 0.11), (0.25, 0.15)), True).run()
     assert run.plan.max_frequency is None and "_ringing" not in vars(run.response)
     assert run.response.target.omega[0] == pytest.approx(2.0 * np.pi * 105.78, rel=1e-3)  # found when asked for
+
+
+# --- seen from several points ---------------------------------------------------------------------------------------
+
+POINTS = np.array([(0.2, 0.11), (0.1, 0.2), (0.33, 0.08)])
+
+
+@pytest.mark.slow
+def test_each_point_has_the_vectors_that_it_would_have_alone(monkeypatch):
+    system, shift, made = plate({"boundary": "hinged"}, POINTS), 2e4, []
+    once = ritz.factorise
+    monkeypatch.setattr(ritz, "factorise", lambda matrix: made.append(1) or once(matrix))
+    shared = vectors.Krylovs(system, POINTS, shift)
+    assert len(made) == 1
+    for point, found in zip(POINTS, shared.each):
+        alone = Krylov(system, point[None], shift).modes(30, 0.01)
+        np.testing.assert_allclose(found.modes(30, 0.01).omega, alone.omega, rtol=1e-12)  # the same operations
+        np.testing.assert_allclose(found.modes(30, 0.01).shape_at([point]), alone.shape_at([point]), rtol=1e-9)
+
+
+@pytest.mark.slow
+def test_views_of_a_body_are_as_soft_as_the_body_is_there():
+    """Vectors start with the static deflection under the load, so that the compliance is that of the mesh."""
+    target = Target.of(plate({"boundary": "hinged"}, POINTS))
+    seen = vectors.Views(target, POINTS, 300.0, 1e-2, Elements(0.03), False, Stages())
+    closed = fi.analytic.closed_form(target.mesh, target.section, {"boundary": "hinged"})(n_modes=20)
+    assert not seen.at_rest
+    for i, point in enumerate(POINTS):
+        modes = seen.of(i, lambda modes, margin: modes.frequencies[-1])
+        # 1e-5 by the elements that shrink towards the blow
+        np.testing.assert_allclose(modes.modal_compliance([point]), closed.shapes.compliance(point[None]), rtol=1e-4)
+        assert list(modes.poorer) == ["mesh", "truncation"]
