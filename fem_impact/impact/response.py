@@ -438,13 +438,8 @@ class Response(Totals, check.Locked):
 
     def _moved(self, points: Any, times: Any, body: int, residual: bool, name: str) -> np.ndarray:
         """A motion by Ritz vectors, if they tell it well enough, or else by modes."""
-        rate, asked, own = name == "velocity", _times(times), self.vectors is not None
-        if (
-            residual
-            and own
-            and body in (-1, len(self.bodies) - 1)
-            and self._apart(points, asked, rate) <= motion.MOVED[name]
-        ):
+        rate, asked, mine = name == "velocity", _times(times), body in (-1, len(self.bodies) - 1)
+        if residual and mine and self.vectors is not None and np.isfinite(self._apart(points, asked, rate)):
             return self._descriptions[0].at(points, asked, rate)
         return self._motion(body).at(points, asked, rate, residual)
 
@@ -465,12 +460,7 @@ class Response(Totals, check.Locked):
         velocity : bool
             Whether the error is that of `velocity`.
         """
-        apart = self._apart(points, _times(times), velocity)
-        return (
-            apart + self.error.total
-            if apart <= motion.MOVED["velocity" if velocity else "displacement"]
-            else float("inf")
-        )
+        return self._apart(points, _times(times), velocity) + self.error.total
 
     @property
     def speeds(self) -> tuple[float, ...]:

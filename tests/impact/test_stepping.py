@@ -4,8 +4,9 @@ import re
 
 import numpy as np
 import pytest
+from comparing import worst
 from numpy.testing import assert_allclose
-from test_collision import grazing_blow, measured, target_of, thinned_blow, worst
+from test_collision import grazing_blow, measured, target_of, thinned_blow
 
 import fem_impact as fi
 from fem_impact.impact.collision import Touch, collide
