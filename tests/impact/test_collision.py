@@ -8,6 +8,7 @@ import pytest
 from comparing import worst
 from linear_blow import exact
 from numpy.testing import assert_allclose
+from restarted import followed
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 from scipy.special import gamma
@@ -103,7 +104,7 @@ def test_response_agrees_with_itself():
 
 
 def integrate(bodies, touches, duration, speeds=None, forces=None):
-    """The same modal equations by DOP853 at rtol 1e-12, restarted at every onset and release; final velocities."""
+    """Final velocities by the same modal equations, as `restarted` follows them."""
     omega = np.concatenate([modes.omega for modes in bodies])
     rate = 2.0 * omega * np.concatenate([modes.damping_ratio for modes in bodies])
     starts = np.concatenate([[0], np.cumsum([modes.n_modes for modes in bodies])])
@@ -125,22 +126,10 @@ def integrate(bodies, touches, duration, speeds=None, forces=None):
         force = np.array([float(law.force(x, y)) for law, x, y in zip(laws, d, v)])
         return np.concatenate([z[n:], bias - rate * z[n:] - omega**2 * z[:n] - force @ shape])
 
-    def crossing(i):
-        def gap(t, z):
-            return shape[i] @ z[: len(omega)] - laws[i].gap
+    def gaps(z):
+        return shape @ z[: len(omega)] - [law.gap for law in laws]
 
-        gap.terminal = True
-        return gap
-
-    time, z = 0.0, np.concatenate([np.zeros(len(omega)), p])
-    tight = {"method": "DOP853", "rtol": 1e-12, "atol": 1e-15}
-    while time < duration:
-        events = [crossing(i) for i in range(len(touches))]
-        leg = solve_ivp(push, (time, duration), z, events=events, max_step=duration / 200, **tight)
-        time, z = leg.t[-1], leg.y[:, -1]
-        if leg.status == 1:  # step off the event before looking for the next
-            leg = solve_ivp(push, (time, min(duration, time + 1e-9 * duration)), z, **tight)
-            time, z = leg.t[-1], leg.y[:, -1]
+    z = followed(push, gaps, np.concatenate([np.zeros(len(omega)), p]), duration, max_step=duration / 200)
     return np.split(z[len(omega) :], starts[1:-1])
 
 

@@ -2,13 +2,11 @@
 
 import numpy as np
 import pytest
+import restarted
 from comparing import difference
 from numpy.testing import assert_allclose
-from scipy.integrate import solve_ivp
 
 import fem_impact as fi
-
-TIGHT = {"method": "DOP853", "rtol": 1e-12, "atol": 1e-16}
 
 
 def swinging(n_modes=10, seed=3, damping=0.01):
@@ -22,7 +20,7 @@ def swinging(n_modes=10, seed=3, damping=0.01):
 
 
 def followed(modes, at, mass, law, speed, q, p, duration):
-    """A mass that arrives at the surface of moving modes, by DOP853 restarted where it touches and parts.
+    """A mass that arrives at the surface of moving modes, as `restarted` follows it.
 
     Returns modal displacements and velocities of the body, velocity of the mass, impulse, and time in contact.
     """
@@ -32,24 +30,14 @@ def followed(modes, at, mass, law, speed, q, p, duration):
         d, v = z[2 * n] - u @ z[:n], z[2 * n + 1] - u @ z[n : 2 * n]
         force = float(law.force(d, v))
         swing = u * force - 2.0 * modes.damping_ratio * modes.omega * z[n : 2 * n] - modes.omega**2 * z[:n]
-        return np.concatenate([z[n : 2 * n], swing, [z[2 * n + 1], -force / mass, force]])
+        return np.concatenate([z[n : 2 * n], swing, [z[2 * n + 1], -force / mass, force, d > 0.0]])
 
-    def gap(t, z):
-        return z[2 * n] - u @ z[:n]
+    def gaps(z):
+        return z[2 * n : 2 * n + 1] - u @ z[:n]
 
-    gap.terminal = True
-    z, time, touching = np.concatenate([q, p, [u @ q, speed, 0.0]]), 0.0, 0.0
-    step = 1e-9 * duration
-    while time < duration:
-        leg = solve_ivp(push, (time, min(time + step, duration)), z, **TIGHT)  # off the event
-        z = leg.y[:, -1]
-        closed = gap(0.0, z) > 0.0
-        begin, time = time, leg.t[-1]
-        if time < duration:
-            leg = solve_ivp(push, (time, duration), z, events=[gap], max_step=duration / 200, **TIGHT)
-            z, time = leg.y[:, -1], leg.t[-1]
-        touching += (time - begin) * closed
-    return z[:n], z[n : 2 * n], z[2 * n + 1], z[2 * n + 2], touching
+    start = np.concatenate([q, p, [u @ q, speed, 0.0, 0.0]])
+    z = restarted.followed(push, gaps, start, duration, max_step=duration / 200)
+    return z[:n], z[n : 2 * n], *z[2 * n + 1 :]
 
 
 @pytest.mark.parametrize("law", [fi.Contact.hertz(1e7), fi.Contact.power(1e7, 1.5, loss=0.3)], ids=["hertz", "loss"])
