@@ -198,24 +198,21 @@ class Response(Totals, check.Locked):
         """Whether the model itself is right, as in `verdict`, and a line for each assumption that matters."""
         return tuple(assumption.lines(self.assumptions, self.tolerance))
 
-    @property
+    @cached_property
     def target(self) -> Modes:
         """The struck body; in `collide` the last one.
 
         After a blow by Ritz vectors (see `strike`) these are its modes as far as the force found makes them ring; they
         are found when they are first needed.
         """
-        return self._ringing or self.bodies[-1]
-
-    @cached_property
-    def _ringing(self) -> Modes | None:
-        return self.rings(self) if self.ringing is None and self.rings is not None else self.ringing
+        found = self.rings(self) if self.ringing is None and self.rings is not None else self.ringing
+        return found or self.bodies[-1]
 
     @cached_property
     def _target(self) -> BodyMotion:
-        if self._ringing is not None:
-            return motion.driven(self, self._ringing)
-        return motion.of_run(self, len(self.bodies) - 1)
+        if self.ringing is None and self.rings is None:
+            return motion.of_run(self, len(self.bodies) - 1)
+        return motion.driven(self, self.target)
 
     @cached_property
     def _descriptions(self) -> tuple[BodyMotion, ...]:

@@ -313,7 +313,7 @@ def test_vectors_tell_the_motion_while_the_blow_lasts(mass, stiffness, velocity)
         moved, true = (getattr(response, name)([point], times) for response in (hit, truth))
         error = hit.motion_error([point], times, velocity=velocity)
         assert np.abs(moved - true).max() <= error * np.abs(true).max() and error < 5e-2
-    assert "_ringing" not in vars(hit)
+    assert "target" not in vars(hit)
     assert hit.motion_error([(0.2, 0.11)], [3.0 * hit.history.end_time]) == np.inf
     if stiffness == 1e8:
         assert hit.motion_error([(0.4, 0.25)], times, velocity=velocity) == np.inf
@@ -324,7 +324,7 @@ def test_observed_points_need_no_modes_if_vectors_tell_their_motion():
     target = Target.of(plate({"boundary": "hinged"}), None)
     arguments = {"at": (0.2, 0.11), "speed": 1.0, "tolerance": 1e-2}
     run = planner.Blow(target, BALL, WOODEN, arguments, ((0.2, 0.11), (0.25, 0.15)), True).run()
-    assert run.plan.max_frequency is None and "_ringing" not in vars(run.response)
+    assert run.plan.max_frequency is None and "target" not in vars(run.response)
     assert run.response.target.omega[0] == pytest.approx(2.0 * np.pi * 105.78, rel=1e-3)  # found when asked for
 
 
