@@ -28,17 +28,18 @@ def wall_duration(stiffness, exponent, mass, speed):
 
 
 @pytest.mark.parametrize("exponent", [1.0, 1.2, 1.5, 2.5])
-@pytest.mark.parametrize("speed", [1e-3, 1.0, 30.0])
-def test_mass_on_rigid_wall_meets_closed_forms(exponent, speed):
+@pytest.mark.parametrize("speed, tolerance", [(1e-3, 1e-4), (1.0, 1e-4), (30.0, 1e-4), (1.0, 1e-10)])
+def test_mass_on_rigid_wall_meets_closed_forms(exponent, speed, tolerance):
     law, mass = fi.Contact.power(1e5, exponent), 0.2
-    hit = collide([fi.Modes.rigid(mass)], [Touch(law, 0, None)], speeds=[speed])
+    hit = collide([fi.Modes.rigid(mass)], [Touch(law, 0, None)], speeds=[speed], tolerance=tolerance)
+    exact = max(1e-12, tolerance if hit.scheme == "collocation" else 0.0)
     deepest = (0.5 * (exponent + 1.0) * mass * speed**2 / 1e5) ** (1.0 / (exponent + 1.0))
     assert hit.n_impacts == 1
     assert hit.finished
-    assert_allclose(hit.restitution, 1.0, rtol=1e-12)  # energy is exact at every step
+    assert_allclose(hit.restitution, 1.0, rtol=exact)  # energy is exact at every step of A4
     assert_allclose(hit.contact_time, wall_duration(1e5, exponent, mass, speed), rtol=hit.tolerance)
     assert_allclose(hit.peak_force, 1e5 * deepest**exponent, rtol=hit.tolerance)
-    assert_allclose(hit.impulse, 2.0 * mass * speed, rtol=1e-12)  # momentum is exact at every step
+    assert_allclose(hit.impulse, 2.0 * mass * speed, rtol=exact)  # and so is momentum
 
 
 @pytest.mark.parametrize("law", [fi.Contact.linear(1e5), fi.Contact.hertz(1e6)], ids=["linear", "hertz"])
