@@ -8,7 +8,7 @@ import pytest
 from comparing import worst
 from linear_blow import exact
 from numpy.testing import assert_allclose
-from restarted import followed
+from restarted import followed, measured
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 from scipy.special import gamma
@@ -132,17 +132,6 @@ def integrate(bodies, touches, duration, speeds=None, forces=None):
 
     z = followed(push, gaps, np.concatenate([np.zeros(len(omega)), p]), duration, max_step=duration / 200)
     return np.split(z[len(omega) :], starts[1:-1])
-
-
-def measured(n_modes, seed, damping=0.0, n_rigid=0):
-    """A body known at three points, as from a modal test."""
-    rng = np.random.default_rng(seed)
-    frequencies = np.sort(rng.uniform(100.0, 3000.0, n_modes))
-    frequencies[:n_rigid] = 0.0
-    shapes = rng.normal(0.0, 2.0, (3, n_modes))
-    return fi.Modes.from_arrays(
-        frequencies, shapes, points=[[0.0], [1.0], [2.0]], mass=0.3, damping_ratio=damping, complete=True
-    )
 
 
 HEAVY = np.array([0.02, 0.5, 0.95, 1.0, 1.3, 3.0, 0.01, 0.0, 0.0, 0.1, 0.2, 10.0])

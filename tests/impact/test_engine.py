@@ -11,8 +11,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numba import njit
 from numpy.testing import assert_allclose
+from restarted import measured
 from scipy.optimize import brentq
-from test_collision import measured, wall_duration
+from test_collision import wall_duration
 from test_kernels import drift, plate, run
 from warming import locked
 

@@ -9,16 +9,6 @@ from numpy.testing import assert_allclose
 import fem_impact as fi
 
 
-def swinging(n_modes=10, seed=3, damping=0.01):
-    """A body known at two points; no mode is left out."""
-    rng = np.random.default_rng(seed)
-    frequencies = np.sort(rng.uniform(100.0, 3000.0, n_modes))
-    shapes = rng.normal(0.0, 2.0, (2, n_modes))
-    return fi.Modes.from_arrays(
-        frequencies, shapes, points=[[0.0], [1.0]], mass=0.3, damping_ratio=damping, complete=True
-    )
-
-
 def followed(modes, at, mass, law, speed, q, p, duration):
     """A mass that arrives at the surface of moving modes, as `restarted` follows it.
 
@@ -42,7 +32,7 @@ def followed(modes, at, mass, law, speed, q, p, duration):
 
 @pytest.mark.parametrize("law", [fi.Contact.hertz(1e7), fi.Contact.power(1e7, 1.5, loss=0.3)], ids=["hertz", "loss"])
 def test_a_second_blow_meets_an_independent_integration(law):
-    modes, mass, later = swinging(), 0.02, 4e-3
+    modes, mass, later = restarted.measured(10, 3, 0.01, n_points=2), 0.02, 4e-3
     blow = {"at": [0.0], "speed": 1.0, "tolerance": 1e-7}
     first = fi.strike(modes, fi.Striker.rigid(mass), law, **blow)
     second = fi.strike(modes, fi.Striker.rigid(mass), law, start=first.state(later), **(blow | {"at": [1.0]}))

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 from comparing import worst
 from numpy.testing import assert_allclose
-from test_collision import grazing_blow, measured, target_of, thinned_blow
+from restarted import measured
+from test_collision import grazing_blow, target_of, thinned_blow
 
 import fem_impact as fi
 from fem_impact.impact.collision import Touch, collide

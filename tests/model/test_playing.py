@@ -6,21 +6,13 @@ from itertools import pairwise
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
-from restarted import followed
+from restarted import followed, measured
 
 import fem_impact as fi
 
 DRUM = fi.analytic.disk(0.18, edge="clamped", mass=0.1, first_frequency=150.0, n_modes=60, damping_ratio=0.01)
 BALL, LAW = fi.Striker.rigid(0.02), fi.Contact.linear(2e4)
 LOOSE = {"tolerance": 1e-2, "quantity": "n_impacts"}
-
-
-def measured():
-    """A body known at two points; no mode is left out."""
-    rng = np.random.default_rng(7)
-    frequencies = np.sort(rng.uniform(100.0, 3000.0, 10))
-    shapes = rng.normal(0.0, 2.0, (2, 10))
-    return fi.Modes.from_arrays(frequencies, shapes, points=[[0.0], [1.0]], mass=0.3, damping_ratio=0.01, complete=True)
 
 
 def played(modes, strokes, end):
@@ -53,7 +45,7 @@ def played(modes, strokes, end):
 
 @pytest.mark.parametrize("delay", [0.0, 2e-4, 9e-4], ids=["at once", "while the first presses", "later"])
 def test_two_sticks_on_one_body_meet_an_independent_integration(delay):
-    modes, law = measured(), fi.Contact.hertz(1e6)
+    modes, law = measured(10, 7, 0.01, n_points=2), fi.Contact.hertz(1e6)
     strokes = [(0.0, fi.Striker.rigid(0.05), law, 0.0, 1.0), (delay, fi.Striker.rigid(0.02), LAW, 1.0, 2.0)]
     pair = fi.strokes(modes, strokes, tolerance=1e-6)
     last = pair.hits[-1]
