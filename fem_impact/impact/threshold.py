@@ -140,15 +140,16 @@ def thresholds(modes: Modes, at: Any, masses: Any) -> np.ndarray:
     todo = np.isinf(found) if density > 0.0 else np.isinf(found) & (masses * squared.sum() > 1.0)
     if not todo.any():
         return found
-    # up to here no pulse takes all: that of frequency c has at most 4/3 (c / omega)**2 of a mode above 2 c
-    flexible = omega > 0.0
-    fourth = (squared[flexible] / omega[flexible] ** 4).sum()
-    fourth += density * omega[-1] ** (-3.0 - exponent) / (3.0 + exponent)
-    spare = 1.0 / masses[todo].max() - squared[~flexible].sum()
-    low = np.log(min(0.5 * omega[flexible][0], (9.0 / 16.0 * spare / fourth) ** 0.25))
+    # an upper bound that grows with the contact frequency c: the half-sine spectrum is at most 1, and from 2 c on at
+    # most 4/3 (c / omega)**2; where it says that no pulse takes all of the heaviest hammer's energy, none is tried
+    ends, shares, heaviest = omega[omega > 0.0], squared[omega > 0.0], masses[todo].max()
+    still, beyond = squared[omega == 0.0].sum(), density * omega[-1] ** (-3.0 - exponent) / (3.0 + exponent)
+    above = 16.0 / 9.0 * (np.cumsum((shares / ends**4)[::-1])[::-1] + beyond)  # of each mode and those above
+    harmless = heaviest * (still + np.cumsum(shares) - shares + above * (0.5 * ends) ** 4) < 1.0
+    low = np.log(0.5 * ends[harmless].max() if harmless.any() else ((1.0 / heaviest - still) / above[0]) ** 0.25)
     # above omega[-1], all modes lie in the first lobe, so the energy only grows with the contact frequency
-    beyond = max(low, np.log(omega[-1]))
-    tried = np.append(np.arange(low, beyond, np.log(STEP)), np.arange(beyond, HARDEST + np.log(2.0), np.log(2.0)))
+    last = max(low, np.log(omega[-1]))
+    tried = np.append(np.arange(low, last, np.log(STEP)), np.arange(last, HARDEST + np.log(2.0), np.log(2.0)))
     for start in range(0, len(tried) - 1, AT_ONCE):
         some = tried[start : start + AT_ONCE + 1]
         reached = energy(some)
