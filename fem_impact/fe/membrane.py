@@ -34,7 +34,7 @@ from scipy.sparse import csc_matrix
 from .._base.untyped import Sparse
 from . import plane, slopes
 from .eigenvalues import factorise
-from .elements import area_coordinates, inverses, triangles
+from .elements import area_coordinates, triangles
 from .section import Plate, evaluate
 from .system import System
 
@@ -71,7 +71,7 @@ class Sheet:
         assert rim is not None and isinstance(section, Plate)
         space: Any = system.space
         X, x, dx = slopes.quadrature(system, NODES)
-        gradient = np.einsum("eqji,jqk->eqik", inverses(space, X), plane.reference(X)[1])
+        gradient = plane.gradients(space, np.arange(len(x)), area_coordinates(X.T)[None])
         h = evaluate("thickness", section.thickness, frame.places(x), "m").reshape(dx.shape)
         moduli = (frame.length**2 * h * dx)[..., None, None] * section.stretched
         own = plane.numbered(triangles(rim.points, space.vertices))
@@ -84,7 +84,7 @@ class Sheet:
         plate = np.arange(len(x)), area, x, moduli, gradient, neutral
         parts = [plate, *(_along(space, rib, frame.length, x.shape[1]) for rib in getattr(space, "ribs", ()))]
         cells, area, x, moduli, gradient, neutral = (np.concatenate(each) for each in zip(*parts))
-        return cls(cells, area, x, moduli, gradient, dofs[cells], plane.loosened(space.inner, rim, own)[0], neutral)
+        return cls(cells, area, x, moduli, gradient, dofs[cells], plane.loosened(space, rim, own)[0], neutral)
 
     def strains(self, pieces: np.ndarray) -> np.ndarray:
         """Strains (n, n_q, 3, 30) of the unknowns of pieces (n,)."""
@@ -181,7 +181,7 @@ def _along(space: Any, rib: Any, length: float, n_q: int) -> tuple[np.ndarray, .
     def padded(values: np.ndarray, mode: Any = "edge") -> np.ndarray:
         return np.pad(values, [(0, 0), (0, n_q - ds.shape[1]), *[(0, 0)] * (values.ndim - 2)], mode=mode)
 
-    gradient = plane.gradients(space.inner, cells, area)
+    gradient = plane.gradients(space, cells, area)
     return cells, padded(area), padded(x), padded(moduli, "constant"), padded(gradient), padded(neutral)
 
 

@@ -27,7 +27,7 @@ def domain(body: Subject, make_space: Callable[[Cells, Bent | None], Any], names
     cells = triangles((body.mesh.points - box[0]) / box[1], body.mesh.cells)
     bent = _bent(body.mesh, Frame(*box, 1.0, 1.0), cells)
     space = make_space(cells, bent)
-    return Domain.of(names, body.section, box, cells, space, quadrature(cells, space, bent))
+    return Domain.of(names, body.section, box, cells, space, quadrature(space))
 
 
 def _bent(mesh: Mesh, frame: Frame, cells: Cells) -> Bent | None:

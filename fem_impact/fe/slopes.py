@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 
 from . import beam_elements
-from .elements import area_coordinates
+from .elements import collapsed, on_true_edge
 from .section import Plate, evaluate
 from .system import System
 from .theory import Points, blocks, unknowns_of_cells
@@ -39,20 +39,7 @@ def quadrature(system: System, nodes: int = NODES) -> Points:
     if system.mesh.dimension == 1:
         x, dx = beam_elements.quadrature(space)
         return Points(np.zeros((1, x.shape[1])), x[..., None], dx)
-    node, weight = np.polynomial.legendre.leggauss(nodes)
-    a, b = (x.ravel() for x in np.meshgrid(0.5 * (node + 1.0), 0.5 * (node + 1.0), indexing="ij"))
-    local = np.column_stack([a, b * (1.0 - a)])
-    share = 0.25 * np.outer(weight, weight).ravel() * (1.0 - local[:, 0])
-    x = space.origin[:, None] + (local - 1.0 / 3.0) @ space.jacobian.transpose(0, 2, 1)
-    dx = np.abs(np.linalg.det(space.jacobian))[:, None] * share
-    if space.bent is not None:
-        cells = space.bent.cells
-        area = np.broadcast_to(area_coordinates(local), (len(cells), len(local), 3))
-        moved, gradient = space.bent.shift(cells, area)
-        x[cells] = x[cells] + moved  # a triangle with two curved sides is listed twice, each time with the whole shift
-        steep = space.jacobian[cells][:, None] + gradient[..., 1:] - gradient[..., :1]
-        dx[cells] = np.abs(np.linalg.det(steep)) * share
-    return Points(local.T, x, dx)
+    return on_true_edge(space, *collapsed(nodes))
 
 
 def softness(system: System) -> float:

@@ -23,7 +23,7 @@ def at_facets(space: Any, facets: np.ndarray, cells: np.ndarray) -> tuple[np.nda
     corner = space.vertices[cells][:, None]  # (n, 1, 3)
     first, last = (np.equal(corner, facets[:, end, None, None]).astype(float) for end in (0, 1))
     area = (1.0 - s) * first + s * last  # (n, n_q, 3)
-    x, tangent = space.inner.along(cells, area, last - first)
+    x, tangent = space.along(cells, area, last - first)
     return area, x, np.stack([tangent[..., 1], -tangent[..., 0]], axis=-1) * 0.5 * weight[:, None]
 
 
