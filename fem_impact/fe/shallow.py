@@ -36,7 +36,20 @@ from .plane import FIRST, LOCAL, SECOND, PlaneSpace
 from .ribs import RibLine
 from .section import evaluate
 from .supports import constrain
-from .theory import Domain, Frame, Held, Points, Subject, Term, Theory, blocks, gram, scatter, unknowns_of_cells
+from .theory import (
+    Domain,
+    Frame,
+    Held,
+    Points,
+    Subject,
+    Term,
+    Theory,
+    blocks,
+    gram,
+    no_estimate,
+    scatter,
+    unknowns_of_cells,
+)
 
 # [-] rise of the middle of a side over its chord, over the thickness, above which triangles are divided: bending that
 # does not stretch a curved plate needs displacements beyond quartics there. Ten modes of a cymbal then err by 2e-3
@@ -223,13 +236,8 @@ def steepest(system: Any) -> float:
     return float(np.linalg.norm(space.sloping(cells, plane.gradients(space, cells, area)), axis=2).max())
 
 
-def _errors(system: Any, vectors: np.ndarray, loads: np.ndarray, forced: Any = None) -> np.ndarray:
-    """Errors (3, n) of the squared energy norm: none, as a second mesh tells all of it."""
-    return np.zeros((3, vectors.shape[1]))
-
-
 SHALLOW = Theory(
-    "shallow", "argyris and quartic", 2, _curved_domain, strains_and_motion, _hold_shell, _errors, wave=1.8,
+    "shallow", "argyris and quartic", 2, _curved_domain, strains_and_motion, _hold_shell, no_estimate, wave=1.8,
     unknowns=47.0, fields=("stiffness", "inertia", "walls"), graded=True, compared=True, sharp=plates.is_tiny,
     layered=towards_bends, energies=energies,
 )  # fmt: skip

@@ -27,7 +27,7 @@ from scipy import special
 
 from .._base import check
 from ..fe import membrane, slopes
-from ..fe.assembly import System, assemble, support_of_facets, support_words
+from ..fe.assembly import System, assemble, support_of_facets
 from ..fe.section import PLANE, SOFT, Beam, Plate
 from ..fe.shallow import SHALLOW, strained
 from ..mesh import meshes
@@ -111,7 +111,7 @@ def _unwrapped(shapes: Shapes) -> tuple[Shapes, float, np.ndarray | None]:
 
 def _check_supports(system: System) -> None:
     """Raise ValueError unless it is known what holds the plane of a body of elements, and its slopes are known."""
-    kinds: Any = support_of_facets(system.mesh, dict(system.supports), support_words(system.theory))
+    kinds: Any = support_of_facets(system.mesh, dict(system.supports), system.rules.words)
     if isinstance(system.section, Plate) and system.theory != SHALLOW.name:  # whose linear motion has the same plane
         kinds = support_of_facets(system.mesh, dict(system.section.in_plane), PLANE, "in_plane", kinds)
     if system.theory != SHALLOW.name and not all(isinstance(kind, str) for kind in kinds):
