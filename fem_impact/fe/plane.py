@@ -8,10 +8,10 @@ from scipy.linalg import qr
 from scipy.sparse import block_diag, csr_matrix
 from skfem import Dofs, ElementTriP4
 
-from .._base.rounding import SAME
 from .._base.untyped import Cells, Sparse
 from . import supports
 from .elements import ArgyrisSpace, Triangles, area_coordinates
+from .theory import unresisted
 
 QUARTIC = 15  # shape functions of one component on a triangle
 FIRST, SECOND = slice(21, 21 + QUARTIC), slice(21 + QUARTIC, 21 + 2 * QUARTIC)  # unknowns of both components
@@ -127,11 +127,8 @@ def loosened(inner: Triangles, rim: supports.SupportedRim, own: Dofs) -> tuple[c
     loose, places = held_at(inner, rim.facets, list(rim.plane), own)[0], np.zeros((own.N, 2))
     places[own.element_dofs.T] = nodes(inner)
     motions = rigid(places)
-    left = loose.T @ motions  # the columns of the map are orthonormal
-    lost = motions - loose @ left
-    lengths, turn = np.linalg.svd(lost.T @ lost)[1:]
-    free = turn[np.sqrt(lengths) < SAME * np.sqrt(len(places))].T
-    still = left @ free
+    free = unresisted(motions, loose, loose.T)  # the columns of the map are orthonormal
+    still = loose.T @ motions @ free
     pinned = qr(still.T, pivoting=True, mode="economic")[2][: still.shape[1]] if still.size else []
     return loose[:, np.setdiff1d(np.arange(loose.shape[1]), pinned)], motions @ free
 

@@ -17,6 +17,7 @@ import numpy as np
 from scipy.sparse import coo_matrix, csc_matrix, csr_matrix, eye_array
 
 from .._base import check
+from .._base.rounding import SAME
 from .._base.untyped import Cells, Sparse
 from ..mesh.meshes import Mesh
 from .material import directional
@@ -206,6 +207,14 @@ def kept_unknowns(fixed: np.ndarray) -> tuple[csr_matrix, csr_matrix]:
     """Maps of `Held` that leave out the unknowns ``fixed`` (n_all,) bool."""
     expand = eye_array(len(fixed), format="csr")[:, np.flatnonzero(~fixed)]
     return csr_matrix(expand), csr_matrix(expand.T)
+
+
+def unresisted(motions: np.ndarray, expand: Any, project: Any) -> np.ndarray:
+    """Combinations (n_motions, n) of motions (n_all, n_motions) that maps of `Held` leave as they are."""
+    lost = motions - expand @ (project @ motions)
+    lengths, turn = np.linalg.svd(lost.T @ lost / np.abs(motions).max() ** 2)[1:]
+    free: np.ndarray = turn[np.sqrt(lengths) < SAME * np.sqrt(len(motions))].T
+    return free
 
 
 def unknowns_of_cells(system: Any, vectors: np.ndarray) -> np.ndarray:

@@ -111,18 +111,23 @@ class BeamlikeShapes(Shapes):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class ScaledShapes(Shapes, check.Brief):
-    """The shapes of the same body with another mass and stiffness, see `Modes.scaled`."""
+    """The shapes of the same body with another mass and stiffness, see `Modes.scaled`, or mixed; its deflections stay.
+
+    A mixture is of shapes that are known everywhere, as by the air around a plate.
+    """
 
     base: Shapes
-    amplitude: float  # [-] new shape divided by old
-    frequency: float  # [-] new frequency divided by old
+    amplitude: float = 1.0  # [-] new shape divided by old
+    frequency: float = 1.0  # [-] new frequency divided by old
+    mix: np.ndarray | None = None  # (n_base, n_modes) [-] of the old shapes in each new one
 
     @property
     def dimension(self) -> int:
         return self.base.dimension
 
     def at(self, points: np.ndarray) -> np.ndarray:
-        return self.amplitude * self.base.at(points)
+        found = self.amplitude * self.base.at(points)
+        return found if self.mix is None else found @ self.mix
 
     def contains(self, points: np.ndarray) -> np.ndarray:
         return self.base.contains(points)
@@ -150,6 +155,8 @@ class ScaledShapes(Shapes, check.Brief):
         return None if found is None else self.amplitude * found
 
     def take(self, n_modes: int) -> "ScaledShapes":
+        if self.mix is not None:
+            return replace(self, mix=self.mix[:, :n_modes].copy())
         return replace(self, base=self.base.take(n_modes))
 
     def grid(self) -> tuple[np.ndarray, np.ndarray]:

@@ -31,7 +31,6 @@ from ..fe.assembly import System, assemble, support_of_facets
 from ..fe.section import PLANE, SOFT, Beam, Plate
 from ..fe.shallow import SHALLOW, strained
 from ..mesh import meshes
-from .air import MixedShapes
 from .disk import DiskShapes
 from .modal import Modes
 from .rectangle import RectangleShapes
@@ -100,12 +99,12 @@ def stretch(modes: Modes) -> Stretching:
 
 
 def _unwrapped(shapes: Shapes) -> tuple[Shapes, float, np.ndarray | None]:
-    """The shapes inside `ScaledShapes` and `MixedShapes`, the factor of their amplitude, and their mixture."""
-    if isinstance(shapes, (ScaledShapes, MixedShapes)):
+    """The shapes inside `ScaledShapes`, the factor of their amplitude, and their mixture."""
+    if isinstance(shapes, ScaledShapes):
         base, amplitude, mix = _unwrapped(shapes.base)
-        if isinstance(shapes, ScaledShapes):
-            return base, shapes.amplitude * amplitude, mix
-        return base, amplitude, shapes.mix if mix is None else mix @ shapes.mix
+        if shapes.mix is not None:
+            mix = shapes.mix if mix is None else mix @ shapes.mix
+        return base, shapes.amplitude * amplitude, mix
     return shapes, 1.0, None
 
 
