@@ -9,15 +9,16 @@ from collections.abc import Callable
 from typing import Any
 
 import numpy as np
-from scipy.sparse import csc_matrix
+from scipy.sparse import csc_matrix, csr_matrix
 from skfem import ElementLineHermite, MeshLine
 
 from .._base.rounding import EPSILON, HALVINGS, SAME
-from .._base.untyped import Cells, Sparse
+from .._base.untyped import Cells
 from ..mesh.facets import powers
+from .elements import numbering
 from .section import Elastic
 from .springs import edge_stiffness
-from .theory import Domain, Frame, Points, Subject, unknowns_of_cells
+from .theory import Domain, Frame, Held, Points, Subject, kept_unknowns, unknowns_of_cells
 
 # [-] polynomial degree of the deflection within an element: errs by 1e-12 of a wave of 30 rad; few elements round less
 DEGREE = 32
@@ -97,6 +98,10 @@ class HermiteSpace:
         """The same of the whole deflection, by all unknowns; here it is that by `bending`."""
         return self.bending(cells, points, orders)
 
+    def numbering(self, mesh: Cells) -> tuple[np.ndarray, int]:
+        """Numbers of the unknowns of each element (n_local, n_cells), and how many there are."""
+        return numbering(mesh, self)
+
     def locate(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """The cell that holds each point (n, 1), or else the nearest one, and whether the point lies in it."""
         low = np.minimum(self.start, self.start + self.length)
@@ -139,7 +144,7 @@ def rounding(space: Any) -> float:
     return float(ROUNDED / max(np.abs(space.length).min(), APART) ** 3)
 
 
-def domain(body: Subject, make_space: Callable[[Cells], Any], names: tuple[str, ...]) -> Domain:
+def domain(make_space: Callable[[Cells], Any], body: Subject, names: tuple[str, ...]) -> Domain:
     """The elements of a beam in its frame, with shape functions and the section's fields ``names``."""
     mesh, section = body.mesh, body.section
     low, high = mesh.points.min(axis=0), mesh.points.max(axis=0)
@@ -158,23 +163,33 @@ def domain(body: Subject, make_space: Callable[[Cells], Any], names: tuple[str, 
     return Domain.of(names, section, box, line, space, Points(np.zeros((1, x.shape[1])), x[..., None], dx))
 
 
-def ends(body: Subject) -> list[tuple[bool, str | Elastic]]:
-    """Whether each end of a beam is the left one, and its support."""
-    left = body.mesh.points[body.mesh.facets[:, 0], 0] <= body.mesh.points.min()
-    return list(zip(left.tolist(), body.held))
+def hold(body: Subject, domain: Domain) -> Held:
+    """The supports of both ends of a beam, on its deflection and its rotation by bending.
 
-
-def end_springs(sprung: list[tuple[dict[int, float], int, Elastic]], frame: Frame, n_all: int) -> Sparse:
-    """Stiffness (n_all, n_all) of elastic supports.
-
-    Each comes with the unknowns that add up to the deflection there, the one that is the rotation, and its `Elastic`.
+    A deflection by shear is zero at the left end, as only the sum of both counts, and takes all of it away from a held
+    right end.
     """
-    total = csc_matrix((n_all, n_all))
-    for deflection, turned, kind in sprung:
-        for along, stiffness in zip((deflection, {turned: 1.0}), edge_stiffness([kind], frame)[0]):
-            row = csc_matrix((list(along.values()), ([0] * len(along), list(along))), shape=(1, n_all))
-            total = total + stiffness * row.T @ row
-    return total
+    dofs, n_all = domain.space.numbering(domain.cells)
+    shear = [] if len(dofs) == DEGREE + 1 else [int(dofs[DEGREE + 1, 0]), int(dofs[DEGREE + 2, -1])]
+    fixed, tied, springs = np.zeros(n_all, bool), False, csc_matrix((n_all, n_all))
+    fixed[shear[:1]] = True
+    at_left = body.mesh.points[body.mesh.facets[:, 0], 0] <= body.mesh.points.min()
+    for left, kind in zip(at_left.tolist(), body.held):
+        bent, turned = (dofs[:2, 0] if left else dofs[2:4, -1]).tolist()
+        more = [] if left else shear[1:]
+        if isinstance(kind, Elastic):
+            for along, stiffness in zip(([bent, *more], [turned]), edge_stiffness([kind], domain.frame)[0]):
+                row = csc_matrix((np.ones(len(along)), ([0] * len(along), along)), shape=(1, n_all))
+                springs = springs + stiffness * row.T @ row
+        elif kind != "free":
+            fixed[turned] |= kind == "clamped"
+            fixed[more or bent] = True
+            tied |= bool(more)
+    expand, project = kept_unknowns(fixed)
+    if tied:
+        place = [shear[1]], [np.count_nonzero(~fixed[: dofs[2, -1]])]
+        expand = (expand + csr_matrix(([-1.0], place), shape=expand.shape)).tocsr()
+    return Held(expand, project, dofs, springs)
 
 
 def point_forces(

@@ -37,6 +37,7 @@ from .eigenvalues import factorise
 from .elements import area_coordinates, triangles
 from .section import Plate, evaluate
 from .system import System
+from .theory import gram, scatter
 
 NODES = 4  # [-] Gauss points in each direction of a triangle: exact for the stiffness of quartic elements
 # [-] lowest modes whose stresses choose the fields that are kept: large swings are those of the lowest modes
@@ -102,9 +103,7 @@ class Sheet:
         result = csc_matrix((n_dofs, n_dofs))
         for cells in self.blocks(30):
             strain, dofs = self.strains(cells), self.dofs[cells]
-            local = _flat(strain).transpose(0, 2, 1) @ _flat(self.moduli[cells] @ strain)
-            place = (np.broadcast_to(each, local.shape).ravel() for each in (dofs[:, :, None], dofs[:, None]))
-            result = result + csc_matrix((local.ravel(), tuple(place)), shape=result.shape)
+            result = result + scatter(gram(strain, self.moduli[cells]), dofs.T, n_dofs)
         return result
 
 

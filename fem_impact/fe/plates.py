@@ -20,7 +20,7 @@ from .theory import Domain, Frame, Subject, blocks, gram, scatter
 TINY = 4e-3
 
 
-def domain(body: Subject, make_space: Callable[[Cells, Bent | None], Any], names: tuple[str, ...]) -> Domain:
+def domain(make_space: Callable[[Cells, Bent | None], Any], body: Subject, names: tuple[str, ...]) -> Domain:
     """The triangles of a plate in its frame, with shape functions and the section's fields ``names``."""
     low, high = body.mesh.points.min(axis=0), body.mesh.points.max(axis=0)
     box = 0.5 * (low + high), float((high - low).max())

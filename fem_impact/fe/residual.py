@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 
 from .elements import EXPONENTS, collapsed, curvatures, monomials
-from .springs import along_facets
+from .springs import at_facets
 from .supports import SIDES, cells_of_facets
 from .system import System
 from .theory import unknowns_of_cells
@@ -155,7 +155,7 @@ class Residual:
         space, rim = self.moments.space, self.system.rim
         assert rim is not None
         self.rim_cells = cells_of_facets(rim.facets, space.vertices)[0]
-        x, step = along_facets(space, rim.facets, self.rim_cells)
+        _, x, step = at_facets(space, rim.facets, self.rim_cells)
         ds = np.linalg.norm(step, axis=2)
         normal = step / ds[..., None]
         force = self.moments.across(self.rim_cells, x, normal, rim.curvatures.mean(axis=1)[:, None, None])

@@ -24,6 +24,7 @@ Marguerre (1938), Proc. 5th Int. Congr. Appl. Mech., 93-101; Leissa (1973), Vibr
 from collections.abc import Sequence
 from copy import copy
 from dataclasses import replace
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -105,7 +106,7 @@ def strains_and_motion(space: ShallowSpace, points: Points, cells: np.ndarray) -
 
 
 def _curved_domain(body: Subject, fields: tuple[str, ...]) -> Domain:
-    found = plates.domain(body, ShallowSpace, fields)
+    found = plates.domain(ShallowSpace, body, fields)
     found.space.heights = _heights(found.space, body.section, found.frame)
     return found
 
@@ -214,13 +215,8 @@ def energies(system: Any, section: Any, vectors: np.ndarray) -> tuple[np.ndarray
         raise ValueError(f"a section must keep the {len(space.ribs)} ribs of the body, got {len(section.ribs)}")
     space.heights = _heights(space, section, frame)
     space.ribs = [RibLine.of(rib, line.facets, section, space, frame) for rib, line in zip(section.ribs, space.ribs)]
-    points, whole = slopes.quadrature(system), unknowns_of_cells(system, vectors)
-    K, M = np.zeros((2, vectors.shape[1], vectors.shape[1]))
-    for cells in blocks(len(points.x)):
-        own, dx = whole[cells][:, None], points.dx[cells]
-        for (_, name, parts), total in zip(strains_and_motion(space, points, cells), (K, M)):
-            field = frame.field(section, name, points.x[cells])
-            total += gram(parts @ own, field * dx.reshape(*dx.shape, *[1] * (field.ndim - 2))).sum(axis=0)
+    whole = unknowns_of_cells(system, vectors)
+    K, M = slopes.energies(system, space, partial(frame.field, section), vectors)
     if space.ribs:
         *each, cells = ribs.attached(space, frame, strained)
         for part, total in zip(each, (K, M)):

@@ -1,5 +1,6 @@
 """Integrals of the slopes of a body's shapes: how much a deflection lengthens what lies in its plane."""
 
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -31,6 +32,24 @@ def products(system: System, vectors: np.ndarray, weight: np.ndarray) -> np.ndar
         result += steep.reshape(-1, result.shape[1]).T @ pulled.reshape(-1, result.shape[1])
     size = len(frame.centre)
     return 0.5 * (result + result.T) * frame.length ** (size - 2) / frame.mass
+
+
+def energies(
+    system: System, space: Any, field: Callable[[str, np.ndarray], np.ndarray], vectors: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Twice the mutual strain energy, and the mutual mass (n, n) of vectors (n_dofs, n) in a space, by their terms.
+
+    ``field`` gives one of the section's by its name at places (n, n_q, dimension), in the frame.
+    """
+    points, whole, n = quadrature(system), unknowns_of_cells(system, vectors), vectors.shape[1]
+    found = {"K": np.zeros((n, n)), "M": np.zeros((n, n))}
+    for cells in blocks(len(points.x)):
+        own, dx = whole[cells][:, None], points.dx[cells][..., None, None]  # (n_cells, 1, n_local, n)
+        for matrix, name, parts in system.rules.terms(space, points, cells):
+            weight, moved = field(name, points.x[cells]), parts @ own  # (n_cells, n_q, n_parts, n)
+            pushed = (weight * dx) @ moved if weight.ndim > 2 else weight[..., None, None] * dx * moved
+            found[matrix] += moved.reshape(-1, n).T @ pushed.reshape(-1, n)
+    return found["K"], found["M"]
 
 
 def quadrature(system: System, nodes: int = NODES) -> Points:

@@ -158,7 +158,7 @@ def terms(space: MindlinSpace, points: Points, cells: np.ndarray) -> list[Term]:
 
 
 def _domain(body: Subject, fields: tuple[str, ...]) -> Domain:
-    found = plates.domain(body, MindlinSpace, fields)
+    found = plates.domain(MindlinSpace, body, fields)
     h = evaluate("thickness", body.section.thickness, found.frame.places(found.space.origin), "m")
     found.space.turn(found.cells, h / found.frame.length)
     return found

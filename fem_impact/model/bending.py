@@ -28,7 +28,7 @@ from ..fe.assembly import System, support_of_facets
 from ..fe.corners import meetings
 from ..fe.residual import Moments
 from ..fe.section import PLANE, SHEAR, Beam, Plate, evaluate
-from ..fe.springs import along_facets
+from ..fe.springs import at_facets
 from ..fe.supports import cells_of_facets
 from ..mesh.meshes import Mesh
 from ..modes.disk import DiskShapes
@@ -263,7 +263,7 @@ def _plate(system: System, vectors: np.ndarray, thick: bool) -> np.ndarray:
     free = np.flatnonzero(np.array(rim.kinds) == "free") if rim is not None else np.zeros(0, int)
     if len(free) and rim is not None:
         at = cells_of_facets(rim.facets[free], space.vertices)[0]
-        place, step = along_facets(space, rim.facets[free], at)
+        _, place, step = at_facets(space, rim.facets[free], at)
         ds = np.linalg.norm(step, axis=2)
         nx, ny = np.moveaxis(step / ds[..., None], 2, 0)[..., None]  # its sign does not matter
         moment = moments.derivatives(at, place, 0)[:, 0]
