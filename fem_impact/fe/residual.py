@@ -17,6 +17,7 @@ from typing import Any
 
 import numpy as np
 
+from ..mesh.mesh_files import sides_of
 from .elements import EXPONENTS, collapsed, curvatures, monomials
 from .springs import at_facets
 from .supports import SIDES, cells_of_facets
@@ -130,10 +131,9 @@ class Residual:
 
     def _set_sides(self) -> None:
         space = self.moments.space
-        pairs = np.sort(np.stack([space.vertices[:, side] for side in SIDES], axis=1).reshape(-1, 2), axis=1)
-        key = pairs[:, 0].astype(np.int64) * (int(space.vertices.max()) + 1) + pairs[:, 1]
-        order = np.argsort(key, kind="stable")
-        shared = np.flatnonzero(np.diff(key[order]) == 0)
+        number = sides_of(space.vertices)[1].ravel()
+        order = np.argsort(number, kind="stable")
+        shared = np.flatnonzero(np.diff(number[order]) == 0)
         first, second = order[shared], order[shared + 1]
         self.beside = np.column_stack([first // 3, second // 3])  # (n_sides, 2) cells
         corners = space.corners

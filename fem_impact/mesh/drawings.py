@@ -26,6 +26,7 @@ from .loops import (
     crossed,
     extent,
     polyline,
+    ring,
     segment,
     signed_area,
     tangent,
@@ -75,11 +76,7 @@ def read(source: Any, unit: str | None) -> tuple[Outline, dict[str, np.ndarray],
 
 def _smoothed(points: np.ndarray, notes: list[str]) -> Loop:
     """Loop through points (n, 2): a smooth curve where the turns are small, straight lines elsewhere."""
-    points = check.array("source", points, (None, 2), "m")
-    if len(points) > 1 and np.array_equal(points[0], points[-1]):
-        points = points[:-1]
-    if not 3 <= len(points) <= MOST_PIECES:
-        raise ValueError(f"source must have 3 to {MOST_PIECES} points, got {len(points)}")
+    points = ring("source", points, "points")
     if np.linalg.norm(np.roll(points, -1, axis=0) - points, axis=1).min() == 0.0:
         raise ValueError("source has the same point twice in a row; remove one")
     if signed_area(points) < 0.0:
@@ -191,12 +188,10 @@ def _svg_pieces(whole: Any, svgelements: Any, name: str) -> list[Piece]:
         if isinstance(part, svgelements.Arc):
             centre, a, b = (np.array([p.x, p.y]) for p in (part.center, part.prx, part.pry))
             pieces.append(Arc(centre, a - centre, b - centre, float(part.get_start_t()), float(part.sweep), name))
-        elif isinstance(part, svgelements.CubicBezier):
-            control = [part.start, part.control1, part.control2, part.end]
-            pieces.append(Bezier(np.array([[p.x, p.y] for p in control], float), name))
-        elif isinstance(part, svgelements.QuadraticBezier):
-            control = [part.start, part.control, part.end]
-            pieces.append(Bezier(np.array([[p.x, p.y] for p in control], float), name))
+        elif isinstance(part, (svgelements.CubicBezier, svgelements.QuadraticBezier)):
+            cubic = isinstance(part, svgelements.CubicBezier)
+            inner = (part.control1, part.control2) if cubic else (part.control,)
+            pieces.append(Bezier(np.array([[p.x, p.y] for p in (part.start, *inner, part.end)], float), name))
         elif (
             isinstance(part, (svgelements.Line, svgelements.Close)) and part.start is not None and part.end is not None
         ):

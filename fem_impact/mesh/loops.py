@@ -202,13 +202,19 @@ def _turned(loop: Loop, span: float, anticlockwise: bool) -> Loop:
     return tuple(piece.reversed() for piece in reversed(loop))
 
 
-def straight_loop(name: str, corners: Any, label: str) -> Loop:
-    """Closed polygon through corners (n, 2) [m]; in ``label``, ``{}`` becomes the number of the side's first corner."""
-    points = check.array(name, corners, (None, 2), "m")
+def ring(name: str, given: Any, what: str) -> np.ndarray:
+    """Points (n, 2) [m] of a closed polygon, checked; the first is not repeated at the end."""
+    points = check.array(name, given, (None, 2), "m")
     if len(points) > 1 and np.array_equal(points[0], points[-1]):
         points = points[:-1]
     if not 3 <= len(points) <= MOST_PIECES:
-        raise ValueError(f"{name} must have 3 to {MOST_PIECES} corners, got {len(points)}")
+        raise ValueError(f"{name} must have 3 to {MOST_PIECES} {what}, got {len(points)}")
+    return points
+
+
+def straight_loop(name: str, corners: Any, label: str) -> Loop:
+    """Closed polygon through corners (n, 2) [m]; in ``label``, ``{}`` becomes the number of the side's first corner."""
+    points = ring(name, corners, "corners")
     after = np.roll(points, -1, axis=0)
     gap = np.linalg.norm(after - points, axis=1)
     if gap.min() <= 1e-12 * gap.max():

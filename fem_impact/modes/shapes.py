@@ -230,13 +230,11 @@ class SampledShapes(Shapes, check.Locked):
         found = self.carried[i] @ self.carried[j].T
         if self.rest is not None:
             found += np.where(i[:, None] == j, self.rest[j, 0], 0.0)
-        column = {int(point): k for k, point in enumerate(self.loads)}
-        for k, point in enumerate(i.tolist()):  # by reciprocity
-            if point in column:
-                found[k] = self.static[j, column[point]]
-        for k, point in enumerate(j.tolist()):
-            if point in column:
-                found[:, k] = self.static[i, column[point]]
+        column = np.full(len(self.points), -1)
+        column[self.loads] = np.arange(len(self.loads))
+        rows, columns = column[i], column[j]
+        found[rows >= 0] = self.static[j, rows[rows >= 0, None]]  # by reciprocity
+        found[:, columns >= 0] = self.static[i[:, None], columns[columns >= 0]]
         return found
 
     def compliance_error(self, points: np.ndarray) -> np.ndarray:
