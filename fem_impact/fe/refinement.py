@@ -66,9 +66,7 @@ MOST_MESHES = 8
 # [-] unknowns foretold from the rate at which errors fell, over those allowed, from which on nobody waits for more
 # meshes: rates grow as meshes resolve, and a rate half as large asks for the square of that
 BEYOND = 4.0
-LARGEST_MISSED = (
-    0.99  # [-] of a frequency, by corners: a hundredth of it could be left, and a stated error of 200 is none
-)
+LARGEST_MISSED = 0.99  # [-] of a frequency, by corners: more would state errors above 200, which tell nothing
 
 
 @dataclass(frozen=True, eq=False)

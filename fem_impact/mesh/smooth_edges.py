@@ -4,6 +4,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from .facets import slopes_and_bends
+
 # [rad] a vertex where the rim turns by more is a corner: ten facets of a circle turn by 36 degrees each
 CORNER = np.radians(35.0)
 STRAIGHT = 1e-6  # [rad] a smaller turn is rounding: the rim is straight there
@@ -205,9 +207,7 @@ def _hermite_middles(place: np.ndarray, tangents: np.ndarray, curvatures: np.nda
     length = np.linalg.norm(chord, axis=1)
     along = chord / length[:, None]
     out = np.column_stack([along[:, 1], -along[:, 0]])
-    lean = np.einsum("nei,ni->ne", tangents, out) / np.einsum("nei,ni->ne", tangents, along)
-    slope = lean * length[:, None]
-    bend = -curvatures * (1.0 + lean**2) ** 1.5 * length[:, None] ** 2
+    slope, bend = slopes_and_bends(along, out, length, tangents, curvatures)
     # height s (1 - s) p(s) with p cubic, at s = 1/2
     ends = 0.5 * (slope[:, 0] - slope[:, 1])
     rates = (0.5 * bend[:, 0] + slope[:, 0]) - (-0.5 * bend[:, 1] + slope[:, 1])

@@ -267,10 +267,8 @@ class _Air:
         for i in range(block.start, block.stop) if outside.size else ():
             source = np.tensordot(vectors[window, i], self.strength[window], 1)[None]
             kernel = self._pressing(omega[i])
-            field = irfft2(rfft2(source, self.padded) * rfft2(kernel), self.padded)[
-                0, : source.shape[1], : source.shape[2]
-            ]
-            added = self.weight * np.tensordot(self.strength[outside], field, 2)
+            field = irfft2(rfft2(source, self.padded) * rfft2(kernel), self.padded)[0]
+            added = self.weight * np.tensordot(self.strength[outside], field[: source.shape[1], : source.shape[2]], 2)
             vectors[outside, i] = omega[i] ** 2 * added / (self.old[outside] ** 2 - omega[i] ** 2)
 
     def _solve(
@@ -280,9 +278,8 @@ class _Air:
         middle, half = 0.5 * (band[0] + band[1]), 0.5 * (band[1] - band[0])
         # interpolated from n Chebyshev nodes, cos(k R) errs by 4 Bessel functions J_n(k R) and less, k of half the band
         reach = half / self.speed * self.distance.max()
-        count = max(
-            2, int(np.flatnonzero(jv(np.arange(2.0 * reach + 20.0), reach) > SAME)[-1]) + 1
-        )  # one alone has no span
+        needed = np.flatnonzero(jv(np.arange(2.0 * reach + 20.0), reach) > SAME)
+        count = max(2, int(needed[-1]) + 1)  # one alone has no span
         nodes = middle + half * np.cos(np.pi * (np.arange(count) + 0.5) / count)
         spectrum = rfft2(self.strength[window], self.padded)
         added = BarycentricInterpolator(nodes, [self._added(self.strength[window], spectrum, node) for node in nodes])

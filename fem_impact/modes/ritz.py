@@ -225,9 +225,7 @@ class Krylov:
             value, turn = np.linalg.eigh(inverse)
         value, turn = value[::-1], turn[:, ::-1]
         value = 1.0 / np.maximum(value, np.finfo(float).eps * value[0]) - self.shift
-        few = min(
-            count, self.system.sprung.shape[1]
-        )  # on weak springs, so far below the shift that rounding hides them
+        few = min(count, self.system.sprung.shape[1])  # so far below the shift that rounding hides them
         if few:
             low = self.vectors[:count].T @ turn[:, :few]
             back = np.linalg.eigh(self._flexibility.products(low))[1]
