@@ -29,7 +29,7 @@ L-shaped plate is 33 % above that of Kirchhoff's plate by the membrane, and 13 %
 its shorter side (Sapondzhyan's paradox). Modes that are at rest there follow the relation.
 
 Free and soft edges let beta_t relax within a layer of width h / sqrt(12 kappa), about h/3. `towards_edges` makes the
-triangles shrink to a thickness there. If that takes too many, `missed_by_layers` tells what an unresolved layer misses:
+triangles shrink to a thickness there. If that takes too many, `errors_by_layers` tells what an unresolved layer misses:
 the twisting moment M_nt of the thin plate does work on the relaxation, to first order M_nt^2 width / (2 G h^3/12) per
 length.
 
@@ -266,12 +266,15 @@ def layered(mesh: Mesh, section: Plate, kinds: list[str], coarser: float) -> Mes
     return towards_edges(mesh, loose, coarser * max(LAYER * thin, length / MOST_LAYER))
 
 
-def missed_by_layers(system: Any, vectors: np.ndarray) -> np.ndarray:
-    """Twice the strain energy (n,) that vectors (n_dofs, n) keep as triangles are too large for the edge layers."""
+def errors_by_layers(system: Any, vectors: np.ndarray, loads: np.ndarray, forced: Any = None) -> np.ndarray:
+    """Errors (3, n) of the squared energy norm that vectors keep where triangles are too large for the edge layers.
+
+    The rest is told by a second mesh.
+    """
     space, rim, frame = system.space, system.rim, system.frame
     loose = np.flatnonzero(np.isin(rim.kinds, LOOSE))
     if not loose.size:
-        return np.zeros(vectors.shape[1])
+        return np.zeros((3, vectors.shape[1]))
     cells = supports.cells_of_facets(rim.facets[loose], space.vertices)[0]
     _, x, normal = at_facets(space, rim.facets[loose], cells)
     ds = np.linalg.norm(normal, axis=2)
@@ -288,12 +291,7 @@ def missed_by_layers(system: Any, vectors: np.ndarray) -> np.ndarray:
     bend = curvatures(space.bending(cells, x, (2,))[0])
     unknowns = (system.expand @ vectors)[system.element_dofs[:21, cells]].transpose(1, 0, 2)
     moment = np.einsum("fqi,fqij,fqjk->fqk", turn, stiffness, bend, optimize=True) @ unknowns
-    return np.einsum("fqk,fq->k", moment**2, share * width / rigidity * ds)
-
-
-def errors_by_layers(system: Any, vectors: np.ndarray, loads: np.ndarray, forced: Any = None) -> np.ndarray:
-    """Errors (3, n) of the squared energy norm that vectors have by edge layers; the rest is told by a second mesh."""
-    return np.outer([1.0, 0.0, 0.0], missed_by_layers(system, vectors))
+    return np.outer([1.0, 0.0, 0.0], np.einsum("fqk,fq->k", moment**2, share * width / rigidity * ds))
 
 
 MINDLIN = Theory(

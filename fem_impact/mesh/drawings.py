@@ -13,6 +13,7 @@ import numpy as np
 from .._base import check, isolated
 from .._base.rounding import SAME
 from . import open_paths
+from .facets import angles
 from .loops import (
     FARTHEST,
     LARGEST,
@@ -335,7 +336,7 @@ def _open(name: str, start: np.ndarray, stop: np.ndarray) -> ValueError:
 
 def _loops(name: str, left: list[Piece], span: float, notes: list[str]) -> list[Loop]:
     """Join pieces end to end into closed loops."""
-    starts, stops = (np.array([end(piece) for piece in left]) for end in (_start, _stop))
+    starts, stops = np.stack([piece.at(np.array([0.0, 1.0])) for piece in left], axis=1)
     free = np.ones(len(left), bool)
     loops: list[Loop] = []
     while free.any():
@@ -363,14 +364,6 @@ def _loops(name: str, left: list[Piece], span: float, notes: list[str]) -> list[
     return loops
 
 
-def _start(piece: Piece) -> np.ndarray:
-    return piece.at(np.zeros(1))[0]
-
-
-def _stop(piece: Piece) -> np.ndarray:
-    return piece.at(np.ones(1))[0]
-
-
 def _nested(name: str, loops: list[Loop]) -> Outline:
     """The largest loop becomes the outline, the others its holes; unnamed edges get names."""
     areas = [abs(signed_area(polyline(loop, extent(loop) / 50.0))) for loop in loops]
@@ -390,12 +383,9 @@ def _renamed(piece: Piece, name: str) -> Piece:
 
 def _edges(loop: Loop) -> Loop:
     """Name unnamed pieces edge0, edge1 ...; each corner starts a new edge."""
-    directions = [(tangent(piece, np.zeros(1))[0], tangent(piece, np.ones(1))[0]) for piece in loop]
-    sharp = []
-    for i, (first, _) in enumerate(directions):
-        before = directions[i - 1][1]
-        angle = math.atan2(before[0] * first[1] - before[1] * first[0], float(before @ first))
-        sharp.append(abs(angle) > CORNER)
+    directions = [tangent(piece, np.array([0.0, 1.0])) for piece in loop]
+    before, after = np.stack([directions[-1], *directions[:-1]])[:, 1], np.stack(directions)[:, 0]
+    sharp = (np.abs(angles(before, after)) > CORNER).tolist()
     start = sharp.index(True) if any(sharp) else 0
     number, result = -1, []
     for i in [*range(start, len(loop)), *range(start)]:

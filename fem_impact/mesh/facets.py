@@ -7,6 +7,12 @@ from scipy.special import comb
 CURVE_STEPS = 12
 
 
+def angles(before: np.ndarray, after: np.ndarray) -> np.ndarray:
+    """Turn [rad] from directions (n, 2) to others, positive to the left."""
+    cross = before[:, 0] * after[:, 1] - before[:, 1] * after[:, 0]
+    return np.arctan2(cross, (before * after).sum(axis=1))
+
+
 def powers(x: np.ndarray, highest: int, order: int) -> np.ndarray:
     """The ``order``-th derivative of x**0 ... x**highest, (..., highest + 1)."""
     result = np.zeros((*x.shape, highest + 1))

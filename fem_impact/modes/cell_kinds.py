@@ -60,6 +60,11 @@ def steps(n: int, shapes: Sequence[Any], static: Sequence[Any]) -> dict[str, np.
     return {name: np.stack(each, axis=2) if len(each) else np.zeros((n, 3, 0)) for name, each in named.items()}
 
 
+def spatial(points: np.ndarray) -> np.ndarray:
+    """Points (n, 3) of those with fewer coordinates."""
+    return np.column_stack([points, np.zeros((len(points), 3 - points.shape[1]))])
+
+
 def rows_of(numbers: np.ndarray, wanted: Any) -> np.ndarray:
     """Rows of nodes by their numbers, all of which are known."""
     order = np.argsort(numbers, kind="stable")

@@ -57,7 +57,7 @@ def mesh(path: Path) -> dict[str, np.ndarray]:
     numbers = _labels(path.read_text("utf-8", "replace"))
     if len(numbers) != len(points):
         raise ValueError(f"{path.name} must hold its nodes itself, not in files that it includes")
-    found = {"nodes": _spatial(points), "numbers": numbers}
+    found = {"nodes": cell_kinds.spatial(points), "numbers": numbers}
     return (
         found
         | _names(read.point_sets, numbers)
@@ -72,7 +72,7 @@ def med(path: Path) -> dict[str, np.ndarray]:
 
     h5py.File = closed_hdf5(h5py, path)
     read = meshio.read(path)
-    nodes = _spatial(np.asarray(read.points, float))
+    nodes = cell_kinds.spatial(np.asarray(read.points, float))
     shapes: list[np.ndarray] = []
     static: list[np.ndarray] = []
     frequencies: list[float] = []
@@ -151,10 +151,6 @@ def _names(sets: Any, numbers: np.ndarray) -> dict[str, np.ndarray]:
     """Sets of one node are names."""
     single = {str(name): int(numbers[rows[0]]) for name, rows in sets.items() if len(rows) == 1}
     return {"names": np.array(list(single), str), "named": np.array(list(single.values()), int)}
-
-
-def _spatial(points: np.ndarray) -> np.ndarray:
-    return np.column_stack([points, np.zeros((len(points), 3 - points.shape[1]))])
 
 
 def _labels(text: str) -> np.ndarray:

@@ -22,10 +22,6 @@ PHASE = 0.3  # [-] imaginary over real part, at the best phase, up to which a co
 COMPONENTS = "r1", "r2", "r3"  # along x, y and z
 
 
-def _pyuff() -> Any:
-    return check.extra("pyuff", "uff", "a universal file")
-
-
 def write(
     path: Any, frequencies: np.ndarray, damping_ratio: np.ndarray, shapes: np.ndarray, points: np.ndarray,
     cells: np.ndarray,
@@ -42,9 +38,9 @@ def write(
     points : ndarray, shape (n_points, dimension) [m]
     cells : ndarray, shape (n_cells, 2, 3 or 4), point numbers
     """
-    pyuff, path = _pyuff(), check.path("path", path)
+    pyuff, path = check.extra("pyuff", "uff", "a universal file"), check.path("path", path)
     n_points = len(points)
-    place = np.column_stack([points, np.zeros((n_points, 3 - points.shape[1]))])
+    place = cell_kinds.spatial(points)
     node = np.arange(1, n_points + 1)
     zero, one = np.zeros(n_points, int), np.ones(n_points, int)
     x, y, z = place.T
