@@ -133,19 +133,13 @@ def in_air(
     order = np.argsort(omega, kind="stable")
     whole = block_diag(np.eye(modes.n_rigid), mix[:, order])
     rest = np.zeros(modes.n_rigid)
+    omega, radiated, doubt, unsure = (np.append(rest, each[order]) for each in (omega, radiated, doubt, unsure))
+    before = 0.0 if modes.frequency_error is None else modes.frequency_error
     return Modes(
-        np.concatenate([rest, omega[order]]),
-        modes.damping_ratio + np.concatenate([rest, radiated[order]]),
-        ScaledShapes(modes.shapes, mix=whole),
-        modes.mass,
-        (0.0 if modes.frequency_error is None else modes.frequency_error) + np.concatenate([rest, doubt[order]]),
-        notes=plausible.together(modes.notes, (note,)),
-        poorer=poorer,
-        section=modes.section,
-        thick=modes.thick,
-        air=True,
-        damping_error=np.concatenate([rest, unsure[order]]),
-    )
+        omega, modes.damping_ratio + radiated, ScaledShapes(modes.shapes, mix=whole), modes.mass, before + doubt,
+        notes=plausible.together(modes.notes, (note,)), poorer=poorer, section=modes.section, thick=modes.thick,
+        air=True, damping_error=unsure,
+    )  # fmt: skip
 
 
 def _spacing(modes: Modes, area: float, speed: float) -> float:

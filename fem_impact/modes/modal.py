@@ -656,13 +656,6 @@ def find_modes(
     notes = plausible.together(system.notes, damping_notes(damping, found.omega))
     LOG.info("%d modes up to %.5g Hz", len(found.omega), found.omega[-1] / (2.0 * np.pi))
     return Modes(
-        found.omega,
-        damping,
-        shapes,
-        system.mass,
-        found.error,
-        in_hertz,
-        notes,
-        section=system.section,
+        found.omega, damping, shapes, system.mass, found.error, in_hertz, notes, section=system.section,
         thick=system.rules.thick,
-    )
+    )  # fmt: skip

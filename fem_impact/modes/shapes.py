@@ -310,18 +310,30 @@ def connected_cells(cells: Any, points: np.ndarray) -> np.ndarray | None:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class FieldShapes(Shapes, check.Locked):
-    """Shapes of an FE solution, evaluated anywhere on the body with the shape functions of its elements."""
+class ElementShapes(Shapes):
+    """What shapes by finite elements share."""
 
     system: System
-    vectors: np.ndarray  # (n_dofs, n_modes) [-] mass-normalised in the frame of the system
-    flexibility: Flexibility
-    _under: Remembered = field(default_factory=lambda: Remembered(REMEMBERED), repr=False)  # deflections, by loads
-    _at: Remembered = field(default_factory=lambda: Remembered(REMEMBERED), init=False, repr=False)  # shapes, by point
 
     @property
     def dimension(self) -> int:
         return self.system.mesh.dimension
+
+    def contains(self, points: np.ndarray) -> np.ndarray:
+        return self.system.contains(points)
+
+    def grid(self) -> tuple[np.ndarray, np.ndarray]:
+        return self.system.mesh.points, self.system.mesh.cells
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class FieldShapes(ElementShapes, check.Locked):
+    """Shapes of an FE solution, evaluated anywhere on the body with the shape functions of its elements."""
+
+    vectors: np.ndarray  # (n_dofs, n_modes) [-] mass-normalised in the frame of the system
+    flexibility: Flexibility
+    _under: Remembered = field(default_factory=lambda: Remembered(REMEMBERED), repr=False)  # deflections, by loads
+    _at: Remembered = field(default_factory=lambda: Remembered(REMEMBERED), init=False, repr=False)  # shapes, by point
 
     def at(self, points: np.ndarray) -> np.ndarray:
         if len(points) != 1:
@@ -332,9 +344,6 @@ class FieldShapes(Shapes, check.Locked):
 
     def _shapes(self, points: np.ndarray) -> np.ndarray:
         return self.system.interpolate(points) @ self.vectors * self.system.frame.mass**-0.5
-
-    def contains(self, points: np.ndarray) -> np.ndarray:
-        return self.system.contains(points)
 
     def _deflection(self, loads: np.ndarray) -> point_load.Deflection:
         return self._under.found(loads.tobytes(), lambda: point_load.static_deflection(self.system, loads))
@@ -350,6 +359,3 @@ class FieldShapes(Shapes, check.Locked):
 
     def take(self, n_modes: int) -> "FieldShapes":
         return replace(self, vectors=self.vectors[:, :n_modes].copy())
-
-    def grid(self) -> tuple[np.ndarray, np.ndarray]:
-        return self.system.mesh.points, self.system.mesh.cells

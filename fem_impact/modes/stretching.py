@@ -126,7 +126,7 @@ def _sheet(shapes: Shapes, section: Plate) -> tuple[membrane.Sheet, membrane.Ste
     if isinstance(shapes, (FieldShapes, RitzShapes)):
         system = shapes.system
         _check_supports(system)
-        moved, unit = system.expand @ _vectors(shapes), system.frame.mass**-0.5 / system.frame.length
+        moved, unit = system.expand @ shapes.vectors, system.frame.mass**-0.5 / system.frame.length
 
         def by_elements(cells: np.ndarray, x: np.ndarray) -> np.ndarray:
             slope = system.space.functions(cells, x, (1,))[0]  # (n, 2, n_q, n_local)
@@ -159,20 +159,13 @@ def _tension(shapes: Shapes, section: Beam) -> tuple[np.ndarray, float]:
     """``int w_i' w_j'`` (n, n) of a beam, and its length over E A."""
     if isinstance(shapes, (FieldShapes, RitzShapes)):
         _check_supports(shapes.system)
-        return slopes.products(shapes.system, _vectors(shapes), np.eye(1)), slopes.softness(shapes.system)
+        return slopes.products(shapes.system, shapes.vectors, np.eye(1)), slopes.softness(shapes.system)
     if isinstance(shapes, (BeamShapes, TimoshenkoShapes)):
         if not set(shapes.ends) <= set(HELD):
             raise ValueError(f"{CANNOT}, but an end is free; hold it, or leave stretching out")
         area = float(section.inertia(np.zeros((1, 1)))[0]) / section.material.rho
         return _beam(shapes), shapes.length / (section.material.E * area)
     raise ValueError(f"{CANNOT}, but its shapes are known at points only; leave it out")
-
-
-def _vectors(shapes: FieldShapes | RitzShapes) -> np.ndarray:
-    """The shapes in the unknowns of their system, (n_dofs, n)."""
-    if isinstance(shapes, FieldShapes):
-        return shapes.vectors
-    return np.hstack([shapes.system.rigid, shapes.basis.T @ shapes.turn])[:, : shapes.kept]
 
 
 def _rectangle(shapes: RectangleShapes, points: np.ndarray) -> np.ndarray:
