@@ -135,14 +135,14 @@ class Cases:
         return found
 
     def scene(self) -> dict[str, Any]:
-        """The blow that all cases share, as plain numbers, and which cells these are if not all."""
+        """The blow that all cases share, as plain numbers."""
         case = self.base
         return {
             "target": _plain(case.modes, case.at),
             "striker": _plain(case.striker.modes, case.striker.at),
             "contact": dict(vars(case.contact)),
             "speed": case.speed,
-        } | ({} if self.chosen is None else {"cells": self.chosen.tolist()})
+        }
 
     def sampled(self) -> "Cases":
         """The same cases with each body reduced to its contact points: small enough to send to a cluster."""

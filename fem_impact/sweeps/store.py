@@ -170,20 +170,17 @@ def _made(zarr: Any, place: Any, mark: Mark, n_layers: int, n_cases: int) -> Any
 
 def fingerprint(grid: Any) -> Mark:
     """Digests of everything that determines the results of a map: the blow, the functions and the program."""
-    body = hashlib.sha256(json.dumps(grid.scene(), sort_keys=True).encode())
-    for name, values in grid.axes.items():
-        body.update(f"{name} {values.shape}".encode() + np.ascontiguousarray(values, float).tobytes())
-    striker = grid.base.striker
-    told = grid.tolerance, grid.residual, grid.band, grid.layers, grid.max_impacts, striker.hand, grid.base.first
-    body.update(repr(told).encode() + striker.motion.tobytes())
-    seen = [(modes, np.array([place])) for place, modes in grid.base.views.items()]
+    striker, views = grid.base.striker, grid.base.views
+    seen = [(modes, np.array([place])) for place, modes in views.items()]
+    told = [
+        grid.scene(), dict(grid.axes), grid.chosen, grid.tolerance, grid.residual, grid.band, grid.layers,
+        grid.max_impacts, striker.hand, striker.motion, grid.base.first,
+    ]  # fmt: skip
     for modes, places in seen or [(grid.base.modes, grid.axes.get("at", grid.base.at[None]))]:
         for each in (modes, *modes.poorer.values()):
             yields = [float(each.shapes.compliance(place[None])[0, 0]) for place in places]
-            body.update(repr((each.n_modes, each.stretches, each.thick, each.air, each.unstated, yields)).encode())
-            body.update(each.omega.tobytes() + each.shape_at(places).tobytes())
-            if (spread := each.shapes.spread(places)) is not None:
-                body.update(spread.tobytes())
+            told += [each.stretches, each.thick, each.air, each.unstated, yields]
+            told += [each.omega, each.shape_at(places), each.shapes.spread(places)]
     functions = {}
     for name, function in grid.extra.items():
         try:
@@ -193,7 +190,7 @@ def fingerprint(grid: Any) -> Mark:
                 f"layers: {name!r} cannot be distinguished from other functions ({error}), so a store may mix "
                 "them up; leave out store, or pass a function that does not use it"
             ) from None
-    return {"map": body.hexdigest(), "functions": identity.of(functions), "program": identity.program()}
+    return {"map": identity.of(told), "functions": identity.of(functions), "program": identity.program()}
 
 
 def by_store(grid: Any, path: str | Path, solve: Solve, watch: Watch | None) -> tuple[np.ndarray, Texts]:
