@@ -17,7 +17,7 @@ Kinds = Mapping[str, tuple[type, list[str]]]  # name of a class: the class, and 
 
 
 def kinds(*classes: type, left_out: Collection[str] = ()) -> Kinds:
-    """The dataclasses and named tuples that `save` may meet; fields that are left out have their defaults later."""
+    """The dataclasses and named tuples that `pack` may meet; fields that are left out have their defaults later."""
     found = {}
     for each in classes:
         names = getattr(each, "_fields", None) or [field.name for field in fields(each) if field.init]
@@ -25,15 +25,15 @@ def kinds(*classes: type, left_out: Collection[str] = ()) -> Kinds:
     return found
 
 
-def save(path: Path, key: str, known: Kinds, **things: Any) -> None:
+def pack(path: Path, key: str, known: Kinds, **things: Any) -> None:
     """Write objects found for a key: known classes, mappings, sequences, slices, arrays, texts and numbers in them."""
     arrays: dict[str, np.ndarray] = {}
     told = {name: _packed(thing, known, arrays) for name, thing in things.items()}
     write(path, key, {**arrays, "told": np.array(json.dumps(told))})
 
 
-def load(path: Path, key: str, known: Kinds) -> dict[str, Any] | None:
-    """What `save` wrote for this key, by name, sequences as tuples; None as of `read`. No other class is ever made."""
+def unpack(path: Path, key: str, known: Kinds) -> dict[str, Any] | None:
+    """What `pack` wrote for this key, by name, sequences as tuples; None as of `read`. No other class is ever made."""
     arrays = read(path, key)
     if arrays is None:
         return None

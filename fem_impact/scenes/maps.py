@@ -145,7 +145,7 @@ def _quick_map(
     given = {name: value for name, value in wanted.items() if name != "stage"}
     job = grid.Job(tolerance, band, residual=residual, audit=True, **given)
     try:
-        case, axes = job.body(scene.built, over, stages)
+        case, axes = job.described(scene.built, over, stages)
     except check.SimulationError as error:
         raise check.SimulationError(f"{scene.path}: {error}") from None
     return with_theory(grid.run(case, axes, job), case, axes)

@@ -54,7 +54,7 @@ def save(folder: Path, found: Response | Strokes, points: Any) -> str:
         judged, whole = found.hits[found.hardest], replace(found, target=target, strokes=strokes, hits=hits)
     else:
         judged, whole = found, _known_at(found, points)
-    kept.save(folder / SAVED, _key(folder), KINDS, response=whole, assumptions=judged.assumptions)
+    kept.pack(folder / SAVED, _key(folder), KINDS, response=whole, assumptions=judged.assumptions)
     return SAVED
 
 
@@ -143,7 +143,7 @@ def load_response(folder: str | Path) -> Response | Strokes:
     if not (folder / SAVED).is_file():
         raise fault(folder / SAVED, f"there is no such file, which a blow is read from; {again}")
     try:
-        told = kept.load(folder / SAVED, key, KINDS) or {}
+        told = kept.unpack(folder / SAVED, key, KINDS) or {}
         found, assumptions = told["response"], told["assumptions"]
         if not isinstance(found, Strokes):
             return _checked(found, assumptions)

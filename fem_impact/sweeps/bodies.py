@@ -150,7 +150,7 @@ def by_vectors(
         case = replace(case, first=float(first.frequencies[first.omega > 0.0][0]))
     points = axes.get("at", case.at[None])
     key = _key(target, case, axes, tolerance)
-    known = None if keep is None else kept.load(keep, key, KINDS)
+    known = None if keep is None else kept.unpack(keep, key, KINDS)
     views: Views_ | None = None if known is None else known["views"]
     if views is None:
         others = {name: values for name, values in axes.items() if name != "at"}
@@ -159,7 +159,7 @@ def by_vectors(
         chance = [{name: rng.choice(values) for name, values in others.items()} for _ in range(number - 2)]
         views = Sized(target, case, corners(others), chance, tolerance).views(points, stages)
         if keep is not None and views is not None:
-            kept.save(keep, key, KINDS, views=views)
+            kept.pack(keep, key, KINDS, views=views)
     if views is None:
         return None
     return replace(case, modes=views[tuple(points[0].tolist())], at=points[0], views=views)

@@ -71,7 +71,9 @@ class Job:
             store=None if self.store is None else Path(self.store),
         )
 
-    def body(self, blow: Blow, over: Mapping[str, Any], stages: Stages | None = None) -> tuple[Case, dict[str, Any]]:
+    def described(
+        self, blow: Blow, over: Mapping[str, Any], stages: Stages | None = None
+    ) -> tuple[Case, dict[str, Any]]:
         """The blow on a body described as the map needs it, and the map's axes; as `bodies.body_of`."""
         alone = self.residual and not self.layers
         keep = kept_beside(self.store)
@@ -226,7 +228,7 @@ def sweep(
         over, ours = laid_out(over, contact, alone=alone, cells=cells)
         job = replace(job, ours=ours)
     blow = Blow(Target.of(modes, damping_ratio), striker, contact, {"at": at, "speed": speed})
-    base, axes = job.body(blow, over)
+    base, axes = job.described(blow, over)
     n_cells = math.prod(map(len, axes.values()))
     max_cells = check.number("max_cells", max_cells)
     admit(n_cells, len(LAYERS) + len(job.layers), max_cells, quick=not job.layers, tell=tell)

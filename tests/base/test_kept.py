@@ -61,12 +61,12 @@ def test_no_other_file_is_read(path, raw):
 def test_objects_of_known_classes_come_back_with_what_is_kept_of_them(tmp_path):
     known = kept.kinds(Gong, Blow, left_out={"ringing"})
     gong = Gong(2.0, np.arange(3.0), {(0.1, 0.2): slice(1, 4)}, ringing=len)
-    kept.save(tmp_path / "a.npz", "key", known, blows=[Blow(gong, np.float64(3.0)), None], title="one")
-    found = kept.load(tmp_path / "a.npz", "key", known)
+    kept.pack(tmp_path / "a.npz", "key", known, blows=[Blow(gong, np.float64(3.0)), None], title="one")
+    found = kept.unpack(tmp_path / "a.npz", "key", known)
     assert found["title"] == "one" and found["blows"][1] is None and found["blows"][0].speed == 3.0
     again = found["blows"][0].gong
     assert (again.mass, again.places, again.ringing) == (2.0, {(0.1, 0.2): slice(1, 4)}, None)
     assert_array_equal(again.omega, gong.omega)
-    assert kept.load(tmp_path / "a.npz", "other", known) is None
+    assert kept.unpack(tmp_path / "a.npz", "other", known) is None
     with pytest.raises(KeyError, match="Gong"):
-        kept.load(tmp_path / "a.npz", "key", kept.kinds(Blow))
+        kept.unpack(tmp_path / "a.npz", "key", kept.kinds(Blow))
