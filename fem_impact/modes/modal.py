@@ -14,7 +14,7 @@ from .._base import check, markup
 from .._base.remembered import Remembered
 from .._base.rounding import ROUNDING, SAME
 from ..fe import plausible, refinement
-from ..fe.assembly import THICK, System
+from ..fe.assembly import System
 from ..fe.section import Beam, Plate
 from . import dents, followed, picked, universal_files, unstated, viewing
 from .shapes import (
@@ -664,5 +664,5 @@ def find_modes(
         in_hertz,
         notes,
         section=system.section,
-        thick=system.theory in THICK,
+        thick=system.rules.thick,
     )
