@@ -110,7 +110,7 @@ def test_it_is_a_law_as_any_other():
 
 
 def test_a_blow_deeper_than_the_law_is_known_is_refused():
-    with pytest.raises(ValueError, match=r"deepest must be at least what the blow reaches, 0\.\d+ m, got 0\.002 m"):
+    with pytest.raises(ValueError, match=r"deepest must be at .*, got 0.002 m; give Contact.of a larger one"):
         fi.strike(WALL, BALL, HERTZ, at=None, speed=5.0)
 
 
@@ -125,7 +125,7 @@ def test_a_blow_deeper_than_the_law_is_known_is_refused():
         (lambda d: 10.0 + d, "exponent must lie between 0.5 and 100"),
         (
             lambda d: 1e4 * d + np.round(d / 1e-4),
-            "within 1e-05, but near 0.*; give a larger tolerance or a smaller deepest",
+            "within 1e-05, but near .*; give a larger tolerance or a smaller deepest",
         ),
         (lambda d: 1e4 * d * (1.5 + np.sin(3e5 * d)), "force must grow with the approach"),
     ],
