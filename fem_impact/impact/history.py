@@ -90,7 +90,8 @@ class History(check.Locked):
         return KernelSystem(*bodies, self.law, self.start_q, self.start_p)
 
     def _column(self, first: int) -> np.ndarray:
-        return self.steps[:, layout.HEAD + first : layout.HEAD + layout.WIDTH * self.n_contacts : layout.WIDTH]
+        end = layout.HEAD + layout.WIDTH * len(self.offset)
+        return self.steps[:, layout.HEAD + first : end : layout.WIDTH]
 
     @cached_property
     def impulses(self) -> np.ndarray:
@@ -184,8 +185,9 @@ class History(check.Locked):
         restitution, the second of these over the first; NaN where there is none.
         """
         size = np.abs(self.shape)
-        rate = np.maximum.reduce(np.abs(self._column(layout.SPEED)), axis=None, initial=0.0)
-        deepest = np.maximum.reduce(self._column(0), axis=None, initial=0.0)
+        pushes = self.steps[:, layout.HEAD : layout.HEAD + layout.WIDTH * len(size)]
+        rate = np.maximum.reduce(np.abs(pushes[:, layout.SPEED :: layout.WIDTH]), axis=None, initial=0.0)
+        deepest = np.maximum.reduce(pushes[:, :: layout.WIDTH], axis=None, initial=0.0)
         way = max((size @ (np.abs(self.start_q) + self.end_time * np.abs(self.start_p))).tolist())
         slack = float(max(ROUNDING * way, TOUCH * deepest))
         found = record.find_impacts(self.steps, self.now, self.law, PEAK_LOOKS, ROUNDING * rate, slack)
