@@ -1,5 +1,6 @@
 """How a small change of a body's section changes the energies of its shapes: derivatives of K and M along vectors."""
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
 
@@ -60,14 +61,43 @@ def energy_changes(system: System, change: SectionChange, vectors: np.ndarray) -
         each = [system.rules.energies(system, section, vectors) for section in change.sections]
         K, M = (sum(weight * one for weight, one in zip(change.weights, pair)) for pair in zip(*each))
         return np.asarray(K), np.asarray(M)
-    points, whole, n = slopes.quadrature(system), unknowns_of_cells(system, vectors), vectors.shape[1]
+    points, n = slopes.quadrature(system), vectors.shape[1]
     found = {"K": np.zeros((n, n)), "M": np.zeros((n, n))}
+    for matrix, cells, moved, pushed in _pushed(system, change, vectors, points):
+        pushed = pushed * points.dx[cells][..., None, None]
+        found[matrix] += moved.reshape(-1, n).T @ pushed.reshape(-1, n)
+    return found["K"], found["M"]
+
+
+def frequency_densities(system: System, change: SectionChange, vectors: np.ndarray, square: np.ndarray) -> np.ndarray:
+    """How much a change at each place changes modes: relative changes of frequencies (n_cells, n_q, n).
+
+    They are per unit of the number and per area [1/m^2], or length [1/m] of a beam, at the points of
+    `slopes.quadrature`, for flat bodies and shells without ribs whose section changes in its thickness only.
+
+    Parameters
+    ----------
+    system, change : as in `energy_changes`
+    vectors : ndarray, shape (n_dofs, n), mass-normalised modes in the frame
+    square : ndarray, shape (n,) [-] their eigenvalues in the frame, positive
+    """
+    points = slopes.quadrature(system)
+    found = np.zeros((*points.dx.shape, vectors.shape[1]))
+    for matrix, cells, moved, pushed in _pushed(system, change, vectors, points):
+        found[cells] += (moved * pushed).sum(axis=2) / square if matrix == "K" else -(moved * pushed).sum(axis=2)
+    return 0.5 * found / system.frame.length ** points.x.shape[-1]
+
+
+def _pushed(system: System, change: SectionChange, vectors: np.ndarray, points: Any) -> Iterator[tuple[Any, ...]]:
+    """Of every part of the energies and block of cells: "K" or "M", cells, strains or motions, and stresses by these.
+
+    Both are (n_cells, n_q, n_parts, n), of each vector; the stresses are changes per unit of a number.
+    """
+    whole = unknowns_of_cells(system, vectors)
     for cells in blocks(len(points.x)):
-        own, dx = whole[cells][:, None], points.dx[cells][..., None, None]  # (n_cells, 1, n_local, n)
+        own = whole[cells][:, None]  # (n_cells, 1, n_local, n)
         for matrix, name, parts in system.rules.terms(system.space, points, cells):
             fields = (system.frame.field(each, name, points.x[cells]) for each in change.sections)
             rate: Any = sum(weight * field for weight, field in zip(change.weights, fields))
-            moved = parts @ own  # (n_cells, n_q, n_parts, n)
-            pushed = (rate * dx) @ moved if rate.ndim > 2 else rate[..., None, None] * dx * moved
-            found[matrix] += moved.reshape(-1, n).T @ pushed.reshape(-1, n)
-    return found["K"], found["M"]
+            moved = parts @ own
+            yield matrix, cells, moved, rate @ moved if rate.ndim > 2 else rate[..., None, None] * moved
