@@ -324,6 +324,22 @@ def hammer(options: argparse.Namespace) -> Answer:
     return hammer_commands.hammer(options)
 
 
+def tune(options: argparse.Namespace) -> Answer:
+    """Say what to take off where, so that modes sound at pitches."""
+    from .designs import tuning  # imported only when needed
+
+    picture, wanted = _drawn(options, "tuning.png"), tuning.given(options.pitch)
+    names = ("match", "depth", "radius", "mirror", "patches", "tolerance")
+    with _display(options)("modes"), warnings.catch_warnings():
+        warnings.simplefilter("ignore", fi.ToleranceWarning)  # the first line of the summary says it
+        found = fi.tune(options.scene, wanted, **{name: getattr(options, name) for name in names})
+    if picture is not None:
+        with staged(picture.parent, "tune") as staging:
+            fi.figures.save(staging / picture.name, found.figure())
+    verdict, *lines = found.summary().splitlines()
+    return _answer_of_file(found.data(), [verdict, lines], picture, missed=not found.met)
+
+
 def watch(options: argparse.Namespace) -> Answer | None:
     """Judge the records of taps that a folder gets."""
     from . import hammer_commands  # imported only when needed

@@ -15,13 +15,15 @@ from ..impact import promise
 from ..model.target import Target
 from ..modes.modal import Modes
 from ..scenes.scene import Scene, load_scene
+from ..show import outlined
 from . import pitches as wishes
 from .pitches import Pitch, cents, note
 from .removal import Dishes, Sensitivity, check_body, images, thickness
-from .thinning import Body, Solved, Thinning
+from .thinning import Body, Solved, Thinning, drawn
 
 DEPTH = 0.2  # [-] greatest depth by default over the least thickness: what is left is still about the same body
 RADIUS = 0.12  # [-] of the root of a plate's area, or of a bar's length: about what a thumb rubs off an instrument
+FINEST = 15  # [-] smallest radius goes so often into that root: a thousand places are looked at
 PER_AREA = 1e-8  # [m^3] fact: 0.1 mm off a square centimetre
 MIRRORS = "x", "y", "xy"  # a bar has the first
 
@@ -41,7 +43,7 @@ class Patch(check.Brief):
     def words(self) -> str:
         """What to do, and what comes of it."""
         here = " and ".join(f"({', '.join(f'{x:.4g}' for x in each)})" for each in self.at)
-        moved = ", ".join(f"mode {mode} {value:+.3g} cents" for mode, value in zip(self.modes, self.cents))
+        moved = ", ".join(f"mode {mode} {value:+.1f} cents" for mode, value in zip(self.modes, self.cents))
         return f"{1e3 * self.depth:.3g} mm at {here} m, radius {1e3 * self.radius:.3g} mm: {moved}"
 
     def data(self) -> dict[str, Any]:
@@ -120,6 +122,21 @@ class Tuning(check.Brief):
     @cached_property
     def _slopes(self) -> Sensitivity:
         return self.before.sensitivity
+
+    def figure(self) -> Any:
+        """A matplotlib figure: the map of each mode on the outline, and the patches with their numbers and depths."""
+        points, cells = drawn(self.before.modes)
+        titles = [
+            f"mode {each.pitch.mode}: {each.before:.5g} Hz, wanted {each.pitch.words}, off by {each.off:+.1f} cents"
+            if each.pitch.words else f"mode {each.pitch.mode}: {each.before:.5g} Hz"
+            for each in self.tones
+        ]  # fmt: skip
+        numbers = [self.body.numbers.index(each.pitch.mode) for each in self.tones]
+        dishes = [
+            (each.at, each.radius, [f"{i}: {1e3 * each.depth:.2g} mm, {each.cents[k]:+.1f} cents" for k in numbers])
+            for i, each in enumerate(self.patches, 1)
+        ]
+        return outlined.marked(points, cells, PER_AREA * self.map[:, numbers], titles, dishes)
 
     @check.typed
     def patch(self, at: Any, depth: float, *, radius: float | None = None) -> Patch:
@@ -256,7 +273,7 @@ def tune(
     start = Body.of(target, wanted, tolerance)
     before = start.first()
     size = before.system.mesh.area ** (1.0 / before.modes.dimension)
-    radius = RADIUS * size if radius is None else check.positive("radius", radius, "m")
+    radius = RADIUS * size if radius is None else check.between("radius", radius, size / FINEST, size, "m")
     thinnest = float(thickness(before.system.section, before.system.mesh.points).min())
     depth = DEPTH * thinnest if depth is None else check.positive("depth", depth, "m")
     if depth >= thinnest:
@@ -267,6 +284,16 @@ def tune(
     if not made.met:
         promise.warn(made.verdict)
     return made
+
+
+def given(words: Sequence[str]) -> Any:
+    """Pitches as the prompt has them: each "MODE=PITCH", or none of them with a mode."""
+    split = [text.partition("=") for text in words]
+    if not any(equals for _, equals, _ in split):
+        return list(words)
+    if not all(equals and mode.strip().isdigit() for mode, equals, _ in split):
+        raise ValueError("--pitch must be MODE=PITCH, as in 2=A5, for all pitches or for none")
+    return {int(mode): pitch.strip() or None for mode, _, pitch in split}
 
 
 def _target(body: System | Scene | str | Path) -> Target:

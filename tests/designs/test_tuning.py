@@ -1,11 +1,14 @@
 """`fi.tune`: what it says of cents holds for bodies made anew; a marimba bar; random plates; what it cannot do."""
 
+import json
+
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
 import fem_impact as fi
-from fem_impact.designs import removal
+from fem_impact.cli import main
+from fem_impact.designs import removal, tuning
 from fem_impact.designs.removal import PER_CENT, Dishes
 
 WOOD = fi.Material(E=16e9, nu=0.35, rho=900.0)
@@ -83,6 +86,11 @@ def test_arguments_are_checked():
         fi.tune(bar, {1: "-5 cents"}, depth=0.02)
     with pytest.raises(ValueError, match="mirror must be one of x, got 'y'"):
         fi.tune(bar, {1: "-5 cents"}, mirror="y")
+    with pytest.raises(ValueError, match=r"radius must lie between 0\.0233333 and 0\.35 m"):
+        fi.tune(bar, {1: "-5 cents"}, radius=1e-3)
+    with pytest.raises(ValueError, match="--pitch must be MODE=PITCH, as in 2=A5"):
+        tuning.given(["A4", "2=A5"])
+    assert tuning.given(["A4", "A5"]) == ["A4", "A5"] and tuning.given(["2=A5", "3="]) == {2: "A5", 3: None}
     with pytest.raises(ValueError, match=r"\[target\] must not state mass, .*; leave them out"):
         fi.tune("studies/scenes/heavy_plate.toml", {1: "-5 cents"})
 
@@ -95,6 +103,7 @@ def outline(rng):
 
 
 @pytest.mark.slow
+@pytest.mark.thin(3)
 @pytest.mark.parametrize("seed", range(3))
 def test_plates_of_random_outlines_are_tuned_as_told(seed):
     """Each claim in cents holds for a body made anew and solved to a finer tolerance."""
@@ -108,3 +117,14 @@ def test_plates_of_random_outlines_are_tuned_as_told(seed):
         said = 1200.0 * np.log2(frequency / tone.after)
         assert abs(said) < tone.error_after + 0.05  # 2e-5 of the finer body is 0.03 cents
         assert abs(1200.0 * np.log2(frequency / tone.wanted)) < 1.0 + tone.error_after
+
+
+def test_the_command_tells_prints_and_draws(tmp_path, capsys):
+    path = tmp_path / "tuning.png"
+    words = ["tune", "studies/scenes/marimba_bar.toml", "--pitch", "F#5", "--mirror", "x", "--json", "--out", str(path)]
+    assert main(words) == 0
+    said = json.loads(capsys.readouterr().out)
+    (tone,), (patch,) = said["tones"], said["patches"]
+    assert said["met"] and abs(tone["left"]) < 1.0 and tone["wanted"] == pytest.approx(739.9888454)
+    assert tone["left"] - tone["off"] == pytest.approx(patch["cents"][0])
+    assert path.read_bytes().startswith(b"\x89PNG")
