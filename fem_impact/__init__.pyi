@@ -4,6 +4,7 @@ from . import mesh as mesh
 from ._base.check import SimulationError as SimulationError
 from ._base.check import ToleranceWarning as ToleranceWarning
 from .designs.search import design as design
+from .designs.tuning import tune as tune
 from .fe.assembly import assemble as assemble
 from .fe.material import Material as Material
 from .fe.material import yield_strength as yield_strength

@@ -6,7 +6,7 @@ FORMAT = 1  # number of the format of all answers; it grows when a key changes i
 STATUSES = {
     0: "done", 1: "the run failed", 2: "bad input", 3: "done, but the tolerance is missed", 130: "interrupted",
 }  # fmt: skip
-MISSES = ("strike", "report")  # commands that end with 3 where the tolerance is missed
+MISSES = ("strike", "report", "tune")  # commands that end with 3 where the tolerance is missed
 
 Keys = dict[str, tuple[str, str]]  # key: JSON type (with "?" if it may be left out), and meaning
 ALL: Keys = {
@@ -89,6 +89,13 @@ KEYS: dict[str, Keys] = {
         "verdicts": ("array?", "with --rove: of every point whether a tip works, or why none does"),
         "resolution": ("number?", "with --rove: frequency resolution [Hz]"),
     },
+    "tune": {
+        "tones": ("array", "of each mode pitch, frequency and wanted [Hz], off and error [cents], and then "
+                  "tuned [Hz], left and tuned_error [cents]"),
+        "patches": ("array", "of each its places at [m], radius [m], depth [m], modes, cents (solved) and by_slopes"),
+        "met": ("boolean", "whether every pitch is within the tolerance"),
+        "volume": ("number", "taken off [m^3]"),
+    } | _alike("see `fi.tune`", "tolerance depth radius mirror"),
     "watch": {
         "records": ("array", "of each tap file, tap, good, said, peak [N], reach [Hz] (null: beyond half the rate)"),
         "n_good": ("integer", "good taps so far"),
@@ -147,6 +154,7 @@ KEYS: dict[str, Keys] = {
 }  # fmt: skip
 
 EXAMPLES: dict[str, tuple[str, ...]] = {
+    "tune": ("fem-impact tune studies/scenes/marimba_bar.toml --pitch F#5 --mirror x --out out/tuning.png",),
     "strike": (
         "fem-impact strike studies/scenes/drumstick.toml --tolerance 1e-3 --out out",
         "fem-impact strike studies/scenes/drumstick.toml --listener 0.2 0.1 1.0 --json",

@@ -206,6 +206,19 @@ COMMANDS = {
         _out("hammers.png, or rove.png and .csv, or hammers.html", "none", "picture or page"),
         _format(None),
     ), "a TOML file; its body and strike point are used"),
+    "tune": Command("say what to take off a plate or bar where, so that its modes sound at pitches", commands.tune, (
+        _option("--pitch", "PITCH", "of the next mode, or MODE=PITCH: Hz, a note (A4, \"Bb3 -5 cents\"), \"-14 cents\" "
+                "from now, or \"ratio 4\" to the first; repeatable", action="append", required=True),
+        _option("--match", None, "whether pitches belong to modes in order, or to the nearest (default: order)",
+                choices=("order", "nearest"), default="order"),
+        _option("--depth", "M", "greatest depth [m] (default: a fifth of the thickness)", float),
+        _option("--radius", "M", "radius of the patches [m] (default: an eighth of the body)", float),
+        _option("--mirror", None, "along which axes patches have images", choices=("x", "y", "xy")),
+        _option("--patches", "N", "most patches (default: 6)", int, default=6),
+        _option("--tolerance", "CENTS", "how near to come (default: 1)", float, default=1.0),
+        _out("tuning.png", "none", "picture"),
+        _format(None),
+    ), "a TOML file, such as studies/scenes/marimba_bar.toml"),
     "watch": Command("judge every record of taps that a folder gets: good, or what to do", _later("watch"), (
         _option("--bandwidth", "F", "bandwidth that taps must reach [Hz]", float, required=True),
         _option("--drop", "D", "how far the spectrum may fall within the bandwidth [dB] (default: 10)", float,

@@ -288,6 +288,22 @@ def _split(option: str, text: str) -> tuple[str, str]:
     return name.strip(), value.strip()
 
 
+def tune(options: argparse.Namespace) -> Answer:
+    """Say what to take off where, so that modes sound at pitches."""
+    from .designs import tuning  # imported only when needed
+
+    picture, wanted = picture_of(options, "tuning.png"), tuning.given(options.pitch)
+    names = ("match", "depth", "radius", "mirror", "patches", "tolerance")
+    with progress_of(options)("modes"), warnings.catch_warnings():
+        warnings.simplefilter("ignore", fi.ToleranceWarning)  # the first line of the summary says it
+        found = fi.tune(options.scene, wanted, **{name: getattr(options, name) for name in names})
+    if picture is not None:
+        with staged(picture.parent, "tune") as staging:
+            fi.figures.save(staging / picture.name, found.figure())
+    verdict, *lines = found.summary().splitlines()
+    return answer_of_file(found.data(), [verdict, lines], picture, missed=not found.met)
+
+
 def report(options: argparse.Namespace) -> Answer:
     """Strike and write a page."""
     scene = fi.report.read(options.scene)

@@ -359,6 +359,8 @@ def stated() -> dict[str, dict[str, Any]]:
         "design": {"objects": t["path"], "wanted": {"contact_time": (1e-6, 1.0)},
             "free": {"striker.mass": (0.02, 0.05)}, "least": "striker.mass", "start": {"striker.mass": 0.03},
             "tolerance": 1e-2, "n_modes": 5},
+        "tune": {"body": fi.assemble(fi.mesh.line(0.35), t["beam"]), "pitches": {1: "-20 cents"}, "match": "order",
+            "depth": 2e-3, "radius": 0.04, "mirror": "x", "patches": 4, "tolerance": 2.0},
         "figures.edges": {"mesh": t["square"]},
         "figures.spread": {"found": t["spread"]},
         "mesh.Mesh.refined": {"self": t["square"]},

@@ -71,9 +71,9 @@ DOORS = {  # what these packages may use of those above: what a user does, and m
         "show.export", "show.plots", "show.sampling", "sweeps.bodies", "sweeps.hammers",
     },
     "designs": MODELS | BLOWS | {
-        "fe.assembly", "fe.section", "fe.variation", "impact.clearance", "impact.gradient", "impact.parameters",
-        "impact.promise", "impact.quantities", "mesh.meshes", "model.budget", "modes.varied", "taps.arguments",
-        "taps.solver", "taps.unknowns",
+        "fe.assembly", "fe.refinement", "fe.section", "fe.slopes", "fe.system", "fe.variation", "impact.clearance",
+        "impact.gradient", "impact.parameters", "impact.promise", "impact.quantities", "mesh.meshes", "model.budget",
+        "modes.varied", "modes.viewing", "show.outlined", "taps.arguments", "taps.solver", "taps.unknowns",
     },
 }  # fmt: skip
 

@@ -1,6 +1,6 @@
 """Integrals of the slopes of a body's shapes: how much a deflection lengthens what lies in its plane."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from typing import Any
 
 import numpy as np
@@ -41,15 +41,27 @@ def energies(
 
     ``field`` gives one of the section's by its name at places (n, n_q, dimension), in the frame.
     """
-    points, whole, n = quadrature(system), unknowns_of_cells(system, vectors), vectors.shape[1]
+    points, n = quadrature(system), vectors.shape[1]
     found = {"K": np.zeros((n, n)), "M": np.zeros((n, n))}
-    for cells in blocks(len(points.x)):
-        own, dx = whole[cells][:, None], points.dx[cells][..., None, None]  # (n_cells, 1, n_local, n)
-        for matrix, name, parts in system.rules.terms(space, points, cells):
-            weight, moved = field(name, points.x[cells]), parts @ own  # (n_cells, n_q, n_parts, n)
-            pushed = (weight * dx) @ moved if weight.ndim > 2 else weight[..., None, None] * dx * moved
-            found[matrix] += moved.reshape(-1, n).T @ pushed.reshape(-1, n)
+    for matrix, cells, moved, pushed in stressed(system, space, field, vectors, points):
+        pushed = pushed * points.dx[cells][..., None, None]
+        found[matrix] += moved.reshape(-1, n).T @ pushed.reshape(-1, n)
     return found["K"], found["M"]
+
+
+def stressed(
+    system: System, space: Any, field: Callable[[str, np.ndarray], np.ndarray], vectors: np.ndarray, points: Points
+) -> Iterator[tuple[str, np.ndarray, np.ndarray, np.ndarray]]:
+    """Of every term of the energies and block of cells: "K" or "M", cells, strains or motions, and stresses by these.
+
+    Both are (n_cells, n_q, n_parts, n), of each vector; the arguments are those of `energies`, and its points.
+    """
+    whole = unknowns_of_cells(system, vectors)
+    for cells in blocks(len(points.x)):
+        own = whole[cells][:, None]  # (n_cells, 1, n_local, n)
+        for matrix, name, parts in system.rules.terms(space, points, cells):
+            weight, moved = field(name, points.x[cells]), parts @ own
+            yield matrix, cells, moved, weight @ moved if weight.ndim > 2 else weight[..., None, None] * moved
 
 
 def quadrature(system: System, nodes: int = NODES) -> Points:

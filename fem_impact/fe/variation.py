@@ -1,5 +1,6 @@
 """How a small change of a body's section changes the energies of its shapes: derivatives of K and M along vectors."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
@@ -59,9 +60,33 @@ def energy_changes(system: System, change: SectionChange, vectors: np.ndarray) -
         each = [system.rules.energies(system, section, vectors) for section in change.sections]
         K, M = (sum(weight * one for weight, one in zip(change.weights, pair)) for pair in zip(*each))
         return np.asarray(K), np.asarray(M)
+    return slopes.energies(system, system.space, _rate(system, change), vectors)
+
+
+def frequency_densities(system: System, change: SectionChange, vectors: np.ndarray, square: np.ndarray) -> np.ndarray:
+    """How much a change at each place changes modes: relative changes of frequencies (n_cells, n_q, n).
+
+    They are per unit of the number and per area [1/m^2], or length [1/m] of a beam, at the points of
+    `slopes.quadrature`, for flat bodies and shells without ribs whose section changes in its thickness only.
+
+    Parameters
+    ----------
+    system, change : as in `energy_changes`
+    vectors : ndarray, shape (n_dofs, n), mass-normalised modes in the frame
+    square : ndarray, shape (n,) [-] their eigenvalues in the frame, positive
+    """
+    points = slopes.quadrature(system)
+    found = np.zeros((*points.dx.shape, vectors.shape[1]))
+    for matrix, cells, moved, pushed in slopes.stressed(system, system.space, _rate(system, change), vectors, points):
+        found[cells] += (moved * pushed).sum(axis=2) / square if matrix == "K" else -(moved * pushed).sum(axis=2)
+    return 0.5 * found / system.frame.length ** points.x.shape[-1]
+
+
+def _rate(system: System, change: SectionChange) -> Callable[[str, np.ndarray], np.ndarray]:
+    """The rate at which a field of the section changes, by its name at places in the frame."""
 
     def rate(name: str, x: np.ndarray) -> np.ndarray:
         fields = (system.frame.field(each, name, x) for each in change.sections)
         return np.asarray(sum(weight * field for weight, field in zip(change.weights, fields)))
 
-    return slopes.energies(system, system.space, rate, vectors)
+    return rate

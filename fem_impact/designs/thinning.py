@@ -1,0 +1,255 @@
+"""The search of `tune`: least material off, by linear programs over places of a body that is solved again and again."""
+
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from scipy.optimize import linprog
+
+from .._base import check
+from .._base.check import SimulationError
+from ..fe import refinement
+from ..fe.assembly import reassemble
+from ..fe.system import System
+from ..model.target import RIGID_MOTIONS, Target
+from ..modes import modal
+from ..modes.modal import Modes
+from ..modes.varied import sharing
+from ..modes.viewing import grid
+from . import pitches as wishes
+from .pitches import CENTS, Pitch, cents
+from .removal import Dishes, Places, Sensitivity, thickness, thinner
+
+SPARE = 2  # [-] modes found above the highest wanted, to follow it if it passes them
+SHARE = 0.25  # [-] of the tolerance that frequencies may err by: what is said of a pitch is then true
+AIM = 0.5  # [-] of the tolerance that the search leaves: as much as it may err
+SAME_MODE = 0.5  # [-] least squared cosine between the shapes of a mode before and after: else it is another
+PENALTY = 100.0  # [-] places taken down to the greatest depth that a miss of a cent weighs: more than any pitch costs
+FIRST_STEP = 0.1  # [-] of the least thickness by which the first step may change it: slopes then hold to a tenth or two
+MOST_STEPS = 40  # [-] bodies solved in a search: those of a bar cut to a third of its height take 25
+ALONG = 200  # [-] pieces of a bar where its modes are compared and drawn: ten for each half wave of the twentieth
+ENOUGH = 0.01  # [-] of what is taken off that another step would have to save
+NEGLIGIBLE = 0.02  # [-] of the deepest patch, below which one is left out
+
+
+def drawn(modes: Modes) -> tuple[np.ndarray, np.ndarray]:
+    """Points (n_points, dimension) [m] and cells (n_cells, dimension + 1) all over a body, to draw and compare shapes.
+
+    The elements of a bar are too few for that.
+    """
+    points, cells = grid(modes)
+    if modes.dimension == 2:
+        return points, cells
+    here = np.arange(ALONG)
+    return np.linspace(points.min(axis=0), points.max(axis=0), ALONG + 1), np.column_stack([here, here + 1])
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Solved(check.Brief):
+    """A body and those of its modes that are looked at."""
+
+    modes: Modes
+    which: np.ndarray  # (n,) their numbers among all modes
+
+    @property
+    def system(self) -> System:
+        """The body of elements."""
+        shapes: Any = self.modes.shapes
+        found: System = shapes.system
+        return found
+
+    @property
+    def frequencies(self) -> np.ndarray:
+        """(n,) [Hz]."""
+        return self.modes.frequencies[self.which]
+
+    @property
+    def errors(self) -> np.ndarray:
+        """Stated errors of the frequencies, (n,) [cents]."""
+        assert self.modes.frequency_error is not None
+        return np.asarray(cents(1.0 + self.modes.frequency_error[self.which]))
+
+    @cached_property
+    def sensitivity(self) -> Sensitivity:
+        """What taking material off does."""
+        shapes: Any = self.modes.shapes
+        return Sensitivity.of(self.system, shapes.vectors[:, self.which], self.modes.omega[self.which])
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Body(check.Brief):
+    """The body to be tuned, and the modes that are looked at."""
+
+    target: Target
+    pitches: tuple[Pitch, ...]
+    numbers: tuple[int, ...]  # of the flexible modes looked at, from 1
+    start: Modes
+    close: float  # [-] largest relative error of frequencies
+
+    @classmethod
+    def of(cls, target: Target, pitches: tuple[Pitch, ...], tolerance: float) -> "Body":
+        """With the modes that pitches mean, for a tolerance [cents]."""
+        close = min(SHARE * (2.0 ** (tolerance / CENTS) - 1.0), refinement.LOOSEST)
+        unsettled = not pitches[0].mode
+        count = max(len(pitches) + SPARE, *(each.mode for each in pitches)) + SPARE + RIGID_MOTIONS
+        modes = target.find(count, tolerance=close)
+        while unsettled and modes.frequencies[-1] < 2.0 * max(each.frequency or 0.0 for each in pitches):
+            modes = target.find(2 * modes.n_modes, tolerance=close)
+        if unsettled:
+            pitches = wishes.settled(pitches, modes.frequencies[modes.n_rigid :])
+        numbers = {each.mode for each in pitches} | {1 for each in pitches if each.ratio is not None}
+        found = cls(target, pitches, tuple(sorted(numbers)), modes, close)
+        found.check_single(modes)
+        return found
+
+    @cached_property
+    def points(self) -> np.ndarray:
+        """Places (n, dimension) [m] all over the body."""
+        return drawn(self.start)[0]
+
+    def check_single(self, modes: Modes) -> None:
+        """Raise SimulationError if a mode looked at shares its frequency with another."""
+        shared = sharing(modes).sum(axis=0) > 1
+        for number in self.numbers:
+            if shared[modes.n_rigid + number - 1]:
+                raise SimulationError(
+                    f"mode {number} at {modes.frequencies[modes.n_rigid + number - 1]:.6g} Hz shares its frequency "
+                    "with another: a patch splits the pair, and neither has a slope of its own; start from a body "
+                    "without this symmetry, or want other modes"
+                )
+
+    def first(self) -> Solved:
+        """As it stands."""
+        return Solved(self.start, self.start.n_rigid + np.array(self.numbers) - 1)
+
+    def after(self, dishes: Dishes, before: Solved) -> Solved:
+        """With dishes, its modes followed by their shapes from a body much like it."""
+        system, whole = before.system, self.first().system.section
+        body = reassemble(replace(system, section=thinner(whole, dishes.depth)), system.mesh)
+        wanted = None if self.target.size_stated else self.close
+        modes = modal.find_modes(body, n_modes=self.start.n_modes, tolerance=wanted)
+        points = self.points
+        old, new = before.modes.shapes.at(points)[:, before.which], modes.shapes.at(points)
+        cosines = (old.T @ new) ** 2 / ((old**2).sum(axis=0)[:, None] * (new**2).sum(axis=0))
+        cosines[:, : modes.n_rigid] = 0.0
+        which = cosines.argmax(axis=1)
+        if cosines.max(axis=1).min() < SAME_MODE or len(set(which)) < len(which):
+            lost = int(cosines.max(axis=1).argmin())
+            raise SimulationError(
+                f"mode {self.numbers[lost]} is no longer to be told from others after this removal; take less depth"
+            )
+        return Solved(modes, which)
+
+    def wanted(self, first: np.ndarray, now: np.ndarray, pitch: Pitch) -> float:
+        """The frequency [Hz] wanted of a mode, from those (n,) [Hz] of all looked at at first and now."""
+        if not pitch.words:
+            return float(first[self.numbers.index(pitch.mode)])
+        return pitch.wanted(now if pitch.ratio is not None else first, self.numbers)
+
+
+@dataclass(eq=False)
+class Thinning:
+    """One search: places that a body may be thinned at, and where it stands."""
+
+    body: Body
+    before: Solved
+    depth: float  # [m] greatest
+    radius: float  # [m]
+    mirror: str
+    tolerance: float  # [cents]
+    n_solved: int = 1
+    rows: tuple[Pitch, ...] = field(init=False)
+
+    def __post_init__(self) -> None:
+        self.rows = tuple(each for each in self.body.pitches if each.words)
+
+    def misses(self, solved: Solved) -> np.ndarray:
+        """How far each pitch is missed, (n_pitches,) [cents]."""
+        first, now = self.before.frequencies, solved.frequencies
+        own = now[[self.body.numbers.index(each.mode) for each in self.rows]]
+        return np.asarray(cents(own, [self.body.wanted(first, now, each) for each in self.rows]))
+
+    def slopes(self, solved: Solved, places: Places) -> tuple[np.ndarray, np.ndarray]:
+        """Changes of the misses (n_pitches, n_places) [cents/m] with depths, and areas (n_places,) [m^2]."""
+        each, areas = map(places.summed, solved.sensitivity.of_dishes(places.middles, self.radius))
+        columns = each.T
+        own = columns[[self.body.numbers.index(row.mode) for row in self.rows]]
+        for i, row in enumerate(self.rows):
+            if row.ratio is not None:
+                own[i] -= columns[self.body.numbers.index(1)]
+        return own, areas
+
+    def area(self, middles: np.ndarray) -> float:
+        """Volume per depth [m^2] of dishes around middles (n, dimension) [m]."""
+        return float(self.before.sensitivity.of_dishes(middles, self.radius)[1].sum())
+
+    def run(self, most: int) -> list[tuple[np.ndarray, float]]:
+        """At most so many places, each with its images and depth, from the largest."""
+        places = Places.over(self.before.system, self.radius, self.mirror)
+        share, solved = self.settle(places, np.zeros(len(places.first)), self.before)
+        order = np.argsort(-share, kind="stable")
+        keep = order[share[order] > NEGLIGIBLE * share.max()][:most] if share.any() else order[:0]
+        if len(keep) < np.count_nonzero(share) and len(keep):
+            places = places.some(keep)
+            begun = self.after(places, share[keep], solved)
+            share, _ = self.settle(places, share[keep], begun)
+            order = np.argsort(-share, kind="stable")
+            keep = order[share[order] > 0.0]
+        return [(places.middles[places.owners == k], float(share[k] * self.depth)) for k in keep]
+
+    def after(self, places: Places, share: np.ndarray, near: Solved) -> Solved:
+        """The body with dishes of shares (n_places,) of the greatest depth."""
+        self.n_solved += 1
+        return self.body.after(places.dishes(share * self.depth), near)
+
+    def settle(self, places: Places, share: np.ndarray, solved: Solved) -> tuple[np.ndarray, Solved]:
+        """Shares (n_places,) of the greatest depth that take least off, and the body then; from shares to start at."""
+        room, overlaps = AIM * self.tolerance, places.overlaps
+        trust = FIRST_STEP * self.thinnest / self.depth
+        slopes, areas = self.slopes(solved, places)
+        cost = areas / areas.max()
+
+        def merit(share: np.ndarray, misses: np.ndarray) -> float:
+            return float(cost @ share + PENALTY * np.maximum(np.abs(misses) - room, 0.0).sum())
+
+        now = self.misses(solved)
+        for _ in range(MOST_STEPS):
+            tried = _cheapest(cost, slopes * self.depth, now, share, overlaps, room, trust)
+            told = merit(share, now) - merit(tried, now + slopes @ (self.depth * (tried - share)))
+            if told <= ENOUGH * max(float(cost @ share), ENOUGH):
+                break
+            try:
+                other = self.after(places, tried, solved)
+            except SimulationError:
+                trust *= 0.5
+                continue
+            gained = merit(share, now) - merit(tried, self.misses(other))
+            if gained > 0.0:
+                share, solved, now = tried, other, self.misses(other)
+                slopes, _ = self.slopes(solved, places)
+            trust *= 2.0 if gained > 0.75 * told else 1.0 if gained > 0.25 * told else 0.4
+        return share, solved
+
+    @cached_property
+    def thinnest(self) -> float:
+        """Least thickness [m] of the body as it stands."""
+        return float(thickness(self.before.system.section, self.before.system.mesh.points).min())
+
+
+def _cheapest(
+    cost: np.ndarray, slopes: np.ndarray, now: np.ndarray, share: np.ndarray, overlaps: np.ndarray, room: float,
+    trust: float,
+) -> np.ndarray:  # fmt: skip
+    """Shares (n,) that cost least with misses, linear in them, within ``room``, or as little beyond as possible."""
+    n, rows = len(share), len(now)
+    beyond = -np.eye(rows)
+    held = slopes @ share - now
+    nothing = np.zeros((n, rows))
+    matrix = np.block([[slopes, beyond], [-slopes, beyond], [overlaps, nothing], [overlaps, nothing]])
+    limits = np.concatenate([room + held, room - held, np.ones(n), overlaps @ share + trust])
+    bounds = [(max(0.0, s - trust), min(1.0, s + trust)) for s in share] + [(0.0, None)] * rows
+    found = linprog(np.append(cost, np.full(rows, PENALTY)), matrix, limits, bounds=bounds, method="highs")
+    if found.x is None:
+        raise SimulationError(f"the linear program of a step failed: {found.message}")
+    return np.clip(np.asarray(found.x[:n]), 0.0, 1.0)

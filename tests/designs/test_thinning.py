@@ -1,0 +1,58 @@
+"""The search of `tune`: linear programs with a known answer, modes followed by their shapes, pairs refused."""
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+import fem_impact as fi
+from fem_impact.designs import pitches, thinning
+from fem_impact.designs.removal import Dishes
+from fem_impact.designs.thinning import Body
+from fem_impact.model.target import Target
+
+WOOD = fi.Material(E=16e9, nu=0.35, rho=900.0)
+BAR = fi.Beam.rectangular(WOOD, width=0.05, height=0.012)
+
+
+def body_of(system, wanted, tolerance=1.0):
+    return Body.of(Target.of(system), pitches.read(wanted, "order"), tolerance)
+
+
+def test_the_place_that_costs_least_for_a_cent_is_taken():
+    cost, slopes = np.array([1.0, 0.5, 0.1]), np.array([[-40.0, -30.0, -1.0]])
+    found = thinning._cheapest(cost, slopes, np.array([12.0]), np.zeros(3), np.eye(3), 0.5, 1.0)
+    # 2.5, 1.7 and 10 % of a place per cent: the second, until 0.5 of 12 cents are left
+    assert_allclose(found, [0.0, 11.5 / 30.0, 0.0], atol=1e-9)
+    held = thinning._cheapest(cost, slopes, np.array([12.0]), np.zeros(3), np.eye(3), 0.5, 0.1)
+    assert_allclose(held, 0.1, atol=1e-9)  # all that the step allows, and the rest is missed
+
+
+def test_modes_that_pass_each_other_are_followed():
+    """A groove across a strip lowers its bending below its twist: numbers change, modes do not."""
+    strip = fi.assemble(fi.mesh.rectangle(0.3, 0.185), fi.Plate(WOOD, 4e-3))
+    body = body_of(strip, {1: None, 2: None})
+    now = body.first()
+    line = np.column_stack([np.full(9, 0.15), np.linspace(0.0, 0.185, 9)])
+    last = now
+    for depth in (0.25e-3, 0.5e-3):
+        last = body.after(Dishes(line, np.full(9, depth), 0.03), last)
+    assert now.which.tolist() == [3, 4] and last.which.tolist() == [4, 3], (now.which, last.which)
+    shapes = [each.modes.shape_at([(0.0, 0.0), (0.0, 0.185)])[:, each.which] for each in (now, last)]
+    for before, after in zip(*shapes):
+        assert_allclose(np.abs(after / before), 1.0, atol=0.3)
+    assert (np.sign(shapes[0][0] * shapes[0][1]) == np.sign(shapes[1][0] * shapes[1][1])).all()
+
+
+def test_pairs_are_refused():
+    square = fi.assemble(fi.mesh.rectangle(0.3, 0.3), fi.Plate(WOOD, 3e-3), {"boundary": "hinged"})
+    assert body_of(square, {1: "A2"}).numbers == (1,)
+    with pytest.raises(
+        fi.SimulationError, match=r"mode 2 at .* shares its frequency with another.*; start from a body "
+    ):
+        body_of(square, {2: "A3"})
+
+
+def test_a_removal_after_which_a_mode_is_another_is_refused():
+    bar = body_of(fi.assemble(fi.mesh.line(0.35), BAR), {3: None})
+    with pytest.raises(fi.SimulationError, match=r"mode 3 is no longer to be told .*; take less depth"):
+        bar.after(Dishes(np.array([[0.03]]), np.array([0.0118]), 0.03), bar.first())
