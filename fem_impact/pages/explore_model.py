@@ -52,9 +52,10 @@ class Setup:
     scene: Scene
     mesh: Mesh
     base: grid.Case
+    loose: bool = False  # whether the files of the scene vanish with the server, so that saved scenes name no folder
 
     @classmethod
-    def of(cls, scene: Scene) -> "Setup":
+    def of(cls, scene: Scene, loose: bool = False) -> "Setup":
         """The setup of a scene, with enough modes for its shortest blow, but at most `MOST_MODES`.
 
         If vectors can tell the blows, the first few modes do: they bridge the seconds until the vectors of a new strike
@@ -64,7 +65,7 @@ class Setup:
         _, first = plan.description.found(Stages())
         at = np.atleast_1d(np.asarray(scene.blow.values["at"], float))
         case = grid.Case(first, scene.make_striker(), scene.make_contact(), at, float(scene.blow.values["speed"]))
-        setup = cls(scene, scene.body(), case)
+        setup = cls(scene, scene.body(), case, loose)
         if setup.by_vectors:
             return setup
         hard = replace(setup.start, stiffness=SPANS["stiffness"] ** 0.5, mass=setup.start.mass / SPANS["mass"] ** 0.5)
@@ -176,7 +177,8 @@ class Setup:
         """The tables of a scene file with these settings."""
         tables = self.scene.data()
         tables.pop("map", None)
-        tables["mesh"] |= {key: str(Path(tables["mesh"][key]).resolve()) for key in PATHS if key in tables["mesh"]}
+        files = {key: Path(tables["mesh"][key]) for key in PATHS if key in tables["mesh"]}
+        tables["mesh"] |= {key: file.name if self.loose else str(file.resolve()) for key, file in files.items()}
         law = self.law(settings)
         tables["contact"] = law.table
         tables["contact"]["gap"] = law.gap

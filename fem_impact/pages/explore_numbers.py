@@ -16,12 +16,14 @@ from ..impact.quantities import rebound
 from ..impact.response import Response
 from ..model.playing import Strokes, strokes
 from ..modes.modal import Modes
+from ..scenes.scene import Scene
 from ..scenes.schema import written
 from ..scenes.sentences import RAISED, place, power, si
 from ..show import sound
 from ..show.figures import SPECTRUM_DEPTH
 from ..sweeps.grid import Case
 from . import report
+from .explore_bench import Order, built
 from .explore_map import Mapper, Picture, Window
 from .explore_model import MAP_TOLERANCE, Settings, Setup, limit_of, quick
 
@@ -44,13 +46,25 @@ class View:
 class Explorer:
     """A setup, what is known of its strike points, and everything the page shows of its blows."""
 
-    def __init__(self, setup: Setup) -> None:
-        self.setup, self.mapper = setup, Mapper(setup)
+    def __init__(self, setup: Setup, first: Scene | None = None, order: Order | None = None) -> None:
+        self.first = first or setup.scene  # what the server began with
+        self.become(setup, order or Order())
+
+    def become(self, setup: Setup, order: Order) -> None:
+        """Take another setup in the place of the one before."""
+        self.setup, self.order, self.mapper = setup, order, Mapper(setup)
         self.views: dict[Point, View] = {}
         self.rest = setup.residual_at(setup.start.at)  # [m/N] of the last point known, good enough for a first answer
         self.limit: tuple[Any, float] = None, 0.0  # [Hz] the last threshold, and what it is of
         if not setup.by_vectors:
             self.learn(setup.start.at, View(self.rest, None))
+
+    def open(self, order: Order) -> Setup:
+        """Find the setup of an order: seconds, for its modes; kernels that it needs are compiled."""
+        setup = Setup.of(built(self.first, order), order.dropped)
+        self.become(setup, order)
+        self.answer(setup.start)
+        return setup
 
     def learn(self, at: Point, view: View) -> None:
         """Remember a strike point; the oldest is forgotten."""

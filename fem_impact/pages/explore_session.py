@@ -4,14 +4,16 @@ import asyncio
 from collections.abc import Callable
 from concurrent.futures import Future
 from dataclasses import replace
+from pathlib import Path
 from typing import Any, Protocol
 
 from .._base.check import SimulationError
 from ..scenes.sentences import place
+from .explore_bench import Order, order_of, pickable
 from .explore_map import Mapper, Picture, Window
 from .explore_model import Settings, Setup
 from .explore_numbers import Explorer, Message, Point, View, drawn
-from .explore_view import RATES, check_sliders, ends, pair
+from .explore_view import RATES, check_sliders, ends, laid_out, pair
 
 REST = 0.15  # [s] without a change before the blow is judged and the map drawn again
 
@@ -32,15 +34,30 @@ class Session:
     """The settings of one open page, and what of it is still being computed.
 
     Everything runs on the event loop; ``judge`` and ``mapper`` are processes that hold a `Explorer` each. What a page
-    asks for waits until all other pages had their turn, and then only the last of it is computed.
+    asks for waits until all other pages had their turn, and then only the last of it is computed. All pages show the
+    body that one of them put on the bench last.
     """
 
-    def __init__(self, explorer: Explorer, judge: Asks, mapper: Asks, send: Callable[[Message], Any]) -> None:
+    def __init__(
+        self, explorer: Explorer, judge: Asks, mapper: Asks, send: Callable[[Message], Any],
+        pages: set["Session"] | None = None, folder: Path | None = None,
+    ) -> None:  # fmt: skip
         self.explorer, self.judge, self.mapper, self.send = explorer, judge, mapper, send
-        self.setup: Setup = explorer.setup
+        self.pages: set[Session] = set() if pages is None else pages  # all that are open
+        self.pages.add(self)
+        self.folder = folder  # of dropped files
+        self.height, self.rate = 0.0, RATES[2]
+        self.order: Order | None = None  # what the page wants on the bench
+        self.tasks: dict[str, asyncio.Task[None]] = {}  # opening, judging, mapping, listening
+        self.roll: bool | None = None  # whether to play a roll or a blow next
+        self.closed = False
+        self._begin()
+
+    def _begin(self) -> None:
+        """Start with the scene's own blow on the body on the bench."""
+        self.setup: Setup = self.explorer.setup
         self.settings: Settings = self.setup.start
         self.ends = ends(self.setup)
-        self.height, self.rate = 0.0, RATES[2]
         self.heard_at: Point = tuple(float(x) for x in self.setup.scene.points[0])
         self.window = Window.of(self.setup, None, None)
         self.number = self.last = 0  # of the last request that was answered, and of the last one
@@ -48,15 +65,32 @@ class Session:
         self.ear: tuple[float, float] | None = None  # where the page wants to listen since then
         self.asked: asyncio.Handle | None = None  # the answer to come
         self.resting: asyncio.TimerHandle | None = None
-        self.tasks: dict[str, asyncio.Task[None]] = {}  # judging, mapping, listening
         self.judged: Any = None  # what the numbers on the page are exact for
         self.mapped: Any = None  # what the map on the page was drawn for
-        self.roll: bool | None = None  # whether to play a roll or a blow next
-        self.closed = False
+
+    def show(self) -> None:
+        """Tell the page what lies on the bench."""
+        explorer = self.explorer
+        picks = pickable(explorer.first, explorer.order, self.setup.scene)
+        self.send(
+            {"kind": "setup", **laid_out(self.setup), "picks": picks, "at": self.settings.at, "ear": self.heard_at}
+        )
+
+    def _restart(self) -> None:
+        """Show another body, or another mallet; what was computed for the one before is not wanted any more."""
+        for handle in (self.asked, self.resting, *(task for name, task in self.tasks.items() if name != "open")):
+            if handle is not None:
+                handle.cancel()
+        heard_at = self.heard_at
+        self._begin()
+        if self.explorer.order.at is not None:
+            self.heard_at = self.setup.place(*heard_at, *([0.0] * (2 - len(heard_at)))) or self.heard_at
+        self.show()
 
     def close(self) -> None:
         """The page is gone."""
         self.closed = True
+        self.pages.discard(self)
         for handle in (self.asked, self.resting, *self.tasks.values()):
             if handle is not None:
                 handle.cancel()
@@ -70,6 +104,8 @@ class Session:
             self.roll = bool(message["play"] == "roll")
             self.send({"kind": "sound", "uri": "", "note": "Computing the sound …"})
             self._start("listen", self._play)
+        elif "open" in message:
+            self._order(message["open"])
         elif "view" in message:
             view = message["view"]
             if view is not None and not isinstance(view, dict):
@@ -215,6 +251,30 @@ class Session:
         while not picture.finest:
             picture = await made(Mapper.finer, picture)
         sent(picture, exact=True)
+
+    def _order(self, wanted: Any) -> None:
+        """Put on the bench what the page wants; what it may not have is told there."""
+        try:
+            self.order = order_of(wanted, self.folder, self.order or self.explorer.order, self.settings.at)
+        except ValueError as error:
+            self.send({"kind": "bench", "failed": str(error)})
+        else:
+            self._start("open", self._open)
+
+    async def _open(self) -> None:
+        """What was ordered last."""
+        while self.order is not None:
+            order, self.order = self.order, None
+            self.send({"kind": "bench"})
+            try:
+                setup: Setup = await self._ask(self.judge, Explorer.open, order)
+            except (SimulationError, ValueError) as error:
+                self.send({"kind": "bench", "failed": str(error)})
+                continue
+            self.explorer.become(setup, order)
+            self.mapper.ask(Explorer.become, setup, order)
+            for page in list(self.pages):
+                page._restart()
 
     async def _play(self) -> None:
         """The sound that was asked for last."""

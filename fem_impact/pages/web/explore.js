@@ -4,15 +4,16 @@
   const facts = JSON.parse($("facts").textContent);
 
   dress();
-  const shown = { at: facts.at, ear: facts.at, time: [], force: [], spectrum: [] };
-  const body = bodyPlot("body-plot", facts, (place) => {
+  const shown = { at: null, ear: null, time: [], force: [], spectrum: [] };
+  const body = bodyPlot("body-plot", null, (place) => {
+    if (!shown.at) return;
     body.mark(...place(shown.ear), look.heard, 4);
     body.mark(...place(shown.at), look.struck);
   });
 
   const map = new Plot(
-    "map-plot", { ...ends(facts.mass), log: true, unit: "kg", label: "mass of the striker" },
-    { ...ends(facts.stiffness), log: true, unit: "", label: "stiffness over the scene's" }, (c) => {
+    "map-plot", { low: 1, high: 10, log: true, unit: "kg", label: "mass of the striker" },
+    { low: 1, high: 10, log: true, unit: "", label: "stiffness over the scene's" }, (c) => {
       if (map.cells) drawMap(map, c, map.cells);
       if (shown.mass) map.mark(map.px(shown.mass), map.py(shown.stiffness), look.struck);
       if (map.dragged) {
@@ -40,14 +41,26 @@
     pending = { ...pending, turn: { ...pending?.turn, ...values } };
     flush();
   };
-  const sliders = Object.fromEntries([...document.querySelectorAll("input[type=range]")].map((one) => [one.id, one]));
+  let sliders = {};
   const span = (slider) => [+slider.dataset.low, +slider.dataset.high, slider.dataset.logarithmic === "1"];
-  for (const [name, slider] of Object.entries(sliders)) {
+  const made = (kind, values, ...parts) => {
+    const element = Object.assign(document.createElement(kind), values);
+    element.append(...parts);
+    return element;
+  };
+  const sliderOf = ({ name, label, low, high, step, logarithmic }) => {
+    const slider = made("input", { type: "range", id: name, min: 0, max: facts.steps, autocomplete: "off" });
+    slider.setAttribute("value", step);
+    Object.assign(slider.dataset, { low, high, logarithmic: +logarithmic });
     slider.addEventListener("input", () => {
-      const [low, high, log] = span(slider), share = slider.value / slider.max;
-      turn({ [name]: log ? low * (high / low) ** share : low + (high - low) * share });
+      const share = slider.value / slider.max;
+      turn({ [name]: logarithmic ? low * (high / low) ** share : low + (high - low) * share });
     });
-  }
+    sliders[name] = slider;
+    const said = made("output", { id: `${name}-said` });
+    said.htmlFor.add(name);
+    return made("div", { className: "slider" }, made("label", { htmlFor: name, textContent: label }), said, slider);
+  };
   const stand = (name, value) => {
     const slider = sliders[name];
     if (!slider) return;
@@ -56,10 +69,34 @@
   };
 
   // What comes back ---------------------------------------------------------------------------------------------------
+  const before = [];   // windows of the map to go back to
   const cells = Object.fromEntries([...document.querySelectorAll("#numbers dd")].map((one) => [one.dataset.name, one]));
   const put = (element, text) => { if (element.textContent !== text) element.textContent = text; };
   const sentence = (text) => text && text[0].toUpperCase() + text.slice(1);
   const take = {
+    setup(got) {
+      Object.assign(facts, got);
+      Object.assign(shown, { at: got.at, ear: got.ear, time: [], force: [], spectrum: [], mass: null, resonance: null, limit: null });
+      document.title = $("heading").textContent = got.heading;
+      put($("notes"), got.notes.map((one) => `${one}.`).join(" "));
+      sliders = {};
+      for (const [card, list] of Object.entries(got.cards)) $(`sliders-${card}`).replaceChildren(...list.map(sliderOf));
+      body.show(facts);
+      Object.assign(map.x, ends(facts.mass));
+      Object.assign(map.y, ends(facts.stiffness));
+      map.cells = null;
+      before.length = 0;
+      $("back").disabled = $("whole").disabled = true;
+      for (const plot of [body, map]) plot.draw();
+      pick(got.picks);
+      [busy, pending] = [false, null];
+      turn({});
+    },
+    bench(got) {
+      put($("bench-said"), got.failed ? `${sentence(got.failed)}.` : "Computing the modes …");
+      $("bench-said").className = got.failed ? "note missed" : "note";
+      root.dataset.bench = got.failed ? "failed" : "busy";
+    },
     blow(got) {
       for (const name of ["at", "ear", "mass", "stiffness"]) if (name in got) shown[name] = got[name];
       for (const [name, text] of Object.entries(got.said ?? {})) {
@@ -142,11 +179,7 @@
   socket.onmessage = ({ data }) => {
     const got = JSON.parse(data);
     take[got.kind](got);
-    root.dataset.ready = "true";
-  };
-  socket.onopen = () => {
-    busy = false;
-    turn({});
+    if (got.kind === "rest") root.dataset.ready = "true";
   };
   socket.onclose = () => {
     put($("verdict"), "The connection to fem-impact has ended: start it again, then reload this page.");
@@ -158,6 +191,65 @@
     for (const plot of [body, map, force, spectrum]) plot.draw();
   };
   matchMedia("(prefers-color-scheme: dark)").addEventListener("change", redress);
+
+  // What lies on the bench ------------------------------------------------------------------------------------------------
+  const order = (wanted) => say({ open: wanted });
+  const options = (select, first, groups, picked, words = "") => {
+    const wanted = words.toLowerCase().split(/[\s,]+/);
+    const fits = (group, name) => name === picked || wanted.every((word) => `${group} ${name}`.toLowerCase().includes(word));
+    const option = (name) => made("option", { value: name, textContent: name, selected: name === picked });
+    const kept = groups.map(([group, names]) => [group, names.filter((name) => fits(group, name))]).filter(([, names]) => names.length);
+    select.replaceChildren(
+      made("option", { value: "", textContent: first, selected: !picked }),
+      ...kept.map(([group, names]) => made("optgroup", { label: group }, ...names.map(option))),
+    );
+  };
+  const lists = { material: ["materials", "as in the scene"], mallet: ["mallets", "as in the scene"] };
+  const pick = (picks) => {
+    facts.picks = picks;
+    for (const [name, [key, first]] of Object.entries(lists)) {
+      options($(`pick-${name}`), first, picks[key], picks[name], $(`search-${name}`).value);
+      $(`of-${name}`).hidden = !picks[key].length;
+    }
+    options($("pick-unit"), "as the file says", [["unit", picks.units]], picks.unit);
+    $("of-unit").hidden = !picks.units.length;
+    $("of-thickness").hidden = picks.thickness === null;
+    $("pick-thickness").value = picks.thickness === null ? "" : +picks.thickness.toPrecision(6);
+    put($("drawing"), picks.drawing ? `On the bench: ${picks.drawing}` : "");
+    $("first").hidden = !picks.drawing || !picks.first;
+    put($("first"), `Back to “${picks.first}”`);
+    put($("bench-said"), "");
+    root.dataset.bench = JSON.stringify([picks.drawing, picks.material, picks.mallet, picks.thickness]);
+  };
+  for (const name of ["material", "mallet", "unit"]) $(`pick-${name}`).onchange = ({ target }) => order({ [name]: target.value });
+  for (const [name, [key, first]] of Object.entries(lists)) {
+    $(`search-${name}`).oninput = ({ target }) => options($(`pick-${name}`), first, facts.picks[key], facts.picks[name], target.value);
+  }
+  $("pick-thickness").onchange = ({ target }) => order({ thickness: +target.value });
+  $("first").onclick = () => order({ drawing: "" });
+  const drop = async (file) => {
+    if (!file) return;
+    take.bench({});
+    try {
+      const answer = await fetch(`/drop?name=${encodeURIComponent(file.name)}`, { method: "POST", body: file });
+      const text = await answer.text();
+      if (answer.ok) order({ drawing: text, unit: "" });
+      else take.bench({ failed: answer.status === 400 && text.length < 400 && !text.startsWith("<") ? text : `${file.name} was refused (${answer.status})` });
+    } catch {
+      take.bench({ failed: `${file.name} could not be handed over: it has ${(file.size / 1e6).toPrecision(3)} MB, at most ${facts.largest / 1e6} MB are taken` });
+    }
+  };
+  $("file").onchange = ({ target }) => {
+    drop(target.files[0]);
+    target.value = "";   // the same file again is another choice
+  };
+  for (const kind of ["dragover", "dragleave", "drop"]) {
+    addEventListener(kind, (event) => {
+      event.preventDefault();
+      $("drop").classList.toggle("over", kind === "dragover");
+      if (kind === "drop") drop(event.dataTransfer.files[0]);
+    });
+  }
 
   // Hands on the pictures -----------------------------------------------------------------------------------------------
   $("listen").onclick = () => say({ play: "blow" });
@@ -173,7 +265,6 @@
     turn(body.flat ? { x, y } : { x });
   });
 
-  const before = [];   // windows to go back to
   let wheeled = 0;
   const view = (x, y) => {
     const inside = ([low, high], [least, most]) => {
@@ -224,14 +315,14 @@
     map.dragged = Math.max(Math.abs(to[0] - from[0]), Math.abs(to[1] - from[1])) > 6 ? [...from, ...to] : null;
     map.draw();
   });
-  const drop = () => {
+  const letGo = () => {
     from = map.dragged = null;
     map.draw();
   };
   map.canvas.addEventListener("pointerup", (event) => {
     if (!from) return;
     const [to, dragged] = [held(event), map.dragged];
-    drop();
+    letGo();
     if (dragged) {
       before.push(now());
       view([map.value(map.x, dragged[0]), map.value(map.x, dragged[2])], [map.value(map.y, dragged[1]), map.value(map.y, dragged[3])]);
@@ -240,6 +331,6 @@
       turn({ mass: map.value(map.x, to[0]), stiffness: map.value(map.y, to[1]) });
     }
   });
-  map.canvas.addEventListener("pointercancel", drop);
-  addEventListener("keydown", ({ key }) => { if (key === "Escape") drop(); });
+  map.canvas.addEventListener("pointercancel", letGo);
+  addEventListener("keydown", ({ key }) => { if (key === "Escape") letGo(); });
 })();
