@@ -55,23 +55,26 @@ class Setup:
     loose: bool = False  # whether the files of the scene vanish with the server, so that saved scenes name no folder
 
     @classmethod
-    def of(cls, scene: Scene, loose: bool = False) -> "Setup":
+    def of(cls, scene: Scene, loose: bool = False, before: "Setup | None" = None) -> "Setup":
         """The setup of a scene, with enough modes for its shortest blow, but at most `MOST_MODES`.
 
         If vectors can tell the blows, the first few modes do: they bridge the seconds until the vectors of a new strike
-        point are found.
+        point are found. ``before`` is a setup of the same body, whose modes are taken as far as they reach.
         """
-        plan = scene.plan(target="modal", n_modes=FIRST_LOOK)
-        _, first = plan.description.found(Stages())
+        first, plan = before and before.base.modes, None
+        if first is None:
+            plan = scene.plan(target="modal", n_modes=FIRST_LOOK)
+            _, first = plan.description.found(Stages())
         at = np.atleast_1d(np.asarray(scene.blow.values["at"], float))
         case = grid.Case(first, scene.make_striker(), scene.make_contact(), at, float(scene.blow.values["speed"]))
-        setup = cls(scene, scene.body(), case, loose)
+        setup = cls(scene, scene.body() if before is None else before.mesh, case, loose)
         if setup.by_vectors:
             return setup
         hard = replace(setup.start, stiffness=SPANS["stiffness"] ** 0.5, mass=setup.start.mass / SPANS["mass"] ** 0.5)
         needed = bodies.number_of_modes(first, bodies.needed_frequency(setup.case(hard), setup.tolerance))
         if needed <= first.n_modes:
             return setup
+        plan = plan or scene.plan(target="modal", n_modes=FIRST_LOOK)
         _, more = plan.but(n_modes=min(needed, MOST_MODES)).description.found(Stages())
         return replace(setup, base=replace(case, modes=more))
 

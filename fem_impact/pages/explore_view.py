@@ -122,13 +122,14 @@ def check_sliders(known: Ends, turned: Any) -> dict[str, float]:
     found = {}
     for name, value in turned.items():
         low, high, _ = known[name]
-        number = _number(name, value)
+        number = number_of(name, value)
         held = min(max(number, low), high)
         found[name] = number if name in ("x", "y") and abs(held - number) > SAME * (high - low) else held
     return found
 
 
-def _number(name: str, value: Any) -> float:
+def number_of(name: str, value: Any) -> float:
+    """A finite number; ValueError if it is anything else."""
     if isinstance(value, (int, float)) and not isinstance(value, bool):
         with suppress(OverflowError):  # an integer beyond all floats
             if math.isfinite(number := float(value)):
@@ -140,5 +141,5 @@ def pair(name: str, values: Any) -> tuple[float, float]:
     """Two finite numbers; ValueError if they are anything else."""
     if not isinstance(values, list) or len(values) != 2:
         raise ValueError(f"{name} must be two numbers")
-    first, second = (_number(name, value) for value in values)
+    first, second = (number_of(name, value) for value in values)
     return first, second

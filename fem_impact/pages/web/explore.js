@@ -7,10 +7,19 @@
   const shown = { at: null, ear: null, time: [], force: [], spectrum: [] };
   const body = bodyPlot("body-plot", null, (place) => {
     if (!shown.at) return;
+    for (const { at, body: of, colour, letter } of kept.values()) {
+      if (of !== `${facts.picks.drawing} ${facts.picks.unit}`) continue;
+      body.mark(...place(at), colour);
+      body.context.fillStyle = look.ink;
+      body.context.textAlign = "left";
+      body.context.fillText(letter, place(at)[0] + 10, place(at)[1] - 8);
+    }
     body.mark(...place(shown.ear), look.heard, 4);
     body.mark(...place(shown.at), look.struck);
   });
 
+  const kept = new Map();   // letter -> blow
+  const COLOURS = ["#d55e00", "#009e73", "#cc79a7", "#b8860b", "#7e57c2", "#8d6e63", "#e64980", "#868e96"];
   const map = new Plot(
     "map-plot", { low: 1, high: 10, log: true, unit: "kg", label: "mass of the striker" },
     { low: 1, high: 10, log: true, unit: "", label: "stiffness over the scene's" }, (c) => {
@@ -38,6 +47,7 @@
     pending = null;
   };
   const turn = (values) => {
+    stale();
     pending = { ...pending, turn: { ...pending?.turn, ...values } };
     flush();
   };
@@ -68,6 +78,112 @@
     slider.value = Math.round(slider.max * (log ? Math.log(value / low) / Math.log(high / low) : (value - low) / (high - low)));
   };
 
+  // Sounds ------------------------------------------------------------------------------------------------------------
+  let context = null;
+  const heard = new Map();   // sounds of the present blow, and by letter and share of the speed
+  const waiting = new Set();
+  const forget = (letter) => { for (const key of [...heard.keys()]) if ((key[0] ?? " ") === letter) heard.delete(key); };
+  let asking = false;   // for the sound of the present blow
+  const stale = () => {   // the present blow is another one
+    forget(" ");
+    asking = false;
+  };
+  // As loud to each other as the program computed them, the loudest of the blows in question at a quarter of full scale.
+  const volume = ({ unit, scale, peak }) => {
+    const sounds = [heard.get(""), ...[...kept.values()].map(({ sound }) => sound)];
+    return (0.25 * scale) / (Math.max(0, ...sounds.filter((one) => one?.uri && one.unit === unit).map((one) => one.peak)) || peak || 1);
+  };
+  const ring = async (sound, after = 0) => {
+    if (!sound?.uri || !navigator.userActivation?.hasBeenActive) return;
+    context ??= new AudioContext();
+    if (context.state === "suspended") context.resume();
+    sound.buffer ??= context.decodeAudioData(bytes(sound.uri.slice(sound.uri.indexOf(",") + 1)).buffer);
+    const source = context.createBufferSource(), gain = context.createGain();
+    source.buffer = await sound.buffer;
+    gain.gain.value = volume(sound);
+    source.connect(gain).connect(context.destination);
+    source.start(context.currentTime + after);
+    root.dataset.rung = +(root.dataset.rung ?? 0) + 1;
+  };
+  const strike = () => {
+    if (heard.has("")) return ring(heard.get(""));
+    asking = true;
+    say({ play: "blow" });
+  };
+  const hit = (letter, share) => {
+    const key = `${letter} ${share}`;
+    const known = heard.get(key) ?? (share === 1 ? kept.get(letter)?.sound : null);
+    if (known) ring(known);
+    else if (!waiting.has(key)) {
+      waiting.add(key);
+      say({ hit: { letter, share } });
+    }
+  };
+  const nth = (i) => {   // the kept blow of a key or a note, round and round
+    const letters = [...kept.keys()].sort();
+    return letters.length ? letters[((i % letters.length) + letters.length) % letters.length] : "";
+  };
+
+  // Blows kept to compare -------------------------------------------------------------------------------------------------
+  const reach = () => {
+    const all = [shown, ...kept.values()], most = (list) => list.reduce((a, b) => Math.max(a, b), 0);
+    Object.assign(force.x, { high: most(all.map((one) => one.time.at(-1) ?? 0)) || 1 });
+    Object.assign(force.y, { high: 1.08 * most(all.map((one) => most(one.force))) || 1 });
+    const top = most(all.map((one) => one.top ?? 0)) || 1;
+    Object.assign(spectrum.y, { low: facts.depth * top, high: 2 * top });
+  };
+  const compare = () => {
+    const blows = [...kept.values()].sort((a, b) => (a.letter < b.letter ? -1 : 1));
+    shown.kept = blows;
+    $("kept").replaceChildren(...blows.map(({ letter, heading, words, cells: numbers, sound, colour }) => {
+      const mark = made("b", { textContent: letter });
+      mark.style.color = colour;
+      const play = made("button", { type: "button", textContent: `Play ${letter}`, disabled: !sound.uri, onclick: () => hit(letter, 1) });
+      const away = made("button", { type: "button", className: "quiet", textContent: `Forget ${letter}`, onclick: () => say({ forget: letter }) });
+      const list = numbers.map(([name, text]) => made("div", {}, made("dt", { textContent: name }), made("dd", { textContent: text })));
+      return made("article", {}, made("h3", {}, mark, ` ${heading}`), made("p", { className: "note", textContent: words }), made("dl", {}, ...list), made("div", { className: "buttons" }, play, away));
+    }));
+    $("turns").disabled = blows.length < 2;
+    put($("turns"), blows.length > 2 ? blows.map((one) => one.letter).join(" then ") : "A then B");
+    root.dataset.kept = blows.map((one) => one.letter).join("");
+    reach();
+    for (const plot of [force, spectrum, body]) plot.draw();
+  };
+  $("keep").onclick = () => say({ keep: true });
+  $("turns").onclick = () => shown.kept.forEach(({ sound }, i) => ring(sound, 1.2 * i));   // each has rung for a second
+
+  // Keys and MIDI ---------------------------------------------------------------------------------------------------------
+  const ROWS = [["zxcvbnm,", 0.5], ["asdfghjk", 1], ["qwertyui", 2]];
+  addEventListener("keydown", (event) => {
+    const { key, target, repeat, ctrlKey, altKey, metaKey } = event;
+    if (repeat || ctrlKey || altKey || metaKey || target.matches("select, input:not([type=range], [type=radio], [type=checkbox])")) return;
+    if (key === " ") {
+      if (target.matches("button, a, audio, [type=radio], [type=checkbox]")) return;   // it presses these
+      event.preventDefault();
+      strike();
+    }
+    for (const [row, share] of ROWS) if (row.includes(key.toLowerCase())) hit(nth(row.indexOf(key.toLowerCase())), share);
+  });
+  $("midi").onclick = async () => {
+    if (!navigator.requestMIDIAccess) {
+      put($("midi-said"), "This browser has no Web MIDI. Chrome, Edge and Firefox have; or play by `fem-impact play SCENE --midi-port`.");
+      return;
+    }
+    try {
+      const access = await navigator.requestMIDIAccess(), inputs = [...access.inputs.values()];
+      for (const input of inputs) {
+        input.onmidimessage = ({ data: [status, note, velocity] }) => {
+          // sixteen steps, so that a sound once computed sounds at once; the hardest is twice as fast as the blow
+          if ((status & 0xf0) === 0x90 && velocity) hit(nth(note - 60), Math.ceil((velocity / 127) * 16) / 8);
+        };
+      }
+      const names = inputs.map(({ name }) => name).join(", ");
+      put($("midi-said"), names ? `Listening to ${names}: middle C strikes A, the next keys B, C …; velocity is speed.` : "No MIDI keyboard is connected: connect one and press again.");
+    } catch (error) {
+      put($("midi-said"), `The browser does not allow MIDI: ${error.message}`);
+    }
+  };
+
   // What comes back ---------------------------------------------------------------------------------------------------
   const before = [];   // windows of the map to go back to
   const cells = Object.fromEntries([...document.querySelectorAll("#numbers dd")].map((one) => [one.dataset.name, one]));
@@ -93,7 +209,7 @@
       turn({});
     },
     bench(got) {
-      put($("bench-said"), got.failed ? `${sentence(got.failed)}.` : "Computing the modes …");
+      put($("bench-said"), got.failed ? `${got.failed}.` : "Computing the modes …");
       $("bench-said").className = got.failed ? "note missed" : "note";
       root.dataset.bench = got.failed ? "failed" : "busy";
     },
@@ -113,8 +229,7 @@
         spectrum.draw();
       } else if (got.force) {
         [shown.time, shown.force] = [floats(got.time), floats(got.force)];
-        Object.assign(force.x, { high: shown.time.at(-1) || 1 });
-        Object.assign(force.y, { high: 1.08 * shown.force.reduce((a, b) => Math.max(a, b), 0) || 1 });
+        reach();
         for (const [name, text] of got.cells) put(cells[name], text);
         put($("what"), got.what);
         const error = cells["estimated error"], own = cells["model's error"];
@@ -128,7 +243,9 @@
       force.draw();
       root.dataset.answered = got.number;
       if (got.spectrum) take.rest(got);
-      if (got.exact) root.dataset.judged = got.number;
+      if (!got.exact) return;
+      root.dataset.judged = got.number;
+      if ($("aloud").checked && navigator.userActivation?.hasBeenActive && !heard.has("") && !asking) strike();
     },
     rest(got) {
       if (got.resonates) {
@@ -140,8 +257,8 @@
         $("scene").href = got.scene;
       }
       if (got.spectrum) {
-        shown.spectrum = floats(got.spectrum);
-        Object.assign(spectrum.y, { low: facts.depth * got.top, high: 2 * got.top });
+        Object.assign(shown, { spectrum: floats(got.spectrum), top: got.top });
+        reach();
       }
       spectrum.draw();
       map.draw();
@@ -173,7 +290,27 @@
       const player = $("player");
       if (!got.uri) return;   // not there yet
       player.src = got.uri;
-      player.play().catch(() => {});   // the browser may require another click before it plays
+      if (asking) heard.set("", got);   // neither a roll, nor the sound of a blow before
+      asking = false;
+      ring(got);
+    },
+    hit(got) {
+      const key = `${got.letter} ${got.share}`;
+      waiting.delete(key);
+      if (!got.uri) { put($("heard"), got.note); return; }
+      if (got.letter ? kept.has(got.letter) : got.number === number && !pending) heard.set(key, got);
+      ring(got);
+    },
+    kept(got) {
+      const blow = { ...got, time: floats(got.time), force: floats(got.force), spectrum: floats(got.spectrum) };
+      blow.colour = COLOURS[got.letter.charCodeAt(0) - 65];
+      kept.set(got.letter, blow);
+      compare();
+    },
+    forgotten(got) {
+      kept.delete(got.letter);
+      forget(got.letter);
+      compare();
     },
   };
   socket.onmessage = ({ data }) => {
@@ -252,18 +389,34 @@
   }
 
   // Hands on the pictures -----------------------------------------------------------------------------------------------
-  $("listen").onclick = () => say({ play: "blow" });
-  $("roll").onclick = () => say({ play: "roll" });
-  body.canvas.addEventListener("click", ({ offsetX, offsetY }) => {
+  $("listen").onclick = strike;
+  $("roll").onclick = () => {
+    asking = false;
+    say({ play: "roll" });
+  };
+  let dragged = null;   // which point the hand holds
+  const near = (point, { offsetX, offsetY }) => Math.hypot(body.px(point[0]) - offsetX, body.py(point[1] ?? 0) - offsetY);
+  body.canvas.addEventListener("pointerdown", (event) => {
+    if (event.button || !shown.at) return;
+    dragged = $("listens").checked ? "ear" : "at";
+    const other = dragged === "at" ? "ear" : "at";
+    if (near(shown[other], event) < 12 && near(shown[dragged], event) > 12) dragged = other;
+    body.canvas.setPointerCapture(event.pointerId);
+    moved(event);
+  });
+  body.canvas.addEventListener("pointermove", (event) => { if (dragged) moved(event); });
+  for (const kind of ["pointerup", "pointercancel"]) body.canvas.addEventListener(kind, () => { dragged = null; });
+  const moved = ({ offsetX, offsetY }) => {
     const x = body.value(body.x, offsetX), y = body.flat ? body.value(body.y, offsetY) : 0;
-    if ($("listens").checked) {
+    if (dragged === "ear") {
+      stale();
       pending = { ...pending, ear: [x, y] };
       flush();
       return;
     }
     follow = true;
     turn(body.flat ? { x, y } : { x });
-  });
+  };
 
   let wheeled = 0;
   const view = (x, y) => {

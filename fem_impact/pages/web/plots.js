@@ -194,12 +194,12 @@ const plots = (() => {
   const forceAndSpectrum = (facts, shown) => {
     const both = (c, draw) => {
       c.lineWidth = 2;
-      if (shown.kept) {
-        c.strokeStyle = look.struck;
-        c.setLineDash([6, 4]);
-        draw(shown.kept);
-        c.setLineDash([]);
+      c.setLineDash([6, 4]);
+      for (const kept of [shown.kept ?? []].flat()) {
+        c.strokeStyle = kept.colour ?? look.struck;
+        draw(kept);
       }
+      c.setLineDash([]);
       c.strokeStyle = look.line;
       draw(shown);
     };
