@@ -61,13 +61,15 @@ class Setup:
         If vectors can tell the blows, the first few modes do: they bridge the seconds until the vectors of a new strike
         point are found. ``before`` is a setup of the same body, whose modes are taken as far as they reach.
         """
-        first, plan = before and before.base.modes, None
-        if first is None:
+        plan = None
+        if before is not None:
+            first, mesh = before.base.modes, before.mesh
+        else:
             plan = scene.plan(target="modal", n_modes=FIRST_LOOK)
-            _, first = plan.description.found(Stages())
+            first, mesh = plan.description.found(Stages())[1], scene.body()
         at = np.atleast_1d(np.asarray(scene.blow.values["at"], float))
         case = grid.Case(first, scene.make_striker(), scene.make_contact(), at, float(scene.blow.values["speed"]))
-        setup = cls(scene, scene.body() if before is None else before.mesh, case, loose)
+        setup = cls(scene, mesh, case, loose)
         if setup.by_vectors:
             return setup
         hard = replace(setup.start, stiffness=SPANS["stiffness"] ** 0.5, mass=setup.start.mass / SPANS["mass"] ** 0.5)
