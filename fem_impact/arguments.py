@@ -237,9 +237,11 @@ COMMANDS = {
     )),
     "explore": Command(
         "serve a page on this machine where sliders and clicks change the blow", commands.explore, (
+        _option("scene", "SCENE", "a TOML file, an .svg or .dxf drawing or a mesh file (default: a wooden plate; drop "
+                "yours on the page)", _place, nargs="?"),
         _option("--port", "N", "port on 127.0.0.1 (default: any free port)", int, default=0),
         _flag("--no-open", "print the address, but do not open it in a browser"),
-    )),
+    ), ""),
     "play": Command(
         "strike a scene from the keyboard, a MIDI file or a MIDI port, and hear it at once", commands.play, (
         _option("--midi", "FILE", "play the notes of a MIDI file: middle C is the first point", _place),

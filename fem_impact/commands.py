@@ -337,14 +337,13 @@ def page(options: argparse.Namespace) -> Answer:
 
 def explore(options: argparse.Namespace) -> None:
     """Serve a page until the program is stopped."""
-    scene = fi.load_scene(options.scene)
 
     def ready(address: str) -> None:
         options.show(answer({"address": address}, [f"{address}   (Ctrl-C stops it)"]))
         if not options.no_open:
             webbrowser.open(address)
 
-    fi.explore.serve(scene, port=options.port, ready=ready, watch=progress_of(options))
+    fi.explore.serve(options.scene, port=options.port, ready=ready, watch=progress_of(options))
 
 
 def play(options: argparse.Namespace) -> Answer:

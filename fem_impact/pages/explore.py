@@ -2,12 +2,15 @@
 
 import gc
 import logging
+import tempfile
 from collections.abc import Callable
-from contextlib import nullcontext
+from contextlib import ExitStack, nullcontext
+from pathlib import Path
 
 from .._base import check
 from ..model.planner import Watch
 from ..scenes.scene import Scene
+from .explore_bench import built, first_scene
 from .explore_model import Setup
 from .explore_numbers import Explorer
 from .explore_worker import Worker
@@ -15,13 +18,19 @@ from .explore_worker import Worker
 
 @check.typed
 def serve(
-    scene: Scene, *, port: int = 0, ready: Callable[[str], None] | None = None, watch: Watch | None = None
+    scene: Scene | str | Path | None = None,
+    *,
+    port: int = 0,
+    ready: Callable[[str], None] | None = None,
+    watch: Watch | None = None,
 ) -> None:
     """Serve the page until interrupted.
 
     Parameters
     ----------
-    scene : Scene
+    scene : Scene, or path of a scene, a drawing or a mesh file, optional
+        A drawing becomes the plate of ``fem-impact new --from``; without any, the page begins with a wooden plate.
+        Others can be dropped on the page, and materials and mallets of the catalogue be picked there.
     port : int
         0 chooses any free port.
     ready : callable, optional
@@ -32,7 +41,7 @@ def serve(
     Raises
     ------
     ValueError
-        If the extra ``web`` is not installed, or the port number is invalid.
+        If the extra ``web`` is not installed, the port number is invalid, or the file is wrong.
     OSError
         If the port is in use.
     """
@@ -46,21 +55,21 @@ def serve(
         raise ValueError(f"port must lie between 0 and 65535, got {port}")
     logging.getLogger("tornado.access").setLevel(logging.CRITICAL)  # do not report refused requests on the terminal
     workers: list[Worker] = []
-    try:
+    first, order = first_scene(scene)
+    with ExitStack() as ended, tempfile.TemporaryDirectory(prefix="fem_impact_") as folder:
+        ended.callback(gc.unfreeze)
         with (watch or nullcontext)("modes"):
-            explorer = Explorer(Setup.of(scene))
-            workers += [Worker(explorer), Worker(explorer)]  # one judges blows while the other draws a map or a sound
+            explorer = Explorer(Setup.of(built(first, order)), first, order)
+            for _ in range(2):  # one judges blows while the other draws a map or a sound
+                workers.append(Worker(explorer))
+                ended.callback(workers[-1].stop)
             explorer.answer(explorer.setup.start)  # compile the kernels before the page opens
         gc.collect()
         gc.freeze()  # the modes outlive every answer, and looking through them takes longer than one
-        server, address = open_server(explorer, workers, port)
+        server, address = open_server(explorer, workers, port, Path(folder))
         if ready is not None:
             ready(address)
         try:
             IOLoop.current().start()
         finally:
             server.stop()
-    finally:
-        gc.unfreeze()
-        for worker in workers:
-            worker.stop()

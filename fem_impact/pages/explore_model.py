@@ -52,25 +52,31 @@ class Setup:
     scene: Scene
     mesh: Mesh
     base: grid.Case
+    loose: bool = False  # whether the files of the scene vanish with the server, so that saved scenes name no folder
 
     @classmethod
-    def of(cls, scene: Scene) -> "Setup":
+    def of(cls, scene: Scene, loose: bool = False, before: "Setup | None" = None) -> "Setup":
         """The setup of a scene, with enough modes for its shortest blow, but at most `MOST_MODES`.
 
         If vectors can tell the blows, the first few modes do: they bridge the seconds until the vectors of a new strike
-        point are found.
+        point are found. ``before`` is a setup of the same body, whose modes are taken as far as they reach.
         """
-        plan = scene.plan(target="modal", n_modes=FIRST_LOOK)
-        _, first = plan.description.found(Stages())
+        plan = None
+        if before is not None:
+            first, mesh = before.base.modes, before.mesh
+        else:
+            plan = scene.plan(target="modal", n_modes=FIRST_LOOK)
+            first, mesh = plan.description.found(Stages())[1], scene.body()
         at = np.atleast_1d(np.asarray(scene.blow.values["at"], float))
         case = grid.Case(first, scene.make_striker(), scene.make_contact(), at, float(scene.blow.values["speed"]))
-        setup = cls(scene, scene.body(), case)
+        setup = cls(scene, mesh, case, loose)
         if setup.by_vectors:
             return setup
         hard = replace(setup.start, stiffness=SPANS["stiffness"] ** 0.5, mass=setup.start.mass / SPANS["mass"] ** 0.5)
         needed = bodies.number_of_modes(first, bodies.needed_frequency(setup.case(hard), setup.tolerance))
         if needed <= first.n_modes:
             return setup
+        plan = plan or scene.plan(target="modal", n_modes=FIRST_LOOK)
         _, more = plan.but(n_modes=min(needed, MOST_MODES)).description.found(Stages())
         return replace(setup, base=replace(case, modes=more))
 
@@ -176,7 +182,8 @@ class Setup:
         """The tables of a scene file with these settings."""
         tables = self.scene.data()
         tables.pop("map", None)
-        tables["mesh"] |= {key: str(Path(tables["mesh"][key]).resolve()) for key in PATHS if key in tables["mesh"]}
+        files = {key: Path(tables["mesh"][key]) for key in PATHS if key in tables["mesh"]}
+        tables["mesh"] |= {key: file.name if self.loose else str(file.resolve()) for key, file in files.items()}
         law = self.law(settings)
         tables["contact"] = law.table
         tables["contact"]["gap"] = law.gap

@@ -4,7 +4,7 @@ import base64
 import math
 import warnings
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -16,12 +16,14 @@ from ..impact.quantities import rebound
 from ..impact.response import Response
 from ..model.playing import Strokes, strokes
 from ..modes.modal import Modes
+from ..scenes.scene import Scene
 from ..scenes.schema import written
 from ..scenes.sentences import RAISED, place, power, si
 from ..show import sound
 from ..show.figures import SPECTRUM_DEPTH
 from ..sweeps.grid import Case
 from . import report
+from .explore_bench import Order, built
 from .explore_map import Mapper, Picture, Window
 from .explore_model import MAP_TOLERANCE, Settings, Setup, limit_of, quick
 
@@ -41,16 +43,49 @@ class View:
     body: Modes | None  # Ritz vectors, where these tell the blows
 
 
+@dataclass(frozen=True, eq=False)
+class Kept:
+    """A blow kept to compare others with, on its own body and heard from its own place."""
+
+    setup: Setup
+    settings: Settings
+    where: Point  # [m] of the listener
+    height: float  # [m] of the listener
+    told: Message  # what pages show of it
+
+
 class Explorer:
     """A setup, what is known of its strike points, and everything the page shows of its blows."""
 
-    def __init__(self, setup: Setup) -> None:
-        self.setup, self.mapper = setup, Mapper(setup)
+    def __init__(self, setup: Setup, first: Scene | None = None, order: Order | None = None) -> None:
+        self.first = first or setup.scene  # what the server began with
+        self.kept: dict[str, Kept] = {}  # letter -> blow
+        self.become(setup, order or Order())
+
+    def become(self, setup: Setup, order: Order) -> None:
+        """Take another setup in the place of the one before."""
+        self.setup, self.order, self.mapper = setup, order, Mapper(setup)
         self.views: dict[Point, View] = {}
         self.rest = setup.residual_at(setup.start.at)  # [m/N] of the last point known, good enough for a first answer
         self.limit: tuple[Any, float] = None, 0.0  # [Hz] the last threshold, and what it is of
         if not setup.by_vectors:
             self.learn(setup.start.at, View(self.rest, None))
+
+    def open(self, order: Order) -> Setup:
+        """Find the setup of an order: seconds, unless only the mallet is another one; kernels are compiled."""
+        same = replace(self.order, mallet=order.mallet, at=order.at) == order and order.at is not None
+        setup = Setup.of(built(self.first, order), order.dropped, self.setup if same else None)
+        self.become(setup, order)
+        self.answer(setup.start)
+        return setup
+
+    def keep(self, letter: str, settings: Settings, where: Point, height: float, told: Message) -> None:
+        """Keep a blow on the present body under a letter."""
+        self.kept = {**self.kept, letter: Kept(self.setup, settings, where, height, told)}
+
+    def forget(self, letter: str) -> None:
+        """Keep a blow no longer."""
+        self.kept = {name: kept for name, kept in self.kept.items() if name != letter}
 
     def learn(self, at: Point, view: View) -> None:
         """Remember a strike point; the oldest is forgotten."""
@@ -116,25 +151,13 @@ class Explorer:
 
     def listen(self, settings: Settings, where: Point, height: float, rate: float | None) -> Message:
         """The blow, or ``rate`` [1/s] of them, as heard on the surface or ``height`` [m] above it."""
-        case = self.setup.case(settings)
-        for point in (settings.at, where)[: 1 if height > 0.0 else 2]:
-            if self.setup.at_rest(point):
-                return {"uri": "", "note": f"Silent: the body does not move at {place(point)}."}
-        try:
-            rung = case.blow(tolerance=self.setup.tolerance) if rate is None else rolled(case, rate)
-            if height > 0.0:
-                heard = sound.radiate(rung, (*where, height), duration=PLAYED)
-            else:
-                heard = sound.synthesise(rung, where, duration=PLAYED)
-        except (SimulationError, ValueError) as error:
-            return {"uri": "", "note": str(error)}
-        level = heard.peak_level
-        raised = max(0.0, report.QUIET - level) if math.isfinite(level) else 0.0  # of a sound that is quiet
-        note = f"Peak {heard.said}; full scale {heard.full_scale:g} {heard.unit}"
-        note = (note + (f", raised here by {raised:.1f} dB." if raised else ".")).replace("-", "−")
-        uri = report.audio(heard.samples * 10.0 ** (raised / 20.0), heard.rate)
-        place_of = f"{si(height, 'm', 3)} above {place(where)}" if height > 0.0 else f"the surface at {place(where)}"
-        return {"uri": uri, "note": f"Heard from {place_of}. {note}"}
+        return _heard(self.setup, settings, where, height, rate)
+
+    def struck(self, letter: str, settings: Settings, where: Point, height: float, share: float) -> Message:
+        """The sound of a kept blow, or without a letter of the present one, ``share`` times as fast."""
+        kept = self.kept.get(letter) or Kept(self.setup, settings, where, height, {})
+        faster = replace(kept.settings, speed=share * kept.settings.speed)
+        return _heard(kept.setup, faster, kept.where, kept.height, None)
 
     def said(self, settings: Settings, height: float, rate: float) -> dict[str, str]:
         """What each slider stands at, in words."""
@@ -153,6 +176,32 @@ class Explorer:
             "height": f"{si(height, 'm', 3)}, in the air" if height > 0.0 else "on the surface",
         }
         return said | {letter: si(value, "m", 3) for letter, value in zip("xy", settings.at)}
+
+
+def _heard(setup: Setup, settings: Settings, where: Point, height: float, rate: float | None) -> Message:
+    """A sound as the page plays it; ``scale`` is what a sample of one stands for, in the unit of the peak."""
+    case = setup.case(settings)
+    for point in (settings.at, where)[: 1 if height > 0.0 else 2]:
+        if setup.at_rest(point):
+            return {"uri": "", "note": f"Silent: the body does not move at {place(point)}."}
+    try:
+        rung = case.blow(tolerance=setup.tolerance) if rate is None else rolled(case, rate)
+        if height > 0.0:
+            heard = sound.radiate(rung, (*where, height), duration=PLAYED)
+        else:
+            heard = sound.synthesise(rung, where, duration=PLAYED)
+    except (SimulationError, ValueError) as error:
+        return {"uri": "", "note": str(error)}
+    level = heard.peak_level
+    raised = max(0.0, report.QUIET - level) if math.isfinite(level) else 0.0  # of a sound that is quiet
+    note = f"Peak {heard.said}; full scale {heard.full_scale:g} {heard.unit}"
+    note = (note + (f", raised here by {raised:.1f} dB." if raised else ".")).replace("-", "−")
+    uri = report.audio(heard.samples * 10.0 ** (raised / 20.0), heard.rate)
+    place_of = f"{si(height, 'm', 3)} above {place(where)}" if height > 0.0 else f"the surface at {place(where)}"
+    return {
+        "uri": uri, "note": f"Heard from {place_of}. {note}", "unit": heard.unit,
+        "scale": heard.full_scale * 10.0 ** (-raised / 20.0), "peak": heard.full_scale * 10.0 ** (level / 20.0),
+    }  # fmt: skip
 
 
 def rolled(case: Case, rate: float) -> Strokes:

@@ -4,6 +4,7 @@ import json
 import logging
 import socket
 from contextlib import suppress
+from pathlib import Path
 from typing import Any
 
 from tornado.httpserver import HTTPServer
@@ -13,6 +14,7 @@ from tornado.websocket import WebSocketClosedError, WebSocketHandler
 
 from .._base import check
 from . import report
+from .explore_bench import LARGEST_DRAWING, safe_name
 from .explore_numbers import Explorer
 from .explore_session import Session
 from .explore_view import page, parsed
@@ -20,7 +22,7 @@ from .explore_worker import Worker
 
 LOG = logging.getLogger(__name__)
 LOCAL = "127.0.0.1"
-LARGEST_REQUEST = 64 * 1024  # [byte] of a request or a message: a slider's value takes a few hundred, headers 2 000
+LARGEST_REQUEST = 64 * 1024  # [byte] of a message: a slider's value takes a few hundred; headers take 2 000
 POLICY = {  # what the page may load and where it may send: nothing but its own parts, pictures and sounds made here
     "default-src": "'none'", "script-src": "'self'", "style-src": "'self'", "connect-src": "'self'",
     "img-src": "data:", "media-src": "data:", "base-uri": "'none'", "form-action": "'none'",
@@ -41,18 +43,39 @@ class Text(RequestHandler):
         self.finish(self.text)
 
 
+class Drop(RequestHandler):
+    """Takes a file that was dropped on the page, under a name without folders, into the server's own folder."""
+
+    def initialize(self, origins: set[str], folder: Path) -> None:
+        self.origins, self.folder = origins, folder
+
+    def post(self) -> None:
+        if self.request.headers.get("Origin", "").lower() not in self.origins:
+            self.set_status(403)
+            return
+        try:
+            name = safe_name(self.get_query_argument("name", ""))
+        except ValueError as error:
+            self.set_status(400)
+            self.finish(str(error))
+            return
+        (self.folder / name).write_bytes(self.request.body)
+        self.finish(name)
+
+
 class Talk(WebSocketHandler):
     """The connection that an open page keeps."""
 
-    def initialize(self, hosts: set[str], explorer: Explorer, workers: list[Worker]) -> None:
-        self.hosts, self.explorer, self.workers = hosts, explorer, workers
+    def initialize(self, origins: set[str], explorer: Explorer, workers: list[Worker], **shared: Any) -> None:
+        self.origins, self.explorer, self.workers, self.shared = origins, explorer, workers, shared
 
     def check_origin(self, origin: str) -> bool:
-        return origin.lower() in {f"http://{host}" for host in self.hosts}
+        return origin.lower() in self.origins
 
     def open(self, *_: str, **__: str) -> None:
         self.set_nodelay(True)
-        self.session = Session(self.explorer, self.workers[0], self.workers[1], self._say)
+        self.session = Session(self.explorer, self.workers[0], self.workers[1], self._say, **self.shared)
+        self.session.show()
 
     def on_message(self, message: str | bytes) -> None:
         if self.session.closed:
@@ -95,20 +118,23 @@ class Guard(Router):
         return self.application.get_handler_delegate(request, Refused)
 
 
-def open_server(explorer: Explorer, workers: list[Worker], port: int) -> tuple[HTTPServer, str]:
-    """A server on the loopback address, and its address; port 0 is any free one."""
+def open_server(explorer: Explorer, workers: list[Worker], port: int, folder: Path) -> tuple[HTTPServer, str]:
+    """A server on the loopback address, and its address; port 0 is any free one, dropped files go to the folder."""
     listening = socket.create_server((LOCAL, port))
     listening.setblocking(False)
     port = listening.getsockname()[1]
     hosts = {f"{name}:{port}" for name in (LOCAL, "localhost")}
-    parts = {"/": ("html", page(explorer.setup))}
+    origins = {f"http://{host}" for host in hosts}
+    parts = {"/": ("html", page())}
     for name, kind in (("explore.css", "css"), ("plots.js", "javascript"), ("explore.js", "javascript")):
         parts[f"/{name}"] = kind, (report.WEB / name).read_text(encoding="utf-8")
+    shared = {"origins": origins, "explorer": explorer, "workers": workers, "folder": folder, "pages": set()}
     application = Application(
         [*((path, Text, {"kind": kind, "text": text}) for path, (kind, text) in parts.items()),
-         ("/talk", Talk, {"hosts": hosts, "explorer": explorer, "workers": workers})],
+         ("/drop", Drop, {"origins": origins, "folder": folder}),
+         ("/talk", Talk, shared)],
         websocket_max_message_size=LARGEST_REQUEST,
     )  # fmt: skip
-    http = HTTPServer(Guard(application, hosts), max_body_size=LARGEST_REQUEST, max_header_size=LARGEST_REQUEST // 4)
+    http = HTTPServer(Guard(application, hosts), max_body_size=LARGEST_DRAWING, max_header_size=LARGEST_REQUEST // 4)
     http.add_socket(listening)
     return http, f"http://{LOCAL}:{port}/"

@@ -1,18 +1,24 @@
 """Follows one open page: answers its hand at once, and computes the rest when the hand rests."""
 
 import asyncio
+from collections import deque
 from collections.abc import Callable
 from concurrent.futures import Future
 from dataclasses import replace
+from pathlib import Path
 from typing import Any, Protocol
 
 from .._base.check import SimulationError
-from ..scenes.sentences import place
+from ..scenes.sentences import place, si
+from .explore_bench import Order, order_of, pickable
 from .explore_map import Mapper, Picture, Window
 from .explore_model import Settings, Setup
 from .explore_numbers import Explorer, Message, Point, View, drawn
-from .explore_view import RATES, check_sliders, ends, pair
+from .explore_view import RATES, check_sliders, ends, laid_out, number_of, pair
 
+LETTERS = "ABCDEFGH"  # of kept blows: more curves in one picture are a tangle
+WAITING = 8  # [-] hits computed one after another; of a longer queue the oldest are too late to be played
+SHARES = (0.1, 10.0)  # [-] of the speed that keys and MIDI may ask for
 REST = 0.15  # [s] without a change before the blow is judged and the map drawn again
 
 
@@ -32,15 +38,31 @@ class Session:
     """The settings of one open page, and what of it is still being computed.
 
     Everything runs on the event loop; ``judge`` and ``mapper`` are processes that hold a `Explorer` each. What a page
-    asks for waits until all other pages had their turn, and then only the last of it is computed.
+    asks for waits until all other pages had their turn, and then only the last of it is computed. All pages show the
+    body that one of them put on the bench last.
     """
 
-    def __init__(self, explorer: Explorer, judge: Asks, mapper: Asks, send: Callable[[Message], Any]) -> None:
+    def __init__(
+        self, explorer: Explorer, judge: Asks, mapper: Asks, send: Callable[[Message], Any],
+        pages: set["Session"] | None = None, folder: Path | None = None,
+    ) -> None:  # fmt: skip
         self.explorer, self.judge, self.mapper, self.send = explorer, judge, mapper, send
-        self.setup: Setup = explorer.setup
+        self.pages: set[Session] = set() if pages is None else pages  # all that are open
+        self.pages.add(self)
+        self.folder = folder  # of dropped files
+        self.height, self.rate = 0.0, RATES[2]
+        self.order: Order | None = None  # what the page wants on the bench
+        self.tasks: dict[str, asyncio.Task[None]] = {}  # opening, judging, mapping, listening
+        self.hits: deque[tuple[str, float]] = deque(maxlen=WAITING)  # letters and shares of the speed
+        self.roll: bool | None = None  # whether to play a roll or a blow next
+        self.closed = False
+        self._begin()
+
+    def _begin(self) -> None:
+        """Start with the scene's own blow on the body on the bench."""
+        self.setup: Setup = self.explorer.setup
         self.settings: Settings = self.setup.start
         self.ends = ends(self.setup)
-        self.height, self.rate = 0.0, RATES[2]
         self.heard_at: Point = tuple(float(x) for x in self.setup.scene.points[0])
         self.window = Window.of(self.setup, None, None)
         self.number = self.last = 0  # of the last request that was answered, and of the last one
@@ -48,15 +70,33 @@ class Session:
         self.ear: tuple[float, float] | None = None  # where the page wants to listen since then
         self.asked: asyncio.Handle | None = None  # the answer to come
         self.resting: asyncio.TimerHandle | None = None
-        self.tasks: dict[str, asyncio.Task[None]] = {}  # judging, mapping, listening
         self.judged: Any = None  # what the numbers on the page are exact for
         self.mapped: Any = None  # what the map on the page was drawn for
-        self.roll: bool | None = None  # whether to play a roll or a blow next
-        self.closed = False
+
+    def show(self) -> None:
+        """Tell the page what lies on the bench."""
+        explorer = self.explorer
+        picks = pickable(explorer.first, explorer.order, self.setup.scene)
+        points = {"at": self.settings.at, "ear": self.heard_at}
+        self.send({"kind": "setup", **laid_out(self.setup), "picks": picks, **points})
+        for kept in explorer.kept.values():
+            self.send(kept.told)
+
+    def _restart(self) -> None:
+        """Show another body, or another mallet; what was computed for the one before is not wanted any more."""
+        for handle in (self.asked, self.resting, *(task for name, task in self.tasks.items() if name != "open")):
+            if handle is not None:
+                handle.cancel()
+        heard_at = self.heard_at
+        self._begin()
+        if self.explorer.order.at is not None:
+            self.heard_at = self.setup.place(*heard_at, *([0.0] * (2 - len(heard_at)))) or self.heard_at
+        self.show()
 
     def close(self) -> None:
         """The page is gone."""
         self.closed = True
+        self.pages.discard(self)
         for handle in (self.asked, self.resting, *self.tasks.values()):
             if handle is not None:
                 handle.cancel()
@@ -70,6 +110,15 @@ class Session:
             self.roll = bool(message["play"] == "roll")
             self.send({"kind": "sound", "uri": "", "note": "Computing the sound …"})
             self._start("listen", self._play)
+        elif "keep" in message:
+            self._start("keep", self._keep)
+        elif "forget" in message:
+            self._forget(message["forget"])
+        elif "hit" in message:
+            self.hits.append(_hit_of(message["hit"]))
+            self._start("hit", self._hit)
+        elif "open" in message:
+            self._order(message["open"])
         elif "view" in message:
             view = message["view"]
             if view is not None and not isinstance(view, dict):
@@ -216,6 +265,66 @@ class Session:
             picture = await made(Mapper.finer, picture)
         sent(picture, exact=True)
 
+    async def _keep(self) -> None:
+        """Keep the present blow, judged and heard, under the first letter that is free."""
+        explorer, settings, where, height = self.explorer, self.settings, self.heard_at, self.height
+        found = await self._ask(self.judge, Explorer.judge, settings)
+        sound = await self._ask(self.mapper, Explorer.listen, settings, where, height, None)
+        letter = next((each for each in LETTERS if each not in explorer.kept), None)
+        if "failed" in found or letter is None:
+            many = f"{len(LETTERS)} blows are kept: forget one first."
+            self.send({"kind": "note", "text": f"{found['failed']}." if "failed" in found else many})
+            return
+        told = {
+            "kind": "kept", "letter": letter, "heading": self.setup.scene.title or self.setup.scene.path.stem,
+            "words": f"{si(settings.mass, 'kg', 3)} with {si(settings.speed, 'm/s', 3)} at {place(settings.at)}",
+            "at": settings.at, "body": _body(explorer.order), "sound": sound, **found,
+        }  # fmt: skip
+        explorer.keep(letter, settings, where, height, told)
+        self.mapper.ask(Explorer.keep, letter, settings, where, height, {})
+        for page in self.pages:
+            page.send(told)
+
+    def _forget(self, letter: Any) -> None:
+        if not isinstance(letter, str) or letter not in self.explorer.kept:
+            return  # another page was faster
+        self.explorer.forget(letter)
+        self.mapper.ask(Explorer.forget, letter)
+        for page in self.pages:
+            page.send({"kind": "forgotten", "letter": letter})
+
+    async def _hit(self) -> None:
+        """The sounds of keys, one after another."""
+        while self.hits:
+            letter, share = self.hits.popleft()
+            about = letter, self.settings, self.heard_at, self.height, share
+            sound = await self._ask(self.mapper, Explorer.struck, *about)
+            self.send({"kind": "hit", "letter": letter, "share": share, "number": self.number, **sound})
+
+    def _order(self, wanted: Any) -> None:
+        """Put on the bench what the page wants; what it may not have is told there."""
+        try:
+            self.order = order_of(wanted, self.folder, self.order or self.explorer.order, self.settings.at)
+        except ValueError as error:
+            self.send({"kind": "bench", "failed": str(error)})
+        else:
+            self._start("open", self._open)
+
+    async def _open(self) -> None:
+        """What was ordered last."""
+        while self.order is not None:
+            order, self.order = self.order, None
+            self.send({"kind": "bench"})
+            try:
+                setup: Setup = await self._ask(self.mapper, Explorer.open, order)  # a map waits for less
+            except (SimulationError, ValueError) as error:
+                self.send({"kind": "bench", "failed": str(error)})
+                continue
+            self.explorer.become(setup, order)
+            self.judge.ask(Explorer.become, setup, order)
+            for page in list(self.pages):
+                page._restart()
+
     async def _play(self) -> None:
         """The sound that was asked for last."""
         while self.roll is not None:
@@ -226,3 +335,15 @@ class Session:
                 sound = {"uri": "", "note": f"{error}."}
             if self.roll is None:
                 self.send({"kind": "sound", **sound})
+
+
+def _hit_of(told: Any) -> tuple[str, float]:
+    """Letter and share of the speed of a key; ValueError if a page sends anything else."""
+    if not isinstance(told, dict) or not isinstance(told.get("letter"), str):
+        raise ValueError("hit must be a table of letter and share")
+    return told["letter"][:1], min(max(number_of("share", told.get("share")), SHARES[0]), SHARES[1])
+
+
+def _body(order: Order) -> str:
+    """What tells bodies apart whose points can be shown in one picture."""
+    return f"{order.drawing.name if order.drawing else ''} {order.unit or ''}"

@@ -11,6 +11,7 @@ from .._base.rounding import SAME
 from ..fe.section import Plate
 from ..mesh.meshes import Mesh
 from ..show.figures import SPECTRUM_DEPTH
+from .explore_bench import LARGEST_DRAWING
 from .explore_map import NARROWEST
 from .explore_model import Setup
 from .explore_numbers import BAND, SPECTRUM_POINTS
@@ -50,9 +51,17 @@ def ends(setup: Setup) -> Ends:
     return found
 
 
-def page(setup: Setup) -> str:
-    """The page as HTML."""
-    title = setup.scene.title or setup.scene.path.stem
+def page() -> str:
+    """The page as HTML, before it is told what it shows."""
+    facts = {
+        "steps": STEPS, "band": BAND, "points": SPECTRUM_POINTS, "depth": SPECTRUM_DEPTH, "narrowest": NARROWEST,
+        "largest": LARGEST_DRAWING,
+    }  # fmt: skip
+    return str(template("explore.html").render(facts=facts, cards=list(CARDS)))
+
+
+def laid_out(setup: Setup) -> dict[str, Any]:
+    """What the page shows of a setup: its name, the body, the sliders beside each picture, and the axes."""
     known = ends(setup)
     cards = {
         card: [
@@ -64,13 +73,11 @@ def page(setup: Setup) -> str:
         ]
         for card, names in CARDS.items()
     }  # fmt: skip
-    facts = {
+    return {
+        "heading": setup.scene.title or setup.scene.path.stem, "cards": cards, "notes": list(setup.mesh.notes),
         "loops": loops(setup.mesh), "ribs": [setup.mesh.pieces(rib.path).tolist() for rib in setup.scene.ribs],
-        "band": BAND, "points": SPECTRUM_POINTS, "at": setup.start.at,
-        "depth": SPECTRUM_DEPTH, "narrowest": NARROWEST,
         "mass": setup.range("mass"), "stiffness": setup.range("stiffness"),
     }  # fmt: skip
-    return str(template("explore.html").render(heading=title, cards=cards, steps=STEPS, facts=facts))
 
 
 def _share(name: str, low: float, high: float, value: float) -> float:
@@ -115,13 +122,14 @@ def check_sliders(known: Ends, turned: Any) -> dict[str, float]:
     found = {}
     for name, value in turned.items():
         low, high, _ = known[name]
-        number = _number(name, value)
+        number = number_of(name, value)
         held = min(max(number, low), high)
         found[name] = number if name in ("x", "y") and abs(held - number) > SAME * (high - low) else held
     return found
 
 
-def _number(name: str, value: Any) -> float:
+def number_of(name: str, value: Any) -> float:
+    """A finite number; ValueError if it is anything else."""
     if isinstance(value, (int, float)) and not isinstance(value, bool):
         with suppress(OverflowError):  # an integer beyond all floats
             if math.isfinite(number := float(value)):
@@ -133,5 +141,5 @@ def pair(name: str, values: Any) -> tuple[float, float]:
     """Two finite numbers; ValueError if they are anything else."""
     if not isinstance(values, list) or len(values) != 2:
         raise ValueError(f"{name} must be two numbers")
-    first, second = (_number(name, value) for value in values)
+    first, second = (number_of(name, value) for value in values)
     return first, second

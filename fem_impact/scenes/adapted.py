@@ -49,10 +49,10 @@ def text(
     if drawing is not None:
         whole, notes = _drawn(whole, drawing, unit, folder)
     if material is not None:
-        facts = materials.entry(material).facts
+        damped = damping_of(material)
         whole = _with(whole, "[material]", _listed_as("material", material))
-        if "loss_factor" in facts:
-            ratio = f"damping_ratio = {0.5 * facts['loss_factor'].value:.2g}"
+        if damped is not None:
+            ratio = f"damping_ratio = {damped}"
             line = next(each for each in whole.splitlines() if each.startswith("damping_ratio"))
             whole = whole.replace(line, f"{ratio.ljust(26)}{LOST}")
     if mallet is not None:
@@ -60,12 +60,21 @@ def text(
         whole = _with(whole, "[striker]", _listed_as("striker", mallet))
         whole = _with(whole, "[contact]", "# [contact]               # left out: the name of the striker says it\n")
     if (drawing, material, mallet) != (None, None, None):
-        body = kind if drawing is None else drawing.stem
-        title = (
-            f"{body[0].upper()}{body[1:]}{f' of {material}' if material else ''} struck by {mallet or 'a steel ball'}"
-        )
+        title = titled(kind if drawing is None else drawing.stem, material, mallet or "a steel ball")
         whole = whole.replace(whole.splitlines()[0], f"title = {json.dumps(title)}", 1)
     return whole, notes
+
+
+def damping_of(material: str) -> float | None:
+    """Damping ratio [-] of a body of this material: half its loss factor; None if that is not known."""
+    facts = materials.entry(material).facts
+    return float(f"{0.5 * facts['loss_factor'].value:.2g}") if "loss_factor" in facts else None
+
+
+def titled(body: str, material: str | None, mallet: str | None) -> str:
+    """What a body of a material and what strikes it are called together."""
+    struck = f" struck by {mallet}" if mallet else ""
+    return f"{body[0].upper()}{body[1:]}{f' of {material}' if material else ''}{struck}"
 
 
 def _drawn(whole: str, drawing: Path, unit: str | None, folder: Path) -> tuple[str, tuple[str, ...]]:

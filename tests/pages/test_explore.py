@@ -12,6 +12,7 @@ from importlib import import_module
 
 import pytest
 from test_cli import TEXT
+from test_explore_bench import LEAF
 from test_interrupt import RUNNER
 
 from fem_impact import cli
@@ -22,9 +23,9 @@ SLIDERS = ("mass", "stiffness", "exponent", "speed", "bending", "x", "y")
 MAP = "document.documentElement.dataset.map !== undefined"
 
 
-def served(scene, *options):
+def served(*words):
     """A server of its own, and the address it printed."""
-    command = [sys.executable, "-m", "fem_impact.cli", "explore", str(scene), "--no-open", *options]
+    command = [sys.executable, "-m", "fem_impact.cli", "explore", *map(str, words), "--no-open"]
     server = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
     line = server.stdout.readline()
     assert line.startswith("http://127.0.0.1:"), server.communicate(timeout=120)[1]
@@ -215,7 +216,7 @@ def test_button_plays_the_sound(opened):
     shown.until("document.getElementById('player').readyState >= 1")
     assert shown.tab.evaluate("document.getElementById('player').duration") == pytest.approx(2.0, abs=0.01)
     shown.until("document.getElementById('heard').innerText.includes('full scale 10 m/s')")
-    shown.until("!document.getElementById('player').paused || document.getElementById('player').currentTime > 0")
+    shown.until("Number(document.documentElement.dataset.rung) >= 1")
     before = shown.tab.evaluate("document.getElementById('player').src")
     shown.tab.click("#roll")
     shown.until(f"document.getElementById('player').src !== {before!r}")
@@ -286,7 +287,22 @@ def test_keyboard_turns_every_slider(opened):
     shown = opened()
     stops = shown.tabbed_to()
     names = [name for _, name, _ in stops]
-    for name in [*SLIDERS, "height", "rate", "damping", "thickness", "loss", "listen", "roll", "closer", "player"]:
+    for name in [
+        *SLIDERS,
+        "height",
+        "rate",
+        "damping",
+        "thickness",
+        "loss",
+        "listen",
+        "roll",
+        "closer",
+        "player",
+        "file",
+        "pick-mallet",
+        "keep",
+        "midi",
+    ]:
         assert name in names
     assert [stop for stop in stops if not stop[2]] == []
     before = shown.tab.inner_text("#mass-said")
@@ -316,3 +332,83 @@ def test_ctrl_c_before_it_serves_is_quiet_too(scene, tmp_path):
     done = subprocess.run([sys.executable, "-c", RUNNER, *words], capture_output=True, text=True)
     assert mark.read_text() == "sent" and done.stdout == ""  # mid-run, and nothing served yet
     assert "Traceback" not in done.stderr and done.returncode in (0, 130, -signal.SIGINT)
+
+
+@pytest.mark.slow
+def test_a_dropped_drawing_is_struck_with_yarn_and_compared(visit, tmp_path):
+    """A percussionist's way: a leaf, a mallet, two points side by side with their sounds."""
+    pytest.importorskip("svgelements", reason="the extra cad is not installed")
+    leaf = tmp_path / "leaf.svg"
+    leaf.write_text(LEAF)
+    server, address = served()
+    try:
+        shown = visit(address)
+        shown.until("document.documentElement.dataset.ready === 'true'")
+        root = "document.documentElement.dataset"
+        shown.tab.set_input_files("#file", {"name": "bad.svg", "mimeType": "image/svg+xml", "buffer": b"<svg/>"})
+        shown.until(f"{root}.bench === 'failed'")
+        assert "bad.svg" in shown.tab.inner_text("#bench-said")
+        shown.tab.set_input_files("#file", leaf)
+        shown.until(f"{root}.bench.includes('leaf.svg')")
+        assert "the drawing's y is taken as -y" in shown.tab.inner_text("#notes")
+        shown.tab.fill("#search-mallet", "mallet medium")
+        assert shown.tab.locator("#pick-mallet option").all_inner_texts() == [
+            "as in the scene", "yarn, medium", "rubber, medium"
+        ]  # fmt: skip
+        shown.tab.select_option("#pick-mallet", "yarn, medium")
+        shown.until(f"{root}.bench.includes('yarn, medium')")
+        assert shown.tab.inner_text("h1") == "Leaf struck by yarn, medium"
+        for letters, x in (("A", 0.5), ("AB", 0.7)):
+            click(shown, "body", x, 0.5)
+            shown.tab.click("#keep")
+            shown.until(f"{root}.kept === '{letters}'")
+        first, second = (each.inner_text() for each in shown.tab.locator("#kept article").all())
+        assert "peak force" in first and first.splitlines()[1:] != second.splitlines()[1:]
+        shown.tab.evaluate(f"delete {root}.rung")
+        shown.tab.click("#turns")
+        shown.until(f"Number({root}.rung) >= 2")
+        assert shown.errors == []
+    finally:
+        server.send_signal(signal.SIGINT)
+        assert server.communicate(timeout=120)[1] == ""
+
+
+@pytest.mark.slow
+def test_keys_and_midi_strike_kept_blows_at_other_speeds(opened):
+    shown = opened()
+    shown.tab.click("#midi")
+    shown.until("document.getElementById('midi-said').textContent !== ''")  # whatever this browser has
+    shown.tab.uncheck("#aloud")
+    shown.tab.click("#keep")
+    shown.until("document.documentElement.dataset.kept === 'A'")
+    shown.tab.evaluate(
+        """() => {
+            window.fake = { name: 'Keys' };
+            navigator.requestMIDIAccess = async () => ({ inputs: new Map([['a', window.fake]]) });
+            document.documentElement.dataset.rung = 0;
+            document.activeElement.blur();
+        }"""
+    )
+    rung = 0
+    for key in ("a", "q", "q", "z", " "):  # as kept, twice as fast, the same from memory, half as fast, the present
+        rung += 1
+        shown.tab.keyboard.press(key if key != " " else "Space")
+        shown.until(f"document.documentElement.dataset.rung === '{rung}'")
+    shown.tab.click("#midi")
+    shown.until("document.getElementById('midi-said').textContent.startsWith('Listening to Keys')")
+    shown.tab.evaluate("window.fake.onmidimessage({ data: [0x90, 61, 100] })")
+    shown.until(f"document.documentElement.dataset.rung === '{rung + 1}'")
+    shown.tab.get_by_role("button", name="Forget A").click()
+    shown.until("document.documentElement.dataset.kept === ''")
+    shown.tab.evaluate("delete navigator.requestMIDIAccess; navigator.requestMIDIAccess = undefined")
+    shown.tab.click("#midi")
+    shown.until("document.getElementById('midi-said').textContent.startsWith('This browser has no Web MIDI')")
+    assert shown.errors == []
+
+
+def test_a_file_from_elsewhere_is_refused(address):
+    for origin in ({}, {"Origin": "http://evil.example"}):
+        assert ask(address, None, "/drop?name=a.svg", "POST", Content_Length="0", **origin) == 403
+    own = {"Origin": address.rstrip("/"), "Content_Length": "0"}
+    assert ask(address, None, "/drop?name=a.toml", "POST", **own) == 400
+    assert ask(address, None, "/drop?name=..%2Fa.svg", "POST", **own) == 200

@@ -261,7 +261,7 @@ async def talk(host, text):
     return reader, writer
 
 
-def test_pages_that_vanish_or_send_nonsense_are_one_line_each(explorer, caplog, monkeypatch):
+def test_pages_that_vanish_or_send_nonsense_are_one_line_each(explorer, caplog, monkeypatch, tmp_path):
     pytest.importorskip("tornado", reason="exploring is an extra: fem-impact[web]")
     from fem_impact.pages import explore_server
 
@@ -271,13 +271,16 @@ def test_pages_that_vanish_or_send_nonsense_are_one_line_each(explorer, caplog, 
 
     async def work():
         asyncio.get_running_loop().set_exception_handler(lambda _, context: bad.append(context))
-        server, address = explore_server.open_server(explorer, [Beside(explorer), Beside(explorer)], 0)
+        server, address = explore_server.open_server(explorer, [Beside(explorer), Beside(explorer)], 0, tmp_path)
         host = address.split("/")[2]
         for _ in range(5):
             _, writer = await talk(host, '{"number": 1, "turn": {"mass": 0.02}}')
             writer.transport.abort()
         for text in BAD.values():
             reader, writer = await talk(host, text)
+            frame, size = await reader.readexactly(2)
+            assert frame == 0x81 and size == 126  # what lies on the bench
+            await reader.readexactly(int.from_bytes(await reader.readexactly(2), "big"))
             assert (await reader.read(2))[0] == 0x88  # the connection is closed
             writer.transport.abort()
         while sum("page" in record.getMessage() for record in caplog.records) < 5 + len(BAD):
@@ -292,3 +295,42 @@ def test_pages_that_vanish_or_send_nonsense_are_one_line_each(explorer, caplog, 
     assert sorted(line.partition(":")[0] for line in said) == ["a page has gone"] * 5 + ["a page is refused"] * len(BAD)
     assert all(len(line) < 200 and "\n" not in line for line in said)
     assert not any(record.exc_info for record in caplog.records)
+
+
+def test_all_pages_show_what_one_puts_on_the_bench(explorer, monkeypatch):
+    monkeypatch.setattr(explore_session, "REST", 60.0)
+    own, said, pages = explore_numbers.Explorer(explorer.setup), [], set()  # the others stay with the scene
+
+    async def work():
+        one, other = (
+            explore_session.Session(
+                own, Beside(own), Beside(own), lambda told, who=who: said.append((who, told)), pages
+            )
+            for who in "ab"
+        )
+        other.take({"ear": [0.2, 0.1]})
+        await asyncio.sleep(0.01)
+        one.take({"open": {"mallet": "yarn, medium"}})
+        await one.tasks["open"]
+        one.close(), other.close()
+        return other
+
+    other = run(work)
+    (who, busy), *shown = [(who, told) for who, told in said if told["kind"] in ("bench", "setup")]
+    assert (who, busy) == ("a", {"kind": "bench"}) and {who for who, _ in shown} == {"a", "b"}
+    assert all(told["heading"] == "Small struck by yarn, medium" for _, told in shown)
+    assert other.setup.base.striker.mass == 0.03 and other.heard_at == (0.2, 0.1)
+    assert other.settings.at == explorer.setup.start.at and not pages
+
+
+def test_what_cannot_be_put_on_the_bench_is_said_in_words(explorer, monkeypatch):
+    wishes = [{"open": {"thickness": 1e9}}, {"open": {"mallet": "yarm, soft"}}, {"open": [1]}]
+
+    def done(said):
+        return len([1 for one in said if "failed" in one]) == 3
+
+    said, session, _ = follow(explorer, monkeypatch, *wishes, until=done, rest=60.0)
+    told = [one["failed"] for one in said if "failed" in one]
+    assert "thickness must lie between" in told[0]
+    assert "did you mean 'yarn, soft'" in told[2] and "open must be a table" in told[1]
+    assert session.setup is explorer.setup

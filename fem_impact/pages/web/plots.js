@@ -70,13 +70,13 @@ const plots = (() => {
       c.clearRect(0, 0, wide, tall);
       c.font = look.font;
       const ticks = (axis, most) => axis.hidden ? [] : (axis.log ? logarithmic : linear)(axis.low, axis.high, most)
-        .map(([value, step]) => [value, si(value, axis.unit, step)]);
+        .map(([value, step]) => [value, si(value * (axis.times ?? 1), axis.unit, step * (axis.times ?? 1))]);
       const rows = ticks(y, 5);
       const left = Math.max(y.hidden ? 0 : 30, ...rows.map(([, text]) => c.measureText(text).width)) + (y.hidden ? 10 : 8) + (y.label ? 18 : 0);
       Object.assign(x, { from: left, to: wide - 14 });
       Object.assign(y, { from: tall - (x.label ? 40 : 24), to: 10 });
       if (this.square) this.square();
-      const columns = ticks(x, (x.to - x.from) / 75);
+      const columns = ticks(x, (x.to - x.from) / (x.times ? 45 : 75));
       c.strokeStyle = look.rule;
       c.fillStyle = look.soft;
       c.lineWidth = 1;
@@ -146,11 +146,10 @@ const plots = (() => {
 
   const ends = ([low, high]) => ({ low, high });
   // The body: lengths alike along both axes, some room around; `marks` draws what lies on it.
-  const bodyPlot = (id, { loops, ribs }, marks) => {
-    const corners = loops.flat(), flat = corners.some((one) => one[1] !== corners[0][1]);
-    const reach = (i) => [Math.min(...corners.map((one) => one[i])), Math.max(...corners.map((one) => one[i]))];
-    const [left, right] = reach(0), [low, high] = flat ? reach(1) : [-0.1 * (right - left), 0.1 * (right - left)];
-    const body = new Plot(id, { low: left, high: right, unit: "m" }, { low, high, unit: "m", hidden: !flat }, (c) => {
+  const bodyPlot = (id, facts, marks) => {
+    let loops = [], ribs = [], flat, left, right, low, high;
+    const axis = (label) => ({ low: 0, high: 1, unit: "", times: 1000, label: `${label} in mm` });
+    const body = new Plot(id, axis("x"), axis("y"), (c) => {
       c.beginPath();
       for (const loop of loops) {
         for (const [i, [x, y]] of loop.entries()) c[i ? "lineTo" : "moveTo"](body.px(x), body.py(y));
@@ -169,8 +168,19 @@ const plots = (() => {
       c.stroke();
       marks(([x, y]) => [body.px(x), body.py(y ?? 0)]);
     });
-    body.flat = flat;
+    body.show = (shape) => {
+      ({ loops, ribs } = shape);
+      const corners = loops.flat();
+      const reach = (i) => corners.map((one) => one[i]).reduce(([a, b], one) => [Math.min(a, one), Math.max(b, one)], [Infinity, -Infinity]);
+      [left, right] = reach(0);
+      body.flat = flat = corners.some((one) => one[1] !== corners[0][1]);
+      [low, high] = flat ? reach(1) : [-0.1 * (right - left), 0.1 * (right - left)];
+      body.y.hidden = !flat;
+      body.y.label = flat ? "y in mm" : "";
+    };
+    if (facts) body.show(facts);
     body.square = () => {
+      if (!loops.length) return;
       const { x, y } = body, wide = x.to - x.from, tall = y.from - y.to;
       const scale = Math.max((right - left) / wide, (high - low) / tall) * 1.08;
       Object.assign(x, { low: 0.5 * (left + right - wide * scale), high: 0.5 * (left + right + wide * scale) });
@@ -184,12 +194,12 @@ const plots = (() => {
   const forceAndSpectrum = (facts, shown) => {
     const both = (c, draw) => {
       c.lineWidth = 2;
-      if (shown.kept) {
-        c.strokeStyle = look.struck;
-        c.setLineDash([6, 4]);
-        draw(shown.kept);
-        c.setLineDash([]);
+      c.setLineDash([6, 4]);
+      for (const kept of [shown.kept ?? []].flat()) {
+        c.strokeStyle = kept.colour ?? look.struck;
+        draw(kept);
       }
+      c.setLineDash([]);
       c.strokeStyle = look.line;
       draw(shown);
     };
