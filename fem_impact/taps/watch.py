@@ -79,7 +79,8 @@ def advice(file: str, taps: Taps, i: int, bandwidth: float, drop: float = 10.0) 
     if not wrong and reach is not None and reach < bandwidth:
         wrong.append(
             f"too soft for {in_hertz(bandwidth, 3)}: take the next tip (this one reaches {in_hertz(reach, 3)}; the "
-            f"tip must be {(bandwidth / reach) ** 2:.2g} times as stiff)"  # the time of contact goes with one over its root
+            # the time of contact goes with one over the root of the stiffness
+            f"tip must be {(bandwidth / reach) ** 2:.2g} times as stiff)"
         )
     far = f"beyond {in_hertz(0.5 * taps.rate, 3)}" if reach is None else in_hertz(reach, 3)
     peak = float(taps.peak[i])
