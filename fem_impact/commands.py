@@ -288,20 +288,6 @@ def _split(option: str, text: str) -> tuple[str, str]:
     return name.strip(), value.strip()
 
 
-def hammer(options: argparse.Namespace) -> Answer:
-    """Find hammers for a bandwidth, or plan a test with one that roves."""
-    from . import hammer_commands  # imported only when needed
-
-    return hammer_commands.hammer(options)
-
-
-def watch(options: argparse.Namespace) -> Answer | None:
-    """Judge the records of taps that a folder gets."""
-    from . import hammer_commands  # imported only when needed
-
-    return hammer_commands.watch(options)
-
-
 def report(options: argparse.Namespace) -> Answer:
     """Strike and write a page."""
     scene = fi.report.read(options.scene)
@@ -524,13 +510,6 @@ def verify(options: argparse.Namespace) -> Answer:
 def _choices(options: argparse.Namespace) -> dict[str, Any]:
     names = ("tolerance", "quantity", "target", "model", "n_modes", "size")
     return {name: getattr(options, name) for name in names if getattr(options, name) is not None}
-
-
-def frf(options: argparse.Namespace) -> Answer:
-    """List the peaks of frequency responses, and write them and a page about them."""
-    from . import hammer_commands  # imported only when needed
-
-    return hammer_commands.frf(options)
 
 
 def fit(options: argparse.Namespace) -> Answer:
