@@ -104,6 +104,10 @@ def _interruptible(options: argparse.Namespace) -> Iterator[None]:
             signal.signal(each, signal.SIG_IGN)
         if options.command in ("explore", "watch") and number == signal.SIGINT:
             undo_all()
+            last = getattr(options, "last", None)  # their last word
+            if last and not options.quiet:
+                with suppress(OSError):
+                    os.write(2, f"fem-impact: {last}\n".encode())
             os._exit(0)  # Ctrl-C is the normal way to stop them
         if undo_all():
             word = "interrupted" if number == signal.SIGINT else "terminated"

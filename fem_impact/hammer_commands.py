@@ -165,6 +165,7 @@ def watch(options: argparse.Namespace) -> replies.Answer | None:
         replies.remark(options, f"watching {folder.path}; Ctrl-C stops it")
     while True:
         new = seen.judged(folder.look())
+        options.last = seen.last_word
         if new and not options.once:
             options.show(seen.report_on(new))
         if options.once and not folder.waiting:
@@ -182,6 +183,12 @@ class _Watched:
         self.path = replies.file_of(options, "watch.png") or Path("out") / options.scene.resolve().name / "watch.png"
         self.every: dict[str, list[Any]] = {}  # name of a file: `Advice` of each of its taps
         self.good: dict[str, Any] = {}  # the same: its good taps
+
+    @property
+    def last_word(self) -> str:
+        """What is said when the program is stopped."""
+        told = [one for each in self.every.values() for one in each]
+        return f"stopped; {sum(one.good for one in told)} of {len(told)} taps in {len(self.every)} files were good"
 
     def judged(self, paths: Sequence[Path]) -> list[Any]:
         """Advice on every tap of some files; the picture shows the last of them."""

@@ -407,6 +407,7 @@ def stated() -> dict[str, dict[str, Any]]:
         "Taps.from_arrays": {"force": t["taps"].force, "response": t["taps"].force, "rate": 25600.0, "names": ["a"],
             "units": ["m/s^2"], "overload": False, "labels": ["one"]},
         "Taps.pick": {"self": t["taps"], "which": 0},
+        "Taps.cut_off": {"self": t["taps"], "tap": 0},
         "Taps.between": {"self": t["taps"], "start": 0.0, "end": 2e-3},
         "Taps.save": {"self": t["taps"], "path": folder / "saved.npz"},
         "measure": {"hit": t["hit"], "rate": 8000.0, "at": [at], "anti_alias": (4, 3e3), "tip_mass": 1e-3,

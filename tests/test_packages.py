@@ -68,7 +68,7 @@ DOORS = {  # what these packages may use of those above: what a user does, and m
     "taps": MODELS | BLOWS | {
         "fe.assembly", "impact.accuracy", "impact.engine", "impact.history", "impact.measured", "impact.quantities",
         "impact.reduced_body", "impact.spectra", "modes.picked", "modes.universal_files", "scenes.schema",
-        "show.export", "show.plots", "show.sampling", "sweeps.bodies", "sweeps.hammers",
+        "show.export", "show.figures", "show.plots", "show.sampling", "sweeps.bodies", "sweeps.hammers",
     },
     "designs": MODELS | BLOWS | {
         "fe.assembly", "fe.refinement", "fe.section", "fe.slopes", "fe.system", "fe.variation", "impact.clearance",

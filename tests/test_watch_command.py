@@ -1,6 +1,11 @@
 """`fem-impact watch` as it is typed: a folder with good and bad records, read once, and followed until Ctrl-C."""
 
 import json
+import os
+import signal
+import subprocess
+import sys
+from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
@@ -59,3 +64,22 @@ def test_a_new_record_gets_a_line_of_its_own_until_the_program_is_stopped(folder
 def test_a_folder_without_records_says_so(tmp_path, capsys):
     assert cli.main(["watch", str(tmp_path), "--bandwidth", "2000", "--once"]) == 0
     assert capsys.readouterr().out.strip() == "no records yet"
+
+
+@pytest.mark.slow  # starts a process
+def test_ctrl_c_ends_a_watch_cleanly_with_its_last_word(folder, tmp_path):
+    """A real signal to a real process, once it has judged what is there."""
+    words = ["watch", str(folder), "--bandwidth", "2000", "--out", str(tmp_path / "seen.png")]
+    watch = subprocess.Popen(
+        [sys.executable, "-m", "fem_impact", *words], cwd=tmp_path, text=True, stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE, env={**os.environ, "PYTHONPATH": str(Path(fi.__file__).parents[1])},
+    )  # fmt: skip
+    try:
+        told = [watch.stdout.readline() for _ in range(4)]  # three records, and the picture
+        watch.send_signal(signal.SIGINT)
+        _, said = watch.communicate(timeout=300)
+    finally:
+        watch.kill()
+    assert watch.returncode == 0 and sum(line.startswith(("good", "soft", "torn")) for line in told) == 3
+    assert said.splitlines()[-1] == "fem-impact: stopped; 1 of 3 taps in 3 files were good"
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["records", "seen.png"]

@@ -14,7 +14,7 @@ from .._base.explained import noted
 from .._base.files import replacing
 from ..modes import picked, stabilisation
 from ..modes.modal import Modes
-from ..show import export
+from ..show import export, figures
 from ..show.style import BLUE, GREY, VERMILION, panels, set_units
 from ..taps import transfer, watch
 from ..taps.records import Taps
@@ -80,7 +80,7 @@ def _tap_rows(taps: Taps) -> list[tuple[str, str, str, str, str]]:
     rows = []
     for i, name in enumerate(taps.labels):
         reach = watch.reach_of(taps, i)
-        far = f"beyond {watch.in_hertz(0.5 * taps.rate)}" if reach is None else watch.in_hertz(reach)
+        far = f"beyond {figures.in_hertz(0.5 * taps.rate, 3)}" if reach is None else figures.in_hertz(reach, 3)
         rows.append((name, f"{taps.peak[i]:.4g} N", str(taps.n_pulses[i]), far,
                      "; ".join(watch.faults(taps, i)) or "good"))  # fmt: skip
     return rows

@@ -10,9 +10,9 @@ from .._base import check
 from .._base.explained import noted
 from .._base.files import replacing
 from ..show import export, plots
+from ..show.figures import in_hertz
 from ..sweeps.hammers import catalogue
 from ..taps.roving import Roving
-from ..taps.watch import in_hertz
 from . import report
 from .fit_page import uri
 
@@ -25,7 +25,7 @@ def tip_verdict(plan: Roving, i: int, j: int) -> str:
         return "too hard to tell"
     if plan.n_impacts[i, j] > 1:
         return "double hit"
-    return "works" if plan.works[i, j] else f"too soft for {in_hertz(plan.bandwidth)}"
+    return "works" if plan.works[i, j] else f"too soft for {in_hertz(plan.bandwidth, 3)}"
 
 
 def overload(plan: Roving, i: int, j: int) -> float | None:
@@ -50,7 +50,7 @@ def _sheet(plan: Roving, i: int) -> dict[str, Any]:
         limit, sure = overload(plan, i, j), plan.coherence[i, j]
         rows.append((
             plan.hammers[j], plan.tips[j], f"{1e3 * plan.masses[j]:.4g} g",
-            "" if np.isnan(plan.reach[i, j]) else in_hertz(float(plan.reach[i, j])),
+            "" if np.isnan(plan.reach[i, j]) else in_hertz(float(plan.reach[i, j]), 3),
             "" if np.isnan(sure) else f"{sure:.3f}", "" if limit is None else f"{limit:.2g} m/s",
             tip_verdict(plan, i, j),
         ))  # fmt: skip
@@ -58,7 +58,7 @@ def _sheet(plan: Roving, i: int) -> dict[str, Any]:
     if best >= 0:
         take = f"Take {plan.hammers[best]} with its {plan.tips[best]} tip"
         limit = overload(plan, i, best)
-        reach, sure = in_hertz(float(plan.reach[i, best])), plan.coherence[i, best]
+        reach, sure = in_hertz(float(plan.reach[i, best]), 3), plan.coherence[i, best]
         words.append(f"It hits once, reaches {reach} at {plan.drop:g} dB down; expected mean coherence {sure:.3f}.")
         words += [f"Its range is exceeded above {limit:.2g} m/s."] if limit is not None else []
     else:
@@ -75,7 +75,7 @@ def write(path: str | Path, plan: Roving, *, title: str, notes: tuple[str, ...] 
     """Write the sheets of a plan; needs the extra ``web``. Printed, each point has a page of its own."""
     check.extra("jinja2", "web", "a page")
     tiles: Mapping[str, str] = {
-        "bandwidth": in_hertz(plan.bandwidth), "drop": f"{plan.drop:g} dB", "points": str(len(plan.points)),
+        "bandwidth": in_hertz(plan.bandwidth, 3), "drop": f"{plan.drop:g} dB", "points": str(len(plan.points)),
         "points that work": str(sum(each >= 0 for each in plan.best)), "pairs tried": str(len(plan.tips)),
     }  # fmt: skip
     page = report.template("sheet.html").render(

@@ -18,7 +18,7 @@ AFTER = 3.0  # [-] of its pulses' length that is drawn of a record after them
 def draw_pulses(axes: Any, taps: Taps, which: Sequence[int]) -> None:
     """The force of some taps, from just before to some time after their pulses; pulses of double hits are marked."""
     for n, i in enumerate(which):
-        pulses = taps._pulses[i]
+        pulses = taps.pulses[i]
         if not pulses:
             continue
         first, last = pulses[0][0], pulses[-1][1]

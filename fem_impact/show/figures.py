@@ -266,9 +266,9 @@ def snapshot(plane: np.ndarray, cells: np.ndarray, deflection: np.ndarray, at: n
     return figure
 
 
-def in_hertz(value: float) -> str:
-    """A frequency with its unit, to four digits."""
-    return f"{value:.4g} Hz" if value < 1e4 else f"{value * 1e-3:.4g} kHz"
+def in_hertz(value: float, digits: int = 4) -> str:
+    """A frequency [Hz] with its unit; in kHz from where its digits before the point are more than asked for."""
+    return f"{value:.{digits}g} Hz" if value < 10.0**digits else f"{value * 1e-3:.{digits}g} kHz"
 
 
 def _unflattened(shape: np.ndarray, cells: np.ndarray, flat: float = SAME) -> np.ndarray:

@@ -108,19 +108,14 @@ def _universal(path: Path, times: np.ndarray, force: np.ndarray, moved: dict[str
         channels += [(label, kind, n, values, unit) for n, values in zip(numbers, moved.get(name, np.zeros((0, 0))).T)]
     sets = [
         {
-            "type": 58, "binary": 0, "id1": label, "id2": "fem_impact", "id3": "NONE", "id4": "NONE", "id5": "NONE",
-            "func_type": 1, "ver_num": 1, "load_case_id": 0, "rsp_ent_name": "NONE", "rsp_node": int(number),
-            "rsp_dir": way, "ref_ent_name": "NONE", "ref_node": int(node), "ref_dir": way, "ord_data_type": 4,
-            "num_pts": len(times), "abscissa_spacing": 1, "abscissa_min": float(times[0]),
-            "abscissa_inc": float(steps.mean()), "z_axis_value": 0.0, "abscissa_spec_data_type": 17,
-            "abscissa_len_unit_exp": 0, "abscissa_force_unit_exp": 0, "abscissa_temp_unit_exp": 0,
+            "type": 58, "binary": 0, "id1": label, "id2": "fem_impact", "func_type": 1, "ver_num": 1,
+            "rsp_ent_name": "NONE", "rsp_node": int(number), "rsp_dir": way, "ref_ent_name": "NONE",
+            "ref_node": int(node), "ref_dir": way, "ord_data_type": 4, "num_pts": len(times), "abscissa_spacing": 1,
+            "abscissa_min": float(times[0]), "abscissa_inc": float(steps.mean()), "abscissa_spec_data_type": 17,
             "abscissa_axis_lab": "Time", "abscissa_axis_units_lab": "s", "ordinate_spec_data_type": kind,
-            "ordinate_len_unit_exp": 0, "ordinate_force_unit_exp": 0, "ordinate_temp_unit_exp": 0,
-            "ordinate_axis_lab": label, "ordinate_axis_units_lab": unit, "orddenom_spec_data_type": 0,
-            "orddenom_len_unit_exp": 0, "orddenom_force_unit_exp": 0, "orddenom_temp_unit_exp": 0,
-            "orddenom_axis_lab": "NONE", "orddenom_axis_units_lab": "NONE", "z_axis_spec_data_type": 0,
-            "z_axis_len_unit_exp": 0, "z_axis_force_unit_exp": 0, "z_axis_temp_unit_exp": 0, "z_axis_axis_lab": "NONE",
-            "z_axis_axis_units_lab": "NONE", "data": np.asarray(values, float), "x": times,
+            "ordinate_axis_lab": label, "ordinate_axis_units_lab": unit, "data": np.asarray(values, float), "x": times,
+            **dict.fromkeys(("load_case_id", "z_axis_value", "orddenom_spec_data_type"), 0),
+            **dict.fromkeys(("id3", "id4", "id5"), "NONE"),
         }
         for label, kind, number, values, unit in channels
     ]  # fmt: skip

@@ -160,10 +160,11 @@ class Taps:
     @cached_property
     def n_pulses(self) -> np.ndarray:
         """Pulses of each tap, (n_taps,); more than one of a double hit, however small above noise and ringing."""
-        return np.array([len(each) for each in self._pulses])
+        return np.array([len(each) for each in self.pulses])
 
     @cached_property
-    def _pulses(self) -> list[list[tuple[int, int]]]:
+    def pulses(self) -> list[list[tuple[int, int]]]:
+        """First sample of every pulse of each tap, and the one after its last."""
         least = self.table.attrs.get("pulse")
         return [triggers.pulses(row, noise, least) for row, noise in zip(self.force, self.noise)]
 
@@ -176,7 +177,7 @@ class Taps:
     def impulse(self) -> np.ndarray:
         """Impulse of each tap from the begin of its first to the end of its last pulse, (n_taps,) [N s]."""
         found = np.zeros(self.n_taps)
-        for i, (row, each) in enumerate(zip(self.force, self._pulses)):
+        for i, (row, each) in enumerate(zip(self.force, self.pulses)):
             found[i] = row[max(0, each[0][0] - 1) : each[-1][1] + 1].sum() / self.rate if each else 0.0
         return found
 
@@ -224,13 +225,13 @@ class Taps:
         """The taps in a few readable lines."""
         lines = [f"{self.n_taps} taps of {len(self.time)} samples at {self.rate:g} Hz"]
         rows = [
-            (name, f"{peak:.4g} N", f"{impulse:.4g} N s", str(pulses), ", ".join(self._cut(i)))
+            (name, f"{peak:.4g} N", f"{impulse:.4g} N s", str(pulses), ", ".join(self.cut_off(i)))
             for i, (name, peak, impulse, pulses) in enumerate(zip(self.labels, self.peak, self.impulse, self.n_pulses))
         ]
         lines += markup.columns(rows, ("", "peak", "impulse", "pulses", "cut off"))
         return "\n".join(lines + noted(self.notes))
 
-    def _cut(self, tap: int) -> list[str]:
+    def cut_off(self, tap: int) -> list[str]:
         """Names of the sensors that are cut off in a tap."""
         row = self.table["overload"].values[tap]
         return [str(name) for name, cut in zip(self.table["sensor"].values, row) if cut]
@@ -333,7 +334,7 @@ def read_taps(
     taps = Taps.from_arrays(
         rows, responses, rate=stated, names=names, units=kinds, overload=cut, labels=labels, pulse=pulse
     )  # fmt: skip
-    flat = [f"{label} ({', '.join(taps._cut(i))})" for i, label in enumerate(taps.labels) if any(cut[i])]
+    flat = [f"{label} ({', '.join(taps.cut_off(i))})" for i, label in enumerate(taps.labels) if any(cut[i])]
     for which, what in (
         ([label for label, n in zip(taps.labels, taps.n_pulses) if n > 1], "{}: more than one pulse, kept as one tap"),
         ([label for label, late in zip(taps.labels, taps.cut_short) if late],

@@ -146,7 +146,7 @@ def frf(
 def _force_window(taps: Taps, length: float) -> np.ndarray:
     """One around every pulse of every tap, zero elsewhere, (n_taps, n_times)."""
     found = np.zeros(taps.force.shape)
-    for row, onset, pulses in zip(found, taps.onset, taps._pulses):
+    for row, onset, pulses in zip(found, taps.onset, taps.pulses):
         for start in (onset, *(first / taps.rate for first, _ in pulses if first > onset * taps.rate)):
             x = (taps.time - start) / length
             fall = np.clip((x - 0.75) / 0.25, 0.0, 1.0)  # its last quarter falls as a cosine, so that no edge is heard

@@ -9,6 +9,7 @@ import numpy as np
 
 from .._base import check
 from .._base.files import PARTIAL
+from ..show.figures import in_hertz
 from ..sweeps.hammers import falls
 from . import triggers
 from .records import Taps
@@ -35,7 +36,7 @@ def reach_of(taps: Taps, i: int, drop: float = 10.0) -> float | None:
     None if it stays above that up to half the rate. Only the samples of the pulses count, as noise beside them hides
     how a spectrum falls.
     """
-    pulses = taps._pulses[i]
+    pulses = taps.pulses[i]
     if not pulses:
         return None
     first, last = max(0, pulses[0][0] - triggers.GUARD), pulses[-1][1] + triggers.GUARD
@@ -47,7 +48,7 @@ def reach_of(taps: Taps, i: int, drop: float = 10.0) -> float | None:
 def faults(taps: Taps, i: int) -> list[str]:
     """What is wrong with one tap, whatever the bandwidth."""
     wrong = []
-    cut = taps._cut(i)
+    cut = taps.cut_off(i)
     if cut:
         wrong.append(f"overload of {', '.join(cut)}, repeat softer or with a larger range")
     lead = round(taps.onset[i] * taps.rate)
@@ -77,17 +78,14 @@ def advice(file: str, taps: Taps, i: int, bandwidth: float, drop: float = 10.0) 
     reach, wrong = reach_of(taps, i, drop), faults(taps, i)
     if not wrong and reach is not None and reach < bandwidth:
         wrong.append(
-            f"too soft for {in_hertz(bandwidth)}: take the next tip (this one reaches {in_hertz(reach)}; the tip must "
-            f"be {(bandwidth / reach) ** 2:.2g} times as stiff)"  # the time of contact goes with one over its root
+            f"too soft for {in_hertz(bandwidth, 3)}: take the next tip (this one reaches {in_hertz(reach, 3)}; the "
+            # the time of contact goes with one over the root of the stiffness
+            f"tip must be {(bandwidth / reach) ** 2:.2g} times as stiff)"
         )
-    far = f"beyond {in_hertz(0.5 * taps.rate)}" if reach is None else in_hertz(reach)
+    far = f"beyond {in_hertz(0.5 * taps.rate, 3)}" if reach is None else in_hertz(reach, 3)
     peak = float(taps.peak[i])
     said = "; ".join(wrong) or f"good: {peak:.3g} N, reaches {far}"
     return Advice(file, taps.labels[i], not wrong, said, peak, reach)
-
-
-def in_hertz(value: float) -> str:
-    return f"{value / 1e3:.3g} kHz" if value >= 1e3 else f"{value:.3g} Hz"
 
 
 @dataclass(eq=False)
