@@ -201,6 +201,8 @@ def _follow(bodies, laws, parts, speed, options, striker=None, at=None, others=(
     pace = engine.pace_of(system, held)
     _check_way(system, pace[0] * pace[1], options.tolerance)
     found = refine_steps(system, options, pace, stretched)
+    for i, law in enumerate(laws):
+        law.law.check_reached(law, found.fine, i)
     growth = distance.growth(found.coarse, found.fine)
     if len(found.coarse.contacts) != len(found.fine.contacts):  # a given step was too long
         found = replace(found, coarse=found.fine, steps=(found.steps[0],) * 2)

@@ -15,6 +15,7 @@ from .._base.remembered import Remembered
 from .._base.rounding import SAME
 from ..fe import plausible, refinement
 from ..fe.assembly import (
+    EVERY,
     THEORIES,
     THICK,
     System,
@@ -130,6 +131,8 @@ class Target:
                 "target must not be a system of element 'morley', which serves to check frequencies; assemble it with "
                 "'argyris', or give its modes of `find_modes`"
             )
+        if body.rules not in EVERY:
+            raise ValueError(f"target must be the modes of `find_modes`, as the theory {body.theory!r} is your own")
         posts = tuple((at, "hinged" if np.isinf(stiffness) else stiffness) for at, stiffness in body.point_supports)
         held, masses = body.supports, body.point_masses
         return cls(body.mesh, body.section, held, masses, posts, {}, damping_ratio, "fe", body.theory, body)
