@@ -9,7 +9,7 @@ from . import beam_elements
 from .elements import collapsed, on_true_edge
 from .section import Plate, evaluate
 from .system import System
-from .theory import Points, blocks, unknowns_of_cells
+from .theory import Points, blocks, unknowns_of_cells, weighted
 
 NODES = 6  # [-] Gauss points in each direction of a triangle: exact for products of slopes of quintics
 
@@ -47,8 +47,7 @@ def energies(
         own, dx = whole[cells][:, None], points.dx[cells][..., None, None]  # (n_cells, 1, n_local, n)
         for matrix, name, parts in system.rules.terms(space, points, cells):
             weight, moved = field(name, points.x[cells]), parts @ own  # (n_cells, n_q, n_parts, n)
-            pushed = (weight * dx) @ moved if weight.ndim > 2 else weight[..., None, None] * dx * moved
-            found[matrix] += moved.reshape(-1, n).T @ pushed.reshape(-1, n)
+            found[matrix] += moved.reshape(-1, n).T @ (weighted(weight, moved) * dx).reshape(-1, n)
     return found["K"], found["M"]
 
 
