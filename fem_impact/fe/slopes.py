@@ -9,7 +9,7 @@ from . import beam_elements
 from .elements import collapsed, on_true_edge
 from .section import Plate, evaluate
 from .system import System
-from .theory import Points, blocks, unknowns_of_cells
+from .theory import Points, blocks, unknowns_of_cells, weighted
 
 NODES = 6  # [-] Gauss points in each direction of a triangle: exact for products of slopes of quintics
 
@@ -61,7 +61,7 @@ def stressed(
         own = whole[cells][:, None]  # (n_cells, 1, n_local, n)
         for matrix, name, parts in system.rules.terms(space, points, cells):
             weight, moved = field(name, points.x[cells]), parts @ own
-            yield matrix, cells, moved, weight @ moved if weight.ndim > 2 else weight[..., None, None] * moved
+            yield matrix, cells, moved, weighted(weight, moved)
 
 
 def quadrature(system: System, nodes: int = NODES) -> Points:

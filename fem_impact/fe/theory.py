@@ -193,14 +193,15 @@ def plain_kinds(supports: Sequence[str | Elastic]) -> list[str]:
     return ["free" if isinstance(kind, Elastic) else kind for kind in supports]
 
 
-def gram(parts: np.ndarray, weight: np.ndarray) -> np.ndarray:
-    """Sum (n, k, k) over the points of a quadrature of ``parts.T @ weight @ parts``, parts (n, n_q, m, k).
+def weighted(weight: np.ndarray, parts: np.ndarray) -> np.ndarray:
+    """Parts (n, n_q, m, k) times a weight, which is a number at each point, (n, n_q), or a matrix, (n, n_q, m, m)."""
+    return weight @ parts if weight.ndim == parts.ndim else weight[..., None, None] * parts
 
-    The weight is a number at each point, (n, n_q), or a matrix, (n, n_q, m, m).
-    """
-    weighted = weight @ parts if weight.ndim == parts.ndim else weight[..., None, None] * parts
+
+def gram(parts: np.ndarray, weight: np.ndarray) -> np.ndarray:
+    """Sum (n, k, k) over the points of a quadrature of ``parts.T @ weight @ parts``, as of `weighted`."""
     n, k = len(parts), parts.shape[-1]
-    return parts.reshape(n, -1, k).transpose(0, 2, 1) @ weighted.reshape(n, -1, k)
+    return parts.reshape(n, -1, k).transpose(0, 2, 1) @ weighted(weight, parts).reshape(n, -1, k)
 
 
 def kept_unknowns(fixed: np.ndarray) -> tuple[csr_matrix, csr_matrix]:
@@ -294,7 +295,7 @@ class Strain(check.Brief):
         for matrix, name, parts in system.rules.terms(self.domain.space, self.domain.points, cells):
             if matrix == "K":
                 strained = parts @ own
-                total = total + np.einsum(pairs, self.domain.fields[name][cells] @ strained, strained)
+                total = total + np.einsum(pairs, weighted(self.domain.fields[name][cells], strained), strained)
         return total
 
     def _sum(self, system: Any, vectors: np.ndarray, pairs: str) -> np.ndarray:

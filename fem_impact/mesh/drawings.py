@@ -16,7 +16,6 @@ from . import open_paths
 from .facets import angles
 from .loops import (
     FARTHEST,
-    LARGEST,
     MOST_PIECES,
     UNITS,
     Arc,
@@ -27,6 +26,7 @@ from .loops import (
     crossed,
     extent,
     polyline,
+    refuse_millimetres,
     ring,
     segment,
     signed_area,
@@ -223,12 +223,8 @@ def _dxf(path: Path, unit: str | None, notes: list[str]) -> Drawn:
             scale = 1.0
             notes.append(f"{path.name} states no unit; assumed metres, pass unit= to change that")
     loops, lines = _chained(path.name, _unpacked(path.name, drawn, scale * np.eye(2)), notes)
-    size = max(extent(loop) for loop in loops)
-    if unit is None and size > LARGEST:
-        raise ValueError(
-            f"{path.name} extends over {size:g} m, which looks like millimetres read as metres; "
-            "pass unit='mm' to load it, or unit='m' if it is that large"
-        )
+    if unit is None:
+        refuse_millimetres(path.name, max(extent(loop) for loop in loops))
     return loops, lines
 
 

@@ -16,7 +16,6 @@ def angles(before: np.ndarray, after: np.ndarray) -> np.ndarray:
 def powers(x: np.ndarray, highest: int, order: int) -> np.ndarray:
     """The ``order``-th derivative of x**0 ... x**highest, (..., highest + 1)."""
     result = np.zeros((*x.shape, highest + 1))
-    factor = 1.0
     for k in range(order, highest + 1):
         factor = float(np.prod(np.arange(k - order + 1, k + 1))) if order else 1.0
         result[..., k] = factor * x ** (k - order)

@@ -202,6 +202,15 @@ def _turned(loop: Loop, span: float, anticlockwise: bool) -> Loop:
     return tuple(piece.reversed() for piece in reversed(loop))
 
 
+def refuse_millimetres(name: str, *sides: float) -> None:
+    """Raise ValueError if a drawing or mesh with sides [m], whose unit nobody stated, is too large to be in metres."""
+    if max(sides) > LARGEST:
+        raise ValueError(
+            f"{name} extends over {' x '.join(f'{side:g}' for side in sides)} m, which looks like millimetres read as "
+            "metres; pass unit='mm' to load it, or unit='m' if it is that large"
+        )
+
+
 def ring(name: str, given: Any, what: str) -> np.ndarray:
     """Points (n, 2) [m] of a closed polygon, checked; the first is not repeated at the end."""
     points = check.array(name, given, (None, 2), "m")

@@ -15,7 +15,7 @@ from scipy.spatial import cKDTree
 from .._base import check
 from .._base.rounding import SAME
 from . import meshio_reader
-from .loops import FARTHEST, LARGEST, UNITS
+from .loops import FARTHEST, UNITS, refuse_millimetres
 
 # [-] nodes per point on average above which a file is refused as damaged: parts that touch share a point by few
 CROWD = 16
@@ -99,12 +99,8 @@ def _plane_points(
     if unit is not None:
         scale = UNITS[check.one_of("unit", unit, UNITS)]
         points, height = points * scale, None if height is None else height * scale
-    elif used.size and np.ptp(points[used], axis=0).max() > LARGEST:
-        x, y = np.ptp(points[used], axis=0)
-        raise ValueError(
-            f"{name} extends over {x:g} x {y:g} m, which looks like millimetres read as metres; "
-            "pass unit='mm' to load it, or unit='m' if it is that large"
-        )
+    elif used.size:
+        refuse_millimetres(name, *np.ptp(points[used], axis=0))
     return points, height, notes
 
 

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from ..fe import point_load, refinement
-from ..fe.assembly import System
+from ..fe.assembly import System, usual_theory
 from ..fe.kirchhoff import ARGYRIS
 from ..fe.refinement import FLATTER
 from ..fe.section import Plate
@@ -48,7 +48,7 @@ def usable(target: Target) -> bool:
         return False
     ratio = target.damping_ratio
     by_mode = not callable(ratio) and np.ndim(ratio if ratio is not None else 0.0) > 0
-    return not by_mode and (target.system is None or target.system.element == target.element)
+    return not by_mode and (target.system is None or target.system.rules is usual_theory(target.section, 2))
 
 
 def _strict(rule: tuple[float, float], tolerance: float) -> float:

@@ -22,7 +22,6 @@ from functools import partial
 from typing import NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 from scipy.fft import fft2, ifft2, next_fast_len
 from scipy.ndimage import binary_erosion
 from scipy.sparse import csr_array
@@ -51,20 +50,18 @@ TURNS, ROUNDS = 50, 8  # [-] iterations between restarts, and restarts; ten iter
 class Jumps(NamedTuple):
     """Pressure jumps of some modes on one lattice, for unit modal acceleration and a density of 1 kg/m^3."""
 
-    modes: npt.NDArray[np.intp]  # (n,) which modes
-    points: npt.NDArray[np.float64]  # (n_cells, 2) [m] centres of the cells
+    modes: np.ndarray  # (n,) which modes
+    points: np.ndarray  # (n_cells, 2) [m] centres of the cells
     size: float  # [m] side of a cell
-    inner: npt.NDArray[np.complex128]  # (n_cells, n) [m kg**-0.5] of the plate without the cells along its edge
-    outer: npt.NDArray[np.complex128]  # (n_cells, n) of the plate and the space to the next centres around it
+    inner: np.ndarray  # (n_cells, n) [m kg**-0.5] of the plate without the cells along its edge
+    outer: np.ndarray  # (n_cells, n) of the plate and the space to the next centres around it
 
     @property
-    def mean(self) -> npt.NDArray[np.complex128]:
+    def mean(self) -> np.ndarray:
         """Half way between both, (n_cells, n) [m kg**-0.5], as the plate's edge lies between theirs."""
         return 0.5 * (self.inner + self.outer)
 
-    def bounds(
-        self, place: npt.NDArray[np.float64], omega: npt.NDArray[np.float64], speed: float
-    ) -> tuple[npt.NDArray[np.complex128], npt.NDArray[np.float64]]:
+    def bounds(self, place: np.ndarray, omega: np.ndarray, speed: float) -> tuple[np.ndarray, np.ndarray]:
         """Pressure of every mode at a place (3,) [m], by `mean`, and the half width of the estimate, (n,) each.
 
         In m kg**-0.5 Pa per kg/m^3 and m/s^2: for a density of 1 kg/m^3 and unit modal acceleration at the frequencies
@@ -81,16 +78,14 @@ class Jumps(NamedTuple):
         return own[0], DOUBT * apart + LEAST * np.sqrt((np.abs(own[1:]) ** 2).mean(axis=0))
 
 
-def dipoles(
-    points: npt.NDArray[np.float64], size: float, place: npt.NDArray[np.float64], wave: npt.NDArray[np.float64]
-) -> npt.NDArray[np.complex128]:
+def dipoles(points: np.ndarray, size: float, place: np.ndarray, wave: np.ndarray) -> np.ndarray:
     """Pressure at a place for unit jumps on cells, at wavenumbers (n,) [1/m], (n_cells, n) [-]."""
     way = np.sqrt(((points - place[:2]) ** 2).sum(axis=1) + place[2] ** 2)
     turn = 1j * np.outer(way, wave)
     return (place[2] * size**2 / (4.0 * np.pi * way**3))[:, None] * (1.0 - turn) * np.exp(turn)
 
 
-def _directions() -> npt.NDArray[np.float64]:
+def _directions() -> np.ndarray:
     """Unit vectors spread evenly over the half space in front of a plate, (DIRECTIONS, 3) [-]."""
     number = np.arange(DIRECTIONS) + 0.5
     up, angle = number / DIRECTIONS, np.pi * (1.0 + np.sqrt(5.0)) * number  # a spiral of the golden ratio
@@ -98,7 +93,7 @@ def _directions() -> npt.NDArray[np.float64]:
     return np.stack([across * np.cos(angle), across * np.sin(angle), up], axis=1)
 
 
-def reach(modes: Modes, speed: float) -> npt.NDArray[np.float64]:
+def reach(modes: Modes, speed: float) -> np.ndarray:
     """Cells across a square as large as the plate that each mode needs, (n_modes,) [-]; rigid motions get zero."""
     side = np.sqrt(measure(*modes.shapes.grid()))
     number = np.arange(1, modes.n_modes + 1)  # its wavelength, by Weyl's law
@@ -106,7 +101,7 @@ def reach(modes: Modes, speed: float) -> npt.NDArray[np.float64]:
     return np.where(modes.omega > 0.0, np.maximum(PER_WAVE * wave * side / (2.0 * np.pi), ACROSS[0]), 0.0)
 
 
-def jumps(modes: Modes, wanted: npt.NDArray[np.bool_], speed: float) -> Iterator[Jumps]:
+def jumps(modes: Modes, wanted: np.ndarray, speed: float) -> Iterator[Jumps]:
     """The jumps of the wanted modes, each at its own frequency, on lattices as fine as they need."""
     needed = reach(modes, speed)
     side = np.sqrt(measure(*modes.shapes.grid()))
@@ -138,14 +133,14 @@ class AirSheet:
         Side of a cell.
     """
 
-    inside: npt.NDArray[np.bool_]
+    inside: np.ndarray
     size: float
     padded: tuple[int, int]
-    inverse: npt.NDArray[np.float64]  # (padded) [1/m] mean of 1 / R between two cells
-    distance: npt.NDArray[np.float64]  # (padded) [m]
-    slopes: npt.NDArray[np.float64]  # (padded) [1/m^2] of a wave on the lattice, squared
+    inverse: np.ndarray  # (padded) [1/m] mean of 1 / R between two cells
+    distance: np.ndarray  # (padded) [m]
+    slopes: np.ndarray  # (padded) [1/m^2] of a wave on the lattice, squared
 
-    def __init__(self, inside: npt.NDArray[np.bool_], size: float) -> None:
+    def __init__(self, inside: np.ndarray, size: float) -> None:
         self.inside, self.size = inside, size
         nx, ny = (next_fast_len(2 * n + 2) for n in inside.shape)  # room for the next centres
         self.padded = nx, ny
@@ -153,7 +148,7 @@ class AirSheet:
         turns = (np.cos(2.0 * np.pi * np.arange(n) / n) for n in self.padded)
         self.slopes = (4.0 - 2.0 * np.add.outer(*turns)) / size**2
 
-    def jump(self, acceleration: npt.NDArray[np.float64], wave: float) -> npt.NDArray[np.complex128]:
+    def jump(self, acceleration: np.ndarray, wave: float) -> np.ndarray:
         """Jump (n_cells,) [Pa] for an acceleration (n_cells,) [m/s^2] in air of 1 kg/m^3 and a wavenumber [1/m]."""
         if not acceleration.any():
             return np.zeros(acceleration.shape, complex)
@@ -172,9 +167,7 @@ class AirSheet:
             raise SimulationError(f"the air around the plate was not solved for in {TURNS * ROUNDS} iterations")
         return found
 
-    def _folded(
-        self, factor: npt.NDArray[np.complex128], values: npt.NDArray[np.complex128]
-    ) -> npt.NDArray[np.complex128]:
+    def _folded(self, factor: np.ndarray, values: np.ndarray) -> np.ndarray:
         """Apply an operator of the whole lattice to values on the plate, (n_cells,)."""
         field = np.zeros(self.inside.shape, complex)
         field[self.inside] = np.ravel(values)
@@ -185,12 +178,12 @@ class AirSheet:
 class Field(NamedTuple):
     """What a listener gets of the modes heard: derivatives of their amplitudes, delayed by a way through the air."""
 
-    orders: dict[int, npt.NDArray[np.float64]]  # order of derivative -> (n_ways, n) weights, for 1 kg/m^3
-    way: npt.NDArray[np.float64]  # (n_ways,) [m]
+    orders: dict[int, np.ndarray]  # order of derivative -> (n_ways, n) weights, for 1 kg/m^3
+    way: np.ndarray  # (n_ways,) [m]
 
 
 def fields(
-    modes: Modes, wanted: npt.NDArray[np.bool_], place: npt.NDArray[np.float64], speed: float, step: float
+    modes: Modes, wanted: np.ndarray, place: np.ndarray, speed: float, step: float
 ) -> tuple[Field, tuple[Field, Field]]:
     """The field of the wanted modes at a place (3,) [m], and what to take from it and to add to it as its bounds.
 

@@ -54,14 +54,25 @@ def on_foundation(space, points, cells):
     return [*kirchhoff.terms(space, points, cells), Term("K", "foundation", value)]
 
 
-def test_a_theory_may_ask_its_own_section_for_another_field():
+def bedded():
     fields = ("stiffness", "inertia", "foundation")
-    made = replace(kirchhoff.ARGYRIS, name="bedded", element="argyris", terms=on_foundation, fields=fields, **OWN)
-    plate = Bedded(STEEL, THICKNESS)
-    modes = fi.find_modes(fi.assemble(fi.mesh.rectangle(*SIDES), plate, {"boundary": "hinged"}, theory=made), n_modes=6)
-    stiffness, inertia = plate.stiffness(np.zeros((1, 2)))[0, 0, 0], STEEL.rho * THICKNESS
+    made = replace(kirchhoff.ARGYRIS, name="bedded", element="on a bed", terms=on_foundation, fields=fields, **OWN)
+    return fi.assemble(fi.mesh.rectangle(*SIDES), Bedded(STEEL, THICKNESS), {"boundary": "hinged"}, theory=made)
+
+
+def test_a_theory_may_ask_its_own_section_for_another_field():
+    modes = fi.find_modes(bedded(), n_modes=6)
+    stiffness, inertia = modes.section.stiffness(np.zeros((1, 2)))[0, 0, 0], STEEL.rho * THICKNESS
     exact = np.sqrt((square_waves() ** 2 * stiffness + 3e8) / inertia)
     assert_allclose(modes.omega, exact, rtol=1e-6)  # as Kirchhoff's plate on this mesh
+
+
+@pytest.mark.slow
+def test_a_body_of_its_own_theory_is_struck_as_its_modes_are():
+    blow = {"at": (0.2, 0.1), "speed": 1.0, "tolerance": 1e-2}
+    body, ball, law = bedded(), fi.Striker.rigid(0.5), fi.Contact.linear(1e7)
+    planned, own = fi.strike(body, ball, law, **blow), fi.strike(fi.find_modes(body, n_modes=100), ball, law, **blow)
+    assert abs(planned.restitution - own.restitution) < 2e-2  # two tolerances
 
 
 def test_a_theory_of_another_dimension_is_refused():
