@@ -9,7 +9,6 @@ from .._base import check
 from . import slopes
 from .section import Beam, Plate
 from .system import System
-from .theory import blocks, unknowns_of_cells
 
 # fourth-order differences over values at these multiples of a step: about the value, and to one side of it
 DIFFERENCES = (
@@ -60,14 +59,9 @@ def energy_changes(system: System, change: SectionChange, vectors: np.ndarray) -
         each = [system.rules.energies(system, section, vectors) for section in change.sections]
         K, M = (sum(weight * one for weight, one in zip(change.weights, pair)) for pair in zip(*each))
         return np.asarray(K), np.asarray(M)
-    points, whole, n = slopes.quadrature(system), unknowns_of_cells(system, vectors), vectors.shape[1]
-    found = {"K": np.zeros((n, n)), "M": np.zeros((n, n))}
-    for cells in blocks(len(points.x)):
-        own, dx = whole[cells][:, None], points.dx[cells][..., None, None]  # (n_cells, 1, n_local, n)
-        for matrix, name, parts in system.rules.terms(system.space, points, cells):
-            fields = (system.frame.field(each, name, points.x[cells]) for each in change.sections)
-            rate: Any = sum(weight * field for weight, field in zip(change.weights, fields))
-            moved = parts @ own  # (n_cells, n_q, n_parts, n)
-            pushed = (rate * dx) @ moved if rate.ndim > 2 else rate[..., None, None] * dx * moved
-            found[matrix] += moved.reshape(-1, n).T @ pushed.reshape(-1, n)
-    return found["K"], found["M"]
+
+    def rate(name: str, x: np.ndarray) -> np.ndarray:
+        fields = (system.frame.field(each, name, x) for each in change.sections)
+        return np.asarray(sum(weight * field for weight, field in zip(change.weights, fields)))
+
+    return slopes.energies(system, system.space, rate, vectors)

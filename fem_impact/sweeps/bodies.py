@@ -22,7 +22,7 @@ from ..model.budget import FINEST, Budget
 from ..model.by_modes import MOST_MODES
 from ..model.planner import Blow
 from ..model.target import CLOSE, FIRST_FLEXIBLE, FIRST_LOOK, Elements, Stages, Target
-from ..model.views import TOGETHER, Views
+from ..model.vectors import TOGETHER, Views
 from ..modes.modal import Modes, damping_ratios
 from ..modes.shapes import FieldShapes, SampledShapes
 from .batches import allowed
