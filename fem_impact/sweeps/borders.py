@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -60,25 +61,25 @@ class Plane:
         first, second = self.grid.axes
         return first, second
 
+    @cached_property
+    def columns(self) -> list[tuple[np.ndarray, np.ndarray, bool]]:
+        """Of both axes the values (n,), these or their logarithms, which are evenly spaced, and which of the two."""
+        axes = [np.asarray(values, float).reshape(-1) for values in self.grid.axes.values()]
+        logs = [logarithmic(values) for values in axes]
+        return [(values, np.log(values) if log else values, log) for values, log in zip(axes, logs)]
+
     def values(self, places: np.ndarray) -> np.ndarray:
         """Values (n, 2) of the axes at places (n, 2); between cells evenly spaced as the cells are."""
         found = np.empty(places.shape)
-        for column, place, values in zip(found.T, places.T, self.grid.axes.values()):
-            values = np.asarray(values, float).reshape(-1)
-            log = logarithmic(values)
-            column[:] = np.interp(place, np.arange(len(values)), np.log(values) if log else values)
+        for column, place, (values, even, log) in zip(found.T, places.T, self.columns):
+            between = np.interp(place, np.arange(len(values)), even)
             on, whole = place == np.round(place), np.round(place).astype(int)
-            column[:] = np.where(on, values[whole], np.exp(column) if log else column)
+            column[:] = np.where(on, values[whole], np.exp(between) if log else between)
         return found
 
     def shares(self) -> tuple[np.ndarray, ...]:
         """Distance (n - 1,) [-] of neighbouring cells along each axis, as a share of the axis."""
-        found = []
-        for values in self.grid.axes.values():
-            values = np.asarray(values, float).reshape(-1)
-            place = np.log(values) if logarithmic(values) else values
-            found.append(np.diff(place) / (place[-1] - place[0]))
-        return tuple(found)
+        return tuple(np.diff(even) / (even[-1] - even[0]) for _, even, _ in self.columns)
 
     def counted(self, places: np.ndarray, turn: str) -> np.ndarray:
         """Number of impacts (n,) at places (n, 2), by a finer tolerance than that of the map; -1 if refused."""

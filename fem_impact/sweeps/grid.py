@@ -84,7 +84,7 @@ class Job:
         place = self.store / turn if self.store is not None and turn else self.store
         return solve_all(cases, self.workers, self.client, place, None if turn else self.watch)
 
-    def refined(self, cases: Cases) -> refined.Refined | None:
+    def refined(self, cases: Cases) -> refined.MapSheet | None:
         """Compute a map where its answer changes; None if it has few cells, unless asked for."""
         there = os.listdir(self.store) if self.store is not None and self.store.exists() else ()
         held = {name for name in there if not name.startswith(PARTIAL)}  # but for what is not finished
@@ -260,7 +260,7 @@ def run(base: Case, axes: Mapping[str, np.ndarray], job: Job) -> xarray.Dataset:
     if job.ours:
         table.attrs["cells"] = f"all {cases.n_cases} cells computed"
     if computed is not None:
-        _tell_interpolated(table, computed.computed)
+        _tell_interpolated(table, computed.computed.reshape(cases.shape))
         gap = refined.widest_gap(cases.shape)
     if job.borders or (job.borders is None and job.ours and not why_none(cases)):
         found = find_borders(cases, np.asarray(table.n_impacts), job.solved)

@@ -19,15 +19,6 @@ Tell = Callable[[int], Any]  # takes the number of cells that are settled
 
 
 @dataclass(frozen=True, eq=False)
-class Refined:
-    """A map with two axes whose cells are computed or interpolated."""
-
-    numbers: np.ndarray  # (n_layers, n_cases)
-    texts: Texts  # failed cell: error text
-    computed: np.ndarray  # (n, n) whether each cell was computed
-
-
-@dataclass(frozen=True, eq=False)
 class Blocks:
     """Rectangles of cells, each with 3 x 3 nodes: its corners, the middles of its sides and its own."""
 
@@ -113,7 +104,7 @@ class MapSheet:
     def __init__(self, shape: tuple[int, int], layers: list[str]) -> None:
         self.width = shape[1]
         self.numbers = np.full((len(layers), shape[0] * shape[1]), np.nan)
-        self.texts: Texts = {}
+        self.texts: Texts = {}  # failed cell: error text
         self.computed = np.zeros(shape[0] * shape[1], bool)
         self.settled = np.zeros(shape[0] * shape[1], bool)  # computed or interpolated
         self.count, self.error = layers.index("n_impacts"), layers.index("error")
@@ -175,7 +166,7 @@ class MapSheet:
 
 def refine(
     shape: tuple[int, int], layers: list[str], tolerance: float, compute: Compute, tell: Tell | None = None
-) -> Refined:
+) -> MapSheet:
     """Compute a map (n, n) where its answer changes, and interpolate elsewhere to within the tolerance of each cell.
 
     ``layers`` as of `cases.LAYERS`; ``compute`` computes cells, numbered with the last axis fastest, and takes a name
@@ -207,6 +198,6 @@ def refine(
         beside = beside_change(np.nan_to_num(sheet.numbers[sheet.count], nan=-1.0).reshape(shape))
         left = np.flatnonzero(beside.ravel() & ~sheet.computed)
         if not len(left):
-            return Refined(sheet.numbers, sheet.texts, sheet.computed.reshape(shape))
+            return sheet
         turn += 1
         sheet.add(left, compute, f"round-{turn}")

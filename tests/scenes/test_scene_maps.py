@@ -265,6 +265,9 @@ def test_hammer_at_the_prompt(capsys):
     [
         (["--bandwidth", "0"], "bandwidth must lie between 0.001 and 1e+09 Hz, got 0 Hz"),
         (["--bandwidth", "inf"], "bandwidth must be finite, got inf Hz"),
+        (["--bandwidth", "1e300"], "bandwidth must lie between 0.001 and 1e+09 Hz, got 1e+300 Hz"),
+        (["--bandwidth", "500", "--masses", "1e30", "0.2"], "masses must lie between 1e-06 and 10000 kg, got 1e+30 kg"),
+        (["--bandwidth", "500", "--masses", "5e-324"], "masses must lie between"),
         (["--bandwidth", "500", "--masses", "0"], "masses must lie between 1e-06 and 10000 kg, got 0 kg"),
         (["--bandwidth", "500", "--masses", "0.01", "nan"], "masses must be finite"),
         (["--bandwidth", "500", "--drop", "60"], "drop must lie between 1 and 40 dB, got 60 dB"),
@@ -273,19 +276,6 @@ def test_hammer_at_the_prompt(capsys):
 def test_hammers_of_no_sense_are_told(given, message, capsys):
     assert cli.main(["hammer", str(SCENES / "drumstick_map.toml"), *given]) == 2
     assert message in " ".join(capsys.readouterr().err.split())
-
-
-@pytest.mark.parametrize(
-    ("bandwidth", "masses", "text"),
-    [
-        (800.0, [1e30, 0.2], r"masses must lie between 1e-06 and 10000 kg, got 1e\+30 kg"),
-        (800.0, [5e-324], "masses must lie between"),
-        (1e300, [0.1], r"bandwidth must lie between 0.001 and 1e\+09 Hz"),
-    ],
-)
-def test_hammers_beyond_all_reason_are_refused_at_once(bandwidth, masses, text):
-    with pytest.raises(ValueError, match=text):
-        fi.hammers.choose(fi.Modes.rigid(1.0), None, bandwidth, masses)
 
 
 PIECES = {
