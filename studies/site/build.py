@@ -26,6 +26,7 @@ HERE = Path(__file__).parent
 ROOT = HERE.parents[1]
 QUIETLY = ("-b", "html", "-q", "-E", "-W", "--keep-going")
 PARTS = {
+    "Begin": [f"studies/site/hats/{hat}" for hat in ("percussionist", "test_engineer", "analyst", "teacher")],
     "Use": [
         "studies/guide",
         "studies/site/questions",
