@@ -5,6 +5,7 @@ import re
 import subprocess
 import sys
 import tomllib
+from dataclasses import replace
 from pathlib import Path
 
 import gallery
@@ -60,6 +61,16 @@ def test_every_picture_is_in_the_gallery_or_on_a_page():
     missing = {path.name for path in gallery.PICTURES.glob("*.png")} - shown
     assert [name for name in missing if name not in pages] == []
     assert len(shown) > 50
+
+
+def test_reference_cases_are_a_table_and_end_the_build_where_one_does_not_hold():
+    (verdict,) = fi.verify("wall-hertz")
+    text = gallery.verified([verdict])
+    row = text.splitlines()[-1].split(" | ")
+    assert row[0] == "| wall-hertz" and float(row[4]) == pytest.approx(verdict.worst.ours, rel=1e-8)
+    wrong = replace(verdict, lines=[replace(line, reference=2.0 * line.ours) for line in verdict.lines])
+    with pytest.raises(ValueError, match="reference cases must hold, got wall-hertz beyond their errors"):
+        gallery.verified([verdict, wrong])
 
 
 def test_links_that_lead_nowhere_and_files_from_elsewhere_are_found(tmp_path):

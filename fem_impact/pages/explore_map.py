@@ -11,6 +11,7 @@ from .._base.check import SimulationError
 from ..impact import threshold
 from ..modes.modal import Modes
 from ..sweeps import batches, cases, refined
+from ..sweeps.cells import law_numbers
 from .explore_model import MAP_TOLERANCE, Settings, Setup, quick
 
 FIRST = {False: (25, 17), True: (13, 9)}  # [-] points of mass and stiffness at first, with True where blows take longer
@@ -191,7 +192,7 @@ class Mapper:
         hard = stiffness * law.stiffness
         lossy = law.loss > 0.0
         counts = np.full(len(mass), np.nan)
-        laws = {name: value * shared for name, value in vars(law).items()}
+        laws = {name: value * shared for name, value in law_numbers(law).items()}
         if cases.batchable(laws).all() and not case.modes.stretches:
             family = {0: batches.Family.of(case.modes, case.at, case.striker, True, lossy)}
             blows = batches.Blows(

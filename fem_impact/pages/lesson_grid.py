@@ -10,6 +10,7 @@ import numpy as np
 from .._base.check import SimulationError
 from ..modes.modal import Modes
 from ..sweeps import cases
+from ..sweeps.cells import law_numbers
 from ..sweeps.grid import Case
 from .explore_map import Mapper, Picture, Window
 from .explore_model import Settings, Setup, limit_of
@@ -180,7 +181,7 @@ def _map(mapper: Mapper, settings: Settings, window: Window, body: Modes | None)
     picture = mapper.first(settings, window, body)
     picture = mapper.finer(settings, picture, body)
     law = mapper.case.contact
-    quick = cases.batchable({name: np.array([value]) for name, value in vars(law).items()}).all()
+    quick = cases.batchable({name: np.array([value]) for name, value in law_numbers(law).items()}).all()
     return mapper.sharp(settings, picture, body) if quick and not mapper.case.modes.stretches else picture
 
 

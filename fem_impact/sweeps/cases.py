@@ -17,7 +17,7 @@ from ..impact.distance import distance
 from ..impact.response import Response
 from ..modes.modal import Modes
 from . import batches
-from .cells import ALONE, FAMILY_AXES, LAW, LOSSY, Case
+from .cells import ALONE, FAMILY_AXES, LOSSY, Case, law_numbers
 from .store import LARGEST_BLOCK, Texts, Watch, block_size, by_blocks, by_cluster, by_store
 
 LOG = logging.getLogger(__name__)
@@ -312,7 +312,7 @@ def solve_cases(cases: Cases, start: int, stop: int, *, workers: int | None = No
     numbers = np.full((len(names), count), np.nan)
     numbered = cases.numbered(start, stop)
     shared = {"target_mass": base.modes.mass, "mass": base.striker.mass, "speed": base.speed}
-    shared |= {name: getattr(base.contact, name) for name in {*LAW, *ALONE}}
+    shared |= law_numbers(base.contact)
     column = {
         name: cases.axes[name][numbered[name]] if name in numbered else np.full(count, value)
         for name, value in shared.items()

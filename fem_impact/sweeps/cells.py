@@ -100,6 +100,11 @@ def laid_out(
     return {name: values.values(count) if name in free else values for name, values in found.items()}, True
 
 
+def law_numbers(contact: Contact) -> dict[str, float]:
+    """The numbers of a contact that decide how its blow is followed, by name."""
+    return {name: float(getattr(contact, name)) for name in {*LAW, *ALONE}}
+
+
 @dataclass(frozen=True, eq=False)
 class Case:
     """One cell of a map: the arguments of `strike`."""

@@ -26,7 +26,14 @@ HERE = Path(__file__).parent
 ROOT = HERE.parents[1]
 QUIETLY = ("-b", "html", "-q", "-E", "-W", "--keep-going")
 PARTS = {
-    "Use": ["studies/guide", "studies/site/questions", "studies/site/choosing", "studies/notebooks/index"],
+    "Begin": [f"studies/site/hats/{hat}" for hat in ("percussionist", "test_engineer", "analyst", "teacher")],
+    "Use": [
+        "studies/guide",
+        "studies/site/questions",
+        "studies/site/choosing",
+        "studies/site/doors",
+        "studies/notebooks/index",
+    ],
     "See and hear": ["studies/README", "gallery/index", "gallery/scenes"],
     "Look up": ["studies/api", "studies/commands", "studies/scene_keys", "studies/notes"],
     "Trust": ["studies/theory", "studies/limits", "gallery/checks", "studies/verification/reality/README"],

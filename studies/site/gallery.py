@@ -7,6 +7,8 @@ from functools import cache
 import scenes
 from shared import PICTURES, STUDIES
 
+import fem_impact as fi
+
 ROOT = STUDIES.parent
 SECTIONS = {
     "Figures of the source": "figures/fig*.py",
@@ -99,7 +101,7 @@ def write(folder, sounds):
             (folder / f"{path.stem}.md").write_text(page(path, sounds.get(path.stem, [])), encoding="utf-8")
     (folder / "index.md").write_text(text, encoding="utf-8")
     (folder / "scenes.md").write_text(scenes.page(player, sounds), encoding="utf-8")
-    (folder / "checks.md").write_text(checks(), encoding="utf-8")
+    (folder / "checks.md").write_text(checks() + verified(fi.verify()), encoding="utf-8")
 
 
 def checks():
@@ -118,3 +120,24 @@ Each study below says in its first sentence what it checks; its numbers are in [
             lines = f"{sum(kept)} lines" if kept else "-"
             text += f"| [{path.stem}]({path.stem}.md) | {about(path)[0]} | {lines} |\n"
     return text
+
+
+def verified(verdicts):
+    """The table of reference cases as they came out while the site was built; ValueError if an error did not hold."""
+    missed = [each.name for each in verdicts if not each.holds]
+    if missed:
+        raise ValueError(f"reference cases must hold, got {', '.join(missed)} beyond their errors")
+    text = f"""
+## Reference cases
+
+What `fem-impact verify` prints, as it came out while this page was built: of each case the number that takes the
+largest share of what both errors allow. All {len(verdicts)} hold.
+
+| case | what | number | source | ours | difference | stated error | reference within |
+|---|---|---|---|---|---|---|---|
+"""
+    for each in verdicts:
+        worst = each.worst
+        text += f"| {each.name} | {each.kind}: {each.source} | {worst.quantity} | {worst.reference:.9g} {worst.unit} | "
+        text += f"{worst.ours:.9g} | {worst.difference:.1e} | {worst.error:.1e} | {worst.within:.1e} |\n"
+    return text.replace("[1/", "\\[1/")
