@@ -22,7 +22,7 @@ from .splitting import towards_points
 from .springs import check_masses, check_posts
 from .supports import support_of_facets
 from .system import System, notes_on
-from .theory import Strain, Subject, Theory, integrals, plain_kinds, scatter
+from .theory import Strain, Subject, Theory, check_own, integrals, plain_kinds, scatter
 from .thick import MINDLIN
 
 __all__ = [
@@ -46,7 +46,7 @@ def assemble(
     supports: Mapping[str, str | Elastic] | None = None,
     element: str | None = None,
     *,
-    theory: str | None = None,
+    theory: str | Theory | None = None,
     point_masses: Sequence[tuple[ArrayLike, float]] = (),
     point_supports: Sequence[ArrayLike | tuple[ArrayLike, float]] = (),
     near: Any = None,
@@ -69,11 +69,12 @@ def assemble(
     element : str, optional
         For a thin plate "argyris" (the default; frequencies from above) or "morley" (from below, straight edges only,
         as a check). Otherwise there is one for each theory.
-    theory : str, optional
+    theory : str or Theory, optional
         For a plate "kirchhoff" (the default; thin) or "mindlin" (with shear and rotary inertia); for a beam "euler" or
         "timoshenko". A thick plate takes some five times as long. A force, a mass or an observed point acts on it over
         a disk of radius 0.325 times the thickness, because under a point it would give way without limit. A plate that
         is curved, ribbed or unevenly layered is "shallow", see `fe.shallow`: thin, with displacements in its plane.
+        A theory of your own is a `fe.theory.Theory`, as in ``studies/tutorials/own_theory.py``.
     point_masses : sequence of (point [m], mass [kg])
         Masses without extent that move with the plate or beam.
     point_supports : sequence of (point [m], "hinged" or stiffness [N/m]) or (point [m], "clamped", radius [m])
@@ -126,12 +127,7 @@ def assemble(
         ribs = [replace(rib, path=mesh.line(rib.path)) for rib in section.ribs]
         section = replace(section, rise=section.rise or mesh.rise, ribs=tuple(ribs))
     usual = usual_theory(section, mesh.dimension)
-    theory = check.one_of("theory", usual.name if theory is None else theory, THEORIES[mesh.dimension])
-    if usual is SHALLOW and theory != usual.name:
-        why = "a plate that is curved, ribbed or unevenly layered"
-        raise ValueError(f"theory must be {usual.name!r} for {why}, got {theory!r}")
-    known = {each.element: each for each in EVERY if each.name == theory}
-    rules = known[check.one_of("element", next(iter(known)) if element is None else element, tuple(known))]
+    rules = _chosen(usual, theory, element, mesh.dimension)
     supports = {} if supports is None else supports
     if callable(getattr(section, "thickness", None)):
         mesh = aligned(mesh)
@@ -153,6 +149,23 @@ def usual_theory(section: Any, dimension: int) -> Theory:
     if dimension == 2 and isinstance(section, Plate) and not section.plain:
         return SHALLOW
     return ARGYRIS if dimension == 2 else EULER
+
+
+def _chosen(usual: Theory, theory: str | Theory | None, element: str | None, dimension: int) -> Theory:
+    """The theory of `assemble`."""
+    if isinstance(theory, Theory):
+        if theory.dimension != dimension or element is not None:
+            raise ValueError(
+                f"theory must be of dimension {dimension}, as the mesh, and goes without element, got "
+                f"{theory.name!r} of dimension {theory.dimension}"
+            )
+        return theory
+    theory = check.one_of("theory", usual.name if theory is None else theory, THEORIES[dimension])
+    if usual is SHALLOW and theory != usual.name:
+        why = "a plate that is curved, ribbed or unevenly layered"
+        raise ValueError(f"theory must be {usual.name!r} for {why}, got {theory!r}")
+    known = {each.element: each for each in EVERY if each.name == theory}
+    return known[check.one_of("element", next(iter(known)) if element is None else element, tuple(known))]
 
 
 def ribbed(mesh: Mesh, section: Any) -> Mesh:
@@ -181,6 +194,8 @@ def _assembled(
     body = Subject(fine, section, support_of_facets(fine, supports, rules.words), marked)
     domain = rules.domain(body, rules.fields)
     held = rules.hold(body, domain)
+    if rules not in EVERY:
+        check_own(rules, domain, held)
     make = rules.matrices or (lambda _, domain: integrals(rules, domain, np.arange(len(domain.points.x))))
     K, M = (scatter(each, held.dofs, held.expand.shape[0]) for each in make(body, domain))
     if held.ribs is not None:

@@ -5,19 +5,20 @@ the fourth power of their number, would spoil the lowest modes. One element of d
 rounding.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
-from scipy.sparse import csc_matrix
+from scipy.sparse import csc_matrix, csr_matrix
 from skfem import ElementLineHermite, MeshLine
 
 from .._base.rounding import EPSILON, HALVINGS, SAME
-from .._base.untyped import Cells, Sparse
+from .._base.untyped import Cells
 from ..mesh.facets import powers
+from .elements import numbering
 from .section import Elastic
 from .springs import edge_stiffness
-from .theory import Domain, Frame, Points, Subject
+from .theory import Domain, Frame, Held, Points, Subject, kept_unknowns, unknowns_of_cells
 
 # [-] polynomial degree of the deflection within an element: errs by 1e-12 of a wave of 30 rad; few elements round less
 DEGREE = 32
@@ -69,7 +70,7 @@ class HermiteSpace:
             matrix[:, 4:, :4] = matrix[:, :4, 4:].transpose(0, 2, 1)
             matrix[:, 4:, 4:] = diagonal[..., None] * np.eye(DEGREE - 3)
 
-    def functions(self, cells: np.ndarray, points: np.ndarray, orders: tuple[int, ...]) -> list[np.ndarray]:
+    def bending(self, cells: np.ndarray, points: np.ndarray, orders: tuple[int, ...]) -> list[np.ndarray]:
         """Derivatives (n, n_q, DEGREE + 1) of order 0 to 2 of the shapes of cells (n,) at points (n, n_q, 1)."""
         h = self.length[cells][:, None]
         s = (points[..., 0] - self.start[cells][:, None]) / h
@@ -92,6 +93,14 @@ class HermiteSpace:
             whole = np.concatenate([ends, bubbles], axis=-1)
             result.append(whole / h[..., None] ** order)
         return result
+
+    def functions(self, cells: np.ndarray, points: np.ndarray, orders: tuple[int, ...]) -> list[np.ndarray]:
+        """The same of the whole deflection, by all unknowns; here it is that by `bending`."""
+        return self.bending(cells, points, orders)
+
+    def numbering(self, mesh: Cells) -> tuple[np.ndarray, int]:
+        """Numbers of the unknowns of each element (n_local, n_cells), and how many there are."""
+        return numbering(mesh, self)
 
     def locate(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """The cell that holds each point (n, 1), or else the nearest one, and whether the point lies in it."""
@@ -135,7 +144,7 @@ def rounding(space: Any) -> float:
     return float(ROUNDED / max(np.abs(space.length).min(), APART) ** 3)
 
 
-def domain(body: Subject, make_space: Callable[[Cells], Any], names: tuple[str, ...]) -> Domain:
+def domain(make_space: Callable[[Cells], Any], body: Subject, names: tuple[str, ...]) -> Domain:
     """The elements of a beam in its frame, with shape functions and the section's fields ``names``."""
     mesh, section = body.mesh, body.section
     low, high = mesh.points.min(axis=0), mesh.points.max(axis=0)
@@ -154,23 +163,33 @@ def domain(body: Subject, make_space: Callable[[Cells], Any], names: tuple[str, 
     return Domain.of(names, section, box, line, space, Points(np.zeros((1, x.shape[1])), x[..., None], dx))
 
 
-def ends(body: Subject) -> list[tuple[bool, str | Elastic]]:
-    """Whether each end of a beam is the left one, and its support."""
-    left = body.mesh.points[body.mesh.facets[:, 0], 0] <= body.mesh.points.min()
-    return list(zip(left.tolist(), body.held))
+def hold(body: Subject, domain: Domain) -> Held:
+    """The supports of both ends of a beam, on its deflection and its rotation by bending.
 
-
-def end_springs(sprung: list[tuple[dict[int, float], int, Elastic]], frame: Frame, n_all: int) -> Sparse:
-    """Stiffness (n_all, n_all) of elastic supports.
-
-    Each comes with the unknowns that add up to the deflection there, the one that is the rotation, and its `Elastic`.
+    A deflection by shear is zero at the left end, as only the sum of both counts, and takes all of it away from a held
+    right end.
     """
-    total = csc_matrix((n_all, n_all))
-    for deflection, turned, kind in sprung:
-        for along, stiffness in zip((deflection, {turned: 1.0}), edge_stiffness([kind], frame)[0]):
-            row = csc_matrix((list(along.values()), ([0] * len(along), list(along))), shape=(1, n_all))
-            total = total + stiffness * row.T @ row
-    return total
+    dofs, n_all = domain.space.numbering(domain.cells)
+    shear = [] if len(dofs) == DEGREE + 1 else [int(dofs[DEGREE + 1, 0]), int(dofs[DEGREE + 2, -1])]
+    fixed, tied, springs = np.zeros(n_all, bool), False, csc_matrix((n_all, n_all))
+    fixed[shear[:1]] = True
+    at_left = body.mesh.points[body.mesh.facets[:, 0], 0] <= body.mesh.points.min()
+    for left, kind in zip(at_left.tolist(), body.held):
+        bent, turned = (dofs[:2, 0] if left else dofs[2:4, -1]).tolist()
+        more = [] if left else shear[1:]
+        if isinstance(kind, Elastic):
+            for along, stiffness in zip(([bent, *more], [turned]), edge_stiffness([kind], domain.frame)[0]):
+                row = csc_matrix((np.ones(len(along)), ([0] * len(along), along)), shape=(1, n_all))
+                springs = springs + stiffness * row.T @ row
+        elif kind != "free":
+            fixed[turned] |= kind == "clamped"
+            fixed[more or bent] = True
+            tied |= bool(more)
+    expand, project = kept_unknowns(fixed)
+    if tied:
+        place = [shear[1]], [np.count_nonzero(~fixed[: dofs[2, -1]])]
+        expand = (expand + csr_matrix(([-1.0], place), shape=expand.shape)).tocsr()
+    return Held(expand, project, dofs, springs)
 
 
 def point_forces(
@@ -268,35 +287,41 @@ def _misfit(fields: Callable, low: np.ndarray, high: np.ndarray, span: float) ->
     return ((missed - rounded) / np.abs(every).max(axis=2)).max(axis=0)
 
 
-def energy_errors(
-    space: HermiteSpace, stiffness: np.ndarray, curvature: np.ndarray, load: np.ndarray, moments: np.ndarray,
-    hinges: Sequence[Any] = (),
-) -> np.ndarray:  # fmt: skip
-    """Error (n,) of the squared energy norm of solutions, from moments in equilibrium with the loads.
+def balanced_errors(
+    system: Any, vectors: np.ndarray, loads: np.ndarray, forced: np.ndarray | None = None
+) -> np.ndarray:
+    """Errors (3, n) of the squared energy norm of solutions, from moments and shear forces in equilibrium.
 
-    The bending moment that balances a load is its double integral plus a linear function. The least difference
-    between the moment of the solution and any such moment bounds the error (Prager and Synge).
-
-    Parameters
-    ----------
-    space : HermiteSpace
-    stiffness : ndarray, shape (n_cells, n_q), at the points of `quadrature`
-    curvature : ndarray, shape (n_cells, n_q, n), of n solutions
-    load : ndarray, shape (n_cells, n_q, n), force per length
-    moments : ndarray, shape (n_cells, n_q, n), of point forces: each force times the distance beyond its point
-    hinges : sequence of ndarray, shape (n_cells, n_q), distance beyond each point held at rest, by an unknown force
+    What balances a load is its double integral plus a linear moment, and its integral plus a constant. The least
+    difference between what the solution has and any such bounds the error (Prager and Synge). Arguments are those of
+    `residual.energy_errors`; a slender beam has no shear force of its own that could differ.
     """
-    x, dx = quadrature(space)
-    carried = integral_along(space, integral_along(space, load))
-    missed = stiffness[..., None] * curvature - carried - moments
-    weight = (dx / stiffness).ravel()
-    flat = missed.reshape(weight.size, -1)
-    free = np.sqrt(weight)[:, None] * np.column_stack(
-        [np.ones(weight.size), x.ravel(), *(beyond.ravel() for beyond in hinges)]
-    )
-    rest = np.sqrt(weight)[:, None] * flat
-    rest -= free @ np.linalg.lstsq(free, rest, rcond=None)[0]
-    return (rest**2).sum(axis=0)
+    space, (x, dx) = system.space, quadrature(system.space)
+    cells, at, bent = np.arange(len(x)), x[..., None], DEGREE + 1
+    unknowns, pushed = (unknowns_of_cells(system, field) for field in (vectors, loads))
+    fields = {name: system.frame.field(system.section, name, at)[..., None] for name in system.rules.fields}
+    slope, curve = space.bending(cells, at, (1, 2))
+    push = -integral_along(space, fields["inertia"] * (space.functions(cells, at, (0,))[0] @ pushed))
+    moment = -push
+    if "rotary" in fields:
+        moment = moment - fields["rotary"] * (slope @ pushed[:, :bent])
+    moment = integral_along(space, moment)
+    forces, hinges = point_forces(system, vectors, loads, forced)
+    for place, force in forces:
+        moment, push = moment + (at - place).clip(0.0) * force, push - (at > place) * force
+    one, beyond = np.ones_like(x), [(x - place).clip(0.0) for place in hinges]
+    rows = [(fields["stiffness"], curve @ unknowns[:, :bent], moment, [-x, one, *beyond])]
+    if "shear" in fields:
+        levers = [one, 0.0 * one, *(-1.0 * (x > place) for place in hinges)]
+        rows.append((fields["shear"], space.shears(cells, at, 1) @ unknowns[:, bent:], push, levers))
+    missed, free = [], []
+    for stiff, strain, carried, levers in rows:
+        weight = np.sqrt(dx[..., None] / stiff)
+        missed.append((weight * (stiff * strain - carried)).reshape(x.size, -1))
+        free.append((weight * np.stack(levers, axis=-1)).reshape(x.size, -1))
+    rest, constants = np.concatenate(missed), np.concatenate(free)
+    rest -= constants @ np.linalg.lstsq(constants, rest, rcond=None)[0]
+    return np.outer([1.0, 0.0, 0.0], (rest**2).sum(axis=0))
 
 
 def integral_along(space: Any, values: np.ndarray) -> np.ndarray:

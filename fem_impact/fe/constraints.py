@@ -9,7 +9,7 @@ from scipy.sparse import csr_matrix, diags
 from .._base.rounding import ROUNDING, SAME
 from .._base.untyped import Sparse
 from .interpolation import Interpolation
-from .theory import Domain, Held
+from .theory import Domain, Held, unresisted
 
 
 class Attached(NamedTuple):
@@ -38,7 +38,8 @@ def load_and_release(
         felt = rows.rows(points, expand)
         M = M + felt.T @ diags(weights / domain.frame.mass) @ felt
     across = _across(domain.space.origin[:, 0], held.dofs, expand)
-    moving = _rigid(domain.space.linear(held.dofs, expand.shape[0]), expand, project)[across]
+    every = domain.space.linear(held.dofs, expand.shape[0])
+    moving = (project @ every @ unresisted(every, expand, project))[across]
     expand = expand[:, across].tocsr()
     K, M = (expand.T @ (K + springs) @ expand).tocsc(), (expand.T @ M @ expand).tocsc()
     rigid, sprung = _resisted(moving, expand.T @ (springs @ (expand @ moving)), M)
@@ -73,15 +74,6 @@ def _on_posts(posts: list, held: Held, domain: Domain, rows: Interpolation) -> t
         expand = expand @ csr_matrix((entries, place), shape=(len(moves), len(others)))
         project = project[others]
     return springs.tocsc(), expand.tocsr(), project.tocsr()
-
-
-def _rigid(every: np.ndarray, expand: csr_matrix, project: csr_matrix) -> np.ndarray:
-    """Those rigid motions (n_dofs, n), of ``every`` one (n_all, n_motions), that no support but springs resists."""
-    left = project @ every
-    lost = every - expand @ left
-    scale = np.abs(every).max()
-    _, lengths, turn = np.linalg.svd(lost.T @ lost / scale**2)
-    return left @ turn[np.sqrt(lengths) < SAME * np.sqrt(len(every))].T
 
 
 def _resisted(moving: np.ndarray, force: np.ndarray, M: Sparse) -> tuple[np.ndarray, np.ndarray]:

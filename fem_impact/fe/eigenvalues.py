@@ -228,12 +228,12 @@ def _krylov(solve: Any, M: csc_matrix, n: int, available: int, allowed: float, w
     size = M.shape[0]
     most = min(available, 6 * n + 20 * width)
     rng = np.random.default_rng(0)  # fixed seed, so that every run gives the same modes
-    basis = [np.empty((width * (2 * n // width + 4), size))]  # rows are vectors; more are taken as they are needed
+    basis = np.empty((width * (2 * n // width + 4), size))  # rows are vectors; more are taken as they are needed
     small = np.zeros((most + width, most + width))
     block = solve(M @ rng.standard_normal((size, width)))
     block, carried, _ = _normal(*_normal(block, M @ block)[:2])
-    basis[0][:width], done, older, before = block.T, 0, np.zeros((size, 0)), np.zeros((size, 0))
-    next_look, filled = 2 * n + 2 * width, width  # rows filled of the last part
+    basis[:width], done, older, before = block.T, 0, np.zeros((size, 0)), np.zeros((size, 0))
+    next_look = 2 * n + 2 * width
     while True:
         new = solve(carried)  # the operator applied to the newest block
         heavy = M @ new
@@ -244,9 +244,8 @@ def _krylov(solve: Any, M: csc_matrix, n: int, available: int, allowed: float, w
         small[max(0, done - width) : done + width, done : done + width] = overlap
         done += width
         new, heavy, factor = _normal(new, heavy)
-        parts = [*basis[:-1], basis[-1][:filled]]
-        drift = np.concatenate([part @ heavy for part in parts])  # earlier directions that rounding brought back
-        new -= _combined(parts, drift)
+        drift = basis[:done] @ heavy  # earlier directions that rounding brought back
+        new -= basis[:done].T @ drift
         small[:done, done - width : done] += drift @ factor
         heavy = M @ new  # again: a hundredth of the work, and half the overlap that is left
         older, before, (block, carried, again) = carried, block, _normal(new, heavy)
@@ -259,21 +258,12 @@ def _krylov(solve: Any, M: csc_matrix, n: int, available: int, allowed: float, w
             values, turn = values[nearest], turn[:, nearest]
             residual = np.linalg.norm(factor @ turn[-width:], axis=0)
             if full or (residual <= allowed * np.abs(values)).all():
-                return _combined(parts, turn)
+                return basis[:done].T @ turn
             next_look = done + 4 * width
-        if filled == len(basis[-1]):
-            basis, filled = [*basis, np.empty((4 * width, size))], 0
-        basis[-1][filled : filled + width], filled = block.T, filled + width
+        if done + width > len(basis):
+            basis.resize((done + n + 4 * width, size), refcheck=False)  # seldom, and mostly without a copy
+        basis[done : done + width] = block.T
         small[done : done + width, done - width : done] = factor
-
-
-def _combined(parts: list[np.ndarray], weights: np.ndarray) -> np.ndarray:
-    """Combinations (n_dofs, n) of vectors, the rows of all ``parts``, by ``weights`` (n_vectors, n)."""
-    ends = np.cumsum([len(part) for part in parts])
-    found = parts[0].T @ weights[: ends[0]]
-    for part, end in zip(parts[1:], ends[1:]):
-        found += part.T @ weights[end - len(part) : end]
-    return found
 
 
 def _normal(vectors: np.ndarray, heavy: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

@@ -1,12 +1,11 @@
 """Triangular elements whose shape functions stay accurate for any size, shape and position of the triangle."""
 
-from collections.abc import Callable
 from itertools import product
 from typing import Any
 
 import numpy as np
 from scipy.spatial import cKDTree
-from skfem import Dofs, ElementTriArgyris, ElementTriMorley, MappingAffine, MeshTri
+from skfem import Dofs, ElementTriArgyris, ElementTriMorley, MeshTri
 from skfem.quadrature import get_quadrature
 
 from .._base.rounding import SAME
@@ -15,7 +14,8 @@ from ..mesh.facets import CURVE_STEPS, Curves, powers
 from .supports import SIDES
 from .theory import Points
 
-EXPONENTS = np.array([(i, j) for i in range(6) for j in range(6 - i)])  # the 21 monomials of degree 5
+# by highest degree: the exponents (n, 2) of monomials of quadratics, of cubics and of quintics
+EXPONENTS = {k: np.array([(i, j) for i in range(k + 1) for j in range(k + 1 - i)]) for k in (2, 3, 5)}
 NEAR_CURVE = 1e-5  # [-] the same at curved edges: the mesh is closer to the curve than this share of a triangle
 # [-] nearest triangles searched first: about those around a vertex; if none holds the point, all are searched
 CANDIDATES = 8
@@ -25,10 +25,10 @@ REFERENCE = np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]]) - 1.0 / 3.0  # corner
 DERIVATIVES = ((0, 0), (1, 0), (0, 1), (2, 0), (1, 1), (0, 2))  # unknowns at a vertex: orders in x and y
 
 
-def monomials(local: np.ndarray, dx: int, dy: int) -> np.ndarray:
-    """Derivative of the 21 monomials at local coordinates (..., 2), shape (..., 21)."""
-    x, y = powers(local[..., 0], 5, dx), powers(local[..., 1], 5, dy)
-    return x[..., EXPONENTS[:, 0]] * y[..., EXPONENTS[:, 1]]
+def monomials(local: np.ndarray, dx: int, dy: int, degree: int = 5) -> np.ndarray:
+    """Derivative of the monomials up to a degree at local coordinates (..., 2), shape (..., n); 21 of them up to 5."""
+    (i, j), (x, y) = EXPONENTS[degree].T, (powers(local[..., k], degree, d) for k, d in enumerate((dx, dy)))
+    return x[..., i] * y[..., j]
 
 
 def curvatures(hessian: np.ndarray) -> np.ndarray:
@@ -76,33 +76,16 @@ class Bent:
         return moved, gradient
 
 
-class _BentMapping(MappingAffine):
-    """scikit-fem's mapping from the reference triangle, extended to bent triangles."""
-
-    def __init__(self, mesh: Cells, bent: Bent) -> None:
-        super().__init__(mesh)
-        self.bent = bent
-
-    def _shift(self, X: np.ndarray, tind: np.ndarray | None) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        cells = np.arange(self.mesh.t.shape[1]) if tind is None else tind
-        X = np.broadcast_to(X, (2, X.shape[-1]))
-        area = np.broadcast_to(area_coordinates(X.T), (len(cells), X.shape[1], 3))
-        return cells, *self.bent.shift(cells, area)
-
-    def F(self, X: np.ndarray, tind: np.ndarray | None = None) -> np.ndarray:
-        """Where points of the reference triangle lie."""
-        return super().F(X, tind) + self._shift(X, tind)[1].transpose(2, 0, 1)
-
-    def detDF(self, X: np.ndarray, tind: np.ndarray | None = None) -> np.ndarray:
-        """Determinant of the map there."""
-        cells, _, gradient = self._shift(X, tind)
-        J = self.A[:, :, cells].transpose(2, 0, 1)[:, None] + gradient[..., 1:] - gradient[..., :1]
-        return J[..., 0, 0] * J[..., 1, 1] - J[..., 0, 1] * J[..., 1, 0]
-
-
 class Triangles:
-    """The triangles of one mesh: local coordinates, normals of sides, and a search for the triangle of a point."""
+    """The triangles of one mesh and polynomials on them, with a search for the triangle of a point.
 
+    Spaces of shape functions are kinds of it: they state the first three and find ``coefficients``.
+    """
+
+    degree: int  # of the polynomials
+    order: int  # of the quadrature
+    element: type[Any]  # scikit-fem's class, which numbers the unknowns
+    coefficients: np.ndarray  # (n_cells, n, n_local) of the monomials in each shape function
     corners: np.ndarray  # (n_cells, 3, 2)
     vertices: np.ndarray  # (n_cells, 3)
     bent: Bent | None
@@ -134,33 +117,38 @@ class Triangles:
         offset = points - self.origin[cells].reshape(*shape, 2)
         return np.einsum("eij,e...j->e...i", self.inverse[cells], offset)
 
-    def chain(self, cells: np.ndarray, order: int) -> np.ndarray:
-        """Matrices (n, order + 1, order + 1) that turn derivatives in local coordinates of cells (n,) into x and y."""
-        inverse = self.inverse[cells]
-        a, b, c, d = (inverse[:, i, j] for i, j in product(range(2), repeat=2))
-        if order == 1:
-            rows = [[a, c], [b, d]]
-        else:
-            rows = [[a * a, 2 * a * c, c * c], [a * b, a * d + b * c, c * d], [b * b, 2 * b * d, d * d]]
-        return np.stack([np.stack(row, axis=-1) for row in rows], axis=1)
+    def straight(self, cells: np.ndarray, local: np.ndarray) -> np.ndarray:
+        """Places (n, n_q, 2) of local coordinates (n_q, 2) in cells (n,), as if all sides were straight."""
+        return self.origin[cells, None] + local @ self.jacobian[cells].transpose(0, 2, 1)
 
-    def derivatives(
-        self, cells: np.ndarray, points: np.ndarray, orders: tuple[int, ...],
-        terms: Callable[[np.ndarray, int, int], np.ndarray], weights: np.ndarray,
-    ) -> list[np.ndarray]:  # fmt: skip
-        """Derivatives of polynomials, one array for each order, as in `ArgyrisSpace.functions`.
-
-        ``terms(local, dx, dy)`` gives derivatives (..., n) of n terms; ``weights`` (n_cells, n, n_local) combine them.
-        """
+    def derivatives(self, cells: np.ndarray, points: np.ndarray, order: int, degree: int) -> np.ndarray:
+        """Derivatives (n, order + 1, n_q, n_terms) by x and y of the monomials of cells (n,) at points (n, n_q, 2)."""
         local = self.local(cells, points)
-        result = []
-        for order in orders:
-            raw = [terms(local, order - k, k) @ weights[cells] for k in range(order + 1)]
-            stacked = np.stack(raw, axis=1)  # (n, order + 1, n_q, n_local)
-            if order:
-                stacked = (self.chain(cells, order) @ stacked.reshape(*stacked.shape[:2], -1)).reshape(stacked.shape)
-            result.append(stacked if order else raw[0])
-        return result
+        raw = np.stack([monomials(local, order - k, k, degree) for k in range(order + 1)], axis=1)
+        return (chained(self.inverse[cells], order) @ raw.reshape(*raw.shape[:2], -1)).reshape(raw.shape)
+
+    def bending(self, cells: np.ndarray, points: np.ndarray, orders: tuple[int, ...]) -> list[np.ndarray]:
+        """Derivatives of the shape functions of cells (n,) at points (n, n_q, 2), one array for each order.
+
+        The arrays are (n, n_q, n_local) for order 0, (n, 2, n_q, n_local) for order 1, (n, 3, n_q, n_local) for order
+        2: xx, xy, yy.
+        """
+        weights = self.coefficients[cells][:, None]
+        found = [self.derivatives(cells, points, order, self.degree) @ weights for order in orders]
+        return [each if order else each[:, 0] for each, order in zip(found, orders)]
+
+    def functions(self, cells: np.ndarray, points: np.ndarray, orders: tuple[int, ...]) -> list[np.ndarray]:
+        """The same by all unknowns; here they are those of `bending`."""
+        return self.bending(cells, points, orders)
+
+    def jacobians(self, cells: np.ndarray, area: np.ndarray) -> np.ndarray:
+        """Jacobians (n, n_q, 2, 2) of the map from the reference triangle at area coordinates (n or 1, n_q, 3)."""
+        area = np.broadcast_to(area, (len(cells), *area.shape[1:]))
+        plain = np.broadcast_to(self.jacobian[cells][:, None], (*area.shape[:2], 2, 2))
+        if self.bent is None:
+            return plain
+        turned = self.bent.shift(cells, area)[1]
+        return plain + turned[..., 1:] - turned[..., :1]
 
     def along(self, cells: np.ndarray, area: np.ndarray, step: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Points of cells (n,) at area coordinates (n, n_q, 3), and their derivatives along ``step``, both (n, n_q, 2).
@@ -210,7 +198,7 @@ class Triangles:
         return cells[row, best], depth[row, best]
 
 
-class ArgyrisSpace:
+class ArgyrisSpace(Triangles):
     """Quintic shape functions of all triangles of one mesh, in the local coordinates of each.
 
     scikit-fem inverts a Vandermonde matrix of monomials in physical coordinates, which becomes singular when elements
@@ -218,60 +206,34 @@ class ArgyrisSpace:
     and its unknowns to the reference directions.
     """
 
-    element: type[Any] = ElementTriArgyris  # scikit-fem's class: it numbers the unknowns
-    order: int = 10  # of the quadrature: exact for products of quintics
-    inner: Triangles
-    origin: np.ndarray  # these and the next as in `Triangles`
-    inverse: np.ndarray
-    jacobian: np.ndarray
-    vertices: np.ndarray
-    curved: np.ndarray
-    bent: Bent | None
-    normals: np.ndarray  # (n_cells, 3, 2) at `middles`
-    middles: np.ndarray  # (n_cells, 3, 2) of the sides, on the true curve
-    coefficients: np.ndarray  # (n_cells, 21, 21) of the monomials in each shape function
+    degree = 5
+    order = 10  # exact for products of quintics
+    element = ElementTriArgyris
+    middles: np.ndarray  # (n_cells, 3, 2) of the sides, on the true curve, as are the normals
 
     def __init__(self, mesh: Cells, bent: Bent | None = None) -> None:
-        self.inner = Triangles(mesh, bent)
-        self.origin, self.inverse, self.jacobian = self.inner.origin, self.inner.inverse, self.inner.jacobian
-        self.vertices, self.curved, self.bent = self.inner.vertices, self.inner.curved, bent
-        corners, self.normals = self.inner.corners, self.inner.normals.copy()
-        self.middles = np.stack([0.5 * (corners[:, p] + corners[:, q]) for p, q in SIDES], axis=1)
+        super().__init__(mesh, bent)
+        self.middles = np.stack([0.5 * (self.corners[:, p] + self.corners[:, q]) for p, q in SIDES], axis=1)
         if bent is not None:
-            at = bent.cells, bent.sides
-            self.middles[at], self.normals[at] = bent.curves.middle()
-        self.coefficients = self._invert(corners, self.middles)
-
-    def _invert(self, corners: np.ndarray, middles: np.ndarray) -> np.ndarray:
-        n = len(corners)
+            curved = bent.cells, bent.sides
+            self.middles[curved], self.normals[curved] = bent.curves.middle()
+        n, every = len(self.origin), np.arange(len(self.origin))
         functionals = np.zeros((n, 21, 21))
         turn = np.zeros((n, 21, 21))  # physical unknowns -> unknowns along the reference directions
-        J = self.jacobian
         for k in range(3):
-            at = self.inner.local(np.arange(n), corners[:, k])
+            at = self.local(every, self.corners[:, k])
             for row, (dx, dy) in enumerate(DERIVATIVES):
                 functionals[:, 6 * k + row] = monomials(at, dx, dy)
-            a, b, c, d = J[:, 0, 0], J[:, 0, 1], J[:, 1, 0], J[:, 1, 1]
-            block = turn[:, 6 * k : 6 * k + 6, 6 * k : 6 * k + 6]
-            block[:, 0, 0] = 1.0
-            block[:, 1:3, 1:3] = np.stack([np.stack([a, c], -1), np.stack([b, d], -1)], axis=1)
-            hessian = [[a * a, 2 * a * c, c * c], [a * b, a * d + b * c, c * d], [b * b, 2 * b * d, d * d]]
-            block[:, 3:, 3:] = np.stack([np.stack(row, axis=-1) for row in hessian], axis=1)
+            for order, own in enumerate((slice(1), slice(1, 3), slice(3, 6))):
+                turn[:, 6 * k : 6 * k + 6, 6 * k : 6 * k + 6][:, own, own] = chained(self.jacobian, order)
         for side in range(3):
             weight = np.einsum("eij,ej->ei", self.inverse, self.normals[:, side])  # in local coordinates
             size = np.linalg.norm(weight, axis=1)
-            at = self.inner.local(np.arange(n), middles[:, side])
+            at = self.local(every, self.middles[:, side])
             row = weight[:, :1] * monomials(at, 1, 0) + weight[:, 1:] * monomials(at, 0, 1)
             functionals[:, 18 + side] = row / size[:, None]
             turn[:, 18 + side, 18 + side] = 1.0 / size
-        return np.linalg.solve(functionals, turn)
-
-    def functions(self, cells: np.ndarray, points: np.ndarray, orders: tuple[int, ...]) -> list[np.ndarray]:
-        """Derivatives of the shape functions of cells (n,) at points (n, n_q, 2), one array for each order.
-
-        The arrays are (n, n_q, 21) for order 0, (n, 2, n_q, 21) for order 1, (n, 3, n_q, 21) for order 2 (xx, xy, yy).
-        """
-        return self.inner.derivatives(cells, points, orders, monomials, self.coefficients)
+        self.coefficients = np.linalg.solve(functionals, turn)
 
     def rule(self) -> tuple[np.ndarray, np.ndarray]:
         """Quadrature of the reference triangle: local coordinates (n_q, 2) and weights (n_q,)."""
@@ -289,85 +251,69 @@ class ArgyrisSpace:
         products = np.einsum("iqa,q,jqb->ijab", bends, weight, bends).reshape(9, 441)
         determinant = np.abs(np.linalg.det(self.jacobian[cells]))
         engineering = np.array([[1.0, 0, 0], [0, 0, 1.0], [0, 2.0, 0]])  # (xx, xy, yy) -> (xx, yy, 2 xy)
-        turn = engineering @ self.inner.chain(cells, 2)
+        turn = engineering @ chained(self.inverse[cells], 2)
         metric = turn.transpose(0, 2, 1) @ stiffness @ turn * determinant[:, None, None]
         C = self.coefficients[cells]
         bending = C.transpose(0, 2, 1) @ (metric.reshape(-1, 9) @ products).reshape(-1, 21, 21) @ C
         mass = C.transpose(0, 2, 1) @ (values.T * weight @ values) @ C
         return bending, mass * determinant[:, None, None]
 
-    def locate(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """The cell that holds each point (n, 2), or else the nearest one, and whether the point lies in it."""
-        return self.inner.locate(points)
-
     def linear(self, element_dofs: np.ndarray, n_all: int) -> np.ndarray:
         """Unknowns (n_all, 3) of the deflections 1, x and y, the rigid motions of a plate."""
         result = np.zeros((n_all, 3))
-        corner = self.inner.corners
         for k in range(3):
             result[element_dofs[6 * k], 0] = 1.0
-            result[element_dofs[6 * k], 1:] = corner[:, k]
+            result[element_dofs[6 * k], 1:] = self.corners[:, k]
             result[element_dofs[6 * k + 1], 1] = 1.0
             result[element_dofs[6 * k + 2], 2] = 1.0
             result[element_dofs[18 + k], 1:] = self.normals[:, k]
         return result
 
 
-class MorleySpace:
+class MorleySpace(Triangles):
     """Quadratic Morley shape functions of straight triangles: deflection at corners, slope at mid-sides.
 
     They are continuous only at those points and approach the frequencies from below, while Argyris elements approach
     them from above.
     """
 
-    element: type[Any] = ElementTriMorley
-    order: int = 4  # of the quadrature: exact for products of quadratics
-    inner: Triangles
-    origin: np.ndarray  # these and the next as in `Triangles`
-    inverse: np.ndarray
-    jacobian: np.ndarray
-    vertices: np.ndarray
-    normals: np.ndarray
-    bent: None
-    coefficients: np.ndarray  # (n_cells, 6, 6) of the monomials in each shape function
+    degree = 2
+    order = 4  # exact for products of quadratics
+    element = ElementTriMorley
 
     def __init__(self, mesh: Cells, bent: Bent | None = None) -> None:
-        self.inner = Triangles(mesh)
-        self.origin, self.inverse, self.jacobian = self.inner.origin, self.inner.inverse, self.inner.jacobian
-        self.vertices, self.normals, self.bent = self.inner.vertices, self.inner.normals, None
-        n = len(self.origin)
-        functionals = np.zeros((n, 6, 6))
+        super().__init__(mesh)
+        functionals = np.zeros((len(self.origin), 6, 6))
         for k, corner in enumerate(REFERENCE):
-            functionals[:, k] = _quadratic(corner[None], 0, 0)
+            functionals[:, k] = monomials(corner[None], 0, 0, 2)
         for side, (p, q) in enumerate(SIDES):
             weight = np.einsum("eij,ej->ei", self.inverse, self.normals[:, side])
-            at = 0.5 * (REFERENCE[p] + REFERENCE[q])[None]
-            functionals[:, 3 + side] = weight[:, :1] * _quadratic(at, 1, 0) + weight[:, 1:] * _quadratic(at, 0, 1)
+            x, y = (monomials(0.5 * (REFERENCE[p] + REFERENCE[q])[None], *by, 2) for by in ((1, 0), (0, 1)))
+            functionals[:, 3 + side] = weight[:, :1] * x + weight[:, 1:] * y
         self.coefficients = np.linalg.inv(functionals)
-
-    def functions(self, cells: np.ndarray, points: np.ndarray, orders: tuple[int, ...]) -> list[np.ndarray]:
-        """The same as `ArgyrisSpace.functions`, with six shape functions per cell."""
-        return self.inner.derivatives(cells, points, orders, _quadratic, self.coefficients)
-
-    def locate(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """The cell that holds each point (n, 2), or the nearest one, and whether the point lies in it."""
-        return self.inner.locate(points)
 
     def linear(self, element_dofs: np.ndarray, n_all: int) -> np.ndarray:
         """Unknowns (n_all, 3) of the deflections 1, x and y."""
         result = np.zeros((n_all, 3))
         for k in range(3):
             result[element_dofs[k], 0] = 1.0
-            result[element_dofs[k], 1:] = self.origin + self.jacobian @ REFERENCE[k]
+            result[element_dofs[k], 1:] = self.corners[:, k]
             result[element_dofs[3 + k], 1:] = self.normals[:, k]
         return result
 
 
-def _quadratic(local: np.ndarray, dx: int, dy: int) -> np.ndarray:
-    """Derivative of the six monomials of degree 2 at local coordinates (..., 2), shape (..., 6)."""
-    x, y = powers(local[..., 0], 2, dx), powers(local[..., 1], 2, dy)
-    i, j = np.array([(i, j) for i in range(3) for j in range(3 - i)]).T
-    return x[..., i] * y[..., j]
+def chained(matrix: np.ndarray, order: int) -> np.ndarray:
+    """Matrices (n, order + 1, order + 1) that turn derivatives of an order by coordinates into those by others.
+
+    ``matrix`` (n, 2, 2) is how those change with these: the inverse Jacobian from local coordinates to x and y.
+    """
+    a, b, c, d = (matrix[:, i, j] for i, j in product(range(2), repeat=2))
+    rows: list[list[Any]] = [
+        [[np.ones(len(matrix))]],
+        [[a, c], [b, d]],
+        [[a * a, 2 * a * c, c * c], [a * b, a * d + b * c, c * d], [b * b, 2 * b * d, d * d]],
+    ][order]
+    return np.stack([np.stack(row, axis=-1) for row in rows], axis=1)
 
 
 def triangles(points: np.ndarray, cells: np.ndarray) -> Cells:
@@ -375,23 +321,25 @@ def triangles(points: np.ndarray, cells: np.ndarray) -> Cells:
     return MeshTri(np.ascontiguousarray(points.T), np.ascontiguousarray(cells.T))
 
 
-def inverses(space: Any, X: np.ndarray) -> np.ndarray:
-    """Inverse Jacobians (n_cells, n_q, 2, 2) of the map from the reference triangle at its points (2, n_q)."""
-    J = np.broadcast_to(space.jacobian[:, None], (len(space.origin), X.shape[1], 2, 2)).copy()
-    if space.bent is not None:
-        cells = space.bent.cells
-        area = np.broadcast_to(area_coordinates(X.T), (len(cells), X.shape[1], 3))
-        gradient = space.bent.shift(cells, area)[1]
-        # a triangle with two curved sides is listed twice, each time with the whole shift
-        J[cells] = space.jacobian[cells][:, None] + gradient[..., 1:] - gradient[..., :1]
-    return np.linalg.inv(J)
+def collapsed(n: int) -> tuple[np.ndarray, np.ndarray]:
+    """Gauss points (n**2, 2) of the reference triangle, so many in each direction, and their weights (n**2,)."""
+    node, weight = np.polynomial.legendre.leggauss(n)
+    a, b = (x.ravel() for x in np.meshgrid(0.5 * (node + 1.0), 0.5 * (node + 1.0), indexing="ij"))
+    return np.column_stack([a, b * (1.0 - a)]), 0.25 * np.outer(weight, weight).ravel() * (1.0 - a)
 
 
-def quadrature(mesh: Any, space: Any, bent: Bent | None) -> Points:
+def on_true_edge(space: Triangles, local: np.ndarray, weight: np.ndarray) -> Points:
+    """Points (n_q, 2) of the reference triangle with their weights (n_q,) on every triangle."""
+    cells, area = np.arange(len(space.origin)), area_coordinates(local)[None]
+    x = space.along(cells, np.broadcast_to(area, (len(cells), *area.shape[1:])), np.zeros((1, 1, 3)))[0]
+    J = space.jacobians(cells, area)
+    return Points(local.T, x, np.abs(J[..., 0, 0] * J[..., 1, 1] - J[..., 0, 1] * J[..., 1, 0]) * weight)
+
+
+def quadrature(space: Triangles) -> Points:
     """The quadrature of a space on every triangle."""
     X, weight = get_quadrature(space.element.refdom, space.order)
-    mapping = mesh._mapping() if bent is None else _BentMapping(mesh, bent)
-    return Points(X, mapping.F(X).transpose(1, 2, 0), np.abs(mapping.detDF(X)) * weight)
+    return on_true_edge(space, X.T, weight)
 
 
 def numbering(mesh: Cells, space: Any) -> tuple[np.ndarray, int]:

@@ -3,6 +3,7 @@
 The deflection is the only field. Argyris triangles approach frequencies from above, Morley triangles from below.
 """
 
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -21,10 +22,6 @@ def terms(space: Any, points: Points, cells: np.ndarray) -> list[Term]:
     """Curvature strains a thin plate, deflection moves it."""
     value, hessian = space.functions(cells, points.x[cells], (0, 2))
     return [Term("K", "stiffness", curvatures(hessian)), Term("M", "inertia", value[:, :, None])]
-
-
-def _domain(body: Subject, fields: tuple[str, ...]) -> Domain:
-    return plates.domain(body, ArgyrisSpace, fields)
 
 
 def _matrices(body: Subject, domain: Domain) -> tuple[np.ndarray, np.ndarray]:
@@ -49,7 +46,7 @@ def _hold(body: Subject, domain: Domain) -> Held:
 def _morley_domain(body: Subject, fields: tuple[str, ...]) -> Domain:
     if body.mesh.curved.any():
         raise ValueError("element 'morley' needs straight edges; use 'argyris', or a polygon")
-    return plates.domain(body, MorleySpace, fields)
+    return plates.domain(MorleySpace, body, fields)
 
 
 def _hold_morley(body: Subject, domain: Domain) -> Held:
@@ -80,8 +77,8 @@ def _morley_errors(system: Any, vectors: np.ndarray, loads: np.ndarray, forced: 
 
 
 ARGYRIS = Theory(
-    "kirchhoff", "argyris", 2, _domain, terms, _hold, residual.energy_errors, wave=1.8, unknowns=10.4,
-    matrices=_matrices, graded=True, sharp=plates.is_tiny,
+    "kirchhoff", "argyris", 2, partial(plates.domain, ArgyrisSpace), terms, _hold, residual.energy_errors, wave=1.8,
+    unknowns=10.4, matrices=_matrices, graded=True, sharp=plates.is_tiny,
 )  # fmt: skip
 MORLEY = Theory(
     "kirchhoff", "morley", 2, _morley_domain, terms, _hold_morley, _morley_errors, wave=0.2, unknowns=4.6,

@@ -34,9 +34,10 @@ from scipy.sparse import csc_matrix
 from .._base.untyped import Sparse
 from . import plane, slopes
 from .eigenvalues import factorise
-from .elements import area_coordinates, inverses, triangles
+from .elements import area_coordinates, triangles
 from .section import Plate, evaluate
 from .system import System
+from .theory import gram, scatter
 
 NODES = 4  # [-] Gauss points in each direction of a triangle: exact for the stiffness of quartic elements
 # [-] lowest modes whose stresses choose the fields that are kept: large swings are those of the lowest modes
@@ -71,7 +72,7 @@ class Sheet:
         assert rim is not None and isinstance(section, Plate)
         space: Any = system.space
         X, x, dx = slopes.quadrature(system, NODES)
-        gradient = np.einsum("eqji,jqk->eqik", inverses(space, X), plane.reference(X)[1])
+        gradient = plane.gradients(space, np.arange(len(x)), area_coordinates(X.T)[None])
         h = evaluate("thickness", section.thickness, frame.places(x), "m").reshape(dx.shape)
         moduli = (frame.length**2 * h * dx)[..., None, None] * section.stretched
         own = plane.numbered(triangles(rim.points, space.vertices))
@@ -84,7 +85,7 @@ class Sheet:
         plate = np.arange(len(x)), area, x, moduli, gradient, neutral
         parts = [plate, *(_along(space, rib, frame.length, x.shape[1]) for rib in getattr(space, "ribs", ()))]
         cells, area, x, moduli, gradient, neutral = (np.concatenate(each) for each in zip(*parts))
-        return cls(cells, area, x, moduli, gradient, dofs[cells], plane.loosened(space.inner, rim, own)[0], neutral)
+        return cls(cells, area, x, moduli, gradient, dofs[cells], plane.loosened(space, rim, own)[0], neutral)
 
     def strains(self, pieces: np.ndarray) -> np.ndarray:
         """Strains (n, n_q, 3, 30) of the unknowns of pieces (n,)."""
@@ -102,9 +103,7 @@ class Sheet:
         result = csc_matrix((n_dofs, n_dofs))
         for cells in self.blocks(30):
             strain, dofs = self.strains(cells), self.dofs[cells]
-            local = _flat(strain).transpose(0, 2, 1) @ _flat(self.moduli[cells] @ strain)
-            place = (np.broadcast_to(each, local.shape).ravel() for each in (dofs[:, :, None], dofs[:, None]))
-            result = result + csc_matrix((local.ravel(), tuple(place)), shape=result.shape)
+            result = result + scatter(gram(strain, self.moduli[cells]), dofs.T, n_dofs)
         return result
 
 
@@ -181,7 +180,7 @@ def _along(space: Any, rib: Any, length: float, n_q: int) -> tuple[np.ndarray, .
     def padded(values: np.ndarray, mode: Any = "edge") -> np.ndarray:
         return np.pad(values, [(0, 0), (0, n_q - ds.shape[1]), *[(0, 0)] * (values.ndim - 2)], mode=mode)
 
-    gradient = plane.gradients(space.inner, cells, area)
+    gradient = plane.gradients(space, cells, area)
     return cells, padded(area), padded(x), padded(moduli, "constant"), padded(gradient), padded(neutral)
 
 

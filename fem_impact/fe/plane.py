@@ -3,17 +3,15 @@
 Thick plates have their shear strains there, shells and stretched plates the displacements in their plane.
 """
 
-from typing import Any
-
 import numpy as np
 from scipy.linalg import qr
 from scipy.sparse import block_diag, csr_matrix
 from skfem import Dofs, ElementTriP4
 
-from .._base.rounding import SAME
 from .._base.untyped import Cells, Sparse
 from . import supports
-from .elements import ArgyrisSpace, Bent, Triangles, area_coordinates
+from .elements import ArgyrisSpace, Triangles, area_coordinates
+from .theory import unresisted
 
 QUARTIC = 15  # shape functions of one component on a triangle
 FIRST, SECOND = slice(21, 21 + QUARTIC), slice(21 + QUARTIC, 21 + 2 * QUARTIC)  # unknowns of both components
@@ -35,32 +33,13 @@ def reference(X: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return values, np.stack(gradients, axis=-1)
 
 
-class PlaneSpace:
-    """Shape functions of one mesh: 21 of the deflection, then 15 for each component in the plane."""
-
-    element: type[Any] = ElementTriP4
-    order: int = ArgyrisSpace.order
-    flat: ArgyrisSpace
-    origin: np.ndarray  # these and the next as in `Triangles`
-    jacobian: np.ndarray
-    inverse: np.ndarray
-    vertices: np.ndarray
-    bent: Bent | None
-    inner: Triangles
-
-    def __init__(self, mesh: Cells, bent: Bent | None = None) -> None:
-        self.flat = ArgyrisSpace(mesh, bent)
-        self.origin, self.jacobian, self.inverse = self.flat.origin, self.flat.jacobian, self.flat.inverse
-        self.vertices, self.bent, self.inner = self.flat.vertices, bent, self.flat.inner
+class PlaneSpace(ArgyrisSpace):
+    """Shape functions of one mesh: 21 of the deflection by `bending`, then 15 for each component in the plane."""
 
     def functions(self, cells: np.ndarray, points: np.ndarray, orders: tuple[int, ...]) -> list[np.ndarray]:
-        """The same as `ArgyrisSpace.functions`, with zeros for the plane, which moves no point across it."""
-        found = self.flat.functions(cells, points, orders)
+        """Those of `bending`, with zeros for the plane, which moves no point across it."""
+        found = self.bending(cells, points, orders)
         return [np.concatenate([f, np.zeros((*f.shape[:-1], 2 * QUARTIC))], axis=-1) for f in found]
-
-    def locate(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """The cell that holds each point (n, 2), or else the nearest one, and whether the point lies in it."""
-        return self.flat.locate(points)
 
 
 def nodes(inner: Triangles) -> np.ndarray:
@@ -76,10 +55,7 @@ def gradients(inner: Triangles, cells: np.ndarray, area: np.ndarray) -> np.ndarr
     """
     n_q = area.shape[1]
     own = reference(area[..., 1:].reshape(-1, 2).T)[1].reshape(2, len(area), n_q, QUARTIC)
-    J = np.broadcast_to(inner.jacobian[cells][:, None], (len(cells), n_q, 2, 2))
-    if inner.bent is not None:
-        turned = inner.bent.shift(cells, np.broadcast_to(area, (len(cells), n_q, 3)))[1]
-        J = J + turned[..., 1:] - turned[..., :1]
+    J = inner.jacobians(cells, area)
     return np.einsum("eqji,jeqk->eqik", np.linalg.inv(J), np.broadcast_to(own, (2, len(cells), n_q, QUARTIC)))
 
 
@@ -151,11 +127,8 @@ def loosened(inner: Triangles, rim: supports.SupportedRim, own: Dofs) -> tuple[c
     loose, places = held_at(inner, rim.facets, list(rim.plane), own)[0], np.zeros((own.N, 2))
     places[own.element_dofs.T] = nodes(inner)
     motions = rigid(places)
-    left = loose.T @ motions  # the columns of the map are orthonormal
-    lost = motions - loose @ left
-    lengths, turn = np.linalg.svd(lost.T @ lost)[1:]
-    free = turn[np.sqrt(lengths) < SAME * np.sqrt(len(places))].T
-    still = left @ free
+    free = unresisted(motions, loose, loose.T)  # the columns of the map are orthonormal
+    still = loose.T @ motions @ free
     pinned = qr(still.T, pivoting=True, mode="economic")[2][: still.shape[1]] if still.size else []
     return loose[:, np.setdiff1d(np.arange(loose.shape[1]), pinned)], motions @ free
 

@@ -20,14 +20,14 @@ from .theory import Domain, Frame, Subject, blocks, gram, scatter
 TINY = 4e-3
 
 
-def domain(body: Subject, make_space: Callable[[Cells, Bent | None], Any], names: tuple[str, ...]) -> Domain:
+def domain(make_space: Callable[[Cells, Bent | None], Any], body: Subject, names: tuple[str, ...]) -> Domain:
     """The triangles of a plate in its frame, with shape functions and the section's fields ``names``."""
     low, high = body.mesh.points.min(axis=0), body.mesh.points.max(axis=0)
     box = 0.5 * (low + high), float((high - low).max())
     cells = triangles((body.mesh.points - box[0]) / box[1], body.mesh.cells)
     bent = _bent(body.mesh, Frame(*box, 1.0, 1.0), cells)
     space = make_space(cells, bent)
-    return Domain.of(names, body.section, box, cells, space, quadrature(cells, space, bent))
+    return Domain.of(names, body.section, box, cells, space, quadrature(space))
 
 
 def _bent(mesh: Mesh, frame: Frame, cells: Cells) -> Bent | None:

@@ -17,9 +17,9 @@ from typing import Any
 
 import numpy as np
 
-from ..mesh.facets import powers
-from .elements import curvatures
-from .springs import along_facets
+from ..mesh.mesh_files import sides_of
+from .elements import EXPONENTS, collapsed, curvatures, monomials
+from .springs import at_facets
 from .supports import SIDES, cells_of_facets
 from .system import System
 from .theory import unknowns_of_cells
@@ -28,19 +28,13 @@ CALIBRATION = 33.0  # [-] weighted squares over the energy error: 20 to 45 for 2
 DEGREE = 5  # polynomial degree of the elements
 POINTS = 3  # [-] Gauss points on a side, and in each direction of a triangle: CALIBRATION was measured with this number
 BLOCK = 128  # [-] solutions processed together, to limit memory
-POWERS = np.array([(i, j) for i in range(4) for j in range(4 - i)])  # a quintic deflection has cubic moments
-NODES = 0.8 / 3.0 * POWERS + 0.2 / 3.0 - 1.0 / 3.0  # ten points inside the triangle, enough to define a cubic
-
-
-def _cubic(local: np.ndarray, dx: int, dy: int) -> np.ndarray:
-    """Derivative of the ten monomials of degree 3 at local coordinates (..., 2), shape (..., 10)."""
-    return powers(local[..., 0], 3, dx)[..., POWERS[:, 0]] * powers(local[..., 1], 3, dy)[..., POWERS[:, 1]]
-
-
+CUBIC = 3  # degree of the moments of a quintic deflection
+# ten points inside the triangle, enough to define a cubic
+NODES = 0.8 / 3.0 * EXPONENTS[CUBIC] + 0.2 / 3.0 - 1.0 / 3.0
 # [-] misfit of the thickness to a cubic within a triangle, beyond which its moments are no cubics either: a step
 STEP = 0.01
 HALVED = 3  # [-] times a triangle is divided in four to look at its thickness: a step is placed to an eighth of a side
-FIT = np.linalg.inv(_cubic(NODES, 0, 0))  # from values at NODES to the coefficients of the cubic
+FIT = np.linalg.inv(monomials(NODES, 0, 0, CUBIC))  # from values at NODES to the coefficients of the cubic
 
 
 class Moments:
@@ -55,19 +49,14 @@ class Moments:
         space: Any = system.space
         self.space, self.n_cells = space, len(space.origin)
         cells = np.arange(self.n_cells)
-        x = space.origin[:, None] + NODES @ space.jacobian.transpose(0, 2, 1)
+        x = space.straight(cells, NODES)
         self.stiffness = system.frame.field(system.section, "stiffness", x)  # (n_cells, n_q, 3, 3)
         moment = self.stiffness @ curvatures(space.functions(cells, x, (2,))[0])  # (n_cells, n_q, 3, 21)
         self.coefficients = np.einsum("pq,eqrk->erpk", FIT, moment, optimize=True)  # (n_cells, 3, 10, 21)
 
     def derivatives(self, cells: np.ndarray, x: np.ndarray, order: int) -> np.ndarray:
         """Derivatives (n, order + 1, 3, n_q, 21) of the moments xx, yy, xy of cells (n,) at points (n, n_q, 2)."""
-        local = self.space.inner.local(cells, x)
-        raw = np.stack([_cubic(local, order - k, k) for k in range(order + 1)], axis=1)  # (n, order + 1, n_q, 10)
-        if order:
-            chain = self.space.inner.chain(cells, order)
-            raw = (chain @ raw.reshape(*raw.shape[:2], -1)).reshape(raw.shape)
-        return raw[:, :, None] @ self.coefficients[cells][:, None]
+        return self.space.derivatives(cells, x, order, CUBIC)[:, :, None] @ self.coefficients[cells][:, None]
 
     def across(self, cells: np.ndarray, x: np.ndarray, normal: np.ndarray, curvature: Any = 0.0) -> np.ndarray:
         """Bending moment and effective shear force (n, 2, n_q, 21) on edges with normals (n, n_q, 2)."""
@@ -123,11 +112,8 @@ class Residual:
     def _set_cells(self) -> None:
         space, frame = self.moments.space, self.system.frame
         cells = np.arange(self.moments.n_cells)
-        node, weight = np.polynomial.legendre.leggauss(POINTS)
-        a, b = (x.ravel() for x in np.meshgrid(0.5 * (node + 1.0), 0.5 * (node + 1.0), indexing="ij"))
-        share = 0.25 * np.outer(weight, weight).ravel() * (1.0 - a)
-        local = np.column_stack([a, b * (1.0 - a)]) - 1.0 / 3.0
-        x = space.origin[:, None] + local @ space.jacobian.transpose(0, 2, 1)
+        local, share = collapsed(POINTS)
+        x = space.straight(cells, local - 1.0 / 3.0)
         second = self.moments.derivatives(cells, x, 2)
         double = np.abs(np.linalg.det(space.jacobian))  # twice the area
         stiffness = self.moments.stiffness.mean(axis=1)
@@ -145,13 +131,12 @@ class Residual:
 
     def _set_sides(self) -> None:
         space = self.moments.space
-        pairs = np.sort(np.stack([space.vertices[:, side] for side in SIDES], axis=1).reshape(-1, 2), axis=1)
-        key = pairs[:, 0].astype(np.int64) * (int(space.vertices.max()) + 1) + pairs[:, 1]
-        order = np.argsort(key, kind="stable")
-        shared = np.flatnonzero(np.diff(key[order]) == 0)
+        number = sides_of(space.vertices)[1].ravel()
+        order = np.argsort(number, kind="stable")
+        shared = np.flatnonzero(np.diff(number[order]) == 0)
         first, second = order[shared], order[shared + 1]
         self.beside = np.column_stack([first // 3, second // 3])  # (n_sides, 2) cells
-        corners = space.inner.corners
+        corners = space.corners
         start, stop = (corners[first // 3, np.array(SIDES)[first % 3, end]] for end in (0, 1))
         length = np.linalg.norm(stop - start, axis=1)
         along = (stop - start) / length[:, None]
@@ -170,7 +155,7 @@ class Residual:
         space, rim = self.moments.space, self.system.rim
         assert rim is not None
         self.rim_cells = cells_of_facets(rim.facets, space.vertices)[0]
-        x, step = along_facets(space, rim.facets, self.rim_cells)
+        _, x, step = at_facets(space, rim.facets, self.rim_cells)
         ds = np.linalg.norm(step, axis=2)
         normal = step / ds[..., None]
         force = self.moments.across(self.rim_cells, x, normal, rim.curvatures.mean(axis=1)[:, None, None])
@@ -200,7 +185,7 @@ class Residual:
         section: Any = self.system.section
         if callable(section.thickness):
             every = np.vstack([looks, places])
-            fit = _cubic(every, 0, 0)
+            fit = monomials(every, 0, 0, CUBIC)
             thickness = self._fields(np.arange(self.moments.n_cells), every)[1]
             missed = thickness - (thickness @ np.linalg.pinv(fit).T) @ fit.T
             self.stepped = np.flatnonzero(np.abs(missed).max(axis=1) > STEP * thickness.max(axis=1))
@@ -208,7 +193,7 @@ class Residual:
             self.uneven, self.misplaced = np.zeros((0, 0, 21)), np.zeros((2, 0, 21, 21))
             return
         bent, root, placed = self._energies(looks, np.full(len(looks), 0.5 / len(looks)))
-        smooth = np.linalg.inv(root)[..., None] * _cubic(looks, 0, 0)[:, None, None]  # (n, n_q, 3, 3, 10)
+        smooth = np.linalg.inv(root)[..., None] * monomials(looks, 0, 0, CUBIC)[:, None, None]  # (n, n_q, 3, 3, 10)
         basis = np.linalg.qr(smooth.reshape(*bent.shape[:2], -1))[0]
         self.uneven = bent - basis @ (basis.transpose(0, 2, 1) @ bent)
         self.misplaced = placed - self._energies(places, weight)[2]
@@ -216,7 +201,7 @@ class Residual:
     def _fields(self, cells: np.ndarray, local: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Points (n, n_q, 2) of cells (n,) in the frame, and inertia there."""
         space = self.moments.space
-        x = space.origin[cells, None] + local @ space.jacobian[cells].transpose(0, 2, 1)
+        x = space.straight(cells, local)
         return x, self.system.frame.field(self.system.section, "inertia", x)
 
     def _energies(self, local: np.ndarray, weight: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

@@ -18,12 +18,13 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from .._base import check
+from ..mesh.mesh_files import sides_of
 from ..mesh.meshes import Mesh
 from .corners import towards
 from .section import Beam, Plate, Varying, evaluate
 from .splitting import distance
 from .springs import at_facets
-from .supports import SIDES, cells_of_facets
+from .supports import cells_of_facets
 from .theory import Frame, gram
 
 CROSSINGS = 3  # [-] rings of triangles around crossings of ribs: as much error as between them
@@ -121,7 +122,7 @@ def sides_on(mesh: Mesh, path: Any) -> np.ndarray:
         if path not in mesh.edges:
             raise ValueError(f"path names edge {path!r}, but the mesh has {', '.join(sorted(mesh.edges)):.300}")
         return mesh.facets[mesh.edges[path]]
-    sides = np.unique(np.sort(np.concatenate([mesh.cells[:, side] for side in SIDES]), axis=1), axis=0)
+    sides = sides_of(mesh.cells)[0]
     on, close = np.zeros(len(sides), bool), ON * float(np.ptp(mesh.points, axis=0).max())
     for start, end in pairwise(path):
         near = distance(mesh.points, start, end) < close

@@ -24,6 +24,7 @@ Marguerre (1938), Proc. 5th Int. Congr. Appl. Mech., 93-101; Leissa (1973), Vibr
 from collections.abc import Sequence
 from copy import copy
 from dataclasses import replace
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -36,7 +37,20 @@ from .plane import FIRST, LOCAL, SECOND, PlaneSpace
 from .ribs import RibLine
 from .section import evaluate
 from .supports import constrain
-from .theory import Domain, Frame, Held, Points, Subject, Term, Theory, blocks, gram, scatter, unknowns_of_cells
+from .theory import (
+    Domain,
+    Frame,
+    Held,
+    Points,
+    Subject,
+    Term,
+    Theory,
+    blocks,
+    gram,
+    no_estimate,
+    scatter,
+    unknowns_of_cells,
+)
 
 # [-] rise of the middle of a side over its chord, over the thickness, above which triangles are divided: bending that
 # does not stretch a curved plate needs displacements beyond quartics there. Ten modes of a cymbal then err by 2e-3
@@ -60,10 +74,10 @@ class ShallowSpace(PlaneSpace):
 
     def linear(self, element_dofs: np.ndarray, n_all: int) -> np.ndarray:
         """Unknowns (n_all, 6) of the deflections 1, x and y, and of the rigid motions in the plane."""
-        flat = self.flat.linear(element_dofs[:21], n_all)
+        flat = super().linear(element_dofs, n_all)
         for i, part in enumerate((FIRST, SECOND)):
             flat[element_dofs[part].T, 1 + i] = -self.heights
-        own, places = np.vstack([element_dofs[FIRST], element_dofs[SECOND]]), plane.nodes(self.inner).transpose(1, 0, 2)
+        own, places = np.vstack([element_dofs[FIRST], element_dofs[SECOND]]), plane.nodes(self).transpose(1, 0, 2)
         within = np.zeros((n_all, 3))
         within[own.reshape(2, -1).ravel()] = plane.rigid(places.reshape(-1, 2))
         return np.hstack([flat, within])
@@ -74,8 +88,8 @@ def strained(space: ShallowSpace, cells: np.ndarray, area: np.ndarray, x: np.nda
 
     The area coordinates may be the same for all cells, (1, n_q, 3).
     """
-    slope, hessian = space.flat.functions(cells, x, (1, 2))
-    gradient = plane.gradients(space.inner, cells, area)
+    slope, hessian = space.bending(cells, x, (1, 2))
+    gradient = plane.gradients(space, cells, area)
     steep = space.sloping(cells, gradient)
     parts = np.zeros((*x.shape[:2], 6, LOCAL))
     parts[:, :, :3, 21:] = plane.strains(gradient)
@@ -92,14 +106,14 @@ def strains_and_motion(space: ShallowSpace, points: Points, cells: np.ndarray) -
 
 
 def _curved_domain(body: Subject, fields: tuple[str, ...]) -> Domain:
-    found = plates.domain(body, ShallowSpace, fields)
+    found = plates.domain(ShallowSpace, body, fields)
     found.space.heights = _heights(found.space, body.section, found.frame)
     return found
 
 
 def _heights(space: ShallowSpace, section: Any, frame: Frame) -> np.ndarray:
     """Rise (n_cells, 15) at the nodes of the plane over the mean plane, in the frame."""
-    local = plane.nodes(space.inner).reshape(-1, 2)
+    local = plane.nodes(space).reshape(-1, 2)
     if section.rise is None:
         return np.zeros((len(space.origin), plane.QUARTIC))
     heights = check.field("rise", section.rise, frame.places(local), "m") / frame.length
@@ -114,9 +128,9 @@ def _hold_shell(body: Subject, domain: Domain) -> Held:
     known = body.section, space, domain.frame
     space.ribs = [RibLine.of(rib, ribs.sides_on(body.mesh, rib.path), *known) for rib in body.section.ribs]
     creased = np.unique(np.concatenate([np.zeros(0, int), *(rib.facets.ravel() for rib in space.ribs)]))
-    expand, project, dofs = constrain(rim, space.vertices, *numbering(domain.cells, space.flat), creased)
+    expand, project, dofs = constrain(rim, space.vertices, *numbering(domain.cells, space), creased)
     n_flat, own = expand.shape[0], plane.numbered(domain.cells)
-    loose, drifts = plane.loosened(space.inner, rim, own)
+    loose, drifts = plane.loosened(space, rim, own)
     space.drifts = np.vstack([np.zeros((n_flat, drifts.shape[1])), drifts])
     dofs = np.vstack([dofs, n_flat + own.element_dofs, n_flat + own.N + own.element_dofs])
     expand, project = plane.together(expand, loose), plane.together(project, loose.T)
@@ -169,9 +183,9 @@ def plane_mass(system: Any, vectors: np.ndarray) -> np.ndarray:
     for cells in blocks(len(x)):
         moved = np.zeros((*dx[cells].shape, 3, LOCAL))
         moved[:, :, 0, FIRST] = moved[:, :, 1, SECOND] = shape
-        steep = space.sloping(cells, plane.gradients(space.inner, cells, area))
+        steep = space.sloping(cells, plane.gradients(space, cells, area))
         larger = np.sqrt(0.5 * (steep**2).sum(axis=2))
-        moved[:, :, 2, :21] = larger[..., None] * space.flat.functions(cells, x[cells], (0,))[0]
+        moved[:, :, 2, :21] = larger[..., None] * space.bending(cells, x[cells], (0,))[0]
         local.append(gram(moved, frame.field(system.section, "inertia", x[cells]) * dx[cells]))
     for piece in space.ribs:
         shape = plane.reference(piece.area[..., 1:].reshape(-1, 2).T)[0].reshape(*piece.ds.shape, plane.QUARTIC)
@@ -201,13 +215,8 @@ def energies(system: Any, section: Any, vectors: np.ndarray) -> tuple[np.ndarray
         raise ValueError(f"a section must keep the {len(space.ribs)} ribs of the body, got {len(section.ribs)}")
     space.heights = _heights(space, section, frame)
     space.ribs = [RibLine.of(rib, line.facets, section, space, frame) for rib, line in zip(section.ribs, space.ribs)]
-    points, whole = slopes.quadrature(system), unknowns_of_cells(system, vectors)
-    K, M = np.zeros((2, vectors.shape[1], vectors.shape[1]))
-    for cells in blocks(len(points.x)):
-        own, dx = whole[cells][:, None], points.dx[cells]
-        for (_, name, parts), total in zip(strains_and_motion(space, points, cells), (K, M)):
-            field = frame.field(section, name, points.x[cells])
-            total += gram(parts @ own, field * dx.reshape(*dx.shape, *[1] * (field.ndim - 2))).sum(axis=0)
+    whole = unknowns_of_cells(system, vectors)
+    K, M = slopes.energies(system, space, partial(frame.field, section), vectors)
     if space.ribs:
         *each, cells = ribs.attached(space, frame, strained)
         for part, total in zip(each, (K, M)):
@@ -220,16 +229,11 @@ def steepest(system: Any) -> float:
     """The steepest slope [-] of the rise of a shell."""
     space = system.space
     cells, area = np.arange(len(space.origin)), area_coordinates(plane.NODES)[None]
-    return float(np.linalg.norm(space.sloping(cells, plane.gradients(space.inner, cells, area)), axis=2).max())
-
-
-def _errors(system: Any, vectors: np.ndarray, loads: np.ndarray, forced: Any = None) -> np.ndarray:
-    """Errors (3, n) of the squared energy norm: none, as a second mesh tells all of it."""
-    return np.zeros((3, vectors.shape[1]))
+    return float(np.linalg.norm(space.sloping(cells, plane.gradients(space, cells, area)), axis=2).max())
 
 
 SHALLOW = Theory(
-    "shallow", "argyris and quartic", 2, _curved_domain, strains_and_motion, _hold_shell, _errors, wave=1.8,
+    "shallow", "argyris and quartic", 2, _curved_domain, strains_and_motion, _hold_shell, no_estimate, wave=1.8,
     unknowns=47.0, fields=("stiffness", "inertia", "walls"), graded=True, compared=True, sharp=plates.is_tiny,
     layered=towards_bends, energies=energies,
 )  # fmt: skip

@@ -1,11 +1,12 @@
 """Integrals of the slopes of a body's shapes: how much a deflection lengthens what lies in its plane."""
 
+from collections.abc import Callable, Iterator
 from typing import Any
 
 import numpy as np
 
 from . import beam_elements
-from .elements import area_coordinates
+from .elements import collapsed, on_true_edge
 from .section import Plate, evaluate
 from .system import System
 from .theory import Points, blocks, unknowns_of_cells
@@ -33,26 +34,43 @@ def products(system: System, vectors: np.ndarray, weight: np.ndarray) -> np.ndar
     return 0.5 * (result + result.T) * frame.length ** (size - 2) / frame.mass
 
 
+def energies(
+    system: System, space: Any, field: Callable[[str, np.ndarray], np.ndarray], vectors: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Twice the mutual strain energy, and the mutual mass (n, n) of vectors (n_dofs, n) in a space, by their terms.
+
+    ``field`` gives one of the section's by its name at places (n, n_q, dimension), in the frame.
+    """
+    points, n = quadrature(system), vectors.shape[1]
+    found = {"K": np.zeros((n, n)), "M": np.zeros((n, n))}
+    for matrix, cells, moved, forced in pushed(system, space, field, vectors, points):
+        forced = forced * points.dx[cells][..., None, None]
+        found[matrix] += moved.reshape(-1, n).T @ forced.reshape(-1, n)
+    return found["K"], found["M"]
+
+
+def pushed(
+    system: System, space: Any, field: Callable[[str, np.ndarray], np.ndarray], vectors: np.ndarray, points: Points
+) -> Iterator[tuple[str, np.ndarray, np.ndarray, np.ndarray]]:
+    """Of each term of `energies` and block of cells: "K" or "M", the cells, strains or motions, and field times them.
+
+    Both are (n_cells, n_q, n_parts, n), of each of n vectors.
+    """
+    whole = unknowns_of_cells(system, vectors)
+    for cells in blocks(len(points.x)):
+        own = whole[cells][:, None]  # (n_cells, 1, n_local, n)
+        for matrix, name, parts in system.rules.terms(space, points, cells):
+            weight, moved = field(name, points.x[cells]), parts @ own
+            yield matrix, cells, moved, weight @ moved if weight.ndim > 2 else weight[..., None, None] * moved
+
+
 def quadrature(system: System, nodes: int = NODES) -> Points:
     """Quadrature on every cell of a system, on the true edge: so many Gauss points in each direction of a triangle."""
     space: Any = system.space
     if system.mesh.dimension == 1:
         x, dx = beam_elements.quadrature(space)
         return Points(np.zeros((1, x.shape[1])), x[..., None], dx)
-    node, weight = np.polynomial.legendre.leggauss(nodes)
-    a, b = (x.ravel() for x in np.meshgrid(0.5 * (node + 1.0), 0.5 * (node + 1.0), indexing="ij"))
-    local = np.column_stack([a, b * (1.0 - a)])
-    share = 0.25 * np.outer(weight, weight).ravel() * (1.0 - local[:, 0])
-    x = space.origin[:, None] + (local - 1.0 / 3.0) @ space.jacobian.transpose(0, 2, 1)
-    dx = np.abs(np.linalg.det(space.jacobian))[:, None] * share
-    if space.bent is not None:
-        cells = space.bent.cells
-        area = np.broadcast_to(area_coordinates(local), (len(cells), len(local), 3))
-        moved, gradient = space.bent.shift(cells, area)
-        x[cells] = x[cells] + moved  # a triangle with two curved sides is listed twice, each time with the whole shift
-        steep = space.jacobian[cells][:, None] + gradient[..., 1:] - gradient[..., :1]
-        dx[cells] = np.abs(np.linalg.det(steep)) * share
-    return Points(local.T, x, dx)
+    return on_true_edge(space, *collapsed(nodes))
 
 
 def softness(system: System) -> float:

@@ -7,6 +7,7 @@ import numpy as np
 
 from .._base.rounding import SAME
 from ..mesh.facets import divided
+from ..mesh.mesh_files import sides_of
 from ..mesh.meshes import Mesh
 
 # [-] triangle size under a point load, as a fraction of the body's breadth or of the distance to a held edge. These
@@ -71,15 +72,12 @@ def _too_large(mesh: Mesh, points: np.ndarray, size: np.ndarray, growth: np.ndar
 
 def divided_across(mesh: Mesh, tall: np.ndarray) -> tuple[Mesh, np.ndarray]:
     """The mesh with the triangles ``tall`` (n_cells,) divided across their longest sides; each facet's old number."""
-    cells, n = mesh.cells, len(mesh.points)
-    pairs = np.sort(np.stack([cells, np.roll(cells, -1, axis=1)], axis=2), axis=2)  # (n_cells, 3, 2)
-    keys, number = np.unique(pairs[..., 0].astype(np.int64) * n + pairs[..., 1], return_inverse=True)
-    number = number.reshape(-1, 3)
-    length = np.linalg.norm(np.diff(mesh.points[pairs], axis=2)[:, :, 0], axis=2)
+    cells, (sides, number, _) = mesh.cells, sides_of(mesh.cells)
+    length = np.linalg.norm(np.diff(mesh.points[sides], axis=1)[:, 0], axis=1)[number]  # (n_cells, 3)
     # equal sides are ranked by number, so that neighbours pick the same one
-    rank = np.round(length / length.max(axis=1, keepdims=True) / SAME) + number / len(keys)
+    rank = np.round(length / length.max(axis=1, keepdims=True) / SAME) + number / len(sides)
     longest = number[np.arange(len(cells)), rank.argmax(axis=1)]
-    marked = np.zeros(len(keys), bool)
+    marked = np.zeros(len(sides), bool)
     marked[longest[tall]] = True
     while True:  # if any side of a triangle is divided, so is its longest
         more = longest[marked[number].any(axis=1) & ~marked[longest]]
@@ -87,9 +85,9 @@ def divided_across(mesh: Mesh, tall: np.ndarray) -> tuple[Mesh, np.ndarray]:
             break
         marked[more] = True
     points, rim, middle = list(mesh.points), Rim(mesh), {}
-    for a, b in zip(*np.divmod(keys[marked], n)):
+    for a, b in sides[marked].tolist():
         middle[a, b] = middle[b, a] = len(points)
-        points.append(rim.split(int(a), int(b), len(points), points, 0.5))
+        points.append(rim.split(a, b, len(points), points, 0.5))
     touched = marked[number].any(axis=1)
     pieces = [piece for cell in cells[touched].tolist() for piece in bisected(points, cell, middle)]
     finer = rim.finish(mesh, np.array(points), np.concatenate([cells[~touched], np.array(pieces, cells.dtype)]))

@@ -11,19 +11,17 @@ from .section import Elastic
 FACET_POINTS = 8  # [-] Gauss points on a boundary facet; exact for products of quintics
 
 
-def along_facets(space: Any, facets: np.ndarray, cells: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Gauss points on boundary facets (n, 2) of cells (n,), and outward normals times ds, both (n, n_q, 2)."""
-    return at_facets(space, facets, cells)[1:]
-
-
 def at_facets(space: Any, facets: np.ndarray, cells: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """The same, after the area coordinates (n, n_q, 3) of the points."""
+    """Gauss points on facets (n, 2) of cells (n,): area coordinates (n, n_q, 3), places, outward normals times ds.
+
+    Places and normals are (n, n_q, 2).
+    """
     node, weight = np.polynomial.legendre.leggauss(FACET_POINTS)
     s = 0.5 * (node + 1.0)[:, None]
     corner = space.vertices[cells][:, None]  # (n, 1, 3)
     first, last = (np.equal(corner, facets[:, end, None, None]).astype(float) for end in (0, 1))
     area = (1.0 - s) * first + s * last  # (n, n_q, 3)
-    x, tangent = space.inner.along(cells, area, last - first)
+    x, tangent = space.along(cells, area, last - first)
     return area, x, np.stack([tangent[..., 1], -tangent[..., 0]], axis=-1) * 0.5 * weight[:, None]
 
 
@@ -33,6 +31,12 @@ def edge_stiffness(supports: Sequence[Any], frame: Any) -> np.ndarray:
     return np.array(pairs).reshape(-1, 2) * [frame.length**3, frame.length] / frame.stiffness
 
 
+def _listed(name: str, given: Any, pairs: str) -> Sequence[Any]:
+    if isinstance(given, (str, dict)) or not isinstance(given, Sequence):
+        raise ValueError(f"{name} must be a list of ({pairs}) pairs, got {check.shown(given)}")
+    return given
+
+
 def check_posts(
     point_supports: Any, dimension: int
 ) -> tuple[list[tuple[np.ndarray, float]], list[tuple[np.ndarray, float]]]:
@@ -40,11 +44,9 @@ def check_posts(
 
     Points (dimension,) [m] with stiffnesses [N/m], infinite if hinged; centres (2,) [m] with radii [m].
     """
-    if isinstance(point_supports, (str, dict)) or not isinstance(point_supports, Sequence):
-        raise ValueError(f"point_supports must be a list of (point, support) pairs, got {check.shown(point_supports)}")
     posts: list[tuple[np.ndarray, float]] = []
     clamps: list[tuple[np.ndarray, float]] = []
-    for i, entry in enumerate(point_supports):
+    for i, entry in enumerate(_listed("point_supports", point_supports, "point, support")):
         clamped = isinstance(entry, Sequence) and len(entry) == 3 and entry[1] == "clamped"
         if not clamped and (not isinstance(entry, Sequence) or isinstance(entry, str) or len(entry) != 2):
             raise ValueError(
@@ -69,10 +71,8 @@ def check_posts(
 
 def check_masses(point_masses: Any, dimension: int) -> list[tuple[np.ndarray, float]]:
     """Check a sequence of (point, mass) pairs; return points (dimension,) [m] and masses [kg]."""
-    if isinstance(point_masses, (str, dict)) or not isinstance(point_masses, Sequence):
-        raise ValueError(f"point_masses must be a list of (point, mass) pairs, got {check.shown(point_masses)}")
     result = []
-    for i, entry in enumerate(point_masses):
+    for i, entry in enumerate(_listed("point_masses", point_masses, "point, mass")):
         if not isinstance(entry, Sequence) or len(entry) != 2:
             raise ValueError(f"point_masses[{i}] must be a pair (point in m, mass in kg), got {check.shown(entry)}")
         point = check.array(f"point of point_masses[{i}]", entry[0], (dimension,), "m", lift=True)

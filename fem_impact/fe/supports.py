@@ -10,6 +10,7 @@ from scipy.sparse import csr_matrix
 
 from .._base import check
 from .._base.untyped import Sparse
+from ..mesh.mesh_files import numbers_of, sides_of
 from ..mesh.meshes import Mesh
 from .section import KINDS, Elastic
 
@@ -139,12 +140,9 @@ def _split(
 
 def cells_of_facets(facets: np.ndarray, cells: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """The triangle of each boundary facet, and the number of the side it is in that triangle, both (n_facets,)."""
-    cells, n = cells.astype(np.int64), int(cells.max()) + 1
-    pairs = np.stack([np.sort(cells[:, side], axis=1) for side in SIDES], axis=1).reshape(-1, 2)
-    keys = pairs[:, 0] * n + pairs[:, 1]
-    order = np.argsort(keys)
-    wanted = np.sort(facets, axis=1).astype(np.int64)
-    found = order[np.searchsorted(keys, wanted[:, 0] * n + wanted[:, 1], sorter=order)]
+    sides, number, _ = sides_of(cells)
+    order = np.argsort(number, axis=None)
+    found = order[np.searchsorted(number.ravel(), numbers_of(sides, facets), sorter=order)]
     return found // 3, found % 3
 
 

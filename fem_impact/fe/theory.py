@@ -1,10 +1,12 @@
 """What a theory of plates or beams consists of, and the one way from it to matrices and strain energies.
 
 A theory is one file that makes a `Theory`, as `kirchhoff`, `thick`, `euler` and `shear_beam` do, and its name in
-`assembly.EVERY`. It says how the elements of a body look (`Domain`), which strains and motions hold energy (`Term`),
-and how supports hold the unknowns (`Held`). What is common follows from these: matrices, point masses and point
-supports, modes, static deflections, derivatives in the section, and errors by a second mesh where the theory has no
-estimate of its own.
+`assembly.EVERY`; or anybody's object, given as ``theory=`` of `assemble`. It says how the elements of a body look
+(`Domain`), which strains and motions hold energy (`Term`), and how supports hold the unknowns (`Held`). What is common
+follows from these: matrices, point masses and point supports, modes, static deflections, derivatives in the section,
+and errors by a second mesh where the theory has no estimate of its own (`no_estimate`). The shortest is
+``dataclasses.replace`` of a known one with other ``terms``, ``matrices=None``, ``errors=no_estimate`` and
+``compared=True``, and a section with a method for each new field.
 """
 
 from collections.abc import Callable, Sequence
@@ -15,13 +17,16 @@ import numpy as np
 from scipy.sparse import coo_matrix, csc_matrix, csr_matrix, eye_array
 
 from .._base import check
+from .._base.rounding import SAME
 from .._base.untyped import Cells, Sparse
 from ..mesh.meshes import Mesh
 from .material import directional
 from .section import KINDS, Elastic
 from .supports import SupportedRim
 
-STIFF = "stiffness", "shear", "walls"  # fields of a section that resist; the others are inert
+# powers of the length in the units of a section's fields, over those of its stiffness or its inertia per area or length
+POWERS = {"shear": -2, "rotary": 2, "foundation": -4}
+INERT = "inertia", "rotary"  # fields of a section that do not resist
 CHUNK = 256  # [-] cells whose shape functions are computed together, to limit memory
 
 
@@ -44,6 +49,10 @@ class Frame:
         """Mass [kg] of a mass 1 in the frame."""
         return float(self.inertia * self.length ** len(self.centre))
 
+    def unit(self, name: str) -> float:
+        """That of a field of a section, see `POWERS`."""
+        return self.inertia if name in INERT else self.stiffness
+
     def local(self, points: np.ndarray) -> np.ndarray:
         """Coordinates [-] in the frame of points [m]."""
         return (points - self.centre) / self.length
@@ -57,11 +66,10 @@ class Frame:
 
     def field(self, section: Any, name: str, local: np.ndarray) -> np.ndarray:
         """A field of a section, see `Term`, at coordinates (n, n_q, dimension), in the frame."""
-        unit = self.stiffness if name in STIFF else self.inertia
-        square: Any = {"shear": self.length**-2, "rotary": self.length**2}.get(name, 1.0)
+        size: Any = self.length ** POWERS.get(name, 0)
         if name == "walls":
-            square = np.outer(*[np.repeat([1.0 / self.length, 1.0], 3)] * 2)
-        found = getattr(section, name)(self.places(local)) / (unit * square)
+            size = np.outer(*[np.repeat([1.0 / self.length, 1.0], 3)] * 2)
+        found = getattr(section, name)(self.places(local)) / (self.unit(name) * size)
         return found.reshape(*local.shape[:2], *found.shape[1:])
 
 
@@ -77,7 +85,9 @@ class Term(NamedTuple):
     """A part of the energy: half the integral of ``parts . field . parts`` over the body."""
 
     matrix: str  # "K" if it is strain energy, "M" if kinetic
-    field: str  # of the section: "stiffness", "shear", "walls", "inertia" or "rotary"
+    # of the section, a method of points (n, dimension) [m]: "stiffness", "shear", "walls", "inertia", "rotary", or a
+    # "foundation" [N/m^3 of a plate, N/m^2 of a beam] on the deflection
+    field: str
     parts: np.ndarray  # (n_cells, n_q, n_parts, n_local) strains or motions by each unknown
 
 
@@ -116,7 +126,7 @@ class Domain:
         fields = {name: bare.field(section, name, points.x) for name in names}
         frame = Frame(*box, float(fields["stiffness"].max()), float(fields["inertia"].max()))
         for name, values in fields.items():
-            fields[name] = values / (frame.stiffness if name in STIFF else frame.inertia)
+            fields[name] = values / frame.unit(name)
         stiffness, inertia, soft = fields["stiffness"], fields["inertia"], 1.0
         if stiffness.ndim > 2:
             plane = section.material.plane_stress
@@ -173,6 +183,11 @@ class Theory:
         return "shear" in self.fields
 
 
+def no_estimate(system: Any, vectors: np.ndarray, loads: np.ndarray, forced: Any = None) -> np.ndarray:
+    """``errors`` (3, n) of a theory that is ``compared``: none, as a second mesh tells all of it."""
+    return np.zeros((3, vectors.shape[1]))
+
+
 def plain_kinds(supports: Sequence[str | Elastic]) -> list[str]:
     """The kind of support of each facet; an elastic support counts as free because it only adds stiffness."""
     return ["free" if isinstance(kind, Elastic) else kind for kind in supports]
@@ -194,6 +209,14 @@ def kept_unknowns(fixed: np.ndarray) -> tuple[csr_matrix, csr_matrix]:
     return csr_matrix(expand), csr_matrix(expand.T)
 
 
+def unresisted(motions: np.ndarray, expand: Any, project: Any) -> np.ndarray:
+    """Combinations (n_motions, n) of motions (n_all, n_motions) that maps of `Held` leave as they are."""
+    lost = motions - expand @ (project @ motions)
+    lengths, turn = np.linalg.svd(lost.T @ lost / np.abs(motions).max() ** 2)[1:]
+    free: np.ndarray = turn[np.sqrt(lengths) < SAME * np.sqrt(len(motions))].T
+    return free
+
+
 def unknowns_of_cells(system: Any, vectors: np.ndarray) -> np.ndarray:
     """Unknowns (n_cells, n_local, n) of each cell, from those of fields (n_dofs, n)."""
     return (system.expand @ vectors)[system.element_dofs].transpose(1, 0, 2)
@@ -202,6 +225,18 @@ def unknowns_of_cells(system: Any, vectors: np.ndarray) -> np.ndarray:
 def blocks(n: int) -> list[np.ndarray]:
     """Numbers of n cells in blocks, to limit memory."""
     return np.array_split(np.arange(n), max(1, -(-n // CHUNK)))
+
+
+def check_own(theory: Theory, domain: Domain, held: Held) -> None:
+    """ValueError where a theory of the user's own has terms that make no matrices."""
+    x, n_local = domain.points.x, len(held.dofs)
+    for matrix, name, parts in theory.terms(domain.space, domain.points, np.arange(len(x))):
+        if matrix not in ("K", "M") or name not in theory.fields:
+            raise ValueError(
+                f"terms of theory {theory.name!r} must be of 'K' or 'M' and of a field among {theory.fields}, got "
+                f"{matrix!r} and {name!r}"
+            )
+        check.array(f"terms of theory {theory.name!r} of {name!r}", parts, (*x.shape[:2], None, n_local))
 
 
 def integrals(theory: Theory, domain: Domain, cells: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -29,7 +29,7 @@ L-shaped plate is 33 % above that of Kirchhoff's plate by the membrane, and 13 %
 its shorter side (Sapondzhyan's paradox). Modes that are at rest there follow the relation.
 
 Free and soft edges let beta_t relax within a layer of width h / sqrt(12 kappa), about h/3. `towards_edges` makes the
-triangles shrink to a thickness there. If that takes too many, `missed_by_layers` tells what an unresolved layer misses:
+triangles shrink to a thickness there. If that takes too many, `errors_by_layers` tells what an unresolved layer misses:
 the twisting moment M_nt of the thin plate does work on the relaxation, to first order M_nt^2 width / (2 G h^3/12) per
 length.
 
@@ -58,7 +58,7 @@ from scipy.spatial import cKDTree
 from .._base.untyped import Cells, Sparse
 from ..mesh.meshes import LONGEST, Mesh
 from . import plane, plates, splitting, supports
-from .elements import Bent, curvatures, inverses, numbering
+from .elements import Bent, area_coordinates, curvatures, numbering
 from .plane import FIRST, LOCAL, QUARTIC, SECOND, PlaneSpace, reference
 from .section import KINDS, SOFT, Plate, evaluate
 from .springs import at_facets
@@ -99,8 +99,8 @@ class MindlinSpace(PlaneSpace):
         ``shapes`` (n, .., n_q, 15) are the quartic functions or their derivatives. For straight triangles.
         """
         node = plane.NODES - 1.0 / 3.0
-        x = self.origin[cells][:, None] + node @ self.jacobian[cells].transpose(0, 2, 1)
-        slope = self.flat.functions(cells, x, (1,))[0].transpose(0, 2, 1, 3)  # (n, 15, 2, 21)
+        x = self.straight(cells, node)
+        slope = self.bending(cells, x, (1,))[0].transpose(0, 2, 1, 3)  # (n, 15, 2, 21)
         slope = slope * ~self.turned[cells][:, :, None, None]
         return [np.einsum("n...k,nkis->n...is", shape, slope, optimize=True) for shape in shapes]
 
@@ -117,7 +117,7 @@ class MindlinSpace(PlaneSpace):
 
     def linear(self, element_dofs: np.ndarray, n_all: int) -> np.ndarray:
         """Unknowns (n_all, 3) of the deflections 1, x and y, which have no shear strain."""
-        found = self.flat.linear(element_dofs, n_all)
+        found = super().linear(element_dofs, n_all)
         for i in range(2):
             rows = element_dofs[(FIRST, SECOND)[i]].T[self.turned]
             found[rows, 1 + i] = 1.0
@@ -126,11 +126,11 @@ class MindlinSpace(PlaneSpace):
 
 def terms(space: MindlinSpace, points: Points, cells: np.ndarray) -> list[Term]:
     """Curvatures of the rotation and shear strains, deflection and rotation."""
-    value, slope, hessian = space.flat.functions(cells, points.x[cells], (0, 1, 2))
-    shape, gradient = reference(points.reference)
+    value, slope, hessian = space.bending(cells, points.x[cells], (0, 1, 2))
+    shape = reference(points.reference)[0]
     n, n_q = value.shape[:2]
-    inverse = inverses(space, points.reference)[cells]
-    gradient = np.einsum("eqji,jqk->eiqk", inverse, gradient)  # of gamma's shapes in x and y
+    area = area_coordinates(points.reference.T)[None]
+    gradient = plane.gradients(space, cells, area).transpose(0, 2, 1, 3)  # of gamma's shapes in x and y
     deflection, rotation = np.zeros((n, n_q, 1, LOCAL)), np.zeros((n, n_q, 2, LOCAL))
     shear, curvature = np.zeros((n, n_q, 2, LOCAL)), np.zeros((n, n_q, 3, LOCAL))
     deflection[:, :, 0, :21] = value
@@ -158,7 +158,7 @@ def terms(space: MindlinSpace, points: Points, cells: np.ndarray) -> list[Term]:
 
 
 def _domain(body: Subject, fields: tuple[str, ...]) -> Domain:
-    found = plates.domain(body, MindlinSpace, fields)
+    found = plates.domain(MindlinSpace, body, fields)
     h = evaluate("thickness", body.section.thickness, found.frame.places(found.space.origin), "m")
     found.space.turn(found.cells, h / found.frame.length)
     return found
@@ -180,7 +180,7 @@ def constrain(
 
     The ``kinds`` of the rim are those of a thin plate that hold the deflection as these do.
     """
-    expand, project, dofs = supports.constrain(rim, space.vertices, *numbering(mesh, space.flat))
+    expand, project, dofs = supports.constrain(rim, space.vertices, *numbering(mesh, space))
     cells, sides = supports.cells_of_facets(rim.facets, space.vertices)
     held = np.array([kind != "free" for kind in rim.kinds])
     if space.bent is not None:
@@ -190,9 +190,9 @@ def constrain(
     n_flat, own = expand.shape[0], plane.numbered(mesh)
     dofs = np.vstack([dofs, n_flat + own.element_dofs, n_flat + own.N + own.element_dofs])
     words = [{"hinged": "sliding", "clamped": "held"}.get(kind, "free") for kind in kinds]
-    loose, at = plane.held_at(space.inner, rim.facets, words, own)
-    local, x, normal = plane.at_rim(space.inner, rim.facets, cells, sides)
-    slope = space.flat.functions(cells, x, (1,))[0].transpose(0, 2, 1, 3)  # (n_facets, 5, 2, 21)
+    loose, at = plane.held_at(space, rim.facets, words, own)
+    local, x, normal = plane.at_rim(space, rim.facets, cells, sides)
+    slope = space.bending(cells, x, (1,))[0].transpose(0, 2, 1, 3)  # (n_facets, 5, 2, 21)
     tied: list[tuple[np.ndarray, np.ndarray, np.ndarray]] = []  # rows, columns and values of gamma_n = w_n
     for node, facets in at.items():
         facet, k = next((place for place in facets if kinds[place[0]] == "clamped"), (-1, -1))
@@ -222,8 +222,8 @@ def _without_slip(
     fourth degree of this slope times the height over the chord. A thin plate is too stiff to use that; a thick one
     would slip there, and its error would only fall as size**3.
     """
-    x, normal = plane.at_rim(space.inner, rim.facets[slips], cells, sides)[1:]
-    slope = space.flat.functions(cells, x, (1,))[0]  # (n, 2, 5, 21)
+    x, normal = plane.at_rim(space, rim.facets[slips], cells, sides)[1:]
+    slope = space.bending(cells, x, (1,))[0]  # (n, 2, 5, 21)
     fourth = np.einsum("ni,niqk,q->nk", normal[:, 3], slope, np.array([1.0, 1.0, -4.0, 6.0, -4.0]))
     rows = np.repeat(np.arange(len(slips)), 21)
     whole = csc_matrix((fourth.ravel(), (rows, dofs[:21, cells].T.ravel())), shape=(len(slips), expand.shape[0]))
@@ -266,12 +266,15 @@ def layered(mesh: Mesh, section: Plate, kinds: list[str], coarser: float) -> Mes
     return towards_edges(mesh, loose, coarser * max(LAYER * thin, length / MOST_LAYER))
 
 
-def missed_by_layers(system: Any, vectors: np.ndarray) -> np.ndarray:
-    """Twice the strain energy (n,) that vectors (n_dofs, n) keep as triangles are too large for the edge layers."""
+def errors_by_layers(system: Any, vectors: np.ndarray, loads: np.ndarray, forced: Any = None) -> np.ndarray:
+    """Errors (3, n) of the squared energy norm that vectors keep where triangles are too large for the edge layers.
+
+    The rest is told by a second mesh.
+    """
     space, rim, frame = system.space, system.rim, system.frame
     loose = np.flatnonzero(np.isin(rim.kinds, LOOSE))
     if not loose.size:
-        return np.zeros(vectors.shape[1])
+        return np.zeros((3, vectors.shape[1]))
     cells = supports.cells_of_facets(rim.facets[loose], space.vertices)[0]
     _, x, normal = at_facets(space, rim.facets[loose], cells)
     ds = np.linalg.norm(normal, axis=2)
@@ -285,15 +288,10 @@ def missed_by_layers(system: Any, vectors: np.ndarray) -> np.ndarray:
     thin = evaluate("thickness", system.section.thickness, frame.places(x), "m").reshape(ds.shape) / frame.length
     coarse = ds.sum(axis=1)[:, None] / thin
     share = np.where(coarse > SEEN, np.minimum(1.0, (coarse / UNSEEN) ** 2), 0.0)
-    bend = curvatures(space.flat.functions(cells, x, (2,))[0])
+    bend = curvatures(space.bending(cells, x, (2,))[0])
     unknowns = (system.expand @ vectors)[system.element_dofs[:21, cells]].transpose(1, 0, 2)
     moment = np.einsum("fqi,fqij,fqjk->fqk", turn, stiffness, bend, optimize=True) @ unknowns
-    return np.einsum("fqk,fq->k", moment**2, share * width / rigidity * ds)
-
-
-def errors_by_layers(system: Any, vectors: np.ndarray, loads: np.ndarray, forced: Any = None) -> np.ndarray:
-    """Errors (3, n) of the squared energy norm that vectors have by edge layers; the rest is told by a second mesh."""
-    return np.outer([1.0, 0.0, 0.0], missed_by_layers(system, vectors))
+    return np.outer([1.0, 0.0, 0.0], np.einsum("fqk,fq->k", moment**2, share * width / rigidity * ds))
 
 
 MINDLIN = Theory(

@@ -1,6 +1,6 @@
 """How a small change of a body's section changes the energies of its shapes: derivatives of K and M along vectors."""
 
-from collections.abc import Iterator
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
@@ -10,7 +10,6 @@ from .._base import check
 from . import slopes
 from .section import Beam, Plate
 from .system import System
-from .theory import blocks, unknowns_of_cells
 
 # fourth-order differences over values at these multiples of a step: about the value, and to one side of it
 DIFFERENCES = (
@@ -61,12 +60,7 @@ def energy_changes(system: System, change: SectionChange, vectors: np.ndarray) -
         each = [system.rules.energies(system, section, vectors) for section in change.sections]
         K, M = (sum(weight * one for weight, one in zip(change.weights, pair)) for pair in zip(*each))
         return np.asarray(K), np.asarray(M)
-    points, n = slopes.quadrature(system), vectors.shape[1]
-    found = {"K": np.zeros((n, n)), "M": np.zeros((n, n))}
-    for matrix, cells, moved, pushed in _pushed(system, change, vectors, points):
-        pushed = pushed * points.dx[cells][..., None, None]
-        found[matrix] += moved.reshape(-1, n).T @ pushed.reshape(-1, n)
-    return found["K"], found["M"]
+    return slopes.energies(system, system.space, _rate(system, change), vectors)
 
 
 def frequency_densities(system: System, change: SectionChange, vectors: np.ndarray, square: np.ndarray) -> np.ndarray:
@@ -83,21 +77,16 @@ def frequency_densities(system: System, change: SectionChange, vectors: np.ndarr
     """
     points = slopes.quadrature(system)
     found = np.zeros((*points.dx.shape, vectors.shape[1]))
-    for matrix, cells, moved, pushed in _pushed(system, change, vectors, points):
+    for matrix, cells, moved, pushed in slopes.pushed(system, system.space, _rate(system, change), vectors, points):
         found[cells] += (moved * pushed).sum(axis=2) / square if matrix == "K" else -(moved * pushed).sum(axis=2)
     return 0.5 * found / system.frame.length ** points.x.shape[-1]
 
 
-def _pushed(system: System, change: SectionChange, vectors: np.ndarray, points: Any) -> Iterator[tuple[Any, ...]]:
-    """Of every part of the energies and block of cells: "K" or "M", cells, strains or motions, and stresses by these.
+def _rate(system: System, change: SectionChange) -> Callable[[str, np.ndarray], np.ndarray]:
+    """Changes of fields of the section per unit of the number, at places in the frame."""
 
-    Both are (n_cells, n_q, n_parts, n), of each vector; the stresses are changes per unit of a number.
-    """
-    whole = unknowns_of_cells(system, vectors)
-    for cells in blocks(len(points.x)):
-        own = whole[cells][:, None]  # (n_cells, 1, n_local, n)
-        for matrix, name, parts in system.rules.terms(system.space, points, cells):
-            fields = (system.frame.field(each, name, points.x[cells]) for each in change.sections)
-            rate: Any = sum(weight * field for weight, field in zip(change.weights, fields))
-            moved = parts @ own
-            yield matrix, cells, moved, rate @ moved if rate.ndim > 2 else rate[..., None, None] * moved
+    def rate(name: str, x: np.ndarray) -> np.ndarray:
+        fields = (system.frame.field(each, name, x) for each in change.sections)
+        return np.asarray(sum(weight * field for weight, field in zip(change.weights, fields)))
+
+    return rate

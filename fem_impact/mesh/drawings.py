@@ -13,6 +13,7 @@ import numpy as np
 from .._base import check, isolated
 from .._base.rounding import SAME
 from . import open_paths
+from .facets import angles
 from .loops import (
     FARTHEST,
     LARGEST,
@@ -26,6 +27,7 @@ from .loops import (
     crossed,
     extent,
     polyline,
+    ring,
     segment,
     signed_area,
     tangent,
@@ -75,11 +77,7 @@ def read(source: Any, unit: str | None) -> tuple[Outline, dict[str, np.ndarray],
 
 def _smoothed(points: np.ndarray, notes: list[str]) -> Loop:
     """Loop through points (n, 2): a smooth curve where the turns are small, straight lines elsewhere."""
-    points = check.array("source", points, (None, 2), "m")
-    if len(points) > 1 and np.array_equal(points[0], points[-1]):
-        points = points[:-1]
-    if not 3 <= len(points) <= MOST_PIECES:
-        raise ValueError(f"source must have 3 to {MOST_PIECES} points, got {len(points)}")
+    points = ring("source", points, "points")
     if np.linalg.norm(np.roll(points, -1, axis=0) - points, axis=1).min() == 0.0:
         raise ValueError("source has the same point twice in a row; remove one")
     if signed_area(points) < 0.0:
@@ -191,12 +189,10 @@ def _svg_pieces(whole: Any, svgelements: Any, name: str) -> list[Piece]:
         if isinstance(part, svgelements.Arc):
             centre, a, b = (np.array([p.x, p.y]) for p in (part.center, part.prx, part.pry))
             pieces.append(Arc(centre, a - centre, b - centre, float(part.get_start_t()), float(part.sweep), name))
-        elif isinstance(part, svgelements.CubicBezier):
-            control = [part.start, part.control1, part.control2, part.end]
-            pieces.append(Bezier(np.array([[p.x, p.y] for p in control], float), name))
-        elif isinstance(part, svgelements.QuadraticBezier):
-            control = [part.start, part.control, part.end]
-            pieces.append(Bezier(np.array([[p.x, p.y] for p in control], float), name))
+        elif isinstance(part, (svgelements.CubicBezier, svgelements.QuadraticBezier)):
+            cubic = isinstance(part, svgelements.CubicBezier)
+            inner = (part.control1, part.control2) if cubic else (part.control,)
+            pieces.append(Bezier(np.array([[p.x, p.y] for p in (part.start, *inner, part.end)], float), name))
         elif (
             isinstance(part, (svgelements.Line, svgelements.Close)) and part.start is not None and part.end is not None
         ):
@@ -340,7 +336,7 @@ def _open(name: str, start: np.ndarray, stop: np.ndarray) -> ValueError:
 
 def _loops(name: str, left: list[Piece], span: float, notes: list[str]) -> list[Loop]:
     """Join pieces end to end into closed loops."""
-    starts, stops = (np.array([end(piece) for piece in left]) for end in (_start, _stop))
+    starts, stops = np.stack([piece.at(np.array([0.0, 1.0])) for piece in left], axis=1)
     free = np.ones(len(left), bool)
     loops: list[Loop] = []
     while free.any():
@@ -368,14 +364,6 @@ def _loops(name: str, left: list[Piece], span: float, notes: list[str]) -> list[
     return loops
 
 
-def _start(piece: Piece) -> np.ndarray:
-    return piece.at(np.zeros(1))[0]
-
-
-def _stop(piece: Piece) -> np.ndarray:
-    return piece.at(np.ones(1))[0]
-
-
 def _nested(name: str, loops: list[Loop]) -> Outline:
     """The largest loop becomes the outline, the others its holes; unnamed edges get names."""
     areas = [abs(signed_area(polyline(loop, extent(loop) / 50.0))) for loop in loops]
@@ -395,12 +383,9 @@ def _renamed(piece: Piece, name: str) -> Piece:
 
 def _edges(loop: Loop) -> Loop:
     """Name unnamed pieces edge0, edge1 ...; each corner starts a new edge."""
-    directions = [(tangent(piece, np.zeros(1))[0], tangent(piece, np.ones(1))[0]) for piece in loop]
-    sharp = []
-    for i, (first, _) in enumerate(directions):
-        before = directions[i - 1][1]
-        angle = math.atan2(before[0] * first[1] - before[1] * first[0], float(before @ first))
-        sharp.append(abs(angle) > CORNER)
+    directions = [tangent(piece, np.array([0.0, 1.0])) for piece in loop]
+    before, after = np.stack([directions[-1], *directions[:-1]])[:, 1], np.stack(directions)[:, 0]
+    sharp = (np.abs(angles(before, after)) > CORNER).tolist()
     start = sharp.index(True) if any(sharp) else 0
     number, result = -1, []
     for i in [*range(start, len(loop)), *range(start)]:

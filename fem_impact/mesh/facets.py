@@ -7,6 +7,12 @@ from scipy.special import comb
 CURVE_STEPS = 12
 
 
+def angles(before: np.ndarray, after: np.ndarray) -> np.ndarray:
+    """Turn [rad] from directions (n, 2) to others, positive to the left."""
+    cross = before[:, 0] * after[:, 1] - before[:, 1] * after[:, 0]
+    return np.arctan2(cross, (before * after).sum(axis=1))
+
+
 def powers(x: np.ndarray, highest: int, order: int) -> np.ndarray:
     """The ``order``-th derivative of x**0 ... x**highest, (..., highest + 1)."""
     result = np.zeros((*x.shape, highest + 1))
@@ -15,6 +21,14 @@ def powers(x: np.ndarray, highest: int, order: int) -> np.ndarray:
         factor = float(np.prod(np.arange(k - order + 1, k + 1))) if order else 1.0
         result[..., k] = factor * x ** (k - order)
     return result
+
+
+def slopes_and_bends(
+    along: np.ndarray, out: np.ndarray, length: np.ndarray, tangents: np.ndarray, curvatures: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """First and second derivatives (n, 2) [m] of the heights over chords, by the share of these, at both ends."""
+    lean = np.einsum("nei,ni->ne", tangents, out) / np.einsum("nei,ni->ne", tangents, along)
+    return lean * length[:, None], -curvatures * (1.0 + lean**2) ** 1.5 * length[:, None] ** 2
 
 
 class Curves:
@@ -31,9 +45,7 @@ class Curves:
         self.along: np.ndarray = chord / self.length[:, None]
         self.out: np.ndarray = np.column_stack([self.along[:, 1], -self.along[:, 0]])
         self.centre: np.ndarray = ends.mean(axis=1)
-        lean = np.einsum("nei,ni->ne", tangents, self.out) / np.einsum("nei,ni->ne", tangents, self.along)
-        slope = lean * self.length[:, None]
-        bend = -curvatures * (1.0 + lean**2) ** 1.5 * self.length[:, None] ** 2
+        slope, bend = slopes_and_bends(self.along, self.out, self.length, tangents, curvatures)
         height = ((middles - self.centre) * self.out).sum(axis=1)
         start, stop = slope[:, 0], -slope[:, 1]  # p(0), p(1)
         values = np.column_stack([start, stop, 0.5 * bend[:, 0] + start, -0.5 * bend[:, 1] - stop, 4.0 * height])

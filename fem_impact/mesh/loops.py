@@ -9,6 +9,7 @@ import shapely
 
 from .._base import check
 from .._base.rounding import HALVINGS, SAME
+from .facets import angles
 
 UNITS = {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "um": 1e-6, "in": 0.0254, "km": 1e3}
 FARTHEST = 1e12  # [-] largest coordinate accepted: products of larger ones lose digits or overflow
@@ -131,8 +132,7 @@ def divide(piece: Piece, size: float) -> np.ndarray:
     points = piece.at(t)
     steps = np.linalg.norm(np.diff(points, axis=0), axis=1)
     direction = tangent(piece, t)
-    cross = direction[:-1, 0] * direction[1:, 1] - direction[:-1, 1] * direction[1:, 0]
-    turning = np.abs(np.arctan2(cross, (direction[:-1] * direction[1:]).sum(axis=1)))
+    turning = np.abs(angles(direction[:-1], direction[1:]))
     need = np.maximum(steps / size, 0.0 if is_straight(piece) else turning / TURN)
     total = np.concatenate([[0.0], np.cumsum(need + 1e-9 * need.sum())])
     n = max(1, int(np.ceil(total[-1] * (1.0 - 1e-6))))
@@ -202,13 +202,19 @@ def _turned(loop: Loop, span: float, anticlockwise: bool) -> Loop:
     return tuple(piece.reversed() for piece in reversed(loop))
 
 
-def straight_loop(name: str, corners: Any, label: str) -> Loop:
-    """Closed polygon through corners (n, 2) [m]; in ``label``, ``{}`` becomes the number of the side's first corner."""
-    points = check.array(name, corners, (None, 2), "m")
+def ring(name: str, given: Any, what: str) -> np.ndarray:
+    """Points (n, 2) [m] of a closed polygon, checked; the first is not repeated at the end."""
+    points = check.array(name, given, (None, 2), "m")
     if len(points) > 1 and np.array_equal(points[0], points[-1]):
         points = points[:-1]
     if not 3 <= len(points) <= MOST_PIECES:
-        raise ValueError(f"{name} must have 3 to {MOST_PIECES} corners, got {len(points)}")
+        raise ValueError(f"{name} must have 3 to {MOST_PIECES} {what}, got {len(points)}")
+    return points
+
+
+def straight_loop(name: str, corners: Any, label: str) -> Loop:
+    """Closed polygon through corners (n, 2) [m]; in ``label``, ``{}`` becomes the number of the side's first corner."""
+    points = ring(name, corners, "corners")
     after = np.roll(points, -1, axis=0)
     gap = np.linalg.norm(after - points, axis=1)
     if gap.min() <= 1e-12 * gap.max():

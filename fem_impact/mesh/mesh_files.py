@@ -255,9 +255,15 @@ def sides_of(cells: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
 
     A cell's sides go from its first vertex to its second, from there to its third, and back.
     """
-    pairs = np.sort(cells[:, [[0, 1], [1, 2], [2, 0]]], axis=2).reshape(-1, 2)
-    unique, number, counts = np.unique(pairs, axis=0, return_inverse=True, return_counts=True)
-    return unique, number.reshape(-1, 3), counts
+    n, (a, b) = int(cells.max()) + 1, np.sort(cells[:, [[0, 1], [1, 2], [2, 0]]], axis=2).astype(np.int64).T
+    keys, number, counts = np.unique((a * n + b).T, return_inverse=True, return_counts=True)
+    return np.column_stack(np.divmod(keys, n)), number.reshape(-1, 3), counts
+
+
+def numbers_of(sides: np.ndarray, pairs: np.ndarray) -> np.ndarray:
+    """Numbers (n,) of those ``sides``, as of `sides_of`, that lie between pairs (n, 2) of vertices."""
+    n, (a, b) = int(sides.max()) + 1, np.sort(pairs, axis=1).T
+    return np.searchsorted(sides[:, 0] * n + sides[:, 1], a * n + b)
 
 
 def longest(points: np.ndarray, cells: np.ndarray) -> float:
@@ -399,9 +405,7 @@ def write(
     if curved.any():
         unique, number, _ = sides_of(cells)
         halfway = points[unique].mean(axis=1)
-        key = unique[:, 0] * len(points) + unique[:, 1]
-        ends = np.sort(facets, axis=1)
-        on_rim = np.searchsorted(key, ends[:, 0] * len(points) + ends[:, 1])
+        on_rim = numbers_of(unique, facets)
         halfway[on_rim] = middles
         place.append(halfway)
         blocks = [

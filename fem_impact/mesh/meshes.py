@@ -487,9 +487,7 @@ def _quartered(mesh: Mesh) -> Mesh:
     n = len(mesh.points)
     cells, unique = mesh_files.quartered(mesh.cells, n)
     points = np.concatenate([mesh.points, mesh.points[unique].mean(axis=1)])
-    keys = unique[:, 0] * n + unique[:, 1]
-    ends = np.sort(mesh.facets, axis=1)
-    middle = n + np.searchsorted(keys, ends[:, 0] * n + ends[:, 1])
+    middle = n + mesh_files.numbers_of(unique, mesh.facets)
     known = mesh.points[mesh.facets], mesh.middles, mesh.tangents, mesh.curvatures
     points[middle], tangent, bend, first, second = divided(*known, 0.5)
     both = np.arange(2 * len(mesh.facets)).reshape(-1, 2)

@@ -41,7 +41,7 @@ def chains(pieces: list[Piece], span: float) -> list[list[int]]:
 def lines(pieces: list[Piece], span: float, close: float) -> list[list[int]]:
     """Those chains with a name that cannot belong to an outline: no other open one is near one of their ends."""
     open_ones = chains(pieces, span)
-    ends = [_ends([pieces[i] for i in chain]) for chain in open_ones]
+    ends = [flattened([pieces[i] for i in chain], np.inf)[[0, -1]] for chain in open_ones]
     found: list[list[int]] = []
     left = list(range(len(open_ones)))
     while True:
@@ -55,12 +55,6 @@ def lines(pieces: list[Piece], span: float, close: float) -> list[list[int]]:
             return found
         found += [open_ones[k] for k in lone]
         left = [k for k in left if k not in lone]
-
-
-def _ends(chain: list[Piece]) -> np.ndarray:
-    """Both ends (2, 2) [m] of a chain."""
-    path = flattened(chain, np.inf)
-    return path[[0, -1]]
 
 
 def flattened(chain: list[Piece], size: float) -> np.ndarray:

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from .._base.markup import BODY, INK, MARGIN, STRIKE, STROKE, WIDTH, picture
+from .mesh_files import loops_of
 
 if TYPE_CHECKING:
     from .meshes import Mesh
@@ -83,20 +84,13 @@ def held_edges(mesh: "Mesh", supports: Mapping[str, Any]) -> dict[int, str]:
 
 def _outline(mesh: "Mesh", held: Mapping[int, str], place: Any) -> str:
     """The filled outline and its supported edges; each facet is a parabola through its middle."""
-    after = {int(a): (int(b), i) for i, (a, b) in enumerate(mesh.facets)}
-    arcs = {}
+    arcs, whole, number = {}, "", {int(start): i for i, start in enumerate(mesh.facets[:, 0])}
     for i, (a, b) in enumerate(mesh.facets):
         pull = 2.0 * mesh.middles[i] - 0.5 * (mesh.points[a] + mesh.points[b])
         (px, py), (bx, by) = place(pull), place(mesh.points[b])
         arcs[i] = f"Q{px:.1f} {py:.1f} {bx:.1f} {by:.1f}"
-    left, whole = set(after), ""
-    while left:
-        start = vertex = min(left)
-        whole += "M{:.1f} {:.1f}".format(*place(mesh.points[start]))
-        while vertex in left:
-            left.remove(vertex)
-            vertex, facet = after[vertex]
-            whole += arcs[facet]
+    for loop in loops_of(mesh.facets):
+        whole += "M{:.1f} {:.1f}".format(*place(mesh.points[loop[0]])) + "".join(arcs[number[each]] for each in loop)
         whole += "Z"
     drawn = f'<path d="{whole}" fill="{BODY}" fill-rule="evenodd" stroke="{STROKE}" stroke-width="1"/>'
     for kind, (width, dashes) in EDGES.items():

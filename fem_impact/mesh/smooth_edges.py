@@ -4,6 +4,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from .facets import angles, slopes_and_bends
+
 # [rad] a vertex where the rim turns by more is a corner: ten facets of a circle turn by 36 degrees each
 CORNER = np.radians(35.0)
 STRAIGHT = 1e-6  # [rad] a smaller turn is rounding: the rim is straight there
@@ -60,7 +62,7 @@ def join(pairs: np.ndarray, tangents: np.ndarray, curvatures: np.ndarray) -> Non
     ``pairs`` (n, 2) holds the facets before and after each vertex.
     """
     a, b = tangents[pairs[:, 0], 1], tangents[pairs[:, 1], 0]
-    angle = np.abs(np.arctan2(a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0], (a * b).sum(axis=1)))
+    angle = np.abs(angles(a, b))
     bent = curvatures[pairs].any(axis=(1, 2))
     near = (angle > 0.0) & (angle < JOINT) & bent
     mean = (a + b)[near] / np.linalg.norm((a + b)[near], axis=1)[:, None]
@@ -91,17 +93,10 @@ def smooth_runs(place: np.ndarray) -> list[Run]:
     return runs
 
 
-def _turns(place: np.ndarray) -> np.ndarray:
-    """Turn [rad] at each vertex of a closed loop (n, 2), positive to the left."""
-    after = np.roll(place, -1, axis=0) - place
-    before = np.roll(after, 1, axis=0)
-    cross = before[:, 0] * after[:, 1] - before[:, 1] * after[:, 0]
-    return np.arctan2(cross, (before * after).sum(axis=1))
-
-
 def _corners(place: np.ndarray) -> np.ndarray:
     """Which vertices of a closed loop are corners, (n,) bool."""
-    turn = _turns(place)
+    ahead = np.roll(place, -1, axis=0) - place
+    turn = angles(np.roll(ahead, 1, axis=0), ahead)
     sharp = np.abs(turn) > CORNER
     company = np.zeros(len(turn), bool)
     for step in (1, -1):
@@ -205,9 +200,7 @@ def _hermite_middles(place: np.ndarray, tangents: np.ndarray, curvatures: np.nda
     length = np.linalg.norm(chord, axis=1)
     along = chord / length[:, None]
     out = np.column_stack([along[:, 1], -along[:, 0]])
-    lean = np.einsum("nei,ni->ne", tangents, out) / np.einsum("nei,ni->ne", tangents, along)
-    slope = lean * length[:, None]
-    bend = -curvatures * (1.0 + lean**2) ** 1.5 * length[:, None] ** 2
+    slope, bend = slopes_and_bends(along, out, length, tangents, curvatures)
     # height s (1 - s) p(s) with p cubic, at s = 1/2
     ends = 0.5 * (slope[:, 0] - slope[:, 1])
     rates = (0.5 * bend[:, 0] + slope[:, 0]) - (-0.5 * bend[:, 1] + slope[:, 1])

@@ -28,10 +28,9 @@ from ..fe.assembly import System, support_of_facets
 from ..fe.corners import meetings
 from ..fe.residual import Moments
 from ..fe.section import PLANE, SHEAR, Beam, Plate, evaluate
-from ..fe.springs import along_facets
+from ..fe.springs import at_facets
 from ..fe.supports import cells_of_facets
 from ..mesh.meshes import Mesh
-from ..modes.air import MixedShapes
 from ..modes.disk import DiskShapes
 from ..modes.modal import Modes
 from ..modes.rectangle import RectangleShapes
@@ -119,11 +118,10 @@ class Known:
 
 
 def unwrapped(shapes: Shapes) -> tuple[Shapes, float, float]:
-    """The shapes inside `ScaledShapes` and `MixedShapes`, and the factors [-] of their amplitude and frequency."""
+    """The shapes inside `ScaledShapes`, and the factors [-] of their amplitude and frequency."""
     amplitude, frequency = 1.0, 1.0
-    while isinstance(shapes, (ScaledShapes, MixedShapes)):
-        if isinstance(shapes, ScaledShapes):
-            amplitude, frequency = amplitude * shapes.amplitude, frequency * shapes.frequency
+    while isinstance(shapes, ScaledShapes):
+        amplitude, frequency = amplitude * shapes.amplitude, frequency * shapes.frequency
         shapes = shapes.base
     return shapes, amplitude, frequency
 
@@ -193,8 +191,8 @@ def bending(body: Known) -> Bending:
         zero = np.zeros(len(steep))
         found = np.stack([body.extent * steep, volume + zero, rotary * steep, shear * force, edge + zero])
     left, shapes = np.ones(low.stop - low.start), modes.shapes
-    while isinstance(shapes, (ScaledShapes, MixedShapes)):
-        if isinstance(shapes, MixedShapes):  # air mixes modes little, and makes them heavier
+    while isinstance(shapes, ScaledShapes):
+        if shapes.mix is not None:  # air mixes modes little, and makes them heavier
             left = left * np.linalg.norm(shapes.mix[:, low], axis=0)
         shapes = shapes.base
     found[:3] *= np.stack([(amplitude * left) ** 2, amplitude * left, left**2])
@@ -265,7 +263,7 @@ def _plate(system: System, vectors: np.ndarray, thick: bool) -> np.ndarray:
     free = np.flatnonzero(np.array(rim.kinds) == "free") if rim is not None else np.zeros(0, int)
     if len(free) and rim is not None:
         at = cells_of_facets(rim.facets[free], space.vertices)[0]
-        place, step = along_facets(space, rim.facets[free], at)
+        _, place, step = at_facets(space, rim.facets[free], at)
         ds = np.linalg.norm(step, axis=2)
         nx, ny = np.moveaxis(step / ds[..., None], 2, 0)[..., None]  # its sign does not matter
         moment = moments.derivatives(at, place, 0)[:, 0]

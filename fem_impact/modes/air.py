@@ -23,7 +23,6 @@ of hinged rectangles); Christian, Davis, Tubis, Anderson, Mills and Rossing (198
 (drumheads, whose low frequencies the air sets).
 """
 
-from dataclasses import dataclass, replace
 from itertools import pairwise
 from typing import Any
 
@@ -39,7 +38,7 @@ from .._base.rounding import EPSILON, HALVINGS, SAME
 from ..fe import plausible
 from ..mesh.meshes import measure
 from .modal import Modes
-from .shapes import Shapes
+from .shapes import ScaledShapes, Shapes
 
 DENSITY, SPEED = 1.204, 343.2  # [kg/m^3], [m/s] fact: of air at 20 degrees C and 1013 hPa
 # [-] cells per wavelength of the highest mode and, in `free_air`, of its sound; two sizes are extrapolated
@@ -58,42 +57,6 @@ FINER = 4
 # most 0.66 of those stated, of 41 plates
 CAREFUL = 1.5
 MOST_SAMPLES = 1e9  # [-] limit of memory: values of all shapes on the grid of points
-
-
-@dataclass(frozen=True, eq=False, repr=False)
-class MixedShapes(Shapes, check.Brief):
-    """Linear combinations of the shapes of a body; its static deflections stay."""
-
-    base: Shapes
-    mix: np.ndarray  # (n_base, n_modes) [-]
-
-    @property
-    def dimension(self) -> int:
-        return self.base.dimension
-
-    def at(self, points: np.ndarray) -> np.ndarray:
-        return self.base.at(points) @ self.mix
-
-    def contains(self, points: np.ndarray) -> np.ndarray:
-        return self.base.contains(points)
-
-    def compliance(self, points: np.ndarray) -> np.ndarray:
-        return self.base.compliance(points)
-
-    def compliance_error(self, points: np.ndarray) -> np.ndarray:
-        return self.base.compliance_error(points)
-
-    def dent(self, points: np.ndarray) -> np.ndarray:
-        return self.base.dent(points)
-
-    def deflection(self, loads: np.ndarray, points: np.ndarray) -> np.ndarray:
-        return self.base.deflection(loads, points)
-
-    def take(self, n_modes: int) -> "MixedShapes":
-        return replace(self, mix=self.mix[:, :n_modes].copy())
-
-    def grid(self) -> tuple[np.ndarray, np.ndarray]:
-        return self.base.grid()
 
 
 @check.typed
@@ -170,19 +133,13 @@ def in_air(
     order = np.argsort(omega, kind="stable")
     whole = block_diag(np.eye(modes.n_rigid), mix[:, order])
     rest = np.zeros(modes.n_rigid)
+    omega, radiated, doubt, unsure = (np.append(rest, each[order]) for each in (omega, radiated, doubt, unsure))
+    before = 0.0 if modes.frequency_error is None else modes.frequency_error
     return Modes(
-        np.concatenate([rest, omega[order]]),
-        modes.damping_ratio + np.concatenate([rest, radiated[order]]),
-        MixedShapes(modes.shapes, whole),
-        modes.mass,
-        (0.0 if modes.frequency_error is None else modes.frequency_error) + np.concatenate([rest, doubt[order]]),
-        notes=plausible.together(modes.notes, (note,)),
-        poorer=poorer,
-        section=modes.section,
-        thick=modes.thick,
-        air=True,
-        damping_error=np.concatenate([rest, unsure[order]]),
-    )
+        omega, modes.damping_ratio + radiated, ScaledShapes(modes.shapes, mix=whole), modes.mass, before + doubt,
+        notes=plausible.together(modes.notes, (note,)), poorer=poorer, section=modes.section, thick=modes.thick,
+        air=True, damping_error=unsure,
+    )  # fmt: skip
 
 
 def _spacing(modes: Modes, area: float, speed: float) -> float:
@@ -248,10 +205,7 @@ class _Air:
         self.weight, self.speed = weight, speed
         nx, ny = strength.shape[1:]
         self.padded = next_fast_len(2 * nx - 1, True), next_fast_len(2 * ny - 1, True)
-        steps = np.meshgrid(*(np.minimum(np.arange(n), n - np.arange(n)) for n in self.padded), indexing="ij")
-        self.distance = size * np.hypot(*steps)  # (padded) [m]
-        nearest = mean_inverse_distance(*(n // 2 + 1 for n in self.padded))
-        self.inverse = nearest[steps[0], steps[1]] / size  # (padded) [1/m] mean of 1 / R between two cells
+        self.distance, self.inverse = between_cells(self.padded, size)
 
     def _added(self, strength: np.ndarray, spectrum: np.ndarray, omega: float) -> np.ndarray:
         """Mass [-] that air adds between sources (n, nx, ny) with a known spectrum, at a frequency [rad/s]."""
@@ -307,10 +261,8 @@ class _Air:
         for i in range(block.start, block.stop) if outside.size else ():
             source = np.tensordot(vectors[window, i], self.strength[window], 1)[None]
             kernel = self._pressing(omega[i])
-            field = irfft2(rfft2(source, self.padded) * rfft2(kernel), self.padded)[
-                0, : source.shape[1], : source.shape[2]
-            ]
-            added = self.weight * np.tensordot(self.strength[outside], field, 2)
+            field = irfft2(rfft2(source, self.padded) * rfft2(kernel), self.padded)[0]
+            added = self.weight * np.tensordot(self.strength[outside], field[: source.shape[1], : source.shape[2]], 2)
             vectors[outside, i] = omega[i] ** 2 * added / (self.old[outside] ** 2 - omega[i] ** 2)
 
     def _solve(
@@ -320,9 +272,8 @@ class _Air:
         middle, half = 0.5 * (band[0] + band[1]), 0.5 * (band[1] - band[0])
         # interpolated from n Chebyshev nodes, cos(k R) errs by 4 Bessel functions J_n(k R) and less, k of half the band
         reach = half / self.speed * self.distance.max()
-        count = max(
-            2, int(np.flatnonzero(jv(np.arange(2.0 * reach + 20.0), reach) > SAME)[-1]) + 1
-        )  # one alone has no span
+        needed = np.flatnonzero(jv(np.arange(2.0 * reach + 20.0), reach) > SAME)
+        count = max(2, int(needed[-1]) + 1)  # one alone has no span
         nodes = middle + half * np.cos(np.pi * (np.arange(count) + 0.5) / count)
         spectrum = rfft2(self.strength[window], self.padded)
         added = BarycentricInterpolator(nodes, [self._added(self.strength[window], spectrum, node) for node in nodes])
@@ -344,13 +295,7 @@ def _sampled(shapes: Shapes, spacing: float) -> tuple[np.ndarray, np.ndarray]:
     Squares cut by the rim count by the part of them on the body. Also returned is how much of each mode's energy
     (n_modes,) [-] the area so missed holds.
     """
-    corner, cells = shapes.grid()
-    low, high = corner.min(axis=0), corner.max(axis=0)
-    period = SAMPLES[0] * SAMPLES[1]
-    count = period * np.ceil((high - low) / (period * spacing)).astype(int)
-    axes = (0.5 * (low[i] + high[i] + spacing * (1.0 - count[i])) + spacing * np.arange(count[i]) for i in (0, 1))
-    places = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1)
-    inside = shapes.contains(places.reshape(-1, 2)).reshape(count)
+    places, inside = lattice(shapes, spacing, SAMPLES[0] * SAMPLES[1])
     rim = binary_dilation(inside, np.ones((3, 3))) & ~binary_erosion(inside, np.ones((3, 3)))
     parts = spacing * ((np.arange(FINER) + 0.5) / FINER - 0.5)
     pieces = (places[rim][:, None] + np.stack(np.meshgrid(parts, parts), axis=-1).reshape(-1, 2)).reshape(-1, 2)
@@ -358,12 +303,12 @@ def _sampled(shapes: Shapes, spacing: float) -> tuple[np.ndarray, np.ndarray]:
     at_rim = shapes.at(pieces[covered])
     values = np.zeros((len(pieces), at_rim.shape[1]))
     values[covered] = at_rim
-    samples = np.zeros((at_rim.shape[1], *count))
+    samples = np.zeros((at_rim.shape[1], *inside.shape))
     samples[:, inside & ~rim] = shapes.at(places[inside & ~rim]).T
     samples[:, rim] = values.reshape(rim.sum(), FINER**2, -1).mean(axis=1).T
     area = (inside & ~rim).sum() + covered.mean() * rim.sum()
     energy = (samples**2).sum(axis=(1, 2)) * covered.sum()
-    missed = abs(area - measure(corner, cells) / spacing**2)
+    missed = abs(area - measure(*shapes.grid()) / spacing**2)
     return samples, missed * (at_rim**2).sum(axis=0) / energy
 
 
@@ -371,6 +316,23 @@ def _strengths(samples: np.ndarray, spacing: float, across: int) -> np.ndarray:
     """Integral of every shape over each cell of some samples across, (n_modes, nx, ny) [m^2 kg**-0.5]."""
     n, nx, ny = samples.shape
     return samples.reshape(n, nx // across, across, ny // across, across).sum(axis=(2, 4)) * spacing**2
+
+
+def lattice(shapes: Shapes, size: float, period: int = 1) -> tuple[np.ndarray, np.ndarray]:
+    """Centres (nx, ny, 2) [m] of square cells around a body, and whether each lies on it; multiples of a period."""
+    corner = shapes.grid()[0]
+    low, high = corner.min(axis=0), corner.max(axis=0)
+    count = period * np.ceil((high - low) / (period * size)).astype(int)
+    axes = (0.5 * (low[i] + high[i] + size * (1.0 - count[i])) + size * np.arange(count[i]) for i in (0, 1))
+    places = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1)
+    return places, shapes.contains(places.reshape(-1, 2)).reshape(count)
+
+
+def between_cells(padded: tuple[int, int], size: float) -> tuple[np.ndarray, np.ndarray]:
+    """Distance [m] between cells of a lattice, and the mean of 1 / R [1/m] between their points, (padded) each."""
+    steps = np.meshgrid(*(np.minimum(np.arange(n), n - np.arange(n)) for n in padded), indexing="ij")
+    nearest = mean_inverse_distance(*(n // 2 + 1 for n in padded))
+    return size * np.hypot(*steps), nearest[steps[0], steps[1]] / size
 
 
 def mean_inverse_distance(nx: int, ny: int) -> np.ndarray:

@@ -1,6 +1,7 @@
 """What the elements of another program's mesh tell: its surface, and whether it is solid; and names of its matrices."""
 
 import re
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -51,6 +52,23 @@ def of_meshio(cells: Any) -> dict[int, np.ndarray]:
             blocks.setdefault(code, []).append(np.asarray(block.data, int)[:, :corners])
     kept = {code: np.vstack(each) for code, each in blocks.items()}
     return {code: each for code, each in kept.items() if code in SOLIDS} or kept
+
+
+def steps(n: int, shapes: Sequence[Any], static: Sequence[Any]) -> dict[str, np.ndarray]:
+    """Modes and static displacements (n_nodes, 3, n_steps), from those (n_nodes, 3) of each step."""
+    named = {"shapes": shapes, "static": static}
+    return {name: np.stack(each, axis=2) if len(each) else np.zeros((n, 3, 0)) for name, each in named.items()}
+
+
+def spatial(points: np.ndarray) -> np.ndarray:
+    """Points (n, 3) of those with fewer coordinates."""
+    return np.column_stack([points, np.zeros((len(points), 3 - points.shape[1]))])
+
+
+def rows_of(numbers: np.ndarray, wanted: Any) -> np.ndarray:
+    """Rows of nodes by their numbers, all of which are known."""
+    order = np.argsort(numbers, kind="stable")
+    return order[np.searchsorted(numbers, wanted, side="right", sorter=order) - 1]
 
 
 def kind_of_matrix(name: str) -> str:

@@ -30,9 +30,8 @@ from scipy.sparse.linalg import LinearOperator, gmres
 
 from .._base.check import SimulationError
 from ..mesh.meshes import measure
-from .air import PER_WAVE, mean_inverse_distance
+from .air import PER_WAVE, between_cells, lattice
 from .modal import Modes
-from .shapes import Shapes
 
 LOG = logging.getLogger(__name__)
 # [-] cells across a square as large as the plate, in the lattices to choose of: next ones are 1.8 to 2.3 times as large
@@ -116,7 +115,7 @@ def jumps(modes: Modes, wanted: npt.NDArray[np.bool_], speed: float) -> Iterator
         if some.size:
             size = float(side / across)
             LOG.info("the air around %d modes, on cells of %.3g m", some.size, size)
-            points, inside = _lattice(modes.shapes, size)
+            points, inside = lattice(modes.shapes, size)
             shapes = modes.shapes.take(int(some[-1]) + 1).at(points[inside])[:, some]
             core = binary_erosion(inside)
             sheets = AirSheet(core, size), AirSheet(inside, size)
@@ -150,10 +149,7 @@ class AirSheet:
         self.inside, self.size = inside, size
         nx, ny = (next_fast_len(2 * n + 2) for n in inside.shape)  # room for the next centres
         self.padded = nx, ny
-        away = [np.minimum(np.arange(n), n - np.arange(n)) for n in self.padded]
-        steps = np.meshgrid(*away, indexing="ij")
-        self.inverse = mean_inverse_distance(nx // 2 + 1, ny // 2 + 1)[steps[0], steps[1]] / size
-        self.distance = size * np.hypot(*steps)
+        self.distance, self.inverse = between_cells(self.padded, size)
         turns = (np.cos(2.0 * np.pi * np.arange(n) / n) for n in self.padded)
         self.slopes = (4.0 - 2.0 * np.add.outer(*turns)) / size**2
 
@@ -184,16 +180,6 @@ class AirSheet:
         field[self.inside] = np.ravel(values)
         nx, ny = self.inside.shape
         return ifft2(fft2(field, self.padded) * factor)[:nx, :ny][self.inside]
-
-
-def _lattice(shapes: Shapes, size: float) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.bool_]]:
-    """Centres (nx, ny, 2) [m] of square cells around a body, and whether each lies on it (nx, ny)."""
-    corner = shapes.grid()[0]
-    low, high = corner.min(axis=0), corner.max(axis=0)
-    count = np.ceil((high - low) / size).astype(int)
-    axes = (0.5 * (low[i] + high[i] + size * (1.0 - count[i])) + size * np.arange(count[i]) for i in (0, 1))
-    points = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1)
-    return points, shapes.contains(points.reshape(-1, 2)).reshape(points.shape[:2])
 
 
 class Field(NamedTuple):

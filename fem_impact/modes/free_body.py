@@ -1,5 +1,6 @@
 """Rigid motions in three dimensions: the six of a body, and those with which one arrives at a blow."""
 
+from collections.abc import Iterable
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -39,9 +40,17 @@ def six(nodes: np.ndarray, mass: float, inertia: Any, centre: Any) -> np.ndarray
         )
     check.between("inertia over mass", float(size[2] / mass), *GYRATION, "m^2")
     apart = nodes - check.array("centre", centre, (3,), "m")
-    turns = [np.cross(axis, apart) / np.sqrt(each) for each, axis in zip(size, axes.T) if each > THIN * size[2]]
-    straight = np.broadcast_to(np.eye(3) / np.sqrt(mass), (len(nodes), 3, 3))
-    return np.concatenate([straight, np.stack(turns, axis=2)], axis=2)
+    kept = size > THIN * size[2]
+    return motions(apart, axes.T[kept]) / np.sqrt(np.append(np.full(3, mass), size[kept]))
+
+
+def motions(apart: np.ndarray, axes: Iterable[np.ndarray]) -> np.ndarray:
+    """Displacements (n_nodes, 3, 3 + n) of shifts along x, y and z, and of turns about axes (n, 3) through the origin.
+
+    ``apart`` (n_nodes, 3) [m] are the nodes seen from it.
+    """
+    shifts = np.broadcast_to(np.eye(3), (len(apart), 3, 3))
+    return np.concatenate([shifts, *(np.cross(axis, apart)[..., None] for axis in axes)], axis=2)
 
 
 def arrival(body: "Body", row: int, way: np.ndarray, along: Any, pivot: Any) -> np.ndarray | None:

@@ -18,6 +18,7 @@ from scipy.sparse import coo_array, csc_array, csc_matrix, issparse
 
 from .._base import check
 from ..fe.eigenvalues import Flexibility, lowest
+from .free_body import motions
 
 ALL = 600  # [-] unknowns up to which all modes are found, and all unit loads on nodes solved: a second together
 MANY = 100  # [-] modes of larger systems
@@ -176,9 +177,7 @@ def _motions(nodes: np.ndarray) -> np.ndarray:
     place = nodes - nodes.mean(axis=0)
     turns = np.eye(3) / (float(np.abs(place).max()) or 1.0)
     found = np.zeros((len(nodes), 2, 3, 6))
-    found[:, 0, :, :3] = np.eye(3)
-    for i in range(3):
-        found[:, 0, :, 3 + i], found[:, 1, :, 3 + i] = np.cross(turns[i], place), turns[i]
+    found[:, 0], found[:, 1, :, 3:] = motions(place, turns), turns
     return found
 
 
@@ -219,7 +218,7 @@ def _resisted(K: Any, motions: np.ndarray) -> np.ndarray:
 
 def _mass(R: Any, rigid: np.ndarray, nodes: np.ndarray) -> float:
     """Mass [kg] that shifts move, of mass-normalised rigid motions."""
-    moved, wanted = R @ rigid, _motions(nodes)[:, 0, :, :3].reshape(-1, 3)
+    moved, wanted = R @ rigid, np.tile(np.eye(3), (len(nodes), 1))
     share = np.linalg.lstsq(moved, wanted, rcond=None)[0]
     shifts = np.abs(moved @ share - wanted).max(axis=0) < UNEQUAL
     masses = np.square(share[:, shifts]).sum(axis=0)

@@ -14,7 +14,7 @@ from .._base import check, markup
 from .._base.remembered import Remembered
 from .._base.rounding import ROUNDING, SAME
 from ..fe import plausible, refinement
-from ..fe.assembly import THICK, System
+from ..fe.assembly import System
 from ..fe.section import Beam, Plate
 from . import dents, followed, picked, universal_files, unstated, viewing
 from .shapes import (
@@ -656,13 +656,6 @@ def find_modes(
     notes = plausible.together(system.notes, damping_notes(damping, found.omega))
     LOG.info("%d modes up to %.5g Hz", len(found.omega), found.omega[-1] / (2.0 * np.pi))
     return Modes(
-        found.omega,
-        damping,
-        shapes,
-        system.mass,
-        found.error,
-        in_hertz,
-        notes,
-        section=system.section,
-        thick=system.theory in THICK,
-    )
+        found.omega, damping, shapes, system.mass, found.error, in_hertz, notes, section=system.section,
+        thick=system.rules.thick,
+    )  # fmt: skip

@@ -116,23 +116,21 @@ def _nodes(read: Any) -> tuple[dict[str, np.ndarray], tuple[Any, np.ndarray]]:
 
 
 def _elements(cards: Any, told: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
-    row = {int(number): i for i, number in enumerate(told["numbers"])}
     blocks: dict[int, list[list[int]]] = {}
     for element in cards.values():
         code, corners = ELEMENTS.get(element.type, (0, 0))
         if code:
-            blocks.setdefault(code, []).append([row[int(node)] for node in element.node_ids[:corners]])
-    return cell_kinds.surface_and_kind(told["nodes"], {code: np.array(each) for code, each in blocks.items()})
+            blocks.setdefault(code, []).append(element.node_ids[:corners])
+    rows = {code: cell_kinds.rows_of(told["numbers"], each) for code, each in blocks.items()}
+    return cell_kinds.surface_and_kind(told["nodes"], rows)
 
 
 def _fields(results: Any, numbers: np.ndarray) -> dict[str, np.ndarray]:
     """Modes and static displacements."""
-    row = {int(number): i for i, number in enumerate(numbers)}
     table = list(results.eigenvectors.values())
-    found: dict[str, np.ndarray] = {}
-    for name, each in {"shapes": table, "static": list(results.displacements.values())}.items():
-        moved = [_at_nodes(one, row) for one in each]
-        found[name] = np.concatenate(moved, axis=2) if moved else np.zeros((len(numbers), 3, 0))
+    each = ([case for one in tables for case in _at_nodes(one, numbers)] for tables in (
+        table, results.displacements.values()))  # fmt: skip
+    found = cell_kinds.steps(len(numbers), *each)
     cycles = [np.asarray(one.mode_cycles if hasattr(one, "mode_cycles") else one.freqs, float) for one in table]
     found["frequencies"] = np.abs(np.concatenate(cycles)) if cycles else np.zeros(0)
     masses = [np.asarray(one.generalized_mass, float) for one in results.eigenvalues.values()]
@@ -141,9 +139,8 @@ def _fields(results: Any, numbers: np.ndarray) -> dict[str, np.ndarray]:
     return found
 
 
-def _at_nodes(table: Any, row: dict[int, int]) -> np.ndarray:
-    """Translations (n_nodes, 3, n_cases) of a Nastran table of displacements."""
-    found = np.zeros((len(row), 3, len(table.data)))
-    rows = [row[int(number)] for number in table.node_gridtype[:, 0]]
-    found[rows] = np.moveaxis(np.asarray(table.data[:, :, :3], float), 0, 2)
+def _at_nodes(table: Any, numbers: np.ndarray) -> np.ndarray:
+    """Translations (n_cases, n_nodes, 3) of a Nastran table of displacements."""
+    found = np.zeros((len(table.data), len(numbers), 3))
+    found[:, cell_kinds.rows_of(numbers, table.node_gridtype[:, 0])] = table.data[:, :, :3]
     return found

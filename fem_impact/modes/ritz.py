@@ -25,7 +25,7 @@ from ..fe.assembly import System
 from ..fe.eigenvalues import Flexibility, factorise, one_thread
 from ..fe.refinement import heavier
 from .modal import Damping, Modes, damping_notes, damping_ratios
-from .shapes import Shapes
+from .shapes import ElementShapes
 
 PIECE = 2**20  # [byte] of earlier vectors taken at a time: fits into the cache of a core
 LOST = 1e-8  # [-] overlap above which all vectors since the last look at it are made again
@@ -225,9 +225,7 @@ class Krylov:
             value, turn = np.linalg.eigh(inverse)
         value, turn = value[::-1], turn[:, ::-1]
         value = 1.0 / np.maximum(value, np.finfo(float).eps * value[0]) - self.shift
-        few = min(
-            count, self.system.sprung.shape[1]
-        )  # on weak springs, so far below the shift that rounding hides them
+        few = min(count, self.system.sprung.shape[1])  # so far below the shift that rounding hides them
         if few:
             low = self.vectors[:count].T @ turn[:, :few]
             back = np.linalg.eigh(self._flexibility.products(low))[1]
@@ -283,10 +281,9 @@ class Krylov:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class RitzShapes(Shapes, check.Brief):
+class RitzShapes(ElementShapes, check.Brief):
     """Shapes of Ritz vectors: complete at the loads they started from, approximate elsewhere."""
 
-    system: System
     loads: np.ndarray  # (n_loads, dimension) [m] points that the vectors started from
     omega: np.ndarray  # (n_all,) [rad/s] of all vectors, rigid motions first
     rows: np.ndarray  # (n_loads, n_all) [kg**-0.5] shapes at the loads
@@ -295,8 +292,9 @@ class RitzShapes(Shapes, check.Brief):
     kept: int | None = None  # number of shapes that count as modes; the others are left out
 
     @property
-    def dimension(self) -> int:
-        return self.system.mesh.dimension
+    def vectors(self) -> np.ndarray:
+        """The shapes in the unknowns of their system, (n_dofs, n_modes)."""
+        return np.hstack([self.system.rigid, self.basis.T @ self.turn])[:, : self.kept]
 
     def at(self, points: np.ndarray) -> np.ndarray:
         return self._all_at(points)[:, : self.kept]
@@ -308,9 +306,6 @@ class RitzShapes(Shapes, check.Brief):
         flexible = (place @ self.basis.T) @ self.turn
         return np.hstack([place @ self.system.rigid, flexible]) * self.system.frame.mass**-0.5
 
-    def contains(self, points: np.ndarray) -> np.ndarray:
-        return self.system.contains(points)
-
     def deflection(self, loads: np.ndarray, points: np.ndarray) -> np.ndarray:
         """Static deflection of all the vectors, which is that of the whole body under the loads they started from."""
         flexible = self.omega > 0.0
@@ -319,6 +314,3 @@ class RitzShapes(Shapes, check.Brief):
 
     def take(self, n_modes: int) -> "RitzShapes":
         return replace(self, kept=n_modes)
-
-    def grid(self) -> tuple[np.ndarray, np.ndarray]:
-        return self.system.mesh.points, self.system.mesh.cells

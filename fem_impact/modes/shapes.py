@@ -111,18 +111,23 @@ class BeamlikeShapes(Shapes):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class ScaledShapes(Shapes, check.Brief):
-    """The shapes of the same body with another mass and stiffness, see `Modes.scaled`."""
+    """The shapes of the same body with another mass and stiffness, see `Modes.scaled`, or mixed; its deflections stay.
+
+    A mixture is of shapes that are known everywhere, as by the air around a plate.
+    """
 
     base: Shapes
-    amplitude: float  # [-] new shape divided by old
-    frequency: float  # [-] new frequency divided by old
+    amplitude: float = 1.0  # [-] new shape divided by old
+    frequency: float = 1.0  # [-] new frequency divided by old
+    mix: np.ndarray | None = None  # (n_base, n_modes) [-] of the old shapes in each new one
 
     @property
     def dimension(self) -> int:
         return self.base.dimension
 
     def at(self, points: np.ndarray) -> np.ndarray:
-        return self.amplitude * self.base.at(points)
+        found = self.amplitude * self.base.at(points)
+        return found if self.mix is None else found @ self.mix
 
     def contains(self, points: np.ndarray) -> np.ndarray:
         return self.base.contains(points)
@@ -150,6 +155,8 @@ class ScaledShapes(Shapes, check.Brief):
         return None if found is None else self.amplitude * found
 
     def take(self, n_modes: int) -> "ScaledShapes":
+        if self.mix is not None:
+            return replace(self, mix=self.mix[:, :n_modes].copy())
         return replace(self, base=self.base.take(n_modes))
 
     def grid(self) -> tuple[np.ndarray, np.ndarray]:
@@ -223,13 +230,11 @@ class SampledShapes(Shapes, check.Locked):
         found = self.carried[i] @ self.carried[j].T
         if self.rest is not None:
             found += np.where(i[:, None] == j, self.rest[j, 0], 0.0)
-        column = {int(point): k for k, point in enumerate(self.loads)}
-        for k, point in enumerate(i.tolist()):  # by reciprocity
-            if point in column:
-                found[k] = self.static[j, column[point]]
-        for k, point in enumerate(j.tolist()):
-            if point in column:
-                found[:, k] = self.static[i, column[point]]
+        column = np.full(len(self.points), -1)
+        column[self.loads] = np.arange(len(self.loads))
+        rows, columns = column[i], column[j]
+        found[rows >= 0] = self.static[j, rows[rows >= 0, None]]  # by reciprocity
+        found[:, columns >= 0] = self.static[i[:, None], columns[columns >= 0]]
         return found
 
     def compliance_error(self, points: np.ndarray) -> np.ndarray:
@@ -305,18 +310,30 @@ def connected_cells(cells: Any, points: np.ndarray) -> np.ndarray | None:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class FieldShapes(Shapes, check.Locked):
-    """Shapes of an FE solution, evaluated anywhere on the body with the shape functions of its elements."""
+class ElementShapes(Shapes):
+    """What shapes by finite elements share."""
 
     system: System
-    vectors: np.ndarray  # (n_dofs, n_modes) [-] mass-normalised in the frame of the system
-    flexibility: Flexibility
-    _under: Remembered = field(default_factory=lambda: Remembered(REMEMBERED), repr=False)  # deflections, by loads
-    _at: Remembered = field(default_factory=lambda: Remembered(REMEMBERED), init=False, repr=False)  # shapes, by point
 
     @property
     def dimension(self) -> int:
         return self.system.mesh.dimension
+
+    def contains(self, points: np.ndarray) -> np.ndarray:
+        return self.system.contains(points)
+
+    def grid(self) -> tuple[np.ndarray, np.ndarray]:
+        return self.system.mesh.points, self.system.mesh.cells
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class FieldShapes(ElementShapes, check.Locked):
+    """Shapes of an FE solution, evaluated anywhere on the body with the shape functions of its elements."""
+
+    vectors: np.ndarray  # (n_dofs, n_modes) [-] mass-normalised in the frame of the system
+    flexibility: Flexibility
+    _under: Remembered = field(default_factory=lambda: Remembered(REMEMBERED), repr=False)  # deflections, by loads
+    _at: Remembered = field(default_factory=lambda: Remembered(REMEMBERED), init=False, repr=False)  # shapes, by point
 
     def at(self, points: np.ndarray) -> np.ndarray:
         if len(points) != 1:
@@ -327,9 +344,6 @@ class FieldShapes(Shapes, check.Locked):
 
     def _shapes(self, points: np.ndarray) -> np.ndarray:
         return self.system.interpolate(points) @ self.vectors * self.system.frame.mass**-0.5
-
-    def contains(self, points: np.ndarray) -> np.ndarray:
-        return self.system.contains(points)
 
     def _deflection(self, loads: np.ndarray) -> point_load.Deflection:
         return self._under.found(loads.tobytes(), lambda: point_load.static_deflection(self.system, loads))
@@ -345,6 +359,3 @@ class FieldShapes(Shapes, check.Locked):
 
     def take(self, n_modes: int) -> "FieldShapes":
         return replace(self, vectors=self.vectors[:, :n_modes].copy())
-
-    def grid(self) -> tuple[np.ndarray, np.ndarray]:
-        return self.system.mesh.points, self.system.mesh.cells

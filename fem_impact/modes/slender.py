@@ -1,8 +1,6 @@
 """Modes of uniform beams: by Euler and Bernoulli here, with shear and rotary inertia by `timoshenko`."""
 
-from collections.abc import Callable
 from dataclasses import dataclass, replace
-from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -13,7 +11,7 @@ from ..fe.section import KINDS, Beam
 from . import timoshenko
 from .modal import Damping, Modes
 from .rectangle import MOST_MODES
-from .request import Request, check_beyond_rigid, check_number, request
+from .request import check_beyond_rigid, check_number, request
 from .shapes import BeamlikeShapes
 from .timoshenko import ENDS
 
@@ -62,54 +60,7 @@ class BeamShapes(BeamlikeShapes, check.Brief):
         return values
 
     def green(self, load: float, x: np.ndarray) -> np.ndarray:
-        return _green(self.ends, load)(x)
-
-
-def _rigid(ends: tuple[str, str]) -> np.ndarray:
-    """Rigid shapes c0 + c1 x of a beam of unit mass and length, (n_rigid, 2)."""
-    if ends == ("free", "free"):
-        return np.array([[1.0, 0.0], [-np.sqrt(3.0), np.sqrt(12.0)]])
-    if ends == ("hinged", "free"):
-        return np.array([[0.0, np.sqrt(3.0)]])
-    if ends == ("free", "hinged"):
-        return np.array([[np.sqrt(3.0), -np.sqrt(3.0)]])
-    return np.zeros((0, 2))
-
-
-@lru_cache(maxsize=64)
-def _green(ends: tuple[str, str], load: float) -> Callable[[np.ndarray], np.ndarray]:
-    """Deflection of the unit beam under a unit force at ``load`` in 0 ... 1, without its rigid motion.
-
-    The deflection is a polynomial that meets the conditions at the left end, plus a cubic in the distance beyond the
-    force. The beam is mirrored if need be so that the force is in its left half: near a clamped end the deflection is
-    of the order of the distance cubed, and mirroring keeps its digits.
-    """
-    if load > 0.5:
-        mirrored = _green(ends[::-1], 1.0 - load)
-        return lambda x: mirrored(1.0 - x)
-    rigid = _rigid(ends)
-    carried = -rigid.T @ (rigid @ [1.0, load])  # inertia force c0 + c1 x that balances the unit force
-    powers = np.array([0.0, 0.0, 0.0, 0.0, carried[0] / 24.0, carried[1] / 120.0])
-    beyond = np.polynomial.Polynomial([-load, 1.0]) ** 3 / 6.0
-
-    def slopes(coefficients: np.ndarray) -> np.ndarray:
-        """Derivatives of the polynomial at the right end that must vanish there."""
-        whole = np.polynomial.Polynomial(coefficients)
-        return np.array([whole.deriv(k)(1.0) if k else whole(1.0) for k in ENDS[ends[1]]])
-
-    free = np.setdiff1d(np.arange(4), ENDS[ends[0]])
-    matrix = np.column_stack([slopes(np.eye(4)[k]) for k in free])
-    powers[free] = np.linalg.lstsq(matrix, -slopes(powers) - slopes(beyond.coef), rcond=None)[0]
-    poly = np.polynomial.Polynomial(powers)
-
-    def bare(x):
-        return poly(x) + (x - load).clip(0.0) ** 3 / 6.0
-
-    node, weight = np.polynomial.legendre.leggauss(6)  # exact to degree 11 on either side of the force
-    x = np.concatenate([0.5 * load * (node + 1.0), load + 0.5 * (1.0 - load) * (node + 1.0)])
-    w = np.concatenate([0.5 * load * weight, 0.5 * (1.0 - load) * weight])
-    share = (rigid @ np.vstack([np.ones_like(x), x])) @ (w * bare(x))  # (n_rigid,)
-    return lambda x: bare(x) - (share @ rigid) @ np.vstack([np.ones_like(x), x])
+        return timoshenko.green(self.ends, timoshenko.SLENDER, load)(x)
 
 
 def beam(
@@ -173,20 +124,29 @@ def beam(
     )  # fmt: skip
     stout = _stoutness(theory, section, length, slenderness, shear_ratio)
     notes = plausible.doubted_sizes((length,), section)
+    rigid = timoshenko.rigid_motions(pair, stout or timoshenko.SLENDER)
+    n_rigid, most = len(rigid), MOST_MODES if stout is None else timoshenko.MOST
+
+    def bent(n: int) -> np.ndarray:
+        """The first n of omega**2 at unit mass and rigidity."""
+        return _roots(pair, n) ** 4 if stout is None else stout.values(pair, n_rigid, n)
+
+    count, reach = asked.count(float(np.sqrt(bent(1)[0])), most)
+    if np.isfinite(reach) and stout is None:
+        check_number(np.sqrt(reach) / np.pi, most)
+        count = n_rigid + int(np.count_nonzero(bent(int(np.sqrt(reach) / np.pi) + 2) <= reach**2))
+    elif np.isfinite(reach) and stout is not None:
+        count = int(stout.count(pair, np.array([reach**2]))[0])
+        check_number(count, most)
+    check_beyond_rigid(count, n_rigid, "bending")
+    p = bent(count - n_rigid)
+    own = _weights(pair, p**0.25) if stout is None else stout.weights(pair, p)
+    weights = np.vstack([np.column_stack([rigid, np.zeros_like(rigid)]), own])
+    values = np.concatenate([np.zeros(n_rigid), p])
+    shapes: Any = BeamShapes(length, pair, values**0.25, weights)
     if stout is not None:
-        return replace(asked.answered(*_timoshenko(stout, pair, length, asked), notes), thick=True)
-    rigid = _rigid(pair)
-    first = float(_roots(pair, 1)[0] ** 2)
-    count, reach = asked.count(first, MOST_MODES)
-    if np.isfinite(reach):
-        check_number(np.sqrt(reach) / np.pi, MOST_MODES)
-        count = len(rigid) + int(np.count_nonzero(_roots(pair, int(np.sqrt(reach) / np.pi) + 2) ** 2 <= reach))
-    check_beyond_rigid(count, len(rigid), "bending")
-    k = _roots(pair, count - len(rigid))
-    weights = np.vstack([np.column_stack([rigid, np.zeros_like(rigid)]), _weights(pair, k)])
-    shapes = BeamShapes(length, pair, np.concatenate([np.zeros(len(rigid)), k]), weights)
-    values = np.concatenate([np.zeros(len(rigid)), k**4])
-    return asked.answered(shapes, values, notes)
+        shapes = timoshenko.TimoshenkoShapes(length, pair, stout, values, weights)
+    return replace(asked.answered(shapes, values, notes), thick=stout is not None)
 
 
 def _stoutness(
@@ -211,23 +171,6 @@ def _stoutness(
     if not min(stout.R, stout.S) >= LIMIT**-2 / 16.0:
         raise ValueError(f"length must be at most {LIMIT:g} times the height for theory = 'timoshenko'; use 'euler'")
     return stout
-
-
-def _timoshenko(
-    stout: timoshenko.Stoutness, ends: tuple[str, str], length: float, asked: Request
-) -> tuple[timoshenko.TimoshenkoShapes, np.ndarray]:
-    """Shapes and omega**2 of a Timoshenko beam at unit mass and rigidity."""
-    rigid = timoshenko.rigid_motions(ends, stout)
-    first = float(np.sqrt(stout.values(ends, len(rigid), 1)[0]))
-    count, reach = asked.count(first, timoshenko.MOST)
-    if np.isfinite(reach):
-        count = int(stout.count(ends, np.array([reach**2]))[0])
-        check_number(count, timoshenko.MOST)
-    check_beyond_rigid(count, len(rigid), "bending")
-    p = stout.values(ends, len(rigid), count - len(rigid))
-    weights = np.vstack([np.column_stack([rigid, np.zeros_like(rigid)]), stout.weights(ends, p)])
-    values = np.concatenate([np.zeros(len(rigid)), p])
-    return timoshenko.TimoshenkoShapes(length, ends, stout, values, weights), values
 
 
 def _weights(ends: tuple[str, str], k: np.ndarray) -> np.ndarray:

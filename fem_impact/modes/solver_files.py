@@ -42,8 +42,8 @@ def calculix(path: Path, deck: str = "") -> dict[str, np.ndarray]:
             frequencies.append(float(value))
         else:
             static.append(moved)
-    found = {"nodes": np.asarray(grid.points, float)} | _steps(len(grid.points), frequencies, shapes, static)
-    found |= {"numbers": np.asarray(grid.point_data["original_node_ids"], int)}
+    found = {"nodes": np.asarray(grid.points, float)} | cell_kinds.steps(len(grid.points), shapes, static)
+    found |= {"numbers": np.asarray(grid.point_data["original_node_ids"], int), "frequencies": np.array(frequencies)}
     sets = {key[5:]: np.flatnonzero(grid.point_data[key]) for key in grid.point_data if key[:5] == "NSET:"}
     return found | _names(sets, found["numbers"]) | cell_kinds.surface_and_kind(found["nodes"], grid.cells_dict)
 
@@ -57,7 +57,7 @@ def mesh(path: Path) -> dict[str, np.ndarray]:
     numbers = _labels(path.read_text("utf-8", "replace"))
     if len(numbers) != len(points):
         raise ValueError(f"{path.name} must hold its nodes itself, not in files that it includes")
-    found = {"nodes": _spatial(points), "numbers": numbers}
+    found = {"nodes": cell_kinds.spatial(points), "numbers": numbers}
     return (
         found
         | _names(read.point_sets, numbers)
@@ -72,7 +72,7 @@ def med(path: Path) -> dict[str, np.ndarray]:
 
     h5py.File = closed_hdf5(h5py, path)
     read = meshio.read(path)
-    nodes = _spatial(np.asarray(read.points, float))
+    nodes = cell_kinds.spatial(np.asarray(read.points, float))
     shapes: list[np.ndarray] = []
     static: list[np.ndarray] = []
     frequencies: list[float] = []
@@ -89,7 +89,8 @@ def med(path: Path) -> dict[str, np.ndarray]:
                 frequencies += [value] if any(values) else []
     names = {name: np.flatnonzero(read.point_data["point_tags"] == tag) for name, tag in _families(read)}
     numbers = np.arange(1, len(nodes) + 1)
-    found = {"nodes": nodes, "numbers": numbers} | _steps(len(nodes), frequencies, shapes, static)
+    found = {"nodes": nodes, "numbers": numbers, "frequencies": np.array(frequencies)}
+    found |= cell_kinds.steps(len(nodes), shapes, static)
     return found | _names(names, numbers) | cell_kinds.surface_and_kind(nodes, cell_kinds.of_meshio(read.cells))
 
 
@@ -125,8 +126,8 @@ def ansys(path: Path) -> dict[str, np.ndarray]:
                 field[[row[int(number)] for number in at[kept]], way] = values[kept, ways.index(name)]
         fields.append(field)
     modal = analysis == MODAL
-    parts = (list(own.time_values), fields, []) if modal else ([], [], fields)
-    return found | _steps(len(numbers), *parts)
+    found["frequencies"] = np.array(own.time_values, float) if modal else np.zeros(0)
+    return found | cell_kinds.steps(len(numbers), *((fields, []) if modal else ([], fields)))
 
 
 def matrix(path: Path) -> dict[str, np.ndarray]:
@@ -146,21 +147,10 @@ def matrix(path: Path) -> dict[str, np.ndarray]:
     return {f"{kind}_entries": table}
 
 
-def _steps(n: int, frequencies: list[float], shapes: list[np.ndarray], static: list[np.ndarray]) -> dict[str, Any]:
-    found = {"frequencies": np.array(frequencies, float)}
-    for name, each in (("shapes", shapes), ("static", static)):
-        found[name] = np.stack(each, axis=2) if each else np.zeros((n, 3, 0))
-    return found
-
-
 def _names(sets: Any, numbers: np.ndarray) -> dict[str, np.ndarray]:
     """Sets of one node are names."""
     single = {str(name): int(numbers[rows[0]]) for name, rows in sets.items() if len(rows) == 1}
     return {"names": np.array(list(single), str), "named": np.array(list(single.values()), int)}
-
-
-def _spatial(points: np.ndarray) -> np.ndarray:
-    return np.column_stack([points, np.zeros((len(points), 3 - points.shape[1]))])
 
 
 def _labels(text: str) -> np.ndarray:

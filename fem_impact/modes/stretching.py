@@ -27,11 +27,10 @@ from scipy import special
 
 from .._base import check
 from ..fe import membrane, slopes
-from ..fe.assembly import System, assemble, support_of_facets, support_words
+from ..fe.assembly import System, assemble, support_of_facets
 from ..fe.section import PLANE, SOFT, Beam, Plate
 from ..fe.shallow import SHALLOW, strained
 from ..mesh import meshes
-from .air import MixedShapes
 from .disk import DiskShapes
 from .modal import Modes
 from .rectangle import RectangleShapes
@@ -100,18 +99,18 @@ def stretch(modes: Modes) -> Stretching:
 
 
 def _unwrapped(shapes: Shapes) -> tuple[Shapes, float, np.ndarray | None]:
-    """The shapes inside `ScaledShapes` and `MixedShapes`, the factor of their amplitude, and their mixture."""
-    if isinstance(shapes, (ScaledShapes, MixedShapes)):
+    """The shapes inside `ScaledShapes`, the factor of their amplitude, and their mixture."""
+    if isinstance(shapes, ScaledShapes):
         base, amplitude, mix = _unwrapped(shapes.base)
-        if isinstance(shapes, ScaledShapes):
-            return base, shapes.amplitude * amplitude, mix
-        return base, amplitude, shapes.mix if mix is None else mix @ shapes.mix
+        if shapes.mix is not None:
+            mix = shapes.mix if mix is None else mix @ shapes.mix
+        return base, shapes.amplitude * amplitude, mix
     return shapes, 1.0, None
 
 
 def _check_supports(system: System) -> None:
     """Raise ValueError unless it is known what holds the plane of a body of elements, and its slopes are known."""
-    kinds: Any = support_of_facets(system.mesh, dict(system.supports), support_words(system.theory))
+    kinds: Any = support_of_facets(system.mesh, dict(system.supports), system.rules.words)
     if isinstance(system.section, Plate) and system.theory != SHALLOW.name:  # whose linear motion has the same plane
         kinds = support_of_facets(system.mesh, dict(system.section.in_plane), PLANE, "in_plane", kinds)
     if system.theory != SHALLOW.name and not all(isinstance(kind, str) for kind in kinds):
@@ -127,7 +126,7 @@ def _sheet(shapes: Shapes, section: Plate) -> tuple[membrane.Sheet, membrane.Ste
     if isinstance(shapes, (FieldShapes, RitzShapes)):
         system = shapes.system
         _check_supports(system)
-        moved, unit = system.expand @ _vectors(shapes), system.frame.mass**-0.5 / system.frame.length
+        moved, unit = system.expand @ shapes.vectors, system.frame.mass**-0.5 / system.frame.length
 
         def by_elements(cells: np.ndarray, x: np.ndarray) -> np.ndarray:
             slope = system.space.functions(cells, x, (1,))[0]  # (n, 2, n_q, n_local)
@@ -160,20 +159,13 @@ def _tension(shapes: Shapes, section: Beam) -> tuple[np.ndarray, float]:
     """``int w_i' w_j'`` (n, n) of a beam, and its length over E A."""
     if isinstance(shapes, (FieldShapes, RitzShapes)):
         _check_supports(shapes.system)
-        return slopes.products(shapes.system, _vectors(shapes), np.eye(1)), slopes.softness(shapes.system)
+        return slopes.products(shapes.system, shapes.vectors, np.eye(1)), slopes.softness(shapes.system)
     if isinstance(shapes, (BeamShapes, TimoshenkoShapes)):
         if not set(shapes.ends) <= set(HELD):
             raise ValueError(f"{CANNOT}, but an end is free; hold it, or leave stretching out")
         area = float(section.inertia(np.zeros((1, 1)))[0]) / section.material.rho
         return _beam(shapes), shapes.length / (section.material.E * area)
     raise ValueError(f"{CANNOT}, but its shapes are known at points only; leave it out")
-
-
-def _vectors(shapes: FieldShapes | RitzShapes) -> np.ndarray:
-    """The shapes in the unknowns of their system, (n_dofs, n)."""
-    if isinstance(shapes, FieldShapes):
-        return shapes.vectors
-    return np.hstack([shapes.system.rigid, shapes.basis.T @ shapes.turn])[:, : shapes.kept]
 
 
 def _rectangle(shapes: RectangleShapes, points: np.ndarray) -> np.ndarray:

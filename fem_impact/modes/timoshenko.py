@@ -16,7 +16,9 @@ Huang (1961), J. Appl. Mech. 28, 579-584 (all ends); Wittrick and Williams (1971
 for counting modes.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 
@@ -46,19 +48,17 @@ class Stoutness:
         """w, beta, moment and shear force of the four solutions, (n, n_points, 4, 4), at p (n,) and x (n_points,)."""
         k, square = (part[:, None] for part in self.waves(p))
         p = p[:, None]
-        result = np.empty((len(p), len(x), 4, 4))
+
+        def solutions(*rows: list[np.ndarray]) -> np.ndarray:
+            return np.moveaxis(np.array(rows), (0, 1), (-1, -2))  # (n, n_points, 4, n_rows)
+
         c, s, turn = np.cos(k * x), np.sin(k * x), (k**2 - p * self.S) / k
-        result[..., 0] = np.stack([c, -turn * s, -turn * k * c, -p / k * s], axis=-1)
-        result[..., 1] = np.stack([s, turn * c, -turn * k * s, p / k * c], axis=-1)
+        waves = solutions([c, -turn * s, -turn * k * c, -p / k * s], [s, turn * c, -turn * k * s, p / k * c])
         q = np.sqrt(np.maximum(square, STEEP**2))
         turn = (q**2 + p * self.S) / q
         down, up = np.exp(-q * x), np.exp(q * (x - 1.0))
-        exponential = np.stack(
-            [
-                np.stack([down, -turn * down, turn * q * down, p / q * down], axis=-1),
-                np.stack([up, turn * up, turn * q * up, -p / q * up], axis=-1),
-            ],
-            axis=-1,
+        exponential = solutions(
+            [down, -turn * down, turn * q * down, p / q * down], [up, turn * up, turn * q * up, -p / q * up]
         )
         mild = np.minimum(square, STEEP**2)
         root = np.sqrt(np.abs(mild))
@@ -67,15 +67,8 @@ class Stoutness:
         safe = np.where(root * x > 1e-8, root, 1.0)
         s = np.where(root * x > 1e-8, np.where(mild > 0.0, np.sinh(low), np.sin(root * x)) / safe, x)
         turn = mild + p * self.S  # the second is scaled by its rotation, which remains at q = 0
-        bounded = np.stack(
-            [
-                np.stack([c, turn * s, turn * c, -p * s], axis=-1),
-                np.stack([mild * s, turn * c, turn * mild * s, -p * c], axis=-1),
-            ],
-            axis=-1,
-        )
-        result[..., 2:] = np.where((square > STEEP**2)[..., None, None], exponential, bounded)
-        return result
+        bounded = solutions([c, turn * s, turn * c, -p * s], [mild * s, turn * c, turn * mild * s, -p * c])
+        return np.concatenate([waves, np.where((square > STEEP**2)[..., None, None], exponential, bounded)], axis=-1)
 
     def hinged(self, n: int) -> np.ndarray:
         """The first n values of p of the beam hinged at both ends, ascending."""
@@ -133,6 +126,9 @@ class Stoutness:
         return found * np.where(near < 0.0, -1.0, 1.0)[:, None]
 
 
+SLENDER = Stoutness(0.0, 0.0)  # without shear and rotary inertia
+
+
 def _negative(matrices: np.ndarray) -> np.ndarray:
     """Number of negative eigenvalues (n,) of symmetric matrices (n, m, m)."""
     return (np.linalg.eigvalsh(0.5 * (matrices + matrices.transpose(0, 2, 1))) < 0.0).sum(axis=1)
@@ -176,15 +172,21 @@ class TimoshenkoShapes(BeamlikeShapes, check.Brief):
         return np.hstack(parts)
 
     def green(self, load: float, x: np.ndarray) -> np.ndarray:
-        return _green(self.ends, self.stoutness, load, x)
+        return green(self.ends, self.stoutness, load)(x)
 
 
-def _green(ends: tuple[str, str], stoutness: Stoutness, load: float, x: np.ndarray) -> np.ndarray:
-    """Deflection (n,) of the unit beam at x (n,) under a unit force at ``load``, without its rigid motion.
+@lru_cache(maxsize=64)
+def green(ends: tuple[str, str], stoutness: Stoutness, load: float) -> Callable[[np.ndarray], np.ndarray]:
+    """Deflection of the unit beam under a unit force at ``load`` in 0 ... 1, without its rigid motion.
 
     w, beta, moment and shear force are polynomials with four constants, those at the left end, plus what the force adds
-    beyond its place and what the inertia of the rigid motion adds, which balances it.
+    beyond its place and what the inertia of the rigid motion adds, which balances it. The beam is mirrored if need be
+    so that the force is in its left half: near a clamped end the deflection is of the order of the distance cubed, and
+    mirroring keeps its digits.
     """
+    if load > 0.5:
+        mirrored = green(ends[::-1], stoutness, 1.0 - load)
+        return lambda x: mirrored(1.0 - x)
     R, S = stoutness.R, stoutness.S
     moving = rigid_motions(ends, stoutness)
     c0, c1 = -moving.T @ (moving @ [1.0, load])  # inertia force c0 + c1 x and moment R c1 per length
@@ -200,20 +202,20 @@ def _green(ends: tuple[str, str], stoutness: Stoutness, load: float, x: np.ndarr
     def driven(x: np.ndarray) -> np.ndarray:
         """w, beta, M and Q (4, n) at x (n,) by the force and the inertia."""
         beyond = (x - load).clip(0.0)
-        push = -c0 * x - c1 * x**2 / 2.0 - ((x > load) | (x >= 1.0))  # a force at an end acts inside
+        push = -c0 * x - c1 * x**2 / 2.0 - (x > load)  # a force at an end acts inside
         moment = c0 * x**2 / 2.0 + c1 * x**3 / 6.0 + beyond - R * c1 * x
         turn = c0 * x**3 / 6.0 + c1 * x**4 / 24.0 + beyond**2 / 2.0 - R * c1 * x**2 / 2.0
         bent = c0 * x**4 / 24.0 + c1 * x**5 / 120.0 + beyond**3 / 6.0 - R * c1 * x**3 / 6.0
         return np.array([bent - S * (c0 * x**2 / 2.0 + c1 * x**3 / 6.0 + beyond), turn, moment, push])
 
-    ends_at = np.array([0.0, 1.0])
-    unit, given = constants(ends_at), driven(ends_at)
-    rows = [(i, end) for end in range(2) for i in ENDS[ends[end]]]
-    matrix, right = np.array([unit[i, end] for i, end in rows]), np.array([given[i, end] for i, end in rows])
-    start = np.linalg.lstsq(matrix, -right, rcond=None)[0]
+    left = np.setdiff1d(np.arange(4), ENDS[ends[0]])  # constants that the left end does not hold
+    far, right = np.ones(1), list(ENDS[ends[1]])
+    start = np.zeros(4)
+    start[left] = np.linalg.lstsq(constants(far)[right, 0][:, left], -driven(far)[right, 0], rcond=None)[0]
     node, weight = np.polynomial.legendre.leggauss(6)  # exact on either side of the force
     place = np.concatenate([0.5 * load * (node + 1.0), load + 0.5 * (1.0 - load) * (node + 1.0)])
     share = np.concatenate([0.5 * load * weight, 0.5 * (1.0 - load) * weight])
     w, beta = (constants(place) @ start + driven(place))[:2]
     carried = moving @ np.vstack([share @ w, share @ (place * w) + R * share @ beta])  # (n_rigid, 1)
-    return (constants(x) @ start + driven(x))[0] - (carried.ravel() @ moving) @ np.vstack([np.ones_like(x), x])
+    drift = carried.ravel() @ moving
+    return lambda x: (constants(x) @ start + driven(x))[0] - drift @ np.vstack([np.ones_like(x), x])

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from .._base import check, isolated
+from . import cell_kinds
 
 NORMAL_MODE, DISPLACEMENT, STRUCTURAL, REAL, STATIC = 2, 8, 1, 2, 1  # codes of data sets 55 and 2414
 CELL_CODE = {2: 11, 3: 91, 4: 94}  # nodes of a cell -> rod, thin shell triangle, thin shell quadrilateral
@@ -19,10 +20,6 @@ LINES, SHELLS, SOLIDS = (11, 21, 22), range(41, 97), range(111, 119)
 CORNERS: dict[int, tuple[int, ...]] = {3: (0, 1, 2), 4: (0, 1, 2, 3), 6: (0, 2, 4), 8: (0, 2, 4, 6)}
 PHASE = 0.3  # [-] imaginary over real part, at the best phase, up to which a complex shape is taken as real: 17 degrees
 COMPONENTS = "r1", "r2", "r3"  # along x, y and z
-
-
-def _pyuff() -> Any:
-    return check.extra("pyuff", "uff", "a universal file")
 
 
 def write(
@@ -41,9 +38,9 @@ def write(
     points : ndarray, shape (n_points, dimension) [m]
     cells : ndarray, shape (n_cells, 2, 3 or 4), point numbers
     """
-    pyuff, path = _pyuff(), check.path("path", path)
+    pyuff, path = check.extra("pyuff", "uff", "a universal file"), check.path("path", path)
     n_points = len(points)
-    place = np.column_stack([points, np.zeros((n_points, 3 - points.shape[1]))])
+    place = cell_kinds.spatial(points)
     node = np.arange(1, n_points + 1)
     zero, one = np.zeros(n_points, int), np.ones(n_points, int)
     x, y, z = place.T
@@ -118,14 +115,12 @@ def arrays(path: Path) -> dict[str, np.ndarray]:
     lost = np.setdiff1d(measured, numbers)
     if lost.size:
         raise ValueError(f"{path.name} has shapes at node {lost[0]}, which has no coordinates; export it again")
-    row = {int(number): i for i, number in enumerate(numbers)}
-    nodes = place[[row[int(n)] for n in measured]]
+    nodes = place[cell_kinds.rows_of(numbers, measured)]
     table = [_mode(path.name, i, mode, measured) for i, mode in enumerate(modes)]
     frequencies, damping, shapes = zip(*sorted(table, key=lambda entry: entry[0])) if table else ((), (), ())
     result = {"frequencies": np.array(frequencies), "damping_ratio": np.array(damping), "nodes": nodes}
-    deflections = [_moved(path.name, i, one, measured) for i, one in enumerate(static)]
-    for name, each in (("shapes", shapes), ("static", deflections)):
-        result[name] = np.stack(each, axis=2) if len(each) else np.zeros((*nodes.shape, 0))
+    still = [_moved(path.name, i, one, measured) for i, one in enumerate(static)]
+    result |= cell_kinds.steps(len(nodes), shapes, still)
     for what, values in result.items():
         if not (np.abs(values) <= check.REACH).all() or (what == "frequencies" and (values < 0.0).any()):
             raise ValueError(f"{path.name} has {what} that are negative, too large or not numbers; export it again")

@@ -17,9 +17,7 @@ SPREAD = 2.0
 # shapes that go over to those of the middle of the body overshoot them by at most two
 OUTSIDE = 2.0
 FLAT = 1e-6  # [-] of their extent, by which points may be off a line or a plane: as many digits as files keep
-HELD = (
-    0.25  # [-] of the mass that moves along in one mode of a held body: at least 0.48 in the first of a clamped plate
-)
+HELD = 0.25  # [-] of the mass that moves along in a mode of a held body: at least 0.48 in the first of a clamped plate
 
 
 def left_out(omega: np.ndarray, rows: np.ndarray, mass: float, dimension: int) -> tuple[np.ndarray, np.ndarray]:
