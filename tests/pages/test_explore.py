@@ -265,7 +265,7 @@ def test_the_map_stands_with_its_legend_and_each_slider_with_what_it_changes(ope
             assert hands[7] >= figure[5] and hands[4] < figure[6]  # beside
         assert hands[7] >= card[7] and hands[5] <= card[5]
     under = shown.tab.evaluate(
-        """['body', 'map', 'force', 'spectrum'].map(name => [...document.querySelectorAll(`#hands-${name} input`)]
+        """['body', 'map', 'force', 'spectrum'].map(n => [...document.querySelectorAll(`#hands-${n} [type=range]`)]
             .map(slider => slider.id))"""
     )
     assert under == [list(names) for names in explore_view.CARDS.values()]
