@@ -6,6 +6,7 @@ import re
 import sys
 import textwrap
 from collections.abc import Callable, Sequence
+from importlib import import_module
 from pathlib import Path
 from typing import Any, NamedTuple, NoReturn
 
@@ -83,6 +84,11 @@ class Command(NamedTuple):
     options: tuple[Option, ...] = ()
     scene: str = "a TOML file"  # the first argument in words; "" for a command without
     called: str = "SCENE"
+
+
+def _later(name: str) -> Callable[[argparse.Namespace], commands.Answer | None]:
+    """What runs a command of `hammer_commands`, which is imported then: it needs numpy, and help does not."""
+    return lambda options: getattr(import_module("fem_impact.hammer_commands"), name)(options)
 
 
 def _option(name: str, value: Any, help: str, type: Any = None, **how: Any) -> Option:
@@ -189,7 +195,7 @@ COMMANDS = {
         _out("spread.json, .nc, .csv and .png", "out/NAME"),
         _format(),
     )),
-    "hammer": Command("find the hammers that reach a bandwidth without a double hit", commands.hammer, (
+    "hammer": Command("find the hammers that reach a bandwidth without a double hit", _later("hammer"), (
         _option("--bandwidth", "F", "bandwidth to reach [Hz]", float, required=True),
         _option("--drop", "D", "how far the spectrum may fall within the bandwidth [dB] (default: 10)", float,
                 default=10.0),
@@ -200,7 +206,7 @@ COMMANDS = {
         _out("hammers.png, or rove.png and .csv, or hammers.html", "none", "picture or page"),
         _format(None),
     ), "a TOML file; its body and strike point are used"),
-    "watch": Command("judge every record of taps that a folder gets: good, or what to do", commands.watch, (
+    "watch": Command("judge every record of taps that a folder gets: good, or what to do", _later("watch"), (
         _option("--bandwidth", "F", "bandwidth that taps must reach [Hz]", float, required=True),
         _option("--drop", "D", "how far the spectrum may fall within the bandwidth [dB] (default: 10)", float,
                 default=10.0),
@@ -275,7 +281,7 @@ COMMANDS = {
     "completion": Command(
         "print a script that completes commands; eval it in ~/.bashrc", lambda options: _complete(options.shell),
         (_option("shell", None, "default: bash", choices=("bash", "zsh", "tcsh"), nargs="?", default="bash"),), ""),
-    "frf": Command("compute frequency responses of taps, or of a scene as a rig would measure it", commands.frf, (
+    "frf": Command("compute frequency responses of taps, or of a scene as a rig would measure it", _later("frf"), (
         *CHANNELS,
         _option("--method", None, "H1 for noise in the response, H2 in the force, Hv in both", default="H1",
                 choices=("H1", "H2", "Hv")),

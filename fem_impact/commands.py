@@ -2,7 +2,6 @@
 
 import argparse
 import math
-import os
 import time
 import warnings
 import webbrowser
@@ -10,55 +9,27 @@ from collections.abc import Sequence
 from contextlib import nullcontext
 from functools import partial
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import fem_impact as fi
 
 from . import answers
 from ._base.explained import noted
 from ._base.files import staged
-from .display import LONG, Display, tell, width
+from .display import LONG, Display
+from .replies import (
+    Answer,
+    answer,
+    answer_of_file,
+    as_table,
+    file_of,
+    folder_of,
+    picture_of,
+    progress_of,
+    remark,
+    title_of,
+)
 from .show import FORMATS
-
-
-class Answer(NamedTuple):
-    """What a command found: as data for programs, and as text for people."""
-
-    data: dict[str, Any]
-    said: Sequence[str | Sequence[str]] | None  # texts to wrap, and tables to print as they are; None: data only
-    missed: bool = False  # whether a tolerance was missed
-    fault: str = ""  # why the command failed all the same
-
-
-def answer(
-    data: dict[str, Any], *said: str | Sequence[str], folder: Path | None = None, files: Sequence[str] = (), **ends: Any
-) -> Answer:
-    """An answer with the files that were written to a folder, which are said last."""
-    lines, where = list(said), None
-    if folder is not None and files:
-        where, one = str(folder), len(files) == 1
-        lines.append(f"Files: {folder / files[0]}" if one else f"Files in {where}{os.sep}: {', '.join(files)}")
-    return Answer({**data, "folder": where, "files": list(files)}, lines, **ends)
-
-
-def _display(options: argparse.Namespace, tells: bool = False) -> Display:
-    """The progress of a command; `tells` for one that announces long work. Quiet commands show nothing."""
-    return Display(tell if tells and not options.quiet else None, shown=not options.quiet)
-
-
-def _tell(options: argparse.Namespace, text: str) -> None:
-    if not options.quiet:
-        tell(text)
-
-
-def _folder(options: argparse.Namespace) -> Path:
-    """The folder that --out names, or one named after the scene."""
-    return options.out if options.out is not None else Path("out") / options.scene.stem
-
-
-def _file(options: argparse.Namespace, name: str) -> Path | None:
-    """The file that --out names: itself if it has an ending, otherwise ``name`` in that folder."""
-    return options.out if options.out is None or options.out.suffix else options.out / name
 
 
 def strike(options: argparse.Namespace) -> Answer:
@@ -79,7 +50,7 @@ def strike(options: argparse.Namespace) -> Answer:
         check.extra("imageio_ffmpeg", "film", "an MP4 file")
     if scene.stroke:
         return _strike_in_turn(options, scene)
-    folder, display = _folder(options), _display(options, tells=True)
+    folder, display = folder_of(options), progress_of(options, tells=True)
     with staged(folder, "strike") as staging, Painter() if options.pictures else nullcontext() as painter:
         place = folder.resolve()  # "." has no name of its own
         keep = place.parent / f"{place.name}.modes.npz"  # not in the folder: an interrupted run leaves that alone
@@ -96,7 +67,7 @@ def strike(options: argparse.Namespace) -> Answer:
         with display("blows"):
             found = band.around(scene, run.response, watch=partial(display.report, "blows"))
     seconds = {**run.seconds, **stages.seconds, "total": time.perf_counter() - began}
-    said: list[str | Sequence[str]] = [_title(scene), run.response.summary()]
+    said: list[str | Sequence[str]] = [title_of(scene), run.response.summary()]
     if options.band:
         data |= {"band": found.data()}
         said.append(found.summary().splitlines())
@@ -119,7 +90,7 @@ def _announce(options: argparse.Namespace, display: Display, verify: bool, files
     more = f", and {plan.ringing:.0f} s for the modes of its files" if files and plan.ringing > LONG else ""
     if plan.costly or more:
         text = f"{plan.cost}{more}; Ctrl-C stops it, and the same command later reuses the modes already found"
-        _tell(options, f"{text} (`fem-impact plan` explains why)")
+        remark(options, f"{text} (`fem-impact plan` explains why)")
 
 
 def _write(
@@ -157,7 +128,7 @@ def _write(
             with stages("pictures"):
                 missing = painter.finish()
             if missing:
-                _tell(options, f"pictures are drawn in two dimensions; {missing}")
+                remark(options, f"pictures are drawn in two dimensions; {missing}")
             files += [*(f"{name}.{options.format}" for name in NAMES), "wave.gif"]
     if run.verified is not None:
         extra["verified"] = run.verified
@@ -204,7 +175,7 @@ def _strike_in_turn(options: argparse.Namespace, scene: Any) -> Answer:
     if wrong:
         raise ValueError(f"--{wrong} must be left out for a scene with strokes")
     began = time.perf_counter()
-    folder, display = _folder(options), _display(options)
+    folder, display = folder_of(options), progress_of(options)
     with staged(folder, "strike") as staging, warnings.catch_warnings():
         warnings.simplefilter("ignore", fi.ToleranceWarning)  # the first line of the summary says it
         stages = Stages(display)
@@ -214,7 +185,7 @@ def _strike_in_turn(options: argparse.Namespace, scene: Any) -> Answer:
         seconds = {**stages.seconds, "total": time.perf_counter() - began}
         data = {**sequence.numbers(found, tables, seconds), "sounds": sounds, "files": files + copies}
         _save_response(staging, scene, found, data)
-    said = [_title(scene), found.summary(), *heard(sounds), f"Time: {seconds['total']:.2f} s"]
+    said = [title_of(scene), found.summary(), *heard(sounds), f"Time: {seconds['total']:.2f} s"]
     return answer(data, *said, folder=folder, files=data["files"], missed=not found.tolerance_met)
 
 
@@ -236,8 +207,8 @@ def heard(sounds: Sequence[dict[str, Any]]) -> list[str]:
 def plan(options: argparse.Namespace) -> Answer:
     """Plan, and strike nothing."""
     scene = fi.load_scene(options.scene)
-    plan = (scene.plan_strokes if scene.stroke else scene.plan)(watch=_display(options), **_choices(options))
-    return answer(plan.data(), _title(scene), str(plan))
+    plan = (scene.plan_strokes if scene.stroke else scene.plan)(watch=progress_of(options), **_choices(options))
+    return answer(plan.data(), title_of(scene), str(plan))
 
 
 def map_of(options: argparse.Namespace) -> Answer:
@@ -248,14 +219,14 @@ def map_of(options: argparse.Namespace) -> Answer:
     chosen = {word in FORMATS: word for word in options.format}  # of pictures and of numbers
     form, picture = maps.can_write(chosen.get(False, "nc"), options.out), chosen.get(True, FORMATS[0])
     scene = fi.load_scene(options.scene)
-    folder = _folder(options)
+    folder = folder_of(options)
     with staged(folder, "map") as staging:
-        display = _display(options)
+        display = progress_of(options)
         with display("cells"):
             table = maps.map_scene(
                 scene, tolerance=options.tolerance, workers=options.workers, client=options.cluster,
                 store=options.store, watch=partial(display.report, "cells"), max_cells=options.max_cells,
-                tell=partial(_tell, options), stage=display, cells=options.cells,
+                tell=partial(remark, options), stage=display, cells=options.cells,
                 borders=True if options.borders else None, refine=False if options.every_cell else None,
             )  # fmt: skip
         with display("files"):
@@ -264,7 +235,7 @@ def map_of(options: argparse.Namespace) -> Answer:
     single, failed = int((table.n_impacts == 1).sum()), int((table.n_impacts < 0).sum())
     data: dict[str, Any] = {"n_blows": table.n_impacts.size, "axes": axes, "n_single": single, "n_failed": failed}
     over = ", ".join(f"{name} ({size})" for name, size in axes.items())
-    said = [_title(scene), f"{table.n_impacts.size} blows over {over}: {single} hit once, {failed} failed"]
+    said = [title_of(scene), f"{table.n_impacts.size} blows over {over}: {single} hit once, {failed} failed"]
     for name in ("cells", "borders"):
         if name in table.attrs:
             data[name] = table.attrs[name]
@@ -285,7 +256,7 @@ def spread(options: argparse.Namespace) -> Answer:
     from .scenes import uncertainty  # imported only when needed
 
     began = time.perf_counter()
-    folder = _folder(options)
+    folder = folder_of(options)
     scene = fi.load_scene(options.scene)
     vary = dict(_split("--vary", text) for text in options.vary)
     pairs = [_split("--correlate", text) for text in options.correlate]
@@ -294,7 +265,7 @@ def spread(options: argparse.Namespace) -> Answer:
     except ValueError:
         raise ValueError("--correlate must look like contact.stiffness,striker.mass=0.5") from None
     with staged(folder, "spread") as staging:
-        display = _display(options)
+        display = progress_of(options)
         with display("blows"):
             found = uncertainty.spread(
                 scene, vary, n=options.blows, correlation=correlation or None, seed=options.seed,
@@ -305,7 +276,7 @@ def spread(options: argparse.Namespace) -> Answer:
         with display("files"):
             names = uncertainty.write(staging, found, options.format)
     seconds = time.perf_counter() - began
-    said = [_title(scene), found.summary().splitlines(), f"Time: {seconds:.2f} s"]
+    said = [title_of(scene), found.summary().splitlines(), f"Time: {seconds:.2f} s"]
     return answer({**found.data(), "seconds": {"total": seconds}}, *said, folder=folder, files=names)
 
 
@@ -317,27 +288,13 @@ def _split(option: str, text: str) -> tuple[str, str]:
     return name.strip(), value.strip()
 
 
-def hammer(options: argparse.Namespace) -> Answer:
-    """Find hammers for a bandwidth, or plan a test with one that roves."""
-    from . import hammer_commands  # imported only when needed
-
-    return hammer_commands.hammer(options)
-
-
-def watch(options: argparse.Namespace) -> Answer | None:
-    """Judge the records of taps that a folder gets."""
-    from . import hammer_commands  # imported only when needed
-
-    return hammer_commands.watch(options)
-
-
 def report(options: argparse.Namespace) -> Answer:
     """Strike and write a page."""
     scene = fi.report.read(options.scene)
-    path = _file(options, "report.html") or Path("out") / options.scene.stem / "report.html"
+    path = file_of(options, "report.html") or Path("out") / options.scene.stem / "report.html"
     changes = {} if options.tolerance is None else {"tolerance": options.tolerance}
     with staged(path.parent) as staging:
-        display = _display(options, tells=True)
+        display = progress_of(options, tells=True)
         before = partial(_announce, options, display, False, False)
         if scene.stroke:
             with warnings.catch_warnings():
@@ -348,18 +305,18 @@ def report(options: argparse.Namespace) -> Answer:
         display.predict(None)
         with display("page"):
             fi.report.write(staging / path.name, scene, run)
-    said = [_title(scene), run.response.summary()]
+    said = [title_of(scene), run.response.summary()]
     missed = not run.response.tolerance_met
-    return _answer_of_file(fi.report.numbers(scene, run), said, path, missed=missed)
+    return answer_of_file(fi.report.numbers(scene, run), said, path, missed=missed)
 
 
 def page(options: argparse.Namespace) -> Answer:
     """Strike the grid of a page without a server."""
-    scene, display = fi.load_scene(options.scene), _display(options)
-    path = _file(options, "page.html") or Path("out") / options.scene.stem / "page.html"
+    scene, display = fi.load_scene(options.scene), progress_of(options)
+    path = file_of(options, "page.html") or Path("out") / options.scene.stem / "page.html"
     with staged(path.parent) as staging:
         found = fi.lesson.write(staging / path.name, scene, watch=display, told=partial(display.report, "blows"))
-    return _answer_of_file(found.data(), [_title(scene), f"{found.summary()}."], path)
+    return answer_of_file(found.data(), [title_of(scene), f"{found.summary()}."], path)
 
 
 def explore(options: argparse.Namespace) -> None:
@@ -371,7 +328,7 @@ def explore(options: argparse.Namespace) -> None:
         if not options.no_open:
             webbrowser.open(address)
 
-    fi.explore.serve(scene, port=options.port, ready=ready, watch=_display(options))
+    fi.explore.serve(scene, port=options.port, ready=ready, watch=progress_of(options))
 
 
 def play(options: argparse.Namespace) -> Answer:
@@ -379,22 +336,22 @@ def play(options: argparse.Namespace) -> Answer:
     from .live import command, devices  # imported only when needed
 
     scene = fi.load_scene(options.scene)
-    path = _file(options, "play.wav") or Path("out") / options.scene.stem / "play.wav"
+    path = file_of(options, "play.wav") or Path("out") / options.scene.stem / "play.wav"
     with staged(path.parent) as staging:
-        with _display(options)("modes"):
+        with progress_of(options)("modes"):
             modes = scene.modes(options.n_modes)
-        with _display(options)("preparing, and compiling if not yet done"):
+        with progress_of(options)("preparing, and compiling if not yet done"):
             player = command.player_of(scene, modes, options)
         with command.source_of(options, player) as (source, told):
             device, missing = command.device_of(options, source.live)
             if missing:
-                _tell(options, missing)
-            _tell(options, told)
+                remark(options, missing)
+            remark(options, told)
             played = devices.perform(player, source, options.duration, device)
         (staging / path.name).write_bytes(played.sound.wav())
     happened = ", ".join(f"{count} {name}" for name, count in player.counted.items())
     said = [
-        _title(scene),
+        title_of(scene),
         *noted(modes.notes),
         f"Played: {happened} of at most {1e6 * player.step:.3g} us, {modes.n_modes} modes",
         f"Blocks: {len(played.seconds)} of {1e3 * player.block / player.rate:.3g} ms; the 99th percentile of their "
@@ -404,7 +361,7 @@ def play(options: argparse.Namespace) -> Answer:
         "played": dict(player.counted), "step": player.step, "n_modes": modes.n_modes, "n_blocks": len(played.seconds),
         "slowest": played.slowest, "missed": played.missed, "notes": modes.notes,
     }  # fmt: skip
-    return _answer_of_file(data, said, path)
+    return answer_of_file(data, said, path)
 
 
 def modes(options: argparse.Namespace) -> Answer:
@@ -412,7 +369,7 @@ def modes(options: argparse.Namespace) -> Answer:
     from ._base import check  # imports numpy, which --help and --version do not need
 
     check.count("n_modes", options.n_modes)
-    scene, display = fi.load_scene(options.scene), _display(options)
+    scene, display = fi.load_scene(options.scene), progress_of(options)
     if options.vtk is not None:
         fi.export.vtk_ending(options.vtk)
     with nullcontext() if options.vtk is None else staged(options.vtk.parent) as staging:  # or fails early
@@ -426,11 +383,11 @@ def modes(options: argparse.Namespace) -> Answer:
         if i > modes.n_rigid
     ]
     rigid = f"Modes 1 to {modes.n_rigid} are rigid motions: nothing holds the body there"
-    said: list[str | Sequence[str]] = [_title(scene), *noted(modes.notes)]
+    said: list[str | Sequence[str]] = [title_of(scene), *noted(modes.notes)]
     said += [rigid if modes.n_rigid > 1 else "Mode 1 is a rigid motion"] if modes.n_rigid else []
-    said.append(_table(rows, ("mode", "frequency", "damping ratio")))
+    said.append(as_table(rows, ("mode", "frequency", "damping ratio")))
     data = {"frequencies": modes.frequencies, "damping_ratios": modes.damping_ratio, "n_rigid": modes.n_rigid}
-    return _answer_of_file({**data, "mass": modes.mass, "notes": modes.notes}, said, options.vtk)
+    return answer_of_file({**data, "mass": modes.mass, "notes": modes.notes}, said, options.vtk)
 
 
 def new(options: argparse.Namespace) -> Answer:
@@ -438,14 +395,14 @@ def new(options: argparse.Namespace) -> Answer:
     from .scenes import adapted, templates  # imported only when needed
 
     name = f"{options.kind if options.drawing is None else options.drawing.stem}.toml"
-    path = _file(options, name) or Path(name)
+    path = file_of(options, name) or Path(name)
     whole, notes = adapted.text(
         options.kind, path.parent, drawing=options.drawing, unit=options.unit, material=options.material,
         mallet=options.mallet,
     )  # fmt: skip
     templates.write(path, options.kind, whole)
     verb = "map" if options.kind == "map" else "strike"
-    found = _answer_of_file({"notes": notes}, noted(notes), path)
+    found = answer_of_file({"notes": notes}, noted(notes), path)
     return found._replace(said=[*(found.said or ()), f"Next: fem-impact {verb} {path}"])
 
 
@@ -454,16 +411,16 @@ def catalogue(options: argparse.Namespace) -> Answer:
     from .impact import listing  # imported only when needed
 
     data, said = listing.listed(" ".join(options.words))
-    return answer(data, *(part if isinstance(part, str) else _table(*part) for part in said))
+    return answer(data, *(part if isinstance(part, str) else as_table(*part) for part in said))
 
 
 def mesh(options: argparse.Namespace) -> Answer:
     """List what supports can name."""
     from .mesh import edge_table  # imported only when needed
 
-    drawn = _drawn(options, "mesh.png")
+    drawn = picture_of(options, "mesh.png")
     ending = options.scene.suffix.lower()
-    with _display(options)("mesh"):
+    with progress_of(options)("mesh"):
         if ending == ".toml":
             if options.unit is not None:
                 raise ValueError("--unit must be left out for a scene, which states it")
@@ -481,9 +438,9 @@ def mesh(options: argparse.Namespace) -> Answer:
         for edge in edges
     ]  # fmt: skip
     heads = ("edge", "length", "facets", "form", "half way at", "the same as")
-    said = [str(options.scene), *noted(mesh.notes), [*_table(facts), "", *_table(rows, heads)]]
+    said = [str(options.scene), *noted(mesh.notes), [*as_table(facts), "", *as_table(rows, heads)]]
     data = {"mesh": dict(facts), "edges": [vars(edge) for edge in edges], "notes": mesh.notes}
-    return _answer_of_file(data, said, drawn)
+    return answer_of_file(data, said, drawn)
 
 
 def show(options: argparse.Namespace) -> Answer:
@@ -507,9 +464,9 @@ def doctor(options: argparse.Namespace) -> Answer:
     """Check the installation."""
     from . import doctor  # imported only when needed
 
-    with _display(options)("checking, and compiling if not yet done"):
+    with progress_of(options)("checking, and compiling if not yet done"):
         findings = doctor.examine()
-    said: list[str | Sequence[str]] = [_table(list(fi.export.versions().items()))]
+    said: list[str | Sequence[str]] = [as_table(list(fi.export.versions().items()))]
     for finding in findings:
         state = "works" if finding.works else "fails" if finding.vital else "missing"
         said.append(f"{finding.name:<22} {state:<8} {finding.seconds:5.2f} s  {finding.remedy}".rstrip())
@@ -526,8 +483,8 @@ def verify(options: argparse.Namespace) -> Answer:
     if options.list:
         known = [{"name": case.name, **case.about} for case in references.select(options.names or "all")]
         told = [(case["name"], case["title"], case["source"]) for case in known]
-        return answer({"cases": known}, _table(told, ("case", "what it is", "source")))
-    display = _display(options)
+        return answer({"cases": known}, as_table(told, ("case", "what it is", "source")))
+    display = progress_of(options)
     with display("cases"):
         found = references.verify(options.names or "all", watch=partial(display.report, "cases"))
     rows = [
@@ -541,44 +498,13 @@ def verify(options: argparse.Namespace) -> Answer:
     )
     said += "" if options.all else "; the one nearest to what errors allow is shown of each (--all: every one)"
     fault = f"{', '.join(failed)}: ours differs by more than both errors allow; see above" if failed else ""
-    picture = _drawn(options, "verify.png")
+    picture = picture_of(options, "verify.png")
     if picture is not None:
         with staged(picture.parent, "verify") as staging:
             figures.save(staging / picture.name, plots.verdicts(found))
     data = {"cases": [each.data for each in found], "n_failed": len(failed)}
     head = ("case", "quantity", "reference", "ours", "allowed", "so it")
-    return _answer_of_file(data, (_table(rows, head), said), picture)._replace(fault=fault)
-
-
-def _title(scene: Any) -> str:
-    return scene.title or str(scene.path)
-
-
-def _drawn(options: argparse.Namespace, name: str) -> Path | None:
-    """The picture to write, with the ending of the format asked for."""
-    path = _file(options, name)
-    return path if path is None or options.format is None else path.with_suffix(f".{options.format}")
-
-
-def _answer_of_file(
-    data: dict[str, Any], said: Sequence[str | Sequence[str]], path: Path | None, missed: bool = False
-) -> Answer:
-    """The answer of a command that wrote one file, or none."""
-    if path is None:
-        return answer(data, *said, missed=missed)
-    return answer(data, *said, folder=path.parent, files=[path.name], missed=missed)
-
-
-def _table(rows: Sequence[Sequence[Any]], head: Sequence[str] = ()) -> list[str]:
-    """A table; on a terminal too narrow for it, each row as a list."""
-    from ._base import markup  # imports numpy, which --help and --version do not need
-
-    lines = markup.columns(rows, head)
-    if max(map(len, lines), default=0) <= width():
-        return lines
-    if not head:
-        return [f"{name}: {value}" for name, value in rows]
-    return [line for first, *rest in rows for line in (str(first), *(f"  {h}: {x}" for h, x in zip(head[1:], rest)))]
+    return answer_of_file(data, (as_table(rows, head), said), picture)._replace(fault=fault)
 
 
 def _choices(options: argparse.Namespace) -> dict[str, Any]:
@@ -586,19 +512,12 @@ def _choices(options: argparse.Namespace) -> dict[str, Any]:
     return {name: getattr(options, name) for name in names if getattr(options, name) is not None}
 
 
-def frf(options: argparse.Namespace) -> Answer:
-    """List the peaks of frequency responses, and write them and a page about them."""
-    from . import hammer_commands  # imported only when needed
-
-    return hammer_commands.frf(options)
-
-
 def fit(options: argparse.Namespace) -> Answer:
     """Find the hammer and the contact behind measured taps."""
     from .pages import fit_page  # imported only when needed
     from .taps import prompt  # imported only when needed
 
-    folder, display = _folder(options), _display(options)
+    folder, display = folder_of(options), progress_of(options)
     with staged(folder, "fit") as staging:
         with display("fit"):
             found, scene, proposal = prompt.fit(options, partial(display.report, "fits"))

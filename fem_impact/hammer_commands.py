@@ -10,7 +10,7 @@ import numpy as np
 
 import fem_impact as fi
 
-from . import commands
+from . import replies
 from ._base import check
 from ._base.explained import noted
 from ._base.files import staged
@@ -20,7 +20,7 @@ MASSES = [m * 10.0**e for e in (-3, -2, -1) for m in (1.0, 2.0, 5.0)] + [1.0]  #
 PAUSE = 0.5  # [s] between two looks at a folder: a file that nobody wrote to for so long is complete
 
 
-def hammer(options: argparse.Namespace) -> commands.Answer:
+def hammer(options: argparse.Namespace) -> replies.Answer:
     """Find hammers for a bandwidth, or plan a test with one that roves."""
     scene = fi.load_scene(options.scene)
     masses = options.masses or MASSES
@@ -29,8 +29,8 @@ def hammer(options: argparse.Namespace) -> commands.Answer:
         return _sheets(options, scene, notes)
     if options.rove is not None:
         return _rove(options, scene, masses, notes)
-    drawn = commands._drawn(options, "hammers.png")
-    with commands._display(options, tells=True)("hammers"):
+    drawn = replies.picture_of(options, "hammers.png")
+    with replies.progress_of(options, tells=True)("hammers"):
         hammers = tips.hammers_for(scene, options.bandwidth, masses, drop=options.drop, between=True)
         if drawn is not None:
             from .show import plots  # imported only when needed, as matplotlib takes a second
@@ -45,10 +45,10 @@ def hammer(options: argparse.Namespace) -> commands.Answer:
         for hammer in hammers
     ]  # fmt: skip
     said: list[str | Sequence[str]] = [
-        commands._title(scene),
+        replies.title_of(scene),
         *noted(notes),
         f"Linear tips that reach {options.bandwidth:g} Hz (spectrum at most {options.drop:g} dB down) and hit once:",
-        commands._table(rows, ("mass", "softest tip", "hardest tip", "its reach")),
+        replies.as_table(rows, ("mass", "softest tip", "hardest tip", "its reach")),
     ]
     for hammer in (each for each in hammers if len(each.working) > 1):
         ranges = ", ".join(f"{low:.3g} to {high:.3g} N/m" for low, high in hammer.working)
@@ -61,15 +61,15 @@ def hammer(options: argparse.Namespace) -> commands.Answer:
     if idle:
         said.append(f"{idle}: no tip reaches {options.bandwidth:g} Hz and hits once; try lighter hammers")
     data = {"bandwidth": options.bandwidth, "drop": options.drop, "hammers": [hammer.data() for hammer in hammers]}
-    return commands._answer_of_file({**data, "notes": notes}, said, drawn)
+    return replies.answer_of_file({**data, "notes": notes}, said, drawn)
 
 
-def _rove(options: argparse.Namespace, scene: Any, masses: Sequence[float], notes: Sequence[str]) -> commands.Answer:
+def _rove(options: argparse.Namespace, scene: Any, masses: Sequence[float], notes: Sequence[str]) -> replies.Answer:
     """Plan a test with a roving hammer."""
     from .taps import roving  # imported only when needed
 
-    number, drawn = check.count("--rove", options.rove), commands._drawn(options, "rove.png")
-    with commands._display(options, tells=True)("points"):
+    number, drawn = check.count("--rove", options.rove), replies.picture_of(options, "rove.png")
+    with replies.progress_of(options, tells=True)("points"):
         plan = roving.of_scene(scene, masses, options.bandwidth, options.drop, number)
         if drawn is not None:
             with staged(drawn.parent) as staging:
@@ -77,11 +77,11 @@ def _rove(options: argparse.Namespace, scene: Any, masses: Sequence[float], note
                 plan.write_csv((staging / drawn.name).with_suffix(".csv"))
     data = {"table": plan.table(), "verdicts": plan.verdicts, "resolution": plan.resolution}
     files = [] if drawn is None else [drawn.name, drawn.with_suffix(".csv").name]
-    said = [commands._title(scene), *noted(notes), plan.summary()]
-    return commands.answer({**data, "notes": [*notes, *plan.notes]}, *said, folder=drawn and drawn.parent, files=files)
+    said = [replies.title_of(scene), *noted(notes), plan.summary()]
+    return replies.answer({**data, "notes": [*notes, *plan.notes]}, *said, folder=drawn and drawn.parent, files=files)
 
 
-def _sheets(options: argparse.Namespace, scene: Any, notes: Sequence[str]) -> commands.Answer:
+def _sheets(options: argparse.Namespace, scene: Any, notes: Sequence[str]) -> replies.Answer:
     """Which hammers of the catalogue suit a scene, as one sheet per point."""
     from .pages import hammer_sheet  # imported only when needed
     from .taps import roving
@@ -89,24 +89,24 @@ def _sheets(options: argparse.Namespace, scene: Any, notes: Sequence[str]) -> co
     if options.masses:
         raise ValueError("--masses must be left out beside --catalogue, whose hammers have their own")
     number = None if options.rove is None else check.count("--rove", options.rove)
-    path = commands._file(options, "hammers.html") or Path("out") / options.scene.stem / "hammers.html"
-    with commands._display(options, tells=True)("points"):
+    path = replies.file_of(options, "hammers.html") or Path("out") / options.scene.stem / "hammers.html"
+    with replies.progress_of(options, tells=True)("points"):
         heaviest = scene.built.target.mass  # heavier ones load a panel so that its modes are others
         kit = roving.catalogued(options.catalogue, options.bandwidth, options.drop, heaviest)
         plan = roving.of_scene(scene, kit, options.bandwidth, options.drop, number)
     with staged(path.parent) as staging:
-        hammer_sheet.write(staging / path.name, plan, title=commands._title(scene), notes=tuple(notes))
+        hammer_sheet.write(staging / path.name, plan, title=replies.title_of(scene), notes=tuple(notes))
     data = {"table": plan.table(), "verdicts": plan.verdicts, "resolution": plan.resolution}
-    said = [commands._title(scene), *noted(notes), plan.summary()]
-    return commands._answer_of_file({**data, "notes": [*notes, *plan.notes]}, said, path)
+    said = [replies.title_of(scene), *noted(notes), plan.summary()]
+    return replies.answer_of_file({**data, "notes": [*notes, *plan.notes]}, said, path)
 
 
-def frf(options: argparse.Namespace) -> commands.Answer:
+def frf(options: argparse.Namespace) -> replies.Answer:
     """List the peaks of frequency responses, and write them and a page about them."""
     from .taps import prompt  # imported only when needed
 
     files = _files(options.out)
-    with commands._display(options)("frequency responses"):
+    with replies.progress_of(options)("frequency responses"):
         heard = prompt.frf(options)
     peaks = prompt.peaks(heard.found)
     rows = [
@@ -117,18 +117,18 @@ def frf(options: argparse.Namespace) -> commands.Answer:
     ]  # fmt: skip
     said = [
         *noted(heard.notes),
-        commands._table(rows, ("response", "peak at", "magnitude", "coherence", "within")),
+        replies.as_table(rows, ("response", "peak at", "magnitude", "coherence", "within")),
     ]
     data = {"peaks": peaks, "notes": heard.notes}
     if not files:
-        return commands.answer(data, *said)
+        return replies.answer(data, *said)
     with staged(files[0].parent) as staging:
         for path in files:
             if path.suffix.lower() == ".html":
                 _write_page(staging / path.name, options, heard)
             else:
                 prompt.write_frf(staging / path.name, heard.found)
-    return commands.answer(data, *said, folder=files[0].parent, files=[path.name for path in files])
+    return replies.answer(data, *said, folder=files[0].parent, files=[path.name for path in files])
 
 
 def _files(out: Path | None) -> list[Path]:
@@ -143,7 +143,7 @@ def _write_page(path: Path, options: argparse.Namespace, heard: Any) -> None:
     from .pages import frf_page  # imported only when needed
 
     scene = heard.scene if options.against is None else fi.load_scene(options.against)
-    with commands._display(options)("page"):
+    with replies.progress_of(options)("page"):
         computed = points = None
         if scene is not None and len(scene.points) == heard.found.sizes["channel"]:
             points, computed = np.array(scene.points, float), scene.modes(frf_page.COMPARED)
@@ -156,13 +156,13 @@ def _write_page(path: Path, options: argparse.Namespace, heard: Any) -> None:
                        points=points)  # fmt: skip
 
 
-def watch(options: argparse.Namespace) -> commands.Answer | None:
+def watch(options: argparse.Namespace) -> replies.Answer | None:
     """Judge the records of a folder, and new ones until the program is stopped."""
     from .taps.watch import Folder  # imported only when needed
 
     folder, seen = Folder(options.scene), _Watched(options)
     if not options.once:
-        commands._tell(options, f"watching {folder.path}; Ctrl-C stops it")
+        replies.remark(options, f"watching {folder.path}; Ctrl-C stops it")
     while True:
         new = seen.judged(folder.look())
         if new and not options.once:
@@ -179,7 +179,7 @@ class _Watched:
         self.options = options
         self.bandwidth = check.positive("--bandwidth", options.bandwidth, "Hz")
         self.drop = check.between("--drop", options.drop, 1.0, 40.0, "dB")
-        self.path = commands._file(options, "watch.png") or Path("out") / options.scene.resolve().name / "watch.png"
+        self.path = replies.file_of(options, "watch.png") or Path("out") / options.scene.resolve().name / "watch.png"
         self.every: dict[str, list[Any]] = {}  # name of a file: `Advice` of each of its taps
         self.good: dict[str, Any] = {}  # the same: its good taps
 
@@ -217,10 +217,10 @@ class _Watched:
         said = f"{told.file}, {told.tap}: {told.said}"
         fi.figures.save(self.path, tap_pictures.watched(last, good, self.bandwidth, self.drop, said))
 
-    def report_on(self, records: Sequence[Any]) -> commands.Answer:
+    def report_on(self, records: Sequence[Any]) -> replies.Answer:
         """The answer that tells some records."""
         lines = [f"{one.file}{', ' * bool(one.tap)}{one.tap}: {one.said}" for one in records]
         n_good = sum(each.n_taps for each in self.good.values())
         data = {"records": [each._asdict() for each in records], "n_good": n_good}
         drawn = self.path if self.path.is_file() and records else None
-        return commands._answer_of_file(data, lines or ["no records yet"], drawn)
+        return replies.answer_of_file(data, lines or ["no records yet"], drawn)

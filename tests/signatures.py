@@ -235,6 +235,7 @@ def stated() -> dict[str, dict[str, Any]]:
             "gap": 1e-4},
         "Contact.elastic_plastic": {"stiffness": 1e8, "yield_speed": 0.1, "mass": 0.1, "gap": 1e-4},
         "Contact.elastic_plastic by approach": {"stiffness": 1e8, "yield_approach": 1e-5},
+        "Contact.of": {"force": lambda d: 1e6 * d**1.5, "deepest": 1e-2, "gap": 1e-4},
         "Contact.felt": {"stiffness": 1e8, "exponent": 2.0, "hysteresis": 0.5, "relaxation": 1e-3, "gap": 1e-4},
         "Contact.force": {"self": t["law"], "approach": [1e-4, 2e-4], "rate": 0.1},
         "assemble": {"mesh": t["square"], "section": t["plate"], "supports": {"boundary": "hinged"},

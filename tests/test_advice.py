@@ -71,18 +71,14 @@ def test_a_band_that_is_too_wide_gets_its_limit(tmp_path, quantity, target):
 
 
 @pytest.mark.slow
-def test_a_map_of_too_many_modes_proposes_a_tolerance(tmp_path, monkeypatch):
+def test_a_map_of_too_many_modes_is_done_with_softer_contacts_or_a_larger_tolerance(tmp_path, monkeypatch):
     monkeypatch.setitem(by_modes.MOST_MODES, "fe", 150)
     text = QUICK.replace('source = "analytic"', 'source = "fe"').replace("[strike]", "[strike]\nresidual = false")
     found, over = loaded(tmp_path, text), {"contact.stiffness": [1e3, 1e5]}
-    with pytest.raises(fi.SimulationError, match="leave out the contacts stiffer than") as caught:
-        maps.map_scene(found, over=over, tolerance=1e-9)
-    enough = float(re.search(r"tolerance = (\S+) is affordable", str(caught.value))[1])
-    words = r"leave out the contacts stiffer than (\S+)"
-    softest = advice(words, lambda: maps.map_scene(found, over=over, tolerance=enough / 3.0), fi.SimulationError)
-    soft = {"contact.stiffness": [1e3, float(softest)]}
-    assert (maps.map_scene(found, over=soft, tolerance=enough / 3.0).n_impacts > 0).all() and float(softest) > 1e3
-    assert (maps.map_scene(found, over=over, tolerance=enough).n_impacts > 0).all()
+    with pytest.raises(fi.SimulationError, match="leave out the lightest strikers and the stiffest contacts, or take"):
+        maps.map_scene(found, over=over, tolerance=1e-6)
+    assert (maps.map_scene(found, over={"contact.stiffness": [1e3]}, tolerance=1e-6).n_impacts > 0).all()
+    assert (maps.map_scene(found, over=over, tolerance=1e-1).n_impacts > 0).all()
 
 
 def test_too_large_elements_get_a_size_that_suffices(tmp_path, capsys):

@@ -1,7 +1,10 @@
-"""Arrays kept in a file for the next run: read only if they are what was written, for what is asked."""
+"""Arrays and objects kept in a file for the next run: read only if they are what was written, for what is asked."""
 
 import hashlib
 import io
+import json
+from collections.abc import Collection, Mapping
+from dataclasses import fields
 from pathlib import Path
 from typing import Any
 
@@ -10,6 +13,63 @@ import numpy as np
 from .files import replacing
 
 SIZE = hashlib.sha256().digest_size
+Kinds = Mapping[str, tuple[type, list[str]]]  # name of a class: the class, and its fields that are kept
+
+
+def kinds(*classes: type, left_out: Collection[str] = ()) -> Kinds:
+    """The dataclasses and named tuples that `pack` may meet; fields that are left out have their defaults later."""
+    found = {}
+    for each in classes:
+        names = getattr(each, "_fields", None) or [field.name for field in fields(each) if field.init]
+        found[each.__name__] = each, [name for name in names if name not in left_out]
+    return found
+
+
+def pack(path: Path, key: str, known: Kinds, **things: Any) -> None:
+    """Write objects found for a key: known classes, mappings, sequences, slices, arrays, texts and numbers in them."""
+    arrays: dict[str, np.ndarray] = {}
+    told = {name: _packed(thing, known, arrays) for name, thing in things.items()}
+    write(path, key, {**arrays, "told": np.array(json.dumps(told))})
+
+
+def unpack(path: Path, key: str, known: Kinds) -> dict[str, Any] | None:
+    """What `pack` wrote for this key, by name, sequences as tuples; None as of `read`. No other class is ever made."""
+    arrays = read(path, key)
+    if arrays is None:
+        return None
+    return {name: _unpacked(told, known, arrays) for name, told in json.loads(str(arrays["told"])).items()}
+
+
+def _packed(value: object, known: Kinds, arrays: dict[str, np.ndarray]) -> Any:
+    """A value as plain data for JSON; arrays are put aside under the number that stands for them."""
+    name = type(value).__name__
+    if name in known:
+        return {"kind": name, "fields": {each: _packed(getattr(value, each), known, arrays) for each in known[name][1]}}
+    if isinstance(value, np.ndarray):
+        arrays[str(len(arrays))] = value
+        return {"array": str(len(arrays) - 1)}
+    if isinstance(value, slice):
+        return {"slice": [value.start, value.stop]}
+    if isinstance(value, Mapping):
+        return {"mapping": [_packed(pair, known, arrays) for pair in value.items()]}
+    if isinstance(value, (tuple, list)):
+        return [_packed(each, known, arrays) for each in value]
+    return value.item() if isinstance(value, np.generic) else value
+
+
+def _unpacked(told: Any, known: Kinds, arrays: Mapping[str, np.ndarray]) -> Any:
+    if isinstance(told, list):
+        return tuple(_unpacked(each, known, arrays) for each in told)
+    if not isinstance(told, dict):
+        return told
+    if "kind" in told:
+        kind, names = known[told["kind"]]
+        return kind(**{name: _unpacked(told["fields"][name], known, arrays) for name in names})
+    if "array" in told:
+        return arrays[told["array"]]
+    if "slice" in told:
+        return slice(*told["slice"])
+    return dict(_unpacked(told["mapping"], known, arrays))
 
 
 def write(path: Path, key: str, arrays: dict[str, Any]) -> None:

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from .._base import check
-from ..impact.gradient import UNIT_OF
+from ..impact.quantities import UNITS
 
 MODE = re.compile(r"mode([1-9]\d*)\.(frequency|ratio)")
 KNOWN = (
@@ -47,7 +47,7 @@ class Goal:
     @property
     def unit(self) -> str:
         """Unit of the quantity, empty for a ratio."""
-        return ("" if self.ratio else "Hz") if self.mode else UNIT_OF.get(self.name.partition("=")[0], "")
+        return ("" if self.ratio else "Hz") if self.mode else UNITS.get(self.name.partition("=")[0], "")
 
     @property
     def scale(self) -> float:

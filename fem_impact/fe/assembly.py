@@ -22,7 +22,7 @@ from .splitting import towards_points
 from .springs import check_masses, check_posts
 from .supports import support_of_facets
 from .system import System, notes_on
-from .theory import Strain, Subject, Theory, integrals, plain_kinds, scatter
+from .theory import Strain, Subject, Theory, check_own, integrals, plain_kinds, scatter
 from .thick import MINDLIN
 
 __all__ = [
@@ -73,8 +73,8 @@ def assemble(
         For a plate "kirchhoff" (the default; thin) or "mindlin" (with shear and rotary inertia); for a beam "euler" or
         "timoshenko". A thick plate takes some five times as long. A force, a mass or an observed point acts on it over
         a disk of radius 0.325 times the thickness, because under a point it would give way without limit. A plate that
-        is curved, ribbed or unevenly layered is "shallow", see `fe.shallow`: thin, with displacements in its plane. Or
-        one of your own, see `fe.theory`, which names its element.
+        is curved, ribbed or unevenly layered is "shallow", see `fe.shallow`: thin, with displacements in its plane.
+        A theory of your own is a `fe.theory.Theory`, as in ``studies/tutorials/own_theory.py``.
     point_masses : sequence of (point [m], mass [kg])
         Masses without extent that move with the plate or beam.
     point_supports : sequence of (point [m], "hinged" or stiffness [N/m]) or (point [m], "clamped", radius [m])
@@ -194,6 +194,8 @@ def _assembled(
     body = Subject(fine, section, support_of_facets(fine, supports, rules.words), marked)
     domain = rules.domain(body, rules.fields)
     held = rules.hold(body, domain)
+    if rules not in EVERY:
+        check_own(rules, domain, held)
     make = rules.matrices or (lambda _, domain: integrals(rules, domain, np.arange(len(domain.points.x))))
     K, M = (scatter(each, held.dofs, held.expand.shape[0]) for each in make(body, domain))
     if held.ribs is not None:

@@ -228,6 +228,18 @@ def blocks(n: int) -> list[np.ndarray]:
     return np.array_split(np.arange(n), max(1, -(-n // CHUNK)))
 
 
+def check_own(theory: Theory, domain: Domain, held: Held) -> None:
+    """ValueError where a theory of the user's own has terms that make no matrices."""
+    x, n_local = domain.points.x, len(held.dofs)
+    for matrix, name, parts in theory.terms(domain.space, domain.points, np.arange(len(x))):
+        if matrix not in ("K", "M") or name not in theory.fields:
+            raise ValueError(
+                f"terms of theory {theory.name!r} must be of 'K' or 'M' and of a field among {theory.fields}, got "
+                f"{matrix!r} and {name!r}"
+            )
+        check.array(f"terms of theory {theory.name!r} of {name!r}", parts, (*x.shape[:2], None, n_local))
+
+
 def integrals(theory: Theory, domain: Domain, cells: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Stiffness and mass (n, n_local, n_local) of cells (n,) from the terms of a theory."""
     found: dict[str, list[np.ndarray]] = {"K": [], "M": []}

@@ -12,7 +12,7 @@ import numpy as np
 
 from .._base import check, known
 from ..fe.material import Material
-from .contact import Contact
+from .contact import Contact, hertz_stiffness, pressed_compliance
 from .striker import Striker
 
 FILE = Path(__file__).with_suffix(".toml")
@@ -129,14 +129,11 @@ def _pressed(entry: Entry, on: Material | None) -> dict[str, float]:
     """Stiffness of Hertz's law between a round tip and a material, and its interval."""
     facts = entry.facts
     radius, E, nu = (facts[name] for name in (("radius", "E", "nu") if "radius" in facts else TIP))
-    tip = (1.0 - nu.value**2) / E.value
-    under = 0.0
+    tip, under, wood = pressed_compliance(E.value, nu.value), 0.0, 0.0
     if on is not None:
-        soft = (on.E, on.nu) if on.E_across is None else (on.E_across, ACROSS_NU)
-        under = (1.0 - soft[1] ** 2) / soft[0]
-    stiffness = 4.0 / 3.0 / (tip + under) * float(np.sqrt(radius.value))
-    share = tip / (tip + under)
-    wood = 0.0 if on is None or on.E_across is None else ACROSS
+        wood = 0.0 if on.E_across is None else ACROSS
+        under = pressed_compliance(*(on.E_across, ACROSS_NU) if on.E_across else (on.E, on.nu))
+    stiffness, share = hertz_stiffness(tip + under, radius.value), tip / (tip + under)
     about = float(np.hypot(0.5 * _about(radius) + share * _about(E), (1.0 - share) * wood))
     return {"value": stiffness, "about": about}
 

@@ -13,7 +13,7 @@ from ..modes.stretching import stretch
 from . import accuracy, distance, engine, promise, what_if
 from .compiled.bundles import KernelSystem
 from .contact import Contact
-from .engine import TOLERANCE
+from .engine import TOLERANCE as TOLERANCE
 from .error import Error
 from .reduced_body import ReducedBody, ends_of, joined, part_of, part_of_striker, stretched_in
 from .response import Response
@@ -22,6 +22,7 @@ from .stepping import Options, refine_steps, takes_options
 from .striker import Striker
 
 LOSSY_STRIKER = 30.0  # [-] a lossy contact multiplies the truncation error of a striker by this: its modes are sparse
+OF_STRIKE = "striker_force", "target_force", "stretching"  # options that `collide` does not have
 STRIKER_SHARE = 0.05  # [-] fraction of the tolerance for the striker's left-out modes: keeping them is cheap
 
 
@@ -45,7 +46,7 @@ class Touch(check.Brief):
                 check.finite(name, check.numbers(name, point, "m"), "m")
 
 
-@takes_options
+@takes_options()
 @check.typed
 def strike(
     modes: Modes, striker: Striker, contact: Contact, *, at: Any, speed: float | None,
@@ -98,24 +99,13 @@ def strike(
     return hit if hit.error.truncation <= 0.5 * asked.tolerance else blow(striker, speed)
 
 
+@takes_options(*OF_STRIKE)
 @check.typed
 def collide(
-    bodies: Sequence[Modes | Striker],
-    contacts: Sequence[Touch],
-    *,
-    speeds: Sequence[float] | None = None,
-    states: Sequence[tuple[Any, Any]] | None = None,
-    tolerance: float = TOLERANCE,
-    quantity: Any = None,
-    residual: bool = True,
-    duration: float | None = None,
-    max_impacts: int | None = None,
-    scheme: str | None = None,
-    dt: float | None = None,
-    forces: Sequence[float] | None = None,
-    start: State | Response | None = None,
-    strict: bool = False,
-) -> Response:
+    bodies: Sequence[Modes | Striker], contacts: Sequence[Touch], *, speeds: Sequence[float] | None = None,
+    states: Sequence[tuple[Any, Any]] | None = None, forces: Sequence[float] | None = None,
+    start: State | Response | None = None, strict: bool = False, **options: Any,
+) -> Response:  # fmt: skip
     """Collide any number of bodies at any number of contacts.
 
     Parameters
@@ -152,13 +142,10 @@ def collide(
     for each in bodies if isinstance(bodies, (list, tuple)) else ():
         if isinstance(each, Striker):
             each.let_go("a collision")
-    return promise.kept(
-        met(
-            bodies, contacts, speeds=speeds, states=states, forces=forces, start=start, tolerance=tolerance,
-            quantity=quantity, residual=residual, duration=duration, max_impacts=max_impacts, scheme=scheme, dt=dt,
-        ),
-        strict,
-    )  # fmt: skip
+    if foreign := [name for name in OF_STRIKE if name in options]:
+        raise TypeError(f"collide() got an unexpected keyword argument {foreign[0]!r}")
+    hit = met(bodies, contacts, speeds=speeds, states=states, forces=forces, start=start, **options)
+    return promise.kept(hit, strict)
 
 
 def met(
@@ -214,6 +201,8 @@ def _follow(bodies, laws, parts, speed, options, striker=None, at=None, others=(
     pace = engine.pace_of(system, held)
     _check_way(system, pace[0] * pace[1], options.tolerance)
     found = refine_steps(system, options, pace, stretched)
+    for i, law in enumerate(laws):
+        law.law.check_reached(law, found.fine, i)
     growth = distance.growth(found.coarse, found.fine)
     if len(found.coarse.contacts) != len(found.fine.contacts):  # a given step was too long
         found = replace(found, coarse=found.fine, steps=(found.steps[0],) * 2)

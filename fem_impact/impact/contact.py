@@ -115,10 +115,9 @@ class Contact(Numbers):
             if getattr(sphere, name, None) is None:
                 raise ValueError(f"sphere must be made by Striker.sphere, got {check.shown(sphere)} without {name}")
         flat = getattr(plate, "material", plate)
-        compliance = sum(
-            (1.0 - nu**2) / E for E, nu in (_isotropic("sphere", sphere.material), _isotropic("plate", flat))
-        )
-        law = cls(4.0 / 3.0 / compliance * float(np.sqrt(sphere.radius)), 1.5, loss, gap)
+        compliance = pressed_compliance(*_isotropic("sphere", sphere.material))
+        compliance += pressed_compliance(*_isotropic("plate", flat))
+        law = cls(hertz_stiffness(compliance, sphere.radius), 1.5, loss, gap)
         if yield_strength is None:
             return law
         pressure = YIELDS * check.positive("yield_strength", yield_strength, "Pa", reach=1e20)  # its square counts
@@ -176,6 +175,16 @@ class Contact(Numbers):
         if not np.isfinite(force).all():
             raise ValueError("approach and rate must give a finite force; check their units, m and m/s")
         return np.maximum(force, 0.0)
+
+
+def pressed_compliance(E: float, nu: float) -> float:
+    """``(1 - nu**2) / E`` [1/Pa] of a half space; those of both bodies add up to one over Hertz's modulus ``E*``."""
+    return (1.0 - nu**2) / E
+
+
+def hertz_stiffness(compliance: float, radius: float) -> float:
+    """Stiffness [N/m**1.5] of a contact of two bodies of that compliance [1/Pa] together and a radius [m]."""
+    return 4.0 / 3.0 / compliance * float(np.sqrt(radius))
 
 
 def _isotropic(name: str, material: Any) -> tuple[float, float]:

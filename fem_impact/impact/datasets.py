@@ -5,20 +5,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from .._base import check
+from .quantities import UNITS
 
 if TYPE_CHECKING:
     from .response import Response
 
-SCALARS = {  # attribute of a response: unit
-    "n_impacts": "1",
-    "margin": "1",
-    "contact_time": "s",
-    "impulse": "N s",
-    "peak_force": "N",
-    "restitution": "1",
-    "speed": "m/s",
-    "energy_error": "1",
-}
+SCALARS = "n_impacts", "margin", "contact_time", "impulse", "peak_force", "restitution", "speed", "energy_error"
 PARTS = {  # of an impact: unit
     "start": "s", "end": "s", "peak_force": "N", "impulse": "N s", "contact": "1", "restitution": "1",
 }  # fmt: skip
@@ -31,9 +23,9 @@ def dataset(hit: "Response", points: Any = None, times: Any = None, max_frequenc
     dims = ("time",) if hit.force.ndim == 1 else ("time", "contact")
     about = {"units": "N", "long_name": "contact force"}
     data: dict[str, Any] = {"force": (dims, hit.force, about)}
-    for name, unit in SCALARS.items():
+    for name in SCALARS:
         value = getattr(hit, name)
-        data[name] = ((), np.nan if value is None else value, {"units": unit})
+        data[name] = ((), np.nan if value is None else value, {"units": UNITS[name] or "1"})
     for name, unit in PARTS.items():
         values = np.array([getattr(impact, name) for impact in hit.impacts], int if name == "contact" else float)
         data[f"impact_{name}"] = (("impact",), values, {"units": unit})

@@ -19,7 +19,7 @@ from .compiled import layout
 from .compiled.law import columns
 from .history import History, mode_energy
 from .parameters import ONE_SIDED, Change, Parameters, unit
-from .quantities import checked_band, name_and_band, rebound
+from .quantities import UNITS, checked_band, name_and_band, rebound
 
 if TYPE_CHECKING:
     from .response import Response
@@ -28,10 +28,6 @@ QUANTITIES = (
     "restitution", "impulse", "contact_time", "peak_force", "peak_time", "spectral_centroid", "spectral_level",
     "modal_energy",
 )  # fmt: skip
-UNIT_OF = {
-    "impulse": "N s", "contact_time": "s", "peak_force": "N", "peak_time": "s", "spectral_centroid": "Hz",
-    "spectral_level": "dB", "modal_energy": "J",
-}  # fmt: skip
 GRAZE = 1e-3  # [-] of the deepest approach: a touch or gap below it may come or go with a change of a thousandth
 TIE = 1e-4  # [-] of the largest force: where two maxima are so alike, a change of 1e-4 may make the other the largest
 NUDGE = 1e-5  # [-] relative change of a number: its square is far below any tolerance, rounding over it below 1e-9
@@ -94,7 +90,7 @@ class Gradient(check.Locked):
         return sum(part * self.numbers[known[name]] * self.slopes[known[name]] for name, part in relative.items())
 
     def __str__(self) -> str:
-        own = UNIT_OF.get(self.quantity.partition("=")[0], "")
+        own = UNITS[self.quantity.partition("=")[0]]
         if self.slopes.ndim > 1:
             return f"{self.quantity} of {self.slopes.shape[1]} modes [{own}] in {', '.join(self.names)}"
         lines = [f"{self.quantity} {self.value:.6g}{f' {own}' if own else ''}"]

@@ -12,7 +12,8 @@ import numpy as np
 
 from .._base import check, markup
 from .._base.explained import noted
-from .trust import UNITS, Trust
+from .quantities import UNITS
+from .trust import Trust
 
 ENDS = (0.05, 0.95)  # [-] nine tenths of all lie between them
 SURE = 1.645  # [-] standard deviations from the middle to these ends
@@ -167,11 +168,11 @@ def of_blow(trust: Trust, measured: Any, samples: Mapping[str, np.ndarray] | Non
         each = judged[check.one_of("measured", name, judged)]
         if each.value is None or each.computation is None:
             raise ValueError(f"measured must not name {name}, whose error is not known: the modes left out govern it")
-        pair = check.array(f"measured {name}", given, (None,), UNITS.get(name, ""), lift=True)
+        pair = check.array(f"measured {name}", given, (None,), UNITS[name], lift=True)
         if len(pair) not in (1, 2) or not pair[0]:
             raise ValueError(f"measured {name} must be a value, or (value, half width of its interval of 90 %)")
         error = check.non_negative(f"error of measured {name}", pair[1]) if len(pair) == 2 else 0.0
-        points.append(Measured(each.name, float(pair[0]), error, UNITS.get(name, "")))
+        points.append(Measured(each.name, float(pair[0]), error, UNITS[name]))
         values.append(np.array([each.value]) if samples is None else samples[name])
         errors.append((each.computation, each.known, 1.0 if name == "restitution" else abs(each.value)))
         said += [f"{each.name}: the band lacks what is not known of {', '.join(each.unknown)}"] if each.unknown else []

@@ -116,7 +116,7 @@ def largest_difference(
 ) -> float:
     """Largest difference [-] of the motions that descriptions of a body tell, over the largest motion.
 
-    Infinite for a single description, and long after the end of the run, ``until`` [s].
+    Infinite for a single description, where it exceeds `MOVED`, and long after the end of the run, ``until`` [s].
     """
     if len(descriptions) < 2 or (times.size and times.max() > LASTS * until):
         return float("inf")
@@ -125,4 +125,5 @@ def largest_difference(
     motions = [each.at(points, times, rate) for each in descriptions]
     largest = float(np.abs(motions[0]).max(initial=0.0))
     apart = sum(float(np.abs(one - other).max(initial=0.0)) for one, other in pairwise(motions))
-    return apart / largest if largest else 0.0
+    apart = apart / largest if largest else 0.0
+    return apart if apart <= MOVED["velocity" if rate else "displacement"] else float("inf")

@@ -30,12 +30,11 @@ UNITS = {
 }  # fmt: skip
 INDEXED = {"contacts": "contact", "bodies": "target"}  # what has the same units as each of several
 # powers with which frequencies and mass of a thin body grow with a number of it
-PLATE = {"section.thickness": (1.0, 1.0), "material.E": (0.5, 0.0), "material.rho": (-0.5, 1.0)}
-BEAM = {"material.E": (0.5, 0.0), "material.rho": (-0.5, 1.0)}
-BAR = {"section.height": (1.0, 1.0), "section.width": (0.0, 1.0), **BEAM}
-ROD = {"section.diameter": (1.0, 2.0), **BEAM}
-# all lengths along the body, at the same thickness
-SCALE: dict[type[object], tuple[float, float]] = {Plate: (-2.0, 2.0), Beam: (-2.0, 1.0)}
+STUFF = {"material.E": (0.5, 0.0), "material.rho": (-0.5, 1.0)}
+PLATE = {"section.thickness": (1.0, 1.0), **STUFF, "target.scale": (-2.0, 2.0)}  # scale: lengths along the body
+BAR = {"section.height": (1.0, 1.0), "section.width": (0.0, 1.0), **STUFF, "target.scale": (-2.0, 1.0)}
+ROD = {"section.diameter": (1.0, 2.0), **STUFF, "target.scale": (-2.0, 1.0)}
+RESCALED = {"mass": (0.0, 1.0), "first_frequency": (1.0, 0.0)}  # the same of any body
 # [-] distance for the slope of a shape in radians of the shortest wave, and of the static compliance in lengths of the
 # body: errs by the fourth power, 1e-12, and leaves 1e-9 of the rounding of a compliance
 SHIFT = 1e-3
@@ -122,10 +121,9 @@ class Parameters(check.Brief):
             for name in self._powers:
                 home, _, part = name.partition(".")
                 part = "width" if part == "diameter" else part
-                value = getattr(section.material if home == "material" else section, part)
+                value = 1.0 if part == "scale" else getattr(section.material if home == "material" else section, part)
                 if not callable(value):
                     found[name] = float(value)
-            found["target.scale"] = 1.0
         return {name: value for name, value in found.items() if name not in self._barred}
 
     @cached_property
@@ -217,14 +215,9 @@ class Parameters(check.Brief):
             return (*self.values, *(name for name in self.sections if name not in self.values))
         names = (wrt,) if isinstance(wrt, str) else check.several("wrt", wrt, str)
         for name in names:
-            if name in self.sections:
+            if name in self.sections or name in self.values:
                 continue
-            if name in self._barred:
-                raise check.SimulationError(f"no gradient in {name}: {self._barred[name]}")
-            if name in self.values:
-                continue
-            reason = self._reason(str(name))
-            if reason:
+            if reason := self._barred.get(name) or self._reason(name):
                 raise check.SimulationError(f"no gradient in {name}: {reason}")
             check.one_of("wrt", name, self.values)
         return names
@@ -232,15 +225,11 @@ class Parameters(check.Brief):
     def _reason(self, name: str) -> str:
         """Why a number that other blows have is not among those of this one."""
         home = name.partition(".")[0]
-        if not self.struck:
-            return self.why_no_section if home in ("section", "material") or name.endswith(".scale") else ""
-        if name in ("strike.x", "strike.y"):
-            return self.why_still
-        if home == "target" and name != "target.scale":
-            return self.why_no_target
         if home in ("section", "material") or name == "target.scale":
             return self.why_no_section
-        return ""
+        if name in ("strike.x", "strike.y") and self.struck:
+            return self.why_still
+        return self.why_no_target if home == "target" and self.struck else ""
 
     def change(self, names: tuple[str, ...]) -> Change:
         """What a unit of each number changes in the run."""
@@ -299,16 +288,8 @@ class Parameters(check.Brief):
             found.zeta[i, self._modes[b]] = self.hit.history.omega[self._modes[b]] > 0.0
             found.zeta[i, self.hit.ends[b].forms] = not self._lossy  # else they are critically damped
         else:
-            self._stretch(found, i, self.bodies.get(home, 1), *self._growth(name), value)
-
-    def _growth(self, name: str) -> tuple[float, float]:
-        """Powers with which frequencies and mass of a body grow with a number."""
-        if name.endswith(".mass"):
-            return 0.0, 1.0
-        if name.endswith(".first_frequency"):
-            return 1.0, 0.0
-        section = self.hit.bodies[-1].section
-        return SCALE[type(section)] if name == "target.scale" else self._powers[name]
+            powers = RESCALED.get(part) or self._powers[name]
+            self._stretch(found, i, self.bodies.get(home, 1), *powers, value)
 
     @cached_property
     def _modes(self) -> tuple[slice, ...]:

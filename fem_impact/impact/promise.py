@@ -4,8 +4,6 @@ import os
 import sys
 import warnings
 from collections.abc import Iterator
-from dataclasses import replace
-from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -133,32 +131,27 @@ def _unstated(hit: "Response") -> list[tuple[str, tuple[str, ...]]]:
 
 
 def _more_modes(hit: "Response") -> Iterator[str]:
-    """How many modes every body that keeps too few needs; what makes them few enough if they are too many."""
+    """How many modes every body that keeps too few needs, and what makes them fewer where they are too many."""
     for body, (name, modes, ends) in enumerate(zip(_names(hit), hit.bodies, hit.ends)):
         if not ends.rest.any() or modes.poorer:  # the number of Ritz vectors has been raised already
             continue
-        needs = partial(_modes_needed, hit, body)
-        number = needs(hit.tolerance)
+        number = _modes_needed(hit, body)
         if number > MOST_ADVISED:
-            loose = accuracy.least_tolerance(lambda tolerance: needs(tolerance) <= MOST_ADVISED)  # noqa: B023
-            soft = next((s for s in 10.0 ** -np.arange(1.0, 31.0) if needs(hit.tolerance, s) <= MOST_ADVISED), None)
-            ways = [] if loose is None or loose <= hit.tolerance else [f"take a tolerance of {loose:g}"]
-            ways += [] if soft is None else [f"divide the stiffness of its contacts by {1.0 / soft:.0e}"]
-            yield f"{name} would have to keep some {number:.1e} modes; {', or '.join(ways) or 'strike it more softly'}"
+            yield f"{name} would have to keep some {number:.1e} modes; take a softer contact"
         elif number > modes.n_modes + 1:
             yield f"keep {int(np.ceil(number))} modes of {name} instead of {modes.n_modes}"
 
 
-def _modes_needed(hit: "Response", body: int, tolerance: float, softer: float = 1.0) -> float:
-    """Modes of a body that a tolerance needs, if the stiffness of its contacts is multiplied by ``softer``."""
-    h, modes, ends, allowed = hit.history, hit.bodies[body], hit.ends[body], SHARE * tolerance
+def _modes_needed(hit: "Response", body: int) -> float:
+    """Modes of a body that the tolerance needs."""
+    h, modes, ends, allowed = hit.history, hit.bodies[body], hit.ends[body], SHARE * hit.tolerance
     own = np.zeros(len(h.omega), bool)
     own[hit.body_slice(body)] = True
     if not modes.omega[-1]:
         return 0.0  # a body that only moves rigidly: nothing tells how close its other modes are
     needed = 0.0
     for point, (i, _) in zip(ends.points, ends.touched):
-        law = replace(hit.contacts[i], stiffness=softer * hit.contacts[i].stiffness)
+        law = hit.contacts[i]
         inverse = float((h.shape[i, (h.omega == 0.0) & ~own] ** 2).sum())  # of the mass that the body feels
         speed = min(REACH, float(np.abs(h._column(1)[:, i]).max(initial=0.0)))
         if not inverse or not speed:
@@ -168,8 +161,7 @@ def _modes_needed(hit: "Response", body: int, tolerance: float, softer: float = 
         needed = max(needed, accuracy.cutoff_frequency(modes, point, tolerance=share, **at))
         if hit.error.resolvable and hit.error.truncation > allowed:
             power = accuracy.order_of(law.exponent, modes.dimension)
-            wanted = modes.frequencies[-1] * (hit.error.truncation / allowed) ** (1.0 / power)
-            needed = max(needed, wanted * softer ** (1.0 / (law.exponent + 1.0)))  # as the contact's frequency falls
+            needed = max(needed, modes.frequencies[-1] * (hit.error.truncation / allowed) ** (1.0 / power))
     return SPARE * modes.n_modes * (needed / modes.frequencies[-1]) ** (0.5 * modes.dimension)
 
 

@@ -10,6 +10,12 @@ from .._base import check
 QUANTITIES = ("restitution", "impulse", "contact_time", "force", "n_impacts", "spectrum", "sound")
 BANDED = ("spectrum", "sound")  # quantities that need an upper frequency
 USUAL = MappingProxyType(dict.fromkeys(("restitution", "impulse", "contact_time", "force", "n_impacts")))
+UNITS = {  # of numbers of a blow, by their names as quantities and as attributes; "" of what has none
+    **dict.fromkeys(("restitution", "n_impacts", "margin", "energy_error"), ""),
+    **dict.fromkeys(("contact_time", "peak_time"), "s"), **dict.fromkeys(("force", "peak_force"), "N"),
+    **dict.fromkeys(("impulse", "spectrum"), "N s"), "speed": "m/s", "spectral_centroid": "Hz",
+    "spectral_level": "dB", "modal_energy": "J", "sound": "",
+}  # fmt: skip
 # [-] number of frequencies at which spectra are looked at: several per lobe of a single pulse are enough
 BAND_POINTS = 257
 

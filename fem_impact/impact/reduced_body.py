@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
-from functools import cached_property
+from functools import cached_property, lru_cache
 
 import numpy as np
 
@@ -207,21 +207,24 @@ def stretched_in(parts: Sequence[ReducedBody]) -> Stretched | None:
     return found
 
 
+@lru_cache(maxsize=64)
+def _tabled(laws: tuple[Contact, ...]) -> tuple[np.ndarray, np.ndarray, list[bool]]:
+    """Contacts as the kernels read them, the approach at first [m], and whether rates count, (n_contacts,) each."""
+    numbers, gaps, rated = zip(*((each.numbers, each.gap, each.rated) for each in laws))
+    return table(list(numbers)), -np.array(gaps), list(rated)
+
+
 def joined(parts: Sequence[ReducedBody], laws: Sequence[Contact]) -> KernelSystem:
     """Join the modes of all bodies; series springs or replacement modes stand in for the left-out modes.
 
     A series spring is exact only for a body with one lossless contact. Otherwise each eigenvector of the residual
     compliance becomes a mode above the last kept one, so that loss and other contacts act on it too.
     """
-    numbers, gaps, rated, forms, n = [], [], [], [], 0
-    for each in laws:
-        numbers.append(each.numbers)
-        gaps.append(-each.gap)
-        rated.append(each.rated)
+    law, offset, rated = _tabled(tuple(laws))
+    law, offset, forms, n = law.copy(), offset.copy(), [], 0
     for part in parts:
         forms.append(part.forms(rated) if part.yields else np.zeros((0, 0)))
         n += len(part.omega) + forms[-1].shape[1]
-    law, offset = table(numbers), np.array(gaps)
     columns, shape = np.zeros((5, n)), np.zeros((len(laws), n))  # frequency, damping, constant force, state; shapes
     start, lossy = 0, True in rated
     for part, form in zip(parts, forms):
@@ -262,7 +265,7 @@ def rest_mode(dimension: int, omega: float, zeta: float, lossy: bool) -> tuple[f
 
 def ends_of(parts: Sequence[ReducedBody], laws: Sequence[Contact]) -> tuple[Ends, ...]:
     """Where every body is touched; a constant force makes left-out modes dip only if a series spring replaces them."""
-    found, rated, last = [], [each.rated for each in laws], 0
+    found, last, rated = [], 0, _tabled(tuple(laws))[2]
     for part in parts:
         last += len(part.omega)
     for part in parts:

@@ -10,7 +10,7 @@ import numpy as np
 from .._base import check
 from ..fe import plausible
 from ..modes.modal import Modes, at_rest
-from . import assumption, balance, datasets, force_spectrum, gradient, in_words, motion, promise, rebound, trust
+from . import assumption, balance, datasets, force_spectrum, gradient, in_words, motion, promise, trust
 from .assumption import Assumption
 from .compiled import record
 from .contact import Contact
@@ -198,24 +198,21 @@ class Response(Totals, check.Locked):
         """Whether the model itself is right, as in `verdict`, and a line for each assumption that matters."""
         return tuple(assumption.lines(self.assumptions, self.tolerance))
 
-    @property
+    @cached_property
     def target(self) -> Modes:
         """The struck body; in `collide` the last one.
 
         After a blow by Ritz vectors (see `strike`) these are its modes as far as the force found makes them ring; they
         are found when they are first needed.
         """
-        return self._ringing or self.bodies[-1]
-
-    @cached_property
-    def _ringing(self) -> Modes | None:
-        return self.rings(self) if self.ringing is None and self.rings is not None else self.ringing
+        found = self.rings(self) if self.ringing is None and self.rings is not None else self.ringing
+        return found or self.bodies[-1]
 
     @cached_property
     def _target(self) -> BodyMotion:
-        if self._ringing is not None:
-            return motion.driven(self, self._ringing)
-        return motion.of_run(self, len(self.bodies) - 1)
+        if self.ringing is None and self.rings is None:
+            return motion.of_run(self, len(self.bodies) - 1)
+        return motion.driven(self, self.target)
 
     @cached_property
     def _descriptions(self) -> tuple[BodyMotion, ...]:
@@ -438,13 +435,8 @@ class Response(Totals, check.Locked):
 
     def _moved(self, points: Any, times: Any, body: int, residual: bool, name: str) -> np.ndarray:
         """A motion by Ritz vectors, if they tell it well enough, or else by modes."""
-        rate, asked, own = name == "velocity", _times(times), self.vectors is not None
-        if (
-            residual
-            and own
-            and body in (-1, len(self.bodies) - 1)
-            and self._apart(points, asked, rate) <= motion.MOVED[name]
-        ):
+        rate, asked, mine = name == "velocity", _times(times), body in (-1, len(self.bodies) - 1)
+        if residual and mine and self.vectors is not None and np.isfinite(self._apart(points, asked, rate)):
             return self._descriptions[0].at(points, asked, rate)
         return self._motion(body).at(points, asked, rate, residual)
 
@@ -465,22 +457,17 @@ class Response(Totals, check.Locked):
         velocity : bool
             Whether the error is that of `velocity`.
         """
-        apart = self._apart(points, _times(times), velocity)
-        return (
-            apart + self.error.total
-            if apart <= motion.MOVED["velocity" if velocity else "displacement"]
-            else float("inf")
-        )
+        return self._apart(points, _times(times), velocity) + self.error.total
 
     @property
     def speeds(self) -> tuple[float, ...]:
         """Final speed [m/s] of each body's rigid motion at its first contact point."""
-        return tuple(float(rebound.rigid_row(self, i) @ self.history.end_p) for i in range(len(self.bodies)))
+        return tuple(float(balance.rigid_row(self, i) @ self.history.end_p) for i in range(len(self.bodies)))
 
     @property
     def in_contact(self) -> bool:
         """Whether the striker, or the first body, still presses another at the end of the run."""
-        return rebound.in_contact(self)
+        return balance.in_contact(self)
 
     @property
     def striker_speeds(self) -> np.ndarray:
@@ -488,7 +475,7 @@ class Response(Totals, check.Locked):
 
         Positive towards the struck body; a falling striker rises by the square of the second over twice the gravity.
         """
-        return rebound.speeds(self)
+        return balance.speeds(self)
 
     @cached_property
     def restitution(self) -> float | None:
@@ -498,7 +485,7 @@ class Response(Totals, check.Locked):
         count. On a body that moved before it may exceed 1. None while the striker is still in contact (`in_contact`),
         and for one that did not arrive. See `Impact.restitution` for that of each impact.
         """
-        return rebound.restitution(self)
+        return balance.restitution(self)
 
     @cached_property
     def _balance(self) -> balance.Balance:

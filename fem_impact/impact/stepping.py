@@ -85,13 +85,17 @@ class Options:
         object.__setattr__(self, "last", (np.inf if self.duration is None else self.duration, self.max_impacts or 0))
 
 
-def takes_options(function: Function) -> Function:
-    """Decorator: show the fields of `Options` in the signature of a function that takes them as ``**options``."""
-    own = inspect.signature(function)
-    shared = [each.replace(kind=each.KEYWORD_ONLY) for each in inspect.signature(Options).parameters.values()]
-    given = [each for each in own.parameters.values() if each.kind is not each.VAR_KEYWORD]
-    function.__signature__ = own.replace(parameters=[*given, *shared])  # type: ignore[attr-defined]
-    return function
+def takes_options(*but: str) -> Callable[[Function], Function]:
+    """Decorator: show fields of `Options`, ``but`` some, in the signature of a function that takes ``**options``."""
+
+    def shown(function: Function) -> Function:
+        own, shared = inspect.signature(function), inspect.signature(Options).parameters
+        given = [each for each in own.parameters.values() if each.kind is not each.VAR_KEYWORD]
+        given += [each.replace(kind=each.KEYWORD_ONLY) for name, each in shared.items() if name not in but]
+        function.__signature__ = own.replace(parameters=given)  # type: ignore[attr-defined]
+        return function
+
+    return shown
 
 
 def scheme_for(tolerance: float, exponent: float) -> str:
@@ -106,18 +110,13 @@ def _first_count(scheme: str, tolerance: float, quantities: Mapping[str, float |
 
 
 def steps_for(
-    contact: Contact,
-    duration: float,
-    tolerance: float,
-    quantities: Mapping[str, float | None],
-    scheme: str | None = None,
-    dt: float | None = None,
-) -> tuple[str, float]:
+    contact: Contact, duration: float, tolerance: float, quantities: Mapping[str, float | None],
+    scheme: str | None = None, dt: float | None = None,
+) -> tuple[str, float]:  # fmt: skip
     """Scheme and first time step [s] of `strike`; ``duration`` is the contact time on a rigid wall [s]."""
     scheme = scheme or scheme_for(tolerance, contact.exponent)
-    if scheme in ("A", "A4"):
-        return scheme, dt or duration / _first_count(scheme, tolerance, quantities)
-    return scheme, dt or duration / (2.0 if scheme == "collocation" else 1.0)
+    count = 2.0 if scheme == "collocation" else _first_count(scheme, tolerance, quantities)
+    return scheme, dt or duration / count
 
 
 @dataclass(frozen=True, eq=False)

@@ -140,12 +140,16 @@ def thresholds(modes: Modes, at: Any, masses: Any) -> np.ndarray:
     todo = np.isinf(found) if density > 0.0 else np.isinf(found) & (masses * squared.sum() > 1.0)
     if not todo.any():
         return found
-    low = np.log(_harmless(omega, squared, density, exponent, masses[todo].max()))
-    while (masses[todo] * energy(np.array([low])) > 1.0).any():
-        low -= 1.0
+    # an upper bound that grows with the contact frequency c: the half-sine spectrum is at most 1, and from 2 c on at
+    # most 4/3 (c / omega)**2; where it says that no pulse takes all of the heaviest hammer's energy, none is tried
+    ends, shares, heaviest = omega[omega > 0.0], squared[omega > 0.0], masses[todo].max()
+    still, beyond = squared[omega == 0.0].sum(), density * omega[-1] ** (-3.0 - exponent) / (3.0 + exponent)
+    above = 16.0 / 9.0 * (np.cumsum((shares / ends**4)[::-1])[::-1] + beyond)  # of each mode and those above
+    harmless = heaviest * (still + np.cumsum(shares) - shares + above * (0.5 * ends) ** 4) < 1.0
+    low = np.log(0.5 * ends[harmless].max() if harmless.any() else ((1.0 / heaviest - still) / above[0]) ** 0.25)
     # above omega[-1], all modes lie in the first lobe, so the energy only grows with the contact frequency
-    beyond = max(low, np.log(omega[-1]))
-    tried = np.append(np.arange(low, beyond, np.log(STEP)), np.arange(beyond, HARDEST + np.log(2.0), np.log(2.0)))
+    last = max(low, np.log(omega[-1]))
+    tried = np.append(np.arange(low, last, np.log(STEP)), np.arange(last, HARDEST + np.log(2.0), np.log(2.0)))
     for start in range(0, len(tried) - 1, AT_ONCE):
         some = tried[start : start + AT_ONCE + 1]
         reached = energy(some)
@@ -157,20 +161,3 @@ def thresholds(modes: Modes, at: Any, masses: Any) -> np.ndarray:
         if not todo.any():
             break
     return found
-
-
-def _harmless(omega: np.ndarray, squared: np.ndarray, density: float, exponent: float, mass: float) -> float:
-    """A contact frequency [rad/s] up to which no pulse takes all the hammer's energy, from an upper bound.
-
-    The bound grows with the contact frequency. The half-sine spectrum is at most 1, and above twice the contact
-    frequency at most 4/3 (contact frequency / frequency)**2.
-    """
-    flexible = omega > 0.0
-    ends, shares = omega[flexible], squared[flexible]
-    beyond = density * ends[-1] ** (-3.0 - exponent) / (3.0 + exponent)
-    fourth = shares / ends**4
-    above = beyond + np.append(np.cumsum(fourth[::-1])[::-1][1:], 0.0)  # sum over the modes above each one
-    half = 0.5 * ends
-    bound = squared[~flexible].sum() + np.cumsum(shares) + 16.0 / 9.0 * half**4 * above
-    safe = int(np.argmax(mass * bound >= 1.0)) if (mass * bound >= 1.0).any() else len(ends)
-    return float(half[safe - 1]) if safe else 1e-3 * float(ends[0])

@@ -9,13 +9,12 @@ import numpy as np
 from .._base import markup
 from . import assumption, promise
 from .distance import value_of
-from .quantities import rebound, words
+from .quantities import UNITS, rebound, words
 
 if TYPE_CHECKING:
     from .response import Response
 
 FEWEST, MOST = 2, 6  # [-] digits shown: as many as the error of the computation lets stand
-UNITS = {"impulse": "N s", "contact_time": "s", "force": "N", "spectrum": "N s"}
 
 
 @dataclass(frozen=True)
@@ -59,7 +58,7 @@ class Judged:
             return "-"
         if self.quantity == "n_impacts":
             return f"{self.value:.0f}"
-        return f"{self.value:.{_digits(self.computation)}g} {UNITS.get(self.quantity, '')}".strip()
+        return f"{self.value:.{_digits(self.computation)}g} {UNITS[self.quantity]}".strip()
 
 
 @dataclass(frozen=True)

@@ -26,13 +26,13 @@ from ..modes.modal import Modes
 from ..modes.rectangle import RectangleShapes
 from ..modes.ritz import RitzShapes
 from ..modes.shapes import FieldShapes
-from . import bending, deflection, fresh, local_contact, shallowness, sliding, still_air, thinness, unstated_damping
+from . import bending, deflection, fresh, local_contact, sliding, still_air, thinness, unstated_damping
 from .idealisation import Surroundings, unyielding
 from .restrike import Struck
 from .target import BOTH, Target
 
 EXAMINERS = (
-    thinness.examine_target, shallowness.examine, thinness.examine_striker, deflection.examine_deflection,
+    thinness.examine_target, thinness.examine_shallowness, thinness.examine_striker, deflection.examine_deflection,
     local_contact.examine_pressure, local_contact.examine_size, local_contact.examine_time, sliding.examine_friction,
     still_air.examine_air, unstated_damping.examine_damping,
 )  # fmt: skip

@@ -267,9 +267,8 @@ def _share(body: Known, integrals: Bending, moved: np.ndarray) -> float:
 
     What bends to a cylinder or a cone between free edges does not stretch at all.
     """
-    if body.plate is None or body.held == 1.0 or body.sprung or quadratic(body.modes):
-        return _crude(body)
-    if body.modes.n_modes == body.modes.n_rigid:
+    still = body.modes.n_modes == body.modes.n_rigid
+    if body.plate is None or body.held == 1.0 or body.sprung or quadratic(body.modes) or still:
         return _crude(body)
     forms = _forms(body.modes).forms
     n = forms.shape[1]

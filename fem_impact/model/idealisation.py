@@ -109,7 +109,6 @@ class Surroundings:
         corners = mesh.points[mesh.cells]
         sides = np.roll(corners, -1, axis=1) - corners
         turns = np.sign(sides[:, 0, 0] * sides[:, 1, 1] - sides[:, 0, 1] * sides[:, 1, 0])  # which way round they go
-        turns = np.sign(sides[:, 0, 0] * sides[:, 1, 1] - sides[:, 0, 1] * sides[:, 1, 0])  # which way round they go
         off = at - corners
         inside = (sides[..., 0] * off[..., 1] - sides[..., 1] * off[..., 0]) * turns[:, None] >= 0.0
         if not inside.all(axis=1).any():

@@ -39,9 +39,9 @@ class Dragged(NamedTuple):
 def examine_friction(struck: Struck) -> Assumption:
     """Striker and target, as far as their motion across the blow is known."""
     hit, history = struck.hit, struck.hit.history
-    found = []
-    for body, place, sign in ((0, _tip(struck), -1.0), (len(hit.bodies) - 1, _spot(struck), 1.0)):
-        if place is None or not hit.impulse:
+    at, tip, found = hit.at if struck.place is None else struck.place[0], getattr(hit.striker, "at", None), []
+    for body, place, sign in ((0, tip, -1.0), (len(hit.bodies) - 1, at, 1.0)):
+        if place is None or not place.size or not hit.impulse:
             continue
         columns, p = hit.body_slice(body), np.zeros(0)
         if not struck.foreseen:
@@ -51,7 +51,7 @@ def examine_friction(struck: Struck) -> Assumption:
         slow = history.omega <= struck.omega
         slow[columns] = False
         others = float(np.square(history.shape[0, slow]).sum())
-        dragged = _dragged(struck.bodies[min(body, 1)], place, p, sign * hit.impulse, struck.omega, others)
+        dragged = _dragged(struck.bodies[min(body, 1)], place[None], p, sign * hit.impulse, struck.omega, others)
         if dragged is not None and dragged.needed > SAME:
             found.append((columns, dragged))
     if not found:
@@ -74,18 +74,6 @@ def examine_friction(struck: Struck) -> Assumption:
         if (known := effect.get(name)) is not None:
             effect[name] = known + share * parting
     return doubt.judged(struck, worst.needed, effect, SQUARE)
-
-
-def _tip(struck: Struck) -> np.ndarray | None:
-    """Where the striker touches, (1, dimension) [m]."""
-    striker = struck.hit.striker
-    return None if striker is None or not striker.modes.dimension else striker.at[None]
-
-
-def _spot(struck: Struck) -> np.ndarray | None:
-    """Where the target is struck, (1, dimension) [m]."""
-    at = struck.hit.at if struck.place is None else struck.place[0]
-    return None if at is None or not struck.bodies[1].dimension else at[None]
 
 
 def _dragged(

@@ -15,6 +15,7 @@ from .._base.remembered import Remembered
 from .._base.rounding import SAME
 from ..fe import plausible, refinement
 from ..fe.assembly import (
+    EVERY,
     THEORIES,
     THICK,
     System,
@@ -107,7 +108,7 @@ class Target:
     blame: Blame = _nobody
 
     def __post_init__(self) -> None:
-        if self.theory is not None and self.mesh is not None and self.system is None:
+        if self.theory is not None and self.mesh is not None:
             check.one_of("theory", self.theory, THEORIES[self.mesh.dimension])
         if self.mesh is not None:
             check.settle(self, mesh=ribbed(self.mesh, self.section))
@@ -130,6 +131,8 @@ class Target:
                 "target must not be a system of element 'morley', which serves to check frequencies; assemble it with "
                 "'argyris', or give its modes of `find_modes`"
             )
+        if body.rules not in EVERY:
+            raise ValueError(f"target must be the modes of `find_modes`, as the theory {body.theory!r} is your own")
         posts = tuple((at, "hinged" if np.isinf(stiffness) else stiffness) for at, stiffness in body.point_supports)
         held, masses = body.supports, body.point_masses
         return cls(body.mesh, body.section, held, masses, posts, {}, damping_ratio, "fe", body.theory, body)
@@ -144,7 +147,7 @@ class Target:
     @property
     def thick(self) -> bool:
         """Whether shear and rotary inertia count."""
-        return self.theory in THICK if self.system is None else self.system.rules.thick
+        return self.theory in THICK
 
     @property
     def element(self) -> str:
@@ -240,14 +243,8 @@ class Target:
         return self.wave(frequency) ** 2 * self.mesh.area / (4.0 * np.pi)
 
     @cached_property
-    def _meshes(self) -> Remembered:
-        return Remembered(
-            4
-        )  # to limit the memory: a plan counts the unknowns of two or three meshes, its run uses them
-
-    @cached_property
-    def _counts(self) -> Remembered:
-        return Remembered(4)
+    def _known(self) -> Remembered:  # meshes and their unknowns: a plan counts those of two or three, its run uses them
+        return Remembered(6)
 
     def _meshed(self, size: float, stages: Stages) -> Mesh:
         """The mesh with elements of another size [m]."""
@@ -256,7 +253,7 @@ class Target:
         if np.isclose(size, mesh.size, rtol=1e-9):
             return mesh
         with stages("mesh"), self.blame("mesh"):
-            return self._meshes.found(size, lambda: mesh.refined(mesh.size / size))
+            return self._known.found(size, lambda: mesh.refined(mesh.size / size))
 
     def n_cells(self, size: float, stages: Stages) -> int:
         """Number of triangles of a size [m], before they shrink towards a blow."""
@@ -275,7 +272,7 @@ class Target:
                 each = coarseness, elements.layer
                 return unknowns_near(mesh, self.section, dict(self.supports), points, graded, *each)
 
-        return self._counts.found(np.append(elements, at).tobytes(), count)
+        return self._known.found(np.append(elements, at).tobytes(), count)
 
     def near(self, at: np.ndarray, elements: Elements, stages: Stages) -> System:
         """The body assembled with elements that shrink towards points (n_points, 2) [m]."""

@@ -1,20 +1,32 @@
-"""Is the body thin? What shear and rotary inertia, which Kirchhoff and Euler leave out, do to a blow.
+"""Is the body thin, and if it is curved, shallow? What shear and inertia that the theory leaves out do to a blow.
 
 Every frequency drops as 1 / sqrt(1 + rotary + shear + edge), `bending.Bending`: the compliances of bending and of shear
 add up, and so do the two inertias, which stays right in sign and size where the first order is not. The modes left out
 yield more by shear, too: in all, a point force on a thick plate sinks in by ln(k_2 / k_1) / (2 pi kappa G h) between
 two wavenumbers; beyond k h = 2 the half space of Hertz's contact has the rest.
 
+A mode of a curved or ribbed plate has kinetic energy besides that of its deflection: in the plane, of ribs as they
+swing about the middle of the plate, and of the surface that is larger than its outline (`fe.shallow.plane_mass`). To
+first order its omega**2 drops by the share of that. Strains measured on the outline are of the same order, the square
+of the slope. Elastic bodies of three dimensions are 0.4 to 1.3 of that drop lower where slopes are 0.09 to 0.5
+(`tests/independent/test_solids.py`); with ribs, most of it is in the frequencies already.
+
 References
 ----------
-Mindlin (1951), J. Appl. Mech. 18, 31-38; Wang (1994), J. Vib. Acoust. 116, 536-540.
+Mindlin (1951), J. Appl. Mech. 18, 31-38; Wang (1994), J. Vib. Acoust. 116, 536-540; Leissa (1973), Vibration of
+shells, NASA SP-288, 1.6 and 2.3; Soedel (2004), Vibrations of shells and plates, 6.8.
 """
+
+from typing import Any
 
 import numpy as np
 
+from ..fe import shallow
 from ..fe.section import SHEAR, Beam, Plate
 from ..impact.assumption import Assumption, allowed
-from .bending import Bending, Known, bending
+from ..modes.ritz import RitzShapes
+from ..modes.shapes import FieldShapes
+from .bending import LOW, Bending, Known, bending, unwrapped
 from .deflection import OTHER
 from .restrike import Doubt, Struck, softer
 
@@ -28,6 +40,10 @@ SLENDER = 'take a thick beam, theory = "timoshenko", or a softer contact'
 NO_SECTION = "the thickness is not stated; give material and section instead of mass and first frequency"
 NO_SLENDERNESS = "give the slenderness of a stick, or material and section of a bar"
 TARGET = Doubt("thin target", "thickness times wavenumber", LIMIT, NO_SECTION)
+STEEP = 0.1  # [-] slope whose square, 1 %, is what frequencies may be off
+SHALLOW = Doubt("shallow target", "steepest slope", STEEP)
+FLATTER = "the body is too steep for shallow theory; take its modes from a program for shells, `fi.Modes.from_arrays`"
+FLAT = "ribs and layers move in the plane, too; take modes of a program for shells or solids, `fi.Modes.from_arrays`"
 STRIKER = Doubt("thin striker", "thickness times wavenumber", LIMIT, NO_SLENDERNESS)
 
 
@@ -152,3 +168,32 @@ def examine_striker(struck: Struck) -> Assumption:
     shape[:, columns] = integrals.heavier(shape[:, columns])
     value = body.thickness * integrals.mean_wave(struck.energy_in(columns))
     return STRIKER.judged(struck, value, struck.changes(omega=omega, shape=shape), SLENDER)
+
+
+def examine_shallowness(struck: Struck) -> Assumption:
+    """The struck body."""
+    shapes: Any = unwrapped(struck.bodies[1].shapes)[0]
+    system = getattr(shapes, "system", None)
+    if system is None or system.rules is not shallow.SHALLOW or not isinstance(shapes, (FieldShapes, RitzShapes)):
+        return SHALLOW.holds(struck)
+    curved = system.section.rise is not None
+    value, remedy = (shallow.steepest(system), FLATTER) if curved else (None, FLAT)
+    if struck.foreseen:
+        return SHALLOW.judged(struck, value, {}, remedy)
+    drop = _drop(struck, system, shapes)
+    omega = struck.hit.history.omega[struck.mine]
+    return SHALLOW.judged(struck, value, struck.changes(omega=struck.with_target(omega * lowered(drop))), remedy)
+
+
+def _drop(struck: Struck, system: Any, shapes: FieldShapes | RitzShapes) -> np.ndarray:
+    """Relative drop of omega**2 (n_modes,) [-]; that of modes above the first is that of the last of these."""
+    modes = struck.bodies[1]
+    n = min(LOW, modes.n_modes - modes.n_rigid)
+    if isinstance(shapes, FieldShapes):
+        vectors = shapes.vectors[:, modes.n_rigid : modes.n_rigid + n]
+    else:
+        vectors = shapes.basis.T @ shapes.turn[:, :n]
+    found = np.einsum("ij,ij->j", vectors, shallow.plane_mass(system, vectors))  # of a whole mass of one
+    every = np.full(modes.n_modes, np.median(found[-max(1, n // 4) :]))
+    every[: modes.n_rigid], every[modes.n_rigid : modes.n_rigid + n] = 0.0, found
+    return every

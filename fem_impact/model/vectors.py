@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from ..fe import point_load, refinement
-from ..fe.assembly import usual_theory
+from ..fe.assembly import System
 from ..fe.kirchhoff import ARGYRIS
 from ..fe.refinement import FLATTER
 from ..fe.section import Plate
@@ -48,7 +48,7 @@ def usable(target: Target) -> bool:
         return False
     ratio = target.damping_ratio
     by_mode = not callable(ratio) and np.ndim(ratio if ratio is not None else 0.0) > 0
-    return not by_mode and (target.system is None or target.system.rules is usual_theory(target.section, 2))
+    return not by_mode and (target.system is None or target.system.element == target.element)
 
 
 def _strict(rule: tuple[float, float], tolerance: float) -> float:
@@ -224,3 +224,35 @@ class Seen:
         if not new:
             return cost.on_mesh(fine, self.count, self.count)
         return cost.on_mesh(fine, new, self.count) + cost.on_mesh(self.coarse.system.n_dofs, new, self.count)
+
+
+# [-] points that share a mesh, to limit the work: each adds elements that shrink towards it; fewer make more meshes
+TOGETHER = 8
+
+
+class Krylovs(Krylov):
+    """Vectors of the first point; `each` has those of all points, one after another.
+
+    A map strikes one body again and again: every mesh is factorised once for all its points, and the vectors of each
+    point then cost one solution each.
+    """
+
+    each: list[Krylov]
+    compliance: np.ndarray  # (n_points, n_points) in the frame, diagonal
+
+    def __init__(self, system: System, points: np.ndarray, shift: float) -> None:
+        super().__init__(system, points[:1], shift)
+        self.each = [self, *(self.beside(point[None]) for point in points[1:])]
+        self.compliance = np.diag([float(one.compliance[0, 0]) for one in self.each])
+
+
+class Views(Seen):
+    """`Seen` from several points (n_points, 2) [m]: with the same shift, meshes and number of vectors."""
+
+    fine: Krylovs
+    coarse: Krylovs
+    kind = Krylovs
+
+    def of(self, point: int, cutoff: Callable[[Modes, float], float]) -> Modes:
+        """The target as seen from one of the points; ``cutoff`` as in `Seen.modes`."""
+        return self._struck(self.fine.each[point], self.coarse.each[point], cutoff)[1]

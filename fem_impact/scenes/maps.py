@@ -17,7 +17,7 @@ from ..impact import threshold
 from ..impact.contact import MARKS, acting_stiffness, wall_time
 from ..model.target import Stages
 from ..show import figures, plots
-from ..sweeps import bodies, cases, grid
+from ..sweeps import cases, grid
 from ..sweeps.borders import PREFIX, read_borders, without_borders
 from ..sweeps.cells import ALIASES, AXES, LAW, Case, Range, laid_out, logarithmic
 from .scene import Scene
@@ -141,18 +141,14 @@ def _quick_map(
     scene: Scene, over: Mapping[str, Any], band: float | None, tolerance: float, wanted: Mapping[str, Any]
 ) -> xarray.Dataset:
     """A map whose axes do not need a new body."""
-    blow, wanted = scene.blow.values, dict(wanted)
-    stages, keep = Stages(wanted.pop("stage", None)), grid.kept_beside(wanted.get("store"))
-    residual = blow.get("residual", True)
+    stages, residual = Stages(wanted.get("stage")), scene.blow.values.get("residual", True)
+    given = {name: value for name, value in wanted.items() if name != "stage"}
+    job = grid.Job(tolerance, band, residual=residual, audit=True, **given)
     try:
-        case, axes = bodies.body_of(
-            scene.built.target, scene.make_striker(), scene.make_contact(), at=blow["at"], speed=blow["speed"],
-            over=over, tolerance=tolerance, alone=residual and not wanted.get("layers"), keep=keep, stages=stages,
-        )  # fmt: skip
+        case, axes = job.described(scene.built, over, stages)
     except check.SimulationError as error:
         raise check.SimulationError(f"{scene.path}: {error}") from None
-    table = grid.run(case, axes, grid.Job(tolerance, band, residual=residual, audit=True, **wanted))
-    return with_theory(table, case, axes)
+    return with_theory(grid.run(case, axes, job), case, axes)
 
 
 def with_theory(table: xarray.Dataset, case: Case, axes: Mapping[str, np.ndarray]) -> xarray.Dataset:

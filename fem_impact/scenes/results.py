@@ -1,8 +1,8 @@
 """Reads back what a strike wrote: the blow from response.npz, and what any folder of results holds."""
 
 import json
-from collections.abc import Callable, Mapping
-from dataclasses import fields, replace
+from collections.abc import Callable
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -31,13 +31,11 @@ from .schema import fault
 from .sentences import si
 
 SAVED = "response.npz"  # beside response.json, whose text is its key: one of them alone, or changed, is refused
-KINDS: dict[str, type] = {
-    kind.__name__: kind
-    for kind in (Assumption, Contact, Ends, Error, Hand, History, Material, Modes, Response, RigidShapes,
-                 SampledShapes, Stretched, Striker, Stroke, Strokes)
-}  # fmt: skip
-# fields that are not kept: functions, and descriptions of the body that only a blow needs
-LEFT_OUT = {"rings", "audit", "vectors", "poorer", "section"}
+# fields that are not kept are functions, and descriptions of the body that only a blow needs
+KINDS = kept.kinds(
+    Assumption, Contact, Ends, Error, Hand, History, Material, Modes, Response, RigidShapes, SampledShapes, Stretched,
+    Striker, Stroke, Strokes, left_out={"rings", "audit", "vectors", "poorer", "section"},
+)  # fmt: skip
 
 
 def save(folder: Path, found: Response | Strokes, points: Any) -> str:
@@ -56,9 +54,7 @@ def save(folder: Path, found: Response | Strokes, points: Any) -> str:
         judged, whole = found.hits[found.hardest], replace(found, target=target, strokes=strokes, hits=hits)
     else:
         judged, whole = found, _known_at(found, points)
-    arrays: dict[str, np.ndarray] = {}
-    told = {"response": _packed(whole, arrays), "assumptions": _packed(judged.assumptions, arrays)}
-    kept.write(folder / SAVED, _key(folder), {**arrays, "told": np.array(json.dumps(told))})
+    kept.pack(folder / SAVED, _key(folder), KINDS, response=whole, assumptions=judged.assumptions)
     return SAVED
 
 
@@ -108,45 +104,6 @@ def _key(folder: Path) -> str:
     return path.read_text(encoding="utf-8", errors="replace")
 
 
-def _fields(kind: type) -> list[str]:
-    """The fields of a class of KINDS that are kept."""
-    if kind is Stroke:
-        return list(Stroke._fields)
-    return [each.name for each in fields(kind) if each.init and each.name not in LEFT_OUT]
-
-
-def _packed(value: Any, arrays: dict[str, np.ndarray]) -> Any:
-    """A value as plain data for JSON; arrays are put aside under the number that stands for them."""
-    if type(value).__name__ in KINDS:
-        told = {name: _packed(getattr(value, name), arrays) for name in _fields(type(value))}
-        return {"kind": type(value).__name__, "fields": told}
-    if isinstance(value, np.ndarray):
-        arrays[str(len(arrays))] = value
-        return {"array": str(len(arrays) - 1)}
-    if isinstance(value, slice):
-        return {"slice": [value.start, value.stop]}
-    if isinstance(value, Mapping):
-        return {"mapping": [[name, _packed(each, arrays)] for name, each in value.items()]}
-    if isinstance(value, (tuple, list)):
-        return [_packed(each, arrays) for each in value]
-    return value.item() if isinstance(value, np.generic) else value
-
-
-def _unpacked(told: Any, arrays: Mapping[str, np.ndarray]) -> Any:
-    if isinstance(told, list):
-        return tuple(_unpacked(each, arrays) for each in told)
-    if not isinstance(told, dict):
-        return told
-    if "kind" in told:
-        kind = KINDS[told["kind"]]
-        return kind(**{name: _unpacked(told["fields"][name], arrays) for name in _fields(kind)})
-    if "array" in told:
-        return arrays[told["array"]]
-    if "slice" in told:
-        return slice(*told["slice"])
-    return {name: _unpacked(each, arrays) for name, each in told["mapping"]}
-
-
 @check.typed
 def load_response(folder: str | Path) -> Response | Strokes:
     """Read back the blow, or the sequence of strokes, that `fem-impact strike` wrote to a folder.
@@ -186,14 +143,12 @@ def load_response(folder: str | Path) -> Response | Strokes:
     if not (folder / SAVED).is_file():
         raise fault(folder / SAVED, f"there is no such file, which a blow is read from; {again}")
     try:
-        arrays = kept.read(folder / SAVED, key)
-        if arrays is not None:
-            told = json.loads(str(arrays["told"]))
-            found, assumptions = (_unpacked(told[name], arrays) for name in ("response", "assumptions"))
-            if not isinstance(found, Strokes):
-                return _checked(found, assumptions)
-            judged = [assumptions if i == found.hardest else None for i in range(len(found.hits))]
-            return replace(found, hits=tuple(map(_checked, found.hits, judged)))
+        told = kept.unpack(folder / SAVED, key, KINDS) or {}
+        found, assumptions = told["response"], told["assumptions"]
+        if not isinstance(found, Strokes):
+            return _checked(found, assumptions)
+        judged = [assumptions if i == found.hardest else None for i in range(len(found.hits))]
+        return replace(found, hits=tuple(map(_checked, found.hits, judged)))
     except Exception:  # what somebody else packed may raise anything
         pass
     raise fault(folder / SAVED, f"it is damaged, or not of the response.json beside it; {again}")

@@ -72,7 +72,7 @@ class Scene(check.Brief):
     layer: tuple[Part, ...] = ()
     observe: Part | None = None
     map: Part | None = None
-    stroke: tuple[Part, ...] = ()  # blows one after another, for `sequence.play`; [strike] says what they share
+    stroke: tuple[Part, ...] = ()  # blows one after another, for `Scene.play`; [strike] says what they share
     known: Mapping[str, Any] = field(default_factory=dict)  # table.key -> distribution of a number with an interval
 
     def strike(self, *, strict: bool = False, **changes: Any) -> Response:
@@ -101,7 +101,7 @@ class Scene(check.Brief):
         Strokes
             As from `fi.strokes`.
         """
-        return sequence.play(self, watch, strict, **changes)
+        return self.run_strokes(watch, strict=strict, **changes).response
 
     @check.typed
     def plan_strokes(self, *, watch: Watch | None = None, **changes: Any) -> sequence.SequencePlan:

@@ -285,8 +285,8 @@ MAKERS: dict[str, tuple[str, dict[str, Callable[..., Any]]]] = {
     }),
     "contact": ("kind", {
         "linear": Contact.linear, "hertz": Contact.hertz, "power": Contact.power,
-        "restituting": Contact.restituting, **{law.name: getattr(Contact, law.name) for law in MARKS.values()},
-        "between": Contact.between,
+        "restituting": Contact.restituting, "between": Contact.between,
+        **{law.name: getattr(Contact, law.name) for law in MARKS.values() if law.numbers},
     }),
     "strike": ("", {"": collision.strike}),
     "stroke": ("", {"": stroke_values}),

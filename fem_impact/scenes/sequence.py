@@ -108,7 +108,7 @@ def run(
     strict: bool = False,
     **changes: Any,
 ) -> Played:
-    """As `Scene.play`, with the plan, which ``before`` sees before it is carried out, and the time of every stage."""
+    """As `Scene.run_strokes`: with the plan, which ``before`` sees first, and the time of every stage."""
     stages = Stages(watch)
     planned = plan(scene, watch, **changes)
     if before is not None:
@@ -120,7 +120,7 @@ def run(
 def plan(scene: "Scene", watch: Watch | None = None, **changes: Any) -> SequencePlan:
     """As `Scene.plan_strokes`."""
     if not scene.stroke:
-        raise scene.fault(f"[[{REPEATED}]] is missing: plan_strokes plans strokes, plan a single blow")
+        raise scene.fault(f"[[{REPEATED}]] is missing: strokes are played together; a single blow has strike and plan")
     wrong = [name for name in changes if name not in TAKEN]
     if wrong:
         raise ValueError(f"{wrong[0]} must be left out for a scene with strokes; it takes {', '.join(TAKEN)}")
@@ -147,13 +147,6 @@ def plan(scene: "Scene", watch: Watch | None = None, **changes: Any) -> Sequence
 def played_order(scene: "Scene") -> list[int]:
     """Which table of the scene each stroke is, in order of time."""
     return sorted(range(len(scene.stroke)), key=lambda i: scene.stroke[i].values["when"])
-
-
-def play(scene: "Scene", watch: Watch | None = None, strict: bool = False, **changes: Any) -> Strokes:
-    """As `Scene.play`."""
-    if not scene.stroke:
-        raise scene.fault(f"[[{REPEATED}]] is missing: Scene.play plays strokes, Scene.strike a single blow")
-    return run(scene, watch, strict=strict, **changes).response
 
 
 def _carried_out(

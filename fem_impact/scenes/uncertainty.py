@@ -286,8 +286,8 @@ class _SpreadAsked:
             ends["at"] = points[np.unique([points.argmin(axis=0), points.argmax(axis=0)])]
         with self._blamed(axes):
             base, _ = bodies.body_of(
-                target, blow.striker, blow.contact, at=at, speed=speed, over=ends or {"speed": np.array([speed])},
-                tolerance=self.tolerance, keep=self.keep, alone=self.residual and not self.places,
+                blow, ends or {"speed": np.array([speed])}, tolerance=self.tolerance, keep=self.keep,
+                alone=self.residual and not self.places,
             )  # fmt: skip
         axes |= self._of_modes(base.modes if self.body else None, base.first)
         if self.places:
@@ -371,11 +371,8 @@ class _SpreadAsked:
                 changes = {
                     "target_mass": base.modes.mass * mass, "target_frequency": base.first_frequency * frequency,
                 }  # fmt: skip
-                other, _ = bodies.body_of(
-                    _made(self.blow.target, each.name, ratio), self.blow.striker, self.blow.contact,
-                    at=self.blow.arguments["at"], speed=self.blow.arguments["speed"], over={"speed": [base.speed]},
-                    tolerance=self.tolerance, alone=self.residual,
-                )  # fmt: skip
+                blow = replace(self.blow, target=_made(self.blow.target, each.name, ratio))
+                other, _ = bodies.body_of(blow, {"speed": [base.speed]}, tolerance=self.tolerance, alone=self.residual)
                 try:
                     one, two = (alone.row(alone.strike(case)) for case in (base.with_values(changes), other))
                     off = max(alone.apart(one, two).values()) if one[0] == two[0] else math.inf

@@ -1,7 +1,5 @@
 """What a map needs of the struck body: Ritz vectors at each strike point if they can carry its blows, or else modes."""
 
-import hashlib
-import json
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -12,7 +10,6 @@ from typing import Any
 import numpy as np
 
 from .._base import check, identity, kept
-from .._base.rounding import HALVINGS
 from ..fe import refinement
 from ..fe.eigenvalues import Flexibility
 from ..impact import accuracy
@@ -23,8 +20,9 @@ from ..model import vectors
 from ..model.asked import refine
 from ..model.budget import FINEST, Budget
 from ..model.by_modes import MOST_MODES
+from ..model.planner import Blow
 from ..model.target import CLOSE, FIRST_FLEXIBLE, FIRST_LOOK, Elements, Stages, Target
-from ..model.views import TOGETHER, Views
+from ..model.vectors import TOGETHER, Views
 from ..modes.modal import Modes, damping_ratios
 from ..modes.shapes import FieldShapes, SampledShapes
 from .batches import allowed
@@ -38,16 +36,13 @@ SPARED = 0.2
 
 Axes = Mapping[str, np.ndarray]
 Views_ = Mapping[tuple[float, ...], Modes]
+KINDS = kept.kinds(Modes, SampledShapes, left_out={"section"})  # of a file of vectors
 
 
 def body_of(
-    target: Target,
-    striker: Striker,
-    contact: Contact,
-    *,
-    at: Any,
-    speed: float,
+    blow: Blow,
     over: Mapping[str, Any],
+    *,
     tolerance: float,
     alone: bool = True,
     keep: Path | None = None,
@@ -55,31 +50,31 @@ def body_of(
 ) -> tuple[Case, dict[str, np.ndarray]]:
     """The blow that all cells of a map share, on a body described as well as its cells need, and the map's axes.
 
-    A body given by its modes keeps them. Striker to tolerance as in `sweep`. ``alone``: only the numbers of the blows
-    are wanted, with the residual compliance; otherwise modes are found. ``keep`` is an .npz file that saves the vectors
-    or the modes; the same map later reads them from there.
+    A body given by its modes keeps them. ``over`` and ``tolerance`` as in `sweep`. ``alone``: only the numbers of the
+    blows are wanted, with the residual compliance; otherwise modes are found. ``keep`` is an .npz file that saves the
+    vectors or the modes; the same map later reads them from there.
     """
-    stages = stages or Stages()
-    speed = check.positive("speed", speed, "m/s", reach=REACH)
+    target, stages = blow.target, stages or Stages()
+    speed = check.positive("speed", blow.arguments["speed"], "m/s", reach=REACH)
+
+    def started(modes: Modes) -> Case:
+        return Case(modes, blow.striker, blow.contact, modes.point("at", blow.arguments["at"])[0], speed)
+
     if target.modes is not None:
-        case = _started(target.finished(target.modes), striker, contact, at, speed)
+        case = started(target.finished(target.modes))
         return case, checked_axes(case, over)
     if alone and vectors.usable(target):
-        case = _started(outline(target, stages), striker, contact, at, speed)
+        case = started(outline(target, stages))
         axes = checked_axes(case, over)
         seen = by_vectors(target, case, axes, tolerance=tolerance, stages=stages, keep=keep)
         if seen is not None:
             return seen, axes
     with stages("modes"):
         first = target.find(2 * FIRST_LOOK, tolerance=tolerance, stages=stages)  # a map has harder blows than one
-    case = _started(target.surrounded(first), striker, contact, at, speed)
+    case = started(target.surrounded(first))
     axes = checked_axes(case, over)
     with stages("modes"):
         return _by_modes(target, case, axes, tolerance, keep), axes
-
-
-def _started(modes: Modes, striker: Striker, contact: Contact, at: Any, speed: float) -> Case:
-    return Case(modes, striker, contact, modes.point("at", at)[0], speed)
 
 
 def outline(target: Target, stages: Stages) -> Modes:
@@ -102,29 +97,18 @@ def corners(axes: Axes) -> list[dict[str, Any]]:
 def _by_modes(target: Target, case: Case, axes: Axes, tolerance: float, keep: Path | None) -> Case:
     """The blow on as many modes as the shortest contact of the map needs."""
 
-    def reach(tolerance: float, axes: Axes = axes) -> float:
-        found = (case.with_values(values) for values in corners(axes))
-        return max(
-            needed_frequency(corner, tolerance) * case.modes.frequencies[-1] / corner.modes.frequencies[-1]
-            for corner in found
-        )
-
-    modes, needed = case.modes, reach(tolerance)
+    modes = case.modes
+    needed = max(
+        needed_frequency(corner, tolerance) * modes.frequencies[-1] / corner.modes.frequencies[-1]
+        for corner in (case.with_values(values) for values in corners(axes))
+    )
     if needed <= modes.frequencies[-1]:
         return case
     number, most = number_of_modes(modes, needed), MOST_MODES[target.kind]
     if number > most:
-        enough = accuracy.least_tolerance(lambda tolerance: number_of_modes(modes, reach(tolerance)) <= most)
-        stiffest = float(np.max(axes.get("stiffness", case.contact.stiffness)))
-        softer = (float(f"{stiffest * 0.5**n:.1e}") for n in range(1, HALVINGS))
-        fits = (
-            k for k in softer if number_of_modes(modes, reach(tolerance, {**axes, "stiffness": np.array([k])})) <= most
-        )
-        soft = next(fits, None)
         raise check.SimulationError(
-            f"the shortest blow of the map needs about {number} modes, at most {most} are allowed; "
-            f"{'no tolerance is large enough' if enough is None else f'tolerance = {enough:g} is affordable'}; or "
-            f"leave out the {'lightest strikers' if soft is None else f'contacts stiffer than {soft:g}'}"
+            f"the shortest blow of the map needs about {number} modes, at most {most} are allowed; leave out the "
+            "lightest strikers and the stiffest contacts, or take a larger tolerance"
         )
     first = None
     if keep is not None and target.kind == "fe":
@@ -166,7 +150,8 @@ def by_vectors(
         case = replace(case, first=float(first.frequencies[first.omega > 0.0][0]))
     points = axes.get("at", case.at[None])
     key = _key(target, case, axes, tolerance)
-    views = None if keep is None else _read(keep, key)
+    known = None if keep is None else kept.unpack(keep, key, KINDS)
+    views: Views_ | None = None if known is None else known["views"]
     if views is None:
         others = {name: values for name, values in axes.items() if name != "at"}
         rng = np.random.default_rng(0)  # the same map gives the same vectors
@@ -174,7 +159,7 @@ def by_vectors(
         chance = [{name: rng.choice(values) for name, values in others.items()} for _ in range(number - 2)]
         views = Sized(target, case, corners(others), chance, tolerance).views(points, stages)
         if keep is not None and views is not None:
-            _write(keep, key, views)
+            kept.pack(keep, key, KINDS, views=views)
     if views is None:
         return None
     return replace(case, modes=views[tuple(points[0].tolist())], at=points[0], views=views)
@@ -306,56 +291,15 @@ class Sized:
         return hit.error.truncation, hit.error.mesh
 
 
-# --- a file of vectors -----------------------------------------------------------------------------------------------
-
-
 def _key(target: Target, case: Case, axes: Axes, tolerance: float) -> str:
-    """Hash of everything that determines the vectors of a map."""
+    """Digest of everything that determines the vectors of a map."""
     shapes = case.modes.shapes
     assert isinstance(shapes, FieldShapes)
-    system, striker = shapes.system, case.striker
+    system, frame, striker = shapes.system, shapes.system.frame, case.striker
     ratio = 0.0 if target.damping_ratio is None else target.damping_ratio
-    told = {
-        "striker": [*striker.modes.omega.tolist(), striker.felt_mass, *striker.shape.tolist()],
-        "contact": vars(case.contact),
-        "blow": [case.speed, tolerance, *case.at.tolist(), case.first],
-        "target": [target.mass, dict(target.scale), target.size_stated],
-        "damping": damping_ratios(ratio, np.geomspace(1.0, 1e7, 50)).tolist(),
-        "axes": {name: values.tolist() for name, values in axes.items()},
-        "program": identity.program(),
-    }
-    body = hashlib.sha256(json.dumps(told, sort_keys=True).encode())
-    for matrix in (system.K, system.M):
-        body.update(matrix.data.tobytes())
-    body.update(repr((system.frame.length, system.frame.stiffness, system.frame.inertia)).encode())
-    return body.hexdigest()
-
-
-def _write(path: Path, key: str, views: Views_) -> None:
-    """Save the vectors at the points that they started from."""
-    arrays: dict[str, Any] = {"places": np.array(list(views))}
-    for i, modes in enumerate(views.values()):
-        arrays |= {f"{i} mass": modes.mass, f"{i} notes": np.array(modes.notes, dtype=str)}
-        for cause, some in {"": modes, **modes.poorer}.items():
-            assert isinstance(some.shapes, SampledShapes)
-            columns = some.omega, some.damping_ratio, some.shapes.values, some.shapes.static
-            arrays |= {f"{i} {cause} {n}": column for n, column in enumerate(columns)}
-    kept.write(path, key, arrays)
-
-
-def _read(path: Path, key: str) -> Views_ | None:
-    """What `_write` saved for the same map; None if there is no such file, or it is damaged."""
-    file = kept.read(path, key)
-    if file is None:
-        return None
-    views = {}
-    for i, place in enumerate(file["places"]):
-        mass, notes = float(file[f"{i} mass"]), tuple(map(str, file[f"{i} notes"]))
-        found = {}
-        for cause in ("", "mesh", "truncation"):
-            if f"{i} {cause} 0" in file:
-                omega, zeta, rows, static = (file[f"{i} {cause} {n}"] for n in range(4))
-                found[cause] = Modes(omega, zeta, SampledShapes(place[None], rows, static), mass, notes=notes)
-        whole = found.pop("")
-        views[tuple(place.tolist())] = replace(whole, poorer=found)
-    return views
+    return identity.of([
+        striker.modes.omega, striker.felt_mass, striker.shape, vars(case.contact), case.speed, tolerance, case.at,
+        case.first, target.mass, dict(target.scale), target.size_stated,
+        damping_ratios(ratio, np.geomspace(1.0, 1e7, 50)), dict(axes), identity.program(), system.K.data, system.M.data,
+        [frame.length, frame.stiffness, frame.inertia],
+    ])  # fmt: skip

@@ -17,8 +17,8 @@ from ..impact.distance import distance
 from ..impact.response import Response
 from ..modes.modal import Modes
 from . import batches
-from .cells import ALONE, FAMILY_AXES, LOSSY, Case
-from .store import LARGEST_BLOCK, Texts, Watch, block_size, by_cluster, by_store
+from .cells import ALONE, FAMILY_AXES, LAW, LOSSY, Case
+from .store import LARGEST_BLOCK, Texts, Watch, block_size, by_blocks, by_cluster, by_store
 
 LOG = logging.getLogger(__name__)
 Result = TypeVar("Result")
@@ -135,14 +135,14 @@ class Cases:
         return found
 
     def scene(self) -> dict[str, Any]:
-        """The blow that all cases share, as plain numbers, and which cells these are if not all."""
+        """The blow that all cases share, as plain numbers."""
         case = self.base
         return {
             "target": _plain(case.modes, case.at),
             "striker": _plain(case.striker.modes, case.striker.at),
             "contact": dict(vars(case.contact)),
             "speed": case.speed,
-        } | ({} if self.chosen is None else {"cells": self.chosen.tolist()})
+        }
 
     def sampled(self) -> "Cases":
         """The same cases with each body reduced to its contact points: small enough to send to a cluster."""
@@ -292,19 +292,12 @@ def solve_all(
     LOG.info("%d blows at the tolerance %g", cases.n_cases, cases.tolerance)
     if client is not None:
         return by_cluster(cases, client, store, partial(solve_cases, workers=1), watch)
+    solve = partial(solve_cases, workers=workers)
     if store is not None:
-        return by_store(cases, store, partial(solve_cases, workers=workers), watch)
-    numbers = np.empty((len(cases.layers), cases.n_cases))
-    texts: Texts = {}
+        return by_store(cases, store, solve, watch)
     often = cases.lossy or cases.extra  # slow ones are told more often
     size = max(batches.FEW, block_size(cases.n_cases)) if often else LARGEST_BLOCK
-    for start in range(0, cases.n_cases, size):
-        stop = min(start + size, cases.n_cases)
-        numbers[:, start:stop], new = solve_cases(cases, start, stop, workers=workers)
-        texts |= new
-        if watch is not None:
-            watch(stop, cases.n_cases)
-    return numbers, texts
+    return by_blocks(cases, solve, watch, size)
 
 
 def solve_cases(cases: Cases, start: int, stop: int, *, workers: int | None = None) -> tuple[np.ndarray, Texts]:
@@ -318,7 +311,8 @@ def solve_cases(cases: Cases, start: int, stop: int, *, workers: int | None = No
     names, base, count = cases.layers, cases.base, stop - start
     numbers = np.full((len(names), count), np.nan)
     numbered = cases.numbered(start, stop)
-    shared = {"target_mass": base.modes.mass, "mass": base.striker.mass, "speed": base.speed, **vars(base.contact)}
+    shared = {"target_mass": base.modes.mass, "mass": base.striker.mass, "speed": base.speed}
+    shared |= {name: getattr(base.contact, name) for name in {*LAW, *ALONE}}
     column = {
         name: cases.axes[name][numbered[name]] if name in numbered else np.full(count, value)
         for name, value in shared.items()

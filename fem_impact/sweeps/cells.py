@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field, fields, replace
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -32,7 +32,7 @@ AXES = {  # name: unit, what it is, its name in a scene file
     "target_frequency": ("Hz", "first flexible frequency of the struck body", "target.first_frequency"),
     "damping_ratio": ("", "damping ratio of the struck body", "target.damping_ratio"),
 }
-LAW = [field.name for field in fields(Contact)]  # the axes that change the contact
+LAW = ["stiffness", "exponent", "loss", "gap", *NUMBERS]  # the axes that change the contact
 ALIASES = {alias: name for name, (_, _, alias) in AXES.items()}
 ALONE = set(MARKS)  # axes of contacts whose cells are computed alone
 RATED = "loss", *(mark for mark, law in MARKS.items() if law.rated)  # those of contacts whose force depends on the rate
@@ -131,7 +131,8 @@ class Case:
         if name == "speed":
             return replace(self, speed=check.positive("speed", value, "m/s", reach=REACH))
         if name in LAW:
-            return replace(self, contact=replace(self.contact, **{name: float(value)}))
+            number: Any = {name: float(value)}
+            return replace(self, contact=replace(self.contact, **number))
         if name in ("mass", "striker_frequency"):
             key = "mass" if name == "mass" else "first_frequency"
             return replace(self, striker=replace(self.striker, modes=self.striker.modes.scaled(**{key: value})))

@@ -19,7 +19,8 @@ from ..impact.contact import Contact
 from ..impact.response import Response
 from ..impact.striker import Striker
 from ..model.asked import COSTLY
-from ..model.target import Target
+from ..model.planner import Blow
+from ..model.target import Stages, Target
 from ..modes.modal import Damping, Modes
 from . import batches, bodies, cell_errors, refined
 from .borders import add_borders, find_borders, why_none
@@ -69,6 +70,14 @@ class Job:
             workers=None if self.workers is None else check.count("workers", self.workers),
             store=None if self.store is None else Path(self.store),
         )
+
+    def described(
+        self, blow: Blow, over: Mapping[str, Any], stages: Stages | None = None
+    ) -> tuple[Case, dict[str, Any]]:
+        """The blow on a body described as the map needs it, and the map's axes; as `bodies.body_of`."""
+        alone = self.residual and not self.layers
+        keep = kept_beside(self.store)
+        return bodies.body_of(blow, over, tolerance=self.tolerance, alone=alone, keep=keep, stages=stages)
 
     def solved(self, cases: Cases, turn: str = "") -> tuple[np.ndarray, Texts]:
         """Compute all cases; those of a round with a name are kept in a folder of the store."""
@@ -218,10 +227,8 @@ def sweep(
         alone = bool(job.layers) or (isinstance(modes, Modes) and modes.stretches)
         over, ours = laid_out(over, contact, alone=alone, cells=cells)
         job = replace(job, ours=ours)
-    base, axes = bodies.body_of(
-        Target.of(modes, damping_ratio), striker, contact, at=at, speed=speed, over=over, tolerance=job.tolerance,
-        alone=residual and not job.layers, keep=kept_beside(store),
-    )  # fmt: skip
+    blow = Blow(Target.of(modes, damping_ratio), striker, contact, {"at": at, "speed": speed})
+    base, axes = job.described(blow, over)
     n_cells = math.prod(map(len, axes.values()))
     max_cells = check.number("max_cells", max_cells)
     admit(n_cells, len(LAYERS) + len(job.layers), max_cells, quick=not job.layers, tell=tell)

@@ -216,15 +216,14 @@ def choose_on(
     return _with_borders(chosen, hammer) if between else chosen
 
 
-def _mixed(masses: np.ndarray) -> list[int]:
+def _mixed(masses: np.ndarray) -> np.ndarray:
     """An order of the masses whose first ones have the mean of all: heavy ones take longer, and the time left is told.
 
-    The bits of the ranks are turned round, so that halves, quarters, ... of the order spread over all.
+    Ranks follow each other as multiples of the golden section do round a circle, which halve the widest gap each time.
     """
-    bits = max(1, int(np.ceil(np.log2(len(masses)))))
-    turned = [int(f"{rank:0{bits}b}"[::-1], 2) for rank in range(2**bits)]
-    order = np.argsort(masses, kind="stable")
-    return [int(order[rank]) for rank in turned if rank < len(masses)]
+    golden = 0.5 * (5.0**0.5 - 1.0)
+    ranks = np.argsort(np.argsort(golden * np.arange(len(masses)) % 1.0))
+    return np.argsort(masses, kind="stable")[ranks]
 
 
 def _with_borders(chosen: tuple[Hammer, ...], hammer: Callable[[float, bool], Hammer]) -> tuple[Hammer, ...]:

@@ -21,7 +21,6 @@ LARGEST_BLOCK = 2**17  # [-] cells computed together at most, to limit the memor
 BLOCKS = 64  # [-] fewest blocks of a large map: a killed run loses at most one block per worker
 ARRAYS = ("numbers", "failures", "done")  # of a store; the last one holds the proofs and is written last
 TEXT = 240  # [byte] longer error texts are cut, because every cell has room for one
-EXTRA = "pip install 'fem-impact[cluster]'"
 
 Texts = dict[int, str]  # failed cell: error text
 Solve = Callable[[Any, int, int], tuple[np.ndarray, Texts]]  # grid, start, stop: numbers (n_layers, n_cells), texts
@@ -34,10 +33,13 @@ OTHERS = {  # what is told of a store whose digests are others
 }
 
 
+def _zarr() -> Any:
+    return check.extra("zarr", "cluster", "a store")
+
+
 def finished(path: Path) -> tuple[int, int]:
     """How many blocks of a store are finished, and of how many; ValueError if it is none."""
-    with _needed("a store"):
-        import zarr
+    zarr = _zarr()
     with _intact(path):
         done = np.asarray(zarr.open_group(str(path), mode="r")["done"])
     return int(np.count_nonzero(done)), done.size
@@ -59,8 +61,7 @@ class Store:
     def __init__(self, path: Path, mark: Mark, n_layers: int, n_cases: int) -> None:
         self.path, self.mark = path, mark
         self.n_layers, self.n_cases, self.block = n_layers, n_cases, block_size(n_cases)
-        with _needed("a store"):
-            import zarr
+        zarr = _zarr()
         with _intact(path):
             group: Any = zarr.open_group(str(path), mode="r")
             found = dict(group.attrs)
@@ -82,8 +83,7 @@ class Store:
     def open(cls, path: str | Path, grid: Any) -> "Store":
         """Open the store of a map, or create it; ValueError if the path holds anything else."""
         path = Path(path).resolve()
-        with _needed("a store"):
-            import zarr
+        zarr = _zarr()
         mark = fingerprint(grid)
         if not path.exists() or (path.is_dir() and not any(path.iterdir())):
             with created(path) as new:
@@ -108,9 +108,7 @@ class Store:
     @cached_property
     def _writable(self) -> list[Any]:
         """The arrays, opened for writing."""
-        import zarr
-
-        group: Any = zarr.open_group(str(self.path), mode="r+")
+        group: Any = _zarr().open_group(str(self.path), mode="r+")
         return [group[name] for name in ARRAYS]
 
     def write(self, block: int, numbers: np.ndarray, texts: Texts) -> tuple[np.ndarray, Texts]:
@@ -170,20 +168,17 @@ def _made(zarr: Any, place: Any, mark: Mark, n_layers: int, n_cases: int) -> Any
 
 def fingerprint(grid: Any) -> Mark:
     """Digests of everything that determines the results of a map: the blow, the functions and the program."""
-    body = hashlib.sha256(json.dumps(grid.scene(), sort_keys=True).encode())
-    for name, values in grid.axes.items():
-        body.update(f"{name} {values.shape}".encode() + np.ascontiguousarray(values, float).tobytes())
-    striker = grid.base.striker
-    told = grid.tolerance, grid.residual, grid.band, grid.layers, grid.max_impacts, striker.hand, grid.base.first
-    body.update(repr(told).encode() + striker.motion.tobytes())
-    seen = [(modes, np.array([place])) for place, modes in grid.base.views.items()]
+    striker, views = grid.base.striker, grid.base.views
+    seen = [(modes, np.array([place])) for place, modes in views.items()]
+    told = [
+        grid.scene(), dict(grid.axes), grid.chosen, grid.tolerance, grid.residual, grid.band, grid.layers,
+        grid.max_impacts, striker.hand, striker.motion, grid.base.first,
+    ]  # fmt: skip
     for modes, places in seen or [(grid.base.modes, grid.axes.get("at", grid.base.at[None]))]:
         for each in (modes, *modes.poorer.values()):
             yields = [float(each.shapes.compliance(place[None])[0, 0]) for place in places]
-            body.update(repr((each.n_modes, each.stretches, each.thick, each.air, each.unstated, yields)).encode())
-            body.update(each.omega.tobytes() + each.shape_at(places).tobytes())
-            if (spread := each.shapes.spread(places)) is not None:
-                body.update(spread.tobytes())
+            told += [each.stretches, each.thick, each.air, each.unstated, yields]
+            told += [each.omega, each.shape_at(places), each.shapes.spread(places)]
     functions = {}
     for name, function in grid.extra.items():
         try:
@@ -193,22 +188,32 @@ def fingerprint(grid: Any) -> Mark:
                 f"layers: {name!r} cannot be distinguished from other functions ({error}), so a store may mix "
                 "them up; leave out store, or pass a function that does not use it"
             ) from None
-    return {"map": body.hexdigest(), "functions": identity.of(functions), "program": identity.program()}
+    return {"map": identity.of(told), "functions": identity.of(functions), "program": identity.program()}
+
+
+def by_blocks(
+    grid: Any, solve: Solve, watch: Watch | None, size: int, store: "Store | None" = None
+) -> tuple[np.ndarray, Texts]:
+    """Compute a map in this process, block by block; what is in a store is read, and what is missing there written."""
+    numbers = np.empty((len(grid.layers), grid.n_cases))
+    texts: Texts = {}
+    for start in range(0, grid.n_cases, size):
+        stop, block = min(start + size, grid.n_cases), start // size
+        found = None if store is None else store.read(block)  # only now: another process may be at work on the same map
+        if found is None:
+            found = solve(grid, start, stop)
+            found = found if store is None else store.write(block, *found)
+        numbers[:, start:stop], new = found
+        texts |= new
+        if watch is not None:
+            watch(stop, grid.n_cases)
+    return numbers, texts
 
 
 def by_store(grid: Any, path: str | Path, solve: Solve, watch: Watch | None) -> tuple[np.ndarray, Texts]:
     """Read a map from a store, and compute in this process what is missing there."""
     store = Store.open(path, grid)
-    numbers = np.empty((store.n_layers, store.n_cases))
-    texts: Texts = {}
-    for block in store.blocks:
-        start, stop = store.bounds(block)
-        found = store.read(block)  # only now: another process may be at work on the same map
-        numbers[:, start:stop], new = found or store.write(block, *solve(grid, start, stop))
-        texts |= new
-        if watch is not None:
-            watch(stop, grid.n_cases)
-    return numbers, texts
+    return by_blocks(grid, solve, watch, store.block, store)
 
 
 def by_cluster(
@@ -220,11 +225,10 @@ def by_cluster(
     ----------
     client : dask.distributed.Client or the address of a scheduler
     """
-    with _needed("client"):
-        from distributed import Client, as_completed
-    if not isinstance(client, (str, Client)):
+    dask = check.extra("distributed", "cluster", "client")
+    if not isinstance(client, (str, dask.Client)):
         raise ValueError(f"client must be a dask.distributed.Client or an address, got {check.shown(client)}")
-    with _connected(Client, client) as connected:
+    with _connected(dask.Client, client) as connected:
         store = None if path is None else Store.open(path, grid)
         block = block_size(grid.n_cases)
         todo = store.missing() if store is not None else list(range(math.ceil(grid.n_cases / block)))
@@ -236,7 +240,7 @@ def by_cluster(
         numbers = np.empty((len(grid.layers), grid.n_cases)) if store is None else np.empty((0, 0))
         texts: Texts = {}
         done = grid.n_cases - sum(min(block, grid.n_cases - i * block) for i in todo)
-        for future, result in as_completed(futures, with_results=True):
+        for future, result in dask.as_completed(futures, with_results=True):
             if future.cancelled():
                 raise OSError(f"client: the cluster dropped the map ({check.line(str(result))}); run it again")
             start = futures[future] * block
@@ -277,15 +281,6 @@ def _connected(make: Any, client: Any) -> Iterator[Any]:
         ) from None
     with made:
         yield made
-
-
-@contextmanager
-def _needed(name: str) -> Iterator[None]:
-    """Turn a missing package into an error that says how to install it."""
-    try:
-        yield
-    except ImportError as error:
-        raise ValueError(f"{name} needs {error.name}: {EXTRA}") from None
 
 
 @contextmanager

@@ -91,7 +91,7 @@ def _spread(problem: Problem, best: Solution, single: Problem, x: np.ndarray) ->
     moved = slopes[:, held] - slopes[:, own] @ np.linalg.lstsq(slopes[:, own], slopes[:, held], rcond=None)[0]
     residual = problem.residual(best.x).reshape(-1, problem.data.n_times)
     noise = profiles.variance(residual, problem.n_values)[0]
-    return float(np.sqrt(noise) * single.data.scale[0, 0]) * moved @ solver.directions(best.jacobian).inverse[held]
+    return float(np.sqrt(noise) * single.data.scale[0, 0]) * moved @ solver.pseudo_inverse(best.jacobian)[held]
 
 
 def _force_only(problem: Problem) -> Problem:

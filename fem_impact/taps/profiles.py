@@ -1,7 +1,8 @@
 """Profiles of the likelihood: how far a value may move, with all others readjusted, before the data object."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from contextlib import suppress
+from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
@@ -12,8 +13,7 @@ from scipy.stats import chi2, t
 from .._base import check
 from .._base.check import SimulationError
 from .._base.rounding import HALVINGS, SAME
-from .ridges import RidgePath, way
-from .solver import ENOUGH, NEARLY, QUICK, Problem, Solution, chord, solve
+from .solver import ENOUGH, NEARLY, Problem, Solution, pseudo_inverse, solve
 from .unknowns import Unknown
 
 SURE = 0.95  # [-] the widest interval that a profile is followed to
@@ -139,53 +139,34 @@ class _Climb:
     bounds: tuple[np.ndarray, np.ndarray]
     target: float  # [-] root of the rise at the end of the widest interval
 
-    @property
-    def farthest(self) -> float:
-        """The longest first step: a quarter of the range, so that four steps see all of it."""
-        return 0.25 * float(self.bounds[1][self.j] - self.bounds[0][self.j])
+    @cached_property
+    def tangent(self) -> tuple[np.ndarray, float]:
+        """How the others go along with the one, (n_coordinates,), by the derivatives at the best fit; and how far that
+        one goes until the sum of squares rises by the noise."""
+        jacobian, way = self.problem.jacobian(self.best.x), np.zeros(len(self.best.x))
+        others = np.setdiff1d(np.arange(len(way)), [self.j, *self.problem.needless])
+        way[others] = -pseudo_inverse(jacobian[:, others]) @ jacobian[:, self.j]
+        way[self.j] = 1.0
+        return way, float(np.sqrt(self.noise) / max(np.linalg.norm(jacobian @ way), 1e-300))
 
-    def way(self, x: np.ndarray, stopped: np.ndarray | None = None) -> RidgePath:
-        """How the other coordinates go along, from a point where they fit best."""
-        return way(self.problem, x, self.j, self.bounds, self.noise, self.farthest / self.target, stopped)
-
-    def first_step(self, trail: RidgePath, root: float) -> float:
-        """Step to the target by curvature, from a point with a root of the rise."""
-        return min((1.02 * self.target - root) * trail.spread, self.farthest)
-
-    def solve(self, trail: RidgePath, last: float) -> tuple[Solution, RidgePath]:
-        """The best fit with the coordinate at ``last``, and the trail with the derivatives that led there."""
-        held = (self.j,)
-        moved, sure = chord(self.problem, trail.to(last), trail.jacobian, held, NEARLY)
-        if not sure:
-            moved = solve(self.problem, moved.x, QUICK, NEARLY, held=held)
-            trail = replace(trail, jacobian=moved.jacobian)
-        if not moved.ended and moved.cost - self.best.cost > self.target**2 * self.noise:
-            moved = solve(self.problem, moved.x, ENOUGH, NEARLY, held=held, method="dogbox")  # quicker along a ridge
-        return moved, trail
-
-    def side(self, trail: RidgePath, sign: float, floor: bool) -> tuple[list[Solution], bool, str]:
+    def side(self, sign: float, floor: bool) -> tuple[list[Solution], bool, str]:
         """Fits up (sign 1) or down (-1) from the best, whether the data set no limit there, and what ended the way."""
-        bound = float(self.bounds[int(sign > 0.0)][self.j])
+        low, high = (float(each[self.j]) for each in self.bounds)
+        bound = high if sign > 0.0 else low
         found: list[Solution] = []
-        root, steep, ended = 0.0, 0.0, False
-        # a little short of the target by curvature, as the second step tells the rest
-        step = min(0.8 * self.target * trail.spread, self.farthest)
+        root, steep, ended, x = 0.0, 0.0, False, self.best.x
+        slope, spread = self.tangent
+        # a little short of the target by curvature, as the second step tells the rest; four steps see all of the range
+        step = min(0.8 * self.target * spread, 0.25 * (high - low))
         for _ in range(HALVINGS):  # most profiles end after two steps
-            reach, meets = trail.reach(sign)
-            touches = reach < step
-            step, here = min(step, reach), float(trail.x[self.j])
+            here = float(x[self.j])
             if step < SAME * max(1.0, abs(here)):
-                if not touches:
-                    break
-                trail = self.way(trail.x, trail.stopped | meets)
-                step = self.first_step(trail, root)
-                continue
-            last = here + sign * step
-            ended = sign * (last - bound) >= -1e-9 * abs(bound)
-            last = bound if ended else last
-            step = abs(last - here)
+                break
+            ended = sign * (here + sign * step - bound) >= -1e-9 * abs(bound)
+            step = abs(bound - here) if ended else step
+            start = np.clip(x + sign * step * slope, *self.bounds)
             try:
-                moved, trail = self.solve(trail, last)
+                moved = solve(self.problem, start, ENOUGH, NEARLY, held=(self.j,))
             except SimulationError:
                 return found, root < self.target and steep <= TOO_STEEP * self.target, "the simulation"
             found.append(moved)
@@ -194,35 +175,33 @@ class _Climb:
                 step *= max(1.0 / GROWTH, 1.02 * (self.target - root) / (steep - root))
                 continue
             was, root = root, steep
-            trail = trail.on(moved.x)
+            x, slope = moved.x, (moved.x - x) / (moved.x[self.j] - here)
             if root >= self.target or ended:
                 break
-            if touches:
-                trail = self.way(moved.x, trail.stopped | meets)
-                step = self.first_step(trail, root)
-                continue
             step = min((1.02 * self.target - root) * step / max(root - was, 1e-3), GROWTH * step)
         if root < self.target and steep <= TOO_STEEP * self.target:
             return found, not (sign < 0.0 and floor and ended), ""
-        held = self._limiting(trail.x)
+        held = self._limiting(found[-1])
         return found, bool(held), held
 
-    def _limiting(self, x: np.ndarray) -> str:
-        """An unknown at an end of its range whose release would lower the sum of squares there; "" if there is none.
+    def _limiting(self, end: Solution) -> str:
+        """An unknown at an end of its range that holds the sum of squares up there; "" if there is none.
 
-        An unknown that only drifted there along a flat valley pulls nothing, and a natural limit at zero is none.
+        That is one whose way back by a quarter of its range costs more than noise: if it only drifted there along a
+        flat valley it costs nothing. A natural limit at zero is none.
         """
-        n = self.problem.n_shared
-        low, high = (bound[:n] for bound in self.problem.bounds)
-        near = 0.02 * (high - low)  # of a bound, which may then hold the unknown
-        down, up = x[:n] - low < near, high - x[:n] < near
-        touched = up | (down & ~np.array([each.floor for each in self.problem.free], bool))
-        touched[self.j : self.j + 1] = False
-        if not touched.any():
-            return ""
-        slope = 2.0 * (self.problem.jacobian(x).T @ self.problem.residual(x))[:n]
-        pulls = touched & (np.where(up, -slope, slope) * (high - low) > self.noise)
-        return self.problem.free[int(pulls.argmax())].name if pulls.any() else ""
+        for k, each in enumerate(self.problem.free):
+            low, high = (float(bound[k]) for bound in self.problem.bounds)
+            near = 0.02 * (high - low)  # of a bound, which may then hold the unknown
+            up = high - end.x[k] < near
+            if k == self.j or not (up or (end.x[k] - low < near and not each.floor)):
+                continue
+            start = end.x.copy()
+            start[k] = high - 0.25 * (high - low) if up else low + 0.25 * (high - low)
+            with suppress(SimulationError):
+                if solve(self.problem, start, ENOUGH, NEARLY, (self.j, k)).cost - end.cost > self.noise:
+                    return each.name
+        return ""
 
 
 def follow(problem: Problem, best: Solution, j: int, noise: float, freedom: int, name: str) -> tuple[Profile, Solution]:
@@ -235,8 +214,7 @@ def follow(problem: Problem, best: Solution, j: int, noise: float, freedom: int,
         low, high = low.copy(), high.copy()
         low[j], high[j] = unknown.bounds
     climb = _Climb(problem, best, j, noise, (low, high), float(t.ppf(0.5 + 0.5 * SURE, freedom)))
-    first = climb.way(best.x)
-    sides = [climb.side(first, sign, unknown.floor) for sign in (-1.0, 1.0)]
+    sides = [climb.side(sign, unknown.floor) for sign in (-1.0, 1.0)]
     fits = sorted([*sides[0][0], best, *sides[1][0]], key=lambda fit: fit.x[j])
     table = [problem.values(fit.x) for fit in fits]
     speeds = np.array([problem.speeds(fit.x) for fit in fits])

@@ -3,7 +3,7 @@
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from scipy.optimize import least_squares
@@ -25,9 +25,7 @@ MOST_OUTLIERS = 0.34  # [-] of what is measured may disagree: with more, nobody 
 ENOUGH = 60  # [-] iterations of one search
 # [-] relative change of the sum of squares or of the values that ends a search
 CLOSE = 1e-8
-# [-] iterations of a search that begins close to its end, or only shows whether to go on, and steps with derivatives
-# of a point nearby
-QUICK = 12
+QUICK = 12  # [-] iterations of a search that begins close to its end, or only shows whether to go on
 # [-] change that ends a search of which only the sum of squares counts: it errs by the square
 NEARLY = 1e-6
 # [-] of the noise variance: a gain that is not sought, as luck makes as much
@@ -312,70 +310,19 @@ def least(
     return Solution(low + found.x * size, 2.0 * float(found.cost), found.jac / size, found.status > 0)
 
 
-def chord(
-    problem: Problem, x: np.ndarray, jacobian: np.ndarray, held: Sequence[int] = (), close: float = CLOSE
-) -> tuple[Solution, bool]:
-    """Least squares with the derivatives of a point nearby, (n_residuals, n_coordinates less those held).
-
-    Returns how far they lead, and whether that is the end: not if the sum of squares falls by less than 0.3 of what
-    they promise, or a bound is in the way. The derivatives then have to be found anew, as by `solve`.
-    """
-    held = [*held, *problem.needless]
-    free = np.setdiff1d(np.arange(len(x)), held)
-    low, high = problem.bounds
-    basis = directions(jacobian)
-    steepest = np.abs(basis.flat).max(axis=1, initial=0.0) / (high - low)[free]
-    travel = 1.0 / steepest.max() if basis.flat.size else 0.0  # at most, along a ridge
-    residual = problem.residual(x)
-    cost = float(residual @ residual)
-    for _ in range(QUICK):
-        along = basis.left.T @ residual
-        promised = float(np.square(along[basis.told]).sum())
-        if promised <= close * cost:  # the end, if there is nothing to gain along a ridge, up to its end
-            gains = 2.0 * np.abs(along[~basis.told]) * basis.sizes[~basis.told] * travel
-            ended = float(np.minimum(gains, np.square(along[~basis.told])).sum()) <= SMALL * cost / residual.size
-            return Solution(x, cost, jacobian, ended), ended
-        moved = x.copy()
-        moved[free] -= basis.inverse @ along[basis.told]
-        if ((moved <= low) | (moved >= high))[free].any():
-            break
-        try:
-            there = problem.residual(moved)
-        except SimulationError:
-            break
-        gained = cost - float(there @ there)
-        if not gained > 0.0:
-            break
-        x, residual, cost = moved, there, cost - gained
-        if gained < 0.3 * promised:
-            break
-    return Solution(x, cost, jacobian, False), False
-
-
 def promised(problem: Problem, found: Solution) -> float:
     """By how much the sum of squares would fall by its derivatives, within the bounds and apart from ridges."""
     low, high = problem.bounds
     inside = (found.x > low + STEP) & (found.x < high - STEP)
-    basis = directions(found.jacobian[:, np.delete(inside, problem.needless)])
-    return float(np.square(basis.left.T @ problem.residual(found.x))[basis.told].sum())
+    slopes = found.jacobian[:, np.delete(inside, problem.needless)]
+    return float(np.square(slopes @ pseudo_inverse(slopes) @ problem.residual(found.x)).sum())
 
 
-class Basis(NamedTuple):
-    """Directions in which coordinates move the residuals, from derivatives."""
-
-    left: np.ndarray  # (n_residuals, n)
-    sizes: np.ndarray  # (n,) by how much a way of one does, the coordinates scaled by their columns
-    told: np.ndarray  # (n,) bool: differences of steps can tell it from a ridge
-    inverse: np.ndarray  # (n_coordinates, n_told) what moves the residuals by one
-    flat: np.ndarray  # (n_coordinates, n - n_told) ways of one along ridges
-
-
-def directions(jacobian: np.ndarray) -> Basis:
-    """The directions of derivatives (n_residuals, n_coordinates)."""
-    columns = np.maximum(np.linalg.norm(jacobian, axis=0), np.finfo(float).tiny)[:, None]
-    left, sizes, right = np.linalg.svd(jacobian / columns.T, full_matrices=False)
-    told = sizes > 3e-5 * sizes[0]  # flatter directions may be ridges
-    return Basis(left, sizes, told, (right[told] / sizes[told, None]).T / columns, right[~told].T / columns)
+def pseudo_inverse(jacobian: np.ndarray) -> np.ndarray:
+    """What moves the residuals by one, (n_coordinates, n_residuals), apart from ridges, whose ways move nothing."""
+    columns = np.maximum(np.linalg.norm(jacobian, axis=0), np.finfo(float).tiny)
+    # differences of steps cannot tell flatter directions from ridges
+    return np.linalg.pinv(jacobian / columns, rcond=3e-5) / columns[:, None]
 
 
 def pulse_length(taps: Any) -> float:

@@ -168,9 +168,10 @@ def _check_name(label: str, name: str, names: list[str]) -> None:
 
 def changed(contact: Contact, values: Mapping[str, float]) -> Contact:
     """The contact with the values whose names begin with ``contact.``; others do not matter."""
-    own = {name.partition(".")[2]: value for name, value in values.items() if name.startswith("contact.")}
+    given = {name.removeprefix("contact."): float(x) for name, x in values.items() if name.startswith("contact.")}
+    own: dict[str, Any] = given
     own.pop(TIME.partition(".")[2], None)
-    return replace(contact, **{name: float(value) for name, value in own.items()})
+    return replace(contact, **own)
 
 
 def _check_contact(contact: Contact, unknown: tuple[Unknown, ...], known: Mapping[str, float]) -> None:

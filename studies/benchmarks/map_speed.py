@@ -146,17 +146,7 @@ def map_of(scene, alone, tolerance=1e-2, side=20):
         "mass": striker.mass * np.geomspace(10**-0.25, 10**0.25, side),
         "stiffness": law.stiffness * np.geomspace(0.1, 10.0, side),
     }
-    blow = scene.blow.values
-    base, axes = bodies.body_of(
-        scene.built.target,
-        striker,
-        law,
-        at=blow["at"],
-        speed=blow["speed"],
-        over=over,
-        tolerance=tolerance,
-        alone=alone,
-    )
+    base, axes = bodies.body_of(scene.built, over, tolerance=tolerance, alone=alone)
     return cells.run(base, axes, cells.Job(tolerance)), base.modes.n_modes
 
 

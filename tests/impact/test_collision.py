@@ -5,8 +5,10 @@ from functools import partial
 
 import numpy as np
 import pytest
+from comparing import worst
 from linear_blow import exact
 from numpy.testing import assert_allclose
+from restarted import followed, measured
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 from scipy.special import gamma
@@ -26,17 +28,18 @@ def wall_duration(stiffness, exponent, mass, speed):
 
 
 @pytest.mark.parametrize("exponent", [1.0, 1.2, 1.5, 2.5])
-@pytest.mark.parametrize("speed", [1e-3, 1.0, 30.0])
-def test_mass_on_rigid_wall_meets_closed_forms(exponent, speed):
+@pytest.mark.parametrize("speed, tolerance", [(1e-3, 1e-4), (1.0, 1e-4), (30.0, 1e-4), (1.0, 1e-10)])
+def test_mass_on_rigid_wall_meets_closed_forms(exponent, speed, tolerance):
     law, mass = fi.Contact.power(1e5, exponent), 0.2
-    hit = collide([fi.Modes.rigid(mass)], [Touch(law, 0, None)], speeds=[speed])
+    hit = collide([fi.Modes.rigid(mass)], [Touch(law, 0, None)], speeds=[speed], tolerance=tolerance)
+    exact = max(1e-12, tolerance if hit.scheme == "collocation" else 0.0)
     deepest = (0.5 * (exponent + 1.0) * mass * speed**2 / 1e5) ** (1.0 / (exponent + 1.0))
     assert hit.n_impacts == 1
     assert hit.finished
-    assert_allclose(hit.restitution, 1.0, rtol=1e-12)  # energy is exact at every step
+    assert_allclose(hit.restitution, 1.0, rtol=exact)  # energy is exact at every step of A4
     assert_allclose(hit.contact_time, wall_duration(1e5, exponent, mass, speed), rtol=hit.tolerance)
     assert_allclose(hit.peak_force, 1e5 * deepest**exponent, rtol=hit.tolerance)
-    assert_allclose(hit.impulse, 2.0 * mass * speed, rtol=1e-12)  # momentum is exact at every step
+    assert_allclose(hit.impulse, 2.0 * mass * speed, rtol=exact)  # and so is momentum
 
 
 @pytest.mark.parametrize("law", [fi.Contact.linear(1e5), fi.Contact.hertz(1e6)], ids=["linear", "hertz"])
@@ -102,7 +105,7 @@ def test_response_agrees_with_itself():
 
 
 def integrate(bodies, touches, duration, speeds=None, forces=None):
-    """The same modal equations by DOP853 at rtol 1e-12, restarted at every onset and release; final velocities."""
+    """Final velocities by the same modal equations, as `restarted` follows them."""
     omega = np.concatenate([modes.omega for modes in bodies])
     rate = 2.0 * omega * np.concatenate([modes.damping_ratio for modes in bodies])
     starts = np.concatenate([[0], np.cumsum([modes.n_modes for modes in bodies])])
@@ -124,34 +127,11 @@ def integrate(bodies, touches, duration, speeds=None, forces=None):
         force = np.array([float(law.force(x, y)) for law, x, y in zip(laws, d, v)])
         return np.concatenate([z[n:], bias - rate * z[n:] - omega**2 * z[:n] - force @ shape])
 
-    def crossing(i):
-        def gap(t, z):
-            return shape[i] @ z[: len(omega)] - laws[i].gap
+    def gaps(z):
+        return shape @ z[: len(omega)] - [law.gap for law in laws]
 
-        gap.terminal = True
-        return gap
-
-    time, z = 0.0, np.concatenate([np.zeros(len(omega)), p])
-    tight = {"method": "DOP853", "rtol": 1e-12, "atol": 1e-15}
-    while time < duration:
-        events = [crossing(i) for i in range(len(touches))]
-        leg = solve_ivp(push, (time, duration), z, events=events, max_step=duration / 200, **tight)
-        time, z = leg.t[-1], leg.y[:, -1]
-        if leg.status == 1:  # step off the event before looking for the next
-            leg = solve_ivp(push, (time, min(duration, time + 1e-9 * duration)), z, **tight)
-            time, z = leg.t[-1], leg.y[:, -1]
+    z = followed(push, gaps, np.concatenate([np.zeros(len(omega)), p]), duration, max_step=duration / 200)
     return np.split(z[len(omega) :], starts[1:-1])
-
-
-def measured(n_modes, seed, damping=0.0, n_rigid=0):
-    """A body known at three points, as from a modal test."""
-    rng = np.random.default_rng(seed)
-    frequencies = np.sort(rng.uniform(100.0, 3000.0, n_modes))
-    frequencies[:n_rigid] = 0.0
-    shapes = rng.normal(0.0, 2.0, (3, n_modes))
-    return fi.Modes.from_arrays(
-        frequencies, shapes, points=[[0.0], [1.0], [2.0]], mass=0.3, damping_ratio=damping, complete=True
-    )
 
 
 HEAVY = np.array([0.02, 0.5, 0.95, 1.0, 1.3, 3.0, 0.01, 0.0, 0.0, 0.1, 0.2, 10.0])
@@ -266,16 +246,10 @@ def test_promise_is_kept_and_the_estimate_is_fair(law, tolerance):
     blow = {"at": (0.465, 0.3), "speed": 1.0, "residual": False}
     truth = fi.strike(plate, stick, law, tolerance=1e-12, scheme="collocation", **blow)
     hit = fi.strike(plate, stick, law, tolerance=tolerance, **blow)
-    error = [
-        abs(hit.restitution - truth.restitution),
-        abs(hit.impulse / truth.impulse - 1.0),
-        abs(hit.contact_time / truth.contact_time - 1.0),
-        abs(hit.peak_force / truth.peak_force - 1.0),
-    ]
-    assert hit.n_impacts == truth.n_impacts
-    assert max(error) <= tolerance
+    error = worst(hit, truth)
+    assert error <= tolerance
     assert hit.error.step <= tolerance
-    assert max(error) <= 3.3 * hit.error.step + 1e-12  # the estimate is not below 0.3 of the truth
+    assert error <= 3.3 * hit.error.step + 1e-12  # the estimate is not below 0.3 of the truth
 
 
 def test_both_schemes_meet_the_exact_linear_blow():
@@ -311,13 +285,10 @@ def test_one_rigid_mass_on_one_mode_meets_its_eigen_solution():
     first = grid[np.argmax([approach(t) < 0.0 for t in grid])]
     end = brentq(approach, first - 1e-6, first, xtol=1e-18)
     rebound = -10.0 * (vectors @ (start * np.cos(np.sqrt(square) * end)))[0]
-    for scheme, accuracy in (("collocation", 1e-11),):
-        hit = fi.strike(
-            target, fi.Striker.rigid(0.01), fi.Contact.linear(k), at=[0.0], speed=1.0, scheme=scheme, tolerance=1e-12,
-            max_impacts=1,
-        )  # fmt: skip
-        assert_allclose(hit.contact_time, end, rtol=accuracy)
-        assert_allclose(hit.restitution, rebound, atol=accuracy)
+    striker, how = fi.Striker.rigid(0.01), {"scheme": "collocation", "tolerance": 1e-12, "max_impacts": 1}
+    hit = fi.strike(target, striker, fi.Contact.linear(k), at=[0.0], speed=1.0, **how)
+    assert_allclose(hit.contact_time, end, rtol=1e-11)
+    assert_allclose(hit.restitution, rebound, atol=1e-11)
 
 
 def test_common_motion_changes_nothing():
@@ -444,10 +415,7 @@ def test_lossy_contacts_keep_their_promise(seeds):
         tolerance = 10.0 ** -(2 + seed % 3)
         hit = fi.strike(*blow, tolerance=tolerance, scheme="A4", **options)
         truth = fi.strike(*blow, tolerance=1e-8, scheme="collocation", **options)
-        assert hit.n_impacts == truth.n_impacts
-        assert abs(hit.restitution - truth.restitution) <= tolerance
-        for name in ("impulse", "contact_time", "peak_force"):
-            assert_allclose(getattr(hit, name), getattr(truth, name), rtol=tolerance, err_msg=f"{name}, seed {seed}")
+        assert worst(hit, truth) <= tolerance, seed
 
 
 @pytest.mark.parametrize("scheme", ["A4", "collocation"])
@@ -524,15 +492,6 @@ def test_contacts_that_open_and_close_together_stay_together(frequency, gap, mas
     assert_allclose(two.speeds, one.speeds, atol=2e-8)  # the tolerance of both
     assert_allclose(two.impulse, one.impulse, rtol=2e-8)
     assert_allclose(two.touching_time, one.contact_time, rtol=2e-8)
-
-
-def worst(one, two):
-    """Largest difference of two blows in what a tolerance promises; 1 if they differ in the number of impacts."""
-    if one.n_impacts != two.n_impacts:
-        return 1.0
-    names = ("impulse", "contact_time", "peak_force")
-    apart = [abs(getattr(one, name) / getattr(two, name) - 1.0) for name in names]
-    return max(abs(one.restitution - two.restitution), *apart)
 
 
 def thinned_blow(seed, lossy=False):

@@ -6,12 +6,14 @@ import sys
 
 import numpy as np
 import pytest
+from comparing import difference
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from numba import njit
 from numpy.testing import assert_allclose
+from restarted import measured
 from scipy.optimize import brentq
-from test_collision import measured, wall_duration
+from test_collision import wall_duration
 from test_kernels import drift, plate, run
 from warming import locked
 
@@ -41,15 +43,6 @@ def test_a_wall_throws_back_all_speed_at_any_step(scheme, exponent, steps):
     assert np.isfinite(r.steps).all()
     assert_allclose(-r.p[0] * mass**-0.5, 1.0, rtol=1e-12)
     assert (r.force >= 0.0).all()
-
-
-@pytest.mark.parametrize("exponent", [1.0, 1.2, 1.5, 2.5])
-def test_duration_and_peak_on_a_wall_to_ten_digits(exponent):
-    law, mass = fi.Contact.power(1e5, exponent), 0.2
-    hit = collide([fi.Modes.rigid(mass)], [Touch(law, 0, None)], speeds=[1.0], tolerance=1e-10)
-    deepest = (0.5 * (exponent + 1.0) * mass / 1e5) ** (1.0 / (exponent + 1.0))
-    assert_allclose(hit.contact_time, wall_duration(1e5, exponent, mass, 1.0), rtol=1e-10)
-    assert_allclose(hit.peak_force, 1e5 * deepest**exponent, rtol=1e-10)
 
 
 @pytest.mark.parametrize("ratio", 10.0 ** np.arange(-6, 8))
@@ -368,10 +361,7 @@ def check_crowded(seed, n_modes, loss, exponent, tolerance):
     *blow, options = crowded(seed, n_modes, loss, exponent)
     hit = fi.strike(*blow, tolerance=tolerance, scheme="A4", **options)
     truth = fi.strike(*blow, tolerance=1e-2 * tolerance, scheme="collocation", **options)
-    tolerance *= 1.01  # and the truth's own
-    assert abs(hit.restitution - truth.restitution) <= tolerance
-    for name in ("impulse", "contact_time", "peak_force"):
-        assert_allclose(getattr(hit, name), getattr(truth, name), rtol=tolerance, err_msg=name)
+    assert difference(hit, truth) <= 1.01 * tolerance  # and the truth's own
 
 
 CROWDED = {

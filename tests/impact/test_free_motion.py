@@ -5,7 +5,6 @@ import pytest
 from numpy.testing import assert_allclose
 from scipy.linalg import expm
 
-import fem_impact as fi
 from fem_impact.impact import free_motion
 
 
@@ -27,14 +26,3 @@ def test_every_mode_moves_as_its_equations_say(order):
     found = free_motion.swing(omega, zeta, bias, (q, p), times, weights, order)
     # critical damping is moved aside by 1e-6
     assert_allclose(found, expected, rtol=0.0, atol=1e-6 * np.abs(expected).max())
-
-
-def test_approach_after_a_blow_is_that_of_its_modes():
-    modes = fi.analytic.rectangle(0.4, 0.3, section=fi.Plate(fi.Material(E=70e9, nu=0.3, rho=2700.0), 2e-3), n_modes=40)
-    hit = fi.strike(modes, fi.Striker.rigid(0.05), fi.Contact.hertz(1e8), at=(0.1, 0.12), speed=1.0)
-    history = hit.history
-    times = np.linspace(0.2 * history.end_time, 3.0 * history.end_time, 500)
-    shown = history.motion(times)
-    assert_allclose(
-        shown, history.offset + history.states(times)[0] @ history.shape.T, atol=1e-12 * np.abs(shown).max()
-    )

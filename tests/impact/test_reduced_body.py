@@ -4,7 +4,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from test_collision import thinned_blow, worst
+from comparing import worst
+from test_collision import thinned_blow
 
 import fem_impact as fi
 

@@ -4,8 +4,10 @@ import re
 
 import numpy as np
 import pytest
+from comparing import worst
 from numpy.testing import assert_allclose
-from test_collision import grazing_blow, measured, target_of, thinned_blow, worst
+from restarted import measured
+from test_collision import grazing_blow, target_of, thinned_blow
 
 import fem_impact as fi
 from fem_impact.impact.collision import Touch, collide
@@ -28,14 +30,6 @@ def test_order_of_scheme_a4(n_modes, law, slope):
         for n in counts
     ]
     assert -np.polyfit(np.log(counts), np.log(errors), 1)[0] > slope
-
-
-def test_a_run_without_end_says_what_to_do():
-    """Two clamped bodies set swinging against each other never part for good."""
-    bodies = [measured(3, 1), measured(3, 2)]
-    touches = [Touch(fi.Contact.linear(1e5), 0, 1, [0.0], [0.0])]
-    with pytest.raises(fi.SimulationError, match="duration of at most"):
-        collide(bodies, touches, states=[(np.zeros(3), np.full(3, 0.1)), (np.zeros(3), np.zeros(3))])
 
 
 def test_a_short_duration_is_still_judged_by_two_runs_of_different_steps():

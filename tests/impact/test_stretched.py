@@ -5,6 +5,7 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
+from comparing import difference
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 from scipy.special import ellipk
@@ -125,45 +126,29 @@ def direct(modes, law, speed, until):
 
 
 @pytest.mark.parametrize(
-    "law, zeta",
+    "law, zeta, radius, speed",
     [
-        (fi.Contact.hertz(1e7), 0.0),
-        (fi.Contact.linear(2e5), 0.02),
-        (fi.Contact.hertz(1e7, loss=0.2), 0.0),
-        (fi.Contact.hertz(3e8), 0.0),  # so stiff that it hits five times
+        (fi.Contact.hertz(1e7), 0.0, None, 1.0),
+        (fi.Contact.linear(2e5), 0.02, None, 1.0),
+        (fi.Contact.hertz(1e7, loss=0.2), 0.0, None, 1.0),
+        (fi.Contact.hertz(3e8), 0.0, None, 1.0),  # so stiff that it hits five times
+        *((fi.Contact.hertz(1e7), 0.01, radius, 2.0) for radius in (2.0, -2.0, 8.0)),
     ],
 )
-def test_blow_on_several_modes_is_that_of_a_direct_integration(law, zeta):
-    modes = plate(8, zeta)
-    hit = blow(modes, law, 1.0, tolerance=1e-6)
+def test_blow_on_several_modes_is_that_of_a_direct_integration(law, zeta, radius, speed):
+    modes = shell(8, radius, zeta) if radius else plate(8, zeta)
+    hit = blow(modes, law, speed, tolerance=1e-6)
     until = hit.impacts[-1].end + 1e-3
-    events, x = direct(modes, law, 1.0, until)
-    assert hit.displacement([AT], np.linspace(0.0, until, 300)).max() > 0.3 * H
-    plain = blow(modes, law, 1.0, stretching=False)
-    assert abs(plain.restitution - hit.restitution) > 1e-2  # it matters here
+    events, x = direct(modes, law, speed, until)
+    assert radius or hit.displacement([AT], np.linspace(0.0, until, 300)).max() > 0.3 * H
+    plain = blow(modes, law, speed, stretching=False)
+    assert abs(plain.restitution - hit.restitution) > (3e-3 if radius else 1e-2)  # it matters here
     assert len(events) == 2 * hit.n_impacts - 1
     assert sum(events[0::2]) - sum(events[1::2]) == pytest.approx(hit.contact_time, rel=3e-6)
-    assert -x[1] == pytest.approx(hit.restitution, abs=3e-6)
+    assert -x[1] == pytest.approx(hit.restitution * speed, abs=3e-6 * speed)
     assert x[-1] == pytest.approx(hit.impulse, rel=3e-6)
     q, p = hit.modal_state([until])
     assert q[0] == pytest.approx(x[2:10], abs=3e-5 * np.abs(q).max())  # the phase of the fastest mode goes on
-    assert p[0] == pytest.approx(x[10:18], abs=3e-5 * np.abs(p).max())
-    assert hit.energy_error < 1e-12
-
-
-@pytest.mark.parametrize("radius", [2.0, -2.0, 8.0])
-def test_blow_on_a_shell_is_that_of_a_direct_integration(radius):
-    modes, law = shell(8, radius, 0.01), fi.Contact.hertz(1e7)
-    hit = blow(modes, law, 2.0, tolerance=1e-6)
-    until = hit.impacts[-1].end + 1e-3
-    events, x = direct(modes, law, 2.0, until)
-    plain = blow(modes, law, 2.0, stretching=False)
-    assert abs(plain.restitution - hit.restitution) > 3e-3  # it matters here
-    assert len(events) == 2 * hit.n_impacts - 1
-    assert sum(events[0::2]) - sum(events[1::2]) == pytest.approx(hit.contact_time, rel=3e-6)
-    assert -x[1] == pytest.approx(hit.restitution * 2.0, abs=6e-6)
-    q, p = hit.modal_state([until])
-    assert q[0] == pytest.approx(x[2:10], abs=3e-5 * np.abs(q).max())
     assert p[0] == pytest.approx(x[10:18], abs=3e-5 * np.abs(p).max())
     assert hit.energy_error < 1e-12
 
@@ -268,10 +253,7 @@ def test_error_estimates_hold():
     modes, law = plate(60), fi.Contact.hertz(1e7)
     hit = fi.strike(modes, HAMMER, law, at=AT, speed=1.0, tolerance=2e-2, stretching=True)
     fine = fi.strike(plate(600), HAMMER, law, at=AT, speed=1.0, tolerance=1e-3, stretching=True)
-    true = max(
-        abs(hit.restitution - fine.restitution),
-        *(abs(getattr(hit, name) / getattr(fine, name) - 1.0) for name in ("impulse", "contact_time", "peak_force")),
-    )
+    true = difference(hit, fine)
     assert true / 3.0 < hit.error.total < 30.0 * true
 
 

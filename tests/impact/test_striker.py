@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
+from restarted import followed
 from scipy.integrate import solve_ivp
 
 import fem_impact as fi
@@ -35,6 +36,14 @@ def test_free_bar_arrives_straight_whatever_point_strikes():
         (lambda: fi.Striker.stick(0.1, 1e4, n_modes=0), "n_modes must be at least 1"),
         (lambda: fi.Striker.sphere(fi.Material(E=1e9, nu=0.3, rho=1e3), 0.0), "radius must lie between"),
         (
+            lambda: fi.Striker.sphere(fi.Material(E=1e9, nu=0.3, rho=1e3), 1e300),
+            "radius must lie between 1e-09 and 1e\\+09 m, got 1e\\+300 m",
+        ),
+        (lambda: fi.Striker.hammer(0.0, 0.1, stiffness=1e3), "head"),
+        (lambda: fi.Striker.hammer(0.1, 0.1, stiffness=-1.0), "stiffness"),
+        (lambda: fi.Striker.stick(mass=0.1, first_frequency=1e3).dropped(0.3), "turns or comes aslant; give its speed"),
+        (lambda: fi.Striker.rigid(0.1).held(fi.Hand(stiffness=100.0)).dropped(0.3), "but a hand holds this one"),
+        (
             lambda: fi.Striker.flexible(
                 fi.analytic.beam(1.0, ends=("clamped", "free"), mass=0.1, first_frequency=10.0, n_modes=2), at=1.0
             ),
@@ -51,11 +60,6 @@ def test_free_bar_arrives_straight_whatever_point_strikes():
 def test_errors_name_argument_rule_and_value(make, text):
     with pytest.raises(ValueError, match=text):
         make()
-
-
-def test_a_sphere_larger_than_any_is_refused():
-    with pytest.raises(ValueError, match="radius must lie between 1e-09 and 1e\\+09 m, got 1e\\+300 m"):
-        fi.Striker.sphere(fi.Material(E=1e9, nu=0.3, rho=1e3), 1e300)
 
 
 def test_a_hammer_of_two_masses_moves_as_its_two_equations_say():
@@ -76,12 +80,6 @@ def test_a_hammer_of_two_masses_moves_as_its_two_equations_say():
     assert_allclose(motion, found.y[:2].T, atol=1e-8 * np.abs(found.y[0]).max())
     assert hit.dissipated["modes"] > 0.0
     assert hit.energy_error < 1e-9
-
-
-@pytest.mark.parametrize("wrong, text", [({"head": 0.0}, "head"), ({"stiffness": -1.0}, "stiffness")])
-def test_a_hammer_needs_masses_and_a_spring(wrong, text):
-    with pytest.raises(ValueError, match=text):
-        fi.Striker.hammer(**({"head": 0.1, "handle": 0.1, "stiffness": 1e3} | wrong))
 
 
 # --- a hand at the fulcrum -------------------------------------------------------------------------------------------
@@ -116,7 +114,7 @@ def test_a_held_mass_is_back_when_its_swing_says(stiffness, force):
 
 
 def bounced(striker, law, speed, duration):
-    """A held striker on a rigid wall, by DOP853 restarted at every touch and release: its modes' velocities."""
+    """A held striker on a rigid wall, as `restarted` follows it: its modes' velocities."""
     body, row, n = striker.body, striker.shape, striker.modes.n_modes
     hand, felt = striker.hand, striker.felt_mass
     rate = 2.0 * striker.modes.damping_ratio * striker.modes.omega
@@ -129,20 +127,9 @@ def bounced(striker, law, speed, duration):
         modal = held * row * (np.arange(n) == 0) - force * row
         return np.concatenate([p, modal - rate * p - striker.modes.omega**2 * q])
 
-    def touch(t, z):
-        return row @ z[:n]
-
-    touch.terminal = True
     assert_allclose(body.omega[0], np.sqrt(hand.stiffness / felt), rtol=1e-12)
-    time, z = 0.0, np.concatenate([np.zeros(n), speed * striker.motion])
-    tight = {"method": "DOP853", "rtol": 1e-12, "atol": 1e-15}
-    while time < duration:
-        leg = solve_ivp(push, (time, min(duration, time + 1e-9)), z, **tight)
-        time, z = leg.t[-1], leg.y[:, -1]
-        if time < duration:
-            leg = solve_ivp(push, (time, duration), z, events=[touch], max_step=1e-4, **tight)
-            time, z = leg.t[-1], leg.y[:, -1]
-    return z[n:]
+    start = np.concatenate([np.zeros(n), speed * striker.motion])
+    return followed(push, lambda z: row[None] @ z[:n], start, duration, max_step=1e-4)[n:]
 
 
 def test_a_held_stick_that_bends_meets_an_independent_integration():
@@ -234,16 +221,3 @@ def test_a_dropped_ball_has_the_energy_of_its_height():
     assert ball.dropped(1.2) == pytest.approx(2.0 * ball.dropped(0.3), rel=1e-12)
     bar = fi.analytic.beam(0.2, ends=("free", "free"), mass=0.1, first_frequency=2e3, n_modes=4)
     assert fi.Striker.flexible(bar, at=[0.0]).dropped(0.3) == ball.dropped(0.3)
-
-
-@pytest.mark.parametrize(
-    "striker, words",
-    [
-        (fi.Striker.stick(mass=0.1, first_frequency=1e3), "turns or comes aslant; give its speed"),
-        (fi.Striker.rigid(0.1).held(fi.Hand(stiffness=100.0)), "but a hand holds this one"),
-    ],
-    ids=["hinged", "held"],
-)
-def test_what_is_held_does_not_fall(striker, words):
-    with pytest.raises(ValueError, match=words):
-        striker.dropped(0.3)

@@ -4,7 +4,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from test_collision import left_out, thin_plate_blow, thinned_blow, worst
+from comparing import worst
+from test_collision import left_out, thin_plate_blow, thinned_blow
 
 import fem_impact as fi
 

@@ -2,6 +2,7 @@ import numpy as np
 import pytest
 import thick_references as thick
 from scipy.special import jn_zeros
+from thick_plates import ritz
 
 import fem_impact as fi
 from fem_impact.model import bending as module
@@ -65,8 +66,8 @@ def test_frequencies_of_a_thick_square_drop_as_mindlin_says(edges):
     h = 0.008
     supports = dict(zip(("left", "right", "bottom", "top"), edges))
     modes = by_elements(fi.mesh.rectangle(SIDE, SIDE), fi.Plate(STEEL, h), supports, 12)
-    exact = thick.square(SIDE, h, E, NU, RHO, edges, 6)
-    true = 1.0 - exact / flexible(modes, modes.omega)[:6]
+    exact = ritz(h / SIDE, NU, edges, 11, 12) * np.sqrt(E / RHO) / SIDE
+    true = 1.0 - exact[exact > 1e-3 * exact[-1]][:6] / flexible(modes, modes.omega)[:6]
     np.testing.assert_allclose(drop(modes)[:6], true, rtol=0.25)  # the layers of the free corners are left out
 
 

@@ -9,7 +9,7 @@ from numpy.polynomial import legendre
 from scipy.linalg import eigh, null_space
 
 KAPPA = 5.0 / 6.0
-DEGREE = 24  # of beams and along the radius; squares take half of it in each direction
+DEGREE = 24  # of beams and along the radius
 
 
 def wang(omega, h, E, nu, rho):
@@ -77,33 +77,3 @@ def disk(radius, h, E, nu, rho, edge, order, count):
     keep = slice(0, 2 * half) if n == 0 else slice(None)
     held = np.array([row[keep] for row in rows if row[keep].any()])
     return _lowest(K[keep, keep], M[keep, keep], held, count)
-
-
-def square(side, h, E, nu, rho, edges, count):
-    """Angular frequencies of a Mindlin square; ``edges`` are those at x = 0, x = side, y = 0 and y = side."""
-    n = DEGREE // 2
-    x, w = legendre.leggauss(2 * n)
-    P, dP = legendre.legval(x, np.eye(n)).T, legendre.legval(x, legendre.legder(np.eye(n))).T * 2.0 / side
-    w = 0.5 * w * side
-    one, d, mixed = P.T * w @ P, dP.T * w @ dP, dP.T * w @ P
-    mass, along, across = np.kron(one, one), np.kron(d, one), np.kron(one, d)
-    D, G = E * h**3 / (12.0 * (1.0 - nu**2)), E / (2.0 * (1.0 + nu))
-    S, B = KAPPA * G * h, 0.5 * D * (1.0 - nu)
-    x_w, y_w = np.kron(mixed, one), np.kron(one, mixed)  # slope of the row's function times the column's
-    xy = np.kron(mixed, mixed.T)  # x slope of the row's times y slope of the column's
-    K = np.block([
-        [S * (along + across), -S * x_w, -S * y_w],
-        [-S * x_w.T, D * along + B * across + S * mass, D * nu * xy + B * xy.T],
-        [-S * y_w.T, D * nu * xy.T + B * xy, D * across + B * along + S * mass],
-    ])  # fmt: skip
-    M = np.kron(np.diag([rho * h, rho * h**3 / 12.0, rho * h**3 / 12.0]), mass)
-    held, eye = [], np.eye(n)
-    for side_of, kind in enumerate(edges):
-        if kind == "free":
-            continue
-        at = legendre.legval(-1.0 if side_of % 2 == 0 else 1.0, eye)[None]
-        rows = np.kron(at, eye) if side_of < 2 else np.kron(eye, at)
-        normal = 1 if side_of < 2 else 2
-        fields = [0, 1, 2] if kind == "clamped" else [0, 3 - normal]
-        held += [np.kron(np.eye(3)[field][None], rows) for field in fields]
-    return _lowest(K, M, np.vstack(held) if held else np.zeros((0, len(K))), count)

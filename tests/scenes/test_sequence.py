@@ -97,7 +97,7 @@ def test_strokes_alike_share_the_plan_of_the_fastest(path):
 def test_what_needs_a_single_blow_says_so(path):
     told = scene.load_scene(path)
     path.write_text(SMALL)
-    with pytest.raises(ValueError, match=r"\[\[stroke\]\] is missing: plan_strokes plans strokes, plan a single blow"):
+    with pytest.raises(ValueError, match=r"\[\[stroke\]\] is missing: strokes are played together; a single blow has"):
         scene.load_scene(path).plan_strokes()
     for call in (told.strike, told.plan, lambda: maps.map_scene(told, over={"striker.mass": [0.1]}),
                  lambda: fi.spread(told, {"striker.mass": "lognormal(0.03, 0.1)"})):  # fmt: skip
@@ -135,6 +135,6 @@ def test_what_is_wrong_with_a_stroke_is_said_before_any_work(path, old, new, tex
 
 def test_a_scene_without_strokes_is_not_played(path):
     path.write_text(SMALL)
-    with pytest.raises(ValueError, match=r"\[\[stroke\]\] is missing: Scene.play plays strokes"):
+    with pytest.raises(ValueError, match=r"\[\[stroke\]\] is missing: strokes are played together"):
         scene.load_scene(path).play()
     assert np.isfinite(scene.load_scene(path).strike().restitution)

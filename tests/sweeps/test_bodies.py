@@ -6,6 +6,7 @@ from numpy.testing import assert_allclose
 
 import fem_impact as fi
 from fem_impact._base import identity
+from fem_impact.model.planner import Blow
 from fem_impact.model.target import Target
 from fem_impact.sweeps import bodies
 
@@ -115,9 +116,8 @@ def test_points_off_the_body_and_wrong_axes_are_told_before_the_work():
 def test_kept_vectors_serve_the_same_map_only(tmp_path, monkeypatch):
     def found(tolerance=1e-2, mass=0.03, keep=tmp_path / "kept.npz"):
         over = {"mass": [0.01, mass], "at": [AT, (0.1, 0.2)]}
-        return bodies.body_of(
-            Target.of(plate()), BALL, fi.Contact.hertz(1e6), at=AT, speed=1.0, over=over, tolerance=tolerance, keep=keep
-        )[0]
+        blow = Blow(Target.of(plate()), BALL, fi.Contact.hertz(1e6), {"at": AT, "speed": 1.0})
+        return bodies.body_of(blow, over, tolerance=tolerance, keep=keep)[0]
 
     first, size = found(), (tmp_path / "kept.npz").stat().st_size
     again = found()

@@ -18,25 +18,25 @@ from typing import Any
 import numpy as np
 
 from .build import inner, outer
-from .laws import felt, layers, plastic
+from .laws import felt, layers, plastic, tabled
 from .laws.base import POWER, Law, LawNumber, Point
 from .laws.felt import memory_energy, relaxes
 from .laws.plastic import dent, yields
 from .laws.power import PowerLaw, continued, power, power_slopes, simple
 
-LAWS: tuple[Law, ...] = (PowerLaw(), layers.LayersLaw(), plastic.PlasticLaw(), felt.FeltLaw())
+LAWS: tuple[Law, ...] = (PowerLaw(), layers.LayersLaw(), plastic.PlasticLaw(), felt.FeltLaw(), tabled.TableLaw())
 NUMBERS: dict[str, LawNumber] = {name: number for law in LAWS for name, number in law.numbers.items()}
 MARKS = {law.mark: law for law in LAWS if law.mark}
-# what kernels know of a contact: where a law has nothing of the kind, 0; the compliance in series [m/N], the kind, and
-# what it remembers
-NAMES = ("stiffness", "exponent", "loss", "compliance", "kind", *NUMBERS, "memory")
-LAW = np.dtype([(name, float) for name in NAMES])
+# what kernels know of a contact: where a law has nothing of the kind, 0; the compliance in series [m/N], the kind,
+# what it remembers, and the table of one of the user's own
+NAMES = ("stiffness", "exponent", "loss", "compliance", "kind", *NUMBERS, "n_knots", "memory", "knots")
+LAW = np.dtype([(name, float, tabled.TABLE if name == "knots" else ()) for name in NAMES])
 NOTHING = (0.0,) * (len(NAMES) - 3)  # of a power law, behind stiffness, exponent and loss
 Row: Any = partial(namedtuple, "Row")(NAMES)  # one contact of such an array, in Python
 
 
 @dataclass(frozen=True)
-class Numbers(felt.FeltNumbers, plastic.PlasticNumbers, layers.LayersNumbers):
+class Numbers(tabled.TableNumbers, felt.FeltNumbers, plastic.PlasticNumbers, layers.LayersNumbers):
     """The numbers of all laws and their methods; bases last to first, as fields come in the order of `LAWS`."""
 
 
@@ -54,7 +54,8 @@ def row_of(contact: Any) -> Any:
     if not law.acts(contact):
         return Row(contact.stiffness, contact.exponent, contact.loss, *NOTHING)
     own = [getattr(contact, name) if name in law.numbers else 0.0 for name in NUMBERS]
-    return Row(contact.stiffness, contact.exponent, contact.loss, 0.0, law.kind, *own, 0.0)
+    knots = law.table(contact)
+    return Row(contact.stiffness, contact.exponent, contact.loss, 0.0, law.kind, *own, contact.n_knots, 0.0, knots)
 
 
 def columns(values: np.ndarray) -> np.ndarray:
@@ -99,6 +100,8 @@ def spring_with(law, i, memory):
         return layers.spring(law, i)
     if kind == plastic.KIND:
         return plastic.spring(law, i, memory)
+    if kind == tabled.KIND:
+        return tabled.spring(law, i)
     return simple(law["stiffness"][i], law["exponent"][i], law["loss"][i], law["compliance"][i])
 
 
@@ -108,6 +111,8 @@ def pushed(x, spring):
     if x <= spring.corner:
         f = spring.stiffness * power(x, spring.exponent)
         return f, f * x / (spring.exponent + 1.0)
+    if spring.kind == tabled.KIND:
+        return tabled.pushed(x, spring)
     return plastic.pushed(x, spring) if spring.kind == plastic.KIND else layers.pushed(x, spring)
 
 
@@ -116,6 +121,8 @@ def steepness(x, f, spring):
     """Slope of the force f over the compression x > 0."""
     if x <= spring.corner:
         return spring.exponent * f / x
+    if spring.kind == tabled.KIND:
+        return tabled.steepness(x, spring)
     return plastic.steepness(x, spring) if spring.kind == plastic.KIND else layers.steepness(x, f, spring)
 
 
@@ -169,6 +176,8 @@ def cornered_slopes(x0, x1, spring):
     """Average slopes between two compressions > 0, of which at least one is beyond the corner."""
     small = min(x0, x1)
     large = max(x0, x1)
+    if spring.kind == tabled.KIND:
+        return tabled.slopes(small, large, spring)
     return plastic.slopes(small, large, spring) if spring.kind == plastic.KIND else layers.slopes(small, large, spring)
 
 
@@ -199,6 +208,8 @@ def smooth_force(x, v, spring):
         f, slope = plastic.far_side(x, spring)
     elif spring.kind == layers.KIND:
         f, slope = layers.far_side(x, spring)
+    elif spring.kind == tabled.KIND:
+        f, slope = tabled.far_side(x, spring)
     else:
         f, slope = continued(x, spring)
     factor = 1.0 + spring.loss * v

@@ -16,8 +16,9 @@ class Spring(NamedTuple):
     compliance: float  # [m/N] in series
     kind: float  # [-]
     corner: float  # [m] compression from which the force takes another course; infinite if none
-    hard: float  # [N/m**hard_exponent] stiffness of what the force gains from there; of felt, what the memory takes
-    hard_exponent: float  # [-]
+    hard: float  # [N/m**hard_exponent] stiffness of what the force gains from there; of felt, what the memory takes;
+    # of the user's own law the address of its table
+    hard_exponent: float  # [-]; of the user's own law its number of knots
     relaxation: float  # [s] of a memory that fades; 0: there is none
     memory: float  # [m**exponent] of felt
     steeper: float  # [N/m] of one that yields: how much steeper its force becomes far beyond the corner
@@ -68,9 +69,16 @@ class Law:
                 f"exponent must be at least 1 for a contact that yields or is felt, got {contact.exponent:g}"
             )
 
+    def check_reached(self, contact: Any, history: Any, i: int) -> None:
+        """ValueError where contact i of a run went deeper than its law is known."""
+
     def acts(self, contact: Any) -> bool:
         """Whether these numbers make it more than a power law."""
         return True
+
+    def table(self, contact: Any) -> Any:
+        """Its knots as kernels read them; see `tabled`."""
+        return 0.0
 
     def force(self, contact: Any, pressed: np.ndarray) -> np.ndarray:
         """Force [N] at approaches >= 0 [m], first pressed, so fast that nothing relaxes, without the loss factor."""

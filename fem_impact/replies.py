@@ -1,0 +1,80 @@
+"""What commands share: their answer, the progress they show, and where they write."""
+
+import argparse
+import os
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from .display import Display, tell, width
+
+
+class Answer(NamedTuple):
+    """What a command found: as data for programs, and as text for people."""
+
+    data: dict[str, Any]
+    said: Sequence[str | Sequence[str]] | None  # texts to wrap, and tables to print as they are; None: data only
+    missed: bool = False  # whether a tolerance was missed
+    fault: str = ""  # why the command failed all the same
+
+
+def answer(
+    data: dict[str, Any], *said: str | Sequence[str], folder: Path | None = None, files: Sequence[str] = (), **ends: Any
+) -> Answer:
+    """An answer with the files that were written to a folder, which are said last."""
+    lines, where = list(said), None
+    if folder is not None and files:
+        where, one = str(folder), len(files) == 1
+        lines.append(f"Files: {folder / files[0]}" if one else f"Files in {where}{os.sep}: {', '.join(files)}")
+    return Answer({**data, "folder": where, "files": list(files)}, lines, **ends)
+
+
+def answer_of_file(
+    data: dict[str, Any], said: Sequence[str | Sequence[str]], path: Path | None, missed: bool = False
+) -> Answer:
+    """The answer of a command that wrote one file, or none."""
+    if path is None:
+        return answer(data, *said, missed=missed)
+    return answer(data, *said, folder=path.parent, files=[path.name], missed=missed)
+
+
+def progress_of(options: argparse.Namespace, tells: bool = False) -> Display:
+    """The progress of a command; `tells` for one that announces long work. Quiet commands show nothing."""
+    return Display(tell if tells and not options.quiet else None, shown=not options.quiet)
+
+
+def remark(options: argparse.Namespace, text: str) -> None:
+    if not options.quiet:
+        tell(text)
+
+
+def folder_of(options: argparse.Namespace) -> Path:
+    """The folder that --out names, or one named after the scene."""
+    return options.out if options.out is not None else Path("out") / options.scene.stem
+
+
+def file_of(options: argparse.Namespace, name: str) -> Path | None:
+    """The file that --out names: itself if it has an ending, otherwise ``name`` in that folder."""
+    return options.out if options.out is None or options.out.suffix else options.out / name
+
+
+def picture_of(options: argparse.Namespace, name: str) -> Path | None:
+    """The picture to write, with the ending of the format asked for."""
+    path = file_of(options, name)
+    return path if path is None or options.format is None else path.with_suffix(f".{options.format}")
+
+
+def title_of(scene: Any) -> str:
+    return scene.title or str(scene.path)
+
+
+def as_table(rows: Sequence[Sequence[Any]], head: Sequence[str] = ()) -> list[str]:
+    """A table; on a terminal too narrow for it, each row as a list."""
+    from ._base import markup  # imports numpy, which --help and --version do not need
+
+    lines = markup.columns(rows, head)
+    if max(map(len, lines), default=0) <= width():
+        return lines
+    if not head:
+        return [f"{name}: {value}" for name, value in rows]
+    return [line for first, *rest in rows for line in (str(first), *(f"  {h}: {x}" for h, x in zip(head[1:], rest)))]

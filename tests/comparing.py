@@ -1,0 +1,25 @@
+"""What blows are compared by, and the slopes of their quantities."""
+
+QUANTITIES = ("impulse", "contact_time", "peak_force")
+
+
+def difference(hit, other):
+    """What the tolerance speaks of: the largest of four differences."""
+    relative = (abs(getattr(hit, name) / getattr(other, name) - 1.0) for name in QUANTITIES)
+    return max(abs(hit.restitution - other.restitution), *relative)
+
+
+def worst(hit, other):
+    """The same; 1 if they differ in the number of impacts."""
+    return difference(hit, other) if hit.n_impacts == other.n_impacts else 1.0
+
+
+def changes(blow, numbers, name, quantities, step=1e-4):
+    """Changes of quantities per relative change of a number, from blows with the number a step smaller and larger."""
+    low, high = (blow(numbers | {name: numbers[name] * (1.0 + side * step)}) for side in (-1.0, 1.0))
+    return [(getattr(high, quantity) - getattr(low, quantity)) / (2.0 * step) for quantity in quantities]
+
+
+def examined(hit, name):
+    """One assumption of a blow."""
+    return next(each for each in hit.assumptions if each.name == name)
