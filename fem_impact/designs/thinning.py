@@ -78,7 +78,7 @@ class Solved(check.Brief):
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Body(check.Brief):
+class Blank(check.Brief):
     """The body to be tuned, and the modes that are looked at."""
 
     target: Target
@@ -88,7 +88,7 @@ class Body(check.Brief):
     close: float  # [-] largest relative error of frequencies
 
     @classmethod
-    def of(cls, target: Target, pitches: tuple[Pitch, ...], tolerance: float) -> "Body":
+    def of(cls, target: Target, pitches: tuple[Pitch, ...], tolerance: float) -> "Blank":
         """With the modes that pitches mean, for a tolerance [cents]."""
         close = min(SHARE * (2.0 ** (tolerance / CENTS) - 1.0), refinement.LOOSEST)
         unsettled = not pitches[0].mode
@@ -152,7 +152,7 @@ class Body(check.Brief):
 class Thinning:
     """One search: places that a body may be thinned at, and where it stands."""
 
-    body: Body
+    body: Blank
     before: Solved
     depth: float  # [m] greatest
     radius: float  # [m]

@@ -19,7 +19,7 @@ from ..show import outlined
 from . import pitches as wishes
 from .pitches import Pitch, cents, note
 from .removal import Dishes, Sensitivity, check_body, images, thickness
-from .thinning import Body, Solved, Thinning, drawn
+from .thinning import Blank, Solved, Thinning, drawn
 
 DEPTH = 0.2  # [-] greatest depth by default over the least thickness: what is left is still about the same body
 RADIUS = 0.12  # [-] of the root of a plate's area, or of a bar's length: about what a thumb rubs off an instrument
@@ -88,7 +88,7 @@ class Tuning(check.Brief):
     volume: float  # [m^3] taken off
     before: Solved = field(repr=False)
     after: Solved = field(repr=False)
-    body: Body = field(repr=False)
+    body: Blank = field(repr=False)
 
     @property
     def met(self) -> bool:
@@ -270,7 +270,7 @@ def tune(
     check_body(target.section)
     if mirror is not None:
         check.one_of("mirror", mirror, MIRRORS if isinstance(target.section, Plate) else MIRRORS[:1])
-    start = Body.of(target, wanted, tolerance)
+    start = Blank.of(target, wanted, tolerance)
     before = start.first()
     size = before.system.mesh.area ** (1.0 / before.modes.dimension)
     radius = RADIUS * size if radius is None else check.between("radius", radius, size / FINEST, size, "m")
@@ -307,7 +307,7 @@ def _target(body: System | Scene | str | Path) -> Target:
     return replace(target, source="fe")
 
 
-def _told(body: Body, search: Thinning, found: Sequence[tuple[np.ndarray, float]]) -> Tuning:
+def _told(body: Blank, search: Thinning, found: Sequence[tuple[np.ndarray, float]]) -> Tuning:
     """The result, with every patch solved after those before it."""
     before = last = search.before
     told, slopes = [], before.sensitivity

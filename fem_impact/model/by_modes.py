@@ -20,8 +20,10 @@ MOST_MODES = {"fe": 2000, "analytic": 50_000, "modes": 50_000}  # [-] limit by s
 # [-] a plate that needs more modes is taken as infinite above a frequency, if it overdamps the contact: a steel sheet
 # then keeps 4 100 modes instead of 15 190
 MANY_MODES = 10_000
-# [-] by dimension, frequency error of the shortest waves that the mesh resolves by `Theory.wave`; beams also round
-SHORT_WAVES = {2: 1e-5, 1: 1e-9}
+# [-] frequency error of the shortest waves that the mesh resolves by `Theory.wave`; beams also round
+SHORT_WAVES = {
+    "argyris": 1e-5, "argyris and quartic": 1e-5, "hermite": 1e-9, "argyris and shear": 1e-5, "hermite and shear": 1e-9,
+}  # fmt: skip
 
 
 @dataclass(frozen=True, eq=False)
@@ -130,8 +132,8 @@ def _with_mesh(asked: Asked, told: Forecast, shapes: FieldShapes, limit: float) 
     mesh = system.mesh
     stated = asked.meshed or refinement.resolves(system, limit)
     size = mesh.size if stated else min(mesh.size, refinement.size_for(system, None, limit, None))
-    n_dofs = round(system.rules.unknowns * mesh.area / size**mesh.dimension)
-    error = max(float(first.frequency_error.max()), SHORT_WAVES[mesh.dimension])
+    n_dofs = round(refinement.unknowns(system.element, mesh, size))
+    error = max(float(first.frequency_error.max()), SHORT_WAVES[system.element])
     reason = f"{system.element} elements of {size:.3g} m, about {n_dofs} unknowns, resolve the shortest wave"
     work = cost.NOTHING  # if the plan has found all modes, and their compliance
     if told.n_modes > first.n_modes:
@@ -140,7 +142,7 @@ def _with_mesh(asked: Asked, told: Forecast, shapes: FieldShapes, limit: float) 
         each = [cost.by_modes(n, told.n_modes) for n in [n_dofs, *coarser]]
         if mesh.dimension == 2:
             finer = [n_dofs * refinement.COARSER**2] if compared else []
-            at_blow = cost.AT_BLOW.get(system.element, max(cost.AT_BLOW.values()))
+            at_blow = cost.AT_BLOW[system.element]
             each += [cost.compliance(n + at_blow) for n in [n_dofs, *finer]]
         work = replace(sum(each, cost.NOTHING), memory=max(part.memory for part in each))  # one mesh after another
     return replace(

@@ -108,7 +108,7 @@ class Target:
     blame: Blame = _nobody
 
     def __post_init__(self) -> None:
-        if self.theory is not None and self.mesh is not None and self.system is None:
+        if self.theory is not None and self.mesh is not None:
             check.one_of("theory", self.theory, THEORIES[self.mesh.dimension])
         if self.mesh is not None:
             check.settle(self, mesh=ribbed(self.mesh, self.section))
@@ -147,7 +147,7 @@ class Target:
     @property
     def thick(self) -> bool:
         """Whether shear and rotary inertia count."""
-        return self.theory in THICK if self.system is None else self.system.rules.thick
+        return self.theory in THICK
 
     @property
     def element(self) -> str:

@@ -7,7 +7,7 @@ from numpy.testing import assert_allclose
 import fem_impact as fi
 from fem_impact.designs import pitches, thinning
 from fem_impact.designs.removal import Dishes
-from fem_impact.designs.thinning import Body
+from fem_impact.designs.thinning import Blank
 from fem_impact.model.target import Target
 
 WOOD = fi.Material(E=16e9, nu=0.35, rho=900.0)
@@ -15,7 +15,7 @@ BAR = fi.Beam.rectangular(WOOD, width=0.05, height=0.012)
 
 
 def body_of(system, wanted, tolerance=1.0):
-    return Body.of(Target.of(system), pitches.read(wanted, "order"), tolerance)
+    return Blank.of(Target.of(system), pitches.read(wanted, "order"), tolerance)
 
 
 def test_the_place_that_costs_least_for_a_cent_is_taken():

@@ -67,14 +67,6 @@ def test_a_theory_may_ask_its_own_section_for_another_field():
     assert_allclose(modes.omega, exact, rtol=1e-6)  # as Kirchhoff's plate on this mesh
 
 
-@pytest.mark.slow
-def test_a_body_of_its_own_theory_is_struck_as_its_modes_are():
-    blow = {"at": (0.2, 0.1), "speed": 1.0, "tolerance": 1e-2}
-    body, ball, law = bedded(), fi.Striker.rigid(0.5), fi.Contact.linear(1e7)
-    planned, own = fi.strike(body, ball, law, **blow), fi.strike(fi.find_modes(body, n_modes=100), ball, law, **blow)
-    assert abs(planned.restitution - own.restitution) < 2e-2  # two tolerances
-
-
 def test_a_theory_of_another_dimension_is_refused():
     with pytest.raises(ValueError, match="theory must be of dimension 2, as the mesh"):
         fi.assemble(fi.mesh.rectangle(*SIDES), fi.Plate(STEEL, THICKNESS), theory=euler.EULER)
