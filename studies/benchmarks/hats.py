@@ -24,7 +24,7 @@ HATS = tuple(sorted(path.stem for path in PAGES.glob("*.md")))
 def path_of(hat):
     """The commands on the page of a hat, and the files that they leave."""
     text = (PAGES / f"{hat}.md").read_text(encoding="utf-8")
-    found = (re.search(rf"^```{kind}\n(.*?)^```", text, re.MULTILINE | re.DOTALL)[1] for kind in ("sh", "files"))
+    found = (re.search(rf"^```{kind}\n(.*?)^```", text, re.MULTILINE | re.DOTALL)[1] for kind in ("sh", "text"))
     commands, files = (part.splitlines() for part in found)
     return commands, files
 
