@@ -10,6 +10,7 @@ import numpy as np
 
 from .._base import check
 from .._base.check import SimulationError
+from .._base.rounding import ROUNDING
 from . import distance, engine
 from .compiled.bundles import KernelSystem
 from .engine import STEP_SHARE, TOLERANCE
@@ -34,6 +35,8 @@ SURELY = 4.0
 # [-] of the largest error in any quantity, what each errs at least: in one alone two runs agree by chance, which left
 # 4 % of the errors of contact times below the truth, one by a factor of five
 CHANCE = 0.2
+# [-] what rounding adds in each step, in blows of 1e5 steps; test_stepping.py
+ROUNDED = 1e-17
 DOUBLINGS = 7  # [-] step halvings before the run gives up: A4 then errs 2**28 times less
 # [-] Difference of two runs over the error of the finer one: first for speeds and impulse, then for contact time and
 # peak force. These two depend on one instant, and modes faster than the step lower the order of A4 there.
@@ -159,7 +162,7 @@ class _Control:
         if "force" in quantities:
             i = [*quantities].index("force")
             error[i] = max(error[i], fine.force_missed)
-        error[:n] = np.maximum(error[:n], CHANCE * max(error[:n].tolist()))
+        error[:n] = np.maximum(error[:n], max(CHANCE * max(error[:n].tolist()), ROUNDED * len(fine.steps)))
         error[n] = min(1.0, SURELY * error[n])
         return Converged(self.scheme, sizes, fine, coarse, error)
 
@@ -206,7 +209,7 @@ class _Control:
         shortest = min(self.pace[0], options.last[0])
         count = _first_count(self.scheme, min(STEP_SHARE * options.tolerance, TOLERANCE), options.quantities)
         first = min(2.0 * shortest / count, _longest_lossy(self.system, self.pace, options.tolerance))
-        return [first * 0.5**n for n in range(DOUBLINGS + 1)], STEP_SHARE * options.tolerance
+        return [first * 0.5**n for n in range(DOUBLINGS + 1)], max(STEP_SHARE * options.tolerance, ROUNDING)
 
     def told(self, best: float, coarse: History, fine: History) -> str:
         """Why no two runs agreed, of which the best erred by ``best``, and what helps."""

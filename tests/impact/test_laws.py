@@ -14,6 +14,7 @@ MADE = {  # one of each, its own course within the approaches below
     "layers": fi.Contact.layers(1e6, 1.3, depth=2e-4, hard_stiffness=1e9, loss=0.2),
     "elastic_plastic": fi.Contact.elastic_plastic(1e8, yield_approach=1e-4),
     "felt": fi.Contact.felt(1e8, 2.0, hysteresis=0.4, relaxation=1e-3),
+    "of": fi.Contact.of(lambda d: 1e7 * d**1.7 + 1e13 * d**3.2, deepest=2e-3),
 }
 APPROACHES = np.array([3e-5, 1.3e-4, 2.7e-4, 6e-4])
 AT, SLOPES = (build.plain(getattr(law, name)) for name in ("at", "slopes"))

@@ -118,3 +118,18 @@ def test_the_earlier_name_of_a_scheme_is_understood():
     )
     assert one.scheme == two.scheme == "A4"
     np.testing.assert_array_equal(one.history.steps, two.history.steps)
+
+
+@pytest.mark.parametrize("contact", [fi.Contact.linear(1e5), fi.Contact.hertz(1e7)], ids=["linear", "hertz"])
+def test_steps_end_where_rounding_begins(contact):
+    """Halved on below that, they would only gather rounding: eight times as many, and 3e-12 of restitution."""
+    plate = fi.analytic.rectangle(1.55, 1.0, mass=0.2, first_frequency=100.0, n_modes=80)
+    near, nearest = (
+        fi.strike(
+            plate, fi.Striker.rigid(0.1), contact, at=(0.465, 0.3), speed=1.0, residual=False, tolerance=tolerance
+        )
+        for tolerance in (1e-11, 1e-12)
+    )
+    assert len(nearest.history.steps) <= 2 * len(near.history.steps)
+    assert abs(nearest.restitution - near.restitution) <= near.error.step + nearest.error.step
+    assert nearest.error.step >= 1e-17 * len(nearest.history.steps)
