@@ -156,8 +156,8 @@ def _chosen(usual: Theory, theory: str | Theory | None, element: str | None, dim
     if isinstance(theory, Theory):
         if theory.dimension != dimension or element is not None:
             raise ValueError(
-                f"theory must be of dimension {dimension}, as the mesh, and goes without element, got "
-                f"{theory.name!r} of dimension {theory.dimension}"
+                f"theory must be of dimension {dimension} as the mesh, and element left out, got {theory.name!r} of "
+                f"dimension {theory.dimension}"
             )
         return theory
     theory = check.one_of("theory", usual.name if theory is None else theory, THEORIES[dimension])

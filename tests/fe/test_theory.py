@@ -68,5 +68,5 @@ def test_a_theory_may_ask_its_own_section_for_another_field():
 
 
 def test_a_theory_of_another_dimension_is_refused():
-    with pytest.raises(ValueError, match="theory must be of dimension 2, as the mesh"):
+    with pytest.raises(ValueError, match="theory must be of dimension 2 as the mesh"):
         fi.assemble(fi.mesh.rectangle(*SIDES), fi.Plate(STEEL, THICKNESS), theory=euler.EULER)
