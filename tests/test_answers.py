@@ -15,7 +15,15 @@ from fem_impact.pages import lesson_grid
 
 ROOT = Path(__file__).parents[1]
 TAPS = ROOT / "studies" / "measured" / "acceleration.lvm"
-KINDS = {"object": dict, "array": list, "string": str, "integer": int, "number": (int, float), "null": type(None)}
+KINDS = {
+    "object": dict,
+    "array": list,
+    "string": str,
+    "integer": int,
+    "number": (int, float),
+    "null": type(None),
+    "boolean": bool,
+}
 STROKES = "[[stroke]]\nwhen = 0.03\n[[stroke]]\nwhen = 0.0\nspeed = 0.5\n"
 RUNS = {  # words that run each command in a second or two
     "strike": "strike small.toml --out out --format svg",
@@ -28,6 +36,7 @@ RUNS = {  # words that run each command in a second or two
     "hammer": "hammer small.toml --bandwidth 300 --masses 0.01",
     "hammer, catalogue": "hammer small.toml --bandwidth 300 --catalogue 086 --out sheet",
     "hammer, rove": "hammer small.toml --bandwidth 300 --masses 0.01 --rove 2 --out rove",
+    "tune": 'tune bar.toml --pitch "-5 cents" --out tuned',
     "watch": f"watch {TAPS.parent} --bandwidth 2000 --once --response Acceleration --out seen.png",
     "report": "report small.toml --out report.html",
     "page": "page small.toml --out page.html",
@@ -52,7 +61,7 @@ def commands():
 
 @pytest.fixture
 def folder(tmp_path):
-    for name, text in (("small", TEXT), ("quick", QUICK), ("flam", SMALL + STROKES)):
+    for name, text in (("small", TEXT), ("quick", QUICK), ("flam", SMALL + STROKES), ("bar", BAR)):
         (tmp_path / f"{name}.toml").write_text(text)
     return tmp_path
 

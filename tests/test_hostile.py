@@ -77,7 +77,7 @@ def test_whole_numbers_beyond_64_bits_are_numbers(told, huge, text, key, status,
 def test_checked_numbers_are_floats_whatever_was_given():
     made = fi.Material(10**20, 0, 10**19, 10**18, 10**17, 10**19), fi.Contact(10**20, 1, 10, -1), fi.Elastic(10**20)
     for thing in made:
-        assert all(type(value) is float for value in vars(thing).values() if value is not None)
+        assert all(type(value) is float for value in vars(thing).values() if value not in (None, ()))
     assert type(fi.Plate(made[0], 1).thickness) is float
 
 

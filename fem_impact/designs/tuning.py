@@ -261,8 +261,8 @@ def tune(
     >>> wood = fi.Material(E=16e9, nu=0.35, rho=900.0)
     >>> bar = fi.assemble(fi.mesh.line(0.35), fi.Beam.rectangular(wood, width=0.05, height=0.012))
     >>> found = fi.tune(bar, {1: "-20 cents"}, mirror="x")
-    >>> found.met, len(found.patches), round(found.tones[0].left)
-    (True, 1, -1)
+    >>> found.met, len(found.patches), abs(found.tones[0].left) <= found.tolerance
+    (True, 1, True)
     """
     wanted = wishes.read(pitches, match)
     tolerance = check.between("tolerance", tolerance, 0.01, 100.0)

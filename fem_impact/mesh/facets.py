@@ -1,7 +1,8 @@
 """Curved boundary facets, written as a height above the chord."""
 
+from math import comb
+
 import numpy as np
-from scipy.special import comb
 
 # [-] iterations to find a point of a curved facet; each gains a digit or two
 CURVE_STEPS = 12
@@ -82,8 +83,9 @@ class Curves:
         power = rise[:, :, None] * self.out[:, None]  # (n, 7, 2)
         power[:, 0] += self.centre - 0.5 * chord
         power[:, 1] += chord
-        k = np.arange(7)
-        return np.einsum("ik,nkd->nid", comb(k[:, None], k) / comb(6, k), power)
+        k = range(7)
+        choices = np.array([[comb(i, j) for j in k] for i in k])
+        return np.einsum("ik,nkd->nid", choices / choices[6], power)
 
     def halfway(self, low: np.ndarray, high: np.ndarray) -> np.ndarray:
         """Point (n, 2) of each part from s = ``low`` to ``high`` that lies equally far from both ends of the part."""

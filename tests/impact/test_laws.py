@@ -16,14 +16,16 @@ MADE = {  # one of each, its own course within the approaches below
     "felt": fi.Contact.felt(1e8, 2.0, hysteresis=0.4, relaxation=1e-3),
     "of": fi.Contact.of(lambda d: 1e7 * d**1.7 + 1e13 * d**3.2, deepest=2e-3),
 }
+TABLES: list[np.ndarray] = []  # kept while their springs are asked
 APPROACHES = np.array([3e-5, 1.3e-4, 2.7e-4, 6e-4])
 AT, SLOPES = (build.plain(getattr(law, name)) for name in ("at", "slopes"))
 each_law = pytest.mark.parametrize("contact", [MADE[each.name] for each in law.LAWS], ids=[e.name for e in law.LAWS])
 
 
 def spring_of(contact, compliance=0.0):
-    """The spring of a contact that has not been pressed."""
-    return build.plain(law.spring_of)(law.table([contact.numbers._replace(compliance=compliance)]), 0)
+    """The spring of a contact that has not been pressed; that of one's own law is read where its table lies."""
+    TABLES.append(law.table([contact.numbers._replace(compliance=compliance)]))
+    return build.plain(law.spring_of)(TABLES[-1], 0)
 
 
 @each_law
@@ -68,7 +70,8 @@ def test_the_law_that_stands_for_it_stores_as_much_at_the_same_approach(contact)
     for d in APPROACHES:
         energy = AT(d, spring).energy
         stands = acting_stiffness(contact.numbers, 1.0 / mass, np.sqrt(2.0 * energy / mass))
-        assert_allclose(stands * d ** (a + 1.0) / (a + 1.0), energy, rtol=1e-9)
+        # the approach of a law of one's own stands between 2000 of it over eight decades
+        assert_allclose(stands * d ** (a + 1.0) / (a + 1.0), energy, rtol=1e-5 if contact.knots else 1e-9)
 
 
 @each_law
@@ -87,6 +90,8 @@ def test_its_numbers_have_names_units_and_words(contact):
     own = contact.law
     assert own.name and set(own.numbers) <= set(vars(contact)) and set(own.slopes) <= set(vars(contact))
     assert all(number.axis for number in own.numbers.values())
+    if contact.knots:
+        return pytest.skip("no scene can state a function of one's own")
     words = [form("contact", own.name, key) for key in contact.table if key != "kind"]
     assert all(words)
     table = contact.table
