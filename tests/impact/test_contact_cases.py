@@ -365,7 +365,7 @@ def contacts(result):
     """Start, end, peak force, impulse, contact of every contact of a run."""
     steps, now = result[0], result[3]
     law = laws.table([[1e6, 1.5]])
-    return record.find_impacts(steps, np.atleast_2d(now), law, 2, 16, 0.0, 0.0)
+    return record.find_impacts(steps, np.atleast_2d(now), law, 16, 0.0, 0.0)
 
 
 def energy_of(result):
