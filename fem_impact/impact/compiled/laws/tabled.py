@@ -13,7 +13,7 @@ import numpy as np
 
 from ...._base import check
 from ..build import COMPILED, inner
-from ..layout import HEAD, WIDTH
+from ..layout import HEAD, PUSH
 from .base import Law, Spring, standing_in
 from .power import PowerNumbers, power_slopes
 
@@ -209,7 +209,7 @@ class TableLaw(Law):
 
     def check_reached(self, contact: Any, history: Any, i: int) -> None:
         deepest, force, _ = contact.knots[-1]
-        reached = history.steps[:, HEAD + WIDTH * i].max(initial=0.0)
+        reached = history.steps[:, HEAD + (PUSH + history.n_coefficients) * i].max(initial=0.0)
         peak = max((impact.peak_force for impact in history.impacts if impact.contact == i), default=0.0)
         if reached > deepest and peak > force:
             raise ValueError(
