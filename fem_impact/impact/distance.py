@@ -69,8 +69,6 @@ def of_runs(
     rigid = two.omega == 0.0  # a swinging body has much momentum, of which the striker's error is no share
     start, end = two.start_p[rigid], two.end_p[rigid]
     momentum = sqrt(max(start.dot(start), end.dot(end)))
-    if not start.dot(start):  # at rest in balance only rounding moves
-        momentum = max(momentum, ROUNDING * sum(each[1][3]) * float(np.abs(two.shape[:, rigid]).max(initial=0.0)))
     momentum = momentum or sqrt(two.start_p.dot(two.start_p)) or sqrt(two.end_p.dot(two.end_p)) or 1.0
     speeds = np.abs(one.end_p[one.omega == 0.0] - end)
     found: dict[str, float] = {"restitution": max(speeds.tolist(), default=0.0) / momentum}

@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import replace
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -10,6 +11,7 @@ from .._base.check import SimulationError
 from .._base.rounding import EPSILON, ROUNDING
 from .compiled import build, record
 from .compiled.bundles import KernelSystem, Limits
+from .compiled.collocation import run_collocation
 from .compiled.energy import run_energy
 from .compiled.law import Row
 from .contact import acting_stiffness, wall_time
@@ -24,10 +26,19 @@ MAX_STEPS = 500_000  # [-] of one run: a time limit of about one second
 MAX_WORK = 1_000_000_000
 # [-] modes times steps of one run in plain Python: the same time limit, as it is 3 000 times slower than the kernels
 PLAIN_WORK = 300_000
-SOONER = 0.1  # [-] of a run that was given up, what is advised: the last run of a blow halves the steps three times
+SOONER = 0.2  # [-] of a run that was given up, what is advised: the last run of a blow halves the steps twice
 FIRST_STEPS = 24.0  # [-] steps per contact with which A4 meets TOLERANCE in most blows; cheapest first run of 12 to 32
 # [-] times per contact at which a flight is searched for near misses or two motions are compared, and their most
 LOOKS = 16.0, 20_000
+NODES = 5  # [-] of collocation; more gain nothing, because the force is not smooth at onset and release
+
+
+@cache
+def gauss(count: int) -> tuple[np.ndarray, np.ndarray]:
+    """Gauss nodes on [0, 1] with 1 appended, (count + 1,), and Lagrange polynomials in powers, (count, count)."""
+    nodes = 0.5 * (np.polynomial.legendre.leggauss(count)[0] + 1.0)
+    powers = np.linalg.inv(np.vander(nodes, increasing=True)).T
+    return np.append(nodes, 1.0), np.ascontiguousarray(powers)
 
 
 def steps_per_contact(tolerance: float, power: float = 0.25) -> float:
@@ -41,24 +52,30 @@ def follow(
 ) -> History:  # fmt: skip
     """One run up to the ``last`` time [s] and number of impacts, 0 for any.
 
-    ``size`` is the step in contact [s], ``chosen_by`` what it comes from.
+    ``size`` is the step in contact [s], for collocation the allowed misfit [-]; ``chosen_by`` is what it comes from.
     """
     most, stretch = most_steps(system, stretched), None
     limits = Limits(float(EPSILON * pace[0] * pace[1]), float(ROUNDING * pace[1]), float(last[0]), last[1], most)
     if stretched is not None:
         stretched = replace(stretched, base=float(size), ramp=scheme == "A4")
         stretch = stretched.kernel
-    result = run_energy(system, stretch, int(scheme == "A4"), float(size), limits)
+    if scheme == "collocation":
+        nodes, powers = gauss(NODES)
+        result = run_collocation(system, nodes, powers, pace[0] / 2.0, float(size) * pace[1], limits)
+    else:
+        result = run_energy(system, stretch, int(scheme == "A4"), float(size), limits)
     history = History(*system, *(*result, stretched))
     time, status = result[5], result[6]
     if status == record.EXHAUSTED:
-        ended = int(np.ceil(SOONER * np.count_nonzero(history.contacts[:, 1] < time)))
+        ended = int(SOONER * np.count_nonzero(history.contacts[:, 1] < time))
         raise SimulationError(
             f"no final separation was reached in {most} steps, up to {time:.4g} s; raise {chosen_by}, or give a "
             f"duration of at most {float(f'{SOONER * time:.1e}'):g} s"
             + (f" or max_impacts of at most {ended}" if ended else "")
         )
     if status == record.FAILED:
+        if scheme == "collocation":
+            raise SimulationError(f"scheme collocation found no valid next step at {time:.4g} s; use A4")
         raise SimulationError(f"scheme {scheme} found no valid next step at {time:.4g} s; check the units of the scene")
     return history
 

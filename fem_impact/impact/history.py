@@ -66,7 +66,7 @@ class History(check.Locked):
     law: np.ndarray  # (n_contacts,) stiffness, exponent, loss, series compliance, .. see `compiled.law.LAW`
     start_q: np.ndarray  # (n_modes,) [m kg**0.5]
     start_p: np.ndarray  # (n_modes,) [m kg**0.5/s]
-    steps: np.ndarray  # (n_steps, 3 + 6 n_contacts), see `energy.run_energy`
+    steps: np.ndarray  # (n_steps, 3 + (4 + n_coefficients) n_contacts), see `energy.run_energy`
     end_q: np.ndarray  # (n_modes,)
     end_p: np.ndarray  # (n_modes,)
     now: np.ndarray  # (6, n_contacts) at the end; row 0 approach [m], row 4 rate [m/s], row 5 memory
@@ -78,6 +78,12 @@ class History(check.Locked):
     miss: float | None = None  # [m] highest approach at which the bodies turned back in flight, if they did
     stretched: Stretched | None = None  # if one of the bodies stretches
     reached: dict[str, Any] = field(default_factory=dict, init=False, repr=False)  # where its motion goes on
+    n_coefficients: int = field(init=False)  # [-] of each step's force polynomial, per contact
+
+    def __post_init__(self) -> None:
+        check.lock_arrays(self)
+        width = (self.steps.shape[1] - layout.HEAD) // len(self.offset)
+        object.__setattr__(self, "n_coefficients", width - layout.PUSH - 1)
 
     @property
     def n_contacts(self) -> int:
@@ -90,13 +96,14 @@ class History(check.Locked):
         return KernelSystem(*bodies, self.law, self.start_q, self.start_p)
 
     def _column(self, first: int) -> np.ndarray:
-        end = layout.HEAD + layout.WIDTH * len(self.offset)
-        return self.steps[:, layout.HEAD + first : end : layout.WIDTH]
+        width, m = layout.PUSH + self.n_coefficients, len(self.offset)
+        return self.steps[:, layout.HEAD + first : layout.HEAD + width * m : width]
 
     @cached_property
     def impulses(self) -> np.ndarray:
         """Impulse of every step and contact [N s], (n_steps, n_contacts)."""
-        return self.steps[:, 1:2] * (self._column(layout.PUSH) + 0.5 * self._column(layout.GAIN))
+        mean = sum(self._column(layout.PUSH + k) / (k + 1.0) for k in range(self.n_coefficients))
+        return self.steps[:, 1:2] * mean
 
     @cached_property
     def pressed(self) -> np.ndarray:
@@ -112,7 +119,7 @@ class History(check.Locked):
         """Contact force [N] and its rate [N/s] at a fraction of each of some steps, (n,) each."""
         found = np.empty((2, len(steps)))
         rows, parts = np.array(steps, np.int64), np.array(part, float)
-        record.forces(self.steps, self.now, self.law, rows, contact, parts, found)
+        record.forces(self.steps, self.now, self.law, self.n_coefficients, rows, contact, parts, found)
         return found[0], found[1]
 
     def force_at(self, times: np.ndarray, contact: int) -> tuple[np.ndarray, np.ndarray]:
@@ -139,7 +146,7 @@ class History(check.Locked):
         if self.stretched is not None:
             return self.stretched.states(self, times)
         q, p = np.empty((len(times), len(self.omega))), np.empty((len(times), len(self.omega)))
-        propagation.replay(self.system, self.steps, times, q, p)
+        propagation.replay(self.system, self.steps, self.n_coefficients, times, q, p)
         return q, p
 
     def motion(self, times: np.ndarray) -> np.ndarray:
@@ -184,13 +191,15 @@ class History(check.Locked):
         Columns are start, end, peak force, impulse, contact index, with what speed the bodies meet and part, and the
         restitution, the second of these over the first; NaN where there is none.
         """
-        size = np.abs(self.shape)
-        pushes = self.steps[:, layout.HEAD : layout.HEAD + layout.WIDTH * len(size)]
-        rate = np.maximum.reduce(np.abs(pushes[:, layout.SPEED :: layout.WIDTH]), axis=None, initial=0.0)
-        deepest = np.maximum.reduce(pushes[:, :: layout.WIDTH], axis=None, initial=0.0)
+        size, width = np.abs(self.shape), layout.PUSH + self.n_coefficients
+        pushes = self.steps[:, layout.HEAD : layout.HEAD + width * len(size)]
+        rate = np.maximum.reduce(np.abs(pushes[:, layout.SPEED :: width]), axis=None, initial=0.0)
+        deepest = np.maximum.reduce(pushes[:, ::width], axis=None, initial=0.0)
         way = max((size @ (np.abs(self.start_q) + self.end_time * np.abs(self.start_p))).tolist())
         slack = float(max(ROUNDING * way, TOUCH * deepest))
-        found = record.find_impacts(self.steps, self.now, self.law, PEAK_LOOKS, ROUNDING * rate, slack)
+        found = record.find_impacts(
+            self.steps, self.now, self.law, self.n_coefficients, PEAK_LOOKS, ROUNDING * rate, slack
+        )
         found = found[found[:, 2] > FAINT * max(found[:, 2].tolist(), default=0.0)]
         if min(found[:, 7].tolist(), default=np.inf) < np.inf:
             found[:, 0] = self._force_begins(found, size)
@@ -227,7 +236,7 @@ class History(check.Locked):
     def nearest_turn(self) -> float:
         """How near to zero an approach turns back, over the farthest it ever turns [-]; infinity where none does."""
         miss = -np.inf if self.miss is None else self.miss
-        return float(record.nearest_turn(self.steps, self.now, self.law, miss))
+        return float(record.nearest_turn(self.steps, self.now, self.law, self.n_coefficients, miss))
 
     @cached_property
     def margin(self) -> float:
@@ -237,10 +246,10 @@ class History(check.Locked):
     @cached_property
     def force_missed(self) -> float:
         """Error [-] of the peak force if steps are too long for its ripples, on which two runs may agree by chance."""
-        if not len(self.contacts):
+        if self.n_coefficients > 2 or not len(self.contacts):
             return 0.0
         peak = float(self.contacts[:, 2].max())
-        return float(record.force_missed(self.steps, self.now, self.law, peak))
+        return float(record.force_missed(self.steps, self.now, self.law, self.n_coefficients, peak))
 
     def samples(self, tolerance: float) -> tuple[np.ndarray, np.ndarray]:
         """Times [s], (n_times,), dense enough for a tolerance, and the forces [N] there, (n_times, n_contacts)."""

@@ -10,9 +10,9 @@ import numpy as np
 
 from .._base import check
 from .._base.check import SimulationError
-from .._base.rounding import ROUNDING
 from . import distance, engine
 from .compiled.bundles import KernelSystem
+from .contact import Contact
 from .engine import STEP_SHARE, TOLERANCE
 from .history import History
 from .quantities import asked_for
@@ -20,7 +20,7 @@ from .stretched import Stretched
 
 Function = TypeVar("Function", bound=Callable)
 
-SCHEMES = {"A": "A", "A4": "A4", "collocation": "A4"}  # the last by an earlier name: A4 meets the same tolerances
+SCHEMES = ("A", "A4", "collocation")
 # [-] tolerance advised over the error reached: steps twice as long, to which it may lead, err 16 times more
 REACHED = 20.0
 AVERAGES = {"restitution", "impulse", "n_impacts"}  # quantities that depend on no single instant
@@ -35,15 +35,14 @@ SURELY = 4.0
 # [-] of the largest error in any quantity, what each errs at least: in one alone two runs agree by chance, which left
 # 4 % of the errors of contact times below the truth, one by a factor of five
 CHANCE = 0.2
-# [-] what rounding adds in each step, in blows of 1e5 steps; test_stepping.py
-ROUNDED = 1e-17
 DOUBLINGS = 7  # [-] step halvings before the run gives up: A4 then errs 2**28 times less
 # [-] Difference of two runs over the error of the finer one: first for speeds and impulse, then for contact time and
 # peak force. These two depend on one instant, and modes faster than the step lower the order of A4 there.
-RICHARDSON = {"A": (3.0, 3.0), "A4": (7.0, 4.0)}
+RICHARDSON = {"A": (3.0, 3.0), "A4": (7.0, 4.0), "collocation": (1.0, 1.0)}
 RINGING = 0.5  # [-] modes with a damping ratio above this do not ring: a swing is down to 3 % of the one before
 # [rad] largest phase of a ringing mode in a step of the coarser run: a third of a period, seen before it comes again
 RESOLVED = 2.0
+COLLOCATION_BELOW = 1e-7  # [-] below this tolerance, collocation needs less work than A4
 
 
 @dataclass(frozen=True)
@@ -76,7 +75,7 @@ class Options:
             tolerance=check.tolerance(self.tolerance),
             duration=None if self.duration is None else check.positive("duration", self.duration, "s"),
             max_impacts=None if self.max_impacts is None else check.count("max_impacts", self.max_impacts),
-            scheme=None if self.scheme is None else SCHEMES[check.one_of("scheme", self.scheme, SCHEMES)],
+            scheme=None if self.scheme is None else check.one_of("scheme", self.scheme, SCHEMES),
             dt=None if self.dt is None else check.positive("dt", self.dt, "s"),
             quantities=asked_for(self.quantity),
             striker_force=check.number("striker_force", self.striker_force, "N"),
@@ -99,6 +98,11 @@ def takes_options(*but: str) -> Callable[[Function], Function]:
     return shown
 
 
+def scheme_for(tolerance: float, exponent: float) -> str:
+    """The scheme that meets a tolerance with the least work."""
+    return "collocation" if tolerance < COLLOCATION_BELOW and exponent >= 1.0 else "A4"
+
+
 def _first_count(scheme: str, tolerance: float, quantities: Mapping[str, float | None]) -> float:
     """Steps per contact in the first run."""
     count = engine.steps_per_contact(tolerance, 0.5 if scheme == "A" else 0.25)
@@ -106,6 +110,7 @@ def _first_count(scheme: str, tolerance: float, quantities: Mapping[str, float |
 
 
 def steps_for(
+    contact: Contact,
     duration: float,
     tolerance: float,
     quantities: Mapping[str, float | None],
@@ -113,8 +118,10 @@ def steps_for(
     dt: float | None = None,
 ) -> tuple[str, float]:
     """Scheme and first time step [s] of `strike`; ``duration`` is the contact time on a rigid wall [s]."""
-    scheme = SCHEMES[scheme or "A4"]
-    return scheme, dt or duration / _first_count(scheme, tolerance, quantities)
+    scheme = scheme or scheme_for(tolerance, contact.exponent)
+    if scheme in ("A", "A4"):
+        return scheme, dt or duration / _first_count(scheme, tolerance, quantities)
+    return scheme, dt or duration / (2.0 if scheme == "collocation" else 1.0)
 
 
 @dataclass(frozen=True, eq=False)
@@ -132,9 +139,25 @@ def refine_steps(
     system: KernelSystem, options: Options, pace: tuple[float, float], stretched: Stretched | None = None
 ) -> Converged:
     """Refine until two successive runs agree to the tolerance; ``pace`` as of `engine.pace_of`."""
-    scheme = options.scheme or "A4"
-    free = scheme == "A4" and options.dt is None
-    return _Control(system, options, pace, scheme, free, stretched).refined()
+    scheme, least = options.scheme, min(system.law["exponent"].tolist())
+    if stretched is not None:
+        if scheme == "collocation":
+            raise ValueError("scheme collocation does not support stretching; use A4")
+        scheme = scheme or "A4"
+    scheme = scheme or scheme_for(options.tolerance, least)
+    if scheme == "collocation" and least < 1.0:
+        raise ValueError(f"scheme collocation needs exponents of at least 1, got {least:g}; use A4")
+    free = options.scheme is None and options.dt is None
+    try:
+        return _Control(system, options, pace, scheme, free, stretched).refined()
+    except _NotMet:
+        if not free or scheme != "A4" or least < 1.0 or stretched is not None:
+            raise
+    return _Control(system, options, pace, "collocation", free, stretched).refined()
+
+
+class _NotMet(SimulationError):
+    """No two runs agreed."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -145,7 +168,7 @@ class _Control:
     options: Options
     pace: tuple[float, float]
     scheme: str
-    free: bool  # whether another scheme or step is no remedy
+    free: bool  # whether scheme and steps are our choice
     stretched: Stretched | None
 
     def run(self, size: float, chosen_by: str = "tolerance") -> History:
@@ -156,13 +179,13 @@ class _Control:
     def judged(self, sizes: tuple[float, float], coarse: History, fine: History) -> Converged:
         """Two runs of a finer and a coarser size, and the errors of the finer one."""
         over, quantities, n = RICHARDSON[self.scheme], self.options.quantities, self.options.n_quantities
-        # a strong loss reacts to the rates of modes faster than the step
-        over = over[0], over[1] / (1.0 + 2.0 * self.pace[1] * max(self.system.law["loss"].tolist()))
+        if self.scheme != "collocation":  # a strong loss reacts to the rates of modes faster than the step
+            over = over[0], over[1] / (1.0 + 2.0 * self.pace[1] * max(self.system.law["loss"].tolist()))
         error = distance.of_runs(coarse, fine, quantities, over)
         if "force" in quantities:
             i = [*quantities].index("force")
             error[i] = max(error[i], fine.force_missed)
-        error[:n] = np.maximum(error[:n], max(CHANCE * max(error[:n].tolist()), ROUNDED * len(fine.steps)))
+        error[:n] = np.maximum(error[:n], CHANCE * max(error[:n].tolist()))
         error[n] = min(1.0, SURELY * error[n])
         return Converged(self.scheme, sizes, fine, coarse, error)
 
@@ -199,17 +222,21 @@ class _Control:
             if 2 * len(found.fine.steps) > engine.most_steps(self.system, self.stretched):
                 break  # the next run would exceed the step limit
         if met is None:
-            raise SimulationError(self.told(best, *runs))
+            raise _NotMet(self.told(best, *runs))
         return met
 
     def sizes(self) -> tuple[list[float], float]:
-        """Steps to try in turn, and the error [-] aimed at."""
+        """Steps, or misfits of collocation, to try in turn, and the error [-] aimed at."""
         options = self.options
+        if self.scheme == "collocation":
+            return [max(1e-15, options.tolerance ** (2.0 / 3.0) * 0.02 ** (1 + n)) for n in range(-1, 5)], (
+                options.tolerance
+            )
         # or the horizon could cut both runs to one step, and they would always agree
         shortest = min(self.pace[0], options.last[0])
         count = _first_count(self.scheme, min(STEP_SHARE * options.tolerance, TOLERANCE), options.quantities)
         first = min(2.0 * shortest / count, _longest_lossy(self.system, self.pace, options.tolerance))
-        return [first * 0.5**n for n in range(DOUBLINGS + 1)], max(STEP_SHARE * options.tolerance, ROUNDING)
+        return [first * 0.5**n for n in range(DOUBLINGS + 1)], STEP_SHARE * options.tolerance
 
     def told(self, best: float, coarse: History, fine: History) -> str:
         """Why no two runs agreed, of which the best erred by ``best``, and what helps."""

@@ -381,7 +381,7 @@ def strike(
     max_impacts : int, optional
         The run stops after this many impacts.
     scheme : {"A", "A4", "collocation"}, optional
-        Time integration scheme, by default A4. "collocation" is an earlier name: A4 meets the same tolerances.
+        Time integration scheme; by default, the tolerance decides.
     dt : float [s], optional
         Time step in contact. If given, the step error is only estimated and may exceed the tolerance.
     striker_force, target_force : float [N]

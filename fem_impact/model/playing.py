@@ -14,7 +14,7 @@ from .._base.check import SimulationError
 from .._base.explained import below, noted
 from ..impact import collision, promise
 from ..impact.collision import TOLERANCE, Touch
-from ..impact.compiled import layout, record
+from ..impact.compiled import record
 from ..impact.contact import Contact
 from ..impact.history import Impact
 from ..impact.quantities import words
@@ -441,7 +441,7 @@ class _Game:
         history = replace(
             h, omega=self.modes.omega, zeta=self.modes.damping_ratio, shape=np.zeros((1, n)), offset=np.zeros(1),
             bias=np.zeros(n), law=h.law[:1].copy(), start_q=self.q, start_p=self.p, end_q=self.q, end_p=self.p,
-            steps=h.steps[:0, : layout.HEAD + layout.WIDTH + 1], now=np.zeros((6, 1)), work=np.zeros(1), end_time=0.0,
+            steps=np.zeros((0, 7 + h.n_coefficients)), now=np.zeros((6, 1)), work=np.zeros(1), end_time=0.0,
             status=record.FINISHED,
         )  # fmt: skip
         return Response(

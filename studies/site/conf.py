@@ -27,7 +27,7 @@ napoleon_google_docstring = False
 napoleon_use_param = napoleon_use_rtype = False
 autodoc_member_order = "bysource"
 autodoc_typehints = "none"  # the docstrings tell types, shapes and units
-autodoc_preserve_defaults = True
+autodoc_preserve_defaults = False
 toc_object_entries = False
 highlight_language = "none"
 html_theme = "furo"

@@ -106,6 +106,7 @@ QUOTES = (
     quote(13, "an approach below # of the deepest", "impact.history.TOUCH"),
     quote(13, "force stays below # of the largest", "impact.history.FAINT"),
     quote(14, "for at most # looks", "impact.compiled.flight.LASTING"),
+    quote(15, "$s = #$ Gauss nodes", "impact.engine.NODES"),
     quote(17, "2 x_n, # x_n^2", "model.idealisation.PULSE"),
     quote(
         17, r"refused where $z \gt #$, where $\chi \lt #$", "model.idealisation.HEAVIEST", "model.idealisation.NEAREST"

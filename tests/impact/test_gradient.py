@@ -153,7 +153,7 @@ def resting_beam(numbers):
     return fi.collide(
         [fi.Modes.rigid(numbers["bodies.0.mass"]), beam], touches, speeds=[numbers["speeds.0"], 0.0],
         states=[still, (1e-4 * beam.rigid_motion([0.5]), np.zeros(6))], forces=[0.0, 20.0], duration=0.012,
-        tolerance=1e-9,
+        tolerance=1e-8,
     )  # fmt: skip
 
 

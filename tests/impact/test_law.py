@@ -22,6 +22,11 @@ def slopes(d0, d1, k, a, c):
     return law.slopes(law.at(d0, spring), law.at(d1, spring), spring)
 
 
+@njit
+def smooth_force(x, v, k, a, loss):
+    return law.smooth_force(x, v, law.simple(k, a, loss, 0.0))
+
+
 @pytest.mark.parametrize("k, a, c", LAWS)
 def test_energy_is_the_integral_of_the_force(k, a, c):
     """Gauss's rule over the compression x, where the approach is x + c F."""
@@ -71,6 +76,22 @@ def test_average_slopes_are_exact_at_any_distance(a, apart):
             k / (a + 1) ** n * (mp.mpf(d1) ** (a + n) - mp.mpf(d0) ** (a + n)) / (mp.mpf(d1) - d0) for n in (1, 0)
         )
     assert_allclose(slopes(d0, d1, k, a, 0.0), [float(energy), float(force)], rtol=1e-12)  # r**4 = 1e-16, and rounding
+
+
+@pytest.mark.parametrize("x, v", [(2e-4, 0.5), (2e-4, -1.5), (-1e-4, 0.2)])
+@pytest.mark.parametrize("k, a", [(1e5, 1.0), (1e7, 1.5), (3e6, 2.0)])
+def test_slopes_of_a_lossy_force_by_central_differences(x, v, k, a):
+    loss, step = 0.3, 1e-4
+    force, by_x, by_v = smooth_force(x, v, k, a, loss)
+    assert_allclose(force, np.sign(x) * k * abs(x) ** a * (1.0 + loss * v), rtol=1e-14)
+    ends = [smooth_force(x * (1.0 + sign * step), v, k, a, loss)[0] for sign in (-1.0, 1.0)]
+    assert_allclose(by_x, (ends[1] - ends[0]) / (2.0 * x * step), rtol=1e-8)  # of order step**2
+    ends = [smooth_force(x, v + sign * step, k, a, loss)[0] for sign in (-1.0, 1.0)]
+    assert_allclose(by_v, (ends[1] - ends[0]) / (2.0 * step), rtol=1e-10)  # straight in the rate
+
+
+def test_a_lossy_contact_never_pulls():
+    assert smooth_force(1e-4, -4.0, 1e5, 1.5, 0.3) == (0.0, 0.0, 0.0)
 
 
 @pytest.mark.parametrize("loss", [0.0, 0.1])

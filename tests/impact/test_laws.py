@@ -18,7 +18,7 @@ MADE = {  # one of each, its own course within the approaches below
 }
 TABLES: list[np.ndarray] = []  # kept while their springs are asked
 APPROACHES = np.array([3e-5, 1.3e-4, 2.7e-4, 6e-4])
-AT, SLOPES = (build.plain(getattr(law, name)) for name in ("at", "slopes"))
+AT, SLOPES, SMOOTH = (build.plain(getattr(law, name)) for name in ("at", "slopes", "smooth_force"))
 each_law = pytest.mark.parametrize("contact", [MADE[each.name] for each in law.LAWS], ids=[e.name for e in law.LAWS])
 
 
@@ -54,6 +54,16 @@ def test_average_slopes_are_those_of_the_ends(contact, compliance):
                 span = two.approach - one.approach
                 wanted = (two.energy - one.energy) / span, (two.force - one.force) / span
                 assert_allclose(SLOPES(one, two, spring), wanted, rtol=1e-12)
+
+
+@each_law
+def test_what_collocation_sees_is_the_force_and_its_slope(contact):
+    spring = spring_of(contact)
+    for d in APPROACHES[spring.corner < APPROACHES] if spring.corner < np.inf else APPROACHES:
+        force, slope, _ = SMOOTH(d, 0.0, spring)
+        assert_allclose(force, contact.force(d), rtol=1e-13)
+        low, high = (SMOOTH(d * (1.0 + side * 1e-4), 0.0, spring)[0] for side in (-1.0, 1.0))
+        assert_allclose((high - low) / (2e-4 * d), slope, rtol=1e-6)
 
 
 @each_law

@@ -42,23 +42,25 @@ def truth(hit, told):
     return blow(h.omega, h.zeta, h.shape[0], h.start_p, told, 1.001 * max(h.end_time, hit.impacts[-1].end))
 
 
-def test_a_blow_that_ends_while_the_contact_yields():
+@pytest.mark.parametrize("scheme", ["A4", "collocation"])
+def test_a_blow_that_ends_while_the_contact_yields(scheme):
     """The approach at the end counts from no dent, although the last step made the dent deeper."""
     law, _ = LAWS["plastic"]
-    hit = struck(law, WALL, 1e-4, duration=5e-5)
+    hit = struck(law, WALL, 1e-4, duration=5e-5, scheme=scheme)
     h = hit.history
     assert_allclose(h.now[0], h.offset + h.shape @ h.end_q, rtol=1e-12)  # rounding of sums of steps
     assert h.now[5, 0] > law.yield_approach and hit.energies["dissipated"] > 0.0
-    assert hit.energy_error < 1e-12  # rounding
+    assert hit.energy_error < 1e-5  # of collocation, a tenth of the tolerance; A4 keeps it to rounding
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", LAWS)
 @pytest.mark.parametrize("target", [WALL, PLATE], ids=["wall", "plate"])
-def test_blows_agree_with_runge_kutta(name, target):
-    """Within the tolerance, and by no more than ten times what is claimed."""
+def test_both_schemes_agree_with_runge_kutta(name, target):
+    """Collocation to 1e-8; A4 within its tolerance, and neither errs by more than ten times what it claims."""
     law, told = LAWS[name]
     fine, usual = struck(law, target, 1e-9), struck(law, target, 1e-4)
+    assert (fine.scheme, usual.scheme) == ("collocation", "A4")
     wanted = truth(fine, told)
     momentum = np.linalg.norm(fine.history.start_p)
     for hit, limit in ((fine, 1e-8), (usual, 1e-4)):
@@ -75,7 +77,7 @@ def test_blows_agree_with_runge_kutta(name, target):
             wanted.lost, abs=4.0 * limit * 0.5 * momentum**2
         )
         assert energies["dissipated"] >= 0.0
-        assert hit.energy_error < 1e-12  # rounding
+        assert hit.energy_error < 1e-10  # of collocation; A4 keeps it to rounding, see below
 
 
 def test_restitution_falls_as_the_fourth_root_of_the_speed():
@@ -91,14 +93,14 @@ def test_nothing_yields_below_the_speed_of_first_yield():
     assert hit.restitution == pytest.approx(1.0, abs=1e-6)
 
 
-@pytest.mark.parametrize("scheme", ["A", "A4"])
+@pytest.mark.parametrize("scheme", ["A", "A4", "collocation"])
 def test_a_dent_stays_and_what_it_took_is_known(scheme):
     """A ball dropped again and again: second impacts begin at the dent and lose only where they press deeper."""
     law = fi.Contact.elastic_plastic(1e9, yield_speed=0.05, mass=0.02)
     floor = [fi.Touch(law, 0, None)]
     hit = fi.collide(
         [fi.Modes.rigid(0.02)], floor, speeds=[1.0], forces=[0.02 * 9.81], max_impacts=3, scheme=scheme,
-        tolerance={"A": 1e-3, "A4": 1e-4}[scheme],
+        tolerance={"A": 1e-3, "A4": 1e-4, "collocation": 1e-8}[scheme],
     )  # fmt: skip
     assert hit.n_impacts == 3
     first, second, third = (
@@ -110,7 +112,7 @@ def test_a_dent_stays_and_what_it_took_is_known(scheme):
     deepest = hit.history.now[5, 0]
     dent = hit.history.offset[0] + hit.displacement(None, [hit.impacts[2].end], body=0)[0, 0]
     assert 0.1 * deepest < dent < deepest  # it leaves the floor at the dent
-    assert hit.energy_error < 1e-13  # the loss is that of the law in closed form
+    assert hit.energy_error < (1e-9 if scheme == "collocation" else 1e-13)  # the loss is that of the law in closed form
 
 
 def test_felt_held_pressed_relaxes_to_its_share():
@@ -148,13 +150,14 @@ def test_felt_hit_again_at_once_is_harder_and_thinner():
         assert hit.energy_error < 1e-12
 
 
-def test_two_contacts_of_other_kinds_at_once_agree_with_finer_steps():
-    """Three balls in a row through felt and a yielding contact."""
+def test_two_contacts_of_other_kinds_at_once_agree_with_the_reference_scheme():
+    """Three balls in a row through felt and a yielding contact: A4 against collocation."""
     balls = [fi.Modes.rigid(m) for m in (0.02, 0.01, 0.03)]
     felt = fi.Contact.felt(1e8, 2.0, hysteresis=0.5, relaxation=1e-4)
     soft = fi.Contact.elastic_plastic(1e8, yield_speed=0.05, mass=0.01)
     touches = [fi.Touch(felt, 0, 1), fi.Touch(soft, 1, 2)]
     usual, fine = (fi.collide(balls, touches, speeds=[1.0, 0.0, 0.0], tolerance=t) for t in (1e-5, 1e-9))
+    assert (usual.scheme, fine.scheme) == ("A4", "collocation")
     assert_allclose(usual.speeds, fine.speeds, atol=1e-5)
     assert_allclose(usual.impulse, fine.impulse, rtol=1e-5)
     for hit in (usual, fine):
@@ -166,7 +169,7 @@ def test_two_contacts_of_other_kinds_at_once_agree_with_finer_steps():
 @pytest.mark.slow
 @pytest.mark.parametrize("seed", range(24))
 def test_the_error_is_what_it_claims_for_random_blows(seed):
-    """A4 at 1e-3 or 1e-4 against 1e-8, on plates of random size with random laws."""
+    """A4 at 1e-3 or 1e-4 against collocation at 1e-8, on plates of random size with random laws."""
     rng = np.random.default_rng(seed)
     plate = fi.analytic.rectangle(1.0 + rng.random(), 1.0, mass=0.2, first_frequency=100.0, n_modes=30)
     k, speed = 10.0 ** rng.uniform(7.0, 9.0), 10.0 ** rng.uniform(-1.0, 1.0)
@@ -182,7 +185,7 @@ def test_the_error_is_what_it_claims_for_random_blows(seed):
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", fi.ToleranceWarning)
         usual = fi.strike(plate, fi.Striker.rigid(mass), law, tolerance=tolerance, **about)
-        fine = fi.strike(plate, fi.Striker.rigid(mass), law, tolerance=1e-8, **about)
+        fine = fi.strike(plate, fi.Striker.rigid(mass), law, tolerance=1e-8, scheme="collocation", **about)
     assert worst(usual, fine) < tolerance
     assert usual.energy_error < 1e-12
 

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from .build import FALSE, inner, outer
+from .build import FALSE, TRUE, inner, outer
 from .bundles import Flights, KernelSystem, Limits
 from .events import EVENT_LIMIT, dipped, strayed
 from .exact import advance, freshen, keep_in_mind, made_tables, predict, record, solve_step, tabulate
@@ -25,7 +25,7 @@ from .frame import (  # isort: skip
     remembered, step_length, take_over, touching,
 )  # fmt: skip
 from .layout import (  # isort: skip
-    APPROACH, BEGUN, BLINDS, CORNERED, EVENTS, FAINT, FALLBACKS, FRESH, LEAST, LEVEL, PAUSE, RATE, READY,
+    APPROACH, BEGUN, BLINDS, CORNERED, EVENTS, FAINT, FALLBACKS, FRESH, HEAD, LEAST, LEVEL, PAUSE, RATE, READY,
     RESPITE, SEEKS, STEPS, TARGET, TIME,
 )  # fmt: skip
 
@@ -68,7 +68,7 @@ def located(contacts, course, limits, h, base, cornered, blind):
         course.counts[TARGET] = -1
         course.counts[CORNERED] = -1
         return True, True, 0.0
-    answer, guess = locate_event(contacts, course, limits, h, cornered)
+    answer, guess = locate_event(contacts, course, limits, h, cornered, TRUE)
     blind = answer == LOST and h >= 1e-3 * base
     if blind:
         course.counts[TARGET] = -1
@@ -102,7 +102,7 @@ def too_long(contacts, special, level, h, still):
                 shorter = max(shorter, 3 if level == 0 else 1)
         elif dipped(contacts, h, i):
             shorter = max(shorter, 1)
-        if special and pressed[i] and strayed(contacts, h, i):
+        if special and pressed[i] and strayed(contacts, h, i, 1.0 if now[RATE, i] > 0.0 else -1.0) == 2:
             shorter = max(shorter, 1)
     return shorter
 
@@ -230,4 +230,4 @@ def run_energy(scene: KernelSystem, stretch: Stretch | None, ramp: int, base: fl
     m, n_modes = scene.shape.shape
     run, tables = made_run(scene), made_tables(n_modes, m, base, ramp)
     room = None if stretch is None else made_room(stretch, scene.omega, m)
-    return followed(follow, (scene, tables, room, limits), run)
+    return followed(follow, (scene, tables, room, limits), run, HEAD + 6 * m)

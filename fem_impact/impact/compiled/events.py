@@ -191,11 +191,11 @@ def last_try(length, value, slope, out_bracket):
 
 
 @inner()
-def first_corner(contacts, h, out_bracket):
+def first_corner(contacts, h, lossy, out_bracket):
     """The first corner within a step: contact, which (see `corner_value`), and when; -1, 0 and h where there is none.
 
     ``out_bracket`` receives two times with the corner in between and, for secants, a third time and the value there
-    and at the start. ``after`` (n_contacts,) is what they remember at the end.
+    and at the start. ``after`` (n_contacts,) is what they remember at the end. Loss is left out unless ``lossy``.
     """
     law, now, y, rate, after = contacts.law, contacts.now, contacts.end, contacts.rate, contacts.after
     target = -1
@@ -204,7 +204,7 @@ def first_corner(contacts, h, out_bracket):
     for i in range(y.size):
         d0, v0, d1, v1 = now[APPROACH, i], now[RATE, i], y[i], rate[i]
         loss = law["loss"][i]
-        if loss > 0.0 and d0 > 0.0:
+        if lossy and loss > 0.0 and d0 > 0.0:
             start = 1.0 + loss * v0
             end = 1.0 + loss * v1
             if end < -LET_GO < LET_GO < start or start < -LET_GO < LET_GO < end:
@@ -271,22 +271,26 @@ def dipped_felt(contacts, h, i):
 
 
 @inner()
-def strayed(contacts, h, i):
-    """Whether contact i left the corner of its law within a step that began there, and came back."""
+def strayed(contacts, h, i, side):
+    """Whether contact i began its step at the corner of its law and ends it beyond (side 1) or before it (side -1).
+
+    0 it stayed, 1 it left the side at once, 2 after a way in which the step must be shorter.
+    """
     law, now, y, rate = contacts.law, contacts.now, contacts.end, contacts.rate
     if relaxes(law, i):
-        return dipped_felt(contacts, h, i)
+        return 2 if dipped_felt(contacts, h, i) else 0
     bend = corner_approach(spring_of(law, i))
     near = NEAR * bend
-    side = 1.0 if now[RATE, i] > 0.0 else -1.0
     d0, v0, d1, v1 = side * (now[APPROACH, i] - bend), side * now[RATE, i], side * (y[i] - bend), side * rate[i]
     deepens = yields(law, i) and side > 0.0
     if bend == np.inf or abs(d0) > near or (d1 >= -near and not (deepens and v1 < 0.0)):
-        return False
+        return 0
     high = 0.0
     if v0 > 0.0 and (v1 < 0.0 or d1 < d0):
         _, high = turn_of(d0, v0, d1, v1, h)
-    return high > near and not (deepens and v1 < 0.0)
+    if high <= near:
+        return 1
+    return 0 if deepens and v1 < 0.0 else 2
 
 
 @inner()

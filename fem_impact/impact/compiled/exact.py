@@ -18,8 +18,8 @@ from .schemes import Free, Own, linear_guess, point_of, remembers, solve_constan
 
 from .layout import (  # isort: skip
     A11, A12, A21, A22, APPROACH, BLIND, CLOSED, COMPRESSION, ENERGY, FORCE, FREE_END, FREE_MEAN, FREE_RATE,
-    GAIN, LENGTH, M1, M2, M3, N_LANE, OWN_END, OWN_END_RAMP, OWN_MEAN, OWN_MEAN_RAMP, OWN_RATE, OWN_RATE_RAMP, PUSH,
-    RATE, START, TIME,
+    LENGTH, M1, M2, M3, N_LANE, OWN_END, OWN_END_RAMP, OWN_MEAN, OWN_MEAN_RAMP, OWN_RATE, OWN_RATE_RAMP, PUSH, RATE,
+    START, TIME,
 )  # fmt: skip
 
 
@@ -223,7 +223,7 @@ def record(contacts, course, row, sums, h, blind):
         closed = contacts.pressed[i] or (f[i] > 0.0 and (blind or start[i] >= 0.0))  # else it ends where they touch
         row[first + CLOSED] = 1.0 if closed else 0.0
         row[first + PUSH] = f[i] - 0.5 * s[i]
-        row[first + GAIN] = s[i]
+        row[first + PUSH + 1] = s[i]
         mean = contacts.free[FREE_MEAN, i]
         for j in range(y.size):
             mean -= sums[OWN_MEAN, i, j] * f[j] + sums[OWN_MEAN_RAMP, i, j] * s[j]

@@ -1,9 +1,9 @@
-"""The frame of every run: flight, step, event, record.
+"""The frame of every run, whatever the scheme: flight, step, event, record.
 
 A run is a loop over tries of a step, each of one length. In flight, where nothing touches, the next onset is found or
 that there is none (see `flight`). A try that shows an opening, a closing or a corner of a force within it is repeated
 with a length that ends there (see `events`), until it does; then the step is taken over and written to the record.
-How a try is worked out and when it must be shorter is said in `energy`.
+What differs between schemes is how a try is worked out and when it must be shorter: `energy`, `collocation`.
 """
 
 from collections.abc import Callable
@@ -25,7 +25,7 @@ from .events import (  # isort: skip
 from .layout import (  # isort: skip
     APPROACH, BEGUN, BLINDS, CLOCKS, CONTACT_ROWS, CORNERED, COUNTERS, EVENTS, FAINT, FALLBACKS, FLYING, FRESH, HEAD,
     LENGTH, LEVEL, LOOKS, MISS, RATE, READY, RELEASED, REMEMBERED, RESET, RESPITE, SEEKS, SIZE, SPEED,
-    START, STEPS, TARGET, TIME, TRIES, WHICH, WIDTH,
+    START, STEPS, TARGET, TIME, TRIES, WHICH,
 )  # fmt: skip
 
 LEVELS = 40  # [-] halvings of the step that may be cached, and where the table of a step of any other length is kept
@@ -43,9 +43,8 @@ def made_run(scene: KernelSystem) -> KernelRun:
     )  # fmt: skip
 
 
-def followed(follow: Callable[..., int], arguments: tuple[Any, ...], run: KernelRun) -> tuple[Any, ...]:
+def followed(follow: Callable[..., int], arguments: tuple[Any, ...], run: KernelRun, width: int) -> tuple[Any, ...]:
     """What a run found, see `energy.run_energy`, with as many rows of its record as it needs."""
-    width = HEAD + (WIDTH + 1) * run.contacts.shape[1]
     steps = np.empty((FIRST_ROWS, width))
     while (status := follow(*arguments, run, steps)) == FULL:
         steps = np.concatenate([steps, np.empty((3 * len(steps), width))])
@@ -116,12 +115,13 @@ def remember(contacts, i, row):
 
     Returns the column where what the row tells of the contact begins.
     """
-    law = contacts.law
+    law, m = contacts.law, contacts.end.size
     memory = law["memory"][i]
-    first = HEAD + WIDTH * i
+    stride = (row.size - HEAD) // m - 1
+    first = HEAD + stride * i
     row[first] = contacts.now[APPROACH, i] + dent(law, i, memory)
     row[first + SPEED] = contacts.now[RATE, i]
-    row[HEAD + WIDTH * contacts.end.size + i] = memory
+    row[HEAD + stride * m + i] = memory
     return first
 
 
@@ -179,7 +179,7 @@ def step_length(course, base, horizon):
 
 
 @inner(part=True)
-def locate_event(contacts, course, limits, h, cornered):
+def locate_event(contacts, course, limits, h, cornered, lossy):
     """After a try of length h: what to do next, and the length of the next try where the end of the step is sought.
 
     The first crossing is sought first, then the first corner before it, if some force has any (``cornered``).
@@ -208,7 +208,7 @@ def locate_event(contacts, course, limits, h, cornered):
         if sought == CROSSING and not abs(contacts.end[count[TARGET]]) <= max(limits.depth, NEAR * bracket[SIZE]):
             return LOST, guess
     if sought != CORNER and cornered:
-        count[CORNERED], count[WHICH], guess = first_corner(contacts, h, bracket)
+        count[CORNERED], count[WHICH], guess = first_corner(contacts, h, lossy, bracket)
         if count[CORNERED] >= 0:
             if count[WHICH] == AGAIN:
                 contacts.law["memory"][count[CORNERED]] = abs(contacts.law["memory"][count[CORNERED]])

@@ -6,7 +6,7 @@ A contact pushes with ``F = k x**a (1 + loss d')`` while its spring is compresse
 differ beyond a corner or remember (one number each, ``memory``); which kind of spring takes which course is said here.
 
 A law is added by a file in that folder, a line in `LAWS` and in `Numbers`, and, where its force has a course of its own
-beyond a corner, a branch in `spring_with`, `pushed`, `steepness` and `cornered_slopes`.
+beyond a corner, a branch in `spring_with`, `pushed`, `steepness`, `cornered_slopes` and `smooth_force`.
 """
 
 from collections import namedtuple
@@ -22,7 +22,7 @@ from .laws import felt, layers, plastic, tabled
 from .laws.base import POWER, Law, LawNumber, Point
 from .laws.felt import memory_energy, relaxes
 from .laws.plastic import dent, yields
-from .laws.power import PowerLaw, power, power_slopes, simple
+from .laws.power import PowerLaw, continued, power, power_slopes, simple
 
 LAWS: tuple[Law, ...] = (PowerLaw(), layers.LayersLaw(), plastic.PlasticLaw(), felt.FeltLaw(), tabled.TableLaw())
 NUMBERS: dict[str, LawNumber] = {name: number for law in LAWS for name, number in law.numbers.items()}
@@ -196,6 +196,32 @@ def slopes(one, two, spring):
     else:
         g, d = cornered_slopes(x0, x1, spring)
     return (g + 0.5 * c * (one.force + two.force) * d) / (1.0 + c * d), d / (1.0 + c * d)
+
+
+@inner()
+def smooth_force(x, v, spring):
+    """Force of a pressed contact and its slopes in compression and rate, continued smoothly below zero compression.
+
+    A spring with a corner is taken on the far side of it, also continued; see `near_side`.
+    """
+    if spring.kind == plastic.KIND:
+        f, slope = plastic.far_side(x, spring)
+    elif spring.kind == layers.KIND:
+        f, slope = layers.far_side(x, spring)
+    elif spring.kind == tabled.KIND:
+        f, slope = tabled.far_side(x, spring)
+    else:
+        f, slope = continued(x, spring)
+    factor = 1.0 + spring.loss * v
+    if factor < 0.0:
+        return 0.0, 0.0, 0.0
+    return f * factor, slope * factor, f * spring.loss
+
+
+@inner()
+def near_side(spring):
+    """The spring as it is below its corner."""
+    return simple(spring.stiffness, spring.exponent, spring.loss, spring.compliance)
 
 
 @inner()

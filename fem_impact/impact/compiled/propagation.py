@@ -15,7 +15,7 @@ import numpy as np
 from . import arrays
 from .arrays import ANGLE_LIMIT, LIGHT, SERIES_END
 from .build import LOOSE, TRUE, inner, outer
-from .layout import A11, A12, A21, A22, GAIN, HEAD, LENGTH, M1, M2, M3, N_LANE, PUSH, START, WIDTH
+from .layout import A11, A12, A21, A22, HEAD, LENGTH, M1, M2, M3, N_LANE, PUSH, START
 from .one_mode import mode_matrix, mode_moments
 
 N_TABLE = 12  # rows of a step table, in the order of `step_table`
@@ -292,28 +292,50 @@ def commit(shape, lanes, h, force, slope, q, p):
 
 
 @inner(allocates=True)
-def push(scene, row, length, q, p, out_q, out_p):
-    """State after a part of a step, (n_modes,), from the step's start; exact for its linear forces."""
+def push(scene, row, n_coefficients, length, q, p, out_q, out_p):
+    """State after a part of a step, (n_modes,), from the step's start; exact for its polynomial forces."""
+    omega, zeta, shape, bias = scene.omega, scene.zeta, scene.shape, scene.bias
     restore(q, p, out_q, out_p)
     if length <= 0.0:
         return
-    m = scene.shape.shape[0]
-    mean, slope = np.empty(m), np.empty(m)
+    m = shape.shape[0]
+    stride = PUSH + n_coefficients
+    weights = np.zeros((max(n_coefficients, 2), m))
     active = False
     for i in range(m):
-        first = HEAD + WIDTH * i
-        slope[i] = row[first + GAIN] * (length / row[LENGTH])
-        mean[i] = row[first + PUSH] + 0.5 * slope[i]
-        active = active or row[first + PUSH] != 0.0 or slope[i] != 0.0
+        scale = 1.0
+        for k in range(n_coefficients):
+            weights[k, i] = row[HEAD + PUSH + stride * i + k] * scale
+            scale *= (k + 1.0) * length / row[LENGTH]
+            if weights[k, i] != 0.0:
+                active = True
+    if n_coefficients > 2 and active:
+        moments = np.empty(n_coefficients + 1)
+        work = np.empty((2, n_coefficients))
+        for n in range(q.size):
+            q0 = out_q[n]
+            p0 = out_p[n]
+            a11, a12, a22 = mode_moments(omega[n], zeta[n], length, moments, work)
+            x = bias[n] * moments[1]
+            v = bias[n] * moments[0]
+            for i in range(m):
+                for k in range(n_coefficients):
+                    x -= shape[i, n] * weights[k, i] * moments[k + 1]
+                    v -= shape[i, n] * weights[k, i] * moments[k]
+            out_q[n] = a11 * q0 + a12 * p0 + length * length * x
+            out_p[n] = -omega[n] * omega[n] * a12 * q0 + a22 * p0 + length * v
+        return
     lanes = np.empty((N_LANE, q.size))
-    lane_table(scene.omega, scene.zeta, length, active or any_of(scene.bias), lanes)
-    glide(lanes, length, scene.bias, out_q, out_p)
+    lane_table(omega, zeta, length, active or any_of(bias), lanes)
+    glide(lanes, length, bias, out_q, out_p)
     if active:
-        commit(scene.shape, lanes, length, mean, slope, out_q, out_p)
+        for i in range(m):
+            weights[0, i] += 0.5 * weights[1, i]
+        commit(shape, lanes, length, weights[0], weights[1], out_q, out_p)
 
 
 @outer()
-def replay(scene, steps, times, out_q, out_p):
+def replay(scene, steps, n_coefficients, times, out_q, out_p):
     """States (n_times, n_modes) at ascending times, from the start state and the recorded forces; exact in between."""
     n_steps = steps.shape[0]
     q = scene.q.copy()
@@ -326,9 +348,9 @@ def replay(scene, steps, times, out_q, out_p):
         row = flight if j == n_steps else steps[j]
         ends = np.inf if j == n_steps else begin + row[LENGTH]
         while k < times.size and times[k] < ends:
-            push(scene, row, times[k] - begin, q, p, out_q[k], out_p[k])
+            push(scene, row, n_coefficients, times[k] - begin, q, p, out_q[k], out_p[k])
             k += 1
         if k >= times.size or j == n_steps:
             return
-        push(scene, row, row[LENGTH], q, p, q, p)
+        push(scene, row, n_coefficients, row[LENGTH], q, p, q, p)
         begin = steps[j + 1, START] if j + 1 < n_steps else begin + row[LENGTH]

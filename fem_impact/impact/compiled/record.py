@@ -1,8 +1,8 @@
 """What a run leaves behind, and the impacts read from it.
 
 A row of ``steps`` is a step or a flight: start, length, whether events were passed; then for each contact approach and
-rate at its start, whether it is closed, its force at the start and what that gains over the step; then what each
-contact remembers. Between the ends the approach is the cubic through both.
+rate at its start, whether it is closed, and the force as powers of the fraction of the step; then what each contact
+remembers. Between the ends the approach is the cubic through both.
 """
 
 from typing import Any
@@ -16,7 +16,7 @@ from .misfit import force_on, misfit
 from .rounding import NEAR
 
 from .layout import (  # isort: skip
-    APPROACH, CLOSED, GAIN, HEAD, LENGTH, PUSH, RATE, REMEMBERED, SPEED, START, WIDTH,
+    APPROACH, CLOSED, HEAD, LENGTH, PUSH, RATE, REMEMBERED, SPEED, START,
 )  # fmt: skip
 
 HIGH = 0.9  # [-] of the largest mean force of a step: only steps with so much are searched for the peak
@@ -46,17 +46,17 @@ def total_energy(bodies, contacts):
 
 
 @inner()
-def memory_of(steps, law, row, i):
+def memory_of(steps, law, n_coefficients, row, i):
     """What contact i remembers in a step."""
-    return steps[row, HEAD + WIDTH * law.shape[0] + i]
+    return steps[row, HEAD + (PUSH + n_coefficients) * law.shape[0] + i]
 
 
 @inner()
-def ends_of(steps, now, law, row, i):
+def ends_of(steps, now, law, n_coefficients, row, i):
     """Approach from the dent and its rate at both ends of a step."""
-    first = HEAD + WIDTH * i
+    first = HEAD + (PUSH + n_coefficients) * i
     last = row + 1 == steps.shape[0]
-    low = dent(law, i, memory_of(steps, law, row, i))
+    low = dent(law, i, memory_of(steps, law, n_coefficients, row, i))
     d0 = steps[row, first] - low
     v0 = steps[row, first + SPEED]
     d1 = (now[APPROACH, i] if last else steps[row + 1, first]) - low
@@ -65,31 +65,46 @@ def ends_of(steps, now, law, row, i):
 
 
 @inner()
-def force_and_rate(steps, now, law, row, i, part):
-    """Force of contact i at a fraction of a step, the law on the cubic through both ends, and its rate [N/s]."""
-    d0, v0, d1, v1 = ends_of(steps, now, law, row, i)
-    spring = spring_with(law, i, memory_of(steps, law, row, i))
-    return force_on(d0, v0, d1, v1, steps[row, LENGTH], part, spring)
-
-
-@outer()
-def forces(steps, now, law, rows, i, part, out):
-    """Force of contact i [N] and its rate [N/s], (2, n), at fractions (n,) of steps (n,)."""
-    for n in range(rows.size):
-        out[0, n], out[1, n] = force_and_rate(steps, now, law, rows[n], i, part[n])
+def force_within(steps, now, law, n_coefficients, row, i, part):
+    """Force of contact i at a fraction of a step: the law on the cubic through both ends, or a higher polynomial."""
+    return force_and_rate(steps, now, law, n_coefficients, row, i, part)[0]
 
 
 @inner()
-def pushing(steps, now, law, row, i):
+def force_and_rate(steps, now, law, n_coefficients, row, i, part):
+    """That force and its rate [N/s]; never negative."""
+    first = HEAD + (PUSH + n_coefficients) * i
+    h = steps[row, LENGTH]
+    if n_coefficients > 2:
+        value = 0.0
+        slope = 0.0
+        for k in range(n_coefficients - 1, -1, -1):
+            slope = slope * part + value
+            value = value * part + steps[row, first + PUSH + k]
+        return max(value, 0.0), slope / h if value > 0.0 else 0.0
+    d0, v0, d1, v1 = ends_of(steps, now, law, n_coefficients, row, i)
+    spring = spring_with(law, i, memory_of(steps, law, n_coefficients, row, i))
+    return force_on(d0, v0, d1, v1, h, part, spring)
+
+
+@outer()
+def forces(steps, now, law, n_coefficients, rows, i, part, out):
+    """Force of contact i [N] and its rate [N/s], (2, n), at fractions (n,) of steps (n,)."""
+    for n in range(rows.size):
+        out[0, n], out[1, n] = force_and_rate(steps, now, law, n_coefficients, rows[n], i, part[n])
+
+
+@inner()
+def pushing(steps, now, law, n_coefficients, row, i):
     """Fractions of a step between which contact i pushes, by the cubic through both ends; (0, 0) if it does not.
 
     A lossy contact stops pushing while the bodies still overlap, when they part as fast as 1 / loss.
     """
-    first = HEAD + WIDTH * i
+    first = HEAD + (PUSH + n_coefficients) * i
     if steps[row, first + CLOSED] == 0.0:
         return 0.0, 0.0
     h = steps[row, LENGTH]
-    d0, v0, d1, v1 = ends_of(steps, now, law, row, i)
+    d0, v0, d1, v1 = ends_of(steps, now, law, n_coefficients, row, i)
     lower = 0.0
     upper = 1.0
     if d0 < 0.0 < d1:
@@ -97,8 +112,10 @@ def pushing(steps, now, law, row, i):
     elif d1 < 0.0 < d0:
         upper = hermite_root(d0, v0, d1, v1, h) / h
     if relaxes(law, i):  # steps end where the body parts from the felt or meets it
-        pushes = steps[row, first + PUSH] != 0.0 or steps[row, first + GAIN] != 0.0
-        return (lower, upper) if pushes else (0.0, 0.0)
+        for k in range(n_coefficients):
+            if steps[row, first + PUSH + k] != 0.0:
+                return lower, upper
+        return 0.0, 0.0
     loss = law["loss"][i]
     start = 1.0 + loss * v0
     end = 1.0 + loss * v1
@@ -135,7 +152,7 @@ def above_felt(law, i, d, v, memory, parted):
 
 
 @outer()
-def nearest_turn(steps, now, law, miss):
+def nearest_turn(steps, now, law, n_coefficients, miss):
     """How near to zero an approach turns back, over the farthest it ever turns; infinity where none does.
 
     Of felt it counts from where its force ends. ``miss`` is the approach where it turned in flight, -infinity if it did
@@ -146,14 +163,14 @@ def nearest_turn(steps, now, law, miss):
     for i in range(now.shape[1]):
         felt = relaxes(law, i)
         for row in range(steps.shape[0]):
-            d0, v0, d1, v1 = ends_of(steps, now, law, row, i)
+            d0, v0, d1, v1 = ends_of(steps, now, law, n_coefficients, row, i)
             turn = turn_within(d0, v0, d1, v1, steps[row, LENGTH])
             if turn < np.inf:
                 farthest = max(farthest, turn)
             if felt:
-                z0 = memory_of(steps, law, row, i)
+                z0 = memory_of(steps, law, n_coefficients, row, i)
                 last = row + 1 == steps.shape[0]
-                z1 = now[REMEMBERED, i] if last else memory_of(steps, law, row + 1, i)
+                z1 = now[REMEMBERED, i] if last else memory_of(steps, law, n_coefficients, row + 1, i)
                 d0, v0 = above_felt(law, i, d0, v0, z0, z0 < 0.0)
                 d1, v1 = above_felt(law, i, d1, v1, z1, z0 < 0.0)
                 turn = turn_within(d0, v0, d1, v1, steps[row, LENGTH])
@@ -162,13 +179,16 @@ def nearest_turn(steps, now, law, miss):
 
 
 @inner()
-def mean_push(steps, row, first):
+def mean_push(steps, n_coefficients, row, first):
     """Mean force of a contact in a step, whose numbers begin at ``first``."""
-    return steps[row, first + PUSH] + 0.5 * steps[row, first + GAIN]
+    mean = 0.0
+    for k in range(n_coefficients):
+        mean += steps[row, first + PUSH + k] / (k + 1.0)
+    return mean
 
 
 @outer()
-def force_missed(steps, now, law, peak):
+def force_missed(steps, now, law, n_coefficients, peak):
     """Largest error [-] of the peak force that `misfit` finds in the steps.
 
     At a corner of the law a single step may miss, which hardly changes the peak: there two in turn count.
@@ -178,12 +198,12 @@ def force_missed(steps, now, law, peak):
         corner = spring_of(law, i).corner < np.inf
         before = 0.0
         for row in range(steps.shape[0]):
-            first = HEAD + WIDTH * i
+            first = HEAD + (PUSH + n_coefficients) * i
             miss = 0.0
             if steps[row, first + CLOSED] > 0.0:
-                mean = mean_push(steps, row, first)
-                d0, v0, d1, v1 = ends_of(steps, now, law, row, i)
-                spring = spring_with(law, i, memory_of(steps, law, row, i))
+                mean = mean_push(steps, n_coefficients, row, first)
+                d0, v0, d1, v1 = ends_of(steps, now, law, n_coefficients, row, i)
+                spring = spring_with(law, i, memory_of(steps, law, n_coefficients, row, i))
                 miss = misfit(mean, d0, v0, d1, v1, steps[row, LENGTH], spring, peak)
             worst = max(worst, min(miss, before) if corner else miss)
             before = miss
@@ -191,34 +211,34 @@ def force_missed(steps, now, law, peak):
 
 
 @inner()
-def peak_in(steps, now, law, row, i, looks):
+def peak_in(steps, now, law, n_coefficients, row, i, looks):
     """Largest force of contact i in a step: the largest of some looks, refined by parabolas."""
     peak = 0.0
     part = 0.0
     for look in range(looks + 1):
-        f = force_and_rate(steps, now, law, row, i, look / looks)[0]
+        f = force_within(steps, now, law, n_coefficients, row, i, look / looks)
         if f > peak:
             peak = f
             part = look / looks
     spread = 1.0 / looks
     for _ in range(4):
         middle = min(max(part, spread), 1.0 - spread)
-        low = force_and_rate(steps, now, law, row, i, middle - spread)[0]
-        top = force_and_rate(steps, now, law, row, i, middle)[0]
-        high = force_and_rate(steps, now, law, row, i, middle + spread)[0]
+        low = force_within(steps, now, law, n_coefficients, row, i, middle - spread)
+        top = force_within(steps, now, law, n_coefficients, row, i, middle)
+        high = force_within(steps, now, law, n_coefficients, row, i, middle + spread)
         bend = low - 2.0 * top + high
         if bend >= 0.0:
             break
         part = middle + min(max(0.5 * (low - high) / bend, -1.0), 1.0) * spread
-        peak = max(peak, force_and_rate(steps, now, law, row, i, part)[0])
+        peak = max(peak, force_within(steps, now, law, n_coefficients, row, i, part))
         spread *= 0.125
     return peak
 
 
 @inner()
-def rate_within(steps, now, law, row, i, part):
+def rate_within(steps, now, law, n_coefficients, row, i, part):
     """Approach rate of contact i at a fraction of a step, by the cubic through both ends."""
-    d0, v0, d1, v1 = ends_of(steps, now, law, row, i)
+    d0, v0, d1, v1 = ends_of(steps, now, law, n_coefficients, row, i)
     if part <= 0.0 or part >= 1.0:
         return v0 if part <= 0.0 else v1
     h = steps[row, LENGTH]
@@ -228,27 +248,27 @@ def rate_within(steps, now, law, row, i, part):
 
 
 @inner()
-def peak_between(steps, now, law, begin, end, i, looks):
+def peak_between(steps, now, law, n_coefficients, begin, end, i, looks):
     """Largest force of contact i in the steps of a push.
 
     It is sought with ``looks`` per step in the step with the largest of a few and in those beside it: where it lies at
     the end of a step, rounding decides which holds the larger look.
     """
-    first = HEAD + WIDTH * i
+    first = HEAD + (PUSH + n_coefficients) * i
     most = 0.0
     for row in range(begin, end):
-        most = max(most, mean_push(steps, row, first))
+        most = max(most, mean_push(steps, n_coefficients, row, first))
     peak = 0.0
     peak_row = begin
     for row in range(begin, end):
-        if mean_push(steps, row, first) >= HIGH * most:
-            for look in range(2):
-                f = force_and_rate(steps, now, law, row, i, 0.5 * look)[0]
+        if mean_push(steps, n_coefficients, row, first) >= HIGH * most:
+            for look in range(n_coefficients):
+                f = force_within(steps, now, law, n_coefficients, row, i, look / n_coefficients)
                 if f > peak:
                     peak = f
                     peak_row = row
     for row in range(max(begin, peak_row - 1), min(end - 1, peak_row + 1) + 1):
-        peak = max(peak, peak_in(steps, now, law, row, i, looks))
+        peak = max(peak, peak_in(steps, now, law, n_coefficients, row, i, looks))
     return peak
 
 
@@ -259,20 +279,22 @@ def stays(steps, row, first, slack):
 
 
 @inner()
-def still_pressed(steps, now, law, i, d):
+def still_pressed(steps, now, law, n_coefficients, i, d):
     """Whether contact i presses at the end of a run, where the approach from its dent is d.
 
     Felt lets go while the body is still in its dent: where its force ends.
     """
     if relaxes(law, i):
-        first = HEAD + WIDTH * i
-        begin = steps[-1, first + PUSH]
-        return now[REMEMBERED, i] >= 0.0 and begin + steps[-1, first + GAIN] > RELEASED * begin
+        first = HEAD + (PUSH + n_coefficients) * i + PUSH
+        end = 0.0
+        for k in range(n_coefficients):
+            end += steps[-1, first + k]
+        return now[REMEMBERED, i] >= 0.0 and end > RELEASED * steps[-1, first]
     return d > NEAR * abs(now[APPROACH, i])
 
 
 @outer()
-def find_impacts(steps, now, law, looks, still, slack):
+def find_impacts(steps, now, law, n_coefficients, looks, still, slack):
     """Every unbroken push, (n_impacts, 8), contact by contact.
 
     Its start, end, peak force, impulse and contact; how fast the bodies approach at its start and part at its end; and
@@ -282,13 +304,14 @@ def find_impacts(steps, now, law, looks, still, slack):
     """
     n_steps = steps.shape[0]
     m = law.shape[0]
+    width = PUSH + n_coefficients
     result = np.empty((8, 8))
     count = ZERO
     for i in range(m):
-        first = HEAD + WIDTH * i
+        first = HEAD + width * i
         row: Any = ZERO
         while row < n_steps:
-            lower, upper = pushing(steps, now, law, row, i)
+            lower, upper = pushing(steps, now, law, n_coefficients, row, i)
             if lower >= upper:
                 row += 1
                 continue
@@ -296,7 +319,7 @@ def find_impacts(steps, now, law, looks, still, slack):
                 result = resized(result, count, 2 * count)
             begin = row
             start = steps[row, START] + lower * steps[row, LENGTH]
-            met = rate_within(steps, now, law, row, i, lower)
+            met = rate_within(steps, now, law, n_coefficients, row, i, lower)
             since = np.inf
             if abs(steps[row, first]) <= slack:
                 back = row
@@ -310,22 +333,22 @@ def find_impacts(steps, now, law, looks, still, slack):
             part = 0.0
             impulse = 0.0
             while upper > lower:
-                impulse += steps[row, LENGTH] * mean_push(steps, row, first)
+                impulse += steps[row, LENGTH] * mean_push(steps, n_coefficients, row, first)
                 end = steps[row, START] + upper * steps[row, LENGTH]
                 part = upper
                 row += 1
                 if upper < 1.0 or row == n_steps:
                     break
-                lower, upper = pushing(steps, now, law, row, i)
+                lower, upper = pushing(steps, now, law, n_coefficients, row, i)
                 if lower > 0.0:
                     break
-            left = -rate_within(steps, now, law, row - 1, i, part)
-            deep = now[APPROACH, i] - dent(law, i, memory_of(steps, law, row - 1, i))
-            if row == n_steps and part >= 1.0 and still_pressed(steps, now, law, i, deep):
+            left = -rate_within(steps, now, law, n_coefficients, row - 1, i, part)
+            deep = now[APPROACH, i] - dent(law, i, memory_of(steps, law, n_coefficients, row - 1, i))
+            if row == n_steps and part >= 1.0 and still_pressed(steps, now, law, n_coefficients, i, deep):
                 left = np.nan
             result[count, 0] = start
             result[count, 1] = end
-            result[count, 2] = peak_between(steps, now, law, begin, row, i, looks)
+            result[count, 2] = peak_between(steps, now, law, n_coefficients, begin, row, i, looks)
             result[count, 3] = impulse
             result[count, 4] = i
             result[count, 5] = met

@@ -8,7 +8,7 @@ import numpy as np
 from ...._base.rounding import HALVINGS
 from ..build import inner
 from .base import Law, LawNumber, Spring, standing_in
-from .power import PowerNumbers, power, power_slopes
+from .power import PowerNumbers, continued, power, power_slopes
 
 KIND = 1.0
 
@@ -121,3 +121,15 @@ def slopes(small, large, spring):
         return g + more, d + steeper
     more = spring.hard * power(further, spring.hard_exponent)
     return g + more * further / ((spring.hard_exponent + 1.0) * (large - small)), d + more / (large - small)
+
+
+@inner()
+def far_side(x, spring):
+    """Force and its slope beyond the corner, continued smoothly to the near side of it."""
+    f, slope = continued(x, spring)
+    further = abs(x - spring.corner)
+    if further > 0.0:
+        more = spring.hard * power(further, spring.hard_exponent)
+        f += more if x > spring.corner else -more
+        slope += spring.hard_exponent * more / further
+    return f, slope

@@ -304,3 +304,12 @@ def slopes(small, large, spring):
     span = large - small
     g = (g * (corner - small) + (f + more) * (large - corner)) / span
     return g, (d * (corner - small) + steep * (large - corner)) / span
+
+
+@inner()
+def far_side(x, spring):
+    """Force and its slope beyond the corner, continued smoothly to the near side of it."""
+    slope = steepness(x, spring)
+    further = x - spring.corner
+    f = spring.stiffness * power(spring.corner, spring.exponent) + (spring.hard + spring.steeper) * further
+    return f - spring.reach * (slope - spring.hard), slope
