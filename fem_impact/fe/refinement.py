@@ -435,12 +435,17 @@ def enclosure(found: Spectrum) -> np.ndarray | None:
     """
     system = found.system
     plate, mesh = system.section, system.mesh
-    if not isinstance(plate, Plate) or not plate.uniform or plate.material.E_across is not None or plate.tension:
+    if not isinstance(plate, Plate) or not plate.uniform or plate.material.E_across is not None:
         return None
-    if system.rim is None or system.element != "argyris" or mesh.curved.any():
+    if (
+        mesh.curved.any()
+        or system.point_masses
+        or system.point_supports
+        or system.element != "argyris"
+        or plate.tension
+    ):
         return None
-    attached = (*system.point_masses, *system.point_supports)
-    if attached or not all(isinstance(kind, str) for kind in system.supports.values()):
+    if system.rim is None or not all(isinstance(kind, str) for kind in system.supports.values()):
         return None
     nu, material = plate.material.nu, plate.material
     if "free" not in system.rim.kinds:  # then nu only changes the rigidity, and nu = 0 gives the best bound

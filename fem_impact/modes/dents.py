@@ -145,10 +145,13 @@ def rest(load: Load, E: float, nu: float) -> tuple[float, float] | None:
     """
     distance = np.linalg.norm(load.apart, axis=1)
     space = (1.0 + nu) / (2.0 * np.pi * E) * (load.apart[:, 2] ** 2 / distance**3 + 2.0 * (1.0 - nu) / distance)
-    found = [_at_load(load.apart, load.deflection - space, ring) for ring in RINGS]
-    values = [value for value in found if value is not None]
-    if len(values) < len(RINGS):
-        return None
+    values = []
+    for ring in RINGS:
+        chosen = _around(distance, *ring)
+        if len(chosen) < FEWEST:
+            return None
+        terms, _ = _smooth(load.apart[chosen])
+        values.append(float(np.linalg.lstsq(terms, (load.deflection - space)[chosen], rcond=None)[0][0]))
     return float(np.mean(values)), float(np.ptp(values) + SINGLE * abs(load.own))
 
 
@@ -158,24 +161,21 @@ def largest(load: Load) -> float | None:
     The largest of fits with ``1 / r`` of unknown size, some beyond the elements over which a load may be spread. Solids
     of three meshes each had 1.02 to 2.11 times their dent.
     """
-    values = [_at_load(load.apart, load.deflection, ring, dented=True) for ring in (*RINGS, FAR)]
-    found = max((load.own - value for value in values if value is not None), default=0.0)
+    distance, values = np.linalg.norm(load.apart, axis=1), []
+    for ring in (*RINGS, FAR):
+        chosen = _around(distance, *ring)
+        if len(chosen) >= FEWEST:
+            smooth, r = _smooth(load.apart[chosen])
+            terms = np.column_stack([smooth, 1.0 / r])
+            values.append(load.own - float(np.linalg.lstsq(terms, load.deflection[chosen], rcond=None)[0][0]))
+    found = max(values, default=0.0)
     return float(min(found, abs(load.own))) if found > 0.0 else None
 
 
-def _at_load(apart: np.ndarray, values: np.ndarray, ring: tuple[float, int], dented: bool = False) -> float | None:
-    """Values at nodes around a load, continued to it by a smooth field, and ``1 / r`` beside it if they are dented.
-
-    The fit takes the nearest nodes beyond so many times the distance of the nearest; None if these are too few.
-    """
-    distance = np.linalg.norm(apart, axis=1)
+def _around(distance: np.ndarray, first: float, n: int) -> np.ndarray:
+    """Nodes of a fit: the nearest n beyond so many times the distance of the nearest."""
     order = np.argsort(distance, kind="stable")
-    chosen = order[distance[order] > ring[0] * distance[order[:1]].sum()][: ring[1]]
-    if len(chosen) < FEWEST:
-        return None
-    smooth, r = _smooth(apart[chosen])
-    terms = np.column_stack([smooth, 1.0 / r]) if dented else smooth
-    return float(np.linalg.lstsq(terms, values[chosen], rcond=None)[0][0])
+    return order[distance[order] > first * distance[order[:1]].sum()][:n]
 
 
 def hidden(load: Load) -> float | None:

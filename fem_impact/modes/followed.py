@@ -48,15 +48,19 @@ class Passive(NamedTuple):
 
 def columns(lines: MeasuredLines, poles: np.ndarray) -> np.ndarray:
     """Weighted accelerances of a mass, a spring and unit modes, real over imaginary parts, (2 n, 2 + n_modes)."""
-    weight = lines.weight
-    found = np.column_stack([weight, weight * lines.s**2, picked.unit_modes(lines.s, weight, poles)])
+    natural, damping = np.exp(poles)
+    square = (lines.s**2)[:, None]
+    modes = square / (square + 2.0 * damping * natural * lines.s[:, None] + natural**2)
+    found = np.hstack([np.ones_like(square), square, modes]) * lines.weight[:, None]
     return np.vstack([found.real, found.imag])
 
 
 def slopes(lines: MeasuredLines, poles: np.ndarray) -> np.ndarray:
     """By logarithms of frequencies and then of damping ratios, of the columns of modes, (2 n, 2 n_modes)."""
-    modes = picked.unit_modes(lines.s, lines.weight, poles)
-    found = np.hstack(list(picked.unit_slopes(lines.s, lines.weight, poles, modes)))
+    natural, damping = np.exp(poles)
+    square, swing = (lines.s**2)[:, None], 2.0 * damping * natural * lines.s[:, None]
+    steep = -square / (square + swing + natural**2) ** 2 * lines.weight[:, None]
+    found = np.hstack([steep * (2.0 * natural**2 + swing), steep * swing])
     return np.vstack([found.real, found.imag])
 
 

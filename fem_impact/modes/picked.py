@@ -209,24 +209,15 @@ def _with_one_more(omega: np.ndarray, data: np.ndarray, weight: np.ndarray, befo
 def _basis(omega: np.ndarray, weight: np.ndarray, poles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Weighted columns of modes, of those below and of those above, real over imaginary parts, (2 n, n_modes + 2); and
     slopes (2, 2 n, n_modes) of the first by logarithms of frequencies and damping ratios, ``poles`` (2, n_modes)."""
-    modes = unit_modes(1j * omega, weight, poles)
-    slopes = unit_slopes(1j * omega, weight, poles, modes)
-    columns = np.column_stack([modes, weight, -weight * (omega / omega[-1]) ** 2])
+    natural, damping = np.exp(poles)
+    swing = 2j * damping * natural * omega[:, None]
+    under = weight[:, None] / (natural**2 - omega[:, None] ** 2 + swing)
+    modes = -(omega[:, None] ** 2) * under
+    steep = -modes * under / weight[:, None]
+    rest = np.column_stack([weight, -weight * (omega / omega[-1]) ** 2])
+    columns = np.hstack([modes, rest])
+    slopes = np.stack([steep * (2.0 * natural**2 + swing), steep * swing])
     return np.vstack([columns.real, columns.imag]), np.concatenate([slopes.real, slopes.imag], axis=1)
-
-
-def unit_modes(s: np.ndarray, weight: np.ndarray, poles: np.ndarray) -> np.ndarray:
-    """Weighted accelerances (n, n_modes) of unit modes at s (n,) [rad/s], of `_Modes.poles`."""
-    natural, damping = np.exp(poles)
-    square = (s**2)[:, None]
-    return weight[:, None] * square / (square + 2.0 * damping * natural * s[:, None] + natural**2)
-
-
-def unit_slopes(s: np.ndarray, weight: np.ndarray, poles: np.ndarray, modes: np.ndarray) -> np.ndarray:
-    """Slopes (2, n, n_modes) of `unit_modes` by the logarithms of their frequencies and damping ratios."""
-    natural, damping = np.exp(poles)
-    steep, swing = -(modes**2) / (weight * s**2)[:, None], 2.0 * damping * natural * s[:, None]
-    return np.stack([steep * (swing + 2.0 * natural**2), steep * swing])
 
 
 def _refined(omega: np.ndarray, data: np.ndarray, weight: np.ndarray, start: np.ndarray, steps: int):

@@ -48,17 +48,19 @@ class Stoutness:
         """w, beta, moment and shear force of the four solutions, (n, n_points, 4, 4), at p (n,) and x (n_points,)."""
         k, square = (part[:, None] for part in self.waves(p))
         p = p[:, None]
-
-        def solutions(*rows: list[np.ndarray]) -> np.ndarray:
-            return np.moveaxis(np.array(rows), (0, 1), (-1, -2))  # (n, n_points, 4, n_rows)
-
+        result = np.empty((len(p), len(x), 4, 4))
         c, s, turn = np.cos(k * x), np.sin(k * x), (k**2 - p * self.S) / k
-        waves = solutions([c, -turn * s, -turn * k * c, -p / k * s], [s, turn * c, -turn * k * s, p / k * c])
+        result[..., 0] = np.stack([c, -turn * s, -turn * k * c, -p / k * s], axis=-1)
+        result[..., 1] = np.stack([s, turn * c, -turn * k * s, p / k * c], axis=-1)
         q = np.sqrt(np.maximum(square, STEEP**2))
         turn = (q**2 + p * self.S) / q
         down, up = np.exp(-q * x), np.exp(q * (x - 1.0))
-        exponential = solutions(
-            [down, -turn * down, turn * q * down, p / q * down], [up, turn * up, turn * q * up, -p / q * up]
+        exponential = np.stack(
+            [
+                np.stack([down, -turn * down, turn * q * down, p / q * down], axis=-1),
+                np.stack([up, turn * up, turn * q * up, -p / q * up], axis=-1),
+            ],
+            axis=-1,
         )
         mild = np.minimum(square, STEEP**2)
         root = np.sqrt(np.abs(mild))
@@ -67,8 +69,15 @@ class Stoutness:
         safe = np.where(root * x > 1e-8, root, 1.0)
         s = np.where(root * x > 1e-8, np.where(mild > 0.0, np.sinh(low), np.sin(root * x)) / safe, x)
         turn = mild + p * self.S  # the second is scaled by its rotation, which remains at q = 0
-        bounded = solutions([c, turn * s, turn * c, -p * s], [mild * s, turn * c, turn * mild * s, -p * c])
-        return np.concatenate([waves, np.where((square > STEEP**2)[..., None, None], exponential, bounded)], axis=-1)
+        bounded = np.stack(
+            [
+                np.stack([c, turn * s, turn * c, -p * s], axis=-1),
+                np.stack([mild * s, turn * c, turn * mild * s, -p * c], axis=-1),
+            ],
+            axis=-1,
+        )
+        result[..., 2:] = np.where((square > STEEP**2)[..., None, None], exponential, bounded)
+        return result
 
     def hinged(self, n: int) -> np.ndarray:
         """The first n values of p of the beam hinged at both ends, ascending."""
