@@ -35,8 +35,10 @@ class Contact(Numbers):
     """
 
     def __post_init__(self) -> None:
+        check.instance("knots", self.knots, tuple)
         check.settle(
             self,
+            misfit=check.between("misfit", self.misfit, 0.0, 0.1),
             stiffness=check.positive("stiffness", self.stiffness, "N/m**exponent", reach=STIFFEST),
             exponent=check.between("exponent", self.exponent, LOWEST_EXPONENT, HIGHEST_EXPONENT),
             loss=check.between("loss", check.non_negative("loss", self.loss, "s/m"), 0.0, MOST_LOSS, "s/m"),

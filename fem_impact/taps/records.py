@@ -233,7 +233,7 @@ class Taps:
 
     def cut_off(self, tap: int) -> list[str]:
         """Names of the sensors that are cut off in a tap."""
-        row = self.table["overload"].values[tap]
+        row = self.table["overload"].values[check.count("tap", tap, 0, self.n_taps - 1)]
         return [str(name) for name, cut in zip(self.table["sensor"].values, row) if cut]
 
     def __repr__(self) -> str:

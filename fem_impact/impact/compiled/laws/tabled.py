@@ -56,7 +56,7 @@ class TableNumbers(PowerNumbers):
     @property
     def n_knots(self) -> int:
         """How many knots it has; 0 if it is not of the user's own."""
-        return len(self.knots) if isinstance(self.knots, tuple) else 0
+        return len(self.knots)
 
     @classmethod
     def of(
