@@ -128,12 +128,11 @@ def folded(found: Modes, cutoff: Callable[[Modes, float], float], margin: float)
     the error of the poorer one and tells what the spring costs, too.
     """
     low, high = (cutoff(found, factor * margin) * (1.0 + 1e-9) for factor in (1.0, 16.0))
-    kept = replace(found, poorer={}).truncated(max_frequency=low)
     poorer = {}
-    for cause, other in found.poorer.items():  # at least as many, as their frequencies lie a little higher
-        last = float(other.frequencies[min(kept.n_modes, other.n_modes) - 1])
-        poorer[cause] = other.truncated(max_frequency=max(high, last))
-    return replace(kept, poorer=poorer)
+    for cause, other in found.poorer.items():
+        flexible = float(other.frequencies[min(other.n_rigid, other.n_modes - 1)])  # a spring needs one to lie above
+        poorer[cause] = other.truncated(max_frequency=max(high, flexible))
+    return replace(replace(found, poorer={}).truncated(max_frequency=low), poorer=poorer)
 
 
 class Seen:
