@@ -15,9 +15,8 @@ from ..fe.variation import SectionChange, frequency_densities
 from .pitches import CENTS
 
 PER_CENT = CENTS / np.log(2.0)  # [-] fact: cents of a relative change
-FALL = (
-    3.0  # [-] exponent of a dish at its radius: smooth everywhere, as elements like it, and a twentieth is left there
-)
+# [-] exponent of a dish at its radius: smooth everywhere, as elements like it, and a twentieth is left there
+FALL = 3.0
 FAR = 2.5  # [-] distance over the radius beyond which a dish is nothing: 1e-8 of its depth
 CLOSER = 0.5  # [-] distance of places looked at over the radius of a dish: between two such, one of them does as well
 

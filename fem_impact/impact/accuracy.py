@@ -1,7 +1,5 @@
 """How many modes a blow needs for a given tolerance, and how long the contact lasts."""
 
-import bisect
-from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -83,13 +81,6 @@ def truncation_error(
     omega_c = 2.0 * np.pi * check.positive("max_frequency", max_frequency, "Hz")
     rest = density / ((1.0 + s) * omega_c ** (1.0 + s))
     return float(left_out_error(mass * omega_0**2 * rest, omega_0 / omega_c, contact.exponent, modes.dimension))
-
-
-def least_tolerance(suffices: Callable[[float], bool]) -> float | None:
-    """The smallest tolerance of one digit, at most 1, that suffices; None if even 1 does not."""
-    known = [*(digit * 10.0**power for power in range(-12, 0) for digit in range(1, 10)), 1.0]
-    first = bisect.bisect_left(known, True, key=suffices)
-    return known[first] if first < len(known) else None
 
 
 def left_out_error(softness: Any, ratio: Any, exponent: Any, dimension: int) -> Any:

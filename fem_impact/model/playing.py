@@ -13,9 +13,10 @@ from .._base import check
 from .._base.check import SimulationError
 from .._base.explained import below, noted
 from ..impact import collision, promise
-from ..impact.collision import TOLERANCE, Touch
+from ..impact.collision import Touch
 from ..impact.compiled import record
 from ..impact.contact import Contact
+from ..impact.engine import TOLERANCE
 from ..impact.history import Impact
 from ..impact.quantities import words
 from ..impact.response import Response, Totals

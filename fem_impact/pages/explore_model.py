@@ -9,8 +9,9 @@ import numpy as np
 
 from .._base.rounding import SAME
 from ..fe import refinement
-from ..impact import accuracy, collision, threshold
+from ..impact import accuracy, threshold
 from ..impact.contact import Contact, acting_stiffness, wall_time
+from ..impact.engine import TOLERANCE
 from ..impact.response import Response
 from ..mesh.meshes import Mesh
 from ..model import vectors
@@ -83,7 +84,7 @@ class Setup:
     @property
     def tolerance(self) -> float:
         """Largest error [-] accepted by the scene."""
-        return float(self.scene.blow.values.get("tolerance", collision.TOLERANCE))
+        return float(self.scene.blow.values.get("tolerance", TOLERANCE))
 
     @cached_property
     def start(self) -> Settings:

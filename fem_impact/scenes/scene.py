@@ -15,8 +15,9 @@ from ..fe.assembly import THICK, System, clamped, support_of_facets, support_wor
 from ..fe.ribs import Rib, sides_on
 from ..fe.section import Beam, Material, Plate, evaluate
 from ..fe.springs import check_posts
-from ..impact import collision, promise
+from ..impact import promise
 from ..impact.contact import Contact
+from ..impact.engine import TOLERANCE
 from ..impact.response import Response
 from ..impact.striker import Striker
 from ..mesh import sketch
@@ -150,7 +151,7 @@ class Scene(check.Brief):
         most = MOST_MODES[target.kind]
         if check.count("count", count) > most:
             raise self.fault(f"count must be at most {most} modes for this scene, got {count}; ask for fewer")
-        tolerance = self.blow.values.get("tolerance", collision.TOLERANCE)
+        tolerance = self.blow.values.get("tolerance", TOLERANCE)
         with self.blame("strike"):
             check.tolerance(tolerance)
         number = min(count + RIGID, most) if elastic else count

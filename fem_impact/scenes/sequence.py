@@ -6,7 +6,8 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 from .._base import check, markup
 from .._base.explained import below, noted, pointed
-from ..impact import assumption, collision, quantities
+from ..impact import assumption, quantities
+from ..impact.engine import TOLERANCE
 from ..model import cost, playing
 from ..model.planner import Plan
 from ..model.playing import Strokes
@@ -125,7 +126,7 @@ def plan(scene: "Scene", watch: Watch | None = None, **changes: Any) -> Sequence
     if wrong:
         raise ValueError(f"{wrong[0]} must be left out for a scene with strokes; it takes {', '.join(TAKEN)}")
     wanted = {name: changes[name] for name in (*OF_SEQUENCE[:2], *OF_BODY) if changes.get(name) is not None}
-    tolerance = check.tolerance(wanted.get("tolerance", scene.blow.values.get("tolerance", collision.TOLERANCE)))
+    tolerance = check.tolerance(wanted.get("tolerance", scene.blow.values.get("tolerance", TOLERANCE)))
     wanted |= {"target": "modal", "tolerance": playing.EACH * tolerance}
     order = played_order(scene)
     parts, alone = [scene.stroke[i] for i in order], [scene.alone(i) for i in order]
