@@ -31,7 +31,8 @@ from fem_impact.model.playing import Strokes
 sys.path.append(str(Path(__file__).parents[1]))  # of `shared`
 import shared
 
-OVER = re.compile("emory|failed to map")  # what interpreters say when they get no more of it
+# what interpreters say when they get no more of it; the last where Python makes a syntax tree
+OVER = re.compile(r"emory|failed to map|field '\w+' is required for")
 EVERYDAY_TOLERANCE = 1e-2  # [-] of every everyday scene, as their files say too
 THROUGH_MODES = {"target": "modal"}  # what a plan needs so that the body's modes carry the blow
 # the plate of frontier.py, by elements ("fe") or closed forms ("analytic")
