@@ -13,6 +13,7 @@ from ..modes.stretching import stretch
 from . import accuracy, distance, engine, promise, what_if
 from .compiled.bundles import KernelSystem
 from .contact import Contact
+from .engine import TOLERANCE as TOLERANCE
 from .error import Error
 from .reduced_body import ReducedBody, ends_of, joined, part_of, part_of_striker, stretched_in
 from .response import Response

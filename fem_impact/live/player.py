@@ -8,7 +8,6 @@ import numpy as np
 from .._base import check
 from ..impact import collision
 from ..impact.contact import Contact
-from ..impact.engine import TOLERANCE
 from ..impact.played import AT_ONCE, StruckBody
 from ..impact.striker import Striker
 from ..modes.modal import Modes
@@ -97,7 +96,7 @@ class Player:
         self.rate = check.count("rate", rate, high=HIGHEST_RATE)
         self.block, self.fastest = check.count("block", block), check.positive("fastest", fastest, "m/s")
         self.sticks = check.count("sticks", sticks, high=16)
-        needed = collision.striker_modes(striker, contact=contact, speed=fastest, tolerance=TOLERANCE)[0]
+        needed = collision.striker_modes(striker, contact=contact, speed=fastest, tolerance=collision.TOLERANCE)[0]
         self.striker = striker if striker.fixed else collision.shortened(striker, needed)
         place = modes.point("listen", self.points[0] if listen is None else listen)
         self._played = StruckBody(
