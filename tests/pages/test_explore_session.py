@@ -70,7 +70,7 @@ ANSWERED = {"until": lambda said: any(one["kind"] == "rest" for one in said), "r
 
 def test_force_and_numbers_come_first_then_the_rest_then_the_verdict(explorer, monkeypatch):
     def done(said):
-        return any(one.get("exact") for one in said) and any(one.get("columns") == 49 for one in said)
+        return any(one.get("exact") for one in said) and sum("columns" in one for one in said) >= 3
 
     said, _, _ = follow(explorer, monkeypatch, {"number": 1, "turn": {"mass": 0.02}}, until=done)
     assert [one["kind"] for one in said[:2]] == ["blow", "rest"]
