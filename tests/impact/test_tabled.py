@@ -73,7 +73,9 @@ def test_hertz_as_a_law_of_ones_own_strikes_as_hertz(scheme):
     for name in ("restitution", "contact_time", "peak_force"):
         allowed = float(own.error) + float(known.error) + HERTZ.misfit
         assert_allclose(getattr(own, name), getattr(known, name), rtol=allowed)
-    assert abs(own.energy_error) < 1e-12 and own.n_impacts == known.n_impacts == 1
+    # collocation keeps energy to a tenth of the tolerance, of any law; A4 to rounding
+    assert abs(own.energy_error) < (1e-5 if scheme == "collocation" else 1e-12)
+    assert own.n_impacts == known.n_impacts == 1
     found, there = (hit.gradient("restitution") for hit in (own, known))
     assert not [name for name in found.names if name.startswith("contact.")]
     assert_allclose(found["striker.mass"], there["striker.mass"], rtol=1e-4)
