@@ -239,8 +239,9 @@ def test_a_click_moves_the_listening_point_too(opened):
     assert shown.tab.locator("#body-plot").screenshot() != before[0]
     assert shown.tab.evaluate("document.getElementById('x').value === document.getElementById('x').defaultValue")
     shown.tab.click("#listen")
-    shown.until("document.getElementById('heard').innerText.includes('full scale')")
-    assert "(0.1395, 0.09)" not in shown.tab.inner_text("#heard")
+    # a strike before may have been heard already, from where the listener was
+    heard = "document.getElementById('heard').innerText"
+    shown.until(f"{heard}.includes('full scale') && !{heard}.includes('(0.1395, 0.09)')")
 
 
 @pytest.mark.slow
@@ -376,9 +377,9 @@ def test_a_dropped_drawing_is_struck_with_yarn_and_compared(visit, tmp_path):
 @pytest.mark.slow
 def test_keys_and_midi_strike_kept_blows_at_other_speeds(opened):
     shown = opened()
+    shown.tab.uncheck("#aloud")  # first: no strike but those of keys is to be heard
     shown.tab.click("#midi")
     shown.until("document.getElementById('midi-said').textContent !== ''")  # whatever this browser has
-    shown.tab.uncheck("#aloud")
     shown.tab.click("#keep")
     shown.until("document.documentElement.dataset.kept === 'A'")
     shown.tab.evaluate(
