@@ -118,7 +118,7 @@ Each study below says in its first sentence what it checks; its numbers are in [
                 len(each.read_text(encoding="utf-8").splitlines()) - 1 for each in path.parent.glob(f"{path.stem}*.csv")
             ]
             lines = f"{sum(kept)} lines" if kept else "-"
-            text += f"| [{path.stem}]({path.stem}.md) | {about(path)[0]} | {lines} |\n"
+            text += f"| [{name(path)}]({path.stem}.md) | {about(path)[0]} | {lines} |\n"
     return text
 
 
