@@ -81,6 +81,8 @@ class Plate:
             raise ValueError(f"ribs must be a list of fi.Rib, got {check.shown(self.ribs)}")
         if not isinstance(self.in_plane, Mapping):
             raise ValueError(f"in_plane must be a dict of edge name -> word, got {check.shown(self.in_plane)}")
+        for edge, word in self.in_plane.items():
+            check.one_of(f"in_plane[{edge!r}]", word, PLANE)
         check.settle(self, layers=layers, ribs=tuple(self.ribs), in_plane=dict(self.in_plane))
 
     @classmethod
