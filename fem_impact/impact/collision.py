@@ -23,7 +23,6 @@ from .striker import Striker
 
 LOSSY_STRIKER = 30.0  # [-] a lossy contact multiplies the truncation error of a striker by this: its modes are sparse
 OF_STRIKE = "striker_force", "target_force", "stretching"  # options that `collide` does not have
-STRIKER_SHARE = 0.05  # [-] fraction of the tolerance for the striker's left-out modes: keeping them is cheap
 
 
 @dataclass(frozen=True, repr=False)
@@ -281,12 +280,12 @@ def _parts(bodies, contacts, speeds, states, forces, residual, strikers=None) ->
 def striker_modes(striker: Striker, *, contact: Contact, speed: float, tolerance: float) -> tuple[int, float]:
     """How many striker modes a blow needs, and the error [-] allowed of leaving out the others.
 
-    That is only STRIKER_SHARE of the tolerance, because striker modes cost little; zero if there are no others.
+    That is only a twentieth of the tolerance, because striker modes cost little; zero if there are no others.
     """
     modes, mass = striker.modes, striker.felt_mass
     if modes.n_modes == modes.n_rigid:
         return modes.n_rigid, 0.0
-    allowed = STRIKER_SHARE * tolerance / (LOSSY_STRIKER if contact.rated else 1.0)
+    allowed = 0.05 * tolerance / (LOSSY_STRIKER if contact.rated else 1.0)
     omega_0 = 2.0 * np.pi * accuracy.contact_resonance(contact, mass, speed)
     whole, density, s = striker.bending
     if not contact.rated and mass * omega_0**2 * whole <= allowed:  # what replaces modes under loss needs one below

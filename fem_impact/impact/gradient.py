@@ -28,20 +28,13 @@ QUANTITIES = (
     "restitution", "impulse", "contact_time", "peak_force", "peak_time", "spectral_centroid", "spectral_level",
     "modal_energy",
 )  # fmt: skip
-GRAZE = 1e-3  # [-] of the deepest approach: a touch or gap below it may come or go with a change of a thousandth
-TIE = 1e-4  # [-] of the largest force: where two maxima are so alike, a change of 1e-4 may make the other the largest
 NUDGE = 1e-5  # [-] relative change of a number: its square is far below any tolerance, rounding over it below 1e-9
-# [-] difference of the slopes on both sides, over the value or the largest slope: 1e-4 to 5e-4 where a blow is smooth
-KINK = 0.02
 # [-] steps of the blow over those of the runs, and changes of a number in them: the first give the slopes, the others,
 # which err some ten times less, the error
 RUNS = (2.0, 2.0 * NUDGE), (4.0, NUDGE)
-CAUTION = 3.0  # [-] error stated over the difference of both
-LEAST = 1e-8  # [-] of the largest slope per relative change: rounding over `NUDGE`
-UNSURE = 5.0  # [-] times the error of when the force is largest: its top is flat, and ripples move it
 # Gauss nodes of a step and their weights: a force that sets in like x**1.5 loses 1e-9 of its impulse
 NODES, WEIGHTS = np.polynomial.legendre.leggauss(4)
-FEW, MANY = 2, 16  # [-] looks per step for the largest force, and for others nearly as large
+FEW = 2  # [-] looks per step for the largest force
 ZOOMS, ABOUT = 3, np.linspace(-1.0, 1.0, 17)  # how often and where about the largest of these looks it is looked for
 INSTEAD = "take differences of runs with the number changed, at a smaller tolerance"
 
@@ -134,8 +127,9 @@ def gradients(
     found = {}
     for (name, band), value, (slopes, error) in zip(wanted, values, differences(parameters, names, told)):
         label = name if band is None else f"{name}={band:g}"
-        doubt = UNSURE * error if name == "peak_time" else error
-        found[label] = Gradient(label, value, names, numbers, slopes, doubt)
+        if name == "peak_time":  # the top of a force is flat, and ripples move it
+            error = 5.0 * error
+        found[label] = Gradient(label, value, names, numbers, slopes, error)
     return found
 
 
@@ -150,7 +144,8 @@ def differences(
     runs = [replace(again, step=again.step / finer).slopes(sizes, one_sided, nudge) for finer, nudge in RUNS]
     found = []
     for slopes, finer in zip(*runs):
-        error = CAUTION * np.abs(slopes - finer) + LEAST * np.abs(slopes).max(axis=0)
+        # the last is rounding over NUDGE
+        error = 3.0 * np.abs(slopes - finer) + 1e-8 * np.abs(slopes).max(axis=0)
         by = sizes.reshape(-1, *[1] * (slopes.ndim - 1))
         found.append((slopes / by, error / by))
     return found
@@ -177,12 +172,12 @@ def _check_possible(hit: "Response", wanted: list[tuple[str, float | None]], sec
         raise SimulationError(
             "no gradient of modal_energy: the modes that ring did not carry the blow; strike modes of find_modes"
         )
-    if h.nearest_turn < GRAZE:
+    if h.nearest_turn < 1e-3:
         raise SimulationError(
             f"no gradient next to a grazing contact: {h.nearest_turn:.1g} of the deepest approach more or less, and "
             "the bodies touch once more or less often; take a slightly heavier or lighter striker, or strike elsewhere"
         )
-    if any(name.startswith("peak") for name in asked) and (apart := _apart(h)) < TIE:
+    if any(name.startswith("peak") for name in asked) and (apart := _apart(h)) < 1e-4:
         raise SimulationError(
             f"no gradient of the peak force: two maxima differ by {apart:.1e} of it, and a small change may make "
             "the other the largest"
@@ -236,7 +231,8 @@ class Again:
             rows.append([(b - a) / (2.0 * nudge) - one * c for a, b, c in zip(low, high, bends[-1])])
         found = [np.array(each) for each in zip(*rows)]
         for value, slopes, bend in zip(plain, found, zip(*bends)):
-            if np.max(np.abs(bend)) > KINK * max(np.max(np.abs(value)), np.max(np.abs(slopes))):
+            # slopes on both sides differ by 1e-4 to 5e-4 where a blow is smooth
+            if np.max(np.abs(bend)) > 0.02 * max(np.max(np.abs(value)), np.max(np.abs(slopes))):
                 raise SimulationError(
                     "no gradient: slopes on both sides of this blow differ, as with a small change of some number "
                     "another force becomes the largest, or a later push yields further; change some number slightly"
@@ -305,7 +301,7 @@ def _apart(history: History) -> float:
     """By how much the largest force exceeds the next of the maxima [-]."""
     maxima = []
     for c in range(history.n_contacts):
-        force = np.pad(_looks(history, c, MANY), 1)
+        force = np.pad(_looks(history, c, 16), 1)
         maxima.append(force[1:-1][(force[1:-1] > force[:-2]) & (force[1:-1] >= force[2:])])
     rival, top = np.sort(np.concatenate([[0.0, 0.0], *maxima]))[-2:]
     return float((top - rival) / top) if top > 0.0 else np.inf

@@ -21,7 +21,6 @@ ONE_BODY = 1e-2
 # [-] largest difference of descriptions up to which Ritz vectors tell a motion: as much as modes err that are found
 # as far as the force reaches
 MOVED = {"displacement": 1e-2, "velocity": 3e-2}
-LASTS = 2.0  # [-] and no longer than this many times the run, as later echoes may be missing from all of them
 LOOKED_AT = 200  # [-] times at which this error is estimated, evenly among those asked for; more only cost time
 
 
@@ -118,7 +117,8 @@ def largest_difference(
 
     Infinite for a single description, where it exceeds `MOVED`, and long after the end of the run, ``until`` [s].
     """
-    if len(descriptions) < 2 or (times.size and times.max() > LASTS * until):
+    # after twice the run, later echoes may be missing from all of them
+    if len(descriptions) < 2 or (times.size and times.max() > 2.0 * until):
         return float("inf")
     if len(times) > LOOKED_AT:
         times = times[np.linspace(0, len(times) - 1, LOOKED_AT).astype(int)]

@@ -21,28 +21,16 @@ from .stretched import Stretched
 Function = TypeVar("Function", bound=Callable)
 
 SCHEMES = ("A", "A4", "collocation")
-# [-] tolerance advised over the error reached: steps twice as long, to which it may lead, err 16 times more
-REACHED = 20.0
 AVERAGES = {"restitution", "impulse", "n_impacts"}  # quantities that depend on no single instant
-# [-] fraction of the usual steps that averages over the blow need: errors of single instants cancel in them
-AVERAGED = 0.5
 # [-] step halvings to decide whether bodies touch or part where the margin is less than its error, which each divides
 # by eight or more
 GRAZES = 6
-# [-] error of a margin over the difference of two runs: beside a graze A4 converges at first order only, and a run of
-# half the steps may show a seventh of the difference to the truth
-SURELY = 4.0
-# [-] of the largest error in any quantity, what each errs at least: in one alone two runs agree by chance, which left
-# 4 % of the errors of contact times below the truth, one by a factor of five
-CHANCE = 0.2
-DOUBLINGS = 7  # [-] step halvings before the run gives up: A4 then errs 2**28 times less
 # [-] Difference of two runs over the error of the finer one: first for speeds and impulse, then for contact time and
 # peak force. These two depend on one instant, and modes faster than the step lower the order of A4 there.
 RICHARDSON = {"A": (3.0, 3.0), "A4": (7.0, 4.0), "collocation": (1.0, 1.0)}
 RINGING = 0.5  # [-] modes with a damping ratio above this do not ring: a swing is down to 3 % of the one before
 # [rad] largest phase of a ringing mode in a step of the coarser run: a third of a period, seen before it comes again
 RESOLVED = 2.0
-COLLOCATION_BELOW = 1e-7  # [-] below this tolerance, collocation needs less work than A4
 
 
 @dataclass(frozen=True)
@@ -99,14 +87,14 @@ def takes_options(*but: str) -> Callable[[Function], Function]:
 
 
 def scheme_for(tolerance: float, exponent: float) -> str:
-    """The scheme that meets a tolerance with the least work."""
-    return "collocation" if tolerance < COLLOCATION_BELOW and exponent >= 1.0 else "A4"
+    """The scheme that meets a tolerance with the least work: below 1e-7 collocation, where it can."""
+    return "collocation" if tolerance < 1e-7 and exponent >= 1.0 else "A4"
 
 
 def _first_count(scheme: str, tolerance: float, quantities: Mapping[str, float | None]) -> float:
-    """Steps per contact in the first run."""
+    """Steps per contact in the first run: for averages half of the usual, as errors of single instants cancel there."""
     count = engine.steps_per_contact(tolerance, 0.5 if scheme == "A" else 0.25)
-    return max(6.0, count * (AVERAGED if set(quantities) <= AVERAGES else 1.0))
+    return max(6.0, count * (0.5 if set(quantities) <= AVERAGES else 1.0))
 
 
 def steps_for(
@@ -185,8 +173,11 @@ class _Control:
         if "force" in quantities:
             i = [*quantities].index("force")
             error[i] = max(error[i], fine.force_missed)
-        error[:n] = np.maximum(error[:n], CHANCE * max(error[:n].tolist()))
-        error[n] = min(1.0, SURELY * error[n])
+        # in one quantity alone two runs agree by chance: with its own difference only, 4 % of the errors of contact
+        # times lay below the truth, one by a factor of five
+        error[:n] = np.maximum(error[:n], 0.2 * max(error[:n].tolist()))
+        # beside a graze A4 converges at first order only, and a margin in two runs may differ by a seventh of its error
+        error[n] = min(1.0, 4.0 * error[n])
         return Converged(self.scheme, sizes, fine, coarse, error)
 
     def refined(self) -> Converged:
@@ -236,11 +227,12 @@ class _Control:
         shortest = min(self.pace[0], options.last[0])
         count = _first_count(self.scheme, min(STEP_SHARE * options.tolerance, TOLERANCE), options.quantities)
         first = min(2.0 * shortest / count, _longest_lossy(self.system, self.pace, options.tolerance))
-        return [first * 0.5**n for n in range(DOUBLINGS + 1)], STEP_SHARE * options.tolerance
+        return [first * 0.5**n for n in range(8)], STEP_SHARE * options.tolerance  # A4 errs 2**28 times less at last
 
     def told(self, best: float, coarse: History, fine: History) -> str:
         """Why no two runs agreed, of which the best erred by ``best``, and what helps."""
-        tolerance, hint, enough = self.options.tolerance, "", min(REACHED * best, 1.0)
+        # steps twice as long, to which the tolerance advised may lead, err 16 times more
+        tolerance, hint, enough = self.options.tolerance, "", min(20.0 * best, 1.0)
         advice = f"raise tolerance to {float(f'{enough:.1e}'):g}" if self.free else "leave out scheme"
         if len(fine.contacts) > 1:
             growth = distance.growth(coarse, fine)

@@ -17,9 +17,7 @@ from ..modes.shapes import REMEMBERED, Shapes
 from ..modes.slender import SHEAR_RATIO, beam
 from .accuracy import left_out_density
 
-SPHERES = 1e-9, 1e9  # [m] radius, from a few atoms to a star
 STICK_MODES = 96  # [-] bending modes of a stick, known in closed form; each blow keeps as many of them as it needs
-MOST_MODES = 1000  # [-] of a stick: higher modes have wavelengths as short as its thickness, where beam theory fails
 
 
 GRAVITY = 9.80665  # [m/s^2] standard; the true one is within 0.3 % of it everywhere
@@ -173,7 +171,7 @@ class Striker(check.Brief):
         4.11
         """
         check.instance("material", material, Material)
-        radius = check.between("radius", radius, *SPHERES, "m")
+        radius = check.between("radius", radius, 1e-9, 1e9, "m")  # from a few atoms to a star
         return cls(Modes.rigid(4.0 / 3.0 * np.pi * radius**3 * material.rho), np.zeros(0), material, radius)
 
     @classmethod
@@ -209,7 +207,8 @@ class Striker(check.Brief):
         >>> round(stick.felt_mass, 6)  # kg
         0.033333
         """
-        kept = STICK_MODES if n_modes is None else check.count("n_modes", n_modes, high=MOST_MODES)
+        # higher modes than the thousandth have wavelengths as short as its thickness, where beam theory fails
+        kept = STICK_MODES if n_modes is None else check.count("n_modes", n_modes, high=1000)
         thick: dict[str, Any] = {}
         if slenderness is not None:
             thick = {"theory": "timoshenko", "slenderness": slenderness, "shear_ratio": shear_ratio}
