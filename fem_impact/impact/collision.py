@@ -67,7 +67,7 @@ def strike(
     def blow(striker: Striker, speed: float, own: tuple[np.ndarray, np.ndarray] | None = None) -> Response:
         arriving = part_of_striker(striker, asked.residual).pushed(asked.striker_force)
 
-        def start(one: float = 1.0, other: float = 1.0) -> list[ReducedBody]:
+        def start_bodies(one: float = 1.0, other: float = 1.0) -> list[ReducedBody]:
             """Both bodies at the start, each as fast as it is known times a factor."""
             target = struck if other == 1.0 else struck.faster(other)
             if own is None:  # the striker arrives at the surface, wherever that is
@@ -78,8 +78,8 @@ def strike(
             return [moving.faster(one), replace(target, pressed=pressed)]
 
         doubt = 0.0 if before is None else 1.0 + before.error
-        others = [start(*factors) for factors in ((doubt, 1.0), (1.0, doubt))[own is None :] if doubt]
-        return _follow((striker.body, modes), (contact,), start(), speed, asked, striker, point[0], others)
+        others = [start_bodies(*factors) for factors in ((doubt, 1.0), (1.0, doubt))[own is None :] if doubt]
+        return _follow((striker.body, modes), (contact,), start_bodies(), speed, asked, striker, point[0], others)
 
     if speed is None:
         assert before is not None
@@ -198,7 +198,12 @@ def _follow(bodies, laws, parts, speed, options, striker=None, at=None, others=(
         held += range(first, first + part.held)
         first += len(part.omega)
     pace = engine.pace_of(system, held)
-    _check_way(system, pace[0] * pace[1], options.tolerance)
+    depth, way = pace[0] * pace[1], max(np.abs(system.offset).tolist())
+    if EPSILON * way > options.tolerance * depth:
+        raise ValueError(
+            f"gap and constant forces must be smaller: with an offset of {way:.3g} m, rounding spoils an approach of "
+            f"{depth:.3g} m beyond the tolerance of {options.tolerance:g}; start nearer to contact"
+        )
     found = refine_steps(system, options, pace, stretched)
     for i, law in enumerate(laws):
         law.law.check_reached(law, found.fine, i)
@@ -221,16 +226,6 @@ def _follow(bodies, laws, parts, speed, options, striker=None, at=None, others=(
         tuple(bodies), tuple(laws), found.fine, speed, options.tolerance, found.scheme, error, striker, at,
         ends_of(parts, laws), options.quantities, rebounds=whole[n + 1 :][order],
     )  # fmt: skip
-
-
-def _check_way(system: KernelSystem, depth: float, tolerance: float) -> None:
-    """Raise ValueError if rounding of a large offset would spoil the approach in contact, about ``depth`` [m]."""
-    way = max(np.abs(system.offset).tolist())
-    if EPSILON * way > tolerance * depth:
-        raise ValueError(
-            f"gap and constant forces must be smaller: with an offset of {way:.3g} m, rounding spoils an approach of "
-            f"{depth:.3g} m beyond the tolerance of {tolerance:g}; start nearer to contact"
-        )
 
 
 def _parts(bodies, contacts, speeds, states, forces, residual, strikers=None) -> tuple[list[ReducedBody], float]:
@@ -287,7 +282,7 @@ def striker_modes(striker: Striker, *, contact: Contact, speed: float, tolerance
         return modes.n_rigid, 0.0
     allowed = 0.05 * tolerance / (LOSSY_STRIKER if contact.rated else 1.0)
     omega_0 = 2.0 * np.pi * accuracy.contact_resonance(contact, mass, speed)
-    whole, density, s = striker.bending
+    whole, density, s = striker.bending_compliance
     if not contact.rated and mass * omega_0**2 * whole <= allowed:  # what replaces modes under loss needs one below
         return modes.n_rigid, allowed
     limit = accuracy.cutoff(density, s, omega_0, contact.exponent, mass, allowed)
@@ -298,9 +293,8 @@ def striker_error(striker: Striker, n_modes: int, *, contact: Contact, speed: fl
     """Expected error [-] if a striker keeps only its first ``n_modes`` modes."""
     highest = float(striker.modes.frequencies[max(n_modes - 1, 1)])
     law: dict[str, Any] = {"contact": contact, "mass": striker.felt_mass, "speed": speed}
-    return accuracy.truncation_error(striker.modes, striker.at, highest, **law) * (
-        LOSSY_STRIKER if contact.rated else 1.0
-    )
+    error = accuracy.truncation_error(striker.modes, striker.at, highest, **law)
+    return LOSSY_STRIKER * error if contact.rated else error
 
 
 def shortened(striker: Striker, n_modes: int) -> Striker:

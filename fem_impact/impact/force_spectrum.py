@@ -62,13 +62,8 @@ def of_pieces(pieces: Pieces, frequencies: np.ndarray) -> np.ndarray:
         return directly(pieces, frequencies)
     time, impulse = _impulses(pieces, rule, parts.astype(int))
     if evenly:
-        return _transform(time, impulse, step, n)
+        return transform_impulses(time, impulse, step, n)
     return _interpolated(time, impulse, span, int(count), frequencies)
-
-
-def of_impulses(time: np.ndarray, impulse: np.ndarray, frequencies: np.ndarray) -> np.ndarray:
-    """Sum of impulses (n,) [N s] at ascending times (n,) [s], times exp(-i omega t); even frequencies from zero on."""
-    return _transform(time, impulse, frequencies[1], len(frequencies))
 
 
 def directly(pieces: Pieces, frequencies: np.ndarray) -> np.ndarray:
@@ -97,7 +92,7 @@ def _impulses(pieces: Pieces, rule: int, parts: np.ndarray) -> tuple[np.ndarray,
     return (t + h * share).T.ravel(), impulse.T.ravel()
 
 
-def _transform(time: np.ndarray, impulse: np.ndarray, step: float, count: int) -> np.ndarray:
+def transform_impulses(time: np.ndarray, impulse: np.ndarray, step: float, count: int) -> np.ndarray:
     """Sum of impulse exp(-i omega time) at frequencies 0, step, 2 step, ... [Hz], (count,), by cells of a radian."""
     # a fast transform of this length repeats itself over the cells, so that later ones may be folded into it
     n_cells = fft.next_fast_len(max(1, int(np.ceil(2.0 * np.pi * (count - 1)))), real=True)
@@ -122,7 +117,7 @@ def _interpolated(
     """
     step, middle = 0.5 / span, 0.5 * span
     root = np.sqrt(BETA**2 - (2.0 * np.pi * WINDOW * step * (time - middle)) ** 2)
-    even = _transform(
+    even = transform_impulses(
         time, impulse * root * np.exp(-root) / WINDOW, step, count
     )  # 2 sinh is exp to rounding: root > 33
     place = frequencies / step

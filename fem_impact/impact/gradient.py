@@ -114,7 +114,11 @@ def gradients(
     """
     sections = sections or {}
     several = (quantity,) if isinstance(quantity, str) else check.several("quantity", quantity, str)
-    wanted = [_asked(item) for item in several]
+    wanted = []
+    for item in several:
+        name, band = name_and_band(item)
+        name = check.one_of("quantity", {"force": "peak_force"}.get(name, name), QUANTITIES)
+        wanted.append((name, checked_band(name, band, name.startswith("spectral"))))
     _check_possible(hit, wanted, bool(sections))
     parameters = Parameters(hit, sections)
     names = parameters.checked(wrt)
@@ -123,7 +127,7 @@ def gradients(
     span = max(impact.end for impact in hit.impacts)
     bands = [band for name, band in wanted if band is not None and name == "spectral_centroid"]
     frequencies = {band: force_spectrum.dense_frequencies(band, span) for band in bands}
-    told = partial(_told, wanted=wanted, frequencies=frequencies)
+    told = partial(read_quantities, wanted=wanted, frequencies=frequencies)
     found = {}
     for (name, band), value, (slopes, error) in zip(wanted, values, differences(parameters, names, told)):
         label = name if band is None else f"{name}={band:g}"
@@ -192,7 +196,7 @@ def _value(hit: "Response", name: str, band: float | None) -> Any:
     if name == "restitution" and hit.restitution is None:
         raise SimulationError(f"no gradient of restitution: {rebound(hit, 5)}")
     if band is not None or name in ("peak_time", "modal_energy"):
-        return _told(hit, [(name, band)], {})[0]
+        return read_quantities(hit, [(name, band)], {})[0]
     return getattr(hit, name)
 
 
@@ -248,7 +252,7 @@ def step_of(hit: "Response") -> float:
     return float(h.steps[h.pressed.any(axis=1), layout.LENGTH].max())
 
 
-def _told(
+def read_quantities(
     blow: "Response", wanted: list[tuple[str, float | None]], frequencies: Mapping[float, np.ndarray]
 ) -> list[Any]:
     """The quantities of a blow; ``frequencies`` [Hz] are those of the spectrum of each band."""
@@ -258,11 +262,13 @@ def _told(
             part, h = blow.body_slice(len(blow.bodies) - 1), blow.history
             found.append(mode_energy(h.omega[part], h.end_q[part], h.end_p[part]))
         elif band is not None:
-            asked = frequencies[band] if name == "spectral_centroid" else np.array([0.0, band])
-            spectrum = force_spectrum.of_impulses(*_impulses(blow.history), asked)
-            found.append(
-                force_spectrum.centroid(asked, spectrum) if name == "spectral_centroid" else level_of(spectrum)
-            )
+            time, impulse = _impulses(blow.history)
+            if name == "spectral_centroid":
+                asked = frequencies[band]
+                spectrum = force_spectrum.transform_impulses(time, impulse, asked[1], len(asked))
+                found.append(force_spectrum.centroid(asked, spectrum))
+            else:
+                found.append(level_of(np.exp(-2j * np.pi * np.array([[0.0], [band]]) * time) @ impulse))
         elif name.startswith("peak"):
             found.append(largest(blow.history)[name == "peak_force"])
         else:
@@ -272,10 +278,9 @@ def _told(
 
 def _looks(history: History, c: int, count: int) -> np.ndarray:
     """Force [N] of contact c at so many equal fractions of every step, in order of time; zero where it is open."""
-    force = np.zeros((len(history.steps), count))
-    rows = np.flatnonzero(history.pressed[:, c])
-    force[rows] = history.force(rows, c, np.arange(count) / count)
-    return force.ravel()
+    rows = np.arange(len(history.steps)).repeat(count)
+    force = history.force_of(rows, c, np.resize(np.arange(count) / count, len(rows)))[0]
+    return np.where(history.pressed[rows, c], force, 0.0)
 
 
 def largest(history: History) -> tuple[float, float]:
@@ -332,13 +337,6 @@ def section_changes(sections: Any) -> dict[str, tuple[float, SectionChange]]:
         name: (float(pair[0]), SectionChange.by_differences(f"sections[{name!r}]", *pair))
         for name, pair in sections.items()
     }
-
-
-def _asked(item: Any) -> tuple[str, float | None]:
-    """A quantity and its band [Hz]."""
-    name, band = name_and_band(item)
-    name = check.one_of("quantity", {"force": "peak_force"}.get(name, name), QUANTITIES)
-    return name, checked_band(name, band, name.startswith("spectral"))
 
 
 def level_of(spectrum: np.ndarray) -> float:

@@ -74,10 +74,11 @@ def remedy(hit: "Response") -> str:
     if error.idealisation > allowed:
         advice.append("give target = 'modal'")
     if error.mesh > allowed:
-        advice += [
-            f"find the modes of {name} with tolerance = {limit:.1g}, or on a finer mesh"
-            for name, limit in _finer_modes(hit)
-        ]
+        for name, modes in zip(_names(hit), hit.bodies):
+            meshed = isinstance(getattr(modes.shapes, "base", modes.shapes), FieldShapes)
+            if meshed and modes.frequency_error is not None and modes.frequency_error.any():
+                limit = max(1e-9, 0.5 * allowed / error.mesh * float(modes.frequency_error.max()))
+                advice.append(f"find the modes of {name} with tolerance = {limit:.1g}, or on a finer mesh")
     if error.inherited > allowed:
         advice.append("give the blow before a smaller tolerance")
     if error.step > allowed:
@@ -99,15 +100,10 @@ def kept(hit: Any, strict: bool = False) -> Any:
 
 def warn(text: str) -> None:
     """Tell the user that a tolerance was missed, at the line that called this program."""
-    warnings.warn(text, ToleranceWarning, stacklevel=_callers_level())
-
-
-def _callers_level() -> int:
-    """The ``stacklevel`` for which a warning of the calling function names the line of the user, not one of ours."""
-    level, frame = 1, sys._getframe(1)
+    level, frame = 1, sys._getframe()
     while frame.f_back is not None and frame.f_code.co_filename.startswith(PACKAGE):
         level, frame = level + 1, frame.f_back
-    return level
+    warnings.warn(text, ToleranceWarning, stacklevel=level)
 
 
 def _names(hit: "Response") -> list[str]:
@@ -159,12 +155,3 @@ def _modes_needed(hit: "Response", body: int) -> float:
             needed = max(needed, modes.frequencies[-1] * (hit.error.truncation / allowed) ** (1.0 / power))
     # Weyl's law counts modes only on average, so a tenth is added
     return 1.1 * modes.n_modes * (needed / modes.frequencies[-1]) ** (0.5 * modes.dimension)
-
-
-def _finer_modes(hit: "Response") -> Iterator[tuple[str, float]]:
-    """Name and largest frequency error allowed of every body found on a mesh."""
-    for name, modes in zip(_names(hit), hit.bodies):
-        meshed = isinstance(getattr(modes.shapes, "base", modes.shapes), FieldShapes)
-        if meshed and modes.frequency_error is not None and modes.frequency_error.any():
-            worst = float(modes.frequency_error.max())
-            yield name, max(1e-9, 0.5 * SHARE * hit.tolerance / hit.error.mesh * worst)

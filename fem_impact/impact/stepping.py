@@ -137,11 +137,11 @@ def refine_steps(
         raise ValueError(f"scheme collocation needs exponents of at least 1, got {least:g}; use A4")
     free = options.scheme is None and options.dt is None
     try:
-        return _Control(system, options, pace, scheme, free, stretched).refined()
+        return _Control(system, options, pace, scheme, free, stretched).agree_runs()
     except _NotMet:
         if not free or scheme != "A4" or least < 1.0 or stretched is not None:
             raise
-    return _Control(system, options, pace, "collocation", free, stretched).refined()
+    return _Control(system, options, pace, "collocation", free, stretched).agree_runs()
 
 
 class _NotMet(SimulationError):
@@ -159,12 +159,12 @@ class _Control:
     free: bool  # whether scheme and steps are our choice
     stretched: Stretched | None
 
-    def run(self, size: float, chosen_by: str = "tolerance") -> History:
+    def follow_blow(self, size: float, chosen_by: str = "tolerance") -> History:
         """One run, see `engine.follow`."""
         how = self.scheme, size, self.pace, self.options.last, self.stretched
         return engine.follow(self.system, *how, chosen_by)
 
-    def judged(self, sizes: tuple[float, float], coarse: History, fine: History) -> Converged:
+    def judge_runs(self, sizes: tuple[float, float], coarse: History, fine: History) -> Converged:
         """Two runs of a finer and a coarser size, and the errors of the finer one."""
         over, quantities, n = RICHARDSON[self.scheme], self.options.quantities, self.options.n_quantities
         if self.scheme != "collocation":  # a strong loss reacts to the rates of modes faster than the step
@@ -180,28 +180,28 @@ class _Control:
         error[n] = min(1.0, 4.0 * error[n])
         return Converged(self.scheme, sizes, fine, coarse, error)
 
-    def refined(self) -> Converged:
+    def agree_runs(self) -> Converged:
         """The first pair of runs that agrees."""
         options, tolerance = self.options, self.options.tolerance
         if options.dt is not None:
             size = min(options.dt, 0.5 * options.last[0])
-            fine, coarse = (self.run(each, "dt") for each in (size, 2.0 * size))
-            return self.judged((size, 2.0 * size), coarse, fine)
-        sizes, aim = self.sizes()
+            fine, coarse = (self.follow_blow(each, "dt") for each in (size, 2.0 * size))
+            return self.judge_runs((size, 2.0 * size), coarse, fine)
+        sizes, aim = self.list_sizes()
         try:
-            runs = [self.run(size) for size in sizes[:2]]
+            runs = [self.follow_blow(size) for size in sizes[:2]]
         except SimulationError as exhausted:  # so many steps are out of reach: longer ones may do
             sizes = [4.0 * sizes[0], 2.0 * sizes[0], *sizes]
             try:
-                runs = [self.run(size) for size in sizes[:2]]
+                runs = [self.follow_blow(size) for size in sizes[:2]]
             except SimulationError:
                 raise exhausted from None
         best, met = np.inf, None
         grazes = 0 if options.quantities.keys() & {"n_impacts", "contact_time"} else GRAZES
         for i, (before, size) in enumerate(pairwise(sizes)):
             if i:
-                runs = [runs[1], self.run(size)]
-            found = self.judged((size, before), *runs)
+                runs = [runs[1], self.follow_blow(size)]
+            found = self.judge_runs((size, before), *runs)
             error = max(found.error[: options.n_quantities].tolist())
             best = min(best, error)
             if error <= tolerance:
@@ -213,10 +213,10 @@ class _Control:
             if 2 * len(found.fine.steps) > engine.most_steps(self.system, self.stretched):
                 break  # the next run would exceed the step limit
         if met is None:
-            raise _NotMet(self.told(best, *runs))
+            raise _NotMet(self.explain_failure(best, *runs))
         return met
 
-    def sizes(self) -> tuple[list[float], float]:
+    def list_sizes(self) -> tuple[list[float], float]:
         """Steps, or misfits of collocation, to try in turn, and the error [-] aimed at."""
         options = self.options
         if self.scheme == "collocation":
@@ -229,7 +229,7 @@ class _Control:
         first = min(2.0 * shortest / count, _longest_lossy(self.system, self.pace, options.tolerance))
         return [first * 0.5**n for n in range(8)], STEP_SHARE * options.tolerance  # A4 errs 2**28 times less at last
 
-    def told(self, best: float, coarse: History, fine: History) -> str:
+    def explain_failure(self, best: float, coarse: History, fine: History) -> str:
         """Why no two runs agreed, of which the best erred by ``best``, and what helps."""
         # steps twice as long, to which the tolerance advised may lead, err 16 times more
         tolerance, hint, enough = self.options.tolerance, "", min(20.0 * best, 1.0)
@@ -238,20 +238,15 @@ class _Control:
             growth = distance.growth(coarse, fine)
             hint = f"; small errors grow {growth:.1g}-fold over {len(fine.contacts)} impacts"
             if self.free and growth == np.inf:  # the last runs were different blows, to which no tolerance applies
-                agreed = _agreed(coarse, fine, tolerance * self.pace[0])
-                advice = f"give max_impacts of at most {max(1, agreed)}"
+                one, two = (np.sort(history.contacts[:, 1]) for history in (coarse, fine))
+                n = min(len(one), len(two))
+                # the first impacts, which end at the same times
+                same = np.append(np.abs(one[:n] - two[:n]) <= tolerance * self.pace[0], False)
+                advice = f"give max_impacts of at most {max(1, int(same.argmin()))}"
         return (
             f"the step error stays at {best:.1e}, above the tolerance {tolerance:.1e}, with {len(fine.steps)} "
             f"steps{hint}; {advice}"
         )
-
-
-def _agreed(coarse: History, fine: History, apart: float) -> int:
-    """How many impacts end in two runs, one after another, at times no more than ``apart`` [s] from each other."""
-    one, two = (np.sort(history.contacts[:, 1]) for history in (coarse, fine))
-    n = min(len(one), len(two))
-    same = np.abs(one[:n] - two[:n]) <= apart
-    return n if same.all() else int(same.argmin())
 
 
 def _longest_lossy(system: KernelSystem, pace: tuple[float, float], tolerance: float) -> float:

@@ -18,8 +18,6 @@ from ..modes.slender import SHEAR_RATIO, beam
 from .accuracy import left_out_density
 
 STICK_MODES = 96  # [-] bending modes of a stick, known in closed form; each blow keeps as many of them as it needs
-
-
 GRAVITY = 9.80665  # [m/s^2] standard; the true one is within 0.3 % of it everywhere
 STIFF_HAND = 0.3  # [-] highest frequency in the hand over the first bending frequency: the squares add to some 10 %
 
@@ -234,10 +232,8 @@ class Striker(check.Brief):
         (0.09, [0.0, 159.2])
         """
         head, handle = check.positive("head", head, "kg"), check.positive("handle", handle, "kg")
-        stiffness, damping = (
-            check.positive("stiffness", stiffness, "N/m"),
-            check.non_negative("damping", damping, "N s/m"),
-        )
+        stiffness = check.positive("stiffness", stiffness, "N/m")
+        damping = check.non_negative("damping", damping, "N s/m")
         mass, reduced = head + handle, head * (handle / (head + handle))
         omega = float(np.sqrt(stiffness / reduced))
         apart = np.sqrt(handle / head / mass), -np.sqrt(head / handle / mass)
@@ -465,7 +461,7 @@ class Striker(check.Brief):
         return left_out(self.modes, self.at[None], self.shape[None])
 
     @cached_property
-    def bending(self) -> tuple[float, float, float]:
+    def bending_compliance(self) -> tuple[float, float, float]:
         """Compliance of all bending at the contact point [m/N], and `accuracy.left_out_density` there."""
         rigid = self.modes.truncated(n_modes=self.modes.n_rigid)
         whole = rigid.residual_compliance(self.at[None])[0, 0]

@@ -191,14 +191,10 @@ def _may_touch(history: History, other: History, duration: float) -> bool:
     """
     if history.bias.any() or history.status != other.status or not len(history.contacts) or not len(other.contacts):
         return False
-    rigid, shape = history.omega == 0.0, history.shape
-    size = np.hypot(history.end_q, history.end_p / np.where(rigid, 1.0, history.omega))
-    gap = -history.offset - shape[:, rigid] @ history.end_q[rigid]
-    apart = -shape[:, rigid] @ history.end_p[rigid]  # [m/s]
-    ahead = (np.abs(shape[:, ~rigid]) @ size[~rigid] - gap)[apart > 0.0] / apart[apart > 0.0]
     end = history.end_time
     if history.status == record.FINISHED:
-        end += max(0.0, float(ahead.max(initial=0.0)))
+        ahead = history.bridged()
+        end += float(ahead[np.isfinite(ahead)].max(initial=0.0))
     start = max(float(found.contacts[:, 1].min()) for found in (history, other))
     end = max(start, end)
     times = np.linspace(start, end, int(min(engine.LOOKS[1], engine.LOOKS[0] * (end - start) / duration)) + 2)
