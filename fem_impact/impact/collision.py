@@ -57,7 +57,7 @@ def strike(
     speed = speed if speed is None else check.non_negative("speed", speed, "m/s")
     before = start.state() if isinstance(start, Response) else start
     point, asked = modes.point("at", at), Options(**options)
-    struck = part_of(modes, ((0, -1.0),), point, asked.residual).pushed(asked.target_force)
+    struck = part_of(modes, ((0, -1.0),), point, asked.residual).push_body(asked.target_force)
     if before is not None:
         q, p = before.of(-1, "modes", modes)
         struck = replace(struck, q=q, p=p)
@@ -65,7 +65,7 @@ def strike(
         struck = replace(struck, stretching=stretch(modes))
 
     def blow(striker: Striker, speed: float, own: tuple[np.ndarray, np.ndarray] | None = None) -> Response:
-        arriving = part_of_striker(striker, asked.residual).pushed(asked.striker_force)
+        arriving = part_of_striker(striker, asked.residual).push_body(asked.striker_force)
 
         def start_bodies(one: float = 1.0, other: float = 1.0) -> list[ReducedBody]:
             """Both bodies at the start, each as fast as it is known times a factor."""
@@ -177,7 +177,7 @@ def met(
 
 def touching(bodies: Sequence[Modes], touch: Touch, speed: float, residual: bool) -> tuple[KernelSystem, float]:
     """Two bodies that are to touch, the first moving, as the kernels take them, and how long the contact may last."""
-    parts, _ = _parts(bodies, [touch], [speed, 0.0], None, None, residual)
+    parts, _ = _parts(bodies, [touch], [speed, 0.0], None, None, residual, {})
     system = joined(parts, [touch.law])
     return system, engine.pace_of(system)[0]
 
@@ -228,7 +228,7 @@ def _follow(bodies, laws, parts, speed, options, striker=None, at=None, others=(
     )  # fmt: skip
 
 
-def _parts(bodies, contacts, speeds, states, forces, residual, strikers=None) -> tuple[list[ReducedBody], float]:
+def _parts(bodies, contacts, speeds, states, forces, residual, strikers) -> tuple[list[ReducedBody], float]:
     """Every body as a `ReducedBody`, and the speed of the first body that moves; ``strikers`` by their number."""
     if states is not None:
         wrong = not isinstance(states, (list, tuple)) or len(states) != len(bodies)
@@ -245,18 +245,18 @@ def _parts(bodies, contacts, speeds, states, forces, residual, strikers=None) ->
                 continue
             if not 0 <= body < len(bodies):
                 raise ValueError(f"contacts must name bodies from 0 to {len(bodies) - 1}, got {body}")
-            at = strikers[body].at if strikers and at is None and body in strikers else at
+            at = strikers[body].at if at is None and body in strikers else at
             ends[body].append((i, sign, bodies[body].point("at", at)))
     parts, arriving = [], 0.0
     for body, modes in enumerate(bodies):
         points = np.vstack([point for _, _, point in ends[body]] or [np.zeros((0, modes.dimension))])
         touched = tuple((i, sign) for i, sign, _ in ends[body])
-        part = part_of(modes, touched, points, residual).pushed(float(forces[body]))
+        part = part_of(modes, touched, points, residual).push_body(float(forces[body]))
         if states is not None:
             q, p = (check.array(f"states[{body}]", value, (modes.n_modes,)) for value in states[body])
             part = replace(part, q=q, p=p)
         speed, own = float(speeds[body]), None
-        if strikers and body in strikers and touched:
+        if body in strikers and touched:
             own, comes = strikers[body].motion, float(part.rows[0] @ strikers[body].motion)
             if comes <= 0.0 and speed:
                 raise ValueError(f"first_at of body {body} must come towards the other body as the striker arrives")

@@ -45,7 +45,7 @@ def steps_per_contact(tolerance: float, power: float = 0.25) -> float:
     return float(24.0 * (TOLERANCE / tolerance) ** power)
 
 
-def follow(
+def run_system(
     system: KernelSystem, scheme: str, size: float, pace: tuple[float, float], last: tuple[float, int],
     stretched: Stretched | None = None, chosen_by: str = "tolerance",
 ) -> History:  # fmt: skip
@@ -94,7 +94,7 @@ def again(history: History, step: float | None = None, **changed: Any) -> Histor
     for array in system:
         array.setflags(write=False)  # or numba would compile the kernels again for writable arrays
     size = pace[0] / steps_per_contact(TOLERANCE) if step is None else step
-    return follow(system, "A4", size, pace, (horizon, most), stretched)
+    return run_system(system, "A4", size, pace, (horizon, most), stretched)
 
 
 def pace_of(system: KernelSystem, held: Sequence[int] = ()) -> tuple[float, float]:

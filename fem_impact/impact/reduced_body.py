@@ -78,13 +78,9 @@ class ReducedBody:
         """The same body with all motion larger by a factor, its rigid position as it is."""
         return replace(self, q=np.where(self.omega == 0.0, 1.0, factor) * self.q, p=factor * self.p)
 
-    def pushed(self, force: float) -> "ReducedBody":
+    def push_body(self, force: float) -> "ReducedBody":
         """The same body under a constant force [N] at its first contact."""
         return replace(self, force=force, bias=self.bias + force * self.rows[0]) if force else self
-
-    def lower(self, error: np.ndarray | float) -> "ReducedBody":
-        """The body with frequencies lower and compliances higher by their errors, those of frequencies relative."""
-        return replace(self, omega=self.omega / (1.0 + error), rest=self.rest + np.diag(self.doubt))
 
     def forms(self, rated: Sequence[bool]) -> np.ndarray:
         """Forms (n_ends, n_forms) of unit stiffness that stand for the modes left out; none where a spring does."""
@@ -130,7 +126,7 @@ class ReducedBody:
         moving = self.omega == 0.0
         if self.q.any() or self.p[~moving].any():
             raise ValueError("a body of Ritz vectors must start at rest; find its modes with find_modes")
-        other, rigid = part_of(modes, self.touched, self.points).pushed(self.force), modes.omega == 0.0
+        other, rigid = part_of(modes, self.touched, self.points).push_body(self.force), modes.omega == 0.0
         rows, velocity = other.rows, other.p
         if self.p.any():
             velocity = float(self.rows[0] @ self.p) * modes.rigid_motion(self.points[:1])

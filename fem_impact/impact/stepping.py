@@ -117,7 +117,7 @@ class Converged:
     """Two runs that agree, the finer one with its estimated errors."""
 
     scheme: str
-    steps: tuple[float, float]  # of the finer and the coarser run, as `engine.follow` takes them
+    steps: tuple[float, float]  # of the finer and the coarser run, as `engine.run_system` takes them
     fine: History
     coarse: History
     error: np.ndarray  # [-] of the finer run, as of `distance.of_runs`
@@ -160,9 +160,9 @@ class _Control:
     stretched: Stretched | None
 
     def follow_blow(self, size: float, chosen_by: str = "tolerance") -> History:
-        """One run, see `engine.follow`."""
+        """One run, see `engine.run_system`."""
         how = self.scheme, size, self.pace, self.options.last, self.stretched
-        return engine.follow(self.system, *how, chosen_by)
+        return engine.run_system(self.system, *how, chosen_by)
 
     def judge_runs(self, sizes: tuple[float, float], coarse: History, fine: History) -> Converged:
         """Two runs of a finer and a coarser size, and the errors of the finer one."""

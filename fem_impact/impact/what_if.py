@@ -33,7 +33,7 @@ class Followed:
     def again(self, parts: Sequence[ReducedBody], *, finely: bool = False) -> History:
         """The blow with these bodies, in the steps of the coarser run or, on request, of the finer."""
         how = self.runs.scheme, self.runs.steps[0 if finely else 1], self.pace, self.options.last
-        return engine.follow(joined(parts, self.laws), *how, stretched_in(parts))
+        return engine.run_system(joined(parts, self.laws), *how, stretched_in(parts))
 
     def changed(self, body: int, part: ReducedBody) -> list[ReducedBody]:
         """The bodies, with one of them changed."""
@@ -155,7 +155,8 @@ def mesh(blow: Followed, bodies: Sequence[Modes]) -> Variation:
     if worst <= 1e-4 * blow.options.tolerance:
         return Variation("mesh", ())
     for i, modes in of_elements:
-        softer[i] = softer[i].lower(0.0 if modes.frequency_error is None else modes.frequency_error)
+        error, part = 0.0 if modes.frequency_error is None else modes.frequency_error, softer[i]
+        softer[i] = replace(part, omega=part.omega / (1.0 + error), rest=part.rest + np.diag(part.doubt))
     return Variation("mesh", [[(softer, 1.0, 1.0)]])
 
 

@@ -190,14 +190,14 @@ def test_lossy_chatter_is_passed_in_ever_longer_rests():
 @pytest.fixture
 def runs(monkeypatch):
     """Steps of every run that `collide` makes, in order."""
-    taken, whole = [], engine.follow
+    taken, whole = [], engine.run_system
 
     def counted(*arguments):
         history = whole(*arguments)
         taken.append(len(history.steps))
         return history
 
-    monkeypatch.setattr(engine, "follow", counted)
+    monkeypatch.setattr(engine, "run_system", counted)
     return taken
 
 
