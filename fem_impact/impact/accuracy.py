@@ -8,7 +8,6 @@ from .._base import check
 from ..modes.modal import Modes
 from .contact import Contact, acting_stiffness, wall_time
 
-SMOOTH = 1.5, 3.0  # [-] the error falls as (omega_0 / omega_c)**min(1.5 + exponent, 3): fitted, see `left_out_error`
 SERIES_SHARE = 0.1  # [-] largest residual compliance times contact stiffness: above it, left-out modes shape the blow
 LOSSY = 5.0  # [-] a lossy contact errs this many times more: one mode, not a spring, replaces the left-out modes
 BAND = 4.0  # [-] kept modes reach at least this multiple of the contact frequency, however heavy the target
@@ -104,10 +103,11 @@ def order_of(exponent: float, dimension: int) -> float:
 def _order(exponent: Any) -> tuple[Any, Any]:
     """Power with which the error falls with the highest kept frequency, and the factor of the error.
 
-    The factor is 1 for linear contacts and 2 from Hertz on: 90 % of random blows on plates err less.
+    Both are fitted, see `left_out_error`. The factor is 1 for linear contacts and 2 from Hertz on: 90 % of random blows
+    on plates err less.
     """
-    power = np.minimum(SMOOTH[0] + exponent, SMOOTH[1])
-    return power, np.maximum(2.0 * (power - SMOOTH[0]) - 1.0, 1.0)
+    smooth = np.minimum(exponent, 1.5)
+    return 1.5 + smooth, np.maximum(2.0 * smooth - 1.0, 1.0)
 
 
 def left_out_density(modes: Modes, point: np.ndarray) -> tuple[float, float]:

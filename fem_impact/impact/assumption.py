@@ -7,11 +7,7 @@ from typing import Any
 
 from .quantities import NAMES as QUANTITY_NAMES
 
-# [-] a larger effect is beyond a first-order estimate: its square, what such an estimate leaves out, is then 4 %
-BEYOND = 0.2
 SILENT = 1e-4  # [-] effects that are never worth a line of their own
-# [-] of the tolerance: an assumption that changes the blow by less gets no line, as several may still add up
-SHARE = 0.1
 ALL = (
     "thin target", "shallow target", "thin striker", "small deflections", "no yielding", "local contact",
     "quasi-static contact", "no friction", "still air", "stated damping",
@@ -76,8 +72,8 @@ class Assumption:
 
     @property
     def beyond(self) -> bool:
-        """Whether the effect is larger than a first-order estimate can tell."""
-        return self.worst > BEYOND
+        """Whether the effect is larger than a first-order estimate tells, which leaves out its square, 4 %."""
+        return self.worst > 0.2
 
     @property
     def doubtful(self) -> bool:
@@ -156,10 +152,14 @@ def allowed(tolerance: float) -> float:
     return max(tolerance, ENOUGH)
 
 
+def negligible_effect(tolerance: float) -> float:
+    """Effect [-] up to which an assumption gets no line: a tenth of the tolerance, as several may still add up."""
+    return max(SILENT, 0.1 * tolerance)
+
+
 def lines(assumptions: Sequence[Assumption], tolerance: float) -> list[str]:
     """The examination in words: whether the model holds, and a line for each assumption that matters."""
-    worth = max(SILENT, SHARE * tolerance)
-    telling = [each for each in assumptions if each.worst > worth or each.doubtful]
+    telling = [each for each in assumptions if each.worst > negligible_effect(tolerance) or each.doubtful]
     return [head(assumptions, tolerance), *(each.sentence for each in sorted(telling, key=lambda each: -each.worst))]
 
 
@@ -188,7 +188,7 @@ def head(assumptions: Sequence[Assumption], tolerance: float) -> str:
     if said:
         return "; ".join(said)
     holds = f"to {error:.1g}"
-    if error <= max(SILENT, SHARE * tolerance):
+    if error <= negligible_effect(tolerance):
         holds = f"to better than 1e{max(round(math.log10(SILENT)), math.ceil(math.log10(error or SILENT)))}"
     taken = ", with the contact as stated" if any(not each.known for each in assumptions) else ""
     return f"the model holds {holds}{taken}"

@@ -36,9 +36,6 @@ OF_STRIKER = {
 # numbers that scenes take without their intervals: nu changes plates less than E does, by a tenth at most, and bodies
 # with another nu need modes of their own; a yield strength changes no blow of an elastic body
 SINGLE = ("nu", "yield_strength")
-ACROSS_NU = 0.3  # [-] Poisson's ratio that stands for those of wood pressed across its grain: 0.5 makes it 18 % stiffer
-# [-] by how much wood, pressed across its grain through a point, may differ from a body that is as soft in every way
-ACROSS = 0.5
 
 T = TypeVar("T")
 
@@ -131,8 +128,10 @@ def _pressed(entry: Entry, on: Material | None) -> dict[str, float]:
     radius, E, nu = (facts[name] for name in (("radius", "E", "nu") if "radius" in facts else TIP))
     tip, under, wood = pressed_compliance(E.value, nu.value), 0.0, 0.0
     if on is not None:
-        wood = 0.0 if on.E_across is None else ACROSS
-        under = pressed_compliance(*(on.E_across, ACROSS_NU) if on.E_across else (on.E, on.nu))
+        # wood pressed across its grain may differ by half from a body that is as soft in every way; 0.3 stands for its
+        # Poisson's ratios: 0.5 makes it 18 % stiffer
+        wood = 0.0 if on.E_across is None else 0.5
+        under = pressed_compliance(*(on.E_across, 0.3) if on.E_across else (on.E, on.nu))
     stiffness, share = hertz_stiffness(tip + under, radius.value), tip / (tip + under)
     about = float(np.hypot(0.5 * _about(radius) + share * _about(E), (1.0 - share) * wood))
     return {"value": stiffness, "about": about}

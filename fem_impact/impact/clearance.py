@@ -34,7 +34,9 @@ def nearest(hit: Response) -> tuple[float, float | None]:
     duration = hit.impacts[0].duration
     scale = hit.speed * duration
     free = replace(history, start_q=history.end_q, start_p=history.end_p, steps=history.steps[:0])
-    span = _span(history, scale)
+    flexible = history.omega > 0.0
+    slowest = history.omega[flexible].min() if flexible.any() else np.inf
+    span = max(duration, min(float(history.bridged(FAR * scale)[0]), 1e3 * duration + 2.0 * np.pi / slowest))
     count = int(np.clip(LOOKS[0] * span / duration, *LOOKS))
     times = np.linspace(0.0, span, count + 1)
     d, v = _approach(free, times)
@@ -56,19 +58,6 @@ def slopes(hit: Response, names: tuple[str, ...], sections: Mapping[str, tuple[f
     if nearest(hit)[1] is None:
         return np.zeros(len(names))
     return differences(Parameters(hit, sections), names, lambda blow: [nearest(blow)[0]])[0][0]
-
-
-def _span(history: History, scale: float) -> float:
-    """How long the modes together can bring the surfaces within `FAR` of each other [s]."""
-    rigid, shape = history.omega == 0.0, history.shape[0]
-    size = np.hypot(history.end_q, history.end_p / np.where(rigid, 1.0, history.omega))
-    reach = float(np.abs(shape[~rigid]) @ size[~rigid]) + abs(float(history.offset[0]))
-    reach += abs(float(shape[rigid] @ history.end_q[rigid])) + FAR * scale
-    apart = -float(shape[rigid] @ history.end_p[rigid])  # [m/s]
-    slowest = history.omega[~rigid].min(initial=np.inf)
-    cycles = 2.0 * np.pi / slowest if np.isfinite(slowest) else 0.0
-    duration = float(history.contacts[0, 1] - history.contacts[0, 0])
-    return max(duration, min(reach / apart, 1e3 * duration + cycles)) if apart > 0.0 else 1e3 * duration + cycles
 
 
 def _approach(free: History, times: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -23,7 +23,6 @@ from .striker import Striker
 
 LOSSY_STRIKER = 30.0  # [-] a lossy contact multiplies the truncation error of a striker by this: its modes are sparse
 OF_STRIKE = "striker_force", "target_force", "stretching"  # options that `collide` does not have
-STRIKER_SHARE = 0.05  # [-] fraction of the tolerance for the striker's left-out modes: keeping them is cheap
 
 
 @dataclass(frozen=True, repr=False)
@@ -58,7 +57,7 @@ def strike(
     speed = speed if speed is None else check.non_negative("speed", speed, "m/s")
     before = start.state() if isinstance(start, Response) else start
     point, asked = modes.point("at", at), Options(**options)
-    struck = part_of(modes, ((0, -1.0),), point, asked.residual).pushed(asked.target_force)
+    struck = part_of(modes, ((0, -1.0),), point, asked.residual).push_body(asked.target_force)
     if before is not None:
         q, p = before.of(-1, "modes", modes)
         struck = replace(struck, q=q, p=p)
@@ -66,9 +65,9 @@ def strike(
         struck = replace(struck, stretching=stretch(modes))
 
     def blow(striker: Striker, speed: float, own: tuple[np.ndarray, np.ndarray] | None = None) -> Response:
-        arriving = part_of_striker(striker, asked.residual).pushed(asked.striker_force)
+        arriving = part_of_striker(striker, asked.residual).push_body(asked.striker_force)
 
-        def start(one: float = 1.0, other: float = 1.0) -> list[ReducedBody]:
+        def start_bodies(one: float = 1.0, other: float = 1.0) -> list[ReducedBody]:
             """Both bodies at the start, each as fast as it is known times a factor."""
             target = struck if other == 1.0 else struck.faster(other)
             if own is None:  # the striker arrives at the surface, wherever that is
@@ -79,8 +78,8 @@ def strike(
             return [moving.faster(one), replace(target, pressed=pressed)]
 
         doubt = 0.0 if before is None else 1.0 + before.error
-        others = [start(*factors) for factors in ((doubt, 1.0), (1.0, doubt))[own is None :] if doubt]
-        return _follow((striker.body, modes), (contact,), start(), speed, asked, striker, point[0], others)
+        others = [start_bodies(*factors) for factors in ((doubt, 1.0), (1.0, doubt))[own is None :] if doubt]
+        return _follow((striker.body, modes), (contact,), start_bodies(), speed, asked, striker, point[0], others)
 
     if speed is None:
         assert before is not None
@@ -178,7 +177,7 @@ def met(
 
 def touching(bodies: Sequence[Modes], touch: Touch, speed: float, residual: bool) -> tuple[KernelSystem, float]:
     """Two bodies that are to touch, the first moving, as the kernels take them, and how long the contact may last."""
-    parts, _ = _parts(bodies, [touch], [speed, 0.0], None, None, residual)
+    parts, _ = _parts(bodies, [touch], [speed, 0.0], None, None, residual, {})
     system = joined(parts, [touch.law])
     return system, engine.pace_of(system)[0]
 
@@ -199,7 +198,12 @@ def _follow(bodies, laws, parts, speed, options, striker=None, at=None, others=(
         held += range(first, first + part.held)
         first += len(part.omega)
     pace = engine.pace_of(system, held)
-    _check_way(system, pace[0] * pace[1], options.tolerance)
+    depth, way = pace[0] * pace[1], max(np.abs(system.offset).tolist())
+    if EPSILON * way > options.tolerance * depth:
+        raise ValueError(
+            f"gap and constant forces must be smaller: with an offset of {way:.3g} m, rounding spoils an approach of "
+            f"{depth:.3g} m beyond the tolerance of {options.tolerance:g}; start nearer to contact"
+        )
     found = refine_steps(system, options, pace, stretched)
     for i, law in enumerate(laws):
         law.law.check_reached(law, found.fine, i)
@@ -224,17 +228,7 @@ def _follow(bodies, laws, parts, speed, options, striker=None, at=None, others=(
     )  # fmt: skip
 
 
-def _check_way(system: KernelSystem, depth: float, tolerance: float) -> None:
-    """Raise ValueError if rounding of a large offset would spoil the approach in contact, about ``depth`` [m]."""
-    way = max(np.abs(system.offset).tolist())
-    if EPSILON * way > tolerance * depth:
-        raise ValueError(
-            f"gap and constant forces must be smaller: with an offset of {way:.3g} m, rounding spoils an approach of "
-            f"{depth:.3g} m beyond the tolerance of {tolerance:g}; start nearer to contact"
-        )
-
-
-def _parts(bodies, contacts, speeds, states, forces, residual, strikers=None) -> tuple[list[ReducedBody], float]:
+def _parts(bodies, contacts, speeds, states, forces, residual, strikers) -> tuple[list[ReducedBody], float]:
     """Every body as a `ReducedBody`, and the speed of the first body that moves; ``strikers`` by their number."""
     if states is not None:
         wrong = not isinstance(states, (list, tuple)) or len(states) != len(bodies)
@@ -251,18 +245,18 @@ def _parts(bodies, contacts, speeds, states, forces, residual, strikers=None) ->
                 continue
             if not 0 <= body < len(bodies):
                 raise ValueError(f"contacts must name bodies from 0 to {len(bodies) - 1}, got {body}")
-            at = strikers[body].at if strikers and at is None and body in strikers else at
+            at = strikers[body].at if at is None and body in strikers else at
             ends[body].append((i, sign, bodies[body].point("at", at)))
     parts, arriving = [], 0.0
     for body, modes in enumerate(bodies):
         points = np.vstack([point for _, _, point in ends[body]] or [np.zeros((0, modes.dimension))])
         touched = tuple((i, sign) for i, sign, _ in ends[body])
-        part = part_of(modes, touched, points, residual).pushed(float(forces[body]))
+        part = part_of(modes, touched, points, residual).push_body(float(forces[body]))
         if states is not None:
             q, p = (check.array(f"states[{body}]", value, (modes.n_modes,)) for value in states[body])
             part = replace(part, q=q, p=p)
         speed, own = float(speeds[body]), None
-        if strikers and body in strikers and touched:
+        if body in strikers and touched:
             own, comes = strikers[body].motion, float(part.rows[0] @ strikers[body].motion)
             if comes <= 0.0 and speed:
                 raise ValueError(f"first_at of body {body} must come towards the other body as the striker arrives")
@@ -281,14 +275,14 @@ def _parts(bodies, contacts, speeds, states, forces, residual, strikers=None) ->
 def striker_modes(striker: Striker, *, contact: Contact, speed: float, tolerance: float) -> tuple[int, float]:
     """How many striker modes a blow needs, and the error [-] allowed of leaving out the others.
 
-    That is only STRIKER_SHARE of the tolerance, because striker modes cost little; zero if there are no others.
+    That is only a twentieth of the tolerance, because striker modes cost little; zero if there are no others.
     """
     modes, mass = striker.modes, striker.felt_mass
     if modes.n_modes == modes.n_rigid:
         return modes.n_rigid, 0.0
-    allowed = STRIKER_SHARE * tolerance / (LOSSY_STRIKER if contact.rated else 1.0)
+    allowed = 0.05 * tolerance / (LOSSY_STRIKER if contact.rated else 1.0)
     omega_0 = 2.0 * np.pi * accuracy.contact_resonance(contact, mass, speed)
-    whole, density, s = striker.bending
+    whole, density, s = striker.bending_compliance
     if not contact.rated and mass * omega_0**2 * whole <= allowed:  # what replaces modes under loss needs one below
         return modes.n_rigid, allowed
     limit = accuracy.cutoff(density, s, omega_0, contact.exponent, mass, allowed)
@@ -299,9 +293,8 @@ def striker_error(striker: Striker, n_modes: int, *, contact: Contact, speed: fl
     """Expected error [-] if a striker keeps only its first ``n_modes`` modes."""
     highest = float(striker.modes.frequencies[max(n_modes - 1, 1)])
     law: dict[str, Any] = {"contact": contact, "mass": striker.felt_mass, "speed": speed}
-    return accuracy.truncation_error(striker.modes, striker.at, highest, **law) * (
-        LOSSY_STRIKER if contact.rated else 1.0
-    )
+    error = accuracy.truncation_error(striker.modes, striker.at, highest, **law)
+    return LOSSY_STRIKER * error if contact.rated else error
 
 
 def shortened(striker: Striker, n_modes: int) -> Striker:

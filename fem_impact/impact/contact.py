@@ -12,8 +12,6 @@ from .compiled.law import MARKS, NUMBERS, Law, Numbers, Row, law_of, row_of
 from .compiled.laws.power import wall_time as wall_time
 
 LOWEST_EXPONENT, HIGHEST_EXPONENT = 0.5, 100.0  # [-] limits: below, no longer a spring; above, a wall
-
-MOST_LOSS = 1e12  # [s/m] far above that of a contact that swallows the slowest blow whole
 YIELDS = 1.6  # [-] fact: pressure at which a round contact first yields, over the yield strength, for nu = 0.3
 STIFFEST = 1e200  # [N/m**exponent] upper limit, 1/STIFFEST the lower: high exponents need huge stiffnesses
 
@@ -41,7 +39,8 @@ class Contact(Numbers):
             misfit=check.between("misfit", self.misfit, 0.0, 0.1),
             stiffness=check.positive("stiffness", self.stiffness, "N/m**exponent", reach=STIFFEST),
             exponent=check.between("exponent", self.exponent, LOWEST_EXPONENT, HIGHEST_EXPONENT),
-            loss=check.between("loss", check.non_negative("loss", self.loss, "s/m"), 0.0, MOST_LOSS, "s/m"),
+            # the limit is far above that of a contact that swallows the slowest blow whole
+            loss=check.between("loss", check.non_negative("loss", self.loss, "s/m"), 0.0, 1e12, "s/m"),
             gap=check.number("gap", self.gap, "m"),
             **{
                 name: check.non_negative(name, getattr(self, name), unit) if most == np.inf

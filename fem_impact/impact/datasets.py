@@ -36,8 +36,13 @@ def dataset(hit: "Response", points: Any = None, times: Any = None, max_frequenc
     data |= {f"energy_{name}": ((), value, {"units": "J"}) for name, value in hit.energies.items()}
     places: dict[str, Any] = {"time": ("time", hit.time, {"units": "s", "long_name": "time"})}
     if points is not None:
-        moved, where = _motion(hit, points, hit.time if times is None else times)
-        data, places = data | moved, places | where
+        moments = check.array("times", hit.time if times is None else times, (None,), "s", lift=True)
+        points = check.places("points", points, hit.bodies[-1].dimension)
+        places["moment"] = "moment", moments, {"units": "s", "long_name": "time"}
+        places |= {axis: ("point", column, {"units": "m", "long_name": axis}) for axis, column in zip("xy", points.T)}
+        for name, unit in (("displacement", "m"), ("velocity", "m/s")):
+            motion = getattr(hit, name)(points, moments)
+            data[name] = ("moment", "point"), motion, {"units": unit, "long_name": name}
     elif times is not None:
         raise ValueError("times must come with points, where the motion is wanted")
     if max_frequency is not None:
@@ -45,23 +50,6 @@ def dataset(hit: "Response", points: Any = None, times: Any = None, max_frequenc
         frequencies, spectrum = hit.band_spectrum(highest)
         places["frequency"] = "frequency", frequencies, {"units": "Hz", "long_name": "frequency"}
         data["spectrum"] = "frequency", abs(spectrum), {"units": "N s", "long_name": "spectrum of the force"}
-    told = {"tolerance": hit.tolerance, "tolerance_met": int(hit.tolerance_met), "verdict": hit.verdict}
-    ended = {
-        "trusted": int(hit.trusted),
-        "outcome": hit.outcome,
-        "in_contact": int(hit.in_contact),
-        "notes": "\n".join(hit.notes),
-    }
-    return xarray.Dataset(data, places, told | ended)
-
-
-def _motion(hit: "Response", points: Any, times: Any) -> tuple[dict[str, Any], dict[str, Any]]:
-    """Displacement and velocity at points over moments, and their coordinates."""
-    moments, target = check.array("times", times, (None,), "s", lift=True), hit.bodies[-1]
-    points = check.places("points", points, target.dimension)
-    places: dict[str, Any] = {"moment": ("moment", moments, {"units": "s", "long_name": "time"})}
-    places |= {axis: ("point", column, {"units": "m", "long_name": axis}) for axis, column in zip("xy", points.T)}
-    dims, moved = ("moment", "point"), {}
-    for name, unit in (("displacement", "m"), ("velocity", "m/s")):
-        moved[name] = dims, getattr(hit, name)(points, moments), {"units": unit, "long_name": name}
-    return moved, places
+    told: dict[str, Any] = {"tolerance": hit.tolerance, "tolerance_met": int(hit.tolerance_met), "verdict": hit.verdict}
+    told |= {"trusted": int(hit.trusted), "outcome": hit.outcome, "in_contact": int(hit.in_contact)}
+    return xarray.Dataset(data, places, told | {"notes": "\n".join(hit.notes)})

@@ -24,10 +24,6 @@ STEP_SHARE = 0.1
 MAX_STEPS = 500_000  # [-] of one run: a time limit of about one second
 # [-] modes, or entries of the forms of stretching, times steps of one run: a time limit of some seconds
 MAX_WORK = 1_000_000_000
-# [-] modes times steps of one run in plain Python: the same time limit, as it is 3 000 times slower than the kernels
-PLAIN_WORK = 300_000
-SOONER = 0.2  # [-] of a run that was given up, what is advised: the last run of a blow halves the steps twice
-FIRST_STEPS = 24.0  # [-] steps per contact with which A4 meets TOLERANCE in most blows; cheapest first run of 12 to 32
 # [-] times per contact at which a flight is searched for near misses or two motions are compared, and their most
 LOOKS = 16.0, 20_000
 NODES = 5  # [-] of collocation; more gain nothing, because the force is not smooth at onset and release
@@ -42,11 +38,14 @@ def gauss(count: int) -> tuple[np.ndarray, np.ndarray]:
 
 
 def steps_per_contact(tolerance: float, power: float = 0.25) -> float:
-    """Steps per contact with which a scheme meets a tolerance in most blows; ``power`` is 1 / order, 1/4 of A4."""
-    return float(FIRST_STEPS * (TOLERANCE / tolerance) ** power)
+    """Steps per contact with which a scheme meets a tolerance in most blows; ``power`` is 1 / order, 1/4 of A4.
+
+    A4 needs 24 for TOLERANCE: of 12 to 32, the cheapest first run.
+    """
+    return float(24.0 * (TOLERANCE / tolerance) ** power)
 
 
-def follow(
+def run_system(
     system: KernelSystem, scheme: str, size: float, pace: tuple[float, float], last: tuple[float, int],
     stretched: Stretched | None = None, chosen_by: str = "tolerance",
 ) -> History:  # fmt: skip
@@ -67,10 +66,11 @@ def follow(
     history = History(*system, *(*result, stretched))
     time, status = result[5], result[6]
     if status == record.EXHAUSTED:
-        ended = int(SOONER * np.count_nonzero(history.contacts[:, 1] < time))
+        sooner = 0.2  # [-] of this run, what is advised: the last run of a blow halves the steps twice
+        ended = int(sooner * np.count_nonzero(history.contacts[:, 1] < time))
         raise SimulationError(
             f"no final separation was reached in {most} steps, up to {time:.4g} s; raise {chosen_by}, or give a "
-            f"duration of at most {float(f'{SOONER * time:.1e}'):g} s"
+            f"duration of at most {float(f'{sooner * time:.1e}'):g} s"
             + (f" or max_impacts of at most {ended}" if ended else "")
         )
     if status == record.FAILED:
@@ -93,7 +93,8 @@ def again(history: History, step: float | None = None, **changed: Any) -> Histor
     most = int(np.isfinite(history.contacts[:, 6]).sum()) if history.status == record.IMPACTS else 0
     for array in system:
         array.setflags(write=False)  # or numba would compile the kernels again for writable arrays
-    return follow(system, "A4", pace[0] / FIRST_STEPS if step is None else step, pace, (horizon, most), stretched)
+    size = pace[0] / steps_per_contact(TOLERANCE) if step is None else step
+    return run_system(system, "A4", size, pace, (horizon, most), stretched)
 
 
 def pace_of(system: KernelSystem, held: Sequence[int] = ()) -> tuple[float, float]:
@@ -138,7 +139,7 @@ def pace_of(system: KernelSystem, held: Sequence[int] = ()) -> tuple[float, floa
 
 def most_steps(system: KernelSystem, stretched: Stretched | None) -> int:
     """Steps after which a run gives up."""
-    if build.limited():
-        return build.most_steps(max(100, PLAIN_WORK // len(system.omega)))
+    if build.limited():  # the same time limit in plain Python, which is 3 000 times slower than the kernels
+        return build.most_steps(max(100, 300_000 // len(system.omega)))
     work = len(system.omega) if stretched is None else stretched.forms.size
     return min(MAX_STEPS, max(1000, MAX_WORK // work))

@@ -12,14 +12,9 @@ from scipy import fft, special
 
 from .._base import check
 
-LEAST_SAMPLES = 800.0  # [-] per impact: its spectrum errs by less than 1e-3 up to the thirtieth lobe
-FEW = 2**12  # [-] pieces times frequencies up to which the direct sum is faster
 MOST_PERIODS = 2.0**18  # [-] periods of the highest frequency in a blow whose centroid is sought: takes half a second
-MOST_NODES = 2**24  # [-] nodes or cells of a transform, to limit the memory to two gigabytes; above it, the direct sum
-TERMS = 14  # [-] of the series: for phases up to a half, that of a cell's end, they leave 0.5**14 / 14! = 7e-16
 WINDOW = 8  # [-] half width of the window that interpolates from twice as many even frequencies: errs by 4e-16
 BETA = 1.5 * np.pi * WINDOW  # [-] fact: best shape of the window, that of Kaiser and Bessel
-EVEN = 1e-15  # [-] of the highest frequency: rounding of frequencies that are evenly spaced from zero on
 # Gauss rules, and half the phase [rad] over a piece at which they err by 1e-15 of its force, by their error term
 RULES = {n: np.polynomial.legendre.leggauss(n) for n in range(2, 12)}
 REACH = {
@@ -50,10 +45,11 @@ def of_pieces(pieces: Pieces, frequencies: np.ndarray) -> np.ndarray:
     """
     t, h, _, _ = pieces
     n, n_terms = len(frequencies), len(t) * len(frequencies)
-    if n_terms <= FEW:
+    if n_terms <= 2**12:  # the direct sum is faster
         return directly(pieces, frequencies)
     step = frequencies[1] if n > 1 else 0.0
-    evenly = step > 0.0 and np.abs(frequencies - step * np.arange(n)).max() <= EVEN * frequencies[-1]
+    # but for their rounding, from zero on
+    evenly = step > 0.0 and np.abs(frequencies - step * np.arange(n)).max() <= 1e-15 * frequencies[-1]
     span = t[-1] + h[-1]
     if not evenly:
         step = 0.5 / span
@@ -61,19 +57,13 @@ def of_pieces(pieces: Pieces, frequencies: np.ndarray) -> np.ndarray:
     half_phase = np.pi * step * (count - 1.0) * h
     rule = min(REACH, key=lambda n: n * np.ceil(half_phase / REACH[n]).sum())
     parts = np.maximum(np.ceil(half_phase / REACH[rule]), 1.0)  # into which a long piece is cut
-    if not max(rule * parts.sum(), 2.0 * np.pi * count) <= min(n_terms, MOST_NODES):
+    # as many nodes or cells as the direct sum has terms cost more, and beyond 2**24 more than two gigabytes
+    if not max(rule * parts.sum(), 2.0 * np.pi * count) <= min(n_terms, 2**24):
         return directly(pieces, frequencies)
     time, impulse = _impulses(pieces, rule, parts.astype(int))
     if evenly:
-        return _transform(time, impulse, step, n)
+        return transform_impulses(time, impulse, step, n)
     return _interpolated(time, impulse, span, int(count), frequencies)
-
-
-def of_impulses(time: np.ndarray, impulse: np.ndarray, frequencies: np.ndarray) -> np.ndarray:
-    """Sum of impulses (n,) [N s] at ascending times (n,) [s], times exp(-i omega t); even frequencies from zero on."""
-    if len(time) * len(frequencies) <= FEW:
-        return np.asarray(np.exp(-2j * np.pi * frequencies[:, None] * time) @ impulse)
-    return _transform(time, impulse, frequencies[1], len(frequencies))
 
 
 def directly(pieces: Pieces, frequencies: np.ndarray) -> np.ndarray:
@@ -102,7 +92,7 @@ def _impulses(pieces: Pieces, rule: int, parts: np.ndarray) -> tuple[np.ndarray,
     return (t + h * share).T.ravel(), impulse.T.ravel()
 
 
-def _transform(time: np.ndarray, impulse: np.ndarray, step: float, count: int) -> np.ndarray:
+def transform_impulses(time: np.ndarray, impulse: np.ndarray, step: float, count: int) -> np.ndarray:
     """Sum of impulse exp(-i omega time) at frequencies 0, step, 2 step, ... [Hz], (count,), by cells of a radian."""
     # a fast transform of this length repeats itself over the cells, so that later ones may be folded into it
     n_cells = fft.next_fast_len(max(1, int(np.ceil(2.0 * np.pi * (count - 1)))), real=True)
@@ -112,7 +102,7 @@ def _transform(time: np.ndarray, impulse: np.ndarray, step: float, count: int) -
     cell, beside = near[first].astype(int) % n_cells, place - near
     turn = 2.0 * np.pi / n_cells * np.arange(count)
     factor, total = np.ones(count, complex), np.zeros(count, complex)
-    for k in range(TERMS):
+    for k in range(14):  # for phases up to a half, that of a cell's end, the series then errs by 0.5**14 / 14! = 7e-16
         total += factor * fft.rfft(np.bincount(cell, np.add.reduceat(impulse, first), n_cells))[:count]
         impulse, factor = impulse * beside, factor * turn * (-1j / (k + 1.0))
     return total
@@ -127,7 +117,7 @@ def _interpolated(
     """
     step, middle = 0.5 / span, 0.5 * span
     root = np.sqrt(BETA**2 - (2.0 * np.pi * WINDOW * step * (time - middle)) ** 2)
-    even = _transform(
+    even = transform_impulses(
         time, impulse * root * np.exp(-root) / WINDOW, step, count
     )  # 2 sinh is exp to rounding: root > 33
     place = frequencies / step

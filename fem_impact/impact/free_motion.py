@@ -3,12 +3,14 @@
 import numpy as np
 
 BLOCK = 128, 128  # [-] times in a block, and blocks computed at a time: does not change the result
-CRITICAL = 1e-6  # [-] damping ratios closer to 1 become 1 plus this: at 1 the two roots coincide; test_free_motion.py
 
 
 def roots(omega: np.ndarray, zeta: np.ndarray) -> np.ndarray:
-    """Both roots [1/s] of ``s**2 + 2 zeta omega s + omega**2`` for each mode, (2, n_modes)."""
-    zeta = np.where(np.abs(zeta - 1.0) < CRITICAL, 1.0 + CRITICAL, zeta)
+    """Both roots [1/s] of ``s**2 + 2 zeta omega s + omega**2`` for each mode, (2, n_modes).
+
+    They would coincide at a damping ratio of 1: up to a millionth from it, it counts as a millionth more.
+    """
+    zeta = np.where(np.abs(zeta - 1.0) < 1e-6, 1.0 + 1e-6, zeta)
     split = omega * np.sqrt(zeta**2 - 1.0 + 0j)
     return np.stack([-zeta * omega + split, -zeta * omega - split])
 

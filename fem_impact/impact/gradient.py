@@ -28,20 +28,13 @@ QUANTITIES = (
     "restitution", "impulse", "contact_time", "peak_force", "peak_time", "spectral_centroid", "spectral_level",
     "modal_energy",
 )  # fmt: skip
-GRAZE = 1e-3  # [-] of the deepest approach: a touch or gap below it may come or go with a change of a thousandth
-TIE = 1e-4  # [-] of the largest force: where two maxima are so alike, a change of 1e-4 may make the other the largest
 NUDGE = 1e-5  # [-] relative change of a number: its square is far below any tolerance, rounding over it below 1e-9
-# [-] difference of the slopes on both sides, over the value or the largest slope: 1e-4 to 5e-4 where a blow is smooth
-KINK = 0.02
 # [-] steps of the blow over those of the runs, and changes of a number in them: the first give the slopes, the others,
 # which err some ten times less, the error
 RUNS = (2.0, 2.0 * NUDGE), (4.0, NUDGE)
-CAUTION = 3.0  # [-] error stated over the difference of both
-LEAST = 1e-8  # [-] of the largest slope per relative change: rounding over `NUDGE`
-UNSURE = 5.0  # [-] times the error of when the force is largest: its top is flat, and ripples move it
 # Gauss nodes of a step and their weights: a force that sets in like x**1.5 loses 1e-9 of its impulse
 NODES, WEIGHTS = np.polynomial.legendre.leggauss(4)
-FEW, MANY = 2, 16  # [-] looks per step for the largest force, and for others nearly as large
+FEW = 2  # [-] looks per step for the largest force
 ZOOMS, ABOUT = 3, np.linspace(-1.0, 1.0, 17)  # how often and where about the largest of these looks it is looked for
 INSTEAD = "take differences of runs with the number changed, at a smaller tolerance"
 
@@ -121,7 +114,11 @@ def gradients(
     """
     sections = sections or {}
     several = (quantity,) if isinstance(quantity, str) else check.several("quantity", quantity, str)
-    wanted = [_asked(item) for item in several]
+    wanted = []
+    for item in several:
+        name, band = name_and_band(item)
+        name = check.one_of("quantity", {"force": "peak_force"}.get(name, name), QUANTITIES)
+        wanted.append((name, checked_band(name, band, name.startswith("spectral"))))
     _check_possible(hit, wanted, bool(sections))
     parameters = Parameters(hit, sections)
     names = parameters.checked(wrt)
@@ -130,12 +127,13 @@ def gradients(
     span = max(impact.end for impact in hit.impacts)
     bands = [band for name, band in wanted if band is not None and name == "spectral_centroid"]
     frequencies = {band: force_spectrum.dense_frequencies(band, span) for band in bands}
-    told = partial(_told, wanted=wanted, frequencies=frequencies)
+    told = partial(read_quantities, wanted=wanted, frequencies=frequencies)
     found = {}
     for (name, band), value, (slopes, error) in zip(wanted, values, differences(parameters, names, told)):
         label = name if band is None else f"{name}={band:g}"
-        doubt = UNSURE * error if name == "peak_time" else error
-        found[label] = Gradient(label, value, names, numbers, slopes, doubt)
+        if name == "peak_time":  # the top of a force is flat, and ripples move it
+            error = 5.0 * error
+        found[label] = Gradient(label, value, names, numbers, slopes, error)
     return found
 
 
@@ -150,7 +148,8 @@ def differences(
     runs = [replace(again, step=again.step / finer).slopes(sizes, one_sided, nudge) for finer, nudge in RUNS]
     found = []
     for slopes, finer in zip(*runs):
-        error = CAUTION * np.abs(slopes - finer) + LEAST * np.abs(slopes).max(axis=0)
+        # the last is rounding over NUDGE
+        error = 3.0 * np.abs(slopes - finer) + 1e-8 * np.abs(slopes).max(axis=0)
         by = sizes.reshape(-1, *[1] * (slopes.ndim - 1))
         found.append((slopes / by, error / by))
     return found
@@ -177,12 +176,12 @@ def _check_possible(hit: "Response", wanted: list[tuple[str, float | None]], sec
         raise SimulationError(
             "no gradient of modal_energy: the modes that ring did not carry the blow; strike modes of find_modes"
         )
-    if h.nearest_turn < GRAZE:
+    if h.nearest_turn < 1e-3:
         raise SimulationError(
             f"no gradient next to a grazing contact: {h.nearest_turn:.1g} of the deepest approach more or less, and "
             "the bodies touch once more or less often; take a slightly heavier or lighter striker, or strike elsewhere"
         )
-    if any(name.startswith("peak") for name in asked) and (apart := _apart(h)) < TIE:
+    if any(name.startswith("peak") for name in asked) and (apart := _apart(h)) < 1e-4:
         raise SimulationError(
             f"no gradient of the peak force: two maxima differ by {apart:.1e} of it, and a small change may make "
             "the other the largest"
@@ -197,7 +196,7 @@ def _value(hit: "Response", name: str, band: float | None) -> Any:
     if name == "restitution" and hit.restitution is None:
         raise SimulationError(f"no gradient of restitution: {rebound(hit, 5)}")
     if band is not None or name in ("peak_time", "modal_energy"):
-        return _told(hit, [(name, band)], {})[0]
+        return read_quantities(hit, [(name, band)], {})[0]
     return getattr(hit, name)
 
 
@@ -236,7 +235,8 @@ class Again:
             rows.append([(b - a) / (2.0 * nudge) - one * c for a, b, c in zip(low, high, bends[-1])])
         found = [np.array(each) for each in zip(*rows)]
         for value, slopes, bend in zip(plain, found, zip(*bends)):
-            if np.max(np.abs(bend)) > KINK * max(np.max(np.abs(value)), np.max(np.abs(slopes))):
+            # slopes on both sides differ by 1e-4 to 5e-4 where a blow is smooth
+            if np.max(np.abs(bend)) > 0.02 * max(np.max(np.abs(value)), np.max(np.abs(slopes))):
                 raise SimulationError(
                     "no gradient: slopes on both sides of this blow differ, as with a small change of some number "
                     "another force becomes the largest, or a later push yields further; change some number slightly"
@@ -252,7 +252,7 @@ def step_of(hit: "Response") -> float:
     return float(h.steps[h.pressed.any(axis=1), layout.LENGTH].max())
 
 
-def _told(
+def read_quantities(
     blow: "Response", wanted: list[tuple[str, float | None]], frequencies: Mapping[float, np.ndarray]
 ) -> list[Any]:
     """The quantities of a blow; ``frequencies`` [Hz] are those of the spectrum of each band."""
@@ -262,11 +262,13 @@ def _told(
             part, h = blow.body_slice(len(blow.bodies) - 1), blow.history
             found.append(mode_energy(h.omega[part], h.end_q[part], h.end_p[part]))
         elif band is not None:
-            asked = frequencies[band] if name == "spectral_centroid" else np.array([0.0, band])
-            spectrum = force_spectrum.of_impulses(*_impulses(blow.history), asked)
-            found.append(
-                force_spectrum.centroid(asked, spectrum) if name == "spectral_centroid" else level_of(spectrum)
-            )
+            time, impulse = _impulses(blow.history)
+            if name == "spectral_centroid":
+                asked = frequencies[band]
+                spectrum = force_spectrum.transform_impulses(time, impulse, asked[1], len(asked))
+                found.append(force_spectrum.centroid(asked, spectrum))
+            else:
+                found.append(level_of(np.exp(-2j * np.pi * np.array([[0.0], [band]]) * time) @ impulse))
         elif name.startswith("peak"):
             found.append(largest(blow.history)[name == "peak_force"])
         else:
@@ -276,10 +278,9 @@ def _told(
 
 def _looks(history: History, c: int, count: int) -> np.ndarray:
     """Force [N] of contact c at so many equal fractions of every step, in order of time; zero where it is open."""
-    force = np.zeros((len(history.steps), count))
-    rows = np.flatnonzero(history.pressed[:, c])
-    force[rows] = history.force(rows, c, np.arange(count) / count)
-    return force.ravel()
+    rows = np.arange(len(history.steps)).repeat(count)
+    force = history.force_of(rows, c, np.resize(np.arange(count) / count, len(rows)))[0]
+    return np.where(history.pressed[rows, c], force, 0.0)
 
 
 def largest(history: History) -> tuple[float, float]:
@@ -305,7 +306,7 @@ def _apart(history: History) -> float:
     """By how much the largest force exceeds the next of the maxima [-]."""
     maxima = []
     for c in range(history.n_contacts):
-        force = np.pad(_looks(history, c, MANY), 1)
+        force = np.pad(_looks(history, c, 16), 1)
         maxima.append(force[1:-1][(force[1:-1] > force[:-2]) & (force[1:-1] >= force[2:])])
     rival, top = np.sort(np.concatenate([[0.0, 0.0], *maxima]))[-2:]
     return float((top - rival) / top) if top > 0.0 else np.inf
@@ -336,13 +337,6 @@ def section_changes(sections: Any) -> dict[str, tuple[float, SectionChange]]:
         name: (float(pair[0]), SectionChange.by_differences(f"sections[{name!r}]", *pair))
         for name, pair in sections.items()
     }
-
-
-def _asked(item: Any) -> tuple[str, float | None]:
-    """A quantity and its band [Hz]."""
-    name, band = name_and_band(item)
-    name = check.one_of("quantity", {"force": "peak_force"}.get(name, name), QUANTITIES)
-    return name, checked_band(name, band, name.startswith("spectral"))
 
 
 def level_of(spectrum: np.ndarray) -> float:

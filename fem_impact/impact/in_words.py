@@ -20,7 +20,6 @@ OUTCOMES = {
     record.IMPACTS: "stopped after max_impacts",
     record.SETTLED: "everything came to rest",
 }
-CHAOTIC = 1e3  # [-] a blow is called chaotic if small differences grow by more than this factor: three digits are lost
 
 
 def lines(hit: "Response") -> str:
@@ -61,7 +60,7 @@ def lines(hit: "Response") -> str:
         lines.append(f"contact time: {each}; any of them {1e3 * hit.touching_time:.5g} ms")
     # what falls comes back later in proportion to the speed it left with: its times err by as much more than the first
     later = hit.impacts[-1].end / hit.impacts[0].end if returns and hit.impacts else 1.0
-    if error.sensitivity > CHAOTIC * max(1.0, later):
+    if error.sensitivity > 1e3 * max(1.0, later):  # three digits are lost
         lines.append(
             f"chaotic: small differences grow {error.sensitivity:.0e}-fold from the first impact to the last; "
             "trust the number of impacts and averages, not single values"

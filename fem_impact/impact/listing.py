@@ -70,13 +70,6 @@ def record(section: str, entry: Entry) -> dict[str, Any]:
     return {**told, "kind": entry.kind, "numbers": numbers}
 
 
-def law(entry: Entry) -> str:
-    """The contact law of a striker in a word."""
-    if "stiffness" not in entry.facts:
-        return "Hertz"
-    return "linear" if entry.facts["exponent"].value == 1.0 else "power"
-
-
 def damping(entry: Entry) -> str:
     """What is known of the damping in the contact of a striker."""
     told = {key: fact.value for key, fact in entry.facts.items()}
@@ -98,7 +91,8 @@ def _striker(entry: Entry) -> Sequence[str]:
     """A striker, on a rigid wall at 1 m/s without loss."""
     contact, mass = entry.contact(), strikers[entry.name].felt_mass
     time = float(wall_time(contact.stiffness, contact.exponent, 1.0 / mass, 1.0))
-    told = (f"{mass:.3g}", law(entry), f"{contact.stiffness:.3g}", f"{contact.exponent:g}", damping(entry))
+    law = "linear" if contact.exponent == 1.0 else "power" if "stiffness" in entry.facts else "Hertz"
+    told = (f"{mass:.3g}", law, f"{contact.stiffness:.3g}", f"{contact.exponent:g}", damping(entry))
     return (entry.name, *told, f"{time:.2g}")
 
 

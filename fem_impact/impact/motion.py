@@ -21,7 +21,6 @@ ONE_BODY = 1e-2
 # [-] largest difference of descriptions up to which Ritz vectors tell a motion: as much as modes err that are found
 # as far as the force reaches
 MOVED = {"displacement": 1e-2, "velocity": 3e-2}
-LASTS = 2.0  # [-] and no longer than this many times the run, as later echoes may be missing from all of them
 LOOKED_AT = 200  # [-] times at which this error is estimated, evenly among those asked for; more only cost time
 
 
@@ -46,22 +45,20 @@ class BodyMotion:
     def at(self, points: Any, times: np.ndarray, rate: bool = False, residual: bool = True) -> np.ndarray:
         """Displacement [m], or its rate [m/s], (n_times, n_points)."""
         motion = self.states(times)[rate] @ self.modes.shape_at(points).T  # (n_times, n_modes) @ (n_modes, n_points)
-        if self.ends is None or not residual:
+        ends, modes = self.ends, self.modes
+        if ends is None or not residual:
             return np.asarray(motion)
-        return np.asarray(motion + self._dip(self.ends, points, times, rate))
-
-    def _dip(self, ends: Ends, points: Any, times: np.ndarray, rate: bool) -> Any:
-        """Static deflection [m] of the left-out modes, or its rate [m/s], (n_times, n_points); 0 without a force."""
-        modes, asked = self.modes, self.modes.points("points", points)
+        asked = modes.points("points", points)
+        # the static deflection of the modes left out
         force = np.stack([-sign * self.history.force_at(times, i)[rate] for i, sign in ends.touched], axis=1)
         if not rate:
             force[:, 0] += ends.dip_force
         if not force.any() or not len(asked):
-            return 0.0
+            return np.asarray(motion)
         swings = modes.omega > 0.0
         pushed, moved = (modes.shapes.at(place)[:, swings] / modes.omega[swings] for place in (ends.points, asked))
         rest = modes.shapes.deflection(ends.points, asked) - moved @ pushed.T  # (n_points, n_ends)
-        return force @ rest.T
+        return np.asarray(motion + force @ rest.T)
 
 
 def of_run(hit: "Response", body: int) -> BodyMotion:
@@ -118,7 +115,8 @@ def largest_difference(
 
     Infinite for a single description, where it exceeds `MOVED`, and long after the end of the run, ``until`` [s].
     """
-    if len(descriptions) < 2 or (times.size and times.max() > LASTS * until):
+    # after twice the run, later echoes may be missing from all of them
+    if len(descriptions) < 2 or (times.size and times.max() > 2.0 * until):
         return float("inf")
     if len(times) > LOOKED_AT:
         times = times[np.linspace(0, len(times) - 1, LOOKED_AT).astype(int)]

@@ -145,19 +145,17 @@ class Parameters(check.Brief):
                 )
         if self.struck and hit.speed == 0.0:
             barred["strike.speed"] = "the speed is zero"
+        # contacts whose bodies touch at the start without pressing or approaching each other
+        h, size = hit.history, np.abs(hit.history.shape)
+        q, p = h.start_q, h.start_p
+        touch = np.abs(h.offset + h.shape @ q) <= ROUNDING * (size @ np.abs(q) + np.abs(h.offset))
+        resting = touch & (np.abs(h.shape @ p) <= ROUNDING * (size @ np.abs(p)))
         for b, ends in enumerate(hit.ends):
-            if not self.struck and any(self._rests(c) for c, _ in ends.touched):
+            if not self.struck and resting[[c for c, _ in ends.touched]].any():
                 barred[f"speeds.{b}"] = (
                     "the body rests against another at the start, and a speed would press or part them; give a gap"
                 )
         return barred
-
-    def _rests(self, c: int) -> bool:
-        """Whether two bodies touch at the start without pressing or approaching each other."""
-        h = self.hit.history
-        sizes = [np.abs(h.shape[c]) @ np.abs(x) for x in (h.start_q, h.start_p)]
-        d, v = float(h.offset[c] + h.shape[c] @ h.start_q), float(h.shape[c] @ h.start_p)
-        return abs(d) <= ROUNDING * (sizes[0] + abs(h.offset[c])) and abs(v) <= ROUNDING * sizes[1]
 
     @property
     def _lossy(self) -> bool:
@@ -217,19 +215,17 @@ class Parameters(check.Brief):
         for name in names:
             if name in self.sections or name in self.values:
                 continue
-            if reason := self._barred.get(name) or self._reason(name):
+            reason, home = self._barred.get(name, ""), name.partition(".")[0]
+            if home in ("section", "material") or name == "target.scale":
+                reason = reason or self.why_no_section
+            elif name in ("strike.x", "strike.y") and self.struck:
+                reason = reason or self.why_still
+            elif home == "target" and self.struck:
+                reason = reason or self.why_no_target
+            if reason:
                 raise check.SimulationError(f"no gradient in {name}: {reason}")
             check.one_of("wrt", name, self.values)
         return names
-
-    def _reason(self, name: str) -> str:
-        """Why a number that other blows have is not among those of this one."""
-        home = name.partition(".")[0]
-        if home in ("section", "material") or name == "target.scale":
-            return self.why_no_section
-        if name in ("strike.x", "strike.y") and self.struck:
-            return self.why_still
-        return self.why_no_target if home == "target" and self.struck else ""
 
     def change(self, names: tuple[str, ...]) -> Change:
         """What a unit of each number changes in the run."""
@@ -379,16 +375,15 @@ class Parameters(check.Brief):
 
 def _slopes(target: Modes, at: np.ndarray, axes: Iterable[int], distance: float, function: Any) -> list[Any]:
     """Derivatives along axes of a function of points (n, dimension) that returns (n, m), (m,) each."""
-    stencils = [_stencil(target, at, axis, distance) for axis in axes]
+    stencils = []
+    for axis in axes:
+        for multiples, weights in DIFFERENCES:
+            points = np.tile(at, (len(multiples), 1))
+            points[:, axis] += distance * np.array(multiples)
+            if target.shapes.contains(points).all():
+                stencils.append((points, np.array(weights)))
+                break
+        else:
+            raise check.SimulationError("no gradient in the strike point: the body is too narrow there")
     values = np.split(function(np.vstack([points for points, _ in stencils])), np.cumsum([len(p) for p, _ in stencils]))
     return [weights @ each / distance for (_, weights), each in zip(stencils, values)]
-
-
-def _stencil(target: Modes, at: np.ndarray, axis: int, distance: float) -> tuple[np.ndarray, np.ndarray]:
-    """Points (n, dimension) [m] on the body along an axis, and the weights (n,) of their difference."""
-    for multiples, weights in DIFFERENCES:
-        points = np.tile(at, (len(multiples), 1))
-        points[:, axis] += distance * np.array(multiples)
-        if target.shapes.contains(points).all():
-            return points, np.array(weights)
-    raise check.SimulationError("no gradient in the strike point: the body is too narrow there")

@@ -21,12 +21,6 @@ if TYPE_CHECKING:
 PACKAGE = str(Path(__file__).parents[1]) + os.sep  # where our own lines are
 # [-] of the tolerance that the advice leaves to one kind of error: two of them fit, and a fifth is left for the rest
 SHARE = 0.4
-UNSURE = 0.9  # [-] errors from here on are of blows that differ in their impacts, for which no tolerance helps
-SPARE = 1.1  # [-] modes advised over modes estimated: Weyl's law counts them only on average, so a tenth is added
-# [-] of that share for the estimate from few modes, which errs: twice if they resolve the contact, 20 times if not
-CAUTION = 0.5, 0.05
-# [-] modes above which other ways out are told: ten times as many as the planner finds by elements
-MOST_ADVISED = 20_000
 # see `Modes.unstated`
 UNSTATED = {
     "compliance": "static compliance", "free": "whether it moves freely", "shapes": "shapes but as measured",
@@ -80,15 +74,16 @@ def remedy(hit: "Response") -> str:
     if error.idealisation > allowed:
         advice.append("give target = 'modal'")
     if error.mesh > allowed:
-        advice += [
-            f"find the modes of {name} with tolerance = {limit:.1g}, or on a finer mesh"
-            for name, limit in _finer_modes(hit)
-        ]
+        for name, modes in zip(_names(hit), hit.bodies):
+            meshed = isinstance(getattr(modes.shapes, "base", modes.shapes), FieldShapes)
+            if meshed and modes.frequency_error is not None and modes.frequency_error.any():
+                limit = max(1e-9, 0.5 * allowed / error.mesh * float(modes.frequency_error.max()))
+                advice.append(f"find the modes of {name} with tolerance = {limit:.1g}, or on a finer mesh")
     if error.inherited > allowed:
         advice.append("give the blow before a smaller tolerance")
     if error.step > allowed:
         advice.append("leave dt and scheme to the program, or give a smaller dt")
-    if not advice and error.total >= UNSURE:
+    if not advice and error.total >= 0.9:  # the runs differ in their impacts, and no tolerance helps
         return "the number of impacts cannot be determined: give max_impacts = 1 for the first impact alone"
     return "; ".join(advice) or f"take a tolerance of {float(f'{1.06 * error.total:.1e}'):g}"  # just above it
 
@@ -105,15 +100,10 @@ def kept(hit: Any, strict: bool = False) -> Any:
 
 def warn(text: str) -> None:
     """Tell the user that a tolerance was missed, at the line that called this program."""
-    warnings.warn(text, ToleranceWarning, stacklevel=_callers_level())
-
-
-def _callers_level() -> int:
-    """The ``stacklevel`` for which a warning of the calling function names the line of the user, not one of ours."""
-    level, frame = 1, sys._getframe(1)
+    level, frame = 1, sys._getframe()
     while frame.f_back is not None and frame.f_code.co_filename.startswith(PACKAGE):
         level, frame = level + 1, frame.f_back
-    return level
+    warnings.warn(text, ToleranceWarning, stacklevel=level)
 
 
 def _names(hit: "Response") -> list[str]:
@@ -136,7 +126,7 @@ def _more_modes(hit: "Response") -> Iterator[str]:
         if not ends.rest.any() or modes.poorer:  # the number of Ritz vectors has been raised already
             continue
         number = _modes_needed(hit, body)
-        if number > MOST_ADVISED:
+        if number > 20_000:  # ten times as many as the planner finds by elements
             yield f"{name} would have to keep some {number:.1e} modes; take a softer contact"
         elif number > modes.n_modes + 1:
             yield f"keep {int(np.ceil(number))} modes of {name} instead of {modes.n_modes}"
@@ -156,19 +146,12 @@ def _modes_needed(hit: "Response", body: int) -> float:
         speed = min(REACH, float(np.abs(h._column(1)[:, i]).max(initial=0.0)))
         if not inverse or not speed:
             continue
-        share = allowed * CAUTION[not hit.error.resolvable] / (accuracy.LOSSY if law.rated else 1.0)
+        # the estimate from few modes errs: twice if they resolve the contact, 20 times if not
+        share = allowed * (0.5 if hit.error.resolvable else 0.05) / (accuracy.LOSSY if law.rated else 1.0)
         at: dict[str, Any] = {"contact": law, "mass": 1.0 / inverse, "speed": speed}
         needed = max(needed, accuracy.cutoff_frequency(modes, point, tolerance=share, **at))
         if hit.error.resolvable and hit.error.truncation > allowed:
             power = accuracy.order_of(law.exponent, modes.dimension)
             needed = max(needed, modes.frequencies[-1] * (hit.error.truncation / allowed) ** (1.0 / power))
-    return SPARE * modes.n_modes * (needed / modes.frequencies[-1]) ** (0.5 * modes.dimension)
-
-
-def _finer_modes(hit: "Response") -> Iterator[tuple[str, float]]:
-    """Name and largest frequency error allowed of every body found on a mesh."""
-    for name, modes in zip(_names(hit), hit.bodies):
-        meshed = isinstance(getattr(modes.shapes, "base", modes.shapes), FieldShapes)
-        if meshed and modes.frequency_error is not None and modes.frequency_error.any():
-            worst = float(modes.frequency_error.max())
-            yield name, max(1e-9, 0.5 * SHARE * hit.tolerance / hit.error.mesh * worst)
+    # Weyl's law counts modes only on average, so a tenth is added
+    return 1.1 * modes.n_modes * (needed / modes.frequencies[-1]) ** (0.5 * modes.dimension)

@@ -19,13 +19,9 @@ from .striker import Striker
 # [-] by dimension: frequency of the replacement mode over the last, fact: sqrt(sum u**2/w**2 / sum u**2/w**4) of those
 # above is sqrt(7/3) on a beam, whose n-th frequency goes as n**2, and sqrt(3) on a plate, where it goes as n
 REST_ABOVE = {1: 1.53, 2: 1.73}
-# [-] frequency of the replacement mode under a lossy contact over the last mode's: so far above that it follows as a
-# spring; it is critically damped
-LOSSY_ABOVE = 30.0
 # [-] two extra runs divide the highest kept frequency by these: near enough to foretell, far enough to differ
 THINNED = 1.4, 2.0
 Touched = tuple[tuple[int, float], ...]  # contact, and sign: 1 for its first body, -1 for its second
-SLOW = 1e-4  # [-] frequency of a rigid motion that may be missing over that of the first mode: it acts as a mass
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -82,13 +78,9 @@ class ReducedBody:
         """The same body with all motion larger by a factor, its rigid position as it is."""
         return replace(self, q=np.where(self.omega == 0.0, 1.0, factor) * self.q, p=factor * self.p)
 
-    def pushed(self, force: float) -> "ReducedBody":
+    def push_body(self, force: float) -> "ReducedBody":
         """The same body under a constant force [N] at its first contact."""
         return replace(self, force=force, bias=self.bias + force * self.rows[0]) if force else self
-
-    def lower(self, error: np.ndarray | float) -> "ReducedBody":
-        """The body with frequencies lower and compliances higher by their errors, those of frequencies relative."""
-        return replace(self, omega=self.omega / (1.0 + error), rest=self.rest + np.diag(self.doubt))
 
     def forms(self, rated: Sequence[bool]) -> np.ndarray:
         """Forms (n_ends, n_forms) of unit stiffness that stand for the modes left out; none where a spring does."""
@@ -119,9 +111,9 @@ class ReducedBody:
         return found
 
     def loosened(self) -> "ReducedBody":
-        """The body with the rigid motions that it may have besides, as its first modes."""
+        """The body with the rigid motions that it may have besides, as its first modes, slow as masses."""
         n = self.loose.shape[1]
-        still, slow = np.zeros(n), np.full(n, SLOW * self.omega[0])
+        still, slow = np.zeros(n), np.full(n, 1e-4 * self.omega[0])
         bias = self.force * self.loose[0] if self.force else still
         return replace(
             self, omega=np.append(slow, self.omega), zeta=np.append(still, self.zeta),
@@ -134,7 +126,7 @@ class ReducedBody:
         moving = self.omega == 0.0
         if self.q.any() or self.p[~moving].any():
             raise ValueError("a body of Ritz vectors must start at rest; find its modes with find_modes")
-        other, rigid = part_of(modes, self.touched, self.points).pushed(self.force), modes.omega == 0.0
+        other, rigid = part_of(modes, self.touched, self.points).push_body(self.force), modes.omega == 0.0
         rows, velocity = other.rows, other.p
         if self.p.any():
             velocity = float(self.rows[0] @ self.p) * modes.rigid_motion(self.points[:1])
@@ -256,10 +248,10 @@ def rest_mode(dimension: int, omega: float, zeta: float, lossy: bool) -> tuple[f
     """Frequency [rad/s] and damping ratio [-] of the mode that replaces those above the last kept one.
 
     A lossy force depends on the approach rate, in which an undamped mode just above the last one would ring. A
-    critically damped mode far above behaves like a series spring and takes almost no energy.
+    critically damped mode far above, at 30 times its frequency, acts like a series spring and takes almost no energy.
     """
     if lossy:
-        return LOSSY_ABOVE * omega, 1.0
+        return 30.0 * omega, 1.0
     return REST_ABOVE[min(dimension, 2)] * omega, float(zeta)
 
 

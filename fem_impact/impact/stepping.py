@@ -21,28 +21,16 @@ from .stretched import Stretched
 Function = TypeVar("Function", bound=Callable)
 
 SCHEMES = ("A", "A4", "collocation")
-# [-] tolerance advised over the error reached: steps twice as long, to which it may lead, err 16 times more
-REACHED = 20.0
 AVERAGES = {"restitution", "impulse", "n_impacts"}  # quantities that depend on no single instant
-# [-] fraction of the usual steps that averages over the blow need: errors of single instants cancel in them
-AVERAGED = 0.5
 # [-] step halvings to decide whether bodies touch or part where the margin is less than its error, which each divides
 # by eight or more
 GRAZES = 6
-# [-] error of a margin over the difference of two runs: beside a graze A4 converges at first order only, and a run of
-# half the steps may show a seventh of the difference to the truth
-SURELY = 4.0
-# [-] of the largest error in any quantity, what each errs at least: in one alone two runs agree by chance, which left
-# 4 % of the errors of contact times below the truth, one by a factor of five
-CHANCE = 0.2
-DOUBLINGS = 7  # [-] step halvings before the run gives up: A4 then errs 2**28 times less
 # [-] Difference of two runs over the error of the finer one: first for speeds and impulse, then for contact time and
 # peak force. These two depend on one instant, and modes faster than the step lower the order of A4 there.
 RICHARDSON = {"A": (3.0, 3.0), "A4": (7.0, 4.0), "collocation": (1.0, 1.0)}
 RINGING = 0.5  # [-] modes with a damping ratio above this do not ring: a swing is down to 3 % of the one before
 # [rad] largest phase of a ringing mode in a step of the coarser run: a third of a period, seen before it comes again
 RESOLVED = 2.0
-COLLOCATION_BELOW = 1e-7  # [-] below this tolerance, collocation needs less work than A4
 
 
 @dataclass(frozen=True)
@@ -99,14 +87,14 @@ def takes_options(*but: str) -> Callable[[Function], Function]:
 
 
 def scheme_for(tolerance: float, exponent: float) -> str:
-    """The scheme that meets a tolerance with the least work."""
-    return "collocation" if tolerance < COLLOCATION_BELOW and exponent >= 1.0 else "A4"
+    """The scheme that meets a tolerance with the least work: below 1e-7 collocation, where it can."""
+    return "collocation" if tolerance < 1e-7 and exponent >= 1.0 else "A4"
 
 
 def _first_count(scheme: str, tolerance: float, quantities: Mapping[str, float | None]) -> float:
-    """Steps per contact in the first run."""
+    """Steps per contact in the first run: for averages half of the usual, as errors of single instants cancel there."""
     count = engine.steps_per_contact(tolerance, 0.5 if scheme == "A" else 0.25)
-    return max(6.0, count * (AVERAGED if set(quantities) <= AVERAGES else 1.0))
+    return max(6.0, count * (0.5 if set(quantities) <= AVERAGES else 1.0))
 
 
 def steps_for(
@@ -129,7 +117,7 @@ class Converged:
     """Two runs that agree, the finer one with its estimated errors."""
 
     scheme: str
-    steps: tuple[float, float]  # of the finer and the coarser run, as `engine.follow` takes them
+    steps: tuple[float, float]  # of the finer and the coarser run, as `engine.run_system` takes them
     fine: History
     coarse: History
     error: np.ndarray  # [-] of the finer run, as of `distance.of_runs`
@@ -149,11 +137,11 @@ def refine_steps(
         raise ValueError(f"scheme collocation needs exponents of at least 1, got {least:g}; use A4")
     free = options.scheme is None and options.dt is None
     try:
-        return _Control(system, options, pace, scheme, free, stretched).refined()
+        return _Control(system, options, pace, scheme, free, stretched).agree_runs()
     except _NotMet:
         if not free or scheme != "A4" or least < 1.0 or stretched is not None:
             raise
-    return _Control(system, options, pace, "collocation", free, stretched).refined()
+    return _Control(system, options, pace, "collocation", free, stretched).agree_runs()
 
 
 class _NotMet(SimulationError):
@@ -171,12 +159,12 @@ class _Control:
     free: bool  # whether scheme and steps are our choice
     stretched: Stretched | None
 
-    def run(self, size: float, chosen_by: str = "tolerance") -> History:
-        """One run, see `engine.follow`."""
+    def follow_blow(self, size: float, chosen_by: str = "tolerance") -> History:
+        """One run, see `engine.run_system`."""
         how = self.scheme, size, self.pace, self.options.last, self.stretched
-        return engine.follow(self.system, *how, chosen_by)
+        return engine.run_system(self.system, *how, chosen_by)
 
-    def judged(self, sizes: tuple[float, float], coarse: History, fine: History) -> Converged:
+    def judge_runs(self, sizes: tuple[float, float], coarse: History, fine: History) -> Converged:
         """Two runs of a finer and a coarser size, and the errors of the finer one."""
         over, quantities, n = RICHARDSON[self.scheme], self.options.quantities, self.options.n_quantities
         if self.scheme != "collocation":  # a strong loss reacts to the rates of modes faster than the step
@@ -185,32 +173,35 @@ class _Control:
         if "force" in quantities:
             i = [*quantities].index("force")
             error[i] = max(error[i], fine.force_missed)
-        error[:n] = np.maximum(error[:n], CHANCE * max(error[:n].tolist()))
-        error[n] = min(1.0, SURELY * error[n])
+        # in one quantity alone two runs agree by chance: with its own difference only, 4 % of the errors of contact
+        # times lay below the truth, one by a factor of five
+        error[:n] = np.maximum(error[:n], 0.2 * max(error[:n].tolist()))
+        # beside a graze A4 converges at first order only, and a margin in two runs may differ by a seventh of its error
+        error[n] = min(1.0, 4.0 * error[n])
         return Converged(self.scheme, sizes, fine, coarse, error)
 
-    def refined(self) -> Converged:
+    def agree_runs(self) -> Converged:
         """The first pair of runs that agrees."""
         options, tolerance = self.options, self.options.tolerance
         if options.dt is not None:
             size = min(options.dt, 0.5 * options.last[0])
-            fine, coarse = (self.run(each, "dt") for each in (size, 2.0 * size))
-            return self.judged((size, 2.0 * size), coarse, fine)
-        sizes, aim = self.sizes()
+            fine, coarse = (self.follow_blow(each, "dt") for each in (size, 2.0 * size))
+            return self.judge_runs((size, 2.0 * size), coarse, fine)
+        sizes, aim = self.list_sizes()
         try:
-            runs = [self.run(size) for size in sizes[:2]]
+            runs = [self.follow_blow(size) for size in sizes[:2]]
         except SimulationError as exhausted:  # so many steps are out of reach: longer ones may do
             sizes = [4.0 * sizes[0], 2.0 * sizes[0], *sizes]
             try:
-                runs = [self.run(size) for size in sizes[:2]]
+                runs = [self.follow_blow(size) for size in sizes[:2]]
             except SimulationError:
                 raise exhausted from None
         best, met = np.inf, None
         grazes = 0 if options.quantities.keys() & {"n_impacts", "contact_time"} else GRAZES
         for i, (before, size) in enumerate(pairwise(sizes)):
             if i:
-                runs = [runs[1], self.run(size)]
-            found = self.judged((size, before), *runs)
+                runs = [runs[1], self.follow_blow(size)]
+            found = self.judge_runs((size, before), *runs)
             error = max(found.error[: options.n_quantities].tolist())
             best = min(best, error)
             if error <= tolerance:
@@ -222,10 +213,10 @@ class _Control:
             if 2 * len(found.fine.steps) > engine.most_steps(self.system, self.stretched):
                 break  # the next run would exceed the step limit
         if met is None:
-            raise _NotMet(self.told(best, *runs))
+            raise _NotMet(self.explain_failure(best, *runs))
         return met
 
-    def sizes(self) -> tuple[list[float], float]:
+    def list_sizes(self) -> tuple[list[float], float]:
         """Steps, or misfits of collocation, to try in turn, and the error [-] aimed at."""
         options = self.options
         if self.scheme == "collocation":
@@ -236,30 +227,26 @@ class _Control:
         shortest = min(self.pace[0], options.last[0])
         count = _first_count(self.scheme, min(STEP_SHARE * options.tolerance, TOLERANCE), options.quantities)
         first = min(2.0 * shortest / count, _longest_lossy(self.system, self.pace, options.tolerance))
-        return [first * 0.5**n for n in range(DOUBLINGS + 1)], STEP_SHARE * options.tolerance
+        return [first * 0.5**n for n in range(8)], STEP_SHARE * options.tolerance  # A4 errs 2**28 times less at last
 
-    def told(self, best: float, coarse: History, fine: History) -> str:
+    def explain_failure(self, best: float, coarse: History, fine: History) -> str:
         """Why no two runs agreed, of which the best erred by ``best``, and what helps."""
-        tolerance, hint, enough = self.options.tolerance, "", min(REACHED * best, 1.0)
+        # steps twice as long, to which the tolerance advised may lead, err 16 times more
+        tolerance, hint, enough = self.options.tolerance, "", min(20.0 * best, 1.0)
         advice = f"raise tolerance to {float(f'{enough:.1e}'):g}" if self.free else "leave out scheme"
         if len(fine.contacts) > 1:
             growth = distance.growth(coarse, fine)
             hint = f"; small errors grow {growth:.1g}-fold over {len(fine.contacts)} impacts"
             if self.free and growth == np.inf:  # the last runs were different blows, to which no tolerance applies
-                agreed = _agreed(coarse, fine, tolerance * self.pace[0])
-                advice = f"give max_impacts of at most {max(1, agreed)}"
+                one, two = (np.sort(history.contacts[:, 1]) for history in (coarse, fine))
+                n = min(len(one), len(two))
+                # the first impacts, which end at the same times
+                same = np.append(np.abs(one[:n] - two[:n]) <= tolerance * self.pace[0], False)
+                advice = f"give max_impacts of at most {max(1, int(same.argmin()))}"
         return (
             f"the step error stays at {best:.1e}, above the tolerance {tolerance:.1e}, with {len(fine.steps)} "
             f"steps{hint}; {advice}"
         )
-
-
-def _agreed(coarse: History, fine: History, apart: float) -> int:
-    """How many impacts end in two runs, one after another, at times no more than ``apart`` [s] from each other."""
-    one, two = (np.sort(history.contacts[:, 1]) for history in (coarse, fine))
-    n = min(len(one), len(two))
-    same = np.abs(one[:n] - two[:n]) <= apart
-    return n if same.all() else int(same.argmin())
 
 
 def _longest_lossy(system: KernelSystem, pace: tuple[float, float], tolerance: float) -> float:

@@ -17,11 +17,7 @@ from ..modes.shapes import REMEMBERED, Shapes
 from ..modes.slender import SHEAR_RATIO, beam
 from .accuracy import left_out_density
 
-SPHERES = 1e-9, 1e9  # [m] radius, from a few atoms to a star
 STICK_MODES = 96  # [-] bending modes of a stick, known in closed form; each blow keeps as many of them as it needs
-MOST_MODES = 1000  # [-] of a stick: higher modes have wavelengths as short as its thickness, where beam theory fails
-
-
 GRAVITY = 9.80665  # [m/s^2] standard; the true one is within 0.3 % of it everywhere
 STIFF_HAND = 0.3  # [-] highest frequency in the hand over the first bending frequency: the squares add to some 10 %
 
@@ -173,7 +169,7 @@ class Striker(check.Brief):
         4.11
         """
         check.instance("material", material, Material)
-        radius = check.between("radius", radius, *SPHERES, "m")
+        radius = check.between("radius", radius, 1e-9, 1e9, "m")  # from a few atoms to a star
         return cls(Modes.rigid(4.0 / 3.0 * np.pi * radius**3 * material.rho), np.zeros(0), material, radius)
 
     @classmethod
@@ -209,7 +205,8 @@ class Striker(check.Brief):
         >>> round(stick.felt_mass, 6)  # kg
         0.033333
         """
-        kept = STICK_MODES if n_modes is None else check.count("n_modes", n_modes, high=MOST_MODES)
+        # higher modes than the thousandth have wavelengths as short as its thickness, where beam theory fails
+        kept = STICK_MODES if n_modes is None else check.count("n_modes", n_modes, high=1000)
         thick: dict[str, Any] = {}
         if slenderness is not None:
             thick = {"theory": "timoshenko", "slenderness": slenderness, "shear_ratio": shear_ratio}
@@ -235,10 +232,8 @@ class Striker(check.Brief):
         (0.09, [0.0, 159.2])
         """
         head, handle = check.positive("head", head, "kg"), check.positive("handle", handle, "kg")
-        stiffness, damping = (
-            check.positive("stiffness", stiffness, "N/m"),
-            check.non_negative("damping", damping, "N s/m"),
-        )
+        stiffness = check.positive("stiffness", stiffness, "N/m")
+        damping = check.non_negative("damping", damping, "N s/m")
         mass, reduced = head + handle, head * (handle / (head + handle))
         omega = float(np.sqrt(stiffness / reduced))
         apart = np.sqrt(handle / head / mass), -np.sqrt(head / handle / mass)
@@ -466,7 +461,7 @@ class Striker(check.Brief):
         return left_out(self.modes, self.at[None], self.shape[None])
 
     @cached_property
-    def bending(self) -> tuple[float, float, float]:
+    def bending_compliance(self) -> tuple[float, float, float]:
         """Compliance of all bending at the contact point [m/N], and `accuracy.left_out_density` there."""
         rigid = self.modes.truncated(n_modes=self.modes.n_rigid)
         whole = rigid.residual_compliance(self.at[None])[0, 0]

@@ -11,9 +11,6 @@ from ..modes.modal import Modes
 from .accuracy import left_out_density
 from .spectra import half_sine_spectrum
 
-# [-] ratio of frequencies in the search: only from the hundredth on is a lobe of the pulse's spectrum narrower
-STEP = 1.01
-AT_ONCE = 64  # [-] of these frequencies tried together, to limit the work
 # [-] width in contact frequencies of each piece of the integral over the modes left out, fact: that of one lobe
 PIECE = 2.0
 # Gauss nodes of each piece and their weights: integrate cos**2 over a lobe to 1e-18
@@ -149,9 +146,10 @@ def thresholds(modes: Modes, at: Any, masses: Any) -> np.ndarray:
     low = np.log(0.5 * ends[harmless].max() if harmless.any() else ((1.0 / heaviest - still) / above[0]) ** 0.25)
     # above omega[-1], all modes lie in the first lobe, so the energy only grows with the contact frequency
     last = max(low, np.log(omega[-1]))
-    tried = np.append(np.arange(low, last, np.log(STEP)), np.arange(last, HARDEST + np.log(2.0), np.log(2.0)))
-    for start in range(0, len(tried) - 1, AT_ONCE):
-        some = tried[start : start + AT_ONCE + 1]
+    # by a hundredth each: only from the hundredth on is a lobe of the pulse's spectrum narrower
+    tried = np.append(np.arange(low, last, np.log(1.01)), np.arange(last, HARDEST + np.log(2.0), np.log(2.0)))
+    for start in range(0, len(tried) - 1, 64):  # tried together, to limit the work
+        some = tried[start : start + 65]
         reached = energy(some)
         for i in np.flatnonzero(todo & (masses * reached.max() > 1.0)):
             j = int(np.argmax(masses[i] * reached > 1.0))

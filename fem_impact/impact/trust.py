@@ -85,8 +85,9 @@ class Trust:
         """All quantities as plain data."""
         return [asdict(each) | {"trusted": each.trusted} for each in self.judged]
 
-    def _rows(self) -> list[tuple[str, ...]]:
-        return [
+    def __str__(self) -> str:
+        head = "quantity", "value", "computation errs by", "model errs by", "trusted", "mostly by"
+        rows = [
             (
                 each.name,
                 each.shown,
@@ -97,11 +98,8 @@ class Trust:
             )
             for each in self.judged
         ]
-
-    def __str__(self) -> str:
-        head = "quantity", "value", "computation errs by", "model errs by", "trusted", "mostly by"
         remedies = dict.fromkeys(each.remedy for each in self.judged if each.remedy)
-        return "\n".join([*markup.columns(self._rows(), head), *(f"To do: {remedy}" for remedy in remedies)])
+        return "\n".join([*markup.columns(rows, head), *(f"To do: {remedy}" for remedy in remedies)])
 
 
 def examine(hit: "Response") -> Trust:
@@ -117,17 +115,13 @@ def in_one_line(hit: "Response") -> str:
         value = rebound(hit, max(FEWEST, _digits(first.computation) - 1))
     else:
         value = first.shown if first.value is not None else ""
-    return f"{first.name} {value}".strip() + promised(hit)
-
-
-def promised(hit: "Response") -> str:
-    """What follows the answer in its line: how well it is computed, and whether the model holds."""
+    answer = f"{first.name} {value}".strip()
     clause = assumption.head(hit.assumptions, hit.tolerance)
     holds = all(each.holds for each in hit.trust)
     if hit.tolerance_met:
-        computed = f", computed to {hit.trust.judged[0].computation:.1g} ({promise.met(hit)})"
+        computed = f"{answer}, computed to {first.computation:.1g} ({promise.met(hit)})"
         return f"{computed}{'; ' if holds else ', but '}{clause}"
-    return f": {promise.sentence(hit)}" + ("" if holds else f"; besides, {clause}")
+    return f"{answer}: {promise.sentence(hit)}" + ("" if holds else f"; besides, {clause}")
 
 
 def _digits(error: float | None) -> int:

@@ -98,7 +98,7 @@ def run(system: engine.KernelSystem, speed: float, step: float, horizon: float) 
     struck = system._replace(p=speed * system.p)
     struck.p.setflags(write=False)  # or numba would compile the kernels again for writable arrays
     last = horizon, 0
-    return engine.follow(struck, "A4", step, (STEPS * step, speed), last, chosen_by="the lower ends of unknown")
+    return engine.run_system(struck, "A4", step, (STEPS * step, speed), last, chosen_by="the lower ends of unknown")
 
 
 def longest_step(system: engine.KernelSystem, contact: Contact, duration: float) -> float:

@@ -48,10 +48,10 @@ def test_two_masses_share_speed_as_in_newtons_cradle(law, ratio):
     mass, other = 0.1, 0.1 * ratio
     hit = fi.strike(fi.Modes.rigid(other), fi.Striker.rigid(mass), law, at=None, speed=1.0)
     # energy and momentum exact to rounding fix both speeds, whatever the step
-    assert_allclose(-hit.restitution, (mass - other) / (mass + other), rtol=0, atol=1e-12)
+    assert_allclose(-hit.restitution, (mass - other) / (mass + other), rtol=0, atol=1e-14)
     speed = hit.velocity(None, [hit.time[-1] + 1.0])[0, 0]
-    assert_allclose(speed, 2.0 * mass / (mass + other), rtol=1e-12)
-    assert hit.n_impacts == 1
+    assert_allclose(speed, 2.0 * mass / (mass + other), rtol=1e-13)
+    assert hit.n_impacts == 1 and hit.momentum_error < 1e-14
     assert hit.energy_error < 1e-13  # rounding of some dozen steps
 
 
@@ -70,21 +70,27 @@ def test_stick_on_half_a_million_kilograms_rings_like_a_third_of_its_mass():
     assert_allclose(hertz.peak_force, 1.1432626298 * 695e3**0.4 * (0.1 / 3.0) ** 0.6, rtol=2e-3)
 
 
-def test_sixty_modes_meet_the_eigen_solution():
-    """Separation and rebound of the linear case from the roots of the secular equation (computed apart)."""
+@pytest.mark.parametrize(
+    ("scheme", "slope", "stiffness"), [("A", 2.0, 1e6), *(("A4", 4.0, k) for k in (1e5, 3e5, 1e6, 3e6))]
+)
+def test_sixty_modes_meet_the_eigen_solution(scheme, slope, stiffness):
+    """Separation and rebound of the linear case from the eigenvectors of the joined bodies."""
     frequencies = 1500.0 * np.arange(1, 60) / (2.0 * np.pi)
     target = fi.Modes.from_arrays(frequencies, np.full((1, 59), 1.5), points=[[0.0]], mass=1.0, complete=True)
-    striker, law = fi.Striker.rigid(0.01), fi.Contact.linear(1e6)
-    for scheme, slope in (("A", 2.0), ("A4", 4.0)):
-        errors = []
-        for n in (25, 50, 100):
-            dt = 3.1553252963599e-4 / n
-            hit = fi.strike(target, striker, law, at=[0.0], speed=1.0, scheme=scheme, dt=dt)
-            errors.append(abs(hit.restitution - 0.704365580386))
-            assert hit.energy_error < 1e-13  # rounding of a hundred steps
-        assert_allclose(np.log2(errors[0] / errors[1]), slope, atol=0.05)  # 2.00 and 4.00 were measured
-        assert_allclose(np.log2(errors[1] / errors[2]), slope, atol=0.05)
-    assert_allclose(hit.contact_time, 3.1553252963599e-4, rtol=1e-8)  # A4 with 100 steps: 4e-10 was measured
+    striker, law = fi.Striker.rigid(0.01), fi.Contact.linear(stiffness)
+    blow = {"at": [0.0], "speed": 1.0, "scheme": scheme, "max_impacts": 1}
+    truth = exact(fi.strike(target, striker, law, **blow | {"scheme": "A4"}).history, wait=0.0)
+    restitution = -truth.p[0] / 0.01**0.5
+    if stiffness == 1e6:  # from the roots of the secular equation, computed apart
+        assert_allclose(truth.contact_time, 3.1553252963599e-4, rtol=1e-12)
+        assert_allclose(restitution, 0.704365580386, atol=1e-12)
+    hits = [fi.strike(target, striker, law, dt=truth.contact_time / n, **blow) for n in (25, 50, 100)]
+    errors = [abs(hit.restitution - restitution) for hit in hits]
+    assert all(hit.energy_error < 1e-13 for hit in hits)  # rounding of a hundred steps
+    assert_allclose(-np.diff(np.log2(errors)), slope, atol=0.05)  # 2.00 and 4.00 were measured
+    if scheme == "A4":
+        assert errors[0] < 2.4e-6  # of a scheme that does not locate them
+        assert_allclose(hits[-1].contact_time, truth.contact_time, rtol=1e-8)  # 4e-10 was measured
 
 
 def test_response_agrees_with_itself():
@@ -291,30 +297,6 @@ def test_one_rigid_mass_on_one_mode_meets_its_eigen_solution():
     assert_allclose(hit.restitution, rebound, atol=1e-11)
 
 
-def test_common_motion_changes_nothing():
-    """Two free bodies, at rest or carried along at 3 m/s: the same force (case 11)."""
-    bodies = [fi.Modes.rigid(0.05), measured(8, 3, n_rigid=1)]
-    touches = [Touch(fi.Contact.hertz(1e7), 0, 1, None, [0.0])]
-    u = bodies[1].shape_at([0.0])[0]
-    carried = np.where(bodies[1].omega == 0.0, 3.0 / u[0], 0.0)
-    still = collide(bodies, touches, speeds=[1.0, 0.0])
-    moving = collide(bodies, touches, states=[(np.zeros(1), [4.0 * 0.05**0.5]), (np.zeros(8), carried)])
-    # the step follows the faster scene, so only the tolerance is common
-    assert_allclose(moving.impulse, still.impulse, rtol=1e-4)
-    assert_allclose(moving.contact_time, still.contact_time, rtol=1e-4)
-
-
-def test_heavy_target_and_heavy_striker_become_rigid():
-    law = fi.Contact.hertz(1e7)
-    errors = [
-        abs(fi.strike(fi.Modes.rigid(mass), fi.Striker.rigid(0.1), law, at=None, speed=1.0).restitution - 1.0)
-        for mass in (1e3, 1e5)
-    ]
-    assert_allclose(errors[0] / errors[1], 100.0, rtol=1e-3)  # O(m_s / m_p)
-    driven = fi.strike(measured(6, 1), fi.Striker.rigid(1e6), law, at=[0.0], speed=1.0, duration=1e-3)
-    assert_allclose(driven.speeds[0], 1.0, rtol=1e-6)
-
-
 def test_stiff_stick_becomes_rigid():
     plate = fi.analytic.rectangle(1.55, 1.0, mass=2.0, first_frequency=100.0, n_modes=60)
     blow = {"at": (0.465, 0.3), "speed": 1.0, "tolerance": 1e-6, "max_impacts": 1}
@@ -467,7 +449,7 @@ def test_collocation_finds_the_peak_wherever_in_its_steps_it_lies(mass, loss):
     for tolerance in 10.0 ** np.arange(-5.0, -8.0, -0.25):
         hit = collide(bodies, [touch], speeds=[1.0, 0.0], tolerance=tolerance, scheme="collocation", residual=False)
         rows = np.flatnonzero(hit.history.pressed[:, 0])
-        dense = hit.history.force(rows, 0, np.linspace(0.0, 1.0, 2001)[None]).max()
+        dense = hit.history.force_of(rows.repeat(2001), 0, np.tile(np.linspace(0.0, 1.0, 2001), len(rows)))[0].max()
         # 2000 looks per step miss (pi/2/2000/2)**2/2 of a peak whose swing takes two steps
         assert_allclose(hit.peak_force, dense, rtol=2e-7)
 

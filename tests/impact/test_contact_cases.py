@@ -4,7 +4,6 @@ from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 import pytest
-from linear_blow import exact
 from numpy.testing import assert_allclose
 from scipy.optimize import brentq
 from warming import locked
@@ -176,34 +175,6 @@ def test_endless_beam_kernel_grows_with_the_root_of_time():
     wanted = factor * 2.0 / 3.0 * (t**1.5 - (t - h) ** 1.5)  # of a unit force held over the step
     # modes beyond the last: their compliance mu**(-3/4) (E I)**(-1/4) wc**(-3/2) / (3 pi) is 1e-7 of it; echo 1e-4
     assert_allclose(rows[0], wanted, rtol=3e-4)
-
-
-# --- case 30: sweep of stiffness, order of A4 ------------------------------------------------------------------------
-
-
-def sixty():
-    frequencies = 1500.0 * np.arange(1, 60) / (2.0 * np.pi)
-    return fi.Modes.from_arrays(frequencies, np.full((1, 59), 1.5), points=[[0.0]], mass=1.0, complete=True)
-
-
-@pytest.mark.parametrize("stiffness", [1e5, 3e5, 1e6, 3e6])
-def test_a4_falls_with_the_fourth_power_of_the_step(stiffness):
-    blow = {"at": [0.0], "speed": 1.0, "max_impacts": 1}
-    law, striker = fi.Contact.linear(stiffness), fi.Striker.rigid(0.01)
-    truth = exact(fi.strike(sixty(), striker, law, scheme="A4", **blow).history, wait=0.0)
-    restitution = -truth.p[0] / 0.01**0.5
-    if stiffness == 1e6:  # from the roots of the secular equation, computed apart
-        assert_allclose(truth.contact_time, 3.1553252963599e-4, rtol=1e-12)
-        assert_allclose(restitution, 0.704365580386, atol=1e-12)
-    counts = (25, 50, 100)
-    errors = [
-        abs(fi.strike(sixty(), striker, law, scheme="A4", dt=truth.contact_time / n, **blow).restitution
-            - restitution)
-        for n in counts
-    ]  # fmt: skip
-    slope = -np.polyfit(np.log(counts), np.log(errors), 1)[0]
-    assert_allclose(slope, 4.0, atol=0.1)  # onset and release are located; 4.00 was measured
-    assert errors[0] < 2.4e-6  # of a scheme that does not locate them
 
 
 # --- case 33: batches ------------------------------------------------------------------------------------------------
@@ -414,27 +385,6 @@ def test_chaotic_runs_do_not_depend_on_threads():
             assert np.array_equal(one[2], two[2])
 
 
-# --- the complete plate from 2000 of its modes -----------------------------------------------------------------------
-
-
-@pytest.fixture(scope="module")
-def complete():
-    return fi.analytic.rectangle(1.55, 1.0, mass=0.2, first_frequency=100.0, n_modes=12000)
-
-
-@pytest.mark.parametrize("law", [fi.Contact.linear(1e5), fi.Contact.hertz(1e7)], ids=["linear", "hertz"])
-@pytest.mark.parametrize("at", [(0.465, 0.31), (0.775, 0.5), (0.2, 0.85)])
-def test_two_thousand_modes_and_their_rest_are_the_complete_plate(complete, law, at):
-    blow = {"at": at, "speed": 1.0, "tolerance": 1e-7, "max_impacts": 1}
-    truth = fi.strike(complete, fi.Striker.rigid(0.02), law, **blow)
-    few = complete.truncated(n_modes=2000)
-    hit = fi.strike(few, fi.Striker.rigid(0.02), law, **blow)
-    assert np.pi / truth.contact_time < 0.05 * few.omega[-1]  # well below the last mode
-    assert_allclose(hit.restitution, truth.restitution, rtol=0, atol=1e-5)  # what the residual compliance promises
-    bare = fi.strike(few, fi.Striker.rigid(0.02), law, residual=False, **blow)
-    assert abs(bare.restitution - truth.restitution) > 3.0 * abs(hit.restitution - truth.restitution)
-
-
 # --- motion under the force ------------------------------------------------------------------------------------------
 
 LAWS = {
@@ -521,36 +471,27 @@ def free_bar(n_modes):
     return fi.analytic.beam(0.5, ends=("free", "free"), mass=0.1, first_frequency=300.0, n_modes=n_modes)
 
 
-def test_body_struck_at_two_points_dips_at_both():
+def bar_between_two(n_modes):
     """Here modes a little above the last stand for the rest in the run; the dip drawn is static all the same."""
-    hits = []
-    for n in (12, 300):
-        bodies = [fi.Modes.rigid(0.02), fi.Modes.rigid(0.03), free_bar(n)]
-        touches = [
-            Touch(fi.Contact.linear(2e4), 0, 2, None, 0.1),
-            Touch(fi.Contact.linear(3e4), 1, 2, None, 0.4),
-        ]
-        hits.append(collide(bodies, touches, speeds=[1.0, 1.5, 0.0], tolerance=1e-6, max_impacts=2))
-    few, all_there = hits
-    times = np.linspace(0.05, 0.9, 12) * all_there.impacts[0].end
-    true = all_there.displacement([0.1, 0.4, 0.25], times)
-    # twelve modes reach 40 times the contact's frequency: 4e-7 was measured, 8e-5 without the dip
-    assert_allclose(few.displacement([0.1, 0.4, 0.25], times), true, atol=2e-6 * np.abs(true).max())
-    assert np.abs(few.displacement([0.1, 0.4, 0.25], times, residual=False) - true).max() > 2e-5 * np.abs(true).max()
+    bodies = [fi.Modes.rigid(0.02), fi.Modes.rigid(0.03), free_bar(n_modes)]
+    touches = [Touch(fi.Contact.linear(2e4), 0, 2, None, 0.1), Touch(fi.Contact.linear(3e4), 1, 2, None, 0.4)]
+    return collide(bodies, touches, speeds=[1.0, 1.5, 0.0], tolerance=1e-6, max_impacts=2)
 
 
-def test_flexible_striker_dips_too():
+def bar_as_striker(n_modes):
     """A free bar meets a block with its middle."""
-    few, all_there = (
-        fi.strike(
-            fi.Modes.rigid(1.0), fi.Striker.flexible(free_bar(n), at=0.25), fi.Contact.linear(2e4), at=None, speed=1.0,
-            tolerance=1e-6, max_impacts=1,
-        )
-        for n in (12, 300)
-    )  # fmt: skip
-    times = np.linspace(0.05, 0.9, 12) * all_there.contact_time
-    true = all_there.displacement([0.25, 0.0, 0.1], times, body=0)
-    # as above: 2e-7 was measured, 7e-5 without the dip
-    assert_allclose(few.displacement([0.25, 0.0, 0.1], times, body=0), true, atol=2e-6 * np.abs(true).max())
-    bare = few.displacement([0.25, 0.0, 0.1], times, body=0, residual=False)
+    block, bar, law = fi.Modes.rigid(1.0), fi.Striker.flexible(free_bar(n_modes), at=0.25), fi.Contact.linear(2e4)
+    return fi.strike(block, bar, law, at=None, speed=1.0, tolerance=1e-6, max_impacts=1)
+
+
+@pytest.mark.parametrize(
+    ("blow", "points", "body"), [(bar_between_two, [0.1, 0.4, 0.25], -1), (bar_as_striker, [0.25, 0.0, 0.1], 0)]
+)
+def test_bodies_struck_at_two_points_and_strikers_dip_too(blow, points, body):
+    few, all_there = blow(12), blow(300)
+    times = np.linspace(0.05, 0.9, 12) * all_there.impacts[0].duration
+    true = all_there.displacement(points, times, body=body)
+    # twelve modes reach 40 times the contact's frequency: 4e-7 and 2e-7 were measured, 8e-5 and 7e-5 without the dip
+    assert_allclose(few.displacement(points, times, body=body), true, atol=2e-6 * np.abs(true).max())
+    bare = few.displacement(points, times, body=body, residual=False)
     assert np.abs(bare - true).max() > 2e-5 * np.abs(true).max()

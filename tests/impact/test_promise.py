@@ -55,6 +55,9 @@ def test_a_miss_warns_and_strict_raises():
     assert fi.export.numbers(hit)["response"]["tolerance_met"] is False
     with pytest.raises(fi.SimulationError, match="MISSED"):
         fi.strike(plate(10), HAMMER, SOFT, at=AT, speed=1.0, tolerance=1e-6, strict=True)
+    bodies, touch = [fi.Modes.rigid(0.1), plate(10)], [fi.Touch(SOFT, 0, 1, None, AT)]
+    with pytest.raises(fi.SimulationError, match="MISSED"):
+        fi.collide(bodies, touch, speeds=[1.0, 0.0], tolerance=1e-6, strict=True)
     assert issubclass(fi.ToleranceWarning, UserWarning)
 
 
@@ -86,12 +89,6 @@ def test_the_warning_names_the_users_line(way, tmp_path):
     code = WAYS[way].__code__
     (line,) = [each.lineno for each in found if each.filename == __file__]
     assert line in {number for _, _, number in code.co_lines()}
-
-
-def test_collisions_raise_too():
-    touch = [fi.Touch(SOFT, 0, 1, None, AT)]
-    with pytest.raises(fi.SimulationError, match="MISSED"):
-        fi.collide([fi.Modes.rigid(0.1), plate(10)], touch, speeds=[1.0, 0.0], tolerance=1e-6, strict=True)
 
 
 def test_a_step_of_ones_own_is_blamed():

@@ -16,11 +16,9 @@ def test_half_sine_levels():
     assert_allclose(spectra.half_sine_spectrum([1.0, 1.0 + 1.01e-4, 1.0 - 1.01e-4], 1.0), np.pi / 4, rtol=1e-4)
 
 
-def test_mobility_is_reciprocal_and_static_at_low_frequency():
+def test_mobility_is_static_at_low_frequency():
     modes = analytic.rectangle(1.0, 0.7, mass=0.5, first_frequency=80.0, n_modes=30, damping_ratio=0.01)
     a, b, low = (0.2, 0.3), (0.6, 0.5), [1e-3]
-    there, back = spectra.mobility(modes, a, b, [50.0, 200.0]), spectra.mobility(modes, b, a, [50.0, 200.0])
-    assert_allclose(there, back, rtol=1e-12)  # same sum in another order
     static = modes.shapes.compliance(np.array([a, b]))[0, 1]
     assert_allclose(spectra.mobility(modes, a, b, low) / (2j * np.pi * low[0]), static, rtol=1e-6)  # damping: 1e-7
 
@@ -44,7 +42,7 @@ def test_many_points_are_reciprocal_and_agree_with_single_ones():
     points, frequencies = [(0.2, 0.3), (0.6, 0.5), (0.5, 0.1)], np.array([50.0, 81.0, 200.0])
     found = {name: spectra.mobility(modes, points, points, frequencies, name) for name in spectra.QUANTITIES}
     assert found["mobility"].shape == (3, 3, 3)
-    assert_allclose(found["mobility"], found["mobility"].transpose(0, 2, 1), rtol=1e-10)  # same sum in another order
+    assert_allclose(found["mobility"], found["mobility"].transpose(0, 2, 1), rtol=1e-12)  # same sum in another order
     for i, to in enumerate(points):
         for j, at in enumerate(points):
             assert_allclose(found["mobility"][:, i, j], spectra.mobility(modes, at, to, frequencies), rtol=1e-10)

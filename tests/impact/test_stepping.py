@@ -65,26 +65,19 @@ def test_a_blow_at_the_usual_tolerance_is_told_by_few_steps(seed):
     assert abs(averaged.restitution - truth.restitution) < averaged.error.total
 
 
-@pytest.mark.parametrize(
-    ("seed", "mass"), [(1, 0.08040367666), (1, 0.31088011), (2, 0.0933117233), (3, 0.02846306), (6, 0.135557784)]
-)
+TOUCHES = [(1, 0.08040367666), (1, 0.31088011), (2, 0.0933117233), (3, 0.02846306), (6, 0.135557784)]
+MISSES = [(1, 0.0716013), (1, 0.0715942250), (8, 0.0478841312), (27, 0.139124020), (34, 0.0220161), (6, 0.135559001)]
+
+
+@pytest.mark.parametrize(("seed", "mass"), TOUCHES + MISSES)
 def test_a_touch_that_barely_happens_is_decided_by_finer_steps(seed, mass):
-    hit, truth = (grazing_blow(seed, mass)(tolerance=tolerance) for tolerance in (1e-2, 1e-8))
-    others = {grazing_blow(seed, factor * mass)(tolerance=1e-6).n_impacts for factor in (0.99, 1.0, 1.01)}
-    assert len(others) > 1  # the number does depend on the mass
-    assert hit.n_impacts == truth.n_impacts
-    assert_allclose(hit.contact_time, truth.contact_time, rtol=1e-2)  # the tolerance
-
-
-@pytest.mark.parametrize(
-    ("seed", "mass"),
-    [(1, 0.0716013), (1, 0.0715942250), (8, 0.0478841312), (27, 0.139124020), (34, 0.0220161), (6, 0.135559001)],
-)
-def test_a_touch_barely_missed_in_flight_is_decided_by_finer_steps(seed, mass):
-    """Rough steps make the bodies turn back just before they touch once more, and nothing of it is in the force."""
+    """Of those missed, rough steps make the bodies turn back in flight, and nothing of it is in the force."""
     hit, truth = (grazing_blow(seed, mass)(tolerance=tolerance) for tolerance in (1e-2, 1e-8))
     assert hit.n_impacts == truth.n_impacts
     assert_allclose(hit.contact_time, truth.contact_time, rtol=1e-2)  # the tolerance
+    if (seed, mass) in TOUCHES:
+        others = {grazing_blow(seed, factor * mass)(tolerance=1e-6).n_impacts for factor in (0.99, 1.0, 1.01)}
+        assert len(others) > 1  # the number does depend on the mass
 
 
 def test_the_tolerance_advised_is_met_and_hardly_looser_than_what_was_reached():

@@ -10,16 +10,14 @@ from test_collision import left_out, thin_plate_blow, thinned_blow
 import fem_impact as fi
 
 
-@pytest.mark.parametrize("seed", [0, 2, 4, 8, 12, 14, 16, 21])
-def test_error_of_leaving_out_modes_is_neither_below_the_true_one_nor_far_above(seed):
+@pytest.mark.parametrize(
+    ("seed", "low", "high"),
+    [*((seed, 1.0, 4.0) for seed in (0, 2, 4, 8, 12, 14, 16, 21)),  # 1.2 to 2.7 times the true one were measured
+     *((seed, 0.5, 3.0) for seed in (55, 105, 123, 151, 183, 206, 274))],  # 0.6 to 1.4; runs agree by chance here
+)  # fmt: skip
+def test_error_of_leaving_out_modes_is_neither_below_the_true_one_nor_far_above(seed, low, high):
     told, true = left_out(seed)
-    assert true < told < 4.0 * true  # 1.2 to 2.7 times it were measured
-
-
-@pytest.mark.parametrize("seed", [55, 105, 123, 151, 183, 206, 274])
-def test_runs_that_agree_by_chance_do_not_hide_the_modes_left_out(seed):
-    told, true = left_out(seed)
-    assert 0.5 * true < told < 3.0 * true  # 0.6 to 1.4 times it were measured; 0.3 to 10 are promised
+    assert low * true < told < high * true  # 0.3 to 10 are promised
 
 
 def test_a_number_of_impacts_that_the_modes_left_out_may_change_is_doubted_aloud():

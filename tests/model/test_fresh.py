@@ -114,14 +114,14 @@ def test_whether_the_model_holds_is_examined_as_plain_python_too(compiler, monke
     plate = fi.analytic.rectangle(0.3, 0.2, section=steel, n_modes=20, damping_ratio=0.01)
     hit = fi.strike(plate, fi.Striker.rigid(0.05), fi.Contact.hertz(1e7), at=(0.1, 0.08), speed=0.2, tolerance=1e-2)
     compiled = audit.examine(hit)
-    most, follow = [], engine.follow
+    most, follow = [], engine.run_system
 
     def seen(*given):
         lacking()
         most.append(build.QUICK.get())
         return follow(*given)
 
-    monkeypatch.setattr(engine, "follow", seen)
+    monkeypatch.setattr(engine, "run_system", seen)
     plain = audit.examine(hit)
     assert compiler.begun == 1 and most and set(most) == {np.inf}  # not cut short: that would look like not known
     for one, other in zip(compiled, plain, strict=True):
