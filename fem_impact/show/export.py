@@ -6,6 +6,7 @@ import io
 import json
 import math
 import platform
+from contextlib import suppress
 from importlib import metadata
 from pathlib import Path
 from typing import Any
@@ -78,7 +79,9 @@ def write_vtk(path: str | Path, modes: Modes | Body, response: Response | None =
         places = viewing.placed(modes, points)
     if response is None:
         parts = _mode_parts(modes, points)
-        stamps = _distinct(modes.frequencies)
+        stamps = np.array(modes.frequencies, float)
+        for i in range(1, len(stamps)):  # equal ones become distinct
+            stamps[i] = max(stamps[i], stamps[i - 1] + SAME * max(stamps[i - 1], 1.0))
     else:
         if times is None:
             raise ValueError("times must be given with response, as an array in s")
@@ -153,7 +156,7 @@ def write_uff(path: str | Path, modes: Modes) -> None:
     points, cells = modes.shapes.grid()
     with replacing(path) as temporary:
         shapes, places = modes.shape_at(points), viewing.placed(modes, points)
-        universal_files.write(temporary, modes.frequencies, modes.damping_ratio, shapes, places, cells)
+        universal_files.write_modes(temporary, modes.frequencies, modes.damping_ratio, shapes, places, cells)
 
 
 @check.typed
@@ -234,16 +237,8 @@ SCALARS = (
     "scheme",
 )  # fmt: skip
 ERROR_PARTS = (
-    "step",
-    "truncation",
-    "mesh",
-    "idealisation",
-    "inherited",
-    "measurement",
-    "sensitivity",
-    "total",
-    "resolvable",
-)
+    "step", "truncation", "mesh", "idealisation", "inherited", "measurement", "sensitivity", "total", "resolvable",
+)  # fmt: skip
 IMPACT_PARTS = ("start", "end", "peak_force", "impulse", "contact", "restitution")
 
 
@@ -257,8 +252,11 @@ def numbers(response: Response) -> dict[str, Any]:
     >>> round(fi.export.numbers(hit)["response"]["restitution"], 3)  # of 1 kg that yields
     0.818
     """
+    centroid = None  # without contact, or if the blow is too long for a band up to AUDIBLE
+    with suppress(ValueError):
+        centroid = response.spectral_centroid(AUDIBLE)
     data = {name: getattr(response, name) for name in SCALARS} | {
-        "spectral_centroid": {"value": _centroid(response), "max_frequency": AUDIBLE},
+        "spectral_centroid": {"value": centroid, "max_frequency": AUDIBLE},
         "error": {name: getattr(response.error, name) for name in ERROR_PARTS},
         "model_error": response.model_error,
         "assumptions": table(response.assumptions),
@@ -270,14 +268,6 @@ def numbers(response: Response) -> dict[str, Any]:
         "response": data,
         "impacts": [{name: getattr(impact, name) for name in IMPACT_PARTS} for impact in response.impacts],
     }
-
-
-def _centroid(response: Response) -> float | None:
-    """Spectral centroid; None without contact, or if the blow is too long for a band up to AUDIBLE."""
-    try:
-        return response.spectral_centroid(AUDIBLE)
-    except ValueError:
-        return None
 
 
 def run_data(run: Run, scene: dict[str, Any]) -> dict[str, Any]:
@@ -368,13 +358,6 @@ def _with_forces(response: Response, times: np.ndarray, moves: list[np.ndarray])
         for field, force in zip(fields, response.history.force_at(times, i)[0]):
             field[name] = force
     return [({"displacement": d, "velocity": v}, field) for d, v, field in zip(*moves, fields)]
-
-
-def _distinct(stamps: np.ndarray) -> np.ndarray:
-    result = np.array(stamps, float)
-    for i in range(1, len(result)):
-        result[i] = max(result[i], result[i - 1] + SAME * max(result[i - 1], 1.0))
-    return result
 
 
 def _write_collection(path: Path, points, cells, parts: list[tuple[dict, dict]], stamps: np.ndarray) -> None:

@@ -50,6 +50,8 @@ def test_disk_frequencies(edge, squared):
 def test_beam_frequencies(ends, roots):
     modes = analytic.beam(2.0, ends=ends, mass=1.0, first_frequency=roots[0] ** 2, n_modes=4)
     assert_allclose(np.sqrt(modes.frequencies[modes.n_rigid :][:2]), roots, rtol=1e-12)  # the digits printed
+    if ends[1] == "free":
+        assert_allclose(modes.shape_at([2.0])[0, modes.n_rigid :] ** 2, 4.0, rtol=1e-9)  # over the mass
 
 
 def test_rectangle_frequencies_and_order():
