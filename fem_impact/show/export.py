@@ -328,35 +328,29 @@ def _mode_parts(modes: Modes | Body, points: np.ndarray) -> list[tuple[dict, dic
 def _motion_parts(
     response: Response, points: np.ndarray, times: np.ndarray, body: Body | None = None
 ) -> list[tuple[dict, dict]]:
-    if body is not None:
-        moves = [body.displacement(state) for state in response.modal_state(times)]
-        return _with_forces(response, times, moves)
-    moves = []
-    # Kept modes only: the residual dip would need a static solution for every grid point. `shapes.at` also accepts the
-    # midpoints of chords along a hole, which lie just off the body.
-    rows = response.target.shapes.at(points)  # (n_points, n_modes)
-    at = None if response.at is None else viewing.placed(response.target, np.atleast_2d(response.at))
-    along = 1.0 if viewing.heights(response.target, points[:1]) is None else -1.0  # the blow, in z
-    for state in response.modal_state(times):
-        vector = np.zeros((len(times), len(points), 3))
-        vector[:, :, 2] = along * state @ rows.T  # (n_times, n_points)
-        moves.append(vector)
-    parts = _with_forces(response, times, moves)
-    if response.striker is not None and at is not None:
-        striker = response.striker
-        tip = response.displacement(striker.at[None], times, body=0)[:, 0]
-        for (_, field), way in zip(parts, tip):
-            field["striker"] = at + np.array([0.0, 0.0, along * way])
-    return parts
-
-
-def _with_forces(response: Response, times: np.ndarray, moves: list[np.ndarray]) -> list[tuple[dict, dict]]:
-    """Displacements and velocities (n_times, n_points, 3), one part per time, with the forces then."""
+    """Displacements and velocities (n_times, n_points, 3), one part per time, with the forces and the striker then."""
     fields: list[dict[str, Any]] = [{"time": t} for t in times]
     for i in range(response.history.n_contacts):
         name = "force" if response.history.n_contacts == 1 else f"force_{i + 1}"
         for field, force in zip(fields, response.history.force_at(times, i)[0]):
             field[name] = force
+    states = response.modal_state(times)
+    if body is not None:
+        moves = [body.displacement(state) for state in states]
+    else:
+        # Kept modes only: the residual dip would need a static solution for every grid point. `shapes.at` also accepts
+        # the midpoints of chords along a hole, which lie just off the body.
+        along = 1.0 if viewing.heights(response.target, points[:1]) is None else -1.0  # the blow, in z
+        rows, moves = response.target.shapes.at(points), []  # (n_points, n_modes)
+        for state in states:
+            vector = np.zeros((len(times), len(points), 3))
+            vector[:, :, 2] = along * state @ rows.T  # (n_times, n_points)
+            moves.append(vector)
+        if response.striker is not None and response.at is not None:
+            at = viewing.placed(response.target, np.atleast_2d(response.at))
+            tip = response.displacement(response.striker.at[None], times, body=0)[:, 0]
+            for field, way in zip(fields, tip):
+                field["striker"] = at + np.array([0.0, 0.0, along * way])
     return [({"displacement": d, "velocity": v}, field) for d, v, field in zip(*moves, fields)]
 
 

@@ -217,6 +217,8 @@ def test_point_off_the_body_is_refused():
     modes = analytic.disk(0.2, mass=1.0, first_frequency=1.0, n_modes=3)
     with pytest.raises(ValueError, match=r"points must lie on the body, got \(0.3, 0\) m"):
         modes.shape_at([[0.3, 0.0]])
+    with pytest.raises(ValueError, match=r"at must lie on the body, got \(0.2, 0.1\) m"):
+        modes.points("at", (0.2, 0.1))
 
 
 def test_rigid_motions_of_a_free_disk_are_those_of_its_mass_and_inertia():

@@ -298,12 +298,6 @@ def test_bounds_are_refused_where_no_proof_covers_the_body():
         find_modes(assemble(mesh.disk(1.0), PLATE, {"boundary": "hinged"}), n_modes=1, bounds=True)
 
 
-def test_strike_point_off_the_body_is_refused():
-    modes = find_modes(assemble(mesh.rectangle(1.0, 1.0, size=0.5), PLATE), n_modes=4)
-    with pytest.raises(ValueError, match=r"at must lie on the body, got \(1.2, 0.5\) m"):
-        modes.points("at", (1.2, 0.5))
-
-
 @pytest.mark.parametrize(
     ("options", "text"),
     [
