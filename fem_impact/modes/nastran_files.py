@@ -127,7 +127,7 @@ def _elements(cards: Any, told: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
 
 def _fields(results: Any, numbers: np.ndarray) -> dict[str, np.ndarray]:
     """Modes and static displacements."""
-    table, cases = list(results.eigenvectors.values()), []
+    table, cases = list(results.eigenvectors.values()), list[list[np.ndarray]]()
     for tables in (table, results.displacements.values()):
         cases.append([])
         for one in tables:
