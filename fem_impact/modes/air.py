@@ -43,20 +43,10 @@ from .shapes import ScaledShapes, Shapes
 DENSITY, SPEED = 1.204, 343.2  # [kg/m^3], [m/s] fact: of air at 20 degrees C and 1013 hPa
 # [-] cells per wavelength of the highest mode and, in `free_air`, of its sound; two sizes are extrapolated
 PER_WAVE = 8.0
-FEWEST = 24.0  # [-] cells across a square as large as the plate, at least: cells at the rim cover a sixth of it
 SAMPLES = 2, 3  # [-] points across a cell over which a shape is averaged, fine and coarse: both use one set of points
 GAIN = (SAMPLES[1] / SAMPLES[0]) ** 2 - 1.0  # [-] fact: the coarse error less the fine one, over the fine one
 # [-] modes solved at the same few frequencies, and modes beside it that air may mix in: far ones swing too differently
 BLOCK = 24
-# [-] part of its lowest and highest frequency by which the masses of a block are known beyond its modes: they seldom
-# leave this band, and the wider one then takes another turn
-ROOM = 0.1
-# [-] pieces across a square that the rim cuts: with one, the added masses of free plates err ten times as much
-FINER = 4
-# [-] stated error of the damping by sound over the differences of grids and samples: with it the true errors were at
-# most 0.66 of those stated, of 41 plates
-CAREFUL = 1.5
-MOST_SAMPLES = 1e9  # [-] limit of memory: values of all shapes on the grid of points
 
 
 @check.typed
@@ -142,16 +132,20 @@ def in_air(
     )  # fmt: skip
 
 
-def _spacing(modes: Modes, area: float, speed: float) -> float:
-    """Distance [m] of the points at which shapes are sampled on a plate of an area [m^2]."""
+def _spacing(modes: Modes, area: float, speed: float, most: float = 1e9) -> float:
+    """Distance [m] of the points at which shapes are sampled on a plate of an area [m^2].
+
+    The shapes take up to ``most`` numbers of memory. At least 24 cells lie across a square as large as the plate: those
+    at the rim then cover a sixth of it.
+    """
     # [1/m] of the highest mode, by Weyl's law, or of its sound
     wave = max(np.sqrt(4.0 * np.pi * modes.n_modes / area), modes.omega[-1] / speed)
-    spacing = min(2.0 * np.pi / wave / PER_WAVE, np.sqrt(area) / FEWEST) / SAMPLES[0]
-    if not modes.n_modes * area / spacing**2 <= MOST_SAMPLES:
+    spacing = min(2.0 * np.pi / wave / PER_WAVE, np.sqrt(area) / 24.0) / SAMPLES[0]
+    if not modes.n_modes * area / spacing**2 <= most:
         raise ValueError(
             f"speed of sound in the air must be higher or modes fewer, got {speed:g} m/s: {modes.n_modes} modes on a "
             f"grid for waves of {2.0 * np.pi / wave:.2g} m, the shortest of plate or sound, take more than "
-            f"{MOST_SAMPLES:.0e} numbers"
+            f"{most:.0e} numbers"
         )
     return float(spacing)
 
@@ -163,11 +157,12 @@ def _extrapolated(
 
     ``sparse`` are those of the same mixtures, sampled at points as much farther apart as the cells are larger, so that
     all errors shrink with their area. ``coarse`` are those of the mixtures found on the coarse grid. What both change
-    may agree by chance, so that no mode is surer, relative to its damping, than those below it.
+    may agree by chance, so that no mode is surer, relative to its damping, than those below it. The true errors were at
+    most 0.66 of those stated, of 41 plates.
     """
     some = np.maximum(fine, np.finfo(float).tiny)
     apart = [np.maximum.accumulate(np.abs(each - fine) / some) for each in (sparse, coarse)]
-    return np.maximum(0.0, fine - (sparse - fine) / GAIN), CAREFUL * (sum(apart) + missed) * fine
+    return np.maximum(0.0, fine - (sparse - fine) / GAIN), 1.5 * (sum(apart) + missed) * fine
 
 
 def _mistaken(air: "_Air", mix: np.ndarray, omega: np.ndarray, doubt: np.ndarray) -> np.ndarray:
@@ -247,7 +242,8 @@ class _Air:
             window = slice(max(0, first - BLOCK), min(count, block.stop + BLOCK))
             low, high = np.inf, 0.0
             while low > omega[block].min() or high < omega[block].max():
-                low, high = min(low, (1.0 - ROOM) * omega[block].min()), max(high, (1.0 + ROOM) * omega[block].max())
+                # a tenth beyond the block, which its modes seldom leave: a wider band then takes another turn
+                low, high = min(low, 0.9 * omega[block].min()), max(high, 1.1 * omega[block].max())
                 self._solve(block, window, (low, high), omega, vectors)
             self._mix_in(block, window, omega, vectors)
         return omega, vectors
@@ -289,15 +285,16 @@ class _Air:
             vectors[window, i] = own if own[np.abs(own).argmax()] > 0.0 else -own
 
 
-def _sampled(shapes: Shapes, spacing: float) -> tuple[np.ndarray, np.ndarray]:
+def _sampled(shapes: Shapes, spacing: float, finer: int = 4) -> tuple[np.ndarray, np.ndarray]:
     """Every shape at points on a square lattice around the body, (n_modes, nx, ny) [kg**-0.5]; zero beside it.
 
-    Squares cut by the rim count by the part of them on the body. Also returned is how much of each mode's energy
-    (n_modes,) [-] the area so missed holds.
+    Squares cut by the rim count by the part of them on the body, in pieces ``finer`` in each direction: with one, the
+    added masses of free plates err ten times as much. Also returned is how much of each mode's energy (n_modes,) [-]
+    the area so missed holds.
     """
     places, inside = lattice(shapes, spacing, SAMPLES[0] * SAMPLES[1])
     rim = binary_dilation(inside, np.ones((3, 3))) & ~binary_erosion(inside, np.ones((3, 3)))
-    parts = spacing * ((np.arange(FINER) + 0.5) / FINER - 0.5)
+    parts = spacing * ((np.arange(finer) + 0.5) / finer - 0.5)
     pieces = (places[rim][:, None] + np.stack(np.meshgrid(parts, parts), axis=-1).reshape(-1, 2)).reshape(-1, 2)
     covered = shapes.contains(pieces)
     at_rim = shapes.at(pieces[covered])
@@ -305,7 +302,7 @@ def _sampled(shapes: Shapes, spacing: float) -> tuple[np.ndarray, np.ndarray]:
     values[covered] = at_rim
     samples = np.zeros((at_rim.shape[1], *inside.shape))
     samples[:, inside & ~rim] = shapes.at(places[inside & ~rim]).T
-    samples[:, rim] = values.reshape(rim.sum(), FINER**2, -1).mean(axis=1).T
+    samples[:, rim] = values.reshape(rim.sum(), finer**2, -1).mean(axis=1).T
     area = (inside & ~rim).sum() + covered.mean() * rim.sum()
     energy = (samples**2).sum(axis=(1, 2)) * covered.sum()
     missed = abs(area - measure(*shapes.grid()) / spacing**2)
@@ -330,15 +327,7 @@ def lattice(shapes: Shapes, size: float, period: int = 1) -> tuple[np.ndarray, n
 
 def between_cells(padded: tuple[int, int], size: float) -> tuple[np.ndarray, np.ndarray]:
     """Distance [m] between cells of a lattice, and the mean of 1 / R [1/m] between their points, (padded) each."""
-    steps = np.meshgrid(*(np.minimum(np.arange(n), n - np.arange(n)) for n in padded), indexing="ij")
-    nearest = mean_inverse_distance(*(n // 2 + 1 for n in padded))
-    return size * np.hypot(*steps), nearest[steps[0], steps[1]] / size
-
-
-def mean_inverse_distance(nx: int, ny: int) -> np.ndarray:
-    """Mean of 1 / R between the points of two unit squares that lie 0, 1 ... steps apart, (nx, ny); exact nearby."""
-    x, y = np.meshgrid(np.arange(-1.0, nx + 1.0), np.arange(-1.0, ny + 1.0), indexing="ij")
-    x, y = np.abs(x), np.abs(y)
+    x, y = np.abs(np.meshgrid(*(np.arange(-1.0, n // 2 + 2.0) for n in padded), indexing="ij"))  # in steps
     distance = np.hypot(x, y)
     one = np.where(x > 0.0, x, 1.0), np.where(y > 0.0, y, 1.0)
     whole = 0.5 * x * y * (y * np.arcsinh(x / one[1]) + x * np.arcsinh(y / one[0])) - distance**3 / 6.0
@@ -346,4 +335,6 @@ def mean_inverse_distance(nx: int, ny: int) -> np.ndarray:
         whole = np.diff(whole, 2, axis=axis)
     distance = distance[1:-1, 1:-1]
     far = 0.5 * EPSILON ** (-1 / 6)  # rounding, 3 EPSILON R**4, then exceeds what the centres miss, R**-2 / 12
-    return np.where(distance > far, 1.0 / np.maximum(distance, 1.0), whole)
+    nearest = np.where(distance > far, 1.0 / np.maximum(distance, 1.0), whole)
+    steps = np.meshgrid(*(np.minimum(np.arange(n), n - np.arange(n)) for n in padded), indexing="ij")
+    return size * np.hypot(*steps), nearest[steps[0], steps[1]] / size

@@ -10,11 +10,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from .._base import check
-from . import dents, free_body, imported, matrices
+from . import cell_kinds, dents, free_body, imported, matrices
 from .modal import Modes, damping_ratios
 
-NEAR = 1e-3  # [-] of the size of the body: a point this near a node is that node
-ALONG = 1.4e-3  # [-] sine of the angle up to which a unit load acts along a direction: a twelfth of a degree
 NOTE = "the error of the mesh on which modes were found elsewhere is not known, and no blow counts it"
 
 
@@ -157,7 +155,7 @@ class Body(check.Brief):
             two files are about different nodes.
         """
         told: dict[str, Any] = {}
-        for found in imported.read(files):
+        for found in imported.read_bodies(files):
             numbers = [each["numbers"] for each in (told, found) if "numbers" in each]
             if len(numbers) == 2 and not np.array_equal(numbers[0], numbers[1]):
                 raise ValueError("files must be about the same nodes; export all results of one model")
@@ -293,8 +291,7 @@ class Body(check.Brief):
     @cached_property
     def axes(self) -> list[int]:
         """The axes along which nodes differ: points of `modes` have these coordinates alone."""
-        spread = np.ptp(self.nodes, axis=0)
-        return [i for i in range(3) if spread[i] > 1e-9 * max(spread.max(), 1e-300)] or [0]
+        return cell_kinds.differing_axes(self.nodes)
 
     def node(self, where: Any) -> int:
         """Row of a node given by its number, its name or a point (3,) [m] within a thousandth of the body's size."""
@@ -306,7 +303,7 @@ class Body(check.Brief):
             return self._row[int(where)]
         apart = np.linalg.norm(self.nodes - check.array("where", where, (3,), "m"), axis=1)
         row = int(apart.argmin())
-        if apart[row] > NEAR * float(np.ptp(self.nodes, axis=0).max()):
+        if apart[row] > 1e-3 * float(np.ptp(self.nodes, axis=0).max()):
             place = ", ".join(f"{x:g}" for x in self.nodes[row])
             raise ValueError(
                 f"where must be a node of the body, got one {apart[row]:.3g} m away from the nearest, node "
@@ -354,7 +351,7 @@ class Body(check.Brief):
             solid=False,
         )  # fmt: skip
         made = dents.settled(made, seen, self.solid)
-        sideways = free_body.across(self.shapes[kept], ways[kept], made.n_modes)
+        sideways = free_body.sideways(self.shapes[kept], ways[kept], made.n_modes)
         return replace(made, shapes=replace(made.shapes, sideways=sideways), notes=(*made.notes, NOTE))
 
     def way(self, where: Any, direction: Any = "normal") -> np.ndarray:
@@ -388,13 +385,13 @@ class Body(check.Brief):
             row, given = self._row[number], np.flatnonzero(self.loads[:, 0] == number)
             force = self.loads[given, 1:]
             share = np.linalg.lstsq(force.T, ways[row], rcond=None)[0]
-            if place[row] >= 0 and np.linalg.norm(share @ force - ways[row]) <= ALONG:
+            if place[row] >= 0 and np.linalg.norm(share @ force - ways[row]) <= 1.4e-3:  # a twelfth of a degree
                 static, others = self.static[:, :, given] @ share, self.numbers != number
                 columns.append(np.einsum("nd,nd->n", static, ways))
                 points.append(int(place[row]))
                 normal = ways[row] if self.normals is None else self.normals[row]
                 square = abs(normal @ ways[row]) >= dents.SQUARE * np.linalg.norm(normal)
-                apart, under = dents.along(self.nodes[others] - self.nodes[row], ways[row]), static @ ways[row]
+                apart, under = dents.seen_along(self.nodes[others] - self.nodes[row], ways[row]), static @ ways[row]
                 seen.append(dents.Load(points[-1], apart, under[others], float(under[row]), square))
         return np.column_stack(columns) if columns else np.zeros((len(ways), 0)), points, seen
 

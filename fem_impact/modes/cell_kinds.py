@@ -6,6 +6,8 @@ from typing import Any
 
 import numpy as np
 
+from .._base.rounding import SAME
+
 LINES, SHELLS = {3, 21, 35}, {5, 7, 9, 22, 23, 28, 34}  # codes of vtk
 SOLIDS = {10, 11, 12, 13, 14, 24, 25, 26, 27, 29, 32, 33}
 # codes and corners of meshio's kinds of cells, without their numbers of nodes
@@ -63,6 +65,13 @@ def steps(n: int, shapes: Sequence[Any], static: Sequence[Any]) -> dict[str, np.
 def spatial(points: np.ndarray) -> np.ndarray:
     """Points (n, 3) of those with fewer coordinates."""
     return np.column_stack([points, np.zeros((len(points), 3 - points.shape[1]))])
+
+
+def differing_axes(points: np.ndarray, without: str = "") -> list[int]:
+    """The axes along which points (n_points, 3) differ, one at least; ``without`` is one that does not count."""
+    others = [i for i, axis in enumerate("xyz") if axis != without]
+    spread = np.ptp(points[:, others], axis=0)
+    return [i for i, wide in zip(others, spread) if wide > SAME * max(spread.max(), 1e-300)] or others[:1]
 
 
 def rows_of(numbers: np.ndarray, wanted: Any) -> np.ndarray:

@@ -1,6 +1,6 @@
 """Modes of a circular plate: Bessel functions, with the static deflection by Boggio's formula and what edges add."""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -13,11 +13,9 @@ from ..fe import plausible
 from ..fe.section import KINDS, Plate
 from .modal import Damping, Modes
 from .request import check_beyond_rigid, check_number, request
-from .shapes import Shapes
+from .shapes import ClosedShapes
 
-DISK_TERMS = 100_000  # [-] most terms summed at the edge of a disk, where they only fall as n**-3; error 5e-11
 MOST_OF_DISK = 50_000  # [-] largest number of modes of a disk; each needs a root search
-DISK_SCAN = 0.5  # [-] step in z = k radius when scanning for roots; roots of one order are about pi apart, six steps
 
 
 def _bessel(n: Any, z: Any) -> tuple[Any, ...]:
@@ -55,7 +53,7 @@ def _roots(edge: str, nu: float, reach: float) -> tuple[np.ndarray, np.ndarray, 
     found = []
     for n in range(int(reach) + 3):
         low = max(0.3, 0.5 * n)  # there is no root below, and J underflows
-        scan = np.linspace(low, reach, 16 + int(max(0.0, reach - low) / DISK_SCAN))
+        scan = np.linspace(low, reach, 16 + int(max(0.0, reach - low) / 0.5))  # roots are about pi apart, six steps
         values = determinant(scan, n)
         turns = np.flatnonzero(np.sign(values[:-1]) * np.sign(values[1:]) < 0)
         found.append(np.column_stack([scan[turns], scan[turns + 1], np.full(len(turns), n)]))
@@ -73,7 +71,7 @@ def _count(z: np.ndarray, order: np.ndarray, reach: float = np.inf) -> int:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class DiskShapes(Shapes, check.Brief):
+class DiskShapes(ClosedShapes, check.Brief):
     """Bessel shapes of a disk of unit mass and rigidity centred at the origin, computed on the unit disk."""
 
     radius: float  # [m]
@@ -102,10 +100,6 @@ class DiskShapes(Shapes, check.Brief):
         x, y = points / self.radius, loads / self.radius
         return np.array([[_green(self.edge, self.nu, place, load) for load in y] for place in x])
 
-    def take(self, n_modes: int) -> "DiskShapes":
-        kept = {name: getattr(self, name)[:n_modes] for name in ("z", "order", "weight", "phase", "scale")}
-        return replace(self, **kept)
-
     def grid(self) -> tuple[np.ndarray, np.ndarray]:
         rings, spokes = 20, 72
         r = np.repeat(np.arange(1, rings + 1) / rings, spokes) * self.radius
@@ -131,7 +125,8 @@ def _green(edge: str, nu: float, place: np.ndarray, load: np.ndarray) -> float:
     if edge == "clamped":
         return clamped
     decay = r * rho
-    terms = min(DISK_TERMS, int(np.log(1e-17) / np.log(np.clip(decay, 1e-3, 1.0 - EPSILON))) + 6)
+    # at the edge terms only fall as n**-3; so many leave an error of 5e-11
+    terms = min(100_000, int(np.log(1e-17) / np.log(np.clip(decay, 1e-3, 1.0 - EPSILON))) + 6)
     n = np.arange(terms)
     wave = np.where(n == 0, 1.0, 2.0) * rho**n * np.cos(n * gamma)
     if edge == "hinged":

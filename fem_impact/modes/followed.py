@@ -12,21 +12,15 @@ import numpy as np
 from scipy.linalg import cho_solve, cholesky, solve_triangular
 from scipy.optimize import nnls
 
+from .._base.rounding import ROUNDING
 from . import picked
 from .picked import DAMPING, GAIN
 
 RATIOS = np.geomspace(1e-3, 0.3, 6)  # [-] damping ratios of poles that may be added, each next three times as wide
-BEYOND = 1.02, 1.06, 1.12, 1.2, 1.35, 1.6, 2.2, 4.0  # [-] first poles above the band, over its end
-ROUNDS = 25  # [-] times that poles are added
-AT_ONCE = 12  # [-] poles added at once
-MOVES = 2  # [-] times that all poles are moved before more are added
-FLOOR = 1e-3  # [-] of the response: below that nothing is told by a line, however little the taps differ
-WIDE = 0.7  # [-] largest damping ratio
 # [-] ways in which noise may have changed the amplitudes, drawn with this many standard errors: noise moves poles, too,
 # which is not drawn; with 2 the true error was above the largest effect for all of one in 26 bodies, by a fifth
 WAYS, SURE = 6, 2.5
 DRAWS = 32  # [-] samples of the noise, of which the first are such ways
-ALIKE = 1e-12  # [-] added to squares of columns of unit size, so that two that are alike do no harm
 AROUND = 10  # [-] lines at least over which what is left is averaged
 
 
@@ -55,7 +49,7 @@ def columns(lines: MeasuredLines, poles: np.ndarray) -> np.ndarray:
     return np.vstack([found.real, found.imag])
 
 
-def slopes(lines: MeasuredLines, poles: np.ndarray) -> np.ndarray:
+def column_slopes(lines: MeasuredLines, poles: np.ndarray) -> np.ndarray:
     """By logarithms of frequencies and then of damping ratios, of the columns of modes, (2 n, 2 n_modes)."""
     natural, damping = np.exp(poles)
     square, swing = (lines.s**2)[:, None], 2.0 * damping * natural * lines.s[:, None]
@@ -78,29 +72,37 @@ def fitted(lines: MeasuredLines, poles: np.ndarray) -> Passive:
 
 
 def _triangle(basis: np.ndarray) -> np.ndarray:
-    """Upper triangle whose square is that of columns of unit size; several times as fast as by their own triangle."""
-    return np.asarray(cholesky(basis.T @ basis + ALIKE * np.eye(basis.shape[1])))
+    """Upper triangle whose square is that of columns of unit size, of which two may be alike.
+
+    It is several times as fast as by their own triangle.
+    """
+    return np.asarray(cholesky(basis.T @ basis + ROUNDING * np.eye(basis.shape[1])))
 
 
-def follow(lines: MeasuredLines) -> Passive:
-    """The sum that follows a response until what is left looks like noise."""
+def follow_response(lines: MeasuredLines, rounds: int = 25, at_once: int = 12, moves: int = 2) -> Passive:
+    """The sum that follows a response until what is left looks like noise.
+
+    It begins with poles above the band. Poles are then added ``at_once`` in each of some ``rounds``, and all are moved
+    some times before more are added.
+    """
     top, low = lines.s.imag[-1], lines.s.imag[0]
-    kept = fitted(lines, np.log(np.stack([top * np.array(BEYOND), np.full(len(BEYOND), 0.02)])))
+    beyond = top * np.array([1.02, 1.06, 1.12, 1.2, 1.35, 1.6, 2.2, 4.0])
+    kept = fitted(lines, np.log(np.stack([beyond, np.full(len(beyond), 0.02)])))
     offered, matrix = _offered(lines)
-    for _ in range(ROUNDS):
+    for _ in range(rounds):
         before = np.square(kept.rest).sum()
         noise = before / max(1, len(kept.rest) - 3 * kept.poles.shape[1])
         told = np.maximum(matrix.T @ kept.rest.astype(np.float32), 0.0) ** 2
         more: list[int] = []
         near = np.exp(offered[0])
-        while len(more) < AT_ONCE and told.max() > GAIN * noise:
+        while len(more) < at_once and told.max() > GAIN * noise:
             best = int(told.argmax())
             more.append(best)
             width = 2.0 * np.exp(offered[:, best]).prod() + 2.0 * lines.s.real[0] + 2.0 * low
             told[np.abs(near - near[best]) <= width] = 0.0
         if not more:
             break
-        kept = _moved(lines, fitted(lines, np.hstack([kept.poles, offered[:, more]])), MOVES)
+        kept = _moved(lines, fitted(lines, np.hstack([kept.poles, offered[:, more]])), moves)
         if before - np.square(kept.rest).sum() < GAIN * noise:
             break
     return kept
@@ -129,14 +131,14 @@ def _moved(lines: MeasuredLines, kept: Passive, steps: int) -> Passive:
         n = kept.poles.shape[1]
         basis = columns(lines, kept.poles)[:, np.append(kept.amplitudes[:2] > 0.0, np.ones(n, bool))]
         basis /= np.linalg.norm(basis, axis=0)
-        steep = slopes(lines, kept.poles) * np.tile(kept.amplitudes[2:], 2)
+        steep = column_slopes(lines, kept.poles) * np.tile(kept.amplitudes[2:], 2)
         steep -= basis @ cho_solve((_triangle(basis), False), basis.T @ steep)
         square, slope = steep.T @ steep, steep.T @ kept.rest
         cost = np.square(kept.rest).sum()
         for _ in range(4):
             step = np.linalg.solve(square + np.diag(caution * np.diag(square) + 1e-12 * square.trace()), slope)
             poles = kept.poles + np.clip(step, -0.5, 0.5).reshape(2, n)
-            poles[1] = np.clip(poles[1], np.log(DAMPING[0]), np.log(WIDE))
+            poles[1] = np.clip(poles[1], np.log(DAMPING[0]), np.log(0.7))
             trial = fitted(lines, poles)
             if np.square(trial.rest).sum() < cost:
                 kept, caution = trial, 0.1 * caution
@@ -167,10 +169,10 @@ def body_of(found: Any, driving: Any, points: Any) -> Following:
     if len(s) < 2 * AROUND:
         raise ValueError(f"frf must have at least {2 * AROUND} lines where its force has power, got {len(s)}")
     noise = _noise(found, lines_used, used, np.abs(values))
-    weight = 1.0 / np.hypot(noise, FLOOR * np.abs(values))
+    weight = 1.0 / np.hypot(noise, 1e-3 * np.abs(values))  # a line tells no more, however little the taps differ
     rows = [(values[:, k] * weight[:, k]).view(float).reshape(-1, 2).T.ravel() for k in range(len(used))]
     lines = MeasuredLines(s, rows[own], weight[:, own])
-    kept = follow(lines)
+    kept = follow_response(lines)
     order, n = np.argsort(kept.poles[0]), kept.poles.shape[1]
     kept = Passive(kept.poles[:, order], np.append(kept.amplitudes[:2], kept.amplitudes[2:][order]), kept.rest)
     natural, damping = np.exp(kept.poles)
@@ -185,26 +187,21 @@ def body_of(found: Any, driving: Any, points: Any) -> Following:
     above = np.where(inside, 0.0, np.append([0.0, 1.0], natural**-2.0))
     rest = np.array([above @ kept.amplitudes, np.sqrt(np.square(above @ changed).mean())])
     loose = 0.0 if inside[0] else float(np.square(changed[0]).mean() ** 0.25)
-    squares = kept.amplitudes[inside]
+    squares, own_modes = kept.amplitudes[inside], np.delete(inside, 1)  # without the spring
     drawn = changed[inside, :WAYS].T / squares
     step = _in_step(lines, kept, noise[:, own], natural, damping)
-    doubt = np.clip(drawn, -1.0, None)[:, None] + np.append(step[:1] * inside[0], step)[None, None][..., _of(inside)]
+    doubt = np.clip(drawn, -1.0, None)[:, None] + np.append(step[:1] * inside[0], step)[None, None][..., own_modes]
     shapes = np.array([squares if k == own else _products(s, rows[k], weight[:, k], kept, inside)
                        for k in range(len(used))]) / np.sqrt(squares)  # fmt: skip
     off = np.linalg.norm(kept.rest) / np.linalg.norm(lines.data)
     notes = [f"follows frequency responses up to {s.imag[-1] / (2.0 * np.pi):.5g} Hz as a passive body, which leaves "
              f"{100.0 * off:.2g} % rms, {spread:.2g} times the noise"]  # fmt: skip
-    omega = np.append(0.0, natural)[_of(inside)]
+    omega = np.append(0.0, natural)[own_modes]
     arrays = {
-        "frequencies": omega / (2.0 * np.pi), "damping_ratio": np.append(0.0, damping)[_of(inside)], "shapes": shapes,
-        "points": picked.places(found, points, used, end),
+        "frequencies": omega / (2.0 * np.pi), "damping_ratio": np.append(0.0, damping)[own_modes], "shapes": shapes,
+        "points": picked.response_points(found, points, used, end),
     }  # fmt: skip
     return Following(arrays, np.broadcast_to(doubt, (WAYS, len(used), len(omega))).copy(), rest, loose, own, notes)
-
-
-def _of(inside: np.ndarray) -> np.ndarray:
-    """Which of a rigid motion and the modes are kept, of columns that hold a spring, too."""
-    return np.delete(inside, 1)
 
 
 def _noise(found: Any, lines: np.ndarray, used: list[int], size: np.ndarray) -> np.ndarray:

@@ -35,16 +35,9 @@ from .modal import Modes
 LOG = logging.getLogger(__name__)
 # [-] cells across a square as large as the plate, in the lattices to choose of: next ones are 1.8 to 2.3 times as large
 ACROSS = 48.0, 64.0, 96.0, 128.0
-# [-] relative, of the solved equations: a thirtieth of LEAST; smaller parts of the operator are not inverted either,
-# which only speeds up the solution
+# [-] relative, of the solved equations: a thirtieth of what a bound states at least; smaller parts of the operator are
+# not inverted either, which only speeds up the solution
 RESIDUAL = 3e-3
-# [-] over the half space in front where two lattices are compared beside the listener's: one may agree by chance
-DIRECTIONS = 12
-DOUBT = 2.5  # [-] half width of an estimate over half the difference of the two lattices; test_free_air.py
-# [-] the half width is at least this part of the mode's mean sound over all directions: where it nearly cancels
-LEAST = 0.1
-NEAREST = 2.0  # [-] cells of the coarsest lattice from the plate to a listener, at least: nearer, it could tell them
-TURNS, ROUNDS = 50, 8  # [-] iterations between restarts, and restarts; ten iterations are usual
 
 
 class Jumps(NamedTuple):
@@ -65,7 +58,9 @@ class Jumps(NamedTuple):
         """Pressure of every mode at a place (3,) [m], by `mean`, and the half width of the estimate, (n,) each.
 
         In m kg**-0.5 Pa per kg/m^3 and m/s^2: for a density of 1 kg/m^3 and unit modal acceleration at the frequencies
-        omega (n,) [rad/s].
+        omega (n,) [rad/s]. The half width is 2.5 times half the difference of the two lattices, where the listener is
+        and over the half space in front, since one place may agree by chance; it is at least a tenth of the mode's mean
+        sound over all directions, as where that nearly cancels (test_free_air.py).
         """
         middle = np.append(0.5 * (self.points.min(axis=0) + self.points.max(axis=0)), 0.0)
         far = max(float(np.linalg.norm(place - middle)), float(np.linalg.norm(np.ptp(self.points, axis=0))))
@@ -75,7 +70,7 @@ class Jumps(NamedTuple):
             for field in (dipoles(self.points, self.size, each, omega / speed) for each in places)
         ]).transpose(1, 0, 2)  # (n_places, n) each  # fmt: skip
         apart = np.maximum(np.abs(half[0]), np.sqrt((np.abs(half[1:]) ** 2).mean(axis=0)))
-        return own[0], DOUBT * apart + LEAST * np.sqrt((np.abs(own[1:]) ** 2).mean(axis=0))
+        return own[0], 2.5 * apart + 0.1 * np.sqrt((np.abs(own[1:]) ** 2).mean(axis=0))
 
 
 def dipoles(points: np.ndarray, size: float, place: np.ndarray, wave: np.ndarray) -> np.ndarray:
@@ -85,10 +80,10 @@ def dipoles(points: np.ndarray, size: float, place: np.ndarray, wave: np.ndarray
     return (place[2] * size**2 / (4.0 * np.pi * way**3))[:, None] * (1.0 - turn) * np.exp(turn)
 
 
-def _directions() -> np.ndarray:
-    """Unit vectors spread evenly over the half space in front of a plate, (DIRECTIONS, 3) [-]."""
-    number = np.arange(DIRECTIONS) + 0.5
-    up, angle = number / DIRECTIONS, np.pi * (1.0 + np.sqrt(5.0)) * number  # a spiral of the golden ratio
+def _directions(n: int = 12) -> np.ndarray:
+    """Unit vectors spread evenly over the half space in front of a plate, (n, 3) [-]."""
+    number = np.arange(n) + 0.5
+    up, angle = number / n, np.pi * (1.0 + np.sqrt(5.0)) * number  # a spiral of the golden ratio
     across = np.sqrt(1.0 - up**2)
     return np.stack([across * np.cos(angle), across * np.sin(angle), up], axis=1)
 
@@ -157,22 +152,21 @@ class AirSheet:
         operator = fft2((self.inverse + swing) * self.size**4 / (4.0 * np.pi)) * (self.slopes - wave**2)
         least = RESIDUAL * np.abs(operator).max()
         inverse = 1.0 / np.where(np.abs(operator) > least, operator, least)
-        square = 2 * acceleration.shape
-        whole, rough = (
-            LinearOperator(square, partial(self._folded, each), dtype=complex) for each in (operator, inverse)
-        )
-        load = acceleration.astype(complex) * self.size**2
-        found, failed = gmres(whole, load, rtol=RESIDUAL, M=rough, restart=TURNS, maxiter=ROUNDS)
-        if failed:
-            raise SimulationError(f"the air around the plate was not solved for in {TURNS * ROUNDS} iterations")
-        return found
-
-    def _folded(self, factor: np.ndarray, values: np.ndarray) -> np.ndarray:
-        """Apply an operator of the whole lattice to values on the plate, (n_cells,)."""
-        field = np.zeros(self.inside.shape, complex)
-        field[self.inside] = np.ravel(values)
         nx, ny = self.inside.shape
-        return ifft2(fft2(field, self.padded) * factor)[:nx, :ny][self.inside]
+
+        def apply(factor: np.ndarray, values: np.ndarray) -> np.ndarray:
+            """An operator of the whole lattice on values on the plate, (n_cells,)."""
+            field = np.zeros((nx, ny), complex)
+            field[self.inside] = np.ravel(values)
+            return ifft2(fft2(field, self.padded) * factor)[:nx, :ny][self.inside]
+
+        square = 2 * acceleration.shape
+        whole, rough = (LinearOperator(square, partial(apply, each), dtype=complex) for each in (operator, inverse))
+        load = acceleration.astype(complex) * self.size**2
+        found, failed = gmres(whole, load, rtol=RESIDUAL, M=rough, restart=50, maxiter=8)  # ten iterations are usual
+        if failed:
+            raise SimulationError("the air around the plate was not solved for in 400 iterations")
+        return found
 
 
 class Field(NamedTuple):
@@ -189,12 +183,13 @@ def fields(
 
     Ways are rounded to multiples of ``step`` [m] by shares of their two neighbours. As a mode rings, the field has its
     pressure by `Jumps.mean`, and the others in phase with it the half width of that estimate, taken away at most to
-    silence. An acceleration tells the part of a jump in phase with it, a velocity the rest.
+    silence. An acceleration tells the part of a jump in phase with it, a velocity the rest. Nearer than two of the
+    coarsest cells, a listener could tell them.
     """
     grid = modes.shapes.grid()[0]
     low, high = grid.min(axis=0), grid.max(axis=0)
     nearest = float(np.linalg.norm(place - np.append(np.clip(place[:2], low, high), 0.0)))
-    least = NEAREST * np.sqrt(measure(*modes.shapes.grid())) / ACROSS[0]
+    least = 2.0 * np.sqrt(measure(*modes.shapes.grid())) / ACROSS[0]
     if nearest < least:
         raise ValueError(f"listener must be at least {least:.3g} m from a plate in free air, got {nearest:.3g} m")
     column = np.cumsum(wanted) - 1

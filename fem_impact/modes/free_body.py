@@ -6,14 +6,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from .._base import check
+from .._base.rounding import SAME
 
 if TYPE_CHECKING:
     from .body import Body
 
 FITS = 1e-2  # [-] misfit of a rigid motion, or of the mass it moves: as many digits as programs and tests agree to
-ALLOWED = 1e-6  # [-] by which the largest moment of inertia may exceed the sum of the others: a plate's does not
-GYRATION = 1e-18, 1e18  # [m^2] inertia over mass, of bodies from some atoms to a star
-THIN = 1e-9  # [-] moment of inertia over the largest: less is none, as of a rod about its own axis
 
 
 def six(nodes: np.ndarray, mass: float, inertia: Any, centre: Any) -> np.ndarray:
@@ -30,17 +28,16 @@ def six(nodes: np.ndarray, mass: float, inertia: Any, centre: Any) -> np.ndarray
     tensor = np.diag(np.broadcast_to(given, 3)) if np.ndim(given) < 2 and np.size(given) in (1, 3) else given
     tensor = check.array("inertia", tensor, (3, 3), "kg m^2")
     size, axes = np.linalg.eigh(0.5 * (tensor + tensor.T))
-    skew = float(np.abs(tensor - tensor.T).max())
-    if size[2] <= 0.0 or size[0] < -THIN * size[2] or size[2] > (1.0 + ALLOWED) * (size[0] + size[1]) or skew > (
-        ALLOWED * size[2]
-    ):  # fmt: skip
+    skew, allowed = float(np.abs(tensor - tensor.T).max()), 1e-6 * size[2]  # a plate's largest is the sum of the others
+    positive = size[2] > 0.0 and size[0] >= -SAME * size[2]
+    if not positive or size[2] > size[0] + size[1] + allowed or skew > allowed:
         raise ValueError(
             "inertia must be that of a body, symmetric and positive and none of its principal moments larger than the "
             f"sum of the others, got {', '.join(f'{each:.4g}' for each in size)} kg m^2"
         )
-    check.between("inertia over mass", float(size[2] / mass), *GYRATION, "m^2")
+    check.between("inertia over mass", float(size[2] / mass), 1e-18, 1e18, "m^2")  # from some atoms to a star
     apart = nodes - check.array("centre", centre, (3,), "m")
-    kept = size > THIN * size[2]
+    kept = size > SAME * size[2]  # not about a rod's own axis
     return motions(apart, axes.T[kept]) / np.sqrt(np.append(np.full(3, mass), size[kept]))
 
 
@@ -106,7 +103,7 @@ def _fitted(shapes: np.ndarray, field: np.ndarray) -> tuple[np.ndarray, float]:
     return found, float(np.abs(shapes @ found - field).max() / np.abs(field).max())
 
 
-def across(shapes: np.ndarray, ways: np.ndarray, n_modes: int) -> np.ndarray:
+def sideways(shapes: np.ndarray, ways: np.ndarray, n_modes: int) -> np.ndarray:
     """Shapes (n_nodes, 2, n_modes) along two directions at right angles to the ways (n_nodes, 3) and to each other.
 
     Modes that come before those of ``shapes`` (n_nodes, 3, n) move along the ways alone.

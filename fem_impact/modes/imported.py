@@ -18,12 +18,10 @@ FIELDS = (
 )  # fmt: skip
 OWN = (*FIELDS, "names")  # fields of a `Body`
 MORE = "modal_mass", "direction", "dofs", "mass_matrix", "stiffness_matrix", "recovery"  # what mappings may hold, too
-RIGID = 0.01, 6  # [-] frequencies this far below the next are rounding, of at most so many rigid motions
 NASTRAN, CALCULIX = (".bdf", ".nas", ".dat", ".pch"), (".inp",)
 DECKS = {".op2": NASTRAN[:3], ".frd": CALCULIX}  # files of a model that lie beside those of its results
 KINDS = {
-    ".uff": ("a universal file", "modes.universal_files:arrays"),
-    ".unv": ("a universal file", "modes.universal_files:arrays"),
+    **dict.fromkeys((".uff", ".unv"), ("a universal file", "modes.universal_files:arrays")),
     ".op2": ("results of Nastran", "modes.nastran_files:results"),
     ".op4": ("matrices of Nastran", "modes.nastran_files:matrices"),
     ".frd": ("results of CalculiX", "modes.solver_files:calculix"),
@@ -33,13 +31,12 @@ KINDS = {
     ".cdb": ("a mesh of Ansys", "modes.solver_files:ansys"),
     ".mtx": ("a matrix", "modes.solver_files:matrix"),
     ".npz": ("arrays of NumPy", ""),
-} | {
     **dict.fromkeys(NASTRAN, ("a deck of Nastran", "modes.nastran_files:deck")),
     ".inp": ("a deck of Abaqus", "modes.solver_files:mesh"),
-}  # fmt: skip
+}
 
 
-def read(files: Any) -> list[dict[str, Any]]:
+def read_bodies(files: Any) -> list[dict[str, Any]]:
     """What each file or object holds; decks beside results of their program are read with these."""
     alone = not isinstance(files, (list, tuple))
     given = [files] if alone else list(files)
@@ -60,7 +57,7 @@ def _one(path: Path, decks: Sequence[Path] | set[Path]) -> dict[str, Any]:
     ending = path.suffix.lower()
     kind, reader = KINDS[ending]
     if not reader:
-        return archive(path)
+        return _archive(path)
     path = path.resolve()
     own = sorted(str(deck.resolve()) for deck in decks if deck.suffix.lower() in DECKS.get(ending, ()))
     found: dict[str, Any] = isolated.read(path, kind, reader, *own[:1])
@@ -99,23 +96,17 @@ def complete(told: dict[str, Any], n_modes: int | None) -> dict[str, Any]:
             raise ValueError(f"modal_mass must be positive, got {scale.min():g} kg")
         shapes = shapes / np.sqrt(scale)
     order = np.argsort(told["frequencies"], kind="stable")
-    told |= {"frequencies": without_rounding(np.asarray(told["frequencies"])[order]), "shapes": shapes[..., order]}
+    found = np.asarray(told["frequencies"])[order]
+    # of at most six rigid motions an eigensolver leaves its rounding, far below the next frequency
+    n_rigid = max((k for k in range(1, min(7, len(found))) if found[k - 1] < 0.01 * found[k]), default=0)
+    told |= {"frequencies": np.append(np.zeros(n_rigid), found[n_rigid:]), "shapes": shapes[..., order]}
     damping = told.get("damping_ratio", 0.0)
     if isinstance(damping, (list, tuple, np.ndarray)):
         told["damping_ratio"] = check.array("damping_ratio", damping, order.shape)[order]
     return {name: told[name] for name in OWN if told.get(name) is not None}
 
 
-def without_rounding(frequencies: np.ndarray) -> np.ndarray:
-    """Frequencies with those of rigid motions, which an eigensolver leaves at its rounding, set to zero."""
-    found = frequencies.copy()
-    few = min(RIGID[1], len(found) - 1)
-    n = max((k for k in range(1, few + 1) if found[k - 1] < RIGID[0] * found[k]), default=0)
-    found[:n] = 0.0
-    return found
-
-
-def archive(path: Path) -> dict[str, Any]:
+def _archive(path: Path) -> dict[str, Any]:
     """A body saved by `Body.save`, arrays under the names of its fields, or a sparse matrix of SciPy."""
     try:
         with np.load(path, allow_pickle=False) as found:

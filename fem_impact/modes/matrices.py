@@ -18,14 +18,11 @@ from scipy.sparse import coo_array, csc_array, csc_matrix, issparse
 
 from .._base import check
 from ..fe.eigenvalues import Flexibility, lowest
+from . import cell_kinds
 from .free_body import motions
 
 ALL = 600  # [-] unknowns up to which all modes are found, and all unit loads on nodes solved: a second together
-MANY = 100  # [-] modes of larger systems
-ROUNDING = 1e-7  # [-] of the terms of a sum that cancel: files keep at least nine digits
-LOPSIDED = 1e-6  # [-] of the largest entry, by which entries and those across the diagonal may differ
-UNEQUAL = 1e-3  # [-] by which the mass may differ that moves along x, y and z
-SLOW = 1e-6  # [-] of stiffness over mass, which makes a free body stiff while its rigid motions are looked for
+KEPT = 1e-7  # [-] of the terms of a sum that cancel, what may be left: files keep at least nine digits
 KINDS = "mass", "stiffness"
 INDEFINITE = (
     "stiffness must be positive, mass not negative, apart from rigid motions of the whole body ({}); write more "
@@ -59,7 +56,7 @@ def solved(told: Mapping[str, Any], loads: Any = None, n_modes: int | None = Non
         turned = turned[(6 * kept[:, None] + np.arange(6)).ravel()][:, used]
     flexibility = _flexibility(M, K, turned, nodes[kept])
     rigid, most = flexibility.rigid, len(flexibility.inertial) - flexibility.rigid.shape[1]
-    wanted = (most if len(used) <= ALL else MANY) if n_modes is None else check.count("n_modes", n_modes)
+    wanted = (most if len(used) <= ALL else 100) if n_modes is None else check.count("n_modes", n_modes)
     wanted -= 0 if n_modes is None else rigid.shape[1]
     if loads is None:
         loads = _unit_loads(turned, numbers[kept]) if len(used) <= ALL else []
@@ -125,7 +122,7 @@ def _symmetric(told: Mapping[str, Any]) -> list[Any]:
         check.array(kind, matrix.tocoo().data if issparse(matrix) else matrix.ravel(), (None,))
         matrix = csc_matrix(matrix, dtype=float)
         across = float(abs(matrix - matrix.T).max())
-        if across > LOPSIDED * float(abs(matrix).max()):
+        if across > 1e-6 * float(abs(matrix).max()):
             raise ValueError(f"{kind} must be symmetric, but entries across its diagonal differ by {across:.3g}")
         found.append((0.5 * (matrix + matrix.T)).tocsc())
     if found[0].shape != found[1].shape:
@@ -148,11 +145,10 @@ def _directions(told: Mapping[str, Any], numbers: np.ndarray, size: int) -> Any:
         dofs = np.column_stack([np.repeat(numbers, each), np.tile(np.arange(1, each + 1), n)])
     dofs = check.array("dofs", dofs, (size, 2)).astype(int)
     moving = np.flatnonzero((dofs[:, 1] >= 1) & (dofs[:, 1] <= 6))
-    row = {int(number): i for i, number in enumerate(numbers)}
-    lost = [int(number) for number in dofs[moving, 0] if int(number) not in row]
-    if lost:
+    lost = np.setdiff1d(dofs[moving, 0], numbers)
+    if lost.size:
         raise ValueError(f"dofs must be of the nodes given, got node {lost[0]}, which has no coordinates")
-    rows, way = np.array([row[int(number)] for number in dofs[moving, 0]], int), dofs[moving, 1] - 1
+    rows, way = cell_kinds.rows_of(numbers, dofs[moving, 0]), dofs[moving, 1] - 1
     frames = np.tile(np.eye(3), (n, 1, 1)) if told.get("frames") is None else np.asarray(told["frames"], float)
     into = 6 * rows[:, None] + 3 * (way[:, None] // 3) + np.arange(3)
     axes = frames[rows, way % 3]  # (n_moving, 3)
@@ -172,22 +168,17 @@ def _recovery(told: Mapping[str, Any], turned: Any, n: int, size: int) -> Any:
     return csc_matrix(given, dtype=float)
 
 
-def _motions(nodes: np.ndarray) -> np.ndarray:
-    """Shifts along x, y, z and turns about them, (n_nodes, shift and turn, 3, 6)."""
-    place = nodes - nodes.mean(axis=0)
-    turns = np.eye(3) / (float(np.abs(place).max()) or 1.0)
-    found = np.zeros((len(nodes), 2, 3, 6))
-    found[:, 0], found[:, 1, :, 3:] = motions(place, turns), turns
-    return found
-
-
 def _candidates(M: Any, K: Any, turned: Any, nodes: np.ndarray) -> np.ndarray:
     """Unknowns (n, 6) among which are all rigid motions: those of nodes, and what follows; or the slowest."""
     if turned is None:
         stiff, heavy = K.toarray(), M.toarray()
-        slow = SLOW * float(np.median(K.diagonal()) / M.diagonal().max())
+        slow = 1e-6 * float(np.median(K.diagonal()) / M.diagonal().max())  # makes a free body stiff meanwhile
         return np.asarray(eigh(heavy, stiff + slow * heavy)[1][:, ::-1][:, :6])
-    found, known = turned.T @ _motions(nodes).reshape(-1, 6), np.diff(turned.tocsc().indptr) > 0
+    place = nodes - nodes.mean(axis=0)
+    turns = np.eye(3) / (float(np.abs(place).max()) or 1.0)
+    moves = np.zeros((len(nodes), 2, 3, 6))  # shifts and turns of nodes, as all shift along x, y, z and turn about them
+    moves[:, 0], moves[:, 1, :, 3:] = motions(place, turns), turns
+    found, known = turned.T @ moves.reshape(-1, 6), np.diff(turned.tocsc().indptr) > 0
     if not known.all():
         inner = K[~known]
         found[~known] = -np.linalg.lstsq(inner[:, ~known].toarray(), inner[:, known] @ found[known], rcond=None)[0]
@@ -199,9 +190,13 @@ def _flexibility(M: Any, K: Any, turned: Any, nodes: np.ndarray) -> Flexibility:
     try:
         moved = _candidates(M, K, turned, nodes)
         size, turn = np.linalg.eigh(moved.T @ (M @ moved))
-        basis = moved @ (turn / np.sqrt(np.maximum(size, 1e-300)))[:, size > ROUNDING * size.max()]
-        _, resisted, way = np.linalg.svd(_resisted(K, basis), full_matrices=len(basis) < basis.shape[1])
-        rigid = basis @ way[int((resisted > ROUNDING * len(moved) ** 0.5).sum()) :].T
+        basis = moved @ (turn / np.sqrt(np.maximum(size, 1e-300)))[:, size > KEPT * size.max()]
+        # forces on unknowns over the largest that can cancel in them, as K[i, j]**2 <= K[i, i] K[j, j]
+        stiff = np.sqrt(np.maximum(K.diagonal(), 0.0))[:, None]
+        size = stiff * (stiff * np.abs(basis)).max(axis=0, initial=0.0).max(initial=0.0)
+        forces = np.divide(K @ basis, size, out=np.zeros(basis.shape), where=size > 0.0)
+        _, resisted, way = np.linalg.svd(forces, full_matrices=len(basis) < basis.shape[1])
+        rigid = basis @ way[int((resisted > KEPT * len(moved) ** 0.5).sum()) :].T
     except np.linalg.LinAlgError as error:
         raise ValueError(INDEFINITE.format(error)) from None
     held = qr(rigid.T, pivoting=True, mode="r")[1][: rigid.shape[1]] if rigid.shape[1] else np.zeros(0, int)
@@ -209,20 +204,13 @@ def _flexibility(M: Any, K: Any, turned: Any, nodes: np.ndarray) -> Flexibility:
     return Flexibility(K, M, rigid, none, none, np.sort(held))
 
 
-def _resisted(K: Any, motions: np.ndarray) -> np.ndarray:
-    """Forces (n, n_motions) on unknowns over the largest that can cancel in them, as K[i, j]**2 <= K[i, i] K[j, j]."""
-    stiff = np.sqrt(np.maximum(K.diagonal(), 0.0))[:, None]
-    size = stiff * (stiff * np.abs(motions)).max(axis=0, initial=0.0).max(initial=0.0)
-    return np.divide(K @ motions, size, out=np.zeros(motions.shape), where=size > 0.0)
-
-
 def _mass(R: Any, rigid: np.ndarray, nodes: np.ndarray) -> float:
-    """Mass [kg] that shifts move, of mass-normalised rigid motions."""
+    """Mass [kg] that shifts move, the same along x, y and z to a thousandth, of mass-normalised rigid motions."""
     moved, wanted = R @ rigid, np.tile(np.eye(3), (len(nodes), 1))
     share = np.linalg.lstsq(moved, wanted, rcond=None)[0]
-    shifts = np.abs(moved @ share - wanted).max(axis=0) < UNEQUAL
+    shifts = np.abs(moved @ share - wanted).max(axis=0) < 1e-3
     masses = np.square(share[:, shifts]).sum(axis=0)
-    if not shifts.any() or np.ptp(masses) > UNEQUAL * masses.max():
+    if not shifts.any() or np.ptp(masses) > 1e-3 * masses.max():
         raise ValueError(
             "total_mass (of files: mass) must be given in kg: the matrices of a body that is held do not tell the mass "
             "of its supports"

@@ -19,7 +19,6 @@ from ..fe.section import Beam, Plate
 from . import dents, followed, picked, universal_files, unstated, viewing
 from .shapes import (
     REMEMBERED,
-    SHAPE_ERROR,
     FieldShapes,
     RigidShapes,
     SampledShapes,
@@ -32,7 +31,6 @@ from .shapes import (
 LOG = logging.getLogger(__name__)
 
 HIGHEST = 0.1 * check.REACH  # [Hz] highest frequency that scaling may produce; 2 pi times it must stay in reach
-SHOWN = 10  # [-] modes listed in a notebook: a table without scrolling
 UNSTATED = {  # by argument of `Modes.from_arrays`
     "compliance": "the static compliance is not given: what the modes left out yield is estimated from those given",
     "free": "no rigid motion is given, and no mode shows that the body is held: it is taken as held",
@@ -169,7 +167,7 @@ class Modes(check.Brief):
         if compliance is not None:
             static = check.array("compliance", compliance, (len(points), len(known)), "m/N")
         if len(known) < len(points) and not complete and omega[-1] > 0.0:
-            rest = np.column_stack(unstated.left_out(omega, values, mass, unstated.unfolded(points).shape[1]))
+            rest = np.column_stack(unstated.estimate_left_out(omega, values, mass, unstated.unfolded(points).shape[1]))
             rest[known] = 0.0
         flexible = omega > 0.0
         yields = values[:, flexible] / omega[flexible]
@@ -208,7 +206,7 @@ class Modes(check.Brief):
             Known only at the measured points, with the elements between them if the file has some; shapes are divided
             by the root of the modal mass in the file.
         """
-        found: dict[str, Any] = universal_files.read(path, direction)
+        found: dict[str, Any] = universal_files.read_modes(path, direction)
         if not len(found["cells"]):
             found["cells"] = None
         return cls.from_arrays(**found, mass=mass, compliance=compliance, free=free)
@@ -277,30 +275,28 @@ class Modes(check.Brief):
         >>> found.frequencies.round().tolist(), found.damping_ratio.round(3).tolist()
         ([120.0, 410.0], [0.02, 0.02])
         """
+        sampled: Any
         if not check.flag("pick", pick):
-            return cls._following(frf, mass, points, driving, free, frequencies is None and compliance is None)
+            if frequencies is not None or compliance is not None:
+                raise ValueError(
+                    "frequencies and compliance must be left out if pick is False: the responses tell them"
+                )
+            body = followed.body_of(frf, driving, points)
+            made = cls.from_arrays(**body.arrays, mass=mass, free=False)
+            sampled = made.shapes
+            rest = np.zeros((len(sampled.points), 2)) if sampled.rest is None else sampled.rest.copy()
+            rest[body.driving] = body.rest
+            loose = body.loose if free is None else 0.0
+            rigid = np.full((len(rest), 1), loose) if loose else None
+            known = replace(sampled, rest=rest, doubt=body.doubt, rigid=rigid)
+            said = ("shapes", *(("free",) if loose else ()))
+            return replace(made, shapes=known, notes=tuple(body.notes), unstated=said)
         told, errors, notes = picked.modes_of(frf, driving, points, frequencies)
         made = cls.from_arrays(**told, mass=mass, compliance=compliance, free=free)
-        rigid = np.zeros((len(errors), made.n_modes - errors.shape[1]))
-        sampled: Any = made.shapes
-        shapes = replace(sampled, doubt=np.hstack([rigid, errors])[None])
+        sure = np.zeros((len(errors), made.n_modes - errors.shape[1]))
+        sampled = made.shapes
+        shapes = replace(sampled, doubt=np.hstack([sure, errors])[None])
         return replace(made, shapes=shapes, notes=(*made.notes, *notes), unstated=(*made.unstated, "shapes"))
-
-    @classmethod
-    def _following(cls, frf: Any, mass: float, points: Any, driving: Any, free: Any, plain: bool) -> "Modes":
-        """`from_frf` without picking."""
-        if not plain:
-            raise ValueError("frequencies and compliance must be left out if pick is False: the responses tell them")
-        body = followed.body_of(frf, driving, points)
-        arrays: dict[str, Any] = body.arrays
-        made = cls.from_arrays(**arrays, mass=mass, free=False)
-        sampled: Any = made.shapes
-        rest = np.zeros((len(arrays["points"]), 2)) if sampled.rest is None else sampled.rest.copy()
-        rest[body.driving] = body.rest
-        loose = body.loose if free is None else 0.0
-        known = replace(sampled, rest=rest, doubt=body.doubt, rigid=np.full((len(rest), 1), loose) if loose else None)
-        said = ("shapes", *(("free",) if loose else ()))
-        return replace(made, shapes=known, notes=tuple(body.notes), unstated=said)
 
     @cached_property
     def known(self) -> Remembered:  # what was found of these modes at points where they were struck
@@ -333,12 +329,13 @@ class Modes(check.Brief):
 
     def _repr_html_(self) -> str:
         """Table of the first modes, for notebooks."""
-        columns = [self.frequencies[:SHOWN], self.damping_ratio[:SHOWN]]
+        shown = 10  # without scrolling
+        columns = [self.frequencies[:shown], self.damping_ratio[:shown]]
         head, forms = ["mode", "frequency", "damping ratio"], ["{:.5g} Hz", "{:.3g}"]
         if self.frequency_error is not None:
             columns, head, forms = [*columns, self.frequency_error], [*head, "estimated error"], [*forms, "{:.0e}"]
         rows = [(i, *map(str.format, forms, row)) for i, row in enumerate(zip(*columns), 1)]
-        more = f" The first {SHOWN}:" if self.n_modes > SHOWN else ""
+        more = f" The first {shown}:" if self.n_modes > shown else ""
         span = f"{self.n_modes} modes up to {self.frequencies[-1]:.5g} Hz of a body of {self.mass:.4g} kg."
         return f"<p>{span}{more}</p>{markup.table(rows, head)}{markup.note_list(self.notes)}"
 
@@ -516,7 +513,8 @@ def left_out(modes: "Modes", place: np.ndarray, rows: np.ndarray) -> tuple[np.nd
     rest = whole - _carried(modes.omega, rows)
     doubt = np.abs(np.diag(whole)) * (modes.shapes.compliance_error(place) + ROUNDING)
     if modes.frequency_error is not None:
-        doubt = doubt + np.diag(_carried(modes.omega, rows, SHAPE_ERROR * modes.frequency_error[modes.omega > 0.0]))
+        # cautious, of a mode's compliance over its frequency's: 2 by omega**-2, the rest for its shape
+        doubt = doubt + np.diag(_carried(modes.omega, rows, 10.0 * modes.frequency_error[modes.omega > 0.0]))
     allowed = doubt.copy()
     dent = modes.shapes.dent(place)[:, 0]
     if dent.any():  # short waves dent a solid, too: modes may hold more of the dent than was left of the compliance

@@ -127,20 +127,17 @@ def _elements(cards: Any, told: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
 
 def _fields(results: Any, numbers: np.ndarray) -> dict[str, np.ndarray]:
     """Modes and static displacements."""
-    table = list(results.eigenvectors.values())
-    each = ([case for one in tables for case in _at_nodes(one, numbers)] for tables in (
-        table, results.displacements.values()))  # fmt: skip
-    found = cell_kinds.steps(len(numbers), *each)
+    table, cases = list(results.eigenvectors.values()), list[list[np.ndarray]]()
+    for tables in (table, results.displacements.values()):
+        cases.append([])
+        for one in tables:
+            moved = np.zeros((len(one.data), len(numbers), 3))
+            moved[:, cell_kinds.rows_of(numbers, one.node_gridtype[:, 0])] = one.data[:, :, :3]
+            cases[-1].extend(moved)
+    found = cell_kinds.steps(len(numbers), *cases)
     cycles = [np.asarray(one.mode_cycles if hasattr(one, "mode_cycles") else one.freqs, float) for one in table]
     found["frequencies"] = np.abs(np.concatenate(cycles)) if cycles else np.zeros(0)
     masses = [np.asarray(one.generalized_mass, float) for one in results.eigenvalues.values()]
     if masses and sum(map(len, masses)) >= len(found["frequencies"]):
         found["modal_mass"] = np.concatenate(masses)[: len(found["frequencies"])]
-    return found
-
-
-def _at_nodes(table: Any, numbers: np.ndarray) -> np.ndarray:
-    """Translations (n_cases, n_nodes, 3) of a Nastran table of displacements."""
-    found = np.zeros((len(table.data), len(numbers), 3))
-    found[:, cell_kinds.rows_of(numbers, table.node_gridtype[:, 0])] = table.data[:, :, :3]
     return found

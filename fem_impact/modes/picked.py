@@ -11,15 +11,12 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from .._base import check
-from . import universal_files
+from . import cell_kinds
 
 PER_FORCE = {"m/s^2/N": 2, "m/s/N": 1, "m/N": 0}  # unit of a response -> times that it was differentiated
 PROMINENCE = 1.5  # [-] of logarithms: peaks of less than a factor of 4.5 over their surroundings may be noise
-FELT = 0.1  # [-] of the largest force spectrum: 20 dB below it a hammer tells little (ISO 7626-5)
 DAMPING = 1e-6, 0.5  # [-] damping ratios of a peak that is sought
 GAIN = 10.0  # [-] of the noise variance: what each value of one more mode must explain, where luck explains one
-CLOSE = 1e-6  # [-] relative change of the sum of squares that ends a search
-SURE = 3.0  # [-] standard errors by which the point struck must move in a mode, for its deflections to have a scale
 ENDS = ("node", "direction"), ("reference", "reference_direction")
 
 
@@ -73,7 +70,8 @@ def responses(name: str, found: Any) -> tuple[np.ndarray, np.ndarray, np.ndarray
         raise ValueError(f"{name}.H must be finite")
     used = omega > 0.0
     if "force" in found:
-        used &= found["force"].values >= FELT * found["force"].values.max()
+        # 20 dB below the largest force spectrum a hammer tells little (ISO 7626-5)
+        used &= found["force"].values >= 0.1 * found["force"].values.max()
     sure = found["coherence"].values.mean(axis=1)[used] if "coherence" in found else 1.0
     omega = omega[used]
     s = 1j * omega + float(found.attrs.get("added_damping", 0.0))
@@ -245,7 +243,7 @@ def _refined(omega: np.ndarray, data: np.ndarray, weight: np.ndarray, start: np.
             columns, square = _curvature(q, slopes, products)
             slope = ((columns.T @ rest) * products).sum(axis=1)
             best, caution = x, 0.1 * caution
-            if cost > (1.0 - CLOSE) * before:
+            if cost > (1.0 - 1e-6) * before:
                 break
         step = np.linalg.lstsq(square + caution * np.diag(np.diag(square)), slope, rcond=None)[0]
         x = np.clip(best + step, low, high)
@@ -275,7 +273,7 @@ def modes_of(found: Any, driving: Any, points: Any, about: Any) -> tuple[dict[st
             f"frf has a response at the point struck, {label(found, drive)}, that moves against the force; change the "
             "sign of its direction"
         )
-    told = own > SURE * doubt
+    told = own > 3.0 * doubt  # standard errors
     if not told.any():
         raise ValueError(f"frf must have a response {label(found, drive)} at the point struck that moves in its modes")
     notes = [f"picked from frequency responses, of which {100.0 * picked.left:.2g} % rms are left unexplained"]
@@ -285,7 +283,7 @@ def modes_of(found: Any, driving: Any, points: Any, about: Any) -> tuple[dict[st
     errors = np.hypot(picked.errors[used] / np.maximum(np.abs(products), 1e-300), picked.misfit[used])
     return {
         "frequencies": picked.frequencies[told], "damping_ratio": picked.damping_ratio[told],
-        "shapes": products[:, told] / np.sqrt(own[told]), "points": places(found, points, used, end),
+        "shapes": products[:, told] / np.sqrt(own[told]), "points": response_points(found, points, used, end),
     }, errors[:, told], notes  # fmt: skip
 
 
@@ -328,7 +326,7 @@ def ends(found: Any, driving: Any) -> tuple[int, list[int], np.ndarray, str]:
     return drive, used.tolist(), sign, "struck" if moves[1] else "place"
 
 
-def places(found: Any, points: Any, used: list[int], end: str) -> np.ndarray:
+def response_points(found: Any, points: Any, used: list[int], end: str) -> np.ndarray:
     """Points (n_used, dimension) [m], given for all channels or stated in the file."""
     if points is not None:
         given = check.array("points", points, (None, None), "m")
@@ -341,4 +339,4 @@ def places(found: Any, points: Any, used: list[int], end: str) -> np.ndarray:
     if not np.isfinite(place).all():
         raise ValueError("points must be given: a node of these responses has no coordinates")
     along = abs(int(found["direction"].values[used[0]]))
-    return place[:, universal_files.across(place, "xyz"[along - 1] if 1 <= along <= 3 else "z")]
+    return place[:, cell_kinds.differing_axes(place, "xyz"[along - 1] if 1 <= along <= 3 else "z")]

@@ -1,7 +1,7 @@
 """Modes of a hinged rectangle: sines, with the static deflection as a sum over images of infinite strips."""
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any
 
@@ -14,12 +14,10 @@ from ..fe import plausible
 from ..fe.section import Plate
 from .modal import Damping, Modes
 from .request import check_number, request
-from .shapes import Shapes
+from .shapes import ClosedShapes
 
 # [-] fact: image forces beyond each shorter side of a hinged plate until rounding, as the n-th gives exp(-2 pi n)
 IMAGES = math.ceil(-math.log(EPSILON) / (2.0 * np.pi))
-# [-] distance x below which polylogarithms are summed as power series, as (x / 2 pi)**n, beyond as exp(-n x)
-NEAR_POLE = 1.0
 POWERS = np.append(2, np.arange(3, 60, 2))  # [-] fact: exponents of these series; all other coefficients are zero
 SERIES: np.ndarray = (
     (-1.0) ** POWERS * special.bernoulli(60)[POWERS - 1] / (POWERS - 1.0) / special.factorial(POWERS)
@@ -28,7 +26,7 @@ MOST_MODES = 1_000_000  # [-] largest number of modes of a rectangle or beam; th
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class RectangleShapes(Shapes, check.Brief):
+class RectangleShapes(ClosedShapes, check.Brief):
     """Sine shapes of a hinged rectangle of unit mass and rigidity with one corner at the origin."""
 
     length: float  # [m]
@@ -59,15 +57,12 @@ class RectangleShapes(Shapes, check.Brief):
         total = once - mirrored
         return np.where(_inside(points, sides)[:, None] & _inside(loads, sides), scale**2 * total, 0.0)
 
-    def take(self, n_modes: int) -> "RectangleShapes":
-        return replace(self, numbers=self.numbers[:n_modes])
-
     def grid(self) -> tuple[np.ndarray, np.ndarray]:
-        return _grid(self.length, self.width)
+        return _rectangle_grid(self.length, self.width)
 
 
 @lru_cache(maxsize=4)  # [-] rectangles; a gradient asks for one several times
-def _grid(length: float, width: float) -> tuple[np.ndarray, np.ndarray]:
+def _rectangle_grid(length: float, width: float) -> tuple[np.ndarray, np.ndarray]:
     """Points [m] and triangles over a rectangle."""
     n = (48, 32)
     x, y = np.meshgrid(np.linspace(0, length, n[0] + 1), np.linspace(0, width, n[1] + 1), indexing="ij")
@@ -108,7 +103,7 @@ def _decaying_cosines(x: np.ndarray, angle: np.ndarray) -> np.ndarray:
     Wood (1992), The computation of polylogarithms, eq. 9.3, for the power series about mu = 0.
     """
     result = np.empty(x.shape)
-    near = x < NEAR_POLE
+    near = x < 1.0  # where the power series falls as (x / 2 pi)**n, beyond as exp(-n x)
     gap, u = x[near], -x[near] + 1j * angle[near]
     log = np.log(np.where(u == 0.0, 1.0, -u))
     powers = np.empty((len(POWERS), len(u)), complex)  # by products, many times as fast as by powers
@@ -120,17 +115,12 @@ def _decaying_cosines(x: np.ndarray, angle: np.ndarray) -> np.ndarray:
     octave = np.floor(np.log2(np.where(near, 1.0, x)))
     for each in np.unique(octave[~near]):
         part = ~near & (octave == each)  # where terms fall at least as exp(-m 2**each), to rounding
-        result[part] = _falling_cosines(x[part], angle[part], math.ceil(-math.log(EPSILON) / 2.0**each))
+        m, gap = np.arange(1.0, math.ceil(-math.log(EPSILON) / 2.0**each) + 1.0)[:, None], x[part]
+        waves = np.empty((len(m), 2, len(gap)), complex)
+        waves[:, 0], waves[:, 1] = np.exp(-gap + 1j * angle[part]), np.exp(-gap)
+        waves = np.multiply.accumulate(waves).real
+        result[part] = ((1.0 + m * gap) * (waves[:, 0] - waves[:, 1]) / m**3).sum(axis=0)
     return result
-
-
-def _falling_cosines(x: np.ndarray, angle: np.ndarray, n_terms: int) -> np.ndarray:
-    """The sum of `_decaying_cosines` itself over so many terms, at (n,) places."""
-    m = np.arange(1.0, n_terms + 1.0)[:, None]
-    waves = np.empty((n_terms, 2, len(x)), complex)
-    waves[:, 0], waves[:, 1] = np.exp(-x + 1j * angle), np.exp(-x)
-    waves = np.multiply.accumulate(waves).real
-    return np.asarray(((1.0 + m * x) * (waves[:, 0] - waves[:, 1]) / m**3).sum(axis=0))
 
 
 def rectangle(

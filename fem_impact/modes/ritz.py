@@ -27,12 +27,6 @@ from ..fe.refinement import heavier
 from .modal import Damping, Modes, damping_notes, damping_ratios
 from .shapes import ElementShapes
 
-PIECE = 2**20  # [byte] of earlier vectors taken at a time: fits into the cache of a core
-LOST = 1e-8  # [-] overlap above which all vectors since the last look at it are made again
-DRIFT = 1e-11  # [-] overlap with earlier vectors above which they are removed more often; Ritz values err by its square
-# [-] vectors that there is room for, over those wanted: taking more later copies all, which so happens seldom and is
-# faster
-ROOM = 2.0
 # [-] part of the vectors with which a second blow tells the error: at the third power it errs 2.9 times more
 FEWER = 0.7
 
@@ -137,7 +131,12 @@ class Krylov:
         """Make vectors until there are at least ``count``, or all that the loads can reach."""
         M = self.system.M
         most = min(count, self.system.n_dofs - self.system.rigid.shape[1])
-        self._make_room(most + self.width - 1)
+        if most + self.width - 1 > len(self.vectors):  # memory for more to come is not used until they do
+            room = 2 * (most + self.width - 1)
+            vectors = np.empty((room, self.system.n_dofs))
+            vectors[: self.count] = self.vectors[: self.count]
+            self.projected = np.pad(self.projected, (0, room - len(self.projected)))
+            self.vectors = vectors
         while self.count < most and not self.full:
             before, start, end = self._latest
             overlap = self._carried.T @ self._next  # in exact arithmetic only the two latest blocks overlap
@@ -176,39 +175,30 @@ class Krylov:
         """Remember where the last vectors are that are known to be orthogonal."""
         self._sound = self.count, self._latest, self._carried, self._next
 
-    def _make_room(self, count: int) -> None:
-        """Take memory for so many vectors, and for more to come: it is not used until they do."""
-        if count > len(self.vectors):
-            room = int(ROOM * count)
-            vectors = np.empty((room, self.system.n_dofs))
-            vectors[: self.count] = self.vectors[: self.count]
-            self.projected = np.pad(self.projected, (0, room - len(self.projected)))
-            self.vectors = vectors
-
     def _cleared(self, new: np.ndarray) -> np.ndarray | None:
         """New vectors without the parts along earlier ones that rounding brought back; clears the latest block alike.
 
         The next block follows from both. Where rounding grew so fast that the vectors since the last look are lost,
-        goes back there to look more often, and returns None.
+        goes back there to look more often, and returns None. Ritz values err by the square of the overlap.
         """
         start, end = self._latest[1:]
         latest = end - start
         both = np.vstack([self.vectors[start:end], new.T])
         heavy = np.vstack([self._carried[:, -latest:].T, (self.system.M @ new).T])
-        rows, worst = max(1, PIECE // (8 * both.shape[1])), 0.0
+        rows, worst = max(1, 2**20 // (8 * both.shape[1])), 0.0  # a piece that fits into the cache of a core
         for i in range(0, start, rows):  # a few rows at a time: memory is read once for both products
             known = self.vectors[i : min(i + rows, start)]
             drift = heavy @ known.T
             both -= drift @ known
             worst = max(worst, float(np.abs(drift[:latest]).max()))
-        if worst > LOST and self._period > 1:
+        if worst > 1e-8 and self._period > 1:
             self.count, self._latest, self._carried, self._next = self._sound
             self._period = self._due = max(1, self._period // 4)
             return None
         self.vectors[start:end] = both[:latest]
         self._carried[:, -latest:] = self.system.M @ both[:latest].T
         new = both[latest:] - (both[latest:] @ self._carried[:, -latest:]) @ both[:latest]
-        self._period = max(1, self._period // 2) if worst > DRIFT else self._period + 1
+        self._period = max(1, self._period // 2) if worst > 1e-11 else self._period + 1
         self._due = self._period
         return new.T
 
@@ -216,9 +206,19 @@ class Krylov:
         """Ascending eigenvalues (count,) and vectors (count, count) of the stiffness projected onto the first vectors.
 
         They come from its shifted inverse, whose rounding is relative to the shift: the stiffness itself spans so many
-        decades that rounding of its largest eigenvalue would spoil the low ones.
+        decades that rounding of its largest eigenvalue would spoil the low ones. It differs from the projected inverse
+        in the last columns only, because the images of all other vectors lie in the space; those columns follow from
+        the stiffness of the last vectors.
         """
-        inverse = self._inverse(count)
+        reach = 2 * self.width - 1  # the image of a vector ends so many vectors later
+        last, band = min(reach, count), slice(max(0, count - 2 * reach), count)
+        inverse = self.projected[:count, :count].copy()
+        inverse = 0.5 * (inverse + inverse.T)
+        pushed = self._shifted @ self.vectors[count - last : count].T  # (n_dofs, last)
+        stiff = self.vectors[band] @ pushed
+        rest = inverse[count - last :, band] @ stiff - np.eye(last)
+        excess = np.linalg.solve(stiff[-last:].T, rest.T)  # rest = excess @ stiff[-last:]
+        inverse[-last:, -last:] -= 0.5 * (excess + excess.T)
         if self.width == 1:
             value, turn = eigh_tridiagonal(inverse.diagonal(), inverse.diagonal(1))
         else:
@@ -233,23 +233,6 @@ class Krylov:
             order = np.argsort(lowest, kind="stable")
             value[:few], turn[:, :few] = lowest[order], turn[:, :few] @ back[:, order]
         return value, turn
-
-    def _inverse(self, count: int) -> np.ndarray:
-        """Inverse of the stiffness K + s**2 M projected onto the first vectors, (count, count).
-
-        It differs from the projected inverse in the last columns only, because the images of all other vectors lie in
-        the space; those columns follow from the stiffness of the last vectors.
-        """
-        reach = 2 * self.width - 1  # the image of a vector ends so many vectors later
-        last, band = min(reach, count), slice(max(0, count - 2 * reach), count)
-        inverse = self.projected[:count, :count].copy()
-        inverse = 0.5 * (inverse + inverse.T)
-        pushed = self._shifted @ self.vectors[count - last : count].T  # (n_dofs, last)
-        stiff = self.vectors[band] @ pushed
-        rest = inverse[count - last :, band] @ stiff - np.eye(last)
-        excess = np.linalg.solve(stiff[-last:].T, rest.T)  # rest = excess @ stiff[-last:]
-        inverse[-last:, -last:] -= 0.5 * (excess + excess.T)
-        return inverse
 
     def modes(self, count: int, damping_ratio: Damping = 0.0) -> Modes:
         """`pairs` of the first ``count`` vectors.

@@ -1,6 +1,5 @@
 """Shapes of modes: where a body is, how it deflects under a force, and the rest of it that moves on its own."""
 
-from abc import abstractmethod
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any, Protocol
@@ -17,8 +16,6 @@ from ..fe.eigenvalues import Flexibility
 from . import unstated
 
 REMEMBERED = 16  # [-] points whose shapes and static deflections a body keeps, because one blow needs them many times
-# [-] error of a mode's compliance over that of its frequency, cautious: 2 by omega**-2, the rest for its shape
-SHAPE_ERROR = 10.0
 
 
 class Shapes(Protocol):
@@ -71,42 +68,13 @@ class Shapes(Protocol):
         """Points (n_points, dimension) [m] and cells (n_cells, dimension + 1) for drawing the body."""
 
 
-@dataclass(frozen=True, eq=False)
-class BeamlikeShapes(Shapes):
-    """What the closed forms of all beams share; each array of theirs has one row per mode."""
-
-    length: float  # [m]
-    ends: tuple[str, str]
-
-    @property
-    def dimension(self) -> int:
-        return 1
-
-    def contains(self, points: np.ndarray) -> np.ndarray:
-        return np.all((points >= -1e-9 * self.length) & (points <= (1 + 1e-9) * self.length), axis=1)
-
-    def compliance(self, points: np.ndarray) -> np.ndarray:
-        result = self.deflection(points, points)
-        return 0.5 * (result + result.T)
-
-    def deflection(self, loads: np.ndarray, points: np.ndarray) -> np.ndarray:
-        """Exact static deflection under each load; a beam that can move rigidly gets inertia relief."""
-        x = points[:, 0] / self.length
-        return np.column_stack([self.green(load, x) for load in loads[:, 0] / self.length])
-
-    @abstractmethod
-    def green(self, load: float, x: np.ndarray) -> np.ndarray:
-        """Deflection (n,) of the unit beam at x (n,) under a unit force at ``load``, without its rigid motion."""
+class ClosedShapes(Shapes, Protocol):
+    """What closed forms share: each of their arrays has one row per mode."""
 
     def take(self, n_modes: int) -> Any:
-        arrays: dict[str, Any] = {
-            name: value[:n_modes] for name, value in vars(self).items() if isinstance(value, np.ndarray)
-        }
-        return replace(self, **arrays)
-
-    def grid(self) -> tuple[np.ndarray, np.ndarray]:
-        node = np.arange(129)
-        return self.length * node[:, None] / 128.0, np.column_stack([node[:-1], node[1:]])
+        fields: Any = self
+        arrays = {name: value for name, value in vars(self).items() if isinstance(value, np.ndarray)}
+        return replace(fields, **{name: value[:n_modes] for name, value in arrays.items()})
 
 
 @dataclass(frozen=True, eq=False, repr=False)

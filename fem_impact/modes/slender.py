@@ -12,11 +12,9 @@ from . import timoshenko
 from .modal import Damping, Modes
 from .rectangle import MOST_MODES
 from .request import check_beyond_rigid, check_number, request
-from .shapes import BeamlikeShapes
-from .timoshenko import ENDS
+from .timoshenko import ENDS, BeamlikeShapes
 
 SHEAR_RATIO = 2.6  # [-] fact: E / G of an isotropic material with nu = 0.3
-ROUND = 0.886  # [-] shear coefficient of a round section, nu = 0.3 (Cowper 1966); 0.857 at nu = 0, 0.9 at 0.5
 LIMIT = 1e5  # [-] largest slenderness of a Timoshenko beam: beyond, shear is below rounding
 
 
@@ -59,8 +57,10 @@ class BeamShapes(BeamlikeShapes, check.Brief):
         values[:, ~flexible] = self.weights[~flexible, 0] + x * self.weights[~flexible, 1]
         return values
 
-    def green(self, load: float, x: np.ndarray) -> np.ndarray:
-        return timoshenko.green(self.ends, timoshenko.SLENDER, load)(x)
+    def slopes(self, x: np.ndarray) -> np.ndarray:
+        """w' (n_points, n_modes) over x / length at x (n_points,) of a beam that cannot move rigidly."""
+        k, (a, b, c, d), x = self.k, self.weights.T, x[:, None]
+        return k * (b * np.cos(k * x) - a * np.sin(k * x) - c * np.exp(-k * x) + d * np.exp(k * (x - 1.0)))
 
 
 def beam(
@@ -124,12 +124,13 @@ def beam(
     )  # fmt: skip
     stout = _stoutness(theory, section, length, slenderness, shear_ratio)
     notes = plausible.doubted_sizes((length,), section)
-    rigid = timoshenko.rigid_motions(pair, stout or timoshenko.SLENDER)
+    stoutness = stout or timoshenko.SLENDER
+    rigid = timoshenko.rigid_motions(pair, stoutness)
     n_rigid, most = len(rigid), MOST_MODES if stout is None else timoshenko.MOST
 
     def bent(n: int) -> np.ndarray:
         """The first n of omega**2 at unit mass and rigidity."""
-        return _roots(pair, n) ** 4 if stout is None else stout.values(pair, n_rigid, n)
+        return _roots(pair, n) ** 4 if stout is None else stout.eigenvalues(pair, n_rigid, n)
 
     count, reach = asked.count(float(np.sqrt(bent(1)[0])), most)
     if np.isfinite(reach) and stout is None:
@@ -143,9 +144,9 @@ def beam(
     own = _weights(pair, p**0.25) if stout is None else stout.weights(pair, p)
     weights = np.vstack([np.column_stack([rigid, np.zeros_like(rigid)]), own])
     values = np.concatenate([np.zeros(n_rigid), p])
-    shapes: Any = BeamShapes(length, pair, values**0.25, weights)
+    shapes: Any = BeamShapes(length, pair, stoutness, values**0.25, weights)
     if stout is not None:
-        shapes = timoshenko.TimoshenkoShapes(length, pair, stout, values, weights)
+        shapes = timoshenko.TimoshenkoShapes(length, pair, stoutness, values, weights)
     return replace(asked.answered(shapes, values, notes), thick=stout is not None)
 
 
@@ -167,7 +168,8 @@ def _stoutness(
     else:
         square = 1.0 / (16.0 * check.between("slenderness", slenderness, 1.0, LIMIT) ** 2)
         ratio = check.between("shear_ratio", shear_ratio, 2.0, 1e3)
-        stout = timoshenko.Stoutness(square, square * ratio / ROUND)
+        # the shear coefficient of a round section, nu = 0.3 (Cowper 1966); 0.857 at nu = 0, 0.9 at 0.5
+        stout = timoshenko.Stoutness(square, square * ratio / 0.886)
     if not min(stout.R, stout.S) >= LIMIT**-2 / 16.0:
         raise ValueError(f"length must be at most {LIMIT:g} times the height for theory = 'timoshenko'; use 'euler'")
     return stout

@@ -13,7 +13,6 @@ import numpy as np
 from ..mesh.meshio_reader import closed_hdf5
 from . import cell_kinds
 
-MODAL, STATIC = 2, 0  # Ansys's kinds of analysis
 MARKET = "%%MatrixMarket"
 ALONG = {"DX": 0, "DY": 1, "DZ": 2}  # components of Code_Aster's displacements
 
@@ -54,7 +53,13 @@ def mesh(path: Path) -> dict[str, np.ndarray]:
 
     read = meshio.read(path)
     points = np.asarray(read.points, float)
-    numbers = _labels(path.read_text("utf-8", "replace"))
+    labels, within = [], False  # of nodes, in the deck's order, which meshio drops
+    for line in path.read_text("utf-8", "replace").splitlines():
+        if line.startswith("*"):
+            within = within if line.startswith("**") else bool(re.match(r"\*NODE\s*(,|$)", line.strip(), re.IGNORECASE))
+        elif within and line.strip():
+            labels.append(int(line.split(",")[0]))
+    numbers = np.array(labels, int)
     if len(numbers) != len(points):
         raise ValueError(f"{path.name} must hold its nodes itself, not in files that it includes")
     found = {"nodes": cell_kinds.spatial(points), "numbers": numbers}
@@ -87,7 +92,8 @@ def med(path: Path) -> dict[str, np.ndarray]:
                 moved = _nodal(step["NOE"], file.get("PROFILS"), columns, len(nodes))
                 (shapes if any(values) else static).append(moved)
                 frequencies += [value] if any(values) else []
-    names = {name: np.flatnonzero(read.point_data["point_tags"] == tag) for name, tag in _families(read)}
+    groups = getattr(read, "point_tags", {}) if "point_tags" in read.point_data else {}
+    names = {name: np.flatnonzero(read.point_data["point_tags"] == tag) for tag, own in groups.items() for name in own}
     numbers = np.arange(1, len(nodes) + 1)
     found = {"nodes": nodes, "numbers": numbers, "frequencies": np.array(frequencies)}
     found |= cell_kinds.steps(len(nodes), shapes, static)
@@ -114,7 +120,7 @@ def ansys(path: Path) -> dict[str, np.ndarray]:
     if isinstance(own, reader.Archive):
         return found
     analysis, row = own._resultheader["kan"], {int(number): i for i, number in enumerate(numbers)}
-    if analysis not in (MODAL, STATIC) or own._resultheader["cpxrst"]:
+    if analysis not in (2, 0) or own._resultheader["cpxrst"]:
         raise ValueError(f"{path.name} must hold real modes or static results")
     fields = []
     for i in range(own.nsets):
@@ -125,7 +131,7 @@ def ansys(path: Path) -> dict[str, np.ndarray]:
             if name in ways:
                 field[[row[int(number)] for number in at[kept]], way] = values[kept, ways.index(name)]
         fields.append(field)
-    modal = analysis == MODAL
+    modal = analysis == 2
     found["frequencies"] = np.array(own.time_values, float) if modal else np.zeros(0)
     return found | cell_kinds.steps(len(numbers), *((fields, []) if modal else ([], fields)))
 
@@ -153,17 +159,6 @@ def _names(sets: Any, numbers: np.ndarray) -> dict[str, np.ndarray]:
     return {"names": np.array(list(single), str), "named": np.array(list(single.values()), int)}
 
 
-def _labels(text: str) -> np.ndarray:
-    """Numbers of nodes of an Abaqus deck, in its order, which meshio drops."""
-    found, within = [], False
-    for line in text.splitlines():
-        if line.startswith("*"):
-            within = within if line.startswith("**") else bool(re.match(r"\*NODE\s*(,|$)", line.strip(), re.IGNORECASE))
-        elif within and line.strip():
-            found.append(int(line.split(",")[0]))
-    return np.array(found, int)
-
-
 def _components(field: Any) -> dict[int, int]:
     """Columns of a field by axis: of displacements alone, by their names."""
     names = field.attrs["NOM"]
@@ -181,9 +176,3 @@ def _nodal(data: Any, profiles: Any, columns: dict[int, int], n: int) -> np.ndar
     for axis, column in columns.items():
         found[rows, axis] = values[:, column]
     return found
-
-
-def _families(read: Any) -> list[tuple[str, int]]:
-    """Names of groups of nodes and their tags."""
-    tags = getattr(read, "point_tags", {}) if "point_tags" in read.point_data else {}
-    return [(name, tag) for tag, names in tags.items() for name in names]

@@ -42,8 +42,6 @@ from .timoshenko import TimoshenkoShapes
 HELD = "clamped", "hinged", SOFT  # supports that hold an edge in the plane, too
 # [-] modes that stretch: entries of its forms grow with their square, and high modes swing too little to matter
 MOST = 40
-COARSEST = 0.25  # [-] triangles of a plate known by formulas over its shorter side: 1e-4 too stiff in its first mode
-NODES = 40  # [-] Gauss points along a radius or a beam, and one more for each radian of the highest mode: six per wave
 CANNOT = "stretching=True works for plates, held or free along their edges, and for beams held at both ends"
 ELASTIC = "its edge is elastic, which does not say how its plane is held"
 
@@ -141,13 +139,14 @@ def _sheet(shapes: Shapes, section: Plate) -> tuple[membrane.Sheet, membrane.Ste
             return np.asarray(found[:, :, :3] + sheet.neutral[pieces] @ found[:, :, 3:])
 
         return sheet, by_elements, taut if system.theory == SHALLOW.name else None
+    coarsest = 0.25  # [-] triangles over the shorter side: 1e-4 too stiff in the first mode
     if isinstance(shapes, RectangleShapes):
         shortest = np.pi / (np.pi * shapes.numbers / (shapes.length, shapes.width)).max()
-        size = min(shortest, COARSEST * min(shapes.length, shapes.width))
-        mesh, steep = meshes.rectangle(shapes.length, shapes.width, size=size), partial(_rectangle, shapes)
+        size = min(shortest, coarsest * min(shapes.length, shapes.width))
+        mesh, steep = meshes.rectangle(shapes.length, shapes.width, size=size), partial(_slopes_of_rectangle, shapes)
     elif isinstance(shapes, DiskShapes):
-        size = shapes.radius * min(np.pi / shapes.z.max(), 2.0 * COARSEST)
-        mesh, steep = meshes.disk(shapes.radius, size=size), partial(_disk, shapes)
+        size = shapes.radius * min(np.pi / shapes.z.max(), 2.0 * coarsest)
+        mesh, steep = meshes.disk(shapes.radius, size=size), partial(_slopes_of_disk, shapes)
     else:
         raise ValueError(f"{CANNOT}, but its shapes are known at points only; leave it out")
     system = assemble(mesh, section, {} if getattr(shapes, "edge", "") == "free" else {"boundary": "clamped"})
@@ -164,18 +163,23 @@ def _tension(shapes: Shapes, section: Beam) -> tuple[np.ndarray, float]:
         if not set(shapes.ends) <= set(HELD):
             raise ValueError(f"{CANNOT}, but an end is free; hold it, or leave stretching out")
         area = float(section.inertia(np.zeros((1, 1)))[0]) / section.material.rho
-        return _beam(shapes), shapes.length / (section.material.E * area)
+        waves = shapes.k if isinstance(shapes, BeamShapes) else shapes.stoutness.waves(shapes.p)[0]
+        # forty, and one more for each radian of the highest mode: six per wave
+        node, weight = np.polynomial.legendre.leggauss(40 + int(waves.max()))
+        slope = shapes.slopes(0.5 * (node + 1.0))
+        gram = (0.5 * weight[:, None] * slope).T @ slope / shapes.length
+        return gram, shapes.length / (section.material.E * area)
     raise ValueError(f"{CANNOT}, but its shapes are known at points only; leave it out")
 
 
-def _rectangle(shapes: RectangleShapes, points: np.ndarray) -> np.ndarray:
+def _slopes_of_rectangle(shapes: RectangleShapes, points: np.ndarray) -> np.ndarray:
     """Slopes (n, n_q, 2, n_modes) of a hinged rectangle at points (n, n_q, 2)."""
     wave = np.pi * shapes.numbers / (shapes.length, shapes.width)
     x, y = points[..., :1] * wave[:, 0], points[..., 1:] * wave[:, 1]
     return 2.0 * np.stack([wave[:, 0] * np.cos(x) * np.sin(y), wave[:, 1] * np.sin(x) * np.cos(y)], 2)
 
 
-def _disk(shapes: DiskShapes, points: np.ndarray) -> np.ndarray:
+def _slopes_of_disk(shapes: DiskShapes, points: np.ndarray) -> np.ndarray:
     """Slopes (n, n_q, 2, n_modes) of a disk at points (n, n_q, 2)."""
     z, n = shapes.z, shapes.order
     r = np.hypot(points[..., :1], points[..., 1:]) / shapes.radius
@@ -187,16 +191,3 @@ def _disk(shapes: DiskShapes, points: np.ndarray) -> np.ndarray:
     out, around = rise * np.cos(angle), -n * value / r * np.sin(angle)
     c, s = along[..., :1], along[..., 1:]
     return shapes.scale / shapes.radius * np.stack([c * out - s * around, s * out + c * around], 2)
-
-
-def _beam(shapes: BeamShapes | TimoshenkoShapes) -> np.ndarray:
-    """``int w_i' w_j'`` (n, n) of a uniform beam, by quadrature along it."""
-    k = shapes.k if isinstance(shapes, BeamShapes) else shapes.stoutness.waves(shapes.p)[0]
-    node, weight = np.polynomial.legendre.leggauss(NODES + int(k.max()))
-    x = 0.5 * (node + 1.0)
-    if isinstance(shapes, BeamShapes):
-        (a, b, c, d), x = shapes.weights.T, x[:, None]
-        slope = k * (b * np.cos(k * x) - a * np.sin(k * x) - c * np.exp(-k * x) + d * np.exp(k * (x - 1.0)))
-    else:
-        slope = shapes.slopes(x)
-    return (0.5 * weight[:, None] * slope).T @ slope / shapes.length

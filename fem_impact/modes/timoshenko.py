@@ -23,13 +23,11 @@ from functools import lru_cache
 import numpy as np
 
 from .._base import check
-from .._base.rounding import HALVINGS
-from .shapes import BeamlikeShapes
+from .._base.rounding import HALVINGS, SAME
+from .shapes import ClosedShapes
 
-STEEP = 1.0  # [-] q above which exponentials replace cosh and sinh, which are bounded below
 ENDS = {"clamped": (0, 1), "hinged": (0, 2), "free": (2, 3)}  # what vanishes there: w, beta, moment, shear force
 MOST = 5000  # [-] largest number of modes; their shapes are integrated point by point
-BLOCK = 64  # [-] modes whose shapes are integrated together, to limit memory
 
 
 @dataclass(frozen=True)
@@ -47,12 +45,12 @@ class Stoutness:
     def fields(self, p: np.ndarray, x: np.ndarray) -> np.ndarray:
         """w, beta, moment and shear force of the four solutions, (n, n_points, 4, 4), at p (n,) and x (n_points,)."""
         k, square = (part[:, None] for part in self.waves(p))
-        p = p[:, None]
+        p, steep = p[:, None], 1.0  # q above which exponentials replace cosh and sinh, which are bounded below
         result = np.empty((len(p), len(x), 4, 4))
         c, s, turn = np.cos(k * x), np.sin(k * x), (k**2 - p * self.S) / k
         result[..., 0] = np.stack([c, -turn * s, -turn * k * c, -p / k * s], axis=-1)
         result[..., 1] = np.stack([s, turn * c, -turn * k * s, p / k * c], axis=-1)
-        q = np.sqrt(np.maximum(square, STEEP**2))
+        q = np.sqrt(np.maximum(square, steep**2))
         turn = (q**2 + p * self.S) / q
         down, up = np.exp(-q * x), np.exp(q * (x - 1.0))
         exponential = np.stack(
@@ -62,9 +60,9 @@ class Stoutness:
             ],
             axis=-1,
         )
-        mild = np.minimum(square, STEEP**2)
+        mild = np.minimum(square, steep**2)
         root = np.sqrt(np.abs(mild))
-        low = np.minimum(root, STEEP) * x
+        low = np.minimum(root, steep) * x
         c = np.where(mild > 0.0, np.cosh(low), np.cos(root * x))
         safe = np.where(root * x > 1e-8, root, 1.0)
         s = np.where(root * x > 1e-8, np.where(mild > 0.0, np.sinh(low), np.sin(root * x)) / safe, x)
@@ -76,7 +74,7 @@ class Stoutness:
             ],
             axis=-1,
         )
-        result[..., 2:] = np.where((square > STEEP**2)[..., None, None], exponential, bounded)
+        result[..., 2:] = np.where((square > steep**2)[..., None, None], exponential, bounded)
         return result
 
     def hinged(self, n: int) -> np.ndarray:
@@ -106,7 +104,7 @@ class Stoutness:
             total = total - _negative(at[:, clamped, 1] @ solved)
         return total
 
-    def values(self, ends: tuple[str, str], first: int, n: int) -> np.ndarray:
+    def eigenvalues(self, ends: tuple[str, str], first: int, n: int) -> np.ndarray:
         """p of the modes number ``first`` (0 is the lowest) to ``first`` + n - 1, (n,)."""
         number = first + np.arange(n)
         around = self.hinged(first + n + 2)
@@ -125,7 +123,7 @@ class Stoutness:
         size = np.abs(at).max(axis=(1, 2))[:, None]  # (n, 1, 4), of any field: one that only turns has no w
         rows = np.concatenate([at[:, i][:, list(ENDS[ends[i]])] for i in range(2)], axis=1)
         found = np.linalg.svd(rows / size)[2][:, 3] / size[:, 0]
-        for block in np.array_split(np.arange(len(p)), max(1, -(-len(p) // BLOCK))):
+        for block in _blocks(len(p)):
             k = self.waves(p[block])[0].max()
             node, weight = np.polynomial.legendre.leggauss(int(k) + 40)
             w, beta = np.moveaxis(self.fields(p[block], 0.5 * (node + 1.0))[:, :, :2], 2, 0)
@@ -136,6 +134,11 @@ class Stoutness:
 
 
 SLENDER = Stoutness(0.0, 0.0)  # without shear and rotary inertia
+
+
+def _blocks(n: int, size: int = 64) -> list[np.ndarray]:
+    """Numbers of modes whose shapes are computed together, to limit memory."""
+    return np.array_split(np.arange(n), max(1, -(-n // size)))
 
 
 def _negative(matrices: np.ndarray) -> np.ndarray:
@@ -154,11 +157,39 @@ def rigid_motions(ends: tuple[str, str], stoutness: Stoutness) -> np.ndarray:
     return np.array([[turn, -turn]]) if ends == ("free", "hinged") else np.zeros((0, 2))
 
 
+@dataclass(frozen=True, eq=False)
+class BeamlikeShapes(ClosedShapes):
+    """What the closed forms of all beams share."""
+
+    length: float  # [m]
+    ends: tuple[str, str]
+    stoutness: Stoutness
+
+    @property
+    def dimension(self) -> int:
+        return 1
+
+    def contains(self, points: np.ndarray) -> np.ndarray:
+        return np.all((points >= -SAME * self.length) & (points <= (1 + SAME) * self.length), axis=1)
+
+    def compliance(self, points: np.ndarray) -> np.ndarray:
+        result = self.deflection(points, points)
+        return 0.5 * (result + result.T)
+
+    def deflection(self, loads: np.ndarray, points: np.ndarray) -> np.ndarray:
+        """Exact static deflection under each load; a beam that can move rigidly gets inertia relief."""
+        x = points[:, 0] / self.length
+        return np.column_stack([green(self.ends, self.stoutness, load)(x) for load in loads[:, 0] / self.length])
+
+    def grid(self) -> tuple[np.ndarray, np.ndarray]:
+        node = np.arange(129)
+        return self.length * node[:, None] / 128.0, np.column_stack([node[:-1], node[1:]])
+
+
 @dataclass(frozen=True, eq=False, repr=False)
 class TimoshenkoShapes(BeamlikeShapes, check.Brief):
     """Shapes of a uniform Timoshenko beam of unit mass and rigidity over x / length in 0 ... 1."""
 
-    stoutness: Stoutness
     p: np.ndarray  # (n_modes,) omega squared; 0 for rigid motions
     weights: np.ndarray  # (n_modes, 4)
 
@@ -172,16 +203,12 @@ class TimoshenkoShapes(BeamlikeShapes, check.Brief):
 
     def slopes(self, x: np.ndarray) -> np.ndarray:
         """w' (n_points, n_modes) at x (n_points,) of a beam that cannot move rigidly: rotation and shear."""
-        blocks = np.array_split(np.arange(len(self.p)), max(1, -(-len(self.p) // BLOCK)))
         parts = []
-        for block in blocks:
+        for block in _blocks(len(self.p)):
             fields = self.stoutness.fields(self.p[block], x)
             steep = fields[:, :, 1] + self.stoutness.S * fields[:, :, 3]
             parts.append(np.einsum("npk,nk->pn", steep, self.weights[block]))
         return np.hstack(parts)
-
-    def green(self, load: float, x: np.ndarray) -> np.ndarray:
-        return green(self.ends, self.stoutness, load)(x)
 
 
 @lru_cache(maxsize=64)

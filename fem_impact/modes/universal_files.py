@@ -11,9 +11,8 @@ import numpy as np
 from .._base import check, isolated
 from . import cell_kinds
 
-NORMAL_MODE, DISPLACEMENT, STRUCTURAL, REAL, STATIC = 2, 8, 1, 2, 1  # codes of data sets 55 and 2414
+NORMAL_MODE, DISPLACEMENT = 2, 8  # codes of data sets 55 and 2414: of an analysis, and of what is shown
 CELL_CODE = {2: 11, 3: 91, 4: 94}  # nodes of a cell -> rod, thin shell triangle, thin shell quadrilateral
-WANTED = (15, 55, 2411, 2414)  # data sets to read: nodes, shapes, nodes in double precision, results
 # codes of elements: rods and beams, plane and shell elements, solids
 LINES, SHELLS, SOLIDS = (11, 21, 22), range(41, 97), range(111, 119)
 # nodes of a shell element -> its corners
@@ -22,7 +21,7 @@ PHASE = 0.3  # [-] imaginary over real part, at the best phase, up to which a co
 COMPONENTS = "r1", "r2", "r3"  # along x, y and z
 
 
-def write(
+def write_modes(
     path: Any, frequencies: np.ndarray, damping_ratio: np.ndarray, shapes: np.ndarray, points: np.ndarray,
     cells: np.ndarray,
 ) -> None:  # fmt: skip
@@ -48,13 +47,19 @@ def write(
     sets: list[dict[Any, Any]] = [nodes | {"type": 15}, nodes | {"type": 2411}]  # 2411 keeps all digits
     code = CELL_CODE.get(cells.shape[1] if len(cells) else 0)
     if code is not None:
-        sets.append({"type": 2412, code: [_element(i, code, cell) for i, cell in enumerate(cells.tolist())]})
+        element: dict[str, Any] = {"fe_descriptor": code, "phys_table": 1, "mat_table": 1, "color": 1}
+        if code == CELL_CODE[2]:
+            element |= {"beam_orientation": 0, "beam_foreend_cross": 1, "beam_aftend_cross": 1}
+        numbered = enumerate((cells + 1).tolist(), 1)
+        sets.append({"type": 2412, code: [
+            element | {"element_nums": i, "num_nodes": len(cell), "nodes_nums": cell} for i, cell in numbered
+        ]})  # fmt: skip
     for i, (frequency, damping) in enumerate(zip(frequencies, damping_ratio)):
         still = np.zeros(n_points)
         sets.append({
             "type": 55, "id1": f"mode {i + 1}", "id2": "mass-normalised, kg**-0.5", "id3": "NONE", "id4": "NONE",
-            "id5": "NONE", "model_type": STRUCTURAL, "analysis_type": NORMAL_MODE, "data_ch": 2,
-            "spec_data_type": DISPLACEMENT, "data_type": REAL, "n_data_per_node": 3, "r1": still, "r2": still,
+            "id5": "NONE", "model_type": 1, "analysis_type": NORMAL_MODE, "data_ch": 2,
+            "spec_data_type": DISPLACEMENT, "data_type": 2, "n_data_per_node": 3, "r1": still, "r2": still,
             "r3": shapes[:, i].copy(), "load_case": 1, "mode_n": i + 1, "freq": float(frequency), "modal_m": 1.0,
             "modal_damp_vis": float(damping), "modal_damp_his": 0.0, "node_nums": node,
         })  # fmt: skip
@@ -62,13 +67,7 @@ def write(
     pyuff.UFF(str(path)).write_sets(sets, mode="add")
 
 
-def _element(i: int, code: int, cell: list[int]) -> dict[str, Any]:
-    element = {"element_nums": i + 1, "fe_descriptor": code, "phys_table": 1, "mat_table": 1, "color": 1}
-    beam = {"beam_orientation": 0, "beam_foreend_cross": 1, "beam_aftend_cross": 1} if code == CELL_CODE[2] else {}
-    return element | beam | {"num_nodes": len(cell), "nodes_nums": [node + 1 for node in cell]}
-
-
-def read(path: Any, direction: str) -> dict[str, np.ndarray]:
+def read_modes(path: Any, direction: str) -> dict[str, np.ndarray]:
     """Read frequencies [Hz], damping ratios, mass-normalised shapes and points from a universal file.
 
     Parameters
@@ -85,7 +84,7 @@ def read(path: Any, direction: str) -> dict[str, np.ndarray]:
     """
     path, direction = check.path("path", path), check.one_of("direction", direction, "xyz")
     found = isolated.read(path, "a universal file", "modes.universal_files:arrays")
-    keep = across(found["nodes"], direction)
+    keep = cell_kinds.differing_axes(found["nodes"], direction)
     names = "frequencies", "damping_ratio"
     told = {"shapes": found["shapes"][:, "xyz".index(direction)], "points": found["nodes"][:, keep]}
     return {name: found[name] for name in names} | told | {"cells": found["lines" if len(keep) == 1 else "triangles"]}
@@ -100,11 +99,12 @@ def arrays(path: Path) -> dict[str, np.ndarray]:
 
     file = pyuff.UFF(str(path))
     kinds = [int(kind) for kind in file.get_set_types()]
-    sets = [file.read_sets(i) for i, kind in enumerate(kinds) if kind in WANTED]
+    # nodes, shapes, nodes in double precision, results
+    sets = [file.read_sets(i) for i, kind in enumerate(kinds) if kind in (15, 55, 2411, 2414)]
     numbers, place = places(sets)
     results = [_result(s) for s in sets if s["type"] in (55, 2414)]
     modes = [s for s in results if s.get("analysis_type") in (NORMAL_MODE, 3)]
-    static = [s for s in results if s.get("analysis_type") == STATIC]
+    static = [s for s in results if s.get("analysis_type") == 1]
     if not len(numbers) or not (modes or static):
         found = ", ".join(str(kind) for kind in sorted(set(kinds))) or "none"
         functions = ", of which 58 are time records or frequency responses, no modes" if 58 in kinds else ""
@@ -130,13 +130,6 @@ def arrays(path: Path) -> dict[str, np.ndarray]:
     codes = {int(element["fe_descriptor"]) for element in elements}
     solid = {} if not codes else {"solid": np.array(True) if codes & set(SOLIDS) else np.zeros(0)}
     return result | cells | {"numbers": measured} | solid
-
-
-def across(points: np.ndarray, direction: str) -> list[int]:
-    """The axes across a direction along which points (n_points, 3) differ; one at least."""
-    others = [i for i, axis in enumerate("xyz") if axis != direction]
-    spread = np.ptp(points[:, others], axis=0)
-    return [i for i, wide in zip(others, spread) if wide > 1e-9 * max(spread.max(), 1e-300)] or others[:1]
 
 
 def places(sets: list[dict]) -> tuple[np.ndarray, np.ndarray]:

@@ -11,16 +11,13 @@ from scipy.spatial import Delaunay, QhullError
 
 from .._base.rounding import SAME
 
-# [-] standard errors of the mean of the squared shapes given, by which that of the others may differ from it
-SPREAD = 2.0
-# [-] where an edge is near, the estimates differ, and the truth may lie outside by as much, but not by more than this:
-# shapes that go over to those of the middle of the body overshoot them by at most two
-OUTSIDE = 2.0
 FLAT = 1e-6  # [-] of their extent, by which points may be off a line or a plane: as many digits as files keep
 HELD = 0.25  # [-] of the mass that moves along in a mode of a held body: at least 0.48 in the first of a clamped plate
 
 
-def left_out(omega: np.ndarray, rows: np.ndarray, mass: float, dimension: int) -> tuple[np.ndarray, np.ndarray]:
+def estimate_left_out(
+    omega: np.ndarray, rows: np.ndarray, mass: float, dimension: int
+) -> tuple[np.ndarray, np.ndarray]:
     """What the modes left out yield at each point: the middle of an interval and half its width, (n_points,) [m/N].
 
     Three estimates differ where the shapes near an edge change with frequency: the last value of S, its mean course
@@ -48,8 +45,11 @@ def left_out(omega: np.ndarray, rows: np.ndarray, mass: float, dimension: int) -
         ways = (share - 1.0) * reached, share * course * last**power - reached, (share - 1.0) * body
         guesses += [each / last**2 for each in ways]
     low, high = np.maximum(np.min(guesses, axis=0), 0.0), np.max(guesses, axis=0)
-    outside = np.minimum(high / np.maximum(low, high / OUTSIDE), OUTSIDE)
-    spread = SPREAD / n**0.5 if dimension > 1 else 2.0 * SPREAD / n  # shapes of a beam are periodic, not random
+    # near an edge the truth may lie outside by as much as the estimates differ, but not by more than a factor of two:
+    # shapes that go over to those of the middle of the body overshoot them by at most that
+    outside = np.minimum(high / np.maximum(low, 0.5 * high), 2.0)
+    # two standard errors of the mean of the squared shapes; those of a beam are periodic, not random
+    spread = 2.0 / n**0.5 if dimension > 1 else 4.0 / n
     low, high = low / outside * max(0.0, 1.0 - spread), high * outside * (1.0 + spread)
     low[still] = high[still] = 0.0
     return 0.5 * (low + high), 0.5 * (high - low)

@@ -87,7 +87,7 @@ def _at_points(modes: Modes, touched: np.ndarray, points: Any) -> Modes:
     new = ~(more[:, None] == touched).all(axis=2).any(axis=1)
     places, n = np.vstack([touched, more[new]]), len(touched)
     values = modes.shapes.at(places)
-    rest = np.column_stack(unstated.left_out(modes.omega, values, modes.mass, modes.dimension))
+    rest = np.column_stack(unstated.estimate_left_out(modes.omega, values, modes.mass, modes.dimension))
     known_errors, dents = estimated(modes.shapes, touched), np.zeros((len(places), 2))
     rest[:n], rest[:n, 1], dents[:n] = 0.0, known_errors["compliance"], modes.shapes.dent(touched)
     static, flexible = modes.shapes.deflection(touched, places), modes.omega > 0.0

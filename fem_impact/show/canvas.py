@@ -25,7 +25,6 @@ FINER = 2  # [-] a frame is drawn with so many pixels for one in each direction,
 RATE = 12  # [1/s] frames per second: enough for a wave, half the size of a film
 HEIGHT = 0.12  # [-] largest drawn deflection over the body's extent
 LIFT = 0.0015  # [-] height of lines above the surface, over their extent
-BALL = 0.03  # [-] drawn radius of the striker over the body's extent
 RIM, VERMILION, RIB = "#666666", "#D55E00", "#009E73"  # colours of the body's edge, of the striker and of ribs
 COLOURS = "PuOr"  # of deflections: symmetric about zero, safe for colour-blind readers
 
@@ -79,8 +78,8 @@ def draw(folder: Path, film: Film, shapes: Gallery, form: str = "png") -> None:
     """Draw all pictures of a blow into a folder, in a format of `show.FORMATS`."""
     pictures = list(frames(film))
     write_gif(folder / "wave.gif", pictures)
-    write(folder / f"wave.{form}", pictures[film.telling])
-    write(folder / f"modes.{form}", gallery(shapes))
+    write_picture(folder / f"wave.{form}", pictures[film.telling])
+    write_picture(folder / f"modes.{form}", gallery(shapes))
 
 
 def frames(film: Film) -> Iterator[Image.Image]:
@@ -115,7 +114,7 @@ def gallery(shown: Gallery) -> Image.Image:
     return picture
 
 
-def write(path: str | Path, picture: Image.Image) -> None:
+def write_picture(path: str | Path, picture: Image.Image) -> None:
     """Write a picture, whole or not at all; the ending sets the format."""
     with replacing(path) as temporary:
         if Path(path).suffix.lower() != ".svg":
@@ -161,7 +160,8 @@ class _Space:
         for line, colour in zip(self.lines, (RIM, RIB)):
             if line.n_cells:
                 self.plotter.add_mesh(line, color=colour, line_width=2 * FINER, render=False)
-        ball = pyvista.Sphere(radius=BALL * self.extent)
+        self.radius = 0.03 * self.extent  # of the striker
+        ball = pyvista.Sphere(radius=self.radius)
         self.ball = self.plotter.add_mesh(ball, color=VERMILION, smooth_shading=True, render=False)
         _look(self.plotter, self.plane, self.rise)
 
@@ -173,7 +173,7 @@ class _Space:
         self.mesh.point_data["Normals"] = _normals(points, self.cells)
         for line in self.lines:
             line.points = points + np.array([0.0, 0.0, LIFT * self.mesh.length])
-        above = self.extent * (BALL + min(HEIGHT * distance, 2.0 * HEIGHT))
+        above = self.radius + self.extent * min(HEIGHT * distance, 2.0 * HEIGHT)
         self.ball.position = (*self.at, height[self.under] + above)
         self.plotter.add_text(title, font_size=10 * FINER, position="upper_left", name="title", render=False)
         self.plotter.reset_camera_clipping_range()  # the striker may lie outside the bounds

@@ -6,6 +6,7 @@ import io
 import json
 import math
 import platform
+from contextlib import suppress
 from importlib import metadata
 from pathlib import Path
 from typing import Any
@@ -78,7 +79,9 @@ def write_vtk(path: str | Path, modes: Modes | Body, response: Response | None =
         places = viewing.placed(modes, points)
     if response is None:
         parts = _mode_parts(modes, points)
-        stamps = _distinct(modes.frequencies)
+        stamps = np.array(modes.frequencies, float)
+        for i in range(1, len(stamps)):  # equal ones become distinct
+            stamps[i] = max(stamps[i], stamps[i - 1] + SAME * max(stamps[i - 1], 1.0))
     else:
         if times is None:
             raise ValueError("times must be given with response, as an array in s")
@@ -153,7 +156,7 @@ def write_uff(path: str | Path, modes: Modes) -> None:
     points, cells = modes.shapes.grid()
     with replacing(path) as temporary:
         shapes, places = modes.shape_at(points), viewing.placed(modes, points)
-        universal_files.write(temporary, modes.frequencies, modes.damping_ratio, shapes, places, cells)
+        universal_files.write_modes(temporary, modes.frequencies, modes.damping_ratio, shapes, places, cells)
 
 
 @check.typed
@@ -234,16 +237,8 @@ SCALARS = (
     "scheme",
 )  # fmt: skip
 ERROR_PARTS = (
-    "step",
-    "truncation",
-    "mesh",
-    "idealisation",
-    "inherited",
-    "measurement",
-    "sensitivity",
-    "total",
-    "resolvable",
-)
+    "step", "truncation", "mesh", "idealisation", "inherited", "measurement", "sensitivity", "total", "resolvable",
+)  # fmt: skip
 IMPACT_PARTS = ("start", "end", "peak_force", "impulse", "contact", "restitution")
 
 
@@ -257,8 +252,11 @@ def numbers(response: Response) -> dict[str, Any]:
     >>> round(fi.export.numbers(hit)["response"]["restitution"], 3)  # of 1 kg that yields
     0.818
     """
+    centroid = None  # without contact, or if the blow is too long for a band up to AUDIBLE
+    with suppress(ValueError):
+        centroid = response.spectral_centroid(AUDIBLE)
     data = {name: getattr(response, name) for name in SCALARS} | {
-        "spectral_centroid": {"value": _centroid(response), "max_frequency": AUDIBLE},
+        "spectral_centroid": {"value": centroid, "max_frequency": AUDIBLE},
         "error": {name: getattr(response.error, name) for name in ERROR_PARTS},
         "model_error": response.model_error,
         "assumptions": table(response.assumptions),
@@ -270,14 +268,6 @@ def numbers(response: Response) -> dict[str, Any]:
         "response": data,
         "impacts": [{name: getattr(impact, name) for name in IMPACT_PARTS} for impact in response.impacts],
     }
-
-
-def _centroid(response: Response) -> float | None:
-    """Spectral centroid; None without contact, or if the blow is too long for a band up to AUDIBLE."""
-    try:
-        return response.spectral_centroid(AUDIBLE)
-    except ValueError:
-        return None
 
 
 def run_data(run: Run, scene: dict[str, Any]) -> dict[str, Any]:
@@ -338,43 +328,30 @@ def _mode_parts(modes: Modes | Body, points: np.ndarray) -> list[tuple[dict, dic
 def _motion_parts(
     response: Response, points: np.ndarray, times: np.ndarray, body: Body | None = None
 ) -> list[tuple[dict, dict]]:
-    if body is not None:
-        moves = [body.displacement(state) for state in response.modal_state(times)]
-        return _with_forces(response, times, moves)
-    moves = []
-    # Kept modes only: the residual dip would need a static solution for every grid point. `shapes.at` also accepts the
-    # midpoints of chords along a hole, which lie just off the body.
-    rows = response.target.shapes.at(points)  # (n_points, n_modes)
-    at = None if response.at is None else viewing.placed(response.target, np.atleast_2d(response.at))
-    along = 1.0 if viewing.heights(response.target, points[:1]) is None else -1.0  # the blow, in z
-    for state in response.modal_state(times):
-        vector = np.zeros((len(times), len(points), 3))
-        vector[:, :, 2] = along * state @ rows.T  # (n_times, n_points)
-        moves.append(vector)
-    parts = _with_forces(response, times, moves)
-    if response.striker is not None and at is not None:
-        striker = response.striker
-        tip = response.displacement(striker.at[None], times, body=0)[:, 0]
-        for (_, field), way in zip(parts, tip):
-            field["striker"] = at + np.array([0.0, 0.0, along * way])
-    return parts
-
-
-def _with_forces(response: Response, times: np.ndarray, moves: list[np.ndarray]) -> list[tuple[dict, dict]]:
-    """Displacements and velocities (n_times, n_points, 3), one part per time, with the forces then."""
+    """Displacements and velocities (n_times, n_points, 3), one part per time, with the forces and the striker then."""
     fields: list[dict[str, Any]] = [{"time": t} for t in times]
     for i in range(response.history.n_contacts):
         name = "force" if response.history.n_contacts == 1 else f"force_{i + 1}"
         for field, force in zip(fields, response.history.force_at(times, i)[0]):
             field[name] = force
+    states = response.modal_state(times)
+    if body is not None:
+        moves = [body.displacement(state) for state in states]
+    else:
+        # Kept modes only: the residual dip would need a static solution for every grid point. `shapes.at` also accepts
+        # the midpoints of chords along a hole, which lie just off the body.
+        along = 1.0 if viewing.heights(response.target, points[:1]) is None else -1.0  # the blow, in z
+        rows, moves = response.target.shapes.at(points), []  # (n_points, n_modes)
+        for state in states:
+            vector = np.zeros((len(times), len(points), 3))
+            vector[:, :, 2] = along * state @ rows.T  # (n_times, n_points)
+            moves.append(vector)
+        if response.striker is not None and response.at is not None:
+            at = viewing.placed(response.target, np.atleast_2d(response.at))
+            tip = response.displacement(response.striker.at[None], times, body=0)[:, 0]
+            for field, way in zip(fields, tip):
+                field["striker"] = at + np.array([0.0, 0.0, along * way])
     return [({"displacement": d, "velocity": v}, field) for d, v, field in zip(*moves, fields)]
-
-
-def _distinct(stamps: np.ndarray) -> np.ndarray:
-    result = np.array(stamps, float)
-    for i in range(1, len(result)):
-        result[i] = max(result[i], result[i - 1] + SAME * max(result[i - 1], 1.0))
-    return result
 
 
 def _write_collection(path: Path, points, cells, parts: list[tuple[dict, dict]], stamps: np.ndarray) -> None:

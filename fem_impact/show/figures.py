@@ -31,8 +31,6 @@ from .style import BLUE, GREEN, GREY, PALETTE, SKY, STYLE, draw_rim, opened, pan
 SPECTRUM_BAND = (10.0, 20e3)  # [Hz] default band: about what people hear
 SPECTRUM_POINTS = 1200  # [-] frequencies in a spectrum: about one per pixel
 SPECTRUM_DEPTH = 1e-4  # [-] bottom of the spectrum axis: 80 dB below the largest value; of energies its square
-MOST_NUMBERS = 20  # [-] with more contacts than this, the numbers would overlap and are left out
-SAND = 1e-3  # [-] of the largest deflection, which nodal lines leave out: along a clamped edge the elements err by less
 TICKS = 4  # [-] most intervals between numbers below a narrow panel
 NAMES = {  # quantity of a blow: its name in a picture
     "n_impacts": "number of impacts",
@@ -76,7 +74,22 @@ def force(response: Response | Strokes, *, band: tuple[float, float] = SPECTRUM_
     low, high = check.band("band", band, "Hz")
     with styled(7.0, 6.0) as figure:
         above, below = figure.subplots(2, 1)
-        _draw_force(above, response)
+        start, end = response.time[0], response.time[-1]
+        if response.impacts:
+            start, end = response.impacts[0].start, response.impacts[-1].end
+        room, several, most = MARGIN * (end - start), response.force.ndim == 2, 20  # numbers that do not overlap
+        names = [f"contact {i}" for i in range(response.force.shape[1])] if several else None
+        above.plot(response.time, response.force, label=names)
+        if several and len(names or ()) <= most:
+            above.legend(loc="upper right")
+        inner: dict[str, Any] = {"xycoords": above.get_xaxis_transform(), "ha": "center", "va": "top"}
+        for number, impact in enumerate(response.impacts, 1):
+            above.axvspan(impact.start, impact.end, color=SKY, alpha=0.2, lw=0)
+            if response.n_impacts <= most:
+                above.annotate(str(number), (0.5 * (impact.start + impact.end), 0.97), color="#555555", **inner)
+        above.set(xlim=(start - room, end + room), xlabel="time", ylabel="contact force", title="Contact force")
+        above.set_ylim(0.0, 1.15 * (response.peak_force or 1.0))  # leaves room for the numbers
+        set_units(above, "s", "N")
         frequencies = np.geomspace(low, high, SPECTRUM_POINTS)
         size = np.abs(response.spectrum(frequencies))
         top = float(size.max(initial=0.0)) or 1.0
@@ -89,28 +102,6 @@ def force(response: Response | Strokes, *, band: tuple[float, float] = SPECTRUM_
         below.plot(natural, np.zeros(len(natural)), "|", label="modes of the struck body", **marks)
         below.legend(loc="lower left")
     return figure
-
-
-def _draw_force(axes: Any, response: Response | Strokes) -> None:
-    start, end = response.time[0], response.time[-1]
-    if response.impacts:
-        start, end = response.impacts[0].start, response.impacts[-1].end
-    room = MARGIN * (end - start)
-    several = response.force.ndim == 2
-    names = [f"contact {i}" for i in range(response.force.shape[1])] if several else None
-    axes.plot(response.time, response.force, label=names)
-    if several and len(names or ()) <= MOST_NUMBERS:
-        axes.legend(loc="upper right")
-    for number, impact in enumerate(response.impacts, 1):
-        axes.axvspan(impact.start, impact.end, color=SKY, alpha=0.2, lw=0)
-        if response.n_impacts <= MOST_NUMBERS:
-            place = (0.5 * (impact.start + impact.end), 0.97)
-            axes.annotate(
-                str(number), place, xycoords=axes.get_xaxis_transform(), ha="center", va="top", color="#555555"
-            )
-    axes.set(xlim=(start - room, end + room), xlabel="time", ylabel="contact force", title="Contact force")
-    axes.set_ylim(0.0, 1.15 * (response.peak_force or 1.0))  # leaves room for the numbers
-    set_units(axes, "s", "N")
 
 
 @check.typed
@@ -228,10 +219,11 @@ def chladni(modes: Modes, count: int, columns: int) -> Figure:
     points = np.concatenate([points, points[sides].mean(axis=1)])
     shapes, columns = sampling.gallery(modes, points, count, columns, first=modes.n_rigid)
     tall = min(1.6, max(0.4, float(np.ptp(points[:, 1]) / np.ptp(points[:, 0]))))
+    sand = 1e-3  # of the largest deflection: along a clamped edge the elements err by less
     with panels(shapes.shape[1], columns, 2.0, 2.0 * tall + 0.35) as (figure, all_axes):
         for i, (axes, shape) in enumerate(zip(all_axes, shapes.T), modes.n_rigid):
-            mesh = Triangulation(points[:, 0], points[:, 1], cells, np.abs(shape[cells]).max(axis=1) < SAND)
-            axes.tricontour(mesh, _unflattened(shape, cells, SAND), levels=[0.0], colors="black")
+            mesh = Triangulation(points[:, 0], points[:, 1], cells, np.abs(shape[cells]).max(axis=1) < sand)
+            axes.tricontour(mesh, _unflattened(shape, cells, sand), levels=[0.0], colors="black")
             draw_rim(axes, points, cells)
             _draw_ribs(axes, modes, points, cells)
             axes.set_axis_off()

@@ -7,14 +7,12 @@ import numpy as np
 
 from .._base import check
 from .._base.files import replacing
+from .._base.rounding import ROUNDING, SAME
 from ..impact.response import Response
 
 ENDINGS = (".op4", ".uff", ".unv", ".bdf", ".inp")
 MODAL = ".uff", ".unv"
-FORCE, DISPLACEMENT, VELOCITY = 13, 8, 11  # kinds of data of universal files
-EVEN = 1e-9  # [-] of the step between times by which they may differ from even ones
-ALONG, WAYS = "xyz", ("x", "y", "z", "-x", "-y", "-z")
-DIGITS = 9  # of Nastran's and Abaqus's numbers: what sixteen characters hold
+WAYS = "x", "y", "z", "-x", "-y", "-z"
 
 
 @check.typed
@@ -57,28 +55,25 @@ def write_history(
     stamps = response.time if times is None else check.array("times", times, (None,), "s")
     if not (np.diff(stamps) > 0.0).all():
         stamps = np.unique(stamps)
-    check.one_of("direction", direction, WAYS)
+    sign, way = divmod(WAYS.index(check.one_of("direction", direction, WAYS)), 3)
+    way = (way + 1) * (1 - 2 * sign)  # as universal files count: 1 to 3, negative against the axis
     check.count("node", node)
     force = np.column_stack([response.history.force_at(stamps, i)[0] for i in range(response.history.n_contacts)])
     with replacing(path) as temporary:
         if ending in (".op4", *MODAL):
-            moved = _motion_at(response, at, stamps)
+            moved = {}
+            if at is not None:
+                points = response.target.points("at", at)
+                moved = {"MOVE": response.displacement(points, stamps), "VELO": response.velocity(points, stamps)}
             if ending == ".op4":
                 temporary.write_text(_op4({"TIME": stamps[:, None], "FORCE": force, **moved}), encoding="ascii")
             else:
                 n = moved["MOVE"].shape[1] if moved else 0
                 names = np.arange(1, n + 1) if numbers is None else check.array("numbers", numbers, (n,)).astype(int)
-                _universal(temporary, stamps, force, moved, [node, direction, names])
+                _universal(temporary, stamps, force, moved, (node, way, names))
         else:
             write = _nastran if ending == ".bdf" else _abaqus
-            temporary.write_text(write(stamps, force, node, direction), encoding="ascii")
-
-
-def _motion_at(response: Response, at: Any, times: np.ndarray) -> dict[str, np.ndarray]:
-    if at is None:
-        return {}
-    points = response.target.points("at", at)
-    return {"MOVE": response.displacement(points, times), "VELO": response.velocity(points, times)}
+            temporary.write_text(write(stamps, force, node, way), encoding="ascii")
 
 
 def _op4(matrices: dict[str, np.ndarray]) -> str:
@@ -95,16 +90,15 @@ def _op4(matrices: dict[str, np.ndarray]) -> str:
     return "\n".join([*lines, ""])
 
 
-def _universal(path: Path, times: np.ndarray, force: np.ndarray, moved: dict[str, np.ndarray], where: list) -> None:
+def _universal(path: Path, times: np.ndarray, force: np.ndarray, moved: dict[str, np.ndarray], where: tuple) -> None:
     """Functions over time, data set 58: the force and then the motion of each point."""
     pyuff = check.extra("pyuff", "uff", "a universal file")
     steps = np.diff(times)
-    if len(times) < 2 or np.ptp(steps) > EVEN * steps.mean() + 1e-12 * np.abs(times).max():
+    if len(times) < 2 or np.ptp(steps) > SAME * steps.mean() + ROUNDING * np.abs(times).max():
         raise ValueError("times must be even for a universal file; give times=np.linspace(start, end, n)")
-    node, direction, numbers = where
-    way = (ALONG.index(direction[-1]) + 1) * (-1 if direction.startswith("-") else 1)
-    channels = [("force", FORCE, node, values, "N") for values in force.T]
-    for name, kind, label, unit in (("MOVE", DISPLACEMENT, "displacement", "m"), ("VELO", VELOCITY, "velocity", "m/s")):
+    node, way, numbers = where
+    channels = [("force", 13, node, values, "N") for values in force.T]  # the format's kinds of data are numbered
+    for name, kind, label, unit in (("MOVE", 8, "displacement", "m"), ("VELO", 11, "velocity", "m/s")):
         channels += [(label, kind, n, values, unit) for n, values in zip(numbers, moved.get(name, np.zeros((0, 0))).T)]
     sets = [
         {
@@ -122,34 +116,29 @@ def _universal(path: Path, times: np.ndarray, force: np.ndarray, moved: dict[str
     pyuff.UFF(str(path)).write_sets(sets, mode="add")
 
 
-def _signed(direction: str) -> np.ndarray:
-    return np.eye(3)[ALONG.index(direction[-1])] * (-1.0 if direction.startswith("-") else 1.0) + 0.0
-
-
-def _nastran(times: np.ndarray, force: np.ndarray, node: int, direction: str) -> str:
+def _nastran(times: np.ndarray, force: np.ndarray, node: int, way: int) -> str:
     """A table of time and force for each contact, and the load on a node: load set 1 of a transient solution."""
     lines = ["$ contact force of a blow, s and N; ask for it by DLOAD = 1 in the case control"]
     loads = "".join(f"{1.0:8.1f}{10 + i:8d}" for i in range(force.shape[1]))
     lines.append(f"DLOAD   {1:8d}{1.0:8.1f}{loads}")
-    x, y, z = _signed(direction)
+    x, y, z = (float(np.sign(way)) if axis == abs(way) else 0.0 for axis in (1, 2, 3))
     for i, values in enumerate(force.T):
         table, load = 100 + i, 10 + i
         lines.append(f"TLOAD1  {load:8d}{1000 + i:8d}{'':8}{'LOAD':>8}{table:8d}")
         lines.append(f"FORCE   {1000 + i:8d}{node:8d}{0:8d}{1.0:8.1f}{x:8.1f}{y:8.1f}{z:8.1f}")
         lines.append(f"TABLED1*{table:16d}{'':48}*")
-        numbers = [f"{value:16.{DIGITS}E}" for pair in zip(times, values) for value in pair] + [f"{'ENDT':>16}"]
+        numbers = [f"{value:16.9E}" for pair in zip(times, values) for value in pair] + [f"{'ENDT':>16}"]
         rows = ["".join(numbers[k : k + 4]) for k in range(0, len(numbers), 4)]
         lines += ["*" + " " * 7, *[f"*       {row:<64}*" for row in rows[:-1]], f"*       {rows[-1]}"]
     return "\n".join([*lines, ""])
 
 
-def _abaqus(times: np.ndarray, force: np.ndarray, node: int, direction: str) -> str:
+def _abaqus(times: np.ndarray, force: np.ndarray, node: int, way: int) -> str:
     """An amplitude for each contact, and the concentrated load that follows it, to be put into a step."""
     lines = ["** contact force of a blow, s and N"]
     for i, values in enumerate(force.T):
         lines.append(f"*AMPLITUDE, NAME=BLOW{i + 1}")
-        lines += [f"{time:.{DIGITS}E}, {value:.{DIGITS}E}" for time, value in zip(times, values)]
-    sign = -1 if direction.startswith("-") else 1
+        lines += [f"{time:.9E}, {value:.9E}" for time, value in zip(times, values)]
     for i in range(force.shape[1]):
-        lines += [f"*CLOAD, AMPLITUDE=BLOW{i + 1}", f"{node}, {ALONG.index(direction[-1]) + 1}, {sign}."]
+        lines += [f"*CLOAD, AMPLITUDE=BLOW{i + 1}", f"{node}, {abs(way)}, {np.sign(way)}."]
     return "\n".join([*lines, ""])

@@ -19,7 +19,7 @@ def marked(points: np.ndarray, cells: np.ndarray, maps: np.ndarray, titles: Sequ
     (n, dimension) [m], the radius [m] and a label for every panel.
     """
     plane = points.shape[1] == 2
-    sides = np.ptp(points, axis=0)
+    sides, angle = np.ptp(points, axis=0), np.linspace(0.0, 2.0 * np.pi, 61)
     tall = 1.2 + 4.6 * min(1.6, max(0.4, float(sides[-1] / sides[0]))) if plane else 2.6
     columns = min(len(titles), 2 if plane else 1)
     with panels(len(titles), columns, 5.6 if plane else 7.0, tall) as (figure, all_axes):
@@ -31,29 +31,21 @@ def marked(points: np.ndarray, cells: np.ndarray, maps: np.ndarray, titles: Sequ
                 draw_rim(axes, points, cells)
                 axes.set_axis_off()
                 figure.colorbar(drawn, ax=axes, label=UNIT, shrink=0.7)
-                _circles(axes, marks)
+                for number, (middles, radius, _) in enumerate(marks, 1):
+                    for x, y in middles:
+                        axes.plot(x + radius * np.cos(angle), y + radius * np.sin(angle), color=VERMILION, lw=1.4)
+                        axes.annotate(str(number), (x, y), ha="center", va="center", fontweight="bold")
             else:
                 axes.plot(points[:, 0], maps[:, i], color=BLUE)
                 axes.axhline(0.0, color=GREY, lw=0.6)
                 axes.set(xlabel="x [m]", ylabel=UNIT.replace(" per", "\nper"))
-                _spans(axes, marks)
+                top: dict[str, Any] = {"xycoords": axes.get_xaxis_transform(), "ha": "center", "va": "top"}
+                for number, (middles, radius, _) in enumerate(marks, 1):
+                    for x in middles[:, 0]:
+                        axes.axvspan(x - radius, x + radius, color=VERMILION, alpha=0.12, lw=0)
+                        axes.annotate(str(number), (x, 0.97), **top)
             labels = "\n".join(mark[2][i] for mark in marks)
             axes.set_title(title, loc="left")
             place = {"ha": "right", "va": "top"} if plane else {"ha": "left", "va": "bottom"}
             axes.annotate(labels, (1.0 if plane else 1.01, 0.0), xycoords="axes fraction", fontsize=8, **place)
     return figure
-
-
-def _circles(axes: Any, marks: Marks) -> None:
-    angle = np.linspace(0.0, 2.0 * np.pi, 61)
-    for number, (middles, radius, _) in enumerate(marks, 1):
-        for x, y in middles:
-            axes.plot(x + radius * np.cos(angle), y + radius * np.sin(angle), color=VERMILION, lw=1.4)
-            axes.annotate(str(number), (x, y), ha="center", va="center", fontweight="bold")
-
-
-def _spans(axes: Any, marks: Marks) -> None:
-    for number, (middles, radius, _) in enumerate(marks, 1):
-        for place in middles[:, 0]:
-            axes.axvspan(place - radius, place + radius, color=VERMILION, alpha=0.12, lw=0)
-            axes.annotate(str(number), (place, 0.97), xycoords=axes.get_xaxis_transform(), ha="center", va="top")

@@ -53,7 +53,7 @@ def mode_shapes(path: str | Path, modes: Modes, *, count: int = 12, columns: int
     if not can_render():
         figures.save(path, figures.mode_shapes(modes, count=count, columns=columns))
         return REMEDY
-    canvas.write(path, canvas.gallery(gallery(modes, count, columns)))
+    canvas.write_picture(path, canvas.gallery(gallery(modes, count, columns)))
     return ""
 
 
@@ -114,7 +114,7 @@ def wave(path: str | Path, response: Response, *, time: float | None = None) -> 
     times = np.linspace(0.0, sampling.end_of(response), FRAMES)
     instant = times[sampling.telling(response, times)] if time is None else check.non_negative("time", time, "s")
     (frame,) = frames_at(response, np.array([instant]))
-    canvas.write(path, frame)
+    canvas.write_picture(path, frame)
     return "" if can_render() else REMEDY
 
 

@@ -2,7 +2,6 @@
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -15,11 +14,8 @@ from ..impact.response import Response
 from . import canvas, figures, pictures, sampling
 from .style import BLUE, VERMILION, font_file, pixels
 
-FRAMES = 144  # [-] default length: twelve seconds
 SIDE, STRIP = (540, 480), 60  # [px] size of the force's picture, and height of the strip with the caption
 LETTERS = 20  # [px] height of the caption's letters: legible at half the size
-DPI = 100.0  # [1/inch] of the force's picture, which sets the size of its letters
-DOT = 6  # [px] radius of the dot on the curve
 
 
 @dataclass(frozen=True)
@@ -56,7 +52,7 @@ def captions(response: Response) -> list[Caption]:
 
 
 @check.typed
-def write(path: str | Path, response: Response, *, frames: int = FRAMES) -> str:
+def write(path: str | Path, response: Response, *, frames: int = 144) -> str:
     """Write the film of a blow from the first touch on, and beside it its captions, which are also in the pictures.
 
     Parameters
@@ -112,7 +108,7 @@ def _composed(response: Response, times: np.ndarray, said: list[Caption]) -> Ite
         whole.paste(force, (size[0], 0))
         draw = ImageDraw.Draw(whole)
         x, y = spot(time)
-        draw.ellipse([size[0] + x - DOT, y - DOT, size[0] + x + DOT, y + DOT], fill=VERMILION)
+        draw.ellipse([size[0] + x - 6, y - 6, size[0] + x + 6, y + 6], fill=VERMILION)
         text = [caption.text for caption in said if caption.time <= time][-1]
         draw.text((LETTERS, SIDE[1] + 0.5 * STRIP), text, "black", face, anchor="lm")
         slow = face.font_variant(size=LETTERS * 3 // 4)
@@ -122,19 +118,20 @@ def _composed(response: Response, times: np.ndarray, said: list[Caption]) -> Ite
 
 def _force(response: Response, end: float) -> tuple[Image.Image, Any]:
     """The picture of the force until an end [s], and a function from a time [s] to the pixel on its curve."""
-    with figures.styled(SIDE[0] / DPI, SIDE[1] / DPI) as figure:
+    dpi = 100.0  # sets the size of its letters
+    with figures.styled(SIDE[0] / dpi, SIDE[1] / dpi) as figure:
         axes = figure.subplots()
         seen = response.time <= end
         axes.plot(1e3 * response.time[seen], response.force[seen], color=BLUE, lw=1.6)
         axes.set(xlabel="time [ms]", ylabel="force [N]", xlim=(0.0, 1e3 * end))
         axes.set_ylim(bottom=0.0)
         axes.set_title(" ")  # room for how slow the film is
-        image = Image.fromarray(pixels(figure, DPI)).resize(SIDE)
-    return image, partial(_place, axes, response)
+        image = Image.fromarray(pixels(figure, dpi)).resize(SIDE)
 
+    def pixel_of(time: float) -> tuple[float, float]:
+        """Pixel of the force at a time [s], from the upper left."""
+        force = float(np.interp(time, response.time, response.force, right=0.0))
+        x, y = axes.transData.transform((1e3 * time, force))
+        return float(x), SIDE[1] - float(y)
 
-def _place(axes: Any, response: Response, time: float) -> tuple[float, float]:
-    """Pixel of the force at a time [s], from the upper left."""
-    force = float(np.interp(time, response.time, response.force, right=0.0))
-    x, y = axes.transData.transform((1e3 * time, force))
-    return float(x), SIDE[1] - float(y)
+    return image, pixel_of

@@ -246,17 +246,25 @@ def _velocity(response: Response, heard: np.ndarray, shape: np.ndarray, times: n
     if response.history.stretched is not None:  # the modes pull on each other: none rings on its own
         blocks = [response.modal_state(times[i : i + BLOCK])[1] for i in range(0, len(times), BLOCK)]
         return np.concatenate([p @ np.where(heard, shape, 0.0) for p in blocks])
-    flights = _flights(response, times)
+    history = response.history
+    busy = np.flatnonzero(history.pressed.any(axis=1))
+    ends = history.steps[:, layout.START] + history.steps[:, layout.LENGTH]
+    # the first sample of every long free flight and of what follows it; the last begins when the blow is over
+    first = np.searchsorted(times, np.append(0.0, ends[busy]))
+    after = np.append(np.searchsorted(times, history.steps[busy, layout.START]), len(times))
+    long = after - first >= free_motion.BLOCK[0]
+    long[-1] = after[-1] > first[-1]
+    flights = list(zip(first[long].tolist(), after[long].tolist()))
     alone = np.ones(len(times), bool)  # samples whose states are asked for: all but those within the flights
-    for first, last in flights:
-        alone[first + 1 : last] = False
+    for start, end in flights:
+        alone[start + 1 : end] = False
     q, p = response.modal_state(times[alone])  # (n_alone, n_modes)
     velocity = np.empty(len(times))
     velocity[alone] = p @ np.where(heard, shape, 0.0)
     row = np.cumsum(alone) - 1
-    for first, last in flights:
-        state = q[row[first], heard], p[row[first], heard]
-        velocity[first:last] = _ring(response, times[first:last], state, heard, shape[None, heard] + 0j, 1)
+    for start, end in flights:
+        state = q[row[start], heard], p[row[start], heard]
+        velocity[start:end] = _ring(response, times[start:end], state, heard, shape[None, heard] + 0j, 1)
     return velocity
 
 
@@ -526,18 +534,6 @@ def _times(response: Response | Strokes, heard: np.ndarray, duration: float | No
 def _scaled(signal: np.ndarray, rate: int, full_scale: float, unit: str, normalise: bool) -> Sound:
     sound = Sound(signal / full_scale, rate, full_scale, unit)
     return sound.normalised() if normalise else sound
-
-
-def _flights(response: Response, times: np.ndarray) -> list[tuple[int, int]]:
-    """First sample of every long free flight and of what follows it; the last flight begins when the blow is over."""
-    history = response.history
-    busy = np.flatnonzero(history.pressed.any(axis=1))
-    ends = history.steps[:, layout.START] + history.steps[:, layout.LENGTH]
-    first = np.searchsorted(times, np.append(0.0, ends[busy]))
-    after = np.append(np.searchsorted(times, history.steps[busy, layout.START]), len(times))
-    long = after - first >= free_motion.BLOCK[0]
-    long[-1] = after[-1] > first[-1]
-    return list(zip(first[long].tolist(), after[long].tolist()))
 
 
 def _ring(

@@ -50,6 +50,8 @@ def test_disk_frequencies(edge, squared):
 def test_beam_frequencies(ends, roots):
     modes = analytic.beam(2.0, ends=ends, mass=1.0, first_frequency=roots[0] ** 2, n_modes=4)
     assert_allclose(np.sqrt(modes.frequencies[modes.n_rigid :][:2]), roots, rtol=1e-12)  # the digits printed
+    if ends[1] == "free":
+        assert_allclose(modes.shape_at([2.0])[0, modes.n_rigid :] ** 2, 4.0, rtol=1e-9)  # over the mass
 
 
 def test_rectangle_frequencies_and_order():
@@ -215,6 +217,8 @@ def test_point_off_the_body_is_refused():
     modes = analytic.disk(0.2, mass=1.0, first_frequency=1.0, n_modes=3)
     with pytest.raises(ValueError, match=r"points must lie on the body, got \(0.3, 0\) m"):
         modes.shape_at([[0.3, 0.0]])
+    with pytest.raises(ValueError, match=r"at must lie on the body, got \(0.2, 0.1\) m"):
+        modes.points("at", (0.2, 0.1))
 
 
 def test_rigid_motions_of_a_free_disk_are_those_of_its_mass_and_inertia():

@@ -2,7 +2,6 @@
 
 import functools
 import warnings
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -13,7 +12,6 @@ from scipy.spatial.transform import Rotation
 import fem_impact as fi
 from fem_impact.modes import viewing
 
-FILES = Path(__file__).parents[1] / "bodies"
 pytestmark = pytest.mark.usefixtures("read_here")
 STEEL = fi.Material(E=210e9, nu=0.3, rho=7850.0)
 LOADS = [(1, (0.0, 0.0, 2.0)), (5, (0.0, 0.0, -1.0))]  # N

@@ -3,16 +3,15 @@
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
+from test_solver_files import block
 
 import fem_impact as fi
 from fem_impact.modes import cell_kinds
 
 
 def test_the_inside_of_a_solid_has_no_normal():
-    grid = np.stack(np.meshgrid(*[np.arange(3.0)] * 3, indexing="ij"), axis=-1).reshape(-1, 3)
+    grid, cells, _ = block((2, 2, 2), (2.0, 2.0, 2.0))
     row = {tuple(place): i for i, place in enumerate(grid.tolist())}
-    corners = np.array([(0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0), (0, 0, 1), (1, 0, 1), (1, 1, 1), (0, 1, 1)])
-    cells = np.array([[row[tuple(map(float, np.add(low, each)))] for each in corners] for low in np.ndindex(2, 2, 2)])
     skin = cell_kinds.surface(grid, {12: cells})
     assert len(skin) == 48  # 24 squares
     shapes = np.random.default_rng(0).standard_normal((27, 3, 4))

@@ -110,7 +110,7 @@ def test_sums_are_passive_whatever_the_response():
 def test_slopes_of_columns_are_their_derivatives():
     lines = followed.MeasuredLines(2j * np.pi * np.array([50.0, 220.0, 700.0]) + 3.0, np.zeros(6), np.ones(3))
     poles, step = np.log([[1300.0, 4000.0], [0.02, 0.1]]), 1e-6
-    found = followed.slopes(lines, poles)
+    found = followed.column_slopes(lines, poles)
     for row in (0, 1):
         for mode in (0, 1):
             apart = np.zeros((2, 2))

@@ -6,30 +6,18 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 from scipy.integrate import solve_ivp
+from test_body import STEEL, body_of, free_bar
 from tumblers import tumbler
 
 import fem_impact as fi
 
-STEEL = fi.Material(E=210e9, nu=0.3, rho=7850.0)
 LAW = fi.Contact.linear(1e6)
 Z = (0.0, 0.0, 1.0)
 
 
-def bar(n_modes=20):
-    section = fi.Beam.rectangular(STEEL, width=0.03, height=0.01)
-    found = fi.analytic.beam(0.4, ends=("free", "free"), section=section, n_modes=n_modes + 2, damping_ratio=0.01)
-    return found, np.linspace(0.0, 0.4, 41)[:, None]
-
-
 def exported(modes, points, loads=()):
-    """The body as another program knows it: it moves along z."""
-    nodes = np.column_stack([points, np.zeros((len(points), 3 - points.shape[1]))])
-    shapes, static = np.zeros((len(points), 3, modes.n_modes)), np.zeros((len(points), 3, len(loads)))
-    shapes[:, 2] = modes.shape_at(points)
-    for k, number in enumerate(loads):
-        static[:, 2, k] = modes.shapes.deflection(points[[number - 1]], points)[:, 0]
-    how = {"mass": modes.mass, "damping_ratio": modes.damping_ratio, "static": static}
-    return fi.Body(modes.frequencies, shapes, nodes, loads=[(number, Z) for number in loads], **how)
+    """The body as another program knows it, with unit loads: it moves along z."""
+    return body_of(modes, points, [(number, Z) for number in loads])
 
 
 def quietly(run, *args, **how):
@@ -44,7 +32,7 @@ def numbers(hit):
 
 def test_two_bars_from_elsewhere_collide_as_our_own():
     """With unit loads exactly; without, within the stated error, to which both sides add theirs."""
-    (own, points), how = bar(), {"speed": 1.0, "tolerance": 1e-2}
+    (own, points), how = free_bar(20), {"speed": 1.0, "tolerance": 1e-2}
     truth = fi.strike(own, fi.Striker.flexible(own, at=points[0]), LAW, at=points[10], **how)
     bodies = {known: exported(own, points, [1, 11] if known else []) for known in (True, False)}
     left_out = {}
@@ -134,7 +122,7 @@ def test_a_hammer_comes_turning_about_its_grip_and_is_free_from_then_on():
 
 def test_a_soft_contact_feels_a_body_that_bends_as_rigid():
     """The contact lasts 40 periods of the first mode; what bends then is the square of that, some 1e-3."""
-    own, points = bar()
+    own, points = free_bar(20)
     body = exported(own, points, [31])
     striker = fi.Striker.of(body, 31, direction="z")
     arm, inertia = 0.1, own.mass * 0.4**2 / 12.0
@@ -222,7 +210,7 @@ def test_random_bodies_in_space_move_as_their_equations_say(seed):
 
 def test_two_contacts_between_the_same_two_bodies_feel_all_that_yields():
     """Between two points the compliance of modes left out counts, too: as of our own bars."""
-    own, points = bar(12)
+    own, points = free_bar(12)
     body = exported(own, points, [1, 11, 31, 41])
     found = [
         quietly(fi.collide, [one, other], [fi.Touch(LAW, 0, 1, a, b), fi.Touch(LAW, 0, 1, c, d)], speeds=[1.0, 0.0],

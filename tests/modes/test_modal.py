@@ -1,6 +1,7 @@
 """FE modes against exact values, their order of convergence, and the static solution they add up to."""
 
 import pickle
+from functools import partial
 
 import numpy as np
 import pytest
@@ -39,13 +40,19 @@ def test_hinged_rectangle_is_exact_to_eight_digits():
     assert_allclose(found, hinged(1.55, 1.0, 6), rtol=1e-8)  # 1e-7 (kh)**8 = 8e-9 for the sixth
 
 
-@pytest.mark.parametrize(("edge", "wanted"), [("clamped", DISK_CLAMPED), ("hinged", DISK_HINGED)])
-def test_order_on_curved_edges(edge, wanted):
-    errors = []
-    for size in (0.24, 0.12):
-        found = parameters(mesh.disk(1.0, size=size), {"boundary": edge}, 3)
-        errors.append(np.abs(found / wanted[:3] - 1.0))
-    assert (np.log2(errors[0] / errors[1]) > 3.5).all()  # five to six were measured
+@pytest.mark.parametrize(
+    ("shape", "sizes", "edge", "wanted", "order"),
+    [
+        (mesh.disk, (0.24, 0.12), "clamped", DISK_CLAMPED[:3], 3.5),  # five to six were measured
+        (mesh.disk, (0.24, 0.12), "hinged", DISK_HINGED[:3], 3.5),
+        # theory 8 once a wave has a few elements
+        (partial(mesh.rectangle, 1.0), (1 / 3, 1 / 6), "hinged", hinged(1.0, 1.0, 4), 6.0),
+    ],
+)
+def test_order_on_curved_and_straight_edges(shape, sizes, edge, wanted, order):
+    found = [parameters(shape(1.0, size=size), {"boundary": edge}, len(wanted)) for size in sizes]
+    errors = np.abs(np.array(found) / wanted - 1.0)
+    assert (np.log2(errors[0] / errors[1]) > order).all()
 
 
 def test_a_hinged_polygon_does_not_become_the_hinged_disk_but_ours_does():
@@ -92,32 +99,6 @@ def test_l_shape_is_stable_once_its_corner_is_graded():
     found = [parameters(mesh.polygon(corners, size=size), {"boundary": "hinged"}, 1)[0] for size in (0.5, 0.25)]
     assert_allclose(found[0], found[1], rtol=1e-4)  # r**(4/3) at the corner; ungraded meshes differ by 2 percent
     assert found[1] < found[0]  # conforming: from above
-
-
-def test_order_on_smooth_straight_cases():
-    errors = []
-    for n in (3, 6):
-        found = parameters(mesh.rectangle(1.0, 1.0, size=1 / n), {"boundary": "hinged"}, 4)
-        errors.append(np.abs(found / hinged(1.0, 1.0, 4) - 1.0))
-    assert (np.log2(errors[0] / errors[1]) > 6.0).all()  # theory 8 once a wave has a few elements
-
-
-@pytest.mark.parametrize(
-    ("supports", "wanted"),
-    [
-        ({"left": "clamped"}, [1.875104068712, 4.694091132974]),
-        ({}, [0.0, 0.0, 4.730040744863, 7.853204624096]),
-        ({"left": "hinged"}, [0.0, 3.926602312048, 7.068582745629]),
-        ({"boundary": "hinged"}, [np.pi, 2 * np.pi]),
-    ],
-)
-def test_beams_meet_their_closed_forms(supports, wanted):
-    modes = find_modes(assemble(mesh.line(0.5, size=0.5 / 80), BAR, supports), n_modes=len(wanted))
-    found = np.sqrt(modes.omega * np.sqrt(7850 * 12 / (210e9 * 0.01**2))) * 0.5
-    assert_allclose(found, wanted, rtol=1e-7)  # 3.5e-4 (kh)**4 = 3e-8
-    if "right" not in supports and "boundary" not in supports:
-        bending = modes.shape_at([0.5])[0, modes.n_rigid :] ** 2 * modes.mass
-        assert_allclose(bending, 4.0, rtol=1e-5)  # u**2 = 4 at a free end
 
 
 @pytest.mark.parametrize("ends", [("clamped", "free"), ("free", "free"), ("hinged", "hinged"), ("hinged", "free")])
@@ -315,12 +296,6 @@ def test_modes_survive_a_pickle():
 def test_bounds_are_refused_where_no_proof_covers_the_body():
     with pytest.raises(ValueError, match="bounds need an isotropic plate of constant thickness with straight edges"):
         find_modes(assemble(mesh.disk(1.0), PLATE, {"boundary": "hinged"}), n_modes=1, bounds=True)
-
-
-def test_strike_point_off_the_body_is_refused():
-    modes = find_modes(assemble(mesh.rectangle(1.0, 1.0, size=0.5), PLATE), n_modes=4)
-    with pytest.raises(ValueError, match=r"at must lie on the body, got \(1.2, 0.5\) m"):
-        modes.points("at", (1.2, 0.5))
 
 
 @pytest.mark.parametrize(

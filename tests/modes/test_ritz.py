@@ -135,10 +135,7 @@ def test_two_contacts_on_one_plate(rectangle):
     """A ball strikes a plate just above a spring elsewhere: the same by vectors of both points as by modes."""
     places = np.array([AT[0], (0.3, 0.2)])
     system = fi.assemble(fi.mesh.rectangle(0.465, 0.3, size=0.03), SPRUCE, {"boundary": "hinged"}, near=places)
-    bodies = (
-        fi.ritz_modes(system, places, max_frequency=1e4, n_vectors=300),
-        exact(n_modes=1000),
-    )
+    bodies = (fi.ritz_modes(system, places, max_frequency=1e4, n_vectors=300), exact(n_modes=1000))
     touches = [
         fi.Touch(fi.Contact.hertz(1e7), 0, 1, None, tuple(places[0])),
         fi.Touch(fi.Contact.linear(2e4, gap=1e-6), 1, None, tuple(places[1]), None),  # without a gap it chatters

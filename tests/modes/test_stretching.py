@@ -362,10 +362,7 @@ def test_the_first_ritz_vector_of_a_free_plate_stretches_as_its_mode_does():
         ),
         (
             lambda: fi.analytic.beam(
-                0.3,
-                ends=("clamped", "free"),
-                section=fi.Beam.rectangular(STEEL, width=0.02, height=H),
-                n_modes=4,
+                0.3, ends=("clamped", "free"), section=fi.Beam.rectangular(STEEL, width=0.02, height=H), n_modes=4
             ),
             "an end is free",
         ),

@@ -91,7 +91,7 @@ def test_a_beam_comes_back_as_a_line_of_points(tmp_path):
     beam = Beam.rectangular(Material(E=210e9, nu=0.3, rho=7850.0), width=0.02, height=0.01)
     modes = find_modes(assemble(mesh.line(1.0, size=0.1), beam, {"left": "clamped"}), n_modes=3)
     points, cells = modes.shapes.grid()
-    universal_files.write(
+    universal_files.write_modes(
         tmp_path / "bar.unv", modes.frequencies, modes.damping_ratio, modes.shape_at(points), points, cells
     )
     again = Modes.from_uff(tmp_path / "bar.unv", mass=modes.mass)

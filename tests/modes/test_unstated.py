@@ -98,9 +98,10 @@ def test_where_a_unit_load_is_known_nothing_is_estimated():
 def test_a_body_in_three_dimensions_may_be_a_bar_or_a_plate():
     """The interval holds both, so it holds each."""
     omega, rows = 2.0 * np.pi * np.arange(1.0, 11.0) * 100.0, np.full((1, 10), 1.3)
-    both = unstated.left_out(omega, rows, 0.5, 3)
+    both = unstated.estimate_left_out(omega, rows, 0.5, 3)
     for dimension in (1, 2):
-        mean, error = unstated.left_out(omega, rows, 1.0 / 1.3**2, dimension)  # the mean squared shape is one over it
+        # the mean squared shape is one over the mass
+        mean, error = unstated.estimate_left_out(omega, rows, 1.0 / 1.3**2, dimension)
         assert both[0] + both[1] >= 0.9 * mean and both[0] - both[1] <= mean + error
 
 

@@ -69,7 +69,7 @@ def test_pictures_are_drawn_from_arrays_alone(tmp_path):
 @pytest.mark.parametrize("form", FORMATS)
 def test_a_picture_is_written_in_every_format(tmp_path, form):
     picture = Image.fromarray(np.random.default_rng(1).integers(0, 255, (20, 30, 3), np.uint8))
-    canvas.write(tmp_path / f"a.{form}", picture)
+    canvas.write_picture(tmp_path / f"a.{form}", picture)
     raw = (tmp_path / f"a.{form}").read_bytes()
     if form == "svg":
         root = ElementTree.fromstring(raw)

@@ -14,17 +14,6 @@ import fem_impact as fi
 from fem_impact.show import export, sampling, sound
 
 
-@pytest.fixture(scope="module")
-def modes():
-    return fi.analytic.rectangle(0.465, 0.3, mass=0.2, first_frequency=100.0, n_modes=30, damping_ratio=0.005)
-
-
-@pytest.fixture(scope="module")
-def hit(modes):
-    how = {"at": (0.1395, 0.09), "speed": 2.0, "tolerance": 1e-3}
-    return fi.strike(modes, fi.Striker.rigid(0.03), fi.Contact.hertz(695e3), **how)
-
-
 @pytest.mark.slow
 def test_motion_of_a_plate_with_a_hole_opens_though_chords_leave_it(tmp_path):
     plate = fi.Plate(fi.Material(E=70e9, nu=0.33, rho=2700.0), 2e-3)

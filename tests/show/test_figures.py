@@ -12,17 +12,6 @@ from fem_impact.show import figures, plots
 from fem_impact.sweeps.hammers import Hammer
 
 
-@pytest.fixture(scope="module")
-def modes():
-    return fi.analytic.rectangle(0.465, 0.3, mass=0.2, first_frequency=100.0, n_modes=30, damping_ratio=0.005)
-
-
-@pytest.fixture(scope="module")
-def hit(modes):
-    how = {"at": (0.1395, 0.09), "speed": 2.0, "tolerance": 1e-3}
-    return fi.strike(modes, fi.Striker.rigid(0.03), fi.Contact.hertz(695e3), **how)
-
-
 def test_force_picture_holds_history_and_spectrum_and_says_its_units(hit):
     above, below = figures.force(hit, band=(20.0, 5e3)).axes
     time, force = above.lines[0].get_data()

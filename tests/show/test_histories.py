@@ -10,13 +10,6 @@ TIMES = np.linspace(0.0, 4e-3, 81)  # s
 POINTS = [(0.1, 0.1), (0.3, 0.2)]  # m
 
 
-@pytest.fixture(scope="module")
-def hit():
-    modes = fi.analytic.rectangle(0.465, 0.3, mass=0.2, first_frequency=100.0, n_modes=12, damping_ratio=0.005)
-    how = {"at": (0.1395, 0.09), "speed": 2.0, "tolerance": 1e-2}
-    return fi.strike(modes, fi.Striker.rigid(0.03), fi.Contact.hertz(695e3), **how)
-
-
 def force(hit):
     return hit.history.force_at(TIMES, 0)[0]
 

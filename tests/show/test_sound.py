@@ -120,13 +120,6 @@ def test_rigid_target_is_silent():
     assert not heard.samples.any() and heard.peak_level == -np.inf
 
 
-@pytest.fixture(scope="module")
-def plate_hit():
-    modes = fi.analytic.rectangle(0.465, 0.3, mass=0.2, first_frequency=100.0, n_modes=30, damping_ratio=0.01)
-    how = {"at": (0.1395, 0.09), "speed": 2.0, "tolerance": 1e-3}
-    return fi.strike(modes, fi.Striker.rigid(0.03), fi.Contact.hertz(695e3), **how)
-
-
 def test_radiated_pressure_is_rayleighs_integral(plate_hit):
     listener, duration = np.array([0.5, -0.2, 0.7]), 0.05
     heard = sound.radiate(plate_hit, listener, duration=duration)

@@ -1,0 +1,21 @@
+"""The blow that most pictures, files and sounds are tested with."""
+
+import pytest
+
+import fem_impact as fi
+
+
+@pytest.fixture(scope="session")
+def modes():
+    return fi.analytic.rectangle(0.465, 0.3, mass=0.2, first_frequency=100.0, n_modes=30, damping_ratio=0.005)
+
+
+@pytest.fixture(scope="session")
+def plate_hit(modes):
+    how = {"at": (0.1395, 0.09), "speed": 2.0, "tolerance": 1e-3}
+    return fi.strike(modes, fi.Striker.rigid(0.03), fi.Contact.hertz(695e3), **how)
+
+
+@pytest.fixture(scope="session")
+def hit(plate_hit):
+    return plate_hit
