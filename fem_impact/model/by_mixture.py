@@ -17,8 +17,6 @@ from .by_modes import MANY_MODES
 from .by_vectors import Vectors
 from .target import FIRST_LOOK, Elements, Stages
 
-# [-] modes times steps of one run of a plate that is infinite above a frequency: a time limit of ten seconds
-MOST_MIXED = 2e8
 NO_MESH = "a mesh that resolves the frequency up to which a plate of 'mixed' keeps its modes has too many unknowns"
 
 
@@ -117,7 +115,8 @@ class Mixed(Description):
             if seen.improved(error, allowed):
                 return self
         twice = 2.0 * hit.bodies[-1].n_modes
-        many = hit.history.steps.shape[0] * twice > MOST_MIXED or (seen is not None and twice > mixed.MOST_VECTORS)
+        # modes times steps of one run: 2e8 take ten seconds
+        many = hit.history.steps.shape[0] * twice > 2e8 or (seen is not None and twice > mixed.MOST_VECTORS)
         if error.idealisation <= allowed or many:
             return None
         higher = replace(self, frequency=2.0 * self.frequency, seen=None)

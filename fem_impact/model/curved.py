@@ -9,10 +9,6 @@ import numpy as np
 from ..modes.stretching import Stretching
 from .bending import Known
 
-# [-] fact: a force a q**2 lowers the frequency of q'' + w**2 q by 5/12 (a / w**2)**2 of the squared amplitude, whose
-# stiffness 2 a q has the mean square 2 a**2 of it
-SOFTENS = 5.0 / 24.0
-
 
 def slopes(found: Stretching, q: np.ndarray) -> np.ndarray:
     """Stiffness (n_times, n, n) [s**-2] that stretching adds to the modes in states q (n_times, n)."""
@@ -49,7 +45,9 @@ def shift(found: Stretching, omega: np.ndarray, energy: np.ndarray) -> np.ndarra
         return np.asarray(0.5 * raised)
     part = np.einsum("km,kij->ijm", found.linear * soft, forms)
     mixed = part + part.transpose(2, 0, 1) + part.transpose(0, 2, 1)
-    return np.asarray(0.5 * raised - SOFTENS * np.einsum("ijm,ijm,m->i", mixed, mixed, energy))
+    # a force a q**2 lowers the frequency of q'' + w**2 q by 5/12 (a / w**2)**2 of the squared amplitude, whose
+    # stiffness 2 a q has the mean square 2 a**2 of it
+    return np.asarray(0.5 * raised - 5.0 / 24.0 * np.einsum("ijm,ijm,m->i", mixed, mixed, energy))
 
 
 def height(body: Known) -> float:

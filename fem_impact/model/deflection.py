@@ -35,13 +35,11 @@ from .bending import Bending, Known, quadratic
 from .idealisation import Waves
 from .restrike import Doubt, Struck
 
-LIMIT = 0.2  # [-] deflection over thickness at which the frequency of a hinged square rises by 2 %
 SLIPS = 0.25  # [-] stretching of a plate whose edge may move in its plane over that of one whose edge may not
 # [-] instants of the blow, and of each period after it, at which tension is found: the largest deflection to 1e-3
 TIMES = 64
 RINGING = 1.5  # [-] tension that acts on a mode swinging alone, over the mean tension, fact: 3/4 and 1/2 of its largest
 FRONT = 2.0 * np.pi  # [-] radius squared of the bent region over rate times time: where Si(r**2 / (4 rate t)) turns
-SLOWER = 3.0  # [-] a mode that is slower or faster than bending waves by this rocks or is pulled; wood differs by less
 # [-] deflection over thickness beyond which no first-order estimate of the stretching helps
 GONG = 1.0
 REMEDY = "take a softer blow or a thicker body: stretching is not modelled"
@@ -50,7 +48,8 @@ DARING = "take a softer blow or a thicker body: stretching = true holds up to de
 OTHER = "take element 'argyris'"
 SNAPS = "it may snap through, as its stiffness turns negative on the way"
 LOCAL = "take a softer blow or a thicker body: local stretching is not modelled"
-SMALL = Doubt("small deflections", "deflection over thickness", LIMIT, "give material and section")
+# from 0.2 on the frequency of a hinged square rises by 2 %
+SMALL = Doubt("small deflections", "deflection over thickness", 0.2, "give material and section")
 STRETCHED = replace(SMALL, limit=GONG)
 
 
@@ -299,10 +298,11 @@ def _bends(body: Known, integrals: Bending, omega: np.ndarray) -> tuple[np.ndarr
         stiffness = np.sqrt(stiffness[:, 0, 0] * stiffness[:, 1, 1])
     waves = np.sqrt(float(np.mean(stiffness)) / body.per_extent) * integrals.wave**2
     ratio = np.divide(omega, waves, out=np.zeros(len(omega)), where=waves > 0.0)
-    pulled = np.minimum(1.0, np.divide(SLOWER, ratio, out=np.ones(len(omega)), where=ratio > 0.0))
+    # what is slower or faster than bending waves by three rocks or is pulled; wood differs by less
+    pulled = np.minimum(1.0, np.divide(3.0, ratio, out=np.ones(len(omega)), where=ratio > 0.0))
     if _answers(body):  # whose modes are faster without being pulled
         pulled = np.ones(len(omega))
-    return np.minimum(1.0, SLOWER * ratio), pulled
+    return np.minimum(1.0, 3.0 * ratio), pulled
 
 
 def _bent_area(body: Known, integrals: Bending, times: np.ndarray) -> np.ndarray:

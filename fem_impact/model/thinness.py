@@ -17,6 +17,7 @@ Mindlin (1951), J. Appl. Mech. 18, 31-38; Wang (1994), J. Vib. Acoust. 116, 536-
 shells, NASA SP-288, 1.6 and 2.3; Soedel (2004), Vibrations of shells and plates, 6.8.
 """
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -30,21 +31,16 @@ from .bending import LOW, Bending, Known, bending, unwrapped
 from .deflection import OTHER
 from .restrike import Doubt, Struck, softer
 
-LIMIT = 0.23  # [-] thickness times wavenumber at which a wave is 1 % too fast for nu = 0.3
-# [-] drop of all frequencies by which a striker of unknown thickness is tried: a choice for a stout one
-DOUBT = 0.2
-NEAR = 10  # [-] modes next to a frequency that tell its wavenumber: some of them swing unlike waves, hardly all of ten
 THICKER = 'take a thick plate, theory = "mindlin", or a softer contact'
 SOFTER = "take a softer contact, or modes of a program for thick shells or solids, `fi.Modes.from_arrays`"
 SLENDER = 'take a thick beam, theory = "timoshenko", or a softer contact'
 NO_SECTION = "the thickness is not stated; give material and section instead of mass and first frequency"
 NO_SLENDERNESS = "give the slenderness of a stick, or material and section of a bar"
-TARGET = Doubt("thin target", "thickness times wavenumber", LIMIT, NO_SECTION)
-STEEP = 0.1  # [-] slope whose square, 1 %, is what frequencies may be off
-SHALLOW = Doubt("shallow target", "steepest slope", STEEP)
+TARGET = Doubt("thin target", "thickness times wavenumber", 0.23, NO_SECTION)  # a wave is 1 % too fast for nu = 0.3
+STRIKER = replace(TARGET, name="thin striker", missing=NO_SLENDERNESS)
+SHALLOW = Doubt("shallow target", "steepest slope", 0.1)  # frequencies may be off by its square, 1 %
 FLATTER = "the body is too steep for shallow theory; take its modes from a program for shells, `fi.Modes.from_arrays`"
 FLAT = "ribs and layers move in the plane, too; take modes of a program for shells or solids, `fi.Modes.from_arrays`"
-STRIKER = Doubt("thin striker", "thickness times wavenumber", LIMIT, NO_SLENDERNESS)
 
 
 def lowered(thick: np.ndarray) -> np.ndarray:
@@ -122,7 +118,8 @@ def wavenumber(body: Known, integrals: Bending | None, omega: float) -> float | 
     """Wavenumber [rad/m] at a frequency [rad/s], of modes if there are any, else of the section; None if not known."""
     if integrals is not None:
         moving = np.flatnonzero((body.modes.omega > 0.0) & (integrals.wave > 0.0))
-        near = moving[np.argsort(np.abs(np.log(body.modes.omega[moving] / omega)))[:NEAR]]
+        # some modes swing unlike waves, hardly all of ten
+        near = moving[np.argsort(np.abs(np.log(body.modes.omega[moving] / omega)))[:10]]
         if len(near):
             return float(np.median(integrals.wave[near] * np.sqrt(omega / body.modes.omega[near])))
     section = body.section
@@ -157,7 +154,7 @@ def examine_striker(struck: Struck) -> Assumption:
     if body is None or body.thickness is None or integrals is None or integrals.thick is None:
         if struck.foreseen:
             return STRIKER.unknown(struck, "the thickness of the striker")
-        omega[columns] *= 1.0 - DOUBT
+        omega[columns] *= 0.8  # as those of a stout one, a choice
         effect = struck.changes(omega=omega)
         if max(np.inf if x is None else x for x in effect.values()) <= allowed(hit.tolerance):  # at most so much
             return STRIKER.judged(struck, None, effect, NO_SLENDERNESS)

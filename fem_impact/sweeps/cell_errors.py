@@ -15,7 +15,6 @@ from .cells import RATED
 
 # [-] cells struck again for the error of vectors, in a batch or alone: some 0.1 and 0.2 s
 DOUBTED = {True: 10_000, False: 100}
-MOST_MIDDLES = 4  # [-] axes whose middle is examined, too: 3**4 = 81 blows, where five would take 243
 
 
 def left_out(cases: Cases) -> np.ndarray:
@@ -64,10 +63,10 @@ def left_out(cases: Cases) -> np.ndarray:
 def model_error(cases: Cases) -> tuple[np.ndarray, str]:
     """The model's own error [-] in the shape of a map, and what of it is not known.
 
-    Examined at the ends and the middle of every axis, at the ends of more than MOST_MIDDLES, and interpolated in
-    its logarithm; NaN where these fail.
+    Examined at the ends and the middle of every axis, at the ends of more than four, and interpolated in its logarithm;
+    NaN where these fail.
     """
-    middle = [] if len(cases.shape) > MOST_MIDDLES else [0.5]
+    middle = [] if len(cases.shape) > 4 else [0.5]  # 3**4 = 81 blows, where five would take 243
     some = [np.unique([0, *(int(share * (n - 1)) for share in middle), n - 1]) for n in cases.shape]
     found = np.empty([len(places) for places in some])
     unknown: dict[str, None] = {}

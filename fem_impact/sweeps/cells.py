@@ -41,7 +41,6 @@ FAMILY_AXES = ("at", "target_frequency", "striker_frequency", "damping_ratio")  
 # [-] values along an axis that has no count: 160 000 cells together take some 2 s, 10 000 alone some 20 s
 SIDE = {True: 400, False: 100}
 MOST_VALUES = 10**6  # [-] most values along one axis of a map
-EVEN = 1e-3  # [-] of a value, off even spacing in the logarithm: less counts as even, as what is typed with four digits
 
 
 @dataclass(frozen=True)
@@ -228,4 +227,4 @@ def logarithmic(values: np.ndarray) -> bool:
         return False
     spaced = (space(values[0], values[-1], len(values)) for space in (np.geomspace, np.linspace))
     by_factors, by_steps = (float(np.abs(each / values - 1.0).max()) for each in spaced)
-    return by_factors < min(EVEN, by_steps)
+    return by_factors < min(1e-3, by_steps)  # of a value: what is typed with four digits

@@ -9,7 +9,6 @@ import numpy as np
 from .batches import allowed
 from .store import Texts
 
-BLOCK = 16  # [-] cells along the sides of the first blocks; islands narrower than a quarter of it can be missed
 LINEAR = ("restitution",)  # layers whose errors are absolute; those of the others are relative
 ROUGH = {"centroid": 0.1}  # [-] weight of what is missed: its lobes change it by 1e-3, which no picture shows
 COUNTED = ("n_impacts", "error")  # layers that are not interpolated
@@ -50,8 +49,8 @@ class Blocks:
 
 
 def first_blocks(shape: tuple[int, ...]) -> Blocks:
-    """Blocks of about BLOCK cells a side that cover a map."""
-    ends = [np.unique(np.round(np.linspace(0, n - 1, max(1, round((n - 1) / BLOCK)) + 1)).astype(int)) for n in shape]
+    """Blocks of about 16 cells a side that cover a map; islands narrower than a quarter of that can be missed."""
+    ends = [np.unique(np.round(np.linspace(0, n - 1, max(1, round((n - 1) / 16)) + 1)).astype(int)) for n in shape]
     rows, columns = (np.column_stack([places[:-1], places[1:]]) for places in ends)
     i, j = (index.ravel() for index in np.indices((len(rows), len(columns))))
     return Blocks(np.stack([rows[i], columns[j]], axis=1))

@@ -156,7 +156,7 @@ def test_slopes_in_air_are_those_of_the_mixed_shapes():
 
 
 def test_frequencies_drop_by_a_hundredth_at_the_limit():
-    assert pytest.approx(0.01, rel=0.05) == 1.0 - (1.0 + still_air.LIMIT) ** -0.5
+    assert pytest.approx(0.01, rel=0.05) == 1.0 - (1.0 + still_air.CARRIED.limit) ** -0.5
 
 
 def test_where_sound_damps_more_than_air_weighs_its_damping_is_named():
