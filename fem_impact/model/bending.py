@@ -163,7 +163,14 @@ def _held(ends: list) -> float:
     return float(all(kind in ("clamped", "hinged") for kind in ends))
 
 
-def bending(body: Known) -> Bending:
+def flexible_vectors(shapes: FieldShapes | RitzShapes, n_rigid: int, number: int) -> np.ndarray:
+    """The first flexible shapes in the unknowns of their system, (n_dofs, number); of Ritz pairs no others are made."""
+    if isinstance(shapes, FieldShapes):
+        return shapes.vectors[:, n_rigid : n_rigid + number]
+    return shapes.basis.T @ shapes.turn[:, :number]
+
+
+def integrate_shapes(body: Known) -> Bending:
     """The integrals of a body's shapes; those of high modes follow from the low ones."""
     modes = body.modes
     shapes, amplitude, _ = unwrapped(modes.shapes)
@@ -173,10 +180,7 @@ def bending(body: Known) -> Bending:
     low = slice(n_rigid, min(n_rigid + max(1, min(LOW, few)), modes.n_modes))
     thick = body.section is not None and not quadratic(modes)
     if isinstance(shapes, (FieldShapes, RitzShapes)):
-        if isinstance(shapes, FieldShapes):
-            vectors = shapes.vectors[:, low]
-        else:
-            vectors = shapes.basis.T @ shapes.turn[:, : low.stop - n_rigid]
+        vectors = flexible_vectors(shapes, n_rigid, low.stop - n_rigid)
         found = (_plate if modes.dimension == 2 else _beam)(shapes.system, vectors, thick)
     else:
         steep, force, volume, edge = _by_formula(shapes, low, body)

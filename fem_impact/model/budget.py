@@ -37,7 +37,7 @@ class Budget:
         return CHEAP * self.total
 
     @property
-    def left_out(self) -> float:
+    def for_left_out(self) -> float:
         """What left-out modes may err [-] by the estimate before the blow.
 
         Half their share: that costs a quarter more modes, but seldom needs a second run.

@@ -44,7 +44,7 @@ class Modal(Description):
         modes = target.finished(first)
         with target.blame("strike"):
             modes.point("at", at)
-        needed = accuracy.cutoff_frequency(modes, at, mass=mass, tolerance=asked.budget.left_out, **asked.law)
+        needed = accuracy.cutoff_frequency(modes, at, mass=mass, tolerance=asked.budget.for_left_out, **asked.law)
         band = max((band for band in asked.quantities.values() if band), default=0.0)
         limit, number = _reach(asked, modes, max(needed, band), more)
         _check_number(asked, modes, limit, number, band > needed)

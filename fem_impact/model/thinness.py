@@ -27,7 +27,7 @@ from ..fe.section import SHEAR, Beam, Plate
 from ..impact.assumption import Assumption, allowed
 from ..modes.ritz import RitzShapes
 from ..modes.shapes import FieldShapes
-from .bending import LOW, Bending, Known, bending, unwrapped
+from .bending import LOW, Bending, Known, flexible_vectors, integrate_shapes, unwrapped
 from .deflection import OTHER
 from .restrike import Doubt, Struck, softer
 
@@ -149,7 +149,7 @@ def examine_striker(struck: Struck) -> Assumption:
     hit, history, modes = struck.hit, struck.hit.history, struck.bodies[0]
     if not modes.dimension or not (modes.omega > 0.0).any() or modes.thick:
         return STRIKER.holds(struck)
-    body, integrals = struck.striker, None if struck.striker is None else bending(struck.striker)
+    body, integrals = struck.striker, None if struck.striker is None else integrate_shapes(struck.striker)
     columns, omega, shape = hit.body_slice(0), history.omega.copy(), history.shape.copy()
     if body is None or body.thickness is None or integrals is None or integrals.thick is None:
         if struck.foreseen:
@@ -186,10 +186,7 @@ def _drop(struck: Struck, system: Any, shapes: FieldShapes | RitzShapes) -> np.n
     """Relative drop of omega**2 (n_modes,) [-]; that of modes above the first is that of the last of these."""
     modes = struck.bodies[1]
     n = min(LOW, modes.n_modes - modes.n_rigid)
-    if isinstance(shapes, FieldShapes):
-        vectors = shapes.vectors[:, modes.n_rigid : modes.n_rigid + n]
-    else:
-        vectors = shapes.basis.T @ shapes.turn[:, :n]
+    vectors = flexible_vectors(shapes, modes.n_rigid, n)
     found = np.einsum("ij,ij->j", vectors, shallow.plane_mass(system, vectors))  # of a whole mass of one
     every = np.full(modes.n_modes, np.median(found[-max(1, n // 4) :]))
     every[: modes.n_rigid], every[modes.n_rigid : modes.n_rigid + n] = 0.0, found

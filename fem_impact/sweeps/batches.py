@@ -58,14 +58,11 @@ class Family:
             parts.append((omega, zeta, squared, rest))
         return cls(*zip(*parts))
 
-    def rigid(self, body: int) -> float:
-        """Sum of the squared shapes of rigid motions, times the mass [-]."""
-        return float(self.squared[body][self.omega[body] == 0.0].sum())
-
-    def static(self, body: int) -> float:
-        """Static compliance of the kept flexible modes, times the mass [kg m/N]."""
-        flexible = self.omega[body] > 0.0
-        return float((self.squared[body][flexible] / self.omega[body][flexible] ** 2).sum())
+    def sums(self, body: int) -> tuple[float, float, float]:
+        """Squared shapes of rigid motions [-], compliance of kept flexible modes and residual one [kg m/N], by mass."""
+        squared, omega = self.squared[body], self.omega[body]
+        flexible = omega > 0.0
+        return squared[~flexible].sum(), (squared[flexible] / omega[flexible] ** 2).sum(), self.rest[body]
 
     def heard(self, body: int, compliance: np.ndarray) -> np.ndarray:
         """Frequency [rad/s] above which all modes together stay below each compliance; 0 if the whole body does."""
@@ -198,16 +195,14 @@ def allowed(tolerance: float) -> float:
     return max(0.1 * tolerance, min(0.5 * tolerance, 2e-5))
 
 
-def count_impacts(
-    blows: Blows, *, tolerance: float, most: int, workers: int | None = None, kernels: Kernels | None = None
-) -> np.ndarray:
+def count_impacts(blows: Blows, *, tolerance: float, most: int, kernels: Kernels | None = None) -> np.ndarray:
     """Only how often each blow touches (n_cases,), at most ``most``; NaN where the modal engine must count.
 
-    Two runs of different steps agree on each number. ``tolerance``, ``workers`` and ``kernels`` as in `bounce`, but
-    errors of forces and times ask for no shorter steps, and a touch in flight is missed where the two agree on that.
+    Two runs of different steps agree on each number. ``tolerance`` and ``kernels`` as in `bounce`, but errors of forces
+    and times ask for no shorter steps, and a touch in flight is missed where the two agree on that.
     """
     kernels = {} if kernels is None else kernels
-    (found,) = _in_pieces(blows, partial(_counted, tolerance=tolerance, most=most, kernels=kernels), workers, kernels)
+    (found,) = _in_pieces(blows, partial(_counted, tolerance=tolerance, most=most, kernels=kernels), None, kernels)
     return found
 
 
@@ -241,14 +236,14 @@ def _follow(blows: Blows, tolerance: float, band: float, kernels: Kernels) -> tu
 
 
 def _refined(engine: "_Engine", tolerance: float) -> tuple[np.ndarray, np.ndarray]:
-    """Result of `_Engine.run` once the steps are short enough, and its error; NaN if they never are.
+    """Result of `_Engine.run_all` once the steps are short enough, and its error; NaN if they never are.
 
     Neither are they of a blow too long for the longest kernel: shorter steps only make it longer.
     """
     n = engine.blows.n_cases
     first = engine.first_step(tolerance)
     todo = np.arange(n)
-    coarse = engine.run(todo, first - 2)
+    coarse = engine.run_all(todo, first - 2)
     # [half-octaves] half the step seldom does, a quarter mostly; not with loss, where errors fall more slowly, nor
     # where the longest kernel would not leave room for more
     finer = np.where((engine.blows.loss > 0.0) | (16.0 * coarse[FOUND_STEPS] > LENGTHS[-1]), 2, 4)
@@ -262,8 +257,8 @@ def _refined(engine: "_Engine", tolerance: float) -> tuple[np.ndarray, np.ndarra
             break
         ratio = 2.0 ** (0.5 * finer)
         slack = SLACK * tolerance * 2.0 ** (0.5 * STEP_ORDER * (first[todo] - step))
-        fine = engine.run(todo, step, slack, ratio * coarse[FOUND_STEPS])
-        found = engine.error(coarse, fine, todo, ratio)
+        fine = engine.run_all(todo, step, slack, ratio * coarse[FOUND_STEPS])
+        found = engine.compare_runs(coarse, fine, todo, ratio)
         met = found <= allowed(tolerance)
         final[:, todo[met]] = fine[:, met]
         error[todo[met]] = found[met]
@@ -282,7 +277,7 @@ def _counted(blows: Blows, tolerance: float, most: int, kernels: Kernels) -> tup
     number, before = np.full(len(todo), np.nan), None
     for turn in range(REFINEMENTS):
         slack = np.full(len(todo), SLACK * tolerance * 2.0 ** (-STEP_ORDER * turn))
-        now = engine.run(todo, step + 2 * turn, slack, None if before is None else 2.0 * before[FOUND_STEPS])
+        now = engine.run_all(todo, step + 2 * turn, slack, None if before is None else 2.0 * before[FOUND_STEPS])
         counted = now[FOUND_STATUS] <= many_blows.DOUBTFUL
         now[FOUND_IMPACTS] = np.where(counted, np.minimum(now[FOUND_IMPACTS], most), np.nan)
         met = np.zeros(len(todo), bool) if before is None else now[FOUND_IMPACTS] == before[FOUND_IMPACTS]
@@ -302,10 +297,8 @@ class _Engine:
         self.keys, self.which = np.unique(blows.family, return_inverse=True)
         self.shares = np.array([1.0 / blows.target_mass, 1.0 / blows.striker_mass])
         families = [blows.families[int(key)] for key in self.keys]
-        rigid, static, rest = (
-            np.array([[number(family, body) for family in families] for body in (0, 1)])[:, self.which] * self.shares
-            for number in (Family.rigid, Family.static, lambda family, body: family.rest[body])
-        )
+        sums = np.array([[family.sums(body) for family in families] for body in (0, 1)])  # (2, n_families, 3)
+        rigid, static, rest = np.moveaxis(sums[:, self.which], 2, 0) * self.shares
         self.own_rigid, self.rigid, self.static = rigid[1], rigid.sum(axis=0), static.sum(axis=0)
         stiffness = blows.stiffness * blows.speed ** (blows.exponent - 1.0)
         self.law = np.zeros(len(stiffness), LAW)
@@ -334,7 +327,7 @@ class _Engine:
             step[ringing] = np.maximum(step[ringing], needed)
         return step
 
-    def run(
+    def run_all(
         self, cells: np.ndarray, step: np.ndarray, slack: np.ndarray | None = None, length: np.ndarray | None = None
     ) -> np.ndarray:
         """Compute blows with the given steps; return what `many_blows.run` writes, (N_FOUND, n_cells).
@@ -378,7 +371,7 @@ class _Engine:
             of_bodies = bundles.Kernels((target, striker), (bounds[0], bounds[1]), (later[0], later[1]))
             many_blows.run(cells[part], pairs, of_bodies, 2.0 ** (-0.5 * exponent), sure, self.band, track, out)
 
-    def error(self, coarse: np.ndarray, fine: np.ndarray, cells: np.ndarray, ratio: np.ndarray) -> np.ndarray:
+    def compare_runs(self, coarse: np.ndarray, fine: np.ndarray, cells: np.ndarray, ratio: np.ndarray) -> np.ndarray:
         """Largest error of the finer run in the quantities under tolerance; infinite if the two runs ended differently.
 
         ``ratio`` is that of their steps. The error in the time of contact is that of the approach divided by its rate

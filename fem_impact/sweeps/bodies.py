@@ -208,8 +208,9 @@ class Sized:
     def views(self, points: np.ndarray, stages: Stages) -> Views_ | None:
         """The target as seen from each point (n_points, 2) [m], reduced to it; None if that is impossible."""
         resonance = [self.case.with_values(values).resonance / self.raised(values) for values in self.ends]
-        size = self._size(max(resonance))
-        if size is None:
+        size, mesh = vectors.size_for(self.target, max(resonance), self.tolerance), self.target.mesh
+        assert mesh is not None
+        if not self.target.size_stated and size < refinement.smallest_size(self.target.element, mesh):
             return None
         extreme = [self.ends[int(np.argmax(resonance))], self.ends[int(np.argmin(resonance))]]
         views: dict[tuple[float, ...], Modes] = {}
@@ -225,14 +226,6 @@ class Sized:
                 _, _, found = refine(replace(one, blows=blows), Sized._judged, stages)
             views |= {tuple(point.tolist()): sampled(modes, point[None]) for point, modes in zip(some, found)}
         return views
-
-    def _size(self, resonance: float) -> float | None:
-        """Element size [m] of the first mesh for the highest contact resonance [Hz]; None if it is too small."""
-        target = self.target
-        size = vectors.size_for(target, resonance, self.tolerance)
-        assert target.mesh is not None
-        allowed = target.size_stated or size >= refinement.smallest_size(target.element, target.mesh)
-        return size if allowed else None
 
     def found(self, stages: Stages, keep: Any = None) -> "tuple[Sized, list[Modes]]":
         """The same, and the target as seen from each point."""
@@ -271,7 +264,7 @@ class Sized:
             needed = []
             for values in self.ends:
                 case = self.at(modes, point, values)
-                allowed = Budget(self.tolerance, case.contact.rated, margin).left_out
+                allowed = Budget(self.tolerance, case.contact.rated, margin).for_left_out
                 law: dict[str, Any] = {"contact": case.contact, "mass": case.striker.felt_mass, "speed": case.speed}
                 limit = accuracy.tail_cutoff(case.modes, point[None], tolerance=allowed, **law)
                 needed.append(limit / self.raised(values))

@@ -17,20 +17,20 @@ from .cells import RATED
 DOUBTED = {True: 10_000, False: 100}
 
 
-def left_out(cases: Cases) -> np.ndarray:
+def estimate_left_out(cases: Cases) -> np.ndarray:
     """Expected error [-] of leaving out modes, in the shape of a map; infinite where they govern the contact."""
     if not cases.residual:
         return np.zeros(cases.shape)
     base, places = cases.base, cases.axes.get("at", cases.base.at[None])
     seen = [base.changed("at", place).modes for place in places] if base.views else [base.modes] * len(places)
 
-    def along(name: str, values: Any) -> np.ndarray:
+    def shaped(name: str, values: Any) -> np.ndarray:
         """Values of an axis, or one that all cells share, shaped to broadcast over the map."""
         shape = [-1 if axis == name else 1 for axis in cases.axes] if name in cases.axes else [1]
         return np.reshape(np.asarray(values, float), shape)
 
     def value(name: str, shared: float) -> np.ndarray:
-        return along(name, cases.axes.get(name, [shared]))
+        return shaped(name, cases.axes.get(name, [shared]))
 
     def own(name: str) -> np.ndarray:
         return value(name, getattr(base.contact, name))
@@ -41,9 +41,9 @@ def left_out(cases: Cases) -> np.ndarray:
     omega = np.pi / wall_time(stiffness, exponent, 1.0 / felt, value("speed", base.speed))
     yielding = base.modes.dimension > 0
     left = [modes.residual_compliance(place)[0, 0] if yielding else 0.0 for modes, place in zip(seen, places)]
-    last = along("at", [modes.omega[-1] for modes in seen])
+    last = shaped("at", [modes.omega[-1] for modes in seen])
     sides = [
-        (base.modes, along("at", left), last, base.first, "target_mass", "target_frequency"),
+        (base.modes, shaped("at", left), last, base.first, "target_mass", "target_frequency"),
         (striker.modes, striker.left_out[0][0, 0], striker.modes.omega[-1], None, "mass", "striker_frequency"),
     ]  # fmt: skip
     total, softness = np.zeros(cases.shape), np.zeros(cases.shape)

@@ -227,14 +227,12 @@ def _with_borders(chosen: tuple[Hammer, ...], hammer: Callable[[float, bool], Ha
     """Hammers in ascending mass, and of neighbours of which one works the last mass in between that does, too."""
     chosen = tuple(sorted(chosen, key=lambda one: one.mass))
     pairs = [pair for pair in pairwise(chosen) if pair[0].works != pair[1].works]
+    between = cache(lambda mass: hammer(mass, True))
     for done, pair in enumerate(pairs):
         progress.report("masses between", done, len(pairs))
         good, bad = sorted(pair, key=lambda one: not one.works)
-        last, edge = good, bad.mass
-        while abs(np.log(edge / last.mass)) > 5e-3:  # finer than a hammer in a hand is known
-            middle = hammer(float(np.sqrt(edge * last.mass)), True)
-            last, edge = (middle, edge) if middle.works else (last, middle.mass)
-        chosen += (last,) if last.border else ()
+        last = _end(lambda mass: between(mass).works, good.mass, bad.mass, 5e-3)  # finer than one in a hand is known
+        chosen += (between(last),) if last != good.mass else ()
     progress.report("masses between", len(pairs), len(pairs))
     return tuple(sorted(chosen, key=lambda one: one.mass))
 
@@ -357,9 +355,9 @@ def _ranges(tips: np.ndarray, good: np.ndarray, suits: Callable[[float], bool]) 
     return tuple(found)
 
 
-def _end(suits: Callable[[float], bool], good: float, bad: float) -> float:
-    """The last tip that suits between a good one and a bad one, to the relative width WIDTH."""
-    while abs(np.log(bad / good)) > WIDTH:
+def _end(suits: Callable[[float], bool], good: float, bad: float, width: float = WIDTH) -> float:
+    """The last tip or mass that suits between a good one and a bad one, to a relative width."""
+    while abs(np.log(bad / good)) > width:
         middle = float(np.sqrt(good * bad))
         good, bad = (middle, bad) if suits(middle) else (good, middle)
     return good

@@ -88,7 +88,7 @@ def _ordered(name: str, numbers: Mapping[str, float], kind: str) -> None:
         raise ValueError(f"mode of vary[{name!r}] must lie between low and high, got {numbers['mode']:g}")
 
 
-def read(vary: Any) -> tuple[Input, ...]:
+def read_inputs(vary: Any) -> tuple[Input, ...]:
     """The inputs from what a user gives: a mapping of names to distributions."""
     if not isinstance(vary, Mapping) or not vary:
         raise ValueError(

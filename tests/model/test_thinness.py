@@ -191,5 +191,5 @@ def test_a_bar_that_turns_has_its_rotary_inertia():
     """By formula: at the end of a free bar, turning adds 3 / (1 + h**2 / length**2) to the mobility 1 / mass."""
     bar = fi.Beam.rectangular(fi.Material(E=210e9, nu=0.3, rho=7850.0), width=0.03, height=0.06)
     modes = fi.analytic.beam(0.2, ends=("free", "free"), section=bar, n_modes=6)
-    rows = bending.bending(bending.known_of(modes)).heavier(modes.shape_at([0.0]))[0, :2]
+    rows = bending.integrate_shapes(bending.known_of(modes)).heavier(modes.shape_at([0.0]))[0, :2]
     assert (rows**2).sum() * modes.mass == pytest.approx(1.0 + 3.0 / (1.0 + 0.3**2), rel=1e-9)
