@@ -26,19 +26,44 @@ from ..modes.modal import Modes
 from ..modes.rectangle import RectangleShapes
 from ..modes.ritz import RitzShapes
 from ..modes.shapes import FieldShapes
-from . import bending, deflection, fresh, local_contact, sliding, still_air, thinness, unstated_damping
+from . import bending, deflection, fresh, local_contact, sliding, still_air, thinness
 from .idealisation import Surroundings, unyielding
-from .restrike import Struck
+from .restrike import Doubt, Struck
 from .target import BOTH, Target
+
+# [-] tolerance of blows that only tell what can be foreseen, on a wall or for the cost: estimates err more
+ROUGH = 1e-2
+# [-] damping ratio tried, on the side of caution: bare metal has a hundredth of it, wood as much, felt more
+PLAUSIBLE = 0.01
+DAMPING = Doubt("stated damping", "damping ratio tried", None)
+
+
+def examine_damping(struck: Struck) -> Assumption:
+    """The struck body, unless its damping is stated, and a flexible striker: every body has some."""
+    hit, zeta, unstated = struck.hit, struck.hit.history.zeta.copy(), []
+    for name, body, modes in zip(("striker", "struck body"), (0, len(hit.bodies) - 1), struck.bodies):
+        flexible = modes.omega > 0.0
+        simple = body and struck.ideal and not struck.foreseen
+        if modes.dimension and flexible.any() and not modes.damping_ratio[flexible].any() and not simple:
+            unstated.append(name)
+            if not struck.foreseen:
+                zeta[hit.body_slice(body)] = np.where(flexible, PLAUSIBLE, 0.0)
+    if not unstated:
+        return DAMPING.holds(struck)
+    remedy = f"state the damping ratio of the {' and of the '.join(unstated)}"
+    if struck.foreseen:
+        return DAMPING.unknown(struck, "what a damping that nobody stated would change", remedy, PLAUSIBLE)
+    effect = struck.changes(zeta=zeta)
+    if "sound" in effect and "struck body" in unstated:
+        effect["sound"] = 1.0  # it would ring for ever
+    return DAMPING.judged(struck, PLAUSIBLE, effect, remedy)
+
 
 EXAMINERS = (
     thinness.examine_target, thinness.examine_shallowness, thinness.examine_striker, deflection.examine_deflection,
     local_contact.examine_pressure, local_contact.examine_size, local_contact.examine_time, sliding.examine_friction,
-    still_air.examine_air, unstated_damping.examine_damping,
+    still_air.examine_air, examine_damping,
 )  # fmt: skip
-
-# [-] tolerance of blows that only tell what can be foreseen, on a wall or for the cost: estimates err more
-ROUGH = 1e-2
 
 
 @dataclass(frozen=True, eq=False)

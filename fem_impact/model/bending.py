@@ -40,13 +40,9 @@ from ..modes.slender import BeamShapes
 from ..modes.timoshenko import TimoshenkoShapes
 from ..modes.unstated import lumps
 
-# [-] flexible modes that are integrated: a blow depends on few others one by one, which follow from TOP of them
+# [-] flexible modes that are integrated: a blow depends on few others one by one, which follow from the upper ten
 LOW = 40
-TRUE_VECTORS = 4  # [-] of so many Ritz pairs the lowest one is a mode: those above are packets, whose shear is singular
-TOP = 4  # [-] the upper one of so many parts of the integrated modes tells how those above go on: ten modes, of LOW
-NODES = 3  # [-] Gauss points in each direction of a triangle: slopes to 1e-3, as a mode's wave spans several triangles
 FADES = 1.0 / np.sqrt(12.0 * SHEAR)  # [-] of the thickness, fact: over this length a twist that shear undoes fades
-ALONG = 200  # [-] Gauss points along a beam or the radius of a disk: 20 and more for each wave of its fortieth mode
 
 
 @dataclass(frozen=True, eq=False)
@@ -167,19 +163,24 @@ def _held(ends: list) -> float:
     return float(all(kind in ("clamped", "hinged") for kind in ends))
 
 
-def bending(body: Known) -> Bending:
+def flexible_vectors(shapes: FieldShapes | RitzShapes, n_rigid: int, number: int) -> np.ndarray:
+    """The first flexible shapes in the unknowns of their system, (n_dofs, number); of Ritz pairs no others are made."""
+    if isinstance(shapes, FieldShapes):
+        return shapes.vectors[:, n_rigid : n_rigid + number]
+    return shapes.basis.T @ shapes.turn[:, :number]
+
+
+def integrate_shapes(body: Known) -> Bending:
     """The integrals of a body's shapes; those of high modes follow from the low ones."""
     modes = body.modes
     shapes, amplitude, _ = unwrapped(modes.shapes)
     n_rigid = modes.n_rigid
-    few = (modes.n_modes - n_rigid) // TRUE_VECTORS if isinstance(shapes, RitzShapes) else LOW
+    # of four Ritz pairs the lowest one is a mode: those above are packets, whose shear is singular
+    few = (modes.n_modes - n_rigid) // 4 if isinstance(shapes, RitzShapes) else LOW
     low = slice(n_rigid, min(n_rigid + max(1, min(LOW, few)), modes.n_modes))
     thick = body.section is not None and not quadratic(modes)
     if isinstance(shapes, (FieldShapes, RitzShapes)):
-        if isinstance(shapes, FieldShapes):
-            vectors = shapes.vectors[:, low]
-        else:
-            vectors = shapes.basis.T @ shapes.turn[:, : low.stop - n_rigid]
+        vectors = flexible_vectors(shapes, n_rigid, low.stop - n_rigid)
         found = (_plate if modes.dimension == 2 else _beam)(shapes.system, vectors, thick)
     else:
         steep, force, volume, edge = _by_formula(shapes, low, body)
@@ -220,8 +221,7 @@ def _extended(modes: Modes, low: slice, found: np.ndarray, per_extent: float, th
     every = np.zeros((5, n))
     every[:, low] = found
     if low.stop < n:
-        size = low.stop - low.start
-        top = slice(low.stop - max(1, size // TOP), low.stop)
+        top = slice(low.stop - max(1, (low.stop - low.start) // 4), low.stop)  # tells how those above go on
         for row in (0, 2, 3):
             every[row, low.stop :] = np.median(every[row, top] / omega[top]) * omega[low.stop :]
         every[4, low.stop :] = np.median(found[4])
@@ -235,7 +235,8 @@ def _plate(system: System, vectors: np.ndarray, thick: bool) -> np.ndarray:
     frame, section = system.frame, system.section
     assert isinstance(section, Plate)
     cells = np.arange(len(space.origin))
-    node, weight = np.polynomial.legendre.leggauss(NODES)
+    # slopes to 1e-3, as the wave of a mode spans several triangles
+    node, weight = np.polynomial.legendre.leggauss(3)
     a, b = (x.ravel() for x in np.meshgrid(0.5 * (node + 1.0), 0.5 * (node + 1.0), indexing="ij"))
     share = 0.25 * np.outer(weight, weight).ravel() * (1.0 - a)
     x = space.origin[:, None] + (np.column_stack([a, b * (1.0 - a)]) - 1.0 / 3.0) @ space.jacobian.transpose(0, 2, 1)
@@ -318,7 +319,7 @@ def _by_formula(shapes: Shapes, low: slice, body: Known) -> tuple[np.ndarray, np
         k = np.pi**2 * ((m / shapes.length) ** 2 + (n / shapes.width) ** 2)
         odd = (1.0 - (-1.0) ** m) * (1.0 - (-1.0) ** n)
         return k, k, 2.0 * shapes.length * shapes.width * odd / (np.pi**2 * m * n), 0.0
-    node, weight = np.polynomial.legendre.leggauss(ALONG)
+    node, weight = np.polynomial.legendre.leggauss(200)  # 20 and more for each wave of the fortieth mode
     x, dx = 0.5 * (node + 1.0), 0.5 * weight
     if isinstance(shapes, DiskShapes):
         return _disk(shapes, low, body, x[:, None], (dx * x)[:, None])

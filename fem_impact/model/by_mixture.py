@@ -17,8 +17,6 @@ from .by_modes import MANY_MODES
 from .by_vectors import Vectors
 from .target import FIRST_LOOK, Elements, Stages
 
-# [-] modes times steps of one run of a plate that is infinite above a frequency: a time limit of ten seconds
-MOST_MIXED = 2e8
 NO_MESH = "a mesh that resolves the frequency up to which a plate of 'mixed' keeps its modes has too many unknowns"
 
 
@@ -48,7 +46,7 @@ class Mixed(Description):
             why = asked.unfit if fits else "is only for thin plates in a vacuum, and for the blow alone"
             asked.refuse(why)
             return None
-        allowed, slow = asked.budget.left_out, asked.mass * seen.mobility
+        allowed, slow = asked.budget.for_left_out, asked.mass * seen.mobility
         resonance = accuracy.contact_resonance(mass=asked.mass, **asked.law)  # [Hz]; of an infinite plate's modes:
         density, omega_0 = 2.0 * seen.mobility / np.pi, 2.0 * np.pi * resonance
         highest = accuracy.cutoff(density, 0.0, omega_0, blow.contact.exponent, asked.mass, allowed)
@@ -63,8 +61,9 @@ class Mixed(Description):
             f"above, it is treated as an infinite plate of mobility {seen.mobility:.3g} m/(N s), from {highest:.3g} Hz "
             "on as a spring"
         )
-        wall = asked.duration
-        why = f"the contact lasts about {wall:.3g} s on a wall, and the striker slows down within {slow:.3g} s"
+        why = (
+            f"the contact lasts about {asked.duration:.3g} s on a wall, and the striker slows down within {slow:.3g} s"
+        )
         number = round(target.count_below(mixed.REACH * frequency / target.stretch))
         chosen: dict[str, Any] = {"element": "closed form"}
         if target.kind == "analytic":
@@ -117,7 +116,8 @@ class Mixed(Description):
             if seen.improved(error, allowed):
                 return self
         twice = 2.0 * hit.bodies[-1].n_modes
-        many = hit.history.steps.shape[0] * twice > MOST_MIXED or (seen is not None and twice > mixed.MOST_VECTORS)
+        # modes times steps of one run: 2e8 take ten seconds
+        many = hit.history.steps.shape[0] * twice > 2e8 or (seen is not None and twice > mixed.MOST_VECTORS)
         if error.idealisation <= allowed or many:
             return None
         higher = replace(self, frequency=2.0 * self.frequency, seen=None)

@@ -14,8 +14,6 @@ from .asked import Asked, Description, Forecast, Unaffordable
 from .budget import NOTCH
 from .target import FIRST_LOOK, Stages
 
-# [-] runs with ever more modes or finer meshes until the tolerance is met: CAUTION makes even a second one rare
-ATTEMPTS = 3
 MOST_MODES = {"fe": 2000, "analytic": 50_000, "modes": 50_000}  # [-] limit by source: takes about 2 GB and some minutes
 # [-] a plate that needs more modes is taken as infinite above a frequency, if it overdamps the contact: a steel sheet
 # then keeps 4 100 modes instead of 15 190
@@ -46,7 +44,7 @@ class Modal(Description):
         modes = target.finished(first)
         with target.blame("strike"):
             modes.point("at", at)
-        needed = accuracy.cutoff_frequency(modes, at, mass=mass, tolerance=asked.budget.left_out, **asked.law)
+        needed = accuracy.cutoff_frequency(modes, at, mass=mass, tolerance=asked.budget.for_left_out, **asked.law)
         band = max((band for band in asked.quantities.values() if band), default=0.0)
         limit, number = _reach(asked, modes, max(needed, band), more)
         _check_number(asked, modes, limit, number, band > needed)
@@ -86,9 +84,9 @@ class Modal(Description):
         return replace(self, forecast=replace(told, n_modes=modes.n_modes)), modes
 
     def refined(self, hit: Response, stages: Stages) -> "Modal | None":
-        """More modes if those left out turn out to matter, more for the air's sake, or a finer mesh."""
+        """More modes if those left out turn out to matter, more for the air's sake, or a finer mesh; twice at most."""
         asked, budget, error = self.asked, self.asked.budget, hit.error
-        if self.attempt == ATTEMPTS or asked.counted or not asked.values["residual"]:
+        if self.attempt == 3 or asked.counted or not asked.values["residual"]:
             return None
         target, missed = asked.blow.target, budget.missed(error, not asked.values["dt"])
         short = error.truncation > budget.half

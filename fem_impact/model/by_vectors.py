@@ -95,7 +95,7 @@ class Vectors(Description):
             return Modal.of(asked, stages).found(stages, keep)
 
         def cutoff(modes: Modes, margin: float) -> float:
-            allowed = replace(asked.budget, margin=margin).left_out
+            allowed = replace(asked.budget, margin=margin).for_left_out
             return accuracy.tail_cutoff(modes, seen.at, mass=asked.mass, tolerance=allowed, **asked.law)
 
         modes = seen.needed_modes(cutoff)

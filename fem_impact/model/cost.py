@@ -183,7 +183,7 @@ def _fastest(work: Callable[[], object]) -> float:
 @cache
 def this_machine() -> Machine | None:
     """This machine as measured before, None if it was not; the same as long as the process lives."""
-    return read()
+    return read_machine()
 
 
 def whose() -> str:
@@ -210,7 +210,7 @@ def calibrate() -> bool:
     return found.credible and keep(found)
 
 
-def read() -> Machine | None:
+def read_machine() -> Machine | None:
     """What was kept of this machine; None if there is nothing, or nothing credible."""
     path = place()
     if path is None:

@@ -5,7 +5,9 @@ N int |grad phi|**2. It is exact for a beam with held ends and 13 % too stiff fo
 its edges; what is left of it where edges are free follows from the stresses in the plane (`modes.stretching`). During
 the blow the bent part of the plate, as far as its waves have come, is held by the part around it. A blow that has
 stretching in it is struck again with half the stress fields, and a blow on a curved, ribbed or unevenly layered body
-without it with the stretching of its lowest modes: the tension of a flat plate says nothing of those (`curved`).
+without it with the stretching of its lowest modes: the tension of a flat plate says nothing of those, whose stretching
+has quadratic forces, too. Pressed on its top a dome softens, and where its tangent stiffness turns negative it may snap
+through.
 
 References
 ----------
@@ -30,18 +32,15 @@ from ..impact.engine import again
 from ..impact.stretched import Stretched
 from ..modes.modal import Modes
 from ..modes.stretching import MOST, Stretching, stretch
-from . import curved
 from .bending import Bending, Known, quadratic
 from .idealisation import Waves
 from .restrike import Doubt, Struck
 
-LIMIT = 0.2  # [-] deflection over thickness at which the frequency of a hinged square rises by 2 %
 SLIPS = 0.25  # [-] stretching of a plate whose edge may move in its plane over that of one whose edge may not
 # [-] instants of the blow, and of each period after it, at which tension is found: the largest deflection to 1e-3
 TIMES = 64
 RINGING = 1.5  # [-] tension that acts on a mode swinging alone, over the mean tension, fact: 3/4 and 1/2 of its largest
 FRONT = 2.0 * np.pi  # [-] radius squared of the bent region over rate times time: where Si(r**2 / (4 rate t)) turns
-SLOWER = 3.0  # [-] a mode that is slower or faster than bending waves by this rocks or is pulled; wood differs by less
 # [-] deflection over thickness beyond which no first-order estimate of the stretching helps
 GONG = 1.0
 REMEDY = "take a softer blow or a thicker body: stretching is not modelled"
@@ -50,7 +49,8 @@ DARING = "take a softer blow or a thicker body: stretching = true holds up to de
 OTHER = "take element 'argyris'"
 SNAPS = "it may snap through, as its stiffness turns negative on the way"
 LOCAL = "take a softer blow or a thicker body: local stretching is not modelled"
-SMALL = Doubt("small deflections", "deflection over thickness", LIMIT, "give material and section")
+# from 0.2 on the frequency of a hinged square rises by 2 %
+SMALL = Doubt("small deflections", "deflection over thickness", 0.2, "give material and section")
 STRETCHED = replace(SMALL, limit=GONG)
 
 
@@ -167,7 +167,7 @@ def _curved(struck: Struck, body: Known, integrals: Bending) -> Assumption:
             return None
         own, energy = _forms(of.modes, MOST), struck.hit.modal_energy([struck.end])[0]
         m = own.forms.shape[1]
-        return np.pad(curved.shift(own, of.modes.omega[:m], energy[:m]), (0, of.modes.n_modes - m))
+        return np.pad(shift_frequencies(own, of.modes.omega[:m], energy[:m]), (0, of.modes.n_modes - m))
 
     try:
         better = again(history, stretched=Stretched(found.forms, found.linear, mine.start))
@@ -176,14 +176,56 @@ def _curved(struck: Struck, body: Known, integrals: Bending) -> Assumption:
         return SMALL.judged(struck, value, dict.fromkeys(struck.quantities), _remedy(body, value))
     effect = distance.of_blows(replace(struck.before, history=better), struck.before, struck.hit.quantities)
     remedy = _remedy(body, float(np.abs(moved @ row).max(initial=0.0))) + _of_rise(body, value)
-    if curved.may_snap(found, omega[:n], moved[:, :n]):
+    if may_snap(found, omega[:n], moved[:, :n]):
         remedy = f"{SNAPS}: {remedy}"
     return SMALL.judged(struck, value, struck.add_sound({**effect}, shift), remedy)
 
 
+def stiffen(found: Stretching, q: np.ndarray) -> np.ndarray:
+    """Stiffness (n_times, n, n) [s**-2] that stretching adds to the modes in states q (n_times, n)."""
+    bent = np.einsum("kij,tj->tki", found.forms, q)
+    pull = np.einsum("tki,ti->tk", bent, q)
+    result = 2.0 * np.einsum("tki,tkj->tij", bent, bent)
+    if len(found.linear):
+        mixed = np.einsum("ki,tkj->tij", found.linear, bent)
+        result += mixed + mixed.transpose(0, 2, 1)
+        pull = pull + q @ found.linear.T
+    return np.asarray(result + np.einsum("tk,kij->tij", pull, found.forms))
+
+
+def may_snap(found: Stretching, omega: np.ndarray, q: np.ndarray) -> bool:
+    """Whether the tangent stiffness of modes (n,) turns negative in one of some states (n_times, n)."""
+    flexible = omega > 0.0
+    added = stiffen(found, q)[:, flexible][:, :, flexible] / np.outer(omega[flexible], omega[flexible])
+    return bool(np.linalg.eigvalsh(added)[:, 0].min(initial=0.0) < -1.0)
+
+
+def shift_frequencies(found: Stretching, omega: np.ndarray, energy: np.ndarray) -> np.ndarray:
+    """Relative shift of the frequencies of modes (n,) that ring with some energies (n,) [J], each in its own phase.
+
+    Quartic energies raise them by the mean stiffness, of its own motion by half of it; cubic ones lower them in second
+    order.
+    """
+    still = omega == 0.0
+    soft = np.divide(1.0, omega, out=np.zeros(len(omega)), where=~still)
+    forms = found.forms * np.outer(soft, soft)
+    raised = 2.0 * np.einsum("kij,kij,j->i", forms, forms, energy)
+    raised += np.einsum("kjj,j,kii->i", forms, energy, forms)
+    raised -= 1.5 * np.einsum("kii,kii,i->i", forms, forms, energy)
+    if not len(found.linear):
+        return np.asarray(0.5 * raised)
+    part = np.einsum("km,kij->ijm", found.linear * soft, forms)
+    mixed = part + part.transpose(2, 0, 1) + part.transpose(0, 2, 1)
+    # a force a q**2 lowers the frequency of q'' + w**2 q by 5/12 (a / w**2)**2 of the squared amplitude, whose
+    # stiffness 2 a q has the mean square 2 a**2 of it
+    return np.asarray(0.5 * raised - 5.0 / 24.0 * np.einsum("ijm,ijm,m->i", mixed, mixed, energy))
+
+
 def _of_rise(body: Known, value: float) -> str:
     """The deflection, over the thickness [-], as a share of the rise, in words; "" of flat bodies."""
-    height, thickness = curved.height(body), body.thickness
+    if body.plate is None or body.plate.rise is None:
+        return ""
+    height, thickness = float(np.ptp(body.plate.rise(body.modes.shapes.grid()[0]))), body.thickness
     return f" (the deflection is {value * thickness / height:.2g} times the rise)" if height and thickness else ""
 
 
@@ -209,7 +251,7 @@ def _stretched(struck: Struck, body: Known, integrals: Bending) -> Assumption:
     value = float(np.abs(moved @ (flexible * history.shape[0, mine])).max(initial=0.0)) / body.thickness
     own, remedy = Stretching(history.stretched.forms, history.stretched.linear), LOCAL + _of_rise(body, value)
     omega, m = history.omega[mine], own.forms.shape[1]
-    if len(own.linear) and curved.may_snap(own, omega[:m], moved[:, :m]):
+    if len(own.linear) and may_snap(own, omega[:m], moved[:, :m]):
         return STRETCHED.unknown(struck, SNAPS, remedy, value)
     if value > GONG:
         return STRETCHED.unknown(struck, "this is a gong: large deflections are not modelled", remedy, value)
@@ -231,8 +273,8 @@ def _fewer_heard(
     omega, energy, moved = struck.hit.history.omega[struck.mine], struck.target_energy, states[:, struck.mine]
     if len(both[0].linear):
         n, m = (each.forms.shape[1] for each in both)
-        found = curved.shift(Stretching(both[0].forms, both[0].linear), omega[:n], energy[:n])
-        found[:m] -= curved.shift(Stretching(both[1].forms, both[1].linear), omega[:m], energy[:m])
+        found = shift_frequencies(Stretching(both[0].forms, both[0].linear), omega[:n], energy[:n])
+        found[:m] -= shift_frequencies(Stretching(both[1].forms, both[1].linear), omega[:m], energy[:m])
         return float(energy[:n] @ np.abs(found) / (energy.sum() or 1.0))
     whole, part = (sum(each.energy(q) for q in states) for each in both)
     soft = np.divide(integrals.slope, omega**2, out=np.zeros(len(omega)), where=omega > 0.0)
@@ -299,10 +341,11 @@ def _bends(body: Known, integrals: Bending, omega: np.ndarray) -> tuple[np.ndarr
         stiffness = np.sqrt(stiffness[:, 0, 0] * stiffness[:, 1, 1])
     waves = np.sqrt(float(np.mean(stiffness)) / body.per_extent) * integrals.wave**2
     ratio = np.divide(omega, waves, out=np.zeros(len(omega)), where=waves > 0.0)
-    pulled = np.minimum(1.0, np.divide(SLOWER, ratio, out=np.ones(len(omega)), where=ratio > 0.0))
+    # what is slower or faster than bending waves by three rocks or is pulled; wood differs by less
+    pulled = np.minimum(1.0, np.divide(3.0, ratio, out=np.ones(len(omega)), where=ratio > 0.0))
     if _answers(body):  # whose modes are faster without being pulled
         pulled = np.ones(len(omega))
-    return np.minimum(1.0, SLOWER * ratio), pulled
+    return np.minimum(1.0, 3.0 * ratio), pulled
 
 
 def _bent_area(body: Known, integrals: Bending, times: np.ndarray) -> np.ndarray:

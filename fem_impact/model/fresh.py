@@ -25,14 +25,13 @@ from ..impact.response import Response
 SWITCH = "NUMBA_DISABLE_JIT"  # variable of numba; where a user sets it, to 0 or 1, nothing is decided here
 MARK = "compiling"  # name of the file that is there while a process compiles
 PATIENCE = 300.0  # [s] age of a mark whose process was killed: compiling takes 15 s, a minute or two on a busy machine
-# [-] most steps of one run as plain Python, and where the body stretches: about a second
-STEPS, STRETCHED = 10_000, 200
+STEPS = 10_000  # [-] most steps of one run as plain Python: about a second
 Answer = TypeVar("Answer")
 
 
 def answer(compute: Callable[[], Response], stretches: bool) -> Response:
-    """What a function finds that strikes once, soon."""
-    return soon(compute, STRETCHED if stretches else STEPS, lambda found: found.tolerance_met)
+    """What a function finds that strikes once, soon; a step of a body that stretches takes as long as fifty."""
+    return soon(compute, STEPS / 50 if stretches else STEPS, lambda found: found.tolerance_met)
 
 
 def soon(compute: Callable[[], Answer], most: float = np.inf, holds: Callable[[Answer], bool] = bool) -> Answer:

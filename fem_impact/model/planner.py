@@ -257,7 +257,7 @@ def strike_as_planned(plan: Plan, stages: Stages, keep: Any = None) -> Run:
     """
     _check_memory(plan)
     last, response, run = refine(plan.description, _strike, stages, keep)
-    response = last.completed(within(plan.tolerance, response, run, last.asked.values), stages, keep)
+    response = last.completed(meet_tolerance(plan.tolerance, response, run, last.asked.values), stages, keep)
     told = last.forecast
     if response.ringing is not None:
         told = replace(told, max_frequency=float(response.target.frequencies[-1]))
@@ -298,10 +298,12 @@ def _strike(found: Description, modes: Modes, stages: Stages) -> tuple[Response,
 def struck(run: Callable[..., Response], values: Mapping[str, Any]) -> Response:
     """What a function strikes with some arguments, again with finer time steps where the other errors leave less."""
     hit = run(**values)
-    return within(hit.tolerance, hit, run, values)
+    return meet_tolerance(hit.tolerance, hit, run, values)
 
 
-def within(tolerance: float, hit: Response, run: Callable[..., Response], values: Mapping[str, Any]) -> Response:
+def meet_tolerance(
+    tolerance: float, hit: Response, run: Callable[..., Response], values: Mapping[str, Any]
+) -> Response:
     """The blow, or the same with time steps that leave room in the tolerance for the other errors."""
     left = tolerance - (hit.error.total - hit.error.step)
     if hit.error.total > tolerance and left > 0.0 and not values.get("dt"):

@@ -20,7 +20,7 @@ from ..impact.engine import again
 from ..impact.history import History
 from ..impact.response import Response
 from ..modes.modal import Modes
-from .bending import Bending, Known, bending, known_of
+from .bending import Bending, Known, integrate_shapes, known_of
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,7 +43,7 @@ class Struck:
     @cached_property
     def bending(self) -> Bending | None:
         """Integrals of the target's shapes; None if they are not known or the target was simplified."""
-        return None if self.target is None or self.ideal else bending(self.target)
+        return None if self.target is None or self.ideal else integrate_shapes(self.target)
 
     @property
     def quantities(self) -> tuple[str, ...]:
@@ -127,7 +127,7 @@ class Struck:
         body, integrals = self.target, self.bending
         if modes is not self.hit.bodies[-1]:
             body = known_of(modes)
-            integrals = None if body is None else bending(body)
+            integrals = None if body is None else integrate_shapes(body)
         energy = self.hit.modal_energy([self.end])[0]
         band = self.hit.quantities["sound"] or np.inf
         energy = np.where((modes.omega > 0.0) & (modes.frequencies <= band), energy, 0.0)

@@ -17,6 +17,7 @@ Mindlin (1951), J. Appl. Mech. 18, 31-38; Wang (1994), J. Vib. Acoust. 116, 536-
 shells, NASA SP-288, 1.6 and 2.3; Soedel (2004), Vibrations of shells and plates, 6.8.
 """
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -26,25 +27,20 @@ from ..fe.section import SHEAR, Beam, Plate
 from ..impact.assumption import Assumption, allowed
 from ..modes.ritz import RitzShapes
 from ..modes.shapes import FieldShapes
-from .bending import LOW, Bending, Known, bending, unwrapped
+from .bending import LOW, Bending, Known, flexible_vectors, integrate_shapes, unwrapped
 from .deflection import OTHER
 from .restrike import Doubt, Struck, softer
 
-LIMIT = 0.23  # [-] thickness times wavenumber at which a wave is 1 % too fast for nu = 0.3
-# [-] drop of all frequencies by which a striker of unknown thickness is tried: a choice for a stout one
-DOUBT = 0.2
-NEAR = 10  # [-] modes next to a frequency that tell its wavenumber: some of them swing unlike waves, hardly all of ten
 THICKER = 'take a thick plate, theory = "mindlin", or a softer contact'
 SOFTER = "take a softer contact, or modes of a program for thick shells or solids, `fi.Modes.from_arrays`"
 SLENDER = 'take a thick beam, theory = "timoshenko", or a softer contact'
 NO_SECTION = "the thickness is not stated; give material and section instead of mass and first frequency"
 NO_SLENDERNESS = "give the slenderness of a stick, or material and section of a bar"
-TARGET = Doubt("thin target", "thickness times wavenumber", LIMIT, NO_SECTION)
-STEEP = 0.1  # [-] slope whose square, 1 %, is what frequencies may be off
-SHALLOW = Doubt("shallow target", "steepest slope", STEEP)
+TARGET = Doubt("thin target", "thickness times wavenumber", 0.23, NO_SECTION)  # a wave is 1 % too fast for nu = 0.3
+STRIKER = replace(TARGET, name="thin striker", missing=NO_SLENDERNESS)
+SHALLOW = Doubt("shallow target", "steepest slope", 0.1)  # frequencies may be off by its square, 1 %
 FLATTER = "the body is too steep for shallow theory; take its modes from a program for shells, `fi.Modes.from_arrays`"
 FLAT = "ribs and layers move in the plane, too; take modes of a program for shells or solids, `fi.Modes.from_arrays`"
-STRIKER = Doubt("thin striker", "thickness times wavenumber", LIMIT, NO_SLENDERNESS)
 
 
 def lowered(thick: np.ndarray) -> np.ndarray:
@@ -122,7 +118,8 @@ def wavenumber(body: Known, integrals: Bending | None, omega: float) -> float | 
     """Wavenumber [rad/m] at a frequency [rad/s], of modes if there are any, else of the section; None if not known."""
     if integrals is not None:
         moving = np.flatnonzero((body.modes.omega > 0.0) & (integrals.wave > 0.0))
-        near = moving[np.argsort(np.abs(np.log(body.modes.omega[moving] / omega)))[:NEAR]]
+        # some modes swing unlike waves, hardly all of ten
+        near = moving[np.argsort(np.abs(np.log(body.modes.omega[moving] / omega)))[:10]]
         if len(near):
             return float(np.median(integrals.wave[near] * np.sqrt(omega / body.modes.omega[near])))
     section = body.section
@@ -152,12 +149,12 @@ def examine_striker(struck: Struck) -> Assumption:
     hit, history, modes = struck.hit, struck.hit.history, struck.bodies[0]
     if not modes.dimension or not (modes.omega > 0.0).any() or modes.thick:
         return STRIKER.holds(struck)
-    body, integrals = struck.striker, None if struck.striker is None else bending(struck.striker)
+    body, integrals = struck.striker, None if struck.striker is None else integrate_shapes(struck.striker)
     columns, omega, shape = hit.body_slice(0), history.omega.copy(), history.shape.copy()
     if body is None or body.thickness is None or integrals is None or integrals.thick is None:
         if struck.foreseen:
             return STRIKER.unknown(struck, "the thickness of the striker")
-        omega[columns] *= 1.0 - DOUBT
+        omega[columns] *= 0.8  # as those of a stout one, a choice
         effect = struck.changes(omega=omega)
         if max(np.inf if x is None else x for x in effect.values()) <= allowed(hit.tolerance):  # at most so much
             return STRIKER.judged(struck, None, effect, NO_SLENDERNESS)
@@ -189,10 +186,7 @@ def _drop(struck: Struck, system: Any, shapes: FieldShapes | RitzShapes) -> np.n
     """Relative drop of omega**2 (n_modes,) [-]; that of modes above the first is that of the last of these."""
     modes = struck.bodies[1]
     n = min(LOW, modes.n_modes - modes.n_rigid)
-    if isinstance(shapes, FieldShapes):
-        vectors = shapes.vectors[:, modes.n_rigid : modes.n_rigid + n]
-    else:
-        vectors = shapes.basis.T @ shapes.turn[:, :n]
+    vectors = flexible_vectors(shapes, modes.n_rigid, n)
     found = np.einsum("ij,ij->j", vectors, shallow.plane_mass(system, vectors))  # of a whole mass of one
     every = np.full(modes.n_modes, np.median(found[-max(1, n // 4) :]))
     every[: modes.n_rigid], every[modes.n_rigid : modes.n_rigid + n] = 0.0, found

@@ -23,14 +23,6 @@ from . import cost
 from .budget import NOTCH
 from .target import Elements, Stages, Target
 
-# what follows from a tolerance: value at 1e-2 or more, and power of 1e-2 / tolerance with which it grows
-WAVES = 1.6, 0.37  # [-] highest frequency that the first mesh resolves, over that of the contact
-SHIFT = 6.0, 1.0 / 6.0  # [-] shift over the angular frequency of the contact: half or twice as much tells blows as well
-FIRST = 84, 0.22  # [-] vectors tried first: they resolve one undisturbed contact
-# [-] what modes left out may err, over what the highest pairs may that act as a spring: these err in every blow
-FOLDED = 4.0, 0.6
-# [-] highest frequency of a mode that matters, over that of the contact: a half sine has 1 / 143 of its impulse there
-EXCITED = 12.0, 0.25
 # [-] vectors besides those that stand for modes: the dip under the load has no wavelength and takes its own
 FEWEST = 30
 # [-] largest (size wave)**2 mass wave**2 / inertia of the triangles at the blow over the tolerance, see `elements_for`:
@@ -51,15 +43,18 @@ def usable(target: Target) -> bool:
     return not by_mode and (target.system is None or target.system.rules is usual_theory(target.section, 2))
 
 
-def _strict(rule: tuple[float, float], tolerance: float) -> float:
-    """What a rule gives at a tolerance, see `WAVES`."""
-    return rule[0] * max(1.0, 1e-2 / tolerance) ** rule[1]
+def _strict(loose: float, power: float, tolerance: float) -> float:
+    """What is ``loose`` at a tolerance of 1e-2 or more, and grows with a power of 1e-2 / tolerance."""
+    return loose * max(1.0, 1e-2 / tolerance) ** power
 
 
 def first_count(target: Target, resonance: float, tolerance: float) -> int:
-    """Number of vectors tried first; hardly more than there are modes that the contact may excite."""
-    modes = target.count_below(_strict(EXCITED, tolerance) * resonance / target.stretch)
-    return round(min(_strict(FIRST, tolerance), FEWEST + modes))
+    """Number of vectors tried first: they resolve one undisturbed contact, or are hardly more than modes may ring.
+
+    A half sine has 1 / 143 of its impulse at 12 times the frequency of the contact.
+    """
+    modes = target.count_below(_strict(12.0, 0.25, tolerance) * resonance / target.stretch)
+    return round(min(_strict(84, 0.22, tolerance), FEWEST + modes))
 
 
 def size_for(target: Target, resonance: float, tolerance: float) -> float:
@@ -68,7 +63,7 @@ def size_for(target: Target, resonance: float, tolerance: float) -> float:
     assert mesh is not None and isinstance(section, Plate)
     if target.size_stated:
         return mesh.size
-    highest = resonance * _strict(WAVES, tolerance) / target.stretch
+    highest = resonance * _strict(1.6, 0.37, tolerance) / target.stretch
     size = min(mesh.size, ARGYRIS.wave / target.wave(highest))
     if section.tension:
         stiffness = float(section.stiffness(mesh.points[mesh.cells].mean(axis=1))[:, 0, 0].max())
@@ -87,10 +82,9 @@ def elements_for(target: Target, size: float, mass: float, resonance: float, tol
     allowed = (DIP * min(tolerance, 1e-2) * target.mass / (mass * wave**2 * area)) ** 0.5 / wave
     # triangles at a blow that are more than 64 times coarser were not tried
     coarseness = min(allowed / (DEPTH * area / target.mesh.perimeter), 64.0)
-    return Elements(size, coarseness, min(1.0, tolerance / 1e-2) ** BENT)
+    return Elements(size, coarseness, min(1.0, tolerance / 1e-2) ** (1.0 / 6.0))  # order six where a plate is curved
 
 
-BENT = 1.0 / 6.0  # [-] power of the tolerance with which triangles shrink where a plate is curved: order six
 # [-] a mesh with more than this part of the elements of another is no coarser: sizes 1.5 apart should leave 0.44
 ALIKE = 0.85
 
@@ -161,9 +155,10 @@ class Seen:
         stages: Stages, shift: float | None = None, count: int | None = None,
     ) -> None:  # fmt: skip
         self.target, self.at, self.fixed, self.stages = target, np.atleast_2d(at), fixed, stages
-        self.shift = (shift or 2.0 * np.pi * resonance * _strict(SHIFT, tolerance)) / target.stretch
+        # half or twice this shift tells blows as well
+        self.shift = (shift or 2.0 * np.pi * resonance * _strict(6.0, 1.0 / 6.0, tolerance)) / target.stretch
         self.count = count or first_count(target, resonance, tolerance)
-        self.margin = _strict(FOLDED, tolerance)
+        self.margin = _strict(4.0, 0.6, tolerance)  # what acts as a spring errs in every blow
         self.whole, self.tried, self.spent = None, [], False
         self.elements, other = compared(target, elements, stages)
         if fixed and self.elements != elements:  # there are no larger elements to compare with
@@ -224,10 +219,6 @@ class Seen:
         if not new:
             return cost.on_mesh(fine, self.count, self.count)
         return cost.on_mesh(fine, new, self.count) + cost.on_mesh(self.coarse.system.n_dofs, new, self.count)
-
-
-# [-] points that share a mesh, to limit the work: each adds elements that shrink towards it; fewer make more meshes
-TOGETHER = 8
 
 
 class Krylovs(Krylov):

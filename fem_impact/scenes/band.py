@@ -12,7 +12,7 @@ from scipy import stats
 from .._base import check, markup
 from ..impact.measured import ENDS, Comparison, of_blow
 from ..impact.response import Response
-from ..sweeps.inputs import drawn, read, shares
+from ..sweeps.inputs import drawn, read_inputs, shares
 from .scene import Scene, load_scene
 from .uncertainty import MOST_BLOWS, spread
 
@@ -160,7 +160,7 @@ def around(
 ) -> Band:
     """The band around a blow of a scene."""
     count, seed = (None if n is None else check.count("n", n, high=MOST_BLOWS)), check.count("seed", seed, low=0)
-    said = {each.name: each.said for each in read(scene.known)}
+    said = {each.name: each.said for each in read_inputs(scene.known)}
     try:
         found = spread(scene, scene.known, n=count or BLOWS, sobol=False, seed=seed, tolerance=hit.tolerance)
     except ValueError:  # an input that needs a body of its own, or a wrong one, which the scenes below refuse
@@ -173,7 +173,7 @@ def _anew(
     scene: Scene, hit: Response, said: Mapping[str, str], n: int, seed: int, watch: Callable[[int, int], Any] | None
 ) -> Band:
     """The band with a scene of its own for each blow."""
-    inputs = read(scene.known)
+    inputs = read_inputs(scene.known)
     rows, failed = [], 0
     for done, row in enumerate(drawn(inputs, shares(n, len(inputs), seed), None)):
         given = {each.name: float(value) for each, value in zip(inputs, row)}

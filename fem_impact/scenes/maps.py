@@ -148,7 +148,7 @@ def _quick_map(
         case, axes = job.described(scene.built, over, stages)
     except check.SimulationError as error:
         raise check.SimulationError(f"{scene.path}: {error}") from None
-    return with_theory(grid.run(case, axes, job), case, axes)
+    return with_theory(grid.compute_map(case, axes, job), case, axes)
 
 
 def with_theory(table: xarray.Dataset, case: Case, axes: Mapping[str, np.ndarray]) -> xarray.Dataset:

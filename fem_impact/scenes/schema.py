@@ -25,7 +25,7 @@ from ..mesh import rise as rises
 from ..modes.analytic import closed_form
 from ..modes.modal import find_modes
 from ..show import sound
-from ..sweeps.cells import along
+from ..sweeps.cells import read_axis
 from . import keys
 from .fields import heights, over_frequency, tapered, varying
 
@@ -254,7 +254,7 @@ def map_values(*, over: Any, max_frequency: Any = None) -> dict[str, Any]:
     if not isinstance(over, dict) or not over:
         raise ValueError(f'over must be a table of axes such as "striker.mass" = [0.05, 0.1], got {check.shown(over)}')
     band = None if max_frequency is None else keys.checked("map", "max_frequency", max_frequency)
-    return {"over": {name: along(name, values) for name, values in over.items()}, "max_frequency": band}
+    return {"over": {name: read_axis(name, values) for name, values in over.items()}, "max_frequency": band}
 
 
 TARGET: dict[str, Any] = {  # keys of [target] and their defaults; None: it says nothing

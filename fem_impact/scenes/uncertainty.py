@@ -24,7 +24,7 @@ from ..show import export, figures
 from ..sweeps import bodies, grid
 from ..sweeps.cases import Cases, few, solve_all, try_each
 from ..sweeps.cells import ALIASES, AXES, LAW, Case
-from ..sweeps.inputs import REACH, Input, crossed, drawn, mixing, read, shares
+from ..sweeps.inputs import REACH, Input, crossed, drawn, mixing, read_inputs, shares
 from ..sweeps.spreads import DOUBLE, QUANTITIES, Checks, Spread
 from ..sweeps.store import Texts
 from .maps import MOST_ROWS, changed_scene
@@ -127,7 +127,7 @@ def spread(
     True
     """
     told, blow = _told(scene, striker, contact, at, speed, damping_ratio)
-    inputs = read(vary)
+    inputs = read_inputs(vary)
     n = check.count("n", n)
     if n > (most := check.number("max_blows", max_blows)):
         raise ValueError(f"n must be at most {most:g} blows, got {n}; raise max_blows")

@@ -24,23 +24,11 @@ from ..impact.compiled.layout import (  # isort: skip
     FOUND_TIME, N_FOUND,
 )  # fmt: skip
 
-STEPS = 12.0  # [-] steps per contact at tolerance 1e-3, rounded up by at most sqrt(2): the first run takes half as many
 STEP_ORDER = 3.5  # [-] order of the error in the step: between 3 (linear contact) and 4 (Hertz)
 REFINEMENTS = 6  # [-] runs after the first one; a blow that then still misses the tolerance goes to the modal engine
-ORDER = 2.0  # [-] order assumed when two runs are compared; cautious, as 3 and more was measured
-# [-] what time steps may err: this share of the tolerance, as with half of it two runs agreed by chance in 8 of 7 000
-# cells; or half of a tolerance so small that it comes to less than FINE, as there they did not
-ALLOWED, FINE = 0.1, 2e-5
 COUNTED = 1e-2  # [-] largest tolerance used: looser ones save no time and miscount impacts
-PER_PERIOD = 2.0  # [-] steps per period of the highest frequency in the centroid's band
-# [-] an error below this many times the accepted one cuts the step by sqrt(2) instead of 2: always 2 leaves 13 % of
-# stiff blows at 3e-5 undone instead of 8 %, always sqrt(2) a third of those with loss
-MILD = 8.0
-HEARD = 3.0  # [-] ringing left unresolved, over tolerance times force: only part of it becomes an error
 LENGTHS = (48, 192, 768, 3072)  # [-] kernel lengths in steps, tried in turn until the blow fits
 SLACK = 2.0  # [-] a touch or gap counts only above this many times tolerance times deepest approach
-MODES = 4096  # [-] modes summed into a kernel at once: limits the memory to about 20 MB
-PIECE = 2**14  # [-] blows a thread follows at once at most: is faster, as their data stay in the cache
 FEW = 1024  # [-] blows that are too few to split between threads: one alone is faster
 
 
@@ -70,14 +58,11 @@ class Family:
             parts.append((omega, zeta, squared, rest))
         return cls(*zip(*parts))
 
-    def rigid(self, body: int) -> float:
-        """Sum of the squared shapes of rigid motions, times the mass [-]."""
-        return float(self.squared[body][self.omega[body] == 0.0].sum())
-
-    def static(self, body: int) -> float:
-        """Static compliance of the kept flexible modes, times the mass [kg m/N]."""
-        flexible = self.omega[body] > 0.0
-        return float((self.squared[body][flexible] / self.omega[body][flexible] ** 2).sum())
+    def sums(self, body: int) -> tuple[float, float, float]:
+        """Squared shapes of rigid motions [-], compliance of kept flexible modes and residual one [kg m/N], by mass."""
+        squared, omega = self.squared[body], self.omega[body]
+        flexible = omega > 0.0
+        return squared[~flexible].sum(), (squared[flexible] / omega[flexible] ** 2).sum(), self.rest[body]
 
     def heard(self, body: int, compliance: np.ndarray) -> np.ndarray:
         """Frequency [rad/s] above which all modes together stay below each compliance; 0 if the whole body does."""
@@ -117,8 +102,8 @@ def kernel_rows(
     n_strides = -(-n_steps // stride)
     looks = 3 if parts is None else 2
     rows: np.ndarray = np.zeros((1 if parts is None else len(parts), looks, 2, n_strides * stride))
-    for start in range(0, len(omega), MODES):
-        some = slice(start, start + MODES)
+    for start in range(0, len(omega), 4096):  # limits the memory to about 20 MB
+        some = slice(start, start + 4096)
         w, z, u = omega[some], zeta[some], squared[some]
         one, many, part = np.empty((3, propagation.N_TABLE, len(w)))
         propagation.step_table(w, z, h, one)
@@ -128,9 +113,10 @@ def kernel_rows(
             convolution.orbit(one[[0, 2, 1, 3]], q, p, look)
         states = np.empty((len(rows), 2, n_strides, 2, len(w)))
         for i, places in enumerate(states):
+            if parts is not None:
+                propagation.step_table(w, z, parts[i] * h, part)
             for place, q, p in zip(places, one[4:8:2], one[5:8:2]):
                 if parts is not None:
-                    propagation.step_table(w, z, parts[i] * h, part)
                     q, p = part[0] * q + part[1] * p, part[2] * q + part[3] * p
                 convolution.orbit(many, q, p, place)
         product = seen.reshape(looks * stride, -1) @ states.reshape(-1, 2 * len(w)).T
@@ -182,7 +168,6 @@ class Bounces:
 
 
 Kernels = dict[tuple[int, int, int, bool], tuple[np.ndarray, ...]]  # keys: family, step, length, later
-KEPT = 128e6  # [byte] kernels are dropped after a call if they take more
 NO_KERNELS = (np.empty((0, 4, 0)),) * 2
 
 
@@ -202,20 +187,22 @@ def bounce(
 
 
 def allowed(tolerance: float) -> float:
-    """Largest estimated error [-] of the time steps that a tolerance accepts."""
-    return max(ALLOWED * tolerance, min(0.5 * tolerance, FINE))
+    """Largest estimated error [-] of the time steps that a tolerance accepts.
+
+    A tenth of it, as with half of it two runs agreed by chance in 8 of 7 000 cells; or half of a tolerance so small
+    that it comes to less than 2e-5, as there they did not.
+    """
+    return max(0.1 * tolerance, min(0.5 * tolerance, 2e-5))
 
 
-def count_impacts(
-    blows: Blows, *, tolerance: float, most: int, workers: int | None = None, kernels: Kernels | None = None
-) -> np.ndarray:
+def count_impacts(blows: Blows, *, tolerance: float, most: int, kernels: Kernels | None = None) -> np.ndarray:
     """Only how often each blow touches (n_cases,), at most ``most``; NaN where the modal engine must count.
 
-    Two runs of different steps agree on each number. ``tolerance``, ``workers`` and ``kernels`` as in `bounce`, but
-    errors of forces and times ask for no shorter steps, and a touch in flight is missed where the two agree on that.
+    Two runs of different steps agree on each number. ``tolerance`` and ``kernels`` as in `bounce`, but errors of forces
+    and times ask for no shorter steps, and a touch in flight is missed where the two agree on that.
     """
     kernels = {} if kernels is None else kernels
-    (found,) = _in_pieces(blows, partial(_counted, tolerance=tolerance, most=most, kernels=kernels), workers, kernels)
+    (found,) = _in_pieces(blows, partial(_counted, tolerance=tolerance, most=most, kernels=kernels), None, kernels)
     return found
 
 
@@ -225,13 +212,14 @@ def _in_pieces(
 ) -> list[np.ndarray]:
     """What ``follow`` finds of blows, by several threads if they are many."""
     workers = workers or os.cpu_count() or 1
-    size = min(PIECE, max(FEW, -(-blows.n_cases // (4 * workers))))
+    piece = 2**14  # blows a thread follows at once at most: their data stay in the cache
+    size = min(piece, max(FEW, -(-blows.n_cases // (4 * workers))))
     if workers == 1 or blows.n_cases <= size:
-        found = [follow(part) for part in blows.pieces(PIECE)]
+        found = [follow(part) for part in blows.pieces(piece)]
     else:
         with ThreadPoolExecutor(workers) as pool:
             found = list(pool.map(follow, blows.pieces(size)))
-    if sum(part.nbytes for parts in kernels.values() for part in parts) > KEPT:
+    if sum(part.nbytes for parts in kernels.values() for part in parts) > 128e6:  # to limit the memory
         kernels.clear()
     return [np.concatenate(columns) for columns in zip(*found)]
 
@@ -248,14 +236,14 @@ def _follow(blows: Blows, tolerance: float, band: float, kernels: Kernels) -> tu
 
 
 def _refined(engine: "_Engine", tolerance: float) -> tuple[np.ndarray, np.ndarray]:
-    """Result of `_Engine.run` once the steps are short enough, and its error; NaN if they never are.
+    """Result of `_Engine.run_all` once the steps are short enough, and its error; NaN if they never are.
 
     Neither are they of a blow too long for the longest kernel: shorter steps only make it longer.
     """
     n = engine.blows.n_cases
     first = engine.first_step(tolerance)
     todo = np.arange(n)
-    coarse = engine.run(todo, first - 2)
+    coarse = engine.run_all(todo, first - 2)
     # [half-octaves] half the step seldom does, a quarter mostly; not with loss, where errors fall more slowly, nor
     # where the longest kernel would not leave room for more
     finer = np.where((engine.blows.loss > 0.0) | (16.0 * coarse[FOUND_STEPS] > LENGTHS[-1]), 2, 4)
@@ -269,13 +257,14 @@ def _refined(engine: "_Engine", tolerance: float) -> tuple[np.ndarray, np.ndarra
             break
         ratio = 2.0 ** (0.5 * finer)
         slack = SLACK * tolerance * 2.0 ** (0.5 * STEP_ORDER * (first[todo] - step))
-        fine = engine.run(todo, step, slack, ratio * coarse[FOUND_STEPS])
-        found = engine.error(coarse, fine, todo, ratio)
+        fine = engine.run_all(todo, step, slack, ratio * coarse[FOUND_STEPS])
+        found = engine.compare_runs(coarse, fine, todo, ratio)
         met = found <= allowed(tolerance)
         final[:, todo[met]] = fine[:, met]
         error[todo[met]] = found[met]
         coarse, todo = fine[:, ~met], todo[~met]
-        finer = np.where(found[~met] < MILD * allowed(tolerance), 1, 2)
+        # halving always leaves 13 % of stiff blows at 3e-5 undone instead of 8 %, never a third of those with loss
+        finer = np.where(found[~met] < 8.0 * allowed(tolerance), 1, 2)
         step = step[~met] + finer
     return final, error
 
@@ -288,7 +277,7 @@ def _counted(blows: Blows, tolerance: float, most: int, kernels: Kernels) -> tup
     number, before = np.full(len(todo), np.nan), None
     for turn in range(REFINEMENTS):
         slack = np.full(len(todo), SLACK * tolerance * 2.0 ** (-STEP_ORDER * turn))
-        now = engine.run(todo, step + 2 * turn, slack, None if before is None else 2.0 * before[FOUND_STEPS])
+        now = engine.run_all(todo, step + 2 * turn, slack, None if before is None else 2.0 * before[FOUND_STEPS])
         counted = now[FOUND_STATUS] <= many_blows.DOUBTFUL
         now[FOUND_IMPACTS] = np.where(counted, np.minimum(now[FOUND_IMPACTS], most), np.nan)
         met = np.zeros(len(todo), bool) if before is None else now[FOUND_IMPACTS] == before[FOUND_IMPACTS]
@@ -308,10 +297,8 @@ class _Engine:
         self.keys, self.which = np.unique(blows.family, return_inverse=True)
         self.shares = np.array([1.0 / blows.target_mass, 1.0 / blows.striker_mass])
         families = [blows.families[int(key)] for key in self.keys]
-        rigid, static, rest = (
-            np.array([[number(family, body) for family in families] for body in (0, 1)])[:, self.which] * self.shares
-            for number in (Family.rigid, Family.static, lambda family, body: family.rest[body])
-        )
+        sums = np.array([[family.sums(body) for family in families] for body in (0, 1)])  # (2, n_families, 3)
+        rigid, static, rest = np.moveaxis(sums[:, self.which], 2, 0) * self.shares
         self.own_rigid, self.rigid, self.static = rigid[1], rigid.sum(axis=0), static.sum(axis=0)
         stiffness = blows.stiffness * blows.speed ** (blows.exponent - 1.0)
         self.law = np.zeros(len(stiffness), LAW)
@@ -319,26 +306,28 @@ class _Engine:
         self.law["loss"], self.law["compliance"] = blows.loss * blows.speed, rest.sum(axis=0)
 
     def first_step(self, tolerance: float) -> np.ndarray:
-        """Step of each blow in half-octaves, h = 2**(-step / 2): at least STEPS per contact with a rigid wall.
+        """Step of each blow in half-octaves, h = 2**(-step / 2).
 
-        A contact with loss needs shorter ones: its force depends on the rate of approach, so that more modes ring.
+        At least 12 per contact with a rigid wall at 1e-3, of which the first run takes half, and two per period of the
+        centroid's highest frequency. A contact with loss needs shorter ones: its force depends on the rate of approach,
+        so that more modes ring; only part of what they ring becomes an error.
         """
         law, loss = self.law, self.law["loss"]
         duration = wall_time(law["stiffness"], law["exponent"], self.rigid, 1.0, law["compliance"])
-        count = STEPS * (1e-3 / tolerance) ** (1.0 / STEP_ORDER)
-        step = np.ceil(2.0 * np.log2(np.maximum(count / duration, PER_PERIOD * self.band))).astype(int)
+        count = 12.0 * (1e-3 / tolerance) ** (1.0 / STEP_ORDER)
+        step = np.ceil(2.0 * np.log2(np.maximum(count / duration, 2.0 * self.band))).astype(int)
         for body in (0, 1) if loss.any() else ():
             rung = loss * (np.pi / duration) ** 2 / self.rigid * self.shares[body]  # [N/m] ringing per compliance
             heard = np.zeros(len(step))
             for i, key in enumerate(self.keys):
                 cells = (self.which == i) & (loss > 0.0)
-                heard[cells] = self.blows.families[int(key)].heard(body, HEARD * tolerance / rung[cells])
+                heard[cells] = self.blows.families[int(key)].heard(body, 3.0 * tolerance / rung[cells])
             ringing = heard > 0.0
             needed = np.ceil(2.0 * np.log2(2.0 * heard[ringing] / RESOLVED)).astype(int)
             step[ringing] = np.maximum(step[ringing], needed)
         return step
 
-    def run(
+    def run_all(
         self, cells: np.ndarray, step: np.ndarray, slack: np.ndarray | None = None, length: np.ndarray | None = None
     ) -> np.ndarray:
         """Compute blows with the given steps; return what `many_blows.run` writes, (N_FOUND, n_cells).
@@ -382,7 +371,7 @@ class _Engine:
             of_bodies = bundles.Kernels((target, striker), (bounds[0], bounds[1]), (later[0], later[1]))
             many_blows.run(cells[part], pairs, of_bodies, 2.0 ** (-0.5 * exponent), sure, self.band, track, out)
 
-    def error(self, coarse: np.ndarray, fine: np.ndarray, cells: np.ndarray, ratio: np.ndarray) -> np.ndarray:
+    def compare_runs(self, coarse: np.ndarray, fine: np.ndarray, cells: np.ndarray, ratio: np.ndarray) -> np.ndarray:
         """Largest error of the finer run in the quantities under tolerance; infinite if the two runs ended differently.
 
         ``ratio`` is that of their steps. The error in the time of contact is that of the approach divided by its rate
@@ -400,5 +389,5 @@ class _Engine:
         change = np.fmax.reduce([swung, *apart.values()])
         same = coarse[FOUND_IMPACTS] == fine[FOUND_IMPACTS]
         same &= (coarse[FOUND_STATUS] <= many_blows.DOUBTFUL) & (fine[FOUND_STATUS] == many_blows.DONE)
-        found = np.maximum(change / (ratio**ORDER - 1.0), fine[FOUND_MISFIT])
+        found = np.maximum(change / (ratio**2 - 1.0), fine[FOUND_MISFIT])  # an order of 3 and more was measured
         return np.where(same, found, np.inf)

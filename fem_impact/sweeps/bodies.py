@@ -22,17 +22,12 @@ from ..model.budget import FINEST, Budget
 from ..model.by_modes import MOST_MODES
 from ..model.planner import Blow
 from ..model.target import CLOSE, FIRST_FLEXIBLE, FIRST_LOOK, Elements, Stages, Target
-from ..model.vectors import TOGETHER, Views
+from ..model.vectors import Views
 from ..modes.modal import Modes, damping_ratios
 from ..modes.shapes import FieldShapes, SampledShapes
 from .batches import allowed
 from .cells import Case, checked_axes, sampled
 from .inputs import REACH
-
-# [-] cells in all, and at each strike point at least, by which vectors are judged: each costs several whole blows
-STRUCK = 10, 4
-# [-] of these may miss the tolerance: two of ten, as beside a cell with another number of impacts no error is small
-SPARED = 0.2
 
 Axes = Mapping[str, np.ndarray]
 Views_ = Mapping[tuple[float, ...], Modes]
@@ -155,7 +150,7 @@ def by_vectors(
     if views is None:
         others = {name: values for name, values in axes.items() if name != "at"}
         rng = np.random.default_rng(0)  # the same map gives the same vectors
-        number = max(STRUCK[1], math.ceil(STRUCK[0] / len(points)))
+        number = max(4, math.ceil(10 / len(points)))  # of cells that judge them: each costs several whole blows
         chance = [{name: rng.choice(values) for name, values in others.items()} for _ in range(number - 2)]
         views = Sized(target, case, corners(others), chance, tolerance).views(points, stages)
         if keep is not None and views is not None:
@@ -213,13 +208,15 @@ class Sized:
     def views(self, points: np.ndarray, stages: Stages) -> Views_ | None:
         """The target as seen from each point (n_points, 2) [m], reduced to it; None if that is impossible."""
         resonance = [self.case.with_values(values).resonance / self.raised(values) for values in self.ends]
-        size = self._size(max(resonance))
-        if size is None:
+        size, mesh = vectors.size_for(self.target, max(resonance), self.tolerance), self.target.mesh
+        assert mesh is not None
+        if not self.target.size_stated and size < refinement.smallest_size(self.target.element, mesh):
             return None
         extreme = [self.ends[int(np.argmax(resonance))], self.ends[int(np.argmin(resonance))]]
         views: dict[tuple[float, ...], Modes] = {}
-        for start in range(0, len(points), TOGETHER):
-            some = points[start : start + TOGETHER]
+        # of more points on a mesh, each adds elements that shrink towards it; fewer make more meshes
+        for start in range(0, len(points), 8):
+            some = points[start : start + 8]
             elements, fixed = Elements(size), self.target.size_stated
             seen = Views(self.target, some, max(resonance), self.tolerance, elements, fixed, stages)
             if seen.at_rest:
@@ -229,14 +226,6 @@ class Sized:
                 _, _, found = refine(replace(one, blows=blows), Sized._judged, stages)
             views |= {tuple(point.tolist()): sampled(modes, point[None]) for point, modes in zip(some, found)}
         return views
-
-    def _size(self, resonance: float) -> float | None:
-        """Element size [m] of the first mesh for the highest contact resonance [Hz]; None if it is too small."""
-        target = self.target
-        size = vectors.size_for(target, resonance, self.tolerance)
-        assert target.mesh is not None
-        allowed = target.size_stated or size >= refinement.smallest_size(target.element, target.mesh)
-        return size if allowed else None
 
     def found(self, stages: Stages, keep: Any = None) -> "tuple[Sized, list[Modes]]":
         """The same, and the target as seen from each point."""
@@ -265,7 +254,8 @@ class Sized:
         if lost:
             self.seen.tried.clear()  # the others have not been tried as often
         worst = np.sort(np.array(errors or [(0.0, 0.0)]), axis=0)  # (n_struck, 2)
-        return Error(0.0, *worst[len(worst) - 1 - int(SPARED * len(worst))].tolist()), found
+        # but for two of ten, as beside a cell with another number of impacts no error is small
+        return Error(0.0, *worst[len(worst) - 1 - int(0.2 * len(worst))].tolist()), found
 
     def _cutoff(self, point: np.ndarray) -> Callable[[Modes, float], float]:
         """Highest frequency [Hz] that any blow needs of some modes; takes them and a safety factor."""
@@ -274,7 +264,7 @@ class Sized:
             needed = []
             for values in self.ends:
                 case = self.at(modes, point, values)
-                allowed = Budget(self.tolerance, case.contact.rated, margin).left_out
+                allowed = Budget(self.tolerance, case.contact.rated, margin).for_left_out
                 law: dict[str, Any] = {"contact": case.contact, "mass": case.striker.felt_mass, "speed": case.speed}
                 limit = accuracy.tail_cutoff(case.modes, point[None], tolerance=allowed, **law)
                 needed.append(limit / self.raised(values))

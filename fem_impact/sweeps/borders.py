@@ -68,7 +68,7 @@ class Plane:
         logs = [logarithmic(values) for values in axes]
         return [(values, np.log(values) if log else values, log) for values, log in zip(axes, logs)]
 
-    def values(self, places: np.ndarray) -> np.ndarray:
+    def values_at(self, places: np.ndarray) -> np.ndarray:
         """Values (n, 2) of the axes at places (n, 2); between cells evenly spaced as the cells are."""
         found = np.empty(places.shape)
         for column, place, (values, even, log) in zip(found.T, places.T, self.columns):
@@ -85,7 +85,7 @@ class Plane:
         """Number of impacts (n,) at places (n, 2), by a finer tolerance than that of the map; -1 if refused."""
         axes = {
             name: column[:, None] if name == "at" else column
-            for name, column in zip(self.names, np.ascontiguousarray(self.values(places).T))
+            for name, column in zip(self.names, np.ascontiguousarray(self.values_at(places).T))
         }
         shared = not {*FAMILY_AXES, "loss"} & set(axes)  # then all rounds strike the same bodies
         tolerance = min(self.grid.tolerance, max(FINEST, FINER * self.grid.tolerance))
@@ -129,7 +129,7 @@ def find_borders(grid: Cases, count: np.ndarray, solve: Solve) -> FoundBorders:
         return FoundBorders((), doubtful)
     edges, which = np.unique(vertices, axis=0, return_inverse=True)
     places, error = _located(plane, fine, edges)
-    values = plane.values(places)[which.reshape(-1)]
+    values = plane.values_at(places)[which.reshape(-1)]
     error = error[which.reshape(-1)]
     ends = np.cumsum([n for _, n in curves])[:-1]
     borders = tuple(
@@ -201,7 +201,7 @@ def add_borders(table: xarray.Dataset, found: FoundBorders, smallest: float) -> 
     """Write borders into a map; islands narrower than ``smallest`` [-] of an axis can be missing."""
     meaning = "whether the number of impacts depends on the tolerance or the body's description, or was refused"
     table["doubtful"] = (table.n_impacts.dims, found.doubtful, {"units": "1", "long_name": meaning})
-    table.attrs["borders"] = _told(found, smallest)
+    table.attrs["borders"] = _describe_borders(found, smallest)
     if not found.borders:
         return table
     n = [len(border.points) for border in found.borders]
@@ -219,7 +219,7 @@ def add_borders(table: xarray.Dataset, found: FoundBorders, smallest: float) -> 
     return table
 
 
-def _told(found: FoundBorders, smallest: float) -> str:
+def _describe_borders(found: FoundBorders, smallest: float) -> str:
     """What is known of the borders, in a sentence."""
     doubt = int(found.doubtful.sum())
     beside = f"{doubt} cells whose number of impacts is in doubt"

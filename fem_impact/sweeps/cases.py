@@ -33,7 +33,6 @@ LAYERS: dict[str, tuple[str, str]] = {  # name: unit, what it is
 }
 POWERS = {"contact_time": -1.0, "impulse": 1.0, "peak_force": 2.0, "centroid": 1.0}  # of a unit of time, see `Cases`
 FAMILIES = 256  # [-] most pairs of bodies of rows that need kernels of their own: some 5 ms each
-BANDS = 64  # [-] most upper ends of the centroid's band; rows between share them, so that few kernels are needed
 
 
 @dataclass(frozen=True, eq=False)
@@ -213,11 +212,14 @@ class Cases:
         return batches.Family.of(case.modes, case.at, striker, self.residual, lossy)
 
     def bands(self, ratio: np.ndarray) -> np.ndarray:
-        """Upper end of the centroid's band in units of the period of each body (n_cells,) [Hz]; few different ones."""
+        """Upper end of the centroid's band in units of the period of each body (n_cells,) [Hz].
+
+        Some 64 different ones, which rows between share: each takes kernels of its own.
+        """
         if self.band is None:
             return np.zeros(len(ratio))
         log = np.log(ratio)
-        width = np.ptp(log) / BANDS
+        width = np.ptp(log) / 64
         return self.band / np.exp(width * np.round(log / width) if width > ROUNDING else log)
 
 

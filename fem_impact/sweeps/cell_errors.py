@@ -15,23 +15,22 @@ from .cells import RATED
 
 # [-] cells struck again for the error of vectors, in a batch or alone: some 0.1 and 0.2 s
 DOUBTED = {True: 10_000, False: 100}
-MOST_MIDDLES = 4  # [-] axes whose middle is examined, too: 3**4 = 81 blows, where five would take 243
 
 
-def left_out(cases: Cases) -> np.ndarray:
+def estimate_left_out(cases: Cases) -> np.ndarray:
     """Expected error [-] of leaving out modes, in the shape of a map; infinite where they govern the contact."""
     if not cases.residual:
         return np.zeros(cases.shape)
     base, places = cases.base, cases.axes.get("at", cases.base.at[None])
     seen = [base.changed("at", place).modes for place in places] if base.views else [base.modes] * len(places)
 
-    def along(name: str, values: Any) -> np.ndarray:
+    def shaped(name: str, values: Any) -> np.ndarray:
         """Values of an axis, or one that all cells share, shaped to broadcast over the map."""
         shape = [-1 if axis == name else 1 for axis in cases.axes] if name in cases.axes else [1]
         return np.reshape(np.asarray(values, float), shape)
 
     def value(name: str, shared: float) -> np.ndarray:
-        return along(name, cases.axes.get(name, [shared]))
+        return shaped(name, cases.axes.get(name, [shared]))
 
     def own(name: str) -> np.ndarray:
         return value(name, getattr(base.contact, name))
@@ -42,9 +41,9 @@ def left_out(cases: Cases) -> np.ndarray:
     omega = np.pi / wall_time(stiffness, exponent, 1.0 / felt, value("speed", base.speed))
     yielding = base.modes.dimension > 0
     left = [modes.residual_compliance(place)[0, 0] if yielding else 0.0 for modes, place in zip(seen, places)]
-    last = along("at", [modes.omega[-1] for modes in seen])
+    last = shaped("at", [modes.omega[-1] for modes in seen])
     sides = [
-        (base.modes, along("at", left), last, base.first, "target_mass", "target_frequency"),
+        (base.modes, shaped("at", left), last, base.first, "target_mass", "target_frequency"),
         (striker.modes, striker.left_out[0][0, 0], striker.modes.omega[-1], None, "mass", "striker_frequency"),
     ]  # fmt: skip
     total, softness = np.zeros(cases.shape), np.zeros(cases.shape)
@@ -64,10 +63,10 @@ def left_out(cases: Cases) -> np.ndarray:
 def model_error(cases: Cases) -> tuple[np.ndarray, str]:
     """The model's own error [-] in the shape of a map, and what of it is not known.
 
-    Examined at the ends and the middle of every axis, at the ends of more than MOST_MIDDLES, and interpolated in
-    its logarithm; NaN where these fail.
+    Examined at the ends and the middle of every axis, at the ends of more than four, and interpolated in its logarithm;
+    NaN where these fail.
     """
-    middle = [] if len(cases.shape) > MOST_MIDDLES else [0.5]
+    middle = [] if len(cases.shape) > 4 else [0.5]  # 3**4 = 81 blows, where five would take 243
     some = [np.unique([0, *(int(share * (n - 1)) for share in middle), n - 1]) for n in cases.shape]
     found = np.empty([len(places) for places in some])
     unknown: dict[str, None] = {}

@@ -41,7 +41,6 @@ FAMILY_AXES = ("at", "target_frequency", "striker_frequency", "damping_ratio")  
 # [-] values along an axis that has no count: 160 000 cells together take some 2 s, 10 000 alone some 20 s
 SIDE = {True: 400, False: 100}
 MOST_VALUES = 10**6  # [-] most values along one axis of a map
-EVEN = 1e-3  # [-] of a value, off even spacing in the logarithm: less counts as even, as what is typed with four digits
 
 
 @dataclass(frozen=True)
@@ -52,12 +51,12 @@ class Range:
     high: float
     log: bool
 
-    def values(self, count: int) -> np.ndarray:
+    def spaced(self, count: int) -> np.ndarray:
         """Evenly spaced values, (count,)."""
         return (np.geomspace if self.log else np.linspace)(self.low, self.high, count)
 
 
-def along(name: str, values: Any) -> Any:
+def read_axis(name: str, values: Any) -> Any:
     """Values along an axis from a list, or from a range {from, to, count, scale}; a `Range` if that has no count."""
     if isinstance(values, list):
         return np.array(values)
@@ -71,7 +70,7 @@ def along(name: str, values: Any) -> Any:
         check.positive(f"{name}.from", low), check.positive(f"{name}.to", high)
     found = Range(low, high, log)
     if "count" in values:
-        return found.values(check.count(f"{name}.count", values["count"], high=MOST_VALUES))
+        return found.spaced(check.count(f"{name}.count", values["count"], high=MOST_VALUES))
     if not low < high:
         raise ValueError(f"{name}.to must be above {name}.from, got {high:g} and {low:g}")
     return found
@@ -85,7 +84,7 @@ def laid_out(
     ``alone``: all cells are computed alone, whatever the contact. ``cells`` is the number of values along an axis that
     is a range without a count; by default those of SIDE for two such axes, and as many cells in all whatever the axes.
     """
-    found = {name: along(name, values) if isinstance(values, Mapping) else values for name, values in over.items()}
+    found = {name: read_axis(name, values) if isinstance(values, Mapping) else values for name, values in over.items()}
     free = [name for name, values in found.items() if isinstance(values, Range)]
     if not free:
         return found, False
@@ -97,7 +96,7 @@ def laid_out(
     given = math.prod(len(np.atleast_1d(values)) for values in found.values() if not isinstance(values, Range))
     most = int((side**2 / given) ** (1.0 / len(free)))
     count = max(2, min(side, most)) if cells is None else check.count("cells", cells, low=2, high=MOST_VALUES)
-    return {name: values.values(count) if name in free else values for name, values in found.items()}, True
+    return {name: values.spaced(count) if name in free else values for name, values in found.items()}, True
 
 
 def law_numbers(contact: Contact) -> dict[str, float]:
@@ -228,4 +227,4 @@ def logarithmic(values: np.ndarray) -> bool:
         return False
     spaced = (space(values[0], values[-1], len(values)) for space in (np.geomspace, np.linspace))
     by_factors, by_steps = (float(np.abs(each / values - 1.0).max()) for each in spaced)
-    return by_factors < min(EVEN, by_steps)
+    return by_factors < min(1e-3, by_steps)  # of a value: what is typed with four digits

@@ -84,7 +84,7 @@ class Job:
         place = self.store / turn if self.store is not None and turn else self.store
         return solve_all(cases, self.workers, self.client, place, None if turn else self.watch)
 
-    def refined(self, cases: Cases) -> refined.MapSheet | None:
+    def compute_refined(self, cases: Cases) -> refined.MapSheet | None:
         """Compute a map where its answer changes; None if it has few cells, unless asked for."""
         there = os.listdir(self.store) if self.store is not None and self.store.exists() else ()
         held = {name for name in there if not name.startswith(PARTIAL)}  # but for what is not finished
@@ -232,7 +232,7 @@ def sweep(
     n_cells = math.prod(map(len, axes.values()))
     max_cells = check.number("max_cells", max_cells)
     admit(n_cells, len(LAYERS) + len(job.layers), max_cells, quick=not job.layers, tell=tell)
-    return run(base, axes, job)
+    return compute_map(base, axes, job)
 
 
 def kept_beside(store: str | Path | None) -> Path | None:
@@ -240,7 +240,7 @@ def kept_beside(store: str | Path | None) -> Path | None:
     return None if store is None else Path(store).with_name(f"{Path(store).name}.modes.npz")
 
 
-def run(base: Case, axes: Mapping[str, np.ndarray], job: Job) -> xarray.Dataset:
+def compute_map(base: Case, axes: Mapping[str, np.ndarray], job: Job) -> xarray.Dataset:
     """The map of a blow over axes that are checked."""
     cases = Cases(base, axes, job.tolerance, job.residual, job.max_frequency, job.layers)
     some = cases.without_speed() or cases  # those to compute
@@ -248,14 +248,14 @@ def run(base: Case, axes: Mapping[str, np.ndarray], job: Job) -> xarray.Dataset:
         if asked and why_none(of):
             raise ValueError(f"{name}: {why_none(of)}")
     drawn = job.ours and not job.layers and not why_none(some)
-    computed = job.refined(some) if job.refine or (drawn and job.refine is None) else None
+    computed = job.compute_refined(some) if job.refine or (drawn and job.refine is None) else None
     numbers, texts = job.solved(some) if computed is None else (computed.numbers, computed.texts)
     failures = listed(texts, some.n_cases)
     doubt = np.broadcast_to(cell_errors.described(some, numbers, job.workers), cases.shape)
     if some is not cases:
         numbers, failures = _with_speed(cases, some, numbers, failures)
     own = cell_errors.model_error(cases) if job.audit else None
-    table = _dataset(cases, numbers, failures, cell_errors.left_out(cases) + doubt, own)
+    table = _dataset(cases, numbers, failures, cell_errors.estimate_left_out(cases) + doubt, own)
     gap = 1.0 / max(1, min(cases.shape) - 1)
     if job.ours:
         table.attrs["cells"] = f"all {cases.n_cases} cells computed"

@@ -26,15 +26,12 @@ from . import batches, bodies
 TOLERANCE = 1e-2
 DECIDED = 1e-4  # [-] error limit of the blows that decide where a range of tips ends, a tenth of its WIDTH
 WIDTH = 1e-3  # [-] relative width to which the ends of a range are found: finer than any tip is known
-WEIGHED = 5e-3  # [-] the same of the mass at which tips that work end: finer than a hammer in a hand is known
 # [-] hardest tip on a body of Ritz vectors, over that whose half sine has the bandwidth: three times its frequency
 HARDEST = 10.0
 # [-] modes used otherwise, whatever the bandwidth, to bound the time; residual compliance replaces the others
 MOST_MODES = 300
 # [-] softest tip tried, over those with the bandwidth and tuned to the first mode: a sixth of their frequency
 SOFTEST = 0.03
-# [-] tips per decade at which impacts are counted, 2 % apart, and at which the bandwidth is found: it is smooth
-PER_DECADE = 100, 12
 STIFFEST = 100.0  # [-] hardest tip tried, over the one for which the modes are complete: ten times its frequency
 MASSES = (1e-6, 1e4)  # [kg] allowed: outside, a blow takes too long to compute or overflows
 BANDWIDTHS = (1e-3, 1e9)  # [Hz] allowed, for the same reason as the masses
@@ -174,7 +171,7 @@ def choose(
     -------
     tuple of Hammer, in the order of the masses
         The ends of each range are found to the relative width WIDTH and belong to it. With ``between`` the hammers
-        ascend in mass, and those found between them are a `border`, to the relative width WEIGHED; neighbours that both
+        ascend in mass, and those found between them are a `border`, to the relative width 5e-3; neighbours that both
         work or both do not are taken to have no other hammers in between.
 
     Notes
@@ -230,14 +227,12 @@ def _with_borders(chosen: tuple[Hammer, ...], hammer: Callable[[float, bool], Ha
     """Hammers in ascending mass, and of neighbours of which one works the last mass in between that does, too."""
     chosen = tuple(sorted(chosen, key=lambda one: one.mass))
     pairs = [pair for pair in pairwise(chosen) if pair[0].works != pair[1].works]
+    between = cache(lambda mass: hammer(mass, True))
     for done, pair in enumerate(pairs):
         progress.report("masses between", done, len(pairs))
         good, bad = sorted(pair, key=lambda one: not one.works)
-        last, edge = good, bad.mass
-        while abs(np.log(edge / last.mass)) > WEIGHED:
-            middle = hammer(float(np.sqrt(edge * last.mass)), True)
-            last, edge = (middle, edge) if middle.works else (last, middle.mass)
-        chosen += (last,) if last.border else ()
+        last = _end(lambda mass: between(mass).works, good.mass, bad.mass, 5e-3)  # finer than one in a hand is known
+        chosen += (between(last),) if last != good.mass else ()
     progress.report("masses between", len(pairs), len(pairs))
     return tuple(sorted(chosen, key=lambda one: one.mass))
 
@@ -296,14 +291,14 @@ def _hammer(
         high = STIFFEST * mass * (2.0 * np.pi * max(tuned)) ** 2
     if high <= low:
         return Hammer(float(mass), (), (), high, None, None, modes.notes)
-    tips = _series(low, high, PER_DECADE[0])
+    tips = _series(low, high, 100)  # 2 % apart
     counts = impacts_of_tips(alone, striker, modes.point("at", at)[0], tips)
     doubtful = np.flatnonzero(np.isnan(counts))
     counts[doubtful] = [hit(float(tip)).n_impacts for tip in tips[doubtful]]
     single = _ranges(tips, counts == 1, once)
     working: Ranges = ()
     for ends in single:
-        tips = _series(*ends, PER_DECADE[1])
+        tips = _series(*ends, 12)  # the bandwidth is smooth
         working += _ranges(tips, np.array([reaches(float(tip), TOLERANCE) for tip in tips]), reaches)
     last = _widest(working or single)[1] if single else None
     reach, error = (bandwidth_of(hit(last), drop), whole(last).error.total) if last else (None, None)
@@ -360,9 +355,9 @@ def _ranges(tips: np.ndarray, good: np.ndarray, suits: Callable[[float], bool]) 
     return tuple(found)
 
 
-def _end(suits: Callable[[float], bool], good: float, bad: float) -> float:
-    """The last tip that suits between a good one and a bad one, to the relative width WIDTH."""
-    while abs(np.log(bad / good)) > WIDTH:
+def _end(suits: Callable[[float], bool], good: float, bad: float, width: float = WIDTH) -> float:
+    """The last tip or mass that suits between a good one and a bad one, to a relative width."""
+    while abs(np.log(bad / good)) > width:
         middle = float(np.sqrt(good * bad))
         good, bad = (middle, bad) if suits(middle) else (good, middle)
     return good

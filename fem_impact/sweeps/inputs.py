@@ -11,7 +11,6 @@ from scipy.stats import qmc
 
 from .._base import check
 
-MOST_INPUTS = 64  # [-] inputs that may vary together
 REACH = 1e30  # [SI] numbers of a blow lie between 1/REACH and REACH: beyond, the kernels never finish
 
 # kind: the names of its numbers, and the distribution they make
@@ -89,15 +88,15 @@ def _ordered(name: str, numbers: Mapping[str, float], kind: str) -> None:
         raise ValueError(f"mode of vary[{name!r}] must lie between low and high, got {numbers['mode']:g}")
 
 
-def read(vary: Any) -> tuple[Input, ...]:
+def read_inputs(vary: Any) -> tuple[Input, ...]:
     """The inputs from what a user gives: a mapping of names to distributions."""
     if not isinstance(vary, Mapping) or not vary:
         raise ValueError(
             f"vary must name at least one input, such as {{'contact.stiffness': ('lognormal', 695e3, 0.1)}}, "
             f"got {check.shown(vary)}"
         )
-    if len(vary) > MOST_INPUTS:
-        raise ValueError(f"vary must name at most {MOST_INPUTS} inputs, got {len(vary)}")
+    if len(vary) > 64:
+        raise ValueError(f"vary must name at most 64 inputs, got {len(vary)}")
     return tuple(Input.of(name, given) for name, given in vary.items())
 
 

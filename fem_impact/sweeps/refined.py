@@ -9,7 +9,6 @@ import numpy as np
 from .batches import allowed
 from .store import Texts
 
-BLOCK = 16  # [-] cells along the sides of the first blocks; islands narrower than a quarter of it can be missed
 LINEAR = ("restitution",)  # layers whose errors are absolute; those of the others are relative
 ROUGH = {"centroid": 0.1}  # [-] weight of what is missed: its lobes change it by 1e-3, which no picture shows
 COUNTED = ("n_impacts", "error")  # layers that are not interpolated
@@ -50,8 +49,8 @@ class Blocks:
 
 
 def first_blocks(shape: tuple[int, ...]) -> Blocks:
-    """Blocks of about BLOCK cells a side that cover a map."""
-    ends = [np.unique(np.round(np.linspace(0, n - 1, max(1, round((n - 1) / BLOCK)) + 1)).astype(int)) for n in shape]
+    """Blocks of about 16 cells a side that cover a map; islands narrower than a quarter of that can be missed."""
+    ends = [np.unique(np.round(np.linspace(0, n - 1, max(1, round((n - 1) / 16)) + 1)).astype(int)) for n in shape]
     rows, columns = (np.column_stack([places[:-1], places[1:]]) for places in ends)
     i, j = (index.ravel() for index in np.indices((len(rows), len(columns))))
     return Blocks(np.stack([rows[i], columns[j]], axis=1))
@@ -121,7 +120,7 @@ class MapSheet:
             self.texts |= {int(cells[i]): text for i, text in new.items()}
             self.computed[cells] = self.settled[cells] = True
 
-    def values(self, cells: np.ndarray) -> np.ndarray:
+    def smooth_values(self, cells: np.ndarray) -> np.ndarray:
         """What is interpolated of cells, (n_smooth, *cells.shape): logarithms of numbers with a relative error."""
         found = self.numbers[self.smooth][:, cells]
         with np.errstate(invalid="ignore", divide="ignore"):
@@ -135,8 +134,8 @@ class MapSheet:
         """
         coarse, fine = blocks.cells(self.width), quarters.cells(self.width)
         rows, columns = (weights(nodes[of], places) for nodes, places in zip(blocks.nodes, quarters.nodes))
-        expected = np.einsum("nip,njq,lnpq->lnij", rows, columns, self.values(coarse)[:, of])
-        off = (self.weight[:, None] * np.abs(expected - self.values(fine)).max(axis=(2, 3))).max(axis=0)
+        expected = np.einsum("nip,njq,lnpq->lnij", rows, columns, self.smooth_values(coarse)[:, of])
+        off = (self.weight[:, None] * np.abs(expected - self.smooth_values(fine)).max(axis=(2, 3))).max(axis=0)
         count = self.numbers[self.count]
         same = (count[fine] == count[coarse][of][:, :1, :1]).all(axis=(1, 2))
         return np.where(same & ~np.isnan(off), off, np.inf)
@@ -153,7 +152,7 @@ class MapSheet:
             rows, columns = (
                 weights(np.array([[0, n // 2, n]]), place[None])[0] for n, place in zip((height, width), places)
             )
-            found = np.einsum("ip,jq,lnpq->lnij", rows, columns, self.values(nodes))
+            found = np.einsum("ip,jq,lnpq->lnij", rows, columns, self.smooth_values(nodes))
             found[self.relative] = np.exp(found[self.relative])
             error = self.numbers[self.error][nodes].max(axis=(1, 2)) + off[some]
             new = ~self.computed[cells]

@@ -15,12 +15,7 @@ from .._base.rounding import SAME
 from .cases import LAYERS
 from .inputs import Input
 
-CONFIDENCE = 0.9  # [-] of every interval: nine of ten cover the truth; a choice
 LEVELS = (0.05, 0.25, 0.5, 0.75, 0.95)  # [-] quantiles told: median, quartiles and the ends of nine tenths of all
-RESAMPLES = 100  # [-] bootstrap samples behind the intervals of Sobol indices: tell a standard deviation to 7 %
-MOST_RESAMPLED = 4096  # [-] groups of blows for Sobol indices, to limit memory: their bootstrap keeps 100 copies
-# [-] share of the variance below which an input is not worth measuring better: the spread would shrink by 1 %
-NEGLIGIBLE = 0.02
 DOUBLE = "double_hit"
 QUANTITIES: dict[str, tuple[str, str]] = {
     **{name: told for name, told in LAYERS.items() if name != "error"},
@@ -69,7 +64,7 @@ class Spread(check.Brief):
     crossed: bool  # whether the blows are groups for Sobol indices
     mixer: np.ndarray | None = None  # what correlates the inputs, see `inputs.mixing`
     seed: int = 0
-    confidence: float = CONFIDENCE  # [-]
+    confidence: float = 0.9  # [-] with which every interval covers the truth
     checks: Checks | None = None
     rescaled: Mapping[str, float] = field(default_factory=dict)  # input of the body: error [-] of rescaling its modes
     title: str = ""
@@ -165,12 +160,13 @@ class Spread(check.Brief):
         d = len(self.inputs)
         groups = np.asarray(self.table[quantity].values, float).reshape(-1, d + 2)
         whole = (self.table["n_impacts"].values.reshape(-1, d + 2) >= 0).all(axis=1)
-        groups = groups[whole][:MOST_RESAMPLED]
+        groups = groups[whole][:4096]  # to limit the memory: their bootstrap keeps 100 copies
         if not len(groups) or np.ptp(groups[:, [0, -1]]) == 0.0:
             return {}
+        # 100 bootstrap samples tell a standard deviation to 7 %
         found = sobol.analyze(
             {"num_vars": d, "names": list(self.names), "bounds": [[0.0, 1.0]] * d}, groups.ravel(),
-            calc_second_order=False, num_resamples=RESAMPLES, conf_level=self.confidence, seed=self.seed + 1,
+            calc_second_order=False, num_resamples=100, conf_level=self.confidence, seed=self.seed + 1,
         )  # fmt: skip
         first, total = (
             [Estimate(float(v), float(v - c), float(v + c)) for v, c in zip(found[key], found[f"{key}_conf"])]
@@ -244,7 +240,7 @@ class Spread(check.Brief):
                 continue
             said = []
             for name, share in self.ranking(quantity):
-                if share < NEGLIGIBLE:
+                if share < 0.02:  # without it, the spread would shrink by 1 %
                     continue
                 sign = "+" if self.correlations[quantity][name] >= 0.0 else "-"
                 found = self.shares.get(quantity, {}).get(name)

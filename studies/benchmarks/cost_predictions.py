@@ -131,7 +131,9 @@ def main() -> None:
         return
     if not options.built_in:
         kept = "kept" if cost.calibrate() else "not kept"
-        print(f"this machine over that of the built-in rates ({kept}): {(cost.read() or cost.REFERENCE).slower}")
+        print(
+            f"this machine over that of the built-in rates ({kept}): {(cost.read_machine() or cost.REFERENCE).slower}"
+        )
     rows, memories, runs = [], [], []
     print("| " + " | ".join(COLUMNS) + " |\n|" + "---|" * len(COLUMNS), flush=True)
     with tempfile.TemporaryDirectory() as folder:

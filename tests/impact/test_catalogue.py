@@ -8,7 +8,7 @@ import pytest
 import fem_impact as fi
 from fem_impact.impact import catalogue
 from fem_impact.impact.contact import wall_time
-from fem_impact.sweeps.inputs import read
+from fem_impact.sweeps.inputs import read_inputs
 
 SECTIONS = {"materials": fi.materials, "strikers": fi.strikers, "hammers": fi.hammers.catalogue}
 FACTS = [
@@ -67,7 +67,7 @@ def test_the_constants_of_wood_are_those_of_a_solid(name):
 def test_every_material_is_one_and_none_looks_like_a_slip(name):
     made = fi.materials[name]
     assert made.notes == () and made.rho == fi.materials.entry(name).facts["rho"].value
-    known = read(fi.materials.entry(name).vary("material"))
+    known = read_inputs(fi.materials.entry(name).vary("material"))
     assert {"material.E", "material.rho"} <= {each.name for each in known}
 
 

@@ -14,7 +14,7 @@ SIDE = 0.1
 
 
 def integrals(modes):
-    return module.bending(module.known_of(modes))
+    return module.integrate_shapes(module.known_of(modes))
 
 
 def flexible(modes, values):
@@ -187,7 +187,7 @@ def test_a_stout_beam_by_formulas_has_the_slopes_of_one_by_elements(ends):
 
 def test_slopes_of_shapes_by_elements_are_those_of_closed_forms():
     mesh, plate, hinged = fi.mesh.rectangle(0.5, 0.3), fi.Plate(STEEL, 3e-3), {"boundary": "hinged"}
-    by_elements = module.bending(module.known_of(fi.find_modes(fi.assemble(mesh, plate, hinged), n_modes=30)))
-    exact = module.bending(module.known_of(fi.analytic.closed_form(mesh, plate, hinged)(n_modes=30)))
+    by_elements = module.integrate_shapes(module.known_of(fi.find_modes(fi.assemble(mesh, plate, hinged), n_modes=30)))
+    exact = module.integrate_shapes(module.known_of(fi.analytic.closed_form(mesh, plate, hinged)(n_modes=30)))
     np.testing.assert_allclose(by_elements.slope, exact.slope, rtol=2e-5)  # three Gauss points a side leave 9e-6
     np.testing.assert_allclose(by_elements.shear, exact.shear, rtol=1e-3)  # third derivatives of quintics: 7e-4

@@ -125,15 +125,15 @@ DAMAGED = {
 def test_a_damaged_file_does_not_count_and_is_replaced(place, benchmarks, text):
     place.parent.mkdir()
     place.write_bytes(text)
-    assert cost.read() is None
-    assert cost.calibrate() and cost.read() == SLOW
+    assert cost.read_machine() is None
+    assert cost.calibrate() and cost.read_machine() == SLOW
 
 
 @pytest.mark.parametrize("change", [{"stamp": "other"}, {"dense": 1e9}, {"dense": 0.0}, {"dense": float("nan")}])
 def test_other_kernels_and_impossible_numbers_do_not_count(place, change):
-    assert cost.keep(SLOW) and cost.read() == SLOW
+    assert cost.keep(SLOW) and cost.read_machine() == SLOW
     place.write_text(json.dumps(json.loads(place.read_text()) | change))
-    assert cost.read() is None
+    assert cost.read_machine() is None
 
 
 def test_doctor_says_where_nothing_can_be_kept(place, benchmarks):
@@ -144,7 +144,7 @@ def test_doctor_says_where_nothing_can_be_kept(place, benchmarks):
 def test_without_compiled_kernels_nothing_is_measured_or_kept(monkeypatch, benchmarks):
     monkeypatch.setattr(cost, "place", lambda: None)
     assert pytest.approx(12.0) == MUCH.seconds and cost.calibrate()
-    assert cost.read() is None and not cost.keep(SLOW) and not benchmarks
+    assert cost.read_machine() is None and not cost.keep(SLOW) and not benchmarks
 
 
 def test_a_disturbed_benchmark_is_not_believed(place, monkeypatch):

@@ -4,7 +4,7 @@ import pytest
 from comparing import examined
 
 import fem_impact as fi
-from fem_impact.model.unstated_damping import PLAUSIBLE
+from fem_impact.model.audit import PLAUSIBLE
 
 PLATE = fi.analytic.rectangle(0.4, 0.3, mass=0.2, first_frequency=100.0, n_modes=60)
 BLOW = {"at": (0.12, 0.09), "speed": 1.0}

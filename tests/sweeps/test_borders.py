@@ -152,5 +152,5 @@ def test_borders_that_were_not_looked_for_are_none():
 
 def test_points_that_are_known_to_the_cell_only_are_told_apart():
     line = borders.Border(1, ("mass", "stiffness"), np.ones((4, 2)), np.array([2e-4, 0.05, 7e-4, 0.1]))
-    told = borders._told(borders.FoundBorders((line,), np.zeros((3, 3), bool)), 0.02)
+    told = borders._describe_borders(borders.FoundBorders((line,), np.zeros((3, 3), bool)), 0.02)
     assert "located to 0.0007 of the axes, 2 of 4 points only to the cell" in told

@@ -128,26 +128,6 @@ def test_speed_matters_under_a_hard_layer():
     assert force[1] > 1.5 * 20.0 * force[0]
 
 
-def test_random_cells_of_a_map_are_the_single_blows():
-    rng = np.random.default_rng(3)
-    over = {"stiffness": np.geomspace(1e4, 1e6, 12), "mass": np.linspace(0.01, 0.2, 11), "target_mass": [0.2, 0.5, 5.0]}
-    table = fi.sweep(plate(), stick(), fi.Contact.linear(1e5), at=AT, speed=1.0, over=over)
-    for _ in range(12):
-        place = {name: int(rng.integers(len(values))) for name, values in over.items()}
-        cell = table.isel(place)
-        hit = fi.strike(
-            plate().scaled(mass=float(cell.target_mass)),
-            stick(float(cell.mass)),
-            fi.Contact.linear(float(cell.stiffness)),
-            at=AT,
-            speed=1.0,
-            tolerance=1e-3,
-        )
-        assert int(cell.n_impacts) == hit.n_impacts
-        assert_allclose(float(cell.restitution), hit.restitution, atol=1e-3)
-        assert_allclose(float(cell.contact_time), hit.contact_time, rtol=1e-3)
-
-
 def test_speed_only_scales_the_forces_of_linear_springs():
     over = {"speed": [0.5, 1.0, 3.0], "stiffness": [5e4, 8e5]}
     table = fi.sweep(plate(), stick(), fi.Contact.linear(1e5), at=AT, speed=7.0, over=over)

@@ -49,15 +49,15 @@ def test_a_wrong_distribution_is_refused(given, text):
 def test_inputs_must_be_named():
     for wrong in ({}, None, [("a", "normal(0, 1)")]):
         with pytest.raises(ValueError, match="vary must name at least one input"):
-            inputs.read(wrong)
+            inputs.read_inputs(wrong)
     with pytest.raises(ValueError, match="vary must map names to distributions"):
-        inputs.read({3: "normal(0, 1)"})
+        inputs.read_inputs({3: "normal(0, 1)"})
     with pytest.raises(ValueError, match="at most 64 inputs"):
-        inputs.read({f"a{i}": "normal(0, 1)" for i in range(65)})
+        inputs.read_inputs({f"a{i}": "normal(0, 1)" for i in range(65)})
 
 
 def pair():
-    return inputs.read({"a": ("normal", 0.0, 1.0), "b": ("uniform", 0.0, 1.0)})
+    return inputs.read_inputs({"a": ("normal", 0.0, 1.0), "b": ("uniform", 0.0, 1.0)})
 
 
 @pytest.mark.parametrize("given", [{("a", "b"): 0.6}, {("b", "a"): 0.6}, [[1.0, 0.6], [0.6, 1.0]]])

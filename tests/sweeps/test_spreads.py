@@ -28,7 +28,7 @@ def spread(restitution, *, values=None, n_parts=1, counts=None, names=("a",), **
         "part": ("blow", np.arange(n) % n_parts),
         "failure": ("blow", np.where(counts < 0, "no luck", "")),
     }
-    told = inputs.read({name: ("lognormal", 1.0, SIGMAS[name]) for name in names})
+    told = inputs.read_inputs({name: ("lognormal", 1.0, SIGMAS[name]) for name in names})
     return Spread(told, xarray.Dataset(data), 1e-3, n_parts > 1, **rest)
 
 
@@ -88,7 +88,7 @@ def test_questions_name_what_is_known():
 
 def grouped(function, n=2**12):
     """A spread of a function of three lognormal inputs, in groups for Sobol indices."""
-    told = inputs.read({name: ("lognormal", 1.0, sigma) for name, sigma in SIGMAS.items()})
+    told = inputs.read_inputs({name: ("lognormal", 1.0, sigma) for name, sigma in SIGMAS.items()})
     values = inputs.drawn(told, inputs.crossed(inputs.shares(n, 6, 0)), None)
     return spread(function(*values.T), values=values, n_parts=5, names=tuple(SIGMAS))
 
