@@ -366,23 +366,19 @@ def test_mutated_scene_loads_or_says_why(tmp_path, line, value, how):
         assert np.isfinite(loaded.modes(2).frequencies).all()
 
 
-def test_sphere_beyond_the_range_of_floats_is_an_error(tmp_path):
-    text = (SCENES / "disk.toml").read_text(encoding="utf-8").replace("radius = 5e-3", "radius = 1e308")
-    with pytest.raises(ValueError, match=r"\[striker\] radius must lie between 1e-09 and"):
-        load_text(tmp_path, text)
-
-
-def test_section_beyond_the_range_of_floats_is_an_error_without_warnings(tmp_path):
-    text = (SCENES / "marimba_bar.toml").read_text(encoding="utf-8").replace("width = 0.05", "width = 1e308")
-    with pytest.raises(ValueError, match=r"scene\.toml: \["):  # warnings are errors here, and would come first
+@pytest.mark.parametrize(
+    ("name", "old", "new", "words"),
+    [
+        ("disk", "radius = 5e-3", "radius = 1e308", r"\[striker\] radius must lie between 1e-09 and"),
+        ("marimba_bar", "width = 0.05", "width = 1e308", r"scene\.toml: \["),
+        ("drumstick", "length = 0.2945", "length = true", r"\[mesh\] length must be a number in m, got True"),
+    ],
+)
+def test_numbers_that_are_none_or_beyond_floats_name_file_and_table_once(tmp_path, name, old, new, words):
+    text = (SCENES / f"{name}.toml").read_text(encoding="utf-8").replace(old, new)
+    with pytest.raises(ValueError, match=words) as caught:  # warnings are errors here, and would come first
         load_text(tmp_path, text).strike()
-
-
-def test_file_and_table_are_named_once(tmp_path):
-    text = (SCENES / "drumstick.toml").read_text(encoding="utf-8").replace("length = 0.2945", "length = true")
-    with pytest.raises(ValueError, match="length must be a number in m, got True") as caught:
-        load_text(tmp_path, text).modes(2)
-    assert str(caught.value).count("[mesh]") == 1 and str(caught.value).count(str(tmp_path / "scene.toml")) == 1
+    assert str(caught.value).count("[") == 1 and str(caught.value).count(str(tmp_path / "scene.toml")) == 1
 
 
 @pytest.mark.parametrize("shape", ['shape = "file"\npath = "{}"', 'shape = "outline"\nsource = "{}"'])
