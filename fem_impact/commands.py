@@ -154,7 +154,7 @@ def _write_heard(
     if not rings:
         return files, []
     with stages("sound"):
-        sounds = hearing.write(folder, scene, response, duration=options.duration, normalise=options.normalise)
+        sounds = hearing.write_sounds(folder, scene, response, duration=options.duration, normalise=options.normalise)
     return [*files, "modes.pvd", *(heard["file"] for heard in sounds)], sounds
 
 
@@ -162,7 +162,7 @@ def _save_response(folder: Path, scene: Any, response: Any, data: dict[str, Any]
     from .scenes import results  # imported only when needed
 
     fi.export.write_json(folder / "response.json", data)
-    results.save(folder, response, scene.points)
+    results.save_response(folder, response, scene.points)
 
 
 def _strike_in_turn(options: argparse.Namespace, scene: Any) -> Answer:
@@ -183,7 +183,7 @@ def _strike_in_turn(options: argparse.Namespace, scene: Any) -> Answer:
         files, sounds = _write_heard(staging, scene, found, options, stages)
         tables, copies = scene.kept(staging, tolerance=found.tolerance)
         seconds = {**stages.seconds, "total": time.perf_counter() - began}
-        data = {**sequence.numbers(found, tables, seconds), "sounds": sounds, "files": files + copies}
+        data = {**sequence.sequence_numbers(found, tables, seconds), "sounds": sounds, "files": files + copies}
         _save_response(staging, scene, found, data)
     said = [title_of(scene), found.summary(), *heard(sounds), f"Time: {seconds['total']:.2f} s"]
     return answer(data, *said, folder=folder, files=data["files"], missed=not found.tolerance_met)
@@ -230,7 +230,7 @@ def map_of(options: argparse.Namespace) -> Answer:
                 borders=True if options.borders else None, refine=False if options.every_cell else None,
             )  # fmt: skip
         with display("files"):
-            names = maps.write(staging, table, form, picture)
+            names = maps.write_map(staging, table, form, picture)
     axes = {str(name): size for name, size in table.n_impacts.sizes.items()}
     single, failed = int((table.n_impacts == 1).sum()), int((table.n_impacts < 0).sum())
     data: dict[str, Any] = {"n_blows": table.n_impacts.size, "axes": axes, "n_single": single, "n_failed": failed}
@@ -274,7 +274,7 @@ def spread(options: argparse.Namespace) -> Answer:
                 store=options.store, watch=partial(display.report, "blows"),
             )  # fmt: skip
         with display("files"):
-            names = uncertainty.write(staging, found, options.format)
+            names = uncertainty.write_spread(staging, found, options.format)
     seconds = time.perf_counter() - began
     said = [title_of(scene), found.summary().splitlines(), f"Time: {seconds:.2f} s"]
     return answer({**found.data(), "seconds": {"total": seconds}}, *said, folder=folder, files=names)
@@ -415,7 +415,7 @@ def new(options: argparse.Namespace) -> Answer:
         options.kind, path.parent, drawing=options.drawing, unit=options.unit, material=options.material,
         mallet=options.mallet,
     )  # fmt: skip
-    templates.write(path, options.kind, whole)
+    templates.write_scene(path, options.kind, whole)
     verb = "map" if options.kind == "map" else "strike"
     found = answer_of_file({"notes": notes}, noted(notes), path)
     return found._replace(said=[*(found.said or ()), f"Next: fem-impact {verb} {path}"])
@@ -539,5 +539,5 @@ def fit(options: argparse.Namespace) -> Answer:
         data, files = prompt.write(staging, found, scene, proposal)
         with display("page"):
             target, at = (None, None) if scene is None else (scene.modes(), scene.blow.values["at"])
-            fit_page.write(staging / "fit.html", found, title=f"Taps of {options.scene.name}", target=target, at=at)
+            fit_page.write_fit(staging / "fit.html", found, title=f"Taps of {options.scene.name}", target=target, at=at)
     return answer(data, (proposal or found).summary(), folder=folder, files=["fit.html", *files])

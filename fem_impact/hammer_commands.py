@@ -14,7 +14,7 @@ from . import replies
 from ._base import check
 from ._base.explained import noted
 from ._base.files import staged
-from .scenes import tips
+from .scenes.sentences import tip_notes
 
 MASSES = [m * 10.0**e for e in (-3, -2, -1) for m in (1.0, 2.0, 5.0)] + [1.0]  # [kg] of hammers from 1 g to 1 kg
 PAUSE = 0.5  # [s] between two looks at a folder: a file that nobody wrote to for so long is complete
@@ -24,14 +24,15 @@ def hammer(options: argparse.Namespace) -> replies.Answer:
     """Find hammers for a bandwidth, or plan a test with one that roves."""
     scene = fi.load_scene(options.scene)
     masses = options.masses or MASSES
-    notes = tips.said_of(scene)
+    notes = tip_notes(scene)
     if options.catalogue is not None:
         return _sheets(options, scene, notes)
     if options.rove is not None:
         return _rove(options, scene, masses, notes)
     drawn = replies.picture_of(options, "hammers.png")
     with replies.progress_of(options, tells=True)("hammers"):
-        hammers = tips.hammers_for(scene, options.bandwidth, masses, drop=options.drop, between=True)
+        body, at = scene.built.target, scene.blow.values["at"]  # its own striker and contact are ignored
+        hammers = fi.hammers.choose_on(body, at, options.bandwidth, masses, drop=options.drop, between=True)
         if drawn is not None:
             from .show import plots  # imported only when needed, as matplotlib takes a second
 
@@ -95,7 +96,7 @@ def _sheets(options: argparse.Namespace, scene: Any, notes: Sequence[str]) -> re
         kit = roving.catalogued(options.catalogue, options.bandwidth, options.drop, heaviest)
         plan = roving.of_scene(scene, kit, options.bandwidth, options.drop, number)
     with staged(path.parent) as staging:
-        hammer_sheet.write(staging / path.name, plan, title=replies.title_of(scene), notes=tuple(notes))
+        hammer_sheet.write_sheets(staging / path.name, plan, title=replies.title_of(scene), notes=tuple(notes))
     data = {"table": plan.table(), "verdicts": plan.verdicts, "resolution": plan.resolution}
     said = [replies.title_of(scene), *noted(notes), plan.summary()]
     return replies.answer_of_file({**data, "notes": [*notes, *plan.notes]}, said, path)
@@ -152,8 +153,8 @@ def _write_page(path: Path, options: argparse.Namespace, heard: Any) -> None:
                 f"--against must be a scene with one observation point for each of {heard.found.sizes['channel']} "
                 f"responses, got {len(scene.points)}; list them in [observe]"
             )
-        frf_page.write(path, heard.found, title=f"Taps of {options.scene.name}", taps=heard.taps, computed=computed,
-                       points=points)  # fmt: skip
+        title = f"Taps of {options.scene.name}"
+        frf_page.write_responses(path, heard.found, title=title, taps=heard.taps, computed=computed, points=points)
 
 
 def watch(options: argparse.Namespace) -> replies.Answer | None:

@@ -41,7 +41,7 @@ from scenes import QUICK as SCENE
 import fem_impact as fi
 from fem_impact import cli
 from fem_impact._base import isolated
-from fem_impact.scenes import maps, tips
+from fem_impact.scenes import maps
 from fem_impact.scenes.scene import Scene
 from fem_impact.sweeps.cases import Cases
 from fem_impact.sweeps.cells import Case
@@ -313,7 +313,8 @@ def command_samples() -> list[tuple[str, bytes]]:
     path.write_text(QUICK)
     scene = fi.load_scene(path)
     run, modes = scene.run(), scene.modes(5)
-    tips.hammers_for(scene, 800.0, [0.1])  # compiles, which may take half a minute
+    # compiles, which may take half a minute
+    fi.hammers.choose_on(scene.built.target, scene.blow.values["at"], 800.0, [0.1])
     maps.map_scene(scene)
     fi.figures.save = lambda path, figure: Path(path).write_bytes(b"")
     fi.report.write = lambda path, scene, run: Path(path).write_bytes(b"")

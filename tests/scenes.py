@@ -1,5 +1,7 @@
 """Scenes that strike at once, as text, for tests of everything around the strike."""
 
+import fem_impact as fi
+
 QUICK = """
 [mesh]
 shape = "rectangle"
@@ -54,3 +56,10 @@ at = [0.17]
 speed = 1.0
 tolerance = 1e-2
 """
+
+
+def load_text(folder, text=SMALL):
+    """The scene of a text, in a file of its own."""
+    path = folder / "scene.toml"
+    path.write_text(text, encoding="utf-8")
+    return fi.load_scene(path)

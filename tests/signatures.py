@@ -57,7 +57,7 @@ INNER = {
     "export.plain", "export.versions", "export.csv_text", "export.run_data", "export.vtk_ending", "figures.snapshot",
     "figures.in_hertz", "figures.styled", "sound.Sound",
     "hammers.Hammer", "hammers.bandwidth_of", "hammers.impacts_of_tips", "hammers.falls", "hammers.half_sine_reach",
-    "report.SoundPlayer", "report.audio", "report.template",
+    "report.SoundPlayer",
     "lesson.write", "lesson.Written", "lesson.Written.data", "lesson.Written.summary",  # many blows, see test_lesson
     "explore.serve",  # ends at an interruption only, see test_explore
     "ToleranceWarning", "analytic.closed_form", "Striker.let_go",
@@ -138,7 +138,7 @@ def things() -> dict[str, Any]:
     )  # fmt: skip
     run = scene.run()
     fi.export.write_json(folder / "response.json", fi.export.run_data(run, scene.data()))
-    results.save(folder, run.response, scene.points)
+    results.save_response(folder, run.response, scene.points)
     frequency = np.arange(1.0, 301.0)
     H = fi.mobility(bar.damped(0.02), [0.0], [0.0], frequency, "accelerance")
     responses = xarray.Dataset(

@@ -15,7 +15,7 @@ def test_stages_and_maps_are_logged_under_the_name_of_the_package(caplog, capsys
     law, striker = fi.Contact.linear(1e5), fi.Striker.rigid(0.05)
     plate = fi.analytic.rectangle(1.55, 1.0, mass=0.2, first_frequency=100.0, n_modes=20)
     with caplog.at_level(logging.INFO, logger="fem_impact"):
-        templates.write(tmp_path / "beam.toml", "beam")
+        templates.write_scene(tmp_path / "beam.toml", "beam")
         fi.load_scene(tmp_path / "beam.toml").strike(tolerance=1e-1)
         fi.sweep(plate, striker, law, at=(0.4, 0.3), speed=1.0, over={"mass": [0.01, 0.02]}, tolerance=1e-1)
         hits = fi.strokes(plate, [(0.0, striker, law, (0.4, 0.3), 1.0)], tolerance=0.5)

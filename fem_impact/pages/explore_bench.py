@@ -15,7 +15,6 @@ from ..scenes.scene import Scene, load_scene, scene_of
 
 LARGEST_DRAWING = 8_000_000  # [byte] of a dropped file: drawings take some kilobytes, meshes of a million nodes more
 RESCALED = ("mass", "first_frequency")  # keys of [target] that were measured on the scene's own material
-THICKNESSES = (1e-5, 1.0)  # [m] thinnest and thickest plate that a page may ask for: a film, a wall
 
 
 @dataclass(frozen=True)
@@ -111,7 +110,7 @@ def order_of(wanted: Any, folder: Path | None, before: Order, at: tuple[float, .
         dropped = drawing is not None
     thickness = before.thickness
     if "thickness" in wanted:
-        thickness = check.between("thickness", float(wanted["thickness"]) * 1e-3, *THICKNESSES, "m")
+        thickness = check.between("thickness", float(wanted["thickness"]) * 1e-3, 1e-5, 1.0, "m")  # a film, a wall
     unit = words.get("unit", before.unit if same else None)
     place = at if same and unit == before.unit else None
     return Order(

@@ -17,7 +17,6 @@ from .explore_model import MAP_TOLERANCE, Settings, Setup, quick
 FIRST = {False: (25, 17), True: (13, 9)}  # [-] points of mass and stiffness at first, with True where blows take longer
 FINEST = 385  # [-] points of mass at most: about one per pixel of the picture
 DRAFT = 3e-2  # [-] of the blows drawn first: borders move by a fifth of a pixel (studies/benchmarks/explore_speed.py)
-LIMITS = 97  # [-] hammers whose thresholds are found; their points are among these on the whole map
 MORE = 4  # [-] impacts from which on the map makes no difference
 NARROWEST = 1.001  # [-] ratio of the ends of an axis when zoomed in
 
@@ -68,7 +67,7 @@ class Mapper:
         self.about: tuple[Settings, Modes | None] | None = None  # settings and body that what follows is of
         self.case: cases.Case  # with mass and stiffness of the scene
         self.kernels: batches.Kernels = {}
-        self.limits: np.ndarray | None = None  # (LIMITS,) [Hz] threshold of hammers all along the map
+        self.limits: np.ndarray | None = None  # (n,) [Hz] threshold of hammers all along the map
 
     def first(self, settings: Settings, window: Window, body: Modes | None = None) -> Picture:
         """The map in its coarsest form; the settings' mass and stiffness do not matter, ``body`` as in `Setup.case`."""
@@ -79,13 +78,13 @@ class Mapper:
         x, y = (part.ravel() for part in np.meshgrid(mass, stiffness))
         counts = self._counts(x, y, DRAFT).reshape(len(stiffness), len(mass))
         found = self._thresholds(mass)
-        there = [self.setup.case(replace(settings, mass=float(one), stiffness=1.0), body=body) for one in mass]
         if law.special:  # as far as the map goes
             reached = [[self.setup.case(replace(settings, mass=float(m), stiffness=float(k))).resonance
                         for k in stiffness] for m in mass]  # fmt: skip
             rising = np.maximum.accumulate(reached, axis=1)
             limit = [np.interp(*at, np.log(stiffness), math.nan, math.nan) for at in zip(found, rising)]
             return Picture(mass, stiffness, counts, found, mass, np.exp(limit))
+        there = (self.setup.case(replace(settings, mass=float(one), stiffness=1.0), body=body) for one in mass)
         ratio = found / np.array([one.resonance for one in there])
         ratio[~((ratio > 0.0) & (ratio < math.inf))] = math.nan
         # contact resonance ~ stiffness**(1 / (exponent + 1))
@@ -164,6 +163,12 @@ class Mapper:
         counts[y, x] = self._counts(picture.mass[x], picture.stiffness[y], MAP_TOLERANCE)
         return replace(picture, n_impacts=counts, tolerance=MAP_TOLERANCE)
 
+    @property
+    def batched(self) -> bool:
+        """Whether blows of these settings are struck many at once."""
+        laws = {name: np.array([value]) for name, value in law_numbers(self.case.contact).items()}
+        return bool(cases.batchable(laws).all()) and not self.case.modes.stretches
+
     def _begin(self, settings: Settings, body: Modes | None) -> None:
         """Forget what is kept if the settings, but for their place on the map, or the body are others."""
         settings = replace(settings, mass=self.setup.start.mass, stiffness=1.0)
@@ -173,13 +178,13 @@ class Mapper:
 
     def _thresholds(self, mass: np.ndarray) -> np.ndarray:
         """Thresholds (n,) [Hz] of hammers (n,) [kg], interpolated between those found once for the whole map."""
-        along = np.geomspace(*self.setup.range("mass"), LIMITS)
+        along = np.geomspace(*self.setup.range("mass"), 97)  # the points of the whole map are among these
         if self.limits is None:
             felt = self.case.striker.felt_mass / self.case.striker.mass
             self.limits = threshold.thresholds(self.case.modes, self.case.at, felt * along)
-        place = np.interp(np.log(mass), np.log(along), np.arange(LIMITS))
+        place = np.interp(np.log(mass), np.log(along), np.arange(len(along)))
         low, part = place.astype(int), place % 1.0
-        near, far = self.limits[low], self.limits[np.minimum(low + 1, LIMITS - 1)]
+        near, far = self.limits[low], self.limits[np.minimum(low + 1, len(along) - 1)]
         some = (near > 0.0) & np.isfinite(near) & (far > 0.0) & np.isfinite(far)
         ratio = np.divide(far, near, out=np.ones(len(mass)), where=some)
         return np.where(some, near * ratio**part, np.where(part < 0.5, near, far))
@@ -192,8 +197,7 @@ class Mapper:
         hard = stiffness * law.stiffness
         lossy = law.loss > 0.0
         counts = np.full(len(mass), np.nan)
-        laws = {name: value * shared for name, value in law_numbers(law).items()}
-        if cases.batchable(laws).all() and not case.modes.stretches:
+        if self.batched:
             family = {0: batches.Family.of(case.modes, case.at, case.striker, True, lossy)}
             blows = batches.Blows(
                 family, np.zeros(len(mass), int), case.modes.mass * shared, mass, hard, law.exponent * shared,

@@ -22,10 +22,8 @@ from ..scenes.scene import Scene
 from ..scenes.schema import PATHS
 from ..sweeps import bodies, grid
 
-MAP_TOLERANCE = 1e-2  # [-] of the blows on the map, which only counts impacts
+MAP_TOLERANCE = 1e-2  # [-] of the blows on the map, which only counts impacts, and of vectors: seconds for each point
 FIRST_LOOK = 30  # [-] modes found first, to estimate the number needed
-MOST_MODES = 100  # [-] largest number; the residual compliance replaces the rest, and the page shows the error
-VECTORS = 1e-2  # [-] error limit of the vectors of a plate by elements: some seconds for each strike point
 SPANS = {  # [-] slider end over the scene's value
     "thickness": 2.0, "mass": 20.0, "stiffness": 1000.0, "speed": 10.0, "bending": 20.0
 }  # fmt: skip
@@ -57,7 +55,7 @@ class Setup:
 
     @classmethod
     def of(cls, scene: Scene, loose: bool = False, before: "Setup | None" = None) -> "Setup":
-        """The setup of a scene, with enough modes for its shortest blow, but at most `MOST_MODES`.
+        """The setup of a scene, with enough modes for its shortest blow, but at most a hundred.
 
         If vectors can tell the blows, the first few modes do: they bridge the seconds until the vectors of a new strike
         point are found. ``before`` is a setup of the same body, whose modes are taken as far as they reach.
@@ -78,7 +76,8 @@ class Setup:
         if needed <= first.n_modes:
             return setup
         plan = plan or scene.plan(target="modal", n_modes=FIRST_LOOK)
-        _, more = plan.but(n_modes=min(needed, MOST_MODES)).description.found(Stages())
+        # the residual compliance replaces the rest, and the page shows the error
+        _, more = plan.but(n_modes=min(needed, 100)).description.found(Stages())
         return replace(setup, base=replace(case, modes=more))
 
     @property
@@ -166,11 +165,11 @@ class Setup:
         # of the sliders' logarithmic way to the hardest blow that vectors are made for
         for share in (1.0, 0.75, 0.5, 0.25, 0.0):
             hard = harder(share)
-            size = vectors.size_for(target, case.with_values(hard).resonance, VECTORS)
+            size = vectors.size_for(target, case.with_values(hard).resonance, MAP_TOLERANCE)
             if refinement.unknowns(target.element, target.mesh, size) <= 10_000:  # besides those nearest to the blow
                 masses = start.mass, start.mass * SPANS["mass"] ** (0.5 * share)
                 heavier = [{**harder(part * share), "mass": mass} for part in (0.0, 0.5, 1.0) for mass in masses]
-                sized = bodies.Sized(target, case, [hard, harder(-share)], heavier, VECTORS)
+                sized = bodies.Sized(target, case, [hard, harder(-share)], heavier, MAP_TOLERANCE)
                 views = sized.views(point[None], Stages())
                 return None if views is None else next(iter(views.values()))
         return None

@@ -22,13 +22,14 @@ from ..scenes.sentences import RAISED, place, power, si
 from ..show import sound
 from ..show.figures import SPECTRUM_DEPTH
 from ..sweeps.grid import Case
-from . import report
 from .explore_bench import Order, built
 from .explore_map import Mapper, Picture, Window
 from .explore_model import MAP_TOLERANCE, Settings, Setup, limit_of, quick
+from .html_page import QUIET, audio
 
 BAND = (20.0, 20e3)  # [Hz] of the spectrum: the audible range
 SPECTRUM_POINTS = 240  # [-] more points take time but show no more
+SPECTRUM_FACTS = {"band": BAND, "points": SPECTRUM_POINTS, "depth": SPECTRUM_DEPTH}  # as pages draw it
 PLAYED = 2.0  # [s] of sound: short enough to compute at each press of the button
 KNOWN = 8  # [-] strike points remembered
 Point = tuple[float, ...]
@@ -119,12 +120,14 @@ class Explorer:
         about = case.at.tobytes(), settings.at in self.views, settings.mass, settings.thickness
         if self.limit[0] != about:  # contact, speed and damping do not change it
             self.limit = about, limit_of(case)
-        resonance, limit = case.resonance, self.limit[1]
-        ratio = f"body {'never' if limit else 'always'} stops it"
-        if 0.0 < limit < math.inf:
-            ratio = f"{resonance / limit:.2g} × threshold"
+        resonance, limit = case.resonance, found_limit(self.limit[1])
+        ratio = (
+            f"{resonance / limit:.2g} × threshold"
+            if limit
+            else f"body {'never' if self.limit[1] else 'always'} stops it"
+        )
         message = {
-            "resonance": resonance, "limit": limit if 0.0 < limit < math.inf else None,
+            "resonance": resonance, "limit": limit,
             "resonates": f"{si(resonance, 'Hz', 3)}, {ratio}",
             "scene": markup.data_uri("application/toml", written(self.setup.saved(settings)).encode()),
         }  # fmt: skip
@@ -159,7 +162,7 @@ class Explorer:
         faster = replace(kept.settings, speed=share * kept.settings.speed)
         return _heard(kept.setup, faster, kept.where, kept.height, None)
 
-    def said(self, settings: Settings, height: float, rate: float) -> dict[str, str]:
+    def tell_sliders(self, settings: Settings, height: float, rate: float) -> dict[str, str]:
         """What each slider stands at, in words."""
         law = self.setup.law(settings)
         raised = "" if settings.exponent == 1.0 else f"{settings.exponent:.3g}".translate(RAISED)
@@ -193,10 +196,10 @@ def _heard(setup: Setup, settings: Settings, where: Point, height: float, rate: 
     except (SimulationError, ValueError) as error:
         return {"uri": "", "note": str(error)}
     level = heard.peak_level
-    raised = max(0.0, report.QUIET - level) if math.isfinite(level) else 0.0  # of a sound that is quiet
+    raised = max(0.0, QUIET - level) if math.isfinite(level) else 0.0  # of a sound that is quiet
     note = f"Peak {heard.said}; full scale {heard.full_scale:g} {heard.unit}"
     note = (note + (f", raised here by {raised:.1f} dB." if raised else ".")).replace("-", "−")
-    uri = report.audio(heard.samples * 10.0 ** (raised / 20.0), heard.rate)
+    uri = audio(heard.samples * 10.0 ** (raised / 20.0), heard.rate)
     place_of = f"{si(height, 'm', 3)} above {place(where)}" if height > 0.0 else f"the surface at {place(where)}"
     return {
         "uri": uri, "note": f"Heard from {place_of}. {note}", "unit": heard.unit,
@@ -220,13 +223,18 @@ def packed(values: np.ndarray, kind: str = "<f4") -> str:
     return base64.b64encode(np.asarray(values, kind).tobytes()).decode("ascii")
 
 
-def drawn(picture: Picture) -> Message:
-    """A map as the page draws it."""
+def drawn(picture: Picture, pack: Callable[[Any, str], str] = packed) -> Message:
+    """A map as the page draws it; ``pack`` makes texts of its numbers."""
     return {
-        "columns": len(picture.mass), "rows": len(picture.stiffness), "counts": packed(picture.n_impacts, "i1"),
+        "columns": len(picture.mass), "rows": len(picture.stiffness), "counts": pack(picture.n_impacts, "i1"),
         "mass": picture.mass[[0, -1]].tolist(), "stiffness": picture.stiffness[[0, -1]].tolist(),
-        "x": packed(picture.limit_mass), "y": packed(picture.limit),
+        "x": pack(picture.limit_mass, "<f4"), "y": pack(picture.limit, "<f4"),
     }  # fmt: skip
+
+
+def found_limit(value: float) -> float | None:
+    """A threshold [Hz] as pages draw it: None if the body always or never stops the striker."""
+    return value if 0.0 < value < math.inf else None
 
 
 def _force(hit: Response) -> Message:
@@ -238,7 +246,7 @@ def _force(hit: Response) -> Message:
 def _spectrum(hit: Response) -> Message:
     size = force_spectrum.magnitude(hit.time, hit.force, np.geomspace(*BAND, SPECTRUM_POINTS))
     top = float(size.max()) or 1.0
-    return {"spectrum": packed(np.maximum(size, 0.1 * SPECTRUM_DEPTH * top)), "top": top}
+    return {"spectrum": packed(np.maximum(size, 0.1 * SPECTRUM_DEPTH * top))}
 
 
 def _numbers(hit: Response, exact: bool) -> list[tuple[str, str]]:

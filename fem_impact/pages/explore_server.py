@@ -13,12 +13,12 @@ from tornado.web import Application, RequestHandler
 from tornado.websocket import WebSocketClosedError, WebSocketHandler
 
 from .._base import check
-from . import report
 from .explore_bench import LARGEST_DRAWING, safe_name
 from .explore_numbers import Explorer
 from .explore_session import Session
 from .explore_view import page, parsed
 from .explore_worker import Worker
+from .html_page import web_text
 
 LOG = logging.getLogger(__name__)
 LOCAL = "127.0.0.1"
@@ -81,7 +81,7 @@ class Talk(WebSocketHandler):
         if self.session.closed:
             return
         try:
-            self.session.take(parsed(message))
+            self.session.obey(parsed(message))
         except ValueError as error:  # no page of ours sends this
             LOG.warning("a page is refused: %s", check.line(str(error)))
             self.session.close()
@@ -127,7 +127,7 @@ def open_server(explorer: Explorer, workers: list[Worker], port: int, folder: Pa
     origins = {f"http://{host}" for host in hosts}
     parts = {"/": ("html", page())}
     for name, kind in (("explore.css", "css"), ("plots.js", "javascript"), ("explore.js", "javascript")):
-        parts[f"/{name}"] = kind, (report.WEB / name).read_text(encoding="utf-8")
+        parts[f"/{name}"] = kind, web_text(name)
     shared = {"origins": origins, "explorer": explorer, "workers": workers, "folder": folder, "pages": set()}
     application = Application(
         [*((path, Text, {"kind": kind, "text": text}) for path, (kind, text) in parts.items()),

@@ -3,10 +3,9 @@
 import asyncio
 from collections import deque
 from collections.abc import Callable
-from concurrent.futures import Future
 from dataclasses import replace
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any
 
 from .._base.check import SimulationError
 from ..scenes.sentences import place, si
@@ -15,19 +14,10 @@ from .explore_map import Mapper, Picture, Window
 from .explore_model import Settings, Setup
 from .explore_numbers import Explorer, Message, Point, View, drawn
 from .explore_view import RATES, check_sliders, ends, laid_out, number_of, pair
+from .explore_worker import Worker
 
 LETTERS = "ABCDEFGH"  # of kept blows: more curves in one picture are a tangle
-WAITING = 8  # [-] hits computed one after another; of a longer queue the oldest are too late to be played
-SHARES = (0.1, 10.0)  # [-] of the speed that keys and MIDI may ask for
 REST = 0.15  # [s] without a change before the blow is judged and the map drawn again
-
-
-class Asks(Protocol):
-    """What a `Worker` does."""
-
-    ended: int
-
-    def ask(self, function: Callable[..., Any], *arguments: Any) -> "Future[Any]": ...
 
 
 class _Superseded(Exception):
@@ -43,7 +33,7 @@ class Session:
     """
 
     def __init__(
-        self, explorer: Explorer, judge: Asks, mapper: Asks, send: Callable[[Message], Any],
+        self, explorer: Explorer, judge: Worker, mapper: Worker, send: Callable[[Message], Any],
         pages: set["Session"] | None = None, folder: Path | None = None,
     ) -> None:  # fmt: skip
         self.explorer, self.judge, self.mapper, self.send = explorer, judge, mapper, send
@@ -53,7 +43,8 @@ class Session:
         self.height, self.rate = 0.0, RATES[2]
         self.order: Order | None = None  # what the page wants on the bench
         self.tasks: dict[str, asyncio.Task[None]] = {}  # opening, judging, mapping, listening
-        self.hits: deque[tuple[str, float]] = deque(maxlen=WAITING)  # letters and shares of the speed
+        # letters and shares of the speed; of a longer queue the oldest are too late to be played
+        self.hits: deque[tuple[str, float]] = deque(maxlen=8)
         self.roll: bool | None = None  # whether to play a roll or a blow next
         self.closed = False
         self._begin()
@@ -84,9 +75,7 @@ class Session:
 
     def _restart(self) -> None:
         """Show another body, or another mallet; what was computed for the one before is not wanted any more."""
-        for handle in (self.asked, self.resting, *(task for name, task in self.tasks.items() if name != "open")):
-            if handle is not None:
-                handle.cancel()
+        self._cancel(*(task for name, task in self.tasks.items() if name != "open"))
         heard_at = self.heard_at
         self._begin()
         if self.explorer.order.at is not None:
@@ -97,11 +86,14 @@ class Session:
         """The page is gone."""
         self.closed = True
         self.pages.discard(self)
-        for handle in (self.asked, self.resting, *self.tasks.values()):
+        self._cancel(*self.tasks.values())
+
+    def _cancel(self, *tasks: "asyncio.Task[None]") -> None:
+        for handle in (self.asked, self.resting, *tasks):
             if handle is not None:
                 handle.cancel()
 
-    def take(self, message: Any) -> None:
+    def obey(self, message: Any) -> None:
         """Do what the page asks for; ValueError if that makes no sense."""
         if not isinstance(message, dict):
             raise ValueError("a message must be a table")
@@ -115,7 +107,11 @@ class Session:
         elif "forget" in message:
             self._forget(message["forget"])
         elif "hit" in message:
-            self.hits.append(_hit_of(message["hit"]))
+            told = message["hit"]
+            if not isinstance(told, dict) or not isinstance(told.get("letter"), str):
+                raise ValueError("hit must be a table of letter and share")
+            share = min(max(number_of("share", told.get("share")), 0.1), 10.0)  # of the speed
+            self.hits.append((told["letter"][:1], share))
             self._start("hit", self._hit)
         elif "open" in message:
             self._order(message["open"])
@@ -165,7 +161,7 @@ class Session:
         again, notes = self._turn()
         self.number = number = self.last
         explorer, settings = self.explorer, self.settings
-        said = explorer.said(settings, self.height, self.rate)
+        said = explorer.tell_sliders(settings, self.height, self.rate)
         about = {"number": number, "said": said, "at": settings.at, "ear": self.heard_at, "note": " ".join(notes)}
         about |= {"mass": settings.mass, "stiffness": settings.stiffness}
         if not again:
@@ -201,7 +197,7 @@ class Session:
         except (SimulationError, ValueError) as error:
             self.send({"kind": "note", "text": f"{error}."})
 
-    async def _ask(self, worker: Asks, function: Callable[..., Any], *arguments: Any) -> Any:
+    async def _ask(self, worker: Worker, function: Callable[..., Any], *arguments: Any) -> Any:
         """The answer of a process; the page is told if that had to be replaced."""
         ended = worker.ended
         answer = await asyncio.wrap_future(worker.ask(function, *arguments))
@@ -275,10 +271,13 @@ class Session:
             many = f"{len(LETTERS)} blows are kept: forget one first."
             self.send({"kind": "note", "text": f"{found['failed']}." if "failed" in found else many})
             return
+        order = explorer.order
         told = {
             "kind": "kept", "letter": letter, "heading": self.setup.scene.title or self.setup.scene.path.stem,
             "words": f"{si(settings.mass, 'kg', 3)} with {si(settings.speed, 'm/s', 3)} at {place(settings.at)}",
-            "at": settings.at, "body": _body(explorer.order), "sound": sound, **found,
+            # what tells bodies apart whose points can be shown in one picture
+            "body": f"{order.drawing.name if order.drawing else ''} {order.unit or ''}",
+            "at": settings.at, "sound": sound, **found,
         }  # fmt: skip
         explorer.keep(letter, settings, where, height, told)
         self.mapper.ask(Explorer.keep, letter, settings, where, height, {})
@@ -335,15 +334,3 @@ class Session:
                 sound = {"uri": "", "note": f"{error}."}
             if self.roll is None:
                 self.send({"kind": "sound", **sound})
-
-
-def _hit_of(told: Any) -> tuple[str, float]:
-    """Letter and share of the speed of a key; ValueError if a page sends anything else."""
-    if not isinstance(told, dict) or not isinstance(told.get("letter"), str):
-        raise ValueError("hit must be a table of letter and share")
-    return told["letter"][:1], min(max(number_of("share", told.get("share")), SHARES[0]), SHARES[1])
-
-
-def _body(order: Order) -> str:
-    """What tells bodies apart whose points can be shown in one picture."""
-    return f"{order.drawing.name if order.drawing else ''} {order.unit or ''}"

@@ -10,12 +10,11 @@ import numpy as np
 from .._base.rounding import SAME
 from ..fe.section import Plate
 from ..mesh.meshes import Mesh
-from ..show.figures import SPECTRUM_DEPTH
 from .explore_bench import LARGEST_DRAWING
 from .explore_map import NARROWEST
 from .explore_model import Setup
-from .explore_numbers import BAND, SPECTRUM_POINTS
-from .report import template
+from .explore_numbers import SPECTRUM_FACTS
+from .html_page import template
 
 SLIDERS = {
     "x": "Strike point x", "y": "Strike point y", "height": "Height of the listener", "rate": "Strokes of a roll",
@@ -53,10 +52,7 @@ def ends(setup: Setup) -> Ends:
 
 def page() -> str:
     """The page as HTML, before it is told what it shows."""
-    facts = {
-        "steps": STEPS, "band": BAND, "points": SPECTRUM_POINTS, "depth": SPECTRUM_DEPTH, "narrowest": NARROWEST,
-        "largest": LARGEST_DRAWING,
-    }  # fmt: skip
+    facts = {**SPECTRUM_FACTS, "steps": STEPS, "narrowest": NARROWEST, "largest": LARGEST_DRAWING}
     return str(template("explore.html").render(facts=facts, cards=list(CARDS)))
 
 
@@ -75,8 +71,7 @@ def laid_out(setup: Setup) -> dict[str, Any]:
     }  # fmt: skip
     return {
         "heading": setup.scene.title or setup.scene.path.stem, "cards": cards, "notes": list(setup.mesh.notes),
-        "loops": loops(setup.mesh), "ribs": [setup.mesh.pieces(rib.path).tolist() for rib in setup.scene.ribs],
-        "mass": setup.range("mass"), "stiffness": setup.range("stiffness"),
+        **drawn_body(setup), "mass": setup.range("mass"), "stiffness": setup.range("stiffness"),
     }  # fmt: skip
 
 
@@ -85,6 +80,11 @@ def _share(name: str, low: float, high: float, value: float) -> float:
     if name in LOGARITHMIC:
         low, high, value = math.log(low), math.log(high), math.log(value)
     return (value - low) / (high - low)
+
+
+def drawn_body(setup: Setup) -> dict[str, Any]:
+    """The outline of a body and its ribs, as pages draw them."""
+    return {"loops": loops(setup.mesh), "ribs": [setup.mesh.pieces(rib.path).tolist() for rib in setup.scene.ribs]}
 
 
 def loops(mesh: Mesh) -> list[list[list[float]]]:

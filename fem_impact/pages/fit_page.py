@@ -1,21 +1,19 @@
 """One page about a fit: pulses, residuals, profiles of the likelihood, double hits; its pictures alone too."""
 
-import io
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from scipy.stats import t
 
-from .._base import check, markup
+from .._base import check
 from .._base.check import SimulationError
-from .._base.files import replacing
 from ..scenes.sentences import si
-from ..show import export, figures, plots
+from ..show import figures, plots
 from ..show.style import BLUE, GREEN, SKY, VERMILION, panels
 from ..taps.found import Found, along, differ, stated
 from ..taps.unknowns import unit_of
-from . import report
+from .html_page import picture_uri, write_page
 
 MASSES, TIPS = (0.5, 1.0, 2.0), (0.1, 0.3, 1.0, 3.0, 10.0)  # [-] of the double-hit table, over those found
 
@@ -98,7 +96,7 @@ def double_hits(found: Found, target: Any = None, at: Any = None) -> list[tuple[
 
 
 @check.typed
-def write(
+def write_fit(
     path: str | Path, found: Found, *, title: str = "Fit of measured taps", target: Any = None, at: Any = None
 ) -> None:
     """Write the page; needs the extra ``web``. Double hits are predicted for ``target`` or the structure found."""
@@ -106,7 +104,9 @@ def write(
     struck = target is not None or found.target is not None
     told = [(name, *stated(found.profiles[name]), unit_of(name)) for name in found.names]
     left_out = [f"{100 * one.error:.2g} %" for one in found.left_out()] if len(found.used) > 1 else []
-    page = report.template("fit.html").render(
+    write_page(
+        path,
+        "fit.html",
         title=title,
         summary=found.summary().splitlines(),
         told=told,
@@ -119,19 +119,8 @@ def write(
             ("whiteness", f"{found.whiteness:.2g}"), ("not determined", str(len(found.unidentifiable))),
             ("taps that disagree", ", ".join(found.outliers) or "none"),
         ],
-        pictures={name: uri(draw(found)) for name, draw in
+        pictures={name: picture_uri(draw(found)) for name, draw in
                   (("pulses", pulses), ("profiles", profiles), ("spectrum", spectrum))},
         double=double_hits(found, target, at) if struck else [],
         compared={law: f"{100 * error:.2g} %" for law, error in found.compared.items()},
-        versions=export.versions(),
-        style=(report.WEB / "report.css").read_text(encoding="utf-8"),
     )  # fmt: skip
-    with replacing(path) as temporary:
-        temporary.write_text(page, encoding="utf-8")
-
-
-def uri(figure: Any) -> str:
-    """A figure as the address of a picture within a page."""
-    file = io.BytesIO()
-    figure.savefig(file, format="png", dpi=120, transparent=True)
-    return markup.data_uri("image/png", file.getvalue())

@@ -1,7 +1,6 @@
 """One page about frequency responses: taps, H1, H2, Hv, coherence, poles and residues, stabilisation, MAC, shapes."""
 
-import json
-from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -11,20 +10,18 @@ from scipy.spatial import Delaunay, QhullError
 
 from .._base import check
 from .._base.explained import noted
-from .._base.files import replacing
+from .._base.known import NINETY
 from ..modes import picked, stabilisation
 from ..modes.modal import Modes
-from ..show import export, figures
+from ..show import figures
 from ..show.style import BLUE, GREY, VERMILION, panels, set_units
 from ..taps import transfer, watch
 from ..taps.records import Taps
-from . import report, tap_pictures
-from .fit_page import uri
+from . import tap_pictures
+from .html_page import picture_uri, script_data, write_page
 
 COMPARED = 40  # [-] computed modes that measured ones may belong to: twice as many as fit a picture
 CHANNELS = 6  # [-] channels that have a picture and a column of residues: more do not fit a screen
-DRAWN = 14, 18  # [-] measured and computed modes of the MAC picture at most: its numbers are to be read
-NINE_TENTHS = 1.645  # [-] standard errors on either side of an interval that holds nine tenths
 
 
 def stabilised(chart: stabilisation.Chart, found: xr.Dataset, modes: picked.Picked) -> Any:
@@ -63,19 +60,6 @@ def likeness(values: np.ndarray, measured: np.ndarray, computed: np.ndarray) -> 
     return figure
 
 
-def _responses(estimates: dict[str, xr.Dataset], count: int) -> Any:
-    with panels(count, 1, 7.2, 2.6) as (figure, all_axes):
-        for channel, axes in enumerate(all_axes):
-            tap_pictures.draw_responses(axes, estimates, channel)
-    return figure
-
-
-def _one(width: float, height: float, draw: Callable[[Any], None]) -> Any:
-    with panels(1, 1, width, height) as (figure, (axes,)):
-        draw(axes)
-    return figure
-
-
 def _tap_rows(taps: Taps) -> list[tuple[str, str, str, str, str]]:
     rows = []
     for i, name in enumerate(taps.labels):
@@ -92,7 +76,7 @@ def _pole_rows(modes: picked.Picked, channels: int) -> list[list[str]]:
     for n, natural in enumerate(modes.frequencies):
         told = [(natural, modes.frequency_errors[n]), (100.0 * modes.damping_ratio[n], 100.0 * modes.damping_errors[n])]
         told += list(zip(modes.products[:channels, n], modes.errors[:channels, n]))
-        rows.append([_within(float(value), NINE_TENTHS * float(error)) for value, error in told])
+        rows.append([_within(float(value), NINETY * float(error)) for value, error in told])
     return rows
 
 
@@ -122,11 +106,11 @@ def _moving(modes: picked.Picked, points: np.ndarray) -> str:
     shapes = modes.products / np.maximum(np.abs(modes.products).max(axis=0), 1e-300)
     names = [f"{one:.5g} Hz" for one in modes.frequencies]
     data = {"points": place, "edges": edges(points), "shapes": shapes.T, "names": names}
-    return json.dumps(export.plain(data)).replace("<", "\\u003c")
+    return script_data(data)
 
 
 @check.typed
-def write(
+def write_responses(
     path: str | Path, found: xr.Dataset, *, title: str = "Frequency responses", taps: Taps | None = None,
     computed: Modes | None = None, points: Any = None,
 ) -> None:  # fmt: skip
@@ -157,8 +141,9 @@ def write(
         compared = _compared(modes, computed, place)
         pictures["mac"] = compared.pop("picture")
     double = [] if taps is None else [taps.labels[i] for i in np.flatnonzero(taps.n_pulses > 1)]
-    page = report.template("frf.html").render(
-        title=title, trouble=trouble, pictures=pictures, channels=names[:shown], n_channels=len(names), double=double,
+    write_page(
+        path, "frf.html", scripts=("shapes.js",), title=title, trouble=trouble, pictures=pictures,
+        channels=names[:shown], n_channels=len(names), double=double,
         taps=[] if taps is None else _tap_rows(taps), notes=noted(() if taps is None else taps.notes),
         poles=[] if modes is None else _pole_rows(modes, shown), pairs=compared.get("pairs", []),
         moving=_moving(modes, place) if modes is not None and place is not None and len(names) > 1 else "",
@@ -169,34 +154,31 @@ def write(
             ("modes", "0" if modes is None else str(len(modes.frequencies))),
             ("left unexplained", "-" if modes is None else f"{100.0 * modes.left:.2g} % rms"),
         ],
-        versions=export.versions(), style=(report.WEB / "report.css").read_text(encoding="utf-8"),
-        script=(report.WEB / "shapes.js").read_text(encoding="utf-8"),
     )  # fmt: skip
-    with replacing(path) as temporary:
-        temporary.write_text(page, encoding="utf-8")
 
 
 def _pictures(found: xr.Dataset, taps: Taps | None, modes: picked.Picked | None, shown: int) -> dict[str, str]:
     """The pictures of the page by name, but for those of computed modes."""
-    pictures = {"responses": uri(_responses(_estimates(found, taps), shown))}
+
+    def drawn(height: float, *parts: tap_pictures.Part) -> str:
+        return picture_uri(tap_pictures.draw_panels(parts, 1, 7.2, height))
+
+    own = str(found.attrs.get("method", "H1"))
+    estimates = {own: found}
+    if taps is not None and not found.attrs.get("added_damping"):  # by every estimator, the one asked for last
+        others = {method: transfer.frf(taps, method=method) for method in transfer.METHODS if method != own}
+        estimates = others | estimates
+    parts = (partial(tap_pictures.draw_responses, found=estimates, channel=i) for i in range(shown))
+    pictures = {"responses": drawn(2.6, *parts)}
     if "coherence" in found and found.attrs.get("averages", 2) > 1:  # of one tap it is 1 everywhere
-        pictures["coherence"] = uri(_one(7.2, 3.0, lambda axes: tap_pictures.draw_coherence(axes, found, range(shown))))
+        pictures["coherence"] = drawn(3.0, lambda axes: tap_pictures.draw_coherence(axes, found, range(shown)))
     if taps is not None:
         some = range(min(tap_pictures.SHOWN, taps.n_taps))
-        pictures["pulses"] = uri(_one(7.2, 3.0, lambda axes: tap_pictures.draw_pulses(axes, taps, some)))
-        pictures["spectra"] = uri(_one(7.2, 3.0, lambda axes: tap_pictures.draw_spectra(axes, taps, some, None, 10.0)))
+        pictures["pulses"] = drawn(3.0, lambda axes: tap_pictures.draw_pulses(axes, taps, some))
+        pictures["spectra"] = drawn(3.0, lambda axes: tap_pictures.draw_spectra(axes, taps, some, None, 10.0))
     if modes is not None:
-        pictures["stable"] = uri(stabilised(stabilisation.chart(found), found, modes))
+        pictures["stable"] = picture_uri(stabilised(stabilisation.chart(found), found, modes))
     return pictures
-
-
-def _estimates(found: xr.Dataset, taps: Taps | None) -> dict[str, xr.Dataset]:
-    """The responses by every estimator, the one asked for last; as they stand without taps."""
-    own = str(found.attrs.get("method", "H1"))
-    if taps is None or found.attrs.get("added_damping"):
-        return {own: found}
-    others = {method: transfer.frf(taps, method=method) for method in transfer.METHODS if method != own}
-    return others | {own: found}
 
 
 def _compared(modes: picked.Picked, computed: Modes, points: np.ndarray) -> dict[str, Any]:
@@ -211,7 +193,7 @@ def _compared(modes: picked.Picked, computed: Modes, points: np.ndarray) -> dict
              f"{100 * pair.difference:+.2f} %", f"{pair.mac:.3f}")
             for pair in transfer.matched(measured, computed, points=points)
         ]  # fmt: skip
-    some = modes.frequencies[: DRAWN[0]]
-    near = near[computed.frequencies[near] <= 1.1 * some[-1]][: DRAWN[1]]
+    some = modes.frequencies[:14]  # of the picture, so few that its numbers can be read, and 18 computed ones
+    near = near[computed.frequencies[near] <= 1.1 * some[-1]][:18]
     values = transfer.mac(modes.products[:, : len(some)], computed.shape_at(points)[:, near])
-    return {"pairs": rows, "picture": uri(likeness(values, some, computed.frequencies[near]))}
+    return {"pairs": rows, "picture": picture_uri(likeness(values, some, computed.frequencies[near]))}

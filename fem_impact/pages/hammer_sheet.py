@@ -8,15 +8,11 @@ import numpy as np
 
 from .._base import check
 from .._base.explained import noted
-from .._base.files import replacing
-from ..show import export, plots
+from ..show import plots
 from ..show.figures import in_hertz
 from ..sweeps.hammers import catalogue
 from ..taps.roving import Roving
-from . import report
-from .fit_page import uri
-
-ROWS = 18  # [-] hammers with their tips on a sheet at most: more do not fit a page
+from .html_page import picture_uri, write_page
 
 
 def tip_verdict(plan: Roving, i: int, j: int) -> str:
@@ -46,7 +42,7 @@ def _sheet(plan: Roving, i: int) -> dict[str, Any]:
     """One point: what to take, the table and the picture."""
     place = f"({', '.join(f'{x:.4g}' for x in plan.points[i])}) m"
     best, rows = int(plan.best[i]), []
-    for j in order(plan, i)[:ROWS]:
+    for j in order(plan, i)[:18]:  # more do not fit a page
         limit, sure = overload(plan, i, j), plan.coherence[i, j]
         rows.append((
             plan.hammers[j], plan.tips[j], f"{1e3 * plan.masses[j]:.4g} g",
@@ -67,21 +63,18 @@ def _sheet(plan: Roving, i: int) -> dict[str, Any]:
     words.append(f"{int(plan.works[i].sum())} of {len(plan.tips)} pairs of hammer and tip work; {double} hit twice.")
     words.append(f"Records of {plan.duration:.3g} s resolve {plan.resolution:.3g} Hz.")
     figure = plots.places(plan.modes, {"struck here": plan.points[i : i + 1]}, {}, plan.sensor, place)
-    return {"at": place, "take": take, "words": words, "rows": rows, "picture": uri(figure)}
+    return {"at": place, "take": take, "words": words, "rows": rows, "picture": picture_uri(figure)}
 
 
 @check.typed
-def write(path: str | Path, plan: Roving, *, title: str, notes: tuple[str, ...] = ()) -> None:
+def write_sheets(path: str | Path, plan: Roving, *, title: str, notes: tuple[str, ...] = ()) -> None:
     """Write the sheets of a plan; needs the extra ``web``. Printed, each point has a page of its own."""
     check.extra("jinja2", "web", "a page")
     tiles: Mapping[str, str] = {
         "bandwidth": in_hertz(plan.bandwidth, 3), "drop": f"{plan.drop:g} dB", "points": str(len(plan.points)),
         "points that work": str(sum(each >= 0 for each in plan.best)), "pairs tried": str(len(plan.tips)),
     }  # fmt: skip
-    page = report.template("sheet.html").render(
-        title=title, notes=noted((*notes, *plan.notes)), tiles=list(tiles.items()), versions=export.versions(),
+    write_page(
+        path, "sheet.html", title=title, notes=noted((*notes, *plan.notes)), tiles=list(tiles.items()),
         sheets=[_sheet(plan, i) for i in range(len(plan.points))],
-        style=(report.WEB / "report.css").read_text(encoding="utf-8"),
     )  # fmt: skip
-    with replacing(path) as temporary:
-        temporary.write_text(page, encoding="utf-8")

@@ -1,30 +1,27 @@
 """Writes one HTML page whose sliders change a blow without a program behind it: every blow is struck beforehand."""
 
 import base64
-import json
 import zlib
 from collections.abc import Callable
 from contextlib import nullcontext
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from .._base import check
-from .._base.files import replacing
 from ..model.planner import Watch
 from ..scenes.scene import Scene
 from ..scenes.sentences import RAISED, place, power, si, tidy, words
-from ..show import export, sound
-from ..show.figures import SPECTRUM_DEPTH
-from . import lesson_grid, report, worksheet
+from ..show import sound
+from . import lesson_grid, worksheet
 from .explore_model import Setup
-from .explore_numbers import BAND, PLAYED, SPECTRUM_POINTS
-from .explore_view import loops
+from .explore_numbers import PLAYED, SPECTRUM_FACTS, drawn, found_limit
+from .explore_view import drawn_body
+from .html_page import script_data, write_page
 from .lesson_grid import NAMES, STEPS, Lesson
 
-ROUNDED = 5e-3  # [-] error of a number with three digits
 SLIDERS = {"mass": "Mass", "stiffness": "Stiffness", "speed": "Speed", "place": "Place"}
 
 
@@ -91,8 +88,23 @@ def write(
         lesson = lesson_grid.made(setup, told or (lambda done, total: None))
         first = scene.run().response
     asked = worksheet.questions(lesson)
-    about = _errors(lesson, len(asked))
-    page = report.template("lesson.html").render(
+    about = Written(
+        n_blows=len(lesson.blows),
+        n_failed=int(np.isnan(lesson.quantity("n_impacts")).sum()),
+        n_missed=sum(not blow.met for blow in lesson.blows),
+        n_unlike=lesson.unlike,
+        tolerance=lesson.tolerance,
+        force_error=max(blow.missed for blow in lesson.blows),
+        spectrum_error=max(blow.spectrum_missed for blow in lesson.blows),
+        questions=len(asked),
+        bytes=0,
+    )
+    frequencies = setup.base.modes.frequencies
+    size = write_page(
+        path,
+        "lesson.html",
+        styles=("explore.css", "lesson.css"),
+        scripts=("plots.js", "lesson.js"),
         title=scene.title or scene.path.stem,
         eyebrow="Move a slider or click: every blow on this page was struck beforehand",
         tiles=[],
@@ -101,28 +113,11 @@ def write(
         sliders=_sliders(lesson),
         asked=asked,
         about=about,
-        rounded=ROUNDED,
-        ringing=_ringing(lesson),
+        ringing=f"{np.count_nonzero(frequencies)} modes up to {si(float(frequencies[-1]), 'Hz', 3)}",
         power=power,
-        n_points=STEPS + 1,
-        versions=export.versions(),
-        facts=json.dumps(export.plain(_facts(lesson)), allow_nan=False, separators=(",", ":")).replace("<", "\\u003c"),
-        style="".join((report.WEB / name).read_text(encoding="utf-8") for name in ("explore.css", "lesson.css")),
-        script="".join((report.WEB / name).read_text(encoding="utf-8") for name in ("plots.js", "lesson.js")),
+        facts=script_data(_facts(lesson)),
     )
-    with replacing(path) as temporary:
-        temporary.write_text(page, encoding="utf-8")
-    return Written(**{**about, "bytes": len(page.encode())})
-
-
-def _errors(lesson: Lesson, questions: int) -> dict[str, Any]:
-    """The fields of `Written`, but for the size of the file."""
-    return {
-        "n_blows": len(lesson.blows), "n_failed": int(np.isnan(lesson.number("n_impacts")).sum()),
-        "n_missed": sum(not blow.met for blow in lesson.blows), "n_unlike": lesson.unlike,
-        "tolerance": lesson.tolerance, "force_error": max(blow.missed for blow in lesson.blows),
-        "spectrum_error": max(blow.spectrum_missed for blow in lesson.blows), "questions": questions,
-    }  # fmt: skip
+    return replace(about, bytes=size)
 
 
 def _squeezed(values: Any, kind: str) -> str:
@@ -146,45 +141,26 @@ def _sliders(lesson: Lesson) -> list[dict[str, Any]]:
             if len(said[name]) > 1]  # fmt: skip
 
 
-def _ear(lesson: Lesson) -> Any:
-    return np.array([lesson.setup.scene.points[0]], float)
-
-
-def _ringing(lesson: Lesson) -> str:
-    """Which modes ring in the sounds of the page, in words."""
-    frequencies = lesson.setup.base.modes.frequencies
-    return f"{np.count_nonzero(frequencies)} modes up to {si(float(frequencies[-1]), 'Hz', 3)}"
-
-
 def _facts(lesson: Lesson) -> dict[str, Any]:
     """Everything the page draws, as data."""
     setup, modes = lesson.setup, lesson.setup.base.modes
-    rings = modes.omega > 0.0
+    rings, ear = modes.omega > 0.0, np.array([setup.scene.points[0]], float)
     cases = [[setup.case(lesson.settings(0, v, k, m)).resonance for k in range(lesson.shape[2])
               for m in range(lesson.shape[3])] for v in range(lesson.shape[1])]  # fmt: skip
     struck = [modes.shape_at(np.array([where]))[0][rings] for where in lesson.places]
     return {
         "shape": lesson.shape, "start": lesson.start, "axes": lesson.axes, "places": lesson.places, "names": NAMES,
-        "tolerance": lesson.tolerance, "steps": STEPS, "band": BAND, "points": SPECTRUM_POINTS, "depth": SPECTRUM_DEPTH,
-        "loops": loops(setup.mesh), "ribs": [setup.mesh.pieces(rib.path).tolist() for rib in setup.scene.ribs],
+        "tolerance": lesson.tolerance, "steps": STEPS, **SPECTRUM_FACTS, **drawn_body(setup),
         "ear": setup.scene.points[0], "played": PLAYED, "full": sound.FULL_SCALE,
-        "limits": [[value if 0.0 < value < np.inf else None for value in row] for row in lesson.limits],
+        "limits": [[found_limit(value) for value in row] for row in lesson.limits],
         "resonance": _squeezed(np.array(cases), "<f4"),
         "omega": _squeezed(modes.omega[rings], "<f4"), "zeta": _squeezed(modes.damping_ratio[rings], "<f4"),
-        "struck": _squeezed(np.array(struck), "<f4"), "heard": _squeezed(modes.shape_at(_ear(lesson))[0][rings], "<f4"),
-        "numbers": _squeezed(lesson.numbers, "<f4"), "met": _squeezed([blow.met for blow in lesson.blows], "u1"),
+        "struck": _squeezed(np.array(struck), "<f4"), "heard": _squeezed(modes.shape_at(ear)[0][rings], "<f4"),
+        "numbers": _squeezed(lesson.all_numbers, "<f4"), "met": _squeezed([blow.met for blow in lesson.blows], "u1"),
         "lengths": _squeezed([len(blow.time) for blow in lesson.blows], "<u2"),
         "ends": _squeezed([[blow.end, blow.top] for blow in lesson.blows], "<f4"),
         # differences of times, which deflate better
         "time": _squeezed(np.concatenate([np.diff(blow.time, prepend=0.0) for blow in lesson.blows]), "<u2"),
         "force": _squeezed(np.concatenate([blow.force for blow in lesson.blows]), "<u2"),
-        "maps": [_map(picture) for picture in lesson.maps],
-    }  # fmt: skip
-
-
-def _map(picture: Any) -> dict[str, Any]:
-    return {
-        "columns": len(picture.mass), "rows": len(picture.stiffness), "counts": _squeezed(picture.n_impacts, "i1"),
-        "mass": picture.mass[[0, -1]], "stiffness": picture.stiffness[[0, -1]],
-        "x": _squeezed(picture.limit_mass, "<f4"), "y": _squeezed(picture.limit, "<f4"),
+        "maps": [drawn(picture, _squeezed) for picture in lesson.maps],
     }  # fmt: skip

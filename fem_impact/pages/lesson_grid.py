@@ -9,19 +9,14 @@ import numpy as np
 
 from .._base.check import SimulationError
 from ..modes.modal import Modes
-from ..sweeps import cases
-from ..sweeps.cells import law_numbers
 from ..sweeps.grid import Case
-from .explore_map import Mapper, Picture, Window
+from .explore_map import MORE, Mapper, Picture, Window
 from .explore_model import Settings, Setup, limit_of
 from .explore_numbers import Explorer, Point
 
 COUNTS = {"mass": 11, "stiffness": 11, "speed": 5}  # [-] positions of the sliders; odd, so that one is the scene's
 SPANS = {"mass": 10.0, "stiffness": 100.0, "speed": 4.0}  # [-] slider end over the scene's value
-TOLERANCE = 3e-3  # [-] of the blows, unless the scene's is larger: the page shows three digits
-FIT = 1e-3  # [-] of its peak by which the points kept of a curve may miss the force: a quarter of a pixel
 STEPS = 65535  # [-] of a 16-bit integer, over which each curve's times and forces are spread
-NEAR = 0.9  # [-] of the way to the edge: on it, a body that is held does not move
 NAMES = ("n_impacts", "peak_force", "contact_time", "restitution", "error", "model_error")
 
 
@@ -78,13 +73,13 @@ class Lesson:
         return len(self.places), *(len(self.axes[name]) for name in ("speed", "stiffness", "mass"))  # type: ignore[return-value]
 
     @cached_property
-    def numbers(self) -> np.ndarray:
+    def all_numbers(self) -> np.ndarray:
         """Numbers of all blows, (n_places, n_speeds, n_stiffnesses, n_masses, len(NAMES)); NaN where one failed."""
         return np.array([blow.numbers for blow in self.blows]).reshape(*self.shape, len(NAMES))
 
-    def number(self, name: str) -> np.ndarray:
+    def quantity(self, name: str) -> np.ndarray:
         """One of NAMES of all blows, (n_places, n_speeds, n_stiffnesses, n_masses)."""
-        found: np.ndarray = self.numbers[..., NAMES.index(name)]
+        found: np.ndarray = self.all_numbers[..., NAMES.index(name)]
         return found
 
     @property
@@ -102,13 +97,13 @@ class Lesson:
     def unlike(self) -> int:
         """Number of blows that the map counts otherwise than they are."""
         wrong = 0
-        for picture, counts in zip(self.maps, self.number("n_impacts").reshape(len(self.maps), *self.shape[2:])):
+        for picture, counts in zip(self.maps, self.quantity("n_impacts").reshape(len(self.maps), *self.shape[2:])):
             rows, columns = (
                 np.abs(np.log(grid[:, None] / axis)).argmin(axis=0)
                 for grid, axis in ((picture.stiffness, self.axes["stiffness"]), (picture.mass, self.axes["mass"]))
             )
             drawn = picture.n_impacts[np.ix_(rows, columns)]
-            wrong += int((drawn != np.minimum(np.nan_to_num(counts, nan=-1.0), 4)).sum())
+            wrong += int((drawn != np.minimum(np.nan_to_num(counts, nan=-1.0), MORE)).sum())
         return wrong
 
 
@@ -138,7 +133,8 @@ def places_of(setup: Setup) -> tuple[Point, ...]:
 
     shares = np.linspace(0.0, 1.0, 101) * float(np.linalg.norm(high - low) / np.linalg.norm(way))
     reach = next((share for share in shares[shares > 1.0] if on_body(share) is None), shares[-1])
-    wanted = {share: on_body(share) for share in (0.0, 0.5, NEAR * reach)}
+    # not on the edge, where a body that is held does not move
+    wanted = {share: on_body(share) for share in (0.0, 0.5, 0.9 * reach)}
     wanted[1.0 if np.array_equal(way, at - middle) else 0.0] = setup.start.at
     points = [wanted[share] for share in sorted(wanted)]
     return tuple(dict.fromkeys(point for point in points if point is not None and not setup.at_rest(point)))
@@ -146,7 +142,7 @@ def places_of(setup: Setup) -> tuple[Point, ...]:
 
 def made(setup: Setup, watch: Callable[[int, int], None]) -> Lesson:
     """Strike all blows of a page; ``watch`` is told how many are done, and of how many."""
-    explorer, tolerance = Explorer(setup), max(TOLERANCE, setup.tolerance)
+    explorer, tolerance = Explorer(setup), max(3e-3, setup.tolerance)  # the page shows three digits
     start, places = setup.start, places_of(setup)
     axes = {
         name: float(getattr(start, name)) * np.geomspace(1.0 / SPANS[name], SPANS[name], n)
@@ -180,9 +176,7 @@ def _map(mapper: Mapper, settings: Settings, window: Window, body: Modes | None)
     """The map behind the blows of one place and speed; drawn finely where blows are quick."""
     picture = mapper.first(settings, window, body)
     picture = mapper.finer(settings, picture, body)
-    law = mapper.case.contact
-    quick = cases.batchable({name: np.array([value]) for name, value in law_numbers(law).items()}).all()
-    return mapper.sharp(settings, picture, body) if quick and not mapper.case.modes.stretches else picture
+    return mapper.sharp(settings, picture, body) if mapper.batched else picture
 
 
 def _alike(case: Case) -> bool:
@@ -209,7 +203,7 @@ def shown(case: Case, tolerance: float) -> Shown:
     seen = hit.time <= end
     time, force = hit.time[seen], hit.force[seen]
     last, top = float(time[-1]), float(force.max()) or 1.0
-    points = kept_points(time, force, FIT * top)
+    points = kept_points(time, force, 1e-3 * top)  # a quarter of a pixel
     kept = np.rint(STEPS * time[points] / last), np.rint(STEPS * force[points] / top)
     apart = np.abs(np.interp(time, kept[0] * last / STEPS, kept[1] * top / STEPS) - force)
     # no spectrum errs by more than the area between the curves

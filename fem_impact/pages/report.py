@@ -1,7 +1,6 @@
 """Writes one self-contained HTML page about a strike: the scene, the errors, the results and the sound."""
 
 import base64
-import io
 import json
 import math
 import os
@@ -12,11 +11,9 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from scipy.io import wavfile
 
 from .._base import check, markup
 from .._base.explained import noted
-from .._base.files import replacing
 from ..impact import spectra
 from ..impact.assumption import SILENT, Assumption
 from ..impact.quantities import NAMES as QUANTITY_NAMES
@@ -32,18 +29,16 @@ from ..scenes.sentences import arriving, body, contact, place, power, si, tidy, 
 from ..scenes.sequence import Played
 from ..show import export, sampling, sound
 from ..show.figures import SPECTRUM_BAND
+from .html_page import QUIET, audio, script_data, write_page
+from .html_page import template as template
 
-SPECTRUM_POINTS = 1000  # [-] of the spectrum: about one per pixel of a wide page
-QUIET = -20.0  # [dB] re full scale: a quieter sound is offered again, amplified
-DISTANCE = 1.0  # [m] from the plate to the default listener
-PLAYED = 3.0  # [s] longest sound of a blow, to keep the page small; of a sequence it is four times as long
+POINTS = 1000  # [-] of a spectrum: about one per pixel of a wide page
 BOUND = {"low": "estimate from below", "high": "estimate from above"}
 MOST_POINTS = 4  # [-] largest number of observation points with a sound player
 OPTIONS = {  # of `fem-impact strike`, by the argument of `Scene.run` that they stand for
     "tolerance": "--tolerance", "quantity": "--quantity", "target": "--target", "n_modes": "--n-modes",
     "size": "--size",
 }  # fmt: skip
-WEB = Path(__file__).parent / "web"
 
 
 @check.typed
@@ -59,21 +54,19 @@ def read(path: str | Path) -> Scene:
         path = path / "response.json"
     if path.suffix.lower() != ".json":
         return load_scene(path)
+    scene = None
     try:
         data = json.loads(read_bytes(path).decode("utf-8", "replace"))
         if isinstance(data, dict) and isinstance(data.get("scene"), dict):
-            return _whole(scene_of(data["scene"], path, folder=path.parent))
+            scene = scene_of(data["scene"], path, folder=path.parent)
     except (json.JSONDecodeError, RecursionError):  # RecursionError: lists nested too deeply
         pass
-    raise fault(path, "not a result of `fem-impact strike`; give its response.json, or the scene's TOML file")
-
-
-def _whole(scene: Scene) -> Scene:
-    """The scene of a result, if the mesh or drawing of its body still exists."""
+    if scene is None:
+        raise fault(path, "not a result of `fem-impact strike`; give its response.json, or the scene's TOML file")
     for source in (scene.mesh.values[key] for key in PATHS if key in scene.mesh.values):
         if not os.path.isfile(source):  # unlike Path.is_file, returns False for invalid file names too
             raise fault(
-                scene.path, f"the file of the struck body is missing: restore {source}, or give the scene's TOML file"
+                path, f"the file of the struck body is missing: restore {source}, or give the scene's TOML file"
             )
     return scene
 
@@ -104,10 +97,17 @@ def write(path: str | Path, scene: Scene, run: Run | Played) -> None:
     if isinstance(run, Run) and not run.rings:
         raise ValueError("run must have modes, because a report shows motion; strike with motion=True")
     response, told = run.response, _of_blow(scene, run) if isinstance(run, Run) else _of_strokes(scene, run)
+    judged = response.hits[response.hardest] if isinstance(response, Strokes) else response
     said = f"Contact force over time: {response.n_impacts} impacts, peak {si(response.peak_force, 'N')}"
     shown = response.time <= _end(response)
-    page = template("report.html").render(
-        told,
+    write_page(
+        path,
+        "report.html",
+        scripts=("report.js",),
+        **told,
+        trust=tuple(judged.trust),
+        assumptions=[_assumption(each) for each in judged.assumptions],
+        reasons=[tidy(line) for line in run.plan.reasons],
         title=scene.title or scene.path.stem,
         picture=scene.picture(),
         observed=bool(scene.watched),
@@ -116,21 +116,15 @@ def write(path: str | Path, scene: Scene, run: Run | Played) -> None:
         verdict=_sentence(tidy(response.verdict)),
         sounds=_sounds(scene, response),
         files=_downloads(scene, run),
-        versions=export.versions(),
         modes_end=si(float(response.target.frequencies[-1]), "Hz"),
         command=_command(scene, run),
         force_picture=markup.curve(response.time[shown], response.force[shown], label="force", unit="N", title=said),
-        # no "<" in the data can close the script element around it
-        data=json.dumps(export.plain(_plots(response)), allow_nan=False, separators=(",", ":")).replace("<", "\\u003c"),
+        data=script_data(_plots(response)),
         plotly=plotly.get_plotlyjs(),
-        style=(WEB / "report.css").read_text(encoding="utf-8"),
-        script=(WEB / "report.js").read_text(encoding="utf-8"),
         si=si,
         power=power,
         rough=_rough,
     )
-    with replacing(path) as temporary:
-        temporary.write_text(page, encoding="utf-8")
 
 
 def _of_blow(scene: Scene, run: Run) -> dict[str, Any]:
@@ -142,10 +136,7 @@ def _of_blow(scene: Scene, run: Run) -> dict[str, Any]:
         "energy_error": response.energy_error,
         "budget": _budget(response),
         "model": _sentence(tidy(response.model_verdict[0])),
-        "trust": tuple(response.trust),
-        "assumptions": [_assumption(each) for each in response.assumptions],
         "modelled": _modelled(run, len(response.history.steps), response.scheme),
-        "reasons": map(tidy, run.plan.reasons),
         "energies": _shares(response.energies, {"target": "struck body"}),
     }  # fmt: skip
 
@@ -178,21 +169,9 @@ def _of_strokes(scene: Scene, run: Played) -> dict[str, Any]:
         "energy_error": max(hit.energy_error for hit in found.hits),
         "budget": budget[:40],
         "model": f"The hardest, stroke {which}: {tidy(own.model_verdict[0])}",
-        "trust": tuple(own.trust),
-        "assumptions": [_assumption(each) for each in own.assumptions],
         "modelled": _modelled(run, sum(len(hit.history.steps) for hit in found.hits), found.hits[0].scheme),
-        "reasons": [tidy(line) for line in run.plan.reasons],
         "energies": _shares(energies, {"target": "struck body", "taken away": "strikers took away"}),
     }  # fmt: skip
-
-
-def template(name: str) -> Any:
-    """A template of the folder ``web``; it escapes all text."""
-    import jinja2
-
-    return jinja2.Environment(
-        loader=jinja2.FileSystemLoader(WEB), autoescape=True, undefined=jinja2.StrictUndefined, trim_blocks=True
-    ).get_template(name)
 
 
 def _command(scene: Scene, run: Run | Played) -> str:
@@ -305,17 +284,17 @@ def _end(response: Response | Strokes) -> float:
 
 
 def _sounds(scene: Scene, response: Response | Strokes) -> list[SoundPlayer]:
-    """The sound at each observation point and, for a plate, at each listener (default: `DISTANCE` from the plate)."""
+    """The sound at each observation point and, for a plate, at each listener, by default 1 m in front of it."""
     heard = [
         (f"Motion at {place(point)}", sound.synthesise(response, point, duration=_duration(response)))
         for point in scene.points[:MOST_POINTS]
     ]
     if response.target.dimension == 2 or scene.listeners:
-        for listener in scene.listeners[:MOST_POINTS] or [[*np.asarray(response.at).tolist(), DISTANCE]]:
-            where = f" to {place(listener)}" if scene.listeners else f", {DISTANCE:g} m in front of the strike point"
+        for listener in scene.listeners[:MOST_POINTS] or [[*np.asarray(response.at).tolist(), 1.0]]:
+            where = f" to {place(listener)}" if scene.listeners else ", 1 m in front of the strike point"
             sounds = hearing.radiated(scene, response, listener, _duration(response))
             for bound, pressure in zip(hearing.BOUNDS[len(sounds)], sounds):
-                told = f" without a baffle, {BOUND[bound]}; {hearing.said(sounds)}" if bound else ""
+                told = f" without a baffle, {BOUND[bound]}; {hearing.tell_level(sounds)}" if bound else ""
                 heard.append((f"Sound radiated{where}{told}", pressure))
     players = []
     for name, samples in heard:
@@ -329,22 +308,18 @@ def _sounds(scene: Scene, response: Response | Strokes) -> list[SoundPlayer]:
 
 
 def _duration(response: Response | Strokes) -> float:
-    rings = sampling.ringing(response.target, response.target.omega > 0.0, (sound.SHORTEST, PLAYED))
-    return rings if isinstance(response, Response) else min(rings + float(np.ptp(response.starts)), 4.0 * PLAYED)
-
-
-def audio(samples: np.ndarray, rate: int) -> str:
-    """A data URI with the samples as a 16-bit WAV file, for the page's player."""
-    file = io.BytesIO()
-    wavfile.write(file, rate, np.round(32767.0 * np.clip(samples, -1.0, 1.0)).astype(np.int16))
-    return markup.data_uri("audio/wav", file.getvalue())
+    """Length of its sounds [s], at most three seconds to keep the page small; of a sequence, twelve."""
+    rings = sampling.ringing(response.target, response.target.omega > 0.0, (sound.SHORTEST, 3.0))
+    return rings if isinstance(response, Response) else min(rings + float(np.ptp(response.starts)), 12.0)
 
 
 @check.typed
 def numbers(scene: Scene, run: Run | Played) -> dict[str, Any]:
     """Everything that was found, as plain data: what the page offers as response.json; arguments as of `write`."""
     tables = scene.data(tolerance=run.response.tolerance)
-    return export.run_data(run, tables) if isinstance(run, Run) else sequence.numbers(run.response, tables, run.seconds)
+    if isinstance(run, Run):
+        return export.run_data(run, tables)
+    return sequence.sequence_numbers(run.response, tables, run.seconds)
 
 
 def _downloads(scene: Scene, run: Run | Played) -> list[dict[str, str]]:
@@ -374,7 +349,7 @@ def _plots(response: Response | Strokes) -> dict[str, Any]:
     frequencies = _frequencies(response)
     # for the mobility: as far as the modes reach, beyond which there are no resonances in it
     last = min(float(modes.frequencies[-1]) or np.inf, float(frequencies[-1]))
-    known = np.geomspace(min(float(frequencies[0]), 0.5 * last), last, SPECTRUM_POINTS)
+    known = np.geomspace(min(float(frequencies[0]), 0.5 * last), last, POINTS)
     moving = (modes.omega > 0.0) & (modes.frequencies < 2.0 * frequencies[-1])
     own: dict[str, Any] = {}
     if isinstance(response, Response):
@@ -399,7 +374,7 @@ def _plots(response: Response | Strokes) -> dict[str, Any]:
 def _frequencies(response: Response | Strokes) -> np.ndarray:
     # the spectrum reaches at least three lobes of that of the shortest impact
     shortest = min((impact.duration for impact in response.impacts), default=1.0)
-    return np.geomspace(SPECTRUM_BAND[0], max(SPECTRUM_BAND[1], 3.0 / shortest), SPECTRUM_POINTS)
+    return np.geomspace(SPECTRUM_BAND[0], max(SPECTRUM_BAND[1], 3.0 / shortest), POINTS)
 
 
 def _view(response: Response | Strokes, end: float) -> dict[str, Any]:

@@ -12,7 +12,7 @@ from ..taps.records import Taps
 from ..taps.transfer import METHODS, frf
 
 SHOWN = 10  # [-] taps, or responses, of a picture at most: a screen holds no more
-AFTER = 3.0  # [-] of its pulses' length that is drawn of a record after them
+Part = Callable[[Any], None]  # draws in given axes
 
 
 def draw_pulses(axes: Any, taps: Taps, which: Sequence[int]) -> None:
@@ -22,7 +22,7 @@ def draw_pulses(axes: Any, taps: Taps, which: Sequence[int]) -> None:
         if not pulses:
             continue
         first, last = pulses[0][0], pulses[-1][1]
-        span = slice(max(0, first - (last - first)), last + int(AFTER * (last - first)))
+        span = slice(max(0, first - (last - first)), last + 3 * (last - first))
         axes.plot(taps.time[span] - taps.time[first], taps.force[i, span], color=PALETTE[n % len(PALETTE)], lw=1.0,
                   label=f"{taps.labels[i]}{': double hit' * (len(pulses) > 1)}")  # fmt: skip
         for begin, end in pulses if len(pulses) > 1 else ():
@@ -94,7 +94,7 @@ def draw_coherence(axes: Any, found: xr.Dataset, channels: Sequence[int]) -> Non
 def watched(last: Taps, good: Taps | None, bandwidth: float, drop: float, said: str) -> Any:
     """The last record beside what the good ones tell so far: a matplotlib figure."""
     found = frf(good) if good is not None and good.response.shape[2] else None
-    parts: list[Callable[[Any], None]] = [
+    parts: list[Part] = [
         lambda axes: draw_pulses(axes, last, range(min(SHOWN, last.n_taps))),
         lambda axes: draw_spectra(axes, last, range(min(SHOWN, last.n_taps)), bandwidth, drop),
     ]
@@ -102,8 +102,15 @@ def watched(last: Taps, good: Taps | None, bandwidth: float, drop: float, said: 
         parts.append(lambda axes: draw_responses(axes, {"H1": found}, 0))
         if found.averages > 1:  # of one tap it is 1 everywhere
             parts.append(lambda axes: draw_coherence(axes, found, [0]))
-    with panels(len(parts), 2, 5.0, 3.2) as (figure, all_axes):
+    title = said if found is None else f"{said}; responses of {found.averages} good taps"
+    return draw_panels(parts, 2, 5.0, 3.2, title)
+
+
+def draw_panels(parts: Sequence[Part], columns: int, width: float, height: float, title: str = "") -> Any:
+    """Several pictures beside and below each other: a matplotlib figure."""
+    with panels(len(parts), columns, width, height) as (figure, all_axes):
         for axes, draw in zip(all_axes, parts):
             draw(axes)
-        figure.suptitle(said if found is None else f"{said}; responses of {found.averages} good taps", fontsize=10)
+        if title:
+            figure.suptitle(title, fontsize=10)
     return figure

@@ -11,7 +11,6 @@ from .explore_numbers import BAND, SPECTRUM_POINTS
 from .lesson_grid import STEPS, Lesson
 
 Position = tuple[int, int, int, int]  # of place, speed, stiffness and mass
-FALLEN = 0.1  # [-] of its largest value, where a spectrum is said to end
 
 
 @dataclass(frozen=True)
@@ -33,7 +32,7 @@ def questions(lesson: Lesson) -> list[Question]:
 def _phrases(lesson: Lesson, position: Position) -> dict[str, str]:
     """The numbers of a blow in words."""
     count, force, time, rebound = (
-        float(lesson.number(name)[position]) for name in ("n_impacts", "peak_force", "contact_time", "restitution")
+        float(lesson.quantity(name)[position]) for name in ("n_impacts", "peak_force", "contact_time", "restitution")
     )
     return {
         "impacts": "not known" if math.isnan(count) else f"{count:.0f} impact{'s' * (count != 1)}",
@@ -60,7 +59,7 @@ def _first(lesson: Lesson) -> Question | None:
 def _impulse(lesson: Lesson) -> Question | None:
     settings, start = lesson.settings(*lesson.start), lesson.start
     felt = lesson.setup.case(settings).striker.felt_mass
-    rebound = float(lesson.number("restitution")[start])
+    rebound = float(lesson.quantity("restitution")[start])
     if math.isnan(rebound):
         return None
     momentum = felt * settings.speed * (1.0 + rebound)
@@ -76,14 +75,14 @@ def _impulse(lesson: Lesson) -> Question | None:
 
 def _single(lesson: Lesson, axis: int) -> tuple[Position, Position] | None:
     """Two neighbours along an axis that hit once each, as near to the scene's blow as there are."""
-    counts, start = lesson.number("n_impacts"), lesson.start
+    counts, start = lesson.quantity("n_impacts"), lesson.start
 
-    def at(i: int) -> Position:
+    def moved_to(i: int) -> Position:
         place_, speed, stiffness, mass = (i if k == axis else start[k] for k in range(4))
         return place_, speed, stiffness, mass
 
     nearest = sorted(range(lesson.shape[axis] - 1), key=lambda step: abs(step + 0.5 - start[axis]))
-    pairs = ((at(step), at(step + 1)) for step in nearest)
+    pairs = ((moved_to(step), moved_to(step + 1)) for step in nearest)
     return next((pair for pair in pairs if counts[pair[0]] == counts[pair[1]] == 1), None)
 
 
@@ -94,7 +93,7 @@ def _stiffer(lesson: Lesson) -> Question | None:
     one, two = pair
     ratio = float(lesson.axes["stiffness"][two[2]] / lesson.axes["stiffness"][one[2]])
     power = lesson.setup.start.exponent
-    time = lesson.number("contact_time")
+    time = lesson.quantity("contact_time")
     return Question(
         f"Make the contact {_times(ratio)} stiffer, from {_stiffness(lesson, one[2])} to {_stiffness(lesson, two[2])} "
         "the scene's stiffness. By which factor does the contact get shorter? What would a rigid wall do?",
@@ -113,7 +112,7 @@ def _faster(lesson: Lesson) -> Question | None:
         return None
     one, two = pair
     slow, fast = (float(lesson.axes["speed"][each[1]]) for each in pair)
-    power, force = lesson.setup.start.exponent, lesson.number("peak_force")
+    power, force = lesson.setup.start.exponent, lesson.quantity("peak_force")
     wall = (fast / slow) ** (2.0 * power / (power + 1.0))
     return Question(
         f"Strike with {si(fast, 'm/s', 3)} instead of {si(slow, 'm/s', 3)}. By which factor does the force grow?",
@@ -123,23 +122,18 @@ def _faster(lesson: Lesson) -> Question | None:
     )  # fmt: skip
 
 
-def _change(counts: np.ndarray) -> int | None:
-    """The first position along an axis before which a blow hits once and after which it does not."""
-    found = np.flatnonzero((counts[:-1] == 1) != (counts[1:] == 1))
-    return int(found[0]) if len(found) else None
-
-
 def _heavier(lesson: Lesson) -> Question | None:
     place_, speed, stiffness, mass = lesson.start
-    counts = lesson.number("n_impacts")[place_, speed, stiffness]
-    here = _change(counts)
-    if here is None:
+    counts = lesson.quantity("n_impacts")[place_, speed, stiffness]
+    changes = np.flatnonzero((counts[:-1] == 1) != (counts[1:] == 1))  # positions before them
+    if not len(changes):
         always = counts[mass]
         return Question(
             "Move the mass from its lowest to its highest value. Does the number of impacts change?",
             f"It does not: {_phrases(lesson, lesson.start)['impacts']} at "
             f"{'each' if (counts == always).all() else 'most'} of them.", lesson.start,
         )  # fmt: skip
+    here = int(changes[0])
     lower, upper = (
         f"{_phrases(lesson, (place_, speed, stiffness, i))['impacts']} at {_mass(lesson, i)}" for i in (here, here + 1)
     )
@@ -173,22 +167,19 @@ def spectrum(lesson: Lesson, position: Position) -> np.ndarray:
     return force_spectrum.magnitude(blow.end / STEPS * blow.time, blow.top / STEPS * blow.force, band)
 
 
-def _ends(lesson: Lesson, position: Position) -> float | None:
-    """Frequency [Hz] at which the spectrum first falls to FALLEN of its largest value; None if it does not."""
-    found = spectrum(lesson, position)
-    below = np.flatnonzero(found < FALLEN * found.max())
-    below = below[below > found.argmax()]
-    return float(np.geomspace(*BAND, SPECTRUM_POINTS)[below[0]]) if len(below) else None
-
-
 def _spectrum(lesson: Lesson) -> Question | None:
     pair = _single(lesson, 2)
     if pair is None:
         return None
-    reach = [_ends(lesson, each) for each in pair]
-    if reach[0] is None or reach[1] is None:
-        return None
-    times = [float(lesson.number("contact_time")[each]) for each in pair]
+    reach = []  # [Hz]
+    for each in pair:
+        found = spectrum(lesson, each)
+        below = np.flatnonzero(found < 0.1 * found.max())
+        below = below[below > found.argmax()]
+        if not len(below):
+            return None
+        reach.append(float(np.geomspace(*BAND, SPECTRUM_POINTS)[below[0]]))
+    times = [float(lesson.quantity("contact_time")[each]) for each in pair]
     return Question(
         f"At which frequency has the spectrum first fallen to a tenth, with {_stiffness(lesson, pair[0][2])} and with "
         f"{_stiffness(lesson, pair[1][2])} the scene's stiffness? What is that frequency times the contact time?",
@@ -202,7 +193,7 @@ def _elsewhere(lesson: Lesson) -> Question | None:
         return None
     _, *rest = lesson.start
     positions = [(i, rest[0], rest[1], rest[2]) for i in range(len(lesson.places))]
-    rebounds = [float(lesson.number("restitution")[each]) for each in positions]
+    rebounds = [float(lesson.quantity("restitution")[each]) for each in positions]
     if any(map(math.isnan, rebounds)):
         return None
     best = int(np.argmax(rebounds))

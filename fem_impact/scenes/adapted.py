@@ -12,7 +12,6 @@ from ..impact.catalogue import materials, strikers
 from . import templates
 
 DRAWINGS = (".svg", ".dxf")
-ASIDE = 0.43  # [-] where along its width and height a body is struck: off its middle, where modes have their nodes
 OUTLINE = """[mesh]                    # the outline of the struck body; `fem-impact mesh {name}` lists its edges
 shape = "{shape}"
 {key} = {file}
@@ -90,7 +89,8 @@ def _drawn(whole: str, drawing: Path, unit: str | None, folder: Path) -> tuple[s
     whole = _with(whole, "[supports]", FREE.format(edges=check.line(", ".join(body.edges))))
     low, high = body.points.min(axis=0), body.points.max(axis=0)
     middles = body.points[body.cells].mean(axis=1)
-    nearest = middles[np.argmin(np.linalg.norm(middles - low - ASIDE * (high - low), axis=1))]
+    aside = low + 0.43 * (high - low)  # off the middle, where modes have their nodes
+    nearest = middles[np.argmin(np.linalg.norm(middles - aside, axis=1))]
     place = f"[{', '.join(f'{x:.4g}' for x in nearest)}]"
     usual = templates.PLACES["plate"]
     return whole.replace(usual.ljust(20), place.ljust(20)).replace(usual, place), body.notes

@@ -61,8 +61,15 @@ class Band(check.Brief):
             if name is None or each.value is None:
                 continue
             low, high = np.quantile(self.values[name], ENDS).tolist()
+            mostly = ""
+            if np.ptp(self.values[name]) > 0.0:
+                parts = {
+                    key: float(stats.spearmanr(self.values[key], self.values[name])[0] ** 2) for key in self.inputs
+                }
+                best = max(parts, key=parts.__getitem__)
+                mostly = best if parts[best] > 1.0 / len(self.values[name]) ** 0.5 else ""
             known = name, each.value, each.computation, each.known, each.unknown
-            found.append(Quantity(*known, low, high, self._mostly(name)))
+            found.append(Quantity(*known, low, high, mostly))
         return tuple(found)
 
     def __getitem__(self, name: str) -> Quantity:
@@ -74,13 +81,6 @@ class Band(check.Brief):
         too."""
         values = {quantity: self.values[name] for quantity, name in NAMES.items()}
         return of_blow(self.hit.trust, measured, values)
-
-    def _mostly(self, name: str) -> str:
-        if np.ptp(self.values[name]) == 0.0:
-            return ""
-        shares_of = {key: float(stats.spearmanr(self.values[key], self.values[name])[0] ** 2) for key in self.inputs}
-        best = max(shares_of, key=shares_of.__getitem__)
-        return best if shares_of[best] > 1.0 / len(self.values[name]) ** 0.5 else ""
 
     def summary(self) -> str:
         """The quantities in a table, and the inputs."""

@@ -50,12 +50,22 @@ def _table(name: str, selector: str, makers: dict[str, Callable[..., Any]]) -> d
     """The schema of one table: that of its only kind, or a choice by the key ``selector``."""
     if not selector:
         return _one(name, makers[""])
+    choices = _choices(name, selector, makers)
+    if name in NAMES:
+        every = (_keys(name, kind, makers[kind])["properties"].items() for kind in reversed(makers))
+        choices.append({
+            "description": "One of the catalogue; other keys replace what its name says.",
+            "type": "object",
+            "properties": {"name": keys.form(name, "", "name"), **{key: one for some in every for key, one in some}},
+            "required": ["name"],
+            "additionalProperties": False,
+        })  # fmt: skip
     return {
         "type": "object",
         "description": keys.TABLES[name],
         "properties": {selector: {"enum": list(makers)}},  # so that editors offer the kinds first
         "required": [] if name in NAMES else [selector],
-        "oneOf": _choices(name, selector, makers) + ([_by_name(name, makers)] if name in NAMES else []),
+        "oneOf": choices,
     }
 
 
@@ -67,20 +77,6 @@ def _one(name: str, maker: Callable[..., Any]) -> dict[str, Any]:
     either = [{"required": found["required"]}, {"required": ["name"]}]
     own = {"name": keys.form(name, "", "name"), **found["properties"]}
     return found | {"properties": own, "required": [], "anyOf": either}
-
-
-def _by_name(table: str, makers: dict[str, Callable[..., Any]]) -> dict[str, Any]:
-    """The schema of a table with a name of the catalogue, and of keys that replace what it says."""
-    keys_of_kinds: dict[str, Any] = {}
-    for kind, maker in makers.items():
-        keys_of_kinds = {**_keys(table, kind, maker)["properties"], **keys_of_kinds}
-    return {
-        "description": "One of the catalogue; other keys replace what its name says.",
-        "type": "object",
-        "properties": {"name": keys.form(table, "", "name"), **keys_of_kinds},
-        "required": ["name"],
-        "additionalProperties": False,
-    }
 
 
 def _choices(name: str, selector: str, makers: dict[str, Callable[..., Any]]) -> list[dict[str, Any]]:

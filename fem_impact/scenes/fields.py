@@ -8,7 +8,7 @@ import numpy as np
 from scipy.interpolate import RegularGridInterpolator
 
 from .._base import check
-from ..mesh.rise import table
+from ..mesh import rise
 
 AXES = ("x", "y")
 SHAPES = ({"value", "centre", "radius"}, {"value", "from", "to"})
@@ -64,7 +64,7 @@ def _cases(name: str, value: dict, dimension: int) -> Callable[[np.ndarray], np.
             ]
             cases.append((inside, np.minimum(*ends), np.maximum(*ends)))
 
-    def at(points: np.ndarray) -> np.ndarray:
+    def value_at(points: np.ndarray) -> np.ndarray:
         result = np.full(len(points), otherwise)
         for inside, first, second in reversed(cases):  # the first case that holds counts
             if isinstance(second, float):
@@ -74,7 +74,7 @@ def _cases(name: str, value: dict, dimension: int) -> Callable[[np.ndarray], np.
             result[here] = inside
         return result
 
-    return at
+    return value_at
 
 
 def tapered(name: str, value: Any) -> Any:
@@ -88,11 +88,13 @@ def tapered(name: str, value: Any) -> Any:
     return lambda along: np.interp(along[:, 0], distance, size)
 
 
-def heights(path: str) -> Any:
+def heights(*, table: str) -> Any:
     """The rise through the points of a CSV file with columns x, y, z [m]; a first line of words is skipped."""
-    file = Path(path)
+    if not isinstance(table, str):
+        raise ValueError(f"table must be the name of a file, got {check.shown(table)}")
+    file = Path(table)
     if not file.is_file():
-        raise ValueError(f"table must name a CSV file with columns x, y, z, got {path!r}; {check.absent(file)}")
+        raise ValueError(f"table must name a CSV file with columns x, y, z, got {table!r}; {check.absent(file)}")
     rows = []
     for number, line in enumerate(file.read_text(encoding="utf-8", errors="replace").splitlines(), 1):
         try:
@@ -103,7 +105,7 @@ def heights(path: str) -> Any:
     if any(len(row) != 3 for row in rows):
         raise ValueError(f"table {file.name} must have three columns, x, y and z in m, divided by commas")
     *plane, z = check.array(f"table {file.name}", rows, (None, 3), "m").T if rows else np.zeros((3, 0))
-    return table(np.column_stack(plane), z)
+    return rise.table(np.column_stack(plane), z)
 
 
 def over_frequency(name: str, value: Any) -> Any:

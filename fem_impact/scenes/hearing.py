@@ -12,7 +12,6 @@ from ..model.playing import Strokes
 from ..show import export, sound
 from .scene import Scene
 
-EARS = 2  # listeners whose sounds make one stereo file
 BOUNDS: dict[int, tuple[str, ...]] = {1: ("",), 2: ("low", "high")}  # number of sounds of a listener: what they are
 
 
@@ -28,7 +27,7 @@ def radiated(
     return sound.radiate_bar(response, listener, width=width, height=height, duration=duration)
 
 
-def said(heard: tuple[sound.Sound, ...]) -> str:
+def tell_level(heard: tuple[sound.Sound, ...]) -> str:
     """The peak level at a listener in words, with its reference; of two sounds the levels between which it lies."""
     low, high = sorted((heard[0], heard[-1]), key=lambda each: each.level)
     if len(heard) == 1 or high.level == -math.inf:
@@ -37,7 +36,7 @@ def said(heard: tuple[sound.Sound, ...]) -> str:
     return f"bounded: between {least} and {high.said}"
 
 
-def write(
+def write_sounds(
     folder: Path, scene: Scene, response: Response | Strokes, *, duration: float | None = None, normalise: bool = False
 ) -> list[dict[str, Any]]:
     """Write strike.wav, strike_2.wav ... of the points, radiated.wav ... of the listeners, and stereo.wav of two.
@@ -54,7 +53,7 @@ def write(
     ears = [radiated(scene, response, listener, duration) for listener in scene.listeners]
     for i, (listener, sounds) in enumerate(zip(scene.listeners, ears)):
         found += _written(folder, partial(_name, "radiated", i), sounds, normalise, listener=listener)
-    if len(ears) == EARS:
+    if len(ears) == 2:
         both = tuple(sound.together(each) for each in zip(*ears))
         found += _written(folder, partial(_name, "stereo", 0), both, normalise, listeners=scene.listeners)
     return found
@@ -79,4 +78,4 @@ def _name(kind: str, i: int, bound: str = "") -> str:
 
 def _levels(sounds: tuple[sound.Sound, ...], heard: sound.Sound) -> dict[str, Any]:
     levels = {"full_scale": heard.full_scale, "unit": heard.unit, "peak_level": heard.peak_level, "level": heard.level}
-    return {**levels, "stated": said(sounds), "reference": sound.REFERENCE[heard.unit][0]}
+    return {**levels, "stated": tell_level(sounds), "reference": sound.REFERENCE[heard.unit][0]}

@@ -13,7 +13,6 @@ from ..mesh.loops import UNITS
 from ..model.target import AIR, MODELS
 
 MOST_LISTENERS = 100  # [-] each costs a sound
-LOWEST_NU = -0.99  # [-] closer to -1, the rigidity of a plate is beyond all numbers
 SOURCES = ("auto", "fe", "analytic")
 Form = dict[str, Any]  # of JSON schema
 
@@ -150,7 +149,8 @@ KEYS: dict[str, tuple[str, Form]] = {
     "material.E": ("Pa, Young's modulus; of wood along the grain", POSITIVE),
     "nu": ("-, Poisson's ratio", NUMBER | {"exclusiveMinimum": -1, "maximum": 0.5}),
     "material.nu": ("-, Poisson's ratio, at most 0.5 unless the material is orthotropic", NUMBER),
-    "target.nu": ("-, Poisson's ratio of a body without [material]", within(LOWEST_NU, 0.5)),
+    # closer to -1, the rigidity of a plate is beyond all numbers
+    "target.nu": ("-, Poisson's ratio of a body without [material]", within(-0.99, 0.5)),
     "rho": ("kg/m^3, density", POSITIVE),
     "E_across": ("Pa, of wood: Young's modulus across the grain", POSITIVE),
     "G": ("Pa, of wood: shear modulus", POSITIVE),

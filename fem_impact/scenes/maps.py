@@ -234,12 +234,17 @@ def draw(
     label = PICTURED.get(layer, layer)
     if "max_frequency" in values.attrs:
         label += f" up to {values.max_frequency:g} Hz"
+    borders = []  # as curves over the picture: values along x and y
+    if values.dims == table.n_impacts.dims and "borders" in table.attrs:
+        # in grams, because SI prefixes do not go with kg
+        rows, columns = (1e3 if name in table.coords and _unit(table[name]) == "g" else 1.0 for name in values.dims)
+        borders = [(columns * border.points[:, 1], rows * border.points[:, 0]) for border in read_borders(table)]
     chosen: dict[str, Any] = {
         "x": _axis(table, values.dims[1]),
         "y": _axis(table, values.dims[0]),
         "colour": plots.Axis(markup.literal(label), _unit(values), log=bool(log), limits=limits),
         "contours": _contours(table, values),
-        "borders": _borders(table, values),
+        "borders": borders,
         "shades": [],
         "marks": marks,
         "title": markup.literal(str(table.attrs.get("title", ""))),
@@ -247,7 +252,6 @@ def draw(
     if "doubtful" in table and layer == "n_impacts" and bool(table.doubtful.any()):
         chosen["shades"] = [(table.doubtful, plots.PURPLE, "number in doubt")]
     shown = values.where(table.n_impacts >= 0)
-    # in grams along axes, because SI prefixes do not go with kg
     heavy = {name: 1e3 * shown[name] for name in shown.dims if name in shown.coords and _unit(shown[name]) == "g"}
     return plots.colour_map(shown.assign_coords(heavy), **{**chosen, **wanted})
 
@@ -265,14 +269,6 @@ def _contours(table: xarray.Dataset, values: xarray.DataArray) -> list[Any]:
     if float(limit.min()) < 1.0 < float(limit.max()):
         found.append((limit, [1.0], "", "threshold: the body stops the striker"))
     return found
-
-
-def _borders(table: xarray.Dataset, values: xarray.DataArray) -> list[tuple[np.ndarray, np.ndarray]]:
-    """The borders of a map as curves over the picture: values along x and y."""
-    if values.dims != table.n_impacts.dims or "borders" not in table.attrs:
-        return []
-    heavy = [1e3 if name in table.coords and _unit(table[name]) == "g" else 1.0 for name in values.dims]
-    return [(heavy[1] * border.points[:, 1], heavy[0] * border.points[:, 0]) for border in read_borders(table)]
 
 
 def _axis(table: xarray.Dataset, name: Any) -> plots.Axis:
@@ -304,7 +300,7 @@ def can_write(form: str, folder: Path | None = None) -> str:
     return form
 
 
-def write(folder: Path, table: xarray.Dataset, form: str = "nc", picture: str = "png") -> list[str]:
+def write_map(folder: Path, table: xarray.Dataset, form: str = "nc", picture: str = "png") -> list[str]:
     """Write map.nc or map.zarr, map.csv, borders.csv and, for two axes, a picture of each layer; return the names.
 
     A map of more than MOST_ROWS cells gets no CSV file: it would be slow to write and useless.

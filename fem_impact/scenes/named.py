@@ -1,6 +1,6 @@
 """Materials and strikers of a scene by name: what ``[material] name = "brass"`` stands for."""
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from typing import Any
 
 from .._base import known
@@ -18,15 +18,24 @@ def filled(tables: Mapping[str, Any]) -> dict[str, Any]:
     if isinstance(found.get("material"), Mapping):
         found["material"] = _material("[material]", found["material"])
     for part in ("layer", "rib"):
-        if isinstance(found.get(part), list):
-            found[part] = [_within(f"[[{part}]] {i}", each) for i, each in enumerate(found[part])]
+        for i, each in _listed_with(found, part, "material"):
+            found[part][i] = {**each, "material": _material(f"[[{part}]] {i} material:", each["material"])}
     found = _striker("[striker]", found, found)
-    if isinstance(found.get("stroke"), list):
-        stated = {"contact": tables["contact"]} if "contact" in tables else {}
-        found["stroke"] = [
-            _stroke(f"[[stroke]] {i} striker:", each, found, stated) for i, each in enumerate(found["stroke"])
-        ]
+    stated = {"contact": tables["contact"]} if "contact" in tables else {}  # it holds for strokes, too
+    for i, each in _listed_with(found, "stroke", "striker"):
+        if "name" in each["striker"]:  # the numbers of a stroke have no intervals
+            made = _striker(f"[[stroke]] {i} striker:", {**stated, **each}, found)
+            found["stroke"][i] = made | {key: known.taken("", made[key])[0] for key in ("striker", "contact")}
     return found
+
+
+def _listed_with(tables: dict[str, Any], name: str, key: str) -> Iterator[tuple[int, Mapping[str, Any]]]:
+    """Number and table of those that may stand several times in which a key is a table; their list is made anew."""
+    if isinstance(tables.get(name), list):
+        tables[name] = list(tables[name])
+        for i, each in enumerate(tables[name]):
+            if isinstance(each, Mapping) and isinstance(each.get(key), Mapping):
+                yield i, each
 
 
 def _material(called: str, table: Mapping[str, Any]) -> dict[str, Any]:
@@ -43,13 +52,6 @@ def _entry(called: str, names: Catalogue[Any], name: Any) -> Entry:
         raise ValueError(f"{called} name: {error}") from None
 
 
-def _within(called: str, table: Any) -> Any:
-    """A layer or rib, whose own material may have a name."""
-    if not isinstance(table, Mapping) or not isinstance(table.get("material"), Mapping):
-        return table
-    return {**table, "material": _material(f"{called} material:", table["material"])}
-
-
 def _striker(called: str, table: Mapping[str, Any], scene: Mapping[str, Any]) -> dict[str, Any]:
     """A table with those of the striker and the contact that the striker's name stands for, if it has one."""
     told = table.get("striker")
@@ -61,19 +63,6 @@ def _striker(called: str, table: Mapping[str, Any], scene: Mapping[str, Any]) ->
     own = {key: value for key, value in told.items() if key != "name"}
     found = {**table, "striker": {**entry.table, **own}}
     return found if "contact" in table else {**found, "contact": entry.contact_table(_struck(called, entry, scene))}
-
-
-def _stroke(called: str, table: Any, scene: Mapping[str, Any], stated: Mapping[str, Any]) -> Any:
-    """A stroke, whose striker may have a name; its numbers have no intervals. A [contact] of the scene holds for it."""
-    if (
-        not isinstance(table, Mapping)
-        or not isinstance(table.get("striker"), Mapping)
-        or "name" not in table["striker"]
-    ):
-        return table
-    found = _striker(called, {**stated, **table}, scene)
-    parts = {key: known.taken("", found[key])[0] for key in ("striker", "contact")}
-    return {**found, **parts}
 
 
 def _struck(called: str, entry: Entry, scene: Mapping[str, Any]) -> Material | None:

@@ -38,7 +38,7 @@ KINDS = kept.kinds(
 )  # fmt: skip
 
 
-def save(folder: Path, found: Response | Strokes, points: Any) -> str:
+def save_response(folder: Path, found: Response | Strokes, points: Any) -> str:
     """Write what `load_response` needs beside response.json, which must be there; return the name of the file.
 
     Of a sequence, the assumptions of its hardest blow are kept, which its verdict is about.
@@ -171,10 +171,10 @@ def _checked(response: Any, assumptions: Any) -> Response:
         good &= h.stretched.forms.shape[1:] == (m, m) and 0 <= h.stretched.first <= n - m
     if not good or not all(isinstance(each, Assumption) for each in assumptions or ()):
         raise ValueError("arrays of a response must fit together")
-    return response if assumptions is None else replace(response, audit=partial(_told, assumptions))
+    return response if assumptions is None else replace(response, audit=partial(_stated_assumptions, assumptions))
 
 
-def _told(assumptions: tuple[Assumption, ...], _: Response) -> tuple[Assumption, ...]:
+def _stated_assumptions(assumptions: tuple[Assumption, ...], _: Response) -> tuple[Assumption, ...]:
     return assumptions
 
 

@@ -50,7 +50,6 @@ from .schema import (
 
 # [-] places along a beam where its section is looked at: ten in each hundredth of it, where it may change
 SECTIONS = 1001
-RIGID = 3  # [-] most rigid motions of a body: a plate lifts and turns about two axes
 NOTHING = Part()  # stands for a missing table
 
 
@@ -121,7 +120,7 @@ class Scene(check.Brief):
             With the `Plan` of every stroke as if it struck the body at rest; what a stroke inherits from those before
             is known after `play` only.
         """
-        return sequence.plan(self, watch, **changes)
+        return sequence.plan_sequence(self, watch, **changes)
 
     @check.typed
     def run_strokes(
@@ -137,7 +136,7 @@ class Scene(check.Brief):
         ``watch`` and ``before`` as in `run`, ``before`` with the plan of the body; ``strict`` and ``changes`` as in
         `play`. `report.write` makes a page of it.
         """
-        return sequence.run(self, watch, before=before, strict=strict, **changes)
+        return sequence.run_sequence(self, watch, before=before, strict=strict, **changes)
 
     def modes(self, count: int | None = None, *, elastic: bool = False, keep: Path | None = None) -> Modes:
         """Modes of the struck body: the first ``count``, or as many as the blow needs to meet its tolerance.
@@ -154,7 +153,7 @@ class Scene(check.Brief):
         tolerance = self.blow.values.get("tolerance", TOLERANCE)
         with self.blame("strike"):
             check.tolerance(tolerance)
-        number = min(count + RIGID, most) if elastic else count
+        number = min(count + 3, most) if elastic else count  # a plate lifts and turns about two axes
         first = None
         if keep is not None and target.kind == "fe" and number > FIRST_LOOK:
             first = target.find(FIRST_LOOK, tolerance=tolerance)  # what is kept starts from its mesh

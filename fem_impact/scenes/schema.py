@@ -72,15 +72,8 @@ def rise_of(value: Any) -> Callable[..., Any]:
     key = "table" if "table" in value else "shape"
     rest = {name: item for name, item in value.items() if name != key}
     if key == "table":
-        return _within("rise", value, _heights)
+        return _within("rise", value, heights)
     return _within("rise", rest, RISES[check.one_of("rise.shape", value[key], RISES)])
-
-
-def _heights(*, table: str) -> Any:
-    """A smooth surface through heights in a CSV file."""
-    if not isinstance(table, str):
-        raise ValueError(f"table must be the name of a file, got {check.shown(table)}")
-    return heights(table)
 
 
 def _risen(maker: Callable[..., Any]) -> Callable[..., Any]:
@@ -187,14 +180,11 @@ def target_values(**values: Any) -> dict[str, Any]:
     scale = {key: given.pop(key) for key in ("mass", "first_frequency")}
     given["damping_ratio"] = over_frequency("damping_ratio", given["damping_ratio"])
     for key, read in (("point_masses", _weight), ("point_supports", _post)):
-        given[key] = tuple(read(i, entry) for i, entry in enumerate(_listed(key, given[key])))
+        if not isinstance(given[key], (list, tuple)):
+            words = f"{key} must be a list of tables such as [{{ at = [0.1, 0.2] }}]"
+            raise ValueError(f"{words}, got {check.shown(given[key])}")
+        given[key] = tuple(read(i, entry) for i, entry in enumerate(given[key]))
     return given | {"scale": {key: value for key, value in scale.items() if value is not None}}
-
-
-def _listed(name: str, value: Any) -> Sequence[Any]:
-    if not isinstance(value, (list, tuple)):
-        raise ValueError(f"{name} must be a list of tables such as [{{ at = [0.1, 0.2] }}], got {check.shown(value)}")
-    return value
 
 
 def _weight(i: int, entry: Any) -> tuple[Any, float]:

@@ -135,3 +135,15 @@ def _single_or_multiple(response: Response, law: Contact) -> str:
         return f"Single hit expected, whatever the {wall}: the striker always rebounds."
     number, side = ("Single hit", "below") if resonance < limit else ("Several hits", "above")
     return f"{number} expected: the {wall}, is {side} the limit of {si(limit, 'Hz', 3)} (kinetic-energy criterion)."
+
+
+def tip_notes(scene: Scene) -> tuple[str, ...]:
+    """A note if the scene's own contact is not a linear spring, as the tips of hammers are: what it amounts to."""
+    if scene.contact.kind == "linear":
+        return ()
+    law, mass, speed = scene.make_contact(), scene.make_striker().felt_mass, float(scene.blow.values["speed"])
+    alike = accuracy.resonant_stiffness(mass, accuracy.contact_resonance(law, mass, speed))
+    return (
+        f"tips are linear springs [N/m]; the scene's contact is of another kind ({scene.contact.kind}) and not used: "
+        f"under {1e3 * mass:.4g} g at {speed:g} m/s it acts as long as a tip of {alike:.3g} N/m",
+    )

@@ -101,7 +101,7 @@ class Played(NamedTuple):
     seconds: dict[str, float]  # [s] wall time of each stage, by its name
 
 
-def run(
+def run_sequence(
     scene: "Scene",
     watch: Watch | None = None,
     *,
@@ -111,14 +111,25 @@ def run(
 ) -> Played:
     """As `Scene.run_strokes`: with the plan, which ``before`` sees first, and the time of every stage."""
     stages = Stages(watch)
-    planned = plan(scene, watch, **changes)
+    planned = plan_sequence(scene, watch, **changes)
     if before is not None:
         before(planned.body)
-    found = _carried_out(scene, planned, stages, strict, changes)
+    _, modes = planned.body.description.found(stages)
+    told = {name: scene.blow.values[name] for name in OF_SEQUENCE if name in scene.blow.values}
+    told |= {name: value for name, value in changes.items() if name in OF_SEQUENCE and value is not None}
+    strokes: list[tuple[Any, ...]] = []
+    for i, part in enumerate(scene.stroke):
+        single, own = scene.alone(i), part.values
+        striker = (single if "striker" in own else scene).make_striker()
+        stroke = own["when"], striker, single.make_contact(), single.blow.values["at"], single.blow.values["speed"]
+        strokes.append((*stroke, own["lasts"]) if "lasts" in own else stroke)
+    with stages("strike"):
+        found = playing.strokes(modes, strokes, strict=strict, **told)
+    found = replace(found, notes=tuple(dict.fromkeys((*modes.notes, *found.notes))))
     return Played(planned, found, dict(stages.seconds))
 
 
-def plan(scene: "Scene", watch: Watch | None = None, **changes: Any) -> SequencePlan:
+def plan_sequence(scene: "Scene", watch: Watch | None = None, **changes: Any) -> SequencePlan:
     """As `Scene.plan_strokes`."""
     if not scene.stroke:
         raise scene.fault(f"[[{REPEATED}]] is missing: strokes are played together; a single blow has strike and plan")
@@ -150,25 +161,7 @@ def played_order(scene: "Scene") -> list[int]:
     return sorted(range(len(scene.stroke)), key=lambda i: scene.stroke[i].values["when"])
 
 
-def _carried_out(
-    scene: "Scene", planned: SequencePlan, stages: Stages, strict: bool, changes: Mapping[str, Any]
-) -> Strokes:
-    """Play the strokes of a scene as planned; ``changes`` are those of the plan."""
-    _, modes = planned.body.description.found(stages)
-    told = {name: scene.blow.values[name] for name in OF_SEQUENCE if name in scene.blow.values}
-    told |= {name: value for name, value in changes.items() if name in OF_SEQUENCE and value is not None}
-    strokes: list[tuple[Any, ...]] = []
-    for i, part in enumerate(scene.stroke):
-        single, own = scene.alone(i), part.values
-        striker = (single if "striker" in own else scene).make_striker()
-        stroke = own["when"], striker, single.make_contact(), single.blow.values["at"], single.blow.values["speed"]
-        strokes.append((*stroke, own["lasts"]) if "lasts" in own else stroke)
-    with stages("strike"):
-        found = playing.strokes(modes, strokes, strict=strict, **told)
-    return replace(found, notes=tuple(dict.fromkeys((*modes.notes, *found.notes))))
-
-
-def numbers(found: Strokes, scene: Mapping[str, Any], seconds: Mapping[str, float]) -> dict[str, Any]:
+def sequence_numbers(found: Strokes, scene: Mapping[str, Any], seconds: Mapping[str, float]) -> dict[str, Any]:
     """Everything a sequence told, as plain data: its numbers, strokes and impacts, and the tables of its scene."""
     data = {name: getattr(found, name) for name in SCALARS}
     strokes = [

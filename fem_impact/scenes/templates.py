@@ -115,7 +115,7 @@ def text(kind: str) -> str:
     return whole + MAP if kind == "map" else whole
 
 
-def write(path: Path, kind: str, whole: str | None = None) -> None:
+def write_scene(path: Path, kind: str, whole: str | None = None) -> None:
     """Write the scene of a kind, or another text; refuses to replace a file."""
     if path.suffix.lower() != ".toml":
         raise ValueError(f"a scene must be a .toml file, got {path}")

@@ -30,7 +30,6 @@ from ..sweeps.store import Texts
 from .maps import MOST_ROWS, changed_scene
 from .scene import Scene, load_scene
 
-CHECKED = 16  # [-] blows struck again one by one, as a sample: their worst shows an error that many have
 # [-] levels of an input of the body at which the body is made anew: nine tenths of its values lie between
 TAILS = (0.05, 0.95)
 # [-] default limit of a spread, to limit the work to some minutes and 1 GB of numbers
@@ -126,7 +125,7 @@ def spread(
     >>> abs(found.quantile("contact_time", 0.5).value / (3.14159 * (0.1 / 1e5) ** 0.5) - 1.0) < 1e-2
     True
     """
-    told, blow = _told(scene, striker, contact, at, speed, damping_ratio)
+    told, blow = _scene_and_blow(scene, striker, contact, at, speed, damping_ratio)
     inputs = read_inputs(vary)
     n = check.count("n", n)
     if n > (most := check.number("max_blows", max_blows)):
@@ -154,7 +153,9 @@ def spread(
                   why_no_shares=why)  # fmt: skip
 
 
-def _told(scene: Any, striker: Any, contact: Any, at: Any, speed: Any, damping_ratio: Any) -> tuple[Scene | None, Blow]:
+def _scene_and_blow(
+    scene: Any, striker: Any, contact: Any, at: Any, speed: Any, damping_ratio: Any
+) -> tuple[Scene | None, Blow]:
     """The scene if there is one, and the blow."""
     if isinstance(scene, (System, Modes)):
         check.instance("striker", striker, Striker)
@@ -212,7 +213,8 @@ class _SpreadAsked:
             raise ValueError("vary must name the mass and frequency of the body, or what makes them, but not both")
 
     def _sort(self, name: str, axis: str, column: np.ndarray) -> None:
-        dimension = self.dimension
+        dimension, (table, _, key) = self.dimension, name.partition(".")
+        part = getattr(self.scene, table, None) if table in ("striker", "contact") else None
         if name in PLACES[:dimension]:
             self.places[PLACES.index(name)] = column
         elif name in BODY.get(dimension, {}):
@@ -223,7 +225,7 @@ class _SpreadAsked:
             if axis in self.own:
                 raise ValueError(f"vary names {axis} twice")
             self.own[axis] = column
-        elif self._numeric(name):
+        elif part is not None and isinstance(part.values.get(key), (int, float)):
             self.parts[name] = column
         else:
             known = [*ALIASES, *AXES, *PLACES[:dimension], *BODY.get(dimension, {})]
@@ -237,19 +239,19 @@ class _SpreadAsked:
         target = self.blow.target
         return target.mesh.dimension if target.mesh is not None else target.modes.dimension if target.modes else 0
 
-    def _numeric(self, name: str) -> bool:
-        """Whether the scene has such a number of a striker or of the contact."""
-        table, _, key = name.partition(".")
-        part = getattr(self.scene, table, None) if table in ("striker", "contact") else None
-        return part is not None and isinstance(part.values.get(key), (int, float))
-
     def _of_body(self, name: str) -> float:
         """The body's own value of an input, which must be one number."""
-        target = self.blow.target
+        target, section = self.blow.target, self.blow.target.section
         if name == SIZE:
-            _scalable(target)
+            springs = any(isinstance(held, Elastic) for held in target.supports.values())
+            pulled = isinstance(section, Plate) and (section.tension or not section.plain)
+            stiff = springs or pulled or target.thick or target.air
+            if target.mesh is None or stiff or target.point_masses or target.scale:  # lengths do not scale exactly
+                raise ValueError(
+                    f"vary: {SIZE} needs a thin body of stated size, flat, without springs, tension, ribs, point "
+                    "masses or air; vary target.mass and target.first_frequency"
+                )
             return 1.0
-        section = target.section
         if section is None:
             raise ValueError(f"vary: {name} needs a body with a section; vary target.mass and target.first_frequency")
         table, key = name.split(".")
@@ -389,17 +391,6 @@ def _below(name: str, column: np.ndarray) -> ValueError:
     )
 
 
-def _scalable(target: Target) -> None:
-    """ValueError unless all lengths of the body can be scaled exactly."""
-    springs = any(isinstance(held, Elastic) for held in target.supports.values())
-    pulled = isinstance(target.section, Plate) and (target.section.tension or not target.section.plain)
-    if target.mesh is None or springs or pulled or target.point_masses or target.thick or target.air or target.scale:
-        raise ValueError(
-            f"vary: {SIZE} needs a thin body of stated size, flat, without springs, tension, ribs, point masses or "
-            "air; vary target.mass and target.first_frequency"
-        )
-
-
 def _made(target: Target, name: str, ratio: float) -> Target:
     """The target with one number of its section or material multiplied."""
     section = target.section
@@ -420,8 +411,8 @@ def _made(target: Target, name: str, ratio: float) -> Target:
 
 def _checked(exact: Cases, numbers: np.ndarray, workers: int | None) -> Checks:
     """Strike a few blows again one by one, with the values they really have."""
-    some = [int(i) for i in np.unique(np.linspace(0, exact.n_cases - 1, CHECKED).astype(int))]
-
+    # so many that the worst of them shows an error that many have
+    some = [int(i) for i in np.unique(np.linspace(0, exact.n_cases - 1, 16).astype(int))]
     hits = {i: hit for i, (hit, _) in zip(some, try_each(some, exact.blow, workers)) if hit is not None}
     apart: dict[str, float] = {}
     others = 0
@@ -459,7 +450,7 @@ def _table(
     return xarray.Dataset(data)
 
 
-def write(folder: Path, found: Spread, picture: str = "png") -> list[str]:
+def write_spread(folder: Path, found: Spread, picture: str = "png") -> list[str]:
     """Write spread.json, spread.nc, spread.csv and spread.png, or another format; return the names.
 
     A spread of more than `maps.MOST_ROWS` blows gets no CSV file: it would be slow to write and useless.

@@ -321,7 +321,7 @@ def test_a_slip_of_a_unit_is_told_before_what_follows_from_it():
 @pytest.mark.slow  # half a minute
 def test_the_new_plate_in_air_meets_its_own_tolerance(tmp_path):
     """As its assumption 'still air' advises; the air of the modes that the blow alone needs errs too much."""
-    templates.write(tmp_path / "plate.toml", "plate")
+    templates.write_scene(tmp_path / "plate.toml", "plate")
     text = (tmp_path / "plate.toml").read_text()
     first = fi.load_scene(tmp_path / "plate.toml").strike()
     assert any('air = "both sides" under [target]' in each.remedy for each in first.assumptions)

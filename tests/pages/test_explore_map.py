@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scenes import load_text
 from test_cli import TEXT
 
 import fem_impact as fi
@@ -13,9 +14,7 @@ from fem_impact.pages import explore_map, explore_model
 
 @pytest.fixture(scope="module")
 def stand(tmp_path_factory):
-    path = tmp_path_factory.mktemp("setup") / "small.toml"
-    path.write_text(TEXT)
-    return explore_model.Setup.of(fi.load_scene(path))
+    return explore_model.Setup.of(load_text(tmp_path_factory.mktemp("setup"), TEXT))
 
 
 @pytest.fixture(scope="module")

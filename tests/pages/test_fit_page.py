@@ -9,7 +9,7 @@ import matplotlib.pyplot as plt
 import pytest
 
 import fem_impact as fi
-from fem_impact.pages import fit_page
+from fem_impact.pages import fit_page, html_page
 from fem_impact.taps.found import Found
 
 
@@ -27,7 +27,7 @@ def found():
 
 def test_a_page_with_values_ridges_pictures_and_double_hits(found, tmp_path):
     made, _ = found
-    fit_page.write(tmp_path / "fit.html", made, title="A <hammer> & a bar")
+    fit_page.write_fit(tmp_path / "fit.html", made, title="A <hammer> & a bar")
     page = (tmp_path / "fit.html").read_text()
     assert "A &lt;hammer&gt; &amp; a bar" in page
     assert page.count("data:image/png;base64,") == 3
@@ -49,7 +49,7 @@ def test_labels_of_axes_keep_apart_and_pictures_have_no_background(found):
         boxes = [label.get_window_extent() for label in axes.get_xticklabels(which="both") if label.get_text()]
         boxes = sorted(box.extents[[0, 2]].tolist() for box in boxes)
         assert all(one[1] < next[0] for one, next in pairwise(boxes))
-    pixels = plt.imread(io.BytesIO(base64.b64decode(fit_page.uri(figure).partition(",")[2])))
+    pixels = plt.imread(io.BytesIO(base64.b64decode(html_page.picture_uri(figure).partition(",")[2])))
     assert pixels[0, 0, 3] == 0.0
 
 
@@ -59,7 +59,7 @@ def test_a_verdict_counts_what_the_model_lacks(found, white, badge, tmp_path, mo
     monkeypatch.setattr(Found, "whiteness", white)
     made = replace(found[0])
     made.__dict__["profiles"] = found[0].profiles
-    fit_page.write(tmp_path / "fit.html", made)
+    fit_page.write_fit(tmp_path / "fit.html", made)
     page = (tmp_path / "fit.html").read_text()
     assert page.count('class="badge ') == 1 and f'class="badge {badge}"' in page
     assert ("the model lacks something" in page) == (badge == "bad")

@@ -27,7 +27,7 @@ def taps():
 @pytest.fixture(scope="module")
 def written(taps, tmp_path_factory):
     path = tmp_path_factory.mktemp("page") / "frf.html"
-    frf_page.write(path, fi.frf(taps.pick([0])), title="A <plate>", taps=taps, computed=PLATE, points=POINTS)
+    frf_page.write_responses(path, fi.frf(taps.pick([0])), title="A <plate>", taps=taps, computed=PLATE, points=POINTS)
     return path
 
 
@@ -44,10 +44,10 @@ def test_the_page_tells_double_hits_poles_and_computed_modes(written):
 @pytest.mark.slow
 def test_without_points_nothing_moves_and_without_peaks_it_says_so(taps, tmp_path):
     found = fi.frf(taps)
-    frf_page.write(tmp_path / "a.html", found)
+    frf_page.write_responses(tmp_path / "a.html", found)
     assert "<canvas" not in (tmp_path / "a.html").read_text()
     flat = found.assign(H=found.H * 0.0 + 1.0)
-    frf_page.write(tmp_path / "b.html", flat)
+    frf_page.write_responses(tmp_path / "b.html", flat)
     assert "No modes were picked: found has no peaks that are modes" in (tmp_path / "b.html").read_text()
 
 

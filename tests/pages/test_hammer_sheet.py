@@ -56,7 +56,7 @@ def test_what_works_comes_first_and_double_hits_last(plan):
 
 @pytest.mark.slow
 def test_every_point_has_a_sheet_that_prints_on_a_page_of_its_own(plan, tmp_path, visit):
-    hammer_sheet.write(tmp_path / "sheet.html", plan, title="A <panel>", notes=("tips are linear",))
+    hammer_sheet.write_sheets(tmp_path / "sheet.html", plan, title="A <panel>", notes=("tips are linear",))
     page = visit((tmp_path / "sheet.html").as_uri(), width=360, height=800)
     assert not page.errors and page.tab.evaluate("document.documentElement.scrollWidth") <= 360
     assert page.tab.locator("section.sheet").count() == 2

@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
-from scenes import SMALL
+from scenes import SMALL, load_text
 
 import fem_impact as fi
 from fem_impact.pages import lesson, lesson_grid, worksheet
@@ -18,9 +18,7 @@ HELD = "document.documentElement.lesson"
 
 @pytest.fixture(scope="module")
 def scene(tmp_path_factory):
-    path = tmp_path_factory.mktemp("lesson") / "small.toml"
-    path.write_text('title = "<b>& small"\n' + SMALL)
-    return fi.load_scene(path)
+    return load_text(tmp_path_factory.mktemp("lesson"), 'title = "<b>& small"\n' + SMALL)
 
 
 @pytest.fixture(scope="module")
@@ -64,14 +62,14 @@ def test_numbers_are_those_of_the_program(scene, held):
     assert about.n_failed == 0
     for position in positions(grid, 6):
         hit = blow_of(scene, grid, position)
-        error = grid.number("error")[position]
+        error = grid.quantity("error")[position]
         if not hit.tolerance_met or not grid.blows[int(np.ravel_multi_index(position, grid.shape))].met:
             continue  # a number of impacts that depends on the last digit
-        assert grid.number("n_impacts")[position] == hit.n_impacts
+        assert grid.quantity("n_impacts")[position] == hit.n_impacts
         near = 2.0 * (error + hit.error.total) + 1e-5  # what both say they err by, twice, as one in twenty is worse
         for name in ("peak_force", "contact_time"):
-            assert_allclose(grid.number(name)[position], getattr(hit, name), rtol=near)
-        assert_allclose(grid.number("restitution")[position], hit.restitution, atol=near)
+            assert_allclose(grid.quantity(name)[position], getattr(hit, name), rtol=near)
+        assert_allclose(grid.quantity("restitution")[position], hit.restitution, atol=near)
 
 
 @pytest.mark.slow

@@ -2,16 +2,14 @@
 
 import numpy as np
 import pytest
-from scenes import SMALL
+from scenes import load_text
 
-import fem_impact as fi
 from fem_impact.pages import explore_model, lesson_grid
 
 
 @pytest.fixture
 def small(tmp_path):
-    (tmp_path / "small.toml").write_text(SMALL)
-    return fi.load_scene(tmp_path / "small.toml")
+    return load_text(tmp_path)
 
 
 def test_lines_between_kept_points_miss_a_curve_by_no_more_than_allowed():

@@ -10,7 +10,7 @@ import sys
 import numpy as np
 import pytest
 from conftest import Page
-from scenes import BAR, SMALL
+from scenes import BAR, SMALL, load_text
 from test_cli import TEXT
 
 import fem_impact as fi
@@ -110,8 +110,7 @@ def test_the_command_on_the_page_gives_the_same_numbers(tmp_path, monkeypatch, c
 
 
 def test_a_change_that_no_option_names_is_reproduced_from_python(tmp_path):
-    (tmp_path / "scene.toml").write_text(SMALL)
-    scene = fi.load_scene(tmp_path / "scene.toml")
+    scene = load_text(tmp_path)
     run = scene.run(motion=True, speed=1.0)
     told = report._command(scene, run)
     assert told.startswith("fi.load_scene(") and eval(told, {"fi": fi}).impulse == run.response.impulse
@@ -172,8 +171,7 @@ def test_beams_and_balls_have_a_page_too(tmp_path):
         '[striker]\nkind = "sphere"\nradius = 0.01\nE = 210e9\nnu = 0.3\nrho = 7850.0\n'
         '[contact]\nkind = "linear"\nstiffness = 1e5\n[strike]\nat = [0.1]\nspeed = 1.0\ntolerance = 1e-2\n'
     )
-    (tmp_path / "bar.toml").write_text(text)
-    scene = fi.load_scene(tmp_path / "bar.toml")
+    scene = load_text(tmp_path, text)
     report.write(tmp_path / "bar.html", scene, scene.run(target="modal"))
     page = (tmp_path / "bar.html").read_text(encoding="utf-8")
     assert "A beam of 350" in page and "by a ball of 32.88" in page
@@ -204,8 +202,7 @@ def test_the_result_of_a_sequence_gives_the_same_strokes(tmp_path):
 
 
 def test_listeners_in_free_air_get_a_player_for_each_bound(tmp_path):
-    (tmp_path / "bar.toml").write_text(BAR + "[observe]\nlistener = [0.2, 0.1, 0.5]\n")
-    scene = fi.load_scene(tmp_path / "bar.toml")
+    scene = load_text(tmp_path, BAR + "[observe]\nlistener = [0.2, 0.1, 0.5]\n")
     players = report._sounds(scene, scene.run(target="modal").response)
     told = {player.name.partition("; ")[2] for player in players} - {""}
     assert len(told) == 1 and re.fullmatch(r"bounded: between [\d.]+ and [\d.]+ dB re 20 µPa", told.pop())
@@ -338,8 +335,7 @@ def test_pictures_have_a_text_for_those_who_cannot_see_them(desktop):
 
 
 def test_a_report_begins_with_what_was_missed_and_what_would_meet_it(tmp_path):
-    (tmp_path / "scene.toml").write_text(SMALL)
-    scene = fi.load_scene(tmp_path / "scene.toml")
+    scene = load_text(tmp_path)
     fi.report.write(tmp_path / "report.html", scene, scene.run(target="modal", n_modes=5, tolerance=1e-6))
     page = (tmp_path / "report.html").read_text()
     head = page[page.index("<header>") : page.index("</header>")]

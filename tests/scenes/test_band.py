@@ -4,7 +4,7 @@ import json
 
 import numpy as np
 import pytest
-from scenes import QUICK
+from scenes import QUICK, load_text
 
 import fem_impact as fi
 from fem_impact import cli
@@ -13,9 +13,7 @@ WALL = QUICK.replace("mass = 0.2", "mass = 1e9")  # so heavy that contact time a
 
 
 def load(tmp_path, text):
-    path = tmp_path / "scene.toml"
-    path.write_text(text)
-    return fi.load_scene(path)
+    return load_text(tmp_path, text)
 
 
 @pytest.mark.parametrize("n", [None, 64])

@@ -5,6 +5,7 @@ import tomllib
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
+from scenes import load_text
 
 import fem_impact as fi
 from fem_impact.scenes.fields import over_frequency, varying
@@ -69,8 +70,7 @@ tolerance = 1e-2
 @pytest.fixture
 def load(tmp_path):
     def write(text):
-        (tmp_path / "scene.toml").write_text(text)
-        return fi.load_scene(tmp_path / "scene.toml")
+        return load_text(tmp_path, text)
 
     return write
 

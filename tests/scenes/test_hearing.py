@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
-from scenes import BAR, SMALL
+from scenes import BAR, SMALL, load_text
 from scipy.io import wavfile
 
 from fem_impact import commands
@@ -19,11 +19,9 @@ listeners = [[0.1, 0.15, 0.3], [0.6, 0.15, 0.9]]
 
 @pytest.mark.parametrize("normalise", [False, True])
 def test_every_point_and_listener_has_a_file_and_two_listeners_stereo(tmp_path, normalise):
-    path = tmp_path / "scene.toml"
-    path.write_text(SMALL + OBSERVE)
-    told = scene.load_scene(path)
+    told = load_text(tmp_path, SMALL + OBSERVE)
     hit = told.run(target="modal").response
-    found = hearing.write(tmp_path, told, hit, duration=0.05, normalise=normalise)
+    found = hearing.write_sounds(tmp_path, told, hit, duration=0.05, normalise=normalise)
     names = [each["file"] for each in found]
     assert names == ["strike.wav", "strike_2.wav", "radiated.wav", "radiated_2.wav", "stereo.wav"]
     read = {each["file"]: wavfile.read(tmp_path / each["file"])[1] * each["full_scale"] for each in found}
@@ -48,11 +46,9 @@ TWO = "[observe]\nlisteners = [[0.1, 0.15, 0.3], [0.3, 0.05, 0.5]]\n"
 
 @pytest.mark.parametrize("text", [FREE, BAR], ids=["plate", "bar"])
 def test_in_free_air_a_listener_gets_both_bounds_and_never_one_number(tmp_path, capsys, text):
-    path = tmp_path / "scene.toml"
-    path.write_text(text + TWO)
-    told = scene.load_scene(path)
+    told = load_text(tmp_path, text + TWO)
     hit = told.run(target="modal", n_modes=4).response
-    found = hearing.write(tmp_path, told, hit, duration=0.05)
+    found = hearing.write_sounds(tmp_path, told, hit, duration=0.05)
     names = [f"{name}_{bound}.wav" for name in ("radiated", "radiated_2", "stereo") for bound in ("low", "high")]
     assert [each["file"] for each in found] == ["strike.wav", *names]
     place = told.listeners[1]
@@ -85,8 +81,8 @@ def test_the_air_around_a_plate_sees_no_wall_either(tmp_path):
 
 def test_silence_is_said():
     quiet, tone = (sound.Sound(value * np.ones(10), 48000, 1.0, "Pa") for value in (0.0, 0.2))
-    assert hearing.said((quiet, tone)) == "bounded: between silence and 80.0 dB re 20 µPa"
-    assert hearing.said((tone,)) == "80.0 dB re 20 µPa" and "inf" in hearing.said((quiet, quiet))
+    assert hearing.tell_level((quiet, tone)) == "bounded: between silence and 80.0 dB re 20 µPa"
+    assert hearing.tell_level((tone,)) == "80.0 dB re 20 µPa" and "inf" in hearing.tell_level((quiet, quiet))
 
 
 @pytest.mark.parametrize(

@@ -84,7 +84,7 @@ def test_any_number_of_a_scene_is_an_axis(scene):
 
 
 def test_files_say_what_the_map_holds(table, tmp_path):
-    names = maps.write(tmp_path, table)
+    names = maps.write_map(tmp_path, table)
     assert {"map.nc", "map.csv", "n_impacts.png", "centroid.png"} <= set(names)
     with xarray.open_dataset(tmp_path / "map.nc", engine="scipy") as read:
         assert_allclose(read.contact_time, table.contact_time)
@@ -98,7 +98,7 @@ def test_borders_are_drawn_and_written(scene, tmp_path):
     over = {"contact.stiffness": [2e4, 1e5, 4e5], "striker.mass": [0.02, 0.06, 0.1]}
     table = maps.map_scene(scene, over=over, borders=True)
     curves = fi.read_borders(table)
-    assert "borders.csv" in maps.write(tmp_path, table)
+    assert "borders.csv" in maps.write_map(tmp_path, table)
     rows = [line.split(",") for line in (tmp_path / "borders.csv").read_text().splitlines()]
     assert len(rows) == 1 + sum(len(border.points) for border in curves)
     drawn = maps.draw(table.assign(doubtful=table.n_impacts == 2), "n_impacts")
@@ -168,7 +168,7 @@ def test_zarr_keeps_why_a_cell_failed(table, tmp_path):
     failed = table.copy(deep=True)
     failed["failure"] = failed.failure.astype("<U40")
     failed.failure[1, 0] = "the motion may be chaotic: é"
-    maps.write(tmp_path, failed, "zarr")
+    maps.write_map(tmp_path, failed, "zarr")
     with xarray.open_zarr(tmp_path / "map.zarr") as read:
         assert read.failure.values.tolist() == [["", ""], ["the motion may be chaotic: é", ""], ["", ""]]
         assert_allclose(read.contact_time, table.contact_time)

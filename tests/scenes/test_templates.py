@@ -3,6 +3,7 @@
 import re
 
 import pytest
+from scenes import load_text
 
 import fem_impact as fi
 from fem_impact import cli
@@ -11,7 +12,7 @@ from fem_impact.scenes import maps, templates
 
 def made(kind, folder):
     path = folder / f"{kind}.toml"
-    templates.write(path, kind)
+    templates.write_scene(path, kind)
     return fi.load_scene(path)
 
 
@@ -43,9 +44,7 @@ def test_what_a_comment_offers_is_known(kind, tmp_path):
     """Commented-out keys are valid when the comment sign is removed."""
     text = re.sub(r"^# (?=\w+ = |\[\[)", "", templates.text(kind), flags=re.MULTILINE)
     assert text != templates.text(kind)
-    path = tmp_path / "more.toml"
-    path.write_text(text)
-    fi.load_scene(path).built  # noqa: B018  builds the whole scene, and complains of what is unknown
+    load_text(tmp_path, text).built  # noqa: B018  builds the whole scene, and complains of what is unknown
 
 
 def test_the_prompt_writes_a_scene_and_says_what_is_next(tmp_path, monkeypatch, capsys):
@@ -60,7 +59,7 @@ def test_the_prompt_writes_a_scene_and_says_what_is_next(tmp_path, monkeypatch, 
     ("words", "text"),
     [
         (["new", "palte"], "did you mean 'plate'"),
-        (["new", "plate", "--out", "there.toml"], "there.toml exists already"),
+        (["new", "plate", "--out", "there.toml"], "exists already; name another file with --out, or remove it"),
         (["new", "plate", "--out", "scene.txt"], "a scene must be a .toml file"),
     ],
 )
@@ -72,13 +71,3 @@ def test_the_prompt_refuses_and_replaces_nothing(tmp_path, monkeypatch, capsys, 
     assert text in captured.err and captured.err.count("\n") == 1
     assert [path.name for path in tmp_path.iterdir()] == ["there.toml"]
     assert (tmp_path / "there.toml").read_text() == "mine"
-
-
-def test_a_new_scene_replaces_no_file(tmp_path, monkeypatch, capsys):
-    monkeypatch.chdir(tmp_path)
-    assert cli.main(["new"]) == 0
-    assert cli.main(["new"]) == 2
-    assert "plate.toml exists already; name another file with --out, or remove it" in capsys.readouterr().err
-    assert cli.main(["new", "--out", "other.toml"]) == 0
-    (tmp_path / "plate.toml").unlink()
-    assert cli.main(["new"]) == 0

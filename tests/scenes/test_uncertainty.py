@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import xarray
 from numpy.testing import assert_allclose
-from scenes import SMALL
+from scenes import SMALL, load_text
 from scipy import stats
 
 import fem_impact as fi
@@ -54,9 +54,7 @@ def wall(vary, **wanted):
 @pytest.fixture
 def scene(tmp_path):
     def make(text=RIGID):
-        path = tmp_path / "ball.toml"
-        path.write_text(text)
-        return fi.load_scene(path)
+        return load_text(tmp_path, text)
 
     return make
 

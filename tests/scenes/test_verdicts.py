@@ -20,7 +20,7 @@ def test_a_shipped_scene_has_an_answer_to_trust(name):
 
 @pytest.mark.parametrize("kind", templates.BODIES)
 def test_a_new_scene_has_an_answer_to_trust(kind, tmp_path):
-    templates.write(tmp_path / "new.toml", kind)
+    templates.write_scene(tmp_path / "new.toml", kind)
     hit = fi.load_scene(tmp_path / "new.toml").strike()
     assert hit.trusted, hit.verdict
 
@@ -51,8 +51,10 @@ EVERYDAY = sorted((FOLDER / "everyday").glob("*.toml"))
 
 @pytest.mark.slow
 @pytest.mark.parametrize("path", EVERYDAY, ids=lambda path: path.stem)
-def test_an_everyday_scene_is_trusted_or_says_why_it_is_not(path):
+def test_an_everyday_scene_meets_its_tolerance_and_is_trusted_or_says_why_it_is_not(path):
     found = fi.load_scene(path)
     hit = found.play() if found.stroke else found.strike()
+    if not found.stroke and path.stem != "drumhead_buzz":  # whose bounces do not end
+        assert hit.tolerance_met and hit.n_impacts >= 1 and -1.0 < hit.restitution <= 1.0 and hit.finished
     text = " ".join(path.read_text(encoding="utf-8").replace("\n#", " ").split())
     assert hit.trusted == (path.stem not in UNTRUSTED) == ("ot trusted" not in text), hit.verdict

@@ -1,6 +1,6 @@
 "use strict";
 (() => {
-  const { $, root, bytes, floats, look, dress, Plot, ends, bodyPlot, forceAndSpectrum, drawMap, paintMap } = plots;
+  const { $, root, bytes, floats, look, dress, ends, bodyPlot, forceAndSpectrum, mapPlot, drawMap, paintMap } = plots;
   const facts = JSON.parse($("facts").textContent);
 
   dress();
@@ -20,21 +20,19 @@
 
   const kept = new Map();   // letter -> blow
   const COLOURS = ["#d55e00", "#009e73", "#cc79a7", "#b8860b", "#7e57c2", "#8d6e63", "#e64980", "#868e96"];
-  const map = new Plot(
-    "map-plot", { low: 1, high: 10, log: true, unit: "kg", label: "mass of the striker" },
-    { low: 1, high: 10, log: true, unit: "", label: "stiffness over the scene's" }, (c) => {
-      if (map.cells) drawMap(map, c, map.cells);
-      if (shown.mass) map.mark(map.px(shown.mass), map.py(shown.stiffness), look.struck);
-      if (map.dragged) {
-        const [a, b, d, e] = map.dragged;
-        c.strokeStyle = look.over;
-        c.lineWidth = 1.5;
-        c.fillStyle = "rgb(255 255 255 / 35%)";
-        c.fillRect(a, b, d - a, e - b);
-        c.strokeRect(a, b, d - a, e - b);
-      }
-    });
-  const [force, spectrum] = forceAndSpectrum(facts, shown);
+  const map = mapPlot([1, 10], [1, 10], (c) => {
+    if (map.cells) drawMap(map, c, map.cells);
+    if (shown.mass) map.mark(map.px(shown.mass), map.py(shown.stiffness), look.struck);
+    if (map.dragged) {
+      const [a, b, d, e] = map.dragged;
+      c.strokeStyle = look.over;
+      c.lineWidth = 1.5;
+      c.fillStyle = "rgb(255 255 255 / 35%)";
+      c.fillRect(a, b, d - a, e - b);
+      c.strokeRect(a, b, d - a, e - b);
+    }
+  });
+  const [force, spectrum, fit] = forceAndSpectrum(facts, shown);
 
   // One request at a time: what the hand does meanwhile is sent together once the answer is here --------------------------
   const socket = new WebSocket(`ws://${location.host}/talk`);
@@ -125,13 +123,7 @@
   };
 
   // Blows kept to compare -------------------------------------------------------------------------------------------------
-  const reach = () => {
-    const all = [shown, ...kept.values()], most = (list) => list.reduce((a, b) => Math.max(a, b), 0);
-    Object.assign(force.x, { high: most(all.map((one) => one.time.at(-1) ?? 0)) || 1 });
-    Object.assign(force.y, { high: 1.08 * most(all.map((one) => most(one.force))) || 1 });
-    const top = most(all.map((one) => one.top ?? 0)) || 1;
-    Object.assign(spectrum.y, { low: facts.depth * top, high: 2 * top });
-  };
+  const reach = () => fit([shown, ...kept.values()]);
   const compare = () => {
     const blows = [...kept.values()].sort((a, b) => (a.letter < b.letter ? -1 : 1));
     shown.kept = blows;
@@ -257,7 +249,7 @@
         $("scene").href = got.scene;
       }
       if (got.spectrum) {
-        Object.assign(shown, { spectrum: floats(got.spectrum), top: got.top });
+        shown.spectrum = floats(got.spectrum);
         reach();
       }
       spectrum.draw();

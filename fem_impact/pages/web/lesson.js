@@ -1,5 +1,5 @@
 (async () => {
-  const { $, root, bytes, si, look, dress, Plot, ends, bodyPlot, frequencies, forceAndSpectrum, drawMap, paintMap } = plots;
+  const { $, root, bytes, si, look, dress, bodyPlot, frequencies, forceAndSpectrum, mapPlot, drawMap, paintMap } = plots;
   const facts = JSON.parse($("facts").textContent);
   const inflate = async (text, kind) => {
     const stream = new Blob([bytes(text)]).stream().pipeThrough(new DecompressionStream("deflate"));
@@ -127,14 +127,12 @@
     body.mark(...place(here()), look.struck);
   });
   const { mass, stiffness } = facts.axes;
-  const map = new Plot(
-    "map-plot", { ...ends([mass[0], mass.at(-1)]), log: true, unit: "kg", label: "mass of the striker" },
-    { ...ends([stiffness[0], stiffness.at(-1)]), log: true, unit: "", label: "stiffness over the scene's" }, (c) => {
-      drawMap(map, c, maps[at.place * nSpeeds + at.speed]);
-      if (shown.kept) map.mark(map.px(mass[shown.kept.at.mass]), map.py(stiffness[shown.kept.at.stiffness]), look.body);
-      map.mark(map.px(mass[at.mass]), map.py(stiffness[at.stiffness]), look.struck);
-    });
-  const [force, spectrum] = forceAndSpectrum(facts, shown);
+  const map = mapPlot([mass[0], mass.at(-1)], [stiffness[0], stiffness.at(-1)], (c) => {
+    drawMap(map, c, maps[at.place * nSpeeds + at.speed]);
+    if (shown.kept) map.mark(map.px(mass[shown.kept.at.mass]), map.py(stiffness[shown.kept.at.stiffness]), look.body);
+    map.mark(map.px(mass[at.mass]), map.py(stiffness[at.stiffness]), look.struck);
+  });
+  const [force, spectrum, fit] = forceAndSpectrum(facts, shown);
   const cells = Object.fromEntries([...document.querySelectorAll("#numbers dd")].map((one) => [one.dataset.name, one]));
   const sliders = Object.fromEntries([...document.querySelectorAll("input[type=range]")].map((one) => [one.id, one]));
   const three = (value, unit) => Number.isFinite(value) ? si(value, unit, Math.abs(value) / 10) : "—";
@@ -154,11 +152,7 @@
     for (const [name, text] of Object.entries(said)) cells[name].textContent = text;
     cells["estimated error"].className = found.met ? "" : "missed";
     $("said").textContent = found.met ? "" : failed ? "This blow failed." : "This blow misses its tolerance: trust neither its last digits nor the number of its impacts.";
-    const kept = shown.kept ?? { time: [0], force: [0], spectrum: [0] };
-    const top = (name) => Math.max(found[name].reduce((a, b) => Math.max(a, b), 0), kept[name].reduce((a, b) => Math.max(a, b), 0)) || 1;
-    Object.assign(force.x, { high: Math.max(found.time.at(-1), kept.time.at(-1)) || 1 });
-    Object.assign(force.y, { high: 1.08 * top("force") });
-    Object.assign(spectrum.y, { low: facts.depth * top("spectrum"), high: 2 * top("spectrum") });
+    fit([found, ...[shown.kept ?? []].flat()]);
     for (const plot of [body, map, force, spectrum]) plot.draw();
     root.dataset.shown = number(at);
   };

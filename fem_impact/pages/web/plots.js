@@ -219,9 +219,19 @@ const plots = (() => {
         c.setLineDash([]);
         both(c, ({ spectrum: values }) => spectrum.curve(hertz, values));
       });
-    return [force, spectrum];
+    const most = (list) => list.reduce((a, b) => Math.max(a, b), 0);
+    const fit = (blows) => {   // axes that hold all of some blows
+      force.x.high = most(blows.map((one) => one.time.at(-1) ?? 0)) || 1;
+      force.y.high = 1.08 * most(blows.map((one) => most(one.force))) || 1;
+      const top = most(blows.map((one) => most(one.spectrum))) || 1;
+      Object.assign(spectrum.y, { low: facts.depth * top, high: 2 * top });
+    };
+    return [force, spectrum, fit];
   };
 
+  const mapPlot = (mass, stiffness, paint) => new Plot(
+    "map-plot", { ...ends(mass), log: true, unit: "kg", label: "mass of the striker" },
+    { ...ends(stiffness), log: true, unit: "", label: "stiffness over the scene's" }, paint);
   // Numbers of impacts as pixels, each point in the middle of one, and the threshold.
   const drawMap = (map, c, cells) => {
     const [x0, x1] = cells.mass.map((one) => map.px(one)), [y0, y1] = cells.stiffness.map((one) => map.py(one));
@@ -252,5 +262,5 @@ const plots = (() => {
     cells.image = image;
   };
 
-  return { $, root, bytes, floats, si, look, dress, Plot, ends, bodyPlot, frequencies, forceAndSpectrum, drawMap, paintMap };
+  return { $, root, bytes, floats, si, look, dress, Plot, ends, bodyPlot, frequencies, forceAndSpectrum, mapPlot, drawMap, paintMap };
 })();
