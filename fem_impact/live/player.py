@@ -13,9 +13,6 @@ from ..impact.striker import Striker
 from ..modes.modal import Modes
 from ..show.sound import FULL_SCALE, HIGHEST_RATE, RATE, Sound
 
-# [-] frames computed at a time: 1.3 ms at 48 kHz, as usual; longer ones delay strokes, shorter ones cost more calls
-BLOCK = 64
-
 
 class PlayedStroke(NamedTuple):
     """A stroke of a player."""
@@ -66,7 +63,7 @@ class Player:
 
     def __init__(
         self, modes: Modes, striker: Striker, contact: Contact, *, points: Any, fastest: float, listen: Any = None,
-        rate: int = RATE, block: int = BLOCK, sticks: int = 4, n_trace: int = 0,
+        rate: int = RATE, block: int = 64, sticks: int = 4, n_trace: int = 0,
     ) -> None:  # fmt: skip
         """Prepare everything that a block needs.
 
@@ -82,7 +79,7 @@ class Player:
             Point to listen to; the first of ``points`` by default.
         rate : int [Hz]
         block : int
-            Frames in a block.
+            Frames in a block, 1.3 ms as usual; longer ones delay strokes, shorter ones cost more calls.
         sticks : int
             How many can be on the body at once; the next one takes the place of the oldest that does not touch.
         n_trace : int

@@ -354,13 +354,13 @@ class Modes(check.Brief):
         if self.dimension == 0:
             n_points = 1 if points is None else len(np.atleast_2d(check.numbers(name, points, "m")))
             return np.zeros((max(1, n_points), 0))
-        array = check.places(name, points, self.dimension)
+        array = check.body_points(name, points, self.dimension)
 
         def inside() -> None:
             check.on_body(name, array, self.shapes.contains(array), self.shapes.grid()[0])
 
         if len(array) == 1:
-            self.known.found(("inside", array.tobytes()), inside)
+            self.known.recall(("inside", array.tobytes()), inside)
         else:
             inside()
         return array
