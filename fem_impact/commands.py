@@ -363,7 +363,8 @@ def run_play(options: argparse.Namespace) -> Answer:
             remark(options, told)
             played = devices.perform(player, source, options.duration, device)
         (staging / path.name).write_bytes(played.sound.wav())
-    happened = ", ".join(f"{count} {name}" for name, count in player.counted.items())
+    counted = player.struck.counted
+    happened = ", ".join(f"{count} {name}" for name, count in counted.items())
     said = [
         title_of(scene),
         *noted(modes.notes),
@@ -372,7 +373,7 @@ def run_play(options: argparse.Namespace) -> Answer:
         f"computing time is {1e3 * played.slowest:.3g} ms; {played.missed} missed their deadline",
     ]
     data = {
-        "played": dict(player.counted), "step": player.step, "n_modes": modes.n_modes, "n_blocks": len(played.seconds),
+        "played": dict(counted), "step": player.step, "n_modes": modes.n_modes, "n_blocks": len(played.seconds),
         "slowest": played.slowest, "missed": played.missed, "notes": modes.notes,
     }  # fmt: skip
     return answer(data, *said, path=path)

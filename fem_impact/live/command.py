@@ -27,7 +27,7 @@ def player_of(scene: Scene, modes: Modes, options: argparse.Namespace) -> Player
     )  # fmt: skip
     peak = max(abs(player.play([PlayedStroke(0, 0, player.fastest)], 0.1).samples).max(), 1e-30)
     player.gain /= player.sticks * float(peak)  # a stroke by every stick at once does not clip
-    player.reset()
+    player.struck.reset()
     return player
 
 
