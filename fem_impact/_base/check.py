@@ -241,7 +241,7 @@ def array(name: str, value: Any, shape: tuple[int | None, ...], unit: str = "", 
     return finite(name, result, unit)
 
 
-def body_points(name: str, value: Any, dimension: int) -> np.ndarray:
+def places(name: str, value: Any, dimension: int) -> np.ndarray:
     """Return one point or several on a body of a dimension as a new array (n_points, dimension) [m]."""
     raw = numbers(name, value, "m")
     if dimension == 1 and (raw.ndim < 2 or raw.shape[-1] != 1):

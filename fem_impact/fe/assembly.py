@@ -136,7 +136,7 @@ def assemble(
         mesh, supports = pierced(mesh, clamps), clamped(supports, len(clamps))
     mesh = ribbed(mesh, section)
     attached = Attached(check_masses(point_masses, mesh.dimension), posts)
-    near = None if near is None else check.body_points("near", near, mesh.dimension)
+    near = None if near is None else check.places("near", near, mesh.dimension)
     near, coarseness = None if near is None or not len(near) else near, check.number("coarseness", coarseness)
     if coarseness < 1.0:
         raise ValueError(f"coarseness must be at least 1, got {coarseness:g}")

@@ -58,7 +58,7 @@ def dataset(hit: "Response", points: Any = None, times: Any = None, max_frequenc
 def _motion(hit: "Response", points: Any, times: Any) -> tuple[dict[str, Any], dict[str, Any]]:
     """Displacement and velocity at points over moments, and their coordinates."""
     moments, target = check.array("times", times, (None,), "s", lift=True), hit.bodies[-1]
-    points = check.body_points("points", points, target.dimension)
+    points = check.places("points", points, target.dimension)
     places: dict[str, Any] = {"moment": ("moment", moments, {"units": "s", "long_name": "time"})}
     places |= {axis: ("point", column, {"units": "m", "long_name": axis}) for axis, column in zip("xy", points.T)}
     dims, moved = ("moment", "point"), {}

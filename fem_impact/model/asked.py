@@ -281,7 +281,7 @@ def _struck_at(target: Target, at: Any, changes: Mapping[str, Any]) -> Any:
         with blame():
             return target.modes.point("at", at)[0] if target.modes.dimension else at
     with blame():
-        place = check.body_points("at", at, mesh.dimension)
+        place = check.places("at", at, mesh.dimension)
         if len(place) != 1:
             raise ValueError(f"at must be one point, got {len(place)}")
     along = mesh.dimension == 1 and mesh.points.min() <= place[0, 0] <= mesh.points.max()

@@ -354,7 +354,7 @@ class Modes(check.Brief):
         if self.dimension == 0:
             n_points = 1 if points is None else len(np.atleast_2d(check.numbers(name, points, "m")))
             return np.zeros((max(1, n_points), 0))
-        array = check.body_points(name, points, self.dimension)
+        array = check.places(name, points, self.dimension)
 
         def inside() -> None:
             check.on_body(name, array, self.shapes.contains(array), self.shapes.grid()[0])

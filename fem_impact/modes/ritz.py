@@ -69,7 +69,7 @@ def ritz_modes(
     >>> seen.n_modes, round(float(seen.frequencies[0]), 2)
     (40, 105.78)
     """
-    place = check.body_points("points", points, system.mesh.dimension)
+    place = check.places("points", points, system.mesh.dimension)
     check.on_body("points", place, system.contains(place), system.mesh.points)
     shift = np.pi * check.positive("max_frequency", max_frequency, "Hz")
     krylov = Krylov(system, place, shift)
