@@ -1,13 +1,26 @@
 """What every command prints with --json, how it ends, and examples of it: the tables that help, pages and tests use."""
 
+from enum import IntEnum
 from typing import Any
 
 FORMAT = 1  # number of the format of all answers; it grows when a key changes its meaning, not when one is added
-STATUSES = {
-    0: "done", 1: "the run failed", 2: "bad input", 3: "done, but the tolerance is missed", 130: "interrupted",
-}  # fmt: skip
 MISSES = ("strike", "report", "tune")  # commands that end with 3 where the tolerance is missed
 
+
+class Status(IntEnum):
+    """How a command ends, as Unix tools do: 130 is 128 + SIGINT."""
+
+    DONE = 0
+    FAILED = 1
+    BAD_INPUT = 2
+    MISSED = 3
+    INTERRUPTED = 130
+
+
+STATUSES = {
+    Status.DONE: "done", Status.FAILED: "the run failed", Status.BAD_INPUT: "bad input",
+    Status.MISSED: "done, but the tolerance is missed", Status.INTERRUPTED: "interrupted",
+}  # fmt: skip
 Keys = dict[str, tuple[str, str]]  # key: JSON type (with "?" if it may be left out), and meaning
 ALL: Keys = {
     "command": ("string", "the command"),
@@ -201,8 +214,8 @@ EXAMPLES: dict[str, tuple[str, ...]] = {
 
 def epilog(command: str) -> str:
     """The end of a command's help: examples, each on an indented line, and how it may end."""
-    ends = "; ".join(f"{number} {said}" for number, said in STATUSES.items() if number != 3 or command in MISSES)
-    return "\n".join(["examples:", *(f"  {line}" for line in EXAMPLES[command]), "", f"exit status: {ends}"])
+    can = (f"{number} {said}" for number, said in STATUSES.items() if number != Status.MISSED or command in MISSES)
+    return "\n".join(["examples:", *(f"  {line}" for line in EXAMPLES[command]), "", f"exit status: {'; '.join(can)}"])
 
 
 def schema(command: str) -> dict[str, Any]:

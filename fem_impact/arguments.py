@@ -16,8 +16,6 @@ from . import answers, commands
 from .display import complain
 from .show import FORMATS
 
-BAD_INPUT = 2  # exit status, as Unix tools use it
-
 
 def _place(text: str) -> Path:
     """A path given on the command line."""
@@ -50,7 +48,7 @@ class Parser(argparse.ArgumentParser):
         close = difflib.get_close_matches(found[0], known, n=1) if found else []
         verb = "".join(f" {word}" for choices in verbs for word in self.given[:1] if word in choices)
         hint = f"did you mean {close[0]}?" if close else f"see {self.prog}{verb} --help"
-        sys.exit(complain(f"{message:.300}; {hint}", BAD_INPUT))
+        sys.exit(complain(f"{message:.300}; {hint}", answers.Status.BAD_INPUT))
 
 
 class _Help(argparse.HelpFormatter):
@@ -141,7 +139,7 @@ CHANNELS = (
 )
 TAPS = "measured taps: .lvm, .csv, .npz, .wav, .mat or .uff"
 COMMANDS = {
-    "strike": Command("strike a scene; write force, spectrum, modes and sound", commands.strike, (
+    "strike": Command("strike a scene; write force, spectrum, modes and sound", commands.run_strike, (
         _out("response.json and .npz, force, modes and sounds", "out/NAME"),
         *MODEL,
         _flag("--strict", "write nothing if the tolerance is missed, and exit with 1 instead of 3"),
@@ -157,14 +155,15 @@ COMMANDS = {
         _option("--duration", "S", "length of the sounds [s] (default: until they decay)", float),
         _flag("--normalise", "scale each sound to a peak of 1.0"),
     ), "a TOML file, such as studies/scenes/drumstick.toml"),
-    "plan": Command("show the model, its reasons, expected errors and cost, without striking", commands.plan, MODEL),
-    "modes": Command("list the modes of the struck body; write their shapes", commands.modes, (
+    "plan": Command(
+        "show the model, its reasons, expected errors and cost, without striking", commands.run_plan, MODEL),
+    "modes": Command("list the modes of the struck body; write their shapes", commands.run_modes, (
         _option("--n-modes", "N", "how many, besides rigid motions (default: 12)", int, default=12),
         _older("--count", "n_modes", type=int),
         _option("--vtk", "FILE", "write the shapes to a .pvd or .vtu file", _place),
     )),
     "map": Command(
-        "strike a scene on the grid of its table [map]; write numbers, borders and pictures", commands.map_of, (
+        "strike a scene on the grid of its table [map]; write numbers, borders and pictures", commands.run_map, (
         _out("map.nc, CSV files and, for two axes, a picture of each layer", "out/NAME"),
         TOLERANCE,
         _option("--format", None, "format of the numbers, nc or zarr, or of the pictures, png, pdf or svg; repeatable "
@@ -180,7 +179,7 @@ COMMANDS = {
     ), "a TOML file, such as studies/scenes/drumstick_map.toml"),
     "spread": Command(
         "strike a scene with uncertain inputs: how much the answers scatter, and which input causes it",
-        commands.spread, (
+        commands.run_spread, (
         _option("--vary", "INPUT=LAW", 'an uncertain number, such as "contact.stiffness=lognormal(695e3, 0.1)"; '
                 "repeatable; also normal(mean, deviation), uniform(low, high), loguniform(low, high), triangular(low, "
                 "mode, high)", action="append", default=[], required=True),
@@ -195,7 +194,7 @@ COMMANDS = {
         _out("spread.json, .nc, .csv and .png", "out/NAME"),
         _format(),
     )),
-    "hammer": Command("find the hammers that reach a bandwidth without a double hit", _later("hammer"), (
+    "hammer": Command("find the hammers that reach a bandwidth without a double hit", _later("run_hammer"), (
         _option("--bandwidth", "F", "bandwidth to reach [Hz]", float, required=True),
         _option("--drop", "D", "how far the spectrum may fall within the bandwidth [dB] (default: 10)", float,
                 default=10.0),
@@ -206,7 +205,8 @@ COMMANDS = {
         _out("hammers.png, or rove.png and .csv, or hammers.html", "none", "picture or page"),
         _format(None),
     ), "a TOML file; its body and strike point are used"),
-    "tune": Command("say what to take off a plate or bar where, so that its modes sound at pitches", commands.tune, (
+    "tune": Command(
+        "say what to take off a plate or bar where, so that its modes sound at pitches", commands.run_tune, (
         _option("--pitch", "PITCH", "of the next mode, or MODE=PITCH: Hz, a note (A4, \"Bb3 -5 cents\"), \"-14 cents\" "
                 "from now, or \"ratio 4\" to the first; repeatable", action="append", required=True),
         _option("--match", None, "whether pitches belong to modes in order, or to the nearest (default: order)",
@@ -219,7 +219,7 @@ COMMANDS = {
         _out("tuning.png", "none", "picture"),
         _format(None),
     ), "a TOML file, such as studies/scenes/marimba_bar.toml"),
-    "watch": Command("judge every record of taps that a folder gets: good, or what to do", _later("watch"), (
+    "watch": Command("judge every record of taps that a folder gets: good, or what to do", _later("run_watch"), (
         _option("--bandwidth", "F", "bandwidth that taps must reach [Hz]", float, required=True),
         _option("--drop", "D", "how far the spectrum may fall within the bandwidth [dB] (default: 10)", float,
                 default=10.0),
@@ -227,23 +227,23 @@ COMMANDS = {
         *CHANNELS,
         _out("watch.png", "out/NAME", "picture"),
     ), f"the folder that gets {TAPS}", "FOLDER"),
-    "report": Command("strike a scene; write one HTML page with everything about the blow", commands.report, (
+    "report": Command("strike a scene; write one HTML page with everything about the blow", commands.run_report, (
         _out("report.html", "out/NAME", "page"),
         TOLERANCE,
     ), "a TOML file, or a folder written by `strike`", "SCENE|RESULT"),
     "page": Command(
-        "strike a scene on a grid; write one HTML page with sliders, sound and questions", commands.page, (
+        "strike a scene on a grid; write one HTML page with sliders, sound and questions", commands.run_page, (
         _out("page.html", "out/NAME", "page"),
     )),
     "explore": Command(
-        "serve a page on this machine where sliders and clicks change the blow", commands.explore, (
+        "serve a page on this machine where sliders and clicks change the blow", commands.run_explore, (
         _option("scene", "SCENE", "a TOML file, an .svg or .dxf drawing or a mesh file (default: a wooden plate; drop "
                 "yours on the page)", _place, nargs="?"),
         _option("--port", "N", "port on 127.0.0.1 (default: any free port)", int, default=0),
         _flag("--no-open", "print the address, but do not open it in a browser"),
     ), ""),
     "play": Command(
-        "strike a scene from the keyboard, a MIDI file or a MIDI port, and hear it at once", commands.play, (
+        "strike a scene from the keyboard, a MIDI file or a MIDI port, and hear it at once", commands.run_play, (
         _option("--midi", "FILE", "play the notes of a MIDI file: middle C is the first point", _place),
         _option("--midi-port", "NAME", "play from the MIDI input whose name begins with NAME", nargs="?", const=""),
         _older("--port", "midi_port", nargs="?", const=""),
@@ -257,7 +257,7 @@ COMMANDS = {
         _flag("--silent", "play into the file only, and count the deadlines that would be missed"),
         _out("play.wav", "out/NAME", "sound"),
     )),
-    "new": Command("write a commented scene to begin with", commands.new, (
+    "new": Command("write a commented scene to begin with", commands.run_new, (
         _option("kind", "KIND", "plate, disk, beam or map (default: plate)", nargs="?", default="plate"),
         _option("--from", "FILE", "the outline of the plate, an .svg or .dxf drawing or a mesh file", _place,
                 dest="drawing"),
@@ -267,26 +267,26 @@ COMMANDS = {
         _out("KIND.toml", "here", "scene"),
     ), ""),
     "catalogue": Command(
-        "list materials, strikers and impact hammers that have a name, or all numbers of one", commands.catalogue, (
+        "list materials, strikers and impact hammers that have a name, or all numbers of one", commands.run_catalogue, (
         _option("words", "WORD", "part of a name or group, such as spruce (default: all)", nargs="*"),
     ), ""),
     "mesh": Command(
-        "list the edges, sizes and units of a mesh, drawing or scene, to state its supports", commands.mesh, (
+        "list the edges, sizes and units of a mesh, drawing or scene, to state its supports", commands.run_mesh, (
         _option("--unit", "U", "unit of the numbers in the file: m, cm, mm, um, in or km (default: the file's)"),
         _out("elements and named edges, mesh.png", "none", "picture"),
         _format(None),
     ), "a mesh file, an .svg or .dxf drawing, or a scene, a .toml file", "FILE"),
     "show": Command(
-        "show what a folder of results holds, or how much of a store is finished", commands.show, (),
+        "show what a folder of results holds, or how much of a store is finished", commands.run_show, (),
         "a folder that --out or --store named", "FOLDER"),
     "schema": Command(
         "print a JSON schema: of scenes, for editors to check them, or of what a command prints with --json",
-        commands.schema,
+        commands.run_schema,
         (_option("of", "COMMAND", "a command (default: scenes)", nargs="?", choices=tuple(answers.KEYS)),), ""),
     "doctor": Command(
-        "check this installation and suggest a remedy for each failure", commands.doctor, scene=""),
+        "check this installation and suggest a remedy for each failure", commands.run_doctor, scene=""),
     "verify": Command(
-        "compute reference cases and say whether our stated errors hold on this machine", commands.verify, (
+        "compute reference cases and say whether our stated errors hold on this machine", commands.run_verify, (
         _option("names", "NAME", "a case, or how its name begins, as square (default: all)", nargs="*"),
         _flag("--list", "list the cases, compute none"),
         _flag("--all", "show every number, not only the worst of each case"),
@@ -296,7 +296,7 @@ COMMANDS = {
     "completion": Command(
         "print a script that completes commands; eval it in ~/.bashrc", lambda options: _complete(options.shell),
         (_option("shell", None, "default: bash", choices=("bash", "zsh", "tcsh"), nargs="?", default="bash"),), ""),
-    "frf": Command("compute frequency responses of taps, or of a scene as a rig would measure it", _later("frf"), (
+    "frf": Command("compute frequency responses of taps, or of a scene as a rig would measure it", _later("run_frf"), (
         *CHANNELS,
         _option("--method", None, "H1 for noise in the response, H2 in the force, Hv in both", default="H1",
                 choices=("H1", "H2", "Hv")),
@@ -306,7 +306,7 @@ COMMANDS = {
                 _place),
         _out("frf.csv and frf.html", "none", ".csv, .uff or .html file"),
     ), f"{TAPS} or frequency responses; or a scene, a TOML file", "TAPS|SCENE"),
-    "fit": Command("find the hammer and the contact that explain measured taps", commands.fit, (
+    "fit": Command("find the hammer and the contact that explain measured taps", commands.run_fit, (
         _option("body", "SCENE", "the scene struck (default: a wall)", _place, nargs="?"),
         *CHANNELS,
         _option("--unknown", "NAME=LOW:HIGH", "a number to find in a range; repeatable (default: stiffness, exponent, "

@@ -7,10 +7,9 @@ import logging
 import os
 import signal
 import sys
-import threading
 import warnings
-from collections.abc import Iterator, MutableMapping
-from contextlib import contextmanager, suppress
+from collections.abc import MutableMapping
+from contextlib import AbstractContextManager, suppress
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -19,12 +18,11 @@ import fem_impact as fi
 
 from . import answers
 from ._base.explained import named
-from ._base.files import undo_all
-from .arguments import BAD_INPUT, parser
+from ._base.files import signalled, undo_all
+from .answers import Status
+from .arguments import parser
 from .commands import Answer
 from .display import complain, wrapped
-
-FAILED, MISSED, INTERRUPTED = 1, 3, 130  # exit statuses, as Unix tools use them; 130 is 128 + SIGINT
 
 
 def main(arguments: list[str] | None = None) -> int:
@@ -44,18 +42,19 @@ def main(arguments: list[str] | None = None) -> int:
                 warnings.simplefilter("ignore")
             found: Answer | None = options.run(options)
             if found is None:  # it has shown its answer already
-                return 0
+                return Status.DONE
             _print(options, found)
     except ValueError as error:
-        return complain(error, BAD_INPUT)
+        return complain(error, Status.BAD_INPUT)
     except BrokenPipeError:
         _forget_output()
-        return FAILED
+        return Status.FAILED
     except OSError as error:
         _forget_output()
-        return complain(f"{error.filename}: {error.strerror}" if error.filename else error.strerror or error, FAILED)
+        said = f"{error.filename}: {error.strerror}" if error.filename else error.strerror or error
+        return complain(said, Status.FAILED)
     except MemoryError:
-        return complain("not enough memory; `fem-impact plan SCENE` shows what needs it", FAILED)
+        return complain("not enough memory; `fem-impact plan SCENE` shows what needs it", Status.FAILED)
     except RuntimeError as error:
         if not isinstance(error, fi.SimulationError):
             raise
@@ -65,12 +64,12 @@ def main(arguments: list[str] | None = None) -> int:
             words = sys.argv[1:] if arguments is None else arguments
             again, environment = child.python("__main__:main", *words, NUMBA_DISABLE_JIT="0")
             os.execve(again[0], again, environment)
-        return complain(error, FAILED)
+        return complain(error, Status.FAILED)
     except KeyboardInterrupt:
-        return complain(f"interrupted; {_kept(options)}", INTERRUPTED)
+        return complain(f"interrupted; {_kept(options)}", Status.INTERRUPTED)
     if found.fault:
-        return complain(found.fault, FAILED)
-    return MISSED if found.missed else 0
+        return complain(found.fault, Status.FAILED)
+    return Status.MISSED if found.missed else Status.DONE
 
 
 def _print(options: argparse.Namespace, found: Answer) -> None:
@@ -92,15 +91,12 @@ def _print_json(data: dict[str, Any]) -> None:
     print(json.dumps(fi.export.plain(data), indent=2, allow_nan=False))
 
 
-@contextmanager
-def _interruptible(options: argparse.Namespace) -> Iterator[None]:
+def _interruptible(options: argparse.Namespace) -> AbstractContextManager[None]:
     """On Ctrl-C or SIGTERM, remove unfinished output and end the process."""
-    if threading.current_thread() is not threading.main_thread():
-        yield
-        return
+    ends = signal.SIGINT, signal.SIGTERM
 
     def end(number: int, _: Any) -> None:
-        for each in before:
+        for each in ends:
             signal.signal(each, signal.SIG_IGN)
         if options.command in ("explore", "watch") and number == signal.SIGINT:
             undo_all()
@@ -115,12 +111,7 @@ def _interruptible(options: argparse.Namespace) -> Iterator[None]:
                 os.write(2, f"fem-impact: {word}; {_kept(options)}\n".encode())
             os._exit(128 + number)
 
-    before = {number: signal.signal(number, end) for number in (signal.SIGINT, signal.SIGTERM)}
-    try:
-        yield
-    finally:
-        for number, handler in before.items():
-            signal.signal(number, handler)
+    return signalled(end, *ends)
 
 
 def _kept(options: argparse.Namespace) -> str:

@@ -16,14 +16,14 @@ import fem_impact as fi
 from . import answers
 from ._base.explained import noted
 from ._base.files import staged
-from .display import LONG, Display
+from .display import ANNOUNCED, Display
 from .replies import (
     Answer,
     answer,
-    answer_of_file,
     as_table,
     file_of,
     folder_of,
+    page_of,
     picture_of,
     progress_of,
     remark,
@@ -32,7 +32,7 @@ from .replies import (
 from .show import FORMATS
 
 
-def strike(options: argparse.Namespace) -> Answer:
+def run_strike(options: argparse.Namespace) -> Answer:
     """Strike and write."""
     from ._base import check  # imported only when needed
     from .impact import promise
@@ -79,7 +79,7 @@ def strike(options: argparse.Namespace) -> Answer:
         tested = f" (which also treats the body as {run.finer.target}: it has too many modes)" if coarse else ""
         differences = ", ".join(f"{name} {value:.1e}" for name, value in run.verified.items())
         said.append(f"Verified by a finer run{tested}: {differences}")
-    said += heard(data.get("sounds", ()))
+    said += describe_sounds(data.get("sounds", ()))
     said.append("Time: " + ", ".join(f"{name} {value:.2f} s" for name, value in seconds.items()))
     return answer(data, *said, folder=folder, files=data["files"], missed=not run.response.tolerance_met)
 
@@ -87,7 +87,7 @@ def strike(options: argparse.Namespace) -> Answer:
 def _announce(options: argparse.Namespace, display: Display, verify: bool, files: bool, plan: Any) -> None:
     """Warn of a long run before it starts, and let its prediction tell the time left; ``files`` may take modes."""
     display.predict(None if verify else plan.seconds)  # the plan of the second, finer run is not known yet
-    more = f", and {plan.ringing:.0f} s for the modes of its files" if files and plan.ringing > LONG else ""
+    more = f", and {plan.ringing:.0f} s for the modes of its files" if files and plan.ringing > ANNOUNCED else ""
     if plan.costly or more:
         text = f"{plan.cost}{more}; Ctrl-C stops it, and the same command later reuses the modes already found"
         remark(options, f"{text} (`fem-impact plan` explains why)")
@@ -185,11 +185,11 @@ def _strike_in_turn(options: argparse.Namespace, scene: Any) -> Answer:
         seconds = {**stages.seconds, "total": time.perf_counter() - began}
         data = {**sequence.sequence_numbers(found, tables, seconds), "sounds": sounds, "files": files + copies}
         _save_response(staging, scene, found, data)
-    said = [title_of(scene), found.summary(), *heard(sounds), f"Time: {seconds['total']:.2f} s"]
+    said = [title_of(scene), found.summary(), *describe_sounds(sounds), f"Time: {seconds['total']:.2f} s"]
     return answer(data, *said, folder=folder, files=data["files"], missed=not found.tolerance_met)
 
 
-def heard(sounds: Sequence[dict[str, Any]]) -> list[str]:
+def describe_sounds(sounds: Sequence[dict[str, Any]]) -> list[str]:
     """A line for each sound: its peak, and what a sample of 1 in its file means."""
     lines = []
     for each in sounds:
@@ -204,14 +204,14 @@ def heard(sounds: Sequence[dict[str, Any]]) -> list[str]:
     return lines
 
 
-def plan(options: argparse.Namespace) -> Answer:
+def run_plan(options: argparse.Namespace) -> Answer:
     """Plan, and strike nothing."""
     scene = fi.load_scene(options.scene)
     plan = (scene.plan_strokes if scene.stroke else scene.plan)(watch=progress_of(options), **_choices(options))
     return answer(plan.data(), title_of(scene), str(plan))
 
 
-def map_of(options: argparse.Namespace) -> Answer:
+def run_map(options: argparse.Namespace) -> Answer:
     """Strike the grid of a scene."""
     from .scenes import maps  # imported only when needed
 
@@ -251,7 +251,7 @@ def map_of(options: argparse.Namespace) -> Answer:
     return answer(data, *said, folder=folder, files=names)
 
 
-def spread(options: argparse.Namespace) -> Answer:
+def run_spread(options: argparse.Namespace) -> Answer:
     """Strike with uncertain inputs."""
     from .scenes import uncertainty  # imported only when needed
 
@@ -288,7 +288,7 @@ def _split(option: str, text: str) -> tuple[str, str]:
     return name.strip(), value.strip()
 
 
-def tune(options: argparse.Namespace) -> Answer:
+def run_tune(options: argparse.Namespace) -> Answer:
     """Say what to take off where, so that modes sound at pitches."""
     from .designs import tuning  # imported only when needed
 
@@ -301,13 +301,13 @@ def tune(options: argparse.Namespace) -> Answer:
         with staged(picture.parent, "tune") as staging:
             fi.figures.save(staging / picture.name, found.figure())
     verdict, *lines = found.summary().splitlines()
-    return answer_of_file(found.data(), [verdict, lines], picture, missed=not found.met)
+    return answer(found.data(), verdict, lines, path=picture, missed=not found.met)
 
 
-def report(options: argparse.Namespace) -> Answer:
+def run_report(options: argparse.Namespace) -> Answer:
     """Strike and write a page."""
     scene = fi.report.read(options.scene)
-    path = file_of(options, "report.html") or Path("out") / options.scene.stem / "report.html"
+    path = page_of(options, "report.html")
     changes = {} if options.tolerance is None else {"tolerance": options.tolerance}
     with staged(path.parent) as staging:
         display = progress_of(options, tells=True)
@@ -321,21 +321,20 @@ def report(options: argparse.Namespace) -> Answer:
         display.predict(None)
         with display("page"):
             fi.report.write(staging / path.name, scene, run)
-    said = [title_of(scene), run.response.summary()]
-    missed = not run.response.tolerance_met
-    return answer_of_file(fi.report.numbers(scene, run), said, path, missed=missed)
+    data, missed = fi.report.numbers(scene, run), not run.response.tolerance_met
+    return answer(data, title_of(scene), run.response.summary(), path=path, missed=missed)
 
 
-def page(options: argparse.Namespace) -> Answer:
+def run_page(options: argparse.Namespace) -> Answer:
     """Strike the grid of a page without a server."""
     scene, display = fi.load_scene(options.scene), progress_of(options)
-    path = file_of(options, "page.html") or Path("out") / options.scene.stem / "page.html"
+    path = page_of(options, "page.html")
     with staged(path.parent) as staging:
         found = fi.lesson.write(staging / path.name, scene, watch=display, told=partial(display.report, "blows"))
-    return answer_of_file(found.data(), [title_of(scene), f"{found.summary()}."], path)
+    return answer(found.data(), title_of(scene), f"{found.summary()}.", path=path)
 
 
-def explore(options: argparse.Namespace) -> None:
+def run_explore(options: argparse.Namespace) -> None:
     """Serve a page until the program is stopped."""
 
     def ready(address: str) -> None:
@@ -346,12 +345,12 @@ def explore(options: argparse.Namespace) -> None:
     fi.explore.serve(options.scene, port=options.port, ready=ready, watch=progress_of(options))
 
 
-def play(options: argparse.Namespace) -> Answer:
+def run_play(options: argparse.Namespace) -> Answer:
     """Strike by hand or from a MIDI file, and hear it."""
     from .live import command, devices  # imported only when needed
 
     scene = fi.load_scene(options.scene)
-    path = file_of(options, "play.wav") or Path("out") / options.scene.stem / "play.wav"
+    path = page_of(options, "play.wav")
     with staged(path.parent) as staging:
         with progress_of(options)("modes"):
             modes = scene.modes(options.n_modes)
@@ -364,7 +363,8 @@ def play(options: argparse.Namespace) -> Answer:
             remark(options, told)
             played = devices.perform(player, source, options.duration, device)
         (staging / path.name).write_bytes(played.sound.wav())
-    happened = ", ".join(f"{count} {name}" for name, count in player.counted.items())
+    counted = player.struck.counted
+    happened = ", ".join(f"{count} {name}" for name, count in counted.items())
     said = [
         title_of(scene),
         *noted(modes.notes),
@@ -373,13 +373,13 @@ def play(options: argparse.Namespace) -> Answer:
         f"computing time is {1e3 * played.slowest:.3g} ms; {played.missed} missed their deadline",
     ]
     data = {
-        "played": dict(player.counted), "step": player.step, "n_modes": modes.n_modes, "n_blocks": len(played.seconds),
+        "played": dict(counted), "step": player.step, "n_modes": modes.n_modes, "n_blocks": len(played.seconds),
         "slowest": played.slowest, "missed": played.missed, "notes": modes.notes,
     }  # fmt: skip
-    return answer_of_file(data, said, path)
+    return answer(data, *said, path=path)
 
 
-def modes(options: argparse.Namespace) -> Answer:
+def run_modes(options: argparse.Namespace) -> Answer:
     """List the modes of the struck body."""
     from ._base import check  # imports numpy, which --help and --version do not need
 
@@ -402,10 +402,10 @@ def modes(options: argparse.Namespace) -> Answer:
     said += [rigid if modes.n_rigid > 1 else "Mode 1 is a rigid motion"] if modes.n_rigid else []
     said.append(as_table(rows, ("mode", "frequency", "damping ratio")))
     data = {"frequencies": modes.frequencies, "damping_ratios": modes.damping_ratio, "n_rigid": modes.n_rigid}
-    return answer_of_file({**data, "mass": modes.mass, "notes": modes.notes}, said, options.vtk)
+    return answer({**data, "mass": modes.mass, "notes": modes.notes}, *said, path=options.vtk)
 
 
-def new(options: argparse.Namespace) -> Answer:
+def run_new(options: argparse.Namespace) -> Answer:
     """Write a scene to begin with."""
     from .scenes import adapted, templates  # imported only when needed
 
@@ -417,11 +417,11 @@ def new(options: argparse.Namespace) -> Answer:
     )  # fmt: skip
     templates.write_scene(path, options.kind, whole)
     verb = "map" if options.kind == "map" else "strike"
-    found = answer_of_file({"notes": notes}, noted(notes), path)
+    found = answer({"notes": notes}, *noted(notes), path=path)
     return found._replace(said=[*(found.said or ()), f"Next: fem-impact {verb} {path}"])
 
 
-def catalogue(options: argparse.Namespace) -> Answer:
+def run_catalogue(options: argparse.Namespace) -> Answer:
     """List what has a name, or all that is known of one."""
     from .impact import listing  # imported only when needed
 
@@ -429,7 +429,7 @@ def catalogue(options: argparse.Namespace) -> Answer:
     return answer(data, *(part if isinstance(part, str) else as_table(*part) for part in said))
 
 
-def mesh(options: argparse.Namespace) -> Answer:
+def run_mesh(options: argparse.Namespace) -> Answer:
     """List what supports can name."""
     from .mesh import edge_table  # imported only when needed
 
@@ -455,10 +455,10 @@ def mesh(options: argparse.Namespace) -> Answer:
     heads = ("edge", "length", "facets", "form", "half way at", "the same as")
     said = [str(options.scene), *noted(mesh.notes), [*as_table(facts), "", *as_table(rows, heads)]]
     data = {"mesh": dict(facts), "edges": [vars(edge) for edge in edges], "notes": mesh.notes}
-    return answer_of_file(data, said, drawn)
+    return answer(data, *said, path=drawn)
 
 
-def show(options: argparse.Namespace) -> Answer:
+def run_show(options: argparse.Namespace) -> Answer:
     """Say what a folder of results holds."""
     from .scenes import results  # imported only when needed
 
@@ -466,7 +466,7 @@ def show(options: argparse.Namespace) -> Answer:
     return answer(data, *said, folder=options.scene, files=data["files"])
 
 
-def schema(options: argparse.Namespace) -> Answer:
+def run_schema(options: argparse.Namespace) -> Answer:
     """Print a schema: of scenes, or of what a command prints as JSON."""
     if options.of is not None:
         return Answer(answers.schema(options.of), None)
@@ -475,7 +475,7 @@ def schema(options: argparse.Namespace) -> Answer:
     return Answer(editor_schema.schema(), None)
 
 
-def doctor(options: argparse.Namespace) -> Answer:
+def run_doctor(options: argparse.Namespace) -> Answer:
     """Check the installation."""
     from . import doctor  # imported only when needed
 
@@ -490,7 +490,7 @@ def doctor(options: argparse.Namespace) -> Answer:
     return answer({"findings": [vars(finding) for finding in findings]}, *said, fault=fault)
 
 
-def verify(options: argparse.Namespace) -> Answer:
+def run_verify(options: argparse.Namespace) -> Answer:
     """Compute the reference cases on this machine."""
     from . import references  # imported only when needed
     from .show import figures, plots
@@ -519,7 +519,7 @@ def verify(options: argparse.Namespace) -> Answer:
             figures.save(staging / picture.name, plots.verdicts(found))
     data = {"cases": [each.data for each in found], "n_failed": len(failed)}
     head = ("case", "quantity", "reference", "ours", "allowed", "so it")
-    return answer_of_file(data, (as_table(rows, head), said), picture)._replace(fault=fault)
+    return answer(data, as_table(rows, head), said, path=picture, fault=fault)
 
 
 def _choices(options: argparse.Namespace) -> dict[str, Any]:
@@ -527,7 +527,7 @@ def _choices(options: argparse.Namespace) -> dict[str, Any]:
     return {name: getattr(options, name) for name in names if getattr(options, name) is not None}
 
 
-def fit(options: argparse.Namespace) -> Answer:
+def run_fit(options: argparse.Namespace) -> Answer:
     """Find the hammer and the contact behind measured taps."""
     from .pages import fit_page  # imported only when needed
     from .taps import prompt  # imported only when needed

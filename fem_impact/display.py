@@ -14,11 +14,11 @@ from rich.console import Console
 from rich.table import Column
 from rich.text import Text
 
-from ._base.explained import pointed
+from ._base.explained import pointed, printable
 from ._base.files import undoable
 from ._base.progress import heard
 
-LONG = 10.0  # [s] time left that is announced even if nobody sees the line
+ANNOUNCED = 10.0  # [s] time left that is announced even if nobody sees the line
 LONGER = 2.0  # [-] over the time announced last, from which on a longer one is announced, too
 
 
@@ -42,9 +42,7 @@ def tell(text: str) -> None:
 def complain(error: object, status: int) -> int:
     """Print an error on one line of stderr; return the exit status."""
     with suppress(OSError):  # if stderr is closed, the exit status must suffice
-        text = " ".join(pointed(str(error)).split())
-        escaped = "".join(c if c.isprintable() else repr(c)[1:-1] for c in text)
-        print(f"fem-impact: {escaped}", file=sys.stderr, flush=True)
+        print(f"fem-impact: {printable(pointed(str(error)))}", file=sys.stderr, flush=True)
     return status
 
 
@@ -115,13 +113,13 @@ class Display:
     def _warn(self, left: float, said: str) -> None:
         """Tell what is left [s] if it is long and makes the whole LONGER than was told."""
         whole = self.spent + left
-        if self.tell is not None and left > LONG and (self.told is None or whole > LONGER * self.told):
+        if self.tell is not None and left > ANNOUNCED and (self.told is None or whole > LONGER * self.told):
             self.tell(f"{'' if self.told is None else 'longer than predicted: '}{said}; Ctrl-C stops it")
             self.told = whole
 
     def _overdue(self) -> None:
         """Tell that what was to end long ago still runs, and look again later."""
-        if self.tell is not None and self.told is not None and self.spent >= max(LONG, LONGER * self.told):
+        if self.tell is not None and self.told is not None and self.spent >= max(ANNOUNCED, LONGER * self.told):
             self.tell(f"longer than predicted: {self.spent:.0f} s so far; Ctrl-C stops it")
             self.told = self.spent
         self._arm()
@@ -130,7 +128,7 @@ class Display:
         """Look at the clock when the command is overdue, whatever stage runs then."""
         self._disarm()
         if self.tell is not None and self.told is not None:
-            self.alarm = threading.Timer(max(LONG, LONGER * self.told) - self.spent, self._overdue)
+            self.alarm = threading.Timer(max(ANNOUNCED, LONGER * self.told) - self.spent, self._overdue)
             self.alarm.daemon = True
             self.alarm.start()
 
@@ -143,11 +141,6 @@ class Display:
     def spent(self) -> float:
         """Processor time [s] since it was predicted or began."""
         return time.process_time() - self.began
-
-    @property
-    def late(self) -> bool:
-        """Whether it has taken LONGER than was told."""
-        return self.told is not None and self.spent > LONGER * self.told
 
     @contextmanager
     def __call__(self, name: str) -> Iterator[None]:
@@ -184,14 +177,15 @@ class Display:
                 self._warn(left, f"{total} {what}: about {left:.0f} s more")
         self._draw()
 
-    def said(self) -> str:
+    def status_line(self) -> str:
         """Count, rate, time so far and time left of the running stage; on a narrow terminal its name and less."""
         if not self.running:
             return ""
         name, began = self.running[-1]
         spent, count, parts = time.monotonic() - began, self.count, []
         left = count.left() if count is not None else None if self.end is None else self.end - time.monotonic()
-        last = "longer than predicted" if self.late else "soon done"
+        late = self.told is not None and self.spent > LONGER * self.told
+        last = "longer than predicted" if late else "soon done"
         # before two seconds, the first counts are no guide
         ends = [] if left is None or spent <= 2.0 else [f"{_clock(left)} left" if left > 0.0 else last]
         if count is not None:
@@ -210,7 +204,7 @@ class Display:
     @contextmanager
     def _opened(self) -> Iterator[None]:
         """The line while the outermost stage runs."""
-        columns: list[bars.ProgressColumn] = [bars.SpinnerColumn(), _Text(self.said)]
+        columns: list[bars.ProgressColumn] = [bars.SpinnerColumn(), _Text(self.status_line)]
         if self.wide:
             columns[1:1] = [_Text(lambda: self.running[-1][0]), bars.BarColumn(bar_width=20)]
         with bars.Progress(*columns, console=self.console, transient=True) as self.bar:

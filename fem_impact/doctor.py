@@ -15,6 +15,7 @@ import numpy as np
 
 from . import mesh
 from ._base import progress
+from ._base.check import EXTRAS
 from ._base.files import scratch
 from .fe.assembly import assemble
 from .fe.section import Material, Plate
@@ -28,23 +29,7 @@ from .modes.modal import Modes, find_modes
 from .show import export, figures, pictures
 from .sweeps.grid import sweep
 
-SQUARE = 2.0 * np.pi**2  # [-] fact: omega of a hinged unit square of unit stiffness and mass
-
 UNKEPT = "make the folder of the compiled kernels writable; else costs are predicted for another machine"
-EXTRAS: dict[str, tuple[str, ...]] = {  # extra: its purpose and the modules it needs
-    "cad": ("drawings", "svgelements", "ezdxf"),
-    "film": ("films as MP4 files", "imageio_ffmpeg"),
-    "uff": ("universal files", "pyuff"),
-    "nastran": ("results of Nastran", "pyNastran"),
-    "ansys": ("results and matrices of Ansys", "ansys"),
-    "calculix": ("results of CalculiX", "pyvista_frd"),
-    "cluster": ("clusters and stores", "distributed", "zarr"),
-    "hdf5": ("meshes in HDF5", "h5py"),
-    "completion": ("shell completion", "shtab"),
-    "spread": ("Sobol indices", "SALib"),
-    "play": ("playing", "mido", "rtmidi", "sounddevice"),
-    "web": ("report and explore", "plotly", "tornado", "jinja2"),
-}
 
 
 @dataclass(frozen=True)
@@ -95,7 +80,7 @@ def _extra(name: str, purpose: str, modules: list[str]) -> Finding:
 def _finite_elements() -> bool:
     plate = Plate(Material(E=12.0 * (1.0 - 0.09), nu=0.3, rho=1.0), 1.0)
     modes = find_modes(assemble(mesh.rectangle(1.0, 1.0), plate, supports={"boundary": "hinged"}), n_modes=1)
-    return bool(abs(modes.omega[0] / SQUARE - 1.0) < 1e-4)
+    return bool(abs(modes.omega[0] / (2.0 * np.pi**2) - 1.0) < 1e-4)  # unit stiffness and mass
 
 
 def _blow() -> Response:

@@ -17,10 +17,9 @@ from ._base.files import staged
 from .scenes.sentences import tip_notes
 
 MASSES = [m * 10.0**e for e in (-3, -2, -1) for m in (1.0, 2.0, 5.0)] + [1.0]  # [kg] of hammers from 1 g to 1 kg
-PAUSE = 0.5  # [s] between two looks at a folder: a file that nobody wrote to for so long is complete
 
 
-def hammer(options: argparse.Namespace) -> replies.Answer:
+def run_hammer(options: argparse.Namespace) -> replies.Answer:
     """Find hammers for a bandwidth, or plan a test with one that roves."""
     scene = fi.load_scene(options.scene)
     masses = options.masses or MASSES
@@ -62,7 +61,7 @@ def hammer(options: argparse.Namespace) -> replies.Answer:
     if idle:
         said.append(f"{idle}: no tip reaches {options.bandwidth:g} Hz and hits once; try lighter hammers")
     data = {"bandwidth": options.bandwidth, "drop": options.drop, "hammers": [hammer.data() for hammer in hammers]}
-    return replies.answer_of_file({**data, "notes": notes}, said, drawn)
+    return replies.answer({**data, "notes": notes}, *said, path=drawn)
 
 
 def _rove(options: argparse.Namespace, scene: Any, masses: Sequence[float], notes: Sequence[str]) -> replies.Answer:
@@ -76,10 +75,14 @@ def _rove(options: argparse.Namespace, scene: Any, masses: Sequence[float], note
             with staged(drawn.parent) as staging:
                 fi.figures.save(staging / drawn.name, plan.figure())
                 plan.write_csv((staging / drawn.name).with_suffix(".csv"))
-    data = {"table": plan.table(), "verdicts": plan.verdicts, "resolution": plan.resolution}
     files = [] if drawn is None else [drawn.name, drawn.with_suffix(".csv").name]
+    return _answer_of_plan(scene, plan, notes, folder=drawn and drawn.parent, files=files)
+
+
+def _answer_of_plan(scene: Any, plan: Any, notes: Sequence[str], **files: Any) -> replies.Answer:
+    data = {"table": plan.table(), "verdicts": plan.verdicts, "resolution": plan.resolution}
     said = [replies.title_of(scene), *noted(notes), plan.summary()]
-    return replies.answer({**data, "notes": [*notes, *plan.notes]}, *said, folder=drawn and drawn.parent, files=files)
+    return replies.answer({**data, "notes": [*notes, *plan.notes]}, *said, **files)
 
 
 def _sheets(options: argparse.Namespace, scene: Any, notes: Sequence[str]) -> replies.Answer:
@@ -90,23 +93,22 @@ def _sheets(options: argparse.Namespace, scene: Any, notes: Sequence[str]) -> re
     if options.masses:
         raise ValueError("--masses must be left out beside --catalogue, whose hammers have their own")
     number = None if options.rove is None else check.count("--rove", options.rove)
-    path = replies.file_of(options, "hammers.html") or Path("out") / options.scene.stem / "hammers.html"
+    path = replies.page_of(options, "hammers.html")
     with replies.progress_of(options, tells=True)("points"):
         heaviest = scene.built.target.mass  # heavier ones load a panel so that its modes are others
         kit = roving.catalogued(options.catalogue, options.bandwidth, options.drop, heaviest)
         plan = roving.of_scene(scene, kit, options.bandwidth, options.drop, number)
     with staged(path.parent) as staging:
         hammer_sheet.write_sheets(staging / path.name, plan, title=replies.title_of(scene), notes=tuple(notes))
-    data = {"table": plan.table(), "verdicts": plan.verdicts, "resolution": plan.resolution}
-    said = [replies.title_of(scene), *noted(notes), plan.summary()]
-    return replies.answer_of_file({**data, "notes": [*notes, *plan.notes]}, said, path)
+    return _answer_of_plan(scene, plan, notes, path=path)
 
 
-def frf(options: argparse.Namespace) -> replies.Answer:
+def run_frf(options: argparse.Namespace) -> replies.Answer:
     """List the peaks of frequency responses, and write them and a page about them."""
     from .taps import prompt  # imported only when needed
 
-    files = _files(options.out)
+    out: Path | None = options.out
+    files = [] if out is None else [out] if out.suffix else [out / "frf.csv", out / "frf.html"]
     with replies.progress_of(options)("frequency responses"):
         heard = prompt.frf(options)
     peaks = prompt.peaks(heard.found)
@@ -132,13 +134,6 @@ def frf(options: argparse.Namespace) -> replies.Answer:
     return replies.answer(data, *said, folder=files[0].parent, files=[path.name for path in files])
 
 
-def _files(out: Path | None) -> list[Path]:
-    """The files that --out names: of a folder the table and the page."""
-    if out is None:
-        return []
-    return [out] if out.suffix else [out / "frf.csv", out / "frf.html"]
-
-
 def _write_page(path: Path, options: argparse.Namespace, heard: Any) -> None:
     """The page about frequency responses, beside the modes of the scene measured or of the one to compare with."""
     from .pages import frf_page  # imported only when needed
@@ -157,7 +152,7 @@ def _write_page(path: Path, options: argparse.Namespace, heard: Any) -> None:
         frf_page.write_responses(path, heard.found, title=title, taps=heard.taps, computed=computed, points=points)
 
 
-def watch(options: argparse.Namespace) -> replies.Answer | None:
+def run_watch(options: argparse.Namespace) -> replies.Answer | None:
     """Judge the records of a folder, and new ones until the program is stopped."""
     from .taps.watch import Folder  # imported only when needed
 
@@ -171,7 +166,7 @@ def watch(options: argparse.Namespace) -> replies.Answer | None:
             options.show(seen.report_on(new))
         if options.once and not folder.waiting:
             return seen.report_on([one for each in seen.every.values() for one in each])
-        time.sleep(PAUSE)
+        time.sleep(0.5)  # a file that nobody wrote to for so long is complete
 
 
 class _Watched:
@@ -231,4 +226,4 @@ class _Watched:
         n_good = sum(each.n_taps for each in self.good.values())
         data = {"records": [each._asdict() for each in records], "n_good": n_good}
         drawn = self.path if self.path.is_file() and records else None
-        return replies.answer_of_file(data, lines or ["no records yet"], drawn)
+        return replies.answer(data, *(lines or ["no records yet"]), path=drawn)

@@ -19,23 +19,21 @@ class Answer(NamedTuple):
 
 
 def answer(
-    data: dict[str, Any], *said: str | Sequence[str], folder: Path | None = None, files: Sequence[str] = (), **ends: Any
+    data: dict[str, Any],
+    *said: str | Sequence[str],
+    path: Path | None = None,
+    folder: Path | None = None,
+    files: Sequence[str] = (),
+    **ends: Any,
 ) -> Answer:
-    """An answer with the files that were written to a folder, which are said last."""
+    """An answer with the files that were written, one or those in a folder, which are said last."""
     lines, where = list(said), None
+    if path is not None:
+        folder, files = path.parent, [path.name]
     if folder is not None and files:
         where, one = str(folder), len(files) == 1
         lines.append(f"Files: {folder / files[0]}" if one else f"Files in {where}{os.sep}: {', '.join(files)}")
     return Answer({**data, "folder": where, "files": list(files)}, lines, **ends)
-
-
-def answer_of_file(
-    data: dict[str, Any], said: Sequence[str | Sequence[str]], path: Path | None, missed: bool = False
-) -> Answer:
-    """The answer of a command that wrote one file, or none."""
-    if path is None:
-        return answer(data, *said, missed=missed)
-    return answer(data, *said, folder=path.parent, files=[path.name], missed=missed)
 
 
 def progress_of(options: argparse.Namespace, tells: bool = False) -> Display:
@@ -56,6 +54,11 @@ def folder_of(options: argparse.Namespace) -> Path:
 def file_of(options: argparse.Namespace, name: str) -> Path | None:
     """The file that --out names: itself if it has an ending, otherwise ``name`` in that folder."""
     return options.out if options.out is None or options.out.suffix else options.out / name
+
+
+def page_of(options: argparse.Namespace, name: str) -> Path:
+    """The file that --out names, or ``name`` in a folder named after the scene."""
+    return file_of(options, name) or folder_of(options) / name
 
 
 def picture_of(options: argparse.Namespace, name: str) -> Path | None:

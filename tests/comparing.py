@@ -1,4 +1,8 @@
-"""What blows are compared by, and the slopes of their quantities."""
+"""What blows are compared by, the slopes of their quantities, and what is printed."""
+
+import re
+
+import numpy as np
 
 QUANTITIES = ("impulse", "contact_time", "peak_force")
 
@@ -18,6 +22,13 @@ def changes(blow, numbers, name, quantities, step=1e-4):
     """Changes of quantities per relative change of a number, from blows with the number a step smaller and larger."""
     low, high = (blow(numbers | {name: numbers[name] * (1.0 + side * step)}) for side in (-1.0, 1.0))
     return [(getattr(high, quantity) - getattr(low, quantity)) / (2.0 * step) for quantity in quantities]
+
+
+def assert_printed(printed, stated, number=r"-?\d+(?:\.\d+)?(?:e[+-]?\d+)?", **how):
+    """The words of two texts are the same, in columns as wide as their numbers, and these are close."""
+    assert re.sub(number, "#", printed).split() == re.sub(number, "#", stated).split(), printed
+    numbers = [[float(each) for each in re.findall(number, text)] for text in (printed, stated)]
+    np.testing.assert_allclose(*numbers, **how)
 
 
 def examined(hit, name):

@@ -133,7 +133,7 @@ def read_here(monkeypatch):
         import h5py
 
         monkeypatch.setattr(h5py, "File", h5py.File)  # the reader of meshes replaces it
-    monkeypatch.setattr(isolated, "run", run)
+    monkeypatch.setattr(isolated, "run_reader", run)
 
 
 class Said(NamedTuple):

@@ -152,7 +152,7 @@ MESH_FORMATS: dict[str, dict] = {
 
 
 def quick(path: Path, reader: str, arguments: tuple[str, ...], patience: float) -> tuple[int, bytes, bytes]:
-    """What `isolated.run` gives, from this process: one that starts afresh would take 0.2 s an input.
+    """What `isolated.run_reader` gives, from this process: one that starts afresh would take 0.2 s an input.
 
     An input that ends this process is judged again by the real one, see `fuzz`.
     """
@@ -421,7 +421,7 @@ def limit_memory() -> None:
     resource.setrlimit(resource.RLIMIT_AS, (own + MEMORY, resource.getrlimit(resource.RLIMIT_AS)[1]))
 
 
-def work(category: str, numbers: range, send: Connection, keep: Path | None, again: bool) -> None:
+def work(category: str, numbers: range, send: Connection, again: bool) -> None:
     """Judge inputs and send a row for each; runs in a process of its own, which an input may end.
 
     Unless it judges an input ``again``, it does itself what the package leaves to a process apart.
@@ -430,7 +430,7 @@ def work(category: str, numbers: range, send: Connection, keep: Path | None, aga
     limit_memory()
     resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
     if not again:
-        isolated.run = quick
+        isolated.run_reader = quick
     with tempfile.TemporaryDirectory() as name, open(os.devnull, "w") as null:
         os.dup2(null.fileno(), 1)
         os.dup2(null.fileno(), 2)
@@ -441,14 +441,12 @@ def work(category: str, numbers: range, send: Connection, keep: Path | None, aga
             left = sorted(file.name for file in folder.iterdir() if file != path)
             if left and verdict in ("", REFUSED):
                 verdict = f"left {left}"
-            if keep is not None and verdict not in ("", REFUSED):
-                shutil.copy(path, keep)
             for file in folder.iterdir():
                 shutil.rmtree(file) if file.is_dir() else file.unlink()
             send.send((number, verdict, path.name, round(time.monotonic() - began, 3)))
 
 
-def fuzz(category: str, inputs: int, keep: Path | None = None) -> tuple[Counter, list[tuple]]:
+def fuzz(category: str, inputs: int) -> tuple[Counter, list[tuple]]:
     """Judge many inputs; one that ends the process is judged again in another, by itself.
 
     Returns
@@ -460,7 +458,7 @@ def fuzz(category: str, inputs: int, keep: Path | None = None) -> tuple[Counter,
     while waiting:
         numbers, again = waiting.pop()
         receive, send = context.Pipe(duplex=False)
-        process = context.Process(target=work, args=(category, numbers, send, keep, again))
+        process = context.Process(target=work, args=(category, numbers, send, again))
         process.start()
         send.close()
         current, end = numbers.start, "hangs where no signal is heard"
@@ -500,7 +498,6 @@ def main() -> int:
     parser.add_argument("category", choices=CATEGORIES)
     parser.add_argument("--inputs", type=int, default=10_000)
     parser.add_argument("--only", type=int)
-    parser.add_argument("--keep", type=Path)
     options = parser.parse_args()
     if options.only is not None:
         samples = CATEGORIES[options.category].samples()
@@ -512,10 +509,8 @@ def main() -> int:
                 warnings.simplefilter("error")
                 CATEGORIES[options.category].read(path)
         return 0
-    if options.keep:
-        options.keep.mkdir(exist_ok=True)
     began = time.monotonic()
-    tally, failures = fuzz(options.category, options.inputs, options.keep)
+    tally, failures = fuzz(options.category, options.inputs)
     print(json.dumps({"category": options.category, "results": tally[""], "refused": tally[REFUSED],
                       "failed": failures, "seconds": round(time.monotonic() - began, 1)}))  # fmt: skip
     return 1 if failures else 0

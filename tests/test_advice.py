@@ -11,7 +11,6 @@ import pytest
 from scenes import QUICK, SMALL
 
 import fem_impact as fi
-from fem_impact import cli
 from fem_impact._base import explained
 from fem_impact.impact import engine
 from fem_impact.model import by_modes
@@ -81,14 +80,11 @@ def test_a_map_of_too_many_modes_is_done_with_softer_contacts_or_a_larger_tolera
     assert (maps.map_scene(found, over=over, tolerance=1e-1).n_impacts > 0).all()
 
 
-def test_too_large_elements_get_a_size_that_suffices(tmp_path, capsys):
+def test_too_large_elements_get_a_size_that_suffices(tmp_path, prompt):
     loaded(tmp_path, SMALL.replace('source = "analytic"', 'source = "fe"'))
-    name = str(tmp_path / "scene.toml")
-    assert cli.main(["plan", name, "--size", "1"]) == 2
-    said = " ".join(capsys.readouterr().err.split())
-    assert "size must be smaller or n_modes lower: elements of 1 m have" in said
-    size = re.search(r"elements of (\S+) m suffice", said)[1]
-    assert cli.main(["plan", name, "--size", size]) == 0
+    ran = prompt("plan scene.toml --size 1")
+    assert ran.status == 2 and "size must be smaller or n_modes lower: elements of 1 m have" in ran.err
+    assert prompt("plan scene.toml --size", re.search(r"elements of (\S+) m suffice", ran.err)[1]).status == 0
 
 
 @pytest.mark.slow  # half a minute
@@ -145,35 +141,28 @@ def test_an_infinite_target_off_the_plate_is_blamed_on_the_point(tmp_path):
 @pytest.mark.parametrize(
     "place, words", [("folder", "it is a folder; name a file in it"), ("null", "it is not a regular")]
 )
-def test_a_folder_and_a_device_are_not_called_missing(tmp_path, capsys, place, words):
+def test_a_folder_and_a_device_are_not_called_missing(tmp_path, prompt, place, words):
     name = str(tmp_path) if place == "folder" else "/dev/null"
-    (tmp_path / "scene.toml").write_text(SMALL)
-    assert cli.main(["strike", name]) == 2
-    assert capsys.readouterr().err.strip() == f"fem-impact: {name}: {words}" + (" file" if place == "null" else "")
+    ran = prompt("strike", name)
+    assert ran.status == 2 and ran.err.strip() == f"fem-impact: {name}: {words}" + (" file" if place == "null" else "")
     for read in (fi.mesh.load, fi.mesh.outline):
         with pytest.raises(ValueError, match=words):
             read(name)
-    assert cli.main(["plan", str(tmp_path / "scene.toml")]) == 0
 
 
-def test_a_bad_option_is_not_blamed_on_the_file_and_a_bad_key_is_blamed_once(tmp_path, capsys):
+def test_a_bad_option_is_not_blamed_on_the_file_and_a_bad_key_is_blamed_once(tmp_path, prompt):
     loaded(tmp_path, SMALL)
-    name = str(tmp_path / "scene.toml")
+    words = "tolerance must lie between 1e-12 and 1, got 0\n"
     for verb in ("plan", "strike"):
-        assert cli.main([verb, name, "--tolerance", "0", *(["--out", str(tmp_path / "o")] * (verb == "strike"))]) == 2
-        assert capsys.readouterr().err == "fem-impact: tolerance must lie between 1e-12 and 1, got 0\n"
+        assert prompt(f"{verb} scene.toml --tolerance 0") == (2, "", f"fem-impact: {words}")
     (tmp_path / "scene.toml").write_text(SMALL.replace("tolerance = 1e-2", "tolerance = 0"))
-    assert cli.main(["plan", name]) == 2
-    assert capsys.readouterr().err == f"fem-impact: {name}: [strike] tolerance must lie between 1e-12 and 1, got 0\n"
-    assert cli.main(["plan", name, "--tolerance", "1e-2"]) == 0
+    assert prompt("plan scene.toml") == (2, "", f"fem-impact: scene.toml: [strike] {words}")
+    assert prompt("plan scene.toml --tolerance 1e-2").status == 0
 
 
-def test_a_strike_may_write_into_the_folder_where_it_runs(tmp_path, monkeypatch):
+def test_a_strike_may_write_into_the_folder_where_it_runs(tmp_path, prompt):
     loaded(tmp_path, SMALL)
-    (tmp_path / "here").mkdir()
-    monkeypatch.chdir(tmp_path / "here")
-    assert cli.main(["strike", "../scene.toml", "--out", "."]) == 0
-    assert (tmp_path / "here" / "response.json").is_file()
+    assert prompt("strike scene.toml --out .").status == 0 and (tmp_path / "response.json").is_file()
 
 
 def test_the_contact_of_wood_is_refused_and_its_advice_works():
@@ -517,18 +506,16 @@ def test_a_run_without_end_is_ended_by_each_of_what_is_told(monkeypatch, given, 
         assert struck(HARD, mass=0.5, **{**blow, **given, **way}).history.end_time > 0.0
 
 
-def test_too_little_memory_points_to_the_plan_which_says_what_needs_it(tmp_path, capsys, monkeypatch):
+def test_too_little_memory_points_to_the_plan_which_says_what_needs_it(tmp_path, prompt, monkeypatch):
     loaded(tmp_path, SMALL)
 
     def full(*_, **__):
         raise MemoryError
 
     monkeypatch.setattr(fi.Scene, "run", full)
-    name = str(tmp_path / "scene.toml")
-    assert cli.main(["strike", name, "--out", str(tmp_path / "o")]) == 1
-    assert capsys.readouterr().err == "fem-impact: not enough memory; `fem-impact plan SCENE` shows what needs it\n"
-    assert cli.main(["plan", name]) == 0
-    assert re.search(r"Cost: about .* and \d+ MB predicted", capsys.readouterr().out)
+    words = "fem-impact: not enough memory; `fem-impact plan SCENE` shows what needs it\n"
+    assert prompt("strike scene.toml") == (1, "", words)
+    assert re.search(r"Cost: about .* and \d+ MB predicted", prompt("plan scene.toml").out)
 
 
 def test_a_store_of_another_map_asks_for_a_new_folder(tmp_path):
@@ -539,13 +526,11 @@ def test_a_store_of_another_map_asks_for_a_new_folder(tmp_path):
     swept(max_cells=3, store=tmp_path / "b", tolerance=2e-2)
 
 
-def test_a_heavy_hammer_advises_lighter_ones(tmp_path, capsys):
+def test_a_heavy_hammer_advises_lighter_ones(tmp_path, prompt):
     loaded(tmp_path, SMALL)
-    name = str(tmp_path / "scene.toml")
-    assert cli.main(["hammer", name, "--bandwidth", "600", "--masses", "2.0"]) == 0
-    assert "try lighter hammers" in " ".join(capsys.readouterr().out.split())
-    assert cli.main(["hammer", name, "--bandwidth", "600", "--masses", "0.001"]) == 0
-    assert "try lighter hammers" not in " ".join(capsys.readouterr().out.split())
+    for mass in (2.0, 0.001):
+        ran = prompt("hammer scene.toml --bandwidth 600 --masses", mass)
+        assert ran.status == 0 and ("try lighter hammers" in " ".join(ran.out.split())) == (mass > 1.0)
 
 
 @pytest.mark.slow  # a connection is tried for ten seconds

@@ -53,7 +53,7 @@ def test_a_strike_writes_nothing_where_one_file_cannot_be_written(scene, tmp_pat
     (tmp_path / "out").mkdir()
     (tmp_path / "out" / "modes").write_text("mine")
     ran = prompt("strike small.toml --out out")
-    assert (ran.status, ran.err) == (cli.FAILED, f"fem-impact: {Path('out/modes')}: Not a directory\n")
+    assert (ran.status, ran.err) == (answers.Status.FAILED, f"fem-impact: {Path('out/modes')}: Not a directory\n")
     assert names(tmp_path / "out") == ["modes"]
 
 

@@ -46,14 +46,14 @@ def test_the_time_left_is_judged_by_the_progress_so_far(clock):
     shown = on_terminal(100)
     with shown("modes"):
         report("vectors", 0, 100)
-        assert shown.said() == "0/100 vectors, 0:00"
+        assert shown.status_line() == "0/100 vectors, 0:00"
         clock.now += 10.0
         report("vectors", 20, 100)  # 80 more at 2 per second
-        assert shown.said() == "20/100 vectors, 2/s, 0:10, 0:40 left"
+        assert shown.status_line() == "20/100 vectors, 2/s, 0:10, 0:40 left"
         clock.now += 5.0
-        assert shown.said().endswith("0:15, 0:35 left")
+        assert shown.status_line().endswith("0:15, 0:35 left")
         report("vectors", 3, 400)  # another search begins
-        assert "left" not in shown.said()
+        assert "left" not in shown.status_line()
 
 
 def test_cells_found_in_a_store_do_not_count_as_done_just_now(clock):
@@ -62,20 +62,20 @@ def test_cells_found_in_a_store_do_not_count_as_done_just_now(clock):
         report("cells", 900, 1000)
         clock.now += 10.0
         report("cells", 950, 1000)
-        assert shown.said() == "950/1000, 5/s, 0:10, 0:10 left"
+        assert shown.status_line() == "950/1000, 5/s, 0:10, 0:10 left"
 
 
 def test_without_a_count_the_prediction_tells(clock):
     shown = on_terminal(100)
     shown.predict(3600.0 + 65.0)
     with shown("strike"):
-        assert shown.said() == "0:00"
+        assert shown.status_line() == "0:00"
         clock.now += 5.0
-        assert shown.said() == "0:05, 1:01:00 left"
+        assert shown.status_line() == "0:05, 1:01:00 left"
         clock.now += 4000.0
-        assert shown.said() == "1:06:45, soon done"
+        assert shown.status_line() == "1:06:45, soon done"
         shown.predict(None)
-        assert shown.said() == "1:06:45"
+        assert shown.status_line() == "1:06:45"
 
 
 def test_a_stage_within_a_stage_has_its_own_name_and_the_outer_one_comes_back(clock):
@@ -83,9 +83,9 @@ def test_a_stage_within_a_stage_has_its_own_name_and_the_outer_one_comes_back(cl
     with shown("modes"):
         report("vectors", 5, 100)
         with shown("mesh"):
-            assert shown.running[-1][0] == "mesh" and shown.said() == "0:00"
-        assert shown.said() == "5/100 vectors, 0:00" and shown.running[-1][0] == "modes"
-    assert shown.said() == "" and shown.bar is None
+            assert shown.running[-1][0] == "mesh" and shown.status_line() == "0:00"
+        assert shown.status_line() == "5/100 vectors, 0:00" and shown.running[-1][0] == "modes"
+    assert shown.status_line() == "" and shown.bar is None
 
 
 @pytest.mark.parametrize("width", [20, 40, 59, 60, 100])
@@ -138,9 +138,9 @@ def test_the_line_itself_says_what_takes_longer_than_predicted(clock):
     shown.predict(12.0)
     with shown("strike"):
         clock.now += 20.0
-        assert shown.said() == "0:20, soon done"
+        assert shown.status_line() == "0:20, soon done"
         clock.now += 10.0
-        assert shown.said() == "0:30, longer than predicted"
+        assert shown.status_line() == "0:30, longer than predicted"
 
 
 def test_hammers_that_take_longer_than_the_first_ones_are_announced_again(clock):

@@ -7,7 +7,6 @@ import pytest
 from scenes import QUICK, SMALL
 
 import fem_impact as fi
-from fem_impact import cli
 
 HUGE = ("9999999999999999999999999", "18446744073709551616")  # beyond 64 bits
 DISK = """
@@ -42,15 +41,13 @@ TIN = "".join(line for line in DISK.splitlines(True) if not line.startswith(("E_
 
 
 @pytest.fixture
-def told(tmp_path, capsys):
+def told(tmp_path, prompt):
     """Run a command on a scene; returns its status and what it said."""
 
     def run(text, verb="strike", *words):
         (tmp_path / "s.toml").write_text(text)
-        out = () if verb == "plan" else ("--out", str(tmp_path / "out"))
-        status = cli.main([verb, str(tmp_path / "s.toml"), *out, *words])
-        captured = capsys.readouterr()
-        return status, " ".join((captured.out + captured.err).split())
+        ran = prompt([verb, "s.toml", *([] if verb == "plan" else ["--out", "out"])], *words)
+        return ran.status, " ".join((ran.out + ran.err).split())
 
     return run
 

@@ -123,11 +123,6 @@ def cpu_time(parent, name):
     return min(taken)
 
 
-@pytest.mark.slow  # starts five processes
-def test_strike_is_all_or_nothing(tmp_path):
-    assert all(stop(tmp_path, "strike", number, share) for number, share in zip(ENDS, (0.7, 0.4)))
-
-
 @pytest.mark.slow
 @pytest.mark.parametrize("name", COMMANDS)
 def test_every_command_at_any_moment(tmp_path, name, all_cases):

@@ -95,8 +95,8 @@ NOT_MIRRORED = {  # tested under the name of what uses them
     "fe/plates.py", "fe/system.py", "impact/played.py", "mesh/meshio_reader.py", "model/asked.py", "model/budget.py",
     "model/by_idealisation.py", "model/by_mixture.py", "model/by_vectors.py", "modes/disk.py",
     "modes/rectangle.py", "modes/request.py", "modes/shapes.py", "modes/slender.py", "pages/explore_server.py",
-    "pages/explore_view.py", "references/blows.py", "references/contacts.py", "references/plates.py",
-    "references/shells.py", "references/slender.py", "scenes/maps.py", "scenes/schema.py",
+    "pages/explore_view.py", "references/blows.py", "references/contacts.py",
+    "references/frequencies.py", "scenes/maps.py", "scenes/schema.py",
     "show/plots.py", "show/style.py",
 }  # fmt: skip
 

@@ -4,14 +4,13 @@ import re
 from pathlib import Path
 from typing import NamedTuple
 
-import numpy as np
 import pytest
+from comparing import assert_printed
 
 from fem_impact import arguments
 
 ROOT = Path(__file__).parents[1]
 TEXT = (ROOT / "studies" / "site" / "questions.md").read_text(encoding="utf-8")
-NUMBER = r"-?\d+(?:\.\d+)?(?:e[+-]\d+)?"
 NEEDS = {"uff": "pyuff", "calculix": "pyvista_frd", "web": "jinja2", "spread": "SALib"}  # extra: a module of it
 SLOW = (  # above 0.3 s
     "hear what my mallet", "tune a bar", "drawing of my instrument", "choose hammer", "frequency responses",
@@ -80,11 +79,7 @@ def test_lines_of_python_print_what_the_page_says(answer, here, read_here, capsy
         if f"extra `{extra}`" in answer.prose:
             pytest.importorskip(module)
     exec(compile(answer.code, "questions.md", "exec"), {})
-    printed = capsys.readouterr().out
-    shape = [re.sub(NUMBER, "#", text).split() for text in (printed, answer.printed)]
-    assert shape[0] == shape[1], printed
-    numbers = [[float(each) for each in re.findall(NUMBER, text)] for text in (printed, answer.printed)]
-    np.testing.assert_allclose(*numbers, rtol=0.1, atol=1e-3)  # as in test_readme: errors are estimates
+    assert_printed(capsys.readouterr().out, answer.printed, rtol=0.1, atol=1e-3)  # as in test_readme
 
 
 @pytest.mark.parametrize("answer", marked([each for each in ALL if each.language == "sh"]))

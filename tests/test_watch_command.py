@@ -1,6 +1,5 @@
 """`fem-impact watch` as it is typed: a folder with good and bad records, read once, and followed until Ctrl-C."""
 
-import json
 import os
 import signal
 import subprocess
@@ -11,7 +10,7 @@ from types import SimpleNamespace
 import pytest
 
 import fem_impact as fi
-from fem_impact import cli, hammer_commands
+from fem_impact import hammer_commands
 
 
 @pytest.fixture
@@ -27,10 +26,8 @@ def folder(tmp_path):
 
 
 @pytest.mark.slow
-def test_once_tells_every_record_and_what_cannot_be_read_and_draws(folder, tmp_path, capsys):
-    words = ["watch", str(folder), "--bandwidth", "2000", "--once", "--out", str(tmp_path / "seen.svg")]
-    assert cli.main([*words, "--json", "--quiet"]) == 0
-    found = json.loads(capsys.readouterr().out)
+def test_once_tells_every_record_and_what_cannot_be_read_and_draws(folder, tmp_path, prompt):
+    found = prompt("watch records --bandwidth 2000 --once --out seen.svg --json --quiet").json
     told = {each["file"]: each for each in found["records"]}
     assert told["good.npz"]["good"] and found["n_good"] == 1
     assert told["soft.npz"]["said"].startswith("too soft for 2 kHz")
@@ -39,7 +36,7 @@ def test_once_tells_every_record_and_what_cannot_be_read_and_draws(folder, tmp_p
 
 
 @pytest.mark.slow
-def test_a_new_record_gets_a_line_of_its_own_until_the_program_is_stopped(folder, tmp_path, capsys, monkeypatch):
+def test_a_new_record_gets_a_line_of_its_own_until_the_program_is_stopped(folder, tmp_path, prompt, monkeypatch):
     later = (folder / "good.npz").read_bytes()
     (folder / "good.npz").unlink()
     steps = [None, None, lambda: (folder / "good.npz").write_bytes(later[:500]),
@@ -53,17 +50,14 @@ def test_a_new_record_gets_a_line_of_its_own_until_the_program_is_stopped(folder
             step()
 
     monkeypatch.setattr(hammer_commands, "time", SimpleNamespace(sleep=sleep))
-    words = ["watch", str(folder), "--bandwidth", "2000", "--out", str(tmp_path / "seen.png")]
-    cli.main(words)
-    said = capsys.readouterr().out
+    said = prompt("watch records --bandwidth 2000 --out seen.png").out
     lines = [line for line in said.splitlines() if line.startswith(("good", "soft", "torn"))]
     assert [line.split()[0] for line in lines] == ["soft.npz,", "torn.csv:", "good.npz,"]
     assert "good: " in lines[2] and (tmp_path / "seen.png").stat().st_size > 1e4
 
 
-def test_a_folder_without_records_says_so(tmp_path, capsys):
-    assert cli.main(["watch", str(tmp_path), "--bandwidth", "2000", "--once"]) == 0
-    assert capsys.readouterr().out.strip() == "no records yet"
+def test_a_folder_without_records_says_so(prompt):
+    assert prompt("watch . --bandwidth 2000 --once") == (0, "no records yet\n", "")
 
 
 @pytest.mark.slow  # starts a process

@@ -15,10 +15,8 @@ from typing import Any, TypeVar, get_args, get_origin
 
 import numpy as np
 
-from .explained import pointed
+from .explained import pointed, printable
 
-LONGEST = 500  # [-] characters quoted from a file or another library; longer text is cut
-SHOWN = 80  # [-] characters quoted from a value the user passed; longer text is cut
 REACH = 1e75  # [-] largest number accepted; 1 / REACH is the smallest: the fourth power of both still fits a float
 MOST = 10**9  # [-] largest count accepted: more items would not fit into memory
 SOURCES = {  # type -> how a user makes one, for error messages
@@ -44,6 +42,21 @@ SOURCES = {  # type -> how a user makes one, for error messages
     "Touch": "fi.Touch",
 }
 
+EXTRAS: dict[str, tuple[str, ...]] = {  # extra: its purpose and the modules it needs
+    "cad": ("drawings", "svgelements", "ezdxf"),
+    "film": ("films as MP4 files", "imageio_ffmpeg"),
+    "uff": ("universal files", "pyuff"),
+    "nastran": ("results of Nastran", "pyNastran"),
+    "ansys": ("results and matrices of Ansys", "ansys"),
+    "calculix": ("results of CalculiX", "pyvista_frd"),
+    "cluster": ("clusters and stores", "distributed", "zarr"),
+    "hdf5": ("meshes in HDF5", "h5py"),
+    "completion": ("shell completion", "shtab"),
+    "spread": ("Sobol indices", "SALib"),
+    "play": ("playing", "mido", "rtmidi", "sounddevice"),
+    "web": ("report and explore", "plotly", "tornado", "jinja2"),
+}
+
 Function = TypeVar("Function", bound=Callable)
 
 
@@ -63,12 +76,12 @@ def _suffix(unit: str) -> str:
 
 
 def shown(value: Any) -> str:
-    """Any value as one short line of text for a message."""
+    """Any value as one line of at most 80 characters for a message."""
     try:
         text = repr(value)
     except ValueError:  # Python refuses to print an integer with thousands of digits
         text = f"a {type(value).__name__} too long to print"
-    return line(text)[:SHOWN]
+    return line(text)[:80]
 
 
 def number(name: str, value: Any, unit: str = "", *, reach: float = REACH) -> float:
@@ -300,10 +313,10 @@ def ascending(name: str, value: Any, unit: str = "") -> np.ndarray:
     return result
 
 
-def line(text: str) -> str:
+def line(text: str, longest: int = 500) -> str:
     """Text from a file or another library, reduced to one printable line of limited length."""
-    safe = "".join(c if c.isprintable() else repr(c)[1:-1] for c in " ".join(text.split()))
-    return safe if len(safe) <= LONGEST else safe[:LONGEST] + " ..."
+    safe = printable(text)
+    return safe if len(safe) <= longest else safe[:longest] + " ..."
 
 
 def one_of(name: str, value: Any, allowed: Iterable[str]) -> str:

@@ -59,7 +59,9 @@ def end(process: "subprocess.Popen[bytes]") -> int:
     return process.wait()
 
 
-def run(target: str, *arguments: str, timeout: float, **variables: str) -> "subprocess.CompletedProcess[bytes]":
+def run_function(
+    target: str, *arguments: str, timeout: float, **variables: str
+) -> "subprocess.CompletedProcess[bytes]":
     """Run a function of this package in a process until it ends; raises TimeoutExpired after a time [s]."""
     command, environment = python(target, *arguments, **variables)
     return subprocess.run(command, capture_output=True, timeout=timeout, env=environment, check=False)

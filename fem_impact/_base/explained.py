@@ -62,6 +62,11 @@ def pointed(text: str) -> str:
     return f"{bare} ({place})" if place else bare
 
 
+def printable(text: str) -> str:
+    """Text as one line in which everything can be printed."""
+    return "".join(c if c.isprintable() else repr(c)[1:-1] for c in " ".join(text.split()))
+
+
 def below(first: str) -> list[str]:
     """The line that follows the first line of a summary, which itself stays short; none if nothing explains it."""
     place = where(first)

@@ -7,10 +7,13 @@ import platform
 import re
 import secrets
 import shutil
+import signal
 import tempfile
+import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
+from typing import Any
 
 PARTIAL = ".partial-"  # prefix of every temporary name, which goes on with machine, process and a random number
 MACHINE = re.sub(r"[^A-Za-z0-9.]", "_", platform.node())
@@ -42,6 +45,20 @@ def undo_all() -> bool:
     for undo in reversed(UNDONE):
         undo()
     return True
+
+
+@contextmanager
+def signalled(act: Callable[[int, Any], object], *numbers: int) -> Iterator[None]:
+    """Answer signals by ``act`` while the block runs; nothing in other threads than the main one, which gets none."""
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    before = {number: signal.signal(number, act) for number in numbers}
+    try:
+        yield
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)
 
 
 @contextmanager

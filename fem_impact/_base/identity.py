@@ -20,7 +20,8 @@ from typing import Any
 
 import numpy as np
 
-HOME = Path(__file__).parents[1]
+from .child import PACKAGE
+
 NUMERICS = ("numpy", "scipy", "numba", "scikit-fem")  # libraries whose versions may change the digits of a result
 PLAIN = (type(None), bool, int, float, complex, str, bytes, range, type(...), type(NotImplemented))
 OF_A_CLASS = {  # what a class has besides its own names, or what follows from them
@@ -33,12 +34,12 @@ OF_A_CLASS = {  # what a class has besides its own names, or what follows from t
 def program() -> str:
     """Digest of this package's source and of the versions of the libraries that compute for it."""
     body = hashlib.sha256(repr([version(name) for name in NUMERICS]).encode())
-    for file in sorted(HOME.rglob("*.py")):
-        body.update(file.relative_to(HOME).as_posix().encode() + hashlib.sha256(file.read_bytes()).digest())
+    for file in sorted(PACKAGE.rglob("*.py")):
+        body.update(file.relative_to(PACKAGE).as_posix().encode() + hashlib.sha256(file.read_bytes()).digest())
     return body.hexdigest()
 
 
-def of(thing: Any) -> str:
+def identify(thing: Any) -> str:
     """Digest of a function or an object.
 
     Raises
@@ -173,7 +174,7 @@ def _module(module: ModuleType) -> tuple[str, list[Any]]:
 def _installed(module: str) -> bool:
     """Whether a module belongs to Python, to this program or to an installed package."""
     top = module.partition(".")[0]
-    if top in sys.stdlib_module_names or top == HOME.name:
+    if top in sys.stdlib_module_names or top == PACKAGE.name:
         return True
     places = [getattr(sys.modules.get(top), "__file__", None) or "", *getattr(sys.modules.get(top), "__path__", ())]
     return any(part in ("site-packages", "dist-packages") for place in places for part in Path(place).parts)

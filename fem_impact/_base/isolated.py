@@ -23,14 +23,10 @@ from . import check, child
 PATIENCE = 8.0
 WAITING = 20.0  # [-] limit on the time by the clock over that: ends what only waits, not what a busy machine delays
 MEMORY = 2 << 30  # [byte] limit on the reader's address space; Python and numpy alone use 0.2 GB
-EXTRAS = {  # library -> extra
-    "svgelements": "cad", "ezdxf": "cad", "pyuff": "uff", "h5py": "hdf5", "pyNastran": "nastran",
-    "pyvista_frd": "calculix", "ansys": "ansys",
-}  # fmt: skip
-DONE, REFUSED, TOLD = 0, 1, 3  # exit statuses; any other means the reader crashed
+REFUSED, TOLD = 1, 3  # exit statuses besides 0; any other means the reader crashed
 
 
-def read(path: Path, kind: str, reader: str, *arguments: str) -> dict[str, np.ndarray]:
+def read_apart(path: Path, kind: str, reader: str, *arguments: str) -> dict[str, np.ndarray]:
     """Call a reader function of this package on a file, in a separate process.
 
     Parameters
@@ -56,11 +52,11 @@ def read(path: Path, kind: str, reader: str, *arguments: str) -> dict[str, np.nd
             raise ValueError(f"{path.name} cannot be read as {kind} (it is empty or begins with zeros only)")
     patience = min(PATIENCE + path.stat().st_size / 2e5, 30.0)  # a third of the slowest reader's speed in byte/s
     try:
-        status, out, said = run(path, reader, arguments, patience)
+        status, out, said = run_reader(path, reader, arguments, patience)
     except subprocess.TimeoutExpired:
         status, out = REFUSED, b""
         said = f"reading took longer than {patience:.0f} s; export it again or in another format".encode()
-    if status != DONE:
+    if status:
         reason = check.line(said.decode("utf-8", "replace"))
         if status == TOLD:
             raise ValueError(reason)
@@ -70,13 +66,13 @@ def read(path: Path, kind: str, reader: str, *arguments: str) -> dict[str, np.nd
         return dict(arrays)
 
 
-def run(path: Path, reader: str, arguments: tuple[str, ...], patience: float) -> tuple[int, bytes, bytes]:
+def run_reader(path: Path, reader: str, arguments: tuple[str, ...], patience: float) -> tuple[int, bytes, bytes]:
     """Run the reader process: its exit status, the arrays as npz bytes, and the error text if it failed.
 
     Raises TimeoutExpired if it computes longer than ``patience`` [s], or takes `WAITING` times as long by the clock.
     """
     words = str(math.ceil(patience)), str(path), reader, *arguments
-    done = child.run("_base.isolated:process", *words, timeout=WAITING * patience, OPENBLAS_NUM_THREADS="1")
+    done = child.run_function("_base.isolated:process", *words, timeout=WAITING * patience, OPENBLAS_NUM_THREADS="1")
     if done.returncode == -getattr(signal, "SIGXCPU", 0) != 0:
         raise subprocess.TimeoutExpired(reader, patience)
     return done.returncode, done.stdout, done.stderr
@@ -93,11 +89,11 @@ def main(path: Path, reader: str, arguments: list[str]) -> tuple[int, bytes]:
                 raise TypeError("it contains objects where numbers should be")
             out = io.BytesIO()
             np.savez(out, **arrays)
-            return DONE, out.getvalue()
+            return 0, out.getvalue()
     except ImportError as error:
         library = (error.name or "").split(".")[0]
-        extra = f"'fem-impact[{EXTRAS[library]}]'" if library in EXTRAS else library
-        return REFUSED, f"this needs {library}: pip install {extra}".encode()
+        extras = (f"'fem-impact[{name}]'" for name, (_, *modules) in check.EXTRAS.items() if library in modules)
+        return REFUSED, f"this needs {library}: pip install {next(extras, library)}".encode()
     except MemoryError:
         return 2, b""
     except (Exception, SystemExit) as error:  # parsers raise anything, even SystemExit

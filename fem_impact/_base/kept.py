@@ -29,12 +29,12 @@ def pack(path: Path, key: str, known: Kinds, **things: Any) -> None:
     """Write objects found for a key: known classes, mappings, sequences, slices, arrays, texts and numbers in them."""
     arrays: dict[str, np.ndarray] = {}
     told = {name: _packed(thing, known, arrays) for name, thing in things.items()}
-    write(path, key, {**arrays, "told": np.array(json.dumps(told))})
+    write_arrays(path, key, {**arrays, "told": np.array(json.dumps(told))})
 
 
 def unpack(path: Path, key: str, known: Kinds) -> dict[str, Any] | None:
-    """What `pack` wrote for this key, by name, sequences as tuples; None as of `read`. No other class is ever made."""
-    arrays = read(path, key)
+    """What `pack` wrote for this key, by name, sequences as tuples; or None. No other class is ever made."""
+    arrays = read_arrays(path, key)
     if arrays is None:
         return None
     return {name: _unpacked(told, known, arrays) for name, told in json.loads(str(arrays["told"])).items()}
@@ -72,7 +72,7 @@ def _unpacked(told: Any, known: Kinds, arrays: Mapping[str, np.ndarray]) -> Any:
     return dict(_unpacked(told["mapping"], known, arrays))
 
 
-def write(path: Path, key: str, arrays: dict[str, Any]) -> None:
+def write_arrays(path: Path, key: str, arrays: dict[str, Any]) -> None:
     """Write named arrays found for a key: an npz file, and behind it a digest of it and the key."""
     with replacing(path) as temporary, open(temporary, "w+b") as file:
         np.savez(file, **arrays)
@@ -81,8 +81,8 @@ def write(path: Path, key: str, arrays: dict[str, Any]) -> None:
         file.write(digest)
 
 
-def read(path: Path, key: str) -> dict[str, np.ndarray] | None:
-    """The arrays that `write` wrote for this key; None if the file is missing, for another key or damaged anywhere."""
+def read_arrays(path: Path, key: str) -> dict[str, np.ndarray] | None:
+    """The arrays written for this key; None if the file is missing, for another key or damaged anywhere."""
     try:
         raw = path.read_bytes()
     except (OSError, MemoryError):

@@ -9,9 +9,8 @@ import numpy as np
 
 from .explained import noted
 
-WIDTH, HEIGHT = 360.0, 210.0  # [px] size of a picture; narrow pages shrink it
+WIDTH = 360.0  # [px] of a picture; narrow pages shrink it
 MARGIN = 16.0  # [px] empty border, so that markers on the edge are not cut off
-SAMPLES = 400  # [-] points kept of a curve: about one per pixel
 # Pages set these CSS variables for light and dark themes; notebooks fall back to the colour after the comma.
 INK, BODY = "var(--ink, #333333)", "var(--body, #d6e6f2)"
 STROKE, STRIKE = "var(--line-strong, #0072b2)", "var(--strike, #d55e00)"
@@ -72,20 +71,21 @@ def side_by_side(*parts: str) -> str:
 def curve(x: np.ndarray, y: np.ndarray, *, label: str, unit: str, title: str) -> str:
     """Time history ``y`` [unit] over ``x`` [s], labelled with its peak and duration."""
     x, y = np.asarray(x, float), np.asarray(y, float)
-    if len(x) > SAMPLES:
-        some = np.unique(np.append(np.linspace(0, len(x) - 1, SAMPLES).astype(int), y.argmax()))
+    if len(x) > 400:  # about one point per pixel is enough
+        some = np.unique(np.append(np.linspace(0, len(x) - 1, 400).astype(int), y.argmax()))
         x, y = x[some], y[some]
     span, top = float(np.ptp(x)) or 1.0, float(y.max(initial=0.0)) or 1.0
     across = MARGIN + (WIDTH - 2 * MARGIN) * (x - x[0]) / span
-    up = HEIGHT - 1.5 * MARGIN - (HEIGHT - 3.5 * MARGIN) * y / top
+    height = 210.0  # [px]
+    foot, right = height - 1.5 * MARGIN, WIDTH - MARGIN
+    up = foot - (height - 3.5 * MARGIN) * y / top
     line = " ".join(f"{a:.1f},{b:.1f}" for a, b in zip(across, up))
-    foot, right = HEIGHT - 1.5 * MARGIN, WIDTH - MARGIN
     drawn = (
         f'<line x1="{MARGIN}" x2="{right}" y1="{foot}" y2="{foot}" stroke="{INK}" stroke-width="0.6"/>'
         f'<polyline points="{line}" fill="none" stroke="{STROKE}" stroke-width="1.6" stroke-linejoin="round"/>'
     )
-    said = _text(MARGIN, MARGIN, f"{label}, peak {top:.4g} {unit}") + _text(right, HEIGHT - 6, f"{span:.4g} s", "end")
-    return picture(HEIGHT, title, drawn + said)
+    said = _text(MARGIN, MARGIN, f"{label}, peak {top:.4g} {unit}") + _text(right, height - 6, f"{span:.4g} s", "end")
+    return picture(height, title, drawn + said)
 
 
 def _text(x: float, y: float, text: str, anchor: str = "start") -> str:

@@ -15,20 +15,20 @@ SLOW = logging.getLogger("fem_impact.slow")
 LONG = 2.0  # [s] of work that is announced: longer than one waits without wondering
 Listener = Callable[[str, int, int], object]
 Oracle = Callable[[float], object]
-LISTENER: ContextVar[Listener | None] = ContextVar("LISTENER", default=None)  # of the work in this thread
-ORACLE: ContextVar[Oracle | None] = ContextVar("ORACLE", default=None)  # the same, of what is left
+Ears = tuple[Listener | None, Oracle | None]
+EARS: ContextVar[Ears] = ContextVar("EARS", default=(None, None))  # of the work in this thread
 
 
 def report(what: str, done: int, total: int) -> None:
     """Say how many of something are done, to the listener if there is one."""
-    listener = LISTENER.get()
+    listener, _ = EARS.get()
     if listener is not None:
         listener(what, done, total)
 
 
 def foresee(seconds: float) -> None:
     """Say how many more seconds work takes that was not planned, or was planned otherwise."""
-    oracle = ORACLE.get()
+    _, oracle = EARS.get()
     if oracle is not None:
         oracle(seconds)
 
@@ -36,12 +36,11 @@ def foresee(seconds: float) -> None:
 @contextmanager
 def heard(listener: Listener | None, oracle: Oracle | None = None) -> Iterator[None]:
     """Send the reports of the block to a listener and an oracle; None silences them."""
-    tokens = LISTENER.set(listener), ORACLE.set(oracle)
+    token = EARS.set((listener, oracle))
     try:
         yield
     finally:
-        LISTENER.reset(tokens[0])
-        ORACLE.reset(tokens[1])
+        EARS.reset(token)
 
 
 class Line(logging.Handler):

@@ -15,7 +15,7 @@ class Remembered:
     def __reduce__(self):
         return Remembered, (self.most,)
 
-    def found(self, key: Hashable, find: Callable[[], Any]) -> Any:
+    def recall(self, key: Hashable, find: Callable[[], Any]) -> Any:
         """The result for a key: a known one, or that of ``find()``, which then displaces the oldest."""
         with self.lock:
             if key in self.results:

@@ -167,11 +167,11 @@ def solve_or_read(system: System, n_modes: int | None, max_frequency: float | No
     numbers = [part for A in matrices for part in (A.data, A.indices, A.indptr)]
     key = hashlib.sha256(b"".join([asked, *(part.tobytes() for part in numbers)])).hexdigest()
     names = ("omega", "vectors", "parts")
-    arrays = keeping.read(path, key)
+    arrays = keeping.read_arrays(path, key)
     if arrays is not None:
         return Spectrum(system, Flexibility.of(system), *(arrays[name] for name in names))
     found = solve_on_mesh(system, n_modes, max_frequency)
-    keeping.write(path, key, {name: getattr(found, name) for name in names})
+    keeping.write_arrays(path, key, {name: getattr(found, name) for name in names})
     return found
 
 

@@ -305,5 +305,5 @@ def shortened(striker: Striker, n_modes: int) -> Striker:
     def short() -> Striker:
         return replace(striker, modes=striker.modes.truncated(n_modes=n_modes), fixed=True)
 
-    found: Striker = striker.known.found(("shortened", n_modes), short)
+    found: Striker = striker.known.recall(("shortened", n_modes), short)
     return found

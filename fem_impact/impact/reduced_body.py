@@ -148,7 +148,7 @@ def part_of(modes: Modes, touched: Touched, points: np.ndarray, residual: bool =
         rest = left_out(modes, points, rows) if residual and modes.dimension and touched else None
         return reduce_body(modes, touched, points, rows, rest)
 
-    found: ReducedBody = modes.known.found((points.tobytes(), touched, residual), reduced)
+    found: ReducedBody = modes.known.recall((points.tobytes(), touched, residual), reduced)
     return found
 
 
@@ -160,7 +160,7 @@ def part_of_striker(striker: Striker, residual: bool = True) -> ReducedBody:
         part = reduce_body(striker.body, ((0, 1.0),), striker.at[None], striker.shape[None], rest)
         return replace(part, bias=part.bias + striker.push, held=int(striker.hand is not None))
 
-    found: ReducedBody = striker.known.found(("reduced", residual), reduced)
+    found: ReducedBody = striker.known.recall(("reduced", residual), reduced)
     return found
 
 

@@ -2,13 +2,13 @@
 
 import argparse
 import signal
-import threading
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
 
+from .._base.files import signalled
 from ..modes.modal import Modes
 from ..scenes.scene import Scene
-from .controllers import KEYS, Hands, Source, keys, port, read_midi, spread
+from .controllers import KEYS, Hands, Source, keys, port, read_midi, spread_points
 from .devices import Clock, Device, Speaker
 from .player import PlayedStroke, Player, Score
 
@@ -20,14 +20,14 @@ def player_of(scene: Scene, modes: Modes, options: argparse.Namespace) -> Player
     blow = scene.blow.values
     # the speed of the scene is a stroke of half strength
     fastest = options.fastest if options.fastest is not None else 2.0 * blow["speed"]
-    points = options.at or list(spread(modes, blow["at"], N_POINTS))
+    points = options.at or list(spread_points(modes, blow["at"], N_POINTS))
     player = Player(
         modes, scene.make_striker(), scene.make_contact(), points=points, fastest=fastest, listen=scene.points[0],
         block=options.block,
     )  # fmt: skip
     peak = max(abs(player.play([PlayedStroke(0, 0, player.fastest)], 0.1).samples).max(), 1e-30)
     player.gain /= player.sticks * float(peak)  # a stroke by every stick at once does not clip
-    player.reset()
+    player.struck.reset()
     return player
 
 
@@ -40,7 +40,7 @@ def source_of(options: argparse.Namespace, player: Player) -> Iterator[tuple[Sou
         return
     hands = Hands()
     with ExitStack() as open_now:
-        open_now.enter_context(_ended_by_hand(hands))
+        open_now.enter_context(signalled(lambda *_: hands.stop(), signal.SIGINT))  # ends the playing, not the program
         if options.midi_port is not None:
             name = open_now.enter_context(port(options.midi_port, hands, len(player.points), player.fastest))
             yield hands, f"MIDI port {name}; Ctrl-C ends"
@@ -57,16 +57,3 @@ def device_of(options: argparse.Namespace, live: bool) -> tuple[Device | None, s
         return Speaker(), ""
     except ValueError as error:
         return (Clock() if live else None), str(error)
-
-
-@contextmanager
-def _ended_by_hand(hands: Hands) -> Iterator[None]:
-    """Let Ctrl-C end the playing, and not the program."""
-    if threading.current_thread() is not threading.main_thread():
-        yield
-        return
-    before = signal.signal(signal.SIGINT, lambda *_: hands.stop())
-    try:
-        yield
-    finally:
-        signal.signal(signal.SIGINT, before)

@@ -17,12 +17,8 @@ from ..modes.modal import Modes
 from ..modes.viewing import grid
 from .player import AT_ONCE, PlayedStroke
 
-# [-] fact: the MIDI note in the middle of a keyboard; it is the first point, each semitone up the next, round and round
-FIRST_NOTE = 60
 KEYS = ("zxcvbnm,./", "asdfghjkl;", "qwertyuiop", "1234567890")  # a column strikes one point, a row up twice as fast
 ENDS = ("\x1b", "\x04", "\x03")  # Escape, Ctrl-D and Ctrl-C end the playing
-# [s] between looks whether the playing has ended: nobody notices such a delay at the end, and it costs nothing
-PATIENCE = 0.05
 
 
 class Source(Protocol):
@@ -46,7 +42,7 @@ class Hands:
         self._waiting: deque[PlayedStroke] = deque()
         self._ended = threading.Event()
 
-    def strike(self, point: int, speed: float) -> None:
+    def add_stroke(self, point: int, speed: float) -> None:
         """Strike as soon as possible."""
         self._waiting.append(PlayedStroke(0, point, speed))
 
@@ -63,7 +59,7 @@ class Hands:
         return self._ended.is_set() and not self._waiting
 
 
-def spread(modes: Modes, first: Any, count: int) -> np.ndarray:
+def spread_points(modes: Modes, first: Any, count: int) -> np.ndarray:
     """Points over a body, the given one and then by their distance from it, (count, dimension) [m].
 
     Each is the point of a fine grid that lies farthest from those before (Gonzalez 1985, Theor. Comput. Sci. 38, 293).
@@ -79,8 +75,8 @@ def spread(modes: Modes, first: Any, count: int) -> np.ndarray:
 
 
 def of_note(note: int, velocity: int, n_points: int, fastest: float) -> tuple[int, float]:
-    """Point and speed [m/s] of a MIDI note."""
-    return (note - FIRST_NOTE) % n_points, fastest * velocity / 127  # the largest velocity of MIDI
+    """Point and speed [m/s] of a MIDI note: middle C, 60, is the first point, each semitone up the next, in rounds."""
+    return (note - 60) % n_points, fastest * velocity / 127  # the largest velocity of MIDI
 
 
 def read_midi(path: Path, n_points: int, fastest: float, rate: int) -> list[PlayedStroke]:
@@ -119,7 +115,7 @@ def port(name: str, hands: Hands, n_points: int, fastest: float) -> Iterator[str
 
     def heard(message: Any) -> None:
         if message.type == "note_on" and message.velocity > 0:
-            hands.strike(*of_note(message.note, message.velocity, n_points, fastest))
+            hands.add_stroke(*of_note(message.note, message.velocity, n_points, fastest))
 
     with mido.open_input(found[0], callback=heard):
         yield found[0]
@@ -135,7 +131,7 @@ def keys(hands: Hands, n_points: int, fastest: float) -> Iterator[None]:
                 break
             struck = of_key(key, n_points, fastest)
             if struck is not None:
-                hands.strike(*struck)
+                hands.add_stroke(*struck)
         hands.stop()
 
     thread = threading.Thread(target=listen, daemon=True)
@@ -156,8 +152,8 @@ def of_key(key: str, n_points: int, fastest: float) -> tuple[int, float] | None:
     return None
 
 
-def _pressed(hands: Hands) -> Iterator[str]:
-    """Keys as they are pressed, until the input or the playing ends."""
+def _pressed(hands: Hands, patience: float = 0.05) -> Iterator[str]:
+    """Keys as they are pressed, until the input or, as is seen after some patience [s], the playing ends."""
     if os.name == "nt" and sys.stdin.isatty():
         import msvcrt
 
@@ -165,11 +161,11 @@ def _pressed(hands: Hands) -> Iterator[str]:
             if msvcrt.kbhit():  # type: ignore[attr-defined]
                 yield msvcrt.getwch()  # type: ignore[attr-defined]
             else:
-                threading.Event().wait(PATIENCE / 10.0)
+                threading.Event().wait(patience / 10.0)
         return
     handle = sys.stdin.fileno()
     while not hands.over(0):
-        if select.select([handle], [], [], PATIENCE)[0]:
+        if select.select([handle], [], [], patience)[0]:
             text = os.read(handle, 64).decode("utf-8", "replace")
             if not text:
                 return

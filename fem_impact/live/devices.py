@@ -34,9 +34,9 @@ class Feed:
 
 
 class Device(Protocol):
-    """Calls `Feed.copy` once in each block's time between start and stop."""
+    """Calls `Feed.copy` once in each block's time between play_feed and stop."""
 
-    def start(self, feed: Feed, rate: int) -> None:
+    def play_feed(self, feed: Feed, rate: int) -> None:
         """Begin to play."""
 
     def stop(self) -> None:
@@ -53,7 +53,7 @@ class Speaker:
         except (OSError, ValueError, RuntimeError) as error:  # no PortAudio, or no device
             raise ValueError(f"no loudspeaker can be used here ({error}), only the file is written") from None
 
-    def start(self, feed: Feed, rate: int) -> None:
+    def play_feed(self, feed: Feed, rate: int) -> None:
         """Begin to play."""
 
         def callback(out: np.ndarray, *_: Any) -> None:
@@ -73,7 +73,7 @@ class Speaker:
 class Clock:
     """A device that plays nothing, in time: it asks for every block when a loudspeaker would."""
 
-    def start(self, feed: Feed, rate: int) -> None:
+    def play_feed(self, feed: Feed, rate: int) -> None:
         """Begin to ask."""
         self._ended = threading.Event()
         self._thread = threading.Thread(target=self._ask, args=(feed, feed.blocks.shape[1] / rate), daemon=True)
@@ -119,7 +119,7 @@ def perform(player: Player, source: Source, longest: float, device: Device | Non
     feed, seconds = Feed(most, player.block), np.zeros(most)
     rings = sampling.ringing(player.modes, player.modes.omega > 0.0, (SHORTEST, LONGEST))
     if device is not None:
-        device.start(feed, player.rate)
+        device.play_feed(feed, player.rate)
     try:
         end = most
         while feed.written < end:

@@ -13,9 +13,6 @@ from ..impact.striker import Striker
 from ..modes.modal import Modes
 from ..show.sound import FULL_SCALE, HIGHEST_RATE, RATE, Sound
 
-# [-] frames computed at a time: 1.3 ms at 48 kHz, as usual; longer ones delay strokes, shorter ones cost more calls
-BLOCK = 64
-
 
 class PlayedStroke(NamedTuple):
     """A stroke of a player."""
@@ -63,10 +60,11 @@ class Player:
     step: float  # [s] longest step in contact
     sticks: int  # [-] most that are on the body at once
     gain: float  # [s/m] of samples
+    struck: StruckBody  # which counts what happens, and starts afresh by its ``reset``
 
     def __init__(
         self, modes: Modes, striker: Striker, contact: Contact, *, points: Any, fastest: float, listen: Any = None,
-        rate: int = RATE, block: int = BLOCK, sticks: int = 4, n_trace: int = 0,
+        rate: int = RATE, block: int = 64, sticks: int = 4, n_trace: int = 0,
     ) -> None:  # fmt: skip
         """Prepare everything that a block needs.
 
@@ -82,11 +80,11 @@ class Player:
             Point to listen to; the first of ``points`` by default.
         rate : int [Hz]
         block : int
-            Frames in a block.
+            Frames in a block, 1.3 ms as usual; longer ones delay strokes, shorter ones cost more calls.
         sticks : int
             How many can be on the body at once; the next one takes the place of the oldest that does not touch.
         n_trace : int
-            Steps in contact that `trace` keeps.
+            Steps in contact that ``struck.trace`` keeps.
         """
         self.modes, self.contact = modes, contact
         if modes.dimension and not (isinstance(points, (list, tuple, np.ndarray)) and len(points)):
@@ -99,19 +97,15 @@ class Player:
         needed = collision.striker_modes(striker, contact=contact, speed=fastest, tolerance=collision.TOLERANCE)[0]
         self.striker = striker if striker.fixed else collision.shortened(striker, needed)
         place = modes.point("listen", self.points[0] if listen is None else listen)
-        self._played = StruckBody(
+        self.struck = StruckBody(
             modes, self.striker, contact, points=self.points, listen=place, fastest=self.fastest, rate=self.rate,
             sticks=sticks, n_trace=n_trace,
         )  # fmt: skip
-        self.step, self.gain = self._played.step, 1.0 / FULL_SCALE
-
-    def reset(self) -> None:
-        """Bring the body to rest, without sticks, at frame zero."""
-        self._played.reset()
+        self.step, self.gain = self.struck.step, 1.0 / FULL_SCALE
 
     def fill(self, strokes: Sequence[PlayedStroke], out: np.ndarray) -> None:
         """Compute the next block into ``out`` (n_frames,) float32, with the strokes in it, by frames of the block."""
-        self._played.fill(strokes, self.gain, out)
+        self.struck.fill(strokes, self.gain, out)
 
     def play(self, strokes: Sequence[PlayedStroke | tuple[int, int, float]], duration: float) -> Sound:
         """The sound [m/s] of strokes, by frames since now, for a duration [s]; the same strokes give the same bits."""
@@ -126,13 +120,3 @@ class Player:
         check.count("point of a stroke", point, low=0, high=len(self.points) - 1)
         frame = check.count("frame of a stroke", frame, low=0)
         return PlayedStroke(frame, point, check.between("speed of a stroke", speed, 0.0, self.fastest, "m/s"))
-
-    @property
-    def counted(self) -> dict[str, int]:
-        """What happened so far, see `StruckBody.counted`."""
-        return self._played.counted
-
-    @property
-    def trace(self) -> np.ndarray:
-        """Steps in contact so far, up to ``n_trace``, see `StruckBody.trace`."""
-        return self._played.trace

@@ -168,7 +168,7 @@ def _refuse_entities(path: Path) -> None:
 
 def _svg(path: Path, unit: str | None, notes: list[str]) -> Drawn:
     """Closed loops and named open paths [m] of all shapes in an SVG file, y upward."""
-    drawn = isolated.read(path, "SVG", "mesh.drawings:svg_arrays")
+    drawn = isolated.read_apart(path, "SVG", "mesh.drawings:svg_arrays")
     box, pixels, width = drawn["size"].tolist()
     scale = PIXEL
     if unit is not None:
@@ -214,7 +214,7 @@ def dxf_arrays(path: Path) -> dict[str, np.ndarray]:
 
 def _dxf(path: Path, unit: str | None, notes: list[str]) -> Drawn:
     """Closed loops, and open paths on named layers, of the lines, arcs and splines in a DXF file's model space [m]."""
-    drawn = isolated.read(path, "DXF", "mesh.drawings:dxf_arrays")
+    drawn = isolated.read_apart(path, "DXF", "mesh.drawings:dxf_arrays")
     if unit is not None:
         scale = UNITS[check.one_of("unit", unit, UNITS)]
     else:

@@ -27,7 +27,7 @@ class Raw:
 
 def read(path: Path) -> Raw:
     """Read a mesh file; ValueError names the file and the fault."""
-    arrays = isolated.read(path, "a mesh", "mesh.meshio_reader:arrays")
+    arrays = isolated.read_apart(path, "a mesh", "mesh.meshio_reader:arrays")
     index = json.loads(arrays["index"].tobytes())
     blocks = [(kind, arrays[f"cells{i}"], arrays.get(f"tags{i}")) for i, kind in enumerate(index["kinds"])]
     sets = {name: [arrays.get(f"set{s}_{i}") for i in range(len(blocks))] for s, name in enumerate(index["sets"])}

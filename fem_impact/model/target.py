@@ -253,7 +253,7 @@ class Target:
         if np.isclose(size, mesh.size, rtol=1e-9):
             return mesh
         with stages("mesh"), self.blame("mesh"):
-            return self._known.found(size, lambda: mesh.refined(mesh.size / size))
+            return self._known.recall(size, lambda: mesh.refined(mesh.size / size))
 
     def n_cells(self, size: float, stages: Stages) -> int:
         """Number of triangles of a size [m], before they shrink towards a blow."""
@@ -272,7 +272,7 @@ class Target:
                 each = coarseness, elements.layer
                 return unknowns_near(mesh, self.section, dict(self.supports), points, graded, *each)
 
-        return self._known.found(np.append(elements, at).tobytes(), count)
+        return self._known.recall(np.append(elements, at).tobytes(), count)
 
     def near(self, at: np.ndarray, elements: Elements, stages: Stages) -> System:
         """The body assembled with elements that shrink towards points (n_points, 2) [m]."""

@@ -357,7 +357,7 @@ class Modes(check.Brief):
             check.on_body(name, array, self.shapes.contains(array), self.shapes.grid()[0])
 
         if len(array) == 1:
-            self.known.found(("inside", array.tobytes()), inside)
+            self.known.recall(("inside", array.tobytes()), inside)
         else:
             inside()
         return array

@@ -306,7 +306,7 @@ class FieldShapes(ElementShapes, check.Locked):
     def at(self, points: np.ndarray) -> np.ndarray:
         if len(points) != 1:
             return self._shapes(points)
-        shapes = self._at.found(points.tobytes(), lambda: self._shapes(points))
+        shapes = self._at.recall(points.tobytes(), lambda: self._shapes(points))
         shapes.flags.writeable = False
         return shapes
 
@@ -314,7 +314,7 @@ class FieldShapes(ElementShapes, check.Locked):
         return self.system.interpolate(points) @ self.vectors * self.system.frame.mass**-0.5
 
     def _deflection(self, loads: np.ndarray) -> point_load.Deflection:
-        return self._under.found(loads.tobytes(), lambda: point_load.static_deflection(self.system, loads))
+        return self._under.recall(loads.tobytes(), lambda: point_load.static_deflection(self.system, loads))
 
     def compliance(self, points: np.ndarray) -> np.ndarray:
         return self._deflection(points).compliance

@@ -83,7 +83,7 @@ def read_modes(path: Any, direction: str) -> dict[str, np.ndarray]:
         are halved, and elements with nodes that were not measured are left out
     """
     path, direction = check.path("path", path), check.one_of("direction", direction, "xyz")
-    found = isolated.read(path, "a universal file", "modes.universal_files:arrays")
+    found = isolated.read_apart(path, "a universal file", "modes.universal_files:arrays")
     keep = cell_kinds.differing_axes(found["nodes"], direction)
     names = "frequencies", "damping_ratio"
     told = {"shapes": found["shapes"][:, "xyz".index(direction)], "points": found["nodes"][:, keep]}

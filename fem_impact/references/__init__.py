@@ -1,18 +1,16 @@
 """Reference cases: numbers known from elsewhere, what this program says of them, and whether its stated errors hold.
 
-Start with `verify`. `cases.toml` holds what each case is, its source and its numbers; `case` compares, and `plates`,
-`slender`, `shells`, `contacts` and `blows` compute.
+Start with `verify`. `cases.toml` holds what each case is, its source and its numbers; `case` compares, and
+`frequencies`, `contacts` and `blows` compute.
 """
 
 from collections.abc import Callable, Mapping, Sequence
 
 from .._base import check
-from . import blows, contacts, plates, shells, slender
+from . import blows, contacts, frequencies
 from .case import Reference, ReferenceLine, ReferenceVerdict
 
-CASES: Mapping[str, Reference] = {
-    each.name: each for room in (plates, slender, shells, contacts, blows) for each in room.CASES
-}
+CASES: Mapping[str, Reference] = {each.name: each for room in (frequencies, contacts, blows) for each in room.CASES}
 __all__ = ["CASES", "Reference", "ReferenceLine", "ReferenceVerdict", "select", "verify"]
 
 

@@ -17,9 +17,6 @@ from ..modes import analytic
 from ..modes.modal import Modes, find_modes
 from .case import TABLE, Reference, ReferenceLine, of_blow
 
-HAMMERS = (1e-3, 2e-3, 5e-3, 10e-3, 20e-3, 50e-3, 100e-3, 200e-3)  # [kg] those of the figures
-DIGITS = 1e-3  # [-] fact: of the thresholds, three or four digits are known
-
 
 def tip_displacement(n_modes: int = 40) -> np.ndarray:
     """Displacement of the tip of SDNL32 [mm] at 1 ... 12 ms, positive away from the stop, (12,)."""
@@ -113,9 +110,9 @@ def _thresholds(name: str) -> list[ReferenceLine]:
         modes = analytic.beam(1.0, ends=("free", "free"), mass=0.2, first_frequency=100.0, n_modes=1000)
         at = np.array([float(place)])
     lines = []
-    for mass, there in zip(HAMMERS, TABLE[name]["values"]):
-        ours = threshold.threshold_frequency(modes, at, mass) or 0.0
-        lines.append(ReferenceLine(f"{1e3 * mass:g} g hammer", "Hz", there, DIGITS * there, ours, 0.0))
+    for grams, there in zip((1, 2, 5, 10, 20, 50, 100, 200), TABLE[name]["values"]):  # the hammers of the figures
+        ours = threshold.threshold_frequency(modes, at, 1e-3 * grams) or 0.0
+        lines.append(ReferenceLine(f"{grams} g hammer", "Hz", there, 1e-3 * there, ours, 0.0))  # of 3 or 4 digits known
     return lines
 
 

@@ -27,7 +27,7 @@ FRAMES = 48  # [-] default length of an animation: four seconds
 def can_render() -> bool:
     """Whether pyvista can render here; tested once, in a process that may die from a signal, as `try` cannot catch."""
     try:
-        return child.run("show.canvas:probe", timeout=60.0, **canvas.WINDOW).returncode == 0
+        return child.run_function("show.canvas:probe", timeout=60.0, **canvas.WINDOW).returncode == 0
     except subprocess.TimeoutExpired:
         return False
 

@@ -287,7 +287,7 @@ def _key(target: Target, case: Case, axes: Axes, tolerance: float) -> str:
     assert isinstance(shapes, FieldShapes)
     system, frame, striker = shapes.system, shapes.system.frame, case.striker
     ratio = 0.0 if target.damping_ratio is None else target.damping_ratio
-    return identity.of([
+    return identity.identify([
         striker.modes.omega, striker.felt_mass, striker.shape, vars(case.contact), case.speed, tolerance, case.at,
         case.first, target.mass, dict(target.scale), target.size_stated,
         damping_ratios(ratio, np.geomspace(1.0, 1e7, 50)), dict(axes), identity.program(), system.K.data, system.M.data,

@@ -182,13 +182,13 @@ def fingerprint(grid: Any) -> Mark:
     functions = {}
     for name, function in grid.extra.items():
         try:
-            functions[name] = identity.of(function)
+            functions[name] = identity.identify(function)
         except ValueError as error:
             raise ValueError(
                 f"layers: {name!r} cannot be distinguished from other functions ({error}), so a store may mix "
                 "them up; leave out store, or pass a function that does not use it"
             ) from None
-    return {"map": identity.of(told), "functions": identity.of(functions), "program": identity.program()}
+    return {"map": identity.identify(told), "functions": identity.identify(functions), "program": identity.program()}
 
 
 def by_blocks(

@@ -60,7 +60,7 @@ def read(path: Any) -> Recording:
         If the file holds no channels, or channels that are uneven in time or not finite.
     """
     place = check.path("path", path)
-    found = isolated.read(place, "a measurement", "taps.readers:arrays")
+    found = isolated.read_apart(place, "a measurement", "taps.readers:arrays")
     count = sum(name.startswith("segment") for name in found)
     rate = float(found["rate"])
     return Recording(

@@ -338,7 +338,7 @@ def _function_sets(data: xr.Dataset) -> list[dict[str, Any]]:
 
 def read_frf(path: Any) -> xr.Dataset:
     """Read the frequency responses (data set 58, function type 4) of a universal file, as `frf` returns them."""
-    found = isolated.read(check.path("path", path), "frequency responses", "taps.transfer:arrays")
+    found = isolated.read_apart(check.path("path", path), "frequency responses", "taps.transfer:arrays")
     coords: dict[str, Any] = {"frequency": ("frequency", found["frequency"], {"units": "Hz"})}
     coords |= {name: ("channel", found[f"{name}s"].astype(str)) for name in ("channel", "unit")}
     coords["units"] = coords.pop("unit")

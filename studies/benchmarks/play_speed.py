@@ -53,7 +53,7 @@ def force_error() -> float:
         hit = fi.strike(
             game.modes, game.striker, game.contact, at=game.points[i], speed=float(speed), tolerance=1e-6, duration=0.02
         )
-        end, force = game.trace[:, 0], game.trace[:, 5]
+        end, force = game.struck.trace[:, 0], game.struck.trace[:, 5]
         worst = max(worst, float(np.abs(force - np.interp(end, hit.time, hit.force)).max() / hit.peak_force))
     return worst
 
@@ -101,13 +101,13 @@ def main(minutes: float) -> None:
         PlayedStroke(int(frame), int(point), float(speed))
         for frame, point, speed in zip(frames, rng.integers(0, 10, count), rng.uniform(0.05, FASTEST, count))
     ]
-    game.reset()
+    game.struck.reset()
     game.taken.clear()  # type: ignore[attr-defined]
     begin = time.perf_counter()
     played = perform(game, Score(strokes), 60.0 * minutes)
     took = time.perf_counter() - begin
     taken = np.array(game.taken)  # type: ignore[attr-defined]
-    happened = ", ".join(f"{count} {name}" for name, count in game.counted.items())
+    happened = ", ".join(f"{count} {name}" for name, count in game.struck.counted.items())
     print(f"{minutes:g} minutes, {happened}: {took:.1f} s, {100.0 * took / (60.0 * minutes):.1f} % of one core")
     print(f"{'[ms] per block':<22}" + "".join(f"{f'{part:g} %':>10}" for part in PARTS))
     row("CPU time", taken)

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 import fem_impact as fi
-from fem_impact import arguments, cli
+from fem_impact import answers, arguments, cli
 from fem_impact._base import child
 from fem_impact.pages import explore_worker
 from fem_impact.show import pictures
@@ -73,11 +73,11 @@ def run_again_compiled(monkeypatch):
     failing = arguments.COMMANDS["modes"]._replace(run=lambda _: (_ for _ in ()).throw(fi.SimulationError("none")))
     monkeypatch.setitem(arguments.COMMANDS, "modes", failing)
     monkeypatch.setattr(os, "execve", lambda *them: began.append(them))
-    assert cli.main(["modes", "none.toml"]) == cli.FAILED
+    assert cli.main(["modes", "none.toml"]) == answers.Status.FAILED
     ((program, words, environment),) = began
     assert program == words[0] == sys.executable
     done = subprocess.run(words, env=environment, capture_output=True, text=True)
-    assert done.returncode == cli.BAD_INPUT and "none.toml" in done.stderr
+    assert done.returncode == answers.Status.BAD_INPUT and "none.toml" in done.stderr
 
 
 def probe_for_rendering(monkeypatch):

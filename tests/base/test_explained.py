@@ -1,14 +1,13 @@
 """Messages name the headings that explain them: at their end, below a first line, and for programs as a list."""
 
-import json
+from pathlib import Path
 
 import pytest
 
 import fem_impact as fi
-from fem_impact import cli
 from fem_impact._base import explained
 
-FIRM = "studies/scenes/drumstick_firm.toml"
+FIRM = Path(__file__).parents[2] / "studies" / "scenes" / "drumstick_firm.toml"
 ONE = " (notes.md#not-resolvable)"
 
 
@@ -19,7 +18,7 @@ def test_a_message_ends_with_what_explains_it_once_however_it_is_passed_on():
     assert explained.pointed("nothing is wrong") == "nothing is wrong" and explained.below("nothing is wrong") == []
 
 
-def test_errors_and_warnings_of_python_and_the_prompt_name_their_headings(capsys, tmp_path):
+def test_errors_and_warnings_of_python_name_their_headings():
     modes = fi.analytic.rectangle(0.465, 0.3, mass=0.063, first_frequency=50.0, n_modes=4)
     blow = {"at": (0.14, 0.09), "speed": 1.0}
     with pytest.warns(fi.ToleranceWarning, match=r"MISSED.*\(notes\.md#tolerance-missed.*\)$"):
@@ -33,11 +32,9 @@ def test_errors_and_warnings_of_python_and_the_prompt_name_their_headings(capsys
         fi.strike(modes, fi.Striker.rigid(0.02), fi.Contact.linear(1e3), at=(9.0, 9.0), speed=1.0)
 
 
-def test_a_strike_names_what_explains_its_model_in_text_and_for_programs(capsys, tmp_path):
-    assert cli.main(["strike", FIRM, "--out", str(tmp_path / "out")]) == 0
-    first, *rest = capsys.readouterr().out.split("\n1 impact")
+def test_a_strike_names_what_explains_its_model_in_text_and_for_programs(prompt):
+    first, *rest = prompt("strike", FIRM).out.split("\n1 impact")
     assert "notes.md" not in first
     assert "(notes.md#still-air)" in " ".join("".join(rest).split())
-    assert cli.main(["strike", FIRM, "--json", "--out", str(tmp_path / "out")]) == 0
-    see = json.loads(capsys.readouterr().out)["see"]
+    see = prompt("strike --json", FIRM).json["see"]
     assert {"notes.md#small-deflections", "notes.md#beyond-this-estimate", "notes.md#still-air"} <= set(see)

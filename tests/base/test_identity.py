@@ -79,19 +79,19 @@ APART = {
 @pytest.mark.parametrize("name", SAME)
 def test_what_does_the_same_is_the_same(name):
     one, two = SAME[name]
-    assert identity.of(one()) == identity.of(two())
+    assert identity.identify(one()) == identity.identify(two())
 
 
 @pytest.mark.parametrize("name", APART)
 def test_what_does_something_else_is_told_apart(name):
     one, two = APART[name]
-    assert identity.of(one()) == identity.of(one()) != identity.of(two())
+    assert identity.identify(one()) == identity.identify(one()) != identity.identify(two())
 
 
 def test_globals_count_as_they_are_now(monkeypatch):
-    before = identity.of(scaled)
+    before = identity.identify(scaled)
     monkeypatch.setitem(globals(), "FACTOR", 3.0)
-    assert identity.of(scaled) != before
+    assert identity.identify(scaled) != before
 
 
 def test_a_module_of_ones_own_is_its_file_and_what_it_imports(tmp_path, monkeypatch):
@@ -103,7 +103,7 @@ def test_a_module_of_ones_own_is_its_file_and_what_it_imports(tmp_path, monkeypa
         for name in ("mine", "mine_too"):
             sys.modules.pop(name, None)
             (tmp_path / "__pycache__" / f"{name}.cpython-{sys.version_info[0]}{sys.version_info[1]}.pyc").unlink(True)
-        return identity.of(compiled("def f(h):\n import mine\n return mine.x"))
+        return identity.identify(compiled("def f(h):\n import mine\n return mine.x"))
 
     first = seen("x = 1.0")
     assert first != seen("x = 2.5") and first == seen("x = 1.0")
@@ -111,17 +111,17 @@ def test_a_module_of_ones_own_is_its_file_and_what_it_imports(tmp_path, monkeypa
 
 def test_what_cannot_be_told_apart_is_named():
     with pytest.raises(ValueError, match=r"^it uses an object of type _thread.lock$"):
-        identity.of(closed(threading.Lock()))
+        identity.identify(closed(threading.Lock()))
     deep = []
     for _ in range(sys.getrecursionlimit()):
         deep = [deep]
     with pytest.raises(ValueError, match="nested too deeply"):
-        identity.of(deep)
+        identity.identify(deep)
 
 
 def test_a_function_that_calls_itself_has_an_end():
     one, two = (compiled(f"def f(h):\n return f(h - {i}) if h > 0 else 0") for i in (1, 2))
-    assert identity.of(one) != identity.of(two)
+    assert identity.identify(one) != identity.identify(two)
 
 
 def test_the_program_is_the_same_in_every_call():

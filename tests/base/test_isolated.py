@@ -53,7 +53,7 @@ def test_reader_that_a_busy_machine_delays_ends(tmp_path, monkeypatch):
         out, said = process.communicate(timeout=timeout)
         return subprocess.CompletedProcess(command, process.returncode, out, said)
 
-    monkeypatch.setattr(child, "run", delayed)
+    monkeypatch.setattr(child, "run_function", delayed)
     monkeypatch.setattr(isolated, "PATIENCE", 4.0)
     assert len(mesh.load(written(tmp_path / "plate.vtu")).cells) == len(PLATE.cells)
 
@@ -71,7 +71,7 @@ def test_header_that_claims_more_than_the_memory_is_refused(tmp_path):
 
 @pytest.mark.parametrize("status", [2, -6, -11])
 def test_reader_that_dies_or_fills_the_memory_is_a_sentence(tmp_path, monkeypatch, status):
-    monkeypatch.setattr(isolated, "run", lambda path, reader, arguments, patience: (status, b"", b""))
+    monkeypatch.setattr(isolated, "run_reader", lambda path, reader, arguments, patience: (status, b"", b""))
     (tmp_path / "plate.msh").write_text("any")
     with pytest.raises(ValueError, match=r"plate\.msh cannot be read as a mesh \(.* crashed or exceeded 2 GB\)"):
         mesh.load(tmp_path / "plate.msh")
@@ -83,7 +83,7 @@ def test_holes_are_not_parsed(tmp_path, name, size):
     with (tmp_path / name).open("wb") as file:
         file.truncate(size)
     with pytest.raises(ValueError, match=rf"{name.replace('.', '[.]')} .*(begins with zeros only|empty)"):
-        isolated.read(tmp_path / name, "a mesh", "mesh.meshio_reader:read")
+        isolated.read_apart(tmp_path / name, "a mesh", "mesh.meshio_reader:read")
 
 
 @pytest.mark.parametrize("reader", ["mesh.meshio_reader:arrays", "mesh.drawings:svg_arrays"])
@@ -149,11 +149,18 @@ def test_every_format_that_hdf5_holds_is_read(tmp_path):
         assert mesh.load(written(tmp_path / name)).area == pytest.approx(1.0)
 
 
-def test_missing_hdf5_is_named(tmp_path, monkeypatch):
-    (tmp_path / "plate.med").write_bytes(b"\x89HDF\r\n\x1a\n")
-    monkeypatch.setitem(sys.modules, "h5py", None)
-    told = 1, b"this needs h5py: pip install 'fem-impact[hdf5]'"
-    assert isolated.main(tmp_path / "plate.med", "mesh.meshio_reader:arrays", []) == told
+@pytest.mark.parametrize(
+    ("name", "content", "reader", "library", "extra"),
+    [
+        ("plate.med", b"\x89HDF\r\n\x1a\n", "mesh.meshio_reader:arrays", "h5py", "hdf5"),
+        ("plate.svg", b"<svg/>", "mesh.drawings:svg_arrays", "svgelements", "cad"),
+    ],
+)
+def test_a_missing_library_is_named(tmp_path, monkeypatch, name, content, reader, library, extra):
+    (tmp_path / name).write_bytes(content)
+    monkeypatch.setitem(sys.modules, library, None)
+    told = f"this needs {library}: pip install 'fem-impact[{extra}]'"
+    assert isolated.main(tmp_path / name, reader, []) == (1, told.encode())
 
 
 def test_unknown_ending_is_told_with_those_that_are_known(tmp_path):

@@ -28,16 +28,16 @@ class Blow(NamedTuple):
 
 @pytest.fixture
 def path(tmp_path):
-    kept.write(tmp_path / "modes.npz", "key", ARRAYS)
+    kept.write_arrays(tmp_path / "modes.npz", "key", ARRAYS)
     return tmp_path / "modes.npz"
 
 
 def test_what_was_written_is_read(path):
-    found = kept.read(path, "key")
+    found = kept.read_arrays(path, "key")
     assert set(found) == set(ARRAYS)
     for name, array in ARRAYS.items():
         assert_array_equal(found[name], array)
-    assert kept.read(path, "other") is None and kept.read(path.with_name("none"), "key") is None
+    assert kept.read_arrays(path, "other") is None and kept.read_arrays(path.with_name("none"), "key") is None
 
 
 def test_no_file_with_a_flipped_bit_is_read(path):
@@ -46,16 +46,16 @@ def test_no_file_with_a_flipped_bit_is_read(path):
         damaged = bytearray(raw)
         damaged[place // 8] ^= 1 << place % 8
         path.write_bytes(damaged)
-        assert kept.read(path, "key") is None, place
+        assert kept.read_arrays(path, "key") is None, place
 
 
 @pytest.mark.parametrize("raw", [b"", b"PK", 40 * b"\0"])
 def test_no_other_file_is_read(path, raw):
     path.write_bytes(raw)
-    assert kept.read(path, "key") is None
+    assert kept.read_arrays(path, "key") is None
     path.unlink()
     path.mkdir()
-    assert kept.read(path, "key") is None
+    assert kept.read_arrays(path, "key") is None
 
 
 def test_objects_of_known_classes_come_back_with_what_is_kept_of_them(tmp_path):

@@ -14,13 +14,13 @@ def test_known_results_are_not_computed_again_and_the_oldest_are_dropped():
         return 2.0 * x
 
     for x in (1.0, 2.0, 1.0, 3.0, 2.0, 1.0):
-        assert store.found(x, partial(double, x)) == 2.0 * x
+        assert store.recall(x, partial(double, x)) == 2.0 * x
     assert asked == [1.0, 2.0, 3.0, 1.0]
     assert len(store.results) == 2
 
 
 def test_a_pickled_store_is_empty_and_as_large():
     store = Remembered(3)
-    store.found(b"", lambda: 0.0)
+    store.recall(b"", lambda: 0.0)
     copy = pickle.loads(pickle.dumps(store))
     assert (copy.most, copy.results) == (3, {})

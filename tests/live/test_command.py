@@ -10,47 +10,42 @@ from scenes import SMALL
 from scipy.io import wavfile
 from test_controllers import midi
 
-from fem_impact import cli
-
 pytestmark = pytest.mark.xdist_group("live")  # one worker compiles
 
 
 @pytest.fixture
 def scene(tmp_path):
     (tmp_path / "small.toml").write_text(SMALL)
-    return str(tmp_path / "small.toml")
 
 
 @pytest.mark.slow
-def test_a_midi_file_is_played_into_a_wav_twice_the_same(scene, tmp_path, capsys):
-    words = ["play", scene, "--midi", str(midi(tmp_path / "a.mid")), "--silent", "--modes", "40", "--out"]
-    assert cli.main([*words, str(tmp_path / "one.wav")]) == 0
-    said = capsys.readouterr()
+def test_a_midi_file_is_played_into_a_wav_twice_the_same(scene, tmp_path, prompt):
+    midi(tmp_path / "a.mid")
+    said = prompt("play small.toml --midi a.mid --silent --modes 40 --out one.wav")
+    assert said.status == 0
     out = " ".join(said.out.split())
     assert "3 notes of" in said.err and "3 strokes, 0 stolen, 3 contacts" in out
     found = re.search(r"Blocks: (\d+) of 1.33 ms; .* is [\d.]+ ms; \d+ missed their deadline", out)
-    assert cli.main([*words, str(tmp_path / "two.wav")]) == 0
+    assert prompt("play small.toml --midi a.mid --silent --modes 40 --out two.wav").status == 0
     assert (tmp_path / "one.wav").read_bytes() == (tmp_path / "two.wav").read_bytes()
     rate, samples = wavfile.read(tmp_path / "one.wav")
     assert rate == 48_000 and len(samples) == 64 * int(found[1]) and 0.1 < np.abs(samples).max() < 1.0
 
 
 @pytest.mark.slow
-def test_piped_keys_are_played_in_time_without_a_device(scene, tmp_path, monkeypatch, capsys):
+def test_piped_keys_are_played_in_time_without_a_device(scene, tmp_path, monkeypatch, prompt):
     there, here = os.pipe()
     os.write(here, b"1a")
     os.close(here)
     with os.fdopen(there) as reader:
         monkeypatch.setattr(sys, "stdin", reader)
-        monkeypatch.chdir(tmp_path)
-        assert cli.main(["play", scene, "--silent", "--modes", "20", "--at", "0.1", "0.1", "--fastest", "1"]) == 0
-    assert "2 strokes" in capsys.readouterr().out
+        said = prompt("play small.toml --silent --modes 20 --at 0.1 0.1 --fastest 1")
+    assert said.status == 0 and "2 strokes" in said.out
     assert (tmp_path / "out" / "small" / "play.wav").is_file()
 
 
 @pytest.mark.slow
-def test_a_midi_file_that_is_not_there_is_told_in_one_line(scene, tmp_path, capsys, monkeypatch):
+def test_a_midi_file_that_is_not_there_is_told_in_one_line(scene, tmp_path, prompt):
     pytest.importorskip("mido", reason="the extra play is missing")
-    words = ["play", scene, "--modes", "20", "--midi", str(tmp_path / "no.mid")]
-    assert cli.main([*words, "--out", str(tmp_path / "a" / "x.wav")]) == 2
-    assert capsys.readouterr().err.count("no.mid") == 1 and not (tmp_path / "a").exists()
+    said = prompt("play small.toml --modes 20 --midi no.mid --out a/x.wav")
+    assert said.status == 2 and said.err.count("no.mid") == 1 and not (tmp_path / "a").exists()

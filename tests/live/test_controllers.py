@@ -21,7 +21,7 @@ def test_points_are_spread_over_any_outline():
         ),
         n_modes=4,
     )  # fmt: skip
-    points = controllers.spread(modes, (0.1, 0.2), 8)
+    points = controllers.spread_points(modes, (0.1, 0.2), 8)
     assert modes.shapes.contains(points).all() and points[0] == pytest.approx((0.1, 0.2))
     apart = np.linalg.norm(points[:, None] - points, axis=2)[~np.eye(8, dtype=bool)]
     assert apart.min() > 0.15

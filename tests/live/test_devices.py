@@ -79,7 +79,7 @@ def test_a_speaker_gets_the_blocks_by_its_callback(monkeypatch):
                         time.sleep(1e-5)
 
             self.clock = Fast()
-            self.clock.start(Feed(1, 64), 48_000)
+            self.clock.play_feed(Feed(1, 64), 48_000)
 
         def stop(self):
             self.clock.stop()

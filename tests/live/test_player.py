@@ -57,12 +57,12 @@ def test_the_force_of_a_blow_is_that_of_strike(name, point, speed):
     game = player(striker, law, n_trace=20_000)
     sound = game.play([PlayedStroke(0, point, speed)], 0.05)
     hit = fi.strike(game.modes, striker, law, at=POINTS[point], speed=speed, tolerance=1e-6, duration=0.05)
-    end, length, struck, mean, _, force = game.trace.T
+    end, length, struck, mean, _, force = game.struck.trace.T
     assert (struck == point).all()
     expected = np.interp(end, hit.time, hit.force)
     assert np.abs(force - expected).max() < 1e-3 * hit.peak_force  # what is promised
     assert mean @ length == pytest.approx(hit.impulse, rel=1e-3)
-    assert game.counted["contacts"] == hit.n_impacts
+    assert game.struck.counted["contacts"] == hit.n_impacts
     heard = fi.sound.synthesise(hit, POINTS[0], duration=0.05)
     assert np.abs(sound.samples - heard.samples).max() < 1e-3 * np.abs(heard.samples).max()
 
@@ -76,7 +76,7 @@ def test_strokes_on_a_body_still_moving_are_those_of_strokes():
     strokes = [(w / 48e3, STICK, HERTZ, POINTS[i], v) for w, i, v in zip(when, at, speeds)]
     roll = fi.strokes(game.modes, strokes, tolerance=1e-4, duration=0.1)
     heard = fi.sound.synthesise(roll, POINTS[0], duration=0.1)
-    _, length, _, mean, _, _ = game.trace.T
+    _, length, _, mean, _, _ = game.struck.trace.T
     assert mean @ length == pytest.approx(roll.impulse, rel=1e-3)
     # the last two sticks do not feel how far the modes left out move under each other
     assert np.abs(sound.samples - heard.samples).max() < 2e-3 * np.abs(heard.samples).max()
@@ -88,7 +88,7 @@ def test_a_stick_held_by_a_hand_comes_back():
     game = player(held, n_modes=30, n_trace=20_000)
     game.play([PlayedStroke(0, 0, 1.0)], 0.1)
     hit = fi.strike(game.modes, held, HERTZ, at=POINTS[0], speed=1.0, tolerance=1e-4, duration=0.03)
-    end, length, _, mean, _, _ = game.trace.T
+    end, length, _, mean, _, _ = game.struck.trace.T
     assert hit.n_impacts >= 3
     early = end < 0.03
     assert mean[early] @ length[early] == pytest.approx(hit.impulse, rel=2e-3)  # the last contact may be cut off
@@ -105,7 +105,7 @@ def test_the_same_strokes_give_the_same_bits_in_blocks_of_any_length():
     assert first == player(n_modes=60, block=1000).play(strokes, 0.5).wav()
     game = player(n_modes=60)
     game.play(strokes, 0.3)
-    game.reset()
+    game.struck.reset()
     assert game.play(strokes, 0.5).wav() == first
 
 
@@ -113,9 +113,9 @@ def test_the_same_strokes_give_the_same_bits_in_blocks_of_any_length():
 def test_a_stick_too_many_takes_the_place_of_another_and_all_leave_at_last():
     game = player(n_modes=30, sticks=2)
     game.play([PlayedStroke(100 * i, i % 3, 0.5) for i in range(6)], 0.05)
-    assert game.counted["strokes"] == 6 and game.counted["stolen"] > 0
+    assert game.struck.counted["strokes"] == 6 and game.struck.counted["stolen"] > 0
     game.play([], 1.5)
-    state = game._played.state
+    state = game.struck.state
     assert state.place[0] == 0 and not state.q[: state.q.size - 30].any()
 
 
@@ -124,7 +124,7 @@ def test_a_free_body_does_not_fly_away():
     bar = fi.analytic.beam(0.4, ends=("free", "free"), mass=0.1, first_frequency=200.0, n_modes=20, damping_ratio=0.01)
     game = Player(bar, fi.Striker.rigid(0.02), fi.Contact.hertz(1e6), points=[[0.2]], fastest=1.0, n_trace=20_000)
     game.play([PlayedStroke(9600 * i, 0, 1.0) for i in range(10)], 2.0)
-    end, length, _, mean, _, _ = game.trace.T
+    end, length, _, mean, _, _ = game.struck.trace.T
     each = [(mean * length)[(end > 0.2 * i) & (end <= 0.2 * (i + 1))].sum() for i in range(10)]
     assert each == pytest.approx([each[0]] * 10, rel=0.2)  # what rings on changes it a little
 
@@ -143,7 +143,7 @@ for n in (64, 48_000):
     before = rtsys.get_allocation_stats().alloc
     game.fill([PlayedStroke(n // 70 * i, i % 3, 1.0) for i in range(60)], out)
     print(rtsys.get_allocation_stats().alloc - before)
-print(len(game._played.body) + len(game._played.pads) + len(game._played.state) + 4)
+print(len(game.struck.body) + len(game.struck.pads) + len(game.struck.state) + 4)
 """
     environment = {**os.environ, "NUMBA_NRT_STATS": "1"}
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, env=environment, check=True)

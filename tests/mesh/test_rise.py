@@ -46,7 +46,7 @@ def test_a_table_goes_through_its_points_and_on_straight_beyond_them():
 def test_a_table_is_told_by_its_numbers_whenever_it_was_made():
     one, same, other = (fi.rise.table(PLACES, PLACES[:, i]) for i in (0, 0, 1))
     one(PLACES)
-    assert identity.of(one) == identity.of(same) != identity.of(other)
+    assert identity.identify(one) == identity.identify(same) != identity.identify(other)
     assert_allclose(pickle.loads(pickle.dumps(one))(PLACES), PLACES[:, 0], atol=1e-15)
 
 

@@ -16,7 +16,7 @@ from fem_impact.fe.section import Beam, Material, Plate
 from fem_impact.modes import analytic
 from fem_impact.modes.modal import find_modes
 from fem_impact.references.case import TABLE
-from fem_impact.references.plates import hinged
+from fem_impact.references.frequencies import hinged
 
 STEEL = Material(E=210e9, nu=0.3, rho=7850.0)
 PLATE = Plate(STEEL, 2e-3)

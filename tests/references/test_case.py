@@ -1,7 +1,5 @@
 """The reference cases hold, tell what fails, and are what the command `verify` says."""
 
-import json
-
 import pytest
 
 import fem_impact as fi
@@ -33,29 +31,22 @@ def test_all_of_the_table_is_computed_and_says_where_it_is_from():
 
 
 @pytest.mark.parametrize("change", [1e-3, -1e-3])
-def test_a_wrong_number_is_told(change, monkeypatch, capsys):
-    from fem_impact.cli import main
-
+def test_a_wrong_number_is_told(change, monkeypatch, prompt):
     given = case.TABLE["timoshenko-ball"]
     wrong = {**given, "values": {**given["values"], "restitution": given["values"]["restitution"] * (1.0 + change)}}
     monkeypatch.setattr(blows, "TABLE", {**case.TABLE, "timoshenko-ball": wrong})
     [verdict] = fi.verify("timoshenko-ball")
     assert not verdict.holds and verdict.worst.quantity == "restitution"
-    assert main(["verify", "timoshenko", "--all"]) == 1
-    said = capsys.readouterr()
-    assert said.out.count("FAILS") == 1 and "timoshenko-ball: ours differs" in said.err
+    said = prompt("verify timoshenko --all")
+    assert said.status == 1 and said.out.count("FAILS") == 1 and "timoshenko-ball: ours differs" in said.err
 
 
-def test_a_few_by_their_beginnings_as_data_and_picture(tmp_path, capsys):
-    from fem_impact.cli import main
-
-    assert main(["verify", "beam-hinged-f", "two", "--json", "--out", str(tmp_path / "new")]) == 0
-    found = json.loads(capsys.readouterr().out)
+def test_a_few_by_their_beginnings_as_data_and_picture(tmp_path, prompt):
+    found = prompt("verify beam-hinged-f two --json --out new").json
     assert [each["name"] for each in found["cases"]] == ["beam-hinged-free", "two-masses"]
     assert found["n_failed"] == 0 and found["cases"][0]["lines"][0]["holds"]
     assert (tmp_path / "new" / "verify.png").stat().st_size > 1000
-    assert main(["verify", "--list"]) == 0
-    said = capsys.readouterr().out
+    said = prompt("verify --list").out
     assert all(name in said for name in references.CASES)
 
 

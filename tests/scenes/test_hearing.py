@@ -64,7 +64,7 @@ def test_in_free_air_a_listener_gets_both_bounds_and_never_one_number(tmp_path, 
         assert each["stated"] == f"bounded: between {levels} dB re 20 µPa" and each["listener"] == place
     assert [each.get("bound") for each in found] == [None, *["low", "high"] * 3]
     assert found[3]["full_scale"] == found[4]["full_scale"]
-    lines = commands.heard(found)
+    lines = commands.describe_sounds(found)
     assert (
         len(lines) == 4
         and f"Listener: {found[4]['stated']}; full scale of radiated_2_low.wav and radiated_2_high.wav" in lines[2]

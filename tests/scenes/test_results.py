@@ -165,14 +165,14 @@ class Bomb:
 def repacked(folder, **changes):
     """Response.npz with other arrays, and a digest that fits: by somebody who knows the format."""
     key = results._key(folder)
-    arrays = results.kept.read(folder / results.SAVED, key)
-    results.kept.write(folder / results.SAVED, key, {**arrays, **changes})
+    arrays = results.kept.read_arrays(folder / results.SAVED, key)
+    results.kept.write_arrays(folder / results.SAVED, key, {**arrays, **changes})
 
 
 def test_nothing_planted_runs_and_arrays_that_do_not_fit_are_refused(written, tmp_path):
     folder = written(SMALL)
     shutil.copytree(folder, tmp_path / "good")
-    told = json.loads(str(results.kept.read(folder / results.SAVED, results._key(folder))["told"]))
+    told = json.loads(str(results.kept.read_arrays(folder / results.SAVED, results._key(folder))["told"]))
     steps = told["response"]["fields"]["history"]["fields"]["steps"]["array"]
 
     def spoilt(change):
