@@ -43,12 +43,12 @@ def decays(exponent, out_decay):
 
 @njit
 def spring_at(d, spring):
-    return laws.at(d, spring)
+    return laws.point_at(d, spring)
 
 
 @njit
-def solve_constant(start, e, b, loss, spring):
-    return schemes.solve_constant(start, e, b, loss, spring)
+def solve_constant(start, e, b, h, spring):
+    return schemes.solve_constant(start, e, b, h, spring)
 
 
 def run(
@@ -368,8 +368,8 @@ def test_release_branch_meets_the_smooth_one():
     start = spring_at(1e-4, spring)
     b = 1e-9
     edge = b * start.energy / start.approach  # free end approach at which the step ends with the contact just open
-    below = solve_constant(start, edge * (1.0 - 1e-9), b, 0.0, spring)
-    above = solve_constant(start, edge * (1.0 + 1e-9), b, 0.0, spring)
+    below = solve_constant(start, edge * (1.0 - 1e-9), b, 1.0, spring)
+    above = solve_constant(start, edge * (1.0 + 1e-9), b, 1.0, spring)
     assert_allclose(below[1], above[1], rtol=1e-7)
     assert below[0].approach <= 0.0 <= above[0].approach
 
