@@ -75,7 +75,7 @@ class Family:
         """Kernels of both bodies at unit mass, (6, n_steps) each, and bounds of their motion in flight."""
         found = []
         for omega, zeta, squared in zip(self.omega, self.zeta, self.squared):
-            bounds = np.empty((convolution.SPLITS + convolution.LEVELS, 2, 2))
+            bounds = np.empty((convolution.SPLITS + convolution.N_SPANS, 2, 2))
             convolution.flight_bounds(omega, zeta, squared, h, bounds)
             found.append((kernel_rows(omega, zeta, squared, h, n_steps)[0], bounds))
         return found[0][0], found[1][0], found[0][1], found[1][1]

@@ -41,16 +41,6 @@ def decays(exponent, out_decay):
     propagation.decays(exponent, out_decay)
 
 
-@njit
-def spring_at(d, spring):
-    return laws.at(d, spring)
-
-
-@njit
-def solve_constant(start, e, b, loss, spring):
-    return schemes.solve_constant(start, e, b, loss, spring)
-
-
 def run(
     omega, shape, *, k=1e5, exponent=1.0, loss=0.0, compliance=0.0, zeta=None, offset=0.0, bias=None, q=None, p=None,
     speed=1.0, scheme="A4", h=1e-5, horizon=np.inf, n_max=0, max_steps=20000, noise=(0.0, 0.0),
@@ -365,11 +355,11 @@ def test_grazing_touch_is_continuous_and_keeps_energy(depth, scheme):
 
 def test_release_branch_meets_the_smooth_one():
     spring = Spring(1e5, 1.5, 0.0, 0.0, laws.POWER, np.inf, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0)
-    start = spring_at(1e-4, spring)
+    start, solve = build.plain(laws.point_at)(1e-4, spring), build.plain(schemes.solve_constant)
     b = 1e-9
     edge = b * start.energy / start.approach  # free end approach at which the step ends with the contact just open
-    below = solve_constant(start, edge * (1.0 - 1e-9), b, 0.0, spring)
-    above = solve_constant(start, edge * (1.0 + 1e-9), b, 0.0, spring)
+    below = solve(start, edge * (1.0 - 1e-9), b, 1.0, spring)
+    above = solve(start, edge * (1.0 + 1e-9), b, 1.0, spring)
     assert_allclose(below[1], above[1], rtol=1e-7)
     assert below[0].approach <= 0.0 <= above[0].approach
 

@@ -18,8 +18,10 @@ MADE = {  # one of each, its own course within the approaches below
 }
 TABLES: list[np.ndarray] = []  # kept while their springs are asked
 APPROACHES = np.array([3e-5, 1.3e-4, 2.7e-4, 6e-4])
-AT, SLOPES, SMOOTH = (build.plain(getattr(law, name)) for name in ("at", "slopes", "smooth_force"))
+AT, SLOPES, SMOOTH = (build.plain(getattr(law, name)) for name in ("point_at", "mean_slopes", "smooth_force"))
 each_law = pytest.mark.parametrize("contact", [MADE[each.name] for each in law.LAWS], ids=[e.name for e in law.LAWS])
+POWERS = [fi.Contact.power(k, a) for k, a in ((1e5, 1.0), (1e7, 1.5), (1e4, 0.7))]
+each_course = pytest.mark.parametrize("contact", [*MADE.values(), *POWERS], ids=[*MADE, "linear", "hertz", "soft"])
 
 
 def spring_of(contact, compliance=0.0):
@@ -34,7 +36,7 @@ def test_kernels_and_python_know_the_same_force(contact):
     assert_allclose(found, contact.force(APPROACHES), rtol=1e-13)
 
 
-@each_law
+@each_course
 @pytest.mark.parametrize("compliance", [0.0, 1e-7])
 def test_the_force_is_the_slope_of_the_energy(contact, compliance):
     spring = spring_of(contact, compliance)
@@ -43,11 +45,11 @@ def test_the_force_is_the_slope_of_the_energy(contact, compliance):
         assert_allclose((high - low) / (2e-4 * d), AT(d, spring).force, rtol=1e-7)  # of order 1e-4**2
 
 
-@each_law
+@each_course
 @pytest.mark.parametrize("compliance", [0.0, 1e-7])
 def test_average_slopes_are_those_of_the_ends(contact, compliance):
     spring = spring_of(contact, compliance)
-    points = [AT(d, spring) for d in APPROACHES]
+    points = [AT(d, spring) for d in (-1e-4, 1e-7, *APPROACHES)]
     for one in points:
         for two in points:
             if one is not two:

@@ -112,7 +112,7 @@ def test_approaches_are_found_from_force_and_energy(exponent):
     contact = fi.Contact.elastic_plastic(1e8, exponent, yield_approach=1.0)  # of 1 m, for an exponent of 100
     for x in (0.5, 1.01, 1.5, 30.0, 1e3 if exponent > 10.0 else 1e4):
         assert contact.law.approach(contact, float(contact.force(x))) == pytest.approx(x, rel=1e-12)
-        energy = build.plain(law.at)(x, build.plain(law.spring_of)(law.table([contact.numbers]), 0)).energy
+        energy = build.plain(law.point_at)(x, build.plain(law.spring_of)(law.table([contact.numbers]), 0)).energy
         stands = float(contact.law.acting(contact.numbers, 1.0, np.sqrt(2.0 * energy)))
         assert stands == pytest.approx((exponent + 1.0) * energy / x ** (exponent + 1.0), rel=1e-11 * exponent)
 
@@ -168,8 +168,8 @@ def test_slopes_keep_their_digits_for_any_two_approaches(exponent):
         for span in (1e-16, 1e-10, 1e-6, 1e-4):
             near, far = spring.corner + start, spring.corner + start + span
             x = near + 0.5 * (node + 1.0) * (far - near)
-            forces = [build.plain(law.at)(each, spring).force for each in x]
-            g, d = build.plain(plastic.slopes)(near, far, spring)
+            forces = [build.plain(law.point_at)(each, spring).force for each in x]
+            g, d = build.plain(plastic.slopes_beyond)(near, far, spring)
             assert_allclose(g, 0.5 * weight @ forces, rtol=1e-13)
             steep = [build.plain(plastic.steepness)(each, spring) for each in x]
             assert_allclose(d, 0.5 * weight @ steep, rtol=1e-13)
@@ -181,5 +181,5 @@ def test_pressed_again_it_goes_on_where_it_was():
     deep = 30.0 * FIRST
     build.plain(law.harden)(row, 0, 0.4 * deep)
     left = build.plain(law.dent)(row, 0, row["memory"][0])
-    force = build.plain(law.at)(deep - left, build.plain(law.spring_of)(row, 0)).force
+    force = build.plain(law.point_at)(deep - left, build.plain(law.spring_of)(row, 0)).force
     assert force == pytest.approx(float(ROUND.force(deep)), rel=1e-13)

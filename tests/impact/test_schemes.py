@@ -16,8 +16,8 @@ MASS = 0.01  # [kg]
 def constant(h, d0, v0, k, a, loss, c):
     """Scheme A: approach, rate and energies after a step of a mass pressed by its motion, and whether it settled."""
     spring = law.simple(k, a, loss, c)
-    start = law.at(d0, spring)
-    end, f = schemes.solve_constant(start, d0 + h * v0, 0.5 * h * h / MASS, loss / h, spring)
+    start = law.point_at(d0, spring)
+    end, f = schemes.solve_constant(start, d0 + h * v0, 0.5 * h * h / MASS, h, spring)
     return end.approach, v0 - h * f / MASS, start.energy, end.energy, True
 
 
@@ -25,7 +25,7 @@ def constant(h, d0, v0, k, a, loss, c):
 def ramp(h, d0, v0, k, a, loss, c):
     """The same by scheme A4: a rigid mass answers a unit of the force t/h - 1/2 with these six numbers."""
     spring = law.simple(k, a, loss, c)
-    start = law.at(d0, spring)
+    start = law.point_at(d0, spring)
     b = h * h / MASS
     free = schemes.Free(d0 + h * v0, d0 + 0.5 * h * v0, v0)
     own = schemes.Own(0.5 * b, -b / 12.0, b / 6.0, -b / 24.0, h / MASS, 0.0)

@@ -84,7 +84,7 @@ def test_hertz_as_a_law_of_ones_own_strikes_as_hertz(scheme):
 def test_average_slopes_are_those_of_the_energy_also_across_knots_and_at_both_ends():
     numbers = law.table([HERTZ.numbers])
     spring = build.plain(law.spring_of)(numbers, 0)
-    at, slopes = build.plain(law.at), build.plain(law.slopes)
+    at, slopes = build.plain(law.point_at), build.plain(law.mean_slopes)
     for one, two in [(1e-7, 1.5e-6), (1e-6, 3e-6), (4e-6, 1e-3), (1e-5, 1.0001e-5), (1e-3, 3e-3), (2.5e-3, 3e-3)]:
         start, end = at(one, spring), at(two, spring)
         g, d = slopes(start, end, spring)

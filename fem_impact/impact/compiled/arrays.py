@@ -14,7 +14,7 @@ from .one_mode import mode_matrix, mode_moments
 
 Array: TypeAlias = np.ndarray
 LIGHT = 0.9  # [-] damping ratio up to which a mode takes the fast lanes
-SERIES_END = 3.0  # [-] omega*h below which the fast lanes sum a power series: 13 terms leave 3e-17
+SERIES_END = 3.0  # [-] omega*h below which the moments' recursion runs downwards: from 30 on it leaves 1e-17
 ANGLE_LIMIT = 1e6  # [-] angle up to which the reduction in `waves` is exact
 
 
@@ -36,7 +36,11 @@ def lane_table(omega: Array, zeta: Array, h: float, whole: bool, out_lanes: Arra
         m1 = (1.0 - 2.0 * x * s - out_lanes[A22]) * inverse
         m2 = (1.0 - 2.0 * x * m1 - s) * inverse
         m3 = (0.5 - 2.0 * x * m2 - m1) * inverse
-        m2[near], m3[near] = _near_moments(2.0 * x[near], square[near])
+        second = third = np.ones_like(x)
+        for k in range(29, 2, -1):
+            first = 1.0 - square / ((k + 1) * (k + 2)) * third - 2.0 * x / (k + 1) * second
+            second, third = first, second
+        m2, m3 = np.where(near, second / 6.0, m2), np.where(near, third / 24.0, m3)
         m1 = np.where(near, 0.5 - 2.0 * x * m2 - square * m3, m1)
         out_lanes[M1], out_lanes[M2], out_lanes[M3] = h * m1, h * m2, h * (m3 - 0.5 * m2)
     work, m = np.empty((2, 3)), np.empty(4)
@@ -46,18 +50,6 @@ def lane_table(omega: Array, zeta: Array, h: float, whole: bool, out_lanes: Arra
             mode_moments(omega[n], zeta[n], h, m, work)
             out_lanes[4:, n] = h * m[1], h * m[2], h * (m[3] - 0.5 * m[2])
     out_lanes[A21] = -omega * omega * out_lanes[A12]
-
-
-def _near_moments(double: Array, square: Array) -> tuple[Array, Array]:
-    """Moments 2 and 3, (n_modes,) each, by power series; see `propagation.near_moments`."""
-    second, third = np.zeros_like(double), np.zeros_like(double)
-    last, now, factor = np.zeros_like(double), np.ones_like(double), 1.0 / 6.0
-    for j in range(1, 30):
-        second += now * factor
-        third += now * (factor / (j + 3.0))
-        last, now = now, -double * now - square * last
-        factor /= j + 3.0
-    return second, third
 
 
 def restore(q: Array, p: Array, out_q: Array, out_p: Array) -> None:
@@ -81,8 +73,8 @@ def commit(shape: Array, lanes: Array, h: float, force: Array, slope: Array, q: 
             p -= u * (f * lanes[A12] + s * lanes[M1])
 
 
-def approach(shape: Array, offset: Array, i: int, q: Array, p: Array) -> tuple[float, float]:
-    """`flight.approach`."""
+def approach_of(shape: Array, offset: Array, i: int, q: Array, p: Array) -> tuple[float, float]:
+    """`flight.approach_of`."""
     return offset[i] + shape[i] @ q, shape[i] @ p
 
 

@@ -4,14 +4,9 @@ import numpy as np
 
 from .build import LOOSE, inner
 from .cubics import cubic
-from .law import at
+from .law import point_at
 
-MOST_WAVES = 3e8  # [-] samples times frequencies of one centroid, to limit the work; longer ones take a transform
 LANES = 32  # [-] frequencies of a spectrum found together; does not change the result
-WAVES = 16.0  # [-] frequencies over the inverse of the time between first touch and last: errs by 1e-4; test_batches.py
-FEWEST_WAVES, MOST_POINTS = 64.0, 65536.0  # [-] frequencies of a spectrum
-SAMPLES = 12.0  # [-] of the force per period of a spectrum's highest frequency: the rule errs by (2 pi / 12)**4 / 720
-PARTS = 2.0  # [-] and per step, at least
 
 
 @inner(allocates=True, fastmath=LOOSE)
@@ -64,15 +59,17 @@ def centroid(contacts, n_contacts, n_steps, h, ends, rates, spring, limit):
     the sums would take long.
     """
     begun = contacts[0, 0]
-    wanted = min(max(WAVES * limit * (contacts[n_contacts - 1, 1] - begun), FEWEST_WAVES), MOST_POINTS)
+    # 16 frequencies over the inverse of the time between first touch and last: errs by 1e-4; test_batches.py
+    wanted = min(max(16.0 * limit * (contacts[n_contacts - 1, 1] - begun), 64.0), 65536.0)
     n = LANES * int(np.ceil(wanted / LANES))
     step = 2.0 * np.pi * limit / (n - 1)
     real = np.zeros(n)
     imag = np.zeros(n)
     for contact in range(n_contacts):
         start, end = contacts[contact, 0], contacts[contact, 1]
-        samples = max(16.0, PARTS * (end - start) / h, SAMPLES * limit * (end - start))
-        if n * samples > MOST_WAVES:
+        # two per step, and 12 per period of the highest frequency: the rule errs by (2 pi / 12)**4 / 720
+        samples = max(16.0, 2.0 * (end - start) / h, 12.0 * limit * (end - start))
+        if n * samples > 3e8:  # the work; a transform takes it
             return np.nan
         count = 2 * int(np.ceil(0.5 * samples))
         dt = (end - start) / count
@@ -81,7 +78,7 @@ def centroid(contacts, n_contacts, n_steps, h, ends, rates, spring, limit):
             t = (start + i * dt) / h
             j = min(int(t), n_steps - 1)
             d, rate = cubic(ends[j], h * rates[j], ends[j + 1], h * rates[j + 1], t - j)
-            force[i] = dt * max(0.0, at(d, spring).force * (1.0 + spring.loss * rate / h))
+            force[i] = dt * max(0.0, point_at(d, spring).force * (1.0 + spring.loss * rate / h))
         if spring.exponent == 1.0:
             force[0] = force[1] / 12.0
             force[count] = force[count - 1] / 12.0

@@ -13,11 +13,11 @@ from .build import FALSE, LOOSE, TRUE, inner, outer
 from .bundles import KernelSystem, Limits
 from .events import EVENT_LIMIT, dipped, strayed
 from .exact import freshen
-from .flight import NEVER, ONSET, SLOW, UNPROVED, made_flights
-from .law import at, corner_approach, near_side, power, relaxes, smooth_force, special_of, spring_of, yields
+from .flight import NEVER, ONSET, SLOW, UNPROVED, approach_of, made_flights
+from .law import corner_approach, point_at, power, relaxes, simple, smooth_force, special_of, spring_of, yields
 from .laws.felt import faded, lags
 from .one_mode import mode_moments
-from .propagation import any_of, restore
+from .propagation import any_of, glide, restore
 from .record import EXHAUSTED, FAILED, FINISHED, FULL, SETTLED
 from .rounding import NEAR, OVERFLOW, SOLVED, STALLED
 from .schemes import solve_linear
@@ -28,13 +28,12 @@ from .frame import (  # isort: skip
 )  # fmt: skip
 from .layout import (  # isort: skip
     A11, A12, A21, A22, APPROACH, BEGUN, CLOSED, CORNERED, EVENTS, FAILURES, FRESH, HEAD,
-    LENGTH, LEVEL, PUSH, RATE, SEEKS, START, STEPS, TARGET, TIME, TRIES,
+    LENGTH, LEVEL, M1, PUSH, RATE, SEEKS, START, STEPS, TARGET, TIME, TRIES,
 )  # fmt: skip
 
 MOBILITY, BEYOND = range(2)  # rows of `CollocationRoom.contacts`
-GUESS, FORCES, SQUEEZE = range(3)  # and of `CollocationRoom.nodes`
+FORCES, SQUEEZE = range(2)  # and of `CollocationRoom.nodes`
 BEGINS, ENDS, MOMENTS = range(3)  # and of `NodeGrid.work`
-PUSHED = 4  # row after those of free motion: displacement by a constant force
 MOVED, SPED = range(2)  # rows of what force polynomials do: to the approach and to its rate
 WELL, TURNED, LONG = range(3)  # how a step looks: take it so, take it again otherwise pressed, take a shorter one
 
@@ -44,7 +43,7 @@ class NodeGrid(NamedTuple):
 
     nodes: np.ndarray  # (s + 1,) fractions of the step, the last one 1
     powers: np.ndarray  # (s, s) Lagrange polynomials of the first s as powers
-    free: np.ndarray  # (n_levels, s + 1, 5, n_modes)
+    free: np.ndarray  # (n_levels, s + 1, M1 + 1, n_modes)
     last: np.ndarray  # (n_levels, 2 s, n_modes)
     inner: np.ndarray  # (n_levels, 2, s, s, n_contacts, n_contacts)
     known: np.ndarray  # (n_levels,) whether a level's are there
@@ -58,7 +57,7 @@ class CollocationRoom(NamedTuple):
     """Where a step is worked out."""
 
     contacts: np.ndarray  # (2, n_contacts) mobility [1/kg], and whether the step runs beyond the corner of the law
-    nodes: np.ndarray  # (3, s, n_contacts) first guess of the forces at the nodes [N], the forces, compressions [m]
+    nodes: np.ndarray  # (2, s, n_contacts) forces at the nodes [N], at first a guess, and compressions [m]
     lag: np.ndarray  # (n_contacts, s + 1, s + 1), see `lag_table`
     free: np.ndarray  # (2, s + 1, n_contacts) approach and rate if nothing pushed
     matrix: np.ndarray  # (s n_contacts + 1, s n_contacts), the last row for the other side
@@ -69,8 +68,8 @@ class CollocationRoom(NamedTuple):
 def tabulate(bodies, grid, slot, h):
     """Coefficients of one collocation step of length h.
 
-    ``free``: a11, a12, a21, a22 and constant force's displacement up to each node; ``last``: displacement, then
-    velocity at the end per unit force of each polynomial; ``inner``: approach and its rate at a node per force
+    ``free``: the rows A11 to M1 of `propagation.lane_table` up to each node; ``last``: displacement, then velocity at
+    the end per unit force of each polynomial; ``inner``: approach and its rate at a node per force
     polynomial, summed over the modes.
     """
     omega, shape, nodes, powers = bodies.omega, bodies.shape, grid.nodes, grid.powers
@@ -97,7 +96,7 @@ def tabulate(bodies, grid, slot, h):
             out_free[a, A12, n] = a12
             out_free[a, A21, n] = -omega[n] * omega[n] * a12
             out_free[a, A22, n] = a22
-            out_free[a, PUSHED, n] = t * t * moments[1]
+            out_free[a, M1, n] = t * moments[1]
             for b in range(s):
                 x = 0.0
                 v = 0.0
@@ -121,17 +120,18 @@ def tabulate(bodies, grid, slot, h):
 
 
 @inner(part=True, fastmath=LOOSE)
-def free_approach(bodies, offset, free, out):
+def free_approach(bodies, offset, grid, slot, h, out):
     """Approach and rate (2, s + 1, n_contacts) at a step's nodes if nothing pushed."""
-    shape, bias, q, p = bodies.shape, bodies.bias, bodies.q, bodies.p
+    shape, bias, q, p, free = bodies.shape, bodies.bias, bodies.q, bodies.p, grid.free[slot]
     m, n_modes = shape.shape
     for a in range(free.shape[0]):
+        t = grid.nodes[a] * h
         for i in range(m):
             d = 0.0
             v = 0.0
             for n in range(n_modes):
                 u = shape[i, n]
-                d += u * (free[a, A11, n] * q[n] + free[a, A12, n] * p[n] + free[a, PUSHED, n] * bias[n])
+                d += u * (free[a, A11, n] * q[n] + free[a, A12, n] * p[n] + t * free[a, M1, n] * bias[n])
                 v += u * (free[a, A21, n] * q[n] + free[a, A22, n] * p[n] + free[a, A12, n] * bias[n])
             out[MOVED, a, i] = offset[i] + d
             out[SPED, a, i] = v
@@ -141,7 +141,9 @@ def free_approach(bodies, offset, free, out):
 def side_of(law, i, beyond):
     """The spring of contact i on the side of its corner where the step runs."""
     spring = spring_of(law, i)
-    return spring if beyond[i] or spring.corner == np.inf else near_side(spring)
+    if beyond[i] or spring.corner == np.inf:
+        return spring
+    return simple(spring.stiffness, spring.exponent, spring.loss, spring.compliance)
 
 
 @inner()
@@ -155,13 +157,6 @@ def sides(law, now, out_beyond):
             out_beyond[i] = d >= (1.0 - NEAR) * bend and rate > 0.0
         else:
             out_beyond[i] = d > (1.0 + NEAR) * bend or (d >= (1.0 - NEAR) * bend and rate >= 0.0)
-
-
-@inner()
-def weight_of(inner, mobility, h, i):
-    """What turns a misfit of contact i's force at a step's end into a speed [s/kg]."""
-    s = inner.shape[1]
-    return min(mobility[i] * h, inner[SPED, s - 1, s - 1, i, i] * 4.0 + 1e-3 * mobility[i] * h)
 
 
 @inner()
@@ -271,14 +266,13 @@ def solve_collocation(contacts, room, inner):
 
 
 @inner(part=True, fastmath=LOOSE)
-def collocation_end(bodies, contacts, f, free, last):
+def collocation_end(bodies, contacts, f, free, last, h):
     """State at a collocation step's end, and approach and rate of each contact there."""
-    shape, bias, q, p, new_q, new_p = bodies.shape, bodies.bias, bodies.q, bodies.p, bodies.free_q, bodies.free_p
+    shape, new_q, new_p = bodies.shape, bodies.free_q, bodies.free_p
     m, n_modes = shape.shape
     s = f.shape[0]
-    for n in range(n_modes):
-        new_q[n] = free[s, A11, n] * q[n] + free[s, A12, n] * p[n] + free[s, PUSHED, n] * bias[n]
-        new_p[n] = free[s, A21, n] * q[n] + free[s, A22, n] * p[n] + free[s, A12, n] * bias[n]
+    restore(bodies.q, bodies.p, new_q, new_p)
+    glide(free[s], h, bodies.bias, new_q, new_p)
     for i in range(m):
         for b in range(s):
             force = f[b, i]
@@ -287,13 +281,7 @@ def collocation_end(bodies, contacts, f, free, last):
                     new_q[n] -= shape[i, n] * force * last[b, n]
                     new_p[n] -= shape[i, n] * force * last[s + b, n]
     for i in range(m):
-        d = 0.0
-        v = 0.0
-        for n in range(n_modes):
-            d += shape[i, n] * new_q[n]
-            v += shape[i, n] * new_p[n]
-        contacts.end[i] = contacts.offset[i] + d
-        contacts.rate[i] = v
+        contacts.end[i], contacts.rate[i] = approach_of(shape, contacts.offset, i, new_q, new_p)
 
 
 @inner(part=True)
@@ -305,10 +293,7 @@ def collocate(bodies, contacts, grid, room, slot, h):
     law, y, rate, after, now = contacts.law, contacts.end, contacts.rate, contacts.after, contacts.now
     f, lag, inner = room.nodes[FORCES], room.lag, grid.inner[slot]
     s, m = f.shape
-    free_approach(bodies, contacts.offset, grid.free[slot], room.free)
-    for a in range(s):
-        for i in range(m):
-            f[a, i] = room.nodes[GUESS, a, i]
+    free_approach(bodies, contacts.offset, grid, slot, h, room.free)
     for i in range(m):
         after[i] = law["memory"][i]
         if relaxes(law, i):
@@ -318,15 +303,15 @@ def collocate(bodies, contacts, grid, room, slot, h):
                 after[i] = faded(law, i, h)
     if not solve_collocation(contacts, room, inner):
         return np.inf
-    collocation_end(bodies, contacts, f, grid.free[slot], grid.last[slot])
+    collocation_end(bodies, contacts, f, grid.free[slot], grid.last[slot], h)
     worst = 0.0
     for i in range(m):
         if not abs(y[i]) < OVERFLOW:
             return np.inf
         if contacts.pressed[i]:
             spring = side_of(law, i, room.contacts[BEYOND])
-            f0, _, _ = smooth_force(max(0.0, at(now[APPROACH, i], spring).compression), now[RATE, i], spring)
-            f1, _, _ = smooth_force(max(0.0, at(y[i], spring).compression), rate[i], spring)
+            f0, _, _ = smooth_force(max(0.0, point_at(now[APPROACH, i], spring).compression), now[RATE, i], spring)
+            f1, _, _ = smooth_force(max(0.0, point_at(y[i], spring).compression), rate[i], spring)
             if spring.relaxation > 0.0:
                 after[i] = memory_at(lag[i], s, room.nodes[SQUEEZE], f, i, spring)
                 f0 -= spring.hard * spring.memory
@@ -334,7 +319,9 @@ def collocate(bodies, contacts, grid, room, slot, h):
             for b in range(s):
                 f0 -= grid.work[BEGINS, b] * f[b, i]
                 f1 -= grid.work[ENDS, b] * f[b, i]
-            worst = max(worst, max(abs(f0), abs(f1)) * weight_of(inner, room.contacts[MOBILITY], h, i))
+            quick = room.contacts[MOBILITY, i] * h  # [s/kg] if all modes answered at once
+            weight = min(quick, inner[SPED, s - 1, s - 1, i, i] * 4.0 + 1e-3 * quick)
+            worst = max(worst, max(abs(f0), abs(f1)) * weight)
     return worst
 
 
@@ -400,27 +387,14 @@ def look_ahead(contacts, grid, room, row, smooth):
     s, m = room.nodes[FORCES].shape
     for i in range(m):
         push = HEAD + (PUSH + s) * i + PUSH
+        last = room.nodes[FORCES, s - 1, i]
         for a in range(s):
             ahead = 0.0
             if smooth and contacts.pressed[i]:
                 position = 1.0 + grid.nodes[a]
                 for k in range(s - 1, -1, -1):
-                    ahead = ahead * position + row[push + k] if m == 1 else room.nodes[FORCES, s - 1, i]
-            room.nodes[GUESS, a, i] = max(0.0, ahead)
-
-
-@inner()
-def prepare(shape, grid, room):
-    """The polynomials at a step's start and end, and the mobilities."""
-    powers = grid.powers
-    for b in range(powers.shape[0]):
-        grid.work[BEGINS, b] = powers[b, 0]
-        grid.work[ENDS, b] = 0.0
-        for k in range(powers.shape[1]):
-            grid.work[ENDS, b] += powers[b, k]
-    for i in range(shape.shape[0]):
-        for n in range(shape.shape[1]):
-            room.contacts[MOBILITY, i] += shape[i, n] * shape[i, n]
+                    ahead = ahead * position + row[push + k] if m == 1 else last
+            room.nodes[FORCES, a, i] = max(0.0, ahead)
 
 
 @inner()
@@ -428,7 +402,7 @@ def guess_again(room):
     """Begin the next try from the forces of the last."""
     for a in range(room.nodes.shape[1]):
         for i in range(room.nodes.shape[2]):
-            room.nodes[GUESS, a, i] = max(0.0, room.nodes[FORCES, a, i])
+            room.nodes[FORCES, a, i] = max(0.0, room.nodes[FORCES, a, i])
 
 
 @inner(part=True)
@@ -439,12 +413,13 @@ def judged(contacts, course, grid, room, misfit, h, special, limits):
     if misfit == np.inf and count[SEEKS] != NOTHING:
         count[SEEKS] = NOTHING
         count[LEVEL] += 1
+        room.nodes[FORCES] = 0.0
         return False, 0.0
     if count[SEEKS] == NOTHING:
         look = LONG if misfit == np.inf else seen(contacts, room, special, count[LEVEL], h, limits)
         if look == LONG:
             count[LEVEL] += 1
-            room.nodes[GUESS] = 0.0
+            room.nodes[FORCES] = 0.0
         if look != WELL:
             return False, 0.0
     answer, guess = locate_event(contacts, course, limits, h, special, FALSE)
@@ -462,12 +437,11 @@ def judged(contacts, course, grid, room, misfit, h, special, limits):
 
 
 @outer(allocates=False, seconds=10.0)
-def follow(scene, grid, room, flights, limits, run, steps):
+def follow_nodes(scene, grid, room, flights, limits, run, steps):
     """Step by step until the run ends, or until its record is FULL."""
     bodies, contacts, course = moving(scene, run), touching(run), course_of(run)
     if course.counts[BEGUN] == 0:
         begin(scene, bodies, contacts, course, grid.base)
-        prepare(scene.shape, grid, room)
     count = course.counts
     special, _ = special_of(contacts.law)
     quiet = not any_of(bodies.bias)
@@ -488,7 +462,7 @@ def follow(scene, grid, room, flights, limits, run, steps):
                     break
                 if found == ONSET:
                     count[LEVEL] = min(LEVELS - 2, count[LEVEL] + 4)
-                    room.nodes[GUESS] = 0.0
+                    room.nodes[FORCES] = 0.0
                 continue
             if special and count[FRESH] == 1:
                 freshen(contacts, TRUE)
@@ -525,22 +499,6 @@ def follow(scene, grid, room, flights, limits, run, steps):
     return status
 
 
-def made_grid(nodes: np.ndarray, powers: np.ndarray, shape: np.ndarray, base: float, limit: float) -> NodeGrid:
-    """Room for the tables of steps, none known."""
-    (m, n_modes), s, n_levels = shape.shape, len(nodes) - 1, LEVELS + 1
-    free, last = np.empty((n_levels, s + 1, 5, n_modes)), np.empty((n_levels, 2 * s, n_modes))
-    tables = free, last, np.empty((n_levels, 2, s, s, m, m)), np.zeros(n_levels)
-    return NodeGrid(nodes, powers, *tables, np.empty((3, s + 1)), np.empty((2, s)), base, limit)
-
-
-def made_room(m: int, s: int) -> CollocationRoom:
-    """Arrays for the work of a step."""
-    return CollocationRoom(
-        np.zeros((2, m)), np.zeros((3, s, m)), np.zeros((m, s + 1, s + 1)), np.zeros((2, s + 1, m)),
-        np.zeros((s * m + 1, s * m)), np.zeros(m, np.int64),
-    )  # fmt: skip
-
-
 def run_collocation(
     scene: KernelSystem, nodes: np.ndarray, powers: np.ndarray, base: float, limit: float, limits: Limits
 ) -> tuple[Any, ...]:
@@ -551,7 +509,16 @@ def run_collocation(
     [m/s], and doubled where it does not. nodes, powers: see `NodeGrid`; the rest, and the results, as in
     `energy.run_energy`. The status is FAILED where the halvings are used up.
     """
-    m, n_modes = scene.shape.shape
-    grid, room = made_grid(nodes, powers, scene.shape, base, limit), made_room(m, len(nodes) - 1)
+    (m, n_modes), s, n_levels = scene.shape.shape, len(powers), LEVELS + 1
+    free, last = np.empty((n_levels, s + 1, M1 + 1, n_modes)), np.empty((n_levels, 2 * s, n_modes))
+    work = np.zeros((3, s + 1))
+    work[BEGINS, :s], work[ENDS, :s] = powers[:, 0], powers.sum(axis=1)
+    tables = free, last, np.empty((n_levels, 2, s, s, m, m)), np.zeros(n_levels), work, np.empty((2, s))
+    grid = NodeGrid(nodes, powers, *tables, base, limit)
+    room = CollocationRoom(
+        np.zeros((2, m)), np.zeros((2, s, m)), np.zeros((m, s + 1, s + 1)), np.zeros((2, s + 1, m)),
+        np.zeros((s * m + 1, s * m)), np.zeros(m, np.int64),
+    )  # fmt: skip
+    room.contacts[MOBILITY] = (scene.shape**2).sum(axis=1)
     flights = made_flights(n_modes, base, 1e-6 * base)
-    return followed(follow, (scene, grid, room, flights, limits), made_run(scene), HEAD + (PUSH + len(nodes)) * m)
+    return followed(follow_nodes, (scene, grid, room, flights, limits), made_run(scene), HEAD + (PUSH + len(nodes)) * m)

@@ -11,7 +11,7 @@ from .propagation import restore
 
 END, END_RAMP, RATE, RATE_RAMP, MEAN, MEAN_RAMP = (np.uintp(row) for row in range(6))  # rows of a kernel
 N_ROWS = 6
-LEVELS = 5  # [-] lengths of a look ahead in flight: 1, 2, 4, 8 and 16 steps
+N_SPANS = 5  # [-] lengths of a look ahead in flight: 1, 2, 4, 8 and 16 steps
 SPLITS = 2  # [-] halvings of a step in flight where the whole leaves a doubt
 
 
@@ -33,7 +33,7 @@ def orbit(table, q, p, out_states):
 def flight_bounds(omega, zeta, squared, h, out_bounds):
     """What cubics through both ends of a look ahead miss of a body's free motion, at unit mass.
 
-    Parameters: out_bounds (SPLITS + LEVELS, 2, 2), for looks of 1/4, 1/2, 1, 2, 4, ... steps: of the approach and of
+    Parameters: out_bounds (SPLITS + N_SPANS, 2, 2), for looks of 1/4, 1/2, 1, 2, 4, ... steps: of the approach and of
     its slope over the look H, after a force of unit jumps and one of unit bends (changes of its slope). A jump leaves
     a mode with the velocity u**2 / omega at most, a bend with u**2 / omega**2. The cubic misses H**4 / 384 and
     sqrt(3) / 216 H**4 times the fourth derivative, or no more than the motion itself.
@@ -44,7 +44,7 @@ def flight_bounds(omega, zeta, squared, h, out_bounds):
         if w == 0.0:
             continue
         size = squared[n] * np.sqrt(1.0 + 4.0 * z * z) / (w * w)
-        for level in range(SPLITS + LEVELS):
+        for level in range(SPLITS + N_SPANS):
             angle = w * h * 2.0 ** (level - SPLITS)
             steep = (angle * (1.0 + 2.0 * z)) ** 4
             missed = size * min(steep / 384.0, 2.0 + 0.25 * angle)
@@ -91,34 +91,16 @@ def convolve(rows, n, known, segments, n_segments, force, ramp):
 
 @inner(fastmath=LOOSE)
 def convolve_flight(rows, n, segments, n_segments, force, ramp):
-    """The same after all forces: approach and rate."""
+    """The same in flight, after all forces: approach and rate."""
     end = 0.0
     rate = 0.0
     shift = rows.shape[1] - 1 - n
     for i in range(n_segments):
-        low, high = segments[i, 0], min(segments[i, 1], n)
-        if low < high:
-            first, start = np.uintp(shift + low), np.uintp(low)
-            for j in range(np.uintp(high - low)):
-                f = force[start + j]
-                s = ramp[start + j]
-                end += rows[END, first + j] * f + rows[END_RAMP, first + j] * s
-                rate += rows[RATE, first + j] * f + rows[RATE_RAMP, first + j] * s
-    return end, rate
-
-
-@inner(fastmath=LOOSE)
-def within(kernel, n, segments, n_segments, force, ramp):
-    """Approach and rate within step n caused by all earlier forces, from a kernel later by a part of a step."""
-    end = 0.0
-    rate = 0.0
-    for i in range(n_segments):
-        low, high = segments[i, 0], min(segments[i, 1], n)
-        if low < high:
-            first, start = np.uintp(n - 1 - low), np.uintp(low)
-            for j in range(np.uintp(high - low)):
-                f = force[start + j]
-                s = ramp[start + j]
-                end += kernel[END, first - j] * f + kernel[END_RAMP, first - j] * s
-                rate += kernel[RATE, first - j] * f + kernel[RATE_RAMP, first - j] * s
+        low = segments[i, 0]
+        first, start = np.uintp(shift + low), np.uintp(low)
+        for j in range(np.uintp(segments[i, 1] - low)):
+            f = force[start + j]
+            s = ramp[start + j]
+            end += rows[END, first + j] * f + rows[END_RAMP, first + j] * s
+            rate += rows[RATE, first + j] * f + rows[RATE_RAMP, first + j] * s
     return end, rate

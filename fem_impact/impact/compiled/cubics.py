@@ -1,4 +1,7 @@
-"""Cubics through both ends of an interval with the slopes there: where they cross zero, turn, or surely do neither."""
+"""Cubics through both ends of an interval with the slopes there: where they cross zero, turn, or surely do neither.
+
+The interval is of unit length: of a step of length h the slopes are h times the rates at its ends.
+"""
 
 import numpy as np
 
@@ -21,7 +24,7 @@ def crossing(d0, v0, d1, v1):
     """Where that cubic passes zero, its ends differing in sign."""
     low = 0.0
     high = 1.0
-    t = d0 / (d0 - d1)
+    t = d0 / (d0 - d1) if d0 != 0.0 else 0.5  # it may begin at zero, and pass it later
     for _ in range(ITERATIONS):
         value, slope = cubic(d0, v0, d1, v1, t)
         if (value > 0.0) == (d1 > 0.0):
@@ -39,12 +42,13 @@ def crossing(d0, v0, d1, v1):
 
 @inner()
 def turning(d0, v0, d1, v1):
-    """Value where that cubic turns in between, its end slopes differing in sign."""
-    a = 3.0 * (2.0 * (d0 - d1) + v0 + v1)
+    """Where that cubic turns, its end slopes differing in sign, and its value there."""
+    a = 2.0 * (d0 - d1) + v0 + v1
     b = 3.0 * (d1 - d0) - 2.0 * v0 - v1
-    root = np.sqrt(max(0.0, b * b - a * v0))
-    t = -v0 / (b + root) if v0 < 0.0 else v0 / (root - b)
-    return cubic(d0, v0, d1, v1, t)[0]
+    side = 1.0 if v0 < 0.0 else -1.0
+    root = side * np.sqrt(max(0.0, b * b - 3.0 * a * v0))
+    t = -v0 / (b + root) if side * b >= 0.0 else (root - b) / (3.0 * a)
+    return t, cubic(d0, v0, d1, v1, t)[0]
 
 
 @inner()

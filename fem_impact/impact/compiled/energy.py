@@ -121,14 +121,6 @@ def shortened(bodies, contacts, course, room, special, h, still):
 
 
 @inner(part=True)
-def lengthen(count):
-    """Halve the next step less often after one that ended at no event."""
-    if count[TARGET] < 0 and count[CORNERED] < 0:
-        count[LEVEL] = max(0, count[LEVEL] - 1)
-        count[LEAST] = max(0, count[LEAST] - 1)
-
-
-@inner(part=True)
 def finite(contacts):
     """Whether a step ends with numbers."""
     total = 0.0
@@ -139,11 +131,14 @@ def finite(contacts):
 
 @inner(part=True, fastmath=False)
 def move_on(bodies, contacts, course, room, tables, slot, h, horizon):
-    """Move the modes to the end of a step, and predict the next one at once if it is alike."""
+    """Move the modes to the end of a step; how long the next one is, predicted at once if it is alike."""
+    count = course.counts
+    if count[TARGET] < 0 and count[CORNERED] < 0:  # halved less often after one that ended at no event
+        count[LEVEL] = max(0, count[LEVEL] - 1)
+        count[LEAST] = max(0, count[LEAST] - 1)
     if room is not None:
         finish(bodies, contacts, room, tables.lanes[slot], h)
         return
-    count = course.counts
     alike = slot == count[LEVEL] and course.clock[TIME] + h <= horizon
     if contacts.end.size == 1 and alike and contacts.pressed[0]:
         advance(bodies, contacts, tables, slot, h)
@@ -207,7 +202,6 @@ def follow(scene, tables, room, limits, run, steps):
         count[FALLBACKS] += tables.ramp and fine == 0 and any_of(contacts.force)
         count[BLINDS] += blind
         take_over(contacts, course, limits, h, tables.base, special)
-        lengthen(count)
         move_on(bodies, contacts, course, room, tables, slot, h, limits.horizon)
         if quiet and at_rest(bodies, contacts, course):
             status = SETTLED

@@ -12,6 +12,7 @@ ever before. These corners of the force are located by secants. Events that pile
 import numpy as np
 
 from .build import inner
+from .cubics import crossing, turning
 from .law import corner_approach, relaxes, spring_of, yields
 from .laws.felt import parting, parting_rate
 from .rounding import NEAR, REPEATED
@@ -22,41 +23,10 @@ from .layout import (  # isort: skip
 
 LOCATED = 1e-11  # [-] of the approach about an event: a stored energy of 1e-22 of the step's is left out there
 LET_GO = 1e-7  # [-] of the force's factor 1 + loss * rate: about zero up to this
-TURNED = 1e-8  # [-] of the rates about a turn: so far from zero, the approach there errs by the square of it
-DIPPED = 1e-6  # [-] of what makes it push: a body that leaves its felt by less within a step has not left it
-AT_ONCE = 1e-3  # [-] of a step: a body that parts from its felt and meets it again within that has not parted
-AGAIN = 4  # kind of corner: a body meets its felt again at once, and the step is to be taken pressed
+# kinds of corners: it lets go or pushes again by its rate, the bend, the turn, it parts from its felt or meets it, and
+# meets it again at once, so that the step is to be taken pressed
+LETS_GO, BENDS, TURNS, PARTS, AGAIN = range(5)
 EVENT_LIMIT = 64  # [-] events within one step's time: chatter, passed with unlocated steps, each time for twice as long
-
-
-@inner()
-def lowest(d0, v0, d1, v1, h):
-    """Smallest value of the cubic through both ends' positions and rates where it falls at first and rises at last."""
-    a = 2.0 * (d0 - d1) + h * (v0 + v1)
-    b = 3.0 * (d1 - d0) - h * (2.0 * v0 + v1)
-    c = h * v0
-    root = np.sqrt(max(0.0, b * b - 3.0 * a * c))
-    t = -c / (b + root) if b >= 0.0 else (root - b) / (3.0 * a)
-    return d0 + t * (c + t * (b + t * a))
-
-
-@inner()
-def hermite_root(d0, v0, d1, v1, h):
-    """First zero in (0, h] of the cubic through both ends, where d0 and d1 differ in sign; by bisection and secant."""
-    a = 2.0 * (d0 - d1) + h * (v0 + v1)
-    b = 3.0 * (d1 - d0) - h * (2.0 * v0 + v1)
-    c = h * v0
-    low = 0.0
-    high = 1.0
-    rising = d1 > d0
-    for _ in range(60):
-        t = 0.5 * (low + high)
-        value = d0 + t * (c + t * (b + t * a))
-        if (value > 0.0) == rising:
-            high = t
-        else:
-            low = t
-    return high * h
 
 
 @inner(part=True)
@@ -75,7 +45,7 @@ def first_crossing(contacts, h, limits):
     at = h
     for i in range(y.size):
         if crossed(contacts.pressed[i], now[APPROACH, i], now[RATE, i], y[i], limits.depth, limits.still):
-            root = hermite_root(now[APPROACH, i], now[RATE, i], y[i], rate[i], h)
+            root = h * crossing(now[APPROACH, i], h * now[RATE, i], y[i], h * rate[i])
             if root <= at:
                 at = root
                 target = i
@@ -89,8 +59,7 @@ def dipped(contacts, h, i):
     d1, v1, pressed = contacts.end[i], contacts.rate[i], contacts.pressed[i]
     side = 1.0 if pressed else -1.0
     if side * v0 < 0.0 < side * v1 and (d1 > 0.0 if pressed else d1 <= 0.0):
-        low = lowest(side * d0, side * v0, side * d1, side * v1, h)
-        return low < -NEAR * max(side * d0, side * d1)
+        return side * turning(d0, h * v0, d1, h * v1)[1] < -NEAR * max(side * d0, side * d1)
     return False
 
 
@@ -110,8 +79,8 @@ def narrow(contacts, h, limits, target, bracket):
         )  # or contacts that open together take turns for ever
         if i != target and crossed(pressed[i], now[APPROACH, i], now[RATE, i], y[i], slack, limits.still):
             enclose(contacts, h, i, bracket)
-            guess = hermite_root(now[APPROACH, i], now[RATE, i], y[i], rate[i], h)
-            return i, guess if guess < h else 0.5 * h
+            part = crossing(now[APPROACH, i], h * now[RATE, i], y[i], h * rate[i])
+            return i, part * h if part < 1.0 else 0.5 * h
     miss = y[target]
     good = max(limits.depth, LOCATED * bracket[SIZE])
     if abs(miss) <= good or bracket[HIGH] - bracket[LOW] <= REPEATED * bracket[HIGH]:
@@ -149,36 +118,19 @@ def enclose(contacts, h, target, bracket):
 @inner()
 def letting_go(loss, d0, v0, d1, v1, h):
     """Fraction of a step at which the factor 1 + loss * rate changes its sign, by the cubic through both ends."""
-    start = 1.0 + loss * v0
-    b = 2.0 * loss * (3.0 * (d1 - d0) / h - 2.0 * v0 - v1)
-    a = loss * (v1 - v0) - b
-    root = np.sqrt(max(0.0, b * b - 4.0 * a * start))
-    side = 1.0 if v1 > v0 else -1.0
-    return -2.0 * start / (b + side * root) if side * b >= 0.0 else 0.5 * (side * root - b) / a
-
-
-@inner()
-def turn_of(d0, v0, d1, v1, h):
-    """When the cubic through both ends, rising at first and falling later, turns back, and how high it is there."""
-    a = 2.0 * (d0 - d1) + h * (v0 + v1)
-    b = 3.0 * (d1 - d0) - h * (2.0 * v0 + v1)
-    c = h * v0
-    root = np.sqrt(max(0.0, b * b - 3.0 * a * c))
-    t = c / (root - b) if b <= 0.0 else -(b + root) / (3.0 * a)
-    return t * h, d0 + t * (c + t * (b + t * a))
+    slope, turn = 6.0 * (d1 - d0) / h, 2.0 * (v0 + v1)
+    start, end = loss * (slope - turn - 2.0 * v0), loss * (turn + 2.0 * v1 - slope)
+    return crossing(1.0 + loss * v0, start, 1.0 + loss * v1, end)
 
 
 @inner()
 def corner_value(law, i, which, d, v, memory):
-    """What changes its sign at a corner of contact i's force.
-
-    0 it lets go or pushes again by its rate, 1 the bend, 2 the turn, 3 it parts from its felt or meets it.
-    """
-    if which == 0:
+    """What changes its sign at a corner of contact i's force of this kind."""
+    if which == LETS_GO:
         return 1.0 + law["loss"][i] * v
-    if which == 3:
+    if which == PARTS:
         return parting(law, i, d, memory)
-    return -v if which == 2 else d - corner_approach(spring_of(law, i))
+    return -v if which == TURNS else d - corner_approach(spring_of(law, i))
 
 
 @inner()
@@ -192,14 +144,14 @@ def last_try(length, value, slope, out_bracket):
 
 @inner()
 def first_corner(contacts, h, lossy, out_bracket):
-    """The first corner within a step: contact, which (see `corner_value`), and when; -1, 0 and h where there is none.
+    """The first corner within a step: contact, its kind, and when; -1, LETS_GO and h where there is none.
 
     ``out_bracket`` receives two times with the corner in between and, for secants, a third time and the value there
     and at the start. ``after`` (n_contacts,) is what they remember at the end. Loss is left out unless ``lossy``.
     """
     law, now, y, rate, after = contacts.law, contacts.now, contacts.end, contacts.rate, contacts.after
     target = -1
-    kind = 0
+    kind = LETS_GO
     at = h
     for i in range(y.size):
         d0, v0, d1, v1 = now[APPROACH, i], now[RATE, i], y[i], rate[i]
@@ -210,7 +162,7 @@ def first_corner(contacts, h, lossy, out_bracket):
             if end < -LET_GO < LET_GO < start or start < -LET_GO < LET_GO < end:
                 root = h * letting_go(loss, d0, v0, d1, v1, h)
                 if 0.0 < root < at:
-                    at, target, kind = root, i, 0
+                    at, target, kind = root, i, LETS_GO
                     last_try(h, end, start, out_bracket)
         if relaxes(law, i):
             apart = law["memory"][i] < 0.0
@@ -222,12 +174,12 @@ def first_corner(contacts, h, lossy, out_bracket):
                 root = h * start / (start - end)
                 leaves = parting_rate(law, i, d0, v0, law["memory"][i]) if apart and d0 > 0.0 else 0.0
                 if leaves < 0.0:  # and comes back: no straight line
-                    root = hermite_root(start, leaves, end, parting_rate(law, i, d1, v1, after[i]), h)
-                if root < AT_ONCE * h:
+                    root = h * crossing(start, h * leaves, end, h * parting_rate(law, i, d1, v1, after[i]))
+                if root < 1e-3 * h:
                     if apart:
                         return i, AGAIN, h
                 elif root < at:
-                    at, target, kind = root, i, 3
+                    at, target, kind = root, i, PARTS
                     last_try(h, end, start, out_bracket)
             continue
         bend = corner_approach(spring_of(law, i))
@@ -236,22 +188,23 @@ def first_corner(contacts, h, lossy, out_bracket):
             continue
         late, high = h, d1
         if v1 < 0.0 < v0:
-            late, high = turn_of(d0, v0, d1, v1, h)
+            part, high = turning(d0, h * v0, d1, h * v1)
+            late = part * h
         if yields(law, i) and d0 >= bend - near:
             if v1 < 0.0 < v0 and high > bend + near and 0.0 < late < at:
-                at, target, kind = late, i, 2
+                at, target, kind = late, i, TURNS
                 last_try(h, -v1, -v0, out_bracket)
         elif d0 < bend - near and high > bend + near:
-            root = hermite_root(d0 - bend, v0, d1 - bend, v1, h) if d1 > bend else -1.0
+            root = h * crossing(d0 - bend, h * v0, d1 - bend, h * v1) if d1 > bend else -1.0
             if root <= 0.0 or root > late:
                 root = late * (bend - d0) / (high - d0)
             if root < at:
-                at, target, kind = root, i, 1
+                at, target, kind = root, i, BENDS
                 last_try(late, high - bend, d0 - bend, out_bracket)
         elif not yields(law, i) and d0 > bend + near and d1 < bend - near:
-            root = hermite_root(d0 - bend, v0, d1 - bend, v1, h)
+            root = h * crossing(d0 - bend, h * v0, d1 - bend, h * v1)
             if root < at:
-                at, target, kind = root, i, 1
+                at, target, kind = root, i, BENDS
                 last_try(h, d1 - bend, d0 - bend, out_bracket)
     out_bracket[LOW] = 0.0
     return target, kind, at
@@ -267,7 +220,9 @@ def dipped_felt(contacts, h, i):
     g0, g1 = parting(law, i, now[APPROACH, i], z0), parting(law, i, y[i], z1)
     r0 = parting_rate(law, i, now[APPROACH, i], now[RATE, i], z0)
     r1 = parting_rate(law, i, y[i], rate[i], z1)
-    return r0 < 0.0 < r1 and g0 > 0.0 and g1 > 0.0 and lowest(g0, r0, g1, r1, h) < -DIPPED * max(g0, g1)
+    if not (r0 < 0.0 < r1 and g0 > 0.0 and g1 > 0.0):
+        return False
+    return turning(g0, h * r0, g1, h * r1)[1] < -1e-6 * max(g0, g1)  # by less it has not left
 
 
 @inner()
@@ -287,7 +242,7 @@ def strayed(contacts, h, i, side):
         return 0
     high = 0.0
     if v0 > 0.0 and (v1 < 0.0 or d1 < d0):
-        _, high = turn_of(d0, v0, d1, v1, h)
+        high = turning(d0, h * v0, d1, h * v1)[1]
     if high <= near:
         return 1
     return 0 if deepens and v1 < 0.0 else 2
@@ -302,12 +257,12 @@ def nearer(contacts, i, which, h, bracket):
     law, memory = contacts.law, contacts.after[i]
     miss = corner_value(law, i, which, contacts.end[i], contacts.rate[i], memory)
     good = 0.1 * LET_GO
-    if which == 1:
+    if which == BENDS:
         good = 0.1 * NEAR * corner_approach(spring_of(law, i))
-    elif which == 3:
+    elif which == PARTS:
         good = 0.1 * NEAR * law["hysteresis"][i] * abs(memory)
-    elif which == 2:
-        good = TURNED * (abs(bracket[MISSED]) + abs(bracket[SLOPE]))
+    elif which == TURNS:
+        good = 1e-8 * (abs(bracket[MISSED]) + abs(bracket[SLOPE]))  # the approach errs by the square of it
     if abs(miss) <= good or bracket[HIGH] - bracket[LOW] <= NEAR * bracket[HIGH]:
         return 0.0
     bracket[LOW if miss * bracket[SLOPE] > 0.0 else HIGH] = h

@@ -11,7 +11,7 @@ from .build import LOOSE, TRUE, inner
 from .bundles import Tables
 from .flight import GLIDES
 from .frame import LEVELS, remember
-from .law import at, harden, relaxes, spring_of
+from .law import harden, point_at, relaxes, spring_of
 from .laws.felt import faded, meet
 from .propagation import any_of, lane_table
 from .schemes import Free, Own, linear_guess, point_of, remembers, solve_constants, solve_ramp, solve_ramps
@@ -134,7 +134,7 @@ def freshen(contacts, fresh):
             now[APPROACH, i] -= deeper
             contacts.free[FREE_END, i] -= deeper
             contacts.free[FREE_MEAN, i] -= deeper
-        point = at(now[APPROACH, i], spring_of(law, i))
+        point = point_at(now[APPROACH, i], spring_of(law, i))
         now[COMPRESSION, i] = point.compression
         now[FORCE, i] = point.force
         now[ENERGY, i] = point.energy
@@ -207,7 +207,7 @@ def keep_in_mind(contacts, h, ramped):
                 spring, start = spring_of(law, i), point_of(contacts.now, i)
                 smooth = ramped and (f[i] != 0.0 or s[i] != 0.0)
                 contacts.after[i] = remembers(
-                    h, start, at(contacts.end[i], spring), contacts.now[RATE, i], contacts.rate[i], smooth, spring
+                    h, start, point_at(contacts.end[i], spring), contacts.now[RATE, i], contacts.rate[i], smooth, spring
                 )
 
 

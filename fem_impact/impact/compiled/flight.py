@@ -12,24 +12,19 @@ import numpy as np
 from . import arrays
 from .build import LOOSE, inner
 from .bundles import Flights
-from .events import lowest
+from .cubics import turning
 from .layout import FASTEST, HARDEST, N_LANE, REACH, RIGID, RIGID_ACCELERATION, RIGID_RATE
 from .propagation import any_of, glide, lane_table, restore
 from .rounding import REPEATED
 
-PATIENT = 4  # [-] looks of a flight that make do with the table of a step up to four times shorter than allowed
 GLIDES = 40  # [-] step lengths of free flight kept, each twice the one before; does not change the result
-SLOW_LOOKS = 300  # [-] looks of a flight that lead hardly on before a stepping scheme takes over
 AWAY = 1e14  # [-] over rounding of the approach: bodies that come no nearer than so much of it, 2 %, touch by no error
 LASTING = 200  # [-] looks after which a proof that nothing touches again does without that
-# [rad] of the fastest swing per look of bodies that only nearly touch: cubics then miss a turn by 1e-5 of the swing
-TURNS = 0.25
 ONSET, NEVER, LATER, SLOW, UNPROVED = range(5)  # how a flight ends, see `find_onset`
-LOOK_LIMIT = 20_000_000  # [-] looks ahead times modes in one free flight: a time limit of some 0.1 s
 
 
-@inner(arrays=arrays.approach, fastmath=LOOSE)
-def approach(shape, offset, i, q, p):
+@inner(arrays=arrays.approach_of, fastmath=LOOSE)
+def approach_of(shape, offset, i, q, p):
     """Approach of contact i and its rate."""
     d = 0.0
     v = 0.0
@@ -98,9 +93,9 @@ def watched(bodies, offset, i, before, h, out_miss):
 
     ``out_miss`` (1,) is raised to where it turned back meanwhile, by the cubic through both ends.
     """
-    d, v = approach(bodies.shape, offset, i, bodies.q, bodies.p)
+    d, v = approach_of(bodies.shape, offset, i, bodies.q, bodies.p)
     if v < 0.0 < before[i, 1]:
-        out_miss[0] = max(out_miss[0], -lowest(-before[i, 0], -before[i, 1], -d, -v, h))
+        out_miss[0] = max(out_miss[0], turning(before[i, 0], h * before[i, 1], d, h * v)[1])
     before[i, 0] = d
     before[i, 1] = v
     return d, v
@@ -115,9 +110,14 @@ def safe_wait(bounds, i, d, v):
     wait = max(wait, quadratic_wait(d, max(0.0, rate + bounds[i, FASTEST]), pull))
     if bounds[i, RIGID_ACCELERATION] <= 0.0 and ahead + reach <= 0.0:
         wait = max(wait, quadratic_wait(ahead + reach, max(0.0, rate), 0.0))
-        if hardest > 0.0:  # it cannot touch, but turns back near enough to be told
-            wait = min(wait, TURNS * bounds[i, FASTEST] / hardest)
     return wait
+
+
+@inner()
+def carry_rigid(bounds, i, time):
+    """Rigid part of contact i's approach, and its rate, after a time."""
+    bounds[i, RIGID] += time * (bounds[i, RIGID_RATE] + 0.5 * bounds[i, RIGID_ACCELERATION] * time)
+    bounds[i, RIGID_RATE] += time * bounds[i, RIGID_ACCELERATION]
 
 
 @inner()
@@ -142,7 +142,7 @@ def kept_slot(flights, wait, look):
     slot = int(np.floor(np.log2(wait / flights.base))) + GLIDES // 2
     if not 2 <= slot < GLIDES:
         return GLIDES
-    if look < PATIENT and flights.known[slot] == 0.0:
+    if look < 4 and flights.known[slot] == 0.0:  # makes do with the table of a step up to four times shorter
         slot -= 1 if flights.known[slot - 1] != 0.0 else (2 if flights.known[slot - 2] != 0.0 else 0)
     return slot
 
@@ -155,8 +155,7 @@ def fly_on(bodies, flights, slot, wait, pushed, bounds):
         flights.known[slot] = 1.0
     glide(flights.lanes[slot], wait, bodies.bias, bodies.q, bodies.p)
     for i in range(bounds.shape[0]):
-        bounds[i, RIGID] += wait * (bounds[i, RIGID_RATE] + 0.5 * bounds[i, RIGID_ACCELERATION] * wait)
-        bounds[i, RIGID_RATE] += wait * bounds[i, RIGID_ACCELERATION]
+        carry_rigid(bounds, i, wait)
 
 
 @inner(allocates=True)
@@ -168,7 +167,7 @@ def find_onset(bodies, offset, flights, limits, limit, out_miss):
     left as it was. ``out_miss`` (1,) is raised to where an approach turns back.
 
     Returns (elapsed, contact, status): ONSET at `contact`; NEVER any contact again (proved); LATER than the limit;
-    SLOW, looks shorter than `shortest`: hand over to a stepping scheme; UNPROVED within LOOK_LIMIT.
+    SLOW, looks shorter than `shortest`: hand over to a stepping scheme; UNPROVED within some 0.1 s.
     """
     q, p, m = bodies.q, bodies.p, bodies.shape.shape[0]
     elapsed = wait = 0.0
@@ -178,7 +177,7 @@ def find_onset(bodies, offset, flights, limits, limit, out_miss):
     before = np.zeros((m, 2))
     old_q = q.copy()
     old_p = p.copy()
-    for look in range(LOOK_LIMIT // (q.size + 50)):
+    for look in range(20_000_000 // (q.size + 50)):  # some 0.1 s
         last = wait
         wait = np.inf
         first = -1
@@ -200,6 +199,10 @@ def find_onset(bodies, offset, flights, limits, limit, out_miss):
             if meets(bounds, offset, i, d, v, elapsed, limits.still):
                 return elapsed, i, ONSET
             bound = safe_wait(bounds, i, d, v)
+            apart = bounds[i, RIGID_ACCELERATION] <= 0.0 and bounds[i, RIGID] + bounds[i, REACH] <= 0.0
+            if apart and bounds[i, HARDEST] > 0.0:  # it cannot touch, but turns back near enough to be told
+                # a quarter of a radian of the fastest swing: cubics then miss a turn by 1e-5 of it
+                bound = min(bound, 0.25 * bounds[i, FASTEST] / bounds[i, HARDEST])
             if bound < wait:
                 wait = bound
                 first = i
@@ -217,7 +220,7 @@ def find_onset(bodies, offset, flights, limits, limit, out_miss):
                 return elapsed, first, ONSET if leading > 0.0 else SLOW
             if wait < flights.shortest:
                 slow += 1
-                if slow > SLOW_LOOKS:
+                if slow > 300:
                     return elapsed, first, SLOW
             if not close and bounds[first, HARDEST] != 0.0:
                 slot = kept_slot(flights, wait, look)

@@ -13,14 +13,14 @@ import numpy as np
 
 from .build import inner
 from .bundles import Bodies, Contacts, Course, KernelRun, KernelSystem
-from .flight import NEVER, ONSET, SLOW, approach, find_onset
+from .flight import NEVER, ONSET, SLOW, approach_of, find_onset
 from .law import dent, harden, relaxes
 from .laws.felt import rest_of
 from .record import EXHAUSTED, FULL, HORIZON, IMPACTS, total_energy
 from .rounding import ITERATIONS, NEAR
 
 from .events import (  # isort: skip
-    AGAIN, EVENT_LIMIT, LOCATED, enclose, first_corner, first_crossing, narrow, nearer,
+    AGAIN, EVENT_LIMIT, LOCATED, PARTS, enclose, first_corner, first_crossing, narrow, nearer,
 )  # fmt: skip
 from .layout import (  # isort: skip
     APPROACH, BEGUN, BLINDS, CLOCKS, CONTACT_ROWS, CORNERED, COUNTERS, EVENTS, FAINT, FALLBACKS, FLYING, FRESH, HEAD,
@@ -85,7 +85,7 @@ def begin(scene, bodies, contacts, course, base):
         bodies.twice[n] = 2.0 * scene.zeta[n] * scene.omega[n]
     for i in range(contacts.end.size):
         contacts.offset[i] = scene.offset[i]
-        now[APPROACH, i], now[RATE, i] = approach(bodies.shape, contacts.offset, i, bodies.q, bodies.p)
+        now[APPROACH, i], now[RATE, i] = approach_of(bodies.shape, contacts.offset, i, bodies.q, bodies.p)
         contacts.pressed[i] = now[APPROACH, i] > 0.0 or (now[APPROACH, i] == 0.0 and now[RATE, i] > 0.0)
     course.clock[RESPITE] = base
     course.clock[MISS] = -np.inf
@@ -150,7 +150,7 @@ def fly(bodies, contacts, course, flights, limits, row):
     row[LENGTH] = elapsed
     for i in range(contacts.end.size):
         remember(contacts, i, row)
-        now[APPROACH, i], now[RATE, i] = approach(bodies.shape, contacts.offset, i, bodies.q, bodies.p)
+        now[APPROACH, i], now[RATE, i] = approach_of(bodies.shape, contacts.offset, i, bodies.q, bodies.p)
         now[APPROACH, i] = min(0.0, now[APPROACH, i])
         slack = max(limits.depth, LOCATED * elapsed * abs(now[RATE, i]))
         if found == ONSET and now[APPROACH, i] >= -slack:  # contacts may close together
@@ -263,7 +263,7 @@ def take_over(contacts, course, limits, h, base, special):
             law["memory"][i] = contacts.after[i]
     clock[TIME] += h
     corner = count[CORNERED]
-    if corner >= 0 and count[WHICH] == 3 and law["memory"][corner] > 0.0:
+    if corner >= 0 and count[WHICH] == PARTS and law["memory"][corner] > 0.0:
         count[RELEASED] += 1
     count[RELEASED] += settle(contacts, count[TARGET], limits, base)
     if clock[TIME] - clock[RESET] > base:

@@ -6,7 +6,7 @@ A contact pushes with ``F = k x**a (1 + loss d')`` while its spring is compresse
 differ beyond a corner or remember (one number each, ``memory``); which kind of spring takes which course is said here.
 
 A law is added by a file in that folder, a line in `LAWS` and in `Numbers`, and, where its force has a course of its own
-beyond a corner, a branch in `spring_with`, `pushed`, `steepness`, `cornered_slopes` and `smooth_force`.
+beyond a corner, a branch in `spring_with`, `force_and_energy`, `steepness`, `mean_slopes` and `smooth_force`.
 """
 
 from collections import namedtuple
@@ -106,14 +106,14 @@ def spring_with(law, i, memory):
 
 
 @inner()
-def pushed(x, spring):
+def force_and_energy(x, spring):
     """Force and stored energy at a compression x > 0, without the compliance in series."""
     if x <= spring.corner:
         f = spring.stiffness * power(x, spring.exponent)
         return f, f * x / (spring.exponent + 1.0)
     if spring.kind == tabled.KIND:
-        return tabled.pushed(x, spring)
-    return plastic.pushed(x, spring) if spring.kind == plastic.KIND else layers.pushed(x, spring)
+        return tabled.pushed_beyond(x, spring)
+    return plastic.pushed_beyond(x, spring) if spring.kind == plastic.KIND else layers.pushed_beyond(x, spring)
 
 
 @inner()
@@ -138,7 +138,7 @@ def compression(d, spring):
     high = d
     x = min(d, (d / (k * c)) ** (1.0 / a))
     for _ in range(200):
-        f, _ = pushed(x, spring)
+        f, _ = force_and_energy(x, spring)
         r = x + c * f - d
         if r > 0.0:
             high = x
@@ -158,12 +158,12 @@ def compressed(x, spring):
     """The spring at a given compression."""
     if x <= 0.0:
         return Point(x, x, 0.0, 0.0)
-    f, energy = pushed(x, spring)
+    f, energy = force_and_energy(x, spring)
     return Point(x + spring.compliance * f, x, f, energy + 0.5 * spring.compliance * f * f)
 
 
 @inner()
-def at(d, spring):
+def point_at(d, spring):
     """The spring at a given approach."""
     if d <= 0.0:
         return Point(d, d, 0.0, 0.0)
@@ -172,17 +172,7 @@ def at(d, spring):
 
 
 @inner()
-def cornered_slopes(x0, x1, spring):
-    """Average slopes between two compressions > 0, of which at least one is beyond the corner."""
-    small = min(x0, x1)
-    large = max(x0, x1)
-    if spring.kind == tabled.KIND:
-        return tabled.slopes(small, large, spring)
-    return plastic.slopes(small, large, spring) if spring.kind == plastic.KIND else layers.slopes(small, large, spring)
-
-
-@inner()
-def slopes(one, two, spring):
+def mean_slopes(one, two, spring):
     """Average slopes between two points: energy over approach (G) and force over approach (D), without cancellation."""
     if one.approach <= 0.0 or two.approach <= 0.0:
         if one.approach <= 0.0 and two.approach <= 0.0:
@@ -190,11 +180,15 @@ def slopes(one, two, spring):
         span = two.approach - one.approach
         return (two.energy - one.energy) / span, (two.force - one.force) / span
     c = spring.compliance
-    x0, x1 = one.compression, two.compression
-    if max(x0, x1) <= spring.corner:
-        g, d = power_slopes(spring.stiffness, spring.exponent, x0, x1)
+    small, large = min(one.compression, two.compression), max(one.compression, two.compression)
+    if large <= spring.corner:
+        g, d = power_slopes(spring.stiffness, spring.exponent, small, large)
+    elif spring.kind == tabled.KIND:
+        g, d = tabled.slopes_beyond(small, large, spring)
+    elif spring.kind == plastic.KIND:
+        g, d = plastic.slopes_beyond(small, large, spring)
     else:
-        g, d = cornered_slopes(x0, x1, spring)
+        g, d = layers.slopes_beyond(small, large, spring)
     return (g + 0.5 * c * (one.force + two.force) * d) / (1.0 + c * d), d / (1.0 + c * d)
 
 
@@ -202,7 +196,7 @@ def slopes(one, two, spring):
 def smooth_force(x, v, spring):
     """Force of a pressed contact and its slopes in compression and rate, continued smoothly below zero compression.
 
-    A spring with a corner is taken on the far side of it, also continued; see `near_side`.
+    A spring with a corner is taken on the far side of it, also continued; see `collocation.side_of`.
     """
     if spring.kind == plastic.KIND:
         f, slope = plastic.far_side(x, spring)
@@ -216,12 +210,6 @@ def smooth_force(x, v, spring):
     if factor < 0.0:
         return 0.0, 0.0, 0.0
     return f * factor, slope * factor, f * spring.loss
-
-
-@inner()
-def near_side(spring):
-    """The spring as it is below its corner."""
-    return simple(spring.stiffness, spring.exponent, spring.loss, spring.compliance)
 
 
 @inner()
@@ -250,11 +238,11 @@ def harden(law, i, approach):
 def held(approach, law, i):
     """Energy that contact i stores at an approach from its dent [m]; felt never less than left to itself."""
     if not relaxes(law, i):
-        return at(approach, spring_of(law, i)).energy
+        return point_at(approach, spring_of(law, i)).energy
     z = abs(law["memory"][i])
     spring = spring_with(law, i, z)
     x = max(max(0.0, approach), felt.surface(law, i, z))
-    return at(x, spring).energy + memory_energy(x, z, spring)
+    return point_at(x, spring).energy + memory_energy(x, z, spring)
 
 
 @outer()
@@ -282,6 +270,6 @@ def yielded(law):
     for i in range(law.shape[0]):
         deepest = law["memory"][i]
         if yields(law, i) and deepest > law["yield_approach"][i]:
-            whole = pushed(deepest, spring_with(law, i, 0.0))[1]
-            total += whole - pushed(deepest - dent(law, i, deepest), spring_of(law, i))[1]
+            whole = force_and_energy(deepest, spring_with(law, i, 0.0))[1]
+            total += whole - force_and_energy(deepest - dent(law, i, deepest), spring_of(law, i))[1]
     return total

@@ -15,22 +15,19 @@ from .build import ONE, inner, outer
 from .bundles import Bodies, Contacts, Tables
 from .events import dipped
 from .exact import contact_sums, freshen, keep_in_mind, predict, solve_step
-from .flight import approach, motion_bounds, quadratic_wait
-from .law import at, special_of, spring_of
+from .flight import approach_of, carry_rigid, motion_bounds, safe_wait
+from .law import point_at, special_of, spring_of
 from .laws.felt import rest_of
 from .propagation import any_of, commit, glide, product, restore
 from .rounding import OVERFLOW
 
 from .layout import (  # isort: skip
-    APPROACH, FASTEST, FREE_END, FREE_RATE, HARDEST, RATE, REACH, RIGID, RIGID_ACCELERATION, RIGID_RATE,
+    APPROACH, FREE_END, FREE_RATE, RATE, REACH, RIGID, RIGID_ACCELERATION, RIGID_RATE,
 )  # fmt: skip
 
-FULL = 1 << 20  # [-] ticks of a frame: the shortest step is one, 2e-11 s at 48 kHz
-LEVELS = FULL.bit_length()  # lengths of steps, from a frame to a tick
+TICKS = 1 << 20  # [-] ticks of a frame: the shortest step is one, 2e-11 s at 48 kHz
+LEVELS = TICKS.bit_length()  # lengths of steps, from a frame to a tick
 N_ON, N_LOOKS, FRAME, FORCED = range(4)  # places of `PlayState.place`
-LOOKS = 64  # [-] looks of a flight after which its bounds are drawn anew, as they loosen
-FAINT = 1e-140  # [-] of sqrt(J): a mode with less is at rest, before its numbers get slow to calculate with
-SWEEP = 1024  # [-] frames after which modes are looked at for that, to limit the work
 STRUCK, STOLEN, TOUCHED, TRACED, STEPS, LOST, COUNTERS = range(7)  # what is counted; how many counters
 
 
@@ -180,7 +177,7 @@ def put_on(body, pads, limits, state, pad, speed):
     state.slot[m] = slot
     state.pad[m] = pad
     state.until[m] = state.place[FRAME] + limits.lasts
-    _, state.now[RATE, m] = approach(state.rows, state.offset, m, state.q, state.p)
+    _, state.now[RATE, m] = approach_of(state.rows, state.offset, m, state.q, state.p)
     state.now[APPROACH, m] = state.offset[m]
     state.pressed[m] = state.offset[m] >= 0.0 and state.now[RATE, m] > 0.0
     state.counted[STRUCK] += 1
@@ -211,7 +208,7 @@ def flight(body, pads, limits, state, level):
     """Level of a step, no longer than the given, in which surely nothing touches; -1 if a stick left for good."""
     m = state.place[N_ON]
     bodies = moving(body, state)
-    if state.place[FORCED] == 1 or state.place[N_LOOKS] >= LOOKS:
+    if state.place[FORCED] == 1 or state.place[N_LOOKS] >= 64:  # as they loosen
         state.place[N_LOOKS] = 0
         state.place[FORCED] = 0
         for i in range(m - 1, -1, -1):
@@ -224,18 +221,7 @@ def flight(body, pads, limits, state, level):
     state.place[N_LOOKS] += 1
     wait = np.inf
     for i in range(m):
-        d = min(state.now[APPROACH, i], 0.0)
-        r0, r1, r2, reach = (
-            state.bounds[i, RIGID],
-            state.bounds[i, RIGID_RATE],
-            state.bounds[i, RIGID_ACCELERATION],
-            state.bounds[i, REACH],
-        )
-        bound = quadratic_wait(d, state.now[RATE, i], state.bounds[i, HARDEST] + max(r2, 0.0))
-        bound = max(bound, quadratic_wait(d, max(0.0, r1 + state.bounds[i, FASTEST]), max(r2, 0.0)))
-        if r2 <= 0.0 and r0 + reach <= 0.0:
-            bound = max(bound, quadratic_wait(r0 + reach, max(0.0, r1), 0.0))
-        wait = min(wait, bound)
+        wait = min(wait, safe_wait(state.bounds, i, min(state.now[APPROACH, i], 0.0), state.now[RATE, i]))
     while level < limits.flight and limits.period * 0.5**level > wait:
         level += 1
     return level
@@ -248,8 +234,7 @@ def glided(state, h, end):
     for i in range(state.place[N_ON]):
         state.now[APPROACH, i] = end[FREE_END, i]
         state.now[RATE, i] = end[FREE_RATE, i]
-        state.bounds[i, RIGID] += h * (state.bounds[i, RIGID_RATE] + 0.5 * state.bounds[i, RIGID_ACCELERATION] * h)
-        state.bounds[i, RIGID_RATE] += h * state.bounds[i, RIGID_ACCELERATION]
+        carry_rigid(state.bounds, i, h)
         rest_of(state.law, i, h)
 
 
@@ -260,7 +245,7 @@ def noted(state, time, h, force):
         if force[i] > 0.0 and state.counted[TRACED] < state.trace.shape[0]:
             row = state.trace[state.counted[TRACED]]
             spring = spring_of(state.law, i)
-            pushes = at(state.now[APPROACH, i], spring).force * (1.0 + spring.loss * state.now[RATE, i])
+            pushes = point_at(state.now[APPROACH, i], spring).force * (1.0 + spring.loss * state.now[RATE, i])
             row[0] = time
             row[1] = h
             row[2] = state.pad[i]
@@ -332,7 +317,7 @@ def tidied(body, pads, state):
     for n in range(state.q.size):
         size = abs(state.p[n]) + body.omega[n] * abs(state.q[n])
         lost = lost or not size < OVERFLOW
-        if size < FAINT and body.omega[n] > 0.0:
+        if size < 1e-140 and body.omega[n] > 0.0:  # [J**0.5] before its numbers get slow to calculate with
             state.q[n] = 0.0
             state.p[n] = 0.0
     if lost:
@@ -357,20 +342,20 @@ def play_block(body, pads, limits, state, strokes, gain, out):
             if state.place[FRAME] >= state.until[i] and not state.pressed[i]:
                 take_off(pads, state, i)
         tick = 0
-        while tick < FULL:
+        while tick < TICKS:
             level = 0
-            while FULL >> level > FULL - tick:
+            while TICKS >> level > TICKS - tick:
                 level += 1
             if state.place[N_ON] == 0:
                 glide(body.tables[level], limits.period * 0.5**level, state.bias, state.q, state.p)
-                tick += FULL >> level
+                tick += TICKS >> level
                 continue
             touching = False
             for i in range(state.place[N_ON]):
                 touching = touching or state.pressed[i]
             level = max(level, limits.contact) if touching else flight(body, pads, limits, state, level)
             if level >= 0:
-                tick += FULL >> step(body, limits, state, level, (state.place[FRAME] + tick / FULL) * limits.period)
+                tick += TICKS >> step(body, limits, state, level, (state.place[FRAME] + tick / TICKS) * limits.period)
         state.place[FRAME] += 1
-        if state.place[FRAME] % SWEEP == 0:
+        if state.place[FRAME] % 1024 == 0:
             tidied(body, pads, state)

@@ -15,13 +15,13 @@ from .build import ZERO, inner, outer
 from .bundles import Track
 from .centroids import centroid
 from .cubics import LOOKS, crossing, cubic, parted, turning
-from .law import Point, at, simple, spring_of
+from .law import Point, point_at, simple, spring_of
 from .laws.base import Spring
 from .misfit import misfit
 from .schemes import Free, Own, solve_constant, solve_ramp
 
 from .convolution import (  # isort: skip
-    END, END_RAMP, LEVELS, MEAN, MEAN_RAMP, N_ROWS, RATE_RAMP, SPLITS, combine, convolve, convolve_flight, within,
+    END, END_RAMP, N_SPANS, MEAN, MEAN_RAMP, N_ROWS, RATE_RAMP, SPLITS, combine, convolve, convolve_flight,
 )  # fmt: skip
 from .convolution import RATE as RATE_ROW  # isort: skip
 from .layout import (  # isort: skip
@@ -35,12 +35,7 @@ DONE, DOUBTFUL, AWKWARD, LONG = range(4)  # how a blow ended: proved apart; with
 # missed; in a way not followed here; longer than the kernel
 NEARER, UNPROVED, APART, TOUCH = range(4)  # what a look ahead in flight found: a shorter one is needed, or kernels of
 # parts of a step; no touch; a touch
-FIRST = 32  # [-] steps of a kernel combined at first
 PIECES = 3  # [-] of the step in which a contact opens, integrated by themselves: order 4
-FEWEST = 1.0  # [-] steps of a contact at least; briefer ones are looked at closer
-LETTING_GO = 0.9  # [-] loss times rate of parting from which a blow is left to the modal engine: at 1 it stops pushing
-TINY = 1e-15  # [-] curvature of a straight line
-DIP = 0.2  # [-] of the lesser approach at a step's ends: one that dips lower in between is looked at closer
 
 
 class Straight(NamedTuple):
@@ -91,7 +86,7 @@ def extend(kernels, shares, track, wanted):
     first, second = kernels.rows
     known, n_steps = track.counts[KNOWN], track.force.size
     while known < min(wanted, n_steps):
-        more = min(max(FIRST, 2 * known), n_steps)
+        more = min(max(32, 2 * known), n_steps)
         combine(first[:, :more], second[:, :more], shares[0], shares[1], known, track.rows[:, n_steps - more :])
         known = more
     track.counts[KNOWN] = known
@@ -142,7 +137,7 @@ def doubt(level, state, shares, bounds):
 def longest_look(kernels, blow, track, n):
     """Level of the longest look ahead from step n that might leave no doubt."""
     state = track.state
-    for level in range(LEVELS - 1, 0, -1):
+    for level in range(N_SPANS - 1, 0, -1):
         rise = state[RATE] * 2.0**level * blow.h
         error, rate_error = doubt(SPLITS + level, state, blow.shares, kernels.bounds)
         if n + 2**level <= track.force.size and (
@@ -167,8 +162,10 @@ def cleared(kernels, blow, track, n, end, end_rate):
             if i < parts:
                 right, steep = (n + i / parts) * h, 1.0
                 for kernel, share in zip(kernels.later, blow.shares):
-                    late = kernel[i * 2 ** (SPLITS - split) - 1]
-                    y, rate = within(late, n, track.segments, track.counts[N_SEGMENTS], track.force, track.ramp)
+                    late = kernel[i * 2 ** (SPLITS - split) - 1][:, ::-1]
+                    y, rate = convolve_flight(
+                        late, n - 1, track.segments, track.counts[N_SEGMENTS], track.force, track.ramp
+                    )
                     right -= share * y
                     steep -= share * rate
             sure = sure and parted(left, slope * dt, right, steep * dt, error + state[MARGIN], rate_error)
@@ -256,16 +253,6 @@ def expected(blow, track, n):
 
 
 @inner(part=True)
-def sum_ahead(track, n):
-    """What the forces before step n do to the next one, found while the force of step n is."""
-    if n + 1 < track.force.size:
-        end, mean, rate = convolve(
-            track.rows, n + 1, n, track.segments, track.counts[N_SEGMENTS], track.force, track.ramp
-        )
-        track.state[END_AHEAD], track.state[MEAN_AHEAD], track.state[RATE_AHEAD] = end, mean, rate
-
-
-@inner(part=True)
 def solve(blow, start, rate, free):
     """Scheme A4 for one step, or A where that fails: point at the end, mean force and what the force gains."""
     own, spring, line = blow.own, blow.spring, blow.straight
@@ -280,7 +267,7 @@ def solve(blow, start, rate, free):
     guess = start.compression + rate * blow.h if d0 > 0.0 else 0.5 * free.end
     settled, point, f, s = solve_ramp(guess, blow.h, start, rate, free, own, spring)
     if not settled:
-        point, f = solve_constant(start, free.end, own.end, spring.loss / blow.h, spring)
+        point, f = solve_constant(start, free.end, own.end, blow.h, spring)
         s = 0.0
     return point, f, s
 
@@ -322,7 +309,7 @@ def lossy_peak(d0, v0, d1, v1, spring, loss):
     top = left = right = before = 0.0
     for part in range(LOOKS + 1):
         d, rate = cubic(d0, v0, d1, v1, part / LOOKS)
-        value = at(d, spring).force * (1.0 + loss * rate)
+        value = point_at(d, spring).force * (1.0 + loss * rate)
         if part == 0 or value > top:
             best, top, left = part, value, before
         elif part == best + 1:
@@ -330,7 +317,7 @@ def lossy_peak(d0, v0, d1, v1, spring, loss):
         before = value
     if best in (0, LOOKS):
         return top
-    return top - 0.125 * (left - right) ** 2 / min(left - 2.0 * top + right, -TINY * top)
+    return top - 0.125 * (left - right) ** 2 / min(left - 2.0 * top + right, -1e-15 * top)
 
 
 @inner(part=True)
@@ -340,7 +327,7 @@ def mark_peak(blow, track, n):
     d0, v0, d1, v1 = track.ends[n], track.rates[n] * h, track.ends[n + 1], track.rates[n + 1] * h
     state[HIGHEST] = max(state[HIGHEST], d1)
     if v0 > 0.0 and v1 < 0.0:
-        state[HIGHEST] = max(state[HIGHEST], turning(d0, v0, d1, v1))
+        state[HIGHEST] = max(state[HIGHEST], turning(d0, v0, d1, v1)[1])
     state[DEEPEST] = max(state[DEEPEST], state[HIGHEST])
     if spring.loss > 0.0:
         state[PEAK] = max(state[PEAK], lossy_peak(d0, v0, d1, v1, spring, spring.loss / h))
@@ -357,7 +344,7 @@ def opening(d0, free, own, spring, loss):
     zero, and is none then. ``loss`` is over the step [1/m].
     """
     swift = own.end + 12.0 * own.mean_ramp
-    start = d0 + swift * at(d0, spring).force
+    start = d0 + swift * point_at(d0, spring).force
     first = -4.0 * start - 2.0 * free.end + 6.0 * free.mean
     second = 3.0 * (start + free.end) - 6.0 * free.mean
     k, c = spring.stiffness, spring.compliance + swift
@@ -378,7 +365,7 @@ def opening(d0, free, own, spring, loss):
         for stage in range(4):
             part = 0.0 if stage == 0 else dt if stage == 3 else 0.5 * dt
             pushed = impulse + part * f
-            elastic = at(d + part * rate, soft).force
+            elastic = point_at(d + part * rate, soft).force
             free = first + 2.0 * second * (piece * dt + part) - 2.0 * slow * pushed
             f = elastic * (1.0 + loss * free) / (1.0 + fast * elastic * loss)
             rate = free - fast * f
@@ -403,10 +390,10 @@ def let_go(blow, track, n, free, y, rate):
     d0, v0 = state[APPROACH], state[RATE]
     part, speed = opening(track.ends[n], free, blow.own, blow.spring, blow.spring.loss / h)
     now = (n + part) * h
-    if now - state[BEGAN] < FEWEST * h or state[HIGHEST] < state[MARGIN]:
+    if now - state[BEGAN] < h or state[HIGHEST] < state[MARGIN]:
         counts[ENDING] = DOUBTFUL
     state[NEEDED] = n + 2.0
-    state[LOWEST] = turning(d0, v0 * h, y, rate * h) if v0 < 0.0 < rate else y
+    state[LOWEST] = turning(d0, v0 * h, y, rate * h)[1] if v0 < 0.0 < rate else y
     state[SWING] += h / abs(speed)
     state[TOUCHED] += now - state[BEGAN]
     track.contacts[counts[N_CONTACTS], 0] = state[BEGAN]
@@ -424,7 +411,12 @@ def let_go(blow, track, n, free, y, rate):
 def press(blow, track, n, free):
     """Solve step n, in contact, and take it over; whether the blow can be followed further."""
     state, own, h = track.state, blow.own, blow.h
-    sum_ahead(track, n)
+    if (
+        n + 1 < track.force.size
+    ):  # what the forces before step n do to the next one, before the force of step n is known
+        state[END_AHEAD], state[MEAN_AHEAD], state[RATE_AHEAD] = convolve(
+            track.rows, n + 1, n, track.segments, track.counts[N_SEGMENTS], track.force, track.ramp
+        )
     d0, v0 = state[APPROACH], state[RATE]
     start = Point(d0, state[COMPRESSION], state[FORCE], state[ENERGY])
     point, f, s = solve(blow, start, v0, free)
@@ -434,11 +426,11 @@ def press(blow, track, n, free):
     if y <= 0.0 and (n == 0 or d0 <= 0.0):
         return False
     dips = v0 < 0.0 < rate and d0 > 0.0 and y > 0.0
-    if dips and turning(d0, v0 * h, y, rate * h) < max(DIP * min(d0, y), state[MARGIN]):
+    if dips and turning(d0, v0 * h, y, rate * h)[1] < max(0.2 * min(d0, y), state[MARGIN]):
         track.counts[ENDING] = DOUBTFUL
     mend(blow, track, n, point, rate)
     mark_peak(blow, track, n)
-    if blow.spring.loss * track.rates[n + 1] < -LETTING_GO:
+    if blow.spring.loss * track.rates[n + 1] < -0.9:  # at -1 it stops pushing, which is not followed here
         return False
     if y <= 0.0:
         let_go(blow, track, n, free, y, rate)
@@ -492,11 +484,11 @@ def force_missed(blow, track, peak):
 
 
 @inner(part=True)
-def write(blow, track, status, n, cell, out_found):
+def write_found(blow, track, status, n, cell, out_found):
     """Write what was found of a blow to its column of the results."""
     state, counts = track.state, track.counts
     deepest, touched = state[DEEPEST], state[TOUCHED]
-    peak = state[PEAK] if blow.spring.loss > 0.0 else at(deepest, blow.spring).force
+    peak = state[PEAK] if blow.spring.loss > 0.0 else point_at(deepest, blow.spring).force
     out_found[FOUND_IMPACTS, cell] = counts[N_CONTACTS]
     out_found[FOUND_TIME, cell] = touched
     out_found[FOUND_IMPULSE, cell] = state[IMPULSE]
@@ -531,7 +523,7 @@ def run(cells, pairs, kernels, h, certify, band, track, out_found):
         extend(kernels, (pairs.shares[0, cell], pairs.shares[1, cell]), track, ZERO + 2)
         blow = blow_of(pairs, cell, h, certify, track.rows)
         status, n = follow_blow(kernels, blow, track)
-        write(blow, track, status, n, cell, out_found)
+        write_found(blow, track, status, n, cell, out_found)
         if band > 0.0 and status in (DONE, DOUBTFUL):
             out_found[FOUND_CENTROID, cell] = centroid(
                 track.contacts, track.counts[N_CONTACTS], n, h, track.ends, track.rates, blow.spring, band

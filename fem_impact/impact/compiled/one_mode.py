@@ -4,17 +4,16 @@ import numpy as np
 
 from .build import inner
 
-SERIES_LIMIT = 1.0  # [-] below this omega*h the moment recursion cancels and a power series takes over
-OVERDAMPED = 1.2  # [-] damping ratio from which the two decay rates are far enough apart for partial fractions
-
 
 @inner()
 def mode_matrix(w, z, h):
-    """Exact free motion of one flexible mode: a11, a12, a22 of the state's step, then slow and fast rate and half gap.
+    """Exact free motion of one mode: a11, a12, a22 of the state's step, then slow and fast rate and half gap.
 
     The rates are those of an overdamped mode, zero below; a21 is -w**2 a12.
     """
     x = z * w * h
+    if w == 0.0:
+        return 1.0, h, 1.0, 0.0, 0.0, 0.0
     if z < 1.0:
         damped = w * np.sqrt((1.0 - z) * (1.0 + z))
         decay = np.exp(-x)
@@ -69,21 +68,14 @@ def mode_moments(w, z, h, out_moments, work):
 
     Moment k is ``h**(-k-1)`` times the integral over [0, h] of ``(h-t)**(k-1)/(k-1)! g(t)``, k = 0 being
     g(h)/h. They obey ``th**2 m[k+1] = 1/k! - 2 x m[k] - m[k-1]`` with ``th = w h``, ``x = z th``: upwards while
-    k < th, downwards from a power series above; heavily damped modes take partial fractions.
+    k < th, downwards above, from where ``(k+1)! m[k]`` is 1; heavily damped modes take partial fractions.
     """
     count = out_moments.size - 1
-    if w == 0.0:
-        value = 1.0
-        for k in range(count + 1):
-            out_moments[k] = value
-            value /= k + 2.0
-        return 1.0, h, 1.0
     th = w * h
     x = z * th
     a11, a12, a22, slow, fast, root = mode_matrix(w, z, h)
     out_moments[0] = a12 / h
-    heavy = z >= OVERDAMPED and fast * h >= SERIES_LIMIT
-    if heavy:
+    if z >= 1.2 and fast * h >= 1.0:  # rates so far apart
         exponential_sums(slow * h, work[0])
         exponential_sums(fast * h, work[1])
         for k in range(1, count + 1):
@@ -102,24 +94,17 @@ def mode_moments(w, z, h, out_moments, work):
         out_moments[k + 1] = new
         inverse /= k + 1.0
     if upward < count:
-        factor = 1.0
-        for k in range(2, count + 2):
-            factor /= k
-        inverse = factor * (count + 1.0)
-        last = 0.0
-        now = 1.0
-        top = 0.0
-        above = 0.0
-        for j in range(1, 80):
-            top += now * factor
-            factor /= count + j + 1.0
-            above += now * factor
-            last, now = now, -2.0 * x * now - th * th * last
-            if (abs(now) + abs(last)) * factor < 1e-19 * abs(top):
-                break
-        out_moments[count] = top
-        for k in range(count, upward + 1, -1):
-            out_moments[k - 1] = inverse - 2.0 * x * out_moments[k] - th * th * above
-            above = out_moments[k]
-            inverse *= k
+        second = third = 1.0  # moments k and k + 1 times (k+1)! and (k+2)!, which for large k they are
+        for k in range(count + 11 + int(4.0 * (th + x)), upward + 1, -1):
+            part = 1.0 / ((k + 1.0) * (k + 2.0))
+            first = 1.0 - part * th * th * third - part * (k + 2.0) * 2.0 * x * second
+            third = second
+            second = first
+            if k <= count + 1:
+                out_moments[k - 1] = second
+        share = 1.0
+        for k in range(count + 1):
+            if k > upward:
+                out_moments[k] *= share
+            share /= k + 2.0
     return a11, a12, a22

@@ -10,7 +10,8 @@ from typing import Any
 import numpy as np
 
 from .build import ZERO, inner, outer
-from .events import hermite_root, letting_go, lowest
+from .cubics import crossing, cubic, turning
+from .events import letting_go
 from .law import dent, power, relaxes, spring_of, spring_with, stored
 from .misfit import force_on, misfit
 from .rounding import NEAR
@@ -19,20 +20,8 @@ from .layout import (  # isort: skip
     APPROACH, CLOSED, HEAD, LENGTH, PUSH, RATE, REMEMBERED, SPEED, START,
 )  # fmt: skip
 
-HIGH = 0.9  # [-] of the largest mean force of a step: only steps with so much are searched for the peak
-RELEASED = 0.01  # [-] of the force at the start of the last step: felt that carries less at its end has let go
 FINISHED, HORIZON, IMPACTS, SETTLED, EXHAUSTED, FAILED = range(6)  # why a run ended
 FULL = -1  # it did not: its record is full
-
-
-@inner(allocates=True)
-def resized(array, n, length):
-    """The first n rows of an array in a new one of another length."""
-    result = np.empty((length, array.shape[1]))
-    for i in range(n):
-        for j in range(array.shape[1]):
-            result[i, j] = array[i, j]
-    return result
 
 
 @inner()
@@ -108,9 +97,9 @@ def pushing(steps, now, law, n_coefficients, row, i):
     lower = 0.0
     upper = 1.0
     if d0 < 0.0 < d1:
-        lower = hermite_root(d0, v0, d1, v1, h) / h
+        lower = crossing(d0, h * v0, d1, h * v1)
     elif d1 < 0.0 < d0:
-        upper = hermite_root(d0, v0, d1, v1, h) / h
+        upper = crossing(d0, h * v0, d1, h * v1)
     if relaxes(law, i):  # steps end where the body parts from the felt or meets it
         for k in range(n_coefficients):
             if steps[row, first + PUSH + k] != 0.0:
@@ -128,15 +117,6 @@ def pushing(steps, now, law, n_coefficients, row, i):
         else:
             upper = min(upper, at)
     return lower, upper
-
-
-@inner()
-def turn_within(d0, v0, d1, v1, h):
-    """Where the cubic through both ends of a step turns back; infinity if it does not."""
-    if (v0 < 0.0 < v1) or (v1 < 0.0 < v0):
-        side = 1.0 if v0 < 0.0 else -1.0
-        return side * lowest(side * d0, side * v0, side * d1, side * v1, h)
-    return np.inf
 
 
 @inner()
@@ -163,18 +143,20 @@ def nearest_turn(steps, now, law, n_coefficients, miss):
     for i in range(now.shape[1]):
         felt = relaxes(law, i)
         for row in range(steps.shape[0]):
+            h = steps[row, LENGTH]
             d0, v0, d1, v1 = ends_of(steps, now, law, n_coefficients, row, i)
-            turn = turn_within(d0, v0, d1, v1, steps[row, LENGTH])
-            if turn < np.inf:
-                farthest = max(farthest, turn)
+            turns = v0 < 0.0 < v1 or v1 < 0.0 < v0
+            if turns:
+                farthest = max(farthest, turning(d0, h * v0, d1, h * v1)[1])
             if felt:
                 z0 = memory_of(steps, law, n_coefficients, row, i)
                 last = row + 1 == steps.shape[0]
                 z1 = now[REMEMBERED, i] if last else memory_of(steps, law, n_coefficients, row + 1, i)
                 d0, v0 = above_felt(law, i, d0, v0, z0, z0 < 0.0)
                 d1, v1 = above_felt(law, i, d1, v1, z1, z0 < 0.0)
-                turn = turn_within(d0, v0, d1, v1, steps[row, LENGTH])
-            nearest = min(nearest, abs(turn))
+                turns = v0 < 0.0 < v1 or v1 < 0.0 < v0
+            if turns:
+                nearest = min(nearest, abs(turning(d0, h * v0, d1, h * v1)[1]))
     return nearest / farthest if farthest > 0.0 else np.inf
 
 
@@ -242,9 +224,7 @@ def rate_within(steps, now, law, n_coefficients, row, i, part):
     if part <= 0.0 or part >= 1.0:
         return v0 if part <= 0.0 else v1
     h = steps[row, LENGTH]
-    a = 2.0 * (d0 - d1) + h * (v0 + v1)
-    b = 3.0 * (d1 - d0) - h * (2.0 * v0 + v1)
-    return v0 + part * (2.0 * b + 3.0 * a * part) / h
+    return cubic(d0, h * v0, d1, h * v1, part)[1] / h
 
 
 @inner()
@@ -261,7 +241,7 @@ def peak_between(steps, now, law, n_coefficients, begin, end, i, looks):
     peak = 0.0
     peak_row = begin
     for row in range(begin, end):
-        if mean_push(steps, n_coefficients, row, first) >= HIGH * most:
+        if mean_push(steps, n_coefficients, row, first) >= 0.9 * most:
             for look in range(n_coefficients):
                 f = force_within(steps, now, law, n_coefficients, row, i, look / n_coefficients)
                 if f > peak:
@@ -289,7 +269,7 @@ def still_pressed(steps, now, law, n_coefficients, i, d):
         end = 0.0
         for k in range(n_coefficients):
             end += steps[-1, first + k]
-        return now[REMEMBERED, i] >= 0.0 and end > RELEASED * steps[-1, first]
+        return now[REMEMBERED, i] >= 0.0 and end > 0.01 * steps[-1, first]
     return d > NEAR * abs(now[APPROACH, i])
 
 
@@ -305,7 +285,7 @@ def find_impacts(steps, now, law, n_coefficients, looks, still, slack):
     n_steps = steps.shape[0]
     m = law.shape[0]
     width = PUSH + n_coefficients
-    result = np.empty((8, 8))
+    result = np.empty((m * n_steps, 8))  # each takes a step at least
     count = ZERO
     for i in range(m):
         first = HEAD + width * i
@@ -315,8 +295,6 @@ def find_impacts(steps, now, law, n_coefficients, looks, still, slack):
             if lower >= upper:
                 row += 1
                 continue
-            if count == result.shape[0]:
-                result = resized(result, count, 2 * count)
             begin = row
             start = steps[row, START] + lower * steps[row, LENGTH]
             met = rate_within(steps, now, law, n_coefficients, row, i, lower)
@@ -355,4 +333,4 @@ def find_impacts(steps, now, law, n_coefficients, looks, still, slack):
             result[count, 6] = left
             result[count, 7] = since
             count += 1
-    return resized(result, count, count)
+    return result[:count].copy()

@@ -20,7 +20,7 @@ from typing import NamedTuple
 import numpy as np
 
 from .build import inner
-from .law import Point, at, compressed, memory_energy, power, slopes, spring_of, steepness
+from .law import Point, compressed, mean_slopes, memory_energy, point_at, power, spring_of, steepness
 from .laws.felt import growth, soaked
 from .rounding import CHORD, ITERATIONS, OVERFLOW, REPEATED, SOLVED, STALLED
 
@@ -29,7 +29,6 @@ from .layout import (  # isort: skip
     OWN_MEAN_RAMP, OWN_RATE, OWN_RATE_RAMP, RATE,
 )  # fmt: skip
 
-ROUNDED = 1e-14  # [-] of the elastic energies: rounding of what a step of felt loses
 WORK_ERROR = 1e-9  # [-] a step whose force's work misses the stored energy by more lost its digits: scheme A takes it
 
 
@@ -59,116 +58,60 @@ def point_of(now, i):
 
 
 @inner()
-def solve_constant(start, e, b, loss, spring):
+def mean_force(start, y, h, spring):
+    """Scheme A at an approach y at the step's end: the point there, mean force, never less than 0, its slope, memory.
+
+    Felt takes up the middle compression u: ``z1 - z0 = (1 - exp(-h/tau)) (u**a - z0)``, and takes the force
+    ``k share (z0 + z1) / 2``. So the step loses ``k share (z1 - z0) (u - mean of z**(1/a))``, never less than nothing.
+    """
+    end = point_at(y, spring)
+    g, d = mean_slopes(start, end, spring)
+    span = y - start.approach
+    turn = (end.force - g) / span if abs(span) > CHORD * (abs(y) + abs(start.approach)) else 0.5 * d
+    if spring.relaxation == 0.0:
+        loss = spring.loss / h
+        f = g + loss * (end.energy - start.energy)
+        return (end, f, turn + loss * end.force, 0.0) if f > 0.0 else (end, 0.0, 0.0, 0.0)
+    a, z = spring.exponent, spring.memory
+    middle = 0.5 * (max(0.0, start.compression) + max(0.0, end.compression))
+    taken = -np.expm1(-h / spring.relaxation)
+    aim = power(middle, a) if middle > 0.0 else 0.0
+    memory = z + taken * (aim - z)
+    f = g - 0.5 * spring.hard * (z + memory)
+    if f <= 0.0:
+        left = spring.hard / spring.stiffness
+        return end, 0.0, 0.0, z * np.exp(-(1.0 - left) * h / spring.relaxation)
+    if end.compression > 0.0:
+        turn -= 0.25 * spring.hard * taken * a * aim / middle
+    return end, f, turn, memory
+
+
+@inner()
+def solve_constant(start, e, b, h, spring):
     """Scheme A: the point at the step's end and the force >= 0, with ``y = e - b force``; always exists, unique.
 
-    ``loss`` is the Hunt-Crossley factor over the step length [1/m].
+    By Newton's method between bounds.
     """
-    d0, v0 = start.approach, start.energy
-    if spring.stiffness == 0.0:
-        return at(e, spring), 0.0
-    k, a, c = spring.stiffness, spring.exponent, spring.compliance
-    if d0 <= 0.0 and e <= 0.0:
-        return at(e, spring), 0.0
-    if d0 > 0.0 and b * (v0 / d0 - loss * v0) >= e:  # it opens: all of V0 is given back
-        free = e - d0 + b * loss * v0
-        root = np.sqrt(free * free + 4.0 * b * v0)
-        gap = 0.5 * (root - free) if free <= 0.0 else 2.0 * b * v0 / (root + free)
-        f = v0 / gap - loss * v0 if gap > 0.0 else 0.0
-        return (at(d0 - gap, spring), f) if f > 0.0 else (at(e, spring), 0.0)
-    if a == 1.0 and loss == 0.0 and spring.corner == np.inf:
-        half = 0.5 * b * k / (1.0 + k * c)
-        if d0 >= 0.0:
-            y = (e - half * d0) / (1.0 + half)
-        else:
-            s = e + d0
-            root = np.sqrt(max(0.0, s * s - 4.0 * (1.0 + half) * e * d0))
-            y = 0.5 * (s + root) / (1.0 + half) if s >= 0.0 else -2.0 * e * d0 / (root - s)
-        end = at(y, spring)
-        return end, slopes(start, end, spring)[0]
-    high = e if loss == 0.0 else max(e, e + b * loss * v0)
-    y = high
-    if loss == 0.0 and c == 0.0 and e > 0.0 and b > 0.0:
+    end, f, turn, _ = mean_force(start, e, h, spring)
+    low, high, y = e - b * f, e, e
+    a, d0 = spring.exponent, start.approach
+    if spring.loss == 0.0 and spring.compliance == 0.0 and e > 0.0 and b > 0.0 and f > 0.0:
         share = e - d0 if d0 <= 0.0 else 1.0
-        y = min(high, ((a + 1.0) * e * share / (b * k)) ** (1.0 / (a + (1.0 if d0 <= 0.0 else 0.0))))
-        y *= 1.0 + SOLVED
-    low = 0.0
-    f = 0.0
-    end = start
+        y = ((a + 1.0) * e * share / (b * spring.stiffness)) ** (1.0 / (a + (1.0 if d0 <= 0.0 else 0.0)))
+        y = max(low, min(high, y * (1.0 + SOLVED)))
+        end, f, turn, _ = mean_force(start, y, h, spring)
     for _ in range(300):
-        end = at(y, spring)
-        g, slope = slopes(start, end, spring)
-        f = g + loss * (end.energy - v0)
         r = y - e + b * f
         if r > 0.0:
             high = y
         else:
             low = y
-        span = y - d0
-        turn = (end.force - g) / span if abs(span) > CHORD * (abs(y) + abs(d0)) else 0.5 * slope
-        new = y - r / (1.0 + b * (turn + loss * end.force))
-        if not low <= new <= high:
-            new = 0.5 * (low + high)
-        if abs(new - y) <= REPEATED * abs(y):
+        new = y - r / (1.0 + b * turn)
+        if abs(new - y) <= REPEATED * abs(y) or high - low <= REPEATED * max(abs(low), abs(high)):
             break
-        y = new
-    return end, max(0.0, f)
-
-
-@inner()
-def felt_mean(start, y, h, spring):
-    """Scheme A for felt: mean force, its slope over the approach y at the end, and the memory there.
-
-    The memory takes up the middle compression u: ``z1 - z0 = (1 - exp(-h/tau)) (u**a - z0)``, and takes the force
-    ``k share (z0 + z1) / 2``. So the step loses ``k share (z1 - z0) (u - mean of z**(1/a))``, never less than nothing.
-    """
-    end = at(y, spring)
-    g, d = slopes(start, end, spring)
-    a = spring.exponent
-    middle = 0.5 * (max(0.0, start.compression) + max(0.0, end.compression))
-    taken = -np.expm1(-h / spring.relaxation)
-    aim = power(middle, a) if middle > 0.0 else 0.0
-    memory = spring.memory + taken * (aim - spring.memory)
-    f = g - 0.5 * spring.hard * (spring.memory + memory)
-    if f <= 0.0:
-        left = spring.hard / spring.stiffness
-        return 0.0, 0.0, spring.memory * np.exp(-(1.0 - left) * h / spring.relaxation)
-    span = y - start.approach
-    turn = (end.force - g) / span if abs(span) > CHORD * (abs(y) + abs(start.approach)) else 0.5 * d
-    if end.compression > 0.0:
-        turn -= 0.25 * spring.hard * taken * a * aim / middle
-    return f, turn, memory
-
-
-@inner()
-def solve_felt(start, e, b, h, spring):
-    """Scheme A for one felt contact: as `solve_constant`, by regula falsi between bounds (Illinois)."""
-    f, _, _ = felt_mean(start, e, h, spring)
-    if f == 0.0:
-        return at(e, spring), 0.0
-    high = e
-    low = e - b * f
-    above = b * f
-    below = low - e + b * felt_mean(start, low, h, spring)[0]
-    y = low
-    side = 0
-    for _ in range(200):
-        if below == above or high - low <= REPEATED * max(abs(high), abs(low)):
-            break
-        y = (low * above - high * below) / (above - below)
-        f, _, _ = felt_mean(start, y, h, spring)
-        r = y - e + b * f
-        if r == 0.0:
-            break
-        if r > 0.0:
-            high, above = y, r
-            below *= 0.5 if side == 1 else 1.0
-            side = 1
-        else:
-            low, below = y, r
-            above *= 0.5 if side == -1 else 1.0
-            side = -1
-    return at(y, spring), f
+        y = new if low < new < high else 0.5 * (low + high)
+        end, f, turn, _ = mean_force(start, y, h, spring)
+    return end, f
 
 
 @inner()
@@ -187,31 +130,30 @@ def lossy_terms(h, start, end, rate0, free_rate, spring):
 
 @inner()
 def remembers(h, start, end, rate0, rate1, ramped, spring):
-    """What felt remembers after a step of scheme A4 or A."""
+    """What felt remembers after a step of scheme A4 or A; 0 of another contact."""
+    if spring.relaxation == 0.0:
+        return 0.0
     if not ramped:
-        return felt_mean(start, end.approach, h, spring)[2]
+        return mean_force(start, end.approach, h, spring)[3]
     g0, r0, _ = growth(start, rate0, spring)
     g1, r1, _ = growth(end, rate1, spring)
     return max(0.0, soaked(h, 1.0, g0, g1, r0, r1, spring)[0])
 
 
 @inner()
-def gained(start, end, memory, spring):
-    """What a contact stores more at the end of a step [J]."""
-    more = end.energy - start.energy
-    if spring.relaxation > 0.0:
-        more += memory_energy(max(0.0, end.compression), memory, spring)
-        more -= memory_energy(max(0.0, start.compression), spring.memory, spring)
-    return more
+def fair(start, end, f, s, mean, memory, spring):
+    """Whether a step of scheme A4 loses neither less than nothing nor, without loss, more than its rounding.
 
-
-@inner()
-def fair(lost, start, end, spring):
-    """Whether a step loses neither less than nothing nor, without loss, more than its rounding."""
+    ``mean`` is its mean approach, ``memory`` what is remembered at its end.
+    """
+    work = f * (end.approach - start.approach) + s * (0.5 * (start.approach + end.approach) - mean)
+    stored = end.energy - start.energy
     if spring.relaxation > 0.0:
-        return lost >= -ROUNDED * (start.energy + end.energy)
+        stored += memory_energy(max(0.0, end.compression), memory, spring)
+        stored -= memory_energy(max(0.0, start.compression), spring.memory, spring)
+        return work - stored >= -1e-14 * (start.energy + end.energy)
     slack = WORK_ERROR * (start.energy + end.energy)
-    return lost >= 0.0 if spring.loss > 0.0 else -slack <= lost <= slack
+    return work >= stored if spring.loss > 0.0 else abs(work - stored) <= slack
 
 
 @inner()
@@ -245,7 +187,7 @@ def solve_ramp(guess, h, start, rate0, free, own, spring):
     for iteration in range(ITERATIONS):
         end = compressed(x, spring)
         y = end.approach
-        g, d = slopes(start, end, spring)
+        g, d = mean_slopes(start, end, spring)
         middle = 0.5 * (d0 + y)
         right = g + d * (free.mean - middle)
         s = end.force - start.force
@@ -263,12 +205,10 @@ def solve_ramp(guess, h, start, rate0, free, own, spring):
             s = (top - part * own.rate * f) / two
         r = y - free.end + own.end * f + own.end_ramp * s
         if last or r == 0.0 or (close and abs(r) <= SOLVED * max(scale, abs(y))):
-            work = f * (y - d0) + s * (middle - (free.mean - own.mean * f - own.mean_ramp * s))
-            memory = 0.0
-            if spring.relaxation > 0.0:
-                memory = remembers(h, start, end, rate0, free.rate - own.rate * f - own.rate_ramp * s, True, spring)
-            lost = work - gained(start, end, memory, spring)
-            return f >= 0.0 and fair(lost, start, end, spring), end, f, s
+            mean = free.mean - own.mean * f - own.mean_ramp * s
+            rate1 = free.rate - own.rate * f - own.rate_ramp * s
+            memory = remembers(h, start, end, rate0, rate1, True, spring)
+            return f >= 0.0 and fair(start, end, f, s, mean, memory, spring), end, f, s
         if not lossy or iteration == 0:
             steep = steepness(x, end.force, spring) if x > 0.0 else 0.0  # dF/dx; over the approach it is less
             tangent = steep / (1.0 + c * steep)
@@ -324,24 +264,6 @@ def solve_linear(matrix, vector, n):
 
 
 @inner()
-def mean_force(h, y, now, law, i):
-    """Mean force of scheme A for one contact ending at approach y, and its slope; the force never pulls."""
-    spring = spring_of(law, i)
-    if spring.relaxation > 0.0:
-        f, slope, _ = felt_mean(point_of(now, i), y, h, spring)
-        return f, slope
-    start, end = point_of(now, i), at(y, spring)
-    g, d = slopes(start, end, spring)
-    loss = spring.loss / h
-    f = g + loss * (end.energy - start.energy)
-    if f <= 0.0:
-        return 0.0, 0.0
-    span = y - start.approach
-    turn = (end.force - g) / span if abs(span) > CHORD * (abs(y) + abs(start.approach)) else 0.5 * d
-    return f, turn + loss * end.force
-
-
-@inner()
 def sweep_constants(h, now, law, e, sums, out_y, out_f):
     """Solve scheme A's equations one contact at a time, the others' forces held; the largest relative change."""
     m = e.size
@@ -352,11 +274,7 @@ def sweep_constants(h, now, law, e, sums, out_y, out_f):
             if j != i:
                 rest -= sums[OWN_END, i, j] * out_f[j]
         old = out_f[i]
-        spring = spring_of(law, i)
-        if spring.relaxation > 0.0:
-            end, out_f[i] = solve_felt(point_of(now, i), rest, sums[OWN_END, i, i], h, spring)
-        else:
-            end, out_f[i] = solve_constant(point_of(now, i), rest, sums[OWN_END, i, i], law["loss"][i] / h, spring)
+        end, out_f[i] = solve_constant(point_of(now, i), rest, sums[OWN_END, i, i], h, spring_of(law, i))
         out_y[i] = end.approach
         if out_f[i] != old:
             change = max(change, abs(out_f[i] - old) / max(abs(out_f[i]), abs(old)))
@@ -387,7 +305,7 @@ def solve_constants(h, now, law, e, sums, work, out_y, out_f):
             y = e[i]
             for j in range(m):
                 y -= sums[OWN_END, i, j] * out_f[j]
-            force, slope[i] = mean_force(h, y, now, law, i)
+            _, force, slope[i], _ = mean_force(point_of(now, i), y, h, spring_of(law, i))
             step[i] = force - out_f[i]
             if step[i] != 0.0:
                 worst = max(worst, abs(step[i]) / max(force, abs(out_f[i])))
@@ -412,7 +330,7 @@ def solve_constants(h, now, law, e, sums, work, out_y, out_f):
                 for j in range(m):
                     y -= sums[OWN_END, i, j] * (out_f[j] + (t if look > 0 else 0.0) * step[j])
                     lift += sums[OWN_END, i, j] * step[j]
-                force, _ = mean_force(h, y, now, law, i)
+                force = mean_force(point_of(now, i), y, h, spring_of(law, i))[1]
                 rise += lift * (out_f[i] + (t if look > 0 else 0.0) * step[i] - force)
             if look == 0:
                 begin = rise
@@ -441,8 +359,8 @@ def ramp_forces(h, y, contacts, sums, work, out_f, out_s, out_r):
     vector = work[2, 2]
     for i in range(m):
         spring = spring_of(law, i)
-        start, end = point_of(now, i), at(y[i], spring)
-        g, d = slopes(start, end, spring)
+        start, end = point_of(now, i), point_at(y[i], spring)
+        g, d = mean_slopes(start, end, spring)
         add, tilt, held_back, part = lossy_terms(h, start, end, now[RATE, i], vf[i], spring)
         for j in range(m):
             matrix[i, j] = d * sums[OWN_MEAN, i, j] + held_back * sums[OWN_RATE, i, j]
@@ -513,14 +431,13 @@ def solve_ramps(h, contacts, sums, work):
         if not out_f[i] >= 0.0:
             return False
         spring = spring_of(law, i)
-        start, end = point_of(now, i), at(out_y[i], spring)
+        start, end = point_of(now, i), point_at(out_y[i], spring)
         mean = contacts.free[FREE_MEAN, i]
         v1 = contacts.free[FREE_RATE, i]
         for j in range(m):
             mean -= sums[OWN_MEAN, i, j] * out_f[j] + sums[OWN_MEAN_RAMP, i, j] * out_s[j]
             v1 -= sums[OWN_RATE, i, j] * out_f[j] + sums[OWN_RATE_RAMP, i, j] * out_s[j]
-        memory = remembers(h, start, end, now[RATE, i], v1, True, spring) if spring.relaxation > 0.0 else 0.0
-        work_done = out_f[i] * (out_y[i] - now[APPROACH, i]) + out_s[i] * (0.5 * (now[APPROACH, i] + out_y[i]) - mean)
-        if not fair(work_done - gained(start, end, memory, spring), start, end, spring):
+        memory = remembers(h, start, end, now[RATE, i], v1, True, spring)
+        if not fair(start, end, out_f[i], out_s[i], mean, memory, spring):
             return False
     return True

@@ -37,11 +37,6 @@ from .layout import (  # isort: skip
     STEPS, TAKEOFF, TIME,
 )  # fmt: skip
 
-LEAST = 1e-6  # [-] of the stiffness against any motion of a shell, that is from bending: less is lost in rounding
-UNSEEN = 1.0  # [rad] modes that turn further in a step than this are not seen by the cubic through its ends
-SHORTEST = 8  # [-] halvings of the step to see them
-RIPPLE = 1e-3  # [-] of the way of a contact in a step: such modes may close it unseen where they move it farther
-
 
 class Stretch(NamedTuple):
     """The forms B and rows l of the modes that stretch a body: `count` of them from `first` on."""
@@ -157,21 +152,14 @@ def prepare(bodies, contacts, room, lanes, h):
     for row in range(3):
         for c in range(contacts.end.size):
             room.free[row, c] = contacts.free[row, c]
-    bend(forms, q[first : first + count], room.bent[0])
+    for end in range(2):  # as if it stayed
+        bend(forms, q[first : first + count], room.bent[end])
     for i in range(count):
         n = first + i
         drift = lanes[M1, n] * (bodies.p[n] + bodies.twice[n] * q[n]) + h * lanes[M2, n] * bodies.bias[n]
         room.ends[0, i] = lanes[A12, n] * q[n] / h + drift
-        room.pull[0, i] = 0.0
-    for k in range(forms.shape[0]):
-        s = 0.0
-        for i in range(count):
-            s += q[first + i] * room.bent[0, k, i]
-        lead = led(room.linear, k, q, first)
-        for i in range(count):
-            room.pull[0, i] -= (s + lead) * room.bent[0, k, i]
-            if room.linear.shape[0] > 0:
-                room.pull[0, i] -= 0.5 * s * room.linear[k, i]
+        room.ends[1, i] = q[n]
+    pulls(room, q, ZERO)
     for i in range(count):
         room.pull[1, i] = h * room.hint[i]
         room.pull[0, i] += 0.5 * room.pull[1, i]
@@ -264,7 +252,7 @@ def made_room(stretch: Stretch, omega: np.ndarray, n_contacts: int) -> StretchRo
     own = omega[first : first + count]
     weight = np.divide(1.0, own, out=np.zeros(count), where=own > 0.0)
     share, turn = np.linalg.eigh(np.eye(count) - 0.5 * (stretch.linear * weight).T @ (stretch.linear * weight))
-    half = weight[:, None] * turn / np.sqrt(np.maximum(share, LEAST))
+    half = weight[:, None] * turn / np.sqrt(np.maximum(share, 1e-6))  # of a shell's stiffness; less is lost in rounding
     return StretchRoom(
         stretch.forms, stretch.linear, first, half @ half.T, np.zeros((3, n_contacts)), np.zeros((3, count)),
         np.zeros((3, n_forms, count)), np.zeros((4, count)), np.zeros((3, count)), np.zeros(count),
@@ -341,7 +329,7 @@ def flown(bodies, contacts, course, room, limits):
 @inner()
 def unseen(bodies, contacts, h, level):
     """1 if modes too fast for the step may close a contact that the cubic through its ends leaves open, else 0."""
-    if level >= SHORTEST:
+    if level >= 8:
         return 0
     for i in range(contacts.end.size):
         if contacts.pressed[i]:
@@ -350,9 +338,9 @@ def unseen(bodies, contacts, h, level):
         ripple = 0.0
         for n in range(bodies.q.size):
             w = bodies.omega[n]
-            if w * h > UNSEEN:
+            if w * h > 1.0:
                 ripple += abs(bodies.shape[i, n]) * np.sqrt(bodies.q[n] ** 2 + (bodies.p[n] / w) ** 2)
-        if max(start, end) + ripple > 0.0 and ripple > RIPPLE * (abs(start) + abs(end)):
+        if max(start, end) + ripple > 0.0 and ripple > 1e-3 * (abs(start) + abs(end)):
             return 1
     return 0
 

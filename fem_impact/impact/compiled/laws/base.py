@@ -85,8 +85,15 @@ class Law:
         return np.asarray(contact.stiffness * pressed**contact.exponent)
 
     def acting(self, row: Any, mobility: Any, speed: Any) -> np.ndarray:
-        """See `contact.acting_stiffness`."""
-        return np.full(np.broadcast_shapes(np.shape(mobility), np.shape(speed)), row.stiffness, float)
+        """See `contact.acting_stiffness`: of the power law that stores as much at the same deepest approach."""
+        energy = np.asarray(0.5 * np.asarray(speed) ** 2 / np.asarray(mobility))  # [J]
+        deepest, power = self.deepest(row, energy), row.exponent + 1.0
+        stands_in = power * energy / np.where(deepest > 0.0, deepest, 1.0) ** power
+        return np.where(deepest > 0.0, stands_in, row.stiffness)
+
+    def deepest(self, row: Any, energy: np.ndarray) -> np.ndarray:
+        """Approach [m] at which it has taken an energy [J], first pressed; 0 of a power law."""
+        return np.zeros(energy.shape)
 
     def sunk(self, row: Any, memory: np.ndarray, left: np.ndarray) -> np.ndarray:
         """How much lower than at first the surface lies [m], by its memory and the time it has been ``left`` [s]."""
@@ -103,9 +110,3 @@ class Law:
     def sentence(self, contact: Any, si: Any) -> str:
         """What a report adds to the sentence on a power law; ``si`` writes a number with its unit."""
         return ""
-
-
-def standing_in(row: Any, energy: np.ndarray, deepest: np.ndarray) -> np.ndarray:
-    """Stiffness of the power law that stores an energy [J] at the same deepest approach [m]."""
-    a = row.exponent
-    return np.where(deepest > 0.0, (a + 1.0) * energy / np.maximum(deepest, 1e-300) ** (a + 1.0), row.stiffness)

@@ -7,7 +7,7 @@ import numpy as np
 
 from ...._base.rounding import HALVINGS
 from ..build import inner
-from .base import Law, LawNumber, Spring, standing_in
+from .base import Law, LawNumber, Spring
 from .power import PowerNumbers, continued, power, power_slopes
 
 KIND = 1.0
@@ -69,9 +69,8 @@ class LayersLaw(Law):
         further = np.maximum(pressed - contact.depth, 0.0)
         return super().force(contact, pressed) + contact.hard_stiffness * further**contact.hard_exponent
 
-    def acting(self, row: Any, mobility: Any, speed: Any) -> np.ndarray:
+    def deepest(self, row: Any, energy: np.ndarray) -> np.ndarray:
         k, a, hard, b = row.stiffness, row.exponent, row.hard_stiffness, row.hard_exponent
-        energy = 0.5 * np.asarray(speed) ** 2 / np.asarray(mobility)  # [J]
         deepest = ((a + 1.0) * energy / k) ** (1.0 / (a + 1.0))  # [m] by the power law alone
         low, high = np.zeros_like(deepest), deepest
         for _ in range(HALVINGS):
@@ -79,7 +78,7 @@ class LayersLaw(Law):
             over = np.maximum(middle - row.depth, 0.0)
             stored = k * middle ** (a + 1.0) / (a + 1.0) + hard * over ** (b + 1.0) / (b + 1.0)
             low, high = np.where(stored < energy, middle, low), np.where(stored < energy, high, middle)
-        return standing_in(row, energy, np.where(deepest > row.depth, high, deepest))
+        return np.where(deepest > row.depth, high, deepest)
 
     def sentence(self, contact: Any, si: Any) -> str:
         return f" Beyond {si(contact.depth, 'm')} it meets a hard layer."
@@ -95,7 +94,7 @@ def spring(law, i):
 
 
 @inner()
-def pushed(x, spring):
+def pushed_beyond(x, spring):
     """Force and stored energy at a compression beyond the corner."""
     a, further = spring.exponent, x - spring.corner
     f = spring.stiffness * power(x, a)
@@ -112,7 +111,7 @@ def steepness(x, f, spring):
 
 
 @inner()
-def slopes(small, large, spring):
+def slopes_beyond(small, large, spring):
     """Average slopes between two compressions > 0, of which at least one is beyond the corner."""
     further = large - spring.corner
     g, d = power_slopes(spring.stiffness, spring.exponent, small, large)

@@ -22,12 +22,11 @@ import numpy as np
 
 from ...._base import check
 from ..build import inner
-from .base import Law, LawNumber, Spring, standing_in
+from .base import Law, LawNumber, Spring
 from .power import PowerNumbers, power, power_slopes
 
 KIND = 2.0
 REACH = 12.0  # [-] approaches of first yield: nearest to finite elements, force within 12 %; test_plastic.py
-STEPS = 20  # [-] most steps of Newton's method: 5 for round bodies, 12 for the exponent 100; test_plastic.py
 
 
 @dataclass(frozen=True)
@@ -113,10 +112,6 @@ class PlasticLaw(Law):
     def force(self, contact: Any, pressed: np.ndarray) -> np.ndarray:
         return _course(contact, pressed)[0]
 
-    def acting(self, row: Any, mobility: Any, speed: Any) -> np.ndarray:
-        energy = 0.5 * np.asarray(speed) ** 2 / np.asarray(mobility)  # [J]
-        return standing_in(row, energy, self._deepest(row, energy))
-
     def sunk(self, row: Any, memory: np.ndarray, left: np.ndarray) -> np.ndarray:
         deepest = np.maximum(np.abs(memory), row.yield_approach)
         force, _, _, wide = _course(row, deepest)
@@ -139,12 +134,11 @@ class PlasticLaw(Law):
 
     def rebound(self, contact: Any, energy: float) -> float:
         """Restitution [-] of a body with this energy [J] on a rigid wall."""
-        force, _, stored, wide = _course(contact, self._deepest(contact, np.asarray(energy)))
+        force, _, stored, wide = _course(contact, self.deepest(contact, np.asarray(energy)))
         back = force / (contact.stiffness * wide ** (contact.exponent - 1.0))
         return float(np.sqrt(force * back / ((contact.exponent + 1.0) * stored)))
 
-    def _deepest(self, row: Any, energy: np.ndarray) -> np.ndarray:
-        """Approach [m] at which it has taken an energy [J], first pressed."""
+    def deepest(self, row: Any, energy: np.ndarray) -> np.ndarray:
         k, a, first = row.stiffness, row.exponent, row.yield_approach
         elastic = ((a + 1.0) * energy / k) ** (1.0 / (a + 1.0))  # [m]
         force, steep = k * first**a, a * k * first ** (a - 1.0)
@@ -176,7 +170,7 @@ steeper = inner()(_steeper)
 
 def _descended(found: np.ndarray, missed: Callable[[np.ndarray], np.ndarray]) -> np.ndarray:
     """Newton's method for an approach [m] from one along the tangent at first yield, too deep as force is convex."""
-    for _ in range(STEPS):
+    for _ in range(20):  # 5 for round bodies, 12 for the exponent 100; test_plastic.py
         change = missed(found)
         found = found - change
         if (np.abs(change) <= 1e-9 * found).all():  # what is left is its square
@@ -199,7 +193,7 @@ def _course(row: Any, pressed: Any) -> tuple[np.ndarray, ...]:
 
 
 @inner()
-def parts(z):
+def exponential_parts(z):
     """``1 - exp(-z)``, what that lacks of z, and what this lacks of z**2 / 2, without cancellation, for z >= 0."""
     if z >= 1.0:
         one = -np.expm1(-z)
@@ -224,7 +218,7 @@ def pressed_to(law, i, memory):
     if memory <= first:
         return k * power(first, a), steep, steeper(a) * steep, first
     reach = REACH * first
-    gone, plastic, _ = parts((memory - first) / reach)
+    gone, plastic, _ = exponential_parts((memory - first) / reach)
     more = steeper(a) * steep
     force = k * power(first, a) + steep * (memory - first) + more * reach * plastic
     back = force / (k * power(memory + reach * plastic, a - 1.0))
@@ -259,11 +253,11 @@ def dent(law, i, memory):
 
 
 @inner()
-def pushed(x, spring):
+def pushed_beyond(x, spring):
     """Force and stored energy at a compression beyond the corner."""
     a, corner, further, reach = spring.exponent, spring.corner, x - spring.corner, spring.reach
     f = spring.stiffness * power(corner, a)
-    _, two, three = parts(further / reach)
+    _, two, three = exponential_parts(further / reach)
     more = spring.hard * further
     energy = f * corner / (a + 1.0) + further * (f + 0.5 * more) + spring.steeper * reach * reach * three
     return f + more + spring.steeper * reach * two, energy
@@ -279,11 +273,11 @@ def steepness(x, spring):
 def further_slopes(near, far, spring):
     """Average force above that at the corner, and average slope, between two distances beyond it."""
     reach = spring.reach
-    one, two, _ = parts(near / reach)
+    one, two, _ = exponential_parts(near / reach)
     z = (far - near) / reach
     if z <= 0.0:
         return spring.hard * near + spring.steeper * reach * two, spring.hard + spring.steeper * one
-    _, later, last = parts(z)
+    _, later, last = exponential_parts(z)
     force = two + 0.5 * z * one + (1.0 - one) * last / z
     return (
         0.5 * spring.hard * (near + far) + spring.steeper * reach * force,
@@ -292,7 +286,7 @@ def further_slopes(near, far, spring):
 
 
 @inner()
-def slopes(small, large, spring):
+def slopes_beyond(small, large, spring):
     """Average slopes between two compressions > 0, of which at least one is beyond the corner."""
     k, a, corner = spring.stiffness, spring.exponent, spring.corner
     f = k * power(corner, a)

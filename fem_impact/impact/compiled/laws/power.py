@@ -105,7 +105,7 @@ def power(x, exponent):
 
 @inner()
 def power_slopes(k, a, x0, x1):
-    """Average slopes of ``k x**(a+1) / (a+1)`` and ``k x**a`` between two compressions > 0."""
+    """Average slopes of ``k x**(a+1) / (a+1)`` and ``k x**a`` between two compressions > 0, x0 the smaller."""
     if a == 1.0:
         return 0.5 * k * (x0 + x1), k
     if a == 1.5:
@@ -113,19 +113,17 @@ def power_slopes(k, a, x0, x1):
         r1 = np.sqrt(x1)
         g = 0.4 * k * (x1 * x1 + x1 * r1 * r0 + x1 * x0 + r1 * r0 * x0 + x0 * x0) / (r0 + r1)
         return g, k * (x0 + r0 * r1 + x1) / (r0 + r1)
-    small = min(x0, x1)
-    large = max(x0, x1)
-    r = (large - small) / (large + small)
+    r = (x1 - x0) / (x1 + x0)
     if r < 1e-4:
-        mid = 0.5 * (large + small)
+        mid = 0.5 * (x1 + x0)
         f = k * mid**a
         g = f * (1.0 + a * (a - 1.0) / 6.0 * r * r)
         return g, a * f / mid * (1.0 + (a - 1.0) * (a - 2.0) / 6.0 * r * r)
-    f = k * large**a
-    if small < 1e-17 * large:
-        return f / (a + 1.0), f / large
-    log = np.log1p((small - large) / large)
-    return f / (a + 1.0) * np.expm1((a + 1.0) * log) / np.expm1(log), f / large * np.expm1(a * log) / np.expm1(log)
+    f = k * x1**a
+    if x0 < 1e-16 * x1:
+        return f / (a + 1.0), f / x1
+    log = np.log1p((x0 - x1) / x1)
+    return f / (a + 1.0) * np.expm1((a + 1.0) * log) / np.expm1(log), f / x1 * np.expm1(a * log) / np.expm1(log)
 
 
 @inner()

@@ -14,13 +14,11 @@ import numpy as np
 from ...._base import check
 from ..build import COMPILED, inner
 from ..layout import HEAD, PUSH
-from .base import Law, Spring, standing_in
+from .base import Law, Spring
 from .power import PowerNumbers, power_slopes
 
 KIND = 4.0
 KNOTS = 96  # [-] most knots: with them a force of the exponent 5 errs by 1e-5; test_tabled.py
-FIRST = 24  # [-] knots before those are added that the force asks for
-SHALLOWEST = 1e-3  # [-] first knot over the deepest: below it, only 1e-6 of the energy of a blow is stored
 NUDGE = 1e-5  # [-] of the approach, for slopes by differences: they err by 1e-10
 TABLE = (KNOTS, 4)  # approach [m], force [N], slope [N/m] and stored energy [J] at each knot, at the end of a law's row
 
@@ -145,7 +143,7 @@ class _Own:
 
     def fitted(self, tolerance: float) -> tuple[np.ndarray, float]:
         """Knots (n, 3), and by how much the force between them differs at most [-]."""
-        x = np.geomspace(SHALLOWEST * self.deepest, self.deepest, FIRST)
+        x = np.geomspace(1e-3 * self.deepest, self.deepest, 24)  # below the first, 1e-6 of a blow's energy is stored
         shares = np.array([0.25, 0.5, 0.75])
         while True:
             knots = self.knot(x)
@@ -227,11 +225,9 @@ class TableLaw(Law):
     def force(self, contact: Any, pressed: np.ndarray) -> np.ndarray:
         return course(_knots(contact), pressed)[0]
 
-    def acting(self, row: Any, mobility: Any, speed: Any) -> np.ndarray:
-        energy = 0.5 * np.asarray(speed) ** 2 / np.asarray(mobility)  # [J]
+    def deepest(self, row: Any, energy: np.ndarray) -> np.ndarray:
         x = np.geomspace(1e-6, 1e2, 2000) * _knots(row)[-1, 0]
-        deepest = np.exp(np.interp(np.log(energy), np.log(course(_knots(row), x)[1]), np.log(x)))
-        return standing_in(row, energy, deepest)
+        return np.asarray(np.exp(np.interp(np.log(energy), np.log(course(_knots(row), x)[1]), np.log(x))))
 
     def approach(self, contact: Any, force: float) -> float:
         x, f, slope = _knots(contact).T
@@ -255,19 +251,19 @@ def spring(law, i):
 
 
 @inner()
-def number(spring, i, column):
+def knot_number(spring, i, column):
     """A number of knot i of a spring, see `TABLE`."""
     return number_at(np.int64(spring.hard), np.int64(4 * i + column))
 
 
 @inner()
-def piece(x, spring):
+def piece_at(x, spring):
     """The piece between two knots that holds a compression, or the nearest."""
     low = 0
     high = int(spring.hard_exponent) - 2
     while low < high:
         middle = (low + high + 1) // 2
-        if number(spring, middle, 0) <= x:
+        if knot_number(spring, middle, 0) <= x:
             low = middle
         else:
             high = middle - 1
@@ -275,42 +271,42 @@ def piece(x, spring):
 
 
 @inner()
-def cubic(i, spring):
+def force_cubic(i, spring):
     """Of piece i: where it begins, how long it is, and the coefficients of its force in shares of that."""
-    x, f, s = number(spring, i, 0), number(spring, i, 1), number(spring, i, 2)
-    h = number(spring, i + 1, 0) - x
-    rise, end = number(spring, i + 1, 1) - f, h * number(spring, i + 1, 2)
+    x, f, s = knot_number(spring, i, 0), knot_number(spring, i, 1), knot_number(spring, i, 2)
+    h = knot_number(spring, i + 1, 0) - x
+    rise, end = knot_number(spring, i + 1, 1) - f, h * knot_number(spring, i + 1, 2)
     return x, h, f, h * s, 3.0 * rise - 2.0 * h * s - end, h * s + end - 2.0 * rise
 
 
 @inner()
-def last(spring):
+def last_knot(spring):
     """Compression, force, slope and stored energy at the last knot."""
     i = int(spring.hard_exponent) - 1
-    return number(spring, i, 0), number(spring, i, 1), number(spring, i, 2), number(spring, i, 3)
+    return knot_number(spring, i, 0), knot_number(spring, i, 1), knot_number(spring, i, 2), knot_number(spring, i, 3)
 
 
 @inner()
-def pushed(x, spring):
+def pushed_beyond(x, spring):
     """Force and stored energy at a compression beyond the corner."""
-    end, f, s, energy = last(spring)
+    end, f, s, energy = last_knot(spring)
     if x >= end:
         over = x - end
         return f + s * over, energy + over * (f + 0.5 * s * over)
-    i = piece(x, spring)
-    start, h, a, b, c, d = cubic(i, spring)
+    i = piece_at(x, spring)
+    start, h, a, b, c, d = force_cubic(i, spring)
     t = (x - start) / h
-    energy = number(spring, i, 3) + h * t * (a + t * (b / 2.0 + t * (c / 3.0 + t * d / 4.0)))
+    energy = knot_number(spring, i, 3) + h * t * (a + t * (b / 2.0 + t * (c / 3.0 + t * d / 4.0)))
     return a + t * (b + t * (c + t * d)), energy
 
 
 @inner()
 def far_side(x, spring):
     """Force and its slope beyond the corner, continued smoothly to the near side of it."""
-    end, f, s, _ = last(spring)
+    end, f, s, _ = last_knot(spring)
     if x >= end:
         return f + s * (x - end), s
-    start, h, a, b, c, d = cubic(piece(x, spring), spring)
+    start, h, a, b, c, d = force_cubic(piece_at(x, spring), spring)
     t = (x - start) / h
     return a + t * (b + t * (c + t * d)), (b + t * (2.0 * c + 3.0 * t * d)) / h
 
@@ -322,14 +318,14 @@ def steepness(x, spring):
 
 
 @inner()
-def slopes(small, large, spring):
+def slopes_beyond(small, large, spring):
     """Average slopes between two compressions > 0, of which at least one is beyond the corner."""
-    end, f, s, _ = last(spring)
+    end, f, s, _ = last_knot(spring)
     if small >= end:
         return f + s * (0.5 * (small + large) - end), s
-    i = piece(small, spring)
-    if small >= spring.corner and large <= number(spring, i + 1, 0):
-        return within(small, large, i, spring)
+    i = piece_at(small, spring)
+    if small >= spring.corner and large <= knot_number(spring, i + 1, 0):
+        return slopes_in_piece(small, large, i, spring)
     work = gain = 0.0  # times the way
     x = small
     if small < spring.corner:
@@ -337,8 +333,8 @@ def slopes(small, large, spring):
         g, d = power_slopes(spring.stiffness, spring.exponent, small, x)
         work, gain = g * (x - small), d * (x - small)
     while x < large and x < end:
-        stop = min(large, number(spring, i + 1, 0))
-        g, d = within(x, stop, i, spring)
+        stop = min(large, knot_number(spring, i + 1, 0))
+        g, d = slopes_in_piece(x, stop, i, spring)
         work += g * (stop - x)
         gain += d * (stop - x)
         x = stop
@@ -350,9 +346,9 @@ def slopes(small, large, spring):
 
 
 @inner()
-def within(small, large, i, spring):
+def slopes_in_piece(small, large, i, spring):
     """Average slopes between two compressions in piece i."""
-    start, h, a, b, c, d = cubic(i, spring)
+    start, h, a, b, c, d = force_cubic(i, spring)
     t, u = (small - start) / h, (large - start) / h
     squares = t * t + t * u + u * u
     g = a + 0.5 * b * (t + u) + c * squares / 3.0 + 0.25 * d * (t + u) * (t * t + u * u)
