@@ -1,6 +1,6 @@
 """The search of `tune`: least material off, by linear programs over places of a body that is solved again and again."""
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
@@ -21,16 +21,7 @@ from . import pitches as wishes
 from .pitches import CENTS, Pitch, cents
 from .removal import Dishes, Places, Sensitivity, thickness, thinner
 
-SPARE = 2  # [-] modes found above the highest wanted, to follow it if it passes them
-SHARE = 0.25  # [-] of the tolerance that frequencies may err by: what is said of a pitch is then true
-AIM = 0.5  # [-] of the tolerance that the search leaves: as much as it may err
-SAME_MODE = 0.5  # [-] least squared cosine between the shapes of a mode before and after: else it is another
 PENALTY = 100.0  # [-] places taken down to the greatest depth that a miss of a cent weighs: more than any pitch costs
-FIRST_STEP = 0.1  # [-] of the least thickness by which the first step may change it: slopes then hold to a tenth or two
-MOST_STEPS = 40  # [-] bodies solved in a search: those of a bar cut to a third of its height take 25
-ALONG = 200  # [-] pieces of a bar where its modes are compared and drawn: ten for each half wave of the twentieth
-ENOUGH = 0.01  # [-] of what is taken off that another step would have to save
-NEGLIGIBLE = 0.02  # [-] of the deepest patch, below which one is left out
 
 
 def drawn(modes: Modes) -> tuple[np.ndarray, np.ndarray]:
@@ -41,8 +32,8 @@ def drawn(modes: Modes) -> tuple[np.ndarray, np.ndarray]:
     points, cells = grid(modes)
     if modes.dimension == 2:
         return points, cells
-    here = np.arange(ALONG)
-    return np.linspace(points.min(axis=0), points.max(axis=0), ALONG + 1), np.column_stack([here, here + 1])
+    here = np.arange(200)  # pieces: ten for each half wave of the twentieth mode
+    return np.linspace(points.min(axis=0), points.max(axis=0), len(here) + 1), np.column_stack([here, here + 1])
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -71,6 +62,11 @@ class Solved(check.Brief):
         return np.asarray(cents(1.0 + self.modes.frequency_error[self.which]))
 
     @cached_property
+    def thinnest(self) -> float:
+        """Least thickness [m]."""
+        return float(thickness(self.system.section, self.system.mesh.points).min())
+
+    @cached_property
     def sensitivity(self) -> Sensitivity:
         """What taking material off does."""
         shapes: Any = self.modes.shapes
@@ -90,9 +86,11 @@ class Blank(check.Brief):
     @classmethod
     def of(cls, target: Target, pitches: tuple[Pitch, ...], tolerance: float) -> "Blank":
         """With the modes that pitches mean, for a tolerance [cents]."""
-        close = min(SHARE * (2.0 ** (tolerance / CENTS) - 1.0), refinement.LOOSEST)
+        # frequencies err by a quarter of the tolerance at most: what is said of a pitch is then true
+        close = min(0.25 * (2.0 ** (tolerance / CENTS) - 1.0), refinement.LOOSEST)
         unsettled = not pitches[0].mode
-        count = max(len(pitches) + SPARE, *(each.mode for each in pitches)) + SPARE + RIGID_MOTIONS
+        # two above the highest wanted, to follow it if it passes them
+        count = max(len(pitches) + 2, *(each.mode for each in pitches)) + 2 + RIGID_MOTIONS
         modes = target.find(count, tolerance=close)
         while unsettled and modes.frequencies[-1] < 2.0 * max(each.frequency or 0.0 for each in pitches):
             modes = target.find(2 * modes.n_modes, tolerance=close)
@@ -134,7 +132,7 @@ class Blank(check.Brief):
         cosines = (old.T @ new) ** 2 / ((old**2).sum(axis=0)[:, None] * (new**2).sum(axis=0))
         cosines[:, : modes.n_rigid] = 0.0
         which = cosines.argmax(axis=1)
-        if cosines.max(axis=1).min() < SAME_MODE or len(set(which)) < len(which):
+        if cosines.max(axis=1).min() < 0.5 or len(set(which)) < len(which):
             lost = int(cosines.max(axis=1).argmin())
             raise SimulationError(
                 f"mode {self.numbers[lost]} is no longer to be told from others after this removal; take less depth"
@@ -159,10 +157,11 @@ class Thinning:
     mirror: str
     tolerance: float  # [cents]
     n_solved: int = 1
-    rows: tuple[Pitch, ...] = field(init=False)
 
-    def __post_init__(self) -> None:
-        self.rows = tuple(each for each in self.body.pitches if each.words)
+    @cached_property
+    def rows(self) -> tuple[Pitch, ...]:
+        """The pitches of which something is wanted."""
+        return tuple(each for each in self.body.pitches if each.words)
 
     def misses(self, solved: Solved) -> np.ndarray:
         """How far each pitch is missed, (n_pitches,) [cents]."""
@@ -189,7 +188,7 @@ class Thinning:
         places = Places.over(self.before.system, self.radius, self.mirror)
         share, solved = self.settle(places, np.zeros(len(places.first)), self.before)
         order = np.argsort(-share, kind="stable")
-        keep = order[share[order] > NEGLIGIBLE * share.max()][:most] if share.any() else order[:0]
+        keep = order[share[order] > 0.02 * share.max()][:most] if share.any() else order[:0]  # others are negligible
         if len(keep) < np.count_nonzero(share) and len(keep):
             places = places.some(keep)
             begun = self.after(places, share[keep], solved)
@@ -205,8 +204,8 @@ class Thinning:
 
     def settle(self, places: Places, share: np.ndarray, solved: Solved) -> tuple[np.ndarray, Solved]:
         """Shares (n_places,) of the greatest depth that take least off, and the body then; from shares to start at."""
-        room, overlaps = AIM * self.tolerance, places.overlaps
-        trust = FIRST_STEP * self.thinnest / self.depth
+        room, overlaps = 0.5 * self.tolerance, places.overlaps  # as much is left to what the search errs
+        trust = 0.1 * self.before.thinnest / self.depth  # slopes of so large a step hold to a tenth or two
         slopes, areas = self.slopes(solved, places)
         cost = areas / areas.max()
 
@@ -214,10 +213,10 @@ class Thinning:
             return float(cost @ share + PENALTY * np.maximum(np.abs(misses) - room, 0.0).sum())
 
         now = self.misses(solved)
-        for _ in range(MOST_STEPS):
+        for _ in range(40):  # bodies: those of a bar cut to a third of its height take 25
             tried = _cheapest(cost, slopes * self.depth, now, share, overlaps, room, trust)
             told = merit(share, now) - merit(tried, now + slopes @ (self.depth * (tried - share)))
-            if told <= ENOUGH * max(float(cost @ share), ENOUGH):
+            if told <= 0.01 * max(float(cost @ share), 0.01):  # of what is taken off
                 break
             try:
                 other = self.after(places, tried, solved)
@@ -230,11 +229,6 @@ class Thinning:
                 slopes, _ = self.slopes(solved, places)
             trust *= 2.0 if gained > 0.75 * told else 1.0 if gained > 0.25 * told else 0.4
         return share, solved
-
-    @cached_property
-    def thinnest(self) -> float:
-        """Least thickness [m] of the body as it stands."""
-        return float(thickness(self.before.system.section, self.before.system.mesh.points).min())
 
 
 def _cheapest(

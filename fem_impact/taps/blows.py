@@ -19,7 +19,6 @@ from ..modes.modal import Modes, left_out
 from .rig import FINE, MARGIN, Rig, accelerations, behind_tip
 
 STEPS = 40.0  # [-] steps of a contact: the force is then exact to 1e-5 of its peak
-FASTEST = 6.0  # [-] steps per period of the fastest mode that the contact sees: the force errs by 4e-6 of its peak
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -110,7 +109,8 @@ def longest_step(system: engine.KernelSystem, contact: Contact, duration: float)
     share = (system.shape[0, flexible] / system.omega[flexible]) ** 2
     whole = share.sum() + (duration**2) * float((system.shape[0, ~flexible] ** 2).sum()) / 10.0
     fast = system.omega[flexible][share > 1e-6 * whole]  # others change the force by as little
-    return min(step, 2.0 * np.pi / (FASTEST * fast.max())) if fast.size else step
+    # six steps per period of the fastest mode that the contact sees: the force errs by 4e-6 of its peak
+    return min(step, 2.0 * np.pi / (6.0 * fast.max())) if fast.size else step
 
 
 def records(

@@ -15,8 +15,6 @@ from . import triggers
 from .records import Taps
 
 ENDINGS = (".lvm", ".csv", ".tsv", ".txt", ".npy", ".npz", ".wav", ".mat", ".uff", ".unv", ".58")  # of records
-# [-] lines of a spectrum per inverse of the pulse's length: finer ones move where it falls by less than 0.1 %
-LINES = 64
 
 
 class Advice(NamedTuple):
@@ -41,8 +39,8 @@ def reach_of(taps: Taps, i: int, drop: float = 10.0) -> float | None:
         return None
     first, last = max(0, pulses[0][0] - triggers.GUARD), pulses[-1][1] + triggers.GUARD
     row = taps.force[i, first:last]
-    size = np.abs(np.fft.rfft(row, LINES * len(row)))
-    return falls(np.fft.rfftfreq(LINES * len(row), 1.0 / taps.rate), size, drop)
+    n = 64 * len(row)  # finer lines move where the spectrum falls by less than 0.1 %
+    return falls(np.fft.rfftfreq(n, 1.0 / taps.rate), np.abs(np.fft.rfft(row, n)), drop)
 
 
 def faults(taps: Taps, i: int) -> list[str]:

@@ -79,7 +79,7 @@ def test_fast_modes_that_matter_shorten_the_step():
     assert blows.longest_step(joined((ball, blows.wall()), [law]), law, 4e-4) == pytest.approx(1e-5)
     fast = blows.wall().with_mode(40e3, 0.01, 0.0, np.zeros(0))
     step = blows.longest_step(joined((ball, fast), [law]), law, 4e-4)
-    assert step == pytest.approx(1.0 / (blows.FASTEST * 40e3))
+    assert step == pytest.approx(1.0 / (6.0 * 40e3))
 
 
 def test_a_fast_mode_that_matters_is_followed():
