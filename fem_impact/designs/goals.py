@@ -77,7 +77,7 @@ class Goal:
         return " and ".join(words for words, end in zip(ends, (self.low, self.high)) if math.isfinite(end)) + unit
 
 
-def read(wanted: Any, blows: tuple[str, ...]) -> tuple[Goal, ...]:
+def read_goals(wanted: Any, blows: tuple[str, ...]) -> tuple[Goal, ...]:
     """All goals from what a user wants; those not told for one blow hold for each. ValueError says what is wrong."""
     example = f", as in {EXAMPLE}"
     table = arguments.table("wanted", wanted, example)

@@ -76,7 +76,7 @@ def read_pitch(name: str, mode: int, value: Any) -> Pitch:
     raise ValueError(f"{name} must be {HOW}; got {check.shown(value)}")
 
 
-def read(pitches: Any, match: str) -> tuple[Pitch, ...]:
+def read_pitches(pitches: Any, match: str) -> tuple[Pitch, ...]:
     """All pitches, in the order of their modes; those to be matched by nearness have mode 0 until `settled`."""
     check.one_of("match", match, MATCHES)
     if isinstance(pitches, Mapping):

@@ -1,5 +1,6 @@
 """Taking material off a plate or bar in round dishes: the section that is left, and what each dish does to modes."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -34,12 +35,10 @@ class Dishes:
     radius: float  # [m]
 
     @classmethod
-    def together(cls, several: "list[Dishes]") -> "Dishes":
-        """All dishes of several."""
-        return cls(
-            np.concatenate([each.middles for each in several]), np.concatenate([each.depths for each in several]),
-            several[0].radius,
-        )  # fmt: skip
+    def of_places(cls, places: Sequence[tuple[np.ndarray, float]], radius: float) -> "Dishes":
+        """Those of places (n, dimension) [m] with one depth [m] each."""
+        depths = np.repeat([deep for _, deep in places], [len(at) for at, _ in places])
+        return cls(np.concatenate([at for at, _ in places]), depths, radius)
 
     def depth(self, points: np.ndarray) -> np.ndarray:
         """Depth [m] taken off at points (n_points, dimension) [m], (n_points,)."""

@@ -213,11 +213,11 @@ def design(
     if least is not None and most is not None:
         raise ValueError("most must be left out where least is given")
     tolerance = check.between("tolerance", tolerance, 1e-9, 0.5)
-    maker, first = Maker.of(objects, box.names), box.start(start)
-    wishes = goals.read(wanted, tuple(maker.pieces(box.values(first))))
+    maker, first = Maker.of(objects, box.names), box.start_at(start)
+    wishes = goals.read_goals(wanted, tuple(maker.pieces(box.values(first))))
     count = None if n_modes is None else check.count("n_modes", n_modes, high=10_000)  # of a body in a blow
     search = _Search(maker, box, wishes, least or most, -1.0 if most else 1.0, count)
-    found = search.run(first, tolerance)
+    found = search.search_from(first, tolerance)
     tries = check.count("tries", tries, high=1024)  # points where a search begins
     points = qmc.Sobol(len(first), seed=0).random_base2(max(1, math.ceil(math.log2(tries))))
     low, high = box.bounds
@@ -225,7 +225,7 @@ def design(
         if found.met and search.least is None:
             break
         try:
-            other = search.run(low + point * (high - low), tolerance)
+            other = search.search_from(low + point * (high - low), tolerance)
         except (SimulationError, ValueError):
             continue
         found = min(found, other, key=search.rank)
@@ -308,11 +308,9 @@ class _Search:
     def slope(self, x: np.ndarray) -> np.ndarray:
         """Derivatives (n_goals, n_free) of all goals in the values of the free numbers."""
         key = x.tobytes()
-        if key not in self.slopes:
-            self.slopes[key] = self._slopes(self.state(x))
-        return self.slopes[key]
-
-    def _slopes(self, state: _State) -> np.ndarray:
+        if key in self.slopes:
+            return self.slopes[key]
+        state = self.state(x)
         found = np.zeros((len(self.goals), len(self.box.unknowns)))
         scales = [state.values[each.name] if each.log else each.high - each.low for each in self.box.unknowns]
         rates = {name: self.maker.rates(state.values, name, scale) for name, scale in zip(self.maker.names, scales)}
@@ -324,9 +322,10 @@ class _Search:
             some = [i for i, goal in enumerate(self.goals) if goal.blow == blow and not goal.mode]
             labels = [self.goals[i].name for i in some]
             found[some] = _hit_slopes(hit, labels, state.values, {name: rate[blow] for name, rate in rates.items()})
+        self.slopes[key] = found
         return found
 
-    def run(self, first: np.ndarray, tolerance: float) -> Design:
+    def search_from(self, first: np.ndarray, tolerance: float) -> Design:
         """One search from one point."""
         low, high = self.box.bounds
         x = solver.least(  # with a number to make least, this finds where the goals are met at all

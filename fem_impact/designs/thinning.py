@@ -96,26 +96,21 @@ class Blank(check.Brief):
             modes = target.find(2 * modes.n_modes, tolerance=close)
         if unsettled:
             pitches = wishes.settled(pitches, modes.frequencies[modes.n_rigid :])
-        numbers = {each.mode for each in pitches} | {1 for each in pitches if each.ratio is not None}
-        found = cls(target, pitches, tuple(sorted(numbers)), modes, close)
-        found.check_single(modes)
-        return found
-
-    @cached_property
-    def points(self) -> np.ndarray:
-        """Places (n, dimension) [m] all over the body."""
-        return drawn(self.start)[0]
-
-    def check_single(self, modes: Modes) -> None:
-        """Raise SimulationError if a mode looked at shares its frequency with another."""
+        numbers = sorted({each.mode for each in pitches} | {1 for each in pitches if each.ratio is not None})
         shared = sharing(modes).sum(axis=0) > 1
-        for number in self.numbers:
+        for number in numbers:
             if shared[modes.n_rigid + number - 1]:
                 raise SimulationError(
                     f"mode {number} at {modes.frequencies[modes.n_rigid + number - 1]:.6g} Hz shares its frequency "
                     "with another: a patch splits the pair, and neither has a slope of its own; start from a body "
                     "without this symmetry, or want other modes"
                 )
+        return cls(target, pitches, tuple(numbers), modes, close)
+
+    @cached_property
+    def spots(self) -> np.ndarray:
+        """Places (n, dimension) [m] all over the body."""
+        return drawn(self.start)[0]
 
     def first(self) -> Solved:
         """As it stands."""
@@ -127,8 +122,8 @@ class Blank(check.Brief):
         body = reassemble(replace(system, section=thinner(whole, dishes.depth)), system.mesh)
         wanted = None if self.target.size_stated else self.close
         modes = modal.find_modes(body, n_modes=self.start.n_modes, tolerance=wanted)
-        points = self.points
-        old, new = before.modes.shapes.at(points)[:, before.which], modes.shapes.at(points)
+        old, new = (each.shapes.at(self.spots) for each in (before.modes, modes))
+        old = old[:, before.which]
         cosines = (old.T @ new) ** 2 / ((old**2).sum(axis=0)[:, None] * (new**2).sum(axis=0))
         cosines[:, : modes.n_rigid] = 0.0
         which = cosines.argmax(axis=1)
@@ -159,22 +154,22 @@ class Thinning:
     n_solved: int = 1
 
     @cached_property
-    def rows(self) -> tuple[Pitch, ...]:
+    def sought(self) -> tuple[Pitch, ...]:
         """The pitches of which something is wanted."""
         return tuple(each for each in self.body.pitches if each.words)
 
     def misses(self, solved: Solved) -> np.ndarray:
         """How far each pitch is missed, (n_pitches,) [cents]."""
         first, now = self.before.frequencies, solved.frequencies
-        own = now[[self.body.numbers.index(each.mode) for each in self.rows]]
-        return np.asarray(cents(own, [self.body.wanted(first, now, each) for each in self.rows]))
+        own = now[[self.body.numbers.index(each.mode) for each in self.sought]]
+        return np.asarray(cents(own, [self.body.wanted(first, now, each) for each in self.sought]))
 
-    def slopes(self, solved: Solved, places: Places) -> tuple[np.ndarray, np.ndarray]:
+    def miss_slopes(self, solved: Solved, places: Places) -> tuple[np.ndarray, np.ndarray]:
         """Changes of the misses (n_pitches, n_places) [cents/m] with depths, and areas (n_places,) [m^2]."""
         each, areas = map(places.summed, solved.sensitivity.of_dishes(places.middles, self.radius))
         columns = each.T
-        own = columns[[self.body.numbers.index(row.mode) for row in self.rows]]
-        for i, row in enumerate(self.rows):
+        own = columns[[self.body.numbers.index(row.mode) for row in self.sought]]
+        for i, row in enumerate(self.sought):
             if row.ratio is not None:
                 own[i] -= columns[self.body.numbers.index(1)]
         return own, areas
@@ -183,7 +178,7 @@ class Thinning:
         """Volume per depth [m^2] of dishes around middles (n, dimension) [m]."""
         return float(self.before.sensitivity.of_dishes(middles, self.radius)[1].sum())
 
-    def run(self, most: int) -> list[tuple[np.ndarray, float]]:
+    def choose_places(self, most: int) -> list[tuple[np.ndarray, float]]:
         """At most so many places, each with its images and depth, from the largest."""
         places = Places.over(self.before.system, self.radius, self.mirror)
         share, solved = self.settle(places, np.zeros(len(places.first)), self.before)
@@ -206,7 +201,7 @@ class Thinning:
         """Shares (n_places,) of the greatest depth that take least off, and the body then; from shares to start at."""
         room, overlaps = 0.5 * self.tolerance, places.overlaps  # as much is left to what the search errs
         trust = 0.1 * self.before.thinnest / self.depth  # slopes of so large a step hold to a tenth or two
-        slopes, areas = self.slopes(solved, places)
+        slopes, areas = self.miss_slopes(solved, places)
         cost = areas / areas.max()
 
         def merit(share: np.ndarray, misses: np.ndarray) -> float:
@@ -226,7 +221,7 @@ class Thinning:
             gained = merit(share, now) - merit(tried, self.misses(other))
             if gained > 0.0:
                 share, solved, now = tried, other, self.misses(other)
-                slopes, _ = self.slopes(solved, places)
+                slopes, _ = self.miss_slopes(solved, places)
             trust *= 2.0 if gained > 0.75 * told else 1.0 if gained > 0.25 * told else 0.4
         return share, solved
 

@@ -104,7 +104,7 @@ class Tuning(check.Brief):
     @property
     def points(self) -> np.ndarray:
         """Places (n_points, dimension) [m] of the `map`."""
-        return self.body.points
+        return self.body.spots
 
     @cached_property
     def map(self) -> np.ndarray:
@@ -149,7 +149,7 @@ class Tuning(check.Brief):
         place = self.before.modes.point("at", at)[0]
         depth, radius = check.positive("depth", depth, "m"), check.positive("radius", radius or self.radius, "m")
         middles = images(place, self.mirror, self.before.system)
-        solved = self.body.after(Dishes(middles, np.full(len(middles), depth), radius), self.before)
+        solved = self.body.after(Dishes.of_places([(middles, depth)], radius), self.before)
         slopes = depth * self.before.sensitivity.of_dishes(middles, radius)[0].sum(axis=0)
         moved = cents(solved.frequencies, self.before.frequencies)
         return Patch(middles, radius, depth, self.body.numbers, moved, slopes)
@@ -256,7 +256,7 @@ def tune(
     >>> found.met, len(found.patches), abs(found.tones[0].left) <= found.tolerance
     (True, 1, True)
     """
-    wanted = wishes.read(pitches, match)
+    wanted = wishes.read_pitches(pitches, match)
     tolerance = check.between("tolerance", tolerance, 0.01, 100.0)
     target = _target(body)
     check_body(target.section)
@@ -272,7 +272,7 @@ def tune(
     if depth >= before.thinnest:
         raise ValueError(f"depth must be less than the thickness, {before.thinnest:g} m, got {depth:g} m")
     search = Thinning(start, before, depth, radius, mirror or "", tolerance)
-    found = search.run(check.count("patches", patches, high=100))
+    found = search.choose_places(check.count("patches", patches, high=100))
     made = _finish(start, search, found)
     if not made.met:
         promise.warn(made.verdict)
@@ -305,8 +305,7 @@ def _finish(body: Blank, search: Thinning, found: Sequence[tuple[np.ndarray, flo
     before = last = search.before
     told, slopes = [], before.sensitivity
     for k, (middles, deep) in enumerate(found, 1):
-        dishes = [Dishes(at, np.full(len(at), each), search.radius) for at, each in found[:k]]
-        now = body.after(Dishes.together(dishes), last)
+        now = body.after(Dishes.of_places(found[:k], search.radius), last)
         linear = deep * slopes.of_dishes(middles, search.radius)[0].sum(axis=0)
         moved = cents(now.frequencies, last.frequencies)
         told.append(Patch(middles, search.radius, deep, body.numbers, moved, linear))

@@ -92,7 +92,7 @@ def of_target(modes: Modes, at: Any, points: Any = None, softness: float | None 
     return tapped(reduce_body(modes, ((0, -1.0),), place, rows, rest), seen, modes.mass)
 
 
-def run(system: engine.KernelSystem, speed: float, step: float, horizon: float) -> History:
+def follow_blow(system: engine.KernelSystem, speed: float, step: float, horizon: float) -> History:
     """One blow of a system that moves at unit speed, at a speed [m/s] with a step in contact [s], up to a time [s]."""
     struck = system._replace(p=speed * system.p)
     struck.p.setflags(write=False)  # or numba would compile the kernels again for writable arrays
@@ -127,7 +127,7 @@ def records(
     step = longest_step(system, contact, duration)
     out = np.zeros((len(speeds), 1 + len(target.seen), n_fine))
     for one, speed in zip(out, speeds):
-        history = run(system, float(speed), step, times[-1])
+        history = follow_blow(system, float(speed), step, times[-1])
         until = int(np.searchsorted(times, history.end_time, side="right"))
         pushed = one[0, first:]
         with np.errstate(all="ignore"):  # the rate of the force, not used here, is infinite at the onset of soft laws

@@ -232,7 +232,7 @@ def _fit(
     used, outliers = list(range(cut.n_taps)), {}
     # of two taps that disagree, either may be wrong
     while robust and len(used) > max(3, (1.0 - solver.MOST_OUTLIERS) * cut.n_taps):
-        each = np.array([one.error for one in predictions.left_out(problem, best.x, cut.pick(used))])
+        each = np.array([one.error for one in predictions.predict_left_out(problem, best.x, cut.pick(used))])
         worst = int(each.argmax())
         others = [i for i in range(len(used)) if i != worst]
         without, begun = problem.among(others, best.x)

@@ -95,7 +95,7 @@ class Found(check.Brief):
     def _follow(self, name: str) -> tuple[Profile, np.ndarray, float]:
         """A profile, and coordinates and sum of squares of the best fit met on the way."""
         problem, x, j = _coordinate(self.problem, self.best.x, name)
-        profile, met = profiles.follow(problem, replace(self.best, x=x), j, *self._noise[:2], name)
+        profile, met = profiles.follow_profile(problem, replace(self.best, x=x), j, *self._noise[:2], name)
         return profile, problem.moved(met.x, self.problem), met.cost
 
     @cached_property
@@ -204,7 +204,7 @@ class Found(check.Brief):
         if len(self.used) < 2:
             raise ValueError("taps must be two at least, to predict one from the others")
         if rise_only not in self._left_out:
-            self._left_out[rise_only] = predictions.left_out(self.problem, self.best.x, self._used, rise_only)
+            self._left_out[rise_only] = predictions.predict_left_out(self.problem, self.best.x, self._used, rise_only)
         return self._left_out[rise_only]
 
     @property

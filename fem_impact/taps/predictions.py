@@ -99,7 +99,7 @@ def _spread(problem: Problem, best: Solution, single: Problem, x: np.ndarray) ->
     return float(np.sqrt(noise) * single.data.scale[0, 0]) * moved @ solver.pseudo_inverse(best.jacobian)[held]
 
 
-def left_out(problem: Problem, x: np.ndarray, taps: Taps, rise_only: bool = False) -> tuple[Prediction, ...]:
+def predict_left_out(problem: Problem, x: np.ndarray, taps: Taps, rise_only: bool = False) -> tuple[Prediction, ...]:
     """Every tap of a problem, predicted from a fit to the others that begins at ``x``."""
     n_taps = problem.data.n_taps
     found = []

@@ -213,7 +213,9 @@ class _Climb:
         return ""
 
 
-def follow(problem: Problem, best: Solution, j: int, noise: float, freedom: int, name: str) -> tuple[Profile, Solution]:
+def follow_profile(
+    problem: Problem, best: Solution, j: int, noise: float, freedom: int, name: str
+) -> tuple[Profile, Solution]:
     """The profile of a coordinate, and the best fit met on the way."""
     low, high = problem.bounds
     if j < problem.n_shared:

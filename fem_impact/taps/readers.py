@@ -16,7 +16,7 @@ from . import units
 END_OF_HEADER = "***End_of_Header***"
 COMMENTS = ("#", "%", "//")  # begin lines that are no data
 HEADER_LINES = 200  # [-] of a text table at most, before its numbers begin
-FEWEST = 8  # [-] samples of a channel
+LEAST = 8  # [-] samples of a channel
 AGREE = 0.01  # [-] two statements of the rate may differ by this, as written with few digits
 MOST_CHANNELS = 256  # [-] of a file; an array with more rows holds something else
 RATE_NAMES = ("rate", "fs", "sampling_rate", "samplerate", "sample_rate", "sampling_frequency", "frequency")
@@ -81,8 +81,8 @@ def arrays(path: Path) -> dict[str, np.ndarray]:
         reader = labview if head.startswith(b"LabVIEW Measurement") else universal if _universal(head) else table
     found = reader(path)
     for i, segment in enumerate(found.segments):
-        if len(segment) < FEWEST:
-            raise ValueError(f"{path.name} has {len(segment)} samples in segment {i + 1}; at least {FEWEST} are needed")
+        if len(segment) < LEAST:
+            raise ValueError(f"{path.name} has {len(segment)} samples in segment {i + 1}; at least {LEAST} are needed")
         if not (np.abs(segment) <= check.REACH).all():
             row, column = np.argwhere(~(np.abs(segment) <= check.REACH))[0]
             raise ValueError(
@@ -522,20 +522,20 @@ class Universal:
         return [self.file.read_sets(i) for i, kind in enumerate(self.kinds) if kind in kinds]
 
     @cached_property
-    def functions(self) -> list[dict]:
+    def function_sets(self) -> list[dict]:
         """The data sets 58."""
         return self.sets(58)
 
     def of_type(self, function: int, words: str, instead: str = "") -> list[dict]:
         """The functions of a type, whole and finite; ValueError says what the file holds without any."""
         found = []
-        for one, i in zip(self.functions, (i for i, kind in enumerate(self.kinds) if kind == 58)):
+        for one, i in zip(self.function_sets, (i for i, kind in enumerate(self.kinds) if kind == 58)):
             if int(one.get("func_type", 0)) == function:
                 first, last = self.file._block_ind[i][:2]
                 check_uff(self.path, one, self.raw[first : last + 1])
                 found.append(one)
         if not found:
-            types = sorted({int(one.get("func_type", 0)) for one in self.functions})
+            types = sorted({int(one.get("func_type", 0)) for one in self.function_sets})
             said = [f"{UFF_TYPES.get(each, 'functions')} (data set 58, function type {each})" for each in types]
             others = ", ".join(str(kind) for kind in sorted(set(self.kinds) - {58}))
             holds = " and ".join(said + [f"data sets {others}"] * bool(others)) or "no data sets"

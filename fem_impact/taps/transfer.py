@@ -277,7 +277,7 @@ def in_order(gap: np.ndarray) -> np.ndarray:
     return columns
 
 
-def table(pairs: tuple[Pair, ...]) -> str:
+def pair_table(pairs: tuple[Pair, ...]) -> str:
     """The pairs as text."""
     rows = [
         (pair.measured + 1, f"{pair.measured_frequency:.5g} Hz", pair.computed + 1, f"{pair.computed_frequency:.5g} Hz",
@@ -287,52 +287,32 @@ def table(pairs: tuple[Pair, ...]) -> str:
     return "\n".join(markup.columns(rows, ("measured", "", "computed", "", "difference", "MAC")))
 
 
-def write_uff(path: str | Path, data: Taps | xr.Dataset) -> None:
-    """Write taps (time records) or frequency responses of `frf` to data sets 58 of a universal file; needs pyuff."""
+def write_uff(path: str | Path, data: xr.Dataset) -> None:
+    """Write frequency responses of `frf` to data sets 58 of a universal file; needs pyuff."""
     pyuff = check.extra("pyuff", "uff", "a universal file")
-    sets = _time_sets(data) if isinstance(data, Taps) else _function_sets(data)
+    codes = {"func_type": readers.FREQUENCY_RESPONSE, "ord_data_type": 6, "abscissa_spec_data_type": 18}
+    frequency, sets = data["frequency"].values, []
+    for k, name in enumerate(data["channel"].values):
+        unit = str(data["units"].values[k]).removesuffix("/N")
+        made = _set(str(name), k + 2, frequency, data["H"].values[:, k]) | codes
+        ends = zip(("rsp_node", "rsp_dir", "ref_node", "ref_dir"), WAY)
+        way = {key: int(data[name].values[k]) for key, name in ends if name in data.coords}
+        sets.append(made | {"ordinate_spec_data_type": RESPONSE_CODE[unit], "orddenom_spec_data_type": 13} | way)
+        if "coherence" in data:
+            sure = {"func_type": readers.COHERENCE, "ord_data_type": 4, "data": data["coherence"].values[:, k]}
+            sets.append(sets[-1] | sure)
     with replacing(path) as temporary:
         pyuff.UFF(str(temporary)).write_sets(sets, mode="overwrite")
 
 
-def _set(name: str, number: int, x: np.ndarray, values: np.ndarray, **codes: Any) -> dict[str, Any]:
+def _set(name: str, number: int, x: np.ndarray, values: np.ndarray) -> dict[str, Any]:
     return {
         "type": 58, "binary": 0, "id1": name[:60], "id2": "NONE", "id3": "NONE", "id4": "NONE", "id5": "NONE",
         "ver_num": 0, "load_case_id": 0, "rsp_ent_name": "NONE", "rsp_node": number, "rsp_dir": 3,
         "ref_ent_name": "NONE", "ref_node": 1, "ref_dir": 3, "num_pts": len(x), "abscissa_spacing": 1,
         "abscissa_min": float(x[0]), "abscissa_inc": float(x[-1] - x[0]) / (len(x) - 1), "z_axis_value": 0.0,
-        "orddenom_spec_data_type": 0, "x": x, "data": values, **codes,
+        "orddenom_spec_data_type": 0, "x": x, "data": values,
     }  # fmt: skip
-
-
-def _time_sets(taps: Taps) -> list[dict[str, Any]]:
-    codes = {"func_type": 1, "ord_data_type": 4, "abscissa_spec_data_type": 17}
-    sets = []
-    for i in range(taps.n_taps):
-        sets.append(_set("force", 1, taps.time, taps.force[i], ordinate_spec_data_type=13, **codes))
-        for k, (name, unit) in enumerate(zip(taps.table["channel"].values, taps.units)):
-            code = RESPONSE_CODE[unit]
-            sets.append(
-                _set(str(name), k + 2, taps.time, taps.response[i, :, k], ordinate_spec_data_type=code, **codes)
-            )
-    return sets
-
-
-def _function_sets(data: xr.Dataset) -> list[dict[str, Any]]:
-    codes = {"func_type": readers.FREQUENCY_RESPONSE, "ord_data_type": 6, "abscissa_spec_data_type": 18}
-    frequency, sets = data["frequency"].values, []
-    for k, name in enumerate(data["channel"].values):
-        unit = str(data["units"].values[k]).removesuffix("/N")
-        made = _set(
-            str(name), k + 2, frequency, data["H"].values[:, k], ordinate_spec_data_type=RESPONSE_CODE[unit], **codes
-        )
-        ends = zip(("rsp_node", "rsp_dir", "ref_node", "ref_dir"), WAY)
-        way = {key: int(data[name].values[k]) for key, name in ends if name in data.coords}
-        sets.append(made | {"orddenom_spec_data_type": 13} | way)
-        if "coherence" in data:
-            sure = {"func_type": readers.COHERENCE, "ord_data_type": 4, "data": data["coherence"].values[:, k]}
-            sets.append(sets[-1] | sure)
-    return sets
 
 
 def read_frf(path: Any) -> xr.Dataset:
@@ -377,7 +357,7 @@ def arrays(path: Path) -> dict[str, np.ndarray]:
     ways = np.array([_way(one) for one in sets])
     found = {"frequency": frequency, "H": np.column_stack(columns), "channels": np.array(names, dtype=str)}
     found |= {"units": np.array(units), "ways": ways, "notes": np.array(list(dict.fromkeys(notes)), dtype=str)}
-    sure = {_way(one): np.real(one["data"]) for one in file.functions if one.get("func_type") == readers.COHERENCE}
+    sure = {_way(one): np.real(one["data"]) for one in file.function_sets if one.get("func_type") == readers.COHERENCE}
     if all(way in sure and len(sure[way]) == len(frequency) for way in map(tuple, ways.tolist())):
         found["coherence"] = np.column_stack([sure[tuple(way)] for way in ways.tolist()]).astype(float)
         if not ((found["coherence"] >= 0.0) & (found["coherence"] <= 1.0 + 1e-6)).all():

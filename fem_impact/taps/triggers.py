@@ -54,6 +54,14 @@ def starts(force: np.ndarray, trigger: float, together: int) -> np.ndarray:
     return above[np.concatenate([[True], np.diff(above) > together])]
 
 
+def find_rooms(force: np.ndarray, trigger: float, together: int) -> list[tuple[int, int, int]]:
+    """Of every tap its first sample above the trigger, and the samples before and after it that are its own."""
+    begun = starts(force, trigger, together)
+    halves = (0.5 * np.diff(begun)).astype(int)
+    before, after = np.append(begun[:1], halves), np.append(halves, len(force) - begun[-1:])
+    return list(zip(begun.tolist(), before.tolist(), after.tolist()))
+
+
 def pulses(force: np.ndarray, noise: float = 0.0, least: float | None = None) -> list[tuple[int, int]]:
     """First sample of every pulse of a tap (n_times,), and the one after its last; two of a double hit.
 
@@ -132,12 +140,7 @@ def cut(
     moved = [row - rest for (row, _), rest in zip(segments, rests)]
     whole = np.concatenate(moved)
     limit = level(whole) if trigger is None else check.positive("trigger", trigger, "N")
-    places = []  # segment, first sample above the trigger, and the samples before and after it that are the tap's own
-    for k, row in enumerate(moved):
-        begun = starts(row, limit, pause)
-        halves = (0.5 * np.diff(begun)).astype(int)
-        ahead, behind = np.append(begun[:1], halves), np.append(halves, len(row) - begun[-1:])
-        places += [(k, *place) for place in zip(begun.tolist(), ahead.tolist(), behind.tolist())]
+    places = [(k, *place) for k, row in enumerate(moved) for place in find_rooms(row, limit, pause)]
     if not places:
         raise ValueError(
             f"no tap was found in {name}: its force reaches {whole.max():.3g} N and the trigger is {limit:.3g} N; "

@@ -108,7 +108,7 @@ class Box:
         """The unknowns by name at coordinates (n_unknowns,)."""
         return {each.name: float(np.clip(each.outside(z), each.low, each.high)) for each, z in zip(self.unknowns, x)}
 
-    def start(self, given: Any) -> np.ndarray:
+    def start_at(self, given: Any) -> np.ndarray:
         """Coordinates (n_unknowns,) of the values given by name; of others the middle of the range."""
         table, (low, high) = arguments.table("start", given), self.bounds
         for name in table:

@@ -56,7 +56,7 @@ class Updated(check.Brief):
             lines.append(f"{name} = {value:.4g}{told}")
         left = ", ".join(f"{frequency:.5g} Hz" for frequency in self.unpaired)
         alone = [f"without a mode of the body, left out: {left}"] if left else []
-        return "\n".join([*lines, transfer.table(self.pairs), *alone, f"{self.n_solves} solves"])
+        return "\n".join([*lines, transfer.pair_table(self.pairs), *alone, f"{self.n_solves} solves"])
 
 
 def update(
@@ -125,15 +125,16 @@ def update(
         raise ValueError(f"measured must hold at least {n} frequencies for as many unknowns, got {len(target)}")
     if (target <= 0.0).any():
         raise ValueError("measured must hold positive frequencies only; leave out rigid motions")
-    for each in box.unknowns if isinstance(build, Scene) else ():
-        check.one_of(f"the table of unknown[{each.name!r}]", each.name.partition(".")[0], TABLES)
-        try:
-            build.changed({each.name: each.low})
-        except ValueError as error:
-            raise ValueError(f"unknown[{each.name!r}]: {error}") from None
+    if isinstance(build, Scene):
+        for each in box.unknowns:
+            check.one_of(f"the table of unknown[{each.name!r}]", each.name.partition(".")[0], TABLES)
+            try:
+                build.changed({each.name: each.low})
+            except ValueError as error:
+                raise ValueError(f"unknown[{each.name!r}]: {error}") from None
     search = _Misfit(build, box, measured, target, points)
     used = every = np.arange(len(target))  # numbers of the measured modes that are paired
-    found = search.fit(box.start(start), every)
+    found = search.fit(box.start_at(start), every)
     for count in range(3):  # frequencies that belong to no mode: with more, nobody knows which ones are right
         spare = len(every) - count - n
         if spare < n or count > MOST_OUTLIERS * len(every):

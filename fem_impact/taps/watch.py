@@ -1,9 +1,9 @@
 """Judge every record of taps that a folder gets: good, or what to do before the next one."""
 
-from collections.abc import Iterator
+from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -100,7 +100,13 @@ class Folder:
 
     def look(self) -> list[Path]:
         """Records that are new or changed and that nobody wrote to since the last look, the oldest first."""
-        now = {path.name: (stat.st_size, stat.st_mtime_ns) for path, stat in self._records()}
+        now = {}
+        for path in self.path.iterdir():
+            if path.suffix.lower() in ENDINGS and not path.name.startswith((PARTIAL, ".", "~")):
+                with suppress(FileNotFoundError):  # renamed since it was listed
+                    stat = path.stat()
+                    if path.is_file() and stat.st_size:
+                        now[path.name] = stat.st_size, stat.st_mtime_ns
         settled = [name for name, state in now.items() if state == self.last.get(name) != self.told.get(name)]
         self.last = now
         self.told |= {name: now[name] for name in settled}
@@ -110,13 +116,3 @@ class Folder:
     def waiting(self) -> bool:
         """Whether records are there that were not handed out."""
         return any(self.told.get(name) != state for name, state in self.last.items())
-
-    def _records(self) -> Iterator[tuple[Path, Any]]:
-        for path in self.path.iterdir():
-            if path.suffix.lower() in ENDINGS and not path.name.startswith((PARTIAL, ".", "~")):
-                try:
-                    stat = path.stat()
-                except FileNotFoundError:  # renamed since it was listed
-                    continue
-                if path.is_file() and stat.st_size:
-                    yield path, stat

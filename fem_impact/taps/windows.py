@@ -81,7 +81,7 @@ def cut(taps: Taps, window: Any) -> Taps:
     starts = np.round(taps.onset * taps.rate).astype(int)
     before, after = round(float(first) * taps.rate), round(float(last) * taps.rate)
     before, after = min(before, int(starts.min())), min(after, int(len(taps.time) - starts.max()))
-    if before < 0 or after < 4 or before + after < readers.FEWEST:
+    if before < 0 or after < 4 or before + after < readers.LEAST:
         raise ValueError(f"window must leave samples after the onset, got {after}; give longer records")
     samples = xr.DataArray(starts[:, None] + np.arange(-before, after), dims=("tap", "time"))
     table = taps.table.drop_vars("time").isel(tap=xr.DataArray(np.arange(taps.n_taps), dims="tap"), time=samples)

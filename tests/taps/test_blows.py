@@ -19,7 +19,7 @@ def plate():
 def blow(striker, target, law, speed, duration, horizon, finer=1.0):
     """A quick blow by its longest step, or a finer one."""
     system = joined((striker, target), [law])
-    return blows.run(system, speed, blows.longest_step(system, law, duration) / finer, horizon)
+    return blows.follow_blow(system, speed, blows.longest_step(system, law, duration) / finer, horizon)
 
 
 @pytest.mark.filterwarnings("ignore::fem_impact.ToleranceWarning")

@@ -90,6 +90,7 @@ def test_without_a_code_of_the_denominator_force_is_assumed_and_told(tmp_path):
         ([response(1), response(1, np.full(200, 2.0), func_type=6, ord_data_type=4)], "coherence that is not between"),
         ([response(1, np.where(X == 50.0, np.inf, H))], "no finite number"),
         ([NODES], "holds data sets 15, no frequency responses"),
+        ([response(1, H.real, func_type=1)], r"holds time records \(data set 58, function type 1\), no frequency resp"),
     ],
 )
 def test_a_wrong_file_is_refused(tmp_path, sets, text):

@@ -40,7 +40,7 @@ class Known:
         """Of the first unknown, whose best fit is known."""
         x = np.array([float(each.inside(value)) for each, value in zip(self.free, (best, 2.0 * best, 0.0))])
         start = Solution(x, float(np.square(self.residual(x)).sum()), self.jacobian(x))
-        return profiles.follow(self, start, 0, 1.0, FREEDOM, "a")[0]
+        return profiles.follow_profile(self, start, 0, 1.0, FREEDOM, "a")[0]
 
 
 def parabola(open_=(False, False), log=False, n=41, width=0.1):

@@ -274,10 +274,8 @@ def test_a_wav_that_is_cut_off_says_so(tmp_path):
     assert "cut off" in notes and len(values) == 500
 
 
-RECORD = transfer._set(
-    "NONE", 1, np.arange(40) / RATE, np.arange(40.0), func_type=1, ord_data_type=4, abscissa_spec_data_type=17,
-    ordinate_spec_data_type=13,
-)  # fmt: skip
+KINDS = {"func_type": 1, "ord_data_type": 4, "abscissa_spec_data_type": 17, "ordinate_spec_data_type": 13}
+RECORD = transfer._set("NONE", 1, np.arange(40) / RATE, np.arange(40.0)) | KINDS
 MOVES = {"ordinate_spec_data_type": 12, "data": 2.0 * np.arange(40)}
 POUNDS = {"type": 164, "units_code": 2, "units_description": "foot", "temp_mode": 1, "length": 3.2808, "force": 0.22481,
           "temp": 1.8, "temp_offset": 459.67}  # fmt: skip
