@@ -1,4 +1,4 @@
-"""Simulated taps of a hammer on a structure of two modes, for tests of what is found from them."""
+"""Simulated taps of a hammer on a structure of two modes, for tests of what is found from them, and fits to them."""
 
 import fem_impact as fi
 
@@ -11,7 +11,7 @@ STRUCTURE = fi.Modes.from_arrays(
 )
 
 
-def taps_of(target, place, *, mass=MASS, law=LAW, speeds=SPEEDS, noise=0.005, **rig):
+def taps_of(target=STRUCTURE, place=(0.0,), *, mass=MASS, law=LAW, speeds=SPEEDS, noise=0.005, **rig):
     """One record for each speed; ``law`` may be a list of contacts, one for each."""
     laws = law if isinstance(law, list) else [law] * len(speeds)
     hits = [
@@ -19,3 +19,10 @@ def taps_of(target, place, *, mass=MASS, law=LAW, speeds=SPEEDS, noise=0.005, **
         for v, each in zip(speeds, laws)
     ]
     return [fi.measure(h, rate=RATE, noise=noise, rng=i, onset=i * 7e-6, **rig) for i, h in enumerate(hits)]
+
+
+def fitted(taps, **changes):
+    """A fit to taps of the structure, from two starts and without profiles."""
+    given = {"target": STRUCTURE, "at": [0.0], "striker": fi.Striker.rigid(0.1), "contact": LAW, "unknown": RANGES,
+             "starts": 2, "profiles": False}  # fmt: skip
+    return fi.fit(taps, **given | changes)

@@ -8,6 +8,7 @@ from typing import Any
 
 from .._base import check
 from ..impact.quantities import UNITS
+from ..taps import arguments
 
 MODE = re.compile(r"mode([1-9]\d*)\.(frequency|ratio)")
 KNOWN = (
@@ -15,7 +16,6 @@ KNOWN = (
     "n_impacts", "clearance", "mode1.frequency", "mode2.ratio",
 )  # fmt: skip
 CLEAR = 0.01  # [-] clearance of a blow that shall hit once: far beside what grazes, little beside an impact
-DECIBELS = 20.0 / math.log(10.0)  # [dB] fact: a miss of a level is told as that of the force
 EXAMPLE = '{"mode1.frequency": 262.0, "contact_time": (1e-3, 2e-3)}'
 
 
@@ -55,7 +55,7 @@ class Goal:
         if self.name in ("restitution", "clearance"):
             return 1.0
         if self.name.startswith("spectral_level"):
-            return DECIBELS
+            return 20.0 / math.log(10.0)  # dB: a miss of a level is told as that of the force
         return max(abs(end) for end in (self.low, self.high) if math.isfinite(end)) or 1.0
 
     @property
@@ -77,27 +77,25 @@ class Goal:
         return " and ".join(words for words, end in zip(ends, (self.low, self.high)) if math.isfinite(end)) + unit
 
 
-def read(wanted: Any, blows: tuple[str, ...]) -> tuple[Goal, ...]:
+def read_goals(wanted: Any, blows: tuple[str, ...]) -> tuple[Goal, ...]:
     """All goals from what a user wants; those not told for one blow hold for each. ValueError says what is wrong."""
-    table = _table("wanted", wanted)
+    example = f", as in {EXAMPLE}"
+    table = arguments.table("wanted", wanted, example)
     if not table:
         raise ValueError(f"wanted must name at least one quantity, as in {EXAMPLE}")
     found: list[Goal] = []
     for name, value in table.items():
         if isinstance(value, Mapping):
             check.one_of("the blow in wanted", name, [blow for blow in blows if blow])
-            found += [_goal(f"wanted[{name!r}]", own, what, name) for own, what in _table("wanted", value).items()]
+            found += [
+                _goal(f"wanted[{name!r}]", own, what, name)
+                for own, what in arguments.table("wanted", value, example).items()
+            ]
         elif MODE.fullmatch(name):
             found.append(_goal("wanted", name, value, ""))
         else:
             found += [_goal("wanted", name, value, blow) for blow in blows]
     return tuple(found)
-
-
-def _table(name: str, value: Any) -> dict[str, Any]:
-    if not isinstance(value, Mapping) or not all(isinstance(key, str) for key in value):
-        raise ValueError(f"{name} must be a dict of names, as in {EXAMPLE}; got {check.shown(value)}")
-    return dict(value)
 
 
 def _goal(where: str, name: str, value: Any, blow: str) -> Goal:

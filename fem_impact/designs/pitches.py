@@ -18,8 +18,6 @@ FREQUENCY, BESIDE, RATIO = (
     re.compile(rf"({NUMBER})(?:\s*Hz)?"), re.compile(rf"({NUMBER})\s*cents?"), re.compile(rf"ratio\s+({NUMBER})")
 )  # fmt: skip
 HOW = "a frequency in Hz, a note such as 'A4' or 'Bb3 -5 cents', '-14 cents' from now, or 'ratio 4' to the first mode"
-# [-] how many times as far as the nearest mode the next must be: at less, errors and taste decide which is meant
-APART = 2.0
 MATCHES = ("order", "nearest")
 
 
@@ -78,7 +76,7 @@ def read_pitch(name: str, mode: int, value: Any) -> Pitch:
     raise ValueError(f"{name} must be {HOW}; got {check.shown(value)}")
 
 
-def read(pitches: Any, match: str) -> tuple[Pitch, ...]:
+def read_pitches(pitches: Any, match: str) -> tuple[Pitch, ...]:
     """All pitches, in the order of their modes; those to be matched by nearness have mode 0 until `settled`."""
     check.one_of("match", match, MATCHES)
     if isinstance(pitches, Mapping):
@@ -103,7 +101,8 @@ def settled(pitches: tuple[Pitch, ...], frequencies: np.ndarray) -> tuple[Pitch,
     for each in pitches:
         far = np.abs(cents(frequencies, each.frequency))
         first, second = np.argsort(far)[:2]
-        if far[second] < APART * far[first] or 1 + first in taken:
+        # at less than twice as far, errors and taste decide which is meant
+        if far[second] < 2.0 * far[first] or 1 + first in taken:
             raise ValueError(
                 f"pitches: {each.words} is {far[first]:.0f} cents from mode {first + 1} and {far[second]:.0f} cents "
                 f"from mode {second + 1}, so it is not clear which is meant; name the mode, as in "

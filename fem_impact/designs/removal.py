@@ -1,5 +1,6 @@
 """Taking material off a plate or bar in round dishes: the section that is left, and what each dish does to modes."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -15,15 +16,11 @@ from ..fe.variation import SectionChange, frequency_densities
 from .pitches import CENTS
 
 PER_CENT = CENTS / np.log(2.0)  # [-] fact: cents of a relative change
-# [-] exponent of a dish at its radius: smooth everywhere, as elements like it, and a twentieth is left there
-FALL = 3.0
-FAR = 2.5  # [-] distance over the radius beyond which a dish is nothing: 1e-8 of its depth
-CLOSER = 0.5  # [-] distance of places looked at over the radius of a dish: between two such, one of them does as well
 
 
 def bell(square: np.ndarray) -> np.ndarray:
-    """Depth of a dish over that in its middle, at squared distances over its squared radius."""
-    return np.asarray(np.exp(-FALL * square))
+    """Depth of a dish over that in its middle, at squared distances over its squared radius: smooth everywhere."""
+    return np.asarray(np.exp(-3.0 * square))
 
 
 @dataclass(frozen=True, eq=False)
@@ -38,12 +35,10 @@ class Dishes:
     radius: float  # [m]
 
     @classmethod
-    def together(cls, several: "list[Dishes]") -> "Dishes":
-        """All dishes of several."""
-        return cls(
-            np.concatenate([each.middles for each in several]), np.concatenate([each.depths for each in several]),
-            several[0].radius,
-        )  # fmt: skip
+    def of_places(cls, places: Sequence[tuple[np.ndarray, float]], radius: float) -> "Dishes":
+        """Those of places (n, dimension) [m] with one depth [m] each."""
+        depths = np.repeat([deep for _, deep in places], [len(at) for at, _ in places])
+        return cls(np.concatenate([at for at, _ in places]), depths, radius)
 
     def depth(self, points: np.ndarray) -> np.ndarray:
         """Depth [m] taken off at points (n_points, dimension) [m], (n_points,)."""
@@ -126,7 +121,7 @@ class Sensitivity:
         Volumes per depth are areas [m^2]; what lies beyond the edge is not there.
         """
         found, areas = np.zeros((len(middles), self.cents.shape[1])), np.zeros(len(middles))
-        for i, near in enumerate(self.tree.query_ball_point(middles, FAR * radius)):
+        for i, near in enumerate(self.tree.query_ball_point(middles, 2.5 * radius)):  # 1e-8 of the depth is left there
             dish = bell(((self.places[near] - middles[i]) ** 2).sum(axis=1) / radius**2)
             found[i], areas[i] = dish @ self.cents[near], dish @ self.areas[near]
         return found, areas
@@ -157,7 +152,7 @@ class Places:
     def over(cls, system: System, radius: float, axes: str) -> "Places":
         """Those over the whole body, so close that a dish between two does no more than both."""
         low, size = system.mesh.points.min(axis=0), np.ptp(system.mesh.points, axis=0)
-        lines = [a + s * np.linspace(0.0, 1.0, 1 + max(2, round(s / (CLOSER * radius)))) for a, s in zip(low, size)]
+        lines = [a + s * np.linspace(0.0, 1.0, 1 + max(2, round(s / (0.5 * radius)))) for a, s in zip(low, size)]
         for k in map("xy".index, axes):
             lines[k] = lines[k][lines[k] <= low[k] + (0.5 + SAME) * size[k]]
         middles = np.stack(np.meshgrid(*lines, indexing="ij"), axis=-1).reshape(-1, len(low))

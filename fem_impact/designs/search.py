@@ -27,7 +27,6 @@ from . import goals
 from .goals import Goal
 from .objects import Maker, Piece, Rate
 
-TOLERANCE = 1e-3  # [-] default miss of what is wanted: 1.7 cents of a frequency
 # [-] relative change that ends a search: its last steps gain several digits each, so a looser end hardly saves any
 CLOSE = 1e-10
 LOST = 1e3  # [-] miss of numbers that make no blow: any that is far above the miss of a blow makes the search turn back
@@ -124,7 +123,7 @@ class Design(check.Brief):
         for name, piece in self.maker.pieces(self.values).items():
             own = [each.goal for each in self.reached if each.goal.blow == name and not each.goal.mode]
             if own:
-                hits[name], apart[name] = _twice(piece, self.tolerance)
+                hits[name], apart[name] = _strike_twice(piece, self.tolerance)
                 found |= {goal.label: _of_hit(hits[name], goal) for goal in own}
         some = [each.goal for each in self.reached if each.goal.mode]
         if some:
@@ -144,7 +143,7 @@ def design(
     least: str | None = None,
     most: str | None = None,
     start: Mapping[str, float] | None = None,
-    tolerance: float = TOLERANCE,
+    tolerance: float = 1e-3,
     tries: int = 1,
     n_modes: int | None = None,
 ) -> Design:
@@ -171,7 +170,8 @@ def design(
     start : mapping of number to value, optional
         Where the search begins; by default the middle of each range.
     tolerance : float [-]
-        Largest miss of a goal, relative to the wanted value (of a restitution absolute).
+        Largest miss of a goal, relative to the wanted value (of a restitution absolute); 0.001 of a frequency are 1.7
+        cents.
     tries : int
         Most points, spread over the ranges, where a search begins: until one finds a design; with ``least`` or ``most``
         all of them.
@@ -213,11 +213,11 @@ def design(
     if least is not None and most is not None:
         raise ValueError("most must be left out where least is given")
     tolerance = check.between("tolerance", tolerance, 1e-9, 0.5)
-    maker, first = Maker.of(objects, box.names), box.start(start)
-    wishes = goals.read(wanted, tuple(maker.pieces(box.values(first))))
+    maker, first = Maker.of(objects, box.names), box.start_at(start)
+    wishes = goals.read_goals(wanted, tuple(maker.pieces(box.values(first))))
     count = None if n_modes is None else check.count("n_modes", n_modes, high=10_000)  # of a body in a blow
     search = _Search(maker, box, wishes, least or most, -1.0 if most else 1.0, count)
-    found = search.run(first, tolerance)
+    found = search.search_from(first, tolerance)
     tries = check.count("tries", tries, high=1024)  # points where a search begins
     points = qmc.Sobol(len(first), seed=0).random_base2(max(1, math.ceil(math.log2(tries))))
     low, high = box.bounds
@@ -225,7 +225,7 @@ def design(
         if found.met and search.least is None:
             break
         try:
-            other = search.run(low + point * (high - low), tolerance)
+            other = search.search_from(low + point * (high - low), tolerance)
         except (SimulationError, ValueError):
             continue
         found = min(found, other, key=search.rank)
@@ -308,11 +308,9 @@ class _Search:
     def slope(self, x: np.ndarray) -> np.ndarray:
         """Derivatives (n_goals, n_free) of all goals in the values of the free numbers."""
         key = x.tobytes()
-        if key not in self.slopes:
-            self.slopes[key] = self._slopes(self.state(x))
-        return self.slopes[key]
-
-    def _slopes(self, state: _State) -> np.ndarray:
+        if key in self.slopes:
+            return self.slopes[key]
+        state = self.state(x)
         found = np.zeros((len(self.goals), len(self.box.unknowns)))
         scales = [state.values[each.name] if each.log else each.high - each.low for each in self.box.unknowns]
         rates = {name: self.maker.rates(state.values, name, scale) for name, scale in zip(self.maker.names, scales)}
@@ -324,11 +322,15 @@ class _Search:
             some = [i for i, goal in enumerate(self.goals) if goal.blow == blow and not goal.mode]
             labels = [self.goals[i].name for i in some]
             found[some] = _hit_slopes(hit, labels, state.values, {name: rate[blow] for name, rate in rates.items()})
+        self.slopes[key] = found
         return found
 
-    def run(self, first: np.ndarray, tolerance: float) -> Design:
+    def search_from(self, first: np.ndarray, tolerance: float) -> Design:
         """One search from one point."""
-        x = self._squares(first)  # with a number to make least, this finds where the goals are met at all
+        low, high = self.box.bounds
+        x = solver.least(  # with a number to make least, this finds where the goals are met at all
+            self._misses, self._pulled, first, (low, high), close=CLOSE, iterations=solver.ENOUGH, method="dogbox"
+        ).x  # fmt: skip
         if self.least is not None:
             x = self._least(x, tolerance)
         state, slopes = self.state(x), self.slope(x)
@@ -336,7 +338,6 @@ class _Search:
             Reached(goal, float(value), dict(zip(self.maker.names, row.tolist())))
             for goal, value, row in zip(self.goals, state.found, slopes)
         )
-        low, high = self.box.bounds
         part = (x - low) / (high - low)
         ends = tuple(each.name for each, p in zip(self.box.unknowns, part) if min(p, 1.0 - p) < SAME)
         return Design(
@@ -363,21 +364,9 @@ class _Search:
         scale = np.array([goal.scale for goal in self.goals])
         return self.slope(x) / scale[:, None] / np.array(per_value)
 
-    def _squares(self, first: np.ndarray) -> np.ndarray:
-        begun = False
-
-        def misses(x: np.ndarray) -> np.ndarray:
-            nonlocal begun
-            if not begun:
-                self.state(x)  # an error at the start is the user's
-                begun = True
-            return self._misses(x)
-
-        def slopes(x: np.ndarray) -> np.ndarray:
-            return self._turned(x) * (self._misses(x) != 0.0)[:, None]
-
-        bounds, count = self.box.bounds, solver.ENOUGH
-        return solver.least(misses, slopes, first, bounds, close=CLOSE, iterations=count, method="dogbox").x
+    def _pulled(self, x: np.ndarray) -> np.ndarray:
+        """Derivatives (n_goals, n_free) of the misses in the coordinates; none of goals that are met."""
+        return self._turned(x) * (self._misses(x) != 0.0)[:, None]
 
     def _least(self, first: np.ndarray, tolerance: float) -> np.ndarray:
         """Where one number is smallest or largest of all points seen that meet the goals; else where it ends."""
@@ -415,7 +404,7 @@ class _Search:
         }  # fmt: skip
 
 
-def _twice(piece: Piece, tolerance: float) -> tuple[Response, Mapping[str, float]]:
+def _strike_twice(piece: Piece, tolerance: float) -> tuple[Response, Mapping[str, float]]:
     """A blow by a plan of its own, and its differences from a finer one; modes that were given stay."""
     if piece.target.modes is None:
         run = planner.verify(piece.blow.run(tolerance=min(tolerance, piece.arguments.get("tolerance", tolerance))))

@@ -1,6 +1,6 @@
 """The search of `tune`: least material off, by linear programs over places of a body that is solved again and again."""
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
@@ -21,16 +21,7 @@ from . import pitches as wishes
 from .pitches import CENTS, Pitch, cents
 from .removal import Dishes, Places, Sensitivity, thickness, thinner
 
-SPARE = 2  # [-] modes found above the highest wanted, to follow it if it passes them
-SHARE = 0.25  # [-] of the tolerance that frequencies may err by: what is said of a pitch is then true
-AIM = 0.5  # [-] of the tolerance that the search leaves: as much as it may err
-SAME_MODE = 0.5  # [-] least squared cosine between the shapes of a mode before and after: else it is another
 PENALTY = 100.0  # [-] places taken down to the greatest depth that a miss of a cent weighs: more than any pitch costs
-FIRST_STEP = 0.1  # [-] of the least thickness by which the first step may change it: slopes then hold to a tenth or two
-MOST_STEPS = 40  # [-] bodies solved in a search: those of a bar cut to a third of its height take 25
-ALONG = 200  # [-] pieces of a bar where its modes are compared and drawn: ten for each half wave of the twentieth
-ENOUGH = 0.01  # [-] of what is taken off that another step would have to save
-NEGLIGIBLE = 0.02  # [-] of the deepest patch, below which one is left out
 
 
 def drawn(modes: Modes) -> tuple[np.ndarray, np.ndarray]:
@@ -41,8 +32,8 @@ def drawn(modes: Modes) -> tuple[np.ndarray, np.ndarray]:
     points, cells = grid(modes)
     if modes.dimension == 2:
         return points, cells
-    here = np.arange(ALONG)
-    return np.linspace(points.min(axis=0), points.max(axis=0), ALONG + 1), np.column_stack([here, here + 1])
+    here = np.arange(200)  # pieces: ten for each half wave of the twentieth mode
+    return np.linspace(points.min(axis=0), points.max(axis=0), len(here) + 1), np.column_stack([here, here + 1])
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -71,6 +62,11 @@ class Solved(check.Brief):
         return np.asarray(cents(1.0 + self.modes.frequency_error[self.which]))
 
     @cached_property
+    def thinnest(self) -> float:
+        """Least thickness [m]."""
+        return float(thickness(self.system.section, self.system.mesh.points).min())
+
+    @cached_property
     def sensitivity(self) -> Sensitivity:
         """What taking material off does."""
         shapes: Any = self.modes.shapes
@@ -90,34 +86,31 @@ class Blank(check.Brief):
     @classmethod
     def of(cls, target: Target, pitches: tuple[Pitch, ...], tolerance: float) -> "Blank":
         """With the modes that pitches mean, for a tolerance [cents]."""
-        close = min(SHARE * (2.0 ** (tolerance / CENTS) - 1.0), refinement.LOOSEST)
+        # frequencies err by a quarter of the tolerance at most: what is said of a pitch is then true
+        close = min(0.25 * (2.0 ** (tolerance / CENTS) - 1.0), refinement.LOOSEST)
         unsettled = not pitches[0].mode
-        count = max(len(pitches) + SPARE, *(each.mode for each in pitches)) + SPARE + RIGID_MOTIONS
+        # two above the highest wanted, to follow it if it passes them
+        count = max(len(pitches) + 2, *(each.mode for each in pitches)) + 2 + RIGID_MOTIONS
         modes = target.find(count, tolerance=close)
         while unsettled and modes.frequencies[-1] < 2.0 * max(each.frequency or 0.0 for each in pitches):
             modes = target.find(2 * modes.n_modes, tolerance=close)
         if unsettled:
             pitches = wishes.settled(pitches, modes.frequencies[modes.n_rigid :])
-        numbers = {each.mode for each in pitches} | {1 for each in pitches if each.ratio is not None}
-        found = cls(target, pitches, tuple(sorted(numbers)), modes, close)
-        found.check_single(modes)
-        return found
-
-    @cached_property
-    def points(self) -> np.ndarray:
-        """Places (n, dimension) [m] all over the body."""
-        return drawn(self.start)[0]
-
-    def check_single(self, modes: Modes) -> None:
-        """Raise SimulationError if a mode looked at shares its frequency with another."""
+        numbers = sorted({each.mode for each in pitches} | {1 for each in pitches if each.ratio is not None})
         shared = sharing(modes).sum(axis=0) > 1
-        for number in self.numbers:
+        for number in numbers:
             if shared[modes.n_rigid + number - 1]:
                 raise SimulationError(
                     f"mode {number} at {modes.frequencies[modes.n_rigid + number - 1]:.6g} Hz shares its frequency "
                     "with another: a patch splits the pair, and neither has a slope of its own; start from a body "
                     "without this symmetry, or want other modes"
                 )
+        return cls(target, pitches, tuple(numbers), modes, close)
+
+    @cached_property
+    def spots(self) -> np.ndarray:
+        """Places (n, dimension) [m] all over the body."""
+        return drawn(self.start)[0]
 
     def first(self) -> Solved:
         """As it stands."""
@@ -129,12 +122,12 @@ class Blank(check.Brief):
         body = reassemble(replace(system, section=thinner(whole, dishes.depth)), system.mesh)
         wanted = None if self.target.size_stated else self.close
         modes = modal.find_modes(body, n_modes=self.start.n_modes, tolerance=wanted)
-        points = self.points
-        old, new = before.modes.shapes.at(points)[:, before.which], modes.shapes.at(points)
+        old, new = (each.shapes.at(self.spots) for each in (before.modes, modes))
+        old = old[:, before.which]
         cosines = (old.T @ new) ** 2 / ((old**2).sum(axis=0)[:, None] * (new**2).sum(axis=0))
         cosines[:, : modes.n_rigid] = 0.0
         which = cosines.argmax(axis=1)
-        if cosines.max(axis=1).min() < SAME_MODE or len(set(which)) < len(which):
+        if cosines.max(axis=1).min() < 0.5 or len(set(which)) < len(which):
             lost = int(cosines.max(axis=1).argmin())
             raise SimulationError(
                 f"mode {self.numbers[lost]} is no longer to be told from others after this removal; take less depth"
@@ -159,23 +152,24 @@ class Thinning:
     mirror: str
     tolerance: float  # [cents]
     n_solved: int = 1
-    rows: tuple[Pitch, ...] = field(init=False)
 
-    def __post_init__(self) -> None:
-        self.rows = tuple(each for each in self.body.pitches if each.words)
+    @cached_property
+    def sought(self) -> tuple[Pitch, ...]:
+        """The pitches of which something is wanted."""
+        return tuple(each for each in self.body.pitches if each.words)
 
     def misses(self, solved: Solved) -> np.ndarray:
         """How far each pitch is missed, (n_pitches,) [cents]."""
         first, now = self.before.frequencies, solved.frequencies
-        own = now[[self.body.numbers.index(each.mode) for each in self.rows]]
-        return np.asarray(cents(own, [self.body.wanted(first, now, each) for each in self.rows]))
+        own = now[[self.body.numbers.index(each.mode) for each in self.sought]]
+        return np.asarray(cents(own, [self.body.wanted(first, now, each) for each in self.sought]))
 
-    def slopes(self, solved: Solved, places: Places) -> tuple[np.ndarray, np.ndarray]:
+    def miss_slopes(self, solved: Solved, places: Places) -> tuple[np.ndarray, np.ndarray]:
         """Changes of the misses (n_pitches, n_places) [cents/m] with depths, and areas (n_places,) [m^2]."""
         each, areas = map(places.summed, solved.sensitivity.of_dishes(places.middles, self.radius))
         columns = each.T
-        own = columns[[self.body.numbers.index(row.mode) for row in self.rows]]
-        for i, row in enumerate(self.rows):
+        own = columns[[self.body.numbers.index(row.mode) for row in self.sought]]
+        for i, row in enumerate(self.sought):
             if row.ratio is not None:
                 own[i] -= columns[self.body.numbers.index(1)]
         return own, areas
@@ -184,12 +178,12 @@ class Thinning:
         """Volume per depth [m^2] of dishes around middles (n, dimension) [m]."""
         return float(self.before.sensitivity.of_dishes(middles, self.radius)[1].sum())
 
-    def run(self, most: int) -> list[tuple[np.ndarray, float]]:
+    def choose_places(self, most: int) -> list[tuple[np.ndarray, float]]:
         """At most so many places, each with its images and depth, from the largest."""
         places = Places.over(self.before.system, self.radius, self.mirror)
         share, solved = self.settle(places, np.zeros(len(places.first)), self.before)
         order = np.argsort(-share, kind="stable")
-        keep = order[share[order] > NEGLIGIBLE * share.max()][:most] if share.any() else order[:0]
+        keep = order[share[order] > 0.02 * share.max()][:most] if share.any() else order[:0]  # others are negligible
         if len(keep) < np.count_nonzero(share) and len(keep):
             places = places.some(keep)
             begun = self.after(places, share[keep], solved)
@@ -205,19 +199,19 @@ class Thinning:
 
     def settle(self, places: Places, share: np.ndarray, solved: Solved) -> tuple[np.ndarray, Solved]:
         """Shares (n_places,) of the greatest depth that take least off, and the body then; from shares to start at."""
-        room, overlaps = AIM * self.tolerance, places.overlaps
-        trust = FIRST_STEP * self.thinnest / self.depth
-        slopes, areas = self.slopes(solved, places)
+        room, overlaps = 0.5 * self.tolerance, places.overlaps  # as much is left to what the search errs
+        trust = 0.1 * self.before.thinnest / self.depth  # slopes of so large a step hold to a tenth or two
+        slopes, areas = self.miss_slopes(solved, places)
         cost = areas / areas.max()
 
         def merit(share: np.ndarray, misses: np.ndarray) -> float:
             return float(cost @ share + PENALTY * np.maximum(np.abs(misses) - room, 0.0).sum())
 
         now = self.misses(solved)
-        for _ in range(MOST_STEPS):
+        for _ in range(40):  # bodies: those of a bar cut to a third of its height take 25
             tried = _cheapest(cost, slopes * self.depth, now, share, overlaps, room, trust)
             told = merit(share, now) - merit(tried, now + slopes @ (self.depth * (tried - share)))
-            if told <= ENOUGH * max(float(cost @ share), ENOUGH):
+            if told <= 0.01 * max(float(cost @ share), 0.01):  # of what is taken off
                 break
             try:
                 other = self.after(places, tried, solved)
@@ -227,14 +221,9 @@ class Thinning:
             gained = merit(share, now) - merit(tried, self.misses(other))
             if gained > 0.0:
                 share, solved, now = tried, other, self.misses(other)
-                slopes, _ = self.slopes(solved, places)
+                slopes, _ = self.miss_slopes(solved, places)
             trust *= 2.0 if gained > 0.75 * told else 1.0 if gained > 0.25 * told else 0.4
         return share, solved
-
-    @cached_property
-    def thinnest(self) -> float:
-        """Least thickness [m] of the body as it stands."""
-        return float(thickness(self.before.system.section, self.before.system.mesh.points).min())
 
 
 def _cheapest(

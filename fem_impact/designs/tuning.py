@@ -18,13 +18,9 @@ from ..scenes.scene import Scene, load_scene
 from ..show import outlined
 from . import pitches as wishes
 from .pitches import Pitch, cents, note
-from .removal import Dishes, Sensitivity, check_body, images, thickness
+from .removal import Dishes, check_body, images
 from .thinning import Blank, Solved, Thinning, drawn
 
-DEPTH = 0.2  # [-] greatest depth by default over the least thickness: what is left is still about the same body
-RADIUS = 0.12  # [-] of the root of a plate's area, or of a bar's length: about what a thumb rubs off an instrument
-FINEST = 15  # [-] smallest radius goes so often into that root: a thousand places are looked at
-PER_AREA = 1e-8  # [m^3] fact: 0.1 mm off a square centimetre
 MIRRORS = "x", "y", "xy"  # a bar has the first
 
 
@@ -105,10 +101,10 @@ class Tuning(check.Brief):
         """The section after all patches."""
         return self.after.system.section
 
-    @cached_property
+    @property
     def points(self) -> np.ndarray:
         """Places (n_points, dimension) [m] of the `map`."""
-        return self.body.points
+        return self.body.spots
 
     @cached_property
     def map(self) -> np.ndarray:
@@ -116,12 +112,8 @@ class Tuning(check.Brief):
 
         Times 1e-8 it is cents per 0.1 mm off a square centimetre.
         """
-        found, areas = self._slopes.of_dishes(self.points, self.radius)
+        found, areas = self.before.sensitivity.of_dishes(self.points, self.radius)
         return found / areas[:, None]
-
-    @cached_property
-    def _slopes(self) -> Sensitivity:
-        return self.before.sensitivity
 
     def figure(self) -> Any:
         """A matplotlib figure: the map of each mode on the outline, and the patches with their numbers and depths."""
@@ -136,7 +128,7 @@ class Tuning(check.Brief):
             (each.at, each.radius, [f"{i}: {1e3 * each.depth:.2g} mm, {each.cents[k]:+.1f} cents" for k in numbers])
             for i, each in enumerate(self.patches, 1)
         ]
-        return outlined.marked(points, cells, PER_AREA * self.map[:, numbers], titles, dishes)
+        return outlined.marked(points, cells, 1e-8 * self.map[:, numbers], titles, dishes)  # m^3: 0.1 mm off 1 cm^2
 
     @check.typed
     def patch(self, at: Any, depth: float, *, radius: float | None = None) -> Patch:
@@ -157,8 +149,8 @@ class Tuning(check.Brief):
         place = self.before.modes.point("at", at)[0]
         depth, radius = check.positive("depth", depth, "m"), check.positive("radius", radius or self.radius, "m")
         middles = images(place, self.mirror, self.before.system)
-        solved = self.body.after(Dishes(middles, np.full(len(middles), depth), radius), self.before)
-        slopes = depth * self._slopes.of_dishes(middles, radius)[0].sum(axis=0)
+        solved = self.body.after(Dishes.of_places([(middles, depth)], radius), self.before)
+        slopes = depth * self.before.sensitivity.of_dishes(middles, radius)[0].sum(axis=0)
         moved = cents(solved.frequencies, self.before.frequencies)
         return Patch(middles, radius, depth, self.body.numbers, moved, slopes)
 
@@ -264,7 +256,7 @@ def tune(
     >>> found.met, len(found.patches), abs(found.tones[0].left) <= found.tolerance
     (True, 1, True)
     """
-    wanted = wishes.read(pitches, match)
+    wanted = wishes.read_pitches(pitches, match)
     tolerance = check.between("tolerance", tolerance, 0.01, 100.0)
     target = _target(body)
     check_body(target.section)
@@ -273,14 +265,15 @@ def tune(
     start = Blank.of(target, wanted, tolerance)
     before = start.first()
     size = before.system.mesh.area ** (1.0 / before.modes.dimension)
-    radius = RADIUS * size if radius is None else check.between("radius", radius, size / FINEST, size, "m")
-    thinnest = float(thickness(before.system.section, before.system.mesh.points).min())
-    depth = DEPTH * thinnest if depth is None else check.positive("depth", depth, "m")
-    if depth >= thinnest:
-        raise ValueError(f"depth must be less than the thickness, {thinnest:g} m, got {depth:g} m")
+    # about what a thumb rubs off an instrument; of the smallest, a thousand places are looked at
+    radius = 0.12 * size if radius is None else check.between("radius", radius, size / 15, size, "m")
+    # what is left by default is still about the same body
+    depth = 0.2 * before.thinnest if depth is None else check.positive("depth", depth, "m")
+    if depth >= before.thinnest:
+        raise ValueError(f"depth must be less than the thickness, {before.thinnest:g} m, got {depth:g} m")
     search = Thinning(start, before, depth, radius, mirror or "", tolerance)
-    found = search.run(check.count("patches", patches, high=100))
-    made = _told(start, search, found)
+    found = search.choose_places(check.count("patches", patches, high=100))
+    made = _finish(start, search, found)
     if not made.met:
         promise.warn(made.verdict)
     return made
@@ -307,13 +300,12 @@ def _target(body: System | Scene | str | Path) -> Target:
     return replace(target, source="fe")
 
 
-def _told(body: Blank, search: Thinning, found: Sequence[tuple[np.ndarray, float]]) -> Tuning:
+def _finish(body: Blank, search: Thinning, found: Sequence[tuple[np.ndarray, float]]) -> Tuning:
     """The result, with every patch solved after those before it."""
     before = last = search.before
     told, slopes = [], before.sensitivity
     for k, (middles, deep) in enumerate(found, 1):
-        dishes = [Dishes(at, np.full(len(at), each), search.radius) for at, each in found[:k]]
-        now = body.after(Dishes.together(dishes), last)
+        now = body.after(Dishes.of_places(found[:k], search.radius), last)
         linear = deep * slopes.of_dishes(middles, search.radius)[0].sum(axis=0)
         moved = cents(now.frequencies, last.frequencies)
         told.append(Patch(middles, search.radius, deep, body.numbers, moved, linear))

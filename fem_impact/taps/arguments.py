@@ -17,12 +17,12 @@ def texts(name: str, value: Any, count: int | None = None, each: str = "") -> li
     return list(value)
 
 
-def table(name: str, value: Any) -> dict[str, Any]:
+def table(name: str, value: Any, example: str = "") -> dict[str, Any]:
     """Return ``value`` as a dict whose keys are texts; None gives an empty one."""
     if value is None:
         return {}
     if not isinstance(value, Mapping) or not all(isinstance(key, str) for key in value):
-        raise ValueError(f"{name} must be a dict of names, got {check.shown(value)}")
+        raise ValueError(f"{name} must be a dict of names{example}, got {check.shown(value)}")
     return dict(value)
 
 

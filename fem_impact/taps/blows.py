@@ -19,7 +19,6 @@ from ..modes.modal import Modes, left_out
 from .rig import FINE, MARGIN, Rig, accelerations, behind_tip
 
 STEPS = 40.0  # [-] steps of a contact: the force is then exact to 1e-5 of its peak
-FASTEST = 6.0  # [-] steps per period of the fastest mode that the contact sees: the force errs by 4e-6 of its peak
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -93,7 +92,7 @@ def of_target(modes: Modes, at: Any, points: Any = None, softness: float | None 
     return tapped(reduce_body(modes, ((0, -1.0),), place, rows, rest), seen, modes.mass)
 
 
-def run(system: engine.KernelSystem, speed: float, step: float, horizon: float) -> History:
+def follow_blow(system: engine.KernelSystem, speed: float, step: float, horizon: float) -> History:
     """One blow of a system that moves at unit speed, at a speed [m/s] with a step in contact [s], up to a time [s]."""
     struck = system._replace(p=speed * system.p)
     struck.p.setflags(write=False)  # or numba would compile the kernels again for writable arrays
@@ -110,7 +109,8 @@ def longest_step(system: engine.KernelSystem, contact: Contact, duration: float)
     share = (system.shape[0, flexible] / system.omega[flexible]) ** 2
     whole = share.sum() + (duration**2) * float((system.shape[0, ~flexible] ** 2).sum()) / 10.0
     fast = system.omega[flexible][share > 1e-6 * whole]  # others change the force by as little
-    return min(step, 2.0 * np.pi / (FASTEST * fast.max())) if fast.size else step
+    # six steps per period of the fastest mode that the contact sees: the force errs by 4e-6 of its peak
+    return min(step, 2.0 * np.pi / (6.0 * fast.max())) if fast.size else step
 
 
 def records(
@@ -127,7 +127,7 @@ def records(
     step = longest_step(system, contact, duration)
     out = np.zeros((len(speeds), 1 + len(target.seen), n_fine))
     for one, speed in zip(out, speeds):
-        history = run(system, float(speed), step, times[-1])
+        history = follow_blow(system, float(speed), step, times[-1])
         until = int(np.searchsorted(times, history.end_time, side="right"))
         pushed = one[0, first:]
         with np.errstate(all="ignore"):  # the rate of the force, not used here, is infinite at the onset of soft laws

@@ -43,11 +43,11 @@ def stated_units(found: readers.Recording, given: Mapping[str, str] | None) -> l
         if not isinstance(text, str) or units.known(text) is None:
             words = ", ".join(word for factors in units.KINDS.values() for word in factors)
             raise ValueError(f"units must be one of {words}, got {check.shown(text)} for {name!r}")
-        unit[number("units", name, found)] = text
+        unit[find_channel("units", name, found)] = text
     return unit
 
 
-def number(argument: str, which: Any, found: readers.Recording) -> int:
+def find_channel(argument: str, which: Any, found: readers.Recording) -> int:
     """The number of a channel named by (part of) its name or by its number."""
     there = ", ".join(repr(name) for name in found.names[:20])
     if isinstance(which, (int, np.integer)) and not isinstance(which, bool):
@@ -71,7 +71,7 @@ def number(argument: str, which: Any, found: readers.Recording) -> int:
 
 def force_channel(found: readers.Recording, force: Any, unit: list[str], name: str) -> int:
     if force is not None:
-        return number("force", force, found)
+        return find_channel("force", force, found)
     kinds = [units.known(text) for text in unit]
     hits = [i for i, kind in enumerate(kinds) if kind and kind[0] == "N"]
     hits = hits or [i for i, text in enumerate(found.names) if units.FORCE_NAMES.search(text)]
@@ -89,7 +89,7 @@ def response_channels(found: readers.Recording, response: Any, unit: list[str], 
         asked = [response] if isinstance(response, (str, int, np.integer)) else response
         if not isinstance(asked, (list, tuple)):
             raise ValueError(f"response must be the names or numbers of channels, got {check.shown(response)}")
-        return [number("response", which, found) for which in asked]
+        return [find_channel("response", which, found) for which in asked]
     kinds = [units.known(text) for text in unit]
     return [
         i
@@ -103,7 +103,7 @@ def scales(found: readers.Recording, scale: Any, struck: int) -> dict[int, float
         return {}
     if isinstance(scale, Mapping):
         scale = arguments.table("scale", scale)
-        return {number("scale", name, found): check.number(f"scale of {name}", x) for name, x in scale.items()}
+        return {find_channel("scale", name, found): check.number(f"scale of {name}", x) for name, x in scale.items()}
     return {struck: check.number("scale", scale)}
 
 

@@ -16,14 +16,10 @@ from ..modes.modal import Modes
 from . import arguments, nested, predictions, solver, windows
 from .found import Found, Watch, profiled
 from .nested import Inner
-from .profiles import DOUBTED, variance
 from .records import Taps
 from .rig import Rig
 from .solver import Problem
 from .unknowns import TIME, Setting, Unknown, checked
-
-STARTS = 5  # [-] searches, from the best of `solver.starts`; where all end poorly, more follow
-FEWEST = 3  # [-] taps, to tell which one disagrees: of two, either may be wrong
 
 
 class Starts(NamedTuple):
@@ -51,7 +47,7 @@ def fit(
     tip_mass: float = 0.0,
     resonance: float | None = None,
     window: Any = None,
-    starts: int = STARTS,
+    starts: int = 5,
     smaller: Found | None = None,
     robust: bool = True,
     profiles: bool = True,
@@ -159,8 +155,12 @@ def fit(
         for setting in settings
     ]  # fmt: skip
     if len(found) > 1:
-        scores = [float(np.sqrt(np.mean([one.error**2 for one in each.left_out()]))) for each in found]
-        named = {_law_name(law): score for law, score in zip(laws, scores)}
+        scores = [predictions.rms_error(each.left_out()) for each in found]
+        kinds = {1.0: "linear", 1.5: "Hertz"}
+        named = {
+            kinds.get(law.exponent, f"power {law.exponent:g}") + " with loss" * bool(law.loss) + law.law.words: score
+            for law, score in zip(laws, scores)
+        }
         found = [replace(found[int(np.argmin(scores))], compared=named)]
     return profiled(found[0]) if profiles else found[0]
 
@@ -201,21 +201,15 @@ def _usable(taps: Taps, window: Any) -> tuple[Taps, np.ndarray, list[str]]:
     return cut.pick(whole), noise[whole], notes
 
 
-def _law_name(law: Contact) -> str:
-    kinds = {1.0: "linear", 1.5: "Hertz"}
-    return kinds.get(law.exponent, f"power {law.exponent:g}") + " with loss" * bool(law.loss) + law.law.words
-
-
 def _fit(
     setting: Setting, cut: Taps, noise: np.ndarray, notes: list[str], *, known: Mapping[str, float],
     per_tap: list[str], robust: bool, begin: Starts,
 ) -> Found:  # fmt: skip
     """The fit of one contact law to taps whose noise over the peak is (n_taps,)."""
     length = solver.pulse_length(cut)
-    free = tuple(
-        Unknown(TIME, length / solver.TIMES, length * solver.TIMES) if each.name == "contact.stiffness" else each
-        for each in setting.unknown
-    )
+    # the contact time is sought within a factor of 30 of the measured one
+    time = Unknown(TIME, length / 30.0, length * 30.0)
+    free = tuple(time if each.name == "contact.stiffness" else each for each in setting.unknown)
     own = [each.name for each, given in zip(free, setting.unknown) if given.name in per_tap]
     data = windows.data(cut, setting.n_points, np.ones((1, 1 + setting.n_points)))
     problem = Problem(setting, data, free, known, tuple(own) if cut.n_taps > 1 else ())
@@ -224,19 +218,25 @@ def _fit(
     best, minima, inner = _search(problem, cut, length, begin)
     part = problem.residual(best.x).reshape(data.values.shape)
     spread = np.sqrt(np.square(part).mean(axis=(0, 2)))  # of each channel, the force first
-    weights = _sureness(part[:, 0], noise)[:, None] * spread[0] / np.maximum(spread, 1e-300)
+    # noise of a first fit beyond that of the taps (n_taps,) is the model's and counts alike for all
+    model = max(0.0, float(np.median(np.square(part[:, 0]).mean(axis=1) - noise**2)))
+    sureness = 1.0 / np.sqrt(np.maximum(noise**2 + model, 1e-300))
+    if sureness.max() <= 1.5 * sureness.min():  # less is how well the noise of short rests is known
+        sureness = np.ones(len(noise))
+    sureness /= np.sqrt(np.mean(sureness**2))
+    weights = sureness[:, None] * spread[0] / np.maximum(spread, 1e-300)
     if (weights != 1.0).any():
-        problem = replace(problem, data=windows.data(cut, setting.n_points, weights), _last={})
+        problem = replace(problem, data=windows.data(cut, setting.n_points, weights))
         best = solver.solve(problem, best.x)
         minima = (best.cost,)
-    notes += _apart(problem, best)
     used, outliers = list(range(cut.n_taps)), {}
-    while robust and len(used) > max(FEWEST, (1.0 - solver.MOST_OUTLIERS) * cut.n_taps):
-        each = np.array([one.error for one in predictions.left_out(problem, best.x, cut.pick(used))])
+    # of two taps that disagree, either may be wrong
+    while robust and len(used) > max(3, (1.0 - solver.MOST_OUTLIERS) * cut.n_taps):
+        each = np.array([one.error for one in predictions.predict_left_out(problem, best.x, cut.pick(used))])
         worst = int(each.argmax())
         others = [i for i in range(len(used)) if i != worst]
-        without = replace(problem, data=problem.data.pick(others), _last={})
-        solved = solver.solve(without, best.x[problem.kept(others)])
+        without, begun = problem.among(others, best.x)
+        solved = solver.solve(without, begun)
         fewer = Found(cut, tuple(used[i] for i in others), {}, without, solved, (solved.cost,), (), {})
         # rare by chance: a tap that the others predict worse than this times the median of their own errors
         if each[worst] <= 4.0 * float(np.median(fewer.errors)):
@@ -246,7 +246,8 @@ def _fit(
     stuck = False
     if inner is not None:
         problem, best, stuck = nested.never_worse(problem, best, inner.among(used, problem.data), notes)
-    if not best.ended and solver.promised(problem, best) > solver.PROMISED * best.cost:
+    # ridges promise up to a hundredth of the sum of squares
+    if not best.ended and solver.promised(problem, best) > 0.01 * best.cost:
         notes.append(f"the search had not ended after {solver.ENOUGH} steps: narrow the ranges, or raise starts")
     return Found(cut, tuple(used), outliers, problem, best, minima, tuple(notes), {}, begin.watch, stuck)
 
@@ -262,34 +263,6 @@ def _inner(smaller: Found, cut: Taps, n_points: int) -> Inner:
     return Inner("what smaller lacks", smaller.problem, smaller.best.x)
 
 
-def _sureness(residual: np.ndarray, noise: np.ndarray) -> np.ndarray:
-    """Weights (n_taps,) [-] of taps whose noise over the peak differs: that of residuals (n_taps, n_times) of a first
-    fit beyond the noise (n_taps,) is the model's and counts alike for all."""
-    model = max(0.0, float(np.median(np.square(residual).mean(axis=1) - noise**2)))
-    weights = 1.0 / np.sqrt(np.maximum(noise**2 + model, 1e-300))
-    weights /= np.sqrt(np.mean(weights**2))
-    unequal = weights.max() > 1.5 * weights.min()  # less is how well the noise of short rests is known
-    return weights if unequal else np.ones(len(noise))
-
-
-def _apart(problem: Problem, best: solver.Solution) -> list[str]:
-    """A note if taps that share a stiffness, and leave more than noise, are explained better with one each."""
-    if problem.own or problem.data.n_taps < FEWEST or TIME not in [each.name for each in problem.free]:
-        return []
-    white = variance(problem.residual(best.x).reshape(-1, problem.data.n_times), problem.n_values)[2]
-    if white >= DOUBTED:
-        return []
-    each = replace(problem, own=(TIME,), _last={})
-    freed = solver.solve(each, np.append(best.x, np.zeros(problem.data.n_taps)), solver.QUICK, solver.NEARLY)
-    if freed.cost > best.cost / 4.0:  # half the residual: less may be luck
-        return []
-    whole = float(np.square(problem.data.values).sum())
-    one, own = (100.0 * np.sqrt(cost / whole) for cost in (best.cost, freed.cost))
-    return [
-        f"one contact.stiffness for all taps leaves {one:.2g} %; with one for each (per_tap), {own:.2g} % would be left"
-    ]
-
-
 def _search(
     problem: Problem, taps: Taps, length: float, begin: Starts
 ) -> tuple[solver.Solution, tuple[float, ...], Inner | None]:
@@ -298,7 +271,7 @@ def _search(
     They begin with what all taps share. A mode more never fits worse: searches begin where the model without the last
     mode ends, too.
     """
-    common = replace(problem, own=(), _last={})
+    common = replace(problem, own=())
     begun = solver.starts(common, length, taps.impulse, begin.rng)
     found: list[solver.Solution] = []
     # an rms of the residual of 6 % of the records' is above the noise of usual ones: after a poorer fit the search goes

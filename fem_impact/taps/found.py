@@ -16,11 +16,10 @@ from ..impact.measured import Comparison
 from ..impact.response import Response
 from ..impact.striker import Striker
 from ..modes.modal import Modes
-from . import against, predictions, profiles, solver, windows
+from . import predictions, profiles, solver, windows
 from .predictions import Prediction
-from .profiles import Profile
+from .profiles import Profile, Scatter
 from .records import Taps
-from .scatter import Scatter, scatter
 from .solver import Problem, Solution
 from .unknowns import UNITS, changed, unit_of
 
@@ -42,6 +41,11 @@ class Found(check.Brief):
     compared: Mapping[str, float]  # contact law -> root mean square of its errors at left-out taps [-]; if several
     watch: Watch | None = None
     stuck: bool = False  # its own searches ended above a smaller model inside it
+
+    @property
+    def _used(self) -> Taps:
+        """The taps that the fit used."""
+        return self.taps.pick(list(self.used))
 
     @cached_property
     def _noise(self) -> tuple[float, int, float]:
@@ -74,9 +78,8 @@ class Found(check.Brief):
     def spreads(self) -> dict[str, Scatter]:
         """How much the taps used differ in each unknown that was freed for them."""
         noise, freedom, _ = self._noise
-        return {
-            name: scatter(*_coordinate(self.problem, self.best.x, name), noise, freedom) for name in self.per_tap
-        }  # fmt: skip
+        places = {name: _coordinate(self.problem, self.best.x, name) for name in self.per_tap}
+        return {name: profiles.scatter(*place, noise, freedom) for name, place in places.items()}
 
     def profile(self, name: str) -> Profile:
         """The likelihood profile of an unknown, of a tap's own value of it, or of its speed, ``"speed[0]"``."""
@@ -92,7 +95,7 @@ class Found(check.Brief):
     def _follow(self, name: str) -> tuple[Profile, np.ndarray, float]:
         """A profile, and coordinates and sum of squares of the best fit met on the way."""
         problem, x, j = _coordinate(self.problem, self.best.x, name)
-        profile, met = profiles.follow(problem, replace(self.best, x=x), j, *self._noise[:2], name)
+        profile, met = profiles.follow_profile(problem, replace(self.best, x=x), j, *self._noise[:2], name)
         return profile, problem.moved(met.x, self.problem), met.cost
 
     @cached_property
@@ -144,10 +147,14 @@ class Found(check.Brief):
         return self.problem.residual(self.best.x).reshape(shape)[:, 0] * self.problem.data.scale[:, :1]
 
     @property
+    def _measured(self) -> np.ndarray:
+        """Force of the taps used, (n_used, n_times) [N]."""
+        return self.problem.data.values[:, 0] * self.problem.data.scale[:, :1]
+
+    @property
     def errors(self) -> np.ndarray:
         """Root mean square of the residual over that of the force, of the taps used, (n_used,) [-]."""
-        measured = self.problem.data.values[:, 0] * self.problem.data.scale[:, :1]
-        return np.linalg.norm(self.residual, axis=1) / np.linalg.norm(measured, axis=1)
+        return np.linalg.norm(self.residual, axis=1) / np.linalg.norm(self._measured, axis=1)
 
     @property
     def error(self) -> float:
@@ -168,8 +175,7 @@ class Found(check.Brief):
     def residual_spectrum(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Frequencies [Hz], and the amplitude spectra of residual and force, (n_used, n_frequencies) [N s]."""
         rate = self.taps.rate
-        measured = self.problem.data.values[:, 0] * self.problem.data.scale[:, :1]
-        spectra = [np.abs(np.fft.rfft(rows, axis=1)) / rate for rows in (self.residual, measured)]
+        spectra = [np.abs(np.fft.rfft(rows, axis=1)) / rate for rows in (self.residual, self._measured)]
         return np.fft.rfftfreq(self.residual.shape[1], 1.0 / rate), spectra[0], spectra[1]
 
     def predict(self, tap: Any = 0) -> Prediction:
@@ -198,14 +204,13 @@ class Found(check.Brief):
         if len(self.used) < 2:
             raise ValueError("taps must be two at least, to predict one from the others")
         if rise_only not in self._left_out:
-            used = self.taps.pick(list(self.used))
-            self._left_out[rise_only] = predictions.left_out(self.problem, self.best.x, used, rise_only)
+            self._left_out[rise_only] = predictions.predict_left_out(self.problem, self.best.x, self._used, rise_only)
         return self._left_out[rise_only]
 
     @property
     def misfit(self) -> float:
         """What the model lacks: root mean square over the force, as `error`, without the noise of the taps [-]."""
-        used = self.taps.pick(list(self.used))
+        used = self._used
         noise = np.square(used.noise) / np.square(used.force).mean(axis=1)
         return float(np.sqrt(max(0.0, np.mean(self.errors**2 - noise))))
 
@@ -236,9 +241,9 @@ class Found(check.Brief):
         """
         calibration = check.non_negative("calibration", calibration)
         if measured is None:
-            return against.compared(self, self.taps.pick(list(self.used)), self.left_out(), calibration)
+            return predictions.compare_taps(self._used, self.left_out(), self.misfit, calibration)
         each = tuple(self.predict(measured.pick(i)) for i in range(measured.n_taps))
-        return against.compared(self, measured, each, calibration)
+        return predictions.compare_taps(measured, each, self.misfit, calibration)
 
     @cached_property
     def _left_out(self) -> dict[bool, tuple[Prediction, ...]]:
@@ -252,12 +257,11 @@ class Found(check.Brief):
     @property
     def striker(self) -> Striker:
         """The hammer found."""
-        given = self.problem.setting.striker
-        body = self.problem.setting.hammer(self.problem.values(self.best.x))
-        if len(body.omega) == 1 and given.modes.n_modes == 1:
+        given, values = self.problem.setting.striker, self.problem.values(self.best.x)
+        body = self.problem.setting.hammer(values)
+        if len(body.omega) == 1:
             return Striker.rigid(body.felt_mass)
         if given.modes.n_modes > 1:
-            values = self.problem.values(self.best.x)
             part = {key: values.get(f"striker.{key}") for key in ("mass", "first_frequency")}
             return Striker.flexible(given.modes.scaled(**part), at=given.at)
         modes = Modes.from_arrays(
@@ -311,9 +315,7 @@ class Found(check.Brief):
         body = target if target is not None else self.target
         if body is None:
             raise ValueError("target must be given: these taps were fitted to a wall, on which no hammer hits twice")
-        place = at if target is not None else ([0.0] if self.problem.setting.target is None else None)
-        if target is None:
-            place = [0.0]
+        place = at if target is not None else [0.0]
         hammer, law = self.striker, self.contact
         if tip is not None:
             factor = check.positive("tip", tip)
@@ -333,7 +335,9 @@ class Found(check.Brief):
         """What stands against trusting the values: what the data do not tell, and what the model lacks; else none."""
         said = [f"The data do not tell {', '.join(self.unidentifiable)}"] if self.unidentifiable else []
         if self.whiteness < profiles.DOUBTED:
-            said.append("The residual is not noise: the model lacks something; intervals are widened for it")
+            own = "contact.stiffness" in self.names and not self.per_tap and len(self.used) > 1
+            lacks = "something, such as a stiffness for each tap (per_tap)" if own else "something"
+            said.append(f"The residual is not noise: the model lacks {lacks}; intervals are widened for it")
         return tuple(said)
 
     def summary(self) -> str:
@@ -365,6 +369,7 @@ class Found(check.Brief):
 
     def data(self) -> dict[str, Any]:
         """Everything found, by name, in SI units, for a JSON file."""
+        keys = ("mean", "deviation", "relative", "by_noise", "chance")
         return {
             "values": self.values,
             "unidentifiable": list(self.unidentifiable),
@@ -373,14 +378,7 @@ class Found(check.Brief):
             "intervals": {name: list(self.interval(name)) for name in self.names if name not in self.unidentifiable},
             "point": self.point,
             "per_tap": {
-                name: {
-                    "mean": each.mean,
-                    "deviation": each.deviation,
-                    "relative": each.relative,
-                    "by_noise": each.by_noise,
-                    "chance": each.chance,
-                    "values": each.values.tolist(),
-                }
+                name: {key: getattr(each, key) for key in keys} | {"values": each.values.tolist()}
                 for name, each in self.spreads.items()
             },
             "errors": self.errors.tolist(),
@@ -432,12 +430,12 @@ def _coordinate(problem: Problem, x: np.ndarray, name: str) -> tuple[Problem, np
     shared, _, number = name.partition("[")
     i = int(number[:-1]) if number else 0
     if shared == "speed":
-        other = replace(problem, momentum=False, _last={})
+        other = replace(problem, momentum=False)
         return other, problem.moved(x, other), problem.n_shared + i
     j = [each.name for each in problem.setting.unknown].index(shared)
     free = tuple(problem.setting.unknown[j] if k == j else each for k, each in enumerate(problem.free))
     own = tuple(each.name for each, before in zip(free, problem.free) if before.name in problem.own)
-    other = replace(problem, free=free, own=own, centre=i if number else None, _last={})
+    other = replace(problem, free=free, own=own, centre=i if number else None)
     return other, problem.moved(x, other), j
 
 
@@ -448,7 +446,7 @@ def profiled(found: Found) -> Found:
             found._profiles[name], x, cost = found._follow(name)
             if found.watch is not None:
                 found.watch(i + 1, len(found.names))
-            if cost < found.best.cost - solver.SMALL * found._noise[0]:
+            if cost < found.best.cost - 0.05 * found._noise[0]:  # of the variance: luck makes as much
                 break
         else:
             return found

@@ -11,7 +11,6 @@ from . import solver
 from .solver import NEARLY, Data, Problem, Solution
 from .unknowns import DAMPING, TIME
 
-SHARES = 0.2, 0.5, 0.8  # [-] of the frequencies that shape a pulse, where a mode that does not move yet begins
 # values with which unknowns of the hammer and of modes change nothing; infinity and zero are the ends of their ranges
 NEUTRAL = {
     "first_frequency": np.inf, "mode_ratio": 0.0, "tip_mass": 0.0, "mass": np.inf, "damping": DAMPING, "gain": 1.0,
@@ -27,7 +26,8 @@ class Inner(NamedTuple):
 
     def among(self, taps: list[int], data: Data) -> "Inner":
         """The same for some of its taps, as a larger problem holds and weighs them."""
-        return self._replace(problem=replace(self.problem, data=data, _last={}), x=self.x[self.problem.kept(taps)])
+        fewer, x = self.problem.among(taps, self.x)
+        return self._replace(problem=replace(fewer, data=data), x=x)
 
 
 def without(problem: Problem) -> tuple[str, Problem] | None:
@@ -47,9 +47,7 @@ def without(problem: Problem) -> tuple[str, Problem] | None:
     own = tuple(name for name in problem.own if name not in lost)
     if not free:
         return None
-    return last, replace(
-        problem, setting=replace(problem.setting, unknown=names), free=free, fixed=fixed, own=own, _last={}
-    )
+    return last, replace(problem, setting=replace(problem.setting, unknown=names), free=free, fixed=fixed, own=own)
 
 
 def embedded(problem: Problem, inner: Inner) -> list[np.ndarray]:
@@ -59,15 +57,15 @@ def embedded(problem: Problem, inner: Inner) -> list[np.ndarray]:
     values[TIME] = problem.setting.contact_time(values)
     low, high = (bound[: problem.n_shared] for bound in problem.bounds)
     begun = []
-    for share in SHARES if any(each.name not in values for each in problem.free) else SHARES[:1]:
+    # of the frequencies that shape a pulse, where a mode that does not move yet begins
+    for share in (0.2, 0.5, 0.8) if any(each.name not in values for each in problem.free) else (0.2,):
         shared = low + share * (high - low)
         for i, each in enumerate(problem.free):
             if each.name in values:
                 with np.errstate(divide="ignore"):
                     shared[i] = np.clip(each.inside(values[each.name]), low[i], high[i])
             elif each.name.endswith(".frequency"):
-                ends = np.clip(np.log(np.array(solver.FELT) / values[TIME]), low[i], high[i])
-                shared[i] = ends[0] + share * (ends[1] - ends[0])
+                shared[i] = solver.felt_frequency(share, values[TIME], low[i], high[i])
         apart = dict(zip(_owners(small), small.apart(x)))
         rest = [apart.get(name, np.zeros(n_taps)) for name in _owners(problem)]
         begun.append(np.concatenate([shared, x[small.n_shared : small.n_shared + 2 * n_taps], *rest]))
@@ -93,9 +91,7 @@ def _neutral(small: Problem, names: list[str]) -> dict[str, float]:
     return found
 
 
-def never_worse(
-    problem: Problem, best: Solution, inner: Inner, notes: list[str]
-) -> tuple[Problem, Solution, bool]:  # fmt: skip
+def never_worse(problem: Problem, best: Solution, inner: Inner, notes: list[str]) -> tuple[Problem, Solution, bool]:
     """The larger model, from the best fit of the smaller one if its own searches ended above that; the smaller one if
     that is no better; and whether they did. ``notes`` say so."""
     cost = (1.0 + NEARLY) * float(np.square(inner.problem.residual(inner.x)).sum())

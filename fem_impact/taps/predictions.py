@@ -1,16 +1,22 @@
-"""Taps as a model has them, with all held that taps have in common; and each from a fit to the others."""
+"""Taps as a model has them, with all held that they have in common; each from a fit to the others; measured ones beside
+the bands of what values leave open, what the model lacks, and the noise."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property, partial
 
 import numpy as np
+from scipy.signal import resample
 
 from .._base import check
+from ..impact.measured import SEED, SURE, Comparison, Measured, Predicted, Trace, compare
 from . import profiles, solver, windows
 from .records import Taps
+from .rig import FINE
 from .solver import HALF_LOST, Problem, Solution
 from .unknowns import TIME
+
+DRAWS = 400  # [-] of the values of a fit, and of the noise: ends good to 0.06 of the width
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -56,14 +62,13 @@ def predicted(problem: Problem, best: Solution, tap: Taps, rise_only: bool = Fal
     data = windows.data(tap, n_points, np.ones(1 + n_points))
     free = tuple(each for each in problem.free if each.name in problem.own)
     names = {each.name for each in free} | {TIME} | ({"contact.stiffness"} if TIME in problem.own else set())
-    single = _force_only(
-        replace(
-            problem, data=replace(data, values=data.values[:, :1], scale=data.scale[:, :1]), free=free, own=(),
-            fixed={name: value for name, value in values.items() if name not in names},
-        )
+    single = replace(  # a prediction is judged by the force
+        problem, setting=replace(problem.setting, points=None, n_points=0), free=free, own=(),
+        data=replace(data, values=data.values[:, :1], scale=data.scale[:, :1]),
+        fixed={name: value for name, value in values.items() if name not in names},
     )  # fmt: skip
     until = int(tap.force[0].argmax()) + 1 if rise_only else None
-    seen = replace(single, data=replace(single.data, values=single.data.values[..., :until]), _last={})
+    seen = replace(single, data=replace(single.data, values=single.data.values[..., :until]))
     own = [float(each.inside(values[each.name])) for each in free]
     momentum = np.log(HALF_LOST * tap.impulse[0])
     x = seen.aligned(np.array([*own, momentum, tap.onset[0] * tap.rate - data.lead - 1.0]))
@@ -81,7 +86,7 @@ def _spread(problem: Problem, best: Solution, single: Problem, x: np.ndarray) ->
 
     What the values move is lessened by what speed, onset and own values of the tap, found from itself, take back.
     """
-    whole = replace(single, free=problem.free, fixed=problem.fixed, _last={})
+    whole = replace(single, free=problem.free, fixed=problem.fixed)
     table = single.values(x)
     table[TIME] = single.setting.contact_time(table)
     shared = [float(each.inside(table[each.name])) for each in problem.free]
@@ -94,18 +99,54 @@ def _spread(problem: Problem, best: Solution, single: Problem, x: np.ndarray) ->
     return float(np.sqrt(noise) * single.data.scale[0, 0]) * moved @ solver.pseudo_inverse(best.jacobian)[held]
 
 
-def _force_only(problem: Problem) -> Problem:
-    """The problem without response channels: a prediction is judged by the force."""
-    return replace(problem, setting=replace(problem.setting, points=None, n_points=0), _last={})
-
-
-def left_out(problem: Problem, x: np.ndarray, taps: Taps, rise_only: bool = False) -> tuple[Prediction, ...]:
+def predict_left_out(problem: Problem, x: np.ndarray, taps: Taps, rise_only: bool = False) -> tuple[Prediction, ...]:
     """Every tap of a problem, predicted from a fit to the others that begins at ``x``."""
     n_taps = problem.data.n_taps
     found = []
     for tap in range(n_taps):
         others = [i for i in range(n_taps) if i != tap]
-        part = replace(problem, data=problem.data.pick(others), _last={})
-        without = solver.solve(part, x[problem.kept(others)], close=solver.NEARLY)
+        part, begun = problem.among(others, x)
+        without = solver.solve(part, begun, close=solver.NEARLY)
         found.append(predicted(part, without, taps.pick(tap), rise_only))
     return tuple(found)
+
+
+def rms_error(several: tuple[Prediction, ...]) -> float:
+    """Root mean square of the errors of predictions [-]."""
+    return float(np.sqrt(np.mean([one.error**2 for one in several])))
+
+
+def widths(force: np.ndarray, rate: float) -> np.ndarray:
+    """Time [s] for which records (n, n_times) exceed half their peak, of their band-limited interpolation."""
+    fine = resample(force, FINE * force.shape[1], axis=1)
+    above = fine - 0.5 * fine.max(axis=1, keepdims=True)
+    up = np.maximum(above, 0.0)
+    size = np.abs(above[:, :-1]) + np.abs(above[:, 1:])
+    parts = (up[:, :-1] + up[:, 1:]) / np.maximum(size, np.finfo(float).tiny)  # straight lines between fine samples
+    return parts.sum(axis=1) / (FINE * rate)
+
+
+def compare_taps(taps: Taps, several: tuple[Prediction, ...], lacking: float, calibration: float) -> Comparison:
+    """Peak and width of each tap, and its force, against its prediction; see `Found.against`.
+
+    What the model is ``lacking`` [-], over the force, and the deviation of its ``calibration`` widen the bands.
+    """
+    rng, rate = np.random.default_rng(SEED), taps.rate
+    points, columns, traces = [], [], []
+    for label, one, noise in zip(taps.labels, several, taps.noise.tolist()):
+        drawn = one.force + rng.standard_normal((DRAWS, one.spread.shape[1])) @ one.spread.T
+        shaken = one.measured + noise * rng.standard_normal((DRAWS, len(one.measured)))
+        peak, width = float(one.measured.max()), float(widths(one.measured[None], rate)[0])
+        reading = SURE * float(np.hypot(noise, calibration * peak)), SURE * float(widths(shaken, rate).std())
+        points += [
+            Measured(f"{label}, peak", peak, reading[0], "N"),
+            Measured(f"{label}, width", width, reading[1], "s"),
+        ]
+        columns += [drawn.max(axis=1), widths(drawn, rate)]
+        rms = float(np.sqrt(np.mean(one.force**2)))  # what the model lacks is spread over the record as the residual
+        own = SURE * np.hypot(noise, calibration * one.force)
+        band = np.hypot(own, SURE * np.sqrt(np.square(one.spread).sum(axis=1) + (lacking * rms) ** 2))
+        traces.append(Trace(label, one.time, -one.residual, own, band))
+    # fixed steps and aliasing err by a hundredth of 1e-3, see `blows`
+    bands = Predicted(np.column_stack(columns), computation=1e-3, model=lacking)
+    return compare(tuple(points), bands, traces=tuple(traces), title="Taps against the fit")

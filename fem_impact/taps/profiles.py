@@ -1,4 +1,5 @@
-"""Profiles of the likelihood: how far a value may move, with all others readjusted, before the data object."""
+"""How well the data tell a value: profiles of the likelihood over it, with all others readjusted, and its scatter over
+taps that have values of their own."""
 
 from collections.abc import Mapping
 from contextlib import suppress
@@ -9,10 +10,11 @@ from typing import Any
 import numpy as np
 from scipy.interpolate import PchipInterpolator
 from scipy.stats import chi2, t
+from scipy.stats import f as fisher
 
 from .._base import check
 from .._base.check import SimulationError
-from .._base.rounding import HALVINGS, SAME
+from .._base.rounding import HALVINGS, ROUNDING, SAME
 from .solver import ENOUGH, NEARLY, QUICK, Problem, Solution, pseudo_inverse, solve
 from .unknowns import Unknown
 
@@ -211,7 +213,9 @@ class _Climb:
         return ""
 
 
-def follow(problem: Problem, best: Solution, j: int, noise: float, freedom: int, name: str) -> tuple[Profile, Solution]:
+def follow_profile(
+    problem: Problem, best: Solution, j: int, noise: float, freedom: int, name: str
+) -> tuple[Profile, Solution]:
     """The profile of a coordinate, and the best fit met on the way."""
     low, high = problem.bounds
     if j < problem.n_shared:
@@ -234,3 +238,45 @@ def follow(problem: Problem, best: Solution, j: int, noise: float, freedom: int,
         others, freedom, unknown.low, unknown.high, unknown.log,
     )  # fmt: skip
     return profile, min(fits, key=lambda fit: fit.cost)
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Scatter(check.Brief):
+    """One unknown over the taps."""
+
+    name: str
+    values: np.ndarray  # (n_taps,)
+    mean: float  # geometric if `relative`
+    deviation: float  # standard deviation over the taps; of the logarithm [-] if `relative`
+    by_noise: float  # the same, as noise alone would make it
+    relative: bool  # whether the range is positive, so that ratios count
+    freedom: int  # degrees of freedom of the noise variance
+
+    @property
+    def chance(self) -> float:
+        """Probability that noise alone makes taps differ this much [-]; large: one value for all would do."""
+        return float(fisher.sf((self.deviation / max(self.by_noise, 1e-300)) ** 2, len(self.values) - 1, self.freedom))
+
+
+def scatter(problem: Problem, x: np.ndarray, i: int, noise: float, freedom: int) -> Scatter:
+    """The scatter of the free unknown number ``i``, which every tap has its own value of.
+
+    Parameters
+    ----------
+    x : ndarray, shape (n_coordinates,), the best fit
+    noise : float, variance of the residuals
+    freedom : int, its degrees of freedom
+    """
+    n_taps, unknown = problem.data.n_taps, problem.free[i]
+    place = [each.name for each in problem.free if each.name in problem.own].index(unknown.name)
+    columns = problem.n_shared + (2 + place) * n_taps + np.arange(n_taps)
+    answers = np.linalg.pinv(problem.jacobian(x), rcond=ROUNDING)[columns]  # (n_taps, n_residuals) to the noise
+    answers -= answers.mean(axis=0)  # apart from the mean of all taps
+    variance = noise * float(np.square(answers).sum()) / (n_taps - 1)
+    size = 1.0 if unknown.log else unknown.high - unknown.low
+    apart = problem.apart(x)[place]
+    values = np.array([problem.values(x, tap)[unknown.name] for tap in range(n_taps)])
+    return Scatter(
+        unknown.name, values, problem.values(x)[unknown.name], size * float(np.std(apart, ddof=1)),
+        size * float(np.sqrt(variance)), unknown.log, freedom,
+    )  # fmt: skip

@@ -9,13 +9,14 @@ import numpy as np
 import xarray as xr
 
 from .._base import check
-from .._base.files import staged
+from .._base.files import replacing, staged
 from ..impact.contact import Contact
 from ..impact.striker import Striker
 from ..modes import picked
 from ..scenes.scene import Scene, load_scene
+from ..scenes.schema import written
 from ..show import export
-from . import found_scene, transfer
+from . import transfer
 from .fit import fit as fit_taps
 from .found import Found, Watch
 from .proposal import Proposal, propose
@@ -135,6 +136,48 @@ def fit(options: Any, watch: Watch | None) -> tuple[Found, Scene | None, Proposa
     return fit_taps(taps, unknown=unknown, known=known, per_tap=options.per_tap, watch=watch, **given), scene, None
 
 
+def scene_tables(found: Found, scene: Scene | None = None) -> tuple[dict[str, Any], list[str]]:
+    """The tables of the scene file, and what could not be kept."""
+    hammer, law = found.striker, found.contact
+    notes = []
+    if hammer.modes.n_modes > 1:
+        notes.append("the hammer is written as its rigid mass: its modes are left out")
+    speed = float(np.mean(found.problem.speeds(found.best.x)))
+    strike: dict[str, Any] = {"speed": speed}
+    if scene is None:
+        if found.problem.setting.target is not None or len(found.problem.setting.structure(found.point).omega):
+            raise ValueError("scene must be given: the struck body of these taps is known at its strike point only")
+        made: dict[str, Any] = {
+            "title": "Hammer and tip found from measured taps, on a wall",
+            "mesh": {"shape": "rectangle", "length": 1.0, "width": 0.8},
+            # for a wall: it gains two millionths of the hammer's speed, and bends at 200 times the rate of 0.1 ms
+            "target": {"mass": 1e6 * hammer.felt_mass, "first_frequency": 1e6},
+            "supports": {"boundary": "free"},
+        }
+        strike |= {"at": [0.5, 0.4], "tolerance": 1e-4}
+    else:
+        made = scene.data()
+        made.pop("map", None)
+        strike = dict(made.pop("strike")) | strike
+    made["striker"] = {"kind": "rigid", "mass": hammer.felt_mass}
+    made["contact"] = law.table
+    made["strike"] = strike
+    return made, notes
+
+
+@check.typed
+def write_scene(path: str | Path, found: Found, scene: Scene | None = None) -> tuple[str, ...]:
+    """Write the scene file; the body struck is that of ``scene`` or, for taps on a wall, a plate as heavy as one.
+
+    Returns what could not be kept. The file says in its first lines which values the data did not tell.
+    """
+    made, notes = scene_tables(found, scene)
+    lines = [f"# {line}" for line in (*found.summary().splitlines(), *notes)]
+    with replacing(path) as temporary:
+        temporary.write_text("\n".join(lines) + "\n\n" + written(made), encoding="utf-8")
+    return tuple(notes)
+
+
 def write(
     folder: Path, found: Found, scene: Scene | None, proposal: Proposal | None
 ) -> tuple[dict[str, Any], list[str]]:
@@ -146,6 +189,6 @@ def write(
     files = ["fit.json"]
     modes = [name for name in found.names if name.startswith("mode")]
     if scene is not None or not (modes or "target.mass" in found.names):
-        found_scene.write_scene(folder / "scene.toml", found, scene)
+        write_scene(folder / "scene.toml", found, scene)
         files.append("scene.toml")
     return data, files

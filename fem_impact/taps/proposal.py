@@ -4,8 +4,6 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
-import numpy as np
-
 from .._base import check, markup
 from .._base.check import SimulationError
 from ..impact.contact import Contact
@@ -13,17 +11,13 @@ from ..impact.striker import Striker
 from . import solver, windows
 from .fit import fit
 from .found import Found, Watch, profiled
+from .predictions import rms_error
 from .records import Taps
 
 Ranges = dict[str, tuple[float, float]]
 STIFFNESS = {"contact.stiffness": (1e2, 1e16)}  # of a law of unknown exponent, N/m**exponent: from felt to steel
-EXPONENT = {"contact.exponent": (1.0, 4.0)}
-LOSS = {"contact.loss": (0.0, 20.0)}
 GAIN = 0.9  # [-] of the error at taps left out that a larger model must come below: less is luck of a few taps
 PER_TAP = "stiffness per tap"
-MOST_MODES = 2  # [-] that are tried: a pulse of few samples tells no more
-MASSES = 1e-1, 1e4  # [-] modal masses tried, over that of the hammer: more do not move
-FREQUENCIES = 0.05, 5.0  # [-] of modes tried, times the contact time: below and above they do not shape the pulse
 
 
 @dataclass(frozen=True)
@@ -121,7 +115,7 @@ def propose(
         one = _fitted(joined, law, dict(STIFFNESS), given)
         if one is not None:
             tried.append(_trial(name, "", one, False))
-            best = one if best is None or _left_out(one) < GAIN * _left_out(best) else best
+            best = one if best is None or rms_error(one.left_out()) < GAIN * rms_error(best.left_out()) else best
     if best is None:
         raise SimulationError("no blow of a contact on a wall ends as these taps do; read the taps again")
     law, name = best.problem.setting.contact, "linear" if best.problem.setting.contact.exponent == 1.0 else "Hertz"
@@ -138,7 +132,7 @@ def propose(
             one = _fitted(joined, law, ranges | more, given | own | {"smaller": best})
             if one is None:
                 continue
-            taken = _left_out(one) < GAIN * _left_out(best)
+            taken = rms_error(one.left_out()) < GAIN * rms_error(best.left_out())
             tried.append(_trial(label, name, one, taken))
             if taken:
                 best, ranges, name = one, ranges | more, label
@@ -151,13 +145,14 @@ def propose(
 
 def _steps(striker: Striker, length: float) -> list[tuple[str, Ranges]]:
     """What is added one after another: its name and its ranges."""
-    band = FREQUENCIES[0] / length, FREQUENCIES[1] / length
-    heavy = MASSES[0] * striker.mass, MASSES[1] * striker.mass
+    band = 0.05 / length, 5.0 / length  # modes below and above do not shape the pulse
+    heavy = 0.1 * striker.mass, 1e4 * striker.mass  # more do not move
     head: Ranges = {"striker.first_frequency": band, "striker.mode_ratio": (1e-4, 10.0)}
     steps: list[tuple[str, Ranges]] = [
-        ("exponent", EXPONENT), ("loss", LOSS), ("springy head", head), (PER_TAP, {}),
+        ("exponent", {"contact.exponent": (1.0, 4.0)}), ("loss", {"contact.loss": (0.0, 20.0)}), ("springy head", head),
+        (PER_TAP, {}),
     ]  # fmt: skip
-    for i in range(1, MOST_MODES + 1):
+    for i in (1, 2):  # a pulse of few samples tells no more
         mode: Ranges = {f"mode{i}.frequency": band, f"mode{i}.mass": heavy, f"mode{i}.damping": (0.0, 0.5)}
         steps.append((f"mode {i}", mode))
     return steps
@@ -173,10 +168,6 @@ def _fitted(taps: Taps, law: Contact, ranges: Ranges, given: Mapping[str, Any]) 
         return None
 
 
-def _left_out(found: Found) -> float:
-    return float(np.sqrt(np.mean([each.error**2 for each in found.left_out()])))
-
-
 def _trial(name: str, inside: str, found: Found, taken: bool) -> Trial:
     n_unknowns = found.problem.n_values - 2 * len(found.used)
-    return Trial(name, inside, n_unknowns, found.error, _left_out(found), found.stuck, taken)
+    return Trial(name, inside, n_unknowns, found.error, rms_error(found.left_out()), found.stuck, taken)

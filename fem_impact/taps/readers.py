@@ -4,6 +4,7 @@ import re
 import warnings
 from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
@@ -15,18 +16,14 @@ from . import units
 END_OF_HEADER = "***End_of_Header***"
 COMMENTS = ("#", "%", "//")  # begin lines that are no data
 HEADER_LINES = 200  # [-] of a text table at most, before its numbers begin
-# [-] of the step: times may deviate from an even grid by the first, by the second if rounded; a gap does by a whole one
-UNEVEN = 0.02, 0.3
-FEWEST = 8  # [-] samples of a channel
+LEAST = 8  # [-] samples of a channel
 AGREE = 0.01  # [-] two statements of the rate may differ by this, as written with few digits
 MOST_CHANNELS = 256  # [-] of a file; an array with more rows holds something else
 RATE_NAMES = ("rate", "fs", "sampling_rate", "samplerate", "sample_rate", "sampling_frequency", "frequency")
 STEP_NAMES = ("dt", "delta_x", "delta_t", "tsample", "sampling_interval")
 TIME_NAMES = ("time", "t", "times", "x_value", "zeit", "time_s")
 TIME_UNITS = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "µs": 1e-6, "ns": 1e-9, "min": 60.0, "h": 3600.0}
-EXCITATION, ACCELERATION, VELOCITY, DISPLACEMENT = 13, 12, 11, 8  # codes of quantities in data set 58
-UFF_UNITS = {EXCITATION: "N", 9: "N", ACCELERATION: "m/s^2", VELOCITY: "m/s", DISPLACEMENT: "m"}
-UFF_HEAD = 13  # lines of a data set 58 before its numbers
+UFF_UNITS = {13: "N", 9: "N", 12: "m/s^2", 11: "m/s", 8: "m"}  # codes of quantities in data set 58
 UFF_END = re.compile(rb" {4}-1(?=\r|\n|\Z| {74})")  # begins and ends a data set, also right behind binary numbers
 TIME_RESPONSE, FREQUENCY_RESPONSE, COHERENCE = 1, 4, 6  # function types of data set 58
 UFF_TYPES = {  # function types of data set 58 -> what it holds
@@ -84,8 +81,8 @@ def arrays(path: Path) -> dict[str, np.ndarray]:
         reader = labview if head.startswith(b"LabVIEW Measurement") else universal if _universal(head) else table
     found = reader(path)
     for i, segment in enumerate(found.segments):
-        if len(segment) < FEWEST:
-            raise ValueError(f"{path.name} has {len(segment)} samples in segment {i + 1}; at least {FEWEST} are needed")
+        if len(segment) < LEAST:
+            raise ValueError(f"{path.name} has {len(segment)} samples in segment {i + 1}; at least {LEAST} are needed")
         if not (np.abs(segment) <= check.REACH).all():
             row, column = np.argwhere(~(np.abs(segment) <= check.REACH))[0]
             raise ValueError(
@@ -134,7 +131,7 @@ def labview(path: Path) -> Recording:
     notes: list[str] = []
     first: tuple[tuple[str, ...], tuple[str, ...]] | None = None
     for head, names, rows in _labview_segments(lines, separator, path):
-        stated_count = _count(head)
+        stated_count = max((int(cell) for cell in head.get("Samples") or [] if cell.isdigit()), default=0)
         if len(rows) < stated_count:
             notes.append(
                 f"segment {len(segments) + 1} states {stated_count} samples and holds {len(rows)}: the file may be cut "
@@ -172,11 +169,6 @@ def labview(path: Path) -> Recording:
     if rates and not np.allclose(rates, rates[0], rtol=1e-6):
         raise ValueError(f"{path.name} has channels of different rates, {min(rates):g} and {max(rates):g} Hz")
     return Recording(tuple(segments), *first, _round_rate(rates[0]) if rates else None, tuple(dict.fromkeys(notes)))
-
-
-def _count(head: dict[str, list[str]]) -> int:
-    """Largest number of samples that the header of a segment states; 0 if none."""
-    return max((int(cell) for cell in head.get("Samples") or [] if cell.isdigit()), default=0)
 
 
 def _labview_rates(steps: list[str], time: np.ndarray | None, path: Path) -> list[float]:
@@ -343,7 +335,8 @@ def _rate(path: Path, time: np.ndarray) -> float:
     step = (time[-1] - time[0]) / (len(time) - 1)
     away = np.abs(time - time[0] - step * np.arange(len(time)))
     spread = float(np.ptp(np.diff(time)))  # times written with few digits differ by one unit of the last
-    if away.max() > np.clip(0.6 * spread / step, *UNEVEN) * step:
+    # a gap is a whole step; rounded times may be 0.3 off an even grid, others 0.02
+    if away.max() > np.clip(0.6 * spread / step, 0.02, 0.3) * step:
         k = int(away.argmax())
         raise ValueError(
             f"{path.name} is not evenly sampled: sample {k + 1} is {away[k]:.2g} s off a step of {step:.3g} s"
@@ -464,21 +457,13 @@ def _universal(head: bytes) -> bool:
 
 def universal(path: Path) -> Recording:
     """Time records in data set 58 of a universal file; the second record of a channel begins a new segment."""
-    file, kinds, raw = uff_file(path)
-    sets = [file.read_sets(i) for i, kind in enumerate(kinds) if kind == 58]
-    if not any(int(one.get("func_type", 0)) == TIME_RESPONSE for one in sets):
-        raise ValueError(
-            f"{path.name} holds {uff_holds(kinds, sets)}, no time records; export those, or give the path of frequency "
-            "responses to fi.frf"
-        )
-    factors = uff_factors([file.read_sets(i) for i, kind in enumerate(kinds) if kind == 164])
+    file = Universal.opened(path)
+    instead = "; export those, or give the path of frequency responses to fi.frf"
+    factors = file.factors
     channels: dict[tuple[Any, ...], list[np.ndarray]] = {}
     rates, unit, notes = [], {}, []
-    for one, block in zip(sets, (file._block_ind[i] for i, kind in enumerate(kinds) if kind == 58)):
-        if int(one.get("func_type", 0)) != TIME_RESPONSE:
-            continue
+    for one in file.of_type(TIME_RESPONSE, "time records", instead):
         data = np.real(np.asarray(one["data"])).astype(float)
-        check_uff(path, one, raw[block[0] : block[1] + 1])
         code = int(one.get("ordinate_spec_data_type", 0))
         stated = str(one.get("ordinate_axis_units_lab") or "").strip()
         stated, kind = "" if stated == "NONE" else stated, UFF_UNITS.get(code)
@@ -512,37 +497,64 @@ def universal(path: Path) -> Recording:
     )
 
 
-def uff_file(path: Path) -> tuple[Any, list[int], bytes]:
-    """A universal file as pyuff opens it, the kinds of its data sets, and its bytes."""
-    import pyuff
+@dataclass(frozen=True, eq=False)
+class Universal:
+    """A universal file as pyuff opens it."""
 
-    raw = path.read_bytes()
-    if len(UFF_END.findall(raw)) % 2:
-        raise ValueError(f"{path.name} ends within a data set; it may be cut off")
-    file = pyuff.UFF(str(path))
-    return file, [int(kind) for kind in file.get_set_types()], raw
+    path: Path
+    file: Any
+    kinds: list[int]  # of its data sets
+    raw: bytes
 
+    @classmethod
+    def opened(cls, path: Path) -> "Universal":
+        """ValueError if the file is cut off."""
+        import pyuff
 
-def uff_holds(kinds: list[int], sets: list[dict]) -> str:
-    """What a universal file of data sets ``kinds`` holds, in words; ``sets`` are those of kind 58."""
-    types = sorted({int(one.get("func_type", 0)) for one in sets})
-    said = [f"{UFF_TYPES.get(each, 'functions')} (data set 58, function type {each})" for each in types]
-    others = ", ".join(str(kind) for kind in sorted(set(kinds) - {58}))
-    return " and ".join(said + [f"data sets {others}"] * bool(others)) or "no data sets"
+        raw = path.read_bytes()
+        if len(UFF_END.findall(raw)) % 2:
+            raise ValueError(f"{path.name} ends within a data set; it may be cut off")
+        file = pyuff.UFF(str(path))
+        return cls(path, file, [int(kind) for kind in file.get_set_types()], raw)
+
+    def sets(self, *kinds: int) -> list[dict]:
+        """The data sets of some kinds."""
+        return [self.file.read_sets(i) for i, kind in enumerate(self.kinds) if kind in kinds]
+
+    @cached_property
+    def function_sets(self) -> list[dict]:
+        """The data sets 58."""
+        return self.sets(58)
+
+    def of_type(self, function: int, words: str, instead: str = "") -> list[dict]:
+        """The functions of a type, whole and finite; ValueError says what the file holds without any."""
+        found = []
+        for one, i in zip(self.function_sets, (i for i, kind in enumerate(self.kinds) if kind == 58)):
+            if int(one.get("func_type", 0)) == function:
+                first, last = self.file._block_ind[i][:2]
+                check_uff(self.path, one, self.raw[first : last + 1])
+                found.append(one)
+        if not found:
+            types = sorted({int(one.get("func_type", 0)) for one in self.function_sets})
+            said = [f"{UFF_TYPES.get(each, 'functions')} (data set 58, function type {each})" for each in types]
+            others = ", ".join(str(kind) for kind in sorted(set(self.kinds) - {58}))
+            holds = " and ".join(said + [f"data sets {others}"] * bool(others)) or "no data sets"
+            raise ValueError(f"{self.path.name} holds {holds}, no {words}{instead}")
+        return found
+
+    @property
+    def factors(self) -> dict[str, float]:
+        """By what data of a unit's kind are divided to be in SI, from data sets 164."""
+        found: dict[str, float] = {}
+        for one in self.sets(164):
+            length, force = float(one["length"]), float(one["force"])
+            found |= {"N": force, "m/s^2": length, "m/s": length, "m": length}
+        return {kind: factor for kind, factor in found.items() if factor > 0.0 and factor != 1.0}
 
 
 def uff_name(one: dict) -> str:
     name = str(one.get("id1", "")).strip()
     return name if name not in ("", "NONE") else f"node {one.get('rsp_node', 0)} direction {one.get('rsp_dir', 0)}"
-
-
-def uff_factors(sets: list[dict]) -> dict[str, float]:
-    """By what data of a unit's kind are divided to be in SI, from data sets 164."""
-    found: dict[str, float] = {}
-    for one in sets:
-        length, force = float(one["length"]), float(one["force"])
-        found |= {"N": force, "m/s^2": length, "m/s": length, "m": length}
-    return {kind: factor for kind, factor in found.items() if factor > 0.0 and factor != 1.0}
 
 
 def check_uff(path: Path, one: dict, raw: bytes) -> None:
@@ -552,7 +564,7 @@ def check_uff(path: Path, one: dict, raw: bytes) -> None:
         raise ValueError(
             f"{path.name} states {count} samples of {name!r} and holds {len(one['data'])}; export it again"
         )
-    tail = b"\n".join(raw.split(b"\n")[UFF_HEAD:])
+    tail = b"\n".join(raw.split(b"\n")[13:])  # behind the lines of its head
     if one["binary"]:
         kind = ("<" if one["byte_ordering"] == 1 else ">") + ("f4" if one["ord_data_type"] in (2, 5) else "f8")
         size = int(kind[-1])

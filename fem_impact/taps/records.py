@@ -68,8 +68,8 @@ class Taps:
         rate = check.between("rate", rate, *RATES, "Hz")
         rows = check.array("force", force, (None, None), "N", lift=True)
         n_taps, n_times = rows.shape
-        if n_taps < 1 or n_times < readers.FEWEST:
-            raise ValueError(f"force must hold at least one tap of {readers.FEWEST} samples, got shape {rows.shape}")
+        if n_taps < 1 or n_times < readers.LEAST:
+            raise ValueError(f"force must hold at least one tap of {readers.LEAST} samples, got shape {rows.shape}")
         if response is None:
             others = np.zeros((n_taps, n_times, 0))
         else:
@@ -212,9 +212,9 @@ class Taps:
         start, end = check.number("start", start, "s"), check.number("end", end, "s")
         first, last = np.searchsorted(self.time, [start - 0.5 / self.rate, end + 0.5 / self.rate])
         cut = self.table.isel(time=slice(int(first), int(last)))
-        if cut.sizes["time"] < readers.FEWEST:
+        if cut.sizes["time"] < readers.LEAST:
             raise ValueError(
-                f"start and end must leave at least {readers.FEWEST} samples of {len(self.time)}, got {start:g} and "
+                f"start and end must leave at least {readers.LEAST} samples of {len(self.time)}, got {start:g} and "
                 f"{end:g} s"
             )
         cut = cut.assign_coords(time=("time", np.arange(cut.sizes["time"]) / self.rate, {"units": "s"}))

@@ -50,9 +50,7 @@ class Roving(check.Locked):
     masses: np.ndarray  # (n_blows,) [kg]
     stiffnesses: np.ndarray  # (n_blows,) [N/m]
     n_impacts: np.ndarray  # (n_points, n_blows): 1, or 2 for several; 0 where the modes do not resolve the tip
-    reach: (
-        np.ndarray
-    )  # (n_points, n_blows) [Hz] where the force spectrum has fallen by the drop; NaN unless it hits once
+    reach: np.ndarray  # (n_points, n_blows) [Hz] where the force spectrum has fallen by the drop; NaN unless one hit
     coherence: np.ndarray  # (n_points, n_blows) [-] mean over the band, above the first mode; NaN unless it works
     at_modes: np.ndarray  # (n_points, n_blows) [-] mean at the natural frequencies in the band
     duration: float  # [s] of a record
@@ -67,12 +65,8 @@ class Roving(check.Locked):
     @property
     def lines(self) -> float | None:
         """Lines within the half-power bandwidth of the sharpest mode in the band; None without damping or modes."""
-        widths = 2.0 * self.modes.damping_ratio[self._inside] * self.modes.frequencies[self._inside]
+        widths = (2.0 * self.modes.damping_ratio * self.modes.frequencies)[inside_band(self.modes, self.bandwidth)]
         return float(widths.min() / self.resolution) if widths.size and widths.min() > 0.0 else None
-
-    @property
-    def _inside(self) -> np.ndarray:
-        return (self.modes.omega > 0.0) & (self.modes.frequencies <= self.bandwidth)
 
     @property
     def works(self) -> np.ndarray:
@@ -130,9 +124,8 @@ class Roving(check.Locked):
         -------
         matplotlib.figure.Figure
         """
-        groups = {}
-        for i, (hammer, tip) in enumerate(zip(self.hammers, self.tips)):
-            groups[f"{hammer}, {tip}"] = self.points[self.best == i]
+        tips = enumerate(zip(self.hammers, self.tips))
+        groups = {f"{hammer}, {tip}": self.points[self.best == i] for i, (hammer, tip) in tips}
         for verdict in (NO_BAND, DOUBLE, UNKNOWN):
             groups[verdict] = self.points[[each == verdict for each in self.verdicts]]
         crossed = {DOUBLE: "x", NO_BAND: "v", UNKNOWN: "s"}
@@ -161,6 +154,11 @@ class Roving(check.Locked):
         sharp = "" if self.lines is None else f", {self.lines:.2g} lines in the half-power width of the sharpest mode"
         lines.append(f"records of {self.duration:.3g} s resolve {self.resolution:.3g} Hz{sharp}")
         return "\n".join([*lines, *noted(self.notes)])
+
+
+def inside_band(modes: Modes, bandwidth: float) -> np.ndarray:
+    """Which modes are flexible and within the bandwidth [Hz], (n_modes,) bool."""
+    return (modes.omega > 0.0) & (modes.frequencies <= bandwidth)
 
 
 def _blank(values: np.ndarray) -> list[Any]:
@@ -227,17 +225,9 @@ def plan_test(
 
 
 def planned(
-    target: Target,
-    modes: Modes,
-    hammers: Any,
-    points: Any,
-    bandwidth: float,
-    *,
-    sensor: Any = None,
-    drop: float = 10.0,
-    noise: float = NOISE,
-    duration: float | None = None,
-) -> Roving:
+    target: Target, modes: Modes, hammers: Any, points: Any, bandwidth: float, *, sensor: Any, drop: float,
+    noise: float = NOISE, duration: float | None = None,
+) -> Roving:  # fmt: skip
     """As `plan_test`, on a body however it is known, and its modes up to beyond the band."""
     centre = bandwidth / chooser.half_sine_reach(check.between("drop", drop, 1.0, 40.0, "dB"))
     names, tips, masses, stiffnesses = _kit(hammers, centre)
@@ -254,10 +244,8 @@ def planned(
     seen, _ = bodies.of_hammers(
         target, places, blows, blows[:2], chooser.TOLERANCE, chooser.MOST_MODES, stages
     )  # fmt: skip
-    inside = (modes.omega > 0.0) & (modes.frequencies <= bandwidth)
-    if duration is None:
-        # lines at most 10 Hz apart, to part modes
-        duration = sampling.ringing(modes, inside, (0.1, triggers.LONGEST))
+    if duration is None:  # lines at most 10 Hz apart, to part modes
+        duration = sampling.ringing(modes, inside_band(modes, bandwidth), (0.1, triggers.LONGEST))
     n_times = round(check.positive("duration", duration, "s") * RATE * bandwidth)
     if not 8 <= n_times <= 2 * MOST_LINES:
         raise ValueError(
@@ -380,7 +368,7 @@ class _Rig:
             floor = (self.noise * np.abs(record).max()) ** 2 * self.n_times / (RATE * self.bandwidth) ** 2
             power = np.abs(spectrum) ** 2
             kept = kept * power / np.maximum(power + floor, np.finfo(float).tiny)
-        own = self.modes.frequencies[(self.modes.omega > 0.0) & (self.modes.frequencies <= self.bandwidth)]
+        own = self.modes.frequencies[inside_band(self.modes, self.bandwidth)]
         band = (self.frequencies <= self.bandwidth) & (self.frequencies >= own.min(initial=self.bandwidth))
         over = float(np.mean(kept[band])) if band.any() else float(np.interp(self.bandwidth, self.frequencies, kept))
         return over, float(np.interp(own, self.frequencies, kept).mean()) if own.size else over

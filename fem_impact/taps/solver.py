@@ -17,10 +17,6 @@ from .unknowns import TIME, Setting, Unknown
 # [-] momentum over impulse of a blow that returns with two thirds of its speed, fact: 1 / (1 + 2 / 3): usual taps
 HALF_LOST = 0.6
 STEP = 1e-4  # [-] of coordinates, for derivatives by differences: blows with a fixed step are smooth to 1e-6
-# [-] the contact time is sought within this factor of the measured one
-TIMES = 30.0
-# [-] frequency times contact time of modes that shape a pulse, where searches begin
-FELT = 0.1, 5.0
 MOST_OUTLIERS = 0.34  # [-] of what is measured may disagree: with more, nobody knows which ones are right
 ENOUGH = 60  # [-] iterations of one search
 # [-] relative change of the sum of squares or of the values that ends a search
@@ -28,11 +24,6 @@ CLOSE = 1e-8
 QUICK = 12  # [-] iterations of a search that begins close to its end, or only shows whether to go on
 # [-] change that ends a search of which only the sum of squares counts: it errs by the square
 NEARLY = 1e-6
-# [-] of the noise variance: a gain that is not sought, as luck makes as much
-SMALL = 0.05
-# [-] of the sum of squares: what a search that used up its iterations may still promise without a word, as ridges do
-PROMISED = 0.01
-
 
 Function = Callable[[np.ndarray], np.ndarray]
 
@@ -71,7 +62,7 @@ class Problem(check.Brief):
     own: tuple[str, ...] = ()  # names among `free` that every tap has a value of its own for
     centre: int | None = None  # the tap whose own values the unknowns are, in place of the mean of all
     momentum: bool = True  # False: the coordinate of a tap is the logarithm of its speed itself
-    _last: dict[bytes, np.ndarray] = field(default_factory=dict, repr=False)
+    _last: dict[bytes, np.ndarray] = field(default_factory=dict, init=False, repr=False)
 
     @property
     def n_shared(self) -> int:
@@ -102,10 +93,11 @@ class Problem(check.Brief):
         first, n_taps = self.n_shared + 2 * self.data.n_taps, self.data.n_taps
         return [first + k * n_taps + (self.centre or 0) for k in range(len(self.own))]
 
-    def kept(self, taps: Sequence[int]) -> list[int]:
-        """The coordinates that remain of a problem with these taps only."""
+    def among(self, taps: Sequence[int], x: np.ndarray) -> "tuple[Problem, np.ndarray]":
+        """The problem with some of its taps only, and what remains of coordinates."""
         n, n_taps = self.n_shared, self.data.n_taps
-        return [*range(n), *(n + k * n_taps + i for k in range(2 + len(self.own)) for i in taps)]
+        kept = [*range(n), *(n + k * n_taps + i for k in range(2 + len(self.own)) for i in taps)]
+        return replace(self, data=self.data.pick(taps)), x[kept]
 
     def _weights(self) -> np.ndarray:
         """Weights (n_taps,) [-] of the taps in what the unknowns with own values are."""
@@ -330,6 +322,12 @@ def pulse_length(taps: Any) -> float:
     return float(np.median(0.5 * np.pi * taps.impulse / taps.peak))
 
 
+def felt_frequency(share: float, length: float, low: float, high: float) -> float:
+    """Logarithm of a frequency within bounds, a share of the way along those that shape a pulse of a length [s]."""
+    first, last = np.clip(np.log(np.array([0.1, 5.0]) / length), low, high)
+    return float(first + share * (last - first))
+
+
 def starts(problem: Problem, length: float, momentum: np.ndarray, rng: np.random.Generator) -> list[np.ndarray]:
     """Starting points in order of their sums of squares, of 64 that fill the ranges evenly; neighbours last.
 
@@ -348,8 +346,7 @@ def starts(problem: Problem, length: float, momentum: np.ndarray, rng: np.random
             if each.name == TIME:
                 shared[i] = np.clip(np.log(length) + 0.6 * (point[i] - 0.5), low[i], high[i])
             elif each.name.endswith("frequency") and each.log:
-                ends = np.clip(np.log(np.array(FELT) / length), low[i], high[i])
-                shared[i] = ends[0] + point[i] * (ends[1] - ends[0])
+                shared[i] = felt_frequency(point[i], length, low[i], high[i])
         x = np.concatenate([shared, np.log(HALF_LOST * momentum), np.zeros(len(momentum))])
         try:
             x = problem.aligned(x)

@@ -23,8 +23,7 @@ SURE = 0.9  # [-] probability that the true response lies within the error state
 UNITS = {"m/s^2": "accelerance", "m/s": "mobility", "m": "receptance"}
 WAY = ("node", "direction", "reference", "reference_direction")  # of a response in data set 58
 ENDS = ("place", "struck")  # where it is measured and struck
-FREQUENCY = 18  # code of the abscissa in data set 58
-RESPONSE_CODE = {"m/s^2": readers.ACCELERATION, "m/s": readers.VELOCITY, "m": readers.DISPLACEMENT}
+RESPONSE_CODE = {unit: code for code, unit in readers.UFF_UNITS.items() if unit != "N"}
 
 
 def frf(
@@ -278,7 +277,7 @@ def in_order(gap: np.ndarray) -> np.ndarray:
     return columns
 
 
-def table(pairs: tuple[Pair, ...]) -> str:
+def pair_table(pairs: tuple[Pair, ...]) -> str:
     """The pairs as text."""
     rows = [
         (pair.measured + 1, f"{pair.measured_frequency:.5g} Hz", pair.computed + 1, f"{pair.computed_frequency:.5g} Hz",
@@ -288,52 +287,32 @@ def table(pairs: tuple[Pair, ...]) -> str:
     return "\n".join(markup.columns(rows, ("measured", "", "computed", "", "difference", "MAC")))
 
 
-def write_uff(path: str | Path, data: Taps | xr.Dataset) -> None:
-    """Write taps (time records) or frequency responses of `frf` to data sets 58 of a universal file; needs pyuff."""
+def write_uff(path: str | Path, data: xr.Dataset) -> None:
+    """Write frequency responses of `frf` to data sets 58 of a universal file; needs pyuff."""
     pyuff = check.extra("pyuff", "uff", "a universal file")
-    sets = _time_sets(data) if isinstance(data, Taps) else _function_sets(data)
+    codes = {"func_type": readers.FREQUENCY_RESPONSE, "ord_data_type": 6, "abscissa_spec_data_type": 18}
+    frequency, sets = data["frequency"].values, []
+    for k, name in enumerate(data["channel"].values):
+        unit = str(data["units"].values[k]).removesuffix("/N")
+        made = _set(str(name), k + 2, frequency, data["H"].values[:, k]) | codes
+        ends = zip(("rsp_node", "rsp_dir", "ref_node", "ref_dir"), WAY)
+        way = {key: int(data[name].values[k]) for key, name in ends if name in data.coords}
+        sets.append(made | {"ordinate_spec_data_type": RESPONSE_CODE[unit], "orddenom_spec_data_type": 13} | way)
+        if "coherence" in data:
+            sure = {"func_type": readers.COHERENCE, "ord_data_type": 4, "data": data["coherence"].values[:, k]}
+            sets.append(sets[-1] | sure)
     with replacing(path) as temporary:
         pyuff.UFF(str(temporary)).write_sets(sets, mode="overwrite")
 
 
-def _set(name: str, number: int, x: np.ndarray, values: np.ndarray, **codes: Any) -> dict[str, Any]:
+def _set(name: str, number: int, x: np.ndarray, values: np.ndarray) -> dict[str, Any]:
     return {
         "type": 58, "binary": 0, "id1": name[:60], "id2": "NONE", "id3": "NONE", "id4": "NONE", "id5": "NONE",
         "ver_num": 0, "load_case_id": 0, "rsp_ent_name": "NONE", "rsp_node": number, "rsp_dir": 3,
         "ref_ent_name": "NONE", "ref_node": 1, "ref_dir": 3, "num_pts": len(x), "abscissa_spacing": 1,
         "abscissa_min": float(x[0]), "abscissa_inc": float(x[-1] - x[0]) / (len(x) - 1), "z_axis_value": 0.0,
-        "orddenom_spec_data_type": 0, "x": x, "data": values, **codes,
+        "orddenom_spec_data_type": 0, "x": x, "data": values,
     }  # fmt: skip
-
-
-def _time_sets(taps: Taps) -> list[dict[str, Any]]:
-    codes = {"func_type": 1, "ord_data_type": 4, "abscissa_spec_data_type": 17}
-    sets = []
-    for i in range(taps.n_taps):
-        sets.append(_set("force", 1, taps.time, taps.force[i], ordinate_spec_data_type=13, **codes))
-        for k, (name, unit) in enumerate(zip(taps.table["channel"].values, taps.units)):
-            code = RESPONSE_CODE[unit]
-            sets.append(
-                _set(str(name), k + 2, taps.time, taps.response[i, :, k], ordinate_spec_data_type=code, **codes)
-            )
-    return sets
-
-
-def _function_sets(data: xr.Dataset) -> list[dict[str, Any]]:
-    codes = {"func_type": readers.FREQUENCY_RESPONSE, "ord_data_type": 6, "abscissa_spec_data_type": 18}
-    frequency, sets = data["frequency"].values, []
-    for k, name in enumerate(data["channel"].values):
-        unit = str(data["units"].values[k]).removesuffix("/N")
-        made = _set(
-            str(name), k + 2, frequency, data["H"].values[:, k], ordinate_spec_data_type=RESPONSE_CODE[unit], **codes
-        )
-        ends = zip(("rsp_node", "rsp_dir", "ref_node", "ref_dir"), WAY)
-        way = {key: int(data[name].values[k]) for key, name in ends if name in data.coords}
-        sets.append(made | {"orddenom_spec_data_type": 13} | way)
-        if "coherence" in data:
-            sure = {"func_type": readers.COHERENCE, "ord_data_type": 4, "data": data["coherence"].values[:, k]}
-            sets.append(sets[-1] | sure)
-    return sets
 
 
 def read_frf(path: Any) -> xr.Dataset:
@@ -351,24 +330,19 @@ def read_frf(path: Any) -> xr.Dataset:
 
 def arrays(path: Path) -> dict[str, np.ndarray]:
     """The result of `read_frf` as arrays, for the separate process."""
-    file, kinds, raw = readers.uff_file(path)
-    functions = [(file.read_sets(i), file._block_ind[i]) for i, kind in enumerate(kinds) if kind == 58]
-    sets = [(one, block) for one, block in functions if int(one.get("func_type", 0)) == readers.FREQUENCY_RESPONSE]
-    if not sets:
-        holds = readers.uff_holds(kinds, [one for one, _ in functions])
-        raise ValueError(f"{path.name} holds {holds}, no frequency responses")
-    factors = readers.uff_factors([file.read_sets(i) for i, kind in enumerate(kinds) if kind == 164])
-    frequency = np.asarray(sets[0][0]["x"], float)
+    file = readers.Universal.opened(path)
+    factors = file.factors
+    sets = file.of_type(readers.FREQUENCY_RESPONSE, "frequency responses")
+    frequency = np.asarray(sets[0]["x"], float)
     names: list[str] = []
     units: list[str] = []
     columns: list[np.ndarray] = []
     notes: list[str] = []
-    for one, block in sets:
+    for one in sets:
         name = readers.uff_name(one)
-        readers.check_uff(path, one, raw[block[0] : block[1] + 1])
         if not np.iscomplexobj(one["data"]):
             raise ValueError(f"{path.name} has magnitudes only of {name!r}; export complex responses")
-        if int(one.get("abscissa_spec_data_type") or 0) not in (0, FREQUENCY):
+        if int(one.get("abscissa_spec_data_type") or 0) not in (0, 18):  # not stated, or frequency
             raise ValueError(f"{path.name} has a response {name!r} over something else than frequency; export it again")
         x = np.asarray(one["x"], float)
         if not (len(x) and x[0] >= 0.0 and (np.diff(x) > 0.0).all() and x[-1] <= check.REACH):
@@ -380,15 +354,21 @@ def arrays(path: Path) -> dict[str, np.ndarray]:
         units.append(f"{unit}/N")
         columns.append(np.asarray(one["data"], complex) * factor)
         notes += note
-    ways = np.array([_way(one) for one, _ in sets])
+    ways = np.array([_way(one) for one in sets])
     found = {"frequency": frequency, "H": np.column_stack(columns), "channels": np.array(names, dtype=str)}
     found |= {"units": np.array(units), "ways": ways, "notes": np.array(list(dict.fromkeys(notes)), dtype=str)}
-    sure = {_way(one): np.real(one["data"]) for one, _ in functions if one.get("func_type") == readers.COHERENCE}
+    sure = {_way(one): np.real(one["data"]) for one in file.function_sets if one.get("func_type") == readers.COHERENCE}
     if all(way in sure and len(sure[way]) == len(frequency) for way in map(tuple, ways.tolist())):
         found["coherence"] = np.column_stack([sure[tuple(way)] for way in ways.tolist()]).astype(float)
         if not ((found["coherence"] >= 0.0) & (found["coherence"] <= 1.0 + 1e-6)).all():
             raise ValueError(f"{path.name} has a coherence that is not between 0 and 1; export it again")
-    found |= _places(file, kinds, ways, factors.get("m", 1.0))
+    numbers, place = universal_files.places(file.sets(15, 2411))
+    row = {int(number): i for i, number in enumerate(numbers)}
+    for end, column in zip(ENDS, (0, 2)):
+        here = [row.get(int(node)) for node in ways[:, column]]
+        if any(i is not None for i in here):
+            scaled = place / factors.get("m", 1.0)
+            found[end] = np.array([np.full(3, np.nan) if i is None else scaled[i] for i in here])
     if not (np.abs(found["H"]) <= check.REACH).all():
         raise ValueError(f"{path.name} holds values that are no finite numbers; export it again")
     return found
@@ -417,19 +397,6 @@ def _per_force(path: Path, name: str, one: dict[str, Any], factors: dict[str, fl
             raise ValueError(f"{path.name} has a response {name!r} that is no motion per force (quantity code {code})")
         parts.append((si, stated[1] if stated else 1.0 / factors.get(si, 1.0)))
     return parts[0][0], parts[0][1] / parts[1][1], notes
-
-
-def _places(file: Any, kinds: list[int], ways: np.ndarray, factor: float) -> dict[str, np.ndarray]:
-    """Coordinates (n_channels, 3) [m] of both ends of responses, if the file has those of a node; NaN without."""
-    nodes = [file.read_sets(i) for i, kind in enumerate(kinds) if kind in (15, 2411)]
-    numbers, place = universal_files.places(nodes)
-    row = {int(number): i for i, number in enumerate(numbers)}
-    found = {}
-    for name, column in zip(ENDS, (0, 2)):
-        here = [row.get(int(node)) for node in ways[:, column]]
-        if any(i is not None for i in here):
-            found[name] = np.array([np.full(3, np.nan) if i is None else place[i] / factor for i in here])
-    return found
 
 
 def _way(one: dict[str, Any]) -> tuple[int, ...]:

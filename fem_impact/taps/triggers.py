@@ -9,10 +9,6 @@ from scipy.interpolate import interp1d
 from .._base import check
 from .._base.rounding import SAME
 
-# [-] of the largest force: a tap begins where the force rises above this; lower would meet ringing, higher lose taps
-LEVEL = 0.05
-# [-] standard deviations of the noise that the trigger stays above at least: never by chance, in any record
-NOISE = 8.0
 # [-] of a tap's largest force: pulses above this are apart where the force falls below half of it, smaller ones below
 # half of their own
 PULSE = 0.1
@@ -20,7 +16,6 @@ PULSE = 0.1
 # fewer, as a pulse or a tap is already sure
 CLEAR = 6.0
 CLIPPED = 3  # [-] equal largest samples in a row that count as clipped: two may be equal by chance
-BEFORE = 0.02  # [s] longest record before a tap: 20 ms tell the offset, more may reach back to the last tap's ringing
 LONGEST = 10.0  # [s] longest record of one tap: lines 0.1 Hz apart
 FEWEST = 8  # [-] samples before a tap from which an offset is estimated: to a third of the noise, fewer make it worse
 # [samples] before the onset that do not count as rest, as pulses start flat
@@ -35,8 +30,12 @@ def noise(force: np.ndarray) -> float:
 
 
 def level(force: np.ndarray) -> float:
-    """The trigger [N] for a record (n_samples,)."""
-    return max(LEVEL * float(force.max(initial=0.0)), NOISE * noise(force))
+    """The trigger [N] for a record (n_samples,).
+
+    A twentieth of the largest force: lower would meet ringing, higher lose taps. Eight standard deviations of noise are
+    never reached by chance, in any record.
+    """
+    return max(0.05 * float(force.max(initial=0.0)), 8.0 * noise(force))
 
 
 def onset(force: np.ndarray) -> int:
@@ -55,12 +54,12 @@ def starts(force: np.ndarray, trigger: float, together: int) -> np.ndarray:
     return above[np.concatenate([[True], np.diff(above) > together])]
 
 
-def rooms(force: np.ndarray, trigger: float, together: int) -> list[tuple[int, int, int]]:
+def find_rooms(force: np.ndarray, trigger: float, together: int) -> list[tuple[int, int, int]]:
     """Of every tap its first sample above the trigger, and the samples before and after it that are its own."""
     begun = starts(force, trigger, together)
-    halves = 0.5 * np.diff(begun)
+    halves = (0.5 * np.diff(begun)).astype(int)
     before, after = np.append(begun[:1], halves), np.append(halves, len(force) - begun[-1:])
-    return [(int(start), int(free), int(rest)) for start, free, rest in zip(begun, before, after)]
+    return list(zip(begun.tolist(), before.tolist(), after.tolist()))
 
 
 def pulses(force: np.ndarray, noise: float = 0.0, least: float | None = None) -> list[tuple[int, int]]:
@@ -141,7 +140,7 @@ def cut(
     moved = [row - rest for (row, _), rest in zip(segments, rests)]
     whole = np.concatenate(moved)
     limit = level(whole) if trigger is None else check.positive("trigger", trigger, "N")
-    places = [(k, *place) for k, row in enumerate(moved) for place in rooms(row, limit, pause)]
+    places = [(k, *place) for k, row in enumerate(moved) for place in find_rooms(row, limit, pause)]
     if not places:
         raise ValueError(
             f"no tap was found in {name}: its force reaches {whole.max():.3g} N and the trigger is {limit:.3g} N; "
@@ -149,7 +148,8 @@ def cut(
         )
     if len(places) > 10_000:  # they are noise
         raise ValueError(f"{name} has {len(places)} places above {limit:.3g} N; give trigger= and together=")
-    wanted = BEFORE if before is None else check.positive("before", before, "s")
+    # 20 ms tell the offset, more may reach back to the last tap's ringing
+    wanted = 0.02 if before is None else check.positive("before", before, "s")
     frees = [free for _, _, free, _ in places]
     some = [free for free in frees if free >= FEWEST]  # a few taps that a record begins with cut those of others short
     least = min(some) if 2 * len(some) > len(frees) else min(frees)

@@ -108,7 +108,7 @@ class Box:
         """The unknowns by name at coordinates (n_unknowns,)."""
         return {each.name: float(np.clip(each.outside(z), each.low, each.high)) for each, z in zip(self.unknowns, x)}
 
-    def start(self, given: Any) -> np.ndarray:
+    def start_at(self, given: Any) -> np.ndarray:
         """Coordinates (n_unknowns,) of the values given by name; of others the middle of the range."""
         table, (low, high) = arguments.table("start", given), self.bounds
         for name in table:
@@ -144,7 +144,12 @@ def checked(
     held = known or {}
     for name in held:
         _check_name("known", name, contains)
-    _check_contact(contact, found, held)
+    own = [each for each in found if each.name.startswith("contact.")]
+    for ends in product(*((each.low, each.high) for each in own)):
+        try:
+            changed(contact, {**held, **{each.name: end for each, end in zip(own, ends)}})
+        except ValueError as error:
+            raise ValueError(f"unknown and known must make a contact within all ranges: {error}") from None
     for i in modes:
         for part in ("frequency", "mass"):
             if f"mode{i}.{part}" not in unknown:
@@ -152,9 +157,8 @@ def checked(
     if modes != list(range(1, len(modes) + 1)):
         raise ValueError(f"unknown must number its modes from 1, got {modes}")
     if striker.modes.n_modes > 1:
-        for part in ("mode_ratio", "damping"):
-            if f"striker.{part}" in unknown and part == "mode_ratio":
-                raise ValueError("unknown striker.mode_ratio is for a rigid striker; this one has modes of its own")
+        if "striker.mode_ratio" in unknown:
+            raise ValueError("unknown striker.mode_ratio is for a rigid striker; this one has modes of its own")
     elif "striker.first_frequency" not in unknown and {"striker.mode_ratio", "striker.damping"} & set(unknown):
         raise ValueError("unknown must hold striker.first_frequency too: the striker given is rigid")
     return found
@@ -168,20 +172,11 @@ def _check_name(label: str, name: str, names: list[str]) -> None:
 
 def changed(contact: Contact, values: Mapping[str, float]) -> Contact:
     """The contact with the values whose names begin with ``contact.``; others do not matter."""
-    given = {name.removeprefix("contact."): float(x) for name, x in values.items() if name.startswith("contact.")}
-    own: dict[str, Any] = given
-    own.pop(TIME.partition(".")[2], None)
-    return replace(contact, **own)
-
-
-def _check_contact(contact: Contact, unknown: tuple[Unknown, ...], known: Mapping[str, float]) -> None:
-    """ValueError unless the numbers at the ends of all ranges make a contact."""
-    own = [each for each in unknown if each.name.startswith("contact.")]
-    for ends in product(*((each.low, each.high) for each in own)):
-        try:
-            changed(contact, {**known, **{each.name: end for each, end in zip(own, ends)}})
-        except ValueError as error:
-            raise ValueError(f"unknown and known must make a contact within all ranges: {error}") from None
+    given: dict[str, Any] = {
+        name.removeprefix("contact."): float(x) for name, x in values.items() if name.startswith("contact.")
+    }
+    given.pop("time", None)
+    return replace(contact, **given)
 
 
 def _products(rows: np.ndarray) -> np.ndarray:
@@ -228,10 +223,9 @@ class Setting(check.Brief):
     def hammer(self, values: Mapping[str, float]) -> blows.TappedBody:
         """The striker with its unknowns."""
         part = {name: values.get(f"striker.{name}") for name in STRIKER}
-        body = self._hammer
         if self.striker.modes.n_modes > 1:
-            return body.scaled(part["mass"], part["first_frequency"], part["damping"])
-        body = body.scaled(part["mass"], None, None)
+            return self._hammer.scaled(part["mass"], part["first_frequency"], part["damping"])
+        body = self._hammer.scaled(part["mass"], None, None)
         if part["first_frequency"] is None:
             return body
         # without a ratio, two equal masses and a spring, as nothing is known

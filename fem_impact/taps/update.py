@@ -56,7 +56,7 @@ class Updated(check.Brief):
             lines.append(f"{name} = {value:.4g}{told}")
         left = ", ".join(f"{frequency:.5g} Hz" for frequency in self.unpaired)
         alone = [f"without a mode of the body, left out: {left}"] if left else []
-        return "\n".join([*lines, transfer.table(self.pairs), *alone, f"{self.n_solves} solves"])
+        return "\n".join([*lines, transfer.pair_table(self.pairs), *alone, f"{self.n_solves} solves"])
 
 
 def update(
@@ -126,10 +126,15 @@ def update(
     if (target <= 0.0).any():
         raise ValueError("measured must hold positive frequencies only; leave out rigid motions")
     if isinstance(build, Scene):
-        _check_names(build, box)
+        for each in box.unknowns:
+            check.one_of(f"the table of unknown[{each.name!r}]", each.name.partition(".")[0], TABLES)
+            try:
+                build.changed({each.name: each.low})
+            except ValueError as error:
+                raise ValueError(f"unknown[{each.name!r}]: {error}") from None
     search = _Misfit(build, box, measured, target, points)
     used = every = np.arange(len(target))  # numbers of the measured modes that are paired
-    found = search.fit(box.start(start), every)
+    found = search.fit(box.start_at(start), every)
     for count in range(3):  # frequencies that belong to no mode: with more, nobody knows which ones are right
         spare = len(every) - count - n
         if spare < n or count > MOST_OUTLIERS * len(every):
@@ -225,16 +230,6 @@ def _half_widths(found: Solution, spare: int) -> np.ndarray:
         return np.full(len(found.x), np.inf)
     variance = np.diag(np.linalg.pinv(found.jacobian.T @ found.jacobian)) * found.cost / spare
     return float(t.ppf(0.95, spare)) * np.sqrt(variance)
-
-
-def _check_names(scene: Scene, box: Box) -> None:
-    """ValueError unless the unknowns are numbers of the scene's body."""
-    for each in box.unknowns:
-        check.one_of(f"the table of unknown[{each.name!r}]", each.name.partition(".")[0], TABLES)
-        try:
-            scene.changed({each.name: each.low})
-        except ValueError as error:
-            raise ValueError(f"unknown[{each.name!r}]: {error}") from None
 
 
 def _modes_of(build: Any, values: dict[str, float], count: int) -> Modes:

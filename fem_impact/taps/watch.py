@@ -1,9 +1,9 @@
 """Judge every record of taps that a folder gets: good, or what to do before the next one."""
 
-from collections.abc import Iterator
+from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -15,8 +15,6 @@ from . import triggers
 from .records import Taps
 
 ENDINGS = (".lvm", ".csv", ".tsv", ".txt", ".npy", ".npz", ".wav", ".mat", ".uff", ".unv", ".58")  # of records
-# [-] lines of a spectrum per inverse of the pulse's length: finer ones move where it falls by less than 0.1 %
-LINES = 64
 
 
 class Advice(NamedTuple):
@@ -41,8 +39,8 @@ def reach_of(taps: Taps, i: int, drop: float = 10.0) -> float | None:
         return None
     first, last = max(0, pulses[0][0] - triggers.GUARD), pulses[-1][1] + triggers.GUARD
     row = taps.force[i, first:last]
-    size = np.abs(np.fft.rfft(row, LINES * len(row)))
-    return falls(np.fft.rfftfreq(LINES * len(row), 1.0 / taps.rate), size, drop)
+    n = 64 * len(row)  # finer lines move where the spectrum falls by less than 0.1 %
+    return falls(np.fft.rfftfreq(n, 1.0 / taps.rate), np.abs(np.fft.rfft(row, n)), drop)
 
 
 def faults(taps: Taps, i: int) -> list[str]:
@@ -102,7 +100,13 @@ class Folder:
 
     def look(self) -> list[Path]:
         """Records that are new or changed and that nobody wrote to since the last look, the oldest first."""
-        now = {path.name: (stat.st_size, stat.st_mtime_ns) for path, stat in self._records()}
+        now = {}
+        for path in self.path.iterdir():
+            if path.suffix.lower() in ENDINGS and not path.name.startswith((PARTIAL, ".", "~")):
+                with suppress(FileNotFoundError):  # renamed since it was listed
+                    stat = path.stat()
+                    if path.is_file() and stat.st_size:
+                        now[path.name] = stat.st_size, stat.st_mtime_ns
         settled = [name for name, state in now.items() if state == self.last.get(name) != self.told.get(name)]
         self.last = now
         self.told |= {name: now[name] for name in settled}
@@ -112,13 +116,3 @@ class Folder:
     def waiting(self) -> bool:
         """Whether records are there that were not handed out."""
         return any(self.told.get(name) != state for name, state in self.last.items())
-
-    def _records(self) -> Iterator[tuple[Path, Any]]:
-        for path in self.path.iterdir():
-            if path.suffix.lower() in ENDINGS and not path.name.startswith((PARTIAL, ".", "~")):
-                try:
-                    stat = path.stat()
-                except FileNotFoundError:  # renamed since it was listed
-                    continue
-                if path.is_file() and stat.st_size:
-                    yield path, stat

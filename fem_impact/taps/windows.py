@@ -3,9 +3,10 @@
 from typing import Any
 
 import numpy as np
+import xarray as xr
 
 from .._base import check
-from . import triggers
+from . import readers, triggers
 from .records import Taps
 from .solver import Data
 
@@ -80,18 +81,13 @@ def cut(taps: Taps, window: Any) -> Taps:
     starts = np.round(taps.onset * taps.rate).astype(int)
     before, after = round(float(first) * taps.rate), round(float(last) * taps.rate)
     before, after = min(before, int(starts.min())), min(after, int(len(taps.time) - starts.max()))
-    if before < 0 or after < 4:
+    if before < 0 or after < 4 or before + after < readers.LEAST:
         raise ValueError(f"window must leave samples after the onset, got {after}; give longer records")
-    rows = [np.arange(s - before, s + after) for s in starts]
-    force = np.stack([row[index] for row, index in zip(taps.force, rows)])
-    response = np.stack([row[index] for row, index in zip(taps.response, rows)])
-    made = Taps.from_arrays(
-        force, response, rate=taps.rate, names=taps.table["channel"].values.tolist(), units=taps.units,
-        overload=taps.table["overload"].values, labels=taps.labels, notes=taps.notes,
-        pulse=taps.table.attrs.get("pulse"),
-    )  # fmt: skip
-    made.table["onset"] = ("tap", np.full(len(starts), before / taps.rate))
-    return made
+    samples = xr.DataArray(starts[:, None] + np.arange(-before, after), dims=("tap", "time"))
+    table = taps.table.drop_vars("time").isel(tap=xr.DataArray(np.arange(taps.n_taps), dims="tap"), time=samples)
+    table["time"] = ("time", np.arange(before + after) / taps.rate, {"units": "s"})
+    table["onset"] = ("tap", np.full(len(starts), before / taps.rate), {"units": "s"})
+    return Taps(table, taps.notes)
 
 
 def data(taps: Taps, n_points: int, weights: np.ndarray) -> Data:

@@ -8,7 +8,7 @@ from fem_impact.designs import goals
 
 
 def test_values_and_ranges_miss_by_what_lies_outside():
-    value, below, between = goals.read(
+    value, below, between = goals.read_goals(
         {"mode1.frequency": 440.0, "contact_time": (None, 2e-3), "restitution": (0.2, 0.4)}, ("",)
     )
     assert value.exact and not below.exact
@@ -20,7 +20,7 @@ def test_values_and_ranges_miss_by_what_lies_outside():
 
 
 def test_goals_hold_for_each_blow_or_for_one():
-    found = goals.read(
+    found = goals.read_goals(
         {"mode2.ratio": 4.0, "impulse": 1.0, "loud": {"spectral_centroid=5000": 900.0}}, ("soft", "loud")
     )
     labels = [goal.label for goal in found]
@@ -45,17 +45,17 @@ def test_goals_hold_for_each_blow_or_for_one():
 )
 def test_what_cannot_be_wanted_is_said(wanted, words):
     with pytest.raises(ValueError, match=words):
-        goals.read(wanted, ("",))
+        goals.read_goals(wanted, ("",))
 
 
 def test_one_impact_is_wanted_as_a_clearance():
-    (found,) = goals.read({"n_impacts": 1}, ("",))
+    (found,) = goals.read_goals({"n_impacts": 1}, ("",))
     assert found.name == "clearance" and found.low == goals.CLEAR and found.high == np.inf
     assert found.miss(0.5) == 0.0 and found.miss(-0.5) == -0.5 - goals.CLEAR
     with pytest.raises(ValueError, match=r"wanted\['n_impacts'\] must be 1, the only count"):
-        goals.read({"n_impacts": 2}, ("",))
+        goals.read_goals({"n_impacts": 2}, ("",))
 
 
 def test_levels_miss_as_their_forces():
-    (found,) = goals.read({"spectral_level=800": (-10.0, None)}, ("",))
+    (found,) = goals.read_goals({"spectral_level=800": (-10.0, None)}, ("",))
     assert_allclose(found.miss(-10.0 - 20.0 * np.log10(1.01)), -np.log(1.01))  # one per cent

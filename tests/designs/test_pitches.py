@@ -13,7 +13,7 @@ from fem_impact.designs import pitches
      ("A4 +100 cents", 466.1637615), ("A#4", 466.1637615), ("B3 -1200 cents", 123.4708253), (523.25, 523.25)],
 )  # fmt: skip
 def test_notes_are_those_of_equal_temperament(text, frequency):
-    (found,) = pitches.read({2: text}, "order")
+    (found,) = pitches.read_pitches({2: text}, "order")
     assert found.mode == 2
     assert_allclose(found.wanted(np.array([1.0]), [1]), frequency, rtol=1e-9)  # digits of the published table
 
@@ -25,7 +25,7 @@ def test_a_frequency_is_told_as_the_nearest_note(frequency, said):
 
 
 def test_intervals_are_from_now_and_ratios_to_the_first_mode():
-    first, second, third = pitches.read([262.0, "-100 cents", "ratio 4"], "order")
+    first, second, third = pitches.read_pitches([262.0, "-100 cents", "ratio 4"], "order")
     now = np.array([250.0, 800.0, 1700.0])
     assert first.wanted(now, (1, 2, 3)) == 262.0
     assert_allclose(second.wanted(now, (1, 2, 3)), 800.0 * 2.0 ** (-1.0 / 12.0))
@@ -33,14 +33,14 @@ def test_intervals_are_from_now_and_ratios_to_the_first_mode():
 
 
 def test_each_pitch_is_that_of_the_nearest_mode_if_there_is_no_doubt():
-    given = pitches.read(["A4", 800.0], "nearest")
+    given = pitches.read_pitches(["A4", 800.0], "nearest")
     assert [each.mode for each in pitches.settled(given, np.array([200.0, 430.0, 830.0, 1500.0]))] == [2, 3]
     with pytest.raises(
         ValueError, match=r"A4 is 386 cents from mode 3 and 498 cents from mode 2.*name the mode, as in"
     ):
         pitches.settled(given[:1], np.array([100.0, 330.0, 550.0]))
     with pytest.raises(ValueError, match="so it is not clear which is meant; name the mode"):
-        pitches.settled(pitches.read([440.0, 441.0], "nearest"), np.array([100.0, 441.0, 900.0]))
+        pitches.settled(pitches.read_pitches([440.0, 441.0], "nearest"), np.array([100.0, 441.0, 900.0]))
 
 
 @pytest.mark.parametrize(
@@ -54,4 +54,4 @@ def test_each_pitch_is_that_of_the_nearest_mode_if_there_is_no_doubt():
 )  # fmt: skip
 def test_what_is_no_pitch_is_refused(given, match, says):
     with pytest.raises(ValueError, match=says):
-        pitches.read(given, match)
+        pitches.read_pitches(given, match)

@@ -84,8 +84,8 @@ FREE = {"height": (0.01, 0.03), "deep": (1e-3, 15e-3), "yarn": (1e6, 1e9)}
 def test_all_slopes_are_differences():
     box = Box.of("free", FREE)
     names = {"mode1.frequency": 1.0, "mode2.ratio": 1.0, "contact_time": 1.0, "restitution": 1.0}
-    run = search._Search(Maker.of(undercut, tuple(FREE)), box, goals.read(names, ("",)), None, 1.0, 12)
-    x = box.start({"height": 0.022, "deep": 8e-3, "yarn": 3e7})
+    run = search._Search(Maker.of(undercut, tuple(FREE)), box, goals.read_goals(names, ("",)), None, 1.0, 12)
+    x = box.start_at({"height": 0.022, "deep": 8e-3, "yarn": 3e7})
     slopes = run.slope(x)
     for j, each in enumerate(box.unknowns):
         step = 1e-3 * np.eye(len(x))[j]

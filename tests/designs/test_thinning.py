@@ -15,7 +15,7 @@ BAR = fi.Beam.rectangular(WOOD, width=0.05, height=0.012)
 
 
 def body_of(system, wanted, tolerance=1.0):
-    return Blank.of(Target.of(system), pitches.read(wanted, "order"), tolerance)
+    return Blank.of(Target.of(system), pitches.read_pitches(wanted, "order"), tolerance)
 
 
 def test_the_place_that_costs_least_for_a_cent_is_taken():

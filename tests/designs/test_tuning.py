@@ -17,8 +17,8 @@ BAR = fi.Beam.rectangular(WOOD, width=0.05, height=0.012)
 
 def again(found, mesh, whole, modes, **held):
     """Frequencies (n,) [Hz] of modes numbers (n,) of a body made anew from what is told of the patches."""
-    each = [Dishes(patch.at, np.full(len(patch.at), patch.depth), patch.radius) for patch in found.patches]
-    less = removal.thinner(whole, Dishes.together(each).depth)
+    patches = [(patch.at, patch.depth) for patch in found.patches]
+    less = removal.thinner(whole, Dishes.of_places(patches, found.radius).depth)
     solved = fi.find_modes(fi.assemble(mesh, less, **held), n_modes=max(modes) + 3, tolerance=2e-5)
     return solved.frequencies[solved.n_rigid + np.array(modes) - 1]
 

@@ -24,7 +24,7 @@ def test_a_name_that_fits_several_channels_is_refused():
     with pytest.raises(ValueError, match="has several force channels"):
         channels.force_channel(found, None, ["N", "N"], "a.csv")
     with pytest.raises(ValueError, match="fits several channels"):
-        channels.number("force", "force", found)
+        channels.find_channel("force", "force", found)
 
 
 def test_factors_are_to_si_times_the_scale():

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hammer_taps import LAW, MASS, RANGES, RATE, STRUCTURE, taps_of
+from hammer_taps import LAW, MASS, RANGES, RATE, STRUCTURE, fitted, taps_of
 
 import fem_impact as fi
 
@@ -12,17 +12,8 @@ MEASURED = Path(__file__).parents[2] / "studies" / "measured"
 
 
 @pytest.fixture(scope="module")
-def structure():
-    return STRUCTURE
-
-
-@pytest.fixture(scope="module")
-def found(structure):
-    guess = fi.Striker.rigid(0.1)
-    return fi.fit(
-        taps_of(structure, [0.0]), target=structure, at=[0.0], striker=guess, contact=fi.Contact.hertz(1e7),
-        unknown=RANGES, starts=3,
-    )  # fmt: skip
+def found():
+    return fitted(taps_of(), contact=fi.Contact.hertz(1e7), starts=3, profiles=True)
 
 
 def test_on_a_known_structure_everything_is_told(found):
@@ -37,17 +28,17 @@ def test_on_a_known_structure_everything_is_told(found):
     assert found.whiteness > 0.01
 
 
-def test_taps_are_predicted_and_so_are_new_ones(found, structure):
+def test_taps_are_predicted_and_so_are_new_ones(found):
     assert max(one.error for one in found.left_out()) < 0.025  # 0.5 % of the peak is 1.3 % of the rms force here
-    new = fi.Taps.from_arrays(taps_of(structure, [0.0], speeds=(1.6,), noise=0.0)[0].force, rate=RATE)
+    new = fi.Taps.from_arrays(taps_of(speeds=(1.6,), noise=0.0)[0].force, rate=RATE)
     one = found.predict(new)
     assert one.error < 0.01 and one.speed == pytest.approx(1.6, rel=0.02)
     assert found.predict(2).error == pytest.approx(found.errors[2], rel=0.05)
 
 
-def test_what_was_found_strikes_again(found, structure):
-    hit = fi.strike(structure, found.striker, found.contact, at=[0.0], speed=1.0)
-    wanted = fi.strike(structure, fi.Striker.rigid(MASS), LAW, at=[0.0], speed=1.0)
+def test_what_was_found_strikes_again(found):
+    hit = fi.strike(STRUCTURE, found.striker, found.contact, at=[0.0], speed=1.0)
+    wanted = fi.strike(STRUCTURE, fi.Striker.rigid(MASS), LAW, at=[0.0], speed=1.0)
     assert hit.peak_force == pytest.approx(wanted.peak_force, rel=0.01)
     single = found.double_hit(tip=1e-2)
     assert single.n_impacts == 1 and found.double_hit(mass=0.5, tip=1e3).n_impacts > 1
@@ -74,7 +65,7 @@ def test_on_a_wall_mass_and_stiffness_are_a_ridge():
 
 
 @pytest.mark.slow
-def test_a_response_tells_what_the_force_cannot(structure):
+def test_a_response_tells_what_the_force_cannot():
     both = fi.Modes.from_arrays(
         [0.0, 900.0], [[1.0, 1.5], [1.0, -0.9]], points=[[0.0], [1.0]], mass=1.0, damping_ratio=0.02, complete=True
     )
@@ -111,12 +102,10 @@ LOSING = {
 
 
 @pytest.mark.parametrize("kind", LOSING)
-def test_any_number_of_a_contact_is_found_by_its_name(structure, kind):
+def test_any_number_of_a_contact_is_found_by_its_name(kind):
     truth, guess, ranges = LOSING[kind]
-    taps = taps_of(structure, [0.0], law=truth, noise=0.001)
-    made = fi.fit(
-        taps, target=structure, at=[0.0], striker=fi.Striker.rigid(MASS), contact=guess, unknown=ranges, starts=3
-    )
+    given = {"striker": fi.Striker.rigid(MASS), "contact": guess, "unknown": ranges, "starts": 3, "profiles": True}
+    made = fitted(taps_of(law=truth, noise=0.001), **given)
     assert made.unidentifiable == () and made.whiteness > 0.01
     for name in ranges:
         wanted = getattr(truth, name.partition(".")[2])
@@ -125,24 +114,18 @@ def test_any_number_of_a_contact_is_found_by_its_name(structure, kind):
         assert getattr(made.contact, name.partition(".")[2]) == pytest.approx(wanted, rel=0.02)  # 0.6 % measured
 
 
-def test_a_tap_that_disagrees_is_named(structure):
-    taps = taps_of(structure, [0.0], speeds=(0.4, 0.7, 1.0, 1.3))
-    other = taps_of(structure, [0.0], law=fi.Contact.power(2e8, 1.7), speeds=(0.9,))
-    made = fi.fit(
-        [*taps, *other], target=structure, at=[0.0], striker=fi.Striker.rigid(0.1), contact=LAW, unknown=RANGES,
-        starts=2, profiles=False,
-    )  # fmt: skip
+def test_a_tap_that_disagrees_is_named():
+    taps = taps_of(speeds=(0.4, 0.7, 1.0, 1.3))
+    other = taps_of(law=fi.Contact.power(2e8, 1.7), speeds=(0.9,))
+    made = fitted([*taps, *other])
     assert list(made.outliers) == ["tap 5"] and made.used == (0, 1, 2, 3)
     assert made.point["contact.exponent"] == pytest.approx(1.7, abs=0.05)
 
 
-def test_laws_are_compared_by_left_out_taps(structure):
+def test_laws_are_compared_by_left_out_taps():
     laws = [fi.Contact.linear(1e6), fi.Contact.hertz(1e7)]
-    made = fi.fit(
-        taps_of(structure, [0.0], law=fi.Contact.hertz(1e8)), target=structure, at=[0.0], contact=laws,
-        striker=fi.Striker.rigid(0.1), unknown={name: RANGES[name] for name in ("contact.stiffness", "striker.mass")},
-        starts=2, profiles=False,
-    )  # fmt: skip
+    unknown = {name: RANGES[name] for name in ("contact.stiffness", "striker.mass")}
+    made = fitted(taps_of(law=fi.Contact.hertz(1e8)), contact=laws, unknown=unknown)
     assert made.contact.exponent == 1.5 and made.compared["Hertz"] < 0.3 * made.compared["linear"]
 
 
@@ -165,8 +148,8 @@ def test_four_real_taps_are_predicted_from_each_other():
     assert each.whiteness < 0.01 and "residual is not noise" in each.summary()
 
 
-def test_wrong_arguments_are_refused(structure):
-    taps = taps_of(structure, [0.0])
+def test_wrong_arguments_are_refused():
+    taps = taps_of()
     given = {"striker": fi.Striker.rigid(0.1), "contact": LAW, "unknown": RANGES}
     with pytest.raises(ValueError, match="response_at needs accelerations"):
         fi.fit(taps, response_at=[[0.0]], **given)
@@ -199,9 +182,8 @@ def test_a_search_goes_on_where_all_starts_end_in_a_poor_minimum():
                  "target.first_frequency": (60.0, 150.0), "target.mass": (0.5, 5.0)},
         starts=1, profiles=False,
     )  # fmt: skip
-    assert (
-        len(found.minima) > 1 and max(found.minima) > 50.0 * found.best.cost
-    )  # others end at a bound of the frequency
+    # others end at a bound of the frequency
+    assert len(found.minima) > 1 and max(found.minima) > 50.0 * found.best.cost
     assert found.point["target.mass"] == pytest.approx(1.5, rel=0.02)  # 0.3 % was found in 0.2 % of noise
     assert found.point["target.first_frequency"] == pytest.approx(90.0, rel=0.01)
 

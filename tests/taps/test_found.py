@@ -4,7 +4,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from hammer_taps import LAW, MASS, RANGES, STRUCTURE, taps_of
+from hammer_taps import LAW, MASS, RANGES, fitted, taps_of
 
 import fem_impact as fi
 from fem_impact.taps.found import along, differ, stated
@@ -16,18 +16,16 @@ SPEEDS = (0.5, 0.7, 0.9, 1.1)
 @pytest.fixture(scope="module")
 def taps():
     laws = [fi.Contact.power(factor * LAW.stiffness, LAW.exponent) for factor in FACTORS]
-    return taps_of(STRUCTURE, [0.0], law=laws, speeds=SPEEDS, noise=0.003)
+    return taps_of(law=laws, speeds=SPEEDS, noise=0.003)
 
 
-def fitted(taps, per_tap=(), **changes):
-    given = {"target": STRUCTURE, "at": [0.0], "striker": fi.Striker.rigid(0.1), "contact": fi.Contact.hertz(1e7),
-             "unknown": RANGES, "starts": 2, "robust": False, "profiles": False}  # fmt: skip
-    return fi.fit(taps, per_tap=per_tap, **given | changes)
+def hertz(taps, per_tap=()):
+    return fitted(taps, contact=fi.Contact.hertz(1e7), robust=False, per_tap=per_tap)
 
 
 @pytest.fixture(scope="module")
 def each(taps):
-    return fitted(taps, "contact.stiffness")
+    return hertz(taps, "contact.stiffness")
 
 
 def test_every_tap_gets_its_own_stiffness_and_the_unknown_is_their_mean(each):
@@ -43,11 +41,11 @@ def test_every_tap_gets_its_own_stiffness_and_the_unknown_is_their_mean(each):
 
 
 def test_one_stiffness_for_all_explains_such_taps_worse(taps, each):
-    common = fitted(taps)
+    common = hertz(taps)
     assert common.error > 3.0 * each.error and common.whiteness < 1e-6 < each.whiteness
     worst = [max(one.error for one in made.left_out()) for made in (common, each)]
     assert worst[0] > 3.0 * worst[1]
-    assert ["with one for each (per_tap)" in note for note in common.notes] == [True] and not each.notes
+    assert "a stiffness for each tap (per_tap)" in common.verdict[-1] and "per_tap" not in each.summary()
 
 
 @pytest.mark.slow
@@ -68,7 +66,7 @@ def test_words_and_numbers_tell_the_spread(each):
 
 
 def test_equal_taps_do_not_differ_beyond_the_noise():
-    made = fitted(taps_of(STRUCTURE, [0.0], speeds=SPEEDS, noise=0.005), "contact.stiffness")
+    made = hertz(taps_of(speeds=SPEEDS), "contact.stiffness")
     spread = made.spreads["contact.stiffness"]
     assert spread.chance > 0.05 and 0.3 < spread.deviation / spread.by_noise < 3.0  # this seed's noise
     assert "one value for all would do" in differ(spread)
@@ -89,9 +87,9 @@ def test_what_a_tap_has_of_its_own_and_nobody_can_tell_gets_no_number():
 
 def test_a_name_that_is_not_unknown_has_no_value_for_each_tap(taps):
     with pytest.raises(ValueError, match="per_tap must be one of"):
-        fitted(taps, "contact.loss")
+        hertz(taps, "contact.loss")
     with pytest.raises(ValueError, match="per_tap must be a list of texts"):
-        fitted(taps, 3)
+        hertz(taps, 3)
 
 
 @pytest.mark.parametrize(

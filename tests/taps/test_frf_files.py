@@ -16,13 +16,8 @@ H = -(X**2) / (100.0**2 - X**2 + 2j * X)  # 1/kg
 
 
 def response(node, data=H, **codes):
-    return {
-        "type": 58, "binary": 0, "func_type": 4, "rsp_node": node, "rsp_dir": 3, "ref_node": 1, "ref_dir": 3,
-        "ord_data_type": 6, "abscissa_spacing": 1, "abscissa_min": 1.0, "abscissa_inc": 1.0, "num_pts": len(data),
-        "abscissa_spec_data_type": 18, "ordinate_spec_data_type": 12, "orddenom_spec_data_type": 13, "x": X,
-        "data": data, "id1": f"point {node}", "id2": "NONE", "id3": "NONE", "id4": "NONE", "id5": "NONE",
-        "rsp_ent_name": "NONE", "ref_ent_name": "NONE", "z_axis_value": 0.0, "ver_num": 0, "load_case_id": 0, **codes,
-    }  # fmt: skip
+    kinds = {"ordinate_spec_data_type": 12, "orddenom_spec_data_type": 13, "abscissa_spec_data_type": 18}
+    return transfer._set(f"point {node}", node, X, data) | kinds | {"func_type": 4, "ord_data_type": 6} | codes
 
 
 NODES = {"type": 15, "node_nums": [1, 2], "def_cs": [0, 0], "disp_cs": [0, 0], "color": [1, 1], "x": [0.1, 0.3],
@@ -95,6 +90,7 @@ def test_without_a_code_of_the_denominator_force_is_assumed_and_told(tmp_path):
         ([response(1), response(1, np.full(200, 2.0), func_type=6, ord_data_type=4)], "coherence that is not between"),
         ([response(1, np.where(X == 50.0, np.inf, H))], "no finite number"),
         ([NODES], "holds data sets 15, no frequency responses"),
+        ([response(1, H.real, func_type=1)], r"holds time records \(data set 58, function type 1\), no frequency resp"),
     ],
 )
 def test_a_wrong_file_is_refused(tmp_path, sets, text):

@@ -4,22 +4,22 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from hammer_taps import LAW, STRUCTURE, taps_of
+from hammer_taps import LAW, taps_of
 
 import fem_impact as fi
 from fem_impact.taps import nested, solver
 from fem_impact.taps.nested import Inner
-from fem_impact.taps.proposal import LOSS, STIFFNESS
+from fem_impact.taps.proposal import STIFFNESS
 
 HAMMER = fi.Striker.rigid(0.2)
-EXPONENT = {"contact.exponent": (1.0, 4.0)}
+EXPONENT, LOSS = {"contact.exponent": (1.0, 4.0)}, {"contact.loss": (0.0, 20.0)}
 MODE = {"mode1.frequency": (100.0, 5e3), "mode1.mass": (0.02, 2e3)}
 MODES = {**MODE, "mode2.frequency": (100.0, 5e3), "mode2.mass": (0.02, 2e3)}
 
 
 @pytest.fixture(scope="module")
 def taps():
-    return taps_of(STRUCTURE, [0.0], noise=0.003)
+    return taps_of(noise=0.003)
 
 
 def fitted(taps, unknown, **changes):
@@ -110,5 +110,5 @@ def test_a_search_that_did_not_end_says_so_where_it_would_gain(taps, small, monk
     cut = fitted(taps, STIFFNESS | EXPONENT | MODE)
     monkeypatch.undo()
     assert any(note.startswith("the search had not ended") for note in cut.notes) and not small.notes
-    assert solver.promised(cut.problem, cut.best) > solver.PROMISED * cut.best.cost
+    assert solver.promised(cut.problem, cut.best) > 0.01 * cut.best.cost
     assert solver.promised(small.problem, small.best) < 1e-3 * small.best.cost

@@ -1,4 +1,4 @@
-"""Profiles of the likelihood, on problems whose answer is known."""
+"""Profiles of the likelihood and the scatter over taps, on problems whose answer is known."""
 
 import numpy as np
 import pytest
@@ -40,7 +40,7 @@ class Known:
         """Of the first unknown, whose best fit is known."""
         x = np.array([float(each.inside(value)) for each, value in zip(self.free, (best, 2.0 * best, 0.0))])
         start = Solution(x, float(np.square(self.residual(x)).sum()), self.jacobian(x))
-        return profiles.follow(self, start, 0, 1.0, FREEDOM, "a")[0]
+        return profiles.follow_profile(self, start, 0, 1.0, FREEDOM, "a")[0]
 
 
 def parabola(open_=(False, False), log=False, n=41, width=0.1):
@@ -153,3 +153,41 @@ def test_one_white_record_of_a_hundred_is_doubted():
         row = rng.standard_normal((2, 100))
         grown += abs(profiles.variance(row, 0)[0] / np.square(row).mean() - 1.0) > 1e-12
     assert grown <= 12  # 4 +- 2 are expected
+
+
+class Straight:
+    """A linear problem: each tap measures its own value 50 times, besides a momentum and an onset that matter not."""
+
+    def __init__(self, n_taps):
+        self.free, self.own, self.n_shared = (Unknown("a", 1.0, 10.0),), ("a",), 1
+        self.data = type("Data", (), {"n_taps": n_taps})
+
+    def jacobian(self, x):
+        n = self.data.n_taps
+        out = np.zeros((n, 50, 1 + 3 * n))
+        out[:, :, 0] = 1.0
+        for tap in range(n):
+            out[tap, :, 1 + 2 * n + tap] += 1.0
+            out[:, :, 1 + 2 * n + tap] -= 1.0 / n
+        return out.reshape(-1, 1 + 3 * n)
+
+    def apart(self, x):
+        far = x[None, 1 + 2 * self.data.n_taps :]
+        return far - far.mean()
+
+    def values(self, x, tap=None):
+        return {"a": float(np.exp(x[0] + (0.0 if tap is None else self.apart(x)[0, tap])))}
+
+
+def test_noise_makes_the_spread_of_independent_means():
+    problem, noise = Straight(5), 0.04
+    x = np.concatenate([[np.log(2.0)], np.zeros(10), [0.1, -0.1, 0.2, 0.0, 0.3]])
+    made = profiles.scatter(problem, x, 0, noise, 200)
+    assert made.by_noise == pytest.approx(np.sqrt(noise / 50), rel=1e-9)  # standard error of a mean of 50
+    assert made.deviation == pytest.approx(np.std([0.1, -0.1, 0.2, 0.0, 0.3], ddof=1)) and made.mean == 2.0
+    assert made.chance < 1e-3
+
+
+def test_a_spread_as_noise_makes_it_is_no_surprise():
+    made = profiles.Scatter("a", np.ones(5), 1.0, 0.1, 0.1, True, 200)
+    assert made.chance == pytest.approx(0.41, abs=0.01)  # F(1; 4, 200)

@@ -1,4 +1,4 @@
-"""The commands for measured taps."""
+"""The commands for measured taps, and scene files that strike with what was found."""
 
 import json
 from pathlib import Path
@@ -13,6 +13,7 @@ from fem_impact.taps import prompt
 
 ROOT = Path(__file__).parents[2]
 TAPS = ROOT / "studies" / "measured" / "acceleration_multi.lvm"
+LAW = fi.Contact.hertz(2e8)
 
 
 def test_fit_writes_a_page_numbers_and_a_scene(tmp_path, capsys):
@@ -87,3 +88,41 @@ def test_peaks_of_five_times_their_surroundings_are_listed_and_lower_ones_are_no
         {"frequency": frequency, "channel": ["a"]},
     )  # fmt: skip
     assert [each["frequency"] for each in prompt.peaks(found)] == [100.0]
+
+
+@pytest.fixture(scope="module")
+def found():
+    wall = [fi.Touch(LAW, 0, None)]
+    hits = [fi.collide([fi.Modes.rigid(0.1)], wall, speeds=[v]) for v in (0.5, 1.0)]
+    taps = [fi.measure(hit, rate=25600.0, noise=1e-3, rng=i) for i, hit in enumerate(hits)]
+    ranges = {"contact.stiffness": (1e6, 1e10)}
+    return fi.fit(taps, striker=fi.Striker.rigid(0.1), contact=LAW, unknown=ranges, starts=1)
+
+
+def test_a_wall_becomes_a_scene_with_the_same_blow(found, tmp_path):
+    assert prompt.write_scene(tmp_path / "s.toml", found) == ()
+    hit = fi.load_scene(tmp_path / "s.toml").strike()
+    same = fi.collide([fi.Modes.rigid(0.1)], [fi.Touch(found.contact, 0, None)], speeds=[hit.speed])
+    assert hit.peak_force == pytest.approx(same.peak_force, rel=1e-3)  # the tolerance is 1e-4
+    assert hit.speed == pytest.approx(0.75, rel=0.01)
+    assert "90 % interval" in (tmp_path / "s.toml").read_text()
+
+
+def test_the_body_of_a_scene_is_kept(found, tmp_path):
+    scene = fi.load_scene(ROOT / "studies" / "scenes" / "drumstick.toml")
+    prompt.write_scene(tmp_path / "s.toml", found, scene)
+    again = fi.load_scene(tmp_path / "s.toml")
+    assert again.data()["mesh"] == scene.data()["mesh"]
+    assert again.make_striker().mass == pytest.approx(0.1) and again.make_contact().exponent == 1.5
+
+
+def test_an_unknown_structure_needs_a_scene(found):
+    body = fi.Modes.from_arrays([500.0], [[1.0]], points=[[0.0]], mass=1.0, complete=True)
+    hit = fi.strike(body, fi.Striker.rigid(0.1), LAW, at=[0.0], speed=1.0)
+    taps = [fi.measure(hit, rate=25600.0)]
+    made = fi.fit(
+        taps, target=body, at=[0.0], striker=fi.Striker.rigid(0.1), contact=LAW, starts=1,
+        unknown={"contact.stiffness": (1e6, 1e10)},
+    )  # fmt: skip
+    with pytest.raises(ValueError, match="scene must be given"):
+        prompt.scene_tables(made)
