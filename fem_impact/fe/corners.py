@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from .._base.rounding import HALVINGS
+from .._base.rounding import HALVINGS, SAME
 from ..mesh.meshes import Mesh
 from .material import Material, turned
 from .splitting import Rim, bisected, strip
@@ -20,7 +20,6 @@ CORNER_ERROR = 1e-7
 SMALLEST = 1e-10  # [-] smallest ring as a fraction of the extent; rounding of the coordinates spoils smaller ones
 SMALLEST_FREE = 3e-3  # [-] the same at a free corner, which moves: rounding grows with the ring's size to the -2
 MILD = 2.95  # [-] corners with a larger exponent get no rings: there rings cost quintic triangles more than they gain
-FLATTEST = 1e-9  # [-] least imaginary part of a root mu, far below that of any material: rounding may take it away
 MILD_FREE = 2.5  # [-] the same between free edges, where the singular part is small, so that rings pay off later
 # [-] roots mu that lie closer, over their imaginary part, are taken apart: those of an isotropic plate are equal, and
 # exponents change by 1e-7
@@ -32,8 +31,8 @@ SAY = 1e-3
 def _roots(D: np.ndarray) -> np.ndarray:
     """The four numbers mu (4,) for which any function of ``x + mu y`` bends a plate of stiffness D without load."""
     equation = [D[1, 1], 4.0 * D[1, 2], 2.0 * D[0, 1] + 4.0 * D[2, 2], 4.0 * D[0, 2], D[0, 0]]
-    upper = sorted(np.roots(equation), key=lambda mu: mu.imag)[2:]  # above the real axis, but for rounding
-    one, other = (complex(mu.real, max(mu.imag, FLATTEST)) for mu in upper)
+    upper = sorted(np.roots(equation), key=lambda mu: mu.imag)[2:]  # above the real axis, which rounding may hide
+    one, other = (complex(mu.real, max(mu.imag, SAME)) for mu in upper)
     if abs(one - other) < APART * one.imag:
         middle, step = 0.5 * (one + other), 0.5j * APART * one.imag
         one, other = middle + step, middle - step

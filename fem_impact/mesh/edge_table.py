@@ -23,7 +23,11 @@ class Edge:
 
 def edges(mesh: Mesh) -> list[Edge]:
     """The named edges of a mesh, in its order; `WHOLE` comes last."""
-    lengths = facet_lengths(mesh)
+    ends = mesh.points[mesh.facets]  # (n_facets, 2, 2), or (2, 1, 1) on a beam
+    # the chord errs by length cubed, the two chords through the middle by a quarter of that: the difference cancels it
+    chord = np.linalg.norm(ends[:, -1] - ends[:, 0], axis=1)
+    halves = np.linalg.norm(ends - mesh.middles[:, None], axis=2).sum(axis=1)
+    lengths = (4.0 * halves - chord) / 3.0
     names = [*(name for name in mesh.edges if name != WHOLE), WHOLE]
     sets = {name: frozenset(np.asarray(mesh.edges[name]).tolist()) for name in names}
     found = []
@@ -37,21 +41,6 @@ def edges(mesh: Mesh) -> list[Edge]:
             Edge(name, float(lengths[facets].sum()), len(facets), bool(mesh.curved[facets].any()), middle, twins)
         )
     return found
-
-
-def facet_lengths(mesh: Mesh) -> np.ndarray:
-    """Length (n_facets,) [m] of each facet along the true curve, from its ends and its middle; zeros on a beam.
-
-    Notes
-    -----
-    The chord errs by length cubed, the two chords through the middle by a quarter of that: the difference cancels it.
-    """
-    if mesh.dimension == 1:
-        return np.zeros(len(mesh.facets))
-    ends = mesh.points[mesh.facets]  # (n_facets, 2, 2)
-    chord = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)
-    halves = np.linalg.norm(ends - mesh.middles[:, None], axis=2).sum(axis=1)
-    return (4.0 * halves - chord) / 3.0
 
 
 def sides(mesh: Mesh) -> tuple[float, float, float]:
