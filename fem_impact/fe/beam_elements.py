@@ -146,7 +146,7 @@ def domain(make_space: Callable[[Cells], Any], body: Subject, names: tuple[str, 
     bare = Frame(*box, 1.0, 1.0)
 
     def fields(x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        places = bare.places(x)
+        places = bare.to_metres(x)
         return section.stiffness(places), section.inertia(places)
 
     points, marked = (bare.local(each)[:, 0] for each in (mesh.points, body.marked))

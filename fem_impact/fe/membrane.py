@@ -68,7 +68,7 @@ class Sheet:
         space: Any = system.space
         X, x, dx = slopes.quadrature(system, 4)  # exact for the stiffness of quartic elements
         gradient = plane.gradients(space, np.arange(len(x)), area_coordinates(X.T)[None])
-        h = evaluate("thickness", section.thickness, frame.places(x), "m").reshape(dx.shape)
+        h = evaluate("thickness", section.thickness, frame.to_metres(x), "m").reshape(dx.shape)
         moduli = (frame.length**2 * h * dx)[..., None, None] * section.stretched
         own = plane.numbered(triangles(rim.points, space.vertices))
         dofs = np.vstack([own.element_dofs, own.N + own.element_dofs]).T

@@ -272,13 +272,20 @@ def heavier(system: System, values: np.ndarray, vectors: np.ndarray) -> tuple[np
 
 
 def fine_enough(system: System, n_modes: int | None, max_frequency: float | None, tolerance: float | None) -> System:
-    """The system on a mesh that resolves the shortest wave wanted; unchanged if the user chose the mesh size."""
-    size = size_for(system, n_modes, max_frequency, tolerance)
-    if system.mesh.size_stated or size >= system.mesh.size:
+    """The system on a mesh that resolves the shortest wave wanted; unchanged if the user chose the mesh size.
+
+    For a tolerance it is the mesh expected to meet it if edges and corners need no finer one: a mesh file much finer
+    than needed gives way to a coarser mesh, too.
+    """
+    mesh, size = system.mesh, size_for(system, n_modes, max_frequency, tolerance)
+    finer = size < mesh.size
+    coarser = tolerance is not None and size > mesh.size and len(mesh.cells) > CHEAP_CELLS
+    if mesh.size_stated or not (finer or coarser):
         return system
-    finer = system.mesh.refined(system.mesh.size / size)
+    other = mesh.refined(mesh.size / size)
     # a mesh file's largest triangle sets its size, so a mesh refined to a smaller size can still have fewer cells
-    return reassemble(system, finer) if len(finer.cells) > len(system.mesh.cells) else system
+    more = len(other.cells) - len(mesh.cells)
+    return reassemble(system, other) if (more > 0 if finer else more < 0) else system
 
 
 def resolves(system: System, max_frequency: float) -> bool:
@@ -332,7 +339,8 @@ def refine(system: System, n_modes: int | None, max_frequency: float | None, tol
         raise ValueError(
             "tolerance needs a mesh that can be refined; make it with fi.mesh or load it with fi.mesh.load"
         )
-    found, size = solve_on_mesh(_start(system, n_modes, max_frequency, tolerance), n_modes, max_frequency), np.inf
+    first = fine_enough(system, n_modes, max_frequency, tolerance)
+    found, size = solve_on_mesh(first, n_modes, max_frequency), np.inf
     seen: list[tuple[float, float]] = []
     bent = found.system.rules.compared and not found.system.rules.thick
     for left in reversed(range(9)):
@@ -393,15 +401,6 @@ def _needed(parts: np.ndarray, goal: float) -> float:
     return max(LEAST_STEP, float(np.exp(brentq(excess, 0.0, -np.log(EPSILON))))) if excess(0.0) > 0.0 else LEAST_STEP
 
 
-def _start(system: System, n_modes: int | None, max_frequency: float | None, tolerance: float) -> System:
-    """The system on the mesh expected to meet a tolerance if its edges and corners need no finer one."""
-    mesh, size = system.mesh, size_for(system, n_modes, max_frequency, tolerance)
-    if mesh.size_stated or size <= mesh.size or len(mesh.cells) <= CHEAP_CELLS:
-        return fine_enough(system, n_modes, max_frequency, tolerance)
-    coarse = mesh.refined(mesh.size / size)  # a mesh file much finer than needed
-    return reassemble(system, coarse) if len(coarse.cells) < len(mesh.cells) else system
-
-
 def enclosure(found: Spectrum) -> np.ndarray | None:
     """Guaranteed bounds of each frequency, (n_modes, 2) [rad/s], or None if no proof covers the body.
 
@@ -437,7 +436,7 @@ def enclosure(found: Spectrum) -> np.ndarray | None:
     if mesh.recipe is not None and abs(factor - 1.0) > 0.1:
         morley = reassemble(morley, mesh.refined(factor))
     second = solve_on_mesh(morley, len(found.omega), None)
-    longest = mesh_files.longest(second.system.mesh.points, second.system.mesh.cells) / system.frame.length
+    longest = mesh_files.side_lengths(second.system.mesh.points, second.system.mesh.cells).max() / system.frame.length
     value = (second.omega / system.frame.rate) ** 2
     lower = value / (1.0 + MORLEY**2 * value * longest**4 / (1.0 - nu))
     bounds = np.column_stack([np.sqrt(lower) * system.frame.rate, found.omega])

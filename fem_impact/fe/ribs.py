@@ -193,7 +193,7 @@ class RibLine(NamedTuple):
         """Where a rib of a plate lies: on the sides ``facets`` (n, 2)."""
         cells = cells_of_facets(facets, space.vertices)[0]
         area, x, normal = at_facets(space, facets, cells)
-        ds, place = np.linalg.norm(normal, axis=2), frame.places(x)
+        ds, place = np.linalg.norm(normal, axis=2), frame.to_metres(x)
         nx, ny = np.moveaxis(normal / ds[..., None], 2, 0)
         along = np.stack([ny**2, nx**2, -nx * ny], axis=-1)  # for the tangent (-ny, nx)
         twist = np.stack([-nx * ny, nx * ny, 0.5 * (nx**2 - ny**2)], axis=-1)

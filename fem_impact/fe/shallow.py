@@ -115,7 +115,7 @@ def _heights(space: ShallowSpace, section: Any, frame: Frame) -> np.ndarray:
     local = plane.nodes(space).reshape(-1, 2)
     if section.rise is None:
         return np.zeros((len(space.origin), plane.QUARTIC))
-    heights = check.field("rise", section.rise, frame.places(local), "m") / frame.length
+    heights = check.field("rise", section.rise, frame.to_metres(local), "m") / frame.length
     tilt = np.column_stack([np.ones(len(local)), local])  # it stretches nothing, but would cost digits
     weight = np.repeat(np.sqrt(np.abs(np.linalg.det(space.jacobian))), plane.QUARTIC)
     heights -= tilt @ np.linalg.lstsq(weight[:, None] * tilt, weight * heights, rcond=None)[0]
@@ -193,7 +193,7 @@ def plane_mass(system: Any, vectors: np.ndarray) -> np.ndarray:
         slope = space.functions(piece.cells, piece.x, (1,))[0].transpose(0, 2, 1, 3)
         moved = -(piece.stiffness[..., 0, 1] / piece.stiffness[..., 0, 0] / frame.length)[..., None, None] * slope
         moved[:, :, 0, FIRST] = moved[:, :, 1, SECOND] = shape
-        turns = piece.rib.turning(frame.places(piece.x)).reshape(piece.ds.shape) / frame.length**2
+        turns = piece.rib.turning(frame.to_metres(piece.x)).reshape(piece.ds.shape) / frame.length**2
         each = gram(moved, piece.inertia * piece.ds) + gram(slope, turns * piece.ds)
         local.append(each / (frame.inertia * frame.length))
         where.append(piece.cells)

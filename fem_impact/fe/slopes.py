@@ -78,7 +78,7 @@ def softness(system: System) -> float:
     """Integral of one over the thickness of a plate [m], of one over E A of a beam [1/N]."""
     frame, section = system.frame, system.section
     _, x, dx = quadrature(system)
-    place = frame.places(x)
+    place = frame.to_metres(x)
     if isinstance(section, Plate):
         size = evaluate("thickness", section.thickness, place, "m")
     else:

@@ -56,7 +56,7 @@ class Frame:
         """Coordinates [-] in the frame of points [m]."""
         return (points - self.centre) / self.length
 
-    def places(self, local: np.ndarray) -> np.ndarray:
+    def to_metres(self, local: np.ndarray) -> np.ndarray:
         """Points (n, dimension) [m] at coordinates (..., dimension) in the frame; on a beam never beyond its ends."""
         points = self.centre + self.length * local.reshape(-1, len(self.centre))
         if len(self.centre) > 1:
@@ -68,7 +68,7 @@ class Frame:
         size: Any = self.length ** POWERS.get(name, 0)
         if name == "walls":
             size = np.outer(*[np.repeat([1.0 / self.length, 1.0], 3)] * 2)
-        found = getattr(section, name)(self.places(local)) / (self.unit(name) * size)
+        found = getattr(section, name)(self.to_metres(local)) / (self.unit(name) * size)
         return found.reshape(*local.shape[:2], *found.shape[1:])
 
 

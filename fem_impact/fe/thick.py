@@ -56,6 +56,7 @@ from scipy.sparse.linalg import spsolve
 from scipy.spatial import cKDTree
 
 from .._base.untyped import Cells, Sparse
+from ..mesh.mesh_files import side_lengths
 from ..mesh.meshes import LONGEST, Mesh
 from . import plane, plates, splitting, supports
 from .elements import Bent, area_coordinates, curvatures, numbering
@@ -81,8 +82,7 @@ class MindlinSpace(PlaneSpace):
 
     def turn(self, mesh: Cells, thickness: np.ndarray) -> None:
         """Let the nodes of straight triangles much smaller than their ``thickness`` (n_cells,) hold rotations."""
-        corner = mesh.p.T[self.vertices]
-        longest = np.linalg.norm(np.roll(corner, -1, axis=1) - corner, axis=2).max(axis=1)
+        longest = side_lengths(mesh.p.T, self.vertices).max(axis=1)
         bends = np.zeros(len(longest), bool)
         if self.bent is not None:
             bends[self.bent.cells] = True
@@ -156,7 +156,7 @@ def terms(space: MindlinSpace, points: Points, cells: np.ndarray) -> list[Term]:
 
 def _domain(body: Subject, fields: tuple[str, ...]) -> Domain:
     found = plates.domain(MindlinSpace, body, fields)
-    h = evaluate("thickness", body.section.thickness, found.frame.places(found.space.origin), "m")
+    h = evaluate("thickness", body.section.thickness, found.frame.to_metres(found.space.origin), "m")
     found.space.turn(found.cells, h / found.frame.length)
     return found
 
@@ -239,9 +239,8 @@ def towards_edges(mesh: Mesh, loose: np.ndarray, size: float) -> Mesh:
         ends = mesh.points[mesh.facets[loose]]
         steps = np.ceil(2.0 * np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1) / size).astype(int)
         along = [np.linspace(0.0, 1.0, n + 1)[:, None] * (b - a) + a for (a, b), n in zip(ends, steps)]
-        corner = mesh.points[mesh.cells]
-        away = cKDTree(np.concatenate(along)).query(corner)[0].min(axis=1)
-        longest = np.linalg.norm(np.roll(corner, -1, axis=1) - corner, axis=2).max(axis=1)
+        away = cKDTree(np.concatenate(along)).query(mesh.points[mesh.cells])[0].min(axis=1)
+        longest = side_lengths(mesh.points, mesh.cells).max(axis=1)
         tall = longest > np.maximum(size, splitting.GROWTH * away) * LONGEST
         if not tall.any():
             return mesh
@@ -283,7 +282,7 @@ def errors_by_layers(system: Any, vectors: np.ndarray, loads: np.ndarray, forced
     twist = np.stack([-2.0 * nx * ny, 2.0 * nx * ny, nx**2 - ny**2], axis=-1)  # strains of a unit 2 kappa_nt
     rigidity = np.einsum("fqi,fqij,fqj->fq", 0.5 * twist * [1.0, 1.0, 2.0], stiffness, 0.5 * twist * [1.0, 1.0, 2.0])
     width = np.sqrt(rigidity / np.einsum("fqi,fqij,fqj->fq", along, shear, along))
-    thin = evaluate("thickness", system.section.thickness, frame.places(x), "m").reshape(ds.shape) / frame.length
+    thin = evaluate("thickness", system.section.thickness, frame.to_metres(x), "m").reshape(ds.shape) / frame.length
     coarse = ds.sum(axis=1)[:, None] / thin
     # sides up to four times the thickness resolve the layer, from nine times on they miss it
     share = np.where(coarse > 4.0, np.minimum(1.0, (coarse / 9.0) ** 2), 0.0)

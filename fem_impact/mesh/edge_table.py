@@ -4,6 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from .mesh_files import side_lengths
 from .meshes import Mesh
 
 WHOLE = "boundary"  # the name of all edges together
@@ -45,8 +46,7 @@ def edges(mesh: Mesh) -> list[Edge]:
 
 def sides(mesh: Mesh) -> tuple[float, float, float]:
     """Shortest, median and longest side [m] of the elements."""
-    corners = mesh.points[mesh.cells]
-    along = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2).ravel()
+    along = side_lengths(mesh.points, mesh.cells)
     return float(along.min()), float(np.median(along)), float(along.max())
 
 

@@ -259,9 +259,10 @@ def numbers_of(sides: np.ndarray, pairs: np.ndarray) -> np.ndarray:
     return np.searchsorted(sides[:, 0] * n + sides[:, 1], a * n + b)
 
 
-def longest(points: np.ndarray, cells: np.ndarray) -> float:
-    """Length [m] of the longest side of all triangles."""
-    return float(np.linalg.norm(points[cells] - points[np.roll(cells, 1, axis=1)], axis=2).max())
+def side_lengths(points: np.ndarray, cells: np.ndarray) -> np.ndarray:
+    """Lengths (n_cells, 3) [m] of the sides of triangles, from the first vertex to the second and on."""
+    corner = points[cells]
+    return np.linalg.norm(np.roll(corner, -1, axis=1) - corner, axis=2)
 
 
 def boundary(cells: np.ndarray) -> np.ndarray:

@@ -333,7 +333,7 @@ def load(path: Any, *, unit: str | None = None) -> Mesh:
     edges["boundary"] = np.arange(len(facets))
     made = Mesh(
         points, cells, facets, edges, curve.middles, curve.tangents, curve.curvatures,
-        size=mesh_files.longest(points, cells) / LONGEST, size_stated=False,
+        size=float(mesh_files.side_lengths(points, cells).max()) / LONGEST, size_stated=False,
         notes=tuple(f"{Path(path).name}: {note}" for note in notes),
         rise=None if heights is None else table(*heights),
     )  # fmt: skip
