@@ -103,7 +103,7 @@ class Sensitivity:
     def of(cls, system: System, vectors: np.ndarray, omega: np.ndarray) -> "Sensitivity":
         """Of modes with vectors (n_dofs, n_modes) in the frame and frequencies (n_modes,) [rad/s]."""
         section, frame, points = system.section, system.frame, quadrature(system)
-        places = frame.places(points.x)
+        places = frame.to_metres(points.x)
         unit = float(thickness(section, places).min())
 
         def left(share: float) -> Any:

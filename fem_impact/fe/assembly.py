@@ -188,8 +188,9 @@ def _assembled(
             f"section must be a {wanted.__name__} on a mesh of dimension {mesh.dimension}, got {check.shown(section)}"
         )
     given = [] if near is None else list(near)
-    marked = np.reshape([*given, *attached.points], (-1, mesh.dimension))  # forces act here
-    size = np.append(np.full(len(given), coarseness), np.ones(len(attached.points)))
+    held_at = [point for point, _ in (*attached.masses, *attached.posts)]
+    marked = np.reshape([*given, *held_at], (-1, mesh.dimension))  # forces act here
+    size = np.append(np.full(len(given), coarseness), np.ones(len(held_at)))
     corners, fine = _graded(rules, mesh, section, supports, marked, graded, layer, size)
     body = Subject(fine, section, support_of_facets(fine, supports, rules.words), marked)
     domain = rules.domain(body, rules.fields)
@@ -206,7 +207,7 @@ def _assembled(
     matrices, springs = load_and_release(K, M, held, domain, attached, rows)
     mass = float(domain.fields["inertia"].sum()) * domain.frame.mass + sum(mass for _, mass in attached.masses)
     if held.ribs is not None:
-        lifted = domain.space.linear(held.dofs, held.expand.shape[0])[:, 0]
+        lifted = domain.space.rigid_unknowns(held.dofs, held.expand.shape[0])[:, 0]
         springs, mass = springs + held.ribs[0], mass + float(lifted @ (held.ribs[1] @ lifted)) * domain.frame.mass
     strain = Strain(domain, springs) if rules.sharp is not None and rules.sharp(domain) else None
     return System(

@@ -24,14 +24,8 @@ from .theory import Domain, Frame, Held, Points, Subject, kept_unknowns, unknown
 DEGREE = 32
 QUADRATURE = 3 * DEGREE // 2  # [-] Gauss points of an element; exact for two shapes and a section of degree 31
 APART = 0.01  # [-] nodes closer than this fraction of the beam cause a rounding error of 1e-9 in the stiffness
-ROUNDED = 1e-15  # [-] rounding error of an element as long as the beam; grows as 1 / length**3 for shorter ones
 # [-] degree of the polynomial that must fit the section within an element: well below the 31 that QUADRATURE bears
 SMOOTH = 12
-LOOKS = 4000  # [-] places where a section is looked at: saw cuts wider than 4e-4 of the beam, pi / 2 / LOOKS, are seen
-# [-] smallest element made to fit the section, as a fraction of the beam: 20 halvings, a jump is then pinned to 1e-6
-NARROWEST = 1e-6
-ROUNDING = 1e-14  # [-] a smaller misfit is just rounding
-MOST_BREAKS = 2000  # [-] most places where the section may jump or kink
 
 
 class _Hermite(ElementLineHermite):
@@ -70,7 +64,7 @@ class HermiteSpace:
             matrix[:, 4:, :4] = matrix[:, :4, 4:].transpose(0, 2, 1)
             matrix[:, 4:, 4:] = diagonal[..., None] * np.eye(DEGREE - 3)
 
-    def bending(self, cells: np.ndarray, points: np.ndarray, orders: tuple[int, ...]) -> list[np.ndarray]:
+    def bending_functions(self, cells: np.ndarray, points: np.ndarray, orders: tuple[int, ...]) -> list[np.ndarray]:
         """Derivatives (n, n_q, DEGREE + 1) of order 0 to 2 of the shapes of cells (n,) at points (n, n_q, 1)."""
         h = self.length[cells][:, None]
         s = (points[..., 0] - self.start[cells][:, None]) / h
@@ -95,8 +89,8 @@ class HermiteSpace:
         return result
 
     def functions(self, cells: np.ndarray, points: np.ndarray, orders: tuple[int, ...]) -> list[np.ndarray]:
-        """The same of the whole deflection, by all unknowns; here it is that by `bending`."""
-        return self.bending(cells, points, orders)
+        """The same of the whole deflection, by all unknowns; here it is that by `bending_functions`."""
+        return self.bending_functions(cells, points, orders)
 
     def numbering(self, mesh: Cells) -> tuple[np.ndarray, int]:
         """Numbers of the unknowns of each element (n_local, n_cells), and how many there are."""
@@ -111,7 +105,7 @@ class HermiteSpace:
         slack = SAME / np.abs(self.length[cell])
         return cell, (s >= -slack) & (s <= 1.0 + slack)
 
-    def linear(self, element_dofs: np.ndarray, n_all: int) -> np.ndarray:
+    def rigid_unknowns(self, element_dofs: np.ndarray, n_all: int) -> np.ndarray:
         """Unknowns (n_all, 2) of the deflections 1 and x, the rigid motions of a beam."""
         result = np.zeros((n_all, 2))
         for k in range(2):
@@ -140,8 +134,8 @@ def nodes(points: np.ndarray, marked: np.ndarray, held: np.ndarray) -> np.ndarra
 
 
 def rounding(space: Any) -> float:
-    """Relative error of static deflections caused by rounding in the stiffness of the shortest element."""
-    return float(ROUNDED / max(np.abs(space.length).min(), APART) ** 3)
+    """Relative error of static deflections by rounding in the shortest element; 1e-15 in one as long as the beam."""
+    return float(1e-15 / max(np.abs(space.length).min(), APART) ** 3)
 
 
 def domain(make_space: Callable[[Cells], Any], body: Subject, names: tuple[str, ...]) -> Domain:
@@ -152,7 +146,7 @@ def domain(make_space: Callable[[Cells], Any], body: Subject, names: tuple[str, 
     bare = Frame(*box, 1.0, 1.0)
 
     def fields(x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        places = bare.places(x)
+        places = bare.to_metres(x)
         return section.stiffness(places), section.inertia(places)
 
     points, marked = (bare.local(each)[:, 0] for each in (mesh.points, body.marked))
@@ -232,27 +226,28 @@ def divided(fields: Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]], nodes
     every = np.sort(np.append(nodes, breaks))
     low, high, margin = every[:-1], every[1:], SAME * span  # skip the inexactly located kink at a node
     while low.size:
-        rough = (_misfit(fields, low + margin, high - margin, span) > SAME) & (high - low > NARROWEST * span)
+        # none is halved below a millionth of the beam: a jump is then pinned to that
+        rough = (_misfit(fields, low + margin, high - margin, span) > SAME) & (high - low > 1e-6 * span)
         middle = 0.5 * (low + high)[rough]
         every = np.append(every, middle)
         low, high = np.append(low[rough], middle), np.append(middle, high[rough])
     return MeshLine(np.sort(every))
 
 
-def _breaks(fields: Callable, nodes: np.ndarray) -> np.ndarray:
+def _breaks(fields: Callable, nodes: np.ndarray, most: int = 2000) -> np.ndarray:
     """Places (n,) where the section jumps, to rounding, or kinks, to within SAME times the length of the beam."""
     span, low, high = nodes[-1] - nodes[0], nodes[:-1], nodes[1:]
     found: list[float] = []
     while low.size:
-        # at a kink the misfit falls only in proportion to the interval; for a smooth section it falls much faster
-        # neighbours look a little beyond their common end, so that a step there is within one of them
+        # at a kink the misfit falls only in proportion to the interval; for a smooth section it falls much faster, to
+        # rounding; neighbours look a little beyond their common end, so that a step there is within one of them
         over = 0.01 * SAME * span
-        rough = _misfit(fields, low - over, high + over, span) > np.maximum(SAME * (high - low) / span, ROUNDING)
+        rough = _misfit(fields, low - over, high + over, span) > np.maximum(SAME * (high - low) / span, 1e-14)
         low, high = low[rough], high[rough]
         found += (0.5 * (low + high)[high - low < SAME * span]).tolist()
         low, high = low[high - low >= SAME * span], high[high - low >= SAME * span]
-        if len(low) + len(found) > MOST_BREAKS:
-            raise ValueError(f"section must have at most {MOST_BREAKS} steps and kinks, got more; make it smoother")
+        if len(low) + len(found) > most:
+            raise ValueError(f"section must have at most {most} steps and kinks, got more; make it smoother")
         middle = 0.5 * (low + high)
         low, high = np.append(low, middle), np.append(middle, high)
     places = np.sort(_at_steps(fields, np.array(found), SAME * span)) if found else np.zeros(0)
@@ -275,8 +270,11 @@ def _at_steps(fields: Callable, places: np.ndarray, near: float) -> np.ndarray:
 
 
 def _misfit(fields: Callable, low: np.ndarray, high: np.ndarray, span: float) -> np.ndarray:
-    """Relative misfit (n,) of stiffness, its inverse and inertia to polynomials of degree SMOOTH, beyond rounding."""
-    count = 2 * SMOOTH + 1 + int(LOOKS * (high - low).max() / span)
+    """Relative misfit (n,) of stiffness, its inverse and inertia to polynomials of degree SMOOTH, beyond rounding.
+
+    With 4000 looks along the beam, saw cuts wider than pi / 2 / 4000 of it are seen.
+    """
+    count = 2 * SMOOTH + 1 + int(4000 * (high - low).max() / span)
     node = np.cos(np.pi * np.arange(count) / (count - 1))  # Chebyshev, with both ends
     x = 0.5 * (low + high)[:, None] + 0.5 * (high - low)[:, None] * node
     stiffness, inertia = (field.reshape(x.shape) for field in fields(x.ravel()))
@@ -300,7 +298,7 @@ def balanced_errors(
     cells, at, bent = np.arange(len(x)), x[..., None], DEGREE + 1
     unknowns, pushed = (unknowns_of_cells(system, field) for field in (vectors, loads))
     fields = {name: system.frame.field(system.section, name, at)[..., None] for name in system.rules.fields}
-    slope, curve = space.bending(cells, at, (1, 2))
+    slope, curve = space.bending_functions(cells, at, (1, 2))
     push = -integral_along(space, fields["inertia"] * (space.functions(cells, at, (0,))[0] @ pushed))
     moment = -push
     if "rotary" in fields:
@@ -328,13 +326,9 @@ def integral_along(space: Any, values: np.ndarray) -> np.ndarray:
     """Integral from the left end of values (n_cells, n_q, n) at the Gauss points, at the same points."""
     each = np.einsum("eq,eqk->ek", quadrature(space)[1], values)
     before = np.concatenate([np.zeros_like(each[:1]), np.cumsum(each, axis=0)[:-1]])
-    return before[:, None] + 0.5 * space.length[:, None, None] * (_running_integral() @ values)
-
-
-def _running_integral() -> np.ndarray:
-    """Matrix (n_q, n_q) from values at the Gauss points to the integral of their polynomial from -1 to each point."""
     node, weight = np.polynomial.legendre.leggauss(QUADRATURE)
-    values = np.polynomial.legendre.legvander(node, QUADRATURE)
-    k = np.arange(1, QUADRATURE)
-    integrals = np.column_stack([node + 1.0, (values[:, 2:] - values[:, :-2]) / (2 * k + 1)])
-    return integrals @ ((np.arange(QUADRATURE)[:, None] + 0.5) * values[:, :-1].T * weight)
+    legendre = np.polynomial.legendre.legvander(node, QUADRATURE)
+    k = np.arange(QUADRATURE)
+    parts = np.column_stack([node + 1.0, (legendre[:, 2:] - legendre[:, :-2]) / (2 * k[1:] + 1)])
+    within = parts @ ((k[:, None] + 0.5) * legendre[:, :-1].T * weight)  # (n_q, n_q) of the polynomial from -1 on
+    return before[:, None] + 0.5 * space.length[:, None, None] * (within @ values)

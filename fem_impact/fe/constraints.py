@@ -18,10 +18,6 @@ class Attached(NamedTuple):
     masses: list[tuple[np.ndarray, float]]  # points [m] and masses [kg]
     posts: list[tuple[np.ndarray, float]]  # points [m] and stiffnesses [N/m] of what holds them; infinite if hinged
 
-    @property
-    def points(self) -> list[np.ndarray]:
-        return [point for point, _ in (*self.masses, *self.posts)]
-
 
 def load_and_release(
     K: Any, M: Any, held: Held, domain: Domain, attached: Attached, rows: Interpolation
@@ -37,10 +33,18 @@ def load_and_release(
             rows.check(f"point of point_masses[{i}]", point[None])
         felt = rows.rows(points, expand)
         M = M + felt.T @ diags(weights / domain.frame.mass) @ felt
-    across = _across(domain.space.origin[:, 0], held.dofs, expand)
-    every = domain.space.linear(held.dofs, expand.shape[0])
-    moving = (project @ every @ unresisted(every, expand, project))[across]
-    expand = expand[:, across].tocsr()
+    # unknowns in order along the x axis: in that left by dividing triangles into four, factorising takes five times as
+    # long
+    place, weight = np.zeros(expand.shape[0]), np.zeros(expand.shape[0])
+    for row in held.dofs:
+        np.add.at(place, row, domain.space.origin[:, 0])
+        np.add.at(weight, row, 1.0)
+    used = abs(expand).sign()
+    shares = np.asarray(used.sum(axis=0)).ravel()
+    order = np.argsort((used.T @ (place / np.maximum(weight, 1.0))) / shares, kind="stable")
+    every = domain.space.rigid_unknowns(held.dofs, expand.shape[0])
+    moving = (project @ every @ unresisted(every, expand, project))[order]
+    expand = expand[:, order].tocsr()
     K, M = (expand.T @ (K + springs) @ expand).tocsc(), (expand.T @ M @ expand).tocsc()
     rigid, sprung = _resisted(moving, expand.T @ (springs @ (expand @ moving)), M)
     fixed = qr(np.hstack([rigid, sprung]).T, pivoting=True, mode="economic")[2][: rigid.shape[1] + sprung.shape[1]]
@@ -87,17 +91,3 @@ def _resisted(moving: np.ndarray, force: np.ndarray, M: Sparse) -> tuple[np.ndar
     values, turn = eigh(moving.T @ force, moving.T @ (M @ moving))
     free = values <= SAME * max(values[-1], 0.0)
     return moving @ turn[:, free], moving @ turn[:, ~free & (values < 1.0)]
-
-
-def _across(origin: np.ndarray, element_dofs: np.ndarray, expand: csr_matrix) -> np.ndarray:
-    """Order of the unknowns (n_dofs,) along the x axis, for a fast factorisation; ``origin`` (n_cells,) places cells.
-
-    In the order left by dividing triangles into four, the minimum degree ordering takes five times as long.
-    """
-    place, weight = np.zeros(expand.shape[0]), np.zeros(expand.shape[0])
-    for row in element_dofs:
-        np.add.at(place, row, origin)
-        np.add.at(weight, row, 1.0)
-    used = abs(expand).sign()
-    shares = np.asarray(used.sum(axis=0)).ravel()
-    return np.argsort((used.T @ (place / np.maximum(weight, 1.0))) / shares, kind="stable")

@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from .._base.rounding import HALVINGS
+from .._base.rounding import HALVINGS, SAME
 from ..mesh.meshes import Mesh
 from .material import Material, turned
 from .splitting import Rim, bisected, strip
@@ -20,7 +20,6 @@ CORNER_ERROR = 1e-7
 SMALLEST = 1e-10  # [-] smallest ring as a fraction of the extent; rounding of the coordinates spoils smaller ones
 SMALLEST_FREE = 3e-3  # [-] the same at a free corner, which moves: rounding grows with the ring's size to the -2
 MILD = 2.95  # [-] corners with a larger exponent get no rings: there rings cost quintic triangles more than they gain
-FLATTEST = 1e-9  # [-] least imaginary part of a root mu, far below that of any material: rounding may take it away
 MILD_FREE = 2.5  # [-] the same between free edges, where the singular part is small, so that rings pay off later
 # [-] roots mu that lie closer, over their imaginary part, are taken apart: those of an isotropic plate are equal, and
 # exponents change by 1e-7
@@ -32,8 +31,8 @@ SAY = 1e-3
 def _roots(D: np.ndarray) -> np.ndarray:
     """The four numbers mu (4,) for which any function of ``x + mu y`` bends a plate of stiffness D without load."""
     equation = [D[1, 1], 4.0 * D[1, 2], 2.0 * D[0, 1] + 4.0 * D[2, 2], 4.0 * D[0, 2], D[0, 0]]
-    upper = sorted(np.roots(equation), key=lambda mu: mu.imag)[2:]  # above the real axis, but for rounding
-    one, other = (complex(mu.real, max(mu.imag, FLATTEST)) for mu in upper)
+    upper = sorted(np.roots(equation), key=lambda mu: mu.imag)[2:]  # above the real axis, which rounding may hide
+    one, other = (complex(mu.real, max(mu.imag, SAME)) for mu in upper)
     if abs(one - other) < APART * one.imag:
         middle, step = 0.5 * (one + other), 0.5j * APART * one.imag
         one, other = middle + step, middle - step
@@ -131,9 +130,13 @@ class Singular(NamedTuple):
     free: bool  # whether it moves: both edges are free
 
 
-def singular(mesh: Mesh, kinds: list[str], material: Material) -> dict[int, Singular]:
-    """Vertices that the supports ``kinds`` (n_facets,) make so singular that rings of triangles are put there."""
-    found = {}
+def around_corners(mesh: Mesh, kinds: list[str], material: Material) -> tuple[dict[int, Singular], Mesh]:
+    """Put rings of shrinking triangles at every corner that the supports ``kinds`` (n_facets,) make singular.
+
+    Returns these corners and the mesh. The worst case is two hinged edges at nearly 180 degrees: at 172.5 degrees the
+    exponent is 1.04, and rounding of the coordinates leaves an error of 13 % (9 % measured on a 48-sided polygon).
+    """
+    found: dict[int, Singular] = {}
     stiffness = material.plane_stress / material.plane_stress.max()
     length = np.linalg.norm(np.diff(mesh.points[mesh.facets], axis=1)[:, 0], axis=1)
     extent = float(np.ptp(mesh.points, axis=0).max())
@@ -147,16 +150,6 @@ def singular(mesh: Mesh, kinds: list[str], material: Material) -> dict[int, Sing
         power = 2.0 * (z - 1.0)
         if n:
             found[vertex] = Singular(power, n, float((share * SHRINK**n) ** power), pair == ("free", "free"))
-    return found
-
-
-def around_corners(mesh: Mesh, kinds: list[str], material: Material) -> tuple[dict[int, Singular], Mesh]:
-    """Put rings of shrinking triangles at every corner that the supports ``kinds`` (n_facets,) make singular.
-
-    Returns these corners and the mesh. The worst case is two hinged edges at nearly 180 degrees: at 172.5 degrees the
-    exponent is 1.04, and rounding of the coordinates leaves an error of 13 % (9 % measured on a 48-sided polygon).
-    """
-    found = singular(mesh, kinds, material)
     return found, towards(mesh, {vertex: each.n_rings for vertex, each in found.items()})
 
 

@@ -16,13 +16,7 @@ from .theory import Points
 
 # by highest degree: the exponents (n, 2) of monomials of quadratics, of cubics and of quintics
 EXPONENTS = {k: np.array([(i, j) for i in range(k + 1) for j in range(k + 1 - i)]) for k in (2, 3, 5)}
-NEAR_CURVE = 1e-5  # [-] the same at curved edges: the mesh is closer to the curve than this share of a triangle
-# [-] nearest triangles searched first: about those around a vertex; if none holds the point, all are searched
-CANDIDATES = 8
-# [-] share of a triangle's size; no curved edge bulges this far: facets bulge by an eighth of their turn, below 0.1
-REACH = 0.5
 REFERENCE = np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]]) - 1.0 / 3.0  # corners in local coordinates
-DERIVATIVES = ((0, 0), (1, 0), (0, 1), (2, 0), (1, 1), (0, 2))  # unknowns at a vertex: orders in x and y
 
 
 def monomials(local: np.ndarray, dx: int, dy: int, degree: int = 5) -> np.ndarray:
@@ -117,6 +111,11 @@ class Triangles:
         offset = points - self.origin[cells].reshape(*shape, 2)
         return np.einsum("eij,e...j->e...i", self.inverse[cells], offset)
 
+    def rule(self) -> tuple[np.ndarray, np.ndarray]:
+        """Quadrature of the reference triangle: points (n_q, 2) and weights (n_q,)."""
+        X, weight = get_quadrature(self.element.refdom, self.order)
+        return X.T, weight
+
     def straight(self, cells: np.ndarray, local: np.ndarray) -> np.ndarray:
         """Places (n, n_q, 2) of local coordinates (n_q, 2) in cells (n,), as if all sides were straight."""
         return self.origin[cells, None] + local @ self.jacobian[cells].transpose(0, 2, 1)
@@ -127,7 +126,7 @@ class Triangles:
         raw = np.stack([monomials(local, order - k, k, degree) for k in range(order + 1)], axis=1)
         return (chained(self.inverse[cells], order) @ raw.reshape(*raw.shape[:2], -1)).reshape(raw.shape)
 
-    def bending(self, cells: np.ndarray, points: np.ndarray, orders: tuple[int, ...]) -> list[np.ndarray]:
+    def bending_functions(self, cells: np.ndarray, points: np.ndarray, orders: tuple[int, ...]) -> list[np.ndarray]:
         """Derivatives of the shape functions of cells (n,) at points (n, n_q, 2), one array for each order.
 
         The arrays are (n, n_q, n_local) for order 0, (n, 2, n_q, n_local) for order 1, (n, 3, n_q, n_local) for order
@@ -138,8 +137,8 @@ class Triangles:
         return [each if order else each[:, 0] for each, order in zip(found, orders)]
 
     def functions(self, cells: np.ndarray, points: np.ndarray, orders: tuple[int, ...]) -> list[np.ndarray]:
-        """The same by all unknowns; here they are those of `bending`."""
-        return self.bending(cells, points, orders)
+        """The same by all unknowns; here they are those of `bending_functions`."""
+        return self.bending_functions(cells, points, orders)
 
     def jacobians(self, cells: np.ndarray, area: np.ndarray) -> np.ndarray:
         """Jacobians (n, n_q, 2, 2) of the map from the reference triangle at area coordinates (n or 1, n_q, 3)."""
@@ -150,7 +149,7 @@ class Triangles:
         turned = self.bent.shift(cells, area)[1]
         return plain + turned[..., 1:] - turned[..., :1]
 
-    def along(self, cells: np.ndarray, area: np.ndarray, step: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    def points_along(self, cells: np.ndarray, area: np.ndarray, step: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Points of cells (n,) at area coordinates (n, n_q, 3), and their derivatives along ``step``, both (n, n_q, 2).
 
         ``step`` (n, 1, 3) is a change of the area coordinates.
@@ -163,13 +162,13 @@ class Triangles:
 
     def locate(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """The cell that holds each point (n, 2), or else the nearest one, and whether the point lies in it."""
-        count = min(CANDIDATES, len(self.origin))
+        count = min(8, len(self.origin))  # about those around a vertex; if none holds the point, all are searched
         near = self.tree.query(points, k=count)[1].reshape(len(points), count)
         cell, depth = self._deepest(points, near)
         margin = np.full(len(self.origin), -SAME)
         if self.curved.any():
             size = np.sqrt(np.abs(np.linalg.det(self.jacobian)))
-            margin = np.minimum(margin, -NEAR_CURVE * size[self.curved].max() / size)
+            margin = np.minimum(margin, -1e-5 * size[self.curved].max() / size)  # the mesh is as close to the curve
         lost = depth < margin[cell]
         if lost.any():
             every = np.broadcast_to(np.arange(len(self.origin)), (1, len(self.origin)))
@@ -183,7 +182,7 @@ class Triangles:
         offset = points[:, None] - self.origin[cells]
         local = np.einsum("nkij,nkj->nki", self.inverse[cells], offset) + 1.0 / 3.0
         straight = np.minimum(local.min(axis=2), 1.0 - local.sum(axis=2))
-        bent = self.curved[cells] & (straight > -REACH)
+        bent = self.curved[cells] & (straight > -0.5)  # facets bulge by less: an eighth of their turn, below 0.1
         if self.bent is not None and bent.any():
             which, away = cells[bent], offset[bent]
             place = local[bent]
@@ -222,7 +221,7 @@ class ArgyrisSpace(Triangles):
         turn = np.zeros((n, 21, 21))  # physical unknowns -> unknowns along the reference directions
         for k in range(3):
             at = self.local(every, self.corners[:, k])
-            for row, (dx, dy) in enumerate(DERIVATIVES):
+            for row, (dx, dy) in enumerate(((0, 0), (1, 0), (0, 1), (2, 0), (1, 1), (0, 2))):  # unknowns at a vertex
                 functionals[:, 6 * k + row] = monomials(at, dx, dy)
             for order, own in enumerate((slice(1), slice(1, 3), slice(3, 6))):
                 turn[:, 6 * k : 6 * k + 6, 6 * k : 6 * k + 6][:, own, own] = chained(self.jacobian, order)
@@ -235,17 +234,13 @@ class ArgyrisSpace(Triangles):
             turn[:, 18 + side, 18 + side] = 1.0 / size
         self.coefficients = np.linalg.solve(functionals, turn)
 
-    def rule(self) -> tuple[np.ndarray, np.ndarray]:
-        """Quadrature of the reference triangle: local coordinates (n_q, 2) and weights (n_q,)."""
-        X, weight = get_quadrature(self.element.refdom, self.order)
-        return X.T - 1.0 / 3.0, weight
-
     def uniform(self, cells: np.ndarray, stiffness: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Bending and mass matrices (n, 21, 21) of straight cells (n,) with uniform stiffness (3, 3) and unit inertia.
 
         The integrals of products of monomials are the same for all triangles, so they are computed once.
         """
-        local, weight = self.rule()
+        points, weight = self.rule()
+        local = points - 1.0 / 3.0
         values = monomials(local, 0, 0)
         bends = np.stack([monomials(local, 2 - k, k) for k in range(3)])  # (3, n_q, 21)
         products = np.einsum("iqa,q,jqb->ijab", bends, weight, bends).reshape(9, 441)
@@ -258,7 +253,7 @@ class ArgyrisSpace(Triangles):
         mass = C.transpose(0, 2, 1) @ (values.T * weight @ values) @ C
         return bending, mass * determinant[:, None, None]
 
-    def linear(self, element_dofs: np.ndarray, n_all: int) -> np.ndarray:
+    def rigid_unknowns(self, element_dofs: np.ndarray, n_all: int) -> np.ndarray:
         """Unknowns (n_all, 3) of the deflections 1, x and y, the rigid motions of a plate."""
         result = np.zeros((n_all, 3))
         for k in range(3):
@@ -292,7 +287,7 @@ class MorleySpace(Triangles):
             functionals[:, 3 + side] = weight[:, :1] * x + weight[:, 1:] * y
         self.coefficients = np.linalg.inv(functionals)
 
-    def linear(self, element_dofs: np.ndarray, n_all: int) -> np.ndarray:
+    def rigid_unknowns(self, element_dofs: np.ndarray, n_all: int) -> np.ndarray:
         """Unknowns (n_all, 3) of the deflections 1, x and y."""
         result = np.zeros((n_all, 3))
         for k in range(3):
@@ -331,15 +326,9 @@ def collapsed(n: int) -> tuple[np.ndarray, np.ndarray]:
 def on_true_edge(space: Triangles, local: np.ndarray, weight: np.ndarray) -> Points:
     """Points (n_q, 2) of the reference triangle with their weights (n_q,) on every triangle."""
     cells, area = np.arange(len(space.origin)), area_coordinates(local)[None]
-    x = space.along(cells, np.broadcast_to(area, (len(cells), *area.shape[1:])), np.zeros((1, 1, 3)))[0]
+    x = space.points_along(cells, np.broadcast_to(area, (len(cells), *area.shape[1:])), np.zeros((1, 1, 3)))[0]
     J = space.jacobians(cells, area)
     return Points(local.T, x, np.abs(J[..., 0, 0] * J[..., 1, 1] - J[..., 0, 1] * J[..., 1, 0]) * weight)
-
-
-def quadrature(space: Triangles) -> Points:
-    """The quadrature of a space on every triangle."""
-    X, weight = get_quadrature(space.element.refdom, space.order)
-    return on_true_edge(space, X.T, weight)
 
 
 def numbering(mesh: Cells, space: Any) -> tuple[np.ndarray, int]:

@@ -11,9 +11,6 @@ from .._base.untyped import Sparse
 from .section import evaluate
 from .theory import Frame, Theory, blocks
 
-FINE, ROUGH = (6, 24), (2, 8)  # [-] points on a disk, radial and around: error 3e-5 of a compliance at h/L = 0.2
-FEW = 64  # [-] at more points, as for a picture, the rough ones do: their error is 1e-6 of a mode of h k = 1
-
 
 class Interpolation:
     """Rows from the unknowns of a body to its deflection at points.
@@ -62,7 +59,9 @@ def spread_forces(space: Any, points: np.ndarray, radius: np.ndarray) -> tuple[n
     Each disk, of its ``radius`` (n_points,), is cut at the edge of the body. A weight linear in the place moves its
     centre back to the point, so that a rigid motion is seen exactly.
     """
-    rings, spokes = FINE if len(points) <= FEW else ROUGH
+    # points on a disk, radial and around: these err by 3e-5 of a compliance at h/L = 0.2; at many points, as for a
+    # picture, fewer do, which err by 1e-6 of a mode of h k = 1
+    rings, spokes = (6, 24) if len(points) <= 64 else (2, 8)
     node, weight = np.polynomial.legendre.leggauss(rings)
     turn = 2.0 * np.pi * np.arange(spokes) / spokes
     away = np.sqrt(0.5 * (node + 1.0))  # Gauss points in the radius squared

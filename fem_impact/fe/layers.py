@@ -76,7 +76,7 @@ def stacked(layers: Any) -> tuple[Layer, ...]:
     return tuple(layer._replace(middle=layer.middle + middle) for layer in found)
 
 
-def together(layers: Sequence[Layer]) -> Laminated:
+def merge_layers(layers: Sequence[Layer]) -> Laminated:
     """The material of a uniform plate that bends and shears as the layers do."""
     whole = sum(layer.thickness for layer in layers)
     bending = 12.0 / whole**3 * moments(layers)[3:, 3:]

@@ -7,7 +7,6 @@ import numpy as np
 from .._base import check
 from . import plausible
 
-DIRECTIONS = 36  # [-] directions in which waves in wood are looked at: the softest is then known to a hundredth
 # [Pa] mean pressure under the pyramid of 136 degrees for a Vickers number of 1: kgf/mm^2, but of its slanted faces
 VICKERS = float(9.80665e6 / np.sin(np.radians(68.0)))
 TABOR = 2.8  # [-] mean pressure under a deep dent over the yield strength (Tabor 1951)
@@ -21,8 +20,8 @@ def turned(stiffness: np.ndarray, angle: float) -> np.ndarray:
 
 
 def directional(stiffness: np.ndarray) -> np.ndarray:
-    """What a stiffness (3, 3) on strains (xx, yy, 2 xy) opposes to a wave in each of DIRECTIONS directions."""
-    angle = np.pi * np.arange(DIRECTIONS) / DIRECTIONS
+    """What a stiffness (3, 3) on strains (xx, yy, 2 xy) opposes to a wave every 5 degrees: the least to a hundredth."""
+    angle = np.pi * np.arange(36) / 36
     wave = np.stack([np.cos(angle) ** 2, np.sin(angle) ** 2, np.sin(2.0 * angle)])
     return np.asarray(np.einsum("in,ij,jn->n", wave, stiffness, wave))
 

@@ -37,16 +37,11 @@ from .eigenvalues import factorise
 from .elements import area_coordinates, triangles
 from .section import Plate, evaluate
 from .system import System
-from .theory import gram, scatter
+from .theory import blocks, gram, scatter
 
-NODES = 4  # [-] Gauss points in each direction of a triangle: exact for the stiffness of quartic elements
 # [-] lowest modes whose stresses choose the fields that are kept: large swings are those of the lowest modes
 SWINGING = 16
-ENTRIES = 500_000  # [-] of an array of pairs of modes, to limit memory
 MOST = 32  # [-] fields kept at most: they have 99 % of the energy of 16 modes with equal energies
-WORK = 30_000  # [-] entries of all forms together, to limit the work of a step: 18 fields of 40 modes
-# [-] of that energy, in fields that are not kept: stiffens the body by a millionth less, below any tolerance
-LEFT_OUT = 1e-6
 
 Steep = Callable[[np.ndarray, np.ndarray], np.ndarray]
 Taut = Callable[[np.ndarray], np.ndarray]
@@ -71,9 +66,9 @@ class Sheet:
         rim, section, frame = system.rim, system.section, system.frame
         assert rim is not None and isinstance(section, Plate)
         space: Any = system.space
-        X, x, dx = slopes.quadrature(system, NODES)
+        X, x, dx = slopes.quadrature(system, 4)  # exact for the stiffness of quartic elements
         gradient = plane.gradients(space, np.arange(len(x)), area_coordinates(X.T)[None])
-        h = evaluate("thickness", section.thickness, frame.places(x), "m").reshape(dx.shape)
+        h = evaluate("thickness", section.thickness, frame.to_metres(x), "m").reshape(dx.shape)
         moduli = (frame.length**2 * h * dx)[..., None, None] * section.stretched
         own = plane.numbered(triangles(rim.points, space.vertices))
         dofs = np.vstack([own.element_dofs, own.N + own.element_dofs]).T
@@ -92,9 +87,8 @@ class Sheet:
         return plane.strains(self.gradient[pieces])
 
     def blocks(self, n_pairs: int) -> list[np.ndarray]:
-        """Numbers of the pieces in blocks, to limit the memory that pairs of modes take."""
-        most = max(1, ENTRIES // (3 * n_pairs * self.x.shape[1]))
-        return np.array_split(np.arange(len(self.x)), -(-len(self.x) // most))
+        """Numbers of the pieces in blocks, so that pairs of modes take 4 MB at most."""
+        return blocks(len(self.x), max(1, 500_000 // (3 * n_pairs * self.x.shape[1])))
 
     @property
     def stiffness(self) -> Sparse:
@@ -108,8 +102,8 @@ class Sheet:
 
 
 def most(n_modes: int) -> int:
-    """How many fields are kept at most."""
-    return max(1, min(MOST, WORK // n_modes**2))
+    """How many fields are kept at most: so few that a step has 30 000 entries to work on, 18 fields of 40 modes."""
+    return max(1, min(MOST, 30_000 // n_modes**2))
 
 
 def forms(sheet: Sheet, steep: Steep, omega: np.ndarray, taut: Taut | None = None) -> tuple[np.ndarray, np.ndarray]:
@@ -153,8 +147,8 @@ def forms(sheet: Sheet, steep: Steep, omega: np.ndarray, taut: Taut | None = Non
         pairs, motions = weight**2 @ own[:-n], omega**-2.0 @ own[-n:]  # the second: shares of their energies
         weight = np.append(weight, np.sqrt(pairs / max(1.0, motions)) / omega)
     size, kept = (each[..., ::-1] for each in np.linalg.eigh(products * weight[:, None] * weight))
-    missing = 1.0 - np.cumsum(size) / size.sum()
-    count = min(most(n), 1 + int(np.count_nonzero(missing > LEFT_OUT)))
+    missing = 1.0 - np.cumsum(size) / size.sum()  # without a millionth a body is stiffer by less than any tolerance
+    count = min(most(n), 1 + int(np.count_nonzero(missing > 1e-6)))
     mixed = weight[:, None] * kept[:, :count] / np.sqrt(size[:count])
     moved = settled @ mixed
     every = np.triu_indices(n)

@@ -5,10 +5,10 @@ Thick plates have their shear strains there, shells and stretched plates the dis
 
 import numpy as np
 from scipy.linalg import qr
-from scipy.sparse import block_diag, csr_matrix
+from scipy.sparse import csr_matrix
 from skfem import Dofs, ElementTriP4
 
-from .._base.untyped import Cells, Sparse
+from .._base.untyped import Cells
 from . import supports
 from .elements import ArgyrisSpace, Triangles, area_coordinates
 from .theory import unresisted
@@ -34,18 +34,18 @@ def reference(X: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 class PlaneSpace(ArgyrisSpace):
-    """Shape functions of one mesh: 21 of the deflection by `bending`, then 15 for each component in the plane."""
+    """Shape functions of one mesh: 21 by `bending_functions`, then 15 for each component in the plane."""
 
     def functions(self, cells: np.ndarray, points: np.ndarray, orders: tuple[int, ...]) -> list[np.ndarray]:
-        """Those of `bending`, with zeros for the plane, which moves no point across it."""
-        found = self.bending(cells, points, orders)
+        """Those of `bending_functions`, with zeros for the plane, which moves no point across it."""
+        found = self.bending_functions(cells, points, orders)
         return [np.concatenate([f, np.zeros((*f.shape[:-1], 2 * QUARTIC))], axis=-1) for f in found]
 
 
 def nodes(inner: Triangles) -> np.ndarray:
     """Where the nodes (n_cells, 15, 2) of both components lie, on the true edge."""
     cells, none = np.arange(len(inner.origin)), np.zeros((1, 1, 3))
-    return inner.along(cells, np.broadcast_to(area_coordinates(NODES), (len(cells), QUARTIC, 3)), none)[0]
+    return inner.points_along(cells, np.broadcast_to(area_coordinates(NODES), (len(cells), QUARTIC, 3)), none)[0]
 
 
 def gradients(inner: Triangles, cells: np.ndarray, area: np.ndarray) -> np.ndarray:
@@ -76,7 +76,7 @@ def at_rim(
     s = np.array([0.0, 1.0, 0.25, 0.5, 0.75])[:, None]
     first, last = (np.eye(3)[pairs[:, end]][:, None] for end in range(2))  # (n, 1, 3)
     area = (1.0 - s) * first + s * last
-    x, step = inner.along(cells, area, last - first)
+    x, step = inner.points_along(cells, area, last - first)
     backward = inner.vertices[cells, pairs[:, 0]] != facets[:, 0]
     step = np.where(backward[:, None, None], -step, step)
     normal = np.stack([step[..., 1], -step[..., 0]], axis=-1)
@@ -112,7 +112,7 @@ def held_at(
     return csr_matrix((entries, (rows, columns)), shape=(2 * n, 2 * len(free) + len(single))), at
 
 
-def rigid(places: np.ndarray) -> np.ndarray:
+def plane_motions(places: np.ndarray) -> np.ndarray:
     """Values (2 n, 3) at nodes (n, 2) of the rigid motions in the plane: along x, along y, and turning."""
     one, none = np.ones(len(places)), np.zeros(len(places))
     return np.vstack([np.column_stack([one, none, -places[:, 1]]), np.column_stack([none, one, places[:, 0]])])
@@ -126,13 +126,8 @@ def loosened(inner: Triangles, rim: supports.SupportedRim, own: Dofs) -> tuple[c
     """
     loose, places = held_at(inner, rim.facets, list(rim.plane), own)[0], np.zeros((own.N, 2))
     places[own.element_dofs.T] = nodes(inner)
-    motions = rigid(places)
+    motions = plane_motions(places)
     free = unresisted(motions, loose, loose.T)  # the columns of the map are orthonormal
     still = loose.T @ motions @ free
     pinned = qr(still.T, pivoting=True, mode="economic")[2][: still.shape[1]] if still.size else []
     return loose[:, np.setdiff1d(np.arange(loose.shape[1]), pinned)], motions @ free
-
-
-def together(first: Sparse, second: Sparse) -> csr_matrix:
-    """Block diagonal of a map of the deflection's unknowns and one of the plane's."""
-    return block_diag([first, second], format="csr")

@@ -8,36 +8,26 @@ from scipy.sparse import csc_matrix
 
 from .._base.untyped import Cells, Sparse
 from ..mesh.facets import Curves
-from ..mesh.meshes import Mesh
-from .elements import Bent, quadrature, triangles
+from .elements import Bent, on_true_edge, triangles
 from .section import PLANE
 from .springs import at_facets, edge_stiffness
 from .supports import SupportedRim, cells_of_facets, support_of_facets
-from .theory import Domain, Frame, Subject, blocks, gram, scatter
-
-# [-] smallest triangle over the extent below which eigenvalues come from the strain energy: rounding in K grows as the
-# size to the power -2, and larger triangles leave 1e-11
-TINY = 4e-3
+from .theory import Domain, Subject, blocks, gram, scatter
 
 
 def domain(make_space: Callable[[Cells, Bent | None], Any], body: Subject, names: tuple[str, ...]) -> Domain:
     """The triangles of a plate in its frame, with shape functions and the section's fields ``names``."""
-    low, high = body.mesh.points.min(axis=0), body.mesh.points.max(axis=0)
+    mesh = body.mesh
+    low, high = mesh.points.min(axis=0), mesh.points.max(axis=0)
     box = 0.5 * (low + high), float((high - low).max())
-    cells = triangles((body.mesh.points - box[0]) / box[1], body.mesh.cells)
-    bent = _bent(body.mesh, Frame(*box, 1.0, 1.0), cells)
+    cells = triangles((mesh.points - box[0]) / box[1], mesh.cells)
+    bent, curved = None, mesh.curved
+    if curved.any():  # triangles there are bent onto the true edge
+        facets, middles = mesh.facets[curved], (mesh.middles[curved] - box[0]) / box[1]
+        curves = Curves(cells.p.T[facets], middles, mesh.tangents[curved], mesh.curvatures[curved] * box[1])
+        bent = Bent(curves, facets, *cells_of_facets(facets, cells.t.T), cells.t.T)
     space = make_space(cells, bent)
-    return Domain.of(names, body.section, box, cells, space, quadrature(space))
-
-
-def _bent(mesh: Mesh, frame: Frame, cells: Cells) -> Bent | None:
-    """Bending of the triangles at curved facets onto the true edge; None if every edge is straight."""
-    curved = mesh.curved
-    if not curved.any():
-        return None
-    facets, middles = mesh.facets[curved], frame.local(mesh.middles[curved])
-    curves = Curves(cells.p.T[facets], middles, mesh.tangents[curved], mesh.curvatures[curved] * frame.length)
-    return Bent(curves, facets, *cells_of_facets(facets, cells.t.T), cells.t.T)
+    return Domain.of(names, body.section, box, cells, space, on_true_edge(space, *space.rule()))
 
 
 def rim(body: Subject, found: Domain, kinds: list[str]) -> SupportedRim:
@@ -82,5 +72,8 @@ def springs(
 
 
 def is_tiny(found: Domain) -> bool:
-    """Whether the smallest triangle is so small that the stiffness matrix loses digits."""
-    return bool(np.abs(np.linalg.det(found.space.jacobian)).min() < TINY**2)
+    """Whether the smallest triangle is so small that the stiffness matrix loses digits.
+
+    Rounding grows as its size to the power -2; triangles larger than 4e-3 of the body leave 1e-11.
+    """
+    return bool(np.abs(np.linalg.det(found.space.jacobian)).min() < 4e-3**2)

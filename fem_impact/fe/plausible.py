@@ -49,12 +49,11 @@ RANGES = {
 }  # fmt: skip
 NAMES = {"rho": "density", "damping_ratio": "damping_ratio =", "speed": "speed", "length": "a length of"}
 TURN = 2.0 * np.pi  # [rad] fact: a full one
-ROLLING = 20.0  # [-] fact: G over the rolling shear modulus of softwood: 0.064 E over 0.003 E, Wood Handbook, table 5-1
 # [-] thickness over the shortest side above which a remark is made: thin theory then errs by tens of per cent
 THICK = 0.3
 
 
-def number(name: str, value: Any) -> Iterator[str]:
+def note_number(name: str, value: Any) -> Iterator[str]:
     """A note if a number lies outside the `PlausibleRange` of that name; none for a function of place."""
     known = RANGES[name]
     if callable(value) or value is None or known.low <= value <= known.high:
@@ -66,7 +65,7 @@ def number(name: str, value: Any) -> Iterator[str]:
 
 def material(given: Any) -> tuple[str, ...]:
     """Notes on the numbers of a `Material`."""
-    notes = [note for name in ("E", "E_across", "G", "rho") for note in number(name, getattr(given, name))]
+    notes = [note for name in ("E", "E_across", "G", "rho") for note in note_number(name, getattr(given, name))]
     if abs(given.angle) > TURN:
         notes.append(
             f"angle = {given.angle:g} rad is {abs(given.angle) / TURN:.3g} turns; rad are expected, and "
@@ -77,7 +76,7 @@ def material(given: Any) -> tuple[str, ...]:
 
 def doubted_sizes(sides: Sequence[float], section: Any = None) -> tuple[str, ...]:
     """Notes on a body with sides [m] in its plane, or along its line, and a section."""
-    notes = list(number("length", max(sides)))
+    notes = list(note_number("length", max(sides)))
     if section is None:
         return tuple(notes)
     layers = getattr(section, "layers", ())
@@ -108,18 +107,21 @@ def ribs(given: Sequence[Any], sides: Sequence[float]) -> Iterator[str]:
 
 
 def rolling(given: Any) -> tuple[str, ...]:
-    """Note on a `Material` across whose grain a thick plate shears as stiffly as in its plane: wood does not."""
+    """Note on a `Material` across whose grain a thick plate shears as stiffly as in its plane: wood does not.
+
+    Softwood has 0.064 E in its plane and 0.003 E across the grain, a twentieth (Wood Handbook, table 5-1).
+    """
     if given.G is None or given.G_yz is not None:
         return ()
     return (
         f"G_yz is not stated and taken as that in the plane, G = {given.G:g} Pa; the rolling shear modulus of wood is "
-        f"about {given.G / ROLLING:.2g}",
+        f"about {given.G / 20.0:.2g}",
     )
 
 
 def damping(ratios: np.ndarray) -> tuple[str, ...]:
     """Notes on damping ratios (n_modes,) [-] of modes that are not rigid."""
-    return tuple(number("damping_ratio", float(np.median(ratios)))) if len(ratios) else ()
+    return tuple(note_number("damping_ratio", float(np.median(ratios)))) if len(ratios) else ()
 
 
 def together(*several: Sequence[str]) -> tuple[str, ...]:

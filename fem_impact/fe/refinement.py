@@ -23,50 +23,23 @@ from .material import directional
 from .section import Plate
 from .system import System
 
-# [-] ratio of element sizes whose frequencies are compared, and order: less than half the unknowns, errors times five
-COARSER, COMPARED = 1.5, 4.0
-# [-] modes in a row of waves much alike, whose largest error each is stated to have: two meshes may agree by chance
-ALIKE = 5
-# [-] the order assumed if ribs end inside, where stresses in the plane are singular; measured: 1 to 2
-ENDING = 1.5
+COARSER = 1.5  # [-] ratio of element sizes whose frequencies are compared: less than half the unknowns
 # [-] the same ratio where triangles are halved, at the blow and where a plate is curved: one halving more
 FLATTER = 2.0
 ERROR_OF_WAVE = (8e-7, 3.3)  # [-] a smooth frequency's error is at most 8e-7 (kh)**8, growing slower above kh = 3.3
 # [-] factor of the edge length in Weyl's law, fact: 1 + Gamma(3/4) / (sqrt(pi) Gamma(5/4)) clamped; free for nu = 0.3
 EDGE_TERM = {"clamped": 1.76, "hinged": 1.0, "soft hinged": 1.0, "free": -1.71}
 CLAIMED = 2.0  # [-] factor on error estimates, which are 0.3 to 4 times the true error; test_residual.py
-# [-] factor on the rounding error of K, estimated as a random walk: three standard deviations of one
-ROUNDED = 3.0
 MORLEY = 0.2574578  # [-] error constant of Morley interpolation, over h**2 (Carstensen and Gallistl 2014)
-# [-] unknowns of the Morley solution for the lower bounds; cheap beside the modes themselves
-MORLEY_UNKNOWNS = 20_000
-# [rad] as `Theory.wave`, if CHEAP_CELLS triangles suffice: error 2e-7, clamped 1e-5
-FINE_WAVE = 1.1
 # [-] triangles that take little time to solve, so that fewer are not worthwhile; point loads start with as many
 CHEAP_CELLS = 700
-# [-] largest element under tension, in edge layers sqrt(D / tension): error of 3e-4 at most on a clamped disk
-LAYERS = 10.0
-# [-] but elements are not made smaller than the extent over this: some 4 000 triangles on a square at most
-FINEST_LAYER = 40.0
 LOOSEST = 0.1  # [-] largest tolerance of frequencies
 MOST_UNKNOWNS = 150_000  # [-] refinement gives up beyond this size
-# [-] fraction of the tolerance that meshes after the first aim at: less makes them finer than needed, more often
-# takes another
-MARGIN = 0.6
 # [-] powers of the size with which the parts of the error fall: 8 of smooth shapes less a reserve, at curved rims, at
 # steps of the thickness
 ORDERS = 7.5, 5.0, 1.0
 # [-] smallest ratio of element sizes between two meshes: a tenth more triangles; with less the mesh may not change
 LEAST_STEP = 1.05
-# [-] the same where a plate is curved or ribbed, whose estimates scatter by a factor of two or three from mesh to mesh;
-# for the same reason some meshes foretell nothing of others: a guitar's top takes six, the fifth the worst
-BENT_STEP = 1.2
-# [-] meshes tried to meet a tolerance, each finer: where eight do not suffice, rounding or corners hold the error
-MOST_MESHES = 8
-# [-] unknowns foretold from the rate at which errors fell, over those allowed, from which on nobody waits for more
-# meshes: rates grow as meshes resolve, and a rate half as large asks for the square of that
-BEYOND = 4.0
-LARGEST_MISSED = 0.99  # [-] of a frequency, by corners: more would state errors above 200, which tell nothing
 
 
 @dataclass(frozen=True, eq=False)
@@ -183,11 +156,13 @@ def _claimed(system: System, omega: np.ndarray, vectors: np.ndarray) -> np.ndarr
     values, vectors = (omega[flexible] / system.frame.rate) ** 2, vectors[:, flexible]
     parts[:3, flexible] = CLAIMED * 0.5 * system.rules.errors(system, vectors, vectors * values) / values
     if system.rules.compared:
-        parts[0, flexible] += maximum_filter1d(_compared(system, omega)[flexible] / omega[flexible], ALIKE)
+        # each mode of five in a row is stated to have the largest error of them: two meshes may agree by chance
+        parts[0, flexible] += maximum_filter1d(_compared(system, omega)[flexible] / omega[flexible], 5)
     vectors, squares = Flexibility.of(system).bent(vectors)[0], system.K.multiply(system.K)
     rounding = 0.5 * np.finfo(float).eps * np.sqrt(np.einsum("ij,ij->j", vectors**2, squares @ vectors**2)) / values
     corners = _missed_at_corners(system, vectors, values)
-    parts[3, flexible] = ROUNDED * rounding + RESIDUAL**2 + corners  # the second is what the eigensolver leaves
+    # three standard deviations of a random walk, and what the eigensolver leaves
+    parts[3, flexible] = 3.0 * rounding + RESIDUAL**2 + corners
     return parts
 
 
@@ -206,13 +181,14 @@ def _missed_at_corners(system: System, vectors: np.ndarray, values: np.ndarray) 
         if corner.free:
             own = np.minimum(own, corner.left / CLAIMED) if corner.left > SAY else 0.0
         missed += own
-    return CLAIMED * missed / (1.0 - np.minimum(missed, LARGEST_MISSED))
+    return CLAIMED * missed / (1.0 - np.minimum(missed, 0.99))  # more would state errors above 200, which tell nothing
 
 
 def _compared(system: System, omega: np.ndarray) -> np.ndarray:
     """Estimated errors (n_modes,) [rad/s] of frequencies of a thick or curved plate, from those on other triangles.
 
-    The order assumed is less than that of smooth plates, whose errors are stated some three times too large.
+    The order assumed, four, is less than that of smooth plates, whose errors are stated some three times too large. It
+    is 1.5 if ribs end inside, where stresses in the plane are singular; 1 to 2 were measured.
     """
     mesh, n_modes = system.mesh, len(omega)
     if mesh.recipe is None:
@@ -229,7 +205,7 @@ def _compared(system: System, omega: np.ndarray) -> np.ndarray:
         ratio = (len(body.space.origin) / len(system.space.origin)) ** 0.5
     again = _pairs(body, n_modes, None)[1]
     ends = ribs.singular(system.mesh, getattr(system.section, "ribs", ()))[0].values()
-    order = ENDING if any(1 in each for each in ends) else COMPARED
+    order = 1.5 if any(1 in each for each in ends) else 4.0
     return np.abs(again - omega) / np.abs(ratio**-order - 1.0)
 
 
@@ -296,13 +272,20 @@ def heavier(system: System, values: np.ndarray, vectors: np.ndarray) -> tuple[np
 
 
 def fine_enough(system: System, n_modes: int | None, max_frequency: float | None, tolerance: float | None) -> System:
-    """The system on a mesh that resolves the shortest wave wanted; unchanged if the user chose the mesh size."""
-    size = size_for(system, n_modes, max_frequency, tolerance)
-    if system.mesh.size_stated or size >= system.mesh.size:
+    """The system on a mesh that resolves the shortest wave wanted; unchanged if the user chose the mesh size.
+
+    For a tolerance it is the mesh expected to meet it if edges and corners need no finer one: a mesh file much finer
+    than needed gives way to a coarser mesh, too.
+    """
+    mesh, size = system.mesh, size_for(system, n_modes, max_frequency, tolerance)
+    finer = size < mesh.size
+    coarser = tolerance is not None and size > mesh.size and len(mesh.cells) > CHEAP_CELLS
+    if mesh.size_stated or not (finer or coarser):
         return system
-    finer = system.mesh.refined(system.mesh.size / size)
+    other = mesh.refined(mesh.size / size)
     # a mesh file's largest triangle sets its size, so a mesh refined to a smaller size can still have fewer cells
-    return reassemble(system, finer) if len(finer.cells) > len(system.mesh.cells) else system
+    more = len(other.cells) - len(mesh.cells)
+    return reassemble(system, other) if (more > 0 if finer else more < 0) else system
 
 
 def resolves(system: System, max_frequency: float) -> bool:
@@ -318,7 +301,7 @@ def size_for(system: System, n_modes: int | None, max_frequency: float | None, t
         size = _wave_per_element(tolerance) / wave
     elif system.rules.graded:  # a few modes cost little, so find them more accurately
         affordable = (2.3 * system.mesh.area / CHEAP_CELLS) ** 0.5
-        size = min(size, max(affordable, FINE_WAVE / wave))
+        size = min(size, max(affordable, 1.1 / wave))  # errors of 2e-7, clamped 1e-5
     if isinstance(system.section, Plate) and system.section.tension:
         size = min(size, layer_size(system.frame.stiffness, system.section.tension, system.frame.length))
     return size
@@ -327,9 +310,10 @@ def size_for(system: System, n_modes: int | None, max_frequency: float | None, t
 def layer_size(stiffness: float, tension: float, extent: float) -> float:
     """Size [m] of elements that resolve the narrow bending layer at the edge of a stretched plate.
 
-    ``stiffness`` [N m], ``tension`` [N/m], ``extent`` [m] of the body.
+    ``stiffness`` [N m], ``tension`` [N/m], ``extent`` [m] of the body. Ten widths of the layer err by 3e-4 at most on a
+    clamped disk; a fortieth of the extent makes some 4 000 triangles on a square.
     """
-    return max(LAYERS * (stiffness / tension) ** 0.5, extent / FINEST_LAYER)
+    return max(10.0 * (stiffness / tension) ** 0.5, extent / 40.0)
 
 
 def _wave_per_element(error: float) -> float:
@@ -346,25 +330,29 @@ def refine(system: System, n_modes: int | None, max_frequency: float | None, tol
     """Find modes with an estimated relative error below a tolerance, refining the mesh as often as needed.
 
     The shortest wave sets the size of the first mesh. If edges or corners need a finer one, the estimated errors set
-    the size of the next.
+    the size of the next, which aims at 60 % of the tolerance. Where eight more do not suffice, rounding or corners hold
+    the error; nor does anybody wait for more than four times the unknowns allowed, as foretold from how errors fell:
+    rates grow as meshes resolve, and a rate half as large asks for the square of that. Of curved or ribbed plates,
+    whose estimates scatter by a factor of two or three, meshes foretell nothing, and each is finer by a fifth at least.
     """
     if system.mesh.recipe is None:
         raise ValueError(
             "tolerance needs a mesh that can be refined; make it with fi.mesh or load it with fi.mesh.load"
         )
-    found, size = solve_on_mesh(_start(system, n_modes, max_frequency, tolerance), n_modes, max_frequency), np.inf
+    first = fine_enough(system, n_modes, max_frequency, tolerance)
+    found, size = solve_on_mesh(first, n_modes, max_frequency), np.inf
     seen: list[tuple[float, float]] = []
     bent = found.system.rules.compared and not found.system.rules.thick
-    for left in reversed(range(MOST_MESHES + 1)):
+    for left in reversed(range(9)):
         if float(found.error.max()) <= tolerance:
             return found
         mesh = found.system.mesh
-        step = max(_needed(found.parts, MARGIN * tolerance), BENT_STEP if bent else 0.0)
+        step = max(_needed(found.parts, 0.6 * tolerance), 1.2 if bent else 0.0)
         seen.append((mesh.size, float(found.error.max())))
         foreseen = 1.0 if bent else _foreseen(seen, tolerance)
         if (
             not left
-            or found.system.n_dofs * foreseen**mesh.dimension > BEYOND * MOST_UNKNOWNS
+            or found.system.n_dofs * foreseen**mesh.dimension > 4.0 * MOST_UNKNOWNS
             or not step < np.inf
             or found.system.n_dofs * step**mesh.dimension > MOST_UNKNOWNS
             or mesh.size >= size
@@ -413,15 +401,6 @@ def _needed(parts: np.ndarray, goal: float) -> float:
     return max(LEAST_STEP, float(np.exp(brentq(excess, 0.0, -np.log(EPSILON))))) if excess(0.0) > 0.0 else LEAST_STEP
 
 
-def _start(system: System, n_modes: int | None, max_frequency: float | None, tolerance: float) -> System:
-    """The system on the mesh expected to meet a tolerance if its edges and corners need no finer one."""
-    mesh, size = system.mesh, size_for(system, n_modes, max_frequency, tolerance)
-    if mesh.size_stated or size <= mesh.size or len(mesh.cells) <= CHEAP_CELLS:
-        return fine_enough(system, n_modes, max_frequency, tolerance)
-    coarse = mesh.refined(mesh.size / size)  # a mesh file much finer than needed
-    return reassemble(system, coarse) if len(coarse.cells) < len(mesh.cells) else system
-
-
 def enclosure(found: Spectrum) -> np.ndarray | None:
     """Guaranteed bounds of each frequency, (n_modes, 2) [rad/s], or None if no proof covers the body.
 
@@ -452,21 +431,14 @@ def enclosure(found: Spectrum) -> np.ndarray | None:
         nu, material = 0.0, replace(material, E=material.E / (1.0 - nu**2), nu=0.0)
     if nu < 0.0:
         return None
-    second = _second_opinion(system, Plate(material, plate.thickness), len(found.omega))
-    longest = mesh_files.longest(second.system.mesh.points, second.system.mesh.cells) / system.frame.length
+    morley = assemble(mesh, Plate(material, plate.thickness), system.supports, "morley")
+    factor = (20_000 / morley.n_dofs) ** 0.5  # so many unknowns are cheap beside the modes themselves
+    if mesh.recipe is not None and abs(factor - 1.0) > 0.1:
+        morley = reassemble(morley, mesh.refined(factor))
+    second = solve_on_mesh(morley, len(found.omega), None)
+    longest = mesh_files.side_lengths(second.system.mesh.points, second.system.mesh.cells).max() / system.frame.length
     value = (second.omega / system.frame.rate) ** 2
     lower = value / (1.0 + MORLEY**2 * value * longest**4 / (1.0 - nu))
     bounds = np.column_stack([np.sqrt(lower) * system.frame.rate, found.omega])
     bounds *= np.array([1.0 - SAME, 1.0 + SAME])  # rounding and the eigensolver
     return bounds
-
-
-def _second_opinion(system: System, plate: Plate, n_modes: int) -> Spectrum:
-    """Modes of the same body on Morley elements, with about MORLEY_UNKNOWNS unknowns."""
-    mesh = system.mesh
-    morley = assemble(mesh, plate, system.supports, "morley")
-    if mesh.recipe is not None:
-        factor = (MORLEY_UNKNOWNS / morley.n_dofs) ** 0.5
-        if abs(factor - 1.0) > 0.1:
-            morley = reassemble(morley, mesh.refined(factor))
-    return solve_on_mesh(morley, n_modes, None)

@@ -22,17 +22,14 @@ from .elements import EXPONENTS, collapsed, curvatures, monomials
 from .springs import at_facets
 from .supports import SIDES, cells_of_facets
 from .system import System
-from .theory import unknowns_of_cells
+from .theory import blocks, unknowns_of_cells
 
 CALIBRATION = 33.0  # [-] weighted squares over the energy error: 20 to 45 for 20 kinds of plates; test_residual.py
 DEGREE = 5  # polynomial degree of the elements
 POINTS = 3  # [-] Gauss points on a side, and in each direction of a triangle: CALIBRATION was measured with this number
-BLOCK = 128  # [-] solutions processed together, to limit memory
 CUBIC = 3  # degree of the moments of a quintic deflection
 # ten points inside the triangle, enough to define a cubic
 NODES = 0.8 / 3.0 * EXPONENTS[CUBIC] + 0.2 / 3.0 - 1.0 / 3.0
-# [-] misfit of the thickness to a cubic within a triangle, beyond which its moments are no cubics either: a step
-STEP = 0.01
 HALVED = 3  # [-] times a triangle is divided in four to look at its thickness: a step is placed to an eighth of a side
 FIT = np.linalg.inv(monomials(NODES, 0, 0, CUBIC))  # from values at NODES to the coefficients of the cubic
 
@@ -58,7 +55,7 @@ class Moments:
         """Derivatives (n, order + 1, 3, n_q, 21) of the moments xx, yy, xy of cells (n,) at points (n, n_q, 2)."""
         return self.space.derivatives(cells, x, order, CUBIC)[:, :, None] @ self.coefficients[cells][:, None]
 
-    def across(self, cells: np.ndarray, x: np.ndarray, normal: np.ndarray, curvature: Any = 0.0) -> np.ndarray:
+    def edge_forces(self, cells: np.ndarray, x: np.ndarray, normal: np.ndarray, curvature: Any = 0.0) -> np.ndarray:
         """Bending moment and effective shear force (n, 2, n_q, 21) on edges with normals (n, n_q, 2)."""
         moment, slope = self.derivatives(cells, x, 0)[:, 0], self.derivatives(cells, x, 1)
         nx, ny = (normal[..., i, None] for i in range(2))
@@ -144,7 +141,7 @@ class Residual:
         node, weight = np.polynomial.legendre.leggauss(POINTS)
         x = start[:, None] + 0.5 * (node + 1.0)[:, None] * (stop - start)[:, None]
         every = np.broadcast_to(normal[:, None], x.shape)
-        jump = [self.moments.across(self.beside[:, k], x, every) for k in range(2)]  # (n_sides, 2, n_q, 21)
+        jump = [self.moments.edge_forces(self.beside[:, k], x, every) for k in range(2)]  # (n_sides, 2, n_q, 21)
         rigidity = np.mean([self.moments.rigidity(self.beside[:, k], normal) for k in range(2)], axis=0)
         size = length[:, None] / DEGREE * np.column_stack([np.ones(len(length)), (length / DEGREE) ** 2])
         scale = np.sqrt(0.5 * size[..., None] * length[:, None, None] * 0.5 * weight / rigidity[:, None, None])
@@ -158,7 +155,7 @@ class Residual:
         _, x, step = at_facets(space, rim.facets, self.rim_cells)
         ds = np.linalg.norm(step, axis=2)
         normal = step / ds[..., None]
-        force = self.moments.across(self.rim_cells, x, normal, rim.curvatures.mean(axis=1)[:, None, None])
+        force = self.moments.edge_forces(self.rim_cells, x, normal, rim.curvatures.mean(axis=1)[:, None, None])
         kinds = np.array(rim.kinds)
         length = ds.sum(axis=1)
         rigidity = self.moments.rigidity(self.rim_cells, normal.mean(axis=1))
@@ -181,6 +178,7 @@ class Residual:
         """
         space, looks = self.moments.space, _looks()
         places, weight = space.rule()
+        places = places - 1.0 / 3.0
         self.stepped = np.zeros(0, int)
         section: Any = self.system.section
         if callable(section.thickness):
@@ -188,7 +186,8 @@ class Residual:
             fit = monomials(every, 0, 0, CUBIC)
             thickness = self._fields(np.arange(self.moments.n_cells), every)[1]
             missed = thickness - (thickness @ np.linalg.pinv(fit).T) @ fit.T
-            self.stepped = np.flatnonzero(np.abs(missed).max(axis=1) > STEP * thickness.max(axis=1))
+            # a step: with more than a hundredth beside any cubic, the moments are no cubics either
+            self.stepped = np.flatnonzero(np.abs(missed).max(axis=1) > 0.01 * thickness.max(axis=1))
         if not len(self.stepped):
             self.uneven, self.misplaced = np.zeros((0, 0, 21)), np.zeros((2, 0, 21, 21))
             return
@@ -218,8 +217,8 @@ class Residual:
 
     def errors(self, vectors: np.ndarray, loads: np.ndarray) -> np.ndarray:
         """Errors (3, n) of `energy_errors` for solutions (n_dofs, n) under the inertia of ``loads`` (n_dofs, n)."""
-        blocks = [slice(i, i + BLOCK) for i in range(0, vectors.shape[1], BLOCK)]
-        return np.concatenate([self._errors(vectors[:, block], loads[:, block]) for block in blocks], axis=1)
+        some = blocks(vectors.shape[1], 128)
+        return np.concatenate([self._errors(vectors[:, block], loads[:, block]) for block in some], axis=1)
 
     def _errors(self, vectors: np.ndarray, loads: np.ndarray) -> np.ndarray:
         unknowns, pushed = (unknowns_of_cells(self.system, field) for field in (vectors, loads))

@@ -27,9 +27,6 @@ from .springs import at_facets
 from .supports import cells_of_facets
 from .theory import Frame, gram
 
-CROSSINGS = 3  # [-] rings of triangles around crossings of ribs: as much error as between them
-# [-] longest side at the end of a rib inside, over its width: it acts there like a point, which would turn endlessly
-END = 2.0
 # [-] least height of triangles on ribs, over the extent: up to 2.5e-4 they lost the digits of K, at 2.5e-3 they did not
 FINEST = 3e-4
 ON = 1e-8  # [-] of the extent: vertices of a mesh nearer to a path lie on it; the mesher leaves 1e-12
@@ -163,13 +160,17 @@ def singular(mesh: Mesh, ribs: Sequence[Rib]) -> tuple[dict[int, list[int]], dic
 
 
 def around_ends(mesh: Mesh, ribs: Sequence[Rib]) -> Mesh:
-    """The mesh with rings of triangles that shrink to ends and crossings of ribs inside the plate."""
+    """The mesh with rings of triangles that shrink to ends and crossings of ribs inside the plate.
+
+    At its end a rib acts like a point, which would turn endlessly: triangles shrink to twice its width. Around a
+    crossing three rings leave as much error as there is between crossings.
+    """
     rings, (counts, width) = {}, singular(mesh, ribs)
     for vertex in counts:
         around = mesh.points[mesh.cells[(mesh.cells == vertex).any(axis=1)]]
         longest = float(np.linalg.norm(around - mesh.points[vertex], axis=2).max())
-        ends = max(0, int(np.ceil(np.log2(longest / (END * width[vertex])))))
-        rings[vertex] = ends if 1 in counts[vertex] else CROSSINGS
+        ends = max(0, int(np.ceil(np.log2(longest / (2.0 * width[vertex])))))
+        rings[vertex] = ends if 1 in counts[vertex] else 3
     return towards(mesh, {vertex: number for vertex, number in rings.items() if number})
 
 
@@ -192,7 +193,7 @@ class RibLine(NamedTuple):
         """Where a rib of a plate lies: on the sides ``facets`` (n, 2)."""
         cells = cells_of_facets(facets, space.vertices)[0]
         area, x, normal = at_facets(space, facets, cells)
-        ds, place = np.linalg.norm(normal, axis=2), frame.places(x)
+        ds, place = np.linalg.norm(normal, axis=2), frame.to_metres(x)
         nx, ny = np.moveaxis(normal / ds[..., None], 2, 0)
         along = np.stack([ny**2, nx**2, -nx * ny], axis=-1)  # for the tangent (-ny, nx)
         twist = np.stack([-nx * ny, nx * ny, 0.5 * (nx**2 - ny**2)], axis=-1)

@@ -16,7 +16,6 @@ KINDS = ("clamped", "hinged", "free")  # supports of an edge besides `Elastic`
 # how an edge is held in the plane of a plate: sliding only along itself, across only across itself
 PLANE = ("held", "free", "sliding", "across")
 SOFT = "soft hinged"  # support of a thick plate that leaves the rotation along the edge free
-TWISTS = 8  # [-] terms of the series of the torsion of a rectangle: the next is 1e-6 of the first
 Varying = float | Callable[[np.ndarray], Any]
 
 
@@ -71,7 +70,7 @@ class Plate:
         check.settle(self, tension=check.non_negative("tension", self.tension, "N/m"))
         bare = isinstance(self.layers, Sequence) and not len(self.layers)
         layers = () if bare else check.several("layers", self.layers, layering.Layer)
-        if layers and self.material != layering.together(layers):
+        if layers and self.material != layering.merge_layers(layers):
             raise ValueError("material must be that of the layers; make a plate of layers by Plate.laminate")
         if layers and self.thickness != sum(layer.thickness for layer in layers):
             raise ValueError("thickness must be that of the layers; make a plate of layers by Plate.laminate")
@@ -107,7 +106,7 @@ class Plate:
         (0.003, [28.47, 2.62, 1.8])
         """
         found = layering.stacked(layers)
-        return cls(layering.together(found), sum(layer.thickness for layer in found), tension, found)
+        return cls(layering.merge_layers(found), sum(layer.thickness for layer in found), tension, found)
 
     @property
     def uniform(self) -> bool:
@@ -280,7 +279,7 @@ class Beam:
         shear = self.material.transverse[0]
         if self.round:
             return shear * np.pi / 32.0 * height**4
-        thin, n = np.minimum(height, width), np.arange(1, 2 * TWISTS, 2)[:, None]
+        thin, n = np.minimum(height, width), np.arange(1, 16, 2)[:, None]  # the ninth term is 1e-6 of the first
         ratio = np.maximum(height, width) / thin
         missing = (np.tanh(0.5 * n * np.pi * ratio) / n**5).sum(axis=0) / ratio
         return shear * thin**4 * ratio * (1.0 / 3.0 - 64.0 / np.pi**5 * missing)

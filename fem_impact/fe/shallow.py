@@ -28,6 +28,7 @@ from functools import partial
 from typing import Any
 
 import numpy as np
+from scipy.sparse import block_diag
 
 from .._base import check
 from ..mesh.meshes import Mesh
@@ -52,10 +53,8 @@ from .theory import (
     unknowns_of_cells,
 )
 
-# [-] rise of the middle of a side over its chord, over the thickness, above which triangles are divided: bending that
-# does not stretch a curved plate needs displacements beyond quartics there. Ten modes of a cymbal then err by 2e-3
-SAG = 0.5
-# [-] the same of what the rise differs from a quartic along a side: where its curvature jumps
+# [-] what the rise differs from a quartic along a side, over the thickness, above which triangles are divided: where
+# its curvature jumps
 KINK = 0.005
 MOST_BENT = 20_000  # [-] triangles from which on a rise is refused, as one that jumps, and finer meshes divide no more
 
@@ -72,14 +71,14 @@ class ShallowSpace(PlaneSpace):
         found: np.ndarray = (gradient @ self.heights[cells][:, None, :, None])[..., 0]
         return found
 
-    def linear(self, element_dofs: np.ndarray, n_all: int) -> np.ndarray:
+    def rigid_unknowns(self, element_dofs: np.ndarray, n_all: int) -> np.ndarray:
         """Unknowns (n_all, 6) of the deflections 1, x and y, and of the rigid motions in the plane."""
-        flat = super().linear(element_dofs, n_all)
+        flat = super().rigid_unknowns(element_dofs, n_all)
         for i, part in enumerate((FIRST, SECOND)):
             flat[element_dofs[part].T, 1 + i] = -self.heights
         own, places = np.vstack([element_dofs[FIRST], element_dofs[SECOND]]), plane.nodes(self).transpose(1, 0, 2)
         within = np.zeros((n_all, 3))
-        within[own.reshape(2, -1).ravel()] = plane.rigid(places.reshape(-1, 2))
+        within[own.reshape(2, -1).ravel()] = plane.plane_motions(places.reshape(-1, 2))
         return np.hstack([flat, within])
 
 
@@ -88,7 +87,7 @@ def strained(space: ShallowSpace, cells: np.ndarray, area: np.ndarray, x: np.nda
 
     The area coordinates may be the same for all cells, (1, n_q, 3).
     """
-    slope, hessian = space.bending(cells, x, (1, 2))
+    slope, hessian = space.bending_functions(cells, x, (1, 2))
     gradient = plane.gradients(space, cells, area)
     steep = space.sloping(cells, gradient)
     parts = np.zeros((*x.shape[:2], 6, LOCAL))
@@ -116,7 +115,7 @@ def _heights(space: ShallowSpace, section: Any, frame: Frame) -> np.ndarray:
     local = plane.nodes(space).reshape(-1, 2)
     if section.rise is None:
         return np.zeros((len(space.origin), plane.QUARTIC))
-    heights = check.field("rise", section.rise, frame.places(local), "m") / frame.length
+    heights = check.field("rise", section.rise, frame.to_metres(local), "m") / frame.length
     tilt = np.column_stack([np.ones(len(local)), local])  # it stretches nothing, but would cost digits
     weight = np.repeat(np.sqrt(np.abs(np.linalg.det(space.jacobian))), plane.QUARTIC)
     heights -= tilt @ np.linalg.lstsq(weight[:, None] * tilt, weight * heights, rcond=None)[0]
@@ -133,7 +132,7 @@ def _hold_shell(body: Subject, domain: Domain) -> Held:
     loose, drifts = plane.loosened(space, rim, own)
     space.drifts = np.vstack([np.zeros((n_flat, drifts.shape[1])), drifts])
     dofs = np.vstack([dofs, n_flat + own.element_dofs, n_flat + own.N + own.element_dofs])
-    expand, project = plane.together(expand, loose), plane.together(project, loose.T)
+    expand, project = (block_diag(pair, format="csr") for pair in ((expand, loose), (project, loose.T)))
     n_all = expand.shape[0]
     held = None
     if space.ribs:
@@ -157,7 +156,9 @@ def towards_bends(mesh: Mesh, section: Any, kinds: list[str], coarser: float) ->
         sag = np.abs(z[4] - 0.5 * (z[0] + z[8])).max(axis=1)
         kink = np.abs(z[1::2] - np.tensordot(between, z[::2], 1)).max(axis=(0, 2))
         least = evaluate("thickness", section.thickness, corner.mean(axis=1), "m") * coarser**2
-        uneven = (sag > SAG * least) | (kink > KINK * least)
+        # bending that does not stretch a curved plate needs displacements beyond quartics where the middle of a side
+        # rises more than this over its chord; ten modes of a cymbal then err by 2e-3
+        uneven = (sag > 0.5 * least) | (kink > KINK * least)
         if not uneven.any():
             return mesh
         mesh = splitting.divided_across(mesh, uneven)[0]
@@ -185,14 +186,14 @@ def plane_mass(system: Any, vectors: np.ndarray) -> np.ndarray:
         moved[:, :, 0, FIRST] = moved[:, :, 1, SECOND] = shape
         steep = space.sloping(cells, plane.gradients(space, cells, area))
         larger = np.sqrt(0.5 * (steep**2).sum(axis=2))
-        moved[:, :, 2, :21] = larger[..., None] * space.bending(cells, x[cells], (0,))[0]
+        moved[:, :, 2, :21] = larger[..., None] * space.bending_functions(cells, x[cells], (0,))[0]
         local.append(gram(moved, frame.field(system.section, "inertia", x[cells]) * dx[cells]))
     for piece in space.ribs:
         shape = plane.reference(piece.area[..., 1:].reshape(-1, 2).T)[0].reshape(*piece.ds.shape, plane.QUARTIC)
         slope = space.functions(piece.cells, piece.x, (1,))[0].transpose(0, 2, 1, 3)
         moved = -(piece.stiffness[..., 0, 1] / piece.stiffness[..., 0, 0] / frame.length)[..., None, None] * slope
         moved[:, :, 0, FIRST] = moved[:, :, 1, SECOND] = shape
-        turns = piece.rib.turning(frame.places(piece.x)).reshape(piece.ds.shape) / frame.length**2
+        turns = piece.rib.turning(frame.to_metres(piece.x)).reshape(piece.ds.shape) / frame.length**2
         each = gram(moved, piece.inertia * piece.ds) + gram(slope, turns * piece.ds)
         local.append(each / (frame.inertia * frame.length))
         where.append(piece.cells)
@@ -205,7 +206,7 @@ def plane_mass(system: Any, vectors: np.ndarray) -> np.ndarray:
     return system.expand.T @ heavy
 
 
-def energies(system: Any, section: Any, vectors: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def shell_energies(system: Any, section: Any, vectors: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Twice the mutual strain energy, and the mutual mass (n, n) of vectors (n_dofs, n), with another section.
 
     Its ribs, if any, lie where those of the system do.
@@ -216,7 +217,7 @@ def energies(system: Any, section: Any, vectors: np.ndarray) -> tuple[np.ndarray
     space.heights = _heights(space, section, frame)
     space.ribs = [RibLine.of(rib, line.facets, section, space, frame) for rib, line in zip(section.ribs, space.ribs)]
     whole = unknowns_of_cells(system, vectors)
-    K, M = slopes.energies(system, space, partial(frame.field, section), vectors)
+    K, M = slopes.section_energies(system, space, partial(frame.field, section), vectors)
     if space.ribs:
         *each, cells = ribs.attached(space, frame, strained)
         for part, total in zip(each, (K, M)):
@@ -235,5 +236,5 @@ def steepest(system: Any) -> float:
 SHALLOW = Theory(
     "shallow", "argyris and quartic", 2, _curved_domain, strains_and_motion, _hold_shell, no_estimate, wave=1.8,
     unknowns=47.0, fields=("stiffness", "inertia", "walls"), graded=True, compared=True, sharp=plates.is_tiny,
-    layered=towards_bends, energies=energies,
+    layered=towards_bends, energies=shell_energies,
 )  # fmt: skip

@@ -27,7 +27,7 @@ LOCAL = 2 * BENT  # of both
 
 
 class TimoshenkoSpace(HermiteSpace):
-    """Shape functions of the elements of one line: those of W by `bending`, then two hats and bubbles for s."""
+    """Shape functions of one line: those of W by `bending_functions`, then two hats and bubbles for s."""
 
     def shears(self, cells: np.ndarray, points: np.ndarray, order: int) -> np.ndarray:
         """Shape functions of s (n, n_q, DEGREE + 1), or their derivatives, of cells (n,) at points (n, n_q, 1)."""
@@ -44,7 +44,7 @@ class TimoshenkoSpace(HermiteSpace):
 
     def functions(self, cells: np.ndarray, points: np.ndarray, orders: tuple[int, ...]) -> list[np.ndarray]:
         """Derivatives of the deflection w, as in `HermiteSpace.functions`, of order 0 or 1."""
-        bent = self.bending(cells, points, orders)
+        bent = self.bending_functions(cells, points, orders)
         return [np.concatenate([b, self.shears(cells, points, k)], axis=-1) for b, k in zip(bent, orders)]
 
     def numbering(self, mesh: Cells) -> tuple[np.ndarray, int]:
@@ -59,7 +59,7 @@ def terms(space: TimoshenkoSpace, points: Points, cells: np.ndarray) -> list[Ter
     """Curvature and shear strain, deflection and rotation."""
     x = points.x[cells]
     none = np.zeros((*x.shape[:2], BENT))
-    slope, curve = (np.concatenate([b, none], axis=-1) for b in space.bending(cells, x, (1, 2)))
+    slope, curve = (np.concatenate([b, none], axis=-1) for b in space.bending_functions(cells, x, (1, 2)))
     strain = np.concatenate([none, space.shears(cells, x, 1)], axis=-1)
     value = space.functions(cells, x, (0,))[0]
     named = (

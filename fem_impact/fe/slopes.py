@@ -11,8 +11,6 @@ from .section import Plate, evaluate
 from .system import System
 from .theory import Points, blocks, unknowns_of_cells, weighted
 
-NODES = 6  # [-] Gauss points in each direction of a triangle: exact for products of slopes of quintics
-
 
 def products(system: System, vectors: np.ndarray, weight: np.ndarray) -> np.ndarray:
     """Integrals (n, n) of ``grad w_i . weight grad w_j`` over the body, on its true edge.
@@ -34,7 +32,7 @@ def products(system: System, vectors: np.ndarray, weight: np.ndarray) -> np.ndar
     return 0.5 * (result + result.T) * frame.length ** (size - 2) / frame.mass
 
 
-def energies(
+def section_energies(
     system: System, space: Any, field: Callable[[str, np.ndarray], np.ndarray], vectors: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
     """Twice the mutual strain energy, and the mutual mass (n, n) of vectors (n_dofs, n) in a space, by their terms.
@@ -54,7 +52,7 @@ def stressed(
 ) -> Iterator[tuple[str, np.ndarray, np.ndarray, np.ndarray]]:
     """Of every term of the energies and block of cells: "K" or "M", cells, strains or motions, and stresses by these.
 
-    Both are (n_cells, n_q, n_parts, n), of each vector; the arguments are those of `energies`, and its points.
+    Both are (n_cells, n_q, n_parts, n), of each vector; the arguments are those of `section_energies`, and its points.
     """
     whole = unknowns_of_cells(system, vectors)
     for cells in blocks(len(points.x)):
@@ -64,8 +62,11 @@ def stressed(
             yield matrix, cells, moved, weighted(weight, moved)
 
 
-def quadrature(system: System, nodes: int = NODES) -> Points:
-    """Quadrature on every cell of a system, on the true edge: so many Gauss points in each direction of a triangle."""
+def quadrature(system: System, nodes: int = 6) -> Points:
+    """Quadrature on every cell of a system, on the true edge.
+
+    Of triangles it has so many Gauss points in each direction; six are exact for products of slopes of quintics.
+    """
     space: Any = system.space
     if system.mesh.dimension == 1:
         x, dx = beam_elements.quadrature(space)
@@ -77,7 +78,7 @@ def softness(system: System) -> float:
     """Integral of one over the thickness of a plate [m], of one over E A of a beam [1/N]."""
     frame, section = system.frame, system.section
     _, x, dx = quadrature(system)
-    place = frame.places(x)
+    place = frame.to_metres(x)
     if isinstance(section, Plate):
         size = evaluate("thickness", section.thickness, place, "m")
     else:

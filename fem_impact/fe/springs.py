@@ -8,20 +8,18 @@ import numpy as np
 from .._base import check
 from .section import Elastic
 
-FACET_POINTS = 8  # [-] Gauss points on a boundary facet; exact for products of quintics
-
 
 def at_facets(space: Any, facets: np.ndarray, cells: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Gauss points on facets (n, 2) of cells (n,): area coordinates (n, n_q, 3), places, outward normals times ds.
 
     Places and normals are (n, n_q, 2).
     """
-    node, weight = np.polynomial.legendre.leggauss(FACET_POINTS)
+    node, weight = np.polynomial.legendre.leggauss(8)  # exact for products of quintics
     s = 0.5 * (node + 1.0)[:, None]
     corner = space.vertices[cells][:, None]  # (n, 1, 3)
     first, last = (np.equal(corner, facets[:, end, None, None]).astype(float) for end in (0, 1))
     area = (1.0 - s) * first + s * last  # (n, n_q, 3)
-    x, tangent = space.along(cells, area, last - first)
+    x, tangent = space.points_along(cells, area, last - first)
     return area, x, np.stack([tangent[..., 1], -tangent[..., 0]], axis=-1) * 0.5 * weight[:, None]
 
 

@@ -16,7 +16,6 @@ from .section import KINDS, Elastic
 
 # [-] two facets join smoothly if tangents [rad] and curvatures times length differ by less: arcs from files do
 SMOOTH = 1e-5
-RANK = 1e-5  # [-] singular values below this count as zero; directions in the smallest triangles are no more accurate
 SIDES = ((0, 1), (1, 2), (0, 2))  # vertices of each facet of a triangle, in scikit-fem's order
 
 
@@ -104,7 +103,7 @@ def _left(conditions: np.ndarray, length: float) -> tuple[np.ndarray, np.ndarray
     weight = length ** -np.concatenate([[0.0, 1.0, 1.0], np.full(n - 3, 2.0)])  # unknown = weight * scaled unknown
     rows = conditions * weight
     rows = rows / np.abs(rows).max(axis=1, keepdims=True)
-    kept = null_space(rows, rcond=RANK) if len(rows) else np.eye(n)
+    kept = null_space(rows, rcond=1e-5) if len(rows) else np.eye(n)  # directions in tiny triangles are no more exact
     return weight[:, None] * kept, kept.T / weight
 
 

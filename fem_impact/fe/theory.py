@@ -27,7 +27,6 @@ from .supports import SupportedRim
 # powers of the length in the units of a section's fields, over those of its stiffness or its inertia per area or length
 POWERS = {"shear": -2, "rotary": 2, "foundation": -4}
 INERT = "inertia", "rotary"  # fields of a section that do not resist
-CHUNK = 256  # [-] cells whose shape functions are computed together, to limit memory
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,7 +56,7 @@ class Frame:
         """Coordinates [-] in the frame of points [m]."""
         return (points - self.centre) / self.length
 
-    def places(self, local: np.ndarray) -> np.ndarray:
+    def to_metres(self, local: np.ndarray) -> np.ndarray:
         """Points (n, dimension) [m] at coordinates (..., dimension) in the frame; on a beam never beyond its ends."""
         points = self.centre + self.length * local.reshape(-1, len(self.centre))
         if len(self.centre) > 1:
@@ -69,7 +68,7 @@ class Frame:
         size: Any = self.length ** POWERS.get(name, 0)
         if name == "walls":
             size = np.outer(*[np.repeat([1.0 / self.length, 1.0], 3)] * 2)
-        found = getattr(section, name)(self.places(local)) / (self.unit(name) * size)
+        found = getattr(section, name)(self.to_metres(local)) / (self.unit(name) * size)
         return found.reshape(*local.shape[:2], *found.shape[1:])
 
 
@@ -223,9 +222,9 @@ def unknowns_of_cells(system: Any, vectors: np.ndarray) -> np.ndarray:
     return (system.expand @ vectors)[system.element_dofs].transpose(1, 0, 2)
 
 
-def blocks(n: int) -> list[np.ndarray]:
-    """Numbers of n cells in blocks, to limit memory."""
-    return np.array_split(np.arange(n), max(1, -(-n // CHUNK)))
+def blocks(n: int, most: int = 256) -> list[np.ndarray]:
+    """Numbers of n cells in blocks of so many at most, to limit memory."""
+    return np.array_split(np.arange(n), max(1, -(-n // most)))
 
 
 def check_own(theory: Theory, domain: Domain, held: Held) -> None:

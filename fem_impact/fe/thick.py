@@ -56,6 +56,7 @@ from scipy.sparse.linalg import spsolve
 from scipy.spatial import cKDTree
 
 from .._base.untyped import Cells, Sparse
+from ..mesh.mesh_files import side_lengths
 from ..mesh.meshes import LONGEST, Mesh
 from . import plane, plates, splitting, supports
 from .elements import Bent, area_coordinates, curvatures, numbering
@@ -67,11 +68,8 @@ from .theory import Domain, Held, Points, Subject, Term, Theory
 # [-] radius over which a point force is spread, over the thickness: right stress below a small load (Westergaard 1926)
 PATCH = 0.325
 LOOSE = "free", SOFT  # supports with a layer
-LAYER = 2.0  # [-] size of triangles in this layer over the thickness h: errors of some 2e-4 h / L of a frequency
 # [-] most triangles along these edges, to bound the size of the mesh; a plate that needs more keeps larger ones
 MOST_LAYER = 120.0
-# [-] sides over the thickness below which they resolve the layer, above which they miss it; in between as the square
-SEEN, UNSEEN = 4.0, 9.0
 SMALL = 0.1  # [-] longest side over the thickness below which nodes hold rotations: either choice loses two digits here
 
 
@@ -84,8 +82,7 @@ class MindlinSpace(PlaneSpace):
 
     def turn(self, mesh: Cells, thickness: np.ndarray) -> None:
         """Let the nodes of straight triangles much smaller than their ``thickness`` (n_cells,) hold rotations."""
-        corner = mesh.p.T[self.vertices]
-        longest = np.linalg.norm(np.roll(corner, -1, axis=1) - corner, axis=2).max(axis=1)
+        longest = side_lengths(mesh.p.T, self.vertices).max(axis=1)
         bends = np.zeros(len(longest), bool)
         if self.bent is not None:
             bends[self.bent.cells] = True
@@ -100,7 +97,7 @@ class MindlinSpace(PlaneSpace):
         """
         node = plane.NODES - 1.0 / 3.0
         x = self.straight(cells, node)
-        slope = self.bending(cells, x, (1,))[0].transpose(0, 2, 1, 3)  # (n, 15, 2, 21)
+        slope = self.bending_functions(cells, x, (1,))[0].transpose(0, 2, 1, 3)  # (n, 15, 2, 21)
         slope = slope * ~self.turned[cells][:, :, None, None]
         return [np.einsum("n...k,nkis->n...is", shape, slope, optimize=True) for shape in shapes]
 
@@ -115,9 +112,9 @@ class MindlinSpace(PlaneSpace):
             slope[small, ..., :21] = self.slopes_in_rotations(cells[small], shape[small])[0].transpose(0, 2, 1, 3)
         return slope
 
-    def linear(self, element_dofs: np.ndarray, n_all: int) -> np.ndarray:
+    def rigid_unknowns(self, element_dofs: np.ndarray, n_all: int) -> np.ndarray:
         """Unknowns (n_all, 3) of the deflections 1, x and y, which have no shear strain."""
-        found = super().linear(element_dofs, n_all)
+        found = super().rigid_unknowns(element_dofs, n_all)
         for i in range(2):
             rows = element_dofs[(FIRST, SECOND)[i]].T[self.turned]
             found[rows, 1 + i] = 1.0
@@ -126,7 +123,7 @@ class MindlinSpace(PlaneSpace):
 
 def terms(space: MindlinSpace, points: Points, cells: np.ndarray) -> list[Term]:
     """Curvatures of the rotation and shear strains, deflection and rotation."""
-    value, slope, hessian = space.bending(cells, points.x[cells], (0, 1, 2))
+    value, slope, hessian = space.bending_functions(cells, points.x[cells], (0, 1, 2))
     shape = reference(points.reference)[0]
     n, n_q = value.shape[:2]
     area = area_coordinates(points.reference.T)[None]
@@ -159,7 +156,7 @@ def terms(space: MindlinSpace, points: Points, cells: np.ndarray) -> list[Term]:
 
 def _domain(body: Subject, fields: tuple[str, ...]) -> Domain:
     found = plates.domain(MindlinSpace, body, fields)
-    h = evaluate("thickness", body.section.thickness, found.frame.places(found.space.origin), "m")
+    h = evaluate("thickness", body.section.thickness, found.frame.to_metres(found.space.origin), "m")
     found.space.turn(found.cells, h / found.frame.length)
     return found
 
@@ -192,7 +189,7 @@ def constrain(
     words = [{"hinged": "sliding", "clamped": "held"}.get(kind, "free") for kind in kinds]
     loose, at = plane.held_at(space, rim.facets, words, own)
     local, x, normal = plane.at_rim(space, rim.facets, cells, sides)
-    slope = space.bending(cells, x, (1,))[0].transpose(0, 2, 1, 3)  # (n_facets, 5, 2, 21)
+    slope = space.bending_functions(cells, x, (1,))[0].transpose(0, 2, 1, 3)  # (n_facets, 5, 2, 21)
     tied: list[tuple[np.ndarray, np.ndarray, np.ndarray]] = []  # rows, columns and values of gamma_n = w_n
     for node, facets in at.items():
         facet, k = next((place for place in facets if kinds[place[0]] == "clamped"), (-1, -1))
@@ -202,14 +199,14 @@ def constrain(
         row = n @ slope[facet, k]  # (21,)
         for i in range(2):
             tied.append((np.full(21, node + i * own.N), dofs[:21, cells[facet]], n[i] * row))
-    whole = plane.together(expand, loose)
+    whole = block_diag([expand, loose], format="csr")
     if tied:
         row, column, value = (np.concatenate(part) for part in zip(*tied))
         tie = coo_matrix((value, (row, column)), shape=(2 * own.N, n_flat)).tocsr() @ expand
         lower = block_diag([csr_matrix((n_flat, 0)), tie], format="csr")
         lower.resize(whole.shape)
         whole = (whole + lower).tocsr()
-    return whole, plane.together(project, loose.T), dofs
+    return whole, block_diag([project, loose.T], format="csr"), dofs
 
 
 def _without_slip(
@@ -223,7 +220,7 @@ def _without_slip(
     would slip there, and its error would only fall as size**3.
     """
     x, normal = plane.at_rim(space, rim.facets[slips], cells, sides)[1:]
-    slope = space.bending(cells, x, (1,))[0]  # (n, 2, 5, 21)
+    slope = space.bending_functions(cells, x, (1,))[0]  # (n, 2, 5, 21)
     fourth = np.einsum("ni,niqk,q->nk", normal[:, 3], slope, np.array([1.0, 1.0, -4.0, 6.0, -4.0]))
     rows = np.repeat(np.arange(len(slips)), 21)
     whole = csc_matrix((fourth.ravel(), (rows, dofs[:21, cells].T.ravel())), shape=(len(slips), expand.shape[0]))
@@ -242,9 +239,8 @@ def towards_edges(mesh: Mesh, loose: np.ndarray, size: float) -> Mesh:
         ends = mesh.points[mesh.facets[loose]]
         steps = np.ceil(2.0 * np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1) / size).astype(int)
         along = [np.linspace(0.0, 1.0, n + 1)[:, None] * (b - a) + a for (a, b), n in zip(ends, steps)]
-        corner = mesh.points[mesh.cells]
-        away = cKDTree(np.concatenate(along)).query(corner)[0].min(axis=1)
-        longest = np.linalg.norm(np.roll(corner, -1, axis=1) - corner, axis=2).max(axis=1)
+        away = cKDTree(np.concatenate(along)).query(mesh.points[mesh.cells])[0].min(axis=1)
+        longest = side_lengths(mesh.points, mesh.cells).max(axis=1)
         tall = longest > np.maximum(size, splitting.GROWTH * away) * LONGEST
         if not tall.any():
             return mesh
@@ -263,7 +259,8 @@ def layered(mesh: Mesh, section: Plate, kinds: list[str], coarser: float) -> Mes
     ends = mesh.points[mesh.facets[loose]]
     length = float(np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1).sum())
     thin = float(evaluate("thickness", section.thickness, mesh.middles[loose], "m").min())
-    return towards_edges(mesh, loose, coarser * max(LAYER * thin, length / MOST_LAYER))
+    # triangles of twice the thickness h err by some 2e-4 h / L of a frequency
+    return towards_edges(mesh, loose, coarser * max(2.0 * thin, length / MOST_LAYER))
 
 
 def errors_by_layers(system: Any, vectors: np.ndarray, loads: np.ndarray, forced: Any = None) -> np.ndarray:
@@ -285,10 +282,11 @@ def errors_by_layers(system: Any, vectors: np.ndarray, loads: np.ndarray, forced
     twist = np.stack([-2.0 * nx * ny, 2.0 * nx * ny, nx**2 - ny**2], axis=-1)  # strains of a unit 2 kappa_nt
     rigidity = np.einsum("fqi,fqij,fqj->fq", 0.5 * twist * [1.0, 1.0, 2.0], stiffness, 0.5 * twist * [1.0, 1.0, 2.0])
     width = np.sqrt(rigidity / np.einsum("fqi,fqij,fqj->fq", along, shear, along))
-    thin = evaluate("thickness", system.section.thickness, frame.places(x), "m").reshape(ds.shape) / frame.length
+    thin = evaluate("thickness", system.section.thickness, frame.to_metres(x), "m").reshape(ds.shape) / frame.length
     coarse = ds.sum(axis=1)[:, None] / thin
-    share = np.where(coarse > SEEN, np.minimum(1.0, (coarse / UNSEEN) ** 2), 0.0)
-    bend = curvatures(space.bending(cells, x, (2,))[0])
+    # sides up to four times the thickness resolve the layer, from nine times on they miss it
+    share = np.where(coarse > 4.0, np.minimum(1.0, (coarse / 9.0) ** 2), 0.0)
+    bend = curvatures(space.bending_functions(cells, x, (2,))[0])
     unknowns = (system.expand @ vectors)[system.element_dofs[:21, cells]].transpose(1, 0, 2)
     moment = np.einsum("fqi,fqij,fqjk->fqk", turn, stiffness, bend, optimize=True) @ unknowns
     return np.outer([1.0, 0.0, 0.0], np.einsum("fqk,fq->k", moment**2, share * width / rigidity * ds))

@@ -60,7 +60,7 @@ def energy_changes(system: System, change: SectionChange, vectors: np.ndarray) -
         each = [system.rules.energies(system, section, vectors) for section in change.sections]
         K, M = (sum(weight * one for weight, one in zip(change.weights, pair)) for pair in zip(*each))
         return np.asarray(K), np.asarray(M)
-    return slopes.energies(system, system.space, _rate(system, change), vectors)
+    return slopes.section_energies(system, system.space, _rate(system, change), vectors)
 
 
 def frequency_densities(system: System, change: SectionChange, vectors: np.ndarray, square: np.ndarray) -> np.ndarray:

@@ -99,7 +99,7 @@ class Response(Totals, check.Locked):
         """What the bodies assumed, and numbers that are allowed but probably a slip of a unit, in plain words."""
         striker = () if self.striker is None else self.striker.notes
         place = () if self.at is None else at_rest(self.bodies[-1], self.at[None])
-        speed = tuple(plausible.number("speed", abs(self.speed)))
+        speed = tuple(plausible.note_number("speed", abs(self.speed)))
         return plausible.together(*(modes.notes for modes in reversed(self.bodies)), striker, speed, place)
 
     @property

@@ -34,13 +34,9 @@ from .loops import (
 )
 from .smooth_edges import smooth_runs
 
-PIXEL = 0.0254 / 96.0  # [m] fact: one SVG px: 1/96 inch by the CSS standard
 DXF_UNITS = {1: 0.0254, 2: 0.3048, 4: 1e-3, 5: 1e-2, 6: 1.0, 13: 1e-6, 14: 0.1}  # $INSUNITS code -> [m]
 # [-] gaps below this fraction of the extent are closed and noted: a line's width on paper, no hole anybody means
 BRIDGED = 1e-3
-LONGEST_NAME = 100  # [-] characters kept of an edge name
-# [-] pieces shorter than this fraction of the extent are dropped: single precision of drawing programs leaves as much
-SHORT = 1e-7
 MOST_NUMBERS = 100 * MOST_PIECES  # [-] most digit groups in the shapes of a drawing; an arc of long decimals has 12
 SHAPES = {"path", "rect", "circle", "ellipse", "line", "polyline", "polygon"}
 LONGEST_COMMENT = 1_000_000  # [-] characters of a comment in a drawing: longer ones are none
@@ -51,7 +47,7 @@ CORNER = 0.1
 Drawn = tuple[list[Loop], dict[str, np.ndarray]]  # closed loops, and named open paths (n, 2) [m]
 
 
-def read(source: Any, unit: str | None) -> tuple[Outline, dict[str, np.ndarray], list[str]]:
+def read_outline(source: Any, unit: str | None) -> tuple[Outline, dict[str, np.ndarray], list[str]]:
     """Outline [m] from a file name, a shapely polygon or points (n, 2), named open paths, and notes on assumptions."""
     notes: list[str] = []
     if isinstance(source, (str, Path)):
@@ -170,7 +166,7 @@ def _svg(path: Path, unit: str | None, notes: list[str]) -> Drawn:
     """Closed loops and named open paths [m] of all shapes in an SVG file, y upward."""
     drawn = isolated.read_apart(path, "SVG", "mesh.drawings:svg_arrays")
     box, pixels, width = drawn["size"].tolist()
-    scale = PIXEL
+    scale = 0.0254 / 96.0  # one px by the CSS standard
     if unit is not None:
         scale = UNITS[check.one_of("unit", unit, UNITS)] * box / pixels if pixels else math.nan
     elif not math.isnan(width):
@@ -276,7 +272,7 @@ def _packed(pieces: list[Piece]) -> dict[str, np.ndarray]:
         "numbers": np.concatenate([np.zeros(0), *rows]),
         "lengths": np.array([len(row) for row in rows], int),
         "arcs": np.array([isinstance(piece, Arc) for piece in pieces], bool),
-        "names": np.array([piece.name[:LONGEST_NAME] for piece in pieces], str),
+        "names": np.array([piece.name[:100] for piece in pieces], str),
     }
 
 
@@ -300,7 +296,8 @@ def _chained(name: str, pieces: list[Piece], notes: list[str]) -> Drawn:
     if not (np.abs(corners) < FARTHEST).all():
         raise ValueError(f"{name} has coordinates beyond {FARTHEST:g} m; correct the drawing")
     span = float(np.ptp(corners, axis=0).max(initial=0.0)) if pieces else 0.0
-    left = [piece for piece in pieces if extent((piece,)) > SHORT * span]
+    # the single precision of drawing programs leaves shorter pieces
+    left = [piece for piece in pieces if extent((piece,)) > 1e-7 * span]
     if not left:
         raise ValueError(f"{name} has no outline; draw it with paths, lines, arcs or splines")
     lines = open_paths.lines(left, span, BRIDGED * span)
@@ -311,7 +308,7 @@ def _chained(name: str, pieces: list[Piece], notes: list[str]) -> Drawn:
     for chain in lines:
         if extent(tuple(left[i] for i in chain)) > (1.0 + BRIDGED) * largest:
             raise _open(name, *open_paths.flattened([left[i] for i in chain], np.inf)[[0, -1]])
-    size = span / open_paths.PARTS
+    size = span / 20.0  # parts of a curve are no longer: a quarter circle errs by 3e-4 of it
     paths = [(left[chain[0]].name, open_paths.flattened([left[i] for i in chain], size)) for chain in lines]
     named = open_paths.named(paths, {piece.name for loop in loops for piece in loop})
     if named:

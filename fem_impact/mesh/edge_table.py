@@ -4,6 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from .mesh_files import side_lengths
 from .meshes import Mesh
 
 WHOLE = "boundary"  # the name of all edges together
@@ -23,7 +24,11 @@ class Edge:
 
 def edges(mesh: Mesh) -> list[Edge]:
     """The named edges of a mesh, in its order; `WHOLE` comes last."""
-    lengths = facet_lengths(mesh)
+    ends = mesh.points[mesh.facets]  # (n_facets, 2, 2), or (2, 1, 1) on a beam
+    # the chord errs by length cubed, the two chords through the middle by a quarter of that: the difference cancels it
+    chord = np.linalg.norm(ends[:, -1] - ends[:, 0], axis=1)
+    halves = np.linalg.norm(ends - mesh.middles[:, None], axis=2).sum(axis=1)
+    lengths = (4.0 * halves - chord) / 3.0
     names = [*(name for name in mesh.edges if name != WHOLE), WHOLE]
     sets = {name: frozenset(np.asarray(mesh.edges[name]).tolist()) for name in names}
     found = []
@@ -39,25 +44,9 @@ def edges(mesh: Mesh) -> list[Edge]:
     return found
 
 
-def facet_lengths(mesh: Mesh) -> np.ndarray:
-    """Length (n_facets,) [m] of each facet along the true curve, from its ends and its middle; zeros on a beam.
-
-    Notes
-    -----
-    The chord errs by length cubed, the two chords through the middle by a quarter of that: the difference cancels it.
-    """
-    if mesh.dimension == 1:
-        return np.zeros(len(mesh.facets))
-    ends = mesh.points[mesh.facets]  # (n_facets, 2, 2)
-    chord = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)
-    halves = np.linalg.norm(ends - mesh.middles[:, None], axis=2).sum(axis=1)
-    return (4.0 * halves - chord) / 3.0
-
-
 def sides(mesh: Mesh) -> tuple[float, float, float]:
     """Shortest, median and longest side [m] of the elements."""
-    corners = mesh.points[mesh.cells]
-    along = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2).ravel()
+    along = side_lengths(mesh.points, mesh.cells)
     return float(along.min()), float(np.median(along)), float(along.max())
 
 

@@ -4,6 +4,8 @@ from math import comb
 
 import numpy as np
 
+from .._base.rounding import SAME
+
 # [-] iterations to find a point of a curved facet; each gains a digit or two
 CURVE_STEPS = 12
 
@@ -12,6 +14,12 @@ def angles(before: np.ndarray, after: np.ndarray) -> np.ndarray:
     """Turn [rad] from directions (n, 2) to others, positive to the left."""
     cross = before[:, 0] * after[:, 1] - before[:, 1] * after[:, 0]
     return np.arctan2(cross, (before * after).sum(axis=1))
+
+
+def is_curved(ends: np.ndarray, middles: np.ndarray) -> np.ndarray:
+    """Which facets are curved, (n,) bool, from their ends (n, 2, 2) and middles (n, 2)."""
+    chord = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)
+    return np.linalg.norm(middles - ends.mean(axis=1), axis=1) > SAME * chord
 
 
 def powers(x: np.ndarray, highest: int, order: int) -> np.ndarray:
@@ -108,13 +116,12 @@ def divided(
     point, tangent, curvature : ndarray, shapes (n, 2), (n, 2), (n,), at the cut
     first, second : ndarray, shape (n, 2), middle points of the two parts
     """
-    chord = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)
-    straight = np.linalg.norm(middles - ends.mean(axis=1), axis=1) <= 1e-9 * chord
+    straight, zero = ~is_curved(ends, middles), np.zeros(len(ends))
     plain = ends[:, 0] + share * (ends[:, 1] - ends[:, 0])
     if straight.all():
-        return plain, tangents[:, 0], 0.0 * chord, 0.5 * (ends[:, 0] + plain), 0.5 * (plain + ends[:, 1])
+        return plain, tangents[:, 0], zero, 0.5 * (ends[:, 0] + plain), 0.5 * (plain + ends[:, 1])
     curves = Curves(ends, middles, tangents, curvatures)
-    cut, zero = np.full(len(ends), share), np.zeros(len(ends))
+    cut = np.full(len(ends), share)
     point, tangent, curvature = curves.at(cut)
     first, second = curves.halfway(zero, cut), curves.halfway(cut, zero + 1.0)
     tangent, curvature = np.where(straight[:, None], tangents[:, 0], tangent), np.where(straight, 0.0, curvature)

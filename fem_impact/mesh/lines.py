@@ -11,8 +11,6 @@ from scipy.optimize import brentq
 from .._base.rounding import SAME
 from .loops import SAMPLES, Outline, Piece, extent, polyline
 
-LOOKS = 500.0  # [-] points along an outline at which it is told what lies inside
-
 
 class Lines(NamedTuple):
     """Straight lines inside an outline that meet each other and the outline at their ends only."""
@@ -26,7 +24,7 @@ def inside(outline: Outline, paths: Sequence[np.ndarray]) -> Lines:
     span = extent(outline.outer)
     pieces = [piece for loop in outline.loops for piece in loop]
     cuts: dict[int, list[float]] = {id(piece): [] for piece in pieces}
-    size = min(span / LOOKS, min(extent(loop) for loop in outline.loops) / 8.0)
+    size = min(span / 500.0, min(extent(loop) for loop in outline.loops) / 8.0)
     body = shapely.Polygon(polyline(outline.outer, size), [polyline(hole, size) for hole in outline.holes])
     shapely.prepare(body)
     segments = [np.array(pair) for path in paths for pair in pairwise(path)]

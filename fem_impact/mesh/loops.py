@@ -18,7 +18,6 @@ SLENDER = 1e4  # [-] largest area / half width**2: the mesher is fast up to 4e3 
 # [rad] largest turn within one facet: puts 26 facets on a circle; half of it doubles the triangles at curved edges
 TURN = 0.25
 MOST_PIECES = 2000  # [-] most pieces in an outline: several times what tracing programs write
-HERE = 1e-15  # [-] the search ends when the parameter moves by no more than this: rounding
 # [-] intervals per piece for integrating its length and turning: some ten for each facet of a whole circle
 SAMPLES = 256
 
@@ -156,7 +155,7 @@ def crossing(piece: Piece, start: np.ndarray, end: np.ndarray, share: np.ndarray
         good = (better >= low) & (better <= high) & (np.abs(better - t) <= 0.5 * moved)
         better = np.where(good, better, 0.5 * (low + high))
         moved, t = np.abs(better - t), better
-        if moved.max(initial=0.0) <= HERE:
+        if moved.max(initial=0.0) <= 1e-15:  # rounding
             break
     return t
 

@@ -17,17 +17,12 @@ from .._base.rounding import SAME
 from . import meshio_reader
 from .loops import FARTHEST, UNITS, refuse_millimetres
 
-# [-] nodes per point on average above which a file is refused as damaged: parts that touch share a point by few
-CROWD = 16
 PLANE = ("triangle", "triangle6", "quad")
 FLAT = 1e-5  # [-] of its extent, across the plane of a mesh: less is noise, as of coordinates with six digits
-# [-] slope of the mean plane from one of two axes up to which that one counts, as half its square in lengths is 5e-4
-TILTED = 0.03
-STEEP = 1.0  # [-] slope above which a surface is no shallow shell by any measure: its area is 1.4 times its outline's
 NODES = {"line": 2, "line3": 3, "triangle": 3, "triangle6": 6, "quad": 4}  # nodes per cell of the types read here
 
 
-def read(path: Any, unit: str | None) -> tuple[
+def read_mesh(path: Any, unit: str | None) -> tuple[
     np.ndarray, np.ndarray, dict[tuple[int, int], np.ndarray], dict[str, set[tuple[int, int]]], list[str],
     tuple[np.ndarray, np.ndarray] | None,
 ]:  # fmt: skip
@@ -43,7 +38,7 @@ def read(path: Any, unit: str | None) -> tuple[
     heights : None if it is flat, else all its points (n, 2) [m] in its mean plane, and their heights (n,) [m] over it
     """
     path = check.path("path", path)
-    data = meshio_reader.read(path)
+    data = meshio_reader.read_raw(path)
     raw, height, notes = _plane_points(path, data, unit)
     cells, nodes = _triangles(path, data)
     if height is not None:
@@ -114,7 +109,8 @@ def _levelled(points: np.ndarray, used: np.ndarray, notes: list[str]) -> tuple[n
     axis = int(np.abs(normal).argmax())
     normal = normal * np.sign(normal[axis])
     tilt = float(np.linalg.norm(np.delete(normal, axis))) / float(normal[axis])
-    if tilt <= (FLAT if size[-1] <= FLAT * size[0] else TILTED):
+    # a curved surface may lean by 0.03: that changes lengths by half its square, 5e-4
+    if tilt <= (FLAT if size[-1] <= FLAT * size[0] else 0.03):
         return points, axis
     notes.append(f"the mean plane of the mesh is tilted by {np.degrees(np.arctan(tilt)):.3g} degrees and was levelled")
     # the smallest turn to the axis: half turns about the line halfway to the normal, and about the axis
@@ -130,7 +126,7 @@ def _sloping(path: Path, points: np.ndarray, height: np.ndarray, cells: np.ndarr
     size, level = np.hypot(across[:, 0], across[:, 1]), np.abs(across[:, 2])
     slope = np.divide(size, level, out=np.where(size > SAME * size.max(), np.inf, 0.0), where=level > SAME * size)
     worst = int(slope.argmax())
-    if slope[worst] > STEEP:
+    if slope[worst] > 1.0:  # the area is 1.4 times that of the outline: no shallow shell by any measure
         x, y, z = corner[worst].mean(axis=0)
         raise ValueError(
             f"{path.name} is too steep for a plate: near ({x:g}, {y:g}) m, {z:g} m above its mean plane, it slopes by "
@@ -209,7 +205,8 @@ def _mend(path: Path, points: np.ndarray, cells: np.ndarray, notes: list[str]):
         raise ValueError(f"{name} has all its nodes at one point; export it again")
     leader = np.arange(len(points))
     tree = cKDTree(points[used])
-    if tree.count_neighbors(tree, SAME * span) > CROWD * len(used):  # counts each node as its own neighbour
+    # each node is its own neighbour; parts that touch share a point by few, not by sixteen on average
+    if tree.count_neighbors(tree, SAME * span) > 16 * len(used):
         raise ValueError(f"{name} has most of its nodes at a few points; export it again")
     for a, b in sorted(map(tuple, tree.query_pairs(SAME * span))):
         leader[used[b]] = min(leader[used[b]], leader[used[a]])
@@ -262,9 +259,10 @@ def numbers_of(sides: np.ndarray, pairs: np.ndarray) -> np.ndarray:
     return np.searchsorted(sides[:, 0] * n + sides[:, 1], a * n + b)
 
 
-def longest(points: np.ndarray, cells: np.ndarray) -> float:
-    """Length [m] of the longest side of all triangles."""
-    return float(np.linalg.norm(points[cells] - points[np.roll(cells, 1, axis=1)], axis=2).max())
+def side_lengths(points: np.ndarray, cells: np.ndarray) -> np.ndarray:
+    """Lengths (n_cells, 3) [m] of the sides of triangles, from the first vertex to the second and on."""
+    corner = points[cells]
+    return np.linalg.norm(np.roll(corner, -1, axis=1) - corner, axis=2)
 
 
 def boundary(cells: np.ndarray) -> np.ndarray:
@@ -376,7 +374,7 @@ def loops_of(rim: np.ndarray) -> list[list[int]]:
     return loops
 
 
-def write(
+def write_mesh(
     path: str | Path, points: np.ndarray, cells: np.ndarray, facets: np.ndarray, middles: np.ndarray,
     curved: np.ndarray, edges: Mapping[str, np.ndarray], rise: Any = None,
 ) -> None:  # fmt: skip

@@ -1,6 +1,7 @@
 """The mesh of a plate or beam: its elements, its named edges on the exact curve and how to refine it."""
 
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
@@ -10,22 +11,16 @@ import numpy as np
 
 from .._base import check, markup
 from . import drawings, lines, mesh_files, sketch, smooth_edges
-from .facets import Curves, divided
+from .facets import Curves, divided, is_curved
 from .loops import Bezier, Outline, circle, crossed, extent, polyline, segment, signed_area, straight_loop
 from .rise import table
 from .triangulation import triangulate
 
-# [-] at most this many along a rectangle, however slender: the default mesh then has 1 200 triangles at most
-LONG_DIVISIONS = 64
 MOST_CELLS = 200_000  # [-] most triangles allowed: several times what `find_modes` can solve
 SMALLEST_HOLE = 1e-6  # [-] smallest hole radius over disk radius: a smaller hole is lost in rounding
-# [-] split a loaded mesh if its triangles end up less than this factor too small (twice as many), else mesh anew
-OVERSHOOT = 1.45
 LONGEST = 1.5  # [-] longest side of a triangle over the requested size: 1.4 to 1.6 on rectangles, disks and a guitar
 # [-] default elements across a rectangle or any other outline: a first mesh only, which `find_modes` refines
 DEFAULT_DIVISIONS = 8
-BEAM_DIVISIONS = 4  # [-] default elements along a beam: few, because their degree is high
-MOST_BEAM_CELLS = 5000  # [-] most beam elements allowed: more are never needed at that degree
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -63,9 +58,7 @@ class Mesh(check.Locked):
         """Which facets are curved, (n_facets,) bool."""
         if self.dimension == 1:
             return np.zeros(len(self.facets), bool)
-        ends = self.points[self.facets]  # (n_facets, 2, 2)
-        chord = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)
-        return np.linalg.norm(self.middles - ends.mean(axis=1), axis=1) > 1e-9 * chord
+        return is_curved(self.points[self.facets], self.middles)
 
     @property
     def perimeter(self) -> float:
@@ -140,7 +133,8 @@ def rectangle(length: float, width: float, *, size: float | None = None) -> Mesh
     length = check.positive("length", length, "m")
     width = check.positive("width", width, "m")
     short, long = sorted((length, width))
-    size, stated = _element_size(size, max(short / DEFAULT_DIVISIONS, long / LONG_DIVISIONS))
+    # at most 64 along it, however slender: the default mesh then has 1 200 triangles at most
+    size, stated = _element_size(size, max(short / DEFAULT_DIVISIONS, long / 64.0))
     _check_affordable(2.0 * (length / size + 1.0) * (width / size + 1.0), size, MOST_CELLS)
     least = 1 if stated else 2
     nx, ny = max(least, round(length / size)), max(least, round(width / size))
@@ -173,8 +167,8 @@ def line(length: float, *, size: float | None = None) -> Mesh:
     [0.0, 0.1, 0.2, 0.3, 0.4]
     """
     length = check.positive("length", length, "m")
-    size, stated = _element_size(size, length / BEAM_DIVISIONS)
-    _check_affordable(length / size, size, MOST_BEAM_CELLS)
+    size, stated = _element_size(size, length / 4.0)  # few elements do, because their degree is high
+    _check_affordable(length / size, size, 5000)
     n = max(1, round(length / size))
     cells = np.column_stack([np.arange(n), np.arange(1, n + 1)])
     edges = {"left": np.array([0]), "right": np.array([1]), "boundary": np.array([0, 1])}
@@ -280,7 +274,7 @@ def outline(source: Any, *, size: float | None = None, unit: str | None = None) 
     >>> sorted(egg.edges), bool(egg.curved.all())
     (['boundary', 'edge0', 'outer'], True)
     """
-    curve, lines, notes = drawings.read(source, unit)
+    curve, lines, notes = drawings.read_outline(source, unit)
     return replace(fill(curve, size=size), notes=tuple(notes), lines=lines)
 
 
@@ -317,7 +311,7 @@ def load(path: Any, *, unit: str | None = None) -> Mesh:
     >>> round(fi.mesh.load("plate.msh").area, 6)  # m^2
     0.12
     """
-    points, cells, given, pairs, notes, heights = mesh_files.read(path, unit)
+    points, cells, given, pairs, notes, heights = mesh_files.read_mesh(path, unit)
     rim = mesh_files.boundary(cells)
     follower = {int(a): int(b) for a, b in rim}
     loops = [np.array([(a, follower[a]) for a in loop]) for loop in mesh_files.loops_of(rim)]
@@ -339,7 +333,7 @@ def load(path: Any, *, unit: str | None = None) -> Mesh:
     edges["boundary"] = np.arange(len(facets))
     made = Mesh(
         points, cells, facets, edges, curve.middles, curve.tangents, curve.curvatures,
-        size=mesh_files.longest(points, cells) / LONGEST, size_stated=False,
+        size=float(mesh_files.side_lengths(points, cells).max()) / LONGEST, size_stated=False,
         notes=tuple(f"{Path(path).name}: {note}" for note in notes),
         rise=None if heights is None else table(*heights),
     )  # fmt: skip
@@ -372,7 +366,7 @@ def save(path: Any, mesh: Mesh) -> None:
     """
     if not isinstance(mesh, Mesh) or mesh.dimension != 2:
         raise ValueError("mesh must be the mesh of a plate, got a beam; make a beam with fi.mesh.line")
-    mesh_files.write(path, mesh.points, mesh.cells, mesh.facets, mesh.middles, mesh.curved, mesh.edges, mesh.rise)
+    mesh_files.write_mesh(path, mesh.points, mesh.cells, mesh.facets, mesh.middles, mesh.curved, mesh.edges, mesh.rise)
 
 
 def pierced(mesh: Mesh, holes: Sequence[tuple[np.ndarray, float]], *, size: float | None = None) -> Mesh:
@@ -456,21 +450,15 @@ def _facets_outline(mesh: Mesh) -> Outline:
 
 def _resized(mesh: Mesh, *, size: float) -> Mesh:
     """A mesh from a file with triangles of about ``size`` [m]: split in four, or new ones inside the same rim."""
-    ratio = mesh.size / size
-    if ratio >= 1.0 - 1e-9 and 2.0 ** np.ceil(np.log2(ratio) - 1e-9) < OVERSHOOT * ratio:
-        return replace(_divided(mesh, size=size), recipe=partial(_resized, mesh))
+    ratio, recipe = mesh.size / size, partial(_resized, mesh)
+    # split, unless triangles end up smaller by 1.45 than asked for, which are twice as many
+    if ratio >= 1.0 - 1e-9 and 2.0 ** np.ceil(np.log2(ratio) - 1e-9) < 1.45 * ratio:
+        return replace(_divided(mesh, size=size), recipe=recipe)
     around = _facets_outline(mesh)
-    _check_affordable(2.0 * mesh.area / size / size, size, MOST_CELLS)
-    try:
-        arrays = None if crossed(around) else triangulate(around, size)
-    except check.SimulationError:
-        arrays = None
-    if arrays is None:  # fall back on splitting the file's own triangles, which only costs more
-        return replace(_divided(mesh, size=size), recipe=partial(_divided, mesh))
-    parts = arrays["edges"]
-    edges = {name: np.concatenate([parts[str(i)] for i in numbers]) for name, numbers in mesh.edges.items()}
-    recipe = partial(_resized, mesh)
-    return Mesh(**{**arrays, "edges": edges}, recipe=recipe, size=size)
+    if not crossed(around):
+        with suppress(check.SimulationError):  # of the mesher; splitting only costs more
+            return _filled(mesh, around, size, recipe=recipe)
+    return _divided(mesh, size=size)
 
 
 def _divided(mesh: Mesh, *, size: float) -> Mesh:

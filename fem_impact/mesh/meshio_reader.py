@@ -25,7 +25,7 @@ class Raw:
     nodes: dict[str, np.ndarray] = field(default_factory=dict)  # name -> numbers of nodes
 
 
-def read(path: Path) -> Raw:
+def read_raw(path: Path) -> Raw:
     """Read a mesh file; ValueError names the file and the fault."""
     arrays = isolated.read_apart(path, "a mesh", "mesh.meshio_reader:arrays")
     index = json.loads(arrays["index"].tobytes())

@@ -6,8 +6,6 @@ import shapely
 from .._base.rounding import SAME
 from .loops import Piece, divide, is_straight
 
-PARTS = 20.0  # [-] straight parts of a curve over the drawing's extent, at least: a quarter circle errs by 3e-4 of it
-
 
 def chains(pieces: list[Piece], span: float) -> list[list[int]]:
     """Numbers of pieces that follow each other under one name, from an open end or a branch to the next."""

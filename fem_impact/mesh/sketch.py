@@ -11,7 +11,6 @@ from .mesh_files import loops_of
 if TYPE_CHECKING:
     from .meshes import Mesh
 
-BAR = 0.03  # [-] drawn thickness of a beam over its length
 EDGES = {  # support -> line width [px] and dash pattern; free edges keep the thin outline
     "clamped": (4.5, ""),
     "hinged": (2.5, "7 4"),
@@ -35,7 +34,10 @@ def draw_body(
     title : str, description for screen readers
     """
     held = held_edges(mesh, supports or {})
-    plane = mesh.points if mesh.dimension == 2 else _bar(mesh.points[:, 0])
+    plane = mesh.points
+    if mesh.dimension == 1:
+        thick = 0.015 * np.ptp(plane)  # half of that drawn
+        plane = np.array([[plane.min(), -thick], [plane.max(), thick]])
     low, size = plane.min(axis=0), np.ptp(plane, axis=0)
     scale = float(min((WIDTH - 2 * MARGIN) / size[0], 1.1 * WIDTH / size[1]))
     height = scale * float(size[1]) + 2 * MARGIN
@@ -46,7 +48,9 @@ def draw_body(
 
     if mesh.dimension == 2:
         drawn = _outline(mesh, held, place)
-        drawn += "".join(_line(piece, place) for path in ribs for piece in mesh.pieces(path))
+        for piece in (piece for path in ribs for piece in mesh.pieces(path)):
+            along = "L".join("{:.1f} {:.1f}".format(*place(end)) for end in piece)
+            drawn += f'<path d="M{along}" fill="none" stroke="{INK}" stroke-width="2" stroke-linecap="round"/>'
     else:
         (x0, y0), (x1, y1) = place(low), place(low + size)
         box = f'x="{x0:.1f}" y="{y1:.1f}" width="{x1 - x0:.1f}" height="{y0 - y1:.1f}"'
@@ -63,12 +67,6 @@ def draw_body(
             f'<circle cx="{a:.1f}" cy="{b:.1f}" r="10" fill="none" stroke="{STRIKE}" stroke-width="1.5"/>'
         )
     return picture(height, title, drawn)
-
-
-def _line(ends: np.ndarray, place: Any) -> str:
-    """A straight piece of a rib between ends (2, 2) [m]."""
-    path = "L".join("{:.1f} {:.1f}".format(*place(end)) for end in ends)
-    return f'<path d="M{path}" fill="none" stroke="{INK}" stroke-width="2" stroke-linecap="round"/>'
 
 
 def held_edges(mesh: "Mesh", supports: Mapping[str, Any]) -> dict[int, str]:
@@ -104,11 +102,6 @@ def _outline(mesh: "Mesh", held: Mapping[int, str], place: Any) -> str:
             style = f'stroke="{STROKE}" stroke-width="{width}" stroke-dasharray="{dashes}"'
             drawn += f'<path d="{parts}" fill="none" {style}/>'
     return drawn
-
-
-def _bar(x: np.ndarray) -> np.ndarray:
-    thick = 0.5 * BAR * float(np.ptp(x))
-    return np.array([[x.min(), -thick], [x.max(), thick]])
 
 
 def _end(place: tuple[float, float], kind: str) -> str:

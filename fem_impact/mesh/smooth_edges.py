@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .facets import angles, slopes_and_bends
+from .facets import angles, is_curved, slopes_and_bends
 
 # [rad] a vertex where the rim turns by more is a corner: ten facets of a circle turn by 36 degrees each
 CORNER = np.radians(35.0)
@@ -50,9 +50,7 @@ def recover_rim(points: np.ndarray, loops: list[np.ndarray], given: dict[int, np
             known = np.array([given[f] for f in facets]) if all(f in given for f in facets) else None
             middles[facets], tangents[facets], curvatures[facets] = _fit(place, closed, known)
         join(np.column_stack([np.roll(numbers, 1), numbers]), tangents, curvatures)
-    ends = points[np.concatenate(loops)]
-    sag = np.linalg.norm(middles - ends.mean(axis=1), axis=1)
-    curved = sag > 1e-9 * np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)
+    curved = is_curved(points[np.concatenate(loops)], middles)
     return SmoothRim(middles, tangents, curvatures, int(curved.sum()))
 
 
@@ -94,7 +92,7 @@ def smooth_runs(place: np.ndarray) -> list[Run]:
 
 
 def _corners(place: np.ndarray) -> np.ndarray:
-    """Which vertices of a closed loop are corners, (n,) bool."""
+    """Which vertices of a closed loop are corners, or where a straight side runs into a curve, (n,) bool."""
     ahead = np.roll(place, -1, axis=0) - place
     turn = angles(np.roll(ahead, 1, axis=0), ahead)
     sharp = np.abs(turn) > CORNER
@@ -102,17 +100,11 @@ def _corners(place: np.ndarray) -> np.ndarray:
     for step in (1, -1):
         other = np.roll(turn, step)
         company |= (np.sign(other) == np.sign(turn)) & (np.abs(other) >= np.abs(turn) / ALIKE) & ~np.roll(sharp, step)
-    return sharp | ((np.abs(turn) > STRAIGHT) & ~company) | _joints(turn, sharp)
-
-
-def _joints(turn: np.ndarray, sharp: np.ndarray) -> np.ndarray:
-    """Vertices where a straight side runs into a curve, (n,) bool: the rim turns on one side only."""
     still = np.abs(turn) <= STRAIGHT
-    bent = ~still & ~sharp
-    before, after = np.roll(turn, 1), np.roll(turn, -1)
-    # at the joint itself the turn is half of that along the curve
-    half = bent & (np.roll(still, 1) ^ np.roll(still, -1))
-    return half & (np.abs(turn) < 0.75 * np.maximum(np.abs(before), np.abs(after)))
+    # the rim turns on one side of a joint only, and at the joint itself by half as much as along the curve
+    beside = np.maximum(np.abs(np.roll(turn, 1)), np.abs(np.roll(turn, -1)))
+    joint = (np.roll(still, 1) ^ np.roll(still, -1)) & (np.abs(turn) < 0.75 * beside)
+    return sharp | (~still & (~company | joint))
 
 
 def _runs(corner: np.ndarray) -> list[tuple[np.ndarray, bool]]:

@@ -13,9 +13,6 @@ from .smooth_edges import join
 
 SPREAD = 1.3  # [-] inner sides may be this much longer than the requested size before the mesher divides them
 REMEDY = "remove very thin necks or spikes, or pass another size"
-CROWDED = 0.3  # [-] of the longest facet of a piece: ends of facets nearer to the end of a line give way to it
-TOUCHING = 1e-8  # [-] of the extent: ends of lines nearer to another point are that point
-GRADING = 0.35  # [-] netgen's growth rate of elements away from small ones, close to its own default of 0.3
 
 
 def triangulate(outline: Outline, size: float, lines: Lines | None = None) -> dict[str, Any]:
@@ -56,7 +53,7 @@ def triangulate(outline: Outline, size: float, lines: Lines | None = None) -> di
         rim = np.array([piece.at(np.array([a]))[0] for piece, a, _ in chords])
         _append(geometry, (lines.ends - centre) / span, (rim - centre) / span)
     try:
-        made = geometry.GenerateMesh(maxh=SPREAD * size / span, grading=GRADING, quad_dominated=False)
+        made = geometry.GenerateMesh(maxh=SPREAD * size / span, grading=0.35, quad_dominated=False)
     except NgException as error:
         raise check.SimulationError(f"the mesher could not fill the outline ({error}); {REMEDY}") from None
     points = np.array([p.p for p in made.Points()])[:, :2] * span + centre
@@ -70,11 +67,11 @@ def triangulate(outline: Outline, size: float, lines: Lines | None = None) -> di
 
 
 def _ending(t: np.ndarray, cuts: list[float]) -> np.ndarray:
-    """Parameters (n,) of the facets of a piece that end at ``cuts``, too; others too near to one give way."""
+    """Parameters (n,) of the facets of a piece that end at ``cuts``, too; others nearer than 0.3 facets give way."""
     for cut in cuts:
         inner = t[1:-1]
         if min(cut, 1.0 - cut) > SAME:
-            near = np.abs(inner - cut) < CROWDED * np.diff(t).max()
+            near = np.abs(inner - cut) < 0.3 * np.diff(t).max()
             t = np.sort([0.0, *inner[~near | np.isin(inner, cuts)], cut, 1.0])
     return np.unique(t)
 
@@ -86,7 +83,7 @@ def _append(geometry: Any, ends: np.ndarray, rim: np.ndarray) -> None:
         numbers = []
         for place in line:
             away = np.linalg.norm(np.array(known) - place, axis=1)
-            if away.min() > TOUCHING:
+            if away.min() > 1e-8:  # of the extent: else it is that point
                 geometry.AppendPoint(*place)
                 known.append(place)
                 numbers.append(len(known) - 1)

@@ -143,7 +143,7 @@ class Asked:
     @property
     def slips(self) -> tuple[str, ...]:
         """Notes on numbers of the striker and the speed that are probably a slip of a unit."""
-        return *self.blow.striker.notes, *plausible.number("speed", self.values["speed"])
+        return *self.blow.striker.notes, *plausible.note_number("speed", self.values["speed"])
 
     @cached_property
     def seen(self) -> idealisation.Outside | None:

@@ -80,7 +80,7 @@ def test_cantilever_under_its_weight_is_the_quartic(places):
 
 
 def rigid(places, dofs, n_dofs):
-    return HermiteSpace(MeshLine(np.asarray(places))).linear(dofs, n_dofs)
+    return HermiteSpace(MeshLine(np.asarray(places))).rigid_unknowns(dofs, n_dofs)
 
 
 def test_rigid_motions_cost_nothing_and_weigh_what_the_beam_does():
@@ -169,7 +169,7 @@ def test_error_of_a_solution_that_does_not_bend_is_the_energy_of_the_clamped_bea
     """Prager and Synge: the best linear moment is left out, as in a beam clamped at both ends, q**2 L**5 / 720 EI."""
     beam = fi.Beam.rectangular(fi.Material(E=1e9, nu=0.3, rho=1e3), width=0.01, height=1e-5)  # shear is 1e-10 of it
     system = fi.assemble(fi.mesh.line(1.0), beam, {"boundary": "clamped"}, theory=theory, near=[(0.35,)])
-    even = system.space.linear(system.element_dofs, system.expand.shape[0])[:, :1]
+    even = system.space.rigid_unknowns(system.element_dofs, system.expand.shape[0])[:, :1]
     whole = replace(system, expand=eye_array(len(even), format="csr"))  # its ends may be pushed, too
     assert_allclose(beam_elements.balanced_errors(whole, 0.0 * even, even)[0], 1.0 / 720.0, rtol=1e-7)
     push = beam_elements.balanced_errors(whole, 0.0 * even, 0.0 * even, np.array([[0.35]]))[0]

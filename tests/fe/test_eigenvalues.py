@@ -16,6 +16,12 @@ from fem_impact.fe.section import Material, Plate
 from fem_impact.mesh import rectangle
 
 
+def body_of(K, M):
+    """A body that cannot move rigidly."""
+    nothing = np.zeros((K.shape[0], 0))
+    return Flexibility(K, M, nothing, nothing, nothing, np.zeros(0, int))
+
+
 def pencil(n, seed, repeated):
     """Stiffness and mass (n, n) with known eigenvalues, some of them three times."""
     rng = np.random.default_rng(seed)
@@ -41,8 +47,7 @@ def test_inertia_counts_the_values_below_a_shift(repeated):
 @pytest.mark.parametrize("repeated", [False, True])
 def test_lowest_values_and_their_vectors(search, repeated):
     K, M, values = pencil(150, 5, repeated)
-    nothing = np.zeros((150, 0))
-    found, vectors = search(Flexibility(K, M, nothing, nothing, nothing, np.zeros(0, int)), 20)
+    found, vectors = search(body_of(K, M), 20)
     assert_allclose(found[:20], values[:20], rtol=1e-9)  # of values spread over six decades
     gram = vectors[:, :20].T @ (M @ vectors[:, :20])
     assert_allclose(gram, np.eye(20), atol=1e-9)
@@ -53,8 +58,7 @@ def test_lowest_values_and_their_vectors(search, repeated):
 def test_memory_is_taken_for_the_vectors_that_are_needed_not_for_the_most_that_may_be():
     """Twice as many vectors as modes are usual; room for six times as many was asked for at once, 27 GB of a pane."""
     system, n = assemble(rectangle(1.0, 0.7, size=0.03), Plate(Material(E=210e9, nu=0.3, rho=7850.0), 2e-3)), 100
-    nothing = np.zeros((system.n_dofs, 0))
-    heavier = Flexibility(system.K + system.M, system.M, nothing, nothing, nothing, np.zeros(0, int))
+    heavier = body_of(system.K + system.M, system.M)
     assert system.n_dofs > 20 * n  # no dense solver
     tracemalloc.start()
     eigenvalues._krylov(heavier._whole.solve, system.M, n, system.n_dofs, eigenvalues.RESIDUAL)
@@ -79,8 +83,7 @@ def test_a_beam_whose_slice_misses_modes_is_found_with_another_number(monkeypatc
     """A search that loses a mode of the last slice is noticed; fewer modes need no such slice."""
     whole = eigenvalues._krylov
     stiff = np.diag((1.0 + np.arange(400.0)) ** 4)
-    nothing = np.zeros((400, 0))
-    body = Flexibility(csc_matrix(stiff), csc_matrix(np.eye(400)), nothing, nothing, nothing, np.zeros(0, int))
+    body = body_of(csc_matrix(stiff), csc_matrix(np.eye(400)))
 
     def loses(solve, M, n, available, allowed, width=eigenvalues.BLOCK):
         found = whole(solve, M, n, available, allowed, width)

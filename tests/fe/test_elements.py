@@ -58,10 +58,10 @@ def test_argyris_functions_keep_their_digits_far_from_the_origin():
 
 def test_morley_functions_contain_the_rigid_motions():
     space = MorleySpace(triangles(POINTS, CELLS))
-    rigid = space.linear(np.arange(12).reshape(2, 6).T, 12)
+    rigid = space.rigid_unknowns(np.arange(12).reshape(2, 6).T, 12)
     inside = np.array([[[0.4, 0.3]], [[0.9, 0.8]]])
     value = space.functions(np.arange(2), inside, (0,))[0]
     for cell in range(2):
         functions = value[cell, 0]
-        # 1, x and y from the unknowns that `linear` gives them
+        # 1, x and y from the unknowns that `rigid_unknowns` gives them
         assert_allclose(functions @ rigid.reshape(2, 6, 3)[cell], [1.0, *inside[cell, 0]], atol=1e-13)

@@ -191,14 +191,6 @@ def test_varying_thickness_needs_no_twin():
     assert_allclose(*uniform, rtol=1e-7)
 
 
-def test_wood_as_stiff_across_as_along_is_isotropic():
-    wood = fi.Material.orthotropic(E_along=10e9, E_across=10e9, nu=0.3, G=10e9 / 2.6, rho=2700.0)
-    isotropic = fi.Plate(fi.Material(E=10e9, nu=0.3, rho=2700.0), thickness=2e-3)
-    mesh, held = fi.mesh.rectangle(1.0, 0.8, size=0.08), {"boundary": "clamped"}
-    plain = finite_elements(mesh, held, [[0.3, 0.3]], section=fi.Plate(wood, thickness=2e-3))
-    assert_allclose(plain, finite_elements(mesh, held, [[0.3, 0.3]], section=isotropic), rtol=1e-9)
-
-
 @pytest.mark.slow
 def test_springs_tension_and_masses_are_part_of_it():
     mesh = fi.mesh.rectangle(0.3, 0.2)
