@@ -14,6 +14,7 @@ from .._base import check
 from . import cell_kinds
 
 PER_FORCE = {"m/s^2/N": 2, "m/s/N": 1, "m/N": 0}  # unit of a response -> times that it was differentiated
+FELT = 0.1  # [-] of the largest force spectrum: 20 dB below it a hammer tells little (ISO 7626-5)
 PROMINENCE = 1.5  # [-] of logarithms: peaks of less than a factor of 4.5 over their surroundings may be noise
 DAMPING = 1e-6, 0.5  # [-] damping ratios of a peak that is sought
 GAIN = 10.0  # [-] of the noise variance: what each value of one more mode must explain, where luck explains one
@@ -70,8 +71,7 @@ def responses(name: str, found: Any) -> tuple[np.ndarray, np.ndarray, np.ndarray
         raise ValueError(f"{name}.H must be finite")
     used = omega > 0.0
     if "force" in found:
-        # 20 dB below the largest force spectrum a hammer tells little (ISO 7626-5)
-        used &= found["force"].values >= 0.1 * found["force"].values.max()
+        used &= found["force"].values >= FELT * found["force"].values.max()
     sure = found["coherence"].values.mean(axis=1)[used] if "coherence" in found else 1.0
     omega = omega[used]
     s = 1j * omega + float(found.attrs.get("added_damping", 0.0))
