@@ -275,3 +275,14 @@ def test_a_free_block_of_one_to_five_is_a_mindlin_plate_within_a_hundredth():
     thin = fi.find_modes(fi.assemble(fi.mesh.rectangle(1.0, 1.0), fi.Plate(UNIT, 0.2), {}), n_modes=9).omega[3:]
     assert_allclose(thick_one, exact, rtol=0.01)
     assert (thin > 1.05 * exact).all()
+
+
+@pytest.mark.slow
+def test_hinged_random_quadrilaterals_follow_wangs_relation():
+    rng = np.random.default_rng(6)
+    turn = 0.5 * np.pi * (np.arange(4) + rng.uniform(-0.25, 0.25, 4))
+    corners = rng.uniform(0.85, 1.0, (4, 1)) * np.column_stack([np.cos(turn), np.sin(turn)])
+    mesh, held = fi.mesh.polygon(corners), {"boundary": "hinged"}
+    thin = fi.find_modes(fi.assemble(mesh, fi.Plate(UNIT, 0.1), held), n_modes=4, tolerance=1e-5)
+    found = modes_of(mesh, 0.1, held, 4, tolerance=1e-5)
+    assert_allclose(found.omega, thick_elements.hinged_polygon(thin.omega, 0.1), rtol=1e-5)  # 5e-7
