@@ -53,7 +53,7 @@ def raw(folder, triangles=None, sets=None):
     cells = "triangle", TRIANGLES if triangles is None else triangles, None
     found = meshio_reader.Raw(np.array(SQUARE, float), [cells, lines], {}, sets or {})
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(meshio_reader, "read", lambda path: found)
+        patch.setattr(meshio_reader, "read_raw", lambda path: found)
         return fi.mesh.load(folder / "plate.msh")
 
 

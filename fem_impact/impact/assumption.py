@@ -7,6 +7,8 @@ from typing import Any
 
 from .quantities import NAMES as QUANTITY_NAMES
 
+# [-] a larger effect is beyond a first-order estimate: its square, what such an estimate leaves out, is then 4 %
+BEYOND = 0.2
 SILENT = 1e-4  # [-] effects that are never worth a line of their own
 ALL = (
     "thin target", "shallow target", "thin striker", "small deflections", "no yielding", "local contact",
@@ -72,8 +74,8 @@ class Assumption:
 
     @property
     def beyond(self) -> bool:
-        """Whether the effect is larger than a first-order estimate tells, which leaves out its square, 4 %."""
-        return self.worst > 0.2
+        """Whether the effect is larger than a first-order estimate can tell."""
+        return self.worst > BEYOND
 
     @property
     def doubtful(self) -> bool:

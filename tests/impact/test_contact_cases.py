@@ -240,7 +240,7 @@ def test_kernel_form_is_the_modal_form(exponent, n_steps, damping_ratio):
     out = np.empty((layout.N_FOUND, 1))
     column = np.ones(1)
     shares, law = np.array([column / 2.0, column / mass]), laws.table([[stiffness, exponent]])
-    pairs = bundles.Pairs(shares, law, column / mass, column * family.static(0) / 2.0, 0.0 * column)
+    pairs = bundles.Pairs(shares, law, column / mass, column * family.sums(0)[1] / 2.0, 0.0 * column)
     target, striker, *bounds = family.kernels(h, 512)
     kernels = bundles.Kernels((target, striker), (bounds[0], bounds[1]), family.later(h, 512))
     many_blows.run(np.zeros(1, int), pairs, kernels, h, True, 0.0, many_blows.made_track(512), out)
