@@ -42,6 +42,7 @@ from .theory import blocks, gram, scatter
 # [-] lowest modes whose stresses choose the fields that are kept: large swings are those of the lowest modes
 SWINGING = 16
 MOST = 32  # [-] fields kept at most: they have 99 % of the energy of 16 modes with equal energies
+WORK = 30_000  # [-] entries of all forms together, to limit the work of a step: 18 fields of 40 modes
 
 Steep = Callable[[np.ndarray, np.ndarray], np.ndarray]
 Taut = Callable[[np.ndarray], np.ndarray]
@@ -102,8 +103,8 @@ class Sheet:
 
 
 def most(n_modes: int) -> int:
-    """How many fields are kept at most: so few that a step has 30 000 entries to work on, 18 fields of 40 modes."""
-    return max(1, min(MOST, 30_000 // n_modes**2))
+    """How many fields are kept at most."""
+    return max(1, min(MOST, WORK // n_modes**2))
 
 
 def forms(sheet: Sheet, steep: Steep, omega: np.ndarray, taut: Taut | None = None) -> tuple[np.ndarray, np.ndarray]:

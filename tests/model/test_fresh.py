@@ -183,7 +183,8 @@ def test_after_the_first_blow_of_a_kind_it_is_on_disk(tmp_path):
         "plate = fi.analytic.rectangle(0.2, 0.3, section=section, n_modes=20)\n"
         "how = dict(at=(0.09, 0.13), speed=1.0, tolerance=1e-2)\n"
         "hit = fi.strike(plate, fi.Striker.rigid(0.02), fi.Contact.hertz(1e6), **how{})\n"
-        "print([sum(each.follow.stats.cache_hits.values()) for each in (energy, collocation)])"
+        "kernels = energy.follow, collocation.follow_nodes\n"
+        "print([sum(each.stats.cache_hits.values()) for each in kernels])"
     )
     environment = {name: value for name, value in os.environ.items() if name != fresh.SWITCH}
     environment["NUMBA_CACHE_DIR"] = str(tmp_path)

@@ -9,7 +9,7 @@ from numpy.testing import assert_allclose
 from scenes import SMALL, load_text
 
 import fem_impact as fi
-from fem_impact.pages import lesson, lesson_grid, worksheet
+from fem_impact.pages import explore_numbers, lesson, lesson_grid, worksheet
 
 COUNTS = {"mass": 5, "stiffness": 5, "speed": 3}
 READY = "document.documentElement.dataset.ready === 'true'"
@@ -75,7 +75,7 @@ def test_numbers_are_those_of_the_program(scene, held):
 @pytest.mark.slow
 def test_what_the_browser_shows_is_within_the_errors_that_the_page_prints(held, shown):
     about, grid, path = held
-    band = np.geomspace(*lesson.BAND, lesson.SPECTRUM_POINTS)
+    band = np.geomspace(*explore_numbers.BAND, explore_numbers.SPECTRUM_POINTS)
     printed = path.read_text(encoding="utf-8")
     assert lesson.power(about.force_error) in printed and lesson.power(about.spectrum_error) in printed
     for position in positions(grid, 6):
