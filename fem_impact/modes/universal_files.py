@@ -208,3 +208,14 @@ def _mode(name: str, i: int, mode: dict, measured: np.ndarray) -> tuple[float, f
             )
         shape = shape.real
     return frequency, max(damping, 0.0), np.asarray(shape, float) / np.sqrt(modal_mass)
+
+
+def function(name: str, node: int, direction: int, x: np.ndarray, values: np.ndarray) -> dict[str, Any]:
+    """A data set 58 for pyuff: values over an even axis (n,), at a node and along its axis, from node 1 along z."""
+    return {
+        "type": 58, "binary": 0, "id1": name[:60], **dict.fromkeys(("id2", "id3", "id4", "id5"), "NONE"),
+        "ver_num": 0, "load_case_id": 0, "rsp_ent_name": "NONE", "rsp_node": node, "rsp_dir": direction,
+        "ref_ent_name": "NONE", "ref_node": 1, "ref_dir": 3, "num_pts": len(x), "abscissa_spacing": 1,
+        "abscissa_min": float(x[0]), "abscissa_inc": float(x[-1] - x[0]) / (len(x) - 1), "z_axis_value": 0.0,
+        "orddenom_spec_data_type": 0, "x": x, "data": values,
+    }  # fmt: skip

@@ -9,6 +9,7 @@ from .._base import check
 from .._base.files import replacing
 from .._base.rounding import ROUNDING, SAME
 from ..impact.response import Response
+from ..modes import universal_files
 
 ENDINGS = (".op4", ".uff", ".unv", ".bdf", ".inp")
 MODAL = ".uff", ".unv"
@@ -101,15 +102,11 @@ def _universal(path: Path, times: np.ndarray, force: np.ndarray, moved: dict[str
     for name, kind, label, unit in (("MOVE", 8, "displacement", "m"), ("VELO", 11, "velocity", "m/s")):
         channels += [(label, kind, n, values, unit) for n, values in zip(numbers, moved.get(name, np.zeros((0, 0))).T)]
     sets = [
-        {
-            "type": 58, "binary": 0, "id1": label, "id2": "fem_impact", "func_type": 1, "ver_num": 1,
-            "rsp_ent_name": "NONE", "rsp_node": int(number), "rsp_dir": way, "ref_ent_name": "NONE",
-            "ref_node": int(node), "ref_dir": way, "ord_data_type": 4, "num_pts": len(times), "abscissa_spacing": 1,
-            "abscissa_min": float(times[0]), "abscissa_inc": float(steps.mean()), "abscissa_spec_data_type": 17,
-            "abscissa_axis_lab": "Time", "abscissa_axis_units_lab": "s", "ordinate_spec_data_type": kind,
-            "ordinate_axis_lab": label, "ordinate_axis_units_lab": unit, "data": np.asarray(values, float), "x": times,
-            **dict.fromkeys(("load_case_id", "z_axis_value", "orddenom_spec_data_type"), 0),
-            **dict.fromkeys(("id3", "id4", "id5"), "NONE"),
+        universal_files.function(label, int(number), way, times, np.asarray(values, float)) | {
+            "id2": "fem_impact", "func_type": 1, "ver_num": 1, "ref_node": int(node), "ref_dir": way,
+            "ord_data_type": 4, "abscissa_spec_data_type": 17, "abscissa_axis_lab": "Time",
+            "abscissa_axis_units_lab": "s", "ordinate_spec_data_type": kind, "ordinate_axis_lab": label,
+            "ordinate_axis_units_lab": unit,
         }
         for label, kind, number, values, unit in channels
     ]  # fmt: skip

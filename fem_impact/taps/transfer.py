@@ -294,7 +294,7 @@ def write_uff(path: str | Path, data: xr.Dataset) -> None:
     frequency, sets = data["frequency"].values, []
     for k, name in enumerate(data["channel"].values):
         unit = str(data["units"].values[k]).removesuffix("/N")
-        made = _set(str(name), k + 2, frequency, data["H"].values[:, k]) | codes
+        made = universal_files.function(str(name), k + 2, 3, frequency, data["H"].values[:, k]) | codes
         ends = zip(("rsp_node", "rsp_dir", "ref_node", "ref_dir"), WAY)
         way = {key: int(data[name].values[k]) for key, name in ends if name in data.coords}
         sets.append(made | {"ordinate_spec_data_type": RESPONSE_CODE[unit], "orddenom_spec_data_type": 13} | way)
@@ -303,16 +303,6 @@ def write_uff(path: str | Path, data: xr.Dataset) -> None:
             sets.append(sets[-1] | sure)
     with replacing(path) as temporary:
         pyuff.UFF(str(temporary)).write_sets(sets, mode="overwrite")
-
-
-def _set(name: str, number: int, x: np.ndarray, values: np.ndarray) -> dict[str, Any]:
-    return {
-        "type": 58, "binary": 0, "id1": name[:60], "id2": "NONE", "id3": "NONE", "id4": "NONE", "id5": "NONE",
-        "ver_num": 0, "load_case_id": 0, "rsp_ent_name": "NONE", "rsp_node": number, "rsp_dir": 3,
-        "ref_ent_name": "NONE", "ref_node": 1, "ref_dir": 3, "num_pts": len(x), "abscissa_spacing": 1,
-        "abscissa_min": float(x[0]), "abscissa_inc": float(x[-1] - x[0]) / (len(x) - 1), "z_axis_value": 0.0,
-        "orddenom_spec_data_type": 0, "x": x, "data": values,
-    }  # fmt: skip
 
 
 def read_frf(path: Any) -> xr.Dataset:
