@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 import fem_impact as fi
+from fem_impact.modes import universal_files
 from fem_impact.taps import transfer
 
 pyuff = pytest.importorskip("pyuff")
@@ -17,7 +18,12 @@ H = -(X**2) / (100.0**2 - X**2 + 2j * X)  # 1/kg
 
 def response(node, data=H, **codes):
     kinds = {"ordinate_spec_data_type": 12, "orddenom_spec_data_type": 13, "abscissa_spec_data_type": 18}
-    return transfer._set(f"point {node}", node, X, data) | kinds | {"func_type": 4, "ord_data_type": 6} | codes
+    return (
+        universal_files.function(f"point {node}", node, 3, X, data)
+        | kinds
+        | {"func_type": 4, "ord_data_type": 6}
+        | codes
+    )
 
 
 NODES = {"type": 15, "node_nums": [1, 2], "def_cs": [0, 0], "disp_cs": [0, 0], "color": [1, 1], "x": [0.1, 0.3],

@@ -5,7 +5,8 @@ import pytest
 from scipy.io import savemat, wavfile
 
 import fem_impact as fi
-from fem_impact.taps import readers, transfer
+from fem_impact.modes import universal_files
+from fem_impact.taps import readers
 
 RATE = 20e3  # [Hz]
 
@@ -275,7 +276,7 @@ def test_a_wav_that_is_cut_off_says_so(tmp_path):
 
 
 KINDS = {"func_type": 1, "ord_data_type": 4, "abscissa_spec_data_type": 17, "ordinate_spec_data_type": 13}
-RECORD = transfer._set("NONE", 1, np.arange(40) / RATE, np.arange(40.0)) | KINDS
+RECORD = universal_files.function("NONE", 1, 3, np.arange(40) / RATE, np.arange(40.0)) | KINDS
 MOVES = {"ordinate_spec_data_type": 12, "data": 2.0 * np.arange(40)}
 POUNDS = {"type": 164, "units_code": 2, "units_description": "foot", "temp_mode": 1, "length": 3.2808, "force": 0.22481,
           "temp": 1.8, "temp_offset": 459.67}  # fmt: skip
