@@ -2,7 +2,6 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from itertools import pairwise
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -111,7 +110,7 @@ def check_same_body(hit: "Response", modes: Modes) -> None:
 def largest_difference(
     descriptions: Sequence[BodyMotion], points: Any, times: np.ndarray, rate: bool, until: float
 ) -> float:
-    """Largest difference [-] of the motions that descriptions of a body tell, over the largest motion.
+    """Largest difference [-] of the motion that other descriptions of a body tell from the first's, over the largest.
 
     Infinite for a single description, where it exceeds `MOVED`, and long after the end of the run, ``until`` [s].
     """
@@ -122,6 +121,6 @@ def largest_difference(
         times = times[np.linspace(0, len(times) - 1, LOOKED_AT).astype(int)]
     motions = [each.at(points, times, rate) for each in descriptions]
     largest = float(np.abs(motions[0]).max(initial=0.0))
-    apart = sum(float(np.abs(one - other).max(initial=0.0)) for one, other in pairwise(motions))
+    apart = max(float(np.abs(other - motions[0]).max(initial=0.0)) for other in motions[1:])
     apart = apart / largest if largest else 0.0
     return apart if apart <= MOVED["velocity" if rate else "displacement"] else float("inf")

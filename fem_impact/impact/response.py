@@ -217,7 +217,7 @@ class Response(Totals, check.Locked):
     @cached_property
     def _descriptions(self) -> tuple[BodyMotion, ...]:
         """The motion of the target by its own Ritz vectors, and by each poorer description."""
-        each = () if self.vectors is None else (self.vectors, *self.vectors.poorer.values())
+        each = () if self.vectors is None else self.vectors.descriptions().values()
         return tuple(motion.driven(self, modes) for modes in each)
 
     def _motion(self, body: int) -> BodyMotion:

@@ -1,8 +1,10 @@
 """What if: a blow struck again with something changed tells what an error of that size does to it."""
 
 import functools
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
@@ -161,26 +163,44 @@ def mesh(blow: Followed, bodies: Sequence[Modes]) -> Variation:
 
 
 def add_poorer_descriptions(blow: Followed, bodies: Sequence[Modes], errors: dict[str, np.ndarray]) -> None:
-    """Add the errors that ever poorer descriptions of a body tell, each compared with the one before.
+    """Add the errors that poorer descriptions of a body tell: of each two blows that differ by one cause.
 
-    They run in fine steps, because the fastest modes of two descriptions differ, and so do their step errors.
+    For each cause the worst counts, because two descriptions can agree by chance. They run in fine steps, because the
+    fastest modes of two descriptions differ, and so do their step errors.
     """
-    quantities, n = blow.options.quantities, blow.options.n_quantities
     for i, body in enumerate(bodies):
-        before = blow.runs.fine
-        for cause, other in body.poorer.items():
-            found = one_more = np.ones(len(blow.runs.error))
-            try:
-                less = blow.again(blow.changed(i, blow.parts[i].described_by(other)), finely=True)
-                found = distance.of_runs(less, before, quantities)
-                if len(before.contacts) != len(blow.runs.fine.contacts):  # other impacts, of which nothing is known
-                    found = np.append(found[: n + 1], one_more[n + 1 :])
-                if _may_touch(before, less, blow.pace[0]):
-                    found = found + one_more
-                before = less
-            except SimulationError:  # the poorer body cannot be followed, so it tells nothing
-                pass
+        (itself, _), *others = body.descriptions().items()
+        runs: dict[frozenset[str], History | None] = {itself: blow.runs.fine}
+        for lacking, other in others:
+            runs[lacking] = None
+            with suppress(SimulationError):
+                runs[lacking] = blow.again(blow.changed(i, blow.parts[i].described_by(other)), finely=True)
+        for cause, found in worst_differences(runs, lambda one, other: _told_by(blow, one, other)).items():
             errors[cause] = errors.get(cause, 0.0) + found
+
+
+def worst_differences(
+    runs: Mapping[frozenset[str], Any], difference: Callable[[Any, Any], np.ndarray]
+) -> dict[str, np.ndarray]:
+    """The largest difference by cause of any two runs, kept by what they lack, of which one lacks nothing else."""
+    worst: dict[str, np.ndarray] = {}
+    for lacking, run in runs.items():
+        for cause in lacking:
+            if lacking - {cause} in runs:
+                found = difference(runs[lacking - {cause}], run)
+                worst[cause] = np.maximum(worst.get(cause, 0.0), found)
+    return worst
+
+
+def _told_by(blow: Followed, better: History | None, poorer: History | None) -> np.ndarray:
+    """What two descriptions of a body tell of the error of one; those that cannot be followed tell nothing."""
+    n, one_more = blow.options.n_quantities, np.ones(len(blow.runs.error))
+    if better is None or poorer is None:
+        return one_more
+    found = distance.of_runs(poorer, better, blow.options.quantities)
+    if len(better.contacts) != len(blow.runs.fine.contacts):  # other impacts, of which nothing is known
+        found = np.append(found[: n + 1], one_more[n + 1 :])
+    return found + one_more if _may_touch(better, poorer, blow.pace[0]) else found
 
 
 def _may_touch(history: History, other: History, duration: float) -> bool:

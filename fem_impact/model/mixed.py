@@ -81,17 +81,16 @@ def mixed(modes: Modes, at: Any, mobility: float, frequency: float, highest: flo
 
     ``modes`` are all up to `REACH` times the frequency, ``mobility`` [m/(N s)] is that of the infinite plate, which
     acts as a spring above a ``highest`` frequency [Hz]; echoes are left out above the first one. `Modes.poorer` holds
-    the same of poorer descriptions, and last for half the frequency, so that a blow states the error of the echoes left
-    out.
+    the same of poorer descriptions, and for half the frequency, so that a blow states the error of the echoes left out.
     """
     point = modes.point("at", at)
-    poorer = {cause: _mixed(other, point, mobility, frequency, highest) for cause, other in modes.poorer.items()}
-    last = list(modes.poorer.values())[-1] if modes.poorer else modes
-    poorer["idealisation"] = _mixed(last, point, mobility, 0.5 * frequency, highest)
-    return replace(_mixed(modes, point, mobility, frequency, highest), poorer=poorer)
+    found = _mixed(modes, point, mobility, frequency, highest)
+    half = _mixed(replace(modes, poorer={}), point, mobility, 0.5 * frequency, highest)
+    return replace(found, poorer={**found.poorer, "idealisation": half})
 
 
 def _mixed(modes: Modes, point: np.ndarray, mobility: float, frequency: float, highest: float) -> Modes:
+    poorer = {cause: _mixed(other, point, mobility, frequency, highest) for cause, other in modes.poorer.items()}
     modes = replace(modes, poorer={}).truncated(max_frequency=max(REACH * frequency, float(modes.frequencies[0])))
     above, shape, rest = absorbing(mobility, frequency, highest)
     rows = modes.shapes.at(point)[0] * np.sqrt(kept_share(modes.omega, mobility, above, shape))
@@ -103,5 +102,6 @@ def _mixed(modes: Modes, point: np.ndarray, mobility: float, frequency: float, h
     static = float(((rows[moving] / omega[moving]) ** 2).sum()) + rest
     shapes = SampledShapes(point, rows[order][None], np.array([[static]]))
     return Modes(
-        omega[order], ratio[order], shapes, modes.mass, None if error is None else error[order], notes=modes.notes
-    )
+        omega[order], ratio[order], shapes, modes.mass, None if error is None else error[order], notes=modes.notes,
+        poorer=poorer,
+    )  # fmt: skip

@@ -122,11 +122,13 @@ def folded(found: Modes, cutoff: Callable[[Modes, float], float], margin: float)
     the error of the poorer one and tells what the spring costs, too.
     """
     low, high = (cutoff(found, factor * margin) * (1.0 + 1e-9) for factor in (1.0, 16.0))
-    poorer = {}
-    for cause, other in found.poorer.items():
-        flexible = float(other.frequencies[min(other.n_rigid, other.n_modes - 1)])  # a spring needs one to lie above
-        poorer[cause] = other.truncated(max_frequency=max(high, flexible))
-    return replace(replace(found, poorer={}).truncated(max_frequency=low), poorer=poorer)
+
+    def up_to(limit: float, modes: Modes) -> Modes:
+        poorer = {cause: up_to(high, other) for cause, other in modes.poorer.items()}
+        flexible = float(modes.frequencies[min(modes.n_rigid, modes.n_modes - 1)])  # a spring needs one to lie above
+        return replace(replace(modes, poorer={}).truncated(max_frequency=max(limit, flexible)), poorer=poorer)
+
+    return up_to(low, found)
 
 
 class Seen:
@@ -181,12 +183,11 @@ class Seen:
         return kept
 
     def _struck(self, fine: Krylov, coarse: Krylov, cutoff: Callable[[Modes, float], float]) -> tuple[Modes, Modes]:
-        """All Ritz pairs of the vectors, with those on a coarser mesh, and the same up to ``cutoff``."""
+        """All Ritz pairs, with those of fewer vectors and on a coarser mesh, and the same up to ``cutoff``."""
         with self.stages("vectors"):
-            found = fine.pairs(self.count)
+            found = fine.modes(self.count)
             other = coarse.modes(found.n_modes - fine.system.rigid.shape[1])  # as many vectors on either mesh
-        found = replace(found, poorer={"mesh": replace(other, poorer={}), **other.poorer})
-        found = self.target.finished_vectors(found)
+        found = self.target.finished_vectors(replace(found, poorer={"mesh": other, **found.poorer}))
         return found, folded(found, cutoff, self.margin)
 
     def improved(self, error: Error, allowed: float) -> bool:

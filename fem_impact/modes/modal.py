@@ -55,8 +55,8 @@ class Modes(check.Brief):
     frequency_error: np.ndarray | None = None  # (n_modes,) [-] estimated relative error; find_modes always gives it
     bounds: np.ndarray | None = None  # (n_modes, 2) [Hz] guaranteed lower and upper bound of each frequency
     notes: tuple[str, ...] = field(default=(), repr=False)  # what was assumed, and probable slips of a unit
-    # The same body described less and less well, in this order: "mesh", "truncation", "idealisation". The blow with
-    # each differs by this part of `Error` from the blow with the description before it
+    # The same body described less well in one respect: "mesh", "truncation", "idealisation", each of which may hold
+    # poorer ones in turn. Blows with two descriptions that differ in one respect differ by this part of `Error`
     poorer: Mapping[str, "Modes"] = field(default_factory=dict, repr=False)
     section: Plate | Beam | None = field(default=None, repr=False)  # None if not known, as that of a scaled body
     thick: bool = field(default=False, repr=False)  # whether shear and rotary inertia are in them
@@ -440,6 +440,13 @@ class Modes(check.Brief):
         section = self.section if mass == frequency == 1.0 else None
         scaled: dict[str, Any] = {"shapes": shapes, "mass": self.mass * mass, "bounds": bounds, "poorer": poorer}
         return replace(self, omega=self.omega * frequency, section=section, **scaled)
+
+    def descriptions(self) -> dict[frozenset[str], "Modes"]:
+        """This and all poorer descriptions of the body, by what each describes less well."""
+        found = {frozenset[str](): self}
+        for cause, other in self.poorer.items():
+            found |= {lacking | {cause}: each for lacking, each in other.descriptions().items()}
+        return found
 
     def truncated(self, *, max_frequency: float | None = None, n_modes: int | None = None) -> "Modes":
         """The lowest modes only, up to a frequency [Hz] or a number; the residual compliance replaces the others."""

@@ -9,7 +9,7 @@ from .._base.check import SimulationError
 from .._base.rounding import ROUNDING
 from ..impact import accuracy
 from ..impact.contact import wall_time
-from ..impact.what_if import RESOLVABLE
+from ..impact.what_if import RESOLVABLE, worst_differences
 from .cases import Cases, solve_cases, try_each
 from .cells import RATED
 
@@ -94,10 +94,10 @@ def described(cases: Cases, numbers: np.ndarray, workers: int | None = None) -> 
     which something is not stated (`Modes.unstated`).
     """
     base = cases.base
-    causes = list(dict.fromkeys(cause for modes in base.views.values() for cause in modes.poorer))
+    descriptions = dict.fromkeys(lacking for modes in base.views.values() for lacking in modes.descriptions())
     bodies = base.modes, base.striker.modes
     unstated = cases.residual and any(each.unstated or each.shapes.dent(each.shapes.grid()[0]).any() for each in bodies)
-    if not causes and not unstated:
+    if len(descriptions) < 2 and not unstated:
         return np.zeros(cases.shape)
     most = DOUBTED[cases.quick and not unstated]
     thinner = max(1.0, (cases.n_cases / most) ** (1.0 / len(cases.shape)))
@@ -106,13 +106,19 @@ def described(cases: Cases, numbers: np.ndarray, workers: int | None = None) -> 
     few = replace(cases, axes=axes, band=None, kernels={})
     names = [cases.layers.index(name) for name in few.layers]
     mine = numbers.reshape(-1, *cases.shape)[np.ix_(np.array(names), *chosen)]
-    total, count = np.zeros(few.shape), few.layers.index("n_impacts")
-    before = mine
-    for cause in causes:
-        other, _ = solve_cases(replace(few, base=base.poorer(cause), kernels={}), 0, few.n_cases, workers=workers)
-        before, better = other.reshape(mine.shape), before
-        change = np.fmax.reduce(list(few.apart(better, before).values()))
-        total += np.where(better[count] == before[count], change, 1.0)
+    count = few.layers.index("n_impacts")
+
+    def struck(lacking: frozenset[str]) -> np.ndarray:
+        """The layers on the body described less well."""
+        poorer = replace(few, base=base.lacking(lacking), kernels={})
+        return solve_cases(poorer, 0, few.n_cases, workers=workers)[0].reshape(mine.shape)
+
+    def difference(one: np.ndarray, other: np.ndarray) -> np.ndarray:
+        change = np.fmax.reduce(list(few.apart(one, other).values()))
+        return np.where(one[count] == other[count], change, 1.0)
+
+    runs = {lacking: struck(lacking) if lacking else mine for lacking in descriptions}
+    total = sum(worst_differences(runs, difference).values(), np.zeros(few.shape))
     several = np.flatnonzero((mine[count] > 1) | unstated)
     several = several[:: max(1, -(-len(several) // DOUBTED[False]))]
     for i, (hit, _) in zip(several, try_each(several, few.blow, workers)):

@@ -1,8 +1,9 @@
 """The cells of a map: one blow, and the parameters along which a map may vary it."""
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field, replace
+from functools import reduce
 from typing import Any
 
 import numpy as np
@@ -167,9 +168,13 @@ class Case:
         hit = strike(self.modes, self.striker, self.contact, at=self.at, speed=self.speed, **options)
         return audited(hit)
 
-    def poorer(self, cause: str) -> "Case":
-        """The same blow on the body described less well (`Modes.poorer`)."""
-        return self._with(lambda modes: modes.poorer.get(cause, modes))
+    def lacking(self, causes: Iterable[str]) -> "Case":
+        """The same blow on the body described less well in these respects (`Modes.descriptions`), where it can be."""
+
+        def poorest(modes: Modes) -> Modes:
+            return reduce(lambda found, cause: found.poorer.get(cause, found), sorted(causes), modes)
+
+        return self._with(poorest)
 
     def sampled(self, places: np.ndarray) -> "Case":
         """The same blow on bodies reduced to their contact points, (n_points, dimension) [m] of the one struck."""

@@ -175,7 +175,7 @@ def fingerprint(grid: Any) -> Mark:
         grid.max_impacts, striker.hand, striker.motion, grid.base.first,
     ]  # fmt: skip
     for modes, places in seen or [(grid.base.modes, grid.axes.get("at", grid.base.at[None]))]:
-        for each in (modes, *modes.poorer.values()):
+        for each in modes.descriptions().values():
             yields = [float(each.shapes.compliance(place[None])[0, 0]) for place in places]
             told += [each.stretches, each.thick, each.air, each.unstated, yields]
             told += [each.omega, each.shape_at(places), each.shapes.spread(places)]
