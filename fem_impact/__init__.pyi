@@ -33,8 +33,8 @@ from .model.playing import strokes as strokes
 from .modes import analytic as analytic
 from .modes.air import in_air as in_air
 from .modes.body import Body as Body
+from .modes.finding import find_modes as find_modes
 from .modes.modal import Modes as Modes
-from .modes.modal import find_modes as find_modes
 from .modes.modal import rayleigh as rayleigh
 from .modes.ritz import ritz_modes as ritz_modes
 from .pages import explore as explore

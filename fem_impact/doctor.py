@@ -25,7 +25,8 @@ from .impact.response import Response
 from .impact.striker import Striker
 from .model import cost
 from .modes import analytic
-from .modes.modal import Modes, find_modes
+from .modes.finding import find_modes
+from .modes.modal import Modes
 from .show import export, figures, pictures
 from .sweeps.grid import sweep
 

@@ -10,7 +10,7 @@ from fem_impact import mesh
 from fem_impact.fe.assembly import assemble
 from fem_impact.fe.eigenvalues import count_below
 from fem_impact.fe.section import Beam, Material, Plate
-from fem_impact.modes.modal import find_modes
+from fem_impact.modes.finding import find_modes
 from fem_impact.references.frequencies import hinged
 
 STEEL = Material(E=210e9, nu=0.3, rho=7850.0)

@@ -27,7 +27,7 @@ def test_stages_and_maps_are_logged_under_the_name_of_the_package(caplog, capsys
     assert ("fem_impact.sweeps.cases", "2 blows at the tolerance 0.1") in said
     assert ("fem_impact.model.playing", f"stroke 0 at 0 s: {hits.n_impacts} impacts") in said
     assert any(name == "fem_impact.modes.free_air" and "modes, on cells of 0.0" in text for name, text in said)
-    assert any(name == "fem_impact.modes.modal" and text.startswith("3 modes up to ") for name, text in said)
+    assert any(name == "fem_impact.modes.finding" and text.startswith("3 modes up to ") for name, text in said)
     assert capsys.readouterr() == ("", "")
 
 

@@ -61,7 +61,7 @@ def test_a_package_says_what_it_is_for_and_where_to_start(name):
     assert name == "impact/compiled" or any(f"`{module}`" in text for module in modules)
 
 
-MODELS = {"model.planner", "model.target", "modes.modal", "scenes.scene"}
+MODELS = {"model.planner", "model.target", "modes.finding", "modes.modal", "scenes.scene"}
 BLOWS = {f"impact.{name}" for name in ("collision", "contact", "response", "striker")}
 DOORS = {  # what these packages may use of those above: what a user does, and modules that hide how a blow is computed
     "live": MODELS | BLOWS | {"impact.played", "modes.viewing", "show.sampling", "show.sound"},
@@ -96,7 +96,7 @@ NOT_MIRRORED = {  # tested under the name of what uses them
     "model/by_idealisation.py", "model/by_mixture.py", "model/by_vectors.py", "modes/disk.py",
     "modes/rectangle.py", "modes/request.py", "modes/shapes.py", "modes/slender.py", "pages/explore_server.py",
     "pages/explore_view.py", "references/blows.py", "references/contacts.py",
-    "references/frequencies.py", "scenes/maps.py", "scenes/schema.py",
+    "references/frequencies.py", "scenes/maps.py", "scenes/schema.py", "scenes/whole.py",
     "show/plots.py", "show/style.py",
 }  # fmt: skip
 

@@ -13,7 +13,7 @@ from ..fe import refinement
 from ..fe.assembly import reassemble
 from ..fe.system import System
 from ..model.target import RIGID_MOTIONS, Target
-from ..modes import modal
+from ..modes import finding
 from ..modes.modal import Modes
 from ..modes.varied import sharing
 from ..modes.viewing import grid
@@ -121,7 +121,7 @@ class Blank(check.Brief):
         system, whole = before.system, self.first().system.section
         body = reassemble(replace(system, section=thinner(whole, dishes.depth)), system.mesh)
         wanted = None if self.target.size_stated else self.close
-        modes = modal.find_modes(body, n_modes=self.start.n_modes, tolerance=wanted)
+        modes = finding.find_modes(body, n_modes=self.start.n_modes, tolerance=wanted)
         old, new = (each.shapes.at(self.spots) for each in (before.modes, modes))
         old = old[:, before.which]
         cosines = (old.T @ new) ** 2 / ((old**2).sum(axis=0)[:, None] * (new**2).sum(axis=0))

@@ -30,7 +30,7 @@ from ..fe.assembly import (
 )  # fmt: skip
 from ..fe.section import Beam, Plate
 from ..mesh.meshes import Mesh
-from ..modes import analytic, modal
+from ..modes import analytic, finding
 from ..modes.air import in_air
 from ..modes.modal import Damping, Modes
 from ..modes.shapes import FieldShapes
@@ -319,7 +319,7 @@ class Target:
             body = replace(body, mesh=replace(body.mesh, size_stated=enough))
         with self.blame("mesh"), np.errstate(all="ignore"):  # an overflow becomes inf, which the checks refuse
             if body is not None:
-                return modal.find_modes(body, **reach, tolerance=wanted, keep=keep)
+                return finding.find_modes(body, **reach, tolerance=wanted, keep=keep)
             assert self.closed is not None
             return self.closed(**reach)
 

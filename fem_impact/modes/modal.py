@@ -1,10 +1,8 @@
 """Modes: the description of a structure that every later stage works on, whether computed or measured."""
 
-import logging
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -13,13 +11,11 @@ from numpy.typing import ArrayLike
 from .._base import check, markup
 from .._base.remembered import Remembered
 from .._base.rounding import ROUNDING, SAME
-from ..fe import plausible, refinement
-from ..fe.assembly import System
+from ..fe import plausible
 from ..fe.section import Beam, Plate
 from . import dents, followed, picked, universal_files, unstated, viewing
 from .shapes import (
     REMEMBERED,
-    FieldShapes,
     RigidShapes,
     SampledShapes,
     ScaledShapes,
@@ -27,8 +23,6 @@ from .shapes import (
     connected_cells,
     loose_motions,
 )
-
-LOG = logging.getLogger(__name__)
 
 HIGHEST = 0.1 * check.REACH  # [Hz] highest frequency that scaling may produce; 2 pi times it must stay in reach
 UNSTATED = {  # by argument of `Modes.from_arrays`
@@ -581,86 +575,3 @@ def rayleigh(mass_factor: float, stiffness_factor: float) -> Callable[[np.ndarra
         return 0.5 * (mass_factor / omega + stiffness_factor * omega)
 
     return ratio
-
-
-@check.typed
-def find_modes(
-    system: System,
-    *,
-    n_modes: int | None = None,
-    max_frequency: float | None = None,
-    damping_ratio: Damping = 0.0,
-    tolerance: float | None = None,
-    bounds: bool = False,
-    keep: str | Path | None = None,
-) -> Modes:
-    """Find the lowest modes of a body without missing any; rigid motions come first, with frequency exactly zero.
-
-    Parameters
-    ----------
-    system : System
-    n_modes : int, optional
-        How many modes to find, rigid motions included. Give either this or ``max_frequency``.
-    max_frequency : float [Hz], optional
-        Find all modes up to this frequency.
-    damping_ratio : float, array (n_modes,) or function of frequency [Hz] returning [-]
-    tolerance : float [-], optional
-        Largest relative error accepted in any frequency; the mesh is refined until the estimated error is below it.
-    bounds : bool
-        Whether to compute guaranteed bounds of each frequency (`Modes.bounds`), for isotropic plates of constant
-        thickness with straight edges. A margin, not a proof, covers rounding and the eigensolver.
-    keep : path of an .npz file, optional
-        File where the modes are saved; the same call later reads them from there. Ignored if a tolerance is given.
-
-    Returns
-    -------
-    Modes, always with `frequency_error`
-
-    Raises
-    ------
-    ValueError
-        If neither or both of n_modes and max_frequency are given, or the mesh has too few unknowns.
-    SimulationError
-        If the tolerance is not met, or modes are missing according to the inertia of the factorised matrix.
-
-    Examples
-    --------
-    >>> plate = fi.Plate(fi.Material(E=10e9, nu=0.3, rho=450.0), thickness=3e-3)
-    >>> system = fi.assemble(fi.mesh.rectangle(0.465, 0.3), plate, {"boundary": "hinged"})
-    >>> modes = fi.find_modes(system, n_modes=3, damping_ratio=0.005)
-    >>> modes.frequencies.round(2).tolist()
-    [105.78, 199.05, 329.86]
-    """
-    if (n_modes is None) == (max_frequency is None):
-        raise ValueError("find_modes needs either n_modes or max_frequency")
-    if n_modes is not None:
-        n_modes = check.count("n_modes", n_modes)
-    if max_frequency is not None:
-        max_frequency = check.positive("max_frequency", max_frequency, "Hz")
-    if tolerance is not None:
-        found = refinement.refine(
-            system, n_modes, max_frequency, check.between("tolerance", tolerance, 1e-10, refinement.LOOSEST)
-        )
-    else:
-        fine = refinement.fine_enough(system, n_modes, max_frequency, None)
-        wanted = n_modes, max_frequency
-        found = (
-            refinement.solve_on_mesh(fine, *wanted)
-            if keep is None
-            else refinement.solve_or_read(fine, *wanted, Path(keep))
-        )
-    shapes = FieldShapes(found.system, found.vectors.copy(), found.flexibility)
-    damping = damping_ratios(damping_ratio, found.omega)
-    enclosed = refinement.enclosure(found) if bounds else None
-    if bounds and enclosed is None:
-        raise ValueError(
-            "bounds need an isotropic plate of constant thickness with straight edges and nothing attached; "
-            "give a tolerance instead, which works for any body"
-        )
-    in_hertz = None if enclosed is None else enclosed / (2.0 * np.pi)
-    notes = plausible.together(system.notes, damping_notes(damping, found.omega))
-    LOG.info("%d modes up to %.5g Hz", len(found.omega), found.omega[-1] / (2.0 * np.pi))
-    return Modes(
-        found.omega, damping, shapes, system.mass, found.error, in_hertz, notes, section=system.section,
-        thick=system.rules.thick,
-    )  # fmt: skip

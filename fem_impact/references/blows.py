@@ -14,7 +14,8 @@ from ..impact.contact import Contact
 from ..impact.response import Response
 from ..impact.striker import Striker
 from ..modes import analytic
-from ..modes.modal import Modes, find_modes
+from ..modes.finding import find_modes
+from ..modes.modal import Modes
 from .case import TABLE, Reference, ReferenceLine, of_blow
 
 

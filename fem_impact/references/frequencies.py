@@ -11,7 +11,7 @@ from scipy.optimize import brentq
 from .. import mesh
 from ..fe.assembly import assemble
 from ..fe.section import Beam, Material, Plate
-from ..modes.modal import find_modes
+from ..modes.finding import find_modes
 from .case import TABLE, Reference, ReferenceLine, of_modes
 
 STEEL = Material(E=210e9, nu=0.3, rho=7850.0)

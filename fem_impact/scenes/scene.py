@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from .._base import check, known, markup
-from ..fe.assembly import THICK, System, clamped, support_of_facets, support_words
+from ..fe.assembly import System, clamped, support_of_facets, support_words
 from ..fe.ribs import Rib, sides_on
 from ..fe.section import Beam, Material, Plate, evaluate
 from ..fe.springs import check_posts
@@ -30,22 +30,11 @@ from ..model.target import FIRST_LOOK, Stages, Target, Watch
 from ..modes.modal import Modes
 from . import sequence
 from .named import filled
-from .schema import (
-    MAKERS,
-    NESTED,
-    PARTS,
-    PATHS,
-    REPEATED,
-    REQUIRED,
-    TABLES,
-    Part,
-    fault,
-    read_list,
-    read_part,
-    read_strokes,
-    read_tables,
-    rise_of,
-    supports_of,
+from .whole import check_whole
+
+from .schema import (  # isort: skip
+    MAKERS, NESTED, PARTS, PATHS, REPEATED, REQUIRED, TABLES, Part, fault, read_list, read_part, read_strokes,
+    read_tables, supports_of,
 )  # fmt: skip
 
 # [-] places along a beam where its section is looked at: ten in each hundredth of it, where it may change
@@ -261,7 +250,7 @@ class Scene(check.Brief):
         heard = {"listener": listeners[0]} if len(listeners) == 1 else {"listeners": list(listeners)}
         part = Part("", {**told, **heard})
         scene = replace(self, observe=part)
-        _check_whole(scene)
+        check_whole(scene)
         return scene
 
     def changed(self, values: Mapping[str, float]) -> "Scene":
@@ -558,7 +547,7 @@ def scene_of(tables: Mapping[str, Any], path: Path, *, folder: Path) -> Scene:
     parts: dict[str, Any] = {name: read_list(path, name, tables.pop(name)) for name in PARTS if name in tables}
     parts |= {name: read_part(path, name, table, folder) for name, table in tables.items()}
     scene = Scene(path, title, blow=parts.pop("strike"), stroke=strokes, known=intervals, **parts)
-    _check_whole(scene)
+    check_whole(scene)
     return scene
 
 
@@ -602,52 +591,3 @@ def plan(
     if striker is not None or contact is not None:
         raise ValueError("striker and contact must be left out for a scene, which has its own")
     return (scene if isinstance(scene, Scene) else load_scene(scene)).plan(watch=watch, **changes)
-
-
-def _check_whole(scene: Scene) -> None:
-    """Build whatever is cheap, so that a wrong number fails at once, and check that the tables fit together."""
-    target, line = scene.target.values, scene.mesh.kind == "line"
-    bare = scene.section is None and not scene.layer
-    _ = scene._target
-    if "rise" in scene.mesh.values:
-        with scene.blame("mesh"):
-            rise_of(scene.mesh.values["rise"])
-    scene._ribs(None)
-    if not scene.layer and (scene.material is None) != bare:
-        missing, there = ("section", "material") if bare else ("material", "section")
-        raise scene.fault(f"[{missing}] is missing; [{there}] needs it")
-    thick, other = target.get("theory") in THICK, scene.striker.kind != "sphere" or bare
-    wrong = {
-        "[target] needs mass and first_frequency if there is no [material]": bare
-        and not {"mass", "first_frequency"} <= set(target),
-        "[[rib]] needs [material] and [section] of a plate, and [in_plane] too": (bare or line)
-        and (scene.rib or scene.in_plane.values),
-        "[target] theory needs [material] and [section]: shear depends on the thickness": bare and thick,
-        "[target] baffle must be left out for a beam, which is in free air": line and target.get("baffle") is True,
-        "[contact] kind 'between' needs a striker of kind 'sphere' and a [section]": other
-        and scene.contact.kind == "between",
-        f"[strike] max_impacts must be left out with [[{REPEATED}]]; give a stroke lasts instead": scene.stroke
-        and "max_impacts" in scene.blow.values,
-        "[observe] listener of a beam needs [material] and [section], for its width": bare and line and scene.listeners,
-    }
-    for text, holds in wrong.items():
-        if holds:
-            raise scene.fault(text)
-    for table in ("observe", "map"):
-        part = getattr(scene, table)
-        if part is not None:
-            scene._make(table, part)
-    if scene.listeners and line:
-        width, height = scene.girth
-        if height > width:
-            raise scene.fault(
-                f"[observe] listener must be left out for a beam higher than wide, here {height:g} and {width:g} m: "
-                "its sound is not known"
-            )
-    if not bare:
-        scene.make_section("plate" if scene.section is None else scene.section.kind)
-    scene.make_striker()
-    scene.make_contact()
-    for i, part in enumerate(scene.stroke):
-        if any(name in part.values for name in NESTED):
-            _check_whole(scene.alone(i))

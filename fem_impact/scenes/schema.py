@@ -23,7 +23,7 @@ from ..impact.contact import MARKS, Contact
 from ..impact.striker import STICK_MODES, Hand, Striker
 from ..mesh import rise as rises
 from ..modes.analytic import closed_form
-from ..modes.modal import find_modes
+from ..modes.finding import find_modes
 from ..show import sound
 from ..sweeps.cells import read_axis
 from . import keys

@@ -12,7 +12,8 @@ from scipy.stats import f, qmc, t
 from .._base import check
 from .._base.check import SimulationError
 from ..fe.assembly import System
-from ..modes.modal import Modes, find_modes
+from ..modes.finding import find_modes
+from ..modes.modal import Modes
 from ..scenes.scene import Scene, load_scene
 from . import transfer
 from .profiles import DOUBTED

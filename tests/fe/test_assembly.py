@@ -13,7 +13,7 @@ from fem_impact.fe import assembly
 from fem_impact.fe.assembly import assemble
 from fem_impact.fe.elements import ArgyrisSpace
 from fem_impact.fe.section import Beam, Material, Plate
-from fem_impact.modes.modal import find_modes
+from fem_impact.modes.finding import find_modes
 
 STEEL = Material(E=210e9, nu=0.3, rho=7850.0)
 PLATE = Plate(STEEL, 2e-3)

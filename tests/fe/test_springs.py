@@ -8,7 +8,7 @@ from scipy.optimize import brentq
 from fem_impact import mesh
 from fem_impact.fe.assembly import assemble
 from fem_impact.fe.section import Beam, Elastic, Material, Plate
-from fem_impact.modes.modal import find_modes
+from fem_impact.modes.finding import find_modes
 
 STEEL = Material(E=210e9, nu=0.3, rho=7850.0)
 PLATE = Plate(STEEL, 2e-3)

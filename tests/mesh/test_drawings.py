@@ -10,7 +10,7 @@ from fem_impact._base import isolated
 from fem_impact.fe.assembly import assemble
 from fem_impact.fe.ribs import Rib
 from fem_impact.fe.section import Beam, Material, Plate
-from fem_impact.modes.modal import find_modes
+from fem_impact.modes.finding import find_modes
 
 PLATE = Plate(Material(E=210e9, nu=0.3, rho=7850.0), 2e-3)
 PER_RATE = np.sqrt(7850 * 2e-3 / (210e9 * 2e-3**3 / (12 * (1 - 0.3**2))))

@@ -14,7 +14,7 @@ from fem_impact import mesh, rise
 from fem_impact._base.check import SimulationError
 from fem_impact.fe.assembly import assemble
 from fem_impact.fe.section import Material, Plate
-from fem_impact.modes.modal import find_modes
+from fem_impact.modes.finding import find_modes
 
 pytestmark = pytest.mark.usefixtures("read_here")
 MESHES = Path(__file__).parents[2] / "meshes"

@@ -9,7 +9,8 @@ from fem_impact.fe.assembly import assemble
 from fem_impact.fe.section import Beam, Material, Plate
 from fem_impact.modes import universal_files
 from fem_impact.modes.air import in_air
-from fem_impact.modes.modal import Modes, find_modes
+from fem_impact.modes.finding import find_modes
+from fem_impact.modes.modal import Modes
 from fem_impact.show import export, figures, sampling
 
 pyuff = pytest.importorskip("pyuff", reason="the uff extra is not installed")

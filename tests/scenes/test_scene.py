@@ -18,7 +18,7 @@ from fem_impact.impact import collision
 from fem_impact.impact.contact import Contact
 from fem_impact.impact.striker import Hand, Striker
 from fem_impact.model.budget import Budget
-from fem_impact.modes import analytic, modal
+from fem_impact.modes import analytic, finding
 from fem_impact.scenes import maps, scene
 from fem_impact.scenes.sentences import words
 
@@ -169,7 +169,7 @@ def test_material_and_section_give_the_plate_its_own_mass(tmp_path):
     )
     assert_allclose(modes.mass, 0.465 * 0.3 * 450.0 * 3e-3, rtol=1e-12)
     # the scene refines to 1e-2, the default mesh is at least that good on the first four
-    assert_allclose(modes.frequencies, modal.find_modes(system, n_modes=4).frequencies, rtol=2e-2)
+    assert_allclose(modes.frequencies, finding.find_modes(system, n_modes=4).frequencies, rtol=2e-2)
 
 
 def test_mass_and_frequency_rescale_a_material(tmp_path):

@@ -114,6 +114,17 @@ def safe_wait(bounds, i, d, v):
 
 
 @inner()
+def safe_look(bounds, i, d, v):
+    """The same, but short enough to see where a contact that cannot touch turns back near enough to be told."""
+    wait = safe_wait(bounds, i, d, v)
+    apart = bounds[i, RIGID_ACCELERATION] <= 0.0 and bounds[i, RIGID] + bounds[i, REACH] <= 0.0
+    if apart and bounds[i, HARDEST] > 0.0:
+        # a quarter of a radian of the fastest swing: cubics then miss a turn by 1e-5 of it
+        wait = min(wait, 0.25 * bounds[i, FASTEST] / bounds[i, HARDEST])
+    return wait
+
+
+@inner()
 def carry_rigid(bounds, i, time):
     """Rigid part of contact i's approach, and its rate, after a time."""
     bounds[i, RIGID] += time * (bounds[i, RIGID_RATE] + 0.5 * bounds[i, RIGID_ACCELERATION] * time)
@@ -198,11 +209,7 @@ def find_onset(bodies, offset, flights, limits, limit, out_miss):
             d = min(d, 0.0)
             if meets(bounds, offset, i, d, v, elapsed, limits.still):
                 return elapsed, i, ONSET
-            bound = safe_wait(bounds, i, d, v)
-            apart = bounds[i, RIGID_ACCELERATION] <= 0.0 and bounds[i, RIGID] + bounds[i, REACH] <= 0.0
-            if apart and bounds[i, HARDEST] > 0.0:  # it cannot touch, but turns back near enough to be told
-                # a quarter of a radian of the fastest swing: cubics then miss a turn by 1e-5 of it
-                bound = min(bound, 0.25 * bounds[i, FASTEST] / bounds[i, HARDEST])
+            bound = safe_look(bounds, i, d, v)
             if bound < wait:
                 wait = bound
                 first = i

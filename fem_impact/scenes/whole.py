@@ -1,0 +1,58 @@
+"""A scene as a whole: its tables fit together, and what is cheap to build can be built."""
+
+from typing import TYPE_CHECKING
+
+from ..fe.assembly import THICK
+from .schema import NESTED, REPEATED, rise_of
+
+if TYPE_CHECKING:
+    from .scene import Scene
+
+
+def check_whole(scene: "Scene") -> None:
+    """Build whatever is cheap, so that a wrong number fails at once, and check that the tables fit together."""
+    target, line = scene.target.values, scene.mesh.kind == "line"
+    bare = scene.section is None and not scene.layer
+    _ = scene._target
+    if "rise" in scene.mesh.values:
+        with scene.blame("mesh"):
+            rise_of(scene.mesh.values["rise"])
+    scene._ribs(None)
+    if not scene.layer and (scene.material is None) != bare:
+        missing, there = ("section", "material") if bare else ("material", "section")
+        raise scene.fault(f"[{missing}] is missing; [{there}] needs it")
+    thick, other = target.get("theory") in THICK, scene.striker.kind != "sphere" or bare
+    wrong = {
+        "[target] needs mass and first_frequency if there is no [material]": bare
+        and not {"mass", "first_frequency"} <= set(target),
+        "[[rib]] needs [material] and [section] of a plate, and [in_plane] too": (bare or line)
+        and (scene.rib or scene.in_plane.values),
+        "[target] theory needs [material] and [section]: shear depends on the thickness": bare and thick,
+        "[target] baffle must be left out for a beam, which is in free air": line and target.get("baffle") is True,
+        "[contact] kind 'between' needs a striker of kind 'sphere' and a [section]": other
+        and scene.contact.kind == "between",
+        f"[strike] max_impacts must be left out with [[{REPEATED}]]; give a stroke lasts instead": scene.stroke
+        and "max_impacts" in scene.blow.values,
+        "[observe] listener of a beam needs [material] and [section], for its width": bare and line and scene.listeners,
+    }
+    for text, holds in wrong.items():
+        if holds:
+            raise scene.fault(text)
+    for table in ("observe", "map"):
+        part = getattr(scene, table)
+        if part is not None:
+            scene._make(table, part)
+    if scene.listeners and line:
+        width, height = scene.girth
+        if height > width:
+            raise scene.fault(
+                f"[observe] listener must be left out for a beam higher than wide, here {height:g} and {width:g} m: "
+                "its sound is not known"
+            )
+    if not bare:
+        scene.make_section("plate" if scene.section is None else scene.section.kind)
+    scene.make_striker()
+    scene.make_contact()
+    for i, part in enumerate(scene.stroke):
+        if any(name in part.values for name in NESTED):
+            check_whole(scene.alone(i))
