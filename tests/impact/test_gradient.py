@@ -96,7 +96,7 @@ def test_gradients_are_central_differences():
 
 
 @pytest.mark.slow
-@pytest.mark.thin(13)
+@pytest.mark.thin(24)
 @pytest.mark.parametrize("first", range(100, 700, 25))
 def test_gradients_of_many_blows_are_central_differences(first):
     assert check_seeds(range(first, first + 25)) >= 11
