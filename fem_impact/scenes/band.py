@@ -58,16 +58,16 @@ class Band(check.Brief):
         found = []
         for each in self.hit.trust:
             name = NAMES.get(each.quantity)
-            if name is None or each.value is None:
+            values = self.values.get(name or "", np.empty(0))
+            ended = np.isfinite(values)  # there is no restitution of a blow that ends in contact
+            if name is None or each.value is None or not ended.any():
                 continue
-            low, high = np.quantile(self.values[name], ENDS).tolist()
+            low, high = np.quantile(values[ended], ENDS).tolist()
             mostly = ""
-            if np.ptp(self.values[name]) > 0.0:
-                parts = {
-                    key: float(stats.spearmanr(self.values[key], self.values[name])[0] ** 2) for key in self.inputs
-                }
-                best = max(parts, key=parts.__getitem__)
-                mostly = best if parts[best] > 1.0 / len(self.values[name]) ** 0.5 else ""
+            if np.ptp(values[ended]) > 0.0:
+                ranks = {key: stats.spearmanr(self.values[key][ended], values[ended])[0] for key in self.inputs}
+                best = max(ranks, key=lambda key: float(ranks[key] ** 2))
+                mostly = best if ranks[best] ** 2 > 1.0 / ended.sum() ** 0.5 else ""
             known = name, each.value, each.computation, each.known, each.unknown
             found.append(Quantity(*known, low, high, mostly))
         return tuple(found)
@@ -179,7 +179,8 @@ def _anew(
         given = {each.name: float(value) for each, value in zip(inputs, row)}
         try:
             one = scene.changed(given).strike(tolerance=hit.tolerance)
-            rows.append({**given, **{name: float(getattr(one, name) or 0.0) for name in NAMES.values()}})
+            found = np.array([getattr(one, name) for name in NAMES.values()], float)  # None becomes NaN
+            rows.append(given | dict(zip(NAMES.values(), found.tolist())))
         except check.SimulationError:
             failed += 1
         if watch is not None:

@@ -349,11 +349,13 @@ class Scene(check.Brief):
             )
 
     def check_unpushed(self) -> None:
-        """Raise ValueError if something pushes the bodies besides their contact: maps and spreads do not follow it."""
-        for name in ("striker_force", "target_force"):
-            if self.blow.values.get(name):
-                raise self.fault(f"[strike] {name} must be left out here: maps and spreads follow blows without it")
+        """Raise ValueError if a force or an early end is given, which maps and spreads do not follow."""
         self.make_striker().let_go("a map or spread")
+        for name in ("striker_force", "target_force", "duration", "max_impacts"):
+            if self.blow.values.get(name):
+                raise self.fault(
+                    f"[strike] {name} must be left out here: maps and spreads follow whole blows without it"
+                )
 
     def _staged(self, stages: Stages) -> Blow:
         """`built`, with its time."""

@@ -71,11 +71,15 @@ class Cases:
         return bool(self.base.contact.lossy or LOSSY & set(self.axes))
 
     @property
+    def special(self) -> bool:
+        """Whether any contact is more than a power law with or without loss."""
+        return bool(self.base.contact.special or ALONE & set(self.axes))
+
+    @property
     def quick(self) -> bool:
         """Whether all cases are computed together, and none with loss, which takes longer."""
         exponents = self.axes.get("exponent", [self.base.contact.exponent])
-        special = self.base.contact.special or ALONE & set(self.axes)
-        alone = self.lossy or special or self.extra or self.base.modes.stretches
+        alone = self.lossy or self.special or self.extra or self.base.modes.stretches
         return not alone and min(exponents) >= 1.0
 
     @property

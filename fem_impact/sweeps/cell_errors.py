@@ -9,9 +9,11 @@ from .._base.check import SimulationError
 from .._base.rounding import ROUNDING
 from ..impact import accuracy
 from ..impact.contact import wall_time
+from ..impact.reduced_body import THINNED
+from ..impact.stepping import RINGING
 from ..impact.what_if import RESOLVABLE, worst_differences
 from .cases import Cases, solve_cases, try_each
-from .cells import RATED
+from .cells import RATED, Case
 
 # [-] cells struck again for the error of vectors, in a batch or alone: some 0.1 and 0.2 s
 DOUBTED = {True: 10_000, False: 100}
@@ -86,43 +88,72 @@ def model_error(cases: Cases) -> tuple[np.ndarray, str]:
 
 
 def described(cases: Cases, numbers: np.ndarray, workers: int | None = None) -> np.ndarray:
-    """Error [-] of too few Ritz vectors and of their mesh in each cell, in the shape of a map; zero for most modes.
+    """Error [-] of the bodies' description in each cell, in the shape of a map, as blows on poorer ones tell it.
 
-    Evenly spaced cells, at most DOUBTED, are struck again on the body described less well (`Modes.poorer`); any other
-    cell has the error of the nearest of them. Too few vectors may agree on a final separation that is none; therefore
-    cells with several impacts are also struck alone, because `strike` looks for that; so are the cells of a body of
-    which something is not stated (`Modes.unstated`).
+    Evenly spaced cells, at most DOUBTED, are struck again on bodies described less well: by `Modes.poorer`, or where
+    modes left out may matter `thinner`. Any other cell has the error of the nearest. Too few vectors may agree on a
+    final separation that is none; therefore cells with several impacts are also struck alone, because `strike` looks
+    for that; so are the cells of a body of which something is not stated (`Modes.unstated`).
     """
     base = cases.base
     descriptions = dict.fromkeys(lacking for modes in base.views.values() for lacking in modes.descriptions())
     bodies = base.modes, base.striker.modes
     unstated = cases.residual and any(each.unstated or each.shapes.dent(each.shapes.grid()[0]).any() for each in bodies)
-    if len(descriptions) < 2 and not unstated:
+    thin = thinner(base) if cases.residual and not base.views else []
+    if len(descriptions) < 2 and not unstated and not thin:
         return np.zeros(cases.shape)
     most = DOUBTED[cases.quick and not unstated]
-    thinner = max(1.0, (cases.n_cases / most) ** (1.0 / len(cases.shape)))
-    chosen = [np.unique(np.round(np.linspace(0, n - 1, max(1, int(n / thinner)))).astype(int)) for n in cases.shape]
+    fewer = max(1.0, (cases.n_cases / most) ** (1.0 / len(cases.shape)))
+    chosen = [np.unique(np.round(np.linspace(0, n - 1, max(1, int(n / fewer)))).astype(int)) for n in cases.shape]
     axes = {name: values[some] for (name, values), some in zip(cases.axes.items(), chosen)}
-    few = replace(cases, axes=axes, band=None, kernels={})
+    few = replace(cases, axes=axes, band=None, extra={}, kernels={})
     names = [cases.layers.index(name) for name in few.layers]
-    mine = numbers.reshape(-1, *cases.shape)[np.ix_(np.array(names), *chosen)]
+    mine = numbers.reshape(-1, *cases.shape)[np.ix_(np.array(names), *chosen)].reshape(len(names), -1)
     count = few.layers.index("n_impacts")
 
-    def struck(lacking: frozenset[str]) -> np.ndarray:
-        """The layers on the body described less well."""
-        poorer = replace(few, base=base.lacking(lacking), kernels={})
-        return solve_cases(poorer, 0, few.n_cases, workers=workers)[0].reshape(mine.shape)
+    def struck(poorer: Case, some: np.ndarray) -> np.ndarray:
+        """The layers of some cells on bodies described less well."""
+        return solve_cases(replace(few, base=poorer, chosen=some, kernels={}), 0, len(some), workers=workers)[0]
 
     def difference(one: np.ndarray, other: np.ndarray) -> np.ndarray:
         change = np.fmax.reduce(list(few.apart(one, other).values()))
         return np.where(one[count] == other[count], change, 1.0)
 
-    runs = {lacking: struck(lacking) if lacking else mine for lacking in descriptions}
-    total = sum(worst_differences(runs, difference).values(), np.zeros(few.shape))
-    several = np.flatnonzero((mine[count] > 1) | unstated)
+    every = np.arange(few.n_cases)
+    runs = {lacking: struck(base.lacking(lacking), every) if lacking else mine for lacking in descriptions}
+    total = sum(worst_differences(runs, difference).values(), np.zeros(few.n_cases))
+    expected = estimate_left_out(few).reshape(-1)
+    doubted = np.isfinite(expected) & (few.special | (expected > 1e-3 * cases.tolerance)) & (mine[count] > 0)
+    some = np.flatnonzero(doubted)
+    for poorer, weight in thin if some.size else ():
+        change = difference(mine[:, some], struck(poorer, some))
+        total[some] = np.maximum(total[some], np.where(change < 1.0, weight * change, 1.0))
+    several = np.flatnonzero(unstated | ((mine[count] > 1) & bool(descriptions)))
     several = several[:: max(1, -(-len(several) // DOUBTED[False]))]
     for i, (hit, _) in zip(several, try_each(several, few.blow, workers)):
         if hit is not None:
-            total.flat[i] = max(total.flat[i], hit.error.truncation + hit.error.mesh + hit.error.measurement)
+            total[i] = max(total[i], hit.error.truncation + hit.error.mesh + hit.error.measurement)
     nearest = [np.abs(np.arange(n)[:, None] - some).argmin(axis=1) for n, some in zip(cases.shape, chosen)]
-    return total[np.ix_(*nearest)]
+    return total.reshape(few.shape)[np.ix_(*nearest)]
+
+
+def thinner(base: Case) -> list[tuple[Case, float]]:
+    """The blow on bodies with their upper modes replaced by compliance, and the error over what this changes.
+
+    For each of THINNED that leaves modes out, as of a single blow (`what_if.modes_left_out`).
+    """
+    found = []
+    for wanted in () if base.modes.stretches else THINNED:
+        fewer, ratios = [], []
+        for modes in (base.modes, base.striker.modes):
+            flexible = modes.frequencies[modes.omega > 0.0] if modes.dimension else np.empty(0)
+            if len(flexible) > 1:
+                kept = modes.truncated(max_frequency=max(flexible[-1] / wanted, flexible[0]))
+                ratio = float(modes.omega[-1] / kept.omega[-1])
+                ratios += [ratio ** (1.0 if modes.damping_ratio[-1] > RINGING else 2.0)] if ratio > 1.0 else []
+                modes = kept
+            fewer.append(modes)
+        if ratios:
+            striker = replace(base.striker, modes=fewer[1])
+            found.append((replace(base, modes=fewer[0], striker=striker), 1.0 / (min(ratios) - 1.0)))
+    return found

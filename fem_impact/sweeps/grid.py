@@ -255,7 +255,7 @@ def compute_map(base: Case, axes: Mapping[str, np.ndarray], job: Job) -> xarray.
     if some is not cases:
         numbers, failures = _with_speed(cases, some, numbers, failures)
     own = cell_errors.model_error(cases) if job.audit else None
-    table = _dataset(cases, numbers, failures, cell_errors.estimate_left_out(cases) + doubt, own)
+    table = _dataset(cases, numbers, failures, np.maximum(cell_errors.estimate_left_out(cases), doubt), own)
     gap = 1.0 / max(1, min(cases.shape) - 1)
     if job.ours:
         table.attrs["cells"] = f"all {cases.n_cases} cells computed"

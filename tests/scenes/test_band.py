@@ -8,6 +8,7 @@ from scenes import QUICK, load_text
 
 import fem_impact as fi
 from fem_impact import cli
+from fem_impact.scenes import maps
 
 WALL = QUICK.replace("mass = 0.2", "mass = 1e9")  # so heavy that contact time and impulse have closed forms
 
@@ -59,3 +60,20 @@ def test_the_command_tells_the_band(tmp_path, capsys):
     path.write_text(QUICK)
     assert cli.main(["strike", str(path), "--band", "--out", str(tmp_path / "none")]) == 2
     assert not (tmp_path / "none").exists()
+
+
+def test_a_band_of_a_blow_that_ends_early_is_of_such_blows(tmp_path):
+    """A map or spread follows whole blows, and refuses; a quarter of the blows here ends in contact (it was 0)."""
+    text = WALL.replace("stiffness = 1e4", "stiffness = { value = 1e4, low = 7e3, high = 1.1e4 }")
+    time = np.pi * (0.03 / 8e3) ** 0.5  # a contact of half that stiffness lasts longer
+    ended = fi.band(load(tmp_path, text.replace("[strike]", f"[strike]\nduration = {time:.6g}")), n=32)
+    restitution = ended.values["restitution"]
+    assert ended.anew and np.isnan(restitution).sum() == 8
+    assert ended["restitution"].low > 0.99 and ended["contact_time"].high < 1.001 * time
+    scene = load(tmp_path, QUICK.replace("[strike]", "[strike]\nmax_impacts = 1"))
+    for whole in (
+        lambda: fi.spread(scene, {"striker.mass": ("uniform", 0.02, 0.03)}, n=8),
+        lambda: maps.map_scene(scene, over={"striker.mass": [0.02, 0.03]}),
+    ):
+        with pytest.raises(ValueError, match=r"\[strike\] max_impacts must be left out here"):
+            whole()
