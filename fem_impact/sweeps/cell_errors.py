@@ -15,8 +15,8 @@ from ..impact.what_if import RESOLVABLE, worst_differences
 from .cases import Cases, solve_cases, try_each
 from .cells import RATED, Case
 
-# [-] cells struck again for the error of vectors, in a batch or alone: some 0.1 and 0.2 s
-DOUBTED = {True: 10_000, False: 100}
+# [-] cells struck again on poorer bodies: of modes in a batch, a tenth of a large map's time; of vectors; or alone
+DOUBTED = {"modes": 400, "vectors": 10_000, "alone": 100}
 
 
 def estimate_left_out(cases: Cases) -> np.ndarray:
@@ -102,7 +102,7 @@ def described(cases: Cases, numbers: np.ndarray, workers: int | None = None) -> 
     thin = thinner(base) if cases.residual and not base.views else []
     if len(descriptions) < 2 and not unstated and not thin:
         return np.zeros(cases.shape)
-    most = DOUBTED[cases.quick and not unstated]
+    most = DOUBTED["alone" if unstated or not cases.quick else "vectors" if len(descriptions) > 1 else "modes"]
     fewer = max(1.0, (cases.n_cases / most) ** (1.0 / len(cases.shape)))
     chosen = [np.unique(np.round(np.linspace(0, n - 1, max(1, int(n / fewer)))).astype(int)) for n in cases.shape]
     axes = {name: values[some] for (name, values), some in zip(cases.axes.items(), chosen)}
@@ -123,13 +123,13 @@ def described(cases: Cases, numbers: np.ndarray, workers: int | None = None) -> 
     runs = {lacking: struck(base.lacking(lacking), every) if lacking else mine for lacking in descriptions}
     total = sum(worst_differences(runs, difference).values(), np.zeros(few.n_cases))
     expected = estimate_left_out(few).reshape(-1)
-    doubted = np.isfinite(expected) & (few.special | (expected > 1e-3 * cases.tolerance)) & (mine[count] > 0)
+    doubted = np.isfinite(expected) & (few.special | (expected > 1e-2 * cases.tolerance)) & (mine[count] > 0)
     some = np.flatnonzero(doubted)
     for poorer, weight in thin if some.size else ():
         change = difference(mine[:, some], struck(poorer, some))
         total[some] = np.maximum(total[some], np.where(change < 1.0, weight * change, 1.0))
     several = np.flatnonzero(unstated | ((mine[count] > 1) & bool(descriptions)))
-    several = several[:: max(1, -(-len(several) // DOUBTED[False]))]
+    several = several[:: max(1, -(-len(several) // DOUBTED["alone"]))]
     for i, (hit, _) in zip(several, try_each(several, few.blow, workers)):
         if hit is not None:
             total[i] = max(total[i], hit.error.truncation + hit.error.mesh + hit.error.measurement)
