@@ -102,6 +102,22 @@ def test_a_collision_at_two_contacts_goes_on_from_its_middle(where):
     assert_allclose(rest.velocity(LISTEN, LATER), wanted, atol=apart * np.abs(wanted).max())
 
 
+@pytest.mark.parametrize("stiffness", [2e4, 2.2e4, 2.4e4, 2.7e4, 3e4, 3.3e4])
+def test_a_contact_that_has_just_opened_does_not_open_again(stiffness):
+    """Rounding leaves its approach at 1e-17 m of either sign; strokes that wait for a lift would wait for ever."""
+    bodies = [fi.Modes.rigid(0.02), fi.Modes.rigid(0.5), PLATE]
+    touches = [
+        fi.Touch(fi.Contact.linear(stiffness), 0, 2, None, AT),
+        fi.Touch(fi.Contact.linear(2e4), 1, 2, None, (1.0, 0.4)),
+    ]
+    rule = {"tolerance": 1e-2, "residual": False, "max_impacts": 1}
+    first = fi.collide(bodies, touches, speeds=[1.0, 0.5, 0.0], **rule)
+    assert [each.contact for each in first.impacts if each.separation_speed is not None] == [0]
+    rest = fi.collide(bodies, touches, start=first, **rule)
+    assert [each.contact for each in rest.impacts] == [1]
+    assert rest.impacts[0].separation_speed > 0.0
+
+
 def test_the_energies_of_a_second_blow_count_from_its_start():
     law = fi.Contact.hertz(1e7)
     first = fi.strike(PLATE, STICK, law, at=AT, speed=1.0)
