@@ -192,11 +192,8 @@ def _follow(bodies, laws, parts, speed, options, striker=None, at=None, others=(
         raise ValueError(
             "duration or max_impacts must be given, because a constant force keeps pressing the bodies together"
         )
-    held: list[int] = []
-    first = 0
-    for part in parts:
-        held += range(first, first + part.held)
-        first += len(part.omega)
+    firsts = np.cumsum([0, *(len(part.omega) for part in parts)]).tolist()
+    held = [first + i for first, part in zip(firsts, parts) for i in range(part.held)]
     pace = engine.pace_of(system, held)
     depth, way = pace[0] * pace[1], max(np.abs(system.offset).tolist())
     if EPSILON * way > options.tolerance * depth:

@@ -14,9 +14,8 @@ from .contact import sunk
 from .free_motion import swing
 from .stretched import Stretched
 
-# [-] of the largest force of a blow: a push that stays below is rounding; a steep law gives 1e-24 to a touch of 1e-8
-# of the deepest approach
-FAINT = 1e-30
+# [-] of the largest force and of the deepest approach of a blow: a push that stays below both is an error of steps
+FAINT = 1e-9
 # [-] of the largest approach: bodies nearer than this touch, an atom's width in most blows; errors of the first step
 # part bodies that are pressed from rest by less
 TOUCH = 1e-6
@@ -192,7 +191,9 @@ class History(check.Locked):
         slack = float(max(ROUNDING * way, TOUCH * deepest))
         looks = 16  # per step for the peak force: misses (pi/11/16)**2/8 before the parabola
         found = record.find_impacts(self.steps, self.now, self.law, self.n_coefficients, looks, ROUNDING * rate, slack)
-        found = found[found[:, 2] > FAINT * max(found[:, 2].tolist(), default=0.0)]
+        peak, pressed = found[:, 2], self.law[found[:, 4].astype(int)]
+        depth = (peak / pressed["stiffness"]) ** (1.0 / pressed["exponent"])
+        found = found[(peak > FAINT * peak.max(initial=0.0)) | (depth > FAINT * deepest)]
         if min(found[:, 7].tolist(), default=np.inf) < np.inf:
             # bodies that touch at rest press each other as soon as a force acts on one of them: a constant one, or that
             # of a push at another contact

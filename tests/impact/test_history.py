@@ -71,6 +71,17 @@ def test_a_ball_that_meets_others_presses_them_all_at_once(n, exponent, toleranc
     assert_allclose(first, 1e-4 / 0.5, rtol=1e-9)
 
 
+@pytest.mark.parametrize("tolerance", [1e-2, 1e-3, 1e-5])
+def test_a_body_that_draws_back_from_what_it_touches_does_not_press_it(tolerance):
+    """A rod pushed by a ball beyond its centre of percussion: its other end leaves the wall at once, for good."""
+    law, shapes = fi.Contact.hertz(1e8), [[3.0, 3.0], [3.0, -6.0]]
+    rod = fi.Modes.from_arrays([0.0, 0.0], shapes, points=[[0.0], [1.0]], mass=1.0 / 9.0, complete=True)
+    touches = fi.Touch(law, 0, 1), fi.Touch(law, 1, 2, None, [0.0]), fi.Touch(law, 2, None, [1.0])
+    balls = [fi.Modes.rigid(0.1)] * 2
+    hit = fi.collide([*balls, rod], touches, speeds=[1.0, 0.0, 0.0], tolerance=tolerance)
+    assert [each.contact for each in hit.impacts] == [0, 1]
+
+
 def test_how_small_a_force_or_gap_counts_as_none_does_not_matter(monkeypatch):
     histories = [blow.history for blow in (slow_chain(1e-3), random_chain(13, 1e-3))]
     wanted = [history.impacts for history in histories]

@@ -102,6 +102,18 @@ def test_a_collision_at_two_contacts_goes_on_from_its_middle(where):
     assert_allclose(rest.velocity(LISTEN, LATER), wanted, atol=apart * np.abs(wanted).max())
 
 
+@pytest.mark.parametrize("left", [-1e-18, 0.0, 1e-18])
+def test_a_contact_that_has_just_opened_does_not_open_again(left):
+    """Rounding leaves an approach of either sign [m]; strokes that wait for a lift waited for ever."""
+    body = fi.Modes.from_arrays([150.0], [[3.0], [-2.0]], points=[[0.0], [1.0]], mass=0.2, complete=True)
+    touches = [fi.Touch(fi.Contact.linear(2e4), i, 2, None, [float(i)]) for i in range(2)]
+    still, states = np.zeros(1), [([0.2**0.5 * left], [-0.2]), ([1e-3], [-0.1])]
+    bodies = [fi.Modes.rigid(0.2), fi.Modes.rigid(0.5), body]
+    rest = fi.collide(bodies, touches, states=[*states, (still, still)], tolerance=1e-2, max_impacts=1)
+    assert [each.contact for each in rest.impacts] == [1]
+    assert rest.impacts[0].separation_speed > 0.0
+
+
 def test_the_energies_of_a_second_blow_count_from_its_start():
     law = fi.Contact.hertz(1e7)
     first = fi.strike(PLATE, STICK, law, at=AT, speed=1.0)
