@@ -35,6 +35,7 @@ from .loops import (
 from .smooth_edges import smooth_runs
 
 DXF_UNITS = {1: 0.0254, 2: 0.3048, 4: 1e-3, 5: 1e-2, 6: 1.0, 13: 1e-6, 14: 0.1}  # $INSUNITS code -> [m]
+SVG_UNITS = UNITS | {"px": 0.0254 / 96.0, "pt": 0.0254 / 72.0, "pc": 0.0254 / 6.0}  # by the CSS standard -> [m]
 # [-] gaps below this fraction of the extent are closed and noted: a line's width on paper, no hole anybody means
 BRIDGED = 1e-3
 MOST_NUMBERS = 100 * MOST_PIECES  # [-] most digit groups in the shapes of a drawing; an arc of long decimals has 12
@@ -127,11 +128,20 @@ def svg_arrays(path: Path) -> dict[str, np.ndarray]:
             whole.reify()
             found += _svg_pieces(whole, svgelements, str(shape.id) if shape.id else "")
             _check_number(path.name, found)
-    box = drawing.viewbox.width if drawing.viewbox is not None and drawing.viewbox.width else drawing.width
-    stated = re.fullmatch(r"\s*([\d.eE+-]+)\s*(mm|cm|in)\s*", str(drawing.values.get("width", "")))
-    # parsed here because svgelements rounds its millimetre to seven digits
-    width = float(stated[1]) * UNITS[stated[2]] if stated else np.nan
-    return {**_packed(found), "size": np.array([float(box), float(drawing.width), width])}
+    shown, box = svgelements.Matrix(drawing.viewbox_transform), drawing.viewbox
+    # parsed here because svgelements rounds its millimetre to seven digits, and takes a side not stated for 1000 px
+    sides = [_side(str(drawing.values.get(name, ""))) for name in ("width", "height")]
+    each = np.array(sides) / (box.width, box.height) if box else 0.0 * np.array(sides) + SVG_UNITS["px"]
+    style = str(box.preserve_aspect_ratio if box else "")
+    if not style.startswith("none") or np.isnan(each).any():
+        each = np.full(2, (np.fmax if "slice" in style else np.fmin).reduce(each))
+    return {**_packed(found), "pixels": np.array([shown.a, shown.d]), "size": each}
+
+
+def _side(text: str) -> float:
+    """A width or height [m] of an SVG file; NaN if it states none, or one without a unit."""
+    stated = re.fullmatch(r"\s*([\d.eE+-]+)\s*([a-z]+)\s*", text.lower())
+    return float(stated[1]) * SVG_UNITS.get(stated[2], math.nan) if stated else math.nan
 
 
 def _refuse_entities(path: Path) -> None:
@@ -165,18 +175,18 @@ def _refuse_entities(path: Path) -> None:
 def _svg(path: Path, unit: str | None, notes: list[str]) -> Drawn:
     """Closed loops and named open paths [m] of all shapes in an SVG file, y upward."""
     drawn = isolated.read_apart(path, "SVG", "mesh.drawings:svg_arrays")
-    box, pixels, width = drawn["size"].tolist()
-    scale = 0.0254 / 96.0  # one px by the CSS standard
+    pixels, size = drawn["pixels"], drawn["size"]  # of one unit of the drawing, along x and y
     if unit is not None:
-        scale = UNITS[check.one_of("unit", unit, UNITS)] * box / pixels if pixels else math.nan
-    elif not math.isnan(width):
-        scale = width / pixels if pixels else math.nan
-    else:
+        size = np.full(2, UNITS[check.one_of("unit", unit, UNITS)])
+    elif np.isnan(size).any():
+        size = pixels * SVG_UNITS["px"]
         notes.append(f"{path.name} states no unit; assumed px of 1/96 inch, pass unit= to change that")
     notes.append(f"{path.name}: y points down in an SVG file and up here: the drawing's y is taken as -y")
-    if not (math.isfinite(scale) and scale > 0.0):
+    with np.errstate(divide="ignore", invalid="ignore"):
+        scale = size / pixels
+    if not (np.isfinite(scale) & (scale > 0.0)).all():
         raise ValueError(f"{path.name} has no usable width and viewBox; set both to positive numbers")
-    return _chained(path.name, _unpacked(path.name, drawn, np.diag([scale, -scale])), notes)
+    return _chained(path.name, _unpacked(path.name, drawn, np.diag(scale * [1.0, -1.0])), notes)
 
 
 def _svg_pieces(whole: Any, svgelements: Any, name: str) -> list[Piece]:

@@ -77,6 +77,27 @@ def test_svg_without_a_unit_says_what_was_taken(tmp_path):
     assert "states no unit" in shape.notes[0]
 
 
+@pytest.mark.parametrize(
+    ("head", "unit", "size"),
+    [
+        ('width="200" height="100" viewBox="0 0 100 100"', "mm", (0.05, 0.04)),  # drawn half as wide as the page
+        ('width="200mm" height="100mm" viewBox="0 0 100 100" preserveAspectRatio="none"', "mm", (0.05, 0.04)),
+        ('width="200mm" height="100mm" viewBox="0 0 100 100" preserveAspectRatio="none"', None, (0.1, 0.04)),
+        ('width="200mm" height="100mm" viewBox="0 0 100 100"', None, (0.05, 0.04)),
+        ('width="200mm" height="100mm" viewBox="0 0 100 100" preserveAspectRatio="xMidYMid slice"', None, (0.1, 0.08)),
+        ('width="100mm" viewBox="0 0 100 100"', None, (0.05, 0.04)),
+        ('height="100mm" viewBox="0 0 300 200"', None, (0.025, 0.02)),
+        ('width="10CM" height="10CM" viewBox="0 0 100 100"', None, (0.05, 0.04)),
+        ('width="72pt" height="72pt" viewBox="0 0 100 100"', None, (0.0127, 0.01016)),
+        ('width="100mm" height="100mm"', None, (50 * 0.0254 / 96, 40 * 0.0254 / 96)),
+    ],
+)
+def test_svg_has_the_size_of_its_page_or_of_the_unit_given(tmp_path, head, unit, size):
+    shape = mesh.outline(svg(tmp_path, '<rect width="50" height="40"/>', head), unit=unit)
+    assert_allclose(np.ptp(shape.points, axis=0), size, rtol=1e-9)
+    assert not any("no unit" in note for note in shape.notes)
+
+
 def test_dxf_lines_and_arcs_in_any_order_make_a_stadium(tmp_path):
     def draw(space):
         space.add_line((0, 0), (1000, 0))
