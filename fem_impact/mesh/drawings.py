@@ -211,16 +211,24 @@ def dxf_arrays(path: Path) -> dict[str, np.ndarray]:
     import ezdxf
 
     drawing = ezdxf.readfile(path)
+    hidden = {layer.dxf.name.lower() for layer in drawing.layers if layer.is_off() or layer.is_frozen()}
     found: list[Piece] = []
+    left: set[str] = set()
     for entity in drawing.modelspace():
-        found += _dxf_pieces(entity)
+        seen = not entity.dxf.get("invisible", 0) and entity.dxf.layer.lower() not in hidden
+        pieces = _dxf_pieces(entity) if seen else []
+        left |= set() if pieces else {entity.dxftype() if seen else f"hidden {entity.dxftype()}"}
+        found += pieces
         _check_number(path.name, found)
-    return {**_packed(found), "unit": np.array(int(drawing.header.get("$INSUNITS", 0)))}
+    unit = np.array(int(drawing.header.get("$INSUNITS", 0)))
+    return {**_packed(found), "unit": unit, "left": np.array(sorted(left), str)}
 
 
 def _dxf(path: Path, unit: str | None, notes: list[str]) -> Drawn:
     """Closed loops, and open paths on named layers, of the lines, arcs and splines in a DXF file's model space [m]."""
     drawn = isolated.read_apart(path, "DXF", "mesh.drawings:dxf_arrays")
+    if drawn["left"].size:
+        notes.append(f"{path.name}: left out, as they are no lines to see: {', '.join(drawn['left'].tolist())}")
     if unit is not None:
         scale = UNITS[check.one_of("unit", unit, UNITS)]
     else:
@@ -255,8 +263,9 @@ def _dxf_pieces(entity: Any) -> list[Piece]:
         start = float(entity.dxf.start_param)
         sweep = (float(entity.dxf.end_param) - start) % (2.0 * math.pi) or 2.0 * math.pi
         return [Arc(flat(entity.dxf.center), a, b, start, sweep, name)]
-    if kind in ("LWPOLYLINE", "POLYLINE"):
-        return [piece for part in entity.virtual_entities() for piece in _dxf_pieces(part)]
+    if kind in ("LWPOLYLINE", "POLYLINE", "INSERT"):
+        whole = entity.multi_insert() if kind == "INSERT" else [entity]
+        return [piece for each in whole for part in each.virtual_entities() for piece in _dxf_pieces(part)]
     if kind == "SPLINE":
         curve = entity.construction_tool()
         if curve.is_rational:

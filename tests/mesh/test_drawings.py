@@ -119,6 +119,27 @@ def test_dxf_polyline_with_a_bulge_is_an_arc(tmp_path):
     assert_allclose(curved, 2.0, rtol=1e-6)
 
 
+def test_dxf_blocks_are_drawn_and_what_is_hidden_or_no_line_is_told(tmp_path):
+    def draw(space):
+        space.add_lwpolyline([(0, 0), (1, 0), (1, 3), (0, 3)], close=True)
+        space.doc.blocks.new("bolt").add_circle((0, 0), 0.1)
+        pair = space.doc.blocks.new("pair")
+        pair.add_blockref("bolt", (0, 0))
+        pair.add_blockref("bolt", (0.6, 0))
+        rows = {"rotation": 90.0, "column_count": 2, "column_spacing": 1.0}  # columns turn with the block
+        space.add_blockref("pair", (0.5, 0.5), dxfattribs=rows)
+        space.doc.layers.add("Plan").off()
+        space.add_circle((0.2, 0.2), 0.1, dxfattribs={"layer": "plan"})
+        space.add_circle((0.2, 0.2), 0.1, dxfattribs={"invisible": 1})
+        space.add_text("top")
+
+    shape = mesh.outline(dxf(tmp_path, draw))
+    holes = [shape.points[shape.facets[shape.edges[f"hole{i}"]].ravel()] for i in range(4)]
+    centres = [0.5 * (hole.min(axis=0) + hole.max(axis=0)) for hole in holes]
+    assert_allclose(sorted(y for _, y in centres), [0.5, 1.1, 1.5, 2.1], atol=2e-3)  # chords
+    assert "hole4" not in shape.edges and "to see: TEXT, hidden CIRCLE" in shape.notes[0]
+
+
 def test_dxf_ellipse_and_spline(tmp_path):
     shape = mesh.outline(dxf(tmp_path, lambda space: space.add_ellipse((0, 0), (2, 0), 0.5)))
     assert_allclose(4.0 * first(shape, "clamped"), 27.377, rtol=1e-4)
