@@ -17,9 +17,9 @@ from .._base.rounding import SAME
 from . import meshio_reader
 from .loops import FARTHEST, UNITS, refuse_millimetres
 
-PLANE = ("triangle", "triangle6", "quad")
+PLANE = {"triangle": 3, "triangle6": 6, "triangle7": 7, "quad": 4, "quad8": 8, "quad9": 9}  # nodes of cells read here
 FLAT = 1e-5  # [-] of its extent, across the plane of a mesh: less is noise, as of coordinates with six digits
-NODES = {"line": 2, "line3": 3, "triangle": 3, "triangle6": 6, "quad": 4}  # nodes per cell of the types read here
+NODES = PLANE | {"line": 2, "line3": 3}
 
 
 def read_mesh(path: Any, unit: str | None) -> tuple[
@@ -150,21 +150,20 @@ def _triangles(path: Path, data: meshio_reader.Raw) -> tuple[np.ndarray, dict]:
             "make a beam with fi.mesh.line" if any(k.startswith("line") for k in kinds) else "a plate needs triangles"
         )
         raise ValueError(f"{name} contains {found} but no triangles; mesh the surface with triangles ({hint})")
+    other = [kind for kind in kinds if kind.startswith(("triangle", "quad", "polygon")) and kind not in PLANE]
+    if other:
+        raise ValueError(f"{name} contains {', '.join(other)}, which are not read; export linear or quadratic cells")
     if solid:
         raise ValueError(f"{name} contains volume cells ({', '.join(solid)}); export only the flat surface")
     cells, middles = [], {}
     for kind, nodes, _ in data.blocks:
         if kind in NODES and nodes.shape[1:] != (NODES[kind],):
             raise ValueError(f"{name} has a {kind} without exactly {NODES[kind]} nodes; export it again")
-        if kind == "triangle":
-            cells.append(nodes)
-        elif kind == "quad":
-            cells += [nodes[:, [0, 1, 2]], nodes[:, [0, 2, 3]]]
-        elif kind == "triangle6":
-            cells.append(nodes[:, :3])
-            for row in nodes.tolist():
-                for k, (a, b) in enumerate(((0, 1), (1, 2), (2, 0))):
-                    middles[row[a], row[b]] = row[3 + k]
+        n = 3 if kind.startswith("triangle") else 4
+        if kind in PLANE:
+            cells += [nodes[:, [0, k, k + 1]] for k in range(1, n - 1)]
+            for row in nodes.tolist() if nodes.shape[1] > n else ():
+                middles.update({(row[k], row[(k + 1) % n]): row[n + k] for k in range(n)})
     return np.concatenate(cells), middles
 
 

@@ -218,6 +218,27 @@ def test_quadrilaterals_are_divided(tmp_path):
     assert_allclose(parameters(plate, {"boundary": "hinged"}), HINGED, rtol=1e-5)
 
 
+@pytest.mark.parametrize("kind", ["quad8", "quad9"])
+def test_curved_quadrilaterals_beside_triangles_are_no_holes(tmp_path, kind):
+    """A ring of quadratic cells, half quadrilaterals, half triangles."""
+    n, turn = 24, np.linspace(0.0, 2.0 * np.pi, 48, endpoint=False)
+    place = np.concatenate([r * np.column_stack([np.cos(turn), np.sin(turn)]) for r in (0.8, 0.9, 1.0)])
+    quads, triangles = [], []
+    for i in range(n):
+        (a, m, b), across = [(2 * i + k) % 48 for k in range(3)], 96
+        inner, middle, outer = ([a + up, m + up, b + up] for up in (0, 48, across))
+        corners, between = [inner[0], outer[0], outer[2], inner[2]], [middle[0], outer[1], middle[2], inner[1]]
+        if i % 2:
+            quads.append(corners + between + ([middle[1]] if kind == "quad9" else []))
+        else:
+            triangles += [[*corners[:3], *between[:2], middle[1]], [corners[0], *corners[2:], middle[1], *between[2:]]]
+    points = np.column_stack([place, np.zeros(len(place))])
+    meshio.Mesh(points, [(kind, np.array(quads)), ("triangle6", np.array(triangles))]).write(tmp_path / "ring.vtu")
+    ring = mesh.load(tmp_path / "ring.vtu")
+    assert set(ring.edges) == {"outer", "hole0", "boundary"} and ring.curved.all()
+    assert_allclose(np.abs(ring.curvatures[ring.edges["outer"]]), 1.0, rtol=1e-3)
+
+
 def test_units_are_converted(tmp_path):
     path = written(tmp_path, GOOD.points * 1e3, GOOD.cells)
     assert_allclose(mesh.load(path, unit="mm").area, 1.55)
