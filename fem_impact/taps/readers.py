@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from .._base import check, isolated
+from ..modes import universal_files
 from . import units
 
 END_OF_HEADER = "***End_of_Header***"
@@ -459,7 +460,7 @@ def universal(path: Path) -> Recording:
     """Time records in data set 58 of a universal file; the second record of a channel begins a new segment."""
     file = Universal.opened(path)
     instead = "; export those, or give the path of frequency responses to fi.frf"
-    factors = file.factors
+    factors = universal_files.factors(file.sets(164))
     channels: dict[tuple[Any, ...], list[np.ndarray]] = {}
     rates, unit, notes = [], {}, []
     for one in file.of_type(TIME_RESPONSE, "time records", instead):
@@ -541,15 +542,6 @@ class Universal:
             holds = " and ".join(said + [f"data sets {others}"] * bool(others)) or "no data sets"
             raise ValueError(f"{self.path.name} holds {holds}, no {words}{instead}")
         return found
-
-    @property
-    def factors(self) -> dict[str, float]:
-        """By what data of a unit's kind are divided to be in SI, from data sets 164."""
-        found: dict[str, float] = {}
-        for one in self.sets(164):
-            length, force = float(one["length"]), float(one["force"])
-            found |= {"N": force, "m/s^2": length, "m/s": length, "m": length}
-        return {kind: factor for kind, factor in found.items() if factor > 0.0 and factor != 1.0}
 
 
 def uff_name(one: dict) -> str:
