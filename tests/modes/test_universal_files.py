@@ -131,8 +131,8 @@ def test_files_in_other_units_or_frames_and_of_other_quantities(tmp_path):
     assert_allclose(again.frequencies, modes.frequencies, rtol=1e-5)
     shapes = modes.shape_at(points)
     assert_allclose(again.shape_at(points), shapes, atol=1e-5 * np.abs(shapes).max())
-    frames = {"type": 2420, "CS_colors": [8, 8], "CS_names": ["all", "own"], "CS_sys_labels": [1, 5], "CS_types": [0, 0]}
-    frames["CS_matrices"] = [np.eye(4)[:, :3], np.eye(4)[::-1, :3]]
+    frames = {"type": 2420, "CS_colors": [8, 8], "CS_names": ["all", "own"], "CS_sys_labels": [1, 5]}
+    frames |= {"CS_types": [0, 0], "CS_matrices": [np.eye(4)[:, :3], np.eye(4)[::-1, :3]]}
     for system, told in ((1, True), (5, False)):
         for entry in sets[:2]:
             entry["disp_cs"] = np.full(len(points), system)
