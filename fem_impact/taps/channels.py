@@ -32,7 +32,9 @@ def in_si(
         notes.append("the force is mostly negative and was turned around")
         pushed = [-row for row in pushed]
     moved = [segment[:, others] * np.array(factors[1:]) for segment in found.segments]
-    return list(zip(pushed, moved)), [found.names[i] for i in others], kinds[1:], notes
+    whole = [found.names[i] for i in others]
+    short = [units.label(name)[0] for name in whole]
+    return list(zip(pushed, moved)), short if len(set(short)) == len(short) else whole, kinds[1:], notes
 
 
 def stated_units(found: readers.Recording, given: Mapping[str, str] | None) -> list[str]:
