@@ -389,10 +389,12 @@ def write_mesh(
     if path.suffix != ".msh":
         raise ValueError(f"path must end in .msh, got {path.name!r}")
     own = [name for name in edges if name not in ("boundary", "outer")] or ["boundary"]
-    tag = np.zeros(len(facets), int)
-    for i, name in enumerate(own):
-        tag[edges[name]] = i + 1
-    names = {name: np.array([i + 1, 1]) for i, name in enumerate(own)} | {"plate": np.array([len(own) + 1, 2])}
+    parts = [np.arange(len(facets))[edges[name]] for name in own]  # a facet of two names is written twice
+    parts.append(np.setdiff1d(np.arange(len(facets)), np.concatenate(parts)))
+    tag = np.repeat([*range(1, len(own) + 1), 0], [len(part) for part in parts])
+    facets, middles = facets[np.concatenate(parts)], middles[np.concatenate(parts)]
+    names = {name: np.array([i + 1, 1]) for i, name in enumerate(own)}
+    names["plate" if "plate" not in own else " ".join([*own, "plate"])] = np.array([len(own) + 1, 2])
     place = [points]
     blocks: list[tuple[str, np.ndarray]] = [("line", facets), ("triangle", cells)]
     if curved.any():

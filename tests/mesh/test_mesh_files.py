@@ -53,6 +53,20 @@ def test_saved_mesh_comes_back_with_its_edges(tmp_path):
     assert_allclose(parameters(plate, supports), parameters(GOOD, supports), rtol=1e-5)
 
 
+def test_saved_edges_may_overlap_and_be_called_as_the_surface(tmp_path):
+    points = np.column_stack([GOOD.points, np.zeros(len(GOOD.points))])
+    left = np.flatnonzero(points[:, 0] == 0.0)
+    sets = {"plate": left, "ALL": np.arange(len(points)), "LOW": left[points[left, 1] < 0.3]}
+    meshio.Mesh(points, [("triangle", GOOD.cells)], point_sets=sets).write(tmp_path / "plate.inp")
+    given = mesh.load(tmp_path / "plate.inp")
+    mesh.save(tmp_path / "again.msh", given)
+    again = mesh.load(tmp_path / "again.msh")
+    assert set(again.edges) == set(given.edges)
+    for name, facets in given.edges.items():
+        places = [np.sort(m.points[m.facets[m.edges[name]]].mean(axis=1), axis=0) for m in (given, again)]
+        assert len(facets) and np.array_equal(*places)
+
+
 def test_sets_of_nodes_are_edges(tmp_path):
     """Abaqus names a support by the nodes it holds; that of all nodes is the whole rim, a single node no edge."""
     points = np.column_stack([GOOD.points, np.zeros(len(GOOD.points))])
