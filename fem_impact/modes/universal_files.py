@@ -199,7 +199,7 @@ def _result(one: dict) -> dict:
         return {}
     values = np.array([row[:3] for row in one["data_at_node"]])
     told = {"freq": one.get("record12_field2"), "modal_m": one.get("record12_field4")}
-    told |= {"modal_damp_vis": one.get("record12_field5")}
+    told |= {"modal_damp_vis": one.get("record12_field5"), "modal_damp_his": one.get("record12_field6")}
     return one | told | dict(zip(COMPONENTS, values.T))
 
 
@@ -221,7 +221,8 @@ def _mode(name: str, i: int, mode: dict, measured: np.ndarray) -> tuple[float, f
         frequency, damping = abs(pole) / (2.0 * np.pi), -pole.real / abs(pole)
         modal_mass = abs(scale) / (2.0 * abs(pole.imag)) if scale else 0.0  # a normal mode has modal A = 2 i omega_d m
     else:
-        frequency, damping = float(mode["freq"]), float(mode.get("modal_damp_vis") or 0.0)
+        frequency, hysteretic = float(mode["freq"]), float(mode.get("modal_damp_his") or 0.0)
+        damping = float(mode.get("modal_damp_vis") or 0.5 * hysteretic)  # as much at resonance
         modal_mass = float(mode.get("modal_m") or 0.0)
     if modal_mass <= 0.0:
         raise ValueError(

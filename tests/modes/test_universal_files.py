@@ -105,8 +105,10 @@ def test_shapes_are_scaled_by_their_modal_mass(tmp_path):
     sets = pyuff.UFF(str(path)).read_sets()
     for entry in sets[3:]:
         entry["modal_m"], entry["r3"] = 4.0, 2.0 * entry["r3"]
+        entry["modal_damp_vis"], entry["modal_damp_his"] = 0.0, 0.02  # a loss factor: twice the damping ratio
     other = tmp_path / "scaled.uff"
     pyuff.UFF(str(other)).write_sets(sets, mode="add")
+    assert_allclose(Modes.from_uff(other, mass=1.0).damping_ratio, 0.01)
     assert_allclose(
         Modes.from_uff(other, mass=1.0).shape_at(points),
         Modes.from_uff(path, mass=1.0).shape_at(points),
