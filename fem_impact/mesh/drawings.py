@@ -195,14 +195,9 @@ def _svg_pieces(whole: Any, svgelements: Any, name: str) -> list[Piece]:
         if isinstance(part, svgelements.Arc):
             centre, a, b = (np.array([p.x, p.y]) for p in (part.center, part.prx, part.pry))
             pieces.append(Arc(centre, a - centre, b - centre, float(part.get_start_t()), float(part.sweep), name))
-        elif isinstance(part, (svgelements.CubicBezier, svgelements.QuadraticBezier)):
-            cubic = isinstance(part, svgelements.CubicBezier)
-            inner = (part.control1, part.control2) if cubic else (part.control,)
-            pieces.append(Bezier(np.array([[p.x, p.y] for p in (part.start, *inner, part.end)], float), name))
-        elif (
-            isinstance(part, (svgelements.Line, svgelements.Close)) and part.start is not None and part.end is not None
-        ):
-            pieces.append(segment((part.start.x, part.start.y), (part.end.x, part.end.y), name))
+        elif not isinstance(part, svgelements.Move) and part.start is not None and part.end is not None:
+            control = [getattr(part, end, None) for end in ("start", "control", "control1", "control2", "end")]
+            pieces.append(Bezier(np.array([[p.x, p.y] for p in control if p is not None], float), name))
     return pieces
 
 
@@ -251,13 +246,9 @@ def _dxf_pieces(entity: Any) -> list[Piece]:
     if kind == "LINE":
         return [segment(flat(entity.dxf.start), flat(entity.dxf.end), name)]
     if kind in ("ARC", "CIRCLE"):
-        start = math.radians(entity.dxf.start_angle) if kind == "ARC" else 0.0
-        stop = math.radians(entity.dxf.end_angle) if kind == "ARC" else 2.0 * math.pi
-        sweep = (stop - start) % (2.0 * math.pi) or 2.0 * math.pi
-        side = -1.0 if entity.dxf.extrusion.z < 0.0 else 1.0  # drawn from below: x is mirrored
-        radius = float(entity.dxf.radius)
-        centre = flat(entity.dxf.center) * [side, 1.0]
-        return [Arc(centre, np.array([side * radius, 0.0]), np.array([0.0, radius]), start, sweep, name)]
+        from ezdxf.entities import Ellipse
+
+        return _dxf_pieces(Ellipse.from_arc(entity))
     if kind == "ELLIPSE":
         a, b = flat(entity.dxf.major_axis), flat(entity.minor_axis)
         start = float(entity.dxf.start_param)
@@ -268,10 +259,8 @@ def _dxf_pieces(entity: Any) -> list[Piece]:
         return [piece for each in whole for part in each.virtual_entities() for piece in _dxf_pieces(part)]
     if kind == "SPLINE":
         curve = entity.construction_tool()
-        if curve.is_rational:
-            parts = [part.control_points for part in curve.cubic_bezier_approximation(level=8)]
-        else:
-            parts = list(curve.bezier_decomposition())
+        near = curve.cubic_bezier_approximation(level=8) if curve.is_rational else ()
+        parts = [part.control_points for part in near] or list(curve.bezier_decomposition())
         return [Bezier(np.array([flat(p) for p in part]), name) for part in parts]
     return []
 
@@ -300,12 +289,10 @@ def _unpacked(name: str, drawn: dict[str, np.ndarray], matrix: np.ndarray) -> li
     if not np.isfinite(drawn["numbers"]).all():
         raise ValueError(f"{name} has coordinates that are not finite numbers; correct the drawing")
     rows = np.split(drawn["numbers"], np.cumsum(drawn["lengths"])[:-1])
-    pieces: list[Piece] = []
-    for row, arc, edge in zip(rows, drawn["arcs"], drawn["names"].tolist()):
-        if arc:
-            pieces.append(Arc(row[:2], row[2:4], row[4:6], float(row[6]), float(row[7]), edge))
-        else:
-            pieces.append(Bezier(row.reshape(-1, 2), edge))
+    pieces = [
+        Arc(row[:2], row[2:4], row[4:6], *row[6:].tolist(), edge) if arc else Bezier(row.reshape(-1, 2), edge)
+        for row, arc, edge in zip(rows, drawn["arcs"], drawn["names"].tolist())
+    ]
     return [piece.moved(matrix, np.zeros(2)) for piece in pieces]
 
 

@@ -70,16 +70,11 @@ def _plane_points(
     lost = used[(used < 0) | (used >= len(points))]
     if lost.size:
         raise ValueError(f"{name} has a cell with node {lost[0]} but only {len(points)} nodes; export it again")
-    bad = used[~np.isfinite(points[used]).all(axis=1)]
-    if bad.size:
-        raise ValueError(
-            f"{name} has a coordinate that is not a number at node {bad[0]}: {points[bad[0]]}; correct that node"
-        )
-    far = used[np.abs(points[used]).max(axis=1, initial=0.0) > FARTHEST]
-    if far.size:
-        raise ValueError(
-            f"{name} has a coordinate beyond {FARTHEST:g} at node {far[0]}: {points[far[0]]}; correct that node"
-        )
+    far = np.abs(points[used]) > FARTHEST
+    for what, where in ("that is not a number", ~np.isfinite(points[used])), (f"beyond {FARTHEST:g}", far):
+        bad = used[where.any(axis=1)]
+        if bad.size:
+            raise ValueError(f"{name} has a coordinate {what} at node {bad[0]}: {points[bad[0]]}; correct that node")
     height = None
     if points.shape[1] == 3:
         points, flat = _levelled(points, used, notes)

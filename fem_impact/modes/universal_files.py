@@ -148,11 +148,8 @@ def places(sets: list[dict]) -> tuple[np.ndarray, np.ndarray]:
 
 def factors(sets: list[dict]) -> dict[str, float]:
     """By what data of a unit's kind are divided to be in SI, from data sets 164."""
-    found: dict[str, float] = {}
-    for one in sets:
-        if one["type"] == 164:
-            length, force = float(one["length"]), float(one["force"])
-            found |= {"N": force, "m/s^2": length, "m/s": length, "m": length}
+    length, force = next(((float(s["length"]), float(s["force"])) for s in sets if s["type"] == 164), (1.0, 1.0))
+    found = {"N": force, "m/s^2": length, "m/s": length, "m": length}
     return {kind: factor for kind, factor in found.items() if factor > 0.0 and factor != 1.0}
 
 

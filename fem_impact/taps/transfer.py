@@ -320,7 +320,7 @@ def read_frf(path: Any) -> xr.Dataset:
 
 def arrays(path: Path) -> dict[str, np.ndarray]:
     """The result of `read_frf` as arrays, for the separate process."""
-    file = readers.Universal.opened(path)
+    file = readers.Universal(path)
     factors = universal_files.factors(file.sets(164))
     sets = file.of_type(readers.FREQUENCY_RESPONSE, "frequency responses")
     frequency = np.asarray(sets[0]["x"], float)

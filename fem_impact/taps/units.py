@@ -25,12 +25,9 @@ LABEL = re.compile(r"^(.*?)\s*[\[(]([^\])]*)[\])]\s*$")  # "Force [N]", "Force (
 def known(unit: str) -> tuple[str, float] | None:
     """The SI unit of a unit's kind, and the factor to it; None for a unit that is not known."""
     text = re.sub(r"(?<=/s)(²|\*\*2|2)$", "^2", unit.strip("() ").replace("μ", "µ"))
-    for fold in (str, str.casefold):  # "mN" and "MN" differ, so the exact spelling comes first
-        for si, factors in KINDS.items():
-            for name, factor in factors.items():
-                if fold(name) == fold(text):
-                    return si, factor
-    return None
+    every = [(name, si, factor) for si, factors in KINDS.items() for name, factor in factors.items()]
+    folds = str, str.casefold  # "mN" and "MN" differ, so the exact spelling comes first
+    return next(((si, factor) for fold in folds for name, si, factor in every if fold(name) == fold(text)), None)
 
 
 def label(text: str) -> tuple[str, str]:
