@@ -44,7 +44,6 @@ LONGEST_COMMENT = 1_000_000  # [-] characters of a comment in a drawing: longer 
 # [rad] in a drawing without names, a sharper turn, of some 6 degrees, starts a new edge; smooth joints turn by less
 CORNER = 0.1
 
-
 Drawn = tuple[list[Loop], dict[str, np.ndarray]]  # closed loops, and named open paths (n, 2) [m]
 
 
@@ -182,8 +181,7 @@ def _svg(path: Path, unit: str | None, notes: list[str]) -> Drawn:
         size = pixels * SVG_UNITS["px"]
         notes.append(f"{path.name} states no unit; assumed px of 1/96 inch, pass unit= to change that")
     notes.append(f"{path.name}: y points down in an SVG file and up here: the drawing's y is taken as -y")
-    with np.errstate(divide="ignore", invalid="ignore"):
-        scale = size / pixels
+    scale = size / np.where(pixels, pixels, np.nan)
     if not (np.isfinite(scale) & (scale > 0.0)).all():
         raise ValueError(f"{path.name} has no usable width and viewBox; set both to positive numbers")
     return _chained(path.name, _unpacked(path.name, drawn, np.diag(scale * [1.0, -1.0])), notes)
@@ -240,20 +238,17 @@ def _dxf(path: Path, unit: str | None, notes: list[str]) -> Drawn:
 def _dxf_pieces(entity: Any) -> list[Piece]:
     kind, name = entity.dxftype(), "" if entity.dxf.get("layer", "0") == "0" else str(entity.dxf.layer)
 
-    def flat(point: Any) -> np.ndarray:
-        return np.array([point[0], point[1]], float)
-
     if kind == "LINE":
-        return [segment(flat(entity.dxf.start), flat(entity.dxf.end), name)]
+        return [segment(tuple(entity.dxf.start.vec2), tuple(entity.dxf.end.vec2), name)]
     if kind in ("ARC", "CIRCLE"):
         from ezdxf.entities import Ellipse
 
         return _dxf_pieces(Ellipse.from_arc(entity))
     if kind == "ELLIPSE":
-        a, b = flat(entity.dxf.major_axis), flat(entity.minor_axis)
+        centre, a, b = (np.array([p.x, p.y]) for p in (entity.dxf.center, entity.dxf.major_axis, entity.minor_axis))
         start = float(entity.dxf.start_param)
         sweep = (float(entity.dxf.end_param) - start) % (2.0 * math.pi) or 2.0 * math.pi
-        return [Arc(flat(entity.dxf.center), a, b, start, sweep, name)]
+        return [Arc(centre, a, b, start, sweep, name)]
     if kind in ("LWPOLYLINE", "POLYLINE", "INSERT"):
         whole = entity.multi_insert() if kind == "INSERT" else [entity]
         return [piece for each in whole for part in each.virtual_entities() for piece in _dxf_pieces(part)]
@@ -261,7 +256,7 @@ def _dxf_pieces(entity: Any) -> list[Piece]:
         curve = entity.construction_tool()
         near = curve.cubic_bezier_approximation(level=8) if curve.is_rational else ()
         parts = [part.control_points for part in near] or list(curve.bezier_decomposition())
-        return [Bezier(np.array([flat(p) for p in part]), name) for part in parts]
+        return [Bezier(np.array([[p.x, p.y] for p in part]), name) for part in parts]
     return []
 
 
@@ -289,8 +284,8 @@ def _unpacked(name: str, drawn: dict[str, np.ndarray], matrix: np.ndarray) -> li
     if not np.isfinite(drawn["numbers"]).all():
         raise ValueError(f"{name} has coordinates that are not finite numbers; correct the drawing")
     rows = np.split(drawn["numbers"], np.cumsum(drawn["lengths"])[:-1])
-    pieces = [
-        Arc(row[:2], row[2:4], row[4:6], *row[6:].tolist(), edge) if arc else Bezier(row.reshape(-1, 2), edge)
+    pieces: list[Piece] = [
+        Arc(row[:2], row[2:4], row[4:6], row[6], row[7], edge) if arc else Bezier(row.reshape(-1, 2), edge)
         for row, arc, edge in zip(rows, drawn["arcs"], drawn["names"].tolist())
     ]
     return [piece.moved(matrix, np.zeros(2)) for piece in pieces]

@@ -141,9 +141,7 @@ def _triangles(path: Path, data: meshio_reader.Raw) -> tuple[np.ndarray, dict]:
     solid = [kind for kind in kinds if kind.startswith(("tetra", "hexahedron", "wedge", "pyramid"))]
     if not set(kinds) & set(PLANE):
         found = ", ".join(kinds) or "no cells"
-        hint = (
-            "make a beam with fi.mesh.line" if any(k.startswith("line") for k in kinds) else "a plate needs triangles"
-        )
+        hint = "make a beam with fi.mesh.line" if set(kinds) & {"line", "line3"} else "a plate needs triangles"
         raise ValueError(f"{name} contains {found} but no triangles; mesh the surface with triangles ({hint})")
     other = [kind for kind in kinds if kind.startswith(("triangle", "quad", "polygon")) and kind not in PLANE]
     if other:
@@ -390,21 +388,20 @@ def write_mesh(
     facets, middles = facets[np.concatenate(parts)], middles[np.concatenate(parts)]
     names = {name: np.array([i + 1, 1]) for i, name in enumerate(own)}
     names["plate" if "plate" not in own else " ".join([*own, "plate"])] = np.array([len(own) + 1, 2])
-    place = [points]
+    flat = points
     blocks: list[tuple[str, np.ndarray]] = [("line", facets), ("triangle", cells)]
     if curved.any():
         unique, number, _ = sides_of(cells)
         halfway = points[unique].mean(axis=1)
         on_rim = numbers_of(unique, facets)
         halfway[on_rim] = middles
-        place.append(halfway)
+        flat = np.concatenate([points, halfway])
         blocks = [
             ("line3", np.column_stack([facets, len(points) + on_rim])),
             ("triangle6", np.column_stack([cells, len(points) + number])),
         ]
     import meshio  # imported here because it takes 0.1 s and only saving needs it
 
-    flat = np.concatenate(place)
     tags = [tag, np.full(len(cells), len(own) + 1)]
     data = {"gmsh:physical": tags, "gmsh:geometrical": tags}
     height = np.zeros(len(flat)) if rise is None else check.field("rise", rise, flat, "m")

@@ -12,7 +12,6 @@ from .._base import check, isolated
 from . import cell_kinds
 
 NORMAL_MODE, DISPLACEMENT = 2, 8  # codes of data sets 55 and 2414: of an analysis, and of what is shown
-MOTIONS = 0, DISPLACEMENT, 11, 12  # what shapes of data set 55 may show: not stated, or as velocity or acceleration
 CELL_CODE = {2: 11, 3: 91, 4: 94}  # nodes of a cell -> rod, thin shell triangle, thin shell quadrilateral
 # codes of elements: rods and beams, plane and shell elements, solids
 LINES, SHELLS, SOLIDS = (11, 21, 22), range(41, 97), range(111, 119)
@@ -104,8 +103,7 @@ def arrays(path: Path) -> dict[str, np.ndarray]:
     sets = [file.read_sets(i) for i, kind in enumerate(kinds) if kind in (15, 55, 164, 2411, 2414, 2420)]
     _refuse_frames(path.name, sets)
     numbers, place = places(sets)
-    scale = factors(sets)
-    length, force = (scale.get(kind, 1.0) for kind in ("m", "N"))
+    length, force = (factors(sets).get(kind, 1.0) for kind in ("m", "N"))
     results = [_result(s) for s in sets if s["type"] in (55, 2414)]
     modes = [s for s in results if s.get("analysis_type") in (NORMAL_MODE, 3)]
     static = [s for s in results if s.get("analysis_type") == 1]
@@ -155,13 +153,12 @@ def factors(sets: list[dict]) -> dict[str, float]:
 
 def _refuse_frames(name: str, sets: list[dict]) -> None:
     """ValueError if nodes are placed, or move, along axes of their own."""
-    whole = [s for s in sets if s["type"] == 2420]
-    systems = [each for s in whole for each in zip(s["CS_sys_labels"], s["CS_types"], s["CS_matrices"])]
-    turned = {label for label, kind, axes in systems if kind or not np.allclose(axes, np.eye(4)[:, :3])}
-    for key in ("def_cs", "disp_cs"):
-        found = turned & {int(frame) for s in sets if s["type"] in (15, 2411) for frame in s[key]}
-        if found:
-            raise ValueError(f"{name} has nodes in coordinate system {min(found)}; export all in the global one")
+    rows = [zip(s["CS_sys_labels"], s["CS_types"], s["CS_matrices"]) for s in sets if s["type"] == 2420]
+    turned = {label for row in rows for label, kind, axes in row if kind or not np.allclose(axes, np.eye(4)[:, :3])}
+    nodes = [s for s in sets if s["type"] in (15, 2411)]
+    used = turned & {int(frame) for s in nodes for key in ("def_cs", "disp_cs") for frame in s[key]}
+    if used:
+        raise ValueError(f"{name} has nodes in coordinate system {min(used)}; export all in the global one")
 
 
 def _elements(file: Any, i: int) -> list[dict]:
@@ -191,7 +188,7 @@ def _cells(elements: list[dict], row: dict[int, int], dimension: int) -> np.ndar
 def _result(one: dict) -> dict:
     """A data set 2414 as one 55 says the same; nothing of what shows no motion, such as stresses."""
     if one["type"] == 55:
-        return one if one.get("spec_data_type", 0) in MOTIONS else {}
+        return one if one.get("spec_data_type", 0) in (0, DISPLACEMENT, 11, 12) else {}
     if one.get("dataset_location") != 1 or one.get("result_type") != DISPLACEMENT:
         return {}
     values = np.array([row[:3] for row in one["data_at_node"]])

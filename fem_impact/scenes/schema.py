@@ -430,8 +430,7 @@ def _check_keys(selector: str, kind: str, values: dict[str, Any], maker: Callabl
         if key not in arguments:
             found = {name: [k for k, m in makers.items() if key in keys_of(m)] for name, (_, makers) in MAKERS.items()}
             own = next((kinds for name, kinds in found.items() if maker in MAKERS[name][1].values()), [])
-            homes = [f"[{name}]" for name, kinds in found.items() if kinds]
-            homes = [f"{selector} = {', '.join(map(repr, own))}"] if own else homes
+            homes = [f"{selector} = {', '.join(map(repr, own))}"] if own else [f"[{n}]" for n, k in found.items() if k]
             elsewhere = f"; it is one of {' and '.join(homes)}" if homes else f"; it has {', '.join(known)}"
             raise ValueError(f"{key} is not a key of this table{check.nearest(key, known) or elsewhere}")
     for key, argument in arguments.items():
