@@ -35,6 +35,7 @@ from .loops import (
 from .smooth_edges import smooth_runs
 
 DXF_UNITS = {1: 0.0254, 2: 0.3048, 4: 1e-3, 5: 1e-2, 6: 1.0, 13: 1e-6, 14: 0.1}  # $INSUNITS code -> [m]
+SVG_UNITS = UNITS | {"px": 0.0254 / 96.0, "pt": 0.0254 / 72.0, "pc": 0.0254 / 6.0}  # by the CSS standard -> [m]
 # [-] gaps below this fraction of the extent are closed and noted: a line's width on paper, no hole anybody means
 BRIDGED = 1e-3
 MOST_NUMBERS = 100 * MOST_PIECES  # [-] most digit groups in the shapes of a drawing; an arc of long decimals has 12
@@ -42,7 +43,6 @@ SHAPES = {"path", "rect", "circle", "ellipse", "line", "polyline", "polygon"}
 LONGEST_COMMENT = 1_000_000  # [-] characters of a comment in a drawing: longer ones are none
 # [rad] in a drawing without names, a sharper turn, of some 6 degrees, starts a new edge; smooth joints turn by less
 CORNER = 0.1
-
 
 Drawn = tuple[list[Loop], dict[str, np.ndarray]]  # closed loops, and named open paths (n, 2) [m]
 
@@ -127,11 +127,20 @@ def svg_arrays(path: Path) -> dict[str, np.ndarray]:
             whole.reify()
             found += _svg_pieces(whole, svgelements, str(shape.id) if shape.id else "")
             _check_number(path.name, found)
-    box = drawing.viewbox.width if drawing.viewbox is not None and drawing.viewbox.width else drawing.width
-    stated = re.fullmatch(r"\s*([\d.eE+-]+)\s*(mm|cm|in)\s*", str(drawing.values.get("width", "")))
-    # parsed here because svgelements rounds its millimetre to seven digits
-    width = float(stated[1]) * UNITS[stated[2]] if stated else np.nan
-    return {**_packed(found), "size": np.array([float(box), float(drawing.width), width])}
+    shown, box = svgelements.Matrix(drawing.viewbox_transform), drawing.viewbox
+    # parsed here because svgelements rounds its millimetre to seven digits, and takes a side not stated for 1000 px
+    sides = [_side(str(drawing.values.get(name, ""))) for name in ("width", "height")]
+    each = np.array(sides) / (box.width, box.height) if box else 0.0 * np.array(sides) + SVG_UNITS["px"]
+    style = str(box.preserve_aspect_ratio if box else "")
+    if not style.startswith("none") or np.isnan(each).any():
+        each = np.full(2, (np.fmax if "slice" in style else np.fmin).reduce(each))
+    return {**_packed(found), "pixels": np.array([shown.a, shown.d]), "size": each}
+
+
+def _side(text: str) -> float:
+    """A width or height [m] of an SVG file; NaN if it states none, or one without a unit."""
+    stated = re.fullmatch(r"\s*([\d.eE+-]+)\s*([a-z]+)\s*", text.lower())
+    return float(stated[1]) * SVG_UNITS.get(stated[2], math.nan) if stated else math.nan
 
 
 def _refuse_entities(path: Path) -> None:
@@ -165,18 +174,17 @@ def _refuse_entities(path: Path) -> None:
 def _svg(path: Path, unit: str | None, notes: list[str]) -> Drawn:
     """Closed loops and named open paths [m] of all shapes in an SVG file, y upward."""
     drawn = isolated.read_apart(path, "SVG", "mesh.drawings:svg_arrays")
-    box, pixels, width = drawn["size"].tolist()
-    scale = 0.0254 / 96.0  # one px by the CSS standard
+    pixels, size = drawn["pixels"], drawn["size"]  # of one unit of the drawing, along x and y
     if unit is not None:
-        scale = UNITS[check.one_of("unit", unit, UNITS)] * box / pixels if pixels else math.nan
-    elif not math.isnan(width):
-        scale = width / pixels if pixels else math.nan
-    else:
+        size = np.full(2, UNITS[check.one_of("unit", unit, UNITS)])
+    elif np.isnan(size).any():
+        size = pixels * SVG_UNITS["px"]
         notes.append(f"{path.name} states no unit; assumed px of 1/96 inch, pass unit= to change that")
     notes.append(f"{path.name}: y points down in an SVG file and up here: the drawing's y is taken as -y")
-    if not (math.isfinite(scale) and scale > 0.0):
+    scale = size / np.where(pixels, pixels, np.nan)
+    if not (np.isfinite(scale) & (scale > 0.0)).all():
         raise ValueError(f"{path.name} has no usable width and viewBox; set both to positive numbers")
-    return _chained(path.name, _unpacked(path.name, drawn, np.diag([scale, -scale])), notes)
+    return _chained(path.name, _unpacked(path.name, drawn, np.diag(scale * [1.0, -1.0])), notes)
 
 
 def _svg_pieces(whole: Any, svgelements: Any, name: str) -> list[Piece]:
@@ -185,14 +193,9 @@ def _svg_pieces(whole: Any, svgelements: Any, name: str) -> list[Piece]:
         if isinstance(part, svgelements.Arc):
             centre, a, b = (np.array([p.x, p.y]) for p in (part.center, part.prx, part.pry))
             pieces.append(Arc(centre, a - centre, b - centre, float(part.get_start_t()), float(part.sweep), name))
-        elif isinstance(part, (svgelements.CubicBezier, svgelements.QuadraticBezier)):
-            cubic = isinstance(part, svgelements.CubicBezier)
-            inner = (part.control1, part.control2) if cubic else (part.control,)
-            pieces.append(Bezier(np.array([[p.x, p.y] for p in (part.start, *inner, part.end)], float), name))
-        elif (
-            isinstance(part, (svgelements.Line, svgelements.Close)) and part.start is not None and part.end is not None
-        ):
-            pieces.append(segment((part.start.x, part.start.y), (part.end.x, part.end.y), name))
+        elif not isinstance(part, svgelements.Move) and part.start is not None and part.end is not None:
+            control = [getattr(part, end, None) for end in ("start", "control", "control1", "control2", "end")]
+            pieces.append(Bezier(np.array([[p.x, p.y] for p in control if p is not None], float), name))
     return pieces
 
 
@@ -201,16 +204,24 @@ def dxf_arrays(path: Path) -> dict[str, np.ndarray]:
     import ezdxf
 
     drawing = ezdxf.readfile(path)
+    hidden = {layer.dxf.name.lower() for layer in drawing.layers if layer.is_off() or layer.is_frozen()}
     found: list[Piece] = []
+    left: set[str] = set()
     for entity in drawing.modelspace():
-        found += _dxf_pieces(entity)
+        seen = not entity.dxf.get("invisible", 0) and entity.dxf.layer.lower() not in hidden
+        pieces = _dxf_pieces(entity) if seen else []
+        left |= set() if pieces else {entity.dxftype() if seen else f"hidden {entity.dxftype()}"}
+        found += pieces
         _check_number(path.name, found)
-    return {**_packed(found), "unit": np.array(int(drawing.header.get("$INSUNITS", 0)))}
+    unit = np.array(int(drawing.header.get("$INSUNITS", 0)))
+    return {**_packed(found), "unit": unit, "left": np.array(sorted(left), str)}
 
 
 def _dxf(path: Path, unit: str | None, notes: list[str]) -> Drawn:
     """Closed loops, and open paths on named layers, of the lines, arcs and splines in a DXF file's model space [m]."""
     drawn = isolated.read_apart(path, "DXF", "mesh.drawings:dxf_arrays")
+    if drawn["left"].size:
+        notes.append(f"{path.name}: left out, as they are no lines to see: {', '.join(drawn['left'].tolist())}")
     if unit is not None:
         scale = UNITS[check.one_of("unit", unit, UNITS)]
     else:
@@ -227,33 +238,25 @@ def _dxf(path: Path, unit: str | None, notes: list[str]) -> Drawn:
 def _dxf_pieces(entity: Any) -> list[Piece]:
     kind, name = entity.dxftype(), "" if entity.dxf.get("layer", "0") == "0" else str(entity.dxf.layer)
 
-    def flat(point: Any) -> np.ndarray:
-        return np.array([point[0], point[1]], float)
-
     if kind == "LINE":
-        return [segment(flat(entity.dxf.start), flat(entity.dxf.end), name)]
+        return [segment(tuple(entity.dxf.start.vec2), tuple(entity.dxf.end.vec2), name)]
     if kind in ("ARC", "CIRCLE"):
-        start = math.radians(entity.dxf.start_angle) if kind == "ARC" else 0.0
-        stop = math.radians(entity.dxf.end_angle) if kind == "ARC" else 2.0 * math.pi
-        sweep = (stop - start) % (2.0 * math.pi) or 2.0 * math.pi
-        side = -1.0 if entity.dxf.extrusion.z < 0.0 else 1.0  # drawn from below: x is mirrored
-        radius = float(entity.dxf.radius)
-        centre = flat(entity.dxf.center) * [side, 1.0]
-        return [Arc(centre, np.array([side * radius, 0.0]), np.array([0.0, radius]), start, sweep, name)]
+        from ezdxf.entities import Ellipse
+
+        return _dxf_pieces(Ellipse.from_arc(entity))
     if kind == "ELLIPSE":
-        a, b = flat(entity.dxf.major_axis), flat(entity.minor_axis)
+        centre, a, b = (np.array([p.x, p.y]) for p in (entity.dxf.center, entity.dxf.major_axis, entity.minor_axis))
         start = float(entity.dxf.start_param)
         sweep = (float(entity.dxf.end_param) - start) % (2.0 * math.pi) or 2.0 * math.pi
-        return [Arc(flat(entity.dxf.center), a, b, start, sweep, name)]
-    if kind in ("LWPOLYLINE", "POLYLINE"):
-        return [piece for part in entity.virtual_entities() for piece in _dxf_pieces(part)]
+        return [Arc(centre, a, b, start, sweep, name)]
+    if kind in ("LWPOLYLINE", "POLYLINE", "INSERT"):
+        whole = entity.multi_insert() if kind == "INSERT" else [entity]
+        return [piece for each in whole for part in each.virtual_entities() for piece in _dxf_pieces(part)]
     if kind == "SPLINE":
         curve = entity.construction_tool()
-        if curve.is_rational:
-            parts = [part.control_points for part in curve.cubic_bezier_approximation(level=8)]
-        else:
-            parts = list(curve.bezier_decomposition())
-        return [Bezier(np.array([flat(p) for p in part]), name) for part in parts]
+        near = curve.cubic_bezier_approximation(level=8) if curve.is_rational else ()
+        parts = [part.control_points for part in near] or list(curve.bezier_decomposition())
+        return [Bezier(np.array([[p.x, p.y] for p in part]), name) for part in parts]
     return []
 
 
@@ -281,12 +284,10 @@ def _unpacked(name: str, drawn: dict[str, np.ndarray], matrix: np.ndarray) -> li
     if not np.isfinite(drawn["numbers"]).all():
         raise ValueError(f"{name} has coordinates that are not finite numbers; correct the drawing")
     rows = np.split(drawn["numbers"], np.cumsum(drawn["lengths"])[:-1])
-    pieces: list[Piece] = []
-    for row, arc, edge in zip(rows, drawn["arcs"], drawn["names"].tolist()):
-        if arc:
-            pieces.append(Arc(row[:2], row[2:4], row[4:6], float(row[6]), float(row[7]), edge))
-        else:
-            pieces.append(Bezier(row.reshape(-1, 2), edge))
+    pieces: list[Piece] = [
+        Arc(row[:2], row[2:4], row[4:6], row[6], row[7], edge) if arc else Bezier(row.reshape(-1, 2), edge)
+        for row, arc, edge in zip(rows, drawn["arcs"], drawn["names"].tolist())
+    ]
     return [piece.moved(matrix, np.zeros(2)) for piece in pieces]
 
 

@@ -17,9 +17,9 @@ from .._base.rounding import SAME
 from . import meshio_reader
 from .loops import FARTHEST, UNITS, refuse_millimetres
 
-PLANE = ("triangle", "triangle6", "quad")
+PLANE = {"triangle": 3, "triangle6": 6, "triangle7": 7, "quad": 4, "quad8": 8, "quad9": 9}  # nodes of cells read here
 FLAT = 1e-5  # [-] of its extent, across the plane of a mesh: less is noise, as of coordinates with six digits
-NODES = {"line": 2, "line3": 3, "triangle": 3, "triangle6": 6, "quad": 4}  # nodes per cell of the types read here
+NODES = PLANE | {"line": 2, "line3": 3}
 
 
 def read_mesh(path: Any, unit: str | None) -> tuple[
@@ -70,16 +70,11 @@ def _plane_points(
     lost = used[(used < 0) | (used >= len(points))]
     if lost.size:
         raise ValueError(f"{name} has a cell with node {lost[0]} but only {len(points)} nodes; export it again")
-    bad = used[~np.isfinite(points[used]).all(axis=1)]
-    if bad.size:
-        raise ValueError(
-            f"{name} has a coordinate that is not a number at node {bad[0]}: {points[bad[0]]}; correct that node"
-        )
-    far = used[np.abs(points[used]).max(axis=1, initial=0.0) > FARTHEST]
-    if far.size:
-        raise ValueError(
-            f"{name} has a coordinate beyond {FARTHEST:g} at node {far[0]}: {points[far[0]]}; correct that node"
-        )
+    far = np.abs(points[used]) > FARTHEST
+    for what, where in ("that is not a number", ~np.isfinite(points[used])), (f"beyond {FARTHEST:g}", far):
+        bad = used[where.any(axis=1)]
+        if bad.size:
+            raise ValueError(f"{name} has a coordinate {what} at node {bad[0]}: {points[bad[0]]}; correct that node")
     height = None
     if points.shape[1] == 3:
         points, flat = _levelled(points, used, notes)
@@ -146,25 +141,22 @@ def _triangles(path: Path, data: meshio_reader.Raw) -> tuple[np.ndarray, dict]:
     solid = [kind for kind in kinds if kind.startswith(("tetra", "hexahedron", "wedge", "pyramid"))]
     if not set(kinds) & set(PLANE):
         found = ", ".join(kinds) or "no cells"
-        hint = (
-            "make a beam with fi.mesh.line" if any(k.startswith("line") for k in kinds) else "a plate needs triangles"
-        )
+        hint = "make a beam with fi.mesh.line" if set(kinds) & {"line", "line3"} else "a plate needs triangles"
         raise ValueError(f"{name} contains {found} but no triangles; mesh the surface with triangles ({hint})")
+    other = [kind for kind in kinds if kind.startswith(("triangle", "quad", "polygon")) and kind not in PLANE]
+    if other:
+        raise ValueError(f"{name} contains {', '.join(other)}, which are not read; export linear or quadratic cells")
     if solid:
         raise ValueError(f"{name} contains volume cells ({', '.join(solid)}); export only the flat surface")
     cells, middles = [], {}
     for kind, nodes, _ in data.blocks:
         if kind in NODES and nodes.shape[1:] != (NODES[kind],):
             raise ValueError(f"{name} has a {kind} without exactly {NODES[kind]} nodes; export it again")
-        if kind == "triangle":
-            cells.append(nodes)
-        elif kind == "quad":
-            cells += [nodes[:, [0, 1, 2]], nodes[:, [0, 2, 3]]]
-        elif kind == "triangle6":
-            cells.append(nodes[:, :3])
-            for row in nodes.tolist():
-                for k, (a, b) in enumerate(((0, 1), (1, 2), (2, 0))):
-                    middles[row[a], row[b]] = row[3 + k]
+        n = 3 if kind.startswith("triangle") else 4
+        if kind in PLANE:
+            cells += [nodes[:, [0, k, k + 1]] for k in range(1, n - 1)]
+            for row in nodes.tolist() if nodes.shape[1] > n else ():
+                middles.update({(row[k], row[(k + 1) % n]): row[n + k] for k in range(n)})
     return np.concatenate(cells), middles
 
 
@@ -390,25 +382,26 @@ def write_mesh(
     if path.suffix != ".msh":
         raise ValueError(f"path must end in .msh, got {path.name!r}")
     own = [name for name in edges if name not in ("boundary", "outer")] or ["boundary"]
-    tag = np.zeros(len(facets), int)
-    for i, name in enumerate(own):
-        tag[edges[name]] = i + 1
-    names = {name: np.array([i + 1, 1]) for i, name in enumerate(own)} | {"plate": np.array([len(own) + 1, 2])}
-    place = [points]
+    parts = [np.arange(len(facets))[edges[name]] for name in own]  # a facet of two names is written twice
+    parts.append(np.setdiff1d(np.arange(len(facets)), np.concatenate(parts)))
+    tag = np.repeat([*range(1, len(own) + 1), 0], [len(part) for part in parts])
+    facets, middles = facets[np.concatenate(parts)], middles[np.concatenate(parts)]
+    names = {name: np.array([i + 1, 1]) for i, name in enumerate(own)}
+    names["plate" if "plate" not in own else " ".join([*own, "plate"])] = np.array([len(own) + 1, 2])
+    flat = points
     blocks: list[tuple[str, np.ndarray]] = [("line", facets), ("triangle", cells)]
     if curved.any():
         unique, number, _ = sides_of(cells)
         halfway = points[unique].mean(axis=1)
         on_rim = numbers_of(unique, facets)
         halfway[on_rim] = middles
-        place.append(halfway)
+        flat = np.concatenate([points, halfway])
         blocks = [
             ("line3", np.column_stack([facets, len(points) + on_rim])),
             ("triangle6", np.column_stack([cells, len(points) + number])),
         ]
     import meshio  # imported here because it takes 0.1 s and only saving needs it
 
-    flat = np.concatenate(place)
     tags = [tag, np.full(len(cells), len(own) + 1)]
     data = {"gmsh:physical": tags, "gmsh:geometrical": tags}
     height = np.zeros(len(flat)) if rise is None else check.field("rise", rise, flat, "m")

@@ -75,7 +75,7 @@ def complete(told: dict[str, Any], n_modes: int | None) -> dict[str, Any]:
     """Fields of a `Body` from what files hold of it."""
     told = matrices.labelled(told)
     if "mass_matrix" in told or "stiffness_matrix" in told:
-        told |= matrices.solved(told, told.get("loads"), n_modes)
+        told |= matrices.solved(told, told.get("loads"), n_modes) | {"own": True}
         told.pop("modal_mass", None)
     if not len(told.get("frequencies", ())):
         raise ValueError("files must hold modes; ask the other program for its eigenvectors, too, or for its matrices")
@@ -98,7 +98,8 @@ def complete(told: dict[str, Any], n_modes: int | None) -> dict[str, Any]:
     order = np.argsort(told["frequencies"], kind="stable")
     found = np.asarray(told["frequencies"])[order]
     # of at most six rigid motions an eigensolver leaves its rounding, far below the next frequency
-    n_rigid = max((k for k in range(1, min(7, len(found))) if found[k - 1] < 0.01 * found[k]), default=0)
+    some = range(1, 1 if "own" in told else min(7, len(found)))  # not of our own solver, or of what it saved
+    n_rigid = max((k for k in some if found[k - 1] < 0.01 * found[k]), default=0)
     told |= {"frequencies": np.append(np.zeros(n_rigid), found[n_rigid:]), "shapes": shapes[..., order]}
     damping = told.get("damping_ratio", 0.0)
     if isinstance(damping, (list, tuple, np.ndarray)):
@@ -111,7 +112,8 @@ def _archive(path: Path) -> dict[str, Any]:
     try:
         with np.load(path, allow_pickle=False) as found:
             if "format" not in found:
-                return {name: found[name] for name in (*OWN, *MORE, "named") if name in found}
+                own = {"own": True} if "named" in found else {}
+                return {name: found[name] for name in (*OWN, *MORE, "named") if name in found} | own
         kind = cell_kinds.kind_of_matrix(path.stem)
         if not kind:
             raise ValueError("name the matrix K..., M... or R..., to say what it is")

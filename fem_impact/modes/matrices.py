@@ -171,8 +171,9 @@ def _recovery(told: Mapping[str, Any], turned: Any, n: int, size: int) -> Any:
 def _candidates(M: Any, K: Any, turned: Any, nodes: np.ndarray) -> np.ndarray:
     """Unknowns (n, 6) among which are all rigid motions: those of nodes, and what follows; or the slowest."""
     if turned is None:
-        stiff, heavy = K.toarray(), M.toarray()
-        slow = 1e-6 * float(np.median(K.diagonal()) / M.diagonal().max())  # makes a free body stiff meanwhile
+        stiff, heavy, resists = K.toarray(), M.toarray(), K.diagonal()
+        some = np.median(resists[resists >= KEPT * resists.max()]) or 1.0  # not of rigid motions, if these are unknowns
+        slow = 1e-6 * float(some / M.diagonal().max())  # makes a free body stiff meanwhile
         return np.asarray(eigh(heavy, stiff + slow * heavy)[1][:, ::-1][:, :6])
     place = nodes - nodes.mean(axis=0)
     turns = np.eye(3) / (float(np.abs(place).max()) or 1.0)

@@ -1,6 +1,6 @@
 """Read and write modes as universal files, the format of modal testing; needs pyuff.
 
-Data sets 15, 55, 2411, 2412, and 2414 to read.
+Data sets 15, 55, 2411, 2412, and 164, 2414 and 2420 to read.
 """
 
 from pathlib import Path
@@ -99,9 +99,11 @@ def arrays(path: Path) -> dict[str, np.ndarray]:
 
     file = pyuff.UFF(str(path))
     kinds = [int(kind) for kind in file.get_set_types()]
-    # nodes, shapes, nodes in double precision, results
-    sets = [file.read_sets(i) for i, kind in enumerate(kinds) if kind in (15, 55, 2411, 2414)]
+    # nodes, shapes, units, nodes in double precision, results, frames
+    sets = [file.read_sets(i) for i, kind in enumerate(kinds) if kind in (15, 55, 164, 2411, 2414, 2420)]
+    _refuse_frames(path.name, sets)
     numbers, place = places(sets)
+    length, force = (factors(sets).get(kind, 1.0) for kind in ("m", "N"))
     results = [_result(s) for s in sets if s["type"] in (55, 2414)]
     modes = [s for s in results if s.get("analysis_type") in (NORMAL_MODE, 3)]
     static = [s for s in results if s.get("analysis_type") == 1]
@@ -109,7 +111,8 @@ def arrays(path: Path) -> dict[str, np.ndarray]:
         found = ", ".join(str(kind) for kind in sorted(set(kinds))) or "none"
         functions = ", of which 58 are time records or frequency responses, no modes" if 58 in kinds else ""
         raise ValueError(
-            f"{path.name} must hold nodes (15 or 2411) and mode shapes (55); its data sets are {found}{functions}"
+            f"{path.name} must hold nodes (15 or 2411) and mode shapes (55) of motions, not of stress or strain; its "
+            f"data sets are {found}{functions}"
         )
     measured = np.asarray((modes + static)[0]["node_nums"], int)
     lost = np.setdiff1d(measured, numbers)
@@ -119,8 +122,9 @@ def arrays(path: Path) -> dict[str, np.ndarray]:
     table = [_mode(path.name, i, mode, measured) for i, mode in enumerate(modes)]
     frequencies, damping, shapes = zip(*sorted(table, key=lambda entry: entry[0])) if table else ((), (), ())
     result = {"frequencies": np.array(frequencies), "damping_ratio": np.array(damping), "nodes": nodes}
-    still = [_moved(path.name, i, one, measured) for i, one in enumerate(static)]
+    still = [_moved(path.name, i, one, measured) / length for i, one in enumerate(static)]
     result |= cell_kinds.steps(len(nodes), shapes, still)
+    result["shapes"] = result["shapes"] * np.sqrt(force / length)  # of which the unit of mass follows
     for what, values in result.items():
         if not (np.abs(values) <= check.REACH).all() or (what == "frequencies" and (values < 0.0).any()):
             raise ValueError(f"{path.name} has {what} that are negative, too large or not numbers; export it again")
@@ -133,11 +137,28 @@ def arrays(path: Path) -> dict[str, np.ndarray]:
 
 
 def places(sets: list[dict]) -> tuple[np.ndarray, np.ndarray]:
-    """Numbers (n_nodes,) and places (n_nodes, 3) of the nodes in data sets 2411 or, without them, 15."""
+    """Numbers (n_nodes,) and places (n_nodes, 3) [m] of the nodes in data sets 2411 or, without them, 15."""
     nodes = [s for s in sets if s["type"] == 2411] or [s for s in sets if s["type"] == 15]
     numbers = [np.asarray(s["node_nums"], int) for s in nodes]
-    place = [np.column_stack([s["x"], s["y"], s["z"]]).astype(float) for s in nodes]
+    place = [np.column_stack([s["x"], s["y"], s["z"]]).astype(float) / factors(sets).get("m", 1.0) for s in nodes]
     return np.concatenate([np.zeros(0, int), *numbers]), np.concatenate([np.zeros((0, 3)), *place])
+
+
+def factors(sets: list[dict]) -> dict[str, float]:
+    """By what data of a unit's kind are divided to be in SI, from data sets 164."""
+    length, force = next(((float(s["length"]), float(s["force"])) for s in sets if s["type"] == 164), (1.0, 1.0))
+    found = {"N": force, "m/s^2": length, "m/s": length, "m": length}
+    return {kind: factor for kind, factor in found.items() if factor > 0.0 and factor != 1.0}
+
+
+def _refuse_frames(name: str, sets: list[dict]) -> None:
+    """ValueError if nodes are placed, or move, along axes of their own."""
+    rows = [zip(s["CS_sys_labels"], s["CS_types"], s["CS_matrices"]) for s in sets if s["type"] == 2420]
+    turned = {label for row in rows for label, kind, axes in row if kind or not np.allclose(axes, np.eye(4)[:, :3])}
+    nodes = [s for s in sets if s["type"] in (15, 2411)]
+    used = turned & {int(frame) for s in nodes for key in ("def_cs", "disp_cs") for frame in s[key]}
+    if used:
+        raise ValueError(f"{name} has nodes in coordinate system {min(used)}; export all in the global one")
 
 
 def _elements(file: Any, i: int) -> list[dict]:
@@ -165,12 +186,14 @@ def _cells(elements: list[dict], row: dict[int, int], dimension: int) -> np.ndar
 
 
 def _result(one: dict) -> dict:
-    """A data set 2414 as one 55 says the same; others as they are."""
-    if one["type"] != 2414 or one.get("dataset_location") != 1 or one.get("result_type") != DISPLACEMENT:
-        return one if one["type"] != 2414 else {}
+    """A data set 2414 as one 55 says the same; nothing of what shows no motion, such as stresses."""
+    if one["type"] == 55:
+        return one if one.get("spec_data_type", 0) in (0, DISPLACEMENT, 11, 12) else {}
+    if one.get("dataset_location") != 1 or one.get("result_type") != DISPLACEMENT:
+        return {}
     values = np.array([row[:3] for row in one["data_at_node"]])
     told = {"freq": one.get("record12_field2"), "modal_m": one.get("record12_field4")}
-    told |= {"modal_damp_vis": one.get("record12_field5")}
+    told |= {"modal_damp_vis": one.get("record12_field5"), "modal_damp_his": one.get("record12_field6")}
     return one | told | dict(zip(COMPONENTS, values.T))
 
 
@@ -192,7 +215,8 @@ def _mode(name: str, i: int, mode: dict, measured: np.ndarray) -> tuple[float, f
         frequency, damping = abs(pole) / (2.0 * np.pi), -pole.real / abs(pole)
         modal_mass = abs(scale) / (2.0 * abs(pole.imag)) if scale else 0.0  # a normal mode has modal A = 2 i omega_d m
     else:
-        frequency, damping = float(mode["freq"]), float(mode.get("modal_damp_vis") or 0.0)
+        frequency, hysteretic = float(mode["freq"]), float(mode.get("modal_damp_his") or 0.0)
+        damping = float(mode.get("modal_damp_vis") or 0.5 * hysteretic)  # as much at resonance
         modal_mass = float(mode.get("modal_m") or 0.0)
     if modal_mass <= 0.0:
         raise ValueError(

@@ -25,6 +25,7 @@ def check_whole(scene: "Scene") -> None:
     wrong = {
         "[target] needs mass and first_frequency if there is no [material]": bare
         and not {"mass", "first_frequency"} <= set(target),
+        "[target] nu must be left out beside [material], which has it": not bare and "nu" in target,
         "[[rib]] needs [material] and [section] of a plate, and [in_plane] too": (bare or line)
         and (scene.rib or scene.in_plane.values),
         "[target] theory needs [material] and [section]: shear depends on the thickness": bare and thick,

@@ -32,7 +32,9 @@ def in_si(
         notes.append("the force is mostly negative and was turned around")
         pushed = [-row for row in pushed]
     moved = [segment[:, others] * np.array(factors[1:]) for segment in found.segments]
-    return list(zip(pushed, moved)), [found.names[i] for i in others], kinds[1:], notes
+    short = [units.label(found.names[i])[0] for i in others]
+    short = short if len(set(short)) == len(short) else [found.names[i] for i in others]
+    return list(zip(pushed, moved)), short, kinds[1:], notes
 
 
 def stated_units(found: readers.Recording, given: Mapping[str, str] | None) -> list[str]:
@@ -72,8 +74,7 @@ def find_channel(argument: str, which: Any, found: readers.Recording) -> int:
 def force_channel(found: readers.Recording, force: Any, unit: list[str], name: str) -> int:
     if force is not None:
         return find_channel("force", force, found)
-    kinds = [units.known(text) for text in unit]
-    hits = [i for i, kind in enumerate(kinds) if kind and kind[0] == "N"]
+    hits = [i for i, text in enumerate(unit) if (units.known(text) or "")[:1] == ("N",)]
     hits = hits or [i for i, text in enumerate(found.names) if units.FORCE_NAMES.search(text)]
     if len(hits) != 1 and len(found.names) == 1 and not units.RESPONSE_NAMES.search(found.names[0]):
         hits = [0]
@@ -90,10 +91,9 @@ def response_channels(found: readers.Recording, response: Any, unit: list[str], 
         if not isinstance(asked, (list, tuple)):
             raise ValueError(f"response must be the names or numbers of channels, got {check.shown(response)}")
         return [find_channel("response", which, found) for which in asked]
-    kinds = [units.known(text) for text in unit]
     return [
         i
-        for i, (kind, text) in enumerate(zip(kinds, found.names))
+        for i, (kind, text) in enumerate(zip(map(units.known, unit), found.names))
         if i != struck and ((kind and kind[0] != "N") or (not unit[i] and units.RESPONSE_NAMES.search(text)))
     ]
 

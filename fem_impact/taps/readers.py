@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from .._base import check, isolated
+from ..modes import universal_files
 from . import units
 
 END_OF_HEADER = "***End_of_Header***"
@@ -402,9 +403,8 @@ def _columns(path: Path, found: dict[str, np.ndarray]) -> Recording:
 def numpy_file(path: Path) -> Recording:
     """An .npy array, or an .npz of named arrays with ``rate``, ``dt`` or ``time`` among them."""
     loaded = np.load(path, allow_pickle=False)
-    if isinstance(loaded, np.ndarray):
-        return _columns(path, {"array": loaded})
-    return _columns(path, {name: loaded[name] for name in loaded.files})
+    alone = isinstance(loaded, np.ndarray)
+    return _columns(path, {"array": loaded} if alone else {name: loaded[name] for name in loaded.files})
 
 
 def matlab(path: Path) -> Recording:
@@ -457,9 +457,9 @@ def _universal(head: bytes) -> bool:
 
 def universal(path: Path) -> Recording:
     """Time records in data set 58 of a universal file; the second record of a channel begins a new segment."""
-    file = Universal.opened(path)
+    file = Universal(path)
     instead = "; export those, or give the path of frequency responses to fi.frf"
-    factors = file.factors
+    factors = universal_files.factors(file.sets(164))
     channels: dict[tuple[Any, ...], list[np.ndarray]] = {}
     rates, unit, notes = [], {}, []
     for one in file.of_type(TIME_RESPONSE, "time records", instead):
@@ -497,25 +497,17 @@ def universal(path: Path) -> Recording:
     )
 
 
-@dataclass(frozen=True, eq=False)
 class Universal:
-    """A universal file as pyuff opens it."""
+    """A universal file as pyuff opens it; ValueError if it is cut off."""
 
-    path: Path
-    file: Any
-    kinds: list[int]  # of its data sets
-    raw: bytes
-
-    @classmethod
-    def opened(cls, path: Path) -> "Universal":
-        """ValueError if the file is cut off."""
+    def __init__(self, path: Path) -> None:
         import pyuff
 
-        raw = path.read_bytes()
-        if len(UFF_END.findall(raw)) % 2:
+        self.path, self.raw = path, path.read_bytes()
+        if len(UFF_END.findall(self.raw)) % 2:
             raise ValueError(f"{path.name} ends within a data set; it may be cut off")
-        file = pyuff.UFF(str(path))
-        return cls(path, file, [int(kind) for kind in file.get_set_types()], raw)
+        self.file: Any = pyuff.UFF(str(path))
+        self.kinds = [int(kind) for kind in self.file.get_set_types()]  # of its data sets
 
     def sets(self, *kinds: int) -> list[dict]:
         """The data sets of some kinds."""
@@ -541,15 +533,6 @@ class Universal:
             holds = " and ".join(said + [f"data sets {others}"] * bool(others)) or "no data sets"
             raise ValueError(f"{self.path.name} holds {holds}, no {words}{instead}")
         return found
-
-    @property
-    def factors(self) -> dict[str, float]:
-        """By what data of a unit's kind are divided to be in SI, from data sets 164."""
-        found: dict[str, float] = {}
-        for one in self.sets(164):
-            length, force = float(one["length"]), float(one["force"])
-            found |= {"N": force, "m/s^2": length, "m/s": length, "m": length}
-        return {kind: factor for kind, factor in found.items() if factor > 0.0 and factor != 1.0}
 
 
 def uff_name(one: dict) -> str:

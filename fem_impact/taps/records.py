@@ -244,9 +244,10 @@ class Taps:
 
     def save(self, path: str | Path) -> None:
         """Write the taps to an .npz file that `read_taps` reads again."""
-        arrays = {"force": self.force, "rate": np.array(self.rate), "time": self.time}
-        for i, (name, unit) in enumerate(zip(self.table["channel"].values, self.units)):
-            arrays[f"{name} [{unit}]"] = self.response[:, :, i]
+        arrays = {"force [N]": self.force, "rate": np.array(self.rate), "time": self.time}
+        names = [str(name) for name in self.table["channel"].values]
+        for i, (name, unit) in enumerate(zip(names, self.units)):
+            arrays[f"{name} {i + 1} [{unit}]" if names.count(name) > 1 else f"{name} [{unit}]"] = self.response[:, :, i]
         with check.path("path", path).open("wb") as file:
             np.savez_compressed(file, **arrays)  # type: ignore[arg-type]
 

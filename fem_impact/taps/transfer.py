@@ -320,8 +320,8 @@ def read_frf(path: Any) -> xr.Dataset:
 
 def arrays(path: Path) -> dict[str, np.ndarray]:
     """The result of `read_frf` as arrays, for the separate process."""
-    file = readers.Universal.opened(path)
-    factors = file.factors
+    file = readers.Universal(path)
+    factors = universal_files.factors(file.sets(164))
     sets = file.of_type(readers.FREQUENCY_RESPONSE, "frequency responses")
     frequency = np.asarray(sets[0]["x"], float)
     names: list[str] = []
@@ -352,13 +352,12 @@ def arrays(path: Path) -> dict[str, np.ndarray]:
         found["coherence"] = np.column_stack([sure[tuple(way)] for way in ways.tolist()]).astype(float)
         if not ((found["coherence"] >= 0.0) & (found["coherence"] <= 1.0 + 1e-6)).all():
             raise ValueError(f"{path.name} has a coherence that is not between 0 and 1; export it again")
-    numbers, place = universal_files.places(file.sets(15, 2411))
+    numbers, place = universal_files.places(file.sets(15, 164, 2411))
     row = {int(number): i for i, number in enumerate(numbers)}
     for end, column in zip(ENDS, (0, 2)):
         here = [row.get(int(node)) for node in ways[:, column]]
         if any(i is not None for i in here):
-            scaled = place / factors.get("m", 1.0)
-            found[end] = np.array([np.full(3, np.nan) if i is None else scaled[i] for i in here])
+            found[end] = np.array([np.full(3, np.nan) if i is None else place[i] for i in here])
     if not (np.abs(found["H"]) <= check.REACH).all():
         raise ValueError(f"{path.name} holds values that are no finite numbers; export it again")
     return found
@@ -368,13 +367,15 @@ def _per_force(path: Path, name: str, one: dict[str, Any], factors: dict[str, fl
     """SI unit of the motion in a response per force, the factor to it, and notes: by codes, or by labels without."""
     parts: list[tuple[str, float]] = []
     notes = []
-    for what, default in (("ordinate", ""), ("orddenom", "N")):
+    ends = [str(one.get(f"{what}_axis_units_lab") or "").strip() for what in ("ordinate", "orddenom")]
+    over, _, under = ends[0].rpartition("/")
+    if (known_unit(under) or "")[:1] == ("N",):  # as "g/lbf"
+        ends = [over, ends[1] if known_unit(ends[1]) else under]
+    for what, label, default in zip(("ordinate", "orddenom"), ends, ("", "N")):
         code = int(one.get(f"{what}_spec_data_type") or 0)
-        label = str(one.get(f"{what}_axis_units_lab") or "").strip()
-        stated, kind = (
-            known_unit(label.partition("/N")[0] if what == "ordinate" else label),
-            readers.UFF_UNITS.get(code),
-        )
+        stated, kind = known_unit(label), readers.UFF_UNITS.get(code)
+        if kind and not stated and label not in ("", "NONE"):
+            notes.append(f"{name}: the unit {label!r} is not known, {kind} assumed by its code {code}")
         if stated and kind and stated[0] != kind:
             raise ValueError(
                 f"{path.name} states the unit {label!r} for {name!r}, whose code {code} means {kind}; export it again"

@@ -7,8 +7,8 @@ FORCE = {
     "kgf": 9.80665, "kp": 9.80665, "dyn": 1e-5,
 }  # fmt: skip
 ACCELERATION = {
-    "m/s^2": 1.0, "m/s2": 1.0, "m/s²": 1.0, "m/s**2": 1.0, "m*s^-2": 1.0, "ms-2": 1.0, "g": 9.80665, "gn": 9.80665,
-    "mm/s^2": 1e-3, "in/s^2": 0.0254, "ft/s^2": 0.3048,
+    "m/s^2": 1.0, "m*s^-2": 1.0, "ms-2": 1.0, "g": 9.80665, "gn": 9.80665, "mm/s^2": 1e-3, "cm/s^2": 1e-2,
+    "in/s^2": 0.0254, "ft/s^2": 0.3048,
 }  # fmt: skip
 VELOCITY = {"m/s": 1.0, "mm/s": 1e-3, "um/s": 1e-6, "µm/s": 1e-6, "in/s": 0.0254}
 DISPLACEMENT = {"m": 1.0, "mm": 1e-3, "um": 1e-6, "µm": 1e-6, "in": 0.0254}
@@ -24,13 +24,10 @@ LABEL = re.compile(r"^(.*?)\s*[\[(]([^\])]*)[\])]\s*$")  # "Force [N]", "Force (
 
 def known(unit: str) -> tuple[str, float] | None:
     """The SI unit of a unit's kind, and the factor to it; None for a unit that is not known."""
-    text = unit.strip().replace("μ", "µ")
-    for fold in (str, str.casefold):  # "mN" and "MN" differ, so the exact spelling comes first
-        for si, factors in KINDS.items():
-            for name, factor in factors.items():
-                if fold(name) == fold(text):
-                    return si, factor
-    return None
+    text = re.sub(r"(?<=/s)(²|\*\*2|2)$", "^2", unit.strip("() ").replace("μ", "µ"))
+    every = [(name, si, factor) for si, factors in KINDS.items() for name, factor in factors.items()]
+    folds = str, str.casefold  # "mN" and "MN" differ, so the exact spelling comes first
+    return next(((si, factor) for fold in folds for name, si, factor in every if fold(name) == fold(text)), None)
 
 
 def label(text: str) -> tuple[str, str]:

@@ -77,6 +77,27 @@ def test_svg_without_a_unit_says_what_was_taken(tmp_path):
     assert "states no unit" in shape.notes[0]
 
 
+@pytest.mark.parametrize(
+    ("head", "unit", "size"),
+    [
+        ('width="200" height="100" viewBox="0 0 100 100"', "mm", (0.05, 0.04)),  # drawn half as wide as the page
+        ('width="200mm" height="100mm" viewBox="0 0 100 100" preserveAspectRatio="none"', "mm", (0.05, 0.04)),
+        ('width="200mm" height="100mm" viewBox="0 0 100 100" preserveAspectRatio="none"', None, (0.1, 0.04)),
+        ('width="200mm" height="100mm" viewBox="0 0 100 100"', None, (0.05, 0.04)),
+        ('width="200mm" height="100mm" viewBox="0 0 100 100" preserveAspectRatio="xMidYMid slice"', None, (0.1, 0.08)),
+        ('width="100mm" viewBox="0 0 100 100"', None, (0.05, 0.04)),
+        ('height="100mm" viewBox="0 0 300 200"', None, (0.025, 0.02)),
+        ('width="10CM" height="10CM" viewBox="0 0 100 100"', None, (0.05, 0.04)),
+        ('width="72pt" height="72pt" viewBox="0 0 100 100"', None, (0.0127, 0.01016)),
+        ('width="100mm" height="100mm"', None, (50 * 0.0254 / 96, 40 * 0.0254 / 96)),
+    ],
+)
+def test_svg_has_the_size_of_its_page_or_of_the_unit_given(tmp_path, head, unit, size):
+    shape = mesh.outline(svg(tmp_path, '<rect width="50" height="40"/>', head), unit=unit)
+    assert_allclose(np.ptp(shape.points, axis=0), size, rtol=1e-9)
+    assert not any("no unit" in note for note in shape.notes)
+
+
 def test_dxf_lines_and_arcs_in_any_order_make_a_stadium(tmp_path):
     def draw(space):
         space.add_line((0, 0), (1000, 0))
@@ -96,6 +117,27 @@ def test_dxf_polyline_with_a_bulge_is_an_arc(tmp_path):
     shape = mesh.outline(dxf(tmp_path, lambda space: space.add_lwpolyline(corners, close=True)))
     curved = shape.curvatures[np.abs(shape.curvatures[:, 0]) > 0]
     assert_allclose(curved, 2.0, rtol=1e-6)
+
+
+def test_dxf_blocks_are_drawn_and_what_is_hidden_or_no_line_is_told(tmp_path):
+    def draw(space):
+        space.add_lwpolyline([(0, 0), (1, 0), (1, 3), (0, 3)], close=True)
+        space.doc.blocks.new("bolt").add_circle((0, 0), 0.1)
+        pair = space.doc.blocks.new("pair")
+        pair.add_blockref("bolt", (0, 0))
+        pair.add_blockref("bolt", (0.6, 0))
+        rows = {"rotation": 90.0, "column_count": 2, "column_spacing": 1.0}  # columns turn with the block
+        space.add_blockref("pair", (0.5, 0.5), dxfattribs=rows)
+        space.doc.layers.add("Plan").off()
+        space.add_circle((0.2, 0.2), 0.1, dxfattribs={"layer": "plan"})
+        space.add_circle((0.2, 0.2), 0.1, dxfattribs={"invisible": 1})
+        space.add_text("top")
+
+    shape = mesh.outline(dxf(tmp_path, draw))
+    holes = [shape.points[shape.facets[shape.edges[f"hole{i}"]].ravel()] for i in range(4)]
+    centres = [0.5 * (hole.min(axis=0) + hole.max(axis=0)) for hole in holes]
+    assert_allclose(sorted(y for _, y in centres), [0.5, 1.1, 1.5, 2.1], atol=2e-3)  # chords
+    assert "hole4" not in shape.edges and "to see: TEXT, hidden CIRCLE" in shape.notes[0]
 
 
 def test_dxf_ellipse_and_spline(tmp_path):

@@ -53,6 +53,20 @@ def test_saved_mesh_comes_back_with_its_edges(tmp_path):
     assert_allclose(parameters(plate, supports), parameters(GOOD, supports), rtol=1e-5)
 
 
+def test_saved_edges_may_overlap_and_be_called_as_the_surface(tmp_path):
+    points = np.column_stack([GOOD.points, np.zeros(len(GOOD.points))])
+    left = np.flatnonzero(points[:, 0] == 0.0)
+    sets = {"plate": left, "ALL": np.arange(len(points)), "LOW": left[points[left, 1] < 0.3]}
+    meshio.Mesh(points, [("triangle", GOOD.cells)], point_sets=sets).write(tmp_path / "plate.inp")
+    given = mesh.load(tmp_path / "plate.inp")
+    mesh.save(tmp_path / "again.msh", given)
+    again = mesh.load(tmp_path / "again.msh")
+    assert set(again.edges) == set(given.edges)
+    for name, facets in given.edges.items():
+        places = [np.sort(m.points[m.facets[m.edges[name]]].mean(axis=1), axis=0) for m in (given, again)]
+        assert len(facets) and np.array_equal(*places)
+
+
 def test_sets_of_nodes_are_edges(tmp_path):
     """Abaqus names a support by the nodes it holds; that of all nodes is the whole rim, a single node no edge."""
     points = np.column_stack([GOOD.points, np.zeros(len(GOOD.points))])
@@ -216,6 +230,27 @@ def test_quadrilaterals_are_divided(tmp_path):
     cells = np.stack([n[:-1, :-1], n[1:, :-1], n[1:, 1:], n[:-1, 1:]], axis=-1).reshape(-1, 4)
     plate = mesh.load(written(tmp_path, np.column_stack([x.ravel(), y.ravel()]), cells, kind="quad"))
     assert_allclose(parameters(plate, {"boundary": "hinged"}), HINGED, rtol=1e-5)
+
+
+@pytest.mark.parametrize("kind", ["quad8", "quad9"])
+def test_curved_quadrilaterals_beside_triangles_are_no_holes(tmp_path, kind):
+    """A ring of quadratic cells, half quadrilaterals, half triangles."""
+    n, turn = 24, np.linspace(0.0, 2.0 * np.pi, 48, endpoint=False)
+    place = np.concatenate([r * np.column_stack([np.cos(turn), np.sin(turn)]) for r in (0.8, 0.9, 1.0)])
+    quads, triangles = [], []
+    for i in range(n):
+        (a, m, b), across = [(2 * i + k) % 48 for k in range(3)], 96
+        inner, middle, outer = ([a + up, m + up, b + up] for up in (0, 48, across))
+        corners, between = [inner[0], outer[0], outer[2], inner[2]], [middle[0], outer[1], middle[2], inner[1]]
+        if i % 2:
+            quads.append(corners + between + ([middle[1]] if kind == "quad9" else []))
+        else:
+            triangles += [[*corners[:3], *between[:2], middle[1]], [corners[0], *corners[2:], middle[1], *between[2:]]]
+    points = np.column_stack([place, np.zeros(len(place))])
+    meshio.Mesh(points, [(kind, np.array(quads)), ("triangle6", np.array(triangles))]).write(tmp_path / "ring.vtu")
+    ring = mesh.load(tmp_path / "ring.vtu")
+    assert set(ring.edges) == {"outer", "hole0", "boundary"} and ring.curved.all()
+    assert_allclose(np.abs(ring.curvatures[ring.edges["outer"]]), 1.0, rtol=1e-3)
 
 
 def test_units_are_converted(tmp_path):

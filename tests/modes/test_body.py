@@ -195,6 +195,16 @@ def test_rounding_of_rigid_motions_is_none(tmp_path):
     assert fi.Body.load(table, mass=1.0).modes("z").n_rigid == 2
 
 
+def test_soft_springs_are_no_rounding(tmp_path):
+    """Two masses of 1 kg on soft springs: 1 Hz, 225 Hz; 0 Hz would leave the springs' static deflection unexplained."""
+    stiffness = 1e6 * np.array([[1.0, -1.0], [-1.0, 1.0]]) + np.diag([40.0, 40.0])
+    nodes, dofs = np.array([(0.0, 0.0, 0.0), (1.0, 0.0, 0.0)]), np.array([(1, 1), (2, 1)])
+    body = fi.Body.from_matrices(np.eye(2), stiffness, nodes, dofs=dofs, total_mass=2.0)
+    matrices = {"mass_matrix": np.eye(2), "stiffness_matrix": stiffness, "nodes": nodes, "dofs": dofs}
+    for again in (fi.Body.load(matrices, mass=2.0), fi.Body.load(body.save(tmp_path / "soft"))):
+        assert_allclose(again.frequencies, np.sqrt([40.0, 2e6 + 40.0]) / (2.0 * np.pi), rtol=1e-9)
+
+
 @pytest.mark.parametrize(
     ("change", "text"),
     [

@@ -195,3 +195,11 @@ def test_a_solid_of_sparse_matrices_is_the_thick_beam():
     assert_allclose(body.frequencies[6:8], own.frequencies[2], rtol=0.01)  # across y and across z
     modes = body.modes("z")
     assert modes.shapes.compliance(np.array([nodes[at]]))[0, 0] < body.static[at, 2, 0]
+
+
+def test_a_rigid_body_is_told_by_its_recovery():
+    """Of unknowns that nothing resists: no stiffness tells a scale."""
+    nodes = np.array([(0.0, 0.0, 0.0), (1.0, 0.0, 0.0), (0.0, 1.0, 0.0)])
+    shapes = np.vstack([np.eye(3)] * 3)  # shifts
+    body = fi.Body.from_matrices(2.0 * np.eye(3), np.zeros((3, 3)), nodes, recovery=shapes)
+    assert body.frequencies.tolist() == [0.0, 0.0, 0.0] and body.mass == pytest.approx(2.0)

@@ -106,8 +106,10 @@ def test_shapes_are_scaled_by_their_modal_mass(tmp_path):
     sets = pyuff.UFF(str(path)).read_sets()
     for entry in sets[3:]:
         entry["modal_m"], entry["r3"] = 4.0, 2.0 * entry["r3"]
+        entry["modal_damp_vis"], entry["modal_damp_his"] = 0.0, 0.02  # a loss factor: twice the damping ratio
     other = tmp_path / "scaled.uff"
     pyuff.UFF(str(other)).write_sets(sets, mode="add")
+    assert_allclose(Modes.from_uff(other, mass=1.0).damping_ratio, 0.01)
     assert_allclose(
         Modes.from_uff(other, mass=1.0).shape_at(points),
         Modes.from_uff(path, mass=1.0).shape_at(points),
@@ -116,13 +118,43 @@ def test_shapes_are_scaled_by_their_modal_mass(tmp_path):
     )
 
 
+def test_files_in_other_units_or_frames_and_of_other_quantities(tmp_path):
+    """Inches and pounds of force, for which the unit of mass is 175 kg, and stresses beside shapes."""
+    modes, points, _, path = written(tmp_path)
+    sets = pyuff.UFF(str(path)).read_sets()
+    inch, pound, other = 1.0 / 0.0254, 1.0 / 4.4482216152605, tmp_path / "other.uff"
+    for entry in sets[:2]:
+        entry.update({axis: np.asarray(entry[axis]) * inch for axis in "xyz"})
+    for entry in sets[3:]:
+        entry["r3"] = entry["r3"] / np.sqrt(pound / inch)
+    units = {"type": 164, "units_code": 7, "units_description": "inch", "temp_mode": 1, "length": inch, "force": pound}
+    stresses = [entry | {"spec_data_type": 2, "data_type": 4} for entry in sets[3:]]
+    pyuff.UFF(str(other)).write_sets([units | {"temp": 1.0, "temp_offset": 0.0}, *sets, *stresses], mode="add")
+    again = Modes.from_uff(other, mass=modes.mass)
+    assert_allclose(again.frequencies, modes.frequencies, rtol=1e-5)
+    shapes = modes.shape_at(points)
+    assert_allclose(again.shape_at(points), shapes, atol=1e-5 * np.abs(shapes).max())
+    frames = {"type": 2420, "CS_colors": [8, 8], "CS_names": ["all", "own"], "CS_sys_labels": [1, 5]}
+    frames |= {"CS_types": [0, 0], "CS_matrices": [np.eye(4)[:, :3], np.eye(4)[::-1, :3]]}
+    for system, told in ((1, True), (5, False)):
+        for entry in sets[:2]:
+            entry["disp_cs"] = np.full(len(points), system)
+        framed = tmp_path / f"framed{system}.uff"
+        pyuff.UFF(str(framed)).write_sets([frames, *sets], mode="add")
+        if told:
+            assert Modes.from_uff(framed, mass=1.0).n_modes == modes.n_modes
+        else:
+            with pytest.raises(ValueError, match="nodes in coordinate system 5; export all in the global one"):
+                Modes.from_uff(framed, mass=1.0)
+
+
 def test_what_a_file_lacks_is_said(tmp_path):
     _, _, _, path = written(tmp_path)
     sets = pyuff.UFF(str(path)).read_sets()
     alone = tmp_path / "nodes.uff"
     pyuff.UFF(str(alone)).write_sets(sets[:1], mode="add")
     with pytest.raises(
-        ValueError, match=r"must hold nodes \(15 or 2411\) and mode shapes \(55\); its data sets are 15"
+        ValueError, match=r"must hold nodes \(15 or 2411\) and mode shapes \(55\) of.*; its data sets are 15"
     ):
         Modes.from_uff(alone, mass=1.0)
     for entry in sets[3:]:

@@ -236,6 +236,7 @@ def test_every_scene_of_the_studies_loads_with_a_title(path):
 BAD = [
     ("length = 0.465", "lenght = 0.465", r"\[mesh\] lenght is not a key of this table; did you mean 'length'\?"),
     ("length = 0.465", 'theory = "mindlin"', r"\[mesh\] theory is not a key of this table; it is one of \[target\]"),
+    ("stiffness = 695e3", "exponent = 2", r"\[contact\] exponent is not a key .*; it is one of kind = 'power', 'r"),
     ("length = 0.465", "", r"\[mesh\] length is missing for shape = 'rectangle'"),
     ("length = 0.465", 'length = "long"', r"\[mesh\] length must be a number in m, got 'long'"),
     ("length = 0.465", "length = true", r"\[mesh\] length must be a number in m, got True"),
@@ -282,6 +283,11 @@ BAD = [
         "[target]",
         "[material]\nE = 1e9\nnu = 0.3\nrho = 1e3\n[target]",
         r"\[section\] is missing; \[material\] needs it",
+    ),
+    (
+        "[target]",
+        '[material]\nE = 1e9\nnu = 0.3\nrho = 1e3\n[section]\nkind = "plate"\nthickness = 1e-3\n[target]\nnu = 0.2',
+        r"\[target\] nu must be left out beside \[material\], which has it",
     ),
 ]
 

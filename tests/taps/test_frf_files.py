@@ -80,6 +80,21 @@ def test_a_file_by_hand_with_its_own_units(tmp_path):
     assert np.allclose(transfer.arrays(path)["H"][:, 0], 1e-3 * H, rtol=1e-4)
 
 
+@pytest.mark.parametrize(
+    ("over", "under", "factor", "told"),
+    [
+        ("mm/s2", "N", 1e-3, False), ("(m/s²)/N", "NONE", 1.0, False), ("m/s**2/lbf", "NONE", 1 / 4.4482216, False),
+        ("g/kN", "NONE", 9.80665e-3, False), ("g/kN", "kN", 9.80665e-3, False), ("mV", "N", 1.0, True),
+        ("m/s^2", "pounds", 1.0, True),
+    ],
+)  # fmt: skip
+def test_units_of_a_response_are_followed_or_told(tmp_path, over, under, factor, told):
+    labels = {"ordinate_axis_units_lab": over, "orddenom_axis_units_lab": under}
+    found = transfer.arrays(written(tmp_path / "a.uff", response(1, **labels)))
+    assert np.allclose(found["H"][:, 0], factor * H, rtol=1e-6)
+    assert any("is not known" in note for note in found["notes"].tolist()) == told
+
+
 def test_without_a_code_of_the_denominator_force_is_assumed_and_told(tmp_path):
     found = transfer.arrays(written(tmp_path / "a.uff", response(1, orddenom_spec_data_type=0)))
     assert found["notes"].tolist() == ["point 1: what it is divided by is not stated, N assumed"]

@@ -109,6 +109,26 @@ def test_saved_taps_are_read_again(tmp_path):
     assert again.units == taps.units
 
 
+@pytest.mark.parametrize(
+    ("names", "read"),
+    [
+        (("acc", "acc"), ("acc 1", "acc 2")),
+        (("hammer acc", "input"), ("hammer acc", "input")),
+        (("t", "force"), ("t", "force")),
+    ],
+)
+def test_saved_taps_keep_channels_of_any_names(tmp_path, names, read):
+    pulse = np.pad(np.hanning(20), (50, 130))
+    response = np.column_stack([np.sin(np.arange(200.0)), np.cos(np.arange(200.0))])[None]
+    taps = fi.Taps.from_arrays(pulse, response, rate=1e4, names=names, units=["m/s", "m/s"])
+    taps.save(tmp_path / "t.npz")
+    again = fi.read_taps(tmp_path / "t.npz")
+    assert tuple(again.table["channel"].values) == read and again.units == taps.units
+    assert np.allclose(np.ptp(again.response, axis=1), np.ptp(response, axis=1)) and np.allclose(again.force, pulse)
+    again.save(tmp_path / "u.npz")
+    assert tuple(fi.read_taps(tmp_path / "u.npz").table["channel"].values) == read
+
+
 def test_arrays_of_wrong_shape_are_refused():
     with pytest.raises(ValueError, match="at least one tap"):
         fi.Taps.from_arrays(np.zeros((2, 3)), rate=1e3)
