@@ -104,7 +104,7 @@ def by_cluster(bounces):
     from distributed import Client, LocalCluster
 
     modes, side = source.plate(2.0), round(bounces**0.5)
-    with LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=None) as cluster, Client(cluster) as client:
+    with LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=":0") as cluster, Client(cluster) as client:
         grid(modes, 300), grid(modes, 300, client=client)
         for _ in range(3):
             alone, spread = best(1, grid, modes, side), best(1, partial(grid, client=client), modes, side)

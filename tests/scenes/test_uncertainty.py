@@ -259,7 +259,7 @@ def test_a_cluster_gives_the_same_blows():
     vary = {"striker.mass": ("lognormal", 0.05, 0.2), "target.damping_ratio": ("uniform", 0.0, 0.02)}
     blow = {"at": (0.465, 0.3), "speed": 1.0, "n": 256, "sobol": False}
     bodies = fi.Striker.rigid(0.05), fi.Contact.hertz(1e6)
-    kind = {"n_workers": 1, "threads_per_worker": 1, "dashboard_address": None}
+    kind = {"n_workers": 1, "threads_per_worker": 1, "dashboard_address": ":0"}
     with distributed.LocalCluster(**kind) as cluster, distributed.Client(cluster) as client:
         far = fi.spread(plate, vary, *bodies, client=client, **blow)
     near = fi.spread(plate, vary, *bodies, **blow)

@@ -150,7 +150,7 @@ def test_a_map_that_was_stopped_goes_on(tmp_path, monkeypatch):
 @pytest.mark.filterwarnings("default")
 def test_a_cluster_refines_the_same(dense):
     distributed = pytest.importorskip("distributed", reason="the cluster extra is not installed")
-    settings = {"n_workers": 1, "threads_per_worker": 1, "dashboard_address": None, "host": "127.0.0.1"}
+    settings = {"n_workers": 1, "threads_per_worker": 1, "dashboard_address": ":0", "host": "127.0.0.1"}
     with distributed.LocalCluster(**settings) as cluster:
         table = swept(client=cluster.scheduler_address)
     assert "interpolated" in table and np.array_equal(table.n_impacts, dense.n_impacts)

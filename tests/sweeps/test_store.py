@@ -166,7 +166,7 @@ def test_of_two_that_create_a_store_at_once_the_second_goes_on_with_that_of_the_
 @pytest.mark.slow
 @pytest.mark.filterwarnings("default")
 def test_a_local_cluster_gives_the_same_map(tmp_path, undisturbed):
-    settings = {"n_workers": 2, "threads_per_worker": 1, "dashboard_address": None, "host": "127.0.0.1"}
+    settings = {"n_workers": 2, "threads_per_worker": 1, "dashboard_address": ":0", "host": "127.0.0.1"}
     with distributed.LocalCluster(**settings) as cluster, distributed.Client(cluster) as client:
         assert_same(sweep(client=client), undisturbed)
         assert_same(sweep(client=client, store=tmp_path / "map"), undisturbed)
