@@ -49,7 +49,7 @@ INNER = {
      "Scene.body", "Scene.closed_form", "Scene.fault", "Scene.finder", "Scene.make_contact",
     "Scene.make_section", "Scene.make_striker", "Scene.data", "Scene.alone", "Scene.check_single",
     "Scene.check_unpushed",
-    "Modes.to_pyvista",  # no arguments
+    "Modes.to_pyvista", "Modes.descriptions",  # no arguments
     "Gradient", "Gradient.change", "Response.band_spectrum",  # made by Response.gradient; its arguments are any words
     "Plan.data", "Plan.run", "Plan.strike", "Response.body_slice", "Response.summary", "Scene.picture",
     "mesh.Mesh", "mesh.Mesh.line", "mesh.Mesh.pieces", "mesh.straight", "mesh.fill", "Modes.points",

@@ -6,7 +6,6 @@ from typing import Any
 
 import numpy as np
 import shapely
-from scipy.interpolate import BPoly
 
 from .._base import check
 from .._base.rounding import HALVINGS, SAME
@@ -58,9 +57,14 @@ class Bezier:
 
     def at(self, t: np.ndarray, derivative: int = 0) -> np.ndarray:
         """Points (n, 2) at parameters (n,) between 0 and 1, or a derivative with respect to the parameter."""
-        if derivative >= len(self.control):
-            return np.zeros((*np.shape(t), 2))
-        return np.asarray(BPoly(self.control[:, None], [0.0, 1.0])(np.asarray(t, float), nu=derivative))
+        control = self.control
+        for _ in range(derivative):
+            control = (len(control) - 1) * np.diff(control, axis=0)
+            if not len(control):
+                return np.zeros((*np.shape(t), 2))
+        t, degree = np.asarray(t)[..., None], len(control) - 1
+        k = np.arange(degree + 1)
+        return np.array([math.comb(degree, int(i)) for i in k]) * t**k * (1.0 - t) ** (degree - k) @ control
 
     def reversed(self) -> "Bezier":
         """The same piece traversed backwards."""

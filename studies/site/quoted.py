@@ -104,7 +104,7 @@ QUOTES = (
     quote(13, "until the approach is below # of its size", "impact.compiled.events.LOCATED"),
     quote(13, "After # events", "impact.compiled.events.EVENT_LIMIT"),
     quote(13, "an approach below # of the deepest", "impact.history.TOUCH"),
-    quote(13, "force stays below # of the largest", "impact.history.FAINT"),
+    quote(13, "a push that stays below # both of the largest force", "impact.history.FAINT"),
     quote(14, "for at most # looks", "impact.compiled.flight.LASTING"),
     quote(15, "$s = #$ Gauss nodes", "impact.engine.NODES"),
     quote(17, "2 x_n, # x_n^2", "model.idealisation.PULSE"),

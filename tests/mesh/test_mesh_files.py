@@ -253,6 +253,14 @@ def test_curved_quadrilaterals_beside_triangles_are_no_holes(tmp_path, kind):
     assert_allclose(np.abs(ring.curvatures[ring.edges["outer"]]), 1.0, rtol=1e-3)
 
 
+def test_cells_that_would_become_a_hole_are_refused(tmp_path):
+    square, cubic = [(0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0)], [[0, 2, 3, *range(4, 11)]]
+    points = np.array([*square, *np.zeros((7, 3))], float)
+    meshio.Mesh(points, [("triangle", [[0, 1, 2]]), ("triangle10", cubic)]).write(tmp_path / "plate.msh", "gmsh22")
+    with pytest.raises(ValueError, match="contains triangle10, which are not read; export linear or quadratic cells"):
+        mesh.load(tmp_path / "plate.msh")
+
+
 def test_units_are_converted(tmp_path):
     path = written(tmp_path, GOOD.points * 1e3, GOOD.cells)
     assert_allclose(mesh.load(path, unit="mm").area, 1.55)
