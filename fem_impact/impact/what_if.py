@@ -165,40 +165,50 @@ def mesh(blow: Followed, bodies: Sequence[Modes]) -> Variation:
 def add_poorer_descriptions(blow: Followed, bodies: Sequence[Modes], errors: dict[str, np.ndarray]) -> None:
     """Add the errors that poorer descriptions of a body tell: of each two blows that differ by one cause.
 
-    For each cause the worst counts, because two descriptions can agree by chance. They run in fine steps, because the
-    fastest modes of two descriptions differ, and so do their step errors.
+    For each cause the worst counts, because two descriptions can agree by chance; but only the first of each tells
+    whether there may be other impacts. They run in fine steps, because the fastest modes of two descriptions differ,
+    and so do their step errors.
     """
     for i, body in enumerate(bodies):
         (itself, _), *others = body.descriptions().items()
-        runs: dict[frozenset[str], History | None] = {itself: blow.runs.fine}
-        for lacking, other in others:
-            runs[lacking] = None
-            with suppress(SimulationError):
-                runs[lacking] = blow.again(blow.changed(i, blow.parts[i].described_by(other)), finely=True)
-        for cause, found in worst_differences(runs, lambda one, other: _told_by(blow, one, other)).items():
+        runs = {itself: blow.runs.fine} | {lacking: _followed_by(blow, i, other) for lacking, other in others}
+        for cause, found in worst_differences(runs, functools.partial(_told_by, blow)).items():
             errors[cause] = errors.get(cause, 0.0) + found
 
 
+def _followed_by(blow: Followed, body: int, other: Modes) -> History | None:
+    """The blow on a body described otherwise, or None if that cannot be followed."""
+    with suppress(SimulationError):
+        return blow.again(blow.changed(body, blow.parts[body].described_by(other)), finely=True)
+    return None
+
+
 def worst_differences(
-    runs: Mapping[frozenset[str], Any], difference: Callable[[Any, Any], np.ndarray]
+    runs: Mapping[frozenset[str], Any], difference: Callable[[Any, Any, bool], np.ndarray]
 ) -> dict[str, np.ndarray]:
-    """The largest difference by cause of any two runs, kept by what they lack, of which one lacks nothing else."""
+    """The largest difference by cause of any two runs, kept by what they lack, of which one lacks nothing else.
+
+    ``difference`` of the better and the poorer run is told, too, whether they are the first for their cause.
+    """
     worst: dict[str, np.ndarray] = {}
     for lacking, run in runs.items():
         for cause in lacking:
             if lacking - {cause} in runs:
-                found = difference(runs[lacking - {cause}], run)
+                found = difference(runs[lacking - {cause}], run, cause not in worst)
                 worst[cause] = np.maximum(worst.get(cause, 0.0), found)
     return worst
 
 
-def _told_by(blow: Followed, better: History | None, poorer: History | None) -> np.ndarray:
+def _told_by(blow: Followed, better: History | None, poorer: History | None, first: bool) -> np.ndarray:
     """What two descriptions of a body tell of the error of one; those that cannot be followed tell nothing."""
     n, one_more = blow.options.n_quantities, np.ones(len(blow.runs.error))
     if better is None or poorer is None:
-        return one_more
-    found = distance.of_runs(poorer, better, blow.options.quantities)
-    if len(better.contacts) != len(blow.runs.fine.contacts):  # other impacts, of which nothing is known
+        return one_more * first
+    found, number = distance.of_runs(poorer, better, blow.options.quantities), len(blow.runs.fine.contacts)
+    if not first:
+        same = len(better.contacts) == len(poorer.contacts) == number
+        return np.append(found[:n] if same else np.zeros(n), np.zeros(len(one_more) - n))
+    if len(better.contacts) != number:  # other impacts, of which nothing is known
         found = np.append(found[: n + 1], one_more[n + 1 :])
     return found + one_more if _may_touch(better, poorer, blow.pace[0]) else found
 

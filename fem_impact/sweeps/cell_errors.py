@@ -115,9 +115,9 @@ def described(cases: Cases, numbers: np.ndarray, workers: int | None = None) -> 
         """The layers of some cells on bodies described less well."""
         return solve_cases(replace(few, base=poorer, chosen=some, kernels={}), 0, len(some), workers=workers)[0]
 
-    def difference(one: np.ndarray, other: np.ndarray) -> np.ndarray:
+    def difference(one: np.ndarray, other: np.ndarray, first: bool = True) -> np.ndarray:
         change = np.fmax.reduce(list(few.apart(one, other).values()))
-        return np.where(one[count] == other[count], change, 1.0)
+        return np.where(one[count] == other[count], change, 1.0 * first)
 
     every = np.arange(few.n_cases)
     runs = {lacking: struck(base.lacking(lacking), every) if lacking else mine for lacking in descriptions}
