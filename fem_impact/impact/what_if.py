@@ -83,6 +83,11 @@ def what_if(blow: Followed, variations: Sequence[Variation]) -> dict[str, np.nda
     return errors
 
 
+def left_out_weight(ratio: float, damping_ratio: float) -> float:
+    """Error of modes left out over what dividing the highest kept frequency by ``ratio`` changes; see `modes_left_out`."""
+    return 1.0 / (ratio ** (1.0 if damping_ratio > RINGING else 2.0) - 1.0)
+
+
 def modes_left_out(blow: Followed, bodies: Sequence[Modes]) -> tuple[Variation, bool]:
     """Upper modes replaced by their compliance, and whether what that does tells the error.
 
@@ -109,8 +114,8 @@ def modes_left_out(blow: Followed, bodies: Sequence[Modes]) -> tuple[Variation, 
         known = modes.poorer and any(other.omega[-1] > modes.omega[-1] for other in modes.poorer.values())
         changes.append([])
         for thin, ratio in () if known else part.thinner:
-            power = 1.0 if part.zeta[-1] > RINGING else 2.0
-            changes[-1].append((blow.changed(i, thin), 1.0 / (ratio**power - 1.0), 1.0 / (ratio**0.5 - 1.0)))
+            weight = left_out_weight(ratio, part.zeta[-1])
+            changes[-1].append((blow.changed(i, thin), weight, 1.0 / (ratio**0.5 - 1.0)))
         looked &= len(changes[-1]) == len(THINNED)
     found = Variation("truncation", changes, 0.3 * expected, 10.0 if looked else np.inf)
     return found, max(softness) <= RESOLVABLE

@@ -10,12 +10,11 @@ from .._base.rounding import ROUNDING
 from ..impact import accuracy
 from ..impact.contact import wall_time
 from ..impact.reduced_body import THINNED
-from ..impact.stepping import RINGING
-from ..impact.what_if import RESOLVABLE, worst_differences
+from ..impact.what_if import RESOLVABLE, left_out_weight, worst_differences
 from .cases import Cases, solve_cases, try_each
 from .cells import RATED, Case
 
-# [-] cells struck again on poorer bodies: of modes in a batch, a tenth of a large map's time; of vectors; or alone
+# [-] cells struck again on poorer bodies: of modes in a batch, a fifth of a large map's time; of vectors; or alone
 DOUBTED = {"modes": 400, "vectors": 10_000, "alone": 100}
 
 
@@ -97,12 +96,12 @@ def described(cases: Cases, numbers: np.ndarray, workers: int | None = None) -> 
     """
     base = cases.base
     descriptions = dict.fromkeys(lacking for modes in base.views.values() for lacking in modes.descriptions())
-    bodies = base.modes, base.striker.modes
+    by_vectors, bodies = len(descriptions) > 1, (base.modes, base.striker.modes)
     unstated = cases.residual and any(each.unstated or each.shapes.dent(each.shapes.grid()[0]).any() for each in bodies)
     thin = thinner(base) if cases.residual and not base.views else []
-    if len(descriptions) < 2 and not unstated and not thin:
+    if not by_vectors and not unstated and not thin:
         return np.zeros(cases.shape)
-    most = DOUBTED["alone" if unstated or not cases.quick else "vectors" if len(descriptions) > 1 else "modes"]
+    most = DOUBTED["alone" if unstated or not cases.quick else "vectors" if by_vectors else "modes"]
     fewer = max(1.0, (cases.n_cases / most) ** (1.0 / len(cases.shape)))
     chosen = [np.unique(np.round(np.linspace(0, n - 1, max(1, int(n / fewer)))).astype(int)) for n in cases.shape]
     axes = {name: values[some] for (name, values), some in zip(cases.axes.items(), chosen)}
@@ -128,7 +127,7 @@ def described(cases: Cases, numbers: np.ndarray, workers: int | None = None) -> 
     for poorer, weight in thin if some.size else ():
         change = difference(mine[:, some], struck(poorer, some))
         total[some] = np.maximum(total[some], np.where(change < 1.0, weight * change, 1.0))
-    several = np.flatnonzero(unstated | ((mine[count] > 1) & bool(descriptions)))
+    several = np.flatnonzero(unstated | ((mine[count] > 1) & by_vectors))
     several = several[:: max(1, -(-len(several) // DOUBTED["alone"]))]
     for i, (hit, _) in zip(several, try_each(several, few.blow, workers)):
         if hit is not None:
@@ -144,16 +143,16 @@ def thinner(base: Case) -> list[tuple[Case, float]]:
     """
     found = []
     for wanted in () if base.modes.stretches else THINNED:
-        fewer, ratios = [], []
+        fewer, weights = [], []
         for modes in (base.modes, base.striker.modes):
             flexible = modes.frequencies[modes.omega > 0.0] if modes.dimension else np.empty(0)
             if len(flexible) > 1:
                 kept = modes.truncated(max_frequency=max(flexible[-1] / wanted, flexible[0]))
                 ratio = float(modes.omega[-1] / kept.omega[-1])
-                ratios += [ratio ** (1.0 if modes.damping_ratio[-1] > RINGING else 2.0)] if ratio > 1.0 else []
+                weights += [left_out_weight(ratio, modes.damping_ratio[-1])] if ratio > 1.0 else []
                 modes = kept
             fewer.append(modes)
-        if ratios:
+        if weights:
             striker = replace(base.striker, modes=fewer[1])
-            found.append((replace(base, modes=fewer[0], striker=striker), 1.0 / (min(ratios) - 1.0)))
+            found.append((replace(base, modes=fewer[0], striker=striker), max(weights)))
     return found
