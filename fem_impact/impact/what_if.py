@@ -84,7 +84,7 @@ def what_if(blow: Followed, variations: Sequence[Variation]) -> dict[str, np.nda
 
 
 def left_out_weight(ratio: float, damping_ratio: float) -> float:
-    """Error of modes left out over the change when the highest frequency is divided by ``ratio``, see `modes_left_out`."""
+    """Error of modes left out over the change by a highest frequency lower by ``ratio``, see `modes_left_out`."""
     return 1.0 / (ratio ** (1.0 if damping_ratio > RINGING else 2.0) - 1.0)
 
 
