@@ -91,11 +91,6 @@ def test_gradients_of_some_blows_are_central_differences():
 
 
 @pytest.mark.slow
-def test_gradients_are_central_differences():
-    assert check_seeds(range(3, 14)) >= 6
-
-
-@pytest.mark.slow
 @pytest.mark.thin(24)
 @pytest.mark.parametrize("first", range(100, 700, 6))
 def test_gradients_of_many_blows_are_central_differences(first):
@@ -119,6 +114,7 @@ def test_gradients_with_two_contacts_are_central_differences():
 
 
 @pytest.mark.slow
+@pytest.mark.thin(3)
 @pytest.mark.parametrize(
     "kind, seed", [("two sticks", 0), ("two sticks", 15), ("buzz", 13), ("over a stop", 44), ("over a stop", 50)]
 )
