@@ -253,11 +253,26 @@ def _dxf_pieces(entity: Any) -> list[Piece]:
         whole = entity.multi_insert() if kind == "INSERT" else [entity]
         return [piece for each in whole for part in each.virtual_entities() for piece in _dxf_pieces(part)]
     if kind == "SPLINE":
-        curve = entity.construction_tool()
+        curve = _clamped(entity.construction_tool())
         near = curve.cubic_bezier_approximation(level=8) if curve.is_rational else ()
         parts = [part.control_points for part in near] or list(curve.bezier_decomposition())
         return [Bezier(np.array([[p.x, p.y] for p in part]), name) for part in parts]
     return []
+
+
+def _clamped(curve: Any) -> Any:
+    """The same curve of ezdxf with its first and last knots repeated, so that it begins and ends at control points."""
+    if curve.is_clamped:
+        return curve
+    degree, (low, high) = curve.degree, (curve.knots()[curve.degree], curve.knots()[curve.count])
+    for end in (low, high):
+        for _ in range(degree - curve.knots().count(end)):
+            curve = curve.insert_knot(end)
+    inner = [knot for knot in curve.knots() if low < knot < high]
+    first = sum(knot <= low for knot in curve.knots()) - degree - 1
+    used, order = slice(first, first + len(inner) + degree + 1), degree + 1
+    knots = [*[low] * order, *inner, *[high] * order]
+    return type(curve)(curve.control_points[used], order, knots, curve.weights()[used] or None)
 
 
 def _check_number(name: str, pieces: list[Piece]) -> None:

@@ -4,12 +4,15 @@ import numpy as np
 import pytest
 import shapely
 from numpy.testing import assert_allclose
+from scipy.interpolate import BSpline
+from scipy.spatial import cKDTree
 
 from fem_impact import mesh
 from fem_impact._base import isolated
 from fem_impact.fe.assembly import assemble
 from fem_impact.fe.ribs import Rib
 from fem_impact.fe.section import Beam, Material, Plate
+from fem_impact.mesh import drawings
 from fem_impact.modes.finding import find_modes
 
 PLATE = Plate(Material(E=210e9, nu=0.3, rho=7850.0), 2e-3)
@@ -146,6 +149,23 @@ def test_dxf_ellipse_and_spline(tmp_path):
     points = [(0.0, 0.0), (1.0, 0.0), (1.2, 0.8), (0.0, 1.0), (0.0, 0.0)]
     curve = mesh.outline(dxf(tmp_path, lambda space: space.add_spline(points)))
     assert curve.curved.all()
+
+
+@pytest.mark.parametrize("weights", [None, [1.0, 2.0, 1.0, 0.5, 1.0, 1.0, 1.0, 2.0, 1.0]])
+def test_dxf_spline_whose_end_knots_are_not_repeated(tmp_path, weights):
+    corner, knots = np.array([(2, 0), (1, 2), (-1, 2), (-2, 0), (-1, -2), (1, -2)] * 2, float)[:9], np.arange(2.0, 15.0)
+
+    def draw(space):
+        spline = space.add_open_spline(corner)
+        spline.knots, spline.weights = knots, weights or []
+
+    weighted = np.column_stack([corner, np.ones(9)]) * np.reshape(weights or np.ones(9), (9, 1))
+    curve = BSpline(knots, weighted, 3)(np.linspace(5.0, 11.0, 100_001))
+    control = drawings.dxf_arrays(dxf(tmp_path, draw))["numbers"].reshape(-1, 4, 2)  # of cubics, end to end
+    assert_allclose(control[:, 0], np.roll(control[:, 3], 1, axis=0), atol=1e-12)
+    halfway = np.array([1.0, 3.0, 3.0, 1.0]) / 8.0 @ control
+    away, _ = cKDTree(curve[:, :2] / curve[:, 2:]).query(halfway)
+    assert away.max() < 1e-4  # half the distance of the 100 001 points, around a curve of length 10
 
 
 @pytest.mark.parametrize(
