@@ -15,6 +15,7 @@ from ..modes import universal_files
 from . import units
 
 END_OF_HEADER = "***End_of_Header***"
+DECIMAL = r"[+-]?\d+,\d+(?:[eE][+-]?\d+)?"  # a number with a decimal comma, or two numbers
 COMMENTS = ("#", "%", "//")  # begin lines that are no data
 HEADER_LINES = 200  # [-] of a text table at most, before its numbers begin
 LEAST = 8  # [-] samples of a channel
@@ -279,6 +280,14 @@ def table(path: Path) -> Recording:
                 if one and other and units.known(one) != units.known(other):
                     raise ValueError(f"{path.name} states two units for {name!r}, {one!r} and {other!r}")
     values = _numbers(lines[start:], separator, use, comma, path)
+    if separator == ",":
+        rows, timed = lines[start:], bool(heads) or (np.diff(values[:, 0]) > 0.0).all()
+        pattern = f'.*"{DECIMAL}".*|{"" if timed else f"{DECIMAL}(,{DECIMAL})*"}'
+        if all(re.fullmatch(pattern, row.strip()) for row in rows):
+            raise ValueError(
+                f"{path.name} has rows like {rows[0].strip()[:40]!r}, whose commas may be decimal; write points in its "
+                f"numbers, semicolons between its columns, or a heading with a name for each of {width} columns"
+            )
     return _timed(path, values, [names[i] for i in use], [unit[i] for i in use], bool(heads))
 
 

@@ -53,6 +53,19 @@ def test_tables_with_any_separator_and_decimal_sign(tmp_path, separator, comma):
     check(taps)
 
 
+@pytest.mark.parametrize("head", ["", "Force [N]\n", "Force [N];Acceleration [g]\n"])
+@pytest.mark.parametrize("row", ["0,{}", "0,{},-1,25", '"0,{}","-1,25"', '0.5,"1,{}"'])
+def test_commas_that_may_be_decimal_are_no_columns_without_a_heading(tmp_path, row, head):
+    path = tmp_path / "t.csv"
+    path.write_text(head + "".join(row.format(i % 7) + "\n" for i in range(20)))
+    with pytest.raises(ValueError, match=r"t\.csv has rows like .*, whose commas may be decimal; write points in its"):
+        recording(path)
+    values = "".join(f"{i % 7},{i % 3},{i % 2},1\n" for i in range(20))
+    for certain in ("a,b,c,d\n" + values, values.replace(",", ";"), values.replace(",", ",-", 1)):
+        path.write_text(certain)
+        assert recording(path)[-1].shape == (20, 4)
+
+
 def test_a_row_of_units_and_a_rate_by_hand(tmp_path):
     _, force, acceleration = channels()
     rows = "\n".join(f"{f:.9g};{a:.9g}" for f, a in zip(force / 4.4482216152605, acceleration))
