@@ -74,6 +74,23 @@ def differing_axes(points: np.ndarray, without: str = "") -> list[int]:
     return [i for i, wide in zip(others, spread) if wide > SAME * max(spread.max(), 1e-300)] or others[:1]
 
 
+def count_rigid(size: np.ndarray, far: float = 0.01) -> int:
+    """How many modes of frequencies [Hz] ascending in size are rigid: rounding leaves at most six far below."""
+    return max((k for k in range(1, min(7, len(size))) if size[k - 1] < far * size[k]), default=0)
+
+
+def settled(frequencies: np.ndarray) -> np.ndarray:
+    """Frequencies [Hz], ascending in size and below zero where eigenvalues are, with zeros for rigid motions."""
+    n_rigid = count_rigid(np.abs(frequencies))
+    found = np.append(np.zeros(n_rigid), frequencies[n_rigid:])
+    if (found < 0.0).any():
+        raise ValueError(
+            f"files must hold a stable body, but the mode at {found[found < 0.0][0]:g} Hz has a negative eigenvalue, "
+            "too large for the rounding of a rigid motion; correct the model, or the load under which it buckles"
+        )
+    return found
+
+
 def rows_of(numbers: np.ndarray, wanted: Any) -> np.ndarray:
     """Rows of nodes by their numbers, all of which are known."""
     order = np.argsort(numbers, kind="stable")

@@ -95,12 +95,10 @@ def complete(told: dict[str, Any], n_modes: int | None) -> dict[str, Any]:
         if scale.min() <= 0.0:
             raise ValueError(f"modal_mass must be positive, got {scale.min():g} kg")
         shapes = shapes / np.sqrt(scale)
-    order = np.argsort(told["frequencies"], kind="stable")
+    order = np.argsort(np.abs(told["frequencies"]), kind="stable")
     found = np.asarray(told["frequencies"])[order]
-    # of at most six rigid motions an eigensolver leaves its rounding, far below the next frequency
-    some = range(1, 1 if "own" in told else min(7, len(found)))  # not of our own solver, or of what it saved
-    n_rigid = max((k for k in some if found[k - 1] < 0.01 * found[k]), default=0)
-    told |= {"frequencies": np.append(np.zeros(n_rigid), found[n_rigid:]), "shapes": shapes[..., order]}
+    found = found if "own" in told else cell_kinds.settled(found)  # our own solver, and what it saved, has zeros
+    told |= {"frequencies": found, "shapes": shapes[..., order]}
     damping = told.get("damping_ratio", 0.0)
     if isinstance(damping, (list, tuple, np.ndarray)):
         told["damping_ratio"] = check.array("damping_ratio", damping, order.shape)[order]

@@ -169,12 +169,12 @@ def _recovery(told: Mapping[str, Any], turned: Any, n: int, size: int) -> Any:
 
 
 def _candidates(M: Any, K: Any, turned: Any, nodes: np.ndarray) -> np.ndarray:
-    """Unknowns (n, 6) among which are all rigid motions: those of nodes, and what follows; or the slowest."""
+    """Unknowns (n, 6) among which are all rigid motions: those of nodes, and what follows; or the seven slowest."""
     if turned is None:
         stiff, heavy, resists = K.toarray(), M.toarray(), K.diagonal()
         some = np.median(resists[resists >= KEPT * resists.max()]) or 1.0  # not of rigid motions, if these are unknowns
         slow = 1e-6 * float(some / M.diagonal().max())  # makes a free body stiff meanwhile
-        return np.asarray(eigh(heavy, stiff + slow * heavy)[1][:, ::-1][:, :6])
+        return np.asarray(eigh(heavy, stiff + slow * heavy)[1][:, ::-1][:, :7])
     place = nodes - nodes.mean(axis=0)
     turns = np.eye(3) / (float(np.abs(place).max()) or 1.0)
     moves = np.zeros((len(nodes), 2, 3, 6))  # shifts and turns of nodes, as all shift along x, y, z and turn about them
@@ -190,19 +190,39 @@ def _flexibility(M: Any, K: Any, turned: Any, nodes: np.ndarray) -> Flexibility:
     """The body with the motions that nothing resists."""
     try:
         moved = _candidates(M, K, turned, nodes)
-        size, turn = np.linalg.eigh(moved.T @ (M @ moved))
-        basis = moved @ (turn / np.sqrt(np.maximum(size, 1e-300)))[:, size > KEPT * size.max()]
+        some = moved[:, :6]
+        size, turn = np.linalg.eigh(some.T @ (M @ some))
+        basis = some @ (turn / np.sqrt(np.maximum(size, 1e-300)))[:, size > KEPT * size.max()]
         # forces on unknowns over the largest that can cancel in them, as K[i, j]**2 <= K[i, i] K[j, j]
         stiff = np.sqrt(np.maximum(K.diagonal(), 0.0))[:, None]
         size = stiff * (stiff * np.abs(basis)).max(axis=0, initial=0.0).max(initial=0.0)
         forces = np.divide(K @ basis, size, out=np.zeros(basis.shape), where=size > 0.0)
         _, resisted, way = np.linalg.svd(forces, full_matrices=len(basis) < basis.shape[1])
         rigid = basis @ way[int((resisted > KEPT * len(moved) ** 0.5).sum()) :].T
+        K, rigid = (K, rigid) if turned is not None else _released(M, K, moved, rigid)
     except np.linalg.LinAlgError as error:
         raise ValueError(INDEFINITE.format(error)) from None
     held = qr(rigid.T, pivoting=True, mode="r")[1][: rigid.shape[1]] if rigid.shape[1] else np.zeros(0, int)
     none = np.zeros((M.shape[0], 0))
     return Flexibility(K, M, rigid, none, none, np.sort(held))
+
+
+def _released(M: Any, K: Any, slowest: np.ndarray, rigid: np.ndarray) -> tuple[Any, np.ndarray]:
+    """Stiffness without the rounding that resists rigid motions, and these (n, n_rigid), if it hid some of them.
+
+    No spring has a negative eigenvalue: the rounding is then as large. Without any, springs are as soft only where
+    eigenvalues differ as the digits of files do.
+    """
+    inert = np.einsum("ij,ij->j", slowest, M @ slowest)
+    slowest = slowest[:, inert > 0.0] / np.sqrt(inert[inert > 0.0])  # mass-normalised, as they are orthogonal
+    values, way = eigh(slowest.T @ (K @ slowest))
+    order = np.argsort(np.abs(values))
+    n_rigid = cell_kinds.count_rigid(np.abs(values[order]) ** 0.5, 0.01 if values[0] < 0.0 else KEPT**0.5)
+    if n_rigid <= rigid.shape[1]:
+        return K, rigid
+    rigid = slowest @ way[:, order[:n_rigid]]
+    kept = np.eye(len(rigid)) - rigid @ (M @ rigid).T
+    return csc_matrix(kept.T @ (K @ kept)), rigid
 
 
 def _mass(R: Any, rigid: np.ndarray, nodes: np.ndarray) -> float:

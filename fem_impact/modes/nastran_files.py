@@ -136,7 +136,8 @@ def _fields(results: Any, numbers: np.ndarray) -> dict[str, np.ndarray]:
             cases[-1].extend(moved)
     found = cell_kinds.steps(len(numbers), *cases)
     cycles = [np.asarray(one.mode_cycles if hasattr(one, "mode_cycles") else one.freqs, float) for one in table]
-    found["frequencies"] = np.abs(np.concatenate(cycles)) if cycles else np.zeros(0)
+    signs = [np.where(np.asarray(getattr(one, "eigns", 0.0)) < 0.0, -1.0, 1.0) for one in table]
+    found["frequencies"] = np.concatenate([np.zeros(0), *(sign * np.abs(each) for sign, each in zip(signs, cycles))])
     masses = [np.asarray(one.generalized_mass, float) for one in results.eigenvalues.values()]
     if masses and sum(map(len, masses)) >= len(found["frequencies"]):
         found["modal_mass"] = np.concatenate(masses)[: len(found["frequencies"])]

@@ -103,16 +103,16 @@ def arrays(path: Path) -> dict[str, np.ndarray]:
     sets = [file.read_sets(i) for i, kind in enumerate(kinds) if kind in (15, 55, 164, 2411, 2414, 2420)]
     _refuse_frames(path.name, sets)
     numbers, place = places(sets)
-    length, force = (factors(sets).get(kind, 1.0) for kind in ("m", "N"))
+    length, force = map(factors(sets).get, ("m", "N"), (1.0, 1.0))
     results = [_result(s) for s in sets if s["type"] in (55, 2414)]
     modes = [s for s in results if s.get("analysis_type") in (NORMAL_MODE, 3)]
     static = [s for s in results if s.get("analysis_type") == 1]
     if not len(numbers) or not (modes or static):
-        found = ", ".join(str(kind) for kind in sorted(set(kinds))) or "none"
+        held = ", ".join(str(kind) for kind in sorted(set(kinds))) or "none"
         functions = ", of which 58 are time records or frequency responses, no modes" if 58 in kinds else ""
         raise ValueError(
             f"{path.name} must hold nodes (15 or 2411) and mode shapes (55) of motions, not of stress or strain; its "
-            f"data sets are {found}{functions}"
+            f"data sets are {held}{functions}"
         )
     measured = np.asarray((modes + static)[0]["node_nums"], int)
     lost = np.setdiff1d(measured, numbers)
@@ -120,14 +120,16 @@ def arrays(path: Path) -> dict[str, np.ndarray]:
         raise ValueError(f"{path.name} has shapes at node {lost[0]}, which has no coordinates; export it again")
     nodes = place[cell_kinds.rows_of(numbers, measured)]
     table = [_mode(path.name, i, mode, measured) for i, mode in enumerate(modes)]
-    frequencies, damping, shapes = zip(*sorted(table, key=lambda entry: entry[0])) if table else ((), (), ())
-    result = {"frequencies": np.array(frequencies), "damping_ratio": np.array(damping), "nodes": nodes}
+    frequencies, damping, shapes = zip(*sorted(table, key=lambda entry: abs(entry[0]))) if table else ((), (), ())
+    found = np.array(frequencies)
+    found = cell_kinds.settled(found) if (found < 0.0).any() else found
+    result = {"frequencies": found, "damping_ratio": np.array(damping), "nodes": nodes}
     still = [_moved(path.name, i, one, measured) / length for i, one in enumerate(static)]
     result |= cell_kinds.steps(len(nodes), shapes, still)
     result["shapes"] = result["shapes"] * np.sqrt(force / length)  # of which the unit of mass follows
     for what, values in result.items():
-        if not (np.abs(values) <= check.REACH).all() or (what == "frequencies" and (values < 0.0).any()):
-            raise ValueError(f"{path.name} has {what} that are negative, too large or not numbers; export it again")
+        if not (np.abs(values) <= check.REACH).all():
+            raise ValueError(f"{path.name} has {what} that are too large or not numbers; export it again")
     elements = [element for i, kind in enumerate(kinds) if kind == 2412 for element in _elements(file, i)]
     row = {int(n): i for i, n in enumerate(measured)}
     cells = {name: _cells(elements, row, i + 1) for i, name in enumerate(("lines", "triangles"))}
@@ -139,8 +141,8 @@ def arrays(path: Path) -> dict[str, np.ndarray]:
 def places(sets: list[dict]) -> tuple[np.ndarray, np.ndarray]:
     """Numbers (n_nodes,) and places (n_nodes, 3) [m] of the nodes in data sets 2411 or, without them, 15."""
     nodes = [s for s in sets if s["type"] == 2411] or [s for s in sets if s["type"] == 15]
-    numbers = [np.asarray(s["node_nums"], int) for s in nodes]
-    place = [np.column_stack([s["x"], s["y"], s["z"]]).astype(float) / factors(sets).get("m", 1.0) for s in nodes]
+    numbers, length = [np.asarray(s["node_nums"], int) for s in nodes], factors(sets).get("m", 1.0)
+    place = [np.column_stack([s["x"], s["y"], s["z"]]).astype(float) / length for s in nodes]
     return np.concatenate([np.zeros(0, int), *numbers]), np.concatenate([np.zeros((0, 3)), *place])
 
 

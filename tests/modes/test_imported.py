@@ -110,3 +110,11 @@ def test_models_of_pyfbs_are_bodies():
     model.eig_vec = vectors * 1j
     with pytest.raises(ValueError, match="files must hold real modes; solve the pyFBS model undamped"):
         fi.Body.load(model, mass=1.0)
+
+
+def test_a_negative_eigenvalue_is_a_rigid_motion_only_if_it_is_tiny():
+    told = {"shapes": np.ones((1, 3, 3)), "nodes": np.zeros((1, 3)), "mass": 1.0}
+    body = fi.Body.load(told | {"frequencies": [-1e-6, 1e-3, 110.0]})
+    assert body.frequencies.tolist() == [0.0, 0.0, 110.0]
+    with pytest.raises(ValueError, match="a stable body, but the mode at -40 Hz has a negative eigenvalue, too large"):
+        fi.Body.load(told | {"frequencies": [-40.0, 1e-3, 110.0]})

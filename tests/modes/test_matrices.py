@@ -8,6 +8,7 @@ from scipy.sparse import csc_array, save_npz
 from test_body import STEEL, struck
 
 import fem_impact as fi
+from fem_impact.modes.free_body import motions
 
 pytestmark = pytest.mark.usefixtures("read_here")
 LENGTH, WIDTH, HEIGHT, N = 0.4, 0.03, 0.01, 20  # m, m, m, elements
@@ -203,3 +204,28 @@ def test_a_rigid_body_is_told_by_its_recovery():
     shapes = np.vstack([np.eye(3)] * 3)  # shifts
     body = fi.Body.from_matrices(2.0 * np.eye(3), np.zeros((3, 3)), nodes, recovery=shapes)
     assert body.frequencies.tolist() == [0.0, 0.0, 0.0] and body.mass == pytest.approx(2.0)
+
+
+@pytest.mark.parametrize("scale", [1e-12, 1e-8, 1e-5])
+@pytest.mark.parametrize("seed", range(3))
+def test_rounding_of_modal_matrices_resists_no_rigid_motion(scale, seed):
+    """Six rigid motions and twelve modes, whose stiffness is wrong by a part of the first, of either sign."""
+    rng, mass = np.random.default_rng(seed), 0.1 * 12
+    nodes = rng.uniform(-1.0, 1.0, (12, 3)) * (0.3, 0.2, 0.05)
+    rigid = motions(nodes - nodes.mean(axis=0), np.eye(3)).reshape(36, 6)
+    recovery = np.linalg.qr(np.column_stack([rigid, rng.normal(size=(36, 12))]))[0] / np.sqrt(0.1)
+    values = np.append(np.zeros(6), (2.0 * np.pi * np.linspace(100.0, 2000.0, 12)) ** 2)
+    wrong = scale * values[6] * rng.normal(size=(18, 18))
+    body = fi.Body.from_matrices(np.eye(18), np.diag(values) + 0.5 * (wrong + wrong.T), nodes, recovery=recovery)
+    assert_allclose(body.frequencies, np.sqrt(values) / (2.0 * np.pi), rtol=10.0 * scale + 1e-12)
+    assert body.mass == pytest.approx(mass, rel=1e-3)
+
+
+def test_soft_springs_are_no_rounding():
+    """At a thousandth of the first frequency: one eigenvalue is a millionth of the next."""
+    values = (2.0 * np.pi * np.array([0.1, 100.0, 300.0])) ** 2
+    nodes = np.array([(0.0, 0.0, 0.0), (1.0, 0.0, 0.0), (2.0, 0.0, 0.0)])
+    recovery = np.zeros((9, 3))
+    recovery[2::3] = np.linalg.qr(np.column_stack([np.ones(3), np.eye(3)[:, :2]]))[0]
+    body = fi.Body.from_matrices(np.eye(3), np.diag(values), nodes, recovery=recovery, total_mass=3.0)
+    assert_allclose(body.frequencies, [0.1, 100.0, 300.0], rtol=1e-9)

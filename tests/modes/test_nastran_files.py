@@ -1,5 +1,6 @@
 """Results, decks and matrices of Nastran."""
 
+from contextlib import nullcontext
 from pathlib import Path
 
 import numpy as np
@@ -60,6 +61,27 @@ def test_static_results_of_nastran_in_frames_of_their_own(tmp_path):
     assert_allclose(body.static[1, :, 0], [-1.0, 3.0, 2.0], atol=1e-6)
     assert_allclose(body.shapes[1, :, 0], [-1.0, 3.0, 2.0], atol=1e-6)
     assert body.frequencies[0] == pytest.approx(4.0 / (2.0 * np.pi), rel=1e-6) and body.cells.tolist() == [[0, 1]]
+
+
+def test_a_buckled_model_of_nastran_is_refused(tmp_path):
+    pytest.importorskip("pyNastran", reason="the nastran extra is not installed")
+    if not hasattr(np, "in1d"):
+        pytest.MonkeyPatch().setattr(np, "in1d", np.isin, raising=False)
+    from pyNastran.op2.op2 import OP2
+    from pyNastran.op2.tables.oug.oug_eigenvectors import RealEigenvectorArray
+
+    written_deck(tmp_path / "bar.bdf", np.zeros((0, 2), int), sets=False)
+    numbers, moved = np.array([[1, 1], [2, 1]], "int32"), np.ones((2, 2, 6), "float32")
+    for first, said in ((-1e-9, ""), (-16.0, "the mode at -0.63662 Hz has a negative eigenvalue")):
+        results, cycles = OP2(debug=False), np.sqrt(np.abs([first, 900.0])) / (2.0 * np.pi)
+        results.is_nx = False
+        modal = [1, 2], [first, 900.0], cycles.tolist()
+        results.eigenvectors[1] = RealEigenvectorArray.add_modal_case("OUGV1", numbers, moved, 1, *modal)
+        results.eigenvectors[1].table_code = 7  # not that of displacements
+        results.write_op2(str(tmp_path / "bar.op2"))
+        files = [tmp_path / "bar.op2", tmp_path / "bar.bdf"]
+        with pytest.raises(ValueError, match=said) if said else nullcontext():
+            assert_allclose(fi.Body.load(files, mass=1.0).frequencies, [0.0, cycles[1]], rtol=1e-6)
 
 
 def written_op4(path, matrices):
