@@ -1,5 +1,6 @@
 """Read triangles and named edges from a file; repair what is safe to repair, refuse the rest with a reason."""
 
+import re
 from collections.abc import Mapping
 from contextlib import redirect_stderr, redirect_stdout
 from io import StringIO
@@ -386,7 +387,8 @@ def write_mesh(
     parts.append(np.setdiff1d(np.arange(len(facets)), np.concatenate(parts)))
     tag = np.repeat([*range(1, len(own) + 1), 0], [len(part) for part in parts])
     facets, middles = facets[np.concatenate(parts)], middles[np.concatenate(parts)]
-    names = {name: np.array([i + 1, 1]) for i, name in enumerate(own)}
+    # meshio writes a name in quotation marks as it is, and reads it as a shell does
+    names = {re.sub(r'(["\\])', r"\\\1", name): np.array([i + 1, 1]) for i, name in enumerate(own)}
     names["plate" if "plate" not in own else " ".join([*own, "plate"])] = np.array([len(own) + 1, 2])
     flat = points
     blocks: list[tuple[str, np.ndarray]] = [("line", facets), ("triangle", cells)]

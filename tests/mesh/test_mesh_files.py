@@ -53,6 +53,13 @@ def test_saved_mesh_comes_back_with_its_edges(tmp_path):
     assert_allclose(parameters(plate, supports), parameters(GOOD, supports), rtol=1e-5)
 
 
+@pytest.mark.parametrize("name", ['3/4" rim', '"', "a\\b", "\\", 'a\\"b', " ä "])
+def test_any_name_of_an_edge_comes_back(tmp_path, name):
+    given = replace(GOOD, edges=GOOD.edges | {name: np.array([0])})
+    mesh.save(tmp_path / "plate.msh", given)
+    assert len(mesh.load(tmp_path / "plate.msh").edges[name]) == 1
+
+
 def test_saved_edges_may_overlap_and_be_called_as_the_surface(tmp_path):
     points = np.column_stack([GOOD.points, np.zeros(len(GOOD.points))])
     left = np.flatnonzero(points[:, 0] == 0.0)
