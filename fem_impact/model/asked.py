@@ -8,6 +8,8 @@ from inspect import signature
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, ClassVar
 
+import numpy as np
+
 from .._base import check
 from ..fe import plausible
 from ..impact import accuracy, collision, stepping
@@ -105,7 +107,10 @@ class Asked:
                 values[name] = getattr(options, name)
             values["stretching"] = options.stretching or blow.target.stretching
             speed = check.positive("speed", values["speed"], "m/s")
-        values["at"] = _struck_at(blow.target, values["at"], changes)
+        values["at"] = _placed(blow.target, "at", values["at"], partial(blow.target.blame, "strike", changes))[0]
+        watched = [point for point in blow.points if blow.moving and point is not blow.arguments.get("at")]
+        if watched:
+            _placed(blow.target, "points", watched, partial(blow.target.blame, "observe"))
         duration = accuracy.contact_duration(blow.contact, blow.striker.felt_mass, speed)
         budget = Budget(options.tolerance, blow.contact.rated)
         return cls(blow, changes, values, pieces, budget, options.quantities, duration)
@@ -273,20 +278,25 @@ def refine(description: Any, strike: Callable[..., tuple[Any, Any]], stages: Sta
     return struck
 
 
-def _struck_at(target: Target, at: Any, changes: Mapping[str, Any]) -> Any:
-    """The strike point (dimension,) [m], checked to lie on the body."""
-    mesh, blame = target.mesh, partial(target.blame, "strike", changes)
-    if mesh is None:
-        assert target.modes is not None
-        with blame():
-            return target.modes.point("at", at)[0] if target.modes.dimension else at
+def _placed(target: Target, name: str, given: Any, blame: Callable[[], Any]) -> Any:
+    """Points (n_points, dimension) [m], checked to lie on the body; one if they are those of ``at``."""
+    mesh = target.mesh
     with blame():
-        place = check.places("at", at, mesh.dimension)
-        if len(place) != 1:
+        if mesh is None:
+            assert target.modes is not None
+            place = target.modes.points(name, given) if target.modes.dimension else [given]
+        else:
+            place = check.places(name, given, mesh.dimension)
+        if name == "at" and len(place) != 1:
             raise ValueError(f"at must be one point, got {len(place)}")
-    along = mesh.dimension == 1 and mesh.points.min() <= place[0, 0] <= mesh.points.max()
-    if not along and (mesh.dimension == 1 or idealisation.Surroundings.seen(mesh, place[0]) is None):
-        inside = target.assembled(Stages()).contains(place)  # perhaps between a curved edge and its chord
+    if mesh is None:
+        return place
+    if mesh.dimension == 1:
+        far = ((place < mesh.points.min()) | (place > mesh.points.max()))[:, 0]
+    else:
+        far = np.array([idealisation.Surroundings.seen(mesh, point) is None for point in place])
+    if far.any():
+        inside = target.assembled(Stages()).contains(place[far])  # perhaps between a curved edge and its chord
         with blame():
-            check.on_body("at", place, inside, mesh.points)
-    return place[0]
+            check.on_body(name, place[far], inside, mesh.points)
+    return place

@@ -282,10 +282,6 @@ def _check_memory(plan: Plan) -> None:
 def _strike(found: Description, modes: Modes, stages: Stages) -> tuple[Response, Callable[..., Response]]:
     """A blow with the time steps foretold, or coarser ones if that takes too many, and how to repeat it."""
     asked, blow = found.asked, found.asked.blow
-    if found.rings:
-        with blow.target.blame("observe"):
-            for point in blow.points:
-                modes.points("points", [point])
     striker = collision.shortened(blow.striker, asked.striker_modes(found.margin)[0])
     run = partial(collision.strike, modes, striker, blow.contact)
     with stages("strike"), blow.target.blame("strike"):

@@ -1,5 +1,6 @@
 """A scene file builds what the public functions build, and says in one line what is wrong with it."""
 
+from contextlib import nullcontext
 from dataclasses import FrozenInstanceError
 from pathlib import Path
 
@@ -301,6 +302,17 @@ def test_bad_scene_is_told_in_one_line_with_file_table_and_key(tmp_path, old, ne
     with pytest.raises(ValueError, match=text) as caught:
         load_text(tmp_path, bad).strike()
     assert str(caught.value).startswith(f"{tmp_path / 'scene.toml'}: ") and "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize("source", ["analytic", "fe"])
+def test_points_beside_the_body_are_refused_before_anything_is_computed(tmp_path, source):
+    """Corners and points on the rim are on it."""
+    for points, kept in (([[0.465, 0.3], [0.0, 0.1]], True), ([[0.1, 0.1], [0.1, 0.31]], False)):
+        text = edited("speed = 2.0", f"speed = 2.0\n[observe]\npoints = {points}")
+        made = load_text(tmp_path, text.replace('"analytic"', f'"{source}"'))
+        told = r"\[observe\] points must lie on the body, got \(0.1, 0.31\) m"
+        with nullcontext() if kept else pytest.raises(ValueError, match=told):
+            made.plan()
 
 
 @pytest.mark.parametrize(
