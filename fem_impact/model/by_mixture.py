@@ -17,6 +17,7 @@ from .by_modes import MANY_MODES
 from .by_vectors import Vectors
 from .target import FIRST_LOOK, Elements, Stages
 
+MOST = vectors.MOST_VECTORS // 2  # [-] a time limit: half a minute on a mesh of 50 000 unknowns
 NO_MESH = "a mesh that resolves the frequency up to which a plate of 'mixed' keeps its modes has too many unknowns"
 
 
@@ -109,15 +110,15 @@ class Mixed(Description):
     def refined(self, hit: Response, stages: Stages) -> "Mixed | Vectors | None":
         """More vectors, a finer mesh or twice the frequency; vectors for all frequencies if they cost less."""
         asked, error, allowed, seen = self.asked, hit.error, self.asked.budget.half, self.seen
-        if seen is not None and seen.count < mixed.MOST_VECTORS:
+        if seen is not None and seen.count < MOST:
             if error.truncation > 0.5 * allowed:
-                seen.count = min(mixed.MOST_VECTORS, 2 * seen.count)  # it lasts longer than expected
+                seen.count = min(MOST, 2 * seen.count)  # it lasts longer than expected
                 return self
             if seen.improved(error, allowed):
                 return self
         twice = 2.0 * hit.bodies[-1].n_modes
         # modes times steps of one run: 2e8 take ten seconds
-        many = hit.history.steps.shape[0] * twice > 2e8 or (seen is not None and twice > mixed.MOST_VECTORS)
+        many = hit.history.steps.shape[0] * twice > 2e8 or (seen is not None and twice > MOST)
         if error.idealisation <= allowed or many:
             return None
         higher = replace(self, frequency=2.0 * self.frequency, seen=None)

@@ -41,8 +41,6 @@ REACH = 2.0  # [-] the modes are needed up to this multiple of the frequency, wh
 RESOLVED = 1.25
 # [-] duration of the blow to be expected, over mass times mobility: exp(-15) = 3e-7 of the speed is left then
 LASTING = 15.0
-# [-] of the vectors at most, a time limit: half a minute on a mesh of 50 000 unknowns
-MOST_VECTORS = 1000
 
 
 def first_frequency(mass: float, mobility: float, echo: float, duration: float) -> float:
