@@ -159,6 +159,10 @@ class Body(check.Brief):
             numbers = [each["numbers"] for each in (told, found) if "numbers" in each]
             if len(numbers) == 2 and not np.array_equal(numbers[0], numbers[1]):
                 raise ValueError("files must be about the same nodes; export all results of one model")
+            for name in told.keys() & found.keys():
+                if name == "recovery" or name.endswith(("_matrix", "_entries")):
+                    kind = name.partition("_")[0]
+                    raise ValueError(f"files must hold the matrix of {kind} once, but two of them do; leave out one")
             static = [each["static"] for each in (told, found) if "static" in each]
             found = {name: value for name, value in found.items() if np.size(value) or name not in told}
             told |= found | ({"static": np.concatenate(static, axis=2)} if static else {})

@@ -1,7 +1,7 @@
 """What the elements of another program's mesh tell: its surface, and whether it is solid; and names of its matrices."""
 
 import re
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from typing import Any
 
 import numpy as np
@@ -15,8 +15,8 @@ BASIC = {
     "line": (3, 2), "triangle": (5, 3), "quad": (9, 4), "tetra": (10, 4), "hexahedron": (12, 8), "wedge": (13, 6),
     "pyramid": (14, 5),
 }  # fmt: skip
-# names of matrices and of their files: Nastran's KAA, K2GG, Abaqus's job_STIF1.mtx
-NAMES = (("stiffness", r"^K|STIF"), ("mass", r"^M|MASS"), ("recovery", r"^R"))
+# names of matrices and of their files: Nastran's KAA, K2GG, but not K4AA of damping, Abaqus's job_STIF1.mtx
+NAMES = (("stiffness", r"^K(?!4[A-Z])|STIF"), ("mass", r"^M|MASS"), ("recovery", r"^R"))
 
 
 def surface_and_kind(points: np.ndarray, blocks: dict[int, np.ndarray]) -> dict[str, np.ndarray]:
@@ -100,6 +100,17 @@ def rows_of(numbers: np.ndarray, wanted: Any) -> np.ndarray:
 def kind_of_matrix(name: str) -> str:
     """Mass, stiffness or recovery, by the name of a matrix; an empty text if neither."""
     return next((kind for kind, pattern in NAMES if re.search(pattern, name.upper())), "")
+
+
+def matrices_by_kind(file: str, names: Iterable[str]) -> dict[str, str]:
+    """Names of the mass, stiffness and recovery among those of a file's matrices."""
+    found: dict[str, str] = {}
+    for name in names:
+        kind = kind_of_matrix(name)
+        if kind in found:
+            raise ValueError(f"{file} holds {found[kind]} and {name}, and either may be {kind}; leave one of them out")
+        found |= {kind: name} if kind else {}
+    return found
 
 
 def triplets(kind: str, matrix: Any) -> dict[str, np.ndarray]:

@@ -77,11 +77,14 @@ def complete(told: dict[str, Any], n_modes: int | None) -> dict[str, Any]:
     if "mass_matrix" in told or "stiffness_matrix" in told:
         told |= matrices.solved(told, told.get("loads"), n_modes) | {"own": True}
         told.pop("modal_mass", None)
-    if not len(told.get("frequencies", ())):
+    found = check.array("frequencies", told.get("frequencies", ()), (None,), "Hz")
+    if not len(found):
         raise ValueError("files must hold modes; ask the other program for its eigenvectors, too, or for its matrices")
     if told.get("mass") is None:
         raise ValueError("mass must be given in kg: these files do not hold it")
     shapes = np.asarray(told.get("shapes", ()))
+    if shapes.shape[-1:] != found.shape:
+        raise ValueError(f"shapes must be as many as the {len(found)} frequencies, got them in shape {shapes.shape}")
     if shapes.ndim == 2:
         way = told.get("direction")
         if way is None:
@@ -91,14 +94,13 @@ def complete(told: dict[str, Any], n_modes: int | None) -> dict[str, Any]:
         shapes = np.einsum("nm,nd->ndm", shapes, way / np.linalg.norm(way, axis=1, keepdims=True))
     scale = told.get("modal_mass")
     if scale is not None:
-        scale = check.array("modal_mass", scale, (len(told["frequencies"]),), "kg")
+        scale = check.array("modal_mass", scale, found.shape, "kg")
         if scale.min() <= 0.0:
             raise ValueError(f"modal_mass must be positive, got {scale.min():g} kg")
         shapes = shapes / np.sqrt(scale)
-    order = np.argsort(np.abs(told["frequencies"]), kind="stable")
-    found = np.asarray(told["frequencies"])[order]
-    found = found if "own" in told else cell_kinds.settled(found)  # our own solver, and what it saved, has zeros
-    told |= {"frequencies": found, "shapes": shapes[..., order]}
+    order = np.argsort(np.abs(found), kind="stable")  # our own solver, and what it saved, has zeros
+    settled = found[order] if "own" in told else cell_kinds.settled(found[order])
+    told |= {"frequencies": settled, "shapes": shapes[..., order]}
     damping = told.get("damping_ratio", 0.0)
     if isinstance(damping, (list, tuple, np.ndarray)):
         told["damping_ratio"] = check.array("damping_ratio", damping, order.shape)[order]

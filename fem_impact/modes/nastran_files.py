@@ -55,9 +55,11 @@ def deck(path: Path) -> dict[str, np.ndarray]:
                 if wrong:
                     raise ValueError(f"{path.name} has displacements in frame {wrong[0]}, which is not rectangular")
                 told["frames"] = np.array([model.coords[number].beta() for number in frames.tolist()])
-    for name, matrix in model.dmig.items():
-        kind = cell_kinds.kind_of_matrix(name)
-        if kind in ("mass", "stiffness"):
+    for kind, name in cell_kinds.matrices_by_kind(path.name, model.dmig).items():
+        matrix = model.dmig[name]
+        if matrix.is_complex:
+            raise ValueError(f"{kind} must be real; give damping as damping_ratio")
+        if kind != "recovery":
             pair = np.asarray(matrix.GCj), np.asarray(matrix.GCi)
             told[f"{kind}_entries"] = np.column_stack([*pair, np.asarray(matrix.Real, float)])
     kept = [card for cards in (model.asets, model.bsets, model.csets) for card in cards]
@@ -75,10 +77,9 @@ def matrices(path: Path) -> dict[str, np.ndarray]:
 
         found = read_op4(str(path), **quiet)
     told: dict[str, np.ndarray] = {}
-    for name, matrix in found.items():
-        kind, values = cell_kinds.kind_of_matrix(name), matrix[1] if isinstance(matrix, tuple) else matrix.data
-        if kind:
-            told |= cell_kinds.triplets(kind, values)
+    for kind, name in cell_kinds.matrices_by_kind(path.name, found).items():
+        matrix = found[name]
+        told |= cell_kinds.triplets(kind, matrix[1] if isinstance(matrix, tuple) else matrix.data)
     if not told:
         raise ValueError(f"{path.name} must hold matrices named K... and M..., got {', '.join(found) or 'none'}")
     return told

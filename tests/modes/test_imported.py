@@ -116,5 +116,10 @@ def test_a_negative_eigenvalue_is_a_rigid_motion_only_if_it_is_tiny():
     told = {"shapes": np.ones((1, 3, 3)), "nodes": np.zeros((1, 3)), "mass": 1.0}
     body = fi.Body.load(told | {"frequencies": [-1e-6, 1e-3, 110.0]})
     assert body.frequencies.tolist() == [0.0, 0.0, 110.0]
+    for wrong, said in (("ab", "be numbers in Hz, got 'ab'"), (1.0, r"have shape"), (np.ones((2, 2)), r"have shape")):
+        with pytest.raises(ValueError, match=f"frequencies must {said}"):
+            fi.Body.load(told | {"frequencies": wrong})
+    with pytest.raises(ValueError, match=r"shapes must be as many as the 2 frequencies, got them in shape \(1, 3, 3\)"):
+        fi.Body.load(told | {"frequencies": [1.0, 2.0]})
     with pytest.raises(ValueError, match="a stable body, but the mode at -40 Hz has a negative eigenvalue, too large"):
         fi.Body.load(told | {"frequencies": [-40.0, 1e-3, 110.0]})

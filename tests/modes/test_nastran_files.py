@@ -123,6 +123,26 @@ def test_matrices_of_nastran_with_the_sets_of_their_deck(tmp_path):
     held_to_truth(fi.Body.load([tmp_path / "bar.op4", deck]))
 
 
+def test_structural_damping_of_nastran_is_no_stiffness(tmp_path):
+    """Nastran writes K4AAX beside KAAX, and MUG1, which recovers displacements, beside MAA."""
+    pytest.importorskip("pyNastran", reason="the nastran extra is not installed")
+    M, K, _, dofs = reduced()
+    deck = written_deck(tmp_path / "bar.pch", dofs, sets=False, entries={"KAAX": K, "MAAX": M, "K4AAX": 0.02 * K})
+    alone = written_deck(tmp_path / "alone.pch", dofs, sets=False, entries={"KAAX": K, "MAAX": M})
+    assert_allclose(fi.Body.load(deck).frequencies, fi.Body.load(alone).frequencies)
+    written_op4(tmp_path / "bar.op4", {"MAA": M, "KAA": K, "MUG1": 0.5 * M})
+    with pytest.raises(ValueError, match=r"bar\.op4 holds MAA and MUG1, and either may be mass; leave one of them out"):
+        fi.Body.load([tmp_path / "bar.op4", written_deck(tmp_path / "bar.bdf", dofs)])
+    with pytest.raises(
+        ValueError, match=r"files must hold the matrix of (mass|stiffness) once, but two of them do; leave"
+    ):
+        fi.Body.load([alone, deck])
+    turned = "DMIG,KAAX,0,6,3,0\nDMIG,KAAX,1,1,,1,1,1.,0.02\nGRID,1,,0.,0.,0.\n"
+    (tmp_path / "turned.pch").write_text(turned)
+    with pytest.raises(ValueError, match="stiffness must be real; give damping as damping_ratio"):
+        fi.Body.load(tmp_path / "turned.pch", mass=1.0)
+
+
 def test_matrices_of_nastran_as_dmig(tmp_path):
     """Ten digits are kept: rigid motions of the reduction resist by 1e-9 of what cancels in them."""
     pytest.importorskip("pyNastran", reason="the nastran extra is not installed")
