@@ -19,7 +19,7 @@ from scipy.sparse import coo_array, csc_array, csc_matrix, issparse
 from .._base import check
 from ..fe.eigenvalues import Flexibility, lowest
 from . import cell_kinds
-from .free_body import motions
+from .free_body import FITS, motions
 
 ALL = 600  # [-] unknowns up to which all modes are found, and all unit loads on nodes solved: a second together
 KEPT = 1e-7  # [-] of the terms of a sum that cancel, what may be left: files keep at least nine digits
@@ -77,8 +77,15 @@ def solved(told: Mapping[str, Any], loads: Any = None, n_modes: int | None = Non
         "static": (R @ static).reshape(len(kept), 3, -1), "loads": loads,
         "nodes": nodes[kept], "numbers": numbers[kept],
     }  # fmt: skip
-    if told.get("mass") is None:
-        found["mass"] = _mass(R, rigid, nodes[kept])
+    own, given = _mass(R, rigid, nodes[kept]), told.get("mass")
+    if own is None and given is None:
+        raise ValueError(
+            "total_mass (of files: mass) must be given in kg: the matrices of a body that is held do not tell the mass "
+            "of its supports"
+        )
+    if own is not None and given is not None and abs(given - own) > FITS * own:
+        raise ValueError(f"total_mass (of files: mass) must be that of the matrices, {own:g} kg, got {given:g} kg")
+    found["mass"] = own if given is None else given
     return found | _at_kept(told, kept, len(nodes))
 
 
@@ -143,8 +150,11 @@ def _directions(told: Mapping[str, Any], numbers: np.ndarray, size: int) -> Any:
                 f"they are not three or six of each of the {n} nodes"
             )
         dofs = np.column_stack([np.repeat(numbers, each), np.tile(np.arange(1, each + 1), n)])
-    dofs = check.array("dofs", dofs, (size, 2)).astype(int)
+    given = check.array("dofs", dofs, (size, 2))
+    dofs = given.astype(int)
     moving = np.flatnonzero((dofs[:, 1] >= 1) & (dofs[:, 1] <= 6))
+    if (given != dofs).any() or len(np.unique(dofs[moving], axis=0)) < len(moving) or not len(moving):
+        raise ValueError("dofs must be whole numbers, each node and direction from 1 to 6 once, and one at least")
     lost = np.setdiff1d(dofs[moving, 0], numbers)
     if lost.size:
         raise ValueError(f"dofs must be of the nodes given, got node {lost[0]}, which has no coordinates")
@@ -225,18 +235,13 @@ def _released(M: Any, K: Any, slowest: np.ndarray, rigid: np.ndarray) -> tuple[A
     return csc_matrix(kept.T @ (K @ kept)), rigid
 
 
-def _mass(R: Any, rigid: np.ndarray, nodes: np.ndarray) -> float:
+def _mass(R: Any, rigid: np.ndarray, nodes: np.ndarray) -> float | None:
     """Mass [kg] that shifts move, the same along x, y and z to a thousandth, of mass-normalised rigid motions."""
     moved, wanted = R @ rigid, np.tile(np.eye(3), (len(nodes), 1))
     share = np.linalg.lstsq(moved, wanted, rcond=None)[0]
     shifts = np.abs(moved @ share - wanted).max(axis=0) < 1e-3
     masses = np.square(share[:, shifts]).sum(axis=0)
-    if not shifts.any() or np.ptp(masses) > 1e-3 * masses.max():
-        raise ValueError(
-            "total_mass (of files: mass) must be given in kg: the matrices of a body that is held do not tell the mass "
-            "of its supports"
-        )
-    return float(masses.mean())
+    return float(masses.mean()) if shifts.any() and np.ptp(masses) <= 1e-3 * masses.max() else None
 
 
 def _unit_loads(turned: Any, numbers: np.ndarray) -> list[tuple[int, np.ndarray]]:

@@ -116,6 +116,9 @@ def test_a_negative_eigenvalue_is_a_rigid_motion_only_if_it_is_tiny():
     told = {"shapes": np.ones((1, 3, 3)), "nodes": np.zeros((1, 3)), "mass": 1.0}
     body = fi.Body.load(told | {"frequencies": [-1e-6, 1e-3, 110.0]})
     assert body.frequencies.tolist() == [0.0, 0.0, 110.0]
+    told |= {"shapes": np.random.default_rng(1).normal(size=(1, 3, 3))}
+    with pytest.raises(ValueError, match="files must hold each mode once, but that at 90 Hz is there twice"):
+        fi.Body.load(told | {"frequencies": [9.0, 90.0, 90.0], "shapes": told["shapes"][..., [0, 1, 1]]})
     for wrong, said in (("ab", "be numbers in Hz, got 'ab'"), (1.0, r"have shape"), (np.ones((2, 2)), r"have shape")):
         with pytest.raises(ValueError, match=f"frequencies must {said}"):
             fi.Body.load(told | {"frequencies": wrong})

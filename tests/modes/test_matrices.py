@@ -140,6 +140,13 @@ def test_unknowns_without_mass_make_no_modes():
         ({"stiffness": np.diag([1.0, 1.0, 1.0, -1.0])}, "stiffness must be positive, mass not negative"),
         ({"dofs": None}, "dofs must be given, node and direction"),
         ({"dofs": [(1, 1), (2, 1), (1, 2), (9, 2)]}, "dofs must be of the nodes given, got node 9"),
+        ({"dofs": [(1, 1), (2, 1), (1, 2), (1, 2)]}, "dofs must be whole numbers, each node and direction from 1 to 6"),
+        ({"dofs": [(1, 1), (2, 1), (1, 2), (2, 2.5)]}, "dofs must be whole numbers, each node and direction from 1 to"),
+        ({"dofs": [(1, 7), (2, 7), (1, 8), (2, 8)]}, "dofs must be whole numbers, each node and direction from 1 to 6"),
+        (
+            {"stiffness": np.kron(np.eye(2), [[1.0, -1.0], [-1.0, 1.0]])},
+            r"total_mass \(of files: mass\) must be that of the matrices, 2 kg, got 4 kg",
+        ),
         ({"recovery": np.ones((4, 4))}, r"recovery must be \(6, 4\)"),
         ({"loads": [(7, (1.0, 0.0, 0.0))]}, "loads must be on nodes that can move, got node 7"),
         ({"modes": 3}, "fields must be one of"),
