@@ -98,12 +98,7 @@ def complete(told: dict[str, Any], n_modes: int | None) -> dict[str, Any]:
         if scale.min() <= 0.0:
             raise ValueError(f"modal_mass must be positive, got {scale.min():g} kg")
         shapes = shapes / np.sqrt(scale)
-    # two sums over all places, each with its own weight, are the same of the same shape alone
-    flat = shapes.reshape(-1, len(found))
-    marks = np.vstack([found, *(np.arange(1.0, len(flat) + 1.0) ** power @ flat for power in (0.5, 1.0))])
-    marks, counts = np.unique(marks[:, flat.any(axis=0)], axis=1, return_counts=True)
-    if (counts > 1).any():
-        raise ValueError(f"files must hold each mode once, but that at {marks[0, counts.argmax()]:g} Hz is there twice")
+    cell_kinds.refuse_twice(found, shapes)
     order = np.argsort(np.abs(found), kind="stable")  # our own solver, and what it saved, has zeros
     settled = found[order] if "own" in told else cell_kinds.settled(found[order])
     told |= {"frequencies": settled, "shapes": shapes[..., order]}

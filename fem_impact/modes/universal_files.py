@@ -130,6 +130,7 @@ def arrays(path: Path) -> dict[str, np.ndarray]:
     for what, values in result.items():
         if not (np.abs(values) <= check.REACH).all():
             raise ValueError(f"{path.name} has {what} that are too large or not numbers; export it again")
+    cell_kinds.refuse_twice(found, result["shapes"])
     elements = [element for i, kind in enumerate(kinds) if kind == 2412 for element in _elements(file, i)]
     row = {int(n): i for i, n in enumerate(measured)}
     cells = {name: _cells(elements, row, i + 1) for i, name in enumerate(("lines", "triangles"))}

@@ -475,16 +475,10 @@ def universal(path: Path) -> Recording:
         data = np.real(np.asarray(one["data"])).astype(float)
         code = int(one.get("ordinate_spec_data_type", 0))
         stated = str(one.get("ordinate_axis_units_lab") or "").strip()
-        stated, kind = "" if stated == "NONE" else stated, UFF_UNITS.get(code)
+        stated = "" if stated == "NONE" else stated
         key = (uff_name(one), int(one.get("rsp_node", 0)), int(one.get("rsp_dir", 0)), code)
-        known = units.known(stated)
-        if known and kind and known[0] != kind:
-            raise ValueError(
-                f"{path.name} states the unit {stated!r} for {key[0]!r}, whose code {code} means {kind}; "
-                "export it again"
-            )
-        if stated and kind and not known:
-            notes.append(f"{key[0]}: the unit {stated!r} is not known, {kind} assumed by its code {code}")
+        known, kind, doubts = uff_unit(path, key[0], stated, code)
+        notes += doubts
         if kind and not known and kind in factors:
             data = data / factors[kind]
             notes.append(f"{key[0]}: brought to {kind} by data set 164")
@@ -547,6 +541,17 @@ class Universal:
 def uff_name(one: dict) -> str:
     name = str(one.get("id1", "")).strip()
     return name if name not in ("", "NONE") else f"node {one.get('rsp_node', 0)} direction {one.get('rsp_dir', 0)}"
+
+
+def uff_unit(path: Path, name: str, label: str, code: int) -> tuple[tuple[str, float] | None, str | None, list[str]]:
+    """What the label of a unit in data set 58 is known as, the unit of its code, and a note if the code decides."""
+    known, kind = units.known(label), UFF_UNITS.get(code)
+    if known and kind and known[0] != kind:
+        raise ValueError(
+            f"{path.name} states the unit {label!r} for {name!r}, whose code {code} means {kind}; export it again"
+        )
+    doubtful = kind and not known and label not in ("", "NONE")
+    return known, kind, [f"{name}: the unit {label!r} is not known, {kind} assumed by its code {code}"] * bool(doubtful)
 
 
 def check_uff(path: Path, one: dict, raw: bytes) -> None:

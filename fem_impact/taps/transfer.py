@@ -366,20 +366,15 @@ def arrays(path: Path) -> dict[str, np.ndarray]:
 def _per_force(path: Path, name: str, one: dict[str, Any], factors: dict[str, float]) -> tuple[str, float, list[str]]:
     """SI unit of the motion in a response per force, the factor to it, and notes: by codes, or by labels without."""
     parts: list[tuple[str, float]] = []
-    notes = []
+    notes: list[str] = []
     ends = [str(one.get(f"{what}_axis_units_lab") or "").strip() for what in ("ordinate", "orddenom")]
     over, _, under = ends[0].rpartition("/")
     if (known_unit(under) or "")[:1] == ("N",):  # as "g/lbf"
         ends = [over, ends[1] if known_unit(ends[1]) else under]
     for what, label, default in zip(("ordinate", "orddenom"), ends, ("", "N")):
         code = int(one.get(f"{what}_spec_data_type") or 0)
-        stated, kind = known_unit(label), readers.UFF_UNITS.get(code)
-        if kind and not stated and label not in ("", "NONE"):
-            notes.append(f"{name}: the unit {label!r} is not known, {kind} assumed by its code {code}")
-        if stated and kind and stated[0] != kind:
-            raise ValueError(
-                f"{path.name} states the unit {label!r} for {name!r}, whose code {code} means {kind}; export it again"
-            )
+        stated, kind, doubts = readers.uff_unit(path, name, label, code)
+        notes += doubts
         if stated is None and kind is None and not code and default:
             notes.append(f"{name}: what it is divided by is not stated, N assumed")
             kind = default

@@ -1,5 +1,6 @@
 """Files of other programs are read as bodies, and what they lack is said."""
 
+from contextlib import nullcontext
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -116,9 +117,6 @@ def test_a_negative_eigenvalue_is_a_rigid_motion_only_if_it_is_tiny():
     told = {"shapes": np.ones((1, 3, 3)), "nodes": np.zeros((1, 3)), "mass": 1.0}
     body = fi.Body.load(told | {"frequencies": [-1e-6, 1e-3, 110.0]})
     assert body.frequencies.tolist() == [0.0, 0.0, 110.0]
-    told |= {"shapes": np.random.default_rng(1).normal(size=(1, 3, 3))}
-    with pytest.raises(ValueError, match="files must hold each mode once, but that at 90 Hz is there twice"):
-        fi.Body.load(told | {"frequencies": [9.0, 90.0, 90.0], "shapes": told["shapes"][..., [0, 1, 1]]})
     for wrong, said in (("ab", "be numbers in Hz, got 'ab'"), (1.0, r"have shape"), (np.ones((2, 2)), r"have shape")):
         with pytest.raises(ValueError, match=f"frequencies must {said}"):
             fi.Body.load(told | {"frequencies": wrong})
@@ -126,3 +124,13 @@ def test_a_negative_eigenvalue_is_a_rigid_motion_only_if_it_is_tiny():
         fi.Body.load(told | {"frequencies": [1.0, 2.0]})
     with pytest.raises(ValueError, match="a stable body, but the mode at -40 Hz has a negative eigenvalue, too large"):
         fi.Body.load(told | {"frequencies": [-40.0, 1e-3, 110.0]})
+
+
+def test_a_mode_told_twice_is_refused():
+    """Two modes of one frequency differ at some of four nodes, and at fewer they may not."""
+    shapes = np.random.default_rng(1).normal(size=(4, 3, 2))[..., [0, 1, 1]]
+    for n in (1, 4):
+        told = {"nodes": np.eye(4, 3)[:n], "mass": 1.0, "frequencies": [9.0, 90.0, 90.0], "shapes": shapes[:n]}
+        said = "files must hold each mode once, but that at 90 Hz is there twice"
+        with pytest.raises(ValueError, match=said) if n == 4 else nullcontext():
+            fi.Body.load(told)
