@@ -133,9 +133,7 @@ def test_structural_damping_of_nastran_is_no_stiffness(tmp_path):
     written_op4(tmp_path / "bar.op4", {"MAA": M, "KAA": K, "MUG1": 0.5 * M})
     with pytest.raises(ValueError, match=r"bar\.op4 holds MAA and MUG1, and either may be mass; leave one of them out"):
         fi.Body.load([tmp_path / "bar.op4", written_deck(tmp_path / "bar.bdf", dofs)])
-    with pytest.raises(
-        ValueError, match=r"files must hold the matrix of (mass|stiffness) once, but two of them do; leave"
-    ):
+    with pytest.raises(ValueError, match=r"files must hold the matrix of .* once, but two of them do; leave out one"):
         fi.Body.load([alone, deck])
     turned = "DMIG,KAAX,0,6,3,0\nDMIG,KAAX,1,1,,1,1,1.,0.02\nGRID,1,,0.,0.,0.\n"
     (tmp_path / "turned.pch").write_text(turned)
