@@ -258,10 +258,10 @@ def _refined(engine: "_Engine", tolerance: float) -> tuple[np.ndarray, np.ndarra
         ratio = 2.0 ** (0.5 * finer)
         slack = SLACK * tolerance * 2.0 ** (0.5 * STEP_ORDER * (first[todo] - step))
         fine = engine.run_all(todo, step, slack, ratio * coarse[FOUND_STEPS])
-        found = engine.compare_runs(coarse, fine, todo, ratio)
-        met = found <= allowed(tolerance)
+        found, stated = engine.compare_runs(coarse, fine, todo, ratio)
+        met = (found <= allowed(tolerance)) & (stated <= tolerance)
         final[:, todo[met]] = fine[:, met]
-        error[todo[met]] = found[met]
+        error[todo[met]] = stated[met]
         coarse, todo = fine[:, ~met], todo[~met]
         # halving always leaves 13 % of stiff blows at 3e-5 undone instead of 8 %, never a third of those with loss
         finer = np.where(found[~met] < 8.0 * allowed(tolerance), 1, 2)
@@ -371,11 +371,15 @@ class _Engine:
             of_bodies = bundles.Kernels((target, striker), (bounds[0], bounds[1]), (later[0], later[1]))
             many_blows.run(cells[part], pairs, of_bodies, 2.0 ** (-0.5 * exponent), sure, self.band, track, out)
 
-    def compare_runs(self, coarse: np.ndarray, fine: np.ndarray, cells: np.ndarray, ratio: np.ndarray) -> np.ndarray:
-        """Largest error of the finer run in the quantities under tolerance; infinite if the two runs ended differently.
+    def compare_runs(
+        self, coarse: np.ndarray, fine: np.ndarray, cells: np.ndarray, ratio: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Largest error of the finer run in the quantities under tolerance, and what is stated of it, (n_cells,) each.
 
-        ``ratio`` is that of their steps. The error in the time of contact is that of the approach divided by its rate
-        there.
+        Both infinite if the two runs ended differently. ``ratio`` is that of their steps. The error in the time of
+        contact is that of the approach divided by its rate there. The peak of a lossy force hangs on the rates of modes
+        faster than the step: in 8 % of 920 random cells it erred by more than what is found, by up to six times; in
+        1.6 % by more than what is stated.
         """
         one, two = (
             {
@@ -389,5 +393,9 @@ class _Engine:
         change = np.fmax.reduce([swung, *apart.values()])
         same = coarse[FOUND_IMPACTS] == fine[FOUND_IMPACTS]
         same &= (coarse[FOUND_STATUS] <= many_blows.DOUBTFUL) & (fine[FOUND_STATUS] == many_blows.DONE)
-        found = np.maximum(change / (ratio**2 - 1.0), fine[FOUND_MISFIT])  # an order of 3 and more was measured
-        return np.where(same, found, np.inf)
+        order = ratio**2 - 1.0  # an order of 3 and more was measured
+        found = np.where(same, np.maximum(change / order, fine[FOUND_MISFIT]), np.inf)
+        rung = np.maximum(apart["force"] / order, fine[FOUND_MISFIT]) * (
+            1.0 + 5.0 * np.minimum(0.5, self.law["loss"][cells])
+        )
+        return found, np.maximum(found, rung)
