@@ -44,16 +44,16 @@ SEEKS, TARGET, CORNERED, WHICH, TRIES, COUNTERS = range(13, 19)
 # the last one do to the next step; when the contact began, and the time in contact before [s]; the force's impulse,
 # its moment about the start, its largest, its jumps [N] and bends [N/s], and where it last ended;
 # approaches [m]: deepest of all, farthest of this contact and of the last gap, and what a touch or gap must exceed;
-# sum of 1 / rate where contacts begin and end; steps needed
+# sum of 1 / rate where contacts begin and end; steps needed; how near to zero the approach turned back
 END_AHEAD, MEAN_AHEAD, RATE_AHEAD, BEGAN, TOUCHED, IMPULSE, MOMENT, PEAK, JUMPS, BENDS, HELD, SLOPED = range(5, 17)
-DEEPEST, HIGHEST, LOWEST, MARGIN, SWING, NEEDED, BLOW_STATES = range(17, 24)
+DEEPEST, HIGHEST, LOWEST, MARGIN, SWING, NEEDED, NEAREST, BLOW_STATES = range(17, 25)
 
 # and counters: whether it is in contact; how it would end now; contacts that have ended; runs of steps with a force;
 # steps of the kernel that are combined
 PRESSED, ENDING, N_CONTACTS, N_SEGMENTS, KNOWN, BLOW_COUNTS = range(6)
 
 # rows of what is found of many blows (N_FOUND, n_cells): impacts, time in contact, impulse, peak force, centroid, how
-# it ended, the relative error of the peak by `misfit` (of certified runs), steps needed, and the relative change of the
-# time in contact per relative change of the approach
+# it ended, the relative error of the peak by `misfit` (of certified runs), steps needed, the relative change of the
+# time in contact per relative change of the approach, and how near to zero that turned back over how deep it was
 FOUND_IMPACTS, FOUND_TIME, FOUND_IMPULSE, FOUND_PEAK, FOUND_CENTROID, FOUND_STATUS = range(6)
-FOUND_MISFIT, FOUND_STEPS, FOUND_SWING, N_FOUND = range(6, 10)
+FOUND_MISFIT, FOUND_STEPS, FOUND_SWING, FOUND_MARGIN, N_FOUND = range(6, 11)

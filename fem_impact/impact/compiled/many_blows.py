@@ -26,9 +26,9 @@ from .convolution import (  # isort: skip
 from .convolution import RATE as RATE_ROW  # isort: skip
 from .layout import (  # isort: skip
     APPROACH, BEGAN, BENDS, BLOW_COUNTS, BLOW_STATES, COMPRESSION, DEEPEST, END_AHEAD, ENDING, ENERGY,
-    FORCE, FOUND_CENTROID, FOUND_IMPACTS, FOUND_IMPULSE, FOUND_MISFIT, FOUND_PEAK, FOUND_STATUS, FOUND_STEPS,
-    FOUND_SWING, FOUND_TIME, HELD, HIGHEST, IMPULSE, JUMPS, KNOWN, LOWEST, MARGIN, MEAN_AHEAD, MOMENT,
-    N_CONTACTS, N_SEGMENTS, NEEDED, PEAK, PRESSED, RATE, RATE_AHEAD, SLOPED, SWING, TOUCHED,
+    FORCE, FOUND_CENTROID, FOUND_IMPACTS, FOUND_IMPULSE, FOUND_MARGIN, FOUND_MISFIT, FOUND_PEAK, FOUND_STATUS,
+    FOUND_STEPS, FOUND_SWING, FOUND_TIME, HELD, HIGHEST, IMPULSE, JUMPS, KNOWN, LOWEST, MARGIN, MEAN_AHEAD, MOMENT,
+    N_CONTACTS, N_SEGMENTS, NEAREST, NEEDED, PEAK, PRESSED, RATE, RATE_AHEAD, SLOPED, SWING, TOUCHED,
 )  # fmt: skip
 
 DONE, DOUBTFUL, AWKWARD, LONG = range(4)  # how a blow ended: proved apart; with something that the steps may have
@@ -71,6 +71,7 @@ class MapBlow(NamedTuple):
 def begin(track):
     """A blow at unit speed that is about to touch."""
     track.state[:] = 0.0
+    track.state[NEAREST] = np.inf
     track.counts[:] = 0
     track.state[RATE] = track.rates[0] = 1.0
     track.counts[PRESSED] = 1
@@ -196,6 +197,8 @@ def look(kernels, blow, track, n, level):
             return UNPROVED, end, rate
         if not blow.certify or not cleared(kernels, blow, track, n, end, rate):
             counts[ENDING] = DOUBTFUL
+    if end <= 0.0 and state[RATE] > 0.0 > rate:
+        state[NEAREST] = min(state[NEAREST], -turning(state[APPROACH], state[RATE] * span, end, rate * span)[1])
     return TOUCH if end > 0.0 else APART, end, rate
 
 
@@ -224,6 +227,7 @@ def glide(blow, track, n, end, rate):
 def touch(blow, track, n, end, rate):
     """Begin a contact within step n; where it would end if nothing pushed."""
     state, counts, h = track.state, track.counts, blow.h
+    state[NEAREST] = min(state[NEAREST], -state[LOWEST])
     if state[LOWEST] > -state[MARGIN]:
         counts[ENDING] = DOUBTFUL
     d, v0, v1 = state[APPROACH], state[RATE] * h, rate * h
@@ -392,6 +396,7 @@ def let_go(blow, track, n, free, y, rate):
     now = (n + part) * h
     if now - state[BEGAN] < h or state[HIGHEST] < state[MARGIN]:
         counts[ENDING] = DOUBTFUL
+    state[NEAREST] = min(state[NEAREST], state[HIGHEST])
     state[NEEDED] = n + 2.0
     state[LOWEST] = turning(d0, v0 * h, y, rate * h)[1] if v0 < 0.0 < rate else y
     state[SWING] += h / abs(speed)
@@ -426,8 +431,11 @@ def press(blow, track, n, free):
     if y <= 0.0 and (n == 0 or d0 <= 0.0):
         return False
     dips = v0 < 0.0 < rate and d0 > 0.0 and y > 0.0
-    if dips and turning(d0, v0 * h, y, rate * h)[1] < max(0.2 * min(d0, y), state[MARGIN]):
-        track.counts[ENDING] = DOUBTFUL
+    if dips:
+        low = turning(d0, v0 * h, y, rate * h)[1]
+        state[NEAREST] = min(state[NEAREST], low)
+        if low < max(0.2 * min(d0, y), state[MARGIN]):
+            track.counts[ENDING] = DOUBTFUL
     mend(blow, track, n, point, rate)
     mark_peak(blow, track, n)
     if blow.spring.loss * track.rates[n + 1] < -0.9:  # at -1 it stops pushing, which is not followed here
@@ -498,6 +506,7 @@ def write_found(blow, track, status, n, cell, out_found):
     if status == DONE and blow.certify:  # else nobody asks
         out_found[FOUND_MISFIT, cell] = force_missed(blow, track, peak) / peak
     out_found[FOUND_STEPS, cell] = n if status == LONG else state[NEEDED]
+    out_found[FOUND_MARGIN, cell] = state[NEAREST] / deepest if deepest > 0.0 else np.inf
     out_found[FOUND_SWING, cell] = deepest * state[SWING] / touched if touched > 0.0 else np.inf
 
 
