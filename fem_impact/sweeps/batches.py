@@ -182,9 +182,7 @@ def bounce(
     ``d = v x`` the blow depends on stiffness and speed only through ``k v**(exponent - 1)``; times do not change, and
     forces scale with v.
     """
-    kernels = {} if kernels is None else kernels
-    follow = partial(_follow, tolerance=tolerance, band=band, kernels=kernels)
-    return Bounces(*_in_pieces(blows, follow, workers, kernels))
+    return Bounces(*_in_pieces(blows, partial(_follow, tolerance=tolerance, band=band), workers, kernels))
 
 
 def allowed(tolerance: float) -> float:
@@ -202,17 +200,16 @@ def count_impacts(blows: Blows, *, tolerance: float, most: int, kernels: Kernels
     Two runs of different steps agree on each number. ``tolerance`` and ``kernels`` as in `bounce`, but errors of forces
     and times ask for no shorter steps, and a touch in flight is missed where the two agree on that.
     """
-    kernels = {} if kernels is None else kernels
-    (found,) = _in_pieces(blows, partial(_counted, tolerance=tolerance, most=most, kernels=kernels), None, kernels)
-    return found
+    return _in_pieces(blows, partial(_counted, tolerance=tolerance, most=most), None, kernels)[0]
 
 
 @one_thread
 def _in_pieces(
-    blows: Blows, follow: Callable[[Blows], tuple[np.ndarray, ...]], workers: int | None, kernels: Kernels
+    blows: Blows, following: Callable[..., tuple[np.ndarray, ...]], workers: int | None, kernels: Kernels | None
 ) -> list[np.ndarray]:
-    """What ``follow`` finds of blows, by several threads if they are many."""
-    workers = workers or os.cpu_count() or 1
+    """What ``following`` finds of blows, with the kernels known so far, by several threads if they are many."""
+    kernels = {} if kernels is None else kernels
+    follow, workers = partial(following, kernels=kernels), workers or os.cpu_count() or 1
     piece = 2**14  # blows a thread follows at once at most: their data stay in the cache
     size = min(piece, max(FEW, -(-blows.n_cases // (4 * workers))))
     if workers == 1 or blows.n_cases <= size:
@@ -338,8 +335,7 @@ class _Engine:
         """
         out = np.full((N_FOUND, self.blows.n_cases), np.nan)
         slacks = np.zeros(self.blows.n_cases)
-        if slack is not None:
-            slacks[cells] = slack
+        slacks[cells] = 0.0 if slack is None else slack
         todo = np.ones(len(cells), bool)
         for limit in LENGTHS:
             now = todo if length is None or limit == LENGTHS[-1] else todo & (length < limit)
@@ -397,9 +393,7 @@ class _Engine:
         same &= (coarse[FOUND_STATUS] <= many_blows.DOUBTFUL) & (fine[FOUND_STATUS] == many_blows.DONE)
         margins = np.minimum(CLEAR, [coarse[FOUND_MARGIN], fine[FOUND_MARGIN]])
         same &= 8.0 * np.abs(margins[1] - margins[0]) <= ratio**2 * margins[1]
-        order = ratio**2 - 1.0  # an order of 3 and more was measured
-        found = np.where(same, np.maximum(change / order, fine[FOUND_MISFIT]), np.inf)
-        rung = np.maximum(apart["force"] / order, fine[FOUND_MISFIT]) * (
-            1.0 + 5.0 * np.minimum(0.5, self.law["loss"][cells])
-        )
+        order, misfit = ratio**2 - 1.0, fine[FOUND_MISFIT]  # an order of 3 and more was measured
+        found = np.where(same, np.maximum(change / order, misfit), np.inf)
+        rung = (1.0 + 5.0 * np.minimum(0.5, self.law["loss"][cells])) * np.maximum(apart["force"] / order, misfit)
         return found, np.maximum(found, rung)

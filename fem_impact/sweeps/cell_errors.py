@@ -30,13 +30,10 @@ def estimate_left_out(cases: Cases) -> np.ndarray:
         shape = [-1 if axis == name else 1 for axis in cases.axes] if name in cases.axes else [1]
         return np.reshape(np.asarray(values, float), shape)
 
-    def value(name: str, shared: float) -> np.ndarray:
-        return shaped(name, cases.axes.get(name, [shared]))
+    def value(name: str, shared: float | None = None) -> np.ndarray:
+        return shaped(name, cases.axes.get(name, [getattr(base.contact, name) if shared is None else shared]))
 
-    def own(name: str) -> np.ndarray:
-        return value(name, getattr(base.contact, name))
-
-    stiffness, exponent = own("stiffness"), own("exponent")
+    stiffness, exponent = value("stiffness"), value("exponent")
     striker = base.striker
     felt = striker.felt_mass * (value("mass", striker.mass) / striker.mass)
     omega = np.pi / wall_time(stiffness, exponent, 1.0 / felt, value("speed", base.speed))
@@ -57,7 +54,7 @@ def estimate_left_out(cases: Cases) -> np.ndarray:
         above = np.minimum(1.0, omega / (edge * ratio))
         total = total + accuracy.left_out_error(soft, above, exponent, modes.dimension)
         softness = softness + soft
-    lossy = np.where(sum(own(name) for name in RATED) > 0.0, accuracy.LOSSY, 1.0)
+    lossy = np.where(sum(value(name) for name in RATED) > 0.0, accuracy.LOSSY, 1.0)
     return np.where(softness <= RESOLVABLE, total * lossy, np.inf)
 
 

@@ -301,14 +301,10 @@ def admit(n_cells: int, n_layers: int, max_cells: float, *, quick: bool = True, 
 
 def _with_speed(cases: Cases, fewer: Cases, numbers: np.ndarray, failures: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Blows at all speeds from those at one speed: impulse and peak force scale with it, all else is unchanged."""
-    along = list(cases.axes).index("speed")
-    shape = [1] * len(cases.shape)
-    shape[along] = -1
-    ratio = (cases.axes["speed"] / cases.axes["speed"][0]).reshape(shape)
-    whole = np.broadcast_to(numbers.reshape(-1, *fewer.shape), (len(numbers), *cases.shape)).copy()
-    for row, name in enumerate(cases.layers):
-        if name in ("impulse", "peak_force"):
-            whole[row] *= ratio
+    shape = [-1 if name == "speed" else 1 for name in cases.axes]
+    ratio = np.reshape(cases.axes["speed"] / cases.axes["speed"][0], shape)
+    scales = [ratio if name in ("impulse", "peak_force") else np.ones_like(ratio) for name in cases.layers]
+    whole = numbers.reshape(-1, *fewer.shape) * np.stack(scales)
     failures = np.broadcast_to(failures.reshape(fewer.shape), cases.shape)
     return whole.reshape(len(numbers), -1), failures.reshape(-1)
 

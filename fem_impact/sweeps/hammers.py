@@ -2,7 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from functools import cache
+from functools import cache, partial
 from itertools import pairwise
 from typing import Any
 
@@ -261,12 +261,10 @@ def _hammer(
     striker, alone = Striker.rigid(mass), replace(modes, poorer={})
 
     @cache
-    def whole(tip: float) -> Response:
-        return strike(modes, striker, Contact.linear(tip), at=at, speed=1.0, tolerance=DECIDED, max_impacts=2)
+    def hit(tip: float, tolerance: float = DECIDED, body: Modes = alone) -> Response:
+        return strike(body, striker, Contact.linear(tip), at=at, speed=1.0, tolerance=tolerance, max_impacts=2)
 
-    @cache
-    def hit(tip: float, tolerance: float = DECIDED) -> Response:
-        return strike(alone, striker, Contact.linear(tip), at=at, speed=1.0, tolerance=tolerance, max_impacts=2)
+    whole = partial(hit, body=modes)
 
     def once(tip: float) -> bool:
         """Whether a tip hits once, as told by all descriptions of the body."""

@@ -116,10 +116,9 @@ def blow_of(pairs, cell, h, certify, rows):
     swift = own.end + 12.0 * own.mean_ramp
     swift_rate = own.rate + (12.0 * own.mean - 6.0 * own.end) / h
     stiff = 1.0 / (1.0 + k * swift)
-    shares = (pairs.shares[0, cell], pairs.shares[1, cell])
-    rigid, static, slack = pairs.rigid[cell], pairs.static[cell], pairs.slack[cell]
     return MapBlow(
-        h, 1.0 / h, certify, shares, spring, own, once, straight, swift, swift_rate, stiff, rigid, static, slack
+        h, 1.0 / h, certify, (pairs.shares[0, cell], pairs.shares[1, cell]), spring, own, once, straight, swift,
+        swift_rate, stiff, pairs.rigid[cell], pairs.static[cell], pairs.slack[cell],
     )  # fmt: skip
 
 
@@ -416,9 +415,7 @@ def let_go(blow, track, n, free, y, rate):
 def press(blow, track, n, free):
     """Solve step n, in contact, and take it over; whether the blow can be followed further."""
     state, own, h = track.state, blow.own, blow.h
-    if (
-        n + 1 < track.force.size
-    ):  # what the forces before step n do to the next one, before the force of step n is known
+    if n + 1 < track.force.size:  # what the forces before step n do to the next one, before its own is known
         state[END_AHEAD], state[MEAN_AHEAD], state[RATE_AHEAD] = convolve(
             track.rows, n + 1, n, track.segments, track.counts[N_SEGMENTS], track.force, track.ramp
         )
@@ -430,8 +427,7 @@ def press(blow, track, n, free):
     push(blow, track, n, f, s)
     if y <= 0.0 and (n == 0 or d0 <= 0.0):
         return False
-    dips = v0 < 0.0 < rate and d0 > 0.0 and y > 0.0
-    if dips:
+    if v0 < 0.0 < rate and d0 > 0.0 and y > 0.0:
         low = turning(d0, v0 * h, y, rate * h)[1]
         state[NEAREST] = min(state[NEAREST], low)
         if low < max(0.2 * min(d0, y), state[MARGIN]):
