@@ -113,8 +113,7 @@ class MapSheet:
 
     def add(self, cells: np.ndarray, compute: Compute, turn: str) -> None:
         """Compute those of some cells that are not."""
-        cells = np.unique(cells)
-        cells = cells[~self.computed[cells]]
+        cells = np.unique(cells[~self.computed[cells]])
         if len(cells):
             self.numbers[:, cells], new = compute(cells, turn)
             self.texts |= {int(cells[i]): text for i, text in new.items()}
@@ -186,8 +185,9 @@ def refine(
         quarters, of = blocks.quarters()
         sheet.add(quarters.cells(shape[1]), compute, f"round-{turn}")
         off = sheet.missed(blocks, quarters, of)
-        split = np.zeros(len(blocks.along), bool)
-        np.logical_or.at(split, of, off > tolerance - allowed(tolerance))
+        spent = sheet.numbers[sheet.error][quarters.cells(shape[1])].max(axis=(1, 2))
+        spent = np.fmax(allowed(tolerance), np.where(spent > tolerance, 0.0, spent))  # no more cells help those
+        split = np.bincount(of, off > tolerance - spent, len(blocks.along)) > 0.0
         sheet.fill(quarters.some(~split[of]), off[~split[of]])
         blocks = quarters.some(split[of])
         blocks = blocks.some((blocks.along[:, :, 1] - blocks.along[:, :, 0] > 1).any(axis=1))
