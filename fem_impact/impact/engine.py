@@ -13,7 +13,7 @@ from .compiled import build, record
 from .compiled.bundles import KernelSystem, Limits
 from .compiled.collocation import run_collocation
 from .compiled.energy import run_energy
-from .compiled.law import Row
+from .compiled.law import Row, law_of
 from .contact import acting_stiffness, wall_time
 from .history import History
 from .stretched import Stretched
@@ -21,6 +21,9 @@ from .stretched import Stretched
 TOLERANCE = 1e-4  # [-] default tolerance: below what contact laws and materials are known to
 # [-] of the tolerance, what steps may err: two coarse runs agree by chance, and a single blow gains little by them
 STEP_SHARE = 0.1
+# [-] steps of a first run in half a swing on the steepest slope of a force with a course of its own; with fewer, two
+# runs may both take the whole of an unloading in one step, and agree: contact times erred by 3e-3 and said 1e-5
+STEEP = 8.0
 MAX_STEPS = 500_000  # [-] of one run: a time limit of about one second
 # [-] modes, or entries of the forms of stretching, times steps of one run: a time limit of some seconds
 MAX_WORK = 1_000_000_000
@@ -46,7 +49,7 @@ def steps_per_contact(tolerance: float, power: float = 0.25) -> float:
 
 
 def run_system(
-    system: KernelSystem, scheme: str, size: float, pace: tuple[float, float], last: tuple[float, int],
+    system: KernelSystem, scheme: str, size: float, pace: tuple[float, ...], last: tuple[float, int],
     stretched: Stretched | None = None, chosen_by: str = "tolerance",
 ) -> History:  # fmt: skip
     """One run up to the ``last`` time [s] and number of impacts, 0 for any.
@@ -97,9 +100,11 @@ def again(history: History, step: float | None = None, **changed: Any) -> Histor
     return run_system(system, "A4", size, pace, (horizon, most), stretched)
 
 
-def pace_of(system: KernelSystem, held: Sequence[int] = ()) -> tuple[float, float]:
-    """Shortest expected duration [s] of an undisturbed contact, and its approach speed [m/s].
+def pace_of(system: KernelSystem, held: Sequence[int] = ()) -> tuple[float, float, float]:
+    """Shortest expected duration [s] of an undisturbed contact, its approach speed [m/s], and the longest first step.
 
+    These steps [s] see how a contact opens that yields, and the hard layer of another: both may be far quicker than the
+    whole. They are infinite where all contacts follow power laws.
     ``held`` are numbers of modes that count as masses, though a hand makes them swing.
     """
     rate = system.omega * np.maximum(1.0, 2.0 * system.zeta)  # an overdamped mode acts as a dashpot, not as a mass
@@ -111,7 +116,7 @@ def pace_of(system: KernelSystem, held: Sequence[int] = ()) -> tuple[float, floa
     beyond[-1] = np.inf
     last = beyond > rate[order]  # the last mode of each distinct frequency
     beyond = beyond[last]
-    shortest, fastest = np.inf, 0.0
+    shortest, fastest, longest = np.inf, 0.0, np.inf
     for i, law in enumerate(map(Row._make, system.law.tolist())):
         k, exponent, compliance = law.stiffness, law.exponent, law.compliance
         mobile = (system.shape[i, order] ** 2).cumsum()[last]  # [1/kg] sum over the modes up to each
@@ -130,11 +135,15 @@ def pace_of(system: KernelSystem, held: Sequence[int] = ()) -> tuple[float, floa
             continue
         free = wall_time(acting_stiffness(law, mobile, speed), exponent, mobile, speed, compliance)
         shortest = min(shortest, float(free[(np.pi / free < above).argmax()]))
+        if law.kind:
+            swing = np.sqrt(law_of(law).steepest(law, 0.5 * speed**2 / mobile) * mobile)  # [rad/s]
+            steep = float(swing[(swing < above).argmax()])
+            longest = min(longest, np.pi / (STEEP * steep)) if steep else longest
         fastest = max(fastest, float(speed))
     if not np.isfinite(shortest):
         k = system.law["stiffness"][0]
-        return float(np.sqrt(1.0 / (k * max(1e-300, (system.shape[0] ** 2).sum())))), 1.0
-    return shortest, fastest
+        return float(np.sqrt(1.0 / (k * max(1e-300, (system.shape[0] ** 2).sum())))), 1.0, longest
+    return shortest, fastest, longest
 
 
 def most_steps(system: KernelSystem, stretched: Stretched | None) -> int:

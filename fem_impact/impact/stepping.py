@@ -124,7 +124,7 @@ class Converged:
 
 
 def refine_steps(
-    system: KernelSystem, options: Options, pace: tuple[float, float], stretched: Stretched | None = None
+    system: KernelSystem, options: Options, pace: tuple[float, float, float], stretched: Stretched | None = None
 ) -> Converged:
     """Refine until two successive runs agree to the tolerance; ``pace`` as of `engine.pace_of`."""
     scheme, least = options.scheme, min(system.law["exponent"].tolist())
@@ -154,7 +154,7 @@ class _Control:
 
     system: KernelSystem
     options: Options
-    pace: tuple[float, float]
+    pace: tuple[float, float, float]
     scheme: str
     free: bool  # whether scheme and steps are our choice
     stretched: Stretched | None
@@ -169,6 +169,9 @@ class _Control:
         over, quantities, n = RICHARDSON[self.scheme], self.options.quantities, self.options.n_quantities
         if self.scheme != "collocation":  # a strong loss reacts to the rates of modes faster than the step
             over = over[0], over[1] / (1.0 + 2.0 * self.pace[1] * max(self.system.law["loss"].tolist()))
+        if self.scheme == "A4" and len(felt := self.system.law[self.system.law["relaxation"] > 0.0]):
+            order = 1.0 + felt["exponent"].min()  # what it remembers sets in like the force
+            over = min(over[0], 2.0**order - 1.0), min(over[1], 2.0**order - 1.0)
         error = distance.of_runs(coarse, fine, quantities, over)
         if "force" in quantities:
             i = [*quantities].index("force")
@@ -226,7 +229,7 @@ class _Control:
         # or the horizon could cut both runs to one step, and they would always agree
         shortest = min(self.pace[0], options.last[0])
         count = _first_count(self.scheme, min(STEP_SHARE * options.tolerance, TOLERANCE), options.quantities)
-        first = min(2.0 * shortest / count, _longest_lossy(self.system, self.pace, options.tolerance))
+        first = min(2.0 * shortest / count, self.pace[2], _longest_lossy(self.system, self.pace, options.tolerance))
         return [first * 0.5**n for n in range(8)], STEP_SHARE * options.tolerance  # A4 errs 2**28 times less at last
 
     def explain_failure(self, best: float, coarse: History, fine: History) -> str:
@@ -249,7 +252,7 @@ class _Control:
         )
 
 
-def _longest_lossy(system: KernelSystem, pace: tuple[float, float], tolerance: float) -> float:
+def _longest_lossy(system: KernelSystem, pace: tuple[float, float, float], tolerance: float) -> float:
     """Longest step [s] that resolves the modes whose ringing shows in a lossy contact force; infinite without loss.
 
     A lossy force depends on the approach rate. A force that rises like a spring's makes each mode ring in that rate,

@@ -29,7 +29,7 @@ class Followed:
     laws: Sequence[Contact]
     system: KernelSystem
     options: Options
-    pace: tuple[float, float]  # as of `engine.pace_of`
+    pace: tuple[float, float, float]  # as of `engine.pace_of`
     runs: Converged
 
     def again(self, parts: Sequence[ReducedBody], *, finely: bool = False) -> History:

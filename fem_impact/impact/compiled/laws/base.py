@@ -95,6 +95,13 @@ class Law:
         """Approach [m] at which it has taken an energy [J], first pressed; 0 of a power law."""
         return np.zeros(energy.shape)
 
+    def steepest(self, row: Any, energy: np.ndarray) -> np.ndarray:
+        """Slope of its force [N/m] where it is pressed deepest, or leaves from there; 0 of a power law."""
+        deepest = self.deepest(row, energy)
+        less = (1.0 - 1e-4) * deepest
+        rise = self.force(row, deepest) - self.force(row, less)
+        return np.asarray(rise / np.where(deepest > 0.0, deepest - less, 1.0))
+
     def sunk(self, row: Any, memory: np.ndarray, left: np.ndarray) -> np.ndarray:
         """How much lower than at first the surface lies [m], by its memory and the time it has been ``left`` [s]."""
         return np.zeros(memory.shape)

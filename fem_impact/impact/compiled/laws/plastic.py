@@ -151,6 +151,10 @@ class PlasticLaw(Law):
         found = _descended(first + (np.sqrt(force * force + 2.0 * steep * further) - force) / steep, missed)
         return np.where(elastic > first, found, elastic)
 
+    def steepest(self, row: Any, energy: np.ndarray) -> np.ndarray:
+        wide = _course(row, self.deepest(row, energy))[3]
+        return np.asarray(row.exponent * row.stiffness * wide ** (row.exponent - 1.0))  # as it unloads
+
     def sentence(self, contact: Any, si: Any) -> str:
         return f" Beyond {si(contact.yield_approach, 'm')} it yields and keeps a dent."
 
