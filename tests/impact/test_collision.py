@@ -371,6 +371,16 @@ def test_errors_name_argument_rule_and_value(change, text):
         fi.strike(plate, fi.Striker.rigid(0.01), blow.pop("contact"), **blow)
 
 
+BAR = fi.analytic.beam(1.0, mass=0.2, first_frequency=100.0, n_modes=3)
+
+
+@pytest.mark.parametrize(("body", "at"), [(fi.Modes.rigid(0.1), ()), (BAR, (0.2, 0.2))])
+def test_a_body_that_cannot_press_itself_is_refused(body, at):
+    with pytest.raises(ValueError, match=r"second of contact 0 must be another body.* body 0 does not move towards"):
+        fi.collide([body], [fi.Touch(fi.Contact.linear(1e5), 0, 0, *at)], duration=1e-3)
+    assert fi.collide([BAR], [fi.Touch(fi.Contact.linear(1e5, gap=1.0), 0, 0, 0.2, 0.7)], duration=1e-3).n_impacts == 0
+
+
 def lossy_blow(seed):
     """A random blow of a mass on a plate through a contact that throws back 5 to 99 % of the speed, off a wall."""
     rng = np.random.default_rng(seed)
