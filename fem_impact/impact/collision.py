@@ -244,11 +244,11 @@ def _parts(bodies, contacts, speeds, states, forces, residual, strikers) -> tupl
                 raise ValueError(f"contacts must name bodies from 0 to {len(bodies) - 1}, got {body}")
             at = strikers[body].at if at is None and body in strikers else at
             ends[body].append((i, sign, bodies[body].point("at", at)))
-        body, points = touch.first, [end[2] for end in ends[touch.first][-2:]]
-        if body == touch.second and (not bodies[body].omega.any() or np.array_equal(*points)):
+        one = touch.first
+        if one == touch.second and (not bodies[one].omega.any() or np.array_equal(*(end[2] for end in ends[one][-2:]))):
             raise ValueError(
                 f"second of contact {i} must be another body, or first_at and second_at must be two points of one that "
-                f"bends: body {body} does not move towards itself"
+                f"bends: body {one} does not move towards itself"
             )
     parts, arriving = [], 0.0
     for body, modes in enumerate(bodies):
