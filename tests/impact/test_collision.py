@@ -411,6 +411,18 @@ def test_lossy_contacts_keep_their_promise(seeds):
 
 
 @pytest.mark.parametrize("scheme", ["A4", "collocation"])
+def test_a_push_that_ends_while_the_bodies_overlap_counts_for_max_impacts(scheme):
+    """A ringing bar is let go and pushed again before it is out of reach: one impact gave six."""
+    bar = fi.analytic.beam(1.0, ends=("hinged", "hinged"), mass=0.2, first_frequency=1500.0, n_modes=1)
+    blow = {"at": 0.3, "speed": 1.0, "residual": False, "scheme": scheme}
+    law = fi.Contact.hertz(1e7, loss=6.0)
+    one, all_of_it = (fi.strike(bar, fi.Striker.rigid(0.05), law, **blow, **last) for last in ({"max_impacts": 1}, {}))
+    assert one.n_impacts == 1 < all_of_it.n_impacts
+    assert one.impulse == pytest.approx(all_of_it.impacts[0].impulse, rel=1e-4)
+    assert one.impacts[0].restitution == pytest.approx(all_of_it.impacts[0].restitution, abs=1e-3)
+
+
+@pytest.mark.parametrize("scheme", ["A4", "collocation"])
 def test_lossy_contact_lets_go_while_the_bodies_overlap(scheme):
     """On a wall a mass leaves at e v with 1 + loss rate = 0 never reached; drawn away by a force, it is."""
     law = fi.Contact.linear(1e4, loss=2.0)

@@ -28,7 +28,7 @@ from .frame import (  # isort: skip
 )  # fmt: skip
 from .layout import (  # isort: skip
     A11, A12, A21, A22, APPROACH, BEGUN, CLOSED, CORNERED, EVENTS, FAILURES, FRESH, HEAD,
-    LENGTH, LEVEL, M1, PUSH, RATE, SEEKS, START, STEPS, TARGET, TIME, TRIES,
+    LENGTH, LEVEL, M1, PUSH, RATE, RELEASED, SEEKS, START, STEPS, TARGET, TIME, TRIES,
 )  # fmt: skip
 
 MOBILITY, BEYOND = range(2)  # rows of `CollocationRoom.contacts`
@@ -365,12 +365,15 @@ def record(contacts, course, grid, room, row, inner, h):
     row[LENGTH] = h
     for i in range(m):
         first = remember(contacts, i, row)
+        pushed = contacts.force[i] > 0.0
+        contacts.force[i] = 0.0
         if contacts.pressed[i]:
             row[first + CLOSED] = 1.0
             for k in range(s):
                 for b in range(s):
                     row[first + PUSH + k] += powers[b, k] * f[b, i]
         for a in range(s):
+            contacts.force[i] = max(contacts.force[i], f[a, i])
             v = room.free[SPED, a, i]
             for b in range(s):
                 for j in range(m):
@@ -379,6 +382,8 @@ def record(contacts, course, grid, room, row, inner, h):
             for k in range(s):
                 weight += powers[a, k] / (k + 1.0)
             course.done[i] += weight * h * f[a, i] * v
+        if pushed and contacts.pressed[i] and contacts.force[i] == 0.0 and contacts.law["loss"][i] > 0.0:
+            course.counts[RELEASED] += 1  # it was let go within a step
 
 
 @inner()

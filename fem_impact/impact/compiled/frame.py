@@ -14,13 +14,13 @@ import numpy as np
 from .build import inner
 from .bundles import Bodies, Contacts, Course, KernelRun, KernelSystem
 from .flight import NEVER, ONSET, SLOW, approach_of, find_onset
-from .law import dent, harden, relaxes
+from .law import dent, harden
 from .laws.felt import rest_of
 from .record import EXHAUSTED, FULL, HORIZON, IMPACTS, total_energy
 from .rounding import ITERATIONS, NEAR
 
 from .events import (  # isort: skip
-    AGAIN, EVENT_LIMIT, LOCATED, PARTS, enclose, first_corner, first_crossing, narrow, nearer,
+    AGAIN, EVENT_LIMIT, LETS_GO, LOCATED, PARTS, enclose, first_corner, first_crossing, narrow, nearer,
 )  # fmt: skip
 from .layout import (  # isort: skip
     APPROACH, BEGUN, BLINDS, CLOCKS, CONTACT_ROWS, CORNERED, COUNTERS, EVENTS, FAINT, FALLBACKS, FLYING, FRESH, HEAD,
@@ -230,11 +230,11 @@ def at_rest(bodies, contacts, course):
 
 @inner(part=True)
 def settle(contacts, target, limits, base):
-    """Take over approaches and rates at a step's end; the number of contacts that opened, but for felt left before.
+    """Take over approaches and rates at a step's end; the number of contacts that opened, but for those without force.
 
     Contacts open or close together if they do within a tiny part of the longest step ``base``, or rounding decides.
     """
-    law, now, pressed, y, rate = contacts.law, contacts.now, contacts.pressed, contacts.end, contacts.rate
+    now, pressed, y, rate = contacts.now, contacts.pressed, contacts.end, contacts.rate
     opened = 0
     for i in range(y.size):
         was = pressed[i]
@@ -251,7 +251,7 @@ def settle(contacts, target, limits, base):
             pressed[i] = rate[i] > limits.still or (was and rate[i] >= -limits.still)
         else:
             pressed[i] = y[i] > 0.0
-        if was and not pressed[i] and not (relaxes(law, i) and law["memory"][i] < 0.0):
+        if was and not pressed[i] and contacts.force[i] > 0.0:
             opened += 1
     return opened
 
@@ -265,7 +265,7 @@ def take_over(contacts, course, limits, h, base, special):
             law["memory"][i] = contacts.after[i]
     clock[TIME] += h
     corner = count[CORNERED]
-    if corner >= 0 and count[WHICH] == PARTS and law["memory"][corner] > 0.0:
+    if corner >= 0 and contacts.force[corner] > 0.0 and (count[WHICH] == PARTS or count[WHICH] == LETS_GO):
         count[RELEASED] += 1
     count[RELEASED] += settle(contacts, count[TARGET], limits, base)
     if clock[TIME] - clock[RESET] > base:

@@ -262,9 +262,9 @@ def stays(steps, row, first, slack):
 def still_pressed(steps, now, law, n_coefficients, i, d):
     """Whether contact i presses at the end of a run, where the approach from its dent is d.
 
-    Felt lets go while the body is still in its dent: where its force ends.
+    Felt lets go while the body is still in its dent, and so may a contact with loss: where its force ends.
     """
-    if relaxes(law, i):
+    if relaxes(law, i) or law["loss"][i] > 0.0:
         first = HEAD + (PUSH + n_coefficients) * i + PUSH
         end = 0.0
         for k in range(n_coefficients):
