@@ -262,15 +262,16 @@ def stays(steps, row, first, slack):
 def still_pressed(steps, now, law, n_coefficients, i, d):
     """Whether contact i presses at the end of a run, where the approach from its dent is d.
 
-    Felt lets go while the body is still in its dent, and so may a contact with loss: where its force ends.
+    Felt lets go while the body is still in its dent, where its force ends; a contact with loss may, where the bodies
+    part as fast as 1 / loss.
     """
-    if relaxes(law, i) or law["loss"][i] > 0.0:
+    if relaxes(law, i):
         first = HEAD + (PUSH + n_coefficients) * i + PUSH
         end = 0.0
         for k in range(n_coefficients):
             end += steps[-1, first + k]
         return now[REMEMBERED, i] >= 0.0 and end > 0.01 * steps[-1, first]
-    return d > NEAR * abs(now[APPROACH, i])
+    return d > NEAR * abs(now[APPROACH, i]) and 1.0 + law["loss"][i] * now[RATE, i] > NEAR
 
 
 @outer()
