@@ -28,15 +28,19 @@ SMOKE = (
 )  # fmt: skip
 # Slow families of `independent`, whose files stay as they came: of how many cases one is run, as of a mark `thin`.
 SHARES = {
+    "test_a_plate_gives_what_its_series_says_at_many_points": 3,
     "test_claims_cover_the_truth_in_a_whole_family": 5,
     "test_counts_beside_thresholds_are_right_or_in_doubt": 2,
     "test_domes_sound_as_flat_ones_within_the_stated_bound": 3,
-    "test_maps_whole_bodies_and_elements_keep_their_promise_or_tell": 2,
+    "test_maps_whole_bodies_and_elements_keep_their_promise_or_tell": 3,
     "test_modes_picked_from_a_tap_say_how_well_they_are_known": 2,
     "test_more_blows_keep_their_promise_or_tell": 3,
     "test_more_closed_forms_are_the_textbooks": 5,
     "test_more_rings": 3,
+    "test_processes_that_open_one_new_store_together_all_finish_it": 2,
     "test_radiated_pressure_anywhere": 3,
+    "test_reference_moves_as_scipy_does": 2,
+    "test_solids_are_met_to_what_thin_and_shallow_theory_can": 2,
 }
 FLAGS = (
     "--no-sandbox", "--disable-gpu", "--disable-quic", "--no-first-run", "--disable-background-networking",

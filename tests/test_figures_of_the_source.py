@@ -246,6 +246,7 @@ QUICK = ("fig05", "fig07", "fig14", "fig16")
 @pytest.mark.parametrize(
     "name", [pytest.param(name, marks=() if name in QUICK else pytest.mark.slow) for name in SCRIPTS]
 )
+@pytest.mark.thin(3)
 def test_a_script_alone_writes_picture_and_data(name, tmp_path, monkeypatch):
     monkeypatch.setattr("sys.argv", [f"{name}.py", str(tmp_path)])
     runpy.run_path(str(FIGURES / f"{name}.py"), run_name="__main__")

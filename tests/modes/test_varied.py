@@ -203,6 +203,7 @@ def barred():
 
 @pytest.mark.slow
 @pytest.mark.parametrize(("name", "value"), {"height": 12e-3, "width": 8e-3, "radius": 3.0}.items())
+@pytest.mark.thin(2)
 def test_ribs_have_slopes_in_their_sizes(barred, name, value):
     """The mass in the plane is that of a projection on the modes, whose space changes as well: least for low modes."""
     plate, modes, at_rest = barred
