@@ -113,13 +113,12 @@ def pytest_collection_modifyitems(config, items):
         share = thin.args[0] if thin else SHARES.get(item.originalname, 1)
         if share > 1 and item.get_closest_marker("slow"):
             families.setdefault((item.path, item.originalname, share), []).append(item)
-    left_out = []
+    left_out = set()
     for (*_, share), family in families.items():
         family.sort(key=lambda item: crc32(item.name.encode()))  # a fixed choice that follows no order of the cases
-        left_out += family[-(-len(family) // share) :]
-    kept = [item for item in items if item not in set(left_out)]
-    items[:] = kept
-    config.hook.pytest_deselected(items=left_out)
+        left_out |= {*family[-(-len(family) // share) :]}
+    items[:] = [item for item in items if item not in left_out]
+    config.hook.pytest_deselected(items=list(left_out))
 
 
 @pytest.fixture(scope="session")

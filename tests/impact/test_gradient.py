@@ -74,14 +74,11 @@ def check_seeds(seeds):
             continue
         slopes, differences, doubt, lossy = found
         message = f"seed {seed}, {QUANTITIES}"
-        # each blow has steps of its own, so that differences err, too: the worst of 200 blows is off by 2.3e-6, and by
-        # 1.3e-5 in the peak of a lossy force, which rings with every mode
+        # each blow has steps of its own, so that differences err, too: the worst of 200 blows is off by 2.3e-6
         off = np.abs(slopes - differences)
-        allowed = np.array([1e-5, 1e-5, 1e-5, 2e-5 if lossy else 1e-5])
-        assert (off[:4] <= allowed + doubt[:4]).all(), f"{message}: off by {off}, doubt {doubt}"
-        # the magnitude of a spectrum has corners at its zeros, which differences of finite steps run over: by 2.5 times
-        # their doubt with seed 580, where slopes are those of steps a quarter as long to 4e-6
-        assert abs(slopes[5] - differences[5]) <= 5e-5 + 3.0 * doubt[5], message
+        assert (off[:4] <= 1e-5 + doubt[:4]).all(), f"{message}: off by {off}, doubt {doubt}"
+        # the magnitude of a spectrum has corners at its zeros, which differences of finite steps run over
+        assert abs(slopes[5] - differences[5]) <= 5e-5 + 2.0 * doubt[5], message
         # a lossy force rings with every mode, so that steps move its peak; the error stated was 5e-2 where 1e-2 was off
         late = 2e-2 if lossy else 1e-5
         assert abs(slopes[4] - differences[4]) <= late + 2.0 * doubt[4], message
@@ -94,10 +91,15 @@ def test_gradients_of_some_blows_are_central_differences():
 
 
 @pytest.mark.slow
-@pytest.mark.thin(50)
-@pytest.mark.parametrize("first", range(100, 700, 6))
+def test_gradients_are_central_differences():
+    assert check_seeds(range(3, 14)) >= 6
+
+
+@pytest.mark.slow
+@pytest.mark.thin(24)
+@pytest.mark.parametrize("first", range(100, 700, 25))
 def test_gradients_of_many_blows_are_central_differences(first):
-    assert check_seeds(range(first, first + 6)) >= 1
+    assert check_seeds(range(first, first + 25)) >= 11
 
 
 def check_contacts(seed, kind):

@@ -162,6 +162,7 @@ def test_time_steps_leave_most_of_the_tolerance():
         blows = many(modes, striker, stiffness, mass=mass, residual=residual)
         found, fine = batches.bounce(blows, tolerance=1e-3), batches.bounce(blows, tolerance=3e-5)
         both = found.done & fine.done
+        # 89.5 % of the second family, 1.5 % fewer than where runs need not agree on the margin to another number
         assert both.mean() > 0.88 and (found.n_impacts == fine.n_impacts)[both].all()
         error = np.abs(found.restitution - fine.restitution)
         for name in ("contact_time", "impulse", "peak_force"):
@@ -296,38 +297,15 @@ def test_moments_between_the_steps_are_not_lost():
 
 
 GRAZING = [  # plate's modes, mass [kg], damping, length [m], point [m]; striker's first frequency [Hz] and mass, N/m
-    (
-        30,
-        0.9503408781650838,
-        0.0,
-        1.595076795866436,
-        (0.7914332851432211, 0.3161716648278219),
-        0.0,
-        40.78244,
-        2900504.9,
-    ),
-    (
-        10,
-        1.8118418183882197,
-        0.0,
-        1.2446600956926335,
-        (0.6844691157011585, 0.4160585196596517),
-        700.0,
-        16.6276,
-        4.7222e6,
-    ),
-    (30, 0.272586112720981, 0.0, 1.610576210668923, (0.859483251902951, 0.573245557394275), 700.0, 0.93763, 2021885.8),
-    (
-        30,
-        0.160763325411239,
-        0.005,
-        1.069459472895576,
-        (0.777390030519, 0.432775426303),
-        2000.0,
-        0.175782749,
-        2267400.22,
-    ),
-]
+    (30, 0.9503408781650838, 0.0, 1.595076795866436, (0.7914332851432211, 0.3161716648278219),
+     0.0, 40.78244, 2900504.9),
+    (10, 1.8118418183882197, 0.0, 1.2446600956926335, (0.6844691157011585, 0.4160585196596517),
+     700.0, 16.6276, 4722200.0),
+    (30, 0.272586112720981, 0.0, 1.610576210668923, (0.859483251902951, 0.573245557394275),
+     700.0, 0.93763, 2021885.8),
+    (30, 0.160763325411239, 0.005, 1.069459472895576, (0.777390030519, 0.432775426303),
+     2000.0, 0.175782749, 2267400.22),
+]  # fmt: skip
 
 
 def test_a_count_that_a_change_as_large_as_its_error_alters_is_not_told():
