@@ -179,7 +179,7 @@ def touching(bodies: Sequence[Modes], touch: Touch, speed: float, residual: bool
     """Two bodies that are to touch, the first moving, as the kernels take them, and how long the contact may last."""
     parts, _ = _parts(bodies, [touch], [speed, 0.0], None, None, residual, {})
     system = joined(parts, [touch.law])
-    return system, engine.pace_of(system)[0]
+    return system, engine.pace_of(system).duration
 
 
 def _follow(bodies, laws, parts, speed, options, striker=None, at=None, others=()) -> Response:
@@ -195,7 +195,7 @@ def _follow(bodies, laws, parts, speed, options, striker=None, at=None, others=(
     firsts = np.cumsum([0, *(len(part.omega) for part in parts)]).tolist()
     held = [first + i for first, part in zip(firsts, parts) for i in range(part.held)]
     pace = engine.pace_of(system, held)
-    depth, way = pace[0] * pace[1], max(np.abs(system.offset).tolist())
+    depth, way = pace.duration * pace.speed, max(np.abs(system.offset).tolist())
     if EPSILON * way > options.tolerance * depth:
         raise ValueError(
             f"gap and constant forces must be smaller: with an offset of {way:.3g} m, rounding spoils an approach of "

@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import replace
 from functools import cache
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -32,6 +32,18 @@ LOOKS = 16.0, 20_000
 NODES = 5  # [-] of collocation; more gain nothing, because the force is not smooth at onset and release
 
 
+class Pace(NamedTuple):
+    """How fast a system's undisturbed contacts pass; the longest first step is infinite where all follow power laws.
+
+    Such steps see how a contact opens that yields, and the hard layer of another: both may be far quicker than the
+    whole.
+    """
+
+    duration: float  # [s] expected, of the shortest
+    speed: float  # [m/s] of approach, the fastest
+    longest_step: float = np.inf  # [s] the first of a run
+
+
 @cache
 def gauss(count: int) -> tuple[np.ndarray, np.ndarray]:
     """Gauss nodes on [0, 1] with 1 appended, (count + 1,), and Lagrange polynomials in powers, (count, count)."""
@@ -49,7 +61,7 @@ def steps_per_contact(tolerance: float, power: float = 0.25) -> float:
 
 
 def run_system(
-    system: KernelSystem, scheme: str, size: float, pace: tuple[float, ...], last: tuple[float, int],
+    system: KernelSystem, scheme: str, size: float, pace: Pace, last: tuple[float, int],
     stretched: Stretched | None = None, chosen_by: str = "tolerance",
 ) -> History:  # fmt: skip
     """One run up to the ``last`` time [s] and number of impacts, 0 for any.
@@ -57,13 +69,15 @@ def run_system(
     ``size`` is the step in contact [s], for collocation the allowed misfit [-]; ``chosen_by`` is what it comes from.
     """
     most, stretch = most_steps(system, stretched), None
-    limits = Limits(float(EPSILON * pace[0] * pace[1]), float(ROUNDING * pace[1]), float(last[0]), last[1], most)
+    limits = Limits(
+        float(EPSILON * pace.duration * pace.speed), float(ROUNDING * pace.speed), float(last[0]), last[1], most
+    )
     if stretched is not None:
         stretched = replace(stretched, base=float(size), ramp=scheme == "A4")
         stretch = stretched.kernel
     if scheme == "collocation":
         nodes, powers = gauss(NODES)
-        result = run_collocation(system, nodes, powers, pace[0] / 2.0, float(size) * pace[1], limits)
+        result = run_collocation(system, nodes, powers, pace.duration / 2.0, float(size) * pace.speed, limits)
     else:
         result = run_energy(system, stretch, int(scheme == "A4"), float(size), limits)
     history = History(*system, *(*result, stretched))
@@ -96,17 +110,12 @@ def again(history: History, step: float | None = None, **changed: Any) -> Histor
     most = int(np.isfinite(history.contacts[:, 6]).sum()) if history.status == record.IMPACTS else 0
     for array in system:
         array.setflags(write=False)  # or numba would compile the kernels again for writable arrays
-    size = pace[0] / steps_per_contact(TOLERANCE) if step is None else step
+    size = pace.duration / steps_per_contact(TOLERANCE) if step is None else step
     return run_system(system, "A4", size, pace, (horizon, most), stretched)
 
 
-def pace_of(system: KernelSystem, held: Sequence[int] = ()) -> tuple[float, float, float]:
-    """Shortest expected duration [s] of an undisturbed contact, its approach speed [m/s], and the longest first step.
-
-    These steps [s] see how a contact opens that yields, and the hard layer of another: both may be far quicker than the
-    whole. They are infinite where all contacts follow power laws.
-    ``held`` are numbers of modes that count as masses, though a hand makes them swing.
-    """
+def pace_of(system: KernelSystem, held: Sequence[int] = ()) -> Pace:
+    """How fast its contacts pass; modes numbered ``held`` count as masses, though a hand makes them swing."""
     rate = system.omega * np.maximum(1.0, 2.0 * system.zeta)  # an overdamped mode acts as a dashpot, not as a mass
     if held:
         rate[held] = 0.0
@@ -142,8 +151,8 @@ def pace_of(system: KernelSystem, held: Sequence[int] = ()) -> tuple[float, floa
         fastest = max(fastest, float(speed))
     if not np.isfinite(shortest):
         k = system.law["stiffness"][0]
-        return float(np.sqrt(1.0 / (k * max(1e-300, (system.shape[0] ** 2).sum())))), 1.0, longest
-    return shortest, fastest, longest
+        return Pace(float(np.sqrt(1.0 / (k * max(1e-300, (system.shape[0] ** 2).sum())))), 1.0, longest)
+    return Pace(shortest, fastest, longest)
 
 
 def most_steps(system: KernelSystem, stretched: Stretched | None) -> int:

@@ -124,9 +124,9 @@ class Converged:
 
 
 def refine_steps(
-    system: KernelSystem, options: Options, pace: tuple[float, float, float], stretched: Stretched | None = None
+    system: KernelSystem, options: Options, pace: engine.Pace, stretched: Stretched | None = None
 ) -> Converged:
-    """Refine until two successive runs agree to the tolerance; ``pace`` as of `engine.pace_of`."""
+    """Refine until two successive runs agree to the tolerance."""
     scheme, least = options.scheme, min(system.law["exponent"].tolist())
     if stretched is not None:
         if scheme == "collocation":
@@ -154,7 +154,7 @@ class _Control:
 
     system: KernelSystem
     options: Options
-    pace: tuple[float, float, float]
+    pace: engine.Pace
     scheme: str
     free: bool  # whether scheme and steps are our choice
     stretched: Stretched | None
@@ -168,7 +168,7 @@ class _Control:
         """Two runs of a finer and a coarser size, and the errors of the finer one."""
         over, quantities, n = RICHARDSON[self.scheme], self.options.quantities, self.options.n_quantities
         if self.scheme != "collocation":  # a strong loss reacts to the rates of modes faster than the step
-            over = over[0], over[1] / (1.0 + 2.0 * self.pace[1] * max(self.system.law["loss"].tolist()))
+            over = over[0], over[1] / (1.0 + 2.0 * self.pace.speed * max(self.system.law["loss"].tolist()))
         if self.scheme == "A4" and len(felt := self.system.law[self.system.law["relaxation"] > 0.0]):
             order = 1.0 + felt["exponent"].min()  # what it remembers sets in like the force
             over = min(over[0], 2.0**order - 1.0), min(over[1], 2.0**order - 1.0)
@@ -227,9 +227,10 @@ class _Control:
                 options.tolerance
             )
         # or the horizon could cut both runs to one step, and they would always agree
-        shortest = min(self.pace[0], options.last[0])
+        shortest = min(self.pace.duration, options.last[0])
         count = _first_count(self.scheme, min(STEP_SHARE * options.tolerance, TOLERANCE), options.quantities)
-        first = min(2.0 * shortest / count, self.pace[2], _longest_lossy(self.system, self.pace, options.tolerance))
+        longest = min(self.pace.longest_step, _longest_lossy(self.system, self.pace, options.tolerance))
+        first = min(2.0 * shortest / count, longest)
         return [first * 0.5**n for n in range(8)], STEP_SHARE * options.tolerance  # A4 errs 2**28 times less at last
 
     def explain_failure(self, best: float, coarse: History, fine: History) -> str:
@@ -244,7 +245,7 @@ class _Control:
                 one, two = (np.sort(history.contacts[:, 1]) for history in (coarse, fine))
                 n = min(len(one), len(two))
                 # the first impacts, which end at the same times
-                same = np.append(np.abs(one[:n] - two[:n]) <= tolerance * self.pace[0], False)
+                same = np.append(np.abs(one[:n] - two[:n]) <= tolerance * self.pace.duration, False)
                 advice = f"give max_impacts of at most {max(1, int(same.argmin()))}"
         return (
             f"the step error stays at {best:.1e}, above the tolerance {tolerance:.1e}, with {len(fine.steps)} "
@@ -252,22 +253,22 @@ class _Control:
         )
 
 
-def _longest_lossy(system: KernelSystem, pace: tuple[float, float, float], tolerance: float) -> float:
+def _longest_lossy(system: KernelSystem, pace: engine.Pace, tolerance: float) -> float:
     """Longest step [s] that resolves the modes whose ringing shows in a lossy contact force; infinite without loss.
 
     A lossy force depends on the approach rate. A force that rises like a spring's makes each mode ring in that rate,
     with stiffness times u**2 / omega**2 of the approach speed.
     """
-    longest, numbers = np.inf, (pace[1] * system.law["loss"]).tolist()
+    longest, numbers = np.inf, (pace.speed * system.law["loss"]).tolist()
     if not any(numbers):
         return longest
-    slow = system.omega <= np.pi / pace[0]
+    slow = system.omega <= np.pi / pace.duration
     fastest = (-system.omega).argsort(kind="stable")
     order = fastest[(system.omega[fastest] > 0.0) & (system.zeta[fastest] < RINGING)]
     omega = system.omega[order]
     for shape, number in zip(system.shape, numbers):
         if number > 0.0 and len(omega):
-            stiffness = (1.0 + number) * (np.pi / pace[0]) ** 2 / max(float(shape[slow] @ shape[slow]), 1e-300)
+            stiffness = (1.0 + number) * (np.pi / pace.duration) ** 2 / max(float(shape[slow] @ shape[slow]), 1e-300)
             ringing = number / (1.0 + number) * stiffness * np.cumsum((shape[order] / omega) ** 2)
             heard = np.searchsorted(ringing, tolerance)
             if heard < len(omega):

@@ -29,7 +29,7 @@ class Followed:
     laws: Sequence[Contact]
     system: KernelSystem
     options: Options
-    pace: tuple[float, float, float]  # as of `engine.pace_of`
+    pace: engine.Pace
     runs: Converged
 
     def again(self, parts: Sequence[ReducedBody], *, finely: bool = False) -> History:
@@ -44,7 +44,7 @@ class Followed:
     @functools.cached_property
     def stiffness(self) -> list[float]:
         """Of every contact, as its duration tells it, and the modes that are slower [N/m]."""
-        omega = np.pi / self.pace[0]
+        omega = np.pi / self.pace.duration
         mobility = np.maximum((self.system.shape**2) @ (self.system.omega <= omega), 1e-300)
         return (omega**2 / mobility).tolist()
 
@@ -101,7 +101,7 @@ def modes_left_out(blow: Followed, bodies: Sequence[Modes]) -> tuple[Variation, 
     apply, as to contacts that outlast many periods of the modes left out; the truth was more in 2 of 715 random blows.
     The blow with a poorer description of a body that has modes above those of its own tells the error, too.
     """
-    omega_0, softness, expected, looked = np.pi / blow.pace[0], [0.0] * len(blow.laws), 0.0, True
+    omega_0, softness, expected, looked = np.pi / blow.pace.duration, [0.0] * len(blow.laws), 0.0, True
     changes: list[list[tuple[Sequence[ReducedBody], float, float]]] = []
     for i, (part, modes) in enumerate(zip(blow.parts, bodies)):
         if not part.yields:
@@ -215,7 +215,7 @@ def _told_by(blow: Followed, better: History | None, poorer: History | None, fir
         return np.append(found[:n] if same else np.zeros(n), np.zeros(len(one_more) - n))
     if len(better.contacts) != number:  # other impacts, of which nothing is known
         found = np.append(found[: n + 1], one_more[n + 1 :])
-    return found + one_more if _may_touch(better, poorer, blow.pace[0]) else found
+    return found + one_more if _may_touch(better, poorer, blow.pace.duration) else found
 
 
 def _may_touch(history: History, other: History, duration: float) -> bool:
