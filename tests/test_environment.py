@@ -125,6 +125,7 @@ def without(tmp_path_factory):
 
 
 @pytest.mark.slow
+@pytest.mark.thin(3)
 @pytest.mark.parametrize("words", CORE)
 def test_core_commands_work_without_extras(tmp_path, without, words):
     done = run(tmp_path, f"$FEM {words}", without)

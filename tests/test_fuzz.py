@@ -58,7 +58,7 @@ def test_mutated_inputs_give_a_result_or_one_clear_error(category, tmp_path):
 
 
 @pytest.mark.slow
-@pytest.mark.thin(3)
+@pytest.mark.thin(6)
 @pytest.mark.parametrize("category", fuzz.CATEGORIES)
 def test_very_many_mutated_inputs_give_a_result_or_one_clear_error(category, all_cases):
     skip_without_extras()

@@ -17,7 +17,7 @@ def test_every_hat_has_a_path_that_the_prompt_knows():
 
 
 @pytest.mark.slow
-@pytest.mark.thin(2)
+@pytest.mark.thin(4)
 @pytest.mark.parametrize("hat", hats.HATS)
 def test_the_commands_of_a_hat_lead_to_its_files(hat, tmp_path, capsys):
     for command, seconds, done in hats.walk(hat, tmp_path):

@@ -41,7 +41,7 @@ def test_no_notebook_tells_where_or_when_it_was_run(path):
 
 @pytest.mark.slow
 @pytest.mark.parametrize("path", FILES, ids=lambda path: path.stem)
-@pytest.mark.thin(2)
+@pytest.mark.thin(3)
 def test_the_outputs_are_those_of_a_run(path):
     pytest.importorskip("nbclient", reason="nbclient is not installed")
     pytest.importorskip("ipykernel", reason="ipykernel is not installed")

@@ -92,7 +92,7 @@ def test_how_small_a_force_or_gap_counts_as_none_does_not_matter(monkeypatch):
 
 
 @pytest.mark.slow
-@pytest.mark.thin(4)
+@pytest.mark.thin(8)
 @pytest.mark.parametrize("seed", range(40))
 @pytest.mark.filterwarnings("ignore::fem_impact.ToleranceWarning")
 def test_impacts_of_random_chains_do_not_depend_on_the_tolerance(seed):

@@ -50,7 +50,7 @@ EVERYDAY = sorted((FOLDER / "everyday").glob("*.toml"))
 
 
 @pytest.mark.slow
-@pytest.mark.thin(5)
+@pytest.mark.thin(10)
 @pytest.mark.parametrize("path", EVERYDAY, ids=lambda path: path.stem)
 def test_an_everyday_scene_meets_its_tolerance_and_is_trusted_or_says_why_it_is_not(path):
     found = fi.load_scene(path)
