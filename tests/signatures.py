@@ -137,8 +137,7 @@ def things() -> dict[str, Any]:
         tolerance=1e-2, borders=True,
     )  # fmt: skip
     run = scene.run()
-    fi.export.write_json(folder / "response.json", fi.export.run_data(run, scene.data()))
-    results.save_response(folder, run.response, scene.points)
+    results.save_response(folder, run.response, scene.points, fi.export.run_data(run, scene.data()))
     frequency = np.arange(1.0, 301.0)
     H = fi.mobility(bar.damped(0.02), [0.0], [0.0], frequency, "accelerance")
     responses = xarray.Dataset(
