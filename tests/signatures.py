@@ -57,7 +57,6 @@ INNER = {
     "export.plain", "export.versions", "export.csv_text", "export.run_data", "export.vtk_ending", "figures.snapshot",
     "figures.in_hertz", "figures.styled", "sound.Sound",
     "hammers.Hammer", "hammers.bandwidth_of", "hammers.impacts_of_tips", "hammers.falls", "hammers.half_sine_reach",
-    "report.SoundPlayer",
     "lesson.write", "lesson.Written", "lesson.Written.data", "lesson.Written.summary",  # many blows, see test_lesson
     "explore.serve",  # ends at an interruption only, see test_explore
     "ToleranceWarning", "analytic.closed_form", "Striker.let_go",

@@ -6,7 +6,6 @@ import math
 import os
 import shlex
 from collections.abc import Mapping
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -30,7 +29,6 @@ from ..scenes.sequence import Played
 from ..show import export, sampling, sound
 from ..show.figures import SPECTRUM_BAND
 from .html_page import QUIET, audio, script_data, write_page
-from .html_page import template as template
 
 POINTS = 1000  # [-] of a spectrum: about one per pixel of a wide page
 BOUND = {"low": "estimate from below", "high": "estimate from above"}
@@ -266,15 +264,6 @@ def _shares(energies: Mapping[str, float], called: Mapping[str, str]) -> list[di
     ]  # fmt: skip
 
 
-@dataclass(frozen=True)
-class SoundPlayer:
-    """One sound on the page."""
-
-    name: str
-    note: str
-    uri: str
-
-
 def _end(response: Response | Strokes) -> float:
     """When the pictures of a blow or a sequence end [s]."""
     if isinstance(response, Response):
@@ -283,8 +272,8 @@ def _end(response: Response | Strokes) -> float:
     return last + (sampling.AFTER - 1.0) * (last - float(response.starts[0]))
 
 
-def _sounds(scene: Scene, response: Response | Strokes) -> list[SoundPlayer]:
-    """The sound at each observation point and, for a plate, at each listener, by default 1 m in front of it."""
+def _sounds(scene: Scene, response: Response | Strokes) -> list[dict[str, str]]:
+    """Players of the sound at each observation point and, for a plate, each listener, by default 1 m in front of it."""
     heard = [
         (f"Motion at {place(point)}", sound.synthesise(response, point, duration=_duration(response)))
         for point in scene.points[:MOST_POINTS]
@@ -300,10 +289,11 @@ def _sounds(scene: Scene, response: Response | Strokes) -> list[SoundPlayer]:
     for name, samples in heard:
         level = samples.peak_level
         stated = f"peak {samples.said}; full scale {samples.full_scale:g} {samples.unit}, as in every report"
-        players.append(SoundPlayer(name, stated, audio(samples.samples, samples.rate)))
+        players.append({"name": name, "note": stated, "uri": audio(samples.samples, samples.rate)})
         if -math.inf < level < QUIET:
             raised = audio(samples.samples * 10.0 ** (-level / 20.0), samples.rate)
-            players.append(SoundPlayer(name, f"the same sound amplified by {-level:.1f} dB to full scale", raised))
+            said = f"the same sound amplified by {-level:.1f} dB to full scale"
+            players.append({"name": name, "note": said, "uri": raised})
     return players
 
 
