@@ -1,6 +1,5 @@
 """Writes one self-contained HTML page about a strike: the scene, the errors, the results and the sound."""
 
-import base64
 import json
 import math
 import os
@@ -28,7 +27,7 @@ from ..scenes.sentences import arriving, body, contact, place, power, si, tidy, 
 from ..scenes.sequence import Played
 from ..show import export, sampling, sound
 from ..show.figures import SPECTRUM_BAND
-from .html_page import QUIET, audio, script_data, write_page
+from .html_page import QUIET, audio, packed, script_data, write_page
 
 POINTS = 1000  # [-] of a spectrum: about one per pixel of a wide page
 BOUND = {"low": "estimate from below", "high": "estimate from above"}
@@ -409,8 +408,7 @@ def _lines(ends: np.ndarray) -> list[list[float | None]]:
 def _packed(rows: np.ndarray) -> dict[str, Any]:
     """Rows as little-endian 16-bit integers and their unit: a tenth of the size of text."""
     step = float(np.abs(rows).max(initial=0.0)) / 32767.0 or 1.0
-    raw = np.ascontiguousarray(np.round(rows / step).astype("<i2")).tobytes()
-    return {"step": step, "rows": len(rows), "data": base64.b64encode(raw).decode("ascii")}
+    return {"step": step, "rows": len(rows), "data": packed(np.round(rows / step), "<i2")}
 
 
 def _short(values: np.ndarray) -> list[float]:
