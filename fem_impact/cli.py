@@ -74,21 +74,18 @@ def main(arguments: list[str] | None = None) -> int:
 
 def _print(options: argparse.Namespace, found: Answer) -> None:
     """Print an answer as text, or as JSON with what all answers have."""
-    if found.said is None:
-        _print_json(found.data)
-    elif options.json:
-        ours = {"command": options.command, "format": answers.FORMAT, **found.data}
-        said = ("\n".join([part] if isinstance(part, str) else part) for part in found.said)
-        rest = {"notes": [], "see": named(said), "versions": fi.export.versions()}
-        _print_json(ours | {name: value for name, value in rest.items() if name not in ours})
+    if found.said is None or options.json:
+        data = found.data
+        if found.said is not None:
+            said = ("\n".join([part] if isinstance(part, str) else part) for part in found.said)
+            rest = {"notes": [], "see": named(said), "versions": fi.export.versions()}
+            data = {"command": options.command, "format": answers.FORMAT} | data
+            data |= {name: value for name, value in rest.items() if name not in data}
+        print(json.dumps(fi.export.plain(data), indent=2, allow_nan=False))
     else:
         for part in found.said:
             print(wrapped(part) if isinstance(part, str) else "\n".join(part))
     print(end="", flush=True)
-
-
-def _print_json(data: dict[str, Any]) -> None:
-    print(json.dumps(fi.export.plain(data), indent=2, allow_nan=False))
 
 
 def _interruptible(options: argparse.Namespace) -> AbstractContextManager[None]:

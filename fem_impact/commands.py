@@ -1,4 +1,7 @@
-"""What the commands do: each reads its options, calls the library and returns its answer; contains no physics."""
+"""What the commands do: each reads its options, calls the library and returns its answer; contains no physics.
+
+`arguments.COMMANDS` says in words what each of them is for.
+"""
 
 import argparse
 import math
@@ -33,7 +36,6 @@ from .show import FORMATS
 
 
 def run_strike(options: argparse.Namespace) -> Answer:
-    """Strike and write."""
     from ._base import check  # imported only when needed
     from .impact import promise
     from .model.target import Stages
@@ -65,7 +67,7 @@ def run_strike(options: argparse.Namespace) -> Answer:
     keep.unlink(missing_ok=True)
     if options.band:
         with display("blows"):
-            found = band.around(scene, run.response, watch=partial(display.report, "blows"))
+            found = band.around(scene, run.response)
     seconds = {**run.seconds, **stages.seconds, "total": time.perf_counter() - began}
     said: list[str | Sequence[str]] = [title_of(scene), run.response.summary()]
     if options.band:
@@ -97,7 +99,8 @@ def _write(
     folder: Path, scene: Any, run: Any, options: argparse.Namespace, stages: Any, painter: Any
 ) -> dict[str, Any]:
     """Write every file of a strike; return the contents of response.json."""
-    from .show import sampling  # imported only when needed
+    from .scenes import results  # imported only when needed
+    from .show import sampling
     from .show.canvas import NAMES
 
     response = run.response
@@ -135,7 +138,7 @@ def _write(
     changes = {name: value for name, value in run.plan.changes.items() if name in ("tolerance", "quantity")}
     tables, copies = scene.kept(folder, **changes)
     data = fi.export.run_data(run, tables) | fi.export.plain({**extra, "files": files + copies})
-    _save_response(folder, scene, response, data)
+    results.save_response(folder, response, scene.points, data)
     return data
 
 
@@ -158,17 +161,10 @@ def _write_heard(
     return [*files, "modes.pvd", *(heard["file"] for heard in sounds)], sounds
 
 
-def _save_response(folder: Path, scene: Any, response: Any, data: dict[str, Any]) -> None:
-    from .scenes import results  # imported only when needed
-
-    fi.export.write_json(folder / "response.json", data)
-    results.save_response(folder, response, scene.points)
-
-
 def _strike_in_turn(options: argparse.Namespace, scene: Any) -> Answer:
     """Play the strokes of a scene and write what they did."""
     from .model.target import Stages  # imported only when needed
-    from .scenes import sequence
+    from .scenes import results, sequence
 
     given = {name: getattr(options, name) for name in ("verify", "pictures", "film", "vtk", "target")}
     wrong = next((name for name, value in given.items() if value), None)
@@ -184,7 +180,7 @@ def _strike_in_turn(options: argparse.Namespace, scene: Any) -> Answer:
         tables, copies = scene.kept(staging, tolerance=found.tolerance)
         seconds = {**stages.seconds, "total": time.perf_counter() - began}
         data = {**sequence.sequence_numbers(found, tables, seconds), "sounds": sounds, "files": files + copies}
-        _save_response(staging, scene, found, data)
+        results.save_response(staging, found, scene.points, data)
     said = [title_of(scene), found.summary(), *describe_sounds(sounds), f"Time: {seconds['total']:.2f} s"]
     return answer(data, *said, folder=folder, files=data["files"], missed=not found.tolerance_met)
 
@@ -205,14 +201,12 @@ def describe_sounds(sounds: Sequence[dict[str, Any]]) -> list[str]:
 
 
 def run_plan(options: argparse.Namespace) -> Answer:
-    """Plan, and strike nothing."""
     scene = fi.load_scene(options.scene)
     plan = (scene.plan_strokes if scene.stroke else scene.plan)(watch=progress_of(options), **_choices(options))
     return answer(plan.data(), title_of(scene), str(plan))
 
 
 def run_map(options: argparse.Namespace) -> Answer:
-    """Strike the grid of a scene."""
     from .scenes import maps  # imported only when needed
 
     began = time.perf_counter()
@@ -252,7 +246,6 @@ def run_map(options: argparse.Namespace) -> Answer:
 
 
 def run_spread(options: argparse.Namespace) -> Answer:
-    """Strike with uncertain inputs."""
     from .scenes import uncertainty  # imported only when needed
 
     began = time.perf_counter()
@@ -289,7 +282,6 @@ def _split(option: str, text: str) -> tuple[str, str]:
 
 
 def run_tune(options: argparse.Namespace) -> Answer:
-    """Say what to take off where, so that modes sound at pitches."""
     from .designs import tuning  # imported only when needed
 
     picture, wanted = picture_of(options, "tuning.png"), tuning.given(options.pitch)
@@ -305,7 +297,6 @@ def run_tune(options: argparse.Namespace) -> Answer:
 
 
 def run_report(options: argparse.Namespace) -> Answer:
-    """Strike and write a page."""
     scene = fi.report.read(options.scene)
     path = page_of(options, "report.html")
     changes = {} if options.tolerance is None else {"tolerance": options.tolerance}
@@ -326,7 +317,6 @@ def run_report(options: argparse.Namespace) -> Answer:
 
 
 def run_page(options: argparse.Namespace) -> Answer:
-    """Strike the grid of a page without a server."""
     scene, display = fi.load_scene(options.scene), progress_of(options)
     path = page_of(options, "page.html")
     with staged(path.parent) as staging:
@@ -335,8 +325,6 @@ def run_page(options: argparse.Namespace) -> Answer:
 
 
 def run_explore(options: argparse.Namespace) -> None:
-    """Serve a page until the program is stopped."""
-
     def ready(address: str) -> None:
         options.show(answer({"address": address}, [f"{address}   (Ctrl-C stops it)"]))
         if not options.no_open:
@@ -346,7 +334,6 @@ def run_explore(options: argparse.Namespace) -> None:
 
 
 def run_play(options: argparse.Namespace) -> Answer:
-    """Strike by hand or from a MIDI file, and hear it."""
     from .live import command, devices  # imported only when needed
 
     scene = fi.load_scene(options.scene)
@@ -380,7 +367,6 @@ def run_play(options: argparse.Namespace) -> Answer:
 
 
 def run_modes(options: argparse.Namespace) -> Answer:
-    """List the modes of the struck body."""
     from ._base import check  # imports numpy, which --help and --version do not need
 
     check.count("n_modes", options.n_modes)
@@ -406,7 +392,6 @@ def run_modes(options: argparse.Namespace) -> Answer:
 
 
 def run_new(options: argparse.Namespace) -> Answer:
-    """Write a scene to begin with."""
     from .scenes import adapted, templates  # imported only when needed
 
     name = f"{options.kind if options.drawing is None else options.drawing.stem}.toml"
@@ -422,7 +407,6 @@ def run_new(options: argparse.Namespace) -> Answer:
 
 
 def run_catalogue(options: argparse.Namespace) -> Answer:
-    """List what has a name, or all that is known of one."""
     from .impact import listing  # imported only when needed
 
     data, said = listing.listed(" ".join(options.words))
@@ -430,7 +414,6 @@ def run_catalogue(options: argparse.Namespace) -> Answer:
 
 
 def run_mesh(options: argparse.Namespace) -> Answer:
-    """List what supports can name."""
     from .mesh import edge_table  # imported only when needed
 
     drawn = picture_of(options, "mesh.png")
@@ -459,7 +442,6 @@ def run_mesh(options: argparse.Namespace) -> Answer:
 
 
 def run_show(options: argparse.Namespace) -> Answer:
-    """Say what a folder of results holds."""
     from .scenes import results  # imported only when needed
 
     data, said = results.describe(options.scene)
@@ -467,7 +449,6 @@ def run_show(options: argparse.Namespace) -> Answer:
 
 
 def run_schema(options: argparse.Namespace) -> Answer:
-    """Print a schema: of scenes, or of what a command prints as JSON."""
     if options.of is not None:
         return Answer(answers.schema(options.of), None)
     from .scenes import editor_schema  # imported only when needed
@@ -476,7 +457,6 @@ def run_schema(options: argparse.Namespace) -> Answer:
 
 
 def run_doctor(options: argparse.Namespace) -> Answer:
-    """Check the installation."""
     from . import doctor  # imported only when needed
 
     with progress_of(options)("checking, and compiling if not yet done"):
@@ -491,7 +471,6 @@ def run_doctor(options: argparse.Namespace) -> Answer:
 
 
 def run_verify(options: argparse.Namespace) -> Answer:
-    """Compute the reference cases on this machine."""
     from . import references  # imported only when needed
     from .show import figures, plots
 
@@ -528,7 +507,6 @@ def _choices(options: argparse.Namespace) -> dict[str, Any]:
 
 
 def run_fit(options: argparse.Namespace) -> Answer:
-    """Find the hammer and the contact behind measured taps."""
     from .pages import fit_page  # imported only when needed
     from .taps import prompt  # imported only when needed
 

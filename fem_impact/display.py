@@ -49,19 +49,13 @@ def complain(error: object, status: int) -> int:
 class Count:
     """How many of something are done, since when."""
 
-    what: str
-    first: int  # already done when it began
-    began: float  # [s] on the monotonic clock
-    done: int
-    total: int
-    now: float  # [s] of the last change
-
     def __init__(self, what: str, done: int, total: int) -> None:
-        self.what, self.first, self.began = what, done, time.monotonic()
+        self.what, self.first = what, done  # already done when it began
+        self.began = time.monotonic()  # [s]
         self.update(done, total)
 
     def update(self, done: int, total: int) -> None:
-        self.done, self.total, self.now = done, total, time.monotonic()
+        self.done, self.total, self.now = done, total, time.monotonic()  # [s] of the last change
 
     @property
     def rate(self) -> float:

@@ -20,7 +20,6 @@ MASSES = [m * 10.0**e for e in (-3, -2, -1) for m in (1.0, 2.0, 5.0)] + [1.0]  #
 
 
 def run_hammer(options: argparse.Namespace) -> replies.Answer:
-    """Find hammers for a bandwidth, or plan a test with one that roves."""
     scene = fi.load_scene(options.scene)
     masses = options.masses or MASSES
     notes = tip_notes(scene)
@@ -104,7 +103,6 @@ def _sheets(options: argparse.Namespace, scene: Any, notes: Sequence[str]) -> re
 
 
 def run_frf(options: argparse.Namespace) -> replies.Answer:
-    """List the peaks of frequency responses, and write them and a page about them."""
     from .taps import prompt  # imported only when needed
 
     out: Path | None = options.out
@@ -153,7 +151,6 @@ def _write_page(path: Path, options: argparse.Namespace, heard: Any) -> None:
 
 
 def run_watch(options: argparse.Namespace) -> replies.Answer | None:
-    """Judge the records of a folder, and new ones until the program is stopped."""
     from .taps.watch import Folder  # imported only when needed
 
     folder, seen = Folder(options.scene), _Watched(options)
@@ -161,11 +158,13 @@ def run_watch(options: argparse.Namespace) -> replies.Answer | None:
         replies.remark(options, f"watching {folder.path}; Ctrl-C stops it")
     while True:
         new = seen.judged(folder.look())
-        options.last = seen.last_word
+        told = [one for each in seen.every.values() for one in each]
+        n_good = sum(one.good for one in told)
+        options.last = f"stopped; {n_good} of {len(told)} taps in {len(seen.every)} files were good"
         if new and not options.once:
             options.show(seen.report_on(new))
         if options.once and not folder.waiting:
-            return seen.report_on([one for each in seen.every.values() for one in each])
+            return seen.report_on(told)
         time.sleep(0.5)  # a file that nobody wrote to for so long is complete
 
 
@@ -179,12 +178,6 @@ class _Watched:
         self.path = replies.file_of(options, "watch.png") or Path("out") / options.scene.resolve().name / "watch.png"
         self.every: dict[str, list[Any]] = {}  # name of a file: `Advice` of each of its taps
         self.good: dict[str, Any] = {}  # the same: its good taps
-
-    @property
-    def last_word(self) -> str:
-        """What is said when the program is stopped."""
-        told = [one for each in self.every.values() for one in each]
-        return f"stopped; {sum(one.good for one in told)} of {len(told)} taps in {len(self.every)} files were good"
 
     def judged(self, paths: Sequence[Path]) -> list[Any]:
         """Advice on every tap of some files; the picture shows the last of them."""

@@ -57,7 +57,6 @@ INNER = {
     "export.plain", "export.versions", "export.csv_text", "export.run_data", "export.vtk_ending", "figures.snapshot",
     "figures.in_hertz", "figures.styled", "sound.Sound",
     "hammers.Hammer", "hammers.bandwidth_of", "hammers.impacts_of_tips", "hammers.falls", "hammers.half_sine_reach",
-    "report.SoundPlayer",
     "lesson.write", "lesson.Written", "lesson.Written.data", "lesson.Written.summary",  # many blows, see test_lesson
     "explore.serve",  # ends at an interruption only, see test_explore
     "ToleranceWarning", "analytic.closed_form", "Striker.let_go",
@@ -137,8 +136,7 @@ def things() -> dict[str, Any]:
         tolerance=1e-2, borders=True,
     )  # fmt: skip
     run = scene.run()
-    fi.export.write_json(folder / "response.json", fi.export.run_data(run, scene.data()))
-    results.save_response(folder, run.response, scene.points)
+    results.save_response(folder, run.response, scene.points, fi.export.run_data(run, scene.data()))
     frequency = np.arange(1.0, 301.0)
     H = fi.mobility(bar.damped(0.02), [0.0], [0.0], frequency, "accelerance")
     responses = xarray.Dataset(

@@ -110,7 +110,7 @@ def test_listener_of_the_command_is_the_one_of_the_scene(scene, prompt):
     assert again["radiated"] == noted and again["scene"]["observe"] == {"listener": [0.5, 0.3, 1.0]}
     assert "radiated.wav" in again["files"]
     heard = fi.report._sounds(fi.load_scene(scene).heard_from([0.5, 0.3, 1.0]), fi.load_scene(scene).strike())
-    assert "Sound radiated to (0.5, 0.3, 1)\N{NO-BREAK SPACE}m" in [player.name for player in heard]
+    assert "Sound radiated to (0.5, 0.3, 1)\N{NO-BREAK SPACE}m" in [player["name"] for player in heard]
     ran = prompt("strike small.toml --listener 0.5 0.3 0")
     assert ran.status == 2 and "[observe] listener must lie off the plate's plane" in ran.err
 

@@ -16,7 +16,7 @@ from ..fe.section import Beam, Plate
 from ..fe.variation import DIFFERENCES, STEP, SectionChange
 from ..impact import collision
 from ..impact.contact import Contact
-from ..impact.parameters import LAW
+from ..impact.parameters import LAW, numbers_of
 from ..impact.response import Response
 from ..impact.striker import Striker
 from ..mesh.meshes import Mesh
@@ -63,26 +63,17 @@ class Piece(check.Brief):
             at = self.arguments["at"]
             place = np.atleast_1d(np.asarray([] if at is None else at, float))
             found |= {f"strike.{name}": float(x) for name, x in zip("xy", place)}
-            found |= _of_modes("striker", self.striker.modes)
+            found |= numbers_of("striker", self.striker.modes)
         if isinstance(target.damping_ratio, (int, float)):
             found["target.damping_ratio"] = float(target.damping_ratio)
         if target.modes is not None:
-            found = {**_of_modes("target", target.modes), **found}
+            found = {**numbers_of("target", target.modes), **found}
         return found | {f"target.{name}": float(value) for name, value in target.scale.items()}
 
     @property
     def section(self) -> Plate | Beam | None:
         """The section of a body of elements; None if its modes were given."""
         return self.target.section if self.target.modes is None else None
-
-
-def _of_modes(body: str, modes: Modes) -> dict[str, float]:
-    flexible = modes.omega > 0.0
-    found = {f"{body}.mass": modes.mass}
-    if flexible.any():
-        found[f"{body}.first_frequency"] = float(modes.frequencies[flexible][0])
-        found[f"{body}.damping_ratio"] = float(modes.damping_ratio[flexible][0])
-    return found
 
 
 @dataclass(frozen=True, eq=False, repr=False)

@@ -329,7 +329,8 @@ class _Search:
         """One search from one point."""
         low, high = self.box.bounds
         x = solver.least(  # with a number to make least, this finds where the goals are met at all
-            self._misses, self._pulled, first, (low, high), close=CLOSE, iterations=solver.ENOUGH, method="dogbox"
+            self._misses, lambda x: self._turned(x) * (self._misses(x) != 0.0)[:, None],  # none of goals that are met
+            first, (low, high), close=CLOSE, iterations=solver.ENOUGH, method="dogbox",
         ).x  # fmt: skip
         if self.least is not None:
             x = self._least(x, tolerance)
@@ -363,10 +364,6 @@ class _Search:
                      for each, z in zip(self.box.unknowns, x)]  # fmt: skip
         scale = np.array([goal.scale for goal in self.goals])
         return self.slope(x) / scale[:, None] / np.array(per_value)
-
-    def _pulled(self, x: np.ndarray) -> np.ndarray:
-        """Derivatives (n_goals, n_free) of the misses in the coordinates; none of goals that are met."""
-        return self._turned(x) * (self._misses(x) != 0.0)[:, None]
 
     def _least(self, first: np.ndarray, tolerance: float) -> np.ndarray:
         """Where one number is smallest or largest of all points seen that meet the goals; else where it ends."""

@@ -42,11 +42,6 @@ class Patch(check.Brief):
         moved = ", ".join(f"mode {mode} {value:+.1f} cents" for mode, value in zip(self.modes, self.cents))
         return f"{1e3 * self.depth:.3g} mm at {here} m, radius {1e3 * self.radius:.3g} mm: {moved}"
 
-    def data(self) -> dict[str, Any]:
-        """The patch as plain data."""
-        names = "at", "radius", "depth", "modes", "cents", "by_slopes"
-        return {name: getattr(self, name) for name in names}
-
 
 @dataclass(frozen=True)
 class Tone:
@@ -189,7 +184,7 @@ class Tuning(check.Brief):
             for each in self.tones
         ]  # fmt: skip
         own = {name: getattr(self, name) for name in ("met", "tolerance", "depth", "radius", "mirror", "volume")}
-        return {"tones": tones, "patches": [each.data() for each in self.patches], **own}
+        return {"tones": tones, "patches": [dict(vars(each)) for each in self.patches], **own}
 
 
 @check.typed

@@ -63,6 +63,16 @@ def unit(name: str) -> str:
     return UNITS["strike.speed"] if home == "speeds" else UNITS.get(f"{INDEXED.get(group, home)}.{part}", "")
 
 
+def numbers_of(body: str, modes: Modes) -> dict[str, float]:
+    """Mass, first flexible frequency and its damping ratio, by the names of the numbers of a body."""
+    flexible = modes.omega > 0.0
+    found = {f"{body}.mass": modes.mass}
+    if flexible.any():
+        found[f"{body}.first_frequency"] = float(modes.frequencies[flexible][0])
+        found[f"{body}.damping_ratio"] = float(modes.damping_ratio[flexible][0])
+    return found
+
+
 @dataclass(frozen=True, eq=False, repr=False)
 class Parameters(check.Brief):
     """The numbers of one blow: of `strike` by the names that scene files give them, of `collide` by its own.
@@ -110,11 +120,7 @@ class Parameters(check.Brief):
             if name == "target" and self.why_no_target:
                 continue
             modes = hit.striker.modes if name == "striker" and hit.striker is not None else hit.bodies[b]
-            found[f"{name}.mass"] = modes.mass
-            flexible = modes.omega > 0.0
-            if flexible.any():
-                found[f"{name}.first_frequency"] = float(modes.frequencies[flexible][0])
-                found[f"{name}.damping_ratio"] = float(modes.damping_ratio[flexible][0])
+            found |= numbers_of(name, modes)
         if not self.why_no_section:
             section = hit.bodies[-1].section
             assert section is not None

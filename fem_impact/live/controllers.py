@@ -5,45 +5,32 @@ import select
 import sys
 import threading
 from collections import deque
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 
 from .._base import check
 from ..modes.modal import Modes
 from ..modes.viewing import grid
-from .player import AT_ONCE, PlayedStroke
+from .player import AT_ONCE, PlayedStroke, Score
 
 KEYS = ("zxcvbnm,./", "asdfghjkl;", "qwertyuiop", "1234567890")  # a column strikes one point, a row up twice as fast
 ENDS = ("\x1b", "\x04", "\x03")  # Escape, Ctrl-D and Ctrl-C end the playing
 
 
-class Source(Protocol):
-    """What strokes a body."""
-
-    live: bool  # whether strokes come at any moment, and not from a file
-
-    def due(self, begin: int, end: int) -> Sequence[PlayedStroke]:
-        """The strokes of a block, by frames of the block."""
-
-    def over(self, frame: int) -> bool:
-        """Whether none follows from a frame on."""
-
-
 class Hands:
     """Strokes that come at any moment, each struck at the start of the next block."""
 
-    live = True
+    live = True  # not from a file
 
     def __init__(self) -> None:
         self._waiting: deque[PlayedStroke] = deque()
         self._ended = threading.Event()
 
     def add_stroke(self, point: int, speed: float) -> None:
-        """Strike as soon as possible."""
         self._waiting.append(PlayedStroke(0, point, speed))
 
     def stop(self) -> None:
@@ -57,6 +44,9 @@ class Hands:
     def over(self, frame: int) -> bool:
         """Whether the playing was ended."""
         return self._ended.is_set() and not self._waiting
+
+
+Source = Hands | Score  # what strokes a body
 
 
 def spread_points(modes: Modes, first: Any, count: int) -> np.ndarray:

@@ -3,7 +3,7 @@
 import threading
 import time
 from dataclasses import dataclass, field
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 
@@ -33,16 +33,6 @@ class Feed:
             self.missed += self.written > 0
 
 
-class Device(Protocol):
-    """Calls `Feed.copy` once in each block's time between play_feed and stop."""
-
-    def play_feed(self, feed: Feed, rate: int) -> None:
-        """Begin to play."""
-
-    def stop(self) -> None:
-        """End."""
-
-
 class Speaker:
     """The loudspeaker of this machine."""
 
@@ -54,8 +44,6 @@ class Speaker:
             raise ValueError(f"no loudspeaker can be used here ({error}), only the file is written") from None
 
     def play_feed(self, feed: Feed, rate: int) -> None:
-        """Begin to play."""
-
         def callback(out: np.ndarray, *_: Any) -> None:
             feed.copy(out[:, 0])
 
@@ -65,7 +53,6 @@ class Speaker:
         self._stream.start()
 
     def stop(self) -> None:
-        """End."""
         self._stream.stop()
         self._stream.close()
 
@@ -74,7 +61,6 @@ class Clock:
     """A device that plays nothing, in time: it asks for every block when a loudspeaker would."""
 
     def play_feed(self, feed: Feed, rate: int) -> None:
-        """Begin to ask."""
         self._ended = threading.Event()
         self._thread = threading.Thread(target=self._ask, args=(feed, feed.blocks.shape[1] / rate), daemon=True)
         self._thread.start()
@@ -88,9 +74,11 @@ class Clock:
             feed.copy(out)
 
     def stop(self) -> None:
-        """End."""
         self._ended.set()
         self._thread.join()
+
+
+Device = Speaker | Clock  # calls `Feed.copy` once in each block's time between play_feed and stop
 
 
 @dataclass(frozen=True, eq=False)

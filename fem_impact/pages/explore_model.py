@@ -10,7 +10,7 @@ import numpy as np
 from .._base.rounding import SAME
 from ..fe import refinement
 from ..impact import accuracy, threshold
-from ..impact.contact import Contact, acting_stiffness, wall_time
+from ..impact.contact import Contact
 from ..impact.engine import TOLERANCE
 from ..impact.response import Response
 from ..mesh.meshes import Mesh
@@ -216,8 +216,7 @@ class Setup:
 
 def quick(case: grid.Case, most: int = 6) -> Response:
     """The same in a few milliseconds, whatever the case: in coarse steps, with few impacts and no mesh error."""
-    law, mass = case.contact, case.striker.felt_mass
-    wall = float(wall_time(acting_stiffness(law.numbers, 1.0 / mass, case.speed), law.exponent, 1.0 / mass, case.speed))
+    wall = accuracy.contact_duration(case.contact, case.striker.felt_mass, case.speed)
     alone = replace(case, modes=replace(case.modes, poorer={}))
     return alone.blow(tolerance=MAP_TOLERANCE, scheme="A4", dt=wall / 16.0, max_impacts=most)
 

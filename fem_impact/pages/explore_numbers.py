@@ -1,6 +1,5 @@
 """What the live page shows of a blow, as numbers and words that can be sent to it."""
 
-import base64
 import math
 import warnings
 from collections.abc import Callable
@@ -25,7 +24,7 @@ from ..sweeps.grid import Case
 from .explore_bench import Order, built
 from .explore_map import Mapper, Picture, Window
 from .explore_model import MAP_TOLERANCE, Settings, Setup, limit_of, quick
-from .html_page import QUIET, audio
+from .html_page import QUIET, audio, packed
 
 BAND = (20.0, 20e3)  # [Hz] of the spectrum: the audible range
 SPECTRUM_POINTS = 240  # [-] more points take time but show no more
@@ -216,11 +215,6 @@ def rolled(case: Case, rate: float) -> Strokes:
             case.modes, [(float(time), case.striker, case.contact, case.at, case.speed) for time in when],
             tolerance=MAP_TOLERANCE,
         )  # fmt: skip
-
-
-def packed(values: np.ndarray, kind: str = "<f4") -> str:
-    """Numbers as the page reads them: base64 of 32-bit floats, or of another type."""
-    return base64.b64encode(np.asarray(values, kind).tobytes()).decode("ascii")
 
 
 def drawn(picture: Picture, pack: Callable[[Any, str], str] = packed) -> Message:

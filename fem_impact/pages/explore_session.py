@@ -7,13 +7,14 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+from .._base import check
 from .._base.check import SimulationError
 from ..scenes.sentences import place, si
 from .explore_bench import Order, order_of, pickable
 from .explore_map import Mapper, Picture, Window
 from .explore_model import Settings, Setup
 from .explore_numbers import Explorer, Message, Point, View, drawn
-from .explore_view import RATES, check_sliders, ends, laid_out, number_of, pair
+from .explore_view import RATES, check_sliders, ends, laid_out, pair
 from .explore_worker import Worker
 
 LETTERS = "ABCDEFGH"  # of kept blows: more curves in one picture are a tangle
@@ -110,7 +111,7 @@ class Session:
             told = message["hit"]
             if not isinstance(told, dict) or not isinstance(told.get("letter"), str):
                 raise ValueError("hit must be a table of letter and share")
-            share = min(max(number_of("share", told.get("share")), 0.1), 10.0)  # of the speed
+            share = min(max(check.number("share", told.get("share")), 0.1), 10.0)  # of the speed
             self.hits.append((told["letter"][:1], share))
             self._start("hit", self._hit)
         elif "open" in message:

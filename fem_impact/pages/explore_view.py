@@ -2,14 +2,14 @@
 
 import json
 import math
-from contextlib import suppress
 from typing import Any
 
 import numpy as np
 
+from .._base import check
 from .._base.rounding import SAME
 from ..fe.section import Plate
-from ..mesh.meshes import Mesh
+from ..mesh.mesh_files import loops_of
 from .explore_bench import LARGEST_DRAWING
 from .explore_map import NARROWEST
 from .explore_model import Setup
@@ -83,25 +83,13 @@ def _share(name: str, low: float, high: float, value: float) -> float:
 
 
 def drawn_body(setup: Setup) -> dict[str, Any]:
-    """The outline of a body and its ribs, as pages draw them."""
-    return {"loops": loops(setup.mesh), "ribs": [setup.mesh.pieces(rib.path).tolist() for rib in setup.scene.ribs]}
-
-
-def loops(mesh: Mesh) -> list[list[list[float]]]:
-    """The outline of a body as closed loops of points (n, 2) [m]; of a beam, the line between its ends."""
-    if mesh.dimension == 1:
-        ends = float(mesh.points.min()), float(mesh.points.max())
-        return [[[ends[0], 0.0], [ends[1], 0.0]]]
-    after = {int(a): int(b) for a, b in mesh.facets}  # the body lies on the left of each facet
-    found: list[list[list[float]]] = []
-    while after:
-        here = next(iter(after))
-        loop = []
-        while here in after:
-            loop.append(np.round(mesh.points[here], 9).tolist())
-            here = after.pop(here)
-        found.append(loop)
-    return found
+    """The outline of a body, as closed loops of points (n, 2) [m], and its ribs, as pages draw them."""
+    mesh = setup.mesh
+    if mesh.dimension == 1:  # the line between its ends
+        loops = [[[float(end), 0.0] for end in (mesh.points.min(), mesh.points.max())]]
+    else:
+        loops = [np.round(mesh.points[loop], 9).tolist() for loop in loops_of(mesh.facets)]
+    return {"loops": loops, "ribs": [mesh.pieces(rib.path).tolist() for rib in setup.scene.ribs]}
 
 
 def parsed(message: str | bytes) -> Any:
@@ -122,24 +110,15 @@ def check_sliders(known: Ends, turned: Any) -> dict[str, float]:
     found = {}
     for name, value in turned.items():
         low, high, _ = known[name]
-        number = number_of(name, value)
+        number = check.number(name, value)
         held = min(max(number, low), high)
         found[name] = number if name in ("x", "y") and abs(held - number) > SAME * (high - low) else held
     return found
-
-
-def number_of(name: str, value: Any) -> float:
-    """A finite number; ValueError if it is anything else."""
-    if isinstance(value, (int, float)) and not isinstance(value, bool):
-        with suppress(OverflowError):  # an integer beyond all floats
-            if math.isfinite(number := float(value)):
-                return number
-    raise ValueError(f"{name} must be a number")
 
 
 def pair(name: str, values: Any) -> tuple[float, float]:
     """Two finite numbers; ValueError if they are anything else."""
     if not isinstance(values, list) or len(values) != 2:
         raise ValueError(f"{name} must be two numbers")
-    first, second = (number_of(name, value) for value in values)
+    first, second = (check.number(name, value) for value in values)
     return first, second

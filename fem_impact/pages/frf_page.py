@@ -11,6 +11,7 @@ from scipy.spatial import Delaunay, QhullError
 from .._base import check
 from .._base.explained import noted
 from .._base.known import NINETY
+from ..mesh.mesh_files import sides_of
 from ..modes import picked, stabilisation
 from ..modes.modal import Modes
 from ..show import figures
@@ -94,8 +95,7 @@ def edges(points: np.ndarray) -> list[list[int]]:
     except (QhullError, ValueError):  # along a line, or too few
         along = np.argsort(flat @ np.linalg.svd(flat - flat.mean(axis=0))[2][0])
         return np.column_stack([along[:-1], along[1:]]).tolist()
-    pairs = np.sort(np.concatenate([triangles[:, [0, 1]], triangles[:, [1, 2]], triangles[:, [0, 2]]]), axis=1)
-    return np.unique(pairs, axis=0).tolist()
+    return sides_of(triangles)[0].tolist()
 
 
 def _moving(modes: picked.Picked, points: np.ndarray) -> str:

@@ -1,7 +1,9 @@
 """Fills the templates of the folder ``web``: pages of one file each, with styles, scripts, pictures and sounds."""
 
+import base64
 import io
 import json
+import zlib
 from pathlib import Path
 from typing import Any
 
@@ -43,6 +45,12 @@ def write_page(
 def script_data(data: Any) -> str:
     """Data as JSON within a page; no "<" in it can close the script element around it."""
     return json.dumps(export.plain(data), allow_nan=False, separators=(",", ":")).replace("<", "\\u003c")
+
+
+def packed(values: Any, kind: str = "<f4", squeezed: bool = False) -> str:
+    """Numbers as pages read them: base64 of 32-bit floats, or of another type; deflated if ``squeezed``."""
+    raw = np.asarray(values, kind).tobytes()
+    return base64.b64encode(zlib.compress(raw, 9) if squeezed else raw).decode("ascii")
 
 
 def audio(samples: np.ndarray, rate: int) -> str:

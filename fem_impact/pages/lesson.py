@@ -1,10 +1,9 @@
 """Writes one HTML page whose sliders change a blow without a program behind it: every blow is struck beforehand."""
 
-import base64
-import zlib
 from collections.abc import Callable
 from contextlib import nullcontext
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -19,10 +18,11 @@ from . import lesson_grid, worksheet
 from .explore_model import Setup
 from .explore_numbers import PLAYED, SPECTRUM_FACTS, drawn, found_limit
 from .explore_view import drawn_body
-from .html_page import script_data, write_page
+from .html_page import packed, script_data, write_page
 from .lesson_grid import NAMES, STEPS, Lesson
 
 SLIDERS = {"mass": "Mass", "stiffness": "Stiffness", "speed": "Speed", "place": "Place"}
+_squeezed = partial(packed, squeezed=True)  # what all blows of a page take
 
 
 @dataclass(frozen=True, eq=False)
@@ -118,11 +118,6 @@ def write(
         facts=script_data(_facts(lesson)),
     )
     return replace(about, bytes=size)
-
-
-def _squeezed(values: Any, kind: str) -> str:
-    """Numbers as the page reads them: little-endian of a type, deflated, base64."""
-    return base64.b64encode(zlib.compress(np.asarray(values, kind).tobytes(), 9)).decode("ascii")
 
 
 def _sliders(lesson: Lesson) -> list[dict[str, Any]]:

@@ -1,12 +1,10 @@
 """Writes one self-contained HTML page about a strike: the scene, the errors, the results and the sound."""
 
-import base64
 import json
 import math
 import os
 import shlex
 from collections.abc import Mapping
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -29,8 +27,7 @@ from ..scenes.sentences import arriving, body, contact, place, power, si, tidy, 
 from ..scenes.sequence import Played
 from ..show import export, sampling, sound
 from ..show.figures import SPECTRUM_BAND
-from .html_page import QUIET, audio, script_data, write_page
-from .html_page import template as template
+from .html_page import QUIET, audio, packed, script_data, write_page
 
 POINTS = 1000  # [-] of a spectrum: about one per pixel of a wide page
 BOUND = {"low": "estimate from below", "high": "estimate from above"}
@@ -266,15 +263,6 @@ def _shares(energies: Mapping[str, float], called: Mapping[str, str]) -> list[di
     ]  # fmt: skip
 
 
-@dataclass(frozen=True)
-class SoundPlayer:
-    """One sound on the page."""
-
-    name: str
-    note: str
-    uri: str
-
-
 def _end(response: Response | Strokes) -> float:
     """When the pictures of a blow or a sequence end [s]."""
     if isinstance(response, Response):
@@ -283,8 +271,8 @@ def _end(response: Response | Strokes) -> float:
     return last + (sampling.AFTER - 1.0) * (last - float(response.starts[0]))
 
 
-def _sounds(scene: Scene, response: Response | Strokes) -> list[SoundPlayer]:
-    """The sound at each observation point and, for a plate, at each listener, by default 1 m in front of it."""
+def _sounds(scene: Scene, response: Response | Strokes) -> list[dict[str, str]]:
+    """Players of the sound at each observation point and, for a plate, each listener, by default 1 m in front of it."""
     heard = [
         (f"Motion at {place(point)}", sound.synthesise(response, point, duration=_duration(response)))
         for point in scene.points[:MOST_POINTS]
@@ -300,10 +288,11 @@ def _sounds(scene: Scene, response: Response | Strokes) -> list[SoundPlayer]:
     for name, samples in heard:
         level = samples.peak_level
         stated = f"peak {samples.said}; full scale {samples.full_scale:g} {samples.unit}, as in every report"
-        players.append(SoundPlayer(name, stated, audio(samples.samples, samples.rate)))
+        players.append({"name": name, "note": stated, "uri": audio(samples.samples, samples.rate)})
         if -math.inf < level < QUIET:
             raised = audio(samples.samples * 10.0 ** (-level / 20.0), samples.rate)
-            players.append(SoundPlayer(name, f"the same sound amplified by {-level:.1f} dB to full scale", raised))
+            said = f"the same sound amplified by {-level:.1f} dB to full scale"
+            players.append({"name": name, "note": said, "uri": raised})
     return players
 
 
@@ -419,8 +408,7 @@ def _lines(ends: np.ndarray) -> list[list[float | None]]:
 def _packed(rows: np.ndarray) -> dict[str, Any]:
     """Rows as little-endian 16-bit integers and their unit: a tenth of the size of text."""
     step = float(np.abs(rows).max(initial=0.0)) / 32767.0 or 1.0
-    raw = np.ascontiguousarray(np.round(rows / step).astype("<i2")).tobytes()
-    return {"step": step, "rows": len(rows), "data": base64.b64encode(raw).decode("ascii")}
+    return {"step": step, "rows": len(rows), "data": packed(np.round(rows / step), "<i2")}
 
 
 def _short(values: np.ndarray) -> list[float]:

@@ -28,8 +28,7 @@ def draw_pulses(axes: Any, taps: Taps, which: Sequence[int]) -> None:
         for begin, end in pulses if len(pulses) > 1 else ():
             top = begin + int(taps.force[i, begin:end].argmax())
             axes.plot(taps.time[top] - taps.time[first], taps.force[i, top], "v", color=VERMILION, ms=7)
-    axes.set_xlabel("time after the tap begins")
-    axes.set_ylabel("force")
+    axes.set(xlabel="time after the tap begins", ylabel="force")
     set_units(axes, "s", "N")
     axes.legend(fontsize=8)
 
@@ -45,9 +44,7 @@ def draw_spectra(axes: Any, taps: Taps, which: Sequence[int], bandwidth: float |
     if bandwidth is not None:
         axes.plot([0.0, bandwidth, bandwidth], [-drop, -drop, 6.0], color=GREY, lw=1.2)
         axes.set_xlim(0.0, min(0.5 * taps.rate, 2.5 * bandwidth))
-    axes.set_ylim(-50.0, 6.0)
-    axes.set_xlabel("frequency")
-    axes.set_ylabel("force spectrum [dB]")
+    axes.set(xlabel="frequency", ylabel="force spectrum [dB]", ylim=(-50.0, 6.0))
     set_units(axes, "Hz")
 
 
@@ -61,9 +58,7 @@ def draw_responses(axes: Any, found: Mapping[str, xr.Dataset], channel: int) -> 
         error = each.error.values[1:, channel]
         low, high = np.maximum(size - error, 0.03 * size), size + error
         axes.fill_between(frequency, low, high, color=SKY, alpha=0.3, lw=0, label="90 % of the last")
-    axes.set_xlabel("frequency")
-    axes.set_ylabel(f"response [{each.units.values[channel]}]")
-    axes.set_xlim(0.0, felt(each))
+    axes.set(xlabel="frequency", ylabel=f"response [{each.units.values[channel]}]", xlim=(0.0, felt(each)))
     axes.set_title(str(each.channel.values[channel]))
     set_units(axes, "Hz")
     axes.legend(fontsize=8)
@@ -83,10 +78,7 @@ def draw_coherence(axes: Any, found: xr.Dataset, channels: Sequence[int]) -> Non
     for n, k in enumerate(channels):
         axes.plot(found.frequency.values, found.coherence.values[:, k], color=PALETTE[n % len(PALETTE)], lw=0.9,
                   label=str(found.channel.values[k]))  # fmt: skip
-    axes.set_ylim(0.0, 1.03)
-    axes.set_xlim(0.0, felt(found))
-    axes.set_xlabel("frequency")
-    axes.set_ylabel("coherence")
+    axes.set(xlabel="frequency", ylabel="coherence", xlim=(0.0, felt(found)), ylim=(0.0, 1.03))
     set_units(axes, "Hz")
     axes.legend(fontsize=8)
 

@@ -24,8 +24,10 @@ class Question:
 
 def questions(lesson: Lesson) -> list[Question]:
     """All questions that the blows of a page can answer."""
-    asked = [_first(lesson), _impulse(lesson), _stiffer(lesson), _faster(lesson)]
-    asked += [_heavier(lesson), _harder(lesson), _spectrum(lesson), _elsewhere(lesson)]
+    speeds, stiffnesses = _single(lesson, 1), _single(lesson, 2)
+    asked = [_first(lesson), _impulse(lesson), stiffnesses and _stiffer(lesson, *stiffnesses)]
+    asked += [speeds and _faster(lesson, *speeds), _heavier(lesson), _harder(lesson)]
+    asked += [stiffnesses and _spectrum(lesson, *stiffnesses), _elsewhere(lesson)]
     return [each for each in asked if each is not None]
 
 
@@ -42,10 +44,6 @@ def _phrases(lesson: Lesson, position: Position) -> dict[str, str]:
 
 def _mass(lesson: Lesson, i: int) -> str:
     return si(float(lesson.axes["mass"][i]), "kg", 3)
-
-
-def _times(value: float) -> str:
-    return f"{value:.3g} times"
 
 
 def _first(lesson: Lesson) -> Question | None:
@@ -86,32 +84,25 @@ def _single(lesson: Lesson, axis: int) -> tuple[Position, Position] | None:
     return next((pair for pair in pairs if counts[pair[0]] == counts[pair[1]] == 1), None)
 
 
-def _stiffer(lesson: Lesson) -> Question | None:
-    pair = _single(lesson, 2)
-    if pair is None:
-        return None
-    one, two = pair
+def _stiffer(lesson: Lesson, one: Position, two: Position) -> Question:
     ratio = float(lesson.axes["stiffness"][two[2]] / lesson.axes["stiffness"][one[2]])
     power = lesson.setup.start.exponent
     time = lesson.quantity("contact_time")
     return Question(
-        f"Make the contact {_times(ratio)} stiffer, from {_stiffness(lesson, one[2])} to {_stiffness(lesson, two[2])} "
-        "the scene's stiffness. By which factor does the contact get shorter? What would a rigid wall do?",
+        f"Make the contact {ratio:.3g} times stiffer, from {_stiffness(lesson, one[2])} to "
+        f"{_stiffness(lesson, two[2])} the scene's stiffness. By which factor does the contact get shorter? What would "
+        "a rigid wall do?",
         f"{float(time[two] / time[one]):.3g}. On a rigid wall the contact time goes with the stiffness to the power "
         f"−1/(n + 1), n being the exponent {power:.3g}: {ratio ** (-1.0 / (power + 1.0)):.3g}.", two,
     )  # fmt: skip
 
 
 def _stiffness(lesson: Lesson, i: int) -> str:
-    return _times(float(lesson.axes["stiffness"][i]))
+    return f"{float(lesson.axes['stiffness'][i]):.3g} times"
 
 
-def _faster(lesson: Lesson) -> Question | None:
-    pair = _single(lesson, 1)
-    if pair is None:
-        return None
-    one, two = pair
-    slow, fast = (float(lesson.axes["speed"][each[1]]) for each in pair)
+def _faster(lesson: Lesson, one: Position, two: Position) -> Question:
+    slow, fast = (float(lesson.axes["speed"][each[1]]) for each in (one, two))
     power, force = lesson.setup.start.exponent, lesson.quantity("peak_force")
     wall = (fast / slow) ** (2.0 * power / (power + 1.0))
     return Question(
@@ -167,24 +158,21 @@ def spectrum(lesson: Lesson, position: Position) -> np.ndarray:
     return force_spectrum.magnitude(blow.end / STEPS * blow.time, blow.top / STEPS * blow.force, band)
 
 
-def _spectrum(lesson: Lesson) -> Question | None:
-    pair = _single(lesson, 2)
-    if pair is None:
-        return None
+def _spectrum(lesson: Lesson, one: Position, two: Position) -> Question | None:
     reach = []  # [Hz]
-    for each in pair:
+    for each in (one, two):
         found = spectrum(lesson, each)
         below = np.flatnonzero(found < 0.1 * found.max())
         below = below[below > found.argmax()]
         if not len(below):
             return None
         reach.append(float(np.geomspace(*BAND, SPECTRUM_POINTS)[below[0]]))
-    times = [float(lesson.quantity("contact_time")[each]) for each in pair]
+    times = [float(lesson.quantity("contact_time")[each]) for each in (one, two)]
     return Question(
-        f"At which frequency has the spectrum first fallen to a tenth, with {_stiffness(lesson, pair[0][2])} and with "
-        f"{_stiffness(lesson, pair[1][2])} the scene's stiffness? What is that frequency times the contact time?",
+        f"At which frequency has the spectrum first fallen to a tenth, with {_stiffness(lesson, one[2])} and with "
+        f"{_stiffness(lesson, two[2])} the scene's stiffness? What is that frequency times the contact time?",
         f"{si(reach[0], 'Hz', 3)} and {si(reach[1], 'Hz', 3)}; times the contact time {reach[0] * times[0]:.2g} and "
-        f"{reach[1] * times[1]:.2g}. A shorter pulse excites higher modes, and the blow sounds brighter.", pair[1],
+        f"{reach[1] * times[1]:.2g}. A shorter pulse excites higher modes, and the blow sounds brighter.", two,
     )  # fmt: skip
 
 

@@ -1,6 +1,6 @@
 """A blow as well as its inputs are known: beside the errors of computation and model, what the inputs leave open."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from scipy import stats
 
-from .._base import check, markup
+from .._base import check, markup, progress
 from ..impact.measured import ENDS, Comparison, of_blow
 from ..impact.response import Response
 from ..sweeps.inputs import drawn, read_inputs, shares
@@ -155,23 +155,19 @@ def check_known(scene: Scene) -> None:
         )
 
 
-def around(
-    scene: Scene, hit: Response, *, n: int | None = None, seed: int = 0, watch: Callable[[int, int], Any] | None = None
-) -> Band:
+def around(scene: Scene, hit: Response, *, n: int | None = None, seed: int = 0) -> Band:
     """The band around a blow of a scene."""
     count, seed = (None if n is None else check.count("n", n, high=MOST_BLOWS)), check.count("seed", seed, low=0)
     said = {each.name: each.said for each in read_inputs(scene.known)}
     try:
         found = spread(scene, scene.known, n=count or BLOWS, sobol=False, seed=seed, tolerance=hit.tolerance)
     except ValueError:  # an input that needs a body of its own, or a wrong one, which the scenes below refuse
-        return _anew(scene, hit, said, count or ANEW, seed, watch)
+        return _anew(scene, hit, said, count or ANEW, seed)
     values = {name: found.values(name) for name in (*said, *NAMES.values())}
     return Band(hit, said, values, found.n_failed, anew=False)
 
 
-def _anew(
-    scene: Scene, hit: Response, said: Mapping[str, str], n: int, seed: int, watch: Callable[[int, int], Any] | None
-) -> Band:
+def _anew(scene: Scene, hit: Response, said: Mapping[str, str], n: int, seed: int) -> Band:
     """The band with a scene of its own for each blow."""
     inputs = read_inputs(scene.known)
     rows, failed = [], 0
@@ -183,8 +179,7 @@ def _anew(
             rows.append(given | dict(zip(NAMES.values(), found.tolist())))
         except check.SimulationError:
             failed += 1
-        if watch is not None:
-            watch(done + 1, n)
+        progress.report("blows", done + 1, n)
     if not rows:
         raise check.SimulationError("no blow succeeded, so nothing has a band; narrow the intervals")
     values = {name: np.array([row[name] for row in rows]) for name in rows[0]}

@@ -18,7 +18,7 @@ from ..impact.contact import MARKS, acting_stiffness, wall_time
 from ..model.target import Stages
 from ..show import figures, plots
 from ..sweeps import cases, grid
-from ..sweeps.borders import PREFIX, read_borders, without_borders
+from ..sweeps.borders import PREFIX, read_borders
 from ..sweeps.cells import ALIASES, AXES, LAW, Case, Range, laid_out, logarithmic
 from .scene import Scene
 from .schema import MAKERS, Part
@@ -207,7 +207,7 @@ def draw(
     *,
     limits: tuple[float | None, float | None] = (None, None),
     **wanted: Any,
-) -> Any:
+) -> figures.Figure:
     """Draw one layer of a map with two axes in colour, with contours of contact resonance and threshold.
 
     Parameters
@@ -220,10 +220,6 @@ def draw(
         Values at the ends of the colour scale; by default the extremes of the layer.
     **wanted
         Arguments of `plots.colour_map` that replace those chosen here.
-
-    Returns
-    -------
-    matplotlib.figure.Figure
     """
     values = table[layer]
     if values.ndim != 2:
@@ -313,7 +309,7 @@ def write_map(folder: Path, table: xarray.Dataset, form: str = "nc", picture: st
         table.to_zarr(folder / names[0], zarr_format=2)  # version 3 has no standard for text yet
     if table.n_impacts.size <= MOST_ROWS:
         names.append("map.csv")
-        without_borders(table).to_dataframe().to_csv(folder / "map.csv")
+        table.drop_dims(PREFIX, errors="ignore").to_dataframe().to_csv(folder / "map.csv")  # what each cell has
     if PREFIX in table.sizes:
         names.append("borders.csv")
         table[[name for name in table.data_vars if table[name].dims == (PREFIX,)]].to_dataframe().to_csv(

@@ -26,6 +26,7 @@ from ..model.playing import Stroke, Strokes
 from ..modes import unstated
 from ..modes.modal import Modes
 from ..modes.shapes import RigidShapes, SampledShapes, estimated
+from ..show import export
 from ..sweeps import store
 from .schema import fault
 from .sentences import si
@@ -38,11 +39,12 @@ KINDS = kept.kinds(
 )  # fmt: skip
 
 
-def save_response(folder: Path, found: Response | Strokes, points: Any) -> str:
-    """Write what `load_response` needs beside response.json, which must be there; return the name of the file.
+def save_response(folder: Path, found: Response | Strokes, points: Any, data: dict[str, Any]) -> None:
+    """Write the data as response.json, and beside it what `load_response` needs.
 
     Of a sequence, the assumptions of its hardest blow are kept, which its verdict is about.
     """
+    export.write_json(folder / "response.json", data)
     judged: Response
     whole: Response | Strokes
     if isinstance(found, Strokes):
@@ -55,7 +57,6 @@ def save_response(folder: Path, found: Response | Strokes, points: Any) -> str:
     else:
         judged, whole = found, _known_at(found, points)
     kept.pack(folder / SAVED, _key(folder), KINDS, response=whole, assumptions=judged.assumptions)
-    return SAVED
 
 
 def _alone(striker: Striker) -> Striker:

@@ -397,7 +397,7 @@ class Scene(check.Brief):
         with self.blame("target"):
             clamps = check_posts(self._target["point_supports"], mesh.dimension)[1]
             mesh = pierced(mesh, clamps) if clamps else mesh
-        ribs = self._ribs(mesh)
+        ribs = list(self._listed("rib", within=mesh))
         paths = [rib.path for rib in ribs if not isinstance(rib.path, str)]
         with self.blame("rib"):
             mesh = lined(mesh, paths) if paths else mesh
@@ -409,10 +409,7 @@ class Scene(check.Brief):
     @property
     def ribs(self) -> tuple[Rib, ...]:
         """The ribs of a plate."""
-        return self._ribs(self.body())
-
-    def _ribs(self, mesh: Mesh | None) -> tuple[Rib, ...]:
-        return tuple(self._listed("rib", within=mesh))
+        return tuple(self._listed("rib", within=self.body()))
 
     def _listed(self, table: str, **supplied: Any) -> Iterator[Any]:
         """What the tables that may stand several times make, with the material of the body where they state none."""

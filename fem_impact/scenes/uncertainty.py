@@ -2,8 +2,7 @@
 
 import math
 import re
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
@@ -286,30 +285,24 @@ class _SpreadAsked:
         if self.places:
             points = self._points(at)
             ends["at"] = points[np.unique([points.argmin(axis=0), points.argmax(axis=0)])]
-        with self._blamed(axes):
-            base, _ = bodies.body_of(
-                blow, ends or {"speed": np.array([speed])}, tolerance=self.tolerance, keep=self.keep,
-                alone=self.residual and not self.places,
-            )  # fmt: skip
-        axes |= self._of_modes(base.modes if self.body else None, base.first)
-        if self.places:
-            axes["at"] = base.modes.points("vary: strike point", self._points(at))
-        return Cases(replace(base, speed=speed), axes, self.tolerance, self.residual, by_row=True)
-
-    @contextmanager
-    def _blamed(self, axes: Mapping[str, np.ndarray]) -> Iterator[None]:
-        """Turns an error about an axis into one that names the input and its distribution."""
         for each in self.inputs:
             axis = ALIASES.get(each.name, each.name)
             if axis in axes and axis in POSITIVE and axes[axis].min() <= 0.0:
                 raise _below(each.name, axes[axis])
         try:
-            yield
-        except ValueError as error:
+            base, _ = bodies.body_of(
+                blow, ends or {"speed": np.array([speed])}, tolerance=self.tolerance, keep=self.keep,
+                alone=self.residual and not self.places,
+            )  # fmt: skip
+        except ValueError as error:  # what is wrong with an axis is told of the inputs
             if re.split(r"[ \[]", str(error))[0] not in (*AXES, "over", "first_frequency"):
                 raise
             said = str(error).replace("over['at']", "the strike point")
             raise ValueError(f"vary reaches values that are not allowed: {said}") from None
+        axes |= self._of_modes(base.modes if self.body else None, base.first)
+        if self.places:
+            axes["at"] = base.modes.points("vary: strike point", self._points(at))
+        return Cases(replace(base, speed=speed), axes, self.tolerance, self.residual, by_row=True)
 
     def _factors(self, body: Mapping[str, Any]) -> list[Any]:
         """Factors of the body's mass and of its frequencies from those of its inputs; 1 where the scene states them."""

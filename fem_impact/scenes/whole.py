@@ -17,7 +17,7 @@ def check_whole(scene: "Scene") -> None:
     if "rise" in scene.mesh.values:
         with scene.blame("mesh"):
             rise_of(scene.mesh.values["rise"])
-    scene._ribs(None)
+    list(scene._listed("rib"))
     if not scene.layer and (scene.material is None) != bare:
         missing, there = ("section", "material") if bare else ("material", "section")
         raise scene.fault(f"[{missing}] is missing; [{there}] needs it")

@@ -83,14 +83,43 @@ def draw(folder: Path, film: Film, shapes: Gallery, form: str = "png") -> None:
 
 
 def frames(film: Film) -> Iterator[Image.Image]:
-    """A picture of the body at every instant, all on the same scale."""
-    space = _Space(film)
+    """A picture of body, striker and title at every instant, all on the same scale.
+
+    They move in one window: a new one takes 0.2 s each.
+    """
+    import pyvista
+
+    plane, cells, extent = film.plane, film.cells, _extent(film.plane)
+    rise = film.rise + np.zeros(len(plane))
+    under = int(np.argmin(((plane - film.at) ** 2).sum(axis=1)))  # the striker
+    plotter = _plotter((FINER * SIZE[0], FINER * SIZE[1]))
+    plotter.disable_anti_aliasing()  # several pixels become one, in half the time
+    mesh = _mesh(plane, cells, rise, np.zeros(len(plane)))
+    _add_surface(plotter, mesh)
+    lines = [_sides(mesh.points, sides) for sides in (film.rim, film.ribs)]
+    for line, colour in zip(lines, (RIM, RIB)):
+        if line.n_cells:
+            plotter.add_mesh(line, color=colour, line_width=2 * FINER, render=False)
+    radius = 0.03 * extent  # of the striker
+    ball = plotter.add_mesh(pyvista.Sphere(radius=radius), color=VERMILION, smooth_shading=True, render=False)
+    _look(plotter, plane, rise)
     try:
         for i, (deflection, gap, title) in enumerate(zip(film.motion, film.gap, film.titles)):
-            yield space.picture(deflection, float(gap), title)
+            height = rise - HEIGHT * extent * deflection
+            points = np.column_stack([plane, height])
+            mesh.points, mesh["deflection"] = points, -deflection
+            mesh.point_data["Normals"] = _normals(points, cells)
+            for line in lines:
+                line.points = points + np.array([0.0, 0.0, LIFT * mesh.length])
+            above = radius + extent * min(HEIGHT * float(gap), 2.0 * HEIGHT)
+            ball.position = (*film.at, height[under] + above)
+            plotter.add_text(title, font_size=10 * FINER, position="upper_left", name="title", render=False)
+            plotter.reset_camera_clipping_range()  # the striker may lie outside the bounds
+            plotter.render()
+            yield Image.fromarray(plotter.screenshot(None)).reduce(FINER)
             progress.report("frames", i + 1, len(film.titles))
     finally:
-        space.plotter.close()
+        plotter.close()
 
 
 def gallery(shown: Gallery) -> Image.Image:
@@ -141,44 +170,6 @@ def write_gif(path: str | Path, pictures: list[Image.Image]) -> None:
     first, *rest = (picture.quantize(palette=colours, dither=Image.Dither.NONE) for picture in pictures)
     with replacing(path) as temporary:
         first.save(temporary, save_all=True, append_images=rest, duration=1000 // RATE, loop=0)
-
-
-class _Space:
-    """A window with body, striker and title, which move from frame to frame: a new window takes 0.2 s each."""
-
-    def __init__(self, film: Film) -> None:
-        import pyvista
-
-        self.plane, self.cells, self.at, self.extent = film.plane, film.cells, film.at, _extent(film.plane)
-        self.rise = film.rise + np.zeros(len(film.plane))
-        self.under = int(np.argmin(((self.plane - self.at) ** 2).sum(axis=1)))  # the striker
-        self.plotter = _plotter((FINER * SIZE[0], FINER * SIZE[1]))
-        self.plotter.disable_anti_aliasing()  # several pixels become one, in half the time
-        self.mesh = _mesh(self.plane, self.cells, self.rise, np.zeros(len(self.plane)))
-        _add_surface(self.plotter, self.mesh)
-        self.lines = [_sides(self.mesh.points, sides) for sides in (film.rim, film.ribs)]
-        for line, colour in zip(self.lines, (RIM, RIB)):
-            if line.n_cells:
-                self.plotter.add_mesh(line, color=colour, line_width=2 * FINER, render=False)
-        self.radius = 0.03 * self.extent  # of the striker
-        ball = pyvista.Sphere(radius=self.radius)
-        self.ball = self.plotter.add_mesh(ball, color=VERMILION, smooth_shading=True, render=False)
-        _look(self.plotter, self.plane, self.rise)
-
-    def picture(self, deflection: np.ndarray, distance: float, title: str) -> Image.Image:
-        """One frame; deflection (n_points,) and distance of the striker in units of the largest deflection."""
-        height = self.rise - HEIGHT * self.extent * deflection
-        points = np.column_stack([self.plane, height])
-        self.mesh.points, self.mesh["deflection"] = points, -deflection
-        self.mesh.point_data["Normals"] = _normals(points, self.cells)
-        for line in self.lines:
-            line.points = points + np.array([0.0, 0.0, LIFT * self.mesh.length])
-        above = self.radius + self.extent * min(HEIGHT * distance, 2.0 * HEIGHT)
-        self.ball.position = (*self.at, height[self.under] + above)
-        self.plotter.add_text(title, font_size=10 * FINER, position="upper_left", name="title", render=False)
-        self.plotter.reset_camera_clipping_range()  # the striker may lie outside the bounds
-        self.plotter.render()
-        return Image.fromarray(self.plotter.screenshot(None)).reduce(FINER)
 
 
 def _normals(points: np.ndarray, cells: np.ndarray) -> np.ndarray:

@@ -137,11 +137,11 @@ def animation(path: str | Path, response: Response, *, frames: int = FRAMES) -> 
     film = Path(path).suffix.lower() == ".mp4"
     encoder = check.extra("imageio_ffmpeg", "film", "an MP4 file") if film else None
     times = np.linspace(0.0, sampling.end_of(response), check.count("frames", frames, low=2, high=sampling.MOST_FRAMES))
-    if encoder is not None:
+    if film:
         with replacing(path) as temporary:
             encode(encoder, temporary, frames_at(response, times))
-        return "" if can_render() else REMEDY
-    canvas.write_gif(path, list(frames_at(response, times)))
+    else:
+        canvas.write_gif(path, list(frames_at(response, times)))
     return "" if can_render() else REMEDY
 
 

@@ -82,12 +82,7 @@ class Mark:
 def curves(
     drawn: Sequence[Curve], *, x: Axis, y: Axis, title: str = "", filled: Curve | None = None, between: Any = None
 ) -> Figure:
-    """Draw curves in one or more panels; shade ``filled`` down to zero, and ``between`` = (x, low, high).
-
-    Returns
-    -------
-    matplotlib.figure.Figure
-    """
+    """Draw curves in one or more panels; shade ``filled`` down to zero, and ``between`` = (x, low, high)."""
     panels = list(dict.fromkeys(curve.panel for curve in drawn))
     with styled(6.4, 3.8 if len(panels) == 1 else 2.2 * len(panels)) as figure:
         called = {tuple(curve.label for curve in drawn if curve.panel == panel and curve.label) for panel in panels}
@@ -137,10 +132,6 @@ def colour_map(
     marks : sequence of Mark
     shades : sequence of (mask on the same grid, colour, name), painted over the colours
     borders : sequence of (x, y), between numbers of impacts
-
-    Returns
-    -------
-    matplotlib.figure.Figure
     """
     along_y, along_x = (np.asarray(values[dim], float) for dim in values.dims)
     field = np.ma.masked_invalid(np.asarray(values, float))
@@ -229,13 +220,8 @@ def _edges(centres: np.ndarray, log: bool) -> np.ndarray:
     return np.exp(place) if log else place
 
 
-def hammers(found: Sequence[Hammer], bandwidth: float, drop: float = 10.0) -> Any:
-    """Draw the range of tips that work, over the mass of the hammer: computed at the dots, straight in between.
-
-    Returns
-    -------
-    matplotlib.figure.Figure
-    """
+def hammers(found: Sequence[Hammer], bandwidth: float, drop: float = 10.0) -> Figure:
+    """Draw the range of tips that work, over the mass of the hammer: computed at the dots, straight in between."""
     found = sorted(found, key=lambda hammer: hammer.mass)
     mass = 1e3 * np.array([hammer.mass for hammer in found])
     hardest = np.array([hammer.hardest or np.nan for hammer in found])

@@ -245,10 +245,16 @@ class Sized:
         with stages("strike"):
             for (i, modes), (n, values) in product(enumerate(found), enumerate(self.blows)):
                 before = self.tried.setdefault((i, n), [])
-                if not vectors.hopeless(before):
-                    errors.append(self._error(self.at(modes, self.seen.at[i], values)))
-                    before.append(errors[-1][0])
-                    lost |= vectors.hopeless(before)
+                if vectors.hopeless(before):
+                    continue
+                case, close = self.at(modes, self.seen.at[i], values), max(FINEST, Budget(self.tolerance).cheap)
+                try:
+                    error = case.blow(tolerance=close, max_impacts=self.max_impacts).error
+                    errors.append((error.truncation, error.mesh))
+                except check.SimulationError:  # nothing is known of a blow that fails
+                    errors.append((0.0, 0.0))
+                before.append(errors[-1][0])
+                lost |= vectors.hopeless(before)
         if lost:
             self.seen.tried.clear()  # the others have not been tried as often
         worst = np.sort(np.array(errors or [(0.0, 0.0)]), axis=0)  # (n_struck, 2)
@@ -269,14 +275,6 @@ class Sized:
             return max(needed)
 
         return cutoff
-
-    def _error(self, case: Case) -> tuple[float, float]:
-        """Errors of vectors and of the mesh in a blow; nothing if it fails."""
-        try:
-            hit = case.blow(tolerance=max(FINEST, Budget(self.tolerance).cheap), max_impacts=self.max_impacts)
-        except check.SimulationError:
-            return 0.0, 0.0
-        return hit.error.truncation, hit.error.mesh
 
 
 def _key(target: Target, case: Case, axes: Axes, tolerance: float) -> str:

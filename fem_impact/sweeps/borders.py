@@ -41,14 +41,6 @@ class Border:
 
 
 @dataclass(frozen=True, eq=False)
-class FoundBorders:
-    """The borders of a map, and what is known of the number of impacts beside them."""
-
-    borders: tuple[Border, ...]
-    doubtful: np.ndarray  # (n, n) whether the number of impacts of a cell depends on the tolerance, or was refused
-
-
-@dataclass(frozen=True, eq=False)
 class Plane:
     """The two axes of a map; a place on it is counted in cells, (n, 2), fractions lie between the cells."""
 
@@ -111,10 +103,11 @@ def why_none(grid: Cases) -> str:
     return ""
 
 
-def find_borders(grid: Cases, count: np.ndarray, solve: Solve) -> FoundBorders:
-    """The borders between numbers of impacts on a grid, see `why_none`, and what is in doubt.
+def find_borders(grid: Cases, count: np.ndarray, solve: Solve) -> tuple[tuple[Border, ...], np.ndarray]:
+    """The borders between numbers of impacts on a grid, see `why_none`, and which of its cells (n, n) are in doubt.
 
-    ``count`` is the number in each cell, -1 if it was refused; ``solve`` computes cases and takes a name for the round.
+    In doubt is a number that depends on the tolerance, or was refused. ``count`` is the number in each cell, -1 if it
+    was refused; ``solve`` computes cases and takes a name for the round.
 
     Cells beside a border are counted again by a finer tolerance, until none is left that was not. Then each edge
     between two cells that a border crosses is halved until the crossing is known to WIDTH: all edges of one round are
@@ -126,7 +119,7 @@ def find_borders(grid: Cases, count: np.ndarray, solve: Solve) -> FoundBorders:
     doubtful = (fine < 0) | (count < 0) | (fine != count)
     curves, vertices = _joined(fine)
     if not curves:
-        return FoundBorders((), doubtful)
+        return (), doubtful
     edges, which = np.unique(vertices, axis=0, return_inverse=True)
     places, error = _located(plane, fine, edges)
     values = plane.values_at(places)[which.reshape(-1)]
@@ -136,7 +129,7 @@ def find_borders(grid: Cases, count: np.ndarray, solve: Solve) -> FoundBorders:
         Border(level, plane.names, points, errors)
         for (level, _), points, errors in zip(curves, np.split(values, ends), np.split(error, ends))
     )
-    return FoundBorders(borders, doubtful)
+    return borders, doubtful
 
 
 def _recounted(plane: Plane, count: np.ndarray) -> np.ndarray:
@@ -197,47 +190,40 @@ def _located(plane: Plane, count: np.ndarray, edges: np.ndarray) -> tuple[np.nda
     return 0.5 * (low + high), 0.5 * width
 
 
-def add_borders(table: xarray.Dataset, found: FoundBorders, smallest: float) -> xarray.Dataset:
+def add_borders(table: xarray.Dataset, borders: tuple[Border, ...], doubtful: np.ndarray, smallest: float) -> None:
     """Write borders into a map; islands narrower than ``smallest`` [-] of an axis can be missing."""
     meaning = "whether the number of impacts depends on the tolerance or the body's description, or was refused"
-    table["doubtful"] = (table.n_impacts.dims, found.doubtful, {"units": "1", "long_name": meaning})
-    table.attrs["borders"] = _describe_borders(found, smallest)
-    if not found.borders:
-        return table
-    n = [len(border.points) for border in found.borders]
+    table["doubtful"] = (table.n_impacts.dims, doubtful, {"units": "1", "long_name": meaning})
+    table.attrs["borders"] = _describe_borders(borders, int(doubtful.sum()), smallest)
+    if not borders:
+        return
+    n = [len(border.points) for border in borders]
     columns: dict[str, Any] = {
-        "impacts": np.repeat(np.array([border.impacts for border in found.borders], np.int32), n),
+        "impacts": np.repeat(np.array([border.impacts for border in borders], np.int32), n),
         "curve": np.repeat(np.arange(len(n), dtype=np.int32), n),
-        "error": np.concatenate([border.error for border in found.borders]),
+        "error": np.concatenate([border.error for border in borders]),
     }
     for name, values in columns.items():
         table[f"{PREFIX}_{name}"] = (PREFIX, values, {"units": "1", "long_name": MEANINGS[name]})
-    points = np.concatenate([border.points for border in found.borders])
-    for name, values in zip(found.borders[0].axes, points.T):
+    points = np.concatenate([border.points for border in borders])
+    for name, values in zip(borders[0].axes, points.T):
         unit = table[name].attrs.get("units", AXES[name][0])
         table[f"{PREFIX}_{name}"] = (PREFIX, values, {"units": unit, "long_name": f"{AXES[name][1]}, on a border"})
-    return table
 
 
-def _describe_borders(found: FoundBorders, smallest: float) -> str:
-    """What is known of the borders, in a sentence."""
-    doubt = int(found.doubtful.sum())
+def _describe_borders(borders: tuple[Border, ...], doubt: int, smallest: float) -> str:
+    """What is known of the borders, and that so many cells are in doubt, in a sentence."""
     beside = f"{doubt} cells whose number of impacts is in doubt"
     missed = f"islands narrower than {smallest:.2g} of an axis can be missing"
-    if not found.borders:
+    if not borders:
         return f"no border between numbers of impacts; {beside}; {missed}"
-    error = np.concatenate([border.error for border in found.borders])
+    error = np.concatenate([border.error for border in borders])
     fine = error[error <= 0.5 * WIDTH]
     located = f"located to {fine.max():.1g} of the axes" if len(fine) else "not located"
     n_coarse = len(error) - len(fine)
     coarse = f", {n_coarse} of {len(error)} points only to the cell" if n_coarse else ""
-    curves = f"{len(found.borders)} curve{'s' if len(found.borders) > 1 else ''}"
+    curves = f"{len(borders)} curve{'s' if len(borders) > 1 else ''}"
     return f"{curves} between numbers of impacts, {located}{coarse}; {beside}; {missed}"
-
-
-def without_borders(table: xarray.Dataset) -> xarray.Dataset:
-    """A map without its borders: only what each cell has."""
-    return table.drop_dims(PREFIX, errors="ignore")
 
 
 def read_borders(table: xarray.Dataset) -> tuple[Border, ...]:

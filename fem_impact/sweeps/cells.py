@@ -170,11 +170,7 @@ class Case:
 
     def lacking(self, causes: Iterable[str]) -> "Case":
         """The same blow on the body described less well in these respects (`Modes.descriptions`), where it can be."""
-
-        def poorest(modes: Modes) -> Modes:
-            return reduce(lambda found, cause: found.poorer.get(cause, found), sorted(causes), modes)
-
-        return self._with(poorest)
+        return self._with(lambda modes: reduce(lambda one, cause: one.poorer.get(cause, one), sorted(causes), modes))
 
     def sampled(self, places: np.ndarray) -> "Case":
         """The same blow on bodies reduced to their contact points, (n_points, dimension) [m] of the one struck."""

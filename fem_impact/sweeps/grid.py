@@ -263,9 +263,9 @@ def compute_map(base: Case, axes: Mapping[str, np.ndarray], job: Job) -> xarray.
         _tell_interpolated(table, computed.computed.reshape(cases.shape))
         gap = refined.widest_gap(cases.shape)
     if job.borders or (job.borders is None and job.ours and not why_none(cases)):
-        found = find_borders(cases, np.asarray(table.n_impacts), job.solved)
-        found.doubtful[doubt >= 1.0] = True
-        add_borders(table, found, gap)
+        borders, doubtful = find_borders(cases, np.asarray(table.n_impacts), job.solved)
+        doubtful[doubt >= 1.0] = True
+        add_borders(table, borders, doubtful, gap)
     return table
 
 

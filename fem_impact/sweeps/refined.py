@@ -92,13 +92,7 @@ def beside_change(count: np.ndarray) -> np.ndarray:
 
 
 class MapSheet:
-    """The numbers of all cells of a map as far as they are known.
-
-    Parameters
-    ----------
-    shape : (n, n)
-    layers : list of str, see `cases.LAYERS`
-    """
+    """The numbers of all cells of a map as far as they are known; its layers are as of `cases.LAYERS`."""
 
     def __init__(self, shape: tuple[int, int], layers: list[str]) -> None:
         self.width = shape[1]

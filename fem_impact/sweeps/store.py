@@ -92,14 +92,9 @@ class Store:
             raise not_free(path)
         return cls(path, mark, len(grid.layers), grid.n_cases)
 
-    @property
-    def blocks(self) -> range:
-        """Numbers of all blocks."""
-        return range(math.ceil(self.n_cases / self.block))
-
     def missing(self) -> list[int]:
-        """Blocks that are not in the store, or not as they were written."""
-        return [block for block in self.blocks if self.read(block) is None]
+        """Numbers of the blocks that are not in the store, or not as they were written."""
+        return [block for block in range(math.ceil(self.n_cases / self.block)) if self.read(block) is None]
 
     def bounds(self, block: int) -> tuple[int, int]:
         """First cell of a block and the one after its last."""
@@ -221,9 +216,7 @@ def by_cluster(
 ) -> tuple[np.ndarray, Texts]:
     """Compute a map on a Dask cluster; if there is a store, the workers write finished blocks to it themselves.
 
-    Parameters
-    ----------
-    client : dask.distributed.Client or the address of a scheduler
+    ``client`` is a dask.distributed.Client or the address of a scheduler.
     """
     dask = check.extra("distributed", "cluster", "client")
     if not isinstance(client, (str, dask.Client)):

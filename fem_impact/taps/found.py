@@ -1,7 +1,7 @@
 """What a fit found, how far the data tell it, and what it predicts."""
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any
 
@@ -41,6 +41,8 @@ class Found(check.Brief):
     compared: Mapping[str, float]  # contact law -> root mean square of its errors at left-out taps [-]; if several
     watch: Watch | None = None
     stuck: bool = False  # its own searches ended above a smaller model inside it
+    _profiles: dict[str, Profile] = field(default_factory=dict, init=False, repr=False)
+    _left_out: dict[bool, tuple[Prediction, ...]] = field(default_factory=dict, init=False, repr=False)
 
     @property
     def _used(self) -> Taps:
@@ -87,10 +89,6 @@ class Found(check.Brief):
         if name not in self._profiles:
             self._profiles[name] = self._follow(name)[0]
         return self._profiles[name]
-
-    @cached_property
-    def _profiles(self) -> dict[str, Profile]:
-        return {}
 
     def _follow(self, name: str) -> tuple[Profile, np.ndarray, float]:
         """A profile, and coordinates and sum of squares of the best fit met on the way."""
@@ -244,10 +242,6 @@ class Found(check.Brief):
             return predictions.compare_taps(self._used, self.left_out(), self.misfit, calibration)
         each = tuple(self.predict(measured.pick(i)) for i in range(measured.n_taps))
         return predictions.compare_taps(measured, each, self.misfit, calibration)
-
-    @cached_property
-    def _left_out(self) -> dict[bool, tuple[Prediction, ...]]:
-        return {}
 
     @property
     def contact(self) -> Contact:

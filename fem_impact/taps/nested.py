@@ -66,15 +66,10 @@ def embedded(problem: Problem, inner: Inner) -> list[np.ndarray]:
                     shared[i] = np.clip(each.inside(values[each.name]), low[i], high[i])
             elif each.name.endswith(".frequency"):
                 shared[i] = solver.felt_frequency(share, values[TIME], low[i], high[i])
-        apart = dict(zip(_owners(small), small.apart(x)))
-        rest = [apart.get(name, np.zeros(n_taps)) for name in _owners(problem)]
+        apart = dict(zip(small.owners, small.apart(x)))
+        rest = [apart.get(name, np.zeros(n_taps)) for name in problem.owners]
         begun.append(np.concatenate([shared, x[small.n_shared : small.n_shared + 2 * n_taps], *rest]))
     return begun
-
-
-def _owners(problem: Problem) -> list[str]:
-    """The names of `Problem.own` in the order of the coordinates."""
-    return [each.name for each in problem.free if each.name in problem.own]
 
 
 def _neutral(small: Problem, names: list[str]) -> dict[str, float]:

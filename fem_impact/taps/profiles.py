@@ -268,7 +268,7 @@ def scatter(problem: Problem, x: np.ndarray, i: int, noise: float, freedom: int)
     freedom : int, its degrees of freedom
     """
     n_taps, unknown = problem.data.n_taps, problem.free[i]
-    place = [each.name for each in problem.free if each.name in problem.own].index(unknown.name)
+    place = problem.owners.index(unknown.name)
     columns = problem.n_shared + (2 + place) * n_taps + np.arange(n_taps)
     answers = np.linalg.pinv(problem.jacobian(x), rcond=ROUNDING)[columns]  # (n_taps, n_residuals) to the noise
     answers -= answers.mean(axis=0)  # apart from the mean of all taps

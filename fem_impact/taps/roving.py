@@ -220,7 +220,7 @@ def plan_test(
     (('works', 'works'), 'small')
     """
     target = Target.of(system, damping_ratio)
-    modes = _modes(target, bandwidth, Stages())
+    modes = _modes(target, bandwidth)
     return planned(target, modes, hammers, points, bandwidth, sensor=sensor, drop=drop, noise=noise, duration=duration)
 
 
@@ -232,7 +232,6 @@ def planned(
     centre = bandwidth / chooser.half_sine_reach(check.between("drop", drop, 1.0, 40.0, "dB"))
     names, tips, masses, stiffnesses = _kit(hammers, centre)
     noise = check.between("noise", noise, 0.0, 10.0)
-    stages = Stages()
     places = modes.points("points", points)
     at_sensor = places[0] if sensor is None else modes.point("sensor", sensor)[0]
     if len(places) * len(masses) > MOST_BLOWS:
@@ -241,9 +240,7 @@ def planned(
         )
     pairs, alike = np.unique(np.column_stack([masses, stiffnesses]), axis=0, return_inverse=True)
     blows = [{"mass": float(mass), "stiffness": float(tip)} for mass, tip in pairs]
-    seen, _ = bodies.of_hammers(
-        target, places, blows, blows[:2], chooser.TOLERANCE, chooser.MOST_MODES, stages
-    )  # fmt: skip
+    seen, _ = bodies.of_hammers(target, places, blows, blows[:2], chooser.TOLERANCE, chooser.MOST_MODES, Stages())
     if duration is None:  # lines at most 10 Hz apart, to part modes
         duration = sampling.ringing(modes, inside_band(modes, bandwidth), (0.1, triggers.LONGEST))
     n_times = round(check.positive("duration", duration, "s") * RATE * bandwidth)
@@ -251,7 +248,7 @@ def planned(
         raise ValueError(
             f"duration must hold 8 to {2 * MOST_LINES} samples at {RATE:g} times the bandwidth, got {n_times}"
         )
-    rig = _Rig(modes, at_sensor, bandwidth, noise, n_times)
+    rig = _Rig(modes, bandwidth, noise, n_times)
     shape = len(places), len(masses)
     counts, reach, coherence, at_modes, peaks = np.zeros(shape, int), *(np.full(shape, np.nan) for _ in range(4))
     for i, (place, body) in enumerate(zip(places, seen)):
@@ -266,7 +263,8 @@ def planned(
                 continue
             reach[i, same] = chooser.bandwidth_of(hit, drop)
             if reach[i, same[0]] >= bandwidth:
-                answer = rig.answer(place) if answer is None else answer
+                if answer is None:  # acceleration at the sensor per force here, (n_lines,) complex [1/kg]
+                    answer = spectra.mobility(modes, place, at_sensor, rig.frequencies, "accelerance")
                 coherence[i, same], at_modes[i, same] = np.array(rig.coherence(hit, answer))[:, None]
     progress.report("points", len(places), len(places))
     return Roving(
@@ -275,19 +273,18 @@ def planned(
     )  # fmt: skip
 
 
-def _modes(target: Target, bandwidth: float, stages: Stages) -> Modes:
+def _modes(target: Target, bandwidth: float) -> Modes:
     """The structure's modes up to beyond the band; ValueError if that is none of a hammer."""
     check.between("bandwidth", bandwidth, *chooser.BANDWIDTHS, "Hz")
-    if target.modes is not None:
-        return target.surrounded(target.modes)
-    with stages("modes"):
+    found = target.modes
+    if found is None:
         close = 1e-3  # far below the spacing of frequencies
-        found = target.find(FIRST_LOOK, tolerance=close, stages=stages)
+        found = target.find(FIRST_LOOK, tolerance=close)
         # modes up to less than that bend the top of the band, more only cost time
         reach = 1.5 * bandwidth / target.stretch  # modes are found before the body is scaled
         if found.frequencies[-1] < reach:
-            found = target.find(FIRST_LOOK, reach, tolerance=close, first=found, stages=stages)
-        return target.surrounded(found)
+            found = target.find(FIRST_LOOK, reach, tolerance=close, first=found)
+    return target.surrounded(found)
 
 
 def _kit(told: Any, centre: float) -> tuple[tuple[str, ...], tuple[str, ...], np.ndarray, np.ndarray]:
@@ -341,7 +338,6 @@ class _Rig:
     """Sensor and analyser of the test."""
 
     modes: Modes
-    sensor: np.ndarray
     bandwidth: float  # [Hz]
     noise: float  # [-]
     n_times: int
@@ -350,10 +346,6 @@ class _Rig:
     def frequencies(self) -> np.ndarray:
         """Lines [Hz] of a record, without 0 Hz."""
         return np.fft.rfftfreq(self.n_times, 1.0 / (RATE * self.bandwidth))[1:]
-
-    def answer(self, point: np.ndarray) -> np.ndarray:
-        """Acceleration at the sensor per force at a point, (n_lines,) complex [1/kg]."""
-        return spectra.mobility(self.modes, point, self.sensor, self.frequencies, "accelerance")
 
     def coherence(self, hit: Any, answer: np.ndarray) -> tuple[float, float]:
         """Mean expected coherence over the band, from its first mode on, and at its natural frequencies."""
@@ -420,6 +412,6 @@ def of_scene(scene: Scene, hammers: Any, bandwidth: float, drop: float, number: 
     """The plan for about so many points over the body of a scene, or for its strike point alone; the sensor sits
     there."""
     target, at = scene.built.target, scene.blow.values["at"]
-    modes = _modes(target, bandwidth, Stages())
+    modes = _modes(target, bandwidth)
     points = [at] if number is None else spread_points(modes, number)
     return planned(target, modes, hammers, points, bandwidth, sensor=at, drop=drop)

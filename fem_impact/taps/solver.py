@@ -83,6 +83,11 @@ class Problem(check.Brief):
         return [i for i, each in enumerate(self.free) if each.name in self.own]
 
     @property
+    def owners(self) -> list[str]:
+        """The names of `own` in the order of the coordinates."""
+        return [self.free[i].name for i in self._own]
+
+    @property
     def n_values(self) -> int:
         """Number of values that the data decide: of all coordinates, one for each name in `own` changes nothing."""
         return self.n_shared + self.data.n_taps * (2 + len(self.own)) - len(self.own)

@@ -13,7 +13,8 @@ from numpy.polynomial import chebyshev
 from scipy.special import gamma
 
 from .._base import check
-from ..impact.contact import NUMBERS, Contact, acting_stiffness, wall_time
+from ..impact import accuracy
+from ..impact.contact import NUMBERS, Contact, wall_time
 from ..impact.striker import Striker
 from ..modes.modal import Modes
 from . import arguments, blows
@@ -203,11 +204,12 @@ class Setting(check.Brief):
 
     def records(self, values: Mapping[str, float], speeds: np.ndarray, n_times: int, lead: int) -> np.ndarray:
         """Fine records of the blows that the values make, see `blows.records`."""
-        law = changed(self.contact, values)
+        law, mass = changed(self.contact, values), self.felt_mass(values)
         met = replace(law, gap=0.0) if law.gap else law  # the record begins where the bodies touch
         return blows.records(
-            self.hammer(values), self.structure(values), met, speeds, duration=self.duration(values, law),
-            n_times=n_times, lead=lead, rig=self.rig, tip_mass=values.get("striker.tip_mass", self.rig.tip_mass),
+            self.hammer(values), self.structure(values), met, speeds, lead=lead, rig=self.rig, n_times=n_times,
+            duration=accuracy.contact_duration(law, mass, 0.5 * self.impulse / mass),
+            tip_mass=values.get("striker.tip_mass", self.rig.tip_mass),
         )  # fmt: skip
 
     @cached_property
@@ -284,14 +286,6 @@ class Setting(check.Brief):
         k = values.get("contact.stiffness", self.contact.stiffness)
         a = values.get("contact.exponent", self.contact.exponent)
         return float(wall_time(k, a, 1.0 / mass, 0.5 * self.impulse / mass))
-
-    def duration(self, values: Mapping[str, float], law: Contact | None = None) -> float:
-        """The same time [s] with all that the contact does: layers, yielding, memory."""
-        law = law or changed(self.contact, values)
-        mass = self.felt_mass(values)
-        speed = 0.5 * self.impulse / mass
-        acting = acting_stiffness(law.numbers, 1.0 / mass, speed)
-        return float(wall_time(acting, law.exponent, 1.0 / mass, speed))
 
     def stiffness(self, values: Mapping[str, float], time: float) -> float:
         """The stiffness [N/m**exponent] that `contact_time` has this contact time [s] for."""

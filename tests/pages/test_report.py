@@ -204,9 +204,9 @@ def test_the_result_of_a_sequence_gives_the_same_strokes(tmp_path):
 def test_listeners_in_free_air_get_a_player_for_each_bound(tmp_path):
     scene = load_text(tmp_path, BAR + "[observe]\nlistener = [0.2, 0.1, 0.5]\n")
     players = report._sounds(scene, scene.run(target="modal").response)
-    told = {player.name.partition("; ")[2] for player in players} - {""}
+    told = {player["name"].partition("; ")[2] for player in players} - {""}
     assert len(told) == 1 and re.fullmatch(r"bounded: between [\d.]+ and [\d.]+ dB re 20 µPa", told.pop())
-    names = [player.name.partition(";")[0] for player in players if "bounded" in player.name]
+    names = [player["name"].partition(";")[0] for player in players if "bounded" in player["name"]]
     place = "Sound radiated to (0.2, 0.1, 0.5)\N{NO-BREAK SPACE}m without a baffle"
     assert list(dict.fromkeys(names)) == [f"{place}, estimate from below", f"{place}, estimate from above"]
 

@@ -159,7 +159,7 @@ class Straight:
     """A linear problem: each tap measures its own value 50 times, besides a momentum and an onset that matter not."""
 
     def __init__(self, n_taps):
-        self.free, self.own, self.n_shared = (Unknown("a", 1.0, 10.0),), ("a",), 1
+        self.free, self.owners, self.n_shared = (Unknown("a", 1.0, 10.0),), ["a"], 1
         self.data = type("Data", (), {"n_taps": n_taps})
 
     def jacobian(self, x):

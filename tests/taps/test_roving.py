@@ -9,7 +9,6 @@ from scenes import SMALL
 
 import fem_impact as fi
 from fem_impact import cli
-from fem_impact.model.target import Stages
 from fem_impact.taps import roving
 
 PLATE = fi.analytic.rectangle(1.0, 0.7, mass=2.0, first_frequency=50.0, n_modes=150, damping_ratio=0.01)
@@ -130,5 +129,5 @@ def test_the_prompt_plans_points_over_the_body(tmp_path, capsys):
 
 def test_modes_of_a_scaled_scene_reach_a_little_beyond_the_band(tmp_path):
     (tmp_path / "scene.toml").write_text(SMALL.replace('source = "analytic"', 'source = "fe"'))
-    found = roving._modes(fi.load_scene(tmp_path / "scene.toml").built.target, BAND, Stages())
+    found = roving._modes(fi.load_scene(tmp_path / "scene.toml").built.target, BAND)
     assert found.frequencies[0] == pytest.approx(100.0) and 1.5 * BAND < found.frequencies[-1] < 5.0 * BAND
