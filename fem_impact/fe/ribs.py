@@ -92,14 +92,11 @@ class Rib:
         """
         place, beam = self.distances(points), self.section
         inertia = beam.inertia(place)
-        if self.offset is None:
+        z: Any = self.offset
+        if z is None:
             z = -0.5 * (thickness + evaluate("height", beam.height, place, "m"))
-        else:
-            z = (
-                check.field("offset", self.offset, points, "m")
-                if callable(self.offset)
-                else np.full(len(points), self.offset)
-            )
+        elif callable(z):
+            z = check.field("offset", z, points, "m")
         stretch = beam.material.E * inertia / beam.material.rho
         result = np.zeros((len(points), 3, 3))
         result[:, 0, 0] = stretch

@@ -120,18 +120,11 @@ def strip(points: list[np.ndarray], a: int, b: int, c: int, d: int) -> list[list
 class Rim:
     """The boundary facets while they are being split."""
 
-    facets: list[list[int]]  # vertices of each
-    number: dict[tuple[int, int], int]  # of the facet between two vertices
-    middles: list[np.ndarray]
-    tangents: list[np.ndarray]
-    curvatures: list[np.ndarray]
-    parent: list[int]  # facet of the whole mesh
-
     def __init__(self, mesh: Mesh) -> None:
-        self.facets = mesh.facets.tolist()
-        self.number = {(a, b): i for i, (a, b) in enumerate(self.facets)}
+        self.facets: list[list[int]] = mesh.facets.tolist()  # vertices of each
+        self.number = {(a, b): i for i, (a, b) in enumerate(self.facets)}  # of the facet between two vertices
         self.middles, self.tangents, self.curvatures = list(mesh.middles), list(mesh.tangents), list(mesh.curvatures)
-        self.parent = list(range(len(self.facets)))
+        self.parent = list(range(len(self.facets)))  # facet of the whole mesh
 
     def split(self, vertex: int, far: int, new: int, points: list[np.ndarray], ratio: float) -> np.ndarray:
         """Return the point that divides the side from a vertex to ``far``; a boundary facet there becomes two."""

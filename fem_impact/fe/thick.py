@@ -83,11 +83,8 @@ class MindlinSpace(PlaneSpace):
     def turn(self, mesh: Cells, thickness: np.ndarray) -> None:
         """Let the nodes of straight triangles much smaller than their ``thickness`` (n_cells,) hold rotations."""
         longest = side_lengths(mesh.p.T, self.vertices).max(axis=1)
-        bends = np.zeros(len(longest), bool)
-        if self.bent is not None:
-            bends[self.bent.cells] = True
         dofs = plane.numbered(mesh).element_dofs.T  # (n_cells, 15)
-        small = np.setdiff1d(dofs[(longest < SMALL * thickness) & ~bends], dofs[bends])
+        small = np.setdiff1d(dofs[(longest < SMALL * thickness) & ~self.curved], dofs[self.curved])
         self.turned = np.isin(dofs, small)
 
     def slopes_in_rotations(self, cells: np.ndarray, *shapes: np.ndarray) -> list[np.ndarray]:
