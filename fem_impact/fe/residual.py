@@ -20,7 +20,7 @@ import numpy as np
 from ..mesh.mesh_files import sides_of
 from .elements import EXPONENTS, collapsed, curvatures, monomials
 from .springs import at_facets
-from .supports import SIDES, cells_of_facets
+from .supports import SIDES
 from .system import System
 from .theory import blocks, unknowns_of_cells
 
@@ -132,10 +132,7 @@ class Residual:
     def _set_rim(self) -> None:
         space, rim = self.moments.space, self.system.rim
         assert rim is not None
-        self.rim_cells = cells_of_facets(rim.facets, space.vertices)[0]
-        _, x, step = at_facets(space, rim.facets, self.rim_cells)
-        ds = np.linalg.norm(step, axis=2)
-        normal = step / ds[..., None]
+        self.rim_cells, _, x, ds, normal = at_facets(space, rim.facets)
         force = self.moments.edge_forces(self.rim_cells, x, normal, rim.curvatures.mean(axis=1)[:, None, None])
         kinds = np.array(rim.kinds)
         length = ds.sum(axis=1)

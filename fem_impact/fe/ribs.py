@@ -24,7 +24,6 @@ from .corners import towards
 from .section import Beam, Plate, Varying, evaluate
 from .splitting import distance
 from .springs import at_facets
-from .supports import cells_of_facets
 from .theory import Frame, gram
 
 # [-] least height of triangles on ribs, over the extent: up to 2.5e-4 they lost the digits of K, at 2.5e-3 they did not
@@ -188,10 +187,8 @@ class RibLine(NamedTuple):
     @classmethod
     def of(cls, rib: Rib, facets: np.ndarray, section: Plate, space: Any, frame: Frame) -> "RibLine":
         """Where a rib of a plate lies: on the sides ``facets`` (n, 2)."""
-        cells = cells_of_facets(facets, space.vertices)[0]
-        area, x, normal = at_facets(space, facets, cells)
-        ds, place = np.linalg.norm(normal, axis=2), frame.to_metres(x)
-        nx, ny = np.moveaxis(normal / ds[..., None], 2, 0)
+        cells, area, x, ds, normal = at_facets(space, facets)
+        (nx, ny), place = np.moveaxis(normal, 2, 0), frame.to_metres(x)
         along = np.stack([ny**2, nx**2, -nx * ny], axis=-1)  # for the tangent (-ny, nx)
         twist = np.stack([-nx * ny, nx * ny, 0.5 * (nx**2 - ny**2)], axis=-1)
         stiffness, inertia = rib.rigidity(place, evaluate("thickness", section.thickness, place, "m"))

@@ -84,12 +84,8 @@ def divided_across(mesh: Mesh, tall: np.ndarray) -> tuple[Mesh, np.ndarray]:
         if not more.size:
             break
         marked[more] = True
-    points, rim, middle = list(mesh.points), Rim(mesh), {}
-    for a, b in sides[marked].tolist():
-        middle[a, b] = middle[b, a] = len(points)
-        points.append(rim.split(a, b, len(points), points, 0.5))
-    touched = marked[number].any(axis=1)
-    pieces = [piece for cell in cells[touched].tolist() for piece in bisected(points, cell, middle)]
+    points, rim, touched = list(mesh.points), Rim(mesh), marked[number].any(axis=1)
+    pieces = rim.halve(sides[marked].tolist(), cells[touched].tolist(), points)
     finer = rim.finish(mesh, np.array(points), np.concatenate([cells[~touched], np.array(pieces, cells.dtype)]))
     return finer, np.array(rim.parent)
 
@@ -149,6 +145,14 @@ class Rim:
         self.curvatures.append(np.array([curvature, last[1]]))
         self.parent.append(self.parent[facet])
         return place
+
+    def halve(self, sides: list, cells: list[list[int]], points: list[np.ndarray]) -> list[list[int]]:
+        """Divide cells at the middles of sides (pairs of vertices), which are appended to ``points``."""
+        middle = {}
+        for a, b in sides:
+            middle[a, b] = middle[b, a] = len(points)
+            points.append(self.split(a, b, len(points), points, 0.5))
+        return [piece for cell in cells for piece in bisected(points, cell, middle)]
 
     def finish(self, mesh: Mesh, points: np.ndarray, cells: np.ndarray) -> Mesh:
         parent = np.array(self.parent)

@@ -269,10 +269,8 @@ def errors_by_layers(system: Any, vectors: np.ndarray, loads: np.ndarray, forced
     loose = np.flatnonzero(np.isin(rim.kinds, LOOSE))
     if not loose.size:
         return np.zeros((3, vectors.shape[1]))
-    cells = supports.cells_of_facets(rim.facets[loose], space.vertices)[0]
-    _, x, normal = at_facets(space, rim.facets[loose], cells)
-    ds = np.linalg.norm(normal, axis=2)
-    nx, ny = np.moveaxis(normal / ds[..., None], 2, 0)
+    cells, _, x, ds, normal = at_facets(space, rim.facets[loose])
+    nx, ny = np.moveaxis(normal, 2, 0)
     stiffness, shear = (frame.field(system.section, name, x) for name in ("stiffness", "shear"))
     along = np.stack([-ny, nx], axis=-1)
     turn = np.stack([-nx * ny, nx * ny, nx**2 - ny**2], axis=-1)  # the moment M_nt from M_xx, M_yy, M_xy

@@ -29,7 +29,6 @@ from ..fe.elements import collapsed
 from ..fe.residual import Moments
 from ..fe.section import PLANE, SHEAR, Beam, Plate, evaluate
 from ..fe.springs import at_facets
-from ..fe.supports import cells_of_facets
 from ..fe.theory import unknowns_of_cells
 from ..mesh.meshes import Mesh
 from ..modes.disk import DiskShapes, bessel
@@ -250,10 +249,8 @@ def _plate(system: System, vectors: np.ndarray, thick: bool) -> np.ndarray:
     rim = system.rim
     free = np.flatnonzero(np.array(rim.kinds) == "free") if rim is not None else np.zeros(0, int)
     if len(free) and rim is not None:
-        at = cells_of_facets(rim.facets[free], space.vertices)[0]
-        _, place, step = at_facets(space, rim.facets[free], at)
-        ds = np.linalg.norm(step, axis=2)
-        nx, ny = np.moveaxis(step / ds[..., None], 2, 0)[..., None]  # its sign does not matter
+        at, _, place, ds, normal = at_facets(space, rim.facets[free])
+        nx, ny = np.moveaxis(normal, 2, 0)[..., None]  # its sign does not matter
         moment = moments.derivatives(at, place, 0)[:, 0]
         twist = ((moment[:, 1] - moment[:, 0]) * nx * ny + moment[:, 2] * (nx**2 - ny**2)) @ moved[at]
         flat = frame.to_metres(place)

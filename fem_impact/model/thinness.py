@@ -25,8 +25,7 @@ import numpy as np
 from ..fe import shallow
 from ..fe.section import SHEAR, Beam, Plate
 from ..impact.assumption import Assumption, allowed
-from ..modes.ritz import RitzShapes
-from ..modes.shapes import FieldShapes, unwrapped
+from ..modes.shapes import unwrapped
 from .bending import LOW, Bending, Known, flexible_vectors, integrate_shapes
 from .deflection import OTHER
 from .restrike import Doubt, Struck, softer
@@ -172,7 +171,7 @@ def examine_shallowness(struck: Struck) -> Assumption:
     modes = struck.bodies[1]
     shapes: Any = unwrapped(modes.shapes)[0]
     system = getattr(shapes, "system", None)
-    if system is None or system.rules is not shallow.SHALLOW or not isinstance(shapes, (FieldShapes, RitzShapes)):
+    if system is None or system.rules is not shallow.SHALLOW:
         return SHALLOW.holds(struck)
     curved = system.section.rise is not None
     value, remedy = (shallow.steepest(system), FLATTER) if curved else (None, FLAT)

@@ -116,7 +116,7 @@ def hopeless(tried: list[float], patience: int = 3) -> bool:
 
 
 def folded(found: Modes, cutoff: Callable[[Modes, float], float], margin: float) -> Modes:
-    """The Ritz pairs up to ``cutoff``, as in `Seen.modes`; those above act as a spring.
+    """The Ritz pairs up to ``cutoff``, as in `Seen.needed_modes`; those above act as a spring.
 
     The poorer descriptions keep more pairs, whose spring errs 16 times less, so that the difference of their blows is
     the error of the poorer one and tells what the spring costs, too.
@@ -239,5 +239,5 @@ class Views(Seen):
     kind = Krylovs
 
     def of(self, point: int, cutoff: Callable[[Modes, float], float]) -> Modes:
-        """The target as seen from one of the points; ``cutoff`` as in `Seen.modes`."""
+        """The target as seen from one of the points; ``cutoff`` as in `needed_modes`."""
         return self._struck(self.fine.each[point], self.coarse.each[point], cutoff)[1]
