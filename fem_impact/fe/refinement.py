@@ -58,11 +58,6 @@ class Spectrum:
         """Estimated relative error of omega, (n_modes,) [-]."""
         return self.parts.sum(axis=0)
 
-    @property
-    def n_rigid(self) -> int:
-        """Number of rigid motions."""
-        return self.flexibility.rigid.shape[1]
-
 
 def unknowns(element: str, mesh: Mesh, size: float) -> float:
     """Number of unknowns [-] on a mesh of the same outline with another element size [m]."""
