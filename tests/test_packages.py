@@ -117,6 +117,8 @@ def classes():
             if isinstance(node, ast.ClassDef):
                 names = {item.name for item in node.body if isinstance(item, ast.FunctionDef)}
                 names |= {item.target.id for item in node.body if isinstance(item, ast.AnnAssign)}
+                stored = (item for item in ast.walk(node) if isinstance(getattr(item, "ctx", None), ast.Store))
+                names |= {ast.unparse(item)[5:] for item in stored if ast.unparse(item).startswith("self.")}
                 found.append((package(path), node.name, names))
     return found
 

@@ -253,11 +253,7 @@ def unknowns_near(
 
 
 def reassemble(
-    system: System,
-    mesh: Mesh,
-    near: np.ndarray | None = None,
-    layer: float | None = None,
-    element: str | None = None,
+    system: System, mesh: Mesh, near: np.ndarray | None = None, layer: float | None = None, element: str | None = None
 ) -> System:
     """Assemble the same body on another mesh.
 

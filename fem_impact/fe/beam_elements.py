@@ -42,16 +42,12 @@ class HermiteSpace:
 
     element: type[Any] = _Hermite
 
-    start: np.ndarray  # (n_cells,)
-    length: np.ndarray  # (n_cells,)
-    origin: np.ndarray  # (n_cells, 1) the start
-    bubbles: np.ndarray  # (n_cells, DEGREE - 3, DEGREE - 3) of Legendre's bubbles in each shape function
-
     def __init__(self, mesh: Cells) -> None:
         ends = mesh.p[0, mesh.t]  # (2, n_cells)
-        self.start, self.length = ends[0], ends[1] - ends[0]
+        self.start, self.length = ends[0], ends[1] - ends[0]  # (n_cells,)
         self.origin = self.start[:, None]  # (n_cells, 1)
-        self.bubbles = np.broadcast_to(np.eye(DEGREE - 3), (len(self.start), DEGREE - 3, DEGREE - 3))  # Legendre
+        # (n_cells, DEGREE - 3, DEGREE - 3) of Legendre's bubbles in each shape function
+        self.bubbles = np.broadcast_to(np.eye(DEGREE - 3), (len(self.start), DEGREE - 3, DEGREE - 3))
 
     def decouple(self, K: np.ndarray, M: np.ndarray) -> None:
         """Turn the bubbles into modes of the clamped elements and update K and M (n_cells, n_local, n_local)."""
@@ -88,9 +84,7 @@ class HermiteSpace:
             result.append(whole / h[..., None] ** order)
         return result
 
-    def functions(self, cells: np.ndarray, points: np.ndarray, orders: tuple[int, ...]) -> list[np.ndarray]:
-        """The same of the whole deflection, by all unknowns; here it is that by `bending_functions`."""
-        return self.bending_functions(cells, points, orders)
+    functions = bending_functions  # of the whole deflection, by all unknowns
 
     def numbering(self, mesh: Cells) -> tuple[np.ndarray, int]:
         """Numbers of the unknowns of each element (n_local, n_cells), and how many there are."""

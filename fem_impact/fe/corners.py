@@ -9,7 +9,7 @@ import numpy as np
 from .._base.rounding import HALVINGS, SAME
 from ..mesh.meshes import Mesh
 from .material import Material, turned
-from .splitting import Rim, bisected, strip
+from .splitting import Rim, strip
 
 # [-] size of each ring of triangles over that of the ring around it: 0.7 takes twice the rings, 0.35 slimmer cells
 SHRINK = 0.5
@@ -192,11 +192,7 @@ def _narrowed(points: list[np.ndarray], cells: list[list[int]], corners: set[int
         marked = sorted({side for cell in cells for side in _wide_sides(points, cell, corners)})
         if not marked:
             break
-        middle = {}
-        for a, b in marked:
-            middle[a, b] = middle[b, a] = len(points)
-            points.append(rim.split(a, b, len(points), points, 0.5))
-        cells = [piece for cell in cells for piece in bisected(points, cell, middle)]
+        cells = rim.halve(marked, cells, points)
     return cells
 
 

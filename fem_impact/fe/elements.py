@@ -38,21 +38,14 @@ def area_coordinates(local: np.ndarray) -> np.ndarray:
 class Bent:
     """Map that bends the triangles at curved facets onto the true curve and leaves the others straight."""
 
-    curves: Curves
-    cells: np.ndarray  # (n,) of each curved facet
-    sides: np.ndarray  # (n,) of the cell
-    start: np.ndarray  # (n,) corner of the cell at which the facet starts
-    stop: np.ndarray  # (n,) and ends
-    of_side: np.ndarray  # (n_cells, 3) curved facet of every side, or -1
-
     def __init__(
         self, curves: Curves, facets: np.ndarray, cells: np.ndarray, sides: np.ndarray, vertices: np.ndarray
     ) -> None:
-        self.curves, self.cells, self.sides = curves, cells, sides
+        self.curves, self.cells, self.sides = curves, cells, sides  # (n,) cell of each curved facet, and side of that
         corner = vertices[cells]  # (n, 3)
-        self.start = (corner == facets[:, :1]).argmax(axis=1)
-        self.stop = (corner == facets[:, 1:]).argmax(axis=1)
-        self.of_side = np.full(vertices.shape, -1)
+        self.start = (corner == facets[:, :1]).argmax(axis=1)  # (n,) corner of the cell at which the facet starts
+        self.stop = (corner == facets[:, 1:]).argmax(axis=1)  # (n,) and ends
+        self.of_side = np.full(vertices.shape, -1)  # (n_cells, 3) curved facet of every side, or -1
         self.of_side[cells, sides] = np.arange(len(cells))
 
     def shift(self, cells: np.ndarray, area: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -73,32 +66,26 @@ class Bent:
 class Triangles:
     """The triangles of one mesh and polynomials on them, with a search for the triangle of a point.
 
-    Spaces of shape functions are kinds of it: they state the first three and find ``coefficients``.
+    Spaces of shape functions are kinds of it: they state the numbers and the element, and find ``coefficients``.
     """
 
     degree: int  # of the polynomials
     order: int  # of the quadrature
     element: type[Any]  # scikit-fem's class, which numbers the unknowns
     coefficients: np.ndarray  # (n_cells, n, n_local) of the monomials in each shape function
-    corners: np.ndarray  # (n_cells, 3, 2)
-    vertices: np.ndarray  # (n_cells, 3)
-    bent: Bent | None
-    origin: np.ndarray  # (n_cells, 2) centre
-    jacobian: np.ndarray  # (n_cells, 2, 2) of the map from the reference triangle
-    inverse: np.ndarray  # (n_cells, 2, 2) of that
-    normals: np.ndarray  # (n_cells, 3, 2) of the sides, the same for both triangles beside one
-    curved: np.ndarray  # (n_cells,) bool
-    tree: Any  # scipy's search tree of the centres
+    per_corner: int  # unknowns at a corner: the deflection, and maybe its derivatives; one for each side follows them
 
     def __init__(self, mesh: Cells, bent: Bent | None = None) -> None:
         corners = mesh.p[:, mesh.t].transpose(2, 1, 0)  # (n_cells, 3, 2)
         self.corners, self.vertices, self.bent = corners, mesh.t.T, bent
-        self.origin = corners.mean(axis=1)
+        self.origin = corners.mean(axis=1)  # (n_cells, 2) centre
+        # (n_cells, 2, 2) of the map from the reference triangle
         self.jacobian = np.stack([corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]], axis=2)
-        self.inverse = np.linalg.inv(self.jacobian)
+        self.inverse: np.ndarray = np.linalg.inv(self.jacobian)
         along = np.stack([corners[:, q] - corners[:, p] for p, q in SIDES], axis=1)
         up = np.stack([self.vertices[:, p] < self.vertices[:, q] for p, q in SIDES], axis=1)
         along = along * np.where(up, 1.0, -1.0)[..., None]  # the two triangles of a side must agree
+        # (n_cells, 3, 2) of the sides
         self.normals = np.stack([along[..., 1], -along[..., 0]], axis=-1) / np.linalg.norm(along, axis=2)[..., None]
         self.curved = np.zeros(len(corners), bool)
         if bent is not None:
@@ -136,9 +123,19 @@ class Triangles:
         found = [self.derivatives(cells, points, order, self.degree) @ weights for order in orders]
         return [each if order else each[:, 0] for each, order in zip(found, orders)]
 
-    def functions(self, cells: np.ndarray, points: np.ndarray, orders: tuple[int, ...]) -> list[np.ndarray]:
-        """The same by all unknowns; here they are those of `bending_functions`."""
-        return self.bending_functions(cells, points, orders)
+    functions = bending_functions  # by all unknowns
+
+    def rigid_unknowns(self, element_dofs: np.ndarray, n_all: int) -> np.ndarray:
+        """Unknowns (n_all, 3) of the deflections 1, x and y, the rigid motions of a plate."""
+        result = np.zeros((n_all, 3))
+        for k in range(3):
+            corner = element_dofs[self.per_corner * k :]
+            result[corner[0], 0] = 1.0
+            result[corner[0], 1:] = self.corners[:, k]
+            if self.per_corner > 1:  # the slopes
+                result[corner[1], 1] = result[corner[2], 2] = 1.0
+            result[element_dofs[3 * self.per_corner + k], 1:] = self.normals[:, k]
+        return result
 
     def jacobians(self, cells: np.ndarray, area: np.ndarray) -> np.ndarray:
         """Jacobians (n, n_q, 2, 2) of the map from the reference triangle at area coordinates (n or 1, n_q, 3)."""
@@ -208,10 +205,11 @@ class ArgyrisSpace(Triangles):
     degree = 5
     order = 10  # exact for products of quintics
     element = ElementTriArgyris
-    middles: np.ndarray  # (n_cells, 3, 2) of the sides, on the true curve, as are the normals
+    per_corner = 6
 
     def __init__(self, mesh: Cells, bent: Bent | None = None) -> None:
         super().__init__(mesh, bent)
+        # (n_cells, 3, 2) of the sides, on the true curve, as are the normals
         self.middles = np.stack([0.5 * (self.corners[:, p] + self.corners[:, q]) for p, q in SIDES], axis=1)
         if bent is not None:
             curved = bent.cells, bent.sides
@@ -253,17 +251,6 @@ class ArgyrisSpace(Triangles):
         mass = C.transpose(0, 2, 1) @ (values.T * weight @ values) @ C
         return bending, mass * determinant[:, None, None]
 
-    def rigid_unknowns(self, element_dofs: np.ndarray, n_all: int) -> np.ndarray:
-        """Unknowns (n_all, 3) of the deflections 1, x and y, the rigid motions of a plate."""
-        result = np.zeros((n_all, 3))
-        for k in range(3):
-            result[element_dofs[6 * k], 0] = 1.0
-            result[element_dofs[6 * k], 1:] = self.corners[:, k]
-            result[element_dofs[6 * k + 1], 1] = 1.0
-            result[element_dofs[6 * k + 2], 2] = 1.0
-            result[element_dofs[18 + k], 1:] = self.normals[:, k]
-        return result
-
 
 class MorleySpace(Triangles):
     """Quadratic Morley shape functions of straight triangles: deflection at corners, slope at mid-sides.
@@ -275,6 +262,7 @@ class MorleySpace(Triangles):
     degree = 2
     order = 4  # exact for products of quadratics
     element = ElementTriMorley
+    per_corner = 1
 
     def __init__(self, mesh: Cells, bent: Bent | None = None) -> None:
         super().__init__(mesh)
@@ -286,15 +274,6 @@ class MorleySpace(Triangles):
             x, y = (monomials(0.5 * (REFERENCE[p] + REFERENCE[q])[None], *by, 2) for by in ((1, 0), (0, 1)))
             functionals[:, 3 + side] = weight[:, :1] * x + weight[:, 1:] * y
         self.coefficients = np.linalg.inv(functionals)
-
-    def rigid_unknowns(self, element_dofs: np.ndarray, n_all: int) -> np.ndarray:
-        """Unknowns (n_all, 3) of the deflections 1, x and y."""
-        result = np.zeros((n_all, 3))
-        for k in range(3):
-            result[element_dofs[k], 0] = 1.0
-            result[element_dofs[k], 1:] = self.corners[:, k]
-            result[element_dofs[3 + k], 1:] = self.normals[:, k]
-        return result
 
 
 def chained(matrix: np.ndarray, order: int) -> np.ndarray:

@@ -52,13 +52,11 @@ def springs(
     total, stiffness = csc_matrix((n_all, n_all)), edge_stiffness(body.held, frame)
     on = np.flatnonzero(stiffness.any(axis=1))
     if on.size:
-        facets, (push, turn) = body.mesh.facets[on], stiffness[on].T
-        cells = cells_of_facets(facets, space.vertices)[0]
-        area, x, normal = at_facets(space, facets, cells)
-        ds = np.linalg.norm(normal, axis=2)
+        push, turn = stiffness[on].T
+        cells, area, x, ds, normal = at_facets(space, body.mesh.facets[on])
         value, slope = space.functions(cells, x, (0, 1))
         slope = slope if slopes is None else slopes(cells, area, x)
-        across = np.einsum("nqi,niqk->nqk", normal / ds[..., None], slope)
+        across = np.einsum("nqi,niqk->nqk", normal, slope)
         pushed = gram(value[:, :, None], push[:, None] * ds) + gram(across[:, :, None], turn[:, None] * ds)
         total = total + scatter(pushed, dofs[:, cells], n_all)
     if body.section.tension:

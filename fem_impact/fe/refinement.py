@@ -58,11 +58,6 @@ class Spectrum:
         """Estimated relative error of omega, (n_modes,) [-]."""
         return self.parts.sum(axis=0)
 
-    @property
-    def n_rigid(self) -> int:
-        """Number of rigid motions."""
-        return self.flexibility.rigid.shape[1]
-
 
 def unknowns(element: str, mesh: Mesh, size: float) -> float:
     """Number of unknowns [-] on a mesh of the same outline with another element size [m]."""
@@ -131,8 +126,12 @@ def _pairs(
     return flexibility, omega, vectors
 
 
-def solve_or_read(system: System, n_modes: int | None, max_frequency: float | None, path: Path) -> Spectrum:
-    """Call `solve_on_mesh` and save the result in a file; a later call for the same modes of the same body reads it."""
+def solve_or_read(
+    system: System, n_modes: int | None, max_frequency: float | None, path: str | Path | None
+) -> Spectrum:
+    """Call `solve_on_mesh` and save the result in a file, if any; a later call for the same modes of it reads that."""
+    if path is None:
+        return solve_on_mesh(system, n_modes, max_frequency)
     frame = system.frame  # the matrices are the same for every size, thickness and material
     sizes = frame.length, frame.stiffness, frame.inertia
     asked = repr((n_modes, max_frequency, system.element, *sizes, identity.program())).encode()
@@ -140,11 +139,11 @@ def solve_or_read(system: System, n_modes: int | None, max_frequency: float | No
     numbers = [part for A in matrices for part in (A.data, A.indices, A.indptr)]
     key = hashlib.sha256(b"".join([asked, *(part.tobytes() for part in numbers)])).hexdigest()
     names = ("omega", "vectors", "parts")
-    arrays = keeping.read_arrays(path, key)
+    arrays = keeping.read_arrays(Path(path), key)
     if arrays is not None:
         return Spectrum(system, Flexibility.of(system), *(arrays[name] for name in names))
     found = solve_on_mesh(system, n_modes, max_frequency)
-    keeping.write_arrays(path, key, {name: getattr(found, name) for name in names})
+    keeping.write_arrays(Path(path), key, {name: getattr(found, name) for name in names})
     return found
 
 
@@ -414,17 +413,11 @@ def enclosure(found: Spectrum) -> np.ndarray | None:
     """
     system = found.system
     plate, mesh = system.section, system.mesh
-    if not isinstance(plate, Plate) or not plate.uniform or plate.material.E_across is not None:
+    if not isinstance(plate, Plate) or not plate.uniform or plate.material.E_across is not None or plate.tension:
         return None
-    if (
-        mesh.curved.any()
-        or system.point_masses
-        or system.point_supports
-        or system.element != "argyris"
-        or plate.tension
-    ):
-        return None
-    if system.rim is None or not all(isinstance(kind, str) for kind in system.supports.values()):
+    sprung = not all(isinstance(kind, str) for kind in system.supports.values())
+    attached = sprung or system.point_masses or system.point_supports
+    if attached or mesh.curved.any() or system.rim is None or system.element != "argyris":
         return None
     nu, material = plate.material.nu, plate.material
     if "free" not in system.rim.kinds:  # then nu only changes the rigidity, and nu = 0 gives the best bound

@@ -20,7 +20,7 @@ import numpy as np
 from ..mesh.mesh_files import sides_of
 from .elements import EXPONENTS, collapsed, curvatures, monomials
 from .springs import at_facets
-from .supports import SIDES, cells_of_facets
+from .supports import SIDES
 from .system import System
 from .theory import blocks, unknowns_of_cells
 
@@ -37,11 +37,6 @@ FIT = np.linalg.inv(monomials(NODES, 0, 0, CUBIC))  # from values at NODES to th
 class Moments:
     """Bending moments of all triangles as cubic polynomials, their derivatives and the edge forces."""
 
-    space: Any  # of the system
-    n_cells: int
-    stiffness: np.ndarray  # (n_cells, n_q, 3, 3)
-    coefficients: np.ndarray  # (n_cells, 3, 10, 21) of the cubics
-
     def __init__(self, system: System) -> None:
         space: Any = system.space
         self.space, self.n_cells = space, len(space.origin)
@@ -49,7 +44,7 @@ class Moments:
         x = space.straight(cells, NODES)
         self.stiffness = system.frame.field(system.section, "stiffness", x)  # (n_cells, n_q, 3, 3)
         moment = self.stiffness @ curvatures(space.functions(cells, x, (2,))[0])  # (n_cells, n_q, 3, 21)
-        self.coefficients = np.einsum("pq,eqrk->erpk", FIT, moment, optimize=True)  # (n_cells, 3, 10, 21)
+        self.coefficients = np.einsum("pq,eqrk->erpk", FIT, moment, optimize=True)  # (n_cells, 3, 10, 21) of the cubics
 
     def derivatives(self, cells: np.ndarray, x: np.ndarray, order: int) -> np.ndarray:
         """Derivatives (n, order + 1, 3, n_q, 21) of the moments xx, yy, xy of cells (n,) at points (n, n_q, 2)."""
@@ -85,20 +80,6 @@ def _looks() -> np.ndarray:
 class Residual:
     """Residuals of a plate's solutions, as linear operators on the unknowns of each triangle and side."""
 
-    system: System
-    moments: Moments
-    inertia: np.ndarray  # (n_cells, n_q, 21)
-    balance: np.ndarray  # (n_cells, n_q, 21) what the moments leave of a load
-    beside: np.ndarray  # (n_sides, 2) cells
-    jumps: np.ndarray  # (n_sides, 2 n_q, 42) of moment and force
-    rim_cells: np.ndarray  # (n_facets,)
-    missed: np.ndarray  # (n_facets, 2 n_q, 21) of what a free edge asks
-    moved: np.ndarray  # (n_facets, 2, n_q, 21) of what a held edge forbids
-    reaction: np.ndarray  # (n_facets, 2, n_q, 21)
-    stepped: np.ndarray  # (n,) cells across which the thickness jumps
-    uneven: np.ndarray  # (n, 3 n_q, 21) what their moments differ from any cubic
-    misplaced: np.ndarray  # (2, n, 21, 21) stiffness and mass that the quadrature misses
-
     def __init__(self, system: System) -> None:
         self.system, self.moments = system, Moments(system)
         self._set_cells()
@@ -124,7 +105,7 @@ class Residual:
             curve = space.functions(cells, x, (2,))[0]
             pull = section.tension * frame.length**2 / frame.stiffness
             balance = balance - pull * (curve[:, 0] + curve[:, 2])
-        self.balance = scale[..., None] * balance
+        self.balance = scale[..., None] * balance  # (n_cells, n_q, 21) what the moments leave of a load
 
     def _set_sides(self) -> None:
         space = self.moments.space
@@ -145,27 +126,24 @@ class Residual:
         rigidity = np.mean([self.moments.rigidity(self.beside[:, k], normal) for k in range(2)], axis=0)
         size = length[:, None] / DEGREE * np.column_stack([np.ones(len(length)), (length / DEGREE) ** 2])
         scale = np.sqrt(0.5 * size[..., None] * length[:, None, None] * 0.5 * weight / rigidity[:, None, None])
-        self.jumps = np.concatenate([jump[0], -jump[1]], axis=3) * scale[..., None]
-        self.jumps = self.jumps.reshape(len(shared), -1, 42)
+        jumps = np.concatenate([jump[0], -jump[1]], axis=3) * scale[..., None]
+        self.jumps = jumps.reshape(len(shared), -1, 42)  # (n_sides, 2 n_q, 42) of moment and force
 
     def _set_rim(self) -> None:
         space, rim = self.moments.space, self.system.rim
         assert rim is not None
-        self.rim_cells = cells_of_facets(rim.facets, space.vertices)[0]
-        _, x, step = at_facets(space, rim.facets, self.rim_cells)
-        ds = np.linalg.norm(step, axis=2)
-        normal = step / ds[..., None]
+        self.rim_cells, _, x, ds, normal = at_facets(space, rim.facets)
         force = self.moments.edge_forces(self.rim_cells, x, normal, rim.curvatures.mean(axis=1)[:, None, None])
         kinds = np.array(rim.kinds)
         length = ds.sum(axis=1)
         rigidity = self.moments.rigidity(self.rim_cells, normal.mean(axis=1))
-        size = (
-            length[:, None] / DEGREE * np.column_stack([kinds != "clamped", (kinds == "free") * (length / DEGREE) ** 2])
-        )
+        part = length / DEGREE
+        size = part[:, None] * np.column_stack([kinds != "clamped", (kinds == "free") * part**2])
         scale = np.sqrt(size[..., None] * ds[:, None] / rigidity[:, None, None])
         value, slope = space.functions(self.rim_cells, x, (0, 1))
         turn = np.einsum("fqi,fiqk->fqk", normal, slope)
         held_by = rim.springs[:, ::-1, None, None] * np.stack([turn, -value], axis=1)
+        # (n_facets, 2 n_q, 21) of what a free edge asks, and (n_facets, 2, n_q, 21) of what a held one forbids
         self.missed = ((force + held_by) * scale[..., None]).reshape(len(ds), -1, 21)
         held = np.stack([kinds != "free", kinds == "clamped"], axis=1)[:, :, None, None]
         self.moved = np.stack([value, -turn], axis=1) * held * ds[:, None, :, None]
@@ -179,12 +157,13 @@ class Residual:
         space, looks = self.moments.space, _looks()
         places, weight = space.rule()
         places = places - 1.0 / 3.0
-        self.stepped = np.zeros(0, int)
+        self.stepped = np.zeros(0, int)  # (n,) cells across which the thickness jumps
         section: Any = self.system.section
         if callable(section.thickness):
             every = np.vstack([looks, places])
             fit = monomials(every, 0, 0, CUBIC)
-            thickness = self._fields(np.arange(self.moments.n_cells), every)[1]
+            x = space.straight(np.arange(self.moments.n_cells), every)
+            thickness = self.system.frame.field(section, "inertia", x)
             missed = thickness - (thickness @ np.linalg.pinv(fit).T) @ fit.T
             # a step: with more than a hundredth beside any cubic, the moments are no cubics either
             self.stepped = np.flatnonzero(np.abs(missed).max(axis=1) > 0.01 * thickness.max(axis=1))
@@ -194,21 +173,17 @@ class Residual:
         bent, root, placed = self._energies(looks, np.full(len(looks), 0.5 / len(looks)))
         smooth = np.linalg.inv(root)[..., None] * monomials(looks, 0, 0, CUBIC)[:, None, None]  # (n, n_q, 3, 3, 10)
         basis = np.linalg.qr(smooth.reshape(*bent.shape[:2], -1))[0]
+        # (n, 3 n_q, 21) of their moments, beside any cubic, and (2, n, 21, 21) of both matrices
         self.uneven = bent - basis @ (basis.transpose(0, 2, 1) @ bent)
         self.misplaced = placed - self._energies(places, weight)[2]
-
-    def _fields(self, cells: np.ndarray, local: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Points (n, n_q, 2) of cells (n,) in the frame, and inertia there."""
-        space = self.moments.space
-        x = space.straight(cells, local)
-        return x, self.system.frame.field(self.system.section, "inertia", x)
 
     def _energies(self, local: np.ndarray, weight: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Of stepped cells: roots of strain energy (n, 3 n_q, 21) and stiffness, and both matrices (2, n, 21, 21)."""
         space, cells = self.moments.space, self.stepped
-        x, inertia = self._fields(cells, local)
+        frame, section, x = self.system.frame, self.system.section, space.straight(cells, local)
+        stiffness, inertia = (frame.field(section, name, x) for name in ("stiffness", "inertia"))
         dx = weight * np.abs(np.linalg.det(space.jacobian[cells]))[:, None]
-        root = np.linalg.cholesky(self.system.frame.field(self.system.section, "stiffness", x))  # (n, n_q, 3, 3)
+        root = np.linalg.cholesky(stiffness)  # (n, n_q, 3, 3)
         value, second = space.functions(cells, x, (0, 2))
         bent = root.transpose(0, 1, 3, 2) @ curvatures(second) * np.sqrt(dx)[..., None, None]
         bent = bent.reshape(len(cells), -1, 21)
@@ -217,10 +192,6 @@ class Residual:
 
     def errors(self, vectors: np.ndarray, loads: np.ndarray) -> np.ndarray:
         """Errors (3, n) of `energy_errors` for solutions (n_dofs, n) under the inertia of ``loads`` (n_dofs, n)."""
-        some = blocks(vectors.shape[1], 128)
-        return np.concatenate([self._errors(vectors[:, block], loads[:, block]) for block in some], axis=1)
-
-    def _errors(self, vectors: np.ndarray, loads: np.ndarray) -> np.ndarray:
         unknowns, pushed = (unknowns_of_cells(self.system, field) for field in (vectors, loads))
         total = _squares(self.inertia @ pushed - self.balance @ unknowns)
         total += _squares(self.jumps @ unknowns[self.beside].reshape(len(self.beside), 42, -1))
@@ -251,7 +222,8 @@ def energy_errors(
     forced : ndarray, shape (n, dimension) [m], optional
         Points where an additional unit force acts, one for each solution.
     """
-    return Residual(system).errors(vectors, loads)
+    residual, some = Residual(system), blocks(vectors.shape[1], 128)  # to limit memory
+    return np.concatenate([residual.errors(vectors[:, block], loads[:, block]) for block in some], axis=1)
 
 
 def _squares(values: np.ndarray) -> np.ndarray:

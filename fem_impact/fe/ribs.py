@@ -24,7 +24,6 @@ from .corners import towards
 from .section import Beam, Plate, Varying, evaluate
 from .splitting import distance
 from .springs import at_facets
-from .supports import cells_of_facets
 from .theory import Frame, gram
 
 # [-] least height of triangles on ribs, over the extent: up to 2.5e-4 they lost the digits of K, at 2.5e-3 they did not
@@ -92,14 +91,11 @@ class Rib:
         """
         place, beam = self.distances(points), self.section
         inertia = beam.inertia(place)
-        if self.offset is None:
+        z: Any = self.offset
+        if z is None:
             z = -0.5 * (thickness + evaluate("height", beam.height, place, "m"))
-        else:
-            z = (
-                check.field("offset", self.offset, points, "m")
-                if callable(self.offset)
-                else np.full(len(points), self.offset)
-            )
+        elif callable(z):
+            z = check.field("offset", z, points, "m")
         stretch = beam.material.E * inertia / beam.material.rho
         result = np.zeros((len(points), 3, 3))
         result[:, 0, 0] = stretch
@@ -191,10 +187,8 @@ class RibLine(NamedTuple):
     @classmethod
     def of(cls, rib: Rib, facets: np.ndarray, section: Plate, space: Any, frame: Frame) -> "RibLine":
         """Where a rib of a plate lies: on the sides ``facets`` (n, 2)."""
-        cells = cells_of_facets(facets, space.vertices)[0]
-        area, x, normal = at_facets(space, facets, cells)
-        ds, place = np.linalg.norm(normal, axis=2), frame.to_metres(x)
-        nx, ny = np.moveaxis(normal / ds[..., None], 2, 0)
+        cells, area, x, ds, normal = at_facets(space, facets)
+        (nx, ny), place = np.moveaxis(normal, 2, 0), frame.to_metres(x)
         along = np.stack([ny**2, nx**2, -nx * ny], axis=-1)  # for the tangent (-ny, nx)
         twist = np.stack([-nx * ny, nx * ny, 0.5 * (nx**2 - ny**2)], axis=-1)
         stiffness, inertia = rib.rigidity(place, evaluate("thickness", section.thickness, place, "m"))

@@ -84,12 +84,8 @@ def divided_across(mesh: Mesh, tall: np.ndarray) -> tuple[Mesh, np.ndarray]:
         if not more.size:
             break
         marked[more] = True
-    points, rim, middle = list(mesh.points), Rim(mesh), {}
-    for a, b in sides[marked].tolist():
-        middle[a, b] = middle[b, a] = len(points)
-        points.append(rim.split(a, b, len(points), points, 0.5))
-    touched = marked[number].any(axis=1)
-    pieces = [piece for cell in cells[touched].tolist() for piece in bisected(points, cell, middle)]
+    points, rim, touched = list(mesh.points), Rim(mesh), marked[number].any(axis=1)
+    pieces = rim.halve(sides[marked].tolist(), cells[touched].tolist(), points)
     finer = rim.finish(mesh, np.array(points), np.concatenate([cells[~touched], np.array(pieces, cells.dtype)]))
     return finer, np.array(rim.parent)
 
@@ -120,18 +116,11 @@ def strip(points: list[np.ndarray], a: int, b: int, c: int, d: int) -> list[list
 class Rim:
     """The boundary facets while they are being split."""
 
-    facets: list[list[int]]  # vertices of each
-    number: dict[tuple[int, int], int]  # of the facet between two vertices
-    middles: list[np.ndarray]
-    tangents: list[np.ndarray]
-    curvatures: list[np.ndarray]
-    parent: list[int]  # facet of the whole mesh
-
     def __init__(self, mesh: Mesh) -> None:
-        self.facets = mesh.facets.tolist()
-        self.number = {(a, b): i for i, (a, b) in enumerate(self.facets)}
+        self.facets: list[list[int]] = mesh.facets.tolist()  # vertices of each
+        self.number = {(a, b): i for i, (a, b) in enumerate(self.facets)}  # of the facet between two vertices
         self.middles, self.tangents, self.curvatures = list(mesh.middles), list(mesh.tangents), list(mesh.curvatures)
-        self.parent = list(range(len(self.facets)))
+        self.parent = list(range(len(self.facets)))  # facet of the whole mesh
 
     def split(self, vertex: int, far: int, new: int, points: list[np.ndarray], ratio: float) -> np.ndarray:
         """Return the point that divides the side from a vertex to ``far``; a boundary facet there becomes two."""
@@ -156,6 +145,14 @@ class Rim:
         self.curvatures.append(np.array([curvature, last[1]]))
         self.parent.append(self.parent[facet])
         return place
+
+    def halve(self, sides: list, cells: list[list[int]], points: list[np.ndarray]) -> list[list[int]]:
+        """Divide cells at the middles of sides (pairs of vertices), which are appended to ``points``."""
+        middle = {}
+        for a, b in sides:
+            middle[a, b] = middle[b, a] = len(points)
+            points.append(self.split(a, b, len(points), points, 0.5))
+        return [piece for cell in cells for piece in bisected(points, cell, middle)]
 
     def finish(self, mesh: Mesh, points: np.ndarray, cells: np.ndarray) -> Mesh:
         parent = np.array(self.parent)

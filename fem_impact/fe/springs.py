@@ -7,20 +7,24 @@ import numpy as np
 
 from .._base import check
 from .section import Elastic
+from .supports import cells_of_facets
 
 
-def at_facets(space: Any, facets: np.ndarray, cells: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Gauss points on facets (n, 2) of cells (n,): area coordinates (n, n_q, 3), places, outward normals times ds.
+def at_facets(space: Any, facets: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    """Cells (n,) of facets (n, 2), and Gauss points on these: area coordinates (n, n_q, 3), places, weights, normals.
 
-    Places and normals are (n, n_q, 2).
+    Places and outward unit normals are (n, n_q, 2), weights (n, n_q).
     """
+    cells = cells_of_facets(facets, space.vertices)[0]
     node, weight = np.polynomial.legendre.leggauss(8)  # exact for products of quintics
     s = 0.5 * (node + 1.0)[:, None]
     corner = space.vertices[cells][:, None]  # (n, 1, 3)
     first, last = (np.equal(corner, facets[:, end, None, None]).astype(float) for end in (0, 1))
     area = (1.0 - s) * first + s * last  # (n, n_q, 3)
     x, tangent = space.points_along(cells, area, last - first)
-    return area, x, np.stack([tangent[..., 1], -tangent[..., 0]], axis=-1) * 0.5 * weight[:, None]
+    normal = np.stack([tangent[..., 1], -tangent[..., 0]], axis=-1) * 0.5 * weight[:, None]
+    ds = np.linalg.norm(normal, axis=2)
+    return cells, area, x, ds, normal / ds[..., None]
 
 
 def edge_stiffness(supports: Sequence[Any], frame: Any) -> np.ndarray:

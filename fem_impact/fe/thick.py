@@ -83,11 +83,8 @@ class MindlinSpace(PlaneSpace):
     def turn(self, mesh: Cells, thickness: np.ndarray) -> None:
         """Let the nodes of straight triangles much smaller than their ``thickness`` (n_cells,) hold rotations."""
         longest = side_lengths(mesh.p.T, self.vertices).max(axis=1)
-        bends = np.zeros(len(longest), bool)
-        if self.bent is not None:
-            bends[self.bent.cells] = True
         dofs = plane.numbered(mesh).element_dofs.T  # (n_cells, 15)
-        small = np.setdiff1d(dofs[(longest < SMALL * thickness) & ~bends], dofs[bends])
+        small = np.setdiff1d(dofs[(longest < SMALL * thickness) & ~self.curved], dofs[self.curved])
         self.turned = np.isin(dofs, small)
 
     def slopes_in_rotations(self, cells: np.ndarray, *shapes: np.ndarray) -> list[np.ndarray]:
@@ -272,10 +269,8 @@ def errors_by_layers(system: Any, vectors: np.ndarray, loads: np.ndarray, forced
     loose = np.flatnonzero(np.isin(rim.kinds, LOOSE))
     if not loose.size:
         return np.zeros((3, vectors.shape[1]))
-    cells = supports.cells_of_facets(rim.facets[loose], space.vertices)[0]
-    _, x, normal = at_facets(space, rim.facets[loose], cells)
-    ds = np.linalg.norm(normal, axis=2)
-    nx, ny = np.moveaxis(normal / ds[..., None], 2, 0)
+    cells, _, x, ds, normal = at_facets(space, rim.facets[loose])
+    nx, ny = np.moveaxis(normal, 2, 0)
     stiffness, shear = (frame.field(system.section, name, x) for name in ("stiffness", "shear"))
     along = np.stack([-ny, nx], axis=-1)
     turn = np.stack([-nx * ny, nx * ny, nx**2 - ny**2], axis=-1)  # the moment M_nt from M_xx, M_yy, M_xy

@@ -13,7 +13,7 @@ from ..fe.section import Material
 from ..modes import free_body
 from ..modes.body import Body
 from ..modes.modal import Modes, left_out
-from ..modes.shapes import REMEMBERED, Shapes
+from ..modes.shapes import REMEMBERED, WrappedShapes
 from ..modes.slender import SHEAR_RATIO, beam
 from .accuracy import left_out_density
 
@@ -52,40 +52,23 @@ class Hand:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class HeldShapes(Shapes, check.Brief):
+class HeldShapes(WrappedShapes):
     """The shapes of a body whose rigid motion is held by a spring."""
 
-    base: Shapes
     omega: float  # [rad/s] of that motion
-
-    @property
-    def dimension(self) -> int:
-        return self.base.dimension
 
     def at(self, points: np.ndarray) -> np.ndarray:
         return self.base.at(points)
 
-    def contains(self, points: np.ndarray) -> np.ndarray:
-        return self.base.contains(points)
-
     def deflection(self, loads: np.ndarray, points: np.ndarray) -> np.ndarray:
         own = self.base.at(points)[:, :1] @ self.base.at(loads)[:, :1].T / self.omega**2
         return self.base.deflection(loads, points) + own
-
-    def compliance_error(self, points: np.ndarray) -> np.ndarray:
-        return self.base.compliance_error(points)
 
     def dent(self, points: np.ndarray) -> np.ndarray:
         return self.base.dent(points)
 
     def across(self, points: np.ndarray) -> np.ndarray | None:
         return self.base.across(points)
-
-    def take(self, n_modes: int) -> "HeldShapes":
-        return replace(self, base=self.base.take(n_modes))
-
-    def grid(self) -> tuple[np.ndarray, np.ndarray]:
-        return self.base.grid()
 
 
 @dataclass(frozen=True, eq=False, repr=False)

@@ -180,9 +180,7 @@ def _polynomials(place: np.ndarray, closed: bool) -> tuple[np.ndarray, np.ndarra
         velocity, acceleration = powers[1], 2.0 * powers[2]
         speed = np.hypot(*velocity)
         tangent[i] = velocity / speed
-        total = np.linalg.norm(np.diff(near, axis=0), axis=1).sum()
-        cross = velocity[0] * acceleration[1] - velocity[1] * acceleration[0]
-        curvature[i] = cross / speed**3 if total > 0.0 else 0.0
+        curvature[i] = (velocity[0] * acceleration[1] - velocity[1] * acceleration[0]) / speed**3
     return tangent, curvature
 
 

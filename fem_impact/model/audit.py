@@ -24,8 +24,7 @@ from ..mesh.meshes import Mesh
 from ..modes.disk import DiskShapes
 from ..modes.modal import Modes
 from ..modes.rectangle import RectangleShapes
-from ..modes.ritz import RitzShapes
-from ..modes.shapes import FieldShapes
+from ..modes.shapes import ElementShapes, unwrapped
 from . import bending, deflection, fresh, local_contact, sliding, still_air, thinness
 from .idealisation import Surroundings, unyielding
 from .restrike import Doubt, Struck
@@ -167,10 +166,10 @@ def _clearance(modes: Modes, known: bending.Known | None, mesh: Mesh | None, at:
 
     A beam is struck on its centre line.
     """
-    shapes = bending.unwrapped(modes.shapes)[0]
+    shapes = unwrapped(modes.shapes)[0]
     if at is None or not modes.dimension:
         return None
-    if isinstance(shapes, (FieldShapes, RitzShapes)):
+    if isinstance(shapes, ElementShapes):
         mesh = shapes.system.mesh
     if modes.dimension == 1:
         width = None if known is None else still_air.width_of(known)

@@ -20,24 +20,24 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from scipy import special
 from scipy.spatial import KDTree
 
 from ..fe import beam_elements
 from ..fe.assembly import System, support_of_facets
 from ..fe.corners import meetings
+from ..fe.elements import collapsed
 from ..fe.residual import Moments
 from ..fe.section import PLANE, SHEAR, Beam, Plate, evaluate
 from ..fe.springs import at_facets
-from ..fe.supports import cells_of_facets
+from ..fe.theory import unknowns_of_cells
 from ..mesh.meshes import Mesh
-from ..modes.disk import DiskShapes
+from ..modes.disk import DiskShapes, bessel
 from ..modes.modal import Modes
 from ..modes.rectangle import RectangleShapes
 from ..modes.ritz import RitzShapes
-from ..modes.shapes import FieldShapes, ScaledShapes, Shapes
+from ..modes.shapes import ElementShapes, FieldShapes, unwrapped
 from ..modes.slender import BeamShapes
-from ..modes.timoshenko import TimoshenkoShapes
+from ..modes.timoshenko import BeamlikeShapes, TimoshenkoShapes
 from ..modes.unstated import lumps
 
 # [-] flexible modes that are integrated: a blow depends on few others one by one, which follow from the upper ten
@@ -113,19 +113,10 @@ class Known:
         return float(evaluate("thickness", size, points, "m").mean())
 
 
-def unwrapped(shapes: Shapes) -> tuple[Shapes, float, float]:
-    """The shapes inside `ScaledShapes`, and the factors [-] of their amplitude and frequency."""
-    amplitude, frequency = 1.0, 1.0
-    while isinstance(shapes, ScaledShapes):
-        amplitude, frequency = amplitude * shapes.amplitude, frequency * shapes.frequency
-        shapes = shapes.base
-    return shapes, amplitude, frequency
-
-
 def known_of(modes: Modes) -> Known | None:
     """What the modes of a plate or beam tell of it; None if its shapes are known at points only, or it is rigid."""
     shapes = unwrapped(modes.shapes)[0]
-    if isinstance(shapes, (FieldShapes, RitzShapes)):
+    if isinstance(shapes, ElementShapes):
         return around(modes, modes.section, shapes.system.mesh, shapes.system.supports)
     if isinstance(shapes, RectangleShapes):
         sides = shapes.length, shapes.width
@@ -133,7 +124,7 @@ def known_of(modes: Modes) -> Known | None:
     if isinstance(shapes, DiskShapes):
         a = shapes.radius
         return Known(modes, modes.section, np.pi * a**2, float(shapes.edge != "free"), 2.0 * np.pi * a)
-    if isinstance(shapes, (BeamShapes, TimoshenkoShapes)):
+    if isinstance(shapes, BeamlikeShapes):
         return Known(modes, modes.section, shapes.length, _held(list(shapes.ends)), 0.0)
     return None
 
@@ -141,7 +132,7 @@ def known_of(modes: Modes) -> Known | None:
 def quadratic(modes: Modes) -> bool:
     """Whether the shapes are those of Morley's element, whose quadratics have no shear force."""
     shapes = unwrapped(modes.shapes)[0]
-    return isinstance(shapes, (FieldShapes, RitzShapes)) and shapes.system.element == "morley"
+    return isinstance(shapes, ElementShapes) and shapes.system.element == "morley"
 
 
 def around(modes: Modes, section: Plate | Beam | None, mesh: Mesh, supports: Any) -> Known:
@@ -173,7 +164,7 @@ def flexible_vectors(shapes: FieldShapes | RitzShapes, n_rigid: int, number: int
 def integrate_shapes(body: Known) -> Bending:
     """The integrals of a body's shapes; those of high modes follow from the low ones."""
     modes = body.modes
-    shapes, amplitude, _ = unwrapped(modes.shapes)
+    shapes, amplitude, mix = unwrapped(modes.shapes)
     n_rigid = modes.n_rigid
     # of four Ritz pairs the lowest one is a mode: those above are packets, whose shear is singular
     few = (modes.n_modes - n_rigid) // 4 if isinstance(shapes, RitzShapes) else LOW
@@ -183,7 +174,7 @@ def integrate_shapes(body: Known) -> Bending:
         vectors = flexible_vectors(shapes, n_rigid, low.stop - n_rigid)
         found = (_plate if modes.dimension == 2 else _beam)(shapes.system, vectors, thick)
     else:
-        steep, force, volume, edge = _by_formula(shapes, low, body)
+        steep, force, volume, edge = _by_formula(shapes.part(low), body)  # type: ignore[attr-defined]
         rotary = shear = 0.0  # of a uniform, if a plate isotropic body, over its squared wavenumber [m**2]
         if body.section is not None and not modes.thick:  # both are in the frequencies of a thick body
             section, origin = body.section, np.zeros((1, modes.dimension))
@@ -191,11 +182,8 @@ def integrate_shapes(body: Known) -> Bending:
             shear = float(section.stiffness(origin).flat[0] / section.shear(origin).flat[0])
         zero = np.zeros(len(steep))
         found = np.stack([body.extent * steep, volume + zero, rotary * steep, shear * force, edge + zero])
-    left, shapes = np.ones(low.stop - low.start), modes.shapes
-    while isinstance(shapes, ScaledShapes):
-        if shapes.mix is not None:  # air mixes modes little, and makes them heavier
-            left = left * np.linalg.norm(shapes.mix[:, low], axis=0)
-        shapes = shapes.base
+    # air mixes modes little, and makes them heavier
+    left = np.ones(low.stop - low.start) if mix is None else np.linalg.norm(mix[:, low], axis=0)
     found[:3] *= np.stack([(amplitude * left) ** 2, amplitude * left, left**2])
     extended = _extended(modes, low, found, body.per_extent, thick)
     return replace(extended, turning=_turning(body)) if thick and n_rigid else extended
@@ -235,14 +223,10 @@ def _plate(system: System, vectors: np.ndarray, thick: bool) -> np.ndarray:
     frame, section = system.frame, system.section
     assert isinstance(section, Plate)
     cells = np.arange(len(space.origin))
-    # slopes to 1e-3, as the wave of a mode spans several triangles
-    node, weight = np.polynomial.legendre.leggauss(3)
-    a, b = (x.ravel() for x in np.meshgrid(0.5 * (node + 1.0), 0.5 * (node + 1.0), indexing="ij"))
-    share = 0.25 * np.outer(weight, weight).ravel() * (1.0 - a)
-    x = space.origin[:, None] + (np.column_stack([a, b * (1.0 - a)]) - 1.0 / 3.0) @ space.jacobian.transpose(0, 2, 1)
+    local, share = collapsed(3)  # slopes to 1e-3, as the wave of a mode spans several triangles
+    x = space.straight(cells, local - 1.0 / 3.0)
     area = np.abs(np.linalg.det(space.jacobian))[:, None] * share  # (n_cells, n_q)
-    moved = (system.expand @ vectors)[system.element_dofs.T]  # (n_cells, 21, n)
-    flat = frame.centre + frame.length * x.reshape(-1, 2)
+    moved, flat = unknowns_of_cells(system, vectors), frame.to_metres(x)  # (n_cells, 21, n), (n_cells n_q, 2)
     value, slope = space.functions(cells, x, (0, 1))
     steep = np.einsum("eiqk,eiqk->eqk", *(2 * [slope @ moved[:, None]]))
     result = np.zeros((5, vectors.shape[1]))
@@ -258,29 +242,22 @@ def _plate(system: System, vectors: np.ndarray, thick: bool) -> np.ndarray:
     Q = np.stack([(q @ moved) for q in (force[:, 0, 0] + force[:, 1, 2], force[:, 0, 2] + force[:, 1, 1])])
     soft = np.linalg.inv(section.shear(flat)).reshape(*area.shape, 2, 2) * frame.stiffness / frame.length**2
     energy = (vectors * (system.K @ vectors)).sum(axis=0)
-    plane = np.where(_from_corners(system, flat).reshape(area.shape) > h * FADES, area, 0.0)
+    places = [vertex for vertex, *_ in meetings(system.mesh, support_of_facets(system.mesh, system.supports))]
+    away = KDTree(system.mesh.points[places]).query(flat)[0] if places else np.full(len(flat), np.inf)
+    plane = np.where(away.reshape(area.shape) > h * FADES, area, 0.0)
     result[3] = np.einsum("eq,aeqk,eqab,beqk->k", plane, Q, soft, Q, optimize=True) / energy
     rim = system.rim
     free = np.flatnonzero(np.array(rim.kinds) == "free") if rim is not None else np.zeros(0, int)
     if len(free) and rim is not None:
-        at = cells_of_facets(rim.facets[free], space.vertices)[0]
-        _, place, step = at_facets(space, rim.facets[free], at)
-        ds = np.linalg.norm(step, axis=2)
-        nx, ny = np.moveaxis(step / ds[..., None], 2, 0)[..., None]  # its sign does not matter
+        at, _, place, ds, normal = at_facets(space, rim.facets[free])
+        nx, ny = np.moveaxis(normal, 2, 0)[..., None]  # its sign does not matter
         moment = moments.derivatives(at, place, 0)[:, 0]
         twist = ((moment[:, 1] - moment[:, 0]) * nx * ny + moment[:, 2] * (nx**2 - ny**2)) @ moved[at]
-        flat = frame.centre + frame.length * place.reshape(-1, 2)
+        flat = frame.to_metres(place)
         h = evaluate("thickness", section.thickness, flat, "m").reshape(ds.shape)
         stiff = section.stiffness(flat)[:, 2, 2].reshape(ds.shape) / frame.stiffness
         result[4] = np.einsum("eq,eqk->k", ds * h * FADES / frame.length / stiff, twist**2) / energy
     return result
-
-
-def _from_corners(system: System, points: np.ndarray) -> np.ndarray:
-    """Distances (n,) [m] of points from the next corner or change of support; infinite without any."""
-    mesh = system.mesh
-    places = [vertex for vertex, _, _ in meetings(mesh, support_of_facets(mesh, system.supports))]
-    return KDTree(mesh.points[places]).query(points)[0] if places else np.full(len(points), np.inf)
 
 
 def _beam(system: System, vectors: np.ndarray, thick: bool) -> np.ndarray:
@@ -289,14 +266,13 @@ def _beam(system: System, vectors: np.ndarray, thick: bool) -> np.ndarray:
     frame, section = system.frame, system.section
     assert isinstance(section, Beam)
     x, dx = beam_elements.quadrature(space)
-    moved = (system.expand @ vectors)[system.element_dofs.T]
+    moved, place = unknowns_of_cells(system, vectors), frame.to_metres(x)
     slope, bend = space.functions(np.arange(len(x)), x[..., None], (1, 2))
     steep = (slope @ moved) ** 2  # (n_cells, n_q, n)
     result = np.zeros((5, vectors.shape[1]))
     result[0] = np.einsum("eq,eqk->k", dx, steep) / (frame.length * frame.mass)
     if not thick:
         return result
-    place = (frame.centre + frame.length * x.reshape(-1, 1)).clip(system.mesh.points.min(), system.mesh.points.max())
     stiffness, gyration = section.stiffness(place).reshape(x.shape), section.rotary(place).reshape(x.shape)
     result[2] = np.einsum("eq,eqk->k", dx * gyration, steep) / (frame.inertia * frame.length**2)
     moment = (stiffness / frame.stiffness)[..., None] * (bend @ moved)
@@ -309,50 +285,46 @@ def _beam(system: System, vectors: np.ndarray, thick: bool) -> np.ndarray:
     return result
 
 
-def _by_formula(shapes: Shapes, low: slice, body: Known) -> tuple[np.ndarray, np.ndarray, Any, Any]:
-    """Squared wavenumbers [rad**2/m**2] of slopes and of shear forces, volume and edge of closed formulas, (n_low,).
+def _by_formula(
+    shapes: RectangleShapes | DiskShapes | BeamShapes | TimoshenkoShapes, body: Known
+) -> tuple[np.ndarray, np.ndarray, Any, Any]:
+    """Squared wavenumbers [rad**2/m**2] of slopes and of shear forces, volume and edge of closed formulas, (n_modes,).
 
     Those of a hinged rectangle are exact; others are by quadrature along the beam or the radius of the disk.
     """
     if isinstance(shapes, RectangleShapes):
-        m, n = shapes.numbers[low].T
+        m, n = shapes.numbers.T
         k = np.pi**2 * ((m / shapes.length) ** 2 + (n / shapes.width) ** 2)
         odd = (1.0 - (-1.0) ** m) * (1.0 - (-1.0) ** n)
         return k, k, 2.0 * shapes.length * shapes.width * odd / (np.pi**2 * m * n), 0.0
     node, weight = np.polynomial.legendre.leggauss(200)  # 20 and more for each wave of the fortieth mode
     x, dx = 0.5 * (node + 1.0), 0.5 * weight
     if isinstance(shapes, DiskShapes):
-        return _disk(shapes, low, body, x[:, None], (dx * x)[:, None])
+        return _disk(shapes, body, x[:, None], (dx * x)[:, None])
+    steep = dx @ shapes.slopes(x) ** 2 / shapes.length**2
     if isinstance(shapes, TimoshenkoShapes):
-        slope = replace(shapes, p=shapes.p[low], weights=shapes.weights[low]).slopes(x)
-        steep = dx @ slope**2 / shapes.length**2
         return steep, 0.0 * steep, 0.0, 0.0
-    assert isinstance(shapes, BeamShapes)
-    k, (a, b, c, d), x = shapes.k[low], shapes.weights[low].T, x[:, None]
-    sine, cosine, near, far = np.sin(k * x), np.cos(k * x), c * np.exp(-k * x), d * np.exp(k * (x - 1.0))
-    steep = dx @ (k * (b * cosine - a * sine - near + far)) ** 2
-    force = dx @ (k * (a * sine - b * cosine - near + far)) ** 2  # third derivative over k**2
-    return steep / shapes.length**2, force / shapes.length**2, 0.0, 0.0
+    k, (a, b, c, d), x = shapes.k, shapes.weights.T, x[:, None]
+    third = k * (a * np.sin(k * x) - b * np.cos(k * x) - c * np.exp(-k * x) + d * np.exp(k * (x - 1.0)))  # over k**2
+    return steep, dx @ third**2 / shapes.length**2, 0.0, 0.0
 
 
 def _disk(
-    shapes: DiskShapes, low: slice, body: Known, r: np.ndarray, dr: np.ndarray
+    shapes: DiskShapes, body: Known, r: np.ndarray, dr: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray, Any]:
     """The same of a disk, from radii (n_r, 1) [-] and their weights, which are times r."""
-    z, n, share, a = shapes.z[low], shapes.order[low], shapes.weight[low], shapes.radius
+    z, n, a = shapes.z, shapes.order, shapes.radius
 
     def parts(r: np.ndarray) -> tuple[np.ndarray, ...]:
         """J and I and their slopes at radii (n_r, 1)."""
-        grown = share * np.exp(z * (r - 1.0))
-        i = special.ive(n, z * r) * grown
-        di = 0.5 * (special.ive(n - 1, z * r) + special.ive(n + 1, z * r)) * grown * z
-        return special.jv(n, z * r), special.jvp(n, z * r) * z, i, di
+        grown, (j, dj, i, di) = shapes.weight * np.exp(z * (r - 1.0)), bessel(n, z * r)
+        return j, dj * z, i * grown, di * grown * z
 
     j, dj, i, di = parts(r)
     whole = (dr * (j + i) ** 2).sum(axis=0)
     steep = (dr * ((dj + di) ** 2 + (n * (j + i) / r) ** 2)).sum(axis=0) / whole
     force = (dr * ((di - dj) ** 2 + (n * (i - j) / r) ** 2)).sum(axis=0) / whole  # of the Laplacian, over z**4
-    mean = 2.0 * np.pi * (dr * (j + i)).sum(axis=0) * shapes.scale[low]
+    mean = 2.0 * np.pi * (dr * (j + i)).sum(axis=0) * shapes.scale
     edge: Any = 0.0
     if shapes.edge == "free" and body.thickness is not None:
         j, dj, i, di = (part[0] for part in parts(np.ones((1, 1))))

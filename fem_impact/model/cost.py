@@ -180,12 +180,6 @@ def _fastest(work: Callable[[], object]) -> float:
     return min(times)
 
 
-@cache
-def this_machine() -> Machine | None:
-    """This machine as measured before, None if it was not; the same as long as the process lives."""
-    return read_machine()
-
-
 def whose() -> str:
     """The machine that predicted seconds belong to, in words."""
     return "a typical machine (`fem-impact doctor` measures yours)" if this_machine() is None else "this machine"
@@ -221,6 +215,9 @@ def read_machine() -> Machine | None:
     except (OSError, ValueError, KeyError, TypeError, RecursionError):
         return None
     return found if kept.get("stamp") == _stamp() and found.credible else None
+
+
+this_machine = cache(read_machine)  # the same as long as the process lives
 
 
 def keep(machine: Machine) -> bool:

@@ -246,13 +246,8 @@ def from_outside(target: Target, at: Any, mass: float, duration: float) -> Outsi
         rigid = rigid_error(modes, at, mass, duration)
         if modes.dimension == 1:
             return Outside(modes.mass, rigid, np.inf, np.inf, notes=notes)
-    if (
-        not isinstance(section, Plate)
-        or callable(section.thickness)
-        or not section.uniform
-        or target.point_masses
-        or target.point_supports
-    ):
+    attached = target.point_masses or target.point_supports
+    if not isinstance(section, Plate) or callable(section.thickness) or not section.uniform or attached:
         return None
     kinds = support_of_facets(mesh, dict(target.supports))
     free = any(kind not in ("clamped", "hinged") for kind in kinds)

@@ -203,11 +203,9 @@ class Strokes(Totals, check.Locked):
 
     def summary(self) -> str:
         """The sequence in a few readable lines."""
-        within = (
-            f"{self.n_impacts} impacts in {self.impacts[-1].end - self.starts[0]:.4g} s"
-            if self.impacts
-            else "no impact"
-        )
+        within = "no impact"
+        if self.impacts:
+            within = f"{self.n_impacts} impacts in {self.impacts[-1].end - self.starts[0]:.4g} s"
         lines = [self.verdict, *below(self.verdict), f"{len(self.strokes)} strokes, {within}"]
         lines += [
             f"  {each.start * 1e3:10.4f} to {each.end * 1e3:10.4f} ms: stroke {each.contact}, peak "

@@ -25,9 +25,8 @@ import numpy as np
 from ..fe import shallow
 from ..fe.section import SHEAR, Beam, Plate
 from ..impact.assumption import Assumption, allowed
-from ..modes.ritz import RitzShapes
-from ..modes.shapes import FieldShapes
-from .bending import LOW, Bending, Known, flexible_vectors, integrate_shapes, unwrapped
+from ..modes.shapes import unwrapped
+from .bending import LOW, Bending, Known, flexible_vectors, integrate_shapes
 from .deflection import OTHER
 from .restrike import Doubt, Struck, softer
 
@@ -169,25 +168,19 @@ def examine_striker(struck: Struck) -> Assumption:
 
 def examine_shallowness(struck: Struck) -> Assumption:
     """The struck body."""
-    shapes: Any = unwrapped(struck.bodies[1].shapes)[0]
+    modes = struck.bodies[1]
+    shapes: Any = unwrapped(modes.shapes)[0]
     system = getattr(shapes, "system", None)
-    if system is None or system.rules is not shallow.SHALLOW or not isinstance(shapes, (FieldShapes, RitzShapes)):
+    if system is None or system.rules is not shallow.SHALLOW:
         return SHALLOW.holds(struck)
     curved = system.section.rise is not None
     value, remedy = (shallow.steepest(system), FLATTER) if curved else (None, FLAT)
     if struck.foreseen:
         return SHALLOW.judged(struck, value, {}, remedy)
-    drop = _drop(struck, system, shapes)
+    n_rigid, n = modes.n_rigid, min(LOW, modes.n_modes - modes.n_rigid)
+    vectors = flexible_vectors(shapes, n_rigid, n)
+    found = np.einsum("ij,ij->j", vectors, shallow.plane_mass(system, vectors))  # of a whole mass of one
+    drop = np.full(modes.n_modes, np.median(found[-max(1, n // 4) :]))  # of modes above: that of the last of these
+    drop[:n_rigid], drop[n_rigid : n_rigid + n] = 0.0, found
     omega = struck.hit.history.omega[struck.mine]
     return SHALLOW.judged(struck, value, struck.changes(omega=struck.with_target(omega * lowered(drop))), remedy)
-
-
-def _drop(struck: Struck, system: Any, shapes: FieldShapes | RitzShapes) -> np.ndarray:
-    """Relative drop of omega**2 (n_modes,) [-]; that of modes above the first is that of the last of these."""
-    modes = struck.bodies[1]
-    n = min(LOW, modes.n_modes - modes.n_rigid)
-    vectors = flexible_vectors(shapes, modes.n_rigid, n)
-    found = np.einsum("ij,ij->j", vectors, shallow.plane_mass(system, vectors))  # of a whole mass of one
-    every = np.full(modes.n_modes, np.median(found[-max(1, n // 4) :]))
-    every[: modes.n_rigid], every[modes.n_rigid : modes.n_rigid + n] = 0.0, found
-    return every

@@ -116,7 +116,7 @@ def hopeless(tried: list[float], patience: int = 3) -> bool:
 
 
 def folded(found: Modes, cutoff: Callable[[Modes, float], float], margin: float) -> Modes:
-    """The Ritz pairs up to ``cutoff``, as in `Seen.modes`; those above act as a spring.
+    """The Ritz pairs up to ``cutoff``, as in `Seen.needed_modes`; those above act as a spring.
 
     The poorer descriptions keep more pairs, whose spring errs 16 times less, so that the difference of their blows is
     the error of the poorer one and tells what the spring costs, too.
@@ -137,17 +137,6 @@ class Seen:
     The resonance and the tolerance decide on shift and first number of vectors, unless these are given.
     """
 
-    target: Target
-    at: np.ndarray  # (1, 2) [m], or of several points
-    elements: Elements  # those to begin with, and then ever smaller ones
-    fixed: bool  # whether the user insists on their size
-    stages: Stages
-    shift: float  # [rad/s] before scaling, see `Krylov`
-    count: int  # vectors
-    margin: float  # [-] over the cutoff, up to which Ritz pairs are kept
-    whole: Modes | None  # all Ritz pairs of the last `modes`
-    tried: list[float]  # [-] truncation errors of the blows so far
-    spent: bool  # whether more vectors no longer help
     fine: Krylov
     coarse: Krylov  # on larger elements; on smaller ones if the user insists on a size and the outline allows no larger
     kind: type[Krylov] = Krylov
@@ -156,12 +145,16 @@ class Seen:
         self, target: Target, at: Any, resonance: float, tolerance: float, elements: Elements, fixed: bool,
         stages: Stages, shift: float | None = None, count: int | None = None,
     ) -> None:  # fmt: skip
-        self.target, self.at, self.fixed, self.stages = target, np.atleast_2d(at), fixed, stages
-        # half or twice this shift tells blows as well
+        self.target, self.at, self.stages = target, np.atleast_2d(at), stages  # (1, 2) [m], or of several points
+        self.fixed = fixed  # whether the user insists on the size of the elements
+        # [rad/s] before scaling, see `Krylov`; half or twice this shift tells blows as well
         self.shift = (shift or 2.0 * np.pi * resonance * _strict(6.0, 1.0 / 6.0, tolerance)) / target.stretch
-        self.count = count or first_count(target, resonance, tolerance)
-        self.margin = _strict(4.0, 0.6, tolerance)  # what acts as a spring errs in every blow
-        self.whole, self.tried, self.spent = None, [], False
+        self.count = count or first_count(target, resonance, tolerance)  # of vectors
+        # [-] over the cutoff, up to which Ritz pairs are kept: what acts as a spring errs in every blow
+        self.margin = _strict(4.0, 0.6, tolerance)
+        self.whole: Modes | None = None  # all Ritz pairs of the last `needed_modes`
+        self.tried: list[float] = []  # [-] truncation errors of the blows so far
+        self.spent = False  # whether more vectors no longer help
         self.elements, other = compared(target, elements, stages)
         if fixed and self.elements != elements:  # there are no larger elements to compare with
             self.elements, other = other, self.elements
@@ -246,5 +239,5 @@ class Views(Seen):
     kind = Krylovs
 
     def of(self, point: int, cutoff: Callable[[Modes, float], float]) -> Modes:
-        """The target as seen from one of the points; ``cutoff`` as in `Seen.modes`."""
+        """The target as seen from one of the points; ``cutoff`` as in `needed_modes`."""
         return self._struck(self.fine.each[point], self.coarse.each[point], cutoff)[1]

@@ -212,10 +212,6 @@ class _Air:
         away = np.divide(1.0, self.distance, out=np.zeros_like(self.distance), where=self.distance > 0.0)
         return self.inverse - 2.0 * away * np.sin(0.5 * omega / self.speed * self.distance) ** 2
 
-    def resistance(self, shape: np.ndarray, omega: float) -> float:
-        """Radiation resistance [1/s] of a mixture (n_flexible,) of the modes at a frequency [rad/s]."""
-        return max(0.0, 2.0 * omega * float(self.exchanged(shape[:, None], omega)[0, 0]))
-
     def exchanged(self, shapes: np.ndarray, omega: float) -> np.ndarray:
         """Damping ratios (n, n) by sound between mixtures (n_flexible, n) of the modes at a frequency [rad/s]."""
         wave = omega / self.speed
@@ -225,7 +221,7 @@ class _Air:
 
     def damping(self, shapes: np.ndarray, omega: np.ndarray) -> np.ndarray:
         """Damping ratios (n,) by sound of mixtures (n_flexible, n) of the modes at frequencies (n,) [rad/s]."""
-        return np.array([self.resistance(shape, x) / (2.0 * x) for shape, x in zip(shapes.T, omega)])
+        return np.array([max(0.0, self.exchanged(shape[:, None], x)[0, 0]) for shape, x in zip(shapes.T, omega)])
 
     def _product(self, strength: np.ndarray, spectrum: np.ndarray, kernel: np.ndarray) -> np.ndarray:
         """Double integrals (n, n) of all pairs of sources (n, nx, ny) with a kernel (padded)."""

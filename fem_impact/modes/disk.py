@@ -18,7 +18,7 @@ from .shapes import ClosedShapes
 MOST_OF_DISK = 50_000  # [-] largest number of modes of a disk; each needs a root search
 
 
-def _bessel(n: Any, z: Any) -> tuple[Any, ...]:
+def bessel(n: Any, z: Any) -> tuple[Any, ...]:
     """J, J', I exp(-z), I' exp(-z) of order n at z."""
     j, dj = special.jv(n, z), special.jvp(n, z)
     i = special.ive(n, z)
@@ -28,7 +28,7 @@ def _bessel(n: Any, z: Any) -> tuple[Any, ...]:
 
 def _edge_rows(edge: str, nu: float, n: Any, z: Any) -> tuple[Any, ...]:
     """The two edge conditions on J and on I exp(-z): (first_j, first_i, second_j, second_i)."""
-    j, dj, i, di = _bessel(n, z)
+    j, dj, i, di = bessel(n, z)
     moment_j = -(1 - nu) * z * dj + ((1 - nu) * n**2 - z**2) * j
     moment_i = -(1 - nu) * z * di + ((1 - nu) * n**2 + z**2) * i
     if edge == "clamped":
@@ -82,7 +82,6 @@ class DiskShapes(ClosedShapes, check.Brief):
     weight: np.ndarray  # (n_modes,) of I exp(-z) relative to J
     phase: np.ndarray  # (n_modes,) 0 for cos, pi/2 for sin
     scale: np.ndarray  # (n_modes,)
-    dimension: int = 2
 
     def at(self, points: np.ndarray) -> np.ndarray:
         r = np.hypot(points[:, 0], points[:, 1])[:, None] / self.radius
@@ -92,6 +91,18 @@ class DiskShapes(ClosedShapes, check.Brief):
         radial = special.jv(n, z * r) + self.weight * special.ive(n, z * r) * growth
         radial = np.where(z == 0.0, np.where(n == 0, 1.0, r), radial)
         return self.scale * radial * np.cos(n * angle - self.phase)
+
+    def slopes(self, points: np.ndarray) -> np.ndarray:
+        """Slopes (n, n_q, 2, n_modes) at points (n, n_q, 2), none of them in the middle."""
+        z, n = self.z, self.order
+        r = np.hypot(points[..., :1], points[..., 1:]) / self.radius
+        along = points / (r * self.radius)
+        angle = n * np.arctan2(points[..., 1:], points[..., :1]) - self.phase
+        grown = self.weight * np.exp(z * (r - 1.0))
+        j, dj, i, di = bessel(n, z * r)
+        out, around = z * (dj + di * grown) * np.cos(angle), -n * (j + i * grown) / r * np.sin(angle)
+        c, s = along[..., :1], along[..., 1:]
+        return self.scale / self.radius * np.stack([c * out - s * around, s * out + c * around], 2)
 
     def contains(self, points: np.ndarray) -> np.ndarray:
         return np.hypot(points[:, 0], points[:, 1]) <= (1 + 1e-9) * self.radius
@@ -241,7 +252,7 @@ def disk(
 
 def _norm(z: np.ndarray, n: np.ndarray, weight: np.ndarray) -> np.ndarray:
     """Factors (n_modes,) that normalise flexible shapes at unit mass, from Lommel's integrals of their squares."""
-    j, dj, i, di = _bessel(n, z)
+    j, dj, i, di = bessel(n, z)
     i, di = weight * i, weight * di
     ring = (n / z) ** 2
     square = 0.5 * (dj**2 + (1.0 - ring) * j**2 + (1.0 + ring) * i**2 - di**2) + (j * di - i * dj) / z

@@ -74,12 +74,7 @@ def find_modes(
         )
     else:
         fine = refinement.fine_enough(system, n_modes, max_frequency, None)
-        wanted = n_modes, max_frequency
-        found = (
-            refinement.solve_on_mesh(fine, *wanted)
-            if keep is None
-            else refinement.solve_or_read(fine, *wanted, Path(keep))
-        )
+        found = refinement.solve_or_read(fine, n_modes, max_frequency, keep)
     shapes = FieldShapes(found.system, found.vectors.copy(), found.flexibility)
     damping = damping_ratios(damping_ratio, found.omega)
     enclosed = refinement.enclosure(found) if bounds else None

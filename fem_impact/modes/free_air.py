@@ -128,20 +128,13 @@ class AirSheet:
         Side of a cell.
     """
 
-    inside: np.ndarray
-    size: float
-    padded: tuple[int, int]
-    inverse: np.ndarray  # (padded) [1/m] mean of 1 / R between two cells
-    distance: np.ndarray  # (padded) [m]
-    slopes: np.ndarray  # (padded) [1/m^2] of a wave on the lattice, squared
-
     def __init__(self, inside: np.ndarray, size: float) -> None:
         self.inside, self.size = inside, size
         nx, ny = (next_fast_len(2 * n + 2) for n in inside.shape)  # room for the next centres
         self.padded = nx, ny
         self.distance, self.inverse = between_cells(self.padded, size)
         turns = (np.cos(2.0 * np.pi * np.arange(n) / n) for n in self.padded)
-        self.slopes = (4.0 - 2.0 * np.add.outer(*turns)) / size**2
+        self.slopes = (4.0 - 2.0 * np.add.outer(*turns)) / size**2  # (padded) [1/m^2] of a wave on the lattice, squared
 
     def jump(self, acceleration: np.ndarray, wave: float) -> np.ndarray:
         """Jump (n_cells,) [Pa] for an acceleration (n_cells,) [m/s^2] in air of 1 kg/m^3 and a wavenumber [1/m]."""

@@ -10,7 +10,7 @@ from scipy.sparse import csc_array, load_npz
 
 from .._base import check, isolated
 from . import cell_kinds, matrices
-from .universal_files import PHASE
+from .universal_files import PHASE, READER
 
 FIELDS = (
     "frequencies", "damping_ratio", "shapes", "nodes", "numbers", "cells", "normals", "static", "mass", "loads",
@@ -21,7 +21,7 @@ MORE = "modal_mass", "direction", "dofs", "mass_matrix", "stiffness_matrix", "re
 NASTRAN, CALCULIX = (".bdf", ".nas", ".dat", ".pch"), (".inp",)
 DECKS = {".op2": NASTRAN[:3], ".frd": CALCULIX}  # files of a model that lie beside those of its results
 KINDS = {
-    **dict.fromkeys((".uff", ".unv"), ("a universal file", "modes.universal_files:arrays")),
+    **dict.fromkeys((".uff", ".unv"), ("a universal file", READER)),
     ".op2": ("results of Nastran", "modes.nastran_files:results"),
     ".op4": ("matrices of Nastran", "modes.nastran_files:matrices"),
     ".frd": ("results of CalculiX", "modes.solver_files:calculix"),

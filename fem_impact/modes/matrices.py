@@ -43,10 +43,8 @@ def solved(told: Mapping[str, Any], loads: Any = None, n_modes: int | None = Non
     """
     M, K = _symmetric(told)
     nodes = check.array("nodes", told.get("nodes", ()), (None, 3), "m")
-    given = told.get("numbers")
-    numbers = (
-        np.arange(1, len(nodes) + 1) if given is None else check.array("numbers", given, (len(nodes),)).astype(int)
-    )
+    given = np.arange(1, len(nodes) + 1) if told.get("numbers") is None else told["numbers"]
+    numbers = check.array("numbers", given, (len(nodes),)).astype(int)
     turned = _directions(told, numbers, M.shape[0])
     R = _recovery(told, turned, len(nodes), M.shape[0])
     kept = np.flatnonzero(np.asarray(abs(R).sum(axis=1)).reshape(-1, 3).any(axis=1))

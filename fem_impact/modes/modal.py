@@ -8,21 +8,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .._base import check, markup
+from .._base import check, isolated, markup
 from .._base.remembered import Remembered
 from .._base.rounding import ROUNDING, SAME
 from ..fe import plausible
 from ..fe.section import Beam, Plate
-from . import dents, followed, picked, universal_files, unstated, viewing
-from .shapes import (
-    REMEMBERED,
-    RigidShapes,
-    SampledShapes,
-    ScaledShapes,
-    Shapes,
-    connected_cells,
-    loose_motions,
-)
+from . import cell_kinds, dents, followed, picked, universal_files, unstated, viewing
+from .shapes import REMEMBERED, RigidShapes, SampledShapes, ScaledShapes, Shapes, connected_cells, loose_motions
 
 HIGHEST = 0.1 * check.REACH  # [Hz] highest frequency that scaling may produce; 2 pi times it must stay in reach
 UNSTATED = {  # by argument of `Modes.from_arrays`
@@ -200,10 +192,14 @@ class Modes(check.Brief):
             Known only at the measured points, with the elements between them if the file has some; shapes are divided
             by the root of the modal mass in the file.
         """
-        found: dict[str, Any] = universal_files.read_modes(path, direction)
-        if not len(found["cells"]):
-            found["cells"] = None
-        return cls.from_arrays(**found, mass=mass, compliance=compliance, free=free)
+        path, direction = check.path("path", path), check.one_of("direction", direction, "xyz")
+        found = isolated.read_apart(path, "a universal file", universal_files.READER)
+        keep = cell_kinds.differing_axes(found["nodes"], direction)
+        cells = found["lines" if len(keep) == 1 else "triangles"]
+        return cls.from_arrays(
+            found["frequencies"], found["shapes"][:, "xyz".index(direction)], points=found["nodes"][:, keep], mass=mass,
+            damping_ratio=found["damping_ratio"], compliance=compliance, cells=cells if len(cells) else None, free=free,
+        )  # fmt: skip
 
     @classmethod
     def from_frf(
@@ -338,7 +334,15 @@ class Modes(check.Brief):
 
         Point arrays ``mode_001`` ... hold the shapes [kg**-0.5], field data ``frequency`` [Hz] and ``damping_ratio``.
         """
-        return viewing.pyvista_grid(self)
+        import pyvista  # loads all of VTK, which few need
+
+        points, cells = viewing.grid(self)
+        kind = {1: pyvista.CellType.VERTEX, 2: pyvista.CellType.LINE, 3: pyvista.CellType.TRIANGLE}[cells.shape[1]]
+        made = pyvista.UnstructuredGrid({kind: cells}, viewing.placed(self, points))
+        for i, shape in enumerate(self.shapes.at(points).T, 1):
+            made.point_data[f"mode_{i:03d}"] = shape
+        made.field_data["frequency"], made.field_data["damping_ratio"] = self.frequencies, self.damping_ratio
+        return made
 
     def points(self, name: str, points: Any) -> np.ndarray:
         """Return points as (n_points, dimension) [m]; raise ValueError if one is not on the body."""

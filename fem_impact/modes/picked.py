@@ -108,7 +108,8 @@ def pick(name: str, found: Any, about: Any = None) -> Picked:
     n = poles.shape[1]
     if not n:
         raise ValueError(f"{name} has no peaks that are modes; give frequencies= near which they are sought")
-    spread = np.sqrt(np.diag(np.linalg.pinv(basis.T @ basis))[:, None] * np.square(rest).sum(axis=0) / _spare(basis))
+    spare = max(1, len(basis) - basis.shape[1])
+    spread = np.sqrt(np.diag(np.linalg.pinv(basis.T @ basis))[:, None] * np.square(rest).sum(axis=0) / spare)
     natural, damping = np.exp(poles)
     doubt = _pole_errors(omega, weight, poles, constants[:n], rest) * np.stack([natural / (2.0 * np.pi), damping])
     damping = np.maximum(damping - float(found.attrs.get("added_damping", 0.0)) / natural, 0.0)  # that of a window
@@ -170,10 +171,6 @@ class _Modes(NamedTuple):
     rest: np.ndarray  # (2 n_frequencies, n_channels) weighted residual
 
 
-def _spare(basis: np.ndarray) -> int:
-    return max(1, len(basis) - basis.shape[1])
-
-
 def _fit(omega: np.ndarray, data: np.ndarray, weight: np.ndarray, start: np.ndarray, steps: int = 60) -> _Modes:
     """The modes near poles (2, n_modes); those whose pole runs away are none."""
     poles, ran = start, np.ones(start.shape[1], bool)
@@ -199,7 +196,7 @@ def _with_one_more(omega: np.ndarray, data: np.ndarray, weight: np.ndarray, befo
         return None
     natural, damping = np.exp(after.poles)
     gain = np.square(before.rest).sum() - np.square(after.rest).sum()
-    noise = np.square(after.rest).sum() / (_spare(after.basis) * data.shape[1])
+    noise = np.square(after.rest).sum() / (max(1, len(data) - after.basis.shape[1]) * data.shape[1])
     near = np.diff(natural) < (damping * natural)[1:]
     return None if near.any() or gain < GAIN * (2 + data.shape[1]) * noise else after
 

@@ -32,13 +32,18 @@ class RectangleShapes(ClosedShapes, check.Brief):
     length: float  # [m]
     width: float  # [m]
     numbers: np.ndarray  # (n_modes, 2) half waves along length and width
-    dimension: int = 2
 
     def at(self, points: np.ndarray) -> np.ndarray:
         phase = np.pi * points / (self.length, self.width)  # (n_points, 2)
         return (
             2.0 * np.sin(np.outer(phase[:, 0], self.numbers[:, 0])) * np.sin(np.outer(phase[:, 1], self.numbers[:, 1]))
         )
+
+    def slopes(self, points: np.ndarray) -> np.ndarray:
+        """Slopes (n, n_q, 2, n_modes) at points (n, n_q, 2)."""
+        wave = np.pi * self.numbers / (self.length, self.width)
+        x, y = points[..., :1] * wave[:, 0], points[..., 1:] * wave[:, 1]
+        return 2.0 * np.stack([wave[:, 0] * np.cos(x) * np.sin(y), wave[:, 1] * np.sin(x) * np.cos(y)], 2)
 
     def contains(self, points: np.ndarray) -> np.ndarray:
         slack = 1e-9 * max(self.length, self.width)

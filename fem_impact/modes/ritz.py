@@ -83,17 +83,6 @@ class Krylov:
         s in (K + s**2 M)**-1 M; about twice the highest angular frequency that matters.
     """
 
-    system: System
-    shift: float  # s**2 in the frame
-    points: np.ndarray  # (n_points, dimension) [m]
-    loads: np.ndarray  # (n_dofs, n_points)
-    width: int  # number of points
-    vectors: np.ndarray  # (room, n_dofs) mass-orthonormal rows
-    projected: np.ndarray  # (room, room) of (K + s**2 M)**-1 M
-    count: int  # of vectors made
-    full: bool  # whether there are no more
-    compliance: np.ndarray  # (n_points, n_points) in the frame
-
     def __init__(self, system: System, points: np.ndarray, shift: float) -> None:
         self.system = system
         self.shift = (shift / system.frame.rate) ** 2  # s**2 in the frame
@@ -110,7 +99,7 @@ class Krylov:
         self.width = len(points)
         self.vectors = np.empty((0, system.n_dofs))  # (room, n_dofs) mass-orthonormal rows
         self.projected = np.zeros((0, 0))  # (room, room) of (K + s**2 M)**-1 M
-        self.count, self.full = 0, False
+        self.count, self.full = 0, False  # how many were made, and whether there are no more
         still = self._flexibility.solve(self.loads)
         self.compliance = self.loads.T @ still  # (n_points, n_points) in the frame
         # the static deflection, so that the compliance is exact; but on weak springs bending is lost beside it

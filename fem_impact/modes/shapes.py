@@ -24,6 +24,7 @@ class Shapes(Protocol):
     @property
     def dimension(self) -> int:
         """Number of coordinates of a point: 2 on a plate, 1 on a beam, 0 for a rigid mass."""
+        return self.grid()[0].shape[1]
 
     def at(self, points: np.ndarray) -> np.ndarray:
         """Mass-normalised shapes (n_points, n_modes) [kg**-0.5] at points (n_points, dimension) [m]."""
@@ -71,40 +72,52 @@ class Shapes(Protocol):
 class ClosedShapes(Shapes, Protocol):
     """What closed forms share: each of their arrays has one row per mode."""
 
-    def take(self, n_modes: int) -> Any:
+    def part(self, modes: slice) -> Any:
+        """The same body with some of its modes only."""
         fields: Any = self
         arrays = {name: value for name, value in vars(self).items() if isinstance(value, np.ndarray)}
-        return replace(fields, **{name: value[:n_modes] for name, value in arrays.items()})
+        return replace(fields, **{name: value[modes] for name, value in arrays.items()})
+
+    def take(self, n_modes: int) -> Any:
+        return self.part(slice(n_modes))
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class ScaledShapes(Shapes, check.Brief):
+class WrappedShapes(Shapes, check.Brief):
+    """What shapes share that are those of a body changed in one respect."""
+
+    base: Shapes
+
+    def contains(self, points: np.ndarray) -> np.ndarray:
+        return self.base.contains(points)
+
+    def compliance_error(self, points: np.ndarray) -> np.ndarray:
+        return self.base.compliance_error(points)
+
+    def take(self, n_modes: int) -> Any:
+        return replace(self, base=self.base.take(n_modes))
+
+    def grid(self) -> tuple[np.ndarray, np.ndarray]:
+        return self.base.grid()
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class ScaledShapes(WrappedShapes):
     """The shapes of the same body with another mass and stiffness, see `Modes.scaled`, or mixed; its deflections stay.
 
     A mixture is of shapes that are known everywhere, as by the air around a plate.
     """
 
-    base: Shapes
     amplitude: float = 1.0  # [-] new shape divided by old
     frequency: float = 1.0  # [-] new frequency divided by old
     mix: np.ndarray | None = None  # (n_base, n_modes) [-] of the old shapes in each new one
-
-    @property
-    def dimension(self) -> int:
-        return self.base.dimension
 
     def at(self, points: np.ndarray) -> np.ndarray:
         found = self.amplitude * self.base.at(points)
         return found if self.mix is None else found @ self.mix
 
-    def contains(self, points: np.ndarray) -> np.ndarray:
-        return self.base.contains(points)
-
     def compliance(self, points: np.ndarray) -> np.ndarray:
         return (self.amplitude / self.frequency) ** 2 * self.base.compliance(points)
-
-    def compliance_error(self, points: np.ndarray) -> np.ndarray:
-        return self.base.compliance_error(points)
 
     def dent(self, points: np.ndarray) -> np.ndarray:
         return (self.amplitude / self.frequency) ** 2 * self.base.dent(points)
@@ -125,10 +138,17 @@ class ScaledShapes(Shapes, check.Brief):
     def take(self, n_modes: int) -> "ScaledShapes":
         if self.mix is not None:
             return replace(self, mix=self.mix[:, :n_modes].copy())
-        return replace(self, base=self.base.take(n_modes))
+        return super().take(n_modes)
 
-    def grid(self) -> tuple[np.ndarray, np.ndarray]:
-        return self.base.grid()
+
+def unwrapped(shapes: Shapes) -> tuple[Shapes, float, np.ndarray | None]:
+    """The shapes inside `ScaledShapes`, the factor [-] of their amplitude, and their mixture."""
+    amplitude, mix = 1.0, None
+    while isinstance(shapes, ScaledShapes):
+        if shapes.mix is not None:
+            mix = shapes.mix if mix is None else shapes.mix @ mix
+        amplitude, shapes = amplitude * shapes.amplitude, shapes.base
+    return shapes, amplitude, mix
 
 
 @dataclass(frozen=True, eq=False)
@@ -137,7 +157,6 @@ class RigidShapes(Shapes):
 
     mass: float  # [kg]
     n_modes: int = 1
-    dimension: int = 0
 
     def at(self, points: np.ndarray) -> np.ndarray:
         return np.full((len(points), self.n_modes), self.mass**-0.5)
@@ -171,10 +190,6 @@ class SampledShapes(Shapes, check.Locked):
     doubt: np.ndarray | None = None  # (n_ways, n_points, n_modes) [-] see `spread`
     dents: np.ndarray | None = None  # (n_points, 2) [m/N] see `dent`
     sideways: np.ndarray | None = None  # (n_points, 2, n_modes) [kg**-0.5] see `across`
-
-    @property
-    def dimension(self) -> int:
-        return self.points.shape[1]
 
     @cached_property
     def _tree(self) -> KDTree:
@@ -282,10 +297,6 @@ class ElementShapes(Shapes):
     """What shapes by finite elements share."""
 
     system: System
-
-    @property
-    def dimension(self) -> int:
-        return self.system.mesh.dimension
 
     def contains(self, points: np.ndarray) -> np.ndarray:
         return self.system.contains(points)

@@ -63,11 +63,8 @@ def mesh(path: Path) -> dict[str, np.ndarray]:
     if len(numbers) != len(points):
         raise ValueError(f"{path.name} must hold its nodes itself, not in files that it includes")
     found = {"nodes": cell_kinds.spatial(points), "numbers": numbers}
-    return (
-        found
-        | _names(read.point_sets, numbers)
-        | cell_kinds.surface_and_kind(found["nodes"], cell_kinds.of_meshio(read.cells))
-    )
+    found |= cell_kinds.surface_and_kind(found["nodes"], cell_kinds.of_meshio(read.cells))
+    return found | _names(read.point_sets, numbers)
 
 
 def med(path: Path) -> dict[str, np.ndarray]:

@@ -19,11 +19,9 @@ Chu and Herrmann (1956), J. Appl. Mech. 23, 532-540; Woinowsky-Krieger (1950), J
 """
 
 from dataclasses import dataclass
-from functools import partial
 from typing import Any
 
 import numpy as np
-from scipy import special
 
 from .._base import check
 from ..fe import membrane, slopes
@@ -35,7 +33,7 @@ from .disk import DiskShapes
 from .modal import Modes
 from .rectangle import RectangleShapes
 from .ritz import RitzShapes
-from .shapes import FieldShapes, ScaledShapes, Shapes
+from .shapes import FieldShapes, Shapes, unwrapped
 from .slender import BeamShapes
 from .timoshenko import TimoshenkoShapes
 
@@ -72,7 +70,7 @@ def stretch(modes: Modes) -> Stretching:
     if section is None or not modes.dimension:
         why = "its section is not known" if modes.dimension else "a mass has none"
         raise ValueError(f"{CANNOT}, but {why}; leave it out")
-    base, amplitude, mix = _unwrapped(modes.shapes)
+    base, amplitude, mix = unwrapped(modes.shapes)
     if isinstance(section, Plate):
         n = min(MOST + rigid, modes.n_modes)
         if n == rigid:
@@ -94,16 +92,6 @@ def stretch(modes: Modes) -> Stretching:
     gram, soft = _tension(base, section)
     gram = amplitude**2 * (gram if mix is None else mix.T @ gram @ mix)
     return Stretching((gram / np.sqrt(2.0 * soft))[None], np.zeros((0, len(gram))))
-
-
-def _unwrapped(shapes: Shapes) -> tuple[Shapes, float, np.ndarray | None]:
-    """The shapes inside `ScaledShapes`, the factor of their amplitude, and their mixture."""
-    if isinstance(shapes, ScaledShapes):
-        base, amplitude, mix = _unwrapped(shapes.base)
-        if shapes.mix is not None:
-            mix = shapes.mix if mix is None else mix @ shapes.mix
-        return base, shapes.amplitude * amplitude, mix
-    return shapes, 1.0, None
 
 
 def _check_supports(system: System) -> None:
@@ -143,15 +131,15 @@ def _sheet(shapes: Shapes, section: Plate) -> tuple[membrane.Sheet, membrane.Ste
     if isinstance(shapes, RectangleShapes):
         shortest = np.pi / (np.pi * shapes.numbers / (shapes.length, shapes.width)).max()
         size = min(shortest, coarsest * min(shapes.length, shapes.width))
-        mesh, steep = meshes.rectangle(shapes.length, shapes.width, size=size), partial(_slopes_of_rectangle, shapes)
+        mesh = meshes.rectangle(shapes.length, shapes.width, size=size)
     elif isinstance(shapes, DiskShapes):
         size = shapes.radius * min(np.pi / shapes.z.max(), 2.0 * coarsest)
-        mesh, steep = meshes.disk(shapes.radius, size=size), partial(_slopes_of_disk, shapes)
+        mesh = meshes.disk(shapes.radius, size=size)
     else:
         raise ValueError(f"{CANNOT}, but its shapes are known at points only; leave it out")
     system = assemble(mesh, section, {} if getattr(shapes, "edge", "") == "free" else {"boundary": "clamped"})
     frame = system.frame
-    return membrane.Sheet.of(system), lambda _, x: steep(frame.centre + frame.length * x), None
+    return membrane.Sheet.of(system), lambda _, x: shapes.slopes(frame.centre + frame.length * x), None
 
 
 def _tension(shapes: Shapes, section: Beam) -> tuple[np.ndarray, float]:
@@ -170,24 +158,3 @@ def _tension(shapes: Shapes, section: Beam) -> tuple[np.ndarray, float]:
         gram = (0.5 * weight[:, None] * slope).T @ slope / shapes.length
         return gram, shapes.length / (section.material.E * area)
     raise ValueError(f"{CANNOT}, but its shapes are known at points only; leave it out")
-
-
-def _slopes_of_rectangle(shapes: RectangleShapes, points: np.ndarray) -> np.ndarray:
-    """Slopes (n, n_q, 2, n_modes) of a hinged rectangle at points (n, n_q, 2)."""
-    wave = np.pi * shapes.numbers / (shapes.length, shapes.width)
-    x, y = points[..., :1] * wave[:, 0], points[..., 1:] * wave[:, 1]
-    return 2.0 * np.stack([wave[:, 0] * np.cos(x) * np.sin(y), wave[:, 1] * np.sin(x) * np.cos(y)], 2)
-
-
-def _slopes_of_disk(shapes: DiskShapes, points: np.ndarray) -> np.ndarray:
-    """Slopes (n, n_q, 2, n_modes) of a disk at points (n, n_q, 2)."""
-    z, n = shapes.z, shapes.order
-    r = np.hypot(points[..., :1], points[..., 1:]) / shapes.radius
-    along = points / (r * shapes.radius)  # no quadrature point is in the middle
-    angle = n * np.arctan2(points[..., 1:], points[..., :1]) - shapes.phase
-    grown = shapes.weight * np.exp(z * (r - 1.0))
-    value = special.jv(n, z * r) + special.ive(n, z * r) * grown
-    rise = z * (special.jvp(n, z * r) + 0.5 * (special.ive(n - 1, z * r) + special.ive(n + 1, z * r)) * grown)
-    out, around = rise * np.cos(angle), -n * value / r * np.sin(angle)
-    c, s = along[..., :1], along[..., 1:]
-    return shapes.scale / shapes.radius * np.stack([c * out - s * around, s * out + c * around], 2)

@@ -24,10 +24,12 @@ import numpy as np
 
 from .._base import check
 from .._base.rounding import HALVINGS, SAME
+from ..fe.theory import blocks
 from .shapes import ClosedShapes
 
 ENDS = {"clamped": (0, 1), "hinged": (0, 2), "free": (2, 3)}  # what vanishes there: w, beta, moment, shear force
 MOST = 5000  # [-] largest number of modes; their shapes are integrated point by point
+TOGETHER = 64  # [-] modes whose shapes are computed together, to limit memory
 
 
 @dataclass(frozen=True)
@@ -123,7 +125,7 @@ class Stoutness:
         size = np.abs(at).max(axis=(1, 2))[:, None]  # (n, 1, 4), of any field: one that only turns has no w
         rows = np.concatenate([at[:, i][:, list(ENDS[ends[i]])] for i in range(2)], axis=1)
         found = np.linalg.svd(rows / size)[2][:, 3] / size[:, 0]
-        for block in _blocks(len(p)):
+        for block in blocks(len(p), TOGETHER):
             k = self.waves(p[block])[0].max()
             node, weight = np.polynomial.legendre.leggauss(int(k) + 40)
             w, beta = np.moveaxis(self.fields(p[block], 0.5 * (node + 1.0))[:, :, :2], 2, 0)
@@ -134,11 +136,6 @@ class Stoutness:
 
 
 SLENDER = Stoutness(0.0, 0.0)  # without shear and rotary inertia
-
-
-def _blocks(n: int, size: int = 64) -> list[np.ndarray]:
-    """Numbers of modes whose shapes are computed together, to limit memory."""
-    return np.array_split(np.arange(n), max(1, -(-n // size)))
 
 
 def _negative(matrices: np.ndarray) -> np.ndarray:
@@ -164,10 +161,6 @@ class BeamlikeShapes(ClosedShapes):
     length: float  # [m]
     ends: tuple[str, str]
     stoutness: Stoutness
-
-    @property
-    def dimension(self) -> int:
-        return 1
 
     def contains(self, points: np.ndarray) -> np.ndarray:
         return np.all((points >= -SAME * self.length) & (points <= (1 + SAME) * self.length), axis=1)
@@ -204,7 +197,7 @@ class TimoshenkoShapes(BeamlikeShapes, check.Brief):
     def slopes(self, x: np.ndarray) -> np.ndarray:
         """w' (n_points, n_modes) at x (n_points,) of a beam that cannot move rigidly: rotation and shear."""
         parts = []
-        for block in _blocks(len(self.p)):
+        for block in blocks(len(self.p), TOGETHER):
             fields = self.stoutness.fields(self.p[block], x)
             steep = fields[:, :, 1] + self.stoutness.S * fields[:, :, 3]
             parts.append(np.einsum("npk,nk->pn", steep, self.weights[block]))

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from .._base import check, isolated
+from .._base import check
 from . import cell_kinds
 
 NORMAL_MODE, DISPLACEMENT = 2, 8  # codes of data sets 55 and 2414: of an analysis, and of what is shown
@@ -19,6 +19,7 @@ LINES, SHELLS, SOLIDS = (11, 21, 22), range(41, 97), range(111, 119)
 CORNERS: dict[int, tuple[int, ...]] = {3: (0, 1, 2), 4: (0, 1, 2, 3), 6: (0, 2, 4), 8: (0, 2, 4, 6)}
 PHASE = 0.3  # [-] imaginary over real part, at the best phase, up to which a complex shape is taken as real: 17 degrees
 COMPONENTS = "r1", "r2", "r3"  # along x, y and z
+READER = "modes.universal_files:arrays"
 
 
 def write_modes(
@@ -65,29 +66,6 @@ def write_modes(
         })  # fmt: skip
     path.unlink(missing_ok=True)
     pyuff.UFF(str(path)).write_sets(sets, mode="add")
-
-
-def read_modes(path: Any, direction: str) -> dict[str, np.ndarray]:
-    """Read frequencies [Hz], damping ratios, mass-normalised shapes and points from a universal file.
-
-    Parameters
-    ----------
-    path : str or Path
-    direction : "x", "y" or "z", the direction in which the body was struck and measured
-
-    Returns
-    -------
-    dict
-        frequencies (n_modes,), damping_ratio (n_modes,), shapes (n_points, n_modes), points (n_points, 1 or 2), and
-        cells (n_cells, 2 or 3), point numbers: lines between the points of a beam, triangles of a plate; quadrilaterals
-        are halved, and elements with nodes that were not measured are left out
-    """
-    path, direction = check.path("path", path), check.one_of("direction", direction, "xyz")
-    found = isolated.read_apart(path, "a universal file", "modes.universal_files:arrays")
-    keep = cell_kinds.differing_axes(found["nodes"], direction)
-    names = "frequencies", "damping_ratio"
-    told = {"shapes": found["shapes"][:, "xyz".index(direction)], "points": found["nodes"][:, keep]}
-    return {name: found[name] for name in names} | told | {"cells": found["lines" if len(keep) == 1 else "triangles"]}
 
 
 def arrays(path: Path) -> dict[str, np.ndarray]:

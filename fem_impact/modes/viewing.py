@@ -1,4 +1,4 @@
-"""Mode shapes to look at: points and cells fine enough to draw them smoothly, and pyvista's own grids."""
+"""Mode shapes to look at: points and cells fine enough to draw them smoothly."""
 
 from typing import TYPE_CHECKING, Any
 
@@ -61,16 +61,3 @@ def rib_sides(modes: "Modes", points: np.ndarray, cells: np.ndarray) -> np.ndarr
         for start, end in system.mesh.pieces(rib.path):  # type: ignore[union-attr]
             on |= (distance(points, start, end) <= close)[sides].all(axis=1)
     return sides[on]
-
-
-def pyvista_grid(modes: "Modes") -> Any:
-    """The body as a `pyvista.UnstructuredGrid` with its mode shapes, see `Modes.to_pyvista`."""
-    import pyvista  # loads all of VTK, which few need
-
-    points, cells = grid(modes)
-    kind = {1: pyvista.CellType.VERTEX, 2: pyvista.CellType.LINE, 3: pyvista.CellType.TRIANGLE}[cells.shape[1]]
-    made = pyvista.UnstructuredGrid({kind: cells}, placed(modes, points))
-    for i, shape in enumerate(modes.shapes.at(points).T, 1):
-        made.point_data[f"mode_{i:03d}"] = shape
-    made.field_data["frequency"], made.field_data["damping_ratio"] = modes.frequencies, modes.damping_ratio
-    return made
