@@ -94,6 +94,9 @@ class WrappedShapes(Shapes, check.Brief):
     def compliance_error(self, points: np.ndarray) -> np.ndarray:
         return self.base.compliance_error(points)
 
+    def spread(self, points: np.ndarray) -> np.ndarray | None:
+        return self.base.spread(points)
+
     def take(self, n_modes: int) -> Any:
         return replace(self, base=self.base.take(n_modes))
 
@@ -127,9 +130,6 @@ class ScaledShapes(WrappedShapes):
 
     def loose(self, points: np.ndarray) -> np.ndarray:
         return self.amplitude * self.base.loose(points)
-
-    def spread(self, points: np.ndarray) -> np.ndarray | None:
-        return self.base.spread(points)
 
     def across(self, points: np.ndarray) -> np.ndarray | None:
         found = self.base.across(points)

@@ -1,5 +1,7 @@
 """What strikes: felt masses, arrival, errors."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
@@ -165,6 +167,21 @@ def test_a_buzz_of_twenty_contacts():
     )  # fmt: skip
     assert {impact.contact for impact in pair.impacts} == {0, 1}
     assert pair.hits[-1].finished  # both lifted: the head swings alone
+
+
+def test_shapes_of_a_held_striker_are_as_doubtful_as_when_it_is_free():
+    """They counted as exact in a hand."""
+    rod = fi.Modes.from_arrays([0.0, 900.0], [[4.0, 3.0]], points=[[0.0]], mass=0.0625, complete=True)
+    doubt = np.array([[[0.0, 0.2]]])
+    rod = replace(rod, shapes=replace(rod.shapes, doubt=doubt), unstated=("shapes",))
+    free = fi.Striker.flexible(rod, at=[0.0])
+    blow = {"at": None, "speed": 1.0, "max_impacts": 1, "tolerance": 1.0}
+    errors = [
+        fi.strike(fi.Modes.rigid(10.0), each, fi.Contact.linear(1e6), **blow).error.of_quantity("impulse")
+        for each in (free, free.held(fi.Hand(10.0)))
+    ]
+    assert errors[0] > 1e-3
+    assert_allclose(errors[1], errors[0], rtol=0.05)  # a hand so soft changes the blow by little
 
 
 def test_a_held_striker_is_a_body_like_others():
