@@ -1,6 +1,6 @@
 """The distance between two blows: every error that the program states is one."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from math import sqrt
 from operator import sub
 from typing import TYPE_CHECKING, Any
@@ -53,12 +53,14 @@ def value_of(hit: "Response", name: str, band: float | None) -> Any:
 
 
 def of_runs(
-    one: History, two: History, quantities: Mapping[str, float | None], over: tuple[float, float] = (1.0, 1.0)
-) -> np.ndarray:
+    one: History, two: History, quantities: Mapping[str, float | None], over: tuple[float, float] = (1.0, 1.0),
+    swings: Sequence[float] = (),
+) -> np.ndarray:  # fmt: skip
     """How far one run is from another [-]: in each quantity asked for, in its margin and in each impact's restitution.
 
     (n_quantities + 1 + n_impacts,), impacts in the order of `History.contacts`. All are 1 if the runs ended
-    differently. The restitution counts by the speed of every body that moves rigidly, over the momentum of all.
+    differently. The restitution counts by the speed of every body that moves rigidly, over the momentum of all;
+    ``swings`` are frequencies [rad/s] of strikers in hands, which do so, too.
     ``over`` divides the distances in quantities that depend on the whole blow, and those in contact time and peak
     force, which depend on an instant; not those of impacts, as points part as fast as the bodies ring there, also in
     modes faster than the step.
@@ -66,11 +68,14 @@ def of_runs(
     each, n_impacts = (one.contacts.T.tolist(), two.contacts.T.tolist()), len(two.contacts)
     if len(one.contacts) != n_impacts or one.status != two.status:
         return np.ones(len(quantities) + 1 + n_impacts)
-    rigid = two.omega == 0.0  # a swinging body has much momentum, of which the striker's error is no share
+    # other bodies that swing have much momentum, of which the striker's error is no share
+    rigid, other = two.omega == 0.0, one.omega == 0.0
+    for omega in swings:
+        rigid, other = rigid | (two.omega == omega), other | (one.omega == omega)
     start, end = two.start_p[rigid], two.end_p[rigid]
     momentum = sqrt(max(start.dot(start), end.dot(end)))
     momentum = momentum or sqrt(two.start_p.dot(two.start_p)) or sqrt(two.end_p.dot(two.end_p)) or 1.0
-    speeds = np.abs(one.end_p[one.omega == 0.0] - end)
+    speeds = np.abs(one.end_p[other] - end)
     found: dict[str, float] = {"restitution": max(speeds.tolist(), default=0.0) / momentum}
     totals = []
     for start, end, peak, impulse, *_ in each if n_impacts else ():

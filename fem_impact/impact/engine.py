@@ -42,6 +42,7 @@ class Pace(NamedTuple):
     duration: float  # [s] expected, of the shortest
     speed: float  # [m/s] of approach, the fastest
     longest_step: float = np.inf  # [s] the first of a run
+    swings: tuple[float, ...] = ()  # [rad/s] frequencies of strikers in hands, which count as masses
 
 
 @cache
@@ -116,6 +117,7 @@ def again(history: History, step: float | None = None, **changed: Any) -> Histor
 
 def pace_of(system: KernelSystem, held: Sequence[int] = ()) -> Pace:
     """How fast its contacts pass; modes numbered ``held`` count as masses, though a hand makes them swing."""
+    swings = tuple(float(system.omega[i]) for i in held)
     rate = system.omega * np.maximum(1.0, 2.0 * system.zeta)  # an overdamped mode acts as a dashpot, not as a mass
     if held:
         rate[held] = 0.0
@@ -151,8 +153,8 @@ def pace_of(system: KernelSystem, held: Sequence[int] = ()) -> Pace:
         fastest = max(fastest, float(speed))
     if not np.isfinite(shortest):
         k = system.law["stiffness"][0]
-        return Pace(float(np.sqrt(1.0 / (k * max(1e-300, (system.shape[0] ** 2).sum())))), 1.0, longest)
-    return Pace(shortest, fastest, longest)
+        return Pace(float(np.sqrt(1.0 / (k * max(1e-300, (system.shape[0] ** 2).sum())))), 1.0, longest, swings)
+    return Pace(shortest, fastest, longest, swings)
 
 
 def most_steps(system: KernelSystem, stretched: Stretched | None) -> int:

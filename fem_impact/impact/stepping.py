@@ -172,7 +172,7 @@ class _Control:
         if self.scheme == "A4" and len(felt := self.system.law[self.system.law["relaxation"] > 0.0]):
             order = 1.0 + felt["exponent"].min()  # what it remembers sets in like the force
             over = min(over[0], 2.0**order - 1.0), min(over[1], 2.0**order - 1.0)
-        error = distance.of_runs(coarse, fine, quantities, over)
+        error = distance.of_runs(coarse, fine, quantities, over, self.pace.swings)
         if "force" in quantities:
             i = [*quantities].index("force")
             error[i] = max(error[i], fine.force_missed)

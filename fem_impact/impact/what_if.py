@@ -70,7 +70,9 @@ def what_if(blow: Followed, variations: Sequence[Variation]) -> dict[str, np.nda
         for ways in each.changes:
             effects = []
             for parts, weight, parting in ways:
-                effects.append(distance.of_runs(blow.again(parts), blow.runs.coarse, quantities))
+                effects.append(
+                    distance.of_runs(blow.again(parts), blow.runs.coarse, quantities, swings=blow.pace.swings)
+                )
                 effects[-1][: n + 1] *= weight
                 effects[-1][n + 1 :] *= parting
             if effects:
@@ -209,7 +211,8 @@ def _told_by(blow: Followed, better: History | None, poorer: History | None, fir
     n, one_more = blow.options.n_quantities, np.ones(len(blow.runs.error))
     if better is None or poorer is None:
         return one_more * first
-    found, number = distance.of_runs(poorer, better, blow.options.quantities), len(blow.runs.fine.contacts)
+    found = distance.of_runs(poorer, better, blow.options.quantities, swings=blow.pace.swings)
+    number = len(blow.runs.fine.contacts)
     if not first:
         same = len(better.contacts) == len(poorer.contacts) == number
         return np.append(found[:n] if same else np.zeros(n), np.zeros(len(one_more) - n))
