@@ -100,6 +100,7 @@ def again(history: History, step: float | None = None, **changed: Any) -> Histor
     return run_system(system, "A4", size, pace, (horizon, most), stretched)
 
 
+@np.errstate(over="ignore", divide="ignore")  # laws steeper than any number
 def pace_of(system: KernelSystem, held: Sequence[int] = ()) -> tuple[float, float, float]:
     """Shortest expected duration [s] of an undisturbed contact, its approach speed [m/s], and the longest first step.
 

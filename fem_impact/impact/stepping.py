@@ -28,6 +28,7 @@ GRAZES = 6
 # [-] Difference of two runs over the error of the finer one: first for speeds and impulse, then for contact time and
 # peak force. These two depend on one instant, and modes faster than the step lower the order of A4 there.
 RICHARDSON = {"A": (3.0, 3.0), "A4": (7.0, 4.0), "collocation": (1.0, 1.0)}
+COARSER = 4.0  # [-] steps over those that are right, with which a blow is tried where these are too many
 RINGING = 0.5  # [-] modes with a damping ratio above this do not ring: a swing is down to 3 % of the one before
 # [rad] largest phase of a ringing mode in a step of the coarser run: a third of a period, seen before it comes again
 RESOLVED = 2.0
@@ -136,6 +137,13 @@ def refine_steps(
     if scheme == "collocation" and least < 1.0:
         raise ValueError(f"scheme collocation needs exponents of at least 1, got {least:g}; use A4")
     free = options.scheme is None and options.dt is None
+    most, span = engine.most_steps(system, stretched), min(pace[0], options.last[0])
+    if options.dt is None and span > COARSER * most * pace[2]:
+        raise SimulationError(
+            f"{most} steps cannot follow a force that acts for {span:.2g} s and changes within "
+            f"{engine.STEEP * pace[2]:.2g} s where it is steepest; take a law of a lower exponent, that yields later "
+            "or that rises less steeply"
+        )
     try:
         return _Control(system, options, pace, scheme, free, stretched).agree_runs()
     except _NotMet:
@@ -194,7 +202,7 @@ class _Control:
         try:
             runs = [self.follow_blow(size) for size in sizes[:2]]
         except SimulationError as exhausted:  # so many steps are out of reach: longer ones may do
-            sizes = [4.0 * sizes[0], 2.0 * sizes[0], *sizes]
+            sizes = [COARSER * sizes[0], 2.0 * sizes[0], *sizes]
             try:
                 runs = [self.follow_blow(size) for size in sizes[:2]]
             except SimulationError:
