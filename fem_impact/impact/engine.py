@@ -63,7 +63,8 @@ def run_system(
         stretch = stretched.kernel
     if scheme == "collocation":
         nodes, powers = gauss(NODES)
-        result = run_collocation(system, nodes, powers, pace[0] / 2.0, float(size) * pace[1], limits)
+        longest = min(pace[0], last[0]) * min(0.5, float(size) ** (1.0 / 6.0))  # or two misfits may take the same steps
+        result = run_collocation(system, nodes, powers, longest, float(size) * pace[1], limits)
     else:
         result = run_energy(system, stretch, int(scheme == "A4"), float(size), limits)
     history = History(*system, *(*result, stretched))
