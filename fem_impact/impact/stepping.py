@@ -180,6 +180,8 @@ class _Control:
         if self.scheme == "A4" and len(felt := self.system.law[self.system.law["relaxation"] > 0.0]):
             order = 1.0 + felt["exponent"].min()  # what it remembers sets in like the force
             over = min(over[0], 2.0**order - 1.0), min(over[1], 2.0**order - 1.0)
+            if felt["relaxation"].min() < sizes[0]:  # it lets go within its relaxation: contact times at first order
+                over = over[0], 1.0
         error = distance.of_runs(coarse, fine, quantities, over)
         if "force" in quantities:
             i = [*quantities].index("force")

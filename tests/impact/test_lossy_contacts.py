@@ -300,3 +300,11 @@ def test_bodies_that_a_loss_lets_go_have_parted_however_the_rate_is_rounded(seed
     hit = fi.strike(body, fi.Striker.rigid(0.86), law, at=[0.0], speed=2.6, max_impacts=2, tolerance=tolerance)
     assert hit.restitution is not None
     assert_allclose(hit.impacts[-1].separation_speed, 1.0 / law.loss, rtol=1e-6)
+
+
+@pytest.mark.parametrize("tolerance", [1e-3, 1e-4])
+def test_felt_that_recovers_within_a_step_errs_at_first_order(tolerance):
+    """Claims of contact times were three times smaller than their errors."""
+    law, ball = fi.Contact.felt(1.66e5, 1.2, hysteresis=0.26, relaxation=1.7e-6), fi.Striker.rigid(1.2e-3)
+    told, true = (fi.strike(WALL, ball, law, at=None, speed=0.2, tolerance=each) for each in (tolerance, 1e-8))
+    assert abs(told.contact_time / true.contact_time - 1.0) < told.error.of_quantity("contact_time")
