@@ -73,9 +73,9 @@ def strike(
             if own is None:  # the striker arrives at the surface, wherever that is
                 surface = float(struck.rows[0] @ target.q) * striker.motion
                 return [replace(arriving, q=surface, p=speed * striker.motion), target]
-            pressed = np.zeros((2, 1)) if before is None else before.force.T
-            moving = replace(arriving, q=own[0], p=own[1], pressed=pressed)
-            return [moving.faster(one), replace(target, pressed=pressed)]
+            assert before is not None
+            moving = replace(arriving, q=own[0], p=own[1], pressed=before.pressing(arriving.touched))
+            return [moving.faster(one), replace(target, pressed=before.pressing(target.touched))]
 
         doubt = 0.0 if before is None else 1.0 + before.error
         others = [start_bodies(*factors) for factors in ((doubt, 1.0), (1.0, doubt))[own is None :] if doubt]
@@ -168,8 +168,7 @@ def met(
         parts[i] = replace(parts[i], bias=parts[i].bias + each.push, held=int(each.hand is not None))
     others = []
     if before is not None:
-        ends = [[i for i, _ in part.touched] for part in parts]
-        parts = [replace(part, pressed=before.force[rows].T) for part, rows in zip(parts, ends)]
+        parts = [replace(part, pressed=before.pressing(part.touched)) for part in parts]
         doubt = 1.0 + before.error
         others = [[*parts[:i], part.faster(doubt), *parts[i + 1 :]] for i, part in enumerate(parts)]
     return _follow(bodies, [touch.law for touch in contacts], parts, arriving, asked, others=others)

@@ -19,6 +19,8 @@ FAINT = 1e-9
 # [-] of the largest approach: bodies nearer than this touch, an atom's width in most blows; errors of the first step
 # part bodies that are pressed from rest by less
 TOUCH = 1e-6
+CUBIC = 3.0**0.5 / 216.0  # [-] error of the rate of a cubic through both ends of a step, over a fourth derivative h**3
+SLOWEST = 0.1  # [-] of a force, what a loss that takes more of it leaves
 CLEAR = 0.05  # [-] margins are told up to this: no error that meets a tolerance moves a blow across more
 
 
@@ -244,11 +246,22 @@ class History(check.Locked):
 
     @cached_property
     def force_missed(self) -> float:
-        """Error [-] of the peak force if steps are too long for its ripples, on which two runs may agree by chance."""
+        """Error [-] of the peak force within steps, on which two runs may agree by chance.
+
+        Steps may be too long for its ripples or, with loss, for the rate in them: that of a cubic errs by nothing at
+        three places in a step, and in both directions between them.
+        """
         if self.n_coefficients > 2 or not len(self.contacts):
             return 0.0
         peak = float(self.contacts[:, 2].max())
-        return float(record.force_missed(self.steps, self.now, self.law, self.n_coefficients, peak))
+        missed = float(record.force_missed(self.steps, self.now, self.law, self.n_coefficients, peak))
+        pushes, speeds = self.impulses / self.steps[:, 1:2], self._column(layout.SPEED)
+        for i in np.flatnonzero(self.law["loss"]):
+            row, loss = int(pushes[:, i].argmax()), float(self.law["loss"][i])
+            bends = np.abs(np.diff(speeds[max(0, row - 3) : row + 4, i], 3))  # fourth derivatives times h**3
+            share = loss / max(1.0 + loss * speeds[row, i], SLOWEST)
+            missed = max(missed, CUBIC * share * float(bends.max(initial=0.0)) * float(pushes[row, i]) / peak)
+        return missed
 
     def samples(self, tolerance: float) -> tuple[np.ndarray, np.ndarray]:
         """Times [s], (n_times,), dense enough for a tolerance, and the forces [N] there, (n_times, n_contacts)."""

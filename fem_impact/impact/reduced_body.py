@@ -38,6 +38,15 @@ class Ends(check.Brief):
     doubtful: bool = False  # whether more than rounding is not known of the body there
     coming: np.ndarray | None = None  # (n_modes,) [kg**0.5] per unit speed, of a striker in `collide`
 
+    def pressed(self, omega: np.ndarray, state: np.ndarray) -> np.ndarray:
+        """Forces (n_ends, 2) that deflect the modes left out as in a state (2, n_modes) of the run, and their rates.
+
+        (0, 2) where a spring stands for these modes: the forces that act deflect it.
+        """
+        forms = unit_forms(self.rest) if omega[self.forms].size else np.zeros((0, 0))
+        signs = np.array([sign for _, sign in self.touched[: len(forms)]])
+        return -signs[:, None] * (forms / np.square(forms).sum(axis=0)) @ (omega * state)[:, self.forms].T
+
 
 @dataclass(frozen=True, eq=False)
 class ReducedBody:
@@ -54,7 +63,7 @@ class ReducedBody:
     bias: np.ndarray  # (n_modes,) [N kg**-0.5]
     force: float  # [N] constant force at its first contact
     points: np.ndarray  # (n_ends, dimension) [m] contact points
-    pressed: np.ndarray  # (2, n_ends) [N], [N/s] contact forces at the start and their rates
+    pressed: np.ndarray  # (n_ends, 2) [N], [N/s] forces that deflect the modes left out at the start, and their rates
     loose: np.ndarray  # (n_ends, n) shapes of rigid motions that it may have besides
     spread: np.ndarray | None = None  # (n_ways, n_ends, n_modes) [-] relative errors of squared shapes
     stretching: Stretching | None = None
@@ -86,9 +95,7 @@ class ReducedBody:
         """Forms (n_ends, n_forms) of unit stiffness that stand for the modes left out; none where a spring does."""
         if not self.yields or (len(self.touched) == 1 and not rated[self.touched[0][0]]):
             return np.zeros((len(self.touched), 0))
-        size, vectors = np.linalg.eigh(self.rest)
-        kept = size > ROUNDING * size[-1]
-        return np.asarray(vectors[:, kept] * np.sqrt(size[kept]))
+        return unit_forms(self.rest)
 
     @cached_property
     def thinner(self) -> "list[tuple[ReducedBody, float]]":
@@ -140,6 +147,13 @@ class ReducedBody:
         return replace(other, stretching=None if self.stretching is None else stretch(modes))
 
 
+def unit_forms(rest: np.ndarray) -> np.ndarray:
+    """Forms (n_ends, n_forms) of unit stiffness that yield by a compliance (n_ends, n_ends) [m/N]."""
+    size, vectors = np.linalg.eigh(rest)
+    kept = size > ROUNDING * size[-1]
+    return np.asarray(vectors[:, kept] * np.sqrt(size[kept]))
+
+
 def part_of(modes: Modes, touched: Touched, points: np.ndarray, residual: bool = True) -> ReducedBody:
     """An undeformed body at rest touched at points; ``residual``: modes left out yield. Its modes remember it."""
 
@@ -179,7 +193,7 @@ def reduce_body(
     largest = rest[0, 0] if n_ends == 1 else np.linalg.eigvalsh(rest)[-1] if n_ends else 0.0
     if largest <= ROUNDING * (rest.trace() + carried):
         rest = np.zeros_like(rest)
-    still, pressed = np.zeros(modes.n_modes), np.zeros((2, n_ends))
+    still, pressed = np.zeros(modes.n_modes), np.zeros((n_ends, 2))
     part = ReducedBody(
         modes.omega, modes.damping_ratio, rows, touched, rest, doubt, still, still, still, 0.0, points, pressed,
         np.zeros((n_ends, 0)) if left_out is None else modes.shapes.loose(points),
@@ -233,9 +247,10 @@ def joined(parts: Sequence[ReducedBody], laws: Sequence[Contact]) -> KernelSyste
         if form.size:
             above, damping = rest_mode(part.points.shape[1], part.omega[-1], part.zeta[-1], lossy)
             for shares in form.T:
-                for (i, sign), share in zip(part.touched, shares):
+                held = np.zeros(2)
+                for (i, sign), share, force in zip(part.touched, shares, part.pressed):
                     shape[i, start] += sign * share * above
-                held = -(part.pressed @ shape[[i for i, _ in part.touched], start]) / above**2
+                    held -= sign * share / above * force
                 columns[:, start] = above, damping, 0.0, *held
                 start += 1
     found = KernelSystem(columns[0], columns[1], shape, offset, columns[2], law, columns[3], columns[4])

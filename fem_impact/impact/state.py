@@ -1,7 +1,7 @@
 """Where all bodies of a blow are at one time and how they move, so that another blow can start there."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -31,8 +31,12 @@ class State(check.Brief):
     contacts: tuple[Contact, ...] = ()
     at: np.ndarray | None = None  # (dimension,) [m] strike point
     remembers: bool = False  # whether a contact may have yielded or be felt that has not recovered
+    # (n_contacts, 2, 2) [N], [N/s] at first and second body: forces that deflect the modes left out as they are, rates
+    pressed: np.ndarray = field(default_factory=lambda: np.zeros((0, 2, 2)))  # by default the forces that act
 
     def __post_init__(self) -> None:
+        if not len(self.pressed):
+            check.settle(self, pressed=np.repeat(self.force[:, None], 2, axis=1))
         check.lock_arrays(self)
         for array in (*self.displacements, *self.velocities):
             array.setflags(write=False)
@@ -56,6 +60,10 @@ class State(check.Brief):
             )
         self._forgets()
         return [self.of(i, f"bodies[{i}]", modes) for i, modes in enumerate(bodies)]
+
+    def pressing(self, touched: Sequence[tuple[int, float]]) -> np.ndarray:
+        """Forces (n_ends, 2) that deflect the modes left out of a body at its contacts, see `ReducedBody.touched`."""
+        return self.pressed[[i for i, _ in touched], [int(sign < 0.0) for _, sign in touched]]
 
     def same_striker(self, striker: Striker, law: Contact, modes: Modes, at: Any) -> Striker:
         """The striker that goes on; ValueError if it, its contact or the strike point is another than before."""
@@ -114,8 +122,12 @@ def state_at(hit: "Response", time: float | None) -> State:
     states = [hit.modal_state([time], body=body) for body in range(len(hit.bodies))]
     forces = np.array([h.force_at(np.array([time]), i) for i in range(len(hit.contacts))])[:, :, 0]
     forces[forces[:, 0] <= SAME * hit.peak_force] = 0.0  # the rounding of a release
+    pressed, own = np.repeat(forces[:, None], 2, axis=1), np.vstack(h.states(np.array([time])))
+    for ends in hit.ends:
+        for (i, sign), force in zip(ends.touched, ends.pressed(h.omega, own)):
+            pressed[i, int(sign < 0.0)] = force
     remembers = any(law.remembers for law in hit.contacts) and any(impact.start < time for impact in hit.impacts)
     return State(
         time, (*hit.bodies[:-1], hit.target), tuple(q[0] for q, _ in states), tuple(p[0] for _, p in states), forces,
-        min(hit.error.total, 1.0), hit.striker, hit.contacts, hit.at, remembers,
+        min(hit.error.total, 1.0), hit.striker, hit.contacts, hit.at, remembers, pressed,
     )  # fmt: skip

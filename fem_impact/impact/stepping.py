@@ -28,6 +28,7 @@ GRAZES = 6
 # [-] Difference of two runs over the error of the finer one: first for speeds and impulse, then for contact time and
 # peak force. These two depend on one instant, and modes faster than the step lower the order of A4 there.
 RICHARDSON = {"A": (3.0, 3.0), "A4": (7.0, 4.0), "collocation": (1.0, 1.0)}
+COARSER = 4.0  # [-] steps over those that are right, with which a blow is tried where these are too many
 RINGING = 0.5  # [-] modes with a damping ratio above this do not ring: a swing is down to 3 % of the one before
 # [rad] largest phase of a ringing mode in a step of the coarser run: a third of a period, seen before it comes again
 RESOLVED = 2.0
@@ -136,6 +137,13 @@ def refine_steps(
     if scheme == "collocation" and least < 1.0:
         raise ValueError(f"scheme collocation needs exponents of at least 1, got {least:g}; use A4")
     free = options.scheme is None and options.dt is None
+    most, span = engine.most_steps(system, stretched), min(pace.duration, options.last[0])
+    if options.dt is None and span > COARSER * most * pace.longest_step:
+        raise SimulationError(
+            f"{most} steps cannot follow a force that acts for {span:.2g} s and changes within "
+            f"{engine.STEEP * pace.longest_step:.2g} s where it is steepest; take a law of a lower exponent, that "
+            "yields later or that rises less steeply"
+        )
     try:
         return _Control(system, options, pace, scheme, free, stretched).agree_runs()
     except _NotMet:
@@ -172,6 +180,8 @@ class _Control:
         if self.scheme == "A4" and len(felt := self.system.law[self.system.law["relaxation"] > 0.0]):
             order = 1.0 + felt["exponent"].min()  # what it remembers sets in like the force
             over = min(over[0], 2.0**order - 1.0), min(over[1], 2.0**order - 1.0)
+            if felt["relaxation"].min() < sizes[0]:  # it lets go within its relaxation: contact times at first order
+                over = over[0], 1.0
         error = distance.of_runs(coarse, fine, quantities, over, self.pace.swings)
         if "force" in quantities:
             i = [*quantities].index("force")
@@ -194,7 +204,7 @@ class _Control:
         try:
             runs = [self.follow_blow(size) for size in sizes[:2]]
         except SimulationError as exhausted:  # so many steps are out of reach: longer ones may do
-            sizes = [4.0 * sizes[0], 2.0 * sizes[0], *sizes]
+            sizes = [COARSER * sizes[0], 2.0 * sizes[0], *sizes]
             try:
                 runs = [self.follow_blow(size) for size in sizes[:2]]
             except SimulationError:

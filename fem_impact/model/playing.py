@@ -232,7 +232,8 @@ class _Stick:
     striker: Striker
     q: np.ndarray
     p: np.ndarray
-    force: np.ndarray  # (2,) [N], [N/s] at its contact and its rate
+    force: np.ndarray = field(default_factory=lambda: np.zeros(2))  # [N], [N/s] at its contact and its rate
+    pressed: np.ndarray = field(default_factory=lambda: np.zeros((2, 2)))  # as in `State`
 
 
 @check.typed
@@ -387,7 +388,8 @@ class _Game:
                     f"strokes[{stick.number}] must have parted for good when the next blow or lift comes, at "
                     f"{self.now:.4g} s, because its contact yields or is felt, whose memory cannot be carried over"
                 )
-            found.append(replace(stick, q=state.displacements[i], p=state.velocities[i], force=state.force[i]))
+            moving = {"q": state.displacements[i], "p": state.velocities[i], "pressed": state.pressed[i]}
+            found.append(replace(stick, force=state.force[i], **moving))
         return found
 
     def _blow(self, fresh: list[int], rule: dict[str, Any]) -> None:
@@ -403,7 +405,7 @@ class _Game:
             hit = audit.audited(planner.struck(blow, rule))
             assert hit.striker is not None
             none = np.zeros(0)
-            self.sticks = [_Stick(fresh[0], hit.striker, none, none, np.zeros(2))]
+            self.sticks = [_Stick(fresh[0], hit.striker, none, none)]
         else:
             sticks = [*self.sticks, *(self._arriving(i, rule) for i in fresh)]
             laws = tuple(self.played[stick.number].contact for stick in sticks)
@@ -414,7 +416,8 @@ class _Game:
             bodies = (*(stick.striker.body for stick in sticks), self.modes)
             q, p = (*(stick.q for stick in sticks), self.q), (*(stick.p for stick in sticks), self.p)
             forces = np.array([stick.force for stick in sticks])
-            start = State(0.0, bodies, q, p, forces, self.error, None, laws)
+            pressed = np.array([stick.pressed for stick in sticks])
+            start = State(0.0, bodies, q, p, forces, self.error, None, laws, pressed=pressed)
             movers = (*(stick.striker for stick in sticks), self.modes)
             hit = planner.struck(partial(collision.met, movers, touches, start=start), rule)
             self.sticks = sticks
@@ -431,7 +434,7 @@ class _Game:
         surface = float(self.modes.shape_at(one.at[None])[0] @ self.q)
         if self.hits:  # with the static deflection under those that press now
             surface = float(self.hits[-1].displacement(one.at[None], [self.now - self.starts[-1]])[0, 0])
-        return _Stick(number, striker, surface * striker.motion, one.speed * striker.motion, np.zeros(2))
+        return _Stick(number, striker, surface * striker.motion, one.speed * striker.motion)
 
     def _alone(self) -> Response:
         """The body moving freely, as a blow without a touch."""

@@ -183,3 +183,11 @@ def test_pressed_again_it_goes_on_where_it_was():
     left = build.plain(law.dent)(row, 0, row["memory"][0])
     force = build.plain(law.point_at)(deep - left, build.plain(law.spring_of)(row, 0)).force
     assert force == pytest.approx(float(ROUND.force(deep)), rel=1e-13)
+
+
+@pytest.mark.parametrize(("exponent", "first"), [(3.0, 1e-8), (8.0, 1e-6), (20.0, 1e-8)])
+def test_a_law_that_no_steps_can_follow_is_refused_at_once(exponent, first):
+    """It took minutes, to end after 500 000 steps with the advice of a duration of 5e-53 s."""
+    law = fi.Contact.elastic_plastic(1e5 * 1e3**exponent, exponent, yield_approach=first)
+    with pytest.raises(fi.SimulationError, match="steps cannot follow a force that acts for"):
+        fi.strike(fi.Modes.rigid(1e6), fi.Striker.rigid(0.05), law, at=None, speed=1.0)

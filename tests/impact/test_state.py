@@ -63,7 +63,7 @@ LISTEN, LATER = [(0.7, 0.6)], np.array([1e-3, 5e-3, 2e-2])  # m, s
     [
         (fi.Contact.linear(1e6), False, 1e-6),
         (fi.Contact.hertz(5e7), True, 1e-6),  # a spring stands for the modes left out: nothing of it swings
-        (fi.Contact.power(5e7, 1.5, loss=0.05), True, 1e-2),  # overdamped modes stand for them, and start at rest
+        (fi.Contact.power(5e7, 1.5, loss=0.05), True, 1e-4),  # overdamped modes stand for them
     ],
     ids=["bare", "complete", "loss"],
 )
@@ -95,11 +95,26 @@ def test_a_collision_at_two_contacts_goes_on_from_its_middle(where):
     rest = fi.collide(bodies, touches, start=state, **rule)
     assert state.force.any() == (where == "pressed")
     assert rest.n_impacts == whole.n_impacts - (where != "pressed")
-    # pressed, the modes that stand for those left out start at their static deflection, and forget their swing
-    apart = 1e-5 if where == "between" else 1e-3
-    assert_allclose(rest.speeds, whole.speeds, atol=apart)
+    # the modes that stand for those left out go on swinging; steps err by this
+    assert_allclose(rest.speeds, whole.speeds, atol=1e-5)
     wanted = whole.velocity(LISTEN, time + LATER)
-    assert_allclose(rest.velocity(LISTEN, LATER), wanted, atol=apart * np.abs(wanted).max())
+    assert_allclose(rest.velocity(LISTEN, LATER), wanted, atol=1e-5 * np.abs(wanted).max())
+
+
+@pytest.mark.filterwarnings("ignore::fem_impact.ToleranceWarning")
+def test_a_state_holds_the_swing_of_the_modes_left_out():
+    """Of 20 modes a collision at two points went on from their static deflection: speeds were off by 0.1 m/s."""
+    plate = fi.analytic.rectangle(1.55, 1.0, mass=0.2, first_frequency=100.0, n_modes=20, damping_ratio=0.002)
+    laws, at = (fi.Contact.hertz(1e7), fi.Contact.linear(1e6)), [(0.44, 0.34), (1.16, 0.17)]
+    touches = [fi.Touch(law, i, 2, None, at[i]) for i, law in enumerate(laws)]
+    bodies, rule = [fi.Modes.rigid(0.05), fi.Modes.rigid(0.02), plate], {"tolerance": 1e-3, "max_impacts": 3}
+    whole = fi.collide(bodies, touches, speeds=[1.0, 2.0, 0.0], **rule)
+    end = whole.history.end_time
+    for time in (0.3 * end, whole.impacts[0].end):
+        rest = fi.collide(bodies, touches, start=whole.state(time), **rule)
+        for body in (0, 1):  # 1e-5 of steps
+            wanted = whole.velocity(None, [end], body=body)
+            assert_allclose(rest.velocity(None, [end - time], body=body), wanted, atol=2e-5)
 
 
 @pytest.mark.parametrize("left", [-1e-18, 0.0, 1e-18])

@@ -189,6 +189,7 @@ def locate_event(contacts, course, limits, h, cornered, lossy):
     count, bracket = course.counts, course.bracket
     sought = count[SEEKS]
     count[SEEKS] = NOTHING
+    answer = TAKEN
     guess = 0.0
     if sought == NOTHING:
         count[CORNERED] = -1
@@ -208,7 +209,7 @@ def locate_event(contacts, course, limits, h, cornered, lossy):
             count[SEEKS] = sought
             return TRY, guess
         if sought == CROSSING and not abs(contacts.end[count[TARGET]]) <= max(limits.depth, NEAR * bracket[SIZE]):
-            return LOST, guess
+            answer = LOST  # but a corner before it may be found
     if sought != CORNER and cornered:
         count[CORNERED], count[WHICH], guess = first_corner(contacts, h, lossy, bracket)
         if count[CORNERED] >= 0:
@@ -219,7 +220,7 @@ def locate_event(contacts, course, limits, h, cornered, lossy):
             count[SEEKS] = CORNER
             count[TRIES] = 0
             return TRY, guess
-    return TAKEN, guess
+    return answer, guess
 
 
 @inner(part=True)

@@ -11,7 +11,7 @@ import numpy as np
 
 from .build import ZERO, inner, outer
 from .cubics import crossing, cubic, turning
-from .events import letting_go
+from .events import LET_GO, letting_go
 from .law import dent, power, relaxes, spring_of, spring_with, stored
 from .misfit import force_on, misfit
 from .rounding import NEAR
@@ -271,7 +271,7 @@ def still_pressed(steps, now, law, n_coefficients, i, d):
         for k in range(n_coefficients):
             end += steps[-1, first + k]
         return now[REMEMBERED, i] >= 0.0 and end > 0.01 * steps[-1, first]
-    return d > NEAR * abs(now[APPROACH, i]) and 1.0 + law["loss"][i] * now[RATE, i] > NEAR
+    return d > NEAR * abs(now[APPROACH, i]) and 1.0 + law["loss"][i] * now[RATE, i] > LET_GO
 
 
 @outer()
