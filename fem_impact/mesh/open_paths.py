@@ -2,8 +2,6 @@
 
 import numpy as np
 import shapely
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
 
 from .._base.rounding import SAME
 from .loops import Piece, divide, is_straight
@@ -13,9 +11,12 @@ def chains(pieces: list[Piece], span: float) -> list[list[int]]:
     """Numbers of pieces that follow each other under one name, from an open end or a branch to the next."""
     ends = np.array([piece.at(np.array([0.0, 1.0])) for piece in pieces]).reshape(-1, 2)
     places = shapely.points(ends)
-    near = shapely.STRtree(places).query(places, "dwithin", SAME * span)  # pairs of ends at one place
-    alike = coo_array((np.ones(near.shape[1]), tuple(near)), shape=(len(ends), len(ends)))
-    node = connected_components(alike, directed=False)[1].reshape(-1, 2)
+    one, other = shapely.STRtree(places).query(places, "dwithin", SAME * span)
+    place, before = np.arange(len(ends)), np.full(len(ends), -1)
+    while not np.array_equal(place, before):  # ends at one place get the smallest of their numbers
+        before = place.copy()
+        np.minimum.at(place, one, place[other])
+    node = place.reshape(-1, 2)
     at: dict[tuple[str, int], list[int]] = {}
     for i, piece in enumerate(pieces):
         for each in node[i].tolist():
