@@ -53,7 +53,7 @@ def test_any_number_gives_a_result_or_one_error_that_names_the_argument(number, 
 
 @pytest.mark.slow
 def test_spoiled_arguments_of_all_functions_give_a_result_or_one_error_that_names_them(all_cases):
-    every = 1 if all_cases else 20
+    every = 1 if all_cases else 10
     command = [sys.executable, str(Path(signatures.__file__)), f"--every={every}"]
     done = subprocess.run(command, capture_output=True, text=True)
     found = json.loads(done.stdout.splitlines()[-1])
