@@ -6,7 +6,8 @@ from reality.record import at_first_look, judge
 
 QUICK = ("small_ball", "leeb", "copper", "steel_cantilever")
 CASES = [
-    pytest.param(each, id=each.key, marks=[] if each.key in QUICK else pytest.mark.slow) for each in page.EXPERIMENTS
+    pytest.param(each, id=each.key, marks=[] if each.key in QUICK else [pytest.mark.slow, pytest.mark.thin(3)])
+    for each in page.EXPERIMENTS
 ]
 
 

@@ -92,6 +92,7 @@ def membrane_in_air(order, number, radius, weight, tension, sides=2):
 
 @pytest.mark.parametrize("order", [0, 1, 2])
 @pytest.mark.slow
+@pytest.mark.thin(3)
 def test_drumhead(order):
     """A kettledrum's head of Mylar in a wall: the air halves the lowest frequency."""
     radius, weight, tension = 0.328, 0.262, 3990.0
