@@ -78,7 +78,7 @@ def run_system(
         stretch = stretched.kernel
     if scheme == "collocation":
         nodes, powers = gauss(NODES)
-        # or two misfits may take the same steps
+        # shorter with the misfit, or runs of two misfits may take the same steps
         longest = min(pace.duration, last[0]) * min(0.5, float(size) ** (1.0 / 6.0))
         result = run_collocation(system, nodes, powers, longest, float(size) * pace.speed, limits)
     else:

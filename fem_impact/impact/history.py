@@ -255,12 +255,12 @@ class History(check.Locked):
             return 0.0
         peak = float(self.contacts[:, 2].max())
         missed = float(record.force_missed(self.steps, self.now, self.law, self.n_coefficients, peak))
-        pushes, speeds = self.impulses / self.steps[:, 1:2], self._column(layout.SPEED)
         for i in np.flatnonzero(self.law["loss"]):
-            row, loss = int(pushes[:, i].argmax()), float(self.law["loss"][i])
-            bends = np.abs(np.diff(speeds[max(0, row - 3) : row + 4, i], 3))  # fourth derivatives times h**3
-            share = loss / max(1.0 + loss * speeds[row, i], SLOWEST)
-            missed = max(missed, CUBIC * share * float(bends.max(initial=0.0)) * float(pushes[row, i]) / peak)
+            pushes, speeds = self.impulses[:, i] / self.steps[:, layout.LENGTH], self._column(layout.SPEED)[:, i]
+            row, loss = int(pushes.argmax()), float(self.law["loss"][i])
+            bends = np.abs(np.diff(speeds[max(0, row - 3) : row + 4], 3))  # fourth derivatives times h**3
+            share = loss / max(1.0 + loss * speeds[row], SLOWEST)
+            missed = max(missed, CUBIC * share * float(bends.max(initial=0.0)) * float(pushes[row]) / peak)
         return missed
 
     def samples(self, tolerance: float) -> tuple[np.ndarray, np.ndarray]:

@@ -193,13 +193,12 @@ def test_after_the_first_blow_of_a_kind_it_is_on_disk(tmp_path, all_cases):
         run = [sys.executable, "-W", "error", "-c", code.format(KINDS[kind])]
         return subprocess.run(run, env=environment, capture_output=True, text=True, check=True).stdout
 
-    wanted = {"energy": [1, 0], "collocation": [0, 1], "stretching": [1, 0]}
-    for kind, found in [*wanted.items()][: None if all_cases else 1]:
+    for kind in [*KINDS][: None if all_cases else 1]:
         assert strike(kind) == "[0, 0]\n"  # as plain Python
         until = time.monotonic() + 400.0
         while list(tmp_path.rglob(fresh.MARK)) and time.monotonic() < until:
             time.sleep(0.2)
-        assert strike(kind) == f"{found}\n"  # read from disk
+        assert strike(kind) == ("[0, 1]\n" if kind == "collocation" else "[1, 0]\n")  # read from disk
     while not list(tmp_path.rglob("many_blows.run*.nbc")) and time.monotonic() < until:
         time.sleep(0.2)
     assert list(tmp_path.rglob("many_blows.run*.nbc"))  # what maps need comes next
