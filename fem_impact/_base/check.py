@@ -243,13 +243,15 @@ def array(name: str, value: Any, shape: tuple[int | None, ...], unit: str = "", 
 
 def places(name: str, value: Any, dimension: int) -> np.ndarray:
     """Return one point or several on a body of a dimension as a new array (n_points, dimension) [m]."""
+    point = f"a point ({', '.join('xyz'[:dimension])}) in m"
+    if value is None:
+        raise ValueError(f"{name} must be given, {point}")
     raw = numbers(name, value, "m")
     if dimension == 1 and (raw.ndim < 2 or raw.shape[-1] != 1):
         raw = raw.reshape(-1, 1)
     if raw.ndim < 2:
         if raw.shape != (dimension,):
-            point = "(x, y)" if dimension == 2 else f"of {dimension} coordinates"
-            raise ValueError(f"{name} must be a point {point} in m, got {shown(value)}")
+            raise ValueError(f"{name} must be {point}, got {shown(value)}")
         raw = raw[None]
     return finite(name, raw, "m") if raw.shape[1:] == (dimension,) else array(name, raw, (None, dimension), "m")
 

@@ -129,9 +129,7 @@ class Assumption:
 
 
 def unexamined(
-    quantities: Iterable[str],
-    why: str = "several bodies meet",
-    remedy: str = "examine each pair by `fi.strike`",
+    quantities: Iterable[str], why: str = "several bodies meet", remedy: str = "examine each pair by `fi.strike`"
 ) -> tuple[Assumption, ...]:
     """Every assumption as not known, for a blow that nobody examined."""
     effect = dict.fromkeys(quantities)

@@ -49,10 +49,7 @@ class Balance:
     @property
     def dissipated(self) -> dict[str, float]:
         """Energy [J] lost to modal damping and to the contacts."""
-        return {
-            "modes": self.modal_loss if self.damped else 0.0,
-            "contact": self.contact_loss if self.lossy else 0.0,
-        }
+        return {"modes": self.modal_loss if self.damped else 0.0, "contact": self.contact_loss if self.lossy else 0.0}
 
     @property
     def error(self) -> float:

@@ -193,7 +193,10 @@ def _follow(bodies, laws, parts, speed, options, striker=None, at=None, others=(
         )
     firsts = np.cumsum([0, *(len(part.omega) for part in parts)]).tolist()
     held = [first + i for first, part in zip(firsts, parts) for i in range(part.held)]
-    pace = engine.pace_of(system, held)
+    pace, own = engine.pace_of(system, held), parts[0]
+    if speed and own.touched:
+        rigid = own.rows[0, : own.held] if own.held else own.rows[0, own.omega == 0.0]
+        pace = pace._replace(rebound=tuple((rigid / speed).tolist()))
     depth, way = pace.duration * pace.speed, max(np.abs(system.offset).tolist())
     if EPSILON * way > options.tolerance * depth:
         raise ValueError(
@@ -236,13 +239,14 @@ def _parts(bodies, contacts, speeds, states, forces, residual, strikers) -> tupl
     forces = np.zeros(len(bodies)) if forces is None else check.array("forces", forces, (len(bodies),), "N")
     ends: list[list] = [[] for _ in bodies]  # (contact, sign, point) on each body
     for i, touch in enumerate(contacts):
-        for body, at, sign in ((touch.first, touch.first_at, 1.0), (touch.second, touch.second_at, -1.0)):
+        both = (touch.first, "first_at", touch.first_at, 1.0), (touch.second, "second_at", touch.second_at, -1.0)
+        for body, name, at, sign in both:
             if body is None:
                 continue
             if not 0 <= body < len(bodies):
                 raise ValueError(f"contacts must name bodies from 0 to {len(bodies) - 1}, got {body}")
             at = strikers[body].at if at is None and body in strikers else at
-            ends[body].append((i, sign, bodies[body].point("at", at)))
+            ends[body].append((i, sign, bodies[body].point(f"{name} of contact {i}", at)))
         one = touch.first
         if one == touch.second and (not bodies[one].omega.any() or np.array_equal(*(end[2] for end in ends[one][-2:]))):
             raise ValueError(

@@ -5,6 +5,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from .._base import check
+from .error import CAUSES
 from .quantities import UNITS
 
 if TYPE_CHECKING:
@@ -31,7 +32,7 @@ def dataset(hit: "Response", points: Any = None, times: Any = None, max_frequenc
         data[f"impact_{name}"] = (("impact",), values, {"units": unit})
     errors = np.array(hit.restitution_errors, float)
     data["impact_restitution_error"] = (("impact",), errors, {"units": "1"})
-    for part in ("step", "truncation", "mesh", "idealisation", "measurement", "total"):
+    for part in (*CAUSES, "total"):
         data[f"error_{part}"] = ((), getattr(hit.error, part), {"units": "1"})
     data |= {f"energy_{name}": ((), value, {"units": "J"}) for name, value in hit.energies.items()}
     places: dict[str, Any] = {"time": ("time", hit.time, {"units": "s", "long_name": "time"})}

@@ -1,6 +1,6 @@
 """The distance between two blows: every error that the program states is one."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from math import sqrt
 from operator import sub
 from typing import TYPE_CHECKING, Any
@@ -13,6 +13,7 @@ from .history import History
 from .quantities import BAND_POINTS, BANDED
 
 if TYPE_CHECKING:
+    from .engine import Pace
     from .response import Response
 
 INSTANTS = ("contact_time", "force")  # quantities that depend on single instants
@@ -54,13 +55,13 @@ def value_of(hit: "Response", name: str, band: float | None) -> Any:
 
 def of_runs(
     one: History, two: History, quantities: Mapping[str, float | None], over: tuple[float, float] = (1.0, 1.0),
-    swings: Sequence[float] = (),
+    pace: "Pace | None" = None,
 ) -> np.ndarray:  # fmt: skip
     """How far one run is from another [-]: in each quantity asked for, in its margin and in each impact's restitution.
 
     (n_quantities + 1 + n_impacts,), impacts in the order of `History.contacts`. All are 1 if the runs ended
-    differently. The restitution counts by the speed of every body that moves rigidly, over the momentum of all;
-    ``swings`` are frequencies [rad/s] of strikers in hands, which do so, too.
+    differently. The restitution counts by the speed of every body that moves rigidly, over the momentum of all, and by
+    that of the first alone; ``pace`` tells which strikers in hands move so, too, and what the first rebounds with.
     ``over`` divides the distances in quantities that depend on the whole blow, and those in contact time and peak
     force, which depend on an instant; not those of impacts, as points part as fast as the bodies ring there, also in
     modes faster than the step.
@@ -69,16 +70,18 @@ def of_runs(
     if len(one.contacts) != n_impacts or one.status != two.status:
         return np.ones(len(quantities) + 1 + n_impacts)
     # other bodies that swing have much momentum, of which the striker's error is no share
-    rigid, other = two.omega == 0.0, one.omega == 0.0
-    for omega in swings:
-        rigid, other = rigid | (two.omega == omega), other | (one.omega == omega)
+    rigid, other = (
+        (np.isin(run.omega, (0.0, *pace.swings)) if pace and pace.swings else run.omega == 0.0).nonzero()[0]
+        for run in (two, one)
+    )
     start, end = two.start_p[rigid], two.end_p[rigid]
     momentum = sqrt(max(start.dot(start), end.dot(end)))
     momentum = momentum or sqrt(two.start_p.dot(two.start_p)) or sqrt(two.end_p.dot(two.end_p)) or 1.0
     # bodies that a force holds pressed rest but for the rounding of what it gave them
     given = float(two.contacts[:, 3].sum()) * np.abs(two.shape[:, rigid]).max(initial=0.0)
-    speeds = np.abs(one.end_p[other] - end) - ROUNDING * given
-    found: dict[str, float] = {"restitution": max(speeds.tolist(), default=0.0) / momentum}
+    speeds = np.maximum(np.abs(one.end_p[other] - end) - ROUNDING * given, 0.0)
+    own = sum(abs(part) * speed for part, speed in zip(pace.rebound if pace else (), speeds.tolist()))
+    found: dict[str, float] = {"restitution": max(max(speeds.tolist(), default=0.0) / momentum, own)}
     totals = []
     for start, end, peak, impulse, *_ in each if n_impacts else ():
         totals.append({"impulse": sum(impulse), "contact_time": sum(map(sub, end, start)), "force": max(peak)})

@@ -43,6 +43,9 @@ class Pace(NamedTuple):
     speed: float  # [m/s] of approach, the fastest
     longest_step: float = np.inf  # [s] the first of a run
     swings: tuple[float, ...] = ()  # [rad/s] frequencies of strikers in hands, which count as masses
+    # [kg**-0.5 s/m] speed of the first body's first contact by the speeds of its rigid motions (n_rigid,), over that of
+    # arrival
+    rebound: tuple[float, ...] = ()
 
 
 @cache
@@ -94,9 +97,8 @@ def run_system(
             + (f" or max_impacts of at most {ended}" if ended else "")
         )
     if status == record.FAILED:
-        if scheme == "collocation":
-            raise SimulationError(f"scheme collocation found no valid next step at {time:.4g} s; use A4")
-        raise SimulationError(f"scheme {scheme} found no valid next step at {time:.4g} s; check the units of the scene")
+        advice = "use A4" if scheme == "collocation" else "check the units of the scene"
+        raise SimulationError(f"scheme {scheme} found no valid next step at {time:.4g} s; {advice}")
     return history
 
 

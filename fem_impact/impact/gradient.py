@@ -142,10 +142,26 @@ def differences(
 ) -> list[tuple[np.ndarray, np.ndarray]]:
     """Slopes in numbers (n,) of each quantity that ``told`` reads from a blow, and their errors: (n,), (n, m)."""
     hit, numbers = parameters.hit, parameters.numbers(names)
-    again = Again(hit, parameters.change(names), parameters.faster(names), step_of(hit), told)
+    change, faster, whole = parameters.change(names), parameters.faster(names), step_of(hit)
     sizes = np.array([abs(number) or parameters.size(name) for name, number in zip(names, numbers)])
     one_sided = np.array([number == 0.0 and name.endswith(ONE_SIDED) for name, number in zip(names, numbers)])
-    runs = [replace(again, step=again.step / finer).slopes(sizes, one_sided, nudge) for finer, nudge in RUNS]
+
+    def again(step: float, i: int = 0, by: float = 0.0) -> list[Any]:
+        """The quantities with number i larger by so much, in steps [s] in contact of one's own."""
+        h, changed = hit.history, {}
+        for name in Change._fields if by else ():
+            each = getattr(h, name)
+            more = columns(each) + by * columns(getattr(change, name)[i])
+            changed[name] = more.view(each.dtype).reshape(each.shape)
+        history = engine.again(h, step, **changed)
+        if len(history.contacts) != len(h.contacts):
+            raise SimulationError(
+                f"no gradient: runs of different steps find {len(history.contacts)} and {len(h.contacts)} impacts; "
+                "give a smaller tolerance and no dt, or max_impacts"
+            )
+        return told(replace(hit, history=history, speed=hit.speed + by * faster[i]))
+
+    runs = [_slopes(partial(again, whole / finer), sizes, one_sided, nudge) for finer, nudge in RUNS]
     found = []
     for slopes, finer in zip(*runs):
         # the last is rounding over NUDGE
@@ -200,48 +216,25 @@ def _value(hit: "Response", name: str, band: float | None) -> Any:
     return getattr(hit, name)
 
 
-@dataclass(frozen=True, eq=False)
-class Again:
-    """A blow run again in steps of its own, with one of its numbers changed."""
-
-    hit: "Response"
-    change: Change
-    faster: np.ndarray  # (n,) [m/s] what a unit of each number adds to the speed of arrival
-    step: float  # [s] in contact
-    told: Callable[["Response"], list[Any]]  # the quantities of a blow
-
-    def __call__(self, i: int = 0, by: float = 0.0) -> list[Any]:
-        """The quantities with number i larger by so much."""
-        h = self.hit.history
-        changed = {
-            name: (columns(each) + by * columns(getattr(self.change, name)[i])).view(each.dtype).reshape(each.shape)
-            for name, each in ((name, getattr(h, name)) for name in Change._fields if by)
-        }
-        history = engine.again(h, self.step, **changed)
-        if len(history.contacts) != len(h.contacts):
+def _slopes(
+    again: Callable[..., list[Any]], sizes: np.ndarray, one_sided: np.ndarray, nudge: float
+) -> list[np.ndarray]:
+    """Of each quantity its slopes per relative change of each number, from changes by ``nudge`` of their sizes."""
+    plain, rows, bends = again(), [], []
+    for i, (by, one) in enumerate(zip(nudge * sizes, one_sided)):
+        low, high = (plain, again(i, 2.0 * by)) if one else (again(i, -by), again(i, by))
+        middle = again(i, by) if one else plain
+        bends.append([(b - 2.0 * m + a) / nudge for a, m, b in zip(low, middle, high)])
+        rows.append([(b - a) / (2.0 * nudge) - one * c for a, b, c in zip(low, high, bends[-1])])
+    found = [np.array(each) for each in zip(*rows)]
+    for value, slopes, bend in zip(plain, found, zip(*bends)):
+        # slopes on both sides differ by 1e-4 to 5e-4 where a blow is smooth
+        if np.max(np.abs(bend)) > 0.02 * max(np.max(np.abs(value)), np.max(np.abs(slopes))):
             raise SimulationError(
-                f"no gradient: runs of different steps find {len(history.contacts)} and {len(h.contacts)} impacts; "
-                "give a smaller tolerance and no dt, or max_impacts"
+                "no gradient: slopes on both sides of this blow differ, as with a small change of some number another "
+                "force becomes the largest, or a later push yields further; change some number slightly"
             )
-        return self.told(replace(self.hit, history=history, speed=self.hit.speed + by * self.faster[i]))
-
-    def slopes(self, sizes: np.ndarray, one_sided: np.ndarray, nudge: float) -> list[np.ndarray]:
-        """Of each quantity its slopes per relative change of each number, from changes by ``nudge`` of their sizes."""
-        plain, rows, bends = self(), [], []
-        for i, (by, one) in enumerate(zip(nudge * sizes, one_sided)):
-            low, high = (plain, self(i, 2.0 * by)) if one else (self(i, -by), self(i, by))
-            middle = self(i, by) if one else plain
-            bends.append([(b - 2.0 * m + a) / nudge for a, m, b in zip(low, middle, high)])
-            rows.append([(b - a) / (2.0 * nudge) - one * c for a, b, c in zip(low, high, bends[-1])])
-        found = [np.array(each) for each in zip(*rows)]
-        for value, slopes, bend in zip(plain, found, zip(*bends)):
-            # slopes on both sides differ by 1e-4 to 5e-4 where a blow is smooth
-            if np.max(np.abs(bend)) > 0.02 * max(np.max(np.abs(value)), np.max(np.abs(slopes))):
-                raise SimulationError(
-                    "no gradient: slopes on both sides of this blow differ, as with a small change of some number "
-                    "another force becomes the largest, or a later push yields further; change some number slightly"
-                )
-        return found
+    return found
 
 
 def step_of(hit: "Response") -> float:

@@ -185,17 +185,13 @@ class History(check.Locked):
         Columns are start, end, peak force, impulse, contact index, with what speed the bodies meet and part, and the
         restitution, the second of these over the first; NaN where there is none.
         """
-        size, width = np.abs(self.shape), layout.PUSH + self.n_coefficients
-        pushes = self.steps[:, layout.HEAD : layout.HEAD + width * len(size)]
-        rate = np.maximum.reduce(np.abs(pushes[:, layout.SPEED :: width]), axis=None, initial=0.0)
-        deepest = np.maximum.reduce(pushes[:, ::width], axis=None, initial=0.0)
+        size, n = np.abs(self.shape), self.n_coefficients
         way = max((size @ (np.abs(self.start_q) + self.end_time * np.abs(self.start_p))).tolist())
-        slack = float(max(ROUNDING * way, TOUCH * deepest))
-        looks = 16  # per step for the peak force: misses (pi/11/16)**2/8 before the parabola
-        found = record.find_impacts(self.steps, self.now, self.law, self.n_coefficients, looks, ROUNDING * rate, slack)
-        peak, pressed = found[:, 2], self.law[found[:, 4].astype(int)]
-        depth = (peak / pressed["stiffness"]) ** (1.0 / pressed["exponent"])
-        found = found[(peak > FAINT * peak.max(initial=0.0)) | (depth > FAINT * deepest)]
+        found = record.find_impacts(self.steps, self.now, self.law, n, ROUNDING, way, TOUCH)
+        if len(found) > 1:
+            peak, pressed = found[:, 2], self.law[found[:, 4].astype(int)]
+            depth = (peak / pressed["stiffness"]) ** (1.0 / pressed["exponent"])
+            found = found[(peak > FAINT * peak.max()) | (depth > FAINT * self._column(0).max(initial=0.0))]
         if min(found[:, 7].tolist(), default=np.inf) < np.inf:
             # bodies that touch at rest press each other as soon as a force acts on one of them: a constant one, or that
             # of a push at another contact

@@ -179,11 +179,7 @@ def part_of_striker(striker: Striker, residual: bool = True) -> ReducedBody:
 
 
 def reduce_body(
-    modes: Modes,
-    touched: Touched,
-    points: np.ndarray,
-    rows: np.ndarray,
-    left_out: tuple[np.ndarray, np.ndarray] | None,
+    modes: Modes, touched: Touched, points: np.ndarray, rows: np.ndarray, left_out: tuple[np.ndarray, np.ndarray] | None
 ) -> ReducedBody:
     """An undeformed body at rest, with its shapes and residual compliance at its contacts."""
     n_ends = len(touched)

@@ -220,10 +220,12 @@ class Response(Totals, check.Locked):
         each = () if self.vectors is None else self.vectors.descriptions().values()
         return tuple(motion.driven(self, modes) for modes in each)
 
-    def _motion(self, body: int) -> BodyMotion:
+    def _is_target(self, body: int) -> bool:
         n = len(self.bodies)
-        check.count("body", body, low=-n, high=n - 1)
-        return self._target if body % n == n - 1 else motion.of_run(self, body % n)
+        return check.count("body", body, low=-n, high=n - 1) % n == n - 1
+
+    def _motion(self, body: int) -> BodyMotion:
+        return self._target if self._is_target(body) else motion.of_run(self, body % len(self.bodies))
 
     @property
     def contact(self) -> Contact:
@@ -435,7 +437,7 @@ class Response(Totals, check.Locked):
 
     def _moved(self, points: Any, times: Any, body: int, residual: bool, name: str) -> np.ndarray:
         """A motion by Ritz vectors, if they tell it well enough, or else by modes."""
-        rate, asked, mine = name == "velocity", _times(times), body in (-1, len(self.bodies) - 1)
+        rate, asked, mine = name == "velocity", _times(times), self._is_target(body)
         if residual and mine and self.vectors is not None and np.isfinite(self._apart(points, asked, rate)):
             return self._descriptions[0].at(points, asked, rate)
         return self._motion(body).at(points, asked, rate, residual)

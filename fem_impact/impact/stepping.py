@@ -99,18 +99,12 @@ def _first_count(scheme: str, tolerance: float, quantities: Mapping[str, float |
 
 
 def steps_for(
-    contact: Contact,
-    duration: float,
-    tolerance: float,
-    quantities: Mapping[str, float | None],
-    scheme: str | None = None,
-    dt: float | None = None,
-) -> tuple[str, float]:
+    contact: Contact, duration: float, tolerance: float, quantities: Mapping[str, float | None],
+    scheme: str | None = None, dt: float | None = None,
+) -> tuple[str, float]:  # fmt: skip
     """Scheme and first time step [s] of `strike`; ``duration`` is the contact time on a rigid wall [s]."""
     scheme = scheme or scheme_for(tolerance, contact.exponent)
-    if scheme in ("A", "A4"):
-        return scheme, dt or duration / _first_count(scheme, tolerance, quantities)
-    return scheme, dt or duration / (2.0 if scheme == "collocation" else 1.0)
+    return scheme, dt or duration / (2.0 if scheme == "collocation" else _first_count(scheme, tolerance, quantities))
 
 
 @dataclass(frozen=True, eq=False)
@@ -139,10 +133,10 @@ def refine_steps(
     free = options.scheme is None and options.dt is None
     most, span = engine.most_steps(system, stretched), min(pace.duration, options.last[0])
     if options.dt is None and span > COARSER * most * pace.longest_step:
+        rise = f"within {engine.STEEP * pace.longest_step:.2g} s" if pace.longest_step else "faster than numbers tell"
         raise SimulationError(
-            f"{most} steps cannot follow a force that acts for {span:.2g} s and changes within "
-            f"{engine.STEEP * pace.longest_step:.2g} s where it is steepest; take a law of a lower exponent, that "
-            "yields later or that rises less steeply"
+            f"{most} steps cannot follow a force that acts for {span:.2g} s and changes {rise} where it is steepest; "
+            "take a law of a lower exponent, that yields later or that rises less steeply"
         )
     try:
         return _Control(system, options, pace, scheme, free, stretched).agree_runs()
@@ -182,7 +176,7 @@ class _Control:
             over = min(over[0], 2.0**order - 1.0), min(over[1], 2.0**order - 1.0)
             if felt["relaxation"].min() < sizes[0]:  # it lets go within its relaxation: contact times at first order
                 over = over[0], 1.0
-        error = distance.of_runs(coarse, fine, quantities, over, self.pace.swings)
+        error = distance.of_runs(coarse, fine, quantities, over, self.pace)
         if "force" in quantities:
             i = [*quantities].index("force")
             error[i] = max(error[i], fine.force_missed)

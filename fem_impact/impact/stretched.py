@@ -7,7 +7,6 @@ import numpy as np
 
 from .._base import check
 from .._base.check import SimulationError
-from .compiled.bundles import KernelSystem
 from .compiled.stretched import Stretch, energies_of_stretching, replay_stretched
 
 
@@ -52,13 +51,11 @@ class Stretched(check.Locked):
         begin = history.reached.get("last", (np.inf,))
         if times[0] < begin[0]:
             begin = 0.0, 0, np.zeros(self.forms.shape[1]), history.start_q, history.start_p
-        bodies = history.omega, history.zeta, history.shape, history.offset, history.bias, history.law
         for array in begin[2:]:
             array.setflags(write=False)  # as the others; numba would compile the kernel again for writable ones
-        failed, *begin = replay_stretched(
-            KernelSystem(*bodies, *begin[3:]), self.kernel, history.steps, int(self.ramp),
-            self.base, begin[:3], np.array(times, float), states,
-        )  # fmt: skip
+        system = history.system._replace(q=begin[3], p=begin[4])
+        how = self.kernel, history.steps, int(self.ramp), self.base, begin[:3]
+        failed, *begin = replay_stretched(system, *how, np.array(times, float), states)
         history.reached["last"] = tuple(begin)
         if failed:
             raise SimulationError(f"the stretching of the motion did not settle at {begin[0]:.4g} s in any step")

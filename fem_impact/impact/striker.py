@@ -157,14 +157,9 @@ class Striker(check.Brief):
 
     @classmethod
     def stick(
-        cls,
-        mass: float,
-        first_frequency: float,
-        *,
-        n_modes: int | None = None,
-        slenderness: float | None = None,
+        cls, mass: float, first_frequency: float, *, n_modes: int | None = None, slenderness: float | None = None,
         shear_ratio: float = SHEAR_RATIO,
-    ) -> "Striker":
+    ) -> "Striker":  # fmt: skip
         """A uniform stick, hinged at its far end, that strikes with its free end like a drumstick.
 
         Parameters

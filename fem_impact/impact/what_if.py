@@ -70,9 +70,7 @@ def what_if(blow: Followed, variations: Sequence[Variation]) -> dict[str, np.nda
         for ways in each.changes:
             effects = []
             for parts, weight, parting in ways:
-                effects.append(
-                    distance.of_runs(blow.again(parts), blow.runs.coarse, quantities, swings=blow.pace.swings)
-                )
+                effects.append(distance.of_runs(blow.again(parts), blow.runs.coarse, quantities, pace=blow.pace))
                 effects[-1][: n + 1] *= weight
                 effects[-1][n + 1 :] *= parting
             if effects:
@@ -178,16 +176,13 @@ def add_poorer_descriptions(blow: Followed, bodies: Sequence[Modes], errors: dic
     """
     for i, body in enumerate(bodies):
         (itself, _), *others = body.descriptions().items()
-        runs = {itself: blow.runs.fine} | {lacking: _followed_by(blow, i, other) for lacking, other in others}
+        runs: dict[frozenset[str], History | None] = {itself: blow.runs.fine}
+        for lacking, other in others:
+            runs[lacking] = None
+            with suppress(SimulationError):
+                runs[lacking] = blow.again(blow.changed(i, blow.parts[i].described_by(other)), finely=True)
         for cause, found in worst_differences(runs, functools.partial(_told_by, blow)).items():
             errors[cause] = errors.get(cause, 0.0) + found
-
-
-def _followed_by(blow: Followed, body: int, other: Modes) -> History | None:
-    """The blow on a body described otherwise, or None if that cannot be followed."""
-    with suppress(SimulationError):
-        return blow.again(blow.changed(body, blow.parts[body].described_by(other)), finely=True)
-    return None
 
 
 def worst_differences(
@@ -211,7 +206,7 @@ def _told_by(blow: Followed, better: History | None, poorer: History | None, fir
     n, one_more = blow.options.n_quantities, np.ones(len(blow.runs.error))
     if better is None or poorer is None:
         return one_more * first
-    found = distance.of_runs(poorer, better, blow.options.quantities, swings=blow.pace.swings)
+    found = distance.of_runs(poorer, better, blow.options.quantities, pace=blow.pace)
     number = len(blow.runs.fine.contacts)
     if not first:
         same = len(better.contacts) == len(poorer.contacts) == number

@@ -78,7 +78,7 @@ def _radius(radius: float) -> float:
     return float(radius)
 
 
-def cap(radius: float, *, centre: ArrayLike = (0.0, 0.0)) -> Rise:
+def cap(radius: float, *, centre: "ArrayLike" = (0.0, 0.0)) -> Rise:
     """A sphere of a radius [m], highest at ``centre`` (2,) [m]; lowest there if the radius is negative.
 
     Examples
@@ -89,13 +89,13 @@ def cap(radius: float, *, centre: ArrayLike = (0.0, 0.0)) -> Rise:
     return partial(_cap, radius=_radius(radius), centre=check.array("centre", centre, (2,), "m"))
 
 
-def cylinder(radius: float, *, angle: float = 0.0, centre: ArrayLike = (0.0, 0.0)) -> Rise:
+def cylinder(radius: float, *, angle: float = 0.0, centre: "ArrayLike" = (0.0, 0.0)) -> Rise:
     """A cylinder of a radius [m] whose straight top runs through ``centre`` at an angle [rad] from the x axis."""
     place = check.array("centre", centre, (2,), "m")
     return partial(_cylinder, radius=_radius(radius), angle=check.number("angle", angle, "rad"), centre=place)
 
 
-def saddle(radius: float, *, angle: float = 0.0, centre: ArrayLike = (0.0, 0.0)) -> Rise:
+def saddle(radius: float, *, angle: float = 0.0, centre: "ArrayLike" = (0.0, 0.0)) -> Rise:
     """A saddle that falls with a radius [m] along a direction ``angle`` [rad] and rises as much across it."""
     place = check.array("centre", centre, (2,), "m")
     return partial(_saddle, radius=_radius(radius), angle=check.number("angle", angle, "rad"), centre=place)
@@ -117,7 +117,7 @@ def cymbal(radius: float, bow: float, cup_radius: float, cup: float) -> Rise:
     return partial(_cymbal, **sizes)
 
 
-def table(points: ArrayLike, heights: ArrayLike) -> Callable[[np.ndarray], np.ndarray]:
+def table(points: "ArrayLike", heights: "ArrayLike") -> Callable[[np.ndarray], np.ndarray]:
     """A smooth surface through heights (n,) [m] at points (n, 2) [m]; beyond them, it goes on straight."""
     place = check.array("points", points, (None, 2), "m")
     height = check.array("heights", heights, (len(place),), "m")

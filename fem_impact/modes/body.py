@@ -108,8 +108,8 @@ class Body(check.Brief):
     @classmethod
     def load(
         cls, files: Any, *, mass: float | None = None, loads: Any = None, damping_ratio: Any = None,
-        modal_mass: ArrayLike | None = None, names: Mapping[str, int] | None = None, normals: ArrayLike | None = None,
-        solid: Any = None, n_modes: int | None = None,
+        modal_mass: "ArrayLike | None" = None, names: Mapping[str, int] | None = None,
+        normals: "ArrayLike | None" = None, solid: Any = None, n_modes: int | None = None,
     ) -> "Body":  # fmt: skip
         """Read a body from files of other programs, or objects of other packages.
 
@@ -178,7 +178,7 @@ class Body(check.Brief):
 
     @classmethod
     def from_matrices(
-        cls, mass: Any, stiffness: Any, nodes: ArrayLike, *, dofs: Any = None, recovery: Any = None,
+        cls, mass: Any, stiffness: Any, nodes: "ArrayLike", *, dofs: Any = None, recovery: Any = None,
         total_mass: float | None = None, loads: Any = None, n_modes: int | None = None, **fields: Any,
     ) -> "Body":  # fmt: skip
         """A body from its matrices, of a whole model or of a reduced one, as of Craig and Bampton.
@@ -232,7 +232,7 @@ class Body(check.Brief):
 
     @classmethod
     def rigid(
-        cls, mass: float, inertia: Any, nodes: ArrayLike, *, centre: ArrayLike = (0.0, 0.0, 0.0), **more: Any
+        cls, mass: float, inertia: Any, nodes: "ArrayLike", *, centre: "ArrayLike" = (0.0, 0.0, 0.0), **more: Any
     ) -> "Body":
         """A rigid body, free to move and to turn: six modes of 0 Hz.
 
@@ -259,7 +259,7 @@ class Body(check.Brief):
         shapes = free_body.six(nodes, mass, inertia, centre)
         return cls(np.zeros(shapes.shape[2]), shapes, nodes, mass, **more)
 
-    def freed(self, inertia: Any, centre: ArrayLike) -> "Body":
+    def freed(self, inertia: Any, centre: "ArrayLike") -> "Body":
         """The same body with its rigid motions, which its modes lack: as of a free one, tested on soft springs.
 
         Parameters
@@ -404,7 +404,7 @@ class Body(check.Brief):
         row = self.node(where)
         return np.asarray(self._ways(direction)[row] @ self.shapes[row])
 
-    def displacement(self, q: ArrayLike, where: Any = None) -> np.ndarray:
+    def displacement(self, q: "ArrayLike", where: Any = None) -> np.ndarray:
         """Displacements (n_times, n_points, 3) [m] at nodes, of the kept modes alone.
 
         Parameters

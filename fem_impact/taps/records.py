@@ -1,6 +1,7 @@
 """The table of measured taps, and how files become one."""
 
 from collections.abc import Iterable, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -88,7 +89,9 @@ class Taps:
         if overload is None:
             cut = [[triggers.clipped(f), *(triggers.clipped(r) for r in each.T)] for f, each in zip(rows, others)]
         else:
-            flags = np.asarray(check.shown(overload) if isinstance(overload, dict) else overload)
+            flags = np.asarray(None)
+            with suppress(ValueError):  # rows of several lengths
+                flags = np.asarray(overload)
             if flags.dtype != bool or flags.shape not in ((), (n_taps, 1 + n_channels)):
                 raise ValueError(
                     f"overload must be bools of shape ({n_taps}, {1 + n_channels}), got {check.shown(overload)}"

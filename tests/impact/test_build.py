@@ -12,6 +12,15 @@ import pytest
 import fem_impact
 from fem_impact.impact.compiled import build, law
 
+compiled_only = pytest.mark.skipif(not build.COMPILED, reason="nothing is compiled anyway")
+
+
+def printed(script, environment, *options, folder=None):
+    """What a script says in a process of its own."""
+    command = [sys.executable, *options, "-c", script]
+    return subprocess.run(command, env=environment, cwd=folder, capture_output=True, text=True, check=True).stdout
+
+
 SCRIPT = """
 import numpy as np
 from fem_impact.impact.compiled.law import table
@@ -37,15 +46,14 @@ for kernel in (energy.follow, record.find_impacts, law.stored):
 """
 
 
-@pytest.mark.skipif(not build.COMPILED, reason="nothing is compiled anyway")
+@compiled_only
 def test_a_plan_compiles_nothing(tmp_path):
     """It strikes, to foresee the length of the blow and what may be wrong with the model, as plain Python."""
-    environment = {**os.environ, "NUMBA_CACHE_DIR": str(tmp_path)}
-    done = subprocess.run([sys.executable, "-c", PLAN], env=environment, capture_output=True, text=True, check=True)
-    assert "predicted for a typical machine" in done.stdout and not list(tmp_path.rglob("*.nb?"))
+    said = printed(PLAN, {**os.environ, "NUMBA_CACHE_DIR": str(tmp_path)})
+    assert "predicted for a typical machine" in said and not list(tmp_path.rglob("*.nb?"))
 
 
-@pytest.mark.skipif(not build.COMPILED, reason="nothing is compiled anyway")
+@compiled_only
 def test_what_is_not_compiled_runs_as_plain_python_and_says_the_same():
     table, approach = law.table([[1e6, 1.5, 0.1]]), np.array([1e-3], np.float32)  # a type nothing is compiled for
     known = len(law.stored.overloads)
@@ -68,11 +76,8 @@ print(law.dents(law.table([[1.0, 1.0]])), sum(law.dents.stats.cache_hits.values(
 def dents(package, **environment):
     """Dents as a new process finds them with the package in a folder: how many kernels it read, and from where."""
     whole = {name: value for name, value in os.environ.items() if name not in ("NUMBA_CACHE_DIR", "XDG_CACHE_HOME")}
-    done = subprocess.run(
-        [sys.executable, "-c", TWICE], env={**whole, "PYTHONPATH": str(package), **environment}, cwd=package,
-        capture_output=True, text=True, check=True,
-    )  # fmt: skip
-    value, hits, place = done.stdout.split()
+    said = printed(TWICE, {**whole, "PYTHONPATH": str(package), **environment}, folder=package)
+    value, hits, place = said.split()
     assert value == "[0.]"
     return int(hits), Path(place)
 
@@ -86,35 +91,28 @@ def installed(tmp_path):
     return tmp_path / "site"
 
 
-@pytest.mark.skipif(not build.COMPILED, reason="nothing is compiled anyway")
+@compiled_only
 def test_users_of_one_installation_that_is_read_only_have_kernels_of_their_own(installed, tmp_path):
-    for user in ("one", "two"):
-        home = {"HOME": str(tmp_path / user)}
-        (first, place), (second, again) = dents(installed, **home), dents(installed, **home)
-        assert (first, second) == (0, 1) and place == again and place.is_relative_to(tmp_path / user)
-
-
-@pytest.mark.skipif(not build.COMPILED, reason="nothing is compiled anyway")
-def test_without_any_place_the_kernels_are_kept_for_the_process(installed):
+    """Spoilt and forbidden files are compiled anew; without any place they are kept for the process."""
+    one, two = {"HOME": str(tmp_path / "one")}, {"NUMBA_CACHE_DIR": str(tmp_path / "two")}
+    (first, place), (second, again) = dents(installed, **one), dents(installed, **one)
+    assert (first, second) == (0, 1) and place == again and place.is_relative_to(tmp_path / "one")
+    hits, place = dents(installed, **two)
+    assert hits == 0 and place.is_relative_to(tmp_path / "two")
+    for name in ("nbi", "nbc"):
+        for file in place.glob(f"law.dents*.{name}"):
+            file.write_bytes(file.read_bytes()[:40])
+        assert dents(installed, **two)[0] == 0
+    assert dents(installed, **two)[0] == 1
+    (index,) = place.glob("law.dents*.nbi")
+    index.unlink()
+    index.mkdir()  # as forbidden as that of another user
+    assert dents(installed, **two)[0] == 0
     hits, place = dents(installed, HOME="/dev/null")
     assert hits == 0 and not place.exists()
 
 
-@pytest.mark.skipif(not build.COMPILED, reason="nothing is compiled anyway")
-def test_spoilt_and_forbidden_files_are_compiled_anew(installed, tmp_path):
-    cache = {"NUMBA_CACHE_DIR": str(tmp_path / "cache")}
-    _, place = dents(installed, **cache)
-    for name in ("nbi", "nbc"):
-        for file in place.glob(f"law.dents*.{name}"):
-            file.write_bytes(file.read_bytes()[:40])
-        assert dents(installed, **cache)[0] == 0 and dents(installed, **cache)[0] == 1
-    (index,) = place.glob("law.dents*.nbi")
-    index.unlink()
-    index.mkdir()  # as forbidden as that of another user
-    assert dents(installed, **cache)[0] == 0
-
-
-@pytest.mark.skipif(not build.COMPILED, reason="nothing is compiled anyway")
+@compiled_only
 def test_compiling_that_takes_long_is_announced_once(caplog):
     compiled = []
 
@@ -140,15 +138,11 @@ print(hit.history.steps.tobytes().hex(), sum(energy.follow.stats.cache_hits.valu
 
 
 @pytest.mark.slow
-@pytest.mark.skipif(not build.COMPILED, reason="nothing is compiled anyway")
+@compiled_only
 def test_the_process_that_compiles_finds_the_digits_of_every_later_one(tmp_path):
     """It did not while parts of a kernel became machine code of their own, too."""
     environment = {**os.environ, "NUMBA_CACHE_DIR": str(tmp_path)}
-    command = [sys.executable, "-W", "ignore", "-c", BLOW]
-    (first, none), (later, one) = (
-        subprocess.run(command, env=environment, capture_output=True, text=True, check=True).stdout.split()
-        for _ in range(2)
-    )
+    (first, none), (later, one) = (printed(BLOW, environment, "-W", "ignore").split() for _ in range(2))
     assert (none, one) == ("0", "1") and first == later
 
 
@@ -158,10 +152,7 @@ def test_an_edit_in_another_file_is_noticed(tmp_path):
     environment = {**os.environ, "PYTHONPATH": str(tmp_path), "NUMBA_CACHE_DIR": str(tmp_path / "cache")}
 
     def answer():
-        done = subprocess.run(
-            [sys.executable, "-c", SCRIPT], env=environment, cwd=tmp_path, capture_output=True, text=True, check=True
-        )
-        return float(done.stdout)
+        return float(printed(SCRIPT, environment, folder=tmp_path))
 
     before = answer()
     kept = set((tmp_path / "cache").rglob("*.nbc"))

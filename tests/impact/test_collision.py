@@ -1,5 +1,6 @@
 """Blows against closed forms: rigid walls, two masses, a stick on a heavy plate."""
 
+import functools
 from dataclasses import replace
 from functools import partial
 
@@ -17,7 +18,16 @@ import fem_impact as fi
 from fem_impact.impact import collision
 from fem_impact.impact.collision import Touch, collide
 
-RATIOS = [10.0**n for n in range(-6, 7)]
+STICK = fi.Striker.stick(0.1, 10e3, n_modes=8)
+AT = {"at": (0.465, 0.3), "speed": 1.0}
+each_scheme = pytest.mark.parametrize("scheme", ["A4", "collocation"])
+
+
+def plate(n_modes, mass=0.2):
+    return fi.analytic.rectangle(1.55, 1.0, mass=mass, first_frequency=100.0, n_modes=n_modes)
+
+
+PLATE_80 = plate(80)
 
 
 def wall_duration(stiffness, exponent, mass, speed):
@@ -34,8 +44,7 @@ def test_mass_on_rigid_wall_meets_closed_forms(exponent, speed, tolerance):
     hit = collide([fi.Modes.rigid(mass)], [Touch(law, 0, None)], speeds=[speed], tolerance=tolerance)
     exact = max(1e-12, tolerance if hit.scheme == "collocation" else 0.0)
     deepest = (0.5 * (exponent + 1.0) * mass * speed**2 / 1e5) ** (1.0 / (exponent + 1.0))
-    assert hit.n_impacts == 1
-    assert hit.finished
+    assert hit.n_impacts == 1 and hit.finished
     assert_allclose(hit.restitution, 1.0, rtol=exact)  # energy is exact at every step of A4
     assert_allclose(hit.contact_time, wall_duration(1e5, exponent, mass, speed), rtol=hit.tolerance)
     assert_allclose(hit.peak_force, 1e5 * deepest**exponent, rtol=hit.tolerance)
@@ -43,7 +52,7 @@ def test_mass_on_rigid_wall_meets_closed_forms(exponent, speed, tolerance):
 
 
 @pytest.mark.parametrize("law", [fi.Contact.linear(1e5), fi.Contact.hertz(1e6)], ids=["linear", "hertz"])
-@pytest.mark.parametrize("ratio", RATIOS)
+@pytest.mark.parametrize("ratio", [1e-6, 1e-3, 0.1, 1.0, 10.0, 1e3, 1e6])
 def test_two_masses_share_speed_as_in_newtons_cradle(law, ratio):
     mass, other = 0.1, 0.1 * ratio
     hit = fi.strike(fi.Modes.rigid(other), fi.Striker.rigid(mass), law, at=None, speed=1.0)
@@ -56,18 +65,17 @@ def test_two_masses_share_speed_as_in_newtons_cradle(law, ratio):
 
 
 def test_stick_on_half_a_million_kilograms_rings_like_a_third_of_its_mass():
-    plate = fi.analytic.rectangle(1.55, 1.0, mass=5e5, first_frequency=100.0, n_modes=60)
-    stick = fi.Striker.stick(0.1, 10e3, n_modes=8)
-    hit = fi.strike(plate, stick, fi.Contact.linear(88.6e3), at=(0.465, 0.3), speed=1.0)
-    half_period = np.pi * np.sqrt(0.1 / 3.0 / 88.6e3)
+    heavy, felt = plate(60, mass=5e5), 0.1 / 3.0
+    hit = fi.strike(heavy, STICK, fi.Contact.linear(88.6e3), **AT)
+    half_period = np.pi * np.sqrt(felt / 88.6e3)
     # the stick's own bending at 10 kHz lengthens a contact of 260 Hz by some (260/10000)**2
     assert_allclose(hit.contact_time, half_period, rtol=2e-3)
     inside = (hit.time > 0.05 * half_period) & (hit.time < 0.95 * half_period)
-    sine = np.sqrt(88.6e3 * 0.1 / 3.0) * np.sin(np.pi * hit.time / half_period)
+    sine = np.sqrt(88.6e3 * felt) * np.sin(np.pi * hit.time / half_period)
     assert_allclose(hit.force[inside], sine[inside], atol=0.01 * sine.max())
-    hertz = fi.strike(plate, stick, fi.Contact.hertz(695e3), at=(0.465, 0.3), speed=1.0)
-    assert_allclose(hertz.contact_time, wall_duration(695e3, 1.5, 0.1 / 3.0, 1.0), rtol=2e-3)
-    assert_allclose(hertz.peak_force, 1.1432626298 * 695e3**0.4 * (0.1 / 3.0) ** 0.6, rtol=2e-3)
+    hertz = fi.strike(heavy, STICK, fi.Contact.hertz(695e3), **AT)
+    assert_allclose(hertz.contact_time, wall_duration(695e3, 1.5, felt, 1.0), rtol=2e-3)
+    assert_allclose(hertz.peak_force, 1.1432626298 * 695e3**0.4 * felt**0.6, rtol=2e-3)
 
 
 @pytest.mark.parametrize(
@@ -84,6 +92,8 @@ def test_sixty_modes_meet_the_eigen_solution(scheme, slope, stiffness):
     if stiffness == 1e6:  # from the roots of the secular equation, computed apart
         assert_allclose(truth.contact_time, 3.1553252963599e-4, rtol=1e-12)
         assert_allclose(restitution, 0.704365580386, atol=1e-12)
+        fine = fi.strike(target, striker, law, **blow | {"scheme": "collocation"}, tolerance=1e-12)
+        assert_allclose([fine.contact_time, fine.restitution], [truth.contact_time, restitution], rtol=1e-11)
     hits = [fi.strike(target, striker, law, dt=truth.contact_time / n, **blow) for n in (25, 50, 100)]
     errors = [abs(hit.restitution - restitution) for hit in hits]
     assert all(hit.energy_error < 1e-13 for hit in hits)  # rounding of a hundred steps
@@ -94,29 +104,30 @@ def test_sixty_modes_meet_the_eigen_solution(scheme, slope, stiffness):
 
 
 def test_response_agrees_with_itself():
-    plate = fi.analytic.rectangle(1.55, 1.0, mass=0.2, first_frequency=100.0, n_modes=60)
-    hit = fi.strike(plate, fi.Striker.stick(0.1, 10e3, n_modes=8), fi.Contact.linear(1e6), at=(0.465, 0.3), speed=1.0)
-    assert hit.n_impacts == 3
+    hit = fi.strike(plate(60), STICK, fi.Contact.linear(1e6), **AT)
+    assert hit.n_impacts == 3 and hit.force.min() >= 0.0
     assert_allclose(sum(hit.energies.values()), 0.5 * 0.1 / 3.0, rtol=1e-12)  # rounding of some hundred steps
     assert_allclose(np.trapezoid(hit.force, hit.time), hit.impulse, rtol=1e-4)  # the tolerance asked for
     assert_allclose(abs(hit.spectrum([0.0])[0]), hit.impulse, rtol=1e-4)
     assert hit.momentum_error < 1e-14  # rounding: momentum is exact at each step
-    assert hit.force.min() >= 0.0
-    q, p = hit.modal_state([hit.history.end_time])
-    assert_allclose(q[0], hit.history.end_q[-60:], atol=1e-12 * np.abs(q).max())  # rounding of 312 steps
-    assert_allclose(p[0], hit.history.end_p[-60:], atol=1e-12 * np.abs(p).max())
+    for found, end in zip(hit.modal_state([hit.history.end_time]), (hit.history.end_q, hit.history.end_p)):
+        assert_allclose(found[0], end[-60:], atol=1e-12 * np.abs(found).max())  # rounding of 312 steps
 
 
 # --- independent integration -----------------------------------------------------------------------------------------
 
 
-def integrate(bodies, touches, duration, speeds=None, forces=None):
-    """Final velocities by the same modal equations, as `restarted` follows them."""
+def integrate(bodies, touches, duration, speeds=None, forces=None, states=None):
+    """Final modal displacements and velocities of each body by the same equations, as `restarted` follows them.
+
+    And how long the first contact was pressed; bodies begin at ``states``, or at rest with ``speeds``.
+    """
     omega = np.concatenate([modes.omega for modes in bodies])
     rate = 2.0 * omega * np.concatenate([modes.damping_ratio for modes in bodies])
     starts = np.concatenate([[0], np.cumsum([modes.n_modes for modes in bodies])])
-    shape = np.zeros((len(touches), len(omega)))
-    p, bias = np.zeros(len(omega)), np.zeros(len(omega))
+    shape, (q, p, bias) = np.zeros((len(touches), len(omega))), np.zeros((3, len(omega)))
+    if states is not None:
+        q, p = (np.concatenate(part) for part in zip(*states))
     for i, t in enumerate(touches):
         for body, at, sign in ((t.first, t.first_at, 1.0), (t.second, t.second_at, -1.0)):
             part = slice(starts[body], starts[body + 1])
@@ -125,69 +136,55 @@ def integrate(bodies, touches, duration, speeds=None, forces=None):
                 p[part] = speeds[body] * bodies[body].rigid_motion(at)
             if forces is not None:
                 bias[part] = forces[body] * bodies[body].shape_at(at)[0]
-    laws = [t.law for t in touches]
+    laws, n = [t.law for t in touches], len(omega)
 
     def push(t, z):
-        n = len(omega)
-        d, v = shape @ z[:n] - [law.gap for law in laws], shape @ z[n:]
-        force = np.array([float(law.force(x, y)) for law, x, y in zip(laws, d, v)])
-        return np.concatenate([z[n:], bias - rate * z[n:] - omega**2 * z[:n] - force @ shape])
+        d, p = gaps(z), z[n : 2 * n]
+        force = np.array([float(law.force(x, y)) for law, x, y in zip(laws, d, shape @ p)])
+        return np.concatenate([p, bias - rate * p - omega**2 * z[:n] - force @ shape, [d[0] > 0.0]])
 
     def gaps(z):
-        return shape @ z[: len(omega)] - [law.gap for law in laws]
+        return shape @ z[:n] - [law.gap for law in laws]
 
-    z = followed(push, gaps, np.concatenate([np.zeros(len(omega)), p]), duration, max_step=duration / 200)
-    return np.split(z[len(omega) :], starts[1:-1])
+    z = followed(push, gaps, np.concatenate([q, p, [0.0]]), duration, max_step=duration / 200)
+    return np.split(z[:n], starts[1:-1]), np.split(z[n : 2 * n], starts[1:-1]), z[-1]
 
 
 HEAVY = np.array([0.02, 0.5, 0.95, 1.0, 1.3, 3.0, 0.01, 0.0, 0.0, 0.1, 0.2, 10.0])
+LIGHT = fi.Modes.rigid(0.05)
 SCENES = {
     "damped, Hertz with loss": (
-        [fi.Modes.rigid(0.05), measured(12, 1, 0.02)],
-        [Touch(fi.Contact.power(1e7, 1.5, loss=0.4), 0, 1, None, [0.0])],
-        {"speeds": [1.0, 0.0]},
-        2e-2,
+        [LIGHT, measured(12, 1, 0.02)], [Touch(fi.Contact.power(1e7, 1.5, loss=0.4), 0, 1, None, [0.0])],
+        {"speeds": [1.0, 0.0]}, 1e-2,
     ),
     "overdamped modes": (
-        [fi.Modes.rigid(0.05), measured(12, 2, HEAVY)],
-        [Touch(fi.Contact.linear(1e5), 0, 1, None, [0.0])],
-        {"speeds": [1.0, 0.0]},
-        2e-2,
+        [LIGHT, measured(12, 2, HEAVY)], [Touch(fi.Contact.linear(1e5), 0, 1, None, [0.0])],
+        {"speeds": [1.0, 0.0]}, 1e-2,
     ),
     "two strikers at two points": (
-        [fi.Modes.rigid(0.05), fi.Modes.rigid(0.02), measured(10, 5, 0.01)],
-        [
-            Touch(fi.Contact.hertz(1e7), 0, 2, None, [0.0]),
-            Touch(fi.Contact.linear(2e5), 1, 2, None, [1.0]),
-        ],
-        {"speeds": [1.0, 2.0, 0.0]},
-        2e-2,
+        [LIGHT, fi.Modes.rigid(0.02), measured(10, 5, 0.01)],
+        [Touch(fi.Contact.hertz(1e7), 0, 2, None, [0.0]), Touch(fi.Contact.linear(2e5), 1, 2, None, [1.0])],
+        {"speeds": [1.0, 2.0, 0.0]}, 1e-2,
     ),
     "a weight falls over a gap": (
-        [fi.Modes.rigid(0.05), measured(10, 6)],
-        [Touch(fi.Contact.hertz(1e7, gap=2e-4), 0, 1, None, [0.0])],
-        {"speeds": [0.0, 0.0], "forces": [0.05 * 9.81, 0.0]},
-        3e-2,
+        [LIGHT, measured(10, 6)], [Touch(fi.Contact.hertz(1e7, gap=2e-4), 0, 1, None, [0.0])],
+        {"speeds": [0.0, 0.0], "forces": [0.05 * 9.81, 0.0]}, 3e-2,
     ),
     "flexible on free": (
         [measured(6, 9, n_rigid=1), measured(10, 8, n_rigid=2)],
-        [Touch(fi.Contact.power(1e6, 1.3), 0, 1, [1.0], [0.0])],
-        {"speeds": [1.0, 0.0]},
-        2e-2,
+        [Touch(fi.Contact.power(1e6, 1.3), 0, 1, [1.0], [0.0])], {"speeds": [1.0, 0.0]}, 1e-2,
     ),
     "preload lets go": (
-        [fi.Modes.rigid(0.05), measured(10, 11, 0.02)],
-        [Touch(fi.Contact.hertz(1e7, gap=-1e-4), 0, 1, None, [0.0])],
-        {"speeds": [0.0, 0.0]},
-        1e-2,
+        [LIGHT, measured(10, 11, 0.02)], [Touch(fi.Contact.hertz(1e7, gap=-1e-4), 0, 1, None, [0.0])],
+        {"speeds": [0.0, 0.0]}, 1e-2,
     ),
-}
+}  # fmt: skip
 
 
 @pytest.mark.parametrize("name", SCENES)
 def test_agrees_with_independent_integration(name):
     bodies, touches, start, duration = SCENES[name]
-    truth = np.concatenate(integrate(bodies, touches, duration, **start))
+    truth = np.concatenate(integrate(bodies, touches, duration, **start)[1])
     for scheme, tolerance, accuracy in (("A4", 1e-4, 3e-4), ("A4", 1e-7, 2e-6), ("collocation", 1e-9, 1e-9)):
         hit = collide(bodies, touches, tolerance=tolerance, scheme=scheme, duration=duration, **start)
         found = np.concatenate([hit.modal_state([duration], body=i)[1][0] for i in range(len(bodies))])
@@ -197,28 +194,31 @@ def test_agrees_with_independent_integration(name):
         assert hit.momentum_error < 1e-12
 
 
+def five_balls(exponent, gap, tolerance):
+    """Newton's cradle; the first ball arrives, the others stand a gap apart. Also the balls and what they touch."""
+    balls = [fi.Modes.rigid(0.1)] * 5
+    touches = [Touch(fi.Contact.power(1e9, exponent, gap=gap if i else 0.0), i, i + 1) for i in range(4)]
+    return collide(balls, touches, speeds=[1.0, 0.0, 0.0, 0.0, 0.0], tolerance=tolerance), balls, touches
+
+
 @pytest.mark.parametrize("gap", [0.0, 1e-6])
 @pytest.mark.parametrize("exponent", [1.0, 1.5])
 def test_five_touching_balls_meet_independent_integration(gap, exponent):
-    """Newton's cradle: balls that touch, or nearly, do not part as two would."""
-    balls = [fi.Modes.rigid(0.1)] * 5
-    touches = [Touch(fi.Contact.power(1e9, exponent, gap=gap if i else 0.0), i, i + 1) for i in range(4)]
-    hit = collide(balls, touches, speeds=[1.0, 0.0, 0.0, 0.0, 0.0], tolerance=1e-10)
-    truth = [float(p[0]) * 0.1**-0.5 for p in integrate(balls, touches, hit.history.end_time, [1.0, 0, 0, 0, 0])]
+    """Balls that touch, or nearly, do not part as two would."""
+    hit, *bodies = five_balls(exponent, gap, 1e-10)
+    truth = [float(p[0]) * 0.1**-0.5 for p in integrate(*bodies, hit.history.end_time, [1.0, 0, 0, 0, 0])[1]]
     assert_allclose(hit.speeds, truth, rtol=0, atol=1e-9)
     assert abs(hit.speeds[0]) > 0.05  # the first ball recoils: not what the textbook says
     assert_allclose(sum(hit.speeds), 1.0, rtol=1e-13)
 
 
 @pytest.mark.parametrize("exponent", [1.0, 1.5])
-@pytest.mark.parametrize("tolerance", [1e-4, 1e-6, 1e-10])
+@pytest.mark.parametrize("tolerance", [1e-3, 1e-4, 1e-6, 1e-10])
 def test_of_five_balls_apart_exactly_the_last_one_leaves(exponent, tolerance):
-    balls = [fi.Modes.rigid(0.1)] * 5
-    touches = [Touch(fi.Contact.power(1e9, exponent, gap=1e-3 if i else 0.0), i, i + 1) for i in range(4)]
-    hit = collide(balls, touches, speeds=[1.0, 0.0, 0.0, 0.0, 0.0], tolerance=tolerance)
+    hit, *_ = five_balls(exponent, 1e-3, tolerance)
     assert_allclose(hit.speeds, [0.0, 0.0, 0.0, 0.0, 1.0], rtol=0, atol=1e-12)
-    assert hit.n_impacts == 4
-    assert hit.finished
+    assert hit.finished and [each.contact for each in hit.impacts] == [0, 1, 2, 3]
+    assert_allclose([(each.approach_speed, each.restitution) for each in hit.impacts], 1.0, rtol=1e-9)
 
 
 # --- orders, references, limits --------------------------------------------------------------------------------------
@@ -226,85 +226,53 @@ def test_of_five_balls_apart_exactly_the_last_one_leaves(exponent, tolerance):
 
 def target_of(n_modes):
     """Evenly spaced modes, all alike at the point: what a struck plate looks like from there."""
-    spacing = 1500.0 * 59.0 / n_modes
-    frequencies = spacing * np.arange(1, n_modes + 1) / (2.0 * np.pi)
-    return fi.Modes.from_arrays(
-        frequencies, np.full((1, n_modes), 11.5 * n_modes**-0.5), points=[[0.0]], mass=1.0, complete=True
-    )
+    frequencies = 1500.0 * 59.0 / n_modes * np.arange(1, n_modes + 1) / (2.0 * np.pi)
+    shapes = np.full((1, n_modes), 11.5 * n_modes**-0.5)
+    return fi.Modes.from_arrays(frequencies, shapes, points=[[0.0]], mass=1.0, complete=True)
 
 
-@pytest.mark.parametrize("exponent", [1.0, 1.5])
-def test_onset_at_any_phase_of_the_step(exponent):
-    """A gap walks the onset through the step: it is located, so the rebound hardly notices (case 19)."""
-    target, striker = target_of(12), fi.Striker.rigid(0.01)
-    rebounds = []
-    for gap in np.linspace(0.0, 1.3e-5, 100):
-        law = fi.Contact.power(1e6 if exponent == 1.0 else 1e8, exponent, gap=gap)
-        rebounds.append(fi.strike(target, striker, law, at=[0.0], speed=1.0, scheme="A4", dt=1.3e-5).restitution)
-    assert np.ptp(rebounds) < 1e-12
+@pytest.mark.parametrize(("exponent", "stiffness"), [(1.0, 1e6), (1.5, 1e8)])
+def test_onset_at_any_phase_of_the_step(exponent, stiffness):
+    """A gap walks the onset through the step: it is located, so the rebound hardly notices."""
+    target, striker, how = target_of(12), fi.Striker.rigid(0.01), {"at": [0.0], "speed": 1.0, "dt": 1.3e-5}
+    laws = (fi.Contact.power(stiffness, exponent, gap=gap) for gap in np.linspace(0.0, 1.3e-5, 100))
+    assert np.ptp([fi.strike(target, striker, law, scheme="A4", **how).restitution for law in laws]) < 1e-12
+
+
+@functools.cache
+def stick_truth(law):
+    return fi.strike(PLATE_80, STICK, law, tolerance=1e-12, scheme="collocation", residual=False, **AT)
 
 
 @pytest.mark.parametrize("law", [fi.Contact.linear(1e6), fi.Contact.hertz(1e8)], ids=["linear", "hertz"])
 @pytest.mark.parametrize("tolerance", [1e-2, 1e-3, 1e-4, 1e-5, 1e-6, 1e-8, 1e-10])
 def test_promise_is_kept_and_the_estimate_is_fair(law, tolerance):
-    plate = fi.analytic.rectangle(1.55, 1.0, mass=0.2, first_frequency=100.0, n_modes=80)
-    stick = fi.Striker.stick(0.1, 10e3, n_modes=8)
-    blow = {"at": (0.465, 0.3), "speed": 1.0, "residual": False}
-    truth = fi.strike(plate, stick, law, tolerance=1e-12, scheme="collocation", **blow)
-    hit = fi.strike(plate, stick, law, tolerance=tolerance, **blow)
-    error = worst(hit, truth)
-    assert error <= tolerance
-    assert hit.error.step <= tolerance
+    hit = fi.strike(PLATE_80, STICK, law, tolerance=tolerance, residual=False, **AT)
+    error = worst(hit, stick_truth(law))
+    assert error <= tolerance and hit.error.step <= tolerance
     assert error <= 3.3 * hit.error.step + 1e-12  # the estimate is not below 0.3 of the truth
 
 
 def test_both_schemes_meet_the_exact_linear_blow():
-    plate = fi.analytic.rectangle(1.55, 1.0, mass=0.2, first_frequency=100.0, n_modes=80)
-    stick = fi.Striker.stick(0.1, 10e3, n_modes=8)
-    blow = {"at": (0.465, 0.3), "speed": 1.0}
-    hits = [
-        fi.strike(plate, stick, fi.Contact.linear(1e6), scheme=scheme, tolerance=tolerance, **blow)
-        for scheme, tolerance in (("collocation", 1e-12), ("A4", 1e-8))
-    ]
-    truth = exact(hits[0].history, wait=0.05)
+    law = fi.Contact.linear(1e6)
+    fine = fi.strike(PLATE_80, STICK, law, scheme="collocation", tolerance=1e-12, **AT)
+    usual = fi.strike(PLATE_80, STICK, law, scheme="A4", tolerance=1e-8, **AT)
+    truth = exact(fine.history, wait=0.05)
     assert len(truth.impacts) == 3
-    for hit in hits:
+    for hit in (fine, usual):
         found = np.array([[impact.start, impact.end, impact.impulse, impact.peak_force] for impact in hit.impacts])
         # the eigenvectors of the joined bodies keep nine digits of slow motions beside modes of 20 kHz
         assert_allclose(found[:, :2], truth.impacts[:, :2], atol=1e-8 * truth.contact_time)
         assert_allclose(found[:, 2:], truth.impacts[:, 2:], rtol=1e-8)
         assert_allclose(hit.history.end_p[0], truth.p[0], rtol=1e-7)
-    assert_allclose(hits[0].restitution, hits[1].restitution, atol=1e-8)
-
-
-def test_one_rigid_mass_on_one_mode_meets_its_eigen_solution():
-    """Two by two eigenvalue problem; the separation by bisection on the closed form."""
-    target = fi.Modes.from_arrays([400.0], [[3.0]], points=[[0.0]], mass=1.0, complete=True)
-    omega, u, k = 2.0 * np.pi * 400.0, np.array([10.0, -3.0]), 1e5
-    square, vectors = np.linalg.eigh(np.diag([0.0, omega**2]) + k * np.outer(u, u))
-    start = vectors.T @ np.array([0.1, 0.0])
-
-    def approach(t):
-        return (u @ vectors) @ (start * np.sin(np.sqrt(square) * t) / np.sqrt(square))
-
-    grid = np.linspace(1e-5, 5e-3, 5000)
-    first = grid[np.argmax([approach(t) < 0.0 for t in grid])]
-    end = brentq(approach, first - 1e-6, first, xtol=1e-18)
-    rebound = -10.0 * (vectors @ (start * np.cos(np.sqrt(square) * end)))[0]
-    striker, how = fi.Striker.rigid(0.01), {"scheme": "collocation", "tolerance": 1e-12, "max_impacts": 1}
-    hit = fi.strike(target, striker, fi.Contact.linear(k), at=[0.0], speed=1.0, **how)
-    assert_allclose(hit.contact_time, end, rtol=1e-11)
-    assert_allclose(hit.restitution, rebound, atol=1e-11)
+    assert_allclose(fine.restitution, usual.restitution, atol=1e-8)
 
 
 def test_stiff_stick_becomes_rigid():
-    plate = fi.analytic.rectangle(1.55, 1.0, mass=2.0, first_frequency=100.0, n_modes=60)
-    blow = {"at": (0.465, 0.3), "speed": 1.0, "tolerance": 1e-6, "max_impacts": 1}
-    rigid = fi.strike(plate, fi.Striker.rigid(0.1 / 3.0), fi.Contact.linear(1e5), **blow).impulse
-    errors = [
-        abs(fi.strike(plate, fi.Striker.stick(0.1, f), fi.Contact.linear(1e5), **blow).impulse - rigid)
-        for f in (5e3, 20e3)
-    ]
+    strikers = fi.Striker.rigid(0.1 / 3.0), fi.Striker.stick(0.1, 5e3), fi.Striker.stick(0.1, 20e3)
+    blow = {**AT, "tolerance": 1e-6, "max_impacts": 1}
+    rigid, *bent = (fi.strike(plate(60, 2.0), each, fi.Contact.linear(1e5), **blow).impulse for each in strikers)
+    errors = [abs(impulse - rigid) for impulse in bent]
     assert_allclose(errors[0] / errors[1], 16.0, rtol=0.1)  # as the square of the stick's frequency
 
 
@@ -329,21 +297,31 @@ def test_restituting_contact_gives_the_restitution_asked_for(restitution):
 # --- ends, flags, errors ---------------------------------------------------------------------------------------------
 
 
+@pytest.mark.parametrize("tolerance", [1e-3, 1e-4])
+def test_a_light_first_body_claims_the_error_of_its_own_speed(tolerance):
+    """It claimed what it did to the momentum of all: 14 times less at 1e-3."""
+    bar = fi.analytic.beam(1.0, mass=2.0, first_frequency=300.0, n_modes=12, ends=("free", "free"))
+    touch, law = partial(Touch, first=0, second=1, second_at=[0.5]), fi.Contact.power(1e7, 1.5)
+    hit, truth = (
+        collide([fi.Modes.rigid(0.01), bar], [touch(law)], speeds=[0.05, -8.0], tolerance=each)
+        for each in (tolerance, 1e-8)
+    )
+    assert 100.0 < truth.restitution < 1000.0  # a slow ball that a fast bar hits
+    assert abs(hit.restitution - truth.restitution) <= hit.trust["restitution"].computation <= tolerance
+
+
 def test_duration_and_max_impacts_stop_the_run():
-    plate = fi.analytic.rectangle(1.55, 1.0, mass=0.2, first_frequency=100.0, n_modes=60)
-    stick, law = fi.Striker.stick(0.1, 10e3, n_modes=8), fi.Contact.linear(1e6)
-    cut = fi.strike(plate, stick, law, at=(0.465, 0.3), speed=1.0, duration=2e-3)
+    cut, one = (
+        fi.strike(plate(60), STICK, fi.Contact.linear(1e6), **AT, **end)
+        for end in ({"duration": 2e-3}, {"max_impacts": 1})
+    )
     assert_allclose(cut.time[-1], 2e-3, rtol=1e-12)
-    assert cut.n_impacts == 2
-    one = fi.strike(plate, stick, law, at=(0.465, 0.3), speed=1.0, max_impacts=1)
-    assert one.n_impacts == 1
-    assert not one.finished
+    assert cut.n_impacts == 2 and one.n_impacts == 1 and not one.finished
 
 
 def test_a_miss_is_no_impact():
     hit = collide([fi.Modes.rigid(1.0)], [Touch(fi.Contact.linear(1e5), 0, None)], speeds=[-1.0])
-    assert hit.n_impacts == 0
-    assert hit.finished
+    assert hit.n_impacts == 0 and hit.finished
     assert hit.peak_force == hit.impulse == hit.contact_time == 0.0
     assert_allclose(hit.speeds, [-1.0])
     assert np.abs(hit.spectrum([0.0, 10.0])).max() == 0.0
@@ -365,13 +343,16 @@ def test_a_miss_is_no_impact():
     ],
 )
 def test_errors_name_argument_rule_and_value(change, text):
-    plate = fi.analytic.rectangle(1.55, 1.0, mass=0.2, first_frequency=100.0, n_modes=10)
-    blow = {"contact": fi.Contact.linear(1e5), "at": (0.465, 0.3), "speed": 1.0} | change
     with pytest.raises(ValueError, match=text):
-        fi.strike(plate, fi.Striker.rigid(0.01), blow.pop("contact"), **blow)
+        fi.strike(plate(10), fi.Striker.rigid(0.01), **{"contact": fi.Contact.linear(1e5), **AT, **change})
 
 
 BAR = fi.analytic.beam(1.0, mass=0.2, first_frequency=100.0, n_modes=3)
+
+
+def test_a_point_that_is_missing_is_named():
+    with pytest.raises(ValueError, match=r"second_at of contact 0 must be given, a point \(x\) in m"):
+        collide([LIGHT, BAR], [Touch(fi.Contact.linear(1e5), 0, 1)], speeds=[1.0, 0.0])
 
 
 @pytest.mark.parametrize(("body", "at"), [(fi.Modes.rigid(0.1), ()), (BAR, (0.2, 0.2))])
@@ -381,26 +362,25 @@ def test_a_body_that_cannot_press_itself_is_refused(body, at):
     assert fi.collide([BAR], [fi.Touch(fi.Contact.linear(1e5, gap=1.0), 0, 0, 0.2, 0.7)], duration=1e-3).n_impacts == 0
 
 
+# --- loss, layers, several contacts ----------------------------------------------------------------------------------
+
+
 def lossy_blow(seed):
     """A random blow of a mass on a plate through a contact that throws back 5 to 99 % of the speed, off a wall."""
     rng = np.random.default_rng(seed)
     length, width = rng.uniform(0.5, 2.0, 2)
-    plate = fi.analytic.rectangle(
+    body = fi.analytic.rectangle(
         length, width, mass=10 ** rng.uniform(-1.5, 1.0), first_frequency=10 ** rng.uniform(1.5, 2.7),
         n_modes=int(rng.integers(5, 60)),
     )  # fmt: skip
     speed, exponent = 10 ** rng.uniform(-1.0, 1.0), rng.choice([1.0, 1.2, 1.5, 2.0, 2.5])
-    law = fi.Contact.restituting(
-        10 ** rng.uniform(4.0, 6.0) * 1e3 ** (exponent - 1.0),
-        exponent,
-        restitution=rng.uniform(0.05, 0.99),
-        speed=speed,
-    )
+    stiffness = 10 ** rng.uniform(4.0, 6.0) * 1e3 ** (exponent - 1.0)
+    law = fi.Contact.restituting(stiffness, exponent, restitution=rng.uniform(0.05, 0.99), speed=speed)
     at = (length * rng.uniform(0.1, 0.9), width * rng.uniform(0.1, 0.9))
-    return plate, fi.Striker.rigid(10 ** rng.uniform(-3.0, -0.5)), law, {"at": at, "speed": speed, "residual": False}
+    return body, fi.Striker.rigid(10 ** rng.uniform(-3.0, -0.5)), law, {"at": at, "speed": speed, "residual": False}
 
 
-@pytest.mark.parametrize("seeds", [range(4), pytest.param(range(4, 60), marks=pytest.mark.slow)], ids=["few", "many"])
+@pytest.mark.parametrize("seeds", [range(4), pytest.param(range(4, 40), marks=pytest.mark.slow)], ids=["few", "many"])
 def test_lossy_contacts_keep_their_promise(seeds):
     for seed in seeds:
         *blow, options = lossy_blow(seed)
@@ -410,7 +390,7 @@ def test_lossy_contacts_keep_their_promise(seeds):
         assert worst(hit, truth) <= tolerance, seed
 
 
-@pytest.mark.parametrize("scheme", ["A4", "collocation"])
+@each_scheme
 def test_a_push_that_ends_while_the_bodies_overlap_counts_for_max_impacts(scheme):
     """A ringing bar is let go and pushed again before it is out of reach: one impact gave six."""
     bar = fi.analytic.beam(1.0, ends=("hinged", "hinged"), mass=0.2, first_frequency=1500.0, n_modes=1)
@@ -422,14 +402,11 @@ def test_a_push_that_ends_while_the_bodies_overlap_counts_for_max_impacts(scheme
     assert one.impacts[0].restitution == pytest.approx(all_of_it.impacts[0].restitution, abs=1e-3)
 
 
-@pytest.mark.parametrize("scheme", ["A4", "collocation"])
+@each_scheme
 def test_lossy_contact_lets_go_while_the_bodies_overlap(scheme):
     """On a wall a mass leaves at e v with 1 + loss rate = 0 never reached; drawn away by a force, it is."""
-    law = fi.Contact.linear(1e4, loss=2.0)
-    mass, pull = 0.1, -60.0  # [kg], [N]
-    hit = collide(
-        [fi.Modes.rigid(mass)], [Touch(law, 0, None)], speeds=[1.0], forces=[pull], tolerance=1e-6, scheme=scheme
-    )
+    mass, pull, floor = 0.1, -60.0, [Touch(fi.Contact.linear(1e4, loss=2.0), 0, None)]  # [kg], [N]
+    hit = collide([fi.Modes.rigid(mass)], floor, speeds=[1.0], forces=[pull], tolerance=1e-6, scheme=scheme)
 
     def rate(t, z):
         return [z[1], (pull - max(0.0, 1e4 * max(z[0], 0.0) * (1.0 + 2.0 * z[1]))) / mass]
@@ -486,70 +463,55 @@ def test_contacts_that_open_and_close_together_stay_together(frequency, gap, mas
     )
     springs = fi.Contact.hertz(1e8, gap=gap), fi.Contact.linear(2e5, gap=gap)
     both = fi.Contact.layers(2e5, 1.0, depth=0.0, hard_stiffness=1e8, gap=gap)
+    rule = {"speeds": [1.0, 0.0], "tolerance": 1e-8, "residual": False, "duration": 0.02}
     two, one = (
-        collide(
-            [fi.Modes.rigid(0.05), target], [Touch(law, 0, 1, None, [0.0]) for law in laws], speeds=[1.0, 0.0],
-            tolerance=1e-8, residual=False, duration=0.02,
-        )
-        for laws in (springs, [both])
-    )  # fmt: skip
+        collide([LIGHT, target], [Touch(law, 0, 1, None, [0.0]) for law in laws], **rule) for laws in (springs, [both])
+    )
     assert_allclose(two.speeds, one.speeds, atol=2e-8)  # the tolerance of both
     assert_allclose(two.impulse, one.impulse, rtol=2e-8)
     assert_allclose(two.touching_time, one.contact_time, rtol=2e-8)
 
 
+# --- random blows, also of other files --------------------------------------------------------------------------------
+
+
 def thinned_blow(seed, lossy=False):
     """A random plate of 1500 modes, how many of them a user keeps, and a mass that strikes it."""
     rng = np.random.default_rng(seed)
-    plate = fi.analytic.rectangle(
-        rng.uniform(1.0, 2.0), 1.0, mass=rng.uniform(0.3, 3.0), first_frequency=rng.uniform(30.0, 100.0), n_modes=1500
-    )
+    length, mass, frequency = rng.uniform(1.0, 2.0), rng.uniform(0.3, 3.0), rng.uniform(30.0, 100.0)
     kept = int(rng.integers(25, 120))
     law = fi.Contact.linear(10 ** rng.uniform(4.0, 5.5)) if seed % 2 else fi.Contact.hertz(10 ** rng.uniform(5.0, 7.0))
     law = replace(law, loss=rng.uniform(0.05, 0.5)) if lossy else law
+    body = fi.analytic.rectangle(length, 1.0, mass=mass, first_frequency=frequency, n_modes=1500)
     at = tuple(rng.uniform(0.2, 0.8, 2))
-    return plate, kept, (fi.Striker.rigid(10 ** rng.uniform(-2.2, -1.0)), law), {"at": at, "speed": 1.0}
-
-
-def left_out(seed, lossy=False):
-    """Estimated and true error of leaving out the upper modes; both blows at the same small step error."""
-    plate, kept, how, where = thinned_blow(seed, lossy)
-    few = fi.strike(plate.truncated(n_modes=kept), *how, **where, tolerance=1e-6)
-    return few.error.truncation, worst(few, fi.strike(plate, *how, **where, tolerance=1e-6))
-
-
-def stick_blow(seed):
-    """A random stick on a plate, through a contact that is lossy for even seeds."""
-    rng = np.random.default_rng(seed)
-    plate = fi.analytic.rectangle(
-        1.3, 1.0, mass=rng.uniform(0.3, 3.0), first_frequency=rng.uniform(30.0, 100.0), n_modes=60
-    )
-    stick = fi.Striker.stick(10 ** rng.uniform(-1.5, -0.5), 10 ** rng.uniform(2.5, 4.0))
-    law = fi.Contact.power(10 ** rng.uniform(5.0, 7.5), 1.5, loss=0.0 if seed % 2 else rng.uniform(0.02, 0.5))
-    return plate, stick, law, {"at": tuple(rng.uniform(0.2, 0.8, 2)), "speed": 1.0}
+    return body, kept, (fi.Striker.rigid(10 ** rng.uniform(-2.2, -1.0)), law), {"at": at, "speed": 1.0}
 
 
 @pytest.mark.parametrize("seed", [54, 22, 51, 15])
 def test_the_modes_that_a_striker_keeps_err_by_less_than_told_and_leave_the_tolerance_to_others(seed):
-    plate, stick, law, where = stick_blow(seed)
+    """A random stick on a plate, through a contact that is lossy for even seeds."""
+    rng = np.random.default_rng(seed)
+    mass, frequency = rng.uniform(0.3, 3.0), rng.uniform(30.0, 100.0)
+    body = fi.analytic.rectangle(1.3, 1.0, mass=mass, first_frequency=frequency, n_modes=60)
+    stick = fi.Striker.stick(10 ** rng.uniform(-1.5, -0.5), 10 ** rng.uniform(2.5, 4.0))
+    law = fi.Contact.power(10 ** rng.uniform(5.0, 7.5), 1.5, loss=0.0 if seed % 2 else rng.uniform(0.02, 0.5))
+    where = {"at": tuple(rng.uniform(0.2, 0.8, 2)), "speed": 1.0, "tolerance": 1e-6}
     kept, _ = collision.striker_modes(stick, contact=law, speed=1.0, tolerance=1e-3)
     told = collision.striker_error(stick, kept, contact=law, speed=1.0)
-    few, all_but_one = (
-        fi.strike(plate, collision.shortened(stick, n), law, **where, tolerance=1e-6) for n in (kept, 95)
-    )
+    few, all_but_one = (fi.strike(body, collision.shortened(stick, n), law, **where) for n in (kept, 95))
     assert worst(few, all_but_one) < min(told, 0.1e-3)  # a tenth of the tolerance; 0.04 of it were measured at most
 
 
 def grazing_blow(seed, mass):
     """A plate and a mass a little lighter or heavier than one that touches it once more, or once less."""
     rng = np.random.default_rng(seed)
-    plate = fi.analytic.rectangle(
+    body = fi.analytic.rectangle(
         1.3, 1.0, mass=rng.uniform(0.2, 1.0), first_frequency=rng.uniform(40.0, 100.0),
         n_modes=int(rng.integers(3, 30)), damping_ratio=rng.choice([0.0, 0.01]),
     )  # fmt: skip
     law = fi.Contact.hertz(10 ** rng.uniform(5.0, 7.0)) if seed % 2 else fi.Contact.linear(10 ** rng.uniform(4.0, 5.5))
     where = {"at": tuple(rng.uniform(0.2, 0.8, 2)), "speed": 1.0, "residual": False}
-    return partial(fi.strike, plate, fi.Striker.rigid(mass), law, **where)
+    return partial(fi.strike, body, fi.Striker.rigid(mass), law, **where)
 
 
 THRESHOLD = 38186.134448119745  # [N/m] where the blow below gets a second impact, by bisection with collocation at 1e-9
@@ -557,27 +519,10 @@ THRESHOLD = 38186.134448119745  # [N/m] where the blow below gets a second impac
 
 @pytest.mark.parametrize("tolerance", [1e-1, 1e-3, 1e-5])
 def test_the_margin_is_how_far_the_blow_is_from_another_number_of_impacts(tolerance):
-    plate = fi.analytic.rectangle(1.0, 0.7, mass=0.2, first_frequency=100.0, n_modes=30, damping_ratio=0.005)
+    body = fi.analytic.rectangle(1.0, 0.7, mass=0.2, first_frequency=100.0, n_modes=30, damping_ratio=0.005)
+    blow = {"at": (0.3, 0.2), "speed": 1.0, "residual": False, "tolerance": tolerance}
     for offset in (-1e-2, -1e-3, -1e-4, -1e-5, -1e-6, 1e-6, 1e-5, 1e-4, 1e-3, 1e-2):
-        law = fi.Contact.linear(THRESHOLD * (1.0 + offset))
-        blow = {"at": (0.3, 0.2), "speed": 1.0, "residual": False, "tolerance": tolerance}
-        hit = fi.strike(plate, fi.Striker.rigid(0.1), law, **blow)
-        assert hit.n_impacts == 1 + (offset > 0.0)
-        assert hit.tolerance_met
+        hit = fi.strike(body, fi.Striker.rigid(0.1), fi.Contact.linear(THRESHOLD * (1.0 + offset)), **blow)
+        assert hit.n_impacts == 1 + (offset > 0.0) and hit.tolerance_met
         # 0.2171 by all runs at 1e-9; a count is trusted from four times the change of the margin on
         assert_allclose(hit.margin / abs(offset), 0.2171, rtol=0.25)
-
-
-def thin_plate_blow():
-    g = np.random.default_rng(777 + 216)
-    width, zeta = g.uniform(0.5, 1.0), float(g.choice([0.0, 0.002, 0.01]))
-    at = (g.uniform(0.05, 0.95), g.uniform(0.05, 0.95) * width)
-    mass, speed = 10 ** g.uniform(-2.0, 0.0), 10 ** g.uniform(-0.5, 0.5)
-    exponent = float(g.choice([1.0, 1.5, 1.5]))
-    stiffness = 10 ** (g.uniform(3.5, 5.7) if exponent == 1.0 else g.uniform(5.0, 7.5))
-
-    def plate(n_modes):
-        kept = {"mass": 0.2, "first_frequency": 100.0, "n_modes": n_modes, "damping_ratio": zeta}
-        return fi.analytic.rectangle(1.0, width, **kept)
-
-    return plate, (fi.Striker.rigid(mass), fi.Contact.power(stiffness, exponent)), {"at": at, "speed": speed}

@@ -4,7 +4,6 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from numba import njit
 from numpy.testing import assert_allclose
 from scipy.optimize import brentq
 
@@ -12,25 +11,19 @@ from fem_impact.impact.compiled import build, flight, layout, stretched
 from fem_impact.impact.compiled.bundles import Bodies, Flights, Limits
 from fem_impact.impact.compiled.flight import LATER, NEVER, ONSET
 
-pytestmark = pytest.mark.xdist_group("flight")  # compiled for these tests alone
-
-
-@njit
-def find_onset(bodies, offset, flights, limits, left, out_miss):
-    return flight.find_onset(bodies, offset, flights, limits, left, out_miss)
+FIND_ONSET = build.plain(flight.find_onset)
 
 
 def fly(omega, shape, q, p, *, offset=0.0, bias=None, left=np.inf, zeta=0.0, base=1e-4, miss=None, depth=0.0):
     """Elapsed time, contact and end of a flight, and the state after it."""
     omega, q, p = (np.array(x, float) for x in (omega, q, p))
-    n = len(omega)
-    bias = np.zeros(n) if bias is None else np.array(bias, float)
+    n, bias = len(omega), np.zeros(len(omega)) if bias is None else np.array(bias, float)
     tables = np.empty((flight.GLIDES + 1, layout.N_LANE, n))
     flights = Flights(tables, np.zeros(flight.GLIDES + 1), base, 1e-3 * base)
     shape, offset = np.atleast_2d(np.array(shape, float)), np.array([offset])
     bodies = Bodies(omega, np.full(n, zeta), 2.0 * zeta * omega, shape, bias, q, p, np.empty(n), np.empty(n))
     miss = np.array([-np.inf]) if miss is None else miss
-    return *find_onset(bodies, offset, flights, Limits(depth, 0.0, np.inf, 0, 1), left, miss), q, p
+    return *FIND_ONSET(bodies, offset, flights, Limits(depth, 0.0, np.inf, 0, 1), left, miss), q, p
 
 
 @pytest.mark.parametrize("gap, speed, gravity", [(1e-3, 0.5, 0.0), (0.2, 0.0, 9.81), (0.05, -1.0, 9.81)])
@@ -101,5 +94,4 @@ def test_a_mode_that_stretches_may_swing_as_far_as_its_energy(phase, reach, over
     bodies = SimpleNamespace(omega=omega, shape=shape, q=q, p=p, bias=np.zeros(2))
     contacts, still = SimpleNamespace(end=np.zeros(1), offset=np.zeros(1)), SimpleNamespace(still=0.0, depth=0.0)
     room = stretched.made_room(stretched.Stretch(np.zeros((1, 1, 1)), np.zeros((0, 1)), 1), omega, 1)
-    parted = build.plain(stretched.parted)(bodies, contacts, room, still)
-    assert parted == over
+    assert build.plain(stretched.parted)(bodies, contacts, room, still) == over

@@ -1,7 +1,6 @@
 """Contacts that yield, have two layers or are felt: against scipy, closed forms, and their own energy balance."""
 
 import warnings
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -12,8 +11,6 @@ from numpy.testing import assert_allclose
 
 import fem_impact as fi
 from fem_impact.impact.accuracy import contact_duration
-from fem_impact.impact.compiled import build, events, layout
-from fem_impact.impact.compiled.law import table
 
 PLATE = fi.analytic.rectangle(1.55, 1.0, mass=0.2, first_frequency=100.0, n_modes=20)
 WALL, AT = fi.Modes.rigid(1e6), (0.45, 0.3)
@@ -31,11 +28,10 @@ LAWS = {  # the law, and the same for `lossy_blow`
 
 def struck(law, target, tolerance, speed=1.0, **wanted):
     at = None if target.dimension == 0 else AT
+    about = {"at": at, "speed": speed, "tolerance": tolerance, "residual": False, **wanted}
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", fi.ToleranceWarning)  # 20 modes do not resolve the stiff contacts
-        return fi.strike(
-            target, fi.Striker.rigid(0.02), law, at=at, speed=speed, tolerance=tolerance, residual=False, **wanted
-        )
+        return fi.strike(target, fi.Striker.rigid(0.02), law, **about)
 
 
 def truth(hit, told):
@@ -65,19 +61,14 @@ def test_both_schemes_agree_with_runge_kutta(name, target):
     wanted = truth(fine, told)
     momentum = np.linalg.norm(fine.history.start_p)
     for hit, limit in ((fine, 1e-8), (usual, 1e-4)):
-        missed = [
-            abs(hit.history.end_p[0] - wanted.speeds[0]) / momentum,
-            abs(hit.impulse / wanted.impulse - 1.0),
-            abs(hit.contact_time / wanted.contact_time - 1.0),
-        ]
+        missed = [abs(getattr(hit, name) / getattr(wanted, name) - 1.0) for name in ("impulse", "contact_time")]
+        missed.append(abs(hit.history.end_p[0] - wanted.speeds[0]) / momentum)
         assert max(missed) < limit
         assert max(missed) < 10.0 * hit.error.step + 1e-11  # 1e-11: what Runge-Kutta itself errs by
         assert hit.peak_force == pytest.approx(wanted.peak, rel=max(limit, 1e-6))  # the truth is sampled 4000 times
-        energies = hit.energies
-        assert energies["contact"] + energies["dissipated"] == pytest.approx(
-            wanted.lost, abs=4.0 * limit * 0.5 * momentum**2
-        )
-        assert energies["dissipated"] >= 0.0
+        lost = hit.energies["contact"] + hit.energies["dissipated"]
+        assert lost == pytest.approx(wanted.lost, abs=4.0 * limit * 0.5 * momentum**2)
+        assert hit.energies["dissipated"] >= 0.0
         assert hit.energy_error < 1e-10  # of collocation; A4 keeps it to rounding, see below
 
 
@@ -98,37 +89,28 @@ def test_what_a_contact_does_within_its_steps_is_claimed(law, told, tolerance):
     assert missed < 1.1 * hit.error.of_quantity("restitution")  # 1.1: terms of higher order
 
 
-def test_restitution_falls_as_the_fourth_root_of_the_speed():
+def test_restitution_falls_as_the_fourth_root_of_the_speed_and_nothing_yields_below_that_of_first_yield():
     law = fi.Contact.elastic_plastic(1e10, yield_speed=1e-3, mass=0.02)
     slow, fast = (struck(law, WALL, 1e-6, speed).restitution for speed in (10.0, 160.0))
     assert slow / fast == pytest.approx(2.0, rel=2e-3)  # falls as first yield over the speed
-
-
-def test_nothing_yields_below_the_speed_of_first_yield():
-    law = fi.Contact.elastic_plastic(1e10, yield_speed=0.1, mass=0.02)
-    hit = struck(law, WALL, 1e-6, 0.0999)
+    hit = struck(fi.Contact.elastic_plastic(1e10, yield_speed=0.1, mass=0.02), WALL, 1e-6, 0.0999)
     assert hit.dissipated["contact"] == pytest.approx(0.0, abs=1e-15 * 0.5 * 0.02 * 0.1**2 * 10.0)
     assert hit.restitution == pytest.approx(1.0, abs=1e-6)
 
 
-@pytest.mark.parametrize("scheme", ["A", "A4", "collocation"])
-def test_a_dent_stays_and_what_it_took_is_known(scheme):
+@pytest.mark.parametrize(("scheme", "tolerance"), [("A", 1e-3), ("A4", 1e-4), ("collocation", 1e-8)])
+def test_a_dent_stays_and_what_it_took_is_known(scheme, tolerance):
     """A ball dropped again and again: second impacts begin at the dent and lose only where they press deeper."""
-    law = fi.Contact.elastic_plastic(1e9, yield_speed=0.05, mass=0.02)
-    floor = [fi.Touch(law, 0, None)]
-    hit = fi.collide(
-        [fi.Modes.rigid(0.02)], floor, speeds=[1.0], forces=[0.02 * 9.81], max_impacts=3, scheme=scheme,
-        tolerance={"A": 1e-3, "A4": 1e-4, "collocation": 1e-8}[scheme],
-    )  # fmt: skip
-    assert hit.n_impacts == 3
-    first, second, third = (
-        abs(hit.velocity(None, [t], body=0)[0, 0]) for t in (hit.impacts[0].end, hit.impacts[1].end, hit.impacts[2].end)
-    )
+    touch = fi.Touch(fi.Contact.elastic_plastic(1e9, yield_speed=0.05, mass=0.02), 0, None)
+    how = {"speeds": [1.0], "forces": [0.02 * 9.81], "max_impacts": 3, "scheme": scheme, "tolerance": tolerance}
+    hit = fi.collide([fi.Modes.rigid(0.02)], [touch], **how)
+    ends = [impact.end for impact in hit.impacts]
+    assert len(ends) == 3
+    first, *later = np.abs(hit.velocity(None, ends, body=0)[:, 0])
     assert first < 0.81
-    assert second == pytest.approx(first, rel=1e-3)  # slower than before: elastic, but for the work of the weight
-    assert third == pytest.approx(first, rel=1e-3)
+    assert_allclose(later, first, rtol=1e-3)  # slower than before: elastic, but for the work of the weight
     deepest = hit.history.now[5, 0]
-    dent = hit.history.offset[0] + hit.displacement(None, [hit.impacts[2].end], body=0)[0, 0]
+    dent = hit.history.offset[0] + hit.displacement(None, ends[2:], body=0)[0, 0]
     assert 0.1 * deepest < dent < deepest  # it leaves the floor at the dent
     assert hit.energy_error < (1e-9 if scheme == "collocation" else 1e-13)  # the loss is that of the law in closed form
 
@@ -185,13 +167,12 @@ def test_two_contacts_of_other_kinds_at_once_agree_with_the_reference_scheme():
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("seed", range(24))
+@pytest.mark.parametrize("seed", range(12))
 def test_the_error_is_what_it_claims_for_random_blows(seed):
     """A4 at 1e-3 or 1e-4 against collocation at 1e-8, on plates of random size with random laws."""
     rng = np.random.default_rng(seed)
     plate = fi.analytic.rectangle(1.0 + rng.random(), 1.0, mass=0.2, first_frequency=100.0, n_modes=30)
-    k, speed = 10.0 ** rng.uniform(7.0, 9.0), 10.0 ** rng.uniform(-1.0, 1.0)
-    mass = 10.0 ** rng.uniform(-2.5, -1.0)
+    k, speed, mass = 10.0 ** rng.uniform(7.0, 9.0), 10.0 ** rng.uniform(-1.0, 1.0), 10.0 ** rng.uniform(-2.5, -1.0)
     time = contact_duration(fi.Contact.hertz(k), mass, speed)
     law = [
         fi.Contact.layers(1e-3 * k, 1.2, depth=0.1 * speed * time, hard_stiffness=k),
@@ -210,24 +191,9 @@ def test_the_error_is_what_it_claims_for_random_blows(seed):
 
 def test_a_stick_that_bends_too_little_to_matter_still_meets_a_lossy_contact():
     stick, law = fi.Striker.stick(mass=0.1, first_frequency=10e3), fi.Contact.power(1e4, 1.5, loss=0.1)
-    found = [fi.strike(PLATE, stick, law, at=AT, speed=0.1, tolerance=tolerance) for tolerance in (0.1, 1e-4)]
-    assert found[0].n_impacts == 1
-    assert found[0].impulse == pytest.approx(found[1].impulse, rel=1e-2)  # a tenth of what was asked for
-
-
-@pytest.mark.parametrize(("depth", "left"), [(0.3, False), (0.45, True)])
-def test_felt_is_left_within_a_step_where_it_comes_back_too_slowly(depth, left):
-    """Felt at rest keeps half of what pressed it: the body leaves it at 1 - 0.5**(2/3) = 0.37 of its indentation."""
-    pressed, h, exponent = 1e-3, 1e-4, 1.5
-    now, rate = np.zeros((6, 1)), 4.0 * depth * pressed / h  # there and back
-    memory = pressed**exponent
-    felt = fi.Contact.felt(1e6, exponent, hysteresis=0.5, relaxation=1e3 * h)
-    law = table([felt.numbers._replace(memory=memory)])
-    now[layout.APPROACH], now[layout.RATE] = pressed, -rate
-    contacts = SimpleNamespace(
-        law=law, now=now, end=np.array([pressed]), rate=np.array([rate]), after=np.array([memory])
-    )
-    assert build.plain(events.dipped_felt)(contacts, h, 0) == left
+    rough, fine = (fi.strike(PLATE, stick, law, at=AT, speed=0.1, tolerance=tolerance) for tolerance in (0.1, 1e-4))
+    assert rough.n_impacts == 1
+    assert rough.impulse == pytest.approx(fine.impulse, rel=1e-2)  # a tenth of what was asked for
 
 
 def felt_blow(stiffness, tolerance):
@@ -266,22 +232,31 @@ def test_felt_that_lets_go_for_less_than_a_step_is_two_impacts(steps):
     assert_allclose([first.end, second.start], [396.77e-6, 403.94e-6], rtol=1e-3)  # at a tolerance of 1e-5
 
 
+def ringing(frequency, shape):
+    """A body of one mode, known at one point."""
+    about = {"points": [[0.0]], "mass": 0.3, "damping_ratio": 0.05, "complete": True}
+    return fi.Modes.from_arrays([frequency], [[shape]], **about)
+
+
+QUICK = fi.Contact.felt(1.66e5, 1.2, hysteresis=0.26, relaxation=1.7e-6)
+
+
 @pytest.mark.parametrize(
-    ("frequency", "shape", "law", "mass", "speed", "tolerance"),
+    ("body", "law", "mass", "speed", "quantity", "tolerance"),
     [
-        (3705.0, 0.126, fi.Contact.power(4.57e6, 1.2, loss=1.38), 0.00211, 5.75, 1e-2),
-        (57.6, 2.0, fi.Contact.power(1.866e6, 1.0, loss=0.0378), 0.2456, 7.36, 1e-4),
-        (120.8, 0.609, fi.Contact.power(1.25e4, 1.0, loss=0.053), 0.0329, 1.66, 1e-5),
+        # a peak that the rate within a step moves: two runs agreed on it by chance, claims were a third to a fifth
+        (ringing(3705.0, 0.126), fi.Contact.power(4.57e6, 1.2, loss=1.38), 0.00211, 5.75, "force", 1e-2),
+        (ringing(57.6, 2.0), fi.Contact.power(1.866e6, 1.0, loss=0.0378), 0.2456, 7.36, "force", 1e-4),
+        (ringing(120.8, 0.609), fi.Contact.power(1.25e4, 1.0, loss=0.053), 0.0329, 1.66, "force", 1e-5),
+        # felt that recovers within a step errs at first order: claims were a third of the errors
+        *((WALL, QUICK, 1.2e-3, 0.2, "contact_time", tolerance) for tolerance in (1e-3, 1e-4)),
     ],
 )
-def test_a_peak_that_the_rate_within_a_step_moves_is_claimed(frequency, shape, law, mass, speed, tolerance):
-    """Two runs agreed on it by chance: claims were three to five times smaller than the error."""
-    body = fi.Modes.from_arrays([frequency], [[shape]], points=[[0.0]], mass=0.3, damping_ratio=0.05, complete=True)
-    told, true = (
-        fi.strike(body, fi.Striker.rigid(mass), law, at=[0.0], speed=speed, max_impacts=1, tolerance=each)
-        for each in (tolerance, 1e-9)
-    )
-    assert abs(told.peak_force / true.peak_force - 1.0) < told.error.of_quantity("force") < tolerance
+def test_what_happens_within_a_step_is_claimed(body, law, mass, speed, quantity, tolerance):
+    blow = {"at": [0.0] if body.dimension else None, "speed": speed, "max_impacts": 1}
+    told, true = (fi.strike(body, fi.Striker.rigid(mass), law, tolerance=each, **blow) for each in (tolerance, 1e-9))
+    name = "peak_force" if quantity == "force" else quantity
+    assert abs(getattr(told, name) / getattr(true, name) - 1.0) < told.error.of_quantity(quantity) < tolerance
 
 
 @pytest.mark.parametrize("tolerance", [1e-3, 1e-4, 1e-5])
@@ -300,11 +275,3 @@ def test_bodies_that_a_loss_lets_go_have_parted_however_the_rate_is_rounded(seed
     hit = fi.strike(body, fi.Striker.rigid(0.86), law, at=[0.0], speed=2.6, max_impacts=2, tolerance=tolerance)
     assert hit.restitution is not None
     assert_allclose(hit.impacts[-1].separation_speed, 1.0 / law.loss, rtol=1e-6)
-
-
-@pytest.mark.parametrize("tolerance", [1e-3, 1e-4])
-def test_felt_that_recovers_within_a_step_errs_at_first_order(tolerance):
-    """Claims of contact times were three times smaller than their errors."""
-    law, ball = fi.Contact.felt(1.66e5, 1.2, hysteresis=0.26, relaxation=1.7e-6), fi.Striker.rigid(1.2e-3)
-    told, true = (fi.strike(WALL, ball, law, at=None, speed=0.2, tolerance=each) for each in (tolerance, 1e-8))
-    assert abs(told.contact_time / true.contact_time - 1.0) < told.error.of_quantity("contact_time")

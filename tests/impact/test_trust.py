@@ -22,9 +22,8 @@ def test_a_clean_answer_says_how_far_both_errors_reach():
     assert hit.trusted and hit.trust.trusted and all(each.remedy == "" for each in hit.trust)
     own = hit.error.of_quantity("restitution")
     answer, rest = hit.verdict.split(", ", 1)
-    assert abs(float(answer.removeprefix("restitution ")) - hit.restitution) <= 0.5 * 10.0 ** -(
-        len(answer.split(".")[1]) - 1e-6
-    )
+    digits = len(answer.split(".")[1])
+    assert abs(float(answer.removeprefix("restitution ")) - hit.restitution) <= 0.5 * 10.0 ** -(digits - 1e-6)
     assert rest == (
         f"computed to {own:.1g} (tolerance 0.001 met); the model holds to {hit.model_error:.1g}, "
         "with the contact as stated"
@@ -79,12 +78,8 @@ def test_both_misses_are_said_and_the_larger_one_dominates():
 
 def test_quantities_are_judged_one_by_one_with_units_and_bands():
     hit = blow(quantity=("force", "n_impacts", "spectrum=2000", "contact_time"))
-    assert [each.name for each in hit.trust] == [
-        "peak force",
-        "number of impacts",
-        "spectrum to 2000 Hz",
-        "contact time",
-    ]
+    names = ["peak force", "number of impacts", "spectrum to 2000 Hz", "contact time"]
+    assert [each.name for each in hit.trust] == names
     assert hit.verdict.startswith(f"peak force {hit.trust['force'].shown}, computed to")
     assert hit.trust["force"].shown.endswith(" N") and hit.trust["n_impacts"].shown == str(hit.n_impacts)
     assert hit.trust["spectrum"].value == pytest.approx(hit.impulse, rel=0.3)  # at 0 Hz, where it is nearly largest
@@ -95,8 +90,7 @@ def test_quantities_are_judged_one_by_one_with_units_and_bands():
 
 
 def test_blows_of_several_bodies_say_that_nobody_examined_the_model():
-    balls = [fi.Modes.rigid(0.1), fi.Modes.rigid(0.2)]
-    touch = fi.Touch(fi.Contact.hertz(1e8), 0, 1)
+    balls, touch = [fi.Modes.rigid(0.1), fi.Modes.rigid(0.2)], fi.Touch(fi.Contact.hertz(1e8), 0, 1)
     hit = fi.collide(balls, [touch], speeds=(1.0, 0.0))
     assert hit.tolerance_met and not hit.trusted
     assert hit.verdict.endswith(

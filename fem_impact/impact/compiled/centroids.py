@@ -83,8 +83,7 @@ def centroid(contacts, n_contacts, n_steps, h, ends, rates, spring, limit):
             force[0] = force[1] / 12.0
             force[count] = force[count - 1] / 12.0
         add_spectrum(force, start - begun, dt, step, real, imag)
-    top = 0.0
-    bottom = 0.0
+    top = bottom = 0.0
     for i in range(n):
         real[i] = np.sqrt(real[i] ** 2 + imag[i] ** 2)
         top += real[i] * i

@@ -10,10 +10,10 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from .build import FALSE, LOOSE, TRUE, inner, outer
-from .bundles import KernelSystem, Limits
+from .bundles import Flights, KernelSystem, Limits
 from .events import EVENT_LIMIT, dipped, strayed
 from .exact import freshen
-from .flight import NEVER, ONSET, SLOW, UNPROVED, approach_of, made_flights
+from .flight import GLIDES, NEVER, ONSET, SLOW, UNPROVED, approach_of
 from .law import corner_approach, point_at, power, relaxes, simple, smooth_force, special_of, spring_of, yields
 from .laws.felt import faded, lags
 from .one_mode import mode_moments
@@ -28,7 +28,7 @@ from .frame import (  # isort: skip
 )  # fmt: skip
 from .layout import (  # isort: skip
     A11, A12, A21, A22, APPROACH, BEGUN, CLOSED, CORNERED, EVENTS, FAILURES, FRESH, HEAD,
-    LENGTH, LEVEL, M1, PUSH, RATE, RELEASED, SEEKS, START, STEPS, TARGET, TIME, TRIES,
+    LENGTH, LEVEL, M1, N_LANE, PUSH, RATE, RELEASED, SEEKS, START, STEPS, TARGET, TIME, TRIES,
 )  # fmt: skip
 
 MOBILITY, BEYOND = range(2)  # rows of `CollocationRoom.contacts`
@@ -77,17 +77,9 @@ def tabulate(bodies, grid, slot, h):
     m = shape.shape[0]
     s = nodes.size - 1
     moments, work = grid.work[MOMENTS], grid.space
-    for a in range(s):
-        for b in range(s):
-            for i in range(m):
-                for j in range(m):
-                    out_inner[MOVED, a, b, i, j] = 0.0
-                    out_inner[SPED, a, b, i, j] = 0.0
+    out_inner[:] = 0.0
     for n in range(omega.size):
-        silent = True
-        for i in range(m):
-            if shape[i, n] != 0.0:
-                silent = False
+        silent = not any_of(shape[:, n])
         for a in range(s + 1):
             c = nodes[a]
             t = c * h
@@ -98,8 +90,7 @@ def tabulate(bodies, grid, slot, h):
             out_free[a, A22, n] = a22
             out_free[a, M1, n] = t * moments[1]
             for b in range(s):
-                x = 0.0
-                v = 0.0
+                x = v = 0.0
                 scale = 1.0
                 for k in range(s):
                     x += powers[b, k] * scale * moments[k + 1]
@@ -127,8 +118,7 @@ def free_approach(bodies, offset, grid, slot, h, out):
     for a in range(free.shape[0]):
         t = grid.nodes[a] * h
         for i in range(m):
-            d = 0.0
-            v = 0.0
+            d = v = 0.0
             for n in range(n_modes):
                 u = shape[i, n]
                 d += u * (free[a, A11, n] * q[n] + free[a, A12, n] * p[n] + t * free[a, M1, n] * bias[n])
@@ -152,11 +142,9 @@ def sides(law, now, out_beyond):
     for i in range(now.shape[1]):
         spring = spring_of(law, i)
         bend = corner_approach(spring)
-        d, rate = now[APPROACH, i], now[RATE, i]
-        if yields(law, i):
-            out_beyond[i] = d >= (1.0 - NEAR) * bend and rate > 0.0
-        else:
-            out_beyond[i] = d > (1.0 + NEAR) * bend or (d >= (1.0 - NEAR) * bend and rate >= 0.0)
+        d, rate, there = now[APPROACH, i], now[RATE, i], now[APPROACH, i] >= (1.0 - NEAR) * bend
+        further = there and rate >= 0.0
+        out_beyond[i] = there and rate > 0.0 if yields(law, i) else d > (1.0 + NEAR) * bend or further
 
 
 @inner()
@@ -216,12 +204,11 @@ def solve_collocation(contacts, room, inner):
     active = room.active
     count = 0
     for i in range(m):
+        for a in range(s):
+            out_f[a, i] = max(0.0, out_f[a, i]) if contacts.pressed[i] else 0.0
         if contacts.pressed[i]:
             active[count] = i
             count += 1
-        else:
-            for a in range(s):
-                out_f[a, i] = 0.0
     last = np.inf
     for iteration in range(40):
         scale = 0.0
@@ -399,15 +386,7 @@ def look_ahead(contacts, grid, room, row, smooth):
                 position = 1.0 + grid.nodes[a]
                 for k in range(s - 1, -1, -1):
                     ahead = ahead * position + row[push + k] if m == 1 else last
-            room.nodes[FORCES, a, i] = max(0.0, ahead)
-
-
-@inner()
-def guess_again(room):
-    """Begin the next try from the forces of the last."""
-    for a in range(room.nodes.shape[1]):
-        for i in range(room.nodes.shape[2]):
-            room.nodes[FORCES, a, i] = max(0.0, room.nodes[FORCES, a, i])
+            room.nodes[FORCES, a, i] = ahead
 
 
 @inner(part=True)
@@ -480,7 +459,6 @@ def follow_nodes(scene, grid, room, flights, limits, run, steps):
             h, slot = step_length(course, grid.base, limits.horizon)
         else:
             h, slot = guess, LEVELS
-            guess_again(room)
         if slot == LEVELS or grid.known[slot] == 0.0:
             tabulate(bodies, grid, slot, h)
         misfit = collocate(bodies, contacts, grid, room, slot, h)
@@ -525,5 +503,5 @@ def run_collocation(
         np.zeros((s * m + 1, s * m)), np.zeros(m, np.int64),
     )  # fmt: skip
     room.contacts[MOBILITY] = (scene.shape**2).sum(axis=1)
-    flights = made_flights(n_modes, base, 1e-6 * base)
+    flights = Flights(np.empty((GLIDES + 1, N_LANE, n_modes)), np.zeros(GLIDES + 1), base, 1e-6 * base)
     return followed(follow_nodes, (scene, grid, room, flights, limits), made_run(scene), HEAD + (PUSH + len(nodes)) * m)

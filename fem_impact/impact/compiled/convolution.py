@@ -72,9 +72,7 @@ def convolve(rows, n, known, segments, n_segments, force, ramp):
 
     Indices without sign, here and below: loops over signed ones do not run in parallel lanes.
     """
-    end = 0.0
-    mean = 0.0
-    rate = 0.0
+    end = mean = rate = 0.0
     shift = rows.shape[1] - 1 - n
     for i in range(n_segments):
         low, high = segments[i, 0], min(segments[i, 1], known)
@@ -92,8 +90,7 @@ def convolve(rows, n, known, segments, n_segments, force, ramp):
 @inner(fastmath=LOOSE)
 def convolve_flight(rows, n, segments, n_segments, force, ramp):
     """The same in flight, after all forces: approach and rate."""
-    end = 0.0
-    rate = 0.0
+    end = rate = 0.0
     shift = rows.shape[1] - 1 - n
     for i in range(n_segments):
         low = segments[i, 0]

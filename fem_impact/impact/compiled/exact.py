@@ -14,7 +14,7 @@ from .frame import LEVELS, remember
 from .law import harden, point_at, relaxes, spring_of
 from .laws.felt import faded, meet
 from .propagation import any_of, lane_table
-from .schemes import Free, Own, linear_guess, point_of, remembers, solve_constants, solve_ramp, solve_ramps
+from .schemes import Free, Own, left_of, linear_guess, point_of, remembers, solve_constants, solve_ramp, solve_ramps
 
 from .layout import (  # isort: skip
     A11, A12, A21, A22, APPROACH, BLIND, CLOSED, COMPRESSION, ENERGY, FORCE, FREE_END, FREE_MEAN, FREE_RATE,
@@ -44,10 +44,7 @@ def contact_sums(shape, lanes, h, out_sums):
     n_contacts, n_modes = shape.shape
     for i in range(n_contacts):
         for j in range(i + 1):
-            s1 = 0.0
-            s4 = 0.0
-            s5 = 0.0
-            s6 = 0.0
+            s1 = s4 = s5 = s6 = 0.0
             for n in range(n_modes):
                 uu = shape[i, n] * shape[j, n]
                 s1 += uu * lanes[A12, n]
@@ -75,9 +72,7 @@ def predict(bodies, contacts, tables, slot, h):
         new_q[n] = lanes[A11, n] * q[n] + lanes[A12, n] * p[n] + h * lanes[M1, n] * bias[n]
         new_p[n] = lanes[A21, n] * q[n] + lanes[A22, n] * p[n] + lanes[A12, n] * bias[n]
     for i in range(n_contacts):
-        end = 0.0
-        mean = 0.0
-        rate = 0.0
+        end = mean = rate = 0.0
         for n in range(n_modes):
             u = shape[i, n]
             end += u * new_q[n]
@@ -97,9 +92,7 @@ def advance(bodies, contacts, tables, slot, h):
     part = 1.0 / h
     f = contacts.force[0] - 0.5 * contacts.slope[0]
     s = contacts.slope[0]
-    end = 0.0
-    mean = 0.0
-    rate = 0.0
+    end = mean = rate = 0.0
     for n in range(q.size):
         u = bodies.shape[0, n]
         a12 = lanes[A12, n]
@@ -165,10 +158,7 @@ def solve_all(contacts, tables, slot, h):
                 f[i] = keep[m + i]
                 s[i] = 0.0
     for i in range(m):
-        v = end[FREE_RATE, i]
-        for j in range(m):
-            v -= sums[OWN_RATE, i, j] * f[j] + sums[OWN_RATE_RAMP, i, j] * s[j]
-        contacts.rate[i] = v
+        contacts.rate[i] = left_of(end[FREE_RATE, i], sums, OWN_RATE, i, f, s)
     return fine
 
 
@@ -224,7 +214,5 @@ def record(contacts, course, row, sums, h, blind):
         row[first + CLOSED] = 1.0 if closed else 0.0
         row[first + PUSH] = f[i] - 0.5 * s[i]
         row[first + PUSH + 1] = s[i]
-        mean = contacts.free[FREE_MEAN, i]
-        for j in range(y.size):
-            mean -= sums[OWN_MEAN, i, j] * f[j] + sums[OWN_MEAN_RAMP, i, j] * s[j]
+        mean = left_of(contacts.free[FREE_MEAN, i], sums, OWN_MEAN, i, f, s)
         course.done[i] += f[i] * (y[i] - start[i]) + s[i] * (0.5 * (start[i] + y[i]) - mean)

@@ -11,9 +11,8 @@ import numpy as np
 
 from . import arrays
 from .build import LOOSE, inner
-from .bundles import Flights
 from .cubics import turning
-from .layout import FASTEST, HARDEST, N_LANE, REACH, RIGID, RIGID_ACCELERATION, RIGID_RATE
+from .layout import FASTEST, HARDEST, REACH, RIGID, RIGID_ACCELERATION, RIGID_RATE
 from .propagation import any_of, glide, lane_table, restore
 from .rounding import REPEATED
 
@@ -26,8 +25,7 @@ ONSET, NEVER, LATER, SLOW, UNPROVED = range(5)  # how a flight ends, see `find_o
 @inner(arrays=arrays.approach_of, fastmath=LOOSE)
 def approach_of(shape, offset, i, q, p):
     """Approach of contact i and its rate."""
-    d = 0.0
-    v = 0.0
+    d = v = 0.0
     for n in range(q.size):
         d += shape[i, n] * q[n]
         v += shape[i, n] * p[n]
@@ -43,12 +41,7 @@ def motion_bounds(bodies, offset, i, out_bounds):
     With a bias force a flexible mode swings about its static rest, hence the shift by bias/omega**2.
     """
     omega, bias, q, p = bodies.omega, bodies.bias, bodies.q, bodies.p
-    position = 0.0
-    rate = 0.0
-    acceleration = 0.0
-    reach = 0.0
-    fastest = 0.0
-    hardest = 0.0
+    position = rate = acceleration = reach = fastest = hardest = 0.0
     for n in range(q.size):
         u = bodies.shape[i, n]
         w = omega[n]
@@ -80,11 +73,6 @@ def quadratic_wait(d, v, a):
     if v >= 0.0:
         return -2.0 * d / (root + v) if root + v > 0.0 else 0.0
     return (root - v) / a
-
-
-def made_flights(n_modes: int, base: float, shortest: float) -> Flights:
-    """Room for the tables of flights, none known."""
-    return Flights(np.empty((GLIDES + 1, N_LANE, n_modes)), np.zeros(GLIDES + 1), base, shortest)
 
 
 @inner()
@@ -184,10 +172,8 @@ def find_onset(bodies, offset, flights, limits, limit, out_miss):
     elapsed = wait = 0.0
     slow = 0
     pushed = any_of(bodies.bias)
-    bounds = np.empty((m, 6))
-    before = np.zeros((m, 2))
-    old_q = q.copy()
-    old_p = p.copy()
+    bounds, before = np.empty((m, 6)), np.zeros((m, 2))
+    old_q, old_p = q.copy(), p.copy()
     for look in range(20_000_000 // (q.size + 50)):  # some 0.1 s
         last = wait
         wait = np.inf

@@ -6,7 +6,7 @@ A contact pushes with ``F = k x**a (1 + loss d')`` while its spring is compresse
 differ beyond a corner or remember (one number each, ``memory``); which kind of spring takes which course is said here.
 
 A law is added by a file in that folder, a line in `LAWS` and in `Numbers`, and, where its force has a course of its own
-beyond a corner, a branch in `spring_with`, `force_and_energy`, `steepness`, `mean_slopes` and `smooth_force`.
+beyond a corner, a branch in `spring_with`, `force_and_energy`, `far_side` and `part_slopes`.
 """
 
 from collections import namedtuple
@@ -80,8 +80,7 @@ def spring_of(law, i):
 @inner()
 def special_of(law):
     """Whether some contact is more than a power law, and whether some force has corners in between."""
-    special = False
-    cornered = False
+    special = cornered = False
     for i in range(law.shape[0]):
         if law["kind"][i] != POWER:
             special = True
@@ -117,13 +116,17 @@ def force_and_energy(x, spring):
 
 
 @inner()
+def far_side(x, spring):
+    """Force and its slope beyond the corner, continued smoothly to the near side of it."""
+    if spring.kind == tabled.KIND:
+        return tabled.far_side(x, spring)
+    return plastic.far_side(x, spring) if spring.kind == plastic.KIND else layers.far_side(x, spring)
+
+
+@inner()
 def steepness(x, f, spring):
     """Slope of the force f over the compression x > 0."""
-    if x <= spring.corner:
-        return spring.exponent * f / x
-    if spring.kind == tabled.KIND:
-        return tabled.steepness(x, spring)
-    return plastic.steepness(x, spring) if spring.kind == plastic.KIND else layers.steepness(x, f, spring)
+    return spring.exponent * f / x if x <= spring.corner else far_side(x, spring)[1]
 
 
 @inner()
@@ -172,6 +175,18 @@ def point_at(d, spring):
 
 
 @inner()
+def part_slopes(small, large, spring):
+    """Average slopes of energy and force between two compressions > 0 on one side of the corner."""
+    if large <= spring.corner:
+        return power_slopes(spring.stiffness, spring.exponent, small, large)
+    if spring.kind == tabled.KIND:
+        return tabled.slopes_beyond(small, large, spring)
+    if spring.kind == plastic.KIND:
+        return plastic.slopes_beyond(small, large, spring)
+    return layers.slopes_beyond(small, large, spring)
+
+
+@inner()
 def mean_slopes(one, two, spring):
     """Average slopes between two points: energy over approach (G) and force over approach (D), without cancellation."""
     if one.approach <= 0.0 or two.approach <= 0.0:
@@ -181,14 +196,14 @@ def mean_slopes(one, two, spring):
         return (two.energy - one.energy) / span, (two.force - one.force) / span
     c = spring.compliance
     small, large = min(one.compression, two.compression), max(one.compression, two.compression)
-    if large <= spring.corner:
-        g, d = power_slopes(spring.stiffness, spring.exponent, small, large)
-    elif spring.kind == tabled.KIND:
-        g, d = tabled.slopes_beyond(small, large, spring)
-    elif spring.kind == plastic.KIND:
-        g, d = plastic.slopes_beyond(small, large, spring)
+    bend = spring.corner
+    if large <= bend or small >= bend:
+        g, d = part_slopes(small, large, spring)
     else:
-        g, d = layers.slopes_beyond(small, large, spring)
+        below, above, span = bend - small, large - bend, large - small
+        g0, d0 = part_slopes(small, bend, spring)
+        g1, d1 = part_slopes(bend, large, spring)
+        g, d = (g0 * below + g1 * above) / span, (d0 * below + d1 * above) / span
     return (g + 0.5 * c * (one.force + two.force) * d) / (1.0 + c * d), d / (1.0 + c * d)
 
 
@@ -198,14 +213,7 @@ def smooth_force(x, v, spring):
 
     A spring with a corner is taken on the far side of it, also continued; see `collocation.side_of`.
     """
-    if spring.kind == plastic.KIND:
-        f, slope = plastic.far_side(x, spring)
-    elif spring.kind == layers.KIND:
-        f, slope = layers.far_side(x, spring)
-    elif spring.kind == tabled.KIND:
-        f, slope = tabled.far_side(x, spring)
-    else:
-        f, slope = continued(x, spring)
+    f, slope = continued(x, spring) if spring.corner == np.inf else far_side(x, spring)
     factor = 1.0 + spring.loss * v
     if factor < 0.0:
         return 0.0, 0.0, 0.0
@@ -234,23 +242,18 @@ def harden(law, i, approach):
     return dent(law, i, law["memory"][i]) - before
 
 
-@inner()
-def held(approach, law, i):
-    """Energy that contact i stores at an approach from its dent [m]; felt never less than left to itself."""
-    if not relaxes(law, i):
-        return point_at(approach, spring_of(law, i)).energy
-    z = abs(law["memory"][i])
-    spring = spring_with(law, i, z)
-    x = max(max(0.0, approach), felt.surface(law, i, z))
-    return point_at(x, spring).energy + memory_energy(x, z, spring)
-
-
 @outer()
 def stored(approach, law):
-    """Energy that all contacts store at their approaches from their dents (n_contacts,) [m]."""
+    """Energy that contacts store at approaches from their dents (n_contacts,) [m]; felt never less than by itself."""
     total = 0.0
     for i in range(law.shape[0]):
-        total += held(approach[i], law, i)
+        z, x = abs(law["memory"][i]), approach[i]
+        if relaxes(law, i):
+            x = max(max(0.0, x), felt.surface(law, i, z))
+        spring = spring_with(law, i, z)
+        total += point_at(x, spring).energy
+        if relaxes(law, i):
+            total += memory_energy(x, z, spring)
     return total
 
 

@@ -15,15 +15,12 @@ from .build import ONE, inner, outer
 from .bundles import Bodies, Contacts, Tables
 from .events import dipped
 from .exact import contact_sums, freshen, keep_in_mind, predict, solve_step
-from .flight import approach_of, carry_rigid, motion_bounds, safe_wait
+from .flight import LASTING, approach_of, carry_rigid, motion_bounds, recedes, safe_wait
 from .law import point_at, special_of, spring_of
 from .laws.felt import rest_of
+from .layout import APPROACH, FREE_END, FREE_RATE, RATE
 from .propagation import any_of, commit, glide, product, restore
 from .rounding import OVERFLOW
-
-from .layout import (  # isort: skip
-    APPROACH, FREE_END, FREE_RATE, RATE, REACH, RIGID, RIGID_ACCELERATION, RIGID_RATE,
-)  # fmt: skip
 
 TICKS = 1 << 20  # [-] ticks of a frame: the shortest step is one, 2e-11 s at 48 kHz
 LEVELS = TICKS.bit_length()  # lengths of steps, from a frame to a tick
@@ -213,9 +210,7 @@ def flight(body, pads, limits, state, level):
         state.place[FORCED] = 0
         for i in range(m - 1, -1, -1):
             motion_bounds(bodies, state.offset, i, state.bounds)
-            rigid, rate = state.bounds[i, RIGID], state.bounds[i, RIGID_RATE]
-            receding = rate <= limits.still and state.bounds[i, RIGID_ACCELERATION] <= 0.0
-            if receding and rigid + state.bounds[i, REACH] <= limits.depth:
+            if recedes(state.bounds, i, limits, LASTING + 1):
                 take_off(pads, state, i)
                 return -1
     state.place[N_LOOKS] += 1
@@ -286,11 +281,9 @@ def step(body, limits, state, level, time):
             keep_in_mind(contacts, h, fine)
         shorter = False
         for i in range(contacts.end.size):
-            if contacts.pressed[i]:
-                shorter = shorter or (contacts.end[i] <= 0.0 and level < limits.opening)
-            else:
-                shorter = shorter or (contacts.end[i] > 0.0 and level < limits.closing)
-            shorter = shorter or (level < limits.opening and dipped(contacts, h, i))
+            finest = limits.opening if contacts.pressed[i] else limits.closing
+            ends = (contacts.end[i] > 0.0) != contacts.pressed[i]
+            shorter = shorter or (ends and level < finest) or (level < limits.opening and dipped(contacts, h, i))
         if not shorter:
             break
         level += 1
@@ -350,9 +343,7 @@ def play_block(body, pads, limits, state, strokes, gain, out):
                 glide(body.tables[level], limits.period * 0.5**level, state.bias, state.q, state.p)
                 tick += TICKS >> level
                 continue
-            touching = False
-            for i in range(state.place[N_ON]):
-                touching = touching or state.pressed[i]
+            touching = any_of(state.pressed[: state.place[N_ON]])
             level = max(level, limits.contact) if touching else flight(body, pads, limits, state, level)
             if level >= 0:
                 tick += TICKS >> step(body, limits, state, level, (state.place[FRAME] + tick / TICKS) * limits.period)

@@ -38,16 +38,6 @@ NEARER, UNPROVED, APART, TOUCH = range(4)  # what a look ahead in flight found: 
 PIECES = 3  # [-] of the step in which a contact opens, integrated by themselves: order 4
 
 
-class Straight(NamedTuple):
-    """A linear contact pressed all along a step: everything is straight in the approach at its end."""
-
-    pressed: bool  # whether the contact is linear, without loss
-    stiffness: float  # [N/m] of both springs in series
-    lever: float  # [N/m] mean force per mean approach
-    turn: float  # [N/m] what the mean force loses per approach at the end
-    over: float  # [-] approach at the end per free one
-
-
 class MapBlow(NamedTuple):
     """What stays the same during one blow."""
 
@@ -58,7 +48,11 @@ class MapBlow(NamedTuple):
     spring: Spring
     own: Own  # what a unit of a step's force takes within that step
     once: Own  # and within the next one
-    straight: Straight
+    linear: bool  # whether the contact is, without loss: pressed all along a step, all is straight in the last approach
+    firm: float  # [N/m] stiffness of both springs in series
+    lever: float  # [N/m] mean force per mean approach
+    turn: float  # [N/m] what the mean force loses per approach at the end
+    over: float  # [-] approach at the end per free one
     swift: float  # [m/N] what the struck surface yields at once, and its rate
     swift_rate: float  # [m/s/N]
     stiff: float  # [-] what is left of a linear contact's force when the surface yields so
@@ -112,21 +106,20 @@ def blow_of(pairs, cell, h, certify, rows):
     lever = k / (1.0 + k * own.mean)
     turn = lever * own.mean_ramp * k
     over = 1.0 / (1.0 - own.end * turn + own.end_ramp * k)
-    straight = Straight(spring.exponent == 1.0 and spring.loss == 0.0, k, lever, turn, over)
+    linear = spring.exponent == 1.0 and spring.loss == 0.0
     swift = own.end + 12.0 * own.mean_ramp
     swift_rate = own.rate + (12.0 * own.mean - 6.0 * own.end) / h
     stiff = 1.0 / (1.0 + k * swift)
     return MapBlow(
-        h, 1.0 / h, certify, (pairs.shares[0, cell], pairs.shares[1, cell]), spring, own, once, straight, swift,
-        swift_rate, stiff, pairs.rigid[cell], pairs.static[cell], pairs.slack[cell],
+        h, 1.0 / h, certify, (pairs.shares[0, cell], pairs.shares[1, cell]), spring, own, once, linear, k, lever, turn,
+        over, swift, swift_rate, stiff, pairs.rigid[cell], pairs.static[cell], pairs.slack[cell],
     )  # fmt: skip
 
 
 @inner()
 def doubt(level, state, shares, bounds):
     """What a look ahead of that level misses at most of the approach and of its slope over the look."""
-    error = 0.0
-    rate_error = 0.0
+    error = rate_error = 0.0
     for share, bound in zip(shares, bounds):
         error += share * (state[JUMPS] * bound[level, 0, 0] + state[BENDS] * bound[level, 0, 1])
         rate_error += share * (state[JUMPS] * bound[level, 1, 0] + state[BENDS] * bound[level, 1, 1])
@@ -258,15 +251,14 @@ def expected(blow, track, n):
 @inner(part=True)
 def solve(blow, start, rate, free):
     """Scheme A4 for one step, or A where that fails: point at the end, mean force and what the force gains."""
-    own, spring, line = blow.own, blow.spring, blow.straight
-    d0 = start.approach
-    if line.pressed and d0 >= 0.0:
-        top = line.lever * (free.mean + own.mean_ramp * line.stiffness * d0)
-        y = line.over * (free.end - own.end * top + own.end_ramp * line.stiffness * d0)
-        f = top - line.turn * y
+    own, spring, k, d0 = blow.own, blow.spring, blow.firm, start.approach
+    if blow.linear and d0 >= 0.0:
+        top = blow.lever * (free.mean + own.mean_ramp * k * d0)
+        y = blow.over * (free.end - own.end * top + own.end_ramp * k * d0)
+        f = top - blow.turn * y
         if y > 0.0 and f >= 0.0:
-            force = line.stiffness * y
-            return Point(y, y - spring.compliance * force, force, 0.5 * force * y), f, line.stiffness * (y - d0)
+            force = k * y
+            return Point(y, y - spring.compliance * force, force, 0.5 * force * y), f, k * (y - d0)
     guess = start.compression + rate * blow.h if d0 > 0.0 else 0.5 * free.end
     settled, point, f, s = solve_ramp(guess, blow.h, start, rate, free, own, spring)
     if not settled:
@@ -297,7 +289,7 @@ def mend(blow, track, n, point, rate):
     spring, y, missed = blow.spring, point.approach, 0.0
     if y > 0.0:
         missed = point.force * (1.0 + spring.loss * rate) - track.force[n] - 0.5 * track.ramp[n]
-        if blow.straight.pressed:
+        if blow.linear:
             missed *= blow.stiff
         else:
             missed *= 1.0 / (1.0 + point.force * (spring.exponent / y * blow.swift + spring.loss * blow.swift_rate))
@@ -360,11 +352,7 @@ def opening(d0, free, own, spring, loss):
     d = start
     impulse = 0.0
     for piece in range(PIECES):
-        change = 0.0
-        push = 0.0
-        rate0 = 0.0
-        rate = 0.0
-        f = 0.0
+        change = push = rate0 = rate = f = 0.0
         for stage in range(4):
             part = 0.0 if stage == 0 else dt if stage == 3 else 0.5 * dt
             pushed = impulse + part * f

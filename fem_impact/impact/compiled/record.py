@@ -22,6 +22,7 @@ from .layout import (  # isort: skip
 
 FINISHED, HORIZON, IMPACTS, SETTLED, EXHAUSTED, FAILED = range(6)  # why a run ended
 FULL = -1  # it did not: its record is full
+PEAK_LOOKS = 16  # [-] per step for a peak force: misses (pi/11/16)**2/8 of it before the parabola
 
 
 @inner()
@@ -55,18 +56,14 @@ def ends_of(steps, now, law, n_coefficients, row, i):
 
 @inner()
 def force_within(steps, now, law, n_coefficients, row, i, part):
-    """Force of contact i at a fraction of a step: the law on the cubic through both ends, or a higher polynomial."""
-    return force_and_rate(steps, now, law, n_coefficients, row, i, part)[0]
+    """Force of contact i at a fraction of a step, never negative, and its rate [N/s].
 
-
-@inner()
-def force_and_rate(steps, now, law, n_coefficients, row, i, part):
-    """That force and its rate [N/s]; never negative."""
+    That is the law on the cubic through both ends, or a higher polynomial.
+    """
     first = HEAD + (PUSH + n_coefficients) * i
     h = steps[row, LENGTH]
     if n_coefficients > 2:
-        value = 0.0
-        slope = 0.0
+        value = slope = 0.0
         for k in range(n_coefficients - 1, -1, -1):
             slope = slope * part + value
             value = value * part + steps[row, first + PUSH + k]
@@ -80,7 +77,7 @@ def force_and_rate(steps, now, law, n_coefficients, row, i, part):
 def forces(steps, now, law, n_coefficients, rows, i, part, out):
     """Force of contact i [N] and its rate [N/s], (2, n), at fractions (n,) of steps (n,)."""
     for n in range(rows.size):
-        out[0, n], out[1, n] = force_and_rate(steps, now, law, n_coefficients, rows[n], i, part[n])
+        out[0, n], out[1, n] = force_within(steps, now, law, n_coefficients, rows[n], i, part[n])
 
 
 @inner()
@@ -193,26 +190,25 @@ def force_missed(steps, now, law, n_coefficients, peak):
 
 
 @inner()
-def peak_in(steps, now, law, n_coefficients, row, i, looks):
+def peak_in(steps, now, law, n_coefficients, row, i):
     """Largest force of contact i in a step: the largest of some looks, refined by parabolas."""
-    peak = 0.0
-    part = 0.0
-    for look in range(looks + 1):
-        f = force_within(steps, now, law, n_coefficients, row, i, look / looks)
+    peak = part = 0.0
+    for look in range(PEAK_LOOKS + 1):
+        f, _ = force_within(steps, now, law, n_coefficients, row, i, look / PEAK_LOOKS)
         if f > peak:
             peak = f
-            part = look / looks
-    spread = 1.0 / looks
+            part = look / PEAK_LOOKS
+    spread = 1.0 / PEAK_LOOKS
     for _ in range(4):
         middle = min(max(part, spread), 1.0 - spread)
-        low = force_within(steps, now, law, n_coefficients, row, i, middle - spread)
-        top = force_within(steps, now, law, n_coefficients, row, i, middle)
-        high = force_within(steps, now, law, n_coefficients, row, i, middle + spread)
+        low, _ = force_within(steps, now, law, n_coefficients, row, i, middle - spread)
+        top, _ = force_within(steps, now, law, n_coefficients, row, i, middle)
+        high, _ = force_within(steps, now, law, n_coefficients, row, i, middle + spread)
         bend = low - 2.0 * top + high
         if bend >= 0.0:
             break
         part = middle + min(max(0.5 * (low - high) / bend, -1.0), 1.0) * spread
-        peak = max(peak, force_within(steps, now, law, n_coefficients, row, i, part))
+        peak = max(peak, force_within(steps, now, law, n_coefficients, row, i, part)[0])
         spread *= 0.125
     return peak
 
@@ -228,10 +224,10 @@ def rate_within(steps, now, law, n_coefficients, row, i, part):
 
 
 @inner()
-def peak_between(steps, now, law, n_coefficients, begin, end, i, looks):
+def peak_between(steps, now, law, n_coefficients, begin, end, i):
     """Largest force of contact i in the steps of a push.
 
-    It is sought with ``looks`` per step in the step with the largest of a few and in those beside it: where it lies at
+    It is sought with all looks in the step with the largest of a few and in those beside it: where it lies at
     the end of a step, rounding decides which holds the larger look.
     """
     first = HEAD + (PUSH + n_coefficients) * i
@@ -243,12 +239,12 @@ def peak_between(steps, now, law, n_coefficients, begin, end, i, looks):
     for row in range(begin, end):
         if mean_push(steps, n_coefficients, row, first) >= 0.9 * most:
             for look in range(n_coefficients):
-                f = force_within(steps, now, law, n_coefficients, row, i, look / n_coefficients)
+                f, _ = force_within(steps, now, law, n_coefficients, row, i, look / n_coefficients)
                 if f > peak:
                     peak = f
                     peak_row = row
     for row in range(max(begin, peak_row - 1), min(end - 1, peak_row + 1) + 1):
-        peak = max(peak, peak_in(steps, now, law, n_coefficients, row, i, looks))
+        peak = max(peak, peak_in(steps, now, law, n_coefficients, row, i))
     return peak
 
 
@@ -275,19 +271,24 @@ def still_pressed(steps, now, law, n_coefficients, i, d):
 
 
 @outer()
-def find_impacts(steps, now, law, n_coefficients, looks, still, slack):
+def find_impacts(steps, now, law, n_coefficients, rounding, way, touch):
     """Every unbroken push, (n_impacts, 8), contact by contact.
 
     Its start, end, peak force, impulse and contact; how fast the bodies approach at its start and part at its end; and
-    since when they have touched at rest, infinity if they met. A rate up to ``still`` [m/s] is rest, an approach up to
-    ``slack`` [m] either way a touch. They approach with 0 where they touched before or press each other as the run
-    begins; where they do as it ends, they part with NaN. ``looks`` as in `peak_between`.
+    since when they have touched at rest, infinity if they met. A rate up to ``rounding`` [-] of the fastest is rest, an
+    approach up to that of the ``way`` [m] that a body goes, or up to ``touch`` [-] of the deepest, either way a touch.
+    They approach with 0 where they touched before or press each other as the run begins; where they do as it ends, they
+    part with NaN.
     """
-    n_steps = steps.shape[0]
-    m = law.shape[0]
-    width = PUSH + n_coefficients
+    n_steps, m, width = steps.shape[0], law.shape[0], PUSH + n_coefficients
     result = np.empty((m * n_steps, 8))  # each takes a step at least
     count = ZERO
+    fastest = deepest = 0.0
+    for first in range(HEAD, HEAD + m * width, width):
+        for k in range(n_steps):
+            fastest = max(fastest, abs(steps[k, first + SPEED]))
+            deepest = max(deepest, steps[k, first])
+    still, slack = rounding * fastest, max(rounding * way, touch * deepest)
     for i in range(m):
         first = HEAD + width * i
         row: Any = ZERO
@@ -309,8 +310,7 @@ def find_impacts(steps, now, law, n_coefficients, looks, still, slack):
             if met <= still or since < np.inf or (row == 0 and steps[row, first] > slack):
                 met = 0.0
             end = start
-            part = 0.0
-            impulse = 0.0
+            part = impulse = 0.0
             while upper > lower:
                 impulse += steps[row, LENGTH] * mean_push(steps, n_coefficients, row, first)
                 end = steps[row, START] + upper * steps[row, LENGTH]
@@ -325,13 +325,7 @@ def find_impacts(steps, now, law, n_coefficients, looks, still, slack):
             deep = now[APPROACH, i] - dent(law, i, memory_of(steps, law, n_coefficients, row - 1, i))
             if row == n_steps and part >= 1.0 and still_pressed(steps, now, law, n_coefficients, i, deep):
                 left = np.nan
-            result[count, 0] = start
-            result[count, 1] = end
-            result[count, 2] = peak_between(steps, now, law, n_coefficients, begin, row, i, looks)
-            result[count, 3] = impulse
-            result[count, 4] = i
-            result[count, 5] = met
-            result[count, 6] = left
-            result[count, 7] = since
+            peak = peak_between(steps, now, law, n_coefficients, begin, row, i)
+            result[count] = start, end, peak, impulse, float(i), met, left, since
             count += 1
     return result[:count].copy()

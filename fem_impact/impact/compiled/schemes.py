@@ -25,7 +25,7 @@ from .laws.felt import growth, soaked
 from .rounding import CHORD, ITERATIONS, OVERFLOW, REPEATED, SOLVED, STALLED
 
 from .layout import (  # isort: skip
-    APPROACH, COMPRESSION, ENERGY, FORCE, FREE_END, FREE_MEAN, FREE_RATE, OWN_END, OWN_END_RAMP, OWN_MEAN,
+    APPROACH, COMPRESSION, ENERGY, FORCE, FREE_END, FREE_MEAN, FREE_RATE, OWN_END, OWN_MEAN,
     OWN_MEAN_RAMP, OWN_RATE, OWN_RATE_RAMP, RATE,
 )  # fmt: skip
 
@@ -318,9 +318,7 @@ def solve_constants(h, now, law, e, sums, work, out_y, out_f):
             matrix[i, i] += 1.0
         if not solve_linear(matrix, step, m):
             break
-        begin = 0.0
-        low = 0.0
-        high = 0.0
+        begin = low = high = 0.0
         t = 1.0
         for look in range(40):
             rise = 0.0
@@ -347,6 +345,14 @@ def solve_constants(h, now, law, e, sums, work, out_y, out_f):
     for _ in range(200):
         if sweep_constants(h, now, law, e, sums, out_y, out_f) <= SOLVED:
             break
+
+
+@inner()
+def left_of(free, sums, row, i, force, slope):
+    """What forces leave of a free approach or rate of contact i; a ``row`` of `exact.contact_sums`, and the next."""
+    for j in range(force.size):
+        free -= sums[row, i, j] * force[j] + sums[row + 1, i, j] * slope[j]
+    return free
 
 
 @inner()
@@ -377,10 +383,7 @@ def ramp_forces(h, y, contacts, sums, work, out_f, out_s, out_r):
         out_f[i] = vector[i]
         out_s[i] = vector[m + i]
     for i in range(m):
-        r = y[i] - e[i]
-        for j in range(m):
-            r += sums[OWN_END, i, j] * out_f[j] + sums[OWN_END_RAMP, i, j] * out_s[j]
-        out_r[i] = r
+        out_r[i] = -left_of(e[i] - y[i], sums, OWN_END, i, out_f, out_s)
     return True
 
 
@@ -392,12 +395,8 @@ def solve_ramps(h, contacts, sums, work):
     """
     law, now, out_y, out_f, out_s = contacts.law, contacts.now, contacts.end, contacts.force, contacts.slope
     m = out_y.size
-    r = work[3, 0]
-    r2 = work[3, 1]
-    f2 = work[3, 2]
-    s2 = work[3, 3]
-    y2 = work[4, 0]
-    jacobian = work[1]
+    r, r2, f2, s2 = work[3, 0], work[3, 1], work[3, 2, :m], work[3, 3, :m]
+    y2, jacobian = work[4, 0], work[1]
     settled = False
     for _ in range(20):
         if not ramp_forces(h, out_y, contacts, sums, work, out_f, out_s, r):
@@ -432,11 +431,8 @@ def solve_ramps(h, contacts, sums, work):
             return False
         spring = spring_of(law, i)
         start, end = point_of(now, i), point_at(out_y[i], spring)
-        mean = contacts.free[FREE_MEAN, i]
-        v1 = contacts.free[FREE_RATE, i]
-        for j in range(m):
-            mean -= sums[OWN_MEAN, i, j] * out_f[j] + sums[OWN_MEAN_RAMP, i, j] * out_s[j]
-            v1 -= sums[OWN_RATE, i, j] * out_f[j] + sums[OWN_RATE_RAMP, i, j] * out_s[j]
+        mean = left_of(contacts.free[FREE_MEAN, i], sums, OWN_MEAN, i, out_f, out_s)
+        v1 = left_of(contacts.free[FREE_RATE, i], sums, OWN_RATE, i, out_f, out_s)
         memory = remembers(h, start, end, now[RATE, i], v1, True, spring)
         if not fair(start, end, out_f[i], out_s[i], mean, memory, spring):
             return False

@@ -29,11 +29,11 @@ from .build import LOOSE, TRUE, ZERO, inner, outer
 from .bundles import KernelSystem
 from .exact import made_tables, predict, solve_step
 from .frame import LEVELS, begin, course_of, made_run, moving, touching
-from .propagation import any_of, commit, lane_table, restore
+from .propagation import any_of, commit, glide, lane_table, restore
 from .rounding import ITERATIONS, OVERFLOW, SOLVED, STALLED
 
 from .layout import (  # isort: skip
-    A11, A12, A21, A22, APPROACH, FLYING, FREE_END, FREE_MEAN, FREE_RATE, HEAD, LENGTH, M1, M2, M3, PUSH, RATE, START,
+    A12, APPROACH, FLYING, FREE_END, FREE_MEAN, FREE_RATE, HEAD, LENGTH, M1, M2, M3, PUSH, RATE, START,
     STEPS, TAKEOFF, TIME,
 )  # fmt: skip
 
@@ -63,12 +63,7 @@ class StretchRoom(NamedTuple):
     apart: np.ndarray  # (2, n_contacts) approaches and rates then
 
 
-def _bend(forms, q, out):
-    """`bend`."""
-    out[:] = forms @ q
-
-
-@inner(arrays=_bend, fastmath=LOOSE)
+@inner(arrays=np.matmul, fastmath=LOOSE)
 def bend(forms, q, out):
     """Every form times a state, (n_forms, count)."""
     for k in range(forms.shape[0]):
@@ -113,10 +108,7 @@ def pulls(room, q, ramp):
         out[0, i] = 0.0
         out[1, i] = 0.0
     for k in range(bent.shape[1]):
-        a = 0.0
-        b = 0.0
-        c = 0.0
-        d = 0.0
+        a = b = c = d = 0.0
         for i in range(out.shape[1]):
             middle = 0.5 * (q[first + i] + ends[1, i])
             whole = 0.5 * (bent[0, k, i] + bent[1, k, i])
@@ -221,8 +213,7 @@ def attempt(bodies, contacts, room, tables, slot, h, given):
         if tables.ramp:
             bend(room.forms, room.ends[2], room.bent[2])
         pulls(room, bodies.q, tables.ramp)
-        change = 0.0
-        size = 0.0
+        change = size = 0.0
         for i in range(room.pull.shape[1]):
             change += abs(room.pull[0, i] - room.pull[2, i]) + abs(room.pull[1, i] - room.pull[3, i])
             size += abs(room.pull[0, i]) + abs(room.pull[1, i])
@@ -279,10 +270,7 @@ def parted(bodies, contacts, room, limits):
                 energy += 0.5 * bodies.bias[n] * soft[n - first, i] * bodies.bias[first + i]
     for i in range(contacts.end.size):
         position = contacts.offset[i]
-        rate = 0.0
-        acceleration = 0.0
-        reach = 0.0
-        give = 0.0
+        rate = acceleration = reach = give = 0.0
         for n in range(q.size):
             u = bodies.shape[i, n]
             w = bodies.omega[n]
@@ -348,22 +336,16 @@ def unseen(bodies, contacts, h, level):
 @inner()
 def part_way(bodies, contacts, room, length, h, lanes, out_q, out_p):
     """Advance a state in place by a part of a step whose forces are known; ``lanes`` are of that length."""
-    f, s = contacts.force, contacts.slope
-    for n in range(out_q.size):
-        q0 = out_q[n]
-        p0 = out_p[n]
-        start = 0.0
-        slope = 0.0
-        if stretches(room, n):
-            i = n - room.first
-            start = room.pull[0, i] - 0.5 * room.pull[1, i]
-            slope = room.pull[1, i] * length / h
-        start += bodies.bias[n]
-        for c in range(f.size):
-            start -= bodies.shape[c, n] * (f[c] - 0.5 * s[c])
-            slope -= bodies.shape[c, n] * s[c] * length / h
-        out_q[n] = lanes[A11, n] * q0 + lanes[A12, n] * p0 + length * (start * lanes[M1, n] + slope * lanes[M2, n])
-        out_p[n] = lanes[A21, n] * q0 + lanes[A22, n] * p0 + start * lanes[A12, n] + slope * lanes[M1, n]
+    share, mean, slope = length / h, contacts.end, contacts.rate  # which are not used here
+    for c in range(mean.size):
+        slope[c] = share * contacts.slope[c]
+        mean[c] = contacts.force[c] - 0.5 * (contacts.slope[c] - slope[c])
+    glide(lanes, length, bodies.bias, out_q, out_p)
+    commit(bodies.shape, lanes, length, mean, slope, out_q, out_p)
+    for i in range(room.pull.shape[1]):
+        n, start, bend = room.first + i, room.pull[0, i] - 0.5 * room.pull[1, i], share * room.pull[1, i]
+        out_q[n] += length * (start * lanes[M1, n] + bend * lanes[M2, n])
+        out_p[n] += start * lanes[A12, n] + bend * lanes[M1, n]
 
 
 @inner()
@@ -393,8 +375,7 @@ def follow_record(scene, run, room, tables, steps, start, times, out):
     begin(scene, bodies, contacts, course, tables.base)
     time, j = start
     known = 0.0
-    k = 0
-    halved = 0
+    k = halved = 0
     while k < times.size and halved <= LEVELS:
         h = tables.base * 0.5**halved
         ends = time + h

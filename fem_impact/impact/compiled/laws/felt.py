@@ -67,8 +67,7 @@ class FeltLaw(Law):
         "relaxation": LawNumber("s", "relaxation time of felt", "time in which the felt relaxes"),
     }
     keys: ClassVar = {"exponent": LawNumber("", "", "", 1.0, 100.0)}
-    remembers = True
-    rated = True
+    remembers = rated = True
     words = " felt"
 
     def check(self, contact: Any) -> None:
@@ -77,7 +76,7 @@ class FeltLaw(Law):
             raise ValueError("relaxation must be positive for felt with hysteresis, got 0 s")
 
     def acting(self, row: Any, mobility: Any, speed: Any) -> np.ndarray:
-        whole = super().acting(row, mobility, speed)
+        whole = np.asarray(row.stiffness)
         for _ in range(4):
             time = wall_time(whole, row.exponent, mobility, speed)
             whole = row.stiffness * (row.relaxation + (1.0 - row.hysteresis) * time) / (row.relaxation + time)

@@ -23,16 +23,9 @@ class LayersNumbers(PowerNumbers):
 
     @classmethod
     def layers(
-        cls,
-        stiffness: float,
-        exponent: float,
-        *,
-        depth: float,
-        hard_stiffness: float,
-        hard_exponent: float = 1.5,
-        loss: float = 0.0,
-        gap: float = 0.0,
-    ) -> Self:
+        cls, stiffness: float, exponent: float, *, depth: float, hard_stiffness: float, hard_exponent: float = 1.5,
+        loss: float = 0.0, gap: float = 0.0,
+    ) -> Self:  # fmt: skip
         """A soft layer over a hard one: ``F = stiffness d**exponent + hard_stiffness (d - depth)**hard_exponent``.
 
         The second term acts where the approach d exceeds ``depth`` [m], at which the soft layer bottoms.
@@ -103,23 +96,12 @@ def pushed_beyond(x, spring):
 
 
 @inner()
-def steepness(x, f, spring):
-    """Slope of the force f there."""
-    further = x - spring.corner
-    more = spring.hard * power(further, spring.hard_exponent)
-    return spring.exponent * (f - more) / x + spring.hard_exponent * more / further
-
-
-@inner()
 def slopes_beyond(small, large, spring):
-    """Average slopes between two compressions > 0, of which at least one is beyond the corner."""
-    further = large - spring.corner
+    """Average slopes between two compressions beyond the corner."""
+    corner = spring.corner
     g, d = power_slopes(spring.stiffness, spring.exponent, small, large)
-    if small > spring.corner:
-        more, steeper = power_slopes(spring.hard, spring.hard_exponent, small - spring.corner, further)
-        return g + more, d + steeper
-    more = spring.hard * power(further, spring.hard_exponent)
-    return g + more * further / ((spring.hard_exponent + 1.0) * (large - small)), d + more / (large - small)
+    more, steeper = power_slopes(spring.hard, spring.hard_exponent, small - corner, large - corner)
+    return g + more, d + steeper
 
 
 @inner()

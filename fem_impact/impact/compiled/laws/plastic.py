@@ -23,9 +23,10 @@ import numpy as np
 from ...._base import check
 from ..build import inner
 from .base import Law, LawNumber, Spring
-from .power import PowerNumbers, power, power_slopes
+from .power import PowerNumbers, power
 
 KIND = 2.0
+LEAST_BACK = 1e-6  # [-] of the deepest approach, on which it unloads: `NEAR` of it is rounding of the approach
 REACH = 12.0  # [-] approaches of first yield: nearest to finite elements, force within 12 %; test_plastic.py
 
 
@@ -37,15 +38,9 @@ class PlasticNumbers(PowerNumbers):
 
     @classmethod
     def elastic_plastic(
-        cls,
-        stiffness: float,
-        exponent: float = 1.5,
-        *,
-        yield_speed: float | None = None,
-        mass: float | None = None,
-        yield_approach: float | None = None,
-        gap: float = 0.0,
-    ) -> Self:
+        cls, stiffness: float, exponent: float = 1.5, *, yield_speed: float | None = None, mass: float | None = None,
+        yield_approach: float | None = None, gap: float = 0.0,
+    ) -> Self:  # fmt: skip
         """A contact that yields: elastic up to first yield, fully plastic far beyond it; it unloads from a dent.
 
         The force leaves first yield along the tangent. Within some 30 times that approach it becomes 3.5 times as steep
@@ -101,8 +96,7 @@ class PlasticLaw(Law):
         "mass": LawNumber("kg", "", "of that mass", None),
         "yield_approach": LawNumber("m", "", "approach at first yield, in place of yield_speed and mass", None),
     }
-    remembers = True
-    hertzian = True
+    remembers = hertzian = True
     slopes = ("stiffness", "exponent", *numbers)
     words = " that yields"
 
@@ -152,8 +146,11 @@ class PlasticLaw(Law):
         return np.where(elastic > first, found, elastic)
 
     def steepest(self, row: Any, energy: np.ndarray) -> np.ndarray:
-        wide = _course(row, self.deepest(row, energy))[3]
-        return np.asarray(row.exponent * row.stiffness * wide ** (row.exponent - 1.0))  # as it unloads
+        deepest = self.deepest(row, energy)
+        force, _, _, wide = _course(row, deepest)
+        hard = row.stiffness * wide ** (row.exponent - 1.0)
+        told = force > LEAST_BACK * deepest * hard  # else rounding hides whether it has turned back
+        return np.where(told, row.exponent * hard, np.inf)  # as it unloads
 
     def sentence(self, contact: Any, si: Any) -> str:
         return f" Beyond {si(contact.yield_approach, 'm')} it yields and keeps a dent."
@@ -268,46 +265,24 @@ def pushed_beyond(x, spring):
 
 
 @inner()
-def steepness(x, spring):
-    """Slope of the force there."""
-    return spring.hard - spring.steeper * np.expm1((spring.corner - x) / spring.reach)
-
-
-@inner()
-def further_slopes(near, far, spring):
-    """Average force above that at the corner, and average slope, between two distances beyond it."""
-    reach = spring.reach
+def slopes_beyond(small, large, spring):
+    """Average slopes between two compressions beyond the corner."""
+    reach, near, far = spring.reach, small - spring.corner, large - spring.corner
+    f = spring.stiffness * power(spring.corner, spring.exponent)
     one, two, _ = exponential_parts(near / reach)
     z = (far - near) / reach
     if z <= 0.0:
-        return spring.hard * near + spring.steeper * reach * two, spring.hard + spring.steeper * one
+        return f + spring.hard * near + spring.steeper * reach * two, spring.hard + spring.steeper * one
     _, later, last = exponential_parts(z)
     force = two + 0.5 * z * one + (1.0 - one) * last / z
-    return (
-        0.5 * spring.hard * (near + far) + spring.steeper * reach * force,
-        spring.hard + spring.steeper * (one + (1.0 - one) * later / z),
-    )
-
-
-@inner()
-def slopes_beyond(small, large, spring):
-    """Average slopes between two compressions > 0, of which at least one is beyond the corner."""
-    k, a, corner = spring.stiffness, spring.exponent, spring.corner
-    f = k * power(corner, a)
-    if small >= corner:
-        g, d = further_slopes(small - corner, large - corner, spring)
-        return f + g, d
-    more, steep = further_slopes(0.0, large - corner, spring)
-    g, d = power_slopes(k, a, small, corner)
-    span = large - small
-    g = (g * (corner - small) + (f + more) * (large - corner)) / span
-    return g, (d * (corner - small) + steep * (large - corner)) / span
+    slope = spring.hard + spring.steeper * (one + (1.0 - one) * later / z)
+    return f + 0.5 * spring.hard * (near + far) + spring.steeper * reach * force, slope
 
 
 @inner()
 def far_side(x, spring):
     """Force and its slope beyond the corner, continued smoothly to the near side of it."""
-    slope = steepness(x, spring)
     further = x - spring.corner
+    slope = spring.hard - spring.steeper * np.expm1(-further / spring.reach)
     f = spring.stiffness * power(spring.corner, spring.exponent) + (spring.hard + spring.steeper) * further
     return f - spring.reach * (slope - spring.hard), slope

@@ -62,12 +62,14 @@ class PowerLaw(Law):
     """A power law, with a loss factor or without."""
 
     name = "power"
-    damped = True
-    hertzian = True
+    damped = hertzian = True
     slopes = ("stiffness", "exponent", "loss")
 
     def acts(self, contact: object) -> bool:
         return False
+
+    def acting(self, row: Any, mobility: Any, speed: Any) -> np.ndarray:
+        return np.asarray(row.stiffness)
 
 
 def wall_time(stiffness: Any, exponent: Any, mobility: Any, speed: Any, compliance: Any = 0.0) -> np.ndarray:

@@ -15,7 +15,7 @@ from ...._base import check
 from ..build import COMPILED, inner
 from ..layout import HEAD, PUSH
 from .base import Law, Spring
-from .power import PowerNumbers, power_slopes
+from .power import PowerNumbers
 
 KIND = 4.0
 KNOTS = 96  # [-] most knots: with them a force of the exponent 5 errs by 1e-5; test_tabled.py
@@ -58,14 +58,9 @@ class TableNumbers(PowerNumbers):
 
     @classmethod
     def of(
-        cls,
-        force: Callable[[Any], Any],
-        *,
-        deepest: float,
-        loss: float = 0.0,
-        gap: float = 0.0,
+        cls, force: Callable[[Any], Any], *, deepest: float, loss: float = 0.0, gap: float = 0.0,
         tolerance: float = 1e-5,
-    ) -> Self:
+    ) -> Self:  # fmt: skip
         """A law of your own: any force over the approach that starts from zero and only grows.
 
         It is asked for a few hundred forces when the contact is made, and kept as cubics between at most 96 knots, so
@@ -312,26 +307,16 @@ def far_side(x, spring):
 
 
 @inner()
-def steepness(x, spring):
-    """Slope of the force there."""
-    return far_side(x, spring)[1]
-
-
-@inner()
 def slopes_beyond(small, large, spring):
-    """Average slopes between two compressions > 0, of which at least one is beyond the corner."""
+    """Average slopes between two compressions beyond the corner."""
     end, f, s, _ = last_knot(spring)
     if small >= end:
         return f + s * (0.5 * (small + large) - end), s
     i = piece_at(small, spring)
-    if small >= spring.corner and large <= knot_number(spring, i + 1, 0):
+    if large <= knot_number(spring, i + 1, 0):
         return slopes_in_piece(small, large, i, spring)
     work = gain = 0.0  # times the way
     x = small
-    if small < spring.corner:
-        x = spring.corner
-        g, d = power_slopes(spring.stiffness, spring.exponent, small, x)
-        work, gain = g * (x - small), d * (x - small)
     while x < large and x < end:
         stop = min(large, knot_number(spring, i + 1, 0))
         g, d = slopes_in_piece(x, stop, i, spring)
