@@ -2,7 +2,7 @@
 
     python studies/api.py
 
-`tests/test_api_page.py` fails while the page is not the one that this script would write.
+`tests/test_pages.py` fails while the page is not the one that this script would write.
 """
 
 import inspect

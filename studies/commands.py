@@ -2,7 +2,7 @@
 
     python studies/commands.py
 
-`tests/test_answers.py` fails while the page is not the one that this script would write.
+`tests/test_pages.py` fails while the page is not the one that this script would write.
 """
 
 import argparse

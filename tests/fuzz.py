@@ -1,13 +1,9 @@
 """Mutated inputs for everything that comes from outside, and the judge of what becomes of them.
 
-    python tests/fuzz.py mesh --inputs 10000     # a category of `CATEGORIES`; prints what failed
-    python tests/fuzz.py mesh --only 4711        # one input again, with its traceback
-
 An input passes where it gives a result or one clear error: ValueError, SimulationError or OSError raised by the
 package itself, in one printable line that names the file, within the time and the memory below, leaving no file.
 """
 
-import argparse
 import contextlib
 import importlib.util
 import io
@@ -25,18 +21,17 @@ import tempfile
 import time
 import traceback
 import warnings
-from collections import Counter
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import cache
-from multiprocessing import get_context
-from multiprocessing.connection import Connection
 from pathlib import Path
 from random import Random
 
 import numpy as np
+import pytest
 from scenes import QUICK as SCENE
+from scenes import load_text
 
 import fem_impact as fi
 from fem_impact import cli
@@ -152,10 +147,7 @@ MESH_FORMATS: dict[str, dict] = {
 
 
 def quick(path: Path, reader: str, arguments: tuple[str, ...], patience: float) -> tuple[int, bytes, bytes]:
-    """What `isolated.run_reader` gives, from this process: one that starts afresh would take 0.2 s an input.
-
-    An input that ends this process is judged again by the real one, see `fuzz`.
-    """
+    """What `isolated.run_reader` gives, from this process: one that starts afresh would take 0.2 s an input."""
     h5py = sys.modules.get("h5py")
     known = getattr(h5py, "File", None)
     logging.disable()  # as the real one does
@@ -308,23 +300,25 @@ completion
 
 
 def command_samples() -> list[tuple[str, bytes]]:
-    """A command line each, and the scene it names; what takes long is replaced by its result."""
-    path = Path(tempfile.mkdtemp()) / "scene.toml"
-    path.write_text(QUICK)
-    scene = fi.load_scene(path)
-    run, modes = scene.run(), scene.modes(5)
-    # compiles, which may take half a minute
-    fi.hammers.choose_on(scene.built.target, scene.blow.values["at"], 800.0, [0.1])
-    maps.map_scene(scene)
-    fi.figures.save = lambda path, figure: Path(path).write_bytes(b"")
-    fi.report.write = lambda path, scene, run: Path(path).write_bytes(b"")
-    Scene.run = lambda self, watch=None, **changes: run
-    Scene.modes = lambda self, count=None, **_: modes if count is None else modes.truncated(n_modes=count)
-    shutil.rmtree(path.parent)
+    """A command line each."""
     return [(f"{i}.txt", line.encode()) for i, line in enumerate(COMMANDS.splitlines())]
 
 
 QUICK = SCENE.replace("tolerance = 1e-2", "tolerance = 1e-1")
+
+
+def hasten(monkeypatch: pytest.MonkeyPatch, folder: Path) -> None:
+    """Replace what takes long in the commands by its result for their scene."""
+    scene = load_text(folder, QUICK)
+    run, modes = scene.run(), scene.modes(5)
+    # compiles, which may take half a minute
+    fi.hammers.choose_on(scene.built.target, scene.blow.values["at"], 800.0, [0.1])
+    maps.map_scene(scene)
+    monkeypatch.setattr(fi.figures, "save", lambda path, figure: Path(path).write_bytes(b""))
+    monkeypatch.setattr(fi.report, "write", lambda path, scene, run: Path(path).write_bytes(b""))
+    monkeypatch.setattr(Scene, "run", lambda self, watch=None, **changes: run)
+    shown = lambda self, count=None, **_: modes if count is None else modes.truncated(n_modes=count)  # noqa: E731
+    monkeypatch.setattr(Scene, "modes", shown)
 
 
 def read_command(path: Path) -> object:
@@ -403,82 +397,32 @@ def judged(read: Callable[[Path], object], path: Path) -> str:
         return f"{type(error).__name__} from {Path(frame.filename).name}:{frame.lineno}: {error!s:.200}"
 
 
-def one(category: str, number: int, folder: Path, samples: list[tuple[str, bytes]]) -> tuple[str, Path]:
-    """Make input ``number`` of a category and judge it."""
-    random = Random(f"{category} {number}")
-    name, raw = samples[number % len(samples)]
-    raws = [other for _, other in samples]
+def one(category: str, number: int, folder: Path) -> str:
+    """Make input ``number`` of a category in an empty folder and judge it, as `judged`."""
+    random, known = Random(f"{category} {number}"), samples(category)
+    name, raw = known[number % len(known)]
     if random.random() < 0.02:  # a wrong ending
-        name = random.choice(samples)[0]
+        name = random.choice(known)[0]
     path = folder / f"{number}-{name}"
-    path.write_bytes(mutated(raw, random, raws))
-    return judged(CATEGORIES[category].read, path), path
+    path.write_bytes(mutated(raw, random, [other for _, other in known]))
+    verdict = judged(CATEGORIES[category].read, path)
+    left = sorted(file.name for file in folder.iterdir() if file != path)
+    for file in folder.iterdir():
+        shutil.rmtree(file) if file.is_dir() else file.unlink()
+    return f"left {left}" if left and verdict in ("", REFUSED) else verdict
 
 
-def limit_memory() -> None:
-    """Let this process have `MEMORY` more than it has now."""
+@contextmanager
+def confined() -> Iterator[Path]:
+    """In an empty folder, with `MEMORY` more than the process has now."""
+    before = resource.getrlimit(resource.RLIMIT_AS)
     own = int(Path("/proc/self/statm").read_text().split()[0]) * resource.getpagesize()
-    resource.setrlimit(resource.RLIMIT_AS, (own + MEMORY, resource.getrlimit(resource.RLIMIT_AS)[1]))
-
-
-def work(category: str, numbers: range, send: Connection, again: bool) -> None:
-    """Judge inputs and send a row for each; runs in a process of its own, which an input may end.
-
-    Unless it judges an input ``again``, it does itself what the package leaves to a process apart.
-    """
-    samples = CATEGORIES[category].samples()
-    limit_memory()
-    resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
-    if not again:
-        isolated.run_reader = quick
-    with tempfile.TemporaryDirectory() as name, open(os.devnull, "w") as null:
-        os.dup2(null.fileno(), 1)
-        os.dup2(null.fileno(), 2)
-        folder = Path(name)
-        for number in numbers:
-            began = time.monotonic()
-            verdict, path = one(category, number, folder, samples)
-            left = sorted(file.name for file in folder.iterdir() if file != path)
-            if left and verdict in ("", REFUSED):
-                verdict = f"left {left}"
-            for file in folder.iterdir():
-                shutil.rmtree(file) if file.is_dir() else file.unlink()
-            send.send((number, verdict, path.name, round(time.monotonic() - began, 3)))
-
-
-def fuzz(category: str, inputs: int) -> tuple[Counter, list[tuple]]:
-    """Judge many inputs; one that ends the process is judged again in another, by itself.
-
-    Returns
-    -------
-    tally : Counter of verdicts '', 'refused' and 'failed'
-    failures : list of (number, verdict, file name, seconds)
-    """
-    rows, waiting, context = [], [(range(inputs), False)], get_context("fork")
-    while waiting:
-        numbers, again = waiting.pop()
-        receive, send = context.Pipe(duplex=False)
-        process = context.Process(target=work, args=(category, numbers, send, again))
-        process.start()
-        send.close()
-        current, end = numbers.start, "hangs where no signal is heard"
-        try:
-            while receive.poll(30.0 * PATIENCE):
-                rows.append(receive.recv())
-                current = rows[-1][0] + 1
-        except EOFError:
-            end = "died"
-            process.join(PATIENCE)
-        process.kill()
-        process.join()
-        if process.exitcode == 1:
-            raise RuntimeError("the fuzzer itself failed outside of any input")
-        if current in numbers and again:
-            rows.append((current, f"{end} ({process.exitcode})", "", 0.0))
-        elif current in numbers:
-            waiting += [(range(current + 1, inputs), False), (range(current, current + 1), True)]
-    failures = [row for row in rows if row[1] not in ("", REFUSED)]
-    return Counter("failed" if row in failures else row[1] for row in rows), failures
+    resource.setrlimit(resource.RLIMIT_AS, (own + MEMORY, before[1]))
+    try:
+        with tempfile.TemporaryDirectory() as name, contextlib.chdir(name):
+            yield Path(name)
+    finally:
+        resource.setrlimit(resource.RLIMIT_AS, before)
 
 
 CATEGORIES = {
@@ -492,29 +436,7 @@ CATEGORIES = {
 }
 
 
-def main() -> int:
-    """Fuzz one category from the prompt."""
-    parser = argparse.ArgumentParser()
-    parser.add_argument("category", choices=CATEGORIES)
-    parser.add_argument("--inputs", type=int, default=10_000)
-    parser.add_argument("--only", type=int)
-    options = parser.parse_args()
-    if options.only is not None:
-        samples = CATEGORIES[options.category].samples()
-        with tempfile.TemporaryDirectory() as name:
-            verdict, path = one(options.category, options.only, Path(name), samples)
-            print(path.name, verdict or "a result")
-            print(path.read_bytes()[:2000])
-            with warnings.catch_warnings():
-                warnings.simplefilter("error")
-                CATEGORIES[options.category].read(path)
-        return 0
-    began = time.monotonic()
-    tally, failures = fuzz(options.category, options.inputs)
-    print(json.dumps({"category": options.category, "results": tally[""], "refused": tally[REFUSED],
-                      "failed": failures, "seconds": round(time.monotonic() - began, 1)}))  # fmt: skip
-    return 1 if failures else 0
-
-
-if __name__ == "__main__":
-    sys.exit(main())
+@cache
+def samples(category: str) -> list[tuple[str, bytes]]:
+    """What the inputs of a category are mutated from."""
+    return CATEGORIES[category].samples()

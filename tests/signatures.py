@@ -1,36 +1,26 @@
 """One valid call of every public function, what spoils an argument, and the judge of what then happens.
 
-    python tests/signatures.py                    # every spoiled call; prints what failed
-    python tests/signatures.py find_modes         # those of one function, with where each failed
-
 A call passes where it gives a result whose numbers are finite, or one error of the package that names the argument.
 """
 
-import argparse
-import contextlib
 import dataclasses
 import dis
 import inspect
-import json
 import math
 import re
-import resource
 import sys
 import tempfile
-import time
 import traceback
 import warnings
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping
-from contextlib import contextmanager
 from functools import cache
 from pathlib import Path
 from typing import Any
-from zlib import crc32
 
 import numpy as np
 import xarray
-from fuzz import PACKAGE, Hang, limit_memory, limited
+from fuzz import PACKAGE, Hang, limited
 from scenes import QUICK
 
 import fem_impact as fi
@@ -456,13 +446,12 @@ FUNCTIONS = ("function", "nan function", "type")  # what these do where a functi
 CALLED = ("watch", "before", "tell", "ready", "build")
 
 
-def cases(names: Any = None) -> Iterator[tuple[str, str, str]]:
+def cases() -> Iterator[tuple[str, str, str]]:
     """Call, parameter and spoil of every spoiled call."""
     for name, arguments in table().items():
-        for parameter in arguments if names is None or name in names else ():
-            if parameter != "self":
-                spoils = [spoil for spoil in SPOILS if parameter not in CALLED or spoil not in FUNCTIONS]
-                yield from ((name, parameter, spoil) for spoil in spoils)
+        for parameter in (each for each in arguments if each != "self"):
+            spoils = [spoil for spoil in SPOILS if parameter not in CALLED or spoil not in FUNCTIONS]
+            yield from ((name, parameter, spoil) for spoil in spoils)
 
 
 # --- the judge -------------------------------------------------------------------------------------------------------
@@ -546,46 +535,3 @@ def not_finite(value: Any, name: str = "", depth: int = 3) -> str:
         fields = (f.name for f in dataclasses.fields(value) if f.name not in ENDLESS and f.name[0] != "_")
         return next((b for k in fields if (b := not_finite(getattr(value, k), f"{name}.{k}", depth - 1))), "")
     return ""
-
-
-@contextmanager
-def confined() -> Iterator[None]:
-    """In an empty folder, with little memory."""
-    before = resource.getrlimit(resource.RLIMIT_AS)
-    limit_memory()
-    try:
-        with tempfile.TemporaryDirectory() as name, contextlib.chdir(name):
-            yield
-    finally:
-        resource.setrlimit(resource.RLIMIT_AS, before)
-
-
-def main() -> int:
-    """Spoil every argument of the calls named, or of all; print what is wrong."""
-    parser = argparse.ArgumentParser()
-    parser.add_argument("names", nargs="*")
-    parser.add_argument("--every", type=int, default=1, help="only about one call in so many, always the same ones")
-    options = parser.parse_args()
-    names = options.names or None
-    for name in names or table():
-        call(name)  # compiles, which may take half a minute
-    failed = [f"{name}: {wrong}" for name in names or table() if (wrong := judged(name, {}))]
-    tally: Counter[str] = Counter()
-    with confined():
-        for name, parameter, spoil in cases(names):
-            if crc32(f"{name} {parameter} {spoil}".encode()) % options.every:
-                continue
-            began = time.monotonic()
-            wrong = judged(name, {parameter: SPOILS[spoil]})
-            tally[name] += 1
-            if wrong:
-                failed.append(f"{name} {parameter}={spoil}: {wrong}")
-                print(failed[-1], flush=True)
-            if (took := time.monotonic() - began) > 2.0:
-                print(f"{took:.1f} s {name} {parameter}={spoil}", flush=True)
-    print(json.dumps({"calls": tally.total(), "functions": len(tally), "failed": failed}))
-    return 1 if failed else 0
-
-
-if __name__ == "__main__":
-    sys.exit(main())

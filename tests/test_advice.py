@@ -5,6 +5,7 @@ import re
 import shutil
 import tomllib
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 import pytest
@@ -36,7 +37,7 @@ def advice(pattern, call, kind=ValueError):
     return float(found[1])
 
 
-@pytest.mark.parametrize("stiffness, tolerance", [(1e8, 1e-9), (1e16, 1e-4), (1e16, 1.0)])
+@pytest.mark.parametrize("stiffness, tolerance", [(1e8, 1e-6), (1e16, 1.0)])
 def test_a_blow_of_too_many_modes_proposes_a_softer_contact(tmp_path, stiffness, tolerance):
     def plan(stiffness, tolerance):
         text = SMALL.replace('source = "analytic"', 'source = "fe"').replace("695e3", str(stiffness))
@@ -49,24 +50,19 @@ def test_a_blow_of_too_many_modes_proposes_a_softer_contact(tmp_path, stiffness,
 
 
 @pytest.mark.parametrize(
-    "wanted, pattern, key",
+    "pattern, much, asked",
     [
-        ({"n_modes": 3000}, r"give n_modes of at most (\d+)", "n_modes"),
-        ({"max_frequency": 1e7}, r"give max_frequency of at most (\S+) Hz", "max_frequency"),
+        (r"give n_modes of at most (\d+)", 3000, lambda most: {"n_modes": int(most)}),
+        (r"give max_frequency of at most (\S+) Hz", 1e7, lambda most: {"max_frequency": most}),
+        (r"band of the quantity of at most (\S+) Hz", 1e7, lambda most: {"quantity": f"sound={most}"}),
+        (r"band of the quantity of at most (\S+) Hz", 1e7,
+         lambda most: {"quantity": f"spectrum={most}", "target": "modal"}),
     ],
-)
-def test_a_part_of_the_plan_that_is_too_large_gets_its_limit(tmp_path, wanted, pattern, key):
+)  # fmt: skip
+def test_a_part_of_the_plan_that_is_too_large_gets_its_limit(tmp_path, pattern, much, asked):
     found = loaded(tmp_path, SMALL.replace('source = "analytic"', 'source = "fe"'))
-    most = advice(pattern, lambda: found.plan(**wanted), fi.SimulationError)
-    assert found.plan(**{key: int(most) if key == "n_modes" else most}).n_modes <= 2000
-
-
-@pytest.mark.parametrize("quantity, target", [("sound", None), ("spectrum", "modal")])
-def test_a_band_that_is_too_wide_gets_its_limit(tmp_path, quantity, target):
-    found = loaded(tmp_path, SMALL.replace('source = "analytic"', 'source = "fe"'))
-    words = r"band of the quantity of at most (\S+) Hz"
-    most = advice(words, lambda: found.plan(quantity=f"{quantity}=1e7", target=target), fi.SimulationError)
-    assert found.plan(quantity=f"{quantity}={most}", target=target).n_modes <= 2000
+    most = advice(pattern, lambda: found.plan(**asked(much)), fi.SimulationError)
+    assert found.plan(**asked(most)).n_modes <= 2000
 
 
 @pytest.mark.slow
@@ -96,36 +92,38 @@ def test_modes_that_miss_a_tolerance_get_one_that_is_met():
     assert float(fi.find_modes(system, n_modes=6, tolerance=met).frequency_error.max()) <= met
 
 
-@pytest.mark.parametrize("mass, n_impacts", [(0.01, 1), (0.3, 1)])
-def test_a_blow_that_misses_its_tolerance_is_done_without_the_scheme(mass, n_impacts):
+def test_a_blow_that_misses_its_tolerance_is_done_without_the_scheme():
     plate = fi.analytic.rectangle(0.465, 0.3, mass=0.2, first_frequency=100.0, n_modes=60)
-    blow = plate, fi.Striker.rigid(mass), fi.Contact.hertz(695e3)
+    blow = plate, fi.Striker.rigid(0.01), fi.Contact.hertz(695e3)
     wanted = {"at": (0.14, 0.09), "speed": 2.0, "tolerance": 1e-11}
     with pytest.raises(fi.SimulationError, match=r"; leave out scheme \(notes"):
         fi.strike(*blow, **wanted, scheme="A")
     hit = fi.strike(*blow, **wanted)
-    assert hit.error.step <= 1e-11 and hit.n_impacts == n_impacts
+    assert hit.error.step <= 1e-11 and hit.n_impacts == 1
+
+
+BY_EDGES = SMALL.replace('boundary = "hinged"', 'left = "clamped"\nright = "hinged"').replace(
+    'source = "analytic"\n', ""
+)
+WEDGE = """[material]
+E = 10e9
+E_across = 0.8e9
+G = 0.7e9
+nu = 0.3
+rho = 400
+[section]
+kind = "plate"
+thickness = { x = [0, 1], y = [0, 1], values = [[3e-3, 3e-3], [4e-3, 4e-3]] }
+[striker]"""
+OF_WOOD = BY_EDGES.replace("first_frequency = 100.0\n", "").replace("mass = 0.2\n", "").replace("[striker]", WEDGE)
 
 
 @pytest.mark.parametrize(
-    "changed, words",
-    [
-        ({"first_frequency = 100.0\n": "", "mass = 0.2\n": ""}, "is only for plates of constant thickness"),
-        ({}, "first_frequency gives the rigidity only once the modes are known"),
-    ],
-)
-def test_a_target_that_cannot_be_infinite_says_why_and_modal_works(tmp_path, changed, words):
-    text = SMALL.replace('boundary = "hinged"', 'left = "clamped"\nright = "hinged"').replace(
-        'source = "analytic"\n', ""
-    )
-    if changed:
-        wood = "[material]\nE = 10e9\nE_across = 0.8e9\nG = 0.7e9\nnu = 0.3\nrho = 400\n"
-        wood += (
-            '[section]\nkind = "plate"\nthickness = { x = [0, 1], y = [0, 1], values = [[3e-3, 3e-3], [4e-3, 4e-3]] }\n'
-        )
-        text = text.replace("[striker]", wood + "[striker]")
-    for old, new in changed.items():
-        text = text.replace(old, new)
+    "text, words",
+    [(OF_WOOD, "is only for plates of constant thickness"),
+     (BY_EDGES, "first_frequency gives the rigidity only once the modes are known")],
+)  # fmt: skip
+def test_a_target_that_cannot_be_infinite_says_why_and_modal_works(tmp_path, text, words):
     found = loaded(tmp_path, text)
     with pytest.raises(ValueError, match=f"target = 'infinite' .*{words}.*; use target = 'modal'"):
         found.plan(target="infinite")
@@ -179,11 +177,10 @@ def test_the_contact_of_wood_is_refused_and_its_advice_works():
 
 def test_an_incompressible_material_is_allowed_as_documented(tmp_path):
     plate = fi.Plate(fi.Material(5e6, 0.5, 950.0), 1e-3)
-    assert fi.analytic.disk(0.05, section=plate, n_modes=3).frequencies[0] > 0.0
+    exact = fi.analytic.disk(0.05, section=plate, n_modes=3).frequencies[0]
+    assert exact > 0.0
     found = fi.find_modes(fi.assemble(fi.mesh.disk(0.05), plate, supports={"boundary": "clamped"}), n_modes=3)
-    assert found.frequencies[0] == pytest.approx(
-        fi.analytic.disk(0.05, section=plate, n_modes=3).frequencies[0], rel=1e-4
-    )
+    assert found.frequencies[0] == pytest.approx(exact, rel=1e-4)
     assert loaded(tmp_path, SMALL.replace("mass = 0.2", "mass = 0.2\nnu = 0.5")).modes(2).n_modes == 2
     with pytest.raises(ValueError, match=r"\[target\] nu must lie between -0.99 and 0.5"):
         loaded(tmp_path, SMALL.replace("mass = 0.2", "mass = 0.2\nnu = -1"))
@@ -193,10 +190,13 @@ PLATE = fi.Plate(STEEL, 1e-3)
 BEAM = fi.Beam.rectangular(STEEL, width=0.02, height=0.01)
 SQUARE = fi.mesh.rectangle(0.4, 0.3, size=0.2)
 DISK = fi.mesh.disk(0.2, size=0.1)
-CLOSED = fi.analytic.rectangle(0.4, 0.3, mass=0.2, first_frequency=100.0, n_modes=20)
+SCALE = {"mass": 0.2, "first_frequency": 100.0}
+closed = partial(fi.analytic.rectangle, 0.4, 0.3)
+CLOSED = closed(**SCALE, n_modes=20)
 SOFT = {"at": (0.13, 0.1), "speed": 1.0, "tolerance": 1e-2}
 HELD = {"boundary": "clamped"}
 HARD = fi.Contact.linear(1e6)
+OVER = '[map]\nover = { "striker.mass" = [0.01, 0.1]%s }\n'
 
 
 def struck(law=None, mass=0.03, **changes):
@@ -204,20 +204,10 @@ def struck(law=None, mass=0.03, **changes):
     return fi.strike(CLOSED, fi.Striker.rigid(mass), law, **{**SOFT, **changes})
 
 
-def collided():
-    return fi.collide([fi.Modes.rigid(1.0)] * 2, [fi.Touch(fi.Contact.linear(1e5), 0, 1)], speeds=[1.0, 0.0])
-
-
-def bar(at):
-    modes = fi.analytic.beam(0.3, ends=("hinged", "free"), mass=0.1, first_frequency=1e3, n_modes=4)
-    return fi.Striker.flexible(modes, at=at)
-
-
 def swept(**changes):
     over = {"mass": [0.02, 0.03, 0.04]}
-    return fi.sweep(
-        CLOSED, fi.Striker.rigid(0.03), fi.Contact.linear(1e4), **{**SOFT, "over": over, "max_cells": 2, **changes}
-    )
+    how = {**SOFT, "over": over, "max_cells": 2, **changes}
+    return fi.sweep(CLOSED, fi.Striker.rigid(0.03), fi.Contact.linear(1e4), **how)
 
 
 def mapped(folder, table):
@@ -228,21 +218,21 @@ def mapped(folder, table):
 ADVICE = {  # what fails, the message, and what it advises
     "closed form": (lambda tmp: loaded(tmp, SMALL.replace('"hinged"', '"clamped"')).plan(), "use source = 'fe'",
      lambda tmp: loaded(tmp, SMALL.replace('"hinged"', '"clamped"').replace('"analytic"', '"fe"')).plan()),
-    "hinge": (lambda _: bar(0.0), "move it off the hinge", lambda _: bar(0.05)),
+    "hinge": (lambda _: fi.Striker.flexible(beam("hinged", "free"), at=0.0), "move it off the hinge",
+     lambda _: fi.Striker.flexible(beam("hinged", "free"), at=0.05)),
     "collocation": (lambda _: struck(fi.Contact.power(1e3, 0.8), scheme="collocation"), "use A4",
      lambda _: struck(fi.Contact.power(1e3, 0.8), scheme="A4")),
     "cells": (lambda _: swept(), "raise max_cells, now 2$", lambda _: swept(max_cells=3)),
     "fewer values": (lambda _: swept(), "give fewer values", lambda _: swept(over={"mass": [0.02, 0.03]})),
     "sound of a beam": (lambda _: fi.sound.radiate(of_a_beam(), (0.0, 0.0, 1.0)), "use radiate_bar",
-     lambda _: fi.sound.radiate_bar(of_a_beam(), (0.0, 0.0, 1.0), width=0.02, height=0.01, duration=0.01)),
+     lambda _: as_bar(of_a_beam())),
     "sound of a beam in free air": (lambda _: fi.sound.radiate_free(of_a_beam(), (0.0, 0.0, 1.0)),
-     "use radiate_bar for a beam",
-     lambda _: fi.sound.radiate_bar(of_a_beam(), (0.0, 0.0, 1.0), width=0.02, height=0.01, duration=0.01)),
-    "sound of a plate as a bar": (lambda _: fi.sound.radiate_bar(struck(), (0.0, 0.0, 1.0), width=0.02, height=0.01),
-     "use radiate$", lambda _: fi.sound.radiate(struck(), (0.0, 0.0, 1.0), duration=0.01)),
+     "use radiate_bar for a beam", lambda _: as_bar(of_a_beam())),
+    "sound of a plate as a bar": (lambda _: as_bar(struck()), "use radiate$",
+     lambda _: fi.sound.radiate(struck(), (0.0, 0.0, 1.0), duration=0.01)),
     "listener": (lambda _: fi.sound.radiate(struck(), (0.1, 0.1, 0.0), duration=0.01), "give a distance",
      lambda _: fi.sound.radiate(struck(), (0.1, 0.1, 0.5), duration=0.01)),
-    "gap of a collision": (lambda tmp: fi.pictures.wave(tmp / "a.png", collided()), "use the response of strike",
+    "gap of a collision": (lambda tmp: fi.pictures.wave(tmp / "a.png", chained(gap=0.0)), "use the response of strike",
      lambda tmp: fi.figures.save(tmp / "a.png", fi.figures.force(struck()))),
     "wood": (lambda _: fi.Material(E=1e10, nu=0.3, rho=450.0, E_across=1e9), "give neither",
      lambda _: fi.Material(E=1e10, nu=0.3, rho=450.0)),
@@ -251,10 +241,9 @@ ADVICE = {  # what fails, the message, and what it advises
     "Morley on a disk": (lambda _: fi.assemble(DISK, PLATE, HELD, element="morley"), "use 'argyris', or a polygon",
      lambda _: (fi.assemble(DISK, PLATE, HELD), fi.assemble(SQUARE, PLATE, HELD, element="morley"))),
     "modes of closed forms": (
-     lambda _: fi.analytic.rectangle(0.4, 0.3, mass=0.2, first_frequency=100.0, max_frequency=1e9), "lower it",
-     lambda _: fi.analytic.rectangle(0.4, 0.3, mass=0.2, first_frequency=100.0, max_frequency=1e4)),
+     lambda _: closed(**SCALE, max_frequency=1e9), "lower it", lambda _: closed(**SCALE, max_frequency=1e4)),
     "map": (lambda tmp: mapped(tmp, ""), r'over = \{ "striker.mass" = \[0.01, 0.1\] \}',
-     lambda tmp: mapped(tmp, '[map]\nover = { "striker.mass" = [0.01, 0.1] }\n')),
+     lambda tmp: mapped(tmp, OVER % "")),
     "too many modes": (lambda tmp: loaded(tmp, SMALL).modes(10**6), "ask for fewer",
      lambda tmp: loaded(tmp, SMALL).modes(10)),
     "nothing to observe": (lambda tmp: loaded(tmp, SMALL + "[observe]\n"), "leave out the table",
@@ -301,28 +290,17 @@ ADVICE = {  # what fails, the message, and what it advises
      lambda _: planned(target="modal", n_modes=9)),
     "air around a beam": (lambda _: Target(fi.mesh.line(0.4), BEAM, air="both sides"),
      "air is known around plates only; leave it out", lambda _: Target(fi.mesh.line(0.4), BEAM)),
-    "no scale of closed forms": (lambda _: fi.analytic.rectangle(0.4, 0.3, mass=0.2, n_modes=4),
-     r"give either section, or both mass \[kg\]",
-     lambda _: (
-        fi.analytic.rectangle(0.4, 0.3, section=PLATE, n_modes=4),
-        fi.analytic.rectangle(0.4, 0.3, mass=0.2, first_frequency=9.0, n_modes=4),
-    )),
-    "no number of closed forms": (lambda _: fi.analytic.rectangle(0.4, 0.3, section=PLATE),
-     "give either n_modes or max_frequency",
-     lambda _: (
-        fi.analytic.rectangle(0.4, 0.3, section=PLATE, n_modes=4),
-        fi.analytic.rectangle(0.4, 0.3, section=PLATE, max_frequency=1e3),
-    )),
+    "no scale of closed forms": (lambda _: closed(mass=0.2, n_modes=4), r"give either section, or both mass \[kg\]",
+     lambda _: (closed(section=PLATE, n_modes=4), closed(**SCALE, n_modes=4))),
+    "no number of closed forms": (lambda _: closed(section=PLATE), "give either n_modes or max_frequency",
+     lambda _: (closed(section=PLATE, n_modes=4), closed(section=PLATE, max_frequency=1e3))),
     "nu twice": (lambda _: fi.analytic.disk(0.1, section=PLATE, nu=0.2, n_modes=4), "give nu or section, not both",
-     lambda _: (
-        fi.analytic.disk(0.1, section=PLATE, n_modes=4),
-        fi.analytic.disk(0.1, mass=0.1, first_frequency=9.0, nu=0.2, n_modes=4),
-    )),
+     lambda _: [fi.analytic.disk(0.1, **how, n_modes=4) for how in ({"section": PLATE}, {**SCALE, "nu": 0.2})]),
     "a closed form of a tapered beam": (
      lambda _: fi.analytic.beam(1.0, ends=("free", "free"), section=stepped(2), n_modes=4),
      "section must be constant along the beam; else use find_modes",
      lambda _: fi.find_modes(fi.assemble(fi.mesh.line(1.0), stepped(2)), n_modes=4)),
-    "a closed form of wood": (lambda _: fi.analytic.rectangle(0.4, 0.3, section=fi.Plate(SPRUCE, 3e-3), n_modes=4),
+    "a closed form of wood": (lambda _: closed(section=fi.Plate(SPRUCE, 3e-3), n_modes=4),
      "without tension; else use find_modes",
      lambda _: fi.find_modes(fi.assemble(SQUARE, fi.Plate(SPRUCE, 3e-3), HELD), n_modes=4)),
     "bounds of a disk": (lambda _: fi.find_modes(fi.assemble(DISK, PLATE, HELD), n_modes=4, bounds=True),
@@ -336,12 +314,9 @@ ADVICE = {  # what fails, the message, and what it advises
      "got 2; write a .pvd", lambda tmp: fi.export.write_vtk(tmp / "a.pvd", CLOSED, struck(), [0.0, 1e-3])),
     "louder than a file": (lambda tmp: replace(sound(), samples=np.array([1e39])).wav(), "check the units of its speed",
      lambda tmp: sound().wav()),
-    "a picture of one axis": (
-     lambda tmp: maps.draw(mapped(tmp, '[map]\nover = { "striker.mass" = [0.01, 0.1] }\n'), "contact_time"),
+    "a picture of one axis": (lambda tmp: maps.draw(mapped(tmp, OVER % ""), "contact_time"),
      "must have two axes to be drawn, got mass; select two",
-     lambda tmp: maps.draw(
-        mapped(tmp, '[map]\nover = { "striker.mass" = [0.01, 0.1], "strike.speed" = [1.0, 2.0] }\n'), "contact_time"
-    )),
+     lambda tmp: maps.draw(mapped(tmp, OVER % ', "strike.speed" = [1.0, 2.0]'), "contact_time")),
     "a map in one file": (lambda tmp: maps.can_write("nc", tmp / "a.nc"), r"give .*a, and --format zarr for map.zarr",
      lambda tmp: maps.can_write("nc", tmp / "a")),
     "a report of no motion": (lambda tmp: reported(tmp, motion=False), "strike with motion=True",
@@ -372,6 +347,7 @@ ADVICE = {  # what fails, the message, and what it advises
 # fmt: on
 
 
+as_bar = partial(fi.sound.radiate_bar, listener=(0.0, 0.0, 1.0), width=0.02, height=0.01, duration=0.01)
 ONE = fi.mesh.polygon([(0, 0), (1, 0), (0, 1)], size=2.0)
 HUNG = fi.assemble(fi.mesh.rectangle(0.4, 0.3), PLATE, near=[(0.13, 0.1)])
 MADE = SMALL.replace("first_frequency = 100.0\nmass = 0.2\n", "").replace("mass = 0.2\nfirst_frequency = 100.0\n", "")
@@ -387,9 +363,8 @@ def beam(*ends):
 
 
 def chained(gap):
-    return fi.collide(
-        [fi.Modes.rigid(1.0)] * 2, [fi.Touch(fi.Contact.linear(1e5, gap=gap), 0, 1)], speeds=[1.0, 0.0], tolerance=1e-6
-    )
+    touch = fi.Touch(fi.Contact.linear(1e5, gap=gap), 0, 1)
+    return fi.collide([fi.Modes.rigid(1.0)] * 2, [touch], speeds=[1.0, 0.0], tolerance=1e-6)
 
 
 def vectors_of(system):
@@ -477,9 +452,8 @@ def test_a_step_error_that_stays_too_large_proposes_what_is_met(monkeypatch, tol
     monkeypatch.setattr(engine, "most_steps", lambda *_: 300)
     law = fi.Contact.power(stiffness, 0.8)  # collocation, which would take over, needs an exponent of 1
     wanted = {"mass": mass, "tolerance": tolerance, "residual": False}
-    with pytest.raises(
-        fi.SimulationError, match=r"; (raise tolerance to|give max_impacts of at most) \S+ \("
-    ) as caught:
+    words = r"; (raise tolerance to|give max_impacts of at most) \S+ \("
+    with pytest.raises(fi.SimulationError, match=words) as caught:
         struck(law, **wanted)
     number = float(explained.POINTER.sub("", str(caught.value)).rpartition(" ")[2])
     key = "max_impacts" if "impacts of" in str(caught.value) else "tolerance"
@@ -497,12 +471,8 @@ def test_a_run_without_end_is_ended_by_each_of_what_is_told(monkeypatch, given, 
     with pytest.raises(fi.SimulationError, match=words) as caught:
         struck(HARD, mass=0.5, **blow, **given)
     soon, few = re.search(r"at most (\S+) s or max_impacts of at most (\d+) ", str(caught.value)).groups()
-    ways = (
-        {"duration": float(soon)},
-        {"max_impacts": int(few)},
-        {"tolerance": 1e-1} if "tolerance" in given else {"dt": 1e-4},
-    )
-    for way in ways:
+    longer = {"tolerance": 1e-1} if "tolerance" in given else {"dt": 1e-4}
+    for way in ({"duration": float(soon)}, {"max_impacts": int(few)}, longer):
         assert struck(HARD, mass=0.5, **{**blow, **given, **way}).history.end_time > 0.0
 
 

@@ -40,16 +40,15 @@ FOLLOWED = (  # by tests that expect other words of the message
 
 def messages(path):
     """Line and text of every string of a module, with {} for its numbers; no docstrings, and no help of the prompt."""
-    tree = ast.parse(path.read_text())
-    skip = set()
-    for node in ast.walk(tree):
+    nodes, skip = list(ast.walk(ast.parse(path.read_text()))), set()
+    for node in nodes:
         if isinstance(node, ast.Expr) and isinstance(node.value, ast.Constant):
             skip.add(node.value)  # docstrings
         elif isinstance(node, ast.keyword) and node.arg in ("help", "metavar", "description", "title"):
             skip |= set(ast.walk(node.value))
         elif isinstance(node, ast.JoinedStr):
             skip |= set(ast.walk(node)) - {node}
-    for node in ast.walk(tree):
+    for node in nodes:
         if node in skip:
             continue
         if isinstance(node, ast.JoinedStr):
@@ -59,28 +58,22 @@ def messages(path):
             yield node.lineno, node.value
 
 
-def expected():
-    """What tests expect of messages: all their strings, and those of three words and more as patterns."""
-    paths = [path for path in TESTS.rglob("*.py") if path.name != Path(__file__).name]
-    texts = [text for path in paths for _, text in messages(path)]
-    patterns = []
-    for text in texts:
-        if len(text.split()) > 2 and len(text) < 200 and "\n" not in text:
-            with suppress(re.error):
-                patterns += [re.compile(text)]
-    return "\n".join(texts), [each for each in patterns if not each.search("anything must match")]
-
-
 @pytest.mark.filterwarnings("ignore::FutureWarning")  # of strings that are no patterns
 def test_all_advice_is_asked_for_in_a_test():
-    """A test expects the message, or the first words of its advice."""
-    asked, patterns = expected()
-    known, alone = [*patterns, *map(re.compile, NO_ADVICE + FOLLOWED)], []
+    """A test expects the message, by a pattern of three words or more, or the first words of its advice."""
+    paths = [path for path in TESTS.rglob("*.py") if path.name != Path(__file__).name]
+    texts = {text for path in paths for _, text in messages(path)}
+    asked, alone = "\n".join(texts), {}
     for path in sorted(set(HOME.rglob("*.py")) - {HOME / "arguments.py"}):  # which is the help of the prompt
         for line, text in messages(path):
-            advice = ADVISES.search(text)
-            if advice and len(text.split()) > 2 and not any(words.search(text) for words in known):
+            if (advice := ADVISES.search(text)) and len(text.split()) > 2:
                 words = re.split(r"\{\}|[;,:()='\"\[]", advice[1])[0].split()
                 if " ".join(words[:4]) not in asked:
-                    alone.append(f"{path.relative_to(HOME)}:{line}: {text}")
-    assert not alone, "\n".join(alone)
+                    alone[text] = f"{path.relative_to(HOME)}:{line}: {text}"
+    expected = [text for text in texts if len(text.split()) > 2 and len(text) < 200 and "\n" not in text]
+    for words in [*NO_ADVICE, *FOLLOWED, *expected]:
+        with suppress(re.error):
+            pattern = re.compile(words)
+            if not pattern.search("anything must match"):
+                alone = {text: place for text, place in alone.items() if not pattern.search(text)}
+    assert not alone, "\n".join(alone.values())

@@ -15,15 +15,8 @@ from fem_impact.pages import lesson_grid
 
 ROOT = Path(__file__).parents[1]
 TAPS = ROOT / "studies" / "measured" / "acceleration.lvm"
-KINDS = {
-    "object": dict,
-    "array": list,
-    "string": str,
-    "integer": int,
-    "number": (int, float),
-    "null": type(None),
-    "boolean": bool,
-}
+KINDS = {"object": dict, "array": list, "string": str, "integer": int, "number": (int, float), "null": type(None),
+         "boolean": bool}  # fmt: skip
 STROKES = "[[stroke]]\nwhen = 0.03\n[[stroke]]\nwhen = 0.0\nspeed = 0.5\n"
 RUNS = {  # words that run each command in a second or two
     "strike": "strike small.toml --out out --format svg",
@@ -79,7 +72,12 @@ def test_every_command_has_keys_and_examples():
     assert ran == set(answers.KEYS) - {"explore"}  # tests/pages/test_explore.py
 
 
-@pytest.mark.parametrize("name", [pytest.param(n, marks=pytest.mark.slow) if n in SLOW else n for n in RUNS])
+def marks(name):
+    live = [pytest.mark.slow, pytest.mark.xdist_group("live")] if name == "play" else []  # one worker compiles
+    return [pytest.mark.slow] if name in SLOW else live
+
+
+@pytest.mark.parametrize("name", [pytest.param(name, marks=marks(name)) for name in RUNS])
 def test_every_answer_is_as_its_schema_says_and_quiet_commands_say_nothing_else(folder, prompt, name, monkeypatch):
     monkeypatch.setattr(lesson_grid, "COUNTS", dict.fromkeys(lesson_grid.COUNTS, 3))  # a page of few blows
     if name == "play":

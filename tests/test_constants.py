@@ -1,6 +1,7 @@
 """The list of named numbers: each is told, and what is written of the tests that hold them is true of this tree."""
 
 import ast
+from functools import cache
 from pathlib import Path
 
 import constants as study
@@ -9,32 +10,35 @@ import pytest
 ROOT = Path(__file__).parents[1]
 
 
+KNOWN = study.constants()
+
+
 def test_every_number_is_told():
-    silent = [each.path for each in study.constants() if each.kind != "layout" and len(each.comment.split()) < 3]
+    silent = [each.path for each in KNOWN if each.kind != "layout" and len(each.comment.split()) < 3]
     assert not silent, "say in a comment what they are and why they are so large"
 
 
+@cache
+def held_in(file):
+    tree = ast.parse((ROOT / file).read_text(encoding="utf-8"))
+    return {node.name for node in ast.walk(tree) if isinstance(node, ast.FunctionDef)}
+
+
 def test_the_tests_that_hold_constants_exist():
-    present = {each.path for each in study.constants()}
+    present = {each.path for each in KNOWN}
     for path, row in study.recorded().items():
         assert path in present, f"{path} is gone: remove its line from studies/verification/constants.csv"
         if "::" in row["holder"]:
             file, name = row["holder"].split("::")[:2]
-            tests = {node.name for node in ast.walk(ast.parse((ROOT / file).read_text(encoding="utf-8")))
-                     if isinstance(node, ast.FunctionDef)}  # fmt: skip
-            assert name.partition("[")[0] in tests, f"python studies/verification/constants.py --hold {path} --again"
+            again = f"python studies/verification/constants.py --hold {path} --again"
+            assert name.partition("[")[0] in held_in(file), again
 
 
 @pytest.mark.parametrize(
     ("text", "factor", "value"),
-    [
-        ("0.5", 10.0, 5.0),
-        ("3", 0.1, 1),
-        ("(1.0, 2)", 2.0, (2.0, 4)),
-        ("{'a': 1.5}", 2.0, {"a": 3.0}),
-        ("2.0**0.5", 2.0, 8.0**0.5),
-    ],
-)
+    [("0.5", 10.0, 5.0), ("3", 0.1, 1), ("(1.0, 2)", 2.0, (2.0, 4)), ("{'a': 1.5}", 2.0, {"a": 3.0}),
+     ("2.0**0.5", 2.0, 8.0**0.5)],
+)  # fmt: skip
 def test_a_constant_is_changed_by_a_factor(text, factor, value):
     new = ast.fix_missing_locations(ast.Expression(study.changed(ast.parse(text, mode="eval").body, factor)))
     assert eval(compile(new, "here", "eval")) == pytest.approx(value, rel=1e-15)

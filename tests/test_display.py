@@ -42,40 +42,34 @@ def lines(shown):
     return re.split(r"[\r\n]+", re.sub(r"\x1b\[[0-9;?]*[a-zA-Z]", "", shown.console.file.getvalue()))
 
 
-def test_the_time_left_is_judged_by_the_progress_so_far(clock):
+@pytest.mark.parametrize(
+    ("stage", "predicted", "steps"),  # of each: seconds that pass, what is then reported or predicted, the line
+    [
+        ("modes", None, [(0.0, ("vectors", 0, 100), "0/100 vectors, 0:00"),
+                         (10.0, ("vectors", 20, 100), "20/100 vectors, 2/s, 0:10, 0:40 left"),  # 80 more at 2/s
+                         (5.0, None, "20/100 vectors, 2/s, 0:15, 0:35 left"),
+                         (0.0, ("vectors", 3, 400), "3/400 vectors, 0:15")]),  # another search begins
+        # cells found in a store do not count as done just now
+        ("cells", None, [(0.0, ("cells", 900, 1000), "900/1000, 0:00"),
+                         (10.0, ("cells", 950, 1000), "950/1000, 5/s, 0:10, 0:10 left")]),
+        # without a count the prediction tells
+        ("strike", 3665.0, [(0.0, None, "0:00"), (5.0, None, "0:05, 1:01:00 left"),
+                            (4000.0, None, "1:06:45, soon done"), (0.0, "none", "1:06:45")]),
+        ("strike", 12.0, [(20.0, None, "0:20, soon done"), (10.0, None, "0:30, longer than predicted")]),
+    ],
+)  # fmt: skip
+def test_the_line_tells_progress_and_the_time_left(clock, stage, predicted, steps):
     shown = on_terminal(100)
-    with shown("modes"):
-        report("vectors", 0, 100)
-        assert shown.status_line() == "0/100 vectors, 0:00"
-        clock.now += 10.0
-        report("vectors", 20, 100)  # 80 more at 2 per second
-        assert shown.status_line() == "20/100 vectors, 2/s, 0:10, 0:40 left"
-        clock.now += 5.0
-        assert shown.status_line().endswith("0:15, 0:35 left")
-        report("vectors", 3, 400)  # another search begins
-        assert "left" not in shown.status_line()
-
-
-def test_cells_found_in_a_store_do_not_count_as_done_just_now(clock):
-    shown = on_terminal(100)
-    with shown("cells"):
-        report("cells", 900, 1000)
-        clock.now += 10.0
-        report("cells", 950, 1000)
-        assert shown.status_line() == "950/1000, 5/s, 0:10, 0:10 left"
-
-
-def test_without_a_count_the_prediction_tells(clock):
-    shown = on_terminal(100)
-    shown.predict(3600.0 + 65.0)
-    with shown("strike"):
-        assert shown.status_line() == "0:00"
-        clock.now += 5.0
-        assert shown.status_line() == "0:05, 1:01:00 left"
-        clock.now += 4000.0
-        assert shown.status_line() == "1:06:45, soon done"
-        shown.predict(None)
-        assert shown.status_line() == "1:06:45"
+    if predicted:
+        shown.predict(predicted)
+    with shown(stage):
+        for seconds, told, line in steps:
+            clock.now += seconds
+            if told == "none":
+                shown.predict(None)
+            elif told:
+                report(*told)
+            assert shown.status_line() == line
 
 
 def test_a_stage_within_a_stage_has_its_own_name_and_the_outer_one_comes_back(clock):
@@ -131,16 +125,6 @@ def test_a_command_that_takes_twice_as_long_as_predicted_says_so_at_once_and_aga
         assert said[1:] == ["longer than predicted: 73 s so far; Ctrl-C stops it"]
         assert shown.alarm.interval == pytest.approx(73.0) and shown.alarm.daemon
     assert shown.alarm is None
-
-
-def test_the_line_itself_says_what_takes_longer_than_predicted(clock):
-    shown = on_terminal(100)
-    shown.predict(12.0)
-    with shown("strike"):
-        clock.now += 20.0
-        assert shown.status_line() == "0:20, soon done"
-        clock.now += 10.0
-        assert shown.status_line() == "0:30, longer than predicted"
 
 
 def test_hammers_that_take_longer_than_the_first_ones_are_announced_again(clock):

@@ -76,7 +76,7 @@ def test_heavy_plate_and_rigid_mass_give_the_closed_forms():
 
 
 @pytest.mark.parametrize("contact", [fi.Contact.linear(1e6), fi.Contact.hertz(1e8)], ids=str)
-@pytest.mark.parametrize("ratio", 10.0 ** np.arange(-6, 7))
+@pytest.mark.parametrize("ratio", [1e-6, 1.0, 1e2, 1e6])
 def test_newtons_cradle_of_two_balls(ratio, contact):
     first, second = 0.1 * ratio, 0.1
     hit = fi.strike(fi.Modes.rigid(second), fi.Striker.rigid(first), contact, at=None, speed=2.0)

@@ -28,19 +28,16 @@ def turned(angle=0.0, shift=0.0, seed=None):
     place = np.argsort(order)
     cells = place[shape.cells] if seed is None else rng.permuted(place[shape.cells], axis=1)[::-1]
     return replace(
-        shape,
-        points=(shape.points @ turn.T + shift)[order],
-        cells=np.ascontiguousarray(cells),
-        facets=place[shape.facets],
-        middles=shape.middles @ turn.T + shift,
-        tangents=shape.tangents @ turn.T,
-    )
+        shape, points=(shape.points @ turn.T + shift)[order], cells=np.ascontiguousarray(cells),
+        facets=place[shape.facets], middles=shape.middles @ turn.T + shift, tangents=shape.tangents @ turn.T,
+    )  # fmt: skip
 
 
-@pytest.mark.parametrize("supports", [{"boundary": "hinged"}, {"boundary": "clamped"}, {}, {"edge0": "clamped"}])
 @pytest.mark.parametrize(
-    "change", [{"angle": 0.7}, {"shift": 1e3}, {"seed": 4}, {"angle": 2.1, "shift": 5.0, "seed": 5}]
-)
+    "supports, change",
+    [({"boundary": "hinged"}, {"angle": 0.7}), ({"boundary": "clamped"}, {"shift": 1e3}), ({}, {"seed": 4}),
+     ({"edge0": "clamped"}, {"angle": 2.1, "shift": 5.0, "seed": 5}), ({}, {"angle": 2.1, "shift": 1e3})],
+)  # fmt: skip
 def test_place_turn_and_order_of_nodes_do_not_matter(supports, change):
     here = find_modes(assemble(QUADRILATERAL, PLATE, supports), n_modes=8)
     there = find_modes(assemble(turned(**change), PLATE, supports), n_modes=8)
@@ -48,15 +45,14 @@ def test_place_turn_and_order_of_nodes_do_not_matter(supports, change):
     assert_allclose(there.omega, here.omega, rtol=1e-9)  # 4e-12 was measured
 
 
-@pytest.mark.parametrize("length", [1e-6, 1e-3, 1e3])
+@pytest.mark.parametrize("length", [1e-6, 1e3])
 def test_frequencies_scale_with_length(length):
     wanted = find_modes(assemble(mesh.disk(1.0, size=0.3), PLATE), n_modes=6).omega
     found = find_modes(assemble(mesh.disk(length, size=0.3 * length), PLATE), n_modes=6).omega
     assert_allclose(found * length**2, wanted, rtol=1e-9)  # rounding
 
 
-@pytest.mark.parametrize("E", [1e3, 1e13])
-@pytest.mark.parametrize("thickness", [1e-6, 0.1])
+@pytest.mark.parametrize("E, thickness", [(1e3, 1e-6), (1e13, 0.1)])
 def test_frequencies_scale_with_stiffness_and_thickness(E, thickness):
     plate = Plate(Material(E=E, nu=0.3, rho=1e3), thickness)
     unit = np.sqrt(E * thickness**2 / (12 * (1 - 0.3**2) * 1e3))
@@ -97,8 +93,8 @@ def test_no_mode_is_missed_in_a_dense_cluster():
     assert count_below(system.K, system.M, below) == 0
 
 
-@pytest.mark.parametrize("n_modes", [60, 120])
-def test_number_of_modes_follows_weyl(n_modes):
+def test_number_of_modes_follows_weyl():
+    n_modes = 120
     modes = find_modes(assemble(mesh.rectangle(1.55, 1.0), PLATE, {"boundary": "hinged"}), n_modes=n_modes)
     wave2 = modes.omega[-1] * PER_RATE
     # Weyl's law with its boundary term for hinged plates, N = A k^2 / 4 pi - P k / 4 pi, fluctuates by about k / 10

@@ -8,7 +8,6 @@ from scenes import QUICK, SMALL
 
 import fem_impact as fi
 
-HUGE = ("9999999999999999999999999", "18446744073709551616")  # beyond 64 bits
 DISK = """
 [mesh]
 shape = "disk"
@@ -57,16 +56,15 @@ def edited(text, key, value):
     return re.sub(rf"^{key} = .*$", f"{key} = {value}", text, flags=re.M)
 
 
-@pytest.mark.parametrize("huge", HUGE)
 @pytest.mark.parametrize(
-    "text, key, status, words",
+    "text, key, huge, status, words",
     [
-        (QUICK, "stiffness", 1, "take a larger tolerance, or a contact with stiffness"),
-        (DISK, "angle", 0, "turns; rad are expected"),
-        (TIN, "loss", 2, "[contact] loss must lie between 0 and 1e+12 s/m"),
+        (QUICK, "stiffness", "9999999999999999999999999", 1, "take a larger tolerance, or a contact with stiffness"),
+        (DISK, "angle", "18446744073709551616", 0, "turns; rad are expected"),
+        (TIN, "loss", "9999999999999999999999999", 2, "[contact] loss must lie between 0 and 1e+12 s/m"),
     ],
 )
-def test_whole_numbers_beyond_64_bits_are_numbers(told, huge, text, key, status, words):
+def test_whole_numbers_beyond_64_bits_are_numbers(told, text, key, huge, status, words):
     found, said = told(edited(text, key, huge), "plan")
     assert found == status and words in said
 
@@ -78,8 +76,10 @@ def test_checked_numbers_are_floats_whatever_was_given():
     assert type(fi.Plate(made[0], 1).thickness) is float
 
 
-@pytest.mark.parametrize("value", ["[]", '["a"]', "{}", "[1.0, 2.0]", "[[1.0]]", "1979-05-27", "true", '"x"'])
-@pytest.mark.parametrize("key", ["duration", "dt", "striker_force"])
+@pytest.mark.parametrize("key, value", [
+    ("duration", "[]"), ("duration", "true"), ("duration", "[[1.0]]"), ("dt", '["a"]'), ("dt", "{}"),
+    ("dt", "1979-05-27"), ("striker_force", "[1.0, 2.0]"), ("striker_force", '"x"'),
+])  # fmt: skip
 def test_a_time_or_force_that_is_no_number_is_told_by_name(told, key, value):
     status, said = told(QUICK.replace("tolerance = 1e-2", f"tolerance = 1e-2\n{key} = {value}"))
     assert status == 2 and f"s.toml: [strike] {key} must be a number in " in said
@@ -90,23 +90,23 @@ def test_an_orthotropic_disk_needs_no_word_on_its_source(told):
     assert status == 0 and "argyris elements" in said
 
 
-@pytest.mark.parametrize("key", ["E", "G"])
-@pytest.mark.parametrize("value", [pytest.param("1e30", marks=pytest.mark.slow), "1e74"])
+@pytest.mark.parametrize(
+    "key, value",
+    [("G", "1e74"), *(pytest.param(*row, marks=pytest.mark.slow) for row in (("E", "1e74"), ("G", "1e30")))],
+)
 def test_an_absurd_stiffness_of_wood_is_a_sentence(told, key, value):
     status, said = told(edited(DISK, key, value), "strike")
     assert status in (0, 1) and "Traceback" not in said  # stiff in every direction is nearly rigid, in one a mistake
-    if key == "G":
-        assert status == 1 and "no tolerance is: check the units" in said
+    assert key == "E" or (status == 1 and "no tolerance is: check the units" in said)
 
 
-@pytest.mark.parametrize("value", ["1e12", *(pytest.param(v, marks=pytest.mark.slow) for v in ("1e30", "1e74"))])
+@pytest.mark.parametrize("value", ["1e12", pytest.param("1e74", marks=pytest.mark.slow)])
 def test_absurd_damping_and_frequency_are_no_traceback(told, value):
     assert told(edited(SMALL, "damping_ratio", value))[0] in (0, 3)  # modes left out would not move either
     assert told(edited(QUICK, "first_frequency", value))[0] in (0, 2)
 
 
 def test_a_listener_out_of_reach_hears_silence_and_all_files_are_there(told, tmp_path):
-    pytest.importorskip("scipy")
     status, said = told(QUICK, "strike", "--target", "modal", "--listener", "0.1", "0.1", "1e10")
     assert status == 0 and "Listener: silence" in said
     assert {"response.json", "force.csv", "radiated.wav"} <= {path.name for path in (tmp_path / "out").iterdir()}
@@ -133,18 +133,21 @@ def test_a_cluster_that_wants_a_certificate_is_a_sentence(told):
 
 
 HEAD = '<svg xmlns="http://www.w3.org/2000/svg" width="465mm" height="300mm" viewBox="0 0 465 300">'
-DRAWINGS = {
-    "pieces": f'{HEAD}<path d="M0 0 {"l1.5 1.25 " * 10**6}z"/></svg>',
-    "comment": f'{HEAD}<!--{"x" * 20_000_000}--><rect width="465" height="300"/></svg>',
-    "shapes": HEAD + '<rect width="4" height="3"/>' * 10**5 + "</svg>",
-}
 
 
-@pytest.mark.parametrize("name, words", [("pieces", "numbers"), ("comment", "a comment"), ("shapes", "shapes")])
+@pytest.mark.parametrize(
+    "words, body",
+    [
+        ("numbers", f'<path d="M0 0 {"l1.5 1.25 " * 10**6}z"/>'),
+        ("a comment", f'<!--{"x" * 20_000_000}--><rect width="465" height="300"/>'),
+        ("shapes", '<rect width="4" height="3"/>' * 10**5),
+    ],
+    ids=["pieces", "comment", "shapes"],
+)
 @pytest.mark.slow
-def test_a_huge_drawing_is_refused_in_seconds(tmp_path, name, words):
+def test_a_huge_drawing_is_refused_in_seconds(tmp_path, words, body):
     pytest.importorskip("svgelements")
-    (tmp_path / "a.svg").write_text(DRAWINGS[name])
+    (tmp_path / "a.svg").write_text(f"{HEAD}{body}</svg>")
     began = sum(os.times()[:4])  # of processor time, children included
     with pytest.raises(ValueError, match=f"contains? .*{words}"):
         fi.mesh.outline(tmp_path / "a.svg")

@@ -26,10 +26,8 @@ COMMANDS = {  # words, and what is there when they are done
     "modes": ("modes scene.toml --vtk out/m.pvd", ["m", "m.pvd"]),
     "map": ("map scene.toml --out out --store store", ["map.csv", "map.nc"]),
     "hammer": ("hammer scene.toml --bandwidth 300 --masses 0.01 0.03 --out out/h.png", ["h.png"]),
-    "sheet": ("hammer scene.toml --bandwidth 300 --catalogue 086 --out out/s.html", ["s.html"]),
     "report": ("report scene.toml --out out/r.html", ["r.html"]),
     "doctor": ("doctor", []),
-    "plan": ("plan scene.toml", []),
 }
 
 
@@ -81,7 +79,7 @@ def run(folder, words, kind="whole", moment=0.0, number=0):
 def prepared(folder, name):
     folder.mkdir()
     (folder / "scene.toml").write_text(SCENE)
-    if name in ("hammer", "sheet"):  # writes into a folder that there is; the others make it
+    if name == "hammer":  # writes into a folder that there is; the others make it
         (folder / "out").mkdir()
     return folder
 

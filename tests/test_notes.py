@@ -42,7 +42,7 @@ def test_a_refined_mesh_file_keeps_its_notes(name):
     assert mesh.refined(2.0 if name == "split" else 0.4).notes == ("two corners were merged",)
 
 
-@pytest.mark.parametrize("wanted", [{"n_modes": 5}, {"n_modes": 60}, {"n_modes": 5, "tolerance": 1e-4}])
+@pytest.mark.parametrize("wanted", [{"n_modes": 5}, {"n_modes": 5, "tolerance": 1e-4}])
 def test_modes_and_all_made_from_them_keep_the_notes_of_the_mesh(drawing, wanted):
     system = fi.assemble(fi.mesh.outline(drawing), SECTION, supports={"boundary": "clamped"})
     assert ASSUMED in system.notes[0]

@@ -10,6 +10,7 @@ import commands
 import pytest
 import scene_keys
 
+import fem_impact as fi
 from fem_impact._base import explained
 from fem_impact.impact import assumption
 
@@ -46,7 +47,9 @@ def test_the_pages_are_there():
 
 
 @pytest.mark.parametrize("path", PAGES, ids=name_of)
-def test_links_lead_to_files_and_headings(path):
+def test_a_page_begins_with_its_one_title_and_its_links_lead_to_files_and_headings(path):
+    titles = re.findall(r"^# .+$", prose(path), flags=re.MULTILINE)
+    assert len(titles) == 1 and prose(path).startswith(titles[0])
     for link in LINK.findall(re.sub(r"`[^`\n]*`", "", prose(path))):
         if link.startswith("https://"):
             continue
@@ -56,25 +59,27 @@ def test_links_lead_to_files_and_headings(path):
         assert not anchor or anchor in anchors(target), f"{name_of(path)}: {link}"
 
 
-@pytest.mark.parametrize("path", PAGES, ids=name_of)
-def test_a_page_has_one_title_and_comes_first(path):
-    titles = re.findall(r"^# .+$", prose(path), flags=re.MULTILINE)
-    assert len(titles) == 1 and prose(path).startswith(titles[0])
-
-
 @pytest.mark.parametrize("name", ["README", "studies/README", "studies/guide", "studies/limits", "studies/notes"])
 def test_files_named_in_sentences_exist(name):
     text = prose(ROOT / f"{name}.md")
     named = re.findall(r"`((?:studies|tests|meshes)/[\w./]+)`", text)
-    named += [
-        f"studies/{each}" for each in re.findall(r"`((?:figures|tutorials|verification|benchmarks)/[\w.]+)`", text)
-    ]
-    assert [each for each in named if not (ROOT / each).exists()] == []
+    within = re.findall(r"`((?:figures|tutorials|verification|benchmarks)/[\w.]+)`", text)
+    assert [each for each in [*named, *(f"studies/{each}" for each in within)] if not (ROOT / each).exists()] == []
 
 
 @pytest.mark.parametrize("script", [api, catalogue, commands, scene_keys], ids=lambda script: script.__name__)
 def test_pages_made_by_scripts_are_current(script):
     assert script.PAGE.read_text(encoding="utf-8") == script.page(), f"run python studies/{script.__name__}.py"
+
+
+def test_the_page_of_public_names_has_every_name_once_says_what_it_is_and_does_not_depend_on_the_run():
+    text = api.page()
+    heads = re.findall(r"^##+ fi\.([\w.]+)$", text, re.MULTILINE)
+    assert len(heads) == len(set(heads)) and set(fi.__all__) - {"__version__"} <= set(heads)
+    assert {"mesh.rectangle", "figures.spread", "export.write_vtk", "hammers.choose"} <= set(heads)
+    for head, told in re.findall(r"^### (fi\.\S+)\n\n`[^`]*`\n\n```text\n(.*?)```", text, re.MULTILINE | re.DOTALL):
+        assert len(told.split()) >= 3, head
+    assert not re.search(rf"0x[0-9a-f]{{6}}|{re.escape(str(ROOT))}|/home/|/tmp/", text)  # no addresses, no folders
 
 
 def sayings():
@@ -91,9 +96,7 @@ def sayings():
 def test_messages_name_each_heading_of_the_page_of_notes_by_the_phrases_that_it_quotes():
     assert sayings() == explained.HEADINGS
     assert set(explained.HEADINGS) <= anchors(ROOT / "studies" / "notes.md")
-
-
-def test_every_assumption_is_explained_under_its_name():
+    # every assumption is explained under its name
     assert {name.replace(" ", "-") for name in assumption.ALL} <= set(explained.HEADINGS)
 
 
@@ -108,12 +111,8 @@ def test_messages_that_the_page_of_notes_quotes_are_said_so():
 
 
 def test_the_page_on_reading_names_files_and_functions_that_exist():
-    text = (
-        (ROOT / "studies" / "theory.md")
-        .read_text()
-        .split("## 25. How to read this program")[1]
-        .split("## References")[0]
-    )
+    theory = (ROOT / "studies" / "theory.md").read_text()
+    text = theory.split("## 25. How to read this program")[1].split("## References")[0]
     named = re.findall(r"`((?:[a-z_]+/)+[a-z_]+\.py)`(?: \(`(\w+)`\))?", text)
     assert len(named) > 60
     for path, function in named:

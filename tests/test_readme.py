@@ -1,13 +1,18 @@
-"""What README and guide show must run as it stands there."""
+"""What README, guide, docstrings and the page of hats show must run as it stands there."""
 
+import doctest
+import inspect
 import re
 import shlex
 import subprocess
 import sys
 from pathlib import Path
 
+import hats
+import numpy as np
 import pytest
 from comparing import assert_printed
+from signatures import everything
 
 import fem_impact as fi
 from fem_impact import arguments
@@ -34,8 +39,8 @@ def words_of(line):
 
 
 SIX = re.findall(r"^`((?:fem-impact|python) [^`]+)`$", README, flags=re.MULTILINE)
-SHOWN = [line for page in (README, GUIDE) for block in blocks(page, "sh") for line in block.splitlines()]
-OURS = [line for line in SHOWN + SIX if "fem-impact " in line]
+LINES = [line for page in (README, GUIDE) for block in blocks(page, "sh") for line in block.splitlines()]
+OURS = [line for line in LINES + SIX if "fem-impact " in line]
 
 
 def test_the_front_page_is_short():
@@ -130,10 +135,60 @@ def test_shown_commands_are_ones_the_parser_takes(line):
 
 @pytest.mark.slow
 @pytest.mark.parametrize("line", SIX, ids=lambda line: line.split()[1])
-def test_the_six_commands_of_the_front_page_run(line, tmp_path):
-    start = [sys.executable] if line.startswith("python ") else [sys.executable, "-m", "fem_impact"]
+def test_the_six_commands_of_the_front_page_run(line, tmp_path, prompt):
     for name in ("studies", "meshes", "fem_impact"):
         (tmp_path / name).symlink_to(ROOT / name)
-    done = subprocess.run([*start, *shlex.split(line)[1:]], cwd=tmp_path, capture_output=True, text=True, timeout=1800)
-    assert done.returncode == 0, done.stderr
-    assert len(done.stdout.splitlines()) > 3
+    program, *words = shlex.split(line)
+    if program == "fem-impact":
+        status, told, said = prompt(words)
+    else:
+        done = subprocess.run([sys.executable, *words], cwd=tmp_path, capture_output=True, text=True, timeout=1800)
+        status, told, said = done.returncode, done.stdout, done.stderr
+    assert status == 0 and len(told.splitlines()) > 3, said
+
+
+EXAMPLES = {name: item.__doc__ for name, item in everything().items() if ">>>" in (item.__doc__ or "")}
+
+
+@pytest.mark.parametrize("name", EXAMPLES)
+def test_an_example_in_a_docstring_prints_what_it_says(name, tmp_path, monkeypatch):
+    if name == "export.write_uff":
+        pytest.importorskip("pyuff")
+    (tmp_path / "studies").symlink_to(ROOT / "studies")
+    monkeypatch.chdir(tmp_path)
+    example = doctest.DocTestParser().get_doctest(EXAMPLES[name], {"fi": fi, "np": np}, name, None, None)
+    told: list[str] = []
+    failed, tried = doctest.DocTestRunner().run(example, out=told.append)
+    assert tried > 0 and not failed, "".join(told)
+
+
+def test_every_function_of_the_first_rank_has_an_example():
+    """All of `fi.name`, every mesh, body, striker and contact there is to make."""
+    kinds = ("Striker.", "Contact.", "Beam.", "Modes.")
+    constructors = {name for name, item in everything().items() if name.startswith(kinds) and inspect.ismethod(item)}
+    made = {f"mesh.{name}" for name in ("rectangle", "disk", "polygon", "line", "outline", "load", "save")}
+    made |= {f"analytic.{name}" for name in ("rectangle", "beam", "disk")}
+    functions = {name for name in fi.__all__ if inspect.isfunction(getattr(fi, name))}
+    assert constructors | made | functions <= set(EXAMPLES) | {"Modes.from_uff"}  # that one in export.write_uff
+
+
+def test_every_hat_has_a_path_that_the_prompt_knows():
+    assert set(hats.HATS) == {"percussionist", "test_engineer", "analyst", "teacher"}
+    for hat in hats.HATS:
+        commands, files = hats.path_of(hat)
+        assert 2 <= len(commands) <= 4 and files
+        for command in commands:
+            words = shlex.split(command)
+            assert arguments.parser().parse_args(words[1:]).command == words[1]
+
+
+@pytest.mark.slow
+@pytest.mark.thin(4)
+@pytest.mark.parametrize("hat", hats.HATS)
+def test_the_commands_of_a_hat_lead_to_its_files(hat, tmp_path, capsys):
+    for command, seconds, done in hats.walk(hat, tmp_path):
+        assert done.returncode in (0, 3) and done.stdout, done.stderr  # 3: done, but the tolerance is missed
+        with capsys.disabled():
+            print(f"\n{hat}: {seconds:.1f} s  {command}", end="")
+    for name in hats.path_of(hat)[1]:
+        assert (tmp_path / name).stat().st_size > 0, name

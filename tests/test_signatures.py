@@ -1,13 +1,13 @@
 """Every public function, every argument spoiled: a result or one clear error; the table and judge are signatures.py."""
 
 import inspect
-import json
-import subprocess
-import sys
-from pathlib import Path
+from itertools import groupby
+from operator import itemgetter
+from zlib import crc32
 
 import pytest
 import signatures
+from fuzz import confined
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
@@ -16,15 +16,18 @@ from fem_impact._base import check
 
 for extra in ("pyuff", "jinja2", "plotly"):  # the table writes a universal file and a report
     pytest.importorskip(extra)
-DRAWN = ("pictures.mode_shapes", "pictures.wave", "pictures.animation", "report.write", "atlas.hammers_for")
-QUICK = [case for case in signatures.cases() if case[0] not in DRAWN]  # those render or search for seconds
+DRAWN = ("pictures.mode_shapes", "pictures.wave", "pictures.animation", "report.write")  # these render for seconds
+COMPILED = ("strike", "strike free", "strike stick", "collide", "sweep", "sweep cells")
+# Known faults: these end in a bare error of numpy instead of one that names the argument.
+OPTIONS = {"deadline": None, "derandomize": True, "suppress_health_check": list(HealthCheck)}
 
 
-@pytest.fixture(scope="module", autouse=True)
-def compiled():
-    """Kernels are compiled before the clock of the judge runs: that may take half a minute."""
-    for name in ("strike", "strike free", "strike stick", "collide", "sweep", "sweep cells"):
+@pytest.fixture(scope="module")
+def quick():
+    """Cases of quick calls, whose kernels are compiled before the clock of the judge runs."""
+    for name in COMPILED:
         signatures.call(name)
+    return [case for case in signatures.cases() if case[0] not in DRAWN]
 
 
 def test_every_public_function_has_a_valid_call():
@@ -36,29 +39,32 @@ def test_every_public_function_has_a_valid_call():
         assert needed - {"self", "changes", "options", "wanted"} <= set(arguments), name
 
 
-@settings(max_examples=300, deadline=None, derandomize=True, suppress_health_check=list(HealthCheck))
-@given(case=st.sampled_from(QUICK))
-def test_a_spoiled_argument_gives_a_result_or_one_error_that_names_it(case):
-    name, parameter, spoil = case
-    with signatures.confined():
-        assert signatures.judged(name, {parameter: signatures.SPOILS[spoil]}) == ""
+@pytest.mark.parametrize("spoils, examples", [(st.none(), 300), (st.floats(), 100)], ids=["spoil", "any number"])
+def test_a_spoiled_argument_gives_a_result_or_one_error_that_names_it(quick, spoils, examples):
+    @settings(max_examples=examples, **OPTIONS)
+    @given(case=st.sampled_from(quick), number=spoils)
+    def check(case, number):
+        name, parameter, spoil = case
+        with confined():
+            value = signatures.SPOILS[spoil] if number is None else number
+            assert signatures.judged(name, {parameter: value}) == ""
 
-
-@settings(max_examples=100, deadline=None, derandomize=True, suppress_health_check=list(HealthCheck))
-@given(number=st.floats(), case=st.sampled_from(QUICK))
-def test_any_number_gives_a_result_or_one_error_that_names_the_argument(number, case):
-    with signatures.confined():
-        assert signatures.judged(case[0], {case[1]: number}) == ""
+    check()
 
 
 @pytest.mark.slow
-def test_spoiled_arguments_of_all_functions_give_a_result_or_one_error_that_names_them(all_cases):
-    every = 1 if all_cases else 10
-    command = [sys.executable, str(Path(signatures.__file__)), f"--every={every}"]
-    done = subprocess.run(command, capture_output=True, text=True)
-    found = json.loads(done.stdout.splitlines()[-1])
-    assert found["failed"] == []
-    assert found["functions"] == len(signatures.table()) and found["calls"] > 9_000 / every
+def test_spoiled_arguments_of_all_functions_give_a_result_or_one_error_that_names_them(quick, all_cases):
+    """Each argument in two ways, always the same ones, or in all."""
+    ways = None if all_cases else 2
+    chosen = [case for _, same in groupby(signatures.cases(), itemgetter(0, 1))
+              for case in sorted(same, key=lambda case: crc32(" ".join(case).encode()))[:ways]]  # fmt: skip
+    assert {name for name, *_ in chosen} == set(signatures.table())
+    failed = {name: wrong for name in signatures.table() if (wrong := signatures.judged(name, {}))}
+    with confined():
+        for name, parameter, spoil in chosen:
+            if wrong := signatures.judged(name, {parameter: signatures.SPOILS[spoil]}):
+                failed[f"{name} {parameter}={spoil}"] = wrong
+    assert not failed
 
 
 def test_the_judge_tells_bare_and_unclear_errors_murmurs_and_broken_numbers_apart(monkeypatch):
@@ -66,13 +72,12 @@ def test_the_judge_tells_bare_and_unclear_errors_murmurs_and_broken_numbers_apar
         monkeypatch.setattr(signatures, "call", lambda name, **changes: function(**changes))
         return signatures.judged("strike", {"speed": 1.0})
 
-    def murmur(speed):
-        signatures.warnings.warn("speed", UserWarning, stacklevel=1)
-
-    assert verdict(lambda speed: speed) == ""
-    assert verdict(lambda speed: speed * float("nan")).startswith("result holds")
-    assert verdict(lambda speed: [][1]).startswith("IndexError")
-    assert verdict(lambda speed: float("x")).startswith("bare ValueError")
-    assert verdict(murmur).startswith("UserWarning")
-    assert verdict(lambda speed: fi.mesh.line(-1.0)).startswith("does not name speed")
-    assert verdict(lambda speed: check.positive("speed", -speed)) == ""
+    for function, words in (
+        (lambda speed: speed * float("nan"), "result holds"),
+        (lambda speed: [][1], "IndexError"),
+        (lambda speed: float("x"), "bare ValueError"),
+        (lambda speed: signatures.warnings.warn("speed", UserWarning, stacklevel=1), "UserWarning"),
+        (lambda speed: fi.mesh.line(-1.0), "does not name speed"),
+    ):
+        assert verdict(function).startswith(words)
+    assert verdict(lambda speed: speed) == verdict(lambda speed: check.positive("speed", -speed)) == ""

@@ -34,18 +34,19 @@ def test_from_nastran_to_the_sound(tmp_path, capsys):
     assert "for a mode at" in capsys.readouterr().out
 
 
-def test_hammer_test_warns_of_double_hits(tmp_path, capsys):
-    modes = tutorial.structure(3e3)
-    verdicts = {(one.place, one.tip): one for one in tutorial.judge(tutorial.plate(), modes)}
+@pytest.mark.slow
+def test_hammer_test_warns_of_double_hits_writes_and_advises(tmp_path, capsys):
+    verdicts = {(one.place, one.tip): one for one in tutorial.main(tmp_path, max_frequency=3e3)}
     assert verdicts["middle", "nylon"].good
     assert verdicts["middle", "rubber"].reach < tutorial.BANDWIDTH and verdicts["middle", "rubber"].n_impacts == 1
     assert verdicts["middle", "steel"].n_impacts > 1 and verdicts["corner", "nylon"].n_impacts > 1
     assert verdicts["middle", "steel"].ratio > 1.0  # beyond the threshold, as the criterion foretells
+    assert "with a hammer of 100 g: tips from" in capsys.readouterr().out and (tmp_path / "hammer_test.png").exists()
 
 
 def test_hammer_test_gives_no_number_of_a_blow_that_missed(tmp_path, capsys, monkeypatch):
-    monkeypatch.setattr(tutorial, "plate", lambda: tutorial.fi.analytic.rectangle(0.6, 0.4, mass=2.6,
-                        first_frequency=60.0, n_modes=20))  # fmt: skip
+    few = tutorial.fi.analytic.rectangle(0.6, 0.4, mass=2.6, first_frequency=60.0, n_modes=20)
+    monkeypatch.setattr(tutorial, "plate", lambda: few)
     monkeypatch.setattr(tutorial, "structure", lambda *_: tutorial.plate())
     monkeypatch.setattr(tutorial.hammers, "choose", lambda *_, **__: [])
     verdicts = tutorial.main(tmp_path)
@@ -53,13 +54,6 @@ def test_hammer_test_gives_no_number_of_a_blow_that_missed(tmp_path, capsys, mon
     assert len(steel) == 2 and all("?" in line and "not resolved" in line for line in steel)
     assert not any(one.good for one in verdicts if not one.trusted)
     assert len(tutorial.draw(tutorial.plate()).axes[0].get_lines()) < len(tutorial.TIPS) + 1  # with the wanted level
-
-
-@pytest.mark.slow
-def test_hammer_test_writes_and_advises(tmp_path, capsys):
-    tutorial.main(tmp_path, max_frequency=4e3)
-    said = capsys.readouterr().out
-    assert "with a hammer of 100 g: tips from" in said and (tmp_path / "hammer_test.png").exists()
 
 
 def test_decay_is_measured_in_the_file_as_it_was_modelled(tmp_path, monkeypatch):

@@ -80,21 +80,20 @@ def run_again_compiled(monkeypatch):
     assert done.returncode == answers.Status.BAD_INPUT and "none.toml" in done.stderr
 
 
-def probe_for_rendering(monkeypatch):
-    pictures.can_render.__wrapped__()
-
-
 def draw(monkeypatch):
     with Painter() as painter:
         painter.process.stdin.close()
         painter.process.wait()
 
 
-@pytest.mark.parametrize(
-    "road",
-    [read_a_mesh, ask_beside_the_page, run_again_compiled]
-    + [pytest.param(road, marks=pytest.mark.slow) for road in (probe_for_rendering, draw)],
-)
+def probe_for_rendering(monkeypatch):
+    pictures.can_render.__wrapped__()
+
+
+SLOW = [pytest.param(road, marks=pytest.mark.slow) for road in (probe_for_rendering, draw)]
+
+
+@pytest.mark.parametrize("road", [read_a_mesh, ask_beside_the_page, run_again_compiled, *SLOW])
 def test_nothing_planted_runs(ran, road, monkeypatch):
     road(monkeypatch)
     assert ran() == ""
@@ -114,14 +113,6 @@ def test_what_this_process_found_by_pythonpath_is_found(tmp_path, monkeypatch):
     path = os.pathsep.join([str(HOME.parent), str(child.LIBRARIES)])
     monkeypatch.setenv("PYTHONPATH", path)
     code = "from fem_impact._base import child; import sys, os; os.execve(sys.executable, *child.python(*sys.argv[1:]))"
-    words = [
-        getattr(sys, "_base_executable", sys.executable),
-        "-c",
-        code,
-        "_base.isolated:process",
-        "60",
-        "none",
-        "no:no",
-    ]
-    done = subprocess.run(words, cwd=tmp_path, capture_output=True, text=True)
+    words = [getattr(sys, "_base_executable", sys.executable), "-c", code, "_base.isolated:process", "60", "none"]
+    done = subprocess.run([*words, "no:no"], cwd=tmp_path, capture_output=True, text=True)
     assert done.returncode == 1 and done.stderr == "this needs fem_impact: pip install fem_impact"

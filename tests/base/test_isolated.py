@@ -58,18 +58,23 @@ def test_reader_that_a_busy_machine_delays_ends(tmp_path, monkeypatch):
     assert len(mesh.load(written(tmp_path / "plate.vtu")).cells) == len(PLATE.cells)
 
 
-def test_header_that_claims_more_than_the_memory_is_refused(tmp_path):
-    path = tmp_path / "plate.ply"
-    path.write_text(
-        "ply\nformat binary_little_endian 1.0\nelement vertex 1000000000000\n"
-        "property double x\nproperty double y\nproperty double z\nelement face 0\n"
-        "property list uchar int vertex_indices\nend_header\n"
-    )
-    with pytest.raises(ValueError, match=r"plate\.ply cannot be read as a mesh"):
-        mesh.load(path)
+PLY = (
+    "ply\nformat binary_little_endian 1.0\nelement vertex 1000000000000\nproperty double x\nproperty double y\n"
+    "property double z\nelement face 0\nproperty list uchar int vertex_indices\nend_header\n"
+)
 
 
-@pytest.mark.parametrize("status", [2, -6, -11])
+@pytest.mark.parametrize(("name", "text", "said"), [
+    ("plate.ply", PLY, "cannot be read as a mesh"),  # claims more than the memory
+    ("plate.xyz", "1", r".*its ending is '\.xyz', but meshio reads .*\.vtu"),
+])  # fmt: skip
+def test_text_that_is_no_mesh_is_refused(tmp_path, name, text, said):
+    (tmp_path / name).write_text(text)
+    with pytest.raises(ValueError, match=f"{name.replace('.', '[.]')} {said}"):
+        mesh.load(tmp_path / name)
+
+
+@pytest.mark.parametrize("status", [2, -6])
 def test_reader_that_dies_or_fills_the_memory_is_a_sentence(tmp_path, monkeypatch, status):
     monkeypatch.setattr(isolated, "run_reader", lambda path, reader, arguments, patience: (status, b"", b""))
     (tmp_path / "plate.msh").write_text("any")
@@ -77,8 +82,7 @@ def test_reader_that_dies_or_fills_the_memory_is_a_sentence(tmp_path, monkeypatc
         mesh.load(tmp_path / "plate.msh")
 
 
-@pytest.mark.parametrize("name", ["plate.msh", "plate.vtu", "plate.svg", "plate.unv"])
-@pytest.mark.parametrize("size", [0, 2**31])
+@pytest.mark.parametrize(("name", "size"), [("plate.msh", 0), ("plate.vtu", 2**31), ("plate.svg", 2**31)])
 def test_holes_are_not_parsed(tmp_path, name, size):
     with (tmp_path / name).open("wb") as file:
         file.truncate(size)
@@ -94,12 +98,6 @@ def test_the_process_that_reads_loads_no_mesher_and_no_solver(reader):
     assert not {"scipy", "netgen", "skfem", "numba", "fem_impact.mesh.meshes"} & set(loaded)
 
 
-def test_memory_of_the_reader_is_limited():
-    script = "from fem_impact._base import isolated; isolated.limit(60); bytearray(3 << 30)"
-    run = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True)
-    assert run.returncode == 1 and "MemoryError" in run.stderr
-
-
 def test_file_that_unpacks_to_more_than_the_memory_is_refused(tmp_path):
     h5py = pytest.importorskip("h5py", reason="the extra hdf5 is not installed")
     path = written(tmp_path / "plate.med")
@@ -113,7 +111,7 @@ def test_file_that_unpacks_to_more_than_the_memory_is_refused(tmp_path):
         mesh.load(path)
 
 
-def test_a_mesh_may_include_what_lies_beside_it_and_a_link_to_a_mesh_elsewhere_is_followed(tmp_path):
+def test_a_mesh_may_include_what_lies_beside_it_and_a_link_to_a_mesh_elsewhere_is_followed(tmp_path, read_here):
     written(tmp_path / "part.inp")
     (tmp_path / "whole.inp").write_text("*INCLUDE, INPUT=part.inp\n")
     assert mesh.load(tmp_path / "whole.inp").area == pytest.approx(1.0)
@@ -143,30 +141,21 @@ def test_hdf5_that_looks_into_other_files_is_refused(tmp_path, how):
         mesh.load(path)
 
 
-def test_every_format_that_hdf5_holds_is_read(tmp_path):
+def test_every_format_that_hdf5_holds_is_read(tmp_path, read_here):
     pytest.importorskip("h5py", reason="the extra hdf5 is not installed")
-    for name in ("plate.med", "plate.h5m", "plate.xdmf"):
-        assert mesh.load(written(tmp_path / name)).area == pytest.approx(1.0)
+    for path in [written(tmp_path / name) for name in ("plate.med", "plate.h5m", "plate.xdmf")]:
+        assert mesh.load(path).area == pytest.approx(1.0)
 
 
-@pytest.mark.parametrize(
-    ("name", "content", "reader", "library", "extra"),
-    [
-        ("plate.med", b"\x89HDF\r\n\x1a\n", "mesh.meshio_reader:arrays", "h5py", "hdf5"),
-        ("plate.svg", b"<svg/>", "mesh.drawings:svg_arrays", "svgelements", "cad"),
-    ],
-)
+@pytest.mark.parametrize(("name", "content", "reader", "library", "extra"), [
+    ("plate.med", b"\x89HDF\r\n\x1a\n", "mesh.meshio_reader:arrays", "h5py", "hdf5"),
+    ("plate.svg", b"<svg/>", "mesh.drawings:svg_arrays", "svgelements", "cad"),
+])  # fmt: skip
 def test_a_missing_library_is_named(tmp_path, monkeypatch, name, content, reader, library, extra):
     (tmp_path / name).write_bytes(content)
     monkeypatch.setitem(sys.modules, library, None)
     told = f"this needs {library}: pip install 'fem-impact[{extra}]'"
     assert isolated.main(tmp_path / name, reader, []) == (1, told.encode())
-
-
-def test_unknown_ending_is_told_with_those_that_are_known(tmp_path):
-    (tmp_path / "plate.xyz").write_text("1")
-    with pytest.raises(ValueError, match=r"its ending is '\.xyz', but meshio reads .*\.vtu"):
-        mesh.load(tmp_path / "plate.xyz")
 
 
 @pytest.mark.parametrize("kind", ["folder", "pipe", "loop", "empty"])

@@ -10,6 +10,7 @@ import fem_impact as fi
 from fem_impact._base import markup
 
 SVG = "{http://www.w3.org/2000/svg}"
+PLATE = {"mass": 1.0, "first_frequency": 200.0}
 
 
 def parsed(html):
@@ -47,18 +48,16 @@ def test_response_shows_its_force(scene):
 def test_a_response_shows_its_impacts_only():
     """A hand holds the striker, so that the run goes on to its end."""
     held = fi.Striker.rigid(0.02).held(fi.Hand(stiffness=100.0, damping=1.0, force=0.1))
-    plate = fi.analytic.rectangle(0.4, 0.3, mass=1.0, first_frequency=200.0, n_modes=5)
     how = {"at": (0.13, 0.1), "speed": 1.0, "tolerance": 1e-2, "duration": 0.05}
-    hit = fi.strike(plate, held, fi.Contact.linear(1e5), **how)
+    hit = fi.strike(fi.analytic.rectangle(0.4, 0.3, **PLATE, n_modes=5), held, fi.Contact.linear(1e5), **how)
     (told,) = (each.text for each in parsed(hit._repr_html_()).iter(f"{SVG}text") if each.text.endswith(" s"))
     assert float(told.split()[0]) == pytest.approx(hit.impacts[-1].end, rel=1e-2)
     assert hit.impacts[-1].end < 0.97 * hit.time[-1]
 
 
 def test_modes_and_meshes_show_themselves():
-    modes = fi.analytic.rectangle(0.4, 0.3, mass=0.2, first_frequency=100.0, n_modes=30)
-    text = "".join(parsed(modes._repr_html_()).itertext())
-    assert "30 modes" in text and "100 Hz" in text and "0.2 kg" in text
+    text = "".join(parsed(fi.analytic.rectangle(0.4, 0.3, **PLATE, n_modes=30)._repr_html_()).itertext())
+    assert "30 modes" in text and "200 Hz" in text and "1 kg" in text
     assert "3 x 2 m" in "".join(parsed(fi.mesh.rectangle(3.0, 2.0)._repr_html_()).itertext()).replace(" m x", " x")
 
 

@@ -24,9 +24,9 @@ def test_numbers_change_by_the_chain_rule():
     mass = maker.rates(values, "mass", 0.05)[""]
     assert mass.section is None
     assert set(mass.numbers) == {"striker.mass", "contact.stiffness", "strike.speed"}
+    exact = {"striker.mass": 1.0, "contact.stiffness": 1e5, "strike.speed": -1.0}
     # differences of fourth order with a step of 1e-5: rounding alone
-    assert_allclose([mass.numbers[name] for name in ("striker.mass", "contact.stiffness", "strike.speed")],
-                    [1.0, 1e5, -1.0], rtol=1e-9)  # fmt: skip
+    assert_allclose([mass.numbers[name] for name in exact], [*exact.values()], rtol=1e-9)
     height = maker.rates(values, "height", 0.02)[""]
     assert height.section is not None and not height.numbers
 
@@ -51,11 +51,8 @@ def test_a_scene_and_a_function_make_the_same_pieces():
         (3, "objects must be a scene, the path of one, or a function"),
         (lambda values: 3, "must return a System, Modes, a dict of arguments"),
         (lambda values: {"target": fi.Modes.rigid(1.0), "striker": fi.Striker.rigid(1.0)}, "contact must be"),
-        (
-            lambda values: {"target": fi.Modes.rigid(1.0), "striker": fi.Striker.rigid(1.0),
-                            "contact": fi.Contact.hertz(1e6), "at": None},
-            "needs speed, an argument of strike",
-        ),
+        (lambda values: {"target": fi.Modes.rigid(1.0), "striker": fi.Striker.rigid(1.0), "at": None,
+                         "contact": fi.Contact.hertz(1e6)}, "needs speed, an argument of strike"),
     ],
 )  # fmt: skip
 def test_what_makes_no_blow_is_said(objects, words):

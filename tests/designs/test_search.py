@@ -11,6 +11,8 @@ from fem_impact.taps.unknowns import Box
 
 WOOD = fi.Material(E=16e9, nu=0.35, rho=900.0)
 WALL = fi.Modes.rigid(1e9)
+TUNED, HEIGHT = {"mode1.frequency": 440.0}, {"height": (5e-3, 40e-3)}
+BALL = {"mass": (1e-3, 1.0), "stiffness": (1e3, 1e7)}
 
 
 def bar(values):
@@ -27,7 +29,7 @@ def ball(values):
 
 
 def test_the_height_of_a_free_bar_is_that_of_the_formula():
-    found = fi.design(bar, {"mode1.frequency": 440.0}, {"height": (5e-3, 40e-3)}, tolerance=1e-9)
+    found = fi.design(bar, TUNED, HEIGHT, tolerance=1e-9)
     beta = 4.730040744862704  # cos b cosh b = 1
     height = 440.0 * 2.0 * np.pi * np.sqrt(12.0 * WOOD.rho / WOOD.E) * (0.35 / beta) ** 2
     assert found.met and found.at_end == ()
@@ -38,8 +40,7 @@ def test_the_height_of_a_free_bar_is_that_of_the_formula():
 
 
 def test_mass_and_stiffness_follow_from_contact_time_and_peak_force():
-    wanted = {"contact_time": 1e-3, "peak_force": 30.0}
-    found = fi.design(ball, wanted, {"mass": (1e-3, 1.0), "stiffness": (1e3, 1e7)}, tolerance=1e-6)
+    found = fi.design(ball, {"contact_time": 1e-3, "peak_force": 30.0}, BALL, tolerance=1e-6)
     # t = pi sqrt(m / k), F = v sqrt(k m)
     assert_allclose(found.values["mass"], 30.0 * 1e-3 / np.pi, rtol=1e-6)
     assert_allclose(found.values["stiffness"], 30.0 * np.pi / 1e-3, rtol=1e-6)
@@ -49,8 +50,7 @@ def test_mass_and_stiffness_follow_from_contact_time_and_peak_force():
 
 
 def test_the_least_mass_lies_where_a_range_ends():
-    wanted = {"contact_time": (1e-3, None), "peak_force": (None, 30.0)}
-    free = {"mass": (1e-3, 1.0), "stiffness": (1e4, 1e7)}
+    wanted, free = {"contact_time": (1e-3, None), "peak_force": (None, 30.0)}, BALL | {"stiffness": (1e4, 1e7)}
     found = fi.design(ball, wanted, free, least="mass", tolerance=1e-6)
     assert_allclose(found.values["mass"], 1e4 * (1e-3 / np.pi) ** 2, rtol=1e-5)  # the softest tip, which is light
     assert found.at_end == ("stiffness",) and found.met
@@ -61,7 +61,7 @@ def test_blows_of_several_names_have_goals_of_their_own():
         return {name: ball({**values, "speed": speed}) for name, speed in (("soft", 1.0), ("loud", 5.0))}
 
     wanted = {"soft": {"peak_force": 30.0}, "loud": {"contact_time": 1e-3}}
-    found = fi.design(two, wanted, {"mass": (1e-3, 1.0), "stiffness": (1e3, 1e7)}, tolerance=1e-6)
+    found = fi.design(two, wanted, BALL, tolerance=1e-6)
     assert_allclose(found["soft: peak_force"], 30.0, rtol=1e-6)
     assert_allclose(found.values["mass"], 30.0 * 1e-3 / np.pi, rtol=1e-6)
 
@@ -97,37 +97,40 @@ def test_all_slopes_are_differences():
 
 
 def test_a_scene_is_designed_by_the_names_of_its_numbers():
-    free = {"contact.stiffness": (1e6, 1e9)}
-    found = fi.design("studies/scenes/marimba_bar.toml", {"contact_time": 1.5e-3}, free, n_modes=12)
-    assert found.met
+    path, free = "studies/scenes/marimba_bar.toml", {"contact.stiffness": (1e6, 1e9)}
+    found = fi.design(path, {"contact_time": 1.5e-3}, free, n_modes=12)
     scene = found.objects
+    assert found.met
     assert_allclose(scene.strike(target="modal").contact_time, 1.5e-3, rtol=2e-3)  # told to 1e-3 by its own plan
     assert scene.contact.values["stiffness"] == found.values["contact.stiffness"]
 
 
 def test_what_is_out_of_reach_warns_and_says_what_holds_it():
     with pytest.warns(fi.ToleranceWarning, match="mode1.frequency is .* wanted 2000 Hz; height stopped at the end"):
-        found = fi.design(bar, {"mode1.frequency": 2000.0}, {"height": (5e-3, 40e-3)})
+        found = fi.design(bar, {"mode1.frequency": 2000.0}, HEIGHT)
     assert not found.met and found.at_end == ("height",)
     assert "MISSED" in found.summary()
 
 
-def test_errors_name_what_is_wrong():
-    with pytest.raises(ValueError, match="least must be one of"):
-        fi.design(bar, {"mode1.frequency": 440.0}, {"height": (5e-3, 40e-3)}, least="width")
-    with pytest.raises(ValueError, match=r"start\['height'\] must lie between 0.005 and 0.04"):
-        fi.design(bar, {"mode1.frequency": 440.0}, {"height": (5e-3, 40e-3)}, start={"height": 1.0})
-    with pytest.raises(ValueError, match=r"free\['height'\] must be a range \(low, high\), got \(0.04, 0.005\)"):
-        fi.design(bar, {"mode1.frequency": 440.0}, {"height": (40e-3, 5e-3)})
-    with pytest.raises(ValueError, match="a quantity of a blow needs striker, contact, at and speed"):
-        fi.design(bar, {"impulse": 1.0}, {"height": (5e-3, 40e-3)})
-    with pytest.raises(ValueError, match="mode 3 needs more modes, the body has 0 flexible ones"):
-        fi.design(lambda values: WALL, {"mode3.frequency": 1.0}, {"mass": (1.0, 2.0)})
+@pytest.mark.parametrize(
+    "objects, wanted, free, how, words",
+    [
+        (bar, TUNED, HEIGHT, {"least": "width"}, "least must be one of"),
+        (bar, TUNED, HEIGHT, {"start": {"height": 1.0}}, r"start\['height'\] must lie between 0.005 and 0.04"),
+        (bar, TUNED, {"height": (40e-3, 5e-3)}, {},
+         r"free\['height'\] must be a range \(low, high\), got \(0.04, 0.005\)"),
+        (bar, {"impulse": 1.0}, HEIGHT, {}, "a quantity of a blow needs striker, contact, at and speed"),
+        (lambda values: WALL, {"mode3.frequency": 1.0}, {"mass": (1.0, 2.0)}, {},
+         "mode 3 needs more modes, the body has 0 flexible ones"),
+    ],
+)  # fmt: skip
+def test_errors_name_what_is_wrong(objects, wanted, free, how, words):
+    with pytest.raises(ValueError, match=words):
+        fi.design(objects, wanted, free, **how)
 
 
 def test_a_search_may_begin_where_a_number_is_one():
     """Its logarithm is zero, from which scipy alone would take no step."""
-    found = fi.design(
-        lambda values: ball({**values, "stiffness": 1e5}), {"contact_time": 2e-3}, {"mass": (0.01, 100.0)}
-    )
+    soft = lambda values: ball({**values, "stiffness": 1e5})  # noqa: E731
+    found = fi.design(soft, {"contact_time": 2e-3}, {"mass": (0.01, 100.0)})
     assert_allclose(found.values["mass"], 1e5 * (2e-3 / np.pi) ** 2, rtol=2e-3)

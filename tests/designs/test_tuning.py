@@ -13,6 +13,8 @@ from fem_impact.designs.removal import PER_CENT, Dishes
 
 WOOD = fi.Material(E=16e9, nu=0.35, rho=900.0)
 BAR = fi.Beam.rectangular(WOOD, width=0.05, height=0.012)
+LINE = fi.mesh.line(0.35)
+ON_LINE = fi.assemble(LINE, BAR)
 
 
 def again(found, mesh, whole, modes, **held):
@@ -24,12 +26,11 @@ def again(found, mesh, whole, modes, **held):
 
 
 def test_a_bar_is_tuned_by_one_groove_where_least_does_most():
-    mesh = fi.mesh.line(0.35)
-    found = fi.tune(fi.assemble(mesh, BAR), {1: "-20 cents", 2: None}, mirror="x")
+    found = fi.tune(ON_LINE, {1: "-20 cents", 2: None}, mirror="x")
     first, second = found.tones
     assert found.met and len(found.patches) == 1
     assert_allclose(first.off, 20.0, rtol=1e-9)
-    assert_allclose([first.after, second.after], again(found, mesh, BAR, [1, 2]), rtol=1e-7)  # tolerance / 100
+    assert_allclose([first.after, second.after], again(found, LINE, BAR, [1, 2]), rtol=1e-7)  # tolerance / 100
     assert abs(first.left) < 1.0
     (patch,) = found.patches
     assert np.abs(patch.at - 0.175).max() < 0.02  # the middle bends most
@@ -38,21 +39,14 @@ def test_a_bar_is_tuned_by_one_groove_where_least_does_most():
     assert_allclose(patch.by_slopes, patch.cents, rtol=0.05)  # a hundredth of the height is taken off
 
 
-def test_the_map_adds_up_to_what_a_uniform_removal_does():
-    bar = fi.assemble(fi.mesh.line(0.35), BAR)
-    found = fi.tune(bar, {1: "-5 cents"})
+def test_the_map_adds_up_to_a_uniform_removal_and_a_single_patch_tells_what_it_does():
+    found = fi.tune(ON_LINE, {1: "-5 cents", 2: None})
     volume = 0.05 * np.trapezoid(found.map[:, 0], found.points[:, 0])  # dishes overlap to a constant, but at the ends
     assert_allclose(volume, -PER_CENT / 0.012, rtol=0.02)
-
-
-def test_a_single_patch_tells_what_it_does():
-    bar = fi.assemble(fi.mesh.line(0.35), BAR)
-    found = fi.tune(bar, {1: "-5 cents", 2: None})
     patch = found.patch((0.02,), 0.1e-3, radius=0.03)
     less = removal.thinner(BAR, Dishes(np.array([[0.02]]), np.array([0.1e-3]), 0.03).depth)
-    exact = fi.find_modes(fi.assemble(fi.mesh.line(0.35), less), n_modes=4).frequencies[2:]
-    before = np.array([each.before for each in found.tones])
-    assert_allclose(patch.cents, 1200.0 * np.log2(exact / before), rtol=1e-6)
+    exact = fi.find_modes(fi.assemble(LINE, less), n_modes=4).frequencies[2:]
+    assert_allclose(patch.cents, 1200.0 * np.log2(exact / [each.before for each in found.tones]), rtol=1e-6)
     assert (patch.cents > 0.0).all()  # the end is lighter
     with pytest.raises(ValueError, match="at must lie on the body"):
         found.patch((0.5,), 1e-4)
@@ -60,39 +54,41 @@ def test_a_single_patch_tells_what_it_does():
 
 def test_a_straight_bar_becomes_a_marimba_bar():
     """Tuned 1 : 4 : 10 as `studies/design_marimba.py` does with one curve, here by grooves in pairs."""
-    mesh = fi.mesh.line(0.35)
-    whole = fi.Beam.rectangular(WOOD, width=0.055, height=0.022)
-    wanted = {1: 261.63, 2: "ratio 4", 3: "ratio 10"}
-    bar = fi.assemble(mesh, whole, theory="timoshenko")
+    whole, wanted = fi.Beam.rectangular(WOOD, width=0.055, height=0.022), {1: 261.63, 2: "ratio 4", 3: "ratio 10"}
+    bar = fi.assemble(LINE, whole, theory="timoshenko")
     found = fi.tune(bar, wanted, mirror="x", depth=0.0185, radius=0.06)
     assert found.met and len(found.patches) <= 3
-    solved = again(found, mesh, whole, [1, 2, 3], theory="timoshenko")
+    solved = again(found, LINE, whole, [1, 2, 3], theory="timoshenko")
     exact = np.array([261.63, 4.0 * solved[0], 10.0 * solved[0]])
     assert np.abs(1200.0 * np.log2(solved / exact)).max() < 1.0
     assert removal.thickness(found.section, np.array([[0.175]]))[0] > 0.022 - 0.0185
 
 
 def test_what_cannot_be_reached_is_said():
-    bar = fi.assemble(fi.mesh.line(0.35), BAR)
     with pytest.warns(fi.ToleranceWarning, match=r"mode 1 stays -.* cents from C6.*; allow more depth or patches"):
-        found = fi.tune(bar, {1: "C6"}, depth=1e-3)
+        found = fi.tune(ON_LINE, {1: "C6"}, depth=1e-3)
     assert not found.met and "MISSED" in found.summary()
     assert found.tones[0].left > found.tones[0].off  # as far as it goes
 
 
-def test_arguments_are_checked():
-    bar = fi.assemble(fi.mesh.line(0.35), BAR)
-    with pytest.raises(ValueError, match=r"depth must be less than the thickness, 0\.012 m, got 0\.02 m"):
-        fi.tune(bar, {1: "-5 cents"}, depth=0.02)
-    with pytest.raises(ValueError, match="mirror must be one of x, got 'y'"):
-        fi.tune(bar, {1: "-5 cents"}, mirror="y")
-    with pytest.raises(ValueError, match=r"radius must lie between 0\.0233333 and 0\.35 m"):
-        fi.tune(bar, {1: "-5 cents"}, radius=1e-3)
+@pytest.mark.parametrize(
+    "body, how, words",
+    [
+        (ON_LINE, {"depth": 0.02}, r"depth must be less than the thickness, 0\.012 m, got 0\.02 m"),
+        (ON_LINE, {"mirror": "y"}, "mirror must be one of x, got 'y'"),
+        (ON_LINE, {"radius": 1e-3}, r"radius must lie between 0\.0233333 and 0\.35 m"),
+        ("studies/scenes/heavy_plate.toml", {}, r"\[target\] must not state mass, .*; leave them out"),
+    ],
+)
+def test_arguments_are_checked(body, how, words):
+    with pytest.raises(ValueError, match=words):
+        fi.tune(body, {1: "-5 cents"}, **how)
+
+
+def test_pitches_of_the_command_are_in_order_or_by_mode():
+    assert tuning.given(["A4", "A5"]) == ["A4", "A5"] and tuning.given(["2=A5", "3="]) == {2: "A5", 3: None}
     with pytest.raises(ValueError, match="--pitch must be MODE=PITCH, as in 2=A5"):
         tuning.given(["A4", "2=A5"])
-    assert tuning.given(["A4", "A5"]) == ["A4", "A5"] and tuning.given(["2=A5", "3="]) == {2: "A5", 3: None}
-    with pytest.raises(ValueError, match=r"\[target\] must not state mass, .*; leave them out"):
-        fi.tune("studies/scenes/heavy_plate.toml", {1: "-5 cents"})
 
 
 def outline(rng):

@@ -38,7 +38,7 @@ def test_symmetric_layers_need_no_plane():
     plate = fi.Plate.laminate([(CARBON, 1e-3, angle) for angle in (0.3, -0.3, -0.3, 0.3)])
     system = fi.assemble(fi.mesh.rectangle(0.3, 0.2), plate, {"boundary": "hinged"})
     forced = fi.assemble(fi.mesh.rectangle(0.3, 0.2), plate, {"boundary": "hinged"}, theory="shallow")
-    thin, shell = (fi.find_modes(each, n_modes=6, tolerance=1e-5).omega for each in (system, forced))
+    thin, shell = (fi.find_modes(each, n_modes=3, tolerance=1e-5).omega for each in (system, forced))
     assert system.theory == "kirchhoff"
     np.testing.assert_allclose(thin, shell, rtol=2e-5)
 
@@ -60,21 +60,16 @@ def test_the_core_of_a_sandwich_gives_by_shear():
     assert (thin / thick) ** 2 == pytest.approx(1.0 + D * square / panel.shear(ORIGIN)[0, 0, 0], rel=2e-2)
 
 
-def test_a_blow_on_plywood_is_computed():
-    birch = fi.Material.orthotropic(E_along=13e9, E_across=0.7e9, nu=0.4, G=0.8e9, rho=640.0)
-    plywood = fi.Plate.laminate([(birch, 1e-3, 0.0), (birch, 1e-3, np.pi / 2.0), (birch, 1e-3, 0.0)])
-    system = fi.assemble(fi.mesh.rectangle(0.4, 0.3), plywood, {"boundary": "hinged"})
-    hit = fi.strike(system, fi.Striker.rigid(5e-3), fi.Contact.hertz(1e7), at=(0.13, 0.1), speed=1.0, tolerance=1e-2)
-    assert hit.tolerance_met and 0.0 < hit.restitution < 1.0
+UNEVEN = fi.Plate.laminate([(ALUMINIUM, 1e-3, 0.0), (CARBON, 1e-3, 0.0)])
 
 
-def test_what_no_layers_can_be_is_refused_by_name():
-    with pytest.raises(ValueError, match=r"layers\[1\] must be \(material, thickness in m, angle in rad\)"):
-        fi.Plate.laminate([(ALUMINIUM, 1e-3, 0.0), (ALUMINIUM, 1e-3)])
-    with pytest.raises(ValueError, match=r"thickness of layers\[0\] must be positive"):
-        fi.Plate.laminate([(ALUMINIUM, -1e-3, 0.0)])
-    plate = fi.Plate.laminate([(ALUMINIUM, 1e-3, 0.0), (CARBON, 1e-3, 0.0)])
-    with pytest.raises(ValueError, match="thickness must be that of the layers; make a plate of layers by"):
-        fi.Plate(plate.material, 1e-3, layers=plate.layers)
-    with pytest.raises(ValueError, match="material must be that of the layers"):
-        fi.Plate(ALUMINIUM, 2e-3, layers=plate.layers)
+@pytest.mark.parametrize(("make", "given", "words"), [
+    (fi.Plate.laminate, ([(ALUMINIUM, 1e-3, 0.0), (ALUMINIUM, 1e-3)],),
+     r"layers\[1\] must be \(material, thickness in m, angle in rad\)"),
+    (fi.Plate.laminate, ([(ALUMINIUM, -1e-3, 0.0)],), r"thickness of layers\[0\] must be positive"),
+    (fi.Plate, (UNEVEN.material, 1e-3), "thickness must be that of the layers; make a plate of layers by"),
+    (fi.Plate, (ALUMINIUM, 2e-3), "material must be that of the layers"),
+])  # fmt: skip
+def test_what_no_layers_can_be_is_refused_by_name(make, given, words):
+    with pytest.raises(ValueError, match=words):
+        make(*given, **{"layers": UNEVEN.layers} if make is fi.Plate else {})

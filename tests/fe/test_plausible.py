@@ -44,26 +44,6 @@ def plate(thickness=3e-3, **changes):
     return fi.Plate(fi.Material(**{**STEEL, **changes}), thickness)
 
 
-@pytest.mark.parametrize(
-    "make, words",
-    [
-        (lambda: fi.analytic.rectangle(465, 300, section=plate(), n_modes=4), "465 m is larger than anything"),
-        (lambda: fi.analytic.rectangle(0.465, 0.3, section=plate(0.5), n_modes=4), "thickness 0.5 m is 1.67 times"),
-        (lambda: fi.analytic.disk(120.0, section=plate(), n_modes=4), "240 m is larger"),
-        (lambda: fi.analytic.disk(0.1, section=plate(rho=7.85), n_modes=4), "density 7.85"),
-        (lambda: fi.analytic.disk(0.1, section=plate(), n_modes=4, damping_ratio=5), "damping_ratio = 5 is more than"),
-        (lambda: fi.analytic.disk(0.1, section=plate(), n_modes=4).damped(0.5), "damping_ratio = 0.5"),
-        (lambda: elements(fi.mesh.rectangle(0.3, 0.2), plate(E=210.0)), "E = 210 Pa"),
-        (lambda: elements(fi.mesh.rectangle(300, 200), plate()), "300 m is larger"),
-        (lambda: elements(fi.mesh.rectangle(0.3, 0.2), plate(3.0)), "thickness 3 m is 15 times the shortest side"),
-        (lambda: elements(fi.mesh.line(0.3), beam(height=0.2)), "height 0.2 m is 0.667 times the length, 0.3 m"),
-    ],
-)
-def test_a_slip_in_a_body_is_noted_by_closed_forms_and_by_elements(make, words):
-    (note,) = make().notes
-    assert words in note
-
-
 def beam(height):
     return fi.Beam.rectangular(fi.Material(**STEEL), width=0.02, height=height)
 
@@ -72,74 +52,79 @@ def elements(mesh, section):
     return fi.find_modes(fi.assemble(mesh, section, supports={"boundary": "hinged"}), n_modes=4)
 
 
+def disk(section=None, radius=0.1, **more):
+    return fi.analytic.disk(radius, section=section or plate(), n_modes=4, **more)
+
+
+SMALL = fi.mesh.rectangle(0.3, 0.2)
+WOOD = {"E_along": 12e9, "E_across": 1e9, "nu": 0.3, "G": 0.8e9, "rho": 700.0}
+OAK = fi.Material.orthotropic(**WOOD)
+
+
+@pytest.mark.parametrize("make, words", [
+    (lambda: fi.analytic.rectangle(465, 300, section=plate(), n_modes=4), "465 m is larger than anything"),
+    (lambda: fi.analytic.rectangle(0.465, 0.3, section=plate(0.5), n_modes=4), "thickness 0.5 m is 1.67 times"),
+    (lambda: disk(radius=120.0), "240 m is larger"),
+    (lambda: disk(plate(rho=7.85)), "density 7.85"),
+    (lambda: disk(damping_ratio=5), "damping_ratio = 5 is more than"),
+    (lambda: disk().damped(0.5), "damping_ratio = 0.5"),
+    (lambda: elements(SMALL, plate(E=210.0)), "E = 210 Pa"),
+    (lambda: elements(fi.mesh.rectangle(300, 200), plate()), "300 m is larger"),
+    (lambda: elements(SMALL, plate(3.0)), "thickness 3 m is 15 times the shortest side"),
+    (lambda: elements(fi.mesh.line(0.3), beam(height=0.2)), "height 0.2 m is 0.667 times the length, 0.3 m"),
+    (lambda: elements(SMALL, fi.Plate.laminate([(OAK, 1e-3, angle) for angle in (0.0, 90.0, 0.0)])),
+     "90 degrees are 1.571"),
+])  # fmt: skip
+def test_a_slip_in_a_body_is_noted_by_closed_forms_and_by_elements(make, words):
+    (note,) = make().notes
+    assert words in note
+
+
 def test_everyday_bodies_get_no_note():
-    assert elements(fi.mesh.rectangle(0.3, 0.2), plate()).notes == ()
-    assert elements(fi.mesh.line(0.3), beam(0.01)).notes == ()
-    assert fi.analytic.disk(0.1, section=plate(), n_modes=4, damping_ratio=0.02).notes == ()
-    assert fi.Striker.sphere(fi.Material(**STEEL), 0.01).notes == ()
+    bodies = elements(SMALL, plate()), elements(fi.mesh.line(0.3), beam(0.01)), disk(damping_ratio=0.02)
+    replaced = disk(damping_ratio=5).damped(0.05)  # a new ratio replaces the note on the old one
+    assert [each.notes for each in (*bodies, fi.Striker.sphere(fi.Material(**STEEL), 0.01), replaced)] == [()] * 5
 
 
 @pytest.mark.parametrize(
     "theory, told, expected", [("kirchhoff", {}, 0), ("mindlin", {}, 1), ("mindlin", {"G_yz": 4e7}, 0)]
 )
 def test_wood_whose_rolling_shear_modulus_is_taken_for_that_in_the_plane_is_noted(theory, told, expected):
-    wood = fi.Material.orthotropic(E_along=11e9, E_across=0.8e9, nu=0.37, G=0.7e9, rho=430.0, **told)
+    wood = fi.Material.orthotropic(**WOOD, **told)
     notes = fi.assemble(fi.mesh.rectangle(0.3, 0.2, size=0.2), fi.Plate(wood, 0.01), theory=theory).notes
     assert len(notes) == expected
-    assert all("G_yz is not stated and taken as that in the plane, G = 7e+08 Pa" in note for note in notes)
+    assert all("G_yz is not stated and taken as that in the plane, G = 8e+08 Pa" in note for note in notes)
 
 
-def test_a_new_damping_ratio_replaces_the_note_on_the_old_one():
-    slipped = fi.analytic.disk(0.1, section=plate(), n_modes=4, damping_ratio=5)
-    assert slipped.damped(0.05).notes == ()
-
-
-def test_a_blow_on_a_support_is_noted_and_one_beside_it_is_not():
-    modes = fi.analytic.rectangle(0.3, 0.2, section=plate(), n_modes=40)
-    rigid, law = fi.Striker.rigid(0.01), fi.Contact.linear(1e6)
+def test_a_blow_on_a_support_its_speed_and_its_sphere_are_noted():
+    modes, law = fi.analytic.rectangle(0.3, 0.2, section=plate(), n_modes=40), fi.Contact.linear(1e6)
+    rigid, ball = fi.Striker.rigid(0.01), fi.Striker.sphere(fi.Material(210.0, 0.3, 7850.0), 0.01)
     (note,) = fi.strike(modes, rigid, law, at=(0.0, 0.0), speed=1.0).notes
     assert note == "the point struck, (0, 0) m, cannot move: it lies on a support, and the blow is that on a wall"
-    assert fi.strike(modes, rigid, law, at=(0.003, 0.002), speed=1.0, tolerance=0.1).notes == ()
-
-
-def test_the_speed_and_the_sphere_of_a_blow_are_noted():
-    modes = fi.analytic.rectangle(0.3, 0.2, section=plate(), n_modes=40)
-    ball = fi.Striker.sphere(fi.Material(210.0, 0.3, 7850.0), 0.01)
-    hit = fi.strike(modes, ball, fi.Contact.linear(1e6), at=(0.1, 0.1), speed=2000.0, tolerance=0.1)
+    assert fi.strike(modes, rigid, law, at=(0.003, 0.002), speed=1.0, tolerance=0.1).notes == ()  # beside it
+    hit = fi.strike(modes, ball, law, at=(0.1, 0.1), speed=2000.0, tolerance=0.1)
     assert np.array([[word in note for word in ("E = 210 Pa", "speed 2000 m/s")] for note in hit.notes]).any(0).all()
     assert "Note: speed 2000 m/s is as fast as a bullet" in hit.summary()
 
 
 @pytest.mark.parametrize(("share", "thick"), [(0.25, False), (0.45, True)])
 def test_a_plate_of_nearly_half_its_side_is_noted_as_thick(share, thick):
-    assert (
-        "times the shortest side" in " ".join(elements(fi.mesh.rectangle(0.3, 0.2), plate(0.2 * share)).notes)
-    ) == thick
+    notes = elements(SMALL, plate(0.2 * share)).notes
+    assert any("times the shortest side" in note for note in notes) == thick
 
 
-@pytest.mark.parametrize(
-    "slip, words",
-    [
-        ({"height": 8.0}, r"height 8 m of ribs\[1\] is 26.7 times the shortest side, 0.3 m; m are expected"),
-        ({"width": 3.0}, r"width 3 m of ribs\[1\]"),
-        ({"offset": -5.0}, r"offset -5 m of ribs\[1\] is 16.7 times"),
-        ({"y": 0.1}, r"ribs\[1\] lies where ribs\[0\] does, and both count"),
-    ],
-)
+@pytest.mark.parametrize("slip, words", [
+    ({"height": 8.0}, r"height 8 m of ribs\[1\] is 26.7 times the shortest side, 0.3 m; m are expected"),
+    ({"width": 3.0}, r"width 3 m of ribs\[1\]"),
+    ({"offset": -5.0}, r"offset -5 m of ribs\[1\] is 16.7 times"),
+    ({"y": 0.1}, r"ribs\[1\] lies where ribs\[0\] does, and both count"),
+    ({"y": 0.1, "offset": 5e-3}, None),
+])  # fmt: skip
 def test_a_slip_in_a_rib_is_noted(slip, words):
-    steel = fi.Material(**STEEL)
-
     def rib(y=0.2, width=3e-3, height=8e-3, offset=None):
-        return fi.Rib([(0.0, y), (0.4, y)], fi.Beam.rectangular(steel, width=width, height=height), offset)
+        section = fi.Beam.rectangular(fi.Material(**STEEL), width=width, height=height)
+        return fi.Rib([(0.0, y), (0.4, y)], section, offset)
 
-    mesh, plate = fi.mesh.rectangle(0.4, 0.3), fi.Plate(steel, 2e-3)
-    (note,) = fi.assemble(mesh, plate, {"boundary": "hinged"}, ribs=[rib(y=0.1), rib(**slip)]).notes
-    assert re.search(words, note)
-    assert fi.assemble(mesh, plate, {"boundary": "hinged"}, ribs=[rib(y=0.1), rib(y=0.1, offset=5e-3)]).notes == ()
-
-
-def test_a_slip_in_a_layer_is_noted():
-    oak = fi.Material.orthotropic(E_along=12e9, E_across=1e9, nu=0.3, G=0.8e9, rho=700.0)
-    crossed = fi.Plate.laminate([(oak, 1e-3, 0.0), (oak, 1e-3, 90.0), (oak, 1e-3, 0.0)])
-    (note,) = fi.assemble(fi.mesh.rectangle(0.4, 0.3), crossed, {"boundary": "hinged"}).notes
-    assert "90 degrees are 1.571" in note
+    ribs = [rib(y=0.1), rib(**slip)]
+    notes = fi.assemble(fi.mesh.rectangle(0.4, 0.3), plate(2e-3), {"boundary": "hinged"}, ribs=ribs).notes
+    assert len(notes) == (words is not None) and all(re.search(words, note) for note in notes)

@@ -5,6 +5,7 @@ import functools
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
+from references_plates import levy, rigidity
 
 import fem_impact as fi
 from fem_impact.fe import point_load
@@ -19,7 +20,6 @@ def finite_elements(mesh, supports, points, section=PLATE):
     return modes.shapes.compliance(np.array(points))
 
 
-# At every kind of edge, from the middle to the edge itself, at a vertex of the rim, in mid-facet and between.
 @functools.cache
 def disk_of(edge):
     """The same disk by closed form and by finite elements."""
@@ -27,19 +27,19 @@ def disk_of(edge):
     return exact, fi.find_modes(fi.assemble(fi.mesh.disk(0.2), PLATE, supports={"boundary": edge}), n_modes=6)
 
 
-RARE = [pytest.param(place, marks=pytest.mark.slow) for place in (0.97, 0.99, 0.9999)]
+RARE = [pytest.param(place, marks=pytest.mark.slow) for place in (0.97, 0.9999)]
 
 
 @pytest.mark.xdist_group("disks")
 @pytest.mark.parametrize("edge", KINDS)
-@pytest.mark.parametrize("place", [0.0, 0.5, 0.999, 1.0, *RARE])
+@pytest.mark.parametrize("place", [0.0, 0.999, 1.0, *RARE])
 def test_disk(edge, place):
     exact, modes = disk_of(edge)
     system = modes.shapes.system
     ends = system.mesh.points[system.mesh.facets[0]]
     angle = np.arctan2(ends[:, 1], ends[:, 0])
     turn = (angle[1] - angle[0] + np.pi) % (2.0 * np.pi) - np.pi
-    for share in (0.0, 0.5, 0.3):
+    for share in (0.0, 0.5, 0.3):  # at a vertex of the rim, in mid-facet and between
         direction = angle[0] + share * turn
         point = place * 0.2 * np.array([[np.cos(direction), np.sin(direction)]])
         found, expected = (one.shapes.compliance(point)[0, 0] for one in (modes, exact))
@@ -64,90 +64,29 @@ def test_deflection_elsewhere():
         assert_allclose(modes.shapes.compliance(points), exact.compliance(points), atol=2e-5 * scale)
 
 
-def levy(edges, length, width, points, section=PLATE, n_terms=40_000):
-    """Static compliance (n,) of a plate hinged at x = 0 and length, its edges y = 0, width as told, by Levy's series.
-
-    Timoshenko and Woinowsky-Krieger, Theory of plates and shells, art. 35 and 47 to 49; per sine across the length an
-    infinite strip's deflection and four functions that decay from the edges.
-    """
-    C = section.stiffness(np.zeros((1, 2)))[0]
-    D, nu = C[0, 0], C[0, 1] / C[0, 0]
-    m = np.arange(1, n_terms + 1)
-    beta = m * np.pi / length
-
-    def strip(s):
-        """(1 + z) exp(-z) / 4 of z = beta abs(s), and its derivatives over beta**k by s."""
-        z, sign = beta * np.abs(s), 1.0 if s >= 0.0 else -1.0
-        e = np.exp(-z)
-        return [0.25 * (1 + z) * e, -0.25 * sign * z * e, 0.25 * (z - 1) * e, 0.25 * sign * (2 - z) * e]
-
-    def decaying(z, sign):
-        """Derivatives over beta**k of exp(-z) and z exp(-z), z growing with the sign along y."""
-        e = np.exp(-z)
-        return [[(-sign) ** k * e, (-sign) ** k * (z - k) * e] for k in range(4)]
-
-    def conditions(kind, jets):
-        w, dw, d2w, d3w = jets
-        return {"clamped": [w, dw], "hinged": [w, d2w], "free": [d2w - nu * w, d3w - (2 - nu) * dw]}[kind]
-
-    values = []
-    for x, y0 in points:
-        rows, right = [], []
-        for kind, y in zip(edges, (0.0, width)):
-            near, far = decaying(beta * y, 1.0), decaying(beta * (width - y), -1.0)
-            columns = [[jet[i] for jet in side] for side in (near, far) for i in range(2)]
-            rows += list(np.array([conditions(kind, column) for column in columns]).transpose(1, 0, 2))
-            right += [-value for value in conditions(kind, strip(y - y0))]
-        matrix, vector = np.array(rows).transpose(2, 0, 1), np.array(right).T
-        weights = np.linalg.solve(matrix, vector[..., None])[..., 0]
-        e, f = np.exp(-beta * y0), np.exp(-beta * (width - y0))
-        shapes = np.column_stack([e, beta * y0 * e, f, beta * (width - y0) * f])
-        each = (0.25 + (weights * shapes).sum(axis=1)) * 2.0 / length / (beta**3 * D)
-        total = (each * np.sin(beta * x) ** 2).sum()
-        tail = each[-1] * n_terms**3 / (2.0 * n_terms * (n_terms + 1.0)) * 0.5  # the mean square of the sines
-        values.append(total + tail)
-    return np.array(values)
-
-
-MORE = [pytest.param((edge, "free"), marks=pytest.mark.slow) for edge in ("clamped", "hinged")]
-MORE += [pytest.param(("clamped", "clamped"), marks=pytest.mark.slow)]
-
-
 # Straight edges of every kind, on them, beside them and in the corners.
-@pytest.mark.parametrize("edges", [("free", "free"), *MORE])
-def test_plates_hinged_at_two_sides(edges):
-    length, width = 0.3, 0.2
-    inside = [(0.15, 0.1), (0.11, 0.07), (0.02, 0.16)]
-    beside = [(0.15, 0.2 - d) for d in (2e-5, 2e-4, 2e-3, 6e-3)] + [(0.15, 2e-3), (3e-4, 0.2 - 2e-4), (0.003, 0.197)]
-    on = [(0.15, 0.2), (0.07, 0.2), (0.0123, 0.2)] if edges[1] == "free" else []
-    points = np.array(inside + beside + on)
+@pytest.mark.parametrize("edges", [
+    ("free", "free"), ("hinged", "hinged"), *(pytest.param(edges, marks=pytest.mark.slow) for edges in (
+        ("clamped", "free"), ("hinged", "free"), ("clamped", "clamped"))),
+])  # fmt: skip
+def test_plates_hinged_at_two_sides_have_levys_compliance(edges):
+    length, width, nu = 0.3, 0.2, 0.33
+    points = [(0.15, 0.1), (0.11, 0.07), (0.02, 0.16), (0.15, 2e-3), (3e-4, width - 2e-4), (0.003, width - 3e-3)]
+    points += [(0.15, width - d) for d in (2e-5, 2e-4, 2e-3, 6e-3)]
+    points += [(0.15, width), (0.07, width), (0.0123, width)] if edges[1] == "free" else []
     supports = {"left": "hinged", "right": "hinged", "bottom": edges[0], "top": edges[1]}
     modes = fi.find_modes(fi.assemble(fi.mesh.rectangle(length, width), PLATE, supports=supports), n_modes=20)
-    expected = levy(edges, length, width, points)
-    found = np.array([modes.shapes.compliance(point[None])[0, 0] for point in points])
-    claim = np.array([modes.shapes.compliance_error(point[None])[0] for point in points])
-    assert_allclose(
-        found, expected, rtol=5e-6
-    )  # 1e-7 and, beside held edges, 2e-6 measured; the series is good to 1e-8
-    assert (np.abs(found / expected - 1.0) < 3.0 * claim).all()
-    for point in points:  # and what twenty modes leave of it is positive, as it must be
-        assert modes.residual_compliance(point[None])[0, 0] > 0.0
-
-
-def test_hinged_rectangle():
-    points = [[0.465, 0.3], [0.8, 0.5], [0.2, 0.15], [0.05, 0.5], [1e-4, 2e-4]]
-    exact = analytic.rectangle(1.55, 1.0, section=PLATE, n_modes=6).shapes
-    for size in (0.25, 0.06):
-        body = fi.mesh.rectangle(1.55, 1.0, size=size)
-        modes = fi.find_modes(fi.assemble(body, PLATE, supports={"boundary": "hinged"}), n_modes=6)
-        for point in np.array(points)[:, None]:
-            found = modes.shapes.compliance(point)
-            assert_allclose(found, exact.compliance(point), rtol=1e-5)  # 1e-6 measured, 4e-6 at the corner
+    for point in points:
+        expected = levy(edges, length, width, nu, point, point) / rigidity(70e9, nu, 2e-3)
+        found = modes.shapes.compliance(np.array([point]))[0, 0]
+        # 1e-7 and, beside held edges, 2e-6 measured
+        assert abs(found / expected - 1.0) < min(5e-6, 3.0 * modes.shapes.compliance_error(np.array([point]))[0])
+        assert modes.residual_compliance(np.array([point]))[0, 0] > 0.0  # what twenty modes leave of it
 
 
 def test_a_body_hinged_at_one_edge_balances_its_load_by_turning():
-    found = finite_elements(fi.mesh.rectangle(1.0, 0.8, size=0.1), {"left": "hinged"}, [[0.5, 0.4]])
-    finer = finite_elements(fi.mesh.rectangle(1.0, 0.8, size=0.05), {"left": "hinged"}, [[0.5, 0.4]])
+    meshes = (fi.mesh.rectangle(1.0, 0.8, size=size) for size in (0.1, 0.05))
+    found, finer = (finite_elements(mesh, {"left": "hinged"}, [[0.5, 0.4]]) for mesh in meshes)
     assert_allclose(found, finer, rtol=2e-6)  # the coarser mesh's smooth part; 2e-7 measured
 
 
@@ -193,9 +132,8 @@ def test_varying_thickness_needs_no_twin():
 
 @pytest.mark.slow
 def test_springs_tension_and_masses_are_part_of_it():
-    mesh = fi.mesh.rectangle(0.3, 0.2)
-    held = finite_elements(mesh, {"boundary": "hinged"}, [[0.1, 0.07]])
-    sprung = finite_elements(mesh, {"boundary": fi.Elastic(1e12)}, [[0.1, 0.07]])
+    edges = ("hinged", fi.Elastic(1e12))
+    held, sprung = (finite_elements(fi.mesh.rectangle(0.3, 0.2), {"boundary": edge}, [[0.1, 0.07]]) for edge in edges)
     assert_allclose(sprung, held, rtol=1e-4)  # what the springs give: 1e-5
     skin = fi.Plate(fi.Material(E=3.5e9, nu=0.38, rho=1380.0), thickness=2e-4, tension=300.0)
     values = [
@@ -208,13 +146,14 @@ def test_springs_tension_and_masses_are_part_of_it():
 
 
 def test_modes_softer_than_the_body_are_an_error():
-    modes = fi.find_modes(fi.assemble(fi.mesh.rectangle(0.3, 0.2), PLATE, supports={"boundary": "hinged"}), n_modes=20)
+    body, blow = (PLATE, {"boundary": "hinged"}), (fi.Striker.rigid(0.02), fi.Contact.linear(1e5))
+    modes = fi.find_modes(fi.assemble(fi.mesh.rectangle(0.3, 0.2), *body), n_modes=20)
     wrong = fi.Modes(0.5 * modes.omega, modes.damping_ratio, modes.shapes, modes.mass)
     with pytest.raises(fi.SimulationError, match=r"softer at \(0.1, 0.07\) m than the whole body"):
-        fi.strike(wrong, fi.Striker.rigid(0.02), fi.Contact.linear(1e5), at=(0.1, 0.07), speed=1.0)
-    fine = fi.assemble(fi.mesh.rectangle(0.3, 0.2, size=0.05), PLATE, supports={"boundary": "hinged"})
-    found = fi.find_modes(fine, n_modes=20)  # "find the modes on a finer mesh": of this body, this time
-    assert fi.strike(found, fi.Striker.rigid(0.02), fi.Contact.linear(1e5), at=(0.1, 0.07), speed=1.0).n_impacts
+        fi.strike(wrong, *blow, at=(0.1, 0.07), speed=1.0)
+    # "find the modes on a finer mesh": of this body, this time
+    found = fi.find_modes(fi.assemble(fi.mesh.rectangle(0.3, 0.2, size=0.05), *body), n_modes=20)
+    assert fi.strike(found, *blow, at=(0.1, 0.07), speed=1.0).n_impacts
 
 
 def test_wood_as_stiff_across_as_along_is_isotropic():

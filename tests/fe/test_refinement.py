@@ -17,8 +17,7 @@ def wavenumber(frequency):
     return (2700.0 * 2e-3 / D) ** 0.25 * np.sqrt(2.0 * np.pi * frequency)
 
 
-@pytest.mark.parametrize("n_modes", [200, 1000])
-@pytest.mark.parametrize("edge", ["clamped", "hinged", "free"])
+@pytest.mark.parametrize(("edge", "n_modes"), [("clamped", 200), ("hinged", 200), ("free", 200), ("free", 1000)])
 def test_the_wave_of_the_last_mode_follows_weyls_law_with_its_edge_term(edge, n_modes):
     exact = wavenumber(fi.analytic.disk(0.4, edge=edge, section=PLATE, n_modes=n_modes).frequencies[-1])
     found = refinement._wave(fi.assemble(fi.mesh.disk(0.4), PLATE, {"boundary": edge}), n_modes, None)
@@ -28,20 +27,9 @@ def test_the_wave_of_the_last_mode_follows_weyls_law_with_its_edge_term(edge, n_
 def test_the_wave_of_a_frequency_is_that_of_bending_waves():
     system = fi.assemble(fi.mesh.rectangle(0.5, 0.3), PLATE, {"left": "clamped"})
     assert_allclose(refinement._wave(system, None, 2e3), wavenumber(2e3), rtol=1e-12)
-    wood = fi.Material.orthotropic(E_along=11e9, E_across=0.8e9, nu=0.3, G=0.7e9, rho=450.0)
-    soft = fi.assemble(fi.mesh.rectangle(0.5, 0.3), fi.Plate(wood, 3e-3))
-    across = 0.8e9 / (1.0 - 0.3**2 * 0.8 / 11.0) * 3e-3**2 / 12.0 / 450.0  # D / m'' of the softest direction
-    assert refinement._wave(soft, None, 2e3) >= 0.999 * (2.0 * np.pi * 2e3) ** 0.5 / across**0.25
 
 
-@pytest.mark.parametrize("error", [1e-3, 1e-6, 1e-10])
-def test_wave_per_element_has_the_error_asked_for(error):
-    kh = refinement._wave_per_element(error)
-    factor, bend = refinement.ERROR_OF_WAVE
-    assert_allclose(factor * kh**8 / (1.0 + (kh / bend) ** 3), error, rtol=1e-9)
-
-
-@pytest.mark.parametrize("tolerance", [1e-4, 1e-6, 1e-8])
+@pytest.mark.parametrize("tolerance", [1e-4, 1e-8])
 def test_elements_of_the_size_for_a_tolerance_meet_it_on_a_smooth_plate(tolerance):
     """The hinged rectangle, exact; its elements are not a hundred times finer than needed either."""
     system = fi.assemble(fi.mesh.rectangle(0.5, 0.3), PLATE, {"boundary": "hinged"})
@@ -54,7 +42,7 @@ def test_elements_of_the_size_for_a_tolerance_meet_it_on_a_smooth_plate(toleranc
     assert (error <= 3.0 * found.error).all()
 
 
-@pytest.mark.parametrize("angle", [0.0, 0.4, np.pi / 4.0, 1.2])
+@pytest.mark.parametrize("angle", [0.0, 1.2])
 def test_the_shortest_wave_in_wood_runs_across_the_grain_whatever_its_angle(angle):
     wood = fi.Material.orthotropic(E_along=140e9, E_across=10e9, nu=0.3, G=5e9, rho=1600.0, angle=angle)
     system = fi.assemble(fi.mesh.disk(0.2), fi.Plate(wood, 2e-3), {"boundary": "clamped"})
@@ -117,18 +105,17 @@ def test_a_kept_spectrum_is_read_and_a_damaged_or_foreign_one_replaced(tmp_path,
     assert len(solved) == 5
 
 
-@pytest.mark.parametrize(("thickness", "size", "rho"), [(4e-3, 1.0, 2700.0), (2e-3, 2.0, 2700.0), (2e-3, 1.0, 2800.0)])
-def test_the_kept_spectrum_of_a_body_of_another_size_is_not_taken(tmp_path, thickness, size, rho):
+def test_the_kept_spectrum_of_a_body_of_another_size_is_not_taken(tmp_path):
     """In the frame of the body, the matrices of all these plates are the same numbers."""
 
-    def plate(thickness, size, rho):
+    def omega(thickness=2e-3, size=1.0, rho=2700.0):
         section = fi.Plate(fi.Material(E=70e9, nu=0.33, rho=rho), thickness)
-        return fi.assemble(fi.mesh.rectangle(0.5 * size, 0.3 * size, size=0.1 * size), section, {"left": "clamped"})
+        plate = fi.assemble(fi.mesh.rectangle(0.5 * size, 0.3 * size, size=0.1 * size), section, {"left": "clamped"})
+        return fi.find_modes(plate, n_modes=3, keep=tmp_path / "modes.npz").omega
 
-    fi.find_modes(plate(2e-3, 1.0, 2700.0), n_modes=3, keep=tmp_path / "modes.npz")
-    other = plate(thickness, size, rho)
-    kept = fi.find_modes(other, n_modes=3, keep=tmp_path / "modes.npz")
-    assert_allclose(kept.omega, fi.find_modes(other, n_modes=3).omega, rtol=1e-12)
+    first = omega()
+    for other, factor in (({"thickness": 4e-3}, 2.0), ({"size": 2.0}, 0.25), ({"rho": 2800.0}, (27 / 28) ** 0.5)):
+        assert_allclose(omega(**other), factor * first, rtol=1e-9)  # by the law of thin plates; rounding
 
 
 @pytest.mark.parametrize(("element", "size", "median"), [("argyris", 0.06, (0.8, 2.0)), ("morley", 0.02, (1.7, 4.0))])
@@ -152,7 +139,7 @@ def test_the_number_of_unknowns_is_foretold(theory):
     assert_allclose(refinement.unknowns(system.element, mesh, mesh.size), system.n_dofs, rtol=0.25)
 
 
-@pytest.mark.parametrize("n_modes", [8, 40])
+@pytest.mark.parametrize("n_modes", [40])
 def test_some_modes_are_found_to_a_few_millionths_if_nothing_is_asked(n_modes):
     """Elements are finer than the wave of the last mode asks, as few of them cost little."""
     system = fi.assemble(fi.mesh.rectangle(0.5, 0.3), PLATE, {"boundary": "hinged"})
@@ -164,10 +151,11 @@ def test_some_modes_are_found_to_a_few_millionths_if_nothing_is_asked(n_modes):
 def test_the_edge_layer_of_a_stretched_plate_is_resolved():
     """A clamped disk under so much tension that its edge bends over a hundredth of its radius."""
     plate = fi.Plate(PLATE.material, thickness=5e-4, tension=2e4)
+    system = fi.assemble(fi.mesh.disk(0.3), plate, {"boundary": "clamped"})
+    chosen = system.mesh.size / refinement.size_for(system, 4, None, None)
     coarse, fine = (
         refinement.solve_on_mesh(refinement.reassemble(system, system.mesh.refined(factor)), 4, None).omega
-        for system in [fi.assemble(fi.mesh.disk(0.3), plate, {"boundary": "clamped"})]
-        for factor in [system.mesh.size / refinement.size_for(system, 4, None, None) * k for k in (1.0, 1.7)]
+        for factor in (chosen, 1.7 * chosen)
     )
     assert_allclose(coarse, fine, rtol=4e-4)  # 2.6e-4 was measured
 
@@ -179,7 +167,6 @@ def test_errors_fall_as_the_step_of_refinement_assumes(mesh):
     goal = found.error.max() / 50.0
     step = refinement._needed(found.parts, goal)
     finer = refinement.solve_on_mesh(refinement.reassemble(found.system, mesh.refined(step)), 12, None)
-
     assert 0.3 * goal < finer.error.max() < 3.0 * goal
 
 
@@ -203,15 +190,12 @@ def test_a_tolerance_that_corners_do_not_allow_is_refused_after_few_meshes(monke
     assert len(seen) <= 3 and seen[-1] < 0.1 * refinement.MOST_UNKNOWNS
 
 
-def test_units_are_doubted_only_where_one_looks_like_a_slip(monkeypatch):
+@pytest.mark.parametrize(("thickness", "words"), [
+    (2e-3, "no tolerance up to 1e-09 is, or ask"), (2.0, "check the units, as thickness 2 m "),
+])  # fmt: skip
+def test_units_are_doubted_only_where_one_looks_like_a_slip(monkeypatch, thickness, words):
     monkeypatch.setattr(refinement, "MOST_UNKNOWNS", 100)
     monkeypatch.setattr(refinement, "LOOSEST", 1e-9)  # whatever is uncertain is too uncertain
-    for thickness, words in (
-        (2e-3, r"no tolerance up to 1e-09 is, or ask"),
-        (2.0, r"check the units, as thickness 2 m "),
-    ):
-        plate = fi.Plate(PLATE.material, thickness)
-        with pytest.raises(fi.SimulationError, match=words):
-            fi.find_modes(
-                fi.assemble(fi.mesh.rectangle(0.3, 0.2), plate, {"left": "clamped"}), n_modes=4, tolerance=1e-9
-            )
+    body = fi.assemble(fi.mesh.rectangle(0.3, 0.2), fi.Plate(PLATE.material, thickness), {"left": "clamped"})
+    with pytest.raises(fi.SimulationError, match=words):
+        fi.find_modes(body, n_modes=4, tolerance=1e-9)

@@ -17,12 +17,9 @@ def bar(width=3e-3, height=12e-3):
     return fi.Beam.rectangular(ALUMINIUM, width=width, height=height)
 
 
-def omegas(system, n, monkeypatch=None):
-    """Angular frequencies without the inertia of what moves in the plane, as the references have them."""
-    if monkeypatch is not None:
-        monkeypatch.setattr(refinement, "heavier", lambda system, values, vectors: (values, None))
-    found = fi.find_modes(system, n_modes=n, tolerance=1e-5)
-    return found.omega, found.frequency_error
+def panel(*ribs, supports=None, thickness=2e-3, **more):
+    supports = {"boundary": "hinged"} if supports is None else supports
+    return fi.assemble(fi.mesh.rectangle(0.4, 0.3), fi.Plate(ALUMINIUM, thickness), supports, ribs=ribs, **more)
 
 
 def test_a_rib_below_a_strip_makes_a_t_beam():
@@ -42,81 +39,61 @@ def test_a_rib_below_a_strip_makes_a_t_beam():
 
 @pytest.mark.parametrize("width", [1e-6, 3e-3, pytest.param(10e-3, marks=pytest.mark.slow)])
 def test_panels_with_a_rib_are_those_of_ritzs_method(width, monkeypatch):
-    sides, thickness, at = (0.4, 0.3), 2e-3, 0.12
+    """Without the inertia of what moves in the plane, as the reference has them."""
+    thickness, at = 2e-3, 0.12
     rib = rectangular_rib("x", at, width, 12e-3, thickness, E, NU, RHO)
     edges = (("hinged", "sliding"),) * 4
-    panel = Panel(sides, reference.isotropic(E, NU, thickness), RHO * thickness, edges, None, (rib,))
-    exact = np.array([row[0] for row in levy_omegas(panel, 8, Order(2, 16))])
-    path = [(0.0, at), (sides[0], at)]
-    system = fi.assemble(
-        fi.mesh.rectangle(*sides), fi.Plate(ALUMINIUM, thickness), {"boundary": "hinged"}, in_plane=SLIDING,
-        ribs=[fi.Rib(path, bar(width))],
-    )  # fmt: skip
-    found, claimed = omegas(system, 8, monkeypatch)
-    error = np.abs(found / exact - 1.0)
-    assert error.max() < 1e-5
-    assert (error < np.maximum(claimed, 1e-7)).all()
+    body = Panel((0.4, 0.3), reference.isotropic(E, NU, thickness), RHO * thickness, edges, None, (rib,))
+    exact = np.array([row[0] for row in levy_omegas(body, 8, Order(2, 16))])
+    monkeypatch.setattr(refinement, "heavier", lambda system, values, vectors: (values, None))
+    system = panel(fi.Rib([(0.0, at), (0.4, at)], bar(width)), in_plane=SLIDING)
+    found = fi.find_modes(system, n_modes=8, tolerance=1e-5)
+    error = np.abs(found.omega / exact - 1.0)
+    assert error.max() < 1e-5 and (error < np.maximum(found.frequency_error, 1e-7)).all()
 
 
 def test_the_offset_decides_and_its_sign_does_not_on_a_flat_plate():
-    mesh, plate, path = fi.mesh.rectangle(0.4, 0.3), fi.Plate(ALUMINIUM, 2e-3), [(0.0, 0.12), (0.4, 0.12)]
-    first = {}
-    for offset in (None, -7e-3, 7e-3, 0.0, lambda points: np.full(len(points), -7e-3)):
-        system = fi.assemble(mesh, plate, {"boundary": "hinged"}, ribs=[fi.Rib(path, bar(), offset)])
-        first[offset if not callable(offset) else "own"] = fi.find_modes(system, n_modes=1).omega[0]
-    assert first[None] == pytest.approx(first[-7e-3], rel=1e-12) == pytest.approx(first["own"], rel=1e-12)
-    assert first[7e-3] == pytest.approx(first[-7e-3], rel=1e-9)
-    assert first[0.0] < 0.9 * first[None]
+    offsets = (None, lambda points: np.full(len(points), -7e-3), -7e-3, 7e-3, 0.0)
+    ribs = [fi.Rib([(0.0, 0.12), (0.4, 0.12)], bar(), offset) for offset in offsets]
+    first, own, below, above, none = (fi.find_modes(panel(rib), n_modes=1).omega[0] for rib in ribs)
+    assert first == pytest.approx(below, rel=1e-12) == pytest.approx(own, rel=1e-12)
+    assert above == pytest.approx(below, rel=1e-9) and none < 0.9 * first
 
 
 def test_a_tapered_rib_weighs_its_integral_and_a_rib_along_an_edge_its_length():
-    def height(x):
-        return 4e-3 + 20e-3 * x[:, 0]
-
     path = [(0.1, 0.05), (0.1, 0.25), (0.3, 0.25)]  # 0.4 m, with a corner
-    plate = fi.Plate(ALUMINIUM, 2e-3)
-    rib = fi.Rib(path, fi.Beam.rectangular(ALUMINIUM, width=3e-3, height=height))
-    bare = fi.assemble(fi.mesh.rectangle(0.4, 0.3), plate)
-    system = fi.assemble(fi.mesh.rectangle(0.4, 0.3), plate, ribs=[rib])
+    tapered = fi.Beam.rectangular(ALUMINIUM, width=3e-3, height=lambda x: 4e-3 + 20e-3 * x[:, 0])
+    bare, system = (panel(*ribs, supports={}) for ribs in ((), (fi.Rib(path, tapered),)))
     assert system.mass - bare.mass == pytest.approx(RHO * 3e-3 * 0.4 * (4e-3 + 20e-3 * 0.2), rel=1e-9)
-    ring = fi.assemble(fi.mesh.disk(0.1), plate, ribs=[fi.Rib("outer", bar())])
-    area = np.pi * 0.1**2 * 2e-3 + 3e-3 * 12e-3 * 2.0 * np.pi * 0.1
-    assert ring.mass == pytest.approx(RHO * area, rel=1e-6)  # facets follow the circle to length**6
+    ring = fi.assemble(fi.mesh.disk(0.1), fi.Plate(ALUMINIUM, 2e-3), ribs=[fi.Rib("outer", bar())])
+    volume = np.pi * 0.1**2 * 2e-3 + 3e-3 * 12e-3 * 2.0 * np.pi * 0.1
+    assert ring.mass == pytest.approx(RHO * volume, rel=1e-6)  # facets follow the circle to length**6
     assert system.rigid.shape[1] == ring.rigid.shape[1] == 3
 
 
-def test_what_no_rib_can_be_is_refused_by_name():
-    with pytest.raises(ValueError, match="path must have two points or more"):
-        fi.Rib([(0.0, 0.0)], bar())
-    with pytest.raises(ValueError, match="section must be"):
-        fi.Rib([(0.0, 0.0), (1.0, 0.0)], fi.Plate(ALUMINIUM, 1e-3))
-    with pytest.raises(ValueError, match="none of it lies on the body"):
-        fi.assemble(
-            fi.mesh.rectangle(0.4, 0.3), fi.Plate(ALUMINIUM, 2e-3), ribs=[fi.Rib([(1.0, 1.0), (2.0, 1.0)], bar())]
-        )
-    with pytest.raises(ValueError, match="path names edge 'rim'"):
-        fi.assemble(fi.mesh.disk(0.1), fi.Plate(ALUMINIUM, 2e-3), ribs=[fi.Rib("rim", bar())])
-    with pytest.raises(ValueError, match="section must not vary along a rib that follows an edge"):
-        fi.Rib("outer", fi.Beam.rectangular(ALUMINIUM, width=1e-3, height=lambda x: 1e-3 + 0.0 * x[:, 0]))
+TINY = r"path of a rib must lie on edges.* m beside 0.4 m; move its points"
+EVEN = fi.Beam.rectangular(ALUMINIUM, width=1e-3, height=lambda x: 1e-3 + 0.0 * x[:, 0])
 
 
-@pytest.mark.parametrize("path", [[(0.2, 0.1), (0.2, 0.1 + 1e-6)], [(0.2, 0.0), (0.2, 0.3 - 1e-5)]])
-def test_ribs_that_ask_for_tiny_triangles_are_refused(path):
-    """A rib of a micrometre doubled the first frequency without a word, as K has lost its digits."""
-    with pytest.raises(ValueError, match=r"path of a rib must lie on edges.* m beside 0.4 m; move its points"):
-        fi.assemble(
-            fi.mesh.rectangle(0.4, 0.3), fi.Plate(ALUMINIUM, 2e-3), {"boundary": "hinged"}, ribs=[fi.Rib(path, bar())]
-        )
+@pytest.mark.parametrize(("path", "section", "words"), [
+    ([(0.0, 0.0)], bar(), "path must have two points or more"),
+    ([(0.0, 0.0), (1.0, 0.0)], fi.Plate(ALUMINIUM, 1e-3), "section must be"),
+    ([(1.0, 1.0), (2.0, 1.0)], bar(), "none of it lies on the body"),
+    ("rim", bar(), "path names edge 'rim'"),
+    ("outer", EVEN, "section must not vary along a rib that follows an edge"),
+    # a rib of a micrometre doubled the first frequency without a word, as K has lost its digits
+    ([(0.2, 0.1), (0.2, 0.1 + 1e-6)], bar(), TINY), ([(0.2, 0.0), (0.2, 0.3 - 1e-5)], bar(), TINY),
+])  # fmt: skip
+def test_what_no_rib_can_be_is_refused_by_name(path, section, words):
+    with pytest.raises(ValueError, match=words):
+        panel(fi.Rib(path, section))
 
 
 @pytest.mark.slow
 def test_the_error_of_crossing_ribs_is_stated():
     """Ribs converge more slowly than smooth bodies; estimates are to be at least 0.3 of the error, here 0.7."""
     paths = [(0.0, 0.12), (0.4, 0.12)], [(0.17, 0.0), (0.17, 0.3)]
-    system = fi.assemble(
-        fi.mesh.rectangle(0.4, 0.3), fi.Plate(ALUMINIUM, 1e-3), {"boundary": "hinged"},
-        ribs=[fi.Rib(list(path), bar(1e-3, 4e-3)) for path in paths],
-    )  # fmt: skip
+    system = panel(*(fi.Rib(path, bar(1e-3, 4e-3)) for path in paths), thickness=1e-3)
     found = fi.find_modes(system, n_modes=6, tolerance=1e-2)
     own = found.shapes.system
     finer = refinement.solve_on_mesh(assembly.reassemble(own, own.mesh.refined(3.0)), 6, None)

@@ -30,48 +30,35 @@ def test_grain_turned_by_a_right_angle_swaps_the_axes():
     assert_allclose(along[0, 0], 11e9 / (1 - 0.3**2 * 0.8 / 11), rtol=1e-14)
 
 
-def test_sections_of_beams():
-    assert_allclose(Beam.rectangular(STEEL, width=0.02, height=0.01).stiffness(POINT[:, :1]), 210e9 * 0.02e-6 / 12)
-    assert_allclose(Beam.circular(STEEL, diameter=0.01).stiffness(POINT[:, :1]), 210e9 * np.pi * 0.01**4 / 64)
-    assert_allclose(Beam.circular(STEEL, diameter=0.01).inertia(POINT[:, :1]), 7850 * np.pi * 0.01**2 / 4)
+def test_sections_of_beams_and_plates_that_vary():
+    bar, rod = Beam.rectangular(STEEL, width=0.02, height=0.01), Beam.circular(STEEL, diameter=0.01)
+    assert_allclose(bar.stiffness(POINT[:, :1]), 210e9 * 0.02e-6 / 12)
+    assert_allclose(rod.stiffness(POINT[:, :1]), 210e9 * np.pi * 0.01**4 / 64)
+    assert_allclose(rod.inertia(POINT[:, :1]), 7850 * np.pi * 0.01**2 / 4)
+    wedge = Plate(STEEL, lambda x: 1e-3 * (1 + x[:, 0]))
+    assert_allclose(wedge.inertia(np.array([[0.0, 0.0], [1.0, 0.0]])), [7.85, 15.7])
 
 
-def test_thickness_may_vary():
-    plate = Plate(STEEL, lambda x: 1e-3 * (1 + x[:, 0]))
-    assert_allclose(plate.inertia(np.array([[0.0, 0.0], [1.0, 0.0]])), [7.85, 15.7])
-
-
-@pytest.mark.parametrize(
-    ("make", "text"),
-    [
-        (lambda: Material(E=-1.0, nu=0.3, rho=1.0), "E must be positive, got -1 Pa"),
-        (lambda: Material(E=1.0, nu=0.6, rho=1.0), "nu must be above -1 and at most 0.5, got 0.6"),
-        (lambda: Material(E=1.0, nu=-1.0, rho=1.0), "nu must be above -1"),
-        (lambda: Material.orthotropic(E_along=1.0, E_across=4.0, nu=0.5, G=1.0, rho=1.0), "release energy"),
-        (lambda: Plate(STEEL, 0.0), "thickness must be positive, got 0 m"),
-        (lambda: Plate(STEEL, lambda x: x[:, 0]).inertia(POINT), r"thickness must be positive everywhere, got 0 m at"),
-        (lambda: Plate(STEEL, lambda x: x[:, 0] + 1e-300).inertia(POINT), "thickness must be at least 1e-75 m every"),
-        (
-            lambda: Plate(STEEL, lambda x: np.ones(7)).inertia(POINT),
-            "thickness must be a function that returns numbers",
-        ),
-        (lambda: Beam.rectangular(STEEL, width=0.1, height=-0.1), "height must be positive, got -0.1 m"),
-    ],
-)
+@pytest.mark.parametrize(("make", "text"), [
+    (lambda: Material(E=-1.0, nu=0.3, rho=1.0), "E must be positive, got -1 Pa"),
+    (lambda: Material(E=1.0, nu=0.6, rho=1.0), "nu must be above -1 and at most 0.5, got 0.6"),
+    (lambda: Material(E=1.0, nu=-1.0, rho=1.0), "nu must be above -1"),
+    (lambda: Material.orthotropic(E_along=1.0, E_across=4.0, nu=0.5, G=1.0, rho=1.0), "release energy"),
+    (lambda: Material(E=1.0, nu=0.3, rho=1.0, yield_strength=-1.0), "yield_strength must be positive, got -1 Pa"),
+    (lambda: Plate(STEEL, 0.0), "thickness must be positive, got 0 m"),
+    (lambda: Plate(STEEL, lambda x: x[:, 0]).inertia(POINT), r"thickness must be positive everywhere, got 0 m at"),
+    (lambda: Plate(STEEL, lambda x: x[:, 0] + 1e-300).inertia(POINT), "thickness must be at least 1e-75 m every"),
+    (lambda: Plate(STEEL, lambda x: np.ones(7)).inertia(POINT), "thickness must be a function that returns numbers"),
+    (lambda: Beam.rectangular(STEEL, width=0.1, height=-0.1), "height must be positive, got -0.1 m"),
+])  # fmt: skip
 def test_refuses_what_no_material_does(make, text):
     with pytest.raises(ValueError, match=text):
         make()
 
 
-def test_a_yield_strength_may_be_stated():
-    assert Material(E=210e9, nu=0.3, rho=7850.0).yield_strength is None
-    wood = {"E_along": 11e9, "E_across": 0.8e9, "nu": 0.37, "G": 0.7e9, "rho": 430.0}
-    assert Material.orthotropic(**wood, yield_strength=5e6).yield_strength == 5e6
-    with pytest.raises(ValueError, match="yield_strength must be positive, got -1 Pa"):
-        Material(E=210e9, nu=0.3, rho=7850.0, yield_strength=-1.0)
-
-
-def test_yield_strength_is_that_of_a_dent_of_the_pyramid():
+def test_yield_strength_may_be_stated_and_is_that_of_a_dent_of_the_pyramid():
     """Vickers' number is over the slanted faces of a pyramid of 136 degrees between them; here of 120 HV."""
+    wood = {"E_along": 11e9, "E_across": 0.8e9, "nu": 0.37, "G": 0.7e9, "rho": 430.0}
+    assert STEEL.yield_strength is None and Material.orthotropic(**wood, yield_strength=5e6).yield_strength == 5e6
     pressure = 120.0 * 9.80665e6 * (2.0 / (2.0 * np.sin(np.radians(68.0))))
     assert yield_strength(120.0) == pytest.approx(pressure / 2.8, rel=1e-12)

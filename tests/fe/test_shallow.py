@@ -32,11 +32,8 @@ def exact(thickness, curvature, n):
 def cap(chi, edge, radius=0.2, thickness=1e-3):
     """A spherical cap, and what squared angular frequencies are in units of D / (rho h a**4)."""
     curvature = thickness / radius**2 * np.sqrt(chi / 12.0 / (1.0 - NU**2))
-    supports = {} if edge == "free" else {"boundary": edge}
-    plate = fi.Plate(ALUMINIUM, thickness)
-    system = fi.assemble(
-        fi.mesh.disk(radius), plate, supports, rise=lambda points: -0.5 * curvature * (points**2).sum(axis=1)
-    )
+    plate, rise = fi.Plate(ALUMINIUM, thickness), lambda points: -0.5 * curvature * (points**2).sum(axis=1)
+    system = fi.assemble(fi.mesh.disk(radius), plate, {"boundary": edge}, rise=rise)
     return system, (2.0 * np.pi) ** 2 * RHO * thickness * radius**4 / float(plate.stiffness(np.zeros((1, 2)))[0, 0, 0])
 
 
@@ -58,10 +55,7 @@ def test_panels_on_shear_diaphragms_are_those_of_the_closed_form(thickness, curv
 
 def test_the_clamped_cylindrical_panel_of_the_literature():
     """Petyt's (1971), as a reference case has it; ours are Ritz's to more digits."""
-
-    def rise(points):
-        return -0.5 * (points[:, 1] - 0.0508) ** 2 / 0.762
-
+    rise = lambda points: -0.5 * (points[:, 1] - 0.0508) ** 2 / 0.762  # noqa: E731
     body = fi.Plate(fi.Material(E=6.8948e10, nu=0.33, rho=2657.0), 3.302e-4)
     system = fi.assemble(fi.mesh.rectangle(0.0762, 0.1016), body, {"boundary": "clamped"}, rise=rise)
     found = fi.find_modes(system, n_modes=5, tolerance=1e-5)
@@ -105,29 +99,26 @@ def test_a_rise_that_is_almost_nothing_leaves_the_plate():
 
 
 def test_a_shell_does_not_care_where_it_is_or_how_high():
-    def rise(points):
-        return 0.1 * points[:, 0] + 2.0 - 0.25 * ((points - 3.0) ** 2).sum(axis=1)
+    def frequencies(shift, tilt, height):
+        mesh = fi.mesh.polygon(shift + np.array([(0.0, 0.0), (0.3, 0.0), (0.2, 0.3)]))
+        rise = lambda p: tilt * p[:, 0] + height - 0.25 * ((p - shift) ** 2).sum(axis=1)  # noqa: E731
+        return fi.find_modes(fi.assemble(mesh, fi.Plate(ALUMINIUM, 1e-3), rise=rise), n_modes=8).frequencies
 
-    plate = fi.Plate(ALUMINIUM, 1e-3)
-    moved = fi.mesh.polygon([(3.0, 3.0), (3.3, 3.0), (3.2, 3.3)])
-    here = fi.mesh.polygon([(0.0, 0.0), (0.3, 0.0), (0.2, 0.3)])
-    one = fi.find_modes(fi.assemble(moved, plate, rise=lambda p: -0.25 * ((p - 3.0) ** 2).sum(axis=1)), n_modes=8)
-    two = fi.find_modes(fi.assemble(here, plate, rise=lambda p: -0.25 * (p**2).sum(axis=1)), n_modes=8)
-    tilted = fi.find_modes(fi.assemble(moved, plate, rise=rise), n_modes=8)
-    np.testing.assert_allclose(one.frequencies, two.frequencies, rtol=1e-8, atol=1e-9)
-    # a tilt stretches nothing: displacements in the plane follow it
-    np.testing.assert_allclose(tilted.frequencies, one.frequencies, rtol=1e-8, atol=1e-9)
+    here = frequencies(0.0, 0.0, 0.0)
+    for place in (
+        (3.0, 0.0, 0.0),
+        (3.0, 0.1, 2.0),
+    ):  # displacements in the plane follow a tilt, which stretches nothing
+        np.testing.assert_allclose(frequencies(*place), here, rtol=1e-8, atol=1e-9)
 
 
 def test_edges_held_in_the_plane_stiffen_a_cap_and_free_ones_do_not():
-    plate, mesh, rise = fi.Plate(ALUMINIUM, 1e-3), fi.mesh.disk(0.2), fi.rise.cap(2.0)
-    first = {}
-    for word in ("held", "sliding", "free"):
-        system = fi.assemble(mesh, plate, {"boundary": "hinged"}, rise=rise, in_plane={"boundary": word})
-        first[word] = fi.find_modes(system, n_modes=1).frequencies[0]
-    usual = fi.find_modes(fi.assemble(mesh, plate, {"boundary": "hinged"}, rise=rise), n_modes=1).frequencies[0]
-    assert usual == pytest.approx(first["held"], rel=1e-12)
-    assert first["free"] < first["sliding"] < 0.9 * first["held"]
+    body, rise = (fi.mesh.disk(0.2), fi.Plate(ALUMINIUM, 1e-3), {"boundary": "hinged"}), fi.rise.cap(2.0)
+    usual, held, sliding, free = (
+        fi.find_modes(fi.assemble(*body, rise=rise, in_plane=how), n_modes=1).frequencies[0]
+        for how in ({}, *({"boundary": word} for word in ("held", "sliding", "free")))
+    )
+    assert usual == pytest.approx(held, rel=1e-12) and free < sliding < 0.9 * held
 
 
 @pytest.mark.parametrize("edge", ["across", "free"])
@@ -156,27 +147,25 @@ def test_the_compliance_is_that_of_all_modes():
     assert whole - summed == pytest.approx(left, rel=0.3)
 
 
-def test_what_cannot_be_is_refused_by_name():
-    plate, mesh = fi.Plate(ALUMINIUM, 1e-3), fi.mesh.rectangle(0.4, 0.3)
-    with pytest.raises(ValueError, match=r"theory must be 'shallow' .* got 'mindlin'"):
-        fi.assemble(mesh, plate, {"boundary": "hinged"}, theory="mindlin", rise=fi.rise.cap(2.0))
-    with pytest.raises(ValueError, match="rise must be a function of points"):
-        fi.assemble(mesh, plate, rise=0.01)
-    with pytest.raises(ValueError, match=r"rise must be a function that returns numbers of shape"):
-        fi.assemble(mesh, plate, rise=lambda points: np.zeros(3))
-    with pytest.raises(ValueError, match=r"in_plane\['left'\] must be .*held"):
-        fi.assemble(mesh, plate, {"left": "hinged"}, in_plane={"left": "loose"})
-    with pytest.raises(ValueError, match="in_plane names edge 'lefty'"):
-        fi.assemble(mesh, plate, {"left": "hinged"}, in_plane={"lefty": "held"})
-    bare = fi.assemble(replace(mesh, recipe=None), plate, rise=fi.rise.cap(2.0))
+CAP, JUMP = fi.rise.cap(2.0), r"rise must be smoother, or the plate thicker.* round off jumps"
+
+
+@pytest.mark.parametrize(("more", "words"), [
+    ({"theory": "mindlin", "rise": CAP}, r"theory must be 'shallow' .* got 'mindlin'"),
+    ({"rise": 0.01}, "rise must be a function of points"),
+    ({"rise": lambda p: np.zeros(3)}, "rise must be a function that returns numbers of shape"),
+    ({"in_plane": {"left": "loose"}}, r"in_plane\['left'\] must be .*held"),
+    ({"in_plane": {"lefty": "held"}}, "in_plane names edge 'lefty'"),
+    ({"rise": lambda p: 1e-3 * (p[:, 0] > 0.13)}, JUMP), ({"rise": lambda p: 1e10 * p[:, 0] ** 2}, JUMP),
+])  # fmt: skip
+def test_what_cannot_be_is_refused_by_name_and_at_once(more, words):
+    with pytest.raises(ValueError, match=words):
+        fi.assemble(fi.mesh.rectangle(*SIDES), fi.Plate(ALUMINIUM, 1e-3), {"boundary": "hinged"}, **more)
+
+
+def test_bodies_that_no_rise_fits_are_refused_by_name():
+    bare = fi.assemble(replace(fi.mesh.rectangle(*SIDES), recipe=None), fi.Plate(ALUMINIUM, 1e-3), rise=CAP)
     with pytest.raises(ValueError, match=r"mesh must be made with fi\.mesh or loaded"):
         fi.find_modes(bare, n_modes=4)
     with pytest.raises(ValueError, match="section must be a Plate for rise"):
-        fi.assemble(fi.mesh.line(1.0), fi.Beam.circular(ALUMINIUM, diameter=0.01), rise=fi.rise.cap(2.0))
-
-
-def test_rises_that_jump_are_refused_before_they_take_minutes():
-    plate, mesh = fi.Plate(ALUMINIUM, 2e-3), fi.mesh.rectangle(0.4, 0.3)
-    for rise in (lambda p: 1e-3 * (p[:, 0] > 0.13), lambda p: 1e10 * p[:, 0] ** 2):
-        with pytest.raises(ValueError, match=r"rise must be smoother, or the plate thicker.* round off jumps"):
-            fi.assemble(mesh, plate, {"boundary": "hinged"}, rise=rise)
+        fi.assemble(fi.mesh.line(1.0), fi.Beam.circular(ALUMINIUM, diameter=0.01), rise=CAP)

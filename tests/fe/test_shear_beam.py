@@ -28,13 +28,11 @@ def sizes(section):
 
 
 def test_cowpers_coefficients():
+    round_one, area, inertia = fi.Beam.circular(ALUMINIUM, diameter=0.02), np.pi * 0.01**2, np.pi * 0.01**4 / 4.0
     assert STOUT.shear_coefficient == pytest.approx(10.0 * 1.33 / (12.0 + 11.0 * 0.33))
-    round_one = fi.Beam.circular(ALUMINIUM, diameter=0.02)
     assert round_one.shear_coefficient == pytest.approx(6.0 * 1.33 / (7.0 + 6.0 * 0.33))
-    area, inertia = np.pi * 0.01**2, np.pi * 0.01**4 / 4.0
-    G = 70e9 / 2.66
-    expected = [70e9 * inertia, round_one.shear_coefficient * G * area, 2700.0 * area, 2700.0 * inertia]
-    assert_allclose(sizes(round_one), expected, rtol=1e-12)
+    shear = round_one.shear_coefficient * 70e9 / 2.66 * area
+    assert_allclose(sizes(round_one), [70e9 * inertia, shear, 2700.0 * area, 2700.0 * inertia], rtol=1e-12)
 
 
 @pytest.mark.parametrize("height", [0.2, 0.08, 1e-4])
@@ -62,13 +60,10 @@ def test_a_step_of_the_section_is_a_node_with_a_kink():
 
 def test_springs_and_a_mass_at_the_ends():
     """Stiff springs are supports; a heavy mass turns a clamped-free beam's first mode into mass on a spring."""
-    line = fi.mesh.line(0.4)
-    firm = fi.Elastic(1e16, 0.0)
+    line, firm, (bending, shear, *_) = fi.mesh.line(0.4), fi.Elastic(1e16, 0.0), sizes(STOUT)
     sprung = fi.find_modes(fi.assemble(line, STOUT, {"left": firm, "right": firm}, theory="timoshenko"), n_modes=4)
     assert_allclose(sprung.omega, hinged(0.4, *sizes(STOUT), 4), rtol=1e-5)
-    mass = [((0.4,), 1e4)]
-    loaded = fi.assemble(line, STOUT, {"left": "clamped"}, theory="timoshenko", point_masses=mass)
-    bending, shear = sizes(STOUT)[:2]
+    loaded = fi.assemble(line, STOUT, {"left": "clamped"}, theory="timoshenko", point_masses=[((0.4,), 1e4)])
     spring = 1.0 / (0.4**3 / 3.0 / bending + 0.4 / shear)
     assert fi.find_modes(loaded, n_modes=1).omega[0] == pytest.approx(np.sqrt(spring / 1e4), rel=1e-3)
 
@@ -86,13 +81,9 @@ def test_the_error_estimate_is_that_of_a_beam_too_coarse_for_its_modes():
 
 
 def test_compliance_of_both_theories_differs_by_the_shear():
-    at = np.array([[0.13]])
-    shear = sizes(STOUT)[1]
-    found = [
-        fi.find_modes(fi.assemble(fi.mesh.line(0.4), STOUT, HINGED, theory=theory), n_modes=2).shapes.compliance(at)
-        for theory in ("euler", "timoshenko")
-    ]
-    assert (found[1] - found[0])[0, 0] == pytest.approx(0.13 * 0.27 / 0.4 / shear, rel=1e-9)
+    systems = (fi.assemble(fi.mesh.line(0.4), STOUT, HINGED, theory=theory) for theory in ("euler", "timoshenko"))
+    one, other = (fi.find_modes(each, n_modes=2).shapes.compliance(np.array([[0.13]]))[0, 0] for each in systems)
+    assert other - one == pytest.approx(0.13 * 0.27 / 0.4 / sizes(STOUT)[1], rel=1e-9)
 
 
 @pytest.mark.parametrize("ends", [{}, {"left": "hinged"}, {"right": "hinged"}])

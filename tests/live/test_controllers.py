@@ -14,57 +14,61 @@ from fem_impact.live.controllers import Hands
 
 
 def test_points_are_spread_over_any_outline():
-    modes = fi.find_modes(
-        fi.assemble(
-            fi.mesh.polygon([(0, 0), (1, 0), (1, 0.3), (0.3, 0.3), (0.3, 1), (0, 1)], size=0.3),
-            fi.Plate(fi.Material(E=7e10, nu=0.3, rho=2700.0), thickness=2e-3), supports={"boundary": "hinged"},
-        ),
-        n_modes=4,
-    )  # fmt: skip
+    corner = fi.mesh.polygon([(0, 0), (1, 0), (1, 0.3), (0.3, 0.3), (0.3, 1), (0, 1)], size=0.3)
+    plate = fi.Plate(fi.Material(E=7e10, nu=0.3, rho=2700.0), thickness=2e-3)
+    modes = fi.find_modes(fi.assemble(corner, plate, supports={"boundary": "hinged"}), n_modes=4)
     points = controllers.spread_points(modes, (0.1, 0.2), 8)
     assert modes.shapes.contains(points).all() and points[0] == pytest.approx((0.1, 0.2))
-    apart = np.linalg.norm(points[:, None] - points, axis=2)[~np.eye(8, dtype=bool)]
-    assert apart.min() > 0.15
-    assert (np.diff(np.linalg.norm(points - points[0], axis=1)) >= 0.0).all()
+    apart = np.linalg.norm(points[:, None] - points, axis=2)
+    assert apart[~np.eye(8, dtype=bool)].min() > 0.15 and (np.diff(apart[0]) >= 0.0).all()
 
 
-def test_a_column_of_keys_is_a_point_and_a_row_a_loudness():
-    assert controllers.of_key("z", 10, 2.0) == (0, 0.25)
-    assert controllers.of_key("S", 10, 2.0) == (1, 0.5)
-    assert controllers.of_key("0", 10, 2.0) == (9, 2.0)
-    assert controllers.of_key("p", 3, 2.0) == (0, 1.0)  # fewer points than columns: round again
-    assert controllers.of_key(" ", 10, 2.0) is None
+@pytest.mark.parametrize(
+    "key, points, fastest, stroke",
+    [("z", 10, 2.0, (0, 0.25)), ("S", 10, 2.0, (1, 0.5)), ("0", 10, 2.0, (9, 2.0)), (" ", 10, 2.0, None),
+     ("p", 3, 2.0, (0, 1.0))],  # fewer points than columns: round again
+)  # fmt: skip
+def test_a_column_of_keys_is_a_point_and_a_row_a_loudness(key, points, fastest, stroke):
+    assert controllers.of_key(key, points, fastest) == stroke
+
+
+def test_a_note_is_a_point_and_its_velocity_a_speed():
     assert controllers.of_note(60, 127, 10, 2.0) == (0, 2.0)
     assert controllers.of_note(59, 64, 10, 127.0) == (9, 64.0)
 
 
-def test_piped_keys_strike_and_the_end_of_the_pipe_ends(monkeypatch):
+@pytest.fixture
+def pipe(monkeypatch):
+    """Where to write what the prompt then reads."""
     there, here = os.pipe()
     with os.fdopen(there) as reader:
         monkeypatch.setattr(sys, "stdin", reader)
-        hands = Hands()
-        with controllers.keys(hands, 10, 1.0):
-            os.write(here, b"z 2")
-            os.close(here)
-            end = time.monotonic() + 120.0
-            found = []
-            while len(found) < 2 and time.monotonic() < end:
-                found += hands.due(0, 64)
-        assert found == [(0, 0, 0.125), (0, 1, 1.0)] and hands.over(0)
+        yield here
 
 
-def test_escape_ends_and_what_was_struck_before_is_played(monkeypatch):
-    there, here = os.pipe()
-    with os.fdopen(there) as reader:
-        monkeypatch.setattr(sys, "stdin", reader)
-        hands = Hands()
-        os.write(here, b"1\x1b2")
-        with controllers.keys(hands, 10, 1.0):
-            end = time.monotonic() + 120.0
-            while not hands._ended.is_set() and time.monotonic() < end:
-                time.sleep(0.001)
-        os.close(here)
-        assert not hands.over(0) and hands.due(0, 64) == [(0, 0, 1.0)] and hands.over(0)
+def waited(done):
+    """Wait until it is true, at most two minutes."""
+    end = time.monotonic() + 120.0
+    while not done() and time.monotonic() < end:
+        time.sleep(0.001)
+
+
+def test_piped_keys_strike_and_the_end_of_the_pipe_ends(pipe):
+    hands, found = Hands(), []
+    with controllers.keys(hands, 10, 1.0):
+        os.write(pipe, b"z 2")
+        os.close(pipe)
+        waited(lambda: found.extend(hands.due(0, 64)) or len(found) >= 2)
+    assert found == [(0, 0, 0.125), (0, 1, 1.0)] and hands.over(0)
+
+
+def test_escape_ends_and_what_was_struck_before_is_played(pipe):
+    hands = Hands()
+    os.write(pipe, b"1\x1b2")
+    with controllers.keys(hands, 10, 1.0):
+        waited(hands._ended.is_set)
+    os.close(pipe)
+    assert not hands.over(0) and hands.due(0, 64) == [(0, 0, 1.0)] and hands.over(0)
 
 
 def midi(path):

@@ -1,10 +1,9 @@
 """Curved facets against curves known in closed form."""
 
 import numpy as np
-import pytest
 from numpy.testing import assert_allclose
 
-from fem_impact.mesh.facets import Curves, divided, powers
+from fem_impact.mesh.facets import Curves, divided
 
 
 def arcs(radius, angle, start=0.3):
@@ -14,11 +13,6 @@ def arcs(radius, angle, start=0.3):
     middle = radius * np.array([[np.cos(start + 0.5 * angle), np.sin(start + 0.5 * angle)]])
     tangents = np.stack([-np.sin(ends), np.cos(ends)], axis=2)
     return points, middle, tangents, np.full((1, 2), 1.0 / radius)
-
-
-def test_derivatives_of_powers():
-    x = np.array([0.0, -0.7, 2.0])
-    assert_allclose(powers(x, 4, 2), np.column_stack([0 * x, 0 * x, 2 + 0 * x, 6 * x, 12 * x**2]), rtol=1e-15)
 
 
 def test_a_facet_follows_its_circle_with_order_eight():
@@ -51,35 +45,26 @@ def test_a_facet_is_the_curve_of_degree_six_that_it_was_taken_from():
     s = np.linspace(0.0, 1.0, 9)
     point, along, curvature = (np.concatenate(x) for x in zip(*(curves.at(np.array([x])) for x in s)))
     assert_allclose(point, placed(s), atol=1e-14)
-    assert_allclose(
-        along[:, 0] * turn[1, 0] + along[:, 1] * turn[1, 1], -slope(s) / np.hypot(1.0, slope(s)), atol=1e-13
-    )
+    assert_allclose(along @ turn[1], -slope(s) / np.hypot(1.0, slope(s)), atol=1e-13)
     assert_allclose(curvature, -bend(s) / np.hypot(1.0, slope(s)) ** 3, atol=1e-12)
-    k = np.arange(7)
-    from_controls = [
-        curves.controls()[0].T @ (np.array([1, 6, 15, 20, 15, 6, 1]) * x**k * (1 - x) ** (6 - k)) for x in s
-    ]
-    assert_allclose(from_controls, placed(s), atol=1e-14)
+    k, x = np.arange(7), s[:, None]
+    bernstein = np.array([1, 6, 15, 20, 15, 6, 1]) * x**k * (1 - x) ** (6 - k)
+    assert_allclose(bernstein @ curves.controls()[0], placed(s), atol=1e-14)
     assert_allclose(curves.middle()[0], placed(np.array([0.5])), atol=1e-15)
     assert_allclose((curves.middle()[1] * curves.at(np.array([0.5]))[1]).sum(), 0.0, atol=1e-15)
 
 
-@pytest.mark.parametrize("share", [0.5, 0.3])
-def test_both_parts_of_a_divided_arc_lie_on_it(share):
-    ends, *rest = arcs(2.0, 0.2)
-    point, tangent, curvature, first, second = divided(ends, *rest, share)
-    # the facet itself, over 0.2 rad, leaves the circle by 5e-11 of its radius, and its tangent by 8e-10
-    assert_allclose(np.linalg.norm([point, first, second], axis=2), 2.0, rtol=1e-10)
-    assert_allclose((point * tangent).sum(), 0.0, atol=4e-9)
-    assert_allclose(curvature, 0.5, rtol=1e-6)
-    for middle, a, b in ((first, ends[:, 0], point), (second, point, ends[:, 1])):
-        assert_allclose(np.linalg.norm(middle - a), np.linalg.norm(middle - b), rtol=1e-10)  # halfway
-
-
-def test_a_straight_facet_stays_straight_beside_a_curved_one():
-    straight = np.array([[[0.0, 0.0], [1.0, 2.0]]])
-    unit = np.array([[[1.0, 2.0], [1.0, 2.0]]]) / np.sqrt(5.0)
+def test_parts_of_a_divided_arc_lie_on_it_and_of_a_straight_facet_beside_it_on_the_line():
+    straight, unit = np.array([[[0.0, 0.0], [1.0, 2.0]]]), np.tile([1.0, 2.0], (1, 2, 1)) / np.sqrt(5.0)
     both = [np.concatenate(x) for x in zip(arcs(2.0, 0.2), (straight, straight.mean(axis=1), unit, np.zeros((1, 2))))]
-    point, tangent, curvature, first, second = (x[1] for x in divided(*both, 0.25))
-    assert_allclose([first, point, second], [[0.125, 0.25], [0.25, 0.5], [0.625, 1.25]], rtol=1e-15)
-    assert_allclose(tangent, unit[0, 0]), assert_allclose(curvature, 0.0, atol=0.0)
+    points, tangents, curvatures, firsts, seconds = divided(*both, 0.25)
+    # the facet itself, over 0.2 rad, leaves the circle by 5e-11 of its radius, and its tangent by 8e-10
+    assert_allclose(np.linalg.norm([points[0], firsts[0], seconds[0]], axis=1), 2.0, rtol=1e-10)
+    assert_allclose(points[0] @ tangents[0], 0.0, atol=4e-9)
+    assert_allclose(curvatures[0], 0.5, rtol=1e-6)
+    (start, end), *_ = both[0]
+    for middle, a, b in ((firsts[0], start, points[0]), (seconds[0], points[0], end)):
+        assert_allclose(np.linalg.norm(middle - a), np.linalg.norm(middle - b), rtol=1e-10)  # halfway
+    assert_allclose([firsts[1], points[1], seconds[1]], [[0.125, 0.25], [0.25, 0.5], [0.625, 1.25]], rtol=1e-15)
+    assert_allclose(tangents[1], unit[0, 0])
+    assert_allclose(curvatures[1], 0.0, atol=0.0)

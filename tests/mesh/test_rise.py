@@ -15,11 +15,14 @@ PLACES = RNG.uniform(-0.2, 0.2, (40, 2))
 
 def test_bodies_have_their_radius():
     x, y = PLACES.T
-    assert_allclose(fi.rise.cap(2.0)(PLACES), np.sqrt(4.0 - x**2 - y**2) - 2.0, atol=1e-15)
-    assert_allclose(fi.rise.cap(-2.0)(PLACES), 2.0 - np.sqrt(4.0 - x**2 - y**2), atol=1e-15)
-    assert_allclose(fi.rise.cylinder(2.0)(PLACES), np.sqrt(4.0 - y**2) - 2.0, atol=1e-15)
-    assert_allclose(fi.rise.cylinder(2.0, angle=0.5 * np.pi)(PLACES), np.sqrt(4.0 - x**2) - 2.0, atol=1e-15)
-    assert_allclose(fi.rise.saddle(2.0)(PLACES), np.sqrt(4.0 - x**2) - np.sqrt(4.0 - y**2), atol=1e-15)
+    for rise, wanted in (
+        (fi.rise.cap(2.0), np.sqrt(4.0 - x**2 - y**2) - 2.0),
+        (fi.rise.cap(-2.0), 2.0 - np.sqrt(4.0 - x**2 - y**2)),
+        (fi.rise.cylinder(2.0), np.sqrt(4.0 - y**2) - 2.0),
+        (fi.rise.cylinder(2.0, angle=0.5 * np.pi), np.sqrt(4.0 - x**2) - 2.0),
+        (fi.rise.saddle(2.0), np.sqrt(4.0 - x**2) - np.sqrt(4.0 - y**2)),
+    ):
+        assert_allclose(rise(PLACES), wanted, atol=1e-15)
     with pytest.raises(ValueError, match=r"radius must be larger than the body, got 0\.1 m"):
         fi.rise.cap(0.1)(PLACES)
 
@@ -50,14 +53,11 @@ def test_a_table_is_told_by_its_numbers_whenever_it_was_made():
     assert_allclose(pickle.loads(pickle.dumps(one))(PLACES), PLACES[:, 0], atol=1e-15)
 
 
-@pytest.mark.parametrize(
-    ("points", "heights", "match"),
-    [
-        (PLACES[:3], np.zeros(3), "points must be four or more, got 3"),
-        (np.outer(np.arange(5.0), [1.0, 2.0]), np.zeros(5), "points must not all lie on one line"),
-        (PLACES, np.zeros(3), "heights must have shape"),
-    ],
-)
+@pytest.mark.parametrize(("points", "heights", "match"), [
+    (PLACES[:3], np.zeros(3), "points must be four or more, got 3"),
+    (np.outer(np.arange(5.0), [1.0, 2.0]), np.zeros(5), "points must not all lie on one line"),
+    (PLACES, np.zeros(3), "heights must have shape"),
+])  # fmt: skip
 def test_tables_that_are_no_surface_are_refused(points, heights, match):
     with pytest.raises(ValueError, match=match):
         fi.rise.table(points, heights)

@@ -83,20 +83,17 @@ def test_half_circles_and_straight_sides_meet_smoothly():
 
 
 def test_a_square_has_four_corners_and_no_curve():
-    side = np.linspace(0.0, 1.0, 5)[:-1]
-    place = np.concatenate([np.column_stack(x) for x in ((side, 0 * side), (1 + 0 * side, side))])
-    place = np.concatenate([place, 1.0 - place])
+    half = np.array([(0, 0), (1, 0), (2, 0), (3, 0), (4, 0), (4, 1), (4, 2), (4, 3)]) / 4.0
+    place = np.concatenate([half, 1.0 - half])
     rim = recover_rim(place, loop_of(place), {})
     assert (rim.n_curved, n_corners_of(place)) == (0, 4)
     assert_allclose(rim.curvatures, 0.0, atol=0.0)
 
 
-def test_a_polygon_of_few_sides_stays_one():
+@pytest.mark.parametrize(("n", "n_corners"), [(8, 8), (24, 0)])
+def test_a_polygon_of_few_sides_stays_one(n, n_corners):
     """An octagon turns by 45 degrees at each vertex: corners; 24 sides turn by 15: a circle."""
-    for n, n_corners in ((8, 8), (24, 0)):
-        angle = 2.0 * np.pi * np.arange(n) / n
-        place = np.column_stack([np.cos(angle), np.sin(angle)])
-        assert n_corners_of(place) == n_corners
+    assert n_corners_of(np.exp(2j * np.pi / n * np.arange(n))[:, None].view(float)) == n_corners
 
 
 @pytest.mark.parametrize(("off", "found"), [(1e-6, True), (4e-6, False)])

@@ -37,20 +37,6 @@ def error_of_endless(modes, mobility, at, law):
     return difference(struck(endless, law, at), struck(modes, law, at))
 
 
-def plate(ratio, rate, shape):
-    """Modes up to ten contact frequencies of a plate that damps the contact by a ratio, its mesh and its mobility."""
-    mobility = 2.0 * ratio * DURATION / (MASS * np.pi)
-    per_area = 1.0 / (8.0 * mobility * rate)
-    reach = 10.0 / DURATION
-    if shape == "rectangle":
-        first = rate * np.pi**2 * (1.0 / 1.5**2 + 1.0) / (2.0 * np.pi)
-        modes = analytic.rectangle(1.5, 1.0, mass=1.5 * per_area, first_frequency=first, max_frequency=reach)
-        return modes, mesh.rectangle(1.5, 1.0), mobility
-    first = rate * 4.935152 / (2.0 * np.pi)
-    modes = analytic.disk(1.0, edge="hinged", mass=np.pi * per_area, first_frequency=first, max_frequency=reach)
-    return modes, mesh.disk(1.0), mobility
-
-
 @pytest.mark.parametrize("ratio", [0.01, 0.1, 0.3])
 def test_endless_plate_damps_a_linear_contact_as_a_dashpot(ratio):
     """Closed form: restitution exp(-pi z / sqrt(1 - z**2)) after pi / (omega sqrt(1 - z**2)), z the damping ratio."""
@@ -62,16 +48,23 @@ def test_endless_plate_damps_a_linear_contact_as_a_dashpot(ratio):
     assert_allclose(hit.contact_time, DURATION / root, rtol=2e-8)
 
 
-@pytest.mark.parametrize("law", LAWS)
-@pytest.mark.parametrize(
-    ("shape", "at", "rate", "ratio"),
-    [
-        ("rectangle", (0.7, 0.5), 50.0, 0.1),  # four edges about equally far
-        ("rectangle", (0.7, 0.2), 6.0, 0.02),  # one edge near
-        ("disk", (0.0, 0.0), 60.0, 0.05),  # every part of the edge sends its echo at once
-        ("disk", (0.5, 0.0), 10.0, 0.2),
-    ],
-)
+def plate(ratio, rate, shape):
+    """Modes up to ten contact frequencies of a plate that damps the contact by a ratio, its mesh and its mobility."""
+    mobility = 2.0 * ratio * DURATION / (MASS * np.pi)
+    per_area, how = 1.0 / (8.0 * mobility * rate), {"max_frequency": 10.0 / DURATION}
+    if shape == "rectangle":
+        how["first_frequency"] = rate * np.pi**2 * (1.0 / 1.5**2 + 1.0) / (2.0 * np.pi)
+        return analytic.rectangle(1.5, 1.0, mass=1.5 * per_area, **how), mesh.rectangle(1.5, 1.0), mobility
+    how["first_frequency"] = rate * 4.935152 / (2.0 * np.pi)
+    return analytic.disk(1.0, edge="hinged", mass=np.pi * per_area, **how), mesh.disk(1.0), mobility
+
+
+@pytest.mark.parametrize(("shape", "at", "rate", "ratio", "law"), [
+    ("rectangle", (0.7, 0.5), 50.0, 0.1, "hertz"),  # four edges about equally far
+    ("rectangle", (0.7, 0.2), 6.0, 0.02, "linear"),  # one edge near
+    ("disk", (0.0, 0.0), 60.0, 0.05, "hertz"),  # every part of the edge sends its echo at once
+    ("disk", (0.5, 0.0), 10.0, 0.2, "linear"),
+])  # fmt: skip
 def test_error_of_an_endless_plate_is_bounded_and_not_by_far(shape, at, rate, ratio, law):
     modes, body, mobility = plate(ratio, rate, shape)
     true = error_of_endless(modes, mobility, at, law)
@@ -86,8 +79,9 @@ def test_endless_plate_is_refused_where_an_echo_or_a_second_blow_may_come():
     assert np.isfinite(idealisation.endless_error(view, 1e-6, 1.0, MASS, DURATION))
 
 
-@pytest.mark.parametrize("law", LAWS)
-@pytest.mark.parametrize(("mass", "first"), [(1e5, 300.0), (3e4, 40.0), (1e4, 3000.0), (300.0, 2000.0)])
+@pytest.mark.parametrize(("mass", "first", "law"), [
+    (1e5, 300.0, "linear"), (3e4, 40.0, "hertz"), (1e4, 3000.0, "linear"), (300.0, 2000.0, "hertz"),
+])  # fmt: skip
 def test_error_of_a_rigid_body_is_bounded_and_not_by_far(mass, first, law):
     at = np.array([0.4, 0.3])
     modes = analytic.rectangle(1.5, 1.0, mass=mass, first_frequency=first, max_frequency=max(3.0 * first, 1e4))
@@ -96,21 +90,18 @@ def test_error_of_a_rigid_body_is_bounded_and_not_by_far(mass, first, law):
     assert 0.9 * true <= stated <= 6.0 * true + 1e-8  # measured 0.95 to 3; the runs' own error
 
 
-@pytest.mark.parametrize("first", [5.0, 100.0, 2000.0])
-@pytest.mark.parametrize(
-    ("shape", "free"), [("rectangle", False), ("clamped", False), ("hinged", False), ("free", True), ("strip", False)]
-)
-def test_bound_without_modes_lies_above_the_error_with_them(shape, free, first):
-    mass = 1e5
+@pytest.mark.parametrize("first", [5.0, 2000.0])
+@pytest.mark.parametrize("shape", ["rectangle", "clamped", "hinged", "free", "strip"])
+def test_bound_without_modes_lies_above_the_error_with_them(shape, first):
+    make, at = {"first_frequency": first, "mass": 1e5, "max_frequency": max(3.0 * first, 1e4)}, np.array([0.3, 0.15])
     if shape in ("rectangle", "strip"):
         sides = (1.5, 1.0) if shape == "rectangle" else (20.0, 0.4)
-        make = {"first_frequency": first, "mass": mass, "max_frequency": max(3.0 * first, 1e4)}
-        modes, body, at = analytic.rectangle(*sides, **make), mesh.rectangle(*sides), np.array([0.3, 0.15])
+        modes, body = analytic.rectangle(*sides, **make), mesh.rectangle(*sides)
     else:
-        modes = analytic.disk(1.0, edge=shape, mass=mass, first_frequency=first, max_frequency=max(3.0 * first, 1e4))
-        body, at = mesh.disk(1.0), np.array([0.3, 0.15])
+        modes, body = analytic.disk(1.0, edge=shape, **make), mesh.disk(1.0)
     view = Surroundings.seen(body, at)
-    bound = idealisation.rigid_bound(view, mass, idealisation.slowest_rate(view, first), free, MASS, DURATION)
+    slowest = idealisation.slowest_rate(view, first)
+    bound = idealisation.rigid_bound(view, 1e5, slowest, shape == "free", MASS, DURATION)
     assert bound >= idealisation.rigid_error(modes, at, MASS, DURATION)
 
 
@@ -121,11 +112,6 @@ def test_surroundings_of_a_point_on_a_disk():
     assert_allclose(view.clearance, 1.5, rtol=1e-2)
     assert view.mirrors(4.0) >= 1.0
     assert Surroundings.seen(mesh.disk(2.0), np.array([2.1, 0.0])) is None
-
-
-def test_centre_of_a_disk_sees_more_mirrors_than_a_point_near_one_edge():
-    centre, near = (Surroundings.seen(mesh.disk(1.0), np.array([x, 0.0])) for x in (0.0, 0.7))
-    assert centre.mirrors(9.0) > 3.0 * near.mirrors(9.0)
 
 
 STEEL = Material(E=210e9, nu=0.3, rho=7850.0)
@@ -172,11 +158,10 @@ def test_clearance_counts_for_less_along_the_grain():
     assert_allclose([view.area, view.perimeter], [2.0, 4.0 / root + 2.0 * root], rtol=1e-12)
 
 
-def grained(material, at, ratio, nearness):
-    """A hinged orthotropic plate, 1.5 m by 1 m, its grain along its length, in closed form, and what is stated of it.
+def grained(material, at, ratio, nearness, law):
+    """Stated and true error of a hinged orthotropic plate, 1.5 m by 1 m, its grain along its length, in closed form.
 
-    Its rigidity and mass are such that it damps the contact by a ratio and its edges are as near as stated. Returns its
-    modes, its mobility [m/(N s)] and the stated error.
+    Its rigidity and mass are such that it damps the contact by a ratio and its edges are as near as stated.
     """
     waves, at = Waves.of(material, THICKNESS), np.asarray(at)
     view = Surroundings.seen(mesh.rectangle(1.5, 1.0), at, waves.stretch)
@@ -185,49 +170,41 @@ def grained(material, at, ratio, nearness):
     per_area = 1.0 / (8.0 * mobility * waves.rate * faster)
     stiff = material.plane_stress * THICKNESS**2 / 12.0 / material.rho * faster**2  # [m**4/s**2]
     m, n = (np.arange(1, 1000) * np.pi / side for side in (1.5, 1.0))
-    along, across = m[:, None] ** 2, n[None] ** 2
-    squared = (
-        stiff[0, 0] * along**2 + 2.0 * (stiff[0, 1] + 2.0 * stiff[2, 2]) * along * across + stiff[1, 1] * across**2
-    )
+    k, l = m[:, None] ** 2, n[None] ** 2
+    squared = stiff[0, 0] * k**2 + 2.0 * (stiff[0, 1] + 2.0 * stiff[2, 2]) * k * l + stiff[1, 1] * l**2
     shape = 2.0 / np.sqrt(1.5 * per_area) * np.sin(m * at[0])[:, None] * np.sin(n * at[1])[None]
-    static = np.sum(shape**2 / squared)
-    kept = np.flatnonzero(squared < (2.0 * np.pi * 10.0 / DURATION) ** 2)
-    kept = kept[np.argsort(squared.ravel()[kept])]
-    shapes = SampledShapes(at[None], shape.ravel()[None, kept], np.array([[static]]))
+    kept = np.argsort(squared.ravel())[: np.count_nonzero(squared < (2.0 * np.pi * 10.0 / DURATION) ** 2)]
+    shapes = SampledShapes(at[None], shape.ravel()[None, kept], np.array([[np.sum(shape**2 / squared)]]))
     modes = Modes(np.sqrt(squared.ravel()[kept]), np.zeros(len(kept)), shapes, 1.5 * per_area)
     rate, slowest = waves.fastest * faster, waves.slowest * faster
-    return modes, mobility, idealisation.endless_error(view, mobility, rate, MASS, DURATION, slowest=slowest)
+    stated = idealisation.endless_error(view, mobility, rate, MASS, DURATION, slowest=slowest)
+    seen = np.isfinite(stated) and modes.n_modes < 3000
+    return stated, error_of_endless(modes, mobility, at, law) if seen else np.nan
 
 
-@pytest.mark.parametrize("law", LAWS)
-@pytest.mark.parametrize(
-    ("material", "at", "ratio", "nearness"),
-    [
-        (replace(SPRUCE, angle=0.0), (0.7, 0.5), 0.15, 3.5),  # the ends along the grain answer first
-        (replace(SPRUCE, angle=0.0), (0.75, 0.15), 0.1, 6.0),  # the near side across it
-        (SOFT_IN_SHEAR, (0.6, 0.45), 0.05, 3.0),
-        (replace(STIFF_IN_SHEAR, angle=0.0), (0.5, 0.4), 0.05, 3.0),
-    ],
-)
+@pytest.mark.parametrize(("material", "at", "ratio", "nearness", "law"), [
+    (replace(SPRUCE, angle=0.0), (0.7, 0.5), 0.15, 3.5, "linear"),  # the ends along the grain answer first
+    (replace(SPRUCE, angle=0.0), (0.75, 0.15), 0.1, 6.0, "hertz"),  # the near side across it
+    (SOFT_IN_SHEAR, (0.6, 0.45), 0.05, 3.0, "linear"),
+    (replace(STIFF_IN_SHEAR, angle=0.0), (0.5, 0.4), 0.05, 3.0, "hertz"),
+])  # fmt: skip
 def test_error_of_an_endless_orthotropic_plate_is_bounded_and_not_by_far(material, at, ratio, nearness, law):
-    modes, mobility, stated = grained(material, at, ratio, nearness)
-    true = error_of_endless(modes, mobility, at, law)
+    stated, true = grained(material, at, ratio, nearness, law)
     assert true <= stated <= 10.0 * true  # 3.0 to 5.1 times measured
 
 
 def test_error_of_random_endless_orthotropic_plates_is_bounded():
     """Moduli up to 30 to 1, shear from very soft to very stiff, grain along the length."""
     rng, found = np.random.default_rng(4), []
-    while len(found) < 30:
+    while len(found) < 12:
         across = 1e10 / 30.0 ** rng.uniform()
         G = 0.5 * (10.0 ** rng.uniform(-1.0, 0.7) * np.sqrt(1e10 * across) - 0.2 * across)
         if G <= 0.0:
             continue
         wood = Material.orthotropic(E_along=1e10, E_across=across, nu=0.2, G=G, rho=500.0)
         at, ratio = rng.uniform([0.2, 0.2], [1.3, 0.8]), rng.uniform(0.01, 0.28)
-        modes, mobility, stated = grained(wood, at, ratio, 2.05 * 5.0 ** rng.uniform())
-        if np.isfinite(stated) and modes.n_modes < 3000:
-            found.append(stated / error_of_endless(modes, mobility, at, str(rng.choice(list(LAWS)))))
+        stated, true = grained(wood, at, ratio, 2.05 * 5.0 ** rng.uniform(), str(rng.choice(list(LAWS))))
+        found += [stated / true] if np.isfinite(true) else []
     assert min(found) >= 1.0
     assert np.median(found) <= 20.0  # single ones are larger: the echoes of several edges can cancel
 
@@ -235,17 +212,18 @@ def test_error_of_random_endless_orthotropic_plates_is_bounded():
 @pytest.mark.slow
 def test_a_spruce_top_counts_as_endless_and_is_struck_as_by_its_modes():
     """Elements, a grain at an angle and clamped edges: the contact is over before the echo returns."""
-    body, at = mesh.rectangle(0.4, 0.3), (0.2, 0.15)
-    system = assemble(body, Plate(SPRUCE, THICKNESS), {"boundary": "clamped"})
-    mass, duration = 2e-3, 1.2e-3
-    law = Contact.hertz(mass * (3.2180654597 / duration) ** 2.5)
-    blow = {"at": at, "speed": 1.0, "tolerance": 0.1}
-    plan = planner.plan_of(system, Striker.rigid(mass), law, **blow)
-    assert plan.target == "infinite"
-    assert_allclose(plan.mobility, Waves.of(SPRUCE, THICKNESS).mobility(SPRUCE.rho * THICKNESS), rtol=1e-12)
+    mass, duration, at = 2e-3, 1.2e-3, (0.2, 0.15)
+    system = assemble(mesh.rectangle(0.4, 0.3), Plate(SPRUCE, THICKNESS), {"boundary": "clamped"})
+
+    def plan(tolerance, **how):
+        law = Contact.hertz(mass * (3.2180654597 / duration) ** 2.5)
+        return planner.plan_of(system, Striker.rigid(mass), law, at=at, speed=1.0, tolerance=tolerance, **how)
+
+    endless = plan(0.1)
+    assert endless.target == "infinite"
+    assert_allclose(endless.mobility, Waves.of(SPRUCE, THICKNESS).mobility(SPRUCE.rho * THICKNESS), rtol=1e-12)
     seen = idealisation.from_outside(Target.of(system), at, mass, duration)
-    by_modes = planner.plan_of(system, Striker.rigid(mass), law, **{**blow, "tolerance": 2e-3}, target="modal").strike()
-    true = difference(plan.strike(), by_modes)
+    true = difference(endless.strike(), plan(2e-3, target="modal").strike())
     assert true <= seen.endless <= 60.0 * true  # as above
 
 

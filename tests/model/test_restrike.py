@@ -1,14 +1,21 @@
+"""Blows struck again with something changed, and what damping that nobody stated would change."""
+
+from functools import partial
+
 import numpy as np
 import pytest
+from comparing import examined
 
 import fem_impact as fi
 from fem_impact.impact import engine
 from fem_impact.model import bending, restrike
-from fem_impact.model.restrike import Struck, softer
+from fem_impact.model.audit import PLAUSIBLE
+from fem_impact.model.restrike import Struck
 
 PLATE = fi.analytic.rectangle(0.4, 0.3, mass=0.2, first_frequency=100.0, n_modes=60)
 LAW, HAMMER = fi.Contact.hertz(1e6), fi.Striker.rigid(0.02)
-BLOW = {"at": (0.12, 0.09), "speed": 1.0, "tolerance": 1e-6}
+SLOW = {"at": (0.12, 0.09), "speed": 1.0}
+BLOW = SLOW | {"tolerance": 1e-6}
 
 
 def struck(quantity=None, **how):
@@ -16,30 +23,15 @@ def struck(quantity=None, **how):
     return Struck(hit, hit.bodies, bending.known_of(PLATE), None)
 
 
-def test_nothing_changes_if_nothing_is_changed():
-    case = struck()
-    assert set(case.changes(omega=case.hit.history.omega).values()) == {0.0}
-
-
-@pytest.mark.parametrize("factor", [0.9, 0.99, 1.05])
+@pytest.mark.parametrize("factor", [0.9, 1.05])
 def test_changes_are_those_of_a_new_blow(factor):
     case = struck(residual=False)
     changed = case.changes(omega=case.with_target(factor * PLATE.omega))
     other = fi.strike(PLATE.scaled(first_frequency=100.0 * factor), HAMMER, LAW, residual=False, **BLOW)
-    expected = {
-        "restitution": abs(other.restitution - case.hit.restitution),
-        "impulse": abs(other.impulse / case.hit.impulse - 1.0),
-        "contact_time": abs(other.contact_time / case.hit.contact_time - 1.0),
-        "force": abs(other.peak_force / case.hit.peak_force - 1.0),
-    }
-    for name, size in expected.items():
+    assert changed["restitution"] == pytest.approx(abs(other.restitution - case.hit.restitution), rel=0.05, abs=2e-5)
+    for name, key in (("impulse", "impulse"), ("contact_time", "contact_time"), ("force", "peak_force")):
+        size = abs(getattr(other, key) / getattr(case.hit, key) - 1.0)
         assert changed[name] == pytest.approx(size, rel=0.05, abs=2e-5)  # both in the steps of a first run: 1e-4
-
-
-def test_more_compliance_is_a_softer_contact():
-    case = struck()
-    effect = case.changes(**softer(case.hit.history, 1e-5))
-    assert effect["force"] > 1e-3 and effect["contact_time"] > 1e-3
 
 
 def test_spectra_are_compared_in_their_band():
@@ -62,11 +54,6 @@ def test_a_limit_of_the_blow_stays():
     assert len(engine.again(first.history).contacts) == 1
 
 
-def test_frequency_of_the_contact_is_that_of_its_longest_impact():
-    case = struck()
-    assert case.omega == pytest.approx(np.pi / max(impact.duration for impact in case.hit.impacts))
-
-
 def test_a_blow_that_cannot_be_struck_again_is_not_known(monkeypatch):
     case = struck()
 
@@ -75,3 +62,35 @@ def test_a_blow_that_cannot_be_struck_again_is_not_known(monkeypatch):
 
     monkeypatch.setattr(restrike, "again", fails)
     assert set(case.changes(omega=0.9 * case.hit.history.omega).values()) == {None}
+
+
+undamped = partial(examined, name="stated damping")
+
+
+@pytest.mark.parametrize("mass", [0.005, 0.02, 0.1])
+def test_effect_is_that_of_striking_a_damped_plate(mass):
+    # residual=False: else another static give of the same modes is a difference, too
+    plain, damped = (
+        fi.strike(PLATE.damped(zeta), fi.Striker.rigid(mass), LAW, residual=False, **BLOW) for zeta in (0.0, PLAUSIBLE)
+    )
+    told = undamped(plain)
+    assert told.value == PLAUSIBLE and "state the damping ratio of the struck body" in told.sentence
+    changes = {"restitution": damped.restitution - plain.restitution, "impulse": damped.impulse / plain.impulse - 1.0}
+    for name, change in changes.items():
+        assert told.effect[name] == pytest.approx(abs(change), rel=0.2, abs=1e-5)  # 1e-5: two runs of a first step
+
+
+def test_a_stated_damping_is_not_doubted():
+    told = undamped(fi.strike(PLATE.damped(1e-4), HAMMER, LAW, **SLOW))
+    assert told.worst == 0.0 and told.known and told.value is None
+
+
+def test_a_sound_without_damping_would_never_end():
+    told = undamped(fi.strike(PLATE, HAMMER, LAW, quantity="sound=2000", **SLOW))
+    assert told.effect["sound"] == 1.0 and told.beyond
+
+
+def test_the_damping_of_a_flexible_striker_counts():
+    stick = fi.Striker.stick(mass=0.05, first_frequency=300.0)
+    told = undamped(fi.strike(PLATE.damped(0.01), stick, LAW, tolerance=1e-3, **SLOW))
+    assert told.worst > 1e-6 and told.remedy == "state the damping ratio of the striker"

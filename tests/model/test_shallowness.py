@@ -44,14 +44,10 @@ def test_the_mass_in_the_plane_lowers_frequencies_as_the_exact_panel_has_it():
 
 
 def test_a_blow_says_how_steep_its_target_is_and_a_flat_one_does_not():
-    striker, contact = fi.Striker.rigid(5e-3), fi.Contact.hertz(1e7)
+    blow = fi.Striker.rigid(5e-3), fi.Contact.hertz(1e7)
     how = {"at": (0.13, 0.1), "speed": 0.1, "tolerance": 1e-2, "damping_ratio": 0.01}
-
-    def found(system):
-        hit = fi.strike(system, striker, contact, **how)
-        return next(each for each in hit.assumptions if each.name == "shallow target")
-
-    steep, flat = found(panel()), found(fi.assemble(fi.mesh.rectangle(*SIDES), PLATE, {"boundary": "hinged"}))
+    plane = fi.assemble(fi.mesh.rectangle(*SIDES), PLATE, {"boundary": "hinged"})
+    steep, flat = (examined(fi.strike(body, *blow, **how), "shallow target") for body in (panel(), plane))
     assert steep.value == pytest.approx(-CURVATURE * 0.5 * np.hypot(*SIDES), rel=1e-3)  # of a plane through triangles
     assert steep.doubtful and 0.0 < steep.worst < 0.05
     assert "steepest slope of the rise is 0.13" in steep.sentence

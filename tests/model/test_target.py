@@ -1,12 +1,20 @@
 """Bodies that a user has assembled are planned and struck like scenes, whatever they are made of."""
 
+from functools import partial
+from pathlib import Path
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 from comparing import difference
 from numpy.testing import assert_allclose
+from scenes import load_text
 
 import fem_impact as fi
-from fem_impact.model.target import Target
+from fem_impact.impact.response import Error
+from fem_impact.model.planner import Blow
+from fem_impact.model.target import Stages, Target
+from fem_impact.modes.analytic import closed_form
 
 ALUMINIUM = fi.Material(E=70e9, nu=0.33, rho=2700.0)
 STICK = fi.Striker.stick(0.1, 1000.0)
@@ -49,40 +57,19 @@ def test_system_is_struck_as_its_modes_are(body):
 
 @pytest.mark.slow
 def test_plan_of_objects_is_that_of_the_same_scene_and_runs(tmp_path):
-    text = """
-[mesh]
-shape = "rectangle"
-length = 0.5
-width = 0.3
-[material]
-E = 70e9
-nu = 0.33
-rho = 2700.0
-[section]
-kind = "plate"
-thickness = 3e-3
-[supports]
-left = "clamped"
-[target]
-damping_ratio = 0.005
-[striker]
-kind = "stick"
-mass = 0.1
-first_frequency = 1000.0
-[contact]
-kind = "linear"
-stiffness = 88.6e3
-[strike]
-at = [0.31, 0.12]
-speed = 1.0
-tolerance = 1e-2
-"""
-    (tmp_path / "scene.toml").write_text(text)
+    scene = load_text(tmp_path, """
+        mesh = { shape = "rectangle", length = 0.5, width = 0.3 }
+        material = { E = 70e9, nu = 0.33, rho = 2700.0 }
+        section = { kind = "plate", thickness = 3e-3 }
+        supports = { left = "clamped" }
+        target = { damping_ratio = 0.005 }
+        striker = { kind = "stick", mass = 0.1, first_frequency = 1000.0 }
+        contact = { kind = "linear", stiffness = 88.6e3 }
+        strike = { at = [0.31, 0.12], speed = 1.0, tolerance = 1e-2 }
+    """)  # fmt: skip
     system = fi.assemble(fi.mesh.rectangle(0.5, 0.3), fi.Plate(ALUMINIUM, 3e-3), {"left": "clamped"})
-    plan = fi.plan(
-        system, STICK, SOFT, at=[0.31, 0.12], speed=1.0, tolerance=1e-2, damping_ratio=0.005
-    )  # fmt: skip
-    told = fi.plan(tmp_path / "scene.toml")
+    plan = fi.plan(system, STICK, SOFT, at=[0.31, 0.12], speed=1.0, tolerance=1e-2, damping_ratio=0.005)
+    told = scene.plan()
     assert plan.data() == told.data() and str(plan) == str(told)
     assert difference(plan.strike(), told.strike()) == 0.0
     assert plan.but(n_modes=30).strike().target.n_modes == 30
@@ -94,64 +81,45 @@ def test_given_modes_are_thinned_but_never_more_than_there_are():
     plan = fi.plan(plate, STICK, SOFT, **how)
     assert 20 <= plan.n_modes < 400 and plan.target == "modal" and plan.error < 1.1e-2
     assert difference(plan.strike(), fi.strike(plate, STICK, SOFT, **how)) < 2e-2
-    few = fi.plan(plate.truncated(n_modes=10), STICK, SOFT, **{**how, "tolerance": 1e-6})
+    few = fi.plan(plate.truncated(n_modes=10), STICK, SOFT, **how | {"tolerance": 1e-6})
     assert few.n_modes == 10 and few.error > 1e-4  # said beforehand
     assert fi.strike(plate, STICK, SOFT, **how, n_modes=25).target.n_modes == 25
 
 
-@pytest.mark.parametrize(
-    ("changes", "text"),
-    [
-        ({"striker": 3}, "striker must be a Striker"),
-        ({"contact": None}, "contact must be a Contact"),
-        ({"at": (2.0, 0.1)}, "at must lie on the body"),
-        ({"tolerence": 1e-3}, "tolerence is not an argument.*did you mean 'tolerance'"),
-    ],
-)
+@pytest.mark.parametrize(("changes", "text"), [
+    ({"striker": 3}, "striker must be a Striker"),
+    ({"contact": None}, "contact must be a Contact"),
+    ({"at": (2.0, 0.1)}, "at must lie on the body"),
+    ({"tolerence": 1e-3}, "tolerence is not an argument.*did you mean 'tolerance'"),
+    ({"target": Path("scene.toml")}, "must be left out for a scene"),
+])  # fmt: skip
 def test_wrong_arguments_are_named(changes, text):
     system = fi.assemble(fi.mesh.rectangle(0.5, 0.3), fi.Plate(ALUMINIUM, 3e-3), {"boundary": "hinged"})
     given = {"striker": STICK, "contact": SOFT, "at": (0.2, 0.1), "speed": 1.0, **changes}
     with pytest.raises((ValueError, TypeError), match=text):
-        fi.plan(system, **given).strike()
+        fi.plan(given.pop("target", system), **given)
 
 
-def test_scene_takes_no_striker_of_its_own(tmp_path):
-    with pytest.raises(ValueError, match="must be left out for a scene"):
-        fi.plan(tmp_path / "scene.toml", STICK)
+PLATE, ROD = fi.Plate(ALUMINIUM, 3e-3), fi.Beam.circular(ALUMINIUM, diameter=0.01)
+WOOD = fi.Material.orthotropic(E_along=11e9, E_across=0.7e9, nu=0.37, G=0.7e9, rho=420.0)
+OBLONG, DISK = fi.mesh.rectangle(0.5, 0.3), fi.mesh.disk(0.2)
 
 
-def test_closed_forms_are_known_by_the_mesh():
-    plate = fi.Plate(ALUMINIUM, 3e-3)
-    from fem_impact.modes.analytic import closed_form
-
-    def formula(mesh, section, **held):
-        found = closed_form(mesh, section, held)
-        return None if found is None else found(n_modes=3).frequencies
-
-    hinged = formula(fi.mesh.rectangle(0.5, 0.3), plate, boundary="hinged")
-    assert_allclose(hinged, fi.analytic.rectangle(0.5, 0.3, section=plate, n_modes=3).frequencies)
-    assert_allclose(
-        formula(fi.mesh.disk(0.2).refined(2.0), plate, outer="clamped"),
-        fi.analytic.disk(0.2, edge="clamped", section=plate, n_modes=3).frequencies,
-    )
-    rod = fi.Beam.circular(ALUMINIUM, diameter=0.01)
-    assert_allclose(
-        formula(fi.mesh.line(0.3), rod, left="clamped"),
-        fi.analytic.beam(0.3, ends=("clamped", "free"), section=rod, n_modes=3).frequencies,
-    )
-    wood = fi.Material.orthotropic(E_along=11e9, E_across=0.7e9, nu=0.37, G=0.7e9, rho=420.0)
-    for none in (
-        formula(fi.mesh.rectangle(0.5, 0.3), plate, left="hinged"),
-        formula(fi.mesh.rectangle(0.5, 0.3), fi.Plate(wood, 3e-3), boundary="hinged"),
-        formula(fi.mesh.rectangle(0.5, 0.3), fi.Plate(ALUMINIUM, wedge), boundary="hinged"),
-        formula(fi.mesh.rectangle(0.5, 0.3), fi.Plate(ALUMINIUM, 3e-3, tension=1e3), boundary="hinged"),
-        formula(fi.mesh.disk(0.2, 0.05), plate, boundary="clamped"),
-        formula(fi.mesh.disk(0.2), plate, boundary=fi.Elastic(1e4)),
-        formula(fi.mesh.polygon([(0, 0), (1, 0), (0, 1)]), plate, boundary="hinged"),
-        formula(fi.mesh.line(0.3), fi.Beam.circular(ALUMINIUM, diameter=wedge)),
-    ):
-        assert none is None
-    assert np.all(hinged > 0.0)
+@pytest.mark.parametrize(("mesh", "section", "held", "exact"), [
+    (OBLONG, PLATE, {"boundary": "hinged"}, partial(fi.analytic.rectangle, 0.5, 0.3)),
+    (DISK.refined(2.0), PLATE, {"outer": "clamped"}, partial(fi.analytic.disk, 0.2, edge="clamped")),
+    (fi.mesh.line(0.3), ROD, {"left": "clamped"}, partial(fi.analytic.beam, 0.3, ends=("clamped", "free"))),
+    (OBLONG, PLATE, {"left": "hinged"}, None), (OBLONG, fi.Plate(WOOD, 3e-3), {"boundary": "hinged"}, None),
+    (OBLONG, fi.Plate(ALUMINIUM, wedge), {"boundary": "hinged"}, None),
+    (OBLONG, fi.Plate(ALUMINIUM, 3e-3, tension=1e3), {"boundary": "hinged"}, None),
+    (fi.mesh.disk(0.2, 0.05), PLATE, {"boundary": "clamped"}, None), (DISK, PLATE, {"boundary": fi.Elastic(1e4)}, None),
+    (fi.mesh.polygon([(0, 0), (1, 0), (0, 1)]), PLATE, {"boundary": "hinged"}, None),
+    (fi.mesh.line(0.3), fi.Beam.circular(ALUMINIUM, diameter=wedge), {}, None),
+])  # fmt: skip
+def test_closed_forms_are_known_by_the_mesh(mesh, section, held, exact):
+    found = closed_form(mesh, section, held)
+    assert (found is None) == (exact is None)
+    assert exact is None or (found(n_modes=3).frequencies == exact(section=section, n_modes=3).frequencies).all()
 
 
 @pytest.mark.parametrize("function", [fi.strike, fi.plan])
@@ -171,3 +139,44 @@ def test_waves_obey_the_equation_of_a_stretched_plate(tension, frequency):
     k = Target(fi.mesh.rectangle(0.5, 0.3), plate, {"boundary": "hinged"}).wave(frequency)
     bending = 70e9 * 2e-3**3 / (12.0 * (1.0 - 0.33**2))
     assert_allclose(bending * k**4 + tension * k**2, 2700.0 * 2e-3 * (2.0 * np.pi * frequency) ** 2, rtol=1e-12)
+
+
+SPRUCE = fi.Plate(fi.Material(10e9, 0.3, 450.0), 3e-3)
+
+
+def modal(tolerance=1e-2, **of_target):
+    """A hinged plate by its modes, as planned for a tolerance."""
+    target = Target(fi.mesh.rectangle(0.4, 0.3), SPRUCE, {"boundary": "hinged"}, damping_ratio=0.01, **of_target)
+    blow = Blow(target, fi.Striker.rigid(0.02), fi.Contact.hertz(1e7), {"at": (0.13, 0.1), "speed": 1.0})
+    return blow.plan(tolerance=tolerance, target="modal").description
+
+
+def after(description, **errors):
+    """What a blow of these errors asks for."""
+    return description.refined(
+        SimpleNamespace(error=Error(**{"step": 0.0, "truncation": 0.0, "mesh": 0.0} | errors)), Stages()
+    )
+
+
+@pytest.mark.parametrize(("truncation", "more"), [(4e-5, False), (6e-5, True)])
+def test_more_modes_are_taken_if_those_left_out_err_more_than_their_share(truncation, more):
+    first = modal(tolerance=1e-4)
+    better = after(first, truncation=truncation)
+    assert (better is not None) == more
+    if more:
+        ratio = better.forecast.n_modes / first.forecast.n_modes
+        assert ratio == pytest.approx(4.0 ** (1.0 / 3.0), rel=0.02)  # the error goes as the cube of the cutoff
+
+
+def test_the_air_gets_more_modes_each_time_it_errs_too_much():
+    first = modal(air="both sides")
+    second = after(first, mesh=2e-2)
+    third = after(second, mesh=1.2e-2)
+    numbers = [each.forecast.n_modes for each in (first, second, third)]
+    assert numbers[1] / numbers[0] == pytest.approx(2.0 / 0.9, rel=0.05)  # as its error is to fall, below the tolerance
+    assert numbers[2] / numbers[1] == pytest.approx(1.2 / 0.9, rel=0.05)
+
+
+def test_three_attempts_are_enough():
+    third = after(after(modal(), truncation=1e-2), truncation=1e-2)
+    assert after(third, truncation=1e-2) is None

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
+from scenes import QUICK, load_text
 from scipy import integrate, special
 
 import fem_impact as fi
@@ -59,14 +60,8 @@ def membrane_in_air(order, number, radius, weight, tension, sides=2):
 
     def transform(j, kappa):
         b = zero[j] / radius
-        return (
-            norm[j]
-            * radius
-            * b
-            * special.jv(order + 1, zero[j])
-            * special.jv(order, kappa * radius)
-            / (b**2 - kappa**2)
-        )
+        edge = norm[j] * radius * b * special.jv(order + 1, zero[j])
+        return edge * special.jv(order, kappa * radius) / (b**2 - kappa**2)
 
     def integrals(k):
         # the kernel exp(-i k R) / R is 2 pi / sqrt(kappa**2 - k**2) in wave numbers
@@ -111,41 +106,59 @@ def test_drumhead(order):
 
 @pytest.fixture(scope="module")
 def plate():
-    return fi.analytic.rectangle(0.465, 0.3, mass=0.19, first_frequency=105.0, n_modes=40)
+    return fi.analytic.rectangle(0.5, 0.3, mass=0.2, first_frequency=100.0, n_modes=20, damping_ratio=0.01)
 
 
-def test_plate_keeps_its_static_deflection_and_order(plate):
+@pytest.fixture(scope="module")
+def loud(plate):
+    return fi.in_air(plate)
+
+
+@pytest.fixture(scope="module")
+def open_air(plate):
+    return fi.in_air(plate, baffled=False)
+
+
+def test_plate_keeps_its_static_deflection_and_order(plate, loud):
     """Still air carries no load; all that it does is to add inertia and to carry sound away."""
-    loud, at = fi.in_air(plate), [(0.1, 0.1)]
+    at = [(0.1, 0.1)]
     assert loud.modal_compliance(at) == pytest.approx(plate.modal_compliance(at), rel=1e-10)
     assert (loud.omega < plate.omega).all() and (np.diff(loud.omega) > 0.0).all()
-    assert (loud.damping_ratio > 0.0).all() and loud.mass == plate.mass
+    assert (loud.damping_ratio > 0.01).all() and loud.mass == plate.mass
 
 
 def test_low_modes_radiate_as_wallace_says(plate):
     """Below ka = 1 the (1, 1) mode radiates like a monopole: Wallace's eq. 15 for one side of a baffled rectangle."""
-    a, b = 0.465, 0.3
+    a, b = 0.5, 0.3
     omega = 0.3 * C / a
     slow = plate.scaled(first_frequency=omega / (2.0 * np.pi))
     ka, kb = omega / C * a, omega / C * b
     sigma = 32.0 * ka * kb / np.pi**5 * (1.0 - ka * kb / 12.0 * ((1.0 - 8.0 / np.pi**2) * (a / b + b / a)))
-    loud = fi.in_air(slow.truncated(n_modes=1), density=1e-3, sides=1)  # so thin that the shift does not matter
+    loud = fi.in_air(
+        slow.truncated(n_modes=1).damped(0.0), density=1e-3, sides=1
+    )  # so thin that the shift does not matter
     found = loud.damping_ratio[0] * 2.0 * loud.omega[0] * slow.mass / (1e-3 * C * a * b)
     assert found == pytest.approx(sigma, rel=0.02)  # Wallace's series has an error of (ka)**4
 
 
 def test_thin_air_changes_nothing_and_one_side_does_half(plate):
-    none = fi.in_air(plate, density=1e-9)
-    assert none.omega == pytest.approx(plate.omega, rel=1e-8)
+    assert fi.in_air(plate, density=1e-9).omega == pytest.approx(plate.omega, rel=1e-8)
     one, two = (1.0 - (fi.in_air(plate, density=0.01, sides=n).omega / plate.omega) ** 2 for n in (1, 2))
     assert two == pytest.approx(2.0 * one, rel=1e-2)  # to first order in the density
 
 
-def test_without_a_wall_the_shift_is_bounded(plate):
-    walled, free = fi.in_air(plate), fi.in_air(plate, baffled=False)
-    low, high = free.omega * (1.0 - free.frequency_error), free.omega * (1.0 + free.frequency_error)
-    assert (high >= plate.omega * (1.0 - 1e-3)).all() and (low <= walled.omega * 1.001).all()
-    assert (free.damping_ratio == plate.damping_ratio).all()
+def test_without_a_wall_the_shift_is_bounded(plate, loud, open_air):
+    low, high = (open_air.omega * (1.0 + side * open_air.frequency_error) for side in (-1.0, 1.0))
+    assert (high >= plate.omega * (1.0 - 1e-3)).all() and (low <= loud.omega * 1.001).all()
+
+
+def test_the_error_of_damping_is_that_of_air_alone_and_follows_the_modes(plate, loud, open_air):
+    assert plate.damping_error is None and loud.damped(0.01).damping_error is None
+    assert (loud.damping_error > 0.0).all() and loud.damping_error[0] < 0.1 * (loud.damping_ratio[0] - 0.01)
+    assert_allclose(loud.truncated(n_modes=5).damping_error, loud.damping_error[:5])
+    # without a wall no sound is counted, though with one it would be as much as the error says
+    assert_allclose(open_air.damping_ratio, 0.01)
+    assert (open_air.damping_error > 0.8 * (loud.damping_ratio - 0.01)).all()
 
 
 def test_free_plate_keeps_its_rigid_motions():
@@ -159,34 +172,16 @@ def test_free_plate_keeps_its_rigid_motions():
 
 
 def test_scene_in_air(tmp_path):
-    text = (
-        '[mesh]\nshape = "rectangle"\nlength = 0.465\nwidth = 0.3\n[material]\nE = 1e10\nnu = 0.3\nrho = 450.0\n'
-        '[section]\nkind = "plate"\nthickness = 3e-3\n[target]\nair = "both sides"\n[supports]\nboundary = "hinged"\n'
-        '[striker]\nkind = "rigid"\nmass = 0.01\n[contact]\nkind = "linear"\nstiffness = 1e5\n'
-        "[strike]\nat = [0.1, 0.1]\nspeed = 1.0\ntolerance = 1e-2\n"
+    # so short a blow that modes far from a block are mixed into it to first order
+    given = QUICK.replace('source = "analytic"', 'source = "fe"').replace("mass = 0.03", "mass = 0.01")
+    given = given.replace("stiffness = 1e4", "stiffness = 1e5")
+    light, heavy = (
+        load_text(tmp_path, given.replace("[target]", f"[target]{air}")) for air in ("", '\nair = "both sides"')
     )
-    path = tmp_path / "scene.toml"
-    path.write_text(text)
-    heavy = fi.load_scene(path)
-    path.write_text(text.replace('air = "both sides"\n', ""))
-    light = fi.load_scene(path)
     assert heavy.modes(20).omega == pytest.approx(fi.in_air(light.modes(20)).omega, rel=1e-6)
-    plan = heavy.plan()
-    assert plan.target == "modal" and any("air" in note for note in heavy.strike().notes)
+    assert heavy.plan().target == "modal" and any("air" in note for note in heavy.strike().notes)
 
 
-def test_air_on_too_fine_a_grid_is_refused_by_the_name_of_its_speed_of_sound():
-    plate = fi.analytic.rectangle(0.5, 0.3, mass=0.2, first_frequency=100.0, n_modes=20)
+def test_air_on_too_fine_a_grid_is_refused_by_the_name_of_its_speed_of_sound(plate):
     with pytest.raises(ValueError, match=r"^speed of sound in the air must be higher or modes fewer, got 0\.01 m/s: "):
         fi.in_air(plate, speed=0.01)
-
-
-def test_the_error_of_damping_is_that_of_air_alone_and_follows_the_modes():
-    plate = fi.analytic.rectangle(0.5, 0.3, mass=0.2, first_frequency=100.0, n_modes=20, damping_ratio=0.01)
-    loud, open_air = fi.in_air(plate), fi.in_air(plate, baffled=False)
-    assert plate.damping_error is None and loud.damped(0.01).damping_error is None
-    assert (loud.damping_error > 0.0).all() and loud.damping_error[0] < 0.1 * (loud.damping_ratio[0] - 0.01)
-    assert_allclose(loud.truncated(n_modes=5).damping_error, loud.damping_error[:5])
-    # without a wall no sound is counted, though with one it would be as much as the error says
-    assert_allclose(open_air.damping_ratio, 0.01)
-    assert (open_air.damping_error > 0.8 * (loud.damping_ratio - 0.01)).all()

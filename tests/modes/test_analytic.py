@@ -23,30 +23,28 @@ def disk_quadrature(radius, n_radial=80, n_angle=128):
     return points, np.repeat(0.5 * radius * weight * r * 2.0 * np.pi / n_angle, n_angle)
 
 
-# Leissa (1969) corrected to converged digits; free beams: Bishop and Johnson (1960), table 7.1.
-@pytest.mark.parametrize(
-    "edge, squared",
-    [
-        ("clamped", [10.2158262, 21.2603977, 21.2603977, 34.8770354, 34.8770354, 39.7711482]),
-        ("hinged", [4.93514904, 13.8981651, 13.8981651, 25.6132967, 25.6132967, 29.7200047]),
-        ("free", [0.0, 0.0, 0.0, 5.3583298, 5.3583298, 9.0031374, 12.4389882, 12.4389882, 20.4745501, 20.4745501]),
-    ],
-)
-def test_disk_frequencies(edge, squared):
-    modes = analytic.disk(0.3, edge=edge, mass=1.0, first_frequency=1.0, n_modes=len(squared))
-    flexible = np.array(squared)[np.array(squared) > 0.0]
-    assert_allclose(modes.frequencies, np.array(squared) / flexible[0], rtol=1e-7)  # the digits printed
+# omega R**2 sqrt(rho h / D), nu = 0.3: Leissa (1969) corrected to converged digits
+DISKS = {
+    "clamped": [10.2158262, 21.2603977, 21.2603977, 34.8770354, 34.8770354, 39.7711482],
+    "hinged": [4.93514904, 13.8981651, 13.8981651, 25.6132967, 25.6132967, 29.7200047],
+    "free": [0.0, 0.0, 0.0, 5.3583298, 5.3583298, 9.0031374, 12.4389882, 12.4389882, 20.4745501, 20.4745501],
+}
+FIRST = {edge: next(filter(None, squared)) for edge, squared in DISKS.items()}
 
 
-@pytest.mark.parametrize(
-    "ends, roots",
-    [
-        (("clamped", "free"), [1.875104068712, 4.694091132974]),
-        (("free", "free"), [4.730040744863, 7.853204624096]),
-        (("hinged", "free"), [3.926602312048, 7.068582745629]),
-        (("hinged", "hinged"), [np.pi, 2 * np.pi]),
-    ],
-)
+@pytest.mark.parametrize("edge", DISKS)
+def test_disk_frequencies(edge):
+    modes = analytic.disk(0.3, edge=edge, mass=1.0, first_frequency=1.0, n_modes=len(DISKS[edge]))
+    assert_allclose(modes.frequencies, np.array(DISKS[edge]) / FIRST[edge], rtol=1e-7)  # the digits printed
+
+
+# free beams: Bishop and Johnson (1960), table 7.1
+@pytest.mark.parametrize("ends, roots", [
+    (("clamped", "free"), [1.875104068712, 4.694091132974]),
+    (("free", "free"), [4.730040744863, 7.853204624096]),
+    (("hinged", "free"), [3.926602312048, 7.068582745629]),
+    (("hinged", "hinged"), [np.pi, 2 * np.pi]),
+])  # fmt: skip
 def test_beam_frequencies(ends, roots):
     modes = analytic.beam(2.0, ends=ends, mass=1.0, first_frequency=roots[0] ** 2, n_modes=4)
     assert_allclose(np.sqrt(modes.frequencies[modes.n_rigid :][:2]), roots, rtol=1e-12)  # the digits printed
@@ -91,29 +89,20 @@ def test_beam_static_compliance_is_the_limit_of_its_modal_sum(ends):
     assert np.diag(rest)[:3].min() > 0.0 and np.abs(rest).max() < 1.01 * tail
 
 
-PLATES = {
-    "rectangle": lambda n: analytic.rectangle(1.55, 1.0, mass=0.2, first_frequency=100.0, n_modes=n),
-    **{
-        edge: lambda n, edge=edge: analytic.disk(0.5, edge=edge, mass=0.2, first_frequency=100.0, n_modes=n)
-        for edge in KINDS
-    },
-}
-
-
-@pytest.mark.parametrize("name", PLATES)
+@pytest.mark.parametrize("name", ["rectangle", *KINDS])
 def test_plate_static_compliance_is_the_limit_of_its_modal_sum(name):
-    modes = PLATES[name](1200)
+    scale = {"mass": 0.2, "first_frequency": 100.0, "n_modes": 1200}
+    square = name == "rectangle"
+    modes = analytic.rectangle(1.55, 1.0, **scale) if square else analytic.disk(0.5, edge=name, **scale)
     points = np.array([[0.31, 0.2], [0.1, 0.33], [0.22, 0.05]])
     rest = modes.residual_compliance(points)
     scale = modes.shapes.compliance(points).max()
     off_diagonal = rest - np.diag(np.diag(rest))
     assert np.abs(off_diagonal).max() < 3e-5 * scale  # oscillating tail: 1e-6 ... 2e-5 measured
     # The diagonal tail is that of an infinite plate, (2 / pi) Y / omega_c with Y = 1 / (8 sqrt(D rho h)).
-    area = 1.55 if name == "rectangle" else np.pi * 0.25
-    density = 0.2 / area
-    first = {"rectangle": np.pi**2 * (1 + 1 / 1.55**2), "clamped": 10.2158262 / 0.25}
-    first |= {"hinged": 4.93514904 / 0.25, "free": 5.3583298 / 0.25}
-    rigidity = density * (2 * np.pi * 100.0 / first[name]) ** 2
+    density = 0.2 / (1.55 if square else np.pi * 0.25)
+    first = np.pi**2 * (1 + 1 / 1.55**2) if square else FIRST[name] / 0.25
+    rigidity = density * (2 * np.pi * 100.0 / first) ** 2
     admittance = 1.0 / (8.0 * np.sqrt(rigidity * density))
     assert_allclose(np.diag(rest), 2.0 / np.pi * admittance / modes.omega[-1], rtol=0.1)  # 5 % measured, wavy
 
@@ -132,17 +121,14 @@ def test_sections_give_absolute_frequencies():
     assert_allclose(rod.frequencies, [exact], rtol=1e-12)  # the root's printed digits
 
 
-DISK_FIRST = {"clamped": 10.2158262, "hinged": 4.93514904, "free": 5.3583298}  # omega R**2 sqrt(rho h / D), nu = 0.3
-
-
 @pytest.mark.parametrize("edge", KINDS)
-@pytest.mark.parametrize("radius", [0.01, 0.2, 3.0, 100.0])
+@pytest.mark.parametrize("radius", [0.01, 100.0])
 def test_a_disk_of_a_section_has_absolute_frequencies_and_compliance_at_every_size(edge, radius):
     plate = section.Plate(STEEL, thickness=1e-3 * radius)
     rigidity, per_area = 210e9 * plate.thickness**3 / (12 * (1 - 0.3**2)), 7850 * plate.thickness
     n_rigid = 3 if edge == "free" else 0
     modes = analytic.disk(radius, edge=edge, section=plate, n_modes=n_rigid + 1)
-    exact = DISK_FIRST[edge] / radius**2 * np.sqrt(rigidity / per_area) / (2 * np.pi)
+    exact = FIRST[edge] / radius**2 * np.sqrt(rigidity / per_area) / (2 * np.pi)
     assert_allclose(modes.frequencies[-1], exact, rtol=1e-8)  # digits printed
     within = analytic.disk(radius, edge=edge, section=plate, max_frequency=1.0001 * exact)
     assert within.n_modes == (5 if edge == "free" else 1)  # three rigid motions and a pair
@@ -152,73 +138,51 @@ def test_a_disk_of_a_section_has_absolute_frequencies_and_compliance_at_every_si
         assert_allclose(modes.shapes.compliance(np.zeros((1, 2))), [[centre]], rtol=1e-12)
 
 
-def test_sections_a_formula_does_not_cover_are_refused():
-    wood = section.Material.orthotropic(E_along=10e9, E_across=1e9, nu=0.3, G=0.8e9, rho=450.0)
-    with pytest.raises(ValueError, match="section must be flat, isotropic"):
-        analytic.disk(0.1, section=section.Plate(wood, thickness=3e-3), n_modes=5)
-    tapered = section.Beam.rectangular(STEEL, width=0.02, height=lambda x: 0.01 + 0 * x[:, 0])
-    with pytest.raises(ValueError, match="constant along the beam"):
-        analytic.beam(0.1, section=tapered, n_modes=5)
-
-
 def test_inertia_relief_leaves_no_rigid_motion():
     modes = analytic.disk(1.0, edge="free", mass=1.0, first_frequency=1.0, n_modes=4)
     points, weight = disk_quadrature(1.0, 30, 32)
-    load = np.array([[0.3, 0.55]])
-    response = np.array([modes.shapes.compliance(np.vstack([load, p[None]]))[0, 1] for p in points[::1]])
-    rigid = modes.shape_at(points)[:, :3]
-    assert (
-        np.abs(rigid.T @ (weight * response)).max() < 1e-4 * np.abs(response).max()
-    )  # 1e-5: the quadrature's error at the kink
+    response = modes.shapes.deflection(np.array([[0.3, 0.55]]), points)[:, 0]
+    left = np.abs(modes.shape_at(points)[:, :3].T @ (weight * response)).max()
+    assert left < 1e-4 * np.abs(response).max()  # 1e-5: the quadrature's error at the kink
 
 
 def test_scaled_modes_keep_form_and_follow_mass_and_frequency():
-    modes = analytic.disk(1.0, edge="free", mass=1.0, first_frequency=50.0, n_modes=30)
+    modes, at = analytic.disk(1.0, edge="free", mass=1.0, first_frequency=50.0, n_modes=30), [[0.2, 0.1]]
     other = modes.scaled(mass=4.0, first_frequency=100.0)
     assert_allclose(other.frequencies, 2.0 * modes.frequencies, rtol=1e-14)
-    assert_allclose(other.shape_at([[0.2, 0.1]]), 0.5 * modes.shape_at([[0.2, 0.1]]), rtol=1e-14)
-    assert_allclose(
-        other.residual_compliance([[0.2, 0.1]]), modes.residual_compliance([[0.2, 0.1]]) / 16.0, rtol=1e-9
-    )  # (1/2)**2 from mass, (1/2)**2 from frequency; the difference of sums loses some digits
+    assert_allclose(other.shape_at(at), 0.5 * modes.shape_at(at), rtol=1e-14)
+    # (1/2)**2 from mass, (1/2)**2 from frequency; the difference of sums loses some digits
+    assert_allclose(other.residual_compliance(at), modes.residual_compliance(at) / 16.0, rtol=1e-9)
 
 
 def test_truncated_modes_hand_the_rest_to_the_residual():
-    modes = analytic.rectangle(1.0, 1.0, mass=1.0, first_frequency=50.0, n_modes=60)
+    modes, at = analytic.rectangle(1.0, 1.0, mass=1.0, first_frequency=50.0, n_modes=60), [[0.3, 0.4]]
     fewer = modes.truncated(max_frequency=500.0)
-    point = [[0.3, 0.4]]
     assert fewer.frequencies[-1] <= 500.0 < modes.frequencies[fewer.n_modes]
-    complete = fewer.modal_compliance(point) + fewer.residual_compliance(point)
-    assert_allclose(complete, modes.modal_compliance(point) + modes.residual_compliance(point), rtol=1e-13)
+    complete, same = (each.modal_compliance(at) + each.residual_compliance(at) for each in (fewer, modes))
+    assert_allclose(complete, same, rtol=1e-13)
 
 
-@pytest.mark.parametrize(
-    "call, text",
-    [
-        (lambda: analytic.rectangle(-1.0, 1.0, mass=1.0, first_frequency=1.0, n_modes=3), "length must be positive"),
-        (lambda: analytic.rectangle(1.0, 1.0, mass=1.0, n_modes=3), "both mass"),
-        (lambda: analytic.rectangle(1.0, 1.0, mass=1.0, first_frequency=1.0), "n_modes or max_frequency"),
-        (lambda: analytic.beam(1.0, ends=("free", "fre"), mass=1.0, first_frequency=1.0, n_modes=3), "mean 'free'"),
-        (lambda: analytic.beam(1.0, ends="free", mass=1.0, first_frequency=1.0, n_modes=3), "two words"),
-        (lambda: analytic.disk(1.0, edge="open", mass=1.0, first_frequency=1.0, n_modes=3), "edge must be one of"),
-        (lambda: analytic.disk(1.0, mass=float("nan"), first_frequency=1.0, n_modes=3), "mass must be finite"),
-        (lambda: modal.Modes.rigid(1.0).stretched(1.0, 0), "frequency must be positive, got 0"),
-        (lambda: modal.Modes.rigid(1.0).stretched("3", 1.0), "mass must be a number, got '3'"),
-        (lambda: modal.rayleigh(1.0, 1e-6)([1.0, 0.0]), "frequency must be positive, got 0 Hz"),
-        (lambda: modal.rayleigh(1.0, 1e-6)(10**400), "frequency must be numbers in Hz"),
-        (lambda: modal.Modes.from_arrays([], [[1.0]], points=[(0.0,)], mass=1.0), "frequencies must not be empty"),
-    ],
-)
+DISK = analytic.disk(0.2, mass=1.0, first_frequency=1.0, n_modes=3)
+
+
+@pytest.mark.parametrize("call, text", [
+    (lambda: analytic.rectangle(-1.0, 1.0, mass=1.0, first_frequency=1.0, n_modes=3), "length must be positive"),
+    (lambda: analytic.beam(1.0, ends=("free", "fre"), mass=1.0, first_frequency=1.0, n_modes=3), "mean 'free'"),
+    (lambda: analytic.beam(1.0, ends="free", mass=1.0, first_frequency=1.0, n_modes=3), "two words"),
+    (lambda: analytic.disk(1.0, edge="open", mass=1.0, first_frequency=1.0, n_modes=3), "edge must be one of"),
+    (lambda: analytic.disk(1.0, mass=float("nan"), first_frequency=1.0, n_modes=3), "mass must be finite"),
+    (lambda: modal.Modes.rigid(1.0).stretched(1.0, 0), "frequency must be positive, got 0"),
+    (lambda: modal.Modes.rigid(1.0).stretched("3", 1.0), "mass must be a number, got '3'"),
+    (lambda: modal.rayleigh(1.0, 1e-6)([1.0, 0.0]), "frequency must be positive, got 0 Hz"),
+    (lambda: modal.rayleigh(1.0, 1e-6)(10**400), "frequency must be numbers in Hz"),
+    (lambda: modal.Modes.from_arrays([], [[1.0]], points=[(0.0,)], mass=1.0), "frequencies must not be empty"),
+    (lambda: DISK.shape_at([[0.3, 0.0]]), r"points must lie on the body, got \(0.3, 0\) m"),
+    (lambda: DISK.points("at", (0.2, 0.1)), r"at must lie on the body, got \(0.2, 0.1\) m"),
+])  # fmt: skip
 def test_bad_input_names_argument_and_rule(call, text):
     with pytest.raises(ValueError, match=text):
         call()
-
-
-def test_point_off_the_body_is_refused():
-    modes = analytic.disk(0.2, mass=1.0, first_frequency=1.0, n_modes=3)
-    with pytest.raises(ValueError, match=r"points must lie on the body, got \(0.3, 0\) m"):
-        modes.shape_at([[0.3, 0.0]])
-    with pytest.raises(ValueError, match=r"at must lie on the body, got \(0.2, 0.1\) m"):
-        modes.points("at", (0.2, 0.1))
 
 
 def test_rigid_motions_of_a_free_disk_are_those_of_its_mass_and_inertia():

@@ -1,8 +1,5 @@
 """Bodies from other programs: read, struck anywhere in any direction, and what is missing told."""
 
-import functools
-import warnings
-
 import numpy as np
 import pytest
 import xarray as xr
@@ -14,14 +11,12 @@ from fem_impact.modes import viewing
 
 pytestmark = pytest.mark.usefixtures("read_here")
 STEEL = fi.Material(E=210e9, nu=0.3, rho=7850.0)
+LAW = fi.Contact.linear(1e6)
 LOADS = [(1, (0.0, 0.0, 2.0)), (5, (0.0, 0.0, -1.0))]  # N
 
 
-def struck(modes, at, law=None, mass=0.05, tolerance=1e-2):
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", fi.ToleranceWarning)
-        law = law or fi.Contact.linear(1e6)
-        return fi.strike(modes, fi.Striker.rigid(mass), law, at=at, speed=1.0, tolerance=tolerance)
+def struck(modes, at, law=LAW, mass=0.05, tolerance=1e-2):
+    return fi.strike(modes, fi.Striker.rigid(mass), law, at=at, speed=1.0, tolerance=tolerance)
 
 
 def hinged(n_modes, n=(9, 7)):
@@ -56,13 +51,12 @@ def body_of(modes, points, loads=(), turn=None, **more):
 def test_a_body_of_our_own_comes_back_with_its_blow(make, n_modes):
     """The truth has 1000 modes; where the unit load is known, the rest of the body is exact."""
     many, points = make(1000 if make is hinged else 300)
-    few, _ = make(n_modes)
-    number = 12
+    few, law, number = make(n_modes)[0], fi.Contact.linear(2e4), 12
+    truth = struck(many, points[number - 1], law, tolerance=1e-5)
     for loads in ((), [(number, (0.0, 0.0, 3.0))]):
         body = body_of(few, points, loads)
         modes, at = body.modes("z"), body.at(number)
-        law = fi.Contact.linear(2e4)
-        found, truth = struck(modes, at, law), struck(many, points[number - 1], law, tolerance=1e-5)
+        found = struck(modes, at, law)
         assert abs(found.restitution - truth.restitution) <= found.error.total + truth.error.total
         assert abs(found.contact_time / truth.contact_time - 1.0) <= found.error.total + truth.error.total
         assert ("not stated of the target: static compliance" in found.verdict) is not bool(loads)
@@ -71,45 +65,39 @@ def test_a_body_of_our_own_comes_back_with_its_blow(make, n_modes):
             assert_allclose(modes.residual_compliance(at), few.residual_compliance(place), rtol=1e-9)
 
 
-@functools.cache
+@pytest.fixture(scope="module")
 def shell():
-    """A shallow cap of steel by our own elements: the system, 100 of its modes, its nodes in space and triangles."""
-    system = fi.assemble(
-        fi.mesh.rectangle(0.4, 0.3), fi.Plate(STEEL, 2e-3), {"boundary": "hinged"}, rise=fi.rise.cap(2.0)
-    )
-    modes = fi.find_modes(system, n_modes=100, damping_ratio=0.01)
-    points, cells = modes.shapes.grid()
-    return system, modes, viewing.placed(modes, points), cells
+    """A shallow cap of steel by our own elements, and 100 of its modes."""
+    plate, cap = fi.Plate(STEEL, 2e-3), fi.rise.cap(2.0)
+    system = fi.assemble(fi.mesh.rectangle(0.4, 0.3), plate, {"boundary": "hinged"}, rise=cap)
+    return system, fi.find_modes(system, n_modes=100, damping_ratio=0.01)
 
 
 @pytest.mark.slow
-@pytest.mark.xdist_group("shell")  # one worker finds its modes
-@pytest.mark.parametrize("n_modes", [5, 20, 100])
-def test_a_shell_of_our_own_comes_back_with_its_blow(n_modes):
+def test_a_shell_of_our_own_comes_back_with_its_blow(shell):
     """The truth is the blow on the shell itself, which finds its own modes and compliance."""
-    system, many, nodes, cells = shell()
-    few = many.truncated(n_modes=n_modes)
-    row = int(np.linalg.norm(nodes[:, :2] - (0.13, 0.11), axis=1).argmin())
-    shapes, static = np.zeros((len(nodes), 3, n_modes)), np.zeros((len(nodes), 3, 1))
-    shapes[:, 2] = few.shape_at(nodes[:, :2])
-    static[:, 2, 0] = few.shapes.deflection(nodes[[row], :2], nodes[:, :2])[:, 0]
-    law = fi.Contact.linear(5e5)
-    truth = fi.strike(
-        system, fi.Striker.rigid(0.05), law, at=nodes[row, :2], speed=1.0, tolerance=1e-3, damping_ratio=0.01
-    )
+    (system, many), law = shell, fi.Contact.linear(5e5)
+    points, cells = many.shapes.grid()
+    nodes = viewing.placed(many, points)
+    row = int(np.linalg.norm(points - (0.13, 0.11), axis=1).argmin())
+    how = {"at": points[row], "speed": 1.0, "tolerance": 1e-3, "damping_ratio": 0.01}
+    truth = fi.strike(system, fi.Striker.rigid(0.05), law, **how)
     assert truth.tolerance_met
-    for known in (False, True):
+    # measured: 0.39, 0.079 and 0.012 without the static solution, 0.37, 0.026 and 2.7e-4 with it
+    for n_modes, known, most in ((5, False, 0.5), (5, True, 0.5), (20, False, 0.1), (20, True, 0.1),
+                                 (100, False, 0.02), (100, True, 1e-3)):  # fmt: skip
+        few = many.truncated(n_modes=n_modes)
+        shapes, static = np.zeros((len(nodes), 3, n_modes)), np.zeros((len(nodes), 3, 1))
+        shapes[:, 2], static[:, 2] = few.shape_at(points), few.shapes.deflection(points[[row]], points)
         told = {"static": static, "loads": [(row + 1, (0.0, 0.0, 1.0))]} if known else {}
-        body = fi.Body(
-            few.frequencies, shapes, nodes, system.mass, damping_ratio=0.01, cells=cells, solid=False, **told
-        )
+        told |= {"damping_ratio": few.damping_ratio, "cells": cells, "solid": False}
+        body = fi.Body(few.frequencies, shapes, nodes, system.mass, **told)
         found = struck(body.modes("z", free=False), body.at(row + 1), law)
         for name in ("restitution", "contact_time", "peak_force"):
             one, two = getattr(found, name), getattr(truth, name)
             assert abs(one - two) <= (found.error.total + truth.error.total) * (1.0 if name == "restitution" else two)
         assert ("not stated of the target: static compliance" in found.verdict) is not known
-        # measured: 0.39, 0.079 and 0.012 without the static solution, 0.37, 0.026 and 2.7e-4 with it
-        assert found.error.total < {5: 0.5, 20: 0.1, 100: 1e-3 if known else 0.02}[n_modes]
+        assert found.error.total < most
 
 
 def test_the_same_body_turned_in_space_has_the_same_blow():
@@ -180,43 +168,28 @@ def test_arrays_and_tables_come_back(tmp_path):
         "damping_ratio": ("mode", body.damping_ratio),
     })  # fmt: skip
     for again in (fi.Body.load(body.save(tmp_path / "plate")), fi.Body.load(table)):
-        assert_allclose(again.modes("z").shapes.compliance(np.array([again.at(5)])),
-                        body.modes("z").shapes.compliance(np.array([body.at(5)])))  # fmt: skip
+        found, wanted = (each.modes("z").shapes.compliance(np.array([each.at(5)])) for each in (again, body))
+        assert_allclose(found, wanted)
         assert_allclose(again.modes("z").damping_ratio, 0.01)
     assert fi.Body.load(tmp_path / "plate.npz").at("middle") == body.at("middle")
 
 
-def test_rounding_of_rigid_motions_is_none(tmp_path):
-    bar, points = free_bar(4)
-    body = body_of(bar, points)
+def test_rounding_of_rigid_motions_is_none():
+    body = body_of(*free_bar(4))
     noisy = body.frequencies + np.array([1e-5, 2e-4, 0.0, 0.0, 0.0, 0.0])
-    table = xr.Dataset({"frequencies": ("m", noisy), "shapes": (("n", "x", "m"), body.shapes),
-                        "nodes": (("n", "x"), body.nodes)})  # fmt: skip
-    assert fi.Body.load(table, mass=1.0).modes("z").n_rigid == 2
+    told = {"shapes": (("n", "x", "m"), body.shapes), "nodes": (("n", "x"), body.nodes)}
+    assert fi.Body.load(xr.Dataset(told | {"frequencies": ("m", noisy)}), mass=1.0).modes("z").n_rigid == 2
 
 
-def test_soft_springs_are_no_rounding(tmp_path):
-    """Two masses of 1 kg on soft springs: 1 Hz, 225 Hz; 0 Hz would leave the springs' static deflection unexplained."""
-    stiffness = 1e6 * np.array([[1.0, -1.0], [-1.0, 1.0]]) + np.diag([40.0, 40.0])
-    nodes, dofs = np.array([(0.0, 0.0, 0.0), (1.0, 0.0, 0.0)]), np.array([(1, 1), (2, 1)])
-    body = fi.Body.from_matrices(np.eye(2), stiffness, nodes, dofs=dofs, total_mass=2.0)
-    matrices = {"mass_matrix": np.eye(2), "stiffness_matrix": stiffness, "nodes": nodes, "dofs": dofs}
-    for again in (fi.Body.load(matrices, mass=2.0), fi.Body.load(body.save(tmp_path / "soft"))):
-        assert_allclose(again.frequencies, np.sqrt([40.0, 2e6 + 40.0]) / (2.0 * np.pi), rtol=1e-9)
-
-
-@pytest.mark.parametrize(
-    ("change", "text"),
-    [
-        ({"shapes": np.zeros((63, 3, 2))}, r"shapes must have shape \(63, 3, 5\)"),
-        ({"numbers": np.ones(63)}, "numbers must differ"),
-        ({"cells": [[0, 1, 63]]}, "cells must be rows of nodes from 0 to 62"),
-        ({"names": {"rim": 99}}, "'rim' must be a node of the body, got 99"),
-        ({"loads": [(1, (0.0, 0.0, 1.0))]}, "loads must be given as .* for each of 0 static solutions, got 1"),
-        ({"loads": [(1, 2.0)]}, r"loads must have shape \(3\)"),
-        ({"names": {"rim": "a"}}, r"names\['rim'\] must be"),
-    ],
-)
+@pytest.mark.parametrize(("change", "text"), [
+    ({"shapes": np.zeros((63, 3, 2))}, r"shapes must have shape \(63, 3, 5\)"),
+    ({"numbers": np.ones(63)}, "numbers must differ"),
+    ({"cells": [[0, 1, 63]]}, "cells must be rows of nodes from 0 to 62"),
+    ({"names": {"rim": 99}}, "'rim' must be a node of the body, got 99"),
+    ({"loads": [(1, (0.0, 0.0, 1.0))]}, "loads must be given as .* for each of 0 static solutions, got 1"),
+    ({"loads": [(1, 2.0)]}, r"loads must have shape \(3\)"),
+    ({"names": {"rim": "a"}}, r"names\['rim'\] must be"),
+])  # fmt: skip
 def test_what_is_no_body_is_refused(change, text):
     plate, points = hinged(5)
     body = body_of(plate, points)

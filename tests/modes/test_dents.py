@@ -64,12 +64,9 @@ def test_plates_and_beams_have_no_dent():
 def test_where_nothing_tells_the_dent_all_is_an_error():
     """A load on a slant, and one among too few nodes."""
     body = solids.known("bar", 0, solids.STEEL)
-    slanted = fi.Body(body.frequencies, body.shapes, body.nodes, body.mass, static=body.static, loads=body.loads,
-                      solid=solids.STEEL, normals=np.tile([0.6, 0.0, 0.8], (len(body.nodes), 1)))  # fmt: skip
-    few = np.arange(9)
-    alone = fi.Body(body.frequencies, body.shapes[few], body.nodes[few], body.mass, static=body.static[few],
-                    loads=body.loads, solid=solids.STEEL)  # fmt: skip
-    for each in (slanted, alone):
+    for n, normals in ((len(body.nodes), np.tile([0.6, 0.0, 0.8], (len(body.nodes), 1))), (9, None)):
+        told = {"static": body.static[:n], "loads": body.loads, "solid": solids.STEEL, "normals": normals}
+        each = fi.Body(body.frequencies, body.shapes[:n], body.nodes[:n], body.mass, **told)
         hit = solids.struck(each.modes("z"), each.at(1))
         assert "around 1 of 1 unit loads too few nodes" in hit.summary()
         assert not hit.tolerance_met and hit.error.total > 0.1
@@ -91,7 +88,7 @@ def spread(r, patch):
 
 
 @pytest.mark.parametrize("beside", [False, True])
-@pytest.mark.parametrize("patch", [0.5e-3, 1.2e-3, 2.2e-3, 3.2e-3, 4.2e-3])
+@pytest.mark.parametrize("patch", [0.5e-3, 1.2e-3, 4.2e-3])
 def test_a_dent_in_solid_elements_is_an_error_where_deflections_hide_it(patch, beside):
     """Loads spread over up to four elements, and at the side of a flat cloud of points, by elements alone."""
     points, _ = half_space()
@@ -106,9 +103,8 @@ def test_a_dent_in_solid_elements_is_an_error_where_deflections_hide_it(patch, b
     dent = column[at] - 3e-9 - 2e-7 * points[at, 0]
     assert dent <= modes.shapes.dent(points[[at]])[0, 1] <= column[at] and "dent" in modes.unstated
     assert "1 of 1 unit loads dent the mesh, whose elements are solid" in modes.notes[-1]
-    assert bool(blind.shapes.dent(points[[at]])[0, 1] > 0.0) is (
-        patch < 1e-3 and not beside
-    )  # without it, nothing is seen
+    seen = bool(blind.shapes.dent(points[[at]])[0, 1] > 0.0)
+    assert seen is (patch < 1e-3 and not beside)  # without it, nothing is seen
 
 
 def test_a_solid_of_unknown_material_counts_the_dent_that_it_has():
@@ -119,14 +115,13 @@ def test_a_solid_of_unknown_material_counts_the_dent_that_it_has():
             assert 0.98 * dents_of[0][0] <= dents_of[1][1] <= 2.2 * dents_of[0][0]
 
 
-@pytest.mark.parametrize("solid", ["steel", (E,), (E, 0.7), (-E, NU), 1.0])
+WOOD = fi.Material.orthotropic(E_along=11e9, E_across=0.85e9, nu=0.37, G=0.7e9, rho=450.0)
+
+
+@pytest.mark.parametrize("solid", ["steel", (E,), (E, 0.7), (-E, NU), 1.0, WOOD])
 def test_what_is_no_solid_is_refused(solid):
-    points, column = half_space()
-    with pytest.raises(ValueError, match="solid must"):
-        known(points, column, solid=solid)
-    wood = fi.Material.orthotropic(E_along=11e9, E_across=0.85e9, nu=0.37, G=0.7e9, rho=450.0)
-    with pytest.raises(ValueError, match="solid must be an isotropic material"):
-        known(points, column, solid=wood)
+    with pytest.raises(ValueError, match="solid must be an isotropic material" if solid is WOOD else "solid must"):
+        known(*half_space(), solid=solid)
 
 
 def test_the_solid_is_kept_in_files(tmp_path):
@@ -139,11 +134,11 @@ def test_the_solid_is_kept_in_files(tmp_path):
 @pytest.mark.slow
 def test_maps_count_what_a_blow_counts():
     """Of a dent taken out, and of one that nobody stated."""
+    law, over = fi.Contact.between(solids.BALL, solids.STEEL), {"speed": [0.05, solids.SPEED]}
     for solid in (solids.STEEL, None):
         body = solids.known("bar", 0, solid)
-        blow = body.modes("z"), solids.BALL, fi.Contact.between(solids.BALL, solids.STEEL)
-        where = {"at": body.at(1), "speed": 0.1}
-        hit, table = solids.struck(blow[0], body.at(1)), fi.sweep(*blow, over={"speed": [0.05, solids.SPEED]}, **where)
+        modes, at = body.modes("z"), body.at(1)
+        hit, table = solids.struck(modes, at), fi.sweep(modes, solids.BALL, law, over=over, at=at, speed=0.1)
         assert_allclose(table.restitution[1], hit.restitution, atol=1e-4)
         assert_allclose(table.truncation[1], hit.error.total, rtol=0.02)
 

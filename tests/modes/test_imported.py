@@ -1,6 +1,5 @@
 """Files of other programs are read as bodies, and what they lack is said."""
 
-from contextlib import nullcontext
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -42,27 +41,27 @@ def test_universal_files_hold_bodies(tmp_path):
 def test_what_files_lack_is_said(tmp_path):
     plate, points = hinged(5)
     body = body_of(plate, points)
-    with pytest.raises(ValueError, match="direction must be one of normal, x, y, z"):
-        body.modes("up")
-    with pytest.raises(ValueError, match="direction must not be zero"):
-        body.modes((0.0, 0.0, 0.0))
     line = fi.Body([1.0], np.ones((3, 3, 1)), np.eye(3)[[0, 0, 0]] * [[0], [1], [2]], mass=1.0)
-    with pytest.raises(ValueError, match="neither cells nor a plane tell the normals"):
-        line.modes()
-    with pytest.raises(ValueError, match=r"files must be one of \.uff, .* got 'body.odb'; convert it"):
-        fi.Body.load(tmp_path / "body.odb", mass=1.0)
-    with pytest.raises(ValueError, match="files must hold modes"):
-        fi.Body.load(FILES / "plate.inp", mass=1.0)
     paths = [tmp_path / "one.npz", tmp_path / "two.npz"]
     body.save(paths[0])
     fi.Body(body.frequencies, body.shapes[:-1], body.nodes[:-1], mass=1.0, cells=np.zeros((0, 3), int)).save(paths[1])
-    with pytest.raises(ValueError, match="files must be about the same nodes; export all results of one"):
-        fi.Body.load(paths)
     told = {"shapes": (("n", "x", "m"), body.shapes), "nodes": (("n", "x"), body.nodes)}
-    with pytest.raises(ValueError, match="files must hold modes"):
-        fi.Body.load(xr.Dataset(told), mass=1.0)
-    with pytest.raises(ValueError, match="mass must be given in kg"):
-        fi.Body.load(xr.Dataset(told | {"frequencies": ("m", body.frequencies)}))
+    moved = xr.Dataset(told | {"frequencies": ("m", body.frequencies)})
+    for call, said in (
+        (lambda: body.modes("up"), "direction must be one of normal, x, y, z"),
+        (lambda: body.modes((0.0, 0.0, 0.0)), "direction must not be zero"),
+        (line.modes, "neither cells nor a plane tell the normals"),
+        (
+            lambda: fi.Body.load(tmp_path / "body.odb", mass=1.0),
+            r"files must be one of \.uff, .* 'body.odb'; convert it",
+        ),
+        (lambda: fi.Body.load(FILES / "plate.inp", mass=1.0), "files must hold modes"),
+        (lambda: fi.Body.load(paths), "files must be about the same nodes; export all results of one"),
+        (lambda: fi.Body.load(xr.Dataset(told), mass=1.0), "files must hold modes"),
+        (lambda: fi.Body.load(moved), "mass must be given in kg"),
+    ):
+        with pytest.raises(ValueError, match=said):
+            call()
 
 
 def test_models_of_sdypy_are_bodies():
@@ -115,22 +114,22 @@ def test_models_of_pyfbs_are_bodies():
 
 def test_a_negative_eigenvalue_is_a_rigid_motion_only_if_it_is_tiny():
     told = {"shapes": np.ones((1, 3, 3)), "nodes": np.zeros((1, 3)), "mass": 1.0}
-    body = fi.Body.load(told | {"frequencies": [-1e-6, 1e-3, 110.0]})
-    assert body.frequencies.tolist() == [0.0, 0.0, 110.0]
-    for wrong, said in (("ab", "be numbers in Hz, got 'ab'"), (1.0, r"have shape"), (np.ones((2, 2)), r"have shape")):
-        with pytest.raises(ValueError, match=f"frequencies must {said}"):
+    assert fi.Body.load(told | {"frequencies": [-1e-6, 1e-3, 110.0]}).frequencies.tolist() == [0.0, 0.0, 110.0]
+    for wrong, said in (
+        ("ab", "frequencies must be numbers in Hz, got 'ab'"),
+        (1.0, r"frequencies must have shape"),
+        (np.ones((2, 2)), r"frequencies must have shape"),
+        ([1.0, 2.0], r"shapes must be as many as the 2 frequencies, got them in shape \(1, 3, 3\)"),
+        ([-40.0, 1e-3, 110.0], "a stable body, but the mode at -40 Hz has a negative eigenvalue, too large"),
+    ):
+        with pytest.raises(ValueError, match=said):
             fi.Body.load(told | {"frequencies": wrong})
-    with pytest.raises(ValueError, match=r"shapes must be as many as the 2 frequencies, got them in shape \(1, 3, 3\)"):
-        fi.Body.load(told | {"frequencies": [1.0, 2.0]})
-    with pytest.raises(ValueError, match="a stable body, but the mode at -40 Hz has a negative eigenvalue, too large"):
-        fi.Body.load(told | {"frequencies": [-40.0, 1e-3, 110.0]})
 
 
 def test_a_mode_told_twice_is_refused():
     """Two modes of one frequency differ at some of four nodes, and at fewer they may not."""
     shapes = np.random.default_rng(1).normal(size=(4, 3, 2))[..., [0, 1, 1]]
-    for n in (1, 4):
-        told = {"nodes": np.eye(4, 3)[:n], "mass": 1.0, "frequencies": [9.0, 90.0, 90.0], "shapes": shapes[:n]}
-        said = "files must hold each mode once, but that at 90 Hz is there twice"
-        with pytest.raises(ValueError, match=said) if n == 4 else nullcontext():
-            fi.Body.load(told)
+    told = {"nodes": np.eye(4, 3), "mass": 1.0, "frequencies": [9.0, 90.0, 90.0], "shapes": shapes}
+    fi.Body.load(told | {"nodes": np.eye(1, 3), "shapes": shapes[:1]})
+    with pytest.raises(ValueError, match="files must hold each mode once, but that at 90 Hz is there twice"):
+        fi.Body.load(told)

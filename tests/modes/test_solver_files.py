@@ -49,11 +49,9 @@ def test_matrices_of_abaqus_beside_its_mesh(tmp_path):
     cells = [f"{i}, {10 * i}, {10 * i + 10}" for i in range(1, N + 1)]
     deck = ["*HEADING", "*NODE", *mesh, "*ELEMENT, TYPE=B31", *cells, "*NSET, NSET=quarter", "60", ""]
     (tmp_path / "bar.inp").write_text("\n".join(deck))
+    labels = [f"{10 * (i + 1)},{way}" for i in range(N + 1) for way in range(1, 7)]
     for name, matrix in (("bar_STIF1", K), ("bar_MASS1", M)):
-        rows = [
-            f"{10 * (i // 6 + 1)},{i % 6 + 1}, {10 * (j // 6 + 1)},{j % 6 + 1}, {matrix[i, j]:.16e}"
-            for i, j in zip(*np.nonzero(np.tril(matrix)))
-        ]
+        rows = (f"{labels[i]}, {labels[j]}, {matrix[i, j]:.16e}" for i, j in zip(*np.nonzero(np.tril(matrix))))
         (tmp_path / f"{name}.mtx").write_text("\n".join(["** Assembled", *rows, ""]))
     body = fi.Body.load([tmp_path / name for name in ("bar.inp", "bar_STIF1.mtx", "bar_MASS1.mtx")])
     assert body.at("quarter") == pytest.approx((0.1,)) and body.numbers[5] == 60
@@ -75,9 +73,7 @@ def block(n=(3, 2, 2), sides=(0.3, 0.2, 0.1)):
     number = np.arange(len(points)).reshape([count + 1 for count in n])
     corners = [(0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0), (0, 0, 1), (1, 0, 1), (1, 1, 1), (0, 1, 1)]
     cells = np.array([[number[tuple(np.add(low, each))] for each in corners] for low in np.ndindex(*n)])
-    top = np.array([[number[i, j, -1], number[i + 1, j, -1], number[i + 1, j + 1, -1], number[i, j + 1, -1]]
-                    for i, j in np.ndindex(*n[:2])])  # fmt: skip
-    return points, cells, top
+    return points, cells, cells.reshape(*n, 8)[:, :, -1, 4:].reshape(-1, 4)
 
 
 def written_med(path, fields, rows=None):
@@ -90,20 +86,21 @@ def written_med(path, fields, rows=None):
     mesh.point_tags = {1: ["corner"]}
     mesh.write(path)
     names = b"".join(name.ljust(16).encode() for name in ("DX", "DY", "DZ", "DRX"))
+    profile = "MED_NO_PROFILE_INTERNAL" if rows is None else "SOME"
+    kept = slice(None) if rows is None else rows
     with h5py.File(path, "r+") as file:
         for name, steps in fields.items():
             field = file["CHA"].create_group(name)
             field.attrs.update({"MAI": np.bytes_("mesh"), "NCO": 4, "NOM": np.bytes_(names), "TYP": 6})
-            for k, (time, values) in enumerate(steps):
-                step = field.create_group(f"{k + 1:020d}{k + 1:020d}")
-                step.attrs.update({"NDT": k + 1, "NOR": k + 1, "PDT": float(time)})
-                profile = "MED_NO_PROFILE_INTERNAL" if rows is None else "SOME"
+            for k, (time, values) in enumerate(steps, 1):
+                step = field.create_group(f"{k:020d}{k:020d}")
+                step.attrs.update({"NDT": k, "NOR": k, "PDT": float(time)})
                 nodal = step.create_group("NOE")
                 nodal.attrs["PFL"] = np.bytes_(profile)
-                kept = values if rows is None else values[rows]
                 data = nodal.create_group(profile)
-                data.attrs["NBR"] = len(points) if rows is not None else len(kept)
-                data.create_dataset("CO", data=np.column_stack([kept, np.zeros(len(kept))]).ravel(order="F"))
+                data.attrs["NBR"] = len(points)
+                moved = np.pad(values[kept], ((0, 0), (0, 1)))
+                data.create_dataset("CO", data=moved.ravel(order="F"))
         if rows is not None:
             place = file.create_group("PROFILS").create_group("SOME")
             place.attrs["NBR"] = len(rows)
@@ -117,17 +114,14 @@ def test_modes_and_static_solutions_of_code_aster(tmp_path, partly):
     points, rng = block()[0], np.random.default_rng(0)
     values = rng.standard_normal((4, len(points), 3))
     rows = np.flatnonzero(points[:, 2] > 0.0) if partly else None
-    fields = {
-        "MODES___DEPL": [(150.0, values[0]), (90.0, values[1]), (400.0, values[2])],
-        "STAT____DEPL": [(0.0, values[3])],
-    }
-    path, corner = written_med(tmp_path / "block.med", fields, rows), (0.3, 0.2, 0.1)
+    fields = {"MODES___DEPL": zip((150.0, 90.0, 400.0), values), "STAT____DEPL": [(0.0, values[3])]}
+    path = written_med(tmp_path / "block.med", fields, rows)
     body = fi.Body.load(path, mass=3.0, loads=[(len(points), (0.0, 0.0, 1.0))])
     wanted = np.where((points[:, 2:] > 0.0) | (not partly), values, 0.0)
     assert_allclose(body.frequencies, [90.0, 150.0, 400.0])
     assert_allclose(body.shapes, np.moveaxis(wanted[[1, 0, 2]], 0, 2))
     assert_allclose(body.static[:, :, 0], wanted[3])
-    assert body.solid is True and body.at("corner") == pytest.approx(corner)
+    assert body.solid is True and body.at("corner") == pytest.approx((0.3, 0.2, 0.1))
     assert len(body.cells) == 2 * 2 * (3 * 2 + 3 * 2 + 2 * 2)  # two triangles a face, each once
 
 
@@ -136,12 +130,10 @@ def test_meshes_of_abaqus_tell_shells_from_solids(tmp_path):
     points, cells, top = block()
     for kind, name, rows, solid in (("C3D8", "solid", cells, True), ("S4R", "shell", top, ())):
         used = np.unique(rows)
-        lines = ["*Heading", "** written by hand", "*Node, nset=all"]
-        lines += [f"{100 + i}, " + ", ".join(f"{x:.6g}" for x in points[i]) for i in used]
-        lines += [f"*Element, type={kind}"]
-        lines += [f"{k + 1}, " + ", ".join(str(100 + i) for i in row) for k, row in enumerate(rows)]
-        lines += ["*Nset, nset=corner", f"{100 + used[-1]},", ""]
-        (tmp_path / f"{name}.inp").write_text("\n".join(lines))
+        nodes = [f"{100 + i}, " + ", ".join(f"{x:.6g}" for x in points[i]) for i in used]
+        elements = [f"{k + 1}, " + ", ".join(str(100 + i) for i in row) for k, row in enumerate(rows)]
+        lines = ["*Heading", "** written by hand", "*Node, nset=all", *nodes, f"*Element, type={kind}", *elements]
+        (tmp_path / f"{name}.inp").write_text("\n".join([*lines, "*Nset, nset=corner", f"{100 + used[-1]},", ""]))
         shapes = np.random.default_rng(0).standard_normal((len(used), 3, 2))
         modes = {"frequencies": [50.0, 80.0], "shapes": shapes}
         body = fi.Body.load([tmp_path / f"{name}.inp", modes], mass=1.0)

@@ -15,7 +15,6 @@ from test_cli import TEXT
 from test_explore_bench import LEAF
 from test_interrupt import RUNNER
 
-from fem_impact import cli
 from fem_impact.pages import explore_view
 from fem_impact.scenes.sentences import si
 
@@ -71,17 +70,24 @@ def ask(address, host=None, path="/", method="GET", **headers):
             return answer.status
 
 
-def test_other_hosts_are_refused(address):
+@pytest.mark.parametrize("host", ["evil.example", "evil.example:80", "127.0.0.1.evil.example", "", "127.0.0.1"])
+def test_other_hosts_are_refused(address, host):
     assert ask(address) == 200
-    for host in ("evil.example", "evil.example:80", "127.0.0.1.evil.example", "", "127.0.0.1"):
-        for path in ("/", "/talk", "/explore.js", "/nowhere"):
-            assert ask(address, host, path) == 403
+    assert {ask(address, host, path) for path in ("/", "/talk", "/explore.js", "/nowhere")} == {403}
 
 
 def test_pages_elsewhere_cannot_speak_to_it(address):
     upgrade = {"Upgrade": "websocket", "Connection": "Upgrade", "Sec_WebSocket_Version": "13"}
     upgrade |= {"Sec_WebSocket_Key": "dGhlIHNhbXBsZSBub25jZQ=="}
     assert ask(address, None, "/talk", Origin="http://evil.example", **upgrade) == 403
+
+
+def test_a_file_from_elsewhere_is_refused(address):
+    for origin in ({}, {"Origin": "http://evil.example"}):
+        assert ask(address, None, "/drop?name=a.svg", "POST", Content_Length="0", **origin) == 403
+    own = {"Origin": address.rstrip("/"), "Content_Length": "0"}
+    assert ask(address, None, "/drop?name=a.toml", "POST", **own) == 400
+    assert ask(address, None, "/drop?name=..%2Fa.svg", "POST", **own) == 200
 
 
 def test_large_requests_are_cut_off(address):
@@ -96,39 +102,30 @@ def test_only_this_machine_is_served(address):
         socket.create_connection(("127.0.0.2", port), timeout=60).close()
 
 
-def test_port_that_is_taken_is_a_sentence(scene, address, capsys):
-    port = address.rstrip("/").rpartition(":")[2]
-    assert cli.main(["explore", str(scene), "--no-open", "--port", port]) == 1
-    assert capsys.readouterr().err.count("\n") == 1
-    assert cli.main(["explore", str(scene), "--no-open", "--port", "70000"]) == 2
-    assert "port must lie between 0 and 65535, got 70000" in capsys.readouterr().err
+def test_a_port_that_is_taken_or_none_is_a_sentence(scene, address, prompt):
+    taken = prompt("explore", scene, "--no-open", "--port", address.rstrip("/").rpartition(":")[2])
+    assert taken.status == 1 and taken.err.count("\n") == 1
+    wrong = prompt("explore", scene, "--no-open", "--port", "70000")
+    assert wrong.status == 2 and "port must lie between 0 and 65535, got 70000" in wrong.err
 
 
-def test_missing_extra_is_named(scene, capsys, monkeypatch):
-    monkeypatch.setitem(sys.modules, "tornado", None)
-    assert cli.main(["explore", str(scene), "--no-open"]) == 2
-    assert "exploring needs tornado: pip install 'fem-impact[web]'" in capsys.readouterr().err
-
-
-def test_nothing_fails_and_nothing_is_asked_for_elsewhere(opened, address):
-    shown = opened()
-    shown.until("document.documentElement.dataset.map !== undefined")
-    assert shown.errors == []
-    own = (address, address.replace("http", "ws", 1), "data:")
-    assert [url for url in shown.requests if not url.startswith(own)] == []
-    assert shown.tab.title() == "<b>small</b>" and shown.tab.locator("h1").inner_text() == "<b>small</b>"
-
-
-def test_sliders_change_the_pictures(opened):
+def test_nothing_is_asked_for_elsewhere_and_sliders_change_the_pictures(opened, address):
     shown, turn = opened(), import_module("explore_speed").TURN
     shown.until(MAP)
+    assert shown.tab.title() == "<b>small</b>" and shown.tab.locator("h1").inner_text() == "<b>small</b>"
+
+    def pictures():
+        return [shown.tab.locator(f"#{plot}-plot").screenshot() for plot in ("map", "force", "spectrum")]
+
+    after = pictures()
     for name in SLIDERS:
-        before = [shown.tab.locator(f"#{plot}-plot").screenshot() for plot in ("map", "force", "spectrum")]
+        before = after
         shown.tab.evaluate(turn, name)  # until everything is answered; how fast: studies/benchmarks/explore_speed.py
-        after = [shown.tab.locator(f"#{plot}-plot").screenshot() for plot in ("map", "force", "spectrum")]
+        after = pictures()
         assert before[1] != after[1] and before[2] != after[2], name
         assert before[0] != after[0] or name not in ("mass", "stiffness")
-    assert shown.errors == []
+    own = (address, address.replace("http", "ws", 1), "data:")
+    assert [url for url in shown.requests if not url.startswith(own)] == [] and shown.errors == []
 
 
 @pytest.mark.slow
@@ -140,6 +137,22 @@ def test_click_moves_the_strike_point_and_the_verdict_follows(opened):
     assert shown.tab.inner_text("#verdict").startswith("Restitution 0.")
     assert "refining" not in shown.tab.inner_text("#numbers")
     assert shown.tab.inner_text("#what").startswith("the first ")
+
+
+@pytest.mark.slow
+def test_a_click_moves_the_listening_point_too(opened):
+    shown = opened()
+    shown.until(MAP)
+    shown.tab.get_by_label("Click listens").check()
+    before = shown.tab.locator("#body-plot").screenshot(), shown.tab.inner_text("#numbers")
+    click(shown, "body", 0.6, 0.4)
+    shown.until("document.documentElement.dataset.rested === '2'")
+    assert shown.tab.locator("#body-plot").screenshot() != before[0]
+    assert shown.tab.evaluate("document.getElementById('x').value === document.getElementById('x').defaultValue")
+    shown.tab.click("#listen")
+    # a strike before may have been heard already, from where the listener was
+    heard = "document.getElementById('heard').innerText"
+    shown.until(f"{heard}.includes('full scale') && !{heard}.includes('(0.1395, 0.09)')")
 
 
 @pytest.mark.slow
@@ -229,25 +242,9 @@ def test_button_plays_the_sound(opened):
 
 
 @pytest.mark.slow
-def test_a_click_moves_the_listening_point_too(opened):
-    shown = opened()
-    shown.until(MAP)
-    shown.tab.get_by_label("Click listens").check()
-    before = shown.tab.locator("#body-plot").screenshot(), shown.tab.inner_text("#numbers")
-    click(shown, "body", 0.6, 0.4)
-    shown.until("document.documentElement.dataset.rested === '2'")
-    assert shown.tab.locator("#body-plot").screenshot() != before[0]
-    assert shown.tab.evaluate("document.getElementById('x').value === document.getElementById('x').defaultValue")
-    shown.tab.click("#listen")
-    # a strike before may have been heard already, from where the listener was
-    heard = "document.getElementById('heard').innerText"
-    shown.until(f"{heard}.includes('full scale') && !{heard}.includes('(0.1395, 0.09)')")
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("width", [390, 768, 1280])
-def test_the_map_stands_with_its_legend_and_each_slider_with_what_it_changes(opened, width):
-    shown = opened(width=width, height=900)
+@pytest.mark.parametrize(("width", "scheme"), [(375, "light"), (375, "dark"), (768, "dark"), (1280, "light")])
+def test_the_map_stands_with_its_legend_and_each_slider_with_what_it_changes(opened, width, scheme):
+    shown = opened(width=width, height=700, color_scheme=scheme)
     assert shown.tab.evaluate("document.documentElement.scrollWidth") == width
     cards = shown.tab.locator(".card").evaluate_all(
         """cards => cards.map(card => [
@@ -260,7 +257,7 @@ def test_the_map_stands_with_its_legend_and_each_slider_with_what_it_changes(ope
         assert card[7] >= 0 and card[5] <= width and figure[2] > 0.5 * min(card[2], 540)
         if legend:
             assert 0 <= legend[4] - figure[6] < 40 and legend[7] >= card[7] and legend[5] <= card[5]
-        if width == 390:
+        if width == 375:
             assert hands[4] >= figure[6]  # below
         else:
             assert hands[7] >= figure[5] and hands[4] < figure[6]  # beside
@@ -275,37 +272,12 @@ def test_the_map_stands_with_its_legend_and_each_slider_with_what_it_changes(ope
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("scheme", ["light", "dark"])
-def test_page_fits_a_phone(opened, scheme):
-    shown = opened(width=375, height=700, color_scheme=scheme)
-    assert shown.tab.evaluate("document.documentElement.scrollWidth") == 375
-    canvases = shown.tab.locator("figure").evaluate_all("all => all.map(f => f.getBoundingClientRect().right)")
-    assert len(canvases) == 4 and max(canvases) <= 375
-
-
-@pytest.mark.slow
 def test_keyboard_turns_every_slider(opened):
     shown = opened()
     stops = shown.tabbed_to()
-    names = [name for _, name, _ in stops]
-    for name in [
-        *SLIDERS,
-        "height",
-        "rate",
-        "damping",
-        "thickness",
-        "loss",
-        "listen",
-        "roll",
-        "closer",
-        "player",
-        "file",
-        "pick-mallet",
-        "keep",
-        "midi",
-    ]:
-        assert name in names
-    assert [stop for stop in stops if not stop[2]] == []
+    names = {name for _, name, _ in stops}
+    others = "height rate damping thickness loss listen roll closer player file pick-mallet keep midi"
+    assert {*SLIDERS, *others.split()} <= names and [stop for stop in stops if not stop[2]] == []
     before = shown.tab.inner_text("#mass-said")
     shown.tab.focus("#mass")
     shown.tab.keyboard.press("ArrowRight")
@@ -390,10 +362,9 @@ def test_keys_and_midi_strike_kept_blows_at_other_speeds(opened):
             document.activeElement.blur();
         }"""
     )
-    rung = 0
-    for key in ("a", "q", "q", "z", " "):  # as kept, twice as fast, the same from memory, half as fast, the present
-        rung += 1
-        shown.tab.keyboard.press(key if key != " " else "Space")
+    # as kept, twice as fast, the same from memory, half as fast, the present
+    for rung, key in enumerate(("a", "q", "q", "z", "Space"), 1):
+        shown.tab.keyboard.press(key)
         shown.until(f"document.documentElement.dataset.rung === '{rung}'")
     shown.tab.click("#midi")
     shown.until("document.getElementById('midi-said').textContent.startsWith('Listening to Keys')")
@@ -405,11 +376,3 @@ def test_keys_and_midi_strike_kept_blows_at_other_speeds(opened):
     shown.tab.click("#midi")
     shown.until("document.getElementById('midi-said').textContent.startsWith('This browser has no Web MIDI')")
     assert shown.errors == []
-
-
-def test_a_file_from_elsewhere_is_refused(address):
-    for origin in ({}, {"Origin": "http://evil.example"}):
-        assert ask(address, None, "/drop?name=a.svg", "POST", Content_Length="0", **origin) == 403
-    own = {"Origin": address.rstrip("/"), "Content_Length": "0"}
-    assert ask(address, None, "/drop?name=a.toml", "POST", **own) == 400
-    assert ask(address, None, "/drop?name=..%2Fa.svg", "POST", **own) == 200

@@ -45,8 +45,8 @@ def test_names_replace_tables_of_a_scene_and_nothing_is_left_of_them(scene):
     assert made.make_contact() == fi.strikers.entry("steel, 10 mm").contact(on=fi.materials["steel, mild"])
     assert tuple(made.blow.values["at"]) == at and made.body().points.tolist() == scene.body().points.tolist()
     assert explore_bench.built(scene, Order()).data() == scene.data()
-    rescaled = scene.data() | {"target": {"mass": 3.0, "damping_ratio": 0.1}}
-    rescaled = scene_of(rescaled, scene.path, folder=scene.path.parent)
+    tables = scene.data() | {"target": {"mass": 3.0, "damping_ratio": 0.1}}
+    rescaled = scene_of(tables, scene.path, folder=scene.path.parent)
     assert explore_bench.built(rescaled, Order(material="brass")).target.values.get("mass") is None
 
 
@@ -63,8 +63,7 @@ def test_what_the_scene_says_in_another_way_cannot_be_picked(scene):
 def test_the_page_offers_every_name_of_the_catalogue_once(scene):
     offered = explore_bench.pickable(scene, Order(), scene)
     for key, names in (("materials", fi.materials), ("mallets", fi.strikers)):
-        listed = [name for _, group in offered[key] for name in group]
-        assert sorted(listed) == sorted(names)
+        assert sorted(name for _, group in offered[key] for name in group) == sorted(names)
     assert offered["units"] == [] and offered["thickness"] == 1e3 * scene.data()["section"]["thickness"]
 
 
@@ -79,13 +78,13 @@ def test_names_of_dropped_files_lead_nowhere_else():
 
 def test_points_stay_where_the_body_stays(tmp_path):
     before, at = Order(tmp_path / "leaf.svg", material="brass", thickness=2e-3), (0.1, 0.2)
-    assert explore_bench.order_of({"mallet": "yarn, soft"}, tmp_path, before, at) == replace(
-        before, mallet="yarn, soft", at=at
-    )
-    other = explore_bench.order_of({"drawing": "b.svg"}, tmp_path, before, at)
-    assert other == replace(before, drawing=tmp_path / "b.svg", dropped=True)
-    assert explore_bench.order_of({"unit": "in"}, tmp_path, before, at).at is None
-    assert explore_bench.order_of({"drawing": "", "material": ""}, tmp_path, before, at).drawing is None
+
+    def order(**wish):
+        return explore_bench.order_of(wish, tmp_path, before, at)
+
+    assert order(mallet="yarn, soft") == replace(before, mallet="yarn, soft", at=at)
+    assert order(drawing="b.svg") == replace(before, drawing=tmp_path / "b.svg", dropped=True)
+    assert order(unit="in").at is None and order(drawing="", material="").drawing is None
 
 
 def test_a_saved_scene_names_a_dropped_file_without_the_folder_that_ends(scene, leaf):

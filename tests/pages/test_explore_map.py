@@ -28,18 +28,15 @@ def whole(stand):
 
 def counted(stand, picture, cells):
     """How many of some cells (row, column) hold the count of the blow itself."""
-    alike = 0
-    for i, j in cells:
-        blow = stand.case(replace(stand.start, mass=picture.mass[j], stiffness=picture.stiffness[i]))
-        alike += min(blow.blow().n_impacts, explore_map.MORE) == picture.n_impacts[i, j]
-    return alike
+    blows = [stand.case(replace(stand.start, mass=picture.mass[j], stiffness=picture.stiffness[i])).blow()
+             for i, j in cells]  # fmt: skip
+    return sum(min(hit.n_impacts, explore_map.MORE) == picture.n_impacts[i, j] for hit, (i, j) in zip(blows, cells))
 
 
 def test_map_counts_as_single_blows_do(stand, mapper):
     picture = mapper.first(stand.start, whole(stand))
-    rows, columns = picture.n_impacts.shape
     rng = np.random.default_rng(3)
-    cells = [(int(i), int(j)) for i, j in zip(rng.integers(0, rows, 8), rng.integers(0, columns, 8))]
+    cells = list(zip(*(rng.integers(0, size, 8) for size in picture.n_impacts.shape)))
     assert counted(stand, picture, cells) >= 7  # one may graze: 1e-2 here
     assert (picture.n_impacts == 1).any() and (picture.n_impacts > 1).any()
 
@@ -49,13 +46,12 @@ def test_limit_is_where_the_contact_resonates_at_the_threshold(stand, mapper):
     picture = mapper.first(settings, whole(stand))
     there = replace(settings, mass=picture.limit_mass[5], stiffness=picture.limit[5])
     assert stand.case(there).resonance == pytest.approx(picture.threshold[5], rel=1e-9)  # one formula solved for two
-    alone = explore_model.limit_of(stand.case(there))
-    assert picture.threshold[5] == pytest.approx(alone, rel=1e-9)  # several hammers at once, to rounding
+    # several hammers at once, to rounding
+    assert picture.threshold[5] == pytest.approx(explore_model.limit_of(stand.case(there)), rel=1e-9)
 
 
 def test_limit_of_a_part_is_that_of_the_whole_map_in_between(stand, mapper):
-    part = explore_map.Window.of(stand, (0.02, 0.03), None)
-    picture = mapper.first(stand.start, part)
+    picture = mapper.first(stand.start, explore_map.Window.of(stand, (0.02, 0.03), None))
     case = stand.case(stand.start)
     felt = case.striker.felt_mass / case.striker.mass
     exact = threshold.thresholds(case.modes, case.at, felt * picture.mass)
@@ -72,7 +68,7 @@ def test_finer_map_keeps_the_coarse_one_and_counts_its_borders(stand, mapper):
     assert (fine.mass[0], fine.mass[-1]) == pytest.approx(window.mass)
     rows, columns = (np.diff(fine.n_impacts, axis=axis) != 0 for axis in (0, 1))
     edge = np.argwhere(rows[:, :-1] | columns[:-1])
-    some = [tuple(cell) for cell in edge[:: max(1, len(edge) // 8)]]
+    some = edge[:: max(1, len(edge) // 8)]
     assert len(some) >= 8 and counted(stand, fine, some) >= len(some) - 2  # right at a border, errors of 1e-2 decide
 
 
@@ -117,9 +113,8 @@ def test_limit_under_a_hard_layer_is_where_the_contact_resonates_at_the_threshol
     setup = replace(stand, base=replace(stand.base, contact=law))
     picture = explore_map.Mapper(setup).first(setup.start, whole(setup))
     assert (picture.n_impacts > 0).all()
-    told = np.flatnonzero(np.isfinite(picture.limit))
-    assert len(told)
-    for i in told:
+    assert np.isfinite(picture.limit).any()
+    for i in np.flatnonzero(np.isfinite(picture.limit)):
         there = replace(setup.start, mass=picture.limit_mass[i], stiffness=picture.limit[i])
         # between two rows of the map the logarithms are taken for straight
         assert setup.case(there).resonance == pytest.approx(picture.threshold[i], rel=0.1)

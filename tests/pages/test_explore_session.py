@@ -64,21 +64,26 @@ def follow(explorer, monkeypatch, *messages, until=lambda said: True, rest=0.0, 
     return said, session, workers
 
 
+WINDOW = {"mass": [0.02, 0.04], "stiffness": [1.0, 10.0]}
 ANSWERED = {"until": lambda said: any(one["kind"] == "rest" for one in said), "rest": 60.0}
+
+
+def mapped(said):
+    """What was sent with a map."""
+    return [one for one in said if one.get("columns")]
 
 
 def test_force_and_numbers_come_first_then_the_rest_then_the_verdict(explorer, monkeypatch):
     def done(said):
-        return any(one.get("exact") for one in said) and sum("columns" in one for one in said) >= 3
+        return any(one.get("exact") for one in said) and len(mapped(said)) >= 3
 
     said, _, _ = follow(explorer, monkeypatch, {"number": 1, "turn": {"mass": 0.02}}, until=done)
     assert [one["kind"] for one in said[:2]] == ["blow", "rest"]
     first, exact = said[0], next(one for one in said if one.get("exact"))
     assert first["mass"] == 0.02 and first["said"]["mass"] == si(0.02, "kg", 3)
     assert "verdict" not in first and exact["verdict"]
-    columns = [one["columns"] for one in said if one.get("columns")]
-    assert columns[:2] == [25, 49]  # coarse first, then finer
-    assert [one["exact"] for one in said if one.get("columns")][:3] == [False, False, False]
+    assert [one["columns"] for one in mapped(said)[:2]] == [25, 49]  # coarse first, then finer
+    assert not any(one["exact"] for one in mapped(said)[:3])
 
 
 def test_a_hand_that_does_not_rest_is_neither_judged_nor_mapped(explorer, monkeypatch):
@@ -90,13 +95,8 @@ def test_a_hand_that_does_not_rest_is_neither_judged_nor_mapped(explorer, monkey
 
 
 def test_a_window_is_mapped_at_once(explorer, monkeypatch):
-    def mapped(said):
-        return any(one.get("columns") for one in said)
-
-    window = {"mass": [0.02, 0.04], "stiffness": [1.0, 10.0]}
-    said, _, _ = follow(explorer, monkeypatch, {"view": window}, until=mapped, rest=60.0)
-    found = next(one for one in said if one.get("columns"))
-    assert (found["mass"], found["stiffness"]) == (pytest.approx([0.02, 0.04]), pytest.approx([1.0, 10.0]))
+    said, _, _ = follow(explorer, monkeypatch, {"view": WINDOW}, until=mapped, rest=60.0)
+    assert all(mapped(said)[0][name] == pytest.approx(ends) for name, ends in WINDOW.items())
 
 
 def test_way_back_is_drawn_even_if_the_map_in_between_was_not_finished(explorer, monkeypatch):
@@ -109,7 +109,7 @@ def test_way_back_is_drawn_even_if_the_map_in_between_was_not_finished(explorer,
         while not any(one.get("columns") == 49 for one in said):
             await asyncio.sleep(0.001)
         await asyncio.sleep(0.01)  # the whole map is done
-        session.obey({"view": {"mass": [0.02, 0.04], "stiffness": [1.0, 10.0]}})
+        session.obey({"view": WINDOW})
         while said[-1].get("mass", [0.0])[0] != pytest.approx(0.02):
             await asyncio.sleep(0.0)
         session.obey({"view": None})  # before its finer form is there
@@ -149,7 +149,7 @@ def test_values_beyond_a_slider_become_its_end(explorer, monkeypatch):
 
 
 @pytest.mark.parametrize(
-    ("message", "stays"), [({"turn": {"x": -0.01, "y": 0.1}}, "strike"), ({"ear": [9.0, 0.1]}, "listening")]
+    "message, stays", [({"turn": {"x": -0.01, "y": 0.1}}, "strike"), ({"ear": [9.0, 0.1]}, "listening")]
 )
 def test_a_click_beside_the_body_moves_nothing_and_says_so(explorer, monkeypatch, message, stays):
     said, session, _ = follow(explorer, monkeypatch, {"number": 1, **message}, **ANSWERED)
@@ -160,14 +160,10 @@ def test_a_click_beside_the_body_moves_nothing_and_says_so(explorer, monkeypatch
 def test_where_the_body_does_not_move_nothing_is_heard(explorer, monkeypatch):
     corner = {"number": 1, "turn": {"x": 0.0, "y": 0.0}}
 
-    def heard(said):
-        return any(one["kind"] == "sound" and "Computing" not in one["note"] for one in said)
-
     said, session, _ = follow(explorer, monkeypatch, corner, **ANSWERED)
     assert session.settings.at == (0.0, 0.0) and said[0]["note"].startswith("The body does not move at (0, 0)")
     settings, middle = session.settings, explorer.setup.start
-    silent = [(settings, middle.at, 0.0), (settings, middle.at, 1.0), (middle, (0.0, 0.0), 0.0)]
-    for struck, where, height in silent:
+    for struck, where, height in ((settings, middle.at, 0.0), (settings, middle.at, 1.0), (middle, (0.0, 0.0), 0.0)):
         sound = explorer.listen(struck, where, height, None)
         assert sound["uri"] == "" and sound["note"].startswith("Silent: the body does not move at (0, 0)")
 
@@ -227,7 +223,7 @@ def test_a_process_that_ended_is_told_in_one_line(explorer, good, told):
 
     run(work)
     notes = [one["text"] for one in said if one["kind"] == "note"]
-    assert len(notes) >= 1 and all(note.endswith(told) and "\n" not in note for note in notes)
+    assert notes and all(note.endswith(told) and "\n" not in note for note in notes)
     assert any(one.get("exact") for one in said) == good
 
 
@@ -294,12 +290,9 @@ def test_all_pages_show_what_one_puts_on_the_bench(explorer, monkeypatch):
     own, said, pages = explore_numbers.Explorer(explorer.setup), [], set()  # the others stay with the scene
 
     async def work():
-        one, other = (
-            explore_session.Session(
-                own, Beside(own), Beside(own), lambda told, who=who: said.append((who, told)), pages
-            )
-            for who in "ab"
-        )
+        one, other = (explore_session.Session(own, Beside(own), Beside(own),
+                                              lambda told, who=who: said.append((who, told)), pages)
+                      for who in "ab")  # fmt: skip
         other.obey({"ear": [0.2, 0.1]})
         await asyncio.sleep(0.01)
         one.obey({"open": {"mallet": "yarn, medium"}})
@@ -316,13 +309,10 @@ def test_all_pages_show_what_one_puts_on_the_bench(explorer, monkeypatch):
 
 
 def test_what_cannot_be_put_on_the_bench_is_said_in_words(explorer, monkeypatch):
+    def failed(said):
+        return [one["failed"] for one in said if "failed" in one]
+
     wishes = [{"open": {"thickness": 1e9}}, {"open": {"mallet": "yarm, soft"}}, {"open": [1]}]
-
-    def done(said):
-        return len([1 for one in said if "failed" in one]) == 3
-
-    said, session, _ = follow(explorer, monkeypatch, *wishes, until=done, rest=60.0)
-    told = [one["failed"] for one in said if "failed" in one]
-    assert "thickness must lie between" in told[0]
-    assert "did you mean 'yarn, soft'" in told[2] and "open must be a table" in told[1]
-    assert session.setup is explorer.setup
+    said, session, _ = follow(explorer, monkeypatch, *wishes, until=lambda said: len(failed(said)) == 3, rest=60.0)
+    wanted = ("thickness must lie between", "open must be a table", "did you mean 'yarn, soft'")
+    assert all(text in told for text, told in zip(wanted, failed(said))) and session.setup is explorer.setup

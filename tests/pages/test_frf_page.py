@@ -1,14 +1,16 @@
 """The page about frequency responses shows taps, poles, stabilisation, computed modes and moving shapes."""
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
 import fem_impact as fi
-from fem_impact import cli
-from fem_impact.pages import frf_page
+from fem_impact.pages import frf_page, tap_pictures
 from fem_impact.taps.windows import joined
 
+DRUMSTICK = Path(__file__).parents[2] / "studies" / "scenes" / "drumstick.toml"
 PLATE = fi.analytic.rectangle(0.4, 0.3, mass=1.0, first_frequency=100.0, n_modes=12, damping_ratio=0.01)
 POINTS = np.array([(x, y) for x in (0.06, 0.2, 0.34) for y in (0.05, 0.15)])
 
@@ -70,8 +72,8 @@ def test_likeness_of_shapes_is_a_picture_of_all_pairs():
 
 
 @pytest.mark.slow
-def test_the_page_in_a_browser_moves_shapes_and_fits_three_widths(written, visit):
-    for width in (360, 768, 1280):
+def test_the_page_in_a_browser_moves_shapes_and_fits_a_phone_and_a_desk(written, visit):
+    for width in (360, 1280):
         page = visit(written.as_uri(), width=width, height=800)
         tab = page.tab
         assert tab.evaluate("document.documentElement.scrollWidth") <= width
@@ -84,11 +86,28 @@ def test_the_page_in_a_browser_moves_shapes_and_fits_three_widths(written, visit
 
 
 @pytest.mark.slow
-def test_the_prompt_writes_table_and_page_and_compares_with_a_scene(taps, tmp_path, capsys):
-    taps.save(tmp_path / "taps.npz")
-    assert cli.main(["frf", str(tmp_path / "taps.npz"), "--out", str(tmp_path / "out"), "--quiet"]) == 0
-    assert sorted(path.suffix for path in (tmp_path / "out").iterdir()) == [".csv", ".html"]
-    scene = "studies/scenes/drumstick.toml"
-    words = ["frf", str(tmp_path / "taps.npz"), "--out", str(tmp_path / "x.html"), "--against", scene]
-    assert cli.main(words) == 2
-    assert "--against must be a scene with one observation point for each of 6 responses" in capsys.readouterr().err
+def test_the_prompt_writes_table_and_page_and_compares_with_a_scene(taps, prompt):
+    taps.save("taps.npz")
+    assert prompt("frf taps.npz --out out --quiet").status == 0
+    assert sorted(path.suffix for path in Path("out").iterdir()) == [".csv", ".html"]
+    ran = prompt("frf taps.npz --out x.html --against", DRUMSTICK)
+    assert ran.status == 2
+    assert "--against must be a scene with one observation point for each of 6 responses" in ran.err
+
+
+def test_the_picture_of_a_watched_folder_marks_double_hits_and_has_responses_of_good_taps(taps):
+    figure = tap_pictures.watched(taps, taps, 2000.0, 10.0, "b.npz: double hit, repeat")
+    pulses, spectra, responses, coherence = figure.axes
+    assert [text.get_text() for text in pulses.get_legend().get_texts()] == ["tap 1", "tap 2: double hit"]
+    marks = [line for line in pulses.lines if line.get_marker() == "v"]
+    assert len(marks) == taps.n_pulses[1] == 2
+    assert [line.get_linestyle() for line in spectra.lines[:2]] == ["-", "--"]
+    assert responses.get_ylabel() == "response [m/s^2/N]" and coherence.get_ylim()[1] > 1.0
+    assert "responses of 2 good taps" in figure.get_suptitle()
+
+
+def test_of_one_good_tap_no_coherence_is_drawn_and_without_any_no_response(taps):
+    alone = tap_pictures.watched(taps, taps.pick([0]), 2000.0, 10.0, "")
+    assert [axes.get_ylabel().split()[0] for axes in alone.axes if axes.get_visible()] == ["force", "force", "response"]
+    shown = [axes for axes in tap_pictures.watched(taps, None, 2e3, 10.0, "").axes if axes.get_visible()]
+    assert len(shown) == 2

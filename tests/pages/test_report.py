@@ -4,8 +4,8 @@ import base64
 import html
 import json
 import re
-import shlex
 import sys
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -15,20 +15,35 @@ from test_cli import TEXT
 
 import fem_impact as fi
 from fem_impact import cli
-from fem_impact.pages import report
+from fem_impact.pages import html_page, report
 from fem_impact.scenes import sentences
 
 SCRIPT = "<script>document.title = 'taken'</script>"
 
 
 @pytest.fixture(scope="module")
-def page(tmp_path_factory):
-    """The page of a small scene whose title tries to be a script."""
-    folder = tmp_path_factory.mktemp("report")
-    scene = folder / "small.toml"
-    scene.write_text(TEXT.replace("A small test", SCRIPT))
-    assert cli.main(["report", str(scene), "--out", str(folder / "out" / "report.html")]) == 0
-    return folder / "out" / "report.html"
+def scene(tmp_path_factory):
+    """A small scene whose title tries to be a script."""
+    path = tmp_path_factory.mktemp("report") / "small.toml"
+    path.write_text(TEXT.replace("A small test", SCRIPT))
+    return path
+
+
+@pytest.fixture(scope="module")
+def page(scene):
+    path = scene.parent / "out" / "report.html"
+    assert cli.main(["report", str(scene), "--out", str(path)]) == 0
+    return path
+
+
+@pytest.fixture(scope="module")
+def text(page):
+    return page.read_text(encoding="utf-8")
+
+
+@pytest.fixture(scope="module")
+def hit(scene):
+    return report.read(scene).strike(target="modal")
 
 
 @pytest.fixture
@@ -56,8 +71,11 @@ def download(text, name):
     return base64.b64decode(raw).decode()
 
 
-def test_page_is_one_file_with_no_way_out_and_texts_of_the_scene_escaped(page):
-    text = page.read_text(encoding="utf-8")
+def table(text, name):
+    return np.loadtxt(download(text, name).splitlines(), delimiter=",", skiprows=1)
+
+
+def test_page_is_one_file_with_no_way_out_and_texts_of_the_scene_escaped(page, text):
     assert [path.name for path in page.parent.iterdir()] == ["report.html"]
     assert page.stat().st_size < 12e6
     own = re.sub(r"<script>.*?</script>", "", text, flags=re.DOTALL)  # plotly's own code names addresses it never asks
@@ -66,8 +84,7 @@ def test_page_is_one_file_with_no_way_out_and_texts_of_the_scene_escaped(page):
     assert SCRIPT not in text and "&lt;script&gt;document.title" in text
 
 
-def test_page_tells_whether_the_model_is_right(page):
-    text = page.read_text(encoding="utf-8")
+def test_page_tells_whether_the_model_is_right(text):
     part = text[text.index('id="model"') : text.index('id="force"')]
     assert text.index('id="trust"') < text.index('id="model"') and "Is the model right?" in part
     for name in ("thin target", "no yielding", "still air", "not known: the thickness of the body"):
@@ -77,35 +94,29 @@ def test_page_tells_whether_the_model_is_right(page):
     assert told["model_error"] >= max(each["effect"]["force"] or 0.0 for each in told["assumptions"])
 
 
-def test_downloads_hold_every_number(page):
-    text = page.read_text(encoding="utf-8")
+def test_downloads_hold_every_number(text, hit):
     data = json.loads(download(text, "response.json"))
-    hit = report.read(page.parent.parent / "small.toml").strike(target="modal")
     assert data["response"]["peak_force"] == hit.peak_force and len(data["impacts"]) == hit.n_impacts
-    time, force = np.loadtxt(download(text, "force.csv").splitlines(), delimiter=",", skiprows=1).T
+    time, force = table(text, "force.csv").T
     assert (time == hit.time).all() and (force == hit.force).all()
 
 
-def test_result_of_a_strike_gives_the_same_blow(page, tmp_path):
-    scene = page.parent.parent / "small.toml"
-    assert cli.main(["strike", str(scene), "--out", str(tmp_path / "out")]) == 0
+def test_result_of_a_strike_gives_the_same_blow(scene, hit, tmp_path):
+    assert cli.main(["strike", str(scene), "--out", str(tmp_path / "out"), "--target", "modal"]) == 0
     for name in (tmp_path / "out", tmp_path / "out" / "response.json"):
-        again = report.read(name)
-        assert again.strike().impulse == report.read(scene).strike().impulse
+        assert report.read(name).strike(target="modal").impulse == hit.impulse
 
 
 @pytest.mark.parametrize(("kind", "target"), [("analytic", "modal"), ("fe", "vectors")])
-def test_the_command_on_the_page_gives_the_same_numbers(tmp_path, monkeypatch, capsys, kind, target):
-    monkeypatch.chdir(tmp_path)
-    (tmp_path / "my plate.toml").write_text(TEXT.replace('"analytic"', f'"{kind}"'))
-    assert cli.main(["report", "my plate.toml", "--out", "r.html", "--tolerance", "0.02"]) == 0
-    page = (tmp_path / "r.html").read_text(encoding="utf-8")
+def test_the_command_on_the_page_gives_the_same_numbers(prompt, kind, target):
+    mesh = "size = 0.05\n[target]" if kind == "fe" else "[target]"
+    Path("my plate.toml").write_text(TEXT.replace('"analytic"', f'"{kind}"').replace("[target]", mesh))
+    assert prompt("report", "my plate.toml", "--out", "r.html", "--tolerance", "0.02").status == 0
+    page = Path("r.html").read_text(encoding="utf-8")
     told = html.unescape(re.search(r"<code>(fem-impact .*?)</code>", page)[1])
-    words = shlex.split(told)
-    assert words[:3] == ["fem-impact", "strike", "my plate.toml"] and f"--target {target}" in told
-    assert cli.main([*words[1:], "--out", "again"]) == 0
-    again = json.loads((tmp_path / "again" / "response.json").read_text())
-    shown = json.loads(download(page, "response.json"))
+    assert told.startswith("fem-impact strike 'my plate.toml'") and f"--target {target}" in told
+    assert prompt(told.removeprefix("fem-impact "), "--out", "again").status == 0
+    again, shown = json.loads(Path("again/response.json").read_text()), json.loads(download(page, "response.json"))
     assert again["response"] == shown["response"] and again["impacts"] == shown["impacts"]
 
 
@@ -116,32 +127,31 @@ def test_a_change_that_no_option_names_is_reproduced_from_python(tmp_path):
     assert told.startswith("fi.load_scene(") and eval(told, {"fi": fi}).impulse == run.response.impulse
 
 
-def test_the_mobility_ends_where_the_modes_end_and_the_page_says_where(page):
-    text = page.read_text(encoding="utf-8")
+def test_the_mobility_ends_where_the_modes_end_and_the_page_says_where(text):
     data = json.loads(re.search(r'<script type="application/json" id="data">(.*?)</script>', text, re.DOTALL)[1])
-    last = np.loadtxt(download(text, "modes.csv").splitlines(), delimiter=",", skiprows=1)[-1, 0]
+    last = table(text, "modes.csv")[-1, 0]
     assert last < data["spectrum"]["x"][-1]  # the spectrum goes on
     assert data["mobility"]["x"][-1] == pytest.approx(last, rel=1e-5) == data["natural"][-1]
     assert f"modes of the struck body end at {sentences.si(last, 'Hz')}" in text
 
 
 @pytest.mark.slow
-def test_result_carries_its_mesh_wherever_it_goes(tmp_path, capsys, monkeypatch):
+def test_result_carries_its_mesh_wherever_it_goes(tmp_path, prompt, monkeypatch):
     text = TEXT.replace('shape = "rectangle"\nlength = 0.465\nwidth = 0.3', 'shape = "file"\npath = "plate.msh"')
     (tmp_path / "scene.toml").write_text(text.replace('"analytic"', '"fe"').replace("1e-2", "1e-1"))
     fi.mesh.save(tmp_path / "plate.msh", fi.mesh.rectangle(0.465, 0.3, size=0.1))
-    monkeypatch.chdir(tmp_path)
-    assert cli.main(["strike", "scene.toml", "--out", "out", "--target", "rigid"]) == 3  # quick, and misses
-    assert "plate.msh" in json.loads((tmp_path / "out" / "response.json").read_text())["files"]
-    (tmp_path / "elsewhere").mkdir()
-    (tmp_path / "out").rename(tmp_path / "elsewhere" / "moved")
-    (tmp_path / "plate.msh").unlink()
-    monkeypatch.chdir("/")
+    assert prompt("strike scene.toml --out out --target rigid").status == 3  # quick, and misses
+    assert "plate.msh" in json.loads(Path("out/response.json").read_text())["files"]
     moved = tmp_path / "elsewhere" / "moved"
+    moved.parent.mkdir()
+    Path("out").rename(moved)
+    Path("plate.msh").unlink()
+    monkeypatch.chdir("/")
     assert report.read(moved).body().points.max() == 0.465
     (moved / "plate.msh").unlink()
-    assert cli.main(["report", str(moved), "--out", str(tmp_path / "report.html")]) == 2
-    assert f"the file of the struck body is missing: restore {moved / 'plate.msh'}" in capsys.readouterr().err
+    ran = prompt("report", moved, "--out", tmp_path / "report.html")
+    assert ran.status == 2
+    assert f"the file of the struck body is missing: restore {moved / 'plate.msh'}" in ran.err
 
 
 @pytest.mark.parametrize(
@@ -149,29 +159,23 @@ def test_result_carries_its_mesh_wherever_it_goes(tmp_path, capsys, monkeypatch)
     ["", "[]", '{"scene": 3}', "[" * 100_000, '{"scene": {"mesh": {"x": ' + "[" * 900 + "]" * 900 + "}}}",
      '{"scene": {"mesh": {}}}'],
 )  # fmt: skip
-def test_file_that_is_no_result_is_a_sentence(tmp_path, capsys, text):
+def test_file_that_is_no_result_is_a_sentence(tmp_path, prompt, text):
     path = tmp_path / "response.json"
     path.write_text(text)
-    assert cli.main(["report", str(path), "--out", str(tmp_path / "report.html")]) == 2
-    said = capsys.readouterr().err
-    assert said.startswith(f"fem-impact: {path}") and said.count("\n") == 1
+    ran = prompt("report", path, "--out", "report.html")
+    assert ran.status == 2 and ran.err.startswith(f"fem-impact: {path}") and ran.err.count("\n") == 1
     assert [file.name for file in tmp_path.iterdir()] == ["response.json"]
 
 
-def test_missing_extra_is_named(tmp_path, capsys, monkeypatch):
+def test_missing_extra_is_named(scene, prompt, monkeypatch):
     monkeypatch.setitem(sys.modules, "plotly.offline", None)
-    (tmp_path / "small.toml").write_text(TEXT)
-    assert cli.main(["report", str(tmp_path / "small.toml"), "--out", str(tmp_path / "r.html")]) == 2
-    assert "a report needs plotly: pip install 'fem-impact[web]'" in capsys.readouterr().err
+    ran = prompt("report", scene, "--out", "r.html")
+    assert ran.status == 2 and "a report needs plotly: pip install 'fem-impact[web]'" in ran.err
 
 
 def test_beams_and_balls_have_a_page_too(tmp_path):
-    text = (
-        '[mesh]\nshape = "line"\nlength = 0.35\n[target]\nmass = 0.35\nfirst_frequency = 750.0\n'
-        '[striker]\nkind = "sphere"\nradius = 0.01\nE = 210e9\nnu = 0.3\nrho = 7850.0\n'
-        '[contact]\nkind = "linear"\nstiffness = 1e5\n[strike]\nat = [0.1]\nspeed = 1.0\ntolerance = 1e-2\n'
-    )
-    scene = load_text(tmp_path, text)
+    ball = 'kind = "sphere"\nradius = 0.01\nE = 210e9\nnu = 0.3\nrho = 7850.0'
+    scene = load_text(tmp_path, BAR.replace('kind = "rigid"\nmass = 0.03', ball))
     report.write(tmp_path / "bar.html", scene, scene.run(target="modal"))
     page = (tmp_path / "bar.html").read_text(encoding="utf-8")
     assert "A beam of 350" in page and "by a ball of 32.88" in page
@@ -180,12 +184,11 @@ def test_beams_and_balls_have_a_page_too(tmp_path):
 STROKES = "[[stroke]]\nwhen = 0.03\n[[stroke]]\nwhen = 0.0\nat = [0.2, 0.1]\nspeed = 0.5\n"
 
 
-def test_a_sequence_has_a_page_with_every_stroke(tmp_path, capsys):
-    path = tmp_path / "flam.toml"
-    path.write_text(SMALL.replace("Small", "Flam") + STROKES)
-    assert cli.main(["report", str(path), "--out", str(tmp_path / "r.html")]) in (0, 3)
-    assert "2 strokes" in capsys.readouterr().out
-    text = (tmp_path / "r.html").read_text(encoding="utf-8")
+def test_a_sequence_has_a_page_with_every_stroke(prompt):
+    Path("flam.toml").write_text(SMALL + STROKES)
+    ran = prompt("report flam.toml --out r.html")
+    assert ran.status in (0, 3) and "2 strokes" in ran.out
+    text = Path("r.html").read_text(encoding="utf-8")
     assert "Report of a sequence" in text and "It is struck 2 times in 30" in text and 'plot-energy" role' not in text
     assert "struck at (0.1395, 0.09) and (0.2, 0.1) m" in text
     data = json.loads(download(text, "response.json"))
@@ -193,12 +196,10 @@ def test_a_sequence_has_a_page_with_every_stroke(tmp_path, capsys):
 
 
 @pytest.mark.slow
-def test_the_result_of_a_sequence_gives_the_same_strokes(tmp_path):
-    path = tmp_path / "flam.toml"
-    path.write_text(SMALL + STROKES)
-    again = report.read(path)
-    assert cli.main(["strike", str(path), "--out", str(tmp_path / "out"), "--duration", "0.01"]) in (0, 3)
-    assert report.read(tmp_path / "out").data()["stroke"] == again.data()["stroke"]
+def test_the_result_of_a_sequence_gives_the_same_strokes(prompt):
+    Path("flam.toml").write_text(SMALL + STROKES)
+    assert prompt("strike flam.toml --out out --duration 0.01").status in (0, 3)
+    assert report.read("out").data()["stroke"] == report.read("flam.toml").data()["stroke"]
 
 
 def test_listeners_in_free_air_get_a_player_for_each_bound(tmp_path):
@@ -227,33 +228,14 @@ def test_small_numbers_have_powers(value, text):
 
 
 def test_nothing_fails_and_nothing_is_asked_for(desktop):
-    shown = desktop
-    shown.tab.wait_for_timeout(300)
-    assert shown.errors == []
-    assert [url for url in shown.requests if not url.startswith(("data:", "blob:"))] == shown.requests[:1]
-    assert shown.requests[0].startswith("file:") and shown.tab.title() == SCRIPT
+    desktop.tab.wait_for_timeout(300)
+    asked = [url for url in desktop.requests if not url.startswith(("data:", "blob:"))]
+    assert desktop.errors == [] and asked == desktop.requests[:1]
+    assert asked[0].startswith("file:") and desktop.tab.title() == SCRIPT
 
 
 @pytest.mark.slow
-def test_slider_and_list_change_the_picture(opened):
-    shown = opened()
-    tab = shown.tab
-    depth = "Math.min(...document.getElementById('plot-wave').data[0].z)"
-    before, picture = tab.evaluate(depth), tab.locator("#plot-wave").screenshot()
-    tab.locator("#wave-time").focus()
-    for _ in range(10):
-        tab.keyboard.press("ArrowRight")
-    shown.until(f"{depth} !== {before}")
-    assert "s" in tab.locator("#wave-out").inner_text()
-    assert tab.locator("#plot-wave").screenshot() != picture
-    shape = "Array.from(document.getElementById('plot-mode').data[0].z).slice(0, 400).join()"
-    before = tab.evaluate(shape)
-    tab.select_option("#mode-pick", index=3)
-    shown.until(f"{shape} !== '{before}'")
-
-
-@pytest.mark.slow
-def test_view_turns_with_the_keyboard_and_plays_when_asked(opened):
+def test_sliders_lists_and_keys_change_the_pictures_and_nothing_moves_by_itself(opened):
     shown = opened()
     tab = shown.tab
     eye = "JSON.stringify(document.getElementById('plot-wave').layout.scene.camera.eye)"
@@ -261,12 +243,23 @@ def test_view_turns_with_the_keyboard_and_plays_when_asked(opened):
     tab.locator("#plot-wave").focus()
     tab.keyboard.press("ArrowLeft")
     shown.until(f"{eye} !== '{before}'")
+    depth = "Math.min(...document.getElementById('plot-wave').data[0].z)"
+    before, picture = tab.evaluate(depth), tab.locator("#plot-wave").screenshot()
+    tab.locator("#wave-time").focus()
+    for _ in range(10):
+        tab.keyboard.press("ArrowRight")
+    shown.until(f"{depth} !== {before}")
+    assert "s" in tab.locator("#wave-out").inner_text() and tab.locator("#plot-wave").screenshot() != picture
     still = tab.locator("#wave-time").input_value()
     tab.wait_for_timeout(200)
-    assert tab.locator("#wave-time").input_value() == still  # nothing moves by itself
+    assert tab.locator("#wave-time").input_value() == still
     tab.locator("#wave-play").press("Enter")
     shown.until(f"document.getElementById('wave-time').value !== '{still}'")
     assert tab.locator("#wave-play").inner_text() == "Pause"
+    shape = "Array.from(document.getElementById('plot-mode').data[0].z).slice(0, 400).join()"
+    before = tab.evaluate(shape)
+    tab.select_option("#mode-pick", index=3)
+    shown.until(f"{shape} !== '{before}'")
 
 
 @pytest.mark.slow
@@ -293,9 +286,8 @@ def test_paper_is_light_and_shows_the_views(opened):
 
 
 def test_sounds_load(desktop):
-    shown = desktop
-    shown.until("[...document.querySelectorAll('audio')].every(a => a.readyState >= 1)")
-    lengths = shown.tab.evaluate("[...document.querySelectorAll('audio')].map(a => a.duration)")
+    desktop.until("[...document.querySelectorAll('audio')].every(a => a.readyState >= 1)")
+    lengths = desktop.tab.evaluate("[...document.querySelectorAll('audio')].map(a => a.duration)")
     assert len(lengths) >= 2 and all(0.4 < length < 4.0 for length in lengths)
 
 
@@ -314,15 +306,10 @@ def test_page_fits_a_phone(opened, scheme):
 
 
 def test_keyboard_reaches_everything_and_shows_where_it_is(desktop):
-    stops = desktop.tabbed_to()
-    tags = [tag for tag, _, _ in stops]
-    names = [name for _, name, _ in stops]
-    for tag in ("A", "BUTTON", "INPUT", "SELECT", "AUDIO"):
-        assert tag in tags
-    for name in ("plot-wave", "wave-play", "wave-time", "plot-mode", "mode-pick"):
-        assert name in names
-    assert names[0] == "Skip to the report"
-    assert [stop for stop in stops if not stop[2]] == []
+    tags, names, seen = zip(*desktop.tabbed_to())
+    assert {"A", "BUTTON", "INPUT", "SELECT", "AUDIO"} <= set(tags)
+    assert {"plot-wave", "wave-play", "wave-time", "plot-mode", "mode-pick"} <= set(names)
+    assert names[0] == "Skip to the report" and all(seen)
 
 
 def test_pictures_have_a_text_for_those_who_cannot_see_them(desktop):
@@ -340,3 +327,8 @@ def test_a_report_begins_with_what_was_missed_and_what_would_meet_it(tmp_path):
     page = (tmp_path / "report.html").read_text()
     head = page[page.index("<header>") : page.index("</header>")]
     assert 'class="badge bad"' in head and "MISSED" in head and "modes of the target instead of 5" in head
+
+
+def test_data_cannot_close_the_script_around_them_and_are_json():
+    data = {"title": "</script><b>", "numbers": [1.5, float("nan")]}
+    assert html_page.script_data(data) == '{"title":"\\u003c/script>\\u003cb>","numbers":[1.5,null]}'

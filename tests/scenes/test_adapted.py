@@ -7,7 +7,6 @@ from pathlib import Path
 import pytest
 
 import fem_impact as fi
-from fem_impact import cli
 from fem_impact.scenes import templates
 
 MESHES = Path(__file__).parents[2] / "meshes"
@@ -16,18 +15,16 @@ LEAF = """<svg xmlns="http://www.w3.org/2000/svg" width="90mm" height="60mm" vie
 
 
 @pytest.fixture
-def leaf(tmp_path, monkeypatch):
+def leaf(tmp_path, monkeypatch, read_here):
     monkeypatch.chdir(tmp_path)
     Path("leaf.svg").write_text(LEAF)
     return tmp_path
 
 
-@pytest.mark.slow  # a process of its own reads the drawing
-def test_a_drawing_becomes_a_scene_of_brass_and_yarn(leaf, capsys):
+@pytest.mark.slow
+def test_a_drawing_becomes_a_scene_of_brass_and_yarn_that_strikes(leaf, prompt):
     pytest.importorskip("svgelements", reason="the extra cad is not installed")
-    words = ["new", "--from", "leaf.svg", "--material", "brass", "--mallet", "yarn, medium"]
-    assert cli.main(words) == 0
-    said = " ".join(capsys.readouterr().out.split())
+    said = " ".join(prompt('new --from leaf.svg --material brass --mallet "yarn, medium"').out.split())
     assert "y points down" in said and "Files: leaf.toml Next: fem-impact strike leaf.toml" in said
     scene = fi.load_scene("leaf.toml")
     assert scene.title == "Leaf of brass struck by yarn, medium"
@@ -37,20 +34,14 @@ def test_a_drawing_becomes_a_scene_of_brass_and_yarn(leaf, capsys):
     assert scene.target.values["damping_ratio"] == 0.5 * fi.materials.entry("brass").facts["loss_factor"].value
     x, y = scene.blow.values["at"]
     assert 0.005 < x < 0.085 and -0.06 < y < 0.0  # inside, with y upwards
-
-
-@pytest.mark.slow
-def test_the_scene_of_a_drawing_strikes(leaf):
-    pytest.importorskip("svgelements", reason="the extra cad is not installed")
-    assert cli.main(["new", "--from", "leaf.svg", "--material", "brass", "--mallet", "yarn, medium"]) == 0
-    hit = fi.load_scene("leaf.toml").strike(tolerance=1e-2)
+    hit = scene.strike(tolerance=1e-2)
     assert hit.tolerance_met and hit.n_impacts >= 1
 
 
 @pytest.mark.slow
-def test_a_mesh_file_becomes_a_scene_elsewhere(leaf):
+def test_a_mesh_file_becomes_a_scene_elsewhere(leaf, prompt):
     shutil.copy(MESHES / "l_shape.msh", leaf)
-    assert cli.main(["new", "--from", "l_shape.msh", "--out", "deep/mine.toml", "--mallet", "steel, 10 mm"]) == 0
+    assert prompt('new --from l_shape.msh --out deep/mine.toml --mallet "steel, 10 mm"').status == 0
     text = Path("deep/mine.toml").read_text()
     assert 'path = "../l_shape.msh"' in text and "# [contact]" in text
     scene = fi.load_scene("deep/mine.toml")
@@ -60,9 +51,8 @@ def test_a_mesh_file_becomes_a_scene_elsewhere(leaf):
 
 
 @pytest.mark.parametrize("kind", templates.KINDS)
-def test_every_kind_takes_a_material(kind, tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-    assert cli.main(["new", kind, "--material", "glass, float"]) == 0
+def test_every_kind_takes_a_material(kind, prompt):
+    assert prompt(["new", kind, "--material", "glass, float"]).status == 0
     made = fi.load_scene(f"{kind}.toml")
     assert made.make_section("beam" if kind == "beam" else "plate").material == fi.materials["glass, float"]
 
@@ -78,15 +68,15 @@ def test_every_kind_takes_a_material(kind, tmp_path, monkeypatch):
         (["--from", "laef.svg"], "laef.svg"),
     ],
 )
-def test_what_does_not_fit_is_refused_and_nothing_written(leaf, capsys, words, text):
-    assert cli.main(["new", *words]) == 2
-    assert text in capsys.readouterr().err and not list(leaf.glob("*.toml"))
+def test_what_does_not_fit_is_refused_and_nothing_written(leaf, prompt, words, text):
+    said = prompt(["new", *words])
+    assert said.status == 2 and text in said.err and not list(leaf.glob("*.toml"))
 
 
-def test_the_catalogue_at_the_prompt(capsys):
-    assert cli.main(["catalogue", "yarn"]) == 0
-    assert re.search(r"yarn, medium\s", capsys.readouterr().out)
-    assert cli.main(["catalogue", "PCB", "086C03"]) == 0
-    assert "mass 0.16 kg" in capsys.readouterr().out
-    assert cli.main(["catalogue", "brss"]) == 2
-    assert "did you mean 'brass'" in capsys.readouterr().err
+@pytest.mark.parametrize(
+    ("words", "status", "text"),
+    [("yarn", 0, r"yarn, medium\s"), ("PCB 086C03", 0, "mass 0.16 kg"), ("brss", 2, "did you mean 'brass'")],
+)
+def test_the_catalogue_at_the_prompt(prompt, words, status, text):
+    said = prompt(f"catalogue {words}")
+    assert said.status == status and re.search(text, said.err if status else said.out)

@@ -57,18 +57,14 @@ def faults(value, schema, where="scene"):
     return found
 
 
-def test_scenes_are_shipped():
-    assert len(SHIPPED) > 20
+STROKE = '\n[[stroke]]\nwhen = 0.0\nstriker = { kind = "rigid", mass = 0.01 }\n'
+TEXTS = {path.stem: path.read_text() for path in SHIPPED} | {kind: templates.text(kind) for kind in templates.KINDS}
 
 
-@pytest.mark.parametrize("path", SHIPPED, ids=lambda path: path.stem)
-def test_every_shipped_scene_satisfies_the_schema(path):
-    assert faults(tomllib.loads(path.read_text()), SCHEMA) == []
-
-
-@pytest.mark.parametrize("kind", templates.KINDS)
-def test_every_new_scene_satisfies_the_schema(kind):
-    assert faults(tomllib.loads(templates.text(kind)), SCHEMA) == []
+@pytest.mark.parametrize("text", [*TEXTS.values(), TEXTS["plate"] + STROKE], ids=[*TEXTS, "strokes"])
+def test_every_shipped_and_every_new_scene_has_a_title_and_satisfies_the_schema(text):
+    tables = tomllib.loads(text)
+    assert len(SHIPPED) > 20 and tables["title"] and faults(tables, SCHEMA) == []
 
 
 @pytest.mark.parametrize(
@@ -83,11 +79,7 @@ def test_every_new_scene_satisfies_the_schema(kind):
         ("nu = 0.3", "nu = true", "scene.material.nu is no number"),
         ("rho = 450.0", "", "scene.material lacks rho"),
         ("rho = 450.0", "rho = -450.0", "scene.material.rho is not above 0"),
-        ("length = 0.4 ", "length = 0.0 ", "scene.mesh.length is not above 0"),
-        ("thickness = 4e-3", "thickness = 0", "scene.section.thickness is not above 0"),
         ("thickness = 4e-3", "thickness = { x = [0.0, 1.0], valus = [1e-3, 2e-3] }", "scene.section.thickness "),
-        ("mass = 0.02", "mass = 0", "scene.striker.mass is not above 0"),
-        ("stiffness = 1e7", "stiffness = -1e7", "scene.contact.stiffness is not above 0"),
         ("at = [0.13, 0.1] ", 'at = "middle" ', "scene.strike.at is no "),
         ("at = [0.13, 0.1] ", "at = [0.13, 0.1, 0.0] ", "scene.strike.at "),
         ("tolerance = 1e-3", "tolerance = 0", "scene.strike.tolerance is below"),
@@ -100,10 +92,13 @@ def test_every_new_scene_satisfies_the_schema(kind):
         ("damping_ratio = 0.005", 'baffle = "no"', "scene.target.baffle is no boolean"),
         ("points = [[0.13, 0.1]]", "listener = [0.1, 0.2]", "scene.observe.listener has 2 items"),
         ("[observe]", "[map.over]\n'striker.mass' = 0.1\n[observe]", "scene.map.over.striker.mass "),
+        ("when = 0.0", "wen = 0.0", "scene.stroke[0] lacks when"),
+        ("mass = 0.01", "mas = 0.01", "scene.stroke[0].striker has mas"),
+        ("when = 0.0", "when = 0.0\nlasts = true", "scene.stroke[0].lasts is no number"),
     ],
 )
 def test_what_a_scene_may_not_say_violates_the_schema_and_is_refused(tmp_path, old, new, fault):
-    text = templates.text("plate")
+    text = templates.text("plate") + STROKE * ("stroke" in fault)
     assert text.count(old) == 1
     found = faults(tomllib.loads(text.replace(old, new)), SCHEMA)
     assert any(said.startswith(tuple(fault.split("|"))) for said in found), found
@@ -117,18 +112,6 @@ def test_the_schema_knows_every_table_and_kind():
     for name, (selector, makers) in MAKERS.items():
         if selector:
             assert SCHEMA["properties"][name]["properties"][selector]["enum"] == list(makers)
-
-
-def test_strokes_have_strikers_and_contacts_of_their_own_in_the_schema():
-    text = templates.text("plate") + '\n[[stroke]]\nwhen = 0.0\nstriker = { kind = "rigid", mass = 0.01 }\n'
-    assert faults(tomllib.loads(text), SCHEMA) == []
-    for old, new, fault in (
-        ("when = 0.0", "wen = 0.0", "scene.stroke[0] lacks when"),
-        ("mass = 0.01", "mas = 0.01", "scene.stroke[0].striker has mas"),
-        ("when = 0.0", "when = 0.0\nlasts = true", "scene.stroke[0].lasts is no number"),
-    ):
-        found = faults(tomllib.loads(text.replace(old, new)), SCHEMA)
-        assert any(said.startswith(fault) for said in found), found
 
 
 def test_the_prompt_prints_the_schema(capsys):

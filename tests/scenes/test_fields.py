@@ -11,25 +11,18 @@ import fem_impact as fi
 from fem_impact.scenes.fields import over_frequency, varying
 
 HEAD = """
-[material]
-E = 70e9
-nu = 0.33
-rho = 2700.0
-[contact]
-kind = "linear"
-stiffness = 88.6e3
+material = { E = 70e9, nu = 0.33, rho = 2700.0 }
+contact = { kind = "linear", stiffness = 88.6e3 }
 """
-PLATE = """
-[mesh]
-shape = "rectangle"
-length = 0.5
-width = 0.3
+PLATE = (
+    HEAD
+    + """
+mesh = { shape = "rectangle", length = 0.5, width = 0.3 }
+supports = { left = { stiffness = 2e5, rotation = 40.0 }, right = "hinged" }
+strike = { at = [0.31, 0.12], speed = 1.0, tolerance = 1e-2 }
 [section]
 kind = "plate"
 thickness = { x = [0.0, 0.5], y = [0.0, 0.3], values = [[2e-3, 2e-3], [4e-3, 4e-3]] }
-[supports]
-left = { stiffness = 2e5, rotation = 40.0 }
-right = "hinged"
 [target]
 damping_ratio = { frequency = [100.0, 1000.0], ratio = [0.01, 0.002] }
 point_masses = [{ at = [0.1, 0.2], mass = 0.05 }]
@@ -41,68 +34,48 @@ length = 0.4
 diameter = { x = [0.0, 0.4], values = [0.008, 0.016] }
 at = 0.4
 left = "hinged"
-[strike]
-at = [0.31, 0.12]
-speed = 1.0
-tolerance = 1e-2
 """
-BAR = """
-[mesh]
-shape = "line"
-length = 0.5
+)
+BAR = (
+    HEAD
+    + """
+mesh = { shape = "line", length = 0.5 }
+supports = { left = { stiffness = 1e4 }, right = { stiffness = 1e4 } }
+striker = { kind = "rigid", mass = 0.02 }
+strike = { at = 0.2, speed = 1.0, tolerance = 1e-2 }
 [section]
 kind = "beam"
 width = 0.04
 height = { cases = [{ value = 6e-3, from = 0.2, to = 0.3 }], otherwise = 9e-3 }
-[supports]
-left = { stiffness = 1e4 }
-right = { stiffness = 1e4 }
-[striker]
-kind = "rigid"
-mass = 0.02
-[strike]
-at = 0.2
-speed = 1.0
-tolerance = 1e-2
 """
-
-
-@pytest.fixture
-def load(tmp_path):
-    def write(text):
-        return load_text(tmp_path, text)
-
-    return write
+)
+ALLOY = fi.Material(E=70e9, nu=0.33, rho=2700.0)
 
 
 @pytest.mark.slow
-def test_plate_with_everything_equals_its_objects(load):
-    alloy = fi.Material(E=70e9, nu=0.33, rho=2700.0)
-    plate = fi.Plate(alloy, lambda x: 2e-3 + 4e-3 * x[:, 0])
+def test_plate_with_everything_equals_its_objects(tmp_path):
+    plate = fi.Plate(ALLOY, lambda x: 2e-3 + 4e-3 * x[:, 0])
     held = {"left": fi.Elastic(2e5, 40.0), "right": "hinged"}
     system = fi.assemble(fi.mesh.rectangle(0.5, 0.3), plate, held, point_masses=[((0.1, 0.2), 0.05)])
     modes = fi.find_modes(system, n_modes=8, tolerance=1e-4)
-    scene = load(HEAD + PLATE)
+    scene = load_text(tmp_path, PLATE)
     found = scene.modes(8)
     assert_allclose(found.frequencies, modes.frequencies, rtol=2e-4)  # both tolerances
     assert_allclose(found.damping_ratio, np.interp(found.frequencies, [100.0, 1000.0], [0.01, 0.002]))
     hit = scene.strike()
     assert hit.target.mass == pytest.approx(0.5 * 0.3 * 3e-3 * 2700.0 + 0.05)
-    radius = [0.004, 0.008]
-    cone = np.pi / 3.0 * 0.4 * (radius[0] ** 2 + radius[0] * radius[1] + radius[1] ** 2)
+    cone = np.pi / 3.0 * 0.4 * (0.004**2 + 0.004 * 0.008 + 0.008**2)
     assert hit.striker.mass == pytest.approx(700.0 * cone, rel=1e-9)
     assert "springs" in scene._repr_html_() or "svg" in scene._repr_html_()
 
 
-def test_stepped_bar_equals_its_objects(load):
-    alloy = fi.Material(E=70e9, nu=0.33, rho=2700.0)
-
+def test_stepped_bar_equals_its_objects(tmp_path):
     def height(x):
         return np.where((x[:, 0] >= 0.2) & (x[:, 0] <= 0.3), 6e-3, 9e-3)
 
-    beam = fi.Beam.rectangular(alloy, width=0.04, height=height)
+    beam = fi.Beam.rectangular(ALLOY, width=0.04, height=height)
     system = fi.assemble(fi.mesh.line(0.5), beam, {"left": fi.Elastic(1e4), "right": fi.Elastic(1e4)})
-    found = load(HEAD + BAR).modes(6)
+    found = load_text(tmp_path, BAR).modes(6)
     assert_allclose(found.frequencies, fi.find_modes(system, n_modes=6, tolerance=1e-3).frequencies, rtol=2e-3)
 
 
@@ -139,12 +112,13 @@ def test_damping_over_frequency():
         ("mass = 0.05 }", "mass = -0.05 }", r"\[target\] point_masses\[0\].mass must be positive"),
         ("at = [0.1, 0.2], ", "", r"\[target\] point_masses\[0\] must have at and mass"),
         ("at = [0.1, 0.2], ", "at = [7.0, 0.2], ", r"\[supports\] point of point_masses\[0\] must lie on the body"),
+        ("[target]", '[target]\ntheory = "timoshenko"', r"\[target\] theory must be one of kirchhoff, mindlin"),
     ],
 )  # fmt: skip
-def test_wrong_values_are_told_with_table_and_key(load, old, new, text):
-    assert old in HEAD + PLATE
+def test_wrong_values_are_told_with_table_and_key(tmp_path, old, new, text):
+    assert old in PLATE
     with pytest.raises(ValueError, match=text):
-        load((HEAD + PLATE).replace(old, new)).strike()
+        load_text(tmp_path, PLATE.replace(old, new)).strike()
 
 
 @pytest.mark.parametrize(
@@ -160,29 +134,14 @@ def test_wrong_cases_are_told(cases, text):
         varying("thickness", cases, 2)
 
 
-def test_what_a_file_holds_is_what_data_gives_back(load):
-    scene = load(HEAD + PLATE)
-    given = tomllib.loads(HEAD + PLATE)
-    told = scene.data()
-    assert {name: told[name] for name in given} == given
+def test_what_a_file_holds_is_what_data_gives_back(tmp_path):
+    assert tomllib.loads(PLATE).items() <= load_text(tmp_path, PLATE).data().items()
 
 
 @pytest.mark.slow
-def test_a_scene_says_that_its_plate_is_thick(load):
-    stout = HEAD + PLATE.replace('right = "hinged"', 'right = "soft hinged"').replace("e-3]", "e-2]")
-    thin = load(stout.replace("soft hinged", "hinged")).built.target.find(3, tolerance=1e-3)
-    target = load(stout.replace("[target]", '[target]\ntheory = "mindlin"')).built.target
+def test_a_scene_says_that_its_plate_is_thick(tmp_path):
+    stout = PLATE.replace('right = "hinged"', 'right = "soft hinged"').replace("e-3]", "e-2]")
+    thin = load_text(tmp_path, stout.replace("soft hinged", "hinged")).built.target.find(3, tolerance=1e-3)
+    target = load_text(tmp_path, stout.replace("[target]", '[target]\ntheory = "mindlin"')).built.target
     assert target.theory == "mindlin" and target.thick and target.closed is None
     assert (target.find(3, tolerance=1e-3).omega < thin.omega).all()
-
-
-@pytest.mark.parametrize(
-    "theory, text",
-    [
-        ("timoshenko", r"\[target\] theory must be one of kirchhoff, mindlin"),
-        ("thick", r"\[target\] theory must be one"),
-    ],
-)
-def test_a_theory_that_does_not_fit_is_told(load, theory, text):
-    with pytest.raises(ValueError, match=text):
-        _ = load((HEAD + PLATE).replace("[target]", f'[target]\ntheory = "{theory}"')).built

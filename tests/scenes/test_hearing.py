@@ -7,7 +7,7 @@ from scenes import BAR, SMALL, load_text
 from scipy.io import wavfile
 
 from fem_impact import commands
-from fem_impact.scenes import hearing, scene
+from fem_impact.scenes import hearing
 from fem_impact.show import sound
 
 OBSERVE = """
@@ -30,9 +30,8 @@ def test_every_point_and_listener_has_a_file_and_two_listeners_stereo(tmp_path, 
         assert_allclose(read[name][:1000], wanted.samples[:1000] * wanted.full_scale, rtol=0, atol=1e-6)  # float32
     near, far = read["radiated.wav"], read["radiated_2.wav"]
     stereo = read["stereo.wav"]
-    assert stereo.shape == (2400, 2)
-    scale = 1e-6 * np.abs(stereo).max()  # float32 and the rounding of the scale
-    assert_allclose(stereo, np.column_stack([near, far]), rtol=0, atol=scale)
+    assert stereo.shape == (2400, 2)  # equal but for float32 and the rounding of the scale
+    assert_allclose(stereo, np.column_stack([near, far]), rtol=0, atol=1e-6 * np.abs(stereo).max())
     assert np.abs(near).max() > 1.5 * np.abs(far).max()  # pressure falls with the distance
     first = [int(np.argmax(np.abs(each) > 1e-3 * np.abs(each).max())) for each in (near, far)]
     assert first[1] - first[0] > 0.5 / 343.0 * 48000  # and arrives later, by at least half a metre's way
@@ -64,19 +63,13 @@ def test_in_free_air_a_listener_gets_both_bounds_and_never_one_number(tmp_path, 
         assert each["stated"] == f"bounded: between {levels} dB re 20 µPa" and each["listener"] == place
     assert [each.get("bound") for each in found] == [None, *["low", "high"] * 3]
     assert found[3]["full_scale"] == found[4]["full_scale"]
-    lines = commands.describe_sounds(found)
-    assert (
-        len(lines) == 4
-        and f"Listener: {found[4]['stated']}; full scale of radiated_2_low.wav and radiated_2_high.wav" in lines[2]
-    )
+    lines, files = commands.describe_sounds(found), "radiated_2_low.wav and radiated_2_high.wav"
+    assert len(lines) == 4 and f"Listener: {found[4]['stated']}; full scale of {files}" in lines[2]
 
 
 def test_the_air_around_a_plate_sees_no_wall_either(tmp_path):
-    path = tmp_path / "scene.toml"
-    path.write_text(FREE.replace("baffle = false", 'baffle = false\nair = "both sides"'))
-    assert any(
-        "half the mass that it would with a rigid wall" in note for note in scene.load_scene(path).modes(2).notes
-    )
+    modes = load_text(tmp_path, FREE.replace("baffle = false", 'baffle = false\nair = "both sides"')).modes(2)
+    assert any("half the mass that it would with a rigid wall" in note for note in modes.notes)
 
 
 def test_silence_is_said():
@@ -96,10 +89,8 @@ def test_silence_is_said():
     ],
 )  # fmt: skip
 def test_what_cannot_be_heard_is_refused_when_the_scene_is_read(tmp_path, text, said):
-    path = tmp_path / "scene.toml"
-    path.write_text(text + TWO)
     with pytest.raises(ValueError, match=said):
-        scene.load_scene(path)
+        load_text(tmp_path, text + TWO)
 
 
 def test_sounds_of_several_kinds_are_not_put_together():

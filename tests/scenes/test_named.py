@@ -24,31 +24,20 @@ def scene(tmp_path, **tables):
     return scene_of(told, tmp_path / "scene.toml", folder=tmp_path)
 
 
-@pytest.mark.parametrize("name", fi.materials)
-def test_a_material_of_a_scene_is_that_of_python(name, tmp_path):
-    made = scene(tmp_path, material={"name": name})
-    assert made.make_section("plate").material == fi.materials[name]
-    of_material = {key: how for key, how in made.known.items() if key.startswith("material")}
-    assert of_material == fi.materials.entry(name).vary("material")
+def test_a_material_of_a_scene_is_that_of_python(tmp_path):
+    for name in fi.materials:
+        made = scene(tmp_path, material={"name": name})
+        assert made.make_section("plate").material == fi.materials[name]
+        of_material = {key: how for key, how in made.known.items() if key.startswith("material")}
+        assert of_material == fi.materials.entry(name).vary("material")
 
 
-@pytest.mark.parametrize("name", fi.strikers)
-def test_a_striker_of_a_scene_is_that_of_python_with_its_contact(name, tmp_path):
-    made = scene(tmp_path, striker={"name": name})
-    entry = fi.strikers.entry(name)
-    assert made.make_contact() == entry.contact(on=fi.materials["brass"])
-    assert made.make_striker().felt_mass == fi.strikers[name].felt_mass and made.striker.kind == entry.kind
-    assert "contact.stiffness" in made.known
-
-
-@pytest.mark.slow
-def test_a_blow_from_a_file_is_the_blow_from_python(tmp_path):
-    made = scene(tmp_path, material={"name": "spruce, Sitka"})
-    entry, spruce = fi.strikers.entry("yarn, medium"), fi.materials["spruce, Sitka"]
-    law = entry.contact(on=spruce)
-    target = made.modes(40)
-    by_hand = fi.strike(target, fi.strikers["yarn, medium"], law, at=[0.13, 0.1], speed=1.0, tolerance=1e-2)
-    assert by_hand.impulse == pytest.approx(made.strike().impulse, rel=1e-2)
+def test_a_striker_of_a_scene_is_that_of_python_with_its_contact(tmp_path):
+    for name in fi.strikers:
+        made, entry = scene(tmp_path, striker={"name": name}), fi.strikers.entry(name)
+        assert made.make_contact() == entry.contact(on=fi.materials["brass"])
+        assert made.make_striker().felt_mass == fi.strikers[name].felt_mass and made.striker.kind == entry.kind
+        assert "contact.stiffness" in made.known
 
 
 def test_other_keys_replace_what_a_name_says_and_lose_its_interval(tmp_path):
@@ -83,9 +72,8 @@ def test_bands_and_spreads_use_the_intervals_of_names(tmp_path):
     assert band["contact_time"].low < band.hit.contact_time < band["contact_time"].high
     vary = {**fi.materials.entry("brass").vary("material"), **fi.strikers.entry("yarn, medium").vary("striker")}
     assert vary.items() <= made.known.items()
-    assert fi.spread(made, vary, n=64, sobol=False).quantile("impulse", 0.5).value == pytest.approx(
-        band.hit.impulse, rel=0.1
-    )
+    middle = fi.spread(made, vary, n=64, sobol=False).quantile("impulse", 0.5).value
+    assert middle == pytest.approx(band.hit.impulse, rel=0.1)
 
 
 @pytest.mark.parametrize(
@@ -114,7 +102,5 @@ def test_wrong_names_are_told_with_their_table(tables, text, tmp_path):
 
 
 def test_a_bare_body_takes_a_soft_mallet(tmp_path):
-    bare = {"mass": 0.2, "first_frequency": 90.0}
-    made = scene(tmp_path, material=None, section=None, target=bare)
-    law = fi.strikers.entry("yarn, medium").contact_table()
-    assert made.make_contact().table == {**known.taken("", law)[0]}
+    made = scene(tmp_path, material=None, section=None, target={"mass": 0.2, "first_frequency": 90.0})
+    assert made.make_contact().table == known.taken("", fi.strikers.entry("yarn, medium").contact_table())[0]

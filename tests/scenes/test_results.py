@@ -4,18 +4,20 @@ import json
 import pickle
 import shutil
 import zipfile
+from pathlib import Path
 from typing import ClassVar
 
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
-from scenes import BAR, QUICK, SMALL
+from scenes import BAR, QUICK, SMALL, load_text
 
 import fem_impact as fi
 from fem_impact import cli
 from fem_impact.scenes import results
 
 FE = SMALL.replace('"analytic"', '"fe"') + "[observe]\npoints = [[0.2, 0.1], [0.3, 0.2]]\n"
+RIGID = 'kind = "rigid"\nmass = 0.03'
 STICK = 'kind = "stick"\nmass = 0.03\nfirst_frequency = 500.0'
 
 
@@ -25,67 +27,7 @@ def other(old, new, text=SMALL):
 
 
 def contact(text):
-    head, rest = SMALL.split("[contact]")
-    return f"{head}[contact]\n{text}\n[strike]{rest.partition('[strike]')[2]}"
-
-
-SCENES = {
-    "modes in closed form": SMALL,
-    "vectors of elements": FE,
-    "a bar": BAR,
-    "a stick in a hand": other(
-        'kind = "rigid"\nmass = 0.03', f"{STICK}\nhand = {{ stiffness = 200.0, damping = 0.5 }}"
-    ).replace("[strike]", "[strike]\nmax_impacts = 2"),
-    "two layers": contact('kind = "layers"\nstiffness = 1e5\nexponent = 1.5\ndepth = 1e-4\nhard_stiffness = 1e7'),
-    "felt": contact('kind = "felt"\nstiffness = 1e7\nexponent = 2.5\nhysteresis = 0.5\nrelaxation = 1e-3'),
-}
-
-
-@pytest.fixture
-def written(tmp_path, capsys):
-    """Strike a scene with the command; its folder, and the response that Python gets."""
-
-    def written(text, *words):
-        (tmp_path / "scene.toml").write_text(text)
-        assert cli.main(["strike", str(tmp_path / "scene.toml"), "--out", str(tmp_path / "out"), *words]) in (0, 3)
-        capsys.readouterr()
-        return tmp_path / "out"
-
-    return written
-
-
-@pytest.mark.parametrize("name", SCENES)
-def test_a_blow_read_back_is_the_blow_that_was_struck(written, tmp_path, name):
-    folder = written(SCENES[name])
-    scene = fi.load_scene(tmp_path / "scene.toml")
-    run = scene.run()
-    hit = run.response.on(run.response.target) if run.plan.target == "vectors" else run.response
-    read = fi.load_response(folder)
-    assert fi.export.numbers(read) == fi.export.numbers(hit)  # to the bit, as all that follows
-    assert read.summary() == hit.summary() and read.impacts == hit.impacts and read.notes == hit.notes
-    assert (read.time == hit.time).all() and (read.force == hit.force).all()
-    assert (read.spectrum([100.0, 900.0]) == hit.spectrum([100.0, 900.0])).all()
-    times = np.linspace(0.0, 2.0 * hit.history.end_time, 40)
-    for points in ([hit.at], scene.points):
-        for motion in ("displacement", "velocity"):
-            want = getattr(hit, motion)(points, times)
-            assert_allclose(getattr(read, motion)(points, times), want, rtol=0, atol=1e-12 * np.abs(want).max())
-    assert read.to_xarray().identical(hit.to_xarray())
-    assert fi.load_response(folder / "response.json").restitution == hit.restitution
-
-
-def test_what_changes_a_blow_read_back_is_known_too(written, tmp_path):
-    read, hit = fi.load_response(written(SMALL)), fi.load_scene(tmp_path / "scene.toml").strike()
-    mine, its = (each.gradient("contact_time", wrt="striker.mass") for each in (read, hit))
-    assert_allclose([*mine.slopes, *mine.error], [*its.slopes, *its.error], rtol=1e-9)
-
-
-def test_a_rigid_body_and_a_flexible_striker_come_back(written):
-    folder = written(other('kind = "rigid"\nmass = 0.03', STICK), "--target", "rigid", "--tolerance", "0.5")
-    read = fi.load_response(folder)
-    told = json.loads((folder / "response.json").read_text())["response"]
-    assert read.restitution == told["restitution"] and read.striker.modes.n_modes > 1
-    assert read.energies["striker"] == told["energies"]["striker"]
+    return other('kind = "hertz"\nstiffness = 695e3', text)
 
 
 STROKES = """
@@ -102,55 +44,125 @@ striker = { kind = "stick", mass = 0.03, first_frequency = 500.0 }
 when = 0.001
 lasts = 0.02
 """
+HELD = f"{STICK}\nhand = {{ stiffness = 200.0, damping = 0.5 }}"
+SCENES = {
+    "modes in closed form": SMALL,
+    "vectors of elements": FE,
+    "a bar": BAR,
+    "a stick in a hand": other(RIGID, HELD).replace("[strike]", "[strike]\nmax_impacts = 2"),
+    "two layers": contact('kind = "layers"\nstiffness = 1e5\nexponent = 1.5\ndepth = 1e-4\nhard_stiffness = 1e7'),
+    "felt": contact('kind = "felt"\nstiffness = 1e7\nexponent = 2.5\nhysteresis = 0.5\nrelaxation = 1e-3'),
+    "strokes": SMALL + STROKES,
+}
 
 
-def test_strokes_read_back_are_those_that_were_played(written, tmp_path):
-    read = fi.load_response(written(SMALL + STROKES, "--duration", "0.01"))
-    scene = fi.load_scene(tmp_path / "scene.toml")
-    played = scene.play()
-    assert max(map(len, played.strikers)) == 2  # two strikers meet on the body
-    assert read.summary() == played.summary() and read.impacts == played.impacts and read.energies == played.energies
-    assert (read.time == played.time).all() and (read.force == played.force).all()
-    assert (read.spectrum([100.0, 900.0]) == played.spectrum([100.0, 900.0])).all()
-    assert [each.striker.felt_mass for each in read.strokes] == [each.striker.felt_mass for each in played.strokes]
-    times = np.linspace(0.0, 0.06, 50)
-    for points in ([read.at], scene.points, [each.at for each in read.strokes]):
+def saved(folder, text, **how):
+    """The scene of a text, its blow or strokes, and what is read back of them."""
+    scene = load_text(folder, text)
+    found = scene.play(**how) if scene.stroke else scene.run(**how).response
+    results.save_response(folder, found, scene.points, {"response": {}})
+    return scene, found, fi.load_response(folder)
+
+
+@pytest.fixture(scope="module")
+def small(tmp_path_factory):
+    """What the command wrote of a blow."""
+    folder = tmp_path_factory.mktemp("small")
+    load_text(folder, SMALL)
+    assert cli.main(["strike", str(folder / "scene.toml"), "--out", str(folder / "out")]) == 0
+    return folder / "out"
+
+
+@pytest.fixture
+def written(small, tmp_path):
+    """A copy of what a blow left, to be damaged."""
+    shutil.copytree(small, tmp_path / "out")
+    return tmp_path / "out"
+
+
+@pytest.mark.parametrize("name", SCENES)
+def test_a_blow_read_back_is_the_blow_that_was_struck(tmp_path, name):
+    """To the bit, but for motion, which goes through the modes again."""
+    scene, hit, read = saved(tmp_path, SCENES[name])
+    points = [each.at for each in read.strokes] if scene.stroke else scene.points
+    if scene.stroke:
+        assert max(map(len, hit.strikers)) == 2  # two strikers meet on the body
+        assert [each.striker.felt_mass for each in read.strokes] == [each.striker.felt_mass for each in hit.strokes]
+        assert read.energies == hit.energies
+    else:
+        hit = hit.on(hit.target) if hit.vectors else hit
+        assert fi.export.numbers(read) == fi.export.numbers(hit) and read.to_xarray().identical(hit.to_xarray())
+        assert fi.load_response(tmp_path / "response.json").restitution == hit.restitution
+    assert read.summary() == hit.summary() and read.impacts == hit.impacts and read.notes == hit.notes
+    assert (read.time == hit.time).all() and (read.force == hit.force).all()
+    assert (read.spectrum([100.0, 900.0]) == hit.spectrum([100.0, 900.0])).all()
+    times = np.linspace(0.0, 2.0 * hit.impacts[-1].end, 40)
+    for places in ([hit.at], scene.points, points):
         for motion in ("displacement", "velocity"):
-            want = getattr(played, motion)(points, times)
-            assert_allclose(getattr(read, motion)(points, times), want, rtol=0, atol=1e-12 * np.abs(want).max())
+            want = getattr(hit, motion)(places, times)
+            assert_allclose(getattr(read, motion)(places, times), want, rtol=0, atol=1e-12 * np.abs(want).max())
 
 
-def test_motion_elsewhere_is_refused(written):
-    read = fi.load_response(written(SMALL))
+def test_what_changes_a_blow_read_back_is_known_too(small):
+    read, hit = fi.load_response(small), fi.load_scene(small.parent / "scene.toml").strike()
+    mine, its = (each.gradient("contact_time", wrt="striker.mass") for each in (read, hit))
+    assert_allclose([*mine.slopes, *mine.error], [*its.slopes, *its.error], rtol=1e-9)
+
+
+def test_a_rigid_body_and_a_flexible_striker_come_back_from_the_command(tmp_path, prompt):
+    load_text(tmp_path, other(RIGID, STICK))
+    said = prompt("strike scene.toml --target rigid --tolerance 0.5 --out out")
+    assert said.status in (0, 3) and "no modes and no sound (use --target modal" in " ".join(said.out.split())
+    read, told = fi.load_response("out"), json.loads(Path("out/response.json").read_text())["response"]
+    assert read.restitution == told["restitution"] and read.striker.modes.n_modes > 1
+    assert read.energies["striker"] == told["energies"]["striker"]
+
+
+def test_a_blow_by_vectors_is_kept_with_the_motion_of_its_modes(tmp_path, prompt):
+    load_text(tmp_path, FE)
+    assert prompt("strike scene.toml --tolerance 0.1 --out out").status in (0, 3)
+    read, told = fi.load_response("out"), json.loads(Path("out/response.json").read_text())["response"]
+    assert read.vectors is None and read.restitution == told["restitution"] and read.target.n_modes > 1
+
+
+def test_motion_elsewhere_is_refused(small):
     with pytest.raises(ValueError, match="points must lie on the body"):
-        read.displacement([(0.01, 0.01)], [0.0])
+        fi.load_response(small).displacement([(0.01, 0.01)], [0.0])
+
+
+DAMAGED = r"damaged, or not of the response\.json beside it"
 
 
 @pytest.mark.parametrize("name", ["response.npz", "response.json"])
 def test_any_flipped_bit_is_refused_in_one_sentence(written, name):
-    folder = written(SMALL)
-    raw = (folder / name).read_bytes()
+    raw = (written / name).read_bytes()
     for place in np.random.default_rng(1).integers(0, len(raw), 25):
         bad = bytearray(raw)
         bad[place] ^= 1
-        (folder / name).write_bytes(bytes(bad))
-        with pytest.raises(ValueError, match=r"damaged, or not of the response\.json beside it") as said:
-            fi.load_response(folder)
-        assert "\n" not in str(said.value)
-    (folder / name).write_bytes(raw[: len(raw) // 2])
+        (written / name).write_bytes(bytes(bad))
+        with pytest.raises(ValueError, match=rf"^[^\n]*{DAMAGED}[^\n]*$"):
+            fi.load_response(written)
+    (written / name).write_bytes(raw[: len(raw) // 2])
     with pytest.raises(ValueError, match="damaged"):
-        fi.load_response(folder)
+        fi.load_response(written)
 
 
-def test_what_is_missing_is_named(written, tmp_path):
-    folder = written(SMALL)
-    (folder / "response.npz").unlink()
-    with pytest.raises(ValueError, match=r"response.npz: there is no such file.*; strike the scene again"):
-        fi.load_response(folder)
-    with pytest.raises(ValueError, match="there is no such folder"):
-        fi.load_response(tmp_path / "none")
-    with pytest.raises(ValueError, match=r"response.json: there is no such file"):
-        fi.load_response(tmp_path)
+def test_what_is_missing_is_named_and_the_folder_that_is_advised_is_read(written, tmp_path, prompt):
+    for wrong in (tmp_path, tmp_path / "none"):
+        with pytest.raises(ValueError, match=r"give the (?:folder|one) that `fem-impact strike` wrote"):
+            fi.load_response(wrong)
+    said = prompt("show", tmp_path)
+    named = said.err.split("give one in it, such as ")[1].strip()
+    assert said.status == 2 and named == str(written)
+    assert prompt("show", named).out and fi.load_response(named).n_impacts > 0
+    (written / "response.npz").unlink()
+    for folder, text in (
+        (written, r"response.npz: there is no such file.*; strike the scene again"),
+        (tmp_path / "none", "there is no such folder"),
+        (tmp_path, r"response.json: there is no such file"),
+    ):
+        with pytest.raises(ValueError, match=text):
+            fi.load_response(folder)
 
 
 class Bomb:
@@ -169,11 +181,14 @@ def repacked(folder, **changes):
     results.kept.write_arrays(folder / results.SAVED, key, {**arrays, **changes})
 
 
-def test_nothing_planted_runs_and_arrays_that_do_not_fit_are_refused(written, tmp_path):
-    folder = written(SMALL)
-    shutil.copytree(folder, tmp_path / "good")
-    told = json.loads(str(results.kept.read_arrays(folder / results.SAVED, results._key(folder))["told"]))
+def test_nothing_planted_runs_and_arrays_that_do_not_fit_are_refused(small, tmp_path):
+    told = json.loads(str(results.kept.read_arrays(small / results.SAVED, results._key(small))["told"]))
     steps = told["response"]["fields"]["history"]["fields"]["steps"]["array"]
+
+    def planted(**changes):
+        shutil.copytree(small, tmp_path / "bad", dirs_exist_ok=True)
+        repacked(tmp_path / "bad", **changes)
+        return tmp_path / "bad"
 
     def spoilt(change):
         other = json.loads(json.dumps(told))
@@ -188,60 +203,37 @@ def test_nothing_planted_runs_and_arrays_that_do_not_fit_are_refused(written, tm
         spoilt(lambda r: r["fields"].update(bodies=[])),
     ]  # fmt: skip
     for plan in plans:
-        shutil.rmtree(folder)
-        shutil.copytree(tmp_path / "good", folder)
-        repacked(folder, **plan)
+        folder = planted(**plan)
         Bomb.ran.clear()  # pickling does not run it, but be sure
-        with pytest.raises(ValueError, match=r"damaged, or not of the response\.json beside it"):
+        with pytest.raises(ValueError, match=DAMAGED):
             fi.load_response(folder)
         assert Bomb.ran == []
     with zipfile.ZipFile(folder / results.SAVED, "w") as file:
         file.writestr("told.npy", pickle.dumps(Bomb()))
     with pytest.raises(ValueError, match="damaged"):
         fi.load_response(folder)
-    shutil.rmtree(folder)
-    shutil.copytree(tmp_path / "good", folder)
-    repacked(folder, **spoilt(lambda r: r["fields"].update(rings="os.system")))  # no field of a file
-    assert fi.load_response(folder).rings is None
-    assert Bomb.ran == [] and fi.load_response(tmp_path / "good").n_impacts > 0
+    assert (
+        fi.load_response(planted(**spoilt(lambda r: r["fields"].update(rings="os.system")))).rings is None
+    )  # no field
+    assert Bomb.ran == [] and fi.load_response(small).n_impacts > 0
 
 
-def said(capsys, *words):
-    assert cli.main([*words]) == 0
-    return " ".join(capsys.readouterr().out.split())
-
-
-def test_show_tells_what_a_folder_holds(written, capsys, tmp_path):
-    folder = written(SMALL)
-    text = said(capsys, "show", str(folder))
+def test_show_tells_what_a_folder_holds(written, prompt, tmp_path):
+    text, hit = " ".join(prompt("show", written).out.split()), fi.load_response(written)
     assert text.startswith("strike: ") and "fi.load_response(" in text and "response.npz" in text
-    hit = fi.load_response(folder)
     assert hit.verdict in text and f"restitution {hit.restitution:.5g}" in text
     (tmp_path / "map.toml").write_text(QUICK)
-    assert cli.main(["map", str(tmp_path / "map.toml"), "--out", str(folder)]) == 0
-    capsys.readouterr()
-    both = json.loads(said(capsys, "show", str(folder), "--json"))
+    assert prompt("map map.toml --out", written).status == 0
+    both = prompt("show --json", written).json
     assert both["holds"] == ["strike", "map"] and "hit once" in " ".join(both["summary"])
     assert both["response"]["restitution"] == hit.restitution
 
 
-def test_the_folder_that_is_advised_is_read(written, capsys):
-    folder = written(SMALL)
-    for wrong in (folder.parent, folder.parent / "none"):
-        with pytest.raises(ValueError, match=r"give the (?:folder|one) that `fem-impact strike` wrote"):
-            fi.load_response(wrong)
-    assert cli.main(["show", str(folder.parent)]) == 2
-    named = capsys.readouterr().err.split("give one in it, such as ")[1].strip()
-    assert named == str(folder) and said(capsys, "show", named) and fi.load_response(named).n_impacts > 0
-
-
-def test_show_tells_how_far_a_store_is(capsys, tmp_path):
+def test_show_tells_how_far_a_store_is(prompt, tmp_path):
     pytest.importorskip("zarr", reason="stores are an extra: fem-impact[cluster]")
     (tmp_path / "map.toml").write_text(QUICK)
-    words = ["map", str(tmp_path / "map.toml"), "--out", str(tmp_path / "out"), "--store", str(tmp_path / "store")]
-    assert cli.main(words) == 0
-    capsys.readouterr()
-    text = said(capsys, "show", str(tmp_path / "store"))
+    assert prompt("map map.toml --out out --store store").status == 0
+    text = " ".join(prompt("show store").out.split())
     assert "a store of a map or a spread" in text and "blocks are finished" in text
     done, total = results.store.finished(tmp_path / "store")
     assert done == total > 0
@@ -258,9 +250,8 @@ def test_show_tells_how_far_a_store_is(capsys, tmp_path):
         ("fit.json", "[" * 100_000, "it is damaged"),
     ],
 )
-def test_show_refuses_other_folders_in_one_sentence(tmp_path, capsys, name, text, why):
+def test_show_refuses_other_folders_in_one_sentence(tmp_path, prompt, name, text, why):
     if name:
         (tmp_path / name).write_text(text)
-    assert cli.main(["show", str(tmp_path)]) == 2
-    error = capsys.readouterr().err
-    assert why in error and error.count("\n") == 1
+    said = prompt("show", tmp_path)
+    assert said.status == 2 and why in said.err and said.err.count("\n") == 1

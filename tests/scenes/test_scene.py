@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from comparing import examined, worst
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose
@@ -20,7 +21,7 @@ from fem_impact.impact.contact import Contact
 from fem_impact.impact.striker import Hand, Striker
 from fem_impact.model.budget import Budget
 from fem_impact.modes import analytic, finding
-from fem_impact.scenes import maps, scene
+from fem_impact.scenes import scene, sentences
 from fem_impact.scenes.sentences import words
 
 SCENES = Path(__file__).parents[2] / "studies" / "scenes"
@@ -29,9 +30,15 @@ TEXT = 'title = "test"\n' + SMALL.replace("damping_ratio = 0.01", "damping_ratio
 )
 
 
-def edited(old, new):
-    assert old in TEXT
-    return TEXT.replace(old, new)
+SOURCE = 'source = "analytic"'
+RIGID, RECTANGLE = 'kind = "rigid"\nmass = 0.03', 'shape = "rectangle"\nlength = 0.465\nwidth = 0.3'
+MATERIAL = "[material]\nE = 10e9\nnu = 0.3\nrho = 450.0\n"
+PLATE = f'{MATERIAL}[section]\nkind = "plate"\nthickness = 3e-3\n[target]'
+
+
+def edited(old, new, text=TEXT):
+    assert old in text
+    return text.replace(old, new)
 
 
 def test_title_cannot_command_a_terminal(tmp_path):
@@ -41,166 +48,99 @@ def test_title_cannot_command_a_terminal(tmp_path):
 
 def test_scene_strikes_what_the_public_functions_strike(tmp_path):
     hit = load_text(tmp_path, TEXT).strike()
-    body = analytic.rectangle(0.465, 0.3, mass=0.2, first_frequency=100.0, n_modes=hit.target.n_modes)
-    again = collision.strike(
-        body.damped(0.005),
-        Striker.rigid(0.03),
-        Contact.hertz(695e3),
-        at=[0.1395, 0.09],
-        speed=2.0,
-        tolerance=Budget(1e-2).half,
-    )
+    body = analytic.rectangle(0.465, 0.3, mass=0.2, first_frequency=100.0, n_modes=hit.target.n_modes).damped(0.005)
+    blow = {"at": [0.1395, 0.09], "speed": 2.0, "tolerance": Budget(1e-2).half}
+    again = collision.strike(body, Striker.rigid(0.03), Contact.hertz(695e3), **blow)
     # the same calls with the same numbers, up to rounding of the scale: 1e-9 of the peak after some 1e3 rad
     assert_allclose(hit.force, again.force, rtol=0, atol=1e-9 * again.peak_force)
     assert hit.n_impacts == again.n_impacts
 
 
-@pytest.mark.parametrize("text, law", [
-    (
-        'kind = "layers"\nstiffness = 1e5\nexponent = 1.2\ndepth = 2e-4\nhard_stiffness = 1e7',
-        Contact.layers(1e5, 1.2, depth=2e-4, hard_stiffness=1e7),
-    ),
-    (
-        'kind = "elastic_plastic"\nstiffness = 695e3\nyield_speed = 0.1\nmass = 0.03',
-        Contact.elastic_plastic(695e3, yield_speed=0.1, mass=0.03),
-    ),
-    (
-        'kind = "felt"\nstiffness = 695e3\nexponent = 1.5\nhysteresis = 0.2\nrelaxation = 1e-3',
-        Contact.felt(695e3, 1.5, hysteresis=0.2, relaxation=1e-3),
-    ),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    ("text", "law"),
+    [
+        ('"layers"\nstiffness = 1e5\nexponent = 1.2\ndepth = 2e-4\nhard_stiffness = 1e7',
+         Contact.layers(1e5, 1.2, depth=2e-4, hard_stiffness=1e7)),
+        ('"elastic_plastic"\nstiffness = 695e3\nyield_speed = 0.1\nmass = 0.03',
+         Contact.elastic_plastic(695e3, yield_speed=0.1, mass=0.03)),
+        ('"felt"\nstiffness = 695e3\nexponent = 1.5\nhysteresis = 0.2\nrelaxation = 1e-3',
+         Contact.felt(695e3, 1.5, hysteresis=0.2, relaxation=1e-3)),
+    ],
+)  # fmt: skip
 def test_contacts_that_lose_and_a_hammer_in_a_scene(tmp_path, text, law):
-    """The scene strikes, tells, and maps the new keys by their names."""
     hammer = 'kind = "hammer"\nhead = 0.03\nhandle = 0.05\nstiffness = 1e4\ndamping = 2.0'
-    told = TEXT.replace('kind = "hertz"\nstiffness = 695e3', text).replace('kind = "rigid"\nmass = 0.03', hammer)
-    loaded = load_text(tmp_path, told)
+    loaded = load_text(tmp_path, edited('"hertz"\nstiffness = 695e3', text).replace(RIGID, hammer))
     hit = loaded.strike()
-    assert hit.contact == law
-    assert hit.striker.mass == pytest.approx(0.08)
-    assert hit.tolerance_met
+    assert hit.contact == law and hit.striker.mass == pytest.approx(0.08)
+    assert hit.tolerance_met and hit.energy_error < 1e-12
     assert (hit.dissipated["contact"] > 0.0) == law.lossy
-    assert hit.energy_error < 1e-12
     assert "g" in words(loaded, hit)[1]
-    key = {"layers": "depth", "elastic_plastic": "yield_approach", "felt": "relaxation"}[law.table["kind"]]
-    values = [0.5 * getattr(law, key), getattr(law, key)]
-    table = maps.map_scene(loaded, over={f"contact.{key}": values}, tolerance=1e-2)
-    assert float(table.restitution[1]) == pytest.approx(hit.restitution, abs=2e-2)
+
+
+TURNING = 'kind = "turning"\nmass = 0.08\ninertia = 2e-5\narm = [0.01, 0.03]\npivot = [-0.2, 0.0]'
 
 
 def test_a_striker_that_turns_in_a_scene(tmp_path):
     """It is the one of `Striker.turning`; the answer tells the mass felt, and what friction would do."""
-    turning = 'kind = "turning"\nmass = 0.08\ninertia = 2e-5\narm = [0.01, 0.03]\npivot = [-0.2, 0.0]'
-    loaded = load_text(tmp_path, TEXT.replace('kind = "rigid"\nmass = 0.03', turning))
+    loaded = load_text(tmp_path, edited(RIGID, TURNING))
     hit = loaded.strike()
-    same = Striker.turning(0.08, 2e-5, (0.01, 0.03), pivot=(-0.2, 0.0))
-    assert_allclose(hit.striker.motion, same.motion)
+    assert_allclose(hit.striker.motion, Striker.turning(0.08, 2e-5, (0.01, 0.03), pivot=(-0.2, 0.0)).motion)
     assert "felt as 57.14\xa0g off its centre" in words(loaded, hit)[1]
-    assert {each.name: each for each in hit.assumptions}["no friction"].worst > 0.0
-    with pytest.raises(ValueError, match="hand needs a striker with one rigid motion, got 6"):
-        held = turning + "\nhand = { stiffness = 1.0 }"
-        load_text(tmp_path, TEXT.replace('kind = "rigid"\nmass = 0.03', held)).strike()
+    assert examined(hit, "no friction").worst > 0.0
 
 
 def test_a_panel_on_posts_in_a_scene(tmp_path):
     posts = "point_supports = [{ at = [0.1, 0.1] }, { at = [0.3, 0.2], stiffness = 1e4 }]"
-    told = TEXT.replace('source = "analytic"', posts)
-    loaded = load_text(tmp_path, told)
-    free, held = load_text(tmp_path, TEXT).modes(3), loaded.modes(3)
+    free, held = (load_text(tmp_path, text).modes(3) for text in (TEXT, edited(SOURCE, posts)))
     assert held.frequencies[0] == pytest.approx(100.0)  # the scale is that of the body on its posts
     assert abs(held.frequencies[1] / held.frequencies[0] - free.frequencies[1] / free.frequencies[0]) > 0.01
     assert np.abs(held.shape_at([(0.1, 0.1)])).max() < 1e-6 * np.abs(held.shape_at([(0.25, 0.1)])).max()
-    for wrong, text in (
-        ("[{ stiffness = 1e4 }]", "must have at"),
-        ("[{ at = [0.1, 0.1], stiffness = 0 }]", "positive"),
-        ("[{ at = [0.1, 0.1], stiffness = 1.0, clamped = 0.01 }]", "must have at and perhaps stiffness, or clamped"),
-    ):
-        with pytest.raises(ValueError, match=text):
-            load_text(tmp_path, told.replace(posts, f"point_supports = {wrong}"))
 
 
 def test_a_plate_clamped_at_a_post_in_a_scene(tmp_path):
     posts = "point_supports = [{ at = [0.1, 0.1], clamped = 0.01 }, { at = [0.3, 0.2] }]"
-    loaded = load_text(tmp_path, TEXT.replace('source = "analytic"', posts))
+    loaded = load_text(tmp_path, edited(SOURCE, posts))
     assert "clamp0" in loaded.body().edges and loaded.held["clamp0"] == "clamped"
     assert [entry[1] for entry in loaded.built.target.point_supports] == ["hinged"]
     shape = loaded.modes(3).shape_at([(0.1101, 0.1), (0.3, 0.2), (0.25, 0.1)])
     assert np.abs(shape[:2]).max() < 1e-3 * np.abs(shape[2]).max()  # at the edge of the clamp and on the other post
-    off = TEXT.replace('source = "analytic"', "point_supports = [{ at = [9.0, 0.1], clamped = 0.01 }]")
-    with pytest.raises(ValueError, match=r"\[target\] point_supports must leave room for each clamp"):
-        load_text(tmp_path, off).strike()
 
 
 def test_a_held_striker_in_a_scene_comes_back(tmp_path):
-    held = 'kind = "rigid"\nmass = 0.03\nhand = { stiffness = 100.0, damping = 0.1, force = -0.3 }'
-    loaded = load_text(tmp_path, TEXT.replace('kind = "rigid"\nmass = 0.03', held))
+    loaded = load_text(tmp_path, edited(RIGID, f"{RIGID}\nhand = {{ stiffness = 100.0, damping = 0.1, force = -0.3 }}"))
     assert loaded.make_striker().hand == Hand(100.0, 0.1, -0.3)
     hit = loaded.strike(tolerance=0.1, duration=0.2, quantity="n_impacts")
     assert any(impact.start > 0.02 for impact in hit.impacts)  # half a swing at 9 Hz
     assert "held by a hand in which it swings at 9.189" in words(loaded, hit)[1]  # sqrt(100 / 0.03) / 2 pi
-    for wrong, text in (("3.0", "hand must be a table"), ("{ stifness = 1.0 }", "hand: stifness is not a key")):
-        told = held.partition("hand")[0] + f"hand = {wrong}"
-        with pytest.raises(ValueError, match=text):
-            load_text(tmp_path, TEXT.replace('kind = "rigid"\nmass = 0.03', told))
 
 
-def test_finite_elements_and_formulas_agree_to_the_tolerance(tmp_path):
-    exact = load_text(tmp_path, TEXT).strike()
-    found = load_text(tmp_path, edited('"analytic"', '"fe"')).strike()
-    # both are promised to 1e-2 of the exact plate, so they differ by 2e-2 at most
-    assert abs(found.restitution - exact.restitution) < 2e-2
-    for name in ("impulse", "contact_time", "peak_force"):
-        assert_allclose(getattr(found, name), getattr(exact, name), rtol=2e-2)
-    assert found.n_impacts == exact.n_impacts
+def test_finite_elements_in_stages_that_are_watched_agree_with_formulas_to_the_tolerance(tmp_path):
+    seen, exact = [], load_text(tmp_path, TEXT).strike()
+    run = load_text(tmp_path, edited('"analytic"', '"fe"')).run(lambda name: seen.append(name) or nullcontext())
+    assert list(dict.fromkeys(seen)) == list(run.seconds) == ["mesh", "modes", "assembly", "vectors", "strike"]
+    assert all(value > 0.0 for value in run.seconds.values())
+    assert worst(run.response, exact) < 2e-2  # both are promised to 1e-2 of the exact plate
 
 
-def test_tolerance_decides_how_many_modes_are_used(tmp_path):
-    loose = load_text(tmp_path, TEXT).modes()
-    tight = load_text(tmp_path, edited("1e-2", "1e-5")).modes()
-    assert tight.n_modes > 2 * loose.n_modes
+def test_tolerance_or_count_decides_how_many_modes_are_used(tmp_path):
+    loose = load_text(tmp_path, TEXT)
+    assert load_text(tmp_path, edited("1e-2", "1e-5")).modes().n_modes > 2 * loose.modes().n_modes
+    assert loose.modes(7).n_modes == 7
 
 
 def test_material_and_section_give_the_plate_its_own_mass(tmp_path):
-    text = TEXT.replace(
-        "[target]\nmass = 0.2\nfirst_frequency = 100.0",
-        '[material]\nE = 10e9\nnu = 0.3\nrho = 450.0\n[section]\nkind = "plate"\nthickness = 3e-3\n[target]',
-    ).replace('"analytic"', '"fe"')
+    text = edited("[target]\nmass = 0.2\nfirst_frequency = 100.0", PLATE).replace('"analytic"', '"fe"')
     modes = load_text(tmp_path, text).modes(4)
-    system = assembly.assemble(
-        mesh.rectangle(0.465, 0.3), Plate(Material(E=10e9, nu=0.3, rho=450.0), 3e-3), supports={"boundary": "hinged"}
-    )
+    plate = Plate(Material(E=10e9, nu=0.3, rho=450.0), 3e-3)
+    system = assembly.assemble(mesh.rectangle(0.465, 0.3), plate, supports={"boundary": "hinged"})
     assert_allclose(modes.mass, 0.465 * 0.3 * 450.0 * 3e-3, rtol=1e-12)
     # the scene refines to 1e-2, the default mesh is at least that good on the first four
     assert_allclose(modes.frequencies, finding.find_modes(system, n_modes=4).frequencies, rtol=2e-2)
 
 
 def test_mass_and_frequency_rescale_a_material(tmp_path):
-    text = TEXT.replace(
-        "[target]", '[material]\nE = 10e9\nnu = 0.3\nrho = 450.0\n[section]\nkind = "plate"\nthickness = 3e-3\n[target]'
-    )
-    modes = load_text(tmp_path, text).modes(4)
+    modes = load_text(tmp_path, edited("[target]", PLATE)).modes(4)
     assert_allclose([modes.mass, modes.frequencies[0]], [0.2, 100.0], rtol=1e-12)
-
-
-def test_count_of_modes_is_what_was_asked(tmp_path):
-    assert load_text(tmp_path, TEXT).modes(7).n_modes == 7
-
-
-def test_stages_are_timed_and_watched(tmp_path):
-    seen = []
-
-    class Watch:
-        def __init__(self, name):
-            seen.append(name)
-
-        def __enter__(self):
-            pass
-
-        def __exit__(self, *_):
-            pass
-
-    run = load_text(tmp_path, edited('"analytic"', '"fe"')).run(Watch)
-    assert list(dict.fromkeys(seen)) == list(run.seconds) == ["mesh", "modes", "assembly", "vectors", "strike"]
-    assert all(value > 0.0 for value in run.seconds.values())
 
 
 def test_arguments_of_the_strike_can_be_replaced(tmp_path):
@@ -222,16 +162,10 @@ def test_scene_is_frozen_and_tells_its_data(tmp_path):
 
 def test_mesh_file_is_found_beside_the_scene(tmp_path, monkeypatch):
     monkeypatch.chdir("/")
-    text = TEXT.replace('shape = "rectangle"\nlength = 0.465\nwidth = 0.3', 'shape = "file"\npath = "none.msh"')
-    loaded = load_text(tmp_path, text.replace('"analytic"', '"fe"'))
+    loaded = load_text(tmp_path, edited(RECTANGLE, 'shape = "file"\npath = "none.msh"').replace('"analytic"', '"fe"'))
     assert loaded.mesh.values["path"] == str(tmp_path / "none.msh")
     with pytest.raises((ValueError, OSError), match=str(tmp_path / "none.msh")):
         loaded.modes(1)
-
-
-@pytest.mark.parametrize("path", sorted(SCENES.glob("*.toml")), ids=lambda path: path.stem)
-def test_every_scene_of_the_studies_loads_with_a_title(path):
-    assert scene.load_scene(path).title
 
 
 BAD = [
@@ -255,11 +189,7 @@ BAD = [
     ('"analytic"', '"formula"', r"\[target\] source must be one of auto, fe, analytic"),
     ("stiffness = 695e3", "stiffness = 0", r"\[contact\] stiffness must be positive"),
     ("stiffness = 695e3", "stifness = 1.0", r"\[contact\] stifness is not a key .*did you mean 'stiffness'"),
-    (
-        'kind = "hertz"\nstiffness = 695e3',
-        'kind = "between"',
-        r"\[contact\] kind 'between' needs a striker of kind 'sphere'",
-    ),
+    ('"hertz"\nstiffness = 695e3', '"between"', r"\[contact\] kind 'between' needs a striker of kind 'sphere'"),
     ("at = [0.1395, 0.09]", "", r"\[strike\] at is missing"),
     ("at = [0.1395, 0.09]", "at = [0.5, 0.09]", r"\[strike\] at must lie on the body, got \(0.5, 0.09\) m"),
     ("at = [0.1395, 0.09]", "at = [0.1, nan]", r"\[strike\] at\[1\] must be finite, got nan"),
@@ -272,36 +202,30 @@ BAD = [
     ('title = "test"', "title = 3", r"title must be text, got 3"),
     ("mass = 0.2", "mass = 0.2\nmass = 0.3", r"not valid TOML: .*line"),
     ("speed = 2.0", "speed = 2.0\n[observe]\npoints = [[9.0, 9.0]]", r"\[observe\] points must lie on the body"),
-    (
-        "speed = 2.0",
-        "speed = 2.0\n[observe]",
-        r"\[observe\] points or listener must be given; add one or leave out the table",
-    ),
+    ("speed = 2.0", "speed = 2.0\n[observe]", r"\[observe\] points or listener must be given; add one or leave out"),
     ("speed = 2.0", "speed = 2.0\n[observe]\nlistener = [0.1]", r"\[observe\] listener must have shape \(3\)"),
     ("speed = 2.0", "speed = 2.0\n[observe]\nlistener = [0.1, 0.1, 0]", r"\[observe\] listener must lie off the plate"),
     ("speed = 2.0", "speed = 2.0\n[observe]\npoints = 3", r"\[observe\] points must be a list of points"),
-    (
-        "[target]",
-        "[material]\nE = 1e9\nnu = 0.3\nrho = 1e3\n[target]",
-        r"\[section\] is missing; \[material\] needs it",
-    ),
-    (
-        "[target]",
-        '[material]\nE = 1e9\nnu = 0.3\nrho = 1e3\n[section]\nkind = "plate"\nthickness = 1e-3\n[target]\nnu = 0.2',
-        r"\[target\] nu must be left out beside \[material\], which has it",
-    ),
-]
+    ("[target]", f"{MATERIAL}[target]", r"\[section\] is missing; \[material\] needs it"),
+    (SOURCE, "point_supports = [{ stiffness = 1e4 }]", "must have at"),
+    (SOURCE, "point_supports = [{ at = [0.1, 0.1], stiffness = 0 }]", "positive"),
+    (SOURCE, "point_supports = [{ at = [0.1, 0.1], stiffness = 1.0, clamped = 0.01 }]",
+     "must have at and perhaps stiffness, or clamped"),
+    (SOURCE, "point_supports = [{ at = [9.0, 0.1], clamped = 0.01 }]",
+     r"\[target\] point_supports must leave room for each clamp"),
+    (RIGID, f"{RIGID}\nhand = 3.0", "hand must be a table"),
+    (RIGID, f"{RIGID}\nhand = {{ stifness = 1.0 }}", "hand: stifness is not a key"),
+    (RIGID, f"{TURNING}\nhand = {{ stiffness = 1.0 }}", "hand needs a striker with one rigid motion, got 6"),
+    ("[target]", f"{PLATE}\nnu = 0.2", r"\[target\] nu must be left out beside \[material\], which has it"),
+]  # fmt: skip
 
 
-@pytest.mark.parametrize(("old", "new", "text"), BAD, ids=[f"{i}" for i in range(len(BAD))])
-@pytest.mark.parametrize("source", ["analytic", "fe"])
-def test_bad_scene_is_told_in_one_line_with_file_table_and_key(tmp_path, old, new, text, source):
-    bad = edited(old, new)
-    if old != '"analytic"':
-        bad = bad.replace('"analytic"', f'"{source}"')
-    with pytest.raises(ValueError, match=text) as caught:
-        load_text(tmp_path, bad).strike()
-    assert str(caught.value).startswith(f"{tmp_path / 'scene.toml'}: ") and "\n" not in str(caught.value)
+@pytest.mark.parametrize(("old", "new", "text"), BAD, ids=range(len(BAD)))
+def test_bad_scene_is_told_in_one_line_with_file_table_and_key(tmp_path, old, new, text):
+    for source in ("analytic", "fe"):
+        with pytest.raises(ValueError, match=text) as caught:
+            load_text(tmp_path, edited(old, new).replace('"analytic"', f'"{source}"')).strike()
+        assert str(caught.value).startswith(f"{tmp_path / 'scene.toml'}: ") and "\n" not in str(caught.value)
 
 
 @pytest.mark.parametrize("source", ["analytic", "fe"])
@@ -364,24 +288,23 @@ def toml(value):
     return repr(value)
 
 
-@settings(max_examples=150, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(max_examples=60, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(line=st.integers(0, len(LINES) - 1), value=VALUES, how=st.sampled_from(["value", "key", "drop", "twice"]))
 def test_mutated_scene_loads_or_says_why(tmp_path, line, value, how):
-    lines = list(LINES)
-    key = lines[line].split(" = ")[0]
-    lines[line] = {
+    lines, old, key = list(LINES), LINES[line], LINES[line].split(" = ")[0]
+    changes = {
         "value": f"{key} = {toml(value)}",
         "key": f"{toml(str(value))} = 1",
         "drop": "",
-        "twice": f"{lines[line]}\n{lines[line]}",
-    }[how]
+        "twice": f"{old}\n{old}",
+    }
+    lines[line] = changes[how]
     try:
-        loaded = load_text(tmp_path, "\n".join(lines))
-        loaded.modes(2)
+        frequencies = load_text(tmp_path, "\n".join(lines)).modes(2).frequencies
     except (ValueError, check.SimulationError) as error:
         assert "\n" not in str(error) and str(tmp_path / "scene.toml") in str(error)
     else:
-        assert np.isfinite(loaded.modes(2).frequencies).all()
+        assert np.isfinite(frequencies).all()
 
 
 @pytest.mark.parametrize(
@@ -389,7 +312,6 @@ def test_mutated_scene_loads_or_says_why(tmp_path, line, value, how):
     [
         ("disk", "radius = 5e-3", "radius = 1e308", r"\[striker\] radius must lie between 1e-09 and"),
         ("marimba_bar", "width = 0.05", "width = 1e308", r"scene\.toml: \["),
-        ("drumstick", "length = 0.2945", "length = true", r"\[mesh\] length must be a number in m, got True"),
     ],
 )
 def test_numbers_that_are_none_or_beyond_floats_name_file_and_table_once(tmp_path, name, old, new, words):
@@ -399,12 +321,35 @@ def test_numbers_that_are_none_or_beyond_floats_name_file_and_table_once(tmp_pat
     assert str(caught.value).count("[") == 1 and str(caught.value).count(str(tmp_path / "scene.toml")) == 1
 
 
-@pytest.mark.parametrize("shape", ['shape = "file"\npath = "{}"', 'shape = "outline"\nsource = "{}"'])
 @pytest.mark.parametrize("place", ["../../../../../../../../etc/passwd", "/etc/passwd", "secret.svg", "secret.msh"])
-def test_a_file_that_is_no_mesh_is_told_without_its_content(tmp_path, shape, place):
+def test_a_file_that_is_no_mesh_is_told_without_its_content(tmp_path, read_here, place):
     for name in ("secret.svg", "secret.msh"):
         (tmp_path / name).write_text("root:x:0:0:hunter2:/root\n")
-    text = TEXT.replace('shape = "rectangle"\nlength = 0.465\nwidth = 0.3', shape.format(place))
-    with pytest.raises(ValueError, match=r"scene\.toml: \[mesh\]") as caught:
-        load_text(tmp_path, text.replace('"analytic"', '"fe"')).modes(1)
-    assert "hunter2" not in str(caught.value) and "root:" not in str(caught.value)
+    for shape in (f'shape = "file"\npath = "{place}"', f'shape = "outline"\nsource = "{place}"'):
+        with pytest.raises(ValueError, match=r"scene\.toml: \[mesh\]") as caught:
+            load_text(tmp_path, edited(RECTANGLE, shape).replace('"analytic"', '"fe"')).modes(1)
+        assert "hunter2" not in str(caught.value) and "root:" not in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("said", "written"),
+    [
+        ("modes up to 1.34e+04 Hz, about 232", "modes up to 13.4 kHz, about 232"),
+        ("steps of 4.23e-05 s (9 per contact), to 4.5e-03", "steps of 42.3 µs (9 per contact), to 4.5 · 10⁻³"),
+        ("elements of 0.011 m, about 13818 unknowns", "elements of 11 mm, about 13818 unknowns"),
+        ("the target, 5e+05 kg, of mobility 1.2e-05 m/(N s)", "the target, 500 t, of mobility 12 µm/(N s)"),
+        ("guitar_0.02.msh: 52 sides of 2 smooth curves", "guitar_0.02.msh: 52 sides of 2 smooth curves"),
+    ],
+)
+def test_sentences_of_a_plan_are_tidied(said, written):
+    assert sentences.tidy(said).replace(sentences.NBSP, " ") == written
+
+
+def test_a_hertz_contact_acts_as_long_as_the_tip_that_is_told(tmp_path):
+    """Hertz on a wall lasts 2.9432 (5/4)**(2/5) (m**2 / (k**2 v))**(1/5); a tip k' lasts pi sqrt(m / k')."""
+    made = load_text(tmp_path, SMALL)
+    k, m, v = made.contact.values["stiffness"], made.make_striker().felt_mass, made.blow.values["speed"]
+    told = float(sentences.tip_notes(made)[0].rsplit("tip of ", 1)[1].split()[0])
+    duration = 2.9432 * (5.0 / 4.0) ** 0.4 * (m**2 / (k**2 * v)) ** 0.2
+    assert_allclose(told, m * (np.pi / duration) ** 2, rtol=6e-3)  # three digits are printed
+    assert sentences.tip_notes(load_text(tmp_path, SMALL.replace('"hertz"', '"linear"'))) == ()  # that is a tip

@@ -8,11 +8,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 import xarray
+from comparing import worst
 from numpy.testing import assert_allclose
 from scenes import QUICK
 
 import fem_impact as fi
-from fem_impact import cli
 from fem_impact.fe import refinement
 from fem_impact.modes import ritz
 from fem_impact.scenes import maps
@@ -22,7 +22,7 @@ from fem_impact.show import plots
 from fem_impact.sweeps import grid
 
 SCENES = Path(__file__).parents[2] / "studies" / "scenes"
-OVER = {"contact.stiffness": [2e4, 1e5, 4e5], "striker.mass": [0.02, 0.1]}
+OVER = {"contact.stiffness": [2e4, 1e5, 4e5], "striker.mass": [0.02, 0.06, 0.1]}
 
 
 @pytest.fixture(scope="module")
@@ -32,26 +32,23 @@ def scene():
 
 @pytest.fixture(scope="module")
 def table(scene):
-    return maps.map_scene(scene, over=OVER, max_frequency=3e3)
+    return maps.map_scene(scene, over=OVER, max_frequency=3e3, borders=True)
 
 
 def test_cells_of_a_scene_map_are_struck_scenes(scene, table):
     changed = maps.changed_scene(maps.changed_scene(scene, "contact.stiffness", 1e5), "striker.mass", 0.02)
-    hit, cell = changed.strike(), table.sel(stiffness=1e5, mass=0.02)
-    assert int(cell.n_impacts) == hit.n_impacts
-    assert_allclose(float(cell.restitution), hit.restitution, atol=2e-3)  # 1e-3 each
-    assert_allclose(float(cell.contact_time), hit.contact_time, rtol=2e-3)
+    assert worst(table.sel(stiffness=1e5, mass=0.02), changed.strike()) < 2e-3  # 1e-3 each
 
 
 def test_theory_stands_beside_the_blows(table):
     felt = table.mass.values / 3.0
     expected = np.sqrt(table.stiffness.values[:, None] / felt) / (2.0 * np.pi)
     assert_allclose(table.contact_resonance, expected, rtol=1e-6)  # the stick's felt mass by finite elements
-    assert table.threshold.dims == ("mass",)
     plate = fi.analytic.rectangle(1.55, 1.0, mass=0.2, first_frequency=100.0, n_modes=300)
     wanted = [fi.threshold_frequency(plate, (0.465, 0.3), m) for m in felt]
+    assert table.threshold.dims == ("mass",)
     assert_allclose(table.threshold, wanted, rtol=0.01)  # other numbers of modes, the rest by their tail
-    assert json.loads(table.attrs["scene"])["map"]["striker.mass"] == [0.02, 0.1]
+    assert json.loads(table.attrs["scene"])["map"]["striker.mass"] == OVER["striker.mass"]
 
 
 LOSING = {  # the law, and values of one of its numbers
@@ -66,10 +63,8 @@ def test_contacts_that_lose_are_mapped(scene, kind):
     law, key, values = LOSING[kind]
     losing = replace(scene, contact=Part(kind, law))
     table = maps.map_scene(losing, over={f"contact.{key}": values, "strike.speed": [1.0]})
-    cell = table.isel({key: 1, "speed": 0})
     hit = maps.changed_scene(losing, f"contact.{key}", values[1]).strike()
-    assert int(cell.n_impacts) == hit.n_impacts
-    assert_allclose(float(cell.restitution), hit.restitution, atol=2e-3)  # 1e-3 each
+    assert worst(table.isel({key: 1, "speed": 0}), hit) < 2e-3  # 1e-3 each
     assert set(table.contact_resonance.dims) == {key, "speed"}  # it depends on every number of the law
     assert abs(float(table.contact_resonance[0, 0] / table.contact_resonance[1, 0]) - 1.0) > 0.05
 
@@ -83,52 +78,29 @@ def test_any_number_of_a_scene_is_an_axis(scene):
         maps.map_scene(scene, over={"mesh.widht": [1.0]})
 
 
-def test_files_say_what_the_map_holds(table, tmp_path):
-    names = maps.write_map(tmp_path, table)
-    assert {"map.nc", "map.csv", "n_impacts.png", "centroid.png"} <= set(names)
+def test_files_say_what_the_map_holds_and_borders_are_drawn(table, tmp_path):
+    assert {"map.nc", "map.csv", "borders.csv", "n_impacts.png", "centroid.png"} <= set(maps.write_map(tmp_path, table))
     with xarray.open_dataset(tmp_path / "map.nc", engine="scipy") as read:
         assert_allclose(read.contact_time, table.contact_time)
-        assert read.contact_time.attrs["units"] == "s"
-        assert read.attrs["scene"] == table.attrs["scene"]
-    assert len((tmp_path / "map.csv").read_text().splitlines()) == 7
+        assert read.contact_time.attrs["units"] == "s" and read.attrs["scene"] == table.attrs["scene"]
+    assert len((tmp_path / "map.csv").read_text().splitlines()) == 10
     assert (tmp_path / "restitution.png").read_bytes()[:4] == b"\x89PNG"
-
-
-def test_borders_are_drawn_and_written(scene, tmp_path):
-    over = {"contact.stiffness": [2e4, 1e5, 4e5], "striker.mass": [0.02, 0.06, 0.1]}
-    table = maps.map_scene(scene, over=over, borders=True)
     curves = fi.read_borders(table)
-    assert "borders.csv" in maps.write_map(tmp_path, table)
-    rows = [line.split(",") for line in (tmp_path / "borders.csv").read_text().splitlines()]
-    assert len(rows) == 1 + sum(len(border.points) for border in curves)
+    assert len((tmp_path / "borders.csv").read_text().splitlines()) == 1 + sum(len(each.points) for each in curves)
     drawn = maps.draw(table.assign(doubtful=table.n_impacts == 2), "n_impacts")
     lines = next(part for part in drawn.axes[0].collections if part.get_label() == "borders")
     first = curves[0].points[0]
     assert_allclose(lines.get_paths()[0].vertices[0], [1e3 * first[1], first[0]], rtol=1e-12)  # masses in grams
-    assert [text.get_text() for text in drawn.legends[0].get_texts()][:2] == [
-        "number in doubt",
-        "the number of impacts changes",
-    ]
-    assert len((tmp_path / "map.csv").read_text().splitlines()) == 10
+    said = [text.get_text() for text in drawn.legends[0].get_texts()]
+    assert said[:2] == ["number in doubt", "the number of impacts changes"]
 
 
 @pytest.mark.slow
-def test_a_scene_that_gives_no_counts_is_a_picture(tmp_path, capsys):
+def test_a_scene_that_gives_no_counts_is_a_picture(tmp_path, prompt):
     text = (SCENES / "drumstick_map.toml").read_text().replace(", count = 20", "").replace("max_frequency", "# no band")
     (tmp_path / "ranges.toml").write_text(text)
-    arguments = [
-        "map",
-        str(tmp_path / "ranges.toml"),
-        "--cells",
-        "12",
-        "--out",
-        str(tmp_path / "out"),
-        "--workers",
-        "1",
-    ]
-    assert cli.main(arguments) == 0
-    told = capsys.readouterr()
-    assert "144 blows over stiffness (12), mass (12)" in told.out
+    told = prompt("map ranges.toml --cells 12 --out out --workers 1")
+    assert told.status == 0 and "144 blows over stiffness (12), mass (12)" in told.out
     assert "Cells: all 144 cells computed" in told.out
     assert "between numbers of impacts, located to" in " ".join(told.out.split())
     assert "all 144 cells are expected to take" in " ".join(told.err.split())
@@ -136,15 +108,17 @@ def test_a_scene_that_gives_no_counts_is_a_picture(tmp_path, capsys):
         assert len(fi.read_borders(read)) > 0 and len(json.loads(read.attrs["scene"])["map"]["striker.mass"]) == 12
 
 
-def test_another_body_for_each_value_needs_a_count(scene):
+def test_another_body_for_each_value_needs_a_count_and_a_store(scene, tmp_path):
     over = {"mesh.width": {"from": 0.8, "to": 1.0}, "striker.mass": {"from": 0.05, "to": 0.1}}
     with pytest.raises(ValueError, match=r"mesh\.width needs a count, because each value needs another body"):
         maps.map_scene(scene, over=over)
     over["mesh.width"]["count"] = 2
-    table = maps.map_scene(scene, over=over, cells=3)
-    assert dict(table.sizes) == {"mesh.width": 2, "mass": 3}
     with pytest.raises(ValueError, match=r"borders: not for axes that need another body, got mesh\.width"):
         maps.map_scene(scene, over=over, cells=3, borders=True)
+    pytest.importorskip("zarr", reason="the cluster extra is not installed")
+    table = maps.map_scene(scene, over=over, cells=3, store=tmp_path / "map")
+    assert dict(table.sizes) == {"mesh.width": 2, "mass": 3}
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["map-0", "map-1"]
 
 
 def test_pictures_name_points_and_whole_numbers(scene):
@@ -165,117 +139,72 @@ def test_contours_of_a_power_law_are_where_it_says():
 
 def test_zarr_keeps_why_a_cell_failed(table, tmp_path):
     pytest.importorskip("zarr", reason="the cluster extra is not installed")
-    failed = table.copy(deep=True)
+    failed = table.drop_vars(["restitution", "impulse", "peak_force", "centroid"]).copy(deep=True)  # fewer pictures
     failed["failure"] = failed.failure.astype("<U40")
     failed.failure[1, 0] = "the motion may be chaotic: é"
     maps.write_map(tmp_path, failed, "zarr")
     with xarray.open_zarr(tmp_path / "map.zarr") as read:
-        assert read.failure.values.tolist() == [["", ""], ["the motion may be chaotic: é", ""], ["", ""]]
+        assert read.failure.values.tolist() == failed.failure.values.tolist()
         assert_allclose(read.contact_time, table.contact_time)
 
 
-def scene_of_size(folder, count):
-    text = (SCENES / "drumstick_map.toml").read_text().replace("count = 20", f"count = {count}")
-    (folder / "large.toml").write_text(text)
-    return str(folder / "large.toml")
-
-
-def test_too_large_a_map_is_refused_and_a_costly_one_says_so(tmp_path, capsys, scene):
-    assert cli.main(["map", scene_of_size(tmp_path, 10**6), "--out", str(tmp_path / "out")]) == 2
-    told = " ".join(capsys.readouterr().err.split())
-    assert "over asks for 1e+12 cells: about" in told
-    assert (
-        "7.2e+04 GB of memory; give fewer values, or raise max_cells, now 1e+08" in told
-    )  # seven layers and two more numbers of 8 byte
-    assert cli.main(["map", scene_of_size(tmp_path, 10**12), "--out", str(tmp_path / "out")]) == 2
-    assert "stiffness.count must be at most 1000000, got" in " ".join(capsys.readouterr().err.split())
-    with pytest.raises(ValueError, match="over asks for 6 cells"):
+def test_too_large_a_map_is_refused_and_a_costly_one_says_so(tmp_path, prompt, scene):
+    text = (SCENES / "drumstick_map.toml").read_text()
+    for count, words in (
+        (10**6, ("over asks for 1e+12 cells: about",
+                 # seven layers and two more numbers of 8 byte
+                 "7.2e+04 GB of memory; give fewer values, or raise max_cells, now 1e+08")),
+        (10**12, ("stiffness.count must be at most 1000000, got",)),
+    ):  # fmt: skip
+        (tmp_path / "large.toml").write_text(text.replace("count = 20", f"count = {count}"))
+        told = prompt("map large.toml --out out")
+        assert told.status == 2 and all(each in " ".join(told.err.split()) for each in words)
+    with pytest.raises(ValueError, match="over asks for 9 cells"):
         maps.map_scene(scene, over=OVER, max_cells=5)
     said = []
     grid.admit(10**8, 6, 1e9, tell=said.append)
     grid.admit(10**4, 6, 1e9, tell=said.append)
-    assert len(said) == 1
-    assert "6.4 GB of memory" in said[0]
-
-
-def test_stores_of_an_axis_for_which_the_body_is_built_anew(scene, tmp_path):
-    pytest.importorskip("zarr", reason="the cluster extra is not installed")
-    over = {"mesh.width": [1.0, 0.9, 0.8], "striker.mass": [0.05, 0.1]}
-    maps.map_scene(scene, over=over, store=tmp_path / "map")
-    assert sorted(path.name for path in tmp_path.iterdir()) == ["map-0", "map-1", "map-2"]
-
-
-@pytest.mark.slow
-def test_map_at_the_prompt(tmp_path, capsys):
-    text = (SCENES / "drumstick_map.toml").read_text().replace("count = 20", "count = 3")
-    (tmp_path / "few.toml").write_text(text)
-    assert cli.main(["map", str(tmp_path / "few.toml"), "--out", str(tmp_path / "out"), "--workers", "1"]) == 0
-    assert "9 blows over stiffness (3), mass (3)" in capsys.readouterr().out
-    assert (tmp_path / "out" / "map.nc").exists()
-    assert cli.main(["map", str(SCENES / "marked_linear.toml"), "--out", str(tmp_path / "none")]) == 2
-    assert "[map] is missing" in capsys.readouterr().err
+    assert len(said) == 1 and "6.4 GB of memory" in said[0]
 
 
 @pytest.mark.parametrize(
-    ("given", "message"),
+    ("line", "message"),
     [
+        ("map drumstick_map --out map.png", "--out must name a folder for map.nc, map.csv and pictures"),
+        ("map marked_linear", "[map] is missing; add it and name the axes, as in over = {"),
+        ("hammer drumstick_map --bandwith 500", "did you mean --bandwidth?"),
+        ("hammer drumstick_map", "see fem-impact hammer --help"),
+        ("hammer drumstick_map --bandwidth 0", "bandwidth must lie between 0.001 and 1e+09 Hz, got 0 Hz"),
+        ("hammer drumstick_map --bandwidth inf", "bandwidth must be finite, got inf Hz"),
+        ("hammer drumstick_map --bandwidth 1e300", "bandwidth must lie between 0.001 and 1e+09 Hz, got 1e+300 Hz"),
         (
-            ["map", "drumstick_map.toml", "--out", "map.png"],
-            "--out must name a folder for map.nc, map.csv and pictures",
+            "hammer drumstick_map --bandwidth 500 --masses 1e30 0.2",
+            "masses must lie between 1e-06 and 10000 kg, got 1e+30",
         ),
-        (["map", "marked_linear.toml"], "[map] is missing; add it and name the axes, as in over = {"),
-        (["hammer", "drumstick_map.toml", "--bandwith", "500"], "did you mean --bandwidth?"),
-        (["hammer", "drumstick_map.toml"], "see fem-impact hammer --help"),
+        ("hammer drumstick_map --bandwidth 500 --masses 0", "masses must lie between 1e-06 and 10000 kg, got 0 kg"),
+        ("hammer drumstick_map --bandwidth 500 --masses 0.01 nan", "masses must be finite"),
+        ("hammer drumstick_map --bandwidth 500 --drop 60", "drop must lie between 1 and 40 dB, got 60 dB"),
     ],
 )
-def test_slips_at_the_prompt_are_told_before_the_work(given, message, capsys):
-    verb, name, *rest = given
-    try:
-        status = cli.main([verb, str(SCENES / name), *rest])
-    except SystemExit as left:
-        status = left.code
-    assert status == 2
-    assert message in " ".join(capsys.readouterr().err.split())
+def test_slips_at_the_prompt_are_told_before_the_work(line, message, prompt):
+    verb, name, *rest = line.split()
+    said = prompt([verb, f"{SCENES / name}.toml", *rest])
+    assert said.status == 2 and message in " ".join(said.err.split())
 
 
 def test_a_map_that_needs_too_many_modes_says_what_to_leave_out():
-    found = scene_of(
-        {**PIECES["plate"], "contact": {"kind": "linear", "stiffness": 1e5}}, Path("plate.toml"), folder=Path()
-    )
     over = {"striker.mass": [1e-4, 0.1], "contact.stiffness": [1e3, 1e9]}
-    with pytest.raises(
-        fi.SimulationError, match=r"needs about \d+ modes, at most 2000 are allowed; leave out the lightest"
-    ):
-        maps.map_scene(found, over=over, tolerance=1e-3)
+    told = r"needs about \d+ modes, at most 2000 are allowed; leave out the lightest"
+    with pytest.raises(fi.SimulationError, match=told):
+        maps.map_scene(body("plate", 1.0), over=over, tolerance=1e-3)
 
 
 @pytest.mark.slow
-def test_hammer_at_the_prompt(capsys):
-    arguments = ["hammer", str(SCENES / "drumstick_map.toml"), "--bandwidth", "400", "--masses", "0.002", "0.2"]
-    assert cli.main([*arguments, "--json"]) == 0
-    data = json.loads(capsys.readouterr().out)
-    works = [hammer["softest"] is not None for hammer in data["hammers"]]
+def test_hammer_at_the_prompt(prompt):
+    words = ["hammer", SCENES / "drumstick_map.toml", "--bandwidth", "400", "--masses", "0.002", "0.2"]
+    works = [hammer["softest"] is not None for hammer in prompt("", *words, "--json").json["hammers"]]
     assert works == [True, True, False]  # the second is the last that does
-    assert cli.main(arguments) == 0
-    assert "200 g: no tip reaches 400 Hz and hits once" in " ".join(capsys.readouterr().out.split())
-
-
-@pytest.mark.parametrize(
-    ("given", "message"),
-    [
-        (["--bandwidth", "0"], "bandwidth must lie between 0.001 and 1e+09 Hz, got 0 Hz"),
-        (["--bandwidth", "inf"], "bandwidth must be finite, got inf Hz"),
-        (["--bandwidth", "1e300"], "bandwidth must lie between 0.001 and 1e+09 Hz, got 1e+300 Hz"),
-        (["--bandwidth", "500", "--masses", "1e30", "0.2"], "masses must lie between 1e-06 and 10000 kg, got 1e+30 kg"),
-        (["--bandwidth", "500", "--masses", "5e-324"], "masses must lie between"),
-        (["--bandwidth", "500", "--masses", "0"], "masses must lie between 1e-06 and 10000 kg, got 0 kg"),
-        (["--bandwidth", "500", "--masses", "0.01", "nan"], "masses must be finite"),
-        (["--bandwidth", "500", "--drop", "60"], "drop must lie between 1 and 40 dB, got 60 dB"),
-    ],
-)
-def test_hammers_of_no_sense_are_told(given, message, capsys):
-    assert cli.main(["hammer", str(SCENES / "drumstick_map.toml"), *given]) == 2
-    assert message in " ".join(capsys.readouterr().err.split())
+    assert "200 g: no tip reaches 400 Hz and hits once" in " ".join(prompt("", *words).out.split())
 
 
 PIECES = {
@@ -298,27 +227,22 @@ PIECES = {
 }
 
 
-@pytest.mark.parametrize("body", [pytest.param("plate", marks=pytest.mark.slow), "bar"])
-@pytest.mark.parametrize("exponent", [1.0, 1.5])
-def test_cells_of_finite_element_scenes_are_struck_scenes(body, exponent):
-    """Masses and stiffnesses over more than a decade, any cell."""
+def body(name, exponent):
     contact = {"kind": "power", "stiffness": 1e5, "exponent": exponent}
-    found = scene_of({**PIECES[body], "contact": contact}, Path(f"{body}.toml"), folder=Path())
-    soft = 1e3 if exponent == 1.0 else 1e5
+    return scene_of({**PIECES[name], "contact": contact}, Path(f"{name}.toml"), folder=Path())
+
+
+@pytest.mark.parametrize(("name", "exponent"), [pytest.param("plate", 1.5, marks=pytest.mark.slow), ("bar", 1.0)])
+def test_cells_of_finite_element_scenes_are_struck_scenes(name, exponent):
+    """Masses and stiffnesses over more than a decade, any cell."""
+    found, soft = body(name, exponent), 1e3 if exponent == 1.0 else 1e5
     over = {"striker.mass": [2e-3, 8e-3, 0.03], "contact.stiffness": soft * np.array([1.0, 6.0, 40.0])}
     table = maps.map_scene(found, over=over)
-    rng = np.random.default_rng(5)
-    for _ in range(4):
-        mass, stiffness = (float(rng.choice(values)) for values in over.values())
+    for i, j in ((0, 2), (1, 1), (2, 0), (2, 2)):
+        mass, stiffness = over["striker.mass"][i], float(over["contact.stiffness"][j])
         changed = maps.changed_scene(found, "contact.stiffness", stiffness)
-        hit, cell = (
-            maps.changed_scene(changed, "striker.mass", mass).strike(),
-            table.sel(mass=mass, stiffness=stiffness),
-        )
-        assert int(cell.n_impacts) == hit.n_impacts
-        assert_allclose(float(cell.restitution), hit.restitution, atol=2.0 * hit.tolerance)  # one each
-        for layer in ("contact_time", "peak_force", "impulse"):
-            assert_allclose(float(cell[layer]), getattr(hit, layer), rtol=2.0 * hit.tolerance)
+        hit = maps.changed_scene(changed, "striker.mass", mass).strike()
+        assert worst(table.sel(mass=mass, stiffness=stiffness), hit) < 2.0 * hit.tolerance  # one each
 
 
 @pytest.mark.slow

@@ -8,7 +8,6 @@ from numpy.testing import assert_allclose
 from scenes import SMALL
 
 import fem_impact as fi
-from fem_impact import cli
 from fem_impact.model.target import Stages
 from fem_impact.scenes import maps, scene
 
@@ -33,9 +32,8 @@ contact = { kind = "linear", stiffness = 1e4 }
 
 @pytest.fixture
 def path(tmp_path):
-    file = tmp_path / "flam.toml"
-    file.write_text(TABLES)
-    return file
+    (tmp_path / "flam.toml").write_text(TABLES)
+    return tmp_path / "flam.toml"
 
 
 def test_a_scene_plays_its_strokes_as_the_function_does(path):
@@ -56,20 +54,19 @@ def test_a_scene_plays_its_strokes_as_the_function_does(path):
     assert scene.scene_of(told.data(), path, folder=path.parent).stroke[1].values == told.stroke[1].values
 
 
-def test_the_prompt_plays_a_scene_and_writes_one_sound_of_all(path, tmp_path, capsys):
-    assert cli.main(["strike", str(path), "--out", str(tmp_path / "out"), "--duration", "0.1"]) in (0, 3)
+def test_the_prompt_plays_a_scene_and_writes_one_sound_of_all(path, tmp_path, prompt):
+    played = prompt("strike flam.toml --out out --duration 0.1")
+    assert played.status in (0, 3) and "2 strokes" in played.out and "stroke 1" in played.out
     data = json.loads((tmp_path / "out" / "response.json").read_text())
-    said = capsys.readouterr().out
-    assert "2 strokes" in said and "stroke 1" in said
     assert {path.name for path in (tmp_path / "out").glob("[!.]*") if path.is_file()} == set(data["files"])
     assert [each["when"] for each in data["strokes"]] == [0.0, 0.03]
     assert sum(each["impulse"] for each in data["strokes"]) == pytest.approx(data["sequence"]["impulse"])
     assert data["scene"]["stroke"][1]["striker"] == {"kind": "rigid", "mass": 0.01}
-    assert cli.main(["strike", str(path), "--verify", "--out", str(tmp_path / "more")]) == 2
-    assert "--verify must be left out for a scene with strokes" in capsys.readouterr().err
+    refused = prompt("strike flam.toml --verify --out more")
+    assert refused.status == 2 and "--verify must be left out for a scene with strokes" in refused.err
 
 
-def test_a_plan_of_strokes_is_of_all_and_the_body_has_the_modes_that_the_hardest_needs(path, capsys):
+def test_a_plan_of_strokes_is_of_all_and_the_body_has_the_modes_that_the_hardest_needs(path, prompt):
     told = scene.load_scene(path)
     planned = told.plan_strokes(tolerance=2e-2)
     assert [each["when"] for each in planned.strokes] == [0.0, 0.03] and planned.needed == 1  # in order of time
@@ -78,11 +75,9 @@ def test_a_plan_of_strokes_is_of_all_and_the_body_has_the_modes_that_the_hardest
     assert planned.body.max_frequency == max(plan.max_frequency for plan in own)
     assert planned.body.seconds > own[1].seconds and planned.meets == all(plan.meets for plan in own)
     assert told.play(tolerance=2e-2).target.n_modes == planned.body.description.found(Stages())[1].n_modes
-    assert cli.main(["plan", str(path), "--tolerance", "2e-2"]) == 0
-    said = capsys.readouterr().out.replace("\n    ", " ")
+    said = prompt("plan flam.toml --tolerance 2e-2").out.replace("\n    ", " ")
     assert "will be met by 2 strokes: each to 0.01 by itself" in said and f"{planned.body.cost}" in said
-    assert cli.main(["plan", str(path), "--tolerance", "2e-2", "--json"]) == 0
-    data = json.loads(capsys.readouterr().out)
+    data = prompt("plan flam.toml --tolerance 2e-2 --json").json
     assert [each["plan"] for each in data["strokes"]] == [0, 1] and len(data["plans"]) == 2 and data["needed"] == 1
 
 
@@ -97,8 +92,12 @@ def test_strokes_alike_share_the_plan_of_the_fastest(path):
 def test_what_needs_a_single_blow_says_so(path):
     told = scene.load_scene(path)
     path.write_text(SMALL)
-    with pytest.raises(ValueError, match=r"\[\[stroke\]\] is missing: strokes are played together; a single blow has"):
-        scene.load_scene(path).plan_strokes()
+    for call in (scene.load_scene(path).plan_strokes, scene.load_scene(path).play):
+        with pytest.raises(
+            ValueError, match=r"\[\[stroke\]\] is missing: strokes are played together; a single blow has"
+        ):
+            call()
+    assert np.isfinite(scene.load_scene(path).strike().restitution)
     for call in (told.strike, told.plan, lambda: maps.map_scene(told, over={"striker.mass": [0.1]}),
                  lambda: fi.spread(told, {"striker.mass": "lognormal(0.03, 0.1)"})):  # fmt: skip
         with pytest.raises(ValueError, match=r"\[\[stroke\]\] must be left out here.* from Python scene.alone\(0\)"):
@@ -131,10 +130,3 @@ def test_what_is_wrong_with_a_stroke_is_said_before_any_work(path, old, new, tex
     path.write_text(TABLES.replace(old, new))
     with pytest.raises(ValueError, match=text):
         scene.load_scene(path)
-
-
-def test_a_scene_without_strokes_is_not_played(path):
-    path.write_text(SMALL)
-    with pytest.raises(ValueError, match=r"\[\[stroke\]\] is missing: strokes are played together"):
-        scene.load_scene(path).play()
-    assert np.isfinite(scene.load_scene(path).strike().restitution)

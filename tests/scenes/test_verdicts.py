@@ -5,23 +5,17 @@ from pathlib import Path
 import pytest
 
 import fem_impact as fi
-from fem_impact.scenes import templates
 
 FOLDER = Path(__file__).parents[2] / "studies" / "scenes"
-NAMES = sorted(path.name for path in FOLDER.glob("*.toml"))
 SHOWN = "drumstick_firm.toml"
+NAMES = sorted(path.name for path in FOLDER.glob("*.toml") if path.name != SHOWN)
 
 
-@pytest.mark.parametrize("name", [name for name in NAMES if name != SHOWN])
+@pytest.mark.parametrize(
+    "name", [pytest.param(name, marks=pytest.mark.slow) if name == "guitar_top.toml" else name for name in NAMES]
+)
 def test_a_shipped_scene_has_an_answer_to_trust(name):
     hit = fi.load_scene(FOLDER / name).strike()
-    assert hit.trusted, hit.verdict
-
-
-@pytest.mark.parametrize("kind", templates.BODIES)
-def test_a_new_scene_has_an_answer_to_trust(kind, tmp_path):
-    templates.write_scene(tmp_path / "new.toml", kind)
-    hit = fi.load_scene(tmp_path / "new.toml").strike()
     assert hit.trusted, hit.verdict
 
 
@@ -30,9 +24,8 @@ def test_a_new_scene_has_an_answer_to_trust(kind, tmp_path):
 def test_the_scene_that_is_not_trusted_names_its_cure(tmp_path):
     text = (FOLDER / SHOWN).read_text(encoding="utf-8")
     wrong = fi.load_scene(FOLDER / SHOWN).strike()
-    assert (
-        not wrong.trusted and "but the model is wrong here: the deflection is 1.3 times the thickness" in wrong.verdict
-    )
+    told = "but the model is wrong here: the deflection is 1.3 times the thickness"
+    assert not wrong.trusted and told in wrong.verdict
     assert f"{wrong.restitution:.2f} to 0.64" in " ".join(text.replace("\n# ", " ").split())
     (tmp_path / SHOWN).write_text(text.replace("\n# stretching", "\nstretching").replace("\n# air", "\nair"))
     cured = fi.load_scene(tmp_path / SHOWN).strike()

@@ -8,7 +8,7 @@ import pytest
 from numpy.testing import assert_allclose
 
 import fem_impact as fi
-from fem_impact.show import figures, plots
+from fem_impact.show import figures, outlined, plots
 from fem_impact.sweeps.hammers import Hammer
 
 
@@ -26,14 +26,14 @@ def test_force_picture_holds_history_and_spectrum_and_says_its_units(hit):
     assert below.xaxis.get_major_formatter().unit == "Hz" and "[N s]" in below.get_ylabel()
 
 
-@pytest.mark.parametrize(("count", "drawn"), [(5, 5), (12, 12), (99, 30)])
+@pytest.mark.parametrize(("count", "drawn"), [(5, 5), (99, 30)])
 def test_mode_shapes_draw_as_many_as_there_are(modes, count, drawn):
-    axes = figures.mode_shapes(modes, count=count).axes
-    titles = [a.get_title(loc="left") for a in axes if a.get_title(loc="left")]
+    titles = [title for axes in figures.mode_shapes(modes, count=count).axes if (title := axes.get_title(loc="left"))]
     assert len(titles) == drawn and titles[0] == "1   100 Hz"
-    # those of a beam are lines
-    beam = fi.analytic.beam(0.4, mass=0.1, first_frequency=1e3, n_modes=3)
-    axes = figures.mode_shapes(beam).axes
+
+
+def test_mode_shapes_of_a_beam_are_lines():
+    axes = figures.mode_shapes(fi.analytic.beam(0.4, mass=0.1, first_frequency=1e3, n_modes=3)).axes
     assert all(len(a.lines) >= 1 for a in axes) and axes[-1].get_xlabel() == "x [m]"
 
 
@@ -99,3 +99,20 @@ def test_the_range_of_tips_of_hammers_closes_between_the_masses_tried():
     assert_allclose(masses.min(), 1.0, rtol=1e-12)
     meeting = 2.0 * 4.0 ** (1.0 / 3.0)  # g: 4e4 (m/2)**-2 = 1e4 (m/2)
     assert_allclose(masses.max(), meeting, rtol=0.01)  # drawn from 100 points per mass
+
+
+def test_patches_stand_where_they_are():
+    points, cells = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]]), np.array([[0, 1, 2], [0, 2, 3]])
+    maps, marks = np.array([[1.0, -2.0], [0.5, 1.0], [-1.0, 0.0], [0.0, 0.3]]), (np.array([[0.3, 0.4]]), 0.1)
+    first, second = outlined.marked(points, cells, maps, ["one", "two"], [(*marks, ["1: a", "1: b"])]).axes[:2]
+    assert_allclose(np.linalg.norm(first.lines[0].get_xydata() - [0.3, 0.4], axis=1), 0.1, rtol=1e-12)
+    assert [axes.get_title(loc="left") for axes in (first, second)] == ["one", "two"]
+    assert "1: b" in [text.get_text() for text in second.texts]
+
+
+def test_a_bar_is_drawn_along_its_length():
+    points = np.linspace(0.0, 1.0, 5)[:, None]
+    cells, marks = np.column_stack([np.arange(4), np.arange(1, 5)]), [(np.array([[0.2], [0.8]]), 0.1, ["1: a"])]
+    (axes,) = outlined.marked(points, cells, points - 0.5, ["one"], marks).axes
+    assert_allclose(axes.lines[0].get_xydata(), np.column_stack([points[:, 0], points[:, 0] - 0.5]))
+    assert [round(each.get_x(), 12) for each in axes.patches] == [0.1, 0.7]

@@ -4,12 +4,13 @@ import sys
 
 import numpy as np
 import pytest
+from numpy.testing import assert_allclose
 from PIL import Image, ImageSequence
 from test_cli import TEXT
 
 import fem_impact as fi
-from fem_impact import cli
 from fem_impact._base import child
+from fem_impact.modes import viewing
 from fem_impact.show import canvas, pictures, sampling
 
 
@@ -40,10 +41,8 @@ def test_mode_shapes_show_as_many_hills_as_valleys(hit, tmp_path, renders):
     said = pictures.mode_shapes(tmp_path / "modes.png", hit.target, count=4, columns=2)
     assert said == ("" if renders else pictures.REMEDY)
     image = Image.open(tmp_path / "modes.png")
-    width, height = image.size
-    second = image.crop((width // 2, 0, width, height // 2))  # mode (2, 1): one half goes up, the other down
-    down, up = coloured(second)
-    assert down > 0.04 and up > 0.04
+    width, height = image.size  # mode (2, 1), the second: one half goes up, the other down
+    assert min(coloured(image.crop((width // 2, 0, width, height // 2)))) > 0.04
 
 
 def test_wave_begins_below_the_striker_and_spreads(hit, tmp_path, renders):
@@ -78,9 +77,8 @@ def test_picture_of_one_instant_and_its_time(hit, tmp_path, renders):
 
 
 def test_gap_is_closed_while_the_striker_presses(hit):
-    first = hit.impacts[0]
-    times = np.array([0.0, 0.5 * (first.start + first.end), hit.impacts[-1].end * 3.0])
-    gap = sampling.gap(hit, times)
+    first, last = hit.impacts[0], hit.impacts[-1]
+    gap = sampling.gap(hit, np.array([0.0, 0.5 * (first.start + first.end), last.end * 3.0]))
     assert gap[0] == gap[1] == 0.0 < gap[2]
 
 
@@ -94,17 +92,15 @@ def test_beam_is_drawn_as_a_ribbon():
 
 
 @pytest.mark.slow
-def test_strike_writes_them_when_asked(tmp_path, monkeypatch, capsys):
+def test_strike_writes_them_when_asked(tmp_path, monkeypatch, prompt):
     monkeypatch.setattr(child.sys, "executable", "/bin/false")  # the other process fails
     monkeypatch.setattr(pictures, "can_render", lambda: False)
     monkeypatch.setitem(pictures.animation.__wrapped__.__kwdefaults__, "frames", 3)
     (tmp_path / "small.toml").write_text(TEXT)
-    out = tmp_path / "out"
-    assert cli.main(["strike", str(tmp_path / "small.toml"), "--out", str(out), "--pictures", "--vtk"]) == 0
+    said = prompt("strike small.toml --out out --pictures --vtk")
+    assert said.status == 0 and pictures.REMEDY in " ".join(said.err.split())
     for name in ("modes.png", "wave.png", "wave.gif", "motion.pvd"):
-        assert (out / name).stat().st_size > 0
-    said = capsys.readouterr()
-    assert pictures.REMEDY in " ".join(said.err.split())
+        assert (tmp_path / "out" / name).stat().st_size > 0
     assert ", pictures " in " ".join(said.out.partition("Time:")[2].split())
 
 
@@ -129,3 +125,35 @@ def test_chladni_figures_of_a_hinged_plate_are_straight_and_of_a_free_disk_diame
     for wrong in (fi.Modes.rigid(1.0), fi.analytic.beam(0.4, mass=0.2, first_frequency=100.0, n_modes=3)):
         with pytest.raises(ValueError, match="dimension of modes must lie between 2 and 2"):
             pictures.chladni(wrong)
+
+
+def areas(points, cells):
+    (x0, y0), (x1, y1), (x2, y2) = (points[cells[:, i]].T for i in range(3))
+    return 0.5 * ((x1 - x0) * (y2 - y0) - (x2 - x0) * (y1 - y0))
+
+
+def test_refined_triangles_cover_the_body_once_fit_together_and_keep_their_orientation():
+    plate = fi.Plate(fi.Material(E=1.0, nu=0.3, rho=1.0), 1.0)
+    system = fi.assemble(fi.mesh.rectangle(1.5, 1.0, size=0.5), plate, supports={"boundary": "hinged"})
+    coarse = fi.find_modes(system, n_modes=1)
+    points, cells = sampling.grid(coarse)
+    assert len(points) >= viewing.ENOUGH
+    assert_allclose(np.abs(areas(points, cells)).sum(), 1.5, rtol=1e-12)
+    assert len(np.unique(points.round(12), axis=0)) == len(points)  # no point twice: neighbours share their sides
+    assert_allclose([points.min(axis=0), points.max(axis=0)], [[0, 0], [1.5, 1.0]], atol=1e-12)
+    before, after = (np.sign(areas(*grid)) for grid in (coarse.shapes.grid(), sampling.grid(coarse)))
+    assert set(after) == set(before)
+
+
+def test_beams_and_rigid_masses_are_left_as_they_are():
+    beam = fi.analytic.beam(0.4, mass=0.1, first_frequency=1e3, n_modes=3)
+    for modes in (beam, fi.Modes.rigid(1.0)):
+        for drawn, own in zip(sampling.grid(modes), modes.shapes.grid()):
+            np.testing.assert_array_equal(drawn, own)
+
+
+def test_the_telling_instant_is_when_the_plate_has_begun_to_yield(plate_hit):
+    times = np.linspace(0.0, sampling.end_of(plate_hit), 50)
+    depth = np.abs(plate_hit.displacement([plate_hit.at], times)[:, 0])
+    first = sampling.telling(plate_hit, times)
+    assert depth[first] >= 0.5 * depth.max() > depth[:first].max()

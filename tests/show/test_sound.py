@@ -30,17 +30,9 @@ def hit():
     return blow()
 
 
-def test_samples_are_the_velocity_of_the_audible_modes(hit):
-    heard = sound.synthesise(hit, POINTS[1], duration=0.3)
-    index = np.array([0, 5, 37, 4096, 4097, 9999, 14399])  # in the blow, on both sides of a block, the last
-    p = hit.modal_state(hit.time[0] + index / sound.RATE)[1][:, 1:4]
-    # 1e-9: phases of some 1e3 rad carry rounding of 1e-13, and the two ways must agree to far less than one bit of 24
-    assert_allclose(heard.samples[index] * sound.FULL_SCALE, p @ SHAPES[1, 1:4], rtol=0, atol=1e-9)
-    assert len(heard.samples) == 14400 and heard.rate == 48_000
-
-
-@pytest.mark.parametrize("damping_ratio", [0.0, 1e-4, 0.5, 2.0])
-@pytest.mark.parametrize("rate", [8_000, 44_100, 1_000_000])  # Hz: slow modes turn by 6e-6 rad in a sample of the last
+@pytest.mark.parametrize(  # [Hz] slow modes turn by 6e-6 rad in a sample of the last
+    ("rate", "damping_ratio"), [(8_000, 0.5), (44_100, 0.0), (44_100, 2.0), (1_000_000, 0.0), (1_000_000, 1e-4)]
+)
 def test_every_sample_of_many_modes_is_that_of_a_direct_sum(rate, damping_ratio):
     frequencies = np.geomspace(1.0, 20e3, 60)  # Hz
     shapes = np.random.default_rng(5).normal(size=(2, 60))
@@ -82,14 +74,13 @@ def test_each_mode_decays_at_its_own_rate(hit):
     heard = sound.synthesise(hit, POINTS[1], duration=1.0)
     times = np.arange(len(heard.samples)) / heard.rate
     for frequency in FREQUENCIES[1:4]:
-        decay = 0.004 * 2 * np.pi * frequency
         ring = heard.samples * np.exp(-2j * np.pi * frequency * times)
-        early, late = (np.abs((ring[a : a + 9600] * np.hanning(9600)).sum()) for a in (4800, 4800 + 4800))
+        early, late = (np.abs((ring[a : a + 9600] * np.hanning(9600)).sum()) for a in (4800, 9600))
         # 2 %: the other modes leak through the window by less than that
-        assert_allclose(np.log(early / late) / 0.1, decay, rtol=0.02)
+        assert_allclose(np.log(early / late) / 0.1, 0.004 * 2 * np.pi * frequency, rtol=0.02)
 
 
-@pytest.mark.parametrize("ratio", [1.0, 1.0 + 1e-9, 1.0 - 1e-9, 3.0, 50.0])
+@pytest.mark.parametrize("ratio", [1.0, 1.0 + 1e-9, 1.0 - 1e-9, 50.0])
 def test_overdamped_and_critical_modes_are_finite_and_right(ratio):
     hit = blow(damping_ratio=ratio)
     heard = sound.synthesise(hit, POINTS[1], duration=0.2)
@@ -138,8 +129,7 @@ def test_radiated_pressure_is_rayleighs_integral(plate_hit):
 
 
 def test_nothing_is_heard_before_the_sound_can_arrive(plate_hit):
-    heard = sound.radiate(plate_hit, (0.2, 0.15, 3.0), duration=0.05)
-    first = int(3.0 / 343.2 * sound.RATE)
+    heard, first = sound.radiate(plate_hit, (0.2, 0.15, 3.0), duration=0.05), int(3.0 / 343.2 * sound.RATE)
     assert not heard.samples[:first].any() and heard.samples[first + 100 :].any()
 
 
@@ -148,14 +138,6 @@ def test_pressure_is_opposite_on_the_other_side_and_falls_with_distance(plate_hi
     assert_allclose(behind, -near, rtol=0, atol=1e-15)
     # a plate 0.5 m across is seen under 0.7 degrees there: spherical spreading to 1e-3, the time between set aside
     assert_allclose(np.abs(far).max() / np.abs(near).max(), 0.5, rtol=0.05)
-
-
-@pytest.mark.parametrize(
-    ("listener", "text"), [((0.1, 0.1, 0.0), "off the plate's plane"), ((0.1, 0.1), r"listener must have shape \(3\)")]
-)
-def test_listener_must_be_a_place_off_the_plate(plate_hit, listener, text):
-    with pytest.raises(ValueError, match=text):
-        sound.radiate(plate_hit, listener)
 
 
 @pytest.fixture(scope="module")
@@ -202,19 +184,30 @@ def test_a_narrow_bar_is_a_dipole_up_to_the_stated_width():
     assert_allclose(0.5 * np.pi * ka**2, exact, rtol=0.04)  # 3 % at most, near 0.3
 
 
-def test_what_cannot_be_heard_says_so(bar_hit, plate_hit, hit):
-    with pytest.raises(ValueError, match="duration must be positive, got -1 s"):
-        sound.synthesise(hit, duration=-1.0)
-    with pytest.raises(ValueError, match="response must be that of a plate"):
-        sound.radiate(hit, (0.0, 0.0, 1.0))
-    asked = {"width": 0.02, "height": 0.01, "duration": 0.01}
-    for response, listener, changes, text in (
-        (plate_hit, (0.1, 0.1, 1.0), {}, "response must be that of a beam"),
-        (bar_hit, (0.1, 0.0, 0.001), {}, "listener must be farther than half the width"),
-        (bar_hit, (0.1, 0.0, 1.0), {"height": 0.03}, "height must be at most the width"),
-    ):
-        with pytest.raises(ValueError, match=text):
-            sound.radiate_bar(response, listener, **{**asked, **changes})
+BAR = {"width": 0.02, "height": 0.01, "duration": 0.01}
+
+
+@pytest.mark.parametrize(
+    ("ask", "text"),
+    [
+        (lambda bar, plate, disk, hit: sound.synthesise(hit, duration=-1.0), "duration must be positive, got -1 s"),
+        (lambda bar, plate, disk, hit: sound.radiate(hit, (0.0, 0.0, 1.0)), "response must be that of a plate"),
+        (lambda bar, plate, disk, hit: sound.radiate(plate, (0.1, 0.1, 0.0)), "off the plate's plane"),
+        (lambda bar, plate, disk, hit: sound.radiate(plate, (0.1, 0.1)), r"listener must have shape \(3\)"),
+        (lambda bar, plate, disk, hit: sound.radiate_bar(plate, (0.1, 0.1, 1.0), **BAR),
+         "response must be that of a beam"),
+        (lambda bar, plate, disk, hit: sound.radiate_bar(bar, (0.1, 0.0, 0.001), **BAR),
+         "listener must be farther than half the width"),
+        (lambda bar, plate, disk, hit: sound.radiate_bar(bar, (0.1, 0.0, 1.0), **BAR | {"height": 0.03}),
+         "height must be at most the width"),
+        (lambda bar, plate, disk, hit: sound.radiate_free(bar, (0.0, 0.0, 1.0)), "use radiate_bar for a beam"),
+        (lambda bar, plate, disk, hit: sound.radiate_free(disk, (0.0, 0.0, 0.01)),
+         r"listener must be at least 0\.0148 m from a plate in free air, got 0\.01 m"),
+    ],
+)  # fmt: skip
+def test_what_cannot_be_heard_says_so(bar_hit, plate_hit, disk_hit, hit, ask, text):
+    with pytest.raises(ValueError, match=text):
+        ask(bar_hit, plate_hit, disk_hit, hit)
 
 
 @pytest.fixture(scope="module")
@@ -257,13 +250,6 @@ def test_without_a_baffle_nothing_is_heard_before_it_can_arrive_or_in_the_plates
     assert aside.level < high.level - 40.0  # [dB] a sheet of dipoles is silent beside itself
 
 
-def test_only_plates_far_enough_are_heard_without_a_baffle(disk_hit, bar_hit):
-    with pytest.raises(ValueError, match="use radiate_bar for a beam"):
-        sound.radiate_free(bar_hit, (0.0, 0.0, 1.0))
-    with pytest.raises(ValueError, match=r"listener must be at least 0\.0148 m from a plate in free air, got 0\.01 m"):
-        sound.radiate_free(disk_hit, (0.0, 0.0, 0.01))
-
-
 def test_any_node_of_a_body_is_heard_along_any_direction():
     """Along the blow as the point itself; across it by its own shapes; rigid motions that were added are silent."""
     bar = fi.analytic.beam(0.4, ends=("free", "free"), mass=0.5, first_frequency=200.0, n_modes=8, damping_ratio=0.01)
@@ -279,8 +265,8 @@ def test_any_node_of_a_body_is_heard_along_any_direction():
     assert_allclose(along, fi.sound.synthesise(hit, body.at(2), duration=0.02).samples, atol=1e-12)
     mirrored = fi.sound.of_node(hit, body, 8, "z", duration=0.02).samples
     assert_allclose(across, 0.5 * mirrored, atol=1e-12)
+    few = fi.strike(body.modes("z").truncated(n_modes=2), hit.striker, law, at=body.at(3), speed=1.0, tolerance=1.0)
     with pytest.raises(
-        ValueError, match=r"response must be of a blow on this body of 6 modes, got one on 2; strike body.modes"
+        ValueError, match=r"must be of a blow on this body of 6 modes, got one on 2; strike body\.modes"
     ):
-        few = fi.strike(body.modes("z").truncated(n_modes=2), hit.striker, law, at=body.at(3), speed=1.0, tolerance=1.0)
         fi.sound.of_node(few, body, 2, "z")

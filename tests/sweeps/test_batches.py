@@ -1,13 +1,16 @@
 """Many blows in kernel form against closed forms, against single blows, and against themselves."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
+from comparing import QUANTITIES, worst
 from numba import njit
 from numpy.testing import assert_allclose
 
 import fem_impact as fi
 from fem_impact.impact import accuracy
-from fem_impact.impact.compiled import centroids, cubics, law, propagation
+from fem_impact.impact.compiled import cubics, propagation
 from fem_impact.sweeps import batches
 
 AT = np.array([0.465, 0.3])
@@ -23,32 +26,30 @@ def parted(d0, v0, d1, v1, error, rate_error):
     return cubics.parted(d0, v0, d1, v1, error, rate_error)
 
 
-@njit
-def centroid(contacts, n_steps, h, ends, rates, stiffness, limit):
-    spring = law.simple(stiffness, 1.0, 0.0, 0.0)
-    return centroids.centroid(contacts, len(contacts), n_steps, h, ends, rates, spring, limit)
+def plate(mass=0.2, n_modes=120, **wanted):
+    return fi.analytic.rectangle(1.55, 1.0, mass=mass, first_frequency=100.0, n_modes=n_modes, **wanted)
 
 
-def plate(mass=0.2, **wanted):
-    return fi.analytic.rectangle(1.55, 1.0, mass=mass, first_frequency=100.0, n_modes=120, **wanted)
-
-
-def many(
-    modes, striker, stiffness, *, at=AT, exponent=1.0, speed=1.0, mass=None, target_mass=None, residual=True, loss=0.0
-):
+def many(modes, striker, stiffness, *, at=AT, exponent=1.0, speed=1.0, mass=None, residual=True, loss=0.0):
     """Blows of one family, one for each stiffness."""
     stiffness = np.atleast_1d(np.asarray(stiffness, float))
-    column = np.ones(len(stiffness))
+    column, moving = np.ones(len(stiffness)), striker.mass if mass is None else mass
+    family = batches.Family.of(modes, at, striker, residual, bool(np.any(loss)))
     return batches.Blows(
-        {0: batches.Family.of(modes, at, striker, residual, bool(np.any(loss)))},
-        np.zeros(len(stiffness), int),
-        column * (modes.mass if target_mass is None else target_mass),
-        column * (striker.mass if mass is None else mass),
-        stiffness,
-        column * exponent,
-        column * speed,
-        column * loss,
-    )
+        {0: family}, np.zeros(len(stiffness), int), column * modes.mass, column * moving,
+        stiffness, column * exponent, column * speed, column * loss,
+    )  # fmt: skip
+
+
+def apart(found, fine):
+    """The largest of four differences, for each blow."""
+    relative = [np.abs(getattr(found, name) / getattr(fine, name) - 1.0) for name in QUANTITIES]
+    return np.max([np.abs(found.restitution - fine.restitution), *relative], axis=0)
+
+
+def one(found, i):
+    """One of many blows, to be compared with a single blow."""
+    return SimpleNamespace(**{name: getattr(found, name)[i] for name in ("n_impacts", "restitution", *QUANTITIES)})
 
 
 @pytest.mark.parametrize("damping_ratio", [0.0, 0.02, 1.3])
@@ -78,13 +79,11 @@ def test_kernel_is_the_modal_propagation(damping_ratio):
 
 @pytest.mark.parametrize("exponent", [1.0, 1.2, 1.5, 2.5])
 def test_two_masses_share_speed_whatever_the_law(exponent):
-    target, striker = fi.Modes.rigid(0.3), fi.Striker.rigid(0.1)
+    target, striker, reduced = fi.Modes.rigid(0.3), fi.Striker.rigid(0.1), 0.1 * 0.3 / 0.4
     blows = many(target, striker, np.logspace(3, 7, 9), at=np.zeros(0), exponent=exponent, speed=2.0)
     found = batches.bounce(blows, tolerance=1e-3)
-    assert found.done.all()
-    assert (found.n_impacts == 1).all()
+    assert found.done.all() and (found.n_impacts == 1).all()
     assert_allclose(found.restitution, (0.3 - 0.1) / (0.3 + 0.1), atol=1e-9)  # energy exact at every step
-    reduced = 0.1 * 0.3 / 0.4
     expected = [accuracy.contact_duration(fi.Contact.power(k, exponent), reduced, 2.0) for k in blows.stiffness]
     assert_allclose(found.contact_time, expected, rtol=1e-3)  # the tolerance
     deepest = (0.5 * (exponent + 1.0) * reduced * 4.0 / blows.stiffness) ** (1.0 / (exponent + 1.0))
@@ -108,31 +107,24 @@ CASES = {
 def test_every_bounce_is_the_single_blow_within_the_tolerance(case, exponent):
     make, strike, at = CASES[case]
     modes, striker = make(), strike()
-    stiffness = np.logspace(4, 6, 7) * 10.0 ** (2.0 * (exponent - 1.0))
-    blows = many(modes, striker, stiffness, at=at, exponent=exponent, speed=3.0)
-    found = batches.bounce(blows, tolerance=1e-3)
+    stiffness = np.logspace(4, 6, 4) * 10.0 ** (2.0 * (exponent - 1.0))
+    found = batches.bounce(many(modes, striker, stiffness, at=at, exponent=exponent, speed=3.0), tolerance=1e-3)
     assert found.done.mean() > 0.7  # the others belong to the modal engine
     for i in np.flatnonzero(found.done):
         hit = fi.strike(modes, striker, fi.Contact.power(stiffness[i], exponent), at=at, speed=3.0, tolerance=1e-5)
-        assert hit.n_impacts == found.n_impacts[i]
-        assert_allclose(found.restitution[i], hit.restitution, atol=1e-3)
-        for name in ("contact_time", "impulse", "peak_force"):
-            assert_allclose(getattr(found, name)[i], getattr(hit, name), rtol=1e-3)
+        assert worst(one(found, i), hit) < 1e-3
 
 
 @pytest.mark.parametrize("loss", [0.0, 0.02])
 def test_estimate_covers_the_error(loss):
     """Effectivity over many random blows: the estimate is no less than a third of the error, and not wildly more."""
     rng = np.random.default_rng(7)
-    stiffness = 10.0 ** rng.uniform(4, 6, 400)
-    blows = many(plate(2.0), fi.Striker.stick(0.1, 10e3), stiffness, loss=loss)
+    blows = many(plate(2.0), fi.Striker.stick(0.1, 10e3), 10.0 ** rng.uniform(4, 6, 400), loss=loss)
     rough, fine = (batches.bounce(blows, tolerance=each) for each in (1e-2, 1e-4 if loss else 1e-6))
     both = rough.done & fine.done
+    relative = [np.abs(getattr(rough, name) / getattr(fine, name) - 1.0)[both] for name in QUANTITIES]
+    effectivity = rough.error[both] / np.max(relative, axis=0)
     assert both.mean() > 0.95
-    error = np.abs(rough.contact_time / fine.contact_time - 1.0)[both]
-    for name in ("impulse", "peak_force"):
-        error = np.maximum(error, np.abs(getattr(rough, name) / getattr(fine, name) - 1.0)[both])
-    effectivity = rough.error[both] / error
     assert (effectivity > 0.3).mean() > 0.97  # flukes aside
     assert np.median(effectivity) < 10.0
     assert (effectivity < 30.0).mean() > 0.95  # 23 and 12 at 95 % with and without loss
@@ -143,9 +135,8 @@ def test_the_peak_of_a_force_that_loses_much_is_covered():
     rng = np.random.default_rng(11)
     n_cells, n_beyond = 0, 0
     for n_modes in (8, 30):
-        modes = fi.analytic.rectangle(1.55, 1.0, mass=0.5, first_frequency=100.0, n_modes=n_modes)
         k, mass, loss = 10.0 ** rng.uniform(4, 6, 60), rng.uniform(0.02, 0.2, 60), rng.uniform(0.3, 1.5, 60)
-        blows = many(modes, fi.Striker.rigid(0.1), k, mass=mass, loss=loss, residual=False)
+        blows = many(plate(0.5, n_modes), fi.Striker.rigid(0.1), k, mass=mass, loss=loss, residual=False)
         rough, fine = (batches.bounce(blows, tolerance=each) for each in (1e-3, 1e-5))
         both = rough.done & fine.done & (rough.n_impacts == fine.n_impacts)
         off = np.abs(rough.peak_force / fine.peak_force - 1.0)[both] - fine.error[both]
@@ -153,40 +144,54 @@ def test_the_peak_of_a_force_that_loses_much_is_covered():
     assert n_cells > 100 and n_beyond < 0.03 * n_cells
 
 
-def test_time_steps_leave_most_of_the_tolerance():
-    """What is left is for the interpolation of a map, or for the vectors: 800 random blows on two bodies."""
+@pytest.mark.parametrize(
+    ("striker", "n_modes", "residual"), [(fi.Striker.stick(0.1, 10e3), 300, True), (fi.Striker.rigid(0.05), 40, False)]
+)
+def test_time_steps_leave_most_of_the_tolerance(striker, n_modes, residual):
+    """What is left is for the interpolation of a map, or for the vectors."""
     rng = np.random.default_rng(5)
-    for striker, n_modes, residual in ((fi.Striker.stick(0.1, 10e3), 300, True), (fi.Striker.rigid(0.05), 40, False)):
-        modes = fi.analytic.rectangle(1.55, 1.0, mass=0.2, first_frequency=100.0, n_modes=n_modes)
-        stiffness, mass = 10.0 ** rng.uniform(4, 6 if residual else 7, 400), rng.uniform(0.01, 0.2, 400)
-        blows = many(modes, striker, stiffness, mass=mass, residual=residual)
-        found, fine = batches.bounce(blows, tolerance=1e-3), batches.bounce(blows, tolerance=3e-5)
-        both = found.done & fine.done
-        # 89.5 % of the second family, 1.5 % fewer than where runs need not agree on the margin to another number
-        assert both.mean() > 0.88 and (found.n_impacts == fine.n_impacts)[both].all()
-        error = np.abs(found.restitution - fine.restitution)
-        for name in ("contact_time", "impulse", "peak_force"):
-            error = np.maximum(error, np.abs(getattr(found, name) / getattr(fine, name) - 1.0))
-        assert np.quantile(error[both], 0.98) < 0.25e-3 and error[both].max() < 1e-3  # 0.2e-3 and 0.9e-3 measured
+    stiffness, mass = 10.0 ** rng.uniform(4, 6 if residual else 7, 400), rng.uniform(0.01, 0.2, 400)
+    blows = many(plate(n_modes=n_modes), striker, stiffness, mass=mass, residual=residual)
+    found, fine = batches.bounce(blows, tolerance=1e-3), batches.bounce(blows, tolerance=3e-5)
+    both = found.done & fine.done
+    # 89.5 % of the second family, 1.5 % fewer than where runs need not agree on the margin to another number
+    assert both.mean() > 0.88 and (found.n_impacts == fine.n_impacts)[both].all()
+    error = apart(found, fine)[both]
+    assert np.quantile(error, 0.98) < 0.25e-3 and error.max() < 1e-3  # 0.2e-3 and 0.9e-3 measured
 
 
-def test_centroids_of_wide_bands_are_those_of_the_half_sine():
-    """Two masses with a linear contact, in a band of 40 inverse contact times, against its spectrum in closed form."""
-    reduced, stiffness = 0.1 * 0.3 / 0.4, 1e5
-    resonance = np.sqrt(stiffness / reduced) / (2.0 * np.pi)
-    blows = many(fi.Modes.rigid(0.3), fi.Striker.rigid(0.1), [stiffness], at=np.zeros(0))
-    band = 80.0 * resonance
-    found = batches.bounce(blows, tolerance=1e-3, band=band)
-    f = np.linspace(0.0, band, 400_001)
+@pytest.mark.parametrize("width", [1.0, 2.5, 9.0, 80.0])  # of the band [contact frequencies]: 1 to 80 lobes
+def test_centroids_of_wide_bands_are_those_of_the_half_sine(width):
+    """Two masses with a linear contact, against its spectrum in closed form."""
+    resonance = np.sqrt(1e5 / (0.1 * 0.3 / 0.4)) / (2.0 * np.pi)
+    blows = many(fi.Modes.rigid(0.3), fi.Striker.rigid(0.1), [1e5], at=np.zeros(0))
+    found, f = (
+        batches.bounce(blows, tolerance=1e-3, band=width * resonance),
+        np.linspace(0.0, width * resonance, 400_001),
+    )
     size = fi.spectra.half_sine_spectrum(f, resonance)
+    # a symmetric pulse has true zeros, where the magnitude has kinks: 4.4e-5 is the most measured
     assert found.done.all()
-    assert_allclose(found.centroid, (f * size).sum() / size.sum(), rtol=1e-3)  # the tolerance
+    assert_allclose(found.centroid, np.trapezoid(f * size, f) / np.trapezoid(size, f), rtol=2e-4)
+
+
+@pytest.mark.parametrize(("stiffness", "impacts"), [(4e5, 2), (1e6, 3)])
+def test_centroids_of_several_impacts_are_those_of_their_spectrum(stiffness, impacts):
+    modes, striker = plate(), fi.Striker.stick(0.1, 10e3)
+    hit = fi.strike(modes, striker, fi.Contact.linear(stiffness), at=AT, speed=1.0, tolerance=1e-6)
+    assert hit.n_impacts == impacts
+    for limit in (300.0, 3e3, 10e3):  # [Hz]
+        found, f = (
+            batches.bounce(many(modes, striker, [stiffness]), tolerance=1e-4, band=limit),
+            np.linspace(0, limit, 20_001),
+        )
+        size = np.abs(hit.spectrum(f))
+        assert_allclose(found.centroid, np.trapezoid(f * size, f) / np.trapezoid(size, f), rtol=2e-4)
 
 
 @pytest.mark.parametrize("n_modes", [30, 300])
 def test_steps_do_not_grow_with_the_modes(n_modes):
-    modes = fi.analytic.rectangle(1.55, 1.0, mass=2.0, first_frequency=100.0, n_modes=n_modes)
-    engine = batches._Engine(many(modes, fi.Striker.stick(0.1, 10e3), [1e5]), 0.0, {})
+    engine = batches._Engine(many(plate(2.0, n_modes), fi.Striker.stick(0.1, 10e3), [1e5]), 0.0, {})
     assert engine.first_step(1e-3)[0] == 26  # h = 2**-13 s whatever the modes: 15 for 1.8 ms
 
 
@@ -251,8 +256,7 @@ def test_looks_ahead_miss_no_more_of_a_flight_than_is_claimed(zeta):
         t = np.linspace(0.0, 1.0, parts + 1)
         curve = [cubic(place[0], rate[0], place[-1], rate[-1], x) for x in t]
         missed, missed_rate = (np.abs(np.array(curve) - np.column_stack([place, rate]))).max(axis=0)
-        assert missed <= error
-        assert missed_rate <= rate_error
+        assert missed <= error and missed_rate <= rate_error
         assert zeta > 1.0 or (missed > 1e-4 * error and missed_rate > 1e-4 * rate_error)  # not idle where modes ring
 
 
@@ -282,18 +286,14 @@ ADVERSARIAL = [  # mass [kg], stiffness [N/m] of sticks that part for 11 us, or 
 
 def test_moments_between_the_steps_are_not_lost():
     rng = np.random.default_rng(11)
-    cells = ADVERSARIAL + list(zip(rng.uniform(0.05, 0.2, 12), 10.0 ** rng.uniform(5.3, 6.0, 12)))
-    modes = fi.analytic.rectangle(1.55, 1.0, mass=0.2, first_frequency=100.0, n_modes=300)
-    blows = many(modes, fi.Striker.stick(0.1, 10e3), [k for _, k in cells], mass=np.array([m for m, _ in cells]))
-    found = batches.bounce(blows, tolerance=1e-3)
+    mass, stiffness = np.array([*ADVERSARIAL, *zip(rng.uniform(0.05, 0.2, 6), 10.0 ** rng.uniform(5.3, 6.0, 6))]).T
+    modes = plate(n_modes=300)
+    found = batches.bounce(many(modes, fi.Striker.stick(0.1, 10e3), stiffness, mass=mass), tolerance=1e-3)
     assert found.done.mean() > 0.9
     for i in np.flatnonzero(found.done):
-        hit = fi.strike(
-            modes, fi.Striker.stick(cells[i][0], 10e3), fi.Contact.linear(cells[i][1]), at=AT, speed=1.0, tolerance=1e-4
-        )
-        assert hit.n_impacts == found.n_impacts[i]
-        assert_allclose(found.contact_time[i], hit.contact_time, rtol=1.1e-3)  # 1e-3, and 1e-4 of the single blow
-        assert_allclose(found.restitution[i], hit.restitution, atol=1.1e-3)
+        striker, law = fi.Striker.stick(mass[i], 10e3), fi.Contact.linear(stiffness[i])
+        hit = fi.strike(modes, striker, law, at=AT, speed=1.0, tolerance=1e-4)
+        assert worst(one(found, i), hit) < 1.1e-3  # 1e-3, and 1e-4 of the single blow
 
 
 GRAZING = [  # plate's modes, mass [kg], damping, length [m], point [m]; striker's first frequency [Hz] and mass, N/m
@@ -308,36 +308,17 @@ GRAZING = [  # plate's modes, mass [kg], damping, length [m], point [m]; striker
 ]  # fmt: skip
 
 
-def test_a_count_that_a_change_as_large_as_its_error_alters_is_not_told():
+@pytest.mark.parametrize(("n_modes", "mass", "damping", "length", "at", "first", "moving", "stiffness"), GRAZING)
+def test_a_count_that_a_change_as_large_as_its_error_alters_is_not_told(
+    n_modes, mass, damping, length, at, first, moving, stiffness
+):
     """Two runs agreed on an impact more or fewer, but not on how near they were to another number of impacts."""
-    for n_modes, mass, damping, length, at, first, moving, stiffness in GRAZING:
-        modes = fi.analytic.rectangle(
-            length, 1.0, mass=mass, first_frequency=100.0, n_modes=n_modes, damping_ratio=damping
-        )
-        striker = fi.Striker.stick(moving, first) if first else fi.Striker.rigid(moving)
-        found = batches.bounce(many(modes, striker, stiffness, at=np.array(at), residual=False), tolerance=1e-2)
-        hit = fi.strike(modes, striker, fi.Contact.linear(stiffness), at=at, speed=1.0, tolerance=1e-6, residual=False)
-        assert not found.done[0] or found.n_impacts[0] == hit.n_impacts
-
-
-@pytest.mark.parametrize("limit", [1e3, 2.5e3, 9e3])
-@pytest.mark.parametrize("second", [None, 1.7e-3, 9.3e-3])
-def test_centroid_of_half_sines_is_that_of_their_spectrum_in_closed_form(second, limit):
-    """One pulse of 1 ms, or a lesser one after it: 1 to 85 lobes within the band."""
-    n, long = 240, 1e-3
-    h, starts, sizes = 11e-3 / n, [0.3e-3] + [second] * (second is not None), [1e-4, 0.4e-4]
-    at, slope = np.full(n + 1, -1e-6), np.zeros(n + 1)
-    for start, size in zip(starts, sizes):
-        phase = np.pi * (np.arange(n + 1) * h - start) / long
-        near = np.abs(phase - 0.5 * np.pi) < 0.5 * np.pi * (1.0 + 2.0 * h / long)
-        at[near], slope[near] = size * np.sin(phase[near]), size * np.pi / long * np.cos(phase[near])
-    contacts = np.array([[start, start + long] for start in starts])
-    found = centroid(contacts, n, h, at, slope, 1e5, limit)
-    f = np.linspace(0.0, limit, 200_001)
-    pulses = sum(size * np.exp(-2j * np.pi * f * start) for start, size in zip(starts, sizes))
-    spectrum = np.abs(pulses) * fi.spectra.half_sine_spectrum(f, 0.5 / long)
-    # a symmetric pulse has true zeros, where the magnitude has kinks: 1.2e-4 is the most measured
-    assert_allclose(found, np.trapezoid(f * spectrum, f) / np.trapezoid(spectrum, f), rtol=2e-4)
+    body = {"mass": mass, "first_frequency": 100.0, "n_modes": n_modes, "damping_ratio": damping}
+    modes = fi.analytic.rectangle(length, 1.0, **body)
+    striker = fi.Striker.stick(moving, first) if first else fi.Striker.rigid(moving)
+    found = batches.bounce(many(modes, striker, stiffness, at=np.array(at), residual=False), tolerance=1e-2)
+    hit = fi.strike(modes, striker, fi.Contact.linear(stiffness), at=at, speed=1.0, tolerance=1e-6, residual=False)
+    assert not found.done[0] or found.n_impacts[0] == hit.n_impacts
 
 
 @pytest.mark.parametrize("stiffness, exponent", [(5e5, 1.0), (1e8, 1.5)])
@@ -356,37 +337,11 @@ def test_impacts_alone_are_counted_as_with_everything_else(stiffness, exponent):
     assert off[0] < 0.02 and off[1] < 0.01
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("frequency", [600.0, 2e3, 10e3])
-def test_nearly_all_cells_of_a_light_plate_meet_the_tolerance(frequency):
-    """A stick on a plate of its own mass: touches that barely part, where errors are amplified, are rare and small.
-
-    Of 10 000 cells up to 30 were off by more than 1e-3, the worst by 2.8e-3, and 3 had another number of impacts, all
-    from gaps or touches of some us; nearly twice that is allowed for.
-    """
-    rng = np.random.default_rng(3)
-    modes = fi.analytic.rectangle(1.55, 1.0, mass=0.2, first_frequency=100.0, n_modes=300)
-    mass, stiffness = rng.uniform(0.01, 0.2, 4000), 10.0 ** rng.uniform(4.0, 6.0, 4000)
-    blows = many(modes, fi.Striker.stick(0.1, frequency), stiffness, mass=mass)
-    found, fine = batches.bounce(blows, tolerance=1e-3), batches.bounce(blows, tolerance=1e-5)
-    both = found.done & fine.done
-    assert both.mean() > 0.99
-    same = found.n_impacts[both] == fine.n_impacts[both]
-    assert same.mean() > 0.997
-    off = np.abs(found.restitution - fine.restitution)
-    for name in ("contact_time", "peak_force"):
-        off = np.maximum(off, np.abs(getattr(found, name) / getattr(fine, name) - 1.0))
-    off = off[both][same]
-    assert (off > 1e-3).mean() < 0.005
-    assert off.max() < 1e-2
-
-
-@pytest.mark.parametrize("exponent", [1.0, 1.5])
-@pytest.mark.parametrize("residual", [True, False])
+@pytest.mark.parametrize(("exponent", "residual"), [(1.0, False), (1.5, True)])
 def test_contacts_with_loss_are_the_single_blow_within_the_tolerance(exponent, residual):
     """Loss hangs on the rate of approach: the ringing of fast modes shows in the force, residual ones too."""
     rng = np.random.default_rng(8)
-    modes, n = plate(0.6, damping_ratio=0.003), 12
+    modes, n = plate(0.6, damping_ratio=0.003), 10
     stick, loss = fi.Striker.stick(0.1, 2e3), 10.0 ** rng.uniform(-2.0, -0.1, n)
     mass, stiffness = rng.uniform(0.02, 0.2, n), 10.0 ** rng.uniform(4.0, 6.0, n) * 10.0 ** (2.0 * (exponent - 1.0))
     blows = many(modes, stick, stiffness, exponent=exponent, speed=0.8, mass=mass, residual=residual, loss=loss)

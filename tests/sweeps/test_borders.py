@@ -12,17 +12,19 @@ from fem_impact.sweeps import borders
 from fem_impact.sweeps.cases import Cases
 from fem_impact.sweeps.cells import Case
 
-AT = (0.465, 0.3)
+AT, RIGID, LINEAR = (0.465, 0.3), fi.Striker.rigid(0.1), fi.Contact.linear(1e5)
 
 
-def case():
-    plate = fi.analytic.rectangle(1.55, 1.0, mass=0.2, first_frequency=100.0, n_modes=20)
-    return Case(plate, fi.Striker.rigid(0.1), fi.Contact.linear(1e5), np.array(AT), 1.0)
+PLATE = fi.analytic.rectangle(1.55, 1.0, mass=0.2, first_frequency=100.0, n_modes=20)
+
+
+def swept(over, law=LINEAR, **wanted):
+    return fi.sweep(PLATE, RIGID, law, at=AT, speed=1.0, over=over, **{"borders": True, **wanted})
 
 
 def found_of(rule, mass, stiffness):
     """Borders of numbers of impacts told by a rule of mass and stiffness instead of blows."""
-    cells = Cases(case(), {"mass": mass, "stiffness": stiffness}, 1e-3)
+    cells = Cases(Case(PLATE, RIGID, LINEAR, np.array(AT), 1.0), {"mass": mass, "stiffness": stiffness}, 1e-3)
     rounds = []
 
     def solve(rows, turn):
@@ -88,12 +90,11 @@ def test_a_number_that_changes_with_the_tolerance_is_in_doubt():
     assert_allclose(found[0].points[:, 0], 0.24, atol=1e-4)
 
 
-@pytest.mark.parametrize("law", [fi.Contact.linear(1e5), fi.Contact.hertz(2e6)], ids=["linear", "hertz"])
+@pytest.mark.parametrize("law", [LINEAR, fi.Contact.hertz(2e6)], ids=["linear", "hertz"])
 def test_blows_on_both_sides_of_a_border_differ(law):
     """Single blows at a hundredth of the tolerance, 1e-3 of the axis to both sides of where the border is told."""
-    bare = case()
     over = {"mass": np.linspace(0.02, 0.2, 5), "stiffness": law.stiffness * np.geomspace(0.1, 10.0, 5)}
-    table = fi.sweep(bare.modes, bare.striker, law, at=AT, speed=1.0, over=over, borders=True)
+    table = swept(over, law)
     curves = fi.read_borders(table)
     assert curves and "located to 0.0005 of the axes" in table.attrs["borders"]
     for border in curves:
@@ -101,28 +102,25 @@ def test_blows_on_both_sides_of_a_border_differ(law):
             counts = set()
             for step in ((-1e-3, 0.0), (1e-3, 0.0), (0.0, -1e-3), (0.0, 1e-3)):
                 mass, stiffness = point[0] + 0.18 * step[0], point[1] * 100.0 ** step[1]
-                contact = fi.Contact(stiffness=stiffness, exponent=law.exponent)
-                hit = fi.strike(bare.modes, fi.Striker.rigid(mass), contact, at=AT, speed=1.0, tolerance=1e-5)
-                counts.add(hit.n_impacts)
+                striker, contact = fi.Striker.rigid(mass), fi.Contact(stiffness=stiffness, exponent=law.exponent)
+                counts.add(fi.strike(PLATE, striker, contact, at=AT, speed=1.0, tolerance=1e-5).n_impacts)
             assert min(counts) <= border.impacts < max(counts)
 
 
 def test_a_file_keeps_the_curves():
-    bare = case()
-    over = {"mass": np.linspace(0.02, 0.2, 4), "stiffness": np.geomspace(1e4, 1e6, 4)}
-    table = fi.sweep(bare.modes, bare.striker, bare.contact, at=AT, speed=1.0, over=over, borders=True)
+    table = swept({"mass": np.linspace(0.02, 0.2, 4), "stiffness": np.geomspace(1e4, 1e6, 4)})
     with xarray.open_dataset(io.BytesIO(bytes(table.to_netcdf(engine="scipy"))), engine="scipy") as read:
         again = fi.read_borders(read)
-    assert len(again) == len(fi.read_borders(table)) > 0
-    for one, two in zip(again, fi.read_borders(table)):
+    assert len(again) > 0 and table.border_stiffness.attrs["units"] == "N/m"
+    for one, two in zip(again, fi.read_borders(table), strict=True):
         assert (one.impacts, one.axes) == (two.impacts, two.axes)
         assert np.array_equal(one.points, two.points) and np.array_equal(one.error, two.error)
-    assert table.border_stiffness.attrs["units"] == "N/m"
-    few = fi.sweep(
-        bare.modes, bare.striker, bare.contact, at=AT, speed=1.0, over={"mass": [0.01, 0.02], "stiffness": [1e3, 2e3]},
-        borders=True,
-    )  # fmt: skip
+    few = swept({"mass": [0.01, 0.02], "stiffness": [1e3, 2e3]})
     assert fi.read_borders(few) == () and few.attrs["borders"].startswith("no border between")
+    with pytest.raises(ValueError, match="table has no borders; make the map with borders=True"):
+        fi.read_borders(swept({"mass": [0.02, 0.2], "stiffness": [1e4, 1e6]}, borders=False))
+    with pytest.raises(ValueError, match="table must be a map"):
+        fi.read_borders({})
 
 
 @pytest.mark.parametrize(
@@ -134,19 +132,8 @@ def test_a_file_keeps_the_curves():
     ],
 )
 def test_maps_without_borders_are_told_at_once(over, message):
-    bare = case()
     with pytest.raises(ValueError, match=message):
-        fi.sweep(bare.modes, bare.striker, bare.contact, at=AT, speed=1.0, over=over, borders=True)
-
-
-def test_borders_that_were_not_looked_for_are_none():
-    bare, over = case(), {"mass": [0.02, 0.2], "stiffness": [1e4, 1e6]}
-    shared = {"at": AT, "speed": 1.0, "over": over}
-    with pytest.raises(ValueError, match="table has no borders; make the map with borders=True"):
-        fi.read_borders(fi.sweep(bare.modes, bare.striker, bare.contact, **shared))
-    assert fi.read_borders(fi.sweep(bare.modes, bare.striker, bare.contact, **shared, borders=True))
-    with pytest.raises(ValueError, match="table must be a map"):
-        fi.read_borders({})
+        swept(over)
 
 
 def test_points_that_are_known_to_the_cell_only_are_told_apart():

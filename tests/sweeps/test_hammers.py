@@ -10,9 +10,7 @@ from fem_impact.sweeps import hammers
 PLATE = fi.analytic.rectangle(1.55, 1.0, mass=0.2, first_frequency=100.0, n_modes=300)
 AT = (0.465, 0.3)
 BODIES = {  # bodies, points and hammers, each drawn once and kept
-    "plate": (PLATE, AT, 0.01),
-    "plate, other point": (PLATE, (0.71, 0.52), 0.005),
-    "disk": (fi.analytic.disk(0.2, edge="free", mass=1.3, first_frequency=80.0, n_modes=150), (0.07, 0.03), 0.05),
+    "plate": (PLATE, (0.71, 0.52), 0.005),
     "clamped disk": (fi.analytic.disk(0.15, mass=0.1, first_frequency=300.0, n_modes=120), (0.04, 0.0), 0.02),
     "beam": (fi.analytic.beam(0.5, ends=("free", "free"), mass=0.4, first_frequency=60.0, n_modes=30), 0.11, 0.05),
 }
@@ -36,8 +34,7 @@ def test_the_tips_that_hit_once_end_where_a_bisection_over_single_blows_ends(nam
     modes, at, mass = BODIES[name]
     (hammer,) = hammers.choose(modes, at, 300.0, [mass])
     low, high = max(hammer.single, key=lambda ends: ends[1] / ends[0])
-    inside = np.geomspace(low, high, 12)
-    assert [impacts(modes, at, mass, tip) for tip in inside] == [1] * 12
+    assert {impacts(modes, at, mass, tip) for tip in np.geomspace(low, high, 6)} == {1}
     bad = 1.05 * high  # 5 %: gaps and ranges narrower than 2 % may be missed
     assert impacts(modes, at, mass, bad) != 1
     assert high == pytest.approx(last_single(modes, at, mass, high, bad), rel=2.0 * hammers.WIDTH)
@@ -97,26 +94,14 @@ def test_several_ranges_are_all_told():
 
 def test_working_tips_hit_once_and_reach_the_bandwidth_and_softer_ones_do_not():
     light, heavy = hammers.choose(PLATE, AT, 500.0, [2e-3, 0.2])
-    assert light.works and not heavy.works and heavy.softest is None
+    assert light.works and not heavy.works and heavy.softest is None and heavy.hardest is not None
     for tip, reaches in ((light.softest, True), (light.hardest, True), (0.98 * light.softest, False)):
         hit = fi.strike(PLATE, fi.Striker.rigid(2e-3), fi.Contact.linear(tip), at=AT, speed=1.0)
         assert hit.n_impacts == 1
         assert (hammers.bandwidth_of(hit, 10.0) >= 0.999 * 500.0) == reaches
 
 
-def test_on_an_unyielding_body_the_softest_tip_is_the_half_sines():
-    heavy = fi.analytic.rectangle(1.55, 1.0, mass=5e5, first_frequency=100.0, n_modes=30)
-    (hammer,) = hammers.choose(heavy, AT, 500.0, [0.02])
-    centre = 500.0 / 2.039  # Hz; a half sine is 10 dB down at 2.039 times its frequency
-    assert_allclose(hammer.softest, 0.02 * (2.0 * np.pi * centre) ** 2, rtol=3e-3)
-
-
-def test_a_bandwidth_beyond_every_tip_has_no_hammer():
-    (hammer,) = hammers.choose(PLATE, AT, 1e6, [0.01])
-    assert not hammer.works and hammer.hardest is not None
-
-
-@pytest.mark.parametrize("mass", [0.01, 0.3, 5.0])
+@pytest.mark.parametrize("mass", [0.01, 5.0])
 def test_a_rigid_body_is_hit_once_by_any_tip(mass):
     """Only the bandwidth matters: k = m (2 pi f / reach)**2 with the reduced mass m."""
     bandwidth, body = 800.0, 5.0
@@ -132,19 +117,16 @@ def test_a_rigid_body_is_hit_once_by_any_tip(mass):
 PRINTED = {3.0: 1.187, 6.0: 1.637, 10.0: 2.039, 20.0: 2.607}
 
 
-@pytest.mark.parametrize("drop", PRINTED)
-def test_reach_of_a_half_sine(drop):
-    assert_allclose(hammers.half_sine_reach(drop), PRINTED[drop], atol=6e-4)
+def test_reach_of_a_half_sine():
+    assert_allclose([hammers.half_sine_reach(drop) for drop in PRINTED], [*PRINTED.values()], atol=6e-4)
 
 
-@pytest.mark.parametrize("body", [0.05, 2.0])  # [kg]
-@pytest.mark.parametrize("drop", [3.0, 20.0])
+@pytest.mark.parametrize(("body", "drop"), [(0.05, 3.0), (2.0, 20.0)])  # [kg]
 def test_bandwidth_of_two_masses_on_a_linear_spring(body, drop):
     """A half sine of the reduced mass, whatever the speed."""
     mass, stiffness = 0.1, 1e5
-    hit = fi.strike(
-        fi.Modes.rigid(body), fi.Striker.rigid(mass), fi.Contact.linear(stiffness), at=None, speed=3.0, tolerance=1e-6
-    )
+    bodies = fi.Modes.rigid(body), fi.Striker.rigid(mass), fi.Contact.linear(stiffness)
+    hit = fi.strike(*bodies, at=None, speed=3.0, tolerance=1e-6)
     resonance = np.sqrt(stiffness * (1.0 / mass + 1.0 / body)) / (2.0 * np.pi)
     assert_allclose(hammers.bandwidth_of(hit, drop), hammers.half_sine_reach(drop) * resonance, rtol=1e-3)  # 400 looks
 
@@ -152,10 +134,11 @@ def test_bandwidth_of_two_masses_on_a_linear_spring(body, drop):
 def test_modes_wanted_follow_from_the_hardest_tip():
     """Its contact frequency is sqrt(10) times that of the bandwidth, and modes reach at least four times that far."""
     plate = fi.analytic.rectangle(1.55, 1.0, mass=1e4, first_frequency=100.0, n_modes=20)
-    found = hammers.highest_frequency(plate, (0.465, 0.3), 500.0, [0.01, 0.02])
+    found, light = (
+        hammers.highest_frequency(each, AT, 500.0, [0.01, 0.02]) for each in (plate, plate.scaled(mass=0.2))
+    )
     assert_allclose(found, 4.0 * np.sqrt(10.0) * 500.0 / hammers.half_sine_reach(10.0), rtol=1e-6)
-    light = plate.scaled(mass=0.2)
-    assert hammers.highest_frequency(light, (0.465, 0.3), 500.0, [0.01, 0.02]) > found
+    assert light > found
 
 
 def test_hammers_on_elements_are_those_on_the_closed_form():

@@ -1,4 +1,4 @@
-"""Statistics of uncertain blows: against binomial laws and Sobol indices in closed form."""
+"""Uncertain inputs and the statistics of blows: against closed forms, binomial laws and Sobol indices."""
 
 import json
 
@@ -44,16 +44,13 @@ def test_quantiles_have_the_interval_of_order_statistics(level):
 
 def test_intervals_of_quantiles_hold_the_truth_as_often_as_they_say():
     rng = np.random.default_rng(1)
-    hits = 0
-    for _ in range(400):
-        found = spread(rng.normal(size=60)).quantile("restitution", 0.5)
-        hits += found.low <= 0.0 <= found.high
-    assert hits / 400 > 0.9 - 3.0 * (0.9 * 0.1 / 400) ** 0.5  # three standard deviations of the count
+    found = [spread(rng.normal(size=60)).quantile("restitution", 0.5) for _ in range(400)]
+    held = np.mean([each.low <= 0.0 <= each.high for each in found])
+    assert held > 0.9 - 3.0 * (0.9 * 0.1 / 400) ** 0.5  # three standard deviations of the count
 
 
 def test_the_chance_of_a_double_hit_has_wilsons_interval():
-    counts = np.array([2] * 7 + [1] * 93)
-    found = spread(np.ones(100), counts=counts).chance()
+    found = spread(np.ones(100), counts=np.array([2] * 7 + [1] * 93)).chance()
     z, p, n = stats.norm.ppf(0.95), 0.07, 100
     middle = (p + z**2 / (2 * n)) / (1 + z**2 / n)
     half = z / (1 + z**2 / n) * np.sqrt(p * (1 - p) / n + z**2 / (4 * n**2))
@@ -76,14 +73,17 @@ def test_without_a_single_result_there_is_no_distribution():
     assert "No blow succeeded" in found.summary()
 
 
-def test_questions_name_what_is_known():
-    found = spread(np.arange(10.0))
-    with pytest.raises(ValueError, match="did you mean 'restitution'"):
-        found.quantile("restitutio", 0.5)
-    with pytest.raises(ValueError, match="level must lie"):
-        found.quantile("restitution", 2.0)
-    with pytest.raises(ValueError, match="quantity must be one of"):
-        found.ranking("a")
+@pytest.mark.parametrize(
+    ("question", "words", "text"),
+    [
+        ("quantile", ("restitutio", 0.5), "did you mean 'restitution'"),
+        ("quantile", ("restitution", 2.0), "level must lie"),
+        ("ranking", ("a",), "quantity must be one of"),
+    ],
+)
+def test_questions_name_what_is_known(question, words, text):
+    with pytest.raises(ValueError, match=text):
+        getattr(spread(np.arange(10.0)), question)(*words)
 
 
 def grouped(function, n=2**12):
@@ -145,10 +145,10 @@ def test_without_sobol_indices_rank_correlations_order_the_inputs():
 
 
 def test_impacts_that_vary_are_called_chaotic():
-    counts = np.array([1, 2, 5, 1] * 10)
-    found = spread(np.linspace(0.1, 0.9, 40), counts=counts)
+    values = np.linspace(0.1, 0.9, 40)
+    found = spread(values, counts=np.array([1, 2, 5, 1] * 10))
     assert found.chaotic and "from 1 to 5: such blows are chaotic" in found.summary()
-    assert not spread(np.linspace(0.1, 0.9, 40)).chaotic
+    assert not spread(values).chaotic
 
 
 def test_what_never_changes_needs_no_measurement():
@@ -159,3 +159,105 @@ def test_what_never_changes_needs_no_measurement():
 def test_all_numbers_are_plain_data():
     text = json.dumps(spread(np.linspace(0.0, 1.0, 50)).data())
     assert json.loads(text)["quantities"]["restitution"]["quantiles"]["0.5"]["value"] == 0.5
+
+
+@pytest.mark.parametrize(
+    ("given", "median", "upper"),
+    [
+        (("normal", 3.0, 0.5), 3.0, 3.5),
+        (("lognormal", 2.0, 0.1), 2.0, 2.0 * np.exp(0.1)),
+        (("uniform", 1.0, 5.0), 3.0, 1.0 + 4.0 * stats.norm.cdf(1.0)),
+        (("loguniform", 1.0, 100.0), 10.0, 100.0 ** stats.norm.cdf(1.0)),
+        (("triangular", 0.0, 1.0, 2.0), 1.0, 2.0 - np.sqrt(2.0 * stats.norm.sf(1.0))),
+        (stats.norm(3.0, scale=0.5), 3.0, 3.5),
+        ("lognormal( 2, 1e-1 )", 2.0, 2.0 * np.exp(0.1)),
+    ],
+)
+def test_a_distribution_has_the_quantiles_of_its_closed_form(given, median, upper):
+    one = inputs.Input.of("a", given)
+    assert_allclose(one.at(np.array([0.5, stats.norm.cdf(1.0)])), [median, upper], rtol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("given", "text"),
+    [
+        (("gaussian", 1.0, 0.1), r"vary\['a'\] must be one of normal, lognormal"),
+        (("normal", 1.0), r"vary\['a'\] must be normal\(mean, deviation\), got 1 numbers"),
+        (("normal", 1.0, 0.0), r"deviation of vary\['a'\] must be positive"),
+        (("lognormal", -1.0, 0.1), r"median of vary\['a'\] must be positive"),
+        (("uniform", 2.0, 1.0), r"low of vary\['a'\] must be below high, got 2 and 1"),
+        (("triangular", 0.0, 3.0, 2.0), r"mode of vary\['a'\] must lie between low and high"),
+        (("loguniform", 0.0, 3.0), r"low of vary\['a'\] must be positive"),
+        ("normal 1 2", r"vary\['a'\] must look like lognormal\(695e3, 0.1\), got 'normal 1 2'"),
+        ("normal(1, b)", r"vary\['a'\] must hold numbers"),
+        (3.0, r"vary\['a'\] must be a distribution such as"),
+        (("normal", float("nan"), 1.0), r"mean of vary\['a'\] must be finite"),
+    ],
+)
+def test_a_wrong_distribution_is_refused(given, text):
+    with pytest.raises(ValueError, match=text):
+        inputs.Input.of("a", given)
+
+
+@pytest.mark.parametrize(
+    ("vary", "text"),
+    [
+        ({}, "vary must name at least one input"),
+        (None, "vary must name at least one input"),
+        ([("a", "normal(0, 1)")], "vary must name at least one input"),
+        ({3: "normal(0, 1)"}, "vary must map names to distributions"),
+        ({f"a{i}": "normal(0, 1)" for i in range(65)}, "at most 64 inputs"),
+    ],
+)
+def test_inputs_must_be_named(vary, text):
+    with pytest.raises(ValueError, match=text):
+        inputs.read_inputs(vary)
+
+
+PAIR = inputs.read_inputs({"a": ("normal", 0.0, 1.0), "b": ("uniform", 0.0, 1.0)})
+
+
+@pytest.mark.parametrize("given", [{("a", "b"): 0.6}, {("b", "a"): 0.6}, [[1.0, 0.6], [0.6, 1.0]]])
+def test_a_gaussian_copula_has_its_rank_correlation(given):
+    values = inputs.drawn(PAIR, inputs.shares(2**14, 2, 0), inputs.mixing(PAIR, given))
+    rank = stats.spearmanr(*values.T).statistic
+    assert_allclose(rank, 6.0 / np.pi * np.arcsin(0.3), atol=5e-3)  # Pearson's formula; even points beat 1/sqrt(n)
+    assert_allclose(np.quantile(values[:, 1], [0.1, 0.9]), [0.1, 0.9], atol=2e-3)  # margins stay as they were
+
+
+@pytest.mark.parametrize(
+    ("given", "text"),
+    [
+        ({("a", "c"): 0.5}, "correlation must be one of a, b, got 'c'"),
+        ({("a", "a"): 0.5}, "pairs of different names"),
+        ({("a", "b"): 1.5}, "correlation of a and b must"),
+        ({("a", "b"): 1.0}, "must be positive definite"),
+        ([[1.0, 0.5], [0.4, 1.0]], "must be symmetric with ones on its diagonal"),
+        ([[1.0]], "must have shape"),
+    ],
+)
+def test_a_wrong_correlation_is_refused(given, text):
+    with pytest.raises(ValueError, match=text):
+        inputs.mixing(PAIR, given)
+
+
+def test_no_correlation_mixes_nothing():
+    assert inputs.mixing(PAIR, None) is None and inputs.mixing(PAIR, np.eye(2)) is None
+
+
+def test_points_are_repeatable_even_and_inside_the_cube():
+    points = inputs.shares(1000, 3, 7)
+    np.testing.assert_array_equal(points, inputs.shares(1000, 3, 7))
+    assert np.abs(points - inputs.shares(1000, 3, 8)).max() > 0.1
+    assert points.min() > 0.0 and points.max() < 1.0
+    # of 1024 points of the sequence every slab of 1/16 holds exactly 64
+    counts = [np.histogram(column, 16, (0.0, 1.0))[0] for column in inputs.shares(1024, 3, 7).T]
+    np.testing.assert_array_equal(counts, 64)
+
+
+def test_groups_for_sobol_indices_exchange_one_input_at_a_time():
+    points = inputs.shares(8, 6, 1)
+    first, second = points[:, :3], points[:, 3:]
+    mixed = [np.where(np.arange(3) == i, second, first) for i in range(3)]
+    groups = inputs.crossed(points).reshape(8, 5, 3).transpose(1, 0, 2)
+    np.testing.assert_array_equal(groups, [first, *mixed, second])

@@ -1,66 +1,72 @@
 """Universal files of frequency responses, as pyuff and others write them: read whole, or refused with what is wrong."""
 
-import struct
-
 import numpy as np
 import pytest
 
 import fem_impact as fi
 from fem_impact.modes import universal_files
-from fem_impact.taps import transfer
+from fem_impact.taps import readers, transfer
 
 pyuff = pytest.importorskip("pyuff")
 # its writer leaves binary files open
-pytestmark = pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionWarning")
+pytestmark = [
+    pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionWarning"),
+    pytest.mark.usefixtures("read_here"),
+]
 X = np.arange(1.0, 201.0)  # Hz
 H = -(X**2) / (100.0**2 - X**2 + 2j * X)  # 1/kg
+KINDS = {"ordinate_spec_data_type": 12, "orddenom_spec_data_type": 13, "abscissa_spec_data_type": 18, "func_type": 4,
+         "ord_data_type": 6}  # fmt: skip
+NODES = {"type": 15, "node_nums": [1, 2], "def_cs": [0, 0], "disp_cs": [0, 0], "color": [1, 1], "x": [0.1, 0.3],
+         "y": [0.0, 0.0], "z": [0.0, 0.0]}  # fmt: skip
+FEET = {"type": 164, "units_code": 2, "units_description": "foot", "temp_mode": 1, "length": 2.0, "force": 0.5,
+        "temp": 1.0, "temp_offset": 1.0}  # fmt: skip
 
 
 def response(node, data=H, **codes):
-    kinds = {"ordinate_spec_data_type": 12, "orddenom_spec_data_type": 13, "abscissa_spec_data_type": 18}
-    return (
-        universal_files.function(f"point {node}", node, 3, X, data)
-        | kinds
-        | {"func_type": 4, "ord_data_type": 6}
-        | codes
-    )
+    return universal_files.function(f"point {node}", node, 3, X, data) | KINDS | codes
 
 
-NODES = {"type": 15, "node_nums": [1, 2], "def_cs": [0, 0], "disp_cs": [0, 0], "color": [1, 1], "x": [0.1, 0.3],
-         "y": [0.0, 0.0], "z": [0.0, 0.0]}  # fmt: skip
+def coherence(node, value):
+    return response(node, np.full(200, value), func_type=6, ord_data_type=4)
 
 
-def written(path, *sets):
-    pyuff.UFF(str(path)).write_sets(list(sets), mode="overwrite")
-    return path
+@pytest.fixture
+def written(tmp_path):
+    def written(*sets):
+        pyuff.UFF(str(tmp_path / "a.uff")).write_sets(list(sets), mode="overwrite")
+        return tmp_path / "a.uff"
+
+    return written
 
 
-def by_hand(values, code=12, units="g", kind=5):
+def by_hand(values, code, units):
     """A data set 58 as the format has it, single precision: six columns of 13 characters."""
     numbers = "".join(f"{x:13.5e}" for x in np.column_stack([values.real, values.imag]).ravel())
-    rows = "\n".join(numbers[i : i + 78] for i in range(0, len(numbers), 78))
     axis = "{:10d}    0    0    0 {:<20} {:<20}"
     head = [
         "    -1", "    58", "FRF by hand", "NONE", "24-NOV-20 10:00:00", "NONE", "NONE",
         f"{4:5d}{0:10d}{0:5d}{0:10d} {'NONE':<10}{2:10d}{3:4d} {'NONE':<10}{1:10d}{-3:4d}",
-        f"{kind:10d}{len(values):10d}{1:10d}{1.0:13.5e}{1.0:13.5e}{0.0:13.5e}",
+        f"{5:10d}{len(values):10d}{1:10d}{1.0:13.5e}{1.0:13.5e}{0.0:13.5e}",
         axis.format(18, "Frequency", "Hz"), axis.format(code, "Acceleration", units), axis.format(13, "Force", "N"),
         axis.format(0, "NONE", "NONE"),
     ]  # fmt: skip
-    return "\n".join([*head, rows, "    -1", ""])
+    return "\n".join([*head, *(numbers[i : i + 78] for i in range(0, len(numbers), 78)), "    -1", ""])
 
 
-def test_a_file_tells_ends_coordinates_and_coherence(tmp_path):
-    sure = [response(k, np.full(200, 0.9), func_type=6, ord_data_type=4) for k in (1, 2)]
-    found = transfer.arrays(written(tmp_path / "a.uff", NODES, response(1), response(2, 0.5 * H, binary=1), *sure))
+def test_a_file_tells_ends_coordinates_and_coherence(written):
+    sets = [NODES, response(1), response(2, 0.5 * H, binary=1), coherence(1, 0.9), coherence(2, 0.9)]
+    found = transfer.arrays(written(*sets))
     assert np.allclose(found["H"], np.column_stack([H, 0.5 * H]), rtol=1e-9)
     assert found["ways"].tolist() == [[1, 3, 1, 3], [2, 3, 1, 3]] and (found["coherence"] == 0.9).all()
     assert found["place"].tolist() == [[0.1, 0.0, 0.0], [0.3, 0.0, 0.0]]
     assert found["struck"].tolist() == [[0.1, 0.0, 0.0]] * 2
+    assert "coherence" not in transfer.arrays(written(response(1)))
+    assert np.allclose(transfer.arrays(written(FEET, response(1)))["H"][:, 0], 0.25 * H, rtol=1e-9)
 
 
-def test_a_file_gives_modes_as_it_stands_and_after_writing_again(tmp_path):
-    given = fi.frf(written(tmp_path / "a.uff", NODES, response(1), response(2, 0.5 * H)))
+def test_a_file_gives_modes_as_it_stands_and_after_writing_again(written, tmp_path):
+    given = fi.frf(written(NODES, response(1), response(2, 0.5 * H)))
     modes = fi.Modes.from_frf(given, mass=2.0)
     assert modes.frequencies == pytest.approx([100.0], rel=1e-6) and modes.damping_ratio == pytest.approx([0.01])
     assert modes.shape_at([[0.1], [0.3]]).ravel() == pytest.approx([1.0, 0.5], rel=1e-4)
@@ -70,14 +76,13 @@ def test_a_file_gives_modes_as_it_stands_and_after_writing_again(tmp_path):
     assert again["ways"].tolist() == [[1, 3, 1, 3], [2, 3, 1, 3]] and np.allclose(again["H"], given.H, rtol=1e-4)
 
 
-def test_a_file_by_hand_with_its_own_units(tmp_path):
-    path = tmp_path / "hand.uff"
-    path.write_text(by_hand(H))
-    found = transfer.arrays(path)
-    assert np.allclose(found["H"][:, 0], 9.80665 * H, rtol=1e-4) and found["units"] == ["m/s^2/N"]
+@pytest.mark.parametrize(("code", "units", "factor"), [(12, "g", 9.80665), (0, "mm/s/N", 1e-3)])
+def test_a_file_by_hand_has_its_own_units(tmp_path, code, units, factor):
+    (tmp_path / "hand.uff").write_text(by_hand(H, code, units))
+    found = transfer.arrays(tmp_path / "hand.uff")
+    assert np.allclose(found["H"][:, 0], factor * H, rtol=1e-4)
+    assert found["units"] == ["m/s^2/N" if code else "m/s/N"]
     assert found["ways"].tolist() == [[2, 3, 1, -3]] and "place" not in found
-    path.write_text(by_hand(H, code=0, units="mm/s/N"))
-    assert np.allclose(transfer.arrays(path)["H"][:, 0], 1e-3 * H, rtol=1e-4)
 
 
 @pytest.mark.parametrize(
@@ -88,15 +93,14 @@ def test_a_file_by_hand_with_its_own_units(tmp_path):
         ("m/s^2", "pounds", 1.0, True),
     ],
 )  # fmt: skip
-def test_units_of_a_response_are_followed_or_told(tmp_path, over, under, factor, told):
-    labels = {"ordinate_axis_units_lab": over, "orddenom_axis_units_lab": under}
-    found = transfer.arrays(written(tmp_path / "a.uff", response(1, **labels)))
+def test_units_of_a_response_are_followed_or_told(written, over, under, factor, told):
+    found = transfer.arrays(written(response(1, ordinate_axis_units_lab=over, orddenom_axis_units_lab=under)))
     assert np.allclose(found["H"][:, 0], factor * H, rtol=1e-6)
     assert any("is not known" in note for note in found["notes"].tolist()) == told
 
 
-def test_without_a_code_of_the_denominator_force_is_assumed_and_told(tmp_path):
-    found = transfer.arrays(written(tmp_path / "a.uff", response(1, orddenom_spec_data_type=0)))
+def test_without_a_code_of_the_denominator_force_is_assumed_and_told(written):
+    found = transfer.arrays(written(response(1, orddenom_spec_data_type=0)))
     assert found["notes"].tolist() == ["point 1: what it is divided by is not stated, N assumed"]
 
 
@@ -106,34 +110,34 @@ def test_without_a_code_of_the_denominator_force_is_assumed_and_told(tmp_path):
         ([response(1, np.abs(H), ord_data_type=4)], "magnitudes only of 'point 1'; export complex responses"),
         ([response(1, abscissa_spec_data_type=17)], "over something else than frequency"),
         ([response(1, x=X[::-1])], "frequencies of 'point 1' that do not ascend"),
+        ([response(1), response(2, x=2.0 * X, abscissa_inc=2.0)], "other frequencies for 'point 2' than for 'point 1'"),
         ([response(1, orddenom_spec_data_type=12)], "no motion per force"),
         ([response(1, ordinate_spec_data_type=13)], "no motion per force"),
-        ([response(1), response(1, np.full(200, 2.0), func_type=6, ord_data_type=4)], "coherence that is not between"),
+        ([response(1), coherence(1, 2.0)], "coherence that is not between"),
         ([response(1, np.where(X == 50.0, np.inf, H))], "no finite number"),
         ([NODES], "holds data sets 15, no frequency responses"),
         ([response(1, H.real, func_type=1)], r"holds time records \(data set 58, function type 1\), no frequency resp"),
     ],
 )
-def test_a_wrong_file_is_refused(tmp_path, sets, text):
+def test_a_wrong_file_is_refused(written, sets, text):
     with pytest.raises(ValueError, match=text) as caught:
-        transfer.arrays(written(tmp_path / "a.uff", *sets))
+        transfer.arrays(written(*sets))
     assert "\n" not in str(caught.value)
 
 
-def test_a_spoiled_file_is_refused(tmp_path):
-    cut = tmp_path / "cut.uff"
-    cut.write_text(by_hand(H)[:-3000])
-    with pytest.raises(ValueError, match="ends within a data set; it may be cut off"):
-        transfer.arrays(cut)
-    fewer = tmp_path / "fewer.uff"
-    fewer.write_text(by_hand(H).replace(f"{200:10d}", f"{250:10d}"))
-    with pytest.raises(ValueError, match="states 250 samples of 'FRF by hand' and holds 200"):
-        transfer.arrays(fewer)
-    worn = written(tmp_path / "worn.uff", NODES, response(1, binary=1))
-    worn.write_bytes(worn.read_bytes().replace(struct.pack("<d", H[49].real), struct.pack("<d", np.nan)))
-    with pytest.raises(ValueError, match="has a value of 'point 1' that is no finite number"):
-        transfer.arrays(worn)
-    other = tmp_path / "other.uff"
-    other.write_text(by_hand(H, code=8))
-    with pytest.raises(ValueError, match="states the unit 'g' for 'FRF by hand', whose code 8 means m"):
-        transfer.arrays(other)
+@pytest.mark.parametrize(
+    ("read", "text"),
+    [
+        (readers.arrays, r"holds frequency responses \(data set 58, function type 4\), no time records"),
+        (universal_files.arrays, "58, of which 58 are time records or frequency responses"),
+    ],
+)
+def test_responses_are_neither_time_records_nor_modes(written, read, text):
+    with pytest.raises(ValueError, match=text):
+        read(written(response(1)))
+
+
+def test_the_prompt_lists_peaks_of_a_file(written, prompt):
+    said = prompt("frf", written(response(1)), "--out", "h.csv")
+    assert said.status == 0 and "100 Hz" in said.out
+    assert np.loadtxt("h.csv", delimiter=",", skiprows=1)[:, 1] == pytest.approx(H.real, rel=1e-3, abs=1e-9)

@@ -3,9 +3,11 @@
 import numpy as np
 import pytest
 from hammer_taps import RATE
+from scenes import load_text
 
 import fem_impact as fi
 
+pytestmark = pytest.mark.usefixtures("read_here")
 LAW = fi.Contact.power(2e11, 1.9, loss=0.15)  # six to eight samples of contact
 SPEEDS = (0.3, 0.42, 0.5, 0.65, 0.8)  # m/s
 GAP, BEFORE = 0.25, 0.1  # s between taps, and before the first
@@ -17,9 +19,9 @@ def struck(target, place, mass=0.15, law=LAW, speeds=SPEEDS, **given):
     return [fi.strike(target, fi.Striker.rigid(mass), law, at=place, speed=v, **given) for v in speeds]
 
 
-def record(hits, noise=0.005, seed=0):
+def record(hits, noise=0.005):
     """One long record of the force of all hits (n_samples,) [N]; noise over the largest peak."""
-    rng = np.random.default_rng(seed)
+    rng = np.random.default_rng(0)
     force = np.zeros(int(RATE * (BEFORE + GAP * len(hits))))
     for i, hit in enumerate(hits):
         tap = fi.measure(hit, rate=RATE, duration=0.9 * GAP, onset=rng.uniform() / RATE)
@@ -28,17 +30,35 @@ def record(hits, noise=0.005, seed=0):
     return force + noise * force.max() * rng.standard_normal(len(force))
 
 
-def written(path, force, heading="Zeit [s];Kraft [N]"):
-    """The record as a German spreadsheet writes it."""
-    time = np.arange(len(force)) / RATE
-    rows = (f"{t:.7f};{f:.6e}".replace(".", ",") for t, f in zip(time, force))
-    path.write_text("\n".join([heading, *rows]) + "\n")
-    return path
+@pytest.fixture
+def read(tmp_path):
+    """Taps of a record as a German spreadsheet writes it."""
+
+    def read(force, heading="Kraft [N]", **options):
+        rows = (f"{i / RATE:.7f};{f:.6e}".replace(".", ",") for i, f in enumerate(force))
+        (tmp_path / "a.csv").write_text("\n".join([f"Zeit [s];{heading}", *rows]) + "\n")
+        return fi.read_taps(tmp_path / "a.csv", **options)
+
+    return read
 
 
 @pytest.fixture(scope="module")
-def force():
-    return record(struck(WALL, None))
+def hits():
+    return struck(WALL, None)
+
+
+@pytest.fixture(scope="module")
+def force(hits):
+    return record(hits)
+
+
+def said(made, text):
+    return any(text in note for note in made.notes)
+
+
+def first_above(force, start):
+    """The first sample above a tenth of the largest force, from some sample on."""
+    return start + int((force[start:] > 0.1 * force.max()).argmax())
 
 
 def fitted(taps, **changes):
@@ -47,25 +67,23 @@ def fitted(taps, **changes):
     return fi.fit(taps, **given | changes)
 
 
-def test_drift_and_offset_beyond_the_trigger_make_no_taps(force, tmp_path):
+def test_drift_and_offset_beyond_the_trigger_make_no_taps(force, read):
     slow = np.linspace(0.0, 0.3 * force.max(), len(force)) - 0.1 * force.max()
-    taps = fi.read_taps(written(tmp_path / "a.csv", 1e-3 * (force + slow), "Zeit [s];Kraft [kN]"))
-    plain = fi.read_taps(written(tmp_path / "b.csv", force))
+    taps, plain = read(1e-3 * (force + slow), "Kraft [kN]"), read(force)
     assert taps.n_taps == plain.n_taps == 5 and (taps.n_pulses == 1).all()
     assert np.allclose(taps.peak, plain.peak, atol=2e-3 * force.max())  # a median of 400 samples of 0.5 % of noise
-    assert any("drift of the force was removed" in note for note in taps.notes) and len(plain.notes) == 1
+    assert said(taps, "drift of the force was removed") and len(plain.notes) == 1
 
 
-def test_a_tap_that_a_record_begins_with_does_not_cost_the_others_their_rest(force, tmp_path):
-    late = force[int(np.flatnonzero(force > 0.1 * force.max())[0]) :]
-    taps = fi.read_taps(written(tmp_path / "a.csv", late))
+def test_a_tap_that_a_record_begins_with_does_not_cost_the_others_their_rest(force, read):
+    taps = read(force[first_above(force, 0) :])
     assert taps.labels == ("tap 2", "tap 3", "tap 4", "tap 5") and taps.onset[0] > 0.01
-    assert any("tap 1 is left out" in note for note in taps.notes)
+    assert said(taps, "tap 1 is left out")
 
 
 @pytest.mark.parametrize("noise", [pytest.param(0.005, marks=pytest.mark.slow), 0.02])
-def test_noise_neither_makes_pulses_nor_widens_the_window(tmp_path, noise):
-    taps = fi.read_taps(written(tmp_path / "a.csv", record(struck(WALL, None), noise)))
+def test_noise_neither_makes_pulses_nor_widens_the_window(hits, read, noise):
+    taps = read(record(hits, noise))
     assert taps.n_pulses.tolist() == [1] * 5
     made = fitted(taps)
     assert len(made.taps.time) < 60  # some 8 samples of contact, 12 before, and 1.5 times 12 after
@@ -75,70 +93,67 @@ def test_noise_neither_makes_pulses_nor_widens_the_window(tmp_path, noise):
 
 
 @pytest.mark.slow
-def test_taps_count_by_how_sure_they_are(force, tmp_path):
-    made = fitted(fi.read_taps(written(tmp_path / "a.csv", force)))
+def test_taps_count_by_how_sure_they_are(force, read):
+    made = fitted(read(force))
     size = np.sqrt(np.square(made.problem.residual(made.best.x)).reshape(5, -1).mean(axis=1))
     assert size.max() < 2.0 * size.min()  # weighted residuals; of the peak they differ by the peaks, a factor of 3.4
 
 
-def test_two_taps_at_the_same_ceiling_are_cut_off(force, tmp_path):
-    low = np.minimum(force, 0.7 * force.max())  # two or three samples of each, on different offsets
-    taps = fi.read_taps(written(tmp_path / "a.csv", low))
+def test_two_taps_at_the_same_ceiling_are_cut_off(force, read):
+    taps = read(np.minimum(force, 0.7 * force.max()))  # two or three samples of each, on different offsets
     assert taps.overload.tolist() == [False, False, False, True, True]
     made = fitted(taps)
-    assert made.taps.n_taps == 3 and any("cut off: tap 4, tap 5" in note for note in made.notes)
+    assert made.taps.n_taps == 3 and said(made, "cut off: tap 4, tap 5")
 
 
 @pytest.mark.slow
 def test_a_trigger_in_the_pulse_is_said_and_left_out(force, tmp_path):
-    starts = [int(np.flatnonzero(force[int(RATE * t) :] > 0.1 * force.max())[0]) + int(RATE * t)
-              for t in BEFORE - 0.01 + GAP * np.arange(5)]  # fmt: skip
-    for shift, said in ((-4, None), (1, "begins or ends within a pulse")):
-        rows = np.array([force[start + shift : start + shift + 200] for start in starts])
+    starts = [first_above(force, int(RATE * t)) for t in BEFORE - 0.01 + GAP * np.arange(5)]
+
+    def rows(*shifts):
+        return np.array([force[n + k : n + k + 200] for n, k in zip(starts, shifts)])
+
+    def read(rows):
         np.savez(tmp_path / "a.npz", force=rows, rate=RATE)
-        taps = fi.read_taps(tmp_path / "a.npz")
-        assert any("begins or ends within a pulse" in note for note in taps.notes) == (said is not None)
-        if said:
-            with pytest.raises(ValueError, match="trigger earlier"):
-                fitted(taps)
-        else:
-            assert fitted(taps).point["contact.exponent"] == pytest.approx(1.9, abs=0.15)
-    mixed = np.array([force[start + (1 if i == 2 else -4) :][:200] for i, start in enumerate(starts)])
-    made = fitted(fi.Taps.from_arrays(mixed, rate=RATE))
-    assert made.taps.labels == ("tap 1", "tap 2", "tap 4", "tap 5") and any("tap 3" in note for note in made.notes)
+        return fi.read_taps(tmp_path / "a.npz")
+
+    early, late = read(rows(*[-4] * 5)), read(rows(*[1] * 5))
+    assert [said(taps, "begins or ends within a pulse") for taps in (early, late)] == [False, True]
+    with pytest.raises(ValueError, match="trigger earlier"):
+        fitted(late)
+    assert fitted(early).point["contact.exponent"] == pytest.approx(1.9, abs=0.15)
+    made = fitted(fi.Taps.from_arrays(rows(-4, -4, 1, -4, -4), rate=RATE))
+    assert made.taps.labels == ("tap 1", "tap 2", "tap 4", "tap 5") and said(made, "tap 3")
 
 
-def test_a_voltage_is_not_taken_for_newtons(force, tmp_path):
-    place = written(tmp_path / "a.csv", 2.25 * force, "Zeit [s];Hammer [mV]")
+def test_a_voltage_is_not_taken_for_newtons(force, read):
     with pytest.raises(ValueError, match=r"scale must be given for 'Hammer'.*in 'mV'"):
-        fi.read_taps(place)
-    assert fi.read_taps(place, scale=1.0 / 2.25).peak[4] == pytest.approx(force.max(), rel=5e-3)
+        read(2.25 * force, "Hammer [mV]")
+    assert read(2.25 * force, "Hammer [mV]", scale=1.0 / 2.25).peak[4] == pytest.approx(force.max(), rel=5e-3)
 
 
 @pytest.mark.slow
-def test_a_spike_is_no_tap_of_this_hammer(force, tmp_path):
+def test_a_spike_is_no_tap_of_this_hammer(force, read):
     sparks = force.copy()
     sparks[[1000, 20000]] = 0.5 * force.max(), -0.5 * force.max()
-    made = fitted(fi.read_taps(written(tmp_path / "a.csv", sparks)))
+    made = fitted(read(sparks))
     assert list(made.outliers) == ["tap 1"] and made.point["contact.exponent"] == pytest.approx(1.9, abs=0.15)
 
 
 @pytest.mark.slow
-def test_five_taps_on_an_unknown_structure_are_predicted_to_their_noise(tmp_path):
+def test_five_taps_on_an_unknown_structure_are_predicted_to_their_noise(read):
     body = fi.Modes.from_arrays(
         [700.0, 2100.0, 5200.0], [[1.1, 0.9, 0.8]], points=[[0.0]], mass=1.0, damping_ratio=0.03, complete=True
     )
     force = record(struck(body, [0.0]))
     time = np.arange(len(force)) / RATE
     force += 0.002 * force.max() * np.sin(2.0 * np.pi * 0.7 * time)  # what a charge amplifier drifts
-    taps = fi.read_taps(written(tmp_path / "a.csv", force))
-    mode = {"mode1.frequency": (500.0, 1e4), "mode1.mass": (0.05, 20.0)}
-    made = fitted(taps, unknown=RANGES | mode, starts=3)
+    taps = read(force)
+    made = fitted(taps, unknown=RANGES | {"mode1.frequency": (500.0, 1e4), "mode1.mass": (0.05, 20.0)}, starts=3)
     assert made.outliers == {} and made.whiteness > 1e-3
     for one, peak in zip(made.left_out(), taps.peak):
-        assert (
-            np.sqrt(np.mean(one.residual**2)) < 1.6 * 0.005 * taps.peak.max()
-        )  # the noise, and a little of the others'
+        # the noise, and a little of the others'
+        assert np.sqrt(np.mean(one.residual**2)) < 1.6 * 0.005 * taps.peak.max()
         assert one.error_of_peak < 1.6 * 0.005 * taps.peak.max() / peak
 
 
@@ -174,20 +189,19 @@ speed = 0.5
 
 @pytest.mark.slow
 @pytest.mark.filterwarnings("ignore::fem_impact.ToleranceWarning")
-def test_double_hits_on_a_known_wooden_plate_tell_the_hammer(tmp_path):
-    (tmp_path / "wood.toml").write_text(WOODEN)
-    plate, place = fi.load_scene(tmp_path / "wood.toml").modes(60), (0.17, 0.12)
+def test_double_hits_on_a_known_wooden_plate_tell_the_hammer(tmp_path, read):
+    plate, place = load_text(tmp_path, WOODEN).modes(60), (0.17, 0.12)
     law = fi.Contact.power(4e8, 1.5, loss=0.2)
     hits = struck(plate, place, 0.02, law, (0.15, 0.25, 0.4, 0.6, 0.9), max_impacts=6, tolerance=1e-3, duration=0.05)
-    taps = fi.read_taps(written(tmp_path / "a.csv", record(hits)))
-    assert (taps.n_pulses > 1).all() and any("more than one pulse" in note for note in taps.notes)
+    taps = read(record(hits))
+    assert (taps.n_pulses > 1).all() and said(taps, "more than one pulse")
     made = fitted(taps, target=plate, at=place, striker=fi.Striker.rigid(0.04),
                   unknown=RANGES | {"striker.mass": (5e-3, 0.3)})  # fmt: skip
     assert made.outliers == {} and made.whiteness > 1e-3
     assert made.point["striker.mass"] == pytest.approx(0.02, rel=0.01)  # the second rise tells it
     assert made.point["contact.exponent"] == pytest.approx(1.5, abs=0.05)
-    rise = made.left_out(rise_only=True)[4]  # the later pulses follow from the rise of the first
-    assert rise.error < 0.05  # 2.2 % of the rms force is noise
+    # the later pulses follow from the rise of the first; 2.2 % of the rms force is noise
+    assert made.left_out(rise_only=True)[4].error < 0.05
 
 
 def test_taps_of_the_wrong_sign_and_empty_ones_are_left_out(force):
@@ -199,6 +213,6 @@ def test_taps_of_the_wrong_sign_and_empty_ones_are_left_out(force):
                   contact=LAW, starts=1, robust=False)  # fmt: skip
     assert made.taps.labels == ("tap 1", "tap 3", "tap 5") and made.error < 0.06
     assert "left out, because their force never pushes: tap 2, tap 4" in made.notes
-    assert any(note.startswith("offsets of the force were removed") for note in made.notes)
+    assert said(made, "offsets of the force were removed")
     with pytest.raises(ValueError, match="a negative one has the wrong sign"):
         fitted(fi.Taps.from_arrays(-rows[:1], rate=RATE))

@@ -47,8 +47,7 @@ def banded():
 
 @pytest.fixture(scope="module")
 def new():
-    taps = taps_of(speeds=(0.5, 0.7, 0.9))
-    return fi.Taps.from_arrays([tap.force[0, :500] for tap in taps], rate=RATE)
+    return fi.Taps.from_arrays([tap.force[0, :500] for tap in taps_of(speeds=(0.5, 0.7, 0.9))], rate=RATE)
 
 
 def test_taps_left_out_and_new_ones_lie_in_their_bands(banded, new):
@@ -56,8 +55,8 @@ def test_taps_left_out_and_new_ones_lie_in_their_bands(banded, new):
     for measured, taps in ((None, banded.taps), (new, new)):
         one = banded.against(measured)
         assert len(one.verdicts) == 2 * taps.n_taps and one.n_inside >= len(one.verdicts) - 2
-        assert 0.7 < np.mean([trace.inside.mean() for trace in one.traces]) < 0.98  # nine tenths; the rest's noise is
-        # known from nine samples only, to a quarter
+        # nine tenths; the rest's noise is known from nine samples only, to a quarter
+        assert 0.7 < np.mean([trace.inside.mean() for trace in one.traces]) < 0.98
     assert banded.misfit < 0.6 * banded.error  # most of what is left is noise
 
 
@@ -66,13 +65,13 @@ def test_a_band_holds_what_the_values_leave_open(banded):
     problem, best, tap = banded.problem, banded.best, banded.taps.pick(0)
     made = problem.residual(best.x).reshape(problem.data.values.shape) + problem.data.values
     rng, forces = np.random.default_rng(0), []
-    for _ in range(20):
+    for _ in range(10):
         values = made + 0.005 * rng.standard_normal(made.shape)
         again = replace(problem, data=replace(problem.data, values=values))
         forces.append(predicted(again, solve(again, best.x), tap).force)
     spread = np.linalg.norm(banded.predict(0).spread)
-    assert spread == pytest.approx(np.linalg.norm(np.std(forces, axis=0, ddof=1)), rel=0.4)  # 20 tell it to a sixth,
-    # as does the noise found
+    # ten tell it to a quarter, the noise found to a sixth
+    assert spread == pytest.approx(np.linalg.norm(np.std(forces, axis=0, ddof=1)), rel=0.4)
 
 
 def test_taps_of_a_softer_tip_lie_outside(banded):

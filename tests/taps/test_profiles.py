@@ -50,16 +50,14 @@ def parabola(open_=(False, False), log=False, n=41, width=0.1):
     return profiles.Profile("a", 2.0, values, rise, open_, ("", ""), {"b": values**-1.5}, 100, 1.0, 3.0, log)
 
 
-@pytest.mark.parametrize("level", [0.5, 0.9, 0.95])
-def test_the_interval_of_a_gaussian_is_students(level):
-    low, high = parabola().interval(level)
-    half = 0.1 * t.ppf(0.5 + 0.5 * level, 100)
-    assert np.allclose([low, high], [2.0 - half, 2.0 + half], rtol=1e-4)
+def test_the_interval_of_a_gaussian_is_students():
+    for level in (0.5, 0.9, 0.95):
+        half = 0.1 * t.ppf(0.5 + 0.5 * level, 100)
+        assert np.allclose(parabola().interval(level), [2.0 - half, 2.0 + half], rtol=1e-4)
 
 
 def test_the_curve_drawn_is_smooth_and_goes_through_the_points():
-    made = parabola(n=7)
-    x, rise = made.curve()
+    x, rise = parabola(n=7).curve()
     assert np.interp(2.1, x, rise) == pytest.approx(1.0, rel=0.02) and len(x) == 200
 
 
@@ -69,11 +67,7 @@ def test_open_ends_are_the_ends_of_the_range():
     assert parabola().told == "told" and parabola(open_=(False, True)).told == "limited"
 
 
-def test_the_ridge_of_a_flat_profile_is_the_power_of_the_others():
-    assert parabola(open_=(True, True), log=True, width=100.0).ridge == pytest.approx({"b": -1.5})
-
-
-def test_white_residuals_are_white_and_coloured_ones_widen():
+def test_white_residuals_are_white_and_coloured_or_ringing_ones_are_not():
     rng = np.random.default_rng(3)
     white = rng.standard_normal((5, 60))
     noise, freedom, chance = profiles.variance(white, 10)
@@ -81,6 +75,8 @@ def test_white_residuals_are_white_and_coloured_ones_widen():
     coloured = np.array([np.convolve(row, np.ones(4), mode="same") for row in white])
     wider, fewer, chance = profiles.variance(coloured, 10)
     assert chance < 1e-6 and fewer < 150 and wider > 2.5 * np.mean(coloured**2)
+    noise = rng.standard_normal((8, 200))
+    assert profiles.variance(noise[:, 8:] + 0.3 * noise[:, :-8], 3)[2] < profiles.DOUBTED  # an echo after eight samples
 
 
 @pytest.mark.parametrize("bend", [0.05, 0.2, 0.3, 0.45])
@@ -122,37 +118,26 @@ def test_another_unknown_at_its_bound_is_named_where_it_ends_the_profile():
 
 
 def test_an_interval_open_at_one_end_and_wide_tells_nothing():
+    values = np.linspace(1.0, 3.0, 201)
     for width, told in ((0.7, "open"), (0.3, "limited")):
-        low = 1.0 + 2.0 * (1.0 - width)  # closed at this place of the range from 1 to 3
-        rise = np.where(np.linspace(1.0, 3.0, 201) < low, 100.0, 0.0)
-        one = profiles.Profile(
-            "a", 3.0, np.linspace(1.0, 3.0, 201), rise, (False, True), ("", ""), {}, 99, 1.0, 3.0, False
-        )
-        assert one.told == told
+        rise = 100.0 * (values < 1.0 + 2.0 * (1.0 - width))  # closed at this place of the range from 1 to 3
+        assert profiles.Profile("a", 3.0, values, rise, (False, True), ("", ""), {}, 99, 1.0, 3.0, False).told == told
 
 
-def test_a_ridge_names_what_moves_by_some_per_cent_for_twice_the_value():
+def test_the_ridge_of_a_flat_profile_is_the_power_of_those_that_move_by_some_per_cent_for_twice_the_value():
+    assert parabola(open_=(True, True), log=True, width=100.0).ridge == pytest.approx({"b": -1.5})
     values = np.linspace(1.0, 3.0, 41)
     others = {"seen": values**0.08, "still": values**-0.03}
     flat = profiles.Profile("a", 2.0, values, 0.0 * values, (True, True), ("", ""), others, 100, 1.0, 3.0, True)
     assert list(flat.ridge) == ["seen"]
 
 
-def test_residuals_that_ring_for_some_samples_are_not_white():
-    rng = np.random.default_rng(4)
-    noise = rng.standard_normal((8, 200))
-    ringing = noise[:, 8:] + 0.3 * noise[:, :-8]  # an echo of eight samples later
-    assert profiles.variance(ringing, 3)[2] < profiles.DOUBTED
-
-
 def test_one_white_record_of_a_hundred_is_doubted():
     """The variance then grows by the sum of an autocorrelation that is none."""
     rng = np.random.default_rng(5)
-    grown = 0
-    for _ in range(400):
-        row = rng.standard_normal((2, 100))
-        grown += abs(profiles.variance(row, 0)[0] / np.square(row).mean() - 1.0) > 1e-12
-    assert grown <= 12  # 4 +- 2 are expected
+    rows = (rng.standard_normal((2, 100)) for _ in range(400))
+    grown = [abs(profiles.variance(row, 0)[0] / np.square(row).mean() - 1.0) > 1e-12 for row in rows]
+    assert sum(grown) <= 12  # 4 +- 2 are expected
 
 
 class Straight:
@@ -181,13 +166,9 @@ class Straight:
 
 def test_noise_makes_the_spread_of_independent_means():
     problem, noise = Straight(5), 0.04
-    x = np.concatenate([[np.log(2.0)], np.zeros(10), [0.1, -0.1, 0.2, 0.0, 0.3]])
-    made = profiles.scatter(problem, x, 0, noise, 200)
+    apart = [0.1, -0.1, 0.2, 0.0, 0.3]
+    made = profiles.scatter(problem, np.concatenate([[np.log(2.0)], np.zeros(10), apart]), 0, noise, 200)
     assert made.by_noise == pytest.approx(np.sqrt(noise / 50), rel=1e-9)  # standard error of a mean of 50
-    assert made.deviation == pytest.approx(np.std([0.1, -0.1, 0.2, 0.0, 0.3], ddof=1)) and made.mean == 2.0
-    assert made.chance < 1e-3
-
-
-def test_a_spread_as_noise_makes_it_is_no_surprise():
-    made = profiles.Scatter("a", np.ones(5), 1.0, 0.1, 0.1, True, 200)
-    assert made.chance == pytest.approx(0.41, abs=0.01)  # F(1; 4, 200)
+    assert made.deviation == pytest.approx(np.std(apart, ddof=1)) and made.mean == 2.0 and made.chance < 1e-3
+    none = profiles.Scatter("a", np.ones(5), 1.0, 0.1, 0.1, True, 200)  # a spread as noise makes it
+    assert none.chance == pytest.approx(0.41, abs=0.01)  # F(1; 4, 200)

@@ -7,16 +7,20 @@ import pytest
 
 import fem_impact as fi
 
+pytestmark = pytest.mark.usefixtures("read_here")
 MEASURED = Path(__file__).parents[2] / "studies" / "measured"
 RATE = 25600.0  # [Hz]
+
+
+def said(taps, text):
+    return any(text in note for note in taps.notes)
 
 
 def test_four_segments_with_decimal_points():
     taps = fi.read_taps(MEASURED / "acceleration_multi.lvm")
     assert taps.n_taps == 4 and taps.rate == RATE and taps.units == ("m/s^2",)
     assert np.allclose(taps.peak, [131.8, 212.4, 191.3, 221.5], atol=0.3)  # N, as the files' own description has them
-    assert (taps.n_pulses == 1).all() and not taps.table.overload.any()
-    assert any("offsets" in note for note in taps.notes)
+    assert (taps.n_pulses == 1).all() and not taps.table.overload.any() and said(taps, "offsets")
 
 
 @pytest.mark.parametrize("name, peak, cut", [("acceleration", 196.0, False), ("camera", 422.0, True)])
@@ -26,34 +30,42 @@ def test_decimal_commas_and_empty_times(name, peak, cut):
     assert abs(taps.peak[0] - peak) < 1.0  # N
     assert taps.units == ("m/s^2",) and np.abs(taps.response).max() > 100.0  # given in g
     assert not taps.overload[0] and bool(taps.table.overload[0, 1]) == cut  # 54.79 g, three times in a row
-    assert any("cut off" in note for note in taps.notes) == cut
+    assert said(taps, "cut off") == cut
 
 
-def record(places, peak=100.0, samples=25600, noise=0.05, offset=2.0, seed=0):
-    force = np.random.default_rng(seed).normal(offset, noise, samples)
+def record(*places, noise=0.05, offset=2.0):
+    """A second of noise, with half sines of 100 N and 13 samples at some places."""
+    force = np.random.default_rng(0).normal(offset, noise, 25600)
     for place in places:
-        force[place : place + 13] += peak * np.sin(np.pi * (np.arange(13) + 0.5) / 13)
+        force[place : place + 13] += 100.0 * np.sin(np.pi * (np.arange(13) + 0.5) / 13)
     return force
 
 
-def test_taps_are_found_in_a_long_record_and_double_hits_stay_together(tmp_path):
-    force = record([5000, 12000, 12200, 20000])
+@pytest.fixture
+def read(tmp_path):
+    def read(samples, /, other=(), **options):
+        np.savez(tmp_path / "t.npz", force=samples, rate=RATE, **dict(other))
+        return fi.read_taps(tmp_path / "t.npz", **options)
+
+    return read
+
+
+def test_taps_are_found_in_a_long_record_and_double_hits_stay_together(read):
+    force = record(5000, 12000, 12200, 20000)
     force[12200:12213] -= 0.6 * (force[12200:12213] - 2.0)
-    np.savez(tmp_path / "t.npz", force=force, rate=RATE)
-    taps = fi.read_taps(tmp_path / "t.npz")
-    assert taps.n_pulses.tolist() == [1, 2, 1]
+    taps = read(force)
+    assert taps.n_pulses.tolist() == [1, 2, 1] and said(taps, "tap 2: more than one pulse")
     assert np.allclose(taps.force[:, :300].mean(axis=1), 0.0, atol=0.02)  # the offset is gone
-    assert any("tap 2: more than one pulse" in note for note in taps.notes)
-    apart = fi.read_taps(tmp_path / "t.npz", together=2e-3)
-    assert apart.n_taps == 4
+    assert read(force, together=2e-3).n_taps == 4
 
 
 @pytest.mark.parametrize("resonance", [None, 8e3])
 def test_a_second_touch_of_a_twentieth_is_told_from_the_ringing_of_a_rig(resonance):
     plate = fi.analytic.rectangle(1.0, 0.7, mass=2.0, first_frequency=60.0, n_modes=150, damping_ratio=0.01)
-    hit = fi.strike(plate, fi.Striker.rigid(0.1), fi.Contact.hertz(2e8), at=(0.31, 0.27), speed=1.0, tolerance=1e-2)
+    ball, law = fi.Striker.rigid(0.1), fi.Contact.hertz(2e8)
+    hit = fi.strike(plate, ball, law, at=(0.31, 0.27), speed=1.0, tolerance=1e-2)
     assert hit.n_impacts == 2 and hit.impacts[1].peak_force < 0.05 * hit.peak_force
-    wall = fi.strike(fi.Modes.rigid(1e4), fi.Striker.rigid(0.1), fi.Contact.hertz(2e8), at=None, speed=1.0)
+    wall = fi.strike(fi.Modes.rigid(1e4), ball, law, at=None, speed=1.0)
     rig = {"rate": RATE, "resonance": resonance, "resonance_damping": 0.03, "noise": 1e-3, "rng": 1}
     assert [int(fi.measure(each, **rig).n_pulses[0]) for each in (hit, wall)] == [2, 1]
 
@@ -63,90 +75,82 @@ def test_a_second_rise_of_seven_hundredths_is_a_pulse_above_the_noise_of_its_rec
     first, second = np.zeros((2, 400))
     first[50:63] = np.sin(np.pi * (np.arange(13) + 0.5) / 13)
     second[90:110] = 0.07 * np.sin(np.pi * (np.arange(20) + 0.5) / 20)
-    one, two = np.array([first, first + second]) + noise * np.random.default_rng(2).standard_normal((2, 400))
-    taps = fi.Taps.from_arrays(100.0 * np.array([one, two]), rate=RATE)
+    rows = np.array([first, first + second]) + noise * np.random.default_rng(2).standard_normal((2, 400))
+    taps = fi.Taps.from_arrays(100.0 * rows, rate=RATE)
     assert taps.n_pulses.tolist() == [1, 2]
     assert taps.impulse[1] / taps.impulse[0] == pytest.approx(1.108, abs=0.02)  # 7 % for 20 samples instead of 13
     told = fi.Taps.from_arrays(taps.force, rate=RATE, pulse=10.0)
     assert told.n_pulses.tolist() == told.pick([0, 1]).n_pulses.tolist() == [1, 1]
-    with pytest.raises(ValueError, match="pulse must be positive"):
-        fi.Taps.from_arrays(taps.force, rate=RATE, pulse=0.0)
 
 
-def test_a_force_that_pulls_is_turned_around(tmp_path):
-    np.savez(tmp_path / "t.npz", force=-record([5000], offset=0.0), rate=RATE)
-    taps = fi.read_taps(tmp_path / "t.npz")
-    assert taps.peak[0] > 99.0 and any("turned around" in note for note in taps.notes)
+def test_a_force_that_pulls_is_turned_around(read):
+    taps = read(-record(5000, offset=0.0))
+    assert taps.peak[0] > 99.0 and said(taps, "turned around")
 
 
-def test_clipping_and_full_scale_are_seen(tmp_path):
-    force = np.minimum(record([5000], noise=0.02), 80.0)
-    np.savez(tmp_path / "t.npz", force=force, rate=RATE)
-    assert fi.read_taps(tmp_path / "t.npz").overload.tolist() == [True]
-    np.savez(tmp_path / "t.npz", force=record([5000]), rate=RATE)
-    assert fi.read_taps(tmp_path / "t.npz").overload.tolist() == [False]
-    assert fi.read_taps(tmp_path / "t.npz", full_scale=90.0).overload.tolist() == [True]
+@pytest.mark.parametrize(("top", "options", "cut"), [(80.0, {}, True), (200.0, {}, False),
+                                                     (200.0, {"full_scale": 90.0}, True)])  # fmt: skip
+def test_clipping_and_full_scale_are_seen(read, top, options, cut):
+    assert read(np.minimum(record(5000, noise=0.02), top), **options).overload.tolist() == [cut]
 
 
-def test_silence_and_wrong_names_are_refused(tmp_path):
+@pytest.mark.parametrize(
+    ("options", "text"),
+    [
+        ({}, "no tap was found"), ({"force": "forse"}, r"'forse' is no channel.*did you mean 'force'"),
+        ({"force": 7}, "channel from 0 to 1"), ({"units": {"force": "pounds"}}, "units must be one of"),
+        ({"units": {1: 2}}, "units must be a dict of names"),
+    ],
+)  # fmt: skip
+def test_silence_and_wrong_names_are_refused(read, options, text):
     quiet = np.random.default_rng(0).normal(0.0, 1.0, 5000)
-    np.savez(tmp_path / "t.npz", force=quiet, other=quiet, rate=RATE)
-    with pytest.raises(ValueError, match="no tap was found"):
-        fi.read_taps(tmp_path / "t.npz")
-    with pytest.raises(ValueError, match=r"'forse' is no channel.*did you mean 'force'"):
-        fi.read_taps(tmp_path / "t.npz", force="forse")
-    with pytest.raises(ValueError, match="channel from 0 to 1"):
-        fi.read_taps(tmp_path / "t.npz", force=7)
-    with pytest.raises(ValueError, match="units must be one of"):
-        fi.read_taps(tmp_path / "t.npz", units={"force": "pounds"})
+    with pytest.raises(ValueError, match=text):
+        read(quiet, other={"other": quiet}, **options)
 
 
 def test_saved_taps_are_read_again(tmp_path):
     taps = fi.read_taps(MEASURED / "acceleration_multi.lvm")
     taps.save(tmp_path / "t.npz")
     again = fi.read_taps(tmp_path / "t.npz")
-    assert again.n_taps == 4 and np.abs(again.force - taps.force[:, : len(again.time)]).max() < 0.2  # offset again
-    assert again.units == taps.units
+    assert again.n_taps == 4 and again.units == taps.units
+    assert np.abs(again.force - taps.force[:, : len(again.time)]).max() < 0.2  # offset again
 
 
 @pytest.mark.parametrize(
     ("names", "read"),
-    [
-        (("acc", "acc"), ("acc 1", "acc 2")),
-        (("hammer acc", "input"), ("hammer acc", "input")),
-        (("t", "force"), ("t", "force")),
-    ],
+    [(("acc", "acc"), ("acc 1", "acc 2")), (("hammer acc", "input"),) * 2, (("t", "force"),) * 2],
 )
 def test_saved_taps_keep_channels_of_any_names(tmp_path, names, read):
     pulse = np.pad(np.hanning(20), (50, 130))
     response = np.column_stack([np.sin(np.arange(200.0)), np.cos(np.arange(200.0))])[None]
-    taps = fi.Taps.from_arrays(pulse, response, rate=1e4, names=names, units=["m/s", "m/s"])
-    taps.save(tmp_path / "t.npz")
-    again = fi.read_taps(tmp_path / "t.npz")
-    assert tuple(again.table["channel"].values) == read and again.units == taps.units
+    taps = again = fi.Taps.from_arrays(pulse, response, rate=1e4, names=names, units=["m/s", "m/s"])
+    for _ in range(2):
+        again.save(tmp_path / "t.npz")
+        again = fi.read_taps(tmp_path / "t.npz")
+        assert tuple(again.table["channel"].values) == read and again.units == taps.units
     assert np.allclose(np.ptp(again.response, axis=1), np.ptp(response, axis=1)) and np.allclose(again.force, pulse)
-    again.save(tmp_path / "u.npz")
-    assert tuple(fi.read_taps(tmp_path / "u.npz").table["channel"].values) == read
 
 
-def test_arrays_of_wrong_shape_are_refused():
-    with pytest.raises(ValueError, match="at least one tap"):
-        fi.Taps.from_arrays(np.zeros((2, 3)), rate=1e3)
-    with pytest.raises(ValueError, match="response must have shape"):
-        fi.Taps.from_arrays(np.zeros((2, 30)), np.zeros((2, 29)), rate=1e3)
-    with pytest.raises(ValueError, match="names must have 1 entries"):
-        fi.Taps.from_arrays(np.zeros((2, 30)), np.zeros((2, 30)), rate=1e3, names=["a", "b"])
+@pytest.mark.parametrize(
+    ("arrays", "options", "text"),
+    [
+        (((2, 3),), {}, "at least one tap"), (((2, 30), (2, 29)), {}, "response must have shape"),
+        (((2, 30), (2, 30)), {"names": ["a", "b"]}, "names must have 1 entries, one for each response"),
+        (((2, 30), (2, 30)), {"names": "a"}, "names must be a list of texts"),
+        (((2, 30),), {"pulse": 0.0}, "pulse must be positive"),
+    ],
+)  # fmt: skip
+def test_arrays_of_wrong_shape_are_refused(arrays, options, text):
+    with pytest.raises(ValueError, match=text):
+        fi.Taps.from_arrays(*map(np.zeros, arrays), rate=1e3, **options)
 
 
 def test_parts_of_a_table():
     taps = fi.read_taps(MEASURED / "acceleration_multi.lvm")
-    two = taps.pick([0, 2])
+    two, cut = taps.pick([0, 2]), taps.between(5e-4, 2e-3)
     assert two.labels == ("tap 1", "tap 3") and np.array_equal(two.force[1], taps.force[2])
-    cut = taps.between(5e-4, 2e-3)
-    assert cut.time[[0, -1]] == pytest.approx([0.0, 1.5e-3], abs=1 / RATE) and np.allclose(
-        cut.onset, taps.onset - 5e-4, atol=1 / RATE
-    )
-    assert np.allclose(cut.peak, taps.peak)
+    assert cut.time[[0, -1]] == pytest.approx([0.0, 1.5e-3], abs=1 / RATE)
+    assert np.allclose(cut.onset, taps.onset - 5e-4, atol=1 / RATE) and np.allclose(cut.peak, taps.peak)
 
 
 @pytest.mark.parametrize(("first", "cut"), [(0.22, False), (0.45, True)])

@@ -7,30 +7,28 @@ import fem_impact as fi
 from fem_impact.taps import rig
 
 RATE = 25600.0  # [Hz]
-WALL = fi.Touch(fi.Contact.linear(4e6), 0, None)
+LAW = fi.Contact.linear(4e6)
+BLOW = fi.collide([fi.Modes.rigid(0.1)], [fi.Touch(LAW, 0, None)], speeds=[1.0], tolerance=1e-6)
 
 
-def blow(mass=0.1, speed=1.0, law=None):
-    touch = WALL if law is None else fi.Touch(law, 0, None)
-    return fi.collide([fi.Modes.rigid(mass)], [touch], speeds=[speed], tolerance=1e-6)
+def measured(**rig):
+    return fi.measure(BLOW, **{"rate": RATE} | rig)
 
 
 def test_a_filter_keeps_the_impulse_and_the_spectrum_of_its_band():
-    hit = blow()
-    tap = fi.measure(hit, rate=RATE, anti_alias="delta-sigma", before=2e-3)
-    assert abs(tap.force.sum() / RATE - hit.impulse) < 1e-5 * hit.impulse  # the filter passes zero frequency
+    tap = measured(anti_alias="delta-sigma", before=2e-3)
+    assert abs(tap.force.sum() / RATE - BLOW.impulse) < 1e-5 * BLOW.impulse  # the filter passes zero frequency
     frequencies = np.fft.rfftfreq(tap.force.shape[1], 1.0 / RATE)
     band = frequencies < 0.45 * RATE
     found = np.fft.rfft(tap.force[0])[band] / RATE * np.exp(2j * np.pi * frequencies[band] * 0.00200)
     lead = round(2e-3 * RATE) / RATE - 2e-3
-    exact = hit.spectrum(frequencies[band]) * np.exp(-2j * np.pi * frequencies[band] * lead)
-    assert np.abs(found - exact).max() < 3e-4 * hit.impulse  # ringing beyond the record's ends
+    exact = BLOW.spectrum(frequencies[band]) * np.exp(-2j * np.pi * frequencies[band] * lead)
+    assert np.abs(found - exact).max() < 3e-4 * BLOW.impulse  # ringing beyond the record's ends
 
 
 def test_half_a_sample_of_onset_shifts_the_record():
-    early, late = (fi.measure(blow(), rate=RATE, onset=shift / RATE) for shift in (0.0, 1.0))
+    early, half, late = (measured(onset=shift / RATE) for shift in (0.0, 0.5, 1.0))
     assert np.abs(early.force[0, :-1] - late.force[0, 1:]).max() < 1e-9 * early.peak[0]
-    half = fi.measure(blow(), rate=RATE, onset=0.5 / RATE)
     assert np.abs(half.force - early.force).max() > 0.05 * early.peak[0]
 
 
@@ -47,8 +45,7 @@ def test_the_table_of_filters_falls_between_its_edges():
 
 
 def test_the_cell_behind_a_rigid_tip_misses_its_share_of_the_force():
-    hit = blow(mass=0.1)
-    whole, behind = (fi.measure(hit, rate=RATE, tip_mass=mass) for mass in (0.0, 0.02))
+    whole, behind = (measured(tip_mass=mass) for mass in (0.0, 0.02))
     assert np.allclose(behind.force, 0.8 * whole.force, atol=1e-9)
 
 
@@ -63,8 +60,7 @@ def test_a_force_sensor_enlarges_what_is_near_its_resonance():
 
 def test_the_mode_of_a_hammer_shows_behind_its_tip():
     hammer = fi.Modes.from_arrays([0.0, 3000.0], [[10.0**0.5, 10.0**0.5]], points=[[0.0]], mass=0.1, complete=True)
-    law = fi.Touch(fi.Contact.linear(4e6), 0, None, first_at=[0.0])
-    hit = fi.collide([hammer], [law], speeds=[1.0], tolerance=1e-6)
+    hit = fi.collide([hammer], [fi.Touch(LAW, 0, None, first_at=[0.0])], speeds=[1.0], tolerance=1e-6)
     tap = fi.measure(hit, rate=RATE, tip_mass=0.01, duration=0.02)
     later = tap.time > hit.impacts[-1].end + 2e-3
     spectrum = np.abs(np.fft.rfft(tap.force[0, later]))
@@ -87,15 +83,12 @@ def test_a_response_is_the_motion_of_the_target():
 
 
 def test_noise_bits_and_range():
-    clean = fi.measure(blow(), rate=RATE)
-    with pytest.raises(ValueError, match="rng must be given"):
-        fi.measure(blow(), rate=RATE, noise=0.01)
-    noisy = fi.measure(blow(), rate=RATE, noise=0.01, rng=1)
+    clean, noisy = measured(), measured(noise=0.01, rng=1)
+    assert np.array_equal(noisy.force, measured(noise=0.01, rng=np.random.default_rng(1)).force)
     assert abs(np.std(noisy.force - clean.force) / (0.01 * clean.peak[0]) - 1.0) < 0.1  # 551 samples: 3 % of spread
-    coarse = fi.measure(blow(), rate=RATE, bits=8)
     step = 1.25 * clean.peak[0] / 128.0
-    assert np.abs(coarse.force - clean.force).max() <= 0.5 * step * (1 + 1e-9)
-    over = fi.measure(blow(), rate=RATE, full_scale=500.0)
+    assert np.abs(measured(bits=8).force - clean.force).max() <= 0.5 * step * (1 + 1e-9)
+    over = measured(full_scale=500.0)
     assert over.overload.tolist() == [True] and over.peak[0] == 500.0
 
 
@@ -103,8 +96,10 @@ def test_noise_bits_and_range():
     "wrong, said",
     [({"rate": 0.0}, "rate"), ({"anti_alias": "brick"}, "anti_alias must be one of"), ({"noise": -1.0}, "noise"),
      ({"duration": 1e-4}, "longer than before"), ({"duration": 1e4}, "duration must be shorter"), ({"bits": 1}, "bits"),
-     ({"anti_alias": (0, 1e3)}, "order"), ({"quantity": "jerk"}, "quantity must be one of")],
+     ({"anti_alias": (0, 1e3)}, "order"), ({"quantity": "jerk"}, "quantity must be one of"),
+     ({"noise": 0.01}, "rng must be given"), ({"noise": 0.01, "rng": -1}, "a seed of whole numbers"),
+     ({"noise": 0.01, "rng": 0.5}, "rng must be")],
 )  # fmt: skip
 def test_wrong_rigs_are_refused(wrong, said):
     with pytest.raises(ValueError, match=said):
-        fi.measure(blow(), **{"rate": RATE} | wrong)
+        measured(**wrong)

@@ -1,20 +1,24 @@
 """The plan of a test against single blows and against records of a simulated rig with noise."""
 
 import csv
+from pathlib import Path
 
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
-from scenes import SMALL
+from scenes import SMALL, load_text
 
 import fem_impact as fi
-from fem_impact import cli
 from fem_impact.taps import roving
 
 PLATE = fi.analytic.rectangle(1.0, 0.7, mass=2.0, first_frequency=50.0, n_modes=150, damping_ratio=0.01)
 KIT = {"small": (0.005, {"vinyl": 1e5, "rubber": 1e3}), "large": (0.3, {"vinyl": 1e6})}
 POINTS = [(0.2, 0.2), (0.5, 0.35), (0.04, 0.05)]
 BAND = 400.0
+
+
+def rows_of(path):
+    return list(csv.DictReader(path.read_text().splitlines()))
 
 
 @pytest.fixture(scope="module")
@@ -32,18 +36,15 @@ def test_impacts_and_reach_are_those_of_single_blows(plan):
                 assert plan.works[i, j] == (size.min() > 0.3162 * size[0])  # 10 dB
     assert plan.verdicts[0] == plan.verdicts[2] == "works"
     assert not plan.works[:, plan.tips.index("rubber")].any()  # too soft for the band
-    best = [np.nanargmax(row) for row in plan.coherence]
-    assert plan.best.tolist() == best
+    assert plan.best.tolist() == [np.nanargmax(row) for row in plan.coherence]
 
 
 def test_expected_coherence_is_that_of_many_noisy_records(plan):
     """Of 60 taps as `fi.measure` records them; the mean over the band has a spread of some 1e-3."""
     i, j = 0, int(plan.best[0])
-    hit = fi.strike(
-        PLATE, fi.Striker.rigid(plan.masses[j]), fi.Contact.linear(plan.stiffnesses[j]), at=POINTS[i], speed=1.0
-    )
-    rng = np.random.default_rng(3)
-    noise = 0.02
+    ball, law = fi.Striker.rigid(plan.masses[j]), fi.Contact.linear(plan.stiffnesses[j])
+    hit = fi.strike(PLATE, ball, law, at=POINTS[i], speed=1.0)
+    rng, noise = np.random.default_rng(3), 0.02
     loud = fi.plan_test(PLATE, KIT, POINTS[:1], BAND, sensor=(0.37, 0.31), noise=noise)
     rig = {"rate": 2.56 * BAND, "at": [(0.37, 0.31)], "anti_alias": "2.56", "duration": loud.duration}
     middle = 0.5 * hit.impacts[0].end * rig["rate"]
@@ -52,8 +53,7 @@ def test_expected_coherence_is_that_of_many_noisy_records(plan):
     peaks = np.abs(records).max(axis=2, keepdims=True)
     records = records + noise * peaks * rng.standard_normal((2, 60, records.shape[2]))
     found = fi.frf(fi.Taps.from_arrays(records[0], records[1][..., None], rate=clean.rate, units=clean.units))
-    first = PLATE.frequencies[0]
-    band = (found.frequency.values >= first) & (found.frequency.values <= BAND)
+    band = (found.frequency.values >= PLATE.frequencies[0]) & (found.frequency.values <= BAND)
     assert 0.3 < loud.coherence[0, j] < 0.95  # the noise is felt
     # samples may miss the peak of the acceleration, to which the noise relates, by some 10 %
     assert_allclose(loud.coherence[0, j], found.coherence.values[band, 0].mean(), atol=0.03)
@@ -68,14 +68,13 @@ def test_where_a_double_hit_cannot_be_avoided_it_is_said_and_drawn(tmp_path):
     drawn = found.figure()
     assert [text.get_text() for text in drawn.legends[0].get_texts()] == ["double hit"]
     found.write_csv(tmp_path / "plan.csv")
-    rows = list(csv.DictReader((tmp_path / "plan.csv").read_text().splitlines()))
+    rows = rows_of(tmp_path / "plan.csv")
     assert [row["impacts"] for row in rows] == ["2 or more"] * 2 and rows[0]["coherence"] == ""
     assert float(rows[0]["resolution [Hz]"]) == pytest.approx(2.0)
 
 
 def test_a_hammer_of_a_mass_gets_tips_from_the_softest_that_reaches_the_band_on_a_wall():
-    wall = fi.Modes.rigid(1e3)
-    found = fi.plan_test(wall, [0.1], [()], 500.0, duration=0.2)
+    found = fi.plan_test(fi.Modes.rigid(1e3), [0.1], [()], 500.0, duration=0.2)
     assert (found.n_impacts == 1).all() and found.verdicts == ("works",)
     assert_allclose(found.reach[0], 500.0 * np.sqrt(roving.TIPS), rtol=1e-3)  # half sines, whose resonance goes so
     assert_allclose(found.lines or 0.0, 0.0)  # no modes
@@ -112,22 +111,18 @@ def test_a_plate_by_elements_gets_the_plan_of_its_modes():
 def test_what_is_no_plan_says_so(changes, text):
     asked = {"hammers": KIT, "points": POINTS, "bandwidth": BAND, **changes}
     with pytest.raises(ValueError, match=text):
-        fi.plan_test(PLATE, asked.pop("hammers"), asked.pop("points"), asked.pop("bandwidth"), **asked)
+        fi.plan_test(PLATE, *(asked.pop(name) for name in ("hammers", "points", "bandwidth")), **asked)
 
 
-def test_the_prompt_plans_points_over_the_body(tmp_path, capsys):
-    path = tmp_path / "scene.toml"
-    assert cli.main(["new", "plate", "--out", str(path)]) == 0
-    drawn = tmp_path / "plan.svg"
-    asked = ["--bandwidth", "400", "--rove", "9", "--masses", "0.002", "0.02", "--out", str(drawn)]
-    assert cli.main(["hammer", str(path), *asked]) == 0
-    said = capsys.readouterr().out
-    assert "points, 12 tips, 400 Hz" in said and "plan.csv" in said
-    rows = list(csv.DictReader((tmp_path / "plan.csv").read_text().splitlines()))
-    assert drawn.read_text().startswith("<?xml") and len({row["point"] for row in rows}) in range(6, 13)
+def test_the_prompt_plans_points_over_the_body(prompt):
+    Path("scene.toml").write_text(SMALL)
+    ran = prompt("hammer scene.toml --bandwidth 400 --rove 9 --masses 0.002 0.02 --out plan.svg")
+    assert ran.status == 0 and "points, 12 tips, 400 Hz" in ran.out and "plan.csv" in ran.out
+    rows = rows_of(Path("plan.csv"))
+    assert Path("plan.svg").read_text().startswith("<?xml") and len({row["point"] for row in rows}) in range(6, 13)
 
 
 def test_modes_of_a_scaled_scene_reach_a_little_beyond_the_band(tmp_path):
-    (tmp_path / "scene.toml").write_text(SMALL.replace('source = "analytic"', 'source = "fe"'))
-    found = roving._modes(fi.load_scene(tmp_path / "scene.toml").built.target, BAND)
+    scene = load_text(tmp_path, SMALL.replace('source = "analytic"', 'source = "fe"'))
+    found = roving._modes(scene.built.target, BAND)
     assert found.frequencies[0] == pytest.approx(100.0) and 1.5 * BAND < found.frequencies[-1] < 5.0 * BAND

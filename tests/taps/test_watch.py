@@ -1,5 +1,7 @@
 """What a watched folder says of each record: written by a simulated rig with the faults that it must tell."""
 
+import re
+
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
@@ -33,9 +35,25 @@ def test_the_reach_of_a_pulse_is_that_of_its_half_sine(reach):
     assert_allclose(judged(tap(tip(reach))).reach, reach, rtol=0.02)
 
 
-def test_a_tap_that_hits_once_and_reaches_the_bandwidth_is_good():
-    found = judged(tap(tip(2500.0)))
-    assert found.good and found.said.startswith("good: ") and "reaches 2.5" in found.said
+def cut(first, last, **rig):
+    whole = tap(tip(3000.0), **rig)
+    return whole.between(first, whole.time[whole.force[0].argmax()] if last is None else last)
+
+
+@pytest.mark.parametrize(
+    ("make", "said"),
+    [
+        (lambda: tap(tip(2500.0)), r"good: .*reaches 2\.5"),
+        (lambda: tap(1e5, PLATE, (0.465, 0.3)), "double hit, repeat$"),
+        (lambda: tap(tip(3000.0), full_scale=20.0, bits=16), "overload of force, repeat softer"),
+        (lambda: cut(5e-3, 20e-3, before=5e-3), "trigger too late, only 1 samples"),  # from the moment of touch on
+        (lambda: cut(0.0, None, before=5e-3), "the record ends within the pulse: record longer$"),
+    ],
+    ids=["good", "double hit", "overload", "late", "short"],
+)
+def test_every_fault_of_a_record_is_told(make, said):
+    found = judged(make())
+    assert re.match(said, found.said) and found.good == said.startswith("good")
 
 
 def test_a_soft_tip_is_told_and_one_as_stiff_as_advised_is_good():
@@ -46,31 +64,11 @@ def test_a_soft_tip_is_told_and_one_as_stiff_as_advised_is_good():
     assert judged(tap(1.1 * factor * tip(1000.0))).good
 
 
-def test_a_double_hit_is_repeated():
-    taps = tap(1e5, PLATE, (0.465, 0.3))
-    assert taps.n_pulses[0] > 1
-    assert judged(taps).said == "double hit, repeat"
-
-
-def test_an_overload_names_its_sensor():
-    taps = tap(tip(3000.0), full_scale=20.0, bits=16)
-    assert judged(taps).said.startswith("overload of force, repeat softer")
-
-
-def test_a_late_trigger_is_told_and_a_record_that_ends_in_the_pulse():
-    whole = tap(tip(3000.0), before=5e-3)
-    late = whole.between(5e-3, 20e-3)  # from the moment of touch on
-    assert judged(late).said.startswith("trigger too late, only 1 samples")
-    top = whole.time[whole.force[0].argmax()]
-    assert judged(whole.between(0.0, top)).said == "the record ends within the pulse: record longer"
-
-
 def test_a_bandwidth_that_the_rate_cannot_show_is_refused():
-    with pytest.raises(
-        ValueError, match=r"below half the rate of a\.npz, 25600 Hz, got 30000 Hz; sample faster, or ask for less"
-    ):
-        watch.advice("a.npz", tap(tip(3000.0)), 0, 30e3)
-    assert "too soft" in watch.advice("a.npz", tap(tip(3000.0)), 0, 20e3).said  # asked for less
+    taps, said = tap(tip(3000.0)), r"half the rate of a\.npz, 25600 Hz, got 30000 Hz; sample faster, or ask for less"
+    with pytest.raises(ValueError, match=f"below {said}"):
+        watch.advice("a.npz", taps, 0, 30e3)
+    assert "too soft" in watch.advice("a.npz", taps, 0, 20e3).said  # asked for less
 
 
 def test_files_are_handed_out_once_nobody_writes_to_them_and_again_when_they_change(tmp_path):
@@ -86,8 +84,5 @@ def test_files_are_handed_out_once_nobody_writes_to_them_and_again_when_they_cha
     (tmp_path / "picture.png").write_bytes(b"no record")
     (tmp_path / "empty.csv").touch()  # its writer has only begun
     assert folder.look() == [] and folder.look() == [file] and folder.look() == []
-
-
-def test_what_is_no_folder_is_refused(tmp_path):
     with pytest.raises(ValueError, match="FOLDER must be a folder that receives records, got"):
         watch.Folder(tmp_path / "none")
