@@ -267,6 +267,6 @@ def test_any_node_of_a_body_is_heard_along_any_direction():
     assert_allclose(across, 0.5 * mirrored, atol=1e-12)
     few = fi.strike(body.modes("z").truncated(n_modes=2), hit.striker, law, at=body.at(3), speed=1.0, tolerance=1.0)
     with pytest.raises(
-        ValueError, match=r"must be of a blow on this body of 6 modes, got one on 2; strike body\.modes"
+        ValueError, match=r"response must be of a blow on this body of 6 modes, got one on 2; strike body.modes"
     ):
         fi.sound.of_node(few, body, 2, "z")
