@@ -64,6 +64,7 @@ def right(changes, found):
     return changes.max() / 3.0 - SLOW <= guess <= 3.0 * changes.max() + SLOW
 
 
+@pytest.mark.thin(3)
 @pytest.mark.parametrize(
     "club", [*clubs(0, 8), *(pytest.param(each, marks=pytest.mark.slow) for each in clubs(11, 24))]
 )
