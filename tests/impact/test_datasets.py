@@ -23,7 +23,8 @@ def test_a_dataset_has_the_numbers_of_its_response():
         assert float(found[name]) == getattr(hit, name)
     np.testing.assert_array_equal(found.impact_end, [impact.end for impact in hit.impacts])
     assert found.force.attrs["units"] == "N" and found.attrs["verdict"] == hit.verdict
-    assert float(found.error_total) == hit.error.total
+    for cause in ("step", "truncation", "mesh", "idealisation", "measurement", "inherited", "total"):
+        assert float(found[f"error_{cause}"]) == getattr(hit.error, cause)
     assert float(found.energy_striker) == hit.energies["striker"]
 
 
