@@ -19,6 +19,7 @@ from .explained import pointed, printable
 
 REACH = 1e75  # [-] largest number accepted; 1 / REACH is the smallest: the fourth power of both still fits a float
 MOST = 10**9  # [-] largest count accepted: more items would not fit into memory
+AXES = "", "(x)", "(x, y)", "(x, y, z)"  # coordinates of a point on a body of each dimension
 SOURCES = {  # type -> how a user makes one, for error messages
     "Body": "fi.Body or fi.Body.load",
     "Comparison": "Response.against, Found.against or fi.band",
@@ -243,15 +244,14 @@ def array(name: str, value: Any, shape: tuple[int | None, ...], unit: str = "", 
 
 def places(name: str, value: Any, dimension: int) -> np.ndarray:
     """Return one point or several on a body of a dimension as a new array (n_points, dimension) [m]."""
-    point = f"a point ({', '.join('xyz'[:dimension])}) in m"
     if value is None:
-        raise ValueError(f"{name} must be given, {point}")
+        raise ValueError(f"{name} must be given, a point {AXES[dimension]} in m")
     raw = numbers(name, value, "m")
     if dimension == 1 and (raw.ndim < 2 or raw.shape[-1] != 1):
         raw = raw.reshape(-1, 1)
     if raw.ndim < 2:
         if raw.shape != (dimension,):
-            raise ValueError(f"{name} must be {point}, got {shown(value)}")
+            raise ValueError(f"{name} must be a point {AXES[dimension]} in m, got {shown(value)}")
         raw = raw[None]
     return finite(name, raw, "m") if raw.shape[1:] == (dimension,) else array(name, raw, (None, dimension), "m")
 

@@ -15,7 +15,6 @@ Berger (1955), J. Appl. Mech. 22, 465-472; Chu and Herrmann (1956), J. Appl. Mec
 (1950), J. Appl. Mech. 17, 35-36 (beams).
 """
 
-from contextlib import suppress
 from dataclasses import replace
 from functools import lru_cache
 from typing import Any
@@ -237,15 +236,6 @@ def _times(struck: Struck) -> np.ndarray:
     return np.append(np.linspace(0.0, end, TIMES + 1)[1:], np.linspace(end, end + 2.0 * period, 2 * TIMES))
 
 
-def _states(history: Any, times: np.ndarray, longest: float) -> np.ndarray:
-    """Modal displacements (n_times, n_all) of a body that stretches, in steps up to ``longest`` [s] that settle."""
-    while longest > history.stretched.base:
-        with suppress(SimulationError):
-            return replace(history, stretched=replace(history.stretched, base=longest)).states(times)[0]
-        longest *= 0.25
-    return history.states(times)[0]
-
-
 def _stretched(struck: Struck, body: Known, integrals: Bending) -> Assumption:
     """A blow that has stretching in it: how large it gets, and what stress fields and modes left out would change.
 
@@ -255,7 +245,8 @@ def _stretched(struck: Struck, body: Known, integrals: Bending) -> Assumption:
     mine, history, times = struck.mine, struck.hit.history, _times(struck)
     assert history.stretched is not None and body.thickness is not None
     flexible = history.omega[mine] > 0.0
-    states = _states(history, times, (times[-1] - struck.end) / (2.0 * TIMES))
+    longest = max(history.stretched.base, (times[-1] - struck.end) / (2.0 * TIMES))
+    states = replace(history, stretched=replace(history.stretched, base=longest)).states(times)[0]
     moved = states[:, mine]
     value = float(np.abs(moved @ (flexible * history.shape[0, mine])).max(initial=0.0)) / body.thickness
     own, remedy = Stretching(history.stretched.forms, history.stretched.linear), LOCAL + _of_rise(body, value)

@@ -217,8 +217,10 @@ def attempt(bodies, contacts, room, tables, slot, h, given):
         for i in range(room.pull.shape[1]):
             change += abs(room.pull[0, i] - room.pull[2, i]) + abs(room.pull[1, i] - room.pull[3, i])
             size += abs(room.pull[0, i]) + abs(room.pull[1, i])
+        if not change < OVERFLOW:  # a sum keeps what is no number; a maximum may drop it
+            break
         settled = change <= SOLVED * size or (change <= STALLED * size and change >= 0.5 * best)
-        if settled or not change < OVERFLOW:  # a sum keeps what is no number; a maximum may drop it
+        if settled:
             break
         best = min(best, change)
     if not settled:
