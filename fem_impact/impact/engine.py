@@ -24,6 +24,9 @@ STEP_SHARE = 0.1
 # [-] steps of a first run in half a swing on the steepest slope of a force with a course of its own; with fewer, two
 # runs may both take the whole of an unloading in one step, and agree: contact times erred by 3e-3 and said 1e-5
 STEEP = 8.0
+# [-] a contact's highest frequency over its lowest from which a body rattles on it; below, steps for the lowest resolve
+# both, and a plate's many modes make neighbours of one frequency
+RATTLES = 2.0
 MAX_STEPS = 500_000  # [-] of one run: a time limit of about one second
 # [-] modes, or entries of the forms of stretching, times steps of one run: a time limit of some seconds
 MAX_WORK = 1_000_000_000
@@ -131,12 +134,12 @@ def pace_of(system: KernelSystem, held: Sequence[int] = ()) -> Pace:
     beyond[:-1] = beyond[1:]
     beyond[-1] = np.inf
     last = beyond > rate[order]  # the last mode of each distinct frequency
-    beyond = beyond[last]
     shortest, fastest, longest = np.inf, 0.0, np.inf
     for i, law in enumerate(map(Row._make, system.law.tolist())):
         k, exponent, compliance = law.stiffness, law.exponent, law.compliance
         mobile = (system.shape[i, order] ** 2).cumsum()[last]  # [1/kg] sum over the modes up to each
-        above, mobile = beyond[mobile > 0.0], mobile[mobile > 0.0]
+        moves = mobile > 0.0
+        mobile, between = mobile[moves], (rate[order][last][moves], beyond[last][moves])
         if not mobile.size:
             continue
         approach = system.offset[i] + float(system.shape[i] @ system.q)
@@ -150,16 +153,27 @@ def pace_of(system: KernelSystem, held: Sequence[int] = ()) -> Pace:
         if speed == 0.0:
             continue
         free = wall_time(acting_stiffness(law, mobile, speed), exponent, mobile, speed, compliance)
-        shortest = min(shortest, float(free[(np.pi / free < above).argmax()]))
+        shortest = min(shortest, float(free[_masses(np.pi / free, *between)]))
         if law.kind:
             swing = np.sqrt(law_of(law).steepest(law, 0.5 * speed**2 / mobile) * mobile)  # [rad/s]
-            steep = float(swing[(swing < above).argmax()])
+            steep = float(swing[_masses(swing, *between)])
             longest = min(longest, np.pi / (STEEP * steep)) if steep else longest
         fastest = max(fastest, float(speed))
     if not np.isfinite(shortest):
         k = system.law["stiffness"][0]
         return Pace(float(np.sqrt(1.0 / (k * max(1e-300, (system.shape[0] ** 2).sum())))), 1.0, longest, swings)
     return Pace(shortest, fastest, longest, swings)
+
+
+def _masses(frequency: np.ndarray, slower: np.ndarray, faster: np.ndarray) -> int:
+    """Up to which number modes are masses to a contact, of those that have its ``frequency`` [rad/s] if they are.
+
+    It must lie above that of the last such mode, at ``slower``, and below the next, at ``faster``: the lowest such
+    counts. But where a heavy body presses a light one that bends, this rattles at the highest.
+    """
+    below = frequency < faster
+    first, (possible,) = int(below.argmax()), (below & (frequency >= slower)).nonzero()
+    return int(possible[-1]) if len(possible) and frequency[possible[-1]] > RATTLES * frequency[first] else first
 
 
 def most_steps(system: KernelSystem, stretched: Stretched | None) -> int:

@@ -319,6 +319,21 @@ def test_duration_and_max_impacts_stop_the_run():
     assert cut.n_impacts == 2 and one.n_impacts == 1 and not one.finished
 
 
+@pytest.mark.parametrize(
+    "law", [fi.Contact.linear, lambda k: fi.Contact.layers(k, 1.0, depth=1.0, hard_stiffness=2 * k)]
+)
+@pytest.mark.parametrize("mass", [1e4, 1e5, 1e6])
+def test_a_light_body_leaves_the_heavy_one_that_hits_it_long_before_that_turns_back(law, mass):
+    own, omega, k = 0.3, 2.0 * np.pi * 40.0, 2e5
+    body = fi.Modes.from_arrays([40.0], [[own**-0.5]], points=[[0.0]], mass=own, damping_ratio=0.0, complete=True)
+    hit = fi.strike(body, fi.Striker.rigid(mass), law(k), at=[0.0], speed=1.0, max_impacts=1, tolerance=1e-3)
+    # pressed by a wall at constant speed, it leaves at a phase of its free swing on both springs
+    still = omega**2 / (omega**2 + k / own)  # [-] of the wall's way that its own spring takes
+    phase = brentq(lambda phase: (1.0 - still) * np.sin(phase) + still * phase, np.pi, 1.5 * np.pi)
+    time = phase / np.sqrt(omega**2 + k / own)
+    assert hit.contact_time == pytest.approx(time, rel=hit.error.of_quantity("contact_time") + own / mass)
+
+
 def test_a_miss_is_no_impact():
     hit = collide([fi.Modes.rigid(1.0)], [Touch(fi.Contact.linear(1e5), 0, None)], speeds=[-1.0])
     assert hit.n_impacts == 0 and hit.finished
