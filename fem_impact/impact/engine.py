@@ -153,10 +153,11 @@ def pace_of(system: KernelSystem, held: Sequence[int] = ()) -> Pace:
         if speed == 0.0:
             continue
         free = wall_time(acting_stiffness(law, mobile, speed), exponent, mobile, speed, compliance)
-        shortest = min(shortest, float(free[_masses(np.pi / free, *between)]))
+        whole, lightest = _masses(np.pi / free, *between)
+        shortest = min(shortest, float(free[lightest]))
         if law.kind:
             swing = np.sqrt(law_of(law).steepest(law, 0.5 * speed**2 / mobile) * mobile)  # [rad/s]
-            steep = float(swing[_masses(swing, *between)])
+            steep = float(max(swing[_masses(swing, *between)[1]], swing[whole]))
             longest = min(longest, np.pi / (STEEP * steep)) if steep else longest
         fastest = max(fastest, float(speed))
     if not np.isfinite(shortest):
@@ -165,15 +166,17 @@ def pace_of(system: KernelSystem, held: Sequence[int] = ()) -> Pace:
     return Pace(shortest, fastest, longest, swings)
 
 
-def _masses(frequency: np.ndarray, slower: np.ndarray, faster: np.ndarray) -> int:
+def _masses(frequency: np.ndarray, slower: np.ndarray, faster: np.ndarray) -> tuple[int, int]:
     """Up to which number modes are masses to a contact, of those that have its ``frequency`` [rad/s] if they are.
 
-    It must lie above that of the last such mode, at ``slower``, and below the next, at ``faster``: the lowest such
-    counts. But where a heavy body presses a light one that bends, this rattles at the highest.
+    It must lie above that of the last such mode, at ``slower``, and below the next, at ``faster``. The lowest such is
+    how the bodies press each other; the second one told is another only where a light body that bends rattles on a
+    heavy one meanwhile, with the highest.
     """
     below = frequency < faster
     first, (possible,) = int(below.argmax()), (below & (frequency >= slower)).nonzero()
-    return int(possible[-1]) if len(possible) and frequency[possible[-1]] > RATTLES * frequency[first] else first
+    rattles = len(possible) and frequency[possible[-1]] > RATTLES * frequency[first]
+    return first, int(possible[-1]) if rattles else first
 
 
 def most_steps(system: KernelSystem, stretched: Stretched | None) -> int:

@@ -185,17 +185,22 @@ def test_pressed_again_it_goes_on_where_it_was():
     assert force == pytest.approx(float(ROUND.force(deep)), rel=1e-13)
 
 
+WALL = fi.Modes.rigid(1e6), 0.05, 1.0
+LIGHT = fi.Modes.from_arrays([120.0], [[500.0]], points=[[0.0]], mass=3e-3, damping_ratio=0.0, complete=True), 8e-4, 0.1
+
+
 @pytest.mark.parametrize(
-    ("law", "rises"),
+    ("law", "blow", "rises"),
     [
-        (fi.Contact.elastic_plastic(1e14, 3.0, yield_approach=1e-8), "faster than numbers tell"),
-        (fi.Contact.elastic_plastic(1e65, 20.0, yield_approach=1e-8), "faster than numbers tell"),
-        (fi.Contact.elastic_plastic(4.8e11, 3.0, yield_approach=1.5e-6), "faster than numbers tell"),
-        (fi.Contact.layers(1e3, 1.0, depth=1e-3, hard_stiffness=1e22, hard_exponent=1.0), "within 1.5e-09 s"),
+        (fi.Contact.elastic_plastic(1e14, 3.0, yield_approach=1e-8), WALL, "faster than numbers tell"),
+        (fi.Contact.elastic_plastic(1e65, 20.0, yield_approach=1e-8), WALL, "faster than numbers tell"),
+        (fi.Contact.elastic_plastic(4.8e11, 3.0, yield_approach=1.5e-6), WALL, "faster than numbers tell"),
+        (fi.Contact.elastic_plastic(7.6e6, 3.5, yield_approach=2e-5), LIGHT, "faster than numbers tell"),
+        (fi.Contact.layers(1e3, 1.0, depth=1e-3, hard_stiffness=1e22, hard_exponent=1.0), WALL, "within 1.5e-09 s"),
     ],
-    ids=["steep", "steepest", "back within 5e-8 of its depth", "on rock"],
+    ids=["steep", "steepest", "back within 5e-8 of its depth", "on a body that bends", "on rock"],
 )
-def test_a_law_that_no_steps_can_follow_is_refused_at_once(law, rises):
+def test_a_law_that_no_steps_can_follow_is_refused_at_once(law, blow, rises):
     """It took minutes, to end after 500 000 steps with the advice of a duration of 5e-53 s."""
     with pytest.raises(fi.SimulationError, match=f"steps cannot follow a force that acts for .* changes {rises}"):
-        fi.strike(fi.Modes.rigid(1e6), fi.Striker.rigid(0.05), law, at=None, speed=1.0)
+        fi.strike(blow[0], fi.Striker.rigid(blow[1]), law, at=[0.0] * blow[0].dimension or None, speed=blow[2])
