@@ -334,6 +334,17 @@ def test_a_light_body_leaves_the_heavy_one_that_hits_it_long_before_that_turns_b
     assert hit.contact_time == pytest.approx(time, rel=hit.error.of_quantity("contact_time") + own / mass)
 
 
+@pytest.mark.parametrize("frequency", [150.0, 200.0, 250.0])
+def test_felt_that_is_nearly_recovered_is_met_where_it_is(frequency):
+    """At 200 Hz the second contact began too early by half of 1e-4 of it, in steps of any length."""
+    body = fi.Modes.from_arrays([frequency], [[1.0]], points=[[0.0]], mass=1.0, damping_ratio=0.0, complete=True)
+    law = fi.Contact.felt(2e13, 1.5, hysteresis=0.7, relaxation=3e-5)
+    blow = {"at": [0.0], "speed": 0.02, "max_impacts": 2}
+    hit, exact = (fi.strike(body, fi.Striker.rigid(140.0), law, tolerance=each, **blow) for each in (1e-4, 1e-7))
+    claimed = hit.error.of_quantity("contact_time") + exact.error.of_quantity("contact_time")
+    assert hit.contact_time == pytest.approx(exact.contact_time, rel=claimed)
+
+
 def test_a_miss_is_no_impact():
     hit = collide([fi.Modes.rigid(1.0)], [Touch(fi.Contact.linear(1e5), 0, None)], speeds=[-1.0])
     assert hit.n_impacts == 0 and hit.finished

@@ -11,20 +11,24 @@ FREQUENCIES, DAMPING = np.array([210.0, 333.0, 340.0, 700.0, 1010.0]), np.array(
 PRODUCTS = np.random.default_rng(3).standard_normal((4, 5))  # 1/kg, of four channels
 
 
-def responses(noise, seed=0):
-    """Accelerances of five modes, two of them near each other, with noise over their root mean square."""
+def responses(noise, seed=0, window=0.0):
+    """Accelerances of five modes, two of them near each other, with noise over their root mean square.
+
+    ``window`` is the decay of an exponential one over the records [1/s].
+    """
     frequency = np.arange(1.0, 1200.0)
-    omega, own = 2.0 * np.pi * frequency[:, None], 2.0 * np.pi * FREQUENCIES
-    H = (-(omega**2) / (own**2 - omega**2 + 2j * DAMPING * own * omega)) @ PRODUCTS.T
+    s, own = window + 2j * np.pi * frequency[:, None], 2.0 * np.pi * FREQUENCIES
+    H = (s**2 / (own**2 + s**2 + 2.0 * DAMPING * own * s)) @ PRODUCTS.T
     drawn = np.random.default_rng(seed).standard_normal((2, *H.shape))
     H = H + noise * np.sqrt(0.5 * np.square(np.abs(H)).mean()) * (drawn[0] + 1j * drawn[1])
     names = [f"channel {k}" for k in range(4)]
     coordinates = {"frequency": frequency, "channel": names, "units": ("channel", ["m/s^2/N"] * 4)}
-    return xr.Dataset({"H": (("frequency", "channel"), H)}, coordinates)
+    return xr.Dataset({"H": (("frequency", "channel"), H)}, coordinates, {"added_damping": window})
 
 
-def test_without_noise_the_poles_are_those_of_the_modes():
-    chart = stabilisation.chart(responses(0.0), 40)
+@pytest.mark.parametrize("window", [0.0, 8.0])
+def test_without_noise_the_poles_are_those_of_the_modes(window):
+    chart = stabilisation.chart(responses(0.0, window=window), 40)
     last = (chart.order == chart.order.max()) & chart.stable
     assert_allclose(chart.frequency[last], FREQUENCIES, rtol=1e-6)  # rounding of models of order 40
     assert_allclose(chart.damping_ratio[last], DAMPING, rtol=1e-4)

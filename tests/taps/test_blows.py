@@ -72,3 +72,5 @@ def test_fast_modes_that_matter_shorten_the_step_and_are_followed():
     times, bodies = np.linspace(0.0, 4e-4, 500), (ball, fast, law)
     rough, exact = (blow(*bodies, 1.0, 4e-4, 1e-3, finer).force_at(times, 0)[0] for finer in (1.0, 16.0))
     assert np.abs(rough - exact).max() < 5e-6 * exact.max()
+    faint = joined((ball, blows.wall().with_mode(25e3, 4e3, 0.0, np.zeros(0))), [law])
+    assert blows.longest_step(faint, law, 4e-4) == pytest.approx(1e-5)

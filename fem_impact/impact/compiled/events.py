@@ -14,7 +14,7 @@ import numpy as np
 from .build import inner
 from .cubics import crossing, turning
 from .law import corner_approach, relaxes, spring_of, yields
-from .laws.felt import parting, parting_rate
+from .laws.felt import above_felt, parting, parting_rate
 from .rounding import NEAR, REPEATED
 
 from .layout import (  # isort: skip
@@ -26,6 +26,7 @@ LET_GO = 1e-7  # [-] of the force's factor 1 + loss * rate: about zero up to thi
 # kinds of corners: it lets go or pushes again by its rate, the bend, the turn, it parts from its felt or meets it, and
 # meets it again at once, so that the step is to be taken pressed
 LETS_GO, BENDS, TURNS, PARTS, AGAIN = range(5)
+AT_ONCE = 1e-6  # [-] of a step in which felt is met: sooner it is met at its start, a contact that much too early
 EVENT_LIMIT = 64  # [-] events within one step's time: chatter, passed with unlocated steps, each time for twice as long
 
 
@@ -172,10 +173,11 @@ def first_corner(contacts, h, lossy, out_bracket):
             if least > 0.0 and (end > least if apart else end < -least):
                 start = min(start, -least) if apart else max(start, least)
                 root = h * start / (start - end)
-                leaves = parting_rate(law, i, d0, v0, law["memory"][i]) if apart and d0 > 0.0 else 0.0
-                if leaves < 0.0:  # and comes back: no straight line
-                    root = h * crossing(start, h * leaves, end, h * parting_rate(law, i, d1, v1, after[i]))
-                if root < 1e-3 * h:
+                if apart:  # it meets the felt like a wall that comes, in a force of any exponent
+                    low, slow = above_felt(law, i, d0, v0, law["memory"][i], apart)
+                    high, fast = above_felt(law, i, d1, v1, after[i], apart)
+                    root = h * crossing(min(low, 0.0), h * slow, high, h * fast)
+                if root < AT_ONCE * h:
                     if apart:
                         return i, AGAIN, h
                 elif root < at:

@@ -12,7 +12,8 @@ import numpy as np
 from .build import ZERO, inner, outer
 from .cubics import crossing, cubic, turning
 from .events import LET_GO, letting_go
-from .law import dent, power, relaxes, spring_of, spring_with, stored
+from .law import dent, relaxes, spring_of, spring_with, stored
+from .laws.felt import above_felt
 from .misfit import force_on, misfit
 from .rounding import NEAR
 
@@ -114,18 +115,6 @@ def pushing(steps, now, law, n_coefficients, row, i):
         else:
             upper = min(upper, at)
     return lower, upper
-
-
-@inner()
-def above_felt(law, i, d, v, memory, parted):
-    """Approach over that at which felt i lets go or is met, and its rate; the body may have ``parted`` from it."""
-    z = abs(memory)
-    if z == 0.0:
-        return d, v
-    a, share = law["exponent"][i], law["hysteresis"][i]
-    surface = (share * z) ** (1.0 / a)
-    grows = -(1.0 - share) * z if parted else (power(d, a) if d > 0.0 else 0.0) - z
-    return d - surface, v - surface * grows / (a * z * law["relaxation"][i])
 
 
 @outer()

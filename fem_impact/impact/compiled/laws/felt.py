@@ -205,6 +205,17 @@ def parting_rate(law, i, approach, rate, memory):
 
 
 @inner()
+def above_felt(law, i, d, v, memory, parted):
+    """Approach over that at which felt i lets go or is met, and its rate; the body may have ``parted`` from it."""
+    z = abs(memory)
+    if z == 0.0:
+        return d, v
+    a, pressed_in = law["exponent"][i], surface(law, i, z)
+    grows = -(1.0 - law["hysteresis"][i]) * z if parted else (power(d, a) if d > 0.0 else 0.0) - z
+    return d - pressed_in, v - pressed_in * grows / (a * z * law["relaxation"][i])
+
+
+@inner()
 def meet(law, i, approach, rate):
     """Decide whether a body pushes felt i at the start of a step or has parted from it."""
     if not relaxes(law, i):
