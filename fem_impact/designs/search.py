@@ -15,7 +15,6 @@ from .._base.check import SimulationError
 from .._base.rounding import SAME
 from ..fe.variation import SectionChange
 from ..impact import clearance, gradient, promise
-from ..impact.quantities import rebound
 from ..impact.response import Response
 from ..model import planner, target
 from ..model.budget import VERIFYING
@@ -433,14 +432,7 @@ def _of_hit(hit: Response, goal: Goal) -> float:
     name, _, band = goal.name.partition("=")
     if name == "clearance":
         return clearance.nearest(hit)[0]
-    if name == "spectral_level":
-        return gradient.level_of(hit.spectrum(np.array([0.0, float(band)])))
-    if name == "peak_time":
-        return float(hit.time[int(np.argmax(hit.force))])
-    value = hit.spectral_centroid(float(band)) if band else getattr(hit, name)
-    if value is None:
-        raise SimulationError(f"no {name}: {rebound(hit, 5)}")
-    return float(value)
+    return float(gradient.value_of(hit, name, float(band) if band else None))
 
 
 def _mode_slopes(modes: Modes, some: list[Goal], rate: Rate) -> np.ndarray:

@@ -108,12 +108,12 @@ def run_system(
 def again(history: History, step: float | None = None, **changed: Any) -> History:
     """The same blow with other modes or contacts, by A4 in steps [s] of its own, to compare with another such run.
 
-    ``changed`` are fields of the history; without any, it is the blow to compare with. Steps are by default those of a
+    ``changed`` are fields of the system; without any, it is the blow to compare with. Steps are by default those of a
     first run.
     """
     before, pace = history.system, pace_of(history.system)
     stretched = changed.pop("stretched", history.stretched)
-    system = before._replace(**{name.removeprefix("start_"): array for name, array in changed.items()})
+    system = before._replace(**changed)
     horizon = history.end_time if history.status == record.HORIZON else np.inf
     most = int(np.isfinite(history.contacts[:, 6]).sum()) if history.status == record.IMPACTS else 0
     for array in system:

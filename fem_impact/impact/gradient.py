@@ -18,7 +18,7 @@ from . import engine, force_spectrum
 from .compiled import layout
 from .compiled.law import columns
 from .history import History, mode_energy
-from .parameters import ONE_SIDED, Change, Parameters, unit
+from .parameters import ONE_SIDED, Parameters, unit
 from .quantities import UNITS, checked_band, name_and_band, rebound
 
 if TYPE_CHECKING:
@@ -123,7 +123,7 @@ def gradients(
     parameters = Parameters(hit, sections)
     names = parameters.checked(wrt)
     numbers = parameters.numbers(names)
-    values = [_value(hit, name, band) for name, band in wanted]
+    values = [value_of(hit, name, band) for name, band in wanted]
     span = max(impact.end for impact in hit.impacts)
     bands = [band for name, band in wanted if band is not None and name == "spectral_centroid"]
     frequencies = {band: force_spectrum.dense_frequencies(band, span) for band in bands}
@@ -149,9 +149,8 @@ def differences(
     def again(step: float, i: int = 0, by: float = 0.0) -> list[Any]:
         """The quantities with number i larger by so much, in steps [s] in contact of one's own."""
         h, changed = hit.history, {}
-        for name in Change._fields if by else ():
-            each = getattr(h, name)
-            more = columns(each) + by * columns(getattr(change, name)[i])
+        for name, each, slopes in zip(change._fields, h.system, change) if by else ():
+            more = columns(each) + by * columns(slopes[i])
             changed[name] = more.view(each.dtype).reshape(each.shape)
         history = engine.again(h, step, **changed)
         if len(history.contacts) != len(h.contacts):
@@ -204,10 +203,9 @@ def _check_possible(hit: "Response", wanted: list[tuple[str, float | None]], sec
         )
 
 
-def _value(hit: "Response", name: str, band: float | None) -> Any:
+def value_of(hit: "Response", name: str, band: float | None) -> Any:
     """Value of a quantity of the blow itself."""
-    if name == "spectral_centroid":
-        assert band is not None
+    if name == "spectral_centroid" and band is not None:
         return hit.spectral_centroid(band)
     if name == "restitution" and hit.restitution is None:
         raise SimulationError(f"no gradient of restitution: {rebound(hit, 5)}")
@@ -261,7 +259,8 @@ def read_quantities(
                 spectrum = force_spectrum.transform_impulses(time, impulse, asked[1], len(asked))
                 found.append(force_spectrum.centroid(asked, spectrum))
             else:
-                found.append(level_of(np.exp(-2j * np.pi * np.array([[0.0], [band]]) * time) @ impulse))
+                low, high = np.abs(np.exp(-2j * np.pi * np.array([[0.0], [band]]) * time) @ impulse)
+                found.append(20.0 * float(np.log10(high / low)))
         elif name.startswith("peak"):
             found.append(largest(blow.history)[name == "peak_force"])
         else:
@@ -330,9 +329,3 @@ def section_changes(sections: Any) -> dict[str, tuple[float, SectionChange]]:
         name: (float(pair[0]), SectionChange.by_differences(f"sections[{name!r}]", *pair))
         for name, pair in sections.items()
     }
-
-
-def level_of(spectrum: np.ndarray) -> float:
-    """Level [dB] of the second of two values of a force spectrum re the first."""
-    size = np.abs(spectrum)
-    return 20.0 * float(np.log10(size[1] / size[0]))

@@ -3,7 +3,7 @@
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -14,6 +14,7 @@ from ..fe.variation import DIFFERENCES, SectionChange
 from ..modes import varied
 from ..modes.modal import Modes
 from . import motion
+from .compiled.bundles import KernelSystem
 from .compiled.law import LAWS, NUMBERS, Row, law_of
 
 if TYPE_CHECKING:
@@ -38,22 +39,7 @@ RESCALED = {"mass": (0.0, 1.0), "first_frequency": (1.0, 0.0)}  # the same of an
 # [-] distance for the slope of a shape in radians of the shortest wave, and of the static compliance in lengths of the
 # body: errs by the fourth power, 1e-12, and leaves 1e-9 of the rounding of a compliance
 SHIFT = 1e-3
-
-
 ONE_SIDED = ".loss", ".damping_ratio"  # numbers that are never negative
-
-
-class Change(NamedTuple):
-    """What a unit of each of some numbers changes in a `System`."""
-
-    omega: np.ndarray  # (n, n_modes)
-    zeta: np.ndarray  # (n, n_modes)
-    shape: np.ndarray  # (n, n_contacts, n_modes)
-    bias: np.ndarray  # (n, n_modes)
-    start_q: np.ndarray  # (n, n_modes)
-    start_p: np.ndarray  # (n, n_modes)
-    offset: np.ndarray  # (n, n_contacts)
-    law: np.ndarray  # (n, n_contacts) of `compiled.law.LAW`
 
 
 def unit(name: str) -> str:
@@ -233,11 +219,10 @@ class Parameters(check.Brief):
             check.one_of("wrt", name, self.values)
         return names
 
-    def change(self, names: tuple[str, ...]) -> Change:
-        """What a unit of each number changes in the run."""
-        h = self.hit.history
-        whole = (getattr(h, name) for name in Change._fields)
-        found = Change(*(np.zeros((len(names), *each.shape), each.dtype) for each in whole))
+    def change(self, names: tuple[str, ...]) -> KernelSystem:
+        """What a unit of each number changes in the run: its arrays have a first axis more, of the numbers."""
+        whole = self.hit.history.system
+        found = KernelSystem(*(np.zeros((len(names), *each.shape), each.dtype) for each in whole))
         axes = {}
         for i, name in enumerate(names):
             if name in self.sections:
@@ -268,7 +253,7 @@ class Parameters(check.Brief):
             return max(float(np.ptp(column)) for column in self.hit.bodies[1].shapes.grid()[0].T)
         return abs(self.hit.speed) if name.startswith("speeds.") and self.hit.speed else 1.0
 
-    def _enter(self, found: Change, i: int, name: str) -> None:
+    def _enter(self, found: KernelSystem, i: int, name: str) -> None:
         home, _, part = name.rpartition(".")
         value = self.values[name]
         if home in self.laws and part == "gap":
@@ -278,13 +263,11 @@ class Parameters(check.Brief):
         elif name == "strike.speed":
             striker = self.hit.striker
             assert striker is not None
-            found.start_p[i, self._modes[0]] = striker.motion  # the target may move already, whatever that speed
+            found.p[i, self._modes[0]] = striker.motion  # the target may move already, whatever that speed
         elif home == "speeds":
             b = int(part)
             modes, ends = self.hit.bodies[b], self.hit.ends[b]
-            found.start_p[i, self._modes[b]] = (
-                modes.rigid_motion(ends.points[:1]) if ends.coming is None else ends.coming
-            )
+            found.p[i, self._modes[b]] = modes.rigid_motion(ends.points[:1]) if ends.coming is None else ends.coming
         elif part == "damping_ratio":
             b = self.bodies[home]
             found.zeta[i, self._modes[b]] = self.hit.history.omega[self._modes[b]] > 0.0
@@ -298,7 +281,7 @@ class Parameters(check.Brief):
         """The modes of every body in the run."""
         return tuple(self.hit.body_slice(b) for b in range(len(self.hit.bodies)))
 
-    def _soften(self, found: Change, i: int, b: int, change: np.ndarray) -> None:
+    def _soften(self, found: KernelSystem, i: int, b: int, change: np.ndarray) -> None:
         """Enter a change (n_ends, n_ends) of the compliance of modes left out [m/N]."""
         ends, h = self.hit.ends[b], self.hit.history
         if not ends.rest.any():
@@ -316,19 +299,18 @@ class Parameters(check.Brief):
         for c, sign, row in zip(contacts, signs, changed):
             found.shape[i, c, ends.forms] += sign * above * row
 
-    def _raise(self, found: Change, i: int, b: int, faster: float) -> None:
+    def _raise(self, found: KernelSystem, i: int, b: int, faster: float) -> None:
         """Let the modes that stand for those left out of a body follow its last one, ``faster`` per unit."""
         forms, h = self.hit.ends[b].forms, self.hit.history
         found.omega[i, forms] = faster * h.omega[forms]
         found.shape[i, :, forms] += faster * h.shape[:, forms]
 
-    def _stretch(self, found: Change, i: int, b: int, faster: float, heavier: float, value: float) -> None:
+    def _stretch(self, found: KernelSystem, i: int, b: int, faster: float, heavier: float, value: float) -> None:
         """A body whose frequencies and mass grow with these powers of a number."""
-        part, h = self._modes[b], self.hit.history
+        part, h = self._modes[b], self.hit.history.system
         found.omega[i, part] = faster / value * h.omega[part]
         found.shape[i, :, part] = -0.5 * heavier / value * h.shape[:, part]
-        for name in ("bias", "start_q", "start_p"):  # displacement and velocity at the start stay
-            power = 0.5 if name.startswith("start") else -0.5
+        for name, power in (("bias", -0.5), ("q", 0.5), ("p", 0.5)):  # displacement and velocity at the start stay
             getattr(found, name)[i, part] = power * heavier / value * getattr(h, name)[part]
         striker = self.hit.striker
         if b == 0 and striker is not None:  # its weight grows, where other constant forces stay
@@ -336,7 +318,7 @@ class Parameters(check.Brief):
         self._raise(found, i, b, faster / value)
         self._soften(found, i, b, -(heavier + 2.0 * faster) / value * self.hit.ends[b].rest)
 
-    def _vary(self, found: Change, i: int, change: SectionChange) -> None:
+    def _vary(self, found: KernelSystem, i: int, change: SectionChange) -> None:
         """A target whose section changes along its length or over its area."""
         hit, target, part, h = self.hit, self.hit.bodies[1], self._modes[1], self.hit.history
         if self.why_no_target or hit.at is None or h.start_q[part].any() or h.start_p[part].any():
@@ -353,7 +335,7 @@ class Parameters(check.Brief):
         carried = 2.0 * row / omega**2 @ (seen.shape[flexible] - row * seen.omega[flexible] / omega)
         self._soften(found, i, 1, np.array([[seen.compliance - float(carried)]]))
 
-    def _shift(self, found: Change, axes: Mapping[int, int]) -> None:
+    def _shift(self, found: KernelSystem, axes: Mapping[int, int]) -> None:
         """The target struck further along an axis, for each parameter its own."""
         hit, target, part = self.hit, self.hit.bodies[1], self._modes[1]
         assert hit.at is not None
@@ -374,7 +356,7 @@ class Parameters(check.Brief):
         for i, slope, rest in zip(axes, slopes, rests):
             found.shape[i, 0, part] = -slope
             found.bias[i, part] = motion.constant_force(hit) * slope
-            found.start_q[i, self._modes[0]] = float(slope @ hit.history.start_q[part]) * striker.motion
+            found.q[i, self._modes[0]] = float(slope @ hit.history.start_q[part]) * striker.motion
             if rest is not None:
                 self._soften(found, i, 1, np.array([[float(rest[0] - 2.0 * carried @ slope[flexible])]]))
 

@@ -146,8 +146,8 @@ def examine_time(struck: Struck) -> Assumption:
 
 
 def _with(history: History, omega: float, shape: float) -> dict[str, np.ndarray]:
-    """The fields of a history that change if the striker gets one more mode at rest."""
+    """The fields of the system that change if the striker gets one more mode at rest."""
     column = np.zeros((len(history.shape), 1))
     column[0] = shape
-    rest = {name: np.append(getattr(history, name), 0.0) for name in ("zeta", "bias", "start_q", "start_p")}
+    rest = {name: np.append(getattr(history.system, name), 0.0) for name in ("zeta", "bias", "q", "p")}
     return {"omega": np.append(history.omega, omega), "shape": np.hstack([history.shape, column]), **rest}

@@ -17,7 +17,7 @@ from ..impact import accuracy, distance
 from ..impact.assumption import Assumption
 from ..impact.compiled.law import columns
 from ..impact.engine import again
-from ..impact.history import History
+from ..impact.history import History, mode_energy
 from ..impact.response import Response
 from ..modes.modal import Modes
 from .bending import Bending, Known, integrate_shapes, known_of
@@ -73,7 +73,7 @@ class Struck:
         """Energy [J] of some modes after the last impact, without rigid motions."""
         q, p = (x[0, columns] for x in self.hit.history.states(np.array([self.end])))
         omega = self.hit.history.omega[columns]
-        return np.where(omega > 0.0, 0.5 * (p**2 + (omega * q) ** 2), 0.0)
+        return np.where(omega > 0.0, mode_energy(omega, q, p), 0.0)
 
     @cached_property
     def target_energy(self) -> np.ndarray:
@@ -88,15 +88,15 @@ class Struck:
     def changes(self, **changed: Any) -> dict[str, float | None]:
         """Change of each quantity, as `distance.of_blows`; None if that blow fails. Of the sound see `add_sound`, too.
 
-        ``changed`` are fields of the history.
+        ``changed`` are fields of the system, or ``stretched`` of the history.
         """
         return self.between({}, changed)
 
     def between(self, start: Mapping[str, Any], end: Mapping[str, Any]) -> dict[str, float | None]:
-        """As `changes`, between two blows with other fields of the history, if the first is not the one found."""
-        h = self.hit.history
+        """As `changes`, between two blows with other fields, if the first is not the one found."""
+        h, system = self.hit.history, self.hit.history.system
         same = (
-            name != "stretched" and np.allclose(columns(x), columns(getattr(h, name)), rtol=SAME, atol=0.0)
+            name != "stretched" and np.allclose(columns(x), columns(getattr(system, name)), rtol=SAME, atol=0.0)
             for name, x in end.items()
         )
         if self.foreseen or (not start and all(same)):
@@ -167,7 +167,7 @@ class Doubt:
 
 
 def softer(history: History, compliance: float) -> dict[str, np.ndarray]:
-    """The fields that change if the contact gets more compliance [m/N] in series."""
+    """The fields of the system that change if the contact gets more compliance [m/N] in series."""
     law = history.law.copy()
     law["compliance"] = np.maximum(0.0, law["compliance"] + compliance)
     return {"law": law}

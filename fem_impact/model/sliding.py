@@ -62,11 +62,11 @@ def examine_friction(struck: Struck) -> Assumption:
         return doubt.unknown(struck, "whether friction jams the contact", SQUARE, worst.needed)
     if struck.foreseen:
         return doubt.judged(struck, worst.needed, {}, SQUARE)
-    changed = {name: getattr(history, name).copy() for name in ("shape", "start_q", "start_p")}
+    changed = {name: getattr(history.system, name).copy() for name in ("shape", "q", "p")}
     for columns, each in found:
         root = np.sqrt(each.squares)
         changed["shape"][:, columns] *= root
-        for name in ("start_q", "start_p"):  # the motion at the contact stays as it is
+        for name in ("q", "p"):  # the motion at the contact stays as it is
             changed[name][columns] /= root
     effect = struck.changes(**changed)
     parting = sum(each.parting for _, each in found)
