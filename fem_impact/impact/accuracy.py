@@ -24,6 +24,11 @@ def contact_duration(contact: Contact, mass: float, speed: float) -> float:
     return float(wall_time(stiffness, contact.exponent, 1.0 / mass, speed))
 
 
+def lasting_stiffness(duration: float, exponent: float, mass: float, speed: float) -> float:
+    """Stiffness [N/m**exponent] of the power law in which a rigid mass has a `contact_duration` [s]."""
+    return float((wall_time(1.0, exponent, 1.0 / mass, speed) / duration) ** (exponent + 1.0))
+
+
 def contact_resonance(contact: Contact, mass: float, speed: float) -> float:
     """Contact resonance [Hz]: one over twice the `contact_duration`."""
     return 0.5 / contact_duration(contact, mass, speed)

@@ -109,11 +109,9 @@ class Setup:
 
     def law(self, settings: Settings) -> Contact:
         """The contact law for these settings; of two layers, stiffness and exponent are the soft one's."""
-        start, law = self.start, self.base.contact
-        mass = self.base.striker.felt_mass
-        wanted = accuracy.contact_duration(Contact(law.stiffness, law.exponent), mass, start.speed)
-        unit = accuracy.contact_duration(Contact(1.0, settings.exponent), mass, start.speed)
-        same = (unit / wanted) ** (settings.exponent + 1.0)  # contact time ~ stiffness**(-1 / (exponent + 1))
+        law, hit = self.base.contact, (self.base.striker.felt_mass, self.start.speed)
+        wanted = accuracy.contact_duration(Contact(law.stiffness, law.exponent), *hit)
+        same = accuracy.lasting_stiffness(wanted, settings.exponent, *hit)
         return replace(law, stiffness=settings.stiffness * same, exponent=settings.exponent, loss=settings.loss or 0.0)
 
     def case(self, settings: Settings, rest: float | None = None, body: Modes | None = None) -> grid.Case:

@@ -15,6 +15,7 @@ from ..fe import plausible
 from ..fe.assembly import System, reassemble
 from ..fe.section import Beam, Elastic, Plate
 from ..impact.contact import Contact
+from ..impact.parameters import BAR, PLATE, ROD
 from ..impact.striker import Striker
 from ..model.planner import Blow
 from ..model.target import CLOSE, FIRST_FLEXIBLE, Target
@@ -36,14 +37,11 @@ MOST_BLOWS = 10**7
 PLACES = ("strike.x", "strike.y")  # inputs that move the strike point
 POSITIVE = ("mass", "stiffness", "speed", "target_mass", "target_frequency", "striker_frequency")  # axes above zero
 SIZE = "target.size"  # [-] factor on all lengths in the plane of a plate, or along a beam
-# Inputs of the body's modes by dimension: powers of its mass and of its frequencies; Kirchhoff, Euler and Bernoulli
-BODY: dict[int, dict[str, tuple[float, float]]] = {
-    2: {"section.thickness": (1.0, 1.0), "material.E": (0.0, 0.5), "material.rho": (1.0, -0.5), SIZE: (2.0, -2.0)},
-    1: {
-        "section.height": (1.0, 1.0), "section.width": (1.0, 0.0), "section.diameter": (2.0, 1.0),
-        "material.E": (0.0, 0.5), "material.rho": (1.0, -0.5), SIZE: (1.0, -2.0),
-    },
-}  # fmt: skip
+# Inputs of the body's modes by dimension: powers of its frequencies and of its mass; Kirchhoff, Euler and Bernoulli
+BODY = {
+    dimension: {SIZE if name == "target.scale" else name: each for name, each in powers.items()}
+    for dimension, powers in ((2, PLATE), (1, BAR | ROD))
+}
 
 
 @check.typed
@@ -309,7 +307,7 @@ class _SpreadAsked:
         found: list[Any] = [1.0, 1.0]
         for i, stated in enumerate(("mass", "first_frequency")):
             for name, ratio in body.items() if stated not in self.blow.target.scale else ():
-                found[i] = found[i] * ratio ** BODY[self.dimension][name][i]
+                found[i] = found[i] * ratio ** BODY[self.dimension][name][1 - i]
         return found
 
     def _of_modes(self, modes: Modes | None, first: float | None = None) -> dict[str, np.ndarray]:

@@ -10,7 +10,6 @@ from typing import Any, cast
 
 import numpy as np
 from numpy.polynomial import chebyshev
-from scipy.special import gamma
 
 from .._base import check
 from ..impact import accuracy
@@ -289,9 +288,5 @@ class Setting(check.Brief):
 
     def stiffness(self, values: Mapping[str, float], time: float) -> float:
         """The stiffness [N/m**exponent] that `contact_time` has this contact time [s] for."""
-        mass = self.felt_mass(values)
-        a = values.get("contact.exponent", self.contact.exponent)
-        speed, q = 0.5 * self.impulse / mass, 1.0 / (a + 1.0)
-        shape = 2.0 * np.sqrt(np.pi) * gamma(1.0 + q) / gamma(0.5 + q)
-        deepest = np.log(time * speed / shape)
-        return float(np.exp(2.0 * np.log(speed) - np.log(2.0 * q) + np.log(mass) - deepest / q))
+        mass, exponent = self.felt_mass(values), values.get("contact.exponent", self.contact.exponent)
+        return accuracy.lasting_stiffness(time, exponent, mass, 0.5 * self.impulse / mass)
