@@ -28,6 +28,7 @@ RUNS = {  # words that run each command in a second or two
     "spread": "spread small.toml --vary striker.mass=uniform(0.02,0.03) --blows 64 --no-sobol --out spread",
     "hammer": "hammer small.toml --bandwidth 300 --masses 0.01",
     "hammer, catalogue": "hammer small.toml --bandwidth 300 --catalogue 086 --out sheet",
+    "hammer, bar": "hammer bar.toml --bandwidth 300 --catalogue 086C01 --out sheet",
     "hammer, rove": "hammer small.toml --bandwidth 300 --masses 0.01 --rove 2 --out rove",
     "tune": 'tune bar.toml --pitch "-5 cents" --out tuned',
     "watch": f"watch {TAPS.parent} --bandwidth 2000 --once --response Acceleration --out seen.png",
@@ -44,7 +45,7 @@ RUNS = {  # words that run each command in a second or two
     "frf": f"frf {TAPS} --response Acceleration --out frf",
     "fit": f"fit {TAPS} --response Acceleration --unknown contact.stiffness=1e5:1e13 --out fit",
 }
-SLOW = {"spread", "watch", "hammer, rove", "hammer, catalogue", "fit", "doctor", "report", "page"}
+SLOW = {"spread", "watch", "hammer, rove", "hammer, catalogue", "hammer, bar", "fit", "doctor", "report", "page"}
 
 
 def commands():

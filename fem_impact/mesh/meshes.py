@@ -68,7 +68,7 @@ class Mesh(check.Locked):
     @property
     def area(self) -> float:
         """Area [m^2] of a plate, up to the chords of curved edges; length [m] of a beam."""
-        return measure(self.points, self.cells)
+        return float(sizes(self.points, self.cells).sum())
 
     def pieces(self, path: Any) -> np.ndarray:
         """Straight pieces (n, 2, 2) [m] of a path (n_points, 2) [m] or, given a name, of that edge."""
@@ -340,10 +340,10 @@ def load(path: Any, *, unit: str | None = None) -> Mesh:
     return replace(made, recipe=partial(_resized, made))
 
 
-def measure(points: np.ndarray, cells: np.ndarray) -> float:
-    """Area [m^2] of triangles or length [m] of line elements, from points (n_points, dimension) and cells."""
+def sizes(points: np.ndarray, cells: np.ndarray) -> np.ndarray:
+    """Areas [m^2] of triangles or lengths [m] of line elements, (n_cells,), from points (n_points, dimension)."""
     corner = points[cells]
-    return float(np.abs(np.linalg.det(corner[:, 1:] - corner[:, :1])).sum()) / points.shape[1]
+    return np.abs(np.linalg.det(corner[:, 1:] - corner[:, :1])) / points.shape[1]
 
 
 @check.typed

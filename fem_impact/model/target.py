@@ -29,7 +29,7 @@ from ..fe.assembly import (
     usual_theory,
 )  # fmt: skip
 from ..fe.section import Beam, Plate
-from ..mesh.meshes import Mesh
+from ..mesh.meshes import Mesh, sizes
 from ..modes import analytic, finding
 from ..modes.air import in_air
 from ..modes.modal import Damping, Modes
@@ -230,11 +230,10 @@ class Target:
 
     @property
     def mass(self) -> float:
-        """Mass [kg] of the plate as struck, with straight edges between the vertices of its mesh."""
+        """Mass [kg] of the body as struck, with straight edges between the vertices of its mesh."""
         assert self.mesh is not None and self.section is not None
-        corners = self.mesh.points[self.mesh.cells]
-        (a, b), (c, d) = (corners[:, 1] - corners[:, 0]).T, (corners[:, 2] - corners[:, 0]).T
-        own = float(0.5 * np.abs(a * d - b * c) @ self.section.inertia(corners.mean(axis=1)))
+        points, cells = self.mesh.points, self.mesh.cells
+        own = float(sizes(points, cells) @ self.section.inertia(points[cells].mean(axis=1)))
         return self.scale.get("mass", own + sum(mass for _, mass in self.point_masses))
 
     def count_below(self, frequency: float) -> float:

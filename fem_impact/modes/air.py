@@ -36,7 +36,7 @@ from scipy.special import jv
 from .._base import check
 from .._base.rounding import EPSILON, HALVINGS, SAME
 from ..fe import plausible
-from ..mesh.meshes import measure
+from ..mesh.meshes import sizes
 from .modal import Modes
 from .shapes import ScaledShapes, Shapes
 
@@ -94,7 +94,7 @@ def in_air(
         return modes
     how: dict[str, Any] = {"density": density, "speed": speed, "sides": sides, "baffled": baffled}
     poorer = {cause: in_air(other, **how) for cause, other in modes.poorer.items()}
-    share, spacing = 1.0 if baffled else 0.5, _spacing(modes, measure(points, cells), speed)
+    share, spacing = 1.0 if baffled else 0.5, _spacing(modes, float(sizes(points, cells).sum()), speed)
     samples, missed = _sampled(modes.shapes, spacing)
     weight = density * sides * share / (2.0 * np.pi)
     found, other = (_Air(modes, _strengths(samples, spacing, n), n * spacing, weight, speed) for n in SAMPLES)
@@ -301,7 +301,7 @@ def _sampled(shapes: Shapes, spacing: float, finer: int = 4) -> tuple[np.ndarray
     samples[:, rim] = values.reshape(rim.sum(), finer**2, -1).mean(axis=1).T
     area = (inside & ~rim).sum() + covered.mean() * rim.sum()
     energy = (samples**2).sum(axis=(1, 2)) * covered.sum()
-    missed = abs(area - measure(*shapes.grid()) / spacing**2)
+    missed = abs(area - sizes(*shapes.grid()).sum() / spacing**2)
     return samples, missed * (at_rim**2).sum(axis=0) / energy
 
 

@@ -28,7 +28,7 @@ from scipy.sparse import csr_array
 from scipy.sparse.linalg import LinearOperator, gmres
 
 from .._base.check import SimulationError
-from ..mesh.meshes import measure
+from ..mesh.meshes import sizes
 from .air import PER_WAVE, between_cells, lattice
 from .modal import Modes
 
@@ -90,7 +90,7 @@ def _directions(n: int = 12) -> np.ndarray:
 
 def reach(modes: Modes, speed: float) -> np.ndarray:
     """Cells across a square as large as the plate that each mode needs, (n_modes,) [-]; rigid motions get zero."""
-    side = np.sqrt(measure(*modes.shapes.grid()))
+    side = np.sqrt(sizes(*modes.shapes.grid()).sum())
     number = np.arange(1, modes.n_modes + 1)  # its wavelength, by Weyl's law
     wave = np.maximum(np.sqrt(4.0 * np.pi * number) / side, modes.omega / speed)  # [1/m]
     return np.where(modes.omega > 0.0, np.maximum(PER_WAVE * wave * side / (2.0 * np.pi), ACROSS[0]), 0.0)
@@ -99,7 +99,7 @@ def reach(modes: Modes, speed: float) -> np.ndarray:
 def jumps(modes: Modes, wanted: np.ndarray, speed: float) -> Iterator[Jumps]:
     """The jumps of the wanted modes, each at its own frequency, on lattices as fine as they need."""
     needed = reach(modes, speed)
-    side = np.sqrt(measure(*modes.shapes.grid()))
+    side = np.sqrt(sizes(*modes.shapes.grid()).sum())
     for coarser, across in zip((0.0, *ACROSS), ACROSS):
         some = np.flatnonzero(wanted & (needed > coarser) & (needed <= across))
         if some.size:
@@ -182,7 +182,7 @@ def fields(
     grid = modes.shapes.grid()[0]
     low, high = grid.min(axis=0), grid.max(axis=0)
     nearest = float(np.linalg.norm(place - np.append(np.clip(place[:2], low, high), 0.0)))
-    least = 2.0 * np.sqrt(measure(*modes.shapes.grid())) / ACROSS[0]
+    least = 2.0 * np.sqrt(sizes(*modes.shapes.grid()).sum()) / ACROSS[0]
     if nearest < least:
         raise ValueError(f"listener must be at least {least:.3g} m from a plate in free air, got {nearest:.3g} m")
     column = np.cumsum(wanted) - 1

@@ -10,6 +10,7 @@ import numpy as np
 from scipy.spatial import Delaunay, QhullError
 
 from .._base.rounding import SAME
+from ..mesh.meshes import sizes
 
 FLAT = 1e-6  # [-] of their extent, by which points may be off a line or a plane: as many digits as files keep
 HELD = 0.25  # [-] of the mass that moves along in a mode of a held body: at least 0.48 in the first of a clamped plate
@@ -98,7 +99,7 @@ def lumps(points: np.ndarray, cells: np.ndarray | None) -> tuple[np.ndarray, np.
     if dimension == 1:
         order = np.argsort(points[:, 0])
         lines = np.column_stack([order[:-1], order[1:]]) if cells is None else cells
-        length = np.abs(np.diff(points[lines, 0], axis=1))[:, 0]
+        length = sizes(points, lines)
         pairs = np.vstack([lines, lines[:, [0, 0]], lines[:, [1, 1]]])
         weight = np.concatenate([4.0 * length, length, length]) / 6.0
     elif dimension == 2:
@@ -106,10 +107,8 @@ def lumps(points: np.ndarray, cells: np.ndarray | None) -> tuple[np.ndarray, np.
             triangles = Delaunay(points).simplices if cells is None else cells
         except (QhullError, ValueError):  # fewer than three points, or all on a line
             return None
-        side = points[triangles[:, 1:]] - points[triangles[:, :1]]
-        area = 0.5 * np.abs(np.linalg.det(side))
         pairs = np.vstack([triangles[:, [0, 1]], triangles[:, [1, 2]], triangles[:, [2, 0]]])
-        weight = np.tile(area / 3.0, 3)
+        weight = np.tile(sizes(points, triangles) / 3.0, 3)
     else:
         return None
     whole = weight.sum()

@@ -13,6 +13,7 @@ from .._base import check, markup
 from ..impact import free_motion
 from ..impact.compiled import layout
 from ..impact.response import Response
+from ..mesh.meshes import sizes
 from ..model.playing import Strokes
 from ..modes import free_air
 from ..modes.air import DENSITY, SPEED
@@ -322,9 +323,8 @@ def radiate(
     density, speed = _air(air)
     rate, heard = _audible(response, rate)
     points, cells = sampling.grid(modes)
-    (ax, ay), (bx, by), (cx, cy) = points[cells].transpose(1, 2, 0)
-    area = 0.5 * np.abs((bx - ax) * (cy - ay) - (by - ay) * (cx - ax))  # a third of it belongs to each corner
-    areas = np.bincount(cells.reshape(-1), np.repeat(area / 3.0, 3), minlength=len(points))
+    thirds = np.repeat(sizes(points, cells) / 3.0, 3)  # of a triangle, which belong to each corner
+    areas = np.bincount(cells.reshape(-1), thirds, minlength=len(points))
     weights = density / (2.0 * np.pi) * np.sign(place[2]) * areas
     way = np.sqrt(((points - place[:2]) ** 2).sum(axis=1) + place[2] ** 2)  # (n_points,) [m]
     shapes = modes.shapes.at(points)[:, heard] * (weights / way)[:, None]  # (n_points, n_heard)
