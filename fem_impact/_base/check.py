@@ -329,6 +329,11 @@ def one_of(name: str, value: Any, allowed: Iterable[str]) -> str:
     raise ValueError(f"{name} must be one of {', '.join(words)}, got {shown(value)}{nearest(value, words)}")
 
 
+def ending(value: Any, *allowed: str) -> str:
+    """Return the ending of the argument ``path``, in small letters, if it is one of those allowed."""
+    return one_of("path ending", path("path", value).suffix.lower(), allowed)
+
+
 def nearest(word: Any, known: Iterable[str]) -> str:
     """Return '; did you mean ...?' for a near miss, else an empty string; an ending that all share tells nothing."""
     ending, known = Path(str(word)).suffix, list(known)

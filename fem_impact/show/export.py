@@ -133,7 +133,7 @@ def write_animation(path: str | Path, modes: Modes, mode: int, *, frames: int = 
 
 def vtk_ending(path: str | Path) -> str:
     """Ending of a path, if `write_vtk` can write it; ValueError otherwise."""
-    return check.one_of("path ending", check.path("path", path).suffix, (".vtu", ".pvd"))
+    return check.ending(path, ".vtu", ".pvd")
 
 
 @check.typed
@@ -196,7 +196,7 @@ def write_sound(path: str | Path, heard: sound.Sound) -> sound.Sound:
     >>> fi.export.write_sound("both.wav", fi.sound.together([tone, tone])).samples.shape
     (4800, 2)
     """
-    check.one_of("path ending", check.path("path", path).suffix.lower(), (".wav",))
+    check.ending(path, ".wav")
     check.instance("heard", heard, sound.Sound)
     heard = heard.faded()
     with replacing(path) as temporary:

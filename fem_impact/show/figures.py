@@ -51,8 +51,7 @@ def styled(width: float, height: float) -> AbstractContextManager[Figure]:
 @check.typed
 def save(path: str | Path, figure: Figure) -> None:
     """Write a figure; the ending of the path sets the format (.png, .pdf, .svg)."""
-    endings = [f".{name}" for name in figure.canvas.get_supported_filetypes()]
-    check.one_of("path ending", check.path("path", path).suffix.lower(), endings)
+    check.ending(path, *(f".{name}" for name in figure.canvas.get_supported_filetypes()))
     with matplotlib.rc_context(STYLE), replacing(path) as temporary:
         figure.savefig(temporary)
 

@@ -52,7 +52,7 @@ def write_history(
     >>> hit = fi.strike(fi.Modes.rigid(1.0), fi.Striker.rigid(0.1), fi.Contact.linear(1e5), at=None, speed=1.0)
     >>> fi.export.write_history("blow.bdf", hit, node=1017, direction="-z")
     """
-    ending = check.one_of("path ending", check.path("path", path).suffix.lower(), ENDINGS)
+    ending = check.ending(path, *ENDINGS)
     stamps = response.time if times is None else check.array("times", times, (None,), "s")
     if not (np.diff(stamps) > 0.0).all():
         stamps = np.unique(stamps)

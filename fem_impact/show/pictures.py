@@ -49,7 +49,7 @@ def mode_shapes(path: str | Path, modes: Modes, *, count: int = 12, columns: int
         Empty, or what to install for a 3D picture if only the flat one of `figures.mode_shapes` could be drawn.
     """
     check.between("dimension of modes", modes.dimension, 1, 2)
-    _ending(path, *STILL)
+    check.ending(path, *STILL)
     if not can_render():
         figures.save(path, figures.mode_shapes(modes, count=count, columns=columns))
         return REMEDY
@@ -110,7 +110,7 @@ def wave(path: str | Path, response: Response, *, time: float | None = None) -> 
     str
         Empty, or what to install for a 3D picture if only a flat one could be drawn.
     """
-    _ending(path, *STILL)
+    check.ending(path, *STILL)
     times = np.linspace(0.0, sampling.end_of(response), FRAMES)
     instant = times[sampling.telling(response, times)] if time is None else check.non_negative("time", time, "s")
     (frame,) = frames_at(response, np.array([instant]))
@@ -133,8 +133,7 @@ def animation(path: str | Path, response: Response, *, frames: int = FRAMES) -> 
     str
         As in `wave`.
     """
-    _ending(path, ".gif", ".mp4")
-    film = Path(path).suffix.lower() == ".mp4"
+    film = check.ending(path, ".gif", ".mp4") == ".mp4"
     encoder = check.extra("imageio_ffmpeg", "film", "an MP4 file") if film else None
     times = np.linspace(0.0, sampling.end_of(response), check.count("frames", frames, low=2, high=sampling.MOST_FRAMES))
     if film:
@@ -154,10 +153,6 @@ def encode(encoder: Any, path: Path, pictures: Iterator[Image.Image]) -> None:
     for picture in (first, *pictures):
         writer.send(np.ascontiguousarray(picture.crop((0, 0, *size))).tobytes())
     writer.close()
-
-
-def _ending(path: str | Path, *endings: str) -> None:
-    check.one_of("path ending", check.path("path", path).suffix.lower(), endings)
 
 
 def film(response: Response, times: np.ndarray | None = None) -> canvas.Film:

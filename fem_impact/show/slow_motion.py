@@ -71,14 +71,13 @@ def write(path: str | Path, response: Response, *, frames: int = 144) -> str:
     ValueError
         If the extra ``film`` is not installed.
     """
-    path = check.path("path", path)
-    check.one_of("path ending", path.suffix.lower(), (".mp4",))
+    check.ending(path, ".mp4")
     encoder = check.extra("imageio_ffmpeg", "film", "an MP4 file")
     times = np.linspace(0.0, sampling.end_of(response), check.count("frames", frames, low=2, high=sampling.MOST_FRAMES))
     said = captions(response)
     with replacing(path) as temporary:
         pictures.encode(encoder, temporary, _composed(response, times, said))
-    with replacing(path.with_suffix(".vtt")) as temporary:
+    with replacing(Path(path).with_suffix(".vtt")) as temporary:
         temporary.write_text(subtitles(said, times), encoding="utf-8")
     return "" if pictures.can_render() else pictures.REMEDY
 

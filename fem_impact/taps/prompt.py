@@ -84,7 +84,7 @@ def peaks(found: xr.Dataset) -> list[dict[str, Any]]:
 
 def write_frf(path: Path, found: xr.Dataset) -> None:
     """Write frequency responses as .csv (real and imaginary parts, coherence) or .uff (data set 58)."""
-    ending = check.one_of("path ending", path.suffix.lower(), (".csv", ".uff"))
+    ending = check.ending(path, ".csv", ".uff")
     with staged(path.parent) as staging:
         if ending == ".uff":
             transfer.write_uff(staging / path.name, found)

@@ -52,8 +52,8 @@ def test_collection_opens_in_pyvista_with_frequencies_as_times(tmp_path, modes):
 
 def test_equal_frequencies_stay_apart_as_times(tmp_path):
     disk = fi.analytic.disk(0.1, edge="clamped", nu=0.3, mass=0.1, first_frequency=200.0, n_modes=5)
-    export.write_vtk(tmp_path / "disk.pvd", disk)
-    times = pyvista.get_reader(tmp_path / "disk.pvd").time_values
+    export.write_vtk(tmp_path / "disk.PVD", disk)
+    times = pyvista.get_reader(tmp_path / "disk.PVD").time_values
     assert len(set(times)) == 5 and disk.frequencies[1] == disk.frequencies[2]
     assert_allclose(times, disk.frequencies, rtol=1e-8)
 
