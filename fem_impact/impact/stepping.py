@@ -12,7 +12,6 @@ from .._base import check
 from .._base.check import SimulationError
 from . import distance, engine
 from .compiled.bundles import KernelSystem
-from .contact import Contact
 from .engine import STEP_SHARE, TOLERANCE
 from .history import History
 from .quantities import asked_for
@@ -92,19 +91,12 @@ def scheme_for(tolerance: float, exponent: float) -> str:
     return "collocation" if tolerance < 1e-7 and exponent >= 1.0 else "A4"
 
 
-def _first_count(scheme: str, tolerance: float, quantities: Mapping[str, float | None]) -> float:
+def first_count(scheme: str, tolerance: float, quantities: Mapping[str, float | None]) -> float:
     """Steps per contact in the first run: for averages half of the usual, as errors of single instants cancel there."""
+    if scheme == "collocation":
+        return 2.0
     count = engine.steps_per_contact(tolerance, 0.5 if scheme == "A" else 0.25)
     return max(6.0, count * (0.5 if set(quantities) <= AVERAGES else 1.0))
-
-
-def steps_for(
-    contact: Contact, duration: float, tolerance: float, quantities: Mapping[str, float | None],
-    scheme: str | None = None, dt: float | None = None,
-) -> tuple[str, float]:  # fmt: skip
-    """Scheme and first time step [s] of `strike`; ``duration`` is the contact time on a rigid wall [s]."""
-    scheme = scheme or scheme_for(tolerance, contact.exponent)
-    return scheme, dt or duration / (2.0 if scheme == "collocation" else _first_count(scheme, tolerance, quantities))
 
 
 @dataclass(frozen=True, eq=False)
@@ -232,7 +224,7 @@ class _Control:
             )
         # or the horizon could cut both runs to one step, and they would always agree
         shortest = min(self.pace.duration, options.last[0])
-        count = _first_count(self.scheme, min(STEP_SHARE * options.tolerance, TOLERANCE), options.quantities)
+        count = first_count(self.scheme, min(STEP_SHARE * options.tolerance, TOLERANCE), options.quantities)
         longest = min(self.pace.longest_step, _longest_lossy(self.system, self.pace, options.tolerance))
         first = min(2.0 * shortest / count, longest)
         return [first * 0.5**n for n in range(8)], STEP_SHARE * options.tolerance  # A4 errs 2**28 times less at last

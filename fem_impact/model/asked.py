@@ -211,16 +211,18 @@ class Asked:
             bending, whole = kept - modes.n_rigid, modes.n_modes - modes.n_rigid
             stiff = "is treated as rigid" if bending == 0 else f"keeps {bending} of its {whole} bending modes"
             reasons = (*reasons, f"the striker {stiff}")
-        fixed = self.values.get("scheme") or ("A4" if self.values["stretching"] else None), self.values["dt"]
-        scheme, dt = stepping.steps_for(self.blow.contact, self.duration, steps, self.quantities, *fixed)
-        until = "fixed by dt" if fixed[1] else f"halved until two runs agree to {steps:.1e}"
+        usual = "A4" if self.values["stretching"] else stepping.scheme_for(steps, self.blow.contact.exponent)
+        scheme, fixed = self.values.get("scheme") or usual, self.values["dt"]
+        dt = fixed or self.duration / stepping.first_count(scheme, steps, self.quantities)
+        until = "fixed by dt" if fixed else f"halved until two runs agree to {steps:.1e}"
         lasts = self.values["duration"]
         end = "until the bodies have parted for good" if lasts is None else f"for {lasts:g} s"
-        count = self.duration / dt
-        refined = scheme == "collocation" and not fixed[1]  # its first step says little of those it takes in the end
+        count = alike = self.duration / dt
+        if scheme == "collocation" and not fixed:  # its first step says little of those it takes in the end:
+            alike = 10.0 * 300.0 * (1e-9 / steps) ** 0.2  # 300 at 1e-9, each ten times the work of another scheme's
         if self.blow.target.air:
             work = work + cost.in_air(n_modes)
-        work = work + cost.strikes(cost.collocated(steps) if refined else count, n_modes + kept)
+        work = work + cost.strikes(alike, n_modes + kept)
         reasons = (*reasons, f"scheme {scheme}, steps of {dt:.3g} s ({count:.0f} per contact), {until}, {end}")
         rest: dict[str, Any] = {"element": None, "size": None, "n_dofs": 0, "max_frequency": None, **chosen}
         return Forecast(

@@ -101,14 +101,6 @@ def in_air(n_modes: float) -> Work:
     return Work(dense=1e-4 * n_modes**2)
 
 
-def collocated(tolerance: float) -> float:
-    """Time steps of an undisturbed contact as `strikes` takes them, by collocation to a tolerance.
-
-    They are 300 at 1e-9, and each is ten times the work of another scheme's step.
-    """
-    return 10.0 * 300.0 * (1e-9 / tolerance) ** 0.2
-
-
 def by_modes(n_dofs: float, n_modes: float) -> Work:
     """Modes on one mesh, their number checked; each takes four times the work of a Ritz vector."""
     return on_mesh(n_dofs, 4.0 * n_modes, n_modes)

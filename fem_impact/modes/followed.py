@@ -79,30 +79,30 @@ def _triangle(basis: np.ndarray) -> np.ndarray:
     return np.asarray(cholesky(basis.T @ basis + ROUNDING * np.eye(basis.shape[1])))
 
 
-def follow_response(lines: MeasuredLines, rounds: int = 25, at_once: int = 12, moves: int = 2) -> Passive:
+def follow_response(lines: MeasuredLines) -> Passive:
     """The sum that follows a response until what is left looks like noise.
 
-    It begins with poles above the band. Poles are then added ``at_once`` in each of some ``rounds``, and all are moved
-    some times before more are added.
+    It begins with poles above the band. Up to a dozen are then added in each of at most 25 rounds, and all are moved
+    twice before more are added.
     """
     top, low = lines.s.imag[-1], lines.s.imag[0]
     beyond = top * np.array([1.02, 1.06, 1.12, 1.2, 1.35, 1.6, 2.2, 4.0])
     kept = fitted(lines, np.log(np.stack([beyond, np.full(len(beyond), 0.02)])))
     offered, matrix = _offered(lines)
-    for _ in range(rounds):
+    for _ in range(25):
         before = np.square(kept.rest).sum()
         noise = before / max(1, len(kept.rest) - 3 * kept.poles.shape[1])
         told = np.maximum(matrix.T @ kept.rest.astype(np.float32), 0.0) ** 2
         more: list[int] = []
         near = np.exp(offered[0])
-        while len(more) < at_once and told.max() > GAIN * noise:
+        while len(more) < 12 and told.max() > GAIN * noise:
             best = int(told.argmax())
             more.append(best)
             width = 2.0 * np.exp(offered[:, best]).prod() + 2.0 * lines.s.real[0] + 2.0 * low
             told[np.abs(near - near[best]) <= width] = 0.0
         if not more:
             break
-        kept = _moved(lines, fitted(lines, np.hstack([kept.poles, offered[:, more]])), moves)
+        kept = _moved(lines, fitted(lines, np.hstack([kept.poles, offered[:, more]])))
         if before - np.square(kept.rest).sum() < GAIN * noise:
             break
     return kept
@@ -124,10 +124,10 @@ def _offered(lines: MeasuredLines) -> tuple[np.ndarray, np.ndarray]:
     return poles, matrix
 
 
-def _moved(lines: MeasuredLines, kept: Passive, steps: int) -> Passive:
-    """The poles moved by damped Gauss-Newton steps, amplitudes eliminated (Kaufman 1975, BIT 15, 49-57)."""
+def _moved(lines: MeasuredLines, kept: Passive) -> Passive:
+    """The poles moved by two damped Gauss-Newton steps, amplitudes eliminated (Kaufman 1975, BIT 15, 49-57)."""
     caution = 1e-2
-    for _ in range(steps):
+    for _ in range(2):
         n = kept.poles.shape[1]
         basis = columns(lines, kept.poles)[:, np.append(kept.amplitudes[:2] > 0.0, np.ones(n, bool))]
         basis /= np.linalg.norm(basis, axis=0)

@@ -108,17 +108,17 @@ def heights(*, table: str) -> Any:
     return rise.table(np.column_stack(plane), z)
 
 
-def over_frequency(name: str, value: Any) -> Any:
-    """A number, or a function of frequency [Hz] from ``{frequency = [...], ratio = [...]}``.
+def over_frequency(value: Any) -> Any:
+    """A damping ratio, or a function of frequency [Hz] from ``{frequency = [...], ratio = [...]}``.
 
     It is linear in between and constant beyond.
     """
     if not isinstance(value, dict):
-        return check.non_negative(name, value)
+        return check.non_negative("damping_ratio", value)
     if set(value) != {"frequency", "ratio"}:
-        raise ValueError(f"{name} must be a number or have frequency and ratio, got {check.shown(value)}")
-    frequency = check.ascending(f"{name}.frequency", value["frequency"], "Hz")
-    ratio = check.array(f"{name}.ratio", value["ratio"], frequency.shape)
+        raise ValueError(f"damping_ratio must be a number or have frequency and ratio, got {check.shown(value)}")
+    frequency = check.ascending("damping_ratio.frequency", value["frequency"], "Hz")
+    ratio = check.array("damping_ratio.ratio", value["ratio"], frequency.shape)
     if (ratio < 0.0).any():
-        raise ValueError(f"{name}.ratio must not be negative, got {ratio.min():g}")
+        raise ValueError(f"damping_ratio.ratio must not be negative, got {ratio.min():g}")
     return lambda hertz: np.interp(hertz, frequency, ratio)

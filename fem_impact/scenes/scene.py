@@ -13,7 +13,7 @@ import numpy as np
 from .._base import check, known, markup
 from ..fe.assembly import System, clamped, support_of_facets, support_words
 from ..fe.ribs import Rib, sides_on
-from ..fe.section import Beam, Material, Plate, evaluate
+from ..fe.section import Beam, Elastic, Material, Plate, evaluate
 from ..fe.springs import check_posts
 from ..impact import promise
 from ..impact.contact import Contact
@@ -34,7 +34,7 @@ from .whole import check_whole
 
 from .schema import (  # isort: skip
     MAKERS, NESTED, PARTS, PATHS, REPEATED, REQUIRED, TABLES, Part, fault, read_list, read_part, read_strokes,
-    read_tables, supports_of,
+    read_tables,
 )  # fmt: skip
 
 # [-] places along a beam where its section is looked at: ten in each hundredth of it, where it may change
@@ -369,7 +369,7 @@ class Scene(check.Brief):
         mesh = self.body()
         section = self.make_section("beam" if mesh.dimension == 1 else "plate")
         section = replace(section, rise=mesh.rise, ribs=self.ribs) if isinstance(section, Plate) else section
-        supports = supports_of(self.held)
+        supports = {edge: Elastic(**kind) if isinstance(kind, dict) else kind for edge, kind in self.held.items()}
         with self.blame("supports"):
             support_of_facets(mesh, supports, support_words(self.target.values.get("theory")))
         for edge in self.in_plane.values:

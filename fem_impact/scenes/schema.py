@@ -178,7 +178,7 @@ def target_values(**values: Any) -> dict[str, Any]:
     for key in set(given) - set(LISTED):
         given[key] = None if given[key] is None else keys.checked("target", key, given[key])
     scale = {key: given.pop(key) for key in ("mass", "first_frequency")}
-    given["damping_ratio"] = over_frequency("damping_ratio", given["damping_ratio"])
+    given["damping_ratio"] = over_frequency(given["damping_ratio"])
     for key, read in (("point_masses", _weight), ("point_supports", _post)):
         if not isinstance(given[key], (list, tuple)):
             words = f"{key} must be a list of tables such as [{{ at = [0.1, 0.2] }}]"
@@ -203,11 +203,6 @@ def _post(i: int, entry: Any) -> tuple:
     if "stiffness" not in entry:
         return entry["at"], "hinged"
     return entry["at"], check.positive(f"point_supports[{i}].stiffness", entry["stiffness"], "N/m")
-
-
-def supports_of(values: Mapping[str, Any]) -> dict[str, Any]:
-    """The supports of a scene: edge -> "clamped", "hinged", "free" or `Elastic`, from {stiffness, rotation}."""
-    return {edge: Elastic(**kind) if isinstance(kind, dict) else kind for edge, kind in values.items()}
 
 
 def _observe(*, points: Any = None, listener: Any = None, listeners: Any = None) -> None:

@@ -26,8 +26,8 @@ def table(name: str, value: Any, example: str = "") -> dict[str, Any]:
     return dict(value)
 
 
-def generator(name: str, value: Any) -> np.random.Generator:
-    """A random generator from a seed or a generator."""
+def generator(value: Any) -> np.random.Generator:
+    """A random generator from ``rng``, a seed or a generator."""
     if isinstance(value, np.random.Generator):
         return value
     seed = [value] if isinstance(value, (int, np.integer)) and not isinstance(value, bool) else value
@@ -35,4 +35,4 @@ def generator(name: str, value: Any) -> np.random.Generator:
         isinstance(part, (int, np.integer)) and not isinstance(part, bool) and part >= 0 for part in seed
     ):  # fmt: skip
         return np.random.default_rng(seed if len(seed) > 1 else seed[0])
-    raise ValueError(f"{name} must be a numpy.random.Generator or a seed of whole numbers, got {check.shown(value)}")
+    raise ValueError(f"rng must be a numpy.random.Generator or a seed of whole numbers, got {check.shown(value)}")

@@ -143,7 +143,7 @@ def fit(
     place = None if target is None else target.point("at", at)[0]
     rig, impulse = Rig(cut.rate, anti_alias, tip_mass, resonance), float(np.mean(cut.impulse))
     inner = None if smaller is None else _inner(smaller, cut, n_points)
-    begin = Starts(check.count("starts", starts), arguments.generator("rng", rng), watch, inner)
+    begin = Starts(check.count("starts", starts), arguments.generator(rng), watch, inner)
     settings = [
         Setting(target, place, striker, law, rig, own, points, n_points, impulse) for law, own in zip(laws, names)
     ]

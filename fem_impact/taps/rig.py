@@ -241,7 +241,7 @@ def _digitised(records: np.ndarray, rig: Rig, rng: Any) -> tuple[np.ndarray, np.
     if rig.noise:
         if rng is None:
             raise ValueError("rng must be given for noise: a numpy.random.Generator or a seed")
-        records = records + rig.noise * peak * arguments.generator("rng", rng).standard_normal(records.shape)
+        records = records + rig.noise * peak * arguments.generator(rng).standard_normal(records.shape)
     top = 1.25 * peak
     top[0] = rig.full_scale or top[0]
     overload = (np.abs(records) >= top).any(axis=1)

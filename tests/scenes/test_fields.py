@@ -92,7 +92,7 @@ def test_first_case_that_holds_counts():
 
 
 def test_damping_over_frequency():
-    damping = over_frequency("damping_ratio", {"frequency": [100.0, 300.0], "ratio": [0.0, 0.2]})
+    damping = over_frequency({"frequency": [100.0, 300.0], "ratio": [0.0, 0.2]})
     assert_allclose(damping(np.array([50.0, 200.0, 400.0])), [0.0, 0.1, 0.2])
 
 
