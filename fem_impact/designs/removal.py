@@ -9,7 +9,7 @@ from scipy.spatial import cKDTree
 
 from .._base import check
 from .._base.rounding import SAME
-from ..fe.section import Beam, Plate, evaluate
+from ..fe.section import Beam, Plate, size_at
 from ..fe.slopes import quadrature
 from ..fe.system import System
 from ..fe.variation import SectionChange, frequency_densities
@@ -55,8 +55,7 @@ def thinner(section: Any, depth: Any) -> Any:
     """
 
     def less(name: str, times: float) -> Any:
-        value = getattr(section, name)
-        return lambda points: evaluate(name, value, points, "m") - times * depth(points)
+        return lambda points: size_at(section, name, points) - times * depth(points)
 
     if isinstance(section, Plate):
         return replace(section, thickness=less("thickness", 1.0))
@@ -69,13 +68,13 @@ def across(section: Any, points: np.ndarray) -> np.ndarray:
     """Width (n,) [m] of the surface of a bar that dishes are cut into, its girth if round; 1 of a plate."""
     if isinstance(section, Plate):
         return np.ones(len(points))
-    return evaluate("width", section.width, points, "m") * (np.pi if section.round else 1.0)
+    return size_at(section, "width", points) * (np.pi if section.round else 1.0)
 
 
 def thickness(section: Any, points: np.ndarray) -> np.ndarray:
     """Thickness of a plate or height of a bar, (n,) [m]."""
     name = "thickness" if isinstance(section, Plate) else "height"
-    return evaluate(name, getattr(section, name), points, "m")
+    return size_at(section, name, points)
 
 
 def check_body(section: Any) -> None:

@@ -15,7 +15,7 @@ from .euler import EULER
 from .interpolation import Interpolation
 from .kirchhoff import ARGYRIS, MORLEY
 from .ribs import Rib, check_apart
-from .section import KINDS, Beam, Elastic, Plate, evaluate
+from .section import KINDS, Beam, Elastic, Plate, size_at
 from .shallow import SHALLOW
 from .shear_beam import TIMOSHENKO
 from .splitting import towards_points
@@ -233,7 +233,7 @@ def _graded(
     if rules.layered is not None:
         fine = rules.layered(fine, section, kinds(fine), layer)
     if len(points):
-        least = rules.patch * evaluate("thickness", section.thickness, points, "m") if rules.patch else 0.0
+        least = rules.patch * size_at(section, "thickness", points) if rules.patch else 0.0
         held = np.array([kind != "free" for kind in support_of_facets(fine, supports, rules.words)])
         fine = towards_points(fine, points, held, least, coarseness)
     return corners, fine

@@ -8,7 +8,7 @@ from scipy.sparse import csr_matrix, vstack
 from .._base import explained
 from .._base.rounding import ROUNDING
 from .._base.untyped import Sparse
-from .section import evaluate
+from .section import size_at
 from .theory import Frame, Theory, blocks
 
 
@@ -34,7 +34,7 @@ class Interpolation:
         rows = self._exactly(local, expand.shape[0])
         if not self.theory.patch:
             return rows
-        radius = self.theory.patch * evaluate("thickness", self.section.thickness, points, "m") / self.frame.length
+        radius = self.theory.patch * size_at(self.section, "thickness", points) / self.frame.length
         moves = abs(rows @ expand).max(axis=1).toarray()[:, 0] > ROUNDING
         still, moving = np.flatnonzero(~moves), np.flatnonzero(moves)
         found = [rows[still]]  # on a support, so at rest

@@ -35,7 +35,7 @@ from .._base.untyped import Sparse
 from . import plane, slopes
 from .eigenvalues import factorise
 from .elements import area_coordinates, triangles
-from .section import Plate, evaluate
+from .section import Plate, size_at
 from .system import System
 from .theory import blocks, gram, scatter
 
@@ -69,7 +69,7 @@ class Sheet:
         space: Any = system.space
         X, x, dx = slopes.quadrature(system, 4)  # exact for the stiffness of quartic elements
         gradient = plane.gradients(space, np.arange(len(x)), area_coordinates(X.T)[None])
-        h = evaluate("thickness", section.thickness, frame.to_metres(x), "m").reshape(dx.shape)
+        h = size_at(section, "thickness", frame.to_metres(x)).reshape(dx.shape)
         moduli = (frame.length**2 * h * dx)[..., None, None] * section.stretched
         own = plane.numbered(triangles(rim.points, space.vertices))
         dofs = np.vstack([own.element_dofs, own.N + own.element_dofs]).T

@@ -21,7 +21,7 @@ from .._base import check
 from ..mesh.mesh_files import sides_of
 from ..mesh.meshes import Mesh
 from .corners import towards
-from .section import Beam, Plate, Varying, evaluate
+from .section import Beam, Plate, Varying, size_at
 from .splitting import distance
 from .springs import at_facets
 from .theory import Frame, gram
@@ -93,7 +93,7 @@ class Rib:
         inertia = beam.inertia(place)
         z: Any = self.offset
         if z is None:
-            z = -0.5 * (thickness + evaluate("height", beam.height, place, "m"))
+            z = -0.5 * (thickness + size_at(beam, "height", place))
         elif callable(z):
             z = check.field("offset", z, points, "m")
         stretch = beam.material.E * inertia / beam.material.rho
@@ -150,7 +150,7 @@ def singular(mesh: Mesh, ribs: Sequence[Rib]) -> tuple[dict[int, list[int]], dic
             for vertex, count in zip(*np.unique(sides_on(mesh, rib.path), return_counts=True)):
                 counts.setdefault(int(vertex), []).append(int(count))
                 place = rib.distances(mesh.points[[vertex]])
-                width[int(vertex)] = float(evaluate("width", rib.section.width, place, "m")[0])
+                width[int(vertex)] = float(size_at(rib.section, "width", place)[0])
     rim = set(np.unique(mesh.facets).tolist())
     return {vertex: each for vertex, each in counts.items() if each != [2] and vertex not in rim}, width
 
@@ -191,7 +191,7 @@ class RibLine(NamedTuple):
         (nx, ny), place = np.moveaxis(normal, 2, 0), frame.to_metres(x)
         along = np.stack([ny**2, nx**2, -nx * ny], axis=-1)  # for the tangent (-ny, nx)
         twist = np.stack([-nx * ny, nx * ny, 0.5 * (nx**2 - ny**2)], axis=-1)
-        stiffness, inertia = rib.rigidity(place, evaluate("thickness", section.thickness, place, "m"))
+        stiffness, inertia = rib.rigidity(place, size_at(section, "thickness", place))
         shaped = stiffness.reshape(*ds.shape, 3, 3), inertia.reshape(ds.shape)
         return cls(rib, facets, cells, area, x, ds, along, twist, *shaped)
 

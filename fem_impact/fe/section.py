@@ -19,17 +19,17 @@ SOFT = "soft hinged"  # support of a thick plate that leaves the rotation along 
 Varying = float | Callable[[np.ndarray], Any]
 
 
-def evaluate(name: str, value: Varying, points: np.ndarray, unit: str) -> np.ndarray:
-    """Values (n_points,) of a number or function at points (n_points, dimension); raise ValueError if not positive."""
-    points = check.array("points", points, (None, None), "m")
+def size_at(section: Any, name: str, points: np.ndarray) -> np.ndarray:
+    """A size (n_points,) [m] of a section, a number or a function, at points; raise ValueError if not positive."""
+    points, value = check.array("points", points, (None, None), "m"), getattr(section, name)
     if not callable(value):
-        return np.full(len(points), check.positive(name, value, unit))
-    field = check.field(name, value, points, unit)
+        return np.full(len(points), check.positive(name, value, "m"))
+    field = check.field(name, value, points, "m")
     worst = int(np.argmin(field))
     if field[worst] < 1.0 / check.REACH:
         where = ", ".join(f"{x:g}" for x in points[worst])
-        rule = "positive" if field[worst] <= 0.0 else f"at least {1.0 / check.REACH:g} {unit}"
-        raise ValueError(f"{name} must be {rule} everywhere, got {field[worst]:g} {unit} at ({where}) m")
+        rule = "positive" if field[worst] <= 0.0 else f"at least {1.0 / check.REACH:g} m"
+        raise ValueError(f"{name} must be {rule} everywhere, got {field[worst]:g} m at ({where}) m")
     return field
 
 
@@ -131,7 +131,7 @@ class Plate:
         """Stiffness (n_points, 6, 6) on strains xx, yy, 2 xy and negative curvatures: [N/m], [N] and [N m]."""
         if self.layers:
             return np.broadcast_to(layering.moments(self.layers), (len(points), 6, 6))
-        thickness = evaluate("thickness", self.thickness, points, "m")[:, None, None]
+        thickness = size_at(self, "thickness", points)[:, None, None]
         result = np.zeros((len(points), 6, 6))
         result[:, :3, :3] = thickness * self.material.plane_stress
         result[:, 3:, 3:] = self.stiffness(points)
@@ -146,23 +146,23 @@ class Plate:
 
     def stiffness(self, points: np.ndarray) -> np.ndarray:
         """Bending stiffness (n_points, 3, 3) [N m] on curvatures (xx, yy, 2 xy)."""
-        thickness = evaluate("thickness", self.thickness, points, "m")
+        thickness = size_at(self, "thickness", points)
         return (thickness**3 / 12.0)[:, None, None] * self.material.plane_stress
 
     def inertia(self, points: np.ndarray) -> np.ndarray:
         """Mass per area (n_points,) [kg/m^2]."""
-        return self.material.rho * evaluate("thickness", self.thickness, points, "m")
+        return self.material.rho * size_at(self, "thickness", points)
 
     def shear(self, points: np.ndarray) -> np.ndarray:
         """Shear stiffness (n_points, 2, 2) [N/m] on mean shear strains (xz, yz), for a thick plate."""
-        return SHEAR * evaluate("thickness", self.thickness, points, "m")[:, None, None] * self.material.through
+        return SHEAR * size_at(self, "thickness", points)[:, None, None] * self.material.through
 
     def rotary(self, points: np.ndarray) -> np.ndarray:
         """Rotary inertia per area (n_points,) [kg], for a thick plate."""
         if self.layers:
             each = [rho * h * (z**2 + h**2 / 12.0) for (rho, h, z) in ((m.rho, h, z) for m, h, z in self.layers)]
             return np.full(len(points), sum(each))
-        return self.material.rho * evaluate("thickness", self.thickness, points, "m") ** 3 / 12.0
+        return self.material.rho * size_at(self, "thickness", points) ** 3 / 12.0
 
 
 @dataclass(frozen=True)
@@ -250,8 +250,8 @@ class Beam:
 
     def stiffness(self, points: np.ndarray) -> np.ndarray:
         """Bending stiffness E I, (n_points,) [N m^2]."""
-        height = evaluate("height", self.height, points, "m")
-        width = evaluate("width", self.width, points, "m")
+        height = size_at(self, "height", points)
+        width = size_at(self, "width", points)
         return self.material.E * width * height**3 * (np.pi / 64.0 if self.round else 1.0 / 12.0)
 
     def inertia(self, points: np.ndarray) -> np.ndarray:
@@ -259,7 +259,7 @@ class Beam:
         return self.material.rho * self._area(points)
 
     def _area(self, points: np.ndarray) -> np.ndarray:
-        area = evaluate("height", self.height, points, "m") * evaluate("width", self.width, points, "m")
+        area = size_at(self, "height", points) * size_at(self, "width", points)
         return area * (np.pi / 4.0 if self.round else 1.0)
 
     @property
@@ -275,7 +275,7 @@ class Beam:
 
     def torsion(self, points: np.ndarray) -> np.ndarray:
         """Torsional stiffness (n_points,) [N m^2] by Saint-Venant, for a rib."""
-        height, width = (evaluate(name, getattr(self, name), points, "m") for name in ("height", "width"))
+        height, width = (size_at(self, name, points) for name in ("height", "width"))
         shear = self.material.transverse[0]
         if self.round:
             return shear * np.pi / 32.0 * height**4

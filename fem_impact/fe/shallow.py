@@ -36,7 +36,7 @@ from . import plane, plates, ribs, slopes, splitting
 from .elements import area_coordinates, curvatures, numbering
 from .plane import FIRST, LOCAL, SECOND, PlaneSpace
 from .ribs import RibLine
-from .section import evaluate
+from .section import size_at
 from .supports import constrain
 from .theory import (
     Domain,
@@ -155,7 +155,7 @@ def towards_bends(mesh: Mesh, section: Any, kinds: list[str], coarser: float) ->
         z = check.field("rise", section.rise, places.reshape(-1, 2), "m").reshape(9, -1, 3)
         sag = np.abs(z[4] - 0.5 * (z[0] + z[8])).max(axis=1)
         kink = np.abs(z[1::2] - np.tensordot(between, z[::2], 1)).max(axis=(0, 2))
-        least = evaluate("thickness", section.thickness, corner.mean(axis=1), "m") * coarser**2
+        least = size_at(section, "thickness", corner.mean(axis=1)) * coarser**2
         # bending that does not stretch a curved plate needs displacements beyond quartics where the middle of a side
         # rises more than this over its chord; ten modes of a cymbal then err by 2e-3
         uneven = (sag > 0.5 * least) | (kink > KINK * least)

@@ -7,7 +7,7 @@ import numpy as np
 
 from . import beam_elements
 from .elements import collapsed, on_true_edge
-from .section import Plate, evaluate
+from .section import Plate, size_at
 from .system import System
 from .theory import Points, blocks, unknowns_of_cells, weighted
 
@@ -80,7 +80,7 @@ def softness(system: System) -> float:
     _, x, dx = quadrature(system)
     place = frame.to_metres(x)
     if isinstance(section, Plate):
-        size = evaluate("thickness", section.thickness, place, "m")
+        size = size_at(section, "thickness", place)
     else:
         size = section.inertia(place) * section.material.E / section.material.rho
     return float((dx.ravel() / size).sum() * frame.length ** x.shape[-1])

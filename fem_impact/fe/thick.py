@@ -61,7 +61,7 @@ from ..mesh.meshes import LONGEST, Mesh
 from . import plane, plates, splitting, supports
 from .elements import Bent, area_coordinates, curvatures, numbering
 from .plane import FIRST, LOCAL, QUARTIC, SECOND, PlaneSpace, reference
-from .section import KINDS, SOFT, Plate, evaluate
+from .section import KINDS, SOFT, Plate, size_at
 from .springs import at_facets
 from .theory import Domain, Held, Points, Subject, Term, Theory
 
@@ -153,7 +153,7 @@ def terms(space: MindlinSpace, points: Points, cells: np.ndarray) -> list[Term]:
 
 def _domain(body: Subject, fields: tuple[str, ...]) -> Domain:
     found = plates.domain(MindlinSpace, body, fields)
-    h = evaluate("thickness", body.section.thickness, found.frame.to_metres(found.space.origin), "m")
+    h = size_at(body.section, "thickness", found.frame.to_metres(found.space.origin))
     found.space.turn(found.cells, h / found.frame.length)
     return found
 
@@ -255,7 +255,7 @@ def layered(mesh: Mesh, section: Plate, kinds: list[str], coarser: float) -> Mes
         return mesh
     ends = mesh.points[mesh.facets[loose]]
     length = float(np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1).sum())
-    thin = float(evaluate("thickness", section.thickness, mesh.middles[loose], "m").min())
+    thin = float(size_at(section, "thickness", mesh.middles[loose]).min())
     # triangles of twice the thickness h err by some 2e-4 h / L of a frequency
     return towards_edges(mesh, loose, coarser * max(2.0 * thin, length / MOST_LAYER))
 
@@ -277,7 +277,7 @@ def errors_by_layers(system: Any, vectors: np.ndarray, loads: np.ndarray, forced
     twist = np.stack([-2.0 * nx * ny, 2.0 * nx * ny, nx**2 - ny**2], axis=-1)  # strains of a unit 2 kappa_nt
     rigidity = np.einsum("fqi,fqij,fqj->fq", 0.5 * twist * [1.0, 1.0, 2.0], stiffness, 0.5 * twist * [1.0, 1.0, 2.0])
     width = np.sqrt(rigidity / np.einsum("fqi,fqij,fqj->fq", along, shear, along))
-    thin = evaluate("thickness", system.section.thickness, frame.to_metres(x), "m").reshape(ds.shape) / frame.length
+    thin = size_at(system.section, "thickness", frame.to_metres(x)).reshape(ds.shape) / frame.length
     coarse = ds.sum(axis=1)[:, None] / thin
     # sides up to four times the thickness resolve the layer, from nine times on they miss it
     share = np.where(coarse > 4.0, np.minimum(1.0, (coarse / 9.0) ** 2), 0.0)

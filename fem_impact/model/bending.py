@@ -27,7 +27,7 @@ from ..fe.assembly import System, support_of_facets
 from ..fe.corners import meetings
 from ..fe.elements import collapsed
 from ..fe.residual import Moments
-from ..fe.section import PLANE, SHEAR, Beam, Plate, evaluate
+from ..fe.section import PLANE, SHEAR, Beam, Plate, size_at
 from ..fe.springs import at_facets
 from ..fe.theory import unknowns_of_cells
 from ..mesh.meshes import Mesh
@@ -106,11 +106,9 @@ class Known:
         """Mean thickness [m] in the direction of the blow; None if it is not known."""
         if self.section is None:
             return None
-        size = self.section.thickness if isinstance(self.section, Plate) else self.section.height
-        if not callable(size):
-            return float(size)
-        points = self.modes.shapes.grid()[0]
-        return float(evaluate("thickness", size, points, "m").mean())
+        name = "thickness" if isinstance(self.section, Plate) else "height"
+        size = getattr(self.section, name)
+        return float(size_at(self.section, name, self.modes.shapes.grid()[0]).mean() if callable(size) else size)
 
 
 def known_of(modes: Modes) -> Known | None:
@@ -234,7 +232,7 @@ def _plate(system: System, vectors: np.ndarray, thick: bool) -> np.ndarray:
     result[1] = np.einsum("eq,eqk->k", area, value @ moved) * frame.length**2 * frame.mass**-0.5
     if not thick:
         return result
-    h = evaluate("thickness", section.thickness, flat, "m").reshape(area.shape)
+    h = size_at(section, "thickness", flat).reshape(area.shape)
     inertia = section.inertia(flat).reshape(area.shape)
     result[2] = np.einsum("eq,eqk->k", area * inertia * h**2 / 12.0, steep) / (frame.inertia * frame.length**2)
     moments = Moments(system)
@@ -254,7 +252,7 @@ def _plate(system: System, vectors: np.ndarray, thick: bool) -> np.ndarray:
         moment = moments.derivatives(at, place, 0)[:, 0]
         twist = ((moment[:, 1] - moment[:, 0]) * nx * ny + moment[:, 2] * (nx**2 - ny**2)) @ moved[at]
         flat = frame.to_metres(place)
-        h = evaluate("thickness", section.thickness, flat, "m").reshape(ds.shape)
+        h = size_at(section, "thickness", flat).reshape(ds.shape)
         stiff = section.stiffness(flat)[:, 2, 2].reshape(ds.shape) / frame.stiffness
         result[4] = np.einsum("eq,eqk->k", ds * h * FADES / frame.length / stiff, twist**2) / energy
     return result

@@ -13,7 +13,7 @@ import numpy as np
 from .._base import check, known, markup
 from ..fe.assembly import System, clamped, support_of_facets, support_words
 from ..fe.ribs import Rib, sides_on
-from ..fe.section import Beam, Elastic, Material, Plate, evaluate
+from ..fe.section import Beam, Elastic, Material, Plate, size_at
 from ..fe.springs import check_posts
 from ..impact import promise
 from ..impact.contact import Contact
@@ -235,7 +235,7 @@ class Scene(check.Brief):
         section, points = self.make_section("beam"), self.body().points
         x = np.linspace(points.min(axis=0), points.max(axis=0), SECTIONS)
         assert isinstance(section, Beam)
-        width, height = (float(evaluate(name, getattr(section, name), x, "m").max()) for name in ("width", "height"))
+        width, height = (float(size_at(section, name, x).max()) for name in ("width", "height"))
         return width, height
 
     @property
