@@ -76,6 +76,12 @@ def replacing(path: str | Path) -> Iterator[Path]:
             temporary.unlink(missing_ok=True)
 
 
+def write_whole(path: str | Path, content: str | bytes) -> int:
+    """Write a file, text as UTF-8, by `replacing`; return its size [byte]."""
+    with replacing(path) as temporary:
+        return temporary.write_bytes(content.encode() if isinstance(content, str) else content)
+
+
 @contextmanager
 def staged(folder: str | Path, command: str | None = None) -> Iterator[Path]:
     """Yield an empty folder; move all its files into ``folder`` if the block succeeds, none if it fails.

@@ -22,7 +22,7 @@ import numpy as np
 import scipy
 import scipy.sparse as sp
 
-from .._base.files import replacing
+from .._base.files import write_whole
 from ..fe.eigenvalues import factorise, one_thread
 from ..impact import collision
 from ..impact.compiled import build
@@ -219,8 +219,7 @@ def keep(machine: Machine) -> bool:
         return False
     with suppress(OSError):
         path.parent.mkdir(parents=True, exist_ok=True)
-        with replacing(path) as temporary:
-            temporary.write_text(json.dumps({"stamp": _stamp(), **asdict(machine)}), encoding="utf-8")
+        write_whole(path, json.dumps({"stamp": _stamp(), **asdict(machine)}))
         return True
     return False
 

@@ -11,7 +11,7 @@ import numpy as np
 from scipy.io import wavfile
 
 from .._base import markup
-from .._base.files import replacing
+from .._base.files import write_whole
 from ..show import export
 
 WEB = Path(__file__).parent / "web"
@@ -37,9 +37,7 @@ def write_page(
 ) -> int:
     """Fill a template with what is told, styles and scripts, and write it; return its size [byte]."""
     parts = {"style": web_text(*styles), "script": web_text(*scripts), "versions": export.versions()}
-    page = template(name).render(parts, **told)
-    with replacing(path) as temporary:
-        return temporary.write_bytes(page.encode())
+    return write_whole(path, template(name).render(parts, **told))
 
 
 def script_data(data: Any) -> str:

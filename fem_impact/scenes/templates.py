@@ -3,7 +3,7 @@
 from pathlib import Path
 
 from .._base import check
-from .._base.files import replacing
+from .._base.files import write_whole
 
 BODIES = {
     "plate": """title = "A steel ball taps a wooden plate"
@@ -122,5 +122,4 @@ def write_scene(path: Path, kind: str, whole: str | None = None) -> None:
     if path.exists():
         raise ValueError(f"{path} exists already; name another file with --out, or remove it")
     path.parent.mkdir(parents=True, exist_ok=True)
-    with replacing(path) as temporary:
-        temporary.write_text(text(kind) if whole is None else whole, encoding="utf-8")
+    write_whole(path, text(kind) if whole is None else whole)

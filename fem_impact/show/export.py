@@ -15,7 +15,7 @@ from xml.sax.saxutils import quoteattr
 import numpy as np
 
 from .._base import check
-from .._base.files import replacing
+from .._base.files import replacing, write_whole
 from .._base.rounding import SAME
 from ..impact.assumption import table
 from ..impact.response import Response
@@ -199,8 +199,7 @@ def write_sound(path: str | Path, heard: sound.Sound) -> sound.Sound:
     check.ending(path, ".wav")
     check.instance("heard", heard, sound.Sound)
     heard = heard.faded()
-    with replacing(path) as temporary:
-        temporary.write_bytes(heard.wav())
+    write_whole(path, heard.wav())
     return heard
 
 
@@ -213,9 +212,7 @@ def write_force(path: str | Path, response: Response | Strokes) -> None:
     >>> hit = fi.strike(fi.Modes.rigid(1.0), fi.Striker.rigid(0.1), fi.Contact.linear(1e5), at=None, speed=1.0)
     >>> fi.export.write_force("force.csv", hit)
     """
-    with replacing(path) as temporary:
-        text = csv_text(**{"time [s]": response.time, "force [N]": response.force})
-        temporary.write_text(text, encoding="utf-8", newline="")
+    write_whole(path, csv_text(**{"time [s]": response.time, "force [N]": response.force}))
 
 
 @check.typed
@@ -227,8 +224,7 @@ def write_json(path: str | Path, data: dict[str, Any]) -> None:
     >>> hit = fi.strike(fi.Modes.rigid(1.0), fi.Striker.rigid(0.1), fi.Contact.linear(1e5), at=None, speed=1.0)
     >>> fi.export.write_json("hit.json", fi.export.numbers(hit))
     """
-    with replacing(path) as temporary:
-        temporary.write_text(json.dumps(plain(data), indent=2, allow_nan=False) + "\n", encoding="utf-8")
+    write_whole(path, json.dumps(plain(data), indent=2, allow_nan=False) + "\n")
 
 
 SCALARS = (
@@ -364,10 +360,9 @@ def _write_collection(path: Path, points, cells, parts: list[tuple[dict, dict]],
         _write_vtu(folder / name, points, cells, arrays, {**fields, "TimeValue": stamp})
         file = quoteattr(f"{folder.name}/{name}")
         lines.append(f'<DataSet timestep="{float(stamp)!r}" group="" part="0" file={file}/>')
-    with replacing(path) as temporary:
-        body = "\n".join(lines)
-        text = f'<VTKFile type="Collection" version="0.1">\n<Collection>\n{body}\n</Collection>\n</VTKFile>\n'
-        temporary.write_text('<?xml version="1.0"?>\n' + text, encoding="utf-8")
+    body = "\n".join(lines)
+    text = f'<VTKFile type="Collection" version="0.1">\n<Collection>\n{body}\n</Collection>\n</VTKFile>\n'
+    write_whole(path, '<?xml version="1.0"?>\n' + text)
 
 
 def _write_vtu(path: Path, points: np.ndarray, cells: np.ndarray, arrays: dict, fields: dict) -> None:
@@ -384,16 +379,15 @@ def _write_vtu(path: Path, points: np.ndarray, cells: np.ndarray, arrays: dict, 
         _data_array(name, array)
         for name, array in (("connectivity", cells.reshape(-1)), ("offsets", offsets), ("types", types))
     )
-    text = (
+    write_whole(
+        path,
         '<?xml version="1.0"?>\n<VTKFile type="UnstructuredGrid" version="1.0" byte_order="LittleEndian" '
         'header_type="UInt64">\n<UnstructuredGrid>\n'
         f"<FieldData>\n{field_data}</FieldData>\n"
         f'<Piece NumberOfPoints="{len(points)}" NumberOfCells="{len(cells)}">\n'
         f"<PointData>\n{point_data}</PointData>\n<Points>\n{geometry}</Points>\n<Cells>\n{cell_data}</Cells>\n"
-        "</Piece>\n</UnstructuredGrid>\n</VTKFile>\n"
+        "</Piece>\n</UnstructuredGrid>\n</VTKFile>\n",
     )
-    with replacing(path) as temporary:
-        temporary.write_text(text, encoding="utf-8")
 
 
 def _data_array(name: str, values: Any, tuples: bool = False) -> str:

@@ -9,7 +9,7 @@ import numpy as np
 from PIL import Image, ImageDraw, ImageFont
 
 from .._base import check
-from .._base.files import replacing
+from .._base.files import replacing, write_whole
 from ..impact.response import Response
 from . import canvas, figures, pictures, sampling
 from .style import BLUE, VERMILION, font_file, pixels
@@ -77,8 +77,7 @@ def write(path: str | Path, response: Response, *, frames: int = 144) -> str:
     said = captions(response)
     with replacing(path) as temporary:
         pictures.encode(encoder, temporary, _composed(response, times, said))
-    with replacing(Path(path).with_suffix(".vtt")) as temporary:
-        temporary.write_text(subtitles(said, times), encoding="utf-8")
+    write_whole(Path(path).with_suffix(".vtt"), subtitles(said, times))
     return "" if pictures.can_render() else pictures.REMEDY
 
 

@@ -9,7 +9,7 @@ import numpy as np
 import xarray as xr
 
 from .._base import check
-from .._base.files import replacing, staged
+from .._base.files import staged, write_whole
 from ..impact.contact import Contact
 from ..impact.striker import Striker
 from ..modes import picked
@@ -173,8 +173,7 @@ def write_scene(path: str | Path, found: Found, scene: Scene | None = None) -> t
     """
     made, notes = scene_tables(found, scene)
     lines = [f"# {line}" for line in (*found.summary().splitlines(), *notes)]
-    with replacing(path) as temporary:
-        temporary.write_text("\n".join(lines) + "\n\n" + written(made), encoding="utf-8")
+    write_whole(path, "\n".join(lines) + "\n\n" + written(made))
     return tuple(notes)
 
 

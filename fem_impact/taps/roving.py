@@ -11,7 +11,7 @@ import numpy as np
 from .._base import check, progress
 from .._base.check import SimulationError
 from .._base.explained import noted
-from .._base.files import replacing
+from .._base.files import write_whole
 from ..fe.assembly import System
 from ..impact import accuracy, spectra
 from ..impact.collision import strike
@@ -113,9 +113,7 @@ class Roving(check.Locked):
 
     def write_csv(self, path: str | Path) -> None:
         """Write `table` as CSV."""
-        text = export.csv_text(**{name: np.array(values, object) for name, values in self.table().items()})
-        with replacing(path) as temporary:
-            temporary.write_text(text, encoding="utf-8", newline="")
+        write_whole(path, export.csv_text(**{name: np.array(x, object) for name, x in self.table().items()}))
 
     def figure(self) -> Any:
         """Every point on the outline, in the colour of the tip to take; crosses where a double hit is unavoidable.
