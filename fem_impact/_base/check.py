@@ -15,6 +15,7 @@ from typing import Any, TypeVar, get_args, get_origin
 
 import numpy as np
 
+from . import markup
 from .explained import pointed, printable
 
 REACH = 1e75  # [-] largest number accepted; 1 / REACH is the smallest: the fourth power of both still fits a float
@@ -344,7 +345,13 @@ def nearest(word: Any, known: Iterable[str]) -> str:
 
 
 class Brief:
-    """A dataclass whose ``repr`` has at most 1000 characters: arrays by their shape, other objects by their class."""
+    """A dataclass whose ``repr`` has at most 1000 characters: arrays by their shape, other objects by their class.
+
+    Notebooks show its ``summary``, if it has one, or else what ``print`` shows.
+    """
+
+    def _repr_html_(self) -> str:
+        return markup.paragraphs(getattr(self, "summary", self.__str__)().splitlines())
 
     def __repr__(self) -> str:
         parts = []

@@ -147,9 +147,6 @@ class Comparison(check.Brief):
 
     __str__ = summary
 
-    def _repr_html_(self) -> str:
-        return markup.paragraphs(self.summary().splitlines())
-
 
 def compare(measured: tuple[Measured, ...], predicted: Predicted, **more: Any) -> Comparison:
     """Every measured number against its band; ``more`` is of the `Comparison`."""

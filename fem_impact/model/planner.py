@@ -128,10 +128,6 @@ class Plan(Forecast, check.Brief):
         plain = {name: dict(value) if isinstance(value, Mapping) else value for name, value in found.items()}
         return plain | {"assumptions": assumption.table(self.assumptions)}
 
-    def _repr_html_(self) -> str:
-        """For notebooks: the plan in words."""
-        return markup.paragraphs(str(self).splitlines())
-
     def __str__(self) -> str:
         wanted = words(self.quantities)
         kept = "met" if self.meets else "MISSED"

@@ -358,9 +358,6 @@ class Found(check.Brief):
         lines += noted(self.notes)
         return "\n".join(lines)
 
-    def _repr_html_(self) -> str:
-        return markup.paragraphs(self.summary().splitlines())
-
     def data(self) -> dict[str, Any]:
         """Everything found, by name, in SI units, for a JSON file."""
         keys = ("mean", "deviation", "relative", "by_noise", "chance")

@@ -18,7 +18,7 @@ RATES = (1.0, 1e9)  # [Hz] sampling rates allowed: beyond, the unit is a mistake
 
 
 @dataclass(frozen=True, eq=False)
-class Taps:
+class Taps(check.Brief):
     """Measured taps: a table of force and responses over tap and time.
 
     `table` is an xarray.Dataset with ``force`` (tap, time) [N], ``response`` (tap, time, channel) in SI units,
@@ -241,9 +241,6 @@ class Taps:
 
     def __repr__(self) -> str:
         return f"Taps({self.n_taps} taps, {len(self.time)} samples at {self.rate:g} Hz)"
-
-    def _repr_html_(self) -> str:
-        return markup.paragraphs(self.summary().splitlines())
 
     def save(self, path: str | Path) -> None:
         """Write the taps to an .npz file that `read_taps` reads again."""

@@ -43,6 +43,7 @@ def test_response_shows_its_force(scene):
     (line,) = tree.iter(f"{SVG}polyline")
     heights = [float(pair.split(",")[1]) for pair in line.get("points").split()]
     assert min(heights) == pytest.approx(2.0 * markup.MARGIN, abs=0.1) and len(heights) <= 401
+    assert hit.state().summary() in "".join(parsed(hit.state()._repr_html_()).itertext())  # as all that has a summary
 
 
 def test_a_response_shows_its_impacts_only():
