@@ -5,7 +5,6 @@ import os
 import shlex
 import shutil
 import time
-from contextlib import suppress
 from typing import Any, NamedTuple
 from zlib import crc32
 
@@ -167,10 +166,6 @@ def read_here(monkeypatch):
         status, answer = isolated.main(path, reader, arguments)
         return (status, b"", answer) if status else (status, answer, b"")
 
-    with suppress(ImportError):
-        import h5py
-
-        monkeypatch.setattr(h5py, "File", h5py.File)  # the reader of meshes replaces it
     monkeypatch.setattr(isolated, "run_reader", run)
 
 

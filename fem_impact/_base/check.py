@@ -322,6 +322,15 @@ def line(text: str, longest: int = 500) -> str:
     return safe if len(safe) <= longest else safe[:longest] + " ..."
 
 
+def numeric(text: str) -> bool:
+    """Whether a word of a file is a number."""
+    try:
+        float(text)
+    except ValueError:
+        return False
+    return True
+
+
 def one_of(name: str, value: Any, allowed: Iterable[str]) -> str:
     """Return ``value`` if it is one of the allowed words; the error suggests the closest one."""
     words = list(allowed)

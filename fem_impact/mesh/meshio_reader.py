@@ -1,7 +1,8 @@
 """Read nodes, cells and names of a mesh file with meshio, in a separate process (see `isolated`)."""
 
 import json
-from contextlib import suppress
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -39,14 +40,11 @@ def arrays(path: Path) -> dict[str, np.ndarray]:
     """The parts of a `Raw`, as arrays; runs in the reader process."""
     import meshio
 
-    with suppress(ImportError):
-        import h5py
-
-        h5py.File = closed_hdf5(h5py, path)
     known = sorted(meshio.extension_to_filetypes)
     if not set(path.suffixes) & set(known):
         raise ValueError(f"its ending is {path.suffix!r}, but meshio reads {', '.join(known)}")
-    mesh = meshio.read(path)
+    with closed_hdf5(path):
+        mesh = meshio.read(path)
     found: dict[str, np.ndarray] = {"points": np.asarray(mesh.points, float)}
     tags = next((key for key in TAGS if key in mesh.cell_data), None)
     for i, block in enumerate(mesh.cells):
@@ -67,12 +65,18 @@ def arrays(path: Path) -> dict[str, np.ndarray]:
     return found
 
 
-def closed_hdf5(h5py: Any, path: Path) -> Any:
-    """A read-only h5py.File that opens only files in the folder of ``path`` and refuses references to other files.
+@contextmanager
+def closed_hdf5(path: Path) -> Iterator[None]:
+    """Meanwhile, h5py.File only reads files in the folder of ``path``, and refuses references to other files.
 
     Without it, an HDF5 file could link to any file on the disk or map its bytes.
     """
-    own, folder = path.resolve(), path.parent.resolve()
+    try:
+        import h5py
+    except ImportError:
+        yield
+        return
+    own, folder, known = path.resolve(), path.parent.resolve(), h5py.File
 
     class File(h5py.File):
         def __init__(self, name: Any, mode: str = "r", **options: Any) -> None:
@@ -95,4 +99,8 @@ def closed_hdf5(h5py: Any, path: Path) -> Any:
                 elif isinstance(item, h5py.Dataset) and (item.external or item.is_virtual):
                     raise PermissionError("it stores its data in another file")
 
-    return File
+    h5py.File = File
+    try:
+        yield
+    finally:
+        h5py.File = known

@@ -72,13 +72,13 @@ def med(path: Path) -> dict[str, np.ndarray]:
     import h5py
     import meshio
 
-    h5py.File = closed_hdf5(h5py, path)
-    read = meshio.read(path)
+    with closed_hdf5(path):
+        read = meshio.read(path)
     nodes = cell_kinds.spatial(np.asarray(read.points, float))
     shapes: list[np.ndarray] = []
     static: list[np.ndarray] = []
     frequencies: list[float] = []
-    with h5py.File(path, "r") as file:
+    with closed_hdf5(path), h5py.File(path) as file:
         for _, field in sorted(file["CHA"].items() if "CHA" in file else ()):
             columns = _components(field)
             steps = sorted(field.values(), key=lambda step: (step.attrs["NDT"], step.attrs["NOR"]))

@@ -89,18 +89,18 @@ def tapered(name: str, value: Any) -> Any:
 
 
 def heights(*, table: str) -> Any:
-    """The rise through the points of a CSV file with columns x, y, z [m]; a first line of words is skipped."""
+    """The rise through the points of a CSV file with columns x, y, z [m]; a first line without numbers is skipped."""
     if not isinstance(table, str):
         raise ValueError(f"table must be the name of a file, got {check.shown(table)}")
     file = Path(table)
     if not file.is_file():
         raise ValueError(f"table must name a CSV file with columns x, y, z, got {table!r}; {check.absent(file)}")
     rows = []
-    for number, line in enumerate(file.read_text(encoding="utf-8", errors="replace").splitlines(), 1):
+    for number, line in enumerate(file.read_text(encoding="utf-8-sig", errors="replace").splitlines(), 1):
         try:
             rows += [[float(word) for word in line.split(",")]] if line.strip() else []
         except ValueError:
-            if number > 1:
+            if number > 1 or any(map(check.numeric, line.split(","))):
                 raise ValueError(f"table {file.name} must hold numbers; line {number} is {check.shown(line)}") from None
     if any(len(row) != 3 for row in rows):
         raise ValueError(f"table {file.name} must have three columns, x, y and z in m, divided by commas")

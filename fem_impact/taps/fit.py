@@ -91,8 +91,8 @@ def fit(
     window : (before, after) [s], optional
         What is compared around each onset; by default the pulses and 1.5 times their length after them.
     starts : int
-        Searches from different points of the ranges; up to three times as many if all of them end poorly. Further ones
-        begin where the model without the last unknown mode, or without that of a springy head, ends.
+        Searches from different points of the ranges, 64 at most; up to three times as many if all of them end poorly.
+        Further ones begin where the model without the last unknown mode, or without that of a springy head, ends.
     smaller : Found, optional
         The fit of a model inside this one to the same taps, where searches begin, too; in place of the former. If none
         of them gets below its sum of squares, it is what is returned, with a note.
@@ -143,7 +143,7 @@ def fit(
     place = None if target is None else target.point("at", at)[0]
     rig, impulse = Rig(cut.rate, anti_alias, tip_mass, resonance), float(np.mean(cut.impulse))
     inner = None if smaller is None else _inner(smaller, cut, n_points)
-    begin = Starts(check.count("starts", starts), arguments.generator(rng), watch, inner)
+    begin = Starts(check.count("starts", starts, high=solver.STARTS), arguments.generator(rng), watch, inner)
     settings = [
         Setting(target, place, striker, law, rig, own, points, n_points, impulse) for law, own in zip(laws, names)
     ]

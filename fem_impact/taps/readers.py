@@ -255,20 +255,21 @@ def table(path: Path) -> Recording:
     """A text table: tabs, semicolons, commas or blanks between numbers, points or commas in them, headings or none."""
     whole = [line for line in _text(path) if line.strip()]
     lines = [line for line in whole if not line.lstrip().startswith(COMMENTS)]
+    commented = bool(whole) and whole[0] not in lines
     for separator, comma in (("\t", False), ("\t", True), (";", False), (";", True), (",", False), (None, False),
                              (None, True)):  # fmt: skip
-        start = _first_row(lines, separator, comma)
-        if start is not None:
+        first = _first_row(lines, separator, comma, commented)
+        if first is not None:
             break
     else:
         raise ValueError(f"{path.name} has no rows of numbers in its first {HEADER_LINES} lines")
-    row = _cells(lines[start], separator)
+    start, row = first
     width, use = len(row), [i for i, cell in enumerate(row) if cell]
     if width > MOST_CHANNELS:
         raise ValueError(f"{path.name} has {width} columns; at most {MOST_CHANNELS} can be read")
     heads = [_cells(line, separator) for line in lines[:start]]
     heads = [cells for cells in heads if len(cells) == width and any(cells)]
-    if not heads and whole[0] not in lines:  # a heading behind a sign of comment, as numpy.savetxt writes it
+    if not heads and commented:  # a heading behind a sign of comment, as numpy.savetxt writes it
         said = [line.lstrip(" #%/") for line in whole[: whole.index(lines[start])] if line not in lines]
         heads = [cells for cells in (_cells(line, separator) for line in said) if len(cells) == width]
     names, unit = [f"column {i + 1}" for i in range(width)], [""] * width
@@ -280,6 +281,9 @@ def table(path: Path) -> Recording:
                 if one and other and units.known(one) != units.known(other):
                     raise ValueError(f"{path.name} states two units for {name!r}, {one!r} and {other!r}")
     values = _numbers(lines[start:], separator, use, comma, path)
+    long = next((line for line in lines[start:] if any(map(str.strip, line.split(separator)[width:]))), None)
+    if long is not None:
+        raise ValueError(f"{path.name} has {width} columns, but also a row {long[:60]!r}; export it again")
     if separator == ",":
         rows, timed = lines[start:], bool(heads) or (np.diff(values[:, 0]) > 0.0).all()
         pattern = f'.*"{DECIMAL}".*|{"" if timed else f"{DECIMAL}(,{DECIMAL})*"}'
@@ -297,26 +301,29 @@ def _cells(line: str, separator: str | None) -> list[str]:
 
 
 def _number(text: str, comma: bool) -> bool:
-    try:
-        float(text.replace(",", ".") if comma else text)
-    except ValueError:
-        return False
-    return True
+    return check.numeric(text.replace(",", ".") if comma else text)
 
 
-def _first_row(lines: list[str], separator: str | None, comma: bool) -> int | None:
-    """The first of three rows of numbers in a row; None if there is none."""
-    good = 0
-    before: list[bool] = []
-    for i, line in enumerate(lines[: HEADER_LINES + 3]):
-        cells = _cells(line, separator)
-        empty = [not cell for cell in cells]  # a column may be empty, all along
-        fits = any(cells) and all(_number(cell, comma) for cell in cells if cell)
-        same = good == 0 or empty == before
-        good = (good + 1 if same else 1) if fits and (separator is None or len(cells) > 1) else 0
-        before = empty
-        if good == 3:
-            return i - 2
+def _first_row(
+    lines: list[str], separator: str | None, comma: bool, commented: bool
+) -> tuple[int, list[str]] | None:  # fmt: skip
+    """Number of the first row of numbers, right or wrong, and the cells of a right one; None unless three are right.
+
+    Below a heading, of words only or a comment, a row that holds both words and numbers is a wrong one.
+    """
+    rows = [_cells(line, separator) for line in lines[: HEADER_LINES + 3]]
+    found = [[_number(cell, comma) for cell in cells if cell] for cells in rows]
+    shapes = [[not cell for cell in cells] for cells in rows]  # a column may be empty, all along
+    whole = [any(f) and all(f) and (separator is None or len(row) > 1) for row, f in zip(rows, found)]
+    for i, cells in enumerate(rows[2:]):
+        if all(whole[i : i + 3]) and shapes[i] == shapes[i + 1] == shapes[i + 2]:
+            width = len(cells)
+            heading = max(
+                (k for k in range(i) if len(rows[k]) == width and not any(found[k])), default=0 if commented else i
+            )
+            wrong = (k for k in range(heading, i) if len(rows[k]) == width and any(found[k]))
+            bare = (k for k in range(i) if whole[k] and len(rows[k]) >= min(width, 2))
+            return min([i, *wrong, *bare]), cells
     return None
 
 

@@ -187,7 +187,7 @@ class Taps(check.Brief):
     @property
     def cut_short(self) -> np.ndarray:
         """Whether the record of each tap begins or ends within a pulse, (n_taps,) bool."""
-        return np.maximum(self.force[:, 0], self.force[:, -1]) > 0.3 * self.peak  # filters leave less
+        return triggers.cut_short(self.force)
 
     @property
     def noise(self) -> np.ndarray:

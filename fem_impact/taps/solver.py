@@ -19,6 +19,7 @@ HALF_LOST = 0.6
 STEP = 1e-4  # [-] of coordinates, for derivatives by differences: blows with a fixed step are smooth to 1e-6
 MOST_OUTLIERS = 0.34  # [-] of what is measured may disagree: with more, nobody knows which ones are right
 ENOUGH = 60  # [-] iterations of one search
+STARTS = 64  # [-] points at most where searches begin: four along each of three unknowns
 # [-] relative change of the sum of squares or of the values that ends a search
 CLOSE = 1e-8
 QUICK = 12  # [-] iterations of a search that begins close to its end, or only shows whether to go on
@@ -334,7 +335,7 @@ def felt_frequency(share: float, length: float, low: float, high: float) -> floa
 
 
 def starts(problem: Problem, length: float, momentum: np.ndarray, rng: np.random.Generator) -> list[np.ndarray]:
-    """Starting points in order of their sums of squares, of 64 that fill the ranges evenly; neighbours last.
+    """Starting points in order of their sums of squares, of `STARTS` that fill the ranges evenly; neighbours last.
 
     Parameters
     ----------
@@ -343,7 +344,7 @@ def starts(problem: Problem, length: float, momentum: np.ndarray, rng: np.random
     """
     n = problem.n_shared
     low, high = (bound[:n] for bound in problem.bounds)
-    points = qmc.Sobol(max(n, 1), rng=rng).random(64) if n else np.zeros((1, 1))  # four along each of three unknowns
+    points = qmc.Sobol(max(n, 1), rng=rng).random(STARTS) if n else np.zeros((1, 1))
     looked: list[tuple[float, np.ndarray]] = []
     for point in points:
         shared = low + (0.02 + 0.96 * point[:n]) * (high - low)

@@ -17,6 +17,7 @@ PULSE = 0.1
 CLEAR = 6.0
 CLIPPED = 3  # [-] equal largest samples in a row that count as clipped: two may be equal by chance
 LONGEST = 10.0  # [s] longest record of one tap: lines 0.1 Hz apart
+EDGE = 0.3  # [-] of a tap's largest force, at the ends of its record: filters leave less
 FEWEST = 8  # [-] samples before a tap from which an offset is estimated: to a third of the noise, fewer make it worse
 # [samples] before the onset that do not count as rest, as pulses start flat
 GUARD = 3
@@ -60,6 +61,28 @@ def find_rooms(force: np.ndarray, trigger: float, together: int) -> list[tuple[i
     halves = (0.5 * np.diff(begun)).astype(int)
     before, after = np.append(begun[:1], halves), np.append(halves, len(force) - begun[-1:])
     return list(zip(begun.tolist(), before.tolist(), after.tolist()))
+
+
+def cut_short(force: np.ndarray) -> np.ndarray:
+    """Whether records (..., n_times) begin or end within a pulse."""
+    return np.maximum(force[..., 0], force[..., -1]) > EDGE * force.max(axis=-1)
+
+
+def pulse_reach(force: np.ndarray, start: int, before: int, after: int) -> tuple[int, int]:
+    """Samples before and after the first one of a tap with which its record is not `cut_short`."""
+    room = force[start - before : start + after]
+    high = np.flatnonzero(room > EDGE * room.max())
+    return before - int(high[0]) + 1, int(high[-1]) - before + 2
+
+
+def most_whole(rooms: np.ndarray, needs: np.ndarray) -> tuple[int, int]:
+    """How many samples of each leave most taps whole, which have ``rooms`` and need others; and how many taps."""
+    possible = needs <= rooms
+    lengths = np.unique(rooms)
+    enough = np.searchsorted(np.sort(needs[possible]), lengths, side="right")
+    whole = enough - np.searchsorted(np.sort(rooms[possible]), lengths)
+    best = np.flatnonzero(whole == whole.max())[-1 if whole.any() else 0]  # of as many, rather the longer records
+    return int(lengths[best]), int(whole[best])
 
 
 def pulses(force: np.ndarray, noise: float = 0.0, least: float | None = None) -> list[tuple[int, int]]:
@@ -150,11 +173,12 @@ def cut(
         raise ValueError(f"{name} has {len(places)} places above {limit:.3g} N; give trigger= and together=")
     # 20 ms tell the offset, more may reach back to the last tap's ringing
     wanted = 0.02 if before is None else check.positive("before", before, "s")
-    frees = [free for _, _, free, _ in places]
-    some = [free for free in frees if free >= FEWEST]  # a few taps that a record begins with cut those of others short
-    least = min(some) if 2 * len(some) > len(frees) else min(frees)
+    rooms = np.array([place[2:] for place in places])
+    needs = np.array([pulse_reach(moved[k], *place) for k, *place in places])
+    least, n_whole = most_whole(rooms[:, 0], np.maximum(needs[:, 0], FEWEST))
+    least = least if 2 * n_whole > len(places) else most_whole(rooms[:, 0], needs[:, 0])[0]
     lead = min(round(wanted * rate), least if before is None else 10**9)
-    tail = min(after for _, _, _, after in places)
+    tail = most_whole(rooms[:, 1], needs[:, 1])[0]
     if length is not None:
         tail = max(1, round(check.positive("length", length, "s") * rate) - lead)
     tail = min(tail, round(LONGEST * rate))

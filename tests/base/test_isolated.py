@@ -142,9 +142,11 @@ def test_hdf5_that_looks_into_other_files_is_refused(tmp_path, how):
 
 
 def test_every_format_that_hdf5_holds_is_read(tmp_path, read_here):
-    pytest.importorskip("h5py", reason="the extra hdf5 is not installed")
+    h5py = pytest.importorskip("h5py", reason="the extra hdf5 is not installed")
+    known = h5py.File
     for path in [written(tmp_path / name) for name in ("plate.med", "plate.h5m", "plate.xdmf")]:
         assert mesh.load(path).area == pytest.approx(1.0)
+        assert h5py.File is known
 
 
 @pytest.mark.parametrize(("name", "content", "reader", "library", "extra"), [

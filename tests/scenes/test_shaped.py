@@ -177,11 +177,13 @@ def test_wrong_shapes_name_file_table_and_key(tmp_path, mesh, rest, match):
     [
         ("1,2,3\n4,5\n", "must have three columns"),
         ("1,2,3\na,b,c\n", "line 2 is"),
+        ("0,0,o\n1,2,3\n", "line 1 is '0,0,o'"),
+        ("\ufeff1,2,3\na,b,c\n", "line 2 is"),
         ("x,y,z\n", "points must be four or more"),
     ],
 )
 def test_wrong_tables_of_heights_name_the_file(tmp_path, text, match):
-    (tmp_path / "heights.csv").write_text(text)
+    (tmp_path / "heights.csv").write_text(text, "utf-8")
     with pytest.raises(ValueError, match=match):
         load(tmp_path, mesh='rise = { table = "heights.csv" }')
 

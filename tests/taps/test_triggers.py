@@ -133,3 +133,23 @@ def test_drift_is_told_and_a_missing_rest(record, said, told):
 
 def test_a_record_lasts_ten_seconds_at_most():
     assert cut(slice(100, 105), 30_000)[0].shape[1] == 10_000 + 20  # and 0.02 s before the tap
+
+
+@pytest.mark.parametrize(
+    ("places", "widths", "kept"),
+    [
+        ((50, 50, 196, 50), (12, 30, 12, 12), [0, 1, 3]),  # the third ends within its pulse,
+        ((50, 50, 186, 50), (12, 30, 12, 12), [0, 1, 3]),  # or too soon after it for the second
+        ((50, 50, -3), (12, 30, 12), [0, 1]),
+        ((-3, -3), (12, 30), [0, 1]),
+    ],
+    ids=["ends within", "ends after", "begins within", "all begin within"],
+)
+def test_a_record_that_ends_early_cuts_no_other_one_short(places, widths, kept):
+    force = np.zeros((len(places), 400))
+    for row, at, width in zip(force, places, widths):
+        row[100 + at : 100 + at + width] = 50.0 * half_sine(width + 2)[1:-1]
+    given = dict.fromkeys(("trigger", "before", "length")) | {"together": 0.05}
+    rows, *_, labels, _ = triggers.cut([(row[100:300], np.zeros((200, 0))) for row in force], 1e4, "here", **given)
+    assert labels == [f"tap {i + 1}" for i in kept]
+    assert triggers.cut_short(rows).tolist() == [places[i] < 0 for i in kept]
