@@ -248,7 +248,7 @@ def places(name: str, value: Any, dimension: int) -> np.ndarray:
     if value is None:
         raise ValueError(f"{name} must be given, a point {AXES[dimension]} in m")
     raw = numbers(name, value, "m")
-    if dimension == 1 and (raw.ndim < 2 or raw.shape[-1] != 1):
+    if dimension == 1 and raw.ndim < 2:
         raw = raw.reshape(-1, 1)
     if raw.ndim < 2:
         if raw.shape != (dimension,):

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from .._base import check
-from . import cell_kinds, dents, free_body, imported, matrices
+from . import cell_kinds, dents, free_body, imported, matrices, universal_files
 from .modal import Modes, damping_ratios
 
 NOTE = "the error of the mesh on which modes were found elsewhere is not known, and no blow counts it"
@@ -173,6 +173,10 @@ class Body(check.Brief):
         loads = None if loads is None else _forces(loads)
         given = {"mass": mass, "loads": loads, "damping_ratio": damping_ratio, "names": names, "normals": normals}
         given |= {"solid": solid, "modal_mass": modal_mass}
+        if damping_ratio is None and "stated_in" in told:
+            told["damping_ratio"] = universal_files.damping_of(
+                told["stated_in"], told["frequencies"], told["damping_ratio"]
+            )
         told |= {name: value for name, value in given.items() if value is not None}
         return cls(**imported.complete(told, n_modes))
 

@@ -1,5 +1,6 @@
 """What the elements of another program's mesh tell: its surface, and whether it is solid; and names of its matrices."""
 
+import math
 import re
 from collections.abc import Iterable, Sequence
 from typing import Any
@@ -93,7 +94,7 @@ def settled(frequencies: np.ndarray) -> np.ndarray:
 
 def refuse_twice(frequencies: np.ndarray, shapes: np.ndarray) -> None:
     """ValueError if a mode is told twice, as in two subcases; two of one frequency may look alike at three nodes."""
-    flat = shapes.reshape(-1, len(frequencies))
+    flat = shapes.reshape(math.prod(shapes.shape[:-1]), len(frequencies))  # which may be none
     marks = np.vstack([frequencies, np.arange(1.0, len(flat) + 1.0) ** 0.5 @ flat])  # the same of one mode alone
     marks, counts = np.unique(marks[:, flat.any(axis=0)], axis=1, return_counts=True)
     if len(shapes) > 3 and (counts > 1).any():

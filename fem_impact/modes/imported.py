@@ -61,6 +61,8 @@ def _one(path: Path, decks: Sequence[Path] | set[Path]) -> dict[str, Any]:
     path = path.resolve()
     own = sorted(str(deck.resolve()) for deck in decks if deck.suffix.lower() in DECKS.get(ending, ()))
     found: dict[str, Any] = isolated.read_apart(path, kind, reader, *own[:1])
+    damping = found.pop("damping_ratio", ())  # empty of static solutions alone
+    found |= {"damping_ratio": damping, "stated_in": path.name} if len(damping) else {}
     for kind in (name[:-9] for name in list(found) if name.endswith("_triplets")):
         rows, columns, values = found.pop(f"{kind}_triplets").T
         shape, at = found.pop(f"{kind}_shape"), (rows.astype(int), columns.astype(int))

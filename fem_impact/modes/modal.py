@@ -194,11 +194,12 @@ class Modes(check.Brief):
         """
         path, direction = check.path("path", path), check.one_of("direction", direction, "xyz")
         found = isolated.read_apart(path, "a universal file", universal_files.READER)
+        damping = universal_files.damping_of(path.name, found["frequencies"], found["damping_ratio"])
         keep = cell_kinds.differing_axes(found["nodes"], direction)
         cells = found["lines" if len(keep) == 1 else "triangles"]
         return cls.from_arrays(
             found["frequencies"], found["shapes"][:, "xyz".index(direction)], points=found["nodes"][:, keep], mass=mass,
-            damping_ratio=found["damping_ratio"], compliance=compliance, cells=cells if len(cells) else None, free=free,
+            damping_ratio=damping, compliance=compliance, cells=cells if len(cells) else None, free=free,
         )  # fmt: skip
 
     @classmethod

@@ -18,6 +18,7 @@ LINES, SHELLS, SOLIDS = (11, 21, 22), range(41, 97), range(111, 119)
 # nodes of a shell element -> its corners
 CORNERS: dict[int, tuple[int, ...]] = {3: (0, 1, 2), 4: (0, 1, 2, 3), 6: (0, 2, 4), 8: (0, 2, 4, 6)}
 PHASE = 0.3  # [-] imaginary over real part, at the best phase, up to which a complex shape is taken as real: 17 degrees
+GROWS = -1e-3  # [-] damping ratio below which its sign is wrong; light damping that was measured errs by less
 COMPONENTS = "r1", "r2", "r3"  # along x, y and z
 READER = "modes.universal_files:arrays"
 
@@ -117,6 +118,18 @@ def arrays(path: Path) -> dict[str, np.ndarray]:
     return result | cells | {"numbers": measured} | solid
 
 
+def damping_of(name: str, frequencies: np.ndarray, ratios: np.ndarray) -> np.ndarray:
+    """Damping ratios (n_modes,) that a file states; ValueError if a mode with them would not swing, or would grow."""
+    wrong = np.flatnonzero((frequencies > 0.0) & ((ratios >= 1.0) | (ratios < GROWS)))
+    if wrong.size:
+        i = int(wrong[0])
+        raise ValueError(
+            f"{name} must state damping ratios from 0 to below 1, got {ratios[i]:g} for mode {i + 1} at "
+            f"{frequencies[i]:g} Hz, where 5 % is 0.05; export it again, or give damping_ratio to fi.Body.load"
+        )
+    return np.maximum(ratios, 0.0)
+
+
 def places(sets: list[dict]) -> tuple[np.ndarray, np.ndarray]:
     """Numbers (n_nodes,) and places (n_nodes, 3) [m] of the nodes in data sets 2411 or, without them, 15."""
     nodes = [s for s in sets if s["type"] == 2411] or [s for s in sets if s["type"] == 15]
@@ -193,8 +206,9 @@ def _mode(name: str, i: int, mode: dict, measured: np.ndarray) -> tuple[float, f
     shape = _moved(name, i, mode, measured)
     if mode["analysis_type"] == 3:
         pole, scale = complex(mode["eig"]), complex(mode.get("modal_a") or 0.0)
-        frequency, damping = abs(pole) / (2.0 * np.pi), -pole.real / abs(pole)
-        modal_mass = abs(scale) / (2.0 * abs(pole.imag)) if scale else 0.0  # a normal mode has modal A = 2 i omega_d m
+        frequency, damping = abs(pole) / (2.0 * np.pi), -pole.real / abs(pole) if pole else 0.0
+        # a normal mode has modal A = 2 i omega_d m
+        modal_mass = abs(scale) / (2.0 * abs(pole.imag)) if pole.imag else 0.0
     else:
         frequency, hysteretic = float(mode["freq"]), float(mode.get("modal_damp_his") or 0.0)
         damping = float(mode.get("modal_damp_vis") or 0.5 * hysteretic)  # as much at resonance
@@ -212,7 +226,7 @@ def _mode(name: str, i: int, mode: dict, measured: np.ndarray) -> tuple[float, f
                 f"{name} has mode {i + 1} at {frequency:g} Hz with phases far from 0 and 180 degrees; export real modes"
             )
         shape = shape.real
-    return frequency, max(damping, 0.0), np.asarray(shape, float) / np.sqrt(modal_mass)
+    return frequency, damping, np.asarray(shape, float) / np.sqrt(modal_mass)
 
 
 def function(name: str, node: int, direction: int, x: np.ndarray, values: np.ndarray) -> dict[str, Any]:

@@ -1,8 +1,10 @@
 """A scene as a whole: its tables fit together, and what is cheap to build can be built."""
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
+from .._base import check
 from ..fe.assembly import THICK
+from ..impact.stepping import Options
 from .schema import NESTED, REPEATED, rise_of
 
 if TYPE_CHECKING:
@@ -43,6 +45,7 @@ def check_whole(scene: "Scene") -> None:
         part = getattr(scene, table)
         if part is not None:
             scene._make(table, part)
+    _check_blow(scene)
     if scene.listeners and line:
         width, height = scene.girth
         if height > width:
@@ -57,3 +60,28 @@ def check_whole(scene: "Scene") -> None:
     for i, part in enumerate(scene.stroke):
         if any(name in part.values for name in NESTED):
             check_whole(scene.alone(i))
+
+
+def _check_blow(scene: "Scene") -> None:
+    """Check the numbers of [strike], and that places are points of a body of this dimension."""
+    options = dict(scene.blow.values)
+    at, speed = options.pop("at"), options.pop("speed")
+    with scene.blame("strike"):
+        _check_place(scene, "at", at)
+        # strokes have speeds of their own
+        (check.non_negative if scene.stroke else check.positive)("speed", speed, "m/s")
+        Options(**options)
+    for i, part in enumerate(scene.stroke):
+        with scene.blame(f"[[{REPEATED}]] {i}"):
+            _check_place(scene, "at", part.values.get("at", at))
+    with scene.blame("observe"):
+        for i, point in enumerate(scene.watched):
+            _check_place(scene, f"points[{i}]", point)
+
+
+def _check_place(scene: "Scene", name: str, value: Any) -> None:
+    listed = isinstance(value, (list, tuple)) and len(value) == 2
+    line = scene.mesh.kind == "line" or (scene.mesh.kind == "file" and not listed)  # which holds either
+    places = check.places(name, value, 1 if line else 2)
+    if len(places) != 1:
+        raise ValueError(f"{name} must be one point, got {check.shown(value)}")

@@ -36,6 +36,11 @@ def test_universal_files_hold_bodies(tmp_path):
     again = fi.Body.load(path, mass=1.0, loads=[(3, (0.0, 0.0, 1.0))])
     assert_allclose(again.static[:, :, 0], load, rtol=1e-5)  # six digits are written
     assert again.shapes.shape == body.shapes.shape
+    apart = {name: getattr(again, name) for name in ("frequencies", "shapes", "nodes", "numbers")}
+    kept = [s for s in pyuff.UFF(str(path)).read_sets() if s["type"] != 55]
+    pyuff.UFF(str(path)).write_sets(kept, mode="overwrite")
+    both = fi.Body.load([path, apart], mass=1.0, loads=[(3, (0.0, 0.0, 1.0))])
+    assert_allclose(both.static[:, :, 0], load, rtol=1e-5)
 
 
 def test_what_files_lack_is_said(tmp_path):

@@ -9,6 +9,7 @@ from fem_impact.fe.assembly import assemble
 from fem_impact.fe.section import Beam, Material, Plate
 from fem_impact.modes import universal_files
 from fem_impact.modes.air import in_air
+from fem_impact.modes.body import Body
 from fem_impact.modes.finding import find_modes
 from fem_impact.modes.modal import Modes
 from fem_impact.show import export, figures, sampling
@@ -153,6 +154,23 @@ def test_what_a_file_lacks_is_said(written, plate, read, tmp_path):
         Modes.from_uff(written[-1], mass=1.0, direction="up")
     with pytest.raises(ValueError, match="no shape to write"):
         export.write_uff(tmp_path / "mass.uff", Modes.rigid(1.0))
+
+
+@pytest.mark.parametrize("ratio", [2.0, 1.0, -0.02, -1e-4])
+def test_a_mode_that_would_not_swing_or_would_grow_is_refused(plate, read, tmp_path, ratio):
+    """Light damping, as it is found from measurements, may be below zero by a thousandth."""
+    _, sets, _ = plate
+    sets[-1]["modal_damp_vis"] = ratio
+    sets[3]["modal_damp_vis"] = 2.0  # of a rigid motion
+    if ratio == -1e-4:
+        assert read(sets).damping_ratio[[-2, -1]].tolist() == [0.01, 0.0]
+        return
+    said = f"other.uff must state damping ratios .*, got {ratio:g} for mode 8 at .*give damping_ratio to fi.Body.load"
+    with pytest.raises(ValueError, match=said):
+        read(sets)
+    with pytest.raises(ValueError, match=said):
+        Body.load(tmp_path / "other.uff", mass=1.0)
+    assert set(Body.load(tmp_path / "other.uff", mass=1.0, damping_ratio=0.02).damping_ratio[3:]) == {0.02}
 
 
 @pytest.mark.parametrize(("degrees", "real"), [(10.0, True), (25.0, False)])

@@ -1,5 +1,6 @@
 """A scene file builds what the public functions build, and says in one line what is wrong with it."""
 
+import re
 from contextlib import nullcontext
 from dataclasses import FrozenInstanceError
 from pathlib import Path
@@ -226,6 +227,25 @@ def test_bad_scene_is_told_in_one_line_with_file_table_and_key(tmp_path, old, ne
         with pytest.raises(ValueError, match=text) as caught:
             load_text(tmp_path, edited(old, new).replace('"analytic"', f'"{source}"')).strike()
         assert str(caught.value).startswith(f"{tmp_path / 'scene.toml'}: ") and "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("key", "value", "said"),
+    [
+        ("speed", "0", "[strike] speed must be positive, got 0 m/s"),
+        ("tolerance", "2", "[strike] tolerance must lie between 1e-12 and 1, got 2"),
+        ("speed", '2.0\nquantity = "loudness"', "[strike] quantity must be one of restitution"),
+        ("speed", "2.0\nduration = -1", "[strike] duration must be positive, got -1 s"),
+        ("at", "[0.1, 0.2, 0.3]", "[strike] at must be a point (x, y) in m"),
+        ("at", '["0.1", "0.2"]', "[strike] at must be numbers in m"),
+        ("speed", "2.0\n[observe]\npoints = [[0.1, 0.1], [0.1]]", "[observe] points[1] must be a point (x, y) in m"),
+        ("speed", "2.0\n[[stroke]]\nwhen = 0\nat = [1]", "[[stroke]] 0 at must be a point (x, y) in m"),
+    ],
+)
+def test_a_blow_that_cannot_be_is_told_as_its_scene_is_read(tmp_path, key, value, said):
+    text = re.sub(rf"^{key} = .*$", f"{key} = {value}", TEXT, flags=re.M)
+    with pytest.raises(ValueError, match=re.escape(f"scene.toml: {said}")):
+        load_text(tmp_path, text)
 
 
 @pytest.mark.parametrize("source", ["analytic", "fe"])
