@@ -20,6 +20,9 @@ from .loops import FARTHEST, UNITS, refuse_millimetres
 
 PLANE = {"triangle": 3, "triangle6": 6, "triangle7": 7, "quad": 4, "quad8": 8, "quad9": 9}  # nodes of cells read here
 FLAT = 1e-5  # [-] of its extent, across the plane of a mesh: less is noise, as of coordinates with six digits
+# [-] of a side, along and across it, within which its middle lies: from a quarter along it the curve turns back, and
+# on a third of a circle it is 0.29 off
+ALONG, ACROSS = 0.26, 0.3
 NODES = PLANE | {"line": 2, "line3": 3}
 
 
@@ -42,12 +45,13 @@ def read_mesh(path: Any, unit: str | None) -> tuple[
     data = meshio_reader.read_raw(path)
     raw, height, notes = _plane_points(path, data, unit)
     cells, nodes = _triangles(path, data)
+    _refuse_far_middles(path, raw, np.array([[*pair, node] for pair, node in nodes.items()], int).reshape(-1, 3))
     if height is not None:
         notes.append(_sloping(path, raw, height, cells))
         used = np.unique(np.append(cells, list(nodes.values())).astype(int))
     heights = None if height is None else (raw[used], height[used])
     names = _named_pairs(path, data, cells)
-    points, cells, number = _mend(path, raw, cells, notes)
+    points, cells, number = _mend(path, raw, np.zeros(len(raw)) if height is None else height, cells, notes)
     middles = {_pair(number[a], number[b]): raw[node] for (a, b), node in nodes.items()}
     pairs = {name: {_pair(number[a], number[b]) for a, b in found} for name, found in names.items()}
     cells = _hanging(points, cells, pairs, notes)
@@ -161,6 +165,21 @@ def _triangles(path: Path, data: meshio_reader.Raw) -> tuple[np.ndarray, dict]:
     return np.concatenate(cells), middles
 
 
+def _refuse_far_middles(path: Path, points: np.ndarray, rows: np.ndarray) -> None:
+    """Raise ValueError if the middle of a side lies far from it; rows (n, 3) hold its vertices and its middle."""
+    a, b, middle = points[rows].transpose(1, 0, 2)
+    side, away = b - a, middle - 0.5 * (a + b)
+    along = np.abs((away * side).sum(axis=1))
+    across = np.abs(away[:, 0] * side[:, 1] - away[:, 1] * side[:, 0])
+    far = np.maximum(along / ALONG, across / ACROSS) > (side**2).sum(axis=1)
+    if far.any():
+        first, second, node = rows[far][0]
+        raise ValueError(
+            f"{path.name} has {np.count_nonzero(far)} sides far from their middles, the first between nodes {first} "
+            f"and {second}, whose middle is node {node}; correct it, or export linear cells"
+        )
+
+
 def _named_pairs(path: Path, data: meshio_reader.Raw, cells: np.ndarray) -> dict[str, set[tuple[int, int]]]:
     """Edge name -> sides, from physical groups, cell sets, numbered line cells and sets of nodes."""
     names: dict[str, set[tuple[int, int]]] = {}
@@ -189,7 +208,7 @@ def _named_pairs(path: Path, data: meshio_reader.Raw, cells: np.ndarray) -> dict
     return names
 
 
-def _mend(path: Path, points: np.ndarray, cells: np.ndarray, notes: list[str]):
+def _mend(path: Path, points: np.ndarray, height: np.ndarray, cells: np.ndarray, notes: list[str]):
     """Merge duplicate nodes, drop degenerate and duplicate triangles, flip inverted ones and renumber the nodes."""
     name = path.name
     used = np.unique(cells)
@@ -202,6 +221,9 @@ def _mend(path: Path, points: np.ndarray, cells: np.ndarray, notes: list[str]):
     if tree.count_neighbors(tree, SAME * span) > 16 * len(used):
         raise ValueError(f"{name} has most of its nodes at a few points; export it again")
     for a, b in sorted(map(tuple, tree.query_pairs(SAME * span))):
+        if abs(height[used[a]] - height[used[b]]) > FLAT * span:
+            x, y = points[used[a]]
+            raise ValueError(f"{name} has two surfaces, one over the other at ({x:g}, {y:g}) m; export one of them")
         leader[used[b]] = min(leader[used[b]], leader[used[a]])
     doubles = int((leader != np.arange(len(points))).sum())
     if doubles:

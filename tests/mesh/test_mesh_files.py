@@ -267,12 +267,17 @@ def test_units_are_converted(tmp_path):
          r"too steep for a plate: near .* slopes by 5\d.* degrees; .* leave out walls and folds"),
         ([(0, 0, 0), (1, 0, 0), (0, 1, 0), (0.5, 0.9, 0.1)], [[0, 1, 2], [0, 1, 3]], "overlap"),  # folded
         ([(0, 0), (1, 0), (0, 1), (-1, 0), (0, -1)], [[0, 1, 2], [0, 3, 4]], "2 pieces that share no side"),
+        ([(0, 0, z) for z in (0, 0.01)] + [(x, 1 - x, z) for x in (0, 1) for z in (0, 0.01)], [[0, 2, 4], [1, 3, 5]],
+         "two surfaces, one over the other at .*; export one of them"),
+        # the middles of the second side and of the third have changed places; one is on the edge of what is a curve
+        ([(0, 0), (1, 0), (0, 1), (0.5, 0), (0, 0.5), (0.5, 0.5)], [range(6)],
+         "1 sides far from their middles, the first between nodes 2 and 0, whose middle is node 5; correct it, or"),
     ],
-    ids=["steep", "folded", "two"],
+    ids=["steep", "folded", "two", "over one another", "middles"],
 )  # fmt: skip
 def test_what_cannot_be_mended_is_refused_with_the_place(tmp_path, points, cells, text):
     with pytest.raises(ValueError, match=text):
-        mesh.load(written(tmp_path, points, cells))
+        mesh.load(written(tmp_path, points, cells, kind={3: "triangle", 6: "triangle6"}[len(cells[0])]))
 
 
 def test_junk_and_missing_files_are_refused(tmp_path, capsys):
