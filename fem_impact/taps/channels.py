@@ -28,7 +28,8 @@ def in_si(
         factors.append(value)
         notes += said
     pushed = [segment[:, struck] * factors[0] for segment in found.segments]
-    if max(row.max() for row in pushed) < -min(row.min() for row in pushed):
+    rested = [row - np.median(row) for row in pushed]  # an offset may exceed the taps
+    if max(row.max() for row in rested) < -min(row.min() for row in rested):
         notes.append("the force is mostly negative and was turned around")
         pushed = [-row for row in pushed]
     moved = [segment[:, others] * np.array(factors[1:]) for segment in found.segments]
@@ -90,7 +91,10 @@ def response_channels(found: readers.Recording, response: Any, unit: list[str], 
         asked = [response] if isinstance(response, (str, int, np.integer)) else response
         if not isinstance(asked, (list, tuple)):
             raise ValueError(f"response must be the names or numbers of channels, got {check.shown(response)}")
-        return [find_channel("response", which, found) for which in asked]
+        others = [find_channel("response", which, found) for which in asked]
+        if struck in others:
+            raise ValueError(f"response must name other channels than the force, got {check.shown(response)}")
+        return others
     return [
         i
         for i, (kind, text) in enumerate(zip(map(units.known, unit), found.names))

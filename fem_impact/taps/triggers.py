@@ -183,6 +183,10 @@ def cut(
         tail = max(1, round(check.positive("length", length, "s") * rate) - lead)
     tail = min(tail, round(LONGEST * rate))
     rows, responses, labels, notes, offsets, tops, drift = [], [], [], [], [], [], 0.0
+    struck = {k for k, *_ in places}
+    without = [str(k + 1) for k in range(len(segments)) if k not in struck]
+    if without:
+        notes.append(f"no tap above {limit:.3g} N in record {', '.join(without[:20])}{', ...' * (len(without) > 20)}")
     for number, (k, start, _, _) in enumerate(places):
         row, other = segments[k]
         first, last = start - lead, start + tail

@@ -66,7 +66,7 @@ def same_rate(tap: Taps, taps: Taps) -> None:
 def cut(taps: Taps, window: Any) -> Taps:
     """The taps cut to the samples compared, all with the same place of the onset."""
     if window is not None:
-        before, after = check.array("window", window, (2,), "s")
+        before, after = (check.non_negative("window", end, "s") for end in check.array("window", window, (2,), "s"))
         first, last = before, after
     else:
         first = BEFORE / taps.rate

@@ -13,7 +13,7 @@ def recording(names, units):
 
 @pytest.mark.parametrize(
     "text, wanted",
-    [("N", ("N", 1.0)), ("Newtons", ("N", 1.0)), ("kN", ("N", 1e3)), ("mN", ("N", 1e-3)),
+    [("N", ("N", 1.0)), ("Newtons", ("N", 1.0)), ("kN", ("N", 1e3)), ("mN", ("N", 1e-3)), ("MN", ("N", 1e6)),
      ("lbf", ("N", 4.4482216152605)), ("g", ("m/s^2", 9.80665)), ("m/s²", ("m/s^2", 1.0)), ("mm/s", ("m/s", 1e-3)),
      ("μm", ("m", 1e-6)), ("mV", None), ("furlong", None)],
 )  # fmt: skip
@@ -43,6 +43,20 @@ def test_a_name_that_fits_several_channels_is_refused():
     for force, said in ((None, "has several force channels"), ("force", "fits several channels")):
         with pytest.raises(ValueError, match=said):
             channels.force_channel(found, force, ["N", "N"], "a.csv")
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_forces_are_turned_around_by_their_taps_and_not_by_their_offset(sign):
+    force = np.pad([[20.0], [80.0], [30.0]], ((20, 20), (0, 0))) - 60.0
+    found = Recording((sign * force,), ("Force",), ("N",), 1e3)
+    ((pushed, _),), *_, notes = channels.in_si(found, "a.csv", None, None, None, None)
+    assert pushed.tolist() == force[:, 0].tolist() and bool(notes) == (sign < 0.0)
+
+
+def test_the_force_is_no_response():
+    found = recording(["Force", "a"], ["N", "g"])
+    with pytest.raises(ValueError, match=r"response must name other channels than the force, got \['a', 'Force'\]"):
+        channels.response_channels(found, ["a", "Force"], ["N", "g"], 0)
 
 
 def test_factors_are_to_si_times_the_scale():

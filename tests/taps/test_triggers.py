@@ -152,4 +152,6 @@ def test_a_record_that_ends_early_cuts_no_other_one_short(places, widths, kept):
     given = dict.fromkeys(("trigger", "before", "length")) | {"together": 0.05}
     rows, *_, labels, _ = triggers.cut([(row[100:300], np.zeros((200, 0))) for row in force], 1e4, "here", **given)
     assert labels == [f"tap {i + 1}" for i in kept]
+    *_, notes = triggers.cut([(row, np.zeros((400, 0))) for row in (force[0], -force[0])], 1e4, "here", **given)
+    assert any(note.startswith("no tap above") and note.endswith("N in record 2") for note in notes)
     assert triggers.cut_short(rows).tolist() == [places[i] < 0 for i in kept]
