@@ -48,6 +48,9 @@ RANGES = {
     ),
 }  # fmt: skip
 NAMES = {"rho": "density", "damping_ratio": "damping_ratio =", "speed": "speed", "length": "a length of"}
+# [-] shapes over those expected from the mass, beyond which a remark is made: at measured points 0.3 to 3 are
+# usual, and another unit of mass gives 30
+ODD = 10.0
 TURN = 2.0 * np.pi  # [rad] fact: a full one
 # [-] thickness over the shortest side above which a remark is made: thin theory then errs by tens of per cent
 THICK = 0.3
@@ -122,6 +125,22 @@ def rolling(given: Any) -> tuple[str, ...]:
 def damping(ratios: np.ndarray) -> tuple[str, ...]:
     """Notes on damping ratios (n_modes,) [-] of modes that are not rigid."""
     return tuple(note_number("damping_ratio", float(np.median(ratios)))) if len(ratios) else ()
+
+
+def elsewhere(nodes: np.ndarray, shapes: np.ndarray, mass: float) -> tuple[str, ...]:
+    """Notes on nodes (n_nodes, 3) [m] and mass-normalised shapes (n_nodes, 3, n_modes) [kg**-0.5] of another program.
+
+    Over the mass, the mean of their squares is one over the mass.
+    """
+    notes = list(note_number("length", float(np.ptp(nodes, axis=0).max(initial=0.0))))
+    if shapes.size and shapes.any():
+        ratio = float(np.sqrt(mass * np.median((shapes**2).sum(axis=1).mean(axis=0))))
+        if not 1.0 / ODD < ratio < ODD:
+            notes.append(
+                f"shapes are {ratio:.2g} times as large as those of a body of {mass:g} kg are on average; they are "
+                "expected mass-normalised, and 1 t**-0.5 is 0.0316 kg**-0.5"
+            )
+    return tuple(notes)
 
 
 def together(*several: Sequence[str]) -> tuple[str, ...]:

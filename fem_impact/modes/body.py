@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from .._base import check
+from ..fe import plausible
 from . import cell_kinds, dents, free_body, imported, matrices, universal_files
 from .modal import Modes, damping_ratios
 
@@ -78,9 +79,10 @@ class Body(check.Brief):
         nodes = check.array("nodes", self.nodes, (None, 3), "m")
         n, omega = len(nodes), 2.0 * np.pi * frequencies
         given = np.arange(1, n + 1) if self.numbers is None else self.numbers
-        numbers = check.array("numbers", given, (n,)).astype(int)
-        if len(np.unique(numbers)) < n:
-            raise ValueError("numbers must differ from node to node")
+        given = check.array("numbers", given, (n,))
+        numbers = given.astype(int)
+        if len(np.unique(numbers)) < n or (numbers != given).any():
+            raise ValueError("numbers must be whole and differ from node to node")
         cells = np.zeros((0, 3)) if self.cells is None else check.array("cells", self.cells, (None, None))
         if cells.shape[1] not in (2, 3) or (cells < 0).any() or (cells >= n).any() or (cells % 1.0).any():
             raise ValueError(f"cells must be rows of nodes from 0 to {n - 1}, two or three each, got {cells.shape}")
@@ -359,8 +361,9 @@ class Body(check.Brief):
             solid=False,
         )  # fmt: skip
         made = dents.settled(made, seen, self.solid)
+        odd = plausible.elsewhere(self.nodes, self.shapes, self.mass)
         sideways = free_body.sideways(self.shapes[kept], ways[kept], made.n_modes)
-        return replace(made, shapes=replace(made.shapes, sideways=sideways), notes=(*made.notes, NOTE))
+        return replace(made, shapes=replace(made.shapes, sideways=sideways), notes=(*made.notes, *odd, NOTE))
 
     def way(self, where: Any, direction: Any = "normal") -> np.ndarray:
         """Unit vector (3,) of a direction, as of `modes`, at a node."""

@@ -92,7 +92,9 @@ def complete(told: dict[str, Any], n_modes: int | None) -> dict[str, Any]:
         if way is None:
             raise ValueError("files must hold the direction of what was measured: add {'direction': 'z'} to them")
         way = np.eye(3)["xyz".index(check.one_of("direction", str(way), "xyz"))] if np.ndim(way) == 0 else way
-        way = np.broadcast_to(np.asarray(way, float), (len(shapes), 3))
+        way = np.broadcast_to(check.numbers("direction", way), (len(shapes), 3))
+        if not way.any(axis=1).all():
+            raise ValueError("direction must not be zero")
         shapes = np.einsum("nm,nd->ndm", shapes, way / np.linalg.norm(way, axis=1, keepdims=True))
     scale = told.get("modal_mass")
     if scale is not None:
@@ -105,7 +107,7 @@ def complete(told: dict[str, Any], n_modes: int | None) -> dict[str, Any]:
     settled = found[order] if "own" in told else cell_kinds.settled(found[order])
     told |= {"frequencies": settled, "shapes": shapes[..., order]}
     damping = told.get("damping_ratio", 0.0)
-    if isinstance(damping, (list, tuple, np.ndarray)):
+    if np.ndim(damping):
         told["damping_ratio"] = check.array("damping_ratio", damping, order.shape)[order]
     return {name: told[name] for name in OWN if told.get(name) is not None}
 

@@ -195,12 +195,16 @@ class Modes(check.Brief):
         path, direction = check.path("path", path), check.one_of("direction", direction, "xyz")
         found = isolated.read_apart(path, "a universal file", universal_files.READER)
         damping = universal_files.damping_of(path.name, found["frequencies"], found["damping_ratio"])
+        shapes = found["shapes"][:, "xyz".index(direction)]
+        if not shapes.any():
+            raise ValueError(f"direction must be one along which {path.name} has motions, got {direction!r}")
         keep = cell_kinds.differing_axes(found["nodes"], direction)
         cells = found["lines" if len(keep) == 1 else "triangles"]
-        return cls.from_arrays(
-            found["frequencies"], found["shapes"][:, "xyz".index(direction)], points=found["nodes"][:, keep], mass=mass,
+        made = cls.from_arrays(
+            found["frequencies"], shapes, points=found["nodes"][:, keep], mass=mass,
             damping_ratio=damping, compliance=compliance, cells=cells if len(cells) else None, free=free,
         )  # fmt: skip
+        return replace(made, notes=(*made.notes, *plausible.elsewhere(found["nodes"], found["shapes"], made.mass)))
 
     @classmethod
     def from_frf(

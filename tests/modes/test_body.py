@@ -183,7 +183,8 @@ def test_rounding_of_rigid_motions_is_none():
 
 @pytest.mark.parametrize(("change", "text"), [
     ({"shapes": np.zeros((63, 3, 2))}, r"shapes must have shape \(63, 3, 5\)"),
-    ({"numbers": np.ones(63)}, "numbers must differ"),
+    ({"numbers": np.ones(63)}, "numbers must be whole and differ"),
+    ({"numbers": np.arange(63) + 0.5}, "numbers must be whole and differ"),
     ({"cells": [[0, 1, 63]]}, "cells must be rows of nodes from 0 to 62"),
     ({"names": {"rim": 99}}, "'rim' must be a node of the body, got 99"),
     ({"loads": [(1, (0.0, 0.0, 1.0))]}, "loads must be given as .* for each of 0 static solutions, got 1"),

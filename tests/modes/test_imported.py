@@ -69,6 +69,16 @@ def test_what_files_lack_is_said(tmp_path):
             call()
 
 
+def test_shapes_by_tonnes_and_places_in_millimetres_are_told():
+    plate, points = hinged(5)
+    body = body_of(plate, points)
+    told = {name: getattr(body, name) for name in ("frequencies", "shapes", "nodes", "mass")} | {"damping_ratio": 0.01}
+    other = fi.Body.load(told | {"shapes": body.shapes / 1000.0**0.5, "nodes": 1000.0 * body.nodes}).modes("z")
+    said = "; ".join(note for note in other.notes if note not in fi.Body.load(told).modes("z").notes)
+    assert "length of 400 m is larger" in said and "they are expected mass-normalised, and 1 t**-0.5 is 0.0316" in said
+    assert set(other.damping_ratio) == {0.01}
+
+
 def test_models_of_sdypy_are_bodies():
     """Receptances of three modes of a hinged plate from a driving point: shapes to 1 % of the largest."""
     ema = pytest.importorskip("sdypy.EMA", reason="sdypy-EMA is not installed")

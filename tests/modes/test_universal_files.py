@@ -150,6 +150,8 @@ def test_what_a_file_lacks_is_said(written, plate, read, tmp_path):
         read(sets[:1])
     with pytest.raises(ValueError, match="there is no such file"):
         Modes.from_uff(tmp_path / "none.uff", mass=1.0)
+    with pytest.raises(ValueError, match=r"one along which plate.uff has motions, got 'x'"):
+        Modes.from_uff(written[-1], mass=1.0, direction="x")
     with pytest.raises(ValueError, match="direction must be one of x, y, z"):
         Modes.from_uff(written[-1], mass=1.0, direction="up")
     with pytest.raises(ValueError, match="no shape to write"):
