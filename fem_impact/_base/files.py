@@ -102,6 +102,8 @@ def staged(folder: str | Path, command: str | None = None) -> Iterator[Path]:
     with _named() as name, undoable(undo):
         staging = folder / name
         try:
+            if folder.exists() and not folder.is_dir():
+                raise NotADirectoryError(20, "it is a file and no folder; name another", str(folder))
             folder.mkdir(parents=True, exist_ok=True)
             _tidy(folder)
             staging.mkdir()

@@ -301,7 +301,7 @@ def read_tables(path: Path) -> dict[str, Any]:
     """Tables of a TOML file as plain dicts; ValueError of one line if it is not valid TOML."""
     raw = read_bytes(path)
     try:
-        text = raw.decode("utf-8")
+        text = raw.decode("utf-8-sig")
         for key in DOTTED.finditer(text):
             if key["more"]:  # the time to parse it grows with the square of its length
                 raise fault(path, f"a key must have at most 16 parts between dots, got {check.shown(key[0])} and more")

@@ -59,7 +59,11 @@ def check_whole(scene: "Scene") -> None:
     scene.make_contact()
     for i, part in enumerate(scene.stroke):
         if any(name in part.values for name in NESTED):
-            check_whole(scene.alone(i))
+            try:
+                check_whole(scene.alone(i))
+            except ValueError as error:
+                said = str(error).removeprefix(f"{check.line(str(scene.path))}: ")
+                raise scene.fault(f"[[{REPEATED}]] {i} {said}") from None
 
 
 def _check_blow(scene: "Scene") -> None:

@@ -135,6 +135,8 @@ def test_anything_but_a_regular_file_is_not_replaced(tmp_path):
         pass
     with pytest.raises(OSError, match="Not a regular file"):
         write(tmp_path, None, pipe="new")
+    with pytest.raises(OSError, match="it is a file and no folder; name another"):
+        write(tmp_path / "pipe", None, a="new")
     assert names(tmp_path) == ["pipe"] and (tmp_path / "pipe").is_fifo()
 
 

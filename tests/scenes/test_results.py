@@ -159,6 +159,7 @@ def test_what_is_missing_is_named_and_the_folder_that_is_advised_is_read(written
     for folder, text in (
         (written, r"response.npz: there is no such file.*; strike the scene again"),
         (tmp_path / "none", "there is no such folder"),
+        (Path(__file__), "it is a file and no folder"),
         (tmp_path, r"response.json: there is no such file"),
     ):
         with pytest.raises(ValueError, match=text):

@@ -239,9 +239,11 @@ def test_bad_scene_is_told_in_one_line_with_file_table_and_key(tmp_path, old, ne
         ("at", "[0.1, 0.2, 0.3]", "[strike] at must be a point (x, y) in m"),
         ("at", '["0.1", "0.2"]', "[strike] at must be numbers in m"),
         ("speed", "2.0\n[observe]\npoints = [[0.1, 0.1], [0.1]]", "[observe] points[1] must be a point (x, y) in m"),
+        ("speed", '2.0\n[[stroke]]\nwhen = 0\nstriker = { kind = "rigid", mass = "x" }',
+         "[[stroke]] 0 [striker] mass must be a number in kg, got 'x'"),
         ("speed", "2.0\n[[stroke]]\nwhen = 0\nat = [1]", "[[stroke]] 0 at must be a point (x, y) in m"),
     ],
-)
+)  # fmt: skip
 def test_a_blow_that_cannot_be_is_told_as_its_scene_is_read(tmp_path, key, value, said):
     text = re.sub(rf"^{key} = .*$", f"{key} = {value}", TEXT, flags=re.M)
     with pytest.raises(ValueError, match=re.escape(f"scene.toml: {said}")):
@@ -263,6 +265,7 @@ def test_points_beside_the_body_are_refused_before_anything_is_computed(tmp_path
     ("raw", "text"),
     [
         (b"\xff\xfe", "must be UTF-8 text"),
+        (b"\xef\xbb\xbftitle = 3", "title must be text, got 3"),  # behind the mark that some editors begin with
         (b"", r"\[mesh\] is missing"),
         (b"mesh = 3", r"mesh must be a table, written \[mesh\]"),
         (b"a = " + b"[" * 50_000, "not valid TOML"),
@@ -270,7 +273,7 @@ def test_points_beside_the_body_are_refused_before_anything_is_computed(tmp_path
         (b"[" + b'"."."\\"" . ' * 9 + b"a]", "a key must have at most 16 parts between dots"),
         (b"#" * 2_000_000, "must be smaller than"),
     ],
-    ids=["no text", "nothing", "no table", "nested", "dotted", "quoted", "huge"],
+    ids=["no text", "marked", "nothing", "no table", "nested", "dotted", "quoted", "huge"],
 )
 def test_file_that_is_no_scene_is_told_so(tmp_path, raw, text):
     (tmp_path / "scene.toml").write_bytes(raw)
