@@ -95,10 +95,12 @@ def settled(frequencies: np.ndarray) -> np.ndarray:
 def refuse_twice(frequencies: np.ndarray, shapes: np.ndarray) -> None:
     """ValueError if a mode is told twice, as in two subcases; two of one frequency may look alike at three nodes."""
     flat = shapes.reshape(math.prod(shapes.shape[:-1]), len(frequencies))  # which may be none
-    marks = np.vstack([frequencies, np.arange(1.0, len(flat) + 1.0) ** 0.5 @ flat])  # the same of one mode alone
-    marks, counts = np.unique(marks[:, flat.any(axis=0)], axis=1, return_counts=True)
-    if len(shapes) > 3 and (counts > 1).any():
-        raise ValueError(f"files must hold each mode once, but that at {marks[0, counts.argmax()]:g} Hz is there twice")
+    seen: set[tuple[float, int]] = set()
+    for frequency, mode in zip(frequencies.tolist(), flat.T):
+        mark = frequency, hash(mode.tobytes())
+        if mark in seen and len(shapes) > 3 and mode.any():
+            raise ValueError(f"files must hold each mode once, but that at {frequency:g} Hz is there twice")
+        seen.add(mark)
 
 
 def rows_of(numbers: np.ndarray, wanted: Any) -> np.ndarray:

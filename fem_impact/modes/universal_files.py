@@ -3,6 +3,7 @@
 Data sets 15, 55, 2411, 2412, and 164, 2414 and 2420 to read.
 """
 
+import re
 from pathlib import Path
 from typing import Any
 
@@ -20,6 +21,7 @@ CORNERS: dict[int, tuple[int, ...]] = {3: (0, 1, 2), 4: (0, 1, 2, 3), 6: (0, 2, 
 PHASE = 0.3  # [-] imaginary over real part, at the best phase, up to which a complex shape is taken as real: 17 degrees
 GROWS = -1e-3  # [-] damping ratio below which its sign is wrong; light damping that was measured errs by less
 COMPONENTS = "r1", "r2", "r3"  # along x, y and z
+UFF_END = re.compile(rb" {4}-1(?=\r|\n|\Z| {74})")  # begins and ends a data set, also right behind binary numbers
 READER = "modes.universal_files:arrays"
 
 
@@ -76,6 +78,7 @@ def arrays(path: Path) -> dict[str, np.ndarray]:
     """
     import pyuff
 
+    refuse_cut(path)
     file = pyuff.UFF(str(path))
     kinds = [int(kind) for kind in file.get_set_types()]
     # nodes, shapes, units, nodes in double precision, results, frames
@@ -94,6 +97,8 @@ def arrays(path: Path) -> dict[str, np.ndarray]:
             f"data sets are {held}{functions}"
         )
     measured = np.asarray((modes + static)[0]["node_nums"], int)
+    if len(np.unique(measured)) < len(measured):
+        raise ValueError(f"{path.name} has a mode with two shapes at one node; export it again")
     lost = np.setdiff1d(measured, numbers)
     if lost.size:
         raise ValueError(f"{path.name} has shapes at node {lost[0]}, which has no coordinates; export it again")
@@ -116,6 +121,12 @@ def arrays(path: Path) -> dict[str, np.ndarray]:
     codes = {int(element["fe_descriptor"]) for element in elements}
     solid = {} if not codes else {"solid": np.array(True) if codes & set(SOLIDS) else np.zeros(0)}
     return result | cells | {"numbers": measured} | solid
+
+
+def refuse_cut(path: Path) -> None:
+    """ValueError if a file ends within a data set."""
+    if len(UFF_END.findall(path.read_bytes())) % 2:
+        raise ValueError(f"{path.name} ends within a data set; it may be cut off")
 
 
 def damping_of(name: str, frequencies: np.ndarray, ratios: np.ndarray) -> np.ndarray:

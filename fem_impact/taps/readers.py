@@ -26,7 +26,6 @@ STEP_NAMES = ("dt", "delta_x", "delta_t", "tsample", "sampling_interval")
 TIME_NAMES = ("time", "t", "times", "x_value", "zeit", "time_s")
 TIME_UNITS = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "µs": 1e-6, "ns": 1e-9, "min": 60.0, "h": 3600.0}
 UFF_UNITS = {13: "N", 9: "N", 12: "m/s^2", 11: "m/s", 8: "m"}  # codes of quantities in data set 58
-UFF_END = re.compile(rb" {4}-1(?=\r|\n|\Z| {74})")  # begins and ends a data set, also right behind binary numbers
 TIME_RESPONSE, FREQUENCY_RESPONSE, COHERENCE = 1, 4, 6  # function types of data set 58
 UFF_TYPES = {  # function types of data set 58 -> what it holds
     1: "time records", 2: "auto spectra", 3: "cross spectra", 4: "frequency responses", 5: "transmissibilities",
@@ -513,9 +512,8 @@ class Universal:
     def __init__(self, path: Path) -> None:
         import pyuff
 
+        universal_files.refuse_cut(path)
         self.path, self.raw = path, path.read_bytes()
-        if len(UFF_END.findall(self.raw)) % 2:
-            raise ValueError(f"{path.name} ends within a data set; it may be cut off")
         self.file: Any = pyuff.UFF(str(path))
         self.kinds = [int(kind) for kind in self.file.get_set_types()]  # of its data sets
 

@@ -148,6 +148,13 @@ def test_what_a_file_lacks_is_said(written, plate, read, tmp_path):
     said = r"must hold nodes \(15 or 2411\) and mode shapes \(55\) of.*; its data sets are 15"
     with pytest.raises(ValueError, match=said):
         read(sets[:1])
+    with pytest.raises(ValueError, match=r"each mode once, but that at 161\.208 Hz is there twice"):
+        read([*sets, sets[-1]])
+    (tmp_path / "cut.uff").write_bytes(written[-1].read_bytes()[:-5000])
+    with pytest.raises(ValueError, match=r"cut\.uff ends within a data set; it may be cut off"):
+        Modes.from_uff(tmp_path / "cut.uff", mass=1.0)
+    with pytest.raises(ValueError, match=r"other\.uff has a mode with two shapes at one node; export it again"):
+        read([*sets[:3], sets[-1] | {"node_nums": np.maximum(sets[-1]["node_nums"], 2)}])
     with pytest.raises(ValueError, match="there is no such file"):
         Modes.from_uff(tmp_path / "none.uff", mass=1.0)
     with pytest.raises(ValueError, match=r"one along which plate.uff has motions, got 'x'"):
