@@ -39,15 +39,19 @@ class Parser(argparse.ArgumentParser):
     def error(self, message: str) -> NoReturn:
         found = re.findall(r"(?:invalid choice: '|unrecognized arguments: )([^' ]+)", message)
         verbs = [action.choices for action in self._actions if isinstance(action.choices, dict)]
-        parsers = [self, *(verb for choices in verbs for verb in choices.values())]
+        every = {name: verb for choices in verbs for name, verb in choices.items()}
+        chosen = [every[name] for name in self.given[:1] if name in every]
+        parsers = [self, *(chosen or every.values())]
         known = [word for each in parsers for action in each._actions for word in action.option_strings]
-        known += [word for action in self._actions for word in action.choices or ()]
+        known += [word for action in self._actions for word in action.choices or () if not chosen]
         if "required" in message:  # perhaps the option was given but misspelled
             words = [word.partition("=")[0] for word in self.given if word.startswith("--")]
             found = [word for word in words if word not in known]
         close = difflib.get_close_matches(found[0], known, n=1) if found else []
         verb = "".join(f" {word}" for choices in verbs for word in self.given[:1] if word in choices)
+        owners = [name for name, each in every.items() if found and found[0] in each._option_string_actions]
         hint = f"did you mean {close[0]}?" if close else f"see {self.prog}{verb} --help"
+        hint = f"{found[0]} is an option of {', '.join(owners)}" if owners and found[0] not in known else hint
         sys.exit(complain(f"{message:.300}; {hint}", answers.Status.BAD_INPUT))
 
 

@@ -129,6 +129,8 @@ def test_bad_scene_is_one_line_status_2_and_no_file(scene, tmp_path, prompt, old
         ("strike small.toml --out small.toml/out", 1, "small.toml"),
         ("strik small.toml", 2, "did you mean strike?"),
         ("strike small.toml --tolerence 1", 2, "did you mean --tolerance?"),
+        ("frf small.toml --bandwith 1", 2, "see fem-impact frf --help"),
+        ("frf small.toml --bandwidth 1", 2, "; --bandwidth is an option of hammer, watch\n"),
         ("modes small.toml --vkt x.vtu", 2, "did you mean --vtk?"),
         ("hammer small.toml", 2, "required: --bandwidth; see fem-impact hammer --help"),
         ("modes small.toml --n-modes x", 2, "invalid int value: 'x'; see fem-impact modes --help"),

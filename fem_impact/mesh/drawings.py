@@ -122,7 +122,7 @@ def svg_arrays(path: Path) -> dict[str, np.ndarray]:
         raise ValueError("it contains no <svg> element")
     found: list[Piece] = []
     for shape in drawing.elements():
-        if isinstance(shape, svgelements.Shape):
+        if isinstance(shape, svgelements.Shape) and shape.values.get("visibility") not in ("hidden", "collapse"):
             whole = svgelements.Path(shape)
             whole.reify()
             found += _svg_pieces(whole, svgelements, str(shape.id) if shape.id else "")
@@ -202,19 +202,24 @@ def _svg_pieces(whole: Any, svgelements: Any, name: str) -> list[Piece]:
 def dxf_arrays(path: Path) -> dict[str, np.ndarray]:
     """Pieces and unit of a DXF file; runs in the reader process (see `isolated`)."""
     import ezdxf
+    from ezdxf import bbox
 
     drawing = ezdxf.readfile(path)
     hidden = {layer.dxf.name.lower() for layer in drawing.layers if layer.is_off() or layer.is_frozen()}
     found: list[Piece] = []
     left: set[str] = set()
+    kept: list[Any] = []
     for entity in drawing.modelspace():
         seen = not entity.dxf.get("invisible", 0) and entity.dxf.layer.lower() not in hidden
         pieces = _dxf_pieces(entity) if seen else []
         left |= set() if pieces else {entity.dxftype() if seen else f"hidden {entity.dxftype()}"}
+        kept += [entity] if pieces else []
         found += pieces
         _check_number(path.name, found)
+    box = bbox.extents(kept, fast=True)
+    size = np.array(box.size if box.has_data else (0.0, 0.0, 0.0))
     unit = np.array(int(drawing.header.get("$INSUNITS", 0)))
-    return {**_packed(found), "unit": unit, "left": np.array(sorted(left), str)}
+    return {**_packed(found), "unit": unit, "left": np.array(sorted(left), str), "size": size}
 
 
 def _dxf(path: Path, unit: str | None, notes: list[str]) -> Drawn:
@@ -230,6 +235,8 @@ def _dxf(path: Path, unit: str | None, notes: list[str]) -> Drawn:
             scale = 1.0
             notes.append(f"{path.name} states no unit; assumed metres, pass unit= to change that")
     loops, lines = _chained(path.name, _unpacked(path.name, drawn, scale * np.eye(2)), notes)
+    if drawn["size"][2] > 1e-3 * drawn["size"].max():  # less is rounding
+        notes.append(f"{path.name}: its z, which goes over {scale * drawn['size'][2]:.3g} m, is left out")
     if unit is None:
         refuse_millimetres(path.name, max(extent(loop) for loop in loops))
     return loops, lines

@@ -5,6 +5,7 @@ from typing import TYPE_CHECKING, Any
 from .._base import check
 from ..fe.assembly import THICK
 from ..impact.stepping import Options
+from .keys import checked, form
 from .schema import NESTED, REPEATED, rise_of
 
 if TYPE_CHECKING:
@@ -16,8 +17,11 @@ def check_whole(scene: "Scene") -> None:
     target, line = scene.target.values, scene.mesh.kind == "line"
     bare = scene.section is None and not scene.layer
     _ = scene._target
-    if "rise" in scene.mesh.values:
-        with scene.blame("mesh"):
+    with scene.blame("mesh"):
+        for key, value in scene.mesh.values.items():
+            if form("mesh", scene.mesh.kind, key).get("type") == "number":
+                checked("mesh", key, value)
+        if "rise" in scene.mesh.values:
             rise_of(scene.mesh.values["rise"])
     list(scene._listed("rib"))
     if not scene.layer and (scene.material is None) != bare:

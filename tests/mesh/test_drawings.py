@@ -85,6 +85,7 @@ def test_an_ellipse_is_an_ellipse(source, half, note, tmp_path):
 
 def test_svg_keeps_size_names_and_holes_and_turns_y_upward(tmp_path):
     body = '<path id="rim" d="M0 0 H300 V200 H0 Z"/><circle id="hole" cx="80" cy="50" r="20"/>'
+    body += '<g visibility="hidden"><circle id="unseen" cx="200" cy="50" r="20"/></g>'
     shape = mesh.outline(in_mm(tmp_path, body, 300, 200))
     assert set(shape.edges) == {"rim", "hole", "outer", "boundary"}
     assert_allclose(np.ptp(shape.points, axis=0), [0.3, 0.2], rtol=1e-9)
@@ -150,7 +151,13 @@ def test_dxf_blocks_are_drawn_and_what_is_hidden_or_no_line_is_told(tmp_path):
     holes = [shape.points[shape.facets[shape.edges[f"hole{i}"]].ravel()] for i in range(4)]
     centres = [0.5 * (hole.min(axis=0) + hole.max(axis=0)) for hole in holes]
     assert_allclose(sorted(y for _, y in centres), [0.5, 1.1, 1.5, 2.1], atol=2e-3)  # chords
-    assert "hole4" not in shape.edges and "to see: TEXT, hidden CIRCLE" in shape.notes[0]
+    assert "hole4" not in shape.edges and "to see: TEXT, hidden CIRCLE" in shape.notes[0] and len(shape.notes) == 1
+
+
+def test_the_third_coordinate_of_a_dxf_file_is_told(tmp_path):
+    tilted = [(0, 0, 0), (1, 0, 0.1), (1, 3, 0.1), (0, 3, 0)]
+    shape = mesh.outline(dxf(tmp_path, lambda space: space.add_polyline3d(tilted, close=True)))
+    assert shape.area == pytest.approx(3.0) and "its z, which goes over 0.1 m, is left out" in shape.notes[0]
 
 
 @pytest.mark.parametrize("weights", [None, [1.0, 2.0, 1.0, 0.5, 1.0, 1.0, 1.0, 2.0, 1.0]])
