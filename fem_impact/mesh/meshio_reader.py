@@ -15,6 +15,9 @@ from .._base import isolated
 TAGS = ("gmsh:physical", "medit:ref", "edge", "cell_tags", "su2:tag", "nastran:ref")
 
 
+NASTRAN = (".bdf", ".fem", ".nas")
+
+
 @dataclass(frozen=True, eq=False)
 class Raw:
     """Contents of a mesh file, unchecked."""
@@ -43,6 +46,8 @@ def arrays(path: Path) -> dict[str, np.ndarray]:
     known = sorted(meshio.extension_to_filetypes)
     if not set(path.suffixes) & set(known):
         raise ValueError(f"its ending is {path.suffix!r}, but meshio reads {', '.join(known)}")
+    if path.suffix.lower() in NASTRAN:
+        _refuse_left_out(path)
     with closed_hdf5(path):
         mesh = meshio.read(path)
     found: dict[str, np.ndarray] = {"points": np.asarray(mesh.points, float)}
@@ -51,18 +56,37 @@ def arrays(path: Path) -> dict[str, np.ndarray]:
         found[f"cells{i}"] = np.asarray(block.data, np.int64)
         if tags is not None:
             found[f"tags{i}"] = np.asarray(mesh.cell_data[tags][i], np.int64).ravel()
-    sets = [name for name in mesh.cell_sets if not name.startswith("gmsh:")]
+    sets = {name: members for name, members in mesh.cell_sets.items() if not name.startswith("gmsh:")}
+    families = {int(tag): own for tag, own in getattr(mesh, "cell_tags", {}).items() if own}  # groups of MED
+    for name in sorted({name for own in families.values() for name in own[1:]}):
+        held = [tag for tag, own in families.items() if name in own]
+        sets[name] = [np.flatnonzero(np.isin(tags, held)) for tags in mesh.cell_data["cell_tags"]]
     for s, name in enumerate(sets):
-        for i, members in enumerate(mesh.cell_sets[name]):
+        for i, members in enumerate(sets[name]):
             if members is not None:
                 found[f"set{s}_{i}"] = np.asarray(members, np.int64).ravel()
     for i, members in enumerate(mesh.point_sets.values()):
         found[f"nodes{i}"] = np.asarray(members, np.int64).ravel()
     labels = [(int(v[0]), name) for name, v in mesh.field_data.items() if len(v) == 2 and int(v[1]) == 1]
+    labels += [(tag, own[0]) for tag, own in families.items()]
     kinds = [block.type for block in mesh.cells]
-    index = {"kinds": kinds, "sets": sets, "labels": labels, "nodes": list(mesh.point_sets)}
+    index = {"kinds": kinds, "sets": list(sets), "labels": labels, "nodes": list(mesh.point_sets)}
     found["index"] = np.frombuffer(json.dumps(index).encode(), np.uint8)
     return found
+
+
+def _refuse_left_out(path: Path) -> None:
+    """ValueError if a Nastran deck has what meshio ignores: files that it includes, and frames of its nodes."""
+    for line in path.read_text("utf-8", "replace").splitlines():
+        card = line[:8].upper()
+        if card.lstrip().startswith("INCLUDE"):
+            raise ValueError(f"{path.name} includes other files; write all into one")
+        if card.startswith(("GRID", "GRDSET")):
+            frame = line.split(",")[2:3] if "," in line else [line[24:40] if "*" in card else line[16:24]]
+            if "".join(frame).strip() not in ("", "0"):
+                raise ValueError(
+                    f"{path.name} has nodes in coordinate system {frame[0].strip()}; export all in the global one"
+                )
 
 
 @contextmanager

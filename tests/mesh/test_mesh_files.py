@@ -214,6 +214,41 @@ def test_hanging_nodes_are_tied_in(tmp_path):
     assert_allclose(held(plate), np.pi**2 * np.array([1.25, 2.0]), rtol=1e-5)
 
 
+def test_groups_of_med_are_edges_which_may_overlap(tmp_path, read_here):
+    pytest.importorskip("h5py", reason="the extra hdf5 is not installed")
+    sides = GOOD.facets[np.concatenate([GOOD.edges["left"], GOOD.edges["right"]])]
+    tags = [np.repeat([-6, -8], len(sides) // 2), np.full(len(GOOD.cells), -7)]
+    points = np.column_stack([GOOD.points, np.zeros(len(GOOD.points))])
+    made = meshio.Mesh(points, [("line", sides), ("triangle", GOOD.cells)], cell_data={"cell_tags": tags})
+    made.cell_tags = {-6: ["left", "ends"], -7: ["all"], -8: ["ends"]}
+    made.write(tmp_path / "a.med")
+    plate = mesh.load(tmp_path / "a.med")
+    assert set(plate.edges) == {"left", "ends", "outer", "boundary"}
+    assert [len(plate.edges[name]) for name in ("left", "ends")] == [len(sides) // 2, len(sides)]
+
+
+@pytest.mark.parametrize(
+    ("grid", "said"),
+    [
+        ("GRID,3,7,1.,1.,0.", "a.bdf has nodes in coordinate system 7; export all in the global one"),
+        ("GRID           3       7      1.      1.      0.", "a.bdf has nodes in coordinate system 7; export all"),
+        ("GRID*                  3               7              1.              1.*\n*                     0.",
+         "a.bdf has nodes in coordinate system 7; export all"),
+        ("GRID,3,0,1.,1.,0.\ninclude 'b.bdf'", "a.bdf includes other files; write all into one"),
+        ("GRID           3       0      1.      1.      0.", None),
+    ],
+    ids=["free", "small", "large", "include", "global"],
+)  # fmt: skip
+def test_decks_of_nastran_with_what_is_not_read_are_refused(tmp_path, read_here, grid, said):
+    text = f"BEGIN BULK\nGRID,1,,0.,0.,0.\nGRID,2,,1.,0.,0.\n{grid}\nCTRIA3,1,1,1,2,3\nENDDATA\n"
+    (tmp_path / "a.bdf").write_text(text)
+    if said is None:
+        assert mesh.load(tmp_path / "a.bdf").area == pytest.approx(0.5)
+        return
+    with pytest.raises(ValueError, match=said):
+        mesh.load(tmp_path / "a.bdf")
+
+
 def test_quadrilaterals_are_divided(tmp_path):
     x, y = np.meshgrid(np.linspace(0, 1.55, 7), np.linspace(0, 1, 5), indexing="ij")
     n = np.arange(35).reshape(7, 5)
