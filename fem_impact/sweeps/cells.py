@@ -217,7 +217,7 @@ def checked_axes(base: Case, over: Mapping[str, Any]) -> dict[str, np.ndarray]:
         if name != "at":
             for value in (axes[name].min(), axes[name].max()):  # what lies between allowed values is allowed
                 if name not in (*LAW, "damping_ratio"):
-                    check.positive(name, value, AXES[name][0], reach=REACH)
+                    check.positive(f"over[{given!r}]", value, AXES[name][0], reach=REACH)
                 base.changed(name, value)  # raises if the body cannot change this way, too
     return axes
 

@@ -125,7 +125,7 @@ def test_points_are_an_axis_with_coordinates():
     [
         ({}, "over must name at least one axis"),
         ({"masss": [1.0]}, "over must be one of .*did you mean 'mass'"),
-        ({"mass": [0.1, -1.0]}, "mass must be positive, got -1 kg"),
+        ({"mass": [0.1, -1.0]}, r"over\['mass'\] must be positive, got -1 kg"),
         ({"mass": []}, "must contain at least one value"),
         ({"mass": [0.1], "striker.mass": [0.1]}, "names the axis mass twice"),
         ({"stiffness": [1e5, np.nan]}, r"over\['stiffness'\] must be finite"),
