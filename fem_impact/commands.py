@@ -137,7 +137,9 @@ def _write(
         extra["verified"] = run.verified
     changes = {name: value for name, value in run.plan.changes.items() if name in ("tolerance", "quantity")}
     tables, copies = scene.kept(folder, **changes)
-    data = fi.export.run_data(run, tables) | fi.export.plain({**extra, "files": files + copies})
+    with stages("assumptions"):
+        numbers = fi.export.run_data(run, tables)
+    data = numbers | fi.export.plain({**extra, "files": files + copies})
     results.save_response(folder, response, scene.points, data)
     return data
 

@@ -33,7 +33,7 @@ def _threads() -> ThreadpoolController:
 
 
 def one_thread(search: Callable) -> Callable:
-    """Make a function do its linear algebra on one thread: with two, narrow blocks take up to four times as long."""
+    """Make a function do its linear algebra on one thread: with two, narrow blocks take up to ten times as long."""
 
     @wraps(search)
     def alone(*arguments: Any, **options: Any) -> Any:
@@ -43,16 +43,29 @@ def one_thread(search: Callable) -> Callable:
     return alone
 
 
-def factorise(A: Sparse) -> Any:
+@dataclass(frozen=True, eq=False)
+class Factors:
+    """A sparse LU factorisation."""
+
+    lu: Any
+
+    @one_thread
+    def solve(self, loads: np.ndarray) -> np.ndarray:
+        """Solutions (n,) or (n, n_loads) of the factorised system."""
+        return np.asarray(self.lu.solve(np.ascontiguousarray(loads)))
+
+
+@one_thread
+def factorise(A: Sparse) -> Factors:
     """Sparse LU factorisation of a symmetric matrix with pivots on the diagonal."""
     options = {"SymmetricMode": True}
-    return splu(A.tocsc(), permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options=options)
+    return Factors(splu(A.tocsc(), permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options=options))
 
 
 def count_below(K: Sparse, M: Sparse, shift: float) -> int:
     """Count the eigenvalues below a shift from the signs of the pivots of K - shift M (Sylvester's law of inertia)."""
     for nudge in (0.0, SAME, -SAME):  # if a pivot happens to vanish, SuperLU takes one off the diagonal: useless signs
-        lu = factorise(K - shift * (1.0 + nudge) * M)
+        lu = factorise(K - shift * (1.0 + nudge) * M).lu
         if np.array_equal(lu.perm_r, lu.perm_c):
             return int(np.count_nonzero(lu.U.diagonal() < 0.0))
     raise check.SimulationError(
@@ -101,11 +114,11 @@ class Flexibility:
         """Static deflection under loads (n_dofs, n); inertia balances them if the body can move rigidly."""
         keep, lu, answer = self._factors
         if not len(self.held):
-            return lu.solve(np.ascontiguousarray(loads))
+            return lu.solve(loads)
         moving = self.M @ self.rigid  # (n_dofs, n_rigid)
         balanced = loads - moving @ (self.rigid.T @ loads)
         result = np.zeros_like(balanced)
-        result[keep] = lu.solve(np.ascontiguousarray(balanced[keep]))
+        result[keep] = lu.solve(balanced[keep])
         if self.pull.size:  # the springs balance what the loads do on the sprung motions
             moved = self.sprung.T @ balanced - self.pull.T @ result
             moved = np.linalg.solve(self.sprung.T @ self.pull - self.pull[keep].T @ answer, moved)
@@ -119,7 +132,7 @@ class Flexibility:
 
     def shifted(self, loads: np.ndarray) -> np.ndarray:
         """The inverse (n_dofs, n) of K + M, without rigid motions."""
-        result = self._whole.solve(np.ascontiguousarray(loads))
+        result = self._whole.solve(loads)
         return result - self.rigid @ (self.rigid.T @ (self.M @ result))
 
     def bent(self, vectors: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -40,7 +40,6 @@ except ImportError:  # Windows
 START = 0.01  # [s] of a strike, besides its time steps
 # [-] unknowns of the elements that shrink towards the blow; triangles of a thick plate have more
 AT_BLOW = {"argyris": 3000, "argyris and shear": 7500, "argyris and quartic": 13_000}
-PER_MODE = 65.0  # [-] unknowns per mode found for motion and sound: 40 at 1.8 rad per triangle, 108 at 1.1
 ELEMENTS = 5e7  # [byte] of the libraries for elements
 
 

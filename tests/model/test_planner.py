@@ -333,8 +333,24 @@ def test_motion_costs_the_modes_it_is_told_by(scene, monkeypatch):
     still, moving = (
         scene(plate(20.0) + extra).plan(target="vectors") for extra in ("", "[observe]\npoints = [[0.1, 0.1]]\n")
     )
-    look = cost.by_modes(cost.PER_MODE * by_vectors.FIRST_LOOK, by_vectors.FIRST_LOOK)
+    look = by_modes.ringing("argyris", by_vectors.FIRST_LOOK)
     assert moving.seconds - still.seconds == pytest.approx(2.0 * look.seconds, rel=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("how", "n_modes"), [({}, 20), ({}, 120), ({"rise": fi.rise.cap(3.0)}, 20), ({"theory": "mindlin"}, 20)]
+)
+def test_modes_that_ring_are_foretold_by_the_meshes_they_take(how, n_modes, monkeypatch):
+    """Within a fifth: the mesher makes triangles as they fit. Of a curved plate a coarser mesh tells the errors."""
+    foretold, sizes = [], []
+    monkeypatch.setattr(cost, "by_modes", lambda n, _: foretold.append(n) or cost.NOTHING)
+    pairs = refinement._pairs
+    monkeypatch.setattr(refinement, "_pairs", lambda body, *how: sizes.append(body.n_dofs) or pairs(body, *how))
+    plate = fi.Plate(fi.Material(E=210e9, nu=0.3, rho=7850.0), 0.8e-3)
+    body = fi.assemble(fi.mesh.rectangle(0.5, 0.4), plate, {"boundary": "clamped"}, **how)
+    fi.find_modes(body, n_modes=n_modes)
+    by_modes.ringing(body.element, n_modes)
+    assert_allclose(foretold, sizes, rtol=0.2)
 
 
 def test_a_better_description_that_fails_leaves_what_there_is(scene, monkeypatch):
