@@ -2,6 +2,7 @@
 
 import base64
 import html
+import re
 
 import numpy as np
 import pytest
@@ -42,6 +43,8 @@ def test_every_object_is_short_as_text(hit, cradle, tmp_path):
         text = repr(thing)
         assert len(text) <= 1000 and text.count("\n") < 12, type(thing)
     assert "speed=2.0" in repr(hit) and isinstance(run, Run)
+    cut = re.search(r"bodies=(.*?), contacts=", repr(hit))
+    assert cut is not None and cut[1].endswith(" ...")  # a number cut short reads as another one
 
 
 def test_a_system_is_drawn_with_its_supports():

@@ -83,7 +83,7 @@ def shown(value: Any) -> str:
         text = repr(value)
     except ValueError:  # Python refuses to print an integer with thousands of digits
         text = f"a {type(value).__name__} too long to print"
-    return line(text)[:80]
+    return line(text, 76)
 
 
 def number(name: str, value: Any, unit: str = "", *, reach: float = REACH) -> float:
@@ -380,7 +380,7 @@ class Brief:
             else:
                 text = " ".join(shown(value).split())
             parts.append(f"{each.name}={text}")
-        return f"{type(self).__name__}({', '.join(parts):.900})"
+        return f"{type(self).__name__}({line(', '.join(parts), 900)})"
 
 
 class Locked(Brief):

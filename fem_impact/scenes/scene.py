@@ -525,7 +525,8 @@ def scene_of(tables: Mapping[str, Any], path: Path, *, folder: Path) -> Scene:
     title = "".join(c if c.isprintable() else " " for c in title)  # terminals obey control characters
     for name, table in tables.items():
         if name not in TABLES:
-            raise fault(path, f"[{name}] is not a table of a scene{check.nearest(name, TABLES)}")
+            what = f"[{name}] is not a table" if isinstance(table, dict | list) else f"{name} is not a key"
+            raise fault(path, f"{what} of a scene{check.nearest(name, (*TABLES, 'title'))}")
         if not isinstance(table, dict) and name not in (REPEATED, *PARTS):
             raise fault(path, f"{name} must be a table, written [{name}]")
     try:

@@ -48,7 +48,6 @@ def mode_shapes(path: str | Path, modes: Modes, *, count: int = 12, columns: int
     str
         Empty, or what to install for a 3D picture if only the flat one of `figures.mode_shapes` could be drawn.
     """
-    check.between("dimension of modes", modes.dimension, 1, 2)
     check.ending(path, *STILL)
     if not can_render():
         figures.save(path, figures.mode_shapes(modes, count=count, columns=columns))

@@ -5,12 +5,24 @@ import numpy as np
 from .._base import check
 from ..impact.response import Response
 from ..impact.striker import Striker
+from ..modes import viewing
 from ..modes.modal import Modes
-from ..modes.viewing import grid
 
 RIBBON = 0.06  # [-] a beam is drawn as a ribbon: width over length
 AFTER = 1.35  # [-] end of the animation over the end of the last contact
 MOST_FRAMES = 1000  # [-] most frames of an animation: 0.2 GB or minutes of work
+
+
+def grid(modes: Modes) -> tuple[np.ndarray, np.ndarray]:
+    """Points and cells as of `viewing.grid`, of a body that can be drawn as a line or a surface."""
+    check.between("dimension of modes", modes.dimension, 1, 2)
+    points, cells = viewing.grid(modes)
+    if (modes.dimension == 2 and cells.shape[1] == 1) or len(points) < 2:
+        raise ValueError(
+            f"modes must be known all over the body, got shapes at {len(points)} points without cells between them; "
+            "strike the scene again if the blow was read from a folder, or give cells to fi.Modes.from_arrays"
+        )
+    return points, cells
 
 
 def surface(modes: Modes) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -36,7 +48,6 @@ def surface(modes: Modes) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
 
 def gallery(modes: Modes, points: np.ndarray, count: int, columns: int, first: int = 0) -> tuple[np.ndarray, int]:
     """The shapes from the ``first`` on at points, each with largest value 1, (n_points, n), and columns to draw."""
-    check.between("dimension of modes", modes.dimension, 1, 2)
     count = min(check.count("count", count), modes.n_modes - first)
     shapes = modes.truncated(n_modes=first + count).shapes.at(points)[:, first:]
     return shapes / np.maximum(np.abs(shapes).max(axis=0), 1e-300), min(check.count("columns", columns), count)

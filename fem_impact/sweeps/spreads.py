@@ -245,7 +245,7 @@ class Spread(check.Brief):
                 sign = "+" if self.correlations[quantity][name] >= 0.0 else "-"
                 found = self.shares.get(quantity, {}).get(name)
                 ends = f" ({_whole(found.total.low)} to {_whole(found.total.high)} %)" if found else ""
-                said.append(f"{name} {100 * share:.0f} %{ends} {sign}")
+                said.append(f"{name} {_whole(share)} %{ends} {sign}")
             lines.append(f"  {quantity}: {'; '.join(said) or 'no input by itself'}")
         lines.append("+ raises the quantity, - lowers it.")
         if self.why_no_shares:
@@ -294,7 +294,7 @@ class Spread(check.Brief):
 
 
 def _whole(share: float) -> str:
-    """A share in whole percent; its interval may leave 0 to 100 %, which no share can."""
+    """A share in whole percent; estimates may leave 0 to 100 %, which no share can."""
     return f"{100.0 * min(1.0, max(0.0, share)):.0f}"
 
 

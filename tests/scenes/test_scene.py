@@ -181,6 +181,7 @@ BAD = [
     ('"rectangle"', '"rectangel"', r"\[mesh\] shape must be one of .*; did you mean 'rectangle'\?"),
     ('shape = "rectangle"', "", r"\[mesh\] shape is missing; it is one of rectangle, disk"),
     ("[strike]", "[strik]", r"\[strik\] is not a table of a scene; did you mean 'strike'\?"),
+    ("title =", "titel =", r"titel is not a key of a scene; did you mean 'title'\?"),
     ("[contact]", "[[contact]]", r"contact must be a table"),
     ("mass = 0.03", "mass = -1", r"\[striker\] mass must be positive, got -1 kg"),
     ("mass = 0.03", "mass = [0.03]", r"\[striker\] mass must be a number in kg"),

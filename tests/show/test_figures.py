@@ -1,6 +1,7 @@
 """Pictures carry the data they are given, with units, and are written without a screen."""
 
 from dataclasses import replace
+from functools import partial
 
 import matplotlib.image
 import numpy as np
@@ -30,6 +31,15 @@ def test_force_picture_holds_history_and_spectrum_and_says_its_units(hit):
 def test_mode_shapes_draw_as_many_as_there_are(modes, count, drawn):
     titles = [title for axes in figures.mode_shapes(modes, count=count).axes if (title := axes.get_title(loc="left"))]
     assert len(titles) == drawn and titles[0] == "1   100 Hz"
+
+
+@pytest.mark.parametrize("draw", [figures.mode_shapes, fi.pictures.chladni, partial(fi.pictures.mode_shapes, "no.png")])
+def test_bodies_known_at_a_few_points_are_not_drawn(draw, modes):
+    """As of a blow that was read from its folder: `fi.load_response`."""
+    at = np.array([[0.1, 0.1], [0.2, 0.1], [0.3, 0.2]])
+    known = fi.Modes.from_arrays(modes.frequencies, modes.shapes.at(at), points=at, mass=modes.mass)
+    with pytest.raises(ValueError, match=r"got shapes at 3 points without cells.*strike the scene again"):
+        draw(known)
 
 
 def test_mode_shapes_of_a_beam_are_lines():

@@ -148,7 +148,7 @@ def test_refined_triangles_cover_the_body_once_fit_together_and_keep_their_orien
 def test_beams_and_rigid_masses_are_left_as_they_are():
     beam = fi.analytic.beam(0.4, mass=0.1, first_frequency=1e3, n_modes=3)
     for modes in (beam, fi.Modes.rigid(1.0)):
-        for drawn, own in zip(sampling.grid(modes), modes.shapes.grid()):
+        for drawn, own in zip(viewing.grid(modes), modes.shapes.grid()):
             np.testing.assert_array_equal(drawn, own)
 
 

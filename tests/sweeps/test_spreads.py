@@ -121,6 +121,7 @@ def test_the_summary_says_what_to_measure_better_with_its_sign():
     line = next(line for line in text.splitlines() if line.startswith("  restitution"))
     assert line.index("a 7") < line.index("b 3") and " c " not in line
     assert line.split(";")[0].endswith("+") and line.endswith("-")
+    assert "restitution: a 100 % (" in grouped(lambda a, b, c: a, n=32).summary()  # estimated at 108 %
 
 
 def test_a_failed_blow_takes_its_group_out_of_the_sobol_indices():
