@@ -35,9 +35,11 @@ class RectangleShapes(ClosedShapes, check.Brief):
 
     def at(self, points: np.ndarray) -> np.ndarray:
         phase = np.pi * points / (self.length, self.width)  # (n_points, 2)
-        return (
-            2.0 * np.sin(np.outer(phase[:, 0], self.numbers[:, 0])) * np.sin(np.outer(phase[:, 1], self.numbers[:, 1]))
+        along, across = (  # modes share their half waves: a sine for each number
+            np.sin(np.outer(angle, np.arange(number.max() + 1)))[:, number]
+            for angle, number in zip(phase.T, self.numbers.T)
         )
+        return np.asarray(2.0 * along * across)
 
     def slopes(self, points: np.ndarray) -> np.ndarray:
         """Slopes (n, n_q, 2, n_modes) at points (n, n_q, 2)."""
