@@ -188,13 +188,13 @@ def _strike_in_turn(options: argparse.Namespace, scene: Any) -> Answer:
 
 
 def describe_sounds(sounds: Sequence[dict[str, Any]]) -> list[str]:
-    """A line for each sound: its peak, and what a sample of 1 in its file means."""
+    """A line for each sound: its peak without rigid motions, and what a sample of 1 in its file means."""
     lines = []
     for each in sounds:
         where = "Point" if "at" in each else "Listener" if "listener" in each else "Both listeners"
         if each.get("bound") == "low":  # the other one's line tells both
             continue
-        level = each["stated"] if "bound" in each else f"peak {each['stated']}"
+        level = each["stated"] if "bound" in each else f"audible peak {each['stated']}"
         if each["level"] is None or each["level"] == -math.inf:
             level = "silence"
         files = f"{each['file'].replace('_high', '_low')} and {each['file']}" if "bound" in each else each["file"]

@@ -138,10 +138,10 @@ def _heavier(lesson: Lesson) -> Question | None:
 def _harder(lesson: Lesson) -> Question | None:
     place_, speed, _, mass = lesson.start
     limit = float(lesson.limits[place_, mass])
-    if not 0.0 < limit < math.inf:
-        return None
     soft, hard = ((place_, speed, i, mass) for i in (0, lesson.shape[2] - 1))
     below, above = (lesson.setup.case(lesson.settings(*each)).resonance for each in (soft, hard))
+    if not below < limit < above:
+        return None
     return Question(
         f"The body stops a striker of {_mass(lesson, mass)} once the contact resonance, {si(below, 'Hz', 3)} with the "
         f"softest and {si(above, 'Hz', 3)} with the hardest contact, is above a threshold: the dashed line. How many "

@@ -36,12 +36,12 @@ def si(value: float, unit: str, digits: int = 4) -> str:
 
 
 def power(value: float) -> str:
-    """A number as a power of ten: 4.5 · 10⁻⁶."""
+    """A number as a power of ten, 4.5 · 10⁻⁶, that no line breaks."""
     if not value or not math.isfinite(value):
         return f"{value:g}".replace("inf", "∞")
     digits, exponent = f"{value:.1e}".split("e")
     size = f"10{str(int(exponent)).translate(RAISED)}"
-    return size if digits == "1.0" else f"{digits.removesuffix('.0')} · {size}"
+    return size if digits == "1.0" else f"{digits.removesuffix('.0')}{NBSP}·{NBSP}{size}"
 
 
 def tidy(text: str) -> str:

@@ -1,6 +1,7 @@
 """The page without a server: what it shows is what the program computes, to within the errors it prints."""
 
 import re
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -200,3 +201,6 @@ def test_answers_to_questions_are_read_off_the_blows(held):
     elsewhere = next(each for each in asked if "each place" in each.asked)
     rebounds = grid.quantity("restitution")[:, speed, grid.start[2], grid.start[3]]
     assert elsewhere.position[0] == int(np.argmax(rebounds))
+    for share in (1.0, 1e-9, 1e9):  # a threshold that no slider reaches has no line on the page, and no question
+        other = replace(grid, limits=share * grid.limits)
+        assert any("dashed line" in each.asked for each in worksheet.questions(other)) == (share == 1.0)

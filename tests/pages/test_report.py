@@ -222,7 +222,7 @@ def test_numbers_have_prefixes(value, unit, text):
     assert sentences.si(value, unit).replace(sentences.NBSP, " ") == text
 
 
-@pytest.mark.parametrize(("value", "text"), [(4.5e-6, "4.5 · 10⁻⁶"), (1e-4, "10⁻⁴"), (0.0, "0")])
+@pytest.mark.parametrize(("value", "text"), [(4.5e-6, "4.5\u00a0·\u00a010⁻⁶"), (1e-4, "10⁻⁴"), (0.0, "0")])
 def test_small_numbers_have_powers(value, text):
     assert sentences.power(value) == text
 
