@@ -111,9 +111,9 @@ class Assumption:
         said = [] if self.value is None else [self.reading]
         if said and self.limit is not None:
             share = "%" in READINGS.get(self.number, "")
-            said[0] += f"; above {f'{100.0 * self.limit:g} %' if share else f'{self.limit:g}'} it matters"
+            said[0] += f"; it usually matters above {f'{100.0 * self.limit:g} %' if share else f'{self.limit:g}'}"
         if self.worst > 0.0:
-            said.append(f"it changes the {self.change()}" + (", beyond this estimate" if self.beyond else ""))
+            said.append(f"here it changes the {self.change()}" + (", beyond this estimate" if self.beyond else ""))
         if not self.known:
             said.append(f"not known: {self.why}")
         said += [self.remedy] if self.remedy else []

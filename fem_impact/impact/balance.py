@@ -79,6 +79,11 @@ def of_bodies(hit: "Response", q: np.ndarray, p: np.ndarray) -> dict[str, float]
     return {name: hit.history.energy(q, p, hit.body_slice(i)) for i, name in enumerate(names)}
 
 
+def loss_in_words(hit: "Response") -> str:
+    """What becomes of the energy that no part holds: where a mode overdamps, waves carry it into an infinite plate."""
+    return "carried off by waves or dissipated" if (hit.history.zeta > 1.0).any() else "dissipated"
+
+
 def touched(hit: "Response", body: int) -> list[int]:
     """The contacts of a body."""
     shape = hit.history.shape[:, hit.body_slice(body)]

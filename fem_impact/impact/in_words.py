@@ -7,6 +7,7 @@ import numpy as np
 
 from .._base import markup
 from .._base.explained import below, noted, pointed
+from . import balance
 from .compiled import record
 from .history import CLEAR
 from .quantities import rebound, words
@@ -38,7 +39,8 @@ def lines(hit: "Response") -> str:
     if hit.margin < CLEAR:
         lines.append(f"margin {hit.margin:.1g} of the deepest approach: that close to another number of impacts")
     total = sum(hit.start_energies.values())
-    shares = ", ".join(f"{name} {value / total:.2%}" for name, value in hit.energies.items()) if total else "none"
+    parts = {balance.loss_in_words(hit) if name == "dissipated" else name: x for name, x in hit.energies.items()}
+    shares = ", ".join(f"{name} {value / total:.2%}" for name, value in parts.items()) if total else "none"
     error = hit.error
     lines += [
         f"contact time {hit.contact_time * 1e3:.5g} ms, peak force {hit.peak_force:.5g} N, "

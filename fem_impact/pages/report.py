@@ -12,7 +12,7 @@ import numpy as np
 
 from .._base import check, markup
 from .._base.explained import noted
-from ..impact import spectra
+from ..impact import balance, spectra
 from ..impact.assumption import SILENT, Assumption
 from ..impact.quantities import NAMES as QUANTITY_NAMES
 from ..impact.quantities import rebound
@@ -134,7 +134,9 @@ def _of_blow(scene: Scene, run: Run) -> dict[str, Any]:
         "budget": _budget(response),
         "model": _sentence(tidy(response.model_verdict[0])),
         "modelled": _modelled(run, len(response.history.steps), response.scheme),
-        "energies": _shares(response.energies, {"target": "struck body"}),
+        "energies": _shares(
+            response.energies, {"target": "struck body", "dissipated": balance.loss_in_words(response)}
+        ),
     }  # fmt: skip
 
 

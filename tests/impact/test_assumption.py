@@ -39,8 +39,8 @@ def test_an_assumption_that_matters_gets_a_line_with_its_number_its_limit_and_th
     head, line = assumption.lines([make({"restitution": 0.01, "force": 0.03}, 0.3), WELL], 1e-3)
     assert head == "the model holds to 0.03"
     assert line == (
-        "thin target: thickness over wave 0.3; above 0.2 it matters; it changes the peak force by about 3 %; "
-        "use a thicker theory"
+        "thin target: thickness over wave 0.3; it usually matters above 0.2; here it changes the peak force by about "
+        "3 %; use a thicker theory"
     )
 
 
@@ -61,7 +61,7 @@ def test_before_the_blow_only_numbers_are_known():
     foreseen = [make({}, 0.5), make({}, 0.1, name="still air")]
     head, line = assumption.lines(foreseen, 1e-4)
     assert head == "the model is doubtful here: thin target"
-    assert line.startswith("thin target: thickness over wave 0.5; above 0.2 it matters")
+    assert line.startswith("thin target: thickness over wave 0.5; it usually matters above 0.2")
     assert foreseen[0].state == "foreseen"
 
 

@@ -46,3 +46,12 @@ def test_a_body_that_stops_has_no_negative_restitution():
     touch = [fi.Touch(fi.Contact.linear(1e6), 0, 1)]
     hit = fi.collide([fi.Modes.rigid(0.1)] * 2, touch, speeds=[1.0, 0.0])
     assert abs(hit.restitution) < 1e-12 and "restitution 0.00000 at 1 m/s" in hit.summary()
+
+
+def test_what_waves_carry_into_an_infinite_plate_is_not_called_lost():
+    plate = fi.Plate(fi.Material(E=7e10, nu=0.23, rho=2500.0), 4e-3)
+    pane = fi.assemble(fi.mesh.rectangle(1.2, 0.8), plate, {"boundary": "clamped"})
+    hit = fi.plan(pane, fi.Striker.rigid(4e-3), fi.Contact.hertz(1e10), at=(0.6, 0.4), speed=1.0, tolerance=0.01,
+                  target="infinite").strike()  # fmt: skip
+    assert "target 0.00%, contact 0.00%, carried off by waves or dissipated " in hit.summary()
+    assert "contact 0.00%, dissipated 0.00%" in blow().summary()
