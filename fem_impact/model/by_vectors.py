@@ -23,7 +23,7 @@ from .by_modes import ringing as found
 from .target import FIRST_LOOK, Elements, Stages
 
 AUDIBLE = 20e3  # [Hz] the ear's limit: no mode above is asked for unless a band of the sound is
-MOST_RINGING = 400  # [-] modes for motion and sound if no band is asked for: some seconds
+MOST_RINGING = 400  # [-] modes for motion and sound if no band is asked for: ten seconds, a minute of a curved plate
 
 
 @dataclass(frozen=True, eq=False)

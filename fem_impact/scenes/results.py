@@ -248,7 +248,7 @@ def _of_map(path: Path) -> tuple[dict[str, Any], list[str]]:
         raise fault(path, "it is damaged: not the map that fem-impact wrote") from None
     axes = ", ".join(f"{name} ({size})" for name, size in counts.sizes.items())
     single, failed = int((counts == 1).sum()), int((counts < 0).sum())
-    lines = [f"{counts.size} blows over {axes}: {single} hit once, {failed} failed"]
+    lines = [f"{counts.size} blow{'s' * (counts.size != 1)} over {axes}: {single} hit once, {failed} failed"]
     return {}, [title, *lines] if title else lines
 
 

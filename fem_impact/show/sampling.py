@@ -19,7 +19,7 @@ def grid(modes: Modes) -> tuple[np.ndarray, np.ndarray]:
     points, cells = viewing.grid(modes)
     if (modes.dimension == 2 and cells.shape[1] == 1) or len(points) < 2:
         raise ValueError(
-            f"modes must be known all over the body, got shapes at {len(points)} points without cells between them; "
+            f"modes must be known all over the body, got shapes without cells between their points, {len(points)}; "
             "strike the scene again if the blow was read from a folder, or give cells to fi.Modes.from_arrays"
         )
     return points, cells
