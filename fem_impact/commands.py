@@ -231,10 +231,8 @@ def run_map(options: argparse.Namespace) -> Answer:
     single, failed = int((table.n_impacts == 1).sum()), int((table.n_impacts < 0).sum())
     data: dict[str, Any] = {"n_blows": table.n_impacts.size, "axes": axes, "n_single": single, "n_failed": failed}
     over = ", ".join(f"{name} ({size})" for name, size in axes.items())
-    said = [
-        title_of(scene),
-        f"{table.n_impacts.size} blow{'s' * (table.n_impacts.size != 1)} over {over}: {single} hit once, {failed} failed",
-    ]
+    blows = f"{table.n_impacts.size} blow{'s' * (table.n_impacts.size != 1)}"
+    said = [title_of(scene), f"{blows} over {over}: {single} hit once, {failed} failed"]
     for name in ("cells", "borders"):
         if name in table.attrs:
             data[name] = table.attrs[name]
