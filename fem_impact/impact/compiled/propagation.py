@@ -266,8 +266,11 @@ def commit(shape, lanes, h, force, slope, q, p):
 
 
 @inner(allocates=True)
-def push(scene, row, n_coefficients, length, q, p, out_q, out_p):
-    """State after a part of a step, (n_modes,), from the step's start; exact for its polynomial forces."""
+def push(scene, row, n_coefficients, length, q, p, lanes, known, out_q, out_p):
+    """State after a part of a step, (n_modes,), from the step's start; exact for its polynomial forces.
+
+    ``lanes`` are the table of the length before, ``known`` (2,) is that length and whether the table is whole.
+    """
     omega, zeta, shape, bias = scene.omega, scene.zeta, scene.shape, scene.bias
     restore(q, p, out_q, out_p)
     if length <= 0.0:
@@ -299,8 +302,11 @@ def push(scene, row, n_coefficients, length, q, p, out_q, out_p):
             out_q[n] = a11 * q0 + a12 * p0 + length * length * x
             out_p[n] = -omega[n] * omega[n] * a12 * q0 + a22 * p0 + length * v
         return
-    lanes = np.empty((N_LANE, q.size))
-    lane_table(omega, zeta, length, active or any_of(bias), lanes)
+    whole = active or any_of(bias)
+    if known[0] != length or (whole and known[1] == 0.0):
+        lane_table(omega, zeta, length, whole, lanes)
+        known[0] = length
+        known[1] = 1.0 if whole else 0.0
     glide(lanes, length, bias, out_q, out_p)
     if active:
         for i in range(m):
@@ -312,6 +318,7 @@ def push(scene, row, n_coefficients, length, q, p, out_q, out_p):
 def replay(scene, steps, n_coefficients, times, out_q, out_p):
     """States (n_times, n_modes) at ascending times, from the start state and the recorded forces; exact in between."""
     n_steps = steps.shape[0]
+    lanes, known = np.empty((2, N_LANE, scene.q.size)), np.zeros((2, 2))  # of the parts of steps, and of whole ones
     q = scene.q.copy()
     p = scene.p.copy()
     flight = np.zeros(steps.shape[1])
@@ -322,9 +329,9 @@ def replay(scene, steps, n_coefficients, times, out_q, out_p):
         row = flight if j == n_steps else steps[j]
         ends = np.inf if j == n_steps else begin + row[LENGTH]
         while k < times.size and times[k] < ends:
-            push(scene, row, n_coefficients, times[k] - begin, q, p, out_q[k], out_p[k])
+            push(scene, row, n_coefficients, times[k] - begin, q, p, lanes[0], known[0], out_q[k], out_p[k])
             k += 1
         if k >= times.size or j == n_steps:
             return
-        push(scene, row, n_coefficients, row[LENGTH], q, p, q, p)
+        push(scene, row, n_coefficients, row[LENGTH], q, p, lanes[1], known[1], q, p)
         begin = steps[j + 1, START] if j + 1 < n_steps else begin + row[LENGTH]
