@@ -446,10 +446,11 @@ def test_following_the_advice_works(tmp_path, name):
 
 
 @pytest.mark.parametrize(
-    "tolerance, mass, stiffness", [(3e-7, 0.5, 1e4), (1e-6, 2.0, 1e4), (1e-3, 5.0, 1e5), (1e-6, 5.0, 1e5)]
+    "most, tolerance, mass, stiffness",
+    [(300, 3e-7, 0.5, 1e4), (300, 1e-6, 2.0, 1e4), (300, 1e-3, 0.5, 1e5), (1000, 1e-3, 5.0, 1e5)],
 )
-def test_a_step_error_that_stays_too_large_proposes_what_is_met(monkeypatch, tolerance, mass, stiffness):
-    monkeypatch.setattr(engine, "most_steps", lambda *_: 300)
+def test_a_step_error_that_stays_too_large_proposes_what_is_met(monkeypatch, most, tolerance, mass, stiffness):
+    monkeypatch.setattr(engine, "most_steps", lambda *_: most)
     law = fi.Contact.power(stiffness, 0.8)  # collocation, which would take over, needs an exponent of 1
     wanted = {"mass": mass, "tolerance": tolerance, "residual": False}
     words = r"; (raise tolerance to|give max_impacts of at most) \S+ \("
