@@ -266,13 +266,12 @@ def commit(shape, lanes, h, force, slope, q, p):
 
 
 @inner(allocates=True)
-def push(scene, row, n_coefficients, length, q, p, lanes, known, out_q, out_p):
-    """State after a part of a step, (n_modes,), from the step's start; exact for its polynomial forces.
+def push(scene, row, n_coefficients, length, table, q, p):
+    """Advance a state (n_modes,) in place by a part of a step, from its start; exact for its polynomial forces.
 
-    ``lanes`` are the table of the length before, ``known`` (2,) is that length and whether the table is whole.
+    ``table`` is that of the length before, and (2,) that length and whether it is whole.
     """
     omega, zeta, shape, bias = scene.omega, scene.zeta, scene.shape, scene.bias
-    restore(q, p, out_q, out_p)
     if length <= 0.0:
         return
     m = shape.shape[0]
@@ -290,8 +289,8 @@ def push(scene, row, n_coefficients, length, q, p, lanes, known, out_q, out_p):
         moments = np.empty(n_coefficients + 1)
         work = np.empty((2, n_coefficients))
         for n in range(q.size):
-            q0 = out_q[n]
-            p0 = out_p[n]
+            q0 = q[n]
+            p0 = p[n]
             a11, a12, a22 = mode_moments(omega[n], zeta[n], length, moments, work)
             x = bias[n] * moments[1]
             v = bias[n] * moments[0]
@@ -299,26 +298,28 @@ def push(scene, row, n_coefficients, length, q, p, lanes, known, out_q, out_p):
                 for k in range(n_coefficients):
                     x -= shape[i, n] * weights[k, i] * moments[k + 1]
                     v -= shape[i, n] * weights[k, i] * moments[k]
-            out_q[n] = a11 * q0 + a12 * p0 + length * length * x
-            out_p[n] = -omega[n] * omega[n] * a12 * q0 + a22 * p0 + length * v
+            q[n] = a11 * q0 + a12 * p0 + length * length * x
+            p[n] = -omega[n] * omega[n] * a12 * q0 + a22 * p0 + length * v
         return
+    lanes, known = table
     whole = active or any_of(bias)
     if known[0] != length or (whole and known[1] == 0.0):
         lane_table(omega, zeta, length, whole, lanes)
         known[0] = length
         known[1] = 1.0 if whole else 0.0
-    glide(lanes, length, bias, out_q, out_p)
+    glide(lanes, length, bias, q, p)
     if active:
         for i in range(m):
             weights[0, i] += 0.5 * weights[1, i]
-        commit(shape, lanes, length, weights[0], weights[1], out_q, out_p)
+        commit(shape, lanes, length, weights[0], weights[1], q, p)
 
 
 @outer()
 def replay(scene, steps, n_coefficients, times, out_q, out_p):
     """States (n_times, n_modes) at ascending times, from the start state and the recorded forces; exact in between."""
     n_steps = steps.shape[0]
-    lanes, known = np.empty((2, N_LANE, scene.q.size)), np.zeros((2, 2))  # of the parts of steps, and of whole ones
+    parts = np.empty((N_LANE, scene.q.size)), np.zeros(2)  # of steps
+    wholes = np.empty((N_LANE, scene.q.size)), np.zeros(2)
     q = scene.q.copy()
     p = scene.p.copy()
     flight = np.zeros(steps.shape[1])
@@ -329,9 +330,10 @@ def replay(scene, steps, n_coefficients, times, out_q, out_p):
         row = flight if j == n_steps else steps[j]
         ends = np.inf if j == n_steps else begin + row[LENGTH]
         while k < times.size and times[k] < ends:
-            push(scene, row, n_coefficients, times[k] - begin, q, p, lanes[0], known[0], out_q[k], out_p[k])
+            restore(q, p, out_q[k], out_p[k])
+            push(scene, row, n_coefficients, times[k] - begin, parts, out_q[k], out_p[k])
             k += 1
         if k >= times.size or j == n_steps:
             return
-        push(scene, row, n_coefficients, row[LENGTH], q, p, lanes[1], known[1], q, p)
+        push(scene, row, n_coefficients, row[LENGTH], wholes, q, p)
         begin = steps[j + 1, START] if j + 1 < n_steps else begin + row[LENGTH]
