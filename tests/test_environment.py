@@ -30,7 +30,11 @@ def run(folder, command, **environment):
         ("$FEM modes scene.toml >&-", 0, ""),
         ("$FEM modes scene.toml <&-", 0, ""),
         ("$FEM modes none.toml 2>&-", 2, ""),
-        ("$FEM modes scene.toml --vtk /dev/null/x.pvd", 1, "fem-impact: /dev/null: File exists\n"),
+        (
+            "$FEM modes scene.toml --vtk /dev/null/x.pvd",
+            1,
+            "fem-impact: /dev/null: it is a file and no folder; name another\n",
+        ),
         ("mkdir gone; cd gone; rmdir ../gone; $FEM strike ../scene.toml", 2, None),
     ],
 )
