@@ -157,7 +157,7 @@ def _solved(rules: Theory, n_dofs: float, n_modes: int) -> list[cost.Work]:
     return [cost.by_modes(n, n_modes) for n in [n_dofs, *coarser]]
 
 
-def ringing(element: str, n_modes: int) -> cost.Work:
+def ringing_work(element: str, n_modes: int) -> cost.Work:
     """So many modes of a plate for motion and sound, on a mesh as `refinement.size_for` makes it for them."""
     rules = BY_ELEMENT[element]
     n_dofs = max(LEAST, PER_MODE * n_modes) * rules.unknowns / BY_ELEMENT["argyris"].unknowns

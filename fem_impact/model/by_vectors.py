@@ -18,8 +18,7 @@ from . import audit, cost, idealisation, vectors
 from .asked import Asked, Description, Unaffordable
 from .budget import CHEAP
 from .by_idealisation import Idealised
-from .by_modes import MOST_MODES, Modal
-from .by_modes import ringing as found
+from .by_modes import MOST_MODES, Modal, ringing_work
 from .target import FIRST_LOOK, Elements, Stages
 
 AUDIBLE = 20e3  # [Hz] the ear's limit: no mode above is asked for unless a band of the sound is
@@ -70,7 +69,7 @@ class Vectors(Description):
         if impacts > 2 and not asked.meshed:  # each multiplies the error that a mesh makes before it
             meshes.append(vectors.finer(target, meshes[0], stages))
         work = cost.by_vectors([target.unknowns(at, each, stages) for each in meshes], count, lasts)
-        ringing = sum((found(target.element, n) for n in (FIRST_LOOK, ringing_count(asked))), cost.NOTHING)
+        ringing = sum((ringing_work(target.element, n) for n in (FIRST_LOOK, ringing_count(asked))), cost.NOTHING)
         why = f"the contact lasts about {asked.duration:.3g} s"
         kept = f"the target is described by about {count} Ritz vectors, more if the error demands it"
         reason = f"{target.element} elements of {size:.3g} m, smaller towards the blow, about {n_dofs} unknowns"
