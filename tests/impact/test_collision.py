@@ -345,6 +345,47 @@ def test_felt_that_is_nearly_recovered_is_met_where_it_is(frequency):
     assert hit.contact_time == pytest.approx(exact.contact_time, rel=claimed)
 
 
+def test_contacts_that_nothing_reaches_leave_the_steps_of_others_alone():
+    """Scheme A, to which all steps fell where one of two contacts stood still, took sixteen times as many."""
+    law = fi.Contact.hertz(1e7)
+    ball, other, *resting = (fi.Modes.rigid(mass) for mass in (0.03, 0.2, 0.1, 0.1))
+    alone = collide([ball, other], [Touch(law, 0, 1)], speeds=[1.0, 0.0], tolerance=1e-4)
+    touches = [Touch(law, 0, 1), Touch(law, 2, 3)]
+    hit = collide([ball, other, *resting], touches, speeds=[1.0, 0.0, 0.0, 0.0], tolerance=1e-4)
+    assert len(hit.history.steps) == len(alone.history.steps) and hit.history.n_fallback == 0
+    assert hit.impulse == pytest.approx(alone.impulse, rel=1e-12)  # rounding of some 40 steps
+
+
+# [Hz] of the struck bar, which draws the ball at its other end apart for half a period: many steps, and less than one
+@pytest.mark.parametrize("frequency", [3e3, 2e4])
+@pytest.mark.parametrize("tolerance", [1e-3, 1e-4])
+def test_a_ball_that_touches_at_rest_is_met_when_the_bar_comes_back(frequency, tolerance):
+    law, u = fi.Contact.hertz(1e7), 0.1**-0.5
+    shapes = [[u, -1.6 * u], [u, 1.6 * u]]
+    bar = fi.Modes.from_arrays([0.0, frequency], shapes, points=[[0.0], [1.0]], mass=0.1, complete=True)
+    bodies = [fi.Modes.rigid(0.03), bar, fi.Modes.rigid(0.05)]
+    touches = [Touch(law, 0, 1, None, [0.0]), Touch(law, 1, 2, [1.0], None)]
+    blow = {"speeds": [1.0, 0.0, 0.0], "quantity": "contact_time", "max_impacts": 1}
+    hit, exact = (collide(bodies, touches, tolerance=each, **blow) for each in (tolerance, 1e-8))
+    claimed = hit.error.of_quantity("contact_time") + exact.error.of_quantity("contact_time")
+    assert hit.contact_time == pytest.approx(exact.contact_time, rel=claimed)
+    assert exact.history.contacts[1, 0] > 0.25 / frequency and hit.history.n_fallback == 0
+
+
+def test_felt_that_is_pressed_by_less_than_rounding_holds_up_no_run():
+    """Its surface was sought again and again in steps that no longer advanced the time."""
+    first, second = 73.526904201, 106.948350492
+    laws = [
+        fi.Contact.power(5.87286308e13, 2.2, loss=first),
+        fi.Contact.power(3.08931397e13, 2.2, loss=second),
+        fi.Contact.felt(1.59207418e9, 1.5, hysteresis=0.71024247, relaxation=1.07473e-3),
+    ]
+    bodies = [fi.Modes.rigid(mass) for mass in (2.713e-3, 1.9864e-2, 0.1488, 0.05)]
+    touches = [Touch(law, i, i + 1) for i, law in enumerate(laws)]
+    hit = collide(bodies, touches, speeds=[0.0119, 0.0, 0.0, 0.0], tolerance=1e-2, max_impacts=1)
+    assert len(hit.history.steps) < 1000
+
+
 def test_a_miss_is_no_impact():
     hit = collide([fi.Modes.rigid(1.0)], [Touch(fi.Contact.linear(1e5), 0, None)], speeds=[-1.0])
     assert hit.n_impacts == 0 and hit.finished

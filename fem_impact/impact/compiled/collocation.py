@@ -390,9 +390,9 @@ def look_ahead(contacts, grid, room, row, smooth):
 
 
 @inner(part=True)
-def judged(contacts, course, grid, room, misfit, h, special, limits):
+def judged(bodies, contacts, course, grid, room, misfit, h, limits):
     """Whether to take a step of length h; if not, the next is shorter, of other contacts, or of the length returned."""
-    count = course.counts
+    count, (special, _) = course.counts, special_of(contacts.law)
     coarse = misfit > grid.limit and count[LEVEL] < LEVELS - 2
     if misfit == np.inf and count[SEEKS] != NOTHING:
         count[SEEKS] = NOTHING
@@ -406,7 +406,7 @@ def judged(contacts, course, grid, room, misfit, h, special, limits):
             room.nodes[FORCES] = 0.0
         if look != WELL:
             return False, 0.0
-    answer, guess = locate_event(contacts, course, limits, h, special, FALSE)
+    answer, guess = locate_event(bodies, contacts, course, limits, h, special, FALSE)
     if answer == TRY and count[TRIES] == 0 and coarse and 0.25 * h < guess < 0.9 * h:
         count[SEEKS] = NOTHING
         count[LEVEL] += 1
@@ -462,7 +462,7 @@ def follow_nodes(scene, grid, room, flights, limits, run, steps):
         if slot == LEVELS or grid.known[slot] == 0.0:
             tabulate(bodies, grid, slot, h)
         misfit = collocate(bodies, contacts, grid, room, slot, h)
-        taken, guess = judged(contacts, course, grid, room, misfit, h, special, limits)
+        taken, guess = judged(bodies, contacts, course, grid, room, misfit, h, limits)
         if not taken:
             continue
         smooth = count[TARGET] < 0 and count[CORNERED] < 0

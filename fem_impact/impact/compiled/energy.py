@@ -62,13 +62,13 @@ def solved(bodies, contacts, room, tables, slot, h):
 
 
 @inner(part=True)
-def located(contacts, course, limits, h, base, cornered, blind):
+def located(bodies, contacts, course, limits, h, base, cornered, blind):
     """Whether to take a step of length h, whether blind, as its event was not found, and the next length to try."""
     if blind:
         course.counts[TARGET] = -1
         course.counts[CORNERED] = -1
         return True, True, 0.0
-    answer, guess = locate_event(contacts, course, limits, h, cornered, TRUE)
+    answer, guess = locate_event(bodies, contacts, course, limits, h, cornered, TRUE)
     blind = answer == LOST and h >= 1e-3 * base
     if blind:
         course.counts[TARGET] = -1
@@ -192,7 +192,7 @@ def follow(scene, tables, room, limits, run, steps):
         fresh = not blind and count[SEEKS] == NOTHING
         if fresh and shortened(bodies, contacts, course, room, special, h, limits.still):
             continue
-        taken, blind, guess = located(contacts, course, limits, h, tables.base, cornered, blind)
+        taken, blind, guess = located(bodies, contacts, course, limits, h, tables.base, cornered, blind)
         if not taken:
             continue
         if not finite(contacts):

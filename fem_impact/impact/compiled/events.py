@@ -38,14 +38,31 @@ def crossed(pressed, d0, v0, y, depth, still):
     return y > depth and (d0 < 0.0 or v0 < -still)
 
 
+@inner()
+def drawn_apart(bodies, contacts, i):
+    """Whether a step's forces, and what already moves, first draw contact i apart, which touches at rest."""
+    pull = 0.0
+    for n in range(bodies.q.size):
+        push = bodies.bias[n] - bodies.omega[n] ** 2 * bodies.q[n] - bodies.twice[n] * bodies.p[n]
+        for j in range(contacts.force.size):
+            push -= bodies.shape[j, n] * contacts.force[j]
+        pull += bodies.shape[i, n] * push
+    return pull < 0.0
+
+
 @inner(part=True)
-def first_crossing(contacts, h, limits):
-    """The contact that opened or closed first within a step, and when by the cubic; -1 and h where none did."""
-    now, y, rate = contacts.now, contacts.end, contacts.rate
+def first_crossing(bodies, contacts, h, limits, first):
+    """The contact that opened or closed first within a step, and when by the cubic; -1 and h where none did.
+
+    One that touches at rest counts as apart only in the ``first`` step of a run: later, rounding decides.
+    """
+    now, y, rate, still = contacts.now, contacts.end, contacts.rate, limits.still
     target = -1
     at = h
     for i in range(y.size):
-        if crossed(contacts.pressed[i], now[APPROACH, i], now[RATE, i], y[i], limits.depth, limits.still):
+        d0, v0, pressed = now[APPROACH, i], now[RATE, i], contacts.pressed[i]
+        closes_later = first and not pressed and d0 == 0.0 and abs(v0) <= still and y[i] > limits.depth
+        if crossed(pressed, d0, v0, y[i], limits.depth, still) or (closes_later and drawn_apart(bodies, contacts, i)):
             root = h * crossing(now[APPROACH, i], h * now[RATE, i], y[i], h * rate[i])
             if root <= at:
                 at = root
@@ -144,11 +161,12 @@ def last_try(length, value, slope, out_bracket):
 
 
 @inner()
-def first_corner(contacts, h, lossy, out_bracket):
+def first_corner(contacts, h, depth, lossy, out_bracket):
     """The first corner within a step: contact, its kind, and when; -1, LETS_GO and h where there is none.
 
-    ``out_bracket`` receives two times with the corner in between and, for secants, a third time and the value there
-    and at the start. ``after`` (n_contacts,) is what they remember at the end. Loss is left out unless ``lossy``.
+    Felt pressed by less than ``depth`` [m] has none: its marks are rounding. ``out_bracket`` receives two times with
+    the corner in between and, for secants, a third time and the value there and at the start. ``after`` (n_contacts,)
+    is what they remember at the end. Loss is left out unless ``lossy``.
     """
     law, now, y, rate, after = contacts.law, contacts.now, contacts.end, contacts.rate, contacts.after
     target = -1
@@ -166,6 +184,8 @@ def first_corner(contacts, h, lossy, out_bracket):
                     at, target, kind = root, i, LETS_GO
                     last_try(h, end, start, out_bracket)
         if relaxes(law, i):
+            if max(d0, d1) <= depth:
+                continue
             apart = law["memory"][i] < 0.0
             start = parting(law, i, d0, law["memory"][i])
             end = parting(law, i, d1, after[i])

@@ -181,7 +181,7 @@ def step_length(course, base, horizon):
 
 
 @inner(part=True)
-def locate_event(contacts, course, limits, h, cornered, lossy):
+def locate_event(bodies, contacts, course, limits, h, cornered, lossy):
     """After a try of length h: what to do next, and the length of the next try where the end of the step is sought.
 
     The first crossing is sought first, then the first corner before it, if some force has any (``cornered``).
@@ -193,7 +193,7 @@ def locate_event(contacts, course, limits, h, cornered, lossy):
     guess = 0.0
     if sought == NOTHING:
         count[CORNERED] = -1
-        count[TARGET], guess = first_crossing(contacts, h, limits)
+        count[TARGET], guess = first_crossing(bodies, contacts, h, limits, course.clock[TIME] == 0.0)
         if count[TARGET] >= 0:
             enclose(contacts, h, count[TARGET], bracket)
             count[SEEKS] = CROSSING
@@ -211,7 +211,7 @@ def locate_event(contacts, course, limits, h, cornered, lossy):
         if sought == CROSSING and not abs(contacts.end[count[TARGET]]) <= max(limits.depth, NEAR * bracket[SIZE]):
             answer = LOST  # but a corner before it may be found
     if sought != CORNER and cornered:
-        count[CORNERED], count[WHICH], guess = first_corner(contacts, h, lossy, bracket)
+        count[CORNERED], count[WHICH], guess = first_corner(contacts, h, limits.depth, lossy, bracket)
         if count[CORNERED] >= 0:
             if count[WHICH] == AGAIN:
                 contacts.law["memory"][count[CORNERED]] = abs(contacts.law["memory"][count[CORNERED]])
@@ -272,7 +272,7 @@ def take_over(contacts, course, limits, h, base, special):
     if clock[TIME] - clock[RESET] > base:
         clock[RESET] = clock[TIME]
         count[EVENTS] = 0
-    elif count[TARGET] >= 0:
+    elif count[TARGET] >= 0 or corner >= 0:
         count[EVENTS] += 1
     count[STEPS] += 1
     count[LOOKS] += 1

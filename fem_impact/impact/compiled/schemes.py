@@ -22,13 +22,14 @@ import numpy as np
 from .build import inner
 from .law import Point, compressed, mean_slopes, memory_energy, point_at, power, spring_of, steepness
 from .laws.felt import growth, soaked
-from .rounding import CHORD, ITERATIONS, OVERFLOW, REPEATED, SOLVED, STALLED
+from .rounding import CHORD, ITERATIONS, NEAR, OVERFLOW, REPEATED, SOLVED, STALLED
 
 from .layout import (  # isort: skip
     APPROACH, COMPRESSION, ENERGY, FORCE, FREE_END, FREE_MEAN, FREE_RATE, OWN_END, OWN_MEAN,
     OWN_MEAN_RAMP, OWN_RATE, OWN_RATE_RAMP, RATE,
 )  # fmt: skip
 
+CLOSING = 1e-6  # [-] of the largest force: less of one that only closes may pull, or scheme A would decide when it does
 WORK_ERROR = 1e-9  # [-] a step whose force's work misses the stored energy by more lost its digits: scheme A takes it
 
 
@@ -397,6 +398,15 @@ def solve_ramps(h, contacts, sums, work):
     m = out_y.size
     r, r2, f2, s2 = work[3, 0], work[3, 1], work[3, 2, :m], work[3, 3, :m]
     y2, jacobian = work[4, 0], work[1]
+    scale = work[2, 3]  # of an approach: what rounding counts from, though it ends at zero
+    widest = 0.0
+    for i in range(m):
+        scale[i] = max(abs(now[APPROACH, i]), abs(contacts.free[FREE_END, i]))
+        for j in range(m):
+            scale[i] = max(scale[i], abs(sums[OWN_END, i, j] * out_f[j]))
+        widest = max(widest, scale[i])
+    for i in range(m):
+        scale[i] = 1e-3 * max(scale[i], NEAR * widest)
     settled = False
     for _ in range(20):
         if not ramp_forces(h, out_y, contacts, sums, work, out_f, out_s, r):
@@ -406,11 +416,8 @@ def solve_ramps(h, contacts, sums, work):
         for j in range(m):
             for i in range(m):
                 y2[i] = out_y[i]
-            shift = 1e-7 * max(abs(out_y[j]), 1e-3 * abs(now[APPROACH, j]))
-            y2[j] += shift
+            y2[j] += 1e-7 * max(abs(out_y[j]), scale[j])
             shift = y2[j] - out_y[j]
-            if not shift > 0.0:
-                return False
             if not ramp_forces(h, y2, contacts, sums, work, f2, s2, r2):
                 return False
             for i in range(m):
@@ -422,11 +429,16 @@ def solve_ramps(h, contacts, sums, work):
             out_y[i] -= r[i]
             if not abs(r[i]) < OVERFLOW:
                 return False
-            if abs(r[i]) > 4e-15 * max(abs(out_y[i]), 1e-2 * abs(now[APPROACH, i])):
+            if abs(r[i]) > 4e-15 * max(abs(out_y[i]), 10.0 * scale[i]):
                 settled = False
     if not settled:
         return False
+    largest = 0.0
     for i in range(m):
+        largest = max(largest, out_f[i])
+    for i in range(m):
+        if now[APPROACH, i] < 0.0 and abs(out_f[i]) <= CLOSING * largest:
+            continue
         if not out_f[i] >= 0.0:
             return False
         spring = spring_of(law, i)
