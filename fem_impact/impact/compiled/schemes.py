@@ -406,7 +406,7 @@ def solve_ramps(h, contacts, sums, work):
             scale[i] = max(scale[i], abs(sums[OWN_END, i, j] * out_f[j]))
         widest = max(widest, scale[i])
     for i in range(m):
-        scale[i] = 1e-3 * max(scale[i], NEAR * widest)
+        scale[i] = max(scale[i], NEAR * widest)
     settled = False
     for _ in range(20):
         if not ramp_forces(h, out_y, contacts, sums, work, out_f, out_s, r):
@@ -416,7 +416,7 @@ def solve_ramps(h, contacts, sums, work):
         for j in range(m):
             for i in range(m):
                 y2[i] = out_y[i]
-            y2[j] += 1e-7 * max(abs(out_y[j]), scale[j])
+            y2[j] += 1e-7 * max(abs(out_y[j]), 1e-3 * scale[j])
             shift = y2[j] - out_y[j]
             if not ramp_forces(h, y2, contacts, sums, work, f2, s2, r2):
                 return False
@@ -429,7 +429,7 @@ def solve_ramps(h, contacts, sums, work):
             out_y[i] -= r[i]
             if not abs(r[i]) < OVERFLOW:
                 return False
-            if abs(r[i]) > 4e-15 * max(abs(out_y[i]), 10.0 * scale[i]):
+            if abs(r[i]) > SOLVED * max(4.0 * abs(out_y[i]), scale[i]):
                 settled = False
     if not settled:
         return False
