@@ -11,6 +11,7 @@ import numpy as np
 from .._base import check
 from .._base.check import SimulationError
 from . import distance, engine
+from .compiled import law
 from .compiled.bundles import KernelSystem
 from .engine import STEP_SHARE, TOLERANCE
 from .history import History
@@ -228,7 +229,7 @@ class _Control:
         # or the horizon could cut both runs to one step, and they would always agree
         shortest = min(self.pace.duration, options.last[0])
         count = first_count(self.scheme, min(STEP_SHARE * options.tolerance, TOLERANCE), options.quantities)
-        longest = min(self.pace.longest_step, _longest_lossy(self.system, self.pace, options.tolerance))
+        longest = min(self.pace.longest_step, _longest_ringing(self.system, self.pace, options.tolerance))
         first = min(2.0 * shortest / count, longest)
         return [first * 0.5**n for n in range(8)], STEP_SHARE * options.tolerance  # A4 errs 2**28 times less at last
 
@@ -266,24 +267,40 @@ def _unseen(coarse: History, fine: History, size: float) -> float:
     return float(impulse @ errs / (impulse.sum() or 1.0))
 
 
-def _longest_lossy(system: KernelSystem, pace: engine.Pace, tolerance: float) -> float:
-    """Longest step [s] that resolves the modes whose ringing shows in a lossy contact force; infinite without loss.
+def _longest_ringing(system: KernelSystem, pace: engine.Pace, tolerance: float) -> float:
+    """Longest step [s] that resolves the modes whose ringing shows in a contact force; infinite if none does.
 
-    A lossy force depends on the approach rate. A force that rises like a spring's makes each mode ring in that rate,
-    with stiffness times u**2 / omega**2 of the approach speed.
+    Modes that ring from the start, about where forces hold them then, show by what they move of the approach. A lossy
+    force depends on the approach rate, too. A force that rises like a spring's makes each mode ring in that rate, with
+    stiffness times u**2 / omega**2 of the approach speed.
     """
-    longest, numbers = np.inf, (pace.speed * system.law["loss"]).tolist()
-    if not any(numbers):
+    longest, numbers, bends = np.inf, (pace.speed * system.law["loss"]).tolist(), system.omega > 0.0
+    rings = (bends & ((system.q != 0.0) | (system.p != 0.0))).any()
+    if not rings and not any(numbers):
         return longest
     slow = system.omega <= np.pi / pace.duration
-    fastest = (-system.omega).argsort(kind="stable")
-    order = fastest[(system.omega[fastest] > 0.0) & (system.zeta[fastest] < RINGING)]
-    omega = system.omega[order]
+    order = (-system.omega).argsort(kind="stable")[: np.count_nonzero(bends)]
+    omega, p = system.omega[order], system.p[order]
+    swing = np.hypot(system.q[order] - (_static(system)[order] / omega**2 if rings else 0.0), p / omega)
+    resounds = system.zeta[order] < RINGING
     for shape, number in zip(system.shape, numbers):
-        if number > 0.0 and len(omega):
+        shown = [(np.abs(shape[order]) * swing, pace.duration * abs(float(shape[slow] @ system.p[slow])))]
+        if number > 0.0:
             stiffness = (1.0 + number) * (np.pi / pace.duration) ** 2 / max(float(shape[slow] @ shape[slow]), 1e-300)
-            ringing = number / (1.0 + number) * stiffness * np.cumsum((shape[order] / omega) ** 2)
-            heard = np.searchsorted(ringing, tolerance)
+            shown.append((resounds * number / (1.0 + number) * stiffness * (shape[order] / omega) ** 2, 1.0))
+        for each, whole in shown:
+            heard = np.searchsorted(np.cumsum(each), tolerance * whole, side="right")
             if heard < len(omega):
                 longest = min(longest, RESOLVED / float(omega[heard]))
     return longest
+
+
+def _static(system: KernelSystem) -> np.ndarray:
+    """Modal forces [N kg**-0.5] as a run starts, (n_modes,): constant ones and those of contacts that are pressed."""
+    found, rates = system.bias.copy(), system.shape @ system.p
+    for i, approach in enumerate(system.offset + system.shape @ system.q):
+        if approach > 0.0:  # the slope of what the contact stores, of any law
+            stored = [law.stored(np.array([(1.0 + part) * approach]), system.law[i : i + 1]) for part in (-1e-3, 1e-3)]
+            factor = max(0.0, 1.0 + system.law["loss"][i] * rates[i])
+            found -= (stored[1] - stored[0]) / (2e-3 * approach) * factor * system.shape[i]
+    return found

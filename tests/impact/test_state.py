@@ -8,6 +8,7 @@ from restarted import measured
 from test_collision import integrate
 
 import fem_impact as fi
+from fem_impact.impact.state import State
 
 
 @pytest.mark.parametrize("law", [fi.Contact.hertz(1e7), fi.Contact.power(1e7, 1.5, loss=0.3)], ids=["hertz", "loss"])
@@ -30,6 +31,17 @@ def test_a_second_blow_meets_an_independent_integration(law):
         assert_allclose(found[0], wanted, atol=1e-6 * np.abs(wanted).max())
     alone = fi.strike(modes, ball, law, at=[1.0], **blow)
     assert abs(alone.restitution - second.restitution) > 0.01  # the motion matters, and by far more than that
+
+
+def test_a_striker_at_a_surface_that_recedes_faster_touches_nothing():
+    """Rounding of where the surface is made 2 of these 60 an impact of 1e-37 N."""
+    body, rng = measured(3, 1, 0.0), np.random.default_rng(1)
+    shape, law = body.shape_at([[0.0]])[0], fi.Contact.layers(1e12, 1.0, depth=1e-9, hard_stiffness=1e15)
+    for size in 10.0 ** rng.uniform(-2.0, 1.0, 60):
+        away = State(0.0, (body,), (1e-4 * rng.normal(size=3),), (size * shape,), np.zeros((0, 2)), 0.0)
+        blow = {"at": [0.0], "speed": 0.5 * size * float(shape @ shape), "start": away, "tolerance": 1e-4}
+        hit = fi.strike(body, fi.Striker.rigid(1e3), law, **blow, max_impacts=1)
+        assert not hit.impacts or hit.impacts[0].start > 0.0
 
 
 PLATE = fi.analytic.rectangle(1.55, 1.0, mass=0.2, first_frequency=100.0, n_modes=200, damping_ratio=0.01)
@@ -63,7 +75,7 @@ def test_a_collision_at_two_contacts_goes_on_from_its_middle(where):
     bodies = [fi.Modes.rigid(0.05), fi.Modes.rigid(0.02), PLATE]
     laws, points = (fi.Contact.hertz(1e7), fi.Contact.linear(2e5, gap=1e-2)), (AT, (1.0, 0.4))
     touches = [fi.Touch(law, i, 2, None, at) for i, (law, at) in enumerate(zip(laws, points))]
-    rule = {"tolerance": 1e-3, "quantity": "n_impacts"}
+    rule = {"tolerance": 1e-7, "quantity": "n_impacts"}
     whole = fi.collide(bodies, touches, speeds=[1.0, 2.0, 0.0], **rule)
     first = whole.impacts[0]
     time = 0.5 * (first.start + first.end) if where == "pressed" else 0.5 * (first.end + whole.impacts[1].start)
@@ -71,7 +83,7 @@ def test_a_collision_at_two_contacts_goes_on_from_its_middle(where):
     rest = fi.collide(bodies, touches, start=state, **rule)
     assert state.force.any() == (where == "pressed")
     assert rest.n_impacts == whole.n_impacts - (where != "pressed")
-    # the modes that stand for those left out go on swinging; steps err by this
+    # the modes that stand for those left out go on swinging; steps err by this, and at 1e-3 by 2e-4
     assert_allclose(rest.speeds, whole.speeds, atol=1e-5)
     wanted = whole.velocity(LISTEN, time + LATER)
     assert_allclose(rest.velocity(LISTEN, LATER), wanted, atol=1e-5 * np.abs(wanted).max())

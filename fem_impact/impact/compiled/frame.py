@@ -78,7 +78,8 @@ def course_of(run):
 def begin(scene, bodies, contacts, course, base):
     """Where all contacts stand at the start of a run, whether they are pressed, and what counts as rest.
 
-    Events are first passed for the time ``base``. A run may start where the one before located a release.
+    Events are first passed for the time ``base``. A run may start where the one before located a release, or with a
+    striker on a surface that is away from rest: the approach is then zero but for the rounding of these.
     """
     now = contacts.now
     for n in range(scene.omega.size):
@@ -86,7 +87,10 @@ def begin(scene, bodies, contacts, course, base):
     for i in range(contacts.end.size):
         contacts.offset[i] = scene.offset[i]
         now[APPROACH, i], now[RATE, i] = approach_of(bodies.shape, contacts.offset, i, bodies.q, bodies.p)
-        if abs(now[APPROACH, i]) <= LOCATED * base * abs(now[RATE, i]):
+        way = base * abs(now[RATE, i])
+        for n in range(scene.omega.size):
+            way += abs(bodies.shape[i, n] * bodies.q[n])
+        if abs(now[APPROACH, i]) <= LOCATED * way:
             now[APPROACH, i] = 0.0
         contacts.pressed[i] = now[APPROACH, i] > 0.0 or (now[APPROACH, i] == 0.0 and now[RATE, i] > 0.0)
     course.clock[RESPITE] = base
