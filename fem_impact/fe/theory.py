@@ -211,9 +211,9 @@ def kept_unknowns(fixed: np.ndarray) -> tuple[csr_matrix, csr_matrix]:
 
 def unresisted(motions: np.ndarray, expand: Any, project: Any) -> np.ndarray:
     """Combinations (n_motions, n) of motions (n_all, n_motions) that maps of `Held` leave as they are."""
-    lost = motions - expand @ (project @ motions)
-    lengths, turn = np.linalg.svd(lost.T @ lost / np.abs(motions).max() ** 2)[1:]
-    free: np.ndarray = turn[np.sqrt(lengths) < SAME * np.sqrt(len(motions))].T
+    lost = (motions - expand @ (project @ motions)) / np.abs(motions).max()
+    lengths, turn = np.linalg.svd(lost, full_matrices=False)[1:]  # of its square, half the digits would be lost
+    free: np.ndarray = turn[lengths < SAME * np.sqrt(len(motions))].T
     return free
 
 
@@ -280,10 +280,11 @@ class Strain(check.Brief):
 
     def around(self, system: Any, vectors: np.ndarray, vertex: int) -> np.ndarray:
         """Twice the strain energy (n_modes,) in the ring of triangles around those that touch a vertex of the mesh."""
-        corners, x = self.domain.space.vertices, self.domain.points.x
+        space = self.domain.space
+        corners = space.vertices
         touching = (corners == vertex).any(axis=1)
         ring = np.isin(corners, corners[touching]).any(axis=1) & ~touching
-        far = np.linalg.norm(x.mean(axis=1) - x[touching].mean(axis=(0, 1)), axis=1)
+        far = np.linalg.norm(space.origin - space.corners[corners == vertex][0], axis=1)
         ring &= far < 4.0 * far[touching].max()  # not the neighbours of its outer vertices, where one ring is all
         return self._of_cells(system, system.expand @ vectors, np.flatnonzero(ring), "nqik,nqik->k")
 

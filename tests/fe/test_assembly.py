@@ -41,6 +41,16 @@ def test_rigid_motions_left_by_the_supports(supports, n_rigid):
     assert_allclose(system.rigid.T @ system.M @ system.rigid, np.eye(n_rigid), atol=1e-12)
 
 
+@pytest.mark.parametrize("degrees", [40.0, 60.0, 75.0, 100.0])
+def test_a_plate_turns_about_a_hinged_edge_in_any_direction(degrees):
+    """Rounding at the hundreds of vertices of the rings at its corners is not a support."""
+    tip = 0.3 * np.cos(np.radians(degrees)), 0.3 * np.sin(np.radians(degrees))
+    for edge in ("edge0", "edge1", "edge2"):
+        system = assemble(mesh.polygon([(0.0, 0.0), (0.3, 0.0), tip]), PLATE, {edge: "hinged"})
+        assert system.rigid.shape[1] == 1
+        assert find_modes(system, n_modes=2).frequencies[1] > 1.0
+
+
 def test_a_rigid_motion_is_linear_in_the_place_however_thin_and_far_away_the_plate_is():
     length, shift = 1e-3, 1e3
     plate = mesh.rectangle(length, 0.01 * length, size=0.01 * length)

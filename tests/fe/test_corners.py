@@ -155,3 +155,16 @@ def test_modes_of_a_sector_err_by_less_than_they_claim(degrees, edge):
     true = sector_waves(degrees, 0.3, edge)[:5] ** 2 * np.sqrt(stiffness / (7850.0 * 3e-3))
     assert (np.abs(modes.omega / true - 1.0) < modes.frequency_error).all()
     assert modes.frequency_error[1:3].max() < 1e-4  # the second and third pass the corner by
+
+
+@pytest.mark.parametrize("ends", [("clamped", "free"), ("hinged", "hinged")])
+def test_corners_filled_by_one_triangle_state_what_they_miss(ends):
+    wood = fi.Material.orthotropic(E_along=10e9, E_across=0.5e9, nu=0.3, G=0.6e9, rho=400.0)
+    mesh = fi.mesh.polygon([(0.0, 0.0), (0.3, 0.0), (0.3, 0.3 * np.tan(np.radians(40.0)))])
+    system = fi.assemble(mesh, fi.Plate(wood, 1e-3), dict(zip(("edge0", "edge2"), ends)))
+    corner = int(np.linalg.norm(mesh.points, axis=1).argmin())
+    assert (system.space.vertices == corner).any(axis=1).sum() == 1
+    assert corner in system.corners
+    modes = fi.find_modes(system, n_modes=3)
+    finer = fi.find_modes(fi.assemble(mesh.refined(2.5), fi.Plate(wood, 1e-3), system.supports), n_modes=3)
+    assert (np.abs(modes.omega / finer.omega - 1.0) < modes.frequency_error + finer.frequency_error).all()
