@@ -172,7 +172,7 @@ def _missed_at_corners(system: System, vectors: np.ndarray, values: np.ndarray) 
     ring tells what the innermost triangles, half as far, would hold, and that they hold little of. Frequencies are too
     high by it, so that an error near one over the frequency found is more over the true one.
     """
-    if system.strain is None or system.rules.compared or not system.graded:
+    if system.strain is None or not system.graded:
         return system.unresolved if system.unresolved > SAY else 0.0
     missed = np.zeros(len(values))
     for vertex, corner in system.corners.items():
