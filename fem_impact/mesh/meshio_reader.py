@@ -48,6 +48,8 @@ def arrays(path: Path) -> dict[str, np.ndarray]:
         raise ValueError(f"its ending is {path.suffix!r}, but meshio reads {', '.join(known)}")
     if path.suffix.lower() in NASTRAN:
         _refuse_left_out(path)
+    if path.suffix.lower() == ".inp":
+        refuse_lost_nodes(path)
     with closed_hdf5(path):
         mesh = meshio.read(path)
     found: dict[str, np.ndarray] = {"points": np.asarray(mesh.points, float)}
@@ -87,6 +89,27 @@ def _refuse_left_out(path: Path) -> None:
                 raise ValueError(
                     f"{path.name} has nodes in coordinate system {frame[0].strip()}; export all in the global one"
                 )
+
+
+def refuse_lost_nodes(path: Path) -> None:
+    """ValueError if an Abaqus deck has nodes that meshio leaves out or puts elsewhere.
+
+    It keeps those of the last block, the last of one number, and neither generates nodes nor turns them.
+    """
+    seen: set[str] = set()
+    within = False
+    for line in path.read_text("utf-8", "replace").splitlines():
+        words = [word.strip().upper() for word in line.lstrip("*").split(",")]
+        if line.startswith("*") and not line.startswith("**"):
+            within = words[0] == "NODE"
+            if words[0] in ("NGEN", "NCOPY", "NFILL", "SYSTEM") or (within and {"SYSTEM=C", "SYSTEM=S"} & set(words)):
+                raise ValueError(f"{path.name} has {line.strip()}, which is not read; write all nodes by x, y and z")
+            if within and seen:
+                raise ValueError(f"{path.name} has several blocks of nodes, as of several parts; write all into one")
+        elif within and not line.startswith("**") and words[0]:
+            if words[0] in seen:
+                raise ValueError(f"{path.name} has node {words[0]} twice; export it again")
+            seen.add(words[0])
 
 
 @contextmanager

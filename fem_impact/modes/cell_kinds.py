@@ -92,14 +92,14 @@ def settled(frequencies: np.ndarray) -> np.ndarray:
     return found
 
 
-def refuse_twice(frequencies: np.ndarray, shapes: np.ndarray) -> None:
+def refuse_twice(frequencies: np.ndarray, shapes: np.ndarray, holder: str = "files") -> None:
     """ValueError if a mode is told twice, as in two subcases; two of one frequency may look alike at three nodes."""
     flat = shapes.reshape(math.prod(shapes.shape[:-1]), len(frequencies))  # which may be none
     seen: set[tuple[float, int]] = set()
     for frequency, mode in zip(frequencies.tolist(), flat.T):
         mark = frequency, hash(mode.tobytes())
         if mark in seen and len(shapes) > 3 and mode.any():
-            raise ValueError(f"files must hold each mode once, but that at {frequency:g} Hz is there twice")
+            raise ValueError(f"{holder} must hold each mode once, but that at {frequency:g} Hz is there twice")
         seen.add(mark)
 
 

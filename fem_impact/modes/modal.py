@@ -139,6 +139,10 @@ class Modes(check.Brief):
         values = check.array("shapes", shapes, (len(points), len(omega)), "kg**-0.5")
         mass, connected = check.positive("mass", mass, "kg"), connected_cells(cells, points)
         damping = damping_ratios(damping_ratio, omega)
+        if not values.any():
+            raise ValueError("shapes must move at least one point in one mode, got zeros only")
+        if unstated.unfolded(points).shape[1] >= min(points.shape[1], 2):  # along a line, two modes may look alike
+            cell_kinds.refuse_twice(omega / (2.0 * np.pi), values, "shapes")
         complete, free = check.flag("complete", complete), None if free is None else check.flag("free", free)
         if complete and (compliance is not None or free):
             raise ValueError("complete must be False if compliance is given or free is True; leave it out")

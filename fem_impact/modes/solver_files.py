@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from ..mesh.meshio_reader import closed_hdf5
+from ..mesh.meshio_reader import closed_hdf5, refuse_lost_nodes
 from . import cell_kinds
 
 MARKET = "%%MatrixMarket"
@@ -51,6 +51,7 @@ def mesh(path: Path) -> dict[str, np.ndarray]:
     """Nodes, elements and names of single nodes of an Abaqus deck."""
     import meshio
 
+    refuse_lost_nodes(path)
     read = meshio.read(path)
     points = np.asarray(read.points, float)
     labels, within = [], False  # of nodes, in the deck's order, which meshio drops

@@ -140,6 +140,8 @@ def fit(
         check.one_of("per_tap", name, unknown)
     n_points, points = _measured_at(levelled, target, response_at)
     cut, noise, notes = _usable(levelled, window)
+    if target is None and at is not None:
+        raise ValueError("at must be left out without a target, which is then a wall or its unknown modes")
     place = None if target is None else target.point("at", at)[0]
     rig, impulse = Rig(cut.rate, anti_alias, tip_mass, resonance), float(np.mean(cut.impulse))
     inner = None if smaller is None else _inner(smaller, cut, n_points)

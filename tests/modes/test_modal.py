@@ -3,6 +3,8 @@
 import pickle
 from dataclasses import replace
 
+import numpy as np
+import pytest
 from numpy.testing import assert_allclose
 
 import fem_impact as fi
@@ -24,3 +26,16 @@ def test_poorer_descriptions_are_listed_by_all_that_they_lack_and_change_with_th
         counts = {tuple(sorted(lacking)): modes.n_modes for lacking, modes in found.items()}
         assert counts == {(): 9, ("mesh",): 9, ("mesh", "truncation"): 3, ("truncation",): 5}
     assert all(modes.mass == 0.4 and (modes.damping_ratio == 0.01).all() for modes in lists[1].values())
+
+
+def test_a_mode_given_twice_and_shapes_of_zeros_are_refused():
+    plate = fi.analytic.rectangle(0.3, 0.3, mass=0.2, first_frequency=100.0, n_modes=6)
+    points = 0.3 * np.random.default_rng(0).random((7, 2))
+    twice = [0, 1, 2, 2, 3]
+    with pytest.raises(ValueError, match="shapes must hold each mode once, but that at 250 Hz is there twice"):
+        fi.Modes.from_arrays(plate.frequencies[twice], plate.shape_at(points)[:, twice], points=points, mass=0.2)
+    with pytest.raises(ValueError, match="shapes must move at least one point in one mode, got zeros only"):
+        fi.Modes.from_arrays([100.0], np.zeros((7, 1)), points=points, mass=0.2)
+    # both modes of a square at 250 Hz are the same along its diagonal
+    along = np.linspace(0.05, 0.25, 7)[:, None] * np.ones(2)
+    assert fi.Modes.from_arrays(plate.frequencies, plate.shape_at(along), points=along, mass=0.2).n_modes == 6

@@ -154,6 +154,7 @@ def test_four_real_taps_are_predicted_from_each_other():
         ({"unknown": {"contact.hysteresis": (0.0, 0.9), "contact.exponent": (0.8, 3.0)},
           "known": {"contact.relaxation": 1e-3}}, "a contact within all ranges: exponent must be at least 1"),
         ({"taps": 3}, "taps must be"),
+        ({"at": [0.1, 0.2]}, "at must be left out without a target"),
         ({"starts": 10**6}, "starts must be at most 64, got 1000000"),
         ({"taps": fi.Taps.from_arrays(100.0 * np.hanning(40), rate=RATE, overload=True)}, "not cut off"),
     ],
