@@ -51,7 +51,9 @@ def read_mesh(path: Any, unit: str | None) -> tuple[
         used = np.unique(np.append(cells, list(nodes.values())).astype(int))
     heights = None if height is None else (raw[used], height[used])
     names = _named_pairs(path, data, cells)
-    points, cells, number = _mend(path, raw, np.zeros(len(raw)) if height is None else height, cells, notes)
+    named = [node for found in names.values() for pair in found for node in pair]  # lines may have nodes of their own
+    level = np.zeros(len(raw)) if height is None else height
+    points, cells, number = _mend(path, raw, level, cells, named, notes)
     middles = {_pair(number[a], number[b]): raw[node] for (a, b), node in nodes.items()}
     pairs = {name: {_pair(number[a], number[b]) for a, b in found} for name, found in names.items()}
     cells = _hanging(points, cells, pairs, notes)
@@ -208,14 +210,16 @@ def _named_pairs(path: Path, data: meshio_reader.Raw, cells: np.ndarray) -> dict
     return names
 
 
-def _mend(path: Path, points: np.ndarray, height: np.ndarray, cells: np.ndarray, notes: list[str]):
+def _mend(
+    path: Path, points: np.ndarray, height: np.ndarray, cells: np.ndarray, named: list[int], notes: list[str]
+):  # fmt: skip
     """Merge duplicate nodes, drop degenerate and duplicate triangles, flip inverted ones and renumber the nodes."""
     name = path.name
     used = np.unique(cells)
     span = float(np.ptp(points[used], axis=0).max())
     if span == 0.0:
         raise ValueError(f"{name} has all its nodes at one point; export it again")
-    leader = np.arange(len(points))
+    leader, used = np.arange(len(points)), np.unique(np.append(used, named).astype(int))
     tree = cKDTree(points[used])
     # each node is its own neighbour; parts that touch share a point by few, not by sixteen on average
     if tree.count_neighbors(tree, SAME * span) > 16 * len(used):

@@ -326,6 +326,11 @@ def load(path: Any, *, unit: str | None = None) -> Mesh:
     inside = sorted(set(pairs) - set(edges))
     if inside:
         notes.append(f"{', '.join(inside)}: not on the rim, so it cannot be supported")
+    sides = {(a, b) for a, b in mesh_files.sides_of(cells)[0].tolist()}
+    for name in sorted(edges):
+        lost = len(pairs[name] - sides)
+        if lost:
+            notes.append(f"{name}: {lost} of its {len(pairs[name])} lines are no sides of triangles and are left out")
     start = 0
     for i, loop in enumerate(loops):
         edges.setdefault("outer" if i == 0 else f"hole{i - 1}", np.arange(start, start + len(loop)))

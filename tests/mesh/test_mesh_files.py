@@ -73,6 +73,30 @@ def test_saved_mesh_comes_back_with_its_edges(tmp_path):
     same_edges(plate, replace(GOOD, edges=GOOD.edges | {"outer": GOOD.edges["boundary"]}))
 
 
+def test_lines_with_nodes_of_their_own_name_edges_and_those_beside_all_triangles_are_told(tmp_path):
+    """As of a drawing whose curves and surface were exported apart: half of the edge was free without a word."""
+    lines = GOOD.facets[GOOD.edges["left"]].copy()
+    n, own = len(GOOD.points), lines[0].copy()
+    lines[0] = [n, n + 1]
+    points = np.vstack([GOOD.points, GOOD.points[own]])
+    tags = {"gmsh:physical": [np.ones(len(lines), int), np.full(len(GOOD.cells), 2)]}
+    tags["gmsh:geometrical"] = tags["gmsh:physical"]
+    names = {"left": np.array([1, 1]), "body": np.array([2, 2])}
+
+    def loaded(lines):
+        cells = [("line", lines), ("triangle", GOOD.cells)]
+        made = meshio.Mesh(np.column_stack([points, np.zeros(n + 2)]), cells, cell_data=tags, field_data=names)
+        made.write(tmp_path / "plate.msh", file_format="gmsh22")
+        return mesh.load(tmp_path / "plate.msh")
+
+    plate = loaded(lines)
+    assert len(plate.edges["left"]) == len(GOOD.edges["left"])
+    assert plate.notes == ("plate.msh: 2 duplicate nodes were merged",)
+    lines[0] = GOOD.facets[GOOD.edges["right"]][0, 0], own[0]
+    said = "left: 1 of its 4 lines are no sides of triangles and are left out"
+    assert any(said in note for note in loaded(lines).notes)
+
+
 def test_any_name_of_an_edge_comes_back(tmp_path):
     names = {name: np.array([i]) for i, name in enumerate(['3/4" rim', '"', "a\\b", "\\", 'a\\"b', " ä "])}
     mesh.save(tmp_path / "plate.msh", replace(GOOD, edges=GOOD.edges | names))
