@@ -207,6 +207,11 @@ class History(check.Locked):
         found[:, 7] = found[:, 6] / met
         return found
 
+    @property
+    def n_ended(self) -> int:
+        """How many impacts end within the run."""
+        return int(np.isfinite(self.contacts[:, 6]).sum())
+
     @cached_property
     def impacts(self) -> tuple[Impact, ...]:
         """All impacts in order of their start."""

@@ -386,6 +386,34 @@ def test_felt_that_is_pressed_by_less_than_rounding_holds_up_no_run():
     assert len(hit.history.steps) < 1000
 
 
+def of_modes(frequencies, shape):
+    return fi.Modes.from_arrays(frequencies, [shape], points=[[0.0]], mass=shape[0] ** -2, complete=True)
+
+
+def test_felt_with_whose_parting_a_run_ends_is_not_pressed():
+    """Its force was taken as acting on, where it ended in the last step rather than at zero of a line."""
+    laws = (
+        fi.Contact.power(3.93e8, 2.155, loss=0.757, gap=72.3e-6),
+        fi.Contact.felt(2.7e9, 2.03, hysteresis=0.418, relaxation=1.76e-4),
+    )
+    bodies = [of_modes([0.0, 816.0], [2.19, 0.781]), fi.Modes.rigid(3.4e-3)]
+    touches = [Touch(laws[0], 0, 1, [0.0], None), Touch(laws[1], 1, None)]
+    hit = collide(bodies, touches, speeds=[9.6, 0.0], tolerance=1e-6, max_impacts=2)
+    longer = collide(bodies, touches, speeds=[9.6, 0.0], tolerance=1e-6, duration=1.42e-3)
+    assert_allclose(hit.history.contacts[:, 6], longer.history.contacts[:, 6], rtol=1e-6)
+
+
+def test_a_run_ends_after_as_many_impacts_as_asked_for():
+    """One release was for less than a step, and part of an unbroken push."""
+    frequencies = [0.0, 219.3, 365.7, 406.1, 494.1, 857.0, 1951.9, 2196.2, 3838.0]
+    body = of_modes(frequencies, [2.263, -0.012, 0.086, 1.491, 3.575, -1.735, 1.421, -0.678, 2.515])
+    laws = fi.Contact.linear(5.3e6, gap=9.129e-6), fi.Contact.hertz(4.96e7), fi.Contact.hertz(4.721e5, gap=3.149e-5)
+    touches = [Touch(laws[0], 0, 1, [0.0], None), Touch(laws[1], 1, 2), Touch(laws[2], 2, None)]
+    bodies = [body, fi.Modes.rigid(2.067e-3), fi.Modes.rigid(0.5543)]
+    hit = collide(bodies, touches, speeds=[3.13, 0.0, 0.0], tolerance=1e-3, max_impacts=7)
+    assert np.isfinite(hit.history.contacts[:, 6]).sum() == 7
+
+
 def test_a_miss_is_no_impact():
     hit = collide([fi.Modes.rigid(1.0)], [Touch(fi.Contact.linear(1e5), 0, None)], speeds=[-1.0])
     assert hit.n_impacts == 0 and hit.finished

@@ -21,7 +21,6 @@ from warming import locked
 from fem_impact.impact.compiled import arrays, build, collocation, energy, layout, propagation, record
 from fem_impact.impact.compiled import law as laws
 from fem_impact.impact.compiled.bundles import KernelSystem, Limits
-from fem_impact.impact.compiled.schemes import CLOSING
 from fem_impact.impact.engine import gauss
 
 EPS = np.finfo(float).eps
@@ -490,10 +489,9 @@ def scenes(draw):
 
 
 def check_invariants(scene):
-    """No NaN, no pull, energy and momentum to rounding; of several contacts one that closes may pull by `CLOSING`."""
+    """No NaN, no pull, energy and momentum to rounding."""
     r = run(**scene, horizon=1000.0 * scene["h"], max_steps=1000)
-    assert np.isfinite(r.q).all() and np.isfinite(r.steps).all()
-    assert (r.force >= (0.0 if r.force.shape[1] == 1 else -CLOSING * r.force.max(axis=1, keepdims=True))).all()
+    assert np.isfinite(r.q).all() and np.isfinite(r.steps).all() and (r.force >= 0.0).all()
     slack, size = np.sqrt(len(r.steps) + 1.0), np.abs(scene["shape"])
     # rounding of the force acts on all displacements: eps f sum |u q| / E, case by case (notes on pitfalls)
     largest = (size @ np.abs(r.q)).max() + np.abs(scene["offset"]).max()

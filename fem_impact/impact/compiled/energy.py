@@ -54,27 +54,28 @@ def fly_if_free(bodies, contacts, course, flights, room, limits, row):
 
 
 @inner(part=True, fastmath=False)
-def solved(bodies, contacts, room, tables, slot, h):
+def solved(bodies, contacts, room, tables, slot, h, blind):
     """Whether the forces of a step were found, and what `solve_step` tells of them."""
     if room is None:
-        return True, solve_step(contacts, tables, slot, h)
-    return attempt(bodies, contacts, room, tables, slot, h, FALSE)
+        return True, solve_step(contacts, tables, slot, h, blind)
+    return attempt(bodies, contacts, room, tables, slot, h, blind, FALSE)
 
 
 @inner(part=True)
-def located(bodies, contacts, course, limits, h, base, cornered, blind):
-    """Whether to take a step of length h, whether blind, as its event was not found, and the next length to try."""
+def located(bodies, contacts, course, limits, h, cornered, blind):
+    """Whether to take a step of length h, and the next length to try; one whose event was not found is passed blind."""
     if blind:
         course.counts[TARGET] = -1
         course.counts[CORNERED] = -1
-        return True, True, 0.0
+        return True, 0.0
     answer, guess = locate_event(bodies, contacts, course, limits, h, cornered, TRUE)
-    blind = answer == LOST and h >= 1e-3 * base
-    if blind:
-        course.counts[TARGET] = -1
-    elif answer == LOST:  # in a tiny step: pass the events that follow
-        course.counts[EVENTS] = EVENT_LIMIT + 1
-    return blind or answer == TAKEN, blind, guess
+    if answer == LOST:
+        course.clock[PAUSE] = np.nextafter(course.clock[TIME], np.inf)
+    if answer == TAKEN:
+        for i in range(contacts.force.size):
+            if contacts.force[i] < 0.0:  # it ends where it touches: rounding
+                contacts.force[i] = 0.0
+    return answer == TAKEN, guess
 
 
 @inner(part=True)
@@ -179,7 +180,7 @@ def follow(scene, tables, room, limits, run, steps):
         else:
             h, slot = guess, LEVELS
         make_ready(bodies, contacts, course, tables, slot, h, special)
-        good, fine = solved(bodies, contacts, room, tables, slot, h)
+        good, fine = solved(bodies, contacts, room, tables, slot, h, blind)
         if not good:
             count[SEEKS] = NOTHING
             count[LEAST] = count[LEVEL] + 1
@@ -192,7 +193,7 @@ def follow(scene, tables, room, limits, run, steps):
         fresh = not blind and count[SEEKS] == NOTHING
         if fresh and shortened(bodies, contacts, course, room, special, h, limits.still):
             continue
-        taken, blind, guess = located(bodies, contacts, course, limits, h, tables.base, cornered, blind)
+        taken, guess = located(bodies, contacts, course, limits, h, cornered, blind)
         if not taken:
             continue
         if not finite(contacts):

@@ -63,7 +63,7 @@ def first_crossing(bodies, contacts, h, limits, first):
         d0, v0, pressed = now[APPROACH, i], now[RATE, i], contacts.pressed[i]
         closes_later = first and not pressed and d0 == 0.0 and abs(v0) <= still and y[i] > limits.depth
         if crossed(pressed, d0, v0, y[i], limits.depth, still) or (closes_later and drawn_apart(bodies, contacts, i)):
-            root = h * crossing(now[APPROACH, i], h * now[RATE, i], y[i], h * rate[i])
+            root = h * crossing(d0, h * v0, y[i], h * rate[i])
             if root <= at:
                 at = root
                 target = i

@@ -134,7 +134,7 @@ def freshen(contacts, fresh):
 
 
 @inner()
-def solve_all(contacts, tables, slot, h):
+def solve_all(contacts, tables, slot, h, blind):
     """Solve one step of several contacts, or by scheme A; 0 where a contact pushes by A (asked for or fallen to)."""
     law, now, end = contacts.law, contacts.now, contacts.free
     y, f, s = contacts.end, contacts.force, contacts.slope
@@ -150,7 +150,7 @@ def solve_all(contacts, tables, slot, h):
         for i in range(m):
             keep[i] = y[i]
             keep[m + i] = f[i]
-        if solve_ramps(h, contacts, sums, work):
+        if solve_ramps(h, contacts, sums, work, blind):
             fine = 1
         else:
             for i in range(m):
@@ -163,7 +163,7 @@ def solve_all(contacts, tables, slot, h):
 
 
 @inner(part=True)
-def solve_step(contacts, tables, slot, h):
+def solve_step(contacts, tables, slot, h, blind):
     """Solve one step of length h from its prediction; 0 where a contact pushes by A (asked for or fallen to)."""
     now, sums = contacts.now, tables.sums[slot]
     free = Free(contacts.free[FREE_END, 0], contacts.free[FREE_MEAN, 0], contacts.free[FREE_RATE, 0])
@@ -181,7 +181,7 @@ def solve_step(contacts, tables, slot, h):
             contacts.slope[0] = s
             contacts.rate[0] = free.rate - own.rate * f - own.rate_ramp * s
             return 1
-    return solve_all(contacts, tables, slot, h)
+    return solve_all(contacts, tables, slot, h, blind)
 
 
 @inner(part=True)

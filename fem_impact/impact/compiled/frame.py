@@ -15,7 +15,7 @@ from .build import inner
 from .bundles import Bodies, Contacts, Course, KernelRun, KernelSystem
 from .flight import NEVER, ONSET, SLOW, approach_of, find_onset
 from .law import dent, harden
-from .laws.felt import rest_of
+from .laws.felt import meet, rest_of
 from .record import EXHAUSTED, FULL, HORIZON, IMPACTS, total_energy
 from .rounding import ITERATIONS, NEAR
 
@@ -136,6 +136,7 @@ def remembered(contacts):
     """Count the approaches at the end of a run from no dent, and add the memory to where the contacts stand."""
     law, now = contacts.law, contacts.now
     for i in range(now.shape[1]):
+        meet(law, i, now[APPROACH, i], now[RATE, i])
         low = dent(law, i, law["memory"][i])  # as long as the last step: what it pressed deeper is not yet counted
         harden(law, i, now[APPROACH, i])
         now[REMEMBERED, i] = law["memory"][i]

@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from .build import ONE, inner, outer
+from .build import ONE, TRUE, inner, outer
 from .bundles import Bodies, Contacts, Tables
 from .events import dipped
 from .exact import contact_sums, freshen, keep_in_mind, predict, solve_step
@@ -276,7 +276,7 @@ def step(body, limits, state, level, time):
             state.known[level] = 1
         freshen(contacts, fresh)
         fresh = False
-        fine = solve_step(contacts, tables, level, h)
+        fine = solve_step(contacts, tables, level, h, TRUE)
         if special:
             keep_in_mind(contacts, h, fine)
         shorter = False

@@ -244,18 +244,14 @@ def stays(steps, row, first, slack):
 
 
 @inner()
-def still_pressed(steps, now, law, n_coefficients, i, d):
+def still_pressed(now, law, i, d):
     """Whether contact i presses at the end of a run, where the approach from its dent is d.
 
     Felt lets go while the body is still in its dent, where its force ends; a contact with loss may, where the bodies
     part as fast as 1 / loss.
     """
     if relaxes(law, i):
-        first = HEAD + (PUSH + n_coefficients) * i + PUSH
-        end = 0.0
-        for k in range(n_coefficients):
-            end += steps[-1, first + k]
-        return now[REMEMBERED, i] >= 0.0 and end > 0.01 * steps[-1, first]
+        return now[REMEMBERED, i] >= 0.0
     return d > NEAR * abs(now[APPROACH, i]) and 1.0 + law["loss"][i] * now[RATE, i] > LET_GO
 
 
@@ -312,7 +308,7 @@ def find_impacts(steps, now, law, n_coefficients, rounding, way, touch):
                     break
             left = -rate_within(steps, now, law, n_coefficients, row - 1, i, part)
             deep = now[APPROACH, i] - dent(law, i, memory_of(steps, law, n_coefficients, row - 1, i))
-            if row == n_steps and part >= 1.0 and still_pressed(steps, now, law, n_coefficients, i, deep):
+            if row == n_steps and part >= 1.0 and still_pressed(now, law, i, deep):
                 left = np.nan
             peak = peak_between(steps, now, law, n_coefficients, begin, row, i)
             result[count] = start, end, peak, impulse, float(i), met, left, since

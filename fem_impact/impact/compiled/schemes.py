@@ -29,7 +29,7 @@ from .layout import (  # isort: skip
     OWN_MEAN_RAMP, OWN_RATE, OWN_RATE_RAMP, RATE,
 )  # fmt: skip
 
-CLOSING = 1e-6  # [-] of the largest force: less of one that only closes may pull, or scheme A would decide when it does
+CLOSING = 1e-6  # [-] of the largest force: less may pull in a try, or scheme A would decide when the contact closes
 WORK_ERROR = 1e-9  # [-] a step whose force's work misses the stored energy by more lost its digits: scheme A takes it
 
 
@@ -389,10 +389,11 @@ def ramp_forces(h, y, contacts, sums, work, out_f, out_s, out_r):
 
 
 @inner()
-def solve_ramps(h, contacts, sums, work):
+def solve_ramps(h, contacts, sums, work, blind):
     """Scheme A4: mean and slope of the forces of one step, starting from the approaches of scheme A at its end.
 
-    Returns False where the iteration does not settle or a force would pull; the step then belongs to scheme A.
+    Returns False where the iteration does not settle or a force would pull; the step then belongs to scheme A. Only in
+    a try, repeated until it ends where a contact closes, may that contact pull: a ``blind`` step is none.
     """
     law, now, out_y, out_f, out_s = contacts.law, contacts.now, contacts.end, contacts.force, contacts.slope
     m = out_y.size
@@ -437,7 +438,7 @@ def solve_ramps(h, contacts, sums, work):
     for i in range(m):
         largest = max(largest, out_f[i])
     for i in range(m):
-        if now[APPROACH, i] < 0.0 and abs(out_f[i]) <= CLOSING * largest:
+        if not blind and now[APPROACH, i] < 0.0 and abs(out_f[i]) <= CLOSING * largest:
             continue
         if not out_f[i] >= 0.0:
             return False

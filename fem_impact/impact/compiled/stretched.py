@@ -183,7 +183,7 @@ def apply_pull(bodies, contacts, room, lanes, h):
 
 
 @inner()
-def attempt(bodies, contacts, room, tables, slot, h, given):
+def attempt(bodies, contacts, room, tables, slot, h, blind, given):
     """Solve a step of contact and stretching forces together: whether it settled, and that of `solve_step`.
 
     The free motion is there. The contacts' forces are results, or ``given``. What stretching does is left in the room.
@@ -196,7 +196,7 @@ def attempt(bodies, contacts, room, tables, slot, h, given):
     for _ in range(ITERATIONS):
         apply_pull(bodies, contacts, room, lanes, h)
         if not given:
-            fine = solve_step(contacts, tables, slot, h)
+            fine = solve_step(contacts, tables, slot, h, blind)
         for i in range(room.pull.shape[1]):
             n = room.first + i
             end = bodies.free_q[n] + room.moved[0, i]
@@ -391,7 +391,7 @@ def follow_record(scene, run, room, tables, steps, start, times, out):
             lane_table(bodies.omega, bodies.zeta, h, TRUE, tables.lanes[0])
             known = h
         predict(bodies, contacts, tables, ZERO, h)
-        good, _ = attempt(bodies, contacts, room, tables, ZERO, h, TRUE)
+        good, _ = attempt(bodies, contacts, room, tables, ZERO, h, TRUE, TRUE)
         if not good:
             halved += 1
             continue
