@@ -298,21 +298,34 @@ def mend(blow, track, n, point, rate):
 
 
 @inner()
+def lossy_force(d0, v0, d1, v1, spring, loss, part):
+    """Force at a part of a step, on the cubic through both ends; slopes and the loss factor over the step's length."""
+    d, rate = cubic(d0, v0, d1, v1, part)
+    return point_at(d, spring).force * (1.0 + loss * rate)
+
+
+@inner()
 def lossy_peak(d0, v0, d1, v1, spring, loss):
-    """Largest force on the cubic through both ends of a step, its slopes and the loss factor over the step's length."""
-    best = 0
-    top = left = right = before = 0.0
-    for part in range(LOOKS + 1):
-        d, rate = cubic(d0, v0, d1, v1, part / LOOKS)
-        value = point_at(d, spring).force * (1.0 + loss * rate)
-        if part == 0 or value > top:
-            best, top, left = part, value, before
-        elif part == best + 1:
-            right = value
-        before = value
-    if best in (0, LOOKS):
-        return top
-    return top - 0.125 * (left - right) ** 2 / min(left - 2.0 * top + right, -1e-15 * top)
+    """Largest force of a step, see `lossy_force`, on the parabola through the three looks about the largest of some.
+
+    It may lie a little beyond an end of the step, where the looks of neither step enclose it.
+    """
+    best, most = 0, 0.0
+    for look in range(LOOKS + 1):
+        value = lossy_force(d0, v0, d1, v1, spring, loss, look / LOOKS)
+        if value > most:
+            best, most = look, value
+    middle = min(max(best, 1), LOOKS - 1)
+    left = lossy_force(d0, v0, d1, v1, spring, loss, (middle - 1) / LOOKS)
+    top = lossy_force(d0, v0, d1, v1, spring, loss, middle / LOOKS)
+    right = lossy_force(d0, v0, d1, v1, spring, loss, (middle + 1) / LOOKS)
+    bend = left - 2.0 * top + right
+    if bend >= 0.0:
+        return most
+    place = 0.5 * (left - right) / bend
+    if abs(place) > 1.5:
+        return most
+    return max(most, top + 0.25 * (right - left) * place)
 
 
 @inner(part=True)
