@@ -2,7 +2,6 @@
 
 import re
 import tomllib
-from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -52,8 +51,10 @@ def built(first: Scene, order: Order) -> Scene:
         scene = scene_of(tomllib.loads(whole), order.drawing.with_suffix(".toml"), folder=order.drawing.parent)
         body = order.drawing.stem
     tables = scene.data()
+    for name, wanted, table in (("material", order.material, "material"), ("thickness", order.thickness, "section")):
+        if wanted is not None and (table not in tables or "layer" in tables):
+            raise ValueError(f"{name} must be left to this scene, whose tables say it in another way")
     if order.material is not None:
-        _need(tables, "material", "material")
         tables["material"] = {"name": order.material}
         target = {key: value for key, value in tables.get("target", {}).items() if key not in RESCALED}
         damped = adapted.damping_of(order.material)
@@ -62,19 +63,12 @@ def built(first: Scene, order: Order) -> Scene:
         tables["striker"] = {"name": order.mallet}
         tables.pop("contact", None)
     if order.thickness is not None:
-        _need(tables, "section", "thickness")
         tables["section"] = {**tables["section"], "thickness": order.thickness}
     if order.at is not None:
         tables["strike"] = {**tables["strike"], "at": list(order.at)}
     if order.drawing is not None or order.material is not None or order.mallet is not None:
         tables["title"] = adapted.titled(body, order.material, order.mallet)
     return scene_of(tables, scene.path, folder=Path())
-
-
-def _need(tables: Mapping[str, Any], table: str, name: str) -> None:
-    """Raise ValueError if a scene has no such table, or other tables say what it would."""
-    if table not in tables or "layer" in tables:
-        raise ValueError(f"{name} must be left to this scene, whose tables say it in another way")
 
 
 def pickable(first: Scene, order: Order, scene: Scene) -> dict[str, Any]:

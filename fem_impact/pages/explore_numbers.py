@@ -151,15 +151,41 @@ class Explorer:
         view = self.views.get(settings.at)
         return step(self.mapper, settings, about, view.body if view else None)
 
-    def listen(self, settings: Settings, where: Point, height: float, rate: float | None) -> Message:
-        """The blow, or ``rate`` [1/s] of them, as heard on the surface or ``height`` [m] above it."""
-        return _heard(self.setup, settings, where, height, rate)
+    def listen(
+        self, settings: Settings, where: Point, height: float, rate: float | None = None, letter: str = "",
+        share: float = 1.0,
+    ) -> Message:  # fmt: skip
+        """A blow, ``rate`` [1/s] of them, or the kept one of a letter, ``share`` times as fast, as the page plays it.
 
-    def struck(self, letter: str, settings: Settings, where: Point, height: float, share: float) -> Message:
-        """The sound of a kept blow, or without a letter of the present one, ``share`` times as fast."""
-        kept = self.kept.get(letter) or Kept(self.setup, settings, where, height, {})
-        faster = replace(kept.settings, speed=share * kept.settings.speed)
-        return _heard(kept.setup, faster, kept.where, kept.height, None)
+        It is heard on the surface or ``height`` [m] above it. ``scale`` is what a sample of one stands for, in the unit
+        of the peak.
+        """
+        setup = self.setup
+        if letter in self.kept:
+            kept = self.kept[letter]
+            setup, settings, where, height = kept.setup, kept.settings, kept.where, kept.height
+        case = setup.case(replace(settings, speed=share * settings.speed))
+        for point in (settings.at, where)[: 1 if height > 0.0 else 2]:
+            if setup.at_rest(point):
+                return {"uri": "", "note": f"Silent: the body does not move at {place(point)}."}
+        try:
+            rung = case.blow(tolerance=setup.tolerance) if rate is None else rolled(case, rate)
+            if height > 0.0:
+                heard = sound.radiate(rung, (*where, height), duration=PLAYED)
+            else:
+                heard = sound.synthesise(rung, where, duration=PLAYED)
+        except (SimulationError, ValueError) as error:
+            return {"uri": "", "note": str(error)}
+        level = heard.peak_level
+        raised = max(0.0, QUIET - level) if math.isfinite(level) else 0.0  # of a sound that is quiet
+        note = f"Peak {heard.said}; full scale {heard.full_scale:g} {heard.unit}"
+        note = (note + (f", raised here by {raised:.1f} dB." if raised else ".")).replace("-", "−")
+        uri = audio(heard.samples * 10.0 ** (raised / 20.0), heard.rate)
+        place_of = f"{si(height, 'm', 3)} above {place(where)}" if height > 0.0 else f"the surface at {place(where)}"
+        return {
+            "uri": uri, "note": f"Heard from {place_of}. {note}", "unit": heard.unit,
+            "scale": heard.full_scale * 10.0 ** (-raised / 20.0), "peak": heard.full_scale * 10.0 ** (level / 20.0),
+        }  # fmt: skip
 
     def tell_sliders(self, settings: Settings, height: float, rate: float) -> dict[str, str]:
         """What each slider stands at, in words."""
@@ -178,32 +204,6 @@ class Explorer:
             "height": f"{si(height, 'm', 3)}, in the air" if height > 0.0 else "on the surface",
         }
         return said | {letter: si(value, "m", 3) for letter, value in zip("xy", settings.at)}
-
-
-def _heard(setup: Setup, settings: Settings, where: Point, height: float, rate: float | None) -> Message:
-    """A sound as the page plays it; ``scale`` is what a sample of one stands for, in the unit of the peak."""
-    case = setup.case(settings)
-    for point in (settings.at, where)[: 1 if height > 0.0 else 2]:
-        if setup.at_rest(point):
-            return {"uri": "", "note": f"Silent: the body does not move at {place(point)}."}
-    try:
-        rung = case.blow(tolerance=setup.tolerance) if rate is None else rolled(case, rate)
-        if height > 0.0:
-            heard = sound.radiate(rung, (*where, height), duration=PLAYED)
-        else:
-            heard = sound.synthesise(rung, where, duration=PLAYED)
-    except (SimulationError, ValueError) as error:
-        return {"uri": "", "note": str(error)}
-    level = heard.peak_level
-    raised = max(0.0, QUIET - level) if math.isfinite(level) else 0.0  # of a sound that is quiet
-    note = f"Peak {heard.said}; full scale {heard.full_scale:g} {heard.unit}"
-    note = (note + (f", raised here by {raised:.1f} dB." if raised else ".")).replace("-", "−")
-    uri = audio(heard.samples * 10.0 ** (raised / 20.0), heard.rate)
-    place_of = f"{si(height, 'm', 3)} above {place(where)}" if height > 0.0 else f"the surface at {place(where)}"
-    return {
-        "uri": uri, "note": f"Heard from {place_of}. {note}", "unit": heard.unit,
-        "scale": heard.full_scale * 10.0 ** (-raised / 20.0), "peak": heard.full_scale * 10.0 ** (level / 20.0),
-    }  # fmt: skip
 
 
 def rolled(case: Case, rate: float) -> Strokes:

@@ -16,7 +16,7 @@ from .._base import check
 from .explore_bench import LARGEST_DRAWING, safe_name
 from .explore_numbers import Explorer
 from .explore_session import Session
-from .explore_view import page, parsed
+from .explore_view import page
 from .explore_worker import Worker
 from .html_page import web_text
 
@@ -46,11 +46,8 @@ class Text(RequestHandler):
 class Drop(RequestHandler):
     """Takes a file that was dropped on the page, under a name without folders, into the server's own folder."""
 
-    def initialize(self, origins: set[str], folder: Path) -> None:
-        self.origins, self.folder = origins, folder
-
     def post(self) -> None:
-        if self.request.headers.get("Origin", "").lower() not in self.origins:
+        if self.request.headers.get("Origin", "").lower() not in self.settings["origins"]:
             self.set_status(403)
             return
         try:
@@ -59,30 +56,28 @@ class Drop(RequestHandler):
             self.set_status(400)
             self.finish(str(error))
             return
-        (self.folder / name).write_bytes(self.request.body)
+        (self.settings["folder"] / name).write_bytes(self.request.body)
         self.finish(name)
 
 
 class Talk(WebSocketHandler):
     """The connection that an open page keeps."""
 
-    def initialize(self, origins: set[str], explorer: Explorer, workers: list[Worker], **shared: Any) -> None:
-        self.origins, self.explorer, self.workers, self.shared = origins, explorer, workers, shared
-
     def check_origin(self, origin: str) -> bool:
-        return origin.lower() in self.origins
+        return origin.lower() in self.settings["origins"]
 
     def open(self, *_: str, **__: str) -> None:
         self.set_nodelay(True)
-        self.session = Session(self.explorer, self.workers[0], self.workers[1], self._say, **self.shared)
+        explorer, workers, pages, folder = (self.settings[name] for name in ("explorer", "workers", "pages", "folder"))
+        self.session = Session(explorer, *workers, self._say, pages, folder)
         self.session.show()
 
     def on_message(self, message: str | bytes) -> None:
         if self.session.closed:
             return
         try:
-            self.session.obey(parsed(message))
-        except ValueError as error:  # no page of ours sends this
+            self.session.obey(json.loads(message))
+        except (ValueError, RecursionError) as error:  # no page of ours sends this
             LOG.warning("a page is refused: %s", check.line(str(error)))
             self.session.close()
             self.close(1003, str(error)[:120])
@@ -128,12 +123,11 @@ def open_server(explorer: Explorer, workers: list[Worker], port: int, folder: Pa
     parts = {"/": ("html", page())}
     for name, kind in (("explore.css", "css"), ("plots.js", "javascript"), ("explore.js", "javascript")):
         parts[f"/{name}"] = kind, web_text(name)
-    shared = {"origins": origins, "explorer": explorer, "workers": workers, "folder": folder, "pages": set()}
     application = Application(
         [*((path, Text, {"kind": kind, "text": text}) for path, (kind, text) in parts.items()),
-         ("/drop", Drop, {"origins": origins, "folder": folder}),
-         ("/talk", Talk, shared)],
-        websocket_max_message_size=LARGEST_REQUEST,
+         ("/drop", Drop), ("/talk", Talk)],
+        websocket_max_message_size=LARGEST_REQUEST, origins=origins, explorer=explorer, workers=workers,
+        folder=folder, pages=set(),
     )  # fmt: skip
     http = HTTPServer(Guard(application, hosts), max_body_size=LARGEST_DRAWING, max_header_size=LARGEST_REQUEST // 4)
     http.add_socket(listening)

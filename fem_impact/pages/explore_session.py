@@ -106,7 +106,12 @@ class Session:
         elif "keep" in message:
             self._start("keep", self._keep)
         elif "forget" in message:
-            self._forget(message["forget"])
+            letter = message["forget"]
+            if isinstance(letter, str) and letter in self.explorer.kept:  # or another page was faster
+                self.explorer.forget(letter)
+                self.mapper.ask(Explorer.forget, letter)
+                for page in self.pages:
+                    page.send({"kind": "forgotten", "letter": letter})
         elif "hit" in message:
             told = message["hit"]
             if not isinstance(told, dict) or not isinstance(told.get("letter"), str):
@@ -285,20 +290,12 @@ class Session:
         for page in self.pages:
             page.send(told)
 
-    def _forget(self, letter: Any) -> None:
-        if not isinstance(letter, str) or letter not in self.explorer.kept:
-            return  # another page was faster
-        self.explorer.forget(letter)
-        self.mapper.ask(Explorer.forget, letter)
-        for page in self.pages:
-            page.send({"kind": "forgotten", "letter": letter})
-
     async def _hit(self) -> None:
         """The sounds of keys, one after another."""
         while self.hits:
             letter, share = self.hits.popleft()
-            about = letter, self.settings, self.heard_at, self.height, share
-            sound = await self._ask(self.mapper, Explorer.struck, *about)
+            about = self.settings, self.heard_at, self.height, None, letter, share
+            sound = await self._ask(self.mapper, Explorer.listen, *about)
             self.send({"kind": "hit", "letter": letter, "share": share, "number": self.number, **sound})
 
     def _order(self, wanted: Any) -> None:

@@ -1,6 +1,5 @@
 """Lays out the live page: sliders, the body to click on, the plots that follow, and the sound."""
 
-import json
 import math
 from typing import Any
 
@@ -90,14 +89,6 @@ def drawn_body(setup: Setup) -> dict[str, Any]:
     else:
         loops = [np.round(mesh.points[loop], 9).tolist() for loop in loops_of(mesh.facets)]
     return {"loops": loops, "ribs": [mesh.pieces(rib.path).tolist() for rib in setup.scene.ribs]}
-
-
-def parsed(message: str | bytes) -> Any:
-    """What a page sends; ValueError if that is not JSON, or too deep."""
-    try:
-        return json.loads(message)
-    except RecursionError:
-        raise ValueError("a message must not be nested so deeply") from None
 
 
 def check_sliders(known: Ends, turned: Any) -> dict[str, float]:

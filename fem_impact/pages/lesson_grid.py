@@ -6,11 +6,11 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
+import shapely
 
 from .._base.check import SimulationError
-from ..modes.modal import Modes
 from ..sweeps.grid import Case
-from .explore_map import MORE, Mapper, Picture, Window
+from .explore_map import MORE, Picture, Window
 from .explore_model import Settings, Setup, limit_of
 from .explore_numbers import Explorer, Point
 
@@ -39,20 +39,13 @@ def kept_points(time: np.ndarray, force: np.ndarray, most: float) -> np.ndarray:
 
     References
     ----------
-    Douglas and Peucker (1973), Cartographica 10, 112-122; here with distances along the force.
+    Douglas and Peucker (1973), Cartographica 10, 112-122, by GEOS, stretched until distances are along the
+    force.
     """
-    kept, spans = [0], [(0, len(time) - 1)]
-    while spans:
-        first, last = spans.pop()
-        inner = slice(first, last + 1)
-        line = np.interp(time[inner], time[[first, last]], force[[first, last]])
-        gap = np.abs(force[inner] - line)
-        worst = int(gap.argmax())
-        if gap[worst] > most:
-            spans += [(first + worst, last), (first, first + worst)]
-        else:
-            kept.append(last)
-    return np.array(kept)
+    steep = float(np.abs(np.diff(force) / np.diff(time)).max()) or 1.0
+    stretched = 1e4 * steep * time
+    kept = shapely.LineString(np.column_stack([stretched, force])).simplify(most, preserve_topology=False)
+    return np.searchsorted(stretched, shapely.get_coordinates(kept)[:, 0])
 
 
 @dataclass(frozen=True, eq=False)
@@ -158,11 +151,18 @@ def made(setup: Setup, watch: Callable[[int, int], None]) -> Lesson:
         body = explorer.look(place).body
         cells = [setup.case(replace(start, at=place, mass=float(mass)), body=body) for mass in axes["mass"]]
         limits.append([limit_of(case) for case in cells])
+        law = cells[0].contact  # whether faster blows are the same: with linear contacts and bodies
+        alike = law.exponent == 1.0 and not (law.lossy or law.special or cells[0].modes.stretches)
         for speed in range(COUNTS["speed"]):
-            maps.append(_map(explorer.mapper, settings_at(setup, axes, place, speed, 0, 0), window, body))
-            if speed and _alike(cells[0]):
-                blows += [_faster(blow, axes["speed"][speed] / axes["speed"][speed - 1])
-                          for blow in blows[-COUNTS["stiffness"] * COUNTS["mass"] :]]  # fmt: skip
+            about, mapper = settings_at(setup, axes, place, speed, 0, 0), explorer.mapper
+            picture = mapper.finer(about, mapper.first(about, window, body), body)
+            maps.append(mapper.sharp(about, picture, body) if mapper.batched else picture)  # where blows are quick
+            if speed and alike:  # but for their force; what the model errs by is not known of them
+                ratio = axes["speed"][speed] / axes["speed"][speed - 1]
+                for blow in blows[-COUNTS["stiffness"] * COUNTS["mass"] :]:
+                    numbers = dict(zip(NAMES, blow.numbers))
+                    numbers |= {"peak_force": numbers["peak_force"] * ratio, "model_error": math.nan}
+                    blows.append(replace(blow, numbers=tuple(numbers.values()), top=blow.top * ratio))
                 continue
             for stiffness in range(COUNTS["stiffness"]):
                 for mass in range(COUNTS["mass"]):
@@ -170,26 +170,6 @@ def made(setup: Setup, watch: Callable[[int, int], None]) -> Lesson:
                     blows.append(shown(setup.case(settings, body=body), tolerance))
                 watch(len(blows), total)
     return Lesson(setup, places, axes, tuple(blows), tuple(maps), np.array(limits), tolerance)
-
-
-def _map(mapper: Mapper, settings: Settings, window: Window, body: Modes | None) -> Picture:
-    """The map behind the blows of one place and speed; drawn finely where blows are quick."""
-    picture = mapper.first(settings, window, body)
-    picture = mapper.finer(settings, picture, body)
-    return mapper.sharp(settings, picture, body) if mapper.batched else picture
-
-
-def _alike(case: Case) -> bool:
-    """Whether faster blows are the same but for their force: with linear contacts and bodies."""
-    law = case.contact
-    return law.exponent == 1.0 and not (law.lossy or law.special or case.modes.stretches)
-
-
-def _faster(blow: Shown, ratio: float) -> Shown:
-    """The same blow on a linear contact at another speed; what the model errs by is not known of it."""
-    numbers = dict(zip(NAMES, blow.numbers))
-    numbers |= {"peak_force": numbers["peak_force"] * ratio, "model_error": math.nan}
-    return replace(blow, numbers=tuple(numbers.values()), top=blow.top * ratio)
 
 
 def shown(case: Case, tolerance: float) -> Shown:

@@ -25,7 +25,12 @@ class Question:
 def questions(lesson: Lesson) -> list[Question]:
     """All questions that the blows of a page can answer."""
     speeds, stiffnesses = _single(lesson, 1), _single(lesson, 2)
-    asked = [_first(lesson), _impulse(lesson), stiffnesses and _stiffer(lesson, *stiffnesses)]
+    told = _phrases(lesson, lesson.start)
+    first = Question(
+        "Strike as the scene does. How many impacts are there, how long are they together, and how large is the force?",
+        f"{told['impacts']}, {told['time']} in contact, at most {told['force']}.", lesson.start,
+    )  # fmt: skip
+    asked = [first, _impulse(lesson), stiffnesses and _stiffer(lesson, *stiffnesses)]
     asked += [speeds and _faster(lesson, *speeds), _heavier(lesson), _harder(lesson)]
     asked += [stiffnesses and _spectrum(lesson, *stiffnesses), _elsewhere(lesson)]
     return [each for each in asked if each is not None]
@@ -44,14 +49,6 @@ def _phrases(lesson: Lesson, position: Position) -> dict[str, str]:
 
 def _mass(lesson: Lesson, i: int) -> str:
     return si(float(lesson.axes["mass"][i]), "kg", 3)
-
-
-def _first(lesson: Lesson) -> Question | None:
-    told = _phrases(lesson, lesson.start)
-    return Question(
-        "Strike as the scene does. How many impacts are there, how long are they together, and how large is the force?",
-        f"{told['impacts']}, {told['time']} in contact, at most {told['force']}.", lesson.start,
-    )  # fmt: skip
 
 
 def _impulse(lesson: Lesson) -> Question | None:
