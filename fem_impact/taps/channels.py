@@ -17,7 +17,11 @@ def in_si(
     unit = stated_units(found, given)
     struck = force_channel(found, force, unit, file)
     others = response_channels(found, response, unit, struck)
-    stated = scales(found, scale, struck)
+    if isinstance(scale, Mapping):
+        table = arguments.table("scale", scale)
+        stated = {find_channel("scale", name, found): check.number(f"scale of {name}", x) for name, x in table.items()}
+    else:
+        stated = {} if scale is None else {struck: check.number("scale", scale)}
     factors: list[float] = []
     kinds: list[str] = []
     notes: list[str] = []
@@ -39,9 +43,7 @@ def in_si(
 
 
 def stated_units(found: readers.Recording, given: Mapping[str, str] | None) -> list[str]:
-    unit = []
-    for name, stated in zip(found.names, found.units):
-        unit.append(stated or units.label(name)[1])
+    unit = [stated or units.label(name)[1] for name, stated in zip(found.names, found.units)]
     for name, text in arguments.table("units", given).items():
         if not isinstance(text, str) or units.known(text) is None:
             words = ", ".join(word for factors in units.KINDS.values() for word in factors)
@@ -100,15 +102,6 @@ def response_channels(found: readers.Recording, response: Any, unit: list[str], 
         for i, (kind, text) in enumerate(zip(map(units.known, unit), found.names))
         if i != struck and ((kind and kind[0] != "N") or (not unit[i] and units.RESPONSE_NAMES.search(text)))
     ]
-
-
-def scales(found: readers.Recording, scale: Any, struck: int) -> dict[int, float]:
-    if scale is None:
-        return {}
-    if isinstance(scale, Mapping):
-        scale = arguments.table("scale", scale)
-        return {find_channel("scale", name, found): check.number(f"scale of {name}", x) for name, x in scale.items()}
-    return {struck: check.number("scale", scale)}
 
 
 def factor(name: str, unit: str, wanted: str, scale: float | None, file: str) -> tuple[float, list[str]]:

@@ -53,7 +53,16 @@ def without(problem: Problem) -> tuple[str, Problem] | None:
 def embedded(problem: Problem, inner: Inner) -> list[np.ndarray]:
     """Coordinates of a larger problem for the same taps at the best fit of a smaller one; several if a mode is new."""
     small, x, n_taps = inner.problem, inner.x, problem.data.n_taps
-    values = _neutral(small, [each.name for each in problem.setting.unknown]) | small.values(x)
+    values = {}
+    for name in (each.name for each in problem.setting.unknown):  # with which they change nothing, if there are any
+        home, _, part = name.partition(".")
+        if home == "contact":
+            values[name] = float(getattr(small.setting.contact, part))
+        elif name == "striker.mass":
+            values[name] = small.setting.striker.mass
+        elif home != "target" and part in NEUTRAL:
+            values[name] = NEUTRAL[part]
+    values |= small.values(x)
     values[TIME] = problem.setting.contact_time(values)
     low, high = (bound[: problem.n_shared] for bound in problem.bounds)
     begun = []
@@ -70,20 +79,6 @@ def embedded(problem: Problem, inner: Inner) -> list[np.ndarray]:
         rest = [apart.get(name, np.zeros(n_taps)) for name in problem.owners]
         begun.append(np.concatenate([shared, x[small.n_shared : small.n_shared + 2 * n_taps], *rest]))
     return begun
-
-
-def _neutral(small: Problem, names: list[str]) -> dict[str, float]:
-    """Values of names with which they change nothing in a smaller model that does not have them, if there are any."""
-    found = {}
-    for name in names:
-        home, _, part = name.partition(".")
-        if home == "contact":
-            found[name] = float(getattr(small.setting.contact, part))
-        elif name == "striker.mass":
-            found[name] = small.setting.striker.mass
-        elif home != "target" and part in NEUTRAL:
-            found[name] = NEUTRAL[part]
-    return found
 
 
 def never_worse(problem: Problem, best: Solution, inner: Inner, notes: list[str]) -> tuple[Problem, Solution, bool]:

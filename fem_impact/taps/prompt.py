@@ -136,8 +136,12 @@ def fit(options: Any, watch: Watch | None) -> tuple[Found, Scene | None, Proposa
     return fit_taps(taps, unknown=unknown, known=known, per_tap=options.per_tap, watch=watch, **given), scene, None
 
 
-def scene_tables(found: Found, scene: Scene | None = None) -> tuple[dict[str, Any], list[str]]:
-    """The tables of the scene file, and what could not be kept."""
+@check.typed
+def write_scene(path: str | Path, found: Found, scene: Scene | None = None) -> tuple[str, ...]:
+    """Write the scene file; the body struck is that of ``scene`` or, for taps on a wall, a plate as heavy as one.
+
+    Returns what could not be kept. The file says in its first lines which values the data did not tell.
+    """
     hammer, law = found.striker, found.contact
     notes = []
     if hammer.modes.n_modes > 1:
@@ -162,16 +166,6 @@ def scene_tables(found: Found, scene: Scene | None = None) -> tuple[dict[str, An
     made["striker"] = {"kind": "rigid", "mass": hammer.felt_mass}
     made["contact"] = law.table
     made["strike"] = strike
-    return made, notes
-
-
-@check.typed
-def write_scene(path: str | Path, found: Found, scene: Scene | None = None) -> tuple[str, ...]:
-    """Write the scene file; the body struck is that of ``scene`` or, for taps on a wall, a plate as heavy as one.
-
-    Returns what could not be kept. The file says in its first lines which values the data did not tell.
-    """
-    made, notes = scene_tables(found, scene)
     lines = [f"# {line}" for line in (*found.summary().splitlines(), *notes)]
     write_whole(path, "\n".join(lines) + "\n\n" + written(made))
     return tuple(notes)

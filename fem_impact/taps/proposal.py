@@ -120,7 +120,16 @@ def propose(
         raise SimulationError("no blow of a contact on a wall ends as these taps do; read the taps again")
     law, name = best.problem.setting.contact, "linear" if best.problem.setting.contact.exponent == 1.0 else "Hertz"
     tried = [replace(one, taken=one.name == name) for one in tried]
-    ranges, waiting = dict(STIFFNESS), _steps(striker, solver.pulse_length(best.taps))
+    length = solver.pulse_length(best.taps)
+    band = 0.05 / length, 5.0 / length  # modes below and above do not shape the pulse
+    heavy = 0.1 * striker.mass, 1e4 * striker.mass  # more do not move
+    ranges: Ranges = dict(STIFFNESS)
+    waiting: list[tuple[str, Ranges]] = [  # what is added one after another: its name and its ranges
+        ("exponent", {"contact.exponent": (1.0, 4.0)}), ("loss", {"contact.loss": (0.0, 20.0)}),
+        ("springy head", {"striker.first_frequency": band, "striker.mode_ratio": (1e-4, 10.0)}), (PER_TAP, {}),
+        *((f"mode {i}", {f"mode{i}.frequency": band, f"mode{i}.mass": heavy, f"mode{i}.damping": (0.0, 0.5)})
+          for i in (1, 2)),  # a pulse of few samples tells no more
+    ]  # fmt: skip
     while True:  # what one addition hid may show after another
         done = {one.name for one in tried}
         for step in list(waiting):
@@ -141,21 +150,6 @@ def propose(
             break
     whole = replace(best, compared={one.name: one.left_out for one in tried}, watch=watch)
     return Proposal(profiled(whole) if profiles else whole, tuple(tried))
-
-
-def _steps(striker: Striker, length: float) -> list[tuple[str, Ranges]]:
-    """What is added one after another: its name and its ranges."""
-    band = 0.05 / length, 5.0 / length  # modes below and above do not shape the pulse
-    heavy = 0.1 * striker.mass, 1e4 * striker.mass  # more do not move
-    head: Ranges = {"striker.first_frequency": band, "striker.mode_ratio": (1e-4, 10.0)}
-    steps: list[tuple[str, Ranges]] = [
-        ("exponent", {"contact.exponent": (1.0, 4.0)}), ("loss", {"contact.loss": (0.0, 20.0)}), ("springy head", head),
-        (PER_TAP, {}),
-    ]  # fmt: skip
-    for i in (1, 2):  # a pulse of few samples tells no more
-        mode: Ranges = {f"mode{i}.frequency": band, f"mode{i}.mass": heavy, f"mode{i}.damping": (0.0, 0.5)}
-        steps.append((f"mode {i}", mode))
-    return steps
 
 
 def _fitted(taps: Taps, law: Contact, ranges: Ranges, given: Mapping[str, Any]) -> Found | None:

@@ -79,7 +79,8 @@ def arrays(path: Path) -> dict[str, np.ndarray]:
     if reader is None:
         with path.open("rb") as file:
             head = file.read(64)
-        reader = labview if head.startswith(b"LabVIEW Measurement") else universal if _universal(head) else table
+        universal_file = re.match(rb"[ \t]*-1[ \t]*\r?\n[ \t]*\d", head)
+        reader = labview if head.startswith(b"LabVIEW Measurement") else universal if universal_file else table
     found = reader(path)
     for i, segment in enumerate(found.segments):
         if len(segment) < LEAST:
@@ -465,11 +466,6 @@ def wav(path: Path) -> Recording:
     return Recording((values,), names, ("full scale",) * len(names), float(rate), tuple(notes))
 
 
-def _universal(head: bytes) -> bool:
-    lines = head.replace(b"\r", b"").split(b"\n")
-    return len(lines) > 1 and lines[0].strip() == b"-1" and lines[1].strip()[:2].isdigit()
-
-
 def universal(path: Path) -> Recording:
     """Time records in data set 58 of a universal file; the second record of a channel begins a new segment."""
     file = Universal(path)
@@ -532,7 +528,24 @@ class Universal:
         for one, i in zip(self.function_sets, (i for i, kind in enumerate(self.kinds) if kind == 58)):
             if int(one.get("func_type", 0)) == function:
                 first, last = self.file._block_ind[i][:2]
-                check_uff(self.path, one, self.raw[first : last + 1])
+                tail = b"\n".join(self.raw[first : last + 1].split(b"\n")[13:])  # behind the lines of its head
+                count, name = int(one["num_pts"]), uff_name(one)
+                if len(one["data"]) != count:
+                    raise ValueError(
+                        f"{self.path.name} states {count} samples of {name!r} and holds {len(one['data'])}; export it "
+                        "again"
+                    )
+                if one["binary"]:
+                    size = 4 if one["ord_data_type"] in (2, 5) else 8
+                    kind = f"{'<' if one['byte_ordering'] == 1 else '>'}f{size}"
+                    good = bool(np.isfinite(np.frombuffer(tail[: len(tail) // size * size], kind)).all())
+                else:
+                    good = b"n" not in tail.lower()  # of NaN and infinity, which the reader would replace by zero
+                if not good:
+                    raise ValueError(
+                        f"{self.path.name} has a value of {name!r} that is no finite number; export it again, or cut "
+                        "it out"
+                    )
                 found.append(one)
         if not found:
             types = sorted({int(one.get("func_type", 0)) for one in self.function_sets})
@@ -557,23 +570,3 @@ def uff_unit(path: Path, name: str, label: str, code: int) -> tuple[tuple[str, f
         )
     doubtful = kind and not known and label not in ("", "NONE")
     return known, kind, [f"{name}: the unit {label!r} is not known, {kind} assumed by its code {code}"] * bool(doubtful)
-
-
-def check_uff(path: Path, one: dict, raw: bytes) -> None:
-    """ValueError if a data set 58 holds fewer samples than stated, or numbers that its reader would replace by zero."""
-    count, name = int(one["num_pts"]), uff_name(one)
-    if len(one["data"]) != count:
-        raise ValueError(
-            f"{path.name} states {count} samples of {name!r} and holds {len(one['data'])}; export it again"
-        )
-    tail = b"\n".join(raw.split(b"\n")[13:])  # behind the lines of its head
-    if one["binary"]:
-        kind = ("<" if one["byte_ordering"] == 1 else ">") + ("f4" if one["ord_data_type"] in (2, 5) else "f8")
-        size = int(kind[-1])
-        good = bool(np.isfinite(np.frombuffer(tail[: len(tail) // size * size], kind)).all())
-    else:
-        good = b"n" not in tail.lower()  # of NaN and infinity
-    if not good:
-        raise ValueError(
-            f"{path.name} has a value of {name!r} that is no finite number; export it again, or cut it out"
-        )

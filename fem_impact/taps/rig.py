@@ -4,6 +4,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from scipy import signal
 
 from .._base import check
 from ..impact.history import History
@@ -71,10 +72,8 @@ class Rig:
             low, high = FILTERS[self.anti_alias] or (1.0, 1.0)
             x = np.clip((np.abs(frequencies) / self.rate - low) / (high - low), 0.0, 1.0)
             return (0.5 + 0.5 * np.cos(np.pi * x)).astype(complex)
-        order, corner = int(self.anti_alias[0]), float(self.anti_alias[1])
-        poles = np.exp(1j * np.pi * (2 * np.arange(order) + order + 1) / (2 * order))
-        s = 1j * frequencies / corner
-        return 1.0 / np.prod(s[:, None] - poles, axis=1)
+        filtered = signal.butter(int(self.anti_alias[0]), self.anti_alias[1], analog=True, output="zpk")
+        return signal.freqs_zpk(*filtered, frequencies)[1]
 
     def senses(self, frequencies: np.ndarray) -> np.ndarray:
         """Transfer function of the force sensor, (n_frequencies,), complex [-]."""

@@ -9,7 +9,7 @@ import xarray as xr
 from scipy.optimize import linear_sum_assignment
 from scipy.stats import f
 
-from .._base import check, isolated, markup
+from .._base import check, isolated
 from .._base.files import replacing
 from ..modes import picked, universal_files
 from ..modes.modal import Modes
@@ -262,29 +262,11 @@ def frequencies(name: str, value: Any) -> np.ndarray:
 
 
 def in_order(gap: np.ndarray) -> np.ndarray:
-    """Ascending columns that make the sum of a table (n_rows, n_columns) smallest, by dynamic programming."""
-    n, m = gap.shape
-    best = np.full((n + 1, m + 1), np.inf)
-    best[0] = 0.0
-    for i in range(1, n + 1):
-        for j in range(i, m + 1):
-            best[i, j] = min(best[i, j - 1], best[i - 1, j - 1] + gap[i - 1, j - 1])
-    columns, j = np.zeros(n, int), m
-    for i in range(n, 0, -1):
-        while j > i and best[i, j - 1] <= best[i, j]:
-            j -= 1
-        columns[i - 1] = j = j - 1
-    return columns
+    """Ascending columns that make the sum of gaps (n_rows, n_columns) between ascending numbers smallest.
 
-
-def pair_table(pairs: tuple[Pair, ...]) -> str:
-    """The pairs as text."""
-    rows = [
-        (pair.measured + 1, f"{pair.measured_frequency:.5g} Hz", pair.computed + 1, f"{pair.computed_frequency:.5g} Hz",
-         f"{100.0 * pair.difference:+.2f} %", "" if pair.mac is None else f"{pair.mac:.3f}")
-        for pair in pairs
-    ]  # fmt: skip
-    return "\n".join(markup.columns(rows, ("measured", "", "computed", "", "difference", "MAC")))
+    Pairs that cross are never nearer than those in order, so that any assignment tells the columns.
+    """
+    return np.sort(linear_sum_assignment(gap)[1])
 
 
 def write_uff(path: str | Path, data: xr.Dataset) -> None:

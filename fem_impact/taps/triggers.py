@@ -47,17 +47,13 @@ def onset(force: np.ndarray) -> int:
     return int(above.argmax())
 
 
-def starts(force: np.ndarray, trigger: float, together: int) -> np.ndarray:
-    """First samples above the trigger; those within ``together`` samples of the last one above belong to one tap."""
-    above = np.flatnonzero(force > trigger)
-    if not above.size:
-        return above
-    return above[np.concatenate([[True], np.diff(above) > together])]
-
-
 def find_rooms(force: np.ndarray, trigger: float, together: int) -> list[tuple[int, int, int]]:
-    """Of every tap its first sample above the trigger, and the samples before and after it that are its own."""
-    begun = starts(force, trigger, together)
+    """Of every tap its first sample above the trigger, and the samples before and after it that are its own.
+
+    Samples above the trigger within ``together`` samples of the last one above belong to one tap.
+    """
+    above = np.flatnonzero(force > trigger)
+    begun = above[np.diff(above, prepend=-1 - together) > together]
     halves = (0.5 * np.diff(begun)).astype(int)
     before, after = np.append(begun[:1], halves), np.append(halves, len(force) - begun[-1:])
     return list(zip(begun.tolist(), before.tolist(), after.tolist()))

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from scipy.stats import f, qmc, t
 
-from .._base import check
+from .._base import check, markup
 from .._base.check import SimulationError
 from ..fe.assembly import System
 from ..modes.finding import find_modes
@@ -57,7 +57,14 @@ class Updated(check.Brief):
             lines.append(f"{name} = {value:.4g}{told}")
         left = ", ".join(f"{frequency:.5g} Hz" for frequency in self.unpaired)
         alone = [f"without a mode of the body, left out: {left}"] if left else []
-        return "\n".join([*lines, transfer.pair_table(self.pairs), *alone, f"{self.n_solves} solves"])
+        rows = [
+            (pair.measured + 1, f"{pair.measured_frequency:.5g} Hz", pair.computed + 1,
+             f"{pair.computed_frequency:.5g} Hz", f"{100.0 * pair.difference:+.2f} %",
+             "" if pair.mac is None else f"{pair.mac:.3f}")
+            for pair in self.pairs
+        ]  # fmt: skip
+        table = markup.columns(rows, ("measured", "", "computed", "", "difference", "MAC"))
+        return "\n".join([*lines, *table, *alone, f"{self.n_solves} solves"])
 
 
 def update(
@@ -173,7 +180,12 @@ class _Misfit:
         while key not in self.solved:
             if len(self.solved) >= MOST_SOLVES:
                 raise SimulationError(f"the search did not end within {MOST_SOLVES} solves; narrow the ranges")
-            modes = _modes_of(self.build, self.box.values(x), len(self.target) + 2 + self.n_rigid)
+            values, count = self.box.values(x), len(self.target) + 2 + self.n_rigid
+            modes = self.build.changed(values).modes(count) if isinstance(self.build, Scene) else self.build(values)
+            if isinstance(modes, System):
+                modes = find_modes(modes, n_modes=count)
+            if not isinstance(modes, Modes):
+                raise ValueError(f"build must return a System of fi.assemble or Modes, got {check.shown(modes)}")
             if modes.n_rigid <= self.n_rigid:
                 self.solved[key] = modes
             self.n_rigid = max(modes.n_rigid, self.n_rigid)
@@ -231,15 +243,3 @@ def _half_widths(found: Solution, spare: int) -> np.ndarray:
         return np.full(len(found.x), np.inf)
     variance = np.diag(np.linalg.pinv(found.jacobian.T @ found.jacobian)) * found.cost / spare
     return float(t.ppf(0.95, spare)) * np.sqrt(variance)
-
-
-def _modes_of(build: Any, values: dict[str, float], count: int) -> Modes:
-    """The first modes of the body with these constants."""
-    if isinstance(build, Scene):
-        return build.changed(values).modes(count)
-    body = build(values)
-    if isinstance(body, System):
-        return find_modes(body, n_modes=count)
-    if not isinstance(body, Modes):
-        raise ValueError(f"build must return a System of fi.assemble or Modes, got {check.shown(body)}")
-    return body

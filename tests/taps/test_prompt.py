@@ -112,9 +112,9 @@ def test_the_body_of_a_scene_is_kept(found, tmp_path):
     assert again.make_striker().mass == pytest.approx(0.1) and again.make_contact().exponent == 1.5
 
 
-def test_an_unknown_structure_needs_a_scene():
+def test_an_unknown_structure_needs_a_scene(tmp_path):
     body = fi.Modes.from_arrays([500.0], [[1.0]], points=[[0.0]], mass=1.0, complete=True)
     hit = fi.strike(body, fi.Striker.rigid(0.1), LAW, at=[0.0], speed=1.0)
     made = fi.fit(fi.measure(hit, rate=25600.0), target=body, at=[0.0], starts=1, profiles=False, **GIVEN)
     with pytest.raises(ValueError, match="scene must be given"):
-        prompt.scene_tables(made)
+        prompt.write_scene(tmp_path / "scene.toml", made)

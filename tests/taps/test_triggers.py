@@ -67,9 +67,9 @@ def test_noise_is_not_raised_by_taps():
 
 def test_noise_alone_is_no_tap_and_one_of_ten_deviations_is():
     force = np.random.default_rng(5).normal(size=100_000)  # up to 4.3 deviations
-    assert not triggers.starts(force, triggers.level(force), 100).size
+    assert not triggers.find_rooms(force, triggers.level(force), 100)
     force[50_000:50_005] += 12.0
-    assert len(triggers.starts(force, triggers.level(force), 100)) == 1
+    assert len(triggers.find_rooms(force, triggers.level(force), 100)) == 1
 
 
 def test_a_ceiling_is_reached_by_several_samples_two_of_them_neighbours():
