@@ -324,7 +324,7 @@ def run_page(options: argparse.Namespace) -> Answer:
     path = page_of(options, "page.html")
     with staged(path.parent) as staging:
         found = fi.lesson.write(staging / path.name, scene, watch=display, told=partial(display.report, "blows"))
-    return answer(found.data(), title_of(scene), f"{found.summary()}.", path=path)
+    return answer(vars(found), title_of(scene), f"{found.summary()}.", path=path)
 
 
 def run_explore(options: argparse.Namespace) -> None:

@@ -151,20 +151,19 @@ def flag(name: str, value: Any) -> bool:
     return bool(value)
 
 
-def instance(name: str, value: Any, *kinds: type) -> None:
-    """Raise ValueError unless ``value`` has one of these types; the message says how to make one."""
+def instance(name: str, value: Any, *kinds: type) -> Any:
+    """Return ``value`` if it has one of these types; ValueError says how to make one."""
     if not isinstance(value, kinds):
         wanted = " or ".join(f"a {kind.__name__} of {SOURCES.get(kind.__name__, 'fem_impact')}" for kind in kinds)
         raise ValueError(f"{name} must be {wanted}, got {shown(value)}")
+    return value
 
 
 def several(name: str, value: Any, *kinds: type) -> tuple:
     """Return ``value`` as a tuple, or raise ValueError unless it is a non-empty list or tuple of these types."""
     if not isinstance(value, (list, tuple)) or not value:
         raise ValueError(f"{name} must be a list of {' or '.join(kind.__name__ for kind in kinds)}, got {shown(value)}")
-    for i, item in enumerate(value):
-        instance(f"{name}[{i}]", item, *kinds)
-    return tuple(value)
+    return tuple(instance(f"{name}[{i}]", item, *kinds) for i, item in enumerate(value))
 
 
 def path(name: str, value: Any) -> Path:

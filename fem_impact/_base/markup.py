@@ -53,11 +53,6 @@ def paragraphs(lines: Iterable[str]) -> str:
     return f'<pre style="white-space:pre-wrap">{html.escape(chr(10).join(lines))}</pre>'
 
 
-def player(wav: bytes, words: str) -> str:
-    """A player for the bytes of a WAV file, and what is said about them."""
-    return f'<audio controls src="{data_uri("audio/wav", wav)}"></audio><p>{html.escape(words)}</p>'
-
-
 def data_uri(kind: str, raw: bytes) -> str:
     """An address that holds the bytes of a file of a media type."""
     return f"data:{kind};base64,{base64.b64encode(raw).decode('ascii')}"

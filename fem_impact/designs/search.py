@@ -103,14 +103,6 @@ class Design(check.Brief):
         lines += ["with", *(f"  {line}" for line in markup.columns(rows)), f"{self.n_evaluations} evaluations"]
         return "\n".join(lines)
 
-    def _repr_html_(self) -> str:
-        """For notebooks: tables of the numbers found and of the goals."""
-        rows = [(each.goal.label, f"{each.value:.6g} {each.goal.unit}", each.goal.words) for each in self.reached]
-        numbers = [(name, f"{value:.6g}") for name, value in self.values.items()]
-        return markup.side_by_side(
-            markup.table(numbers, ["free", "found"]), markup.table(rows, ["quantity", "reached", "wanted"])
-        )
-
     def verify(self) -> Checked:
         """Strike the design as a blow of its own and again with a finer model, as ``strike --verify`` does.
 
@@ -122,7 +114,16 @@ class Design(check.Brief):
         for name, piece in self.maker.pieces(self.values).items():
             own = [each.goal for each in self.reached if each.goal.blow == name and not each.goal.mode]
             if own:
-                hits[name], apart[name] = _strike_twice(piece, self.tolerance)
+                if piece.target.modes is None:  # by a plan of its own
+                    most = min(self.tolerance, piece.arguments.get("tolerance", self.tolerance))
+                    run = planner.verify(piece.blow.run(tolerance=most))
+                    assert run.verified is not None
+                    hits[name], apart[name] = run.response, run.verified
+                else:
+                    modes = piece.target.surrounded(piece.target.modes)
+                    hit = hits[name] = piece.strike(modes, self.tolerance)
+                    finer = piece.strike(modes, hit.tolerance / VERIFYING)
+                    apart[name] = planner.differences(hit, finer, hit.quantities)
                 found |= {goal.label: _of_hit(hits[name], goal) for goal in own}
         some = [each.goal for each in self.reached if each.goal.mode]
         if some:
@@ -398,17 +399,6 @@ class _Search:
         return {
             "type": "ineq" if sign else "eq", "fun": value, "jac": lambda x: factor * self._turned(x)[i]
         }  # fmt: skip
-
-
-def _strike_twice(piece: Piece, tolerance: float) -> tuple[Response, Mapping[str, float]]:
-    """A blow by a plan of its own, and its differences from a finer one; modes that were given stay."""
-    if piece.target.modes is None:
-        run = planner.verify(piece.blow.run(tolerance=min(tolerance, piece.arguments.get("tolerance", tolerance))))
-        assert run.verified is not None
-        return run.response, run.verified
-    modes = piece.target.surrounded(piece.target.modes)
-    hit = piece.strike(modes, tolerance)
-    return hit, planner.differences(hit, piece.strike(modes, hit.tolerance / VERIFYING), hit.quantities)
 
 
 def _modes_of(piece: Piece, count: int, tolerance: float) -> Modes:

@@ -174,10 +174,6 @@ class Thinning:
                 own[i] -= columns[self.body.numbers.index(1)]
         return own, areas
 
-    def area(self, middles: np.ndarray) -> float:
-        """Volume per depth [m^2] of dishes around middles (n, dimension) [m]."""
-        return float(self.before.sensitivity.of_dishes(middles, self.radius)[1].sum())
-
     def choose_places(self, most: int) -> list[tuple[np.ndarray, float]]:
         """At most so many places, each with its images and depth, from the largest."""
         places = Places.over(self.before.system, self.radius, self.mirror)

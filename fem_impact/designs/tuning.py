@@ -253,7 +253,13 @@ def tune(
     """
     wanted = wishes.read_pitches(pitches, match)
     tolerance = check.between("tolerance", tolerance, 0.01, 100.0)
-    target = _target(body)
+    if isinstance(body, System):
+        target = Target.of(body)
+    else:
+        scene = body if isinstance(body, Scene) else load_scene(body)
+        target = replace(scene.built.target, source="fe")
+        if target.scale or target.air is not None:
+            raise scene.fault("[target] must not state mass, first_frequency or air to be tuned; leave them out")
     check_body(target.section)
     if mirror is not None:
         check.one_of("mirror", mirror, MIRRORS if isinstance(target.section, Plate) else MIRRORS[:1])
@@ -284,17 +290,6 @@ def given(words: Sequence[str]) -> Any:
     return {int(mode): pitch.strip() or None for mode, _, pitch in split}
 
 
-def _target(body: System | Scene | str | Path) -> Target:
-    """The body as a target of elements; ValueError if tuning it makes no sense."""
-    if isinstance(body, System):
-        return Target.of(body)
-    scene = body if isinstance(body, Scene) else load_scene(body)
-    target = scene.built.target
-    if target.scale or target.air is not None:
-        raise scene.fault("[target] must not state mass, first_frequency or air to be tuned; leave them out")
-    return replace(target, source="fe")
-
-
 def _finish(body: Blank, search: Thinning, found: Sequence[tuple[np.ndarray, float]]) -> Tuning:
     """The result, with every patch solved after those before it."""
     before = last = search.before
@@ -311,7 +306,7 @@ def _finish(body: Blank, search: Thinning, found: Sequence[tuple[np.ndarray, flo
         sides = [(float(each.frequencies[place]), float(each.errors[place])) for each in (before, last)]
         goal = body.wanted(before.frequencies, last.frequencies, pitch)
         tones.append(Tone(pitch, sides[0][0], sides[1][0], goal, sides[0][1], sides[1][1]))
-    volume = sum(deep * search.area(middles) for middles, deep in found)
+    volume = sum(deep * slopes.of_dishes(middles, search.radius)[1].sum() for middles, deep in found)
     return Tuning(
         tuple(tones), tuple(told), search.tolerance, search.depth, search.radius, search.mirror,
         search.n_solved + len(told), float(volume), before, last, body,

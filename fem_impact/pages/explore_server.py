@@ -69,7 +69,7 @@ class Talk(WebSocketHandler):
     def open(self, *_: str, **__: str) -> None:
         self.set_nodelay(True)
         explorer, workers, pages, folder = (self.settings[name] for name in ("explorer", "workers", "pages", "folder"))
-        self.session = Session(explorer, *workers, self._say, pages, folder)
+        self.session = Session(explorer, workers[0], workers[1], self._say, pages, folder)
         self.session.show()
 
     def on_message(self, message: str | bytes) -> None:

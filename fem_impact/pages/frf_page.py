@@ -61,26 +61,6 @@ def likeness(values: np.ndarray, measured: np.ndarray, computed: np.ndarray) -> 
     return figure
 
 
-def _tap_rows(taps: Taps) -> list[tuple[str, str, str, str, str]]:
-    rows = []
-    for i, name in enumerate(taps.labels):
-        reach = watch.reach_of(taps, i)
-        far = f"beyond {figures.in_hertz(0.5 * taps.rate, 3)}" if reach is None else figures.in_hertz(reach, 3)
-        rows.append((name, f"{taps.peak[i]:.4g} N", str(taps.n_pulses[i]), far,
-                     "; ".join(watch.faults(taps, i)) or "good"))  # fmt: skip
-    return rows
-
-
-def _pole_rows(modes: picked.Picked, channels: int) -> list[list[str]]:
-    """Of each mode frequency, damping ratio and residues, with 90 % intervals."""
-    rows = []
-    for n, natural in enumerate(modes.frequencies):
-        told = [(natural, modes.frequency_errors[n]), (100.0 * modes.damping_ratio[n], 100.0 * modes.damping_errors[n])]
-        told += list(zip(modes.products[:channels, n], modes.errors[:channels, n]))
-        rows.append([_within(float(value), NINETY * float(error)) for value, error in told])
-    return rows
-
-
 def _within(value: float, half: float) -> str:
     """A number and half of its interval, to two digits of that."""
     digits = max(0, 1 - int(np.floor(np.log10(half)))) if half > 0.0 else 3
@@ -140,12 +120,23 @@ def write_responses(
     if modes is not None and computed is not None and place is not None:
         compared = _compared(modes, computed, place)
         pictures["mac"] = compared.pop("picture")
-    double = [] if taps is None else [taps.labels[i] for i in np.flatnonzero(taps.n_pulses > 1)]
+    rows, poles, double = [], [], []
+    if taps is not None:
+        double = [taps.labels[i] for i in np.flatnonzero(taps.n_pulses > 1)]
+        for i, name in enumerate(taps.labels):
+            reach, half = watch.reach_of(taps, i), figures.in_hertz(0.5 * taps.rate, 3)
+            far = f"beyond {half}" if reach is None else figures.in_hertz(reach, 3)
+            good = "; ".join(watch.faults(taps, i)) or "good"
+            rows.append((name, f"{taps.peak[i]:.4g} N", str(taps.n_pulses[i]), far, good))
+    if modes is not None:  # of each frequency, damping ratio and residues, with 90 % intervals
+        values = np.vstack([modes.frequencies, 100.0 * modes.damping_ratio, modes.products[:shown]])
+        errors = np.vstack([modes.frequency_errors, 100.0 * modes.damping_errors, modes.errors[:shown]])
+        poles = [list(map(_within, *each)) for each in zip(values.T.tolist(), (NINETY * errors).T.tolist())]
     write_page(
         path, "frf.html", scripts=("shapes.js",), title=title, trouble=trouble, pictures=pictures,
         channels=names[:shown], n_channels=len(names), double=double,
-        taps=[] if taps is None else _tap_rows(taps), notes=noted(() if taps is None else taps.notes),
-        poles=[] if modes is None else _pole_rows(modes, shown), pairs=compared.get("pairs", []),
+        taps=rows, notes=noted(() if taps is None else taps.notes),
+        poles=poles, pairs=compared.get("pairs", []),
         moving=_moving(modes, place) if modes is not None and place is not None and len(names) > 1 else "",
         tiles=[
             ("taps averaged", str(found.attrs.get("averages", "not stated"))), ("responses", str(len(names))),

@@ -39,10 +39,6 @@ class Written:
     questions: int
     bytes: int
 
-    def data(self) -> dict[str, Any]:
-        """All of that, by name."""
-        return dict(vars(self))
-
     def summary(self) -> str:
         """The same in a sentence or two."""
         return (

@@ -126,12 +126,20 @@ def write(path: str | Path, scene: Scene, run: Run | Played) -> None:
 
 def _of_blow(scene: Scene, run: Run) -> dict[str, Any]:
     """What the page tells of a single blow only."""
-    response = run.response
+    response, error = run.response, run.response.error
+    parts = [
+        ("time step", "from a second run of the same blow", error.step),
+        ("modes left out", "from a run with fewer modes", error.truncation),
+        ("finite elements", "from the frequency errors, weighted by energy", error.mesh),
+    ]
+    if error.measurement:
+        parts.append(("measured responses", "from runs with shapes changed by their errors", error.measurement))
+    scale = max(response.tolerance, *(value for _, _, value in parts))
     return {
         "words": (*noted(run.notes), *words(scene, response)),
-        "strokes": (), "outcome": response.outcome, "error": response.error.total,
+        "strokes": (), "outcome": response.outcome, "error": error.total,
         "energy_error": response.energy_error,
-        "budget": _budget(response),
+        "budget": [(name, how, value, max(0.0, min(1.0, value / scale))) for name, how, value in parts],
         "model": _sentence(tidy(response.model_verdict[0])),
         "modelled": _modelled(run, len(response.history.steps), response.scheme),
         "energies": _shares(
@@ -205,20 +213,6 @@ def _tiles(response: Response | Strokes) -> list[tuple[str, str]]:
         own,
         ("estimated error" if response.tolerance_met else "estimated error, above tolerance", total),
     ]
-
-
-def _budget(response: Response) -> list[tuple[str, str, float, float]]:
-    """The parts of the estimated error: name, how it was found, value, and that over the largest."""
-    error = response.error
-    rows = [
-        ("time step", "from a second run of the same blow", error.step),
-        ("modes left out", "from a run with fewer modes", error.truncation),
-        ("finite elements", "from the frequency errors, weighted by energy", error.mesh),
-    ]
-    if error.measurement:
-        rows.append(("measured responses", "from runs with shapes changed by their errors", error.measurement))
-    scale = max(response.tolerance, *(value for _, _, value in rows))
-    return [(name, how, value, max(0.0, min(1.0, value / scale))) for name, how, value in rows]
 
 
 def _assumption(each: Assumption) -> dict[str, Any]:

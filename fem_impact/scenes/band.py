@@ -156,27 +156,24 @@ def check_known(scene: Scene) -> None:
 
 
 def around(scene: Scene, hit: Response, *, n: int | None = None, seed: int = 0) -> Band:
-    """The band around a blow of a scene."""
+    """The band around a blow of a scene; where inputs need another body, with a scene of its own for each blow."""
     count, seed = (None if n is None else check.count("n", n, high=MOST_BLOWS)), check.count("seed", seed, low=0)
-    said = {each.name: each.said for each in read_inputs(scene.known)}
+    inputs = read_inputs(scene.known)
+    said = {each.name: each.said for each in inputs}
     try:
         found = spread(scene, scene.known, n=count or BLOWS, sobol=False, seed=seed, tolerance=hit.tolerance)
     except ValueError:  # an input that needs a body of its own, or a wrong one, which the scenes below refuse
-        return _anew(scene, hit, said, count or ANEW, seed)
-    values = {name: found.values(name) for name in (*said, *NAMES.values())}
-    return Band(hit, said, values, found.n_failed, anew=False)
-
-
-def _anew(scene: Scene, hit: Response, said: Mapping[str, str], n: int, seed: int) -> Band:
-    """The band with a scene of its own for each blow."""
-    inputs = read_inputs(scene.known)
-    rows, failed = [], 0
+        pass
+    else:
+        values = {name: found.values(name) for name in (*said, *NAMES.values())}
+        return Band(hit, said, values, found.n_failed, anew=False)
+    n, rows, failed = count or ANEW, [], 0
     for done, row in enumerate(drawn(inputs, shares(n, len(inputs), seed), None)):
         given = {each.name: float(value) for each, value in zip(inputs, row)}
         try:
             one = scene.changed(given).strike(tolerance=hit.tolerance)
-            found = np.array([getattr(one, name) for name in NAMES.values()], float)  # None becomes NaN
-            rows.append(given | dict(zip(NAMES.values(), found.tolist())))
+            numbers = np.array([getattr(one, name) for name in NAMES.values()], float)  # None becomes NaN
+            rows.append(given | dict(zip(NAMES.values(), numbers.tolist())))
         except check.SimulationError:
             failed += 1
         progress.report("blows", done + 1, n)

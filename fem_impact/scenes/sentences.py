@@ -66,7 +66,18 @@ def words(scene: Scene, response: Response) -> list[str]:
     assert striker is not None
     arrives = arriving(scene.striker.kind, striker)
     blow = f"It is struck at {place(response.at)} by {arrives}, moving at {si(response.speed, 'm/s')}."
-    return [body(scene, response.target), blow, contact(law), _single_or_multiple(response, law)]
+    # what the kinetic-energy criterion predicts for the blow, from its contact resonance on a rigid wall
+    resonance = accuracy.contact_resonance(law, striker.felt_mass, response.speed)
+    limit = threshold.threshold_frequency(response.target, response.at, striker.felt_mass)
+    wall = f"contact resonance, {si(resonance, 'Hz', 3)}"
+    if limit is None:
+        told = f"No rebound expected, whatever the {wall}: the body is no heavier than the striker."
+    elif math.isinf(limit):
+        told = f"Single hit expected, whatever the {wall}: the striker always rebounds."
+    else:
+        number, side = ("Single hit", "below") if resonance < limit else ("Several hits", "above")
+        told = f"{number} expected: the {wall}, is {side} the limit of {si(limit, 'Hz', 3)} (kinetic-energy criterion)."
+    return [body(scene, response.target), blow, contact(law), told]
 
 
 def body(scene: Scene, modes: Modes) -> str:
@@ -120,21 +131,6 @@ def contact(law: Contact) -> str:
     told = f"The contact is a spring that only pushes, with a force of {stiffness} × indentation{raised}"
     told += f", with loss {law.loss:.3g} s/m." if law.loss else "."
     return told + law.law.sentence(law, si)
-
-
-def _single_or_multiple(response: Response, law: Contact) -> str:
-    """What the kinetic-energy criterion predicts for the blow, from its contact resonance on a rigid wall."""
-    assert response.striker is not None
-    mass = response.striker.felt_mass
-    resonance = accuracy.contact_resonance(law, mass, response.speed)
-    limit = threshold.threshold_frequency(response.target, response.at, mass)
-    wall = f"contact resonance, {si(resonance, 'Hz', 3)}"
-    if limit is None:
-        return f"No rebound expected, whatever the {wall}: the body is no heavier than the striker."
-    if math.isinf(limit):
-        return f"Single hit expected, whatever the {wall}: the striker always rebounds."
-    number, side = ("Single hit", "below") if resonance < limit else ("Several hits", "above")
-    return f"{number} expected: the {wall}, is {side} the limit of {si(limit, 'Hz', 3)} (kinetic-energy criterion)."
 
 
 def tip_notes(scene: Scene) -> tuple[str, ...]:

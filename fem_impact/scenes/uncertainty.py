@@ -122,7 +122,20 @@ def spread(
     >>> abs(found.quantile("contact_time", 0.5).value / (3.14159 * (0.1 / 1e5) ** 0.5) - 1.0) < 1e-2
     True
     """
-    told, blow = _scene_and_blow(scene, striker, contact, at, speed, damping_ratio)
+    if isinstance(scene, (System, Modes)):
+        given = check.instance("striker", striker, Striker), check.instance("contact", contact, Contact)
+        arguments = {"at": at, "speed": check.positive("speed", speed, "m/s", reach=REACH)}
+        told: Scene | None = None
+        blow = Blow(Target.of(scene, damping_ratio), *given, arguments)
+    else:
+        own: dict[str, Any] = {"striker": striker, "contact": contact, "at": at, "speed": speed}
+        for name, value in {**own, "damping_ratio": damping_ratio}.items():
+            if value is not None:
+                raise ValueError(f"{name} must be left out for a scene, which has its own")
+        told = scene if isinstance(scene, Scene) else load_scene(scene)
+        told.check_single()
+        told.check_unpushed()
+        blow = told.built
     inputs = read_inputs(vary)
     n = check.count("n", n)
     if n > (most := check.number("max_blows", max_blows)):
@@ -148,25 +161,6 @@ def spread(
     title = told.title or told.path.name if told is not None else ""
     return Spread(inputs, table, limit, groups, mixer, seed, checks=checks, rescaled=rescaled, title=title, notes=notes,
                   why_no_shares=why)  # fmt: skip
-
-
-def _scene_and_blow(
-    scene: Any, striker: Any, contact: Any, at: Any, speed: Any, damping_ratio: Any
-) -> tuple[Scene | None, Blow]:
-    """The scene if there is one, and the blow."""
-    if isinstance(scene, (System, Modes)):
-        check.instance("striker", striker, Striker)
-        check.instance("contact", contact, Contact)
-        values = {"at": at, "speed": check.positive("speed", speed, "m/s", reach=REACH)}
-        return None, Blow(Target.of(scene, damping_ratio), striker, contact, values)
-    for name, given in (("striker", striker), ("contact", contact), ("at", at), ("speed", speed),
-                        ("damping_ratio", damping_ratio)):  # fmt: skip
-        if given is not None:
-            raise ValueError(f"{name} must be left out for a scene, which has its own")
-    told = scene if isinstance(scene, Scene) else load_scene(scene)
-    told.check_single()
-    told.check_unpushed()
-    return told, told.built
 
 
 def _grouped(sobol: bool | None, mixer: Any, n: int, n_inputs: int) -> tuple[bool, str]:

@@ -1,5 +1,6 @@
 """The sound of a blow, as samples: the velocity of a point on the struck body, or the pressure a plate radiates."""
 
+import html
 import io
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -93,7 +94,8 @@ class Sound(check.Locked):
     def _repr_html_(self) -> str:
         """For notebooks: a player."""
         heard = self.audible().faded()
-        return markup.player(heard.wav(), heard.stated)
+        player = f'<audio controls src="{markup.data_uri("audio/wav", heard.wav())}"></audio>'
+        return f"{player}<p>{html.escape(heard.stated)}</p>"
 
     @property
     def said(self) -> str:
