@@ -7,7 +7,7 @@ from types import MappingProxyType
 from typing import Any
 
 import numpy as np
-from scipy.optimize import minimize
+from scipy.optimize import NonlinearConstraint, minimize
 from scipy.stats import qmc
 
 from .._base import check, markup
@@ -370,35 +370,31 @@ class _Search:
         which = self.maker.names.index(self.least or "")
         unit = np.eye(len(first))[which]
         low, high = self.box.bounds
-        sides = []  # a row each: goal, sign and limit over its scale
-        for i, goal in enumerate(self.goals):
-            if goal.exact:
-                sides.append((i, 0.0, goal.low))
-            else:
-                sides += [(i, s, end) for s, end in ((1.0, goal.low), (-1.0, goal.high)) if math.isfinite(end)]
-        constraints = [self._constraint(*side) for side in sides]
+        scale = np.array([goal.scale for goal in self.goals])
+        ends = np.array([[goal.low, goal.high] for goal in self.goals]).T / scale
+        exact = np.array([goal.exact for goal in self.goals])
+
+        def value(x: np.ndarray) -> np.ndarray:
+            try:
+                return self.state(x).found / scale
+            except (SimulationError, ValueError):
+                return np.where(np.isfinite(ends[0]), ends[0] - LOST, ends[1] + LOST)
+
+        constraints = [
+            NonlinearConstraint(
+                lambda x, some=some: value(x)[some], *ends[:, some], lambda x, some=some: self._turned(x)[some]
+            )
+            for some in (exact, ~exact) if some.any()
+        ]  # fmt: skip
         found = minimize(
             lambda x: self.sign * x[which] / (high[which] - low[which]), first,
             jac=lambda x: self.sign * unit / (high[which] - low[which]), bounds=list(zip(low, high)),
             constraints=constraints, method="SLSQP", options={"maxiter": solver.ENOUGH, "ftol": CLOSE},
         )  # fmt: skip
-        ends = np.clip(found.x, low, high)
+        last = np.clip(found.x, low, high)
         points = [np.frombuffer(key) for key, state in self.seen.items() if isinstance(state, _State)]
-        met = [x for x in [ends, *points] if np.abs(self._misses(x)).max() <= tolerance]
+        met = [x for x in [last, *points] if np.abs(self._misses(x)).max() <= tolerance]
         return min(met, key=lambda x: self.sign * x[which]) if met else first
-
-    def _constraint(self, i: int, sign: float, limit: float) -> dict[str, Any]:
-        goal, factor = self.goals[i], sign or 1.0
-
-        def value(x: np.ndarray) -> float:
-            try:
-                return float(factor * (self.state(x).found[i] - limit) / goal.scale)
-            except (SimulationError, ValueError):
-                return -LOST
-
-        return {
-            "type": "ineq" if sign else "eq", "fun": value, "jac": lambda x: factor * self._turned(x)[i]
-        }  # fmt: skip
 
 
 def _modes_of(piece: Piece, count: int, tolerance: float) -> Modes:
