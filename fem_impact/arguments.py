@@ -331,7 +331,7 @@ def parser() -> argparse.ArgumentParser:
         prog="fem-impact", description="Strike anything thin with anything, and know how far to trust the answer.",
         epilog="fem-impact COMMAND --help shows examples and exit statuses",
     )  # fmt: skip
-    made.add_argument("--version", action=_Version, nargs=0, help="show the version and exit")
+    made.add_argument("--version", action="version", version=f"fem-impact {fi.__version__}")
     verbs = made.add_subparsers(title="commands", metavar="COMMAND", required=True)
     for name, command in COMMANDS.items():
         said = command.help
@@ -350,12 +350,6 @@ def parser() -> argparse.ArgumentParser:
         ):
             verb.add_argument(option, **how)
     return made
-
-
-class _Version(argparse.Action):
-    def __call__(self, parser: argparse.ArgumentParser, *_: Any) -> None:
-        sys.stdout.write(f"fem-impact {fi.__version__}\n")
-        parser.exit()
 
 
 def _complete(shell: str) -> commands.Answer:

@@ -94,7 +94,7 @@ DOORS = {  # what these packages may use of those above: what a user does, and m
     "designs": MODELS | BLOWS | {
         "fe.assembly", "fe.refinement", "fe.section", "fe.slopes", "fe.system", "fe.variation", "impact.clearance",
         "impact.gradient", "impact.parameters", "impact.promise", "impact.quantities", "mesh.meshes", "model.budget",
-        "modes.varied", "modes.viewing", "show.outlined", "taps.arguments", "taps.solver", "taps.unknowns",
+        "modes.varied", "modes.viewing", "show.outlined", "taps.solver", "taps.unknowns",
     },
 }  # fmt: skip
 
@@ -120,7 +120,7 @@ NOT_MIRRORED = {  # tested under the name of what uses them
     "pages/worksheet.py", "references/blows.py", "references/contacts.py", "references/frequencies.py",
     "scenes/band.py", "scenes/maps.py", "scenes/schema.py", "scenes/sentences.py", "scenes/whole.py", "show/canvas.py",
     "show/histories.py", "show/outlined.py", "show/plots.py", "show/sampling.py", "show/style.py", "sweeps/inputs.py",
-    "taps/arguments.py", "taps/proposal.py", "taps/units.py",
+    "taps/proposal.py", "taps/units.py",
 }  # fmt: skip
 
 

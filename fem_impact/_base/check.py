@@ -6,7 +6,7 @@ import importlib
 import inspect
 import math
 import os
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import fields, is_dataclass
 from itertools import chain
 from pathlib import Path
@@ -164,6 +164,34 @@ def several(name: str, value: Any, *kinds: type) -> tuple:
     if not isinstance(value, (list, tuple)) or not value:
         raise ValueError(f"{name} must be a list of {' or '.join(kind.__name__ for kind in kinds)}, got {shown(value)}")
     return tuple(instance(f"{name}[{i}]", item, *kinds) for i, item in enumerate(value))
+
+
+def texts(name: str, value: Any, count: int | None = None, each: str = "") -> list[str]:
+    """Return ``value`` as a list of ``count`` texts, one for each of something."""
+    if not isinstance(value, (list, tuple)) or not all(isinstance(text, str) for text in value):
+        raise ValueError(f"{name} must be a list of texts, got {shown(value)}")
+    if count is not None and len(value) != count:
+        raise ValueError(f"{name} must have {count} entries, one for each {each}, got {len(value)}")
+    return list(value)
+
+
+def table(name: str, value: Any, example: str = "") -> dict[str, Any]:
+    """Return ``value`` as a dict whose keys are texts; None gives an empty one."""
+    if value is None:
+        return {}
+    if not isinstance(value, Mapping) or not all(isinstance(key, str) for key in value):
+        raise ValueError(f"{name} must be a dict of names{example}, got {shown(value)}")
+    return dict(value)
+
+
+def generator(value: Any) -> np.random.Generator:
+    """A random generator from ``rng``, a seed or a generator."""
+    if isinstance(value, np.random.Generator):
+        return value
+    seed = value if isinstance(value, (list, tuple)) else [value]
+    if seed and all(isinstance(x, (int, np.integer)) and not isinstance(x, bool) and x >= 0 for x in seed):
+        return np.random.default_rng(seed)
+    raise ValueError(f"rng must be a numpy.random.Generator or a seed of whole numbers, got {shown(value)}")
 
 
 def path(name: str, value: Any) -> Path:

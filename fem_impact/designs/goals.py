@@ -8,7 +8,6 @@ from typing import Any
 
 from .._base import check
 from ..impact.quantities import UNITS
-from ..taps import arguments
 
 MODE = re.compile(r"mode([1-9]\d*)\.(frequency|ratio)")
 KNOWN = (
@@ -80,7 +79,7 @@ class Goal:
 def read_goals(wanted: Any, blows: tuple[str, ...]) -> tuple[Goal, ...]:
     """All goals from what a user wants; those not told for one blow hold for each. ValueError says what is wrong."""
     example = f", as in {EXAMPLE}"
-    table = arguments.table("wanted", wanted, example)
+    table = check.table("wanted", wanted, example)
     if not table:
         raise ValueError(f"wanted must name at least one quantity, as in {EXAMPLE}")
     found: list[Goal] = []
@@ -89,7 +88,7 @@ def read_goals(wanted: Any, blows: tuple[str, ...]) -> tuple[Goal, ...]:
             check.one_of("the blow in wanted", name, [blow for blow in blows if blow])
             found += [
                 _goal(f"wanted[{name!r}]", own, what, name)
-                for own, what in arguments.table("wanted", value, example).items()
+                for own, what in check.table("wanted", value, example).items()
             ]
         elif MODE.fullmatch(name):
             found.append(_goal("wanted", name, value, ""))

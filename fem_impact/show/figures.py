@@ -201,9 +201,7 @@ def mode_shapes(modes: Modes, *, count: int = 12, columns: int = 4) -> Figure:
                 axes.tripcolor(*points.T, cells, shape, cmap=COLOURS, vmin=-1, vmax=1, shading="gouraud")
                 nodal = _unflattened(shape, cells)
                 axes.tricontour(*points.T, cells, nodal, levels=[0.0], colors="black", linewidths=0.8)
-                draw_rim(axes, points, cells)
-                _draw_ribs(axes, modes, points, cells)
-                axes.set_axis_off()
+                _draw_edges(axes, modes, points, cells)
             axes.set_title(f"{i + 1}   {in_hertz(modes.frequencies[i])}")
     return figure
 
@@ -223,16 +221,16 @@ def chladni(modes: Modes, count: int, columns: int) -> Figure:
         for i, (axes, shape) in enumerate(zip(all_axes, shapes.T), modes.n_rigid):
             mesh = Triangulation(points[:, 0], points[:, 1], cells, np.abs(shape[cells]).max(axis=1) < sand)
             axes.tricontour(mesh, _unflattened(shape, cells, sand), levels=[0.0], colors="black")
-            draw_rim(axes, points, cells)
-            _draw_ribs(axes, modes, points, cells)
-            axes.set_axis_off()
+            _draw_edges(axes, modes, points, cells)
             axes.autoscale_view()
             axes.set_title(f"{i + 1}   {in_hertz(modes.frequencies[i])}")
     return figure
 
 
-def _draw_ribs(axes: Any, modes: Modes, points: np.ndarray, cells: np.ndarray) -> None:
-    """Draw the ribs of a plate as lines."""
+def _draw_edges(axes: Any, modes: Modes, points: np.ndarray, cells: np.ndarray) -> None:
+    """Draw the rim and the ribs of a plate as lines, without axes."""
+    draw_rim(axes, points, cells)
+    axes.set_axis_off()
     axes.add_collection(LineCollection(points[rib_sides(modes, points, cells)], colors=GREEN, linewidths=1.2))
 
 

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 
 from .._base import check
-from . import arguments, readers, units
+from . import readers, units
 
 
 def in_si(
@@ -18,7 +18,7 @@ def in_si(
     struck = force_channel(found, force, unit, file)
     others = response_channels(found, response, unit, struck)
     if isinstance(scale, Mapping):
-        table = arguments.table("scale", scale)
+        table = check.table("scale", scale)
         stated = {find_channel("scale", name, found): check.number(f"scale of {name}", x) for name, x in table.items()}
     else:
         stated = {} if scale is None else {struck: check.number("scale", scale)}
@@ -44,7 +44,7 @@ def in_si(
 
 def stated_units(found: readers.Recording, given: Mapping[str, str] | None) -> list[str]:
     unit = [stated or units.label(name)[1] for name, stated in zip(found.names, found.units)]
-    for name, text in arguments.table("units", given).items():
+    for name, text in check.table("units", given).items():
         if not isinstance(text, str) or units.known(text) is None:
             words = ", ".join(word for factors in units.KINDS.values() for word in factors)
             raise ValueError(f"units must be one of {words}, got {check.shown(text)} for {name!r}")

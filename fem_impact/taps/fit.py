@@ -13,7 +13,7 @@ from .._base.rounding import SAME
 from ..impact.contact import Contact
 from ..impact.striker import Striker
 from ..modes.modal import Modes
-from . import arguments, nested, predictions, solver, windows
+from . import nested, predictions, solver, windows
 from .found import Found, Watch, profiled
 from .nested import Inner
 from .records import Taps
@@ -130,12 +130,12 @@ def fit(
     given = windows.joined(taps)
     levelled = windows.levelled(given)
     laws = [contact] if isinstance(contact, Contact) else list(check.several("contact", contact, Contact))
-    held = {name: check.number(name, value) for name, value in arguments.table("known", known).items()}
+    held = {name: check.number(name, value) for name, value in check.table("known", known).items()}
     names = [checked(unknown, target, striker, law, held) for law in laws]
     for name in held:
         if name in unknown:
             raise ValueError(f"known and unknown both name {name}")
-    each = arguments.texts("per_tap", [per_tap] if isinstance(per_tap, str) else per_tap)
+    each = check.texts("per_tap", [per_tap] if isinstance(per_tap, str) else per_tap)
     for name in each:
         check.one_of("per_tap", name, unknown)
     n_points, points = _measured_at(levelled, target, response_at)
@@ -145,7 +145,7 @@ def fit(
     place = None if target is None else target.point("at", at)[0]
     rig, impulse = Rig(cut.rate, anti_alias, tip_mass, resonance), float(np.mean(cut.impulse))
     inner = None if smaller is None else _inner(smaller, cut, n_points)
-    begin = Starts(check.count("starts", starts, high=solver.STARTS), arguments.generator(rng), watch, inner)
+    begin = Starts(check.count("starts", starts, high=solver.STARTS), check.generator(rng), watch, inner)
     settings = [
         Setting(target, place, striker, law, rig, own, points, n_points, impulse) for law, own in zip(laws, names)
     ]

@@ -12,7 +12,7 @@ import xarray as xr
 
 from .._base import check, markup
 from .._base.explained import noted
-from . import arguments, channels, readers, triggers
+from . import channels, readers, triggers
 
 RATES = (1.0, 1e9)  # [Hz] sampling rates allowed: beyond, the unit is a mistake
 
@@ -79,13 +79,13 @@ class Taps(check.Brief):
             others = check.array("response", raw, (n_taps, n_times, None))
         n_channels = others.shape[2]
         names = [f"response {i + 1}" for i in range(n_channels)] if names is None else names
-        names = arguments.texts("names", names, n_channels, "response")
-        unit = arguments.texts("units", ["m/s^2"] * n_channels if units is None else units, n_channels, "response")
+        names = check.texts("names", names, n_channels, "response")
+        unit = check.texts("units", ["m/s^2"] * n_channels if units is None else units, n_channels, "response")
         for text in unit:
             check.one_of("units", text, [si for si in channels.units.KINDS if si != "N"])
         tags = [f"tap {i + 1}" for i in range(n_taps)] if labels is None else labels
-        tags = arguments.texts("labels", tags, n_taps, "tap of force")
-        said = arguments.texts("notes", notes)
+        tags = check.texts("labels", tags, n_taps, "tap of force")
+        said = check.texts("notes", notes)
         if overload is None:
             cut = [[triggers.clipped(f), *(triggers.clipped(r) for r in each.T)] for f, each in zip(rows, others)]
         else:

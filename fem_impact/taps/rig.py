@@ -9,7 +9,6 @@ from scipy import signal
 from .._base import check
 from ..impact.history import History
 from ..impact.response import Response
-from . import arguments
 from .records import RATES, Taps
 from .triggers import LONGEST
 
@@ -240,7 +239,7 @@ def _digitised(records: np.ndarray, rig: Rig, rng: Any) -> tuple[np.ndarray, np.
     if rig.noise:
         if rng is None:
             raise ValueError("rng must be given for noise: a numpy.random.Generator or a seed")
-        records = records + rig.noise * peak * arguments.generator(rng).standard_normal(records.shape)
+        records = records + rig.noise * peak * check.generator(rng).standard_normal(records.shape)
     top = 1.25 * peak
     top[0] = rig.full_scale or top[0]
     overload = (np.abs(records) >= top).any(axis=1)

@@ -186,8 +186,8 @@ class Problem(check.Brief):
         """Records as the rig samples them, (n_taps, 1 + n_points, n_times), over the scale; or their onset rates."""
         turns = -2j * np.pi * self._chain[0] / self.setting.rig.rate  # of a delay of one sample
         spectra = spectra * np.exp(turns * onsets[:, None, None])
-        whole = thinned(spectra * turns if rate else spectra, self.data.n_times + 2 * MARGIN)
-        return whole[..., MARGIN : MARGIN + self.data.n_times] / self.data.scale[:, :, None]
+        fine = np.fft.irfft(spectra * turns if rate else spectra, FINE * (self.data.n_times + 2 * MARGIN))
+        return fine[..., ::FINE][..., MARGIN : MARGIN + self.data.n_times] / self.data.scale[:, :, None]
 
     def _base(self, x: np.ndarray) -> np.ndarray:
         n, n_taps = self.n_shared, self.data.n_taps
@@ -246,19 +246,6 @@ class Problem(check.Brief):
                 x[n + n_taps + tap] += np.clip(shift, -3.0, 3.0)  # samples: pulses are linear in it so far
             x[n:] = np.clip(x[n:], self.bounds[0][n:], self.bounds[1][n:])
         return x
-
-
-def thinned(spectra: np.ndarray, n: int) -> np.ndarray:
-    """Every `FINE`-th sample, (..., n), of fine records of FINE n samples, from the begin of their spectra (..., m)."""
-    m = spectra.shape[-1]
-    if m > n:
-        return np.fft.irfft(spectra, FINE * n)[..., ::FINE]
-    half = n // 2 + 1
-    folded = np.zeros((*spectra.shape[:-1], half), complex)
-    folded[..., : min(m, half)] = spectra[..., :half]
-    above = np.arange((n + 1) // 2, m)  # what lies above half the rate folds back
-    folded[..., n - above] += spectra[..., above].conj()
-    return np.fft.irfft(folded, n) / FINE
 
 
 @dataclass(frozen=True, eq=False, repr=False)

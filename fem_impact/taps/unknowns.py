@@ -16,7 +16,7 @@ from ..impact import accuracy
 from ..impact.contact import NUMBERS, Contact, wall_time
 from ..impact.striker import Striker
 from ..modes.modal import Modes
-from . import arguments, blows
+from . import blows
 from .rig import Rig
 
 STRIKER = ("mass", "first_frequency", "mode_ratio", "damping", "tip_mass")
@@ -80,7 +80,7 @@ class Box:
     @classmethod
     def of(cls, label: str, value: Any) -> "Box":
         """From a mapping of names to (low, high), at least one."""
-        limits = arguments.table(label, value)
+        limits = check.table(label, value)
         if not limits:
             raise ValueError(f'{label} must name at least one range, as in {{"contact.stiffness": (1e5, 1e8)}}')
         found = []
@@ -110,7 +110,7 @@ class Box:
 
     def start_at(self, given: Any) -> np.ndarray:
         """Coordinates (n_unknowns,) of the values given by name; of others the middle of the range."""
-        table, (low, high) = arguments.table("start", given), self.bounds
+        table, (low, high) = check.table("start", given), self.bounds
         for name in table:
             check.one_of("start", name, self.names)
         x = 0.5 * (low + high)
