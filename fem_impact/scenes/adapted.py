@@ -92,7 +92,7 @@ def _drawn(whole: str, drawing: Path, unit: str | None, folder: Path) -> tuple[s
     aside = low + 0.43 * (high - low)  # off the middle, where modes have their nodes
     nearest = middles[np.argmin(np.linalg.norm(middles - aside, axis=1))]
     place = f"[{', '.join(f'{x:.4g}' for x in nearest)}]"
-    usual = templates.PLACES["plate"]
+    usual = templates.PLACE
     return whole.replace(usual.ljust(20), place.ljust(20)).replace(usual, place), body.notes
 
 

@@ -423,11 +423,8 @@ def _check_keys(selector: str, kind: str, values: dict[str, Any], maker: Callabl
     known = [selector, *arguments] if selector else list(arguments)
     for key in values:
         if key not in arguments:
-            found = {name: [k for k, m in makers.items() if key in keys_of(m)] for name, (_, makers) in MAKERS.items()}
-            own = next((kinds for name, kinds in found.items() if maker in MAKERS[name][1].values()), [])
-            homes = [f"{selector} = {', '.join(map(repr, own))}"] if own else [f"[{n}]" for n, k in found.items() if k]
-            elsewhere = f"; it is one of {' and '.join(homes)}" if homes else f"; it has {', '.join(known)}"
-            raise ValueError(f"{key} is not a key of this table{check.nearest(key, known) or elsewhere}")
+            told = check.nearest(key, known) or f"; it has {', '.join(known)}"
+            raise ValueError(f"{key} is not a key of this table{told}")
     for key, argument in arguments.items():
         if argument.default is inspect.Parameter.empty and key not in values:
             raise ValueError(f"{key} is missing" + (f" for {selector} = {kind!r}" if selector else ""))
