@@ -1,6 +1,5 @@
 """Lays out the live page: sliders, the body to click on, the plots that follow, and the sound."""
 
-import math
 from typing import Any
 
 import numpy as np
@@ -58,11 +57,13 @@ def page() -> str:
 def laid_out(setup: Setup) -> dict[str, Any]:
     """What the page shows of a setup: its name, the body, the sliders beside each picture, and the axes."""
     known = ends(setup)
+    ways = {name: np.log(three) if name in LOGARITHMIC else three for name, three in known.items()}
     cards = {
         card: [
             {
                 "name": name, "label": SLIDERS[name], "low": known[name][0], "high": known[name][1],
-                "step": round(STEPS * _share(name, *known[name])), "logarithmic": name in LOGARITHMIC,
+                "step": round(STEPS * (ways[name][2] - ways[name][0]) / (ways[name][1] - ways[name][0])),
+                "logarithmic": name in LOGARITHMIC,
             }
             for name in names if name in known
         ]
@@ -72,13 +73,6 @@ def laid_out(setup: Setup) -> dict[str, Any]:
         "heading": setup.scene.title or setup.scene.path.stem, "cards": cards, "notes": list(setup.mesh.notes),
         **drawn_body(setup), "mass": setup.range("mass"), "stiffness": setup.range("stiffness"),
     }  # fmt: skip
-
-
-def _share(name: str, low: float, high: float, value: float) -> float:
-    """How far along its way [-] a slider stands."""
-    if name in LOGARITHMIC:
-        low, high, value = math.log(low), math.log(high), math.log(value)
-    return (value - low) / (high - low)
 
 
 def drawn_body(setup: Setup) -> dict[str, Any]:
