@@ -150,18 +150,18 @@ def _globals(code: CodeType, known: dict[str, Any]) -> Iterator[tuple[str, Any]]
 def _named(thing: Any, module: Any, name: str) -> str:
     """Name and version of what belongs to Python, to this program or to an installed package; '' of all else."""
     found = sys.modules.get(module) if isinstance(module, str) else None
-    if found is None or not _installed(module):
+    version = "" if found is None else _versioned(module)
+    if not version:
         return ""
-    label = f"{_versioned(module)} {name}"
     for part in name.split("."):
         found = getattr(found, part, None)
-    return label if found is thing else ""
+    return f"{version} {name}" if found is thing else ""
 
 
 def _module(module: ModuleType) -> tuple[str, list[Any]]:
     """A module: its name and version, or its file and the other modules that it uses."""
-    if _installed(module.__name__):
-        return f"module {_versioned(module.__name__)}", []
+    if version := _versioned(module.__name__):
+        return f"module {version}", []
     file = getattr(module, "__file__", None)
     if file is None:
         raise ValueError(f"it uses the module {module.__name__}, which has no file")
@@ -171,18 +171,12 @@ def _module(module: ModuleType) -> tuple[str, list[Any]]:
     return "module", [Path(file).read_bytes(), *(sys.modules[name] for name in others)]
 
 
-def _installed(module: str) -> bool:
-    """Whether a module belongs to Python, to this program or to an installed package."""
-    top = module.partition(".")[0]
-    if top in sys.stdlib_module_names or top == PACKAGE.name:
-        return True
-    places = [getattr(sys.modules.get(top), "__file__", None) or "", *getattr(sys.modules.get(top), "__path__", ())]
-    return any(part in ("site-packages", "dist-packages") for place in places for part in Path(place).parts)
-
-
 def _versioned(module: str) -> str:
-    """A module's name with the version of its package."""
+    """A module's name with a version, if it belongs to Python, to this program or to an installed package; else ''."""
     top = module.partition(".")[0]
+    home = sys.modules.get(top)
     if top in sys.stdlib_module_names:
         return f"{module} {sys.version}"
-    return f"{module} {getattr(sys.modules.get(top), '__version__', '')}"
+    places = [getattr(home, "__file__", None) or "", *getattr(home, "__path__", ())]
+    installed = any(part in ("site-packages", "dist-packages") for place in places for part in Path(place).parts)
+    return f"{module} {getattr(home, '__version__', '')}" if installed or top == PACKAGE.name else ""
