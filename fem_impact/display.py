@@ -19,6 +19,7 @@ from ._base.files import undoable
 from ._base.progress import heard
 
 ANNOUNCED = 10.0  # [s] time left that is announced even if nobody sees the line
+WIDE = 60  # columns of a terminal from which on there is room for a bar
 LONGER = 2.0  # [-] over the time announced last, from which on a longer one is announced, too
 
 
@@ -186,20 +187,15 @@ class Display:
             what = "" if count.what == name else f" {count.what}"
             parts.append(f"{count.done}/{count.total}{what}")
             parts += [f"{count.rate:.3g}/s"] if count.rate >= 1.0 else []
-        if not self.wide:
+        if self.console.width < WIDE:
             return f"{name} {ends[0] if ends else _clock(spent)}, {', '.join(parts[:1])}".rstrip(", ")
         return ", ".join([*parts, _clock(spent), *ends])
-
-    @property
-    def wide(self) -> bool:
-        """Whether there is room for a bar."""
-        return self.console.width >= 60
 
     @contextmanager
     def _opened(self) -> Iterator[None]:
         """The line while the outermost stage runs."""
         columns: list[bars.ProgressColumn] = [bars.SpinnerColumn(), _Text(self.status_line)]
-        if self.wide:
+        if self.console.width >= WIDE:
             columns[1:1] = [_Text(lambda: self.running[-1][0]), bars.BarColumn(bar_width=20)]
         with bars.Progress(*columns, console=self.console, transient=True) as self.bar:
             self.task = self.bar.add_task("", total=None)

@@ -46,10 +46,6 @@ class Data(check.Brief):
     def n_times(self) -> int:
         return self.values.shape[2]
 
-    def pick(self, taps: Sequence[int]) -> "Data":
-        index = list(taps)
-        return replace(self, values=self.values[index], scale=self.scale[index], impulse=self.impulse[index])
-
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Problem(check.Brief):
@@ -103,7 +99,8 @@ class Problem(check.Brief):
         """The problem with some of its taps only, and what remains of coordinates."""
         n, n_taps = self.n_shared, self.data.n_taps
         kept = [*range(n), *(n + k * n_taps + i for k in range(2 + len(self.own)) for i in taps)]
-        return replace(self, data=self.data.pick(taps)), x[kept]
+        part = {name: getattr(self.data, name)[list(taps)] for name in ("values", "scale", "impulse")}
+        return replace(self, data=replace(self.data, **part)), x[kept]
 
     def _weights(self) -> np.ndarray:
         """Weights (n_taps,) [-] of the taps in what the unknowns with own values are."""
