@@ -117,8 +117,8 @@ NOT_MIRRORED = {  # tested under the name of what uses them
     "model/by_modes.py", "model/by_vectors.py", "modes/disk.py", "modes/rectangle.py", "modes/request.py",
     "modes/shapes.py", "modes/slender.py", "pages/explore_numbers.py", "pages/explore_server.py",
     "pages/explore_view.py", "pages/html_page.py", "pages/lesson_grid.py", "pages/tap_pictures.py",
-    "pages/worksheet.py", "references/blows.py", "references/contacts.py", "references/frequencies.py",
-    "scenes/band.py", "scenes/maps.py", "scenes/schema.py", "scenes/sentences.py", "scenes/whole.py", "show/canvas.py",
+    "pages/worksheet.py", "references/blows.py", "references/frequencies.py", "scenes/band.py", "scenes/maps.py",
+    "scenes/schema.py", "scenes/sentences.py", "scenes/whole.py", "show/canvas.py",
     "show/histories.py", "show/outlined.py", "show/plots.py", "show/sampling.py", "show/style.py", "sweeps/inputs.py",
     "taps/proposal.py", "taps/units.py",
 }  # fmt: skip

@@ -1,16 +1,16 @@
 """Reference cases: numbers known from elsewhere, what this program says of them, and whether its stated errors hold.
 
 Start with `verify`. `cases.toml` holds what each case is, its source and its numbers; `case` compares, and
-`frequencies`, `contacts` and `blows` compute.
+`frequencies` and `blows` compute.
 """
 
 from collections.abc import Callable, Mapping, Sequence
 
 from .._base import check
-from . import blows, contacts, frequencies
+from . import blows, frequencies
 from .case import Reference, ReferenceLine, ReferenceVerdict
 
-CASES: Mapping[str, Reference] = {each.name: each for room in (frequencies, contacts, blows) for each in room.CASES}
+CASES: Mapping[str, Reference] = {each.name: each for room in (frequencies, blows) for each in room.CASES}
 __all__ = ["CASES", "Reference", "ReferenceLine", "ReferenceVerdict", "select", "verify"]
 
 
