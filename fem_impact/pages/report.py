@@ -96,7 +96,7 @@ def write(path: str | Path, scene: Scene, run: Run | Played) -> None:
     response, told = run.response, _of_blow(scene, run) if isinstance(run, Run) else _of_strokes(scene, run)
     judged = response.hits[response.hardest] if isinstance(response, Strokes) else response
     said = f"Contact force over time: {response.n_impacts} impacts, peak {si(response.peak_force, 'N')}"
-    shown = response.time <= _end(response)
+    shown = response.time <= sampling.end_of(response)
     write_page(
         path,
         "report.html",
@@ -259,14 +259,6 @@ def _shares(energies: Mapping[str, float], called: Mapping[str, str]) -> list[di
     ]  # fmt: skip
 
 
-def _end(response: Response | Strokes) -> float:
-    """When the pictures of a blow or a sequence end [s]."""
-    if isinstance(response, Response):
-        return sampling.end_of(response)
-    last = response.impacts[-1].end if response.impacts else float(response.time[-1])
-    return last + (sampling.AFTER - 1.0) * (last - float(response.starts[0]))
-
-
 def _sounds(scene: Scene, response: Response | Strokes) -> list[dict[str, str]]:
     """Players of the sound at each observation point and, for a plate, each listener, by default 1 m in front of it."""
     heard = [
@@ -329,7 +321,7 @@ def _downloads(scene: Scene, run: Run | Played) -> list[dict[str, str]]:
 
 def _plots(response: Response | Strokes) -> dict[str, Any]:
     """The data that the page's script draws: histories, spectrum, energies, and shapes as packed integers."""
-    modes, end = response.target, _end(response)
+    modes, end = response.target, sampling.end_of(response)
     shown = response.time <= end
     frequencies = _frequencies(response)
     # for the mobility: as far as the modes reach, beyond which there are no resonances in it

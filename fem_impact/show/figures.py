@@ -261,15 +261,12 @@ def in_hertz(value: float, digits: int = 4) -> str:
 
 
 def _unflattened(shape: np.ndarray, cells: np.ndarray, flat: float = SAME) -> np.ndarray:
-    """The shape (n_points,), with zeros replaced by a tiny share of the neighbouring values.
+    """The shape (n_points,), with zeros replaced by a tiny share of the values around them.
 
     A supported edge is zero up to rounding; without this, parts of it would be drawn as nodal lines.
     """
-    total, count = np.zeros(len(shape)), np.zeros(len(shape))
-    for i in range(3):
-        np.add.at(total, cells[:, i], shape[cells].sum(axis=1))
-        np.add.at(count, cells[:, i], 3.0)
-    return np.where(np.abs(shape) < flat, SAME * total / np.maximum(count, 1.0), shape)
+    total = np.bincount(cells.ravel(), np.repeat(shape[cells].sum(axis=1), 3), len(shape))
+    return np.where(np.abs(shape) < flat, SAME * total, shape)
 
 
 @check.typed

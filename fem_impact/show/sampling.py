@@ -5,6 +5,7 @@ import numpy as np
 from .._base import check
 from ..impact.response import Response
 from ..impact.striker import Striker
+from ..model.playing import Strokes
 from ..modes import viewing
 from ..modes.modal import Modes
 
@@ -67,9 +68,11 @@ def _struck(response: Response) -> tuple[Striker, np.ndarray]:
     return response.striker, response.at
 
 
-def end_of(response: Response) -> float:
-    """End of the animation of a blow [s]."""
-    return AFTER * (response.impacts[-1].end if response.impacts else float(response.time[-1])) or 1.0
+def end_of(response: Response | Strokes) -> float:
+    """When the pictures of a blow, or of a sequence of strokes, end [s]."""
+    first = 0.0 if isinstance(response, Response) else float(response.starts[0])
+    last = response.impacts[-1].end if response.impacts else float(response.time[-1])
+    return first + AFTER * (last - first) or 1.0
 
 
 def telling(response: Response, times: np.ndarray) -> int:

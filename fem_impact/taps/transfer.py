@@ -20,7 +20,6 @@ from .windows import joined
 
 METHODS = ("H1", "H2", "Hv")
 SURE = 0.9  # [-] probability that the true response lies within the error stated
-UNITS = {"m/s^2": "accelerance", "m/s": "mobility", "m": "receptance"}
 WAY = ("node", "direction", "reference", "reference_direction")  # of a response in data set 58
 ENDS = ("place", "struck")  # where it is measured and struck
 RESPONSE_CODE = {unit: code for code, unit in readers.UFF_UNITS.items() if unit != "N"}

@@ -26,7 +26,6 @@ MOST_MODES = 6  # [-] of an unknown target: a pulse tells few, and each has seve
 DAMPING = 0.02  # [-] of unknown modes, unless it is unknown too: takes an eighth of each swing; a choice
 # [-] along each unknown coordinate of the strike point at which the compliance is computed: a quartic between
 PLACES = 5
-NAME = re.compile(r"(contact|striker|target|mode\d)\.(\w+)")
 UNITS = {
     "stiffness": "N/m**exponent", "exponent": "", "loss": "s/m", "mass": "kg", "first_frequency": "Hz",
     "mode_ratio": "", "damping": "", "tip_mass": "kg", "x": "m", "y": "m", "frequency": "Hz", "gain": "", "gap": "m",
