@@ -100,7 +100,6 @@ def write_fit(
     path: str | Path, found: Found, *, title: str = "Fit of measured taps", target: Any = None, at: Any = None
 ) -> None:
     """Write the page; needs the extra ``web``. Double hits are predicted for ``target`` or the structure found."""
-    check.extra("jinja2", "web", "a page")
     struck = target is not None or found.target is not None
     told = [(name, *stated(found.profiles[name]), unit_of(name)) for name in found.names]
     left_out = [f"{100 * one.error:.2g} %" for one in found.left_out()] if len(found.used) > 1 else []

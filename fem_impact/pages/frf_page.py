@@ -106,7 +106,6 @@ def write_responses(
     points : array_like, (n_channels, dimension) [m], optional
         Where each channel is measured, by default as a universal file states it; the page moves the shapes there.
     """
-    check.extra("jinja2", "web", "a page")
     names, trouble, modes, compared = [str(name) for name in found.channel.values], "", None, {}
     shown = min(CHANNELS, len(names))
     try:

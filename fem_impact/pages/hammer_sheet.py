@@ -69,7 +69,6 @@ def _sheet(plan: Roving, i: int) -> dict[str, Any]:
 @check.typed
 def write_sheets(path: str | Path, plan: Roving, *, title: str, notes: tuple[str, ...] = ()) -> None:
     """Write the sheets of a plan; needs the extra ``web``. Printed, each point has a page of its own."""
-    check.extra("jinja2", "web", "a page")
     tiles: Mapping[str, str] = {
         "bandwidth": in_hertz(plan.bandwidth, 3), "drop": f"{plan.drop:g} dB", "points": str(len(plan.points)),
         "points that work": str(sum(each >= 0 for each in plan.best)), "pairs tried": str(len(plan.tips)),

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from scipy.io import wavfile
 
-from .._base import markup
+from .._base import check, markup
 from .._base.files import write_whole
 from ..show import export
 
@@ -20,8 +20,7 @@ QUIET = -20.0  # [dB] re full scale: a quieter sound is offered amplified
 
 def template(name: str) -> Any:
     """A template of the folder ``web``; it escapes all text."""
-    import jinja2
-
+    jinja2 = check.extra("jinja2", "web", "a page")
     return jinja2.Environment(
         loader=jinja2.FileSystemLoader(WEB), autoescape=True, undefined=jinja2.StrictUndefined, trim_blocks=True
     ).get_template(name)

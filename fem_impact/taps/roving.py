@@ -246,7 +246,7 @@ def planned(
         raise ValueError(
             f"duration must hold 8 to {2 * MOST_LINES} samples at {RATE:g} times the bandwidth, got {n_times}"
         )
-    rig = _Rig(modes, bandwidth, noise, n_times)
+    lines = np.fft.rfftfreq(n_times, 1.0 / (RATE * bandwidth))[1:]  # [Hz] of a record, without 0 Hz
     shape = len(places), len(masses)
     counts, reach, coherence, at_modes, peaks = np.zeros(shape, int), *(np.full(shape, np.nan) for _ in range(4))
     for i, (place, body) in enumerate(zip(places, seen)):
@@ -262,8 +262,9 @@ def planned(
             reach[i, same] = chooser.bandwidth_of(hit, drop)
             if reach[i, same[0]] >= bandwidth:
                 if answer is None:  # acceleration at the sensor per force here, (n_lines,) complex [1/kg]
-                    answer = spectra.mobility(modes, place, at_sensor, rig.frequencies, "accelerance")
-                coherence[i, same], at_modes[i, same] = np.array(rig.coherence(hit, answer))[:, None]
+                    answer = spectra.mobility(modes, place, at_sensor, lines, "accelerance")
+                told = _coherence(hit, answer, lines, n_times, noise, modes, bandwidth)
+                coherence[i, same], at_modes[i, same] = np.array(told)[:, None]
     progress.report("points", len(places), len(places))
     return Roving(
         modes, places, at_sensor, bandwidth, drop, names, tips, masses, stiffnesses, counts, reach, coherence, at_modes,
@@ -331,37 +332,26 @@ def _hit(body: Modes, point: np.ndarray, mass: float, tip: float) -> tuple[int, 
     return (min(hit.n_impacts, 2) if sure else 0), hit
 
 
-@dataclass(frozen=True, eq=False)
-class _Rig:
-    """Sensor and analyser of the test."""
-
-    modes: Modes
-    bandwidth: float  # [Hz]
-    noise: float  # [-]
-    n_times: int
-
-    @cached_property
-    def frequencies(self) -> np.ndarray:
-        """Lines [Hz] of a record, without 0 Hz."""
-        return np.fft.rfftfreq(self.n_times, 1.0 / (RATE * self.bandwidth))[1:]
-
-    def coherence(self, hit: Any, answer: np.ndarray) -> tuple[float, float]:
-        """Mean expected coherence over the band, from its first mode on, and at its natural frequencies."""
-        looks = np.linspace(0.0, self.frequencies[-1], BAND_POINTS)
-        middle = 0.5 * (hit.impacts[0].start + hit.impacts[0].end)
-        about = hit.spectrum(looks) * np.exp(2j * np.pi * middle * looks)  # smooth: it has no delay
-        force = np.interp(self.frequencies, looks, about)
-        kept = np.ones(len(self.frequencies))
-        passed = Rig(RATE * self.bandwidth, FILTER).passes(self.frequencies)
-        for spectrum in (force * passed, force * answer * passed):
-            record = np.fft.irfft(np.concatenate([[0.0], spectrum]), self.n_times) * RATE * self.bandwidth
-            floor = (self.noise * np.abs(record).max()) ** 2 * self.n_times / (RATE * self.bandwidth) ** 2
-            power = np.abs(spectrum) ** 2
-            kept = kept * power / np.maximum(power + floor, np.finfo(float).tiny)
-        own = self.modes.frequencies[inside_band(self.modes, self.bandwidth)]
-        band = (self.frequencies <= self.bandwidth) & (self.frequencies >= own.min(initial=self.bandwidth))
-        over = float(np.mean(kept[band])) if band.any() else float(np.interp(self.bandwidth, self.frequencies, kept))
-        return over, float(np.interp(own, self.frequencies, kept).mean()) if own.size else over
+def _coherence(
+    hit: Any, answer: np.ndarray, lines: np.ndarray, n_times: int, noise: float, modes: Modes, bandwidth: float
+) -> tuple[float, float]:
+    """Mean expected coherence of records (n_times,) over the band, from its first mode on, and at the natural
+    frequencies in it; ``answer`` (n_lines,) [1/kg] is the accelerance at lines [Hz]."""
+    looks = np.linspace(0.0, lines[-1], BAND_POINTS)
+    middle = 0.5 * (hit.impacts[0].start + hit.impacts[0].end)
+    about = hit.spectrum(looks) * np.exp(2j * np.pi * middle * looks)  # smooth: it has no delay
+    force = np.interp(lines, looks, about)
+    kept = np.ones(len(lines))
+    passed = Rig(RATE * bandwidth, FILTER).passes(lines)
+    for spectrum in (force * passed, force * answer * passed):
+        record = np.fft.irfft(np.concatenate([[0.0], spectrum]), n_times) * RATE * bandwidth
+        floor = (noise * np.abs(record).max()) ** 2 * n_times / (RATE * bandwidth) ** 2
+        power = np.abs(spectrum) ** 2
+        kept = kept * power / np.maximum(power + floor, np.finfo(float).tiny)
+    own = modes.frequencies[inside_band(modes, bandwidth)]
+    band = (lines <= bandwidth) & (lines >= own.min(initial=bandwidth))
+    over = float(np.mean(kept[band])) if band.any() else float(np.interp(bandwidth, lines, kept))
+    return over, float(np.interp(own, lines, kept).mean()) if own.size else over
 
 
 def spread_points(modes: Modes, number: int) -> np.ndarray:
