@@ -8,7 +8,6 @@ from pathlib import Path
 from typing import Any
 
 from tornado.httpserver import HTTPServer
-from tornado.routing import Router
 from tornado.web import Application, RequestHandler
 from tornado.websocket import WebSocketClosedError, WebSocketHandler
 
@@ -33,14 +32,12 @@ POLICY = {  # what the page may load and where it may send: nothing but its own 
 class Text(RequestHandler):
     """One of the files of the page."""
 
-    def initialize(self, kind: str, text: str) -> None:
-        self.kind, self.text = kind, text
-
-    def get(self) -> None:
-        self.set_header("Content-Type", f"text/{self.kind}; charset=utf-8")
+    def get(self, name: str | None) -> None:
+        kind, text = self.settings["parts"][name or ""]
+        self.set_header("Content-Type", f"text/{kind}; charset=utf-8")
         self.set_header("Content-Security-Policy", "; ".join(map(" ".join, POLICY.items())))
         self.set_header("Cache-Control", "no-store")
-        self.finish(self.text)
+        self.finish(text)
 
 
 class Drop(RequestHandler):
@@ -101,16 +98,13 @@ class Refused(RequestHandler):
         self.finish("This page is served to 127.0.0.1 and localhost only.\n")
 
 
-class Guard(Router):
+class Guarded(Application):
     """Leads to the page those who ask for this machine by its name."""
 
-    def __init__(self, application: Application, hosts: set[str]) -> None:
-        self.application, self.hosts = application, hosts
-
     def find_handler(self, request: Any, **kwargs: Any) -> Any:
-        if request.headers.get("Host", "").lower() in self.hosts:
-            return self.application.find_handler(request, **kwargs)
-        return self.application.get_handler_delegate(request, Refused)
+        if request.headers.get("Host", "").lower() in self.settings["hosts"]:
+            return super().find_handler(request, **kwargs)
+        return self.get_handler_delegate(request, Refused)
 
 
 def open_server(explorer: Explorer, workers: list[Worker], port: int, folder: Path) -> tuple[HTTPServer, str]:
@@ -119,16 +113,14 @@ def open_server(explorer: Explorer, workers: list[Worker], port: int, folder: Pa
     listening.setblocking(False)
     port = listening.getsockname()[1]
     hosts = {f"{name}:{port}" for name in (LOCAL, "localhost")}
-    origins = {f"http://{host}" for host in hosts}
-    parts = {"/": ("html", page())}
+    parts = {"": ("html", page())}
     for name, kind in (("explore.css", "css"), ("plots.js", "javascript"), ("explore.js", "javascript")):
-        parts[f"/{name}"] = kind, web_text(name)
-    application = Application(
-        [*((path, Text, {"kind": kind, "text": text}) for path, (kind, text) in parts.items()),
-         ("/drop", Drop), ("/talk", Talk)],
-        websocket_max_message_size=LARGEST_REQUEST, origins=origins, explorer=explorer, workers=workers,
-        folder=folder, pages=set(),
+        parts[name] = kind, web_text(name)
+    application = Guarded(
+        [(f"/({'|'.join(filter(None, parts))})?", Text), ("/drop", Drop), ("/talk", Talk)],
+        websocket_max_message_size=LARGEST_REQUEST, origins={f"http://{host}" for host in hosts}, hosts=hosts,
+        parts=parts, explorer=explorer, workers=workers, folder=folder, pages=set(),
     )  # fmt: skip
-    http = HTTPServer(Guard(application, hosts), max_body_size=LARGEST_DRAWING, max_header_size=LARGEST_REQUEST // 4)
+    http = HTTPServer(application, max_body_size=LARGEST_DRAWING, max_header_size=LARGEST_REQUEST // 4)
     http.add_socket(listening)
     return http, f"http://{LOCAL}:{port}/"
