@@ -164,7 +164,14 @@ class Explorer:
             if setup.at_rest(point):
                 return {"uri": "", "note": f"Silent: the body does not move at {place(point)}."}
         try:
-            rung = case.blow(tolerance=setup.tolerance) if rate is None else rolled(case, rate)
+            if rate is None:
+                rung: Response | Strokes = case.blow(tolerance=setup.tolerance)
+            else:  # a roll, which then rings: the blow again and again on the body as it then moves
+                when = np.arange(max(1, round(0.75 * PLAYED * rate))) / rate
+                each = [(float(time), case.striker, case.contact, case.at, case.speed) for time in when]
+                with warnings.catch_warnings():
+                    warnings.simplefilter("ignore", ToleranceWarning)
+                    rung = strokes(case.modes, each, tolerance=MAP_TOLERANCE)
             if height > 0.0:
                 heard = sound.radiate(rung, (*where, height), duration=PLAYED)
             else:
@@ -199,17 +206,6 @@ class Explorer:
             "height": f"{si(height, 'm', 3)}, in the air" if height > 0.0 else "on the surface",
         }
         return said | {letter: si(value, "m", 3) for letter, value in zip("xy", settings.at)}
-
-
-def rolled(case: Case, rate: float) -> Strokes:
-    """A roll, which then rings: the blow again and again, ``rate`` times a second, on the body as it then moves."""
-    when = np.arange(max(1, round(0.75 * PLAYED * rate))) / rate
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", ToleranceWarning)
-        return strokes(
-            case.modes, [(float(time), case.striker, case.contact, case.at, case.speed) for time in when],
-            tolerance=MAP_TOLERANCE,
-        )  # fmt: skip
 
 
 def drawn(picture: Picture, pack: Callable[[Any, str], str] = packed) -> Message:
