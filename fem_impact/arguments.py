@@ -298,7 +298,7 @@ COMMANDS = {
         _format(),
     ), ""),
     "completion": Command(
-        "print a script that completes commands; eval it in ~/.bashrc", lambda options: _complete(options.shell),
+        "print a script that completes commands; eval it in ~/.bashrc", lambda options: completion(options.shell),
         (_option("shell", None, "default: bash", choices=("bash", "zsh", "tcsh"), nargs="?", default="bash"),), ""),
     "frf": Command("compute frequency responses of taps, or of a scene as a rig would measure it", _later("run_frf"), (
         *CHANNELS,
@@ -352,18 +352,15 @@ def parser() -> argparse.ArgumentParser:
     return made
 
 
-def _complete(shell: str) -> commands.Answer:
-    script = completion(parser(), shell)
-    return commands.answer({"shell": shell, "script": script}, [script])
-
-
-def completion(parser: argparse.ArgumentParser, shell: str) -> str:
+def completion(shell: str) -> commands.Answer:
     """A script that completes commands, options and file names."""
     from ._base import check  # imports numpy, which --help and --version do not need
 
     shtab = check.extra("shtab", "completion", "completion")
-    (verbs,) = (action for action in parser._actions if isinstance(action, argparse._SubParsersAction))
+    made = parser()
+    (verbs,) = (action for action in made._actions if isinstance(action, argparse._SubParsersAction))
     for action in (action for verb in verbs.choices.values() for action in verb._actions):
         if action.type is _place:
             action.complete = shtab.FILE
-    return shtab.complete(parser, shell)
+    script = shtab.complete(made, shell)
+    return commands.answer({"shell": shell, "script": script}, [script])

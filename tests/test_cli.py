@@ -218,7 +218,7 @@ def test_default_scene_runs_end_to_end(prompt):
 
 def test_completion_offers_verbs_options_and_files(tmp_path):
     pytest.importorskip("shtab", reason="the extra completion is not installed")
-    script = arguments.completion(arguments.parser(), "bash")
+    script = arguments.completion("bash").data["script"]
     (tmp_path / "plate.toml").touch()
 
     def offered(*words):
