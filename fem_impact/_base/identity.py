@@ -86,7 +86,15 @@ def _used(thing: Any) -> tuple[str, list[Any]]:
     if kind is np.ndarray and not thing.dtype.hasobject:
         return "array", [repr(thing.dtype), thing.shape, thing.tobytes()]
     if isinstance(thing, ModuleType):
-        return _module(thing)
+        if version := _versioned(thing.__name__):
+            return f"module {version}", []
+        file = getattr(thing, "__file__", None)
+        if file is None:
+            raise ValueError(f"it uses the module {thing.__name__}, which has no file")
+        names = {value.__name__ if isinstance(value, ModuleType) else getattr(value, "__module__", None)
+                 for value in vars(thing).values()}  # fmt: skip
+        others = sorted(name for name in names if isinstance(name, str) and name in sys.modules)
+        return "module", [Path(file).read_bytes(), *(sys.modules[name] for name in others)]  # and all that it uses
     name = getattr(thing, "__qualname__", getattr(thing, "__name__", None))
     if isinstance(name, str) and (known := _named(thing, getattr(thing, "__module__", None), name)):
         return known, []
@@ -156,19 +164,6 @@ def _named(thing: Any, module: Any, name: str) -> str:
     for part in name.split("."):
         found = getattr(found, part, None)
     return f"{version} {name}" if found is thing else ""
-
-
-def _module(module: ModuleType) -> tuple[str, list[Any]]:
-    """A module: its name and version, or its file and the other modules that it uses."""
-    if version := _versioned(module.__name__):
-        return f"module {version}", []
-    file = getattr(module, "__file__", None)
-    if file is None:
-        raise ValueError(f"it uses the module {module.__name__}, which has no file")
-    names = {value.__name__ if isinstance(value, ModuleType) else getattr(value, "__module__", None)
-             for value in vars(module).values()}  # fmt: skip
-    others = sorted(name for name in names if isinstance(name, str) and name in sys.modules)
-    return "module", [Path(file).read_bytes(), *(sys.modules[name] for name in others)]
 
 
 def _versioned(module: str) -> str:

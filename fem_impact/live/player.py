@@ -109,14 +109,14 @@ class Player:
 
     def play(self, strokes: Sequence[PlayedStroke | tuple[int, int, float]], duration: float) -> Sound:
         """The sound [m/s] of strokes, by frames since now, for a duration [s]; the same strokes give the same bits."""
-        score = Score([self._checked(stroke) for stroke in strokes])
+        checked = []
+        for frame, point, speed in strokes:
+            point = check.count("point of a stroke", point, low=0, high=len(self.points) - 1)
+            frame = check.count("frame of a stroke", frame, low=0)
+            speed = check.between("speed of a stroke", speed, 0.0, self.fastest, "m/s")
+            checked.append(PlayedStroke(frame, point, speed))
+        score = Score(checked)
         out = np.zeros(round(check.positive("duration", duration, "s") * self.rate), np.float32)
         for begin in range(0, len(out), self.block):
             self.fill(score.due(begin, begin + self.block), out[begin : begin + self.block])
         return Sound(out.astype(float), self.rate, 1.0 / self.gain)
-
-    def _checked(self, stroke: Any) -> PlayedStroke:
-        frame, point, speed = stroke
-        check.count("point of a stroke", point, low=0, high=len(self.points) - 1)
-        frame = check.count("frame of a stroke", frame, low=0)
-        return PlayedStroke(frame, point, check.between("speed of a stroke", speed, 0.0, self.fastest, "m/s"))

@@ -156,10 +156,14 @@ def update(
         if len(rests) * float(f.sf(ratio, count, spare)) < DOUBTED:  # the best of so many choices by chance
             found, used = again, rest
             break
-    spread = dict(zip(box.names, _half_widths(found, len(used) - n)))
+    spare, sizes = len(used) - n, np.linalg.svd(found.jacobian, compute_uv=False)
+    half = np.full(n, np.inf)  # widths of the 90 % intervals of logarithms: frequencies may not tell them
+    if spare >= 1 and sizes[-1] > 1e-6 * sizes[0]:
+        variance = np.diag(np.linalg.pinv(found.jacobian.T @ found.jacobian)) * found.cost / spare
+        half = float(t.ppf(0.95, spare)) * np.sqrt(variance)
     unpaired = tuple(target[np.setdiff1d(every, used)].tolist())
-    pairs = search.pairs(found.x, used)
-    return Updated(box.values(found.x), spread, pairs, search.modes(found.x), len(search.solved), unpaired)
+    told = dict(zip(box.names, half)), search.pairs(found.x, used), search.modes(found.x)
+    return Updated(box.values(found.x), *told, len(search.solved), unpaired)
 
 
 @dataclass(eq=False)
@@ -234,12 +238,3 @@ class _Misfit:
                 miss = float(np.square(table[columns] + steep[columns] @ (here - x) - wanted).sum())
                 best = min(best, (miss, here, rest), key=lambda one: one[0])
         return self.fit(*best[1:]), best[2]
-
-
-def _half_widths(found: Solution, spare: int) -> np.ndarray:
-    """Half widths (n,) of the 90 % intervals of logarithms; infinite where the frequencies do not tell them."""
-    sizes = np.linalg.svd(found.jacobian, compute_uv=False)
-    if spare < 1 or sizes[-1] <= 1e-6 * sizes[0]:
-        return np.full(len(found.x), np.inf)
-    variance = np.diag(np.linalg.pinv(found.jacobian.T @ found.jacobian)) * found.cost / spare
-    return float(t.ppf(0.95, spare)) * np.sqrt(variance)
