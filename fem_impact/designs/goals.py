@@ -57,11 +57,6 @@ class Goal:
             return 20.0 / math.log(10.0)  # dB: a miss of a level is told as that of the force
         return max(abs(end) for end in (self.low, self.high) if math.isfinite(end)) or 1.0
 
-    @property
-    def exact(self) -> bool:
-        """Whether one value is wanted."""
-        return self.low == self.high
-
     def miss(self, value: float) -> float:
         """How far a value is above the range (below, if negative), over the scale."""
         return (max(0.0, value - self.high) + min(0.0, value - self.low)) / self.scale
@@ -70,7 +65,7 @@ class Goal:
     def words(self) -> str:
         """The range, in words."""
         unit = f" {self.unit}".rstrip()
-        if self.exact:
+        if self.low == self.high:
             return f"{self.low:.6g}{unit}"
         ends = f"at least {self.low:.6g}", f"at most {self.high:.6g}"
         return " and ".join(words for words, end in zip(ends, (self.low, self.high)) if math.isfinite(end)) + unit

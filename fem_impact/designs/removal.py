@@ -105,10 +105,9 @@ class Sensitivity:
         places = frame.to_metres(points.x)
         unit = float(thickness(section, places).min())
 
-        def left(share: float) -> Any:
-            return thinner(section, lambda at: np.full(len(at), (share - 1.0) * unit))
-
-        change = SectionChange.by_differences("depth", 1.0, left)
+        change = SectionChange.by_differences(
+            "depth", 1.0, lambda share: thinner(section, lambda at: np.full(len(at), (share - 1.0) * unit))
+        )
         found = frequency_densities(system, change, vectors, (omega / frame.rate) ** 2)
         dx = points.dx.ravel() * frame.length ** places.shape[1]
         own = PER_CENT / unit * dx[:, None] * found.reshape(len(dx), -1)

@@ -372,7 +372,7 @@ class _Search:
         low, high = self.box.bounds
         scale = np.array([goal.scale for goal in self.goals])
         ends = np.array([[goal.low, goal.high] for goal in self.goals]).T / scale
-        exact = np.array([goal.exact for goal in self.goals])
+        exact = ends[0] == ends[1]
 
         def value(x: np.ndarray) -> np.ndarray:
             try:

@@ -116,7 +116,7 @@ class Explorer:
         """What follows the answer: spectrum, threshold and the scene file."""
         case = self.case(settings)
         resonance, threshold = case.resonance, limit_of(case)
-        limit = found_limit(threshold)
+        limit = threshold if 0.0 < threshold < math.inf else None  # as pages draw it
         ratio = (
             f"{resonance / limit:.2g} × threshold" if limit else f"body {'never' if threshold else 'always'} stops it"
         )
@@ -215,11 +215,6 @@ def drawn(picture: Picture, pack: Callable[[Any, str], str] = packed) -> Message
         "mass": picture.mass[[0, -1]].tolist(), "stiffness": picture.stiffness[[0, -1]].tolist(),
         "x": pack(picture.limit_mass, "<f4"), "y": pack(picture.limit, "<f4"),
     }  # fmt: skip
-
-
-def found_limit(value: float) -> float | None:
-    """A threshold [Hz] as pages draw it: None if the body always or never stops the striker."""
-    return value if 0.0 < value < math.inf else None
 
 
 def _force(hit: Response) -> Message:

@@ -16,7 +16,7 @@ from ..scenes.sentences import RAISED, place, power, si, tidy, words
 from ..show import sound
 from . import lesson_grid, worksheet
 from .explore_model import Setup
-from .explore_numbers import PLAYED, SPECTRUM_FACTS, drawn, found_limit
+from .explore_numbers import PLAYED, SPECTRUM_FACTS, drawn
 from .explore_view import drawn_body
 from .html_page import packed, script_data, write_page
 from .lesson_grid import NAMES, STEPS, Lesson
@@ -143,7 +143,7 @@ def _facts(lesson: Lesson) -> dict[str, Any]:
         "shape": lesson.shape, "start": lesson.start, "axes": lesson.axes, "places": lesson.places, "names": NAMES,
         "tolerance": lesson.tolerance, "steps": STEPS, **SPECTRUM_FACTS, **drawn_body(setup),
         "ear": setup.scene.points[0], "played": PLAYED, "full": sound.FULL_SCALE,
-        "limits": [[found_limit(value) for value in row] for row in lesson.limits],
+        "limits": [[value if 0.0 < value < np.inf else None for value in row] for row in lesson.limits],
         "resonance": _squeezed(np.array(cases), "<f4"),
         "omega": _squeezed(modes.omega[rings], "<f4"), "zeta": _squeezed(modes.damping_ratio[rings], "<f4"),
         "struck": _squeezed(np.array(struck), "<f4"), "heard": _squeezed(modes.shape_at(ear)[0][rings], "<f4"),

@@ -2,6 +2,7 @@
 
 import math
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 
@@ -10,7 +11,7 @@ from ..scenes.sentences import place, si
 from .explore_numbers import BAND, SPECTRUM_POINTS
 from .lesson_grid import STEPS, Lesson
 
-Position = tuple[int, int, int, int]  # of place, speed, stiffness and mass
+Position = tuple[int, ...]  # of place, speed, stiffness and mass
 
 
 @dataclass(frozen=True)
@@ -72,12 +73,8 @@ def _single(lesson: Lesson, axis: int) -> tuple[Position, Position] | None:
     """Two neighbours along an axis that hit once each, as near to the scene's blow as there are."""
     counts, start = lesson.quantity("n_impacts"), lesson.start
 
-    def moved_to(i: int) -> Position:
-        place_, speed, stiffness, mass = (i if k == axis else start[k] for k in range(4))
-        return place_, speed, stiffness, mass
-
-    nearest = sorted(range(lesson.shape[axis] - 1), key=lambda step: abs(step + 0.5 - start[axis]))
-    pairs = ((moved_to(step), moved_to(step + 1)) for step in nearest)
+    places = [tuple(i if k == axis else start[k] for k in range(4)) for i in range(lesson.shape[axis])]
+    pairs = sorted(pairwise(places), key=lambda pair: abs(pair[0][axis] + 0.5 - start[axis]))
     return next((pair for pair in pairs if counts[pair[0]] == counts[pair[1]] == 1), None)
 
 

@@ -85,20 +85,19 @@ def _diaphragms() -> list[ReferenceLine]:
     sides, curvature, thickness = (0.4, 0.3), (-0.3, 0.1), 2e-3
     alloy = Material(E=70e9, nu=0.3, rho=2700.0)
 
-    def rise(points: np.ndarray) -> np.ndarray:
-        return 0.5 * (points - np.array(sides) / 2.0) ** 2 @ np.array(curvature)
-
-    plate, sliding = Plate(alloy, thickness), {"boundary": "sliding"}
-    system = assemble(mesh.rectangle(*sides), plate, {"boundary": "hinged"}, rise=rise, in_plane=sliding)
+    system = assemble(
+        mesh.rectangle(*sides), Plate(alloy, thickness), {"boundary": "hinged"}, in_plane={"boundary": "sliding"},
+        rise=lambda points: 0.5 * (points - np.array(sides) / 2.0) ** 2 @ np.array(curvature),
+    )  # fmt: skip
     return of_modes(find_modes(system, n_modes=8, tolerance=1e-5), panel(sides, curvature, alloy, thickness, 8))
 
 
 def _clamped() -> list[ReferenceLine]:
-    def rise(points: np.ndarray) -> np.ndarray:
-        return -0.5 * (points[:, 1] - 0.0508) ** 2 / 0.762
-
     plate, about = Plate(Material(E=6.8948e10, nu=0.33, rho=2657.0), 3.302e-4), TABLE["panel-clamped"]
-    system = assemble(mesh.rectangle(0.0762, 0.1016), plate, {"boundary": "clamped"}, rise=rise)
+    system = assemble(
+        mesh.rectangle(0.0762, 0.1016), plate, {"boundary": "clamped"},
+        rise=lambda points: -0.5 * (points[:, 1] - 0.0508) ** 2 / 0.762,
+    )  # fmt: skip
     return of_modes(find_modes(system, n_modes=5, tolerance=1e-5), about["values"], about["digit"])
 
 

@@ -16,7 +16,7 @@ from ..fe import plausible
 from ..impact import threshold
 from ..impact.contact import MARKS, acting_stiffness, wall_time
 from ..model.target import Stages
-from ..show import figures, plots
+from ..show import export, figures, plots
 from ..sweeps import cases, grid
 from ..sweeps.borders import PREFIX, read_borders
 from ..sweeps.cells import ALIASES, AXES, LAW, Case, Range, laid_out, logarithmic
@@ -106,7 +106,7 @@ def map_scene(
         pieces.append(_quick_map(changed, quick, band, limit, {**wanted, "store": own, "ours": ours, "tell": tell}))
     result = _joined(pieces, slow)
     result.attrs["scene"] = json.dumps(
-        {**scene.data(), "map": {name: list(map(_plain, v)) for name, v in over.items()}}
+        {**scene.data(), "map": {name: list(map(export.plain, v)) for name, v in over.items()}}
     )
     result.attrs["notes"] = "\n".join(plausible.together(*(piece.attrs["notes"].splitlines() for piece in pieces)))
     result.attrs["title"] = scene.title or str(scene.path.name)
@@ -129,12 +129,8 @@ def changed_scene(scene: Scene, key: str, value: Any) -> Scene:
     table, name = key.split(".", 1)
     field = "blow" if table == "strike" else table
     part = getattr(scene, field) or Part()
-    change: dict[str, Any] = {field: Part(part.kind, {**part.values, name: _plain(value)})}
+    change: dict[str, Any] = {field: Part(part.kind, {**part.values, name: export.plain(value)})}
     return replace(scene, **change)
-
-
-def _plain(value: Any) -> Any:
-    return value.tolist() if isinstance(value, (np.ndarray, np.generic)) else value
 
 
 def _quick_map(

@@ -260,13 +260,9 @@ class _SpreadAsked:
             raise ValueError(f"vary: {name} varies in space already; vary target.mass and target.first_frequency")
         return float(value)
 
-    @property
-    def residual(self) -> bool:
-        return self.blow.arguments.get("residual", True)
-
     def cases(self) -> Cases:
         """All blows by row, on a body that serves all of them."""
-        blow, axes = self.blow, dict(self.own)
+        blow, axes, residual = self.blow, dict(self.own), self.blow.arguments.get("residual", True)
         self._add_parts(axes)
         target, at, speed = blow.target, blow.arguments["at"], blow.arguments["speed"]
         first = None
@@ -284,7 +280,7 @@ class _SpreadAsked:
         try:
             base, _ = bodies.body_of(
                 blow, ends or {"speed": np.array([speed])}, tolerance=self.tolerance, keep=self.keep,
-                alone=self.residual and not self.places,
+                alone=residual and not self.places,
             )  # fmt: skip
         except ValueError as error:  # what is wrong with an axis is told of the inputs
             if re.split(r"[ \[]", str(error))[0] not in (*AXES, "over", "first_frequency"):
@@ -294,7 +290,7 @@ class _SpreadAsked:
         axes |= self._of_modes(base.modes if self.body else None, base.first)
         if self.places:
             axes["at"] = base.modes.points("vary: strike point", self._points(at))
-        return Cases(replace(base, speed=speed), axes, self.tolerance, self.residual, by_row=True)
+        return Cases(replace(base, speed=speed), axes, self.tolerance, residual, by_row=True)
 
     def _factors(self, body: Mapping[str, Any]) -> list[Any]:
         """Factors of the body's mass and of its frequencies from those of its inputs; 1 where the scene states them."""
@@ -348,7 +344,8 @@ class _SpreadAsked:
         `SIZE` is missing, as for the bodies that allow it the rescaled modes are the exact ones.
         """
         found: dict[str, float] = {}
-        alone = Cases(base, {}, self.tolerance, self.residual)
+        residual = self.blow.arguments.get("residual", True)
+        alone = Cases(base, {}, self.tolerance, residual)
         for each in self.inputs:
             if each.name not in self.body or each.name == SIZE:
                 continue
@@ -359,7 +356,7 @@ class _SpreadAsked:
                     "target_mass": base.modes.mass * mass, "target_frequency": base.first_frequency * frequency,
                 }  # fmt: skip
                 blow = replace(self.blow, target=_made(self.blow.target, each.name, ratio))
-                other, _ = bodies.body_of(blow, {"speed": [base.speed]}, tolerance=self.tolerance, alone=self.residual)
+                other, _ = bodies.body_of(blow, {"speed": [base.speed]}, tolerance=self.tolerance, alone=residual)
                 try:
                     one, two = (alone.row(alone.strike(case)) for case in (base.with_values(changes), other))
                     off = max(alone.apart(one, two).values()) if one[0] == two[0] else math.inf
