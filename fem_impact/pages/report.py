@@ -95,6 +95,11 @@ def write(path: str | Path, scene: Scene, run: Run | Played) -> None:
         raise ValueError("run must have modes, because a report shows motion; strike with motion=True")
     response, told = run.response, _of_blow(scene, run) if isinstance(run, Run) else _of_strokes(scene, run)
     judged = response.hits[response.hardest] if isinstance(response, Strokes) else response
+    if isinstance(response, Strokes):
+        total, own = power(response.error), ("strokes", str(len(response.strokes)))
+    else:
+        total = power(response.error.total) if response.error.resolvable else "not resolvable"
+        own = "restitution", rebound(response, 4)
     said = f"Contact force over time: {response.n_impacts} impacts, peak {si(response.peak_force, 'N')}"
     shown = response.time <= sampling.end_of(response)
     write_page(
@@ -108,7 +113,14 @@ def write(path: str | Path, scene: Scene, run: Run | Played) -> None:
         title=scene.title or scene.path.stem,
         picture=scene.picture(),
         observed=bool(scene.watched),
-        tiles=_tiles(response),
+        tiles=[
+            ("impacts", str(response.n_impacts)),
+            ("peak force", si(response.peak_force, "N")),
+            ("contact time", si(response.contact_time, "s")),
+            ("impulse", si(response.impulse, "N s")),
+            own,
+            ("estimated error" if response.tolerance_met else "estimated error, above tolerance", total),
+        ],
         response=response,
         verdict=_sentence(tidy(response.verdict)),
         sounds=_sounds(scene, response),
@@ -197,22 +209,6 @@ def _command(scene: Scene, run: Run | Played) -> str:
     words = [(OPTIONS["quantity"], each) for each in ([asked] if isinstance(asked, str) else asked)]
     words += [(OPTIONS[name], f"{value}") for name, value in changes.items() if name != "quantity"]
     return " ".join(["fem-impact strike", quoted, *(f"{option} {shlex.quote(str(value))}" for option, value in words)])
-
-
-def _tiles(response: Response | Strokes) -> list[tuple[str, str]]:
-    if isinstance(response, Strokes):
-        total, own = power(response.error), ("strokes", str(len(response.strokes)))
-    else:
-        total = power(response.error.total) if response.error.resolvable else "not resolvable"
-        own = "restitution", rebound(response, 4)
-    return [
-        ("impacts", str(response.n_impacts)),
-        ("peak force", si(response.peak_force, "N")),
-        ("contact time", si(response.contact_time, "s")),
-        ("impulse", si(response.impulse, "N s")),
-        own,
-        ("estimated error" if response.tolerance_met else "estimated error, above tolerance", total),
-    ]
 
 
 def _assumption(each: Assumption) -> dict[str, Any]:
