@@ -127,7 +127,20 @@ def assemble(
         ribs = [replace(rib, path=mesh.line(rib.path)) for rib in section.ribs]
         section = replace(section, rise=section.rise or mesh.rise, ribs=tuple(ribs))
     usual = usual_theory(section, mesh.dimension)
-    rules = _chosen(usual, theory, element, mesh.dimension)
+    if isinstance(theory, Theory):
+        rules = theory
+        if rules.dimension != mesh.dimension or element is not None:
+            raise ValueError(
+                f"theory must be of dimension {mesh.dimension} as the mesh, and element left out, got {rules.name!r} "
+                f"of dimension {rules.dimension}"
+            )
+    else:
+        named = check.one_of("theory", usual.name if theory is None else theory, THEORIES[mesh.dimension])
+        if usual is SHALLOW and named != usual.name:
+            why = "a plate that is curved, ribbed or unevenly layered"
+            raise ValueError(f"theory must be {usual.name!r} for {why}, got {named!r}")
+        known = {each.element: each for each in EVERY if each.name == named}
+        rules = known[check.one_of("element", next(iter(known)) if element is None else element, tuple(known))]
     supports = {} if supports is None else supports
     if callable(getattr(section, "thickness", None)):
         mesh = aligned(mesh)
@@ -151,29 +164,12 @@ def usual_theory(section: Any, dimension: int) -> Theory:
     return ARGYRIS if dimension == 2 else EULER
 
 
-def _chosen(usual: Theory, theory: str | Theory | None, element: str | None, dimension: int) -> Theory:
-    """The theory of `assemble`."""
-    if isinstance(theory, Theory):
-        if theory.dimension != dimension or element is not None:
-            raise ValueError(
-                f"theory must be of dimension {dimension} as the mesh, and element left out, got {theory.name!r} of "
-                f"dimension {theory.dimension}"
-            )
-        return theory
-    theory = check.one_of("theory", usual.name if theory is None else theory, THEORIES[dimension])
-    if usual is SHALLOW and theory != usual.name:
-        why = "a plate that is curved, ribbed or unevenly layered"
-        raise ValueError(f"theory must be {usual.name!r} for {why}, got {theory!r}")
-    known = {each.element: each for each in EVERY if each.name == theory}
-    return known[check.one_of("element", next(iter(known)) if element is None else element, tuple(known))]
-
-
 def ribbed(mesh: Mesh, section: Any) -> Mesh:
-    """The mesh, of whose triangles sides follow the ribs of a plate."""
+    """The mesh, of whose triangles sides follow the ribs of a plate; ValueError if that makes them too small."""
     paths = [rib.path for rib in getattr(section, "ribs", ()) if not isinstance(rib.path, str)]
     if paths:
         mesh = lined(mesh, paths)
-        check_apart(mesh, [rib for rib in section.ribs if not isinstance(rib.path, str)])
+        check_apart(mesh, paths)
     return mesh
 
 

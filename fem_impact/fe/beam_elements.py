@@ -127,11 +127,6 @@ def nodes(points: np.ndarray, marked: np.ndarray, held: np.ndarray) -> np.ndarra
     return np.unique(np.append(kept, between))
 
 
-def rounding(space: Any) -> float:
-    """Relative error of static deflections by rounding in the shortest element; 1e-15 in one as long as the beam."""
-    return float(1e-15 / max(np.abs(space.length).min(), APART) ** 3)
-
-
 def domain(make_space: Callable[[Cells], Any], body: Subject, names: tuple[str, ...]) -> Domain:
     """The elements of a beam in its frame, with shape functions and the section's fields ``names``."""
     mesh, section = body.mesh, body.section
@@ -244,23 +239,17 @@ def _breaks(fields: Callable, nodes: np.ndarray, most: int = 2000) -> np.ndarray
             raise ValueError(f"section must have at most {most} steps and kinks, got more; make it smoother")
         middle = 0.5 * (low + high)
         low, high = np.append(low, middle), np.append(middle, high)
-    places = np.sort(_at_steps(fields, np.array(found), SAME * span)) if found else np.zeros(0)
-    return places[np.append(True, np.diff(places) > 4.0 * SAME * span)[: len(places)]]  # drop doubles
-
-
-def _at_steps(fields: Callable, places: np.ndarray, near: float) -> np.ndarray:
-    """Places (n,) of steps that lie within ``near`` of given ones, halved to rounding: a frequency moves with a step.
-
-    A kink, at which nothing jumps, ends anywhere so near: that moves a frequency by the square of it.
-    """
-    low, high = places - near, places + near
-    before, after = np.stack(fields(low)), np.stack(fields(high))
-    for _ in range(HALVINGS):
+    # a frequency moves with a step, which is halved to rounding; a kink, at which nothing jumps, ends anywhere so near:
+    # that moves a frequency by the square of it
+    low, high = (np.array(found) + off for off in (-SAME * span, SAME * span))
+    before, after = (np.stack(fields(end)) for end in (low, high)) if found else (low, high)
+    for _ in range(HALVINGS if found else 0):
         middle = 0.5 * (low + high)
         now = np.stack(fields(middle))
         beyond = (np.abs(now - before) > np.abs(now - after)).any(axis=0)
         low, high = np.where(beyond, low, middle), np.where(beyond, middle, high)
-    return 0.5 * (low + high)
+    places = np.sort(0.5 * (low + high))
+    return places[np.append(True, np.diff(places) > 4.0 * SAME * span)[: len(places)]]  # drop doubles
 
 
 def _misfit(fields: Callable, low: np.ndarray, high: np.ndarray, span: float) -> np.ndarray:

@@ -7,7 +7,6 @@ from scipy.linalg import eigh, qr
 from scipy.sparse import csr_matrix, diags
 
 from .._base.rounding import ROUNDING, SAME
-from .._base.untyped import Sparse
 from .interpolation import Interpolation
 from .theory import Domain, Held, unresisted
 
@@ -46,7 +45,12 @@ def load_and_release(
     moving = (project @ every @ unresisted(every, expand, project))[order]
     expand = expand[:, order].tocsr()
     K, M = (expand.T @ (K + springs) @ expand).tocsc(), (expand.T @ M @ expand).tocsc()
-    rigid, sprung = _resisted(moving, expand.T @ (springs @ (expand @ moving)), M)
+    rigid = sprung = moving  # mass-normalised, those that springs do not resist, and weakly
+    if moving.shape[1]:
+        values, turn = eigh(moving.T @ (expand.T @ (springs @ (expand @ moving))), moving.T @ (M @ moving))
+        free = values <= SAME * max(values[-1], 0.0)
+        # weakly: below one in the units of the frame, where eigenvalues of bending are hundreds
+        rigid, sprung = moving @ turn[:, free], moving @ turn[:, ~free & (values < 1.0)]
     fixed = qr(np.hstack([rigid, sprung]).T, pivoting=True, mode="economic")[2][: rigid.shape[1] + sprung.shape[1]]
     size = 1.0 / np.sqrt(K.diagonal())
     even = diags(size)
@@ -78,16 +82,3 @@ def _on_posts(posts: list, held: Held, domain: Domain, rows: Interpolation) -> t
         expand = expand @ csr_matrix((entries, place), shape=(len(moves), len(others)))
         project = project[others]
     return springs.tocsc(), expand.tocsr(), project.tocsr()
-
-
-def _resisted(moving: np.ndarray, force: np.ndarray, M: Sparse) -> tuple[np.ndarray, np.ndarray]:
-    """Mass-normalised motions (n_dofs, n_rigid) that springs do not resist, and weakly (n_dofs, n_sprung).
-
-    ``force`` (n_dofs, n) is that of the springs against rigid motions ``moving`` (n_dofs, n). Weakly means an
-    eigenvalue below one in the units of the frame, where those of bending are hundreds.
-    """
-    if not moving.shape[1]:
-        return moving, moving
-    values, turn = eigh(moving.T @ force, moving.T @ (M @ moving))
-    free = values <= SAME * max(values[-1], 0.0)
-    return moving @ turn[:, free], moving @ turn[:, ~free & (values < 1.0)]

@@ -138,7 +138,7 @@ def around_corners(mesh: Mesh, kinds: list[str], material: Material) -> tuple[di
     """
     found: dict[int, Singular] = {}
     stiffness = material.plane_stress / material.plane_stress.max()
-    length = np.linalg.norm(np.diff(mesh.points[mesh.facets], axis=1)[:, 0], axis=1)
+    length = mesh.chords
     extent = float(np.ptp(mesh.points, axis=0).max())
     for vertex, before, facet in meetings(mesh, kinds):
         (x, y), (u, v) = mesh.tangents[before, 1], mesh.tangents[facet, 0]
@@ -160,8 +160,14 @@ def towards(mesh: Mesh, wanted: dict[int, int]) -> Mesh:
     points, rim = list(mesh.points), Rim(mesh)
     corner = mesh.points[mesh.cells]
     clockwise = np.linalg.det(corner[:, 1:] - corner[:, :1]) < 0.0
-    anticlockwise = np.where(clockwise[:, None], mesh.cells[:, ::-1], mesh.cells).tolist()
-    cells = _narrowed(points, anticlockwise, set(wanted), rim)
+    cells = np.where(clockwise[:, None], mesh.cells[:, ::-1], mesh.cells).tolist()  # anticlockwise
+    # rings do not divide the angle at a corner any finer, so that wide triangles are bisected first; the result does
+    # not depend on the order of the triangles
+    for _ in range(HALVINGS):
+        marked = sorted({side for cell in cells for side in _wide_sides(points, cell, set(wanted))})
+        if not marked:
+            break
+        cells = rim.halve(marked, cells, points)
     touching: dict[int, list[int]] = {vertex: [] for vertex in wanted}
     for c, cell in enumerate(cells):
         for vertex in cell:
@@ -180,20 +186,6 @@ def towards(mesh: Mesh, wanted: dict[int, int]) -> Mesh:
                 cells[c] = [vertex, nearer[a], nearer[b]]
                 cells += strip(points, nearer[a], a, b, nearer[b])
     return rim.finish(mesh, np.array(points), np.array(cells))
-
-
-def _narrowed(points: list[np.ndarray], cells: list[list[int]], corners: set[int], rim: Rim) -> list[list[int]]:
-    """Bisect sides until triangles at corners are narrow and no triangle has two corners.
-
-    Rings do not divide the angle at a corner any finer, so wide triangles are bisected first. The result does not
-    depend on the order of the triangles. New points are appended to ``points``.
-    """
-    for _ in range(HALVINGS):
-        marked = sorted({side for cell in cells for side in _wide_sides(points, cell, corners)})
-        if not marked:
-            break
-        cells = rim.halve(marked, cells, points)
-    return cells
 
 
 def _wide_sides(points: list[np.ndarray], cell: list[int], corners: set[int]) -> list[tuple[int, int]]:

@@ -27,9 +27,7 @@ SLICE = 50  # [-] modes found with each further shift: 30 were 10 % slower, 80 w
 CLUSTER = 1e-6
 
 
-@cache
-def _threads() -> ThreadpoolController:
-    return ThreadpoolController()
+_threads = cache(ThreadpoolController)  # which takes a look at all libraries
 
 
 def one_thread(search: Callable) -> Callable:

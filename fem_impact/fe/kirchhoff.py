@@ -40,14 +40,10 @@ def _hold(body: Subject, domain: Domain) -> Held:
     return Held(expand, project, dofs, plates.springs(body, domain, dofs, expand.shape[0]), rim)
 
 
-def _morley_domain(body: Subject, fields: tuple[str, ...]) -> Domain:
-    if body.mesh.curved.any():
-        raise ValueError("element 'morley' needs straight edges; use 'argyris', or a polygon")
-    return plates.domain(MorleySpace, body, fields)
-
-
 def _hold_morley(body: Subject, domain: Domain) -> Held:
     """A held facet fixes the deflection at its ends, a clamped one also the slope at its middle."""
+    if body.mesh.curved.any():
+        raise ValueError("element 'morley' needs straight edges; use 'argyris', or a polygon")
     if body.section.tension or not all(isinstance(kind, str) for kind in body.held):
         raise ValueError("element 'morley' does not allow tension or elastic supports; use 'argyris'")
     dofs, n_all = numbering(domain.cells, domain.space)
@@ -81,5 +77,6 @@ ARGYRIS = Theory(
     unknowns=10.4, matrices=_matrices, graded=True, sharp=plates.is_tiny,
 )  # fmt: skip
 MORLEY = Theory(
-    "kirchhoff", "morley", 2, _morley_domain, terms, _hold_morley, _morley_errors, wave=0.2, unknowns=4.6,
+    "kirchhoff", "morley", 2, partial(plates.domain, MorleySpace), terms, _hold_morley, _morley_errors, wave=0.2,
+    unknowns=4.6,
 )  # fmt: skip

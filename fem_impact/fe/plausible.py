@@ -122,8 +122,9 @@ def rolling(given: Any) -> tuple[str, ...]:
     )
 
 
-def damping(ratios: np.ndarray) -> tuple[str, ...]:
-    """Notes on damping ratios (n_modes,) [-] of modes that are not rigid."""
+def damping(ratios: np.ndarray, omega: np.ndarray | None = None) -> tuple[str, ...]:
+    """Notes on damping ratios (n_modes,) [-], but for those of rigid motions, where omega (n_modes,) is zero."""
+    ratios = ratios if omega is None else ratios[omega > 0.0]
     return tuple(note_number("damping_ratio", float(np.median(ratios)))) if len(ratios) else ()
 
 

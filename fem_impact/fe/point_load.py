@@ -18,7 +18,7 @@ RESTS = 1e-15
 
 
 @dataclass(frozen=True, eq=False)
-class Deflection:
+class Deflection(check.Locked):
     """Static deflections of a body under unit forces at points, one at a time.
 
     If the body can move rigidly, inertia balances the load and the deflection contains no rigid motion.
@@ -29,9 +29,6 @@ class Deflection:
     vectors: np.ndarray  # (n_dofs, n_loads) [-] in the frame of the system
     compliance: np.ndarray  # (n_loads, n_loads) [m/N] deflection at one load under another
     error: np.ndarray  # (n_loads,) [-] estimated relative error of the compliance's diagonal
-
-    def __post_init__(self) -> None:
-        check.lock_arrays(self)
 
     def at(self, points: np.ndarray) -> np.ndarray:
         """Deflection [m/N] at points (n_points, dimension) [m] under each load, (n_points, n_loads)."""
@@ -95,8 +92,9 @@ def _solved(system: System, mesh: Mesh, loads: np.ndarray) -> Deflection:
     if fine.strain is not None:  # this form is stationary, so the rounding error of K enters squared
         compliance = compliance + compliance.T - fine.strain.products(fine, vectors)
     unit = fine.frame.mass * fine.frame.rate**2
-    # of a plate's smallest triangles
-    relative = np.full(len(loads), 1e-7 if mesh.dimension == 2 else beam_elements.rounding(fine.space))
+    relative = np.full(len(loads), 1e-7)  # of a plate's smallest triangles
+    if mesh.dimension == 1:  # by rounding in the shortest element: 1e-15 in one as long as the beam
+        relative[:] = 1e-15 / max(np.abs(fine.space.length).min(), beam_elements.APART) ** 3
     if not fine.rules.compared:
         diagonal, inertia = compliance.diagonal(), -fine.rigid @ (fine.rigid.T @ forces)
         error, moves = fine.rules.errors(fine, vectors, inertia, loads).sum(axis=0), diagonal > RESTS

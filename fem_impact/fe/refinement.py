@@ -95,9 +95,23 @@ def _wave(system: System, n_modes: int | None, max_frequency: float | None) -> f
 
 
 def solve_on_mesh(system: System, n_modes: int | None, max_frequency: float | None) -> Spectrum:
-    """Find the lowest modes on the mesh as it is: a given number, or all below a frequency [Hz], counted by inertia."""
-    flexibility, omega, vectors = _pairs(system, n_modes, max_frequency)
-    return Spectrum(system, flexibility, omega, vectors, _claimed(system, omega, vectors))
+    """Find the lowest modes on the mesh as it is: a given number, or all below a frequency [Hz], counted by inertia.
+
+    The last of their errors are rounding and unresolved corners.
+    """
+    flexibility, omega, whole = _pairs(system, n_modes, max_frequency)
+    parts, flexible = np.zeros((4, len(omega))), omega > 0.0
+    if flexible.any():
+        values, vectors = (omega[flexible] / system.frame.rate) ** 2, whole[:, flexible]
+        parts[:3, flexible] = CLAIMED * 0.5 * system.rules.errors(system, vectors, vectors * values) / values
+        if system.rules.compared:
+            # each mode of five in a row is stated to have the largest error of them: two meshes may agree by chance
+            parts[0, flexible] += maximum_filter1d(_compared(system, omega)[flexible] / omega[flexible], 5)
+        vectors, squares = flexibility.bent(vectors)[0], system.K.multiply(system.K)
+        rounding = 0.5 * EPSILON * np.sqrt(np.einsum("ij,ij->j", vectors**2, squares @ vectors**2)) / values
+        # three standard deviations of a random walk, and what the eigensolver leaves
+        parts[3, flexible] = 3.0 * rounding + RESIDUAL**2 + _missed_at_corners(system, vectors, values)
+    return Spectrum(system, flexibility, omega, whole, parts)
 
 
 def _pairs(
@@ -118,7 +132,10 @@ def _pairs(
         n = n_modes - n_rigid
         many = system.mesh.dimension == 1 and n > FIRST_SLICE
         values, vectors = by_slices(flexibility, n) if many else _counted(system, flexibility, n, limit)
-        values, vectors = sharpened(system, values, vectors)
+        if system.strain is not None:  # more accurate than K if there are tiny triangles
+            values = system.strain.energy(system, vectors) / np.einsum("ij,ij->j", vectors, system.M @ vectors)
+            order = np.argsort(values, kind="stable")
+            values, vectors = values[order], vectors[:, order]
         values, turn = heavier(system, values, vectors)
         vectors = vectors if turn is None else vectors @ turn
     omega = np.concatenate([np.zeros(n_rigid), np.sqrt(values) * rate])[:n_modes]
@@ -145,24 +162,6 @@ def solve_or_read(
     found = solve_on_mesh(system, n_modes, max_frequency)
     keeping.write_arrays(Path(path), key, {name: getattr(found, name) for name in names})
     return found
-
-
-def _claimed(system: System, omega: np.ndarray, vectors: np.ndarray) -> np.ndarray:
-    """Estimated relative errors of frequencies (`Spectrum.parts`); the last is rounding and unresolved corners."""
-    parts, flexible = np.zeros((4, len(omega))), omega > 0.0
-    if not flexible.any():
-        return parts
-    values, vectors = (omega[flexible] / system.frame.rate) ** 2, vectors[:, flexible]
-    parts[:3, flexible] = CLAIMED * 0.5 * system.rules.errors(system, vectors, vectors * values) / values
-    if system.rules.compared:
-        # each mode of five in a row is stated to have the largest error of them: two meshes may agree by chance
-        parts[0, flexible] += maximum_filter1d(_compared(system, omega)[flexible] / omega[flexible], 5)
-    vectors, squares = Flexibility.of(system).bent(vectors)[0], system.K.multiply(system.K)
-    rounding = 0.5 * np.finfo(float).eps * np.sqrt(np.einsum("ij,ij->j", vectors**2, squares @ vectors**2)) / values
-    corners = _missed_at_corners(system, vectors, values)
-    # three standard deviations of a random walk, and what the eigensolver leaves
-    parts[3, flexible] = 3.0 * rounding + RESIDUAL**2 + corners
-    return parts
 
 
 def _missed_at_corners(system: System, vectors: np.ndarray, values: np.ndarray) -> np.ndarray | float:
@@ -247,16 +246,6 @@ def _counted(system: System, flexibility: Flexibility, n: int, limit: float | No
     )
 
 
-def sharpened(system: System, values: np.ndarray, vectors: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Eigenvalues recomputed from the strain energy, which is more accurate than K if there are tiny triangles."""
-    if system.strain is None or not len(values):
-        return values, vectors
-    energy = system.strain.energy(system, vectors)
-    mass = np.einsum("ij,ij->j", vectors, system.M @ vectors)
-    order = np.argsort(energy / mass, kind="stable")
-    return (energy / mass)[order], vectors[:, order]
-
-
 def heavier(system: System, values: np.ndarray, vectors: np.ndarray) -> tuple[np.ndarray, np.ndarray | None]:
     """Eigenvalues (n,) with the mass in the plane of a ribbed plate, and how vectors (n_dofs, n) combine, if not as is.
 
@@ -296,8 +285,10 @@ def size_for(system: System, n_modes: int | None, max_frequency: float | None, t
     """Size [m] of elements that resolve the shortest wave wanted."""
     wave = _wave(system, n_modes, max_frequency)
     size = system.rules.wave / wave
-    if system.rules.graded and tolerance is not None:
-        size = _wave_per_element(tolerance) / wave
+    if system.rules.graded and tolerance is not None:  # the highest frequency of a smooth plate errs by so much
+        factor, bend = ERROR_OF_WAVE
+        excess = lambda log: np.log(factor / tolerance) + 8.0 * log - np.log1p((np.exp(log) / bend) ** 3)  # noqa: E731
+        size = float(np.exp(brentq(excess, -10.0, 10.0))) / wave
     elif system.rules.graded:  # a few modes cost little, so find them more accurately
         affordable = (2.3 * system.mesh.area / CHEAP_CELLS) ** 0.5
         size = min(size, max(affordable, 1.1 / wave))  # errors of 2e-7, clamped 1e-5
@@ -313,16 +304,6 @@ def layer_size(stiffness: float, tension: float, extent: float) -> float:
     clamped disk; a fortieth of the extent makes some 4 000 triangles on a square.
     """
     return max(10.0 * (stiffness / tension) ** 0.5, extent / 40.0)
-
-
-def _wave_per_element(error: float) -> float:
-    """Wavenumber times element size [rad] at which the highest frequency of a smooth plate has this relative error."""
-    factor, bend = ERROR_OF_WAVE
-
-    def excess(log: float) -> float:
-        return float(np.log(factor / error) + 8.0 * log - np.log1p((np.exp(log) / bend) ** 3))
-
-    return float(np.exp(brentq(excess, -10.0, 10.0)))
 
 
 def refine(system: System, n_modes: int | None, max_frequency: float | None, tolerance: float) -> Spectrum:

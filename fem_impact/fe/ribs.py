@@ -18,8 +18,8 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from .._base import check
-from ..mesh.mesh_files import sides_of
-from ..mesh.meshes import Mesh
+from ..mesh.mesh_files import side_lengths, sides_of
+from ..mesh.meshes import Mesh, sizes
 from .corners import towards
 from .section import Beam, Plate, Varying, size_at
 from .splitting import distance
@@ -104,10 +104,6 @@ class Rib:
         result[:, 2, 2] = beam.torsion(place)
         return result, inertia
 
-    def turning(self, points: np.ndarray) -> np.ndarray:
-        """Rotary inertia per length (n,) [kg m] at points (n, 2) [m]."""
-        return self.section.rotary(self.distances(points))
-
 
 def sides_on(mesh: Mesh, path: Any) -> np.ndarray:
     """Vertices (n, 2) of the sides of triangles that lie on a path (n_points, 2) [m], or on a named edge."""
@@ -125,15 +121,13 @@ def sides_on(mesh: Mesh, path: Any) -> np.ndarray:
     return sides[on]
 
 
-def check_apart(mesh: Mesh, ribs: Sequence[Rib]) -> None:
-    """Raise ValueError if a rib makes triangles so small that the digits of the stiffness are lost."""
+def check_apart(mesh: Mesh, paths: Sequence[np.ndarray]) -> None:
+    """Raise ValueError if a rib along a path makes triangles so small that the digits of the stiffness are lost."""
     extent = float(np.ptp(mesh.points, axis=0).max())
-    for rib in ribs:
-        on = np.isin(mesh.cells, sides_on(mesh, rib.path)).any(axis=1)
-        corner = mesh.points[mesh.cells[on]]
-        side = np.roll(corner, -1, axis=1) - corner
-        twice = np.abs(side[:, 0, 0] * side[:, 1, 1] - side[:, 0, 1] * side[:, 1, 0])
-        least = float((twice / np.linalg.norm(side, axis=2).max(axis=1)).min())  # height of a triangle
+    for path in paths:
+        cells = mesh.cells[np.isin(mesh.cells, sides_on(mesh, path)).any(axis=1)]
+        twice, longest = 2.0 * sizes(mesh.points, cells), side_lengths(mesh.points, cells).max(axis=1)
+        least = float((twice / longest).min())  # height of a triangle
         if least < FINEST * extent:
             raise ValueError(
                 f"path of a rib must lie on edges, ribs and its own points or {FINEST:g} of the plate's size away from "

@@ -1,4 +1,4 @@
-"""Integrals of the slopes of a body's shapes: how much a deflection lengthens what lies in its plane."""
+"""Integrals over a body of the slopes and strains of its shapes."""
 
 from collections.abc import Callable, Iterator
 from typing import Any
@@ -7,29 +7,20 @@ import numpy as np
 
 from . import beam_elements
 from .elements import collapsed, on_true_edge
-from .section import Plate, size_at
 from .system import System
 from .theory import Points, blocks, unknowns_of_cells, weighted
 
 
-def products(system: System, vectors: np.ndarray, weight: np.ndarray) -> np.ndarray:
-    """Integrals (n, n) of ``grad w_i . weight grad w_j`` over the body, on its true edge.
+def lengthened(system: System, vectors: np.ndarray) -> tuple[np.ndarray, float]:
+    """Integrals (n, n) [1/(kg m)] of ``w_i' w_j'`` along a beam, and of one over its E A [1/N].
 
-    ``vectors`` (n_dofs, n) are in the frame, the integrals of the shapes [kg**-0.5] as `Modes` has them; ``weight``
-    (dimension, dimension) is symmetric.
+    ``vectors`` (n_dofs, n) are in the frame; the shapes are those [kg**-0.5] of `Modes`.
     """
-    frame, space = system.frame, system.space
-    _, x, dx = quadrature(system)
-    result = np.zeros((vectors.shape[1],) * 2)
-    whole = unknowns_of_cells(system, vectors)
-    for cells in blocks(len(x)):
-        slope = space.functions(cells, x[cells], (1,))[0]
-        slope = slope[:, None] if slope.ndim == 3 else slope  # (n, dimension, n_q, n_local)
-        steep = slope @ whole[cells][:, None]  # (n, dimension, n_q, n_shapes)
-        pulled = np.einsum("ij,ejqk->eiqk", weight, steep) * dx[cells][:, None, :, None]
-        result += steep.reshape(-1, result.shape[1]).T @ pulled.reshape(-1, result.shape[1])
-    size = len(frame.centre)
-    return 0.5 * (result + result.T) * frame.length ** (size - 2) / frame.mass
+    frame, section, (_, x, dx) = system.frame, system.section, quadrature(system)
+    slope = system.space.functions(np.arange(len(x)), x, (1,))[0] @ unknowns_of_cells(system, vectors)
+    steep, place = (slope * np.sqrt(dx)[..., None]).reshape(-1, vectors.shape[1]), frame.to_metres(x)
+    stiff = section.inertia(place) * section.material.E / section.material.rho
+    return steep.T @ steep / (frame.length * frame.mass), float((dx.ravel() / stiff).sum() * frame.length)
 
 
 def section_energies(
@@ -72,15 +63,3 @@ def quadrature(system: System, nodes: int = 6) -> Points:
         x, dx = beam_elements.quadrature(space)
         return Points(np.zeros((1, x.shape[1])), x[..., None], dx)
     return on_true_edge(space, *collapsed(nodes))
-
-
-def softness(system: System) -> float:
-    """Integral of one over the thickness of a plate [m], of one over E A of a beam [1/N]."""
-    frame, section = system.frame, system.section
-    _, x, dx = quadrature(system)
-    place = frame.to_metres(x)
-    if isinstance(section, Plate):
-        size = size_at(section, "thickness", place)
-    else:
-        size = section.inertia(place) * section.material.E / section.material.rho
-    return float((dx.ravel() / size).sum() * frame.length ** x.shape[-1])

@@ -26,25 +26,30 @@ def towards_points(mesh: Mesh, points: np.ndarray, held: np.ndarray, least: Any 
     smaller than ``least`` [m], a number or one for each point. ``coarseness``, a number or one for each point, is their
     size over that which misses a millionth of the compliance.
     """
-    growth = np.minimum(GROWTH * np.broadcast_to(coarseness, len(points)) ** 0.25, STEEPEST)
+    least, coarseness = (np.broadcast_to(each, len(points)) for each in (least, coarseness))
+    growth = np.minimum(GROWTH * coarseness**0.25, STEEPEST)
     extent = float(np.ptp(mesh.points, axis=0).max())
     breadth = mesh.area / mesh.perimeter
     while True:  # some thirty times to a millionth of the extent
-        size = np.array([_wanted(mesh, held, point, breadth, extent) for point in points])
-        tall = _too_large(mesh, points, np.maximum(coarseness * size, least), growth)
+        start, stop = mesh.points[mesh.facets[held]].transpose(1, 0, 2)
+        edge = np.stack([start, mesh.middles[held], stop], axis=1)
+        corner = mesh.points[mesh.cells]
+        after = np.roll(corner, -1, axis=1)
+        side = after - corner
+        longest = np.linalg.norm(side, axis=2).max(axis=1)
+        tall = np.zeros(len(corner), bool)
+        for point, coarse, floor, steep in zip(points, coarseness, least, growth):
+            free = float(distance(point, edge[:, :-1], edge[:, 1:]).min(initial=np.inf))
+            size = DEPTH * (breadth if free < SAME * extent else min(breadth, free))  # at the point
+            off = point - corner
+            turn = side[..., 0] * off[..., 1] - side[..., 1] * off[..., 0]
+            inside = (turn >= 0.0).all(axis=1) | (turn <= 0.0).all(axis=1)
+            away = np.where(inside, 0.0, distance(point, corner, after).min(axis=1))
+            tall |= longest > np.maximum(max(coarse * size, floor), steep * away)
         if not tall.any():
             return mesh
         mesh, parent = divided_across(mesh, tall)
         held = held[parent]
-
-
-def _wanted(mesh: Mesh, held: np.ndarray, point: np.ndarray, breadth: float, extent: float) -> float:
-    """Largest side [m] allowed for the triangles at a point; ``held`` (n_facets,) says which facets are supported."""
-    if not held.any():
-        return DEPTH * breadth
-    ends = np.stack([mesh.points[mesh.facets[held, 0]], mesh.middles[held], mesh.points[mesh.facets[held, 1]]], axis=1)
-    away = float(distance(point, ends[:, :-1], ends[:, 1:]).min())
-    return DEPTH * (breadth if away < SAME * extent else min(breadth, away))
 
 
 def distance(point: np.ndarray, start: np.ndarray, stop: np.ndarray) -> np.ndarray:
@@ -52,22 +57,6 @@ def distance(point: np.ndarray, start: np.ndarray, stop: np.ndarray) -> np.ndarr
     along = stop - start
     share = ((point - start) * along).sum(axis=-1) / (along**2).sum(axis=-1)
     return np.linalg.norm(point - start - np.clip(share, 0.0, 1.0)[..., None] * along, axis=-1)
-
-
-def _too_large(mesh: Mesh, points: np.ndarray, size: np.ndarray, growth: np.ndarray) -> np.ndarray:
-    """Which triangles have a side longer than both ``size`` at a point and ``growth`` times their distance to it."""
-    corner = mesh.points[mesh.cells]
-    after = np.roll(corner, -1, axis=1)
-    side = after - corner
-    longest = np.linalg.norm(side, axis=2).max(axis=1)
-    tall = np.zeros(len(corner), bool)
-    for point, least, steep in zip(points, size, growth):
-        off = point - corner
-        turn = side[..., 0] * off[..., 1] - side[..., 1] * off[..., 0]
-        inside = (turn >= 0.0).all(axis=1) | (turn <= 0.0).all(axis=1)
-        away = np.where(inside, 0.0, distance(point, corner, after).min(axis=1))
-        tall |= longest > np.maximum(least, steep * away)
-    return tall
 
 
 def divided_across(mesh: Mesh, tall: np.ndarray) -> tuple[Mesh, np.ndarray]:

@@ -85,8 +85,9 @@ class System(check.Brief):
         """What mesh and theory assumed, and numbers that are probably a slip of a unit."""
         assumed = plausible.rolling(self.section.material) if self.theory == "mindlin" else ()
         if self.unresolved > SAY:
-            corner = f"corners leave the frequencies uncertain by {100.0 * self.unresolved:.2g} %, whatever the mesh"
-            assumed = (*assumed, f"{corner}: hinged edges that meet near or beyond 180 degrees do, and free notches")
+            corner = f"corners leave the frequencies uncertain by {100.0 * self.unresolved:.2g} % at most"
+            why = "hinged edges that meet near or beyond 180 degrees do, and free notches"
+            assumed = (*assumed, f"{corner}, whatever the mesh, each by its `frequency_error`: {why}")
         return plausible.together(notes_on(self.mesh, self.section), assumed)
 
     def contains(self, points: np.ndarray) -> np.ndarray:

@@ -28,7 +28,7 @@ r**(pi / angle) have slopes of infinite bending energy, so they are no modes of 
 L-shaped plate is 33 % above that of Kirchhoff's plate by the membrane, and 13 % below Wang's at h = a / 5, where a is
 its shorter side (Sapondzhyan's paradox). Modes that are at rest there follow the relation.
 
-Free and soft edges let beta_t relax within a layer of width h / sqrt(12 kappa), about h/3. `towards_edges` makes the
+Free and soft edges let beta_t relax within a layer of width h / sqrt(12 kappa), about h/3. `layered` makes the
 triangles shrink to a thickness there. If that takes too many, `errors_by_layers` tells what an unresolved layer misses:
 the twisting moment M_nt of the thin plate does work on the relaxation, to first order M_nt^2 width / (2 G h^3/12) per
 length.
@@ -55,7 +55,7 @@ from scipy.sparse import block_diag, coo_matrix, csc_matrix, csr_matrix
 from scipy.sparse.linalg import spsolve
 from scipy.spatial import cKDTree
 
-from .._base.untyped import Cells, Sparse
+from .._base.untyped import Cells
 from ..mesh.mesh_files import side_lengths
 from ..mesh.meshes import LONGEST, Mesh
 from . import plane, plates, splitting, supports
@@ -159,29 +159,17 @@ def _domain(body: Subject, fields: tuple[str, ...]) -> Domain:
 
 
 def _hold(body: Subject, domain: Domain) -> Held:
-    kinds = body.kinds
-    thin = ["free" if kind == "free" else "hinged" for kind in kinds]  # rotations are held apart
-    rim = plates.rim(body, domain, thin)
-    expand, project, dofs = constrain(domain.space, rim, kinds, domain.cells)
-    springs = plates.springs(body, domain, dofs, expand.shape[0], domain.space.rotations)
-    return Held(expand, project, dofs, springs, replace(rim, kinds=kinds))
-
-
-def constrain(
-    space: MindlinSpace, rim: supports.SupportedRim, kinds: list[str], mesh: Cells
-) -> tuple[Sparse, Sparse, np.ndarray]:
-    """Remove the unknowns that the supports ``kinds`` (n_facets,) fix; the same results as `supports.constrain`.
-
-    The ``kinds`` of the rim are those of a thin plate that hold the deflection as these do.
-    """
-    expand, project, dofs = supports.constrain(rim, space.vertices, *numbering(mesh, space))
+    space, kinds, own = domain.space, body.kinds, plane.numbered(domain.cells)
+    # supports of a thin plate that hold the deflection as these do: rotations are held apart
+    rim = plates.rim(body, domain, ["free" if kind == "free" else "hinged" for kind in kinds])
+    expand, project, dofs = supports.constrain(rim, space.vertices, *numbering(domain.cells, space))
     cells, sides = supports.cells_of_facets(rim.facets, space.vertices)
     held = np.array([kind != "free" for kind in rim.kinds])
     if space.bent is not None:
         slips = np.flatnonzero(held & (space.bent.of_side[cells, sides] >= 0))
         if slips.size:
             expand, project = _without_slip(space, rim, slips, cells[slips], sides[slips], dofs, expand, project)
-    n_flat, own = expand.shape[0], plane.numbered(mesh)
+    n_flat = expand.shape[0]
     dofs = np.vstack([dofs, n_flat + own.element_dofs, n_flat + own.N + own.element_dofs])
     words = [{"hinged": "sliding", "clamped": "held"}.get(kind, "free") for kind in kinds]
     loose, at = plane.held_at(space, rim.facets, words, own)
@@ -203,7 +191,9 @@ def constrain(
         lower = block_diag([csr_matrix((n_flat, 0)), tie], format="csr")
         lower.resize(whole.shape)
         whole = (whole + lower).tocsr()
-    return whole, block_diag([project, loose.T], format="csr"), dofs
+    springs = plates.springs(body, domain, dofs, whole.shape[0], space.rotations)
+    project = block_diag([project, loose.T], format="csr")
+    return Held(whole, project, dofs, springs, replace(rim, kinds=kinds))
 
 
 def _without_slip(
@@ -230,21 +220,6 @@ def _without_slip(
     return (expand + place @ solved).tocsr(), project.tocsr()
 
 
-def towards_edges(mesh: Mesh, loose: np.ndarray, size: float) -> Mesh:
-    """Make the triangles of a mesh shrink to a ``size`` [m] towards the facets ``loose`` (n_facets,) bool."""
-    while True:
-        ends = mesh.points[mesh.facets[loose]]
-        steps = np.ceil(2.0 * np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1) / size).astype(int)
-        along = [np.linspace(0.0, 1.0, n + 1)[:, None] * (b - a) + a for (a, b), n in zip(ends, steps)]
-        away = cKDTree(np.concatenate(along)).query(mesh.points[mesh.cells])[0].min(axis=1)
-        longest = side_lengths(mesh.points, mesh.cells).max(axis=1)
-        tall = longest > np.maximum(size, splitting.GROWTH * away) * LONGEST
-        if not tall.any():
-            return mesh
-        mesh, parent = splitting.divided_across(mesh, tall)
-        loose = loose[parent]
-
-
 def layered(mesh: Mesh, section: Plate, kinds: list[str], coarser: float) -> Mesh:
     """The mesh with triangles that resolve the layer along free and soft edges, if `MOST_LAYER` of them suffice.
 
@@ -253,11 +228,19 @@ def layered(mesh: Mesh, section: Plate, kinds: list[str], coarser: float) -> Mes
     loose = np.isin(kinds, LOOSE)
     if not loose.any():
         return mesh
-    ends = mesh.points[mesh.facets[loose]]
-    length = float(np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1).sum())
     thin = float(size_at(section, "thickness", mesh.middles[loose]).min())
     # triangles of twice the thickness h err by some 2e-4 h / L of a frequency
-    return towards_edges(mesh, loose, coarser * max(2.0 * thin, length / MOST_LAYER))
+    size = coarser * max(2.0 * thin, float(mesh.chords[loose].sum()) / MOST_LAYER)
+    while True:
+        ends, steps = mesh.points[mesh.facets[loose]], np.ceil(2.0 * mesh.chords[loose] / size).astype(int)
+        along = [np.linspace(0.0, 1.0, n + 1)[:, None] * (b - a) + a for (a, b), n in zip(ends, steps)]
+        away = cKDTree(np.concatenate(along)).query(mesh.points[mesh.cells])[0].min(axis=1)
+        longest = side_lengths(mesh.points, mesh.cells).max(axis=1)
+        tall = longest > np.maximum(size, splitting.GROWTH * away) * LONGEST
+        if not tall.any():
+            return mesh
+        mesh, parent = splitting.divided_across(mesh, tall)
+        loose = loose[parent]
 
 
 def errors_by_layers(system: Any, vectors: np.ndarray, loads: np.ndarray, forced: Any = None) -> np.ndarray:

@@ -89,27 +89,18 @@ def _smoothed(points: np.ndarray, notes: list[str]) -> Loop:
         elif not curvatures.any():
             pieces += [segment(a, b) for a, b in pairwise(place)]
         else:
-            pieces += _quintics(place, tangents, curvatures)
-    n_curved = sum(not isinstance(piece, Bezier) or len(piece.control) > 2 for piece in pieces)
-    if n_curved:
+            for a, b, (t0, t1), (k0, k1) in zip(place[:-1], place[1:], tangents, curvatures):  # quintics
+                length = float(np.linalg.norm(b - a))
+                normal = np.array([[-t0[1], t0[0]], [-t1[1], t1[0]]])
+                c1, c4 = a + length / 5.0 * t0, b - length / 5.0 * t1
+                c2 = 2.0 * c1 - a + length**2 / 20.0 * k0 * normal[0]
+                c3 = 2.0 * c4 - b + length**2 / 20.0 * k1 * normal[1]
+                pieces.append(Bezier(np.array([a, c1, c2, c3, c4, b])))
+    if any(not isinstance(piece, Bezier) or len(piece.control) > 2 for piece in pieces):
         notes.append(
             "points along gentle bends were joined by smooth curves; fi.mesh.polygon joins points by straight lines"
         )
     return tuple(pieces)
-
-
-def _quintics(place: np.ndarray, tangents: np.ndarray, curvatures: np.ndarray) -> list[Piece]:
-    """Quintics through points (n + 1, 2) with tangents (n, 2, 2) and curvatures (n, 2) given at both ends."""
-    pieces: list[Piece] = []
-    for a, b, (t0, t1), (k0, k1) in zip(place[:-1], place[1:], tangents, curvatures):
-        length = float(np.linalg.norm(b - a))
-        normal = np.array([[-t0[1], t0[0]], [-t1[1], t1[0]]])
-        c1 = a + length / 5.0 * t0
-        c2 = 2.0 * c1 - a + length**2 / 20.0 * k0 * normal[0]
-        c4 = b - length / 5.0 * t1
-        c3 = 2.0 * c4 - b + length**2 / 20.0 * k1 * normal[1]
-        pieces.append(Bezier(np.array([a, c1, c2, c3, c4, b])))
-    return pieces
 
 
 def svg_arrays(path: Path) -> dict[str, np.ndarray]:
@@ -129,18 +120,14 @@ def svg_arrays(path: Path) -> dict[str, np.ndarray]:
             _check_number(path.name, found)
     shown, box = svgelements.Matrix(drawing.viewbox_transform), drawing.viewbox
     # parsed here because svgelements rounds its millimetre to seven digits, and takes a side not stated for 1000 px
-    sides = [_side(str(drawing.values.get(name, ""))) for name in ("width", "height")]
+    stated = (re.fullmatch(r"\s*([\d.eE+-]+)\s*([a-z]+)\s*", str(drawing.values.get(name, "")).lower())
+              for name in ("width", "height"))  # fmt: skip
+    sides = [float(each[1]) * SVG_UNITS.get(each[2], math.nan) if each else math.nan for each in stated]
     each = np.array(sides) / (box.width, box.height) if box else 0.0 * np.array(sides) + SVG_UNITS["px"]
     style = str(box.preserve_aspect_ratio if box else "")
     if not style.startswith("none") or np.isnan(each).any():
         each = np.full(2, (np.fmax if "slice" in style else np.fmin).reduce(each))
     return {**_packed(found), "pixels": np.array([shown.a, shown.d]), "size": each}
-
-
-def _side(text: str) -> float:
-    """A width or height [m] of an SVG file; NaN if it states none, or one without a unit."""
-    stated = re.fullmatch(r"\s*([\d.eE+-]+)\s*([a-z]+)\s*", text.lower())
-    return float(stated[1]) * SVG_UNITS.get(stated[2], math.nan) if stated else math.nan
 
 
 def _refuse_entities(path: Path) -> None:
@@ -389,12 +376,8 @@ def _nested(name: str, loops: list[Loop]) -> Outline:
     problem = crossed(outline)
     if problem:
         raise ValueError(f"{name}: {problem}")
-    holes = tuple(tuple(_renamed(p, f"hole{i}") for p in loop) for i, loop in enumerate(outline.holes))
+    holes = tuple(tuple(replace(p, name=p.name or f"hole{i}") for p in loop) for i, loop in enumerate(outline.holes))
     return Outline(_edges(outline.outer), holes)
-
-
-def _renamed(piece: Piece, name: str) -> Piece:
-    return piece if piece.name else replace(piece, name=name)
 
 
 def _edges(loop: Loop) -> Loop:
@@ -407,5 +390,5 @@ def _edges(loop: Loop) -> Loop:
     for i in [*range(start, len(loop)), *range(start)]:
         if sharp[i] or number < 0:
             number += 1
-        result.append(_renamed(loop[i], f"edge{number}"))
+        result.append(replace(loop[i], name=loop[i].name or f"edge{number}"))
     return tuple(result)

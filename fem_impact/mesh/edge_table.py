@@ -26,9 +26,8 @@ def edges(mesh: Mesh) -> list[Edge]:
     """The named edges of a mesh, in its order; `WHOLE` comes last."""
     ends = mesh.points[mesh.facets]  # (n_facets, 2, 2), or (2, 1, 1) on a beam
     # the chord errs by length cubed, the two chords through the middle by a quarter of that: the difference cancels it
-    chord = np.linalg.norm(ends[:, -1] - ends[:, 0], axis=1)
     halves = np.linalg.norm(ends - mesh.middles[:, None], axis=2).sum(axis=1)
-    lengths = (4.0 * halves - chord) / 3.0
+    lengths = (4.0 * halves - mesh.chords) / 3.0
     names = [*(name for name in mesh.edges if name != WHOLE), WHOLE]
     sets = {name: frozenset(np.asarray(mesh.edges[name]).tolist()) for name in names}
     found = []

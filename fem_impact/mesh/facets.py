@@ -68,9 +68,8 @@ class Curves:
 
     def middle(self) -> tuple[np.ndarray, np.ndarray]:
         """Middle point (n, 2) of each curve and the outward unit normal (n, 2) there."""
-        p, dp = (a[:, 0] for a in self.graph(np.arange(len(self.p)), np.full((len(self.p), 1), 0.5)))
-        normal = self.out - (0.25 * dp / self.length)[:, None] * self.along
-        return self.centre + (0.25 * p)[:, None] * self.out, normal / np.linalg.norm(normal, axis=1)[:, None]
+        point, tangent, _ = self.at(np.full(len(self.p), 0.5))
+        return point, np.column_stack([tangent[:, 1], -tangent[:, 0]])
 
     def at(self, share: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Points (n, 2), unit tangents (n, 2) and curvatures (n,) at chord parameters s = ``share`` (n,)."""

@@ -182,8 +182,11 @@ class Outline:
     @classmethod
     def around(cls, outer: Loop, holes: tuple[Loop, ...] = ()) -> "Outline":
         """An outline from loops of any orientation."""
-        span = extent(outer)
-        return cls(_turned(outer, span, True), tuple(_turned(hole, span, False) for hole in holes))
+        size, turned = extent(outer) / 20.0, []
+        for loop in (outer, *holes):
+            forward = (signed_area(polyline(loop, size)) > 0.0) == (loop is outer)
+            turned.append(loop if forward else tuple(piece.reversed() for piece in reversed(loop)))
+        return cls(turned[0], tuple(turned[1:]))
 
     @property
     def loops(self) -> tuple[Loop, ...]:
@@ -193,12 +196,6 @@ class Outline:
 def extent(loop: Loop) -> float:
     """The longer side [m] of the bounding box of a loop."""
     return float(max(np.ptp(np.concatenate([piece.at(np.linspace(0, 1, 33)) for piece in loop]), axis=0)))
-
-
-def _turned(loop: Loop, span: float, anticlockwise: bool) -> Loop:
-    if (signed_area(polyline(loop, span / 20.0)) > 0.0) == anticlockwise:
-        return loop
-    return tuple(piece.reversed() for piece in reversed(loop))
 
 
 def refuse_millimetres(name: str, *sides: float) -> None:

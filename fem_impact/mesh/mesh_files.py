@@ -1,7 +1,6 @@
 """Read triangles and named edges from a file; repair what is safe to repair, refuse the rest with a reason."""
 
 import re
-from collections.abc import Mapping
 from contextlib import redirect_stderr, redirect_stdout
 from io import StringIO
 from pathlib import Path
@@ -50,12 +49,17 @@ def read_mesh(path: Any, unit: str | None) -> tuple[
         notes.append(_sloping(path, raw, height, cells))
         used = np.unique(np.append(cells, list(nodes.values())).astype(int))
     heights = None if height is None else (raw[used], height[used])
-    names = _named_pairs(path, data, cells)
+    names = _named_pairs(path, data)
     named = [node for found in names.values() for pair in found for node in pair]  # lines may have nodes of their own
     level = np.zeros(len(raw)) if height is None else height
     points, cells, number = _mend(path, raw, level, cells, named, notes)
     middles = {_pair(number[a], number[b]): raw[node] for (a, b), node in nodes.items()}
     pairs = {name: {_pair(number[a], number[b]) for a, b in found} for name, found in names.items()}
+    sides = sides_of(cells)[0]
+    for name, group in data.nodes.items():  # of two duplicates, a set may hold either
+        on = sides[np.isin(sides, number[group]).all(axis=1)]
+        if len(on):
+            pairs.setdefault(name, set()).update(map(tuple, on.tolist()))
     cells = _hanging(points, cells, pairs, notes)
     _refuse_overlap(path, points, cells)
     return points, cells, middles, pairs, notes, heights
@@ -182,8 +186,8 @@ def _refuse_far_middles(path: Path, points: np.ndarray, rows: np.ndarray) -> Non
         )
 
 
-def _named_pairs(path: Path, data: meshio_reader.Raw, cells: np.ndarray) -> dict[str, set[tuple[int, int]]]:
-    """Edge name -> sides, from physical groups, cell sets, numbered line cells and sets of nodes."""
+def _named_pairs(path: Path, data: meshio_reader.Raw) -> dict[str, set[tuple[int, int]]]:
+    """Edge name -> sides, from physical groups, cell sets and numbered line cells."""
     names: dict[str, set[tuple[int, int]]] = {}
 
     def add(name: str, row: np.ndarray) -> None:
@@ -203,10 +207,6 @@ def _named_pairs(path: Path, data: meshio_reader.Raw, cells: np.ndarray) -> dict
                         f"{path.name} has no line {number}, named by set {check.line(name)}; export it again"
                     )
                 add(name, nodes[number])
-    sides = np.concatenate([cells[:, [0, 1]], cells[:, [1, 2]], cells[:, [2, 0]]])
-    for name, group in data.nodes.items():
-        for row in sides[np.isin(sides, group).all(axis=1)]:
-            add(name, row)
     return names
 
 
@@ -393,32 +393,23 @@ def loops_of(rim: np.ndarray) -> list[list[int]]:
     return loops
 
 
-def write_mesh(
-    path: str | Path, points: np.ndarray, cells: np.ndarray, facets: np.ndarray, middles: np.ndarray,
-    curved: np.ndarray, edges: Mapping[str, np.ndarray], rise: Any = None,
-) -> None:  # fmt: skip
-    """Write triangles and named edges as binary Gmsh 2.2; a curved rim makes all triangles quadratic.
-
-    Parameters
-    ----------
-    path : str or Path ending in .msh
-    points, cells, facets, middles, edges, rise : as in a `Mesh`
-    curved : ndarray, shape (n_facets,), bool
-    """
+def write_mesh(path: str | Path, mesh: Any) -> None:
+    """Write a `Mesh` as binary Gmsh 2.2, to a path that ends in .msh; a curved rim makes all triangles quadratic."""
+    points, cells, edges = mesh.points, mesh.cells, mesh.edges
     path = check.path("path", path)
     if path.suffix != ".msh":
         raise ValueError(f"path must end in .msh, got {path.name!r}")
     own = [name for name in edges if name not in ("boundary", "outer")] or ["boundary"]
-    parts = [np.arange(len(facets))[edges[name]] for name in own]  # a facet of two names is written twice
-    parts.append(np.setdiff1d(np.arange(len(facets)), np.concatenate(parts)))
+    parts = [np.arange(len(mesh.facets))[edges[name]] for name in own]  # a facet of two names is written twice
+    parts.append(np.setdiff1d(np.arange(len(mesh.facets)), np.concatenate(parts)))
     tag = np.repeat([*range(1, len(own) + 1), 0], [len(part) for part in parts])
-    facets, middles = facets[np.concatenate(parts)], middles[np.concatenate(parts)]
+    facets, middles = (each[np.concatenate(parts)] for each in (mesh.facets, mesh.middles))
     # meshio writes a name in quotation marks as it is, and reads it as a shell does
     names = {re.sub(r'(["\\])', r"\\\1", name): np.array([i + 1, 1]) for i, name in enumerate(own)}
     names["plate" if "plate" not in own else " ".join([*own, "plate"])] = np.array([len(own) + 1, 2])
     flat = points
     blocks: list[tuple[str, np.ndarray]] = [("line", facets), ("triangle", cells)]
-    if curved.any():
+    if mesh.curved.any():
         unique, number, _ = sides_of(cells)
         halfway = points[unique].mean(axis=1)
         on_rim = numbers_of(unique, facets)
@@ -432,7 +423,7 @@ def write_mesh(
 
     tags = [tag, np.full(len(cells), len(own) + 1)]
     data = {"gmsh:physical": tags, "gmsh:geometrical": tags}
-    height = np.zeros(len(flat)) if rise is None else check.field("rise", rise, flat, "m")
+    height = np.zeros(len(flat)) if mesh.rise is None else check.field("rise", mesh.rise, flat, "m")
     made = meshio.Mesh(np.column_stack([flat, height]), blocks, cell_data=data, field_data=names)
     with redirect_stdout(StringIO()), redirect_stderr(StringIO()):
         made.write(path, file_format="gmsh22", binary=True)

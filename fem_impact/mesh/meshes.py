@@ -61,9 +61,15 @@ class Mesh(check.Locked):
         return is_curved(self.points[self.facets], self.middles)
 
     @property
+    def chords(self) -> np.ndarray:
+        """Distances (n_facets,) [m] between the ends of the facets; zero on a line."""
+        ends = self.points[self.facets]
+        return np.linalg.norm(ends[:, -1] - ends[:, 0], axis=1)
+
+    @property
     def perimeter(self) -> float:
         """Length of the boundary [m], measured along the chords of curved edges."""
-        return float(np.linalg.norm(np.diff(self.points[self.facets], axis=1), axis=2).sum())
+        return float(self.chords.sum())
 
     @property
     def area(self) -> float:
@@ -371,7 +377,7 @@ def save(path: Any, mesh: Mesh) -> None:
     """
     if not isinstance(mesh, Mesh) or mesh.dimension != 2:
         raise ValueError("mesh must be the mesh of a plate, got a beam; make a beam with fi.mesh.line")
-    mesh_files.write_mesh(path, mesh.points, mesh.cells, mesh.facets, mesh.middles, mesh.curved, mesh.edges, mesh.rise)
+    mesh_files.write_mesh(path, mesh)
 
 
 def pierced(mesh: Mesh, holes: Sequence[tuple[np.ndarray, float]], *, size: float | None = None) -> Mesh:
@@ -469,27 +475,23 @@ def _resized(mesh: Mesh, *, size: float) -> Mesh:
 def _divided(mesh: Mesh, *, size: float) -> Mesh:
     """The mesh with its triangles split in four until their size is at most ``size`` [m]."""
     _check_affordable(len(mesh.cells) * (mesh.size / size) ** 2, size, MOST_CELLS)
-    fine = mesh
+    recipe = partial(_divided, mesh)
     for _ in range(max(0, int(np.ceil(np.log2(mesh.size / size) - 1e-9)))):
-        fine = _quartered(fine)
-    return replace(fine, size_stated=True, recipe=partial(_divided, mesh))
-
-
-def _quartered(mesh: Mesh) -> Mesh:
-    """Each triangle split in four; new boundary points lie on the curve of their facet."""
-    n = len(mesh.points)
-    cells, unique = mesh_files.quartered(mesh.cells, n)
-    points = np.concatenate([mesh.points, mesh.points[unique].mean(axis=1)])
-    middle = n + mesh_files.numbers_of(unique, mesh.facets)
-    known = mesh.points[mesh.facets], mesh.middles, mesh.tangents, mesh.curvatures
-    points[middle], tangent, bend, first, second = divided(*known, 0.5)
-    both = np.arange(2 * len(mesh.facets)).reshape(-1, 2)
-    rim = np.stack([mesh.facets[:, 0], middle, middle, mesh.facets[:, 1]], axis=1).reshape(-1, 2)
-    tangents = np.stack([mesh.tangents[:, 0], tangent, tangent, mesh.tangents[:, 1]], axis=1).reshape(-1, 2, 2)
-    curvatures = np.stack([mesh.curvatures[:, 0], bend, bend, mesh.curvatures[:, 1]], axis=1).reshape(-1, 2)
-    edges = {name: both[numbers].ravel() for name, numbers in mesh.edges.items()}
-    middles = np.stack([first, second], axis=1).reshape(-1, 2)
-    return replace(
-        mesh, points=points, cells=cells, facets=rim, edges=edges, middles=middles, tangents=tangents,
-        curvatures=curvatures, size=0.5 * mesh.size,
-    )  # fmt: skip
+        n = len(mesh.points)
+        cells, unique = mesh_files.quartered(mesh.cells, n)
+        points = np.concatenate([mesh.points, mesh.points[unique].mean(axis=1)])
+        middle = n + mesh_files.numbers_of(unique, mesh.facets)
+        known = mesh.points[mesh.facets], mesh.middles, mesh.tangents, mesh.curvatures
+        points[middle], tangent, bend, first, second = divided(*known, 0.5)  # on the curve of their facet
+        both = np.arange(2 * len(mesh.facets)).reshape(-1, 2)
+        halves: dict[str, tuple[np.ndarray, ...]] = {  # of each facet
+            "facets": (mesh.facets[:, 0], middle, middle, mesh.facets[:, 1]), "middles": (first, second),
+            "tangents": (mesh.tangents[:, 0], tangent, tangent, mesh.tangents[:, 1]),
+            "curvatures": (mesh.curvatures[:, 0], bend, bend, mesh.curvatures[:, 1]),
+        }  # fmt: skip
+        rim: dict[str, Any] = {
+            name: np.stack(parts, axis=1).reshape(-1, *getattr(mesh, name).shape[1:]) for name, parts in halves.items()
+        }
+        edges = {name: both[numbers].ravel() for name, numbers in mesh.edges.items()}
+        mesh = replace(mesh, points=points, cells=cells, edges=edges, size=0.5 * mesh.size, **rim)
+    return replace(mesh, size_stated=True, recipe=recipe)

@@ -49,7 +49,7 @@ def arrays(path: Path) -> dict[str, np.ndarray]:
     if path.suffix.lower() in NASTRAN:
         _refuse_left_out(path)
     if path.suffix.lower() == ".inp":
-        refuse_lost_nodes(path)
+        deck_labels(path)
     with closed_hdf5(path):
         mesh = meshio.read(path)
     found: dict[str, np.ndarray] = {"points": np.asarray(mesh.points, float)}
@@ -91,12 +91,12 @@ def _refuse_left_out(path: Path) -> None:
                 )
 
 
-def refuse_lost_nodes(path: Path) -> None:
-    """ValueError if an Abaqus deck has nodes that meshio leaves out or puts elsewhere.
+def deck_labels(path: Path) -> list[str]:
+    """Labels of the nodes of an Abaqus deck, in its order, which meshio drops; ValueError if meshio loses nodes.
 
     It keeps those of the last block, the last of one number, and neither generates nodes nor turns them.
     """
-    seen: set[str] = set()
+    seen: dict[str, None] = {}
     within = False
     for line in path.read_text("utf-8", "replace").splitlines():
         words = [word.strip().upper() for word in line.lstrip("*").split(",")]
@@ -109,7 +109,8 @@ def refuse_lost_nodes(path: Path) -> None:
         elif within and not line.startswith("**") and words[0]:
             if words[0] in seen:
                 raise ValueError(f"{path.name} has node {words[0]} twice; export it again")
-            seen.add(words[0])
+            seen[words[0]] = None
+    return list(seen)
 
 
 @contextmanager

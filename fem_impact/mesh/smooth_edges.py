@@ -130,7 +130,12 @@ def _fit(place: np.ndarray, closed: bool, known: np.ndarray | None) -> tuple[np.
     on_it = place if known is None else np.concatenate([place, known])
     origin, radius = _circle(on_it)
     if np.abs(np.linalg.norm(on_it - origin, axis=1) - radius).max() < ROUND * radius:
-        return _on_circle(place, origin, radius)
+        out = (place - origin) / np.linalg.norm(place - origin, axis=1)[:, None]
+        left = np.sign(out[0, 0] * out[1, 1] - out[0, 1] * out[1, 0])  # 1 if the rim turns left (convex), else -1
+        tangent = left * np.column_stack([-out[:, 1], out[:, 0]])
+        half = out[:-1] + out[1:]
+        middles = origin + radius * half / np.linalg.norm(half, axis=1)[:, None]
+        return middles, np.stack([tangent[:-1], tangent[1:]], axis=1), np.full((len(chord), 2), left / radius)
     if known is None:
         dense, step = place, 1
     else:
@@ -140,7 +145,14 @@ def _fit(place: np.ndarray, closed: bool, known: np.ndarray | None) -> tuple[np.
     tangent, curvature = tangent[::step], curvature[::step]
     tangents = np.stack([tangent[:-1], tangent[1:]], axis=1)
     curvatures = np.stack([curvature[:-1], curvature[1:]], axis=1)
-    return (_hermite_middles(place, tangents, curvatures) if known is None else known), tangents, curvatures
+    if known is None:  # on the quintic that matches tangent and curvature at both ends
+        out = np.column_stack([unit[:, 1], -unit[:, 0]])
+        slope, bend = slopes_and_bends(unit, out, length, tangents, curvatures)
+        # height s (1 - s) p(s) with p cubic, at s = 1/2
+        ends = 0.5 * (slope[:, 0] - slope[:, 1])
+        rates = (0.5 * bend[:, 0] + slope[:, 0]) - (-0.5 * bend[:, 1] + slope[:, 1])
+        known = centre + (0.25 * (ends + rates / 8.0))[:, None] * out
+    return known, tangents, curvatures
 
 
 def _circle(place: np.ndarray) -> tuple[np.ndarray, float]:
@@ -152,16 +164,6 @@ def _circle(place: np.ndarray) -> tuple[np.ndarray, float]:
     rows = np.column_stack([2.0 * local, np.ones(len(local))])
     solution = np.linalg.lstsq(rows, (local**2).sum(axis=1), rcond=None)[0]
     return middle + scale * solution[:2], float(scale * np.sqrt(max(solution[2] + solution[:2] @ solution[:2], 0.0)))
-
-
-def _on_circle(place: np.ndarray, origin: np.ndarray, radius: float):
-    out = (place - origin) / np.linalg.norm(place - origin, axis=1)[:, None]
-    left = np.sign(out[0, 0] * out[1, 1] - out[0, 1] * out[1, 0])  # 1 if the rim turns left (convex), else -1
-    tangent = left * np.column_stack([-out[:, 1], out[:, 0]])
-    half = out[:-1] + out[1:]
-    middles = origin + radius * half / np.linalg.norm(half, axis=1)[:, None]
-    n = len(place) - 1
-    return middles, np.stack([tangent[:-1], tangent[1:]], axis=1), np.full((n, 2), left / radius)
 
 
 def _polynomials(place: np.ndarray, closed: bool) -> tuple[np.ndarray, np.ndarray]:
@@ -182,17 +184,3 @@ def _polynomials(place: np.ndarray, closed: bool) -> tuple[np.ndarray, np.ndarra
         tangent[i] = velocity / speed
         curvature[i] = (velocity[0] * acceleration[1] - velocity[1] * acceleration[0]) / speed**3
     return tangent, curvature
-
-
-def _hermite_middles(place: np.ndarray, tangents: np.ndarray, curvatures: np.ndarray) -> np.ndarray:
-    """Middle (n, 2) of each facet on the quintic that matches tangent and curvature at both ends."""
-    chord = np.diff(place, axis=0)
-    length = np.linalg.norm(chord, axis=1)
-    along = chord / length[:, None]
-    out = np.column_stack([along[:, 1], -along[:, 0]])
-    slope, bend = slopes_and_bends(along, out, length, tangents, curvatures)
-    # height s (1 - s) p(s) with p cubic, at s = 1/2
-    ends = 0.5 * (slope[:, 0] - slope[:, 1])
-    rates = (0.5 * bend[:, 0] + slope[:, 0]) - (-0.5 * bend[:, 1] + slope[:, 1])
-    height = 0.25 * (ends + rates / 8.0)
-    return 0.5 * (place[1:] + place[:-1]) + height[:, None] * out

@@ -42,8 +42,13 @@ def triangulate(outline: Outline, size: float, lines: Lines | None = None) -> di
     for loop in outline.loops:
         first, start = len(chords), len(chords)
         for piece in loop:
-            t = _ending(divide(piece, size), lines.cuts[id(piece)] if lines else [])
-            chords += [(piece, a, b) for a, b in pairwise(t)]
+            t, cuts = divide(piece, size), lines.cuts[id(piece)] if lines else []
+            for cut in cuts:  # where lines end; ends of facets nearer than 0.3 of one give way
+                inner = t[1:-1]
+                if min(cut, 1.0 - cut) > SAME:
+                    near = np.abs(inner - cut) < 0.3 * np.diff(t).max()
+                    t = np.sort([0.0, *inner[~near | np.isin(inner, cuts)], cut, 1.0])
+            chords += [(piece, a, b) for a, b in pairwise(np.unique(t))]
         places = np.array([piece.at(np.array([a]))[0] for piece, a, _ in chords[first:]])
         numbers = [geometry.AppendPoint(*point) for point in (places - centre) / span]
         for i, number in enumerate(numbers):
@@ -64,16 +69,6 @@ def triangulate(outline: Outline, size: float, lines: Lines | None = None) -> di
     if not len(cells) or set(owner.tolist()) != set(range(len(chords))):
         raise check.SimulationError(f"the mesher could not fill the outline; {REMEDY}")
     return _follow(points, cells, facets, owner, chords, outline.outer)
-
-
-def _ending(t: np.ndarray, cuts: list[float]) -> np.ndarray:
-    """Parameters (n,) of the facets of a piece that end at ``cuts``, too; others nearer than 0.3 facets give way."""
-    for cut in cuts:
-        inner = t[1:-1]
-        if min(cut, 1.0 - cut) > SAME:
-            near = np.abs(inner - cut) < 0.3 * np.diff(t).max()
-            t = np.sort([0.0, *inner[~near | np.isin(inner, cuts)], cut, 1.0])
-    return np.unique(t)
 
 
 def _append(geometry: Any, ends: np.ndarray, rim: np.ndarray) -> None:

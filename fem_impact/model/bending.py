@@ -16,7 +16,7 @@ Mindlin (1951), J. Appl. Mech. 18, 31-38; Cowper (1966), J. Appl. Mech. 33, 335-
 Elasticity, art. 109 (torsion of a strip).
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -138,8 +138,7 @@ def around(modes: Modes, section: Plate | Beam | None, mesh: Mesh, supports: Any
     kinds = support_of_facets(mesh, dict(supports))
     if mesh.dimension == 1:
         return Known(modes, section, float(np.ptp(mesh.points)), _held(kinds), 0.0)
-    ends = mesh.points[mesh.facets]
-    length = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)
+    length = mesh.chords
     stated = dict(section.in_plane) if isinstance(section, Plate) else {}
     plane: Any = support_of_facets(mesh, stated, PLANE, "in_plane", kinds)  # type: ignore[arg-type]
     holds = np.array([kind in ("clamped", "hinged", "held") for kind in plane])
@@ -183,8 +182,17 @@ def integrate_shapes(body: Known) -> Bending:
     # air mixes modes little, and makes them heavier
     left = np.ones(low.stop - low.start) if mix is None else np.linalg.norm(mix[:, low], axis=0)
     found[:3] *= np.stack([(amplitude * left) ** 2, amplitude * left, left**2])
-    extended = _extended(modes, low, found, body.per_extent, thick)
-    return replace(extended, turning=_turning(body)) if thick and n_rigid else extended
+    every = np.zeros((5, modes.n_modes))
+    every[:, low] = found
+    if low.stop < modes.n_modes:
+        top = slice(low.stop - max(1, (low.stop - low.start) // 4), low.stop)  # tells how those above go on
+        for row in (0, 2, 3):
+            every[row, low.stop :] = np.median(every[row, top] / modes.omega[top]) * modes.omega[low.stop :]
+        every[4, low.stop :] = np.median(found[4])
+    wave = np.sqrt(np.maximum(every[0], 0.0) * body.per_extent)
+    rest: Any = every[2:] if thick else (None, None, None)
+    turning = _turning(body) if thick and n_rigid else None
+    return Bending(wave, every[0], every[1], rest[0], rest[1], rest[2], turning)
 
 
 def _turning(body: Known) -> np.ndarray | None:
@@ -199,20 +207,6 @@ def _turning(body: Known) -> np.ndarray | None:
     level = np.column_stack([np.ones(len(points)), points])
     slope = np.linalg.lstsq(level, modes.shapes.take(modes.n_rigid).at(points), rcond=None)[0][1:]
     return rotary * slope.T @ slope
-
-
-def _extended(modes: Modes, low: slice, found: np.ndarray, per_extent: float, thick: bool) -> Bending:
-    """All modes, from slope, volume, rotary inertia, shear and edge (5, n_low) of the low ones."""
-    omega, n = modes.omega, modes.n_modes
-    every = np.zeros((5, n))
-    every[:, low] = found
-    if low.stop < n:
-        top = slice(low.stop - max(1, (low.stop - low.start) // 4), low.stop)  # tells how those above go on
-        for row in (0, 2, 3):
-            every[row, low.stop :] = np.median(every[row, top] / omega[top]) * omega[low.stop :]
-        every[4, low.stop :] = np.median(found[4])
-    wave = np.sqrt(np.maximum(every[0], 0.0) * per_extent)
-    return Bending(wave, every[0], every[1], *(every[2:] if thick else (None, None, None)))
 
 
 def _plate(system: System, vectors: np.ndarray, thick: bool) -> np.ndarray:

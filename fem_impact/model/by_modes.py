@@ -50,7 +50,17 @@ class Modal(Description):
             modes.point("at", at)
         needed = accuracy.cutoff_frequency(modes, at, mass=mass, tolerance=asked.budget.for_left_out, **asked.law)
         band = max((band for band in asked.quantities.values() if band), default=0.0)
-        limit, number = _reach(asked, modes, max(needed, band), more)
+        limit, number = max(needed, band), asked.pieces.get("n_modes")
+        if number is None:
+            limit = asked.pieces.get("max_frequency", limit)
+            # the first modes are kept even if fewer are enough
+            number = max(modes.n_modes, round(modes.n_modes * target.growth(modes.frequencies[-1], limit)))
+            limit, number = limit * more ** (2.0 / max(1, modes.dimension)), round(number * more)
+        else:
+            beyond = max(1.0, number / modes.n_modes) ** (2.0 / modes.dimension)
+            limit = modes.frequencies[min(number, modes.n_modes) - 1] * beyond
+        if target.modes is not None and number > target.modes.n_modes:
+            number, limit = target.modes.n_modes, target.modes.frequencies[-1]
         _check_number(asked, modes, limit, number, band > needed)
         left = accuracy.truncation_error(modes, at, limit, mass=mass, **asked.law)
         kept = f"the target keeps its modes up to {limit:.4g} Hz, about {number}; the others act as a spring"
@@ -108,23 +118,6 @@ class Modal(Description):
         better = Modal.of(replace(asked, budget=budget), stages, first, self.more * more, self.attempt + 1)
         progress.foresee(better.forecast.seconds)
         return better
-
-
-def _reach(asked: Asked, modes: Modes, limit: float, more: float) -> tuple[float, int]:
-    """Highest frequency [Hz] and number of the modes for what needs them up to a limit [Hz], or those asked for."""
-    target, number = asked.blow.target, asked.pieces.get("n_modes")
-    if number is None:
-        limit = asked.pieces.get("max_frequency", limit)
-        # the first modes are kept even if fewer are enough
-        number = max(modes.n_modes, round(modes.n_modes * target.growth(modes.frequencies[-1], limit)))
-        limit, number = limit * more ** (2.0 / max(1, modes.dimension)), round(number * more)
-    else:
-        limit = modes.frequencies[min(number, modes.n_modes) - 1] * max(1.0, number / modes.n_modes) ** (
-            2.0 / modes.dimension
-        )
-    if target.modes is not None and number > target.modes.n_modes:
-        number, limit = target.modes.n_modes, target.modes.frequencies[-1]
-    return limit, number
 
 
 def _with_mesh(asked: Asked, told: Forecast, shapes: FieldShapes, limit: float) -> Forecast:

@@ -49,7 +49,13 @@ class Vectors(Description):
                 "n_modes or max_frequency, and no damping ratios mode by mode"
             )
             return None
-        _check_sound(asked)
+        band, most = asked.quantities.get("sound"), MOST_MODES["fe"]
+        if band is not None and (rings := target.count_below(band / target.stretch)) > most:
+            reach = 0.9 * band * most / rings
+            raise check.SimulationError(
+                f"{blow.name}the sound up to {band:g} Hz needs about {rings:.2g} modes, more than the limit of {most}; "
+                f"give a band of the quantity of at most {float(f'{reach:.1e}'):g} Hz"
+            )
         with stages("modes"):
             size = asked.pieces.get("size") or vectors.size_for(target, 0.5 / asked.duration, asked.budget.total)
         assert target.mesh is not None
@@ -144,18 +150,6 @@ def _length_foreseen(asked: Asked) -> tuple[float, int]:
     except check.SimulationError:
         return 1.0, 1
     return max((touch.end for touch in hit.impacts), default=0.0) / asked.duration, hit.n_impacts
-
-
-def _check_sound(asked: Asked) -> None:
-    """Raise an error if the sound asked for takes too many modes."""
-    target, band, most = asked.blow.target, asked.quantities.get("sound"), MOST_MODES["fe"]
-    rings = 0.0 if band is None else target.count_below(band / target.stretch)
-    if band is not None and rings > most:
-        reach = 0.9 * band * most / rings
-        raise check.SimulationError(
-            f"{asked.blow.name}the sound up to {band:g} Hz needs about {rings:.2g} modes, more than the limit of "
-            f"{most}; give a band of the quantity of at most {float(f'{reach:.1e}'):g} Hz"
-        )
 
 
 def ringing_count(asked: Asked) -> int:

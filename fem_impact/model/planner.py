@@ -251,7 +251,14 @@ def strike_as_planned(plan: Plan, stages: Stages, keep: Any = None) -> Run:
 
     ``keep`` is a file that stores the modes of a costly plan.
     """
-    _check_memory(plan)
+    if plan.memory > (here := cost.installed()):
+        advice = "take a larger tolerance or a softer contact"
+        if plan.blow.target.thick:
+            advice += ", or the thin theory, which tells what shear changes of the blow (`thin target`)"
+        raise check.SimulationError(
+            f"{plan.blow.name}this blow needs about {plan.memory / 1e9:.2g} GB of memory for {plan.n_modes} modes or "
+            f"vectors of {plan.n_dofs} unknowns, more than the {here / 1e9:.2g} GB of this machine; {advice}"
+        )
     last, response, run = refine(plan.description, _strike, stages, keep)
     response = last.completed(meet_tolerance(plan.tolerance, response, run, last.asked.values), stages, keep)
     told = last.forecast
@@ -259,20 +266,6 @@ def strike_as_planned(plan: Plan, stages: Stages, keep: Any = None) -> Run:
         told = replace(told, max_frequency=float(response.target.frequencies[-1]))
     plan = _planned(replace(last, forecast=told, seen=None))
     return Run(response, MappingProxyType(stages.seconds), plan, plausible.together(plan.notes, response.notes))
-
-
-def _check_memory(plan: Plan) -> None:
-    """Raise SimulationError if this machine has not the memory that a plan needs."""
-    here = cost.installed()
-    if plan.memory <= here:
-        return
-    advice = "take a larger tolerance or a softer contact"
-    if plan.blow.target.thick:
-        advice += ", or the thin theory, which tells what shear changes of the blow (`thin target`)"
-    raise check.SimulationError(
-        f"{plan.blow.name}this blow needs about {plan.memory / 1e9:.2g} GB of memory for {plan.n_modes} modes or "
-        f"vectors of {plan.n_dofs} unknowns, more than the {here / 1e9:.2g} GB of this machine; {advice}"
-    )
 
 
 def _strike(found: Description, modes: Modes, stages: Stages) -> tuple[Response, Callable[..., Response]]:

@@ -373,13 +373,8 @@ class _Game:
         self.now = self.now + length if hit.history.status == record.IMPACTS else until
         state = hit.state(length if over else None)
         self.q, self.p, self.error = state.displacements[-1], state.velocities[-1], state.error
-        self.sticks = [] if over else self._staying(state)
-        return bool(np.isfinite(self.now))
-
-    def _staying(self, state: State) -> list[_Stick]:
-        """The strikers that stay on the body, as they move now."""
-        found = []
-        for i, stick in enumerate(self.sticks):
+        found = []  # the strikers that stay on the body, as they move now
+        for i, stick in enumerate(() if over else self.sticks):
             stroke = self.played[stick.number]
             if stroke.lifted <= self.now and not state.force[i].any():
                 continue
@@ -390,7 +385,8 @@ class _Game:
                 )
             moving = {"q": state.displacements[i], "p": state.velocities[i], "pressed": state.pressed[i]}
             found.append(replace(stick, force=state.force[i], **moving))
-        return found
+        self.sticks = found
+        return bool(np.isfinite(self.now))
 
     def _blow(self, fresh: list[int], rule: dict[str, Any]) -> None:
         """Run the strikers still on the body together with those that arrive now."""

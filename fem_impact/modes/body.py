@@ -402,7 +402,8 @@ class Body(check.Brief):
                 points.append(int(place[row]))
                 normal = ways[row] if self.normals is None else self.normals[row]
                 square = abs(normal @ ways[row]) >= dents.SQUARE * np.linalg.norm(normal)
-                apart, under = dents.seen_along(self.nodes[others] - self.nodes[row], ways[row]), static @ ways[row]
+                axes, under = np.linalg.svd(ways[[row]])[2], static @ ways[row]
+                apart = (self.nodes[others] - self.nodes[row]) @ axes[[1, 2, 0]].T  # the third axis along the load
                 seen.append(dents.Load(points[-1], apart, under[others], float(under[row]), square))
         return np.column_stack(columns) if columns else np.zeros((len(ways), 0)), points, seen
 

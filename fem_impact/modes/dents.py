@@ -48,14 +48,11 @@ class Load:
     def on_surface(self) -> "Load":
         """The same, seen by nodes of the surface around it alone, if it acts along the normal."""
         near = np.abs(self.apart[:, 2]) <= 0.2 * np.linalg.norm(self.apart, axis=1)  # not deep beside their distance
-        return self._seen_by(near) if self.square else self
+        return replace(self, apart=self.apart[near], deflection=self.deflection[near]) if self.square else self
 
-    def nearest(self) -> "Load":
-        """The same, seen by the nodes of the smallest fit."""
-        return self._seen_by(np.argsort(np.linalg.norm(self.apart, axis=1), kind="stable")[: RINGS[0][1]])
-
-    def _seen_by(self, nodes: np.ndarray) -> "Load":
-        return replace(self, apart=self.apart[nodes], deflection=self.deflection[nodes])
+    def nearest(self) -> np.ndarray:
+        """The nodes of the smallest fit."""
+        return np.argsort(np.linalg.norm(self.apart, axis=1), kind="stable")[: RINGS[0][1]]
 
 
 def stated(solid: Any) -> Any:
@@ -92,7 +89,12 @@ def settled(modes: Any, loads: list[Load], solid: Any) -> Any:
             dent[load.point, 1] = abs(load.own) if found is None else found
             continue
         if solid is None:
-            found = 0.0 if flat and not _surrounded(load) else hidden(load.on_surface())
+            # beside the edge of a plate, where nodes do not lie all around, the deflection ends at no smooth field: the
+            # mean of the nearest over the farthest is at most 0.1 in a grid, 0.14 a row off its edge, 0.36 on it
+            nearest = load.apart[load.nearest()]
+            farthest = np.linalg.norm(nearest, axis=1).max(initial=0.0)
+            surrounded = np.linalg.norm(nearest.sum(axis=0)) < 0.12 * len(nearest) * farthest
+            found = 0.0 if flat and not surrounded else hidden(load.on_surface())
             size = (0.0 if flat else abs(load.own)) if found is None else found
             counts[UNTOLD if found is None else UNKNOWN] += size > 0.0
             dent[load.point, 1] = size
@@ -108,12 +110,6 @@ def settled(modes: Any, loads: list[Load], solid: Any) -> Any:
     return replace(
         modes, shapes=replace(shapes, static=static, dents=dent), notes=(*modes.notes, *notes), unstated=unstated
     )
-
-
-def seen_along(points: np.ndarray, way: np.ndarray) -> np.ndarray:
-    """Points (n, 3) in a frame whose third axis is a unit vector."""
-    axes = np.linalg.svd(way[None])[2]
-    return np.asarray(points @ np.vstack([axes[1:], axes[:1]]).T)
 
 
 def of_points(points: np.ndarray, static: np.ndarray, known: np.ndarray) -> list[Load]:
@@ -179,10 +175,10 @@ def hidden(load: Load) -> float | None:
     times what is seen of it so, 1.3 to 1.82 of tetrahedra, as its rest reaches the others.
     """
     few = load.nearest()
-    around = few.deflection
+    around = load.deflection[few]
     if len(around) < FEWEST:
         return None
-    smooth, r = _smooth(few.apart)
+    smooth, r = _smooth(load.apart[few])
 
     def fitted(shape: np.ndarray) -> tuple[np.ndarray, np.ndarray, float]:
         terms = np.column_stack([smooth, shape])
@@ -196,16 +192,6 @@ def hidden(load: Load) -> float | None:
     doubt = float(np.sqrt(variance * np.linalg.pinv(terms.T @ terms)[0, 0]))
     deeper = load.own - float(found[0])
     return 2.5 * deeper if deeper > 8.0 * doubt + SINGLE * abs(load.own) else 0.0
-
-
-def _surrounded(load: Load) -> bool:
-    """Whether nodes lie all around a load; beside the edge of a plate its deflection ends at no smooth field.
-
-    The mean of the nearest over the farthest of them is at most 0.1 in a grid, a row off its edge 0.14, on it 0.36.
-    """
-    nearest = load.nearest().apart
-    off = np.linalg.norm(nearest.sum(axis=0))
-    return bool(off < 0.12 * len(nearest) * np.linalg.norm(nearest, axis=1).max(initial=0.0))
 
 
 def _smooth(apart: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -244,16 +244,13 @@ def disk(
     second = np.append(False, twice[1:] == twice[:-1])
     rows = np.column_stack([z[twice], n[twice], weight[twice], np.where(second, np.pi / 2, 0.0)])
     wavenumber, order, weights, phases = np.vstack([rigid, rows])[:count].T.copy()
-    scale = np.concatenate([[1.0, 2.0, 2.0][:n_rigid], _norm(*(x[n_rigid:] for x in (wavenumber, order, weights)))])
-    shapes = DiskShapes(radius, edge, ratio, wavenumber, order, weights, phases, scale)
-    notes = plausible.doubted_sizes((2.0 * radius, 2.0 * radius), section)
-    return asked.answered(shapes, (wavenumber**2 * root_area) ** 2, notes)
-
-
-def _norm(z: np.ndarray, n: np.ndarray, weight: np.ndarray) -> np.ndarray:
-    """Factors (n_modes,) that normalise flexible shapes at unit mass, from Lommel's integrals of their squares."""
+    z, n, weight = (x[n_rigid:] for x in (wavenumber, order, weights))
     j, dj, i, di = bessel(n, z)
     i, di = weight * i, weight * di
     ring = (n / z) ** 2
+    # at unit mass, from Lommel's integrals of squares; cos**2 and sin**2 average to one half over the circle
     square = 0.5 * (dj**2 + (1.0 - ring) * j**2 + (1.0 + ring) * i**2 - di**2) + (j * di - i * dj) / z
-    return 1.0 / np.sqrt(np.where(n == 0, 2.0, 1.0) * square)  # cos**2 and sin**2 average to one half over the circle
+    scale = np.concatenate([[1.0, 2.0, 2.0][:n_rigid], 1.0 / np.sqrt(np.where(n == 0, 2.0, 1.0) * square)])
+    shapes = DiskShapes(radius, edge, ratio, wavenumber, order, weights, phases, scale)
+    notes = plausible.doubted_sizes((2.0 * radius, 2.0 * radius), section)
+    return asked.answered(shapes, (wavenumber**2 * root_area) ** 2, notes)

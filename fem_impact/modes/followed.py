@@ -42,19 +42,14 @@ class Passive(NamedTuple):
 
 def columns(lines: MeasuredLines, poles: np.ndarray) -> np.ndarray:
     """Weighted accelerances of a mass, a spring and unit modes, real over imaginary parts, (2 n, 2 + n_modes)."""
-    natural, damping = np.exp(poles)
-    square = (lines.s**2)[:, None]
-    modes = square / (square + 2.0 * damping * natural * lines.s[:, None] + natural**2)
-    found = np.hstack([np.ones_like(square), square, modes]) * lines.weight[:, None]
+    rest = lines.weight[:, None] * np.stack([np.ones_like(lines.s), lines.s**2], axis=1)
+    found = np.hstack([rest, picked.swinging(lines.s, lines.weight, poles)[0]])
     return np.vstack([found.real, found.imag])
 
 
 def column_slopes(lines: MeasuredLines, poles: np.ndarray) -> np.ndarray:
     """By logarithms of frequencies and then of damping ratios, of the columns of modes, (2 n, 2 n_modes)."""
-    natural, damping = np.exp(poles)
-    square, swing = (lines.s**2)[:, None], 2.0 * damping * natural * lines.s[:, None]
-    steep = -square / (square + swing + natural**2) ** 2 * lines.weight[:, None]
-    found = np.hstack([steep * (2.0 * natural**2 + swing), steep * swing])
+    found = np.hstack(list(picked.swinging(lines.s, lines.weight, poles)[1]))
     return np.vstack([found.real, found.imag])
 
 
@@ -191,14 +186,19 @@ def body_of(found: Any, driving: Any, points: Any) -> Following:
     drawn = changed[inside, :WAYS].T / squares
     step = _in_step(lines, kept, noise[:, own], natural, damping)
     doubt = np.clip(drawn, -1.0, None)[:, None] + np.append(step[:1] * inside[0], step)[None, None][..., own_modes]
-    shapes = np.array([squares if k == own else _products(s, rows[k], weight[:, k], kept, inside)
-                       for k in range(len(used))]) / np.sqrt(squares)  # fmt: skip
+    shapes = []
+    for k, row in enumerate(rows):  # amplitudes [1/kg] of the same modes in all responses, of either sign
+        each = columns(MeasuredLines(s, row, weight[:, k]), kept.poles)
+        long = np.linalg.norm(each, axis=0)
+        shapes.append((np.linalg.lstsq(each / long, row, rcond=1e-6)[0] / long)[inside])
+    shapes[own] = squares
     off = np.linalg.norm(kept.rest) / np.linalg.norm(lines.data)
     notes = [f"follows frequency responses up to {s.imag[-1] / (2.0 * np.pi):.5g} Hz as a passive body, which leaves "
              f"{100.0 * off:.2g} % rms, {spread:.2g} times the noise"]  # fmt: skip
     omega = np.append(0.0, natural)[own_modes]
     arrays = {
-        "frequencies": omega / (2.0 * np.pi), "damping_ratio": np.append(0.0, damping)[own_modes], "shapes": shapes,
+        "frequencies": omega / (2.0 * np.pi), "damping_ratio": np.append(0.0, damping)[own_modes],
+        "shapes": np.array(shapes) / np.sqrt(squares),
         "points": picked.response_points(found, points, used, end),
     }  # fmt: skip
     return Following(arrays, np.broadcast_to(doubt, (WAYS, len(used), len(omega))).copy(), rest, loose, own, notes)
@@ -235,13 +235,6 @@ def _drawn(found: Any, lines: MeasuredLines, noise: np.ndarray, used: np.ndarray
         whole += part * rows / np.sqrt(np.square(shade).sum())
     whole *= lines.weight
     return np.hstack([whole.real, whole.imag]).T
-
-
-def _products(s: np.ndarray, data: np.ndarray, weight: np.ndarray, kept: Passive, inside: np.ndarray) -> np.ndarray:
-    """Amplitudes [1/kg] of the modes of the point struck in the response at another point, of either sign."""
-    basis = columns(MeasuredLines(s, data, weight), kept.poles)
-    size = np.linalg.norm(basis, axis=0)
-    return (np.linalg.lstsq(basis / size, data, rcond=1e-6)[0] / size)[inside]
 
 
 def _in_step(

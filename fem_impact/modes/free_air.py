@@ -64,7 +64,10 @@ class Jumps(NamedTuple):
         """
         middle = np.append(0.5 * (self.points.min(axis=0) + self.points.max(axis=0)), 0.0)
         far = max(float(np.linalg.norm(place - middle)), float(np.linalg.norm(np.ptp(self.points, axis=0))))
-        places = [place, *(middle + far * _directions())]
+        number = np.arange(12) + 0.5
+        up, angle = number / 12, np.pi * (1.0 + np.sqrt(5.0)) * number  # a spiral of the golden ratio, evenly spread
+        across = np.sqrt(1.0 - up**2)
+        places = [place, *(middle + far * np.stack([across * np.cos(angle), across * np.sin(angle), up], axis=1))]
         own, half = np.array([
             [np.einsum("cn,cn->n", field, each) for each in (self.mean, 0.5 * (self.outer - self.inner))]
             for field in (dipoles(self.points, self.size, each, omega / speed) for each in places)
@@ -78,14 +81,6 @@ def dipoles(points: np.ndarray, size: float, place: np.ndarray, wave: np.ndarray
     way = np.sqrt(((points - place[:2]) ** 2).sum(axis=1) + place[2] ** 2)
     turn = 1j * np.outer(way, wave)
     return (place[2] * size**2 / (4.0 * np.pi * way**3))[:, None] * (1.0 - turn) * np.exp(turn)
-
-
-def _directions(n: int = 12) -> np.ndarray:
-    """Unit vectors spread evenly over the half space in front of a plate, (n, 3) [-]."""
-    number = np.arange(n) + 0.5
-    up, angle = number / n, np.pi * (1.0 + np.sqrt(5.0)) * number  # a spiral of the golden ratio
-    across = np.sqrt(1.0 - up**2)
-    return np.stack([across * np.cos(angle), across * np.sin(angle), up], axis=1)
 
 
 def reach(modes: Modes, speed: float) -> np.ndarray:

@@ -152,7 +152,15 @@ class Modes(check.Brief):
         if free and loose is not None:
             omega, damping = (np.append(np.zeros(loose.shape[1]), each) for each in (omega, damping))
             values, loose = np.hstack([loose, values]), None
-        rest, known = None, _numbers_of_points(loads, len(points), compliance is not None)
+        rest, known = None, np.arange(0 if compliance is None else len(points))  # points with columns of compliance
+        if loads is not None:
+            known = check.array("loads", loads, (None,)).astype(int)
+            wrong = not len(known) or (known < 0).any() or (known >= len(points)).any()
+            if wrong or compliance is None or len(np.unique(known)) < len(known):
+                raise ValueError(
+                    f"loads must be different numbers of points from 0 to {len(points) - 1} with a column of "
+                    f"compliance each, got {check.shown(loads)}"
+                )
         static = np.zeros((len(points), 0))
         if compliance is not None:
             static = check.array("compliance", compliance, (len(points), len(known)), "m/N")
@@ -164,7 +172,7 @@ class Modes(check.Brief):
         sampled = SampledShapes(points, values, static, connected, rest, loose, known, yields)
         gaps = {"compliance": rest, "free": loose}
         missing = tuple(name for name, what in gaps.items() if what is not None)
-        notes = damping_notes(damping, omega) + tuple(UNSTATED[name] for name in missing)
+        notes = plausible.damping(damping, omega) + tuple(UNSTATED[name] for name in missing)
         made, said = cls(omega, damping, sampled, mass, notes=notes, unstated=missing), dents.stated(solid)
         return made if said == () else dents.settled(made, dents.of_points(points, static, known), said)
 
@@ -477,9 +485,9 @@ class Modes(check.Brief):
     def damped(self, damping_ratio: Damping) -> "Modes":
         """The same modes with other damping ratios: a number, an array (n_modes,) or a function of frequency [Hz]."""
         ratios = damping_ratios(damping_ratio, self.omega)
-        before = damping_notes(self.damping_ratio, self.omega)
+        before = plausible.damping(self.damping_ratio, self.omega)
         others = [note for note in self.notes if note not in before]
-        notes = plausible.together(others, damping_notes(ratios, self.omega))
+        notes = plausible.together(others, plausible.damping(ratios, self.omega))
         poorer = {cause: modes.damped(damping_ratio) for cause, modes in self.poorer.items()}
         return replace(self, damping_ratio=ratios, notes=notes, poorer=poorer, damping_error=None)
 
@@ -502,20 +510,6 @@ def _carried(omega: np.ndarray, rows: np.ndarray, weight: Any = 1.0) -> np.ndarr
     flexible = omega > 0.0
     scaled = rows[:, flexible] / omega[flexible]
     return (weight * scaled) @ scaled.T
-
-
-def _numbers_of_points(loads: Any, n_points: int, given: bool) -> np.ndarray:
-    """Numbers of the points under the loads of a given compliance."""
-    if loads is None:
-        return np.arange(n_points if given else 0)
-    numbers = check.array("loads", loads, (None,)).astype(int)
-    wrong = not len(numbers) or (numbers < 0).any() or (numbers >= n_points).any()
-    if wrong or not given or len(np.unique(numbers)) < len(numbers):
-        raise ValueError(
-            f"loads must be different numbers of points from 0 to {n_points - 1} with a column of compliance each, got "
-            f"{check.shown(loads)}"
-        )
-    return numbers
 
 
 def left_out(modes: "Modes", place: np.ndarray, rows: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -562,11 +556,6 @@ def damping_ratios(damping_ratio: Any, omega: np.ndarray) -> np.ndarray:
     if (result < 0.0).any():
         raise ValueError(f"damping_ratio must not be negative, got {result.min():g}")
     return result
-
-
-def damping_notes(ratios: np.ndarray, omega: np.ndarray) -> tuple[str, ...]:
-    """Notes on the damping ratios (n_modes,) of modes with frequencies omega (n_modes,)."""
-    return plausible.damping(ratios[omega > 0.0])
 
 
 def rayleigh(mass_factor: float, stiffness_factor: float) -> Callable[[np.ndarray], np.ndarray]:

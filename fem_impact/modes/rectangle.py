@@ -53,16 +53,25 @@ class RectangleShapes(ClosedShapes, check.Brief):
         return np.asarray(inside.all(axis=1))
 
     def deflection(self, loads: np.ndarray, points: np.ndarray) -> np.ndarray:
-        """Sum of closed-form deflections of an infinite strip (`_strip`); images make the shorter sides hinged."""
+        """Sum of closed-form deflections of an infinite hinged strip; images make the shorter sides hinged.
+
+        In a strip of unit width and rigidity each force adds the sum over m of 2 sin(m pi place) sin(m pi load) (1 + z)
+        exp(-z) / (4 (m pi)**3), z = m pi times the distance along the strip. This is a difference of polylogarithms in
+        which the constant and linear terms cancel.
+        """
         sides = np.array([self.length, self.width])
         across, along = (1, 0) if self.width < self.length else (0, 1)  # the strip runs along the longer sides
         scale = sides[across]
         place, load = points[:, None, None] / scale, loads[None, :, None] / scale  # (n_points, n_loads, n_images, 2)
         images = 2.0 * sides[along] / scale * np.arange(-IMAGES, IMAGES + 1)
         shift = np.stack([place[..., along] + sign * load[..., along] + images for sign in (-1.0, 1.0)])
-        once, mirrored = _strip(shift, place[..., across], load[..., across])
-        total = once - mirrored
-        return np.where(_inside(points, sides)[:, None] & _inside(loads, sides), scale**2 * total, 0.0)
+        x = np.pi * np.abs(shift)
+        apart, far = (np.pi * np.abs(place + sign * load)[..., across] for sign in (-1.0, 1.0))
+        angles = np.stack(np.broadcast_arrays(apart, np.minimum(far, 2.0 * np.pi - far), x)[:2])
+        near, far = _decaying_cosines(np.broadcast_to(x, angles.shape), angles)
+        once, mirrored = (near - far).sum(axis=-1) / (4.0 * np.pi**3)
+        inside, loaded = ((np.minimum(at, sides - at) > 0.0).all(axis=1) for at in (points, loads))
+        return np.where(inside[:, None] & loaded, scale**2 * (once - mirrored), 0.0)
 
     def grid(self) -> tuple[np.ndarray, np.ndarray]:
         return _rectangle_grid(self.length, self.width)
@@ -79,25 +88,6 @@ def _rectangle_grid(length: float, width: float) -> tuple[np.ndarray, np.ndarray
     for each in found:
         each.setflags(write=False)
     return found
-
-
-def _inside(points: np.ndarray, sides: np.ndarray) -> np.ndarray:
-    """Whether points (n, 2) lie strictly inside a rectangle, (n,) bool."""
-    return np.asarray((np.minimum(points, sides - points) > 0.0).all(axis=1))
-
-
-def _strip(shift: np.ndarray, place: np.ndarray, load: np.ndarray) -> np.ndarray:
-    """Deflection of an infinite hinged strip of unit width and rigidity under forces, summed over the last axis.
-
-    ``shift`` is the distance along the strip. Each force adds the sum over m of 2 sin(m pi place) sin(m pi load)
-    (1 + z) exp(-z) / (4 (m pi)**3), z = m pi shift. This is a difference of polylogarithms in which the constant and
-    linear terms cancel.
-    """
-    x = np.pi * np.abs(shift)
-    far = np.pi * (place + load)
-    angles = np.stack(np.broadcast_arrays(np.pi * np.abs(place - load), np.minimum(far, 2.0 * np.pi - far), x)[:2])
-    near, far = _decaying_cosines(np.broadcast_to(x, angles.shape), angles)
-    return (near - far).sum(axis=-1) / (4.0 * np.pi**3)
 
 
 def _decaying_cosines(x: np.ndarray, angle: np.ndarray) -> np.ndarray:

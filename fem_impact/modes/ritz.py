@@ -20,11 +20,11 @@ from scipy.linalg import eigh_tridiagonal
 
 from .._base import check
 from .._base.rounding import SAME
-from ..fe import point_load
+from ..fe import plausible, point_load
 from ..fe.assembly import System
 from ..fe.eigenvalues import Flexibility, factorise, one_thread
 from ..fe.refinement import heavier
-from .modal import Damping, Modes, damping_notes, damping_ratios
+from .modal import Damping, Modes, damping_ratios
 from .shapes import ElementShapes
 
 # [-] part of the vectors with which a second blow tells the error: at the third power it errs 2.9 times more
@@ -247,7 +247,7 @@ class Krylov:
         rows = np.hstack([self.loads.T @ rigid, (basis @ self.loads).T @ turn]) * frame.mass**-0.5
         damping = damping_ratios(damping_ratio, omega)
         shapes = RitzShapes(self.system, self.points, omega, rows, basis, turn)
-        notes = (*self.system.notes, *damping_notes(damping, omega))
+        notes = (*self.system.notes, *plausible.damping(damping, omega))
         no_error = np.zeros(len(omega))
         return Modes(omega, damping, shapes, self.system.mass, no_error, notes=notes, section=self.system.section)
 

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from ..mesh.meshio_reader import closed_hdf5, refuse_lost_nodes
+from ..mesh.meshio_reader import closed_hdf5, deck_labels
 from . import cell_kinds
 
 MARKET = "%%MatrixMarket"
@@ -51,16 +51,9 @@ def mesh(path: Path) -> dict[str, np.ndarray]:
     """Nodes, elements and names of single nodes of an Abaqus deck."""
     import meshio
 
-    refuse_lost_nodes(path)
+    numbers = np.array(deck_labels(path), int)
     read = meshio.read(path)
     points = np.asarray(read.points, float)
-    labels, within = [], False  # of nodes, in the deck's order, which meshio drops
-    for line in path.read_text("utf-8", "replace").splitlines():
-        if line.startswith("*"):
-            within = within if line.startswith("**") else bool(re.match(r"\*NODE\s*(,|$)", line.strip(), re.IGNORECASE))
-        elif within and line.strip():
-            labels.append(int(line.split(",")[0]))
-    numbers = np.array(labels, int)
     if len(numbers) != len(points):
         raise ValueError(f"{path.name} must hold its nodes itself, not in files that it includes")
     found = {"nodes": cell_kinds.spatial(points), "numbers": numbers}
@@ -87,15 +80,22 @@ def med(path: Path) -> dict[str, np.ndarray]:
             for step, value in zip(steps, values):
                 if not columns or "NOE" not in step:
                     continue
-                moved = _nodal(step["NOE"], file.get("PROFILS"), columns, len(nodes))
+                data, moved = step["NOE"], np.zeros((len(nodes), 3))  # zero at nodes outside the profile of the step
+                profile = data.attrs["PFL"].decode() if isinstance(data.attrs["PFL"], bytes) else str(data.attrs["PFL"])
+                rows = np.arange(len(nodes))
+                if profile != "MED_NO_PROFILE_INTERNAL":
+                    rows = np.asarray(file["PROFILS"][profile]["PFL"][()]) - 1
+                found = np.asarray(data[profile]["CO"][()], float).reshape(len(rows), -1, order="F")
+                for axis, column in columns.items():
+                    moved[rows, axis] = found[:, column]
                 (shapes if any(values) else static).append(moved)
                 frequencies += [value] if any(values) else []
     groups = getattr(read, "point_tags", {}) if "point_tags" in read.point_data else {}
     names = {name: np.flatnonzero(read.point_data["point_tags"] == tag) for tag, own in groups.items() for name in own}
     numbers = np.arange(1, len(nodes) + 1)
-    found = {"nodes": nodes, "numbers": numbers, "frequencies": np.array(frequencies)}
-    found |= cell_kinds.steps(len(nodes), shapes, static)
-    return found | _names(names, numbers) | cell_kinds.surface_and_kind(nodes, cell_kinds.of_meshio(read.cells))
+    told = {"nodes": nodes, "numbers": numbers, "frequencies": np.array(frequencies)}
+    told |= cell_kinds.steps(len(nodes), shapes, static)
+    return told | _names(names, numbers) | cell_kinds.surface_and_kind(nodes, cell_kinds.of_meshio(read.cells))
 
 
 def ansys(path: Path) -> dict[str, np.ndarray]:
@@ -163,14 +163,3 @@ def _components(field: Any) -> dict[int, int]:
     names = names.decode() if isinstance(names, bytes) else str(names)
     each = [names[i : i + 16].strip() for i in range(0, len(names), 16)]
     return {ALONG[name]: column for column, name in enumerate(each) if name in ALONG}
-
-
-def _nodal(data: Any, profiles: Any, columns: dict[int, int], n: int) -> np.ndarray:
-    """Displacements (n, 3) of one step, zero at nodes outside its profile."""
-    profile = data.attrs["PFL"].decode() if isinstance(data.attrs["PFL"], bytes) else str(data.attrs["PFL"])
-    values = np.asarray(data[profile]["CO"][()], float)
-    rows = np.arange(n) if profile == "MED_NO_PROFILE_INTERNAL" else np.asarray(profiles[profile]["PFL"][()]) - 1
-    values, found = values.reshape(len(rows), -1, order="F"), np.zeros((n, 3))
-    for axis, column in columns.items():
-        found[rows, axis] = values[:, column]
-    return found

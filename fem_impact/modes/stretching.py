@@ -45,7 +45,7 @@ ELASTIC = "its edge is elastic, which does not say how its plane is held"
 
 
 @dataclass(frozen=True, eq=False)
-class Stretching:
+class Stretching(check.Locked):
     """The energy ``V = 1/4 sum_k ((a_k q + q' B_k q)**2 - (a_k q)**2)`` [J] that stretching adds to modes q.
 
     The rows a are there if the plane answers to the linear motion; q [m kg**0.5] counts along the blow, away
@@ -54,9 +54,6 @@ class Stretching:
 
     forms: np.ndarray  # (n_forms, n_modes, n_modes) [kg**-0.5 m**-1 s**-1] the matrices B, symmetric
     linear: np.ndarray  # (n_forms, n_modes) [s**-1] the rows a, or (0, n_modes)
-
-    def __post_init__(self) -> None:
-        check.lock_arrays(self)
 
     def truncated(self, n_modes: int) -> "Stretching":
         """That of the first modes only."""
@@ -146,7 +143,7 @@ def _tension(shapes: Shapes, section: Beam) -> tuple[np.ndarray, float]:
     """``int w_i' w_j'`` (n, n) of a beam, and its length over E A."""
     if isinstance(shapes, (FieldShapes, RitzShapes)):
         _check_supports(shapes.system)
-        return slopes.products(shapes.system, shapes.vectors, np.eye(1)), slopes.softness(shapes.system)
+        return slopes.lengthened(shapes.system, shapes.vectors)
     if isinstance(shapes, (BeamShapes, TimoshenkoShapes)):
         if not set(shapes.ends) <= set(HELD):
             raise ValueError(f"{CANNOT}, but an end is free; hold it, or leave stretching out")

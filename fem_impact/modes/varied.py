@@ -94,7 +94,13 @@ def changed_modes(modes: Modes, change: SectionChange, at: np.ndarray) -> ModesC
             slope[i] = float(seen[group] @ force[:n][np.ix_(group, group)] @ seen[group]) / size
     omega = np.zeros(n)
     omega[n_rigid:] = slope[n_rigid:] * frame.rate**2 / (2.0 * modes.omega[n_rigid:])
-    return ModesChange(omega, shape * frame.mass**-0.5, _softer(shapes, change, at))
+    found = shapes._deflection(at[None])
+    system, dip = found.system, found.vectors[:, 0]
+    force = np.asarray(system.interpolate(at[None]).todense())[0]
+    drift = system.rigid @ (system.rigid.T @ force)  # acceleration of a body that can move rigidly
+    stiffer, heavier = energy_changes(system, change, np.column_stack([dip, drift]))
+    softer = -float(stiffer[0, 0] + 2.0 * heavier[0, 1]) / (system.frame.mass * system.frame.rate**2)
+    return ModesChange(omega, shape * frame.mass**-0.5, softer)
 
 
 def _changes(modes: Modes, change: SectionChange, which: np.ndarray, rest: Any) -> tuple[np.ndarray, np.ndarray]:
@@ -141,14 +147,3 @@ def _tail(shapes: FieldShapes, rest: list[np.ndarray], square: np.ndarray) -> np
     size = float(rest[-2] @ heavy)
     ratio = float(rest[-1] @ heavy) / size if size > 0.0 else 0.0
     return 1.0 / np.maximum(1.0 - ratio * square, CLUSTER)
-
-
-def _softer(shapes: FieldShapes, change: SectionChange, at: np.ndarray) -> float:
-    """Change of the static compliance [m/N] of the whole body at a point, per unit of a number."""
-    found = shapes._deflection(at[None])
-    system, dip = found.system, found.vectors[:, 0]
-    load = np.asarray(system.interpolate(at[None]).todense())[0]
-    drift = system.rigid @ (system.rigid.T @ load)  # acceleration of a body that can move rigidly
-    stiffer, heavier = energy_changes(system, change, np.column_stack([dip, drift]))
-    unit = system.frame.mass * system.frame.rate**2
-    return -float(stiffer[0, 0] + 2.0 * heavier[0, 1]) / unit

@@ -120,6 +120,17 @@ def test_sets_of_nodes_are_edges_which_may_overlap_and_be_called_as_the_surface_
     same_edges(mesh.load(tmp_path / "again.msh"), given)
 
 
+def test_a_set_that_holds_one_of_two_duplicate_nodes_names_the_sides_of_both(tmp_path):
+    """Two parts with nodes of their own where they meet, of which the set names those of the first."""
+    points, cells = np.concatenate([GOOD.points] * 2), np.concatenate([GOOD.cells[:HALF], GOOD.cells[HALF:] + N])
+    edge = np.flatnonzero(GOOD.points[:, 0] == 0.0)
+    both = np.intersect1d(GOOD.cells[:HALF], GOOD.cells[HALF:])
+    assert np.isin(edge, both).any()
+    given = np.where(np.isin(edge, GOOD.cells[:HALF]), edge, edge + N)
+    plate = mesh.load(written(tmp_path, points, cells, name="plate.inp", point_sets={"hinge": given}))
+    assert len(plate.edges["hinge"]) == len(GOOD.edges["left"])
+
+
 def test_markers_of_su2_are_edges(tmp_path):
     nodes = "\n".join(f"{x} {y} {i}" for i, (x, y) in enumerate([(0, 0), (1, 0), (1, 1), (0, 1)]))
     markers = "MARKER_TAG= {}\nMARKER_ELEMS= 1\n3 {} {}\n"

@@ -5,10 +5,8 @@ import functools
 import numpy as np
 import pytest
 import xarray as xr
-from scipy.signal import find_peaks
 
 import fem_impact as fi
-from fem_impact.modes import picked
 
 POINTS = np.array([[0.1, 0.09], [0.2, 0.1], [0.3, 0.2], [0.37, 0.11]])  # m
 FREQUENCY = np.arange(0.0, 600.0, 1.0)  # Hz
@@ -101,11 +99,6 @@ def test_damping_of_a_window_is_taken_off():
     given.attrs["added_damping"] = 1.0 / tau
     found = fi.Modes.from_frf(given, mass=0.188, points=POINTS, driving=0)
     assert found.damping_ratio[0] == pytest.approx(0.01, rel=0.05)
-
-
-def test_peaks_are_those_that_stand_out():
-    x = np.exp(np.cumsum(np.random.default_rng(0).standard_normal(2000)) * 0.5)
-    assert np.array_equal(picked.peaks(x), find_peaks(np.log(x), prominence=picked.PROMINENCE)[0])
 
 
 @pytest.mark.parametrize(("change", "arguments", "text"), [
