@@ -8,13 +8,13 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from .._base import check
-from ..mesh.meshes import Mesh, aligned, lined, pierced
+from ..mesh.meshes import Mesh, aligned, pierced
 from .constraints import Attached, load_and_release
 from .corners import Singular, around_corners
 from .euler import EULER
 from .interpolation import Interpolation
 from .kirchhoff import ARGYRIS, MORLEY
-from .ribs import Rib, check_apart
+from .ribs import Rib, ribbed
 from .section import KINDS, Beam, Elastic, Plate, size_at
 from .shallow import SHALLOW
 from .shear_beam import TIMOSHENKO
@@ -162,15 +162,6 @@ def usual_theory(section: Any, dimension: int) -> Theory:
     if dimension == 2 and isinstance(section, Plate) and not section.plain:
         return SHALLOW
     return ARGYRIS if dimension == 2 else EULER
-
-
-def ribbed(mesh: Mesh, section: Any) -> Mesh:
-    """The mesh, of whose triangles sides follow the ribs of a plate; ValueError if that makes them too small."""
-    paths = [rib.path for rib in getattr(section, "ribs", ()) if not isinstance(rib.path, str)]
-    if paths:
-        mesh = lined(mesh, paths)
-        check_apart(mesh, paths)
-    return mesh
 
 
 def _assembled(

@@ -175,28 +175,6 @@ def hold(body: Subject, domain: Domain) -> Held:
     return Held(expand, project, dofs, springs)
 
 
-def point_forces(
-    system: Any, vectors: np.ndarray, loads: np.ndarray, forced: np.ndarray | None
-) -> tuple[list[tuple[float, np.ndarray]], list[float]]:
-    """Places and sizes (n,) of the point forces on solutions; places held at rest, by forces that are unknown.
-
-    Arguments are those of `residual.energy_errors`.
-    """
-    frame = system.frame
-
-    def felt(point: np.ndarray, fields: np.ndarray) -> tuple[float, np.ndarray]:
-        return frame.local(point)[0], np.asarray(system.interpolate(point[None]) @ fields)[0]
-
-    found = [(mass / frame.mass, *felt(point, loads)) for point, mass in system.point_masses]
-    hinges = [frame.local(point)[0] for point, spring in system.point_supports if np.isinf(spring)]
-    soft = [(point, spring) for point, spring in system.point_supports if not np.isinf(spring)]
-    found += [(-spring / (frame.mass * frame.rate**2), *felt(point, vectors)) for point, spring in soft]
-    forces = [(place, size * moved) for size, place, moved in found]
-    if forced is not None:
-        forces += list(zip(frame.local(forced)[:, 0], np.eye(len(forced))))
-    return forces, hinges
-
-
 def quadrature(space: Any) -> tuple[np.ndarray, np.ndarray]:
     """Gauss points of every element and their weights, both (n_cells, n_q)."""
     node, weight = np.polynomial.legendre.leggauss(QUADRATURE)
@@ -287,7 +265,16 @@ def balanced_errors(
     if "rotary" in fields:
         moment = moment - fields["rotary"] * (slope @ pushed[:, :bent])
     moment = integral_along(space, moment)
-    forces, hinges = point_forces(system, vectors, loads, forced)
+    frame, hinges = system.frame, []  # places held at rest, by forces that are unknown
+    forces = [] if forced is None else list(zip(frame.local(forced)[:, 0], np.eye(len(forced))))
+    spring = -frame.mass * frame.rate**2
+    for attached, unit, field in ((system.point_masses, frame.mass, loads), (system.point_supports, spring, vectors)):
+        for point, size in attached:
+            place = frame.local(point)[0]
+            if np.isinf(size):
+                hinges.append(place)
+            else:
+                forces.append((place, size / unit * np.asarray(system.interpolate(point[None]) @ field)[0]))
     for place, force in forces:
         moment, push = moment + (at - place).clip(0.0) * force, push - (at > place) * force
     one, beyond = np.ones_like(x), [(x - place).clip(0.0) for place in hinges]

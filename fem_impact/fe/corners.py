@@ -28,17 +28,6 @@ APART = 3e-4
 SAY = 1e-3
 
 
-def _roots(D: np.ndarray) -> np.ndarray:
-    """The four numbers mu (4,) for which any function of ``x + mu y`` bends a plate of stiffness D without load."""
-    equation = [D[1, 1], 4.0 * D[1, 2], 2.0 * D[0, 1] + 4.0 * D[2, 2], 4.0 * D[0, 2], D[0, 0]]
-    upper = sorted(np.roots(equation), key=lambda mu: mu.imag)[2:]  # above the real axis, which rounding may hide
-    one, other = (complex(mu.real, max(mu.imag, SAME)) for mu in upper)
-    if abs(one - other) < APART * one.imag:
-        middle, step = 0.5 * (one + other), 0.5j * APART * one.imag
-        one, other = middle + step, middle - step
-    return np.array([one, other, np.conj(one), np.conj(other)])
-
-
 def _rows(kind: str, z: np.ndarray, angle: float, mu: np.ndarray, D: np.ndarray) -> list[np.ndarray]:
     """Two conditions (n, 4) of a straight edge at an angle, on the functions ``(x + mu y)**z`` at distance one."""
     c, s, way = np.cos(angle), np.sin(angle), 1j * np.sign(mu.imag)
@@ -78,7 +67,14 @@ def exponent(angle: float, kinds: tuple[str, str], stiffness: tuple[float, ...])
     plates, ch. 9, for the roots mu.
     """
     D = np.reshape(stiffness, (3, 3))
-    mu = _roots(D)
+    # the four numbers mu for which any function of x + mu y bends such a plate without load
+    equation = [D[1, 1], 4.0 * D[1, 2], 2.0 * D[0, 1] + 4.0 * D[2, 2], 4.0 * D[0, 2], D[0, 0]]
+    upper = sorted(np.roots(equation), key=lambda root: root.imag)[2:]  # above the real axis, which rounding may hide
+    one, other = (complex(root.real, max(root.imag, SAME)) for root in upper)
+    if abs(one - other) < APART * one.imag:
+        middle, half = 0.5 * (one + other), 0.5j * APART * one.imag
+        one, other = middle + half, middle - half
+    mu = np.array([one, other, np.conj(one), np.conj(other)])
     real, imaginary = np.meshgrid(np.arange(1.02, MILD + 0.1, 0.06), [0.0, 0.15, 0.4, 0.8])
     z = (real + 1j * imaginary).ravel()
     before = z + 1e-3

@@ -85,30 +85,20 @@ class Material:
 
     def __post_init__(self) -> None:
         nu = check.number("nu", self.nu)
-        check.settle(
-            self,
-            E=check.positive("E", self.E, "Pa"),
-            nu=nu,
-            rho=check.positive("rho", self.rho, "kg/m^3"),
-            angle=check.number("angle", self.angle, "rad"),
-        )
-        if self.yield_strength is not None:
-            check.settle(self, yield_strength=check.positive("yield_strength", self.yield_strength, "Pa"))
+        check.settle(self, nu=nu, angle=check.number("angle", self.angle, "rad"))
+        for name in ("E", "rho", "yield_strength", "E_across", "G", "G_xz", "G_yz"):
+            if name in ("E", "rho") or getattr(self, name) is not None:
+                unit = "kg/m^3" if name == "rho" else "Pa"
+                check.settle(self, **{name: check.positive(name, getattr(self, name), unit)})
         if (self.E_across is None) != (self.G is None):
             raise ValueError("E_across and G must be given together; use Material.orthotropic, or give neither")
         for name in ("G_xz", "G_yz"):
-            if getattr(self, name) is not None:
-                if self.G is None:
-                    raise ValueError(f"{name} needs an orthotropic material; give E_across and G, or leave it out")
-                check.settle(self, **{name: check.positive(name, getattr(self, name), "Pa")})
-        if self.E_across is None or self.G is None:
+            if self.G is None and getattr(self, name) is not None:
+                raise ValueError(f"{name} needs an orthotropic material; give E_across and G, or leave it out")
+        if self.E_across is None:
             if not -1.0 < nu < 0.5 and nu != 0.5:
                 raise ValueError(f"nu must be above -1 and at most 0.5, got {nu:g}")
-            return
-        check.settle(
-            self, E_across=check.positive("E_across", self.E_across, "Pa"), G=check.positive("G", self.G, "Pa")
-        )
-        if nu**2 * self.E_across >= self.E:
+        elif nu**2 * self.E_across >= self.E:
             raise ValueError(
                 f"nu must be below sqrt(E/E_across) = {(self.E / self.E_across) ** 0.5:g}, got {nu:g}: "
                 "otherwise deforming the material would release energy"

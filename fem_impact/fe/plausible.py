@@ -109,19 +109,6 @@ def ribs(given: Sequence[Any], sides: Sequence[float]) -> Iterator[str]:
                 yield f"ribs[{i}] lies where ribs[{j}] does, and both count"
 
 
-def rolling(given: Any) -> tuple[str, ...]:
-    """Note on a `Material` across whose grain a thick plate shears as stiffly as in its plane: wood does not.
-
-    Softwood has 0.064 E in its plane and 0.003 E across the grain, a twentieth (Wood Handbook, table 5-1).
-    """
-    if given.G is None or given.G_yz is not None:
-        return ()
-    return (
-        f"G_yz is not stated and taken as that in the plane, G = {given.G:g} Pa; the rolling shear modulus of wood is "
-        f"about {given.G / 20.0:.2g}",
-    )
-
-
 def damping(ratios: np.ndarray, omega: np.ndarray | None = None) -> tuple[str, ...]:
     """Notes on damping ratios (n_modes,) [-], but for those of rigid motions, where omega (n_modes,) is zero."""
     ratios = ratios if omega is None else ratios[omega > 0.0]

@@ -190,20 +190,6 @@ class Residual:
         mass = (value * (inertia * dx)[..., None]).transpose(0, 2, 1) @ value
         return bent, root, np.stack([bent.transpose(0, 2, 1) @ bent, mass])
 
-    def errors(self, vectors: np.ndarray, loads: np.ndarray) -> np.ndarray:
-        """Errors (3, n) of `energy_errors` for solutions (n_dofs, n) under the inertia of ``loads`` (n_dofs, n)."""
-        unknowns, pushed = (unknowns_of_cells(self.system, field) for field in (vectors, loads))
-        total = _squares(self.inertia @ pushed - self.balance @ unknowns)
-        total += _squares(self.jumps @ unknowns[self.beside].reshape(len(self.beside), 42, -1))
-        at_rim = unknowns[self.rim_cells]
-        total += _squares(self.missed @ at_rim)
-        moved, reaction = (operator @ at_rim[:, None] for operator in (self.moved, self.reaction))
-        rim = 2.0 * np.abs(np.einsum("fiqk,fiqk->ik", moved, reaction)).sum(axis=0)
-        across, load = unknowns[self.stepped], pushed[self.stepped]
-        stiff, heavy = (np.einsum("eik,eij,ejk->k", one, m, across) for one, m in zip((across, load), self.misplaced))
-        steps = _squares(self.uneven @ across) + np.abs(stiff - heavy)
-        return np.stack([total / CALIBRATION, rim, steps])
-
 
 def energy_errors(
     system: System, vectors: np.ndarray, loads: np.ndarray, forced: np.ndarray | None = None
@@ -222,8 +208,20 @@ def energy_errors(
     forced : ndarray, shape (n, dimension) [m], optional
         Points where an additional unit force acts, one for each solution.
     """
-    residual, some = Residual(system), blocks(vectors.shape[1], 128)  # to limit memory
-    return np.concatenate([residual.errors(vectors[:, block], loads[:, block]) for block in some], axis=1)
+    of, found = Residual(system), []
+    for block in blocks(vectors.shape[1], 128):  # to limit memory
+        unknowns, pushed = (unknowns_of_cells(system, field[:, block]) for field in (vectors, loads))
+        total = _squares(of.inertia @ pushed - of.balance @ unknowns)
+        total += _squares(of.jumps @ unknowns[of.beside].reshape(len(of.beside), 42, -1))
+        at_rim = unknowns[of.rim_cells]
+        total += _squares(of.missed @ at_rim)
+        moved, reaction = (operator @ at_rim[:, None] for operator in (of.moved, of.reaction))
+        rim = 2.0 * np.abs(np.einsum("fiqk,fiqk->ik", moved, reaction)).sum(axis=0)
+        across, load = unknowns[of.stepped], pushed[of.stepped]
+        stiff, heavy = (np.einsum("eik,eij,ejk->k", one, m, across) for one, m in zip((across, load), of.misplaced))
+        steps = _squares(of.uneven @ across) + np.abs(stiff - heavy)
+        found.append(np.stack([total / CALIBRATION, rim, steps]))
+    return np.concatenate(found, axis=1)
 
 
 def _squares(values: np.ndarray) -> np.ndarray:

@@ -19,7 +19,7 @@ import numpy as np
 
 from .._base import check
 from ..mesh.mesh_files import side_lengths, sides_of
-from ..mesh.meshes import Mesh, sizes
+from ..mesh.meshes import Mesh, lined, sizes
 from .corners import towards
 from .section import Beam, Plate, Varying, size_at
 from .splitting import distance
@@ -121,9 +121,13 @@ def sides_on(mesh: Mesh, path: Any) -> np.ndarray:
     return sides[on]
 
 
-def check_apart(mesh: Mesh, paths: Sequence[np.ndarray]) -> None:
-    """Raise ValueError if a rib along a path makes triangles so small that the digits of the stiffness are lost."""
-    extent = float(np.ptp(mesh.points, axis=0).max())
+def ribbed(mesh: Mesh, section: Any) -> Mesh:
+    """The mesh, of whose triangles sides follow the ribs of a plate.
+
+    ValueError if a rib makes triangles so small that the digits of the stiffness are lost.
+    """
+    paths = [rib.path for rib in getattr(section, "ribs", ()) if not isinstance(rib.path, str)]
+    mesh, extent = lined(mesh, paths) if paths else mesh, float(np.ptp(mesh.points, axis=0).max())
     for path in paths:
         cells = mesh.cells[np.isin(mesh.cells, sides_on(mesh, path)).any(axis=1)]
         twice, longest = 2.0 * sizes(mesh.points, cells), side_lengths(mesh.points, cells).max(axis=1)
@@ -133,6 +137,7 @@ def check_apart(mesh: Mesh, paths: Sequence[np.ndarray]) -> None:
                 f"path of a rib must lie on edges, ribs and its own points or {FINEST:g} of the plate's size away from "
                 f"them, got {least:.2g} m beside {extent:.3g} m; move its points"
             )
+    return mesh
 
 
 def singular(mesh: Mesh, ribs: Sequence[Rib]) -> tuple[dict[int, list[int]], dict[int, float]]:

@@ -256,11 +256,8 @@ class Beam:
 
     def inertia(self, points: np.ndarray) -> np.ndarray:
         """Mass per length (n_points,) [kg/m]."""
-        return self.material.rho * self._area(points)
-
-    def _area(self, points: np.ndarray) -> np.ndarray:
         area = size_at(self, "height", points) * size_at(self, "width", points)
-        return area * (np.pi / 4.0 if self.round else 1.0)
+        return self.material.rho * (area * (np.pi / 4.0 if self.round else 1.0))
 
     @property
     def shear_coefficient(self) -> float:
@@ -286,7 +283,7 @@ class Beam:
 
     def shear(self, points: np.ndarray) -> np.ndarray:
         """Shear stiffness (n_points,) [N] on the mean shear strain, for a Timoshenko beam."""
-        return self.shear_coefficient * self.material.transverse[0] * self._area(points)
+        return self.shear_coefficient * self.material.transverse[0] / self.material.rho * self.inertia(points)
 
     def rotary(self, points: np.ndarray) -> np.ndarray:
         """Rotary inertia per length (n_points,) [kg m], for a Timoshenko beam."""

@@ -83,7 +83,14 @@ class System(check.Brief):
     @property
     def notes(self) -> tuple[str, ...]:
         """What mesh and theory assumed, and numbers that are probably a slip of a unit."""
-        assumed = plausible.rolling(self.section.material) if self.theory == "mindlin" else ()
+        assumed: tuple[str, ...] = ()
+        given = self.section.material
+        if self.theory == "mindlin" and given.G is not None and given.G_yz is None:
+            # softwood has 0.064 E in its plane and 0.003 E across the grain, a twentieth (Wood Handbook, table 5-1)
+            assumed = (
+                f"G_yz is not stated and taken as that in the plane, G = {given.G:g} Pa; the rolling shear modulus of "
+                f"wood is about {given.G / 20.0:.2g}",
+            )
         if self.unresolved > SAY:
             corner = f"corners leave the frequencies uncertain by {100.0 * self.unresolved:.2g} % at most"
             why = "hinged edges that meet near or beyond 180 degrees do, and free notches"

@@ -272,11 +272,13 @@ class Strain(check.Brief):
 
     def energy(self, system: Any, vectors: np.ndarray) -> np.ndarray:
         """Twice the strain energy (n_modes,) of vectors (n_dofs, n_modes)."""
-        return self._sum(system, vectors, "nqik,nqik->k")
+        return self.products(system, vectors, "nqik,nqik->k")
 
-    def products(self, system: Any, vectors: np.ndarray) -> np.ndarray:
+    def products(self, system: Any, vectors: np.ndarray, pairs: str = "nqik,nqil->kl") -> np.ndarray:
         """Twice the mutual strain energy (n, n) of all pairs of vectors (n_dofs, n)."""
-        return self._sum(system, vectors, "nqik,nqil->kl")
+        moved = system.expand @ vectors
+        total = np.einsum(pairs.replace("nqi", "n"), moved, self.springs @ moved)
+        return total + sum(self._of_cells(system, moved, cells, pairs) for cells in blocks(len(self.domain.points.x)))
 
     def around(self, system: Any, vectors: np.ndarray, vertex: int) -> np.ndarray:
         """Twice the strain energy (n_modes,) in the ring of triangles around those that touch a vertex of the mesh."""
@@ -297,8 +299,3 @@ class Strain(check.Brief):
                 strained = parts @ own
                 total = total + np.einsum(pairs, weighted(self.domain.fields[name][cells], strained), strained)
         return total
-
-    def _sum(self, system: Any, vectors: np.ndarray, pairs: str) -> np.ndarray:
-        moved = system.expand @ vectors
-        total = np.einsum(pairs.replace("nqi", "n"), moved, self.springs @ moved)
-        return total + sum(self._of_cells(system, moved, cells, pairs) for cells in blocks(len(self.domain.points.x)))

@@ -1,7 +1,7 @@
 """How a small change of a body's section changes the energies of its shapes: derivatives of K and M along vectors."""
 
-from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -60,7 +60,7 @@ def energy_changes(system: System, change: SectionChange, vectors: np.ndarray) -
         each = [system.rules.energies(system, section, vectors) for section in change.sections]
         K, M = (sum(weight * one for weight, one in zip(change.weights, pair)) for pair in zip(*each))
         return np.asarray(K), np.asarray(M)
-    return slopes.section_energies(system, system.space, _rate(system, change), vectors)
+    return slopes.section_energies(system, system.space, partial(_rate, system, change), vectors)
 
 
 def frequency_densities(system: System, change: SectionChange, vectors: np.ndarray, square: np.ndarray) -> np.ndarray:
@@ -77,16 +77,13 @@ def frequency_densities(system: System, change: SectionChange, vectors: np.ndarr
     """
     points = slopes.quadrature(system)
     found = np.zeros((*points.dx.shape, vectors.shape[1]))
-    for matrix, cells, moved, pushed in slopes.stressed(system, system.space, _rate(system, change), vectors, points):
+    rate = partial(_rate, system, change)
+    for matrix, cells, moved, pushed in slopes.stressed(system, system.space, rate, vectors, points):
         found[cells] += (moved * pushed).sum(axis=2) / square if matrix == "K" else -(moved * pushed).sum(axis=2)
     return 0.5 * found / system.frame.length ** points.x.shape[-1]
 
 
-def _rate(system: System, change: SectionChange) -> Callable[[str, np.ndarray], np.ndarray]:
-    """The rate at which a field of the section changes, by its name at places in the frame."""
-
-    def rate(name: str, x: np.ndarray) -> np.ndarray:
-        fields = (system.frame.field(each, name, x) for each in change.sections)
-        return np.asarray(sum(weight * field for weight, field in zip(change.weights, fields)))
-
-    return rate
+def _rate(system: System, change: SectionChange, name: str, x: np.ndarray) -> np.ndarray:
+    """The rate at which a field of the section changes at places in the frame."""
+    fields = (system.frame.field(each, name, x) for each in change.sections)
+    return np.asarray(sum(weight * field for weight, field in zip(change.weights, fields)))

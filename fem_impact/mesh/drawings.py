@@ -116,7 +116,15 @@ def svg_arrays(path: Path) -> dict[str, np.ndarray]:
         if isinstance(shape, svgelements.Shape) and shape.values.get("visibility") not in ("hidden", "collapse"):
             whole = svgelements.Path(shape)
             whole.reify()
-            found += _svg_pieces(whole, svgelements, str(shape.id) if shape.id else "")
+            name = str(shape.id) if shape.id else ""
+            for part in whole:
+                if isinstance(part, svgelements.Arc):
+                    centre, a, b = (np.array([p.x, p.y]) for p in (part.center, part.prx, part.pry))
+                    turns = float(part.get_start_t()), float(part.sweep)
+                    found.append(Arc(centre, a - centre, b - centre, *turns, name))
+                elif not isinstance(part, svgelements.Move) and part.start is not None and part.end is not None:
+                    control = [getattr(part, end, None) for end in ("start", "control", "control1", "control2", "end")]
+                    found.append(Bezier(np.array([[p.x, p.y] for p in control if p is not None], float), name))
             _check_number(path.name, found)
     shown, box = svgelements.Matrix(drawing.viewbox_transform), drawing.viewbox
     # parsed here because svgelements rounds its millimetre to seven digits, and takes a side not stated for 1000 px
@@ -171,19 +179,7 @@ def _svg(path: Path, unit: str | None, notes: list[str]) -> Drawn:
     scale = size / np.where(pixels, pixels, np.nan)
     if not (np.isfinite(scale) & (scale > 0.0)).all():
         raise ValueError(f"{path.name} has no usable width and viewBox; set both to positive numbers")
-    return _chained(path.name, _unpacked(path.name, drawn, np.diag(scale * [1.0, -1.0])), notes)
-
-
-def _svg_pieces(whole: Any, svgelements: Any, name: str) -> list[Piece]:
-    pieces: list[Piece] = []
-    for part in whole:
-        if isinstance(part, svgelements.Arc):
-            centre, a, b = (np.array([p.x, p.y]) for p in (part.center, part.prx, part.pry))
-            pieces.append(Arc(centre, a - centre, b - centre, float(part.get_start_t()), float(part.sweep), name))
-        elif not isinstance(part, svgelements.Move) and part.start is not None and part.end is not None:
-            control = [getattr(part, end, None) for end in ("start", "control", "control1", "control2", "end")]
-            pieces.append(Bezier(np.array([[p.x, p.y] for p in control if p is not None], float), name))
-    return pieces
+    return _chained(path.name, _unpacked(path.name, drawn, scale * [1.0, -1.0]), notes)
 
 
 def dxf_arrays(path: Path) -> dict[str, np.ndarray]:
@@ -221,7 +217,7 @@ def _dxf(path: Path, unit: str | None, notes: list[str]) -> Drawn:
         if not scale:
             scale = 1.0
             notes.append(f"{path.name} states no unit; assumed metres, pass unit= to change that")
-    loops, lines = _chained(path.name, _unpacked(path.name, drawn, scale * np.eye(2)), notes)
+    loops, lines = _chained(path.name, _unpacked(path.name, drawn, scale), notes)
     if drawn["size"][2] > 1e-3 * drawn["size"].max():  # less is rounding
         notes.append(f"{path.name}: its z, which goes over {scale * drawn['size'][2]:.3g} m, is left out")
     if unit is None:
@@ -288,16 +284,16 @@ def _packed(pieces: list[Piece]) -> dict[str, np.ndarray]:
     }
 
 
-def _unpacked(name: str, drawn: dict[str, np.ndarray], matrix: np.ndarray) -> list[Piece]:
-    """Pieces from the arrays of `_packed`, transformed by a matrix (2, 2)."""
+def _unpacked(name: str, drawn: dict[str, np.ndarray], scale: Any) -> list[Piece]:
+    """Pieces from the arrays of `_packed`, with x and y multiplied by ``scale``, a number or (2,)."""
     if not np.isfinite(drawn["numbers"]).all():
         raise ValueError(f"{name} has coordinates that are not finite numbers; correct the drawing")
     rows = np.split(drawn["numbers"], np.cumsum(drawn["lengths"])[:-1])
-    pieces: list[Piece] = [
-        Arc(row[:2], row[2:4], row[4:6], row[6], row[7], edge) if arc else Bezier(row.reshape(-1, 2), edge)
-        for row, arc, edge in zip(rows, drawn["arcs"], drawn["names"].tolist())
-    ]
-    return [piece.moved(matrix, np.zeros(2)) for piece in pieces]
+    pieces: list[Piece] = []
+    for row, arc, edge in zip(rows, drawn["arcs"], drawn["names"].tolist()):
+        places = row[: 6 if arc else None].reshape(-1, 2) * scale
+        pieces.append(Arc(places[0], places[1], places[2], row[6], row[7], edge) if arc else Bezier(places, edge))
+    return pieces
 
 
 def _chained(name: str, pieces: list[Piece], notes: list[str]) -> Drawn:

@@ -43,10 +43,6 @@ class Arc:
         """The same piece traversed backwards."""
         return replace(self, start=self.start + self.sweep, sweep=-self.sweep)
 
-    def moved(self, matrix: np.ndarray, shift: np.ndarray) -> "Arc":
-        """The piece transformed by ``matrix`` (2, 2), then shifted by ``shift`` (2,) [m]."""
-        return replace(self, centre=matrix @ self.centre + shift, a=matrix @ self.a, b=matrix @ self.b)
-
 
 @dataclass(frozen=True, eq=False)
 class Bezier:
@@ -69,10 +65,6 @@ class Bezier:
     def reversed(self) -> "Bezier":
         """The same piece traversed backwards."""
         return replace(self, control=self.control[::-1].copy())
-
-    def moved(self, matrix: np.ndarray, shift: np.ndarray) -> "Bezier":
-        """The piece transformed by ``matrix`` (2, 2), then shifted by ``shift`` (2,) [m]."""
-        return replace(self, control=self.control @ matrix.T + shift)
 
 
 Piece = Arc | Bezier
@@ -245,13 +237,9 @@ def crossed(outline: Outline) -> str:
             if hole.intersects(other):
                 return f"holes[{i}] must not overlap or touch holes[{j}]"
         holes.append(hole)
-    return _slender(outer.difference(shapely.union_all(holes)) if holes else outer)
-
-
-def _slender(whole: shapely.Polygon) -> str:
-    """Error text if the body, or a strip of it, is far too slender to fill with triangles; else empty."""
+    whole = outer.difference(shapely.union_all(holes)) if holes else outer
     span = max(np.ptp(np.reshape(whole.bounds, (2, 2)), axis=0))
-    if whole.area * SLENDER < span**2:
+    if whole.area * SLENDER < span**2:  # far too slender to fill with triangles
         return "outline must not be a thousand times longer than wide; widen it"
     for k in range(1, math.ceil(-math.log(SAME, 4.0)) + 1):  # down to rounding
         width = span * 4.0**-k

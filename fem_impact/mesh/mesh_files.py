@@ -189,16 +189,13 @@ def _refuse_far_middles(path: Path, points: np.ndarray, rows: np.ndarray) -> Non
 def _named_pairs(path: Path, data: meshio_reader.Raw) -> dict[str, set[tuple[int, int]]]:
     """Edge name -> sides, from physical groups, cell sets and numbered line cells."""
     names: dict[str, set[tuple[int, int]]] = {}
-
-    def add(name: str, row: np.ndarray) -> None:
-        names.setdefault(name, set()).add((int(row[0]), int(row[1])))
-
     for i, (kind, nodes, tags) in enumerate(data.blocks):
         if kind not in ("line", "line3"):
             continue
-        for row, tag in zip(nodes, () if tags is None else tags.tolist()):
+        rows = [(a, b) for a, b, *_ in nodes.tolist()]
+        for row, tag in zip(rows, () if tags is None else tags.tolist()):
             if tag in data.labels or tag != 0:
-                add(data.labels.get(tag, f"edge{tag}"), row)
+                names.setdefault(data.labels.get(tag, f"edge{tag}"), set()).add(row)
         for name, members in data.sets.items():
             chosen = members[i]
             for number in () if chosen is None else chosen.tolist():
@@ -206,7 +203,7 @@ def _named_pairs(path: Path, data: meshio_reader.Raw) -> dict[str, set[tuple[int
                     raise ValueError(
                         f"{path.name} has no line {number}, named by set {check.line(name)}; export it again"
                     )
-                add(name, nodes[number])
+                names.setdefault(name, set()).add(rows[number])
     return names
 
 

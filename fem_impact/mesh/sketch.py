@@ -55,7 +55,11 @@ def draw_body(
         (x0, y0), (x1, y1) = place(low), place(low + size)
         box = f'x="{x0:.1f}" y="{y1:.1f}" width="{x1 - x0:.1f}" height="{y0 - y1:.1f}"'
         drawn = f'<rect {box} fill="{BODY}" stroke="{STROKE}"/>'
-        drawn += "".join(_end(corner, held.get(i, "free")) for i, corner in enumerate(((x0, y0), (x1, y0))))
+        for i, x in enumerate((x0, x1)):
+            if held.get(i) == "clamped":  # a wall
+                drawn += f'<path d="M{x:.1f} {y0 - 26:.1f}v38" stroke="{STROKE}" stroke-width="4.5"/>'
+            elif held.get(i) == "hinged":
+                drawn += f'<path d="M{x:.1f} {y0:.1f}l-7 12h14z" fill="{STROKE}"/>'
     drawn += "".join(
         f'<circle cx="{a:.1f}" cy="{b:.1f}" r="5" fill="none" stroke="{INK}" stroke-width="1.6"/>'
         for a, b in map(place, points)
@@ -102,13 +106,3 @@ def _outline(mesh: "Mesh", held: Mapping[int, str], place: Any) -> str:
             style = f'stroke="{STROKE}" stroke-width="{width}" stroke-dasharray="{dashes}"'
             drawn += f'<path d="{parts}" fill="none" {style}/>'
     return drawn
-
-
-def _end(place: tuple[float, float], kind: str) -> str:
-    """Support symbol at the end of a beam: a wall if clamped, a triangle if hinged."""
-    x, y = place
-    if kind == "clamped":
-        return f'<path d="M{x:.1f} {y - 26:.1f}v38" stroke="{STROKE}" stroke-width="4.5"/>'
-    if kind == "hinged":
-        return f'<path d="M{x:.1f} {y:.1f}l-7 12h14z" fill="{STROKE}"/>'
-    return ""

@@ -55,8 +55,16 @@ def triangulate(outline: Outline, size: float, lines: Lines | None = None) -> di
             line = ["line", number, numbers[(i + 1) % len(numbers)]]
             geometry.Append(line, leftdomain=1, rightdomain=0, bc=start + i + 1)
     if lines is not None and len(lines.ends):
-        rim = np.array([piece.at(np.array([a]))[0] for piece, a, _ in chords])
-        _append(geometry, (lines.ends - centre) / span, (rim - centre) / span)
+        known = [(piece.at(np.array([a]))[0] - centre) / span for piece, a, _ in chords]  # netgen's points so far
+        for line in (lines.ends - centre) / span:
+            numbers = []
+            for place in line:  # nearer than 1e-8 of the extent to a known point it is that one
+                away = np.linalg.norm(np.array(known) - place, axis=1)
+                numbers.append(len(known) if away.min() > 1e-8 else int(away.argmin()))
+                if numbers[-1] == len(known):
+                    geometry.AppendPoint(*place)
+                    known.append(place)
+            geometry.Append(["line", *numbers], leftdomain=1, rightdomain=1, bc=len(chords) + 1)
     try:
         made = geometry.GenerateMesh(maxh=SPREAD * size / span, grading=0.35, quad_dominated=False)
     except NgException as error:
@@ -69,22 +77,6 @@ def triangulate(outline: Outline, size: float, lines: Lines | None = None) -> di
     if not len(cells) or set(owner.tolist()) != set(range(len(chords))):
         raise check.SimulationError(f"the mesher could not fill the outline; {REMEDY}")
     return _follow(points, cells, facets, owner, chords, outline.outer)
-
-
-def _append(geometry: Any, ends: np.ndarray, rim: np.ndarray) -> None:
-    """Add lines (n, 2, 2) to netgen's geometry, whose points so far are those of the ``rim`` (n_points, 2)."""
-    known = list(rim)
-    for line in ends:
-        numbers = []
-        for place in line:
-            away = np.linalg.norm(np.array(known) - place, axis=1)
-            if away.min() > 1e-8:  # of the extent: else it is that point
-                geometry.AppendPoint(*place)
-                known.append(place)
-                numbers.append(len(known) - 1)
-            else:
-                numbers.append(int(away.argmin()))
-        geometry.Append(["line", *numbers], leftdomain=1, rightdomain=1, bc=len(rim) + 1)
 
 
 def _follow(

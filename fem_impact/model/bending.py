@@ -42,6 +42,7 @@ from ..modes.unstated import lumps
 
 # [-] flexible modes that are integrated: a blow depends on few others one by one, which follow from the upper ten
 LOW = 40
+FIXED = {"clamped", "hinged"}  # supports of ends between which a beam cannot get shorter, and of edges of a plate
 FADES = 1.0 / np.sqrt(12.0 * SHEAR)  # [-] of the thickness, fact: over this length a twist that shear undoes fades
 
 
@@ -123,7 +124,7 @@ def known_of(modes: Modes) -> Known | None:
         a = shapes.radius
         return Known(modes, modes.section, np.pi * a**2, float(shapes.edge != "free"), 2.0 * np.pi * a)
     if isinstance(shapes, BeamlikeShapes):
-        return Known(modes, modes.section, shapes.length, _held(list(shapes.ends)), 0.0)
+        return Known(modes, modes.section, shapes.length, float({*shapes.ends} <= FIXED), 0.0)
     return None
 
 
@@ -137,18 +138,13 @@ def around(modes: Modes, section: Plate | Beam | None, mesh: Mesh, supports: Any
     """What is known of a body with a mesh."""
     kinds = support_of_facets(mesh, dict(supports))
     if mesh.dimension == 1:
-        return Known(modes, section, float(np.ptp(mesh.points)), _held(kinds), 0.0)
+        return Known(modes, section, float(np.ptp(mesh.points)), float({*kinds} <= FIXED), 0.0)
     length = mesh.chords
     stated = dict(section.in_plane) if isinstance(section, Plate) else {}
     plane: Any = support_of_facets(mesh, stated, PLANE, "in_plane", kinds)  # type: ignore[arg-type]
-    holds = np.array([kind in ("clamped", "hinged", "held") for kind in plane])
+    holds = np.array([kind in {*FIXED, "held"} for kind in plane])
     sprung = not all(isinstance(kind, str) for kind in plane)
     return Known(modes, section, mesh.area, float(length[holds].sum() / length.sum()), float(length.sum()), sprung)
-
-
-def _held(ends: list) -> float:
-    """Whether both ends of a beam are held, so that it cannot get shorter between them."""
-    return float(all(kind in ("clamped", "hinged") for kind in ends))
 
 
 def flexible_vectors(shapes: FieldShapes | RitzShapes, n_rigid: int, number: int) -> np.ndarray:

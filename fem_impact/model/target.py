@@ -22,12 +22,12 @@ from ..fe.assembly import (
     assemble,
     notes_on,
     reassemble,
-    ribbed,
     support_of_facets,
     support_words,
     unknowns_near,
     usual_theory,
 )  # fmt: skip
+from ..fe.ribs import ribbed
 from ..fe.section import Beam, Plate
 from ..mesh.meshes import Mesh, sizes
 from ..modes import analytic, finding

@@ -86,12 +86,16 @@ class Body(check.Brief):
         cells = np.zeros((0, 3)) if self.cells is None else check.array("cells", self.cells, (None, None))
         if cells.shape[1] not in (2, 3) or (cells < 0).any() or (cells >= n).any() or (cells % 1.0).any():
             raise ValueError(f"cells must be rows of nodes from 0 to {n - 1}, two or three each, got {cells.shape}")
+        if not isinstance(self.names, Mapping) or not all(isinstance(name, str) for name in self.names):
+            raise ValueError(f"names must map names to node numbers, as {{'rim': 17}}, got {check.shown(self.names)}")
         static = np.zeros((n, 3, 0)) if self.static is None else self.static
         check.settle(
             self, frequencies=frequencies, nodes=nodes, numbers=numbers, cells=cells.astype(int),
             shapes=check.array("shapes", self.shapes, (n, 3, len(frequencies)), "kg**-0.5"),
             mass=check.positive("mass", self.mass, "kg"), damping_ratio=damping_ratios(self.damping_ratio, omega),
-            loads=_forces(self.loads), names=_named(self.names), solid=dents.stated(self.solid),
+            loads=_forces(self.loads), solid=dents.stated(self.solid), names={
+                name: check.count(f"names[{name!r}]", number, low=-(10**9)) for name, number in self.names.items()
+            },
             normals=None if self.normals is None else check.array("normals", self.normals, (n, 3)),
         )  # fmt: skip
         check.settle(self, static=check.array("static", static, (n, 3, None), "m"))
@@ -443,13 +447,6 @@ def _forces(loads: Any) -> np.ndarray:
         if not force.any():
             raise ValueError("loads must not be forces of zero")
     return found
-
-
-def _named(names: Any) -> dict[str, int]:
-    """Names of nodes, checked."""
-    if not isinstance(names, Mapping) or not all(isinstance(name, str) for name in names):
-        raise ValueError(f"names must map names to node numbers, as {{'rim': 17}}, got {check.shown(names)}")
-    return {name: check.count(f"names[{name!r}]", number, low=-(10**9)) for name, number in names.items()}
 
 
 def _normals(nodes: np.ndarray, cells: np.ndarray) -> np.ndarray | None:

@@ -68,19 +68,18 @@ class Jumps(NamedTuple):
         up, angle = number / 12, np.pi * (1.0 + np.sqrt(5.0)) * number  # a spiral of the golden ratio, evenly spread
         across = np.sqrt(1.0 - up**2)
         places = [place, *(middle + far * np.stack([across * np.cos(angle), across * np.sin(angle), up], axis=1))]
+        fields = []  # pressure for unit jumps on cells, (n_cells, n) [-]
+        for each in places:
+            way = np.sqrt(((self.points - each[:2]) ** 2).sum(axis=1) + each[2] ** 2)
+            turn = 1j * np.outer(way, omega / speed)
+            near = each[2] * self.size**2 / (4.0 * np.pi * way**3)
+            fields.append(near[:, None] * (1.0 - turn) * np.exp(turn))
         own, half = np.array([
             [np.einsum("cn,cn->n", field, each) for each in (self.mean, 0.5 * (self.outer - self.inner))]
-            for field in (dipoles(self.points, self.size, each, omega / speed) for each in places)
+            for field in fields
         ]).transpose(1, 0, 2)  # (n_places, n) each  # fmt: skip
         apart = np.maximum(np.abs(half[0]), np.sqrt((np.abs(half[1:]) ** 2).mean(axis=0)))
         return own[0], 2.5 * apart + 0.1 * np.sqrt((np.abs(own[1:]) ** 2).mean(axis=0))
-
-
-def dipoles(points: np.ndarray, size: float, place: np.ndarray, wave: np.ndarray) -> np.ndarray:
-    """Pressure at a place for unit jumps on cells, at wavenumbers (n,) [1/m], (n_cells, n) [-]."""
-    way = np.sqrt(((points - place[:2]) ** 2).sum(axis=1) + place[2] ** 2)
-    turn = 1j * np.outer(way, wave)
-    return (place[2] * size**2 / (4.0 * np.pi * way**3))[:, None] * (1.0 - turn) * np.exp(turn)
 
 
 def reach(modes: Modes, speed: float) -> np.ndarray:

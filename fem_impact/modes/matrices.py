@@ -56,11 +56,10 @@ def solved(told: Mapping[str, Any], loads: Any = None, n_modes: int | None = Non
     rigid, most = flexibility.rigid, len(flexibility.inertial) - flexibility.rigid.shape[1]
     wanted = (most if len(used) <= ALL else 100) if n_modes is None else check.count("n_modes", n_modes)
     wanted -= 0 if n_modes is None else rigid.shape[1]
-    if loads is None:
-        loads = _unit_loads(turned, numbers[kept]) if len(used) <= ALL else []
+    loads, pushed = _loaded(numbers[kept], loads, turned if len(used) <= ALL else None)
     try:
         values, vectors = lowest(flexibility, min(max(wanted, 0), most))
-        forces = R.T @ _forces(numbers[kept], loads)
+        forces = R.T @ pushed
         if len(values) + rigid.shape[1] == len(used):  # then modes tell it, with the rounding of what they carry
             static = (vectors / values) @ (vectors.T @ forces)
         else:
@@ -75,7 +74,13 @@ def solved(told: Mapping[str, Any], loads: Any = None, n_modes: int | None = Non
         "static": (R @ static).reshape(len(kept), 3, -1), "loads": loads,
         "nodes": nodes[kept], "numbers": numbers[kept],
     }  # fmt: skip
-    own, given = _mass(R, rigid, nodes[kept]), told.get("mass")
+    # the mass that shifts move, the same along x, y and z to a thousandth: rigid motions are mass-normalised
+    moved, wanted_shifts = R @ rigid, np.tile(np.eye(3), (len(kept), 1))
+    share = np.linalg.lstsq(moved, wanted_shifts, rcond=None)[0]
+    shifts = np.abs(moved @ share - wanted_shifts).max(axis=0) < 1e-3
+    masses = np.square(share[:, shifts]).sum(axis=0)
+    own = float(masses.mean()) if shifts.any() and np.ptp(masses) <= 1e-3 * masses.max() else None
+    given = told.get("mass")
     if own is None and given is None:
         raise ValueError(
             "total_mass (of files: mass) must be given in kg: the matrices of a body that is held do not tell the mass "
@@ -233,32 +238,23 @@ def _released(M: Any, K: Any, slowest: np.ndarray, rigid: np.ndarray) -> tuple[A
     return csc_matrix(kept.T @ (K @ kept)), rigid
 
 
-def _mass(R: Any, rigid: np.ndarray, nodes: np.ndarray) -> float | None:
-    """Mass [kg] that shifts move, the same along x, y and z to a thousandth, of mass-normalised rigid motions."""
-    moved, wanted = R @ rigid, np.tile(np.eye(3), (len(nodes), 1))
-    share = np.linalg.lstsq(moved, wanted, rcond=None)[0]
-    shifts = np.abs(moved @ share - wanted).max(axis=0) < 1e-3
-    masses = np.square(share[:, shifts]).sum(axis=0)
-    return float(masses.mean()) if shifts.any() and np.ptp(masses) <= 1e-3 * masses.max() else None
+def _loaded(numbers: np.ndarray, loads: Any, turned: Any) -> tuple[Any, np.ndarray]:
+    """Loads and their forces (3 n_nodes, n_loads) [N] on nodes.
 
-
-def _unit_loads(turned: Any, numbers: np.ndarray) -> list[tuple[int, np.ndarray]]:
-    """Loads along x, y and z on the nodes that have unknowns of their own in all of these."""
-    if turned is None:
-        return []
-    own = np.diff(turned.tocsr().indptr).reshape(-1, 6)[:, :3].astype(bool).all(axis=1)
-    return [(int(number), force) for number in numbers[own] for force in np.eye(3)]
-
-
-def _forces(numbers: np.ndarray, loads: Any) -> np.ndarray:
-    """Forces (3 n_nodes, n_loads) [N] on nodes."""
+    Without any given, they are those along x, y and z on the nodes that have unknowns of their own in all of these.
+    """
+    if loads is None:
+        own = np.zeros(len(numbers), bool)
+        if turned is not None:
+            own = np.diff(turned.tocsr().indptr).reshape(-1, 6)[:, :3].astype(bool).all(axis=1)
+        loads = [(int(number), force) for number in numbers[own] for force in np.eye(3)]
     row = {int(number): i for i, number in enumerate(numbers)}
     found = np.zeros((len(numbers), 3, len(loads)))
     for k, (number, *force) in enumerate(loads):
         if number not in row:
             raise ValueError(f"loads must be on nodes that can move, got node {number:g}")
         found[row[number], :, k] = np.ravel(force)
-    return found.reshape(3 * len(numbers), len(loads))
+    return loads, found.reshape(3 * len(numbers), len(loads))
 
 
 def _at_kept(told: Mapping[str, Any], kept: np.ndarray, n: int) -> dict[str, Any]:

@@ -14,7 +14,7 @@ from .._base.rounding import ROUNDING, SAME
 from ..fe import plausible
 from ..fe.section import Beam, Plate
 from . import cell_kinds, dents, followed, picked, universal_files, unstated, viewing
-from .shapes import REMEMBERED, RigidShapes, SampledShapes, ScaledShapes, Shapes, connected_cells, loose_motions
+from .shapes import REMEMBERED, RigidShapes, SampledShapes, ScaledShapes, Shapes
 
 HIGHEST = 0.1 * check.REACH  # [Hz] highest frequency that scaling may produce; 2 pi times it must stay in reach
 UNSTATED = {  # by argument of `Modes.from_arrays`
@@ -137,7 +137,14 @@ class Modes(check.Brief):
             raise ValueError("frequencies must not be empty")
         points = check.array("points", points, (None, None), "m")
         values = check.array("shapes", shapes, (len(points), len(omega)), "kg**-0.5")
-        mass, connected = check.positive("mass", mass, "kg"), connected_cells(cells, points)
+        mass, connected = check.positive("mass", mass, "kg"), None
+        if cells is not None:
+            given = check.array("cells", cells, (None, points.shape[1] + 1))
+            if (given % 1.0).any() or given.min() < 0 or given.max() >= len(points):
+                raise ValueError(
+                    f"cells must be numbers of points from 0 to {len(points) - 1}, got {check.shown(cells)}"
+                )
+            connected = given.astype(int)
         damping = damping_ratios(damping_ratio, omega)
         if not values.any():
             raise ValueError("shapes must move at least one point in one mode, got zeros only")
@@ -148,19 +155,11 @@ class Modes(check.Brief):
             raise ValueError("complete must be False if compliance is given or free is True; leave it out")
         loose = None
         if not complete and omega[0] > 0.0 and points.shape[1] and free is not False:
-            loose = loose_motions(points, connected, values, mass, free)
+            loose = unstated.loose_motions(points, connected, values, mass, free)
         if free and loose is not None:
             omega, damping = (np.append(np.zeros(loose.shape[1]), each) for each in (omega, damping))
             values, loose = np.hstack([loose, values]), None
-        rest, known = None, np.arange(0 if compliance is None else len(points))  # points with columns of compliance
-        if loads is not None:
-            known = check.array("loads", loads, (None,)).astype(int)
-            wrong = not len(known) or (known < 0).any() or (known >= len(points)).any()
-            if wrong or compliance is None or len(np.unique(known)) < len(known):
-                raise ValueError(
-                    f"loads must be different numbers of points from 0 to {len(points) - 1} with a column of "
-                    f"compliance each, got {check.shown(loads)}"
-                )
+        rest, known = None, _numbers_of_points(loads, len(points), compliance is not None)
         static = np.zeros((len(points), 0))
         if compliance is not None:
             static = check.array("compliance", compliance, (len(points), len(known)), "m/N")
@@ -510,6 +509,20 @@ def _carried(omega: np.ndarray, rows: np.ndarray, weight: Any = 1.0) -> np.ndarr
     flexible = omega > 0.0
     scaled = rows[:, flexible] / omega[flexible]
     return (weight * scaled) @ scaled.T
+
+
+def _numbers_of_points(loads: Any, n_points: int, given: bool) -> np.ndarray:
+    """Numbers of the points under the loads of a given compliance."""
+    if loads is None:
+        return np.arange(n_points if given else 0)
+    numbers = check.array("loads", loads, (None,)).astype(int)
+    wrong = not len(numbers) or (numbers < 0).any() or (numbers >= n_points).any()
+    if wrong or not given or len(np.unique(numbers)) < len(numbers):
+        raise ValueError(
+            f"loads must be different numbers of points from 0 to {n_points - 1} with a column of compliance each, got "
+            f"{check.shown(loads)}"
+        )
+    return numbers
 
 
 def left_out(modes: "Modes", place: np.ndarray, rows: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -13,7 +13,6 @@ from .._base.rounding import SAME
 from ..fe import point_load
 from ..fe.assembly import System
 from ..fe.eigenvalues import Flexibility
-from . import unstated
 
 REMEMBERED = 16  # [-] points whose shapes and static deflections a body keeps, because one blow needs them many times
 
@@ -259,37 +258,6 @@ def estimated(shapes: Shapes, points: np.ndarray) -> dict[str, np.ndarray]:
     whole, dent = np.abs(shapes.compliance(points).diagonal()), shapes.dent(points)[:, 1]
     other = shapes.compliance_error(points) * whole - dent
     return {"compliance": np.where(other > SAME * whole, other, 0.0), "dent": dent}
-
-
-def loose_motions(points: np.ndarray, cells: np.ndarray | None, values: np.ndarray, mass: float, free: Any) -> Any:
-    """Rigid motions (n_points, n) that modes without any may lack; None if these are the modes of a held body."""
-    flat = unstated.unfolded(points)
-    own = cells if flat is points else None
-    share, rigid = unstated.carried(flat, own, values, mass), unstated.rigid_motions(points, cells, mass)
-    if free:
-        if share >= unstated.HELD:
-            raise ValueError(
-                f"free must be False: one of the modes carries {share:.0%} of the mass along, as only those of a held "
-                "body do; leave it out, or check mass and the scale of shapes"
-            )
-        if rigid is None:
-            raise ValueError(
-                "free needs points that span the body, to find its rigid motions; give these as modes of 0 Hz instead"
-            )
-        return rigid
-    if share >= unstated.HELD:
-        return None
-    return np.full((len(points), 1), mass**-0.5) if rigid is None else rigid
-
-
-def connected_cells(cells: Any, points: np.ndarray) -> np.ndarray | None:
-    """The cells as numbers of points, (n_cells, dimension + 1), checked."""
-    if cells is None:
-        return None
-    array = check.array("cells", cells, (None, points.shape[1] + 1))
-    if (array != np.round(array)).any() or array.min() < 0 or array.max() >= len(points):
-        raise ValueError(f"cells must be numbers of points from 0 to {len(points) - 1}, got {check.shown(cells)}")
-    return array.astype(int)
 
 
 @dataclass(frozen=True, eq=False, repr=False)

@@ -74,7 +74,10 @@ def med(path: Path) -> dict[str, np.ndarray]:
     frequencies: list[float] = []
     with closed_hdf5(path), h5py.File(path) as file:
         for _, field in sorted(file["CHA"].items() if "CHA" in file else ()):
-            columns = _components(field)
+            named = field.attrs["NOM"]
+            named = named.decode() if isinstance(named, bytes) else str(named)
+            each = [named[i : i + 16].strip() for i in range(0, len(named), 16)]
+            columns = {ALONG[name]: column for column, name in enumerate(each) if name in ALONG}  # of displacements
             steps = sorted(field.values(), key=lambda step: (step.attrs["NDT"], step.attrs["NOR"]))
             values = [float(step.attrs["PDT"]) for step in steps]
             for step, value in zip(steps, values):
@@ -155,11 +158,3 @@ def _names(sets: Any, numbers: np.ndarray) -> dict[str, np.ndarray]:
     """Sets of one node are names."""
     single = {str(name): int(numbers[rows[0]]) for name, rows in sets.items() if len(rows) == 1}
     return {"names": np.array(list(single), str), "named": np.array(list(single.values()), int)}
-
-
-def _components(field: Any) -> dict[int, int]:
-    """Columns of a field by axis: of displacements alone, by their names."""
-    names = field.attrs["NOM"]
-    names = names.decode() if isinstance(names, bytes) else str(names)
-    each = [names[i : i + 16].strip() for i in range(0, len(names), 16)]
-    return {ALONG[name]: column for column, name in enumerate(each) if name in ALONG}

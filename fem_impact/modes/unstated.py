@@ -6,6 +6,8 @@ either, and counts as both. The modes left out above omega_c yield
 ``integral of dS / omega**2 = 2 A omega_c**(p - 2) / (2 - p) - S(omega_c) / omega_c**2``.
 """
 
+from typing import Any
+
 import numpy as np
 from scipy.spatial import Delaunay, QhullError
 
@@ -65,32 +67,36 @@ def unfolded(points: np.ndarray) -> np.ndarray:
     return points if n == points.shape[1] else points @ axes[:n].T
 
 
-def rigid_motions(points: np.ndarray, cells: np.ndarray | None, mass: float) -> np.ndarray | None:
-    """Shapes of the rigid motions of a uniform body over its points, (n_points, 1 + dimension) [kg**-0.5].
+def loose_motions(points: np.ndarray, cells: np.ndarray | None, values: np.ndarray, mass: float, free: Any) -> Any:
+    """Rigid motions (n_points, n) that modes without any may lack; None if these are the modes of a held body.
 
-    None if the points span no line or area.
+    They are those of a uniform body over its points, or all points alike if these span no line or area. Of elastic
+    modes, those of a free body carry none of its mass along; only the lower count, whose waves the points can show.
     """
-    found = lumps(points, cells)
-    if found is None:
+    flat = unfolded(points)
+    own, whole = lumps(flat, cells if flat is points else None), lumps(points, cells)
+    share, rigid = np.nan, None
+    if own is not None:
+        pairs, weight = own
+        mean = weight @ values[pairs, : max(1, len(points) // 2)].mean(axis=1)
+        share = float(mass * (mean**2).max())
+    if free and share >= HELD:
+        raise ValueError(
+            f"free must be False: one of the modes carries {share:.0%} of the mass along, as only those of a held "
+            "body do; leave it out, or check mass and the scale of shapes"
+        )
+    if whole is not None:
+        pairs, weight = whole
+        motions = np.column_stack([np.ones(len(points)), (points - points.mean(axis=0)) / np.ptp(points, axis=0).max()])
+        at = motions[pairs].mean(axis=1)
+        rigid = np.linalg.solve(np.linalg.cholesky(mass * at.T @ (weight[:, None] * at)), motions.T).T
+    if free and rigid is None:
+        raise ValueError(
+            "free needs points that span the body, to find its rigid motions; give these as modes of 0 Hz instead"
+        )
+    if not free and share >= HELD:
         return None
-    pairs, weight = found
-    centre, span = points.mean(axis=0), np.ptp(points, axis=0).max()
-    motions = np.column_stack([np.ones(len(points)), (points - centre) / span])
-    at = motions[pairs].mean(axis=1)
-    return np.linalg.solve(np.linalg.cholesky(mass * at.T @ (weight[:, None] * at)), motions.T).T
-
-
-def carried(points: np.ndarray, cells: np.ndarray | None, shapes: np.ndarray, mass: float) -> float:
-    """Largest share [-] of the mass that moves along in one of the modes: zero for those of a free body, elastic ones.
-
-    Only the lower modes count, whose waves the points can show; not a number if the points span no line or area.
-    """
-    found = lumps(points, cells)
-    if found is None:
-        return np.nan
-    pairs, weight = found
-    mean = weight @ shapes[pairs, : max(1, len(points) // 2)].mean(axis=1)
-    return float(mass * (mean**2).max())
+    return np.full((len(points), 1), mass**-0.5) if rigid is None else rigid
 
 
 def lumps(points: np.ndarray, cells: np.ndarray | None) -> tuple[np.ndarray, np.ndarray] | None:

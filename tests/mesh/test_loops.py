@@ -34,11 +34,7 @@ def test_curvature_of_an_ellipse_and_of_a_cubic():
 
 
 @pytest.mark.parametrize("piece", [ELLIPSE, CUBIC], ids=["arc", "bezier"])
-def test_a_motion_keeps_form_and_turning_back_gives_the_same_places(piece):
-    turn = np.array([[0.6, -0.8], [0.8, 0.6]])
-    moved = piece.moved(turn, np.array([5.0, 7.0]))
-    assert_allclose(moved.at(T), piece.at(T) @ turn.T + [5.0, 7.0], atol=1e-14)
-    assert_allclose(loops.curvature(moved, T), loops.curvature(piece, T), rtol=1e-11)
+def test_turning_back_gives_the_same_places(piece):
     assert_allclose(piece.reversed().at(T), piece.at(1.0 - T), atol=1e-14)
     assert_allclose(loops.tangent(piece.reversed(), T), -loops.tangent(piece, 1.0 - T), atol=1e-12)
 
