@@ -150,7 +150,14 @@ class Material:
     @property
     def notes(self) -> tuple[str, ...]:
         """Numbers that are allowed but probably a slip of a unit, in plain words."""
-        return plausible.material(self)
+        named = ("E", "E_across", "G", "rho")
+        notes = [note for name in named for note in plausible.note_number(name, getattr(self, name))]
+        if abs(self.angle) > plausible.TURN:
+            notes.append(
+                f"angle = {self.angle:g} rad is {abs(self.angle) / plausible.TURN:.3g} turns; rad are expected, and "
+                f"{self.angle:g} degrees are {np.radians(self.angle):.4g}"
+            )
+        return tuple(notes)
 
     @property
     def plane_stress(self) -> np.ndarray:

@@ -66,17 +66,6 @@ def note_number(name: str, value: Any) -> Iterator[str]:
     yield f"{NAMES.get(name, name + ' =')} {value:g}{unit} is {meaning}; {known.slip}"
 
 
-def material(given: Any) -> tuple[str, ...]:
-    """Notes on the numbers of a `Material`."""
-    notes = [note for name in ("E", "E_across", "G", "rho") for note in note_number(name, getattr(given, name))]
-    if abs(given.angle) > TURN:
-        notes.append(
-            f"angle = {given.angle:g} rad is {abs(given.angle) / TURN:.3g} turns; rad are expected, and "
-            f"{given.angle:g} degrees are {np.radians(given.angle):.4g}"
-        )
-    return tuple(notes)
-
-
 def doubted_sizes(sides: Sequence[float], section: Any = None) -> tuple[str, ...]:
     """Notes on a body with sides [m] in its plane, or along its line, and a section."""
     notes = list(note_number("length", max(sides)))

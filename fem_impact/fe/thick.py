@@ -55,11 +55,10 @@ from scipy.sparse import block_diag, coo_matrix, csc_matrix, csr_matrix
 from scipy.sparse.linalg import spsolve
 from scipy.spatial import cKDTree
 
-from .._base.untyped import Cells
 from ..mesh.mesh_files import side_lengths
 from ..mesh.meshes import LONGEST, Mesh
 from . import plane, plates, splitting, supports
-from .elements import Bent, area_coordinates, curvatures, numbering
+from .elements import area_coordinates, curvatures, numbering
 from .plane import FIRST, LOCAL, QUARTIC, SECOND, PlaneSpace, reference
 from .section import KINDS, SOFT, Plate, size_at
 from .springs import at_facets
@@ -76,16 +75,7 @@ SMALL = 0.1  # [-] longest side over the thickness below which nodes hold rotati
 class MindlinSpace(PlaneSpace):
     """Shape functions of one mesh: 21 of the deflection, then 15 for each component of the shear strain."""
 
-    def __init__(self, mesh: Cells, bent: Bent | None = None) -> None:
-        super().__init__(mesh, bent)
-        self.turned = np.zeros((len(self.vertices), QUARTIC), bool)  # nodes that hold rotations, not shear strains
-
-    def turn(self, mesh: Cells, thickness: np.ndarray) -> None:
-        """Let the nodes of straight triangles much smaller than their ``thickness`` (n_cells,) hold rotations."""
-        longest = side_lengths(mesh.p.T, self.vertices).max(axis=1)
-        dofs = plane.numbered(mesh).element_dofs.T  # (n_cells, 15)
-        small = np.setdiff1d(dofs[(longest < SMALL * thickness) & ~self.curved], dofs[self.curved])
-        self.turned = np.isin(dofs, small)
+    turned: np.ndarray  # (n_cells, 15) nodes that hold rotations, not shear strains
 
     def slopes_in_rotations(self, cells: np.ndarray, *shapes: np.ndarray) -> list[np.ndarray]:
         """Part of grad w in the rotations of cells (n,): at nodes that hold shear strains; (.., n_q, 2, 21) each.
@@ -153,8 +143,13 @@ def terms(space: MindlinSpace, points: Points, cells: np.ndarray) -> list[Term]:
 
 def _domain(body: Subject, fields: tuple[str, ...]) -> Domain:
     found = plates.domain(MindlinSpace, body, fields)
-    h = size_at(body.section, "thickness", found.frame.to_metres(found.space.origin))
-    found.space.turn(found.cells, h / found.frame.length)
+    space, frame = found.space, found.frame
+    h = size_at(body.section, "thickness", frame.to_metres(space.origin)) / frame.length
+    longest = side_lengths(found.cells.p.T, space.vertices).max(axis=1)
+    dofs = plane.numbered(found.cells).element_dofs.T  # (n_cells, 15)
+    # nodes of straight triangles much smaller than their thickness
+    small = np.setdiff1d(dofs[(longest < SMALL * h) & ~space.curved], dofs[space.curved])
+    space.turned = np.isin(dofs, small)
     return found
 
 

@@ -44,7 +44,18 @@ def read_mesh(path: Any, unit: str | None) -> tuple[
     data = meshio_reader.read_raw(path)
     raw, height, notes = _plane_points(path, data, unit)
     cells, nodes = _triangles(path, data)
-    _refuse_far_middles(path, raw, np.array([[*pair, node] for pair, node in nodes.items()], int).reshape(-1, 3))
+    rows = np.array([[*pair, node] for pair, node in nodes.items()], int).reshape(-1, 3)
+    a, b, middle = raw[rows].transpose(1, 0, 2)
+    side, away = b - a, middle - 0.5 * (a + b)
+    along = np.abs((away * side).sum(axis=1))
+    across = np.abs(away[:, 0] * side[:, 1] - away[:, 1] * side[:, 0])
+    far = np.maximum(along / ALONG, across / ACROSS) > (side**2).sum(axis=1)
+    if far.any():
+        first, second, node = rows[far][0]
+        raise ValueError(
+            f"{path.name} has {np.count_nonzero(far)} sides far from their middles, the first between nodes {first} "
+            f"and {second}, whose middle is node {node}; correct it, or export linear cells"
+        )
     if height is not None:
         notes.append(_sloping(path, raw, height, cells))
         used = np.unique(np.append(cells, list(nodes.values())).astype(int))
@@ -169,21 +180,6 @@ def _triangles(path: Path, data: meshio_reader.Raw) -> tuple[np.ndarray, dict]:
             for row in nodes.tolist() if nodes.shape[1] > n else ():
                 middles.update({(row[k], row[(k + 1) % n]): row[n + k] for k in range(n)})
     return np.concatenate(cells), middles
-
-
-def _refuse_far_middles(path: Path, points: np.ndarray, rows: np.ndarray) -> None:
-    """Raise ValueError if the middle of a side lies far from it; rows (n, 3) hold its vertices and its middle."""
-    a, b, middle = points[rows].transpose(1, 0, 2)
-    side, away = b - a, middle - 0.5 * (a + b)
-    along = np.abs((away * side).sum(axis=1))
-    across = np.abs(away[:, 0] * side[:, 1] - away[:, 1] * side[:, 0])
-    far = np.maximum(along / ALONG, across / ACROSS) > (side**2).sum(axis=1)
-    if far.any():
-        first, second, node = rows[far][0]
-        raise ValueError(
-            f"{path.name} has {np.count_nonzero(far)} sides far from their middles, the first between nodes {first} "
-            f"and {second}, whose middle is node {node}; correct it, or export linear cells"
-        )
 
 
 def _named_pairs(path: Path, data: meshio_reader.Raw) -> dict[str, set[tuple[int, int]]]:

@@ -65,11 +65,6 @@ def _roots(edge: str, nu: float, reach: float) -> tuple[np.ndarray, np.ndarray, 
     return z[rank], order[rank], weight[rank]
 
 
-def _count(z: np.ndarray, order: np.ndarray, reach: float = np.inf) -> int:
-    """Number of modes for the roots up to ``reach``: one for a root of order 0, two for any other."""
-    return int(np.sum(np.where(order == 0, 1, 2)[z <= reach]))
-
-
 @dataclass(frozen=True, eq=False, repr=False)
 class DiskShapes(ClosedShapes, check.Brief):
     """Bessel shapes of a disk of unit mass and rigidity centred at the origin, computed on the unit disk."""
@@ -231,11 +226,11 @@ def disk(
         limit = np.sqrt(reach / root_area)
         check_number(0.25 * limit**2, MOST_OF_DISK)  # Weyl
         z, n, weight = _roots(edge, ratio, max(5.0, limit))
-        count = n_rigid + _count(z, n, limit)
+        count = n_rigid + int(np.where(n == 0, 1, 2)[z <= limit].sum())  # two modes for any order but 0
     else:
         limit = 2.0 * np.sqrt(count) + 5.0  # Weyl's law: about z**2 / 4 modes, plus an edge term
         z, n, weight = _roots(edge, ratio, limit)
-        while n_rigid + _count(z, n) < count:
+        while n_rigid + int(np.where(n == 0, 1, 2).sum()) < count:
             limit *= 1.2
             z, n, weight = _roots(edge, ratio, limit)
     check_beyond_rigid(count, n_rigid, "flexible")

@@ -83,7 +83,17 @@ def follow_response(lines: MeasuredLines) -> Passive:
     top, low = lines.s.imag[-1], lines.s.imag[0]
     beyond = top * np.array([1.02, 1.06, 1.12, 1.2, 1.35, 1.6, 2.2, 4.0])
     kept = fitted(lines, np.log(np.stack([beyond, np.full(len(beyond), 0.02)])))
-    offered, matrix = _offered(lines)
+    # poles that may be added (2, n), half a width apart, and their columns (2 n_lines, n) of unit size
+    places, spacing = [], np.diff(lines.s.imag).min()
+    for ratio in RATIOS:
+        at = low
+        while at < 1.3 * top:
+            places.append((at, ratio))
+            at += max(0.7 * (ratio * at + lines.s.real[0]), 0.5 * spacing)
+    offered = np.log(np.array(places).T)
+    parts = [columns(lines, piece)[:, 2:].astype(np.float32) for piece in np.array_split(offered, 20, axis=1)]
+    matrix = np.hstack(parts)
+    matrix /= np.linalg.norm(matrix, axis=0)
     for _ in range(25):
         before = np.square(kept.rest).sum()
         noise = before / max(1, len(kept.rest) - 3 * kept.poles.shape[1])
@@ -101,22 +111,6 @@ def follow_response(lines: MeasuredLines) -> Passive:
         if before - np.square(kept.rest).sum() < GAIN * noise:
             break
     return kept
-
-
-def _offered(lines: MeasuredLines) -> tuple[np.ndarray, np.ndarray]:
-    """Poles that may be added (2, n), half a width apart, and their columns (2 n_lines, n) of unit size."""
-    s, found = lines.s, []
-    spacing = np.diff(s.imag).min()
-    for ratio in RATIOS:
-        at = s.imag[0]
-        while at < 1.3 * s.imag[-1]:
-            found.append((at, ratio))
-            at += max(0.7 * (ratio * at + s.real[0]), 0.5 * spacing)
-    poles = np.log(np.array(found).T)
-    parts = [np.asarray(columns(lines, piece))[:, 2:].astype(np.float32) for piece in np.array_split(poles, 20, axis=1)]
-    matrix = np.hstack(parts)
-    matrix /= np.linalg.norm(matrix, axis=0)
-    return poles, matrix
 
 
 def _moved(lines: MeasuredLines, kept: Passive) -> Passive:

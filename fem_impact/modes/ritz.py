@@ -107,7 +107,7 @@ class Krylov:
         self._carried = np.zeros((system.n_dofs, 0))  # M times the two latest blocks of vectors
         self._latest = 0, 0, 0  # where the two latest blocks of vectors begin, and where they end
         self._period, self._due = 1, 1  # [-] blocks between two looks at all vectors, and blocks until the next one
-        self._keep()
+        self._sound = self.count, self._latest, self._carried, self._next  # at the last that are known to be orthogonal
 
     def beside(self, points: np.ndarray) -> "Krylov":
         """Vectors started from other points, with the same factorisations."""
@@ -158,11 +158,7 @@ class Krylov:
             self.count, self._latest = stop, (start, end, stop)
             self._next = self._solve(latest)
             if self._due == self._period:  # all vectors have just been looked at
-                self._keep()
-
-    def _keep(self) -> None:
-        """Remember where the last vectors are that are known to be orthogonal."""
-        self._sound = self.count, self._latest, self._carried, self._next
+                self._sound = self.count, self._latest, self._carried, self._next
 
     def _cleared(self, new: np.ndarray) -> np.ndarray | None:
         """New vectors without the parts along earlier ones that rounding brought back; clears the latest block alike.
