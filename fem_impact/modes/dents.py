@@ -133,13 +133,9 @@ def rest(load: Load, E: float, nu: float) -> tuple[float, float] | None:
     """
     distance = np.linalg.norm(load.apart, axis=1)
     space = (1.0 + nu) / (2.0 * np.pi * E) * (load.apart[:, 2] ** 2 / distance**3 + 2.0 * (1.0 - nu) / distance)
-    values = []
-    for ring in RINGS:
-        chosen = _around(distance, *ring)
-        if len(chosen) < FEWEST:
-            return None
-        terms, _ = _smooth(load.apart[chosen])
-        values.append(float(np.linalg.lstsq(terms, (load.deflection - space)[chosen], rcond=None)[0][0]))
+    values = _fitted(load.apart, load.deflection - space, RINGS)
+    if len(values) < len(RINGS):
+        return None
     return float(np.mean(values)), float(np.ptp(values) + SINGLE * abs(load.own))
 
 
@@ -149,21 +145,25 @@ def largest(load: Load) -> float | None:
     The largest of fits with ``1 / r`` of unknown size, one beyond the elements over which a load may be spread. Solids
     of three meshes each had 1.02 to 2.11 times their dent.
     """
-    distance, values = np.linalg.norm(load.apart, axis=1), []
-    for ring in (*RINGS, (4.5, 96)):
-        chosen = _around(distance, *ring)
-        if len(chosen) >= FEWEST:
-            smooth, r = _smooth(load.apart[chosen])
-            terms = np.column_stack([smooth, 1.0 / r])
-            values.append(load.own - float(np.linalg.lstsq(terms, load.deflection[chosen], rcond=None)[0][0]))
-    found = max(values, default=0.0)
+    values = _fitted(load.apart, load.deflection, (*RINGS, (4.5, 96)), dent=True)
+    found = load.own - min(values, default=load.own)
     return float(min(found, abs(load.own))) if found > 0.0 else None
 
 
-def _around(distance: np.ndarray, first: float, n: int) -> np.ndarray:
-    """Nodes of a fit: the nearest n beyond so many times the distance of the nearest."""
+def _fitted(apart: np.ndarray, values: np.ndarray, rings: Any, dent: bool = False) -> list[float]:
+    """What values (n,) at nodes around a load tell at it, by fits to the nearest beyond each ring, of enough nodes.
+
+    They are those of a smooth field, with ``1 / r`` if there is a ``dent``.
+    """
+    distance, found = np.linalg.norm(apart, axis=1), []
     order = np.argsort(distance, kind="stable")
-    return order[distance[order] > first * distance[order[:1]].sum()][:n]
+    for first, n in rings:
+        chosen = order[distance[order] > first * distance[order[:1]].sum()][:n]
+        if len(chosen) >= FEWEST:
+            smooth, r = _smooth(apart[chosen])
+            terms = np.column_stack([smooth, 1.0 / r]) if dent else smooth
+            found.append(float(np.linalg.lstsq(terms, values[chosen], rcond=None)[0][0]))
+    return found
 
 
 def hidden(load: Load) -> float | None:

@@ -56,8 +56,18 @@ def read_bodies(files: Any) -> list[dict[str, Any]]:
 def _one(path: Path, decks: Sequence[Path] | set[Path]) -> dict[str, Any]:
     ending = path.suffix.lower()
     kind, reader = KINDS[ending]
-    if not reader:
-        return _archive(path)
+    if not reader:  # saved by `Body.save`, arrays under the names of fields, or a sparse matrix of SciPy
+        try:
+            with np.load(path, allow_pickle=False) as held:
+                if "format" not in held:
+                    own_modes = {"own": True} if "named" in held else {}
+                    return {name: held[name] for name in (*OWN, *MORE, "named") if name in held} | own_modes
+            kind = cell_kinds.kind_of_matrix(path.stem)
+            if not kind:
+                raise ValueError("name the matrix K..., M... or R..., to say what it is")
+            return {kind if kind == "recovery" else f"{kind}_matrix": load_npz(path)}
+        except (OSError, ValueError, TypeError, EOFError, zipfile.BadZipFile) as error:
+            raise ValueError(f"{path.name} cannot be read as arrays of NumPy ({check.line(str(error))})") from None
     path = path.resolve()
     own = sorted(str(deck.resolve()) for deck in decks if deck.suffix.lower() in DECKS.get(ending, ()))
     found: dict[str, Any] = isolated.read_apart(path, kind, reader, *own[:1])
@@ -110,21 +120,6 @@ def complete(told: dict[str, Any], n_modes: int | None) -> dict[str, Any]:
     if np.ndim(damping):
         told["damping_ratio"] = check.array("damping_ratio", damping, order.shape)[order]
     return {name: told[name] for name in OWN if told.get(name) is not None}
-
-
-def _archive(path: Path) -> dict[str, Any]:
-    """A body saved by `Body.save`, arrays under the names of its fields, or a sparse matrix of SciPy."""
-    try:
-        with np.load(path, allow_pickle=False) as found:
-            if "format" not in found:
-                own = {"own": True} if "named" in found else {}
-                return {name: found[name] for name in (*OWN, *MORE, "named") if name in found} | own
-        kind = cell_kinds.kind_of_matrix(path.stem)
-        if not kind:
-            raise ValueError("name the matrix K..., M... or R..., to say what it is")
-        return {kind if kind == "recovery" else f"{kind}_matrix": load_npz(path)}
-    except (OSError, ValueError, TypeError, EOFError, zipfile.BadZipFile) as error:
-        raise ValueError(f"{path.name} cannot be read as arrays of NumPy ({check.line(str(error))})") from None
 
 
 def _object(given: Any) -> dict[str, Any] | None:
