@@ -125,7 +125,12 @@ def forms(sheet: Sheet, steep: Steep, omega: np.ndarray, taut: Taut | None = Non
     n, low = len(omega), min(SWINGING, len(omega))
 
     def strained(pieces: np.ndarray, i: np.ndarray, j: np.ndarray) -> np.ndarray:
-        pair = _pairs(steep(sheet.cells[pieces], sheet.x[pieces]), i, j)
+        slope = steep(sheet.cells[pieces], sheet.x[pieces])
+        one, two = slope[..., i], slope[..., j]  # (n, n_q, 2, n_pairs)
+        pair = np.empty((*slope.shape[:2], 3, len(i)))  # products xx, yy, 2 xy
+        np.multiply(one, two, out=pair[:, :, :2])
+        np.multiply(one[:, :, 0], two[:, :, 1], out=pair[:, :, 2])
+        pair[:, :, 2] += one[:, :, 1] * two[:, :, 0]
         return pair if taut is None else np.concatenate([pair, taut(pieces)], axis=-1)
 
     i, j = np.triu_indices(low)
@@ -177,16 +182,6 @@ def _along(space: Any, rib: Any, length: float, n_q: int) -> tuple[np.ndarray, .
 
     gradient = plane.gradients(space, cells, area)
     return cells, padded(area), padded(x), padded(moduli, "constant"), padded(gradient), padded(neutral)
-
-
-def _pairs(slope: np.ndarray, i: np.ndarray, j: np.ndarray) -> np.ndarray:
-    """Products (n, n_q, 3, n_pairs) of the slopes (n, n_q, 2, n_modes) of modes i and j (n_pairs,): xx, yy, 2 xy."""
-    result = np.empty((*slope.shape[:2], 3, len(i)))
-    one, two = slope[..., i], slope[..., j]  # (n, n_q, 2, n_pairs)
-    np.multiply(one, two, out=result[:, :, :2])
-    np.multiply(one[:, :, 0], two[:, :, 1], out=result[:, :, 2])
-    result[:, :, 2] += one[:, :, 1] * two[:, :, 0]
-    return result
 
 
 def _flat(values: np.ndarray) -> np.ndarray:

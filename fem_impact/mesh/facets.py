@@ -61,11 +61,6 @@ class Curves:
         conditions = np.array([k == 0, np.ones(5), k == 1, k, 0.5**k], float)
         self.p: np.ndarray = np.linalg.solve(conditions, values.T).T  # (n, 5) ascending powers of s
 
-    def graph(self, rows: np.ndarray, s: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """p and dp/ds for curves ``rows`` (n,) at s (n, n_q)."""
-        p = self.p[rows][:, None]
-        return (p * powers(s, 4, 0)).sum(axis=2), (p * powers(s, 4, 1)).sum(axis=2)
-
     def middle(self) -> tuple[np.ndarray, np.ndarray]:
         """Middle point (n, 2) of each curve and the outward unit normal (n, 2) there."""
         point, tangent, _ = self.at(np.full(len(self.p), 0.5))

@@ -38,7 +38,22 @@ def results(path: Path, deck: str = "") -> dict[str, np.ndarray]:
         told, (moved, frames) = _nodes(model)
         if frames.any():
             found.transform_displacements_to_global(moved, model.coords, xyz_cid0=told["nodes"])
-        return told | _elements(model.elements, told) | _fields(found, told["numbers"])
+        told |= _elements(model.elements, told)
+        numbers, table, cases = told["numbers"], list(found.eigenvectors.values()), list[list[np.ndarray]]()
+        for tables in (table, found.displacements.values()):  # modes and static displacements
+            cases.append([])
+            for one in tables:
+                moved = np.zeros((len(one.data), len(numbers), 3))
+                moved[:, cell_kinds.rows_of(numbers, one.node_gridtype[:, 0])] = one.data[:, :, :3]
+                cases[-1].extend(moved)
+        cycles = [np.asarray(one.mode_cycles if hasattr(one, "mode_cycles") else one.freqs, float) for one in table]
+        signs = [np.where(np.asarray(getattr(one, "eigns", 0.0)) < 0.0, -1.0, 1.0) for one in table]
+        frequencies = np.concatenate([np.zeros(0), *(sign * np.abs(each) for sign, each in zip(signs, cycles))])
+        told |= cell_kinds.steps(len(numbers), *cases) | {"frequencies": frequencies}
+        masses = [np.asarray(one.generalized_mass, float) for one in found.eigenvalues.values()]
+        if masses and sum(map(len, masses)) >= len(frequencies):
+            told["modal_mass"] = np.concatenate(masses)[: len(frequencies)]
+    return told
 
 
 def deck(path: Path) -> dict[str, np.ndarray]:
@@ -124,22 +139,3 @@ def _elements(cards: Any, told: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
             blocks.setdefault(code, []).append(element.node_ids[:corners])
     rows = {code: cell_kinds.rows_of(told["numbers"], each) for code, each in blocks.items()}
     return cell_kinds.surface_and_kind(told["nodes"], rows)
-
-
-def _fields(results: Any, numbers: np.ndarray) -> dict[str, np.ndarray]:
-    """Modes and static displacements."""
-    table, cases = list(results.eigenvectors.values()), list[list[np.ndarray]]()
-    for tables in (table, results.displacements.values()):
-        cases.append([])
-        for one in tables:
-            moved = np.zeros((len(one.data), len(numbers), 3))
-            moved[:, cell_kinds.rows_of(numbers, one.node_gridtype[:, 0])] = one.data[:, :, :3]
-            cases[-1].extend(moved)
-    found = cell_kinds.steps(len(numbers), *cases)
-    cycles = [np.asarray(one.mode_cycles if hasattr(one, "mode_cycles") else one.freqs, float) for one in table]
-    signs = [np.where(np.asarray(getattr(one, "eigns", 0.0)) < 0.0, -1.0, 1.0) for one in table]
-    found["frequencies"] = np.concatenate([np.zeros(0), *(sign * np.abs(each) for sign, each in zip(signs, cycles))])
-    masses = [np.asarray(one.generalized_mass, float) for one in results.eigenvalues.values()]
-    if masses and sum(map(len, masses)) >= len(found["frequencies"]):
-        found["modal_mass"] = np.concatenate(masses)[: len(found["frequencies"])]
-    return found

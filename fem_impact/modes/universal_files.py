@@ -83,7 +83,12 @@ def arrays(path: Path) -> dict[str, np.ndarray]:
     kinds = [int(kind) for kind in file.get_set_types()]
     # nodes, shapes, units, nodes in double precision, results, frames
     sets = [file.read_sets(i) for i, kind in enumerate(kinds) if kind in (15, 55, 164, 2411, 2414, 2420)]
-    _refuse_frames(path.name, sets)
+    rows = [zip(s["CS_sys_labels"], s["CS_types"], s["CS_matrices"]) for s in sets if s["type"] == 2420]
+    turned = {label for row in rows for label, kind, axes in row if kind or not np.allclose(axes, np.eye(4)[:, :3])}
+    placed = [s[key] for s in sets if s["type"] in (15, 2411) for key in ("def_cs", "disp_cs")]
+    used = turned & {int(frame) for frames in placed for frame in frames}  # axes of their own
+    if used:
+        raise ValueError(f"{path.name} has nodes in coordinate system {min(used)}; export all in the global one")
     numbers, place = places(sets)
     length, force = map(factors(sets).get, ("m", "N"), (1.0, 1.0))
     results = [_result(s) for s in sets if s["type"] in (55, 2414)]
@@ -154,16 +159,6 @@ def factors(sets: list[dict]) -> dict[str, float]:
     length, force = next(((float(s["length"]), float(s["force"])) for s in sets if s["type"] == 164), (1.0, 1.0))
     found = {"N": force, "m/s^2": length, "m/s": length, "m": length}
     return {kind: factor for kind, factor in found.items() if factor > 0.0 and factor != 1.0}
-
-
-def _refuse_frames(name: str, sets: list[dict]) -> None:
-    """ValueError if nodes are placed, or move, along axes of their own."""
-    rows = [zip(s["CS_sys_labels"], s["CS_types"], s["CS_matrices"]) for s in sets if s["type"] == 2420]
-    turned = {label for row in rows for label, kind, axes in row if kind or not np.allclose(axes, np.eye(4)[:, :3])}
-    nodes = [s for s in sets if s["type"] in (15, 2411)]
-    used = turned & {int(frame) for s in nodes for key in ("def_cs", "disp_cs") for frame in s[key]}
-    if used:
-        raise ValueError(f"{name} has nodes in coordinate system {min(used)}; export all in the global one")
 
 
 def _elements(file: Any, i: int) -> list[dict]:
