@@ -104,6 +104,10 @@ class Rib:
         result[:, 2, 2] = beam.torsion(place)
         return result, inertia
 
+    def turning(self, points: np.ndarray) -> np.ndarray:
+        """Rotary inertia per length (n,) [kg m] at points (n, 2) [m]."""
+        return self.section.rotary(self.distances(points))
+
 
 def sides_on(mesh: Mesh, path: Any) -> np.ndarray:
     """Vertices (n, 2) of the sides of triangles that lie on a path (n_points, 2) [m], or on a named edge."""

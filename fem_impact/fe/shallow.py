@@ -193,8 +193,8 @@ def plane_mass(system: Any, vectors: np.ndarray) -> np.ndarray:
         slope = space.functions(piece.cells, piece.x, (1,))[0].transpose(0, 2, 1, 3)
         moved = -(piece.stiffness[..., 0, 1] / piece.stiffness[..., 0, 0] / frame.length)[..., None, None] * slope
         moved[:, :, 0, FIRST] = moved[:, :, 1, SECOND] = shape
-        turns = piece.rib.section.rotary(piece.rib.distances(frame.to_metres(piece.x))) / frame.length**2
-        each = gram(moved, piece.inertia * piece.ds) + gram(slope, turns.reshape(piece.ds.shape) * piece.ds)
+        turns = piece.rib.turning(frame.to_metres(piece.x)).reshape(piece.ds.shape) / frame.length**2
+        each = gram(moved, piece.inertia * piece.ds) + gram(slope, turns * piece.ds)
         local.append(each / (frame.inertia * frame.length))
         where.append(piece.cells)
     whole = scatter(np.concatenate(local), dofs[:, np.concatenate(where)], system.expand.shape[0])
