@@ -67,6 +67,7 @@ class Mapper:
         self.about: tuple[Settings, Modes | None] | None = None  # settings and body that what follows is of
         self.case: cases.Case  # with mass and stiffness of the scene
         self.kernels: batches.Kernels = {}
+        self.limits: np.ndarray | None = None  # (n,) [Hz] threshold of hammers all along the map
 
     def first(self, settings: Settings, window: Window, body: Modes | None = None) -> Picture:
         """The map in its coarsest form; the settings' mass and stiffness do not matter, ``body`` as in `Setup.case`."""
@@ -76,8 +77,7 @@ class Mapper:
         mass, stiffness = (np.geomspace(*ends, n) for ends, n in zip((window.mass, window.stiffness), FIRST[slow]))
         x, y = (part.ravel() for part in np.meshgrid(mass, stiffness))
         counts = self._counts(x, y, DRAFT).reshape(len(stiffness), len(mass))
-        felt = self.case.striker.felt_mass / self.case.striker.mass
-        found = threshold.thresholds(self.case.modes, self.case.at, felt * mass)
+        found = self._thresholds(mass)
         if law.special:  # as far as the map goes
             reached = [[self.setup.case(replace(settings, mass=float(m), stiffness=float(k))).resonance
                         for k in stiffness] for m in mass]  # fmt: skip
@@ -174,7 +174,20 @@ class Mapper:
         settings = replace(settings, mass=self.setup.start.mass, stiffness=1.0)
         if self.about is None or self.about[0] != settings or self.about[1] is not body:
             self.about, self.case = (settings, body), self.setup.case(settings, body=body)
-            self.kernels = {}
+            self.kernels, self.limits = {}, None
+
+    def _thresholds(self, mass: np.ndarray) -> np.ndarray:
+        """Thresholds (n,) [Hz] of hammers (n,) [kg], interpolated between those found once for the whole map."""
+        along = np.geomspace(*self.setup.range("mass"), 97)  # the points of the whole map are among these
+        if self.limits is None:
+            felt = self.case.striker.felt_mass / self.case.striker.mass
+            self.limits = threshold.thresholds(self.case.modes, self.case.at, felt * along)
+        place = np.interp(np.log(mass), np.log(along), np.arange(len(along)))
+        low, part = place.astype(int), place % 1.0
+        near, far = self.limits[low], self.limits[np.minimum(low + 1, len(along) - 1)]
+        some = (near > 0.0) & np.isfinite(near) & (far > 0.0) & np.isfinite(far)
+        ratio = np.divide(far, near, out=np.ones(len(mass)), where=some)
+        return np.where(some, near * ratio**part, np.where(part < 0.5, near, far))
 
     def _counts(self, mass: np.ndarray, stiffness: np.ndarray, tolerance: float) -> np.ndarray:
         """Impacts (n,) of hammers (n,) with contacts (n,)."""

@@ -67,6 +67,7 @@ class Explorer:
         self.setup, self.order, self.mapper = setup, order, Mapper(setup)
         self.views: dict[Point, View] = {}
         self.rest = setup.residual_at(setup.start.at)  # [m/N] of the last point known, good enough for a first answer
+        self.limit: tuple[Any, float] = None, 0.0  # [Hz] the last threshold, and what it is of
         if not setup.by_vectors:
             self.learn(setup.start.at, View(self.rest, None))
 
@@ -115,7 +116,10 @@ class Explorer:
     def rest_of(self, settings: Settings, hit: Response | None) -> Message:
         """What follows the answer: spectrum, threshold and the scene file."""
         case = self.case(settings)
-        resonance, threshold = case.resonance, limit_of(case)
+        about = case.at.tobytes(), settings.at in self.views, settings.mass, settings.thickness
+        if self.limit[0] != about:  # contact, speed and damping do not change it
+            self.limit = about, limit_of(case)
+        resonance, threshold = case.resonance, self.limit[1]
         limit = threshold if 0.0 < threshold < math.inf else None  # as pages draw it
         ratio = (
             f"{resonance / limit:.2g} × threshold" if limit else f"body {'never' if threshold else 'always'} stops it"
