@@ -1,4 +1,3 @@
-import json
 from dataclasses import replace
 
 import pytest
@@ -65,39 +64,7 @@ def test_before_the_blow_only_numbers_are_known():
     assert foreseen[0].state == "foreseen"
 
 
-@pytest.mark.parametrize(
-    "each, state",
-    [(WELL, "estimated"), (UNKNOWN, "not known"), (make({"restitution": None, "force": 0.5}), "beyond this estimate")],
-)
-def test_states(each, state):
-    assert each.state == state
-
-
 def test_total_adds_what_is_done_to_each_quantity_and_takes_the_largest():
     found = [WELL, make({"restitution": 0.01, "force": 0.002}), make({"restitution": 0.0, "force": 0.005}), UNKNOWN]
     assert assumption.total(found) == pytest.approx(0.010001)
     assert assumption.of_quantity(found, "force") == pytest.approx(0.007003)
-
-
-@pytest.mark.parametrize(
-    "number, value, words",
-    [
-        ("mass of the air moved over that of the body", 0.19, "the air carried along weighs 19 % of the body"),
-        ("mass of the air moved over that of the body", 9.1, "the air carried along weighs 9.1 times the body"),
-        ("deflection over thickness", 1.24, "the deflection is 1.2 times the thickness"),
-    ],
-)
-def test_numbers_read_as_one_says_them(number, value, words):
-    assert replace(WELL, number=number, value=value).reading == words
-    assert set(assumption.READINGS) >= {number}
-
-
-def test_a_table_is_plain_data():
-    (row,) = json.loads(json.dumps(assumption.table([UNKNOWN])))
-    assert row["state"] == "not known" and row["effect"] == {"restitution": None, "force": None}
-
-
-def test_a_blow_that_nobody_examined_knows_nothing():
-    found = assumption.unexamined(USUAL)
-    assert tuple(each.name for each in found) == assumption.ALL
-    assert {each.state for each in found} == {"not known"}

@@ -133,7 +133,6 @@ def test_the_gradient_knows_that_the_weight_grows_with_the_mass():
         (lambda: fi.Striker.rigid(0.1).falling(-1.0), "gravity must not be negative"),
         (lambda: fi.Striker.stick(mass=0.1, first_frequency=1e3).falling(), "must fall freely to fall"),
         (lambda: fi.Striker.rigid(0.1).held(fi.Hand(stiffness=10.0)).falling(), "but a hand holds this one"),
-        (lambda: dropped(fi.Contact.linear(1e6), None), "duration or max_impacts must be given"),
         (lambda: fi.sweep(BODY, fi.Striker.rigid(0.1).falling(), fi.Contact.linear(1e6), at=[0.0], speed=1.0,
                           over={"mass": [0.1]}), "must not fall in a map"),
     ],

@@ -50,7 +50,6 @@ WOODEN = SimpleNamespace(material="wood")
     [
         (lambda: fi.Contact.linear(0.0), r"stiffness must be positive, got 0 N/m\*\*exponent"),
         (lambda: fi.Contact.hertz(float("nan")), "stiffness must be finite"),
-        (lambda: fi.Contact.power(1e5, 0.4), "exponent must lie between 0.5 and 100"),
         (lambda: fi.Contact.linear(1e5, loss=-1.0), "loss must not be negative, got -1 s/m"),
         (lambda: fi.Contact.linear(1e5, gap=float("inf")), "gap must be finite"),
         (lambda: fi.Contact.restituting(1e5, 1.5, restitution=1.2, speed=1.0), "restitution must lie between"),

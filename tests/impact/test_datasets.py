@@ -3,7 +3,6 @@
 import numpy as np
 import pytest
 import xarray
-from matplotlib.figure import Figure
 
 import fem_impact as fi
 
@@ -60,15 +59,3 @@ def test_motion_and_spectrum_where_they_are_asked_for():
         hit.to_xarray(times=times)
     with pytest.raises(ValueError, match="max_frequency must be positive, got -1 Hz"):
         hit.to_xarray(max_frequency=-1.0)
-
-
-def test_plots_label_their_axes():
-    found = blow().to_xarray([(0.3, 0.2)], max_frequency=4e3)
-    for name, labels in {
-        "force": ("time [s]", "contact force [N]"),
-        "spectrum": ("frequency [Hz]", "spectrum of the force [N s]"),
-        "velocity": ("time [s]", "velocity [m/s]"),
-    }.items():
-        axes = Figure().subplots()
-        found[name].squeeze().plot(ax=axes)
-        assert (axes.get_xlabel(), axes.get_ylabel()) == labels

@@ -94,12 +94,6 @@ def test_eight_nodes_and_ten_agree(exponent, stiffness):
     assert_allclose(speeds[0], speeds[1], rtol=0, atol=5e-12)
 
 
-def test_gauss_polynomials_are_one_at_their_node():
-    nodes, powers = gauss(4)
-    assert nodes[-1] == 1.0
-    assert_allclose(powers @ np.vander(nodes[:-1], increasing=True).T, np.eye(4), atol=1e-12)  # rounding
-
-
 @pytest.mark.parametrize("exponent", [0.5, 0.52, 0.6])
 @each_scheme
 def test_chatter_of_a_soft_power_comes_to_an_end(exponent, scheme):

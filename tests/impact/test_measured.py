@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import fem_impact as fi
-from fem_impact.impact.measured import Measured, Predicted, Trace, compare
+from fem_impact.impact.measured import Measured, Predicted, compare
 
 WALL, BALL, SPRING = fi.Modes.rigid(1e3), fi.Striker.rigid(0.1), fi.Contact.linear(4e6)
 
@@ -70,14 +70,3 @@ def test_what_is_not_known_of_the_model_is_said():
 def test_measured_numbers_are_checked(measured, what):
     with pytest.raises(ValueError, match=what):
         fi.strike(WALL, BALL, SPRING, at=None, speed=1.0).against(measured)
-
-
-def test_the_picture_shows_every_number_and_force():
-    verdicts = tuple(Measured(f"time {i}", 1.0 + i, 0.1, "s") for i in range(4))
-    time = np.linspace(0.0, 1e-3, 9)
-    trace = Trace("tap", time, np.linspace(-2.0, 2.0, 9), np.full(9, 0.1), np.ones(9))
-    assert trace.inside.sum() == 5
-    found = compare(verdicts, Predicted(np.ones((1, 4)), computation=0.1), traces=(trace, trace))
-    figure = fi.figures.against(found)
-    assert len(figure.axes) == 3 and "56 % inside" in figure.axes[0].get_title("left")
-    assert [label.get_text() for label in figure.axes[2].get_yticklabels()] == [f"time {i}" for i in (3, 2, 1, 0)]

@@ -5,7 +5,6 @@ import re
 import warnings
 from dataclasses import replace
 
-import numpy as np
 import pytest
 from scenes import QUICK
 
@@ -177,9 +176,3 @@ def test_the_prompt_writes_everything_and_exits_with_3(tmp_path, capsys):
     assert told["tolerance_met"] is False and "MISSED" in told["verdict"]
     assert main([*command, "--n-modes", "5", "--strict"]) == 1
     assert "MISSED" in capsys.readouterr().err
-
-
-def test_what_is_met_is_said_with_what_it_is_an_error_of():
-    hit = fi.strike(plate(400), HAMMER, SOFT, at=AT, speed=1.0, tolerance=1e-3, quantity={"spectrum": 2e3})
-    assert "estimated error" in hit.promise and hit.promise.endswith("of spectrum to 2000 Hz")
-    assert np.isfinite(hit.error.total)

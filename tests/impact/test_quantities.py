@@ -11,11 +11,6 @@ def test_quantities_may_be_named_in_three_ways():
     assert asked_for(None) == USUAL and set(USUAL) | set(BANDED) == set(QUANTITIES)
 
 
-def test_what_is_asked_for_cannot_be_changed_afterwards():
-    with pytest.raises(TypeError):
-        asked_for("force")["sound"] = 1.0
-
-
 @pytest.mark.parametrize(
     ("quantity", "text"),
     [
