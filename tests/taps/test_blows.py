@@ -58,12 +58,6 @@ def test_a_scaled_body_is_the_scaled_modes():
     assert np.isclose(other.rest, wanted.rest, rtol=1e-6) and (other.zeta == 0.05).all()
 
 
-def test_one_more_mode_takes_its_modal_mass():
-    body = blows.wall(1).with_mode(500.0, 0.25, 0.03, np.array([0.5]))
-    assert body.omega[0] == pytest.approx(1000.0 * np.pi) and body.rows[0, 0] == 2.0 and body.seen[0, 0] == 1.0
-    assert body.felt_mass == np.inf and blows.of_striker(fi.Striker.rigid(0.2)).felt_mass == pytest.approx(0.2)
-
-
 def test_fast_modes_that_matter_shorten_the_step_and_are_followed():
     """The force with the step chosen, against steps of a sixteenth: 2e-6 of its peak, 1e-5 with steps twice as long."""
     law, ball = fi.Contact.linear(1e6), blows.of_striker(BALL)

@@ -38,13 +38,6 @@ def test_the_force_is_found_by_its_unit_before_its_name():
     assert channels.response_channels(recording(["F", "a1", "x"], ["N", "", "mm"]), None, ["N", "", "mm"], 0) == [1, 2]
 
 
-def test_a_name_that_fits_several_channels_is_refused():
-    found = recording(["Force 1", "Force 2"], ["N", "N"])
-    for force, said in ((None, "has several force channels"), ("force", "fits several channels")):
-        with pytest.raises(ValueError, match=said):
-            channels.force_channel(found, force, ["N", "N"], "a.csv")
-
-
 @pytest.mark.parametrize("sign", [1.0, -1.0])
 def test_forces_are_turned_around_by_their_taps_and_not_by_their_offset(sign):
     force = np.pad([[20.0], [80.0], [30.0]], ((20, 20), (0, 0))) - 60.0

@@ -1,13 +1,11 @@
 """What a fit found: a value for each tap, their spread, predictions, words and numbers."""
 
-from types import SimpleNamespace
-
 import numpy as np
 import pytest
 from hammer_taps import LAW, MASS, RANGES, fitted, taps_of
 
 import fem_impact as fi
-from fem_impact.taps.found import along, differ, stated
+from fem_impact.taps.found import differ
 
 FACTORS = (0.85, 1.1, 1.0, 1.25)  # stiffness of each tap over their typical one: no spot is struck twice
 SPEEDS = (0.5, 0.7, 0.9, 1.1)
@@ -89,18 +87,3 @@ def test_a_name_that_is_not_unknown_has_no_value_for_each_tap(taps):
     for per_tap, said in (("contact.loss", "be one of"), (3, "be a list of texts")):
         with pytest.raises(ValueError, match=f"per_tap must {said}"):
             hertz(taps, per_tap)
-
-
-@pytest.mark.parametrize(
-    ("low", "value", "high", "said"),
-    [(1e6, 2.2345e6, 5e6, ("2.2e+06", "1e+06 to 5e+06")), (0.995, 1.00123, 1.005, ("1.001", "0.995 to 1.005")),
-     (0.15, 0.15, 0.15, ("0.15", "0.15 to 0.15"))],
-)  # fmt: skip
-def test_digits_follow_the_interval(low, value, high, said):
-    profile = SimpleNamespace(interval=lambda: (low, high), value=value, told="told", open=(False, False))
-    assert stated(profile) == said
-
-
-def test_a_ridge_is_told_in_words():
-    said = "mode1.mass falls far faster, speed[0] grows with its power 0.5"
-    assert along({"mode1.mass": -7e6, "speed[0]": 0.5}) == said

@@ -126,12 +126,6 @@ def test_a_trigger_in_the_pulse_is_said_and_left_out(force, tmp_path):
     assert made.taps.labels == ("tap 1", "tap 2", "tap 4", "tap 5") and said(made, "tap 3")
 
 
-def test_a_voltage_is_not_taken_for_newtons(force, read):
-    with pytest.raises(ValueError, match=r"scale must be given for 'Hammer'.*in 'mV'"):
-        read(2.25 * force, "Hammer [mV]")
-    assert read(2.25 * force, "Hammer [mV]", scale=1.0 / 2.25).peak[4] == pytest.approx(force.max(), rel=5e-3)
-
-
 @pytest.mark.slow
 def test_a_spike_is_no_tap_of_this_hammer(force, read):
     sparks = force.copy()

@@ -35,11 +35,6 @@ def test_the_fall_of_a_pulse_follows_from_its_rise_and_the_other_taps(found):
     assert found.left_out() is whole and "own" not in found.taps.table
 
 
-def test_a_tap_at_another_rate_is_refused(found):
-    with pytest.raises(ValueError, match="sampled at 25600 Hz"):
-        found.predict(fi.Taps.from_arrays(np.sin(np.arange(60.0)) ** 2, rate=1e3))
-
-
 @pytest.fixture(scope="module")
 def banded():
     return fitted(taps_of(speeds=(0.4, 0.6, 0.8, 1.0)), starts=1)

@@ -56,11 +56,6 @@ def test_the_interval_of_a_gaussian_is_students():
         assert np.allclose(parabola().interval(level), [2.0 - half, 2.0 + half], rtol=1e-4)
 
 
-def test_the_curve_drawn_is_smooth_and_goes_through_the_points():
-    x, rise = parabola(n=7).curve()
-    assert np.interp(2.1, x, rise) == pytest.approx(1.0, rel=0.02) and len(x) == 200
-
-
 def test_open_ends_are_the_ends_of_the_range():
     flat = parabola(open_=(True, True), width=100.0)
     assert flat.interval() == (1.0, 3.0) and flat.told == "open"
