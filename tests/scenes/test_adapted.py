@@ -1,6 +1,5 @@
 """Scenes to begin with for one's own drawing, and a material and a mallet by name."""
 
-import re
 import shutil
 from pathlib import Path
 
@@ -71,12 +70,3 @@ def test_every_kind_takes_a_material(kind, prompt):
 def test_what_does_not_fit_is_refused_and_nothing_written(leaf, prompt, words, text):
     said = prompt(["new", *words])
     assert said.status == 2 and text in said.err and not list(leaf.glob("*.toml"))
-
-
-@pytest.mark.parametrize(
-    ("words", "status", "text"),
-    [("yarn", 0, r"yarn, medium\s"), ("PCB 086C03", 0, "mass 0.16 kg"), ("brss", 2, "did you mean 'brass'")],
-)
-def test_the_catalogue_at_the_prompt(prompt, words, status, text):
-    said = prompt(f"catalogue {words}")
-    assert said.status == status and re.search(text, said.err if status else said.out)

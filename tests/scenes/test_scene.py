@@ -175,39 +175,21 @@ BAD = [
     ("stiffness = 695e3", "exponent = 2", r"\[contact\] exponent is not a key .*; it has kind, stiffness, loss"),
     ("length = 0.465", "", r"\[mesh\] length is missing for shape = 'rectangle'"),
     ("length = 0.465", 'length = "long"', r"\[mesh\] length must be a number in m, got 'long'"),
-    ("length = 0.465", "length = true", r"\[mesh\] length must be a number in m, got True"),
-    ("length = 0.465", "length = nan", r"\[mesh\] length must be finite, got nan"),
     ("length = 0.465", "length = -0.465", r"\[mesh\] length must be positive, got -0.465 m"),
     ('"rectangle"', '"rectangel"', r"\[mesh\] shape must be one of .*; did you mean 'rectangle'\?"),
     ('shape = "rectangle"', "", r"\[mesh\] shape is missing; it is one of rectangle, disk"),
     ("[strike]", "[strik]", r"\[strik\] is not a table of a scene; did you mean 'strike'\?"),
     ("title =", "titel =", r"titel is not a key of a scene; did you mean 'title'\?"),
     ("[contact]", "[[contact]]", r"contact must be a table"),
-    ("mass = 0.03", "mass = -1", r"\[striker\] mass must be positive, got -1 kg"),
-    ("mass = 0.03", "mass = [0.03]", r"\[striker\] mass must be a number in kg"),
-    ("mass = 0.2", "mass = inf", r"\[target\] mass must be finite, got inf"),
     ("mass = 0.2", "", r"\[target\] needs mass and first_frequency if there is no \[material\]"),
-    ("damping_ratio = 0.005", "damping_ratio = -1", r"\[target\] damping_ratio must not be negative"),
     ('"analytic"', '"formula"', r"\[target\] source must be one of auto, fe, analytic"),
-    ("stiffness = 695e3", "stiffness = 0", r"\[contact\] stiffness must be positive"),
-    ("stiffness = 695e3", "stifness = 1.0", r"\[contact\] stifness is not a key .*did you mean 'stiffness'"),
     ('"hertz"\nstiffness = 695e3', '"between"', r"\[contact\] kind 'between' needs a striker of kind 'sphere'"),
     ("at = [0.1395, 0.09]", "", r"\[strike\] at is missing"),
     ("at = [0.1395, 0.09]", "at = [0.5, 0.09]", r"\[strike\] at must lie on the body, got \(0.5, 0.09\) m"),
-    ("at = [0.1395, 0.09]", "at = [0.1, nan]", r"\[strike\] at\[1\] must be finite, got nan"),
-    ("at = [0.1395, 0.09]", "at = [0.1]", r"\[strike\] at must be a point \(x, y\) in m, got \[0.1\]"),
-    ("at = [0.1395, 0.09]", 'at = "middle"', r"\[strike\] at must be numbers in m, got 'middle'"),
-    ("speed = 2.0", "speed = -2.0", r"\[strike\] speed must .*-2 m/s"),
-    ("tolerance = 1e-2", "tolerance = 0", r"\[strike\] tolerance must lie between"),
     ('boundary = "hinged"', 'boundary = "hinge"', r"\[supports\] boundary must be one of clamped, hinged, free"),
     ('boundary = "hinged"', 'lef = "hinged"', r"\[supports\] .*lef.*did you mean 'left'"),
-    ('title = "test"', "title = 3", r"title must be text, got 3"),
     ("mass = 0.2", "mass = 0.2\nmass = 0.3", r"not valid TOML: .*line"),
-    ("speed = 2.0", "speed = 2.0\n[observe]\npoints = [[9.0, 9.0]]", r"\[observe\] points must lie on the body"),
-    ("speed = 2.0", "speed = 2.0\n[observe]", r"\[observe\] points or listener must be given; add one or leave out"),
-    ("speed = 2.0", "speed = 2.0\n[observe]\nlistener = [0.1]", r"\[observe\] listener must have shape \(3\)"),
     ("speed = 2.0", "speed = 2.0\n[observe]\nlistener = [0.1, 0.1, 0]", r"\[observe\] listener must lie off the plate"),
-    ("speed = 2.0", "speed = 2.0\n[observe]\npoints = 3", r"\[observe\] points must be a list of points"),
     ("[target]", f"{MATERIAL}[target]", r"\[section\] is missing; \[material\] needs it"),
     (SOURCE, "point_supports = [{ stiffness = 1e4 }]", "must have at"),
     (SOURCE, "point_supports = [{ at = [0.1, 0.1], stiffness = 0 }]", "positive"),
@@ -279,11 +261,6 @@ def test_file_that_is_no_scene_is_told_so(tmp_path, raw, text):
     (tmp_path / "scene.toml").write_bytes(raw)
     with pytest.raises(ValueError, match=text):
         scene.load_scene(tmp_path / "scene.toml")
-
-
-def test_formulas_decline_what_they_do_not_know(tmp_path):
-    with pytest.raises(ValueError, match="source = 'analytic' covers beams of constant section"):
-        load_text(tmp_path, edited('boundary = "hinged"', 'left = "clamped"')).modes(3)
 
 
 @pytest.mark.parametrize("source", ["analytic", "fe"])

@@ -121,15 +121,6 @@ def test_another_body_for_each_value_needs_a_count_and_a_store(scene, tmp_path):
     assert sorted(path.name for path in tmp_path.iterdir()) == ["map-0", "map-1"]
 
 
-def test_pictures_name_points_and_whole_numbers(scene):
-    table = maps.map_scene(scene, over={"striker.mass": [0.01, 0.02], "strike.at": [[0.08, 0.05], [0.09, 0.06]]})
-    figure = maps.draw(table.assign(n_impacts=0 * table.n_impacts + 1), "n_impacts")
-    figure.canvas.draw()
-    axes, bar = figure.axes
-    assert [text.get_text() for text in axes.get_xticklabels() if text.get_text()] == ["(0.08, 0.05)", "(0.09, 0.06)"]
-    assert bar.get_yticks().tolist() == [1.0]
-
-
 def test_contours_of_a_power_law_are_where_it_says():
     x, y = np.linspace(0.01, 0.2, 4), np.geomspace(1e4, 1e6, 3)
     finer_x, finer_y, data = plots._finer(x, y, np.sqrt(y[:, None] / x))
@@ -172,17 +163,11 @@ def test_too_large_a_map_is_refused_and_a_costly_one_says_so(tmp_path, prompt, s
     [
         ("map drumstick_map --out map.png", "--out must name a folder for map.nc, map.csv and pictures"),
         ("map marked_linear", "[map] is missing; add it and name the axes, as in over = {"),
-        ("hammer drumstick_map --bandwith 500", "did you mean --bandwidth?"),
-        ("hammer drumstick_map", "see fem-impact hammer --help"),
         ("hammer drumstick_map --bandwidth 0", "bandwidth must lie between 0.001 and 1e+09 Hz, got 0 Hz"),
-        ("hammer drumstick_map --bandwidth inf", "bandwidth must be finite, got inf Hz"),
-        ("hammer drumstick_map --bandwidth 1e300", "bandwidth must lie between 0.001 and 1e+09 Hz, got 1e+300 Hz"),
         (
             "hammer drumstick_map --bandwidth 500 --masses 1e30 0.2",
             "masses must lie between 1e-06 and 10000 kg, got 1e+30",
         ),
-        ("hammer drumstick_map --bandwidth 500 --masses 0", "masses must lie between 1e-06 and 10000 kg, got 0 kg"),
-        ("hammer drumstick_map --bandwidth 500 --masses 0.01 nan", "masses must be finite"),
         ("hammer drumstick_map --bandwidth 500 --drop 60", "drop must lie between 1 and 40 dB, got 60 dB"),
     ],
 )

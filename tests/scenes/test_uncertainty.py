@@ -273,11 +273,6 @@ def test_the_prompt_complains_in_one_line_and_writes_nothing(scene, tmp_path, pr
     assert said.status == 2 and text in said.err and said.err.count("\n") == 1 and not (tmp_path / "out").exists()
 
 
-def test_the_numbers_checked_are_those_of_the_layers():
-    table = cases.Cases(None, {}, 1e-3, band=1e3)
-    assert set(table.apart(np.ones(7), np.ones(7))) == set(cases.LAYERS) - {"n_impacts", "error"}
-
-
 @pytest.mark.parametrize(
     ("table", "line", "words"),
     [
