@@ -1,15 +1,11 @@
 """The page of a fit shows what was found and what the data do not tell."""
 
-import base64
-import io
 from copy import copy
-from itertools import pairwise
 
-import matplotlib.pyplot as plt
 import pytest
 
 import fem_impact as fi
-from fem_impact.pages import fit_page, html_page
+from fem_impact.pages import fit_page
 from fem_impact.taps.found import Found
 
 
@@ -32,18 +28,6 @@ def test_a_page_with_values_ridges_pictures_and_double_hits(found, tmp_path):
     assert "do not tell contact.stiffness" in page and "and the taps are explained as well" in page
     assert "^-" not in found.summary() and 'class="badge good"' not in page
     assert "tip x 10" in page and "http" not in page.replace("http-equiv", "")
-
-
-def test_labels_of_axes_keep_apart_and_pictures_have_no_background(found):
-    figure = fit_page.profiles(found)
-    assert len(fit_page.pulses(found).axes) >= 3 and len(figure.axes) >= 4
-    figure.canvas.draw()
-    for axes in figure.axes:
-        boxes = [label.get_window_extent() for label in axes.get_xticklabels(which="both") if label.get_text()]
-        boxes = sorted(box.extents[[0, 2]].tolist() for box in boxes)
-        assert all(one[1] < next[0] for one, next in pairwise(boxes))
-    pixels = plt.imread(io.BytesIO(base64.b64decode(html_page.picture_uri(figure).partition(",")[2])))
-    assert pixels[0, 0, 3] == 0.0
 
 
 @pytest.mark.parametrize("white, badge", [(0.5, "good"), (1e-4, "bad")])

@@ -4,7 +4,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from numpy.testing import assert_allclose
 
 import fem_impact as fi
 from fem_impact.pages import frf_page, tap_pictures
@@ -65,12 +64,6 @@ def test_numbers_have_the_digits_of_their_intervals(value, half, said):
     assert frf_page._within(value, half) == said
 
 
-def test_likeness_of_shapes_is_a_picture_of_all_pairs():
-    figure = frf_page.likeness(np.eye(3), np.array([1.0, 2.0, 3.0]), np.array([1.1, 2.1, 3.1]))
-    assert_allclose(figure.axes[0].images[0].get_array(), np.eye(3))
-    assert [text.get_text() for text in figure.axes[0].texts] == ["1.00"] * 3
-
-
 @pytest.mark.slow
 def test_the_page_in_a_browser_moves_shapes_and_fits_a_phone_and_a_desk(written, visit):
     for width in (360, 1280):
@@ -104,10 +97,3 @@ def test_the_picture_of_a_watched_folder_marks_double_hits_and_has_responses_of_
     assert [line.get_linestyle() for line in spectra.lines[:2]] == ["-", "--"]
     assert responses.get_ylabel() == "response [m/s^2/N]" and coherence.get_ylim()[1] > 1.0
     assert "responses of 2 good taps" in figure.get_suptitle()
-
-
-def test_of_one_good_tap_no_coherence_is_drawn_and_without_any_no_response(taps):
-    alone = tap_pictures.watched(taps, taps.pick([0]), 2000.0, 10.0, "")
-    assert [axes.get_ylabel().split()[0] for axes in alone.axes if axes.get_visible()] == ["force", "force", "response"]
-    shown = [axes for axes in tap_pictures.watched(taps, None, 2e3, 10.0, "").axes if axes.get_visible()]
-    assert len(shown) == 2

@@ -71,8 +71,3 @@ def test_the_command_writes_film_and_captions(tmp_path, prompt, monkeypatch):
     said = prompt("strike small.toml --film --out out --json")
     assert said.status == 0 and {"slow_motion.mp4", "slow_motion.vtt"} <= set(said.json["files"])
     assert (tmp_path / "out" / "slow_motion.mp4").stat().st_size > 1000
-
-
-def test_other_endings_are_refused(twice, tmp_path):
-    with pytest.raises(ValueError, match="path ending"):
-        fi.slow_motion.write(tmp_path / "blow.gif", twice)

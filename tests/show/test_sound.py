@@ -190,17 +190,11 @@ BAR = {"width": 0.02, "height": 0.01, "duration": 0.01}
 @pytest.mark.parametrize(
     ("ask", "text"),
     [
-        (lambda bar, plate, disk, hit: sound.synthesise(hit, duration=-1.0), "duration must be positive, got -1 s"),
-        (lambda bar, plate, disk, hit: sound.radiate(hit, (0.0, 0.0, 1.0)), "response must be that of a plate"),
-        (lambda bar, plate, disk, hit: sound.radiate(plate, (0.1, 0.1, 0.0)), "off the plate's plane"),
         (lambda bar, plate, disk, hit: sound.radiate(plate, (0.1, 0.1)), r"listener must have shape \(3\)"),
-        (lambda bar, plate, disk, hit: sound.radiate_bar(plate, (0.1, 0.1, 1.0), **BAR),
-         "response must be that of a beam"),
         (lambda bar, plate, disk, hit: sound.radiate_bar(bar, (0.1, 0.0, 0.001), **BAR),
          "listener must be farther than half the width"),
         (lambda bar, plate, disk, hit: sound.radiate_bar(bar, (0.1, 0.0, 1.0), **BAR | {"height": 0.03}),
          "height must be at most the width"),
-        (lambda bar, plate, disk, hit: sound.radiate_free(bar, (0.0, 0.0, 1.0)), "use radiate_bar for a beam"),
         (lambda bar, plate, disk, hit: sound.radiate_free(disk, (0.0, 0.0, 0.01)),
          r"listener must be at least 0\.0148 m from a plate in free air, got 0\.01 m"),
     ],
