@@ -130,7 +130,6 @@ def test_a_beam_on_a_weak_spring_is_found():
 
 
 @pytest.mark.parametrize(("held", "more", "words"), [
-    ({"left": "hinged"}, {"section": Plate(STEEL, 1e-3, tension=1.0)}, "every edge supported"),
     ({}, {"point_masses": [((2.0, 0.5), 1.0)]}, r"must lie on the body, got \(2, 0.5\) m"),
     ({}, {"point_masses": [((0.2, 0.5), -1.0)]}, "mass of .* must be positive, got -1 kg"),
     ({}, {"point_masses": [0.2]}, r"must be a pair \(point in m, mass in kg\)"),

@@ -236,9 +236,7 @@ def test_every_piece_can_be_set_and_taken_back_and_a_smaller_tolerance_takes_a_l
     ({"target": "wall"}, "target must be one of rigid, infinite, vectors, mixed, modal, got 'wall'"),
     ({"n_modes": 0}, "n_modes"),
     ({"size": -1.0}, "size must be positive"),
-    ({"quantity": "restituton"}, "quantity must be one of .*did you mean 'restitution'"),
-    ({"tolerance": 0.0}, "tolerance must lie between"),
-])  # fmt: skip
+    ])  # fmt: skip
 def test_wrong_pieces_are_named(changes, text):
     with pytest.raises(ValueError, match=text):
         fi.plan(SCENES / "drumstick_map.toml", **changes)

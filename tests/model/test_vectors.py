@@ -222,12 +222,6 @@ def test_blow_that_no_mesh_resolves_names_a_contact_that_one_does():
     assert fi.plan(plate(), BALL, fi.Contact.hertz(softer), **BLOW, target="vectors").n_dofs < 160_000
 
 
-@pytest.mark.parametrize("wrong", [{"n_modes": 30}, {"max_frequency": 500.0}, {"residual": False}])
-def test_vectors_refuse_what_only_modes_have(wrong):
-    with pytest.raises(ValueError, match="target = 'vectors' needs"):
-        fi.strike(plate(), BALL, WOODEN, **BLOW, target="vectors", **wrong)
-
-
 @pytest.mark.parametrize(("tolerance", "coarseness"), [(1e-1, 8.0), (1e-3, 2.0), (1e-5, 0.1)])
 def test_triangles_at_the_blow_err_by_little_of_the_tolerance(tolerance, coarseness):
     """As `vectors.DIP` says: against the finest triangles there, with the same elements elsewhere."""

@@ -234,7 +234,6 @@ def test_a_striker_that_turns_is_mapped():
     (lambda: fi.Striker.of(loose(), 1, direction="z", along=(0, 0, -1)), "along must lead towards"),
     (lambda: fi.Striker.of(loose(), 1, direction="z", along=Z, pivot=Z), "give either along"),
     (lambda: fi.Striker.of(loose(), 1, direction="z", pivot=(0, 0, 1)), "pivot must lie off the line"),
-    (lambda: fi.Striker.of(loose(), 1), "neither cells nor a plane"),
     (lambda: fi.Striker.of(loose(scale=2.0), 1, direction="z"), "must be what the rigid motions move, 0.25 kg"),
     (lambda: fi.Striker.of(loose(n=1, at=0.1), 1, direction="z"), "three that are not on a line"),
     (lambda: fi.Striker.of(loose(first=3), 1, direction="z"), "give all six as modes of 0 Hz, or `Body.freed`"),

@@ -279,23 +279,3 @@ def test_the_first_ritz_vector_that_bends_stretches_as_its_mode_does(supports, n
     assert vectors.n_rigid == n_rigid and not stretch(vectors).forms[:, :n_rigid].any()
     one, two = (energy(each, np.eye(n)[-1]) for each in (vectors, modes))
     assert one == pytest.approx(two, rel=1e-3)  # 20 vectors
-
-
-def by_elements(supports, **how):
-    return fi.find_modes(fi.assemble(fi.mesh.rectangle(0.2, 0.2, size=0.1), PLATE, supports, **how), n_modes=4)
-
-
-BAR, BENT = fi.Beam.rectangular(STEEL, width=0.02, height=H), "no mode that bends"
-
-
-@pytest.mark.parametrize("body, why", [
-    (lambda: fi.Modes.rigid(1.0), "a mass has none"),
-    (lambda: fi.analytic.rectangle(0.2, 0.2, mass=1.0, first_frequency=100.0, n_modes=4), "section is not known"),
-    (lambda: fi.analytic.disk(0.2, edge="free", section=PLATE, n_modes=4).truncated(n_modes=3), BENT),
-    (lambda: by_elements({"left": fi.Elastic(1e6)}), "its edge is elastic"),
-    (lambda: by_elements({"boundary": "hinged"}, element="morley"), "element 'morley'"),
-    (lambda: fi.analytic.beam(0.3, ends=("clamped", "free"), section=BAR, n_modes=4), "an end is free"),
-])  # fmt: skip
-def test_bodies_whose_plane_is_not_known_are_refused(body, why):
-    with pytest.raises(ValueError, match=why):
-        stretch(body())
