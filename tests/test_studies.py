@@ -139,11 +139,6 @@ def test_a_scene_that_is_refused_says_so_in_its_row(tmp_path):
     assert row["verdict"].startswith("refused: this blow needs about 5e+03 modes") and "error" not in row
 
 
-def test_the_blows_of_the_study_are_the_everyday_scenes_and_five_more():
-    names = speed.cases()
-    assert len(names) == 30 and "marimba_yarn" in names and "bronze_disk 0.0001" in names
-
-
 def test_the_coverage_of_intervals_is_what_the_file_says():
     found = coverage.judge(coverage.read(STUDIES / "verification" / "fit_coverage.csv"))
     held, called, false = (good / count for good, count in found.values())
@@ -182,12 +177,6 @@ def test_a_plate_with_and_without_stretching_is_drawn(tmp_path, capsys):
     for _, linear, depth, true, told, left in rows[:8]:  # up to half a thickness
         assert depth <= linear and true / 3.0 < told < 3.0 * true and 0.0 < left < 0.02 * true
     assert all(np.isnan(left) == (depth > 1.0) for _, _, depth, _, _, left in rows)
-
-
-def test_what_is_not_known_gets_a_question_mark():
-    hit = right.fi.load_scene(STUDIES / "scenes" / "everyday" / "marimba_yarn.toml").strike()
-    assert np.isnan(right.effects(hit)["no yielding"])
-    assert right.table([{"scene": "a", "still air": "?"}]) == "| scene | still air |\n| --- | --- |\n| a | ? |"
 
 
 @pytest.mark.slow
