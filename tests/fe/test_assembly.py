@@ -8,7 +8,7 @@ from scipy.sparse.linalg import splu
 from fem_impact import mesh
 from fem_impact.fe import assembly
 from fem_impact.fe.assembly import assemble
-from fem_impact.fe.section import Beam, Material, Plate
+from fem_impact.fe.section import Material, Plate
 from fem_impact.modes.finding import find_modes
 
 STEEL = Material(E=210e9, nu=0.3, rho=7850.0)
@@ -22,12 +22,6 @@ def test_an_element_made_for_one_mesh_leaves_the_next_alone():
         for sides in ((1.0, 1.0), (2.0, 0.3), (1.0, 1.0))
     )
     assert abs(first.K - again.K).max() == 0.0
-
-
-def test_mass_is_area_times_thickness_times_density():
-    assert_allclose(assemble(mesh.rectangle(1.5, 1.0), PLATE).mass, 1.5 * 2e-3 * 7850, rtol=1e-12)
-    beam = Beam.rectangular(STEEL, width=0.02, height=lambda x: 0.01 * (1 + x[:, 0]))
-    assert_allclose(assemble(mesh.line(2.0), beam).mass, 7850 * 0.02 * 0.01 * 4.0, rtol=1e-12)
 
 
 @pytest.mark.parametrize(

@@ -11,12 +11,6 @@ STEEL = Material(E=210e9, nu=0.3, rho=7850.0)
 POINT = np.zeros((1, 2))
 
 
-def test_isotropic_plate_has_the_textbook_stiffness():
-    D = 210e9 * 2e-3**3 / (12 * (1 - 0.3**2))
-    wanted = D * np.array([[1, 0.3, 0], [0.3, 1, 0], [0, 0, 0.35]])
-    assert_allclose(Plate(STEEL, 2e-3).stiffness(POINT)[0], wanted, rtol=1e-14)  # the same products, rounded
-
-
 def test_orthotropic_with_equal_moduli_is_isotropic_at_any_angle():
     same = Material.orthotropic(E_along=210e9, E_across=210e9, nu=0.3, G=210e9 / 2.6, rho=7850.0, angle=0.7)
     assert_allclose(same.plane_stress, STEEL.plane_stress, rtol=1e-13, atol=1e-3)  # rounding of 1e11 Pa
