@@ -60,9 +60,9 @@ def test_advice_on_bodies_without_thick_theory_is_not_to_take_it():
     """Blows on curved and ribbed plates named theory = "mindlin", which is refused, and called flat ones too steep."""
     rib = fi.Rib([(0.1, 0.0), (0.1, 0.3)], fi.Beam.rectangular(PLATE.material, width=3e-3, height=8e-3))
     ribbed = fi.assemble(fi.mesh.rectangle(*SIDES), PLATE, {"boundary": "hinged"}, ribs=[rib])
-    ball, contact = fi.Striker.rigid(5e-3), fi.Contact.hertz(1e9)
+    ball, contact = fi.Striker.rigid(5e-3), fi.Contact.hertz(3e8)
     for system, curved in ((panel(), True), (ribbed, False)):
-        hit = fi.strike(system, ball, contact, at=(0.13, 0.1), speed=0.3, tolerance=1e-2, damping_ratio=0.01)
+        hit = fi.strike(system, ball, contact, at=(0.13, 0.1), speed=0.3, tolerance=1e-1, damping_ratio=0.01)
         thin, steep = (examined(hit, name) for name in ("thin target", "shallow target"))
         assert "take a softer contact" in thin.remedy and "mindlin" not in hit.summary()
         assert ("too steep" in steep.remedy) == curved == (steep.value is not None)
