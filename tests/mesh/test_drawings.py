@@ -184,11 +184,14 @@ def test_a_dxf_spline_through_points_is_a_curve(tmp_path):
 
 @pytest.mark.parametrize(("make", "text"), [
     (lambda t: in_mm(t, OPEN + HOLE), r"open outline: it ends at \(0, -0.3\) m, 0.3 m from its start; .* a name"),
+    (lambda t: in_mm(t, RIM + '<path d="M50 20 L200 20"/>'), "has an open outline"),
+    (lambda t: in_mm(t, '<path d="M0 0 H1000 V600 H0 V5"/>'), "has an open outline"),  # by 5 mm of a metre
     (lambda t: t / "none.svg", "there is no such file"),
     (lambda _: [(0, 0), (1, 0)], "must have 3 to 2000 points, got 2"),
     (lambda _: [(0, 0), (1, 1), (1, 0), (0, 1)], "must not cross or touch itself"),
     (lambda _: shapely.Point(0, 0), "one shapely Polygon, got a Point"),
-    ])  # fmt: skip
+    (lambda t: dxf(t, lambda s: s.add_circle((0, 0), 15.0), units=0), "looks like millimetres"),  # 30 m, no unit
+])  # fmt: skip
 def test_what_is_no_outline_is_refused(tmp_path, make, text):
     with pytest.raises(ValueError, match=text):
         mesh.outline(make(tmp_path))
