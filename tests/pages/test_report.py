@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from conftest import Page
+from browsing import Page
 from scenes import BAR, SMALL, load_text
 from test_cli import TEXT
 
