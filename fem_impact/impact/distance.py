@@ -70,17 +70,17 @@ def of_runs(
     if len(one.contacts) != n_impacts or one.status != two.status:
         return np.ones(len(quantities) + 1 + n_impacts)
     # other bodies that swing have much momentum, of which the striker's error is no share
-    rigid, other = (
+    rigid, other = [
         (np.isin(run.omega, (0.0, *pace.swings)) if pace and pace.swings else run.omega == 0.0).nonzero()[0]
         for run in (two, one)
-    )
+    ]
     start, end = two.start_p[rigid], two.end_p[rigid]
     momentum = sqrt(max(start.dot(start), end.dot(end)))
     momentum = momentum or sqrt(two.start_p.dot(two.start_p)) or sqrt(two.end_p.dot(two.end_p)) or 1.0
     # bodies that a force holds pressed rest but for the rounding of what it gave them
     given = float(two.contacts[:, 3].sum()) * np.abs(two.shape[:, rigid]).max(initial=0.0)
     speeds = np.maximum(np.abs(one.end_p[other] - end) - ROUNDING * given, 0.0)
-    own = sum(abs(part) * speed for part, speed in zip(pace.rebound if pace else (), speeds.tolist()))
+    own = sum([abs(part) * speed for part, speed in zip(pace.rebound if pace else (), speeds.tolist())])
     found: dict[str, float] = {"restitution": max(max(speeds.tolist(), default=0.0) / momentum, own)}
     totals = []
     for start, end, peak, impulse, *_ in each if n_impacts else ():

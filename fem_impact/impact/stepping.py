@@ -3,7 +3,6 @@
 import inspect
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
-from functools import cached_property
 from itertools import pairwise
 from typing import Any, TypeVar
 
@@ -136,12 +135,13 @@ def refine_steps(
             f"{most} steps cannot follow a force that acts for {span:.2g} s and changes {rise} where it is steepest; "
             "take a law of a lower exponent, that yields later or that rises less steeply"
         )
+    ringing = _ringing(system, pace)
     try:
-        return _Control(system, options, pace, scheme, free, stretched).agree_runs()
+        return _Control(system, options, pace, scheme, free, stretched, ringing).agree_runs()
     except _NotMet:
         if not free or scheme != "A4" or least < 1.0 or stretched is not None:
             raise
-    return _Control(system, options, pace, "collocation", free, stretched).agree_runs()
+    return _Control(system, options, pace, "collocation", free, stretched, ringing).agree_runs()
 
 
 class _NotMet(SimulationError):
@@ -158,11 +158,7 @@ class _Control:
     scheme: str
     free: bool  # whether scheme and steps are our choice
     stretched: Stretched | None
-
-    @cached_property
-    def ringing(self) -> tuple[np.ndarray, list[np.ndarray], list[np.ndarray]]:
-        """See `_ringing`."""
-        return _ringing(self.system, self.pace)
+    ringing: tuple[np.ndarray, list[np.ndarray], list[np.ndarray]]  # see `_ringing`
 
     def follow_blow(self, size: float, chosen_by: str = "tolerance") -> History:
         """One run, see `engine.run_system`."""
@@ -196,7 +192,7 @@ class _Control:
         """The same runs with the error of modes that neither resolves."""
         omega, _, lossy = self.ringing
         n_faster = np.count_nonzero(omega * found.steps[0] > RESOLVED)
-        if self.scheme == "collocation" or not lossy or not n_faster:
+        if self.scheme == "collocation" or not n_faster:
             return found
         share, most = UNRESOLVED
         missed = min(most * self.options.tolerance, share * max(each[n_faster - 1] for each in lossy))
@@ -211,7 +207,8 @@ class _Control:
         if options.dt is not None:
             size = min(options.dt, 0.5 * options.last[0])
             fine, coarse = (self.follow_blow(each, "dt") for each in (size, 2.0 * size))
-            return self.add_unresolved(self.judge_runs((size, 2.0 * size), coarse, fine))
+            found = self.judge_runs((size, 2.0 * size), coarse, fine)
+            return self.add_unresolved(found) if self.ringing[2] else found
         sizes, aim = self.list_sizes()
         try:
             runs = [self.follow_blow(size) for size in sizes[:2]]
@@ -239,7 +236,7 @@ class _Control:
                 break  # the next run would exceed the step limit
         if met is None:
             raise _NotMet(self.explain_failure(best, *runs))
-        return self.add_unresolved(met)
+        return self.add_unresolved(met) if self.ringing[2] else met
 
     def list_sizes(self) -> tuple[list[float], float]:
         """Steps, or misfits of collocation, to try in turn, and the error [-] aimed at."""
