@@ -121,7 +121,9 @@ def state_at(hit: "Response", time: float | None) -> State:
         raise ValueError(f"time must be at most {end:g} s, where the run stopped before its end, got {time:g} s")
     states = [hit.modal_state([time], body=body) for body in range(len(hit.bodies))]
     forces = np.array([h.force_at(np.array([time]), i) for i in range(len(hit.contacts))])[:, :, 0]
-    forces[forces[:, 0] <= SAME * hit.peak_force] = 0.0  # the rounding of a release
+    which, parts = h.contacts[:, 4].astype(int), np.isfinite(h.contacts[:, 6])
+    forces[which[parts & (np.abs(h.contacts[:, 1] - time) <= SAME * time)]] = 0.0  # what steps leave of it at a release
+    forces[forces[:, 0] <= SAME * hit.peak_force] = 0.0
     pressed, own = np.repeat(forces[:, None], 2, axis=1), np.vstack(h.states(np.array([time])))
     for ends in hit.ends:
         for (i, sign), force in zip(ends.touched, ends.pressed(h.omega, own)):
