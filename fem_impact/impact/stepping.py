@@ -136,8 +136,9 @@ def refine_steps(
             "take a law of a lower exponent, that yields later or that rises less steeply"
         )
     ringing = _ringing(system, pace)
+    control = _Control(system, options, pace, scheme, free, stretched, ringing)
     try:
-        return _Control(system, options, pace, scheme, free, stretched, ringing).agree_runs()
+        return control.add_unresolved(control.agree_runs())
     except _NotMet:
         if not free or scheme != "A4" or least < 1.0 or stretched is not None:
             raise
@@ -192,10 +193,9 @@ class _Control:
         """The same runs with the error of modes that neither resolves."""
         omega, _, lossy = self.ringing
         n_faster = np.count_nonzero(omega * found.steps[0] > RESOLVED)
-        if self.scheme == "collocation" or not n_faster:
+        if self.scheme == "collocation" or not lossy or not n_faster:
             return found
-        share, most = UNRESOLVED
-        missed = min(most * self.options.tolerance, share * max(each[n_faster - 1] for each in lossy))
+        missed = missed_by_ringing(max(each[n_faster - 1] for each in lossy), self.options.tolerance)
         n, error = self.options.n_quantities, found.error.copy()
         least = [missed if name == "force" else 0.2 * missed for name in self.options.quantities]
         error[:n] = np.maximum(error[:n], least)
@@ -207,8 +207,7 @@ class _Control:
         if options.dt is not None:
             size = min(options.dt, 0.5 * options.last[0])
             fine, coarse = (self.follow_blow(each, "dt") for each in (size, 2.0 * size))
-            found = self.judge_runs((size, 2.0 * size), coarse, fine)
-            return self.add_unresolved(found) if self.ringing[2] else found
+            return self.judge_runs((size, 2.0 * size), coarse, fine)
         sizes, aim = self.list_sizes()
         try:
             runs = [self.follow_blow(size) for size in sizes[:2]]
@@ -236,7 +235,7 @@ class _Control:
                 break  # the next run would exceed the step limit
         if met is None:
             raise _NotMet(self.explain_failure(best, *runs))
-        return self.add_unresolved(met) if self.ringing[2] else met
+        return met
 
     def list_sizes(self) -> tuple[list[float], float]:
         """Steps, or misfits of collocation, to try in turn, and the error [-] aimed at."""
@@ -274,6 +273,12 @@ class _Control:
             f"the step error stays at {best:.1e}, above the tolerance {tolerance:.1e}, with {len(fine.steps)} "
             f"steps{hint}; {advice}"
         )
+
+
+def missed_by_ringing(share: Any, tolerance: float) -> Any:
+    """Error [-] of the peak of a force that rings by a share of it [-] in modes faster than the steps."""
+    part, most = UNRESOLVED
+    return np.minimum(part * share, most * tolerance)
 
 
 def _unseen(coarse: History, fine: History, size: float) -> float:

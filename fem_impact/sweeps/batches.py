@@ -16,7 +16,7 @@ from ..impact.contact import wall_time
 from ..impact.distance import distance
 from ..impact.history import CLEAR
 from ..impact.reduced_body import rest_mode
-from ..impact.stepping import RESOLVED, UNRESOLVED
+from ..impact.stepping import RESOLVED, missed_by_ringing
 from ..impact.striker import Striker
 from ..modes.modal import Modes
 
@@ -65,19 +65,21 @@ class Family:
         flexible = omega > 0.0
         return squared[~flexible].sum(), (squared[flexible] / omega[flexible] ** 2).sum(), self.rest[body]
 
-    def heard(self, body: int, compliance: np.ndarray) -> np.ndarray:
-        """Frequency [rad/s] above which all modes together stay below each compliance; 0 if the whole body does."""
+    def upper(self, body: int) -> tuple[np.ndarray, np.ndarray]:
+        """Flexible modes [rad/s], the fastest first, and the compliance [kg m/N] of each with all faster ones."""
         fastest = np.argsort(-self.omega[body])[: np.count_nonzero(self.omega[body])]
         omega = self.omega[body][fastest]
-        above = np.cumsum(self.squared[body][fastest] / omega**2)
+        return omega, np.cumsum(self.squared[body][fastest] / omega**2)
+
+    def heard(self, body: int, compliance: np.ndarray) -> np.ndarray:
+        """Frequency [rad/s] above which all modes together stay below each compliance; 0 if the whole body does."""
+        omega, above = self.upper(body)
         return np.append(omega, 0.0)[np.searchsorted(above, compliance)]
 
     def faster(self, body: int, frequency: np.ndarray) -> np.ndarray:
         """Compliance [kg m/N] of all modes above each frequency [rad/s]."""
-        order = np.argsort(self.omega[body])[np.count_nonzero(self.omega[body] == 0.0) :]
-        omega = self.omega[body][order]
-        above = np.append(np.cumsum((self.squared[body][order] / omega**2)[::-1])[::-1], 0.0)
-        return above[np.searchsorted(omega, frequency, side="right")]
+        omega, above = self.upper(body)
+        return np.append(0.0, above)[np.searchsorted(-omega, -frequency)]
 
     def kernels(self, h: float, n_steps: int) -> tuple[np.ndarray, ...]:
         """Kernels of both bodies at unit mass, (6, n_steps) each, and bounds of their motion in flight."""
@@ -263,9 +265,8 @@ def _refined(engine: "_Engine", tolerance: float) -> tuple[np.ndarray, np.ndarra
         ratio = 2.0 ** (0.5 * finer)
         slack = SLACK * tolerance * 2.0 ** (0.5 * STEP_ORDER * (first[todo] - step))
         fine = engine.run_all(todo, step, slack, ratio * coarse[FOUND_STEPS])
-        share, most = UNRESOLVED
         found, stated = engine.compare_runs(coarse, fine, todo, ratio)
-        stated = np.maximum(stated, np.minimum(share * engine.unresolved(todo, step), most * tolerance))
+        stated = np.maximum(stated, missed_by_ringing(engine.unresolved(todo, step), tolerance))
         met = (found <= allowed(tolerance)) & (stated <= tolerance)
         final[:, todo[met]] = fine[:, met]
         error[todo[met]] = stated[met]
