@@ -56,36 +56,35 @@ def strike(
         raise ValueError("speed must be given in m/s, or start, which says how the striker moves")
     speed = speed if speed is None else check.non_negative("speed", speed, "m/s")
     before = start.state() if isinstance(start, Response) else start
+    if before is not None:
+        before.of(-1, "modes", modes)
     point, asked = modes.point("at", at), Options(**options)
     struck = part_of(modes, ((0, -1.0),), point, asked.residual).push_body(asked.target_force)
-    if before is not None:
-        q, p = before.of(-1, "modes", modes)
-        struck = replace(struck, q=q, p=p)
     if asked.stretching or modes.stretches:
         struck = replace(struck, stretching=stretch(modes))
 
-    def blow(striker: Striker, speed: float, own: tuple[np.ndarray, np.ndarray] | None = None) -> Response:
+    def blow(striker: Striker, speed: float, goes_on: bool = False) -> Response:
         arriving = part_of_striker(striker, asked.residual).push_body(asked.striker_force)
 
-        def start_bodies(one: float = 1.0, other: float = 1.0) -> list[ReducedBody]:
-            """Both bodies at the start, each as fast as it is known times a factor."""
-            target = struck if other == 1.0 else struck.faster(other)
-            if own is None:  # the striker arrives at the surface, wherever that is
+        def start_bodies(before: State | None) -> list[ReducedBody]:
+            """Both bodies at the start."""
+            target = struck
+            if before is not None:
+                target = replace(struck, q=before.displacements[-1], p=before.velocities[-1])
+            if before is None or not goes_on:  # the striker arrives at the surface, wherever that is
                 surface = float(struck.rows[0] @ target.q) * striker.motion
                 return [replace(arriving, q=surface, p=speed * striker.motion), target]
-            assert before is not None
-            moving = replace(arriving, q=own[0], p=own[1], pressed=before.pressing(arriving.touched))
-            return [moving.faster(one), replace(target, pressed=before.pressing(target.touched))]
+            moving = replace(arriving, q=before.displacements[0], p=before.velocities[0])
+            return [replace(part, pressed=before.pressing(part.touched)) for part in (moving, target)]
 
-        doubt = 0.0 if before is None else 1.0 + before.error
-        others = [start_bodies(*factors) for factors in ((doubt, 1.0), (1.0, doubt))[own is None :] if doubt]
-        return _follow((striker.body, modes), (contact,), start_bodies(), speed, asked, striker, point[0], others)
+        others = [] if before is None else [start_bodies(each) for each in before.otherwise]
+        return _follow((striker.body, modes), (contact,), start_bodies(before), speed, asked, striker, point[0], others)
 
     if speed is None:
         assert before is not None
         striker = before.same_striker(striker, contact, modes, point)
-        own = before.of(0, "striker", striker.body)
-        return blow(striker, float(striker.shape @ np.where(striker.modes.omega == 0.0, own[1], 0.0)), own)
+        _, p = before.of(0, "striker", striker.body)
+        return blow(striker, float(striker.shape @ np.where(striker.modes.omega == 0.0, p, 0.0)), True)
     if before is not None and before.force.any():
         raise ValueError(
             "start must be a time when nothing touches, or speed None for the striker to go on; at "
@@ -169,8 +168,9 @@ def met(
     others = []
     if before is not None:
         parts = [replace(part, pressed=before.pressing(part.touched)) for part in parts]
-        doubt = 1.0 + before.error
-        others = [[*parts[:i], part.faster(doubt), *parts[i + 1 :]] for i, part in enumerate(parts)]
+        for state in before.otherwise:
+            moved = zip(parts, state.displacements, state.velocities)
+            others.append([replace(part, q=q, p=p) for part, q, p in moved])
     return _follow(bodies, [touch.law for touch in contacts], parts, arriving, asked, others=others)
 
 
@@ -184,7 +184,7 @@ def touching(bodies: Sequence[Modes], touch: Touch, speed: float, residual: bool
 def _follow(bodies, laws, parts, speed, options, striker=None, at=None, others=()) -> Response:
     """Run the blow to the required tolerance and estimate the remaining errors.
 
-    ``others`` are the parts as they would move at the start if the blow before erred as estimated.
+    ``others`` are the parts as they would move at the start if the blow before erred, see `State.otherwise`.
     """
     system, stretched = joined(parts, laws), stretched_in(parts)
     if options.last == (np.inf, 0) and max((system.bias @ system.shape.T).tolist()) > 0.0:
@@ -211,19 +211,23 @@ def _follow(bodies, laws, parts, speed, options, striker=None, at=None, others=(
         found = replace(found, coarse=found.fine, steps=(found.steps[0],) * 2)
     blow = what_if.Followed(parts, laws, system, options, pace, found)
     left_out, resolvable = what_if.modes_left_out(blow, bodies)
-    inherited = what_if.Variation("inherited", [[(other, 1.0, 1.0)] for other in others])
-    variations = left_out, *what_if.unstated(blow, bodies), what_if.mesh(blow, bodies), inherited
+    variations = left_out, *what_if.unstated(blow, bodies), what_if.mesh(blow, bodies)
     errors = {"step": found.error, **what_if.what_if(blow, variations)}
+    moved = [blow.again(other) for other in others]
+    if moved:
+        apart = [distance.of_runs(run, found.coarse, options.quantities, pace=pace) for run in moved]
+        errors["inherited"] = np.maximum.reduce(apart)
     what_if.add_poorer_descriptions(blow, bodies, errors)
     whole, n = np.add.reduce([*errors.values()]), options.n_quantities
     if "n_impacts" in options.quantities and whole[n] >= found.fine.margin:
         doubted = max(errors.values(), key=lambda error: error[n])
         doubted[[*options.quantities].index("n_impacts")] += 1.0
+    runs = (found.coarse, *moved) if growth < np.inf else ()
     order = np.lexsort(found.fine.contacts[:, (4, 0)].T)  # as `History.impacts`
     error = Error.of_causes(errors, options.quantities, resolvable, growth)
     return Response(
         tuple(bodies), tuple(laws), found.fine, speed, options.tolerance, found.scheme, error, striker, at,
-        ends_of(parts, laws), options.quantities, rebounds=whole[n + 1 :][order],
+        ends_of(parts, laws), options.quantities, rebounds=whole[n + 1 :][order], runs=runs,
     )  # fmt: skip
 
 

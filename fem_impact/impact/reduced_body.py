@@ -83,10 +83,6 @@ class ReducedBody:
         """Whether modes left out yield at its contacts."""
         return len(self.rest.nonzero()[0]) > 0
 
-    def faster(self, factor: float) -> "ReducedBody":
-        """The same body with all motion larger by a factor, its rigid position as it is."""
-        return replace(self, q=np.where(self.omega == 0.0, 1.0, factor) * self.q, p=factor * self.p)
-
     def push_body(self, force: float) -> "ReducedBody":
         """The same body under a constant force [N] at its first contact."""
         return replace(self, force=force, bias=self.bias + force * self.rows[0]) if force else self

@@ -17,6 +17,7 @@ from ..impact.collision import Touch
 from ..impact.compiled import record
 from ..impact.contact import Contact
 from ..impact.engine import TOLERANCE
+from ..impact.error import Error
 from ..impact.history import Impact
 from ..impact.quantities import words
 from ..impact.response import Response, Totals
@@ -232,6 +233,7 @@ class _Stick:
     striker: Striker
     q: np.ndarray
     p: np.ndarray
+    doubt: np.ndarray  # as one of `State.doubts`
     force: np.ndarray = field(default_factory=lambda: np.zeros(2))  # [N], [N/s] at its contact and its rate
     pressed: np.ndarray = field(default_factory=lambda: np.zeros((2, 2)))  # as in `State`
 
@@ -284,12 +286,12 @@ def strokes(
     end = np.inf if duration is None else played[0].when + check.positive("duration", duration, "s")
     begun = start.state() if isinstance(start, Response) else start
     still = np.zeros(modes.n_modes)
-    game = _Game(modes, played, played[0].when, still, still)
+    game = _Game(modes, played, played[0].when, still, still, np.zeros((2, 2, modes.n_modes)))
     if begun is not None:
         if begun.force.any():
             raise ValueError(f"start must be a time when nothing touches; at {begun.time:.4g} s a force acts")
         game.q, game.p = begun.of(-1, "modes", modes)
-        game.error = begun.error
+        game.doubt = begun.doubts[-1]
     game.play_all(end, {"tolerance": EACH * tolerance, "quantity": quantity, "residual": residual})
     notes = tuple(dict.fromkeys(note for hit in game.hits for note in hit.notes))
     hits = tuple(replace(hit, tolerance=tolerance) for hit in game.hits)
@@ -327,7 +329,7 @@ class _Game:
     now: float  # [s]
     q: np.ndarray
     p: np.ndarray
-    error: float = 0.0
+    doubt: np.ndarray  # as one of `State.doubts`
     sticks: list[_Stick] = field(default_factory=list)
     starts: list[float] = field(default_factory=list)
     hits: list[Response] = field(default_factory=list)
@@ -372,7 +374,7 @@ class _Game:
         length = until - self.now if over else hit.history.end_time
         self.now = self.now + length if hit.history.status == record.IMPACTS else until
         state = hit.state(length if over else None)
-        self.q, self.p, self.error = state.displacements[-1], state.velocities[-1], state.error
+        self.q, self.p, self.doubt = state.displacements[-1], state.velocities[-1], state.doubts[-1]
         found = []  # the strikers that stay on the body, as they move now
         for i, stick in enumerate(() if over else self.sticks):
             stroke = self.played[stick.number]
@@ -383,8 +385,8 @@ class _Game:
                     f"strokes[{stick.number}] must have parted for good when the next blow or lift comes, at "
                     f"{self.now:.4g} s, because its contact yields or is felt, whose memory cannot be carried over"
                 )
-            moving = {"q": state.displacements[i], "p": state.velocities[i], "pressed": state.pressed[i]}
-            found.append(replace(stick, force=state.force[i], **moving))
+            moving = state.displacements[i], state.velocities[i], state.doubts[i], state.force[i], state.pressed[i]
+            found.append(_Stick(stick.number, stick.striker, *moving))
         self.sticks = found
         return bool(np.isfinite(self.now))
 
@@ -393,15 +395,16 @@ class _Game:
         if not self.sticks and len(fresh) == 1:
             one = self.played[fresh[0]]
             start = None
-            if self.error or self.q.any() or self.p.any():
-                start = State(0.0, (self.modes,), (self.q,), (self.p,), np.zeros((0, 2)), self.error)
+            if self.hits or self.q.any() or self.p.any():
+                free = np.zeros((0, 2))
+                start = State(0.0, (self.modes,), (self.q,), (self.p,), free, 0.0, doubts=(self.doubt,))
             blow = partial(
                 collision.strike, self.modes, one.striker, one.contact, at=one.at, speed=one.speed, start=start
             )
             hit = audit.audited(planner.struck(blow, rule))
             assert hit.striker is not None
             none = np.zeros(0)
-            self.sticks = [_Stick(fresh[0], hit.striker, none, none)]
+            self.sticks = [_Stick(fresh[0], hit.striker, none, none, none)]
         else:
             sticks = [*self.sticks, *(self._arriving(i, rule) for i in fresh)]
             laws = tuple(self.played[stick.number].contact for stick in sticks)
@@ -413,7 +416,8 @@ class _Game:
             q, p = (*(stick.q for stick in sticks), self.q), (*(stick.p for stick in sticks), self.p)
             forces = np.array([stick.force for stick in sticks])
             pressed = np.array([stick.pressed for stick in sticks])
-            start = State(0.0, bodies, q, p, forces, self.error, None, laws, pressed=pressed)
+            doubts = (*(stick.doubt for stick in sticks), self.doubt)
+            start = State(0.0, bodies, q, p, forces, 0.0, None, laws, pressed=pressed, doubts=doubts)
             movers = (*(stick.striker for stick in sticks), self.modes)
             hit = planner.struck(partial(collision.met, movers, touches, start=start), rule)
             self.sticks = sticks
@@ -427,10 +431,12 @@ class _Game:
             tolerance = Budget(rule["tolerance"]).cheap
             needed = collision.striker_modes(striker, contact=one.contact, speed=one.speed, tolerance=tolerance)[0]
             striker = collision.shortened(striker, needed)
-        surface = float(self.modes.shape_at(one.at[None])[0] @ self.q)
+        row = self.modes.shape_at(one.at[None])[0]
+        surface, doubt = float(row @ self.q), np.zeros((2, 2, len(striker.motion)))
+        doubt[:, 0] = np.outer(self.doubt[:, 0] @ row, striker.motion)
         if self.hits:  # with the static deflection under those that press now
             surface = float(self.hits[-1].displacement(one.at[None], [self.now - self.starts[-1]])[0, 0])
-        return _Stick(number, striker, surface * striker.motion, one.speed * striker.motion)
+        return _Stick(number, striker, surface * striker.motion, one.speed * striker.motion, doubt)
 
     def _alone(self) -> Response:
         """The body moving freely, as a blow without a touch."""
@@ -442,7 +448,9 @@ class _Game:
             steps=np.zeros((0, 7 + h.n_coefficients)), now=np.zeros((6, 1)), work=np.zeros(1), end_time=0.0,
             status=record.FINISHED,
         )  # fmt: skip
+        moved = [replace(history, start_q=self.q + dq, start_p=self.p + dp) for dq, dp in self.doubt]
+        error = Error(0.0, 0.0, 0.0, hit.error.resolvable, inherited=hit.error.total)
         return Response(
-            (self.modes,), hit.contacts[:1], history, 0.0, hit.tolerance, hit.scheme, hit.error,
-            quantities=hit.quantities,
+            (self.modes,), hit.contacts[:1], history, 0.0, hit.tolerance, hit.scheme, error,
+            quantities=hit.quantities, runs=(history, *moved),
         )  # fmt: skip
