@@ -169,9 +169,7 @@ def first_corner(contacts, h, depth, lossy, out_bracket):
     is what they remember at the end. Loss is left out unless ``lossy``.
     """
     law, now, y, rate, after = contacts.law, contacts.now, contacts.end, contacts.rate, contacts.after
-    target = -1
-    kind = LETS_GO
-    at = h
+    target, kind, at = -1, LETS_GO, h
     for i in range(y.size):
         d0, v0, d1, v1 = now[APPROACH, i], now[RATE, i], y[i], rate[i]
         loss = law["loss"][i]
@@ -192,15 +190,15 @@ def first_corner(contacts, h, depth, lossy, out_bracket):
             least = NEAR * law["hysteresis"][i] * abs(after[i])
             if least > 0.0 and (end > least if apart else end < -least):
                 start = min(start, -least) if apart else max(start, least)
-                root = h * start / (start - end)
                 if apart:  # it meets the felt like a wall that comes, in a force of any exponent
                     low, slow = above_felt(law, i, d0, v0, law["memory"][i], apart)
                     high, fast = above_felt(law, i, d1, v1, after[i], apart)
                     root = h * crossing(min(low, 0.0), h * slow, high, h * fast)
-                if root < AT_ONCE * h:
-                    if apart:
+                    if root < AT_ONCE * h:
                         return i, AGAIN, h
-                elif root < at:
+                else:
+                    root = h * start / (start - end)
+                if AT_ONCE * h <= root < at:
                     at, target, kind = root, i, PARTS
                     last_try(h, end, start, out_bracket)
             continue
@@ -216,18 +214,17 @@ def first_corner(contacts, h, depth, lossy, out_bracket):
             if v1 < 0.0 < v0 and high > bend + near and 0.0 < late < at:
                 at, target, kind = late, i, TURNS
                 last_try(h, -v1, -v0, out_bracket)
-        elif d0 < bend - near and high > bend + near:
-            root = h * crossing(d0 - bend, h * v0, d1 - bend, h * v1) if d1 > bend else -1.0
+            continue
+        deepens = d0 < bend - near and high > bend + near
+        if deepens or (not yields(law, i) and d0 > bend + near and d1 < bend - near):
+            if not deepens:
+                late, high = h, d1
+            root = h * crossing(d0 - bend, h * v0, d1 - bend, h * v1) if (d0 < bend) != (d1 < bend) else -1.0
             if root <= 0.0 or root > late:
                 root = late * (bend - d0) / (high - d0)
             if root < at:
                 at, target, kind = root, i, BENDS
                 last_try(late, high - bend, d0 - bend, out_bracket)
-        elif not yields(law, i) and d0 > bend + near and d1 < bend - near:
-            root = h * crossing(d0 - bend, h * v0, d1 - bend, h * v1)
-            if root < at:
-                at, target, kind = root, i, BENDS
-                last_try(h, d1 - bend, d0 - bend, out_bracket)
     out_bracket[LOW] = 0.0
     return target, kind, at
 
