@@ -12,7 +12,7 @@ import numpy as np
 from .build import ZERO, inner, outer
 from .cubics import crossing, cubic, turning
 from .events import LET_GO, letting_go
-from .law import dent, relaxes, spring_of, spring_with, stored
+from .law import dent, point_at, relaxes, spring_of, spring_with, stored
 from .laws.felt import above_felt
 from .misfit import force_on, misfit
 from .rounding import NEAR
@@ -56,8 +56,15 @@ def ends_of(steps, now, law, n_coefficients, row, i):
 
 
 @inner()
-def force_within(steps, now, law, n_coefficients, row, i, part):
-    """Force of contact i at a fraction of a step, never negative, and its rate [N/s].
+def course_of(steps, now, law, n_coefficients, row, i):
+    """Approach from the dent and its rate at both ends of a step, and the spring of contact i in it."""
+    spring = spring_with(law, i, memory_of(steps, law, n_coefficients, row, i))
+    return ends_of(steps, now, law, n_coefficients, row, i), spring
+
+
+@inner()
+def force_within(steps, n_coefficients, row, i, course, part):
+    """Force of contact i at a fraction of a step of that course, never negative, and its rate [N/s].
 
     That is the law on the cubic through both ends, or a higher polynomial.
     """
@@ -69,8 +76,7 @@ def force_within(steps, now, law, n_coefficients, row, i, part):
             slope = slope * part + value
             value = value * part + steps[row, first + PUSH + k]
         return max(value, 0.0), slope / h if value > 0.0 else 0.0
-    d0, v0, d1, v1 = ends_of(steps, now, law, n_coefficients, row, i)
-    spring = spring_with(law, i, memory_of(steps, law, n_coefficients, row, i))
+    (d0, v0, d1, v1), spring = course
     return force_on(d0, v0, d1, v1, h, part, spring)
 
 
@@ -78,7 +84,8 @@ def force_within(steps, now, law, n_coefficients, row, i, part):
 def forces(steps, now, law, n_coefficients, rows, i, part, out):
     """Force of contact i [N] and its rate [N/s], (2, n), at fractions (n,) of steps (n,)."""
     for n in range(rows.size):
-        out[0, n], out[1, n] = force_within(steps, now, law, n_coefficients, rows[n], i, part[n])
+        course = course_of(steps, now, law, n_coefficients, rows[n], i)
+        out[0, n], out[1, n] = force_within(steps, n_coefficients, rows[n], i, course, part[n])
 
 
 @inner()
@@ -170,8 +177,7 @@ def force_missed(steps, now, law, n_coefficients, peak):
             miss = 0.0
             if steps[row, first + CLOSED] > 0.0:
                 mean = mean_push(steps, n_coefficients, row, first)
-                d0, v0, d1, v1 = ends_of(steps, now, law, n_coefficients, row, i)
-                spring = spring_with(law, i, memory_of(steps, law, n_coefficients, row, i))
+                (d0, v0, d1, v1), spring = course_of(steps, now, law, n_coefficients, row, i)
                 miss = misfit(mean, d0, v0, d1, v1, steps[row, LENGTH], spring, peak)
             worst = max(worst, min(miss, before) if corner else miss)
             before = miss
@@ -180,24 +186,29 @@ def force_missed(steps, now, law, n_coefficients, peak):
 
 @inner()
 def peak_in(steps, now, law, n_coefficients, row, i):
-    """Largest force of contact i in a step: the largest of some looks, refined by parabolas."""
+    """Largest force of contact i in a step: where it is pressed deepest, or the largest of some looks, refined."""
+    course = course_of(steps, now, law, n_coefficients, row, i)
+    (d0, v0, d1, v1), spring = course
+    if n_coefficients == 2 and spring.loss == 0.0 and spring.relaxation == 0.0:
+        h = steps[row, LENGTH]
+        return point_at(max(d0, d1, turning(d0, h * v0, d1, h * v1)[1] if v1 < 0.0 < v0 else 0.0), spring).force
     peak = part = 0.0
     for look in range(PEAK_LOOKS + 1):
-        f, _ = force_within(steps, now, law, n_coefficients, row, i, look / PEAK_LOOKS)
+        f, _ = force_within(steps, n_coefficients, row, i, course, look / PEAK_LOOKS)
         if f > peak:
             peak = f
             part = look / PEAK_LOOKS
     spread = 1.0 / PEAK_LOOKS
     for _ in range(4):
         middle = min(max(part, spread), 1.0 - spread)
-        low, _ = force_within(steps, now, law, n_coefficients, row, i, middle - spread)
-        top, _ = force_within(steps, now, law, n_coefficients, row, i, middle)
-        high, _ = force_within(steps, now, law, n_coefficients, row, i, middle + spread)
+        low, _ = force_within(steps, n_coefficients, row, i, course, middle - spread)
+        top, _ = force_within(steps, n_coefficients, row, i, course, middle)
+        high, _ = force_within(steps, n_coefficients, row, i, course, middle + spread)
         bend = low - 2.0 * top + high
         if bend >= 0.0:
             break
         part = middle + min(max(0.5 * (low - high) / bend, -1.0), 1.0) * spread
-        peak = max(peak, force_within(steps, now, law, n_coefficients, row, i, part)[0])
+        peak = max(peak, force_within(steps, n_coefficients, row, i, course, part)[0])
         spread *= 0.125
     return peak
 
@@ -227,8 +238,9 @@ def peak_between(steps, now, law, n_coefficients, begin, end, i):
     peak_row = begin
     for row in range(begin, end):
         if mean_push(steps, n_coefficients, row, first) >= 0.9 * most:
+            course = course_of(steps, now, law, n_coefficients, row, i)
             for look in range(n_coefficients):
-                f, _ = force_within(steps, now, law, n_coefficients, row, i, look / n_coefficients)
+                f, _ = force_within(steps, n_coefficients, row, i, course, look / n_coefficients)
                 if f > peak:
                     peak = f
                     peak_row = row
