@@ -231,13 +231,6 @@ def test_only_stiffness_times_speed_to_the_power_matters():
     assert_allclose(found.impulse / speed, found.impulse[0] / speed[0], rtol=1e-9)
 
 
-def test_threads_change_nothing():
-    blows = many(plate(), fi.Striker.stick(0.1, 10e3), np.logspace(4, 6, 2 * batches.FEW))
-    one, two = (batches.bounce(blows, tolerance=1e-3, workers=n) for n in (1, 2))
-    for name in ("n_impacts", "contact_time", "impulse"):
-        assert np.array_equal(getattr(one, name), getattr(two, name), equal_nan=True)
-
-
 @pytest.mark.parametrize("zeta", [0.0, 0.05, 1.5])
 def test_looks_ahead_miss_no_more_of_a_flight_than_is_claimed(zeta):
     """The bound behind every proved flight against the exact motion after a force of straight pieces with jumps."""
