@@ -40,7 +40,7 @@ def held(plate):
     return parameters(plate, {"boundary": "hinged"})
 
 
-def same_as_good(plate):
+def assert_same_as_good(plate):
     """The same triangles, in any order of points and cells, each counterclockwise."""
     one, two = (np.sort(shape.points[shape.cells].mean(axis=1).round(9) @ [1.0, 1j]) for shape in (plate, GOOD))
     assert_allclose(one, two, atol=1e-12)
@@ -56,10 +56,10 @@ def test_formats_without_names_give_the_same_plate(tmp_path, name):
     if name == "plate.stl":  # single precision
         assert_allclose(held(plate), HINGED, rtol=1e-5)  # refined by find_modes: 1e-6
     else:
-        same_as_good(plate)
+        assert_same_as_good(plate)
 
 
-def same_edges(one, two):
+def assert_same_edges(one, two):
     assert set(one.edges) == set(two.edges)
     for name in one.edges:
         places = [shape.points[shape.facets[shape.edges[name]]].mean(axis=1).round(9) for shape in (one, two)]
@@ -69,8 +69,8 @@ def same_edges(one, two):
 def test_saved_mesh_comes_back_with_its_edges(tmp_path):
     mesh.save(tmp_path / "plate.msh", GOOD)
     plate = mesh.load(tmp_path / "plate.msh")
-    same_as_good(plate)
-    same_edges(plate, replace(GOOD, edges=GOOD.edges | {"outer": GOOD.edges["boundary"]}))
+    assert_same_as_good(plate)
+    assert_same_edges(plate, replace(GOOD, edges=GOOD.edges | {"outer": GOOD.edges["boundary"]}))
 
 
 def test_lines_with_nodes_of_their_own_name_edges_and_those_beside_all_triangles_are_told(tmp_path):
@@ -117,7 +117,7 @@ def test_sets_of_nodes_are_edges_which_may_overlap_and_be_called_as_the_surface_
     assert_allclose(given.points[given.facets[given.edges["plate"]]][..., 0], 0.0)
     assert given.edges["ALL"].tolist() == given.edges["boundary"].tolist()
     mesh.save(tmp_path / "again.msh", given)
-    same_edges(mesh.load(tmp_path / "again.msh"), given)
+    assert_same_edges(mesh.load(tmp_path / "again.msh"), given)
 
 
 def test_a_set_that_holds_one_of_two_duplicate_nodes_names_the_sides_of_both(tmp_path):
@@ -173,7 +173,7 @@ def test_a_mesh_far_finer_than_the_modes_need_is_filled_anew_within_its_rim(tmp_
     modes = find_modes(assemble(plate, PLATE, supports), n_modes=6, tolerance=1e-3)
     used = modes.shapes.system.mesh
     assert len(used.cells) < 0.7 * len(plate.cells)
-    same_edges(used, plate)
+    assert_same_edges(used, plate)
     order = [np.lexsort(np.round(m.middles, 9).T) for m in (used, plate)]
     for field in ("middles", "curvatures"):  # 1e-6: curvatures come from second differences of the curve
         one, two = (getattr(m, field)[rows] for m, rows in zip((used, plate), order))
@@ -239,7 +239,7 @@ N, HALF = len(GOOD.points), len(GOOD.cells) // 2
 def test_what_is_safe_to_mend_is_mended_and_said(tmp_path, points, cells, note):
     plate = mesh.load(written(tmp_path, points, cells))
     assert any(note in said for said in plate.notes) if note else not plate.notes
-    same_as_good(plate)
+    assert_same_as_good(plate)
 
 
 def test_hanging_nodes_are_tied_in(tmp_path):

@@ -115,13 +115,6 @@ def test_ball_on_a_wide_thin_plate_meets_no_echo(scene):
     assert vast.plan().target == "infinite"
 
 
-def test_fewer_quantities_take_fewer_steps():
-    scene = fi.load_scene(SCENES / "drumstick_map.toml")
-    everything, one = (scene.run(tolerance=1e-5, quantity=q).response for q in (None, "restitution"))
-    assert len(one.history.steps) < len(everything.history.steps)
-    assert abs(one.restitution - everything.restitution) < 1e-5
-
-
 @pytest.mark.parametrize(("seed", "loss"), [(1, 0.0), (4, 0.0), (10, 0.0), (13, 0.0), (11, 0.3), (13, 0.3)])
 def test_the_modes_planned_suffice_at_the_first_attempt(seed, loss):
     rng = np.random.default_rng(seed)

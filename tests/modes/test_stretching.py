@@ -27,7 +27,7 @@ def dent(modes, at):
     return energy(modes, softness(modes, at))
 
 
-def same_forms(one, other, rel):
+def assert_same_forms(one, other, rel):
     """The forms may differ by signs and turns of equal modes; their eigenvalues may not."""
     values = [np.linalg.eigvalsh(stretch(modes).forms[0]) for modes in (one, other)]
     assert values[0] == pytest.approx(values[1], rel=rel, abs=1e-12 * values[1].max())  # a stout beam only turns in one
@@ -226,7 +226,7 @@ def test_beams_by_elements_and_by_formulas(ends, theory, height):
     bar = fi.Beam.rectangular(STEEL, width=0.02, height=height)
     closed = fi.analytic.beam(0.3, ends=ends, section=bar, n_modes=8, theory=theory)
     system = fi.assemble(fi.mesh.line(0.3), bar, {"left": ends[0], "right": ends[1]}, theory=theory)
-    same_forms(closed, fi.find_modes(system, n_modes=8), 1e-9)
+    assert_same_forms(closed, fi.find_modes(system, n_modes=8), 1e-9)
 
 
 def test_a_beam_between_walls_stretches_as_woinowsky_krieger_says():

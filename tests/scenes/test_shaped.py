@@ -45,7 +45,7 @@ def frequencies(body, **shape):
     return fi.find_modes(fi.assemble(RECTANGLE, plate, HINGED, **shape), n_modes=4).frequencies
 
 
-def same(scene, expected):
+def assert_same(scene, expected):
     # the same elements in both: what is left is rounding, and that of the eigenvalues is some 1e-12
     np.testing.assert_allclose(scene.modes(4).frequencies, expected, rtol=1e-9)
 
@@ -61,7 +61,7 @@ def same(scene, expected):
 )  # fmt: skip
 def test_every_rise_of_a_scene_is_that_of_python(tmp_path, keys, rise):
     scene = load(tmp_path, mesh=f"rise = {{ {keys} }}")
-    same(scene, frequencies(None, rise=rise))
+    assert_same(scene, frequencies(None, rise=rise))
 
 
 def test_a_table_of_heights_lies_beside_the_scene_and_goes_with_its_results(tmp_path):
@@ -71,7 +71,7 @@ def test_a_table_of_heights_lies_beside_the_scene_and_goes_with_its_results(tmp_
     rows = "\n".join(",".join(map(repr, row)) for row in np.column_stack([points, rise(points)]).tolist())
     (tmp_path / "heights.csv").write_text(f"x,y,z\n{rows}\n")
     scene = load(tmp_path, mesh='rise = { table = "heights.csv" }')
-    same(scene, frequencies(None, rise=fi.rise.table(points, rise(points))))
+    assert_same(scene, frequencies(None, rise=fi.rise.table(points, rise(points))))
     (tmp_path / "kept").mkdir()
     tables, names = scene.kept(tmp_path / "kept")
     assert names == ["heights.csv"] and tables["mesh"]["rise"] == {"table": "heights.csv"}
@@ -91,7 +91,7 @@ def test_ribs_tapered_along_edges_and_of_another_material(tmp_path):
         fi.Rib("left", fi.Beam.circular(ALLOY, diameter=10e-3), 0.0),
     ]
     scene = load(tmp_path, rest=rest)
-    same(scene, frequencies(None, ribs=bars))
+    assert_same(scene, frequencies(None, ribs=bars))
     assert scene.picture().count('stroke-linecap="round"') == 1 + 3  # one straight rib, and the edge in three facets
 
 
@@ -114,7 +114,7 @@ def test_layers_stand_for_the_thickness_and_edges_slide(tmp_path):
     layers = "[in_plane]\nboundary = 'sliding'\n[[layer]]\nthickness = 2e-3\n[[layer]]\nthickness = 1e-3\n"
     scene = load(tmp_path, rest=f"{layers}angle = 1.5\nmaterial = {{ E = 70e9, nu = 0.33, rho = 2700.0 }}", text=text)
     plate = fi.Plate.laminate([(WOOD, 2e-3, 0.0), (ALLOY, 1e-3, 1.5)])
-    same(scene, frequencies(plate, in_plane={"boundary": "sliding"}))
+    assert_same(scene, frequencies(plate, in_plane={"boundary": "sliding"}))
 
 
 def test_numbers_within_ribs_layers_and_rises_have_intervals(tmp_path):
