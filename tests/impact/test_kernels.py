@@ -557,7 +557,7 @@ def test_a_run_leaves_other_threads_free():
         run([0.0, *np.linspace(1e3, 1e5, 300)], [1.0, *np.full(300, -0.05)], k=1e4, h=1e-7, max_steps=count)
 
     press(10)  # compiled or loaded
-    thread = threading.Thread(target=press, args=(100_000,))  # some 0.1 s
+    thread = threading.Thread(target=press, args=(300_000,))  # some 0.3 s
     thread.start()
     ticks = 0
     while thread.is_alive():

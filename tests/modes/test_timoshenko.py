@@ -43,14 +43,6 @@ def test_slender_beams_are_euler_bernoulli_beams(ends):
     assert (stout.omega <= plain.omega * (1.0 + 1e-10)).all()
 
 
-@pytest.mark.parametrize("ends", PAIRS)
-def test_the_static_deflection_is_the_sum_over_all_modes(ends):
-    modes = fi.analytic.beam(0.4, ends=ends, section=bar(0.06), n_modes=200, theory="timoshenko")
-    whole, rest = modes.shapes.compliance(POINTS), modes.residual_compliance(POINTS)
-    assert (np.diag(rest) >= -1e-9 * np.abs(whole).max()).all()
-    assert np.abs(rest).max() < 1e-2 * np.abs(whole).max()  # the sum converges as 1 / n, as shear makes kinks
-
-
 def test_the_first_kind_of_the_second_spectrum_only_turns_the_sections():
     """A hinged beam has a mode without deflection at omega^2 = kappa G A / (rho I)."""
     section, point = bar(0.1), np.zeros((1, 1))

@@ -47,7 +47,7 @@ def read(tmp_path):
     return read
 
 
-def same(found, modes, points):
+def assert_same(found, modes, points):
     assert_allclose(found.frequencies, modes.frequencies, rtol=1e-5)  # six digits are written
     shapes = modes.shape_at(points)
     assert_allclose(found.shape_at(points), shapes, atol=1e-5 * np.abs(shapes).max())
@@ -56,7 +56,7 @@ def same(found, modes, points):
 def test_modes_come_back_as_they_were_written_with_their_elements(written, tmp_path):
     modes, points, cells, path = written
     again = Modes.from_uff(path, mass=modes.mass)
-    same(again, modes, points)
+    assert_same(again, modes, points)
     assert_allclose(again.damping_ratio, modes.damping_ratio, rtol=1e-5)
     assert again.n_rigid == 3 and modes.continuous and not again.continuous
     assert np.array_equal(again.shapes.grid()[1], cells)
@@ -131,7 +131,7 @@ def test_files_in_other_units_or_frames_and_of_other_quantities(written, plate, 
         entry["r3"] = entry["r3"] / np.sqrt(pound / inch)
     units = {"type": 164, "units_code": 7, "units_description": "inch", "temp_mode": 1, "length": inch, "force": pound}
     stresses = [entry | {"spec_data_type": 2, "data_type": 4} for entry in sets[3:]]
-    same(read([units | {"temp": 1.0, "temp_offset": 0.0}, *sets, *stresses], mass=modes.mass), modes, points)
+    assert_same(read([units | {"temp": 1.0, "temp_offset": 0.0}, *sets, *stresses], mass=modes.mass), modes, points)
     frames = {"type": 2420, "CS_colors": [8, 8], "CS_names": ["all", "own"], "CS_sys_labels": [1, 5]}
     frames |= {"CS_types": [0, 0], "CS_matrices": [np.eye(4)[:, :3], np.eye(4)[::-1, :3]]}
 
