@@ -45,16 +45,13 @@ def test_a_scene_and_a_function_make_the_same_pieces():
     assert one.key == two.key  # the body is the same, and found once
 
 
-@pytest.mark.parametrize(
-    "objects, words",
-    [
-        (3, "objects must be a scene, the path of one, or a function"),
-        (lambda values: 3, "must return a System, Modes, a dict of arguments"),
-        (lambda values: {"target": fi.Modes.rigid(1.0), "striker": fi.Striker.rigid(1.0)}, "contact must be"),
-        (lambda values: {"target": fi.Modes.rigid(1.0), "striker": fi.Striker.rigid(1.0), "at": None,
-                         "contact": fi.Contact.hertz(1e6)}, "needs speed, an argument of strike"),
-    ],
-)  # fmt: skip
+@pytest.mark.parametrize("objects, words", [
+    (3, "objects must be a scene, the path of one, or a function"),
+    (lambda values: 3, "must return a System, Modes, a dict of arguments"),
+    (lambda values: {"target": fi.Modes.rigid(1.0), "striker": fi.Striker.rigid(1.0)}, "contact must be"),
+    (lambda values: {"target": fi.Modes.rigid(1.0), "striker": fi.Striker.rigid(1.0), "at": None,
+                     "contact": fi.Contact.hertz(1e6)}, "needs speed, an argument of strike"),
+])  # fmt: skip
 def test_what_makes_no_blow_is_said(objects, words):
     with pytest.raises(ValueError, match=words):
         Maker.of(objects, ()).pieces({})

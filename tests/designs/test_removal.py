@@ -90,7 +90,6 @@ def test_images_stand_once_and_places_lie_on_the_body():
 
 TWO_LAYERS = fi.Plate.laminate([(WOOD, 1e-3, 0.0), (WOOD, 1e-3, np.pi / 2)])
 RIBBED = fi.Plate(WOOD, 4e-3, ribs=(SimpleNamespace(rigidity=None),))
-HOLE = removal.thinner(PLATE, lambda at: np.full(len(at), 5e-3))
 
 
 @pytest.mark.parametrize(

@@ -37,14 +37,11 @@ def cap(chi, edge, radius=0.2, thickness=1e-3):
     return system, (2.0 * np.pi) ** 2 * RHO * thickness * radius**4 / float(plate.stiffness(np.zeros((1, 2)))[0, 0, 0])
 
 
-@pytest.mark.parametrize(
-    "thickness, curvature",
-    [
-        (2e-3, (-0.5, -0.5)), (2e-3, (0.0, -0.5)), (2e-3, (-0.5, 0.5)), (2e-3, (-0.3, 0.1)),
-        pytest.param(4e-5, (-0.2, 0.0), marks=pytest.mark.slow), (4e-5, (-0.2, -0.2)),
-        pytest.param(4e-5, (-0.2, 0.2), marks=pytest.mark.slow),
-    ],
-)  # fmt: skip
+@pytest.mark.parametrize("thickness, curvature", [
+    (2e-3, (-0.5, -0.5)), (2e-3, (0.0, -0.5)), (2e-3, (-0.5, 0.5)), (2e-3, (-0.3, 0.1)),
+    pytest.param(4e-5, (-0.2, 0.0), marks=pytest.mark.slow), (4e-5, (-0.2, -0.2)),
+    pytest.param(4e-5, (-0.2, 0.2), marks=pytest.mark.slow),
+])  # fmt: skip
 def test_panels_on_shear_diaphragms_are_those_of_the_closed_form(thickness, curvature):
     # rises of 5 thicknesses, and of 100 on panels whose thickness is 1e-4 of their size
     found = fi.find_modes(panel(thickness, curvature), n_modes=10, tolerance=1e-5)

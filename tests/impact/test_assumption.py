@@ -16,20 +16,15 @@ WELL = make({"restitution": 1e-6, "force": 3e-6})
 UNKNOWN = make(dict.fromkeys(USUAL), None, unknown="the thickness", name="still air")
 
 
-@pytest.mark.parametrize(
-    ("found", "enough", "line"),
-    [
-        ([WELL, WELL], 1e-4, "the model holds to better than 1e-4"),
-        # never less than the sum, 2.4e-4
-        ([make({"restitution": 8e-5, "force": 0.0})] * 3, 1e-2, "the model holds to better than 1e-3"),
-        # what is not known is said even if the rest is well
-        ([WELL, UNKNOWN], 1e-4,
-         "it is not known whether the model holds: still air (the thickness): use a thicker theory"),
-        ([WELL, replace(UNKNOWN, stated=True)], 1e-4,
-         "the model holds to better than 1e-4, with the contact as stated"),
-        ([make({}, 0.1, name="still air")], 1e-4, "no assumption of the model is expected to fail"),
-    ],
-)  # fmt: skip
+@pytest.mark.parametrize(("found", "enough", "line"), [
+    ([WELL, WELL], 1e-4, "the model holds to better than 1e-4"),
+    # never less than the sum, 2.4e-4
+    ([make({"restitution": 8e-5, "force": 0.0})] * 3, 1e-2, "the model holds to better than 1e-3"),
+    # what is not known is said even if the rest is well
+    ([WELL, UNKNOWN], 1e-4, "it is not known whether the model holds: still air (the thickness): use a thicker theory"),
+    ([WELL, replace(UNKNOWN, stated=True)], 1e-4, "the model holds to better than 1e-4, with the contact as stated"),
+    ([make({}, 0.1, name="still air")], 1e-4, "no assumption of the model is expected to fail"),
+])  # fmt: skip
 def test_one_line_says_how_far_the_model_holds(found, enough, line):
     assert assumption.lines(found, enough) == [line]
 

@@ -127,16 +127,13 @@ def test_the_gradient_knows_that_the_weight_grows_with_the_mass():
     assert_allclose(slope, differences, rtol=1e-3)  # of the third order
 
 
-@pytest.mark.parametrize(
-    ("make", "what"),
-    [
-        (lambda: fi.Striker.rigid(0.1).falling(-1.0), "gravity must not be negative"),
-        (lambda: fi.Striker.stick(mass=0.1, first_frequency=1e3).falling(), "must fall freely to fall"),
-        (lambda: fi.Striker.rigid(0.1).held(fi.Hand(stiffness=10.0)).falling(), "but a hand holds this one"),
-        (lambda: fi.sweep(BODY, fi.Striker.rigid(0.1).falling(), fi.Contact.linear(1e6), at=[0.0], speed=1.0,
-                          over={"mass": [0.1]}), "must not fall in a map"),
-    ],
-)  # fmt: skip
+@pytest.mark.parametrize(("make", "what"), [
+    (lambda: fi.Striker.rigid(0.1).falling(-1.0), "gravity must not be negative"),
+    (lambda: fi.Striker.stick(mass=0.1, first_frequency=1e3).falling(), "must fall freely to fall"),
+    (lambda: fi.Striker.rigid(0.1).held(fi.Hand(stiffness=10.0)).falling(), "but a hand holds this one"),
+    (lambda: fi.sweep(BODY, fi.Striker.rigid(0.1).falling(), fi.Contact.linear(1e6), at=[0.0], speed=1.0,
+                      over={"mass": [0.1]}), "must not fall in a map"),
+])  # fmt: skip
 def test_what_cannot_fall_or_follow_a_fall_says_so(make, what):
     with pytest.raises(ValueError, match=what):
         make()

@@ -197,10 +197,8 @@ def test_many_modes_agree_with_collocation(examples):
     )  # fmt: skip
     def check(seed, n_modes, loss, exponent, tolerance):
         rng = np.random.default_rng(seed)
-        frequencies, shape = (
-            np.sort(rng.uniform(50.0, 2e4, n_modes)),
-            rng.normal(0.0, 20.0 * n_modes**-0.5, (1, n_modes)),
-        )
+        frequencies = np.sort(rng.uniform(50.0, 2e4, n_modes))
+        shape = rng.normal(0.0, 20.0 * n_modes**-0.5, (1, n_modes))
         about = {"mass": 1.0, "damping_ratio": rng.choice([0.0, 0.01]), "complete": True}
         target = fi.Modes.from_arrays(frequencies, shape, points=[[0.0]], **about)
         mass, speed = 10.0 ** rng.uniform(-3.0, -1.5), 10.0 ** rng.uniform(-1.0, 1.0)

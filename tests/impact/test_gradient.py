@@ -386,10 +386,8 @@ def yielding(numbers, tolerance, push=0.0):
 @pytest.mark.filterwarnings("ignore::fem_impact.ToleranceWarning")  # of 20 modes
 def test_gradients_of_contacts_that_yield_are_differences():
     """They unload from a dent, as deep as the force made it, and at the second impact they meet that dent."""
-    quantities, frequencies = (
-        ("restitution", "impulse", "contact_time", "peak_force", "peak_time"),
-        np.linspace(0.0, BAND, 5),
-    )
+    quantities = "restitution", "impulse", "contact_time", "peak_force", "peak_time"
+    frequencies = np.linspace(0.0, BAND, 5)
     hit = yielding(YIELDING, 1e-8, 0.3)
     assert hit.n_impacts == 2 and hit.energies["dissipated"] > 0.1 * hit.start_energies["striker"]
     found = hit.gradient(quantities)

@@ -40,10 +40,8 @@ def run(
     p = np.append(speed / shape[0, 0], np.zeros(n - 1)) if p is None else np.asarray(p, float)
     zeta, bias, q = (np.broadcast_to(np.asarray(x, float), (n,)) for x in (zeta, bias, q))
     offset = np.broadcast_to(np.asarray(offset, float), (m,))
-    scene, limits = (
-        KernelSystem(*locked(omega, zeta, shape, offset, bias, law, q, p)),
-        Limits(0.0, 0.0, float(horizon), n_max, max_steps),
-    )
+    scene = KernelSystem(*locked(omega, zeta, shape, offset, bias, law, q, p))
+    limits = Limits(0.0, 0.0, float(horizon), n_max, max_steps)
     if scheme == "collocation":
         out = collocation.run_collocation(scene, *gauss(5), h, 1e-10 * abs(speed), limits)
     else:
@@ -250,14 +248,11 @@ def test_long_free_flight_keeps_energy_and_phase():
     assert_allclose(energy, energy[0], rtol=1e-14)
 
 
-@pytest.mark.parametrize(
-    ("exponent", "speed", "slower", "rounding"),
-    [
-        (1.0, 1e-12, 1.0, 1e-14), (1.0, 1e6, 1.0, 1e-14),  # rounding through 40 steps
-        (1.2, 100.0, 1.0, 5e-14), (1.5, 100.0, 1.0, 5e-14), (3.0, 100.0, 1.0, 5e-14),  # pow(); 7e-15 was measured
-        (1.5, 1.0, 1e3, 1e-11), (1.0, 1e-3, 1e3, 1e-11),  # milliseconds for seconds: pow() and other roundings
-    ],
-)  # fmt: skip
+@pytest.mark.parametrize(("exponent", "speed", "slower", "rounding"), [
+    (1.0, 1e-12, 1.0, 1e-14), (1.0, 1e6, 1.0, 1e-14),  # rounding through 40 steps
+    (1.2, 100.0, 1.0, 5e-14), (1.5, 100.0, 1.0, 5e-14), (3.0, 100.0, 1.0, 5e-14),  # pow(); 7e-15 was measured
+    (1.5, 1.0, 1e3, 1e-11), (1.0, 1e-3, 1e3, 1e-11),  # milliseconds for seconds: pow() and other roundings
+])  # fmt: skip
 def test_units_of_length_and_time_do_not_matter(exponent, speed, slower, rounding):
     """A blow of another speed through another stiffness is the same in another unit of length."""
     omega, shape = plate(12)

@@ -39,29 +39,26 @@ def bar(*ends, n_modes=2):
     return fi.analytic.beam(1.0, ends=ends, mass=0.1, first_frequency=2e3, n_modes=n_modes)
 
 
-@pytest.mark.parametrize(
-    ("make", "text"),
-    [
-        (lambda: fi.Striker.rigid(-1.0), "mass must be positive, got -1 kg"),
-        (lambda: fi.Striker.stick(0.1, 0.0), "first_frequency must be positive"),
-        (lambda: fi.Striker.stick(0.1, 1e4, n_modes=0), "n_modes must be at least 1"),
-        (lambda: fi.Striker.sphere(STEEL, 0.0), "radius must lie between"),
-        (lambda: fi.Striker.sphere(STEEL, 1e300), r"radius must lie between 1e-09 and 1e\+09 m, got 1e\+300 m"),
-        (lambda: fi.Striker.hammer(0.0, 0.1, stiffness=1e3), "head"),
-        (lambda: fi.Striker.hammer(0.1, 0.1, stiffness=-1.0), "stiffness"),
-        (lambda: fi.Striker.stick(mass=0.1, first_frequency=1e3).dropped(0.3), "turns or comes aslant; give its speed"),
-        (lambda: fi.Striker.rigid(0.1).held(fi.Hand(stiffness=100.0)).dropped(0.3), "but a hand holds this one"),
-        (lambda: fi.Striker.flexible(bar("free", "free", n_modes=12), at=[0.0]).held(fi.Hand(10.0)),
-         "hand needs a striker with one rigid motion"),
-        (lambda: fi.Striker.stick(0.06, 500.0).held(fi.Hand(1e6)),
-         "stiffness of the hand must keep the striker below 0.3 of its bending"),
-        (lambda: fi.Striker.rigid(0.1).held(3.0), "hand must be a Hand of fi.Hand"),
-        (lambda: fi.Hand(0.0), "stiffness must be positive"),
-        (lambda: fi.Hand(1.0, -1.0), "damping must not be negative"),
-        (lambda: fi.sweep(EARTH, HELD, HARD, at=None, speed=1.0, over={"mass": [0.1]}), "must not be held"),
-        (lambda: fi.strike(EARTH, HELD, HARD, at=None, speed=0.8), "duration or max_impacts must be given"),
-    ],
-)  # fmt: skip
+@pytest.mark.parametrize(("make", "text"), [
+    (lambda: fi.Striker.rigid(-1.0), "mass must be positive, got -1 kg"),
+    (lambda: fi.Striker.stick(0.1, 0.0), "first_frequency must be positive"),
+    (lambda: fi.Striker.stick(0.1, 1e4, n_modes=0), "n_modes must be at least 1"),
+    (lambda: fi.Striker.sphere(STEEL, 0.0), "radius must lie between"),
+    (lambda: fi.Striker.sphere(STEEL, 1e300), r"radius must lie between 1e-09 and 1e\+09 m, got 1e\+300 m"),
+    (lambda: fi.Striker.hammer(0.0, 0.1, stiffness=1e3), "head"),
+    (lambda: fi.Striker.hammer(0.1, 0.1, stiffness=-1.0), "stiffness"),
+    (lambda: fi.Striker.stick(mass=0.1, first_frequency=1e3).dropped(0.3), "turns or comes aslant; give its speed"),
+    (lambda: fi.Striker.rigid(0.1).held(fi.Hand(stiffness=100.0)).dropped(0.3), "but a hand holds this one"),
+    (lambda: fi.Striker.flexible(bar("free", "free", n_modes=12), at=[0.0]).held(fi.Hand(10.0)),
+     "hand needs a striker with one rigid motion"),
+    (lambda: fi.Striker.stick(0.06, 500.0).held(fi.Hand(1e6)),
+     "stiffness of the hand must keep the striker below 0.3 of its bending"),
+    (lambda: fi.Striker.rigid(0.1).held(3.0), "hand must be a Hand of fi.Hand"),
+    (lambda: fi.Hand(0.0), "stiffness must be positive"),
+    (lambda: fi.Hand(1.0, -1.0), "damping must not be negative"),
+    (lambda: fi.sweep(EARTH, HELD, HARD, at=None, speed=1.0, over={"mass": [0.1]}), "must not be held"),
+    (lambda: fi.strike(EARTH, HELD, HARD, at=None, speed=0.8), "duration or max_impacts must be given"),
+])  # fmt: skip
 def test_errors_name_argument_rule_and_value(make, text):
     with pytest.raises(ValueError, match=text):
         make()

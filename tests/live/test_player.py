@@ -158,20 +158,17 @@ print(len(game.struck.body) + len(game.struck.pads) + len(game.struck.state) + 4
     assert counted > 1000  # with the lock held, this thread would wait
 
 
-@pytest.mark.parametrize(
-    "play, words",
-    [
-        (lambda: Player(plate(5), STICK, HERTZ, points=3, fastest=1.0),
-         "points must be a list of points of the body, got 3"),
-        (lambda: Player(plate(5), STICK, HERTZ, points=[(0.1, 0.1), (1.0, 0.1)], fastest=1.0),
-         r"points\[1\] must lie on the body"),
-        (lambda: Player(fi.Modes.rigid(1.0), fi.Striker.rigid(1e-9), fi.Contact.linear(1e12), points=[()], fastest=1.0),
-         r"contact must last at least .* s at 1 m/s to be played, got"),
-        (lambda: player(n_modes=5).play([(0, 0, 3.0)], 0.1),
-         "speed of a stroke must lie between 0 and 2 m/s, got 3 m/s"),
-        (lambda: player(n_modes=5).play([(0, 3, 1.0)], 0.1), "point of a stroke must be at most 2, got 3"),
-    ],
-)  # fmt: skip
+@pytest.mark.parametrize("play, words", [
+    (lambda: Player(plate(5), STICK, HERTZ, points=3, fastest=1.0),
+     "points must be a list of points of the body, got 3"),
+    (lambda: Player(plate(5), STICK, HERTZ, points=[(0.1, 0.1), (1.0, 0.1)], fastest=1.0),
+     r"points\[1\] must lie on the body"),
+    (lambda: Player(fi.Modes.rigid(1.0), fi.Striker.rigid(1e-9), fi.Contact.linear(1e12), points=[()], fastest=1.0),
+     r"contact must last at least .* s at 1 m/s to be played, got"),
+    (lambda: player(n_modes=5).play([(0, 0, 3.0)], 0.1),
+     "speed of a stroke must lie between 0 and 2 m/s, got 3 m/s"),
+    (lambda: player(n_modes=5).play([(0, 3, 1.0)], 0.1), "point of a stroke must be at most 2, got 3"),
+])  # fmt: skip
 def test_what_cannot_be_played_is_refused(play, words):
     with pytest.raises(ValueError, match=words):
         play()

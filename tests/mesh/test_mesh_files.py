@@ -223,19 +223,15 @@ ORDER = np.random.default_rng(3).permutation(len(GOOD.points))
 N, HALF = len(GOOD.points), len(GOOD.cells) // 2
 
 
-@pytest.mark.parametrize(
-    ("points", "cells", "note"),
-    [
-        (GOOD.points, np.concatenate([GOOD.cells[::3, ::-1], GOOD.cells[1::3], GOOD.cells[2::3]]),
-         "inverted triangles were flipped"),
-        (np.concatenate([GOOD.points, GOOD.points + 1e-13]),
-         np.concatenate([GOOD.cells[:HALF], GOOD.cells[HALF:] + N]), "duplicate nodes were merged"),
-        (GOOD.points, [*GOOD.cells, [0, 0, 1], [5, 6, 6]], "2 triangles with two corners at one point were removed"),
-        (GOOD.points, [*GOOD.cells, *GOOD.cells[:4]], "4 duplicate triangles were removed"),
-        (GOOD.points[ORDER], np.argsort(ORDER)[GOOD.cells][::-1], None),
-    ],
-    ids=["inverted", "doubled nodes", "collapsed", "twice", "order"],
-)  # fmt: skip
+@pytest.mark.parametrize(("points", "cells", "note"), [
+    (GOOD.points, np.concatenate([GOOD.cells[::3, ::-1], GOOD.cells[1::3], GOOD.cells[2::3]]),
+     "inverted triangles were flipped"),
+    (np.concatenate([GOOD.points, GOOD.points + 1e-13]),
+     np.concatenate([GOOD.cells[:HALF], GOOD.cells[HALF:] + N]), "duplicate nodes were merged"),
+    (GOOD.points, [*GOOD.cells, [0, 0, 1], [5, 6, 6]], "2 triangles with two corners at one point were removed"),
+    (GOOD.points, [*GOOD.cells, *GOOD.cells[:4]], "4 duplicate triangles were removed"),
+    (GOOD.points[ORDER], np.argsort(ORDER)[GOOD.cells][::-1], None),
+], ids=["inverted", "doubled nodes", "collapsed", "twice", "order"])  # fmt: skip
 def test_what_is_safe_to_mend_is_mended_and_said(tmp_path, points, cells, note):
     plate = mesh.load(written(tmp_path, points, cells))
     assert any(note in said for said in plate.notes) if note else not plate.notes
@@ -262,33 +258,26 @@ def test_groups_of_med_are_edges_which_may_overlap(tmp_path, read_here):
     assert [len(plate.edges[name]) for name in ("left", "ends")] == [len(sides) // 2, len(sides)]
 
 
-@pytest.mark.parametrize(
-    ("nodes", "said"),
-    [
-        ("*Node\n1,0,0,0\n2,1,0,0\n3,0,1,0\n2,3,0,0", "a.inp has node 2 twice; export it again"),
-        ("*NODE, NSET=a\n1,0,0,0\n2,1,0,0\n** parts\n*Node\n1,5,5,0\n2,6,5,0", "several blocks of nodes"),
-        ("*Node, system=C\n1,1,0,0\n2,1,90,0\n3,1,180,0", r"a.inp has \*Node, system=C, which is not read"),
-        ("*Node\n1,0,0,0\n2,1,0,0\n3,0,1,0\n*Ngen\n1,3,1", r"a.inp has \*Ngen, which is not read"),
-    ],
-)  # fmt: skip
+@pytest.mark.parametrize(("nodes", "said"), [
+    ("*Node\n1,0,0,0\n2,1,0,0\n3,0,1,0\n2,3,0,0", "a.inp has node 2 twice; export it again"),
+    ("*NODE, NSET=a\n1,0,0,0\n2,1,0,0\n** parts\n*Node\n1,5,5,0\n2,6,5,0", "several blocks of nodes"),
+    ("*Node, system=C\n1,1,0,0\n2,1,90,0\n3,1,180,0", r"a.inp has \*Node, system=C, which is not read"),
+    ("*Node\n1,0,0,0\n2,1,0,0\n3,0,1,0\n*Ngen\n1,3,1", r"a.inp has \*Ngen, which is not read"),
+])  # fmt: skip
 def test_decks_of_abaqus_whose_nodes_would_be_lost_are_refused(tmp_path, read_here, nodes, said):
     (tmp_path / "a.inp").write_text(f"{nodes}\n*Element, type=S3\n1,1,2,3\n")
     with pytest.raises(ValueError, match=said):
         mesh.load(tmp_path / "a.inp")
 
 
-@pytest.mark.parametrize(
-    ("grid", "said"),
-    [
-        ("GRID,3,7,1.,1.,0.", "a.bdf has nodes in coordinate system 7; export all in the global one"),
-        ("GRID           3       7      1.      1.      0.", "a.bdf has nodes in coordinate system 7; export all"),
-        ("GRID*                  3               7              1.              1.*\n*                     0.",
-         "a.bdf has nodes in coordinate system 7; export all"),
-        ("GRID,3,0,1.,1.,0.\ninclude 'b.bdf'", "a.bdf includes other files; write all into one"),
-        ("GRID           3       0      1.      1.      0.", None),
-    ],
-    ids=["free", "small", "large", "include", "global"],
-)  # fmt: skip
+@pytest.mark.parametrize(("grid", "said"), [
+    ("GRID,3,7,1.,1.,0.", "a.bdf has nodes in coordinate system 7; export all in the global one"),
+    ("GRID           3       7      1.      1.      0.", "a.bdf has nodes in coordinate system 7; export all"),
+    ("GRID*                  3               7              1.              1.*\n*                     0.",
+     "a.bdf has nodes in coordinate system 7; export all"),
+    ("GRID,3,0,1.,1.,0.\ninclude 'b.bdf'", "a.bdf includes other files; write all into one"),
+    ("GRID           3       0      1.      1.      0.", None),
+], ids=["free", "small", "large", "include", "global"])  # fmt: skip
 def test_decks_of_nastran_with_what_is_not_read_are_refused(tmp_path, read_here, grid, said):
     text = f"BEGIN BULK\nGRID,1,,0.,0.,0.\nGRID,2,,1.,0.,0.\n{grid}\nCTRIA3,1,1,1,2,3\nENDDATA\n"
     (tmp_path / "a.bdf").write_text(text)
@@ -345,21 +334,17 @@ def test_units_are_converted(tmp_path):
         mesh.load(path, unit="parsec")
 
 
-@pytest.mark.parametrize(
-    ("points", "cells", "text"),
-    [
-        (np.column_stack([GOOD.points, (GOOD.points[:, 0] - 0.8) ** 2]), GOOD.cells,
-         r"too steep for a plate: near .* slopes by 5\d.* degrees; .* leave out walls and folds"),
-        ([(0, 0, 0), (1, 0, 0), (0, 1, 0), (0.5, 0.9, 0.1)], [[0, 1, 2], [0, 1, 3]], "overlap"),  # folded
-        ([(0, 0), (1, 0), (0, 1), (-1, 0), (0, -1)], [[0, 1, 2], [0, 3, 4]], "2 pieces that share no side"),
-        ([(0, 0, z) for z in (0, 0.01)] + [(x, 1 - x, z) for x in (0, 1) for z in (0, 0.01)], [[0, 2, 4], [1, 3, 5]],
-         "two surfaces, one over the other at .*; export one of them"),
-        # the middles of the second side and of the third have changed places; one is on the edge of what is a curve
-        ([(0, 0), (1, 0), (0, 1), (0.5, 0), (0, 0.5), (0.5, 0.5)], [range(6)],
-         "1 sides far from their middles, the first between nodes 2 and 0, whose middle is node 5; correct it, or"),
-    ],
-    ids=["steep", "folded", "two", "over one another", "middles"],
-)  # fmt: skip
+@pytest.mark.parametrize(("points", "cells", "text"), [
+    (np.column_stack([GOOD.points, (GOOD.points[:, 0] - 0.8) ** 2]), GOOD.cells,
+     r"too steep for a plate: near .* slopes by 5\d.* degrees; .* leave out walls and folds"),
+    ([(0, 0, 0), (1, 0, 0), (0, 1, 0), (0.5, 0.9, 0.1)], [[0, 1, 2], [0, 1, 3]], "overlap"),  # folded
+    ([(0, 0), (1, 0), (0, 1), (-1, 0), (0, -1)], [[0, 1, 2], [0, 3, 4]], "2 pieces that share no side"),
+    ([(0, 0, z) for z in (0, 0.01)] + [(x, 1 - x, z) for x in (0, 1) for z in (0, 0.01)], [[0, 2, 4], [1, 3, 5]],
+     "two surfaces, one over the other at .*; export one of them"),
+    # the middles of the second side and of the third have changed places; one is on the edge of what is a curve
+    ([(0, 0), (1, 0), (0, 1), (0.5, 0), (0, 0.5), (0.5, 0.5)], [range(6)],
+     "1 sides far from their middles, the first between nodes 2 and 0, whose middle is node 5; correct it, or"),
+], ids=["steep", "folded", "two", "over one another", "middles"])  # fmt: skip
 def test_what_cannot_be_mended_is_refused_with_the_place(tmp_path, points, cells, text):
     with pytest.raises(ValueError, match=text):
         mesh.load(written(tmp_path, points, cells, kind={3: "triangle", 6: "triangle6"}[len(cells[0])]))

@@ -15,7 +15,6 @@ from fem_impact.mesh.triangulation import SPREAD, triangulate
 ELLIPSE = Arc(np.zeros(2), np.array([3.0, 0.0]), np.array([0.0, 1.0]), 0.0, 2.0 * np.pi, "rim")
 HOLES = (loops.circle((1.0, 0.1), 0.4, "left"), loops.circle((-1.0, 0.0), 0.3, "right"))
 BODY = Outline.around((ELLIPSE,), HOLES)
-AREA = np.pi * (3.0 - 0.4**2 - 0.3**2)
 
 
 @pytest.mark.parametrize("size", [0.3, 0.1])

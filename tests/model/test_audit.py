@@ -269,17 +269,14 @@ LIGHT = {
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(
-    ("body", "name", "better", "does"),
-    [
-        (THICK, "thin target", ', theory = "mindlin"', "has shear"),
-        (LIGHT, "still air", ', air = "both sides", stretching = true', "moves the air"),
-        pytest.param(
-            {**STOUT, "thickness": 1e-3, "mass": 0.05, "stiffness": 1e4, "speed": 1.0}, "small deflections",
-            ", stretching = true", "stiffens as it stretches", marks=pytest.mark.xdist_group("stretched"),
-        ),
-    ],
-)  # fmt: skip
+@pytest.mark.parametrize(("body", "name", "better", "does"), [
+    (THICK, "thin target", ', theory = "mindlin"', "has shear"),
+    (LIGHT, "still air", ', air = "both sides", stretching = true', "moves the air"),
+    pytest.param(
+        {**STOUT, "thickness": 1e-3, "mass": 0.05, "stiffness": 1e4, "speed": 1.0}, "small deflections",
+        ", stretching = true", "stiffens as it stretches", marks=pytest.mark.xdist_group("stretched"),
+    ),
+])  # fmt: skip
 def test_a_scene_takes_the_better_model_that_its_tolerance_requires(tmp_path, body, name, better, does):
     """The thin body in a vacuum, the same with the choice left open, and with the better model stated."""
     plain, auto = (scene_of(tmp_path / "scene.toml", model, **body).run() for model in ("stated", "auto"))

@@ -27,11 +27,8 @@ SQUARE_CLAMPED, SQUARE_FREE, DISK_CLAMPED, DISK_HINGED, TRIANGLE_CLAMPED = (
     TABLE[name]["values"]
     for name in ("square-clamped", "square-free", "disk-clamped", "disk-hinged", "triangle-clamped")
 )
-RECTANGLE, SQUARE, TRIANGLE = (
-    mesh.rectangle(1.55, 1.0),
-    mesh.rectangle(1.0, 1.0),
-    mesh.polygon([(0, 0), (1, 0), (0, 1)]),
-)
+RECTANGLE, SQUARE = mesh.rectangle(1.55, 1.0), mesh.rectangle(1.0, 1.0)
+TRIANGLE = mesh.polygon([(0, 0), (1, 0), (0, 1)])
 # where all corners are convex, hinged plates are membranes twice over: of a hexagon with side 1
 HEXAGON, HEXAGON_HINGED = mesh.polygon(np.exp(1j * np.pi / 3 * np.arange(6))[:, None].view(float)), 7.15533913
 

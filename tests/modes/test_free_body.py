@@ -56,11 +56,6 @@ def test_a_drumstick_from_elsewhere_on_our_own_plate_is_the_stick():
     assert_allclose(stick.felt_mass, 0.05 / 3.0)
 
 
-def spun(body, hit, which, *nodes):
-    """Velocities (n, 3) at nodes at the end of a blow."""
-    return body.displacement(hit.modal_state([hit.history.end_time], body=which)[1], list(nodes))[0]
-
-
 def test_a_body_hit_beside_its_centre_turns_as_closed_forms_say():
     """Two rigid bodies without friction, e = 1: J = 2 v m_e, 1/m_e the sum of 1/m + (r x n).I^-1.(r x n) of both."""
     inertia, arm = np.array([[5e-4, 1e-4, 0.0], [1e-4, 4e-4, -5e-5], [0.0, -5e-5, 3e-4]]), np.array([0.03, -0.02, 0.04])
@@ -77,7 +72,8 @@ def test_a_body_hit_beside_its_centre_turns_as_closed_forms_say():
     push = 2.0 * 3.0 / sum(yields)
     assert_allclose(hit.impulse, push, rtol=1e-10)  # momentum and energy are exact at each step
     for body, which, mass, tensor, sign, came in both:
-        centre, x, y = spun(body, hit, which, "centre", "x", "y")
+        moved = hit.modal_state([hit.history.end_time], body=which)[1]
+        centre, x, y = body.displacement(moved, ["centre", "x", "y"])[0]
         turn = np.linalg.solve(tensor, sign * push * twist)
         assert_allclose(centre, (came + sign * push / mass) * way, atol=1e-9)
         assert_allclose(x - centre, np.cross(turn, [0.1, 0.0, 0.0]), atol=1e-9)

@@ -78,16 +78,13 @@ def test_silence_is_said():
     assert hearing.tell_level((tone,)) == "80.0 dB re 20 µPa" and "inf" in hearing.tell_level((quiet, quiet))
 
 
-@pytest.mark.parametrize(
-    ("text", "said"),
-    [
-        (BAR.replace("height = 0.02", "height = 0.06"), "listener must be left out for a beam higher than wide, here"),
-        (BAR.replace("[target]", "[target]\nbaffle = true"), r"\[target\] baffle must be left out for a beam"),
-        (BAR.partition("[material]")[0] + "[target]\nmass = 0.2\nfirst_frequency = 200.0" + BAR.partition("0.005")[2],
-         r"listener of a beam needs \[material\] and \[section\], for its width"),
-        (FREE.replace("false", "0"), r"\[target\] baffle must be True or False"),
-    ],
-)  # fmt: skip
+@pytest.mark.parametrize(("text", "said"), [
+    (BAR.replace("height = 0.02", "height = 0.06"), "listener must be left out for a beam higher than wide, here"),
+    (BAR.replace("[target]", "[target]\nbaffle = true"), r"\[target\] baffle must be left out for a beam"),
+    (BAR.partition("[material]")[0] + "[target]\nmass = 0.2\nfirst_frequency = 200.0" + BAR.partition("0.005")[2],
+     r"listener of a beam needs \[material\] and \[section\], for its width"),
+    (FREE.replace("false", "0"), r"\[target\] baffle must be True or False"),
+])  # fmt: skip
 def test_what_cannot_be_heard_is_refused_when_the_scene_is_read(tmp_path, text, said):
     with pytest.raises(ValueError, match=said):
         load_text(tmp_path, text + TWO)

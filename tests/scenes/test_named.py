@@ -76,26 +76,23 @@ def test_bands_and_spreads_use_the_intervals_of_names(tmp_path):
     assert middle == pytest.approx(band.hit.impulse, rel=0.1)
 
 
-@pytest.mark.parametrize(
-    ("tables", "text"),
-    [
-        ({"material": {"name": "bras"}}, "[material] name: the catalogue of materials has no 'bras'; did you mean"),
-        ({"striker": {"name": "yarn medum"}}, "[striker] name: the catalogue of strikers has no 'yarn medum'; did you"),
-        ({"striker": {"name": "yarn, medium", "kind": "rigid"}}, "[striker] kind must be left out beside name"),
-        ({"striker": {"name": "yarn, medium", "radius": 1.0}}, "[striker] radius is not a key of this table"),
-        ({"striker": {"kind": "rigid", "mass": 0.1}}, "[contact] is missing"),
-        (
-            {"striker": {"mass": 0.1}, "contact": {"kind": "linear", "stiffness": 1e5}},
-            "[striker] kind is missing; it is one of rigid, sphere, stick, hammer, turning, bar, or give a name of the",
-        ),
-        ({"material": {"E": 1e9, "nu": 0.3}, "striker": {"name": "steel, 10 mm"}}, "[material] rho is missing"),
-        (
-            {"material": None, "section": None, "target": {"mass": 0.2, "first_frequency": 90.0},
-             "striker": {"name": "steel, 10 mm"}},
-            "[striker] name: the contact of 'steel, 10 mm' depends on what it strikes; write a table [material]",
-        ),
-    ],
-)  # fmt: skip
+@pytest.mark.parametrize(("tables", "text"), [
+    ({"material": {"name": "bras"}}, "[material] name: the catalogue of materials has no 'bras'; did you mean"),
+    ({"striker": {"name": "yarn medum"}}, "[striker] name: the catalogue of strikers has no 'yarn medum'; did you"),
+    ({"striker": {"name": "yarn, medium", "kind": "rigid"}}, "[striker] kind must be left out beside name"),
+    ({"striker": {"name": "yarn, medium", "radius": 1.0}}, "[striker] radius is not a key of this table"),
+    ({"striker": {"kind": "rigid", "mass": 0.1}}, "[contact] is missing"),
+    (
+        {"striker": {"mass": 0.1}, "contact": {"kind": "linear", "stiffness": 1e5}},
+        "[striker] kind is missing; it is one of rigid, sphere, stick, hammer, turning, bar, or give a name of the",
+    ),
+    ({"material": {"E": 1e9, "nu": 0.3}, "striker": {"name": "steel, 10 mm"}}, "[material] rho is missing"),
+    (
+        {"material": None, "section": None, "target": {"mass": 0.2, "first_frequency": 90.0},
+         "striker": {"name": "steel, 10 mm"}},
+        "[striker] name: the contact of 'steel, 10 mm' depends on what it strikes; write a table [material]",
+    ),
+])  # fmt: skip
 def test_wrong_names_are_told_with_their_table(tables, text, tmp_path):
     with pytest.raises(ValueError, match=re.escape(text)):
         scene(tmp_path, **tables)

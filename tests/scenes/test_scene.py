@@ -57,17 +57,14 @@ def test_scene_strikes_what_the_public_functions_strike(tmp_path):
     assert hit.n_impacts == again.n_impacts
 
 
-@pytest.mark.parametrize(
-    ("text", "law"),
-    [
-        ('"layers"\nstiffness = 1e5\nexponent = 1.2\ndepth = 2e-4\nhard_stiffness = 1e7',
-         Contact.layers(1e5, 1.2, depth=2e-4, hard_stiffness=1e7)),
-        ('"elastic_plastic"\nstiffness = 695e3\nyield_speed = 0.1\nmass = 0.03',
-         Contact.elastic_plastic(695e3, yield_speed=0.1, mass=0.03)),
-        ('"felt"\nstiffness = 695e3\nexponent = 1.5\nhysteresis = 0.2\nrelaxation = 1e-3',
-         Contact.felt(695e3, 1.5, hysteresis=0.2, relaxation=1e-3)),
-    ],
-)  # fmt: skip
+@pytest.mark.parametrize(("text", "law"), [
+    ('"layers"\nstiffness = 1e5\nexponent = 1.2\ndepth = 2e-4\nhard_stiffness = 1e7',
+     Contact.layers(1e5, 1.2, depth=2e-4, hard_stiffness=1e7)),
+    ('"elastic_plastic"\nstiffness = 695e3\nyield_speed = 0.1\nmass = 0.03',
+     Contact.elastic_plastic(695e3, yield_speed=0.1, mass=0.03)),
+    ('"felt"\nstiffness = 695e3\nexponent = 1.5\nhysteresis = 0.2\nrelaxation = 1e-3',
+     Contact.felt(695e3, 1.5, hysteresis=0.2, relaxation=1e-3)),
+])  # fmt: skip
 def test_contacts_that_lose_and_a_hammer_in_a_scene(tmp_path, text, law):
     hammer = 'kind = "hammer"\nhead = 0.03\nhandle = 0.05\nstiffness = 1e4\ndamping = 2.0'
     loaded = load_text(tmp_path, edited('"hertz"\nstiffness = 695e3', text).replace(RIGID, hammer))
@@ -212,20 +209,17 @@ def test_bad_scene_is_told_in_one_line_with_file_table_and_key(tmp_path, old, ne
         assert str(caught.value).startswith(f"{tmp_path / 'scene.toml'}: ") and "\n" not in str(caught.value)
 
 
-@pytest.mark.parametrize(
-    ("key", "value", "said"),
-    [
-        ("speed", "0", "[strike] speed must be positive, got 0 m/s"),
-        ("length", '"465 mm"', "[mesh] length must be a number in m, got '465 mm'"),
-        ("speed", "2.0\nduration = -1", "[strike] duration must be positive, got -1 s"),
-        ("at", "[0.1, 0.2, 0.3]", "[strike] at must be a point (x, y) in m"),
-        ("at", '["0.1", "0.2"]', "[strike] at must be numbers in m"),
-        ("speed", "2.0\n[observe]\npoints = [[0.1, 0.1], [0.1]]", "[observe] points[1] must be a point (x, y) in m"),
-        ("speed", '2.0\n[[stroke]]\nwhen = 0\nstriker = { kind = "rigid", mass = "x" }',
-         "[[stroke]] 0 [striker] mass must be a number in kg, got 'x'"),
-        ("speed", "2.0\n[[stroke]]\nwhen = 0\nat = [1]", "[[stroke]] 0 at must be a point (x, y) in m"),
-    ],
-)  # fmt: skip
+@pytest.mark.parametrize(("key", "value", "said"), [
+    ("speed", "0", "[strike] speed must be positive, got 0 m/s"),
+    ("length", '"465 mm"', "[mesh] length must be a number in m, got '465 mm'"),
+    ("speed", "2.0\nduration = -1", "[strike] duration must be positive, got -1 s"),
+    ("at", "[0.1, 0.2, 0.3]", "[strike] at must be a point (x, y) in m"),
+    ("at", '["0.1", "0.2"]', "[strike] at must be numbers in m"),
+    ("speed", "2.0\n[observe]\npoints = [[0.1, 0.1], [0.1]]", "[observe] points[1] must be a point (x, y) in m"),
+    ("speed", '2.0\n[[stroke]]\nwhen = 0\nstriker = { kind = "rigid", mass = "x" }',
+     "[[stroke]] 0 [striker] mass must be a number in kg, got 'x'"),
+    ("speed", "2.0\n[[stroke]]\nwhen = 0\nat = [1]", "[[stroke]] 0 at must be a point (x, y) in m"),
+])  # fmt: skip
 def test_a_blow_that_cannot_be_is_told_as_its_scene_is_read(tmp_path, key, value, said):
     text = re.sub(rf"^{key} = .*$", f"{key} = {value}", TEXT, flags=re.M)
     with pytest.raises(ValueError, match=re.escape(f"scene.toml: {said}")):

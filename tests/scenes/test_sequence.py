@@ -107,24 +107,21 @@ def test_what_needs_a_single_blow_says_so(path):
         told.play(max_impacts=1)
 
 
-@pytest.mark.parametrize(
-    ("old", "new", "text"),
-    [
-        ("when = 0.03", "wen = 0.03", r"\[\[stroke\]\] 0 wen is not a key of this table; did you mean 'when'"),
-        ("when = 0.03", "", r"\[\[stroke\]\] 0 when is missing"),
-        ("speed = 0.5", "speed = -0.5", r"\[\[stroke\]\] 1 speed must be positive"),
-        ("lasts = 0.02", "lasts = 0", r"\[\[stroke\]\] 1 lasts must be positive"),
-        ("mass = 0.01 }", "mas = 0.01 }", r"\[\[stroke\]\] 1 striker: mas is not a key"),
-        ("mass = 0.01 }", "mass = -0.01 }", "mass must be positive"),
-        ('"linear", stiff', '"between", stiff', r"\[\[stroke\]\] 1 contact: stiffness is not a key"),
-        ('striker = { kind = "rigid", mass = 0.01 }', "striker = 3", r"striker must be a table with the keys of"),
-        ("tolerance = 1e-2", "tolerance = 1e-2\nmax_impacts = 2", "max_impacts must be left out with"),
-        ("[[stroke]]\nwhen = 0.03\n[[stroke]]", "[stroke]", r"stroke must be tables, each written \[\[stroke\]\]"),
-        ("listeners = [[0.1, 0.15, 0.5]", "listeners = [[0.1, 0.15, 0.0]", "listener must lie off the plate's plane"),
-        ("listeners =", "listener = [0.1, 0.1, 1.0]\nlisteners =", "listener must be left out beside listeners"),
-        ("listeners = [[0.1, 0.15, 0.5], [0.4, 0.15, 0.5]]", "listeners = []", "listeners must be a list of 1 to"),
-    ],
-)  # fmt: skip
+@pytest.mark.parametrize(("old", "new", "text"), [
+    ("when = 0.03", "wen = 0.03", r"\[\[stroke\]\] 0 wen is not a key of this table; did you mean 'when'"),
+    ("when = 0.03", "", r"\[\[stroke\]\] 0 when is missing"),
+    ("speed = 0.5", "speed = -0.5", r"\[\[stroke\]\] 1 speed must be positive"),
+    ("lasts = 0.02", "lasts = 0", r"\[\[stroke\]\] 1 lasts must be positive"),
+    ("mass = 0.01 }", "mas = 0.01 }", r"\[\[stroke\]\] 1 striker: mas is not a key"),
+    ("mass = 0.01 }", "mass = -0.01 }", "mass must be positive"),
+    ('"linear", stiff', '"between", stiff', r"\[\[stroke\]\] 1 contact: stiffness is not a key"),
+    ('striker = { kind = "rigid", mass = 0.01 }', "striker = 3", r"striker must be a table with the keys of"),
+    ("tolerance = 1e-2", "tolerance = 1e-2\nmax_impacts = 2", "max_impacts must be left out with"),
+    ("[[stroke]]\nwhen = 0.03\n[[stroke]]", "[stroke]", r"stroke must be tables, each written \[\[stroke\]\]"),
+    ("listeners = [[0.1, 0.15, 0.5]", "listeners = [[0.1, 0.15, 0.0]", "listener must lie off the plate's plane"),
+    ("listeners =", "listener = [0.1, 0.1, 1.0]\nlisteners =", "listener must be left out beside listeners"),
+    ("listeners = [[0.1, 0.15, 0.5], [0.4, 0.15, 0.5]]", "listeners = []", "listeners must be a list of 1 to"),
+])  # fmt: skip
 def test_what_is_wrong_with_a_stroke_is_said_before_any_work(path, old, new, text):
     assert TABLES.count(old) == 1
     path.write_text(TABLES.replace(old, new))

@@ -11,7 +11,6 @@ from fem_impact.sweeps.cells import Case
 
 AT = np.array([0.465, 0.3])
 STICK, RIGID = fi.Striker.stick(0.1, 2e3, n_modes=4), fi.Striker.rigid(0.05)
-FELT = fi.Contact.felt(1e6, 2.0, hysteresis=0.3, relaxation=1e-3)
 
 
 def rows(striker, law, axes, tolerance=1e-3, **wanted):

@@ -1,6 +1,7 @@
 """Uncertain inputs and the statistics of blows: against closed forms, binomial laws and Sobol indices."""
 
 import json
+from functools import partial
 
 import numpy as np
 import pytest
@@ -179,43 +180,40 @@ def test_a_distribution_has_the_quantiles_of_its_closed_form(given, median, uppe
     assert_allclose(one.at(np.array([0.5, stats.norm.cdf(1.0)])), [median, upper], rtol=1e-12)
 
 
-@pytest.mark.parametrize(
-    ("given", "text"),
-    [
-        (("gaussian", 1.0, 0.1), r"vary\['a'\] must be one of normal, lognormal"),
-        (("normal", 1.0), r"vary\['a'\] must be normal\(mean, deviation\), got 1 numbers"),
-        (("normal", 1.0, 0.0), r"deviation of vary\['a'\] must be positive"),
-        (("lognormal", -1.0, 0.1), r"median of vary\['a'\] must be positive"),
-        (("uniform", 2.0, 1.0), r"low of vary\['a'\] must be below high, got 2 and 1"),
-        (("triangular", 0.0, 3.0, 2.0), r"mode of vary\['a'\] must lie between low and high"),
-        (("loguniform", 0.0, 3.0), r"low of vary\['a'\] must be positive"),
-        ("normal 1 2", r"vary\['a'\] must look like lognormal\(695e3, 0.1\), got 'normal 1 2'"),
-        ("normal(1, b)", r"vary\['a'\] must hold numbers"),
-        (3.0, r"vary\['a'\] must be a distribution such as"),
-        (("normal", float("nan"), 1.0), r"mean of vary\['a'\] must be finite"),
-    ],
-)
-def test_a_wrong_distribution_is_refused(given, text):
-    with pytest.raises(ValueError, match=text):
-        inputs.Input.of("a", given)
-
-
-@pytest.mark.parametrize(
-    ("vary", "text"),
-    [
-        ({}, "vary must name at least one input"),
-        (None, "vary must name at least one input"),
-        ([("a", "normal(0, 1)")], "vary must name at least one input"),
-        ({3: "normal(0, 1)"}, "vary must map names to distributions"),
-        ({f"a{i}": "normal(0, 1)" for i in range(65)}, "at most 64 inputs"),
-    ],
-)
-def test_inputs_must_be_named(vary, text):
-    with pytest.raises(ValueError, match=text):
-        inputs.read_inputs(vary)
-
-
 PAIR = inputs.read_inputs({"a": ("normal", 0.0, 1.0), "b": ("uniform", 0.0, 1.0)})
+DISTRIBUTION, CORRELATION = partial(inputs.Input.of, "a"), partial(inputs.mixing, PAIR)
+
+
+@pytest.mark.parametrize(
+    ("read", "given", "text"),
+    [
+        (DISTRIBUTION, ("gaussian", 1.0, 0.1), r"vary\['a'\] must be one of normal, lognormal"),
+        (DISTRIBUTION, ("normal", 1.0), r"vary\['a'\] must be normal\(mean, deviation\), got 1 numbers"),
+        (DISTRIBUTION, ("normal", 1.0, 0.0), r"deviation of vary\['a'\] must be positive"),
+        (DISTRIBUTION, ("lognormal", -1.0, 0.1), r"median of vary\['a'\] must be positive"),
+        (DISTRIBUTION, ("uniform", 2.0, 1.0), r"low of vary\['a'\] must be below high, got 2 and 1"),
+        (DISTRIBUTION, ("triangular", 0.0, 3.0, 2.0), r"mode of vary\['a'\] must lie between low and high"),
+        (DISTRIBUTION, ("loguniform", 0.0, 3.0), r"low of vary\['a'\] must be positive"),
+        (DISTRIBUTION, "normal 1 2", r"vary\['a'\] must look like lognormal\(695e3, 0.1\), got 'normal 1 2'"),
+        (DISTRIBUTION, "normal(1, b)", r"vary\['a'\] must hold numbers"),
+        (DISTRIBUTION, 3.0, r"vary\['a'\] must be a distribution such as"),
+        (DISTRIBUTION, ("normal", float("nan"), 1.0), r"mean of vary\['a'\] must be finite"),
+        (inputs.read_inputs, {}, "vary must name at least one input"),
+        (inputs.read_inputs, None, "vary must name at least one input"),
+        (inputs.read_inputs, [("a", "normal(0, 1)")], "vary must name at least one input"),
+        (inputs.read_inputs, {3: "normal(0, 1)"}, "vary must map names to distributions"),
+        (inputs.read_inputs, {f"a{i}": "normal(0, 1)" for i in range(65)}, "at most 64 inputs"),
+        (CORRELATION, {("a", "c"): 0.5}, "correlation must be one of a, b, got 'c'"),
+        (CORRELATION, {("a", "a"): 0.5}, "pairs of different names"),
+        (CORRELATION, {("a", "b"): 1.5}, "correlation of a and b must"),
+        (CORRELATION, {("a", "b"): 1.0}, "must be positive definite"),
+        (CORRELATION, [[1.0, 0.5], [0.4, 1.0]], "must be symmetric with ones on its diagonal"),
+        (CORRELATION, [[1.0]], "must have shape"),
+    ],
+)  # fmt: skip
+def test_inputs_that_are_none_are_refused(read, given, text):
+    with pytest.raises(ValueError, match=text):
+        read(given)
 
 
 @pytest.mark.parametrize("given", [{("a", "b"): 0.6}, {("b", "a"): 0.6}, [[1.0, 0.6], [0.6, 1.0]]])
@@ -224,22 +222,6 @@ def test_a_gaussian_copula_has_its_rank_correlation(given):
     rank = stats.spearmanr(*values.T).statistic
     assert_allclose(rank, 6.0 / np.pi * np.arcsin(0.3), atol=5e-3)  # Pearson's formula; even points beat 1/sqrt(n)
     assert_allclose(np.quantile(values[:, 1], [0.1, 0.9]), [0.1, 0.9], atol=2e-3)  # margins stay as they were
-
-
-@pytest.mark.parametrize(
-    ("given", "text"),
-    [
-        ({("a", "c"): 0.5}, "correlation must be one of a, b, got 'c'"),
-        ({("a", "a"): 0.5}, "pairs of different names"),
-        ({("a", "b"): 1.5}, "correlation of a and b must"),
-        ({("a", "b"): 1.0}, "must be positive definite"),
-        ([[1.0, 0.5], [0.4, 1.0]], "must be symmetric with ones on its diagonal"),
-        ([[1.0]], "must have shape"),
-    ],
-)
-def test_a_wrong_correlation_is_refused(given, text):
-    with pytest.raises(ValueError, match=text):
-        inputs.mixing(PAIR, given)
 
 
 def test_no_correlation_mixes_nothing():

@@ -144,21 +144,18 @@ def test_four_real_taps_are_predicted_from_each_other():
     assert each.whiteness < 0.01 and "residual is not noise" in each.summary()
 
 
-@pytest.mark.parametrize(
-    ("changes", "said"),
-    [
-        ({"response_at": [[0.0]]}, "response_at needs accelerations"),
-        ({"known": {"striker.mass": 0.1}}, "known and unknown both name"),
-        ({"known": {"contact.hardness": 0.1}}, "known must be one of"),
-        ({"unknown": {"contact.hysteresis": (0.0, 0.9)}}, "a contact within all ranges: relaxation must be positive"),
-        ({"unknown": {"contact.hysteresis": (0.0, 0.9), "contact.exponent": (0.8, 3.0)},
-          "known": {"contact.relaxation": 1e-3}}, "a contact within all ranges: exponent must be at least 1"),
-        ({"taps": 3}, "taps must be"),
-        ({"at": [0.1, 0.2]}, "at must be left out without a target"),
-        ({"starts": 10**6}, "starts must be at most 64, got 1000000"),
-        ({"taps": fi.Taps.from_arrays(100.0 * np.hanning(40), rate=RATE, overload=True)}, "not cut off"),
-    ],
-)  # fmt: skip
+@pytest.mark.parametrize(("changes", "said"), [
+    ({"response_at": [[0.0]]}, "response_at needs accelerations"),
+    ({"known": {"striker.mass": 0.1}}, "known and unknown both name"),
+    ({"known": {"contact.hardness": 0.1}}, "known must be one of"),
+    ({"unknown": {"contact.hysteresis": (0.0, 0.9)}}, "a contact within all ranges: relaxation must be positive"),
+    ({"unknown": {"contact.hysteresis": (0.0, 0.9), "contact.exponent": (0.8, 3.0)},
+      "known": {"contact.relaxation": 1e-3}}, "a contact within all ranges: exponent must be at least 1"),
+    ({"taps": 3}, "taps must be"),
+    ({"at": [0.1, 0.2]}, "at must be left out without a target"),
+    ({"starts": 10**6}, "starts must be at most 64, got 1000000"),
+    ({"taps": fi.Taps.from_arrays(100.0 * np.hanning(40), rate=RATE, overload=True)}, "not cut off"),
+])  # fmt: skip
 def test_wrong_arguments_are_refused(taps, changes, said):
     given = {"taps": taps, "striker": fi.Striker.rigid(0.1), "contact": LAW, "unknown": RANGES}
     with pytest.raises(ValueError, match=said):

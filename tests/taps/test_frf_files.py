@@ -85,14 +85,11 @@ def test_a_file_by_hand_has_its_own_units(tmp_path, code, units, factor):
     assert found["ways"].tolist() == [[2, 3, 1, -3]] and "place" not in found
 
 
-@pytest.mark.parametrize(
-    ("over", "under", "factor", "told"),
-    [
-        ("mm/s2", "N", 1e-3, False), ("(m/s²)/N", "NONE", 1.0, False), ("m/s**2/lbf", "NONE", 1 / 4.4482216, False),
-        ("g/kN", "NONE", 9.80665e-3, False), ("g/kN", "kN", 9.80665e-3, False), ("mV", "N", 1.0, True),
-        ("m/s^2", "pounds", 1.0, True),
-    ],
-)  # fmt: skip
+@pytest.mark.parametrize(("over", "under", "factor", "told"), [
+    ("mm/s2", "N", 1e-3, False), ("(m/s²)/N", "NONE", 1.0, False), ("m/s**2/lbf", "NONE", 1 / 4.4482216, False),
+    ("g/kN", "NONE", 9.80665e-3, False), ("g/kN", "kN", 9.80665e-3, False), ("mV", "N", 1.0, True),
+    ("m/s^2", "pounds", 1.0, True),
+])  # fmt: skip
 def test_units_of_a_response_are_followed_or_told(written, over, under, factor, told):
     found = transfer.arrays(written(response(1, ordinate_axis_units_lab=over, orddenom_axis_units_lab=under)))
     assert np.allclose(found["H"][:, 0], factor * H, rtol=1e-6)

@@ -94,14 +94,11 @@ def test_clipping_and_full_scale_are_seen(read, top, options, cut):
     assert read(np.minimum(record(5000, noise=0.02), top), **options).overload.tolist() == [cut]
 
 
-@pytest.mark.parametrize(
-    ("options", "text"),
-    [
-        ({}, "no tap was found"), ({"force": "forse"}, r"'forse' is no channel.*did you mean 'force'"),
-        ({"force": 7}, "channel from 0 to 1"), ({"units": {"force": "pounds"}}, "units must be one of"),
-        ({"units": {1: 2}}, "units must be a dict of names"),
-    ],
-)  # fmt: skip
+@pytest.mark.parametrize(("options", "text"), [
+    ({}, "no tap was found"), ({"force": "forse"}, r"'forse' is no channel.*did you mean 'force'"),
+    ({"force": 7}, "channel from 0 to 1"), ({"units": {"force": "pounds"}}, "units must be one of"),
+    ({"units": {1: 2}}, "units must be a dict of names"),
+])  # fmt: skip
 def test_silence_and_wrong_names_are_refused(read, options, text):
     quiet = np.random.default_rng(0).normal(0.0, 1.0, 5000)
     with pytest.raises(ValueError, match=text):
@@ -131,15 +128,12 @@ def test_saved_taps_keep_channels_of_any_names(tmp_path, names, read):
     assert np.allclose(np.ptp(again.response, axis=1), np.ptp(response, axis=1)) and np.allclose(again.force, pulse)
 
 
-@pytest.mark.parametrize(
-    ("arrays", "options", "text"),
-    [
-        (((2, 3),), {}, "at least one tap"), (((2, 30), (2, 29)), {}, "response must have shape"),
-        (((2, 30), (2, 30)), {"names": ["a", "b"]}, "names must have 1 entries, one for each response"),
-        (((2, 30), (2, 30)), {"names": "a"}, "names must be a list of texts"),
-        (((2, 30),), {"pulse": 0.0}, "pulse must be positive"),
-    ],
-)  # fmt: skip
+@pytest.mark.parametrize(("arrays", "options", "text"), [
+    (((2, 3),), {}, "at least one tap"), (((2, 30), (2, 29)), {}, "response must have shape"),
+    (((2, 30), (2, 30)), {"names": ["a", "b"]}, "names must have 1 entries, one for each response"),
+    (((2, 30), (2, 30)), {"names": "a"}, "names must be a list of texts"),
+    (((2, 30),), {"pulse": 0.0}, "pulse must be positive"),
+])  # fmt: skip
 def test_arrays_of_wrong_shape_are_refused(arrays, options, text):
     with pytest.raises(ValueError, match=text):
         fi.Taps.from_arrays(*map(np.zeros, arrays), rate=1e3, **options)

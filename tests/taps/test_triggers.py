@@ -26,21 +26,18 @@ def touching(low, second):
     return np.interp(np.arange(41), [0, 10, 20, 30, 40], [0.0, 1.0, low, second, 0.0])
 
 
-@pytest.mark.parametrize(
-    ("force", "least", "n"),
-    [
-        pytest.param(np.zeros(30), None, 0, id="nothing"),
-        pytest.param(after(0.3), None, 2, id="apart"),
-        pytest.param(after(0.002), None, 2, id="small, but without noise"),
-        # pulses that touch are apart below a twentieth of the peak or half of the smaller
-        *(pytest.param(touching(*how), None, n, id=f"touching {how}")
-          for *how, n in ((0.04, 0.5, 2), (0.06, 0.5, 1), (0.02, 0.07, 2), (0.04, 0.07, 1))),
-        pytest.param(RINGING, None, 1, id="ringing"),
-        pytest.param(PUSHED, None, 2, id="a push above the ringing"),
-        pytest.param(PUSHED, 0.15, 1, id="a push below what was asked for"),
-        pytest.param(BITS, None, 1, id="bits"),
-    ],
-)  # fmt: skip
+@pytest.mark.parametrize(("force", "least", "n"), [
+    pytest.param(np.zeros(30), None, 0, id="nothing"),
+    pytest.param(after(0.3), None, 2, id="apart"),
+    pytest.param(after(0.002), None, 2, id="small, but without noise"),
+    # pulses that touch are apart below a twentieth of the peak or half of the smaller
+    *(pytest.param(touching(*how), None, n, id=f"touching {how}")
+      for *how, n in ((0.04, 0.5, 2), (0.06, 0.5, 1), (0.02, 0.07, 2), (0.04, 0.07, 1))),
+    pytest.param(RINGING, None, 1, id="ringing"),
+    pytest.param(PUSHED, None, 2, id="a push above the ringing"),
+    pytest.param(PUSHED, 0.15, 1, id="a push below what was asked for"),
+    pytest.param(BITS, None, 1, id="bits"),
+])  # fmt: skip
 def test_pulses_are_counted_once_each(force, least, n):
     assert len(triggers.pulses(force, least=least)) == n
 
@@ -118,15 +115,12 @@ def drift(share):
     return {"places": slice(2000, 2010), "added": added, "trigger": 1.0, "length": 0.12}
 
 
-@pytest.mark.parametrize(
-    ("record", "said", "told"),
-    [
-        (drift(0.15), "drift", False), (drift(0.3), "drift", True),  # from a fifth of the trigger on
-        # fewer than eight samples before a tap give no offset
-        ({"places": slice(6, 11)}, "offsets are not removed", True),
-        ({"places": slice(10, 15)}, "offsets are not removed", False),
-    ],
-)  # fmt: skip
+@pytest.mark.parametrize(("record", "said", "told"), [
+    (drift(0.15), "drift", False), (drift(0.3), "drift", True),  # from a fifth of the trigger on
+    # fewer than eight samples before a tap give no offset
+    ({"places": slice(6, 11)}, "offsets are not removed", True),
+    ({"places": slice(10, 15)}, "offsets are not removed", False),
+])  # fmt: skip
 def test_drift_is_told_and_a_missing_rest(record, said, told):
     assert told == (said in cut(**record)[1])
 
