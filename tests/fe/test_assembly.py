@@ -5,20 +5,17 @@ import pytest
 from numpy.testing import assert_allclose
 from scipy.sparse.linalg import splu
 
-from fem_impact import mesh
+import fem_impact as fi
 from fem_impact.fe import assembly
-from fem_impact.fe.assembly import assemble
-from fem_impact.fe.section import Material, Plate
-from fem_impact.modes.finding import find_modes
 
-STEEL = Material(E=210e9, nu=0.3, rho=7850.0)
-PLATE = Plate(STEEL, 2e-3)
+STEEL = fi.Material(E=210e9, nu=0.3, rho=7850.0)
+PLATE = fi.Plate(STEEL, 2e-3)
 
 
 def test_an_element_made_for_one_mesh_leaves_the_next_alone():
     sizes = {(1.0, 1.0): 0.5, (2.0, 0.3): 0.1}
     first, _, again = (
-        assemble(mesh.rectangle(*sides, size=sizes[sides]), PLATE, {"boundary": "hinged"})
+        fi.assemble(fi.mesh.rectangle(*sides, size=sizes[sides]), PLATE, {"boundary": "hinged"})
         for sides in ((1.0, 1.0), (2.0, 0.3), (1.0, 1.0))
     )
     assert abs(first.K - again.K).max() == 0.0
@@ -29,7 +26,7 @@ def test_an_element_made_for_one_mesh_leaves_the_next_alone():
     [({}, 3), ({"left": "hinged"}, 1), ({"left": "hinged", "bottom": "hinged"}, 0), ({"left": "clamped"}, 0)],
 )
 def test_rigid_motions_left_by_the_supports(supports, n_rigid):
-    system = assemble(mesh.rectangle(1.0, 1.0, size=0.5), PLATE, supports)
+    system = fi.assemble(fi.mesh.rectangle(1.0, 1.0, size=0.5), PLATE, supports)
     assert system.rigid.shape[1] == n_rigid
     assert_allclose(system.K @ system.rigid, 0.0, atol=1e-11)  # of a stiffness with ones on its diagonal
     assert_allclose(system.rigid.T @ system.M @ system.rigid, np.eye(n_rigid), atol=1e-12)
@@ -40,15 +37,15 @@ def test_a_plate_turns_about_a_hinged_edge_in_any_direction(degrees):
     """Rounding at the hundreds of vertices of the rings at its corners is not a support."""
     tip = 0.3 * np.cos(np.radians(degrees)), 0.3 * np.sin(np.radians(degrees))
     for edge in ("edge0", "edge1", "edge2"):
-        system = assemble(mesh.polygon([(0.0, 0.0), (0.3, 0.0), tip]), PLATE, {edge: "hinged"})
+        system = fi.assemble(fi.mesh.polygon([(0.0, 0.0), (0.3, 0.0), tip]), PLATE, {edge: "hinged"})
         assert system.rigid.shape[1] == 1
-        assert find_modes(system, n_modes=2).frequencies[1] > 1.0
+        assert fi.find_modes(system, n_modes=2).frequencies[1] > 1.0
 
 
 def test_a_rigid_motion_is_linear_in_the_place_however_thin_and_far_away_the_plate_is():
     length, shift = 1e-3, 1e3
-    plate = mesh.rectangle(length, 0.01 * length, size=0.01 * length)
-    system = assemble(mesh.straight(plate.points + shift, plate.cells, plate.facets, plate.edges), PLATE)
+    plate = fi.mesh.rectangle(length, 0.01 * length, size=0.01 * length)
+    system = fi.assemble(fi.mesh.straight(plate.points + shift, plate.cells, plate.facets, plate.edges), PLATE)
     places = np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 0.01], [0.1, 0.003], [0.5, 0.008], [0.9, 0.001]])
     corner, along, across, *values = system.interpolate(shift + places * length) @ system.rigid @ [1.0, 2.0, 3.0]
     x, y = places[3:].T
@@ -64,9 +61,9 @@ def dip(system, at):
 
 @pytest.mark.parametrize("at", [(0.37, 0.41), (0.5, 0.25), (0.5, 0.5)])  # in a triangle, on a side, at a vertex
 def test_triangles_shrink_towards_a_point(at):
-    shape = mesh.rectangle(1.0, 1.0, size=0.25)
-    plain, graded = (assemble(shape, PLATE, {"boundary": "hinged"}, near=near) for near in (None, at))
-    exact = find_modes(plain, n_modes=1).shapes.compliance(np.array([at]))[0, 0]  # the dip in closed form
+    shape = fi.mesh.rectangle(1.0, 1.0, size=0.25)
+    plain, graded = (fi.assemble(shape, PLATE, {"boundary": "hinged"}, near=near) for near in (None, at))
+    exact = fi.find_modes(plain, n_modes=1).shapes.compliance(np.array([at]))[0, 0]  # the dip in closed form
     rough, fine = (abs(dip(system, at) / exact - 1.0) for system in (plain, graded))
     assert fine < 0.05 * rough  # 0.03 and less were measured; what is left is the flat triangles around it
     assert graded.contains(np.random.default_rng(0).uniform(0.01, 0.99, (50, 2))).all()
@@ -74,29 +71,29 @@ def test_triangles_shrink_towards_a_point(at):
 
 @pytest.mark.parametrize(("kind", "coarseness"), [("free", 1.0), ("hinged", 16.0), ("clamped", 1.0), ("clamped", 16.0)])
 def test_unknowns_are_counted_before_they_are_assembled(kind, coarseness):
-    shape, at, held = mesh.rectangle(1.0, 0.7, size=0.1), (0.37, 0.41), {"boundary": kind}
-    made = assemble(shape, PLATE, held, near=at, coarseness=coarseness).n_dofs
+    shape, at, held = fi.mesh.rectangle(1.0, 0.7, size=0.1), (0.37, 0.41), {"boundary": kind}
+    made = fi.assemble(shape, PLATE, held, near=at, coarseness=coarseness).n_dofs
     told = assembly.unknowns_near(shape, PLATE, held, np.array([at]), coarseness=coarseness)
     assert abs(told / made - 1.0) < 0.02  # the docstring says 1 %
 
 
 @pytest.mark.parametrize("at", [(0.37, 0.41), (0.37, 0.03)])  # inside and near a clamped edge
 def test_compliance_errs_by_the_square_of_the_coarseness_at_the_load(at):
-    shape, held = mesh.rectangle(1.0, 1.0, size=0.1), {"boundary": "clamped"}
-    fine, *coarse = (dip(assemble(shape, PLATE, held, near=at, coarseness=c), at) for c in (1.0, 8.0, 64.0))
+    shape, held = fi.mesh.rectangle(1.0, 1.0, size=0.1), {"boundary": "clamped"}
+    fine, *coarse = (dip(fi.assemble(shape, PLATE, held, near=at, coarseness=c), at) for c in (1.0, 8.0, 64.0))
     for coarseness, found in zip((8.0, 64.0), coarse):
         # the docstring says 1e-7; 6e-8 to 2e-7 were found on other plates
         assert 2e-8 < (1.0 - found / fine) / coarseness**2 < 4e-7
 
 
 @pytest.mark.parametrize(("body", "section", "more", "words"), [
-    (mesh.rectangle(1, 1), PLATE, {"supports": {"lft": "hinged"}}, "edge 'lft'.*did you mean 'left'"),
-    (mesh.line(1), PLATE, {}, "section must be a Beam"),
+    (fi.mesh.rectangle(1, 1), PLATE, {"supports": {"lft": "hinged"}}, "edge 'lft'.*did you mean 'left'"),
+    (fi.mesh.line(1), PLATE, {}, "section must be a Beam"),
     ("plate.msh", PLATE, {}, "mesh must be a Mesh of fi.mesh"),
-    (mesh.rectangle(1, 1), PLATE, {"near": (2.0, 0.5)}, r"near must lie on the body.*\(2, 0.5\) m"),
-    (mesh.rectangle(1, 1), PLATE, {"near": (0.5, 0.5), "coarseness": 0.5}, "at least 1, got 0.5"),
-    (mesh.rectangle(1, 1), PLATE, {"element": "morly"}, "one of argyris, morley.*did you mean 'morley'"),
+    (fi.mesh.rectangle(1, 1), PLATE, {"near": (2.0, 0.5)}, r"near must lie on the body.*\(2, 0.5\) m"),
+    (fi.mesh.rectangle(1, 1), PLATE, {"near": (0.5, 0.5), "coarseness": 0.5}, "at least 1, got 0.5"),
+    (fi.mesh.rectangle(1, 1), PLATE, {"element": "morly"}, "one of argyris, morley.*did you mean 'morley'"),
 ])  # fmt: skip
 def test_refuses_supports_and_sections_that_do_not_fit(body, section, more, words):
     with pytest.raises(ValueError, match=words):
-        assemble(body, section, **more)
+        fi.assemble(body, section, **more)

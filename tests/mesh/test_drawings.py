@@ -7,17 +7,13 @@ from numpy.testing import assert_allclose
 from scipy.interpolate import BSpline
 from scipy.spatial import cKDTree
 
-from fem_impact import mesh
+import fem_impact as fi
 from fem_impact._base import isolated
-from fem_impact.fe.assembly import assemble
-from fem_impact.fe.ribs import Rib
-from fem_impact.fe.section import Beam, Material, Plate
 from fem_impact.mesh import drawings
-from fem_impact.modes.finding import find_modes
 
 pytestmark = pytest.mark.usefixtures("read_here")
 READ_APART = isolated.run_reader
-PLATE = Plate(Material(E=210e9, nu=0.3, rho=7850.0), 2e-3)
+PLATE = fi.Plate(fi.Material(E=210e9, nu=0.3, rho=7850.0), 2e-3)
 PER_RATE = np.sqrt(7850 * 2e-3 / (210e9 * 2e-3**3 / (12 * (1 - 0.3**2))))
 ANGLE = np.linspace(0, 2 * np.pi, 48, endpoint=False)
 RIM = '<rect id="rim" x="0" y="0" width="400" height="300"/>'
@@ -27,7 +23,7 @@ SVG = '<svg xmlns="http://www.w3.org/2000/svg" {head}>{body}</svg>'
 
 def first(shape, support):
     """Dimensionless first frequency with the rim held."""
-    return find_modes(assemble(shape, PLATE, {"boundary": support}), n_modes=1).omega[0] * PER_RATE
+    return fi.find_modes(fi.assemble(shape, PLATE, {"boundary": support}), n_modes=1).omega[0] * PER_RATE
 
 
 def svg(folder, body, head='width="2000mm" height="2000mm" viewBox="0 0 2 2"'):
@@ -59,7 +55,7 @@ def dxf(folder, draw, units=6):
     ids=["points", "shapely", "svg"],
 )
 def test_points_on_a_circle_make_a_disk(source, tmp_path):
-    disk = mesh.outline(source(tmp_path))
+    disk = fi.mesh.outline(source(tmp_path))
     assert_allclose(disk.curvatures, 1.0, rtol=1e-9)
     assert_allclose(first(disk, "hinged"), 4.935149043, rtol=1e-5)  # Bessel root; the polygon's limit is 40 % higher
 
@@ -78,7 +74,7 @@ TURNED = '<ellipse cx="1" cy="1" rx="1" ry=".5" transform="rotate(30 1 1)"/>'
 )
 def test_an_ellipse_is_an_ellipse(source, half, note, tmp_path):
     """a^2 omega sqrt(rho h / D) = 27.377 for a clamped one of 2 : 1 (Leissa, Vibration of Plates, table 3.1)."""
-    shape = mesh.outline(source(tmp_path), unit=None if note else "m")
+    shape = fi.mesh.outline(source(tmp_path), unit=None if note else "m")
     assert not note or note in shape.notes[0]
     assert_allclose(half**2 * first(shape, "clamped"), 27.377, rtol=1e-4)
 
@@ -86,7 +82,7 @@ def test_an_ellipse_is_an_ellipse(source, half, note, tmp_path):
 def test_svg_keeps_size_names_and_holes_and_turns_y_upward(tmp_path):
     body = '<path id="rim" d="M0 0 H300 V200 H0 Z"/><circle id="hole" cx="80" cy="50" r="20"/>'
     body += '<g visibility="hidden"><circle id="unseen" cx="200" cy="50" r="20"/></g>'
-    shape = mesh.outline(in_mm(tmp_path, body, 300, 200))
+    shape = fi.mesh.outline(in_mm(tmp_path, body, 300, 200))
     assert set(shape.edges) == {"rim", "hole", "outer", "boundary"}
     assert_allclose(np.ptp(shape.points, axis=0), [0.3, 0.2], rtol=1e-9)
     hole = shape.points[shape.facets[shape.edges["hole"]][:, 0]]
@@ -107,7 +103,7 @@ def test_svg_keeps_size_names_and_holes_and_turns_y_upward(tmp_path):
     ('width="100mm" height="100mm"', None, (50 * 0.0254 / 96, 40 * 0.0254 / 96)),
 ])  # fmt: skip
 def test_svg_has_the_size_of_its_page_or_of_the_unit_given(tmp_path, head, unit, size):
-    shape = mesh.outline(svg(tmp_path, '<rect width="50" height="40"/>', head), unit=unit)
+    shape = fi.mesh.outline(svg(tmp_path, '<rect width="50" height="40"/>', head), unit=unit)
     assert_allclose(np.ptp(shape.points, axis=0), size, rtol=1e-9)
     assert not any("no unit" in note for note in shape.notes)
 
@@ -120,15 +116,15 @@ def test_dxf_lines_and_arcs_in_any_order_make_a_stadium(tmp_path):
         space.add_arc((0, 500), 500, 90, 270)
         space.add_circle((500, 500), 100)
 
-    shape = mesh.outline(dxf(tmp_path, draw, units=4))
+    shape = fi.mesh.outline(dxf(tmp_path, draw, units=4))
     exact = 1.0 + 0.25 * np.pi - 0.01 * np.pi
-    assert_allclose(mesh.outline(dxf(tmp_path, draw, units=4), size=0.02).area, exact, rtol=1e-3)  # chords
+    assert_allclose(fi.mesh.outline(dxf(tmp_path, draw, units=4), size=0.02).area, exact, rtol=1e-3)  # chords
     assert set(shape.edges) == {"edge0", "hole0", "outer", "boundary"}  # smooth all round: one edge
 
 
 def test_dxf_polyline_with_a_bulge_is_an_arc(tmp_path):
     corners = [(0, 0, 0, 0, 0), (1, 0, 0, 0, 1), (1, 1, 0, 0, 0), (0, 1, 0, 0, 0)]
-    shape = mesh.outline(dxf(tmp_path, lambda space: space.add_lwpolyline(corners, close=True)))
+    shape = fi.mesh.outline(dxf(tmp_path, lambda space: space.add_lwpolyline(corners, close=True)))
     curved = shape.curvatures[np.abs(shape.curvatures[:, 0]) > 0]
     assert_allclose(curved, 2.0, rtol=1e-6)
 
@@ -147,7 +143,7 @@ def test_dxf_blocks_are_drawn_and_what_is_hidden_or_no_line_is_told(tmp_path):
         space.add_circle((0.2, 0.2), 0.1, dxfattribs={"invisible": 1})
         space.add_text("top")
 
-    shape = mesh.outline(dxf(tmp_path, draw))
+    shape = fi.mesh.outline(dxf(tmp_path, draw))
     holes = [shape.points[shape.facets[shape.edges[f"hole{i}"]].ravel()] for i in range(4)]
     centres = [0.5 * (hole.min(axis=0) + hole.max(axis=0)) for hole in holes]
     assert_allclose(sorted(y for _, y in centres), [0.5, 1.1, 1.5, 2.1], atol=2e-3)  # chords
@@ -156,7 +152,7 @@ def test_dxf_blocks_are_drawn_and_what_is_hidden_or_no_line_is_told(tmp_path):
 
 def test_the_third_coordinate_of_a_dxf_file_is_told(tmp_path):
     tilted = [(0, 0, 0), (1, 0, 0.1), (1, 3, 0.1), (0, 3, 0)]
-    shape = mesh.outline(dxf(tmp_path, lambda space: space.add_polyline3d(tilted, close=True)))
+    shape = fi.mesh.outline(dxf(tmp_path, lambda space: space.add_polyline3d(tilted, close=True)))
     assert shape.area == pytest.approx(3.0) and "its z, which goes over 0.1 m, is left out" in shape.notes[0]
 
 
@@ -179,7 +175,7 @@ def test_dxf_spline_whose_end_knots_are_not_repeated(tmp_path, weights):
 
 def test_a_dxf_spline_through_points_is_a_curve(tmp_path):
     points = [(0.0, 0.0), (1.0, 0.0), (1.2, 0.8), (0.0, 1.0), (0.0, 0.0)]
-    assert mesh.outline(dxf(tmp_path, lambda space: space.add_spline(points))).curved.all()
+    assert fi.mesh.outline(dxf(tmp_path, lambda space: space.add_spline(points))).curved.all()
 
 
 @pytest.mark.parametrize(("make", "text"), [
@@ -194,15 +190,15 @@ def test_a_dxf_spline_through_points_is_a_curve(tmp_path):
 ])  # fmt: skip
 def test_what_is_no_outline_is_refused(tmp_path, make, text):
     with pytest.raises(ValueError, match=text):
-        mesh.outline(make(tmp_path))
+        fi.mesh.outline(make(tmp_path))
 
 
 def test_what_is_nearly_wrong_is_taken_and_noted(tmp_path):
     """A gap of half a millimetre, as wide as a pencil line, in an outline of a metre; a plate of 15 m; no unit."""
     bare = svg(tmp_path, '<rect width="96" height="96"/>', 'viewBox="0 0 96 96"')
-    assert "states no unit" in mesh.outline(bare).notes[0]
-    assert any("gap" in note for note in mesh.outline(in_mm(tmp_path, '<path d="M0 0 H1000 V600 H0 V0.5"/>')).notes)
-    assert mesh.outline(dxf(tmp_path, lambda space: space.add_circle((0, 0), 7.5), units=0)).notes
+    assert "states no unit" in fi.mesh.outline(bare).notes[0]
+    assert any("gap" in note for note in fi.mesh.outline(in_mm(tmp_path, '<path d="M0 0 H1000 V600 H0 V0.5"/>')).notes)
+    assert fi.mesh.outline(dxf(tmp_path, lambda space: space.add_circle((0, 0), 7.5), units=0)).notes
 
 
 def test_broken_files_are_refused(tmp_path):
@@ -211,7 +207,7 @@ def test_broken_files_are_refused(tmp_path):
     for name in ("plate.svg", "plate.dxf"):
         (tmp_path / name).write_text("neither")
         with pytest.raises(ValueError, match=f"{name} cannot be read as"):
-            mesh.outline(tmp_path / name)
+            fi.mesh.outline(tmp_path / name)
 
 
 LAUGHS = '<!DOCTYPE svg [<!ENTITY a "ha"><!ENTITY b "&a;&a;&a;&a;">]>'
@@ -224,17 +220,17 @@ def test_entities_are_refused_not_expanded(tmp_path, head, encoding):
     text = f'<?xml version="1.0" encoding="{encoding}"?>{head}' + SVG.format(head="", body="<text>&a;</text>")
     (tmp_path / "plate.svg").write_bytes(text.encode(encoding))
     with pytest.raises(ValueError, match="declares XML entities; save it as plain SVG"):
-        mesh.outline(tmp_path / "plate.svg")
+        fi.mesh.outline(tmp_path / "plate.svg")
 
 
 def test_what_refers_to_itself_or_multiplies_is_a_sentence(tmp_path, monkeypatch):
     with pytest.raises(ValueError, match=r"plate\.svg cannot be read as SVG \(maximum recursion"):
-        mesh.outline(svg(tmp_path, '<g id="a"><use href="#a"/></g>'))
+        fi.mesh.outline(svg(tmp_path, '<g id="a"><use href="#a"/></g>'))
     monkeypatch.setattr(isolated, "run_reader", READ_APART)
     monkeypatch.setattr(isolated, "PATIENCE", 2.0)
     uses = "".join(f'<g id="a{i}">' + f'<use href="#a{i - 1}"/>' * 10 + "</g>" for i in range(1, 9))
     with pytest.raises(ValueError, match=r"plate\.svg cannot be read as SVG \(reading took longer|its reader crashed"):
-        mesh.outline(svg(tmp_path, f'<g id="a0"><rect width="1" height="1"/></g>{uses}'))
+        fi.mesh.outline(svg(tmp_path, f'<g id="a0"><rect width="1" height="1"/></g>{uses}'))
 
 
 def test_links_to_other_files_are_not_followed(tmp_path):
@@ -242,19 +238,19 @@ def test_links_to_other_files_are_not_followed(tmp_path):
     links = ("other.svg#x", f"file://{tmp_path}/other.svg#x", "http://localhost:1/other.svg#x")
     body = "".join(f'<use href="{href}"/><image href="{href}" width="1" height="1"/>' for href in links)
     with pytest.raises(ValueError, match="has no outline"):
-        mesh.outline(svg(tmp_path, body))
+        fi.mesh.outline(svg(tmp_path, body))
 
 
 @pytest.mark.parametrize(("degrees", "n_edges"), [(3.0, 4), (9.0, 5)])
 def test_a_bend_of_some_degrees_starts_a_new_edge(tmp_path, degrees, n_edges):
     body = f'<path d="M0 100 L500 {100.0 - 500.0 * np.tan(np.radians(degrees / 2.0))} L1000 100 V600 H0 Z"/>'
-    shape = mesh.outline(in_mm(tmp_path, body))
+    shape = fi.mesh.outline(in_mm(tmp_path, body))
     assert sum(name.startswith("edge") for name in shape.edges) == n_edges
 
 
 def test_named_open_paths_are_lines(tmp_path):
     lines = '<path id="bar" d="M50 20 L200 20 L300 100"/><path id="brace" d="M0 0 L400 300"/>'  # corner to corner
-    shape = mesh.outline(in_mm(tmp_path, RIM + HOLE + lines))
+    shape = fi.mesh.outline(in_mm(tmp_path, RIM + HOLE + lines))
     assert set(shape.edges) == {"rim", "hole", "outer", "boundary"} and list(shape.lines) == ["bar", "brace"]
     assert_allclose(shape.lines["bar"], [(0.05, -0.02), (0.2, -0.02), (0.3, -0.1)], atol=1e-12)
     assert_allclose(shape.lines["brace"], [(0.0, 0.0), (0.4, -0.3)], atol=1e-12)
@@ -266,10 +262,10 @@ def test_a_line_may_touch_an_outline_of_several_named_edges_and_another_line(tmp
     sides = {"top": "M0 0 H400", "right": "M400 0 V300", "bottom": "M400 300 H0", "left": "M0 300 V0"}
     lines = {"bar": "M400 0 L300 100", "strut": "M300 100 L200 100", "far": "M200 100 L300 100.2 V200"}
     body = "".join(f'<path id="{name}" d="{d}"/>' for name, d in (sides | lines).items())
-    shape = mesh.outline(in_mm(tmp_path, body))
+    shape = fi.mesh.outline(in_mm(tmp_path, body))
     assert set(shape.edges) == {*sides, "outer", "boundary"} and set(shape.lines) == set(lines)
     with pytest.raises(ValueError, match=r"three lines that meet at .*; draw the outline as one path"):
-        mesh.outline(in_mm(tmp_path, body + '<path id="brace" d="M0 0 L400 300"/>'))
+        fi.mesh.outline(in_mm(tmp_path, body + '<path id="brace" d="M0 0 L400 300"/>'))
 
 
 def test_lines_of_one_layer_get_numbers_and_curves_become_straight_parts(tmp_path):
@@ -281,7 +277,7 @@ def test_lines_of_one_layer_get_numbers_and_curves_become_straight_parts(tmp_pat
         for end in ((3, 2), (3.8, 2.5), (3.8, 1.5)):
             space.add_line((3.5, 2), end, dxfattribs={"layer": "fork"})
 
-    shape = mesh.outline(dxf(tmp_path, draw))
+    shape = fi.mesh.outline(dxf(tmp_path, draw))
     assert list(shape.lines) == ["bars0", "bars1", "fork0", "fork1", "fork2"]  # one line up to a branch
     path = shape.lines["bars1"]
     assert_allclose(path[[0, -1]], [(3, 1), (1.5, 2)], atol=1e-12)
@@ -292,13 +288,13 @@ def test_lines_of_one_layer_get_numbers_and_curves_become_straight_parts(tmp_pat
 
 
 def test_a_rib_along_a_line_of_a_drawing_is_that_along_its_points(tmp_path):
-    plate = Plate(Material(E=10e9, nu=0.3, rho=450.0), 3e-3)
-    bar = Beam.rectangular(plate.material, width=8e-3, height=12e-3)
-    shape = mesh.outline(in_mm(tmp_path, RIM + '<path id="bar" d="M50 50 L350 200"/>'), size=0.1)
+    plate = fi.Plate(fi.Material(E=10e9, nu=0.3, rho=450.0), 3e-3)
+    bar = fi.Beam.rectangular(plate.material, width=8e-3, height=12e-3)
+    shape = fi.mesh.outline(in_mm(tmp_path, RIM + '<path id="bar" d="M50 50 L350 200"/>'), size=0.1)
     one, two = (
-        find_modes(assemble(shape, plate, {"rim": "hinged"}, ribs=[Rib(path, bar)]), n_modes=3).omega
+        fi.find_modes(fi.assemble(shape, plate, {"rim": "hinged"}, ribs=[fi.Rib(path, bar)]), n_modes=3).omega
         for path in ("bar", [(0.05, -0.05), (0.35, -0.2)])
     )
     assert_allclose(one, two, rtol=1e-9)  # the same body, but for rounding
-    flat = find_modes(assemble(shape, plate, {"rim": "hinged"}), n_modes=3).omega
+    flat = fi.find_modes(fi.assemble(shape, plate, {"rim": "hinged"}), n_modes=3).omega
     assert one[0] > 1.05 * flat[0]

@@ -10,22 +10,18 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from fem_impact import mesh, rise
-from fem_impact._base.check import SimulationError
-from fem_impact.fe.assembly import assemble
-from fem_impact.fe.section import Material, Plate
-from fem_impact.modes.finding import find_modes
+import fem_impact as fi
 
 pytestmark = pytest.mark.usefixtures("read_here")
 MESHES = Path(__file__).parents[2] / "meshes"
-PLATE = Plate(Material(E=210e9, nu=0.3, rho=7850.0), 2e-3)
+PLATE = fi.Plate(fi.Material(E=210e9, nu=0.3, rho=7850.0), 2e-3)
 PER_RATE = np.sqrt(7850 * 2e-3 / (210e9 * 2e-3**3 / (12 * (1 - 0.3**2))))
-GOOD = mesh.rectangle(1.55, 1.0, size=0.25)
+GOOD = fi.mesh.rectangle(1.55, 1.0, size=0.25)
 HINGED = np.pi**2 * np.array([1 + 1 / 1.55**2, 1 + 4 / 1.55**2])
 
 
 def parameters(shape, supports, n_modes=2):
-    return find_modes(assemble(shape, PLATE, supports), n_modes=n_modes).omega * PER_RATE
+    return fi.find_modes(fi.assemble(shape, PLATE, supports), n_modes=n_modes).omega * PER_RATE
 
 
 def written(folder, points, cells, kind="triangle", name="plate.vtu", **more):
@@ -52,7 +48,7 @@ def assert_same_as_good(plate):
 def test_formats_without_names_give_the_same_plate(tmp_path, name):
     if name.endswith("xdmf"):
         pytest.importorskip("h5py", reason="meshio writes XDMF with h5py")
-    plate = mesh.load(written(tmp_path, GOOD.points, GOOD.cells, name=name))
+    plate = fi.mesh.load(written(tmp_path, GOOD.points, GOOD.cells, name=name))
     if name == "plate.stl":  # single precision
         assert_allclose(held(plate), HINGED, rtol=1e-5)  # refined by find_modes: 1e-6
     else:
@@ -67,8 +63,8 @@ def assert_same_edges(one, two):
 
 
 def test_saved_mesh_comes_back_with_its_edges(tmp_path):
-    mesh.save(tmp_path / "plate.msh", GOOD)
-    plate = mesh.load(tmp_path / "plate.msh")
+    fi.mesh.save(tmp_path / "plate.msh", GOOD)
+    plate = fi.mesh.load(tmp_path / "plate.msh")
     assert_same_as_good(plate)
     assert_same_edges(plate, replace(GOOD, edges=GOOD.edges | {"outer": GOOD.edges["boundary"]}))
 
@@ -87,7 +83,7 @@ def test_lines_with_nodes_of_their_own_name_edges_and_those_beside_all_triangles
         cells = [("line", lines), ("triangle", GOOD.cells)]
         made = meshio.Mesh(np.column_stack([points, np.zeros(n + 2)]), cells, cell_data=tags, field_data=names)
         made.write(tmp_path / "plate.msh", file_format="gmsh22")
-        return mesh.load(tmp_path / "plate.msh")
+        return fi.mesh.load(tmp_path / "plate.msh")
 
     plate = loaded(lines)
     assert len(plate.edges["left"]) == len(GOOD.edges["left"])
@@ -99,8 +95,8 @@ def test_lines_with_nodes_of_their_own_name_edges_and_those_beside_all_triangles
 
 def test_any_name_of_an_edge_comes_back(tmp_path):
     names = {name: np.array([i]) for i, name in enumerate(['3/4" rim', '"', "a\\b", "\\", 'a\\"b', " ä "])}
-    mesh.save(tmp_path / "plate.msh", replace(GOOD, edges=GOOD.edges | names))
-    again = mesh.load(tmp_path / "plate.msh")
+    fi.mesh.save(tmp_path / "plate.msh", replace(GOOD, edges=GOOD.edges | names))
+    again = fi.mesh.load(tmp_path / "plate.msh")
     for name, facets in names.items():
         places = [each.points[each.facets[rows]] for each, rows in ((again, again.edges[name]), (GOOD, facets))]
         assert_allclose(*places)
@@ -111,13 +107,13 @@ def test_sets_of_nodes_are_edges_which_may_overlap_and_be_called_as_the_surface_
     left = np.flatnonzero(GOOD.points[:, 0] == 0.0)
     sets = {"plate": left, "ALL": np.arange(len(GOOD.points)), "FORCE": np.array([3])}
     sets["LOW"] = left[GOOD.points[left, 1] < 0.3]
-    given = mesh.load(written(tmp_path, GOOD.points, GOOD.cells, name="plate.inp", point_sets=sets))
+    given = fi.mesh.load(written(tmp_path, GOOD.points, GOOD.cells, name="plate.inp", point_sets=sets))
     assert set(given.edges) == {"plate", "ALL", "LOW", "outer", "boundary"} and not given.notes
     assert len(given.edges["plate"]) == len(GOOD.edges["left"]) > len(given.edges["LOW"]) > 0
     assert_allclose(given.points[given.facets[given.edges["plate"]]][..., 0], 0.0)
     assert given.edges["ALL"].tolist() == given.edges["boundary"].tolist()
-    mesh.save(tmp_path / "again.msh", given)
-    assert_same_edges(mesh.load(tmp_path / "again.msh"), given)
+    fi.mesh.save(tmp_path / "again.msh", given)
+    assert_same_edges(fi.mesh.load(tmp_path / "again.msh"), given)
 
 
 def test_a_set_that_holds_one_of_two_duplicate_nodes_names_the_sides_of_both(tmp_path):
@@ -127,7 +123,7 @@ def test_a_set_that_holds_one_of_two_duplicate_nodes_names_the_sides_of_both(tmp
     both = np.intersect1d(GOOD.cells[:HALF], GOOD.cells[HALF:])
     assert np.isin(edge, both).any()
     given = np.where(np.isin(edge, GOOD.cells[:HALF]), edge, edge + N)
-    plate = mesh.load(written(tmp_path, points, cells, name="plate.inp", point_sets={"hinge": given}))
+    plate = fi.mesh.load(written(tmp_path, points, cells, name="plate.inp", point_sets={"hinge": given}))
     assert len(plate.edges["hinge"]) == len(GOOD.edges["left"])
 
 
@@ -137,19 +133,19 @@ def test_markers_of_su2_are_edges(tmp_path):
     cells = "NELEM= 2\n5 0 1 2 0\n5 0 2 3 1\n"
     sides = "NMARK= 2\n" + markers.format(7, 0, 1) + markers.format(8, 2, 3)
     (tmp_path / "square.su2").write_text(f"NDIME= 2\n{cells}NPOIN= 4\n{nodes}\n{sides}")
-    plate = mesh.load(tmp_path / "square.su2")
+    plate = fi.mesh.load(tmp_path / "square.su2")
     assert_allclose(plate.points[plate.facets[plate.edges["edge7"]]][..., 1], 0.0)
     assert_allclose(plate.points[plate.facets[plate.edges["edge8"]]][..., 1], 1.0)
 
 
 @pytest.mark.parametrize("name", ["plate.msh", "plate.vtu"])
 def test_a_disk_from_a_file_is_a_disk_and_no_polygon(tmp_path, name):
-    disk = mesh.disk(1.0, size=0.2)
+    disk = fi.mesh.disk(1.0, size=0.2)
     if name.endswith("msh"):
-        mesh.save(tmp_path / name, disk)
+        fi.mesh.save(tmp_path / name, disk)
     else:
         written(tmp_path, disk.points, disk.cells, name=name)
-    plate = mesh.load(tmp_path / name)
+    plate = fi.mesh.load(tmp_path / name)
     assert_allclose(plate.curvatures, 1.0, rtol=1e-6)  # the circle is found in its points
     assert_allclose(held(plate), [4.935149043, 13.89816507], rtol=1e-5)  # Bessel roots
 
@@ -157,8 +153,8 @@ def test_a_disk_from_a_file_is_a_disk_and_no_polygon(tmp_path, name):
 def test_a_smooth_rim_that_is_no_circle_is_followed(tmp_path):
     angle = np.linspace(0, 2 * np.pi, 60, endpoint=False)
     rim = np.column_stack([1.5 * np.cos(angle), np.sin(angle)])
-    shape = mesh.polygon(rim, size=0.2)
-    plate = mesh.load(written(tmp_path, shape.points, shape.cells))
+    shape = fi.mesh.polygon(rim, size=0.2)
+    plate = fi.mesh.load(written(tmp_path, shape.points, shape.cells))
     a, b = 1.5, 1.0
     x, y = plate.points[plate.facets[:, 0]].T
     exact = 1.0 / (a**2 * b**2 * (x**2 / a**4 + y**2 / b**4) ** 1.5)
@@ -167,10 +163,10 @@ def test_a_smooth_rim_that_is_no_circle_is_followed(tmp_path):
 
 
 def test_a_mesh_far_finer_than_the_modes_need_is_filled_anew_within_its_rim(tmp_path):
-    mesh.save(tmp_path / "fine.msh", mesh.disk(1.0, 0.2, size=0.07))
-    plate = mesh.load(tmp_path / "fine.msh")
+    fi.mesh.save(tmp_path / "fine.msh", fi.mesh.disk(1.0, 0.2, size=0.07))
+    plate = fi.mesh.load(tmp_path / "fine.msh")
     supports = {"outer": "clamped", "inner": "free"}
-    modes = find_modes(assemble(plate, PLATE, supports), n_modes=6, tolerance=1e-3)
+    modes = fi.find_modes(fi.assemble(plate, PLATE, supports), n_modes=6, tolerance=1e-3)
     used = modes.shapes.system.mesh
     assert len(used.cells) < 0.7 * len(plate.cells)
     assert_same_edges(used, plate)
@@ -178,14 +174,14 @@ def test_a_mesh_far_finer_than_the_modes_need_is_filled_anew_within_its_rim(tmp_
     for field in ("middles", "curvatures"):  # 1e-6: curvatures come from second differences of the curve
         one, two = (getattr(m, field)[rows] for m, rows in zip((used, plate), order))
         assert_allclose(one, two, rtol=0, atol=1e-6)
-    own = find_modes(assemble(mesh.disk(1.0, 0.2), PLATE, supports), n_modes=6)
+    own = fi.find_modes(fi.assemble(fi.mesh.disk(1.0, 0.2), PLATE, supports), n_modes=6)
     assert_allclose(modes.omega, own.omega, rtol=1e-3)  # the tolerance
 
 
 def test_triangles_under_a_varying_thickness_are_kept():
-    plate = mesh.load(MESHES / "guitar.msh")
-    stepped = Plate(PLATE.material, lambda points: np.where(points[:, 0] < 0.2, 2e-3, 3e-3))
-    used = assemble(plate, stepped, {"body": "clamped"}).mesh
+    plate = fi.mesh.load(MESHES / "guitar.msh")
+    stepped = fi.Plate(PLATE.material, lambda points: np.where(points[:, 0] < 0.2, 2e-3, 3e-3))
+    used = fi.assemble(plate, stepped, {"body": "clamped"}).mesh
     assert_allclose(used.refined(0.5).cells, plate.cells)
     fine = used.refined(2.0)
     assert len(fine.cells) == 4 * len(plate.cells)
@@ -195,9 +191,9 @@ def test_triangles_under_a_varying_thickness_are_kept():
 
 def test_where_the_mesher_fails_the_mesh_is_used_as_it_is(monkeypatch):
     def fail(*_):
-        raise SimulationError("the mesher could not fill the outline")
+        raise fi.SimulationError("the mesher could not fill the outline")
 
-    plate = mesh.load(MESHES / "guitar.msh")
+    plate = fi.mesh.load(MESHES / "guitar.msh")
     monkeypatch.setattr("fem_impact.mesh.meshes.triangulate", fail)
     assert_allclose(plate.refined(0.5).cells, plate.cells)
     assert len(plate.refined(1.3).cells) == 4 * len(plate.cells)
@@ -205,7 +201,7 @@ def test_where_the_mesher_fails_the_mesh_is_used_as_it_is(monkeypatch):
 
 @pytest.mark.parametrize("factor", [1.3, 2.6])
 def test_smaller_triangles_fill_the_same_rim(factor):
-    plate = mesh.load(MESHES / "guitar.msh")
+    plate = fi.mesh.load(MESHES / "guitar.msh")
     fine = plate.refined(factor)
     assert fine.size <= plate.size / factor * (1.0 + 1e-9)
     assert set(fine.edges) == set(plate.edges)
@@ -233,14 +229,14 @@ N, HALF = len(GOOD.points), len(GOOD.cells) // 2
     (GOOD.points[ORDER], np.argsort(ORDER)[GOOD.cells][::-1], None),
 ], ids=["inverted", "doubled nodes", "collapsed", "twice", "order"])  # fmt: skip
 def test_what_is_safe_to_mend_is_mended_and_said(tmp_path, points, cells, note):
-    plate = mesh.load(written(tmp_path, points, cells))
+    plate = fi.mesh.load(written(tmp_path, points, cells))
     assert any(note in said for said in plate.notes) if note else not plate.notes
     assert_same_as_good(plate)
 
 
 def test_hanging_nodes_are_tied_in(tmp_path):
     points = [(0, 0), (1, 0), (2, 0), (2, 1), (1, 1), (0, 1), (1, 0.5)]
-    plate = mesh.load(written(tmp_path, points, [[0, 1, 4], [0, 4, 5], [1, 2, 6], [2, 3, 6], [3, 4, 6]]))
+    plate = fi.mesh.load(written(tmp_path, points, [[0, 1, 4], [0, 4, 5], [1, 2, 6], [2, 3, 6], [3, 4, 6]]))
     assert "hanging nodes" in plate.notes[0]
     assert_allclose(held(plate), np.pi**2 * np.array([1.25, 2.0]), rtol=1e-5)
 
@@ -253,7 +249,7 @@ def test_groups_of_med_are_edges_which_may_overlap(tmp_path, read_here):
     made = meshio.Mesh(points, [("line", sides), ("triangle", GOOD.cells)], cell_data={"cell_tags": tags})
     made.cell_tags = {-6: ["left", "ends"], -7: ["all"], -8: ["ends"]}
     made.write(tmp_path / "a.med")
-    plate = mesh.load(tmp_path / "a.med")
+    plate = fi.mesh.load(tmp_path / "a.med")
     assert set(plate.edges) == {"left", "ends", "outer", "boundary"}
     assert [len(plate.edges[name]) for name in ("left", "ends")] == [len(sides) // 2, len(sides)]
 
@@ -267,7 +263,7 @@ def test_groups_of_med_are_edges_which_may_overlap(tmp_path, read_here):
 def test_decks_of_abaqus_whose_nodes_would_be_lost_are_refused(tmp_path, read_here, nodes, said):
     (tmp_path / "a.inp").write_text(f"{nodes}\n*Element, type=S3\n1,1,2,3\n")
     with pytest.raises(ValueError, match=said):
-        mesh.load(tmp_path / "a.inp")
+        fi.mesh.load(tmp_path / "a.inp")
 
 
 @pytest.mark.parametrize(("grid", "said"), [
@@ -282,17 +278,17 @@ def test_decks_of_nastran_with_what_is_not_read_are_refused(tmp_path, read_here,
     text = f"BEGIN BULK\nGRID,1,,0.,0.,0.\nGRID,2,,1.,0.,0.\n{grid}\nCTRIA3,1,1,1,2,3\nENDDATA\n"
     (tmp_path / "a.bdf").write_text(text)
     if said is None:
-        assert mesh.load(tmp_path / "a.bdf").area == pytest.approx(0.5)
+        assert fi.mesh.load(tmp_path / "a.bdf").area == pytest.approx(0.5)
         return
     with pytest.raises(ValueError, match=said):
-        mesh.load(tmp_path / "a.bdf")
+        fi.mesh.load(tmp_path / "a.bdf")
 
 
 def test_quadrilaterals_are_divided(tmp_path):
     x, y = np.meshgrid(np.linspace(0, 1.55, 7), np.linspace(0, 1, 5), indexing="ij")
     n = np.arange(35).reshape(7, 5)
     cells = np.stack([n[:-1, :-1], n[1:, :-1], n[1:, 1:], n[:-1, 1:]], axis=-1).reshape(-1, 4)
-    plate = mesh.load(written(tmp_path, np.column_stack([x.ravel(), y.ravel()]), cells, kind="quad"))
+    plate = fi.mesh.load(written(tmp_path, np.column_stack([x.ravel(), y.ravel()]), cells, kind="quad"))
     assert_allclose(held(plate), HINGED, rtol=1e-5)
 
 
@@ -312,7 +308,7 @@ def test_curved_quadrilaterals_beside_triangles_are_no_holes(tmp_path, kind):
             triangles += [[*corners[:3], *between[:2], middle[1]], [corners[0], *corners[2:], middle[1], *between[2:]]]
     points = np.column_stack([place, np.zeros(len(place))])
     meshio.Mesh(points, [(kind, np.array(quads)), ("triangle6", np.array(triangles))]).write(tmp_path / "ring.vtu")
-    ring = mesh.load(tmp_path / "ring.vtu")
+    ring = fi.mesh.load(tmp_path / "ring.vtu")
     assert set(ring.edges) == {"outer", "hole0", "boundary"} and ring.curved.all()
     assert_allclose(np.abs(ring.curvatures[ring.edges["outer"]]), 1.0, rtol=1e-3)
 
@@ -322,16 +318,16 @@ def test_cells_that_would_become_a_hole_are_refused(tmp_path):
     points = np.array([*square, *np.zeros((7, 3))], float)
     meshio.Mesh(points, [("triangle", [[0, 1, 2]]), ("triangle10", cubic)]).write(tmp_path / "plate.msh", "gmsh22")
     with pytest.raises(ValueError, match="contains triangle10, which are not read; export linear or quadratic cells"):
-        mesh.load(tmp_path / "plate.msh")
+        fi.mesh.load(tmp_path / "plate.msh")
 
 
 def test_units_are_converted(tmp_path):
     path = written(tmp_path, GOOD.points * 1e3, GOOD.cells)
-    assert_allclose(mesh.load(path, unit="mm").area, 1.55)
+    assert_allclose(fi.mesh.load(path, unit="mm").area, 1.55)
     with pytest.raises(ValueError, match=r"1550 x 1000 m, which looks like millimetres.*pass unit='mm'"):
-        mesh.load(path)
+        fi.mesh.load(path)
     with pytest.raises(ValueError, match="unit must be one of"):
-        mesh.load(path, unit="parsec")
+        fi.mesh.load(path, unit="parsec")
 
 
 @pytest.mark.parametrize(("points", "cells", "text"), [
@@ -347,27 +343,27 @@ def test_units_are_converted(tmp_path):
 ], ids=["steep", "folded", "two", "over one another", "middles"])  # fmt: skip
 def test_what_cannot_be_mended_is_refused_with_the_place(tmp_path, points, cells, text):
     with pytest.raises(ValueError, match=text):
-        mesh.load(written(tmp_path, points, cells, kind={3: "triangle", 6: "triangle6"}[len(cells[0])]))
+        fi.mesh.load(written(tmp_path, points, cells, kind={3: "triangle", 6: "triangle6"}[len(cells[0])]))
 
 
 def test_junk_and_missing_files_are_refused(tmp_path, capsys):
     (tmp_path / "junk.msh").write_text("hello")
     with pytest.raises(ValueError, match=r"junk\.msh cannot be read as a mesh"):
-        mesh.load(tmp_path / "junk.msh")
+        fi.mesh.load(tmp_path / "junk.msh")
     with pytest.raises(ValueError, match="there is no such file"):
-        mesh.load(tmp_path / "nothing.msh")
+        fi.mesh.load(tmp_path / "nothing.msh")
     assert capsys.readouterr() == ("", "")  # errors are raised, not printed
 
 
 @pytest.mark.parametrize("name", ["rectangle", "disk", "cymbal", "guitar", "l_shape"])
 def test_shipped_meshes_load_without_repairs(name):
-    plate = mesh.load(MESHES / f"{name}.msh")
+    plate = fi.mesh.load(MESHES / f"{name}.msh")
     assert not plate.notes
-    modes = find_modes(assemble(plate, PLATE), n_modes=6)
+    modes = fi.find_modes(fi.assemble(plate, PLATE), n_modes=6)
     assert modes.n_rigid == 3
     assert np.isfinite(modes.residual_compliance([plate.points[plate.facets[0, 0]]])).all()
     if name == "cymbal":
-        made = parameters(mesh.disk(0.2032, 0.006), {}, 6)
+        made = parameters(fi.mesh.disk(0.2032, 0.006), {}, 6)
         assert_allclose(modes.omega[3:] * PER_RATE, made[3:], rtol=1e-5)  # two meshes of one body
 
 
@@ -375,17 +371,17 @@ def test_marimba_bar_is_tuned_to_two_octaves(monkeypatch):
     monkeypatch.setattr(sys, "path", [str(MESHES), *sys.path])
     import marimba_bar
 
-    modes = find_modes(assemble(*marimba_bar.bar()), n_modes=4)
+    modes = fi.find_modes(fi.assemble(*marimba_bar.bar()), n_modes=4)
     assert_allclose(modes.frequencies[3] / modes.frequencies[2], 4.0, rtol=0.02)  # what its script promises
 
 
 BENT = 4.0  # [m] radius
-DOME = replace(GOOD, rise=rise.cap(BENT, centre=(0.775, 0.5)))
+DOME = replace(GOOD, rise=fi.rise.cap(BENT, centre=(0.775, 0.5)))
 
 
 def test_a_saved_curved_mesh_comes_back_with_its_rise(tmp_path):
-    mesh.save(tmp_path / "dome.msh", DOME)
-    shape = mesh.load(tmp_path / "dome.msh")
+    fi.mesh.save(tmp_path / "dome.msh", DOME)
+    shape = fi.mesh.load(tmp_path / "dome.msh")
     assert_allclose(shape.points, DOME.points, atol=1e-12)
     away = shape.rise(DOME.points) - DOME.rise(DOME.points)
     assert_allclose(away, away.mean(), atol=1e-12)  # heights over the mean plane
@@ -395,9 +391,9 @@ def test_a_saved_curved_mesh_comes_back_with_its_rise(tmp_path):
     assert slope == pytest.approx(np.tan(np.arcsin(furthest / BENT)), rel=0.05)  # of a triangle, told in two digits
     assert error == pytest.approx(50.0 * slope**2, rel=0.1)
     assert shape.refined(2.0).rise is shape.rise
-    system = assemble(shape, PLATE, {"boundary": "hinged"})
+    system = fi.assemble(shape, PLATE, {"boundary": "hinged"})
     assert system.section.rise is shape.rise and system.theory == "shallow"
-    stated = assemble(shape, PLATE, {"boundary": "hinged"}, rise=rise.saddle(9.0))
+    stated = fi.assemble(shape, PLATE, {"boundary": "hinged"}, rise=fi.rise.saddle(9.0))
     assert stated.section.rise is not shape.rise
 
 
@@ -405,13 +401,13 @@ def test_a_saved_curved_mesh_comes_back_with_its_rise(tmp_path):
 def test_frequencies_of_a_curved_mesh_file_converge_to_those_of_its_surface(tmp_path):
     """Through heights at vertices the surface errs with the square of their distance."""
     errors = []
-    plate = Plate(PLATE.material, 2e-2)
+    plate = fi.Plate(PLATE.material, 2e-2)
     for size in (0.25, 0.125):
-        dome = replace(mesh.rectangle(1.55, 1.0, size=size), rise=DOME.rise)
-        mesh.save(tmp_path / "dome.msh", dome)
+        dome = replace(fi.mesh.rectangle(1.55, 1.0, size=size), rise=DOME.rise)
+        fi.mesh.save(tmp_path / "dome.msh", dome)
         one, two = (
-            find_modes(assemble(shape, plate, {"boundary": "hinged"}), n_modes=3).omega
-            for shape in (dome, mesh.load(tmp_path / "dome.msh"))
+            fi.find_modes(fi.assemble(shape, plate, {"boundary": "hinged"}), n_modes=3).omega
+            for shape in (dome, fi.mesh.load(tmp_path / "dome.msh"))
         )
         errors.append(np.abs(two / one - 1.0).max())
     assert errors[1] < 2e-3 and np.log2(errors[0] / errors[1]) > 1.5  # measured: 2.0 and 2.3
@@ -423,7 +419,7 @@ def test_a_tilted_mesh_is_levelled(tmp_path):
     turn = np.eye(3) + np.sin(angle) * cross + (1.0 - np.cos(angle)) * cross @ cross
     for height in (np.zeros(len(GOOD.points)), DOME.rise(GOOD.points)):
         path = written(tmp_path, np.column_stack([GOOD.points, height]) @ turn.T, GOOD.cells)
-        shape = mesh.load(path)
+        shape = fi.mesh.load(path)
         assert any("is tilted by" in note for note in shape.notes)
         assert shape.area == pytest.approx(GOOD.area, rel=1e-12 if not height.any() else 1e-3)
         assert (shape.rise is None) == (not height.any())
@@ -436,6 +432,6 @@ def test_a_tilted_mesh_is_levelled(tmp_path):
 
 def test_noise_across_the_plane_is_ignored_and_told(tmp_path):
     height = 6e-7 / 0.3 * np.ptp(GOOD.points[:, 0]) * (np.arange(len(GOOD.points)) % 2)
-    noisy = mesh.load(written(tmp_path, np.column_stack([GOOD.points, height]), GOOD.cells, name="noisy.vtk"))
+    noisy = fi.mesh.load(written(tmp_path, np.column_stack([GOOD.points, height]), GOOD.cells, name="noisy.vtk"))
     assert any("across the plane of the mesh, which is ignored" in note for note in noisy.notes)
     assert noisy.area == pytest.approx(GOOD.area, rel=1e-12)

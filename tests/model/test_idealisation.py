@@ -9,26 +9,20 @@ from numpy.testing import assert_allclose
 from scipy import special
 from scipy.optimize import brentq
 
-from fem_impact import mesh
-from fem_impact.fe.assembly import assemble
-from fem_impact.fe.section import Material, Plate
+import fem_impact as fi
 from fem_impact.impact import collision
-from fem_impact.impact.contact import Contact
-from fem_impact.impact.striker import Striker
 from fem_impact.model import idealisation, planner
 from fem_impact.model.idealisation import Surroundings, Waves
 from fem_impact.model.target import Target
-from fem_impact.modes import analytic
-from fem_impact.modes.modal import Modes
 from fem_impact.modes.shapes import SampledShapes
 
 MASS, DURATION = 1.0, 1e-3  # [kg], [s] of every blow here, at 1 m/s
 HERTZ = MASS * (3.2180654597 / DURATION) ** 2.5  # [N/m**1.5], from T = 3.218 (m**2 / (k**2 v))**(1/5)
-LAWS = {"linear": Contact.linear(MASS * (np.pi / DURATION) ** 2), "hertz": Contact.hertz(HERTZ)}
+LAWS = {"linear": fi.Contact.linear(MASS * (np.pi / DURATION) ** 2), "hertz": fi.Contact.hertz(HERTZ)}
 
 
 def struck(modes, law, at, tolerance=1e-6):
-    return collision.strike(modes, Striker.rigid(MASS), LAWS[law], at=at, speed=1.0, tolerance=tolerance)
+    return collision.strike(modes, fi.Striker.rigid(MASS), LAWS[law], at=at, speed=1.0, tolerance=tolerance)
 
 
 def error_of_endless(modes, mobility, at, law):
@@ -54,9 +48,9 @@ def plate(ratio, rate, shape):
     per_area, how = 1.0 / (8.0 * mobility * rate), {"max_frequency": 10.0 / DURATION}
     if shape == "rectangle":
         how["first_frequency"] = rate * np.pi**2 * (1.0 / 1.5**2 + 1.0) / (2.0 * np.pi)
-        return analytic.rectangle(1.5, 1.0, mass=1.5 * per_area, **how), mesh.rectangle(1.5, 1.0), mobility
+        return fi.analytic.rectangle(1.5, 1.0, mass=1.5 * per_area, **how), fi.mesh.rectangle(1.5, 1.0), mobility
     how["first_frequency"] = rate * 4.935152 / (2.0 * np.pi)
-    return analytic.disk(1.0, edge="hinged", mass=np.pi * per_area, **how), mesh.disk(1.0), mobility
+    return fi.analytic.disk(1.0, edge="hinged", mass=np.pi * per_area, **how), fi.mesh.disk(1.0), mobility
 
 
 @pytest.mark.parametrize(("shape", "at", "rate", "ratio", "law"), [
@@ -73,7 +67,7 @@ def test_error_of_an_endless_plate_is_bounded_and_not_by_far(shape, at, rate, ra
 
 
 def test_endless_plate_is_refused_where_an_echo_or_a_second_blow_may_come():
-    view = Surroundings.seen(mesh.rectangle(1.5, 1.0), np.array([0.7, 0.2]))
+    view = Surroundings.seen(fi.mesh.rectangle(1.5, 1.0), np.array([0.7, 0.2]))
     assert idealisation.endless_error(view, 1e-6, 40.0, MASS, DURATION) == np.inf  # echo within the contact
     assert idealisation.endless_error(view, 1e-3, 1.0, MASS, DURATION) == np.inf  # the striker hardly comes back
     assert np.isfinite(idealisation.endless_error(view, 1e-6, 1.0, MASS, DURATION))
@@ -84,7 +78,7 @@ def test_endless_plate_is_refused_where_an_echo_or_a_second_blow_may_come():
 ])  # fmt: skip
 def test_error_of_a_rigid_body_is_bounded_and_not_by_far(mass, first, law):
     at = np.array([0.4, 0.3])
-    modes = analytic.rectangle(1.5, 1.0, mass=mass, first_frequency=first, max_frequency=max(3.0 * first, 1e4))
+    modes = fi.analytic.rectangle(1.5, 1.0, mass=mass, first_frequency=first, max_frequency=max(3.0 * first, 1e4))
     true = difference(struck(idealisation.unyielding(at, mass), law, at, 1e-8), struck(modes, law, at, 1e-8))
     stated = idealisation.rigid_error(modes, at, MASS, DURATION)
     assert 0.9 * true <= stated <= 6.0 * true + 1e-8  # measured 0.95 to 3; the runs' own error
@@ -96,9 +90,9 @@ def test_bound_without_modes_lies_above_the_error_with_them(shape, first):
     make, at = {"first_frequency": first, "mass": 1e5, "max_frequency": max(3.0 * first, 1e4)}, np.array([0.3, 0.15])
     if shape in ("rectangle", "strip"):
         sides = (1.5, 1.0) if shape == "rectangle" else (20.0, 0.4)
-        modes, body = analytic.rectangle(*sides, **make), mesh.rectangle(*sides)
+        modes, body = fi.analytic.rectangle(*sides, **make), fi.mesh.rectangle(*sides)
     else:
-        modes, body = analytic.disk(1.0, edge=shape, **make), mesh.disk(1.0)
+        modes, body = fi.analytic.disk(1.0, edge=shape, **make), fi.mesh.disk(1.0)
     view = Surroundings.seen(body, at)
     slowest = idealisation.slowest_rate(view, first)
     bound = idealisation.rigid_bound(view, 1e5, slowest, shape == "free", MASS, DURATION)
@@ -106,18 +100,18 @@ def test_bound_without_modes_lies_above_the_error_with_them(shape, first):
 
 
 def test_surroundings_of_a_point_on_a_disk():
-    view = Surroundings.seen(mesh.disk(2.0), np.array([0.5, 0.0]))
+    view = Surroundings.seen(fi.mesh.disk(2.0), np.array([0.5, 0.0]))
     assert_allclose(view.area, 4.0 * np.pi, rtol=1e-4)  # parabolas through the middles of arcs of an eighth of the span
     assert_allclose(view.perimeter, 4.0 * np.pi, rtol=1e-2)  # two chords an arc
     assert_allclose(view.clearance, 1.5, rtol=1e-2)
     assert view.mirrors(4.0) >= 1.0
-    assert Surroundings.seen(mesh.disk(2.0), np.array([2.1, 0.0])) is None
+    assert Surroundings.seen(fi.mesh.disk(2.0), np.array([2.1, 0.0])) is None
 
 
-STEEL = Material(E=210e9, nu=0.3, rho=7850.0)
-SPRUCE = Material.orthotropic(E_along=10.9e9, E_across=0.85e9, nu=0.372, G=0.7e9, rho=450.0, angle=0.4)
-SOFT_IN_SHEAR = Material.orthotropic(E_along=1e9, E_across=0.9e9, nu=0.3, G=1e7, rho=500.0)
-STIFF_IN_SHEAR = Material.orthotropic(E_along=17e9, E_across=15e9, nu=0.6, G=30e9, rho=1600.0, angle=1.0)
+STEEL = fi.Material(E=210e9, nu=0.3, rho=7850.0)
+SPRUCE = fi.Material.orthotropic(E_along=10.9e9, E_across=0.85e9, nu=0.372, G=0.7e9, rho=450.0, angle=0.4)
+SOFT_IN_SHEAR = fi.Material.orthotropic(E_along=1e9, E_across=0.9e9, nu=0.3, G=1e7, rho=500.0)
+STIFF_IN_SHEAR = fi.Material.orthotropic(E_along=17e9, E_across=15e9, nu=0.6, G=30e9, rho=1600.0, angle=1.0)
 THICKNESS = 3e-3  # [m]
 
 
@@ -139,7 +133,7 @@ def test_mobility_of_an_endless_plate_is_an_integral_over_the_directions_of_its_
 
 
 def test_orthotropic_plate_without_a_direction_is_the_isotropic_one():
-    same = Material.orthotropic(E_along=210e9, E_across=210e9, nu=0.3, G=210e9 / 2.6, rho=7850.0, angle=0.7)
+    same = fi.Material.orthotropic(E_along=210e9, E_across=210e9, nu=0.3, G=210e9 / 2.6, rho=7850.0, angle=0.7)
     one, two = Waves.of(STEEL, THICKNESS), Waves.of(same, THICKNESS)
     rigidity, per_area = 210e9 * THICKNESS**3 / 12.0 / 0.91, 7850.0 * THICKNESS
     for waves in (one, two):
@@ -150,8 +144,8 @@ def test_orthotropic_plate_without_a_direction_is_the_isotropic_one():
 
 
 def test_clearance_counts_for_less_along_the_grain():
-    wood = Material.orthotropic(E_along=16e9, E_across=1e9, nu=0.0, G=1e9, rho=500.0)
-    body, at = mesh.rectangle(2.0, 1.0), np.array([0.9, 0.6])
+    wood = fi.Material.orthotropic(E_along=16e9, E_across=1e9, nu=0.0, G=1e9, rho=500.0)
+    body, at = fi.mesh.rectangle(2.0, 1.0), np.array([0.9, 0.6])
     view = Surroundings.seen(body, at, Waves.of(wood, THICKNESS).stretch)
     root = 16.0**0.125  # the plane is this much shorter along the grain
     assert_allclose(view.clearance, min(0.9 / root, 0.4 * root), rtol=1e-12)
@@ -164,7 +158,7 @@ def grained(material, at, ratio, nearness, law):
     Its rigidity and mass are such that it damps the contact by a ratio and its edges are as near as stated.
     """
     waves, at = Waves.of(material, THICKNESS), np.asarray(at)
-    view = Surroundings.seen(mesh.rectangle(1.5, 1.0), at, waves.stretch)
+    view = Surroundings.seen(fi.mesh.rectangle(1.5, 1.0), at, waves.stretch)
     faster = view.clearance**2 / (nearness * DURATION * (1.0 + ratio)) / waves.fastest
     mobility = 2.0 * ratio * DURATION / (MASS * np.pi)
     per_area = 1.0 / (8.0 * mobility * waves.rate * faster)
@@ -175,7 +169,7 @@ def grained(material, at, ratio, nearness, law):
     shape = 2.0 / np.sqrt(1.5 * per_area) * np.sin(m * at[0])[:, None] * np.sin(n * at[1])[None]
     kept = np.argsort(squared.ravel())[: np.count_nonzero(squared < (2.0 * np.pi * 10.0 / DURATION) ** 2)]
     shapes = SampledShapes(at[None], shape.ravel()[None, kept], np.array([[np.sum(shape**2 / squared)]]))
-    modes = Modes(np.sqrt(squared.ravel()[kept]), np.zeros(len(kept)), shapes, 1.5 * per_area)
+    modes = fi.Modes(np.sqrt(squared.ravel()[kept]), np.zeros(len(kept)), shapes, 1.5 * per_area)
     rate, slowest = waves.fastest * faster, waves.slowest * faster
     stated = idealisation.endless_error(view, mobility, rate, MASS, DURATION, slowest=slowest)
     seen = np.isfinite(stated) and modes.n_modes < 3000
@@ -201,7 +195,7 @@ def test_error_of_random_endless_orthotropic_plates_is_bounded():
         G = 0.5 * (10.0 ** rng.uniform(-1.0, 0.7) * np.sqrt(1e10 * across) - 0.2 * across)
         if G <= 0.0:
             continue
-        wood = Material.orthotropic(E_along=1e10, E_across=across, nu=0.2, G=G, rho=500.0)
+        wood = fi.Material.orthotropic(E_along=1e10, E_across=across, nu=0.2, G=G, rho=500.0)
         at, ratio = rng.uniform([0.2, 0.2], [1.3, 0.8]), rng.uniform(0.01, 0.28)
         stated, true = grained(wood, at, ratio, 2.05 * 5.0 ** rng.uniform(), str(rng.choice(list(LAWS))))
         found += [stated / true] if np.isfinite(true) else []
@@ -213,11 +207,11 @@ def test_error_of_random_endless_orthotropic_plates_is_bounded():
 def test_a_spruce_top_counts_as_endless_and_is_struck_as_by_its_modes():
     """Elements, a grain at an angle and clamped edges: the contact is over before the echo returns."""
     mass, duration, at = 2e-3, 1.2e-3, (0.2, 0.15)
-    system = assemble(mesh.rectangle(0.4, 0.3), Plate(SPRUCE, THICKNESS), {"boundary": "clamped"})
+    system = fi.assemble(fi.mesh.rectangle(0.4, 0.3), fi.Plate(SPRUCE, THICKNESS), {"boundary": "clamped"})
 
     def plan(tolerance, **how):
-        law = Contact.hertz(mass * (3.2180654597 / duration) ** 2.5)
-        return planner.plan_of(system, Striker.rigid(mass), law, at=at, speed=1.0, tolerance=tolerance, **how)
+        law = fi.Contact.hertz(mass * (3.2180654597 / duration) ** 2.5)
+        return planner.plan_of(system, fi.Striker.rigid(mass), law, at=at, speed=1.0, tolerance=tolerance, **how)
 
     endless = plan(0.1)
     assert endless.target == "infinite"
@@ -228,8 +222,8 @@ def test_a_spruce_top_counts_as_endless_and_is_struck_as_by_its_modes():
 
 
 def test_what_an_orthotropic_plate_under_tension_answers_is_not_known():
-    plate = Plate(SPRUCE, THICKNESS, tension=100.0)
-    target = Target(mesh.rectangle(0.4, 0.3), plate, {"boundary": "clamped"})
+    plate = fi.Plate(SPRUCE, THICKNESS, tension=100.0)
+    target = Target(fi.mesh.rectangle(0.4, 0.3), plate, {"boundary": "clamped"})
     assert idealisation.from_outside(target, (0.2, 0.15), 1e-3, 1e-4).mobility == np.inf
 
 

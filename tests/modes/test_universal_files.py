@@ -4,27 +4,23 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from fem_impact import mesh
-from fem_impact.fe.assembly import assemble
-from fem_impact.fe.section import Beam, Material, Plate
+import fem_impact as fi
 from fem_impact.modes import universal_files
-from fem_impact.modes.air import in_air
-from fem_impact.modes.body import Body
-from fem_impact.modes.finding import find_modes
-from fem_impact.modes.modal import Modes
-from fem_impact.show import export, figures, sampling
+from fem_impact.show import sampling
 
 pyuff = pytest.importorskip("pyuff", reason="the uff extra is not installed")
 pytestmark = pytest.mark.usefixtures("read_here")
-STEEL = Material(E=210e9, nu=0.3, rho=7850.0)
+STEEL = fi.Material(E=210e9, nu=0.3, rho=7850.0)
 
 
 @pytest.fixture(scope="module")
 def written(tmp_path_factory):
     """Modes of a free plate, the points and triangles that are written of them, and the file."""
     path = tmp_path_factory.mktemp("written") / "plate.uff"
-    modes = find_modes(assemble(mesh.rectangle(0.4, 0.3), Plate(STEEL, 2e-3)), n_modes=8, damping_ratio=0.01)
-    export.write_uff(path, modes)
+    modes = fi.find_modes(
+        fi.assemble(fi.mesh.rectangle(0.4, 0.3), fi.Plate(STEEL, 2e-3)), n_modes=8, damping_ratio=0.01
+    )
+    fi.export.write_uff(path, modes)
     return modes, *modes.shapes.grid(), path
 
 
@@ -32,7 +28,7 @@ def written(tmp_path_factory):
 def plate(written):
     """The points of that plate, its data sets to change, and the modes as they were written."""
     *_, path = written
-    return written[1], pyuff.UFF(str(path)).read_sets(), Modes.from_uff(path, mass=1.0)
+    return written[1], pyuff.UFF(str(path)).read_sets(), fi.Modes.from_uff(path, mass=1.0)
 
 
 @pytest.fixture
@@ -42,7 +38,7 @@ def read(tmp_path):
     def read(sets, **told):
         (tmp_path / "other.uff").unlink(missing_ok=True)
         pyuff.UFF(str(tmp_path / "other.uff")).write_sets(sets, mode="add")
-        return Modes.from_uff(tmp_path / "other.uff", **({"mass": 1.0} | told))
+        return fi.Modes.from_uff(tmp_path / "other.uff", **({"mass": 1.0} | told))
 
     return read
 
@@ -55,7 +51,7 @@ def assert_same(found, modes, points):
 
 def test_modes_come_back_as_they_were_written_with_their_elements(written, tmp_path):
     modes, points, cells, path = written
-    again = Modes.from_uff(path, mass=modes.mass)
+    again = fi.Modes.from_uff(path, mass=modes.mass)
     assert_same(again, modes, points)
     assert_allclose(again.damping_ratio, modes.damping_ratio, rtol=1e-5)
     assert again.n_rigid == 3 and modes.continuous and not again.continuous
@@ -63,11 +59,11 @@ def test_modes_come_back_as_they_were_written_with_their_elements(written, tmp_p
     drawn = sampling.grid(again)  # not refined: nothing is known between the points
     assert_allclose(drawn[0], points, atol=1e-9)
     assert np.array_equal(drawn[1], cells)
-    assert len(figures.mode_shapes(again, count=4).axes) >= 4
-    export.write_uff(tmp_path / "again.uff", again)
-    assert np.array_equal(Modes.from_uff(tmp_path / "again.uff", mass=modes.mass).shapes.grid()[1], cells)
+    assert len(fi.figures.mode_shapes(again, count=4).axes) >= 4
+    fi.export.write_uff(tmp_path / "again.uff", again)
+    assert np.array_equal(fi.Modes.from_uff(tmp_path / "again.uff", mass=modes.mass).shapes.grid()[1], cells)
     with pytest.raises(ValueError, match="in_air needs"):
-        in_air(again)
+        fi.in_air(again)
 
 
 def test_nodes_and_triangles_are_in_the_file(written, plate):
@@ -97,16 +93,16 @@ def test_other_elements_are_taken_by_their_corners(plate, read, tmp_path):
     line = "".join(f"{node:10d}" for node in range(1, 21))
     assert line in bare.read_text()
     bare.write_text(bare.read_text().replace(line, "\n".join((line[:80], line[80:160], line[160:]))))
-    assert Modes.from_uff(bare, mass=1.0).shapes.grid()[1].shape == (len(points), 1)  # points alone
+    assert fi.Modes.from_uff(bare, mass=1.0).shapes.grid()[1].shape == (len(points), 1)  # points alone
 
 
 def test_a_beam_comes_back_as_a_line_of_points(tmp_path):
-    beam = Beam.rectangular(STEEL, width=0.02, height=0.01)
-    modes = find_modes(assemble(mesh.line(1.0, size=0.1), beam, {"left": "clamped"}), n_modes=3)
+    beam = fi.Beam.rectangular(STEEL, width=0.02, height=0.01)
+    modes = fi.find_modes(fi.assemble(fi.mesh.line(1.0, size=0.1), beam, {"left": "clamped"}), n_modes=3)
     points, cells = modes.shapes.grid()
     told = modes.frequencies, modes.damping_ratio, modes.shape_at(points), points, cells
     universal_files.write_modes(tmp_path / "bar.unv", *told)
-    again = Modes.from_uff(tmp_path / "bar.unv", mass=modes.mass)
+    again = fi.Modes.from_uff(tmp_path / "bar.unv", mass=modes.mass)
     assert again.dimension == 1 and np.array_equal(again.shapes.grid()[1], cells)
     assert_allclose(again.shape_at([1.0]), modes.shape_at([1.0]), rtol=1e-5)
 
@@ -152,17 +148,17 @@ def test_what_a_file_lacks_is_said(written, plate, read, tmp_path):
         read([*sets, sets[-1]])
     (tmp_path / "cut.uff").write_bytes(written[-1].read_bytes()[:-5000])
     with pytest.raises(ValueError, match=r"cut\.uff ends within a data set; it may be cut off"):
-        Modes.from_uff(tmp_path / "cut.uff", mass=1.0)
+        fi.Modes.from_uff(tmp_path / "cut.uff", mass=1.0)
     with pytest.raises(ValueError, match=r"other\.uff has a mode with two shapes at one node; export it again"):
         read([*sets[:3], sets[-1] | {"node_nums": np.maximum(sets[-1]["node_nums"], 2)}])
     with pytest.raises(ValueError, match="there is no such file"):
-        Modes.from_uff(tmp_path / "none.uff", mass=1.0)
+        fi.Modes.from_uff(tmp_path / "none.uff", mass=1.0)
     with pytest.raises(ValueError, match=r"one along which plate.uff has motions, got 'x'"):
-        Modes.from_uff(written[-1], mass=1.0, direction="x")
+        fi.Modes.from_uff(written[-1], mass=1.0, direction="x")
     with pytest.raises(ValueError, match="direction must be one of x, y, z"):
-        Modes.from_uff(written[-1], mass=1.0, direction="up")
+        fi.Modes.from_uff(written[-1], mass=1.0, direction="up")
     with pytest.raises(ValueError, match="no shape to write"):
-        export.write_uff(tmp_path / "mass.uff", Modes.rigid(1.0))
+        fi.export.write_uff(tmp_path / "mass.uff", fi.Modes.rigid(1.0))
 
 
 @pytest.mark.parametrize("ratio", [2.0, 1.0, -0.02, -1e-4])
@@ -178,8 +174,8 @@ def test_a_mode_that_would_not_swing_or_would_grow_is_refused(plate, read, tmp_p
     with pytest.raises(ValueError, match=said):
         read(sets)
     with pytest.raises(ValueError, match=said):
-        Body.load(tmp_path / "other.uff", mass=1.0)
-    assert set(Body.load(tmp_path / "other.uff", mass=1.0, damping_ratio=0.02).damping_ratio[3:]) == {0.02}
+        fi.Body.load(tmp_path / "other.uff", mass=1.0)
+    assert set(fi.Body.load(tmp_path / "other.uff", mass=1.0, damping_ratio=0.02).damping_ratio[3:]) == {0.02}
 
 
 @pytest.mark.parametrize(("degrees", "real"), [(10.0, True), (25.0, False)])

@@ -13,15 +13,12 @@ from hypothesis import strategies as st
 from numpy.testing import assert_allclose
 from scenes import SMALL, load_text
 
-from fem_impact import mesh
+import fem_impact as fi
 from fem_impact._base import check
 from fem_impact.fe import assembly
-from fem_impact.fe.section import Material, Plate
 from fem_impact.impact import collision
-from fem_impact.impact.contact import Contact
-from fem_impact.impact.striker import Hand, Striker
 from fem_impact.model.budget import Budget
-from fem_impact.modes import analytic, finding
+from fem_impact.modes import finding
 from fem_impact.scenes import scene, sentences
 from fem_impact.scenes.sentences import words
 
@@ -49,9 +46,9 @@ def test_title_cannot_command_a_terminal(tmp_path):
 
 def test_scene_strikes_what_the_public_functions_strike(tmp_path):
     hit = load_text(tmp_path, TEXT).strike()
-    body = analytic.rectangle(0.465, 0.3, mass=0.2, first_frequency=100.0, n_modes=hit.target.n_modes).damped(0.005)
+    body = fi.analytic.rectangle(0.465, 0.3, mass=0.2, first_frequency=100.0, n_modes=hit.target.n_modes).damped(0.005)
     blow = {"at": [0.1395, 0.09], "speed": 2.0, "tolerance": Budget(1e-2).half}
-    again = collision.strike(body, Striker.rigid(0.03), Contact.hertz(695e3), **blow)
+    again = collision.strike(body, fi.Striker.rigid(0.03), fi.Contact.hertz(695e3), **blow)
     # the same calls with the same numbers, up to rounding of the scale: 1e-9 of the peak after some 1e3 rad
     assert_allclose(hit.force, again.force, rtol=0, atol=1e-9 * again.peak_force)
     assert hit.n_impacts == again.n_impacts
@@ -59,11 +56,11 @@ def test_scene_strikes_what_the_public_functions_strike(tmp_path):
 
 @pytest.mark.parametrize(("text", "law"), [
     ('"layers"\nstiffness = 1e5\nexponent = 1.2\ndepth = 2e-4\nhard_stiffness = 1e7',
-     Contact.layers(1e5, 1.2, depth=2e-4, hard_stiffness=1e7)),
+     fi.Contact.layers(1e5, 1.2, depth=2e-4, hard_stiffness=1e7)),
     ('"elastic_plastic"\nstiffness = 695e3\nyield_speed = 0.1\nmass = 0.03',
-     Contact.elastic_plastic(695e3, yield_speed=0.1, mass=0.03)),
+     fi.Contact.elastic_plastic(695e3, yield_speed=0.1, mass=0.03)),
     ('"felt"\nstiffness = 695e3\nexponent = 1.5\nhysteresis = 0.2\nrelaxation = 1e-3',
-     Contact.felt(695e3, 1.5, hysteresis=0.2, relaxation=1e-3)),
+     fi.Contact.felt(695e3, 1.5, hysteresis=0.2, relaxation=1e-3)),
 ])  # fmt: skip
 def test_contacts_that_lose_and_a_hammer_in_a_scene(tmp_path, text, law):
     hammer = 'kind = "hammer"\nhead = 0.03\nhandle = 0.05\nstiffness = 1e4\ndamping = 2.0'
@@ -82,7 +79,7 @@ def test_a_striker_that_turns_in_a_scene(tmp_path):
     """It is the one of `Striker.turning`; the answer tells the mass felt, and what friction would do."""
     loaded = load_text(tmp_path, edited(RIGID, TURNING))
     hit = loaded.strike()
-    assert_allclose(hit.striker.motion, Striker.turning(0.08, 2e-5, (0.01, 0.03), pivot=(-0.2, 0.0)).motion)
+    assert_allclose(hit.striker.motion, fi.Striker.turning(0.08, 2e-5, (0.01, 0.03), pivot=(-0.2, 0.0)).motion)
     assert "felt as 57.14\xa0g off its centre" in words(loaded, hit)[1]
     assert examined(hit, "no friction").worst > 0.0
 
@@ -106,7 +103,7 @@ def test_a_plate_clamped_at_a_post_in_a_scene(tmp_path):
 
 def test_a_held_striker_in_a_scene_comes_back(tmp_path):
     loaded = load_text(tmp_path, edited(RIGID, f"{RIGID}\nhand = {{ stiffness = 100.0, damping = 0.1, force = -0.3 }}"))
-    assert loaded.make_striker().hand == Hand(100.0, 0.1, -0.3)
+    assert loaded.make_striker().hand == fi.Hand(100.0, 0.1, -0.3)
     hit = loaded.strike(tolerance=0.1, duration=0.2, quantity="n_impacts")
     assert any(impact.start > 0.02 for impact in hit.impacts)  # half a swing at 9 Hz
     assert "held by a hand in which it swings at 9.189" in words(loaded, hit)[1]  # sqrt(100 / 0.03) / 2 pi
@@ -129,8 +126,8 @@ def test_tolerance_or_count_decides_how_many_modes_are_used(tmp_path):
 def test_material_and_section_give_the_plate_its_own_mass(tmp_path):
     text = edited("[target]\nmass = 0.2\nfirst_frequency = 100.0", PLATE).replace('"analytic"', '"fe"')
     modes = load_text(tmp_path, text).modes(4)
-    plate = Plate(Material(E=10e9, nu=0.3, rho=450.0), 3e-3)
-    system = assembly.assemble(mesh.rectangle(0.465, 0.3), plate, supports={"boundary": "hinged"})
+    plate = fi.Plate(fi.Material(E=10e9, nu=0.3, rho=450.0), 3e-3)
+    system = assembly.assemble(fi.mesh.rectangle(0.465, 0.3), plate, supports={"boundary": "hinged"})
     assert_allclose(modes.mass, 0.465 * 0.3 * 450.0 * 3e-3, rtol=1e-12)
     # the scene refines to 1e-2, the default mesh is at least that good on the first four
     assert_allclose(modes.frequencies, finding.find_modes(system, n_modes=4).frequencies, rtol=2e-2)
