@@ -36,6 +36,10 @@ RECOUNTS = 8  # [-] runs at most until as many impacts ended as asked for; of 8 
 NODES = 5  # [-] of collocation; more gain nothing, because the force is not smooth at onset and release
 
 
+class Unfit(SimulationError):
+    """A scheme does not get through a blow: it found no valid next step, or no two of its runs agreed."""
+
+
 class Pace(NamedTuple):
     """How fast a system's undisturbed contacts pass; the longest first step is infinite where all follow power laws.
 
@@ -108,7 +112,7 @@ def run_system(
         )
     if status == record.FAILED:
         advice = "use A4" if scheme == "collocation" else "check the units of the scene"
-        raise SimulationError(f"scheme {scheme} found no valid next step at {time:.4g} s; {advice}")
+        raise Unfit(f"scheme {scheme} found no valid next step at {time:.4g} s; {advice}")
     return history
 
 

@@ -136,17 +136,16 @@ def refine_steps(
             "take a law of a lower exponent, that yields later or that rises less steeply"
         )
     ringing = _ringing(system, pace)
-    control = _Control(system, options, pace, scheme, free, stretched, ringing)
-    try:
-        return control.add_unresolved(control.agree_runs())
-    except _NotMet:
-        if not free or scheme != "A4" or least < 1.0 or stretched is not None:
-            raise
-    return _Control(system, options, pace, "collocation", free, stretched, ringing).agree_runs()
-
-
-class _NotMet(SimulationError):
-    """No two runs agreed."""
+    schemes, unfit = [scheme], {}
+    if free and least >= 1.0 and stretched is None:
+        schemes.append("A4" if scheme == "collocation" else "collocation")
+    for each in schemes:
+        control = _Control(system, options, pace, each, free, stretched, ringing)
+        try:
+            return control.add_unresolved(control.agree_runs())
+        except engine.Unfit as why:
+            unfit[each] = why
+    raise unfit.get("A4", unfit[scheme])
 
 
 @dataclass(frozen=True, eq=False)
@@ -234,7 +233,7 @@ class _Control:
             if 2 * len(found.fine.steps) > engine.most_steps(self.system, self.stretched):
                 break  # the next run would exceed the step limit
         if met is None:
-            raise _NotMet(self.explain_failure(best, *runs))
+            raise engine.Unfit(self.explain_failure(best, *runs))
         return met
 
     def list_sizes(self) -> tuple[list[float], float]:

@@ -10,6 +10,7 @@ from restarted import measured
 from test_collision import grazing_blow, target_of, thinned_blow
 
 import fem_impact as fi
+from fem_impact.impact import engine
 from fem_impact.impact.collision import Touch, collide
 from fem_impact.impact.state import State
 
@@ -45,6 +46,25 @@ def test_a_touch_shorter_than_a_step_is_judged_by_runs_of_different_steps(freque
     hit, exact = (collide([tip, fi.Modes.rigid(0.02)], [touch], tolerance=each, **blow) for each in (1e-2, 1e-6))
     claimed = hit.error.of_quantity("impulse") + exact.error.of_quantity("impulse")
     assert hit.impulse == pytest.approx(exact.impulse, rel=claimed)
+
+
+def test_where_a_scheme_does_not_get_through_the_other_is_tried(monkeypatch):
+    """Of 200 random blows at 1e-8 one ended with the advice to take A4, though nobody had asked for collocation."""
+    run = engine.run_system
+
+    def stuck(system, scheme, *how):
+        if scheme == "collocation":
+            raise engine.Unfit("scheme collocation found no valid next step at 0 s; use A4")
+        return run(system, scheme, *how)
+
+    blow = {"at": None, "speed": 1.0, "tolerance": 1e-8}
+    truth = fi.strike(fi.Modes.rigid(0.2), fi.Striker.rigid(0.1), fi.Contact.hertz(1e7), **blow)
+    monkeypatch.setattr(engine, "run_system", stuck)
+    hit = fi.strike(fi.Modes.rigid(0.2), fi.Striker.rigid(0.1), fi.Contact.hertz(1e7), **blow)
+    assert (truth.scheme, hit.scheme) == ("collocation", "A4")
+    assert worst(hit, truth) < 2e-8  # both tolerances
+    with pytest.raises(fi.SimulationError, match="use A4"):
+        fi.strike(fi.Modes.rigid(0.2), fi.Striker.rigid(0.1), fi.Contact.hertz(1e7), **blow, scheme="collocation")
 
 
 def test_a_lossy_force_hears_strongly_damped_modes():
