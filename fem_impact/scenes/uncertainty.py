@@ -350,7 +350,7 @@ class _SpreadAsked:
             if each.name not in self.body or each.name == SIZE:
                 continue
             found[each.name] = 0.0
-            for ratio in (each.at(np.array(TAILS)) / self._of_body(each.name)).tolist():
+            for ratio in (each.distribution.ppf(np.array(TAILS)) / self._of_body(each.name)).tolist():
                 mass, frequency = self._factors({each.name: ratio})
                 changes = {
                     "target_mass": base.modes.mass * mass, "target_frequency": base.first_frequency * frequency,

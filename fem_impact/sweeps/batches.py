@@ -352,13 +352,25 @@ class _Engine:
         Without ``slack``, flights are only sampled and a short touch can be missed: good enough for the coarse run of a
         comparison. ``length`` is the expected number of steps of each blow.
         """
-        out = np.full((N_FOUND, self.blows.n_cases), np.nan)
-        slacks = np.zeros(self.blows.n_cases)
-        slacks[cells] = 0.0 if slack is None else slack
-        todo = np.ones(len(cells), bool)
+        out, slacks, sure = np.full((N_FOUND, self.blows.n_cases), np.nan), np.zeros(self.blows.n_cases), False
+        if slack is not None:
+            slacks[cells], sure = slack, True
+        pairs = bundles.Pairs(self.shares, self.law, self.rigid, self.static, slacks)
+        group = np.stack([self.blows.family[cells], step])
+        order, todo = np.lexsort(group), np.ones(len(cells), bool)
+        edges = np.flatnonzero(np.any(np.diff(group[:, order], axis=1) != 0, axis=0)) + 1
+        parts = np.split(order, edges)  # of one family and step each
         for limit in LENGTHS:
             now = todo if length is None or limit == LENGTHS[-1] else todo & (length < limit)
-            self._run(cells[now], step[now], slacks, slack is not None, limit, out)
+            track = many_blows.made_track(limit)
+            for part in (each[now[each]] for each in parts):
+                if not part.size:
+                    continue
+                family, exponent = group[:, part[0]].tolist()
+                target, striker, *bounds = self.kernel(family, exponent, limit, False)
+                later = self.kernel(family, exponent, limit, True) if sure and limit > LENGTHS[0] else NO_KERNELS
+                of_bodies = bundles.Kernels((target, striker), (bounds[0], bounds[1]), (later[0], later[1]))
+                many_blows.run(cells[part], pairs, of_bodies, 2.0 ** (-0.5 * exponent), sure, self.band, track, out)
             todo &= ~(now & (out[FOUND_STATUS, cells] != many_blows.LONG))
             if not todo.any():
                 break
@@ -371,21 +383,6 @@ class _Engine:
             find = Family.later if later else Family.kernels
             self.kernels[key] = find(self.blows.families[family], 2.0 ** (-0.5 * step), length)
         return self.kernels[key]
-
-    def _run(
-        self, cells: np.ndarray, step: np.ndarray, slack: np.ndarray, sure: bool, length: int, out: np.ndarray
-    ) -> None:
-        pairs = bundles.Pairs(self.shares, self.law, self.rigid, self.static, slack)
-        track = many_blows.made_track(length)
-        group = np.stack([self.blows.family[cells], step])
-        order = np.lexsort(group)
-        edges = np.flatnonzero(np.any(np.diff(group[:, order], axis=1) != 0, axis=0)) + 1
-        for part in np.split(order, edges) if cells.size else ():
-            family, exponent = int(group[0, part[0]]), int(step[part[0]])
-            target, striker, *bounds = self.kernel(family, exponent, length, False)
-            later = self.kernel(family, exponent, length, True) if sure and length > LENGTHS[0] else NO_KERNELS
-            of_bodies = bundles.Kernels((target, striker), (bounds[0], bounds[1]), (later[0], later[1]))
-            many_blows.run(cells[part], pairs, of_bodies, 2.0 ** (-0.5 * exponent), sure, self.band, track, out)
 
     def compare_runs(
         self, coarse: np.ndarray, fine: np.ndarray, cells: np.ndarray, ratio: np.ndarray

@@ -1,8 +1,9 @@
 """What a map needs of the struck body: Ritz vectors at each strike point if they can carry its blows, or else modes."""
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import partial
 from itertools import product
 from pathlib import Path
 from typing import Any
@@ -142,7 +143,15 @@ def by_vectors(
         first = target.finished(target.find(FIRST_FLEXIBLE, tolerance=CLOSE))
         case = replace(case, first=float(first.frequencies[first.omega > 0.0][0]))
     points = axes.get("at", case.at[None])
-    key = _key(target, case, axes, tolerance)
+    shapes, striker, ratio = case.modes.shapes, case.striker, target.damping_ratio
+    assert isinstance(shapes, FieldShapes)
+    system, frame = shapes.system, shapes.system.frame
+    key = identity.identify([  # everything that determines the vectors
+        striker.modes.omega, striker.felt_mass, striker.shape, vars(case.contact), case.speed, tolerance, case.at,
+        case.first, target.mass, dict(target.scale), target.size_stated,
+        damping_ratios(0.0 if ratio is None else ratio, np.geomspace(1.0, 1e7, 50)), dict(axes), identity.program(),
+        system.K.data, system.M.data, [frame.length, frame.stiffness, frame.inertia],
+    ])  # fmt: skip
     known = None if keep is None else kept.unpack(keep, key, KINDS)
     views: Views_ | None = None if known is None else known["views"]
     if views is None:
@@ -228,7 +237,19 @@ class Sized:
     def found(self, stages: Stages, keep: Any = None) -> "tuple[Sized, list[Modes]]":
         """The same, and the target as seen from each point."""
         assert self.seen is not None
-        return self, [self.seen.of(i, self._cutoff(point)) for i, point in enumerate(self.seen.at)]
+
+        def cutoff(point: np.ndarray, modes: Modes, margin: float) -> float:
+            """Highest frequency [Hz] that any blow at a point needs of some modes, with a safety factor."""
+            needed = []
+            for values in self.ends:
+                case = self.at(modes, point, values)
+                allowed = Budget(self.tolerance, case.contact.rated, margin).for_left_out
+                law: dict[str, Any] = {"contact": case.contact, "mass": case.striker.felt_mass, "speed": case.speed}
+                limit = accuracy.tail_cutoff(case.modes, point[None], tolerance=allowed, **law)
+                needed.append(limit / self.raised(values))
+            return max(needed)
+
+        return self, [self.seen.of(i, partial(cutoff, point)) for i, point in enumerate(self.seen.at)]
 
     def refined(self, error: Error, stages: Stages) -> "Sized | None":
         """The same with more vectors or a finer mesh, whichever the errors of its blows require."""
@@ -260,32 +281,3 @@ class Sized:
         worst = np.sort(np.array(errors or [(0.0, 0.0)]), axis=0)  # (n_struck, 2)
         # but for two of ten, as beside a cell with another number of impacts no error is small
         return Error(0.0, *worst[len(worst) - 1 - int(0.2 * len(worst))].tolist()), found
-
-    def _cutoff(self, point: np.ndarray) -> Callable[[Modes, float], float]:
-        """Highest frequency [Hz] that any blow needs of some modes; takes them and a safety factor."""
-
-        def cutoff(modes: Modes, margin: float) -> float:
-            needed = []
-            for values in self.ends:
-                case = self.at(modes, point, values)
-                allowed = Budget(self.tolerance, case.contact.rated, margin).for_left_out
-                law: dict[str, Any] = {"contact": case.contact, "mass": case.striker.felt_mass, "speed": case.speed}
-                limit = accuracy.tail_cutoff(case.modes, point[None], tolerance=allowed, **law)
-                needed.append(limit / self.raised(values))
-            return max(needed)
-
-        return cutoff
-
-
-def _key(target: Target, case: Case, axes: Axes, tolerance: float) -> str:
-    """Digest of everything that determines the vectors of a map."""
-    shapes = case.modes.shapes
-    assert isinstance(shapes, FieldShapes)
-    system, frame, striker = shapes.system, shapes.system.frame, case.striker
-    ratio = 0.0 if target.damping_ratio is None else target.damping_ratio
-    return identity.identify([
-        striker.modes.omega, striker.felt_mass, striker.shape, vars(case.contact), case.speed, tolerance, case.at,
-        case.first, target.mass, dict(target.scale), target.size_stated,
-        damping_ratios(ratio, np.geomspace(1.0, 1e7, 50)), dict(axes), identity.program(), system.K.data, system.M.data,
-        [frame.length, frame.stiffness, frame.inertia],
-    ])  # fmt: skip

@@ -48,11 +48,6 @@ class Plane:
     solve: Solve
     kernels: batches.Kernels = field(default_factory=dict)
 
-    @property
-    def names(self) -> tuple[str, str]:
-        first, second = self.grid.axes
-        return first, second
-
     @cached_property
     def columns(self) -> list[tuple[np.ndarray, np.ndarray, bool]]:
         """Of both axes the values (n,), these or their logarithms, which are evenly spaced, and which of the two."""
@@ -69,15 +64,11 @@ class Plane:
             column[:] = np.where(on, values[whole], np.exp(between) if log else between)
         return found
 
-    def shares(self) -> tuple[np.ndarray, ...]:
-        """Distance (n - 1,) [-] of neighbouring cells along each axis, as a share of the axis."""
-        return tuple(np.diff(even) / (even[-1] - even[0]) for _, even, _ in self.columns)
-
     def counted(self, places: np.ndarray, turn: str) -> np.ndarray:
         """Number of impacts (n,) at places (n, 2), by a finer tolerance than that of the map; -1 if refused."""
         axes = {
             name: column[:, None] if name == "at" else column
-            for name, column in zip(self.names, np.ascontiguousarray(self.values_at(places).T))
+            for name, column in zip(self.grid.axes, np.ascontiguousarray(self.values_at(places).T))
         }
         shared = not {*FAMILY_AXES, "loss"} & set(axes)  # then all rounds strike the same bodies
         tolerance = min(self.grid.tolerance, max(FINEST, FINER * self.grid.tolerance))
@@ -115,7 +106,14 @@ def find_borders(grid: Cases, count: np.ndarray, solve: Solve) -> tuple[tuple[Bo
     is taken for one or none.
     """
     plane = Plane(grid, solve)
-    fine = _recounted(plane, count)
+    fine, sure, spent = count.copy(), np.zeros(count.shape, bool), 0
+    while True:
+        beside = beside_change(fine) & ~sure
+        spent += int(beside.sum())
+        if not beside.any() or spent > MOST_BLOWS:
+            break
+        fine[beside] = plane.counted(np.argwhere(beside).astype(float), f"recount-{int(sure.sum())}")
+        sure |= beside
     doubtful = (fine < 0) | (count < 0) | (fine != count)
     curves, vertices = _joined(fine)
     if not curves:
@@ -124,25 +122,12 @@ def find_borders(grid: Cases, count: np.ndarray, solve: Solve) -> tuple[tuple[Bo
     places, error = _located(plane, fine, edges)
     values = plane.values_at(places)[which.reshape(-1)]
     error = error[which.reshape(-1)]
-    ends = np.cumsum([n for _, n in curves])[:-1]
+    ends, (first, second) = np.cumsum([n for _, n in curves])[:-1], grid.axes
     borders = tuple(
-        Border(level, plane.names, points, errors)
+        Border(level, (first, second), points, errors)
         for (level, _), points, errors in zip(curves, np.split(values, ends), np.split(error, ends))
     )
     return borders, doubtful
-
-
-def _recounted(plane: Plane, count: np.ndarray) -> np.ndarray:
-    """The number of impacts (n, n), found by a finer tolerance in all cells beside one with another number."""
-    fine, sure, spent = count.copy(), np.zeros(count.shape, bool), 0
-    while True:
-        beside = beside_change(fine)
-        beside &= ~sure
-        spent += int(beside.sum())
-        if not beside.any() or spent > MOST_BLOWS:
-            return fine
-        fine[beside] = plane.counted(np.argwhere(beside).astype(float), f"recount-{int(sure.sum())}")
-        sure |= beside
 
 
 def _joined(count: np.ndarray) -> tuple[list[tuple[int, int]], np.ndarray]:
@@ -167,7 +152,7 @@ def _located(plane: Plane, count: np.ndarray, edges: np.ndarray) -> tuple[np.nda
     level, middle = edges[:, 0], edges[:, 1:]
     along = (middle % 2 == 1).argmax(axis=1)
     low, high = middle // 2, (middle + 1) // 2
-    shares = plane.shares()
+    shares = [np.diff(even) / (even[-1] - even[0]) for _, even, _ in plane.columns]  # [-] of neighbouring cells
     size = np.where(along == 0, *(share[np.minimum(low[:, k], len(share) - 1)] for k, share in enumerate(shares)))
     more = count[tuple(low.T)] > level
     low, high = low.astype(float), high.astype(float)

@@ -96,14 +96,10 @@ class Cases:
         cells = self.cells(start, stop)
         return dict(zip(self.axes, [cells] * len(self.axes) if self.by_row else np.unravel_index(cells, self.shape)))
 
-    def case(self, index: int) -> Case:
-        """One blow."""
-        numbered = self.numbered(index, index + 1)
-        return self.base.with_values({name: self.axes[name][i[0]] for name, i in numbered.items()})
-
     def blow(self, index: int) -> Response:
         """One blow by the modal engine."""
-        return self.strike(self.case(index))
+        numbered = self.numbered(index, index + 1)
+        return self.strike(self.base.with_values({name: self.axes[name][i[0]] for name, i in numbered.items()}))
 
     def strike(self, case: Case) -> Response:
         """A blow by the modal engine, to the tolerance of the table."""
@@ -185,7 +181,10 @@ class Cases:
     def families(
         self, numbered: Mapping[str, np.ndarray], loss: np.ndarray
     ) -> tuple[dict[int, batches.Family], np.ndarray]:
-        """The pairs of bodies of some cases by number, and that of each case (n_cells,)."""
+        """The pairs of bodies of some cases by number, and that of each case (n_cells,).
+
+        Of rows they are those with time in units of the struck body's period.
+        """
         if self.by_row:
             which, one = self.pairs
             kind = which[next(iter(numbered.values()))]
@@ -198,22 +197,18 @@ class Cases:
         found = {}
         for number, i in zip(*np.unique(kind, return_index=True)):
             # nothing else of the case, so that no block is rounded differently
-            some = {name: index[i] for name, index in numbered.items() if name in FAMILY_AXES}
-            some = dict.fromkeys(some, one[number]) if self.by_row else some
-            found[int(number)] = self._family(some, bool(loss[i] > 0.0))
+            names, raised = [name for name in numbered if name in FAMILY_AXES], 1.0
+            values = {name: self.axes[name][one[number] if self.by_row else numbered[name][i]] for name in names}
+            if self.by_row:
+                values.pop("target_frequency", None)
+                raised = float(self.ratio[one[number]])
+            case = self.base.with_values(values)
+            striker = case.striker
+            if raised != 1.0 and striker.modes.omega.any():
+                striker = replace(striker, modes=striker.modes.stretched(1.0, 1.0 / raised))
+            lossy = bool(loss[i] > 0.0)
+            found[int(number)] = batches.Family.of(case.modes, case.at, striker, self.residual, lossy)
         return found, kind
-
-    def _family(self, numbered: Mapping[str, int], lossy: bool) -> batches.Family:
-        """The pair of bodies with some values, of rows with time in units of the struck body's period."""
-        values = {name: self.axes[name][i] for name, i in numbered.items()}
-        raised = 1.0
-        if self.by_row and values.pop("target_frequency", None) is not None:
-            raised = float(self.ratio[numbered["target_frequency"]])
-        case = self.base.with_values(values)
-        striker = case.striker
-        if raised != 1.0 and striker.modes.omega.any():
-            striker = replace(striker, modes=striker.modes.stretched(1.0, 1.0 / raised))
-        return batches.Family.of(case.modes, case.at, striker, self.residual, lossy)
 
     def bands(self, ratio: np.ndarray) -> np.ndarray:
         """Upper end of the centroid's band in units of the period of each body (n_cells,) [Hz].
@@ -264,23 +259,15 @@ def few(cases: Cases) -> Cases:
         columns["damping_ratio", 0] = axes["damping_ratio"]
     found = {name: np.array(values) for name, values in axes.items()}
     for (name, i), column in columns.items():
-        levels = _levelled(column, int(FAMILIES ** (1.0 / len(columns))))
+        number, levels = int(FAMILIES ** (1.0 / len(columns))), np.array(column)
+        if len(np.unique(column)) > number:
+            for part in np.array_split(np.argsort(column, kind="stable"), number):  # groups of neighbours
+                levels[part] = column[part].mean()
         if name == "at":
             found["at"][:, i] = levels
         else:
             found[name] = levels * cases.ratio if name == "striker_frequency" else levels
     return replace(cases, axes=found, kernels={})
-
-
-def _levelled(values: np.ndarray, number: int) -> np.ndarray:
-    """Each value (n,) replaced by the mean of its group; groups of neighbours, equally many in each."""
-    if len(np.unique(values)) <= number:
-        return np.array(values)
-    order = np.argsort(values, kind="stable")
-    levels = np.empty(len(values))
-    for part in np.array_split(order, number):
-        levels[part] = values[part].mean()
-    return levels
 
 
 def batchable(column: Mapping[str, np.ndarray]) -> np.ndarray:

@@ -260,7 +260,15 @@ def compute_map(base: Case, axes: Mapping[str, np.ndarray], job: Job) -> xarray.
     if job.ours:
         table.attrs["cells"] = f"all {cases.n_cases} cells computed"
     if computed is not None:
-        _tell_interpolated(table, computed.computed.reshape(cases.shape))
+        known = computed.computed.reshape(cases.shape)
+        told = f"{int(known.sum())} of {known.size} cells computed ({known.mean():.0%})"
+        table.attrs["cells"] = f"{told}, the others interpolated between them"
+        for name, weight in refined.ROUGH.items():
+            if name in table:
+                left = job.tolerance - batches.allowed(job.tolerance)
+                table[name].attrs["interpolation_error"] = left / weight
+        meaning = "whether the cell was interpolated between others, to within the tolerance"
+        table["interpolated"] = (table.n_impacts.dims, ~known, {"units": "1", "long_name": meaning})
         gap = refined.widest_gap(cases.shape)
     if job.borders or (job.borders is None and job.ours and not why_none(cases)):
         borders, doubtful = find_borders(cases, np.asarray(table.n_impacts), job.solved)
@@ -274,18 +282,6 @@ def listed(texts: Texts, n_cases: int) -> np.ndarray:
     failures = np.full(n_cases, "", dtype=f"<U{max(map(len, texts.values()), default=1)}")
     failures[list(texts)] = list(texts.values())
     return failures
-
-
-def _tell_interpolated(table: xarray.Dataset, computed: np.ndarray) -> None:
-    """Say in a map which cells (n, n) were computed."""
-    n, share = int(computed.sum()), computed.mean()
-    table.attrs["cells"] = f"{n} of {computed.size} cells computed ({share:.0%}), the others interpolated between them"
-    meaning = "whether the cell was interpolated between others, to within the tolerance"
-    left = table.attrs["tolerance"] - batches.allowed(table.attrs["tolerance"])
-    for name, weight in refined.ROUGH.items():
-        if name in table:
-            table[name].attrs["interpolation_error"] = left / weight
-    table["interpolated"] = (table.n_impacts.dims, ~computed, {"units": "1", "long_name": meaning})
 
 
 def admit(n_cells: int, n_layers: int, max_cells: float, *, quick: bool = True, tell: Tell | None = None) -> None:

@@ -15,10 +15,10 @@ REACH = 1e30  # [SI] numbers of a blow lie between 1/REACH and REACH: beyond, th
 
 # kind: the names of its numbers, and the distribution they make
 KINDS: dict[str, tuple[tuple[str, ...], Callable[..., Any]]] = {
-    "normal": (("mean", "deviation"), lambda mean, deviation: stats.norm(mean, deviation)),
+    "normal": (("mean", "deviation"), stats.norm),
     "lognormal": (("median", "sigma"), lambda median, sigma: stats.lognorm(sigma, scale=median)),
     "uniform": (("low", "high"), lambda low, high: stats.uniform(low, high - low)),
-    "loguniform": (("low", "high"), lambda low, high: stats.loguniform(low, high)),
+    "loguniform": (("low", "high"), stats.loguniform),
     "triangular": (
         ("low", "mode", "high"),
         lambda low, mode, high: stats.triang((mode - low) / (high - low), low, high - low),
@@ -46,7 +46,13 @@ class Input:
             told = [f"{value:g}" for value in given.args] + [f"{key}={value:g}" for key, value in given.kwds.items()]
             return cls(name, f"{given.dist.name}({', '.join(told)})", given)
         if isinstance(given, str):
-            given = _parsed(name, given)
+            found = re.fullmatch(r"\s*([a-z]+)\s*\(([^()]*)\)\s*", given)
+            if found is None:
+                raise ValueError(f"vary[{name!r}] must look like lognormal(695e3, 0.1), got {check.shown(given)}")
+            try:
+                given = (found[1], *map(float, found[2].split(",")))
+            except ValueError:
+                raise ValueError(f"vary[{name!r}] must hold numbers, got {check.shown(given)}") from None
         if not isinstance(given, Sequence) or not given:
             raise ValueError(
                 f"vary[{name!r}] must be a distribution such as ('lognormal', 695e3, 0.1), got {check.shown(given)}"
@@ -56,36 +62,15 @@ class Input:
         if len(values) != len(wanted):
             raise ValueError(f"vary[{name!r}] must be {kind}({', '.join(wanted)}), got {len(values)} numbers")
         numbers = [check.number(f"{word} of vary[{name!r}]", value, reach=REACH) for word, value in zip(wanted, values)]
-        _ordered(name, dict(zip(wanted, numbers)), kind)
+        named = dict(zip(wanted, numbers))
+        for word in ("deviation", "sigma", "median", *["low"] * (kind == "loguniform")):
+            if word in named:
+                check.positive(f"{word} of vary[{name!r}]", named[word], reach=REACH)
+        if "low" in named and not named["low"] < named["high"]:
+            raise ValueError(f"low of vary[{name!r}] must be below high, got {named['low']:g} and {named['high']:g}")
+        if "mode" in named and not named["low"] <= named["mode"] <= named["high"]:
+            raise ValueError(f"mode of vary[{name!r}] must lie between low and high, got {named['mode']:g}")
         return cls(name, f"{kind}({', '.join(f'{value:g}' for value in numbers)})", make(*numbers))
-
-    def at(self, share: np.ndarray) -> np.ndarray:
-        """Values below which these shares (n,) [-] of all values lie."""
-        return np.asarray(self.distribution.ppf(share), float)
-
-
-def _parsed(name: str, text: str) -> tuple[Any, ...]:
-    """Kind and numbers from "kind(number, number)"."""
-    found = re.fullmatch(r"\s*([a-z]+)\s*\(([^()]*)\)\s*", text)
-    if found is None:
-        raise ValueError(f"vary[{name!r}] must look like lognormal(695e3, 0.1), got {check.shown(text)}")
-    try:
-        return (found[1], *(float(number) for number in found[2].split(",")))
-    except ValueError:
-        raise ValueError(f"vary[{name!r}] must hold numbers, got {check.shown(text)}") from None
-
-
-def _ordered(name: str, numbers: Mapping[str, float], kind: str) -> None:
-    """ValueError unless the numbers make a distribution."""
-    for word in ("deviation", "sigma", "median"):
-        if word in numbers:
-            check.positive(f"{word} of vary[{name!r}]", numbers[word], reach=REACH)
-    if kind == "loguniform":
-        check.positive(f"low of vary[{name!r}]", numbers["low"], reach=REACH)
-    if "low" in numbers and not numbers["low"] < numbers["high"]:
-        raise ValueError(f"low of vary[{name!r}] must be below high, got {numbers['low']:g} and {numbers['high']:g}")
-    if "mode" in numbers and not numbers["low"] <= numbers["mode"] <= numbers["high"]:
-        raise ValueError(f"mode of vary[{name!r}] must lie between low and high, got {numbers['mode']:g}")
 
 
 def read_inputs(vary: Any) -> tuple[Input, ...]:
@@ -144,7 +129,7 @@ def drawn(inputs: Sequence[Input], points: np.ndarray, mixer: np.ndarray | None)
     """Values (n_points, n_inputs) of the inputs at points of the unit cube, correlated by `mixing`."""
     if mixer is not None:
         points = stats.norm.cdf(stats.norm.ppf(points) @ mixer.T)
-    return np.column_stack([each.at(column) for each, column in zip(inputs, points.T)])
+    return np.column_stack([each.distribution.ppf(column) for each, column in zip(inputs, points.T)])
 
 
 def crossed(points: np.ndarray) -> np.ndarray:

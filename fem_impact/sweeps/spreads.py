@@ -152,27 +152,27 @@ class Spread(check.Brief):
         """
         if not self.crossed:
             return {}
-        return {name: self._shares(name) for name in self.varying}
-
-    def _shares(self, quantity: str) -> dict[str, Shares]:
         from SALib.analyze import sobol
 
         d = len(self.inputs)
-        groups = np.asarray(self.table[quantity].values, float).reshape(-1, d + 2)
+        every: dict[str, dict[str, Shares]] = {}
         whole = (self.table["n_impacts"].values.reshape(-1, d + 2) >= 0).all(axis=1)
-        groups = groups[whole][:4096]  # to limit the memory: their bootstrap keeps 100 copies
-        if not len(groups) or np.ptp(groups[:, [0, -1]]) == 0.0:
-            return {}
-        # 100 bootstrap samples tell a standard deviation to 7 %
-        found = sobol.analyze(
-            {"num_vars": d, "names": list(self.names), "bounds": [[0.0, 1.0]] * d}, groups.ravel(),
-            calc_second_order=False, num_resamples=100, conf_level=self.confidence, seed=self.seed + 1,
-        )  # fmt: skip
-        first, total = (
-            [Estimate(float(v), float(v - c), float(v + c)) for v, c in zip(found[key], found[f"{key}_conf"])]
-            for key in ("S1", "ST")
-        )
-        return {name: Shares(*pair) for name, pair in zip(self.names, zip(first, total))}
+        problem = {"num_vars": d, "names": list(self.names), "bounds": [[0.0, 1.0]] * d}
+        for quantity in self.varying:
+            every[quantity] = {}
+            groups = np.asarray(self.table[quantity].values, float).reshape(-1, d + 2)
+            groups = groups[whole][:4096]  # to limit the memory: their bootstrap keeps 100 copies
+            if not len(groups) or np.ptp(groups[:, [0, -1]]) == 0.0:
+                continue
+            # 100 bootstrap samples tell a standard deviation to 7 %
+            how: dict[str, Any] = {"num_resamples": 100, "conf_level": self.confidence, "seed": self.seed + 1}
+            found = sobol.analyze(problem, groups.ravel(), calc_second_order=False, **how)
+            first, total = (
+                [Estimate(float(v), float(v - c), float(v + c)) for v, c in zip(found[key], found[f"{key}_conf"])]
+                for key in ("S1", "ST")
+            )
+            every[quantity] = {name: Shares(*pair) for name, pair in zip(self.names, zip(first, total))}
+        return every
 
     @property
     def n_failed(self) -> int:
@@ -206,7 +206,14 @@ class Spread(check.Brief):
         if not len(self.own):
             return "\n".join([*lines, "No blow succeeded."])
         head = "quantity", "5 %", "median", "95 %", f"{100 * self.confidence:g} % interval of the median"
-        lines += ["", *markup.columns(self._rows(), head)]
+        rows = []
+        for name in (each for each in self.quantities if each != DOUBLE):
+            unit = QUANTITIES[name][0]
+            low, middle, high = (self.quantile(name, level) for level in (0.05, 0.5, 0.95))
+            values = (f"{each.value:.4g}" for each in (low, middle, high))
+            ends = f"{middle.low:.4g} to {middle.high:.4g}"
+            rows.append((f"{name} [{unit}]" if unit else name, *values, ends))
+        lines += ["", *markup.columns(rows, head)]
         lines += ["", f"Chance of a double hit: {double_hits(self)}"]
         if self.chaotic:
             counts = self.values("n_impacts")
@@ -215,18 +222,6 @@ class Spread(check.Brief):
                 "With inputs known only this well, no single one can be predicted; their statistics, as above, can."
             )
         return "\n".join([*lines, "", *self._advice(), *self._honest()])
-
-    def _rows(self) -> list[tuple[str, ...]]:
-        rows = []
-        for name in self.quantities:
-            if name == DOUBLE:
-                continue
-            unit = QUANTITIES[name][0]
-            low, middle, high = (self.quantile(name, level) for level in (0.05, 0.5, 0.95))
-            ends = f"{middle.low:.4g} to {middle.high:.4g}"
-            label = f"{name} [{unit}]" if unit else name
-            rows.append((label, *(f"{each.value:.4g}" for each in (low, middle, high)), ends))
-        return rows
 
     def _advice(self) -> list[str]:
         """What to measure better, quantity by quantity."""

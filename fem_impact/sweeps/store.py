@@ -6,7 +6,7 @@ import logging
 import math
 import uuid
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, nullcontext
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -221,7 +221,13 @@ def by_cluster(
     dask = check.extra("distributed", "cluster", "client")
     if not isinstance(client, (str, dask.Client)):
         raise ValueError(f"client must be a dask.distributed.Client or an address, got {check.shown(client)}")
-    with _connected(dask.Client, client) as connected:
+    try:
+        ours = dask.Client(client, timeout=10) if isinstance(client, str) else nullcontext(client)
+    except (OSError, TypeError) as error:  # TypeError: TLS without a certificate
+        raise OSError(
+            f"client: no cluster answers at {client} ({check.line(str(error))}); start one or correct the address"
+        ) from None
+    with ours as connected:
         store = None if path is None else Store.open(path, grid)
         block = block_size(grid.n_cases)
         todo = store.missing() if store is not None else list(range(math.ceil(grid.n_cases / block)))
@@ -258,22 +264,6 @@ def _work(
     if store.read(block) is None:  # otherwise another worker saved it and died before it could report
         store.write(block, *solve(grid, *store.bounds(block)))
     return None
-
-
-@contextmanager
-def _connected(make: Any, client: Any) -> Iterator[Any]:
-    """The given client, or a new one for an address, which is closed afterwards."""
-    if not isinstance(client, str):
-        yield client
-        return
-    try:
-        made = make(client, timeout=10)
-    except (OSError, TypeError) as error:  # TypeError: TLS without a certificate
-        raise OSError(
-            f"client: no cluster answers at {client} ({check.line(str(error))}); start one or correct the address"
-        ) from None
-    with made:
-        yield made
 
 
 @contextmanager

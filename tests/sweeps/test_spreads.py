@@ -177,7 +177,7 @@ def test_all_numbers_are_plain_data():
 )
 def test_a_distribution_has_the_quantiles_of_its_closed_form(given, median, upper):
     one = inputs.Input.of("a", given)
-    assert_allclose(one.at(np.array([0.5, stats.norm.cdf(1.0)])), [median, upper], rtol=1e-12)
+    assert_allclose(one.distribution.ppf(np.array([0.5, stats.norm.cdf(1.0)])), [median, upper], rtol=1e-12)
 
 
 PAIR = inputs.read_inputs({"a": ("normal", 0.0, 1.0), "b": ("uniform", 0.0, 1.0)})
