@@ -39,7 +39,7 @@ from fem_impact.scenes import maps
 from fem_impact.scenes.scene import Scene
 from fem_impact.sweeps.cases import Cases
 from fem_impact.sweeps.cells import Case
-from fem_impact.sweeps.store import Texts, by_store
+from fem_impact.sweeps.store import Texts, by_blocks
 
 PATIENCE = 10.0  # [s] per input
 MEMORY = 2 << 30  # [byte] more than the process has when it begins
@@ -247,7 +247,7 @@ def store_samples() -> list[tuple[str, bytes]]:
     made = {}
     with tempfile.TemporaryDirectory() as name:
         store = Path(name) / "store"
-        by_store(small_grid(), store, solved, None)
+        by_blocks(small_grid(), solved, None, 1, store)
         made = {str(path.relative_to(store)): path.read_bytes() for path in store.rglob("*") if path.is_file()}
     PRISTINE.update(made)
     return [(name.replace("/", "%"), raw) for name, raw in sorted(made.items())]
@@ -263,7 +263,7 @@ def read_store(path: Path) -> object:
     for name, content in {**PRISTINE, place: raw}.items():
         (path / name).parent.mkdir(parents=True, exist_ok=True)
         (path / name).write_bytes(content)
-    numbers, texts = by_store(small_grid(), path, solved, None)
+    numbers, texts = by_blocks(small_grid(), solved, None, 1, path)
     assert numbers.shape == (6, 2) and numbers.dtype == float and set(texts) <= {0, 1}
     assert all(isinstance(text, str) for text in texts.values())
     return numbers

@@ -18,7 +18,7 @@ from ..impact.response import Response
 from ..modes.modal import Modes
 from . import batches
 from .cells import ALONE, FAMILY_AXES, LOSSY, Case, law_numbers
-from .store import LARGEST_BLOCK, Texts, Watch, block_size, by_blocks, by_cluster, by_store
+from .store import LARGEST_BLOCK, Texts, Watch, block_size, by_blocks, by_cluster
 
 LOG = logging.getLogger(__name__)
 Result = TypeVar("Result")
@@ -52,7 +52,6 @@ class Cases:
     band: float | None = None  # [Hz] upper end of the centroid's band
     extra: Mapping[str, Callable[[Response], float]] = field(default_factory=dict)  # additional layers
     by_row: bool = False  # whether all axes are columns of one table, as long as each other, and not to be combined
-    max_impacts: int | None = None  # what follows does not matter where cases are computed alone
     chosen: np.ndarray | None = None  # (n_cases,) combinations to compute, numbered with the last axis fastest
     kernels: batches.Kernels = field(default_factory=dict)  # computed so far
 
@@ -103,7 +102,7 @@ class Cases:
 
     def strike(self, case: Case) -> Response:
         """A blow by the modal engine, to the tolerance of the table."""
-        return case.blow(tolerance=self.tolerance, residual=self.residual, max_impacts=self.max_impacts)
+        return case.blow(tolerance=self.tolerance, residual=self.residual)
 
     def row(self, hit: Response) -> np.ndarray:
         """The layers (n_layers,) of one blow; one that misses its tolerance, as a chaotic one, has its whole error."""
@@ -285,12 +284,9 @@ def solve_all(
     LOG.info("%d blows at the tolerance %g", cases.n_cases, cases.tolerance)
     if client is not None:
         return by_cluster(cases, client, store, partial(solve_cases, workers=1), watch)
-    solve = partial(solve_cases, workers=workers)
-    if store is not None:
-        return by_store(cases, store, solve, watch)
     often = cases.lossy or cases.extra  # slow ones are told more often
     size = max(batches.FEW, block_size(cases.n_cases)) if often else LARGEST_BLOCK
-    return by_blocks(cases, solve, watch, size)
+    return by_blocks(cases, partial(solve_cases, workers=workers), watch, size, store)
 
 
 def solve_cases(cases: Cases, start: int, stop: int, *, workers: int | None = None) -> tuple[np.ndarray, Texts]:

@@ -196,12 +196,19 @@ def choose_on(
     """As `choose`, on a body however it is known."""
     target = replace(target, stretching=False)  # hammers are chosen for small blows
     masses, centre = _checked(masses), _centre(bandwidth, drop)
-    modes, hardest = _body(target, at, masses, centre, stages or Stages())
+    hardest = HARDEST**0.5 * centre
+
+    def blows(*resonances: float) -> list[dict[str, float]]:
+        pairs = [(mass, accuracy.resonant_stiffness(mass, f)) for mass in masses for f in resonances]
+        return [{"mass": mass, "stiffness": tip} for mass, tip in pairs]
+
+    ends, chance = blows(hardest, SOFTEST**0.5 * centre), blows(centre)
+    (modes, *_), by_vectors = bodies.of_hammers(target, at, ends, chance, TOLERANCE, MOST_MODES, stages or Stages())
     flexible = modes.frequencies[modes.omega > 0.0]
     lowest = float(flexible[0]) if len(flexible) else centre
 
     def hammer(mass: float, border: bool = False) -> Hammer:
-        limit = None if hardest is None else float(accuracy.resonant_stiffness(mass, hardest))
+        limit = float(accuracy.resonant_stiffness(mass, hardest)) if by_vectors else None
         return replace(_hammer(modes, at, mass, bandwidth, drop, (centre, lowest), limit), border=border)
 
     found: dict[int, Hammer] = {}
@@ -235,19 +242,6 @@ def _with_borders(chosen: tuple[Hammer, ...], hammer: Callable[[float, bool], Ha
         chosen += (between(last),) if last != good.mass else ()
     progress.report("masses between", len(pairs), len(pairs))
     return tuple(sorted(chosen, key=lambda one: one.mass))
-
-
-def _body(target: Target, at: Any, masses: np.ndarray, centre: float, stages: Stages) -> tuple[Modes, float | None]:
-    """The body as the blows of all hammers need it; if by Ritz vectors, their highest contact resonance [Hz], too."""
-    hardest = HARDEST**0.5 * centre
-
-    def blows(*resonances: float) -> list[dict[str, float]]:
-        pairs = [(mass, accuracy.resonant_stiffness(mass, f)) for mass in masses for f in resonances]
-        return [{"mass": mass, "stiffness": tip} for mass, tip in pairs]
-
-    ends, chance = blows(hardest, SOFTEST**0.5 * centre), blows(centre)
-    found, by_vectors = bodies.of_hammers(target, at, ends, chance, TOLERANCE, MOST_MODES, stages)
-    return found[0], hardest if by_vectors else None
 
 
 def _hammer(

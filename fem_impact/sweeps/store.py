@@ -167,7 +167,7 @@ def fingerprint(grid: Any) -> Mark:
     seen = [(modes, np.array([place])) for place, modes in views.items()]
     told = [
         grid.scene(), dict(grid.axes), grid.chosen, grid.tolerance, grid.residual, grid.band, grid.layers,
-        grid.max_impacts, striker.hand, striker.motion, grid.base.first,
+        striker.hand, striker.motion, grid.base.first,
     ]  # fmt: skip
     for modes, places in seen or [(grid.base.modes, grid.axes.get("at", grid.base.at[None]))]:
         for each in modes.descriptions().values():
@@ -187,9 +187,11 @@ def fingerprint(grid: Any) -> Mark:
 
 
 def by_blocks(
-    grid: Any, solve: Solve, watch: Watch | None, size: int, store: "Store | None" = None
+    grid: Any, solve: Solve, watch: Watch | None, size: int, path: str | Path | None = None
 ) -> tuple[np.ndarray, Texts]:
-    """Compute a map in this process, block by block; what is in a store is read, and what is missing there written."""
+    """Compute a map in this process, in blocks of a size, or those of a store: what is not there is written to it."""
+    store = None if path is None else Store.open(path, grid)
+    size = size if store is None else store.block
     numbers = np.empty((len(grid.layers), grid.n_cases))
     texts: Texts = {}
     for start in range(0, grid.n_cases, size):
@@ -203,12 +205,6 @@ def by_blocks(
         if watch is not None:
             watch(stop, grid.n_cases)
     return numbers, texts
-
-
-def by_store(grid: Any, path: str | Path, solve: Solve, watch: Watch | None) -> tuple[np.ndarray, Texts]:
-    """Read a map from a store, and compute in this process what is missing there."""
-    store = Store.open(path, grid)
-    return by_blocks(grid, solve, watch, store.block, store)
 
 
 def by_cluster(
@@ -251,7 +247,7 @@ def by_cluster(
             if watch is not None:
                 watch(done, grid.n_cases)
             future.release()
-        return (numbers, texts) if path is None else by_store(grid, path, solve, None)
+        return (numbers, texts) if path is None else by_blocks(grid, solve, None, block, path)
 
 
 def _work(
