@@ -105,21 +105,9 @@ def _held(hit: "Response") -> bool:
     return hit.striker is not None and hit.striker.hand is not None
 
 
-def in_contact(hit: "Response") -> bool:
-    """Whether the first body still presses another at the end of the run."""
-    mine = touched(hit, 0)
-    return any(each.separation_speed is None for each in hit.impacts if each.contact in mine)
-
-
-def speeds(hit: "Response") -> np.ndarray:
-    """Speeds of the striker's rigid motion before and after each impact, (n_impacts, 2), see `Response`."""
-    times = np.array([[each.start, each.end] for each in hit.impacts]).reshape(-1, 2)
-    return (hit.history.states(times.ravel())[1] @ rigid_row(hit, 0)).reshape(-1, 2)
-
-
 def restitution(hit: "Response") -> float | None:
     """Minus the striker's speed after its last separation over that before its first contact, see `Response`."""
-    if in_contact(hit):
+    if hit.in_contact:
         return None
     row, history = rigid_row(hit, 0), hit.history
     before, after = hit.speed, float(row @ history.end_p)

@@ -36,6 +36,7 @@ OF_STRIKER = {
 # numbers that scenes take without their intervals: nu changes plates less than E does, by a tenth at most, and bodies
 # with another nu need modes of their own; a yield strength changes no blow of an elastic body
 SINGLE = ("nu", "yield_strength")
+TIP = ("tip_radius", "tip_E", "tip_nu")
 
 T = TypeVar("T")
 
@@ -96,7 +97,18 @@ class Entry:
         """The table [contact] of a scene in which it strikes a material, or a rigid wall; see `contact`."""
         facts = self.facts
         law = {key: facts[key].table for key in ("stiffness", "exponent") if key in facts}
-        law = law or {"stiffness": _pressed(self, on), "exponent": 1.5}
+        if not law:  # a round tip
+            radius, E, nu = (facts[name] for name in (("radius", "E", "nu") if "radius" in facts else TIP))
+            tip, under, wood = pressed_compliance(E.value, nu.value), 0.0, 0.0
+            if on is not None:
+                # wood pressed across its grain may differ by half from a body that is as soft in every way; 0.3 stands
+                # for its Poisson's ratios: 0.5 makes it 18 % stiffer
+                wood = 0.0 if on.E_across is None else 0.5
+                under = pressed_compliance(*(on.E_across, 0.3) if on.E_across else (on.E, on.nu))
+            stiffness, share = hertz_stiffness(tip + under, radius.value), tip / (tip + under)
+            spread = [0.5 * float(np.log(fact.ends[1] / fact.ends[0])) for fact in (radius, E)]
+            about = float(np.hypot(0.5 * spread[0] + share * spread[1], (1.0 - share) * wood))
+            law = {"stiffness": {"value": stiffness, "about": about}, "exponent": 1.5}
         if "restitution" in facts:
             return {"kind": "restituting", **law, **{key: facts[key].table for key in ("restitution", "speed")}}
         return {"kind": "power", **law, **({"loss": facts["loss"].table} if "loss" in facts else {})}
@@ -120,30 +132,6 @@ class Entry:
         values = known.taken("", self.contact_table(on))[0]
         make: Callable[..., Contact] = getattr(Contact, values.pop("kind"))
         return make(**values)
-
-
-def _pressed(entry: Entry, on: Material | None) -> dict[str, float]:
-    """Stiffness of Hertz's law between a round tip and a material, and its interval."""
-    facts = entry.facts
-    radius, E, nu = (facts[name] for name in (("radius", "E", "nu") if "radius" in facts else TIP))
-    tip, under, wood = pressed_compliance(E.value, nu.value), 0.0, 0.0
-    if on is not None:
-        # wood pressed across its grain may differ by half from a body that is as soft in every way; 0.3 stands for its
-        # Poisson's ratios: 0.5 makes it 18 % stiffer
-        wood = 0.0 if on.E_across is None else 0.5
-        under = pressed_compliance(*(on.E_across, 0.3) if on.E_across else (on.E, on.nu))
-    stiffness, share = hertz_stiffness(tip + under, radius.value), tip / (tip + under)
-    about = float(np.hypot(0.5 * _about(radius) + share * _about(E), (1.0 - share) * wood))
-    return {"value": stiffness, "about": about}
-
-
-TIP = ("tip_radius", "tip_E", "tip_nu")
-
-
-def _about(fact: Fact) -> float:
-    """Half the width of an interval in logarithms [-]."""
-    low, high = fact.ends
-    return 0.5 * float(np.log(high / low))
 
 
 @dataclass(frozen=True)
@@ -230,24 +218,21 @@ def _file() -> Mapping[str, Any]:
 def _entries(section: str) -> Mapping[str, Entry]:
     """The entries of a section of the file; a wood with its constants in every direction comes once for each cut."""
     found: dict[str, Entry] = {}
+    every = sources()
     for group, items in _file()[section].items():
         for name, told in items.items():
-            words = {key: value for key, value in told.items() if key in ("kind", "note")}
-            facts = {key: _fact(key, value) for key, value in told.items() if key not in (*words, "tips")}
+            words, facts = {key: value for key, value in told.items() if key in ("kind", "note")}, {}
+            for key in (key for key in told if key not in (*words, "tips")):
+                # [value, source], [value, about, source] or [value, low, high, source]
+                value, *ends, source = told[key]
+                interval = zip(((), ("about",), ("low", "high"))[len(ends)], map(float, ends))
+                facts[key] = Fact(float(value), MappingProxyType(dict(interval)), UNITS[key], *every[source])
             tips = tuple(told.get("tips", ()))
             for cut, names in CUTS.items() if "E_L" in facts else [("", {})]:
                 own = {key: facts[wood] for key, wood in names.items() if wood in facts}
                 entry = Entry(name + cut, group, MappingProxyType({**facts, **own}), tips=tips, **words)
                 found[entry.name] = entry
     return MappingProxyType(found)
-
-
-def _fact(key: str, told: list[Any]) -> Fact:
-    """A number from ``[value, source]``, ``[value, about, source]`` or ``[value, low, high, source]``."""
-    value, *ends, source = told
-    names = ((), ("about",), ("low", "high"))[len(ends)]
-    words, read = sources()[source]
-    return Fact(float(value), MappingProxyType(dict(zip(names, map(float, ends)))), UNITS[key], words, read)
 
 
 def sources() -> Mapping[str, tuple[str, bool]]:

@@ -106,13 +106,12 @@ class Gradient(check.Locked):
 
 
 def gradients(
-    hit: "Response", quantity: Any, wrt: Any, sections: Mapping[str, tuple[float, SectionChange]] | None = None
+    hit: "Response", quantity: Any, wrt: Any, sections: Mapping[str, tuple[float, SectionChange]]
 ) -> dict[str, Gradient]:
     """The gradient of each quantity, see `Response.gradient`.
 
     ``sections`` are further numbers, each with its value and with how the target's section changes with it.
     """
-    sections = sections or {}
     several = (quantity,) if isinstance(quantity, str) else check.several("quantity", quantity, str)
     wanted = []
     for item in several:
@@ -123,12 +122,12 @@ def gradients(
     parameters = Parameters(hit, sections)
     names = parameters.checked(wrt)
     numbers = parameters.numbers(names)
-    values = [value_of(hit, name, band) for name, band in wanted]
     span = max(impact.end for impact in hit.impacts)
     bands = [band for name, band in wanted if band is not None and name == "spectral_centroid"]
     frequencies = {band: force_spectrum.dense_frequencies(band, span) for band in bands}
     told = partial(read_quantities, wanted=wanted, frequencies=frequencies)
     found = {}
+    values = [value_of(hit, name, band) for name, band in wanted]
     for (name, band), value, (slopes, error) in zip(wanted, values, differences(parameters, names, told)):
         label = name if band is None else f"{name}={band:g}"
         if name == "peak_time":  # the top of a force is flat, and ripples move it

@@ -14,16 +14,15 @@ HEADS: dict[str, tuple[str, ...]] = {
     "strikers": ("striker", "felt mass [kg]", "law", "stiffness [N/m^p]", "p", "damping", "contact [s]"),
     "hammers": ("hammer", "mass [kg]", "up to [N]", "gives [V/N]", "tips"),
 }
-
-
-def matching(words: str) -> dict[str, list[Entry]]:
-    """Entries of each section whose names or groups contain all of some words; all entries if there are none."""
-    return {name: [section.entry(each) for each in section.find(words)] for name, section in SECTIONS.items()}
+KEYS: dict[str, tuple[str, ...]] = {  # numbers of the catalogue behind the name of an entry
+    "materials": ("E", "E_across", "nu", "rho", "loss_factor", "yield_strength"), "strikers": (),
+    "hammers": ("mass", "force", "sensitivity"),
+}  # fmt: skip
 
 
 def listed(words: str) -> tuple[dict[str, Any], list[Any]]:
     """What the prompt answers to some words: data, and sentences or tables (rows, head); of one entry its numbers."""
-    entries = [(section, entry) for section, each in matching(words).items() for entry in each]
+    entries = [(name, section.entry(each)) for name, section in SECTIONS.items() for each in section.find(words)]
     exact = [pair for pair in entries if pair[1].name.lower() == words.lower()]
     entries = exact or entries
     if not entries:
@@ -40,8 +39,25 @@ def listed(words: str) -> tuple[dict[str, Any], list[Any]]:
 
 
 def rows(section: str, entries: Iterable[Entry]) -> Rows:
-    """A row for each entry of a section, under its `HEADS`."""
-    return [{"materials": _material, "strikers": _striker, "hammers": _hammer}[section](each) for each in entries]
+    """A row for each entry of a section, under its `HEADS`; strikers on a rigid wall at 1 m/s without loss."""
+    found: Rows = []
+    for entry in entries:
+        values = {key: fact.value for key, fact in entry.facts.items()}
+        row = [entry.name, *(f"{values[key]:.3g}" if key in values else "-" for key in KEYS[section])]
+        if section == "hammers":
+            row.append(", ".join(entry.tips))
+        if section == "strikers":
+            contact, mass, damping = entry.contact(), strikers[entry.name].felt_mass, "none published"
+            if "restitution" in values:
+                damping = f"restitution {values['restitution']:g} at {values['speed']:g} m/s"
+            elif "loss" in values:
+                damping = f"loss {values['loss']:g} s/m"
+            law = "linear" if contact.exponent == 1.0 else "power" if "stiffness" in values else "Hertz"
+            time = float(wall_time(contact.stiffness, contact.exponent, 1.0 / mass, 1.0))
+            numbers = f"{contact.stiffness:.3g}", f"{contact.exponent:g}", damping, f"{time:.2g}"
+            row += [f"{mass:.3g}", law, *numbers]
+        found.append(row)
+    return found
 
 
 def facts(entry: Entry) -> list[str]:
@@ -68,33 +84,3 @@ def record(section: str, entry: Entry) -> dict[str, Any]:
     }  # fmt: skip
     told = {"section": section, "group": entry.group, "name": entry.name, "note": entry.note, "tips": list(entry.tips)}
     return {**told, "kind": entry.kind, "numbers": numbers}
-
-
-def damping(entry: Entry) -> str:
-    """What is known of the damping in the contact of a striker."""
-    told = {key: fact.value for key, fact in entry.facts.items()}
-    if "restitution" in told:
-        return f"restitution {told['restitution']:g} at {told['speed']:g} m/s"
-    return f"loss {told['loss']:g} s/m" if "loss" in told else "none published"
-
-
-def _number(entry: Entry, key: str) -> str:
-    return f"{entry.facts[key].value:.3g}" if key in entry.facts else "-"
-
-
-def _material(entry: Entry) -> Sequence[str]:
-    keys = ("E", "E_across", "nu", "rho", "loss_factor", "yield_strength")
-    return (entry.name, *(_number(entry, key) for key in keys))
-
-
-def _striker(entry: Entry) -> Sequence[str]:
-    """A striker, on a rigid wall at 1 m/s without loss."""
-    contact, mass = entry.contact(), strikers[entry.name].felt_mass
-    time = float(wall_time(contact.stiffness, contact.exponent, 1.0 / mass, 1.0))
-    law = "linear" if contact.exponent == 1.0 else "power" if "stiffness" in entry.facts else "Hertz"
-    told = (f"{mass:.3g}", law, f"{contact.stiffness:.3g}", f"{contact.exponent:g}", damping(entry))
-    return (entry.name, *told, f"{time:.2g}")
-
-
-def _hammer(entry: Entry) -> Sequence[str]:
-    return (entry.name, *(_number(entry, key) for key in ("mass", "force", "sensitivity")), ", ".join(entry.tips))

@@ -254,14 +254,14 @@ class Parameters(check.Brief):
         return abs(self.hit.speed) if name.startswith("speeds.") and self.hit.speed else 1.0
 
     def _enter(self, found: KernelSystem, i: int, name: str) -> None:
+        """Enter what a unit of a number changes that is none of the strike point or of a section."""
         home, _, part = name.rpartition(".")
-        value = self.values[name]
+        value, striker = self.values[name], self.hit.striker
         if home in self.laws and part == "gap":
             found.offset[i, self.laws[home]] = -1.0
         elif home in self.laws:
             found.law[part][i, self.laws[home]] = 1.0
         elif name == "strike.speed":
-            striker = self.hit.striker
             assert striker is not None
             found.p[i, self._modes[0]] = striker.motion  # the target may move already, whatever that speed
         elif home == "speeds":
@@ -272,9 +272,18 @@ class Parameters(check.Brief):
             b = self.bodies[home]
             found.zeta[i, self._modes[b]] = self.hit.history.omega[self._modes[b]] > 0.0
             found.zeta[i, self.hit.ends[b].forms] = not self._lossy  # else they are critically damped
-        else:
-            powers = RESCALED.get(part) or self._powers[name]
-            self._stretch(found, i, self.bodies.get(home, 1), *powers, value)
+        else:  # frequencies and mass grow with powers of the number
+            faster, heavier = RESCALED.get(part) or self._powers[name]
+            b, h = self.bodies.get(home, 1), self.hit.history.system
+            own = self._modes[b]
+            found.omega[i, own] = faster / value * h.omega[own]
+            found.shape[i, :, own] = -0.5 * heavier / value * h.shape[:, own]
+            for each, power in (("bias", -0.5), ("q", 0.5), ("p", 0.5)):  # displacement and velocity at start stay
+                getattr(found, each)[i, own] = power * heavier / value * getattr(h, each)[own]
+            if b == 0 and striker is not None:  # its weight grows, where other constant forces stay
+                found.bias[i, own] += heavier / value * striker.gravity * striker.motion[: own.stop - own.start]
+            self._raise(found, i, b, faster / value)
+            self._soften(found, i, b, -(heavier + 2.0 * faster) / value * self.hit.ends[b].rest)
 
     @cached_property
     def _modes(self) -> tuple[slice, ...]:
@@ -304,19 +313,6 @@ class Parameters(check.Brief):
         forms, h = self.hit.ends[b].forms, self.hit.history
         found.omega[i, forms] = faster * h.omega[forms]
         found.shape[i, :, forms] += faster * h.shape[:, forms]
-
-    def _stretch(self, found: KernelSystem, i: int, b: int, faster: float, heavier: float, value: float) -> None:
-        """A body whose frequencies and mass grow with these powers of a number."""
-        part, h = self._modes[b], self.hit.history.system
-        found.omega[i, part] = faster / value * h.omega[part]
-        found.shape[i, :, part] = -0.5 * heavier / value * h.shape[:, part]
-        for name, power in (("bias", -0.5), ("q", 0.5), ("p", 0.5)):  # displacement and velocity at the start stay
-            getattr(found, name)[i, part] = power * heavier / value * getattr(h, name)[part]
-        striker = self.hit.striker
-        if b == 0 and striker is not None:  # its weight grows, where other constant forces stay
-            found.bias[i, part] += heavier / value * striker.gravity * striker.motion[: part.stop - part.start]
-        self._raise(found, i, b, faster / value)
-        self._soften(found, i, b, -(heavier + 2.0 * faster) / value * self.hit.ends[b].rest)
 
     def _vary(self, found: KernelSystem, i: int, change: SectionChange) -> None:
         """A target whose section changes along its length or over its area."""

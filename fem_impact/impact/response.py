@@ -471,7 +471,8 @@ class Response(Totals, check.Locked):
     @property
     def in_contact(self) -> bool:
         """Whether the striker, or the first body, still presses another at the end of the run."""
-        return balance.in_contact(self)
+        mine = balance.touched(self, 0)
+        return any(each.separation_speed is None for each in self.impacts if each.contact in mine)
 
     @property
     def striker_speeds(self) -> np.ndarray:
@@ -479,7 +480,8 @@ class Response(Totals, check.Locked):
 
         Positive towards the struck body; a falling striker rises by the square of the second over twice the gravity.
         """
-        return balance.speeds(self)
+        times = np.array([[each.start, each.end] for each in self.impacts]).reshape(-1, 2)
+        return (self.history.states(times.ravel())[1] @ balance.rigid_row(self, 0)).reshape(-1, 2)
 
     @cached_property
     def restitution(self) -> float | None:

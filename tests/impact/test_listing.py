@@ -7,12 +7,11 @@ from fem_impact.impact import listing
 
 
 def test_words_find_entries_by_name_and_group():
-    found = listing.matching("")
-    assert {name: len(entries) for name, entries in found.items()} == {
-        "materials": len(fi.materials), "strikers": len(fi.strikers), "hammers": len(fi.hammers.catalogue),
-    }  # fmt: skip
-    assert [entry.name for entry in listing.matching("5a nylon")["strikers"]] == ["hickory 5A, nylon tip"]
-    assert {entry.group for entry in listing.matching("kistler")["hammers"]} == {"Kistler"}
+    found = listing.listed("")[0]["entries"]
+    assert len(found) == len(fi.materials) + len(fi.strikers) + len(fi.hammers.catalogue)
+    assert [each["name"] for each in listing.listed("5a nylon")[0]["entries"]] == ["hickory 5A, nylon tip"]
+    found = listing.listed("kistler")[0]["entries"]
+    assert {(each["section"], each["group"]) for each in found} == {("hammers", "Kistler")}
 
 
 @pytest.mark.parametrize(("exponent", "ratio"), [(1.0, 1.02), (2.0, 1.31), (3.0, 1.60)])
