@@ -139,12 +139,7 @@ def unexamined(
 def total(assumptions: Sequence[Assumption]) -> float:
     """Largest sum over the assumptions of what they do to one quantity [-]; what is not known is not in it."""
     names = dict.fromkeys(name for each in assumptions for name in each.effect)
-    return max((of_quantity(assumptions, name) for name in names), default=0.0)
-
-
-def of_quantity(assumptions: Sequence[Assumption], name: str) -> float:
-    """Sum of what the assumptions do to a quantity [-]; what is not known is not in it."""
-    return float(sum(each.effect.get(name) or 0.0 for each in assumptions))
+    return max((float(sum(each.effect.get(name) or 0.0 for each in assumptions)) for name in names), default=0.0)
 
 
 def allowed(tolerance: float) -> float:

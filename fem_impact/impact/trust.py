@@ -104,8 +104,32 @@ class Trust:
 
 def examine(hit: "Response") -> Trust:
     """How far to trust each quantity that a blow was asked for."""
-    cure = "" if hit.tolerance_met else promise.remedy(hit)
-    return Trust(tuple(_judged(hit, name, band, cure) for name, band in hit.quantities.items()))
+    cure, judged = "" if hit.tolerance_met else promise.remedy(hit), []
+    found, error, limit = hit.assumptions, hit.error, assumption.allowed(hit.tolerance)
+    for name, band in hit.quantities.items():
+        unsure = [each for each in found if each.open and each.effect.get(name) is None]
+        effects = [each.effect.get(name) or 0.0 for each in found]
+        known, worst = float(sum(effects)), found[effects.index(max(effects))]
+        parts, own = error.parts(name), error.of_quantity(name)
+        if name == "n_impacts" and own < 0.5:  # a number is right, or doubted as a whole
+            own = 0.0
+        cause, size = max(parts.items(), key=lambda part: part[1]) if error.resolvable else ("modes left out", np.inf)
+        dominant = worst.name if max(effects) >= size else cause
+        remedies = [cure] if cure else []
+        if known > limit:
+            remedies.append(worst.remedy)
+        elif unsure:
+            dominant = unsure[0].name if hit.tolerance_met else dominant
+            remedies.append(unsure[0].remedy)
+        value = None if name == "sound" else value_of(hit, name, band)
+        if band is not None and value is not None:
+            value = np.abs(value).max()
+        judged.append(Judged(
+            name, band, None if value is None else float(value), own if error.resolvable else None,
+            None if unsure else known, known, tuple(each.name for each in unsure), dominant, "; ".join(remedies),
+            limit, hit.tolerance,
+        ))  # fmt: skip
+    return Trust(tuple(judged))
 
 
 def in_one_line(hit: "Response") -> str:
@@ -127,30 +151,3 @@ def in_one_line(hit: "Response") -> str:
 def _digits(error: float | None) -> int:
     """Digits of a number with a relative error."""
     return FEWEST if error is None else int(np.clip(np.ceil(-np.log10(max(error, 1e-9))) + 1, FEWEST, MOST))
-
-
-def _judged(hit: "Response", name: str, band: float | None, cure: str) -> Judged:
-    found, error = hit.assumptions, hit.error
-    unsure = [each for each in found if each.open and each.effect.get(name) is None]
-    known = assumption.of_quantity(found, name)
-    limit = assumption.allowed(hit.tolerance)
-    worst = max(found, key=lambda each: each.effect.get(name) or 0.0)
-    parts, own = error.parts(name), error.of_quantity(name)
-    if name == "n_impacts" and own < 0.5:  # a number is right, or doubted as a whole
-        own = 0.0
-    cause, size = max(parts.items(), key=lambda part: part[1]) if error.resolvable else ("modes left out", np.inf)
-    dominant = worst.name if (worst.effect.get(name) or 0.0) >= size else cause
-    remedies = [cure] if cure else []
-    if known > limit:
-        remedies.append(worst.remedy)
-    elif unsure:
-        dominant = unsure[0].name if hit.tolerance_met else dominant
-        remedies.append(unsure[0].remedy)
-    value = None if name == "sound" else value_of(hit, name, band)
-    if band is not None and value is not None:
-        value = np.abs(value).max()
-    return Judged(
-        name, band, None if value is None else float(value), own if error.resolvable else None,
-        None if unsure else known,
-        known, tuple(each.name for each in unsure), dominant, "; ".join(remedies), limit, hit.tolerance,
-    )  # fmt: skip

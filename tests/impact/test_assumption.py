@@ -62,4 +62,3 @@ def test_before_the_blow_only_numbers_are_known():
 def test_total_adds_what_is_done_to_each_quantity_and_takes_the_largest():
     found = [WELL, make({"restitution": 0.01, "force": 0.002}), make({"restitution": 0.0, "force": 0.005}), UNKNOWN]
     assert assumption.total(found) == pytest.approx(0.010001)
-    assert assumption.of_quantity(found, "force") == pytest.approx(0.007003)
