@@ -132,9 +132,8 @@ def fit(
     laws = [contact] if isinstance(contact, Contact) else list(check.several("contact", contact, Contact))
     held = {name: check.number(name, value) for name, value in check.table("known", known).items()}
     names = [checked(unknown, target, striker, law, held) for law in laws]
-    for name in held:
-        if name in unknown:
-            raise ValueError(f"known and unknown both name {name}")
+    if both := [name for name in held if name in unknown]:
+        raise ValueError(f"known and unknown both name {both[0]}")
     each = check.texts("per_tap", [per_tap] if isinstance(per_tap, str) else per_tap)
     for name in each:
         check.one_of("per_tap", name, unknown)

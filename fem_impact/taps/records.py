@@ -85,7 +85,6 @@ class Taps(check.Brief):
             check.one_of("units", text, [si for si in channels.units.KINDS if si != "N"])
         tags = [f"tap {i + 1}" for i in range(n_taps)] if labels is None else labels
         tags = check.texts("labels", tags, n_taps, "tap of force")
-        said = check.texts("notes", notes)
         if overload is None:
             cut = [[triggers.clipped(f), *(triggers.clipped(r) for r in each.T)] for f, each in zip(rows, others)]
         else:
@@ -97,12 +96,11 @@ class Taps(check.Brief):
                     f"overload must be bools of shape ({n_taps}, {1 + n_channels}), got {check.shown(overload)}"
                 )
             cut = np.broadcast_to(flags, (n_taps, 1 + n_channels)).tolist()
-        onset = np.array([triggers.onset(f) for f in rows]) / rate
         table = xr.Dataset(
             {
                 "force": (("tap", "time"), rows, {"units": "N"}),
                 "response": (("tap", "time", "channel"), others),
-                "onset": ("tap", onset, {"units": "s"}),
+                "onset": ("tap", np.array([triggers.onset(f) for f in rows]) / rate, {"units": "s"}),
                 "overload": (("tap", "sensor"), np.array(cut, bool)),
             },
             {
@@ -114,7 +112,7 @@ class Taps(check.Brief):
             },
             {"rate": rate} | ({} if pulse is None else {"pulse": check.positive("pulse", pulse, "N")}),
         )
-        return cls(table, tuple(said))
+        return cls(table, tuple(check.texts("notes", notes)))
 
     @property
     def rate(self) -> float:

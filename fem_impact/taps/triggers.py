@@ -174,14 +174,11 @@ def cut(
     least, n_whole = most_whole(rooms[:, 0], np.maximum(needs[:, 0], FEWEST))
     least = least if 2 * n_whole > len(places) else most_whole(rooms[:, 0], needs[:, 0])[0]
     lead = min(round(wanted * rate), least if before is None else 10**9)
-    tail = most_whole(rooms[:, 1], needs[:, 1])[0]
-    if length is not None:
-        tail = max(1, round(check.positive("length", length, "s") * rate) - lead)
+    longest = None if length is None else round(check.positive("length", length, "s") * rate)
+    tail = most_whole(rooms[:, 1], needs[:, 1])[0] if longest is None else max(1, longest - lead)
     tail = min(tail, round(LONGEST * rate))
     rows, responses, labels, notes, offsets, tops, drift = [], [], [], [], [], [], 0.0
-    struck = {k for k, *_ in places}
-    without = [str(k + 1) for k in range(len(segments)) if k not in struck]
-    if without:
+    if without := [str(k + 1) for k in range(len(segments)) if k not in {place[0] for place in places}]:
         notes.append(f"no tap above {limit:.3g} N in record {', '.join(without[:20])}{', ...' * (len(without) > 20)}")
     for number, (k, start, _, _) in enumerate(places):
         row, other = segments[k]
