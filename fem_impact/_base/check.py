@@ -240,25 +240,22 @@ def typed(function: Function) -> Function:
     @functools.wraps(function)
     def tested(*given: Any, **named: Any) -> Any:
         for name, value in chain(zip(parameters, given), named.items()):
-            if name in checked and not isinstance(value, checked[name][1]):
-                _of_kind(name, value, *checked[name])
+            if name not in checked or isinstance(value, checked[name][1]):
+                continue
+            kinds, ours = checked[name]
+            if value is None and NoneType in kinds:
+                continue
+            if Path in kinds:
+                path(name, value)
+            elif ours:
+                instance(name, value, *ours)
+            elif bool in kinds:
+                flag(name, value)
+            elif not callable(value):
+                raise ValueError(f"{name} must be a function, got {shown(value)}")
         return function(*given, **named)
 
     return tested  # type: ignore[return-value]
-
-
-def _of_kind(name: str, value: Any, kinds: tuple[Any, ...], ours: tuple[type, ...]) -> None:
-    """Raise ValueError unless ``value`` has one of the annotated ``kinds``, of which ``ours`` are in `SOURCES`."""
-    if value is None and NoneType in kinds:
-        return
-    if Path in kinds:
-        path(name, value)
-    elif ours:
-        instance(name, value, *ours)
-    elif bool in kinds:
-        flag(name, value)
-    elif not callable(value):
-        raise ValueError(f"{name} must be a function, got {shown(value)}")
 
 
 def array(name: str, value: Any, shape: tuple[int | None, ...], unit: str = "", *, lift: bool = False) -> np.ndarray:

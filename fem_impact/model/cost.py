@@ -11,7 +11,7 @@ import math
 import os
 import platform
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import asdict, dataclass, fields
 from functools import cache
@@ -158,17 +158,14 @@ def benchmark() -> Machine:
         at, lasts = (0.465, 0.3), 0.5e-3
         collision.strike(plate, mass, law, at=at, speed=1.0, dt=lasts / 4000, duration=lasts, residual=False)
 
-    return Machine(sparse=_fastest(sparse), dense=_fastest(lambda: full @ full), steps=_fastest(steps))
-
-
-def _fastest(work: Callable[[], object]) -> float:
-    """Shortest processor time [s] of three runs: other programs on the machine only make it longer."""
-    times = []
-    for _ in range(3):
-        start = time.process_time()
-        work()
-        times.append(time.process_time() - start)
-    return min(times)
+    found: list[float] = []
+    for work in (sparse, lambda: full @ full, steps):
+        found.append(math.inf)
+        for _ in range(3):  # other programs on the machine only make it longer
+            start = time.process_time()
+            work()
+            found[-1] = min(found[-1], time.process_time() - start)
+    return Machine(*found)
 
 
 def whose() -> str:

@@ -281,7 +281,23 @@ def strokes(
     >>> len(flam.hits), flam.impacts[-1].contact, flam.peak_force > 20.0
     (2, 1, True)
     """
-    played = tuple(sorted(_check_strokes(modes, strokes), key=lambda stroke: stroke.when))
+    if not isinstance(strokes, (list, tuple)) or not 0 < len(strokes) <= 100_000:  # above a day of drumming
+        raise ValueError(
+            "strokes must be a list of (when, striker, contact, at, speed) or, to be lifted, with lasts, got "
+            f"{check.shown(strokes)}"
+        )
+    given = []
+    for i, stroke in enumerate(strokes):
+        name = f"strokes[{i}]"
+        if not isinstance(stroke, (list, tuple)) or len(stroke) not in (5, 6):
+            raise ValueError(f"{name} must be (when, striker, contact, at, speed), got {check.shown(stroke)}")
+        one = Stroke(*stroke)
+        check.instance(f"{name} striker", one.striker, Striker)
+        check.instance(f"{name} contact", one.contact, Contact)
+        when, speed = check.number(f"{name} when", one.when, "s"), check.positive(f"{name} speed", one.speed, "m/s")
+        lasts = one.lasts if one.lasts is None else check.positive(f"{name} lasts", one.lasts, "s")
+        given.append(Stroke(when, one.striker, one.contact, modes.point(f"{name} at", one.at)[0], speed, lasts))
+    played = tuple(sorted(given, key=lambda stroke: stroke.when))
     tolerance = check.tolerance(tolerance)
     end = np.inf if duration is None else played[0].when + check.positive("duration", duration, "s")
     begun = start.state() if isinstance(start, Response) else start
@@ -297,27 +313,6 @@ def strokes(
     hits = tuple(replace(hit, tolerance=tolerance) for hit in game.hits)
     found = Strokes(modes, played, np.array(game.starts), hits, tuple(game.who), tolerance, notes)
     return promise.kept(found, strict)
-
-
-def _check_strokes(modes: Modes, strokes: Any) -> list[Stroke]:
-    """The strokes, each with every number checked."""
-    if not isinstance(strokes, (list, tuple)) or not 0 < len(strokes) <= 100_000:  # above a day of drumming
-        raise ValueError(
-            "strokes must be a list of (when, striker, contact, at, speed) or, to be lifted, with lasts, got "
-            f"{check.shown(strokes)}"
-        )
-    found = []
-    for i, stroke in enumerate(strokes):
-        name = f"strokes[{i}]"
-        if not isinstance(stroke, (list, tuple)) or len(stroke) not in (5, 6):
-            raise ValueError(f"{name} must be (when, striker, contact, at, speed), got {check.shown(stroke)}")
-        one = Stroke(*stroke)
-        check.instance(f"{name} striker", one.striker, Striker)
-        check.instance(f"{name} contact", one.contact, Contact)
-        when, speed = check.number(f"{name} when", one.when, "s"), check.positive(f"{name} speed", one.speed, "m/s")
-        lasts = one.lasts if one.lasts is None else check.positive(f"{name} lasts", one.lasts, "s")
-        found.append(Stroke(when, one.striker, one.contact, modes.point(f"{name} at", one.at)[0], speed, lasts))
-    return found
 
 
 @dataclass(eq=False)

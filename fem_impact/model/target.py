@@ -209,12 +209,6 @@ class Target:
             modes = self.find(FIRST_FLEXIBLE, tolerance=CLOSE)
         return float(self.finished(modes).frequencies[-1] / modes.frequencies[-1])
 
-    def finished_vectors(self, vectors: Modes) -> Modes:
-        """Ritz vectors as struck: scaled and damped like modes, although their first is no mode."""
-        mass = self.scale.get("mass", vectors.mass) / vectors.mass
-        scaled = vectors.stretched(mass, self.stretch)
-        return scaled if self.damping_ratio is None else scaled.damped(self.damping_ratio)
-
     def wave(self, frequency: float, tense: bool = True) -> float:
         """Largest wavenumber [rad/m] of the plate's own waves, before scaling, at a frequency [Hz].
 

@@ -180,7 +180,10 @@ class Seen:
         with self.stages("vectors"):
             found = fine.modes(self.count)
             other = coarse.modes(found.n_modes - fine.system.rigid.shape[1])  # as many vectors on either mesh
-        found = self.target.finished_vectors(replace(found, poorer={"mesh": other, **found.poorer}))
+        found, target = replace(found, poorer={"mesh": other, **found.poorer}), self.target
+        # scaled and damped like modes, although their first is no mode
+        found = found.stretched(target.scale.get("mass", found.mass) / found.mass, target.stretch)
+        found = found if target.damping_ratio is None else found.damped(target.damping_ratio)
         return found, folded(found, cutoff, self.margin)
 
     def improved(self, error: Error, allowed: float) -> bool:

@@ -252,8 +252,12 @@ def compute_map(base: Case, axes: Mapping[str, np.ndarray], job: Job) -> xarray.
     numbers, texts = job.solved(some) if computed is None else (computed.numbers, computed.texts)
     failures = listed(texts, some.n_cases)
     doubt = np.broadcast_to(cell_errors.described(some, numbers, job.workers), cases.shape)
-    if some is not cases:
-        numbers, failures = _with_speed(cases, some, numbers, failures)
+    if some is not cases:  # impulse and peak force scale with the speed, all else is unchanged
+        ratio = cases.axes["speed"] / cases.axes["speed"][0]
+        ratio = np.reshape(ratio, [-1 if name == "speed" else 1 for name in cases.axes])
+        scales = [ratio if name in ("impulse", "peak_force") else np.ones_like(ratio) for name in cases.layers]
+        numbers = (numbers.reshape(-1, *some.shape) * np.stack(scales)).reshape(len(numbers), -1)
+        failures = np.broadcast_to(failures.reshape(some.shape), cases.shape).reshape(-1)
     own = cell_errors.model_error(cases) if job.audit else None
     table = _dataset(cases, numbers, failures, np.maximum(cell_errors.estimate_left_out(cases), doubt), own)
     gap = 1.0 / max(1, min(cases.shape) - 1)
@@ -293,16 +297,6 @@ def admit(n_cells: int, n_layers: int, max_cells: float, *, quick: bool = True, 
         raise ValueError(f"over asks for {cost}; give fewer values, or raise max_cells, now {max_cells:.3g}")
     if tell is not None and (seconds > COSTLY[0] or memory > COSTLY[1]):
         tell(cost)
-
-
-def _with_speed(cases: Cases, fewer: Cases, numbers: np.ndarray, failures: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Blows at all speeds from those at one speed: impulse and peak force scale with it, all else is unchanged."""
-    shape = [-1 if name == "speed" else 1 for name in cases.axes]
-    ratio = np.reshape(cases.axes["speed"] / cases.axes["speed"][0], shape)
-    scales = [ratio if name in ("impulse", "peak_force") else np.ones_like(ratio) for name in cases.layers]
-    whole = numbers.reshape(-1, *fewer.shape) * np.stack(scales)
-    failures = np.broadcast_to(failures.reshape(fewer.shape), cases.shape)
-    return whole.reshape(len(numbers), -1), failures.reshape(-1)
 
 
 def _dataset(cases: Cases, numbers: np.ndarray, failures: np.ndarray, left_out: np.ndarray, own: Any) -> xarray.Dataset:

@@ -221,7 +221,19 @@ class Spread(check.Brief):
                 f"The number of impacts varies from {counts.min():.0f} to {counts.max():.0f}: such blows are chaotic. "
                 "With inputs known only this well, no single one can be predicted; their statistics, as above, can."
             )
-        return "\n".join([*lines, "", *self._advice(), *self._honest()])
+        lines += ["", *self._advice()]
+        if self.checks is not None and self.checks.n_blows:  # how far the blows themselves can be trusted
+            worst = ", ".join(f"{name} {value:.1e}" for name, value in self.checks.apart.items())
+            other = f", {self.checks.n_other} with another number of impacts" if self.checks.n_other else ""
+            unknown = f" (not known: {', '.join(self.checks.unknown)})" if self.checks.unknown else ""
+            lines.append(
+                f"{self.checks.n_blows} blows struck again one by one differ by at most {worst}{other}; "
+                f"error of the body's description {self.checks.body:.1e}, of the model itself "
+                f"{self.checks.model:.1g}{unknown}"
+            )
+        for name, error in self.rescaled.items():
+            lines.append(f"{name}: modes were rescaled; a rebuilt body differs by at most {error:.1e}")
+        return "\n".join([*lines, *noted(self.notes)])
 
     def _advice(self) -> list[str]:
         """What to measure better, quantity by quantity."""
@@ -246,22 +258,6 @@ class Spread(check.Brief):
         if self.why_no_shares:
             lines.append(f"No Sobol indices: {self.why_no_shares}")
         return lines
-
-    def _honest(self) -> list[str]:
-        """How far the blows themselves can be trusted."""
-        lines = []
-        if self.checks is not None and self.checks.n_blows:
-            worst = ", ".join(f"{name} {value:.1e}" for name, value in self.checks.apart.items())
-            other = f", {self.checks.n_other} with another number of impacts" if self.checks.n_other else ""
-            unknown = f" (not known: {', '.join(self.checks.unknown)})" if self.checks.unknown else ""
-            lines.append(
-                f"{self.checks.n_blows} blows struck again one by one differ by at most {worst}{other}; "
-                f"error of the body's description {self.checks.body:.1e}, of the model itself "
-                f"{self.checks.model:.1g}{unknown}"
-            )
-        for name, error in self.rescaled.items():
-            lines.append(f"{name}: modes were rescaled; a rebuilt body differs by at most {error:.1e}")
-        return lines + noted(self.notes)
 
     def data(self) -> dict[str, Any]:
         """All numbers but those of single blows, as plain data."""
