@@ -47,33 +47,28 @@ def identify(thing: Any) -> str:
     ValueError
         If it uses something that cannot be told from others of its kind, such as an open file; says what.
     """
-    try:
-        return _Walk().digest(thing).hex()
-    except RecursionError:
-        raise ValueError("what it uses is nested too deeply") from None
+    known: dict[int, tuple[Any, bytes]] = {}  # the objects, too: only of living ones is the number unique
+    path: list[int] = []  # numbers of the objects that are being looked into
 
-
-class _Walk:
-    """Digests of an object and all that it uses."""
-
-    def __init__(self) -> None:
-        self.known: dict[int, tuple[Any, bytes]] = {}  # the objects, too: only of living ones is the number unique
-        self.path: list[int] = []  # numbers of the objects that are being looked into
-
-    def digest(self, thing: Any) -> bytes:
+    def digest(thing: Any) -> bytes:
         if type(thing) in PLAIN:
             return hashlib.sha256(f"{type(thing).__name__} {thing!r}".encode("utf-8", "surrogatepass")).digest()
         number = id(thing)
-        if number in self.path:
-            return hashlib.sha256(f"itself {self.path.index(number)}".encode()).digest()
-        if number not in self.known:
-            self.path.append(number)
+        if number in path:
+            return hashlib.sha256(f"itself {path.index(number)}".encode()).digest()
+        if number not in known:
+            path.append(number)
             label, used = _used(thing)
-            parts = [self.digest(part) for part in used]
-            self.path.pop()
+            parts = [digest(part) for part in used]
+            path.pop()
             ordered = sorted(parts) if isinstance(thing, (set, frozenset, dict)) else parts
-            self.known[number] = thing, hashlib.sha256(b"".join([label.encode(), *ordered])).digest()
-        return self.known[number][1]
+            known[number] = thing, hashlib.sha256(b"".join([label.encode(), *ordered])).digest()
+        return known[number][1]
+
+    try:
+        return digest(thing).hex()
+    except RecursionError:
+        raise ValueError("what it uses is nested too deeply") from None
 
 
 def _used(thing: Any) -> tuple[str, list[Any]]:

@@ -103,22 +103,17 @@ def main(path: Path, reader: str, arguments: list[str]) -> tuple[int, bytes]:
         return REFUSED, (said.getvalue().strip() or text or type(error).__name__).encode("utf-8", "replace")
 
 
-def limit(seconds: int) -> None:
-    """Limit this process's processor time [s] and its address space to `MEMORY`, and disable core files."""
+def process() -> int:
+    """The reader process itself: limits its processor time and its address space, and leaves no core files."""
+    logging.disable()
     with suppress(ImportError):  # Windows has no such limits; only that by the clock remains there
         import resource
 
-        most = resource.getrlimit(resource.RLIMIT_CPU)[1]
+        seconds, most = int(sys.argv[1]), resource.getrlimit(resource.RLIMIT_CPU)[1]
         own = seconds if most == resource.RLIM_INFINITY else min(seconds, most)
         resource.setrlimit(resource.RLIMIT_CPU, (own, most))
         resource.setrlimit(resource.RLIMIT_AS, (MEMORY, MEMORY))
         resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
-
-
-def process() -> int:
-    """The reader process itself."""
-    logging.disable()
-    limit(int(sys.argv[1]))
     status, answer = main(Path(sys.argv[2]), sys.argv[3], sys.argv[4:])
     (sys.stderr if status else sys.stdout).buffer.write(answer)
     return status
