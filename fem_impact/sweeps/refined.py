@@ -1,7 +1,6 @@
 """Maps computed only where the answer changes; the other cells are interpolated between those computed."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -17,49 +16,41 @@ Compute = Callable[[np.ndarray, str], tuple[np.ndarray, Texts]]  # cells, name o
 Tell = Callable[[int], Any]  # takes the number of cells that are settled
 
 
-@dataclass(frozen=True, eq=False)
-class Blocks:
-    """Rectangles of cells, each with 3 x 3 nodes: its corners, the middles of its sides and its own."""
+def with_middles(along: np.ndarray) -> np.ndarray:
+    """Nodes (n_blocks, 2, 3) along both axes of rectangles of cells, from their first and last (n_blocks, 2, 2).
 
-    along: np.ndarray  # (n_blocks, 2, 2) first and last cell along both axes
-
-    @property
-    def nodes(self) -> tuple[np.ndarray, np.ndarray]:
-        """Cells of the nodes along both axes, (n_blocks, 3) each; two are the same in a block of two cells."""
-        first, last = self.along[:, :, 0], self.along[:, :, 1]
-        three = np.stack([first, (first + last) // 2, last], axis=-1)
-        return three[:, 0], three[:, 1]
-
-    def cells(self, width: int) -> np.ndarray:
-        """Numbers (n_blocks, 3, 3) of the nodes on a map that is ``width`` cells wide."""
-        rows, columns = self.nodes
-        return rows[:, :, None] * width + columns[:, None, :]
-
-    def quarters(self) -> "tuple[Blocks, np.ndarray]":
-        """The quarters of all blocks, and the block (n_quarters,) that each is of."""
-        rows, columns = self.nodes
-        parts = [np.stack([rows[:, i : i + 2], columns[:, j : j + 2]], axis=1) for i in (0, 1) for j in (0, 1)]
-        along, of = np.concatenate(parts), np.tile(np.arange(len(rows)), 4)
-        wide = (along[:, :, 1] > along[:, :, 0]).all(axis=1)
-        return Blocks(along[wide]), of[wide]
-
-    def some(self, chosen: np.ndarray) -> "Blocks":
-        """The blocks of a mask or of numbers."""
-        return Blocks(self.along[chosen])
+    Each has 3 x 3 nodes: corners, the middles of sides and its own; two are the same in a block of two cells.
+    """
+    first, last = along[..., 0], along[..., 1]
+    return np.stack([first, (first + last) // 2, last], axis=-1)
 
 
-def first_blocks(shape: tuple[int, ...]) -> Blocks:
+def cells_of(blocks: np.ndarray, width: int) -> np.ndarray:
+    """Numbers (n_blocks, 3, 3) of the nodes of blocks (n_blocks, 2, 3) on a map that is ``width`` cells wide."""
+    return blocks[:, 0, :, None] * width + blocks[:, 1, None, :]
+
+
+def quarters_of(blocks: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """The quarters of all blocks (n_blocks, 2, 3), and the block (n_quarters,) that each is of."""
+    halves = blocks[..., :2], blocks[..., 1:]
+    parts = [np.stack([one[:, 0], two[:, 1]], axis=1) for one in halves for two in halves]
+    along, of = np.concatenate(parts), np.tile(np.arange(len(blocks)), 4)
+    wide = (along[:, :, 1] > along[:, :, 0]).all(axis=1)
+    return with_middles(along[wide]), of[wide]
+
+
+def first_blocks(shape: tuple[int, ...]) -> np.ndarray:
     """Blocks of about 16 cells a side that cover a map; islands narrower than a quarter of that can be missed."""
     ends = [np.unique(np.round(np.linspace(0, n - 1, max(1, round((n - 1) / 16)) + 1)).astype(int)) for n in shape]
     rows, columns = (np.column_stack([places[:-1], places[1:]]) for places in ends)
     i, j = (index.ravel() for index in np.indices((len(rows), len(columns))))
-    return Blocks(np.stack([rows[i], columns[j]], axis=1))
+    return with_middles(np.stack([rows[i], columns[j]], axis=1))
 
 
 def widest_gap(shape: tuple[int, ...]) -> float:
     """Largest distance [-] between neighbouring cells that are computed in any case, as a share of the axis."""
-    quarters, _ = first_blocks(shape).quarters()
-    return max(float(np.diff(nodes, axis=1).max()) / (n - 1) for nodes, n in zip(quarters.nodes, shape))
+    gaps = np.diff(quarters_of(first_blocks(shape))[0]).max(axis=(0, 2))
+    return float(np.max(gaps / (np.array(shape) - 1)))
 
 
 def weights(nodes: np.ndarray, places: np.ndarray) -> np.ndarray:
@@ -120,25 +111,25 @@ class MapSheet:
             found[self.relative] = np.log(found[self.relative])
         return found
 
-    def missed(self, blocks: Blocks, quarters: Blocks, of: np.ndarray) -> np.ndarray:
+    def missed(self, blocks: np.ndarray, quarters: np.ndarray, of: np.ndarray) -> np.ndarray:
         """Largest error [-] of the parabolas of blocks at the nodes of their quarters, (n_quarters,).
 
         Infinite where a blow failed or the number of impacts differs.
         """
-        coarse, fine = blocks.cells(self.width), quarters.cells(self.width)
-        rows, columns = (weights(nodes[of], places) for nodes, places in zip(blocks.nodes, quarters.nodes))
+        coarse, fine = cells_of(blocks, self.width), cells_of(quarters, self.width)
+        rows, columns = (weights(blocks[of, axis], quarters[:, axis]) for axis in (0, 1))
         expected = np.einsum("nip,njq,lnpq->lnij", rows, columns, self.smooth_values(coarse)[:, of])
         off = (self.weight[:, None] * np.abs(expected - self.smooth_values(fine)).max(axis=(2, 3))).max(axis=0)
         count = self.numbers[self.count]
         same = (count[fine] == count[coarse][of][:, :1, :1]).all(axis=(1, 2))
         return np.where(same & ~np.isnan(off), off, np.inf)
 
-    def fill(self, blocks: Blocks, off: np.ndarray) -> None:
+    def fill(self, blocks: np.ndarray, off: np.ndarray) -> None:
         """Interpolate the cells of blocks whose error (n_blocks,) [-] is known, between their nodes."""
-        size = blocks.along[:, :, 1] - blocks.along[:, :, 0]
+        size = blocks[:, :, 2] - blocks[:, :, 0]
         for height, width in np.unique(size, axis=0):
             some = np.flatnonzero((size == (height, width)).all(axis=1))
-            nodes = blocks.some(some).cells(self.width)
+            nodes = cells_of(blocks[some], self.width)
             places = [np.arange(n + 1) for n in (height, width)]
             first = nodes[:, 0, 0]
             cells = first[:, None, None] + (places[0][:, None] * self.width + places[1])
@@ -173,18 +164,18 @@ def refine(
     """
     sheet = MapSheet(shape, layers)
     blocks, turn = first_blocks(shape), 0
-    sheet.add(blocks.cells(shape[1]), compute, "round-0")
-    while len(blocks.along):
+    sheet.add(cells_of(blocks, shape[1]), compute, "round-0")
+    while len(blocks):
         turn += 1
-        quarters, of = blocks.quarters()
-        sheet.add(quarters.cells(shape[1]), compute, f"round-{turn}")
+        quarters, of = quarters_of(blocks)
+        sheet.add(cells_of(quarters, shape[1]), compute, f"round-{turn}")
         off = sheet.missed(blocks, quarters, of)
-        spent = sheet.numbers[sheet.error][quarters.cells(shape[1])].max(axis=(1, 2))
+        spent = sheet.numbers[sheet.error][cells_of(quarters, shape[1])].max(axis=(1, 2))
         spent = np.fmax(allowed(tolerance), np.where(spent > tolerance, 0.0, spent))  # no more cells help those
-        split = np.bincount(of, off > tolerance - spent, len(blocks.along)) > 0.0
-        sheet.fill(quarters.some(~split[of]), off[~split[of]])
-        blocks = quarters.some(split[of])
-        blocks = blocks.some((blocks.along[:, :, 1] - blocks.along[:, :, 0] > 1).any(axis=1))
+        split = np.bincount(of, off > tolerance - spent, len(blocks)) > 0.0
+        sheet.fill(quarters[~split[of]], off[~split[of]])
+        blocks = quarters[split[of]]
+        blocks = blocks[(blocks[:, :, 2] - blocks[:, :, 0] > 1).any(axis=1)]
         if tell is not None:
             tell(int(sheet.settled.sum()))
     while True:
