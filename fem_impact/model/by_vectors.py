@@ -104,7 +104,7 @@ class Vectors(Description):
             return accuracy.tail_cutoff(modes, seen.at, mass=asked.mass, tolerance=allowed, **asked.law)
 
         modes = seen.needed_modes(cutoff)
-        elements, n_dofs = seen.elements, seen.fine.system.n_dofs
+        elements, n_dofs = seen.elements, seen.n_dofs
         forecast = replace(self.forecast, n_modes=seen.count, size=elements.size, n_dofs=n_dofs)
         return replace(self, forecast=forecast, elements=elements, seen=seen, whole=seen.whole), modes
 

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from ..fe import point_load, refinement
-from ..fe.assembly import System, usual_theory
+from ..fe.assembly import usual_theory
 from ..fe.kirchhoff import ARGYRIS
 from ..fe.refinement import FLATTER
 from ..fe.section import Plate
@@ -132,20 +132,21 @@ def folded(found: Modes, cutoff: Callable[[Modes, float], float], margin: float)
 
 
 class Seen:
-    """A target as a blow at one point sees it, whose contact has a resonance [Hz] on a rigid wall.
+    """A target as a blow at a point sees it, or blows at several, whose contact has a resonance [Hz] on a rigid wall.
 
-    The resonance and the tolerance decide on shift and first number of vectors, unless these are given.
+    The resonance and the tolerance decide on shift and first number of vectors, unless these are given. Every mesh is
+    factorised once for all its points, and the vectors of each point then cost one solution each.
     """
 
-    fine: Krylov
-    coarse: Krylov  # on larger elements; on smaller ones if the user insists on a size and the outline allows no larger
-    kind: type[Krylov] = Krylov
+    fine: list[Krylov]  # of each point
+    # on larger elements; on smaller ones if the user insists on a size and the outline allows no larger
+    coarse: list[Krylov]
 
     def __init__(
         self, target: Target, at: Any, resonance: float, tolerance: float, elements: Elements, fixed: bool,
         stages: Stages, shift: float | None = None, count: int | None = None,
     ) -> None:  # fmt: skip
-        self.target, self.at, self.stages = target, np.atleast_2d(at), stages  # (1, 2) [m], or of several points
+        self.target, self.at, self.stages = target, np.atleast_2d(at), stages  # (n_points, 2) [m]
         self.fixed = fixed  # whether the user insists on the size of the elements
         # [rad/s] before scaling, see `Krylov`; half or twice this shift tells blows as well
         self.shift = (shift or 2.0 * np.pi * resonance * _strict(6.0, 1.0 / 6.0, tolerance)) / target.stretch
@@ -160,31 +161,36 @@ class Seen:
             self.elements, other = other, self.elements
         self.fine, self.coarse = self._krylov(self.elements), self._krylov(other)
 
-    def _krylov(self, elements: Elements) -> Krylov:
+    def _krylov(self, elements: Elements) -> list[Krylov]:
         system = self.target.near(self.at, elements, self.stages)
         with self.stages("vectors"):
-            return self.kind(system, self.at, self.shift)
+            first = Krylov(system, self.at[:1], self.shift)
+            return [first, *(first.beside(point[None]) for point in self.at[1:])]
 
     @property
     def at_rest(self) -> bool:
-        """Whether the point struck lies on a support, where no vector can start."""
-        return bool((self.fine.compliance.diagonal() <= point_load.RESTS).any())
+        """Whether a point struck lies on a support, where no vector can start."""
+        return any(float(one.compliance[0, 0]) <= point_load.RESTS for one in self.fine)
 
-    def needed_modes(self, cutoff: Callable[[Modes, float], float]) -> Modes:
-        """The target as struck; Ritz pairs above ``cutoff`` [Hz], of them and a safety factor, act as a spring."""
-        self.whole, kept = self._struck(self.fine, self.coarse, cutoff)
-        return kept
+    @property
+    def n_dofs(self) -> int:
+        """Number of unknowns of the finer mesh."""
+        return self.fine[0].system.n_dofs
 
-    def _struck(self, fine: Krylov, coarse: Krylov, cutoff: Callable[[Modes, float], float]) -> tuple[Modes, Modes]:
-        """All Ritz pairs, with those of fewer vectors and on a coarser mesh, and the same up to ``cutoff``."""
+    def needed_modes(self, cutoff: Callable[[Modes, float], float], point: int = 0) -> Modes:
+        """The target as struck at a point; Ritz pairs above ``cutoff`` [Hz], of them and a safety factor, are a spring.
+
+        With those of fewer vectors and on a coarser mesh as poorer descriptions.
+        """
+        fine, coarse = self.fine[point], self.coarse[point]
         with self.stages("vectors"):
             found = fine.modes(self.count)
             other = coarse.modes(found.n_modes - fine.system.rigid.shape[1])  # as many vectors on either mesh
         found, target = replace(found, poorer={"mesh": other, **found.poorer}), self.target
         # scaled and damped like modes, although their first is no mode
         found = found.stretched(target.scale.get("mass", found.mass) / found.mass, target.stretch)
-        found = found if target.damping_ratio is None else found.damped(target.damping_ratio)
-        return found, folded(found, cutoff, self.margin)
+        self.whole = found if target.damping_ratio is None else found.damped(target.damping_ratio)
+        return folded(self.whole, cutoff, self.margin)
 
     def improved(self, error: Error, allowed: float) -> bool:
         """Take more vectors or a finer mesh, whichever the error of a blow calls for; False if neither is possible."""
@@ -202,7 +208,7 @@ class Seen:
             # less than 1.4 times as many gain too little for a run, more may overshoot
             self.count, self.margin = min(MOST_VECTORS, round(1.4 * self.count)), NOTCH * self.margin
             return True
-        more = self.fine.system.n_dofs * refinement.COARSER**2
+        more = self.n_dofs * refinement.COARSER**2
         useless = self.spent and error.truncation > allowed
         if error.mesh <= 0.5 * allowed or self.fixed or useless or more > refinement.MOST_UNKNOWNS:
             return False
@@ -212,35 +218,7 @@ class Seen:
 
     def work(self, before: int) -> cost.Work:
         """Work for the next blow, of which ``before`` vectors are known: of all of them on a new mesh."""
-        fine, new = self.fine.system.n_dofs, self.count - before
+        fine, new = self.n_dofs, self.count - before
         if not new:
             return cost.on_mesh(fine, self.count, self.count)
-        return cost.on_mesh(fine, new, self.count) + cost.on_mesh(self.coarse.system.n_dofs, new, self.count)
-
-
-class Krylovs(Krylov):
-    """Vectors of the first point; `each` has those of all points, one after another.
-
-    A map strikes one body again and again: every mesh is factorised once for all its points, and the vectors of each
-    point then cost one solution each.
-    """
-
-    each: list[Krylov]
-    compliance: np.ndarray  # (n_points, n_points) in the frame, diagonal
-
-    def __init__(self, system: System, points: np.ndarray, shift: float) -> None:
-        super().__init__(system, points[:1], shift)
-        self.each = [self, *(self.beside(point[None]) for point in points[1:])]
-        self.compliance = np.diag([float(one.compliance[0, 0]) for one in self.each])
-
-
-class Views(Seen):
-    """`Seen` from several points (n_points, 2) [m]: with the same shift, meshes and number of vectors."""
-
-    fine: Krylovs
-    coarse: Krylovs
-    kind = Krylovs
-
-    def of(self, point: int, cutoff: Callable[[Modes, float], float]) -> Modes:
-        """The target as seen from one of the points; ``cutoff`` as in `needed_modes`."""
-        return self._struck(self.fine.each[point], self.coarse.each[point], cutoff)[1]
+        return cost.on_mesh(fine, new, self.count) + cost.on_mesh(self.coarse[0].system.n_dofs, new, self.count)

@@ -23,7 +23,7 @@ from ..model.budget import FINEST, Budget
 from ..model.by_modes import MOST_MODES
 from ..model.planner import Blow
 from ..model.target import CLOSE, FIRST_FLEXIBLE, FIRST_LOOK, Elements, Stages, Target
-from ..model.vectors import Views
+from ..model.vectors import Seen
 from ..modes.modal import Modes, damping_ratios
 from ..modes.shapes import FieldShapes, SampledShapes
 from .batches import allowed
@@ -31,7 +31,7 @@ from .cells import Case, checked_axes, sampled
 from .inputs import REACH
 
 Axes = Mapping[str, np.ndarray]
-Views_ = Mapping[tuple[float, ...], Modes]
+Views = Mapping[tuple[float, ...], Modes]
 KINDS = kept.kinds(Modes, SampledShapes, left_out={"section"})  # of a file of vectors
 
 
@@ -153,7 +153,7 @@ def by_vectors(
         system.K.data, system.M.data, [frame.length, frame.stiffness, frame.inertia],
     ])  # fmt: skip
     known = None if keep is None else kept.unpack(keep, key, KINDS)
-    views: Views_ | None = None if known is None else known["views"]
+    views: Views | None = None if known is None else known["views"]
     if views is None:
         others = {name: values for name, values in axes.items() if name != "at"}
         rng = np.random.default_rng(0)  # the same map gives the same vectors
@@ -200,7 +200,7 @@ class Sized:
     tolerance: float  # [-]
     max_impacts: int | None = None  # what follows does not matter
     blows: Sequence[Mapping[str, float]] = ()  # values of the axes of those that are struck
-    seen: Views | None = None
+    seen: Seen | None = None
     tried: dict[tuple[int, int], list[float]] = field(default_factory=dict)  # truncation errors of each point and blow
 
     def at(self, modes: Modes, point: np.ndarray, values: Mapping[str, float]) -> Case:
@@ -212,7 +212,7 @@ class Sized:
         wanted = values.get("target_frequency")
         return 1.0 if wanted is None or self.case.first is None else wanted / self.case.first
 
-    def views(self, points: np.ndarray, stages: Stages) -> Views_ | None:
+    def views(self, points: np.ndarray, stages: Stages) -> Views | None:
         """The target as seen from each point (n_points, 2) [m], reduced to it; None if that is impossible."""
         resonance = [self.case.with_values(values).resonance / self.raised(values) for values in self.ends]
         size, mesh = vectors.size_for(self.target, max(resonance), self.tolerance), self.target.mesh
@@ -225,7 +225,7 @@ class Sized:
         for start in range(0, len(points), 8):
             some = points[start : start + 8]
             elements, fixed = Elements(size), self.target.size_stated
-            seen = Views(self.target, some, max(resonance), self.tolerance, elements, fixed, stages)
+            seen = Seen(self.target, some, max(resonance), self.tolerance, elements, fixed, stages)
             if seen.at_rest:
                 return None
             one = replace(self, seen=seen, tried={})
@@ -249,7 +249,7 @@ class Sized:
                 needed.append(limit / self.raised(values))
             return max(needed)
 
-        return self, [self.seen.of(i, partial(cutoff, point)) for i, point in enumerate(self.seen.at)]
+        return self, [self.seen.needed_modes(partial(cutoff, point), i) for i, point in enumerate(self.seen.at)]
 
     def refined(self, error: Error, stages: Stages) -> "Sized | None":
         """The same with more vectors or a finer mesh, whichever the errors of its blows require."""

@@ -101,10 +101,10 @@ def test_mesh_is_refined_when_it_errs_more_than_too_few_vectors_explain(truncati
     """Two meshes with as few vectors differ by what the vectors leave out, too, which no finer mesh mends."""
     seen = seen_at_a_point()
     count, size, fine = seen.count, seen.elements.size, seen.fine
-    assert seen.coarse.system.n_dofs < fine.system.n_dofs
+    assert seen.coarse[0].system.n_dofs < fine[0].system.n_dofs
     assert seen.improved(Error(0.0, truncation, mesh), 1e-3) == (more or finer)
     assert (seen.count > count) == more and (seen.elements.size < size) == finer
-    assert not finer or (seen.coarse is fine and seen.fine.system.n_dofs > fine.system.n_dofs)
+    assert not finer or (seen.coarse is fine and seen.n_dofs > fine[0].system.n_dofs)
 
 
 def test_meshes_are_compared_with_all_vectors():
@@ -114,8 +114,8 @@ def test_meshes_are_compared_with_all_vectors():
     described = {tuple(sorted(lacking)): modes for lacking, modes in found.descriptions().items()}
     assert described.pop(()) is found
     few = int(ritz.FEWER * seen.count)
-    expected = {("mesh",): (seen.coarse, seen.count), ("truncation",): (seen.fine, few)}
-    expected[("mesh", "truncation")] = seen.coarse, few
+    (fine,), (coarse,) = seen.fine, seen.coarse
+    expected = {("mesh",): (coarse, seen.count), ("truncation",): (fine, few), ("mesh", "truncation"): (coarse, few)}
     assert described.keys() == expected.keys()
     for lacking, (mesh, count) in expected.items():
         np.testing.assert_allclose(described[lacking].omega, mesh.pairs(count).omega, rtol=1e-12)  # the same numbers
@@ -309,9 +309,10 @@ def test_each_point_has_the_vectors_that_it_would_have_alone(monkeypatch):
     system, shift, made = plate(near=POINTS), 2e4, []
     once = ritz.factorise
     monkeypatch.setattr(ritz, "factorise", lambda matrix: made.append(1) or once(matrix))
-    shared = vectors.Krylovs(system, POINTS, shift)
+    first = Krylov(system, POINTS[:1], shift)
+    shared = [first, *(first.beside(point[None]) for point in POINTS[1:])]
     assert len(made) == 1
-    for point, found in zip(POINTS, shared.each):
+    for point, found in zip(POINTS, shared):
         alone = Krylov(system, point[None], shift).modes(30, 0.01)
         np.testing.assert_allclose(found.modes(30, 0.01).omega, alone.omega, rtol=1e-12)  # the same operations
         np.testing.assert_allclose(found.modes(30, 0.01).shape_at([point]), alone.shape_at([point]), rtol=1e-9)
@@ -321,11 +322,11 @@ def test_each_point_has_the_vectors_that_it_would_have_alone(monkeypatch):
 def test_views_of_a_body_are_as_soft_as_the_body_is_there():
     """Vectors start with the static deflection under the load, so that the compliance is that of the mesh."""
     target = Target.of(plate(near=POINTS))
-    seen = vectors.Views(target, POINTS, 300.0, 1e-2, Elements(0.03), False, Stages())
+    seen = vectors.Seen(target, POINTS, 300.0, 1e-2, Elements(0.03), False, Stages())
     closed = fi.analytic.closed_form(target.mesh, target.section, {"boundary": "hinged"})(n_modes=20)
     assert not seen.at_rest
     for i, point in enumerate(POINTS):
-        modes = seen.of(i, lambda modes, margin: modes.frequencies[-1])
+        modes = seen.needed_modes(lambda modes, margin: modes.frequencies[-1], i)
         # 1e-5 by the elements that shrink towards the blow
         np.testing.assert_allclose(modes.modal_compliance([point]), closed.shapes.compliance(point[None]), rtol=1e-4)
         assert list(modes.poorer) == ["mesh", "truncation"]
