@@ -4,6 +4,7 @@ import json
 import math
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
+from functools import partial
 from itertools import product
 from pathlib import Path
 from typing import Any
@@ -19,7 +20,7 @@ from ..model.target import Stages
 from ..show import export, figures, plots
 from ..sweeps import cases, grid
 from ..sweeps.borders import PREFIX, read_borders
-from ..sweeps.cells import ALIASES, AXES, LAW, Case, Range, laid_out, logarithmic
+from ..sweeps.cells import ALIASES, AXES, LAW, Case, laid_out, logarithmic
 from .scene import Scene
 from .schema import MAKERS, Part
 
@@ -120,7 +121,7 @@ def _check_slow(scene: Scene, slow: Mapping[str, Any]) -> None:
         if name not in known:
             near = check.nearest(name, [*AXES, *ALIASES, *known])
             raise ValueError(f"{scene.path}: [map] over: {name} is not an axis{near}")
-        if isinstance(values, Range) or (isinstance(values, Mapping) and "count" not in values):
+        if isinstance(values, partial) or (isinstance(values, Mapping) and "count" not in values):
             raise ValueError(f"{scene.path}: [map] over: {name} needs a count, because each value needs another body")
 
 

@@ -3,7 +3,7 @@
 import math
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field, replace
-from functools import reduce
+from functools import partial, reduce
 from typing import Any
 
 import numpy as np
@@ -44,21 +44,8 @@ SIDE = {True: 400, False: 100}
 MOST_VALUES = 10**6  # [-] most values along one axis of a map
 
 
-@dataclass(frozen=True)
-class Range:
-    """An axis whose number of values is not given."""
-
-    low: float
-    high: float
-    log: bool
-
-    def spaced(self, count: int) -> np.ndarray:
-        """Evenly spaced values, (count,)."""
-        return (np.geomspace if self.log else np.linspace)(self.low, self.high, count)
-
-
 def read_axis(name: str, values: Any) -> Any:
-    """Values along an axis from a list, or from a range {from, to, count, scale}; a `Range` if that has no count."""
+    """Values along an axis from a list or a range {from, to, count, scale}; without a count a partial that takes it."""
     if isinstance(values, list):
         return np.array(values)
     if not isinstance(values, Mapping) or not {"from", "to"} <= set(values) <= {"from", "to", "count", "scale"}:
@@ -69,9 +56,9 @@ def read_axis(name: str, values: Any) -> Any:
     log = check.one_of(f"{name}.scale", values.get("scale", "linear"), ("linear", "log")) == "log"
     if log:
         check.positive(f"{name}.from", low), check.positive(f"{name}.to", high)
-    found = Range(low, high, log)
+    found = partial(np.geomspace if log else np.linspace, low, high)
     if "count" in values:
-        return found.spaced(check.count(f"{name}.count", values["count"], high=MOST_VALUES))
+        return found(check.count(f"{name}.count", values["count"], high=MOST_VALUES))
     if not low < high:
         raise ValueError(f"{name}.to must be above {name}.from, got {high:g} and {low:g}")
     return found
@@ -80,24 +67,25 @@ def read_axis(name: str, values: Any) -> Any:
 def laid_out(
     over: Mapping[str, Any], contact: Contact, *, alone: bool = False, cells: int | None = None
 ) -> tuple[dict[str, Any], bool]:
-    """The values along all axes of a map, from values, range or `Range` by name, and whether any of them are ours.
+    """The values along all axes of a map, from values, ranges or what `read_axis` made, and whether any are ours.
 
     ``alone``: all cells are computed alone, whatever the contact. ``cells`` is the number of values along an axis that
     is a range without a count; by default those of SIDE for two such axes, and as many cells in all whatever the axes.
     """
     found = {name: read_axis(name, values) if isinstance(values, Mapping) else values for name, values in over.items()}
-    free = [name for name, values in found.items() if isinstance(values, Range)]
+    free = [name for name, values in found.items() if isinstance(values, partial)]
     if not free:
         return found, False
     names = {ALIASES.get(name, name): values for name, values in found.items()}
     powers = names.get("exponent", [contact.exponent])
-    least = powers.low if isinstance(powers, Range) else check.array("over['exponent']", powers, (None,)).min()
+    powers = powers(2) if isinstance(powers, partial) else powers
+    least = check.array("over['exponent']", powers, (None,)).min()
     alone = alone or least < 1.0 or contact.special
     side = SIDE[not (alone or ALONE & set(names))]
-    given = math.prod(len(np.atleast_1d(values)) for values in found.values() if not isinstance(values, Range))
+    given = math.prod(len(np.atleast_1d(values)) for values in found.values() if not isinstance(values, partial))
     most = int((side**2 / given) ** (1.0 / len(free)))
     count = max(2, min(side, most)) if cells is None else check.count("cells", cells, low=2, high=MOST_VALUES)
-    return {name: values.spaced(count) if name in free else values for name, values in found.items()}, True
+    return {name: values(count) if name in free else values for name, values in found.items()}, True
 
 
 def law_numbers(contact: Contact) -> dict[str, float]:
