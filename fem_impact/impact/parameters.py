@@ -95,7 +95,7 @@ class Parameters(check.Brief):
             found |= {f"{name}.{part}": float(getattr(hit.contacts[c], part)) for part in (*parts, "gap")}
         if self.struck:
             found["strike.speed"] = hit.speed
-            if not self.why_still:
+            if not self.why_no_target and hit.bodies[-1].continuous:
                 found |= {f"strike.{name}": float(x) for name, x in zip("xy", hit.at if hit.at is not None else ())}
         else:
             for b, ends in enumerate(hit.ends):  # of bodies that can move rigidly at their first contact
@@ -162,14 +162,6 @@ class Parameters(check.Brief):
         return ""
 
     @cached_property
-    def why_still(self) -> str:
-        """Why the strike point has no gradient; empty if it has."""
-        target = self.hit.bodies[-1]
-        if self.why_no_target:
-            return self.why_no_target
-        return "" if target.continuous else "the shapes of the target are known at single points only"
-
-    @cached_property
     def why_no_section(self) -> str:
         """Why numbers of section and material have no gradient; empty if they have."""
         if not self.struck:
@@ -211,7 +203,9 @@ class Parameters(check.Brief):
             if home in ("section", "material") or name == "target.scale":
                 reason = reason or self.why_no_section
             elif name in ("strike.x", "strike.y") and self.struck:
-                reason = reason or self.why_still
+                reason = reason or self.why_no_target
+                if not reason and not self.hit.bodies[-1].continuous:
+                    reason = "the shapes of the target are known at single points only"
             elif home == "target" and self.struck:
                 reason = reason or self.why_no_target
             if reason:

@@ -113,8 +113,8 @@ class Striker(check.Brief):
             if shape[: self.modes.n_rigid] @ coming <= 0.0:
                 raise ValueError("arrival must move the contact point towards the struck body")
         check.lock_arrays(self)
-        check.settle(self, aslant=check.flag("aslant", self.aslant))
-        check.settle(self, gravity=check.non_negative("gravity", self.gravity, "m/s^2"))
+        gravity = check.non_negative("gravity", self.gravity, "m/s^2")
+        check.settle(self, aslant=check.flag("aslant", self.aslant), gravity=gravity)
         if self.gravity:
             replace(self, gravity=0.0)._check_free("fall")
         if self.hand is not None:

@@ -151,7 +151,7 @@ def spread(
     values = drawn(inputs, points, mixer)
     if not np.isfinite(values).all() or np.abs(values).max() > REACH:
         raise ValueError(f"vary must stay finite and below {REACH:g}; choose distributions with shorter tails")
-    asked = _SpreadAsked(blow, told, inputs, values, limit, grid.kept_beside(store))
+    asked = _SpreadAsked(blow, told, inputs, values, limit, store)
     exact = replace(asked.cases(), band=band)
     base, rough = exact.base, few(exact)
     numbers, texts = solve_all(rough, workers, client, store, watch)
@@ -191,7 +191,7 @@ class _SpreadAsked:
     inputs: Sequence[Input]
     values: np.ndarray  # (n_cases, n_inputs)
     tolerance: float
-    keep: Path | None
+    store: str | Path | None
     own: dict[str, np.ndarray] = field(default_factory=dict)  # what `_sort` finds: axis of a map -> values
     body: dict[str, np.ndarray] = field(default_factory=dict)  # input of the body -> value over its own [-]
     parts: dict[str, np.ndarray] = field(default_factory=dict)  # other number of the scene -> values
@@ -279,7 +279,7 @@ class _SpreadAsked:
                 raise _below(each.name, axes[axis])
         try:
             base, _ = bodies.body_of(
-                blow, ends or {"speed": np.array([speed])}, tolerance=self.tolerance, keep=self.keep,
+                blow, ends or {"speed": np.array([speed])}, tolerance=self.tolerance, store=self.store,
                 alone=residual and not self.places,
             )  # fmt: skip
         except ValueError as error:  # what is wrong with an axis is told of the inputs

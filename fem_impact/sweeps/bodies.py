@@ -41,16 +41,17 @@ def body_of(
     *,
     tolerance: float,
     alone: bool = True,
-    keep: Path | None = None,
+    store: str | Path | None = None,
     stages: Stages | None = None,
 ) -> tuple[Case, dict[str, np.ndarray]]:
     """The blow that all cells of a map share, on a body described as well as its cells need, and the map's axes.
 
     A body given by its modes keeps them. ``over`` and ``tolerance`` as in `sweep`. ``alone``: only the numbers of the
-    blows are wanted, with the residual compliance; otherwise modes are found. ``keep`` is an .npz file that saves the
+    blows are wanted, with the residual compliance; otherwise modes are found. A file beside a ``store`` keeps the
     vectors or the modes; the same map later reads them from there.
     """
     target, stages = blow.target, stages or Stages()
+    keep = None if store is None else Path(store).with_name(f"{Path(store).name}.modes.npz")
     speed = check.positive("speed", blow.arguments["speed"], "m/s", reach=REACH)
 
     def started(modes: Modes) -> Case:
@@ -133,8 +134,8 @@ def by_vectors(
 ) -> Case | None:
     """The blow on Ritz vectors that carry every cell of a map; None if no mesh allowed or a point struck forbids it.
 
-    ``target`` as of `vectors.usable`, ``case`` on any modes of it, ``axes`` as of `cells.checked_axes`, ``keep`` as of
-    `body_of`. Vectors and mesh may take what the time steps leave of the tolerance of every cell. The shortest contact
+    ``target`` as of `vectors.usable`, ``case`` on any modes of it, ``axes`` as of `cells.checked_axes`, ``keep`` a
+    file. Vectors and mesh may take what the time steps leave of the tolerance of every cell. The shortest contact
     of all cells chooses shift and first mesh. A few cells, those of the shortest and the longest contact among them,
     are struck with all vectors, with fewer and on a coarser mesh; the errors decide on more vectors or a finer mesh, as
     that of a single blow does.

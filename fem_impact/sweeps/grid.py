@@ -76,8 +76,7 @@ class Job:
     ) -> tuple[Case, dict[str, Any]]:
         """The blow on a body described as the map needs it, and the map's axes; as `bodies.body_of`."""
         alone = self.residual and not self.layers
-        keep = kept_beside(self.store)
-        return bodies.body_of(blow, over, tolerance=self.tolerance, alone=alone, keep=keep, stages=stages)
+        return bodies.body_of(blow, over, tolerance=self.tolerance, alone=alone, store=self.store, stages=stages)
 
     def solved(self, cases: Cases, turn: str = "") -> tuple[np.ndarray, Texts]:
         """Compute all cases; those of a round with a name are kept in a folder of the store."""
@@ -233,11 +232,6 @@ def sweep(
     max_cells = check.number("max_cells", max_cells)
     admit(n_cells, len(LAYERS) + len(job.layers), max_cells, quick=not job.layers, tell=tell)
     return compute_map(base, axes, job)
-
-
-def kept_beside(store: str | Path | None) -> Path | None:
-    """File beside a store that keeps what was found of the struck body."""
-    return None if store is None else Path(store).with_name(f"{Path(store).name}.modes.npz")
 
 
 def compute_map(base: Case, axes: Mapping[str, np.ndarray], job: Job) -> xarray.Dataset:
