@@ -2,6 +2,7 @@
 
 import difflib
 import functools
+import html
 import importlib
 import inspect
 import math
@@ -15,7 +16,6 @@ from typing import Any, TypeVar, get_args, get_origin
 
 import numpy as np
 
-from . import markup
 from .explained import pointed, printable
 
 REACH = 1e75  # [-] largest number accepted; 1 / REACH is the smallest: the fourth power of both still fits a float
@@ -389,7 +389,8 @@ class Brief:
     """
 
     def _repr_html_(self) -> str:
-        return markup.paragraphs(getattr(self, "summary", self.__str__)().splitlines())
+        text = "\n".join(getattr(self, "summary", self.__str__)().splitlines())
+        return f'<pre style="white-space:pre-wrap">{html.escape(text)}</pre>'
 
     def __repr__(self) -> str:
         parts = []

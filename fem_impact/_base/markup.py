@@ -48,11 +48,6 @@ def note_list(lines: Iterable[str]) -> str:
     return "".join(f"<p>{html.escape(line)}</p>" for line in noted(lines))
 
 
-def paragraphs(lines: Iterable[str]) -> str:
-    """Lines of text as they are; all text is escaped."""
-    return f'<pre style="white-space:pre-wrap">{html.escape(chr(10).join(lines))}</pre>'
-
-
 def data_uri(kind: str, raw: bytes) -> str:
     """An address that holds the bytes of a file of a media type."""
     return f"data:{kind};base64,{base64.b64encode(raw).decode('ascii')}"
