@@ -116,7 +116,7 @@ class Striker(check.Brief):
         gravity = check.non_negative("gravity", self.gravity, "m/s^2")
         check.settle(self, aslant=check.flag("aslant", self.aslant), gravity=gravity)
         if self.gravity:
-            replace(self, gravity=0.0)._check_free("fall")
+            self._check_free("fall")
         if self.hand is not None:
             check.instance("hand", self.hand, Hand)
             if self.modes.n_rigid != 1:

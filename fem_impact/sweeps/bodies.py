@@ -88,9 +88,6 @@ def corners(axes: Axes) -> list[dict[str, Any]]:
     return [dict(zip(axes, chosen)) for chosen in product(*ends)]
 
 
-# --- modes -----------------------------------------------------------------------------------------------------------
-
-
 def _by_modes(target: Target, case: Case, axes: Axes, tolerance: float, keep: Path | None) -> Case:
     """The blow on as many modes as the shortest contact of the map needs."""
     modes = case.modes
@@ -124,9 +121,6 @@ def needed_frequency(case: Case, tolerance: float) -> float:
 def number_of_modes(first: Modes, frequency: float) -> int:
     """Approximate number of modes up to a frequency [Hz], from the first modes by Weyl's law."""
     return math.ceil(1.1 * first.n_modes * (frequency / first.frequencies[-1]) ** (0.5 * first.dimension))
-
-
-# --- Ritz vectors ----------------------------------------------------------------------------------------------------
 
 
 def by_vectors(

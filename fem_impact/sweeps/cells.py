@@ -180,9 +180,10 @@ def sampled(modes: Modes, points: np.ndarray) -> Modes:
     if modes.unstated:
         error = np.concatenate([estimated(modes.shapes, point[None])["compliance"] for point in points])
         rest = np.column_stack([np.zeros(len(points)), error])  # nothing between the points, as in the compliance
-    known = SampledShapes(points, modes.shape_at(points), np.diag(static), None, rest, modes.shapes.loose(points))
-    known = replace(known, sideways=modes.shapes.across(points), doubt=modes.shapes.spread(points))
-    known = replace(known, dents=dents if dents.any() else None)
+    known = SampledShapes(
+        points, modes.shape_at(points), np.diag(static), rest=rest, rigid=modes.shapes.loose(points),
+        doubt=modes.shapes.spread(points), dents=dents if dents.any() else None, sideways=modes.shapes.across(points),
+    )  # fmt: skip
     return replace(modes, shapes=known, poorer=poorer)
 
 
