@@ -344,24 +344,18 @@ class _Game:
                 "duration": None if np.isinf(until) else until - self.now,
                 "max_impacts": 1 if any(lift <= self.now for lift in lifts) else None,
             }
-            if not lifts:
-                self._keep(self._alone(), ())
-            else:
-                try:
-                    self._blow(fresh, {**rule, **limit})
-                except SimulationError as problem:
-                    raise SimulationError(
-                        f"stroke {' and '.join(map(str, on))} at {self.now:.4g} s: {problem}"
-                    ) from None
+            try:
+                hit = self._blow(fresh, {**rule, **limit}) if lifts else self._alone()
+            except SimulationError as problem:
+                raise SimulationError(f"stroke {' and '.join(map(str, on))} at {self.now:.4g} s: {problem}") from None
+            who = tuple(stick.number for stick in self.sticks)
+            LOG.info("stroke %s at %.4g s: %d impacts", " and ".join(map(str, who)) or "none", self.now, hit.n_impacts)
+            self.starts.append(self.now)
+            self.hits.append(hit)
+            self.who.append(who)
             over = self.hits[-1].history.status in (record.FINISHED, record.SETTLED)
             if (over and not to_come) or not self._go_on(until, over):
                 return
-
-    def _keep(self, hit: Response, who: tuple[int, ...]) -> None:
-        LOG.info("stroke %s at %.4g s: %d impacts", " and ".join(map(str, who)) or "none", self.now, hit.n_impacts)
-        self.starts.append(self.now)
-        self.hits.append(hit)
-        self.who.append(who)
 
     def _go_on(self, until: float, over: bool) -> bool:
         """Move on to where the last blow ended; False if nothing follows."""
@@ -385,7 +379,7 @@ class _Game:
         self.sticks = found
         return bool(np.isfinite(self.now))
 
-    def _blow(self, fresh: list[int], rule: dict[str, Any]) -> None:
+    def _blow(self, fresh: list[int], rule: dict[str, Any]) -> Response:
         """Run the strikers still on the body together with those that arrive now."""
         if not self.sticks and len(fresh) == 1:
             one = self.played[fresh[0]]
@@ -416,7 +410,7 @@ class _Game:
             movers = (*(stick.striker for stick in sticks), self.modes)
             hit = planner.struck(partial(collision.met, movers, touches, start=start), rule)
             self.sticks = sticks
-        self._keep(hit, tuple(stick.number for stick in self.sticks))
+        return hit
 
     def _arriving(self, number: int, rule: dict[str, Any]) -> _Stick:
         """A striker at the surface, wherever that is now, with the modes that it needs."""
