@@ -115,9 +115,20 @@ class Contact(Numbers):
         for name in ("material", "radius"):
             if getattr(sphere, name, None) is None:
                 raise ValueError(f"sphere must be made by Striker.sphere, got {check.shown(sphere)} without {name}")
-        flat = getattr(plate, "material", plate)
-        compliance = pressed_compliance(*_isotropic("sphere", sphere.material))
-        compliance += pressed_compliance(*_isotropic("plate", flat))
+        compliance = 0.0
+        for name, material in (("sphere", sphere.material), ("plate", getattr(plate, "material", plate))):
+            E, nu = getattr(material, "E", None), getattr(material, "nu", None)
+            if getattr(material, "E_across", None) is not None:
+                raise ValueError(
+                    f"{name} must be isotropic, because the contact of an orthotropic body depends on its stiffness "
+                    "across the thickness; give fi.Material with that E instead, or use Contact.hertz with a measured "
+                    "stiffness"
+                )
+            if not isinstance(E, (int, float)) or not isinstance(nu, (int, float)):
+                raise ValueError(
+                    f"{name} must have an isotropic material (E, nu), got {check.shown(material)}; use Contact.hertz"
+                )
+            compliance += pressed_compliance(float(E), float(nu))
         law = cls(hertz_stiffness(compliance, sphere.radius), 1.5, loss, gap)
         if yield_strength is None:
             return law
@@ -186,20 +197,6 @@ def pressed_compliance(E: float, nu: float) -> float:
 def hertz_stiffness(compliance: float, radius: float) -> float:
     """Stiffness [N/m**1.5] of a contact of two bodies of that compliance [1/Pa] together and a radius [m]."""
     return 4.0 / 3.0 / compliance * float(np.sqrt(radius))
-
-
-def _isotropic(name: str, material: Any) -> tuple[float, float]:
-    E, nu = getattr(material, "E", None), getattr(material, "nu", None)
-    if getattr(material, "E_across", None) is not None:
-        raise ValueError(
-            f"{name} must be isotropic, because the contact of an orthotropic body depends on its stiffness across the "
-            "thickness; give fi.Material with that E instead, or use Contact.hertz with a measured stiffness"
-        )
-    if not isinstance(E, (int, float)) or not isinstance(nu, (int, float)):
-        raise ValueError(
-            f"{name} must have an isotropic material (E, nu), got {check.shown(material)}; use Contact.hertz"
-        )
-    return float(E), float(nu)
 
 
 def sunk(law: np.ndarray, memory: np.ndarray, left: np.ndarray) -> np.ndarray:

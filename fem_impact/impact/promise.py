@@ -56,21 +56,15 @@ def _missing(hit: "Response") -> str:
 
 def remedy(hit: "Response") -> str:
     """What would meet the tolerance."""
-    error = hit.error
-    allowed = SHARE * hit.tolerance
+    error, allowed, unstated = hit.error, SHARE * hit.tolerance, _unstated(hit)
     advice: list[str] = []
     if error.truncation > allowed or not error.resolvable:
-        loose = [name for name, missing in _unstated(hit) if "free" in missing]
-        dented = any("dent" in missing for _, missing in _unstated(hit))
-        more = [] if dented else _more_modes(hit)
+        loose = [name for name, missing in unstated if "free" in missing]
+        more = [] if any("dent" in missing for _, missing in unstated) else _more_modes(hit)
         advice += [f"make {name} with free = True or False, as it is" for name in loose] or more
-        advice += [
-            f"{ADVICE[each]} of {name}" for name, missing in _unstated(hit) for each in ADVICE if each in missing
-        ]
+        advice += [f"{ADVICE[each]} of {name}" for name, missing in unstated for each in ADVICE if each in missing]
     if error.measurement > allowed:
-        advice += [
-            f"measure longer or cleaner responses of {name}" for name, told in _unstated(hit) if "shapes" in told
-        ]
+        advice += [f"measure longer or cleaner responses of {name}" for name, told in unstated if "shapes" in told]
     if error.idealisation > allowed:
         advice.append("give target = 'modal'")
     if error.mesh > allowed:

@@ -232,31 +232,18 @@ def _in_pieces(
 
 
 def _follow(blows: Blows, tolerance: float, band: float, kernels: Kernels) -> tuple[np.ndarray, ...]:
-    """The columns of `Bounces` for some blows."""
-    engine = _Engine(blows, band, kernels)
-    final, error = _refined(engine, min(tolerance, COUNTED))
-    v = blows.speed
-    return (
-        final[FOUND_IMPACTS], final[FOUND_TIME], final[FOUND_IMPULSE] * engine.own_rigid - 1.0,
-        final[FOUND_IMPULSE] * v, final[FOUND_PEAK] * v, error, final[FOUND_CENTROID], ~np.isnan(error),
-    )  # fmt: skip
-
-
-def _refined(engine: "_Engine", tolerance: float) -> tuple[np.ndarray, np.ndarray]:
-    """Result of `_Engine.run_all` once the steps are short enough, and its error; NaN if they never are.
+    """The columns of `Bounces` for some blows: once the steps are short enough, NaN if they never are.
 
     Neither are they of a blow too long for the longest kernel: shorter steps only make it longer.
     """
-    n = engine.blows.n_cases
+    engine, tolerance, todo = _Engine(blows, band, kernels), min(tolerance, COUNTED), np.arange(blows.n_cases)
     first = engine.first_step(tolerance)
-    todo = np.arange(n)
     coarse = engine.run_all(todo, first - 2)
     # [half-octaves] half the step seldom does, a quarter mostly; not with loss, where errors fall more slowly, nor
     # where the longest kernel would not leave room for more
-    finer = np.where((engine.blows.loss > 0.0) | (16.0 * coarse[FOUND_STEPS] > LENGTHS[-1]), 2, 4)
+    finer = np.where((blows.loss > 0.0) | (16.0 * coarse[FOUND_STEPS] > LENGTHS[-1]), 2, 4)
     step = first - 2 + finer
-    error = np.full(n, np.nan)
-    final = np.full_like(coarse, np.nan)
+    error, final = np.full(blows.n_cases, np.nan), np.full_like(coarse, np.nan)
     for _ in range(REFINEMENTS):
         fits = coarse[FOUND_STATUS] != many_blows.LONG
         coarse, todo, step, finer = coarse[:, fits], todo[fits], step[fits], finer[fits]
@@ -274,7 +261,11 @@ def _refined(engine: "_Engine", tolerance: float) -> tuple[np.ndarray, np.ndarra
         # halving always leaves 13 % of stiff blows at 3e-5 undone instead of 8 %, never a third of those with loss
         finer = np.where(found[~met] < 8.0 * allowed(tolerance), 1, 2)
         step = step[~met] + finer
-    return final, error
+    v = blows.speed
+    return (
+        final[FOUND_IMPACTS], final[FOUND_TIME], final[FOUND_IMPULSE] * engine.own_rigid - 1.0,
+        final[FOUND_IMPULSE] * v, final[FOUND_PEAK] * v, error, final[FOUND_CENTROID], ~np.isnan(error),
+    )  # fmt: skip
 
 
 def _counted(blows: Blows, tolerance: float, most: int, kernels: Kernels) -> tuple[np.ndarray]:
