@@ -187,22 +187,16 @@ def integrate_shapes(body: Known) -> Bending:
         every[4, low.stop :] = np.median(found[4])
     wave = np.sqrt(np.maximum(every[0], 0.0) * body.per_extent)
     rest: Any = every[2:] if thick else (None, None, None)
-    turning = _turning(body) if thick and n_rigid else None
+    turning = None
+    if thick and n_rigid and body.section is not None:
+        points, cells = modes.shapes.grid()
+        if (masses := lumps(points, cells)) is not None:
+            pairs, weight = masses
+            rotary = body.extent * float(weight @ body.section.rotary(points[pairs].mean(axis=1)))
+            level = np.column_stack([np.ones(len(points)), points])
+            slope = np.linalg.lstsq(level, modes.shapes.take(n_rigid).at(points), rcond=None)[0][1:]
+            turning = rotary * slope.T @ slope
     return Bending(wave, every[0], every[1], rest[0], rest[1], rest[2], turning)
-
-
-def _turning(body: Known) -> np.ndarray | None:
-    """Rotary inertia of the rigid motions of a thin body over their inertia, (n_rigid, n_rigid) [-]."""
-    modes, section = body.modes, body.section
-    points, cells = modes.shapes.grid()
-    found = lumps(points, cells)
-    if found is None or section is None:
-        return None
-    pairs, weight = found
-    rotary = body.extent * float(weight @ section.rotary(points[pairs].mean(axis=1)))
-    level = np.column_stack([np.ones(len(points)), points])
-    slope = np.linalg.lstsq(level, modes.shapes.take(modes.n_rigid).at(points), rcond=None)[0][1:]
-    return rotary * slope.T @ slope
 
 
 def _plate(system: System, vectors: np.ndarray, thick: bool) -> np.ndarray:
