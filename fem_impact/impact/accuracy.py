@@ -34,6 +34,11 @@ def contact_resonance(contact: Contact, mass: float, speed: float) -> float:
     return 0.5 / contact_duration(contact, mass, speed)
 
 
+def number_of_modes(modes: Modes, frequency: float) -> float:
+    """About how many modes a body has up to a frequency [Hz]; Weyl's law tells that on average, so a tenth is added."""
+    return 1.1 * modes.n_modes * (frequency / modes.frequencies[-1]) ** (0.5 * modes.dimension)
+
+
 def resonant_stiffness(mass: Any, resonance: Any) -> Any:
     """Stiffness [N/m] of the linear contact that gives a mass [kg] a contact resonance [Hz]."""
     return mass * (2.0 * np.pi * resonance) ** 2

@@ -147,5 +147,4 @@ def _modes_needed(hit: "Response", body: int) -> float:
         if hit.error.resolvable and hit.error.truncation > allowed:
             power = accuracy.order_of(law.exponent)[0] + (0.5 if modes.dimension == 1 else 0.0)
             needed = max(needed, modes.frequencies[-1] * (hit.error.truncation / allowed) ** (1.0 / power))
-    # Weyl's law counts modes only on average, so a tenth is added
-    return 1.1 * modes.n_modes * (needed / modes.frequencies[-1]) ** (0.5 * modes.dimension)
+    return accuracy.number_of_modes(modes, needed)

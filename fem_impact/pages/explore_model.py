@@ -1,5 +1,6 @@
 """Strikes one scene with other hammers, contacts and strike points, fast enough to follow a slider."""
 
+import math
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
@@ -72,7 +73,8 @@ class Setup:
         if setup.by_vectors:
             return setup
         hard = replace(setup.start, stiffness=SPANS["stiffness"] ** 0.5, mass=setup.start.mass / SPANS["mass"] ** 0.5)
-        needed = bodies.number_of_modes(first, bodies.needed_frequency(setup.case(hard), setup.tolerance))
+        limit = bodies.needed_frequency(setup.case(hard), setup.tolerance)
+        needed = math.ceil(accuracy.number_of_modes(first, limit))
         if needed <= first.n_modes:
             return setup
         plan = plan or scene.plan(target="modal", n_modes=FIRST_LOOK)

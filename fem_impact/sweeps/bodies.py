@@ -97,7 +97,7 @@ def _by_modes(target: Target, case: Case, axes: Axes, tolerance: float, keep: Pa
     )
     if needed <= modes.frequencies[-1]:
         return case
-    number, most = number_of_modes(modes, needed), MOST_MODES[target.kind]
+    number, most = math.ceil(accuracy.number_of_modes(modes, needed)), MOST_MODES[target.kind]
     if number > most:
         raise check.SimulationError(
             f"the shortest blow of the map needs about {number} modes, at most {most} are allowed; leave out the "
@@ -116,11 +116,6 @@ def needed_frequency(case: Case, tolerance: float) -> float:
         case.modes, case.at, contact=case.contact, mass=case.striker.felt_mass, speed=case.speed,
         tolerance=Budget(tolerance).half,
     )  # fmt: skip
-
-
-def number_of_modes(first: Modes, frequency: float) -> int:
-    """Approximate number of modes up to a frequency [Hz], from the first modes by Weyl's law."""
-    return math.ceil(1.1 * first.n_modes * (frequency / first.frequencies[-1]) ** (0.5 * first.dimension))
 
 
 def by_vectors(
