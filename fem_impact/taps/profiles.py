@@ -169,10 +169,10 @@ class _Climb:
         step = min(0.8 * self.target * spread, 0.25 * (high - low))
         for _ in range(HALVINGS):  # most profiles end after two steps
             here = float(x[self.j])
-            if step < SAME * max(1.0, abs(here)):
-                break
             ended = sign * (here + sign * step - bound) >= -1e-9 * abs(bound)
             step = abs(bound - here) if ended else step
+            if step < SAME * max(1.0, abs(here)):
+                break
             start = np.clip(x + sign * step * slope, *self.bounds)
             try:
                 moved = self._solve(start, (self.j,))

@@ -267,16 +267,18 @@ def table(path: Path) -> Recording:
     width, use = len(row), [i for i, cell in enumerate(row) if cell]
     if width > MOST_CHANNELS:
         raise ValueError(f"{path.name} has {width} columns; at most {MOST_CHANNELS} can be read")
-    heads = [_cells(line, separator) for line in lines[:start]]
-    heads = [cells for cells in heads if len(cells) == width and any(cells)]
-    if not heads and commented:  # a heading behind a sign of comment, as numpy.savetxt writes it
-        said = [line.lstrip(" #%/") for line in whole[: whole.index(lines[start])] if line not in lines]
-        heads = [cells for cells in (_cells(line, separator) for line in said) if len(cells) == width]
+    said = [line.lstrip(" #%/") for line in whole[: whole.index(lines[start])] if line not in lines]
+    for above in (lines[:start], said if commented else []):  # a comment may be a heading, as numpy.savetxt writes it
+        heads = [[line.strip(' "')] if width == 1 else _cells(line, separator) for line in above]
+        heads = [cells for cells in heads if len(cells) == width and any(cells)]
+        if heads:
+            break
     names, unit = [f"column {i + 1}" for i in range(width)], [""] * width
     if heads:
         names, unit = map(list, zip(*map(units.label, heads[-1])))
-        if len(heads) > 1 and sum(units.known(cell.strip("[]() ")) is not None for cell in heads[-1]) > 0:
-            (names, before), unit = map(list, zip(*map(units.label, heads[-2]))), [c.strip("[]() ") for c in heads[-1]]
+        last = [cell.strip("[]() ") for cell in heads[-1]]
+        if len(heads) > 1 and (any(map(units.known, last)) or all(map(units.stated, filter(None, last)))):
+            (names, before), unit = map(list, zip(*map(units.label, heads[-2]))), last
             for name, one, other in zip(names, before, unit):
                 if one and other and units.known(one) != units.known(other):
                     raise ValueError(f"{path.name} states two units for {name!r}, {one!r} and {other!r}")
@@ -486,8 +488,9 @@ def universal(path: Path) -> Recording:
             notes.append(f"{key[0]}: brought to {kind} by data set 164")
         unit[key] = stated if known or not kind else kind
         channels.setdefault(key, []).append(data)
-        step = float(one.get("abscissa_inc") or 0.0)
-        rates.append(1.0 / step if step > 0.0 else _rate(path, np.asarray(one["x"], float)))
+        second = TIME_UNITS.get(str(one.get("abscissa_axis_units_lab") or "").strip(), 1.0)
+        step = second * float(one.get("abscissa_inc") or 0.0)
+        rates.append(1.0 / step if step > 0.0 else _rate(path, second * np.asarray(one["x"], float)))
     if not np.allclose(rates, rates[0], rtol=1e-6):
         raise ValueError(f"{path.name} has records of different rates, {min(rates):g} and {max(rates):g} Hz")
     count = min(len(records) for records in channels.values())

@@ -168,14 +168,16 @@ def cut(
     if len(places) > 10_000:  # they are noise
         raise ValueError(f"{name} has {len(places)} places above {limit:.3g} N; give trigger= and together=")
     # 20 ms tell the offset, more may reach back to the last tap's ringing
-    wanted = 0.02 if before is None else check.positive("before", before, "s")
+    longest = np.inf if length is None else check.positive("length", length, "s")
+    wanted = min(0.02, 0.25 * longest) if before is None else check.positive("before", before, "s")
+    if wanted >= longest:
+        raise ValueError(f"length must be longer than before, {wanted:g} s, got {longest:g} s")
     rooms = np.array([place[2:] for place in places])
     needs = np.array([pulse_reach(moved[k], *place) for k, *place in places])
     least, n_whole = most_whole(rooms[:, 0], np.maximum(needs[:, 0], FEWEST))
     least = least if 2 * n_whole > len(places) else most_whole(rooms[:, 0], needs[:, 0])[0]
     lead = min(round(wanted * rate), least if before is None else 10**9)
-    longest = None if length is None else round(check.positive("length", length, "s") * rate)
-    tail = most_whole(rooms[:, 1], needs[:, 1])[0] if longest is None else max(1, longest - lead)
+    tail = most_whole(rooms[:, 1], needs[:, 1])[0] if length is None else max(1, round(longest * rate) - lead)
     tail = min(tail, round(LONGEST * rate))
     rows, responses, labels, notes, offsets, tops, drift = [], [], [], [], [], [], 0.0
     if without := [str(k + 1) for k in range(len(segments)) if k not in {place[0] for place in places}]:

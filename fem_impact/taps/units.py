@@ -17,9 +17,10 @@ FORCE_NAMES = re.compile(r"force|hammer|kraft|excit|\bexc\b|input|^f$", re.IGNOR
 RESPONSE_NAMES = re.compile(r"accel|resp|veloc|displ|vibro|^a\d*$|^acc", re.IGNORECASE)
 OTHERS = (  # not known by `known`: such a channel needs a scale
     "V", "mV", "uV", "µV", "kV", "pC", "A", "mA", "counts", "count", "LSB", "bits", "digits", "%", "dB", "Hz", "kHz",
-    "s", "ms", "us", "µs", "ns", "min", "h", "-", "a.u.",
+    "s", "ms", "us", "µs", "ns", "min", "h", "-", "a.u.", "kg",
 )  # fmt: skip
-LABEL = re.compile(r"^(.*?)\s*[\[(]([^\])]*)[\])]\s*$")  # "Force [N]", "Force (N)"
+# "Force [N]", "Force (N)", "Force / N", "Force in N", "Force, N", "F/N", "a/(m/s^2)"; but "velocity m/s" is a name
+LABEL = re.compile(r"^(.*?)(?:\s*[\[(]|\s+(?:/|in)\s+|,\s+|(?<=^\w)/\(?)([^\])]*)[\])]?$")
 
 
 def known(unit: str) -> tuple[str, float] | None:
@@ -30,9 +31,14 @@ def known(unit: str) -> tuple[str, float] | None:
     return next(((si, factor) for fold in folds for name, si, factor in every if fold(name) == fold(text)), None)
 
 
+def stated(text: str) -> bool:
+    """Whether a text is a unit, known or not."""
+    return known(text) is not None or text in OTHERS
+
+
 def label(text: str) -> tuple[str, str]:
     """Name and unit of a heading such as "Force [N]"; a bracket that holds no unit stays in the name."""
     found = LABEL.match(text.strip())
-    if found and (known(found[2]) or found[2].strip() in OTHERS):
-        return found[1].strip(), found[2].strip()
+    if found and stated(found[2].strip()) and not stated(text):
+        return found[1].rstrip(" /"), found[2].strip()
     return text.strip(), ""

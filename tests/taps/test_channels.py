@@ -24,9 +24,11 @@ def test_known_units(text, wanted):
 @pytest.mark.parametrize(
     "heading, wanted",
     [("Hammer [mV]", ("Hammer", "mV")), ("Force [N]", ("Force", "N")), ("Hammer (lbf)", ("Hammer", "lbf")),
-     ("Force (Trigger)", ("Force (Trigger)", ""))],
+     ("Force (Trigger)", ("Force (Trigger)", "")), ("Kraft / kN", ("Kraft", "kN")), ("F/kN", ("F", "kN")),
+     ("a/(m/s²)", ("a", "m/s²")), ("Zeit in ms", ("Zeit", "ms")), ("Force, lbf", ("Force", "lbf")),
+     ("load [kg]", ("load", "kg")), ("velocity m/s", ("velocity m/s", "")), ("m/s", ("m/s", ""))],
 )  # fmt: skip
-def test_brackets_of_a_heading_are_its_unit_if_they_hold_one(heading, wanted):
+def test_a_heading_ends_with_its_unit_if_it_holds_one(heading, wanted):
     assert units.label(heading) == wanted
 
 

@@ -56,6 +56,11 @@ def test_the_interval_of_a_gaussian_is_students():
         assert np.allclose(parabola().interval(level), [2.0 - half, 2.0 + half], rtol=1e-4)
 
 
+def test_a_best_fit_at_the_end_of_its_range_is_followed_one_way_only():
+    profile = Known(lambda a: 2.0 + a, low=-1.0).profile(-1.0)
+    assert profile.values.min() == -1.0 < profile.interval()[1] < 10.0 and profile.open == (True, False)
+
+
 def test_open_ends_are_the_ends_of_the_range():
     flat = parabola(open_=(True, True), width=100.0)
     assert flat.interval() == (1.0, 3.0) and flat.told == "open"

@@ -70,6 +70,16 @@ def test_commas_that_are_none_separate_columns(tmp_path, text):
     assert recording(tmp_path / "t.csv")[-1].shape == (20, 4)
 
 
+@pytest.mark.parametrize(
+    "text, unit",
+    [("Hammer force [kN]\n" + "1\n" * 20, ["kN"]), ("# Force [kN]\n" + "1\n" * 20, ["kN"]),
+     ("Channel A,Channel B\n(kV),(mV)\n" + "1,2\n" * 20, ["kV", "mV"])],
+)  # fmt: skip
+def test_a_single_column_has_its_heading_and_a_row_of_units_may_hold_no_mechanical_one(tmp_path, text, unit):
+    (tmp_path / "t.csv").write_text(text)
+    assert recording(tmp_path / "t.csv")[0] == unit
+
+
 def test_a_row_of_units_and_a_rate_by_hand(tmp_path):
     path = table(tmp_path / "t.txt", "Hammer;Accel\nlbf;m/s^2\n", (FORCE / 4.4482216152605, ACCELERATION), ";")
     with pytest.raises(ValueError, match="rate must be given"):
@@ -269,6 +279,8 @@ def universal(path, *changes, before=()):
 def test_force_and_acceleration_of_one_point_stay_apart_in_a_universal_file(tmp_path, change):
     units, rate, _, values = recording(universal(tmp_path / "t.uff", change, MOVES | change))
     assert (units, rate) == (["N", "m/s^2"], RATE) and values[10].tolist() == [10.0, 20.0]
+    milliseconds = change | {"abscissa_axis_units_lab": "ms"}
+    assert recording(universal(tmp_path / "t.uff", milliseconds, MOVES | milliseconds))[1] == 1e3 * RATE
 
 
 @UNCLOSED

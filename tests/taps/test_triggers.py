@@ -125,6 +125,13 @@ def test_drift_is_told_and_a_missing_rest(record, said, told):
     assert told == (said in cut(**record)[1])
 
 
+def test_a_short_record_holds_its_tap_and_not_only_what_was_before():
+    rows, said = cut(slice(2000, 2005), length=0.016)
+    assert rows.shape == (1, 16) and rows.max() == 10.0 and "within a pulse" not in said
+    with pytest.raises(ValueError, match=r"length must be longer than before, 0\.02 s, got 0\.016 s"):
+        cut(slice(2000, 2005), length=0.016, before=0.02)
+
+
 def test_a_record_lasts_ten_seconds_at_most():
     assert cut(slice(100, 105), 30_000)[0].shape[1] == 10_000 + 20  # and 0.02 s before the tap
 
