@@ -237,7 +237,8 @@ def joined(parts: Sequence[ReducedBody], laws: Sequence[Contact]) -> KernelSyste
             offset[first] += sign * part.rest[0, 0] * part.force
     for part, form in zip(parts, forms):
         if form.size:
-            above, damping = rest_mode(part.points.shape[1], part.omega[-1], part.zeta[-1], lossy)
+            pushed = np.square(part.rows).sum() / part.rest.trace()
+            above, damping = rest_mode(part.points.shape[1], part.omega[-1], part.zeta[-1], lossy, pushed)
             for shares in form.T:
                 held = np.zeros(2)
                 for (i, sign), share, force in zip(part.touched, shares, part.pressed):
@@ -251,12 +252,15 @@ def joined(parts: Sequence[ReducedBody], laws: Sequence[Contact]) -> KernelSyste
     return found
 
 
-def rest_mode(dimension: int, omega: float, zeta: float, lossy: bool) -> tuple[float, float]:
+def rest_mode(dimension: int, omega: float, zeta: float, lossy: bool, pushed: float) -> tuple[float, float]:
     """Frequency [rad/s] and damping ratio [-] of the mode that replaces those above the last kept one.
+
+    If only rigid motions are kept, ``pushed`` is the square of the frequency of their mass on the residual compliance.
 
     A lossy force depends on the approach rate, in which an undamped mode just above the last one would ring. A
     critically damped mode far above, at 30 times its frequency, acts like a series spring and takes almost no energy.
     """
+    omega = omega or np.sqrt(pushed)
     if lossy:
         return 30.0 * omega, 1.0
     return REST_ABOVE[min(dimension, 2)] * omega, float(zeta)

@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from comparing import worst
+from scipy.integrate import solve_ivp
 from test_collision import thinned_blow
 
 import fem_impact as fi
@@ -41,6 +42,28 @@ def test_what_stands_for_modes_left_out_under_loss_hardly_swings(seed):
         for residual in (False, True)
     )
     assert worst(whole, truth) < 0.0125 * worst(bare, truth)  # 0.008 to 0.010 were measured
+
+
+def test_a_body_known_by_its_rigid_motion_and_its_compliance_meets_a_lossy_contact():
+    """The truth is a mass behind a spring without mass, in series with the contact."""
+    stiffness, loss, compliance = 1e6, 0.2, 1e-6
+
+    def change(_, y):
+        force = (y[0] - y[1] - y[4]) / compliance  # y: positions, speeds, approach
+        rate = (force / (stiffness * max(y[4], 1e-12) ** 1.5) - 1.0) / loss
+        return [y[2], y[3], -force / 0.1, force, rate]
+
+    first, parted = 1e-7, lambda t, y: y[0] - y[1] - y[4]
+    parted.terminal, parted.direction = True, -1.0
+    begun = [first + compliance * stiffness * first**1.5 * (1.0 + loss), 0.0, 1.0, 0.0, first]
+    truth = solve_ivp(change, (0.0, 0.05), begun, "Radau", rtol=1e-8, atol=1e-13, events=parted).y
+    body = fi.Modes.from_arrays([0.0], [[1.0]], points=[[0.0]], mass=1.0, compliance=[[compliance]])
+    given = body, fi.Striker.rigid(0.1), fi.Contact.power(stiffness, 1.5, loss=loss)
+    hit = fi.strike(*given, at=[0.0], speed=1.0, tolerance=0.1)
+    assert hit.restitution == pytest.approx(-truth[2, -1], abs=0.003)
+    assert hit.peak_force == pytest.approx(max(truth[0] - truth[1] - truth[4]) / compliance, rel=0.003)
+    cells = fi.sweep(*given, at=[0.0], speed=1.0, over={"speed": [0.5, 1.0]}, tolerance=0.1)
+    assert float(cells.restitution[1]) == pytest.approx(hit.restitution, abs=1e-3)
 
 
 def test_another_mesh_of_a_free_plate_may_turn_its_rigid_motions():
