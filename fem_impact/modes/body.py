@@ -367,7 +367,7 @@ class Body(check.Brief):
         made = dents.settled(made, seen, self.solid)
         odd = plausible.elsewhere(self.nodes, self.shapes, self.mass)
         sideways = free_body.sideways(self.shapes[kept], ways[kept], made.n_modes)
-        return replace(made, shapes=replace(made.shapes, sideways=sideways), notes=(*made.notes, *odd, NOTE))
+        return replace(made, shapes=replace(made.shapes, sideways=sideways), notes=(*made.notes, *odd, *[NOTE] * bool(made.omega.any())))
 
     def way(self, where: Any, direction: Any = "normal") -> np.ndarray:
         """Unit vector (3,) of a direction, as of `modes`, at a node."""
