@@ -204,7 +204,8 @@ def _compared(system: System, omega: np.ndarray) -> np.ndarray:
     again = _pairs(body, n_modes, None)[1]
     ends = ribs.singular(system.mesh, getattr(system.section, "ribs", ()))[0].values()
     order = 1.5 if any(1 in each for each in ends) else 4.0
-    return np.abs(again - omega) / np.abs(ratio**-order - 1.0)
+    # where triangles at masses, springs and ends of ribs are most, as many of both meshes, only the others tell
+    return np.abs(again - omega) / max(abs(ratio**-order - 1.0), 1.0 - COARSER ** (-0.25 * order))
 
 
 def _counted(system: System, flexibility: Flexibility, n: int, limit: float | None) -> tuple[np.ndarray, np.ndarray]:

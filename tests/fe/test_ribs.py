@@ -98,3 +98,14 @@ def test_the_error_of_crossing_ribs_is_stated():
     own = found.shapes.system
     finer = refinement.solve_on_mesh(assembly.reassemble(own, own.mesh.refined(3.0)), 6, None)
     assert (0.5 * np.abs(found.omega / finer.omega - 1.0) < found.frequency_error).all()
+
+
+@pytest.mark.slow
+def test_a_mesh_fine_at_masses_and_at_the_end_of_a_rib_only_tells_its_error():
+    """On seven meshes the first frequency differs by 4e-4 at most from their mean; 0.09 was stated on this one."""
+    wood = fi.Material(E=12e9, nu=0.3, rho=450.0)
+    rib = fi.Rib([(0.1, 0.1), (0.2, 0.1)], fi.Beam.rectangular(wood, width=0.02, height=0.01))
+    masses = [((0.1, 0.05), 0.01), ((0.2, 0.15), 0.01)]
+    mesh, plate = fi.mesh.rectangle(0.3, 0.2, size=0.03), fi.Plate(wood, 3e-3)
+    system = fi.assemble(mesh, plate, {"boundary": "hinged"}, ribs=[rib], point_masses=masses)
+    assert 4e-4 < fi.find_modes(system, n_modes=3).frequency_error[0] < 5e-3
