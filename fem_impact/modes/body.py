@@ -365,9 +365,9 @@ class Body(check.Brief):
             solid=False,
         )  # fmt: skip
         made = dents.settled(made, seen, self.solid)
-        odd = plausible.elsewhere(self.nodes, self.shapes, self.mass)
+        odd = (*plausible.elsewhere(self.nodes, self.shapes, self.mass), *[NOTE] * bool(made.omega.any()))
         sideways = free_body.sideways(self.shapes[kept], ways[kept], made.n_modes)
-        return replace(made, shapes=replace(made.shapes, sideways=sideways), notes=(*made.notes, *odd, *[NOTE] * bool(made.omega.any())))
+        return replace(made, shapes=replace(made.shapes, sideways=sideways), notes=(*made.notes, *odd))
 
     def way(self, where: Any, direction: Any = "normal") -> np.ndarray:
         """Unit vector (3,) of a direction, as of `modes`, at a node."""
