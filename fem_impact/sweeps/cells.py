@@ -208,6 +208,10 @@ def checked_axes(base: Case, over: Mapping[str, Any]) -> dict[str, np.ndarray]:
                 if name not in (*LAW, "damping_ratio"):
                     check.positive(f"over[{given!r}]", value, AXES[name][0], reach=REACH)
                 base.changed(name, value)  # raises if the body cannot change this way, too
+    for mark, law in MARKS.items():
+        idle = set(law.numbers) & set(axes)
+        if idle and not (getattr(base.contact, mark) or np.any(axes.get(mark, 0.0))):
+            raise ValueError(f"contact.{min(idle)} does nothing unless contact.{mark} is positive; give that, too")
     return axes
 
 

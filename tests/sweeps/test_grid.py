@@ -126,6 +126,8 @@ def test_points_are_an_axis_with_coordinates():
         ({"stiffness": [1e5, np.nan]}, r"over\['stiffness'\] must be finite"),
         ({"exponent": [0.1]}, "exponent must lie between"),
         ({"at": [(9.0, 0.1)]}, "must lie on the body"),
+        ({"contact.depth": [1e-4], "hard_stiffness": [0.0]}, "contact.depth does nothing unless"),
+        ({"relaxation": [1e-4]}, "contact.relaxation does nothing unless contact.hysteresis is positive"),
     ],
 )
 def test_wrong_axes_are_told_at_once(over, message):
