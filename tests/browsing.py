@@ -23,6 +23,13 @@ class Page:
             assert time.monotonic() < end, f"not within {seconds} s: {expression}"
             self.tab.wait_for_timeout(20)
 
+    def assert_fits(self, width):
+        """Nothing is wider than the page, and no text is cut off."""
+        assert self.tab.evaluate("document.documentElement.scrollWidth") == width
+        wide = "e => e.scrollWidth > e.clientWidth + 1 && e.clientWidth > 0"
+        cut = f"[...document.querySelectorAll('main *')].filter({wide}).map(e => e.outerHTML.slice(0, 80))"
+        assert self.tab.evaluate(cut) == []
+
     def tabbed_to(self, most=200):
         """Press Tab until the focus comes round; what it stopped at, and whether each could be seen to have it."""
         stops = []

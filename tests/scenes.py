@@ -21,8 +21,8 @@ kind = "linear"
 stiffness = 1e4
 [strike]
 at = [0.1395, 0.09]
-speed = 2.0
 tolerance = 1e-2
+speed = 2.0
 [map]
 over = { "striker.mass" = [0.03, 0.05] }
 """
@@ -31,6 +31,7 @@ SMALL = (  # the same through a Hertz spring, damped, with no map
     .replace("first_frequency = 100.0", "first_frequency = 100.0\ndamping_ratio = 0.01")
     .replace('"linear"\nstiffness = 1e4', '"hertz"\nstiffness = 695e3')
 )
+TITLED = 'title = "A small test"' + SMALL
 BAR = """
 [mesh]
 shape = "line"
@@ -56,6 +57,14 @@ at = [0.17]
 speed = 1.0
 tolerance = 1e-2
 """
+LEAF = """<svg xmlns="http://www.w3.org/2000/svg" width="90mm" height="60mm" viewBox="0 0 90 60">
+<path d="M 5 30 C 25 0, 65 0, 85 30 C 65 60, 25 60, 5 30 Z"/></svg>"""
+
+
+def edited(old, new, text=TITLED):
+    """A scene in which a piece of its text is another."""
+    assert old in text
+    return text.replace(old, new)
 
 
 def load_text(folder, text=SMALL):

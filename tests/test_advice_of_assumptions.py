@@ -5,6 +5,7 @@ from dataclasses import replace
 from functools import cache, partial
 
 import pytest
+from comparing import examined
 
 import fem_impact as fi
 from fem_impact.impact import assumption
@@ -162,10 +163,6 @@ REMEDIES = {
      "^state the damping ratio of the striker$", [lambda: by_rod(striker=rod())]),
 }
 # fmt: on
-
-
-def examined(hit, name):
-    return next(each for each in hit.assumptions if name.startswith(each.name))
 
 
 STRETCH = tuple(

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from comparing import follow_advice
 
 import fem_impact as fi
 
@@ -52,33 +53,33 @@ def felt(relaxation):
 
 # fmt: off
 DESIGNS = {  # what fails, the message, and what it advises
-    "a mesh that changes": (lambda _: tuned(lambda x: bar(length=x), low=0.2, high=0.6),
-     "it changes the mesh; free numbers of the section instead$", lambda _: tuned(bar)),
-    "supports that change": (lambda _: tuned(lambda x: bar(supports={"left": fi.Elastic(x)}), low=1e3, high=1e5),
+    "a mesh that changes": (lambda: tuned(lambda x: bar(length=x), low=0.2, high=0.6),
+     "it changes the mesh; free numbers of the section instead$", lambda: tuned(bar)),
+    "supports that change": (lambda: tuned(lambda x: bar(supports={"left": fi.Elastic(x)}), low=1e3, high=1e5),
      r"no derivative in \S+: it changes the .* of the body; keep them$",
-     lambda _: tuned(lambda x: bar(x, supports={"left": fi.Elastic(1e4)}), mode=2)),
-    "a contact's memory": (lambda _: struck(felt, 1e-5, 1e-3, 1e-3), r"it changes the contact's \S+; keep that$",
-     lambda _: struck(fi.Contact.linear, 1e4, 1e8, 1e-3)),
-    "modes changed one by one": (lambda _: tuned(beam, low=0.01, high=0.05),
-     r"it changes the modes of the \S+ one by one; make the body of a mesh and a section$", lambda _: tuned(bar)),
+     lambda: tuned(lambda x: bar(x, supports={"left": fi.Elastic(1e4)}), mode=2)),
+    "a contact's memory": (lambda: struck(felt, 1e-5, 1e-3, 1e-3), r"it changes the contact's \S+; keep that$",
+     lambda: struck(fi.Contact.linear, 1e4, 1e8, 1e-3)),
+    "modes changed one by one": (lambda: tuned(beam, low=0.01, high=0.05),
+     r"it changes the modes of the \S+ one by one; make the body of a mesh and a section$", lambda: tuned(bar)),
     "a shared frequency": (
-     lambda _: tuned(lambda x: plate(groove(x)), mode=2, low=0.0, high=0.5, wanted=600.0, start={"x": 0.0}),
+     lambda: tuned(lambda x: plate(groove(x)), mode=2, low=0.0, high=0.5, wanted=600.0, start={"x": 0.0}),
      "modes share it, and a change splits it; want another frequency, or start from a body without this symmetry$",
-     lambda _: (
+     lambda: (
         tuned(lambda x: plate(groove(x)), mode=1, low=0.0, high=1.0, wanted=160.0, start={"x": 0.0}),
         tuned(lambda x: plate(groove(x), (0.4, 0.3)), mode=2, low=0.0, high=1.0, wanted=240.0),
     )),
-    "a thick plate": (lambda _: tuned(lambda x: plate(x, theory="mindlin"), low=5e-3, high=0.05, wanted=800.0),
+    "a thick plate": (lambda: tuned(lambda x: plate(x, theory="mindlin"), low=5e-3, high=0.05, wanted=800.0),
      "it is not available for a thick plate; take a thin one$",
-     lambda _: tuned(plate, low=5e-3, high=0.05, wanted=800.0)),
+     lambda: tuned(plate, low=5e-3, high=0.05, wanted=800.0)),
     "nothing made beside a value": (
-     lambda _: tuned(lambda x: bar(height=0.02 if abs(x - 0.01) < 1e-9 else -1.0), start={"x": 0.01}),
-     r"nothing can be made on either side of .*; change its range$", lambda _: tuned(bar)),
-    "a range that ends too early": (lambda _: tuned(bar, wanted=2000.0), "stopped at the end of the range; widen it$",
-     lambda _: tuned(bar, wanted=2000.0, high=0.1)),
-    "a start in the wrong place": (lambda _: tuned(valley, low=-1.0, high=1.0, wanted=450.0, start={"x": 0.9}),
+     lambda: tuned(lambda x: bar(height=0.02 if abs(x - 0.01) < 1e-9 else -1.0), start={"x": 0.01}),
+     r"nothing can be made on either side of .*; change its range$", lambda: tuned(bar)),
+    "a range that ends too early": (lambda: tuned(bar, wanted=2000.0), "stopped at the end of the range; widen it$",
+     lambda: tuned(bar, wanted=2000.0, high=0.1)),
+    "a start in the wrong place": (lambda: tuned(valley, low=-1.0, high=1.0, wanted=450.0, start={"x": 0.9}),
      "; free more numbers, or begin elsewhere, with start or tries$",
-     lambda _: (
+     lambda: (
         tuned(valley, low=-1.0, high=1.0, wanted=450.0, start={"x": -0.9}),
         tuned(valley, low=-1.0, high=1.0, wanted=450.0, start={"x": 0.9}, tries=4),
     )),
@@ -95,8 +96,4 @@ def valley(x):
 @pytest.mark.parametrize("name", DESIGNS)
 @pytest.mark.filterwarnings("error::fem_impact.ToleranceWarning")
 def test_following_the_advice_gives_a_design(name):
-    wrong, words, right = DESIGNS[name]
-    pointer = r"( \(notes.md#[a-z-]+\))?$" if words.endswith("$") else ""
-    with pytest.raises((fi.SimulationError, fi.ToleranceWarning, ValueError), match=words.removesuffix("$") + pointer):
-        wrong(None)
-    right(None)
+    follow_advice(DESIGNS[name])

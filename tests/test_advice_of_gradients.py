@@ -4,6 +4,7 @@ from functools import cache, partial
 
 import numpy as np
 import pytest
+from comparing import follow_advice
 from numpy.testing import assert_allclose
 
 import fem_impact as fi
@@ -66,39 +67,39 @@ def held(speed=1.0):
 
 # fmt: off
 GRADIENTS = {  # what fails, the message, and what it advises
-    "energy of vectors": (lambda _: energy(body=system(), target="vectors"),
+    "energy of vectors": (lambda: energy(body=system(), target="vectors"),
      "the modes that ring did not carry the blow; strike modes of find_modes$",
-     lambda _: energy(body=fi.find_modes(system(), n_modes=20))),
-    "energy of other modes": (lambda _: struck().on(PLATE).gradient("modal_energy"),
-     "the modes that ring did not carry the blow; strike modes of find_modes$", lambda _: energy()),
-    "grazing": (lambda _: grazing(),
+     lambda: energy(body=fi.find_modes(system(), n_modes=20))),
+    "energy of other modes": (lambda: struck().on(PLATE).gradient("modal_energy"),
+     "the modes that ring did not carry the blow; strike modes of find_modes$", lambda: energy()),
+    "grazing": (lambda: grazing(),
      "grazing contact: .*; take a slightly heavier or lighter striker, or strike elsewhere$",
-     lambda _: (grazing(mass=0.52), grazing(mass=0.48), grazing(at=(0.14, 0.1)))),
-    "no gap": (lambda _: slopes("peak_time", "contact.gap"),
+     lambda: (grazing(mass=0.52), grazing(mass=0.48), grazing(at=(0.14, 0.1)))),
+    "no gap": (lambda: slopes("peak_time", "contact.gap"),
      "the bodies touch at the start, and even a small gap would change how they meet; give a gap$",
-     lambda _: slopes("peak_time", "contact.gap", law=fi.Contact.linear(1e4, gap=1e-4))),
-    "no loss": (lambda _: in_loss(),
+     lambda: slopes("peak_time", "contact.gap", law=fi.Contact.linear(1e4, gap=1e-4))),
+    "no loss": (lambda: in_loss(),
      "without loss the modes left out act as a spring .*; give the contact a small loss$",
-     lambda _: in_loss(law=fi.Contact.linear(1e4, loss=1e-3))),
-    "a rigid target": (lambda _: from_outside("target.mass", target="rigid"),
+     lambda: in_loss(law=fi.Contact.linear(1e4, loss=1e-3))),
+    "a rigid target": (lambda: from_outside("target.mass", target="rigid"),
      "the target is treated as rigid or infinite; strike its modes, with target = 'modal'$",
-     lambda _: from_outside(("target.mass", "strike.x"), target="modal")),
-    "chatter": (lambda _: chatter(dt=1e-3), "the bodies chatter, .*; give max_impacts, a shorter duration or no dt$",
-     lambda _: (chatter(dt=1e-3, max_impacts=1), chatter(dt=1e-3, duration=2e-3), chatter())),
-    "runs of other counts": (lambda _: chatter(dt=5e-4),
+     lambda: from_outside(("target.mass", "strike.x"), target="modal")),
+    "chatter": (lambda: chatter(dt=1e-3), "the bodies chatter, .*; give max_impacts, a shorter duration or no dt$",
+     lambda: (chatter(dt=1e-3, max_impacts=1), chatter(dt=1e-3, duration=2e-3), chatter())),
+    "runs of other counts": (lambda: chatter(dt=5e-4),
      "runs of different steps find .* impacts; give a smaller tolerance and no dt, or max_impacts$",
-     lambda _: (chatter(dt=5e-4, max_impacts=1), chatter())),
-    "a hand": (lambda _: held().gradient("impulse"),
+     lambda: (chatter(dt=5e-4, max_impacts=1), chatter())),
+    "a hand": (lambda: held().gradient("impulse"),
      "take differences of runs with the number changed, at a smaller tolerance$",
-     lambda _: differ(lambda step: held(1.0 + step))),
-    "a speed of a body at rest against another": (lambda _: in_chain(0.0).gradient("contact_time", "speeds.2"),
-     "a speed would press or part them; give a gap$", lambda _: in_chain(1e-5).gradient("contact_time", "speeds.2")),
+     lambda: differ(lambda step: held(1.0 + step))),
+    "a speed of a body at rest against another": (lambda: in_chain(0.0).gradient("contact_time", "speeds.2"),
+     "a speed would press or part them; give a gap$", lambda: in_chain(1e-5).gradient("contact_time", "speeds.2")),
     "sections of other bodies": (
-     lambda _: in_chain(1e-5).gradient("impulse", sections={"t": (1e-3, lambda t: fi.Plate(STEEL, t))}),
-     "sections are those of the target of `strike`; leave them out$", lambda _: in_chain(1e-5).gradient("impulse")),
-    "section of other bodies": (lambda _: in_chain(1e-5).gradient("impulse", "section.thickness"),
+     lambda: in_chain(1e-5).gradient("impulse", sections={"t": (1e-3, lambda t: fi.Plate(STEEL, t))}),
+     "sections are those of the target of `strike`; leave them out$", lambda: in_chain(1e-5).gradient("impulse")),
+    "section of other bodies": (lambda: in_chain(1e-5).gradient("impulse", "section.thickness"),
      "only the target of `strike` has one; take the mass and first frequency of the body$",
-     lambda _: in_chain(1e-5).gradient("impulse", "bodies.1.mass")),
+     lambda: in_chain(1e-5).gradient("impulse", "bodies.1.mass")),
 }
 # fmt: on
 
@@ -106,10 +107,7 @@ GRADIENTS = {  # what fails, the message, and what it advises
 @pytest.mark.parametrize("name", GRADIENTS)
 @pytest.mark.filterwarnings("ignore::fem_impact.ToleranceWarning")  # of steps given and of few modes
 def test_following_the_advice_gives_a_gradient(name):
-    wrong, words, right = GRADIENTS[name]
-    with pytest.raises((fi.SimulationError, ValueError), match=rf"{words[:-1]}( \(notes.md#[a-z-]+\))?$"):
-        wrong(None)
-    right(None)
+    follow_advice(GRADIENTS[name])
 
 
 @pytest.mark.parametrize("gap", [0.0, 1e-5])

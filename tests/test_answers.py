@@ -6,8 +6,7 @@ import shlex
 from pathlib import Path
 
 import pytest
-from scenes import BAR, QUICK, SMALL
-from test_cli import TEXT
+from scenes import BAR, QUICK, SMALL, TITLED
 
 import fem_impact as fi
 from fem_impact import answers, arguments
@@ -55,7 +54,7 @@ def commands():
 
 @pytest.fixture
 def folder(tmp_path):
-    for name, text in (("small", TEXT), ("quick", QUICK), ("flam", SMALL + STROKES), ("bar", BAR)):
+    for name, text in (("small", TITLED), ("quick", QUICK), ("flam", SMALL + STROKES), ("bar", BAR)):
         (tmp_path / f"{name}.toml").write_text(text)
     return tmp_path
 
@@ -175,7 +174,7 @@ def test_hammer_says_that_its_tips_are_linear_and_what_the_contact_amounts_to(fo
     times = [fi.strike(fi.Modes.rigid(1e6), fi.Striker.rigid(mass), each, at=None, speed=speed).contact_time
              for each in (law, fi.Contact.linear(alike))]  # fmt: skip
     assert times[0] == pytest.approx(times[1], rel=1e-2)  # three digits are printed
-    (folder / "small.toml").write_text(TEXT.replace('"hertz"', '"linear"'))
+    (folder / "small.toml").write_text(TITLED.replace('"hertz"', '"linear"'))
     assert prompt(words).json["notes"] == []
 
 

@@ -55,7 +55,6 @@ def beam(**changes):
 @pytest.mark.parametrize(
     ("changes", "said"),
     [
-        ({"dimension": 2}, "theory must be of dimension 1 as the mesh, and element left out, got 'rayleigh' of"),
         ({"fields": ("stiffness", "inertia")}, "terms of theory 'rayleigh' must be of 'K' or 'M' and of a field among"),
         ({"terms": lambda *given: [Term("K", "stiffness", euler.terms(*given)[0].parts * np.nan)]}, "must be finite"),
         ({"terms": lambda *given: [Term("K", "stiffness", euler.terms(*given)[0].parts[..., :3])]}, "must have shape"),

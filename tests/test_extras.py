@@ -7,7 +7,7 @@ from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
-from test_cli import TEXT
+from scenes import TITLED
 
 from fem_impact import doctor
 from fem_impact.show import pictures
@@ -26,7 +26,7 @@ def bare(monkeypatch):
 
 @pytest.fixture
 def scene(tmp_path):
-    (tmp_path / "small.toml").write_text(TEXT + MAP)
+    (tmp_path / "small.toml").write_text(TITLED + MAP)
 
 
 @pytest.mark.slow
@@ -73,7 +73,7 @@ def test_command_that_needs_an_extra_names_it(bare, scene, tmp_path, prompt, wor
     ],
 )
 def test_a_file_that_needs_an_extra_to_be_read_names_it(bare, read_here, tmp_path, prompt, shape, content, remedy):
-    text = TEXT.replace('source = "analytic"', "").replace('shape = "rectangle"\nlength = 0.465\nwidth = 0.3', shape)
+    text = TITLED.replace('source = "analytic"', "").replace('shape = "rectangle"\nlength = 0.465\nwidth = 0.3', shape)
     (tmp_path / "other.toml").write_text(text)
     (tmp_path / shape.split('"')[3]).write_bytes(content)
     said = prompt("modes other.toml")

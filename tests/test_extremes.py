@@ -114,11 +114,9 @@ def test_compliance_stays_that_of_the_plate_where_corners_are_graded(supports):
     assert (modes.omega[modes.n_rigid :] > 1.0).all()  # no rigid motion taken for a mode
 
 
-def test_smallest_meshes_solve():
+def test_the_smallest_mesh_solves():
     one = find_modes(assemble(mesh.rectangle(1, 1, size=9.0), PLATE, {"boundary": "hinged"}), n_modes=1)
     assert one.omega[0] * PER_RATE > 2 * np.pi**2  # from above, with two triangles
-    with pytest.raises(ValueError, match="n_modes lower: elements of 9 m have 1 unknowns for 50 modes"):
-        find_modes(assemble(mesh.rectangle(1, 1, size=9.0), PLATE, {"boundary": "clamped"}), n_modes=50)
 
 
 @pytest.mark.slow

@@ -118,12 +118,10 @@ def test_a_listener_on_the_plate_is_refused_and_nothing_is_written(told, tmp_pat
     assert not (tmp_path / "out").exists()
 
 
-def test_a_blow_too_loud_for_a_wav_is_told(tmp_path):
+def test_a_blow_too_loud_for_a_wav_is_scaled_until_it_fits(tmp_path):
     plate = fi.analytic.rectangle(0.3, 0.2, mass=0.2, first_frequency=100.0, n_modes=4)
     hit = fi.strike(plate, fi.Striker.rigid(0.01), fi.Contact.linear(1e4), at=(0.1, 0.1), speed=1e50, tolerance=0.1)
-    with pytest.raises(ValueError, match="louder than a WAV file can hold"):
-        fi.sound.synthesise(hit).wav()
-    assert fi.export.write_wav(tmp_path / "a.wav", hit).full_scale > 1e30  # scaled until it fits
+    assert fi.export.write_wav(tmp_path / "a.wav", hit).full_scale > 1e30
 
 
 def test_a_cluster_that_wants_a_certificate_is_a_sentence(told):

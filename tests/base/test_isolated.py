@@ -5,7 +5,6 @@ import signal
 import subprocess
 import sys
 import time
-from pathlib import Path
 
 import meshio
 import numpy as np
@@ -160,10 +159,9 @@ def test_a_missing_library_is_named(tmp_path, monkeypatch, name, content, reader
     assert isolated.main(tmp_path / name, reader, []) == (1, told.encode())
 
 
-@pytest.mark.parametrize("kind", ["folder", "pipe", "loop", "empty"])
+@pytest.mark.parametrize("kind", ["pipe", "loop"])
 def test_what_is_no_file_is_told_at_once(tmp_path, kind):
     path = tmp_path / "plate.msh"
-    make = {"folder": os.mkdir, "pipe": os.mkfifo, "loop": lambda path: os.symlink(path, path), "empty": Path.touch}
-    make[kind](path)
+    os.mkfifo(path) if kind == "pipe" else os.symlink(path, path)
     with pytest.raises(ValueError, match=r"plate\.msh"):
         mesh.load(path)

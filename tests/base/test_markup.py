@@ -4,7 +4,7 @@ from xml.etree import ElementTree
 
 import numpy as np
 import pytest
-from test_cli import TEXT
+from scenes import TITLED
 
 import fem_impact as fi
 from fem_impact._base import markup
@@ -20,7 +20,7 @@ def parsed(html):
 
 @pytest.fixture
 def scene(tmp_path):
-    (tmp_path / "small.toml").write_text(TEXT.replace("A small test", "<b>&") + "[observe]\npoints = [[0.3, 0.2]]\n")
+    (tmp_path / "small.toml").write_text(TITLED.replace("A small test", "<b>&") + "[observe]\npoints = [[0.3, 0.2]]\n")
     return fi.load_scene(tmp_path / "small.toml")
 
 

@@ -5,6 +5,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
+from scenes import LEAF
 
 import fem_impact as fi
 from fem_impact.pages import explore_bench, explore_model
@@ -12,8 +13,6 @@ from fem_impact.scenes import adapted
 from fem_impact.scenes.scene import scene_of
 
 Order = explore_bench.Order
-LEAF = """<svg xmlns="http://www.w3.org/2000/svg" width="90mm" height="60mm" viewBox="0 0 90 60">
-<path d="M 5 30 C 25 0, 65 0, 85 30 C 65 60, 25 60, 5 30 Z"/></svg>"""
 
 
 @pytest.fixture

@@ -4,17 +4,10 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from scenes import load_text
-from test_cli import TEXT
 
 import fem_impact as fi
 from fem_impact.impact import threshold
 from fem_impact.pages import explore_map, explore_model
-
-
-@pytest.fixture(scope="module")
-def stand(tmp_path_factory):
-    return explore_model.Setup.of(load_text(tmp_path_factory.mktemp("setup"), TEXT))
 
 
 @pytest.fixture(scope="module")

@@ -6,19 +6,13 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from scenes import load_text
-from test_cli import TEXT
+from scenes import TITLED, load_text
 
 import fem_impact as fi
 from fem_impact.impact import accuracy
 from fem_impact.pages import explore_model, explore_numbers
 from fem_impact.scenes.scene import scene_of
 from fem_impact.scenes.schema import written
-
-
-@pytest.fixture(scope="module")
-def stand(tmp_path_factory):
-    return explore_model.Setup.of(load_text(tmp_path_factory.mktemp("setup"), TEXT))
 
 
 def test_start_is_the_scene(stand):
@@ -83,7 +77,7 @@ def test_a_saved_scene_strikes_as_the_page_does(stand, tmp_path):
     assert saved.impulse == pytest.approx(shown.impulse, rel=5e-3)  # both promise 1e-3
 
 
-ELEMENTS = TEXT.replace('source = "analytic"', 'source = "fe"').replace("stiffness = 695e3", "stiffness = 2e6")
+ELEMENTS = TITLED.replace('source = "analytic"', 'source = "fe"').replace("stiffness = 695e3", "stiffness = 2e6")
 
 
 @pytest.mark.slow
@@ -123,11 +117,6 @@ def test_the_first_answer_to_a_slider_is_the_blow_but_for_small_errors(stand):
             assert fast.n_impacts == slow.n_impacts
             assert (fast.peak_force, fast.impulse) == pytest.approx((slow.peak_force, slow.impulse), rel=2e-2)
     assert compared >= 6
-
-
-@pytest.fixture(scope="module")
-def explorer(stand):
-    return explore_numbers.Explorer(stand)
 
 
 def unpacked(text):

@@ -9,17 +9,10 @@ import time
 from concurrent.futures import Future, ThreadPoolExecutor
 
 import pytest
-from scenes import load_text
-from test_cli import TEXT
 
 import fem_impact as fi
-from fem_impact.pages import explore_map, explore_model, explore_numbers, explore_session
+from fem_impact.pages import explore_map, explore_numbers, explore_session
 from fem_impact.scenes.sentences import si
-
-
-@pytest.fixture(scope="module")
-def explorer(tmp_path_factory):
-    return explore_numbers.Explorer(explore_model.Setup.of(load_text(tmp_path_factory.mktemp("session"), TEXT)))
 
 
 class Beside:

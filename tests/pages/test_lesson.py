@@ -147,9 +147,7 @@ def test_sliders_clicks_and_questions_set_the_blow(held, shown):
 def test_it_fits_the_screen(held, visit, width, scheme):
     page = visit(held[2].as_uri(), width=width, color_scheme=scheme)
     page.until(READY)
-    assert page.tab.evaluate("document.documentElement.scrollWidth") == width
-    cut = "[...document.querySelectorAll('main *')].filter(e => e.scrollWidth > e.clientWidth + 1 && e.clientWidth > 0)"
-    assert page.tab.evaluate(f"{cut}.map(e => e.outerHTML.slice(0, 80))") == []
+    page.assert_fits(width)
     assert all(stop[2] for stop in page.tabbed_to(60))
 
 

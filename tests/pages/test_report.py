@@ -10,8 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from browsing import Page
-from scenes import BAR, SMALL, load_text
-from test_cli import TEXT
+from scenes import BAR, SMALL, TITLED, load_text
 
 import fem_impact as fi
 from fem_impact import cli
@@ -25,7 +24,7 @@ SCRIPT = "<script>document.title = 'taken'</script>"
 def scene(tmp_path_factory):
     """A small scene whose title tries to be a script."""
     path = tmp_path_factory.mktemp("report") / "small.toml"
-    path.write_text(TEXT.replace("A small test", SCRIPT))
+    path.write_text(TITLED.replace("A small test", SCRIPT))
     return path
 
 
@@ -110,7 +109,7 @@ def test_result_of_a_strike_gives_the_same_blow(scene, hit, tmp_path):
 @pytest.mark.parametrize(("kind", "target"), [("analytic", "modal"), ("fe", "vectors")])
 def test_the_command_on_the_page_gives_the_same_numbers(prompt, kind, target):
     mesh = "size = 0.05\n[target]" if kind == "fe" else "[target]"
-    Path("my plate.toml").write_text(TEXT.replace('"analytic"', f'"{kind}"').replace("[target]", mesh))
+    Path("my plate.toml").write_text(TITLED.replace('"analytic"', f'"{kind}"').replace("[target]", mesh))
     assert prompt("report", "my plate.toml", "--out", "r.html", "--tolerance", "0.02").status == 0
     page = Path("r.html").read_text(encoding="utf-8")
     told = html.unescape(re.search(r"<code>(fem-impact .*?)</code>", page)[1])
@@ -137,7 +136,7 @@ def test_the_mobility_ends_where_the_modes_end_and_the_page_says_where(text):
 
 @pytest.mark.slow
 def test_result_carries_its_mesh_wherever_it_goes(tmp_path, prompt, monkeypatch):
-    text = TEXT.replace('shape = "rectangle"\nlength = 0.465\nwidth = 0.3', 'shape = "file"\npath = "plate.msh"')
+    text = TITLED.replace('shape = "rectangle"\nlength = 0.465\nwidth = 0.3', 'shape = "file"\npath = "plate.msh"')
     (tmp_path / "scene.toml").write_text(text.replace('"analytic"', '"fe"').replace("1e-2", "1e-1"))
     fi.mesh.save(tmp_path / "plate.msh", fi.mesh.rectangle(0.465, 0.3, size=0.1))
     assert prompt("strike scene.toml --out out --target rigid").status == 3  # quick, and misses
@@ -193,13 +192,6 @@ def test_a_sequence_has_a_page_with_every_stroke(prompt):
     assert "struck at (0.1395, 0.09) and (0.2, 0.1) m" in text
     data = json.loads(download(text, "response.json"))
     assert [each["when"] for each in data["strokes"]] == [0.0, 0.03]
-
-
-@pytest.mark.slow
-def test_the_result_of_a_sequence_gives_the_same_strokes(prompt):
-    Path("flam.toml").write_text(SMALL + STROKES)
-    assert prompt("strike flam.toml --out out --duration 0.01").status in (0, 3)
-    assert report.read("out").data()["stroke"] == report.read("flam.toml").data()["stroke"]
 
 
 def test_listeners_in_free_air_get_a_player_for_each_bound(tmp_path):

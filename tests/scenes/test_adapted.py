@@ -4,13 +4,12 @@ import shutil
 from pathlib import Path
 
 import pytest
+from scenes import LEAF
 
 import fem_impact as fi
 from fem_impact.scenes import templates
 
 MESHES = Path(__file__).parents[2] / "meshes"
-LEAF = """<svg xmlns="http://www.w3.org/2000/svg" width="90mm" height="60mm" viewBox="0 0 90 60">
-<path d="M 5 30 C 25 0, 65 0, 85 30 C 65 60, 25 60, 5 30 Z"/></svg>"""
 
 
 @pytest.fixture

@@ -11,7 +11,7 @@ from comparing import examined, worst
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose
-from scenes import SMALL, load_text
+from scenes import SMALL, TITLED, edited, load_text
 
 import fem_impact as fi
 from fem_impact._base import check
@@ -23,30 +23,20 @@ from fem_impact.scenes import scene, sentences
 from fem_impact.scenes.sentences import words
 
 SCENES = Path(__file__).parents[2] / "studies" / "scenes"
-TEXT = 'title = "test"\n' + SMALL.replace("damping_ratio = 0.01", "damping_ratio = 0.005").replace(
-    "speed = 2.0\ntolerance = 1e-2\n", "tolerance = 1e-2\nspeed = 2.0\n"
-)
-
-
 SOURCE = 'source = "analytic"'
 RIGID, RECTANGLE = 'kind = "rigid"\nmass = 0.03', 'shape = "rectangle"\nlength = 0.465\nwidth = 0.3'
 MATERIAL = "[material]\nE = 10e9\nnu = 0.3\nrho = 450.0\n"
 PLATE = f'{MATERIAL}[section]\nkind = "plate"\nthickness = 3e-3\n[target]'
 
 
-def edited(old, new, text=TEXT):
-    assert old in text
-    return text.replace(old, new)
-
-
 def test_title_cannot_command_a_terminal(tmp_path):
-    told = load_text(tmp_path, edited('title = "test"', r'title = "a\u001b[31m\u202e\nb"'))
+    told = load_text(tmp_path, edited('title = "A small test"', r'title = "a\u001b[31m\u202e\nb"'))
     assert told.title == "a [31m  b"
 
 
 def test_scene_strikes_what_the_public_functions_strike(tmp_path):
-    hit = load_text(tmp_path, TEXT).strike()
-    body = fi.analytic.rectangle(0.465, 0.3, mass=0.2, first_frequency=100.0, n_modes=hit.target.n_modes).damped(0.005)
+    hit = load_text(tmp_path, TITLED).strike()
+    body = analytic.rectangle(0.465, 0.3, mass=0.2, first_frequency=100.0, n_modes=hit.target.n_modes).damped(0.01)
     blow = {"at": [0.1395, 0.09], "speed": 2.0, "tolerance": Budget(1e-2).half}
     again = collision.strike(body, fi.Striker.rigid(0.03), fi.Contact.hertz(695e3), **blow)
     # the same calls with the same numbers, up to rounding of the scale: 1e-9 of the peak after some 1e3 rad
@@ -86,7 +76,7 @@ def test_a_striker_that_turns_in_a_scene(tmp_path):
 
 def test_a_panel_on_posts_in_a_scene(tmp_path):
     posts = "point_supports = [{ at = [0.1, 0.1] }, { at = [0.3, 0.2], stiffness = 1e4 }]"
-    free, held = (load_text(tmp_path, text).modes(3) for text in (TEXT, edited(SOURCE, posts)))
+    free, held = (load_text(tmp_path, text).modes(3) for text in (TITLED, edited(SOURCE, posts)))
     assert held.frequencies[0] == pytest.approx(100.0)  # the scale is that of the body on its posts
     assert abs(held.frequencies[1] / held.frequencies[0] - free.frequencies[1] / free.frequencies[0]) > 0.01
     assert np.abs(held.shape_at([(0.1, 0.1)])).max() < 1e-6 * np.abs(held.shape_at([(0.25, 0.1)])).max()
@@ -110,7 +100,7 @@ def test_a_held_striker_in_a_scene_comes_back(tmp_path):
 
 
 def test_finite_elements_in_stages_that_are_watched_agree_with_formulas_to_the_tolerance(tmp_path):
-    seen, exact = [], load_text(tmp_path, TEXT).strike()
+    seen, exact = [], load_text(tmp_path, TITLED).strike()
     run = load_text(tmp_path, edited('"analytic"', '"fe"')).run(lambda name: seen.append(name) or nullcontext())
     assert list(dict.fromkeys(seen)) == list(run.seconds) == ["mesh", "modes", "assembly", "vectors", "strike"]
     assert all(value > 0.0 for value in run.seconds.values())
@@ -118,7 +108,7 @@ def test_finite_elements_in_stages_that_are_watched_agree_with_formulas_to_the_t
 
 
 def test_tolerance_or_count_decides_how_many_modes_are_used(tmp_path):
-    loose = load_text(tmp_path, TEXT)
+    loose = load_text(tmp_path, TITLED)
     assert load_text(tmp_path, edited("1e-2", "1e-5")).modes().n_modes > 2 * loose.modes().n_modes
     assert loose.modes(7).n_modes == 7
 
@@ -139,20 +129,20 @@ def test_mass_and_frequency_rescale_a_material(tmp_path):
 
 
 def test_arguments_of_the_strike_can_be_replaced(tmp_path):
-    loaded = load_text(tmp_path, TEXT)
+    loaded = load_text(tmp_path, TITLED)
     assert loaded.run(speed=1.0).response.speed == 1.0
     assert loaded.data(speed=1.0)["strike"] == {"at": [0.1395, 0.09], "speed": 1.0, "tolerance": 1e-2}
 
 
 def test_scene_is_frozen_and_tells_its_data(tmp_path):
-    loaded = load_text(tmp_path, TEXT)
+    loaded = load_text(tmp_path, TITLED)
     with pytest.raises(FrozenInstanceError):
         loaded.title = "other"
     with pytest.raises(TypeError):
         loaded.mesh.values["length"] = 1.0
     data = loaded.data()
     assert data["mesh"] == {"shape": "rectangle", "length": 0.465, "width": 0.3}
-    assert data["supports"] == {"boundary": "hinged"} and data["title"] == "test"
+    assert data["supports"] == {"boundary": "hinged"} and data["title"] == "A small test"
 
 
 def test_mesh_file_is_found_beside_the_scene(tmp_path, monkeypatch):
@@ -168,7 +158,6 @@ BAD = [
     ("length = 0.465", 'theory = "mindlin"', r"\[mesh\] theory is not a key of this table; it has shape, length"),
     ("stiffness = 695e3", "exponent = 2", r"\[contact\] exponent is not a key .*; it has kind, stiffness, loss"),
     ("length = 0.465", "", r"\[mesh\] length is missing for shape = 'rectangle'"),
-    ("length = 0.465", 'length = "long"', r"\[mesh\] length must be a number in m, got 'long'"),
     ("length = 0.465", "length = -0.465", r"\[mesh\] length must be positive, got -0.465 m"),
     ('"rectangle"', '"rectangel"', r"\[mesh\] shape must be one of .*; did you mean 'rectangle'\?"),
     ('shape = "rectangle"', "", r"\[mesh\] shape is missing; it is one of rectangle, disk"),
@@ -218,7 +207,7 @@ def test_bad_scene_is_told_in_one_line_with_file_table_and_key(tmp_path, old, ne
     ("speed", "2.0\n[[stroke]]\nwhen = 0\nat = [1]", "[[stroke]] 0 at must be a point (x, y) in m"),
 ])  # fmt: skip
 def test_a_blow_that_cannot_be_is_told_as_its_scene_is_read(tmp_path, key, value, said):
-    text = re.sub(rf"^{key} = .*$", f"{key} = {value}", TEXT, flags=re.M)
+    text = re.sub(rf"^{key} = .*$", f"{key} = {value}", TITLED, flags=re.M)
     with pytest.raises(ValueError, match=re.escape(f"scene.toml: {said}")):
         load_text(tmp_path, text)
 
@@ -237,16 +226,14 @@ def test_points_beside_the_body_are_refused_before_anything_is_computed(tmp_path
 @pytest.mark.parametrize(
     ("raw", "text"),
     [
-        (b"\xff\xfe", "must be UTF-8 text"),
         (b"\xef\xbb\xbftitle = 3", "title must be text, got 3"),  # behind the mark that some editors begin with
         (b"", r"\[mesh\] is missing"),
         (b"mesh = 3", r"mesh must be a table, written \[mesh\]"),
         (b"a = " + b"[" * 50_000, "not valid TOML"),
         (b"a" + b".a" * 50_000 + b" = 1", "a key must have at most 16 parts between dots, got 'a.a.*' and more"),
         (b"[" + b'"."."\\"" . ' * 9 + b"a]", "a key must have at most 16 parts between dots"),
-        (b"#" * 2_000_000, "must be smaller than"),
     ],
-    ids=["no text", "marked", "nothing", "no table", "nested", "dotted", "quoted", "huge"],
+    ids=["marked", "nothing", "no table", "nested", "dotted", "quoted"],
 )
 def test_file_that_is_no_scene_is_told_so(tmp_path, raw, text):
     (tmp_path / "scene.toml").write_bytes(raw)
@@ -254,16 +241,15 @@ def test_file_that_is_no_scene_is_told_so(tmp_path, raw, text):
         scene.load_scene(tmp_path / "scene.toml")
 
 
-@pytest.mark.parametrize("source", ["analytic", "fe"])
-def test_blow_that_needs_too_many_modes_is_refused_before_they_are_sought(tmp_path, source):
-    text = TEXT.replace("695e3", "1e14").replace('"analytic"', f'"{source}"')
-    words = r"needs about .* (modes, up to .* Hz|unknowns, elements of .* m), more than the limit"
+def test_blow_that_needs_too_many_unknowns_is_refused_before_they_are_sought(tmp_path):
+    text = TITLED.replace("695e3", "1e14").replace('"analytic"', '"fe"')
+    words = r"needs about .* unknowns, elements of .* m, more than the limit"
     with pytest.raises(check.SimulationError, match=words) as caught:
-        load_text(tmp_path, text).strike(target="vectors" if source == "fe" else "modal")
+        load_text(tmp_path, text).strike(target="vectors")
     assert str(caught.value).startswith(f"{tmp_path / 'scene.toml'}: ")
 
 
-LINES = TEXT.strip().splitlines()
+LINES = TITLED.strip().splitlines()
 VALUES = st.one_of(
     st.floats(), st.integers(-(10**30), 10**30), st.booleans(), st.text(max_size=8), st.lists(st.floats(), max_size=3)
 )

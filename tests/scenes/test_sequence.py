@@ -12,9 +12,8 @@ from fem_impact.model.target import Stages
 from fem_impact.scenes import maps, scene
 
 TABLES = (
-    SMALL.replace("duration", "").rstrip()
-    + """
-[observe]
+    SMALL
+    + """[observe]
 points = [[0.2, 0.15], [0.1, 0.2]]
 listeners = [[0.1, 0.15, 0.5], [0.4, 0.15, 0.5]]
 [[stroke]]

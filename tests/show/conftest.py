@@ -11,11 +11,6 @@ def modes():
 
 
 @pytest.fixture(scope="session")
-def plate_hit(modes):
+def hit(modes):
     how = {"at": (0.1395, 0.09), "speed": 2.0, "tolerance": 1e-3}
     return fi.strike(modes, fi.Striker.rigid(0.03), fi.Contact.hertz(695e3), **how)
-
-
-@pytest.fixture(scope="session")
-def hit(plate_hit):
-    return plate_hit

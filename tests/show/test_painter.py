@@ -10,16 +10,9 @@ import numpy as np
 import pytest
 from PIL import Image, ImageSequence
 
-import fem_impact as fi
 from fem_impact._base import progress
 from fem_impact.show import FORMATS, canvas, painter, pictures
 from fem_impact.show.painter import Painter
-
-
-@pytest.fixture(scope="module")
-def hit():
-    plate = fi.analytic.rectangle(0.465, 0.3, mass=0.2, first_frequency=100.0, n_modes=20)
-    return fi.strike(plate, fi.Striker.rigid(0.03), fi.Contact.linear(1e4), at=(0.14, 0.09), speed=1.0, tolerance=0.1)
 
 
 def test_it_draws_what_this_process_would_and_counts_the_frames(hit, tmp_path, monkeypatch):

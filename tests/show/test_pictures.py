@@ -6,19 +6,12 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 from PIL import Image, ImageSequence
-from test_cli import TEXT
+from scenes import TITLED
 
 import fem_impact as fi
 from fem_impact._base import child
 from fem_impact.modes import viewing
 from fem_impact.show import canvas, pictures, sampling
-
-
-@pytest.fixture(scope="module")
-def hit(tmp_path_factory):
-    path = tmp_path_factory.mktemp("pictures") / "small.toml"
-    path.write_text(TEXT)
-    return fi.load_scene(path).strike(target="modal")
 
 
 @pytest.fixture(params=["in space", "in the plane"])
@@ -96,7 +89,7 @@ def test_strike_writes_them_when_asked(tmp_path, monkeypatch, prompt):
     monkeypatch.setattr(child.sys, "executable", "/bin/false")  # the other process fails
     monkeypatch.setattr(pictures, "can_render", lambda: False)
     monkeypatch.setitem(pictures.animation.__wrapped__.__kwdefaults__, "frames", 3)
-    (tmp_path / "small.toml").write_text(TEXT)
+    (tmp_path / "small.toml").write_text(TITLED)
     said = prompt("strike small.toml --out out --pictures --vtk")
     assert said.status == 0 and pictures.REMEDY in " ".join(said.err.split())
     for name in ("modes.png", "wave.png", "wave.gif", "motion.pvd"):
@@ -152,8 +145,8 @@ def test_beams_and_rigid_masses_are_left_as_they_are():
             np.testing.assert_array_equal(drawn, own)
 
 
-def test_the_telling_instant_is_when_the_plate_has_begun_to_yield(plate_hit):
-    times = np.linspace(0.0, sampling.end_of(plate_hit), 50)
-    depth = np.abs(plate_hit.displacement([plate_hit.at], times)[:, 0])
-    first = sampling.telling(plate_hit, times)
+def test_the_telling_instant_is_when_the_plate_has_begun_to_yield(hit):
+    times = np.linspace(0.0, sampling.end_of(hit), 50)
+    depth = np.abs(hit.displacement([hit.at], times)[:, 0])
+    first = sampling.telling(hit, times)
     assert depth[first] >= 0.5 * depth.max() > depth[:first].max()
