@@ -1,6 +1,7 @@
 """What blows are compared by, the slopes of their quantities, and what is printed."""
 
 import re
+from xml.etree import ElementTree
 
 import numpy as np
 import pytest
@@ -32,6 +33,11 @@ def assert_printed(printed, stated, number=r"-?\d+(?:\.\d+)?(?:e[+-]?\d+)?", **h
     assert re.sub(number, "#", printed).split() == re.sub(number, "#", stated).split(), printed
     numbers = [[float(each) for each in re.findall(number, text)] for text in (printed, stated)]
     np.testing.assert_allclose(*numbers, **how)
+
+
+def parsed(html):
+    """HTML that is XML as well: whatever is not closed or escaped fails here."""
+    return ElementTree.fromstring(f"<div>{html}</div>")
 
 
 def examined(hit, name):

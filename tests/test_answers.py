@@ -6,6 +6,7 @@ import shlex
 from pathlib import Path
 
 import pytest
+from jsonschema import Draft7Validator
 from scenes import BAR, QUICK, SMALL, TITLED
 
 import fem_impact as fi
@@ -14,8 +15,6 @@ from fem_impact.pages import lesson_grid
 
 ROOT = Path(__file__).parents[1]
 TAPS = ROOT / "studies" / "measured" / "acceleration.lvm"
-KINDS = {"object": dict, "array": list, "string": str, "integer": int, "number": (int, float), "null": type(None),
-         "boolean": bool}  # fmt: skip
 STROKES = "[[stroke]]\nwhen = 0.03\n[[stroke]]\nwhen = 0.0\nspeed = 0.5\n"
 RUNS = {  # words that run each command in a second or two
     "strike": "strike small.toml --out out --format svg",
@@ -91,11 +90,8 @@ def test_every_answer_is_as_its_schema_says_and_quiet_commands_say_nothing_else(
     assert said.status in (0, 3) and said.err == ""
     found, schema = said.json, answers.schema(command)
     assert found["command"] == command and found["format"] == answers.FORMAT
-    assert set(schema["required"]) <= set(found) <= set(schema["properties"])
-    for key, value in found.items():
-        kinds = schema["properties"][key].get("type", list(KINDS))
-        kinds = [kinds] if isinstance(kinds, str) else kinds
-        assert isinstance(value, tuple(KINDS[each] for each in kinds) if kinds != list(KINDS) else object), key
+    Draft7Validator(schema).validate(found)
+    assert set(found) <= set(schema["properties"])
     for file in found["files"]:
         assert (folder / found["folder"] / file).exists(), file
 
@@ -169,11 +165,6 @@ def test_hammer_says_that_its_tips_are_linear_and_what_the_contact_amounts_to(fo
     words = "hammer small.toml --bandwidth 300 --masses 0.01 --json"
     (note,) = prompt(words).json["notes"]
     assert "tips are linear springs [N/m]; the scene's contact is of another kind (hertz)" in note
-    alike = float(note.split("a tip of ")[1].split()[0])
-    law, mass, speed = fi.Contact.hertz(695e3), 0.03, 2.0  # as long on a rigid wall
-    times = [fi.strike(fi.Modes.rigid(1e6), fi.Striker.rigid(mass), each, at=None, speed=speed).contact_time
-             for each in (law, fi.Contact.linear(alike))]  # fmt: skip
-    assert times[0] == pytest.approx(times[1], rel=1e-2)  # three digits are printed
     (folder / "small.toml").write_text(TITLED.replace('"hertz"', '"linear"'))
     assert prompt(words).json["notes"] == []
 

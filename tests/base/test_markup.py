@@ -1,9 +1,8 @@
 """What a notebook shows of things: pictures and tables that are well-formed, true and escaped."""
 
-from xml.etree import ElementTree
-
 import numpy as np
 import pytest
+from comparing import parsed
 from scenes import TITLED
 
 import fem_impact as fi
@@ -11,11 +10,6 @@ from fem_impact._base import markup
 
 SVG = "{http://www.w3.org/2000/svg}"
 PLATE = {"mass": 1.0, "first_frequency": 200.0}
-
-
-def parsed(html):
-    """HTML that is XML as well: whatever is not closed or escaped fails here."""
-    return ElementTree.fromstring(f"<div>{html}</div>")
 
 
 @pytest.fixture

@@ -1,19 +1,13 @@
 """Sketches of bodies are well-formed, round where the body is round, and say how each edge is held."""
 
-from xml.etree import ElementTree
-
 import pytest
+from comparing import parsed
 
 import fem_impact as fi
 from fem_impact._base import markup
 from fem_impact.mesh import sketch
 
 SVG = "{http://www.w3.org/2000/svg}"
-
-
-def parsed(html):
-    """HTML that is XML as well: whatever is not closed or escaped fails here."""
-    return ElementTree.fromstring(f"<div>{html}</div>")
 
 
 @pytest.mark.parametrize("mesh", [fi.mesh.disk(0.1, hole=0.02), fi.mesh.line(1.0), fi.mesh.rectangle(1.0, 2.0)])

@@ -2,7 +2,6 @@
 
 import re
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -154,14 +153,6 @@ def test_it_fits_the_screen(held, visit, width, scheme):
 def test_scenes_with_strokes_are_refused(tmp_path):
     with pytest.raises(ValueError, match="scene must have a single blow"):
         lesson.write(tmp_path / "page.html", load_text(tmp_path, SMALL + "[[stroke]]\nwhen = 0.0\n"))
-
-
-@pytest.mark.slow
-def test_the_command_writes_it(scene, prompt, monkeypatch):
-    monkeypatch.setattr(lesson_grid, "COUNTS", {"mass": 3, "stiffness": 3, "speed": 3})
-    said = prompt("page", scene.path, "--out", "lesson.html", "--json")
-    assert said.status == 0 and said.json["files"] == ["lesson.html"] and said.json["n_blows"] == 108
-    assert Path("lesson.html").stat().st_size == said.json["bytes"]
 
 
 def test_lines_between_kept_points_miss_a_curve_by_no_more_than_allowed():

@@ -5,7 +5,7 @@ import tomllib
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
-from scenes import load_text
+from scenes import edited, load_text
 
 import fem_impact as fi
 from fem_impact.scenes.fields import over_frequency, varying
@@ -49,6 +49,7 @@ width = 0.04
 height = { cases = [{ value = 6e-3, from = 0.2, to = 0.3 }], otherwise = 9e-3 }
 """
 )
+THICKNESS = "{ x = [0.0, 0.5], y = [0.0, 0.3], values = [[2e-3, 2e-3], [4e-3, 4e-3]] }"
 ALLOY = fi.Material(E=70e9, nu=0.33, rho=2700.0)
 
 
@@ -96,39 +97,31 @@ def test_damping_over_frequency():
     assert_allclose(damping(np.array([50.0, 200.0, 400.0])), [0.0, 0.1, 0.2])
 
 
-@pytest.mark.parametrize(("old", "new", "text"), [
-    ("x = [0.0, 0.5]", "x = [0.5, 0.0]", r"\[section\] thickness.x must be at least two ascending numbers"),
-    ("values = [[2e-3, 2e-3], [4e-3, 4e-3]]", "values = [[2e-3, 2e-3]]", r"\[section\] thickness.values must have"),
-    ("y = [0.0, 0.3], ", "", r"\[section\] thickness must be a number, a table with x, y and values"),
-    ("rotation = 40.0", "rotations = 40.0", r"\[supports\] left: rotations is not a key.*'rotation'"),
-    ("stiffness = 2e5, ", "", r"\[supports\] left: stiffness is missing"),
-    ("stiffness = 2e5", "stiffness = -1.0", r"\[supports\] left: stiffness must not be negative"),
-    ('right = "hinged"', "right = 3", r"\[supports\] right must be one of clamped, hinged, free, soft hinged or"),
-    ("ratio = [0.01, 0.002]", "ratio = [0.01]", r"\[target\] damping_ratio.ratio must have shape"),
-    ("ratio = [0.01, 0.002]", "ratio = [0.01, -1.0]", r"\[target\] damping_ratio.ratio must not be negative"),
-    ("frequency = [100.0, 1000.0]", "hertz = [1.0]", r"\[target\] damping_ratio must be a number or have"),
-    ("mass = 0.05 }", "mass = -0.05 }", r"\[target\] point_masses\[0\].mass must be positive"),
-    ("at = [0.1, 0.2], ", "", r"\[target\] point_masses\[0\] must have at and mass"),
-    ("at = [0.1, 0.2], ", "at = [7.0, 0.2], ", r"\[supports\] point of point_masses\[0\] must lie on the body"),
-    ("[target]", '[target]\ntheory = "timoshenko"', r"\[target\] theory must be one of kirchhoff, mindlin"),
-])  # fmt: skip
-def test_wrong_values_are_told_with_table_and_key(tmp_path, old, new, text):
-    assert old in PLATE
-    with pytest.raises(ValueError, match=text):
-        load_text(tmp_path, PLATE.replace(old, new)).strike()
-
-
 @pytest.mark.parametrize(
-    ("cases", "text"),
+    ("old", "new", "text"),
     [
-        ({"cases": [], "otherwise": -1.0}, "thickness.otherwise must be positive"),
-        ({"cases": 3, "otherwise": 1.0}, "thickness must have cases, a list"),
-        ({"cases": [{"value": 1.0}], "otherwise": 1.0}, r"thickness.cases\[0\] must have value, centre and radius"),
+        ("x = [0.0, 0.5]", "x = [0.5, 0.0]", r"\[section\] thickness.x must be at least two ascending numbers"),
+        ("values = [[2e-3, 2e-3], [4e-3, 4e-3]]", "values = [[2e-3, 2e-3]]", r"\[section\] thickness.values must have"),
+        ("y = [0.0, 0.3], ", "", r"\[section\] thickness must be a number, a table with x, y and values"),
+        ("rotation = 40.0", "rotations = 40.0", r"\[supports\] left: rotations is not a key.*'rotation'"),
+        ("stiffness = 2e5, ", "", r"\[supports\] left: stiffness is missing"),
+        ("stiffness = 2e5", "stiffness = -1.0", r"\[supports\] left: stiffness must not be negative"),
+        ('right = "hinged"', "right = 3", r"\[supports\] right must be one of clamped, hinged, free, soft hinged or"),
+        ("ratio = [0.01, 0.002]", "ratio = [0.01]", r"\[target\] damping_ratio.ratio must have shape"),
+        ("ratio = [0.01, 0.002]", "ratio = [0.01, -1.0]", r"\[target\] damping_ratio.ratio must not be negative"),
+        ("frequency = [100.0, 1000.0]", "hertz = [1.0]", r"\[target\] damping_ratio must be a number or have"),
+        ("mass = 0.05 }", "mass = -0.05 }", r"\[target\] point_masses\[0\].mass must be positive"),
+        ("at = [0.1, 0.2], ", "", r"\[target\] point_masses\[0\] must have at and mass"),
+        ("at = [0.1, 0.2], ", "at = [7.0, 0.2], ", r"\[supports\] point of point_masses\[0\] must lie on the body"),
+        ("[target]", '[target]\ntheory = "timoshenko"', r"\[target\] theory must be one of kirchhoff, mindlin"),
+        (THICKNESS, "{ cases = [], otherwise = -1.0 }", "thickness.otherwise must be positive"),
+        (THICKNESS, "{ cases = 3, otherwise = 1.0 }", "thickness must have cases, a list"),
+        (THICKNESS, "{ cases = [{ value = 1.0 }], otherwise = 1.0 }", r"thickness.cases\[0\] must have value, centre"),
     ],
-)
-def test_wrong_cases_are_told(cases, text):
+)  # fmt: skip
+def test_wrong_values_are_told_with_table_and_key(tmp_path, old, new, text):
     with pytest.raises(ValueError, match=text):
-        varying("thickness", cases, 2)
+        load_text(tmp_path, edited(old, new, PLATE)).strike()
 
 
 def test_what_a_file_holds_is_what_data_gives_back(tmp_path):

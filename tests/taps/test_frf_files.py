@@ -101,37 +101,33 @@ def test_without_a_code_of_the_denominator_force_is_assumed_and_told(written):
     assert found["notes"].tolist() == ["point 1: what it is divided by is not stated, N assumed"]
 
 
+WRONG = [
+    ([response(1, np.abs(H), ord_data_type=4)], "magnitudes only of 'point 1'; export complex responses"),
+    ([response(1, abscissa_spec_data_type=17)], "over something else than frequency"),
+    ([response(1, x=X[::-1])], "frequencies of 'point 1' that do not ascend"),
+    ([response(1), response(2, x=2.0 * X, abscissa_inc=2.0)], "other frequencies for 'point 2' than for 'point 1'"),
+    ([response(1, orddenom_spec_data_type=12)], "no motion per force"),
+    ([response(1, ordinate_spec_data_type=13)], "no motion per force"),
+    ([response(1), coherence(1, 2.0)], "coherence that is not between"),
+    ([response(1, np.where(X == 50.0, np.inf, H))], "no finite number"),
+    ([NODES], "holds data sets 15, no frequency responses"),
+    ([response(1, H.real, func_type=1)], r"holds time records \(data set 58, function type 1\), no frequency resp"),
+]
+
+
 @pytest.mark.parametrize(
-    ("sets", "text"),
+    ("sets", "text", "read"),
     [
-        ([response(1, np.abs(H), ord_data_type=4)], "magnitudes only of 'point 1'; export complex responses"),
-        ([response(1, abscissa_spec_data_type=17)], "over something else than frequency"),
-        ([response(1, x=X[::-1])], "frequencies of 'point 1' that do not ascend"),
-        ([response(1), response(2, x=2.0 * X, abscissa_inc=2.0)], "other frequencies for 'point 2' than for 'point 1'"),
-        ([response(1, orddenom_spec_data_type=12)], "no motion per force"),
-        ([response(1, ordinate_spec_data_type=13)], "no motion per force"),
-        ([response(1), coherence(1, 2.0)], "coherence that is not between"),
-        ([response(1, np.where(X == 50.0, np.inf, H))], "no finite number"),
-        ([NODES], "holds data sets 15, no frequency responses"),
-        ([response(1, H.real, func_type=1)], r"holds time records \(data set 58, function type 1\), no frequency resp"),
+        *((*row, transfer.arrays) for row in WRONG),
+        # responses are neither time records nor modes
+        ([response(1)], r"holds frequency responses \(data set 58, function type 4\), no time records", readers.arrays),
+        ([response(1)], "58, of which 58 are time records or frequency responses", universal_files.arrays),
     ],
 )
-def test_a_wrong_file_is_refused(written, sets, text):
+def test_a_wrong_file_is_refused(written, sets, text, read):
     with pytest.raises(ValueError, match=text) as caught:
-        transfer.arrays(written(*sets))
+        read(written(*sets))
     assert "\n" not in str(caught.value)
-
-
-@pytest.mark.parametrize(
-    ("read", "text"),
-    [
-        (readers.arrays, r"holds frequency responses \(data set 58, function type 4\), no time records"),
-        (universal_files.arrays, "58, of which 58 are time records or frequency responses"),
-    ],
-)
-def test_responses_are_neither_time_records_nor_modes(written, read, text):
-    with pytest.raises(ValueError, match=text):
-        read(written(response(1)))
 
 
 def test_the_prompt_lists_peaks_of_a_file(written, prompt):
