@@ -405,7 +405,6 @@ def result(folder, tables=None):
 
 
 def kept(store):
-    pytest.importorskip("zarr", reason="stores are an extra: fem-impact[cluster]")
     swept(max_cells=3, store=store)
     return store
 
@@ -499,7 +498,8 @@ def test_a_heavy_hammer_advises_lighter_ones(tmp_path, prompt):
 @pytest.mark.slow  # a connection is tried for ten seconds
 @pytest.mark.filterwarnings("default")  # the cluster's own sockets, if its first port is taken
 def test_a_cluster_that_does_not_answer_is_started_or_its_address_corrected():
-    distributed = pytest.importorskip("distributed", reason="clusters are an extra: fem-impact[cluster]")
+    import distributed  # only here, as it is slow to load
+
     with pytest.raises(OSError, match="start one or correct the address"):
         swept(max_cells=3, client="tcp://127.0.0.1:1")
     with distributed.LocalCluster(n_workers=1, processes=False, dashboard_address=":0") as cluster:

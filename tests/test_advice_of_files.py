@@ -2,9 +2,11 @@
 
 from dataclasses import replace
 
+import ezdxf
 import meshio
 import numpy as np
 import pytest
+import pyuff
 import shapely
 from scenes import SMALL
 from scipy.io import savemat
@@ -58,13 +60,11 @@ def raw(folder, triangles=None, sets=None):
 
 
 def svg(folder, body=PLATE, head=INCH, unit=None):
-    pytest.importorskip("svgelements", reason="the cad extra is not installed")
     (folder / "plate.svg").write_text(SVG.format(head=head, body=body))
     return fi.mesh.outline(folder / "plate.svg", unit=unit)
 
 
 def dxf(folder, radius, unit=None, units=6):
-    ezdxf = pytest.importorskip("ezdxf", reason="the cad extra is not installed")
     document = ezdxf.new()
     document.units = units
     document.modelspace().add_circle((0, 0), radius)
@@ -74,7 +74,6 @@ def dxf(folder, radius, unit=None, units=6):
 
 def modes_of(folder, change=None, written=True):
     """Modes from a universal file, of whose data sets ``change`` makes others, before or after they are written."""
-    pyuff = pytest.importorskip("pyuff", reason="the uff extra is not installed")
     modes = fi.find_modes(fi.assemble(GOOD, STEEL), n_modes=4)
     fi.export.write_uff(folder / "good.uff", modes)
     sets = pyuff.UFF(str(folder / "good.uff")).read_sets()
@@ -91,7 +90,6 @@ def modes_of(folder, change=None, written=True):
 
 def functions_of(folder, first="   0.00000000000e+00"):
     """Frequency responses from a universal file, the first of their numbers replaced."""
-    pytest.importorskip("pyuff", reason="the uff extra is not installed")
     (folder / "h.uff").unlink(missing_ok=True)
     transfer.write_uff(
         folder / "h.uff", fi.frf(fi.Taps.from_arrays(np.eye(1, 256, 9), np.zeros((1, 256, 1)), rate=1e3))

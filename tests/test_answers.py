@@ -5,6 +5,7 @@ import re
 import shlex
 from pathlib import Path
 
+import mido
 import pytest
 from jsonschema import Draft7Validator
 from scenes import BAR, QUICK, SMALL, TITLED
@@ -60,7 +61,6 @@ def folder(tmp_path):
 
 def score(path):
     """A MIDI file of one note."""
-    mido = pytest.importorskip("mido", reason="the extra play is not installed")
     file = mido.MidiFile(tracks=[mido.MidiTrack([mido.Message("note_on", note=60, velocity=90, time=10)])])
     file.save(path)
 
@@ -83,8 +83,6 @@ def test_every_answer_is_as_its_schema_says_and_quiet_commands_say_nothing_else(
         score(folder / "score.mid")
     if name == "show":
         assert prompt("strike small.toml --out out --quiet").status == 0
-    if name == "completion":
-        pytest.importorskip("shtab", reason="the extra completion is not installed")
     command = name.partition(",")[0]
     said = prompt(RUNS[name], "--json", "--quiet")
     assert said.status in (0, 3) and said.err == ""

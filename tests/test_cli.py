@@ -199,7 +199,6 @@ def test_closed_pipe_is_no_error(scene, tmp_path):
 
 
 def test_completion_offers_verbs_options_and_files(tmp_path):
-    pytest.importorskip("shtab", reason="the extra completion is not installed")
     script = arguments.completion("bash").data["script"]
     (tmp_path / "plate.toml").touch()
 

@@ -8,8 +8,6 @@ import pytest
 
 from fem_impact._base import isolated
 
-for extra in ("svgelements", "ezdxf", "pyuff"):
-    pytest.importorskip(extra, reason="the extras cad and uff are not installed")
 STARTED = {"mesh": 4, "outline": 4, "uff": 4}  # [-] inputs in the normal run where each starts a process
 MANY, ALL = 1_000, 10_000  # [-] inputs of the slow run, and with --all-cases
 DEAR = {"store": 400, "command": 400}  # those of which each takes 50 ms

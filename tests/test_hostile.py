@@ -125,7 +125,6 @@ def test_a_blow_too_loud_for_a_wav_is_scaled_until_it_fits(tmp_path):
 
 
 def test_a_cluster_that_wants_a_certificate_is_a_sentence(told):
-    pytest.importorskip("distributed")
     status, said = told(QUICK, "map", "--cluster", "tls://127.0.0.1:9")
     assert status == 1 and "client: no cluster answers at tls://127.0.0.1:9" in said
 
@@ -144,7 +143,6 @@ HEAD = '<svg xmlns="http://www.w3.org/2000/svg" width="465mm" height="300mm" vie
 )
 @pytest.mark.slow
 def test_a_huge_drawing_is_refused_in_seconds(tmp_path, words, body):
-    pytest.importorskip("svgelements")
     (tmp_path / "a.svg").write_text(f"{HEAD}{body}</svg>")
     began = sum(os.times()[:4])  # of processor time, children included
     with pytest.raises(ValueError, match=f"contains? .*{words}"):

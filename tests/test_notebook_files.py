@@ -43,8 +43,6 @@ def test_no_notebook_tells_where_or_when_it_was_run(path):
 @pytest.mark.parametrize("path", FILES, ids=lambda path: path.stem)
 @pytest.mark.thin(3)
 def test_the_outputs_are_those_of_a_run(path):
-    pytest.importorskip("nbclient", reason="nbclient is not installed")
-    pytest.importorskip("ipykernel", reason="ipykernel is not installed")
     kept, fresh = outputs(json.loads(path.read_text())), outputs(import_module("notebooks.run").executed(path))
     assert [kinds for kinds, _ in kept] == [kinds for kinds, _ in fresh]
     for (_, before), (_, after) in zip(kept, fresh):

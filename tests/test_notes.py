@@ -14,7 +14,6 @@ SECTION = fi.Plate(fi.Material(E=10e9, nu=0.3, rho=450.0), 1e-3)
 
 @pytest.fixture
 def drawing(tmp_path, read_here):
-    pytest.importorskip("svgelements")
     path = tmp_path / "plate.svg"
     path.write_text(DRAWING)
     return path
@@ -75,7 +74,6 @@ def test_every_command_says_the_notes(scene, prompt):
 
 
 def test_the_report_says_the_notes(scene, tmp_path):
-    pytest.importorskip("plotly")
     found = fi.load_scene(scene)
     fi.report.write(tmp_path / "page.html", found, found.run(target="modal"))
     assert ASSUMED in (tmp_path / "page.html").read_text(encoding="utf-8")

@@ -11,7 +11,6 @@ from fem_impact import arguments
 
 ROOT = Path(__file__).parents[1]
 TEXT = (ROOT / "studies" / "site" / "questions.md").read_text(encoding="utf-8")
-NEEDS = {"uff": "pyuff", "calculix": "pyvista_frd", "web": "jinja2", "spread": "SALib"}  # extra: a module of it
 SLOW = (  # above 0.3 s
     "hear what my mallet", "tune a bar", "drawing of my instrument", "choose hammer", "frequency responses",
     "stiffness of my tip", "modulus", "without believing", "uncertain inputs", "my own scripts", "first blow",
@@ -75,17 +74,12 @@ def test_every_hat_has_ten_questions_and_where_to_read_on():
 
 @pytest.mark.parametrize("answer", marked([each for each in ALL if each.language == "python"]))
 def test_lines_of_python_print_what_the_page_says(answer, here, read_here, capsys):
-    for extra, module in NEEDS.items():
-        if f"extra `{extra}`" in answer.prose:
-            pytest.importorskip(module)
     exec(compile(answer.code, "questions.md", "exec"), {})
     assert_printed(capsys.readouterr().out, answer.printed, rtol=0.1, atol=1e-3)  # as in test_readme
 
 
 @pytest.mark.parametrize("answer", marked([each for each in ALL if each.language == "sh"]))
 def test_commands_run(answer, here, read_here, prompt, tmp_path):
-    if "report" in answer.code:
-        pytest.importorskip(NEEDS["web"])
     for line in answer.code.splitlines():
         name, _, words = line.partition(" ")
         assert name == "fem-impact"

@@ -152,8 +152,6 @@ EXAMPLES = {name: item.__doc__ for name, item in everything().items() if ">>>" i
 
 @pytest.mark.parametrize("name", EXAMPLES)
 def test_an_example_in_a_docstring_prints_what_it_says(name, tmp_path, monkeypatch):
-    if name == "export.write_uff":
-        pytest.importorskip("pyuff")
     (tmp_path / "studies").symlink_to(ROOT / "studies")
     monkeypatch.chdir(tmp_path)
     example = doctest.DocTestParser().get_doctest(EXAMPLES[name], {"fi": fi, "np": np}, name, None, None)

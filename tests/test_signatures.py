@@ -14,8 +14,6 @@ from hypothesis import strategies as st
 import fem_impact as fi
 from fem_impact._base import check
 
-for extra in ("pyuff", "jinja2", "plotly"):  # the table writes a universal file and a report
-    pytest.importorskip(extra)
 DRAWN = ("pictures.mode_shapes", "pictures.wave", "pictures.animation", "report.write")  # these render for seconds
 COMPILED = ("strike", "strike free", "strike stick", "collide", "sweep", "sweep cells")
 # Known faults: these end in a bare error of numpy instead of one that names the argument.

@@ -23,7 +23,6 @@ ROOT = Path(__file__).parents[1]
 @pytest.fixture(scope="module")
 def site(tmp_path_factory):
     """The built site, and what the command that built it ended with and said."""
-    pytest.importorskip("sphinx", reason="Sphinx is not installed: pip install -e '.[site]'")
     folder = tmp_path_factory.mktemp("site")
     words = [sys.executable, str(ROOT / "studies" / "site" / "build.py"), "--out", str(folder)]
     path = os.pathsep.join([str(ROOT), *filter(None, [os.environ.get("PYTHONPATH")])])

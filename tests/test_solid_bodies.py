@@ -10,7 +10,6 @@ import solids
 
 import fem_impact as fi
 
-ng = pytest.importorskip("ngsolve", reason="the test extra is not installed")
 STEEL = fi.Material(E=210e9, nu=0.3, rho=7850.0)
 
 

@@ -26,7 +26,6 @@ def test_from_the_outline_to_the_sound(tmp_path, capsys, monkeypatch):
 @pytest.mark.usefixtures("read_here")
 def test_from_nastran_to_the_sound(tmp_path, capsys):
     """Nastran's files hold single precision, which no number of a blow notices."""
-    pytest.importorskip("pyNastran", reason="the nastran extra is not installed")
     hit, truth = tutorial_nastran.main(tmp_path, max_frequency=150.0)
     for name in ("restitution", "contact_time", "peak_force"):
         assert getattr(hit, name) == pytest.approx(getattr(truth, name), rel=1e-4)

@@ -6,6 +6,7 @@ import subprocess
 import sys
 import time
 
+import h5py
 import meshio
 import numpy as np
 import pytest
@@ -98,7 +99,6 @@ def test_the_process_that_reads_loads_no_mesher_and_no_solver(reader):
 
 
 def test_file_that_unpacks_to_more_than_the_memory_is_refused(tmp_path):
-    h5py = pytest.importorskip("h5py", reason="the extra hdf5 is not installed")
     path = written(tmp_path / "plate.med")
     with h5py.File(path, "r+") as file:
         nodes = next(group for name, group in file["ENS_MAA/mesh"].items())["NOE"]
@@ -122,7 +122,6 @@ def test_a_mesh_may_include_what_lies_beside_it_and_a_link_to_a_mesh_elsewhere_i
 
 @pytest.mark.parametrize("how", ["link", "raw", "xdmf"])
 def test_hdf5_that_looks_into_other_files_is_refused(tmp_path, how):
-    h5py = pytest.importorskip("h5py", reason="the extra hdf5 is not installed")
     (tmp_path / "in").mkdir()
     path = written(tmp_path / "in" / "plate.med")
     (tmp_path / "secret.bin").write_bytes(np.arange(27.0).tobytes())
@@ -141,7 +140,6 @@ def test_hdf5_that_looks_into_other_files_is_refused(tmp_path, how):
 
 
 def test_every_format_that_hdf5_holds_is_read(tmp_path, read_here):
-    h5py = pytest.importorskip("h5py", reason="the extra hdf5 is not installed")
     known = h5py.File
     for path in [written(tmp_path / name) for name in ("plate.med", "plate.h5m", "plate.xdmf")]:
         assert mesh.load(path).area == pytest.approx(1.0)

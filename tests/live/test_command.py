@@ -46,6 +46,5 @@ def test_piped_keys_are_played_in_time_without_a_device(scene, tmp_path, monkeyp
 
 @pytest.mark.slow
 def test_a_midi_file_that_is_not_there_is_told_in_one_line(scene, tmp_path, prompt):
-    pytest.importorskip("mido", reason="the extra play is missing")
     said = prompt("play small.toml --modes 20 --midi no.mid --out a/x.wav")
     assert said.status == 2 and said.err.count("no.mid") == 1 and not (tmp_path / "a").exists()

@@ -3,8 +3,10 @@
 import os
 import sys
 import time
+from contextlib import contextmanager
 from types import SimpleNamespace
 
+import mido
 import numpy as np
 import pytest
 
@@ -73,7 +75,6 @@ def test_escape_ends_and_what_was_struck_before_is_played(pipe):
 
 def midi(path):
     """A file of two tracks in which the tempo doubles after a beat."""
-    mido = pytest.importorskip("mido", reason="the extra play is missing")
     file = mido.MidiFile(ticks_per_beat=480)
     file.tracks.append(mido.MidiTrack([
         mido.MetaMessage("set_tempo", tempo=500_000), mido.Message("note_on", note=60, velocity=127),
@@ -111,21 +112,13 @@ def test_what_is_no_midi_file_is_one_clear_error(tmp_path):
 
 
 def test_a_midi_port_is_found_by_the_start_of_its_name(monkeypatch):
-    heard = []
-
-    class Input:
-        def __enter__(self):
-            heard[0](SimpleNamespace(type="note_on", note=62, velocity=127))
-            heard[0](SimpleNamespace(type="note_on", note=62, velocity=0))
-            heard[0](SimpleNamespace(type="control_change", value=3))
-
-        def __exit__(self, *_):
-            pass
-
+    @contextmanager
     def open_input(name, callback):
         assert name == "Pads 20:0"
-        heard.append(callback)
-        return Input()
+        callback(SimpleNamespace(type="note_on", note=62, velocity=127))
+        callback(SimpleNamespace(type="note_on", note=62, velocity=0))
+        callback(SimpleNamespace(type="control_change", value=3))
+        yield
 
     fake = SimpleNamespace(get_input_names=lambda: ["Through 14:0", "Pads 20:0"], open_input=open_input)
     monkeypatch.setitem(sys.modules, "mido", fake)

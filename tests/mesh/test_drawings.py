@@ -1,5 +1,6 @@
 """Outlines from SVG, DXF, shapely and points: curves stay curves, units are honoured, what is no body is refused."""
 
+import ezdxf
 import numpy as np
 import pytest
 import shapely
@@ -27,7 +28,6 @@ def first(shape, support):
 
 
 def svg(folder, body, head='width="2000mm" height="2000mm" viewBox="0 0 2 2"'):
-    pytest.importorskip("svgelements", reason="the cad extra is not installed")
     (folder / "plate.svg").write_text(SVG.format(head=head, body=body))
     return folder / "plate.svg"
 
@@ -37,7 +37,6 @@ def in_mm(folder, body, width=1000, height=600):
 
 
 def dxf(folder, draw, units=6):
-    ezdxf = pytest.importorskip("ezdxf", reason="the cad extra is not installed")
     document = ezdxf.new()
     document.units = units
     draw(document.modelspace())
@@ -202,8 +201,6 @@ def test_what_is_nearly_wrong_is_taken_and_noted(tmp_path):
 
 
 def test_broken_files_are_refused(tmp_path):
-    for library in ("svgelements", "ezdxf"):
-        pytest.importorskip(library, reason="the cad extra is not installed")
     for name in ("plate.svg", "plate.dxf"):
         (tmp_path / name).write_text("neither")
         with pytest.raises(ValueError, match=f"{name} cannot be read as"):

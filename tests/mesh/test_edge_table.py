@@ -51,8 +51,6 @@ def test_rows_tell_extent_and_elements():
 
 @pytest.mark.parametrize("name", ["guitar.msh", "ukulele.svg"])
 def test_the_prompt_lists_the_edges_of_a_file_and_draws_them(name, prompt, read_here):
-    if name.endswith(".svg"):
-        pytest.importorskip("svgelements", reason="the cad extra is not installed")
     said = prompt("mesh", MESHES / name, "--out", "mesh.png")
     mesh = fi.mesh.outline(MESHES / name) if name.endswith(".svg") else fi.mesh.load(MESHES / name)
     assert said.status == 0 and set(mesh.edges) <= {line.split()[0] for line in said.out.splitlines() if line.split()}

@@ -46,9 +46,7 @@ def assert_same_as_good(plate):
 
 @pytest.mark.parametrize("name", ["plate.vtu", "plate.vtk", "plate.xdmf", "plate.stl", "plate.inp"])
 def test_formats_without_names_give_the_same_plate(tmp_path, name):
-    if name.endswith("xdmf"):
-        pytest.importorskip("h5py", reason="meshio writes XDMF with h5py")
-    plate = fi.mesh.load(written(tmp_path, GOOD.points, GOOD.cells, name=name))
+    plate = mesh.load(written(tmp_path, GOOD.points, GOOD.cells, name=name))
     if name == "plate.stl":  # single precision
         assert_allclose(held(plate), HINGED, rtol=1e-5)  # refined by find_modes: 1e-6
     else:
@@ -242,7 +240,6 @@ def test_hanging_nodes_are_tied_in(tmp_path):
 
 
 def test_groups_of_med_are_edges_which_may_overlap(tmp_path, read_here):
-    pytest.importorskip("h5py", reason="the extra hdf5 is not installed")
     sides = GOOD.facets[np.concatenate([GOOD.edges["left"], GOOD.edges["right"]])]
     tags = [np.repeat([-6, -8], len(sides) // 2), np.full(len(GOOD.cells), -7)]
     points = np.column_stack([GOOD.points, np.zeros(len(GOOD.points))])

@@ -310,7 +310,6 @@ def test_ctrl_c_before_it_serves_is_quiet_too(scene, tmp_path):
 @pytest.mark.slow
 def test_a_dropped_drawing_is_struck_with_yarn_and_compared(visit, tmp_path):
     """A percussionist's way: a leaf, a mallet, two points side by side with their sounds."""
-    pytest.importorskip("svgelements", reason="the extra cad is not installed")
     leaf = tmp_path / "leaf.svg"
     leaf.write_text(LEAF)
     with served() as (address, _):

@@ -22,7 +22,6 @@ def scene():
 
 @pytest.fixture
 def leaf(tmp_path, read_here):
-    pytest.importorskip("svgelements", reason="the extra cad is not installed")
     (tmp_path / "leaf.svg").write_text(LEAF)
     return tmp_path / "leaf.svg"
 

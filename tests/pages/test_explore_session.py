@@ -11,7 +11,7 @@ from concurrent.futures import Future, ThreadPoolExecutor
 import pytest
 
 import fem_impact as fi
-from fem_impact.pages import explore_map, explore_numbers, explore_session
+from fem_impact.pages import explore_map, explore_numbers, explore_server, explore_session
 from fem_impact.scenes.sentences import si
 
 
@@ -240,9 +240,6 @@ async def talk(host, text):
 
 
 def test_pages_that_vanish_or_send_nonsense_are_one_line_each(explorer, caplog, monkeypatch, tmp_path):
-    pytest.importorskip("tornado", reason="exploring is an extra: fem-impact[web]")
-    from fem_impact.pages import explore_server
-
     caplog.set_level(logging.INFO)
     monkeypatch.setattr(explore_session, "REST", 60.0)
     bad = []

@@ -21,7 +21,6 @@ def leaf(tmp_path, monkeypatch, read_here):
 
 @pytest.mark.slow
 def test_a_drawing_becomes_a_scene_of_brass_and_yarn_that_strikes(leaf, prompt):
-    pytest.importorskip("svgelements", reason="the extra cad is not installed")
     said = " ".join(prompt('new --from leaf.svg --material brass --mallet "yarn, medium"').out.split())
     assert "y points down" in said and "Files: leaf.toml Next: fem-impact strike leaf.toml" in said
     scene = fi.load_scene("leaf.toml")

@@ -219,7 +219,6 @@ def test_show_tells_what_a_folder_holds(written, prompt, tmp_path):
 
 
 def test_show_tells_how_far_a_store_is(prompt, tmp_path):
-    pytest.importorskip("zarr", reason="stores are an extra: fem-impact[cluster]")
     (tmp_path / "map.toml").write_text(QUICK)
     assert prompt("map map.toml --out out --store store").status == 0
     text = " ".join(prompt("show store").out.split())

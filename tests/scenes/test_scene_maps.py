@@ -115,7 +115,6 @@ def test_another_body_for_each_value_needs_a_count_and_a_store(scene, tmp_path):
     over["mesh.width"]["count"] = 2
     with pytest.raises(ValueError, match=r"borders: not for axes that need another body, got mesh\.width"):
         maps.map_scene(scene, over=over, cells=3, borders=True)
-    pytest.importorskip("zarr", reason="the cluster extra is not installed")
     table = maps.map_scene(scene, over=over, cells=3, store=tmp_path / "map")
     assert dict(table.sizes) == {"mesh.width": 2, "mass": 3}
     assert sorted(path.name for path in tmp_path.iterdir()) == ["map-0", "map-1"]
@@ -129,7 +128,6 @@ def test_contours_of_a_power_law_are_where_it_says():
 
 
 def test_zarr_keeps_why_a_cell_failed(table, tmp_path):
-    pytest.importorskip("zarr", reason="the cluster extra is not installed")
     failed = table.drop_vars(["restitution", "impulse", "peak_force", "centroid"]).copy(deep=True)  # fewer pictures
     failed["failure"] = failed.failure.astype("<U40")
     failed.failure[1, 0] = "the motion may be chaotic: é"

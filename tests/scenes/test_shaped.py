@@ -93,7 +93,6 @@ def test_ribs_tapered_along_edges_and_of_another_material(tmp_path):
 
 
 def test_a_rib_along_a_line_of_a_drawing(tmp_path):
-    pytest.importorskip("svgelements", reason="the cad extra is not installed")
     shapes = '<rect id="rim" width="400" height="300"/><path id="bar" d="M50 -50 L350 -200" transform="scale(1 -1)"/>'
     head = 'xmlns="http://www.w3.org/2000/svg" width="400mm" height="300mm" viewBox="0 0 400 300"'
     (tmp_path / "plate.svg").write_text(f"<svg {head}>{shapes}</svg>")

@@ -62,7 +62,6 @@ def test_correlated_inputs_change_the_deviation_as_the_closed_form_says():
 
 
 def test_sobol_indices_on_a_wall_are_those_of_a_product():
-    pytest.importorskip("SALib", reason="the spread extra is not installed")
     found = wall(HEAVIER | {"contact.stiffness": ("lognormal", STIFFNESS, 0.4)}, n=8192, sobol=True)
     half = {"striker.mass": 0.1**2, "contact.stiffness": 0.2**2}
     for name, square in half.items():
@@ -217,7 +216,6 @@ def test_the_same_seed_gives_the_same_blows():
 
 
 def test_a_store_serves_the_same_blows_only(tmp_path):
-    pytest.importorskip("zarr", reason="the cluster extra is not installed")
     for _ in range(2):  # written, and read
         found = wall(HEAVIER, n=128, store=tmp_path / "blows")
         assert_allclose(found.values("contact_time"), wall(HEAVIER, n=128).values("contact_time"), rtol=1e-9)

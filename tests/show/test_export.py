@@ -6,6 +6,7 @@ from xml.etree import ElementTree
 import meshio
 import numpy as np
 import pytest
+import pyuff
 import pyvista
 from numpy.testing import assert_allclose
 from scipy.io import wavfile
@@ -206,7 +207,8 @@ def force(hit, monkeypatch):
 
 
 def test_matrices_of_nastran_hold_all_digits(tmp_path, hit, force):
-    op4 = pytest.importorskip("pyNastran.op4.op4", reason="the nastran extra is not installed")
+    from pyNastran.op4 import op4
+
     fi.export.write_history(tmp_path / "blow.op4", hit, TIMES, at=POINTS)
     read = {name: found[1] for name, found in op4.read_op4(str(tmp_path / "blow.op4"), debug=False).items()}
     assert list(read) == ["TIME", "FORCE", "MOVE", "VELO"]
@@ -221,7 +223,6 @@ def test_matrices_of_nastran_hold_all_digits(tmp_path, hit, force):
 
 def test_universal_files_hold_force_and_motion(tmp_path, hit, force):
     """Six digits of single numbers in text; names, nodes, directions and units are there."""
-    pyuff = pytest.importorskip("pyuff", reason="the uff extra is not installed")
     with pytest.raises(ValueError, match="times must be even for a universal file"):
         fi.export.write_history(tmp_path / "blow.uff", hit, [0.0, 1e-3, 1.5e-3])
     fi.export.write_history(tmp_path / "blow.uff", hit, TIMES, at=POINTS, node=17, direction="-z", numbers=[5, 9])
@@ -238,7 +239,8 @@ def test_universal_files_hold_force_and_motion(tmp_path, hit, force):
 
 def test_nastran_loads_a_node_with_the_force(tmp_path, hit, force):
     """Nine digits after the point."""
-    bdf = pytest.importorskip("pyNastran.bdf.bdf", reason="the nastran extra is not installed")
+    from pyNastran.bdf import bdf
+
     fi.export.write_history(tmp_path / "blow.bdf", hit, TIMES, node=17, direction="-y")
     deck = bdf.read_bdf(str(tmp_path / "blow.bdf"), xref=False, validate=False, punch=True, debug=False)
     (load,), (way,) = deck.dloads[1], deck.loads[1000]

@@ -2,6 +2,7 @@
 
 import sys
 
+import imageio_ffmpeg
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
@@ -47,7 +48,6 @@ def test_wave_begins_below_the_striker_and_spreads(hit, tmp_path, renders):
 
 
 def test_film_holds_every_frame(hit, tmp_path):
-    imageio_ffmpeg = pytest.importorskip("imageio_ffmpeg", reason="MP4 files are an extra: fem-impact[film]")
     pictures.animation(tmp_path / "wave.mp4", hit, frames=6)
     frames, seconds = imageio_ffmpeg.count_frames_and_secs(str(tmp_path / "wave.mp4"))
     assert frames == 6 and abs(seconds - 6 / canvas.RATE) < 0.05

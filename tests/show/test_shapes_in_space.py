@@ -2,6 +2,8 @@
 
 import numpy as np
 import pytest
+import pyuff
+import pyvista
 from numpy.testing import assert_allclose
 
 import fem_impact as fi
@@ -44,7 +46,6 @@ def test_sides_along_ribs_are_as_long_as_the_ribs(modes):
 
 
 def test_vtk_has_the_true_shape_and_moves_it_along_the_blow(tmp_path, modes, hit):
-    pyvista = pytest.importorskip("pyvista")
     export.write_vtk(tmp_path / "modes.vtu", modes)
     grid = pyvista.read(tmp_path / "modes.vtu")
     assert_allclose(grid.points[:, 2], RISE(np.asarray(grid.points[:, :2])), atol=1e-12)
@@ -59,7 +60,6 @@ def test_vtk_has_the_true_shape_and_moves_it_along_the_blow(tmp_path, modes, hit
 
 
 def test_universal_files_have_the_rise_and_come_back_in_the_plane(tmp_path, modes):
-    pyuff = pytest.importorskip("pyuff")
     export.write_uff(tmp_path / "modes.uff", modes)
     nodes = pyuff.UFF(str(tmp_path / "modes.uff")).read_sets(1)  # data set 2411
     points = np.column_stack([nodes["x"], nodes["y"]])

@@ -3,6 +3,7 @@
 import subprocess
 from functools import partial
 
+import imageio_ffmpeg
 import numpy as np
 import pytest
 from PIL import Image
@@ -46,10 +47,9 @@ def test_subtitles_follow_each_other_without_gaps_and_end_with_the_film(twice):
 
 @pytest.mark.slow
 def test_the_film_shows_the_force_grow_and_the_body_move(twice, tmp_path, monkeypatch):
-    encoder = pytest.importorskip("imageio_ffmpeg")
     monkeypatch.setattr(pictures, "can_render", lambda: False)  # flat pictures take no display
     fi.slow_motion.write(tmp_path / "blow.mp4", twice, frames=4)
-    unpack = [encoder.get_ffmpeg_exe(), "-loglevel", "error", "-i", tmp_path / "blow.mp4", tmp_path / "%d.png"]
+    unpack = [imageio_ffmpeg.get_ffmpeg_exe(), "-loglevel", "error", "-i", tmp_path / "blow.mp4", tmp_path / "%d.png"]
     subprocess.run(unpack, check=True)
     shown = [np.asarray(Image.open(tmp_path / f"{i}.png")).astype(int) for i in range(1, 5)]
     tall, wide, _ = shown[0].shape
@@ -64,7 +64,6 @@ def test_the_film_shows_the_force_grow_and_the_body_move(twice, tmp_path, monkey
 
 @pytest.mark.slow
 def test_the_command_writes_film_and_captions(tmp_path, prompt, monkeypatch):
-    pytest.importorskip("imageio_ffmpeg")
     monkeypatch.setattr(pictures, "can_render", lambda: False)
     monkeypatch.setattr(slow_motion, "write", partial(slow_motion.write, frames=3))
     (tmp_path / "small.toml").write_text(SMALL)

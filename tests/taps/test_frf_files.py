@@ -2,12 +2,12 @@
 
 import numpy as np
 import pytest
+import pyuff
 
 import fem_impact as fi
 from fem_impact.modes import universal_files
 from fem_impact.taps import readers, transfer
 
-pyuff = pytest.importorskip("pyuff")
 # its writer leaves binary files open
 pytestmark = [
     pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionWarning"),

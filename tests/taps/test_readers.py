@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+import pyuff
 from scipy.io import savemat, wavfile
 
 import fem_impact as fi
@@ -265,7 +266,6 @@ POUNDS = {"type": 164, "units_code": 2, "units_description": "foot", "temp_mode"
 
 
 def universal(path, *changes, before=()):
-    pyuff = pytest.importorskip("pyuff")
     path.unlink(missing_ok=True)
     pyuff.UFF(str(path)).write_sets([*before, *(RECORD | each for each in changes)], mode="add")
     return path
