@@ -45,16 +45,13 @@ def test_a_blow_of_too_many_modes_proposes_a_softer_contact(tmp_path, stiffness,
     assert stiffness > 1e8 or plan(stiffness, 1e-2).n_modes <= 2000
 
 
-@pytest.mark.parametrize(
-    "pattern, much, asked",
-    [
-        (r"give n_modes of at most (\d+)", 3000, lambda most: {"n_modes": int(most)}),
-        (r"give max_frequency of at most (\S+) Hz", 1e7, lambda most: {"max_frequency": most}),
-        (r"band of the quantity of at most (\S+) Hz", 1e7, lambda most: {"quantity": f"sound={most}"}),
-        (r"band of the quantity of at most (\S+) Hz", 1e7,
-         lambda most: {"quantity": f"spectrum={most}", "target": "modal"}),
-    ],
-)  # fmt: skip
+@pytest.mark.parametrize("pattern, much, asked", [
+    (r"give n_modes of at most (\d+)", 3000, lambda most: {"n_modes": int(most)}),
+    (r"give max_frequency of at most (\S+) Hz", 1e7, lambda most: {"max_frequency": most}),
+    (r"band of the quantity of at most (\S+) Hz", 1e7, lambda most: {"quantity": f"sound={most}"}),
+    (r"band of the quantity of at most (\S+) Hz", 1e7,
+     lambda most: {"quantity": f"spectrum={most}", "target": "modal"}),
+])  # fmt: skip
 def test_a_part_of_the_plan_that_is_too_large_gets_its_limit(tmp_path, pattern, much, asked):
     found = load_text(tmp_path, SMALL.replace('source = "analytic"', 'source = "fe"'))
     most = advice(pattern, lambda: found.plan(**asked(much)), fi.SimulationError)

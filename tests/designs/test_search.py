@@ -115,7 +115,8 @@ def test_what_is_out_of_reach_warns_and_says_what_holds_it():
 @pytest.mark.parametrize("objects, wanted, free, how, words", [
     (bar, TUNED, HEIGHT, {"least": "width"}, "least must be one of"),
     (bar, TUNED, HEIGHT, {"start": {"height": 1.0}}, r"start\['height'\] must lie between 0.005 and 0.04"),
-    (bar, TUNED, {"height": (40e-3, 5e-3)}, {}, r"free\['height'\] must be a range \(low, high\), got \(0.04, 0.005\)"),
+    (bar, TUNED, {"height": (40e-3, 5e-3)}, {},
+     r"free\['height'\] must be a range \(low, high\), got \(0.04, 0.005\)"),
     (bar, {"impulse": 1.0}, HEIGHT, {}, "a quantity of a blow needs striker, contact, at and speed"),
     (lambda values: WALL, {"mode3.frequency": 1.0}, {"mass": (1.0, 2.0)}, {},
      "mode 3 needs more modes, the body has 0 flexible ones"),

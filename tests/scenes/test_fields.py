@@ -97,28 +97,25 @@ def test_damping_over_frequency():
     assert_allclose(damping(np.array([50.0, 200.0, 400.0])), [0.0, 0.1, 0.2])
 
 
-@pytest.mark.parametrize(
-    ("old", "new", "text"),
-    [
-        ("x = [0.0, 0.5]", "x = [0.5, 0.0]", r"\[section\] thickness.x must be at least two ascending numbers"),
-        ("values = [[2e-3, 2e-3], [4e-3, 4e-3]]", "values = [[2e-3, 2e-3]]", r"\[section\] thickness.values must have"),
-        ("y = [0.0, 0.3], ", "", r"\[section\] thickness must be a number, a table with x, y and values"),
-        ("rotation = 40.0", "rotations = 40.0", r"\[supports\] left: rotations is not a key.*'rotation'"),
-        ("stiffness = 2e5, ", "", r"\[supports\] left: stiffness is missing"),
-        ("stiffness = 2e5", "stiffness = -1.0", r"\[supports\] left: stiffness must not be negative"),
-        ('right = "hinged"', "right = 3", r"\[supports\] right must be one of clamped, hinged, free, soft hinged or"),
-        ("ratio = [0.01, 0.002]", "ratio = [0.01]", r"\[target\] damping_ratio.ratio must have shape"),
-        ("ratio = [0.01, 0.002]", "ratio = [0.01, -1.0]", r"\[target\] damping_ratio.ratio must not be negative"),
-        ("frequency = [100.0, 1000.0]", "hertz = [1.0]", r"\[target\] damping_ratio must be a number or have"),
-        ("mass = 0.05 }", "mass = -0.05 }", r"\[target\] point_masses\[0\].mass must be positive"),
-        ("at = [0.1, 0.2], ", "", r"\[target\] point_masses\[0\] must have at and mass"),
-        ("at = [0.1, 0.2], ", "at = [7.0, 0.2], ", r"\[supports\] point of point_masses\[0\] must lie on the body"),
-        ("[target]", '[target]\ntheory = "timoshenko"', r"\[target\] theory must be one of kirchhoff, mindlin"),
-        (THICKNESS, "{ cases = [], otherwise = -1.0 }", "thickness.otherwise must be positive"),
-        (THICKNESS, "{ cases = 3, otherwise = 1.0 }", "thickness must have cases, a list"),
-        (THICKNESS, "{ cases = [{ value = 1.0 }], otherwise = 1.0 }", r"thickness.cases\[0\] must have value, centre"),
-    ],
-)  # fmt: skip
+@pytest.mark.parametrize(("old", "new", "text"), [
+    ("x = [0.0, 0.5]", "x = [0.5, 0.0]", r"\[section\] thickness.x must be at least two ascending numbers"),
+    ("values = [[2e-3, 2e-3], [4e-3, 4e-3]]", "values = [[2e-3, 2e-3]]", r"\[section\] thickness.values must have"),
+    ("y = [0.0, 0.3], ", "", r"\[section\] thickness must be a number, a table with x, y and values"),
+    ("rotation = 40.0", "rotations = 40.0", r"\[supports\] left: rotations is not a key.*'rotation'"),
+    ("stiffness = 2e5, ", "", r"\[supports\] left: stiffness is missing"),
+    ("stiffness = 2e5", "stiffness = -1.0", r"\[supports\] left: stiffness must not be negative"),
+    ('right = "hinged"', "right = 3", r"\[supports\] right must be one of clamped, hinged, free, soft hinged or"),
+    ("ratio = [0.01, 0.002]", "ratio = [0.01]", r"\[target\] damping_ratio.ratio must have shape"),
+    ("ratio = [0.01, 0.002]", "ratio = [0.01, -1.0]", r"\[target\] damping_ratio.ratio must not be negative"),
+    ("frequency = [100.0, 1000.0]", "hertz = [1.0]", r"\[target\] damping_ratio must be a number or have"),
+    ("mass = 0.05 }", "mass = -0.05 }", r"\[target\] point_masses\[0\].mass must be positive"),
+    ("at = [0.1, 0.2], ", "", r"\[target\] point_masses\[0\] must have at and mass"),
+    ("at = [0.1, 0.2], ", "at = [7.0, 0.2], ", r"\[supports\] point of point_masses\[0\] must lie on the body"),
+    ("[target]", '[target]\ntheory = "timoshenko"', r"\[target\] theory must be one of kirchhoff, mindlin"),
+    (THICKNESS, "{ cases = [], otherwise = -1.0 }", "thickness.otherwise must be positive"),
+    (THICKNESS, "{ cases = 3, otherwise = 1.0 }", "thickness must have cases, a list"),
+    (THICKNESS, "{ cases = [{ value = 1.0 }], otherwise = 1.0 }", r"thickness.cases\[0\] must have value, centre"),
+])  # fmt: skip
 def test_wrong_values_are_told_with_table_and_key(tmp_path, old, new, text):
     with pytest.raises(ValueError, match=text):
         load_text(tmp_path, edited(old, new, PLATE)).strike()

@@ -46,11 +46,11 @@ def test_scene_strikes_what_the_public_functions_strike(tmp_path):
 
 @pytest.mark.parametrize(("text", "law"), [
     ('"layers"\nstiffness = 1e5\nexponent = 1.2\ndepth = 2e-4\nhard_stiffness = 1e7',
-     fi.Contact.layers(1e5, 1.2, depth=2e-4, hard_stiffness=1e7)),
+     Contact.layers(1e5, 1.2, depth=2e-4, hard_stiffness=1e7)),
     ('"elastic_plastic"\nstiffness = 695e3\nyield_speed = 0.1\nmass = 0.03',
-     fi.Contact.elastic_plastic(695e3, yield_speed=0.1, mass=0.03)),
+     Contact.elastic_plastic(695e3, yield_speed=0.1, mass=0.03)),
     ('"felt"\nstiffness = 695e3\nexponent = 1.5\nhysteresis = 0.2\nrelaxation = 1e-3',
-     fi.Contact.felt(695e3, 1.5, hysteresis=0.2, relaxation=1e-3)),
+     Contact.felt(695e3, 1.5, hysteresis=0.2, relaxation=1e-3)),
 ])  # fmt: skip
 def test_contacts_that_lose_and_a_hammer_in_a_scene(tmp_path, text, law):
     hammer = 'kind = "hammer"\nhead = 0.03\nhandle = 0.05\nstiffness = 1e4\ndamping = 2.0'

@@ -92,23 +92,20 @@ def test_motion_has_displacement_and_velocity_at_each_time(tmp_path, modes, hit)
         assert (force > 0.0) == (indentation > 0.0)  # it presses where it is pressed in
 
 
-@pytest.mark.parametrize(
-    ("write", "text"),
-    [
-        (lambda at, modes, hit: export.write_vtk(at / "a.stl", modes, hit),
-         "path ending must be one of .vtu, .pvd, got '.stl'"),
-        (lambda at, modes, hit: export.write_vtk(at / "a.pvd", modes, hit), "times must be given with response"),
-        (lambda at, modes, hit: export.write_wav(at / "a.wav", hit, duration=0.0), "duration must be positive"),
-        (lambda at, modes, hit: export.write_wav(at / "a.mp3", hit), "path ending must be one of .wav, got '.mp3'"),
-        (lambda at, modes, hit: export.write_animation(at / "a.vtu", modes, 1), "must end in .pvd"),
-        (lambda at, modes, hit: export.write_animation(at / "a.pvd", modes, 31), "mode must be at most 30, got 31"),
-        (lambda at, modes, hit: export.write_animation(at / "a.pvd", modes, 0), "at least 1"),
-        (lambda at, modes, hit: export.write_history(at / "a.bdf", hit, direction="up"), "direction must be one of"),
-        (lambda at, modes, hit: export.write_history(at / "a.bdf", hit, node=0), "node must be"),
-        (lambda at, modes, hit: export.write_history(at / "a.bdf", hit, times=[[0.0]]), "times"),
-        (lambda at, modes, hit: export.write_history(at / "a.csv", hit), r"path ending must be one of \.op4, \.uff"),
-    ],
-)  # fmt: skip
+@pytest.mark.parametrize(("write", "text"), [
+    (lambda at, modes, hit: export.write_vtk(at / "a.stl", modes, hit),
+     "path ending must be one of .vtu, .pvd, got '.stl'"),
+    (lambda at, modes, hit: export.write_vtk(at / "a.pvd", modes, hit), "times must be given with response"),
+    (lambda at, modes, hit: export.write_wav(at / "a.wav", hit, duration=0.0), "duration must be positive"),
+    (lambda at, modes, hit: export.write_wav(at / "a.mp3", hit), "path ending must be one of .wav, got '.mp3'"),
+    (lambda at, modes, hit: export.write_animation(at / "a.vtu", modes, 1), "must end in .pvd"),
+    (lambda at, modes, hit: export.write_animation(at / "a.pvd", modes, 31), "mode must be at most 30, got 31"),
+    (lambda at, modes, hit: export.write_animation(at / "a.pvd", modes, 0), "at least 1"),
+    (lambda at, modes, hit: export.write_history(at / "a.bdf", hit, direction="up"), "direction must be one of"),
+    (lambda at, modes, hit: export.write_history(at / "a.bdf", hit, node=0), "node must be"),
+    (lambda at, modes, hit: export.write_history(at / "a.bdf", hit, times=[[0.0]]), "times"),
+    (lambda at, modes, hit: export.write_history(at / "a.csv", hit), r"path ending must be one of \.op4, \.uff"),
+])  # fmt: skip
 def test_what_cannot_be_written_says_why_and_leaves_nothing(tmp_path, modes, hit, write, text):
     with pytest.raises(ValueError, match=text):
         write(tmp_path, modes, hit)

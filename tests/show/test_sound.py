@@ -137,18 +137,15 @@ def test_a_narrow_bar_is_a_dipole_up_to_the_stated_width():
 BAR = {"width": 0.02, "height": 0.01, "duration": 0.01}
 
 
-@pytest.mark.parametrize(
-    ("ask", "text"),
-    [
-        (lambda bar, plate, disk: sound.radiate(plate, (0.1, 0.1)), r"listener must have shape \(3\)"),
-        (lambda bar, plate, disk: sound.radiate_bar(bar, (0.1, 0.0, 0.001), **BAR),
-         "listener must be farther than half the width"),
-        (lambda bar, plate, disk: sound.radiate_bar(bar, (0.1, 0.0, 1.0), **BAR | {"height": 0.03}),
-         "height must be at most the width"),
-        (lambda bar, plate, disk: sound.radiate_free(disk, (0.0, 0.0, 0.01)),
-         r"listener must be at least 0\.0148 m from a plate in free air, got 0\.01 m"),
-    ],
-)  # fmt: skip
+@pytest.mark.parametrize(("ask", "text"), [
+    (lambda bar, plate, disk: sound.radiate(plate, (0.1, 0.1)), r"listener must have shape \(3\)"),
+    (lambda bar, plate, disk: sound.radiate_bar(bar, (0.1, 0.0, 0.001), **BAR),
+     "listener must be farther than half the width"),
+    (lambda bar, plate, disk: sound.radiate_bar(bar, (0.1, 0.0, 1.0), **BAR | {"height": 0.03}),
+     "height must be at most the width"),
+    (lambda bar, plate, disk: sound.radiate_free(disk, (0.0, 0.0, 0.01)),
+     r"listener must be at least 0\.0148 m from a plate in free air, got 0\.01 m"),
+])  # fmt: skip
 def test_what_cannot_be_heard_says_so(bar_hit, hit, disk_hit, ask, text):
     with pytest.raises(ValueError, match=text):
         ask(bar_hit, hit, disk_hit)
