@@ -113,6 +113,13 @@ def test_a_rigid_body_and_a_flexible_striker_come_back_from_the_command(tmp_path
     assert read.energies["striker"] == told["energies"]["striker"]
 
 
+def test_a_blow_by_vectors_is_kept_with_the_motion_of_its_modes(tmp_path, prompt):
+    load_text(tmp_path, FE)
+    assert prompt("strike scene.toml --tolerance 0.1 --out out").status in (0, 3)
+    read, told = fi.load_response("out"), json.loads(Path("out/response.json").read_text())["response"]
+    assert read.vectors is None and read.restitution == told["restitution"] and read.target.n_modes > 1
+
+
 def test_motion_elsewhere_is_refused(small):
     with pytest.raises(ValueError, match="points must lie on the body"):
         fi.load_response(small).displacement([(0.01, 0.01)], [0.0])

@@ -158,7 +158,6 @@ def test_too_large_a_map_is_refused_and_a_costly_one_says_so(tmp_path, prompt):
     ("line", "message"),
     [
         ("map drumstick_map --out map.png", "--out must name a folder for map.nc, map.csv and pictures"),
-        ("map marked_linear", "[map] is missing; add it and name the axes, as in over = {"),
         ("hammer drumstick_map --bandwidth 0", "bandwidth must lie between 0.001 and 1e+09 Hz, got 0 Hz"),
         (
             "hammer drumstick_map --bandwidth 500 --masses 1e30 0.2",

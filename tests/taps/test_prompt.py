@@ -63,7 +63,6 @@ def test_fit_proposes_the_model_and_lists_what_was_tried(prompt):
     [(["--unknown", "contact.stiffness=3"], "must read NAME=LOW:HIGH"),
      (["--propose", "--known", "striker.mass=0.1"], "--known must be left out beside --propose"),
      (["--propose", "--per-tap", "striker.mass"], "--per-tap must be left out"),
-     (["--unknown", "tip=1:2"], "must be one of"),
      (["--known", "striker.mass=x"], "must read NAME=VALUE"), (["--force", "hammer"], "is no channel")],
 )  # fmt: skip
 def test_wrong_commands_say_what_is_wrong(words, said, prompt):
