@@ -9,6 +9,8 @@ import time
 from concurrent.futures import Future, ThreadPoolExecutor
 
 import pytest
+from tornado.httpclient import HTTPRequest
+from tornado.websocket import websocket_connect
 
 import fem_impact as fi
 from fem_impact.pages import explore_map, explore_numbers, explore_server, explore_session
@@ -217,8 +219,6 @@ def test_a_process_that_ended_is_told_in_one_line(explorer, good, told):
     assert any(one.get("exact") for one in said) == good
 
 
-UPGRADE = "GET /talk HTTP/1.1\r\nHost: {0}\r\nOrigin: http://{0}\r\nUpgrade: websocket\r\nConnection: Upgrade\r\n"
-UPGRADE += "Sec-WebSocket-Key: dGhlIHNhbXBsZSBub25jZQ==\r\nSec-WebSocket-Version: 13\r\n\r\n"
 BAD = {
     "nested": "[" * 60_000,
     "large": '{"turn": {"mass": 1%s}}' % ("0" * 400),
@@ -230,13 +230,9 @@ BAD = {
 
 async def talk(host, text):
     """A connection that has sent a message, as a page would."""
-    reader, writer = await asyncio.open_connection(*host.split(":"))
-    writer.write(UPGRADE.format(host).encode())
-    await reader.readuntil(b"\r\n\r\n")
-    raw = text.encode()
-    size = bytes([0x80 | len(raw)]) if len(raw) < 126 else b"\xfe" + len(raw).to_bytes(2, "big")
-    writer.write(b"\x81" + size + bytes(4) + raw)
-    return reader, writer
+    page = await websocket_connect(HTTPRequest(f"ws://{host}/talk", headers={"Origin": f"http://{host}"}))
+    await page.write_message(text)
+    return page
 
 
 def test_pages_that_vanish_or_send_nonsense_are_one_line_each(explorer, caplog, monkeypatch, tmp_path):
@@ -249,15 +245,14 @@ def test_pages_that_vanish_or_send_nonsense_are_one_line_each(explorer, caplog, 
         server, address = explore_server.open_server(explorer, [Beside(explorer), Beside(explorer)], 0, tmp_path)
         host = address.split("/")[2]
         for _ in range(5):
-            _, writer = await talk(host, '{"number": 1, "turn": {"mass": 0.02}}')
-            writer.transport.abort()
+            page = await talk(host, '{"number": 1, "turn": {"mass": 0.02}}')
+            page.protocol.stream.close()  # without a word
+            page.close()
         for text in BAD.values():
-            reader, writer = await talk(host, text)
-            frame, size = await reader.readexactly(2)
-            assert frame == 0x81 and size == 126  # what lies on the bench
-            await reader.readexactly(int.from_bytes(await reader.readexactly(2), "big"))
-            assert (await reader.read(2))[0] == 0x88  # the connection is closed
-            writer.transport.abort()
+            page = await talk(host, text)
+            assert json.loads(await page.read_message())["kind"] == "setup"  # what lies on the bench
+            assert await page.read_message() is None  # the connection is closed
+            page.close()
         while sum("page" in record.getMessage() for record in caplog.records) < 5 + len(BAD):
             await asyncio.sleep(0.01)
         server.stop()
