@@ -29,7 +29,7 @@ from random import Random
 import numpy as np
 import pytest
 from scenes import QUICK as SCENE
-from scenes import load_text
+from scenes import SHIPPED, load_text
 
 import fem_impact as fi
 from fem_impact import cli
@@ -44,7 +44,6 @@ PATIENCE = 10.0  # [s] per input
 MEMORY = 2 << 30  # [byte] more than the process has when it begins
 SHORT_PATIENCE = 0.5  # [s] of the process that reads a mesh; the files here are read in a hundredth of it
 PACKAGE = str(Path(fi.__file__).parent)
-SCENES = Path(__file__).parents[1] / "studies" / "scenes"
 
 NUMBER = re.compile(rb"[-+]?\d+(?:\.\d*)?(?:[eE][-+]?\d+)?")
 NUMBERS = [b"nan", b"inf", b"-inf", b"1e308", b"-1e308", b"5e-324", b"1e999", b"-1", b"0", b"-0.0", b"1", b"2", b"7"]
@@ -232,12 +231,12 @@ def read_uff(path: Path) -> object:
 
 def scene_samples() -> list[tuple[str, bytes]]:
     """The scenes of the studies."""
-    return [(path.name, path.read_bytes()) for path in sorted(SCENES.glob("*.toml"))]
+    return [(path.name, path.read_bytes()) for path in sorted(SHIPPED.glob("*.toml"))]
 
 
 def result_samples() -> list[tuple[str, bytes]]:
     """What `fem-impact strike` keeps of a scene, without the numbers that nothing reads back."""
-    scenes = [fi.load_scene(path) for path in sorted(SCENES.glob("*.toml"))]
+    scenes = [fi.load_scene(path) for path in sorted(SHIPPED.glob("*.toml"))]
     return [(f"response{i}.json", json.dumps({"scene": fi.export.plain(scene.data())}, indent=1).encode())
             for i, scene in enumerate(scenes)]  # fmt: skip
 

@@ -26,3 +26,8 @@ def fitted(taps, **changes):
     given = {"target": STRUCTURE, "at": [0.0], "striker": fi.Striker.rigid(0.1), "contact": LAW, "unknown": RANGES,
              "starts": 2, "profiles": False}  # fmt: skip
     return fi.fit(taps, **given | changes)
+
+
+def said(made, text):
+    """Whether taps or a fit note a text."""
+    return any(text in note for note in made.notes)

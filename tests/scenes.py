@@ -1,6 +1,11 @@
-"""Scenes that strike at once, as text, for tests of everything around the strike."""
+"""Scenes that strike at once, as text, for tests of everything around the strike, and where those of files are."""
+
+from pathlib import Path
 
 import fem_impact as fi
+
+ROOT = Path(__file__).parents[1]
+MESHES, MEASURED, SHIPPED = ROOT / "meshes", ROOT / "studies" / "measured", ROOT / "studies" / "scenes"
 
 QUICK = """
 [mesh]

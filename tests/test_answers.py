@@ -3,18 +3,16 @@
 import argparse
 import re
 import shlex
-from pathlib import Path
 
 import mido
 import pytest
 from jsonschema import Draft7Validator
-from scenes import BAR, QUICK, SMALL, TITLED
+from scenes import BAR, QUICK, ROOT, SMALL, TITLED
 
 import fem_impact as fi
 from fem_impact import answers, arguments
 from fem_impact.pages import lesson_grid
 
-ROOT = Path(__file__).parents[1]
 TAPS = ROOT / "studies" / "measured" / "acceleration.lvm"
 STROKES = "[[stroke]]\nwhen = 0.03\n[[stroke]]\nwhen = 0.0\nspeed = 0.5\n"
 RUNS = {  # words that run each command in a second or two

@@ -2,13 +2,10 @@
 
 import ast
 from functools import cache
-from pathlib import Path
 
 import constants as study
 import pytest
-
-ROOT = Path(__file__).parents[1]
-
+from scenes import ROOT
 
 KNOWN = study.constants()
 

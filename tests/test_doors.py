@@ -10,12 +10,12 @@ import own_modes
 import own_striker
 import own_theory
 import pytest
+from scenes import ROOT
 
 import fem_impact as fi
 from fem_impact.fe import euler
 from fem_impact.fe.theory import Term
 
-ROOT = Path(__file__).parents[1]
 PAGE = (ROOT / "studies" / "site" / "doors.md").read_text(encoding="utf-8")
 DOORS = own_law, own_striker, own_theory, own_modes, own_estimator
 ROUNDING = 1e-13  # [-] as `fi.verify` allows: what double precision leaves of a closed form

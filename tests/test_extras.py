@@ -3,16 +3,14 @@
 import subprocess
 import sys
 import tomllib
-from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
-from scenes import TITLED
+from scenes import ROOT, TITLED
 
 from fem_impact import doctor
 from fem_impact.show import pictures
 
-ROOT = Path(__file__).parents[1]
 MODULES = [module for _, *modules in doctor.EXTRAS.values() for module in modules]
 MAP = '[map.over]\n"striker.mass" = [0.02, 0.03]\n'
 

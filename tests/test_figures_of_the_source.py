@@ -3,17 +3,17 @@
 import csv
 import runpy
 from importlib import import_module
-from pathlib import Path
 
 import numpy as np
 import other_choices
 import pytest
 import source_scenes as source
 from numpy.testing import assert_allclose
+from scenes import ROOT
 
 import fem_impact as fi
 
-FIGURES = Path(__file__).parents[1] / "studies" / "figures"
+FIGURES = ROOT / "studies" / "figures"
 
 
 def study(number):

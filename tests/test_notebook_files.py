@@ -3,12 +3,12 @@
 import json
 import re
 from importlib import import_module
-from pathlib import Path
 
 import pytest
 from comparing import assert_printed
+from scenes import ROOT
 
-HOME = Path(__file__).parents[1] / "studies" / "notebooks"
+HOME = ROOT / "studies" / "notebooks"
 FILES = sorted(HOME.glob("*.ipynb"))
 
 

@@ -12,8 +12,8 @@ from pathlib import Path
 
 import pytest
 import yaml
+from scenes import ROOT
 
-ROOT = Path(__file__).parents[1]
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
 LICENCE = (ROOT / "LICENSE").read_text(encoding="utf-8")
 AUTHORS = "the fem_impact authors"

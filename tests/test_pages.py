@@ -2,19 +2,18 @@
 
 import re
 from functools import cache
-from pathlib import Path
 
 import api
 import catalogue
 import commands
 import pytest
 import scene_keys
+from scenes import ROOT
 
 import fem_impact as fi
 from fem_impact._base import explained
 from fem_impact.impact import assumption
 
-ROOT = Path(__file__).parents[1]
 PAGES = sorted([*ROOT.glob("*.md"), *(ROOT / "studies").rglob("*.md")])
 FENCE = re.compile(r"^```.*?^```$", re.MULTILINE | re.DOTALL)
 LINK = re.compile(r"!?\[[^\]]*\]\(([^)\s]+)\)")

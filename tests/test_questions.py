@@ -1,15 +1,14 @@
 """Each answer on the page of questions runs as it stands there and prints what the page says."""
 
 import re
-from pathlib import Path
 from typing import NamedTuple
 
 import pytest
 from comparing import assert_printed
+from scenes import ROOT
 
 from fem_impact import arguments
 
-ROOT = Path(__file__).parents[1]
 TEXT = (ROOT / "studies" / "site" / "questions.md").read_text(encoding="utf-8")
 SLOW = (  # above 0.3 s
     "hear what my mallet", "tune a bar", "drawing of my instrument", "choose hammer", "frequency responses",

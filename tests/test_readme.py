@@ -6,18 +6,17 @@ import re
 import shlex
 import subprocess
 import sys
-from pathlib import Path
 
 import hats
 import numpy as np
 import pytest
 from comparing import assert_printed
+from scenes import ROOT
 from signatures import everything
 
 import fem_impact as fi
 from fem_impact import arguments
 
-ROOT = Path(__file__).parents[1]
 README, GUIDE = ((ROOT / name).read_text(encoding="utf-8") for name in ("README.md", "studies/guide.md"))
 NUMBER = r"(?<![\w.])\d+(?:\.\d+)?(?:e[+-]\d+)?"
 

@@ -6,7 +6,6 @@ import subprocess
 import sys
 import tomllib
 from dataclasses import replace
-from pathlib import Path
 
 import gallery
 import links
@@ -14,10 +13,9 @@ import names
 import pytest
 import quoted
 import yaml
+from scenes import ROOT
 
 import fem_impact as fi
-
-ROOT = Path(__file__).parents[1]
 
 
 @pytest.fixture(scope="module")

@@ -1,7 +1,6 @@
 """The studies still reproduce what they were made to show."""
 
 import re
-from pathlib import Path
 
 import assumptions
 import attack
@@ -25,8 +24,9 @@ import roll
 import scene_speed as speed
 import shared
 from numpy.testing import assert_allclose
+from scenes import ROOT
 
-STUDIES = Path(__file__).parents[1] / "studies"
+STUDIES = ROOT / "studies"
 
 
 @pytest.mark.slow

@@ -1,13 +1,12 @@
 """Messages name the headings that explain them: at their end, below a first line, and for programs as a list."""
 
-from pathlib import Path
-
 import pytest
+from scenes import SHIPPED
 
 import fem_impact as fi
 from fem_impact._base import explained
 
-FIRM = Path(__file__).parents[2] / "studies" / "scenes" / "drumstick_firm.toml"
+FIRM = SHIPPED / "drumstick_firm.toml"
 ONE = " (notes.md#not-resolvable)"
 
 

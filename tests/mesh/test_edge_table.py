@@ -5,11 +5,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
+from scenes import MESHES
 
 import fem_impact as fi
 from fem_impact.mesh import edge_table
-
-MESHES = Path(__file__).parents[2] / "meshes"
 
 
 def found(mesh):

@@ -3,18 +3,17 @@
 import re
 import sys
 from dataclasses import replace
-from pathlib import Path
 
 import meshio
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
+from scenes import MESHES
 
 import fem_impact as fi
 
 pytestmark = pytest.mark.usefixtures("read_here")
-MESHES = Path(__file__).parents[2] / "meshes"
-PLATE = fi.Plate(fi.Material(E=210e9, nu=0.3, rho=7850.0), 2e-3)
+PLATE = Plate(Material(E=210e9, nu=0.3, rho=7850.0), 2e-3)
 PER_RATE = np.sqrt(7850 * 2e-3 / (210e9 * 2e-3**3 / (12 * (1 - 0.3**2))))
 GOOD = fi.mesh.rectangle(1.55, 1.0, size=0.25)
 HINGED = np.pi**2 * np.array([1 + 1 / 1.55**2, 1 + 4 / 1.55**2])

@@ -4,12 +4,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from scenes import SHIPPED
 
 import fem_impact as fi
 from fem_impact.pages import frf_page, tap_pictures
 from fem_impact.taps.windows import joined
 
-DRUMSTICK = Path(__file__).parents[2] / "studies" / "scenes" / "drumstick.toml"
+DRUMSTICK = SHIPPED / "drumstick.toml"
 PLATE = fi.analytic.rectangle(0.4, 0.3, mass=1.0, first_frequency=100.0, n_modes=12, damping_ratio=0.01)
 POINTS = np.array([(x, y) for x in (0.06, 0.2, 0.34) for y in (0.05, 0.15)])
 

@@ -4,12 +4,10 @@ import shutil
 from pathlib import Path
 
 import pytest
-from scenes import LEAF
+from scenes import LEAF, MESHES
 
 import fem_impact as fi
 from fem_impact.scenes import templates
-
-MESHES = Path(__file__).parents[2] / "meshes"
 
 
 @pytest.fixture

@@ -2,18 +2,17 @@
 
 import json
 import tomllib
-from pathlib import Path
 
 import pytest
 from jsonschema import Draft7Validator
+from scenes import SHIPPED
 
 import fem_impact as fi
 from fem_impact import cli
 from fem_impact.scenes import editor_schema, templates
 from fem_impact.scenes.schema import MAKERS, TABLES
 
-ROOT = Path(__file__).parents[2]
-SHIPPED = sorted((ROOT / "studies" / "scenes").rglob("*.toml"))
+PATHS = sorted(SHIPPED.rglob("*.toml"))
 SCHEMA = editor_schema.schema()
 CHECKED = Draft7Validator(SCHEMA)
 
@@ -25,14 +24,14 @@ def faults(tables):
 
 
 STROKE = '\n[[stroke]]\nwhen = 0.0\nstriker = { kind = "rigid", mass = 0.01 }\n'
-TEXTS = {path.stem: path.read_text() for path in SHIPPED} | {kind: templates.text(kind) for kind in templates.KINDS}
+TEXTS = {path.stem: path.read_text() for path in PATHS} | {kind: templates.text(kind) for kind in templates.KINDS}
 
 
 @pytest.mark.parametrize("text", [*TEXTS.values(), TEXTS["plate"] + STROKE], ids=[*TEXTS, "strokes"])
 def test_every_shipped_and_every_new_scene_has_a_title_and_satisfies_the_schema(text):
     tables = tomllib.loads(text)
     CHECKED.validate(tables)
-    assert len(SHIPPED) > 20 and tables["title"]
+    assert len(PATHS) > 20 and tables["title"]
 
 
 @pytest.mark.parametrize(

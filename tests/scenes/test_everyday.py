@@ -1,11 +1,11 @@
 """The everyday scenes load, say where their numbers come from and run at their tolerance."""
 
 import re
-from pathlib import Path
 
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
+from scenes import SHIPPED
 
 from fem_impact.fe.section import Material
 from fem_impact.impact.contact import Contact
@@ -13,7 +13,7 @@ from fem_impact.impact.striker import Striker
 from fem_impact.model.idealisation import Surroundings
 from fem_impact.scenes import scene, schema
 
-FOLDER = Path(__file__).parents[2] / "studies" / "scenes" / "everyday"
+FOLDER = SHIPPED / "everyday"
 NAMES = sorted(path.stem for path in FOLDER.glob("*.toml"))
 
 

@@ -3,7 +3,6 @@
 import json
 from contextlib import nullcontext
 from dataclasses import FrozenInstanceError
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -11,7 +10,7 @@ from comparing import examined, worst
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose
-from scenes import SMALL, TITLED, edited, load_text
+from scenes import SHIPPED, SMALL, TITLED, edited, load_text
 
 import fem_impact as fi
 from fem_impact._base import check
@@ -22,7 +21,6 @@ from fem_impact.modes import finding
 from fem_impact.scenes import scene, sentences
 from fem_impact.scenes.sentences import words
 
-SCENES = Path(__file__).parents[2] / "studies" / "scenes"
 SOURCE = 'source = "analytic"'
 RIGID, RECTANGLE = 'kind = "rigid"\nmass = 0.03', 'shape = "rectangle"\nlength = 0.465\nwidth = 0.3'
 MATERIAL = "[material]\nE = 10e9\nnu = 0.3\nrho = 450.0\n"
@@ -284,7 +282,7 @@ def test_mutated_scene_loads_or_says_why(tmp_path, line, value, how):
     ],
 )
 def test_numbers_that_are_none_or_beyond_floats_name_file_and_table_once(tmp_path, name, old, new, words):
-    text = (SCENES / f"{name}.toml").read_text(encoding="utf-8").replace(old, new)
+    text = (SHIPPED / f"{name}.toml").read_text(encoding="utf-8").replace(old, new)
     with pytest.raises(ValueError, match=words) as caught:  # warnings are errors here, and would come first
         load_text(tmp_path, text).strike()
     assert str(caught.value).count("[") == 1 and str(caught.value).count(str(tmp_path / "scene.toml")) == 1

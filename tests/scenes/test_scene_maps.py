@@ -10,7 +10,7 @@ import pytest
 import xarray
 from comparing import worst
 from numpy.testing import assert_allclose
-from scenes import QUICK
+from scenes import QUICK, SHIPPED
 
 import fem_impact as fi
 from fem_impact.fe import refinement
@@ -21,13 +21,12 @@ from fem_impact.scenes.schema import Part
 from fem_impact.show import plots
 from fem_impact.sweeps import grid
 
-SCENES = Path(__file__).parents[2] / "studies" / "scenes"
 OVER = {"contact.stiffness": [2e4, 1e5, 4e5], "striker.mass": [0.02, 0.06, 0.1]}
 
 
 @pytest.fixture(scope="module")
 def scene():
-    return fi.load_scene(SCENES / "drumstick_map.toml")
+    return fi.load_scene(SHIPPED / "drumstick_map.toml")
 
 
 @pytest.fixture(scope="module")
@@ -97,7 +96,9 @@ def test_files_say_what_the_map_holds_and_borders_are_drawn(table, tmp_path):
 
 @pytest.mark.slow
 def test_a_scene_that_gives_no_counts_is_a_picture(tmp_path, prompt):
-    text = (SCENES / "drumstick_map.toml").read_text().replace(", count = 20", "").replace("max_frequency", "# no band")
+    text = (
+        (SHIPPED / "drumstick_map.toml").read_text().replace(", count = 20", "").replace("max_frequency", "# no band")
+    )
     (tmp_path / "ranges.toml").write_text(text)
     told = prompt("map ranges.toml --cells 12 --out out --workers 1")
     assert told.status == 0 and "144 blows over stiffness (12), mass (12)" in told.out
@@ -138,7 +139,7 @@ def test_zarr_keeps_why_a_cell_failed(table, tmp_path):
 
 
 def test_too_large_a_map_is_refused_and_a_costly_one_says_so(tmp_path, prompt):
-    text = (SCENES / "drumstick_map.toml").read_text()
+    text = (SHIPPED / "drumstick_map.toml").read_text()
     for count, words in (
         (10**6, ("over asks for 1e+12 cells: about",
                  # seven layers and two more numbers of 8 byte
@@ -168,7 +169,7 @@ def test_too_large_a_map_is_refused_and_a_costly_one_says_so(tmp_path, prompt):
 )
 def test_slips_at_the_prompt_are_told_before_the_work(line, message, prompt):
     verb, name, *rest = line.split()
-    said = prompt([verb, f"{SCENES / name}.toml", *rest])
+    said = prompt([verb, f"{SHIPPED / name}.toml", *rest])
     assert said.status == 2 and message in " ".join(said.err.split())
 
 
@@ -190,7 +191,7 @@ def test_a_map_that_needs_too_many_modes_says_what_to_leave_out():
 
 @pytest.mark.slow
 def test_hammer_at_the_prompt(prompt):
-    words = ["hammer", SCENES / "drumstick_map.toml", "--bandwidth", "400", "--masses", "0.002", "0.2"]
+    words = ["hammer", SHIPPED / "drumstick_map.toml", "--bandwidth", "400", "--masses", "0.002", "0.2"]
     works = [hammer["softest"] is not None for hammer in prompt("", *words, "--json").json["hammers"]]
     assert works == [True, True, False]  # the second is the last that does
     assert "200 g: no tip reaches 400 Hz and hits once" in " ".join(prompt("", *words).out.split())

@@ -1,36 +1,34 @@
 """Shipped scenes have answers to trust, but for one that shows what is said of the others, and its cure."""
 
-from pathlib import Path
-
 import pytest
+from scenes import SHIPPED
 
 import fem_impact as fi
 
-FOLDER = Path(__file__).parents[2] / "studies" / "scenes"
 SHOWN = "drumstick_firm.toml"
-NAMES = sorted(path.name for path in FOLDER.glob("*.toml") if path.name != SHOWN)
+NAMES = sorted(path.name for path in SHIPPED.glob("*.toml") if path.name != SHOWN)
 
 
 @pytest.mark.parametrize(
     "name", [pytest.param(name, marks=pytest.mark.slow) if name == "guitar_top.toml" else name for name in NAMES]
 )
 def test_a_shipped_scene_has_an_answer_to_trust(name):
-    hit = fi.load_scene(FOLDER / name).strike()
+    hit = fi.load_scene(SHIPPED / name).strike()
     assert hit.trusted, hit.verdict
 
 
 @pytest.mark.slow
 @pytest.mark.xdist_group("stretched")
 def test_the_scene_that_is_not_trusted_names_its_cure(tmp_path):
-    text = (FOLDER / SHOWN).read_text(encoding="utf-8")
-    wrong = fi.load_scene(FOLDER / SHOWN).strike()
+    text = (SHIPPED / SHOWN).read_text(encoding="utf-8")
+    wrong = fi.load_scene(SHIPPED / SHOWN).strike()
     told = "but the model is wrong here: the deflection is 1.3 times the thickness"
     assert not wrong.trusted and told in wrong.verdict
     assert f"{wrong.restitution:.2f} to 0.64" in " ".join(text.replace("\n# ", " ").split())
     (tmp_path / SHOWN).write_text(text.replace("\n# stretching", "\nstretching").replace("\n# air", "\nair"))
     cured = fi.load_scene(tmp_path / SHOWN).strike()
     assert cured.trusted and round(cured.restitution, 2) == 0.64
-    chosen = fi.load_scene(FOLDER / SHOWN).run(model="auto")
+    chosen = fi.load_scene(SHIPPED / SHOWN).run(model="auto")
     assert chosen.response.restitution == pytest.approx(cured.restitution, abs=1e-9)
     assert sum("that took" in note for note in chosen.notes) == 2
 
@@ -39,7 +37,7 @@ UNTRUSTED = (
     "ball_toughened_pane", "ball_window_pane", "drumhead_buzz", "guitar_fingernail", "guitar_plectrum_celluloid",
     "timpano_felt",
 )  # fmt: skip
-EVERYDAY = sorted((FOLDER / "everyday").glob("*.toml"))
+EVERYDAY = sorted((SHIPPED / "everyday").glob("*.toml"))
 
 
 @pytest.mark.slow

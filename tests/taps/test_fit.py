@@ -1,14 +1,11 @@
 """From taps to a model: what is told, what is not, and how well other taps are predicted."""
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 from hammer_taps import LAW, MASS, RANGES, RATE, STRUCTURE, fitted, taps_of
+from scenes import MEASURED
 
 import fem_impact as fi
-
-MEASURED = Path(__file__).parents[2] / "studies" / "measured"
 
 
 @pytest.fixture(scope="module")

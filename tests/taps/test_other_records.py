@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from hammer_taps import RATE
+from hammer_taps import RATE, said
 from scenes import load_text
 
 import fem_impact as fi
@@ -50,10 +50,6 @@ def hits():
 @pytest.fixture(scope="module")
 def force(hits):
     return record(hits)
-
-
-def said(made, text):
-    return any(text in note for note in made.notes)
 
 
 def first_above(force, start):

@@ -6,13 +6,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 import xarray as xr
+from scenes import MEASURED, SHIPPED
 
 import fem_impact as fi
 from fem_impact.taps import prompt
 
-ROOT = Path(__file__).parents[2]
-TAPS = ROOT / "studies" / "measured" / "acceleration_multi.lvm"
-DRUMSTICK = ROOT / "studies" / "scenes" / "drumstick.toml"
+TAPS, DRUMSTICK = MEASURED / "acceleration_multi.lvm", SHIPPED / "drumstick.toml"
 LAW = fi.Contact.hertz(2e8)
 GIVEN = {"striker": fi.Striker.rigid(0.1), "contact": LAW, "unknown": {"contact.stiffness": (1e6, 1e10)}}
 pytestmark = pytest.mark.usefixtures("read_here")

@@ -1,19 +1,13 @@
 """The table of taps: what is found in real records, and what is said about it."""
 
-from pathlib import Path
-
 import numpy as np
 import pytest
+from hammer_taps import RATE, said
+from scenes import MEASURED
 
 import fem_impact as fi
 
 pytestmark = pytest.mark.usefixtures("read_here")
-MEASURED = Path(__file__).parents[2] / "studies" / "measured"
-RATE = 25600.0  # [Hz]
-
-
-def said(taps, text):
-    return any(text in note for note in taps.notes)
 
 
 def test_four_segments_with_decimal_points():

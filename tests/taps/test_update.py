@@ -1,13 +1,12 @@
 """Material constants from measured frequencies."""
 
-from pathlib import Path
-
 import numpy as np
 import pytest
+from scenes import SHIPPED
 
 import fem_impact as fi
 
-DISK = Path(__file__).parents[2] / "studies" / "scenes" / "disk.toml"
+DISK = SHIPPED / "disk.toml"
 # [Hz] measured on a wooden plate 0.212 x 0.108 x 0.0045 m, 457 kg/m^3, clamped at one side
 # (Nemus-Project/magpie-matlab, MIT licence)
 MESH = fi.mesh.rectangle(0.4, 0.3, size=0.1)
