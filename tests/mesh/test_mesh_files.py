@@ -13,7 +13,7 @@ from scenes import MESHES
 import fem_impact as fi
 
 pytestmark = pytest.mark.usefixtures("read_here")
-PLATE = Plate(Material(E=210e9, nu=0.3, rho=7850.0), 2e-3)
+PLATE = fi.Plate(fi.Material(E=210e9, nu=0.3, rho=7850.0), 2e-3)
 PER_RATE = np.sqrt(7850 * 2e-3 / (210e9 * 2e-3**3 / (12 * (1 - 0.3**2))))
 GOOD = fi.mesh.rectangle(1.55, 1.0, size=0.25)
 HINGED = np.pi**2 * np.array([1 + 1 / 1.55**2, 1 + 4 / 1.55**2])
@@ -45,7 +45,7 @@ def assert_same_as_good(plate):
 
 @pytest.mark.parametrize("name", ["plate.vtu", "plate.vtk", "plate.xdmf", "plate.stl", "plate.inp"])
 def test_formats_without_names_give_the_same_plate(tmp_path, name):
-    plate = mesh.load(written(tmp_path, GOOD.points, GOOD.cells, name=name))
+    plate = fi.mesh.load(written(tmp_path, GOOD.points, GOOD.cells, name=name))
     if name == "plate.stl":  # single precision
         assert_allclose(held(plate), HINGED, rtol=1e-5)  # refined by find_modes: 1e-6
     else:
@@ -319,7 +319,7 @@ def test_cells_that_would_become_a_hole_are_refused(tmp_path):
 
 def test_units_are_converted(tmp_path):
     path = written(tmp_path, GOOD.points * 1e3, GOOD.cells)
-    assert_allclose(mesh.load(path, unit="mm").area, 1.55)
+    assert_allclose(fi.mesh.load(path, unit="mm").area, 1.55)
     with pytest.raises(ValueError, match="unit must be one of"):
         fi.mesh.load(path, unit="parsec")
 
@@ -346,7 +346,7 @@ def test_what_cannot_be_mended_is_refused_with_the_place(tmp_path, points, cells
 def test_junk_is_refused(tmp_path, capsys):
     (tmp_path / "junk.msh").write_text("hello")
     with pytest.raises(ValueError, match=r"junk\.msh cannot be read as a mesh"):
-        mesh.load(tmp_path / "junk.msh")
+        fi.mesh.load(tmp_path / "junk.msh")
     assert capsys.readouterr() == ("", "")  # errors are raised, not printed
 
 

@@ -34,7 +34,7 @@ def test_title_cannot_command_a_terminal(tmp_path):
 
 def test_scene_strikes_what_the_public_functions_strike(tmp_path):
     hit = load_text(tmp_path, TITLED).strike()
-    body = analytic.rectangle(0.465, 0.3, mass=0.2, first_frequency=100.0, n_modes=hit.target.n_modes).damped(0.01)
+    body = fi.analytic.rectangle(0.465, 0.3, mass=0.2, first_frequency=100.0, n_modes=hit.target.n_modes).damped(0.01)
     blow = {"at": [0.1395, 0.09], "speed": 2.0, "tolerance": Budget(1e-2).half}
     again = collision.strike(body, fi.Striker.rigid(0.03), fi.Contact.hertz(695e3), **blow)
     # the same calls with the same numbers, up to rounding of the scale: 1e-9 of the peak after some 1e3 rad
@@ -44,11 +44,11 @@ def test_scene_strikes_what_the_public_functions_strike(tmp_path):
 
 @pytest.mark.parametrize(("text", "law"), [
     ('"layers"\nstiffness = 1e5\nexponent = 1.2\ndepth = 2e-4\nhard_stiffness = 1e7',
-     Contact.layers(1e5, 1.2, depth=2e-4, hard_stiffness=1e7)),
+     fi.Contact.layers(1e5, 1.2, depth=2e-4, hard_stiffness=1e7)),
     ('"elastic_plastic"\nstiffness = 695e3\nyield_speed = 0.1\nmass = 0.03',
-     Contact.elastic_plastic(695e3, yield_speed=0.1, mass=0.03)),
+     fi.Contact.elastic_plastic(695e3, yield_speed=0.1, mass=0.03)),
     ('"felt"\nstiffness = 695e3\nexponent = 1.5\nhysteresis = 0.2\nrelaxation = 1e-3',
-     Contact.felt(695e3, 1.5, hysteresis=0.2, relaxation=1e-3)),
+     fi.Contact.felt(695e3, 1.5, hysteresis=0.2, relaxation=1e-3)),
 ])  # fmt: skip
 def test_contacts_that_lose_and_a_hammer_in_a_scene(tmp_path, text, law):
     hammer = 'kind = "hammer"\nhead = 0.03\nhandle = 0.05\nstiffness = 1e4\ndamping = 2.0'
