@@ -191,8 +191,7 @@ def cut(
         quiet = slice(max(0, first), max(0, start - max(3, (start - first) // 4)))
         slope = rests[k] - rests[k][start]  # (n_samples,) [N]
         flat = row - slope
-        rest = flat[quiet], other[quiet]
-        base = (np.median(rest[0]), np.median(rest[1], axis=0)) if len(rest[0]) >= FEWEST else (0.0, 0.0)
+        base = (np.median(flat[quiet]), np.median(other[quiet], axis=0)) if len(flat[quiet]) >= FEWEST else (0.0, 0.0)
         offsets.append(float(base[0]))
         drift = max(drift, float(np.ptp(slope[first:last])))
         rows.append(flat[first:last] - base[0])
