@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from itertools import accumulate
 from typing import Any
 
 import numpy as np
@@ -191,7 +192,7 @@ def _follow(bodies, laws, parts, speed, options, striker=None, at=None, others=(
         raise ValueError(
             "duration or max_impacts must be given, because a constant force keeps pressing the bodies together"
         )
-    firsts = np.cumsum([0, *(len(part.omega) for part in parts)]).tolist()
+    firsts = accumulate((len(part.omega) for part in parts), initial=0)
     held = [first + i for first, part in zip(firsts, parts) for i in range(part.held)]
     pace, own = engine.pace_of(system, held), parts[0]
     if speed and own.touched:
