@@ -258,7 +258,7 @@ def few(cases: Cases) -> Cases:
         columns["damping_ratio", 0] = axes["damping_ratio"]
     found = {name: np.array(values) for name, values in axes.items()}
     for (name, i), column in columns.items():
-        number, levels = int(FAMILIES ** (1.0 / len(columns))), np.array(column)
+        number, levels = int(FAMILIES ** (1.0 / len(columns))), np.array(column, float)
         if len(np.unique(column)) > number:
             for part in np.array_split(np.argsort(column, kind="stable"), number):  # groups of neighbours
                 levels[part] = column[part].mean()
