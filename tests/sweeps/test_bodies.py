@@ -110,12 +110,12 @@ def test_points_off_the_body_and_wrong_axes_are_told_before_the_work(at, over, t
 
 @pytest.mark.slow
 def test_kept_vectors_serve_the_same_map_only(tmp_path, monkeypatch):
-    keep = tmp_path / "kept.npz"
+    store, keep = tmp_path / "map", tmp_path / "map.modes.npz"
 
     def found(mass=0.03):
         over = {"mass": [0.01, mass], "at": [AT, (0.1, 0.2)]}
         blow = Blow(Target.of(plate()), BALL, fi.Contact.hertz(1e6), {"at": AT, "speed": 1.0})
-        return bodies.body_of(blow, over, tolerance=1e-2, keep=keep)[0]
+        return bodies.body_of(blow, over, tolerance=1e-2, store=store)[0]
 
     first, again = found(), found()
     assert keep.stat().st_size < 1e6  # only what the strike points show
