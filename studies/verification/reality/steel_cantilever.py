@@ -21,7 +21,9 @@ def predict() -> Predicted:
     section = fi.Beam.rectangular(steel, width=50.66e-3, height=5.14e-3)
     bar = fi.analytic.beam(0.759, ends=("clamped", "free"), section=section, n_modes=len(MEASURED))
     points = qmc.Sobol(len(KNOWN), seed=0).random(N)
-    E, rho, h, length = (Input.of(name, given).at(column) for (name, given), column in zip(KNOWN.items(), points.T))
+    E, rho, h, length = (
+        Input.of(name, given).distribution.ppf(column) for (name, given), column in zip(KNOWN.items(), points.T)
+    )
     factor = (E / 203e9 * 7850.0 / rho) ** 0.5 * h / 5.14e-3 * (0.759 / length) ** 2
     return Predicted(factor[:, None] * bar.frequencies, model=1e-3)
 
