@@ -147,7 +147,7 @@ def map_of(scene, alone, tolerance=1e-2, side=20):
         "stiffness": law.stiffness * np.geomspace(0.1, 10.0, side),
     }
     base, axes = bodies.body_of(scene.built, over, tolerance=tolerance, alone=alone)
-    return cells.run(base, axes, cells.Job(tolerance)), base.modes.n_modes
+    return cells.compute_map(base, axes, cells.Job(tolerance)), base.modes.n_modes
 
 
 def hammers_of(scene, vectors):
@@ -197,7 +197,7 @@ def by_elements(only):
                 print(f"    {1e3 * first.mass:.4g} g: hardest tip {first.hardest:.4g} and {second.hardest:.4g} N/m")
         seconds, setup, _ = timed(explore_model.Setup.of, scene)
         point, seen, _ = timed(setup.seen, setup.start.at)
-        before, _, _ = timed(lambda: scene.modes(explore_model.MOST_MODES))  # noqa: B023
+        before, _, _ = timed(lambda: scene.modes(100))  # noqa: B023
         print(
             f"  explore opens after {seconds:.1f} s, before after {before:.1f} s or more; a strike point is known by "
             f"{seen.n_modes} vectors after {point:.1f} s"

@@ -17,7 +17,7 @@ import numpy as np
 from numba.core.runtime import rtsys
 
 import fem_impact as fi
-from fem_impact.live.controllers import spread
+from fem_impact.live.controllers import spread_points
 from fem_impact.live.devices import perform
 from fem_impact.live.player import PlayedStroke, Player, Score
 
@@ -41,7 +41,7 @@ def player(kind: type[Player] = Player, **options: object) -> Player:
     """The 1.55 : 1 plate of 200 g under a drumstick through a Hertz spring, with ten points."""
     modes = fi.analytic.rectangle(0.465, 0.3, mass=0.2, first_frequency=100.0, n_modes=N_MODES, damping_ratio=0.005)
     stick, law = fi.Striker.stick(mass=0.1, first_frequency=10e3), fi.Contact.hertz(695e3)
-    return kind(modes, stick, law, points=list(spread(modes, AT, 10)), fastest=FASTEST, **options)  # type: ignore[arg-type]
+    return kind(modes, stick, law, points=list(spread_points(modes, AT, 10)), fastest=FASTEST, **options)  # type: ignore[arg-type]
 
 
 def force_error() -> float:
