@@ -78,8 +78,8 @@ def strike(
             moving = replace(arriving, q=before.displacements[0], p=before.velocities[0])
             return [replace(part, pressed=before.pressing(part.touched)) for part in (moving, target)]
 
-        others = [] if before is None else [start_bodies(each) for each in before.otherwise]
-        return _follow((striker.body, modes), (contact,), start_bodies(before), speed, asked, striker, point[0], others)
+        other = None if before is None else start_bodies(before.otherwise)
+        return _follow((striker.body, modes), (contact,), start_bodies(before), speed, asked, striker, point[0], other)
 
     if speed is None:
         assert before is not None
@@ -166,13 +166,12 @@ def met(
     parts, arriving = _parts(bodies, contacts, speeds, states, forces, asked.residual, strikers)
     for i, each in strikers.items():
         parts[i] = replace(parts[i], bias=parts[i].bias + each.push, held=int(each.hand is not None))
-    others = []
+    other = None
     if before is not None:
         parts = [replace(part, pressed=before.pressing(part.touched)) for part in parts]
-        for state in before.otherwise:
-            moved = zip(parts, state.displacements, state.velocities)
-            others.append([replace(part, q=q, p=p) for part, q, p in moved])
-    return _follow(bodies, [touch.law for touch in contacts], parts, arriving, asked, others=others)
+        state = before.otherwise
+        other = [replace(*each, q=q, p=p) for *each, q, p in zip(parts, state.displacements, state.velocities)]
+    return _follow(bodies, [touch.law for touch in contacts], parts, arriving, asked, other=other)
 
 
 def touching(bodies: Sequence[Modes], touch: Touch, speed: float, residual: bool) -> tuple[KernelSystem, float]:
@@ -182,10 +181,10 @@ def touching(bodies: Sequence[Modes], touch: Touch, speed: float, residual: bool
     return system, engine.pace_of(system).duration
 
 
-def _follow(bodies, laws, parts, speed, options, striker=None, at=None, others=()) -> Response:
+def _follow(bodies, laws, parts, speed, options, striker=None, at=None, other=None) -> Response:
     """Run the blow to the required tolerance and estimate the remaining errors.
 
-    ``others`` are the parts as they would move at the start if the blow before erred, see `State.otherwise`.
+    ``other`` are the parts as they would move at the start if the blow before erred, see `State.otherwise`.
     """
     system, stretched = joined(parts, laws), stretched_in(parts)
     if options.last == (np.inf, 0) and max((system.bias @ system.shape.T).tolist()) > 0.0:
@@ -214,10 +213,9 @@ def _follow(bodies, laws, parts, speed, options, striker=None, at=None, others=(
     left_out, resolvable = what_if.modes_left_out(blow, bodies)
     variations = left_out, *what_if.unstated(blow, bodies), what_if.mesh(blow, bodies)
     errors = {"step": found.error, **what_if.what_if(blow, variations)}
-    moved = [blow.again(other) for other in others]
-    if moved:
-        apart = [distance.of_runs(run, found.coarse, options.quantities, pace=pace) for run in moved]
-        errors["inherited"] = np.maximum.reduce(apart)
+    moved = [blow.again(other)] if other else []
+    for run in moved:
+        errors["inherited"] = distance.of_runs(run, found.coarse, options.quantities, pace=pace)
     what_if.add_poorer_descriptions(blow, bodies, errors)
     whole, n = np.add.reduce([*errors.values()]), options.n_quantities
     if "n_impacts" in options.quantities and whole[n] >= found.fine.margin:

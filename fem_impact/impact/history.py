@@ -143,11 +143,19 @@ class History(check.Locked):
         propagation.replay(self.system, self.steps, self.n_coefficients, times, q, p)
         return q, p
 
-    def motion(self, times: np.ndarray) -> np.ndarray:
-        """Approach [m] of the modes at equally spaced times, (n_times, n_contacts), without the dip of those left out.
+    @cached_property
+    def ended(self) -> "History":
+        """The free motion that follows, from the end state, which only the modes of the run itself have."""
+        return replace(self, start_q=self.end_q, start_p=self.end_p, steps=self.steps[:0], end_time=0.0)
 
-        Needs the end state, which only the modes of the run itself have.
-        """
+    def state(self, time: float) -> np.ndarray:
+        """Modal displacements and velocities (2, n_modes) of the run's own modes at a time."""
+        after = time - self.end_time
+        run, time = (self.ended, after) if after >= 0.0 else (self, time)
+        return np.vstack(run.states(np.array([time])))
+
+    def motion(self, times: np.ndarray) -> np.ndarray:
+        """Approach [m] of its own modes at equally spaced times, (n_times, n_contacts), without the dip of others."""
         n = int(np.searchsorted(times, (1.0 - SAME) * self.end_time))  # nearer to it, as at the end
         found = self.offset + np.vstack(
             [self.states(times[:n])[0] @ self.shape.T, np.zeros((len(times) - n, self.n_contacts))]
@@ -155,14 +163,13 @@ class History(check.Locked):
         after = times[n:] - self.end_time
         if not len(after):
             return found
-        ended = replace(self, start_q=self.end_q, start_p=self.end_p, steps=self.steps[:0])
         if self.stretched is not None:
-            found[n:] += ended.states(after)[0] @ self.shape.T
+            found[n:] += self.ended.states(after)[0] @ self.shape.T
             return found
         rigid, t = self.omega == 0.0, after[:, None]
         drift = self.end_q[rigid] + t * (self.end_p[rigid] + 0.5 * t * self.bias[rigid])
         found[n:] += drift @ self.shape[:, rigid].T
-        q, p = (state[0, ~rigid] for state in ended.states(after[:1]))
+        q, p = (state[0, ~rigid] for state in self.ended.states(after[:1]))
         bodies = self.omega[~rigid], self.zeta[~rigid], self.bias[~rigid]
         for i, row in enumerate(self.shape[:, ~rigid]):
             found[n:, i] += swing(*bodies, (q, p), after, row[None]) + row @ (bodies[2] / bodies[0] ** 2)

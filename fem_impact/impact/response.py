@@ -70,7 +70,7 @@ class Response(Totals, check.Locked):
     # examines whether the model itself is right, when that is asked for
     audit: Callable[["Response"], tuple[Assumption, ...]] | None = field(default=None, repr=False)
     vectors: Modes | None = field(default=None, repr=False)  # all Ritz pairs of the target, if it is described by them
-    # the run in coarser steps, and those from where the blow before may have left the bodies, if it erred
+    # the run in coarser steps, and that from where the blow before would have left the bodies, had it erred
     runs: tuple[History, ...] = field(default=(), repr=False)
     rebounds: np.ndarray | None = None  # (n_impacts,) [-] estimated errors of the restitutions of the impacts
 

@@ -34,31 +34,24 @@ class State(check.Brief):
     remembers: bool = False  # whether a contact may have yielded or be felt that has not recovered
     # (n_contacts, 2, 2) [N], [N/s] at first and second body: forces that deflect the modes left out as they are, rates
     pressed: np.ndarray = field(default_factory=lambda: np.zeros((0, 2, 2)))  # by default the forces that act
-    # of each body (2, 2, n_modes): by how much its displacements and velocities may err, in two ways that all bodies
-    # err together; by default by their ``error``
+    # of each body (2, n_modes): by how much displacements and velocities may err together, by default by ``error``
     doubts: tuple[np.ndarray, ...] = ()
 
     def __post_init__(self) -> None:
         if not len(self.pressed):
             check.settle(self, pressed=np.repeat(self.force[:, None], 2, axis=1))
         if not self.doubts:
-            each = enumerate(zip(self.bodies, self.displacements, self.velocities))
-            check.settle(self, doubts=tuple(self.error * swollen(i, *moving) for i, moving in each))
+            each = zip(self.bodies, self.displacements, self.velocities)
+            check.settle(self, doubts=tuple(self.error * motion(*body) for body in each))
         check.lock_arrays(self)
         for array in (*self.displacements, *self.velocities, *self.doubts):
             array.setflags(write=False)
 
     @property
-    def otherwise(self) -> "tuple[State, ...]":
-        """The same bodies as they would move if the blow before erred as estimated, in each of the ways."""
-        found = []
-        for way in range(2):
-            q, p = zip(*(
-                (q + doubt[way, 0], p + doubt[way, 1])
-                for q, p, doubt in zip(self.displacements, self.velocities, self.doubts)
-            ))  # fmt: skip
-            found.append(replace(self, displacements=q, velocities=p))
-        return tuple(found) if any(doubt.any() for doubt in self.doubts) else ()
+    def otherwise(self) -> "State":
+        """The same bodies as they would move if the blow before erred as estimated."""
+        q = tuple(q + doubt[0] for q, doubt in zip(self.displacements, self.doubts))
+        return replace(self, displacements=q, velocities=tuple(p + d[1] for p, d in zip(self.velocities, self.doubts)))
 
     def of(self, body: int, name: str, modes: Modes) -> tuple[np.ndarray, np.ndarray]:
         """Modal displacements and velocities (n_modes,) of a body; ValueError unless ``modes`` are its own."""
@@ -126,10 +119,9 @@ class State(check.Brief):
         return f"{self.time * 1e3:.4g} ms after the start, {touch}; energies of {len(self.bodies)} bodies: {each}"
 
 
-def swollen(body: int, modes: Modes, q: np.ndarray, p: np.ndarray) -> np.ndarray:
-    """All motion of a body (2, 2, n_modes), its rigid position left out; the second way turns with every body."""
-    motion = np.array([np.where(modes.omega == 0.0, 0.0, q), p])
-    return np.array([motion, (-1.0) ** body * motion])
+def motion(modes: Modes, q: np.ndarray, p: np.ndarray) -> np.ndarray:
+    """How a body moves, (2, n_modes), its rigid position left out."""
+    return np.array([np.where(modes.omega == 0.0, 0.0, q), p])
 
 
 def _alike(one: Modes, other: Modes) -> bool:
@@ -149,7 +141,7 @@ def state_at(hit: "Response", time: float | None) -> State:
     which, parts = h.contacts[:, 4].astype(int), np.isfinite(h.contacts[:, 6])
     forces[which[parts & (np.abs(h.contacts[:, 1] - time) <= SAME * time)]] = 0.0  # what steps leave of it at a release
     forces[forces[:, 0] <= SAME * hit.peak_force] = 0.0
-    pressed, own = np.repeat(forces[:, None], 2, axis=1), np.vstack(h.states(np.array([time])))
+    pressed, own = np.repeat(forces[:, None], 2, axis=1), h.state(time)
     for ends in hit.ends:
         for (i, sign), force in zip(ends.touched, ends.pressed(h.omega, own)):
             pressed[i, int(sign < 0.0)] = force
@@ -165,18 +157,15 @@ def _doubts(hit: "Response", time: float, states: list[tuple[np.ndarray, np.ndar
     """How far all bodies may be from a state of a blow, as `State.doubts`.
 
     Its runs tell what its steps and the blow before it do to the motion, which of other causes is as wrong as the
-    numbers of the blow. The two ways add the steps of a blow to what was before and subtract them.
+    numbers of the blow.
     """
     error, bodies = hit.error, (*hit.bodies[:-1], hit.target)
     told = error.step + error.inherited  # of 1 and more, where there may be other impacts, runs tell nothing
     runs = hit.runs if told < 1.0 and hit.target is hit.bodies[-1] else ()
     other = min(1.0, error.total - (told if runs else 0.0))
-    found = [other * swollen(i, modes, q[0], p[0]) for i, (modes, (q, p)) in enumerate(zip(bodies, states))]
+    found = [other * motion(modes, q[0], p[0]) for modes, (q, p) in zip(bodies, states)]
     if runs:
-        fine, coarse, *moved = [np.vstack(run.states(np.array([time]))) for run in (hit.history, *runs)]
-        steps = (coarse - fine) / RICHARDSON[hit.scheme][0]
-        for way, sign in enumerate((1.0, -1.0)):
-            whole = sign * steps + (moved[way] - coarse if moved else 0.0)
-            for i, doubt in enumerate(found):
-                doubt[way] += whole[:, hit.body_slice(i)]
+        fine, coarse, *moved = [run.state(time) for run in (hit.history, *runs)]
+        whole = (coarse - fine) / RICHARDSON[hit.scheme][0] + (moved[0] - coarse if moved else 0.0)
+        found = [doubt + whole[:, hit.body_slice(i)] for i, doubt in enumerate(found)]
     return tuple(found)

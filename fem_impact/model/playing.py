@@ -302,7 +302,7 @@ def strokes(
     end = np.inf if duration is None else played[0].when + check.positive("duration", duration, "s")
     begun = start.state() if isinstance(start, Response) else start
     still = np.zeros(modes.n_modes)
-    game = _Game(modes, played, played[0].when, still, still, np.zeros((2, 2, modes.n_modes)))
+    game = _Game(modes, played, played[0].when, still, still, np.zeros((2, modes.n_modes)))
     if begun is not None:
         if begun.force.any():
             raise ValueError(f"start must be a time when nothing touches; at {begun.time:.4g} s a force acts")
@@ -420,9 +420,8 @@ class _Game:
             tolerance = Budget(rule["tolerance"]).cheap
             needed = collision.striker_modes(striker, contact=one.contact, speed=one.speed, tolerance=tolerance)[0]
             striker = collision.shortened(striker, needed)
-        row = self.modes.shape_at(one.at[None])[0]
-        surface, doubt = float(row @ self.q), np.zeros((2, 2, len(striker.motion)))
-        doubt[:, 0] = np.outer(self.doubt[:, 0] @ row, striker.motion)
+        row, doubt = self.modes.shape_at(one.at[None])[0], np.zeros((2, len(striker.motion)))
+        surface, doubt[0] = float(row @ self.q), (row @ self.doubt[0]) * striker.motion
         if self.hits:  # with the static deflection under those that press now
             surface = float(self.hits[-1].displacement(one.at[None], [self.now - self.starts[-1]])[0, 0])
         return _Stick(number, striker, surface * striker.motion, one.speed * striker.motion, doubt)
@@ -437,9 +436,10 @@ class _Game:
             steps=np.zeros((0, 7 + h.n_coefficients)), now=np.zeros((6, 1)), work=np.zeros(1), end_time=0.0,
             status=record.FINISHED,
         )  # fmt: skip
-        moved = [replace(history, start_q=self.q + dq, start_p=self.p + dp) for dq, dp in self.doubt]
+        q, p = self.q + self.doubt[0], self.p + self.doubt[1]
+        moved = replace(history, start_q=q, start_p=p, end_q=q, end_p=p)
         error = Error(0.0, 0.0, 0.0, hit.error.resolvable, inherited=hit.error.total)
         return Response(
             (self.modes,), hit.contacts[:1], history, 0.0, hit.tolerance, hit.scheme, error,
-            quantities=hit.quantities, runs=(history, *moved),
+            quantities=hit.quantities, runs=(history, moved),
         )  # fmt: skip
