@@ -254,7 +254,7 @@ def test_groups_of_med_are_edges_which_may_overlap(tmp_path, read_here):
     ("*Node\n1,0,0,0\n2,1,0,0\n3,0,1,0\n2,3,0,0", "a.inp has node 2 twice; export it again"),
     ("*NODE, NSET=a\n1,0,0,0\n2,1,0,0\n** parts\n*Node\n1,5,5,0\n2,6,5,0", "several blocks of nodes"),
     ("*Node, system=C\n1,1,0,0\n2,1,90,0\n3,1,180,0", r"a.inp has \*Node, system=C, which is not read"),
-    ("*Node\n1,0,0,0\n2,1,0,0\n3,0,1,0\n*Ngen\n1,3,1", r"a.inp has \*Ngen, which is not read"),
+    ("*Node\n1,0,0,0\n2,1,0,0\n3,0,1,0\n*Ngen\n1,3,1", r"has \*Ngen, which is not read; write all nodes by x, y"),
 ])  # fmt: skip
 def test_decks_of_abaqus_whose_nodes_would_be_lost_are_refused(tmp_path, read_here, nodes, said):
     (tmp_path / "a.inp").write_text(f"{nodes}\n*Element, type=S3\n1,1,2,3\n")
