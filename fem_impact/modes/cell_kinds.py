@@ -97,7 +97,8 @@ def refuse_twice(frequencies: np.ndarray, shapes: np.ndarray, holder: str = "fil
     flat = shapes.reshape(math.prod(shapes.shape[:-1]), len(frequencies))  # which may be none
     seen: set[tuple[float, int]] = set()
     for frequency, mode in zip(frequencies.tolist(), flat.T):
-        mark = frequency, hash(mode.tobytes())
+        first = mode[mode.nonzero()[0][:1]].sum()
+        mark = frequency, hash((np.sign(first) * mode + 0.0).tobytes())  # of either sign it is the same mode
         if mark in seen and len(shapes) > 3 and mode.any():
             raise ValueError(f"{holder} must hold each mode once, but that at {frequency:g} Hz is there twice")
         seen.add(mark)

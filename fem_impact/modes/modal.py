@@ -516,7 +516,7 @@ def _numbers_of_points(loads: Any, n_points: int, given: bool) -> np.ndarray:
     if loads is None:
         return np.arange(n_points if given else 0)
     numbers = check.array("loads", loads, (None,)).astype(int)
-    wrong = not len(numbers) or (numbers < 0).any() or (numbers >= n_points).any()
+    wrong = not len(numbers) or (numbers < 0).any() or (numbers >= n_points).any() or (numbers != np.ravel(loads)).any()
     if wrong or not given or len(np.unique(numbers)) < len(numbers):
         raise ValueError(
             f"loads must be different numbers of points from 0 to {n_points - 1} with a column of compliance each, got "

@@ -85,8 +85,9 @@ def test_where_a_unit_load_is_known_nothing_is_estimated():
     here, there = struck(modes, at=(0.1,)), struck(modes, at=(0.2,))
     assert here.restitution == struck(whole, at=(0.1,)).restitution and "not stated" not in here.verdict
     assert "not stated of the target: static compliance" in there.verdict
-    with pytest.raises(ValueError, match="loads must be different numbers of points from 0 to 40"):
-        bar(12, compliance=whole.shapes.deflection(POINTS[[10]], POINTS), loads=[41])
+    for wrong in (41, 10.5):
+        with pytest.raises(ValueError, match="loads must be different numbers of points from 0 to 40"):
+            bar(12, compliance=whole.shapes.deflection(POINTS[[10]], POINTS), loads=[wrong])
 
 
 def test_a_body_in_three_dimensions_may_be_a_bar_or_a_plate():
