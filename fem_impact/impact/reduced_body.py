@@ -97,12 +97,13 @@ class ReducedBody:
     def thinner(self) -> "list[tuple[ReducedBody, float]]":
         """The body with its upper modes replaced by their compliance, and the ratio of old to new highest frequency.
 
-        One for each of THINNED that leaves modes out.
+        One for each of THINNED that leaves out other modes.
         """
-        flexible, found = self.omega[self.omega > 0.0], []
+        found: list[tuple[ReducedBody, float]] = []
+        flexible = self.omega[self.omega > 0.0]
         for wanted in THINNED if self.yields and len(flexible) > 1 else ():
             n = int(self.omega.searchsorted(max(flexible[-1] / wanted, flexible[0]), side="right"))
-            if n == len(self.omega):
+            if n == len(found[-1][0].omega if found else self.omega):
                 continue
             gone = self.rows[:, n:] / self.omega[n:]
             thin = replace(

@@ -99,14 +99,16 @@ def modes_left_out(blow: Followed, bodies: Sequence[Modes]) -> tuple[Variation, 
     Two such runs and a minimum guard against a change that is small by chance: 30 % of the predicted error, the median
     over many blows, but at most ten times what the runs found. Where both differ by less, the prediction does not
     apply, as to contacts that outlast many periods of the modes left out; the truth was more in 2 of 715 random blows.
+    Of bodies with so few modes that there are no two such runs the whole prediction counts: with 30 % of it 45 of 150
+    blows on beams known by two modes and their compliance erred by 1.3 to 3 times what was told, with all of it none.
     The blow with a poorer description of a body that has modes above those of its own tells the error, too.
     """
-    omega_0, softness, expected, looked = np.pi / blow.pace.duration, [0.0] * len(blow.laws), 0.0, True
+    omega_0, softness, least, looked = np.pi / blow.pace.duration, [0.0] * len(blow.laws), 0.0, True
     changes: list[list[tuple[Sequence[ReducedBody], float, float]]] = []
     for i, (part, modes) in enumerate(zip(blow.parts, bodies)):
         if not part.yields:
             continue
-        above = omega_0 / max(omega_0, part.omega[-1])
+        above, expected = omega_0 / max(omega_0, part.omega[-1]), 0.0
         for (k, _), rest in zip(part.touched, part.rest.diagonal().tolist()):
             soft = blow.stiffness[k] * rest
             softness[k] += soft
@@ -116,8 +118,10 @@ def modes_left_out(blow: Followed, bodies: Sequence[Modes]) -> tuple[Variation, 
         for thin, ratio in () if known else part.thinner:
             weight = left_out_weight(ratio, part.zeta[-1])
             changes[-1].append((blow.changed(i, thin), weight, 1.0 / (ratio**0.5 - 1.0)))
-        looked &= len(changes[-1]) == len(THINNED)
-    found = Variation("truncation", changes, 0.3 * expected, 10.0 if looked else np.inf)
+        both = len(changes[-1]) == len(THINNED)
+        least += expected if not both and not known else 0.3 * expected
+        looked &= both
+    found = Variation("truncation", changes, least, 10.0 if looked else np.inf)
     return found, max(softness) <= RESOLVABLE
 
 
