@@ -136,25 +136,28 @@ def state_at(hit: "Response", time: float | None) -> State:
     time = end if time is None else check.non_negative("time", time, "s")
     if time > end and h.status not in (record.FINISHED, record.SETTLED):
         raise ValueError(f"time must be at most {end:g} s, where the run stopped before its end, got {time:g} s")
-    states = [hit.modal_state([time], body=body) for body in range(len(hit.bodies))]
+    own = h.state(time)
+    states = [own[:, hit.body_slice(body)] for body in range(len(hit.bodies))]
+    if hit.target is not hit.bodies[-1]:
+        states[-1] = np.vstack(hit.modal_state([time]))
     forces = np.array([h.force_at(np.array([time]), i) for i in range(len(hit.contacts))])[:, :, 0]
     which, parts = h.contacts[:, 4].astype(int), np.isfinite(h.contacts[:, 6])
     forces[which[parts & (np.abs(h.contacts[:, 1] - time) <= SAME * time)]] = 0.0  # what steps leave of it at a release
     forces[forces[:, 0] <= SAME * hit.peak_force] = 0.0
-    pressed, own = np.repeat(forces[:, None], 2, axis=1), h.state(time)
+    pressed = np.repeat(forces[:, None], 2, axis=1)
     for ends in hit.ends:
         for (i, sign), force in zip(ends.touched, ends.pressed(h.omega, own)):
             pressed[i, int(sign < 0.0)] = force
     remembers = any(law.remembers for law in hit.contacts) and any(impact.start < time for impact in hit.impacts)
     bodies = (*hit.bodies[:-1], hit.target)
     return State(
-        time, bodies, tuple(q[0] for q, _ in states), tuple(p[0] for _, p in states), forces,
-        min(hit.error.total, 1.0), hit.striker, hit.contacts, hit.at, remembers, pressed, _doubts(hit, time, states),
+        time, bodies, tuple(q for q, _ in states), tuple(p for _, p in states), forces, min(hit.error.total, 1.0),
+        hit.striker, hit.contacts, hit.at, remembers, pressed, _doubts(hit, time, own, states),
     )  # fmt: skip
 
 
-def _doubts(hit: "Response", time: float, states: list[tuple[np.ndarray, np.ndarray]]) -> tuple[np.ndarray, ...]:
-    """How far all bodies may be from a state of a blow, as `State.doubts`.
+def _doubts(hit: "Response", time: float, own: np.ndarray, states: list[np.ndarray]) -> tuple[np.ndarray, ...]:
+    """How far all bodies may be from a state of a blow, ``own`` that of its run, as `State.doubts`.
 
     Its runs tell what its steps and the blow before it do to the motion, which of other causes is as wrong as the
     numbers of the blow.
@@ -163,9 +166,9 @@ def _doubts(hit: "Response", time: float, states: list[tuple[np.ndarray, np.ndar
     told = error.step + error.inherited  # of 1 and more, where there may be other impacts, runs tell nothing
     runs = hit.runs if told < 1.0 and hit.target is hit.bodies[-1] else ()
     other = min(1.0, error.total - (told if runs else 0.0))
-    found = [other * motion(modes, q[0], p[0]) for modes, (q, p) in zip(bodies, states)]
+    found = [other * motion(modes, *state) for modes, state in zip(bodies, states)]
     if runs:
-        fine, coarse, *moved = [run.state(time) for run in (hit.history, *runs)]
-        whole = (coarse - fine) / RICHARDSON[hit.scheme][0] + (moved[0] - coarse if moved else 0.0)
+        coarse, *moved = [run.state(time) for run in runs]
+        whole = (coarse - own) / RICHARDSON[hit.scheme][0] + (moved[0] - coarse if moved else 0.0)
         found = [doubt + whole[:, hit.body_slice(i)] for i, doubt in enumerate(found)]
     return tuple(found)
