@@ -31,7 +31,7 @@ class Balance:
     @classmethod
     def of(cls, h: History, contacts: Sequence[Contact]) -> "Balance":
         """The balance of a run."""
-        start_contact = float(law.stored(h.offset + h.shape @ h.start_q, h.law))
+        start_contact = float(law.stored(h.offset + h.shape @ h.start_q - law.dents(h.law), h.law))
         end_contact = float(law.stored(h.now[layout.APPROACH] - law.dents(h.end_law), h.end_law))
         start, end = h.energy(h.start_q, h.start_p), h.energy(h.end_q, h.end_p)
         work = float(h.work.sum())

@@ -76,7 +76,7 @@ def strike(
                 surface = float(struck.rows[0] @ target.q) * striker.motion
                 return [replace(arriving, q=surface, p=speed * striker.motion), target]
             moving = replace(arriving, q=before.displacements[0], p=before.velocities[0])
-            return [replace(part, pressed=before.pressing(part.touched)) for part in (moving, target)]
+            return [before.go_on(part) for part in (moving, target)]
 
         other = None if before is None else start_bodies(before.otherwise)
         return _follow((striker.body, modes), (contact,), start_bodies(before), speed, asked, striker, point[0], other)
@@ -168,9 +168,9 @@ def met(
         parts[i] = replace(parts[i], bias=parts[i].bias + each.push, held=int(each.hand is not None))
     other = None
     if before is not None:
-        parts = [replace(part, pressed=before.pressing(part.touched)) for part in parts]
         state = before.otherwise
-        other = [replace(*each, q=q, p=p) for *each, q, p in zip(parts, state.displacements, state.velocities)]
+        moved = [replace(*each, q=q, p=p) for *each, q, p in zip(parts, state.displacements, state.velocities)]
+        parts, other = [before.go_on(part) for part in parts], [state.go_on(part) for part in moved]
     return _follow(bodies, [touch.law for touch in contacts], parts, arriving, asked, other=other)
 
 

@@ -154,6 +154,8 @@ def pace_of(system: KernelSystem, held: Sequence[int] = ()) -> Pace:
         if not mobile.size:
             continue
         approach = system.offset[i] + float(system.shape[i] @ system.q)
+        if law.memory:
+            approach -= float(law_of(law).sunk(law, np.array(law.memory), np.array(0.0)))
         pull = max(0.0, float(system.shape[i] @ system.bias))  # [m/s**2]
         speed = float(np.abs(system.shape[i]) @ np.abs(system.p))
         if pull:

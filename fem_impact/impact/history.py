@@ -10,6 +10,7 @@ from .._base import check
 from .._base.rounding import ROUNDING, SAME
 from .compiled import layout, propagation, record
 from .compiled.bundles import KernelSystem
+from .compiled.law import Row, law_of
 from .contact import sunk
 from .free_motion import swing
 from .stretched import Stretched
@@ -153,6 +154,21 @@ class History(check.Locked):
         after = time - self.end_time
         run, time = (self.ended, after) if after >= 0.0 else (self, time)
         return np.vstack(run.states(np.array([time])))
+
+    def remembered(self, time: float, state: np.ndarray) -> np.ndarray:
+        """What each contact remembers at a time, where the modes are in a ``state`` (2, n_modes), (n_contacts,)."""
+        found, left = self.now[layout.REMEMBERED].copy(), time - self.end_time
+        if not left:
+            return found
+        if left < 0.0:
+            row = int(self.steps[:, layout.START].searchsorted(time, side="right")) - 1
+            found, left = self.steps[row, -self.n_contacts :].copy(), time - float(self.steps[row, layout.START])
+        approach = self.offset + self.shape @ state[0]
+        for i in self.law["kind"].nonzero()[0].tolist():
+            law = Row._make(self.law[i].item())
+            force = float(self.force_at(np.array([time]), i)[0][0])
+            found[i] = law_of(law).remembered(law, found[i], approach[i] - law.compliance * force, force, left)
+        return found
 
     def motion(self, times: np.ndarray) -> np.ndarray:
         """Approach [m] of its own modes at equally spaced times, (n_times, n_contacts), without the dip of others."""

@@ -69,6 +69,7 @@ class ReducedBody:
     stretching: Stretching | None = None
     speed: float = 0.0  # [m/s] with which it arrives in rigid motion, at its first contact
     coming: np.ndarray | None = None  # (n_modes,) modal velocities per unit of that speed, of a striker in `collide`
+    memory: np.ndarray | None = None  # (n_ends,) what its contacts remember at the start; None: nothing
     held: int = 0  # [-] first modes that only a hand makes swing: within a contact they move like a mass
 
     @cached_property
@@ -232,6 +233,8 @@ def joined(parts: Sequence[ReducedBody], laws: Sequence[Contact]) -> KernelSyste
         columns[:, own] = part.omega, part.zeta, part.bias, part.q, part.p
         for (i, sign), row in zip(part.touched, part.rows):
             shape[i, own] += sign * row
+        if part.memory is not None:
+            law["memory"][[i for i, _ in part.touched]] = part.memory
         if part.yields and not form.size:
             first, sign = part.touched[0]
             law["compliance"][first] += part.rest[0, 0]

@@ -11,6 +11,7 @@ from .._base.rounding import SAME
 from ..modes.modal import Modes
 from .compiled import record
 from .contact import Contact
+from .reduced_body import ReducedBody
 from .stepping import RICHARDSON
 from .striker import Striker
 
@@ -31,15 +32,18 @@ class State(check.Brief):
     striker: Striker | None = None
     contacts: tuple[Contact, ...] = ()
     at: np.ndarray | None = None  # (dimension,) [m] strike point
-    remembers: bool = False  # whether a contact may have yielded or be felt that has not recovered
     # (n_contacts, 2, 2) [N], [N/s] at first and second body: forces that deflect the modes left out as they are, rates
     pressed: np.ndarray = field(default_factory=lambda: np.zeros((0, 2, 2)))  # by default the forces that act
     # of each body (2, n_modes): by how much displacements and velocities may err together, by default by ``error``
     doubts: tuple[np.ndarray, ...] = ()
+    # (2, n_contacts) what contacts remember, [m] if they yield, [m**exponent] of felt, and by how much it may err
+    memory: np.ndarray = field(default_factory=lambda: np.zeros((2, 0)))
 
     def __post_init__(self) -> None:
         if not len(self.pressed):
             check.settle(self, pressed=np.repeat(self.force[:, None], 2, axis=1))
+        if not self.memory.size:
+            check.settle(self, memory=np.zeros((2, len(self.force))))
         if not self.doubts:
             each = zip(self.bodies, self.displacements, self.velocities)
             check.settle(self, doubts=tuple(self.error * motion(*body) for body in each))
@@ -51,7 +55,10 @@ class State(check.Brief):
     def otherwise(self) -> "State":
         """The same bodies as they would move if the blow before erred as estimated."""
         q = tuple(q + doubt[0] for q, doubt in zip(self.displacements, self.doubts))
-        return replace(self, displacements=q, velocities=tuple(p + d[1] for p, d in zip(self.velocities, self.doubts)))
+        p = tuple(p + doubt[1] for p, doubt in zip(self.velocities, self.doubts))
+        memory, doubt = self.memory
+        changed = np.copysign(np.maximum(0.0, np.abs(memory) + doubt), memory)
+        return replace(self, displacements=q, velocities=p, memory=np.array([changed, doubt]))
 
     def of(self, body: int, name: str, modes: Modes) -> tuple[np.ndarray, np.ndarray]:
         """Modal displacements and velocities (n_modes,) of a body; ValueError unless ``modes`` are its own."""
@@ -70,12 +77,13 @@ class State(check.Brief):
                 f"start must come from a blow of the same bodies and contacts, got {len(self.bodies)} bodies and "
                 f"{len(self.contacts)} contacts for {len(bodies)} and {len(laws)}"
             )
-        self._forgets()
         return [self.of(i, f"bodies[{i}]", modes) for i, modes in enumerate(bodies)]
 
-    def pressing(self, touched: Sequence[tuple[int, float]]) -> np.ndarray:
-        """Forces (n_ends, 2) that deflect the modes left out of a body at its contacts, see `ReducedBody.touched`."""
-        return self.pressed[[i for i, _ in touched], [int(sign < 0.0) for _, sign in touched]]
+    def go_on(self, part: ReducedBody) -> ReducedBody:
+        """A body as its contacts press it in this state and remember."""
+        ends = [i for i, _ in part.touched]
+        pressed = self.pressed[ends, [int(sign < 0.0) for _, sign in part.touched]]
+        return replace(part, pressed=pressed, memory=self.memory[0, ends])
 
     def same_striker(self, striker: Striker, law: Contact, modes: Modes, at: Any) -> Striker:
         """The striker that goes on; ValueError if it, its contact or the strike point is another than before."""
@@ -89,14 +97,7 @@ class State(check.Brief):
             raise ValueError("striker must be the one of the blow before if speed is None; give its speed")
         if law != self.contacts[0] or self.at is None or not np.array_equal(self.at, at[0]):
             raise ValueError("contact and at must be those of the blow before if speed is None; give a speed")
-        self._forgets()
         return mine
-
-    def _forgets(self) -> None:
-        if self.remembers:
-            raise ValueError(
-                "start must be before the first touch if the contact yields or is felt: what it remembers is not kept"
-            )
 
     def displacement(self, points: Any, *, body: int = -1) -> np.ndarray:
         """Displacement [m] of a body at points (n_points, dimension) [m], by its modes, (n_points,)."""
@@ -148,27 +149,34 @@ def state_at(hit: "Response", time: float | None) -> State:
     for ends in hit.ends:
         for (i, sign), force in zip(ends.touched, ends.pressed(h.omega, own)):
             pressed[i, int(sign < 0.0)] = force
-    remembers = any(law.remembers for law in hit.contacts) and any(impact.start < time for impact in hit.impacts)
     bodies = (*hit.bodies[:-1], hit.target)
+    doubts, memory = _doubts(hit, time, own, states)
     return State(
         time, bodies, tuple(q for q, _ in states), tuple(p for _, p in states), forces, min(hit.error.total, 1.0),
-        hit.striker, hit.contacts, hit.at, remembers, pressed, _doubts(hit, time, own, states),
+        hit.striker, hit.contacts, hit.at, pressed, doubts, memory,
     )  # fmt: skip
 
 
-def _doubts(hit: "Response", time: float, own: np.ndarray, states: list[np.ndarray]) -> tuple[np.ndarray, ...]:
-    """How far all bodies may be from a state of a blow, ``own`` that of its run, as `State.doubts`.
+def _doubts(hit: "Response", time: float, own: np.ndarray, states: list[np.ndarray]) -> tuple[Any, np.ndarray]:
+    """How far all bodies may be from a state of a blow, ``own`` that of its run, as `State.doubts`; and `State.memory`.
 
-    Its runs tell what its steps and the blow before it do to the motion, which of other causes is as wrong as the
-    numbers of the blow.
+    Its runs tell what its steps and the blow before it do to both, which of other causes are as wrong as the numbers of
+    the blow.
     """
     error, bodies = hit.error, (*hit.bodies[:-1], hit.target)
     told = error.step + error.inherited  # of 1 and more, where there may be other impacts, runs tell nothing
     runs = hit.runs if told < 1.0 and hit.target is hit.bodies[-1] else ()
     other = min(1.0, error.total - (told if runs else 0.0))
-    found = [other * motion(modes, *state) for modes, state in zip(bodies, states)]
+    memory = hit.history.remembered(time, own)
+    found, lost = [other * motion(modes, *state) for modes, state in zip(bodies, states)], other * np.abs(memory)
+
+    def told_by(fine: np.ndarray, coarse: np.ndarray, *moved: np.ndarray) -> np.ndarray:
+        return (coarse - fine) / RICHARDSON[hit.scheme][0] + (moved[0] - coarse if moved else 0.0)
+
     if runs:
-        coarse, *moved = [run.state(time) for run in runs]
-        whole = (coarse - own) / RICHARDSON[hit.scheme][0] + (moved[0] - coarse if moved else 0.0)
+        ends = [run.state(time) for run in runs]
+        whole = told_by(own, *ends)
         found = [doubt + whole[:, hit.body_slice(i)] for i, doubt in enumerate(found)]
-    return tuple(found)
+        kept = [np.abs(run.remembered(time, end)) for run, end in zip(runs, ends)]
+        lost += told_by(np.abs(memory), *kept)
+    return tuple(found), np.array([memory, lost])

@@ -236,6 +236,7 @@ class _Stick:
     doubt: np.ndarray  # as one of `State.doubts`
     force: np.ndarray = field(default_factory=lambda: np.zeros(2))  # [N], [N/s] at its contact and its rate
     pressed: np.ndarray = field(default_factory=lambda: np.zeros((2, 2)))  # as in `State`
+    memory: np.ndarray = field(default_factory=lambda: np.zeros(2))  # of its contact, as in `State`
 
 
 @check.typed
@@ -259,7 +260,8 @@ def strokes(
     strokes : sequence of (when, striker, contact, at, speed) or (when, striker, contact, at, speed, lasts)
         When the striker is at the surface [s], wherever that then is, with which speed [m/s], and after which time [s]
         it is lifted, as soon as it does not touch. Without ``lasts`` it stays until it has parted for good (proved);
-        then it is taken away as the next stroke begins. Strikers that are on the body together act together.
+        then it is taken away as the next stroke begins. Strikers that are on the body together act together. A contact
+        that yields or is felt remembers while its striker stays; every stroke finds it new.
     tolerance, quantity, residual, strict
         As in `fi.strike`, for every blow with what it inherits from those before.
     duration : float [s], optional
@@ -369,13 +371,8 @@ class _Game:
             stroke = self.played[stick.number]
             if stroke.lifted <= self.now and not state.force[i].any():
                 continue
-            if stroke.contact.remembers:
-                raise ValueError(
-                    f"strokes[{stick.number}] must have parted for good when the next blow or lift comes, at "
-                    f"{self.now:.4g} s, because its contact yields or is felt, whose memory cannot be carried over"
-                )
             moving = state.displacements[i], state.velocities[i], state.doubts[i], state.force[i], state.pressed[i]
-            found.append(_Stick(stick.number, stick.striker, *moving))
+            found.append(_Stick(stick.number, stick.striker, *moving, state.memory[:, i]))
         self.sticks = found
         return bool(np.isfinite(self.now))
 
@@ -406,7 +403,8 @@ class _Game:
             forces = np.array([stick.force for stick in sticks])
             pressed = np.array([stick.pressed for stick in sticks])
             doubts = (*(stick.doubt for stick in sticks), self.doubt)
-            start = State(0.0, bodies, q, p, forces, 0.0, None, laws, pressed=pressed, doubts=doubts)
+            memory = np.array([stick.memory for stick in sticks]).T
+            start = State(0.0, bodies, q, p, forces, 0.0, None, laws, None, pressed, doubts, memory)
             movers = (*(stick.striker for stick in sticks), self.modes)
             hit = planner.struck(partial(collision.met, movers, touches, start=start), rule)
             self.sticks = sticks

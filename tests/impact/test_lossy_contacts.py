@@ -292,6 +292,20 @@ def test_felt_that_hardly_stays_behind_is_parted_from_before_its_surface(toleran
     assert_allclose(told.contact_time, true.contact_time, rtol=3.0 * told.error.of_quantity("contact_time"))
 
 
+@pytest.mark.parametrize(("seed", "law", "mass", "speeds"), [
+    (94, fi.Contact.felt(5.24e5, 2.68, hysteresis=0.7, relaxation=1.1e-5), 0.025, (0.28, 0.91)),
+    (109, fi.Contact.felt(4.28e6, 2.76, hysteresis=0.73, relaxation=2.1e-5), 0.052, (0.21, 0.18)),
+])  # fmt: skip
+def test_felt_that_is_left_slowly_is_not_met_again(seed, law, mass, speeds):
+    """Of 300 such pairs 10 had one impact too many: a step found no force although the felt pushed at both ends."""
+    body, balls = restarted.measured(10, seed), [fi.Striker.rigid(mass)] * 2
+    touches = [fi.Touch(law, i, 2, None, [0.0]) for i in (0, 1)]
+    told, true = (fi.collide([*balls, body], touches, speeds=(*speeds, 0.0), tolerance=each) for each in (1e-3, 1e-7))
+    assert told.n_impacts == true.n_impacts == 2
+    # two runs share the last step, whose length once was a hundred relaxations, and do not tell its error: 1e-4
+    assert_allclose(told.contact_time, true.contact_time, rtol=2e-5)
+
+
 @pytest.mark.parametrize(("seed", "tolerance"), [(1, 1e-4), (9, 1e-3)])
 def test_bodies_that_a_loss_lets_go_have_parted_however_the_rate_is_rounded(seed, tolerance):
     """Let go is located to 1e-8 of the force's factor, but told to 1e-9: there was no restitution."""

@@ -54,8 +54,11 @@ LISTEN, LATER = [(0.7, 0.6)], np.array([1e-3, 5e-3, 2e-2])  # m, s
     ("law", "residual", "apart"),
     [(fi.Contact.linear(1e6), False, 1e-6),
      (fi.Contact.hertz(5e7), True, 1e-6),  # a spring stands for the modes left out: nothing of it swings
-     (fi.Contact.power(5e7, 1.5, loss=0.05), True, 1e-4)],  # overdamped modes stand for them
-    ids=["bare", "complete", "loss"],
+     (fi.Contact.power(5e7, 1.5, loss=0.05), True, 1e-4),  # overdamped modes stand for them
+     # what they remember goes on with them
+     (fi.Contact.felt(5e8, 2.0, hysteresis=0.5, relaxation=3e-4), False, 1e-6),
+     (fi.Contact.elastic_plastic(5e7, yield_approach=1e-5), False, 1e-6)],
+    ids=["bare", "complete", "loss", "felt", "yields"],
 )  # fmt: skip
 def test_a_blow_of_several_impacts_goes_on_from_its_middle(law, residual, apart, where):
     blow = {"at": AT, "tolerance": 1e-7 if apart < 1e-3 else 1e-3, "residual": residual, "quantity": "n_impacts"}
@@ -199,6 +202,3 @@ def test_what_cannot_start_says_so():
     ):
         with pytest.raises(ValueError, match=words):
             call()
-    soft = fi.strike(PLATE, STICK, other, at=AT, speed=1.0, tolerance=1e-2)
-    with pytest.raises(ValueError, match="what it remembers is not kept"):
-        fi.strike(PLATE, STICK, other, at=AT, speed=None, start=soft)

@@ -11,7 +11,7 @@ import numpy as np
 
 from .build import FALSE, TRUE, inner, outer
 from .bundles import Flights, KernelSystem, Limits
-from .events import EVENT_LIMIT, dipped, strayed
+from .events import EVENT_LIMIT, dipped, lags_behind, strayed
 from .exact import advance, freshen, keep_in_mind, made_tables, predict, record, solve_step, tabulate
 from .flight import NEVER, SLOW, UNPROVED
 from .law import special_of
@@ -103,8 +103,10 @@ def too_long(contacts, special, level, h, still):
                 shorter = max(shorter, 3 if level == 0 else 1)
         elif dipped(contacts, h, i):
             shorter = max(shorter, 1)
-        if special and pressed[i] and strayed(contacts, h, i, 1.0 if now[RATE, i] > 0.0 else -1.0) == 2:
-            shorter = max(shorter, 1)
+        if special and pressed[i]:
+            side = 1.0 if now[RATE, i] > 0.0 else -1.0
+            if strayed(contacts, h, i, side) == 2 or lags_behind(contacts, level, h, i):
+                shorter = max(shorter, 1)
     return shorter
 
 

@@ -27,6 +27,7 @@ LET_GO = 1e-7  # [-] of the force's factor 1 + loss * rate: about zero up to thi
 # meets it again at once, so that the step is to be taken pressed
 LETS_GO, BENDS, TURNS, PARTS, AGAIN = range(5)
 AT_ONCE = 1e-6  # [-] of a step in which felt is met: sooner it is met at its start, a contact that much too early
+HALVED = 8  # [-] halvings of a step before a body parts from felt; with them contact times err by 1e-6 instead of 1e-4
 EVENT_LIMIT = 64  # [-] events within one step's time: chatter, passed with unlocated steps, each time for twice as long
 
 
@@ -242,6 +243,21 @@ def dipped_felt(contacts, h, i):
     if not (r0 < 0.0 < r1 and g0 > 0.0 and g1 > 0.0):
         return False
     return turning(g0, h * r0, g1, h * r1)[1] < -1e-6 * max(g0, g1)  # by less it has not left
+
+
+@inner()
+def lags_behind(contacts, level, h, i):
+    """Whether felt i loses most of its approach in a step longer than its relaxation, or all force although it pushes.
+
+    The body parts from it within such a time of the end, of which the cubic of a longer step knows too little: it may
+    find no force, and the body meets the felt again.
+    """
+    law, approach = contacts.law, contacts.now[APPROACH, i]
+    if not relaxes(law, i) or law["memory"][i] < 0.0 or level >= HALVED:
+        return False
+    if h > law["relaxation"][i] and contacts.end[i] < 0.5 * approach:
+        return True
+    return contacts.force[i] == 0.0 and parting(law, i, approach, law["memory"][i]) > 0.0
 
 
 @inner()

@@ -85,7 +85,7 @@ def begin(scene, bodies, contacts, course, base):
     for n in range(scene.omega.size):
         bodies.twice[n] = 2.0 * scene.zeta[n] * scene.omega[n]
     for i in range(contacts.end.size):
-        contacts.offset[i] = scene.offset[i]
+        contacts.offset[i] = scene.offset[i] - dent(contacts.law, i, contacts.law["memory"][i])
         now[APPROACH, i], now[RATE, i] = approach_of(bodies.shape, contacts.offset, i, bodies.q, bodies.p)
         way = base * abs(now[RATE, i])
         for n in range(scene.omega.size):

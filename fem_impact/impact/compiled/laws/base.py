@@ -106,6 +106,13 @@ class Law:
         """How much lower than at first the surface lies [m], by its memory and the time it has been ``left`` [s]."""
         return np.zeros(memory.shape)
 
+    def remembered(self, row: Any, memory: float, pressed: float, force: float, left: float) -> float:
+        """What it remembers ``left`` [s] after a step began with this memory.
+
+        Its spring is then ``pressed`` by so much [m], and its force [N] zero if it has been so all the while.
+        """
+        return 0.0
+
     def approach(self, contact: Any, force: float) -> float:
         """Approach [m] at which it first has a force [N]."""
         return float((force / contact.stiffness) ** (1.0 / contact.exponent))

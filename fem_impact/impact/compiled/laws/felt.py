@@ -86,6 +86,11 @@ class FeltLaw(Law):
         rate = (1.0 - row.hysteresis) / row.relaxation
         return np.asarray((row.hysteresis * np.abs(memory * np.exp(-rate * left))) ** (1.0 / row.exponent))
 
+    def remembered(self, row: Any, memory: float, pressed: float, force: float, left: float) -> float:
+        if force:
+            return max(0.0, float(pressed**row.exponent - force / row.stiffness) / row.hysteresis)
+        return -abs(memory) * float(np.exp(-(1.0 - row.hysteresis) * left / row.relaxation))
+
     def sentence(self, contact: Any, si: Any) -> str:
         time = si(contact.relaxation, "s")
         return f" It is felt: held pressed, it loses {contact.hysteresis:.0%} of its force in some {time}."

@@ -111,6 +111,9 @@ class PlasticLaw(Law):
         force, _, _, wide = _course(row, deepest)
         return np.asarray(deepest - force / (row.stiffness * wide ** (row.exponent - 1.0)))
 
+    def remembered(self, row: Any, memory: float, pressed: float, force: float, left: float) -> float:
+        return max(memory, pressed) if force else memory
+
     def approach(self, contact: Any, force: float) -> float:
         k, a, first = contact.stiffness, contact.exponent, contact.yield_approach
         more = force - k * first**a
