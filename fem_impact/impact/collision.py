@@ -213,7 +213,7 @@ def _follow(bodies, laws, parts, speed, options, striker=None, at=None, other=No
     left_out, resolvable = what_if.modes_left_out(blow, bodies)
     variations = left_out, *what_if.unstated(blow, bodies), what_if.mesh(blow, bodies)
     errors = {"step": found.error, **what_if.what_if(blow, variations)}
-    moved = [blow.again(other)] if other else []
+    moved = [blow.again(other, moved=True)] if other else []
     for run in moved:
         errors["inherited"] = distance.of_runs(run, found.coarse, options.quantities, pace=pace)
     what_if.add_poorer_descriptions(blow, bodies, errors)

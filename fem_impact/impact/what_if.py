@@ -9,9 +9,10 @@ from typing import Any
 import numpy as np
 
 from .._base.check import SimulationError
+from .._base.rounding import SAME
 from ..modes.modal import Modes
 from . import accuracy, distance, engine
-from .compiled import record
+from .compiled import law, record
 from .compiled.bundles import KernelSystem
 from .contact import Contact
 from .history import History
@@ -32,10 +33,33 @@ class Followed:
     pace: engine.Pace
     runs: Converged
 
-    def again(self, parts: Sequence[ReducedBody], *, finely: bool = False) -> History:
-        """The blow with these bodies, in the steps of the coarser run or, on request, of the finer."""
+    def again(self, parts: Sequence[ReducedBody], *, finely: bool = False, moved: bool = False) -> History:
+        """The blow with these bodies, in the steps of the coarser run or, on request, of the finer.
+
+        They may have ``moved``; otherwise contacts begin as they do in the blow itself.
+        """
         how = self.runs.scheme, self.runs.steps[0 if finely else 1], self.pace, self.options.last
-        return engine.run_system(joined(parts, self.laws), *how, stretched_in(parts))
+        system = joined(parts, self.laws)
+        if self.system.q.any():
+            offset = system.offset + self._apart(system, moved)
+            offset.setflags(write=False)
+            system = system._replace(offset=offset)
+        return engine.run_system(system, *how, stretched_in(parts))
+
+    def _apart(self, system: KernelSystem, moved: bool) -> np.ndarray:
+        """How much nearer (n_contacts,) [m] contacts must begin: what modes that are lacking had moved them, stays.
+
+        Bodies that ``moved`` must not touch at contacts that were open: they would have parted a little later.
+        """
+        own, force = self.system, np.zeros(len(self.laws))
+        stood, stand = (each.offset + each.shape @ each.q for each in (own, system))
+        if moved:
+            about = SAME * (np.abs(own.shape) @ np.abs(own.q))
+            opened = (stood - law.dents(own.law) <= about) | (own.law["memory"] < 0.0)
+            return np.where(opened, np.minimum(0.0, np.maximum(stood, 0.0) - stand), 0.0)
+        for part in self.parts:
+            force[[i for i, _ in part.touched]] = part.pressed[:, 0]
+        return stood + (system.law["compliance"] - own.law["compliance"]) * force - stand
 
     def changed(self, body: int, part: ReducedBody) -> list[ReducedBody]:
         """The bodies, with one of them changed."""
