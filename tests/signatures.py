@@ -457,7 +457,7 @@ def cases() -> Iterator[tuple[str, str, str]]:
 # --- the judge -------------------------------------------------------------------------------------------------------
 
 INFINITE = {"threshold_frequency", "threshold.thresholds", "mobility", "Response.motion_error"}  # documented to
-ENDLESS = {"order", "point_supports"}  # fields documented to be infinite now and then
+ENDLESS = {"order", "point_supports", "sensitivity"}  # fields documented to be infinite now and then
 OTHER_NAMES = {  # parameter: words under which an error may speak of it besides its own name
     **dict.fromkeys(("length", "width", "radius", "factor", "corners", "hole"), ("size", "outline", "max_frequency")),
     **dict.fromkeys(("frequencies", "points"), ("shapes",)),

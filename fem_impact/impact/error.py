@@ -22,7 +22,7 @@ class Error:
     mesh: float  # [-] of the finite elements
     resolvable: bool = True  # False: the left-out modes govern the contact itself, and no estimate holds
     idealisation: float = 0.0  # [-] of treating the target as rigid or infinite
-    sensitivity: float = 1.0  # [-] growth of a small difference from first to last impact
+    sensitivity: float = 1.0  # [-] growth of a small difference from first to last impact; infinite: others happened
     inherited: float = 0.0  # [-] of the motion at the start, from the blow before
     measurement: float = 0.0  # [-] of shapes from measured responses: noise, ends of records, what no body would do
     # [-] by cause, named as above, and quantity; a cause that is not here errs as much in every quantity

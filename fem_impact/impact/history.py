@@ -278,7 +278,9 @@ class History(check.Locked):
         if self.n_coefficients > 2 or not len(self.contacts):
             return 0.0
         peak = float(self.contacts[:, 2].max())
-        missed = float(record.force_missed(self.steps, self.now, self.law, self.n_coefficients, peak))
+        if not peak:  # pressed by less than rounding
+            return 1.0
+        missed = min(1.0, float(record.force_missed(self.steps, self.now, self.law, self.n_coefficients, peak)))
         for i in np.flatnonzero(self.law["loss"]):
             pushes, speeds = self.impulses[:, i] / self.steps[:, layout.LENGTH], self._column(layout.SPEED)[:, i]
             row, loss = int(pushes.argmax()), float(self.law["loss"][i])

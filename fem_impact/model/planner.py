@@ -407,7 +407,7 @@ def strike(
         run = partial(collision.strike, modes, striker, contact, at=at, speed=speed)
         stretches = bool(options.get("stretching")) or modes.stretches
         return promise.kept(fresh.answer(lambda: audit.audited(struck(run, options)), stretches), strict)
-    if options.pop("start", None) is not None or speed is None:
+    if options.pop("start", None) is not None:
         raise ValueError(
             "start needs modes, taken as they are: give those of the blow before, hit.target, and no part of a plan"
         )
