@@ -1,6 +1,7 @@
 """Find the lowest modes of a system without missing any, and refine the mesh until their estimated error is small."""
 
 import hashlib
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -136,7 +137,7 @@ def _pairs(
             values = system.strain.energy(system, vectors) / np.einsum("ij,ij->j", vectors, system.M @ vectors)
             order = np.argsort(values, kind="stable")
             values, vectors = values[order], vectors[:, order]
-        values, turn = heavier(system, values, vectors)
+        values, turn = heavier(system, values, lambda: vectors)
         vectors = vectors if turn is None else vectors @ turn
     omega = np.concatenate([np.zeros(n_rigid), np.sqrt(values) * rate])[:n_modes]
     vectors = np.column_stack([system.rigid, vectors])[:, :n_modes]
@@ -247,15 +248,19 @@ def _counted(system: System, flexibility: Flexibility, n: int, limit: float | No
     )
 
 
-def heavier(system: System, values: np.ndarray, vectors: np.ndarray) -> tuple[np.ndarray, np.ndarray | None]:
+def heavier(
+    system: System, values: np.ndarray, shapes: Callable[[], np.ndarray]
+) -> tuple[np.ndarray, np.ndarray | None]:
     """Eigenvalues (n,) with the mass in the plane of a ribbed plate, and how vectors (n_dofs, n) combine, if not as is.
 
+    The vectors come from ``shapes`` only where they matter: those of many Ritz pairs cost as much as their solutions.
     Ribs hang far below the middle; without them it is left out, as formulas of shells do. The inverse problem keeps the
     digits of the lowest.
     """
     if not (isinstance(system.section, Plate) and system.section.ribs and len(values)):
         return values, None
-    more, soft = vectors.T @ shallow.plane_mass(system, vectors), values**-0.5
+    vectors, soft = shapes(), values**-0.5
+    more = vectors.T @ shallow.plane_mass(system, vectors)
     size, turn = eigh(soft[:, None] * (np.eye(len(values)) + 0.5 * (more + more.T)) * soft)
     return 1.0 / size[::-1], (soft[:, None] * turn / np.sqrt(size))[:, ::-1]
 

@@ -156,6 +156,14 @@ class Asked:
         return idealisation.from_outside(self.blow.target, self.values["at"], self.mass, self.duration)
 
     @property
+    def stopped(self) -> bool:
+        """Whether an infinite plate of the target's mobility stops the striker: damps the contact more than critically.
+
+        Only echoes then throw it off.
+        """
+        return self.seen is not None and self.duration <= 0.5 * np.pi * self.mass * self.seen.mobility < np.inf
+
+    @property
     def unfit(self) -> str:
         """Why the target cannot be treated as rigid or infinite without its modes, if it is not known."""
         target = self.blow.target

@@ -53,7 +53,7 @@ class Mixed(Description):
         highest = accuracy.cutoff(density, 0.0, omega_0, blow.contact.exponent, asked.mass, allowed)
         if not named and mixed.LASTING * slow > 1e4 * asked.duration:  # too many steps, some 24 for each contact time
             return None
-        few = 0.5 * np.pi * slow < asked.duration or target.count_below(highest / target.stretch) < MANY_MODES
+        few = not asked.stopped or target.count_below(highest / target.stretch) < MANY_MODES
         if few and not (named or anyway):
             return None
         frequency = mixed.first_frequency(asked.mass, seen.mobility, seen.echo, asked.duration)
@@ -77,6 +77,10 @@ class Mixed(Description):
                 if named:
                     raise
                 return None
+            with suppress(check.SimulationError):  # the echoes left out mostly ask for more, as far as that is allowed
+                higher = 2.0 * frequency
+                while (twice := _by_elements(asked, higher, stages))[1] <= MOST:
+                    work, higher = replace(work + twice[3], memory=work.memory), 2.0 * higher
             chosen = {"element": target.element, "size": elements.size, "n_dofs": n_dofs, "work": work}
         forecast = asked.foretell(
             "mixed", errors={"echoes left out": asked.budget.half}, reasons=(why, kept), mass=seen.mass,
@@ -119,7 +123,7 @@ class Mixed(Description):
         twice = 2.0 * hit.bodies[-1].n_modes
         # modes times steps of one run: 2e8 take ten seconds
         many = hit.history.steps.shape[0] * twice > 2e8 or (seen is not None and twice > MOST)
-        if error.idealisation <= allowed or many:
+        if error.idealisation <= allowed or (many and seen is None):
             return None
         higher = replace(self, frequency=2.0 * self.frequency, seen=None)
         if seen is None:
@@ -127,14 +131,14 @@ class Mixed(Description):
         try:
             more = _by_elements(asked, higher.frequency, stages)[3].seconds
         except check.SimulationError:
-            more = np.inf
+            more = 0.0 if many else np.inf
         if not (self.compared or "target" in asked.pieces):
             with suppress(check.SimulationError):
                 other = Vectors.of(asked, stages)
                 if other is not None and other.forecast.seconds < more:
                     progress.foresee(other.forecast.seconds)
-                    return replace(other, otherwise=replace(higher, compared=True))
-        if more == np.inf:
+                    return replace(other, otherwise=None if many else replace(higher, compared=True))
+        if many or more == np.inf:
             return None
         progress.foresee(more)
         return higher
@@ -153,4 +157,4 @@ def _by_elements(asked: Asked, frequency: float, stages: Stages) -> tuple[Elemen
     number = target.count_below(mixed.REACH * frequency / target.stretch)
     count = vectors.FEWEST + min(round(number), round(2.5 * phase))  # eight for each half turn
     n_dofs = target.unknowns(asked.values["at"][None], elements, stages)
-    return elements, count, n_dofs, cost.by_vectors([n_dofs, n_dofs / refinement.COARSER**2], count, 1.0)
+    return elements, count, n_dofs, cost.by_vectors([n_dofs, n_dofs / refinement.COARSER**2], count)

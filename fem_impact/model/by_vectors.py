@@ -23,6 +23,7 @@ from .target import FIRST_LOOK, Elements, Stages
 
 AUDIBLE = 20e3  # [Hz] the ear's limit: no mode above is asked for unless a band of the sound is
 MOST_RINGING = 400  # [-] modes for motion and sound if no band is asked for: ten seconds, a minute of a curved plate
+SEVERAL = 3  # [-] impacts at least of a striker at rest until echoes throw it off; 3 to 9 on steel sheets
 
 
 @dataclass(frozen=True, eq=False)
@@ -74,7 +75,10 @@ class Vectors(Description):
         meshes = list(vectors.compared(target, elements, stages))
         if impacts > 2 and not asked.meshed:  # each multiplies the error that a mesh makes before it
             meshes.append(vectors.finer(target, meshes[0], stages))
-        work = cost.by_vectors([target.unknowns(at, each, stages) for each in meshes], count, lasts)
+        grown = min(cost.grown(count, lasts), vectors.MOST_VECTORS)
+        if asked.stopped:  # vectors that end before the echo throw the striker off by one of their own
+            count = max(count, round(0.5 * grown))
+        work = cost.by_vectors([target.unknowns(at, each, stages) for each in meshes], grown)
         ringing = sum((ringing_work(target.element, n) for n in (FIRST_LOOK, ringing_count(asked))), cost.NOTHING)
         why = f"the contact lasts about {asked.duration:.3g} s"
         kept = f"the target is described by about {count} Ritz vectors, more if the error demands it"
@@ -95,7 +99,7 @@ class Vectors(Description):
         asked, seen = self.asked, self.seen
         if seen is None:
             wanted = 0.5 / asked.duration, asked.budget.total, self.elements, asked.meshed
-            seen = vectors.Seen(asked.blow.target, asked.values["at"], *wanted, stages)
+            seen = vectors.Seen(asked.blow.target, asked.values["at"], *wanted, stages, count=self.forecast.n_modes)
         if seen.at_rest:
             return Modal.of(asked, stages).found(stages, keep)
 
@@ -135,7 +139,10 @@ class Vectors(Description):
 
 
 def _length_foreseen(asked: Asked) -> tuple[float, int]:
-    """How long the blow lasts on an infinite plate, in undisturbed contacts, and its impacts; (1, 1) if not known."""
+    """How long the blow lasts on an infinite plate, in undisturbed contacts, and its impacts; (1, 1) if not known.
+
+    Where such a plate stops the striker, only echoes throw it off: until the first has turned once, the blow goes on.
+    """
     at, seen = asked.values["at"], asked.seen
     if seen is None or not np.isfinite(seen.mobility):
         return 1.0, 1
@@ -149,7 +156,10 @@ def _length_foreseen(asked: Asked) -> tuple[float, int]:
             )  # fmt: skip
     except check.SimulationError:
         return 1.0, 1
-    return max((touch.end for touch in hit.impacts), default=0.0) / asked.duration, hit.n_impacts
+    lasts, echo = max((touch.end for touch in hit.impacts), default=0.0) / asked.duration, seen.echo / asked.duration
+    if not asked.stopped:
+        return lasts, hit.n_impacts
+    return max(1.0, echo), SEVERAL if echo > lasts else 1  # still pressing, it is thrown off for good
 
 
 def ringing_count(asked: Asked) -> int:

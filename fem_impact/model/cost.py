@@ -119,12 +119,11 @@ def grown(n_vectors: float, lasts: float) -> float:
     return n_vectors * max(1.0, (n_vectors / 120.0) ** 0.3, (lasts / 4.0) ** 0.7)
 
 
-def by_vectors(n_dofs: Sequence[float], n_vectors: float, lasts: float) -> Work:
-    """Ritz vectors on several meshes of ``n_dofs`` unknowns, for a blow that begins with ``n_vectors``; see `grown`.
+def by_vectors(n_dofs: Sequence[float], n_vectors: float) -> Work:
+    """Ritz vectors on several meshes of ``n_dofs`` unknowns, for a blow that ends with ``n_vectors``; see `grown`.
 
     Each vector must be made orthogonal to all before, so that the work grows with the square of their number.
     """
-    n_vectors = grown(n_vectors, lasts)
     every = sum((on_mesh(n, n_vectors, n_vectors) for n in n_dofs), NOTHING)
     # [s] of all small eigenvalue problems, over their size cubed; three blows on the way to a tolerance
     return every + Work(dense=4e-9 * n_vectors**3, steps=3.0 * START, memory=ELEMENTS)

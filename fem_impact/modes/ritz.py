@@ -236,7 +236,7 @@ class Krylov:
         count = min(count, self.count)
         frame, rigid = self.system.frame, self.system.rigid
         value, turn = self._eigenpairs(count)
-        value, mix = heavier(self.system, value, self.vectors[:count].T @ turn)
+        value, mix = heavier(self.system, value, lambda: self.vectors[:count].T @ turn)
         turn = turn if mix is None else turn @ mix
         omega = np.concatenate([np.zeros(rigid.shape[1]), np.sqrt(np.maximum(value, 0.0)) * frame.rate])
         basis = self.vectors[:count]

@@ -41,8 +41,8 @@ def benchmarks(monkeypatch):
         (cost.strikes, ((100.0, 50), (200.0, 50), (200.0, 100))),
         (cost.by_modes, ((3e3, 20), (6e3, 20), (6e3, 40))),
         (lambda n, _: cost.compliance(n), ((4e3, 0), (8e3, 0), (9e3, 0))),
-        (lambda n, k: cost.by_vectors([n, 3e3], k, 1.0), ((4e3, 80), (8e3, 80), (8e3, 160))),
-        (lambda n, lasts: cost.by_vectors([n, 3e3], 80, lasts), ((4e3, 1.0), (8e3, 1.0), (8e3, 20.0))),
+        (lambda n, k: cost.by_vectors([n, 3e3], k), ((4e3, 80), (8e3, 80), (8e3, 160))),
+        (lambda n, lasts: cost.by_vectors([n, 3e3], cost.grown(80, lasts)), ((4e3, 1.0), (8e3, 1.0), (8e3, 20.0))),
     ],
 )
 def test_more_of_anything_costs_more_time_and_no_less_memory(work, sizes):
@@ -61,9 +61,17 @@ def test_the_time_of_a_finer_mesh_grows_faster_than_its_unknowns():
 def test_many_first_vectors_become_more_and_each_costs_more():
     """The plate of `frontier.py` at 1e-6 begins with 302 vectors, ends with 592 and takes four times as long."""
     meshes = [6676, 4591]
-    few, many = (cost.by_vectors(meshes, n, 1.0).on(cost.REFERENCE) for n in (120, 302))
+    few, many = (cost.by_vectors(meshes, cost.grown(n, 1.0)).on(cost.REFERENCE) for n in (120, 302))
     assert many > 2.5 * few  # 302 vectors that do not grow would cost 2.1 times as much as 120
-    assert cost.by_vectors(meshes, 60, 1.0).on(cost.REFERENCE) > 0.5 * few  # as many as are enough do not grow
+    assert cost.by_vectors(meshes, cost.grown(60, 1.0)).on(cost.REFERENCE) > 0.5 * few  # those that are enough stay
+
+
+@pytest.fixture
+def counted(monkeypatch):
+    """The unknowns and vectors of which plans count the cost."""
+    told, cost_of = [], cost.by_vectors
+    monkeypatch.setattr(cost, "by_vectors", lambda *these: told.append(these) or cost_of(*these))
+    return told
 
 
 @pytest.mark.parametrize(("name", "meshes", "vectors"), [
@@ -74,14 +82,39 @@ def test_many_first_vectors_become_more_and_each_costs_more():
     pytest.param("cymbal_splash_10_maple", (25813, 16503), 165, marks=pytest.mark.slow),
     pytest.param("hammer_car_bonnet", (39445, 36264), 84, marks=pytest.mark.slow),
 ])  # fmt: skip
-def test_the_plan_counts_the_unknowns_and_vectors_that_its_run_has(name, meshes, vectors, monkeypatch):
+def test_the_plan_counts_the_unknowns_and_vectors_that_its_run_has(name, meshes, vectors, counted):
     """Those of the runs are written down, as counted there; a longer blow may need two steps of 1.4 more, or none."""
-    counted, cost_of = [], cost.by_vectors
-    monkeypatch.setattr(cost, "by_vectors", lambda *told: counted.append(told) or cost_of(*told))
     fi.load_scene(next(SCENES.rglob(f"{name}.toml"))).plan()
-    unknowns, first, lasts = counted[0]
+    unknowns, most = counted[0]
     assert_allclose(unknowns, meshes, rtol=0.02)  # 1 %, and what splitting at ribs adds
-    assert vectors / 2.0 <= cost.grown(first, lasts) <= 1.7 * vectors  # two steps of growth, rounded
+    assert vectors / 2.0 <= most <= 1.7 * vectors  # two steps of growth, rounded
+
+
+def sheet(length, width, at, speed):
+    """The plan for a ball of 4 g on a free sheet of steel, 0.6 mm thick, which stops it until echoes come back."""
+    steel = fi.Material(E=210e9, nu=0.3, rho=7850.0)
+    body = fi.assemble(fi.mesh.rectangle(length, width), fi.Plate(steel, 0.6e-3), {"boundary": "free"})
+    ball = fi.Striker.sphere(steel, radius=4.955e-3)
+    return fi.plan(body, ball, fi.Contact.between(ball, steel), at=at, speed=speed, tolerance=1e-2)
+
+
+@pytest.mark.parametrize(("size", "at", "speed", "vectors", "n_meshes"), [
+    ((0.15, 0.1), (0.0555, 0.041), 1.0, 508, 3), ((0.2, 0.15), (0.074, 0.0615), 0.2, 1240, 3),
+    ((0.2, 0.15), (0.02, 0.075), 0.2, 165, 2),  # the echo finds the ball still pressing
+])  # fmt: skip
+def test_a_ball_that_a_sheet_stops_needs_vectors_until_the_echo_has_gone(size, at, speed, vectors, n_meshes, counted):
+    plan = sheet(*size, at, speed)
+    unknowns, most = counted[0]
+    assert plan.target == "vectors" and len(unknowns) == n_meshes
+    assert vectors / 2.0 <= most <= 1.7 * vectors  # those of the runs are written down
+    assert 84 <= plan.n_modes <= 0.7 * most  # begins with fewer, but not with an echo that only they make
+
+
+def test_a_plan_of_both_ways_counts_all_frequencies_that_echoes_may_ask_for(counted):
+    plan = sheet(0.2, 0.15, (0.074, 0.0615), 1.0)
+    assert plan.target == "mixed"
+    assert [count for _, count in counted[:3]] == [255, 480, 929]  # as its run has; it refuses the fourth
+    assert plan.seconds > sum(cost.by_vectors(*told).seconds for told in counted[:3])
 
 
 def test_what_doctor_kept_of_this_machine_serves_every_later_process(place, benchmarks):
