@@ -27,7 +27,7 @@ from ..fe.assembly import System, support_of_facets
 from ..fe.corners import meetings
 from ..fe.elements import collapsed
 from ..fe.residual import Moments
-from ..fe.section import PLANE, SHEAR, Beam, Plate, size_at
+from ..fe.section import KINDS, PLANE, SHEAR, Beam, Plate, size_at
 from ..fe.springs import at_facets
 from ..fe.theory import unknowns_of_cells
 from ..mesh.meshes import Mesh
@@ -116,7 +116,8 @@ def known_of(modes: Modes) -> Known | None:
     """What the modes of a plate or beam tell of it; None if its shapes are known at points only, or it is rigid."""
     shapes = unwrapped(modes.shapes)[0]
     if isinstance(shapes, ElementShapes):
-        return around(modes, modes.section, shapes.system.mesh, shapes.system.supports)
+        system = shapes.system
+        return around(modes, modes.section, system.mesh, system.supports, system.rules.words)
     if isinstance(shapes, RectangleShapes):
         sides = shapes.length, shapes.width
         return Known(modes, modes.section, sides[0] * sides[1], 1.0, 2.0 * sum(sides))
@@ -134,9 +135,11 @@ def quadratic(modes: Modes) -> bool:
     return isinstance(shapes, ElementShapes) and shapes.system.element == "morley"
 
 
-def around(modes: Modes, section: Plate | Beam | None, mesh: Mesh, supports: Any) -> Known:
-    """What is known of a body with a mesh."""
-    kinds = support_of_facets(mesh, dict(supports))
+def around(
+    modes: Modes, section: Plate | Beam | None, mesh: Mesh, supports: Any, words: tuple[str, ...] = KINDS
+) -> Known:
+    """What is known of a body with a mesh; ``words`` are those of its theory for supports."""
+    kinds = support_of_facets(mesh, dict(supports), words)
     if mesh.dimension == 1:
         return Known(modes, section, float(np.ptp(mesh.points)), float({*kinds} <= FIXED), 0.0)
     length = mesh.chords
@@ -224,7 +227,8 @@ def _plate(system: System, vectors: np.ndarray, thick: bool) -> np.ndarray:
     Q = np.stack([(q @ moved) for q in (force[:, 0, 0] + force[:, 1, 2], force[:, 0, 2] + force[:, 1, 1])])
     soft = np.linalg.inv(section.shear(flat)).reshape(*area.shape, 2, 2) * frame.stiffness / frame.length**2
     energy = (vectors * (system.K @ vectors)).sum(axis=0)
-    places = [vertex for vertex, *_ in meetings(system.mesh, support_of_facets(system.mesh, system.supports))]
+    kinds = support_of_facets(system.mesh, system.supports, system.rules.words)
+    places = [vertex for vertex, *_ in meetings(system.mesh, kinds)]
     away = KDTree(system.mesh.points[places]).query(flat)[0] if places else np.full(len(flat), np.inf)
     plane = np.where(away.reshape(area.shape) > h * FADES, area, 0.0)
     result[3] = np.einsum("eq,aeqk,eqab,beqk->k", plane, Q, soft, Q, optimize=True) / energy
