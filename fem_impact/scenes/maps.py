@@ -4,7 +4,6 @@ import json
 import math
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
-from functools import partial
 from itertools import product
 from pathlib import Path
 from typing import Any
@@ -20,9 +19,10 @@ from ..model.target import Stages
 from ..show import export, figures, plots
 from ..sweeps import cases, grid
 from ..sweeps.borders import PREFIX, read_borders
-from ..sweeps.cells import ALIASES, AXES, LAW, Case, laid_out, logarithmic
+from ..sweeps.cells import LAW, Case, laid_out, logarithmic
 from .scene import Scene
-from .schema import MAKERS, Part
+from .schema import Part
+from .whole import check_axes
 
 SLOW = {"loss", *MARKS}  # axes of the contact that take longer per blow
 SLOW |= {f"contact.{name}" for name in SLOW}
@@ -78,11 +78,10 @@ def map_scene(
             f'{scene.path}: [map] is missing; add it and name the axes, as in over = {{ "striker.mass" = [0.01, 0.1] }}'
         )
     law, stretches = scene.make_contact(), bool(scene.target.values.get("stretching"))
-    quick = {name: values for name, values in over.items() if ALIASES.get(name, name) in AXES}
-    slow = {name: values for name, values in over.items() if name not in quick}
-    _check_slow(scene, slow)
+    anew = check_axes(scene, over)
     over, ours = laid_out(over, law, alone=stretches, cells=wanted.pop("cells", None))
-    slow, quick = {name: list(over[name]) for name in slow}, {name: over[name] for name in quick}
+    slow = {name: list(over[name]) for name in anew}
+    quick = {name: values for name, values in over.items() if name not in slow}
     if not quick:
         quick = {"strike.speed": [scene.blow.values["speed"]]}
     if slow:
@@ -112,17 +111,6 @@ def map_scene(
     result.attrs["notes"] = "\n".join(plausible.together(*(piece.attrs["notes"].splitlines() for piece in pieces)))
     result.attrs["title"] = scene.title or str(scene.path.name)
     return result
-
-
-def _check_slow(scene: Scene, slow: Mapping[str, Any]) -> None:
-    """Raise ValueError unless the axes that need another body are numbers of the scene, each with values."""
-    known = [f"{t}.{k}" for t in MAKERS for k in getattr(getattr(scene, t, None), "values", {})]
-    for name, values in slow.items():
-        if name not in known:
-            near = check.nearest(name, [*AXES, *ALIASES, *known])
-            raise ValueError(f"{scene.path}: [map] over: {name} is not an axis{near}")
-        if isinstance(values, partial) or (isinstance(values, Mapping) and "count" not in values):
-            raise ValueError(f"{scene.path}: [map] over: {name} needs a count, because each value needs another body")
 
 
 def changed_scene(scene: Scene, key: str, value: Any) -> Scene:

@@ -1,12 +1,15 @@
 """A scene as a whole: its tables fit together, and what is cheap to build can be built."""
 
+from collections.abc import Mapping
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 from .._base import check
 from ..fe.assembly import THICK
 from ..impact.stepping import Options
+from ..sweeps.cells import ALIASES, AXES
 from .keys import checked, form
-from .schema import NESTED, REPEATED, rise_of
+from .schema import MAKERS, NESTED, REPEATED, rise_of
 
 if TYPE_CHECKING:
     from .scene import Scene
@@ -45,10 +48,10 @@ def check_whole(scene: "Scene") -> None:
     for text, holds in wrong.items():
         if holds:
             raise scene.fault(text)
-    for table in ("observe", "map"):
-        part = getattr(scene, table)
-        if part is not None:
-            scene._make(table, part)
+    if scene.observe is not None:
+        scene._make("observe", scene.observe)
+    if scene.map is not None:
+        check_axes(scene, scene._make("map", scene.map)["over"])
     _check_blow(scene)
     if scene.listeners and line:
         width, height = scene.girth
@@ -68,6 +71,23 @@ def check_whole(scene: "Scene") -> None:
             except ValueError as error:
                 said = str(error).removeprefix(f"{check.line(str(scene.path))}: ")
                 raise scene.fault(f"[[{REPEATED}]] {i} {said}") from None
+
+
+def check_axes(scene: "Scene", over: Mapping[str, Any]) -> list[str]:
+    """The axes of a map that `sweep` does not have, each of whose values needs another body.
+
+    Raises ValueError unless these are numbers of the scene, with values or a range with a count.
+    """
+    tables = [name for name in MAKERS if name not in ("observe", "map")]  # those two change no blow
+    known = [f"{name}.{key}" for name in tables for key in getattr(getattr(scene, name), "values", {})]
+    anew = [name for name in over if ALIASES.get(name, name) not in AXES]
+    for name in anew:
+        if name not in known:
+            near = check.nearest(name, [*AXES, *ALIASES, *known])
+            raise scene.fault(f"[map] over: {name} is not an axis{near}")
+        if isinstance(over[name], partial) or (isinstance(over[name], Mapping) and "count" not in over[name]):
+            raise scene.fault(f"[map] over: {name} needs a count, because each value needs another body")
+    return anew
 
 
 def _check_blow(scene: "Scene") -> None:

@@ -195,6 +195,8 @@ BAD_AT_ONCE = [  # as the scene is read
     ("speed = 2.0", 'speed = 2.0\n[[stroke]]\nwhen = 0\nstriker = { kind = "rigid", mass = "x" }',
      r"\[\[stroke\]\] 0 \[striker\] mass must be a number in kg, got 'x'"),
     ("speed = 2.0", "speed = 2.0\n[[stroke]]\nwhen = 0\nat = [1]", r"\[\[stroke\]\] 0 at must be a point \(x, y\)"),
+    ("speed = 2.0", 'speed = 2.0\n[map.over]\n"striker.mas" = [0.1]',
+     r"\[map\] over: striker\.mas is not an axis; did you mean 'striker.mass'"),
 ]  # fmt: skip
 
 
