@@ -87,7 +87,7 @@ def map_scene(
     if slow:
         for name in ("borders", "refine"):
             if wanted.get(name):
-                raise ValueError(f"{name}: not for axes that need another body, got {', '.join(slow)}")
+                raise ValueError(f"{name} must be left out for axes that need another body, got {', '.join(slow)}")
         wanted, ours = {**wanted, "borders": False}, False
     tell = wanted.pop("tell", None)
     grid.admit(

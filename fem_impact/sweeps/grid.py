@@ -60,7 +60,7 @@ class Job:
         if not isinstance(layers, Mapping) or not all(isinstance(n, str) and callable(f) for n, f in layers.items()):
             raise ValueError(f"layers must map names to functions of a Response, got {check.shown(layers)}")
         if self.refine and layers:
-            raise ValueError("layers of one's own are not interpolated: refine is not for them")
+            raise ValueError("refine must be left out with layers of one's own, which are not interpolated")
         band = self.max_frequency
         check.settle(
             self,
@@ -240,7 +240,7 @@ def compute_map(base: Case, axes: Mapping[str, np.ndarray], job: Job) -> xarray.
     some = cases.without_speed() or cases  # those to compute
     for name, asked, of in (("borders", job.borders, cases), ("refine", job.refine, some)):
         if asked and why_none(of):
-            raise ValueError(f"{name}: {why_none(of)}")
+            raise ValueError(f"{name} must be left out: {why_none(of)}")
     drawn = job.ours and not job.layers and not why_none(some)
     computed = job.compute_refined(some) if job.refine or (drawn and job.refine is None) else None
     numbers, texts = job.solved(some) if computed is None else (computed.numbers, computed.texts)

@@ -114,7 +114,7 @@ def test_another_body_for_each_value_needs_a_count_and_a_store(scene, tmp_path):
     with pytest.raises(ValueError, match=r"mesh\.width needs a count, because each value needs another body"):
         maps.map_scene(scene, over=over)
     over["mesh.width"]["count"] = 2
-    with pytest.raises(ValueError, match=r"borders: not for axes that need another body, got mesh\.width"):
+    with pytest.raises(ValueError, match=r"borders must be left out for axes that need another body, got mesh\.width"):
         maps.map_scene(scene, over=over, cells=3, borders=True)
     table = maps.map_scene(scene, over=over, cells=3, store=tmp_path / "map")
     assert dict(table.sizes) == {"mesh.width": 2, "mass": 3}

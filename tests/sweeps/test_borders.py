@@ -126,9 +126,9 @@ def test_a_file_keeps_the_curves():
 @pytest.mark.parametrize(
     ("over", "message"),
     [
-        ({"mass": [0.1, 0.2]}, r"borders: a map needs two axes of two values or more, got mass \(2\)"),
-        ({"mass": [0.1, 0.2], "at": [(0.4, 0.3), (0.5, 0.3)]}, "borders: axes must have one number each"),
-        ({"mass": [0.1, 0.3, 0.2], "speed": [1.0, 2.0]}, "borders: the values of mass must ascend"),
+        ({"mass": [0.1, 0.2]}, r"borders must be left out: a map needs two axes of two values or more, got mass \(2\)"),
+        ({"mass": [0.1, 0.2], "at": [(0.4, 0.3), (0.5, 0.3)]}, "borders must be left out: axes must have one number"),
+        ({"mass": [0.1, 0.3, 0.2], "speed": [1.0, 2.0]}, "borders must be left out: the values of mass must ascend"),
     ],
 )
 def test_maps_without_borders_are_told_at_once(over, message):
