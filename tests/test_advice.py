@@ -234,7 +234,9 @@ ADVICE = {  # what fails, the message, and what it advises
     "Morley on a disk": (lambda _: fi.assemble(DISK, PLATE, HELD, element="morley"), "use 'argyris', or a polygon",
      lambda _: (fi.assemble(DISK, PLATE, HELD), fi.assemble(SQUARE, PLATE, HELD, element="morley"))),
     "modes of closed forms": (
-     lambda _: closed(**SCALE, max_frequency=1e9), "lower it", lambda _: closed(**SCALE, max_frequency=1e4)),
+     lambda _: closed(**SCALE, max_frequency=1e9), "lower max_frequency", lambda _: closed(**SCALE, max_frequency=1e4)),
+    "a slip in a closed form": (lambda tmp: load_text(tmp, SMALL.replace("0.465", "46500")).plan(),
+     r"\[mesh\] length 46500 m and width 0.3 m must give .*; check the unit", lambda tmp: load_text(tmp, SMALL).plan()),
     "map": (lambda tmp: mapped(tmp, ""), r'over = \{ "striker.mass" = \[0.01, 0.1\] \}',
      lambda tmp: mapped(tmp, OVER % "")),
     "too many modes": (lambda tmp: load_text(tmp, SMALL).modes(10**6), "ask for fewer",

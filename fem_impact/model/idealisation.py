@@ -242,7 +242,8 @@ def from_outside(target: Target, at: Any, mass: float, duration: float) -> Outsi
         most = modes.frequencies[-1] * (5000 / FIRST_LOOK) ** (2.0 / modes.dimension)
         limit = min(20.0 * 0.5 / duration, most)
         if limit > modes.frequencies[-1]:
-            modes = target.finished(find(max_frequency=limit / stretch))
+            with target.blame("mesh"):
+                modes = target.finished(find(max_frequency=limit / stretch))
         rigid = rigid_error(modes, at, mass, duration)
         if modes.dimension == 1:
             return Outside(modes.mass, rigid, np.inf, np.inf, notes=notes)

@@ -178,7 +178,7 @@ def rectangle(
         while _lattice(length, width, reach / root_area, count)[0].size < count:
             reach *= 1.3
     m, n = _lattice(length, width, reach / root_area, count)
-    check_number(min(len(m), count), MOST_MODES)
+    check_number(min(len(m), count), MOST_MODES, length=length, width=width)
     order = np.lexsort((n, m, omega(m, n)))[:count]
     if not order.size:
         raise ValueError(f"max_frequency must reach the first mode, got {max_frequency:g} Hz")
@@ -194,7 +194,7 @@ def _lattice(length: float, width: float, wavenumber_squared: float, most: int) 
     limit = wavenumber_squared * (1.0 + 1e-12)
     size = [int(min(most, side * np.sqrt(limit) / np.pi + 1.0)) for side in (length, width)]
     if size[0] * size[1] > 4 * MOST_MODES:  # more than `rectangle` tries for as many modes as are allowed
-        check_number(size[0] * size[1], MOST_MODES)
+        check_number(size[0] * size[1], MOST_MODES, length=length, width=width)
     m, n = (grid.ravel() for grid in np.meshgrid(*(np.arange(1, k + 1) for k in size), indexing="ij"))
     keep = np.pi**2 * ((m / length) ** 2 + (n / width) ** 2) <= limit
     return m[keep], n[keep]

@@ -87,10 +87,14 @@ def request(
     return Request(section, mass, None, rate=float(np.sqrt(rigidity / mass)) / unit, **wanted)
 
 
-def check_number(about: float, most: int) -> None:
-    """Raise ValueError if more than ``most`` modes lie below max_frequency."""
+def check_number(about: float, most: int, **sizes: float) -> None:
+    """Raise ValueError if a body of these sizes [m] has more than ``most`` modes below max_frequency."""
     if about > most:
-        raise ValueError(f"max_frequency must give at most {most} modes of this body, got about {about:.2g}; lower it")
+        body = " and ".join(f"{name} {size:g} m" for name, size in sizes.items())
+        raise ValueError(
+            f"{body} must give at most {most} modes up to the frequency asked for, got about {about:.2g}; check the "
+            "unit, or lower max_frequency"
+        )
 
 
 def check_beyond_rigid(count: int, n_rigid: int, kind: str) -> None:

@@ -134,11 +134,11 @@ def beam(
 
     count, reach = asked.count(float(np.sqrt(bent(1)[0])), most)
     if np.isfinite(reach) and stout is None:
-        check_number(np.sqrt(reach) / np.pi, most)
+        check_number(np.sqrt(reach) / np.pi, most, length=length)
         count = n_rigid + int(np.count_nonzero(bent(int(np.sqrt(reach) / np.pi) + 2) <= reach**2))
     elif np.isfinite(reach) and stout is not None:
         count = int(stout.count(pair, np.array([reach**2]))[0])
-        check_number(count, most)
+        check_number(count, most, length=length)
     check_beyond_rigid(count, n_rigid, "bending")
     p = bent(count - n_rigid)
     own = _weights(pair, p**0.25) if stout is None else stout.weights(pair, p)
