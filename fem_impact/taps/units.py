@@ -22,6 +22,9 @@ OTHERS = (  # not known by `known`: such a channel needs a scale
 # "Force [N]", "Force (N)", "Force / N", "Force in N", "Force, N", "F/N", "a/(m/s^2)"; but "velocity m/s" is a name
 LABEL = re.compile(r"^(.*?)(?:\s*[\[(]|\s+(?:/|in)\s+|,\s+|(?<=^\w)/\(?)([^\])]*)[\])]?$")
 
+# "acc_g", as names in MATLAB and of columns hold no brackets; of units that begin no other word
+SUFFIX = re.compile(r"_(g|m?N|kN|lbf|mV)$")
+
 
 def known(unit: str) -> tuple[str, float] | None:
     """The SI unit of a unit's kind, and the factor to it; None for a unit that is not known."""
@@ -37,8 +40,9 @@ def stated(text: str) -> bool:
 
 
 def label(text: str) -> tuple[str, str]:
-    """Name and unit of a heading such as "Force [N]"; a bracket that holds no unit stays in the name."""
+    """Name and unit of a heading such as "Force [N]"; what holds no unit, or is one word as "acc_g", is the name."""
     found = LABEL.match(text.strip())
     if found and stated(found[2].strip()) and not stated(text):
         return found[1].rstrip(" /"), found[2].strip()
-    return text.strip(), ""
+    last = SUFFIX.search(text.strip())
+    return text.strip(), last[1] if last else ""

@@ -26,7 +26,8 @@ def test_known_units(text, wanted):
     [("Hammer [mV]", ("Hammer", "mV")), ("Force [N]", ("Force", "N")), ("Hammer (lbf)", ("Hammer", "lbf")),
      ("Force (Trigger)", ("Force (Trigger)", "")), ("Kraft / kN", ("Kraft", "kN")), ("F/kN", ("F", "kN")),
      ("a/(m/s²)", ("a", "m/s²")), ("Zeit in ms", ("Zeit", "ms")), ("Force, lbf", ("Force", "lbf")),
-     ("load [kg]", ("load", "kg")), ("velocity m/s", ("velocity m/s", "")), ("m/s", ("m/s", ""))],
+     ("load [kg]", ("load", "kg")), ("velocity m/s", ("velocity m/s", "")), ("m/s", ("m/s", "")),
+     ("acc_g", ("acc_g", "g")), ("F_kN", ("F_kN", "kN")), ("hammer_in", ("hammer_in", ""))],
 )  # fmt: skip
 def test_a_heading_ends_with_its_unit_if_it_holds_one(heading, wanted):
     assert units.label(heading) == wanted
