@@ -56,7 +56,7 @@ class Parser(argparse.ArgumentParser):
 
 
 class _Help(argparse.HelpFormatter):
-    """Keeps the lines of an epilog; an example that is too long goes on in the next line, as a shell reads it.
+    """Keeps paths whole, and the lines of an epilog, where a long example goes on in the next line, as shells read it.
 
     The usage says what a command needs; the options that it can do without are listed below it.
     """
@@ -64,6 +64,9 @@ class _Help(argparse.HelpFormatter):
     def add_usage(self, usage: Any, actions: Any, groups: Any, prefix: str | None = None) -> None:
         needed = [each for each in actions if each.required or not each.option_strings]
         super().add_usage(usage, needed, (), prefix)
+
+    def _split_lines(self, text: str, width: int) -> list[str]:
+        return textwrap.wrap(text, width, break_on_hyphens=False, break_long_words=False)
 
     def _fill_text(self, text: str, width: int, indent: str) -> str:
         lines = []

@@ -29,8 +29,8 @@ def width() -> int:
 
 
 def wrapped(text: str) -> str:
-    """Text wrapped to the width of the terminal, with continued lines indented."""
-    filled = textwrap.TextWrapper(width(), subsequent_indent="    ", break_on_hyphens=False)  # keeps paths whole
+    """Text wrapped to the width of the terminal, with paths kept whole and continued lines indented."""
+    filled = textwrap.TextWrapper(width(), subsequent_indent="    ", break_on_hyphens=False, break_long_words=False)
     lines = (filled.wrap(line) or [""] for line in text.splitlines())
     return "\n".join(line for wrapped in lines for line in wrapped)
 
