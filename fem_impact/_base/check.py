@@ -215,11 +215,6 @@ def absent(path: Path) -> str:
     return "it is not a regular file" if path.exists() else "there is no such file"
 
 
-def no_folder(path: Path) -> str:
-    """Why a path that is not a folder cannot be one."""
-    return "it is a file and no folder" if path.exists() else "there is no such folder"
-
-
 def typed(function: Function) -> Function:
     """Decorator: check arguments against the annotations of the signature.
 

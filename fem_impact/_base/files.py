@@ -82,6 +82,11 @@ def write_whole(path: str | Path, content: str | bytes) -> int:
         return temporary.write_bytes(content.encode() if isinstance(content, str) else content)
 
 
+def no_folder(path: Path) -> str:
+    """Why a path that is not a folder cannot be one."""
+    return "it is a file and no folder" if path.exists() else "there is no such folder"
+
+
 @contextmanager
 def staged(folder: str | Path, command: str | None = None) -> Iterator[Path]:
     """Yield an empty folder; move all its files into ``folder`` if the block succeeds, none if it fails.
@@ -103,7 +108,7 @@ def staged(folder: str | Path, command: str | None = None) -> Iterator[Path]:
         staging = folder / name
         try:
             if folder.exists() and not folder.is_dir():
-                raise NotADirectoryError(20, "it is a file and no folder; name another", str(folder))
+                raise NotADirectoryError(20, f"{no_folder(folder)}; name another", str(folder))
             folder.mkdir(parents=True, exist_ok=True)
             _tidy(folder)
             staging.mkdir()

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import xarray
 
-from .._base import check, kept
+from .._base import check, files, kept
 from ..fe.section import Material
 from ..impact.assumption import Assumption
 from ..impact.compiled import layout
@@ -138,7 +138,7 @@ def load_response(folder: str | Path) -> Response | Strokes:
     folder = check.path("folder", folder)
     folder = folder.parent if folder.suffix == ".json" else folder
     if not folder.is_dir():
-        raise fault(folder, f"{check.no_folder(folder)}; give the one that `fem-impact strike` wrote")
+        raise fault(folder, f"{files.no_folder(folder)}; give the one that `fem-impact strike` wrote")
     key = _key(folder)
     again = "strike the scene again"
     if not (folder / SAVED).is_file():
@@ -183,7 +183,7 @@ def describe(folder: Path) -> tuple[dict[str, Any], list[str]]:
     """What a folder of results or a store holds: as data, and in a few lines."""
     if not folder.is_dir():
         near = [] if folder.exists() else _names(folder.parent)
-        raise fault(folder, check.no_folder(folder) + check.nearest(folder.name, near))
+        raise fault(folder, files.no_folder(folder) + check.nearest(folder.name, near))
     names = _names(folder)
     if "zarr.json" in names and not (folder / "map.csv").exists():
         done, total = store.finished(folder)
