@@ -133,17 +133,18 @@ def by_vectors(
         first = target.finished(target.find(FIRST_FLEXIBLE, tolerance=CLOSE))
         case = replace(case, first=float(first.frequencies[first.omega > 0.0][0]))
     points = axes.get("at", case.at[None])
-    shapes, striker, ratio = case.modes.shapes, case.striker, target.damping_ratio
-    assert isinstance(shapes, FieldShapes)
-    system, frame = shapes.system, shapes.system.frame
-    key = identity.identify([  # everything that determines the vectors
-        striker.modes.omega, striker.felt_mass, striker.shape, vars(case.contact), case.speed, tolerance, case.at,
-        case.first, target.mass, dict(target.scale), target.size_stated,
-        damping_ratios(0.0 if ratio is None else ratio, np.geomspace(1.0, 1e7, 50)), dict(axes), identity.program(),
-        system.K.data, system.M.data, [frame.length, frame.stiffness, frame.inertia],
-    ])  # fmt: skip
-    known = None if keep is None else kept.unpack(keep, key, KINDS)
-    views: Views | None = None if known is None else known["views"]
+    views: Views | None = None
+    if keep is not None:
+        shapes, striker, ratio = case.modes.shapes, case.striker, target.damping_ratio
+        assert isinstance(shapes, FieldShapes)
+        system, frame = shapes.system, shapes.system.frame
+        key = identity.identify([  # everything that determines the vectors
+            striker.modes.omega, striker.felt_mass, striker.shape, vars(case.contact), case.speed, tolerance, case.at,
+            case.first, target.mass, dict(target.scale), target.size_stated,
+            damping_ratios(0.0 if ratio is None else ratio, np.geomspace(1.0, 1e7, 50)), dict(axes), identity.program(),
+            system.K.data, system.M.data, [frame.length, frame.stiffness, frame.inertia],
+        ])  # fmt: skip
+        views = (kept.unpack(keep, key, KINDS) or {}).get("views")
     if views is None:
         others = {name: values for name, values in axes.items() if name != "at"}
         rng = np.random.default_rng(0)  # the same map gives the same vectors
