@@ -69,7 +69,7 @@ def read_mesh(path: Any, unit: str | None) -> tuple[
     sides = sides_of(cells)[0]
     for name, group in data.nodes.items():  # of two duplicates, a set may hold either
         on = sides[np.isin(sides, number[group]).all(axis=1)]
-        if len(on):
+        if len(on) or (number[group] < 0).all():  # a node of a triangle alone is for a force
             pairs.setdefault(name, set()).update(map(tuple, on.tolist()))
     cells = _hanging(points, cells, pairs, notes)
     _refuse_overlap(path, points, cells)

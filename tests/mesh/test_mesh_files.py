@@ -113,6 +113,14 @@ def test_sets_of_nodes_are_edges_which_may_overlap_and_be_called_as_the_surface_
     assert_same_edges(fi.mesh.load(tmp_path / "again.msh"), given)
 
 
+def test_a_set_of_nodes_of_no_triangle_is_no_edge_and_told_so(tmp_path):
+    points = np.vstack([GOOD.points, [[9.0, 9.0]]])
+    given = fi.mesh.load(written(tmp_path, points, GOOD.cells, name="plate.inp", point_sets={"RP": np.array([N])}))
+    assert given.notes == ("plate.inp: RP: not on the rim, so it cannot be supported",)
+    with pytest.raises(ValueError, match="supports names edge 'RP', but the mesh has the edges boundary, outer"):
+        fi.assemble(given, fi.Plate(fi.Material(E=210e9, nu=0.3, rho=7850.0), 1e-3), {"RP": "clamped"})
+
+
 def test_a_set_that_holds_one_of_two_duplicate_nodes_names_the_sides_of_both(tmp_path):
     """Two parts with nodes of their own where they meet, of which the set names those of the first."""
     points, cells = np.concatenate([GOOD.points] * 2), np.concatenate([GOOD.cells[:HALF], GOOD.cells[HALF:] + N])
