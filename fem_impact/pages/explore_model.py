@@ -205,9 +205,9 @@ class Setup:
         shape = self.base.modes.shape_at([point]) if point else np.ones(1)
         return bool(np.abs(shape).max() * np.sqrt(self.base.modes.mass) < SAME)
 
-    def place(self, x: float, y: float) -> tuple[float, ...] | None:
-        """The strike point under a click; None if the click misses the body."""
-        point = (x, y)[: self.base.modes.dimension]
+    def place(self, *clicked: float) -> tuple[float, ...] | None:
+        """The strike point under a click, of which a beam takes x; None if the click misses the body."""
+        point = clicked[: self.base.modes.dimension]
         try:
             return tuple(self.base.modes.points("at", point)[0].tolist())
         except ValueError:

@@ -80,7 +80,7 @@ class Session:
         heard_at = self.heard_at
         self._begin()
         if self.explorer.order.at is not None:
-            self.heard_at = self.setup.place(*heard_at, *([0.0] * (2 - len(heard_at)))) or self.heard_at
+            self.heard_at = self.setup.place(*heard_at) or self.heard_at
         self.show()
 
     def close(self) -> None:
@@ -151,7 +151,7 @@ class Session:
         at = [turned.pop(letter, None) for letter in "xy"]
         if any(value is not None for value in at):
             point = [old if new is None else new for old, new in zip(before.at, at)]
-            turned_at = self.setup.place(*point, *([0.0] * (2 - len(point))))
+            turned_at = self.setup.place(*point)
             if turned_at is None:
                 notes.append(f"{place(point)} is beside the body: the strike point stays.")
             elif self.setup.at_rest(turned_at):

@@ -120,9 +120,7 @@ def places_of(setup: Setup) -> tuple[Point, ...]:
         way = np.eye(len(at))[0] * 0.25 * (high - low)[0]
 
     def on_body(share: float) -> Point | None:
-        point = np.zeros(2)
-        point[: len(at)] = middle + share * way
-        return setup.place(*point)
+        return setup.place(*(middle + share * way))
 
     shares = np.linspace(0.0, 1.0, 101) * float(np.linalg.norm(high - low) / np.linalg.norm(way))
     reach = next((share for share in shares[shares > 1.0] if on_body(share) is None), shares[-1])

@@ -14,18 +14,16 @@ import xarray
 from .._base import check, markup
 from ..fe import plausible
 from ..impact import threshold
-from ..impact.contact import MARKS, acting_stiffness, wall_time
+from ..impact.contact import acting_stiffness, wall_time
 from ..model.target import Stages
 from ..show import export, figures, plots
 from ..sweeps import cases, grid
 from ..sweeps.borders import PREFIX, read_borders
-from ..sweeps.cells import LAW, Case, laid_out, logarithmic
+from ..sweeps.cells import ALIASES, ALONE, LAW, Case, laid_out, logarithmic
 from .scene import Scene
 from .schema import Part
 from .whole import check_axes
 
-SLOW = {"loss", *MARKS}  # axes of the contact that take longer per blow
-SLOW |= {f"contact.{name}" for name in SLOW}
 FORMATS = ("nc", "zarr")
 FILES = (".nc", ".zarr", ".csv", ".png", ".pdf", ".svg")  # a folder name must not end like this
 MOST_ROWS = 10**6  # [-] a larger map gets no CSV file: spreadsheets end there, and it would have a hundred megabytes
@@ -93,7 +91,8 @@ def map_scene(
     grid.admit(
         math.prod(len(values) for values in over.values()), len(cases.LAYERS),
         wanted.pop("max_cells", grid.MOST_CELLS),
-        quick=not law.lossy and not law.special and law.exponent >= 1.0 and not SLOW & set(over),
+        quick=not law.lossy and not law.special and law.exponent >= 1.0
+        and not {"loss", *ALONE} & {ALIASES.get(name, name) for name in over},
         tell=tell,
     )  # fmt: skip
     pieces = []
