@@ -119,6 +119,6 @@ def over_frequency(value: Any) -> Any:
         raise ValueError(f"damping_ratio must be a number or have frequency and ratio, got {check.shown(value)}")
     frequency = check.ascending("damping_ratio.frequency", value["frequency"], "Hz")
     ratio = check.array("damping_ratio.ratio", value["ratio"], frequency.shape)
-    if (ratio < 0.0).any():
-        raise ValueError(f"damping_ratio.ratio must not be negative, got {ratio.min():g}")
+    if not len(ratio) or (ratio < 0.0).any():
+        raise ValueError(f"damping_ratio.ratio must not be negative or empty, got {check.shown(value['ratio'])}")
     return lambda hertz: np.interp(hertz, frequency, ratio)

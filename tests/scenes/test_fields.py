@@ -107,6 +107,8 @@ def test_damping_over_frequency():
     ('right = "hinged"', "right = 3", r"\[supports\] right must be one of clamped, hinged, free, soft hinged or"),
     ("ratio = [0.01, 0.002]", "ratio = [0.01]", r"\[target\] damping_ratio.ratio must have shape"),
     ("ratio = [0.01, 0.002]", "ratio = [0.01, -1.0]", r"\[target\] damping_ratio.ratio must not be negative"),
+    ("frequency = [100.0, 1000.0], ratio = [0.01, 0.002]", "frequency = [], ratio = []",
+     r"scene\.toml: \[target\] damping_ratio.ratio must not be negative or empty, got \[\]"),
     ("frequency = [100.0, 1000.0]", "hertz = [1.0]", r"\[target\] damping_ratio must be a number or have"),
     ("mass = 0.05 }", "mass = -0.05 }", r"\[target\] point_masses\[0\].mass must be positive"),
     ("at = [0.1, 0.2], ", "", r"\[target\] point_masses\[0\] must have at and mass"),
