@@ -411,6 +411,8 @@ def strike(
         raise ValueError(
             "start needs modes, taken as they are: give those of the blow before, hit.target, and no part of a plan"
         )
+    if speed is None:
+        raise ValueError("speed must be given in m/s")
     plan = plan_of(modes, striker, contact, at=at, speed=speed, damping_ratio=damping_ratio, **options)
     if plan.seconds > progress.LONG:
         progress.SLOW.info("striking takes %s", plan.cost)
