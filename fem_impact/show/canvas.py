@@ -113,7 +113,7 @@ def frames(film: Film) -> Iterator[Image.Image]:
                 line.points = points + np.array([0.0, 0.0, LIFT * mesh.length])
             above = radius + extent * min(HEIGHT * float(gap), 2.0 * HEIGHT)
             ball.position = (*film.at, height[under] + above)
-            plotter.add_text(title, font_size=10 * FINER, position="upper_left", name="title", render=False)
+            _write(plotter, title, 10 * FINER, name="title", render=False)
             plotter.reset_camera_clipping_range()  # the striker may lie outside the bounds
             plotter.render()
             yield Image.fromarray(plotter.screenshot(None)).reduce(FINER)
@@ -136,7 +136,7 @@ def gallery(shown: Gallery) -> Image.Image:
         _add_line(plotter, rim, RIM)
         _add_line(plotter, _sides(mesh.points, shown.ribs), RIB)
         _add_line(plotter, mesh.contour([0.0]), "black")
-        plotter.add_text(title, font_size=9, position="upper_left")
+        _write(plotter, title, 9)
         _look(plotter, shown.plane, shown.rise, zoom=1.15)
     picture = Image.fromarray(plotter.screenshot(None))
     plotter.close()
@@ -221,6 +221,11 @@ def _add_line(plotter: Any, line: Any, colour: str) -> None:
     if line.n_points and line.n_cells:
         raised = line.translate((0.0, 0.0, LIFT * line.length))
         plotter.add_mesh(raised, color=colour, line_width=2, render=False)
+
+
+def _write(plotter: Any, title: str, size: int, **options: Any) -> None:
+    """Write a title, in one font whatever other libraries made the default of the process."""
+    plotter.add_text(title, font_size=size, font="arial", color="black", position="upper_left", **options)
 
 
 def _look(plotter: Any, plane: np.ndarray, rise: Any = 0.0, zoom: float = 1.35) -> None:
