@@ -10,7 +10,6 @@ from numpy.testing import assert_allclose
 
 import fem_impact as fi
 from fem_impact._base import check
-from fem_impact._base.progress import heard
 from fem_impact.fe import assembly, refinement
 from fem_impact.impact import collision
 from fem_impact.model import asked, by_modes, by_vectors, cost, planner
@@ -152,11 +151,9 @@ def test_a_plate_that_is_infinite_only_far_up_is_described_by_vectors_after_all(
     sheet = fi.assemble(fi.mesh.rectangle(a, b), fi.Plate(steel, 0.681e-3), {"boundary": "hinged"})
     how = {"at": (0.5013 * a, 0.3378 * b), "speed": 0.34734, "tolerance": 1e-2}
     plan = fi.plan(sheet, fi.Striker.rigid(0.05339), fi.Contact.power(6.3057e17, 2.7703), **how)
-    told = []
-    with heard(None, told.append):
-        run = plan.run()
+    run = plan.run()
     assert plan.target == "mixed" and run.plan.target == "vectors" and run.response.tolerance_met
-    assert run.response.n_impacts == 2 and max(told) > 2.0 * plan.seconds  # what was not foreseen is told
+    assert run.response.n_impacts == 2 and plan.seconds > run.plan.seconds  # all that may follow is foreseen
 
 
 @pytest.mark.slow
