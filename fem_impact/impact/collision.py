@@ -79,7 +79,10 @@ def strike(
             return [before.go_on(part) for part in (moving, target)]
 
         other = None if before is None else start_bodies(before.otherwise)
-        return _follow((striker.body, modes), (contact,), start_bodies(before), speed, asked, striker, point[0], other)
+        late = 0.0 if before is None else before.late
+        return _follow(
+            (striker.body, modes), (contact,), start_bodies(before), speed, asked, striker, point[0], other, late
+        )
 
     if speed is None:
         assert before is not None
@@ -166,12 +169,12 @@ def met(
     parts, arriving = _parts(bodies, contacts, speeds, states, forces, asked.residual, strikers)
     for i, each in strikers.items():
         parts[i] = replace(parts[i], bias=parts[i].bias + each.push, held=int(each.hand is not None))
-    other = None
+    other, late = None, 0.0
     if before is not None:
-        state = before.otherwise
+        state, late = before.otherwise, before.late
         moved = [replace(*each, q=q, p=p) for *each, q, p in zip(parts, state.displacements, state.velocities)]
         parts, other = [before.go_on(part) for part in parts], [state.go_on(part) for part in moved]
-    return _follow(bodies, [touch.law for touch in contacts], parts, arriving, asked, other=other)
+    return _follow(bodies, [touch.law for touch in contacts], parts, arriving, asked, other=other, late=late)
 
 
 def touching(bodies: Sequence[Modes], touch: Touch, speed: float, residual: bool) -> tuple[KernelSystem, float]:
@@ -181,10 +184,11 @@ def touching(bodies: Sequence[Modes], touch: Touch, speed: float, residual: bool
     return system, engine.pace_of(system).duration
 
 
-def _follow(bodies, laws, parts, speed, options, striker=None, at=None, other=None) -> Response:
+def _follow(bodies, laws, parts, speed, options, striker=None, at=None, other=None, late=0.0) -> Response:
     """Run the blow to the required tolerance and estimate the remaining errors.
 
-    ``other`` are the parts as they would move at the start if the blow before erred, see `State.otherwise`.
+    ``other`` are the parts as they would move at the start, ``late`` [s], if the blow before erred, see
+    `State.otherwise`.
     """
     system, stretched = joined(parts, laws), stretched_in(parts)
     if options.last == (np.inf, 0) and max((system.bias @ system.shape.T).tolist()) > 0.0:
@@ -213,7 +217,7 @@ def _follow(bodies, laws, parts, speed, options, striker=None, at=None, other=No
     left_out, resolvable = what_if.modes_left_out(blow, bodies)
     variations = left_out, *what_if.unstated(blow, bodies), what_if.mesh(blow, bodies)
     errors = {"step": found.error, **what_if.what_if(blow, variations)}
-    moved = [blow.again(other, moved=True)] if other else []
+    moved = [blow.again(other, late=late)] if other else []
     for run in moved:
         errors["inherited"] = distance.of_runs(run, found.coarse, options.quantities, pace=pace)
     what_if.add_poorer_descriptions(blow, bodies, errors)
@@ -226,7 +230,7 @@ def _follow(bodies, laws, parts, speed, options, striker=None, at=None, other=No
     error = Error.of_causes(errors, options.quantities, resolvable, growth)
     return Response(
         tuple(bodies), tuple(laws), found.fine, speed, options.tolerance, found.scheme, error, striker, at,
-        ends_of(parts, laws), options.quantities, rebounds=whole[n + 1 :][order], runs=runs,
+        ends_of(parts, laws), options.quantities, rebounds=whole[n + 1 :][order], runs=runs, late=late,
     )  # fmt: skip
 
 

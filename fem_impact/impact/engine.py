@@ -81,6 +81,8 @@ def run_system(
     ``size`` is the step in contact [s], for collocation the allowed misfit [-]; ``chosen_by`` is what it comes from.
     """
     most, stretch = most_steps(system, stretched), None
+    for array in system:
+        array.setflags(write=False)  # or numba would compile the kernels again for writable arrays
     limits = Limits(
         float(EPSILON * pace.duration * pace.speed), float(ROUNDING * pace.speed), float(last[0]), last[1], most
     )
@@ -127,8 +129,6 @@ def again(history: History, step: float | None = None, **changed: Any) -> Histor
     system = before._replace(**changed)
     horizon = history.end_time if history.status == record.HORIZON else np.inf
     most = history.n_ended if history.status == record.IMPACTS else 0
-    for array in system:
-        array.setflags(write=False)  # or numba would compile the kernels again for writable arrays
     size = pace.duration / steps_per_contact(TOLERANCE) if step is None else step
     return run_system(system, "A4", size, pace, (horizon, most), stretched)
 

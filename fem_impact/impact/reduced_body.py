@@ -250,10 +250,7 @@ def joined(parts: Sequence[ReducedBody], laws: Sequence[Contact]) -> KernelSyste
                     held -= sign * share / above * force
                 columns[:, start] = above, damping, 0.0, *held
                 start += 1
-    found = KernelSystem(columns[0], columns[1], shape, offset, columns[2], law, columns[3], columns[4])
-    for array in found:
-        array.setflags(write=False)
-    return found
+    return KernelSystem(columns[0], columns[1], shape, offset, columns[2], law, columns[3], columns[4])
 
 
 def rest_mode(dimension: int, omega: float, zeta: float, lossy: bool, pushed: float) -> tuple[float, float]:

@@ -72,6 +72,7 @@ class Response(Totals, check.Locked):
     vectors: Modes | None = field(default=None, repr=False)  # all Ritz pairs of the target, if it is described by them
     # the run in coarser steps, and that from where the blow before would have left the bodies, had it erred
     runs: tuple[History, ...] = field(default=(), repr=False)
+    late: float = field(default=0.0, repr=False)  # [s] by how much the latter begins later
     rebounds: np.ndarray | None = None  # (n_impacts,) [-] estimated errors of the restitutions of the impacts
 
     @check.typed

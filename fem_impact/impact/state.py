@@ -38,6 +38,7 @@ class State(check.Brief):
     doubts: tuple[np.ndarray, ...] = ()
     # (2, n_contacts) what contacts remember, [m] if they yield, [m**exponent] of felt, and by how much it may err
     memory: np.ndarray = field(default_factory=lambda: np.zeros((2, 0)))
+    late: float = 0.0  # [s] how much later all this would be reached: doubts of a cut while something touches
 
     def __post_init__(self) -> None:
         if not len(self.pressed):
@@ -150,18 +151,20 @@ def state_at(hit: "Response", time: float | None) -> State:
         for (i, sign), force in zip(ends.touched, ends.pressed(h.omega, own)):
             pressed[i, int(sign < 0.0)] = force
     bodies = (*hit.bodies[:-1], hit.target)
-    doubts, memory = _doubts(hit, time, own, states)
+    doubts, memory, late = _doubts(hit, time, own, states, bool(forces.any()))
     return State(
         time, bodies, tuple(q for q, _ in states), tuple(p for _, p in states), forces, min(hit.error.total, 1.0),
-        hit.striker, hit.contacts, hit.at, pressed, doubts, memory,
+        hit.striker, hit.contacts, hit.at, pressed, doubts, memory, late,
     )  # fmt: skip
 
 
-def _doubts(hit: "Response", time: float, own: np.ndarray, states: list[np.ndarray]) -> tuple[Any, np.ndarray]:
-    """How far all bodies may be from a state of a blow, ``own`` that of its run, as `State.doubts`; and `State.memory`.
+def _doubts(
+    hit: "Response", time: float, own: np.ndarray, states: list[np.ndarray], touching: bool
+) -> tuple[Any, np.ndarray, float]:
+    """How far all bodies may be from a state of a blow, ``own`` that of its run: `State.doubts`, `memory` and `late`.
 
-    Its runs tell what its steps and the blow before it do to both, which of other causes are as wrong as the numbers of
-    the blow.
+    Its runs tell what its steps and the blow before it do to them, which of other causes are as wrong as the numbers of
+    the blow. Where the run was cut as an impact ended while other contacts last, each run counts as it was cut itself.
     """
     error, bodies = hit.error, (*hit.bodies[:-1], hit.target)
     told = error.step + error.inherited  # of 1 and more, where there may be other impacts, runs tell nothing
@@ -169,14 +172,17 @@ def _doubts(hit: "Response", time: float, own: np.ndarray, states: list[np.ndarr
     other = min(1.0, error.total - (told if runs else 0.0))
     memory = hit.history.remembered(time, own)
     found, lost = [other * motion(modes, *state) for modes, state in zip(bodies, states)], other * np.abs(memory)
+    cut, late = touching and time == hit.history.end_time and hit.history.status == record.IMPACTS, 0.0
 
-    def told_by(fine: np.ndarray, coarse: np.ndarray, *moved: np.ndarray) -> np.ndarray:
+    def told_by(fine: Any, coarse: Any, *moved: Any) -> Any:
         return (coarse - fine) / RICHARDSON[hit.scheme][0] + (moved[0] - coarse if moved else 0.0)
 
     if runs:
-        ends = [run.state(time) for run in runs]
+        times = [run.end_time if cut else max(0.0, time - begun) for run, begun in zip(runs, (0.0, hit.late))]
+        late = told_by(time, times[0], *(end + hit.late for end in times[1:])) if cut else 0.0
+        ends = [run.state(each) for run, each in zip(runs, times)]
         whole = told_by(own, *ends)
         found = [doubt + whole[:, hit.body_slice(i)] for i, doubt in enumerate(found)]
-        kept = [np.abs(run.remembered(time, end)) for run, end in zip(runs, ends)]
+        kept = [np.abs(run.remembered(each, end)) for run, each, end in zip(runs, times, ends)]
         lost += told_by(np.abs(memory), *kept)
-    return tuple(found), np.array([memory, lost])
+    return tuple(found), np.array([memory, lost]), late

@@ -33,17 +33,16 @@ class Followed:
     pace: engine.Pace
     runs: Converged
 
-    def again(self, parts: Sequence[ReducedBody], *, finely: bool = False, moved: bool = False) -> History:
+    def again(self, parts: Sequence[ReducedBody], *, finely: bool = False, late: float | None = None) -> History:
         """The blow with these bodies, in the steps of the coarser run or, on request, of the finer.
 
-        They may have ``moved``; otherwise contacts begin as they do in the blow itself.
+        They may have moved and begin ``late`` [s]; by default contacts begin as they do in the blow itself.
         """
-        how = self.runs.scheme, self.runs.steps[0 if finely else 1], self.pace, self.options.last
+        last = max(0.0, self.options.last[0] - (late or 0.0)), self.options.last[1]
+        how = self.runs.scheme, self.runs.steps[0 if finely else 1], self.pace, last
         system = joined(parts, self.laws)
         if self.system.q.any():
-            offset = system.offset + self._apart(system, moved)
-            offset.setflags(write=False)
-            system = system._replace(offset=offset)
+            system = system._replace(offset=system.offset + self._apart(system, late is not None))
         return engine.run_system(system, *how, stretched_in(parts))
 
     def _apart(self, system: KernelSystem, moved: bool) -> np.ndarray:

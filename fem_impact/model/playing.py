@@ -327,6 +327,7 @@ class _Game:
     q: np.ndarray
     p: np.ndarray
     doubt: np.ndarray  # as one of `State.doubts`
+    late: float = 0.0  # as `State.late`
     sticks: list[_Stick] = field(default_factory=list)
     starts: list[float] = field(default_factory=list)
     hits: list[Response] = field(default_factory=list)
@@ -366,6 +367,7 @@ class _Game:
         self.now = self.now + length if hit.history.status == record.IMPACTS else until
         state = hit.state(length if over else None)
         self.q, self.p, self.doubt = state.displacements[-1], state.velocities[-1], state.doubts[-1]
+        self.late = state.late
         found = []  # the strikers that stay on the body, as they move now
         for i, stick in enumerate(() if over else self.sticks):
             stroke = self.played[stick.number]
@@ -404,7 +406,7 @@ class _Game:
             pressed = np.array([stick.pressed for stick in sticks])
             doubts = (*(stick.doubt for stick in sticks), self.doubt)
             memory = np.array([stick.memory for stick in sticks]).T
-            start = State(0.0, bodies, q, p, forces, 0.0, None, laws, None, pressed, doubts, memory)
+            start = State(0.0, bodies, q, p, forces, 0.0, None, laws, None, pressed, doubts, memory, self.late)
             movers = (*(stick.striker for stick in sticks), self.modes)
             hit = planner.struck(partial(collision.met, movers, touches, start=start), rule)
             self.sticks = sticks

@@ -95,7 +95,6 @@ def of_target(modes: Modes, at: Any, points: Any = None, softness: float | None 
 def follow_blow(system: engine.KernelSystem, speed: float, step: float, horizon: float) -> History:
     """One blow of a system that moves at unit speed, at a speed [m/s] with a step in contact [s], up to a time [s]."""
     struck = system._replace(p=speed * system.p)
-    struck.p.setflags(write=False)  # or numba would compile the kernels again for writable arrays
     pace, last = engine.Pace(STEPS * step, speed), (horizon, 0)
     return engine.run_system(struck, "A4", step, pace, last, chosen_by="the lower ends of unknown")
 

@@ -119,11 +119,14 @@ def test_a_single_stroke_is_a_strike():
 
 
 @pytest.mark.filterwarnings("ignore::fem_impact.ToleranceWarning")  # of the restitution with few modes
-@pytest.mark.parametrize("seed", [64, 76, 221, 275, 288])
-def test_what_a_stroke_inherits_is_what_the_steps_before_did_to_the_motion(seed):
+@pytest.mark.parametrize(("seed", "lifted"), [
+    (64, False), (76, False), (221, False), (275, False), (288, False), (84, True), (124, True),
+])  # fmt: skip
+def test_what_a_stroke_inherits_is_what_the_steps_before_did_to_the_motion(seed, lifted):
     """Scaling the motion by the stated error missed by up to a thousand times what is told now, of 269 such rolls one.
 
-    Twice the claim is allowed: estimates are right within a factor.
+    Where a stick is lifted while another presses, what follows begins a little late in a run that errs: without that,
+    1e-11 was told of an error of 1e-5. Twice the claim is allowed: estimates are right within a factor.
     """
     rng, n = np.random.default_rng(seed), 10
     omega = np.sort(10.0 ** rng.uniform(1.7, 3.5, n))
@@ -132,6 +135,11 @@ def test_what_a_stroke_inherits_is_what_the_steps_before_did_to_the_motion(seed)
     ball, law = fi.Striker.rigid(10.0 ** rng.uniform(-2.5, -0.8)), fi.Contact.linear(10.0 ** rng.uniform(4.0, 6.5))
     times = np.cumsum([0.0, *10.0 ** rng.uniform(-2.5, -1.3, 2)])
     played = [(t, ball, law, [0.0], v) for t, v in zip(times, 10.0 ** rng.uniform(-1.0, 0.7, 3))]
+    if lifted:
+        lasts, rng = [], np.random.default_rng(seed + 7_000_000)
+        for _ in played:
+            lasts.append((10.0 ** rng.uniform(-3.0, -1.7),) if rng.random() < 0.6 else ())
+        played = [(0.3 * when, *stroke, *end) for (when, *stroke), end in zip(played, lasts)]
     told, exact = (fi.strokes(body, played, tolerance=tolerance) for tolerance in (1e-3, 1e-7))
     for hit, other in zip(told.hits, exact.hits, strict=True):
         assert hit.n_impacts == other.n_impacts
