@@ -73,9 +73,9 @@ class Strokes(Totals, check.Locked):
         for start, hit, strokes in zip(self.starts.tolist(), self.hits, self.strikers):
             for each in hit.impacts:
                 stroke, begin, end = strokes[each.contact], start + each.start, start + each.end
-                same = (i for i, old in enumerate(found) if old.contact == stroke and each.start == 0.0)
-                i = next((i for i in same if found[i].end >= begin), None)  # the run was cut while this one lasted
-                if i is None:
+                pressed = (i for i, old in enumerate(found) if old.contact == stroke and old.separation_speed is None)
+                i = next(pressed, None)  # the run was cut while this one lasted
+                if i is None or each.start > 0.0:
                     found.append(replace(each, start=begin, end=end, contact=stroke))
                 else:
                     peak = max(found[i].peak_force, each.peak_force)

@@ -60,6 +60,15 @@ def test_two_sticks_on_one_body_meet_an_independent_integration(delay):
     assert_allclose(pair.energies["taken away"], energy, rtol=1e-5)  # a balance of all hits against the end alone
 
 
+def test_an_impact_that_goes_on_as_another_stick_arrives_is_one_whatever_the_rounding():
+    """The run of the first ends some 1e-19 s before the second one arrives."""
+    first, second = 3e-4, 8e-4
+    assert first + (second - first) < second
+    strokes = [(when, BALL, LAW, at, 1.0) for when, at in ((first, (0.05, 0.0)), (second, (0.0, 0.05)))]
+    pair = fi.strokes(DRUM, strokes, tolerance=0.1, duration=1e-3)
+    assert [each.contact for each in pair.impacts] == [0, 1]
+
+
 def alone(strokes):
     """The forces of each stroke on a body at rest: with their start [s]."""
     for start, hit in zip(strokes.starts, strokes.hits):
