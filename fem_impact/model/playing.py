@@ -302,6 +302,8 @@ def strokes(
     played = tuple(sorted(given, key=lambda stroke: stroke.when))
     tolerance = check.tolerance(tolerance)
     end = np.inf if duration is None else played[0].when + check.positive("duration", duration, "s")
+    if end == played[0].when:
+        raise ValueError(f"duration must not vanish beside the time of the first stroke, {end:g} s, got {duration:g} s")
     begun = start.state() if isinstance(start, Response) else start
     still = np.zeros(modes.n_modes)
     game = _Game(modes, played, played[0].when, still, still, np.zeros((2, modes.n_modes)))

@@ -250,10 +250,11 @@ STROKE = 0.0, BALL, LAW, (0.05, 0.0), 1.0
     ([STROKE, (0.1, LAW, BALL, (0.0, 0.0), 1.0)], r"strokes\[1\] striker must be a Striker"),
     ([(0.0, BALL, LAW, (0.5, 0.0), 1.0)], r"strokes\[0\] at must lie on the body"),
     ([(*STROKE, -1.0)], r"strokes\[0\] lasts must be positive"),
+    ([(1e15, *STROKE[1:])], "duration must not vanish beside the time of the first stroke"),
 ])  # fmt: skip
 def test_what_is_no_sequence_says_so(strokes, words):
     with pytest.raises(ValueError, match=words):
-        fi.strokes(DRUM, strokes, **LOOSE)
+        fi.strokes(DRUM, strokes, duration=1e-3, **LOOSE)
 
 
 def test_a_stroke_without_end_says_which_it_is(monkeypatch):
