@@ -64,20 +64,6 @@ def test_two_masses_share_speed_as_in_newtons_cradle(law, ratio):
     assert hit.energy_error < 1e-13  # rounding of some dozen steps
 
 
-def test_stick_on_half_a_million_kilograms_rings_like_a_third_of_its_mass():
-    heavy, felt = plate(60, mass=5e5), 0.1 / 3.0
-    hit = fi.strike(heavy, STICK, fi.Contact.linear(88.6e3), **AT)
-    half_period = np.pi * np.sqrt(felt / 88.6e3)
-    # the stick's own bending at 10 kHz lengthens a contact of 260 Hz by some (260/10000)**2
-    assert_allclose(hit.contact_time, half_period, rtol=2e-3)
-    inside = (hit.time > 0.05 * half_period) & (hit.time < 0.95 * half_period)
-    sine = np.sqrt(88.6e3 * felt) * np.sin(np.pi * hit.time / half_period)
-    assert_allclose(hit.force[inside], sine[inside], atol=0.01 * sine.max())
-    hertz = fi.strike(heavy, STICK, fi.Contact.hertz(695e3), **AT)
-    assert_allclose(hertz.contact_time, wall_duration(695e3, 1.5, felt, 1.0), rtol=2e-3)
-    assert_allclose(hertz.peak_force, 1.1432626298 * 695e3**0.4 * felt**0.6, rtol=2e-3)
-
-
 @pytest.mark.parametrize(
     ("scheme", "slope", "stiffness"), [("A", 2.0, 1e6), *(("A4", 4.0, k) for k in (1e5, 3e5, 1e6, 3e6))]
 )

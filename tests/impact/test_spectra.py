@@ -23,15 +23,6 @@ def test_mobility_is_static_at_low_frequency():
     assert_allclose(spectra.mobility(modes, a, b, low) / (2j * np.pi * low[0]), static, rtol=1e-6)  # damping: 1e-7
 
 
-def test_mobility_of_a_large_plate_averages_to_the_infinite_plate():
-    modes = analytic.rectangle(1.55, 1.0, mass=0.2, first_frequency=10.0, n_modes=2000, damping_ratio=0.02)
-    density, first = 0.2 / 1.55, np.pi**2 * (1 + 1 / 1.55**2)
-    infinite = 1.0 / (8.0 * density * 2 * np.pi * 10.0 / first)
-    drive = spectra.mobility(modes, (0.7, 0.4), (0.7, 0.4), np.linspace(2000.0, 4000.0, 400))
-    assert_allclose(drive.real.mean(), infinite, rtol=0.05)  # Skudrzyk's mean value; 1 % measured
-    assert abs(drive.imag.mean()) < 0.1 * infinite
-
-
 def test_mobility_of_a_rigid_mass_is_that_of_a_mass():
     modes = analytic.Modes.rigid(2.0)
     assert_allclose(spectra.mobility(modes, None, None, [5.0]), 1.0 / (2j * np.pi * 5.0 * 2.0), rtol=1e-14)
