@@ -185,18 +185,6 @@ def test_centroids_of_wide_bands_are_those_of_the_half_sine(width):
     assert_allclose(found.centroid, np.trapezoid(f * size, f) / np.trapezoid(size, f), rtol=2e-4)
 
 
-@pytest.mark.parametrize(("stiffness", "impacts"), [(4e5, 2), (1e6, 3)])
-def test_centroids_of_several_impacts_are_those_of_their_spectrum(stiffness, impacts):
-    modes, striker = plate(), fi.Striker.stick(0.1, 10e3)
-    hit = fi.strike(modes, striker, fi.Contact.linear(stiffness), at=AT, speed=1.0, tolerance=1e-6)
-    assert hit.n_impacts == impacts
-    for limit in (300.0, 3e3, 10e3):  # [Hz]
-        found = batches.bounce(many(modes, striker, [stiffness]), tolerance=1e-4, band=limit)
-        f = np.linspace(0, limit, 20_001)
-        size = np.abs(hit.spectrum(f))
-        assert_allclose(found.centroid, np.trapezoid(f * size, f) / np.trapezoid(size, f), rtol=2e-4)
-
-
 @pytest.mark.parametrize("n_modes", [30, 300])
 def test_steps_do_not_grow_with_the_modes(n_modes):
     engine = batches._Engine(many(plate(2.0, n_modes), fi.Striker.stick(0.1, 10e3), [1e5]), 0.0, {})
@@ -336,22 +324,3 @@ def test_impacts_alone_are_counted_as_with_everything_else(stiffness, exponent):
         off.append((found != whole).mean())
     # grazing touches: 1.75 % and 0.75 % of the cells were measured at most; whole blows take shorter steps
     assert off[0] < 0.02 and off[1] < 0.01
-
-
-@pytest.mark.parametrize(("exponent", "residual"), [(1.0, False), (1.5, True)])
-def test_contacts_with_loss_are_the_single_blow_within_the_tolerance(exponent, residual):
-    """Loss hangs on the rate of approach: the ringing of fast modes shows in the force, residual ones too."""
-    rng = np.random.default_rng(8)
-    modes, n = plate(0.6, damping_ratio=0.003), 10
-    stick, loss = fi.Striker.stick(0.1, 2e3), 10.0 ** rng.uniform(-2.0, -0.1, n)
-    mass, stiffness = rng.uniform(0.02, 0.2, n), 10.0 ** rng.uniform(4.0, 6.0, n) * 10.0 ** (2.0 * (exponent - 1.0))
-    blows = many(modes, stick, stiffness, exponent=exponent, speed=0.8, mass=mass, residual=residual, loss=loss)
-    found = batches.bounce(blows, tolerance=1e-3)
-    assert found.done.mean() > 0.9
-    for i in np.flatnonzero(found.done):
-        law, striker = fi.Contact.power(stiffness[i], exponent, loss=loss[i]), fi.Striker.stick(mass[i], 2e3)
-        hit = fi.strike(modes, striker, law, at=AT, speed=0.8, tolerance=1e-5, residual=residual)
-        assert hit.n_impacts == found.n_impacts[i]
-        assert_allclose(found.restitution[i], hit.restitution, atol=1e-3)
-        assert_allclose(found.contact_time[i], hit.contact_time, rtol=1e-3)
-        assert_allclose(found.peak_force[i], hit.peak_force, rtol=1.5e-3)  # 2 of 2400 blows: 1.1e-3 and 1.4e-3
