@@ -76,20 +76,6 @@ def test_checked_numbers_are_floats_whatever_was_given():
     assert type(fi.Plate(made[0], 1).thickness) is float
 
 
-@pytest.mark.parametrize("key, value", [
-    ("duration", "[]"), ("duration", "true"), ("duration", "[[1.0]]"), ("dt", '["a"]'), ("dt", "{}"),
-    ("dt", "1979-05-27"), ("striker_force", "[1.0, 2.0]"), ("striker_force", '"x"'),
-])  # fmt: skip
-def test_a_time_or_force_that_is_no_number_is_told_by_name(told, key, value):
-    status, said = told(QUICK.replace("tolerance = 1e-2", f"tolerance = 1e-2\n{key} = {value}"))
-    assert status == 2 and f"s.toml: [strike] {key} must be a number in " in said
-
-
-def test_an_orthotropic_disk_needs_no_word_on_its_source(told):
-    status, said = told(DISK, "plan")
-    assert status == 0 and "argyris elements" in said
-
-
 @pytest.mark.parametrize(
     "key, value",
     [("G", "1e74"), *(pytest.param(*row, marks=pytest.mark.slow) for row in (("E", "1e74"), ("G", "1e30")))],

@@ -11,7 +11,6 @@ from scipy import stats
 
 import fem_impact as fi
 from fem_impact.scenes.maps import map_scene
-from fem_impact.sweeps import cases
 
 MASS, STIFFNESS = 0.1, 1e5
 WALL = fi.Modes.rigid(1e12)  # so heavy that it does not move: 1e-13 of the striker's speed
@@ -213,24 +212,6 @@ def test_the_same_seed_gives_the_same_blows():
     one, two, other = (wall(HEAVIER, n=32, seed=seed) for seed in (1, 1, 2))
     xarray.testing.assert_identical(one.table, two.table)
     assert not np.array_equal(one.table["striker.mass"], other.table["striker.mass"])
-
-
-def test_a_store_serves_the_same_blows_only(tmp_path):
-    for _ in range(2):  # written, and read
-        found = wall(HEAVIER, n=128, store=tmp_path / "blows")
-        assert_allclose(found.values("contact_time"), wall(HEAVIER, n=128).values("contact_time"), rtol=1e-9)
-    with pytest.raises(ValueError, match="store holds another map"):
-        wall(HEAVIER, n=128, seed=5, store=tmp_path / "blows")
-
-
-def test_failed_blows_are_told(monkeypatch):
-    def fail(blows, index):
-        raise fi.SimulationError("no luck")
-
-    monkeypatch.setattr(cases.Cases, "blow", fail)
-    bodies = fi.Striker.rigid(0.1), fi.Contact.felt(1e6, 2.0, hysteresis=0.3, relaxation=1e-3)
-    found = fi.spread(WALL, {"speed": "uniform(1, 2)"}, *bodies, n=16, at=None, speed=1.0, sobol=False)
-    assert found.n_failed == 16 and found.checks.n_blows == 0 and set(found.table.failure.values) == {"no luck"}
 
 
 def test_the_centroid_is_one_of_the_quantities():
