@@ -99,14 +99,6 @@ def test_silence_and_wrong_names_are_refused(read, options, text):
         read(quiet, other={"other": quiet}, **options)
 
 
-def test_saved_taps_are_read_again(tmp_path):
-    taps = fi.read_taps(MEASURED / "acceleration_multi.lvm")
-    taps.save(tmp_path / "t.npz")
-    again = fi.read_taps(tmp_path / "t.npz")
-    assert again.n_taps == 4 and again.units == taps.units
-    assert np.abs(again.force - taps.force[:, : len(again.time)]).max() < 0.2  # offset again
-
-
 @pytest.mark.parametrize(
     ("names", "read"),
     [(("acc", "acc"), ("acc 1", "acc 2")), (("hammer acc", "input"),) * 2, (("t", "force"),) * 2],
