@@ -432,31 +432,6 @@ def test_a_body_that_cannot_press_itself_is_refused(body, at):
 # --- loss, layers, several contacts ----------------------------------------------------------------------------------
 
 
-def lossy_blow(seed):
-    """A random blow of a mass on a plate through a contact that throws back 5 to 99 % of the speed, off a wall."""
-    rng = np.random.default_rng(seed)
-    length, width = rng.uniform(0.5, 2.0, 2)
-    body = fi.analytic.rectangle(
-        length, width, mass=10 ** rng.uniform(-1.5, 1.0), first_frequency=10 ** rng.uniform(1.5, 2.7),
-        n_modes=int(rng.integers(5, 60)),
-    )  # fmt: skip
-    speed, exponent = 10 ** rng.uniform(-1.0, 1.0), rng.choice([1.0, 1.2, 1.5, 2.0, 2.5])
-    stiffness = 10 ** rng.uniform(4.0, 6.0) * 1e3 ** (exponent - 1.0)
-    law = fi.Contact.restituting(stiffness, exponent, restitution=rng.uniform(0.05, 0.99), speed=speed)
-    at = (length * rng.uniform(0.1, 0.9), width * rng.uniform(0.1, 0.9))
-    return body, fi.Striker.rigid(10 ** rng.uniform(-3.0, -0.5)), law, {"at": at, "speed": speed, "residual": False}
-
-
-@pytest.mark.parametrize("seeds", [range(4), pytest.param(range(4, 40), marks=pytest.mark.slow)], ids=["few", "many"])
-def test_lossy_contacts_keep_their_promise(seeds):
-    for seed in seeds:
-        *blow, options = lossy_blow(seed)
-        tolerance = 10.0 ** -(2 + seed % 3)
-        hit = fi.strike(*blow, tolerance=tolerance, scheme="A4", **options)
-        truth = fi.strike(*blow, tolerance=1e-8, scheme="collocation", **options)
-        assert worst(hit, truth) <= tolerance, seed
-
-
 @each_scheme
 def test_a_push_that_ends_while_the_bodies_overlap_counts_for_max_impacts(scheme):
     """A ringing bar is let go and pushed again before it is out of reach: one impact gave six."""

@@ -6,12 +6,8 @@ import sys
 
 import numpy as np
 import pytest
-from comparing import difference
-from hypothesis import given, settings
-from hypothesis import strategies as st
 from numpy.testing import assert_allclose
 from restarted import measured
-from scipy.optimize import brentq
 from test_collision import PLATE_80, wall_duration
 from test_kernels import EPS, drift, each_scheme, plate, run
 from warming import locked
@@ -183,34 +179,6 @@ def test_preload_held_by_a_force_stays(exponent):
 
 
 # --- many modes against collocation ----------------------------------------------------------------------------------
-
-
-# derandomized: a promise with an estimate behind it is kept by almost all scenes, and a gate must say the same twice
-@pytest.mark.parametrize("examples", [12, pytest.param(100, marks=pytest.mark.slow)])
-def test_many_modes_agree_with_collocation(examples):
-    """A mass before a body of many modes, and a contact some ten times slower than the fastest of them."""
-
-    @settings(max_examples=examples, deadline=None, derandomize=True)
-    @given(
-        st.integers(0, 10**6), st.sampled_from([100, 200, 500]), st.sampled_from([0.0, 0.0, 0.1, 1.0]),
-        st.sampled_from([1.0, 1.5, 2.0]), st.sampled_from([1e-2, 1e-3, 1e-4]),
-    )  # fmt: skip
-    def check(seed, n_modes, loss, exponent, tolerance):
-        rng = np.random.default_rng(seed)
-        frequencies = np.sort(rng.uniform(50.0, 2e4, n_modes))
-        shape = rng.normal(0.0, 20.0 * n_modes**-0.5, (1, n_modes))
-        about = {"mass": 1.0, "damping_ratio": rng.choice([0.0, 0.01]), "complete": True}
-        target = fi.Modes.from_arrays(frequencies, shape, points=[[0.0]], **about)
-        mass, speed = 10.0 ** rng.uniform(-3.0, -1.5), 10.0 ** rng.uniform(-1.0, 1.0)
-        duration = 10.0 ** rng.uniform(-3.7, -2.7)  # [s] on a rigid wall
-        k = brentq(lambda x: np.log(wall_duration(10.0**x, exponent, mass, speed) / duration), -5.0, 15.0)
-        blow = target, fi.Striker.rigid(mass), fi.Contact.power(10.0**k, exponent, loss=loss / speed)
-        how = {"at": [0.0], "speed": speed, "max_impacts": 1}
-        hit = fi.strike(*blow, tolerance=tolerance, scheme="A4", **how)
-        truth = fi.strike(*blow, tolerance=1e-2 * tolerance, scheme="collocation", **how)
-        assert difference(hit, truth) <= 1.01 * tolerance  # and the truth's own
-
-    check()
 
 
 FLIGHTS = """

@@ -4,7 +4,6 @@ import base64
 import html
 import json
 import re
-import sys
 from pathlib import Path
 
 import numpy as np
@@ -164,12 +163,6 @@ def test_file_that_is_no_result_is_a_sentence(tmp_path, prompt, text):
     ran = prompt("report", path, "--out", "report.html")
     assert ran.status == 2 and ran.err.startswith(f"fem-impact: {path}") and ran.err.count("\n") == 1
     assert [file.name for file in tmp_path.iterdir()] == ["response.json"]
-
-
-def test_missing_extra_is_named(scene, prompt, monkeypatch):
-    monkeypatch.setitem(sys.modules, "plotly.offline", None)
-    ran = prompt("report", scene, "--out", "r.html")
-    assert ran.status == 2 and "a report needs plotly: pip install 'fem-impact[web]'" in ran.err
 
 
 def test_beams_and_balls_have_a_page_too(tmp_path):
