@@ -59,14 +59,6 @@ def test_every_quantity_has_an_error_of_its_own(seed):
     }  # fmt: skip
 
 
-@pytest.mark.slow
-@pytest.mark.xdist_group("stretched")
-def test_what_it_says_to_do_makes_the_answer_trusted():
-    wrong, right = blow(speed=0.3), blow(speed=0.3, stretching=True)
-    assert not wrong.trusted and right.trusted
-    assert abs(right.restitution - wrong.restitution) <= wrong.trust["restitution"].model
-
-
 @pytest.mark.filterwarnings("ignore::fem_impact.ToleranceWarning")
 def test_both_misses_are_said_and_the_larger_one_dominates():
     hit = blow(speed=2.0, n_modes=40)

@@ -26,16 +26,6 @@ def test_refined_mesh_keeps_shape_and_edge_names():
     assert set(fine.edges) == set(coarse.edges)
 
 
-def test_points_of_a_disk_lie_on_the_circle_with_its_curvature():
-    plate = mesh.disk(2.0, 0.5, size=0.4)
-    for name, radius, bend in (("outer", 2.0, 0.5), ("inner", 0.5, -2.0)):
-        mine = plate.edges[name]
-        assert_allclose(np.hypot(*plate.points[plate.facets[mine]].transpose(2, 0, 1)), radius, rtol=1e-12)
-        assert_allclose(np.hypot(*plate.middles[mine].T), radius, rtol=1e-12)
-        assert_allclose(plate.curvatures[mine], bend, rtol=1e-9)  # an edge of the hole is concave
-    assert plate.curved.all()
-
-
 def test_polygon_names_its_sides_and_holes():
     plate = mesh.polygon([(0, 0), (0, 1), (2, 1), (2, 0)], [[(0.5, 0.4), (0.8, 0.4), (0.8, 0.7)]], size=0.3)
     assert_allclose(plate.area, 2.0 - 0.045, rtol=1e-12)

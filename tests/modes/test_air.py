@@ -12,42 +12,6 @@ from fem_impact.modes import air
 RHO, C = air.DENSITY, air.SPEED
 
 
-class Piston(air.Shapes):
-    """A disk that moves as one, with unit velocity."""
-
-    dimension = 2
-
-    def __init__(self, radius):
-        self.radius = radius
-
-    def at(self, points):
-        return np.ones((len(points), 1))
-
-    def contains(self, points):
-        return np.hypot(*points.T) <= self.radius
-
-    def grid(self):
-        turn = np.linspace(0.0, 2.0 * np.pi, 200)
-        return self.radius * np.stack([np.cos(turn), np.sin(turn)], axis=1), np.zeros((0, 3), int)
-
-
-@pytest.mark.parametrize("ka", [0.05, 0.5, 2.0, 5.0])
-def test_piston_has_the_impedance_of_the_textbook(ka):
-    """Rayleigh's piston: resistance 1 - J1(2 ka) / ka, reactance H1(2 ka) / ka, times rho c times the area."""
-    radius, omega = 0.1, ka / 0.1 * C
-    modes = fi.Modes(np.ones(1), np.zeros(1), Piston(radius), 1.0)
-    spacing = radius / 40.0
-    strength = air._strengths(air._sampled(modes.shapes, spacing)[0], spacing, 2)
-    found = air._Air(modes, strength, 2.0 * spacing, RHO / (2.0 * np.pi), C)
-    area = np.pi * radius**2
-    heavy = RHO * C * area * special.struve(1, 2.0 * ka) / ka / omega
-    lost = RHO * C * area * (1.0 - special.jv(1, 2.0 * ka) / ka)
-    added = found._added(found.strength, np.fft.rfft2(found.strength, found.padded), omega)
-    assert added[0, 0] == pytest.approx(heavy, rel=0.01, abs=5e-3 * RHO * radius**3)
-    # 1 % and the absolute part: the edge is made of squares
-    assert 2.0 * omega * found.damping(np.ones((1, 1)), [omega])[0] == pytest.approx(lost, rel=0.01)
-
-
 def membrane_in_air(order, number, radius, weight, tension, sides=2):
     """First frequencies [rad/s] and damping of the modes (order, 1...) of a baffled membrane, by Hankel transforms.
 

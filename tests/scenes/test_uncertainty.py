@@ -60,16 +60,6 @@ def test_correlated_inputs_change_the_deviation_as_the_closed_form_says():
     assert_allclose(np.log(found.values("contact_time")).std(), exact, rtol=5e-3)
 
 
-def test_sobol_indices_on_a_wall_are_those_of_a_product():
-    found = wall(HEAVIER | {"contact.stiffness": ("lognormal", STIFFNESS, 0.4)}, n=8192, sobol=True)
-    half = {"striker.mass": 0.1**2, "contact.stiffness": 0.2**2}
-    for name, square in half.items():
-        first, share = np.expm1(square) / np.expm1(sum(half.values())), found.shares["contact_time"][name]
-        assert_allclose(share.first.value, first, atol=0.02)
-        assert share.total.low <= first <= 1.0
-    assert found.ranking("contact_time")[0][0] == "contact.stiffness"
-
-
 def test_what_depends_linearly_keeps_its_distribution():
     """A linear contact on a wall gives the impulse 2 m v."""
     found = wall({"strike.speed": ("uniform", 1.0, 3.0)}, n=512)
