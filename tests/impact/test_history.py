@@ -103,18 +103,6 @@ def test_impacts_of_random_chains_do_not_depend_on_the_tolerance(seed):
 # --- speeds of meeting and parting -----------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("masses", [(0.1, 0.1), (0.02, 0.3)])
-def test_two_masses_and_a_linear_spring(masses):
-    k, speed, gap = 1e6, 0.7, 1e-4
-    hit = chain(masses, 1.0, [k], [gap], speed, tolerance=1e-8)
-    (impact,) = hit.impacts
-    reduced = masses[0] * masses[1] / sum(masses)
-    assert_allclose(impact.start, gap / speed, rtol=1e-9)
-    assert_allclose(impact.duration, np.pi * np.sqrt(reduced / k), rtol=1e-8)
-    assert_allclose([impact.approach_speed, impact.separation_speed], speed, rtol=1e-9)
-    assert_allclose(impact.restitution, 1.0, rtol=1e-9)
-
-
 def test_bodies_that_touched_before_have_no_restitution_of_an_impact():
     hit = chain([0.1] * 3, 1.5, [1e9] * 2, [0.0, 0.0], 1.0, tolerance=1e-4)
     found = {each.contact: each for each in hit.impacts[:2]}

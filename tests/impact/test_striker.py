@@ -137,24 +137,6 @@ def test_a_bounce_that_dies_is_proved_to_have_ended():
     assert_allclose(gap[-1], 2e-3 + hit.displacement(None, times[-1:])[0, 0], rtol=1e-2)
 
 
-def test_a_buzz_of_twenty_contacts():
-    law = fi.Contact.restituting(1e7, 1.5, restitution=0.9, speed=0.5)
-    stick = fi.Striker.stick(0.06, 500.0).held(fi.Hand(stiffness=100.0, damping=0.05, force=1.5))
-    table = fi.Modes.rigid(50.0)
-    hit = fi.strike(table, stick, law, at=None, speed=0.8, max_impacts=20, tolerance=1e-2, quantity="n_impacts")
-    assert hit.n_impacts == 20
-    assert hit.outcome == "stopped after max_impacts"
-    assert hit.energy_error < 1e-12
-    # as one of two strokes it is lifted after its time
-    pair = fi.strokes(
-        fi.analytic.disk(0.18, edge="clamped", mass=2.0, first_frequency=150.0, n_modes=60, damping_ratio=0.01),
-        [(0.0, stick, law, (0.05, 0.0), 0.8, 0.06), (0.05, stick, law, (-0.05, 0.0), 0.8, 0.06)],
-        tolerance=0.3, quantity="n_impacts",
-    )  # fmt: skip
-    assert {impact.contact for impact in pair.impacts} == {0, 1}
-    assert pair.hits[-1].finished  # both lifted: the head swings alone
-
-
 def test_shapes_of_a_held_striker_are_as_doubtful_as_when_it_is_free():
     """They counted as exact in a hand."""
     rod = fi.Modes.from_arrays([0.0, 900.0], [[4.0, 3.0]], points=[[0.0]], mass=0.0625, complete=True)

@@ -155,18 +155,6 @@ def test_a_disk_from_a_file_is_a_disk_and_no_polygon(tmp_path, name):
     assert_allclose(held(plate), [4.935149043, 13.89816507], rtol=1e-5)  # Bessel roots
 
 
-def test_a_smooth_rim_that_is_no_circle_is_followed(tmp_path):
-    angle = np.linspace(0, 2 * np.pi, 60, endpoint=False)
-    rim = np.column_stack([1.5 * np.cos(angle), np.sin(angle)])
-    shape = fi.mesh.polygon(rim, size=0.2)
-    plate = fi.mesh.load(written(tmp_path, shape.points, shape.cells))
-    a, b = 1.5, 1.0
-    x, y = plate.points[plate.facets[:, 0]].T
-    exact = 1.0 / (a**2 * b**2 * (x**2 / a**4 + y**2 / b**4) ** 1.5)
-    assert_allclose(plate.curvatures[:, 0], exact, rtol=0.01)  # quartics through five points 0.13 apart
-    assert any("smooth curves" in note for note in plate.notes)
-
-
 def test_a_mesh_far_finer_than_the_modes_need_is_filled_anew_within_its_rim(tmp_path):
     fi.mesh.save(tmp_path / "fine.msh", fi.mesh.disk(1.0, 0.2, size=0.07))
     plate = fi.mesh.load(tmp_path / "fine.msh")

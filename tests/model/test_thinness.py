@@ -105,15 +105,6 @@ def test_a_stick_that_is_told_slender_or_stout_has_its_shear_and_a_hammer_has_no
     assert told.known and told.worst == 0.0
 
 
-@pytest.mark.parametrize("measured", [False, True], ids=["scaled", "measured"])
-def test_what_is_not_known_is_not_known(measured):
-    modes, at = fi.analytic.rectangle(*SIDES, mass=0.2, first_frequency=100.0, n_modes=60), [(0.1, 0.1)]
-    if measured:
-        modes = fi.Modes.from_arrays(modes.frequencies, modes.shape_at(at), points=at, mass=0.2, complete=True)
-    told = found(fi.strike(modes, fi.Striker.rigid(0.02), fi.Contact.hertz(1e6), at=at[0], speed=1.0))
-    assert told.state == "not known" and set(told.effect.values()) == {None}
-
-
 WOOD = fi.Material.orthotropic(E_along=11e9, E_across=0.8e9, nu=0.37, G=0.7e9, rho=430.0)
 ROLLING = {"G_xz": 0.6e9, "G_yz": 0.035e9, "angle": 0.3}
 

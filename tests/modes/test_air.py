@@ -1,4 +1,4 @@
-"""Air around plates: pistons, Wallace's rectangles and a drumhead by independent integrals."""
+"""Air around plates: Wallace's rectangles and a drumhead by independent integrals."""
 
 import numpy as np
 import pytest

@@ -128,15 +128,6 @@ def test_inertia_relief_leaves_no_rigid_motion():
     assert left < 1e-4 * np.abs(response).max()  # 1e-5: the quadrature's error at the kink
 
 
-def test_scaled_modes_keep_form_and_follow_mass_and_frequency():
-    modes, at = analytic.disk(1.0, edge="free", mass=1.0, first_frequency=50.0, n_modes=30), [[0.2, 0.1]]
-    other = modes.scaled(mass=4.0, first_frequency=100.0)
-    assert_allclose(other.frequencies, 2.0 * modes.frequencies, rtol=1e-14)
-    assert_allclose(other.shape_at(at), 0.5 * modes.shape_at(at), rtol=1e-14)
-    # (1/2)**2 from mass, (1/2)**2 from frequency; the difference of sums loses some digits
-    assert_allclose(other.residual_compliance(at), modes.residual_compliance(at) / 16.0, rtol=1e-9)
-
-
 DISK = analytic.disk(0.2, mass=1.0, first_frequency=1.0, n_modes=3)
 
 

@@ -64,15 +64,6 @@ def test_a_run_that_stopped_goes_on_where_it_was(tmp_path, undisturbed, monkeypa
     assert sorted(solved) == list(range(0, 320, store.block_size(320)))  # nothing twice and nothing lost
 
 
-def test_error_texts_are_kept(tmp_path, monkeypatch):
-    def fail(*_, **wanted):
-        raise fi.SimulationError("the motion may be chaotic: é")
-
-    monkeypatch.setattr(cells, "strike", fail)
-    table = sweep(over={"exponent": [0.8, 0.9]}, store=tmp_path / "map")
-    assert table.failure.values.tolist() == ["the motion may be chaotic: é"] * 2
-
-
 def test_a_store_of_another_map_or_version_is_refused(tmp_path, monkeypatch):
     sweep(over={"mass": [0.1]}, store=tmp_path / "map")
     with pytest.raises(ValueError, match="store holds another map"):
