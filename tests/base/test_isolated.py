@@ -146,17 +146,6 @@ def test_every_format_that_hdf5_holds_is_read(tmp_path, read_here):
         assert h5py.File is known
 
 
-@pytest.mark.parametrize(("name", "content", "reader", "library", "extra"), [
-    ("plate.med", b"\x89HDF\r\n\x1a\n", "mesh.meshio_reader:arrays", "h5py", "hdf5"),
-    ("plate.svg", b"<svg/>", "mesh.drawings:svg_arrays", "svgelements", "cad"),
-])  # fmt: skip
-def test_a_missing_library_is_named(tmp_path, monkeypatch, name, content, reader, library, extra):
-    (tmp_path / name).write_bytes(content)
-    monkeypatch.setitem(sys.modules, library, None)
-    told = f"this needs {library}: pip install 'fem-impact[{extra}]'"
-    assert isolated.main(tmp_path / name, reader, []) == (1, told.encode())
-
-
 @pytest.mark.parametrize("kind", ["pipe", "loop"])
 def test_what_is_no_file_is_told_at_once(tmp_path, kind):
     path = tmp_path / "plate.msh"

@@ -42,9 +42,3 @@ def test_piped_keys_are_played_in_time_without_a_device(scene, tmp_path, monkeyp
         said = prompt("play small.toml --silent --modes 20 --at 0.1 0.1 --fastest 1")
     assert said.status == 0 and "2 strokes" in said.out
     assert (tmp_path / "out" / "small" / "play.wav").is_file()
-
-
-@pytest.mark.slow
-def test_a_midi_file_that_is_not_there_is_told_in_one_line(scene, tmp_path, prompt):
-    said = prompt("play small.toml --modes 20 --midi no.mid --out a/x.wav")
-    assert said.status == 2 and said.err.count("no.mid") == 1 and not (tmp_path / "a").exists()
