@@ -121,7 +121,6 @@ def test_the_gradient_knows_that_the_weight_grows_with_the_mass():
 @pytest.mark.parametrize(("make", "what"), [
     (lambda: fi.Striker.rigid(0.1).falling(-1.0), "gravity must not be negative"),
     (lambda: fi.Striker.stick(mass=0.1, first_frequency=1e3).falling(), "must fall freely to fall"),
-    (lambda: fi.Striker.rigid(0.1).held(fi.Hand(stiffness=10.0)).falling(), "but a hand holds this one"),
     (lambda: fi.sweep(BODY, fi.Striker.rigid(0.1).falling(), fi.Contact.linear(1e6), at=[0.0], speed=1.0,
                       over={"mass": [0.1]}), "must not fall in a map"),
 ])  # fmt: skip

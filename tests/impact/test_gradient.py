@@ -156,16 +156,11 @@ def test_a_run_that_ends_while_another_contact_presses_ends_later_with_it():
 
 
 def test_what_has_no_gradient_with_several_contacts_says_where():
-    hit, plates = chain_of_balls(CRADLE), {"t": (1e-3, lambda t: fi.Plate(fi.Material(70e9, 0.3, 2700.0), t))}
-    for wrt, sections, kind, words in (
-        ("speeds.2", None, fi.SimulationError, r"no gradient in speeds\.2: the body rests against another"),
-        ("contacts.1.gap", None, fi.SimulationError, r"no gradient in contacts\.1\.gap: the bodies touch at the start"),
-        ("section.thickness", None, fi.SimulationError, "only the target of `strike` has one; take the mass and first"),
-        ("striker.mass", None, ValueError, r"wrt must be one of .*bodies\.2\.mass"),
-        (None, plates, ValueError, "sections are those of the target of `strike`"),
-    ):
-        with pytest.raises(kind, match=words):
-            hit.gradient("impulse", wrt, sections=sections)
+    hit = chain_of_balls(CRADLE)
+    with pytest.raises(fi.SimulationError, match=r"no gradient in contacts\.1\.gap: the bodies touch at the start"):
+        hit.gradient("impulse", "contacts.1.gap")
+    with pytest.raises(ValueError, match=r"wrt must be one of .*bodies\.2\.mass"):
+        hit.gradient("impulse", "striker.mass")
     assert "contacts.1.stiffness = 2e+08 N/m**exponent" in str(hit.gradient("impulse"))
 
     swing = float(beam_and_stop(1.0).displacement([[0.5]], np.linspace(0.0, 8e-3, 4001), body=1).max())
@@ -478,22 +473,16 @@ def test_a_grazing_contact_has_no_gradient():
 
 
 def test_what_has_no_gradient_says_why():
-    hit, held = ball(fi.Contact.hertz(1e6)), fi.Striker.rigid(0.05).held(fi.Hand(stiffness=100.0))
-    missed = ball(fi.Contact.hertz(1e6, gap=1.0), mass=0.1, speed=1.0, duration=0.1)
-    plate = fi.analytic.rectangle(1.55, 1.0, mass=2.0, first_frequency=50.0, n_modes=10)
-    by_hand = fi.strike(plate, held, fi.Contact.hertz(1e6), at=(0.4, 0.3), speed=1.0, tolerance=1e-2, max_impacts=1)
-    none = fi.SimulationError
-    for blow, asked, kind, words in (
-        (hit, ("impulse", "contact.gap"), none, r"no gradient in contact\.gap: the bodies touch at the st"),
-        (hit, ("impulse", "section.thickness"), none, r"no gradient in section\.thickness: section and m"),
-        (missed, ("impulse",), none, "never touched"),
-        (by_hand, ("impulse",), none, "no gradient: a hand holds the striker"),
-        (hit, ("impulse", "striker.colour"), ValueError, "wrt must be one of"),
-        (hit, ("loudness",), ValueError, "quantity must be one of"),
-        (hit, ("spectral_centroid",), ValueError, "needs a frequency, such as 'spectral_centroid=5000'"),
+    hit, missed = ball(fi.Contact.hertz(1e6)), ball(fi.Contact.hertz(1e6, gap=1.0), mass=0.1, speed=1.0, duration=0.1)
+    with pytest.raises(fi.SimulationError, match="never touched"):
+        missed.gradient("impulse")
+    for asked, words in (
+        (("impulse", "striker.colour"), "wrt must be one of"),
+        (("loudness",), "quantity must be one of"),
+        (("spectral_centroid",), "needs a frequency, such as 'spectral_centroid=5000'"),
     ):
-        with pytest.raises(kind, match=words):
-            blow.gradient(*asked)
+        with pytest.raises(ValueError, match=words):
+            hit.gradient(*asked)
 
 
 @pytest.mark.slow

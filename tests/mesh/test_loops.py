@@ -82,19 +82,6 @@ def test_the_body_lies_on_the_left_of_every_loop_however_it_was_drawn():
     assert_allclose(loops.extent(drawn.outer), 6.0, rtol=1e-12)
 
 
-BOW = loops.straight_loop("h", [(0, 2), (2, 2.2), (2, 2), (0, 2.2)], "{}")
-
-
-@pytest.mark.parametrize(("holes", "text"), [
-    ([loops.circle((9.0, 2.0), 0.5)], "holes[0] must lie inside the outline and not touch it"),
-    ([loops.circle((3.5, 2.0), 0.5)], "holes[0] must lie inside the outline and not touch it"),  # touches at (4, 2)
-    ([loops.circle((1.0, 2.0), 0.5), loops.circle((1.7, 2.0), 0.5)], "holes[1] must not overlap or touch holes[0]"),
-    ([BOW], "holes[0] must not cross or touch itself: Self-intersection"),
-])  # fmt: skip
-def test_holes_that_make_no_body_are_told(holes, text):
-    assert loops.crossed(Outline.around((ELLIPSE,), tuple(holes))).startswith(text)
-
-
 def test_straight_and_curved_are_told_apart():
     assert loops.is_straight(Bezier(np.array([[0.0, 0.0], [1.0, 1.0], [3.0, 3.0]])))
     assert not loops.is_straight(Bezier(np.array([[0.0, 0.0], [1.0, 1.0 + 1e-9], [3.0, 3.0]])))

@@ -50,6 +50,9 @@ ROUND = np.linspace(0.0, 2.0 * np.pi, 10**6, endpoint=False)
     (lambda: mesh.polygon([(0, 0), (1, 1), (1, 0), (0, 1)]), "must not cross or touch itself.*Self-intersection"),
     (lambda: mesh.polygon([(0, 0), (1, 1)]), "corners must have 3 to 2000 corners, got 2"),
     (lambda: mesh.polygon([(0, 0), (1, 0), (0, 1)], [[(2, 2), (3, 2), (3, 3)]]), "must lie inside the outline"),
+    (lambda: mesh.polygon([(0, 0), (1, 0), (0, 1)], [[(0, 0.1), (0.2, 0.1), (0.2, 0.2)]]), "and not touch it"),
+    (lambda: mesh.polygon([(0, 0), (1, 0), (0, 1)], [[(0.1, 0.1), (0.3, 0.1), (0.1, 0.3)]] * 2),
+     r"holes\[1\] must not overlap or touch holes\[0\]"),
     (lambda: mesh.line(float("nan")), "length must be finite"),
     # what would take for ever, at once
     (lambda: mesh.rectangle(1.0, 1.0, size=1e-9), r"size must be larger: 1e-09 m gives about 2e\+18 elements"),

@@ -80,17 +80,6 @@ def test_effect_is_that_of_striking_a_damped_plate(mass):
         assert told.effect[name] == pytest.approx(abs(change), rel=0.2, abs=1e-5)  # 1e-5: two runs of a first step
 
 
-def test_a_stated_damping_is_not_doubted():
-    told = undamped(fi.strike(PLATE.damped(1e-4), HAMMER, LAW, **SLOW))
-    assert told.worst == 0.0 and told.known and told.value is None
-
-
 def test_a_sound_without_damping_would_never_end():
     told = undamped(fi.strike(PLATE, HAMMER, LAW, quantity="sound=2000", **SLOW))
     assert told.effect["sound"] == 1.0 and told.beyond
-
-
-def test_the_damping_of_a_flexible_striker_counts():
-    stick = fi.Striker.stick(mass=0.05, first_frequency=300.0)
-    told = undamped(fi.strike(PLATE.damped(0.01), stick, LAW, tolerance=1e-3, **SLOW))
-    assert told.worst > 1e-6 and told.remedy == "state the damping ratio of the striker"

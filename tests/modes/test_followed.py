@@ -6,7 +6,6 @@ import xarray as xr
 
 import fem_impact as fi
 from fem_impact.impact import distance
-from fem_impact.modes import followed
 
 AT = [0.0]
 FREQUENCY = np.arange(0.0, 1500.0, 5.0)  # Hz
@@ -101,17 +100,6 @@ def test_sums_are_passive_whatever_the_response():
     left = [float(note.split("leaves ")[1].split(" %")[0]) for note in body.notes if "leaves" in note]
     assert 15.0 < left[0] < 50.0
     assert body.shapes.spread(np.array([AT])).max() > 0.2
-
-
-def test_slopes_of_columns_are_their_derivatives():
-    lines = followed.MeasuredLines(2j * np.pi * np.array([50.0, 220.0, 700.0]) + 3.0, np.zeros(6), np.ones(3))
-    poles, step = np.log([[1300.0, 4000.0], [0.02, 0.1]]), 1e-6
-    found = followed.column_slopes(lines, poles)
-    for row, mode in np.ndindex(2, 2):
-        apart = np.zeros((2, 2))
-        apart[row, mode] = step
-        change = followed.columns(lines, poles + apart) - followed.columns(lines, poles - apart)
-        assert found[:, 2 * row + mode] == pytest.approx(change[:, 2 + mode] / (2.0 * step), rel=1e-6, abs=1e-8)
 
 
 def test_what_cannot_be_followed_is_refused():

@@ -96,17 +96,6 @@ def test_modes_that_share_a_frequency_answer_a_blow_smoothly_and_have_no_single_
     assert_allclose(whole, modes.frequencies[:3] / 3e-3, rtol=1e-6)  # alike for both of a pair
 
 
-def test_other_modes_say_why_they_have_none():
-    closed = fi.analytic.rectangle(0.4, 0.3, mass=0.2, first_frequency=100.0, n_modes=5)
-    with pytest.raises(fi.SimulationError, match="needs modes of finite elements, of find_modes"):
-        varied.solution(closed)
-    body = fi.mesh.rectangle(0.4, 0.3, size=0.2), fi.Plate(WOOD, 0.02)
-    thick, thin = (fi.find_modes(fi.assemble(*body, theory=theory), n_modes=4) for theory in ("mindlin", None))
-    with pytest.raises(fi.SimulationError, match="it is not available for a thick plate; take a thin one"):
-        varied.solution(thick)
-    assert varied.solution(thin).vectors.shape[1] == 4
-
-
 @pytest.mark.parametrize("square", [0.0, 0.2])
 def test_terms_beyond_the_last_add_up_as_a_geometric_series(square):
     """Each is a third of the one before; those of no size add nothing."""
