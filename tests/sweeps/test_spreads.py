@@ -43,13 +43,6 @@ def test_quantiles_have_the_interval_of_order_statistics(level):
     assert found.value == np.quantile(values, level)
 
 
-def test_intervals_of_quantiles_hold_the_truth_as_often_as_they_say():
-    rng = np.random.default_rng(1)
-    found = [spread(rng.normal(size=60)).quantile("restitution", 0.5) for _ in range(400)]
-    held = np.mean([each.low <= 0.0 <= each.high for each in found])
-    assert held > 0.9 - 3.0 * (0.9 * 0.1 / 400) ** 0.5  # three standard deviations of the count
-
-
 def test_the_chance_of_a_double_hit_has_wilsons_interval():
     found = spread(np.ones(100), counts=np.array([2] * 7 + [1] * 93)).chance()
     z, p, n = stats.norm.ppf(0.95), 0.07, 100
@@ -106,14 +99,6 @@ def test_sobol_indices_of_a_product_are_those_in_closed_form():
         assert_allclose([found[name].first.value, found[name].total.value], [first, total], atol=0.01)
         assert found[name].first.low <= first <= found[name].first.high
         assert found[name].total.low <= total <= found[name].total.high
-
-
-def test_sobol_indices_of_a_sum_are_shares_of_the_variance():
-    pytest.importorskip("SALib", reason="the spread extra is not installed")
-    found = grouped(lambda a, b, c: np.log(a) + np.log(b)).shares["restitution"]
-    assert_allclose([found[k].first.value for k in SIGMAS], [9 / 13, 4 / 13, 0.0], atol=0.01)
-    assert_allclose([found[k].total.value for k in SIGMAS], [9 / 13, 4 / 13, 0.0], atol=0.01)
-    assert found["c"].total.value == 0.0  # exactly: no blow changes with it
 
 
 def test_the_summary_says_what_to_measure_better_with_its_sign():
@@ -224,10 +209,6 @@ def test_a_gaussian_copula_has_its_rank_correlation(given):
     assert_allclose(np.quantile(values[:, 1], [0.1, 0.9]), [0.1, 0.9], atol=2e-3)  # margins stay as they were
 
 
-def test_no_correlation_mixes_nothing():
-    assert inputs.mixing(PAIR, None) is None and inputs.mixing(PAIR, np.eye(2)) is None
-
-
 def test_points_are_repeatable_even_and_inside_the_cube():
     points = inputs.shares(1000, 3, 7)
     np.testing.assert_array_equal(points, inputs.shares(1000, 3, 7))
@@ -236,11 +217,3 @@ def test_points_are_repeatable_even_and_inside_the_cube():
     # of 1024 points of the sequence every slab of 1/16 holds exactly 64
     counts = [np.histogram(column, 16, (0.0, 1.0))[0] for column in inputs.shares(1024, 3, 7).T]
     np.testing.assert_array_equal(counts, 64)
-
-
-def test_groups_for_sobol_indices_exchange_one_input_at_a_time():
-    points = inputs.shares(8, 6, 1)
-    first, second = points[:, :3], points[:, 3:]
-    mixed = [np.where(np.arange(3) == i, second, first) for i in range(3)]
-    groups = inputs.crossed(points).reshape(8, 5, 3).transpose(1, 0, 2)
-    np.testing.assert_array_equal(groups, [first, *mixed, second])
