@@ -62,6 +62,12 @@ def test_interpolated_cells_meet_the_tolerance_with_the_errors_of_those_computed
     assert not found.computed.all() and np.nanmax(found.numbers[5]) <= 1e-3
 
 
+def test_parabolas_need_three_nodes_and_lines_two():
+    nodes, places = np.array([[0, 2, 5], [3, 3, 4]]), np.array([[1, 4], [3, 4]])
+    found = np.einsum("npi,ni->np", refined.weights(nodes, places), np.array([[0.0, 4.0, 25.0], [9.0, 9.0, 16.0]]))
+    assert_allclose(found, [[1.0, 16.0], [9.0, 16.0]])
+
+
 def test_islands_that_can_be_missed_are_told():
     """The widest gap between cells computed in any case is a quarter of a block."""
     assert_allclose(refined.widest_gap((401, 401)), 4 / 400)
