@@ -1,5 +1,7 @@
 """Extremes: any unit, stiffness, place, order of nodes and shape of triangle gives the same frequencies."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
@@ -14,6 +16,33 @@ from fem_impact.references.frequencies import hinged
 STEEL = Material(E=210e9, nu=0.3, rho=7850.0)
 PLATE = Plate(STEEL, 2e-3)
 PER_RATE = np.sqrt(7850 * 2e-3 / (210e9 * 2e-3**3 / (12 * (1 - 0.3**2))))
+QUADRILATERAL = mesh.polygon([(0, 0), (1.3, 0.1), (1.1, 0.9), (0.2, 1.0)], size=0.2)
+
+
+def turned(angle=0.0, shift=0.0, seed=None):
+    """The quadrilateral turned [rad], shifted [m] and with its nodes and triangles in another order."""
+    shape = QUADRILATERAL
+    turn = np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
+    rng = np.random.default_rng(seed)
+    order = np.arange(len(shape.points)) if seed is None else rng.permutation(len(shape.points))
+    place = np.argsort(order)
+    cells = place[shape.cells] if seed is None else rng.permuted(place[shape.cells], axis=1)[::-1]
+    return replace(
+        shape, points=(shape.points @ turn.T + shift)[order], cells=np.ascontiguousarray(cells),
+        facets=place[shape.facets], middles=shape.middles @ turn.T + shift, tangents=shape.tangents @ turn.T,
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    "supports, change",
+    [({"boundary": "hinged"}, {"angle": 0.7}), ({"boundary": "clamped"}, {"shift": 1e3}), ({}, {"seed": 4}),
+     ({"edge0": "clamped"}, {"angle": 2.1, "shift": 5.0, "seed": 5}), ({}, {"angle": 2.1, "shift": 1e3})],
+)  # fmt: skip
+def test_place_turn_and_order_of_nodes_do_not_matter(supports, change):
+    here = find_modes(assemble(QUADRILATERAL, PLATE, supports), n_modes=8)
+    there = find_modes(assemble(turned(**change), PLATE, supports), n_modes=8)
+    assert here.n_rigid == there.n_rigid
+    assert_allclose(there.omega, here.omega, rtol=1e-9)  # 4e-12 was measured
 
 
 @pytest.mark.parametrize("length", [1e-6, 1e3])
