@@ -131,14 +131,16 @@ class Mixed(Description):
         try:
             more = _by_elements(asked, higher.frequency, stages)[3].seconds
         except check.SimulationError:
-            more = 0.0 if many else np.inf
+            if many:
+                return None
+            many, more = True, np.inf
         if not (self.compared or "target" in asked.pieces):
             with suppress(check.SimulationError):
                 other = Vectors.of(asked, stages)
                 if other is not None and other.forecast.seconds < more:
                     progress.foresee(other.forecast.seconds)
                     return replace(other, otherwise=None if many else replace(higher, compared=True))
-        if many or more == np.inf:
+        if many:
             return None
         progress.foresee(more)
         return higher
