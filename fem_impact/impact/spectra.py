@@ -84,7 +84,7 @@ def half_sine_spectrum(frequencies: Any, contact_frequency: float) -> np.ndarray
     [1.0, 0.7854, 0.0]
     """
     frequency = check.finite("frequencies", check.numbers("frequencies", frequencies, "Hz"), "Hz")
-    x = frequency / check.positive("contact_frequency", contact_frequency, "Hz")
+    x = np.abs(frequency) / check.positive("contact_frequency", contact_frequency, "Hz")
     near = np.abs(x - 1.0) < 1e-4  # both cos and 1 - x**2 vanish at 1: use the series of their ratio
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
         far = np.abs(np.cos(0.5 * np.pi * x) / (1.0 - x**2))

@@ -119,7 +119,11 @@ def frf(
              for rest, window in zip((rests[:, :1], rests[:, 1:]), windows)]  # fmt: skip
     shares = [power / np.maximum(whole, tiny) for power, whole in zip(noise, (ff, xx))]  # of noise in force, response
     bias = {"H1": shares[0], "H2": shares[1], "Hv": 0.5 * np.abs(shares[0] - shares[1])}[method]
-    error = np.abs(H) * (_scatter(taps.n_taps, coherence, shares) + bias)
+    if taps.n_taps == 1:
+        scatter = np.sqrt(-np.log(1.0 - SURE) * (shares[0] + shares[1]))
+    else:
+        scatter = _scatter(F, X - H1 * F) / np.maximum(np.abs(H1), tiny)
+    error = np.abs(H) * (scatter + bias)
     return xr.Dataset(
         {
             "H": (("frequency", "channel"), H),
@@ -159,13 +163,16 @@ def _rest(taps: Taps) -> np.ndarray:
     return np.array([rows[:n].std(axis=0) if n >= triggers.FEWEST else short for rows, n in zip(taps.response, ends)])
 
 
-def _scatter(n_taps: int, coherence: np.ndarray, shares: list[np.ndarray]) -> np.ndarray:
-    """Radius over the response, by how far the taps differ or, of one tap, by the shares of its noise."""
-    if n_taps == 1:
-        return np.sqrt(-np.log(1.0 - SURE) * (shares[0] + shares[1]))
+def _scatter(force: np.ndarray, left: np.ndarray) -> np.ndarray:
+    """Radius around H1 by how far it moves without each tap (the jackknife), whatever noise larger taps have.
+
+    Of spectra of the force and of what H1 leaves of the responses, (n_taps, n_frequencies, 1 or n_channels).
+    """
+    n_taps, power = len(force), np.abs(force) ** 2
+    others = np.maximum(power.sum(axis=0) - power, np.finfo(float).eps * power)
+    moved = np.abs(force.conj() * left) / np.maximum(others, np.finfo(float).tiny)
     freedom = 2 * n_taps - 2
-    apart = (1.0 - coherence) / np.maximum(coherence, np.finfo(float).tiny)
-    return np.sqrt(f.ppf(SURE, 2, freedom) * 2.0 / freedom * apart)
+    return np.sqrt(f.ppf(SURE, 2, freedom) * (1.0 - 1.0 / n_taps) * np.square(moved).sum(axis=0))
 
 
 def mac(first: Any, second: Any) -> np.ndarray:
@@ -235,7 +242,7 @@ def matched(measured: Any, computed: Any, *, points: Any = None, which: Any = No
     [(0, -1.0), (2, -3.2)]
     """
     one, two = frequencies("measured", measured), frequencies("computed", computed)
-    used = np.arange(len(one)) if which is None else np.atleast_1d(np.arange(len(one))[which])
+    used = np.unique(np.arange(len(one))[slice(None) if which is None else which])
     one = one[used]
     if not len(one) or len(two) < len(one):
         raise ValueError(f"computed must have at least the {len(one)} modes of measured, got {len(two)}")

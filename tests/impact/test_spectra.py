@@ -13,6 +13,7 @@ def test_half_sine_levels():
     level = 20.0 * np.log10(spectra.half_sine_spectrum([1.187, 1.637, 2.039, 2.607], 1.0))
     assert_allclose(level, [-3.0, -6.0, -10.0, -20.0], atol=0.02)  # abscissae printed to four digits
     assert spectra.half_sine_spectrum(3.0, 1.0) < 1e-15
+    assert spectra.half_sine_spectrum(-1.0, 1.0) == pytest.approx(np.pi / 4)
     assert_allclose(spectra.half_sine_spectrum([1.0, 1.0 + 1.01e-4, 1.0 - 1.01e-4], 1.0), np.pi / 4, rtol=1e-4)
 
 

@@ -90,8 +90,20 @@ def test_the_true_response_lies_within_the_error_stated_in_nine_lines_of_ten(dou
         found, error = in_band(fi.frf(records(double=double, noise=noise, n=n, seed=seed)), "H", "error")
         inside.append(np.abs(found - EXACT) <= error)
     # 2 200 lines tell it to 0.007, and the noise before one tap is known to a tenth from its 125 samples; to first
-    # order of the force's noise, which in the holes of one double hit is half the force: 0.87 there
-    assert np.mean(inside) == pytest.approx(0.9, abs=0.04)
+    # order of the force's noise, which in the holes of one double hit is half the force: 0.87 there; two taps that have
+    # holes elsewhere are told to err more: 0.94
+    assert np.mean(inside) == pytest.approx(0.9, abs=0.05)
+
+
+@pytest.mark.parametrize("n", [3, 10])
+def test_the_error_stated_holds_for_taps_of_unequal_strength_with_noise_in_proportion(n):
+    inside = []
+    for seed in range(5):
+        even, strength = records(double=False, noise=(0.0, 0.01), n=n, seed=seed), np.geomspace(0.3, 3.0, n)
+        force, response = even.force * strength[:, None], even.response * strength[:, None, None]
+        found, error = in_band(fi.frf(fi.Taps.from_arrays(force, response, rate=RATE)), "H", "error")
+        inside.append(np.abs(found - EXACT) <= error)
+    assert np.mean(inside) == pytest.approx(0.9, abs=0.05)  # 0.29 and 0.53 if the noise were alike in all taps
 
 
 def test_a_second_pulse_costs_only_where_the_spectrum_of_the_force_has_holes():
@@ -137,6 +149,11 @@ def test_modes_are_paired_by_shape_although_their_order_changed():
     assert pairs[0].difference == pytest.approx(200.0 / 180.0 - 1.0)
     alone = fi.matched([100.0, 200.0, 310.0], [99.0, 150.0, 205.0, 300.0])
     assert [pair.computed for pair in alone] == [0, 2, 3]
+
+
+def test_modes_chosen_in_any_order_are_paired_in_that_of_their_frequencies():
+    pairs = fi.matched([100.0, 200.0, 300.0], [101.0, 201.0, 301.0], which=[2, 0])
+    assert [(pair.measured, pair.computed) for pair in pairs] == [(0, 0), (2, 2)]
 
 
 @pytest.mark.parametrize(
