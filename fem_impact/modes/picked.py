@@ -18,6 +18,7 @@ FELT = 0.1  # [-] of the largest force spectrum: 20 dB below it a hammer tells l
 PROMINENCE = 1.5  # [-] of logarithms: peaks of less than a factor of 4.5 over their surroundings may be noise
 DAMPING = 1e-6, 0.5  # [-] damping ratios of a peak that is sought
 GAIN = 10.0  # [-] of the noise variance: what each value of one more mode must explain, where luck explains one
+ABOUT = 20  # [-] lines on either side of a peak that tell the noise there, to a tenth
 ENDS = ("node", "direction"), ("reference", "reference_direction")
 
 
@@ -189,6 +190,8 @@ def _with_one_more(omega: np.ndarray, data: np.ndarray, weight: np.ndarray, befo
     natural, damping = np.exp(after.poles)
     gain = np.square(before.rest).sum() - np.square(after.rest).sum()
     noise = np.square(after.rest).sum() / (max(1, len(data) - after.basis.shape[1]) * data.shape[1])
+    about = after.rest.reshape(2, len(omega), -1)[:, max(0, place - ABOUT) : place + ABOUT + 1]
+    noise = max(noise, np.square(about).mean())  # larger where the hammer has little force
     near = np.diff(natural) < (damping * natural)[1:]
     return None if near.any() or gain < GAIN * (2 + data.shape[1]) * noise else after
 

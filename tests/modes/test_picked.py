@@ -130,3 +130,19 @@ def test_flat_responses_have_no_modes():
     said = "frf has no peaks that are modes; give frequencies= near which they are sought"
     with pytest.raises(ValueError, match=said):
         fi.Modes.from_frf(flat, mass=1.0, points=[[0.0]], driving=0)
+
+
+def test_noise_where_the_hammer_has_little_force_makes_no_modes():
+    place = np.arange(6.0)[:, None]
+    body = fi.Modes.from_arrays(
+        [120.0, 260.0], np.hstack([np.cos(place), np.sin(1.0 + place)]), points=place, mass=1.0, damping_ratio=0.02
+    )
+    H = fi.mobility(body, place[:1], place, FREQUENCY[1:], "accelerance")[:, :, 0]
+    noise, counts = np.where(FREQUENCY[1:, None] > 480.0, 1.0, 0.1), []
+    for seed in (4, 5, 6):
+        rng = np.random.default_rng(seed)
+        rough = H + noise * (rng.standard_normal(H.shape) + 1j * rng.standard_normal(H.shape))
+        known = {"frequency": FREQUENCY[1:], "channel": list("abcdef"), "units": ("channel", ["m/s^2/N"] * 6)}
+        given = xr.Dataset({"H": (("frequency", "channel"), rough)}, known)
+        counts.append(len(fi.Modes.from_frf(given, mass=1.0, points=place, driving="a").omega))
+    assert counts == [2, 2, 2]
