@@ -155,13 +155,12 @@ class Asked:
         """What is known of the target without finite elements."""
         return idealisation.from_outside(self.blow.target, self.values["at"], self.mass, self.duration)
 
-    @property
-    def stopped(self) -> bool:
-        """Whether an infinite plate of the target's mobility stops the striker: damps the contact more than critically.
+    def stopped(self, mobility: float) -> bool:
+        """Whether an infinite plate of a mobility [m/(N s)] stops the striker: damps its contact more than critically.
 
         Only echoes then throw it off.
         """
-        return self.seen is not None and self.duration <= 0.5 * np.pi * self.mass * self.seen.mobility < np.inf
+        return self.duration <= 0.5 * np.pi * self.mass * mobility
 
     @property
     def unfit(self) -> str:

@@ -71,12 +71,12 @@ class Vectors(Description):
         wanted, at = (0.5 / asked.duration, asked.budget.total), asked.values["at"][None]
         elements = vectors.elements_for(target, size, asked.mass, *wanted)
         n_dofs, count = target.unknowns(at, elements, stages), vectors.first_count(target, *wanted)
-        lasts, impacts = _length_foreseen(asked)
+        lasts, impacts, stopped = _length_foreseen(asked)
         meshes = list(vectors.compared(target, elements, stages))
         if impacts > 2 and not asked.meshed:  # each multiplies the error that a mesh makes before it
             meshes.append(vectors.finer(target, meshes[0], stages))
         grown = min(cost.grown(count, lasts), vectors.MOST_VECTORS)
-        if asked.stopped:  # vectors that end before the echo throw the striker off by one of their own
+        if stopped:  # vectors that end before the echo throw the striker off by one of their own
             count = max(count, round(0.5 * grown))
         work = cost.by_vectors([target.unknowns(at, each, stages) for each in meshes], grown)
         ringing = sum((ringing_work(target.element, n) for n in (FIRST_LOOK, ringing_count(asked))), cost.NOTHING)
@@ -138,15 +138,17 @@ class Vectors(Description):
         return super().completed(hit, stages)
 
 
-def _length_foreseen(asked: Asked) -> tuple[float, int]:
-    """How long the blow lasts on an infinite plate, in undisturbed contacts, and its impacts; (1, 1) if not known.
+def _length_foreseen(asked: Asked) -> tuple[float, int, bool]:
+    """How long the blow lasts on an infinite plate, in undisturbed contacts, its impacts, and whether it stops there.
 
-    Where such a plate stops the striker, only echoes throw it off: until the first has turned once, the blow goes on.
+    Where such a plate, with the edges nearby, stops the striker, only echoes throw it off: until the first has turned
+    once, the blow goes on. (1, 1, False) if not known.
     """
     at, seen = asked.values["at"], asked.seen
     if seen is None or not np.isfinite(seen.mobility):
-        return 1.0, 1
-    endless = idealisation.endless(at, seen.mass, seen.mobility, asked.duration)
+        return 1.0, 1, False
+    mobility, echo = seen.local
+    endless = idealisation.endless(at, seen.mass, mobility, asked.duration)
     striker = collision.shortened(asked.blow.striker, asked.striker_modes(1.0)[0])
     try:
         with build.uncompiled():
@@ -155,11 +157,11 @@ def _length_foreseen(asked: Asked) -> tuple[float, int]:
                 duration=100.0 * asked.duration,  # the cost of longer blows is told too low
             )  # fmt: skip
     except check.SimulationError:
-        return 1.0, 1
-    lasts, echo = max((touch.end for touch in hit.impacts), default=0.0) / asked.duration, seen.echo / asked.duration
-    if not asked.stopped:
-        return lasts, hit.n_impacts
-    return max(1.0, echo), SEVERAL if echo > lasts else 1  # still pressing, it is thrown off for good
+        return 1.0, 1, False
+    lasts, echo = max((touch.end for touch in hit.impacts), default=0.0) / asked.duration, echo / asked.duration
+    if not asked.stopped(mobility):
+        return lasts, hit.n_impacts, False
+    return max(1.0, echo), SEVERAL if echo > lasts else 1, True  # still pressing, it is thrown off for good
 
 
 def ringing_count(asked: Asked) -> int:
