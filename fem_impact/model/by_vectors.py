@@ -75,7 +75,10 @@ class Vectors(Description):
         meshes = list(vectors.compared(target, elements, stages))
         if impacts > 2 and not asked.meshed:  # each multiplies the error that a mesh makes before it
             meshes.append(vectors.finer(target, meshes[0], stages))
-        grown = min(cost.grown(count, lasts), vectors.MOST_VECTORS)
+        ratio = target.damping_ratio  # by which echoes fade; without, many blows soon disagree
+        ratio = ratio(0.5 / asked.duration) if callable(ratio) else ratio or 0.0
+        lasts = max(lasts, min(asked.pressed, 1.0 / (np.pi * max(ratio, 0.01))))
+        grown = round(min(cost.grown(count, lasts), vectors.MOST_VECTORS, n_dofs))
         if stopped:  # vectors that end before the echo throw the striker off by one of their own
             count = max(count, round(0.5 * grown))
         work = cost.by_vectors([target.unknowns(at, each, stages) for each in meshes], grown)
@@ -88,8 +91,8 @@ class Vectors(Description):
             work, ringing = work + ringing, cost.NOTHING
         shares = dict.fromkeys(("Ritz vectors", "mesh"), asked.budget.half * (1.0 - CHEAP))
         forecast = asked.foretell(
-            "vectors", errors=shares, reasons=(why, kept, reason), n_modes=count, size=size, n_dofs=n_dofs,
-            element=target.element, steps=asked.budget.cheap, mass=target.mass, notes=target.assumed, work=work,
+            "vectors", errors=shares, reasons=(why, kept, reason), n_modes=count, most=grown, size=size,
+            n_dofs=n_dofs, element=target.element, steps=asked.budget.cheap, mass=target.mass, notes=target.assumed, work=work,
             ringing=ringing.seconds,
         )  # fmt: skip
         return cls(asked, forecast, elements)

@@ -9,6 +9,7 @@ import pytest
 from numpy.testing import assert_allclose
 
 import fem_impact as fi
+from fem_impact.impact import engine
 from fem_impact.impact.compiled import build
 from fem_impact.model import cost
 
@@ -88,6 +89,18 @@ def test_the_plan_counts_the_unknowns_and_vectors_that_its_run_has(name, meshes,
     unknowns, most = counted[0]
     assert_allclose(unknowns, meshes, rtol=0.02)  # 1 %, and what splitting at ribs adds
     assert vectors / 2.0 <= most <= 1.7 * vectors  # two steps of growth, rounded
+
+
+def test_a_plan_of_bodies_pressed_together_counts_the_steps_that_they_may_take(monkeypatch):
+    plate = fi.analytic.rectangle(0.4, 0.3, mass=3.24, first_frequency=411.0, n_modes=20, damping_ratio=0.03)
+    how = {"at": (0.13, 0.1), "speed": 0.3, "tolerance": 1e-2, "striker_force": 1.0, "duration": 1.0}
+    plan = fi.plan(plate, fi.Striker.rigid(0.038), fi.Contact.hertz(6e8), **how)
+    steps, run = [], engine.run_system
+    monkeypatch.setattr(engine, "run_system", lambda *args: steps.append(run(*args)) or steps[-1])
+    plan.run()
+    taken = cost.strikes(sum(len(each.steps) for each in steps) / 20.0, 20).seconds
+    assert taken < plan.seconds < 10.0 * taken  # steps that agree at once
+    assert plan.but(striker_force=0.0).seconds < 0.3 * taken
 
 
 def sheet(length, width, at, speed, thickness=0.6e-3, radius=4.955e-3):
