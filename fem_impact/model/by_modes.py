@@ -9,6 +9,7 @@ from ..fe.assembly import BY_ELEMENT
 from ..fe.theory import Theory
 from ..impact import accuracy
 from ..impact.response import Response
+from ..mesh.meshes import Mesh
 from ..modes.modal import Modes, at_rest
 from ..modes.shapes import FieldShapes
 from . import cost, vectors
@@ -26,6 +27,7 @@ SHORT_WAVES = {
 }  # fmt: skip
 PER_MODE = 40.0  # [-] unknowns of thin flat plates for each mode of many, at 1.8 rad per triangle; measured, 38 to 42
 LEAST = 2900.0  # [-] and as many for few modes, at CHEAP_CELLS; measured, 2700
+CROWDED = 1000.0  # [-] squared perimeter over area of a strip 250 times as long as wide
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,18 +45,24 @@ class Modal(Description):
     ) -> "Modal":
         """The target with as many modes as the blow needs; finds the first ones, because they tell how many."""
         target, at, mass = asked.blow.target, asked.values["at"], asked.mass
+        band, mesh = max((band for band in asked.quantities.values() if band), default=0.0), target.mesh
+        # ten times the first modes may crowd between one and two half waves across a strip: to find them takes minutes
+        strip = mesh is not None and mesh.dimension == 2 and mesh.perimeter**2 > CROWDED * mesh.area
+        if mesh is not None and strip and target.kind == "fe" and not asked.counted:
+            least = max(band, accuracy.BAND * 0.5 / asked.duration)  # not its edges, and a third at least
+            number = round(target.count_below(least / target.stretch) / 3.0)
+            _check_number(asked, mesh, least, number, band == least)
         with stages("modes"):
             first = asked.find(FIRST_LOOK, stages=stages) if first is None else first
         modes = target.finished(first)
         with target.blame("strike"):
             modes.point("at", at)
         needed = accuracy.cutoff_frequency(modes, at, mass=mass, tolerance=asked.budget.for_left_out, **asked.law)
-        band = max((band for band in asked.quantities.values() if band), default=0.0)
         limit, number = max(needed, band), asked.pieces.get("n_modes")
         if number is None:
             limit = asked.pieces.get("max_frequency", limit)
             # the first modes are kept even if fewer are enough
-            number = max(modes.n_modes, round(modes.n_modes * target.growth(modes.frequencies[-1], limit)))
+            number = max(modes.n_modes, round(target.number_below(modes, limit)))
             limit, number = limit * more ** (2.0 / max(1, modes.dimension)), round(number * more)
         else:
             beyond = max(1.0, number / modes.n_modes) ** (2.0 / modes.dimension)
@@ -157,7 +165,7 @@ def ringing_work(element: str, n_modes: int) -> cost.Work:
     return sum(_solved(rules, n_dofs, n_modes), cost.NOTHING)
 
 
-def _check_number(asked: Asked, first: Modes, limit: float, number: int, banded: bool) -> None:
+def _check_number(asked: Asked, body: Modes | Mesh, limit: float, number: int, banded: bool) -> None:
     """Raise an error if more modes are needed than allowed; ``banded`` is whether a band of the quantities needs them.
 
     The compliance of modes above a frequency f falls as f**-1 on plates and f**-1.5 on beams, and so does the linear
@@ -166,7 +174,7 @@ def _check_number(asked: Asked, first: Modes, limit: float, number: int, banded:
     contact, most = asked.blow.contact, MOST_MODES[asked.blow.target.kind]
     if number <= most:
         return
-    lower = (most / number) ** (2.0 / first.dimension)  # of the highest frequency
+    lower = (most / number) ** (2.0 / body.dimension)  # of the highest frequency
     if "n_modes" in asked.pieces:
         advice = f"give n_modes of at most {most}"
     elif "max_frequency" in asked.pieces or banded:

@@ -187,7 +187,7 @@ def _ringing(asked: Asked, keep: Any, response: Response) -> Modes:
     force = np.abs(response.spectrum(frequencies))
     limit = band or float(frequencies[np.flatnonzero(force >= 1e-3 * force[0])[-1]])  # -60 dB are not heard
     first = asked.find(FIRST_LOOK)
-    number = round(FIRST_LOOK * target.growth(target.finished(first).frequencies[-1], limit))
+    number = round(target.number_below(target.finished(first), limit))
     most = MOST_MODES["fe"] if band else MOST_RINGING
     modes = first if number <= FIRST_LOOK else asked.find(min(number, most), first=first, keep=keep)
     return target.surrounded(modes)

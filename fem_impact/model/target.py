@@ -316,18 +316,25 @@ class Target:
             assert self.closed is not None
             return self.closed(**reach)
 
-    def growth(self, low: float, high: float) -> float:
-        """How many times more modes there are below a frequency [Hz] than below a lower one, by Weyl's law."""
-        section = self.section
-        if not isinstance(section, Plate) or not section.tension or self.mesh is None:
-            body = self.modes or self.mesh
-            if not low:  # a rigid body has no others
-                return 1.0
-            return (high / low) ** (0.5 * (2 if body is None else body.dimension))
-        middle = self.mesh.points[self.mesh.cells].mean(axis=1)
-        bending, inertia = float(section.stiffness(middle)[:, 0, 0].mean()), float(section.inertia(middle).mean())
-        far, near = (_squared_wave(bending, section.tension, inertia, frequency) for frequency in (high, low))
-        return float(far / near)  # the number goes as the square of the wavenumber
+    def number_below(self, modes: Modes, limit: float) -> float:
+        """About how many modes there are below a frequency [Hz], by Weyl's law from the first ones, all as struck.
+
+        The first modes of a strip crowd, or are those of a beam, and mislead: then the law itself counts the others.
+        """
+        section, low, number = self.section, float(modes.frequencies[-1]), float(modes.n_modes)
+        if not low:  # a rigid body has no others
+            return number
+        growth = limit / low
+        if self.mesh is None or not isinstance(section, Plate):
+            return number * growth ** (0.5 * (2 if (body := self.modes or self.mesh) is None else body.dimension))
+        if section.tension:
+            middle = self.mesh.points[self.mesh.cells].mean(axis=1)
+            bending, inertia = float(section.stiffness(middle)[:, 0, 0].mean()), float(section.inertia(middle).mean())
+            far, near = (_squared_wave(bending, section.tension, inertia, frequency) for frequency in (limit, low))
+            growth = float(far / near)  # the number goes as the square of the wavenumber
+        law = number + self.count_below(limit / self.stretch) - self.count_below(low / self.stretch)
+        # the largest of its wavenumbers is twice the mean across strong grain
+        return law if limit > low and not law / 3.0 <= number * growth <= 3.0 * law else number * growth
 
     def assembled(self, stages: Stages, size: float | None = None) -> System:
         """The assembled body, with elements of the given size [m] or the mesh's own."""

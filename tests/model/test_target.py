@@ -11,6 +11,7 @@ from numpy.testing import assert_allclose
 from scenes import load_text
 
 import fem_impact as fi
+from fem_impact.fe import refinement
 from fem_impact.impact.response import Error
 from fem_impact.model.planner import Blow
 from fem_impact.model.target import Stages, Target
@@ -180,3 +181,22 @@ def test_the_air_gets_more_modes_each_time_it_errs_too_much():
 def test_three_attempts_are_enough():
     third = after(after(modal(), truncation=1e-2), truncation=1e-2)
     assert after(third, truncation=1e-2) is None
+
+
+@pytest.mark.parametrize(("length", "edge"), [(14.0, "free"), (28.5, "hinged")])
+def test_modes_of_strips_are_counted_by_their_area(length, edge):
+    """The first are those of a beam, or crowd about one half wave across."""
+    target = Target.of(fi.assemble(fi.mesh.rectangle(length, 0.19), fi.Plate(ALUMINIUM, 0.01), {"boundary": edge}))
+    first, limit = target.find(20, tolerance=0.05), 20e3
+    k = np.pi * np.arange(1.0, 6.0) / 0.19  # across a hinged strip
+    rate = (ALUMINIUM.plane_stress[0, 0] * 0.01**2 / 12.0 / ALUMINIUM.rho) ** 0.5
+    along = np.sqrt(np.maximum(2.0 * np.pi * limit / rate - k**2, 0.0)) * length / np.pi
+    assert 0.6 < target.number_below(first, limit) / along.sum() < 1.6
+
+
+@pytest.mark.parametrize("theory", ["kirchhoff", "mindlin"])
+def test_a_strip_with_too_many_modes_is_refused_before_the_first_are_found(theory, monkeypatch):
+    monkeypatch.setattr(refinement, "solve_on_mesh", None)  # takes minutes
+    body = fi.assemble(fi.mesh.rectangle(2850.0, 0.19), fi.Plate(ALUMINIUM, 0.01), {"boundary": "hinged"}, theory=theory)
+    with pytest.raises(fi.SimulationError, match="needs about .* modes"):
+        fi.plan(body, STICK, fi.Contact.hertz(1e9), at=(1000.0, 0.08), speed=1.0, target="modal")
