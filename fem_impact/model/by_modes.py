@@ -50,8 +50,8 @@ class Modal(Description):
         strip = mesh is not None and mesh.dimension == 2 and mesh.perimeter**2 > CROWDED * mesh.area
         if mesh is not None and strip and target.kind == "fe" and not asked.counted:
             least = max(band, accuracy.BAND * 0.5 / asked.duration)  # not its edges, and a third at least
-            number = round(target.count_below(least / target.stretch) / 3.0)
-            _check_number(asked, mesh, least, number, band == least)
+            crowd = round(target.count_below(least / target.stretch) / 3.0)
+            _check_number(asked, mesh, least, crowd, band == least)
         with stages("modes"):
             first = asked.find(FIRST_LOOK, stages=stages) if first is None else first
         modes = target.finished(first)

@@ -13,7 +13,7 @@ from ..impact import accuracy, collision
 from ..impact.compiled import build
 from ..impact.motion import LOOKED_AT
 from ..impact.response import Response
-from ..modes.modal import Modes
+from ..modes.modal import Modes, damping_ratios
 from . import audit, cost, idealisation, vectors
 from .asked import Asked, Description, Unaffordable
 from .budget import CHEAP
@@ -23,6 +23,7 @@ from .target import FIRST_LOOK, Elements, Stages
 
 AUDIBLE = 20e3  # [Hz] the ear's limit: no mode above is asked for unless a band of the sound is
 MOST_RINGING = 400  # [-] modes for motion and sound if no band is asked for: ten seconds, a minute of a curved plate
+LONGEST = 100.0  # [-] undisturbed contacts: the cost of longer blows on an infinite plate is told too low
 SEVERAL = 3  # [-] impacts at least of a striker at rest until echoes throw it off; 3 to 9 on steel sheets
 
 
@@ -75,8 +76,8 @@ class Vectors(Description):
         meshes = list(vectors.compared(target, elements, stages))
         if impacts > 2 and not asked.meshed:  # each multiplies the error that a mesh makes before it
             meshes.append(vectors.finer(target, meshes[0], stages))
-        ratio = target.damping_ratio  # by which echoes fade; without, many blows soon disagree
-        ratio = ratio(0.5 / asked.duration) if callable(ratio) else ratio or 0.0
+        # echoes fade by damping; without, many blows soon disagree
+        ratio = float(damping_ratios(target.damping_ratio or 0.0, np.array([np.pi / asked.duration]))[0])
         lasts = max(lasts, min(asked.pressed, 1.0 / (np.pi * max(ratio, 0.01))))
         grown = round(min(cost.grown(count, lasts), vectors.MOST_VECTORS, n_dofs))
         if stopped:  # vectors that end before the echo throw the striker off by one of their own
@@ -92,8 +93,8 @@ class Vectors(Description):
         shares = dict.fromkeys(("Ritz vectors", "mesh"), asked.budget.half * (1.0 - CHEAP))
         forecast = asked.foretell(
             "vectors", errors=shares, reasons=(why, kept, reason), n_modes=count, most=grown, size=size,
-            n_dofs=n_dofs, element=target.element, steps=asked.budget.cheap, mass=target.mass, notes=target.assumed, work=work,
-            ringing=ringing.seconds,
+            n_dofs=n_dofs, element=target.element, steps=asked.budget.cheap, mass=target.mass, notes=target.assumed,
+            work=work, ringing=ringing.seconds,
         )  # fmt: skip
         return cls(asked, forecast, elements)
 
@@ -157,10 +158,10 @@ def _length_foreseen(asked: Asked) -> tuple[float, int, bool]:
         with build.uncompiled():
             hit = collision.strike(
                 endless, striker, asked.blow.contact, at=at, speed=asked.values["speed"], tolerance=audit.ROUGH,
-                duration=100.0 * asked.duration,  # the cost of longer blows is told too low
+                duration=LONGEST * asked.duration,
             )  # fmt: skip
-    except check.SimulationError:
-        return 1.0, 1, False
+    except check.SimulationError:  # it rattles, and not even two runs of this one agree
+        return LONGEST, SEVERAL, False
     lasts, echo = max((touch.end for touch in hit.impacts), default=0.0) / asked.duration, echo / asked.duration
     if not asked.stopped(mobility):
         return lasts, hit.n_impacts, False

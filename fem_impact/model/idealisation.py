@@ -127,7 +127,9 @@ class Surroundings:
         one, two = start - at, start + along - at
         cross = one[:, 0] * two[:, 1] - one[:, 1] * two[:, 0]
         sectors = np.column_stack([cross, np.arctan2(cross, (one * two).sum(axis=1))])
-        return cls(mesh.area + segments, float(length.sum()), float(away.min()), np.column_stack([away, length]), sectors)
+        return cls(
+            mesh.area + segments, float(length.sum()), float(away.min()), np.column_stack([away, length]), sectors
+        )
 
     def share(self, squared: float) -> float:
         """Share [-] of a disk around the point, of a squared radius [m**2], that lies on the plate."""
@@ -295,6 +297,4 @@ def from_outside(target: Target, at: Any, mass: float, duration: float) -> Outsi
     far = endless_error(round_view, mobility, stretch * waves.fastest, mass, duration, slowest=stretch * waves.slowest)
     echo = round_view.clearance**2 / (stretch * waves.fastest)
     factor, distance = round_view.local(NEAREST * stretch * waves.fastest * duration, free)
-    return Outside(
-        whole, rigid, far, mobility, echo, (factor * mobility, distance / (stretch * waves.fastest)), notes
-    )
+    return Outside(whole, rigid, far, mobility, echo, (factor * mobility, distance / (stretch * waves.fastest)), notes)

@@ -91,7 +91,7 @@ def map_scene(
     grid.admit(
         math.prod(len(values) for values in over.values()), len(cases.LAYERS),
         wanted.pop("max_cells", grid.MOST_CELLS),
-        quick=not law.lossy and not law.special and law.exponent >= 1.0
+        quick=not (law.lossy or law.special or stretches) and law.exponent >= 1.0
         and not {"loss", *ALONE} & {ALIASES.get(name, name) for name in over},
         tell=tell,
     )  # fmt: skip
@@ -132,7 +132,7 @@ def _quick_map(
         case, axes = job.described(scene.built, over, stages)
     except check.SimulationError as error:
         raise check.SimulationError(f"{scene.path}: {error}") from None
-    return with_theory(grid.compute_map(case, axes, job), case, axes)
+    return with_theory(grid.compute_map(job.cases(case, axes), job), case, axes)
 
 
 def with_theory(table: xarray.Dataset, case: Case, axes: Mapping[str, np.ndarray]) -> xarray.Dataset:

@@ -1,7 +1,6 @@
 """Maps: one blow for every combination of parameters, returned as an xarray Dataset."""
 
 import json
-import math
 import os
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
@@ -77,6 +76,10 @@ class Job:
         """The blow on a body described as the map needs it, and the map's axes; as `bodies.body_of`."""
         alone = self.residual and not self.layers
         return bodies.body_of(blow, over, tolerance=self.tolerance, alone=alone, store=self.store, stages=stages)
+
+    def cases(self, base: Case, axes: Mapping[str, np.ndarray]) -> Cases:
+        """All cells of a map."""
+        return Cases(base, axes, self.tolerance, self.residual, self.max_frequency, self.layers)
 
     def solved(self, cases: Cases, turn: str = "") -> tuple[np.ndarray, Texts]:
         """Compute all cases; those of a round with a name are kept in a folder of the store."""
@@ -228,15 +231,13 @@ def sweep(
         job = replace(job, ours=ours)
     blow = Blow(Target.of(modes, damping_ratio), striker, contact, {"at": at, "speed": speed})
     base, axes = job.described(blow, over)
-    n_cells = math.prod(map(len, axes.values()))
-    max_cells = check.number("max_cells", max_cells)
-    admit(n_cells, len(LAYERS) + len(job.layers), max_cells, quick=not job.layers, tell=tell)
-    return compute_map(base, axes, job)
+    cases, max_cells = job.cases(base, axes), check.number("max_cells", max_cells)
+    admit(cases.n_cases, len(LAYERS) + len(job.layers), max_cells, quick=cases.quick, tell=tell)
+    return compute_map(cases, job)
 
 
-def compute_map(base: Case, axes: Mapping[str, np.ndarray], job: Job) -> xarray.Dataset:
+def compute_map(cases: Cases, job: Job) -> xarray.Dataset:
     """The map of a blow over axes that are checked."""
-    cases = Cases(base, axes, job.tolerance, job.residual, job.max_frequency, job.layers)
     some = cases.without_speed() or cases  # those to compute
     for name, asked, of in (("borders", job.borders, cases), ("refine", job.refine, some)):
         if asked and why_none(of):

@@ -103,6 +103,16 @@ def test_a_plan_of_bodies_pressed_together_counts_the_steps_that_they_may_take(m
     assert plan.but(striker_force=0.0).seconds < 0.3 * taken
 
 
+def test_a_plan_of_a_blow_of_which_no_two_rough_runs_agree_foresees_a_long_one(counted):
+    plastic = fi.Plate(fi.Material(E=2.2e9, nu=0.4, rho=1021.0), 3.5e-3)
+    body = fi.assemble(fi.mesh.rectangle(0.2945, 0.19), plastic, {"boundary": "hinged"})
+    stick, how = fi.Striker.stick(0.1, 10e3), {"at": (0.088, 0.057), "tolerance": 1e-2}
+    fi.plan(body, stick, fi.Contact.hertz(695e3, loss=0.3), speed=1.0, **how)
+    fi.plan(body, stick, fi.Contact.hertz(695e3, loss=0.3), speed=1e5, **how)  # rattles: took 636 vectors and more
+    (few, usual), (many, most) = counted
+    assert (len(few), len(many)) == (2, 3) and most > 500 > usual
+
+
 def sheet(length, width, at, speed, thickness=0.6e-3, radius=4.955e-3):
     """The plan for a ball, of 4 g, on a free sheet of steel, 0.6 mm thick, which stops it until echoes come back."""
     steel = fi.Material(E=210e9, nu=0.3, rho=7850.0)

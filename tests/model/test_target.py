@@ -197,6 +197,8 @@ def test_modes_of_strips_are_counted_by_their_area(length, edge):
 @pytest.mark.parametrize("theory", ["kirchhoff", "mindlin"])
 def test_a_strip_with_too_many_modes_is_refused_before_the_first_are_found(theory, monkeypatch):
     monkeypatch.setattr(refinement, "solve_on_mesh", None)  # takes minutes
-    body = fi.assemble(fi.mesh.rectangle(2850.0, 0.19), fi.Plate(ALUMINIUM, 0.01), {"boundary": "hinged"}, theory=theory)
-    with pytest.raises(fi.SimulationError, match="needs about .* modes"):
+    body = fi.assemble(
+        fi.mesh.rectangle(2850.0, 0.19), fi.Plate(ALUMINIUM, 0.01), {"boundary": "hinged"}, theory=theory
+    )
+    with pytest.raises(fi.SimulationError, match=r"needs about .* modes"):
         fi.plan(body, STICK, fi.Contact.hertz(1e9), at=(1000.0, 0.08), speed=1.0, target="modal")

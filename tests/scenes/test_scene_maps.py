@@ -1,6 +1,7 @@
 """Maps of scenes, their pictures and files, the choice of a hammer, and both at the prompt."""
 
 import json
+import os
 from contextlib import nullcontext
 from dataclasses import replace
 from pathlib import Path
@@ -153,6 +154,20 @@ def test_too_large_a_map_is_refused_and_a_costly_one_says_so(tmp_path, prompt):
     grid.admit(10**8, 6, 1e9, tell=said.append)
     grid.admit(10**4, 6, 1e9, tell=said.append)
     assert len(said) == 1 and "6.4 GB of memory" in said[0]
+
+
+@pytest.mark.parametrize(("law", "over", "seconds"), [
+    (fi.Contact.linear(1e5), {}, "3e-05"), (fi.Contact.linear(1e5, loss=0.3), {}, "0.006"),
+    (fi.Contact.linear(1e5), {"loss": [0.1]}, "0.006"), (fi.Contact.power(1e5, 0.9), {}, "0.006"),
+])  # fmt: skip
+def test_a_sweep_counts_what_losses_and_steep_springs_cost_as_a_map_does(law, over, seconds, monkeypatch):
+    monkeypatch.setattr(os, "cpu_count", lambda: 1)
+    plate = fi.analytic.rectangle(1.55, 1.0, mass=0.2, first_frequency=100.0, n_modes=5)
+    with pytest.raises(ValueError, match=f"3 cells: about {seconds} s"):
+        fi.sweep(
+            plate, fi.Striker.rigid(0.1), law, at=(0.45, 0.3), speed=1.0, over={"mass": [0.1, 0.2, 0.3], **over},
+            max_cells=2,
+        )  # fmt: skip
 
 
 @pytest.mark.parametrize(
