@@ -23,7 +23,6 @@ from .target import FIRST_LOOK, Elements, Stages
 
 AUDIBLE = 20e3  # [Hz] the ear's limit: no mode above is asked for unless a band of the sound is
 MOST_RINGING = 400  # [-] modes for motion and sound if no band is asked for: ten seconds, a minute of a curved plate
-LONGEST = 100.0  # [-] undisturbed contacts: the cost of longer blows on an infinite plate is told too low
 SEVERAL = 3  # [-] impacts at least of a striker at rest until echoes throw it off; 3 to 9 on steel sheets
 
 
@@ -158,13 +157,15 @@ def _length_foreseen(asked: Asked) -> tuple[float, int, bool]:
         with build.uncompiled():
             hit = collision.strike(
                 endless, striker, asked.blow.contact, at=at, speed=asked.values["speed"], tolerance=audit.ROUGH,
-                duration=LONGEST * asked.duration,
+                duration=100.0 * asked.duration,  # the cost of longer blows is told too low
             )  # fmt: skip
-    except check.SimulationError:  # it rattles, and not even two runs of this one agree
-        return LONGEST, SEVERAL, False
+    except check.SimulationError:
+        return 1.0, 1, False
     lasts, echo = max((touch.end for touch in hit.impacts), default=0.0) / asked.duration, echo / asked.duration
     if not asked.stopped(mobility):
         return lasts, hit.n_impacts, False
+    if mobility > seen.mobility:  # echoes find it pressing on an edge, which yields more and more
+        return max(echo, lasts), SEVERAL, True
     return max(1.0, echo), SEVERAL if echo > lasts else 1, True  # still pressing, it is thrown off for good
 
 

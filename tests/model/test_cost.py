@@ -103,16 +103,6 @@ def test_a_plan_of_bodies_pressed_together_counts_the_steps_that_they_may_take(m
     assert plan.but(striker_force=0.0).seconds < 0.3 * taken
 
 
-def test_a_plan_of_a_blow_of_which_no_two_rough_runs_agree_foresees_a_long_one(counted):
-    plastic = fi.Plate(fi.Material(E=2.2e9, nu=0.4, rho=1021.0), 3.5e-3)
-    body = fi.assemble(fi.mesh.rectangle(0.2945, 0.19), plastic, {"boundary": "hinged"})
-    stick, how = fi.Striker.stick(0.1, 10e3), {"at": (0.088, 0.057), "tolerance": 1e-2}
-    fi.plan(body, stick, fi.Contact.hertz(695e3, loss=0.3), speed=1.0, **how)
-    fi.plan(body, stick, fi.Contact.hertz(695e3, loss=0.3), speed=1e5, **how)  # rattles: took 636 vectors and more
-    (few, usual), (many, most) = counted
-    assert (len(few), len(many)) == (2, 3) and most > 500 > usual
-
-
 def sheet(length, width, at, speed, thickness=0.6e-3, radius=4.955e-3):
     """The plan for a ball, of 4 g, on a free sheet of steel, 0.6 mm thick, which stops it until echoes come back."""
     steel = fi.Material(E=210e9, nu=0.3, rho=7850.0)
@@ -133,12 +123,20 @@ def test_a_ball_that_a_sheet_stops_needs_vectors_until_the_echo_has_gone(size, a
     assert 84 <= plan.n_modes <= 0.7 * most  # begins with fewer, but not with an echo that only they make
 
 
-@pytest.mark.parametrize(("at", "vectors"), [((0.0, 0.0), 1240), ((0.0, 0.13), 834), ((0.13, 0.1), 231)])
+@pytest.mark.parametrize(
+    ("at", "vectors"),
+    [
+        ((0.0, 0.0), 1240),
+        ((0.0, 0.13), 834),
+        ((0.13, 0.1), 231),
+        ((0.0, 0.03), 452),
+    ],
+)
 def test_a_ball_that_only_the_edge_of_a_plate_stops_needs_vectors_for_the_echoes_of_the_others(at, vectors, counted):
     sheet(0.4, 0.3, at, 1.0, 3e-3, 0.01)
     unknowns, most = counted[0]
     assert len(unknowns) == (3 if 0.0 in at else 2)
-    assert vectors / 3.0 <= most <= 1.7 * vectors  # those of the runs are written down
+    assert vectors / 3.5 <= most <= 1.7 * vectors  # those of the runs are written down
 
 
 def test_a_plan_of_both_ways_counts_all_frequencies_that_echoes_may_ask_for(counted):
