@@ -158,16 +158,11 @@ class Asked:
     @property
     def pressed(self) -> float:
         """For how many undisturbed contacts forces press the bodies together, if they do and it is known; else 1."""
-        lasts, pushed = self.values["duration"], self.values["striker_force"] + self.values["target_force"] > 0.0
-        ends = not lasts or self.values.get("max_impacts")
-        return 1.0 if ends or not (pushed or self.blow.striker.returns) else max(1.0, lasts / self.duration)
-
-    def stopped(self, mobility: float) -> bool:
-        """Whether an infinite plate of a mobility [m/(N s)] stops the striker: damps its contact more than critically.
-
-        Only echoes then throw it off.
-        """
-        return self.duration <= 0.5 * np.pi * self.mass * mobility
+        end, force = self.values["duration"], self.values["striker_force"] + self.values["target_force"]
+        if not end or self.values.get("max_impacts") or not (force > 0.0 or self.blow.striker.returns):
+            return 1.0
+        flight = 2.0 * self.mass * self.values["speed"] / force if force > 0.0 else 0.0  # of the first rebound, at most
+        return max(1.0, (end - flight) / self.duration)
 
     @property
     def unfit(self) -> str:

@@ -9,7 +9,6 @@ from ..fe.assembly import BY_ELEMENT
 from ..fe.theory import Theory
 from ..impact import accuracy
 from ..impact.response import Response
-from ..mesh.meshes import Mesh
 from ..modes.modal import Modes, at_rest
 from ..modes.shapes import FieldShapes
 from . import cost, vectors
@@ -46,12 +45,12 @@ class Modal(Description):
         """The target with as many modes as the blow needs; finds the first ones, because they tell how many."""
         target, at, mass = asked.blow.target, asked.values["at"], asked.mass
         band, mesh = max((band for band in asked.quantities.values() if band), default=0.0), target.mesh
-        # ten times the first modes may crowd between one and two half waves across a strip: to find them takes minutes
-        strip = mesh is not None and mesh.dimension == 2 and mesh.perimeter**2 > CROWDED * mesh.area
-        if mesh is not None and strip and target.kind == "fe" and not asked.counted:
+        # ten times the first modes crowd between one and two half waves across a strip: to find them takes minutes
+        long = mesh is not None and mesh.dimension == 2 and mesh.perimeter**2 > CROWDED * mesh.area
+        if long and target.kind == "fe" and not asked.counted:
             least = max(band, accuracy.BAND * 0.5 / asked.duration)  # not its edges, and a third at least
             crowd = round(target.count_below(least / target.stretch) / 3.0)
-            _check_number(asked, mesh, least, crowd, band == least)
+            _check_number(asked, 2, least, crowd, band == least)
         with stages("modes"):
             first = asked.find(FIRST_LOOK, stages=stages) if first is None else first
         modes = target.finished(first)
@@ -69,7 +68,7 @@ class Modal(Description):
             limit = modes.frequencies[min(number, modes.n_modes) - 1] * beyond
         if target.modes is not None and number > target.modes.n_modes:
             number, limit = target.modes.n_modes, target.modes.frequencies[-1]
-        _check_number(asked, modes, limit, number, band > needed)
+        _check_number(asked, modes.dimension, limit, number, band > needed)
         left = accuracy.truncation_error(modes, at, limit, mass=mass, **asked.law)
         kept = f"the target keeps its modes up to {limit:.4g} Hz, about {number}; the others act as a spring"
         why = f"the contact lasts about {asked.duration:.3g} s"
@@ -165,7 +164,7 @@ def ringing_work(element: str, n_modes: int) -> cost.Work:
     return sum(_solved(rules, n_dofs, n_modes), cost.NOTHING)
 
 
-def _check_number(asked: Asked, body: Modes | Mesh, limit: float, number: int, banded: bool) -> None:
+def _check_number(asked: Asked, dimension: int, limit: float, number: int, banded: bool) -> None:
     """Raise an error if more modes are needed than allowed; ``banded`` is whether a band of the quantities needs them.
 
     The compliance of modes above a frequency f falls as f**-1 on plates and f**-1.5 on beams, and so does the linear
@@ -174,7 +173,7 @@ def _check_number(asked: Asked, body: Modes | Mesh, limit: float, number: int, b
     contact, most = asked.blow.contact, MOST_MODES[asked.blow.target.kind]
     if number <= most:
         return
-    lower = (most / number) ** (2.0 / body.dimension)  # of the highest frequency
+    lower = (most / number) ** (2.0 / dimension)  # of the highest frequency
     if "n_modes" in asked.pieces:
         advice = f"give n_modes of at most {most}"
     elif "max_frequency" in asked.pieces or banded:

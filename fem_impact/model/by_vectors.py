@@ -162,7 +162,7 @@ def _length_foreseen(asked: Asked) -> tuple[float, int, bool]:
     except check.SimulationError:
         return 1.0, 1, False
     lasts, echo = max((touch.end for touch in hit.impacts), default=0.0) / asked.duration, echo / asked.duration
-    if not asked.stopped(mobility):
+    if 0.5 * np.pi * asked.mass * mobility < asked.duration:  # damps the contact less than critically
         return lasts, hit.n_impacts, False
     if mobility > seen.mobility:  # echoes find it pressing on an edge, which yields more and more
         return max(echo, lasts), SEVERAL, True

@@ -324,17 +324,12 @@ class Target:
         section, low, number = self.section, float(modes.frequencies[-1]), float(modes.n_modes)
         if not low:  # a rigid body has no others
             return number
-        growth = limit / low
         if self.mesh is None or not isinstance(section, Plate):
-            return number * growth ** (0.5 * (2 if (body := self.modes or self.mesh) is None else body.dimension))
-        if section.tension:
-            middle = self.mesh.points[self.mesh.cells].mean(axis=1)
-            bending, inertia = float(section.stiffness(middle)[:, 0, 0].mean()), float(section.inertia(middle).mean())
-            far, near = (_squared_wave(bending, section.tension, inertia, frequency) for frequency in (limit, low))
-            growth = float(far / near)  # the number goes as the square of the wavenumber
-        law = number + self.count_below(limit / self.stretch) - self.count_below(low / self.stretch)
+            return number * (limit / low) ** (0.5 * modes.dimension)
+        near, far = (self.count_below(frequency / self.stretch) for frequency in (low, limit))
+        grown, law = number * (far / near if section.tension else limit / low), number + far - near
         # the largest of its wavenumbers is twice the mean across strong grain
-        return law if limit > low and not law / 3.0 <= number * growth <= 3.0 * law else number * growth
+        return law if limit > low and not law / 3.0 <= grown <= 3.0 * law else grown
 
     def assembled(self, stages: Stages, size: float | None = None) -> System:
         """The assembled body, with elements of the given size [m] or the mesh's own."""
