@@ -207,11 +207,13 @@ class Asked:
 
     def foretell(
         self, target: str, *, errors: Mapping[str, float], reasons: tuple[str, ...], notes: tuple[str, ...],
-        n_modes: int = 0, most: int = 0, steps: float | None = None, work: cost.Work = cost.NOTHING, **chosen: Any,
+        n_modes: int = 0, most: int = 0, lasts: float = 1.0, steps: float | None = None,
+        work: cost.Work = cost.NOTHING, **chosen: Any,
     ) -> Forecast:  # fmt: skip
         """The forecast for a target: adds striker modes and time steps, with their errors and cost.
 
-        The time steps may err by ``steps`` [-]; by default, half the budget. ``most`` modes may be kept in the end.
+        The time steps may err by ``steps`` [-]; by default, half the budget. ``most`` modes may be kept in the end. The
+        blow ``lasts`` so many undisturbed contacts.
         """
         kept, left = self.striker_modes(self.budget.margin)
         modes, steps = self.blow.striker.modes, steps or self.budget.half
@@ -224,15 +226,17 @@ class Asked:
         scheme, fixed = self.values.get("scheme") or usual, self.values["dt"]
         dt = fixed or self.duration / stepping.first_count(scheme, steps, self.quantities)
         until = "fixed by dt" if fixed else f"halved until two runs agree to {steps:.1e}"
-        lasts = self.values["duration"]
-        end = "until the bodies have parted for good" if lasts is None else f"for {lasts:g} s"
+        stop = self.values["duration"]
+        end = "until the bodies have parted for good" if stop is None else f"for {stop:g} s"
         count = alike = self.duration / dt
         if scheme == "collocation" and not fixed:  # its first step says little of those it takes in the end:
             alike = 10.0 * 300.0 * (1e-9 / steps) ** 0.2  # 300 at 1e-9, each ten times the work of another scheme's
         if self.blow.target.air:
             work = work + cost.in_air(n_modes)
-        if self.pressed > 1.0:  # for three descriptions, by two schemes, steps are halved up to eight times
-            alike = 3.0 * 2.0 / 20.0 * min(255.0 * alike * self.pressed, engine.MAX_STEPS)
+        # for three descriptions, by two schemes, steps are halved up to eight times, the more often the longer it lasts
+        lasts = max(lasts, self.pressed)
+        halved = min(min(255.0, lasts) * alike * lasts, engine.MAX_STEPS)
+        alike = max(alike, 3.0 * 2.0 / 20.0 * halved)
         work = work + cost.strikes(alike, max(n_modes, most) + kept)
         reasons = (*reasons, f"scheme {scheme}, steps of {dt:.3g} s ({count:.0f} per contact), {until}, {end}")
         rest: dict[str, Any] = {"element": None, "size": None, "n_dofs": 0, "max_frequency": None, **chosen}

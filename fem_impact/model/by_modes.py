@@ -3,6 +3,8 @@
 from dataclasses import dataclass, replace
 from typing import Any
 
+import numpy as np
+
 from .._base import check, progress
 from ..fe import plausible, refinement
 from ..fe.assembly import BY_ELEMENT
@@ -69,6 +71,10 @@ class Modal(Description):
         if target.modes is not None and number > target.modes.n_modes:
             number, limit = target.modes.n_modes, target.modes.frequencies[-1]
         _check_number(asked, modes.dimension, limit, number, band > needed)
+        # a heavy striker rattles as fast as the body's mass does, for half a period of its own on the body as a spring
+        point = modes.point("at", at)
+        spring = float(np.sum((modes.shapes.at(point)[0, modes.n_rigid :] / modes.omega[modes.n_rigid :]) ** 2))
+        lasts = np.pi * (mass * spring * (mass + modes.mass) / modes.mass) ** 0.5 / asked.duration
         left = accuracy.truncation_error(modes, at, limit, mass=mass, **asked.law)
         kept = f"the target keeps its modes up to {limit:.4g} Hz, about {number}; the others act as a spring"
         why = f"the contact lasts about {asked.duration:.3g} s"
@@ -78,7 +84,7 @@ class Modal(Description):
             kept += "; it stiffens as it stretches"
         forecast = asked.foretell(
             "modal", errors={"target modes left out": left}, reasons=(why, kept), mass=modes.mass, n_modes=number,
-            max_frequency=limit, first=first, element="closed form" if target.kind == "analytic" else None,
+            max_frequency=limit, first=first, element="closed form" if target.kind == "analytic" else None, lasts=lasts,
             notes=plausible.together(target.assumed, modes.notes, at_rest(modes, modes.point("at", at))),
         )  # fmt: skip
         if isinstance(first.shapes, FieldShapes):

@@ -165,7 +165,7 @@ def _length_foreseen(asked: Asked) -> tuple[float, int, bool]:
     if 0.5 * np.pi * asked.mass * mobility < asked.duration:  # damps the contact less than critically
         return lasts, hit.n_impacts, False
     if mobility > seen.mobility:  # echoes find it pressing on an edge, which yields more and more
-        return max(echo, lasts), SEVERAL, True
+        return max(echo, min(lasts, 5.0 * asked.mass * mobility / asked.duration)), SEVERAL, True
     return max(1.0, echo), SEVERAL if echo > lasts else 1, True  # still pressing, it is thrown off for good
 
 
