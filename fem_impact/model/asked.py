@@ -232,7 +232,7 @@ class Asked:
         if scheme == "collocation" and not fixed:  # its first step says little of those it takes in the end:
             alike = 10.0 * 300.0 * (1e-9 / steps) ** 0.2  # 300 at 1e-9, each ten times the work of another scheme's
         if self.blow.target.air:
-            work = work + cost.in_air(n_modes)
+            work = work + cost.Work(dense=1e-4 * n_modes**2)  # [s] 0.1 ms per mode squared
         # for three descriptions, by two schemes, steps are halved up to eight times, the more often the longer it lasts
         lasts = max(lasts, self.pressed)
         halved = min(min(255.0, lasts) * alike * lasts, engine.MAX_STEPS)

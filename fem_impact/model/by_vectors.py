@@ -164,8 +164,8 @@ def _length_foreseen(asked: Asked) -> tuple[float, int, bool]:
     lasts, echo = max((touch.end for touch in hit.impacts), default=0.0) / asked.duration, echo / asked.duration
     if 0.5 * np.pi * asked.mass * mobility < asked.duration:  # damps the contact less than critically
         return lasts, hit.n_impacts, False
-    if mobility > seen.mobility:  # echoes find it pressing on an edge, which yields more and more
-        return max(echo, min(lasts, 5.0 * asked.mass * mobility / asked.duration)), SEVERAL, True
+    if mobility > seen.mobility:  # echoes find it pressing on an edge, until 3e-4 of its speed are left
+        return max(echo, min(lasts, 8.0 * asked.mass * mobility / asked.duration)), SEVERAL, True
     return max(1.0, echo), SEVERAL if echo > lasts else 1, True  # still pressing, it is thrown off for good
 
 

@@ -95,11 +95,6 @@ def strikes(n_steps: float, n_modes: int) -> Work:
     return Work(steps=START + all_runs * (step + 3.3e-9 * n_modes), memory=2.1e8)  # the process with its libraries
 
 
-def in_air(n_modes: float) -> Work:
-    """Air around the modes of a plate: 0.1 ms per mode squared."""
-    return Work(dense=1e-4 * n_modes**2)
-
-
 def by_modes(n_dofs: float, n_modes: float) -> Work:
     """Modes on one mesh, their number checked; each takes four times the work of a Ritz vector."""
     return on_mesh(n_dofs, 4.0 * n_modes, n_modes)

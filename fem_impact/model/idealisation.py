@@ -131,11 +131,6 @@ class Surroundings:
             mesh.area + segments, float(length.sum()), float(away.min()), np.column_stack([away, length]), sectors
         )
 
-    def share(self, squared: float) -> float:
-        """Share [-] of a disk around the point, of a squared radius [m**2], that lies on the plate."""
-        area, angle = np.abs(self.sectors.T)
-        return float(np.sign(self.sectors[:, 0]) @ np.minimum(area, squared * angle)) / (2.0 * np.pi * squared)
-
     def local(self, reach: float, free: np.ndarray) -> tuple[float, float]:
         """Factor [-] of the mobility by edges within a squared ``reach`` [m**2], and the squared distance of others.
 
@@ -146,10 +141,10 @@ class Surroundings:
         near = self.edges[:, 0] ** 2 < reach
         if not near.any() or not np.repeat(free, 2)[near].all():
             return 1.0, self.clearance**2
-        share, distance = self.share(reach), reach
-        while self.share(distance) > 0.9 * share:
-            distance *= 1.1
-        return share**-1.2, distance
+        sign, (area, angle) = np.sign(self.sectors[:, 0]), np.abs(self.sectors.T)
+        disks = reach * 1.1 ** np.arange(200)  # [m**2] squared radii, up to far beyond the plate
+        share = np.minimum(area, disks[:, None] * angle) @ sign / (2.0 * np.pi * disks)  # [-] of each on the plate
+        return share[0] ** -1.2, disks[np.argmax(share <= 0.9 * share[0])]
 
     def mirrors(self, nearness: float) -> float:
         """Number of straight edges, at least 1, that reflect as much as all edges near the nearest one."""
