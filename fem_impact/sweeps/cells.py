@@ -75,8 +75,6 @@ def laid_out(
     found = {name: read_axis(name, values) if isinstance(values, Mapping) else values for name, values in over.items()}
     free = [name for name, values in found.items() if isinstance(values, partial)]
     if not free:
-        if cells is not None:
-            raise ValueError("cells must be left out, as every axis has its own number of values")
         return found, False
     names = {ALIASES.get(name, name): values for name, values in found.items()}
     powers = names.get("exponent", [contact.exponent])

@@ -148,7 +148,7 @@ def test_a_map_that_was_stopped_goes_on(tmp_path, monkeypatch):
 @pytest.mark.parametrize(
     ("wanted", "message"),
     [
-        ({"over": {"mass": [0.1, 0.2]}, "cells": None}, "refine must be left out: a map needs two axes"),
+        ({"over": {"mass": [0.1, 0.2]}}, "refine must be left out: a map needs two axes"),
         ({"layers": {"own": lambda hit: 1.0}}, "refine must be left out with layers of one's own"),
     ],
 )
