@@ -57,7 +57,7 @@ class Modal(Description):
             first = asked.find(FIRST_LOOK, stages=stages) if first is None else first
         modes = target.finished(first)
         with target.blame("strike"):
-            modes.point("at", at)
+            point = modes.point("at", at)
         needed = accuracy.cutoff_frequency(modes, at, mass=mass, tolerance=asked.budget.for_left_out, **asked.law)
         limit, number = max(needed, band), asked.pieces.get("n_modes")
         if number is None:
@@ -72,8 +72,7 @@ class Modal(Description):
             number, limit = target.modes.n_modes, target.modes.frequencies[-1]
         _check_number(asked, modes.dimension, limit, number, band > needed)
         # a heavy striker rattles as fast as the body's mass does, for half a period of its own on the body as a spring
-        point = modes.point("at", at)
-        spring = float(np.sum((modes.shapes.at(point)[0, modes.n_rigid :] / modes.omega[modes.n_rigid :]) ** 2))
+        spring = float(modes.modal_compliance(point)[0, 0])
         lasts = np.pi * (mass * spring * (mass + modes.mass) / modes.mass) ** 0.5 / asked.duration
         left = accuracy.truncation_error(modes, at, limit, mass=mass, **asked.law)
         kept = f"the target keeps its modes up to {limit:.4g} Hz, about {number}; the others act as a spring"
@@ -85,7 +84,7 @@ class Modal(Description):
         forecast = asked.foretell(
             "modal", errors={"target modes left out": left}, reasons=(why, kept), mass=modes.mass, n_modes=number,
             max_frequency=limit, first=first, element="closed form" if target.kind == "analytic" else None, lasts=lasts,
-            notes=plausible.together(target.assumed, modes.notes, at_rest(modes, modes.point("at", at))),
+            notes=plausible.together(target.assumed, modes.notes, at_rest(modes, point)),
         )  # fmt: skip
         if isinstance(first.shapes, FieldShapes):
             forecast = _with_mesh(asked, forecast, first.shapes, limit * first.frequencies[-1] / modes.frequencies[-1])

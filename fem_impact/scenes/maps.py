@@ -19,7 +19,7 @@ from ..model.target import Stages
 from ..show import export, figures, plots
 from ..sweeps import cases, grid
 from ..sweeps.borders import PREFIX, read_borders
-from ..sweeps.cells import ALIASES, ALONE, LAW, Case, laid_out, logarithmic
+from ..sweeps.cells import LAW, Case, computed_together, laid_out, logarithmic
 from .scene import Scene
 from .schema import Part
 from .whole import check_axes
@@ -91,8 +91,7 @@ def map_scene(
     grid.admit(
         math.prod(len(values) for values in over.values()), len(cases.LAYERS),
         wanted.pop("max_cells", grid.MOST_CELLS),
-        quick=not (law.lossy or law.special or stretches) and law.exponent >= 1.0
-        and not {"loss", *ALONE} & {ALIASES.get(name, name) for name in over},
+        quick=computed_together(law, over) and not (law.lossy or stretches or {"loss", "contact.loss"} & set(over)),
         tell=tell,
     )  # fmt: skip
     pieces = []

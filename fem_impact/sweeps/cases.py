@@ -17,7 +17,7 @@ from ..impact.distance import distance
 from ..impact.response import Response
 from ..modes.modal import Modes
 from . import batches
-from .cells import ALONE, FAMILY_AXES, LOSSY, Case, law_numbers
+from .cells import ALONE, FAMILY_AXES, LOSSY, Case, computed_together, law_numbers
 from .store import LARGEST_BLOCK, Texts, Watch, block_size, by_blocks, by_cluster
 
 LOG = logging.getLogger(__name__)
@@ -77,9 +77,8 @@ class Cases:
     @property
     def quick(self) -> bool:
         """Whether all cases are computed together, and none with loss, which takes longer."""
-        exponents = self.axes.get("exponent", [self.base.contact.exponent])
-        alone = self.lossy or self.special or self.extra or self.base.modes.stretches
-        return not alone and min(exponents) >= 1.0
+        alone = self.lossy or self.extra or self.base.modes.stretches
+        return computed_together(self.base.contact, self.axes) and not alone
 
     @property
     def layers(self) -> list[str]:

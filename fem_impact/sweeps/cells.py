@@ -76,16 +76,20 @@ def laid_out(
     free = [name for name, values in found.items() if isinstance(values, partial)]
     if not free:
         return found, False
-    names = {ALIASES.get(name, name): values for name, values in found.items()}
-    powers = names.get("exponent", [contact.exponent])
-    powers = powers(2) if isinstance(powers, partial) else powers
-    least = check.array("over['exponent']", powers, (None,)).min()
-    alone = alone or least < 1.0 or contact.special
-    side = SIDE[not (alone or ALONE & set(names))]
+    side = SIDE[computed_together(contact, found) and not alone]
     given = math.prod(len(np.atleast_1d(values)) for values in found.values() if not isinstance(values, partial))
     most = int((side**2 / given) ** (1.0 / len(free)))
     count = max(2, min(side, most)) if cells is None else check.count("cells", cells, low=2, high=MOST_VALUES)
     return {name: values(count) if name in free else values for name, values in found.items()}, True
+
+
+def computed_together(contact: Contact, axes: Mapping[str, Any]) -> bool:
+    """Whether the blows of a map with these axes are of power laws, which are computed many at once."""
+    axes = {ALIASES.get(name, name): values for name, values in axes.items()}
+    powers = axes.get("exponent", [contact.exponent])
+    powers = powers(2) if isinstance(powers, partial) else powers
+    least = check.array("over['exponent']", powers, (None,)).min()
+    return bool(least >= 1.0) and not (contact.special or ALONE & set(axes))
 
 
 def law_numbers(contact: Contact) -> dict[str, float]:
