@@ -23,7 +23,8 @@ def test_states_come_in_any_order_and_before_the_blow_is_refused():
 
 def test_motion_after_the_end_needs_no_replay():
     plate = fi.analytic.rectangle(1.55, 1.0, mass=0.2, first_frequency=100.0, n_modes=40, damping_ratio=0.01)
-    hit = fi.strike(plate, fi.Striker.rigid(0.02), fi.Contact.hertz(1e6), at=(0.465, 0.3), speed=1.0, tolerance=1e-3)
+    stick, law = fi.Striker.rigid(0.02), fi.Contact.hertz(1e6)
+    hit = fi.strike(plate, stick, law, at=(0.465, 0.3), speed=1.0, tolerance=1e-3, target_force=-20.0, duration=5e-3)
     history = hit.history
     times = np.linspace(0.0, 3.0 * history.end_time, 40)
     replayed = history.offset + history.states(times)[0] @ history.shape.T
