@@ -249,7 +249,23 @@ class History(check.Locked):
     def nearest_turn(self) -> float:
         """How near to zero an approach turns back, over the farthest it ever turns [-]; infinity where none does."""
         miss = -np.inf if self.miss is None else self.miss
-        return float(record.nearest_turn(self.steps, self.now, self.law, self.n_coefficients, miss))
+        near, far, row, i = record.nearest_turn(self.steps, self.now, self.law, self.n_coefficients, miss)
+        if row >= 0 and abs(near) < CLEAR * far:
+            near = max(0.0, self._turn_in(row, i) * (1.0 if self.pressed[row, i] else -1.0))
+        return abs(near) / far if far else np.inf
+
+    def _turn_in(self, row: int, i: int) -> float:
+        """Approach [m] from its dent at which contact i turns within a step, by the motion of the modes."""
+        part = np.linspace(0.0, 1.0, record.PEAK_LOOKS + 1)
+        times = self.steps[row, layout.START] + part * self.steps[row, layout.LENGTH]
+        q, p = self.states(times)
+        force, slope = self.force_of(np.full(len(part), row), i, part)
+        soft = self.law["compliance"][i] * self.pressed[row, i]
+        approach = self.offset[i] + q @ self.shape[i] - soft * force - self.surfaces(times[:1])[0][0, i]
+        rate = p @ self.shape[i] - soft * slope
+        bend = np.gradient(rate, times)
+        k = int((approach * np.sign(bend.sum())).argmin())
+        return float(approach[k] - (0.5 * rate[k] ** 2 / bend[k] if bend[k] else 0.0))
 
     def bridged(self, reach: float = 0.0) -> np.ndarray:
         """How long after the end all modes together may bring surfaces within ``reach`` [m] of each other [s].

@@ -566,5 +566,30 @@ def test_the_margin_is_how_far_the_blow_is_from_another_number_of_impacts(tolera
     for offset in (-1e-2, -1e-3, -1e-4, -1e-5, -1e-6, 1e-6, 1e-5, 1e-4, 1e-3, 1e-2):
         hit = fi.strike(body, fi.Striker.rigid(0.1), fi.Contact.linear(THRESHOLD * (1.0 + offset)), **blow)
         assert hit.n_impacts == 1 + (offset > 0.0) and hit.tolerance_met
-        # 0.2171 by all runs at 1e-9; a count is trusted from four times the change of the margin on
-        assert_allclose(hit.margin / abs(offset), 0.2171, rtol=0.25)
+        # 0.2171 by all runs at 1e-9; a count is trusted from four times the change of the margin on, which beside a
+        # graze is its error: at most a third of the true one
+        assert_allclose(hit.margin / abs(offset), 0.2171, rtol=0.34)
+
+
+@pytest.mark.parametrize("tolerance", [1e-1, 1e-3])
+def test_a_plate_that_draws_back_within_a_long_step_is_seen_to_let_go(tolerance):
+    """By 3e-5 of the deepest approach; the cubics of two runs in long steps found it still pressed, by 2e-5 alike."""
+    a, b, at = 0.9181845538157066, 0.9929829939977284, (0.4672426619581453, 0.65583208560573)
+    body = fi.analytic.rectangle(a, b, mass=0.2, first_frequency=100.0, n_modes=300)
+    contact, striker = fi.Contact.linear(48727.50908465075), fi.Striker.rigid(0.04059788300022548)
+    hit = fi.strike(body, striker, contact, at=at, speed=1.0, residual=False, tolerance=tolerance)
+    assert hit.n_impacts == 3
+    assert hit.contact_time == pytest.approx(7.077236824e-3, rel=tolerance)  # by `references_blows.on_modes`, to 1e-9
+    assert hit.margin == pytest.approx(3.02e-5, rel=0.1)  # in steps of 1e-7 and by collocation
+
+
+@pytest.mark.filterwarnings("ignore::fem_impact.ToleranceWarning")
+def test_a_contact_opens_where_its_approach_is_zero_to_rounding():
+    """The sum of 120 modes leaves some 1e-15 of it, which was taken for an approach that jumps and passed unseen."""
+    body = fi.analytic.rectangle(
+        1.0, 0.9262769881712828, mass=0.2, first_frequency=100.0, n_modes=120, damping_ratio=0.005
+    )
+    contact = fi.Contact.power(99820817.88136457, 1.3850290691554472, loss=0.1147016298315494)
+    how = {"at": (0.344284067650647, 0.3091784183152457), "speed": 1.0, "residual": False}
+    hit = fi.strike(body, fi.Striker.rigid(0.15476417758359304), contact, dt=1.300492801450553e-06, **how)
+    assert hit.n_impacts == 4 and not hit.history.n_blind  # as by `references_blows.on_modes`

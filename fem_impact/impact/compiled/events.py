@@ -22,6 +22,7 @@ from .layout import (  # isort: skip
 )  # fmt: skip
 
 LOCATED = 1e-11  # [-] of the approach about an event: a stored energy of 1e-22 of the step's is left out there
+SUMMED = 500.0  # [-] over the rounding of an approach: what a sum of a few thousand modes leaves of one that is zero
 LET_GO = 1e-7  # [-] of the force's factor 1 + loss * rate: about zero up to this
 # kinds of corners: it lets go or pushes again by its rate, the bend, the turn, it parts from its felt or meets it, and
 # meets it again at once, so that the step is to be taken pressed

@@ -20,7 +20,7 @@ from .record import EXHAUSTED, FULL, HORIZON, IMPACTS, total_energy
 from .rounding import ITERATIONS, NEAR
 
 from .events import (  # isort: skip
-    AGAIN, EVENT_LIMIT, LETS_GO, LOCATED, PARTS, enclose, first_corner, first_crossing, narrow, nearer,
+    AGAIN, EVENT_LIMIT, LETS_GO, LOCATED, PARTS, SUMMED, enclose, first_corner, first_crossing, narrow, nearer,
 )  # fmt: skip
 from .layout import (  # isort: skip
     APPROACH, BEGUN, BLINDS, CLOCKS, CONTACT_ROWS, CORNERED, COUNTERS, EVENTS, FAINT, FALLBACKS, FLYING, FRESH, HEAD,
@@ -213,7 +213,8 @@ def locate_event(bodies, contacts, course, limits, h, cornered, lossy):
         if guess != 0.0 and count[TRIES] < ITERATIONS:
             count[SEEKS] = sought
             return TRY, guess
-        if sought == CROSSING and not abs(contacts.end[count[TARGET]]) <= max(limits.depth, NEAR * bracket[SIZE]):
+        known = max(SUMMED * limits.depth, NEAR * bracket[SIZE])
+        if sought == CROSSING and not abs(contacts.end[count[TARGET]]) <= known:
             answer = LOST  # but a corner before it may be found
     if sought != CORNER and cornered:
         count[CORNERED], count[WHICH], guess = first_corner(contacts, h, limits.depth, lossy, bracket)

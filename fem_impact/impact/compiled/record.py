@@ -126,13 +126,15 @@ def pushing(steps, now, law, n_coefficients, row, i):
 
 @outer()
 def nearest_turn(steps, now, law, n_coefficients, miss):
-    """How near to zero an approach turns back, over the farthest it ever turns; infinity where none does.
+    """Approach, by the cubic from the dent, that turns back nearest to zero, the farthest, and the nearest's place.
 
-    Of felt it counts from where its force ends. ``miss`` is the approach where it turned in flight, -infinity if it did
-    not.
+    The place is its step and its contact; of felt, where it counts from where the force ends, and of ``miss``, the
+    approach where it turned in flight or -infinity, the step is -1. The farthest is zero where none turns.
     """
-    nearest = -miss
+    nearest = miss
     farthest = 0.0
+    where = -1
+    which = 0
     for i in range(now.shape[1]):
         felt = relaxes(law, i)
         for row in range(steps.shape[0]):
@@ -149,8 +151,10 @@ def nearest_turn(steps, now, law, n_coefficients, miss):
                 d1, v1 = above_felt(law, i, d1, v1, z1, z0 < 0.0)
                 turns = v0 < 0.0 < v1 or v1 < 0.0 < v0
             if turns:
-                nearest = min(nearest, abs(turning(d0, h * v0, d1, h * v1)[1]))
-    return nearest / farthest if farthest > 0.0 else np.inf
+                turn = turning(d0, h * v0, d1, h * v1)[1]
+                if abs(turn) < abs(nearest):
+                    nearest, where, which = turn, -1 if felt else row, i
+    return nearest, farthest, where, which
 
 
 @inner()
