@@ -15,6 +15,7 @@ from ..fe.system import System
 from ..fe.variation import SectionChange, frequency_densities
 from .pitches import CENTS
 
+FINER = 3  # [-] odd: points to look at how deep dishes are together, for each place; a choice: within 4 % on plates
 PER_CENT = CENTS / np.log(2.0)  # [-] fact: cents of a relative change
 
 
@@ -145,18 +146,25 @@ class Places:
     middles: np.ndarray  # (n, dimension) [m]
     owners: np.ndarray  # (n,) number of the place that each belongs to
     radius: float  # [m]
+    between: np.ndarray  # (n_between, dimension) [m] a finer lattice, of the half that is mirrored
+    gap: float  # [m] farthest that a point lies from this lattice
 
     @classmethod
     def over(cls, system: System, radius: float, axes: str) -> "Places":
         """Those over the whole body, so close that a dish between two does no more than both."""
         low, size = system.mesh.points.min(axis=0), np.ptp(system.mesh.points, axis=0)
-        lines = [a + s * np.linspace(0.0, 1.0, 1 + max(2, round(s / (0.5 * radius)))) for a, s in zip(low, size)]
+        counts = [FINER * max(2, round(s / (0.5 * radius))) for s in size]
+        lines = [a + s * np.linspace(0.0, 1.0, 1 + count) for a, s, count in zip(low, size, counts)]
         for k in map("xy".index, axes):
-            lines[k] = lines[k][lines[k] <= low[k] + (0.5 + SAME) * size[k]]
-        middles = np.stack(np.meshgrid(*lines, indexing="ij"), axis=-1).reshape(-1, len(low))
+            lines[k] = lines[k][: 1 + (1 + counts[k]) // 2]
+        between, middles = (
+            np.stack(np.meshgrid(*(line[::step] for line in lines), indexing="ij"), axis=-1).reshape(-1, len(low))
+            for step in (1, FINER)
+        )
         groups = [images(middle, axes, system) for middle in middles]
         groups = [each for each in groups if system.contains(each).all()]
-        return cls(np.concatenate(groups), np.repeat(np.arange(len(groups)), [len(each) for each in groups]), radius)
+        owners = np.repeat(np.arange(len(groups)), [len(each) for each in groups])
+        return cls(np.concatenate(groups), owners, radius, between, float(np.linalg.norm(0.5 * size / counts)))
 
     @property
     def first(self) -> np.ndarray:
@@ -171,8 +179,8 @@ class Places:
     def some(self, keep: np.ndarray) -> "Places":
         """Only those places whose numbers are in ``keep``, in that order."""
         found = [np.flatnonzero(self.owners == k) for k in keep]
-        order = np.concatenate(found)
-        return Places(self.middles[order], np.repeat(np.arange(len(keep)), list(map(len, found))), self.radius)
+        owners = np.repeat(np.arange(len(keep)), list(map(len, found)))
+        return replace(self, middles=self.middles[np.concatenate(found)], owners=owners)
 
     def summed(self, values: np.ndarray) -> np.ndarray:
         """Sums (n_places, ...) over the images of values (n, ...)."""
@@ -182,5 +190,10 @@ class Places:
 
     @property
     def overlaps(self) -> np.ndarray:
-        """Depth at the first middle of each place by a dish of depth 1 at each, (n_places, n_places) [-]."""
-        return self.summed(bell(((self.middles[:, None] - self.first) ** 2).sum(axis=2) / self.radius**2)).T
+        """Greatest depth about each point of `between` by a dish of depth 1 at each place, (n_between, n_places) [-].
+
+        Where dishes are deepest together, their slopes cancel: at a distance from there, they are less by `bell` at
+        most.
+        """
+        found = self.summed(bell(((self.middles[:, None] - self.between) ** 2).sum(axis=2) / self.radius**2)).T
+        return found / bell(np.square(self.gap / self.radius))

@@ -230,11 +230,17 @@ def _cheapest(
     n, rows = len(share), len(now)
     beyond = -np.eye(rows)
     held = slopes @ share - now
-    nothing = np.zeros((n, rows))
-    matrix = np.block([[slopes, beyond], [-slopes, beyond], [overlaps, nothing], [overlaps, nothing]])
-    limits = np.concatenate([room + held, room - held, np.ones(n), overlaps @ share + trust])
+    limits = np.minimum(1.0, overlaps @ share + trust)
     bounds = [(max(0.0, s - trust), min(1.0, s + trust)) for s in share] + [(0.0, None)] * rows
-    found = linprog(np.append(cost, np.full(rows, PENALTY)), matrix, limits, bounds=bounds, method="highs")
-    if found.x is None:
-        raise SimulationError(f"the linear program of a step failed: {found.message}")
-    return np.clip(np.asarray(found.x[:n]), 0.0, 1.0)
+    close = np.zeros(len(limits), bool)  # few limits matter
+    while True:
+        matrix = np.block([[slopes, beyond], [-slopes, beyond], [overlaps[close], np.zeros((close.sum(), rows))]])
+        sides = np.concatenate([room + held, room - held, limits[close]])
+        found = linprog(np.append(cost, np.full(rows, PENALTY)), matrix, sides, bounds=bounds, method="highs")
+        if found.x is None:
+            raise SimulationError(f"the linear program of a step failed: {found.message}")
+        best = np.clip(np.asarray(found.x[:n]), 0.0, 1.0)
+        passed = (overlaps @ best > limits + 1e-6) & ~close
+        if not passed.any():
+            return best
+        close |= passed

@@ -157,9 +157,10 @@ class Tuning(check.Brief):
             doubt = max(each.error_after for each in self.tones)
             return f"tuned: every pitch within {self.tolerance:g} cents; frequencies are known to {doubt:.2g} cents"
         return (
-            f"tuning MISSED: mode {worst.pitch.mode} stays {worst.left:+.3g} cents from {worst.pitch.words}, as far as "
-            f"{len(self.patches)} patches of {1e3 * self.radius:.3g} mm radius and at most {1e3 * self.depth:.3g} mm "
-            "depth reach; allow more depth or patches, another radius, or want less"
+            f"tuning MISSED: mode {worst.pitch.mode} stays {worst.left:+.3g} cents from {worst.pitch.words}, the best "
+            f"that a search from the body as it stands found with {len(self.patches)} patches of "
+            f"{1e3 * self.radius:.3g} mm radius and at most {1e3 * self.depth:.3g} mm depth; allow more depth or "
+            "patches, another radius, or want less"
         )
 
     def summary(self) -> str:
@@ -270,8 +271,9 @@ def tune(
     radius = 0.12 * size if radius is None else check.between("radius", radius, size / 15, size, "m")
     # what is left by default is still about the same body
     depth = 0.2 * before.thinnest if depth is None else check.positive("depth", depth, "m")
-    if depth >= before.thinnest:
-        raise ValueError(f"depth must be less than the thickness, {before.thinnest:g} m, got {depth:g} m")
+    whole, most = ("radius", 0.5) if getattr(target.section, "round", False) else ("thickness", 1.0)
+    if depth >= most * before.thinnest:
+        raise ValueError(f"depth must be less than the {whole}, {most * before.thinnest:g} m, got {depth:g} m")
     search = Thinning(start, before, depth, radius, mirror or "", tolerance)
     found = search.choose_places(check.count("patches", patches, high=100))
     made = _finish(start, search, found)
@@ -306,7 +308,7 @@ def _finish(body: Blank, search: Thinning, found: Sequence[tuple[np.ndarray, flo
         sides = [(float(each.frequencies[place]), float(each.errors[place])) for each in (before, last)]
         goal = body.wanted(before.frequencies, last.frequencies, pitch)
         tones.append(Tone(pitch, sides[0][0], sides[1][0], goal, sides[0][1], sides[1][1]))
-    volume = sum(deep * slopes.of_dishes(middles, search.radius)[1].sum() for middles, deep in found)
+    volume = (before.system.mass - last.system.mass) / before.system.section.material.rho
     return Tuning(
         tuple(tones), tuple(told), search.tolerance, search.depth, search.radius, search.mirror,
         search.n_solved + len(told), float(volume), before, last, body,

@@ -71,10 +71,32 @@ def test_what_cannot_be_reached_is_said():
     assert found.tones[0].left > found.tones[0].off  # as far as it goes
 
 
+def test_no_place_is_deeper_than_allowed_where_dishes_overlap():
+    found = fi.tune(
+        fi.assemble(LINE, BAR, {"right": "hinged"}), {3: "-28 cents", 4: "-52 cents"}, mirror="x", depth=4e-4
+    )
+    places = [(patch.at, patch.depth) for patch in found.patches]
+    deepest = Dishes.of_places(places, found.radius).depth(np.linspace(0.0, 0.35, 5001)[:, None]).max()
+    assert len(places) > 2 and 0.95 * found.depth < deepest <= found.depth  # 1.12 where only middles were bound
+
+
+def test_a_round_bar_is_turned_down_by_rings():
+    """Less is taken off than the girth times the depth, which only holds of shallow grooves."""
+    found = fi.tune(fi.assemble(LINE, fi.Beam.circular(WOOD, diameter=0.012)), {1: "-200 cents"})
+    x = np.linspace(0.0, 0.35, 5001)
+    deep = Dishes.of_places([(each.at, each.depth) for each in found.patches], found.radius).depth(x[:, None])
+    assert_allclose(found.volume, np.trapezoid(np.pi * deep * (0.012 - deep), x), rtol=1e-6)
+
+
 @pytest.mark.parametrize(
     "body, how, words",
     [
         (ON_LINE, {"depth": 0.02}, r"depth must be less than the thickness, 0\.012 m, got 0\.02 m"),
+        (
+            fi.assemble(LINE, fi.Beam.circular(WOOD, diameter=0.012)),
+            {"depth": 0.006},
+            r"depth must be less than the radius, 0\.006 m, got 0\.006 m",
+        ),
         (ON_LINE, {"mirror": "y"}, "mirror must be one of x, got 'y'"),
         (ON_LINE, {"radius": 1e-3}, r"radius must lie between 0\.0233333 and 0\.35 m"),
         ("studies/scenes/heavy_plate.toml", {}, r"\[target\] must not state mass, .*; leave them out"),
