@@ -73,6 +73,19 @@ def test_where_a_double_hit_cannot_be_avoided_it_is_said_and_drawn(tmp_path):
     assert float(rows[0]["resolution [Hz]"]) == pytest.approx(2.0)
 
 
+def test_a_double_hit_that_more_modes_do_not_have_is_none():
+    """A hard tip beside the edge: with the modes given it hits twice, with all of them once."""
+    kit, at = {"hard": (0.091, {"steel": 5.2e6})}, (0.21, 0.408)
+    told = {}
+    for n_modes in (400, 4000):
+        plate = fi.analytic.rectangle(
+            0.6285, 0.4411, mass=1.94, first_frequency=25.7, n_modes=n_modes, damping_ratio=2e-3
+        )
+        told[n_modes] = fi.plan_test(plate, kit, [at], 456.0, drop=20.0)
+    assert told[4000].n_impacts == [[1]]
+    assert told[400].n_impacts == [[0]] and told[400].verdicts == (roving.UNKNOWN,)
+
+
 def test_a_hammer_of_a_mass_gets_tips_from_the_softest_that_reaches_the_band_on_a_wall():
     found = fi.plan_test(fi.Modes.rigid(1e3), [0.1], [()], 500.0, duration=0.2)
     assert (found.n_impacts == 1).all() and found.verdicts == ("works",)
