@@ -292,7 +292,8 @@ def read_taps(
         A force that reaches this is cut off.
     pulse : float [N], optional
         A rise of the force above this counts as a pulse; by default one above 6 standard deviations of the noise and
-        twice the largest pull: contacts never pull, so that a negative force shows how far sensor and filter ring.
+        twice the largest pull: contacts never pull, so that a negative force shows how far sensor and filter ring. What
+        is left of a drift is added to it.
 
     Returns
     -------

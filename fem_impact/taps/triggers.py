@@ -15,6 +15,7 @@ PULSE = 0.1
 # [-] standard deviations of the noise: the same, if they are larger, and those of its mean that an offset exceeds; two
 # fewer, as a pulse or a tap is already sure
 CLEAR = 6.0
+SLOW = 20  # [-] widths of a tap's largest pulse over which a force that stays up is drift; test_other_records.py
 CLIPPED = 3  # [-] equal largest samples in a row that count as clipped: two may be equal by chance
 LONGEST = 10.0  # [s] longest record of one tap: lines 0.1 Hz apart
 EDGE = 0.3  # [-] of a tap's largest force, at the ends of its record: filters leave less
@@ -84,8 +85,8 @@ def most_whole(rooms: np.ndarray, needs: np.ndarray) -> tuple[int, int]:
 def pulses(force: np.ndarray, noise: float = 0.0, least: float | None = None) -> list[tuple[int, int]]:
     """First sample of every pulse of a tap (n_times,), and the one after its last; two of a double hit.
 
-    A pulse rises above ``least`` [N]; by default above the noise, of standard deviation ``noise`` [N], and above what
-    sensor and filter ring: contacts never pull, so that a negative force measures it.
+    A pulse rises above ``least`` [N]; by default above the noise, of standard deviation ``noise`` [N], above what
+    sensor and filter ring: contacts never pull, so that a negative force measures it, and above the largest drift.
     """
     peak = float(force.max(initial=0.0))
     if peak <= 0.0:
@@ -95,6 +96,9 @@ def pulses(force: np.ndarray, noise: float = 0.0, least: float | None = None) ->
         # noise alone pulls 4.5 deviations in a hundred thousand samples; ringing that decays pushes less than twice
         # what it pulled before
         least = max(CLEAR * max(noise, bit), 2.0 * ringing if ringing > 4.5 * noise else 0.0, SAME * peak)
+        block = SLOW * int(np.count_nonzero(force > 0.5 * peak))
+        parts = force[: len(force) // block * block].reshape(-1, block)
+        least += float(np.quantile(parts, 0.25, axis=1).max(initial=0.0))  # no pulses fill three quarters of a part
     up = min(least, 0.5 * peak)  # a tap in strong noise has a pulse, too
     edges = np.flatnonzero(np.diff(np.concatenate([[0], force > 0.5 * up, [0]]).astype(int)))
     tops = np.maximum.reduceat(np.append(force, 0.0), edges)[::2]

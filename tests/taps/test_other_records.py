@@ -71,6 +71,19 @@ def test_drift_and_offset_beyond_the_trigger_make_no_taps(force, read):
     assert said(taps, "drift of the force was removed") and len(plain.notes) == 1
 
 
+@pytest.mark.parametrize("second", [0.0, 0.05])
+def test_drift_that_bends_makes_no_pulses(second, read):
+    """Two newtons of it, smooth beside its noise, look like pushes; a second pulse above it is still seen."""
+    time = np.arange(100_000) / RATE
+    force = 2.0 * np.sin(2.0 * np.pi * 0.5 * time) + 3e-3 * np.random.default_rng(1).standard_normal(len(time))
+    for start, size in ((0.3, 1.0), (0.303, second), (2.1, 1.0), (2.103, second)):
+        wave = (time - start) / 1e-3
+        force += 100.0 * size * np.where((wave > 0.0) & (wave < 1.0), np.sin(np.pi * wave), 0.0)
+    found = read(force)
+    assert found.n_pulses.tolist() == [2 if second else 1] * 2
+    np.testing.assert_allclose(found.impulse, 0.2 / np.pi * (1.0 + second), rtol=5e-3)
+
+
 def test_a_tap_that_a_record_begins_with_does_not_cost_the_others_their_rest(force, read):
     taps = read(force[first_above(force, 0) :])
     assert taps.labels == ("tap 2", "tap 3", "tap 4", "tap 5") and taps.onset[0] > 0.01
