@@ -7,6 +7,7 @@ import pytest
 import xarray as xr
 
 import fem_impact as fi
+from fem_impact.modes import picked
 
 POINTS = np.array([[0.1, 0.09], [0.2, 0.1], [0.3, 0.2], [0.37, 0.11]])  # m
 FREQUENCY = np.arange(0.0, 600.0, 1.0)  # Hz
@@ -146,3 +147,22 @@ def test_noise_where_the_hammer_has_little_force_makes_no_modes():
         given = xr.Dataset({"H": (("frequency", "channel"), rough)}, known)
         counts.append(len(fi.Modes.from_frf(given, mass=1.0, points=place, driving="a").omega))
     assert counts == [2, 2, 2]
+
+
+def test_noise_widens_no_peaks_and_standard_errors_hold_at_one_sigma():
+    """Weights by the noise of each line flattened peaks: damping was 10 % too large, and half of it beyond an error."""
+    rng, rate, n = np.random.default_rng(3), 4096.0, 4096
+    omega, damping = 2.0 * np.pi * np.array([200.0, 380.0, 700.0]), np.array([0.02, 0.015, 0.01])
+    s = 2j * np.pi * np.fft.rfftfreq(n, 1.0 / rate)[:, None]
+    H = (s**2 / (s**2 + 2.0 * damping * omega * s + omega**2)) @ [[1.0], [0.6], [0.9]]
+    pulse = 50.0 * np.sin(np.pi * np.clip((np.arange(n) - 40) / 5.0, 0.0, 1.0))
+    clean = np.fft.irfft(np.fft.rfft(pulse) * H[:, 0], n)
+    found = []
+    for _ in range(40):
+        noise = 0.3 * clean.max() * rng.standard_normal((4, n))
+        taps = fi.Taps.from_arrays(np.tile(pulse, (4, 1)), clean + noise, rate=rate)
+        found.append(picked.pick("frf", fi.frf(taps), omega / (2.0 * np.pi)))
+    ratio = np.array([one.damping_ratio / damping for one in found])
+    assert np.median(ratio) == pytest.approx(1.0, abs=0.03)  # 0.01 of luck; it was 1.1
+    errors = np.array([one.damping_errors for one in found]) / damping
+    assert np.mean(np.abs(ratio - 1.0) < errors) == pytest.approx(0.68, abs=0.09)  # two sigma of 120
