@@ -235,6 +235,16 @@ class Target:
         assert self.mesh is not None
         return self.wave(frequency) ** 2 * self.mesh.area / (4.0 * np.pi)
 
+    def frequency_below(self, count: float) -> float:
+        """Frequency [Hz], before scaling, below which the plate has about so many modes; see `count_below`."""
+        section, mesh = self.section, self.mesh
+        assert isinstance(section, Plate) and mesh is not None
+        middle, squared = mesh.points[mesh.cells].mean(axis=1), 4.0 * np.pi * count / mesh.area
+        stiffness = section.stiffness(middle)
+        bending = np.minimum(stiffness[:, 0, 0], stiffness[:, 1, 1]) * squared**2
+        pull = bending + (section.tension or 0.0) * squared
+        return float((pull / section.inertia(middle)).min() ** 0.5 / (2.0 * np.pi))
+
     @cached_property
     def _known(self) -> Remembered:  # meshes and their unknowns: a plan counts those of two or three, its run uses them
         return Remembered(6)

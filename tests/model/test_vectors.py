@@ -107,6 +107,23 @@ def test_mesh_is_refined_when_it_errs_more_than_too_few_vectors_explain(truncati
     assert not finer or (seen.coarse is fine and seen.n_dofs > fine[0].system.n_dofs)
 
 
+def test_the_shift_follows_many_vectors_onto_a_finer_mesh(monkeypatch):
+    """They tell the same blow from there, and are made orthogonal to all earlier ones a quarter as often."""
+    seen, looks, clear = seen_at_a_point(), [], Krylov._cleared
+    seen.count, before = 400, seen.shift
+    assert seen.improved(Error(0.0, 1e-4, 2e-3), 1e-3)
+    assert seen.target.count_below(seen.shift / (2.0 * np.pi)) == pytest.approx(vectors.SPANNED * 400)
+    monkeypatch.setattr(Krylov, "_cleared", lambda *these: looks.append(1) or clear(*these))
+    numbers, krylovs = [], [Krylov(seen.fine[0].system, seen.at, shift) for shift in (before, seen.shift)]
+    for krylov in krylovs:
+        krylov.grow(400)
+        numbers.append(len(looks) - sum(numbers))
+    assert numbers[1] < 0.3 * numbers[0]
+    fewer = round(ritz.FEWER * 400)
+    true, *hits = (fi.strike(krylovs[i].pairs(n), BALL, WOODEN, **BLOW) for i, n in ((0, 400), (1, 400), (1, fewer)))
+    assert max(worst(hit, true) for hit in hits) < 0.1 * BLOW["tolerance"]
+
+
 def test_meshes_are_compared_with_all_vectors():
     """By the meshes with all vectors and with few, and of either by the numbers of vectors."""
     seen = seen_at_a_point()
