@@ -164,6 +164,12 @@ class Asked:
         flight = 2.0 * self.mass * self.values["speed"] / force if force > 0.0 else 0.0  # of the first rebound, at most
         return max(1.0, (end - flight) / self.duration)
 
+    def highest(self, mobility: float) -> float:
+        """Frequency [Hz] above which a plate of a mobility [m/(N s)] acts as a spring."""
+        density, resonance = 2.0 * mobility / np.pi, accuracy.contact_resonance(mass=self.mass, **self.law)
+        allowed, exponent = self.budget.for_left_out, self.blow.contact.exponent
+        return accuracy.cutoff(density, 0.0, 2.0 * np.pi * resonance, exponent, self.mass, allowed)
+
     @property
     def unfit(self) -> str:
         """Why the target cannot be treated as rigid or infinite without its modes, if it is not known."""

@@ -8,7 +8,6 @@ import numpy as np
 
 from .._base import check, progress
 from ..fe import plausible, refinement
-from ..impact import accuracy
 from ..impact.response import Response
 from ..modes.modal import Modes
 from . import cost, mixed, vectors
@@ -47,10 +46,7 @@ class Mixed(Description):
             why = asked.unfit if fits else "is only for thin plates in a vacuum, and for the blow alone"
             asked.refuse(why)
             return None
-        allowed, slow = asked.budget.for_left_out, asked.mass * seen.mobility
-        resonance = accuracy.contact_resonance(mass=asked.mass, **asked.law)  # [Hz]; of an infinite plate's modes:
-        density, omega_0 = 2.0 * seen.mobility / np.pi, 2.0 * np.pi * resonance
-        highest = accuracy.cutoff(density, 0.0, omega_0, blow.contact.exponent, asked.mass, allowed)
+        slow, highest = asked.mass * seen.mobility, asked.highest(seen.mobility)
         if not named and mixed.LASTING * slow > 1e4 * asked.duration:  # too many steps, some 24 for each contact time
             return None
         few = 0.5 * np.pi * slow < asked.duration or target.count_below(highest / target.stretch) < MANY_MODES
