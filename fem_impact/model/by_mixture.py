@@ -110,7 +110,9 @@ class Mixed(Description):
     def refined(self, hit: Response, stages: Stages) -> "Mixed | Vectors | None":
         """More vectors, a finer mesh or twice the frequency; vectors for all frequencies if they cost less."""
         asked, error, allowed, seen = self.asked, hit.error, self.asked.budget.half, self.seen
-        if seen is not None and seen.count < MOST:
+        # a higher frequency, which it may take, begins with vectors and a mesh of its own
+        simple = error.idealisation > max(allowed, error.truncation, error.mesh)
+        if seen is not None and seen.count < MOST and not simple:
             if error.truncation > 0.5 * allowed:
                 seen.count = min(MOST, 2 * seen.count)  # it lasts longer than expected
                 return self

@@ -1,13 +1,17 @@
 """Modes below a frequency, an infinite plate above: against all modes, in closed form and by finite elements."""
 
 import warnings
+from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
 import fem_impact as fi
+from fem_impact.impact.error import Error
 from fem_impact.model import mixed
+from fem_impact.model.target import Stages
 
 STEEL = fi.Material(E=210e9, nu=0.3, rho=7850.0)
 LENGTH, WIDTH, AT = 0.4, 0.3, (0.13, 0.11)
@@ -110,6 +114,21 @@ def test_what_it_does_not_know_is_refused(body, asked, words):
     target = fi.assemble(*body) if body else system(1e-3)
     with pytest.raises(ValueError, match=f"target = 'mixed' {words}; use target = 'modal'$"):
         fi.plan(target, BALL, HARD, speed=1.0, target="mixed", **asked)
+
+
+@pytest.mark.parametrize(("truncation", "more"), [(5e-3, False), (0.5, True)])
+def test_vectors_do_not_grow_where_a_higher_frequency_must_come_first(truncation, more):
+    """By which the plate is struck with vectors of its own: of a speed of 1e10 m/s, that took half of 20 s."""
+    blow = {"at": AT, "speed": 1.0, "tolerance": 1e-2}
+    described = fi.plan(system(0.5e-3), BALL, HARD, **blow).description
+    seen = SimpleNamespace(count=400, improved=lambda *_: False)
+    hit = SimpleNamespace(
+        error=Error(1e-5, truncation, 1e-3, idealisation=0.1), bodies=[SimpleNamespace(n_modes=100)],
+        history=SimpleNamespace(steps=np.zeros((10, 1))),
+    )  # fmt: skip
+    better = replace(described, seen=seen, compared=True).refined(hit, Stages())
+    assert seen.count == (800 if more else 400)
+    assert better.frequency == described.frequency * (1.0 if more else 2.0)
 
 
 @pytest.mark.slow
