@@ -25,6 +25,7 @@ from .target import FIRST_LOOK, Elements, Stages
 AUDIBLE = 20e3  # [Hz] the ear's limit: no mode above is asked for unless a band of the sound is
 MOST_RINGING = 400  # [-] modes for motion and sound if no band is asked for: ten seconds, a minute of a curved plate
 RESOLVING = 30  # [-] unknowns of the finest mesh for each vector of a heavy striker; 17 to 47 in effectivity.py
+STICKY = 5.0  # [-] loss factor times speed of a contact that hardly throws off by itself: from a wall, 0.2 of the speed
 LIGHT = 0.1  # [-] mass over that of the plate
 SEVERAL = 3  # [-] impacts at least of a striker at rest until echoes throw it off; 3 to 9 on steel sheets
 
@@ -182,14 +183,18 @@ def _roughly(asked: Asked, body: Any, most: float = np.inf, **how: Any) -> Respo
 
 
 def _rattling(asked: Asked, first: int) -> int:
-    """Number of vectors for a striker that an infinite plate stops, so that the edges throw it off; 0 for others.
+    """Number of vectors for a striker that an infinite plate or a loss stops, so that the edges throw it off; else 0.
 
     It takes 1.6 vectors for each mode up to the highest frequency that matters, or three for each period of that as
     long as it lasts. Errors grow 200-fold on the way at most, and fall with the third power of the number: six times
     the ``first``. Within a factor of two in 11 of 11 scenes of studies/verification/effectivity.py.
     """
-    target, seen, mass = asked.blow.target, asked.seen, asked.mass
-    if seen is None or not np.isfinite(seen.mobility) or 0.5 * np.pi * mass * seen.mobility < asked.duration:
+    target, seen, mass, contact = asked.blow.target, asked.seen, asked.mass, asked.blow.contact
+    lost = contact.loss * asked.values["speed"]
+    quicker = (1.0 + lost) ** (1.0 / (contact.exponent + 1.0))  # than without loss, as a stiffer contact
+    if seen is None or not np.isfinite(seen.mobility):
+        return 0
+    if lost < STICKY and 0.5 * np.pi * mass * seen.mobility * quicker < asked.duration:
         return 0
     # half a period of a heavy one on a hinged square as a spring; the first echo throws off a light one
     lasts = np.pi * seen.mobility * (0.74 * mass * seen.mass) ** 0.5 if mass > LIGHT * seen.mass else 0.0
@@ -199,7 +204,7 @@ def _rattling(asked: Asked, first: int) -> int:
             body = target.finished(target.closed(n_modes=FIRST_LOOK + round(heard)))
             hit = _roughly(asked, body, 1000.0, max_impacts=asked.values.get("max_impacts"))
             lasts = max((touch.end for touch in hit.impacts), default=lasts)
-    highest = asked.highest(seen.mobility)
+    highest = quicker * asked.highest(seen.mobility)
     needed = min(1.6 * target.count_below(highest / target.stretch), 3.0 * highest * lasts, 6.0 * first)
     return round(min(needed, vectors.MOST_VECTORS))
 

@@ -161,6 +161,16 @@ def test_a_striker_that_the_edges_throw_off_needs_vectors_for_all_modes_while_it
     assert vectors / 1.5 <= most <= 1.5 * vectors and unknowns / 1.5 <= found[0] <= 1.5 * unknowns
 
 
+@pytest.mark.parametrize(("loss", "vectors"), [(1.0, 85), (1e2, 1210), (1e4, 606)])
+def test_a_striker_that_a_lossy_contact_holds_needs_vectors_while_it_rattles(loss, vectors, counted):
+    """Of 30 g at 1 m/s; the vectors of the runs are written down, which begin with 85."""
+    wood = fi.Plate(fi.Material(E=10e9, nu=0.3, rho=450.0), 3e-3)
+    body = fi.assemble(fi.mesh.rectangle(0.465, 0.3), wood, {"boundary": "hinged"})
+    contact = fi.Contact.hertz(1e6, loss=loss)
+    fi.plan(body, fi.Striker.rigid(0.03), contact, at=(0.2, 0.11), speed=1.0, tolerance=1e-3)
+    assert vectors / 3.0 <= counted[0][1] <= 1.5 * vectors
+
+
 def test_a_plan_of_both_ways_counts_all_frequencies_that_echoes_may_ask_for(counted):
     plan = sheet(0.2, 0.15, (0.074, 0.0615), 1.0)
     assert plan.target == "mixed"
