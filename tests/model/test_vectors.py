@@ -108,7 +108,7 @@ def test_mesh_is_refined_when_it_errs_more_than_too_few_vectors_explain(truncati
 
 
 def test_the_shift_follows_many_vectors_onto_a_finer_mesh(monkeypatch):
-    """They tell the same blow from there, and are made orthogonal to all earlier ones a quarter as often."""
+    """They tell the same blow from there, and are made orthogonal to all earlier ones 0.4 times as often."""
     seen, looks, clear = seen_at_a_point(), [], Krylov._cleared
     seen.count, before = 400, seen.shift
     assert seen.improved(Error(0.0, 1e-4, 2e-3), 1e-3)
@@ -118,7 +118,7 @@ def test_the_shift_follows_many_vectors_onto_a_finer_mesh(monkeypatch):
     for krylov in krylovs:
         krylov.grow(400)
         numbers.append(len(looks) - sum(numbers))
-    assert numbers[1] < 0.3 * numbers[0]
+    assert numbers[1] < 0.4 * numbers[0]
     fewer = round(ritz.FEWER * 400)
     true, *hits = (fi.strike(krylovs[i].pairs(n), BALL, WOODEN, **BLOW) for i, n in ((0, 400), (1, 400), (1, fewer)))
     assert max(worst(hit, true) for hit in hits) < 0.1 * BLOW["tolerance"]
