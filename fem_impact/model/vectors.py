@@ -158,6 +158,7 @@ class Seen:
         self.whole: Modes | None = None  # all Ritz pairs of the last `needed_modes`
         self.tried: list[float] = []  # [-] truncation errors of the blows so far
         self.spent = False  # whether more vectors no longer help
+        self.unmended = np.inf  # [-] error of these meshes with fewer vectors
         self.elements, other = compared(target, elements, stages)
         if fixed and self.elements != elements:  # there are no larger elements to compare with
             self.elements, other = other, self.elements
@@ -201,6 +202,10 @@ class Seen:
             return False
         # the error of the mesh contains that of too few vectors: it is at fault if it is three times as large
         coarse = error.mesh > max(3.0 * error.truncation, 0.5 * allowed)
+        # or if more vectors did not mend it, and are nearly enough
+        lasting = error.mesh > max(0.7 * self.unmended, error.truncation, 0.5 * allowed)
+        coarse |= lasting and error.truncation < allowed
+        self.unmended = error.mesh
         if not self.spent and not coarse:
             self.tried += [error.truncation] * (self.count < MOST_VECTORS)
             # it is 1 until two descriptions agree on the impacts of the blow, which may take twice as many steps
@@ -217,7 +222,7 @@ class Seen:
         self.elements = finer(self.target, self.elements, self.stages)
         # many vectors reach as many modes from any lower shift, but rounding then grows a hundredfold with each vector
         self.shift = max(self.shift, 2.0 * np.pi * self.target.frequency_below(SPANNED * self.count))
-        self.fine, self.coarse = self._krylov(self.elements), self.fine
+        self.fine, self.coarse, self.unmended = self._krylov(self.elements), self.fine, np.inf
         return True
 
     def work(self, before: int) -> cost.Work:

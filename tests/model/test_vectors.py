@@ -107,6 +107,16 @@ def test_mesh_is_refined_when_it_errs_more_than_too_few_vectors_explain(truncati
     assert not finer or (seen.coarse is fine and seen.n_dofs > fine[0].system.n_dofs)
 
 
+@pytest.mark.parametrize(("mesh", "finer"), [(7e-4, True), (4.5e-4, False)])
+def test_mesh_is_refined_when_more_vectors_did_not_mend_its_error(mesh, finer):
+    seen = seen_at_a_point()
+    count, size = seen.count, seen.elements.size
+    assert seen.improved(Error(0.0, 5e-4, 8e-4), 1e-3) and seen.count > count  # what is too little may be either
+    count = seen.count
+    assert seen.improved(Error(0.0, 4.6e-4, mesh), 1e-3)
+    assert (seen.elements.size < size) == finer and (seen.count > count) != finer
+
+
 def test_the_shift_follows_many_vectors_onto_a_finer_mesh(monkeypatch):
     """They tell the same blow from there, and are made orthogonal to all earlier ones 0.4 times as often."""
     seen, looks, clear = seen_at_a_point(), [], Krylov._cleared
