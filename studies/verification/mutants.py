@@ -3,7 +3,7 @@
     python studies/verification/mutants.py                    what was found so far
     python studies/verification/mutants.py --run 200          examine so many random lines that are not yet known
     python studies/verification/mutants.py --run 40 fe taps   of these packages or modules
-    python studies/verification/mutants.py --again            examine those that survived once more
+    python studies/verification/mutants.py --again            once more those that survived or whose test is gone
 
 Each mutant changes one expression of one line: a sign, an operator, a comparison, a number, `and` for `or`, `min` for
 `max`. They are drawn with a fixed seed from all functions of the packages in NUMERICS, without messages and logs. The
@@ -11,9 +11,10 @@ tests run are fast ones: those of the module, those that name it, and those of t
 order. Kernels are run as plain Python by those of their tests that are quick there and call the changed function, and
 are compiled only if none of these fails. `mutants.csv` keeps
 
-holder   the first test that failed when the mutant was first examined: it fails with the mutant, and not without. A
-         test that does not end is a failure, too, if without the mutant it ends in a quarter of the time. "none of the
-         quick": a kernel that was not compiled, as a test was written for it at once, or as nothing can notice it
+holder   the first test that failed when the mutant was first examined, or since that test is gone: it fails with the
+         mutant, and not without. A test that does not end is a failure, too, if without the mutant it ends in a quarter
+         of the time. "none of the quick": a kernel that was not compiled, as a test was written for it at once, or as
+         nothing can notice it
 since    the test, written since, that notices what no test noticed at first; or that the line is gone, as
          nothing needed it or another has its place
 reason   why a mutant that no test can notice changes no result: written by hand
@@ -42,7 +43,7 @@ NUMERICS = ("fe", "modes", "impact", "model", "sweeps", "taps", "designs")
 SEED = 27
 FILES = 9  # [-] test files run for a mutant at most, to limit the work
 # for any kernel
-BLOWS = "kernels", "schemes", "contact_cases", "collision", "history", "lossy_contacts", "flight", "gradient"
+BLOWS = "kernels", "contact_cases", "collision", "history", "lossy_contacts", "flight", "gradient"
 QUICK = 0.7  # [s] of CPU for a test of kernels as plain Python: the compiler takes twenty times as long
 MOST = 150  # [-] such tests run for a mutant, the quickest first, to limit the work
 REACH = ROOT / "out" / "kernel_tests.json"  # what `quick` found; remove it where tests have changed
@@ -271,7 +272,7 @@ def holder(place: Place, sound: dict[str, bool]) -> str:
 
 
 def run(number: int, asked: list[str], again: bool) -> None:
-    """Examine mutants that are not yet known, one by one; or those that survived, once more."""
+    """Examine mutants that are not yet known, one by one; or those that survived or whose test is gone, once more."""
     os.environ["OMP_NUM_THREADS"] = "1"
     os.nice(max(0, 10 - os.nice(0)))
     sys.path[:0] = [str(ROOT), str(ROOT / "tests")]
@@ -284,28 +285,32 @@ def run(number: int, asked: list[str], again: bool) -> None:
     sound: dict[str, bool] = {}
     known, present = recorded(), drawn(asked)
     if again:
-        chosen = [place for place, row in known.items() if alive(row)]
+        chosen = [place for place, row in known.items() if alive(row) or orphaned(row)]
     else:
         chosen = [place for place in present if place not in known][:number]
     chosen.sort(key=lambda place: place.module.startswith(KERNELS))  # which take longest
     for place in chosen:
-        row = dict(zip(FIELDS, (*vars(place).values(), "", "", ""), strict=True))
-        if not again:
-            row["holder"] = holder(place, sound)
-        elif place in present:
-            found = holder(place, sound)
-            row |= {"since": "" if found.startswith(NONE) else found}
-        else:
-            row |= {"since": GONE}
+        found = holder(place, sound) if place in present else GONE
         rows = recorded()  # it may have been edited meanwhile
-        rows[place] = row if not again else rows[place] | {"since": row["since"]}
+        row = rows.setdefault(place, dict.fromkeys(FIELDS, "") | vars(place))
+        survived = row["holder"].startswith(NONE)
+        row["since" if found == GONE or survived else "holder"] = "" if survived and found.startswith(NONE) else found
         write(rows)
-        print(f"{place.module}: {place.line}: {place.change}: {row['holder'] or row['since']}", flush=True)
+        print(f"{place.module}: {place.line}: {place.change}: {found}", flush=True)
 
 
 def alive(row: dict[str, str]) -> bool:
     """Whether no test notices a mutant that changes results."""
     return row["holder"].startswith(NONE) and not row["since"] and not row["reason"]
+
+
+def orphaned(row: dict[str, str]) -> bool:
+    """Whether the test that noticed a mutant is no longer there."""
+    path, _, test = (row["since"] or row["holder"]).partition("::")
+    if not test:
+        return False
+    name = rf"\bdef {test.partition('[')[0]}\("
+    return not (ROOT / path).exists() or not re.search(name, (ROOT / path).read_text("utf-8"))
 
 
 def main() -> None:
