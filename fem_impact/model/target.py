@@ -214,13 +214,17 @@ class Target:
 
         If not ``tense``, that without its tension, which does not act on lengths below that of the bending layer.
         """
+        bending, tension, inertia = self._sections
+        return float(_squared_wave(bending, tension if tense else 0.0, inertia, frequency).max() ** 0.5)
+
+    @property
+    def _sections(self) -> tuple[np.ndarray, float, np.ndarray]:
+        """Least bending stiffness [N m], tension [N/m] and mass per area [kg/m^2] of the plate in its cells."""
         section, mesh = self.section, self.mesh
         assert isinstance(section, Plate) and mesh is not None
         middle = mesh.points[mesh.cells].mean(axis=1)
-        stiffness, inertia = section.stiffness(middle), section.inertia(middle)
-        bending = np.minimum(stiffness[:, 0, 0], stiffness[:, 1, 1])
-        tension = (section.tension or 0.0) if tense else 0.0
-        return float(_squared_wave(bending, tension, inertia, frequency).max() ** 0.5)
+        stiffness = section.stiffness(middle)
+        return np.minimum(stiffness[:, 0, 0], stiffness[:, 1, 1]), section.tension or 0.0, section.inertia(middle)
 
     @property
     def mass(self) -> float:
@@ -237,13 +241,9 @@ class Target:
 
     def frequency_below(self, count: float) -> float:
         """Frequency [Hz], before scaling, below which the plate has about so many modes; see `count_below`."""
-        section, mesh = self.section, self.mesh
-        assert isinstance(section, Plate) and mesh is not None
-        middle, squared = mesh.points[mesh.cells].mean(axis=1), 4.0 * np.pi * count / mesh.area
-        stiffness = section.stiffness(middle)
-        bending = np.minimum(stiffness[:, 0, 0], stiffness[:, 1, 1]) * squared**2
-        pull = bending + (section.tension or 0.0) * squared
-        return float((pull / section.inertia(middle)).min() ** 0.5 / (2.0 * np.pi))
+        assert self.mesh is not None
+        squared, (bending, tension, inertia) = 4.0 * np.pi * count / self.mesh.area, self._sections  # of its wave
+        return float(((bending * squared + tension) * squared / inertia).min() ** 0.5 / (2.0 * np.pi))
 
     @cached_property
     def _known(self) -> Remembered:  # meshes and their unknowns: a plan counts those of two or three, its run uses them
