@@ -247,7 +247,11 @@ class History(check.Locked):
 
     @property
     def nearest_turn(self) -> float:
-        """How near to zero an approach turns back, over the farthest it ever turns [-]; infinity where none does."""
+        """How near to zero an approach turns back, over the farthest it ever turns [-]; infinity where none does.
+
+        A near one counts by the motion of the modes, from which the cubics of long steps differ; as zero where it
+        passes zero although the steps say that it does not.
+        """
         miss = -np.inf if self.miss is None else self.miss
         near, far, row, i = record.nearest_turn(self.steps, self.now, self.law, self.n_coefficients, miss)
         if row >= 0 and abs(near) < CLEAR * far:
@@ -257,15 +261,17 @@ class History(check.Locked):
     def _turn_in(self, row: int, i: int) -> float:
         """Approach [m] from its dent at which contact i turns within a step, by the motion of the modes."""
         part = np.linspace(0.0, 1.0, record.PEAK_LOOKS + 1)
-        times = self.steps[row, layout.START] + part * self.steps[row, layout.LENGTH]
+        length = self.steps[row, layout.LENGTH]
+        times = self.steps[row, layout.START] + part * length
         q, p = self.states(times)
         force, slope = self.force_of(np.full(len(part), row), i, part)
         soft = self.law["compliance"][i] * self.pressed[row, i]
         approach = self.offset[i] + q @ self.shape[i] - soft * force - self.surfaces(times[:1])[0][0, i]
         rate = p @ self.shape[i] - soft * slope
-        bend = np.gradient(rate, times)
+        bend = np.gradient(rate, part)
         k = int((approach * np.sign(bend.sum())).argmin())
-        return float(approach[k] - (0.5 * rate[k] ** 2 / bend[k] if bend[k] else 0.0))
+        beside = 0.0 < abs(rate[k]) * record.PEAK_LOOKS < abs(bend[k])  # it turns between two of these times
+        return float(approach[k] - (0.5 * length * rate[k] ** 2 / bend[k] if beside else 0.0))
 
     def bridged(self, reach: float = 0.0) -> np.ndarray:
         """How long after the end all modes together may bring surfaces within ``reach`` [m] of each other [s].

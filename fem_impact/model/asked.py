@@ -164,6 +164,13 @@ class Asked:
         flight = 2.0 * self.mass * self.values["speed"] / force if force > 0.0 else 0.0  # of the first rebound, at most
         return max(1.0, (end - flight) / self.duration)
 
+    def stopped(self, mobility: float, quicker: float = 1.0) -> bool:
+        """Whether a plate of a mobility [m/(N s)] damps the contact, or one so much ``quicker``, beyond critically.
+
+        Then it does not throw the striker off: its edges do.
+        """
+        return 0.5 * np.pi * self.mass * mobility * quicker >= self.duration
+
     def highest(self, mobility: float) -> float:
         """Frequency [Hz] above which a plate of a mobility [m/(N s)] acts as a spring."""
         density, resonance = 2.0 * mobility / np.pi, accuracy.contact_resonance(mass=self.mass, **self.law)

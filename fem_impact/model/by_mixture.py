@@ -49,7 +49,7 @@ class Mixed(Description):
         slow, highest = asked.mass * seen.mobility, asked.highest(seen.mobility)
         if not named and mixed.LASTING * slow > 1e4 * asked.duration:  # too many steps, some 24 for each contact time
             return None
-        few = 0.5 * np.pi * slow < asked.duration or target.count_below(highest / target.stretch) < MANY_MODES
+        few = not asked.stopped(seen.mobility) or target.count_below(highest / target.stretch) < MANY_MODES
         if few and not (named or anyway):
             return None
         frequency = mixed.first_frequency(asked.mass, seen.mobility, seen.echo, asked.duration)

@@ -164,7 +164,7 @@ def _length_foreseen(asked: Asked) -> tuple[float, int, bool]:
     except check.SimulationError:
         return 1.0, 1, False
     lasts, echo = max((touch.end for touch in hit.impacts), default=0.0) / asked.duration, echo / asked.duration
-    if 0.5 * np.pi * asked.mass * mobility < asked.duration:  # damps the contact less than critically
+    if not asked.stopped(mobility):
         return lasts, hit.n_impacts, False
     if mobility > seen.mobility:  # echoes find it pressing on an edge, until 3e-4 of its speed are left
         return max(echo, min(lasts, 8.0 * asked.mass * mobility / asked.duration)), SEVERAL, True
@@ -194,7 +194,7 @@ def _rattling(asked: Asked, first: int) -> int:
     quicker = (1.0 + lost) ** (1.0 / (contact.exponent + 1.0))  # than without loss, as a stiffer contact
     if seen is None or not np.isfinite(seen.mobility):
         return 0
-    if lost < STICKY and 0.5 * np.pi * mass * seen.mobility * quicker < asked.duration:
+    if lost < STICKY and not asked.stopped(seen.mobility, quicker):
         return 0
     # half a period of a heavy one on a hinged square as a spring; the first echo throws off a light one
     lasts = np.pi * seen.mobility * (0.74 * mass * seen.mass) ** 0.5 if mass > LIGHT * seen.mass else 0.0

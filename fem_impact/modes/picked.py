@@ -11,6 +11,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from .._base import check
+from .._base.rounding import ROUNDING
 from . import cell_kinds
 
 PER_FORCE = {"m/s^2/N": 2, "m/s/N": 1, "m/N": 0}  # unit of a response -> times that it was differentiated
@@ -198,7 +199,8 @@ def _with_one_more(omega: np.ndarray, data: np.ndarray, weight: np.ndarray, befo
     gain = np.square(before.rest).sum() - np.square(after.rest).sum()
     noise = np.square(after.rest).sum() / (max(1, len(data) - after.basis.shape[1]) * data.shape[1])
     about = after.rest.reshape(2, len(omega), -1)[:, max(0, place - ABOUT) : place + ABOUT + 1]
-    noise = max(noise, np.square(about).mean())  # larger where the hammer has little force
+    # larger where the hammer has little force; what is left of exact responses is rounding
+    noise = max(noise, np.square(about).mean(), np.square(ROUNDING * data).mean())
     near = np.diff(natural) < (damping * natural)[1:]
     return None if near.any() or gain < GAIN * (2 + data.shape[1]) * noise else after
 
