@@ -74,7 +74,7 @@ class Vectors(Description):
             )
         wanted, at = (0.5 / asked.duration, asked.budget.total), asked.values["at"][None]
         elements = vectors.elements_for(target, size, asked.mass, *wanted)
-        n_dofs, count = target.unknowns(at, elements, stages), vectors.first_count(target, *wanted)
+        n_dofs, first = target.unknowns(at, elements, stages), vectors.first_count(target, *wanted)
         lasts, impacts, stopped = _length_foreseen(asked)
         meshes = list(vectors.compared(target, elements, stages))
         if impacts > 2 and not asked.meshed:  # each multiplies the error that a mesh makes before it
@@ -82,11 +82,11 @@ class Vectors(Description):
         # echoes fade by damping; without, many blows soon disagree
         ratio = float(damping_ratios(target.damping_ratio or 0.0, np.array([np.pi / asked.duration]))[0])
         lasts = max(lasts, min(asked.pressed, 1.0 / (np.pi * max(ratio, 0.01))))
-        grown = round(min(cost.grown(count, lasts), vectors.MOST_VECTORS, n_dofs))
-        if stopped:  # vectors that end before the echo throw the striker off by one of their own
-            count = max(count, round(0.5 * grown))
+        grown = round(min(cost.grown(first, lasts), vectors.MOST_VECTORS, n_dofs))
+        # vectors that end before the echo throw the striker off by one of their own
+        count = max(first, round(0.5 * grown)) if stopped else first
         unknowns = [target.unknowns(at, each, stages) for each in meshes]
-        if (rattling := _rattling(asked, vectors.first_count(target, *wanted))) > grown:
+        if (rattling := _rattling(asked, first)) > grown:
             grown, finest = rattling, max(*unknowns, RESOLVING * rattling)
             unknowns = [finest, max(unknowns[0], round(finest / refinement.COARSER**2))]
         work = cost.by_vectors(unknowns, grown)

@@ -9,6 +9,7 @@ the poles (least squares frequency domain; Ewins, Modal Testing, chapter 4).
 from typing import Any, NamedTuple
 
 import numpy as np
+from scipy.ndimage import uniform_filter1d
 
 from .._base import check
 from .._base.rounding import ROUNDING
@@ -74,11 +75,7 @@ def responses(name: str, found: Any) -> tuple[np.ndarray, np.ndarray, np.ndarray
     size = np.sqrt(np.square(np.abs(values)).mean(axis=1))
     # errors go with the response where it is large, and are noise where it is small; by the noise of its own line, one
     # that rises above its neighbours would count less than one that falls below them
-    if size.size:
-        size, sure = (
-            np.convolve(np.pad(each, LINES // 2, mode="edge"), np.full(LINES, 1.0 / LINES), "valid")
-            for each in (size, sure)
-        )
+    size, sure = (uniform_filter1d(each, LINES, mode="nearest") for each in (size, sure))
     return s, values, sure / np.hypot(size, max(np.median(size) if size.size else 0.0, 1e-300)), used
 
 
