@@ -147,7 +147,8 @@ def test_two_contacts_of_other_kinds_at_once_agree_with_the_reference_scheme():
     felt = fi.Contact.felt(1e8, 2.0, hysteresis=0.5, relaxation=1e-4)
     soft = fi.Contact.elastic_plastic(1e8, yield_speed=0.05, mass=0.01)
     touches = [fi.Touch(felt, 0, 1), fi.Touch(soft, 1, 2)]
-    usual, fine = (fi.collide(balls, touches, speeds=[1.0, 0.0, 0.0], tolerance=t) for t in (1e-5, 1e-9))
+    blow = {"bodies": balls, "contacts": touches, "speeds": [1.0, 0.0, 0.0]}
+    usual, fine = fi.collide(**blow, tolerance=1e-5), fi.collide(**blow, tolerance=1e-9, scheme="collocation")
     assert (usual.scheme, fine.scheme) == ("A4", "collocation")
     assert_allclose(usual.speeds, fine.speeds, atol=1e-5)
     assert_allclose(usual.impulse, fine.impulse, rtol=1e-5)
