@@ -44,20 +44,27 @@ class BodyMotion:
     def at(self, points: Any, times: np.ndarray, rate: bool = False, residual: bool = True) -> np.ndarray:
         """Displacement [m], or its rate [m/s], (n_times, n_points)."""
         motion = self.states(times)[rate] @ self.modes.shape_at(points).T  # (n_times, n_modes) @ (n_modes, n_points)
-        ends, modes = self.ends, self.modes
+        ends = self.ends
         if ends is None or not residual:
             return np.asarray(motion)
-        asked = modes.points("points", points)
-        # the static deflection of the modes left out
         force = np.stack([-sign * self.history.force_at(times, i)[rate] for i, sign in ends.touched], axis=1)
         if not rate:
             force[:, 0] += ends.dip_force
-        if not force.any() or not len(asked):
-            return np.asarray(motion)
-        swings = modes.omega > 0.0
-        pushed, moved = (modes.shapes.at(place)[:, swings] / modes.omega[swings] for place in (ends.points, asked))
-        rest = modes.shapes.deflection(ends.points, asked) - moved @ pushed.T  # (n_points, n_ends)
-        return np.asarray(motion + force @ rest.T)
+        return np.asarray(motion + force @ self.softness(points).T if force.any() else motion)
+
+    def softness(self, points: Any) -> np.ndarray:
+        """Static deflection of the modes left out at points under unit forces at its ends, (n_points, n_ends) [m/N]."""
+        asked = self.modes.points("points", points)
+        return np.zeros((len(asked), 1)) if self.ends is None else left_out_between(self.modes, self.ends.points, asked)
+
+
+def left_out_between(modes: Modes, loads: np.ndarray, points: np.ndarray) -> np.ndarray:
+    """Static deflection of the modes left out at points under unit forces at loads, (n_points, n_loads) [m/N]."""
+    if not len(points):
+        return np.zeros((0, len(loads)))
+    swings = modes.omega > 0.0
+    pushed, moved = (modes.shapes.at(place)[:, swings] / modes.omega[swings] for place in (loads, points))
+    return np.asarray(modes.shapes.deflection(loads, points) - moved @ pushed.T)
 
 
 def of_run(hit: "Response", body: int) -> BodyMotion:

@@ -13,6 +13,7 @@ import numpy as np
 from ..impact import engine
 from ..impact.contact import Contact
 from ..impact.history import History
+from ..impact.motion import left_out_between
 from ..impact.reduced_body import ReducedBody, joined, reduce_body
 from ..impact.striker import Striker
 from ..modes.modal import Modes, left_out
@@ -27,6 +28,8 @@ class TappedBody(ReducedBody):
 
     seen: np.ndarray = field(kw_only=True)  # (n_points, n_modes) [kg**-0.5] shapes where the response is measured
     mass: float = field(kw_only=True)  # [kg]
+    # (n_points,) [m/N] static deflection of its modes left out there, under a unit force at its contact
+    softness: np.ndarray = field(kw_only=True)
 
     @cached_property
     def felt_mass(self) -> float:
@@ -44,7 +47,8 @@ class TappedBody(ReducedBody):
         return replace(
             self, omega=self.omega * ratio, zeta=self.zeta if damping is None else np.where(flexible, damping, 0.0),
             rows=self.rows * amplitude, p=self.p / amplitude, seen=self.seen * amplitude,
-            rest=self.rest * (amplitude / ratio) ** 2, mass=self.mass if mass is None else mass,
+            rest=self.rest * (amplitude / ratio) ** 2, softness=self.softness * (amplitude / ratio) ** 2,
+            mass=self.mass if mass is None else mass,
         )  # fmt: skip
 
     def with_mode(self, frequency: float, mass: float, damping: float, gains: np.ndarray) -> "TappedBody":
@@ -58,9 +62,10 @@ class TappedBody(ReducedBody):
         )  # fmt: skip
 
 
-def tapped(part: ReducedBody, seen: np.ndarray, mass: float) -> TappedBody:
+def tapped(part: ReducedBody, seen: np.ndarray, mass: float, softness: np.ndarray | None = None) -> TappedBody:
     """A body of a blow as one of a tap."""
-    return TappedBody(**{each.name: getattr(part, each.name) for each in fields(part)}, seen=seen, mass=mass)
+    same = {each.name: getattr(part, each.name) for each in fields(part)}
+    return TappedBody(**same, seen=seen, mass=mass, softness=np.zeros(len(seen)) if softness is None else softness)
 
 
 def wall(n_points: int = 0) -> TappedBody:
@@ -77,19 +82,25 @@ def of_striker(striker: Striker) -> TappedBody:
     return tapped(replace(part, p=striker.motion), np.zeros((0, modes.n_modes)), modes.mass)
 
 
-def of_target(modes: Modes, at: Any, points: Any = None, softness: float | None = None) -> TappedBody:
+def of_target(modes: Modes, at: Any, points: Any = None, compliance: float | None = None) -> TappedBody:
     """A struck body at its strike point, and where its response is measured.
 
-    ``softness`` is the static compliance at the strike point [m/N], if it is known already.
+    ``compliance`` is the static one at the strike point [m/N], if it is known already.
     """
-    place = modes.point("at", at)
-    rows, rest = modes.shape_at(place), None
-    if softness is not None:
-        rest = np.maximum(0.0, softness - modes.modal_compliance(place)), np.zeros(1)
+    place, asked = modes.point("at", at), np.zeros((0, modes.dimension))
+    if points is not None:
+        asked = modes.points("points", points)
+    rows, seen, rest, softness = modes.shape_at(place), modes.shape_at(asked), None, np.zeros(len(asked))
+    if compliance is not None:
+        rest = np.maximum(0.0, compliance - modes.modal_compliance(place)), np.zeros(1)
     elif modes.dimension:
         rest = left_out(modes, place, rows)
-    seen = np.zeros((0, modes.n_modes)) if points is None else modes.shape_at(points)
-    return tapped(reduce_body(modes, ((0, -1.0),), place, rows, rest), seen, modes.mass)
+    if len(asked) and rest is not None and rest[0].any():
+        if compliance is None:
+            softness = left_out_between(modes, place, asked)[:, 0]
+        else:  # of many places: a force here deflects there as one there does here, so that one solution serves all
+            softness = left_out_between(modes, asked, place)[0]
+    return tapped(reduce_body(modes, ((0, -1.0),), place, rows, rest), seen, modes.mass, softness)
 
 
 def follow_blow(system: engine.KernelSystem, speed: float, step: float, horizon: float) -> History:
@@ -133,7 +144,7 @@ def records(
             pushed[:until] = history.force_at(times[:until], 0)[0]
         if len(target.seen):
             struck = slice(n_own, n_own + len(target.omega))
-            one[1:, first:] = accelerations(history, struck, target.seen, pushed, times).T
+            one[1:, first:] = accelerations(history, struck, target.seen, pushed, times, target.softness).T
         if tip_mass:
             until = len(times) if striker.omega.any() else until
             pushed[:until] = behind_tip(history, slice(n_own), tip_mass, pushed[:until], times[:until])

@@ -82,22 +82,29 @@ class Rig:
         return 1.0 / (1.0 - x**2 + 2j * self.resonance_damping * x)
 
 
-def accelerations(history: History, part: slice, rows: np.ndarray, force: np.ndarray, times: np.ndarray) -> np.ndarray:
-    """Acceleration of a body under a contact force, (n_times, n_points) [m/s^2], of its kept modes.
+def accelerations(
+    history: History, part: slice, rows: np.ndarray, force: np.ndarray, times: np.ndarray, softness: Any = 0.0
+) -> np.ndarray:
+    """Acceleration of a body under a contact force, (n_times, n_points) [m/s^2].
 
     Parameters
     ----------
     part : slice, the body's modes in the history
     rows : ndarray, shape (n_points, n_modes) [kg**-0.5], shapes of the body at the points
     force : ndarray, shape (n_times,) [N], at `times`
-    times : ndarray, shape (n_times,) [s], ascending
+    times : ndarray, shape (n_times,) [s], ascending in even steps from the begin of the blow on
+    softness : float or ndarray, shape (n_points,) [m/N], static deflection of its modes left out under a unit force
     """
     omega, zeta = history.omega[part], history.zeta[part]
-    forced = -np.outer(force, history.shape[0, part])  # the force slows the first body and speeds up the second
+    # the force slows the first body and speeds up the second
+    forced = history.bias[part] - np.outer(force, history.shape[0, part])
     if omega.any():
         q, p = history.states(times)
         forced -= 2.0 * zeta * omega * p[:, part] + omega**2 * q[:, part]
-    return forced @ rows.T
+    found = forced @ rows.T
+    if np.any(softness):  # these modes follow the force, which was zero before
+        found += np.outer(np.diff(force, 2, prepend=0.0, append=force[-1]) / (times[1] - times[0]) ** 2, softness)
+    return found
 
 
 def behind_tip(history: History, part: slice, tip_mass: float, force: np.ndarray, times: np.ndarray) -> np.ndarray:
@@ -219,9 +226,9 @@ def measure(
         points = hit.target.points("at", at)
         moved = np.zeros((len(points), n_fine))
         if quantity == "acceleration":
-            target = hit.body_slice(len(hit.bodies) - 1)
-            rows_at = hit.target.shape_at(points)
-            moved[:, begun] = accelerations(hit.history, target, rows_at, pushed, times[begun]).T
+            ringing = hit._motion(-1)
+            rows_at, softness = ringing.modes.shape_at(points), ringing.softness(points)[:, 0]
+            moved[:, begun] = accelerations(ringing.history, ringing.part, rows_at, pushed, times[begun], softness).T
         else:
             moved[:, begun] = getattr(hit, quantity)(points, times[begun]).T
         rows += list(sample(moved, rig, force=False, shift=onset))

@@ -6,7 +6,7 @@ import pytest
 import fem_impact as fi
 from fem_impact.impact import accuracy
 from fem_impact.impact.reduced_body import joined
-from fem_impact.taps import blows, rig
+from fem_impact.taps import blows, rig, unknowns
 
 AT = (0.17, 0.11)
 PLATE = fi.analytic.rectangle(0.4, 0.3, mass=0.8, first_frequency=120.0, n_modes=30, damping_ratio=0.01)
@@ -23,14 +23,14 @@ def blow(striker, target, law, speed, duration, horizon, finer=1.0):
 def test_a_quick_blow_agrees_with_strike_and_its_record_with_measure(hammer, loss):
     law = fi.Contact.power(1e7, 1.4, loss=loss)
     hit = fi.strike(PLATE, hammer, law, at=AT, speed=1.3, tolerance=1e-5)
-    bodies = blows.of_striker(hammer), blows.of_target(PLATE, AT, [(0.1, 0.1)])
+    bodies = blows.of_striker(hammer), blows.of_target(PLATE, AT, [(0.1, 0.1), AT])
     assert abs(blow(*bodies, law, 1.3, 3e-4, 3e-3).impulses.sum() - hit.impulse) < 1e-5 * hit.impulse
     chain = rig.Rig(25600.0)
     fine = blows.records(*bodies, law, np.array([1.3]), duration=3e-4, n_times=80, lead=20, rig=chain, tip_mass=0.0)
     found = rig.sample(fine, chain, force=True)[0, :, rig.MARGIN : -rig.MARGIN]
-    wanted = fi.measure(hit, rate=25600.0, at=(0.1, 0.1), before=20 / 25600, duration=80 / 25600)
+    wanted = fi.measure(hit, rate=25600.0, at=[(0.1, 0.1), AT], before=20 / 25600, duration=80 / 25600)
     assert np.abs(found[0] - wanted.force[0]).max() < 3e-5 * wanted.peak[0]  # 40 steps per contact
-    assert np.abs(found[1] - wanted.response[0, :, 0]).max() < 1e-4 * np.abs(wanted.response).max()
+    assert (np.abs(found[1:].T - wanted.response[0]).max(axis=0) < 1e-4 * np.abs(wanted.response[0]).max(axis=0)).all()
 
 
 @pytest.mark.parametrize(
@@ -56,6 +56,15 @@ def test_a_scaled_body_is_the_scaled_modes():
     wanted = blows.of_target(PLATE.scaled(mass=0.3, first_frequency=200.0), AT)
     assert np.allclose(other.omega, wanted.omega) and np.allclose(np.abs(other.rows), np.abs(wanted.rows))
     assert np.isclose(other.rest, wanted.rest, rtol=1e-6) and (other.zeta == 0.05).all()
+
+
+def test_what_a_body_yields_is_known_at_every_place():
+    point, rig_ = np.array([(0.15, 0.12)]), rig.Rig(25600.0)
+    places = unknowns.checked({"target.x": (0.12, 0.22)}, PLATE, BALL, fi.Contact.hertz(1e7))
+    setting = unknowns.Setting(PLATE, AT, BALL, fi.Contact.hertz(1e7), rig_, places, point, 1, 0.02)
+    found, exact = setting.structure({"target.x": 0.19}), blows.of_target(PLATE, (0.19, AT[1]), point)
+    assert found.rest == pytest.approx(exact.rest, rel=2e-3)  # a quartic over a quarter of the plate: 4e-4
+    assert found.softness == pytest.approx(exact.softness, rel=1e-9)  # reciprocal, to rounding
 
 
 def test_fast_modes_that_matter_shorten_the_step_and_are_followed():
