@@ -356,4 +356,5 @@ class Target:
 def _squared_wave(bending: Any, tension: float, inertia: Any, frequency: float) -> Any:
     """Square of the wavenumber k [rad/m] at a frequency [Hz]: omega**2 inertia = bending k**4 + tension k**2."""
     pull = inertia * (2.0 * np.pi * frequency) ** 2
-    return 2.0 * pull / (np.sqrt(tension**2 + 4.0 * bending * pull) + tension)
+    # zero at 0 Hz without tension, too, where both are
+    return 2.0 * pull / np.maximum(np.sqrt(tension**2 + 4.0 * bending * pull) + tension, np.finfo(float).tiny)

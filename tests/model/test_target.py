@@ -192,6 +192,7 @@ def test_modes_of_strips_are_counted_by_their_area(length, edge):
     rate = (ALUMINIUM.plane_stress[0, 0] * 0.01**2 / 12.0 / ALUMINIUM.rho) ** 0.5
     along = np.sqrt(np.maximum(2.0 * np.pi * limit / rate - k**2, 0.0)) * length / np.pi
     assert 0.6 < target.number_below(first, limit) / along.sum() < 1.6
+    assert target.number_below(first, 0.0) == 0.0  # of a force that reaches no frequency
 
 
 @pytest.mark.parametrize("theory", ["kirchhoff", "mindlin"])
