@@ -234,6 +234,7 @@ CROWD = np.repeat([(0, 0), (1, 0), (0, 1)], 20, axis=0), np.arange(60).reshape(3
 OPEN, CLOSED = ({"body": f'<path d="M0 0 H400 V300{end}"/>'} for end in ("", " Z"))
 ARC = {"body": '<path d="M0 0 A9 9 0 0 1 20 0 Q 10 30 0 0"/>'}
 MM, METRES = {"unit": "mm"}, {"unit": "m"}
+PULSES = 1.0 * (np.arange(4000) % 6 == 0) * (np.arange(4000) > 3000)  # of one tap, or of many of 6 samples
 # fmt: off
 FILES = [  # what reads the file, of what it is refused, a pattern of the message, and of what it reads it as advised
     (mesh_of, {"points": moved(np.nan)}, r"not a number at node \S+: .*; correct that node", {}),
@@ -244,6 +245,8 @@ FILES = [  # what reads the file, of what it is refused, a pattern of the messag
     (mesh_of, {"points": SQUARE, "cells": [[0, 1, 2, 3]], "kind": "tetra"}, "mesh the surface with triangles", {}),
     (mesh_of, {"others": [("tetra", np.array([[0, 1, 2, 3]]))]}, "export only the flat surface", {}),
     (mesh_of, {"points": 0.0 * GOOD.points}, "all its nodes at one point; export it again", {}),
+    (mesh_of, {"points": np.repeat(SQUARE[:2], 2, axis=0), "cells": TRIANGLES},
+     "no triangle with three corners apart; export it again", PLAIN),
     (mesh_of, dict(zip(("points", "cells"), CROWD)), "most of its nodes at a few points; export it again",
      {"points": [(0, 0), (1, 0), (0, 1)], "cells": [[0, 1, 2]]}),
     (mesh_of, {"points": [*SQUARE, (0.2, 0)], "cells": [*TRIANGLES, [0, 4, 1]]},
@@ -308,6 +311,9 @@ FILES = [  # what reads the file, of what it is refused, a pattern of the messag
     (taps_of, {"text": lambda *_: "\0" * 9 + "ab" * 5000, "name": "taps.dat"},
      "give .npy, .npz, .wav, .mat or .uff its own ending",
      lambda f: saved(f, "taps.npz", hammer_force=tap_of(4000)["force"])),
+    (taps_of, {"name": "taps.npz"}, "give a text table the ending .csv", {}),
+    (taps_of, {"text": lambda _, time: told(40.0 * PULSES, 1e3 * time)}, "check the unit of its times",
+     {"text": lambda _, time: told(40.0 * PULSES, 1e3 * time).replace("[s]", "[ms]")}),
     (taps_of, {"name": "taps.lvm"}, "for a plain table use the ending .csv", {}),
     (taps_of, {"length": 9.0}, "give a shorter length or before, or check rate", {"length": 0.05},
      {"text": lambda force, time: told(force), "rate": 100.0, "length": 9.0}),

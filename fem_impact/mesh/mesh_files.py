@@ -230,6 +230,8 @@ def _mend(
     if collapsed.any():
         notes.append(f"{int(collapsed.sum())} triangles with two corners at one point were removed")
         cells = cells[~collapsed]
+    if not len(cells):
+        raise ValueError(f"{name} has no triangle with three corners apart; export it again")
     _, first = np.unique(np.sort(cells, axis=1), axis=0, return_index=True)
     if len(first) < len(cells):
         notes.append(f"{len(cells) - len(first)} duplicate triangles were removed")

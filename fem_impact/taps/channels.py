@@ -84,7 +84,7 @@ def force_channel(found: readers.Recording, force: Any, unit: list[str], name: s
     if len(hits) != 1:
         there = ", ".join(repr(text) for text in found.names[:20])
         said = "has several force channels" if hits else "does not say which channel is the force"
-        raise ValueError(f"force must be given: {name} {said}; its channels are {there}")
+        raise ValueError("; ".join([f"force must be given: {name} {said}; its channels are {there}", *found.notes]))
     return hits[0]
 
 

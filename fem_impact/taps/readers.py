@@ -238,7 +238,8 @@ def _numbers(rows: list[str], separator: str | None, use: list[int], comma: bool
             cells = row.split(separator)
             if max(use) >= len(cells) or not all(_number(cells[k], False) for k in use):
                 raise ValueError(
-                    f"{path.name} has a row without {len(use)} numbers, {i + 1} rows into a segment: {row[:60]!r}"
+                    f"{path.name} has a row without {len(use)} numbers, {i + 1} rows into a segment: {row[:60]!r}; "
+                    "export it again, or cut it out"
                 ) from None
         raise ValueError(f"{path.name} cannot be read as numbers: {error}") from None
 
@@ -358,7 +359,8 @@ def _rate(path: Path, time: np.ndarray) -> float:
     if away.max() > np.clip(0.6 * spread / step, 0.02, 0.3) * step:
         k = int(away.argmax())
         raise ValueError(
-            f"{path.name} is not evenly sampled: sample {k + 1} is {away[k]:.2g} s off a step of {step:.3g} s"
+            f"{path.name} is not evenly sampled by its times: sample {k + 1} is {away[k]:.2g} s off a step of "
+            f"{step:.3g} s; export it again, or give the channels without them, and rate="
         )
     return _round_rate(1.0 / step)
 
@@ -420,6 +422,9 @@ def _columns(path: Path, found: dict[str, np.ndarray]) -> Recording:
 
 def numpy_file(path: Path) -> Recording:
     """An .npy array, or an .npz of named arrays with ``rate``, ``dt`` or ``time`` among them."""
+    with path.open("rb") as file:
+        if not file.read(6).startswith((b"PK", b"\x93NUMPY")):
+            raise ValueError(f"{path.name} is no file of NumPy; give a text table the ending .csv")
     loaded = np.load(path, allow_pickle=False)
     alone = isinstance(loaded, np.ndarray)
     return _columns(path, {"array": loaded} if alone else {name: loaded[name] for name in loaded.files})

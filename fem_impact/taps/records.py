@@ -327,6 +327,11 @@ def read_taps(
     segments, names, kinds, more = channels.in_si(found, name, force, response, scale, units)
     options = {"trigger": trigger, "before": before, "length": length, "together": together}
     rows, responses, full, labels, said = triggers.cut(segments, stated, name, **options)
+    if rows.shape[1] < readers.LEAST:
+        raise ValueError(
+            f"a tap in {name} has {rows.shape[1]} samples at a rate of {stated:g} Hz, {readers.LEAST} at least are "
+            "needed; check the unit of its times, rate, before and length"
+        )
     cut = [
         [bool(top) or triggers.clipped(row, full_scale), *(triggers.clipped(column) for column in other.T)]
         for row, other, top in zip(rows, responses, full)

@@ -204,13 +204,14 @@ def test_tables_as_numpy_and_spreadsheets_write_them(tmp_path):
     [
         (FORCE + 0j, {"rate": RATE}, "complex numbers in 'force'"),
         (FORCE.astype(str), {"rate": RATE}, "does not say which channel is the force"),
+        (FORCE[1:], {"time": TIME}, r"channels are 'accel'; force has shape \(2599,\) and was left out"),
         ((100 * FORCE).astype(np.int16), {"rate": RATE}, r"scale must be given for 'force'.*in 'counts'"),
         (FORCE, {"rate": RATE, "dt": 1e-3}, "different rates.*; give one of them"),
         (FORCE, {"time": TIME, "fs": 2 * RATE}, "different rates"),
         (FORCE, {"time": TIME, "rate": 1.03 * RATE}, "different rates"),
         (FORCE, {"time": TIME, "rate": 1.002 * RATE}, None),
     ],
-    ids=["complex", "text", "counts", "dt", "fs", "3 per cent", "2 per mille"],
+    ids=["complex", "text", "short", "counts", "dt", "fs", "3 per cent", "2 per mille"],
 )
 def test_arrays_that_are_no_samples_or_contradict_their_rate_are_refused(tmp_path, force, rates, said):
     np.savez(tmp_path / "t.npz", force=force, accel=ACCELERATION, **rates)
