@@ -339,10 +339,16 @@ def run_explore(options: argparse.Namespace) -> None:
 
 
 def run_play(options: argparse.Namespace) -> Answer:
-    from .live import command, devices  # imported only when needed
+    from ._base import check  # imports numpy, which --help and --version do not need
+    from .live import command, controllers, devices
 
     scene = fi.load_scene(options.scene)
     path = page_of(options, "play.wav")
+    # what is wrong at a glance is refused before the modes are found
+    check.count("--block", options.block)
+    check.positive("--duration", options.duration, "s")
+    if options.midi is not None:
+        controllers.read_midi(options.midi, 1, 1.0, 1)
     with staged(path.parent) as staging:
         with progress_of(options)("modes"):
             modes = scene.modes(options.n_modes)

@@ -115,18 +115,18 @@ def _pairs(name: str, texts: list[str]) -> dict[str, list[float]]:
 
 def fit(options: Any, watch: Watch | None) -> tuple[Found, Scene | None, Proposal | None]:
     """The fit of a file of taps; the scene struck, None for a wall; and what was tried if the model is asked for."""
+    striker = Striker.rigid(0.1 if options.mass is None else options.mass)  # a usual modal hammer, if nothing is said
     if options.propose:
         for name in ("unknown", "known", "per_tap", "body"):
             if getattr(options, name):
                 name = "SCENE" if name == "body" else f"--{name.replace('_', '-')}"
                 raise ValueError(f"{name} must be left out beside --propose, which tries unknowns and laws itself")
-        proposal = propose(taps_of(options), striker=Striker.rigid(options.mass or 0.1), watch=watch)
+        proposal = propose(taps_of(options), striker=striker, watch=watch)
         return proposal.found, None, proposal
     unknown = {name: tuple(limits) for name, limits in _pairs("unknown", options.unknown).items()} or UNKNOWN
     known = {name: value for name, (value,) in _pairs("known", options.known).items()}
     taps = taps_of(options)
-    # a usual modal hammer, if nothing is said of it
-    given: dict[str, Any] = {"striker": Striker.rigid(options.mass or 0.1), "contact": Contact.hertz(1e7)}
+    given: dict[str, Any] = {"striker": striker, "contact": Contact.hertz(1e7)}
     scene = None
     if options.body is not None:
         scene = load_scene(options.body)

@@ -10,6 +10,8 @@ from scenes import SMALL
 from scipy.io import wavfile
 from test_controllers import midi
 
+from fem_impact.scenes.scene import Scene
+
 pytestmark = pytest.mark.xdist_group("live")  # one worker compiles
 
 
@@ -30,6 +32,16 @@ def test_a_midi_file_is_played_into_a_wav_twice_the_same(scene, tmp_path, prompt
     assert (tmp_path / "one.wav").read_bytes() == (tmp_path / "two.wav").read_bytes()
     rate, samples = wavfile.read(tmp_path / "one.wav")
     assert rate == 48_000 and len(samples) == 64 * int(found[1]) and 0.1 < np.abs(samples).max() < 1.0
+
+
+@pytest.mark.parametrize(
+    ("words", "said"), [("--midi no.mid", "no.mid: there is no such file"), ("--duration 0", "must be positive"),
+                        ("--block 0", "must be at least 1")],
+)  # fmt: skip
+def test_what_is_wrong_at_a_glance_is_refused_before_modes_are_found(scene, monkeypatch, prompt, words, said):
+    monkeypatch.setattr(Scene, "modes", None)
+    ran = prompt(f"play small.toml --silent {words}")
+    assert ran.status == 2 and said in ran.err
 
 
 @pytest.mark.slow

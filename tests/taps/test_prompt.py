@@ -37,6 +37,11 @@ def test_frf_of_a_file_lists_peaks_and_writes_a_table(prompt):
 
 
 @pytest.mark.slow
+def test_a_scene_to_compare_with_needs_a_page(prompt):
+    ran = prompt("frf", TAPS, "--against", "no.toml", "--out", "frf.csv")
+    assert ran.status == 2 and "give --out a folder, or a name that ends in .html" in ran.err
+
+
 def test_frf_of_a_scene_finds_its_modes(prompt):
     ran = prompt("frf", DRUMSTICK, "--rate", "12800")
     first = fi.load_scene(DRUMSTICK).modes(1).frequencies[0]
@@ -62,7 +67,8 @@ def test_fit_proposes_the_model_and_lists_what_was_tried(prompt):
     [(["--unknown", "contact.stiffness=3"], "must read NAME=LOW:HIGH"),
      (["--propose", "--known", "striker.mass=0.1"], "--known must be left out beside --propose"),
      (["--propose", "--per-tap", "striker.mass"], "--per-tap must be left out"),
-     (["--known", "striker.mass=x"], "must read NAME=VALUE"), (["--force", "hammer"], "is no channel")],
+     (["--known", "striker.mass=x"], "must read NAME=VALUE"), (["--force", "hammer"], "is no channel"),
+     (["--mass", "0"], "mass must be positive, got 0 kg")],
 )  # fmt: skip
 def test_wrong_commands_say_what_is_wrong(words, said, prompt):
     ran = prompt("fit", TAPS, "--out", "out", *words)
