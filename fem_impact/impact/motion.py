@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..modes.modal import Modes
+from ..modes.modal import Modes, left_out_between
 from ..modes.shapes import SampledShapes
 from ..modes.stretching import stretch
 from .history import History
@@ -56,15 +56,6 @@ class BodyMotion:
         """Static deflection of the modes left out at points under unit forces at its ends, (n_points, n_ends) [m/N]."""
         asked = self.modes.points("points", points)
         return np.zeros((len(asked), 1)) if self.ends is None else left_out_between(self.modes, self.ends.points, asked)
-
-
-def left_out_between(modes: Modes, loads: np.ndarray, points: np.ndarray) -> np.ndarray:
-    """Static deflection of the modes left out at points under unit forces at loads, (n_points, n_loads) [m/N]."""
-    if not len(points):
-        return np.zeros((0, len(loads)))
-    swings = modes.omega > 0.0
-    pushed, moved = (modes.shapes.at(place)[:, swings] / modes.omega[swings] for place in (loads, points))
-    return np.asarray(modes.shapes.deflection(loads, points) - moved @ pushed.T)
 
 
 def of_run(hit: "Response", body: int) -> BodyMotion:

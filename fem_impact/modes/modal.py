@@ -525,6 +525,15 @@ def _numbers_of_points(loads: Any, n_points: int, given: bool) -> np.ndarray:
     return numbers
 
 
+def left_out_between(modes: "Modes", loads: np.ndarray, points: np.ndarray) -> np.ndarray:
+    """Static deflection of the modes left out at points under unit forces at loads, (n_points, n_loads) [m/N]."""
+    if not len(points):
+        return np.zeros((0, len(loads)))
+    swings = modes.omega > 0.0
+    pushed, moved = (modes.shapes.at(place)[:, swings] / modes.omega[swings] for place in (loads, points))
+    return np.asarray(modes.shapes.deflection(loads, points) - moved @ pushed.T)
+
+
 def left_out(modes: "Modes", place: np.ndarray, rows: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """`Modes.residual_compliance` at points with known shapes (n_points, n_modes), and the error of its diagonal.
 

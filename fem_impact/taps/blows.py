@@ -13,10 +13,9 @@ import numpy as np
 from ..impact import engine
 from ..impact.contact import Contact
 from ..impact.history import History
-from ..impact.motion import left_out_between
 from ..impact.reduced_body import ReducedBody, joined, reduce_body
 from ..impact.striker import Striker
-from ..modes.modal import Modes, left_out
+from ..modes.modal import Modes, left_out, left_out_between
 from .rig import FINE, MARGIN, Rig, accelerations, behind_tip
 
 STEPS = 40.0  # [-] steps of a contact: the force is then exact to 1e-5 of its peak
