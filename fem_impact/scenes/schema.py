@@ -309,7 +309,8 @@ def read_tables(path: Path) -> dict[str, Any]:
     except UnicodeDecodeError:
         raise fault(path, "a scene must be UTF-8 text; save it in that encoding") from None
     except (tomllib.TOMLDecodeError, RecursionError) as error:
-        raise fault(path, f"not valid TOML: {error}") from None
+        said = str(error).replace("Cannot overwrite a value", "the same key is given twice in one table")
+        raise fault(path, f"not valid TOML: {said}") from None
 
 
 def written(tables: Mapping[str, Any]) -> str:

@@ -165,7 +165,7 @@ BAD = [
     ("at = [0.1395, 0.09]", "at = [0.5, 0.09]", r"\[strike\] at must lie on the body, got \(0.5, 0.09\) m"),
     ('boundary = "hinged"', 'boundary = "hinge"', r"\[supports\] boundary must be one of clamped, hinged, free"),
     ('boundary = "hinged"', 'lef = "hinged"', r"\[supports\] .*lef.*did you mean 'left'"),
-    ("mass = 0.2", "mass = 0.2\nmass = 0.3", r"not valid TOML: .*line"),
+    ("mass = 0.2", "mass = 0.2\nmass = 0.3", r"not valid TOML: the same key is given twice .*line"),
     ("[target]", f"{MATERIAL}[target]", r"\[section\] is missing; \[material\] needs it"),
     (SOURCE, "point_supports = [{ stiffness = 1e4 }]", "must have at"),
     (SOURCE, "point_supports = [{ at = [0.1, 0.1], stiffness = 0 }]", "positive"),
