@@ -31,6 +31,8 @@ SHORTEST, LONGEST = 0.5, 5.0  # [s] limits of the default duration: long enough 
 BLOCK = 4096  # [-] samples computed at a time as the first waves arrive: limits the memory, does not change the result
 COMPACT = 0.5  # [-] half the width of a bar times the wavenumber, up to which a piece of it is a dipole; test_sound.py
 SQUARE = 1.51  # [-] mass of air that a square section drags, over that of a flat strip of its width
+# [-] ends of a flat strip drag the less air the nearer, by this power of the distance in widths; test_sound.py
+ENDS = 3.2
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -352,7 +354,8 @@ def radiate_bar(
     ----------
     response : Response or Strokes of a beam, which lies along x
     listener : array_like, shape (3,) [m]
-        Position; the third coordinate is along the motion, positive on the side it moves to.
+        Position, farther than the width from the bar; the third coordinate is along the motion, positive on the side it
+        moves to.
     width, height : float [m]
         Of the bar's section, across and along the motion; at its widest if it varies. The height is at most the width.
     duration, rate : as in `synthesise`
@@ -362,20 +365,22 @@ def radiate_bar(
     -------
     low, high : Sound
         For equal motion the pressure of each mode that is slow enough lies between them: a flat strip of the width, and
-        a section that drags the air of a square one and its own volume of air besides. They keep their ratio.
+        a section that drags the air of a square one and its own volume of air besides. They keep their ratio. Where a
+        mode is hardly heard, and around thick ends nearer than three widths, neither holds.
 
     Notes
     -----
     Every piece of a bar that is narrow beside the sound's wave pushes the air by its mass per length m times the
     acceleration a, and is a dipole: ``p = z / (4 pi R**2) int m (a'(t - R/c) / c + a(t - R/c) / R) dx``. A flat strip
-    has ``m = rho pi width**2 / 4``, a square of that width 1.51 times as much. This holds while half the width times
-    the wavenumber is below 0.5, where it errs by a few per cent; modes above are left out of both sounds, as are rigid
-    motions.
+    has ``m = rho pi width**2 / 4``, a square of that width 1.51 times as much. Air flows around the ends, too: at a
+    distance of d widths from each, m is less by ``sqrt(1 - (1 + d)**-3.2)``. What is heard of a free bar is mostly
+    that, as its motion sums to nothing. This holds while half the width times the wavenumber is below 0.5, where it
+    errs by a tenth at most; modes above are left out of both sounds, as are rigid motions.
 
     References
     ----------
     Pierce, Acoustics (1989), chapter 4 (the dipole); Blevins, Formulas for Natural Frequency and Mode Shape (1979),
-    table 14-1 (masses of air).
+    chapter 14 (masses of air).
 
     Examples
     --------
@@ -397,11 +402,18 @@ def radiate_bar(
     rate, heard = _audible(response, rate)
     heard &= modes.omega * 0.5 * width <= COMPACT * speed
     x = np.sort(modes.shapes.grid()[0][:, 0])
-    x = np.linspace(x[0], x[-1], max(len(x), 8 * int(heard.sum()) + 33))
-    way = np.sqrt((x - place[0]) ** 2 + place[1] ** 2 + place[2] ** 2)  # (n_points,) [m]
-    if not way.min() > 0.5 * width:
-        raise ValueError(f"listener must be farther than half the width from the bar, got {way.min():g} m")
-    share = np.gradient(x) * np.where((x == x[0]) | (x == x[-1]), 0.5, 1.0) * place[2] / (4.0 * np.pi * way**2)
+    gap = float(np.hypot(place[0] - np.clip(place[0], x[0], x[-1]), np.hypot(place[1], place[2])))
+    length = x[-1] - x[0]
+    least = max(width, 2e-4 * length)  # nearer to a wire, its pieces would take long
+    if not gap > least:
+        raise ValueError(f"listener must be farther than {least:g} m from the bar, got {gap:g} m")
+    count = max(len(x), 8 * int(heard.sum()) + 64, int(2.0 * length / gap))  # [-] pieces, at most as long as the gap
+    turn = np.pi * (np.arange(count) + 0.5) / count  # shortest at the ends, where the mass is as a root
+    ends = length * np.stack([np.sin(0.5 * turn), np.cos(0.5 * turn)]) ** 2  # (2, n_pieces) [m] how far away they are
+    x = x[0] + ends[0]
+    way = np.sqrt((x - place[0]) ** 2 + place[1] ** 2 + place[2] ** 2)  # (n_pieces,) [m]
+    mass = np.sqrt(1.0 - (1.0 + ends / width) ** -ENDS).prod(axis=0)  # [-] over that of a piece far from both ends
+    share = 0.5 * np.pi * length / count * np.sin(turn) * mass * place[2] / (4.0 * np.pi * way**2)
     shapes = modes.shapes.at(x[:, None])[:, heard] * share[:, None]
     times = _times(response, heard, duration, rate)
     orders = {3: shapes / speed, 2: shapes / way[:, None]}
