@@ -34,15 +34,14 @@ from scipy.ndimage import binary_dilation, binary_erosion
 from scipy.special import jv
 
 from .._base import check
-from .._base.rounding import EPSILON, HALVINGS, SAME
+from .._base.rounding import HALVINGS, SAME
 from ..fe import plausible
 from ..mesh.meshes import sizes
+from .free_air import PER_WAVE, between_cells, lattice, loads
 from .modal import Modes
 from .shapes import ScaledShapes, Shapes
 
 DENSITY, SPEED = 1.204, 343.2  # [kg/m^3], [m/s] fact: of air at 20 degrees C and 1013 hPa
-# [-] cells per wavelength of the highest mode and, in `free_air`, of its sound; two sizes are extrapolated
-PER_WAVE = 8.0
 SAMPLES = 2, 3  # [-] points across a cell over which a shape is averaged, fine and coarse: both use one set of points
 GAIN = (SAMPLES[1] / SAMPLES[0]) ** 2 - 1.0  # [-] fact: the coarse error less the fine one, over the fine one
 # [-] modes solved at the same few frequencies, and modes beside it that air may mix in: far ones swing too differently
@@ -66,9 +65,9 @@ def in_air(
     sides : {1, 2}
         Sides of the plate that face open air; a box behind one of them is not modelled.
     baffled : bool
-        Whether the plate fills a hole in a large rigid wall. Without the wall air flows around the edge: the added mass
-        lies between none and that with the wall. Half of it is taken, the shift becomes the error, and no
-        damping is added, because far less sound is radiated below coincidence.
+        Whether the plate fills a hole in a large rigid wall. Without the wall air flows around the edge. Half the
+        added mass is taken and no damping is added: the shift and the damping with the wall become the errors or, with
+        air on both sides, those of a sheet of dipoles (see `sound.radiate_free`) where they are larger.
 
     Returns
     -------
@@ -119,6 +118,11 @@ def in_air(
     note = f"air of {density:g} kg/m^3 on {side}, with a rigid wall around the plate"
     if not baffled:
         doubt, unsure, radiated = doubt + heavier, unsure + radiated / share, np.zeros(len(omega))
+        if sides == 2:  # a free edge may radiate more than in a wall, and fast modes be heavier
+            middle, half = (density * each[modes.n_rigid :].T for each in loads(modes, speed))  # (2, n) each
+            for mass, lost in (middle - half, middle + half):
+                bare = omega / modes.omega[modes.n_rigid :] * np.sqrt(np.maximum(0.0, 1.0 + mass))
+                doubt, unsure = np.maximum(doubt, np.abs(bare - 1.0)), np.maximum(unsure, lost)
         note = f"air of {density:g} kg/m^3 on {side} adds half the mass that it would with a rigid wall around"
     order = np.argsort(omega, kind="stable")
     whole = block_diag(np.eye(modes.n_rigid), mix[:, order])
@@ -309,28 +313,3 @@ def _strengths(samples: np.ndarray, spacing: float, across: int) -> np.ndarray:
     """Integral of every shape over each cell of some samples across, (n_modes, nx, ny) [m^2 kg**-0.5]."""
     n, nx, ny = samples.shape
     return samples.reshape(n, nx // across, across, ny // across, across).sum(axis=(2, 4)) * spacing**2
-
-
-def lattice(shapes: Shapes, size: float, period: int = 1) -> tuple[np.ndarray, np.ndarray]:
-    """Centres (nx, ny, 2) [m] of square cells around a body, and whether each lies on it; multiples of a period."""
-    corner = shapes.grid()[0]
-    low, high = corner.min(axis=0), corner.max(axis=0)
-    count = period * np.ceil((high - low) / (period * size)).astype(int)
-    axes = (0.5 * (low[i] + high[i] + size * (1.0 - count[i])) + size * np.arange(count[i]) for i in (0, 1))
-    places = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1)
-    return places, shapes.contains(places.reshape(-1, 2)).reshape(count)
-
-
-def between_cells(padded: tuple[int, int], size: float) -> tuple[np.ndarray, np.ndarray]:
-    """Distance [m] between cells of a lattice, and the mean of 1 / R [1/m] between their points, (padded) each."""
-    x, y = np.abs(np.meshgrid(*(np.arange(-1.0, n // 2 + 2.0) for n in padded), indexing="ij"))  # in steps
-    distance = np.hypot(x, y)
-    one = np.where(x > 0.0, x, 1.0), np.where(y > 0.0, y, 1.0)
-    whole = 0.5 * x * y * (y * np.arcsinh(x / one[1]) + x * np.arcsinh(y / one[0])) - distance**3 / 6.0
-    for axis in (0, 1):  # the fourth derivative by both coordinates, twice each, is 1 / R
-        whole = np.diff(whole, 2, axis=axis)
-    distance = distance[1:-1, 1:-1]
-    far = 0.5 * EPSILON ** (-1 / 6)  # rounding, 3 EPSILON R**4, then exceeds what the centres miss, R**-2 / 12
-    nearest = np.where(distance > far, 1.0 / np.maximum(distance, 1.0), whole)
-    steps = np.meshgrid(*(np.minimum(np.arange(n), n - np.arange(n)) for n in padded), indexing="ij")
-    return size * np.hypot(*steps), nearest[steps[0], steps[1]] / size

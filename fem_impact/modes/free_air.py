@@ -28,11 +28,14 @@ from scipy.sparse import csr_array
 from scipy.sparse.linalg import LinearOperator, gmres
 
 from .._base.check import SimulationError
+from .._base.rounding import EPSILON
 from ..mesh.meshes import sizes
-from .air import PER_WAVE, between_cells, lattice
 from .modal import Modes
+from .shapes import Shapes
 
 LOG = logging.getLogger(__name__)
+# [-] cells per wavelength of the highest mode, and of its sound; in `air`, two sizes are extrapolated
+PER_WAVE = 8.0
 # [-] cells across a square as large as the plate, in the lattices to choose of: next ones are 1.8 to 2.3 times as large
 ACROSS = 48.0, 64.0, 96.0, 128.0
 # [-] relative, of the solved equations: a thirtieth of what a bound states at least; smaller parts of the operator are
@@ -110,6 +113,20 @@ def jumps(modes: Modes, wanted: np.ndarray, speed: float) -> Iterator[Jumps]:
             inner = np.zeros(solved[1].shape, complex)
             inner[core[inside]] = solved[0]
             yield Jumps(some, points[inside], size, inner, solved[1])
+
+
+def loads(modes: Modes, speed: float) -> tuple[np.ndarray, np.ndarray]:
+    """Mass that air of 1 kg/m^3 adds to each mode, and damping ratio by its sound: (n_modes, 2) and half the width.
+
+    The half width has room as in `Jumps.bounds`. Both are zero of modes that no lattice is fine enough for.
+    """
+    middle, half = np.zeros((2, modes.n_modes, 2))
+    for part in jumps(modes, reach(modes, speed) <= ACROSS[-1], speed):
+        shapes = modes.shapes.take(int(part.modes[-1]) + 1).at(part.points)[:, part.modes]
+        for found, jump in ((middle, part.mean), (half, 0.5 * (part.outer - part.inner))):
+            pressed = part.size**2 * (shapes * jump).sum(axis=0)
+            found[part.modes] = np.column_stack([pressed.real, 0.5 * pressed.imag])
+    return middle, 2.5 * np.abs(half)
 
 
 class AirSheet:
@@ -207,3 +224,28 @@ def fields(
     )
     less, more = (Field(bound, np.array([middle])) for bound in bounds)
     return field, (less, more)
+
+
+def lattice(shapes: Shapes, size: float, period: int = 1) -> tuple[np.ndarray, np.ndarray]:
+    """Centres (nx, ny, 2) [m] of square cells around a body, and whether each lies on it; multiples of a period."""
+    corner = shapes.grid()[0]
+    low, high = corner.min(axis=0), corner.max(axis=0)
+    count = period * np.ceil((high - low) / (period * size)).astype(int)
+    axes = (0.5 * (low[i] + high[i] + size * (1.0 - count[i])) + size * np.arange(count[i]) for i in (0, 1))
+    places = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1)
+    return places, shapes.contains(places.reshape(-1, 2)).reshape(count)
+
+
+def between_cells(padded: tuple[int, int], size: float) -> tuple[np.ndarray, np.ndarray]:
+    """Distance [m] between cells of a lattice, and the mean of 1 / R [1/m] between their points, (padded) each."""
+    x, y = np.abs(np.meshgrid(*(np.arange(-1.0, n // 2 + 2.0) for n in padded), indexing="ij"))  # in steps
+    distance = np.hypot(x, y)
+    one = np.where(x > 0.0, x, 1.0), np.where(y > 0.0, y, 1.0)
+    whole = 0.5 * x * y * (y * np.arcsinh(x / one[1]) + x * np.arcsinh(y / one[0])) - distance**3 / 6.0
+    for axis in (0, 1):  # the fourth derivative by both coordinates, twice each, is 1 / R
+        whole = np.diff(whole, 2, axis=axis)
+    distance = distance[1:-1, 1:-1]
+    far = 0.5 * EPSILON ** (-1 / 6)  # rounding, 3 EPSILON R**4, then exceeds what the centres miss, R**-2 / 12
+    nearest = np.where(distance > far, 1.0 / np.maximum(distance, 1.0), whole)
+    steps = np.meshgrid(*(np.minimum(np.arange(n), n - np.arange(n)) for n in padded), indexing="ij")
+    return size * np.hypot(*steps), nearest[steps[0], steps[1]] / size
