@@ -198,14 +198,16 @@ def fields(
         raise ValueError(f"listener must be at least {least:.3g} m from a plate in free air, got {nearest:.3g} m")
     column = np.cumsum(wanted) - 1
     middle = float(np.linalg.norm(place - np.append(0.5 * (low + high), 0.0)))
-    n_ways, count = int((middle + np.linalg.norm(high - low)) / step) + 2, int(wanted.sum())
+    across, count = float(np.linalg.norm(high - low)), int(wanted.sum())
+    shortest = int(max(0.0, middle - across) / step)
+    n_ways = int((middle + across) / step) + 2 - shortest if count else 1
     own = {order: np.zeros((n_ways, count)) for order in (1, 2, 3)}
     bounds = [{order: np.zeros((1, count)) for order in (1, 2)} for _ in range(2)]
     for part in jumps(modes, wanted, speed):
         omega, here = modes.omega[part.modes], column[part.modes]
         way = np.sqrt(((part.points - place[:2]) ** 2).sum(axis=1) + place[2] ** 2)
         share, first = np.modf(way / step)
-        rows, cells = np.concatenate([first, first + 1.0]).astype(int), np.tile(np.arange(len(way)), 2)
+        rows, cells = np.concatenate([first, first + 1.0]).astype(int) - shortest, np.tile(np.arange(len(way)), 2)
         gather = csr_array((np.concatenate([1.0 - share, share]), (rows, cells)), (n_ways, len(way)))
         near = (place[2] * part.size**2 / (4.0 * np.pi * way**3))[:, None]
         far = near * way[:, None] / speed
@@ -220,7 +222,7 @@ def fields(
     some[0] |= not some.any()
     field = Field(
         {order: weights[some] for order, weights in own.items()},
-        np.multiply(np.flatnonzero(some), step, dtype=np.float64),
+        np.multiply(shortest + np.flatnonzero(some), step, dtype=np.float64),
     )
     less, more = (Field(bound, np.array([middle])) for bound in bounds)
     return field, (less, more)

@@ -497,20 +497,23 @@ def _pressure(
 ) -> np.ndarray:  # fmt: skip
     """Sum (n_times,) over points of delayed motion; ``orders``: order of derivative -> weights (n_points, n_heard)."""
     roots = free_motion.roots(response.target.omega[heard], response.target.damping_ratio[heard])
+    last = delay.max()
+    early = last - delay  # [s] how much sooner it arrives than the last: over a long way decays cannot be undone
     delayed = {
-        order: np.stack([np.einsum("km,km->m", shapes, np.exp(-np.outer(delay, r))) for r in roots])
+        order: np.stack([np.einsum("km,km->m", shapes, np.exp(np.outer(early, r))) for r in roots])
         for order, shapes in orders.items()
     }
     found = []
     for hit, part, local in _parts(response, times):
-        n_first = int(np.searchsorted(local, hit.time[-1] + delay.max(), side="right"))
+        n_first = int(np.searchsorted(local, hit.time[-1] + last, side="right"))
         n_first = n_first if hit.history.stretched is None else len(local)
-        early = [_arrival(response, times[part][:n_first], heard, *each, delay, sample) for each in orders.items()]
-        found.append(np.sum(early, axis=0))
+        first = [_arrival(response, times[part][:n_first], heard, *each, delay, sample) for each in orders.items()]
+        found.append(np.sum(first, axis=0))
         if n_first < len(local):
-            q, p = (state[0, heard] for state in hit.modal_state(local[n_first : n_first + 1]))
-            late = [_ring(hit, local[n_first:], (q, p), heard, weights, order) for order, weights in delayed.items()]
-            found.append(np.sum(late, axis=0))
+            since = local[n_first:] - last
+            q, p = (state[0, heard] for state in hit.modal_state(since[:1]))
+            rest = [_ring(hit, since, (q, p), heard, weights, order) for order, weights in delayed.items()]
+            found.append(np.sum(rest, axis=0))
     return np.concatenate(found)
 
 

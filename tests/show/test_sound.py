@@ -168,6 +168,22 @@ def test_a_free_bar_sounds_like_a_flat_strip_of_which_the_ends_are_solved_for(pl
     assert_allclose(np.sqrt((found**2).mean()), wanted, rtol=0.1)  # as stated; 0.03 was seen
 
 
+def test_far_away_the_sound_is_what_it_was_nearby(bar_hit):
+    """Also where modes decay by more than a number holds on the way, after which it was not a number."""
+    disk = fi.analytic.disk(0.2, edge="clamped", mass=0.3, first_frequency=150.0, n_modes=7, damping_ratio=0.3)
+    how = {"at": (0.06, 0.03), "speed": 1.0, "tolerance": 0.9}
+    hit = fi.strike(disk, fi.Striker.rigid(0.03), fi.Contact.linear(1e5), **how)
+
+    def levels(far):
+        place, heard = (0.0, 0.0, far), {"duration": far / 343.2 + 0.02, "rate": 40_000}
+        bar = sound.radiate_bar(bar_hit, place, width=2e-3, height=1e-3, **heard)[1]
+        free = sound.radiate_free(hit, place, **heard)[1]
+        return np.array([each.level for each in (bar, free, sound.radiate(hit, place, **heard))])
+
+    # [dB] at 40 m, phases along the bar still differ by 0.3 at 10 kHz; 0.27 dB was seen
+    assert_allclose(levels(4_000.0) + 40.0, levels(40.0), atol=0.5)
+
+
 BAR = {"width": 0.02, "height": 0.01, "duration": 0.01}
 
 
