@@ -64,9 +64,9 @@ def read_pitch(name: str, mode: int, value: Any) -> Pitch:
     if found := NOTE.fullmatch(text):
         letter, sign, octave, beside = found.groups()
         steps = SEMITONES[letter.upper()] + {"#": 1, "b": -1, "": 0}[sign] + 12 * (int(octave) - 4)
-        return Pitch(mode, text, frequency=CONCERT * 2.0 ** (steps / 12.0 + float(beside or 0.0) / CENTS))
+        return Pitch(mode, text, frequency=CONCERT * 2.0 ** (steps / 12.0 + _interval(name, beside or 0.0) / CENTS))
     if found := BESIDE.fullmatch(text):
-        return Pitch(mode, text, cents=float(found[1]))
+        return Pitch(mode, text, cents=_interval(name, found[1]))
     if found := RATIO.fullmatch(text):
         if mode == 1:
             raise ValueError(f"{name} must not be a ratio: mode 1 is what ratios are to; give {HOW}")
@@ -74,6 +74,11 @@ def read_pitch(name: str, mode: int, value: Any) -> Pitch:
     if found := FREQUENCY.fullmatch(text):
         return read_pitch(name, mode, float(found[1]))
     raise ValueError(f"{name} must be {HOW}; got {check.shown(value)}")
+
+
+def _interval(name: str, text: Any) -> float:
+    """Cents, of ten octaves at most: there is no sound beyond."""
+    return check.between(name, float(text), -10.0 * CENTS, 10.0 * CENTS, "cents")
 
 
 def read_pitches(pitches: Any, match: str) -> tuple[Pitch, ...]:

@@ -142,7 +142,8 @@ class Tuning(check.Brief):
             Mirrored like the others.
         """
         place = self.before.modes.point("at", at)[0]
-        depth, radius = check.positive("depth", depth, "m"), check.positive("radius", radius or self.radius, "m")
+        depth = check.positive("depth", depth, "m")
+        radius = check.positive("radius", self.radius if radius is None else radius, "m")
         middles = images(place, self.mirror, self.before.system)
         solved = self.body.after(Dishes.of_places([(middles, depth)], radius), self.before)
         slopes = depth * self.before.sensitivity.of_dishes(middles, radius)[0].sum(axis=0)
@@ -253,6 +254,8 @@ def tune(
     (True, 1, True)
     """
     wanted = wishes.read_pitches(pitches, match)
+    if not any(each.words for each in wanted):
+        raise ValueError("pitches must want something of a mode: None only looks at one; name a pitch, too")
     tolerance = check.between("tolerance", tolerance, 0.01, 100.0)
     if isinstance(body, System):
         target = Target.of(body)

@@ -50,6 +50,8 @@ def test_each_pitch_is_that_of_the_nearest_mode_if_there_is_no_doubt():
      ({1: -3.0}, "order", r"pitches\[1\] must be positive"), ({}, "order", "pitches must name at least one mode"),
      ({0: "A4"}, "order", "mode in pitches must be"), ({1: "A4"}, "nearest", "match must be left out where"),
      (["-3 cents"], "nearest", "match must be 'order' for pitches that are no frequencies"),
+     ({2: "-999999999 cents"}, "order", "must lie between -12000 and 12000 cents"),
+     ({1: "A4 +99999 cents"}, "order", "must lie between -12000 and 12000 cents"),
      (["A4"], "best", "match must be one of")],
 )  # fmt: skip
 def test_what_is_no_pitch_is_refused(given, match, says):

@@ -50,6 +50,8 @@ def test_the_map_adds_up_to_a_uniform_removal_and_a_single_patch_tells_what_it_d
     assert (patch.cents > 0.0).all()  # the end is lighter
     with pytest.raises(ValueError, match="at must lie on the body"):
         found.patch((0.5,), 1e-4)
+    with pytest.raises(ValueError, match="radius must be positive, got 0 m"):
+        found.patch((0.1,), 1e-4, radius=0.0)
 
 
 def test_a_straight_bar_becomes_a_marimba_bar():
@@ -105,6 +107,11 @@ def test_a_round_bar_is_turned_down_by_rings():
 def test_arguments_are_checked(body, how, words):
     with pytest.raises(ValueError, match=words):
         fi.tune(body, {1: "-5 cents"}, **how)
+
+
+def test_something_must_be_wanted():
+    with pytest.raises(ValueError, match=r"pitches must want something of a mode: .*; name a pitch, too"):
+        fi.tune(ON_LINE, {1: None, 2: None})
 
 
 def test_pitches_of_the_command_are_in_order_or_by_mode():
