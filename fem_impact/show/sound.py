@@ -331,7 +331,8 @@ def radiate(
     areas = np.bincount(cells.reshape(-1), thirds, minlength=len(points))
     weights = density / (2.0 * np.pi) * np.sign(place[2]) * areas
     way = np.sqrt(((points - place[:2]) ** 2).sum(axis=1) + place[2] ** 2)  # (n_points,) [m]
-    shapes = modes.shapes.at(points)[:, heard] * (weights / way)[:, None]  # (n_points, n_heard)
+    # a point stands for a disk of its area, whose mean of 1 / R in its middle is 2 over its radius
+    shapes = modes.shapes.at(points)[:, heard] * (weights / np.hypot(way, np.sqrt(areas / (4.0 * np.pi))))[:, None]
     times = _times(response, heard, duration, rate)
     pressure = _pressure(response, times, heard, {2: shapes}, way / speed, 1.0 / rate)
     return _scaled(pressure, rate, LOUDEST, "Pa", normalise)

@@ -8,7 +8,7 @@ from scipy import special
 import fem_impact as fi
 from fem_impact.impact import free_motion
 from fem_impact.modes import free_air
-from fem_impact.show import sound
+from fem_impact.show import sampling, sound
 
 FREQUENCIES = np.array([0.0, 220.0, 553.0, 1310.0, 30e3])  # Hz: one silent, three heard, one beyond half the rate
 SHAPES = np.array([[1.5, 2.0, 1.7, -1.1, 1.0], [1.5, -1.2, 0.9, 1.3, 1.0]])  # kg**-0.5 at the two points
@@ -88,6 +88,18 @@ def test_pressure_is_opposite_on_the_other_side_and_falls_with_distance(hit):
     assert_allclose(behind, -near, rtol=0, atol=1e-15)
     # a plate 0.5 m across is seen under 0.7 degrees there: spherical spreading to 1e-3, the time between set aside
     assert_allclose(np.abs(far).max() / np.abs(near).max(), 0.5, rtol=0.05)
+
+
+def test_close_to_a_plate_no_single_point_of_it_is_loud():
+    """Over a place where its shape is sampled, the slowest mode was 11 dB louder at 0.01 mm than at 3 mm."""
+    modes = fi.analytic.rectangle(0.4, 0.3, mass=0.3, first_frequency=200.0, n_modes=1)
+    law = fi.Contact.linear(1e5)
+    hit = fi.strike(modes, fi.Striker.rigid(0.03), law, at=(0.17, 0.13), speed=1.0, tolerance=1.0)
+    points = sampling.grid(modes)[0]
+    x, y = points[np.linalg.norm(points - (0.2, 0.15), axis=1).argmin()]
+    near, far = (sound.radiate(hit, (x, y, z), duration=0.1, rate=8_000).level for z in (1e-5, 3e-3))
+    # [dB] the pressure falls from the surface on by density times acceleration, here by 2 % in 3 mm
+    assert_allclose(near, far, atol=0.3)
 
 
 @pytest.fixture(scope="module")
