@@ -61,7 +61,7 @@ class Jumps(NamedTuple):
         """Pressure of every mode at a place (3,) [m], by `mean`, and the half width of the estimate, (n,) each.
 
         In m kg**-0.5 Pa per kg/m^3 and m/s^2: for a density of 1 kg/m^3 and unit modal acceleration at the frequencies
-        omega (n,) [rad/s]. The half width is 2.5 times half the difference of the two lattices, where the listener is
+        omega (n,) [rad/s]. The half width is 3 times half the difference of the two lattices, where the listener is
         and over the half space in front, since one place may agree by chance; it is at least a tenth of the mode's mean
         sound over all directions, as where that nearly cancels (test_free_air.py).
         """
@@ -82,7 +82,7 @@ class Jumps(NamedTuple):
             for field in fields
         ]).transpose(1, 0, 2)  # (n_places, n) each  # fmt: skip
         apart = np.maximum(np.abs(half[0]), np.sqrt((np.abs(half[1:]) ** 2).mean(axis=0)))
-        return own[0], 2.5 * apart + 0.1 * np.sqrt((np.abs(own[1:]) ** 2).mean(axis=0))
+        return own[0], 3.0 * apart + 0.1 * np.sqrt((np.abs(own[1:]) ** 2).mean(axis=0))
 
 
 def reach(modes: Modes, speed: float) -> np.ndarray:
@@ -126,7 +126,7 @@ def loads(modes: Modes, speed: float) -> tuple[np.ndarray, np.ndarray]:
         for found, jump in ((middle, part.mean), (half, 0.5 * (part.outer - part.inner))):
             pressed = part.size**2 * (shapes * jump).sum(axis=0)
             found[part.modes] = np.column_stack([pressed.real, 0.5 * pressed.imag])
-    return middle, 2.5 * np.abs(half)
+    return middle, 3.0 * np.abs(half)
 
 
 class AirSheet:

@@ -447,8 +447,9 @@ def radiate_free(
     Returns
     -------
     low, high : Sound
-        For equal motion the pressure of each mode lies between them. Where a mode is hardly heard, beside its lobes,
-        it may be silent in ``low``.
+        For equal motion the pressure of each mode lies between them; of free plates whose edges run across the lattice,
+        3 of 100 lay beyond, most by less than a sixth of the width. Where a mode is hardly heard, beside its lobes, it
+        may be silent in ``low``.
 
     Notes
     -----
