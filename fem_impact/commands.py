@@ -341,6 +341,7 @@ def run_explore(options: argparse.Namespace) -> None:
 def run_play(options: argparse.Namespace) -> Answer:
     from ._base import check  # imports numpy, which --help and --version do not need
     from .live import command, controllers, devices
+    from .model import asked
 
     scene = fi.load_scene(options.scene)
     path = page_of(options, "play.wav")
@@ -349,6 +350,8 @@ def run_play(options: argparse.Namespace) -> Answer:
     check.positive("--duration", options.duration, "s")
     if options.midi is not None:
         controllers.read_midi(options.midi, 1, 1.0, 1)
+    if options.at:
+        asked.placed(scene.built.target, "--at", options.at, nullcontext)
     with staged(path.parent) as staging:
         with progress_of(options)("modes"):
             modes = scene.modes(options.n_modes)

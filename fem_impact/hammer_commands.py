@@ -107,6 +107,8 @@ def run_frf(options: argparse.Namespace) -> replies.Answer:
 
     out: Path | None = options.out
     files = [] if out is None else [out] if out.suffix else [out / "frf.csv", out / "frf.html"]
+    for path in files:
+        check.ending(path, ".csv", ".uff", ".html")
     if options.against is not None and not any(path.suffix.lower() == ".html" for path in files):
         raise ValueError("--against is for the page: give --out a folder, or a name that ends in .html")
     with replies.progress_of(options)("frequency responses"):

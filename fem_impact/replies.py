@@ -64,7 +64,13 @@ def page_of(options: argparse.Namespace, name: str) -> Path:
 def picture_of(options: argparse.Namespace, name: str) -> Path | None:
     """The picture to write, with the ending of the format asked for."""
     path = file_of(options, name)
-    return path if path is None or options.format is None else path.with_suffix(f".{options.format}")
+    if path is not None and options.format is not None:
+        return path.with_suffix(f".{options.format}")
+    if path is not None:
+        from .show import figures  # imported only when needed
+
+        figures.check_ending(path)
+    return path
 
 
 def title_of(scene: Any) -> str:

@@ -120,6 +120,7 @@ def test_bad_scene_is_one_line_status_2_and_no_file(scene, tmp_path, prompt):
         ("frf small.toml --bandwidth 1", 2, "; --bandwidth is an option of hammer, watch\n"),
         ("modes small.toml --vkt x.vtu", 2, "did you mean --vtk?"),
         ("hammer small.toml", 2, "required: --bandwidth; see fem-impact hammer --help"),
+        ("hammer small.toml --bandwidth -1 --out x.xyz", 2, "path ending must be one of"),
         ("modes small.toml --n-modes x", 2, "invalid int value: 'x'; see fem-impact modes --help"),
         ("map small.toml --format zar", 2, "did you mean zarr?"),
         ("play small.toml --silent a.wav", 2, "unrecognized arguments: a.wav; see fem-impact play --help"),

@@ -102,12 +102,12 @@ def _follow(
                 t[cut, end] = crossing(piece, low[cut], high[cut], along[cut, end])
             place[facets[mine, end]] = piece.at(t[:, end])
         middles[mine] = piece.at(crossing(piece, t[:, 0], t[:, 1], np.full(len(mine), 0.5)))
-        if is_straight(piece):
-            middles[mine] = place[facets[mine]].mean(axis=1)
         for end in (0, 1):
             tangents[mine, end] = tangent(piece, t[:, end])
             curvatures[mine, end] = curvature(piece, t[:, end])
         edges.setdefault(piece.name, []).extend(mine.tolist())
+    straight = np.array([is_straight(chords[j][0]) for j in owner])  # between their ends, also where a gap was closed
+    middles[straight] = place[facets[straight]].mean(axis=1)
     follower = {int(a): i for i, a in enumerate(facets[:, 0])}
     leader = {int(b): i for i, b in enumerate(facets[:, 1])}
     join(np.array([[leader[v], follower[v]] for v in follower]), tangents, curvatures)

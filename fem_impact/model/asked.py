@@ -107,10 +107,10 @@ class Asked:
                 values[name] = getattr(options, name)
             values["stretching"] = options.stretching or blow.target.stretching
             speed = check.positive("speed", values["speed"], "m/s")
-        values["at"] = _placed(blow.target, "at", values["at"], partial(blow.target.blame, "strike", changes))[0]
+        values["at"] = placed(blow.target, "at", values["at"], partial(blow.target.blame, "strike", changes))[0]
         watched = [point for point in blow.points if blow.moving and point is not blow.arguments.get("at")]
         if watched:
-            _placed(blow.target, "points", watched, partial(blow.target.blame, "observe"))
+            placed(blow.target, "points", watched, partial(blow.target.blame, "observe"))
         duration = accuracy.contact_duration(blow.contact, blow.striker.felt_mass, speed)
         budget = Budget(options.tolerance, blow.contact.rated)
         return cls(blow, changes, values, pieces, budget, options.quantities, duration)
@@ -308,7 +308,7 @@ def refine(description: Any, strike: Callable[..., tuple[Any, Any]], stages: Sta
     return struck
 
 
-def _placed(target: Target, name: str, given: Any, blame: Callable[[], Any]) -> Any:
+def placed(target: Target, name: str, given: Any, blame: Callable[[], Any]) -> Any:
     """Points (n_points, dimension) [m], checked to lie on the body; one if they are those of ``at``."""
     mesh = target.mesh
     with blame():

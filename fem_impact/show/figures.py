@@ -6,6 +6,7 @@ from typing import Any
 
 import matplotlib
 import numpy as np
+from matplotlib.backend_bases import FigureCanvasBase
 from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
 from matplotlib.ticker import EngFormatter, MaxNLocator
@@ -51,9 +52,14 @@ def styled(width: float, height: float) -> AbstractContextManager[Figure]:
 @check.typed
 def save(path: str | Path, figure: Figure) -> None:
     """Write a figure; the ending of the path sets the format (.png, .pdf, .svg)."""
-    check.ending(path, *(f".{name}" for name in figure.canvas.get_supported_filetypes()))
+    check_ending(path)
     with matplotlib.rc_context(STYLE), replacing(path) as temporary:
         figure.savefig(temporary)
+
+
+def check_ending(path: str | Path) -> None:
+    """Raise ValueError unless a figure can be written to this path."""
+    check.ending(path, *(f".{name}" for name in FigureCanvasBase.get_supported_filetypes()))
 
 
 @check.typed

@@ -72,6 +72,8 @@ def laid_out(
     ``alone``: all cells are computed alone, whatever the contact. ``cells`` is the number of values along an axis that
     is a range without a count; by default those of SIDE for two such axes, and as many cells in all whatever the axes.
     """
+    if cells is not None:
+        check.count("cells", cells, low=2, high=MOST_VALUES)
     found = {name: read_axis(name, values) if isinstance(values, Mapping) else values for name, values in over.items()}
     free = [name for name, values in found.items() if isinstance(values, partial)]
     if not free:
@@ -79,7 +81,7 @@ def laid_out(
     side = SIDE[computed_together(contact, found) and not alone]
     given = math.prod(len(np.atleast_1d(values)) for values in found.values() if not isinstance(values, partial))
     most = int((side**2 / given) ** (1.0 / len(free)))
-    count = max(2, min(side, most)) if cells is None else check.count("cells", cells, low=2, high=MOST_VALUES)
+    count = max(2, min(side, most)) if cells is None else cells
     return {name: values(count) if name in free else values for name, values in found.items()}, True
 
 

@@ -164,6 +164,8 @@ def cut(
     whole = np.concatenate(moved)
     limit = level(whole) if trigger is None else check.positive("trigger", trigger, "N")
     places = [(k, *place) for k, row in enumerate(moved) for place in find_rooms(row, limit, pause)]
+    if not whole.any():
+        raise ValueError(f"no tap was found in {name}: its force does not change; name its channel, force=")
     if not places:
         raise ValueError(
             f"no tap was found in {name}: its force reaches {whole.max():.3g} N and the trigger is {limit:.3g} N; "

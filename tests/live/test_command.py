@@ -36,7 +36,7 @@ def test_a_midi_file_is_played_into_a_wav_twice_the_same(scene, tmp_path, prompt
 
 @pytest.mark.parametrize(
     ("words", "said"), [("--midi no.mid", "no.mid: there is no such file"), ("--duration 0", "must be positive"),
-                        ("--block 0", "must be at least 1")],
+                        ("--block 0", "must be at least 1"), ("--at 0.6 0.1", "--at must lie on the body")],
 )  # fmt: skip
 def test_what_is_wrong_at_a_glance_is_refused_before_modes_are_found(scene, monkeypatch, prompt, words, said):
     monkeypatch.setattr(Scene, "modes", None)

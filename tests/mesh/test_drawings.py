@@ -1,5 +1,7 @@
 """Outlines from SVG, DXF, shapely and points: curves stay curves, units are honoured, what is no body is refused."""
 
+from itertools import pairwise
+
 import ezdxf
 import numpy as np
 import pytest
@@ -119,6 +121,17 @@ def test_dxf_lines_and_arcs_in_any_order_make_a_stadium(tmp_path):
     exact = 1.0 + 0.25 * np.pi - 0.01 * np.pi
     assert_allclose(fi.mesh.outline(dxf(tmp_path, draw, units=4), size=0.02).area, exact, rtol=1e-3)  # chords
     assert set(shape.edges) == {"edge0", "hole0", "outer", "boundary"}  # smooth all round: one edge
+
+
+def test_an_edge_beside_a_gap_that_is_closed_stays_straight(tmp_path):
+    corners = [(1e-7, 0.0), (0.4, 0.0), (0.4, 0.3), (0.0, 0.3), (0.0, 0.0)]
+
+    def draw(space):
+        for start, end in pairwise(corners):
+            space.add_line(start, end)
+
+    shape = fi.mesh.outline(dxf(tmp_path, draw))
+    assert any("gap of 1e-07 m was closed" in note for note in shape.notes) and not shape.curved.any()
 
 
 def test_dxf_polyline_with_a_bulge_is_an_arc(tmp_path):

@@ -92,6 +92,11 @@ def test_ranges_of_no_sense_are_told(values, message):
         cells.laid_out({"mass": values}, fi.Contact.linear(1e5))
 
 
+def test_a_number_of_cells_of_no_sense_is_told_beside_values_too():
+    with pytest.raises(ValueError, match="cells must be at least 2, got 0"):
+        cells.laid_out({"mass": [0.1, 0.2]}, fi.Contact.linear(1e5), cells=0)
+
+
 def test_values_typed_with_four_digits_are_evenly_spaced_in_the_logarithm():
     values = np.geomspace(0.01, 10.0, 40)
     assert cells.logarithmic(np.array([float(f"{value:.4g}") for value in values]))

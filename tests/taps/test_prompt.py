@@ -42,6 +42,11 @@ def test_a_scene_to_compare_with_needs_a_page(prompt):
     assert ran.status == 2 and "give --out a folder, or a name that ends in .html" in ran.err
 
 
+def test_an_ending_of_no_file_of_responses_is_refused_before_taps_are_read(prompt):
+    ran = prompt("frf", "no.lvm", "--out", "frf.xyz")
+    assert ran.status == 2 and "must be one of .csv, .uff, .html, got '.xyz'" in ran.err
+
+
 def test_frf_of_a_scene_finds_its_modes(prompt):
     ran = prompt("frf", DRUMSTICK, "--rate", "12800")
     first = fi.load_scene(DRUMSTICK).modes(1).frequencies[0]

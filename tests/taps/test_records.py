@@ -88,6 +88,12 @@ def test_clipping_and_full_scale_are_seen(read, top, options, cut):
     assert read(np.minimum(record(5000, noise=0.02), top), **options).overload.tolist() == [cut]
 
 
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_a_force_of_nothing_is_told_as_that(read, sign):
+    with pytest.raises(ValueError, match="its force does not change"):
+        read(sign * np.zeros(5000))
+
+
 @pytest.mark.parametrize(("options", "text"), [
     ({}, "no tap was found"), ({"force": "forse"}, r"'forse' is no channel.*did you mean 'force'"),
     ({"force": 7}, "channel from 0 to 1"), ({"units": {"force": "pounds"}}, "units must be one of"),
