@@ -70,15 +70,31 @@ def directly(pieces: Pieces, frequencies: np.ndarray) -> np.ndarray:
     """The same, summed over the closed forms of all pieces: for few of them, and for very high frequencies.
 
     About its middle a piece has the mean force times sinc and half its rise times the first spherical Bessel function.
+    Zero where the phases, by their rounding, err by more than the force can have there.
     """
     t, h, f0, f1 = pieces
     omega = 2.0 * np.pi * frequencies
     total = np.zeros(len(omega), complex)
-    for block in np.array_split(np.arange(len(omega)), max(1, len(omega) * len(h) // 2**20)):
+    rounding = np.finfo(float).eps * (t + h).max(initial=0.0) * (0.5 * h * np.abs(f0 + f1)).sum()
+    jumps, turns = _unevenness(pieces)
+    known = np.flatnonzero(np.abs(omega) ** 3 * rounding <= np.abs(omega) * jumps + turns)
+    for block in np.array_split(known, max(1, len(known) * len(h) // 2**20)):
         y = omega[block, None] * (0.5 * h)  # (n_block, n_pieces)
         whole = 0.5 * h * ((f0 + f1) * np.sinc(y / np.pi) - 1j * (f1 - f0) * special.spherical_jn(1, y))
         total[block] = (np.exp(-1j * omega[block, None] * (t + 0.5 * h)) * whole).sum(axis=1)
     return total
+
+
+def _unevenness(pieces: Pieces) -> tuple[float, float]:
+    """Sums of the jumps [N] of a force and of its slope [N/s]; over omega and omega**2 they bound its transform."""
+    _, h, f0, f1 = pieces
+    jumps = np.abs(np.diff(np.column_stack([f0, f1]).ravel(), prepend=0.0, append=0.0))
+    jumps[1::2][h > 0.0] = 0.0
+    slope = np.divide(f1 - f0, h, out=np.zeros(len(h)), where=h > 0.0)
+    turns = np.abs(np.diff(slope, prepend=0.0, append=0.0))
+    rest = np.flatnonzero(f1[:-1] == 0.0)  # here there may be a pause
+    turns[rest + 1] = np.abs(slope[rest]) + np.abs(slope[rest + 1])
+    return float(jumps.sum()), float(turns.sum())
 
 
 def _impulses(pieces: Pieces, rule: int, parts: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

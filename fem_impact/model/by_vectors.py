@@ -15,7 +15,7 @@ from ..impact.compiled import build
 from ..impact.motion import LOOKED_AT
 from ..impact.response import Response
 from ..modes.modal import Modes, damping_ratios
-from . import audit, cost, idealisation, vectors
+from . import audit, cost, fresh, idealisation, vectors
 from .asked import Asked, Description, Unaffordable
 from .budget import CHEAP
 from .by_idealisation import Idealised
@@ -160,7 +160,7 @@ def _length_foreseen(asked: Asked) -> tuple[float, int, bool]:
         return 1.0, 1, False
     mobility, echo = seen.local
     try:
-        hit = _roughly(asked, idealisation.endless(at, seen.mass, mobility, asked.duration))
+        hit = _roughly(asked, idealisation.endless(at, seen.mass, mobility, asked.duration), fresh.STEPS)
     except check.SimulationError:
         return 1.0, 1, False
     lasts, echo = max((touch.end for touch in hit.impacts), default=0.0) / asked.duration, echo / asked.duration
@@ -171,7 +171,7 @@ def _length_foreseen(asked: Asked) -> tuple[float, int, bool]:
     return max(1.0, echo), SEVERAL if echo > lasts else 1, True  # still pressing, it is thrown off for good
 
 
-def _roughly(asked: Asked, body: Any, most: float = np.inf, **how: Any) -> Response:
+def _roughly(asked: Asked, body: Any, most: float, **how: Any) -> Response:
     """The blow on a body that stands for the target, in the time of a plan; gives up after ``most`` steps."""
     striker = collision.shortened(asked.blow.striker, asked.striker_modes(1.0)[0])
     at, speed = asked.values["at"], asked.values["speed"]

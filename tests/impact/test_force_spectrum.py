@@ -92,6 +92,16 @@ def test_many_pieces_and_frequencies_too_high_for_the_transform_agree(n_pieces):
         assert_allclose(found, direct, rtol=0.0, atol=allowed(pieces, highest, 2e-14) * whole)
 
 
+def test_what_rounding_hides_is_zero_and_takes_no_time():
+    """Touches of days, in pieces that no transform of seconds resolves."""
+    time = np.linspace(0.0, 1e7, 100_001)
+    pieces = force_spectrum.pieces(time, np.maximum(np.sin(3e-6 * np.pi * time), 0.0)[:, None])
+    frequencies = np.concatenate([[0.0, 1.5e-6], np.full(100_000, 1e3)])  # would take a quarter of an hour
+    found = force_spectrum.of_pieces(pieces, frequencies)
+    assert_allclose(found[:2], force_spectrum.directly(pieces, frequencies[:2]), rtol=1e-12)
+    assert np.abs(found[:2]).min() > 1e5 and not found[2:].any()
+
+
 def test_one_frequency_zeros_and_no_pieces_have_a_spectrum():
     pieces, whole = rough(5_000, seed=4)
     impulse = float((pieces[1] * (pieces[2] + pieces[3])).sum() / 2.0)
