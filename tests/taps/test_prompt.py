@@ -36,7 +36,6 @@ def test_frf_of_a_file_lists_peaks_and_writes_a_table(prompt):
     assert rows.shape[1] == 5 and rows[-1, 0] == pytest.approx(12800.0, rel=0.01)
 
 
-@pytest.mark.slow
 def test_a_scene_to_compare_with_needs_a_page(prompt):
     ran = prompt("frf", TAPS, "--against", "no.toml", "--out", "frf.csv")
     assert ran.status == 2 and "give --out a folder, or a name that ends in .html" in ran.err
@@ -47,6 +46,7 @@ def test_an_ending_of_no_file_of_responses_is_refused_before_taps_are_read(promp
     assert ran.status == 2 and "must be one of .csv, .uff, .html, got '.xyz'" in ran.err
 
 
+@pytest.mark.slow
 def test_frf_of_a_scene_finds_its_modes(prompt):
     ran = prompt("frf", DRUMSTICK, "--rate", "12800")
     first = fi.load_scene(DRUMSTICK).modes(1).frequencies[0]
