@@ -67,9 +67,10 @@ def picture_of(options: argparse.Namespace, name: str) -> Path | None:
     if path is not None and options.format is not None:
         return path.with_suffix(f".{options.format}")
     if path is not None:
-        from .show import figures  # imported only when needed
+        from ._base import check  # imported only when needed
+        from .show import style
 
-        figures.check_ending(path)
+        check.ending(path, *style.ENDINGS)
     return path
 
 

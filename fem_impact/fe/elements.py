@@ -111,7 +111,8 @@ class Triangles:
         """Derivatives (n, order + 1, n_q, n_terms) by x and y of the monomials of cells (n,) at points (n, n_q, 2)."""
         local = self.local(cells, points)
         raw = np.stack([monomials(local, order - k, k, degree) for k in range(order + 1)], axis=1)
-        return (chained(self.inverse[cells], order) @ raw.reshape(*raw.shape[:2], -1)).reshape(raw.shape)
+        flat = raw.reshape(*raw.shape[:2], raw.shape[2] * raw.shape[3])  # not -1: there may be no cells
+        return (chained(self.inverse[cells], order) @ flat).reshape(raw.shape)
 
     def bending_functions(self, cells: np.ndarray, points: np.ndarray, orders: tuple[int, ...]) -> list[np.ndarray]:
         """Derivatives of the shape functions of cells (n,) at points (n, n_q, 2), one array for each order.

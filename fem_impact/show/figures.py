@@ -6,7 +6,6 @@ from typing import Any
 
 import matplotlib
 import numpy as np
-from matplotlib.backend_bases import FigureCanvasBase
 from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
 from matplotlib.ticker import EngFormatter, MaxNLocator
@@ -27,7 +26,7 @@ from ..modes.viewing import rib_sides
 from ..sweeps.spreads import DOUBLE, QUANTITIES, Spread, double_hits
 from . import sampling
 from .canvas import COLOURS, VERMILION
-from .style import BLUE, GREEN, GREY, PALETTE, SKY, STYLE, draw_rim, opened, panels, set_units
+from .style import BLUE, ENDINGS, GREEN, GREY, PALETTE, SKY, STYLE, draw_rim, opened, panels, set_units
 
 SPECTRUM_BAND = (10.0, 20e3)  # [Hz] default band: about what people hear
 SPECTRUM_POINTS = 1200  # [-] frequencies in a spectrum: about one per pixel
@@ -52,14 +51,9 @@ def styled(width: float, height: float) -> AbstractContextManager[Figure]:
 @check.typed
 def save(path: str | Path, figure: Figure) -> None:
     """Write a figure; the ending of the path sets the format (.png, .pdf, .svg)."""
-    check_ending(path)
+    check.ending(path, *ENDINGS)
     with matplotlib.rc_context(STYLE), replacing(path) as temporary:
         figure.savefig(temporary)
-
-
-def check_ending(path: str | Path) -> None:
-    """Raise ValueError unless a figure can be written to this path."""
-    check.ending(path, *(f".{name}" for name in FigureCanvasBase.get_supported_filetypes()))
 
 
 @check.typed

@@ -38,6 +38,7 @@ STYLE: Any = {
     "savefig.dpi": 150.0,
     "text.usetex": False,  # a matplotlibrc in the working folder may say otherwise, with commands of its own
 }
+ENDINGS = tuple(f".{name}" for name in FigureCanvasAgg.get_supported_filetypes())  # of files of figures
 
 
 class StyledFigure(Figure):
