@@ -81,7 +81,8 @@ def frf(
 
     Examples
     --------
-    >>> rod = fi.Modes.from_arrays([0.0, 700.0], [[1.0, 1.0]], points=[[0.0]], mass=1.0, damping_ratio=0.02)
+    >>> known = {"points": [[0.0]], "mass": 1.0, "damping_ratio": 0.02, "complete": True}
+    >>> rod = fi.Modes.from_arrays([0.0, 700.0], [[1.0, 1.0]], **known)
     >>> hit = fi.strike(rod, fi.Striker.rigid(0.02), fi.Contact.linear(1e5), at=[0.0], speed=1.0)
     >>> tap = fi.measure(hit, rate=25600.0, at=[[0.0]], duration=0.5)
     >>> found = fi.frf(tap)
