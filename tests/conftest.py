@@ -17,7 +17,7 @@ settings.register_profile("same", derandomize=True)  # the same cases in every r
 settings.load_profile("same")
 CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
 # What `pytest -m smoke` runs, without their slow cases: quick files of every package, physics in each. They need the
-# kernels of A4 and of maps, but neither collocation nor stretching.
+# kernels of A4 and of maps, but not stretching.
 SMOKE = (
     "designs/test_goals", "fe/test_eigenvalues", "fe/test_membrane", "fe/test_plausible", "impact/test_response",
     "impact/test_contact", "impact/test_force_spectrum", "impact/test_threshold", "mesh/test_meshes",

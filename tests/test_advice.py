@@ -213,8 +213,6 @@ ADVICE = {  # what fails, the message, and what it advises
      lambda tmp: load_text(tmp, SMALL.replace('"hinged"', '"clamped"').replace('"analytic"', '"fe"')).plan()),
     "hinge": (lambda _: fi.Striker.flexible(beam("hinged", "free"), at=0.0), "move it off the hinge",
      lambda _: fi.Striker.flexible(beam("hinged", "free"), at=0.05)),
-    "collocation": (lambda _: struck(fi.Contact.power(1e3, 0.8), scheme="collocation"), "use A4",
-     lambda _: struck(fi.Contact.power(1e3, 0.8), scheme="A4")),
     "cells": (lambda _: swept(), "raise max_cells, now 2$", lambda _: swept(max_cells=3)),
     "fewer values": (lambda _: swept(), "give fewer values", lambda _: swept(over={"mass": [0.02, 0.03]})),
     "sound of a beam": (lambda _: fi.sound.radiate(of_a_beam(), (0.0, 0.0, 1.0)), "use radiate_bar",
@@ -449,7 +447,7 @@ def test_following_the_advice_works(tmp_path, name):
 )
 def test_a_step_error_that_stays_too_large_proposes_what_is_met(monkeypatch, most, tolerance, mass, stiffness):
     monkeypatch.setattr(engine, "most_steps", lambda *_: most)
-    law = fi.Contact.power(stiffness, 0.8)  # collocation, which would take over, needs an exponent of 1
+    law = fi.Contact.power(stiffness, 0.8)
     wanted = {"mass": mass, "tolerance": tolerance, "residual": False}
     words = r"; (raise tolerance to|give max_impacts of at most) \S+ \("
     with pytest.raises(fi.SimulationError, match=words) as caught:

@@ -92,8 +92,6 @@ STRETCHING = {
     "several bodies": (lambda: together(replace(plate(), stretches=True)),
      "can only be struck once, by `fi.strike`; leave stretching out$",
      [lambda: blow(replace(plate(), stretches=True)), lambda: together(plate())]),
-    "collocation": (lambda: blow(plate(), scheme="collocation"), "does not support stretching; use A4$",
-     [lambda: blow(plate(), scheme="A4")]),
 }
 # fmt: on
 

@@ -235,10 +235,8 @@ def _slopes(
 
 
 def step_of(hit: "Response") -> float:
-    """Step [s] of a blow in contact; of one by collocation, that with which scheme A4 would tell as much."""
+    """Step [s] of a blow in contact."""
     h = hit.history
-    if hit.scheme == "collocation":
-        return engine.pace_of(h.system).duration / engine.steps_per_contact(engine.STEP_SHARE * hit.tolerance)
     return float(h.steps[h.pressed.any(axis=1), layout.LENGTH].max())
 
 

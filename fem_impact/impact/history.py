@@ -66,7 +66,7 @@ class History(check.Locked):
     law: np.ndarray  # (n_contacts,) stiffness, exponent, loss, series compliance, .. see `compiled.law.LAW`
     start_q: np.ndarray  # (n_modes,) [m kg**0.5]
     start_p: np.ndarray  # (n_modes,) [m kg**0.5/s]
-    steps: np.ndarray  # (n_steps, 3 + (4 + n_coefficients) n_contacts), see `energy.run_energy`
+    steps: np.ndarray  # (n_steps, 3 + 6 n_contacts), see `energy.run_energy`
     end_q: np.ndarray  # (n_modes,)
     end_p: np.ndarray  # (n_modes,)
     now: np.ndarray  # (6, n_contacts) at the end; row 0 approach [m], row 4 rate [m/s], row 5 memory
@@ -78,12 +78,6 @@ class History(check.Locked):
     miss: float | None = None  # [m] highest approach at which the bodies turned back in flight, if they did
     stretched: Stretched | None = None  # if one of the bodies stretches
     reached: dict[str, Any] = field(default_factory=dict, init=False, repr=False)  # where its motion goes on
-    n_coefficients: int = field(init=False)  # [-] of each step's force polynomial, per contact
-
-    def __post_init__(self) -> None:
-        check.lock_arrays(self)
-        width = (self.steps.shape[1] - layout.HEAD) // len(self.offset)
-        object.__setattr__(self, "n_coefficients", width - layout.PUSH - 1)
 
     @property
     def n_contacts(self) -> int:
@@ -96,14 +90,12 @@ class History(check.Locked):
         return KernelSystem(*bodies, self.law, self.start_q, self.start_p)
 
     def _column(self, first: int) -> np.ndarray:
-        width, m = layout.PUSH + self.n_coefficients, len(self.offset)
-        return self.steps[:, layout.HEAD + first : layout.HEAD + width * m : width]
+        return self.steps[:, layout.HEAD + first : layout.HEAD + layout.WIDTH * self.n_contacts : layout.WIDTH]
 
     @cached_property
     def impulses(self) -> np.ndarray:
         """Impulse of every step and contact [N s], (n_steps, n_contacts)."""
-        mean = sum(self._column(layout.PUSH + k) / (k + 1.0) for k in range(self.n_coefficients))
-        return self.steps[:, 1:2] * mean
+        return self.steps[:, 1:2] * (self._column(layout.PUSH) + 0.5 * self._column(layout.GAIN))
 
     @cached_property
     def pressed(self) -> np.ndarray:
@@ -114,7 +106,7 @@ class History(check.Locked):
         """Contact force [N] and its rate [N/s] at a fraction of each of some steps, (n,) each."""
         found = np.empty((2, len(steps)))
         rows, parts = np.array(steps, np.int64), np.array(part, float)
-        record.forces(self.steps, self.now, self.law, self.n_coefficients, rows, contact, parts, found)
+        record.forces(self.steps, self.now, self.law, rows, contact, parts, found)
         return found[0], found[1]
 
     def force_at(self, times: np.ndarray, contact: int) -> tuple[np.ndarray, np.ndarray]:
@@ -141,7 +133,7 @@ class History(check.Locked):
         if self.stretched is not None:
             return self.stretched.states(self, times)
         q, p = np.empty((len(times), len(self.omega))), np.empty((len(times), len(self.omega)))
-        propagation.replay(self.system, self.steps, self.n_coefficients, times, q, p)
+        propagation.replay(self.system, self.steps, times, q, p)
         return q, p
 
     @cached_property
@@ -208,9 +200,9 @@ class History(check.Locked):
         Columns are start, end, peak force, impulse, contact index, with what speed the bodies meet and part, and the
         restitution, the second of these over the first; NaN where there is none.
         """
-        size, n = np.abs(self.shape), self.n_coefficients
+        size = np.abs(self.shape)
         way = max((size @ (np.abs(self.start_q) + self.end_time * np.abs(self.start_p))).tolist())
-        found = record.find_impacts(self.steps, self.now, self.law, n, ROUNDING, way, TOUCH)
+        found = record.find_impacts(self.steps, self.now, self.law, ROUNDING, way, TOUCH)
         if len(found) > 1:
             peak, pressed = found[:, 2], self.law[found[:, 4].astype(int)]
             depth = (peak / pressed["stiffness"]) ** (1.0 / pressed["exponent"])
@@ -253,7 +245,7 @@ class History(check.Locked):
         passes zero although the steps say that it does not.
         """
         miss = -np.inf if self.miss is None else self.miss
-        near, far, row, i = record.nearest_turn(self.steps, self.now, self.law, self.n_coefficients, miss)
+        near, far, row, i = record.nearest_turn(self.steps, self.now, self.law, miss)
         if row >= 0 and abs(near) < CLEAR * far:
             near = max(0.0, self._turn_in(row, i) * (1.0 if self.pressed[row, i] else -1.0))
         return abs(near) / far if far else np.inf
@@ -297,12 +289,12 @@ class History(check.Locked):
         Steps may be too long for its ripples or, with loss, for the rate in them: that of a cubic errs by nothing at
         three places in a step, and in both directions between them.
         """
-        if self.n_coefficients > 2 or not len(self.contacts):
+        if not len(self.contacts):
             return 0.0
         peak = float(self.contacts[:, 2].max())
         if not peak:  # pressed by less than rounding
             return 1.0
-        missed = min(1.0, float(record.force_missed(self.steps, self.now, self.law, self.n_coefficients, peak)))
+        missed = min(1.0, float(record.force_missed(self.steps, self.now, self.law, peak)))
         for i in np.flatnonzero(self.law["loss"]):
             pushes, speeds = self.impulses[:, i] / self.steps[:, layout.LENGTH], self._column(layout.SPEED)[:, i]
             row, loss = int(pushes.argmax()), float(self.law["loss"][i])

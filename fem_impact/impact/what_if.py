@@ -43,7 +43,7 @@ class Followed:
         system = joined(parts, self.laws)
         if self.system.q.any():
             system = system._replace(offset=system.offset + self._apart(system, late is not None))
-        return engine.run_system(system, *how, stretched_in(parts))
+        return engine.run_system(system, *how, stretched_in(parts), within=self.runs.within)
 
     def _apart(self, system: KernelSystem, moved: bool) -> np.ndarray:
         """How much nearer (n_contacts,) [m] contacts must begin: what modes that are lacking had moved them, stays.

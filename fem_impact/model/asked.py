@@ -103,7 +103,7 @@ class Asked:
                 if name not in ARGUMENTS:
                     raise ValueError(f"{name} is not an argument of a blow{check.nearest(name, [*ARGUMENTS, *PIECES])}")
             options = stepping.Options(**{name: values[name] for name in values if name not in ("at", "speed")})
-            for name in ("dt", "duration", "residual", "striker_force", "target_force"):
+            for name in ("scheme", "dt", "duration", "residual", "striker_force", "target_force"):
                 values[name] = getattr(options, name)
             values["stretching"] = options.stretching or blow.target.stretching
             speed = check.positive("speed", values["speed"], "m/s")
@@ -235,22 +235,18 @@ class Asked:
             bending, whole = kept - modes.n_rigid, modes.n_modes - modes.n_rigid
             stiff = "is treated as rigid" if bending == 0 else f"keeps {bending} of its {whole} bending modes"
             reasons = (*reasons, f"the striker {stiff}")
-        usual = "A4" if self.values["stretching"] else stepping.scheme_for(steps, self.blow.contact.exponent)
-        scheme, fixed = self.values.get("scheme") or usual, self.values["dt"]
+        scheme, fixed = self.values["scheme"], self.values["dt"]
         dt = fixed or self.duration / stepping.first_count(scheme, steps, self.quantities)
         until = "fixed by dt" if fixed else f"halved until two runs agree to {steps:.1e}"
         stop = self.values["duration"]
         end = "until the bodies have parted for good" if stop is None else f"for {stop:g} s"
-        count = alike = self.duration / dt
-        if scheme == "collocation" and not fixed:  # its first step says little of those it takes in the end:
-            alike = 10.0 * 300.0 * (1e-9 / steps) ** 0.2  # 300 at 1e-9, each ten times the work of another scheme's
+        count = self.duration / dt
         if self.blow.target.air:
             work = work + cost.Work(dense=1e-4 * n_modes**2)  # [s] 0.1 ms per mode squared
-        # for three descriptions, by two schemes, steps are halved up to eight times, the more often the longer it lasts
+        # for three descriptions steps are halved up to eight times, the more often the longer it lasts
         lasts = max(lasts, self.pressed)
-        halved = min(min(255.0, lasts) * alike * lasts, engine.MAX_STEPS)
-        alike = max(alike, 3.0 * 2.0 / 20.0 * halved)
-        work = work + cost.strikes(alike, max(n_modes, most) + kept)
+        halved = min(min(255.0, lasts) * count * lasts, engine.MAX_STEPS)
+        work = work + cost.strikes(max(count, 3.0 / 20.0 * halved), max(n_modes, most) + kept)
         reasons = (*reasons, f"scheme {scheme}, steps of {dt:.3g} s ({count:.0f} per contact), {until}, {end}")
         rest: dict[str, Any] = {"element": None, "size": None, "n_dofs": 0, "max_frequency": None, **chosen}
         return Forecast(

@@ -10,7 +10,7 @@ import numpy as np
 from .._base import check, progress
 from ..fe import refinement
 from ..fe.section import Plate
-from ..impact import accuracy, collision
+from ..impact import accuracy, collision, engine
 from ..impact.compiled import build
 from ..impact.motion import LOOKED_AT
 from ..impact.response import Response
@@ -25,7 +25,6 @@ from .target import FIRST_LOOK, Elements, Stages
 AUDIBLE = 20e3  # [Hz] the ear's limit: no mode above is asked for unless a band of the sound is
 MOST_RINGING = 400  # [-] modes for motion and sound if no band is asked for: ten seconds, a minute of a curved plate
 RESOLVING = 30  # [-] unknowns of the finest mesh for each vector of a heavy striker; 17 to 47 in effectivity.py
-STICKY = 5.0  # [-] loss factor times speed of a contact that hardly throws off by itself: from a wall, 0.2 of the speed
 LIGHT = 0.1  # [-] mass over that of the plate
 SEVERAL = 3  # [-] impacts at least of a striker at rest until echoes throw it off; 3 to 9 on steel sheets
 
@@ -194,7 +193,7 @@ def _rattling(asked: Asked, first: int) -> int:
     quicker = (1.0 + lost) ** (1.0 / (contact.exponent + 1.0))  # than without loss, as a stiffer contact
     if seen is None or not np.isfinite(seen.mobility):
         return 0
-    if lost < STICKY and not asked.stopped(seen.mobility, quicker):
+    if lost < engine.STICKY and not asked.stopped(seen.mobility, quicker):
         return 0
     # half a period of a heavy one on a hinged square as a spring; the first echo throws off a light one
     lasts = np.pi * seen.mobility * (0.74 * mass * seen.mass) ** 0.5 if mass > LIGHT * seen.mass else 0.0
@@ -202,7 +201,7 @@ def _rattling(asked: Asked, first: int) -> int:
     if target.closed is not None and heard < 1000.0:
         with suppress(check.SimulationError):
             body = target.finished(target.closed(n_modes=FIRST_LOOK + round(heard)))
-            hit = _roughly(asked, body, 1000.0, max_impacts=asked.values.get("max_impacts"))
+            hit = _roughly(asked, body, 1000.0, residual=False, max_impacts=asked.values.get("max_impacts"))
             lasts = max((touch.end for touch in hit.impacts), default=lasts)
     highest = quicker * asked.highest(seen.mobility)
     needed = min(1.6 * target.count_below(highest / target.stretch), 3.0 * highest * lasts, 6.0 * first)

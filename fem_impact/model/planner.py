@@ -368,7 +368,7 @@ def strike(
     max_impacts : int, optional
         The run stops after this many impacts.
     scheme : {"A", "A4", "collocation"}, optional
-        Time integration scheme; by default, the tolerance decides.
+        Time integration scheme, by default A4; so is the last, the name of an earlier one.
     dt : float [s], optional
         Time step in contact. If given, the step error is only estimated and may exceed the tolerance.
     striker_force, target_force : float [N]

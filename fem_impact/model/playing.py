@@ -14,7 +14,7 @@ from .._base.check import SimulationError
 from .._base.explained import below, noted
 from ..impact import collision, promise
 from ..impact.collision import Touch
-from ..impact.compiled import record
+from ..impact.compiled import layout, record
 from ..impact.contact import Contact
 from ..impact.engine import TOLERANCE
 from ..impact.error import Error
@@ -435,7 +435,7 @@ class _Game:
         history = replace(
             h, omega=self.modes.omega, zeta=self.modes.damping_ratio, shape=np.zeros((1, n)), offset=np.zeros(1),
             bias=np.zeros(n), law=h.law[:1].copy(), start_q=self.q, start_p=self.p, end_q=self.q, end_p=self.p,
-            steps=np.zeros((0, 7 + h.n_coefficients)), now=np.zeros((6, 1)), work=np.zeros(1), end_time=0.0,
+            steps=h.steps[:0, : layout.HEAD + layout.WIDTH + 1], now=np.zeros((6, 1)), work=np.zeros(1), end_time=0.0,
             status=record.FINISHED,
         )  # fmt: skip
         q, p = self.q + self.doubt[0], self.p + self.doubt[1]

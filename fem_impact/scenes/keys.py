@@ -243,7 +243,7 @@ KEYS: dict[str, tuple[str, Form]] = {
     "residual": ("whether the compliance of modes left out acts", FLAG),
     "duration": ("s, when the run stops at the latest", POSITIVE),
     "max_impacts": ("the run stops after so many impacts", COUNT),
-    "scheme": ("of time integration; left out, the tolerance decides", one_of(SCHEMES)),
+    "scheme": ("of time integration; A4 if left out, or by the name of an earlier one", one_of(SCHEMES)),
     "dt": ("s, time step in contact; left out, the tolerance decides", POSITIVE),
     "striker_force": ("N, constant, positive along the blow; such as the weight of a falling ball", NUMBER),
     "target_force": ("N, constant, on the body at the strike point, positive along the blow", NUMBER),

@@ -63,7 +63,6 @@ KINDS = {
     "layers": "fi.strike(modes, stick, fi.Contact.layers(1e5, 1.5, depth=1e-4, hard_stiffness=1e7), **blow)",
     "rigid": "fi.strike(fi.Modes.rigid(0.2), stick, law, **(blow | {'at': None}))",
     "chain": "fi.collide([fi.Modes.rigid(0.1)] * 3, [fi.Touch(law, i, i + 1) for i in (0, 1)], speeds=[1.0, 0.0, 0.0])",
-    "collocation": "fi.strike(modes, stick, law, scheme='collocation', **blow)",
     "stretching": "fi.strike(modes, stick, law, stretching=True, **blow)",
     "map": "fi.sweep(modes, stick, law, over={'mass': [0.02, 0.03]}, **blow)",
     "gradient": "fi.strike(modes, stick, law, **blow).gradient(('restitution', 'peak_force'))",

@@ -103,18 +103,14 @@ def truncations(whole: fi.Scene, reference: fi.Response) -> list[Point]:
 
 
 def steps(whole: fi.Scene, reference: fi.Response) -> list[Point]:
-    """Error over the step of each scheme and the tolerance of collocation, on the same 80 modes as the reference."""
+    """Error over the step of each scheme, on the same 80 modes as the reference."""
     modes, length = reference.target.truncated(n_modes=80), reference.contact_time
-    exact = fi.strike(modes, **blow(whole), tolerance=1e-12, scheme="collocation")
+    exact = fi.strike(modes, **blow(whole), tolerance=1e-11)
     points = []
     for scheme, step in product(("A", "A4"), STEPS):
         strike = lambda: fi.strike(modes, **blow(whole), scheme=scheme, dt=step * length)  # noqa: B023, E731
         seconds, hit = shared.timed(strike, REPEATS)
         points.append(Point(f"scheme {scheme}", seconds, difference(hit, exact), f"step {step:g} of the contact"))
-    for tolerance in TOLERANCES[2:]:
-        strike = lambda: fi.strike(modes, **blow(whole), scheme="collocation", tolerance=tolerance)  # noqa: B023, E731
-        seconds, hit = shared.timed(strike, REPEATS)
-        points.append(Point("collocation", seconds, difference(hit, exact), f"tolerance {tolerance:g}"))
     return points
 
 

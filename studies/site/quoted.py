@@ -106,7 +106,6 @@ QUOTES = (
     quote(13, "an approach below # of the deepest", "impact.history.TOUCH"),
     quote(13, "a push that stays below # both of the largest force", "impact.history.FAINT"),
     quote(14, "for at most # looks", "impact.compiled.flight.LASTING"),
-    quote(15, "$s = #$ Gauss nodes", "impact.engine.NODES"),
     quote(17, "2 x_n, # x_n^2", "model.idealisation.PULSE"),
     quote(
         17, r"refused where $z \gt #$, where $\chi \lt #$", "model.idealisation.HEAVIEST", "model.idealisation.NEAREST"

@@ -70,7 +70,7 @@ def strike(numbers, tolerance=TIGHT, n_modes=20):
 def told(hit, frequencies):
     """The quantities as numbers, the centroid from its spectrum at the same frequencies whatever the blow.
 
-    The largest force and its time are those of steps of scheme A4, as the polynomials of collocation are too coarse.
+    The largest force and its time are those of finer steps.
     """
     size = np.abs(hit.spectrum(frequencies))
     centroid = np.trapezoid(frequencies * size, frequencies) / np.trapezoid(size, frequencies)

@@ -10,15 +10,11 @@ from numpy.testing import assert_allclose
 from restarted import measured
 from test_collision import PLATE_80, wall_duration
 from test_kernels import EPS, drift, each_scheme, plate, run
-from warming import locked
 
 import fem_impact as fi
 from fem_impact.impact import engine
 from fem_impact.impact.collision import Touch, collide
-from fem_impact.impact.compiled import collocation, record
-from fem_impact.impact.compiled.bundles import KernelSystem, Limits
-from fem_impact.impact.compiled.law import table
-from fem_impact.impact.engine import gauss
+from fem_impact.impact.compiled import record
 
 
 @each_scheme
@@ -78,16 +74,6 @@ def test_rest_stays_for_a_million_steps(stiffness):
     assert len(r.steps) >= 1_000_000
     assert_allclose(r.force, weight, rtol=1e-14)
     assert abs(r.q[0] - sunk) < 1e-9 * sunk + EPS * 0.5 * weight * 0.1**2  # of the free fall
-
-
-@pytest.mark.parametrize(("exponent", "stiffness"), [(1.0, 1e6), (1.5, 1e8)])
-def test_eight_nodes_and_ten_agree(exponent, stiffness):
-    omega, shape = plate(12, top=2e4)
-    still, law, limits = np.zeros(13), table([[stiffness, exponent]]), Limits(0.0, 0.0, np.inf, 0, 5000)
-    scene = KernelSystem(*locked(omega, still, shape[None], np.zeros(1), still, law, still, np.append(0.1, still[1:])))
-    speeds = [10.0 * collocation.run_collocation(scene, *gauss(n), 1e-4, 1e-13, limits)[2][0] for n in (8, 10)]
-    # onset and release are located to 1e-11 of the approach about them, which leaves 2e-12 of the speed
-    assert_allclose(speeds[0], speeds[1], rtol=0, atol=5e-12)
 
 
 @pytest.mark.parametrize("exponent", [0.5, 0.52, 0.6])
@@ -178,16 +164,16 @@ def test_preload_held_by_a_force_stays(exponent):
     assert_allclose(hit.force, hold, rtol=1e-9)
 
 
-# --- many modes against collocation ----------------------------------------------------------------------------------
+# --- flights, grazes -------------------------------------------------------------------------------------------------
 
 
 FLIGHTS = """
 import fem_impact as fi
 plate = fi.analytic.rectangle(0.4, 0.3, mass=0.2, first_frequency=100.0, n_modes=8)
-for gap, scheme in ((1.0, "A4"), (1.0, "collocation"), (1e9, "A4")):
+for gap in (1.0, 1e9):
     try:
         fi.strike(plate, fi.Striker.rigid(0.03), fi.Contact.linear(1e4, gap=gap), at=(0.13, 0.1), speed=1.0,
-                  tolerance=1.0, scheme=scheme)
+                  tolerance=1.0)
     except fi.SimulationError:
         pass
 """

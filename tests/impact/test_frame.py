@@ -10,18 +10,16 @@ from warming import locked
 from fem_impact.impact import compiled
 from fem_impact.impact.compiled import frame
 from fem_impact.impact.compiled.bundles import KernelSystem, Limits
-from fem_impact.impact.compiled.collocation import run_collocation
 from fem_impact.impact.compiled.energy import run_energy
 from fem_impact.impact.compiled.law import table
 from fem_impact.impact.compiled.stretched import Stretch
-from fem_impact.impact.engine import gauss
 
 LINES, PARAMETERS = 100, 8  # of a kernel: what fits on two pages, and what a reader keeps in mind
 
 
 @pytest.mark.parametrize(
     "scheme, stretch",
-    [(0, None), (1, None), (1, Stretch(*locked(np.array([[[4e3]]]), np.zeros((0, 1))), 1)), ("collocation", None)],
+    [(0, None), (1, None), (1, Stretch(*locked(np.array([[[4e3]]]), np.zeros((0, 1))), 1))],
 )
 def test_a_record_that_grows_is_the_same(scheme, stretch, monkeypatch):
     """A run that stops at each full record and goes on, against one whose record has room for all: bit for bit."""
@@ -34,8 +32,6 @@ def test_a_record_that_grows_is_the_same(scheme, stretch, monkeypatch):
     limits = Limits(0.0, 0.0, 1e-2, 0, 2000)
 
     def run():
-        if scheme == "collocation":
-            return run_collocation(scene, *gauss(5), 2e-4, 1e-6, limits)
         return run_energy(scene, stretch, scheme, 1e-4, limits)
 
     whole = run()

@@ -53,7 +53,7 @@ def test_bodies_that_touch_are_in_contact_from_when_force_acts_on_them(tolerance
     """Those beyond the gap touch from the start, and press each other when the gap is closed at 0.756 ms."""
     hit = slow_chain(tolerance)
     assert hit.n_impacts == 7
-    assert_allclose(hit.contact_time, 17.479156e-3, rtol=tolerance)  # collocation at 1e-9 and 1e-10
+    assert_allclose(hit.contact_time, 17.479156e-3, rtol=tolerance)  # at 1e-9 and 1e-10, by collocation
     met = next(each for each in hit.impacts if each.contact == 1)
     assert first_touches(hit, 4) == [0.0, met.start, met.start, met.start]
 
@@ -92,7 +92,7 @@ def test_how_small_a_force_or_gap_counts_as_none_does_not_matter(monkeypatch):
 @pytest.mark.parametrize("seed", range(40))
 @pytest.mark.filterwarnings("ignore::fem_impact.ToleranceWarning")
 def test_impacts_of_random_chains_do_not_depend_on_the_tolerance(seed):
-    truth = random_chain(seed, 1e-7)  # errs by some 1e-8; collocation refuses 3 of these chains below
+    truth = random_chain(seed, 1e-7)  # errs by some 1e-8; three of these chains are refused below
     for tolerance in (1e-2, 1e-3, 1e-4, 1e-5, 1e-6):
         found = random_chain(seed, tolerance)
         assert found.n_impacts == truth.n_impacts

@@ -19,8 +19,8 @@ MADE = {  # one of each, its own course within the approaches below
 }
 TABLES: list[np.ndarray] = []  # kept while their springs are asked
 APPROACHES = np.array([3e-5, 1.3e-4, 2.7e-4, 6e-4])
-AT, SLOPES, SMOOTH, SIMPLE = (
-    build.plain(getattr(law, name)) for name in ("point_at", "mean_slopes", "smooth_force", "simple")
+AT, SLOPES, STEEP, SIMPLE = (
+    build.plain(getattr(law, name)) for name in ("point_at", "mean_slopes", "steepness", "simple")
 )
 each_law = pytest.mark.parametrize("contact", [MADE[each.name] for each in law.LAWS], ids=[e.name for e in law.LAWS])
 POWERS = [fi.Contact.power(k, a) for k, a in ((1e5, 1.0), (1e7, 1.5), (1e4, 0.7))]
@@ -61,22 +61,6 @@ def test_average_slopes_are_exact_at_any_distance(a, apart):
         span = mp.mpf(d1) - d0
         exact = [float(1e6 / (a + 1) ** n * (mp.mpf(d1) ** (a + n) - mp.mpf(d0) ** (a + n)) / span) for n in (1, 0)]
     assert_allclose(SLOPES(AT(d0, spring), AT(d1, spring), spring), exact, rtol=1e-12)  # r**4 = 1e-16, and rounding
-
-
-@pytest.mark.parametrize("x, v", [(2e-4, 0.5), (2e-4, -1.5), (-1e-4, 0.2)])
-@pytest.mark.parametrize("k, a", [(1e5, 1.0), (1e7, 1.5), (3e6, 2.0)])
-def test_slopes_of_a_lossy_force_are_central_differences(x, v, k, a):
-    spring, step = SIMPLE(k, a, 0.3, 0.0), 1e-4
-    force, by_x, by_v = SMOOTH(x, v, spring)
-    assert_allclose(force, np.sign(x) * k * abs(x) ** a * (1.0 + 0.3 * v), rtol=1e-14)
-    low, high = (SMOOTH(x * (1.0 + side * step), v, spring)[0] for side in (-1.0, 1.0))
-    assert_allclose(by_x, (high - low) / (2.0 * x * step), rtol=1e-8)  # of order step**2
-    low, high = (SMOOTH(x, v + side * step, spring)[0] for side in (-1.0, 1.0))
-    assert_allclose(by_v, (high - low) / (2.0 * step), rtol=1e-10)  # straight in the rate
-
-
-def test_a_lossy_contact_never_pulls():
-    assert SMOOTH(1e-4, -4.0, SIMPLE(1e5, 1.5, 0.3, 0.0)) == (0.0, 0.0, 0.0)
 
 
 @pytest.mark.parametrize("loss, factor", [(0.0, 1.5), (0.2, 5.0)])
@@ -127,13 +111,11 @@ def test_the_force_is_the_slope_of_the_energy_and_average_slopes_are_those_of_th
 
 
 @each_law
-def test_what_collocation_sees_is_the_force_and_its_slope(contact):
+def test_the_steepness_of_a_law_is_the_slope_of_its_force(contact):
     spring = spring_of(contact)
-    for d in APPROACHES[spring.corner < APPROACHES] if spring.corner < np.inf else APPROACHES:
-        force, slope, _ = SMOOTH(d, 0.0, spring)
-        assert_allclose(force, contact.force(d), rtol=1e-13)
-        low, high = (SMOOTH(d * (1.0 + side * 1e-4), 0.0, spring)[0] for side in (-1.0, 1.0))
-        assert_allclose((high - low) / (2e-4 * d), slope, rtol=1e-6)
+    for d in APPROACHES:
+        low, high = (AT(d * (1.0 + side * 1e-4), spring).force for side in (-1.0, 1.0))
+        assert_allclose(STEEP(d, AT(d, spring).force, spring), (high - low) / (2e-4 * d), rtol=1e-6)
 
 
 @each_law

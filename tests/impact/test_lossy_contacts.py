@@ -39,24 +39,23 @@ def truth(hit, told):
     return blow(h.omega, h.zeta, h.shape[0], h.start_p, told, 1.001 * max(h.end_time, hit.impacts[-1].end))
 
 
-@pytest.mark.parametrize("scheme", ["A4", "collocation"])
-def test_a_blow_that_ends_while_the_contact_yields(scheme):
+def test_a_blow_that_ends_while_the_contact_yields():
     """The approach at the end counts from no dent, although the last step made the dent deeper."""
     law, _ = LAWS["plastic"]
-    hit = struck(law, WALL, 1e-4, duration=5e-5, scheme=scheme)
+    hit = struck(law, WALL, 1e-4, duration=5e-5)
     h = hit.history
     assert_allclose(h.now[0], h.offset + h.shape @ h.end_q, rtol=1e-12)  # rounding of sums of steps
     assert h.now[5, 0] > law.yield_approach and hit.energies["dissipated"] > 0.0
-    assert hit.energy_error < 1e-5  # of collocation, a tenth of the tolerance; A4 keeps it to rounding
+    assert hit.energy_error < 1e-12  # rounding
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", LAWS)
 @pytest.mark.parametrize("target", [WALL, PLATE], ids=["wall", "plate"])
-def test_both_schemes_agree_with_runge_kutta(name, target):
-    """Both to 1e-8, A4 within its tolerance, too, and none errs by more than ten times what it claims."""
+def test_blows_agree_with_runge_kutta(name, target):
+    """Within the tolerance, and by no more than ten times what is claimed."""
     law, told = LAWS[name]
-    fine, usual = struck(law, target, 1e-9, scheme="collocation"), struck(law, target, 1e-4)
+    fine, usual = struck(law, target, 1e-9), struck(law, target, 1e-4)
     wanted = truth(fine, told)
     momentum = np.linalg.norm(fine.history.start_p)
     for hit, limit in ((fine, 1e-8), (struck(law, target, 1e-9), 1e-8), (usual, 1e-4)):
@@ -68,7 +67,7 @@ def test_both_schemes_agree_with_runge_kutta(name, target):
         lost = hit.energies["contact"] + hit.energies["dissipated"]
         assert lost == pytest.approx(wanted.lost, abs=4.0 * limit * 0.5 * momentum**2)
         assert hit.energies["dissipated"] >= 0.0
-        assert hit.energy_error < 1e-10  # of collocation; A4 keeps it to rounding, see below
+        assert hit.energy_error < 1e-12  # rounding
 
 
 @pytest.mark.parametrize(
@@ -88,7 +87,7 @@ def test_what_a_contact_does_within_its_steps_is_claimed(law, told, tolerance):
     assert missed < 1.1 * hit.error.of_quantity("restitution")  # 1.1: terms of higher order
 
 
-@pytest.mark.parametrize(("scheme", "tolerance"), [("A", 1e-3), ("A4", 1e-4), ("collocation", 1e-8)])
+@pytest.mark.parametrize(("scheme", "tolerance"), [("A", 1e-3), ("A4", 1e-4)])
 def test_a_dent_stays_and_what_it_took_is_known(scheme, tolerance):
     """A ball dropped again and again: second impacts begin at the dent and lose only where they press deeper."""
     touch = fi.Touch(fi.Contact.elastic_plastic(1e9, yield_speed=0.05, mass=0.02), 0, None)
@@ -102,7 +101,7 @@ def test_a_dent_stays_and_what_it_took_is_known(scheme, tolerance):
     deepest = hit.history.now[5, 0]
     dent = hit.history.offset[0] + hit.displacement(None, ends[2:], body=0)[0, 0]
     assert 0.1 * deepest < dent < deepest  # it leaves the floor at the dent
-    assert hit.energy_error < (1e-9 if scheme == "collocation" else 1e-13)  # the loss is that of the law in closed form
+    assert hit.energy_error < 1e-13  # the loss is that of the law in closed form
 
 
 def test_felt_held_pressed_relaxes_to_its_share():
@@ -140,15 +139,13 @@ def test_felt_hit_again_at_once_is_harder_and_thinner():
         assert hit.energy_error < 1e-12
 
 
-def test_two_contacts_of_other_kinds_at_once_agree_with_the_reference_scheme():
-    """Three balls in a row through felt and a yielding contact: A4 against collocation."""
+def test_two_contacts_of_other_kinds_at_once_agree_with_finer_steps():
+    """Three balls in a row through felt and a yielding contact."""
     balls = [fi.Modes.rigid(m) for m in (0.02, 0.01, 0.03)]
     felt = fi.Contact.felt(1e8, 2.0, hysteresis=0.5, relaxation=1e-4)
     soft = fi.Contact.elastic_plastic(1e8, yield_speed=0.05, mass=0.01)
     touches = [fi.Touch(felt, 0, 1), fi.Touch(soft, 1, 2)]
-    blow = {"bodies": balls, "contacts": touches, "speeds": [1.0, 0.0, 0.0]}
-    usual, fine = fi.collide(**blow, tolerance=1e-5), fi.collide(**blow, tolerance=1e-9, scheme="collocation")
-    assert (usual.scheme, fine.scheme) == ("A4", "collocation")
+    usual, fine = (fi.collide(balls, touches, speeds=[1.0, 0.0, 0.0], tolerance=t) for t in (1e-5, 1e-9))
     assert_allclose(usual.speeds, fine.speeds, atol=1e-5)
     assert_allclose(usual.impulse, fine.impulse, rtol=1e-5)
     for hit in (usual, fine):
@@ -160,7 +157,7 @@ def test_two_contacts_of_other_kinds_at_once_agree_with_the_reference_scheme():
 @pytest.mark.slow
 @pytest.mark.parametrize("seed", range(12))
 def test_the_error_is_what_it_claims_for_random_blows(seed):
-    """A4 at 1e-3 or 1e-4 against collocation at 1e-8, on plates of random size with random laws."""
+    """At 1e-3 or 1e-4 against 1e-8, on plates of random size with random laws."""
     rng = np.random.default_rng(seed)
     plate = fi.analytic.rectangle(1.0 + rng.random(), 1.0, mass=0.2, first_frequency=100.0, n_modes=30)
     k, speed, mass = 10.0 ** rng.uniform(7.0, 9.0), 10.0 ** rng.uniform(-1.0, 1.0), 10.0 ** rng.uniform(-2.5, -1.0)
@@ -175,7 +172,7 @@ def test_the_error_is_what_it_claims_for_random_blows(seed):
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", fi.ToleranceWarning)
         usual = fi.strike(plate, fi.Striker.rigid(mass), law, tolerance=tolerance, **about)
-        fine = fi.strike(plate, fi.Striker.rigid(mass), law, tolerance=1e-8, scheme="collocation", **about)
+        fine = fi.strike(plate, fi.Striker.rigid(mass), law, tolerance=1e-8, **about)
     assert worst(usual, fine) < tolerance
     assert usual.energy_error < 1e-12
 

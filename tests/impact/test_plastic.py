@@ -171,7 +171,7 @@ def test_slopes_keep_their_digits_for_any_two_approaches(exponent):
             forces = [build.plain(law.point_at)(each, spring).force for each in x]
             g, d = build.plain(plastic.slopes_beyond)(near, far, spring)
             assert_allclose(g, 0.5 * weight @ forces, rtol=1e-13)
-            steep = [build.plain(plastic.far_side)(each, spring)[1] for each in x]
+            steep = [build.plain(plastic.slope_beyond)(each, spring) for each in x]
             assert_allclose(d, 0.5 * weight @ steep, rtol=1e-13)
 
 

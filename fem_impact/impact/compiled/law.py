@@ -6,7 +6,7 @@ A contact pushes with ``F = k x**a (1 + loss d')`` while its spring is compresse
 differ beyond a corner or remember (one number each, ``memory``); which kind of spring takes which course is said here.
 
 A law is added by a file in that folder, a line in `LAWS` and in `Numbers`, and, where its force has a course of its own
-beyond a corner, a branch in `spring_with`, `force_and_energy`, `far_side` and `part_slopes`.
+beyond a corner, a branch in `spring_with`, `force_and_energy`, `steepness` and `part_slopes`.
 """
 
 from collections import namedtuple
@@ -22,7 +22,7 @@ from .laws import felt, layers, plastic, tabled
 from .laws.base import POWER, Law, LawNumber, Point
 from .laws.felt import memory_energy, relaxes
 from .laws.plastic import dent, yields
-from .laws.power import PowerLaw, continued, power, power_slopes, simple
+from .laws.power import PowerLaw, power, power_slopes, simple
 
 LAWS: tuple[Law, ...] = (PowerLaw(), layers.LayersLaw(), plastic.PlasticLaw(), felt.FeltLaw(), tabled.TableLaw())
 NUMBERS: dict[str, LawNumber] = {name: number for law in LAWS for name, number in law.numbers.items()}
@@ -116,17 +116,13 @@ def force_and_energy(x, spring):
 
 
 @inner()
-def far_side(x, spring):
-    """Force and its slope beyond the corner, continued smoothly to the near side of it."""
-    if spring.kind == tabled.KIND:
-        return tabled.far_side(x, spring)
-    return plastic.far_side(x, spring) if spring.kind == plastic.KIND else layers.far_side(x, spring)
-
-
-@inner()
 def steepness(x, f, spring):
     """Slope of the force f over the compression x > 0."""
-    return spring.exponent * f / x if x <= spring.corner else far_side(x, spring)[1]
+    if x <= spring.corner:
+        return spring.exponent * f / x
+    if spring.kind == tabled.KIND:
+        return tabled.slope_beyond(x, spring)
+    return plastic.slope_beyond(x, spring) if spring.kind == plastic.KIND else layers.slope_beyond(x, spring)
 
 
 @inner()
@@ -205,19 +201,6 @@ def mean_slopes(one, two, spring):
         g1, d1 = part_slopes(bend, large, spring)
         g, d = (g0 * below + g1 * above) / span, (d0 * below + d1 * above) / span
     return (g + 0.5 * c * (one.force + two.force) * d) / (1.0 + c * d), d / (1.0 + c * d)
-
-
-@inner()
-def smooth_force(x, v, spring):
-    """Force of a pressed contact and its slopes in compression and rate, continued smoothly below zero compression.
-
-    A spring with a corner is taken on the far side of it, also continued; see `collocation.side_of`.
-    """
-    f, slope = continued(x, spring) if spring.corner == np.inf else far_side(x, spring)
-    factor = 1.0 + spring.loss * v
-    if factor < 0.0:
-        return 0.0, 0.0, 0.0
-    return f * factor, slope * factor, f * spring.loss
 
 
 @inner()

@@ -15,9 +15,10 @@ OWN_END, OWN_END_RAMP, OWN_MEAN, OWN_MEAN_RAMP, OWN_RATE, OWN_RATE_RAMP = range(
 # rows of a step of every mode (N_LANE, n_modes), see `propagation.lane_table`
 A11, A12, A21, A22, M1, M2, M3, N_LANE = range(8)
 
-# columns of a recorded step (n_steps, HEAD + ...), and from the first of a contact's on; see `record`
+# columns of a recorded step (n_steps, HEAD + (WIDTH + 1) n_contacts), and from the first of a contact's on, of which
+# there are WIDTH and, behind those of all, what each remembers; see `record`
 START, LENGTH, BLIND, HEAD = range(4)
-SPEED, CLOSED, PUSH = range(1, 4)
+SPEED, CLOSED, PUSH, GAIN, WIDTH = range(1, 6)
 
 # where a crossing lies: two lengths about it, the size of the values there, and length, value and slope of a try
 LOW, HIGH, SIZE, TRIED, MISSED, SLOPE = range(6)
@@ -32,13 +33,12 @@ TIME, PAUSE, RESPITE, RESET, TAKEOFF, FAINT, MISS, CLOCKS = range(8)
 
 # and counters: steps, of them in contact, fallen back to scheme A, and blind; releases; events since RESET; halvings of
 # the step, and those that it needs; level whose table has predicted the next step, or -1; whether what the contacts
-# remember is still to be brought up to the state; steps before the present flight, or -1; tries since the last step;
-# whether the run has begun
-STEPS, LOOKS, FALLBACKS, BLINDS, RELEASED, EVENTS, LEVEL, LEAST, READY, FRESH, FLYING, FAILURES, BEGUN = range(13)
+# remember is still to be brought up to the state; steps before the present flight, or -1; whether the run has begun
+STEPS, LOOKS, FALLBACKS, BLINDS, RELEASED, EVENTS, LEVEL, LEAST, READY, FRESH, FLYING, BEGUN = range(12)
 
 # and of the search for a step's end: what is sought, the contact that opens or closes, or that has a corner of its
 # force, which corner, and how many tries there were
-SEEKS, TARGET, CORNERED, WHICH, TRIES, COUNTERS = range(13, 19)
+SEEKS, TARGET, CORNERED, WHICH, TRIES, COUNTERS = range(12, 18)
 
 # of one blow among many (`bundles.Track`): where its contact stands as above, APPROACH to RATE; what the forces before
 # the last one do to the next step; when the contact began, and the time in contact before [s]; the force's impulse,

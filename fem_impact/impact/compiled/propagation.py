@@ -15,7 +15,7 @@ import numpy as np
 from . import arrays
 from .arrays import ANGLE_LIMIT, LIGHT, SERIES_END
 from .build import LOOSE, TRUE, inner, outer
-from .layout import A11, A12, A21, A22, HEAD, LENGTH, M1, M2, M3, N_LANE, PUSH, START
+from .layout import A11, A12, A21, A22, GAIN, HEAD, LENGTH, M1, M2, M3, N_LANE, PUSH, START, WIDTH
 from .one_mode import mode_matrix, mode_moments
 
 N_TABLE = 12  # rows of a step table, in the order of `step_table`
@@ -266,56 +266,33 @@ def commit(shape, lanes, h, force, slope, q, p):
 
 
 @inner(allocates=True)
-def push(scene, row, n_coefficients, length, table, q, p):
-    """Advance a state (n_modes,) in place by a part of a step, from its start; exact for its polynomial forces.
+def push(scene, row, length, table, q, p):
+    """Advance a state (n_modes,) in place by a part of a step, from its start; exact for its linear forces.
 
     ``table`` is that of the length before, and (2,) that length and whether it is whole.
     """
-    omega, zeta, shape, bias = scene.omega, scene.zeta, scene.shape, scene.bias
+    bias, shape = scene.bias, scene.shape
     if length <= 0.0:
         return
-    m = shape.shape[0]
-    stride = PUSH + n_coefficients
-    weights = np.zeros((max(n_coefficients, 2), m))
-    active = False
-    for i in range(m):
-        scale = 1.0
-        for k in range(n_coefficients):
-            weights[k, i] = row[HEAD + PUSH + stride * i + k] * scale
-            scale *= (k + 1.0) * length / row[LENGTH]
-            if weights[k, i] != 0.0:
-                active = True
-    if n_coefficients > 2 and active:
-        moments = np.empty(n_coefficients + 1)
-        work = np.empty((2, n_coefficients))
-        for n in range(q.size):
-            q0 = q[n]
-            p0 = p[n]
-            a11, a12, a22 = mode_moments(omega[n], zeta[n], length, moments, work)
-            x = bias[n] * moments[1]
-            v = bias[n] * moments[0]
-            for i in range(m):
-                for k in range(n_coefficients):
-                    x -= shape[i, n] * weights[k, i] * moments[k + 1]
-                    v -= shape[i, n] * weights[k, i] * moments[k]
-            q[n] = a11 * q0 + a12 * p0 + length * length * x
-            p[n] = -omega[n] * omega[n] * a12 * q0 + a22 * p0 + length * v
-        return
+    force, gain = np.empty(shape.shape[0]), np.empty(shape.shape[0])
+    for i in range(force.size):
+        first = HEAD + WIDTH * i
+        gain[i] = row[first + GAIN] * (length / row[LENGTH])
+        force[i] = row[first + PUSH] + 0.5 * gain[i]
+    active = any_of(force) or any_of(gain)
     lanes, known = table
     whole = active or any_of(bias)
     if known[0] != length or (whole and known[1] == 0.0):
-        lane_table(omega, zeta, length, whole, lanes)
+        lane_table(scene.omega, scene.zeta, length, whole, lanes)
         known[0] = length
         known[1] = 1.0 if whole else 0.0
     glide(lanes, length, bias, q, p)
     if active:
-        for i in range(m):
-            weights[0, i] += 0.5 * weights[1, i]
-        commit(shape, lanes, length, weights[0], weights[1], q, p)
+        commit(shape, lanes, length, force, gain, q, p)
 
 
 @outer()
-def replay(scene, steps, n_coefficients, times, out_q, out_p):
+def replay(scene, steps, times, out_q, out_p):
     """States (n_times, n_modes) at ascending times, from the start state and the recorded forces; exact in between."""
     n_steps = steps.shape[0]
     parts = np.empty((N_LANE, scene.q.size)), np.zeros(2)  # of steps
@@ -331,9 +308,9 @@ def replay(scene, steps, n_coefficients, times, out_q, out_p):
         ends = np.inf if j == n_steps else begin + row[LENGTH]
         while k < times.size and times[k] < ends:
             restore(q, p, out_q[k], out_p[k])
-            push(scene, row, n_coefficients, times[k] - begin, parts, out_q[k], out_p[k])
+            push(scene, row, times[k] - begin, parts, out_q[k], out_p[k])
             k += 1
         if k >= times.size or j == n_steps:
             return
-        push(scene, row, n_coefficients, row[LENGTH], wholes, q, p)
+        push(scene, row, row[LENGTH], wholes, q, p)
         begin = steps[j + 1, START] if j + 1 < n_steps else begin + row[LENGTH]

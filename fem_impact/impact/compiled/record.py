@@ -1,7 +1,7 @@
 """What a run leaves behind, and the impacts read from it.
 
 A row of ``steps`` is a step or a flight: start, length, whether events were passed; then for each contact approach and
-rate at its start, whether it is closed, and the force as powers of the fraction of the step; then what each contact
+rate at its start, whether it is closed, the force there and what it gains to the end; then what each contact
 remembers. Between the ends the approach is the cubic through both.
 """
 
@@ -18,7 +18,7 @@ from .misfit import force_on, misfit
 from .rounding import NEAR
 
 from .layout import (  # isort: skip
-    APPROACH, CLOSED, HEAD, LENGTH, PUSH, RATE, REMEMBERED, SPEED, START,
+    APPROACH, CLOSED, GAIN, HEAD, LENGTH, PUSH, RATE, REMEMBERED, SPEED, START, WIDTH,
 )  # fmt: skip
 
 FINISHED, HORIZON, IMPACTS, SETTLED, EXHAUSTED, FAILED = range(6)  # why a run ended
@@ -37,17 +37,17 @@ def total_energy(bodies, contacts):
 
 
 @inner()
-def memory_of(steps, law, n_coefficients, row, i):
+def memory_of(steps, law, row, i):
     """What contact i remembers in a step."""
-    return steps[row, HEAD + (PUSH + n_coefficients) * law.shape[0] + i]
+    return steps[row, HEAD + WIDTH * law.shape[0] + i]
 
 
 @inner()
-def ends_of(steps, now, law, n_coefficients, row, i):
+def ends_of(steps, now, law, row, i):
     """Approach from the dent and its rate at both ends of a step."""
-    first = HEAD + (PUSH + n_coefficients) * i
+    first = HEAD + WIDTH * i
     last = row + 1 == steps.shape[0]
-    low = dent(law, i, memory_of(steps, law, n_coefficients, row, i))
+    low = dent(law, i, memory_of(steps, law, row, i))
     d0 = steps[row, first] - low
     v0 = steps[row, first + SPEED]
     d1 = (now[APPROACH, i] if last else steps[row + 1, first]) - low
@@ -56,49 +56,38 @@ def ends_of(steps, now, law, n_coefficients, row, i):
 
 
 @inner()
-def course_of(steps, now, law, n_coefficients, row, i):
+def course_of(steps, now, law, row, i):
     """Approach from the dent and its rate at both ends of a step, and the spring of contact i in it."""
-    spring = spring_with(law, i, memory_of(steps, law, n_coefficients, row, i))
-    return ends_of(steps, now, law, n_coefficients, row, i), spring
+    spring = spring_with(law, i, memory_of(steps, law, row, i))
+    return ends_of(steps, now, law, row, i), spring
 
 
 @inner()
-def force_within(steps, n_coefficients, row, i, course, part):
-    """Force of contact i at a fraction of a step of that course, never negative, and its rate [N/s].
-
-    That is the law on the cubic through both ends, or a higher polynomial.
-    """
-    first = HEAD + (PUSH + n_coefficients) * i
-    h = steps[row, LENGTH]
-    if n_coefficients > 2:
-        value = slope = 0.0
-        for k in range(n_coefficients - 1, -1, -1):
-            slope = slope * part + value
-            value = value * part + steps[row, first + PUSH + k]
-        return max(value, 0.0), slope / h if value > 0.0 else 0.0
+def force_within(steps, row, course, part):
+    """Force at a fraction of a step of that course, never negative, and its rate [N/s]: the law on the cubic."""
     (d0, v0, d1, v1), spring = course
-    return force_on(d0, v0, d1, v1, h, part, spring)
+    return force_on(d0, v0, d1, v1, steps[row, LENGTH], part, spring)
 
 
 @outer()
-def forces(steps, now, law, n_coefficients, rows, i, part, out):
+def forces(steps, now, law, rows, i, part, out):
     """Force of contact i [N] and its rate [N/s], (2, n), at fractions (n,) of steps (n,)."""
     for n in range(rows.size):
-        course = course_of(steps, now, law, n_coefficients, rows[n], i)
-        out[0, n], out[1, n] = force_within(steps, n_coefficients, rows[n], i, course, part[n])
+        course = course_of(steps, now, law, rows[n], i)
+        out[0, n], out[1, n] = force_within(steps, rows[n], course, part[n])
 
 
 @inner()
-def pushing(steps, now, law, n_coefficients, row, i):
+def pushing(steps, now, law, row, i):
     """Fractions of a step between which contact i pushes, by the cubic through both ends; (0, 0) if it does not.
 
     A lossy contact stops pushing while the bodies still overlap, when they part as fast as 1 / loss.
     """
-    first = HEAD + (PUSH + n_coefficients) * i
+    first = HEAD + WIDTH * i
     if steps[row, first + CLOSED] == 0.0:
         return 0.0, 0.0
     h = steps[row, LENGTH]
-    d0, v0, d1, v1 = ends_of(steps, now, law, n_coefficients, row, i)
+    d0, v0, d1, v1 = ends_of(steps, now, law, row, i)
     lower = 0.0
     upper = 1.0
     if d0 < 0.0 < d1:
@@ -106,10 +95,8 @@ def pushing(steps, now, law, n_coefficients, row, i):
     elif d1 < 0.0 < d0:
         upper = crossing(d0, h * v0, d1, h * v1)
     if relaxes(law, i):  # steps end where the body parts from the felt or meets it
-        for k in range(n_coefficients):
-            if steps[row, first + PUSH + k] != 0.0:
-                return lower, upper
-        return 0.0, 0.0
+        pushes = steps[row, first + PUSH] != 0.0 or steps[row, first + GAIN] != 0.0
+        return (lower, upper) if pushes else (0.0, 0.0)
     loss = law["loss"][i]
     start = 1.0 + loss * v0
     end = 1.0 + loss * v1
@@ -125,7 +112,7 @@ def pushing(steps, now, law, n_coefficients, row, i):
 
 
 @outer()
-def nearest_turn(steps, now, law, n_coefficients, miss):
+def nearest_turn(steps, now, law, miss):
     """Approach, by the cubic from the dent, that turns back nearest to zero, the farthest, and the nearest's place.
 
     The place is its step and its contact; of felt, where it counts from where the force ends, and of ``miss``, the
@@ -139,14 +126,14 @@ def nearest_turn(steps, now, law, n_coefficients, miss):
         felt = relaxes(law, i)
         for row in range(steps.shape[0]):
             h = steps[row, LENGTH]
-            d0, v0, d1, v1 = ends_of(steps, now, law, n_coefficients, row, i)
+            d0, v0, d1, v1 = ends_of(steps, now, law, row, i)
             turns = v0 < 0.0 < v1 or v1 < 0.0 < v0
             if turns:
                 farthest = max(farthest, turning(d0, h * v0, d1, h * v1)[1])
             if felt:
-                z0 = memory_of(steps, law, n_coefficients, row, i)
+                z0 = memory_of(steps, law, row, i)
                 last = row + 1 == steps.shape[0]
-                z1 = now[REMEMBERED, i] if last else memory_of(steps, law, n_coefficients, row + 1, i)
+                z1 = now[REMEMBERED, i] if last else memory_of(steps, law, row + 1, i)
                 d0, v0 = above_felt(law, i, d0, v0, z0, z0 < 0.0)
                 d1, v1 = above_felt(law, i, d1, v1, z1, z0 < 0.0)
                 turns = v0 < 0.0 < v1 or v1 < 0.0 < v0
@@ -158,16 +145,13 @@ def nearest_turn(steps, now, law, n_coefficients, miss):
 
 
 @inner()
-def mean_push(steps, n_coefficients, row, first):
+def mean_push(steps, row, first):
     """Mean force of a contact in a step, whose numbers begin at ``first``."""
-    mean = 0.0
-    for k in range(n_coefficients):
-        mean += steps[row, first + PUSH + k] / (k + 1.0)
-    return mean
+    return steps[row, first + PUSH] + 0.5 * steps[row, first + GAIN]
 
 
 @outer()
-def force_missed(steps, now, law, n_coefficients, peak):
+def force_missed(steps, now, law, peak):
     """Largest error [-] of the peak force that `misfit` finds in the steps.
 
     At a corner of the law a single step may miss, which hardly changes the peak: there two in turn count.
@@ -177,11 +161,11 @@ def force_missed(steps, now, law, n_coefficients, peak):
         corner = spring_of(law, i).corner < np.inf
         before = 0.0
         for row in range(steps.shape[0]):
-            first = HEAD + (PUSH + n_coefficients) * i
+            first = HEAD + WIDTH * i
             miss = 0.0
             if steps[row, first + CLOSED] > 0.0:
-                mean = mean_push(steps, n_coefficients, row, first)
-                (d0, v0, d1, v1), spring = course_of(steps, now, law, n_coefficients, row, i)
+                mean = mean_push(steps, row, first)
+                (d0, v0, d1, v1), spring = course_of(steps, now, law, row, i)
                 miss = misfit(mean, d0, v0, d1, v1, steps[row, LENGTH], spring, peak)
             worst = max(worst, min(miss, before) if corner else miss)
             before = miss
@@ -189,38 +173,38 @@ def force_missed(steps, now, law, n_coefficients, peak):
 
 
 @inner()
-def peak_in(steps, now, law, n_coefficients, row, i):
+def peak_in(steps, now, law, row, i):
     """Largest force of contact i in a step: where it is pressed deepest, or the largest of some looks, refined."""
-    course = course_of(steps, now, law, n_coefficients, row, i)
+    course = course_of(steps, now, law, row, i)
     (d0, v0, d1, v1), spring = course
-    if n_coefficients == 2 and spring.loss == 0.0 and spring.relaxation == 0.0:
+    if spring.loss == 0.0 and spring.relaxation == 0.0:
         h = steps[row, LENGTH]
         return point_at(max(d0, d1, turning(d0, h * v0, d1, h * v1)[1] if v1 < 0.0 < v0 else 0.0), spring).force
     peak = part = 0.0
     for look in range(PEAK_LOOKS + 1):
-        f, _ = force_within(steps, n_coefficients, row, i, course, look / PEAK_LOOKS)
+        f, _ = force_within(steps, row, course, look / PEAK_LOOKS)
         if f > peak:
             peak = f
             part = look / PEAK_LOOKS
     spread = 1.0 / PEAK_LOOKS
     for _ in range(4):
         middle = min(max(part, spread), 1.0 - spread)
-        low, _ = force_within(steps, n_coefficients, row, i, course, middle - spread)
-        top, _ = force_within(steps, n_coefficients, row, i, course, middle)
-        high, _ = force_within(steps, n_coefficients, row, i, course, middle + spread)
+        low, _ = force_within(steps, row, course, middle - spread)
+        top, _ = force_within(steps, row, course, middle)
+        high, _ = force_within(steps, row, course, middle + spread)
         bend = low - 2.0 * top + high
         if bend >= 0.0:
             break
         part = middle + min(max(0.5 * (low - high) / bend, -1.0), 1.0) * spread
-        peak = max(peak, force_within(steps, n_coefficients, row, i, course, part)[0])
+        peak = max(peak, force_within(steps, row, course, part)[0])
         spread *= 0.125
     return peak
 
 
 @inner()
-def rate_within(steps, now, law, n_coefficients, row, i, part):
+def rate_within(steps, now, law, row, i, part):
     """Approach rate of contact i at a fraction of a step, by the cubic through both ends."""
-    d0, v0, d1, v1 = ends_of(steps, now, law, n_coefficients, row, i)
+    d0, v0, d1, v1 = ends_of(steps, now, law, row, i)
     if part <= 0.0 or part >= 1.0:
         return v0 if part <= 0.0 else v1
     h = steps[row, LENGTH]
@@ -228,28 +212,28 @@ def rate_within(steps, now, law, n_coefficients, row, i, part):
 
 
 @inner()
-def peak_between(steps, now, law, n_coefficients, begin, end, i):
+def peak_between(steps, now, law, begin, end, i):
     """Largest force of contact i in the steps of a push.
 
     It is sought with all looks in the step with the largest of a few and in those beside it: where it lies at
     the end of a step, rounding decides which holds the larger look.
     """
-    first = HEAD + (PUSH + n_coefficients) * i
+    first = HEAD + WIDTH * i
     most = 0.0
     for row in range(begin, end):
-        most = max(most, mean_push(steps, n_coefficients, row, first))
+        most = max(most, mean_push(steps, row, first))
     peak = 0.0
     peak_row = begin
     for row in range(begin, end):
-        if mean_push(steps, n_coefficients, row, first) >= 0.9 * most:
-            course = course_of(steps, now, law, n_coefficients, row, i)
-            for look in range(n_coefficients):
-                f, _ = force_within(steps, n_coefficients, row, i, course, look / n_coefficients)
+        if mean_push(steps, row, first) >= 0.9 * most:
+            course = course_of(steps, now, law, row, i)
+            for look in range(2):
+                f, _ = force_within(steps, row, course, 0.5 * look)
                 if f > peak:
                     peak = f
                     peak_row = row
     for row in range(max(begin, peak_row - 1), min(end - 1, peak_row + 1) + 1):
-        peak = max(peak, peak_in(steps, now, law, n_coefficients, row, i))
+        peak = max(peak, peak_in(steps, now, law, row, i))
     return peak
 
 
@@ -272,7 +256,7 @@ def still_pressed(now, law, i, d):
 
 
 @outer()
-def find_impacts(steps, now, law, n_coefficients, rounding, way, touch):
+def find_impacts(steps, now, law, rounding, way, touch):
     """Every unbroken push, (n_impacts, 8), contact by contact.
 
     Its start, end, peak force, impulse and contact; how fast the bodies approach at its start and part at its end; and
@@ -281,26 +265,26 @@ def find_impacts(steps, now, law, n_coefficients, rounding, way, touch):
     They approach with 0 where they touched before or press each other as the run begins; where they do as it ends, they
     part with NaN.
     """
-    n_steps, m, width = steps.shape[0], law.shape[0], PUSH + n_coefficients
+    n_steps, m = steps.shape[0], law.shape[0]
     result = np.empty((m * n_steps, 8))  # each takes a step at least
     count = ZERO
     fastest = deepest = 0.0
-    for first in range(HEAD, HEAD + m * width, width):
+    for first in range(HEAD, HEAD + m * WIDTH, WIDTH):
         for k in range(n_steps):
             fastest = max(fastest, abs(steps[k, first + SPEED]))
             deepest = max(deepest, steps[k, first])
     still, slack = rounding * fastest, max(rounding * way, touch * deepest)
     for i in range(m):
-        first = HEAD + width * i
+        first = HEAD + WIDTH * i
         row: Any = ZERO
         while row < n_steps:
-            lower, upper = pushing(steps, now, law, n_coefficients, row, i)
+            lower, upper = pushing(steps, now, law, row, i)
             if lower >= upper:
                 row += 1
                 continue
             begin = row
             start = steps[row, START] + lower * steps[row, LENGTH]
-            met = rate_within(steps, now, law, n_coefficients, row, i, lower)
+            met = rate_within(steps, now, law, row, i, lower)
             since = np.inf
             if abs(steps[row, first]) <= slack:
                 back = row
@@ -313,20 +297,20 @@ def find_impacts(steps, now, law, n_coefficients, rounding, way, touch):
             end = start
             part = impulse = 0.0
             while upper > lower:
-                impulse += steps[row, LENGTH] * mean_push(steps, n_coefficients, row, first)
+                impulse += steps[row, LENGTH] * mean_push(steps, row, first)
                 end = steps[row, START] + upper * steps[row, LENGTH]
                 part = upper
                 row += 1
                 if upper < 1.0 or row == n_steps:
                     break
-                lower, upper = pushing(steps, now, law, n_coefficients, row, i)
+                lower, upper = pushing(steps, now, law, row, i)
                 if lower > 0.0:
                     break
-            left = -rate_within(steps, now, law, n_coefficients, row - 1, i, part)
-            deep = now[APPROACH, i] - dent(law, i, memory_of(steps, law, n_coefficients, row - 1, i))
+            left = -rate_within(steps, now, law, row - 1, i, part)
+            deep = now[APPROACH, i] - dent(law, i, memory_of(steps, law, row - 1, i))
             if row == n_steps and part >= 1.0 and still_pressed(now, law, i, deep):
                 left = np.nan
-            peak = peak_between(steps, now, law, n_coefficients, begin, row, i)
+            peak = peak_between(steps, now, law, begin, row, i)
             result[count] = start, end, peak, impulse, float(i), met, left, since
             count += 1
     return result[:count].copy()

@@ -33,8 +33,8 @@ from .propagation import any_of, commit, glide, lane_table, restore
 from .rounding import ITERATIONS, OVERFLOW, SOLVED, STALLED
 
 from .layout import (  # isort: skip
-    A12, APPROACH, FLYING, FREE_END, FREE_MEAN, FREE_RATE, HEAD, LENGTH, M1, M2, M3, PUSH, RATE, START,
-    STEPS, TAKEOFF, TIME,
+    A12, APPROACH, FLYING, FREE_END, FREE_MEAN, FREE_RATE, GAIN, HEAD, LENGTH, M1, M2, M3, PUSH, RATE, START,
+    STEPS, TAKEOFF, TIME, WIDTH,
 )  # fmt: skip
 
 
@@ -361,9 +361,10 @@ def piece(contacts, steps, time, j, halved):
         ends = until
         h = min(whole, until - time)
     for i in range(contacts.end.size):
-        push = HEAD + PUSH + (PUSH + 2) * i
-        contacts.slope[i] = steps[j, push + 1] * h / whole
-        contacts.force[i] = steps[j, push] + steps[j, push + 1] * (time - steps[j, START] + 0.5 * h) / whole
+        first = HEAD + WIDTH * i
+        gain = steps[j, first + GAIN] / whole
+        contacts.slope[i] = gain * h
+        contacts.force[i] = steps[j, first + PUSH] + gain * (time - steps[j, START] + 0.5 * h)
     return h, ends, until
 
 

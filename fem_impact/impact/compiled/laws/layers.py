@@ -8,7 +8,7 @@ import numpy as np
 from ...._base.rounding import HALVINGS
 from ..build import inner
 from .base import Law, LawNumber, Spring
-from .power import PowerNumbers, continued, power, power_slopes
+from .power import PowerNumbers, power, power_slopes
 
 KIND = 1.0
 
@@ -105,12 +105,8 @@ def slopes_beyond(small, large, spring):
 
 
 @inner()
-def far_side(x, spring):
-    """Force and its slope beyond the corner, continued smoothly to the near side of it."""
-    f, slope = continued(x, spring)
-    further = abs(x - spring.corner)
-    if further > 0.0:
-        more = spring.hard * power(further, spring.hard_exponent)
-        f += more if x > spring.corner else -more
-        slope += spring.hard_exponent * more / further
-    return f, slope
+def slope_beyond(x, spring):
+    """Slope of the force at a compression beyond the corner."""
+    slope = spring.exponent * spring.stiffness * power(x, spring.exponent) / x
+    further = x - spring.corner
+    return slope + spring.hard_exponent * spring.hard * power(further, spring.hard_exponent) / further

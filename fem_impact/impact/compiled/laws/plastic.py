@@ -283,9 +283,6 @@ def slopes_beyond(small, large, spring):
 
 
 @inner()
-def far_side(x, spring):
-    """Force and its slope beyond the corner, continued smoothly to the near side of it."""
-    further = x - spring.corner
-    slope = spring.hard - spring.steeper * np.expm1(-further / spring.reach)
-    f = spring.stiffness * power(spring.corner, spring.exponent) + (spring.hard + spring.steeper) * further
-    return f - spring.reach * (slope - spring.hard), slope
+def slope_beyond(x, spring):
+    """Slope of the force at a compression beyond the corner."""
+    return spring.hard - spring.steeper * np.expm1((spring.corner - x) / spring.reach)

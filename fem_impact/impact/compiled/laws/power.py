@@ -126,13 +126,3 @@ def power_slopes(k, a, x0, x1):
         return f / (a + 1.0), f / x1
     log = np.log1p((x0 - x1) / x1)
     return f / (a + 1.0) * np.expm1((a + 1.0) * log) / np.expm1(log), f / x1 * np.expm1(a * log) / np.expm1(log)
-
-
-@inner()
-def continued(x, spring):
-    """Force and its slope at a compression, continued smoothly below zero."""
-    a = spring.exponent
-    size = abs(x)
-    f = spring.stiffness * power(size, a) if size > 0.0 else 0.0
-    slope = spring.stiffness if a == 1.0 else (a * f / size if size > 0.0 else 0.0)
-    return (-f if x < 0.0 else f), slope

@@ -13,7 +13,7 @@ import numpy as np
 
 from ...._base import check
 from ..build import COMPILED, inner
-from ..layout import HEAD, PUSH
+from ..layout import HEAD, WIDTH
 from .base import Law, Spring
 from .power import PowerNumbers
 
@@ -202,7 +202,7 @@ class TableLaw(Law):
 
     def check_reached(self, contact: Any, history: Any, i: int) -> None:
         deepest, force, _ = contact.knots[-1]
-        reached = history.steps[:, HEAD + (PUSH + history.n_coefficients) * i].max(initial=0.0)
+        reached = history.steps[:, HEAD + WIDTH * i].max(initial=0.0)
         peak = max((impact.peak_force for impact in history.impacts if impact.contact == i), default=0.0)
         if reached > deepest and peak > force:
             raise ValueError(
@@ -296,14 +296,14 @@ def pushed_beyond(x, spring):
 
 
 @inner()
-def far_side(x, spring):
-    """Force and its slope beyond the corner, continued smoothly to the near side of it."""
-    end, f, s, _ = last_knot(spring)
+def slope_beyond(x, spring):
+    """Slope of the force at a compression beyond the corner."""
+    end, _, s, _ = last_knot(spring)
     if x >= end:
-        return f + s * (x - end), s
-    start, h, a, b, c, d = force_cubic(piece_at(x, spring), spring)
+        return s
+    start, h, _, b, c, d = force_cubic(piece_at(x, spring), spring)
     t = (x - start) / h
-    return a + t * (b + t * (c + t * d)), (b + t * (2.0 * c + 3.0 * t * d)) / h
+    return (b + t * (2.0 * c + 3.0 * t * d)) / h
 
 
 @inner()
