@@ -13,6 +13,8 @@ from .compiled.laws.power import wall_time as wall_time
 
 LOWEST_EXPONENT, HIGHEST_EXPONENT = 0.5, 100.0  # [-] limits: below, no longer a spring; above, a wall
 YIELDS = 1.6  # [-] fact: pressure at which a round contact first yields, over the yield strength, for nu = 0.3
+# [-] loss factor times speed of a contact that hardly throws off by itself: from a wall, 0.2 of the speed
+STICKY = 5.0
 STIFFEST = 1e200  # [N/m**exponent] upper limit, 1/STIFFEST the lower: high exponents need huge stiffnesses
 
 

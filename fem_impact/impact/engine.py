@@ -22,8 +22,6 @@ STEP_SHARE = 0.1
 # [-] steps of a first run in half a swing on the steepest slope of a force with a course of its own; with fewer, two
 # runs may both take the whole of an unloading in one step, and agree: contact times erred by 3e-3 and said 1e-5
 STEEP = 8.0
-# [-] loss factor times speed of a contact that hardly throws off by itself: from a wall, 0.2 of the speed
-STICKY = 5.0
 # [-] speed that a step's force may miss of its law there, over that of approach times the cube of the step's share of
 # the contact: of 300 random blows without it 44 were told out of reach, with it none; of 1 600 one missed in silence
 COARSE = 4.0

@@ -12,7 +12,7 @@ from ..modes.modal import Modes, left_out
 from ..modes.stretching import Stretching, stretch
 from .compiled.bundles import KernelSystem
 from .compiled.law import table
-from .contact import Contact
+from .contact import STICKY, Contact
 from .stretched import Stretched
 from .striker import Striker
 
@@ -226,7 +226,7 @@ def joined(parts: Sequence[ReducedBody], laws: Sequence[Contact]) -> KernelSyste
         forms.append(part.forms(rated) if part.yields else np.zeros((0, 0)))
         n += len(part.omega) + forms[-1].shape[1]
     columns, shape = np.zeros((5, n)), np.zeros((len(laws), n))  # frequency, damping, constant force, state; shapes
-    start, lossy = 0, True in rated
+    start = 0
     for part, form in zip(parts, forms):
         own = slice(start, start + len(part.omega))
         start = own.stop
@@ -239,10 +239,11 @@ def joined(parts: Sequence[ReducedBody], laws: Sequence[Contact]) -> KernelSyste
             first, sign = part.touched[0]
             law["compliance"][first] += part.rest[0, 0]
             offset[first] += sign * part.rest[0, 0] * part.force
+    loss = float((law["loss"] * (np.abs(shape) @ np.abs(columns[4]))).max()) if True in rated else None
     for part, form in zip(parts, forms):
         if form.size:
             pushed = np.square(part.rows).sum() / part.rest.trace()
-            above, damping = rest_mode(part.points.shape[1], part.omega[-1], part.zeta[-1], lossy, pushed)
+            above, damping = rest_mode(part.points.shape[1], part.omega[-1], part.zeta[-1], loss, pushed)
             for shares in form.T:
                 held = np.zeros(2)
                 for (i, sign), share, force in zip(part.touched, shares, part.pressed):
@@ -253,18 +254,21 @@ def joined(parts: Sequence[ReducedBody], laws: Sequence[Contact]) -> KernelSyste
     return KernelSystem(columns[0], columns[1], shape, offset, columns[2], law, columns[3], columns[4])
 
 
-def rest_mode(dimension: int, omega: float, zeta: float, lossy: bool, pushed: float) -> tuple[float, float]:
+def rest_mode(dimension: int, omega: float, zeta: float, loss: float | None, pushed: float) -> tuple[float, float]:
     """Frequency [rad/s] and damping ratio [-] of the mode that replaces those above the last kept one.
 
     If only rigid motions are kept, ``pushed`` is the square of the frequency of their mass on the residual compliance.
+    ``loss`` is the largest loss factor times speed of the contacts, None if their forces do not depend on rates.
 
     A lossy force depends on the approach rate, in which an undamped mode just above the last one would ring. A
     critically damped mode far above, at 30 times its frequency, acts like a series spring and takes almost no energy.
+    A sticky contact would hold the little mass of that one within nanoseconds, and feels no difference: against three
+    times as many modes, 40 random blows on a body erred no more with the nearer one, and took a quarter of the time.
     """
     omega = omega or np.sqrt(pushed)
-    if lossy:
-        return 30.0 * omega, 1.0
-    return REST_ABOVE[min(dimension, 2)] * omega, float(zeta)
+    if loss is None:
+        return REST_ABOVE[min(dimension, 2)] * omega, float(zeta)
+    return max(5.0, 30.0 * np.sqrt(STICKY / max(loss, STICKY))) * omega, 1.0
 
 
 def ends_of(parts: Sequence[ReducedBody], laws: Sequence[Contact]) -> tuple[Ends, ...]:

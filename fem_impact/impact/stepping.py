@@ -14,6 +14,7 @@ from .._base.check import SimulationError
 from . import distance, engine
 from .compiled import law
 from .compiled.bundles import KernelSystem
+from .contact import STICKY
 from .engine import STEP_SHARE, TOLERANCE
 from .history import History
 from .quantities import asked_for
@@ -229,7 +230,7 @@ class _Control:
             if heard < len(omega):
                 longest = min(longest, RESOLVED / float(omega[heard]))
         first = min(2.0 * shortest / count, longest)
-        sticky = self.pace.speed * max(self.system.law["loss"].tolist()) > engine.STICKY
+        sticky = self.pace.speed * max(self.system.law["loss"].tolist()) > STICKY
         within = 0.5 * count * first if sticky and options.scheme == "A4" else 0.0
         return [first * 0.5**n for n in range(8)], aim, within  # A4 errs 2**28 times less at last
 

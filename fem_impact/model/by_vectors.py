@@ -10,8 +10,9 @@ import numpy as np
 from .._base import check, progress
 from ..fe import refinement
 from ..fe.section import Plate
-from ..impact import accuracy, collision, engine
+from ..impact import accuracy, collision
 from ..impact.compiled import build
+from ..impact.contact import STICKY
 from ..impact.motion import LOOKED_AT
 from ..impact.response import Response
 from ..modes.modal import Modes, damping_ratios
@@ -193,7 +194,7 @@ def _rattling(asked: Asked, first: int) -> int:
     quicker = (1.0 + lost) ** (1.0 / (contact.exponent + 1.0))  # than without loss, as a stiffer contact
     if seen is None or not np.isfinite(seen.mobility):
         return 0
-    if lost < engine.STICKY and not asked.stopped(seen.mobility, quicker):
+    if lost < STICKY and not asked.stopped(seen.mobility, quicker):
         return 0
     # half a period of a heavy one on a hinged square as a spring; the first echo throws off a light one
     lasts = np.pi * seen.mobility * (0.74 * mass * seen.mass) ** 0.5 if mass > LIGHT * seen.mass else 0.0

@@ -53,7 +53,7 @@ class Family:
             omega, zeta = np.array(body.omega), np.array(body.damping_ratio)
             squared = body.shape_at(place)[0] ** 2 * body.mass
             if lossy and rest > 0.0:
-                above, damping = rest_mode(body.dimension, omega[-1], zeta[-1], lossy, squared.sum() / rest)
+                above, damping = rest_mode(body.dimension, omega[-1], zeta[-1], 0.0, squared.sum() / rest)
                 omega, zeta = np.append(omega, above), np.append(zeta, damping)
                 squared, rest = np.append(squared, rest * above**2), 0.0
             parts.append((omega, zeta, squared, rest))

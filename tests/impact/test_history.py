@@ -53,7 +53,7 @@ def test_bodies_that_touch_are_in_contact_from_when_force_acts_on_them(tolerance
     """Those beyond the gap touch from the start, and press each other when the gap is closed at 0.756 ms."""
     hit = slow_chain(tolerance)
     assert hit.n_impacts == 7
-    assert_allclose(hit.contact_time, 17.479156e-3, rtol=tolerance)  # at 1e-9 and 1e-10, by collocation
+    assert_allclose(hit.contact_time, 17.479156e-3, rtol=tolerance)  # at 1e-9 and 1e-10
     met = next(each for each in hit.impacts if each.contact == 1)
     assert first_touches(hit, 4) == [0.0, met.start, met.start, met.start]
 
