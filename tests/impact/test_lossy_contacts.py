@@ -8,6 +8,7 @@ import restarted
 from comparing import worst
 from lossy_blow import blow
 from numpy.testing import assert_allclose
+from scipy.integrate import solve_ivp
 
 import fem_impact as fi
 from fem_impact.impact.accuracy import contact_duration
@@ -85,6 +86,28 @@ def test_what_a_contact_does_within_its_steps_is_claimed(law, told, tolerance):
     assert abs(hit.contact_time / wanted.contact_time - 1.0) < 1.1 * hit.error.of_quantity("contact_time")
     missed = abs(hit.history.end_p[0] - wanted.speeds[0]) / np.linalg.norm(hit.history.start_p)
     assert missed < 1.1 * hit.error.of_quantity("restitution")  # 1.1: terms of higher order
+
+
+@pytest.mark.parametrize(("loss", "tolerance"), [(20.0, 1e-6), (230.0, 1e-2), (700.0, 1e-4), (5e3, 1e-5)])
+def test_a_sticky_contact_ends_where_the_overlap_does(loss, tolerance):
+    """It slows the bodies down to 1 / loss: rounding decided when they parted faster, and no two runs agreed."""
+    stiffness, striker, target, speed = 1.4e6, 0.0064, 0.0015, 1.0
+    mass = striker * target / (striker + target)
+
+    def change(_, y):  # approach, and the logarithm of 1 + loss * rate
+        return [np.expm1(y[1]) / loss, -loss * stiffness * max(y[0], 0.0) ** 2 / mass]
+
+    parted = lambda _, y: y[0]  # noqa: E731
+    parted.terminal, parted.direction = True, -1.0
+    start = [0.0, np.log1p(loss * speed)]
+    truth = solve_ivp(change, (0.0, 10.0), start, "LSODA", rtol=1e-11, atol=1e-16, events=parted)
+    hit = fi.strike(
+        fi.Modes.rigid(target), fi.Striker.rigid(striker), fi.Contact.power(stiffness, 2.0, loss=loss), at=None,
+        speed=speed, tolerance=tolerance,
+    )  # fmt: skip
+    assert hit.tolerance_met
+    assert hit.contact_time == pytest.approx(truth.t[-1], rel=hit.error.of_quantity("contact_time"))
+    assert hit.impulse == pytest.approx(mass * (speed - np.expm1(truth.y[1, -1]) / loss), rel=tolerance)
 
 
 @pytest.mark.parametrize(("scheme", "tolerance"), [("A", 1e-3), ("A4", 1e-4)])

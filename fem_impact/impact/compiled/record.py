@@ -81,7 +81,8 @@ def forces(steps, now, law, rows, i, part, out):
 def pushing(steps, now, law, row, i):
     """Fractions of a step between which contact i pushes, by the cubic through both ends; (0, 0) if it does not.
 
-    A lossy contact stops pushing while the bodies still overlap, when they part as fast as 1 / loss.
+    A lossy contact stops pushing while the bodies still overlap, when they part as fast as 1 / loss. A sticky one
+    slows them down to that and holds them at it but for rounding: they part then where the overlap ends.
     """
     first = HEAD + WIDTH * i
     if steps[row, first + CLOSED] == 0.0:
@@ -100,14 +101,15 @@ def pushing(steps, now, law, row, i):
     loss = law["loss"][i]
     start = 1.0 + loss * v0
     end = 1.0 + loss * v1
+    if start > -LET_GO and end > -LET_GO:
+        return lower, upper
     if start <= 0.0 and end <= 0.0:
         return 0.0, 0.0
-    if start < 0.0 or end < 0.0:
-        at = letting_go(loss, d0, v0, d1, v1, h)
-        if start < 0.0:
-            lower = max(lower, at)
-        else:
-            upper = min(upper, at)
+    at = letting_go(loss, d0, v0, d1, v1, h)
+    if start < 0.0:
+        lower = max(lower, at)
+    else:
+        upper = min(upper, at)
     return lower, upper
 
 
