@@ -12,7 +12,7 @@ from .._base import check
 from .._base.check import SimulationError
 from .._base.rounding import ROUNDING, SAME
 from ..fe.assembly import System
-from ..fe.section import Beam, Plate
+from ..fe.section import Beam, Plate, size_at
 from ..fe.variation import DIFFERENCES, STEP, SectionChange
 from ..impact import collision
 from ..impact.contact import Contact
@@ -157,10 +157,17 @@ def _differ(one: Piece, two: Piece) -> bool:
     points = np.vstack([mesh.points, mesh.points[mesh.cells].mean(axis=1)])
     if mesh.dimension == 1:
         points = np.linspace(mesh.points.min(), mesh.points.max(), SECTIONS)[:, None]
-    return any(
-        not np.array_equal(getattr(one.section, name)(points), getattr(two.section, name)(points))
-        for name in ("stiffness", "inertia", "shear")
-    )
+    return not all(map(np.array_equal, _numbers_at(points, one.section), _numbers_at(points, two.section)))
+
+
+def _numbers_at(points: np.ndarray, section: Plate | Beam) -> list[Any]:
+    """All that a section gives the energies of a body at points (n_points, dimension) [m]."""
+    found = [section.inertia(points), section.shear(points)]
+    if isinstance(section, Beam):
+        return [*found, section.stiffness(points)]
+    thickness = size_at(section, "thickness", points)
+    ribs = [each for rib in section.ribs for each in rib.rigidity(points, thickness)]
+    return [*found, section.walls(points), section.tension, section.rise and section.rise(points), *ribs]
 
 
 def _check_alike(name: str, now: Piece, side: Piece) -> None:

@@ -88,6 +88,9 @@ class Design(check.Brief):
             return f"design found: every goal within {self.tolerance:g}"
         worst = max(self.reached, key=lambda each: abs(each.miss))
         held = f"; {', '.join(self.at_end)} stopped at the end of the range; widen it" if self.at_end else ""
+        idle = [name for name in self.values if not any(each.slopes[name] for each in self.reached)]
+        if idle:
+            held += f"; {', '.join(idle)} changes no goal there: round off what it moves, if that is a step"
         return (
             f"design MISSED: {worst.goal.label} is {worst.value:.6g}, wanted {worst.goal.words}"
             f"{held or '; free more numbers, or begin elsewhere, with start or tries'}"

@@ -23,6 +23,16 @@ def lengthened(system: System, vectors: np.ndarray) -> tuple[np.ndarray, float]:
     return steep.T @ steep / (frame.length * frame.mass), float((dx.ravel() / stiff).sum() * frame.length)
 
 
+def pulled(system: System, vectors: np.ndarray) -> np.ndarray:
+    """Integrals (n, n) of ``grad w_i . grad w_j`` over a plate of vectors (n_dofs, n), in the frame."""
+    points, whole = quadrature(system), unknowns_of_cells(system, vectors)
+    found = np.zeros((vectors.shape[1],) * 2)
+    for cells in blocks(len(points.x)):
+        slope = system.space.functions(cells, points.x[cells], (1,))[0] @ whole[cells][:, None]  # (n_cells, 2, n_q, n)
+        found += np.einsum("nq,niqk,niql->kl", points.dx[cells], slope, slope, optimize=True)
+    return found
+
+
 def section_energies(
     system: System, space: Any, field: Callable[[str, np.ndarray], np.ndarray], vectors: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:

@@ -59,8 +59,12 @@ def energy_changes(system: System, change: SectionChange, vectors: np.ndarray) -
     if system.rules.energies is not None:
         each = [system.rules.energies(system, section, vectors) for section in change.sections]
         K, M = (sum(weight * one for weight, one in zip(change.weights, pair)) for pair in zip(*each))
-        return np.asarray(K), np.asarray(M)
-    return slopes.section_energies(system, system.space, partial(_rate, system, change), vectors)
+    else:
+        K, M = slopes.section_energies(system, system.space, partial(_rate, system, change), vectors)
+    pull = sum(weight * getattr(each, "tension", 0.0) for weight, each in zip(change.weights, change.sections))
+    if pull:
+        K = K + pull * system.frame.length**2 / system.frame.stiffness * slopes.pulled(system, vectors)
+    return np.asarray(K), np.asarray(M)
 
 
 def frequency_densities(system: System, change: SectionChange, vectors: np.ndarray, square: np.ndarray) -> np.ndarray:

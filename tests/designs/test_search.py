@@ -126,6 +126,41 @@ def test_errors_name_what_is_wrong(objects, wanted, free, how, words):
         fi.design(objects, wanted, free, **how)
 
 
+def test_tension_rise_and_ribs_change_frequencies():
+    """Their slopes were none: the search stopped where it began, and told to free more numbers."""
+    mesh, sides = fi.mesh.rectangle(0.4, 0.3, size=0.15), {"boundary": "hinged"}
+    thin = fi.Plate(WOOD, 3e-3)
+    inertia, bent = float(thin.inertia(np.zeros((1, 2)))[0]), float(thin.stiffness(np.zeros((1, 2)))[0, 0, 0])
+    square = np.pi**2 * (0.4**-2 + 0.3**-2)
+    pulled = {"tension": (10.0, 2e4)}, lambda x: fi.Plate(WOOD, 3e-3, tension=x["tension"])
+    domed = {"rise": (0.01, 2.0)}, lambda x: fi.Plate(WOOD, 3e-3, rise=lambda at: x["rise"] * (at[:, 0] - 0.2) ** 2)
+    path = [(0.1, 0.0), (0.1, 0.3)]
+    joist = (
+        {"deep": (4e-3, 20e-3)},
+        lambda x: fi.Plate(WOOD, 3e-3, ribs=(fi.Rib(path, fi.Beam.rectangular(WOOD, width=8e-3, height=x["deep"])),)),
+    )
+    hertz = {0: np.sqrt(square * (bent * square + 8e3) / inertia) / (2.0 * np.pi), 1: 160.0, 2: 140.0}
+    for k, (free, made) in enumerate((pulled, domed, joist)):
+        found = fi.design(
+            lambda x, made=made: {"mesh": mesh, "section": made(x), "supports": sides},
+            {"mode1.frequency": hertz[k]}, free,
+        )  # fmt: skip
+        assert found.met
+        if not k:
+            assert_allclose(found.values["tension"], 8e3, rtol=1e-4)
+            slope = square / (8.0 * np.pi**2 * inertia * hertz[0])
+            assert_allclose(found.reached[0].slopes["tension"], slope, rtol=1e-4)
+
+
+def test_a_number_that_only_moves_a_step_is_named():
+    def stepped(values):
+        height = lambda x: np.where(np.abs(x[:, 0] - 0.175) < values["half"], 0.012, 0.02)  # noqa: E731
+        return {"mesh": fi.mesh.line(0.35), "section": fi.Beam.rectangular(WOOD, width=0.05, height=height)}
+
+    with pytest.warns(fi.ToleranceWarning, match="half changes no goal there: round off what it moves"):
+        fi.design(stepped, {"mode1.frequency": 600.0}, {"half": (0.02, 0.15)})
+
+
 def test_a_search_may_begin_where_a_number_is_one():
     """Its logarithm is zero, from which scipy alone would take no step."""
     soft = lambda values: ball({**values, "stiffness": 1e5})  # noqa: E731
