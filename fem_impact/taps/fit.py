@@ -97,7 +97,7 @@ def fit(
         The fit of a model inside this one to the same taps, where searches begin, too; in place of the former. If none
         of them gets below its sum of squares, it is what is returned, with a note.
     robust : bool
-        Whether a tap that the others predict badly is left out and named.
+        Whether a tap that the others predict badly, beyond its own noise, is left out and named.
     profiles : bool
         Whether to follow the likelihood profiles at once; otherwise when first asked for.
     rng : seed or numpy Generator
@@ -233,14 +233,17 @@ def _fit(
     used, outliers = list(range(cut.n_taps)), {}
     # of two taps that disagree, either may be wrong
     while robust and len(used) > max(3, (1.0 - solver.MOST_OUTLIERS) * cut.n_taps):
-        each = np.array([one.error for one in predictions.predict_left_out(problem, best.x, cut.pick(used))])
-        worst = int(each.argmax())
+        alone = predictions.predict_left_out(problem, best.x, cut.pick(used))
+        each, told = np.array([(one.error, one.error_of_peak) for one in alone]).T
+        # what a tap's own noise, known to about a half, explains is no fault of the others
+        beyond = each * np.sqrt(np.maximum(0.0, 1.0 - (1.5 * noise[used] / told) ** 2))
+        worst = int(beyond.argmax())
         others = [i for i in range(len(used)) if i != worst]
         without, begun = problem.among(others, best.x)
         solved = solver.solve(without, begun)
         fewer = Found(cut, tuple(used[i] for i in others), {}, without, solved, (solved.cost,), (), {})
         # rare by chance: a tap that the others predict worse than this times the median of their own errors
-        if each[worst] <= 4.0 * float(np.median(fewer.errors)):
+        if beyond[worst] <= 4.0 * float(np.median(fewer.errors)):
             break
         outliers[cut.labels[used[worst]]] = float(each[worst])
         used, problem, best, minima = list(fewer.used), without, solved, fewer.minima

@@ -114,6 +114,13 @@ def test_a_tap_that_disagrees_is_named():
     assert made.point["contact.exponent"] == pytest.approx(1.7, abs=0.05)
 
 
+@pytest.mark.parametrize("noise", [0.02, 0.05])
+def test_a_tap_that_is_only_noisier_counts_less_and_stays(noise):
+    made = fitted([*taps_of(speeds=(0.4, 0.7, 1.0, 1.3)), *taps_of(speeds=(0.9,), noise=noise)])
+    assert made.outliers == {} and len(made.used) == 5
+    assert made.point["contact.exponent"] == pytest.approx(1.7, abs=0.02)  # this seed's noise: 0.016
+
+
 def test_laws_are_compared_by_left_out_taps():
     laws = [fi.Contact.linear(1e6), fi.Contact.hertz(1e7)]
     unknown = {name: RANGES[name] for name in ("contact.stiffness", "striker.mass")}
