@@ -225,12 +225,18 @@ def measure(
     if at is not None:
         points = hit.target.points("at", at)
         moved = np.zeros((len(points), n_fine))
+        ringing = hit._motion(-1)
+        softness = ringing.softness(points)[:, 0]
         if quantity == "acceleration":
-            ringing = hit._motion(-1)
-            rows_at, softness = ringing.modes.shape_at(points), ringing.softness(points)[:, 0]
+            rows_at = ringing.modes.shape_at(points)
             moved[:, begun] = accelerations(ringing.history, ringing.part, rows_at, pushed, times[begun], softness).T
+        elif (
+            quantity == "velocity"
+        ):  # what follows the force jumps with its rate: between samples, as in `accelerations`
+            rate_of_force = np.gradient(np.append(0.0, pushed), times[1] - times[0])[1:]
+            moved[:, begun] = hit.velocity(points, times[begun], residual=False).T + np.outer(softness, rate_of_force)
         else:
-            moved[:, begun] = getattr(hit, quantity)(points, times[begun]).T
+            moved[:, begun] = hit.displacement(points, times[begun]).T
         rows += list(sample(moved, rig, force=False, shift=onset))
     found, overload = _digitised(np.array(rows)[:, MARGIN : MARGIN + n_times], rig, rng)
     unit = {"acceleration": "m/s^2", "velocity": "m/s", "displacement": "m"}[quantity]
