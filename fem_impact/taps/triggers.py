@@ -167,10 +167,8 @@ def cut(
     if not whole.any():
         raise ValueError(f"no tap was found in {name}: its force does not change; name its channel, force=")
     if not places:
-        raise ValueError(
-            f"no tap was found in {name}: its force reaches {whole.max():.3g} N and the trigger is {limit:.3g} N; "
-            "check scale and trigger"
-        )
+        reached = f"reaches {whole.max():.3g} N and the trigger is {limit:.3g} N"
+        raise ValueError(f"no tap was found in {name}: its force {reached}; check scale and trigger")
     if len(places) > 10_000:  # they are noise
         raise ValueError(f"{name} has {len(places)} places above {limit:.3g} N; give trigger= and together=")
     # 20 ms tell the offset, more may reach back to the last tap's ringing
@@ -185,6 +183,7 @@ def cut(
     lead = min(round(wanted * rate), least if before is None else 10**9)
     tail = most_whole(rooms[:, 1], needs[:, 1])[0] if length is None else max(1, round(longest * rate) - lead)
     tail = min(tail, round(LONGEST * rate))
+    quiet = lead - max(GUARD, lead // 4)  # samples of each record that tell its offset
     rows, responses, labels, notes, offsets, tops, drift = [], [], [], [], [], [], 0.0
     if without := [str(k + 1) for k in range(len(segments)) if k not in {place[0] for place in places}]:
         notes.append(f"no tap above {limit:.3g} N in record {', '.join(without[:20])}{', ...' * (len(without) > 20)}")
@@ -194,14 +193,13 @@ def cut(
         if first < 0 or last > len(row):
             notes.append(f"tap {number + 1} is left out: its record is not complete")
             continue
-        quiet = slice(max(0, first), max(0, start - max(3, (start - first) // 4)))
-        slope = rests[k] - rests[k][start]  # (n_samples,) [N]
-        flat = row - slope
-        base = (np.median(flat[quiet]), np.median(other[quiet], axis=0)) if len(flat[quiet]) >= FEWEST else (0.0, 0.0)
+        slope = rests[k][first:last] - rests[k][start]  # (n_times,) [N]
+        force, response = row[first:last] - slope, other[first:last]
+        base = (np.median(force[:quiet]), np.median(response[:quiet], axis=0)) if quiet >= FEWEST else (0.0, 0.0)
         offsets.append(float(base[0]))
-        drift = max(drift, float(np.ptp(slope[first:last])))
-        rows.append(flat[first:last] - base[0])
-        responses.append(other[first:last] - base[1])
+        drift = max(drift, float(np.ptp(slope)))
+        rows.append(force - base[0])
+        responses.append(response - base[1])
         labels.append(f"tap {number + 1}")
         tops.append(float(row[first:last].max()))
     if not rows:
