@@ -57,13 +57,18 @@ class Jumps(NamedTuple):
         """Half way between both, (n_cells, n) [m kg**-0.5], as the plate's edge lies between theirs."""
         return 0.5 * (self.inner + self.outer)
 
+    @property
+    def doubt(self) -> np.ndarray:
+        """Half the width of an estimate by `mean`: three times half the difference of both, (n_cells, n) [m kg**-0.5]."""
+        return 1.5 * (self.outer - self.inner)
+
     def bounds(self, place: np.ndarray, omega: np.ndarray, speed: float) -> tuple[np.ndarray, np.ndarray]:
         """Pressure of every mode at a place (3,) [m], by `mean`, and the half width of the estimate, (n,) each.
 
         In m kg**-0.5 Pa per kg/m^3 and m/s^2: for a density of 1 kg/m^3 and unit modal acceleration at the frequencies
-        omega (n,) [rad/s]. The half width is 3 times half the difference of the two lattices, where the listener is
-        and over the half space in front, since one place may agree by chance; it is at least a tenth of the mode's mean
-        sound over all directions, as where that nearly cancels (test_free_air.py).
+        omega (n,) [rad/s]. The half width is that by `doubt`, where the listener is and over the half space in front,
+        since one place may agree by chance; it is at least a tenth of the mode's mean sound over all directions, as
+        where that nearly cancels (test_free_air.py).
         """
         middle = np.append(0.5 * (self.points.min(axis=0) + self.points.max(axis=0)), 0.0)
         far = max(float(np.linalg.norm(place - middle)), float(np.linalg.norm(np.ptp(self.points, axis=0))))
@@ -78,11 +83,10 @@ class Jumps(NamedTuple):
             near = each[2] * self.size**2 / (4.0 * np.pi * way**3)
             fields.append(near[:, None] * (1.0 - turn) * np.exp(turn))
         own, half = np.array([
-            [np.einsum("cn,cn->n", field, each) for each in (self.mean, 0.5 * (self.outer - self.inner))]
-            for field in fields
+            [np.einsum("cn,cn->n", field, each) for each in (self.mean, self.doubt)] for field in fields
         ]).transpose(1, 0, 2)  # (n_places, n) each  # fmt: skip
         apart = np.maximum(np.abs(half[0]), np.sqrt((np.abs(half[1:]) ** 2).mean(axis=0)))
-        return own[0], 3.0 * apart + 0.1 * np.sqrt((np.abs(own[1:]) ** 2).mean(axis=0))
+        return own[0], apart + 0.1 * np.sqrt((np.abs(own[1:]) ** 2).mean(axis=0))
 
 
 def reach(modes: Modes, speed: float) -> np.ndarray:
@@ -118,15 +122,15 @@ def jumps(modes: Modes, wanted: np.ndarray, speed: float) -> Iterator[Jumps]:
 def loads(modes: Modes, speed: float) -> tuple[np.ndarray, np.ndarray]:
     """Mass that air of 1 kg/m^3 adds to each mode, and damping ratio by its sound: (n_modes, 2) and half the width.
 
-    The half width has room as in `Jumps.bounds`. Both are zero of modes that no lattice is fine enough for.
+    The half width is that by `Jumps.doubt`. Both are zero of modes that no lattice is fine enough for.
     """
     middle, half = np.zeros((2, modes.n_modes, 2))
     for part in jumps(modes, reach(modes, speed) <= ACROSS[-1], speed):
         shapes = modes.shapes.take(int(part.modes[-1]) + 1).at(part.points)[:, part.modes]
-        for found, jump in ((middle, part.mean), (half, 0.5 * (part.outer - part.inner))):
+        for found, jump in ((middle, part.mean), (half, part.doubt)):
             pressed = part.size**2 * (shapes * jump).sum(axis=0)
             found[part.modes] = np.column_stack([pressed.real, 0.5 * pressed.imag])
-    return middle, 3.0 * np.abs(half)
+    return middle, np.abs(half)
 
 
 class AirSheet:
