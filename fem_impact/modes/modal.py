@@ -415,7 +415,8 @@ class Modes(check.Brief):
 
     def modal_compliance(self, points: Any) -> np.ndarray:
         """Static compliance of the kept modes between points, (n_points, n_points) [m/N]."""
-        return _carried(self.omega, self.shape_at(points))
+        rows = self.shape_at(points)
+        return _carried(self.omega, rows, rows)
 
     def residual_compliance(self, points: Any) -> np.ndarray:
         """Static compliance of the modes left out, (n_points, n_points) [m/N].
@@ -504,11 +505,11 @@ def at_rest(modes: "Modes", point: np.ndarray) -> tuple[str, ...]:
     return (f"the point struck, ({where}) m, cannot move: it lies on a support, and the blow is that on a wall",)
 
 
-def _carried(omega: np.ndarray, rows: np.ndarray, weight: Any = 1.0) -> np.ndarray:
-    """Static compliance (n_points, n_points) [m/N] of modes with shapes (n_points, n_modes), times their weights."""
+def _carried(omega: np.ndarray, moved: np.ndarray, pushed: np.ndarray, weight: Any = 1.0) -> np.ndarray:
+    """Static compliance (n_points, n_loads) [m/N] of modes, times their weights, by shapes at points and at loads."""
     flexible = omega > 0.0
-    scaled = rows[:, flexible] / omega[flexible]
-    return (weight * scaled) @ scaled.T
+    at_points, at_loads = (rows[:, flexible] / omega[flexible] for rows in (moved, pushed))
+    return (weight * at_points) @ at_loads.T
 
 
 def _numbers_of_points(loads: Any, n_points: int, given: bool) -> np.ndarray:
@@ -529,9 +530,8 @@ def left_out_between(modes: "Modes", loads: np.ndarray, points: np.ndarray) -> n
     """Static deflection of the modes left out at points under unit forces at loads, (n_points, n_loads) [m/N]."""
     if not len(points):
         return np.zeros((0, len(loads)))
-    swings = modes.omega > 0.0
-    pushed, moved = (modes.shapes.at(place)[:, swings] / modes.omega[swings] for place in (loads, points))
-    return np.asarray(modes.shapes.deflection(loads, points) - moved @ pushed.T)
+    moved, pushed = (modes.shapes.at(place) for place in (points, loads))
+    return np.asarray(modes.shapes.deflection(loads, points) - _carried(modes.omega, moved, pushed))
 
 
 def left_out(modes: "Modes", place: np.ndarray, rows: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -540,11 +540,11 @@ def left_out(modes: "Modes", place: np.ndarray, rows: np.ndarray) -> tuple[np.nd
     The error is (n_points,) [m/N].
     """
     whole = modes.shapes.compliance(place)
-    rest = whole - _carried(modes.omega, rows)
+    rest = whole - _carried(modes.omega, rows, rows)
     doubt = np.abs(np.diag(whole)) * (modes.shapes.compliance_error(place) + ROUNDING)
     if modes.frequency_error is not None:
         # cautious, of a mode's compliance over its frequency's: 2 by omega**-2, the rest for its shape
-        doubt = doubt + np.diag(_carried(modes.omega, rows, 10.0 * modes.frequency_error[modes.omega > 0.0]))
+        doubt = doubt + np.diag(_carried(modes.omega, rows, rows, 10.0 * modes.frequency_error[modes.omega > 0.0]))
     allowed = doubt.copy()
     dent = modes.shapes.dent(place)[:, 0]
     if dent.any():  # short waves dent a solid, too: modes may hold more of the dent than was left of the compliance
@@ -574,7 +574,6 @@ def damping_ratios(damping_ratio: Any, omega: np.ndarray) -> np.ndarray:
         result = check.array("damping_ratio", damping_ratio, omega.shape)
     else:
         result[flexible] = check.non_negative("damping_ratio", damping_ratio)
-        result[~flexible] = 0.0
     if (result < 0.0).any():
         raise ValueError(f"damping_ratio must not be negative, got {result.min():g}")
     return result
