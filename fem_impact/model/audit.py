@@ -89,7 +89,8 @@ def examine(hit: Response, simplified: Simplified | None = None) -> tuple[Assump
     def examined() -> tuple[Assumption, ...]:
         return tuple(examiner(struck) for examiner in EXAMINERS)
 
-    short = hit.history.stretched is None and len(hit.history.steps) <= fresh.STEPS
+    steps = len(EXAMINERS) * len(hit.history.steps)  # about, as each may strike again
+    short = hit.history.stretched is None and steps <= fresh.TOGETHER * fresh.STEPS
     return fresh.soon(examined) if short else examined()
 
 

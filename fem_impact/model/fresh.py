@@ -19,6 +19,7 @@ from typing import Any, TypeVar
 import numpy as np
 
 from .._base import check, child
+from ..impact import stepping
 from ..impact.compiled import build, energy, places
 from ..impact.response import Response
 
@@ -26,6 +27,8 @@ SWITCH = "NUMBA_DISABLE_JIT"  # variable of numba; where a user sets it, to 0 or
 MARK = "compiling"  # name of the file that is there while a process compiles
 PATIENCE = 300.0  # [s] age of a mark whose process was killed: compiling takes 15 s, a minute or two on a busy machine
 STEPS = 10_000  # [-] most steps of one run as plain Python: about a second
+# [-] runs that give up: all runs of an answer may take as long together; one takes 2 to 6 s of computing, compiling 14
+TOGETHER = 2.0
 Answer = TypeVar("Answer")
 
 
@@ -37,7 +40,7 @@ def answer(compute: Callable[[], Response], stretches: bool) -> Response:
 def soon(compute: Callable[[], Answer], most: float = np.inf, holds: Callable[[Answer], bool] = bool) -> Answer:
     """What a function finds: where kernels are not compiled yet, as plain Python, if that ``holds``.
 
-    Runs as plain Python give up after ``most`` steps.
+    Runs as plain Python give up after ``most`` steps, and all of them together when they took as long as TOGETHER.
     """
     if not build.COMPILED:
         return compute()
@@ -48,7 +51,7 @@ def soon(compute: Callable[[], Answer], most: float = np.inf, holds: Callable[[A
     except build.Uncompiled as error:
         lacking = error.args
     if SWITCH not in os.environ and places.lasting(os.environ) and _under_way(lacking):
-        with suppress(check.SimulationError), build.uncompiled(most):
+        with suppress(check.SimulationError, build.Uncompiled), build.uncompiled(most), stepping.allowance(TOGETHER):
             found = compute()
             if holds(found):
                 return found

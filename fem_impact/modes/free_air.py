@@ -59,7 +59,7 @@ class Jumps(NamedTuple):
 
     @property
     def doubt(self) -> np.ndarray:
-        """Half the width of an estimate by `mean`: three times half the difference of both, (n_cells, n) [m kg**-0.5]."""
+        """Half width of an estimate by `mean`: three times half the difference of both, (n_cells, n) [m kg**-0.5]."""
         return 1.5 * (self.outer - self.inner)
 
     def bounds(self, place: np.ndarray, omega: np.ndarray, speed: float) -> tuple[np.ndarray, np.ndarray]:
