@@ -348,8 +348,7 @@ def run_play(options: argparse.Namespace) -> Answer:
     # what is wrong at a glance is refused before the modes are found
     check.count("--block", options.block)
     check.positive("--duration", options.duration, "s")
-    if options.midi is not None:
-        controllers.read_midi(options.midi, 1, 1.0, 1)
+    notes = [] if options.midi is None else controllers.read_midi(options.midi)
     if options.at:
         asked.placed(scene.built.target, "--at", options.at, nullcontext)
     with staged(path.parent) as staging:
@@ -357,7 +356,7 @@ def run_play(options: argparse.Namespace) -> Answer:
             modes = scene.modes(options.n_modes)
         with progress_of(options)("preparing, and compiling if not yet done"):
             player = command.player_of(scene, modes, options)
-        with command.source_of(options, player) as (source, told):
+        with command.source_of(options, player, notes) as (source, told):
             device, missing = command.device_of(options, source.live)
             if missing:
                 remark(options, missing)

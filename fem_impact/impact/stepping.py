@@ -330,7 +330,7 @@ def _static(system: KernelSystem) -> np.ndarray:
     """Modal forces [N kg**-0.5] as a run starts, (n_modes,): constant ones and those of contacts that are pressed."""
     found, rates = system.bias.copy(), system.shape @ system.p
     for i, approach in enumerate(system.offset + system.shape @ system.q - law.dents(system.law)):
-        if approach > 0.0:  # the slope of what the contact stores, of any law
+        if approach > 0.0:  # the slope of what the contact stores, of any law and memory: only kernels call its force
             stored = [law.stored(np.array([(1.0 + part) * approach]), system.law[i : i + 1]) for part in (-1e-3, 1e-3)]
             factor = max(0.0, 1.0 + system.law["loss"][i] * rates[i])
             found -= (stored[1] - stored[0]) / (2e-3 * approach) * factor * system.shape[i]

@@ -2,13 +2,13 @@
 
 import argparse
 import signal
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import ExitStack, contextmanager
 
 from .._base.files import signalled
 from ..modes.modal import Modes
 from ..scenes.scene import Scene
-from .controllers import KEYS, Hands, Source, keys, port, read_midi, spread_points
+from .controllers import KEYS, Hands, Source, keys, of_note, port, spread_points
 from .devices import Clock, Device, Speaker
 from .player import PlayedStroke, Player, Score
 
@@ -32,10 +32,15 @@ def player_of(scene: Scene, modes: Modes, options: argparse.Namespace) -> Player
 
 
 @contextmanager
-def source_of(options: argparse.Namespace, player: Player) -> Iterator[tuple[Source, str]]:
-    """Where the strokes come from, and that in words."""
-    if options.midi is not None:
-        strokes = read_midi(options.midi, len(player.points), player.fastest, player.rate)
+def source_of(
+    options: argparse.Namespace, player: Player, notes: Sequence[tuple[float, int, int]]
+) -> Iterator[tuple[Source, str]]:
+    """Where the strokes come from, with the ``notes`` of a file by `read_midi`, and that in words."""
+    if notes:
+        strokes = [
+            PlayedStroke(round(time * player.rate), *of_note(note, velocity, len(player.points), player.fastest))
+            for time, note, velocity in notes
+        ]
         yield Score(strokes), f"{len(strokes)} notes of {options.midi}"
         return
     hands = Hands()

@@ -69,27 +69,26 @@ def of_note(note: int, velocity: int, n_points: int, fastest: float) -> tuple[in
     return (note - 60) % n_points, fastest * velocity / 127  # the largest velocity of MIDI
 
 
-def read_midi(path: Path, n_points: int, fastest: float, rate: int) -> list[PlayedStroke]:
-    """The notes of all tracks of a MIDI file as strokes; pauses, controllers and the ends of notes say nothing."""
+def read_midi(path: Path) -> list[tuple[float, int, int]]:
+    """Time [s], number and velocity of the notes of all tracks of a MIDI file; what else it holds says nothing."""
     mido = check.extra("mido", "play", "a MIDI file")
     if not path.is_file():
         raise ValueError(f"{path}: {check.absent(path)}")
     if path.stat().st_size > 10_000_000:  # days of music
         raise ValueError(f"{path}: a MIDI file must have at most 10 MB")
-    strokes, now = [], 0.0
+    notes, now = [], 0.0
     try:
         for message in mido.MidiFile(str(path)):
             now += message.time
             if message.type == "note_on" and message.velocity > 0:
-                struck = of_note(message.note, message.velocity, n_points, fastest)
-                strokes.append(PlayedStroke(round(now * rate), *struck))
+                notes.append((now, message.note, message.velocity))
     except (EOFError, IndexError, KeyError, OSError, TypeError, ValueError, ZeroDivisionError) as error:
         if isinstance(error, OSError) and error.errno:
             raise
         raise ValueError(f"{path}: not a MIDI file that can be read ({error or type(error).__name__})") from None
-    if not strokes:
+    if not notes:
         raise ValueError(f"{path}: holds no notes")
-    return strokes
+    return notes
 
 
 @contextmanager

@@ -87,9 +87,11 @@ def midi(path):
 
 
 def test_a_midi_file_keeps_its_tempo_in_all_tracks(tmp_path):
-    strokes = controllers.read_midi(midi(tmp_path / "a.mid"), 10, 1.27, 48_000)
-    assert [(s.frame, s.point) for s in strokes] == [(0, 0), (12_000, 9), (36_000, 1)]
-    assert [s.speed for s in strokes] == pytest.approx([1.27, 0.01, 0.64])
+    notes = controllers.read_midi(midi(tmp_path / "a.mid"))
+    assert [time for time, _, _ in notes] == pytest.approx([0.0, 0.25, 0.75])
+    struck = [controllers.of_note(*note, 10, 1.27) for _, *note in notes]
+    assert [point for point, _ in struck] == [0, 9, 1]
+    assert [speed for _, speed in struck] == pytest.approx([1.27, 0.01, 0.64])
 
 
 def test_what_is_no_midi_file_is_one_clear_error(tmp_path):
@@ -103,12 +105,12 @@ def test_what_is_no_midi_file_is_one_clear_error(tmp_path):
     for case in cases:
         (tmp_path / "b.mid").write_bytes(case)
         try:
-            controllers.read_midi(tmp_path / "b.mid", 10, 1.0, 48_000)
+            controllers.read_midi(tmp_path / "b.mid")
         except ValueError as error:
             assert str(error).startswith(str(tmp_path / "b.mid")) and "\n" not in str(error)
     for absent, why in ((tmp_path / "none.mid", "there is no such file"), (tmp_path, "it is a folder")):
         with pytest.raises(ValueError, match=why):
-            controllers.read_midi(absent, 10, 1.0, 48_000)
+            controllers.read_midi(absent)
 
 
 def test_a_midi_port_is_found_by_the_start_of_its_name(monkeypatch):
