@@ -319,9 +319,7 @@ class Found(check.Brief):
         if mass is not None:
             mass = check.positive("mass", mass, "kg")
             typical *= hammer.mass / mass
-            hammer = Striker.rigid(mass) if hammer.modes.n_modes == 1 else Striker.flexible(
-                hammer.modes.scaled(mass=mass), at=hammer.at
-            )  # fmt: skip
+            hammer = replace(hammer, modes=hammer.modes.scaled(mass=mass))
         return strike(body, hammer, law, at=place, speed=typical if speed is None else speed, tolerance=1e-3)
 
     @property
