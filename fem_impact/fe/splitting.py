@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 
 from .._base.rounding import SAME
-from ..mesh.facets import divided
+from ..mesh.facets import cross_product, divided
 from ..mesh.mesh_files import sides_of
 from ..mesh.meshes import Mesh
 
@@ -42,7 +42,7 @@ def towards_points(mesh: Mesh, points: np.ndarray, held: np.ndarray, least: Any 
             free = float(distance(point, edge[:, :-1], edge[:, 1:]).min(initial=np.inf))
             size = DEPTH * (breadth if free < SAME * extent else min(breadth, free))  # at the point
             off = point - corner
-            turn = side[..., 0] * off[..., 1] - side[..., 1] * off[..., 0]
+            turn = cross_product(side, off)
             inside = (turn >= 0.0).all(axis=1) | (turn <= 0.0).all(axis=1)
             away = np.where(inside, 0.0, distance(point, corner, after).min(axis=1))
             tall |= longest > np.maximum(max(coarse * size, floor), steep * away)

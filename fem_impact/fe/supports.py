@@ -10,6 +10,7 @@ from scipy.sparse import csr_matrix
 
 from .._base import check
 from .._base.untyped import Sparse
+from ..mesh.facets import cross_product
 from ..mesh.mesh_files import numbers_of, sides_of
 from ..mesh.meshes import Mesh
 from .section import KINDS, Elastic
@@ -39,7 +40,7 @@ class SupportedRim:
         if self.kinds[f] != self.kinds[g]:
             return True
         a, b = self.tangents[f, i], self.tangents[g, j]
-        corner = a @ b < 0.0 or abs(a[0] * b[1] - a[1] * b[0]) > SMOOTH
+        corner = a @ b < 0.0 or abs(cross_product(a, b)) > SMOOTH
         ends = self.points[self.facets[[f, g]]]
         length = float(np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1).max())
         jump = abs(self.curvatures[f, i] - self.curvatures[g, j]) * length > SMOOTH

@@ -1,6 +1,7 @@
 """Curved boundary facets, written as a height above the chord."""
 
 from math import comb
+from typing import Any
 
 import numpy as np
 
@@ -12,8 +13,12 @@ CURVE_STEPS = 12
 
 def angles(before: np.ndarray, after: np.ndarray) -> np.ndarray:
     """Turn [rad] from directions (n, 2) to others, positive to the left."""
-    cross = before[:, 0] * after[:, 1] - before[:, 1] * after[:, 0]
-    return np.arctan2(cross, (before * after).sum(axis=1))
+    return np.arctan2(cross_product(before, after), (before * after).sum(axis=1))
+
+
+def cross_product(one: np.ndarray, two: np.ndarray) -> Any:
+    """Cross product (...) of vectors (..., 2) in the plane, positive where the second points to the left."""
+    return one[..., 0] * two[..., 1] - one[..., 1] * two[..., 0]
 
 
 def is_curved(ends: np.ndarray, middles: np.ndarray) -> np.ndarray:

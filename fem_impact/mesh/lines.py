@@ -9,6 +9,7 @@ import shapely
 from scipy.optimize import brentq
 
 from .._base.rounding import SAME
+from .facets import cross_product
 from .loops import SAMPLES, Outline, Piece, extent, polyline
 
 
@@ -68,13 +69,13 @@ def _meetings(line: np.ndarray, piece: Piece, close: float) -> list[tuple[float,
 def _shares(line: np.ndarray, other: np.ndarray, close: float) -> list[float]:
     """The shares of a line (2, 2) at which another line meets it: both ends of one that runs along it."""
     along, beside = line[1] - line[0], other[1] - other[0]
-    turn = along[0] * beside[1] - along[1] * beside[0]
+    turn = cross_product(along, beside)
     sizes = float(np.linalg.norm(along)), float(np.linalg.norm(beside))
     gap = other - line[0]  # of both ends
-    away = along[0] * gap[:, 1] - along[1] * gap[:, 0]
+    away = cross_product(along, gap)
     if abs(turn) < SAME * sizes[0] * sizes[1]:
         shares = gap @ along / sizes[0] ** 2
         return [float(share) for share in shares[np.abs(away) < close * sizes[0]] if 0.0 < share < 1.0]
-    mine, its = (gap[0, 0] * beside[1] - gap[0, 1] * beside[0]) / turn, -away[0] / turn
+    mine, its = cross_product(gap[0], beside) / turn, -away[0] / turn
     meets = all(-close < share * size < size + close for share, size in zip((mine, its), sizes))
     return [float(mine)] if meets else []

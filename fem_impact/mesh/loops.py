@@ -9,7 +9,7 @@ import shapely
 
 from .._base import check
 from .._base.rounding import HALVINGS, SAME
-from .facets import angles
+from .facets import angles, cross_product
 
 UNITS = {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "um": 1e-6, "in": 0.0254, "km": 1e3}
 FARTHEST = 1e12  # [-] largest coordinate accepted: products of larger ones lose digits or overflow
@@ -110,8 +110,7 @@ def curvature(piece: Piece, t: np.ndarray) -> np.ndarray:
     first, second = piece.at(t, 1), piece.at(t, 2)
     speed = np.linalg.norm(first, axis=-1)
     fastest = np.linalg.norm(piece.at(np.linspace(0.0, 1.0, 9), 1), axis=1).max()
-    cross = first[..., 0] * second[..., 1] - first[..., 1] * second[..., 0]
-    return cross / np.maximum(speed, 1e-6 * fastest) ** 3
+    return cross_product(first, second) / np.maximum(speed, 1e-6 * fastest) ** 3
 
 
 def divide(piece: Piece, size: float) -> np.ndarray:
@@ -160,8 +159,7 @@ def polyline(loop: Loop, size: float) -> np.ndarray:
 def signed_area(points: np.ndarray) -> float:
     """Area [m^2] of a closed polygon (n, 2), positive if anticlockwise."""
     shifted = points - points[0]
-    after = np.roll(shifted, -1, axis=0)
-    return 0.5 * float((shifted[:, 0] * after[:, 1] - shifted[:, 1] * after[:, 0]).sum())
+    return 0.5 * float(cross_product(shifted, np.roll(shifted, -1, axis=0)).sum())
 
 
 @dataclass(frozen=True, eq=False)

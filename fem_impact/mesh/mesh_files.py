@@ -15,6 +15,7 @@ from scipy.spatial import cKDTree
 from .._base import check
 from .._base.rounding import SAME
 from . import meshio_reader
+from .facets import cross_product
 from .loops import FARTHEST, UNITS, refuse_millimetres
 
 PLANE = {"triangle": 3, "triangle6": 6, "triangle7": 7, "quad": 4, "quad8": 8, "quad9": 9}  # nodes of cells read here
@@ -48,7 +49,7 @@ def read_mesh(path: Any, unit: str | None) -> tuple[
     a, b, middle = raw[rows].transpose(1, 0, 2)
     side, away = b - a, middle - 0.5 * (a + b)
     along = np.abs((away * side).sum(axis=1))
-    across = np.abs(away[:, 0] * side[:, 1] - away[:, 1] * side[:, 0])
+    across = np.abs(cross_product(away, side))
     far = np.maximum(along / ALONG, across / ACROSS) > (side**2).sum(axis=1)
     if far.any():
         first, second, node = rows[far][0]
@@ -238,7 +239,7 @@ def _mend(
         cells = cells[np.sort(first)]
     corner = points[cells]
     u, v = corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0]
-    area = 0.5 * (u[:, 0] * v[:, 1] - u[:, 1] * v[:, 0])
+    area = 0.5 * cross_product(u, v)
     longest = np.maximum(np.maximum((u**2).sum(1), (v**2).sum(1)), ((u - v) ** 2).sum(1))
     flat = np.flatnonzero(2.0 * np.abs(area) <= SAME * longest)
     if flat.size:
@@ -367,9 +368,9 @@ def _refuse_overlap(path: Path, points: np.ndarray, cells: np.ndarray) -> None:
         raise ValueError(f"{name} is connected only by the node at ({x:g}, {y:g}) m; connect it along a side")
     # all triangles are anticlockwise, so they overlap exactly if the rim crosses itself
     loops = [shapely.LinearRing(points[loop]) for loop in loops_of(rim)]
-    crossed = [a for i, a in enumerate(loops) if not a.is_simple or any(a.intersects(b) for b in loops[:i])]
-    if crossed:
-        x, y = crossed[0].coords[0]
+    cross_product = [a for i, a in enumerate(loops) if not a.is_simple or any(a.intersects(b) for b in loops[:i])]
+    if cross_product:
+        x, y = cross_product[0].coords[0]
         raise ValueError(f"{name} has triangles that overlap at the rim through ({x:g}, {y:g}) m; mesh it again")
 
 

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .facets import angles, is_curved, slopes_and_bends
+from .facets import angles, cross_product, is_curved, slopes_and_bends
 
 # [rad] a vertex where the rim turns by more is a corner: ten facets of a circle turn by 36 degrees each
 CORNER = np.radians(35.0)
@@ -124,14 +124,14 @@ def _fit(place: np.ndarray, closed: bool, known: np.ndarray | None) -> tuple[np.
     unit = chord / length[:, None]
     centre = 0.5 * (place[1:] + place[:-1])
     bulge = 0.0 if known is None else np.linalg.norm(known - centre, axis=1).max() / length.min()
-    bent = np.abs(unit[:-1, 0] * unit[1:, 1] - unit[:-1, 1] * unit[1:, 0]).max(initial=0.0) > STRAIGHT
+    bent = np.abs(cross_product(unit[:-1], unit[1:])).max(initial=0.0) > STRAIGHT
     if (not bent and bulge < STRAIGHT) or (known is None and len(chord) < 3):
         return centre, np.stack([unit, unit], axis=1), np.zeros((len(chord), 2))
     on_it = place if known is None else np.concatenate([place, known])
     origin, radius = _circle(on_it)
     if np.abs(np.linalg.norm(on_it - origin, axis=1) - radius).max() < ROUND * radius:
         out = (place - origin) / np.linalg.norm(place - origin, axis=1)[:, None]
-        left = np.sign(out[0, 0] * out[1, 1] - out[0, 1] * out[1, 0])  # 1 if the rim turns left (convex), else -1
+        left = np.sign(cross_product(out[0], out[1]))  # 1 if the rim turns left (convex), else -1
         tangent = left * np.column_stack([-out[:, 1], out[:, 0]])
         half = out[:-1] + out[1:]
         middles = origin + radius * half / np.linalg.norm(half, axis=1)[:, None]
@@ -182,5 +182,5 @@ def _polynomials(place: np.ndarray, closed: bool) -> tuple[np.ndarray, np.ndarra
         velocity, acceleration = powers[1], 2.0 * powers[2]
         speed = np.hypot(*velocity)
         tangent[i] = velocity / speed
-        curvature[i] = (velocity[0] * acceleration[1] - velocity[1] * acceleration[0]) / speed**3
+        curvature[i] = cross_product(velocity, acceleration) / speed**3
     return tangent, curvature

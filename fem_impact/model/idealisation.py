@@ -11,6 +11,7 @@ from ..fe.assembly import support_of_facets
 from ..fe.section import Material, Plate
 from ..fe.splitting import distance
 from ..impact import threshold
+from ..mesh.facets import angles, cross_product
 from ..mesh.meshes import Mesh
 from ..modes.modal import Modes, at_rest
 from ..modes.shapes import SampledShapes
@@ -110,9 +111,9 @@ class Surroundings:
         """
         corners = mesh.points[mesh.cells]
         sides = np.roll(corners, -1, axis=1) - corners
-        turns = np.sign(sides[:, 0, 0] * sides[:, 1, 1] - sides[:, 0, 1] * sides[:, 1, 0])  # which way round they go
+        turns = np.sign(cross_product(sides[:, 0], sides[:, 1]))  # which way round they go
         off = at - corners
-        inside = (sides[..., 0] * off[..., 1] - sides[..., 1] * off[..., 0]) * turns[:, None] >= 0.0
+        inside = cross_product(sides, off) * turns[:, None] >= 0.0
         if not inside.all(axis=1).any():
             return None
         ends = np.stack([mesh.points[mesh.facets[:, 0]], mesh.middles, mesh.points[mesh.facets[:, 1]]], axis=1)
@@ -123,10 +124,9 @@ class Surroundings:
         away = distance(at, start, start + along)
         chord = ends[:, 2] - ends[:, 0]
         bulge = ends[:, 1] - 0.5 * (ends[:, 0] + ends[:, 2])
-        segments = 2.0 / 3.0 * float((chord[:, 1] * bulge[:, 0] - chord[:, 0] * bulge[:, 1]).sum())  # body on the left
+        segments = 2.0 / 3.0 * float(cross_product(bulge, chord).sum())  # body on the left
         one, two = start - at, start + along - at
-        cross = one[:, 0] * two[:, 1] - one[:, 1] * two[:, 0]
-        sectors = np.column_stack([cross, np.arctan2(cross, (one * two).sum(axis=1))])
+        sectors = np.column_stack([cross_product(one, two), angles(one, two)])
         return cls(
             mesh.area + segments, float(length.sum()), float(away.min()), np.column_stack([away, length]), sectors
         )
