@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 import fem_impact as fi
+from fem_impact.fe.variation import DIFFERENCES, SectionChange
 
 QUANTITIES = ("impulse", "contact_time", "peak_force")
 
@@ -26,6 +27,12 @@ def changes(blow, numbers, name, quantities, step=1e-4):
     """Changes of quantities per relative change of a number, from blows with the number a step smaller and larger."""
     low, high = (blow(numbers | {name: numbers[name] * (1.0 + side * step)}) for side in (-1.0, 1.0))
     return [(getattr(high, quantity) - getattr(low, quantity)) / (2.0 * step) for quantity in quantities]
+
+
+def along(made, value, step):
+    """How a section changes with the number it is made from."""
+    multiples, weights = DIFFERENCES[0]
+    return SectionChange(tuple(made(value + step * k) for k in multiples), tuple(w / step for w in weights))
 
 
 def assert_printed(printed, stated, number=r"-?\d+(?:\.\d+)?(?:e[+-]?\d+)?", **how):

@@ -2,18 +2,13 @@
 
 import numpy as np
 import pytest
+from comparing import along
 from numpy.testing import assert_allclose
 
 import fem_impact as fi
 from fem_impact.fe.variation import DIFFERENCES, SectionChange, energy_changes
 
 WOOD = fi.Material(E=10e9, nu=0.3, rho=450.0)
-
-
-def along(made, value, step):
-    """How a section changes with the number it is made from."""
-    multiples, weights = DIFFERENCES[0]
-    return SectionChange(tuple(made(value + step * k) for k in multiples), tuple(w / step for w in weights))
 
 
 @pytest.mark.parametrize("multiples, weights", DIFFERENCES)

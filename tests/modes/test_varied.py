@@ -5,6 +5,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from comparing import along
 from numpy.testing import assert_allclose
 
 import fem_impact as fi
@@ -13,11 +14,6 @@ from fem_impact.modes import varied
 
 WOOD = fi.Material(E=16e9, nu=0.35, rho=900.0)
 AT = np.array([0.15])
-
-
-def along(made, value, step):
-    multiples, weights = DIFFERENCES[0]
-    return SectionChange(tuple(made(value + step * k) for k in multiples), tuple(w / step for w in weights))
 
 
 def uniform(height):
