@@ -178,7 +178,7 @@ def cut(
         raise ValueError(f"length must be longer than before, {wanted:g} s, got {longest:g} s")
     rooms = np.array([place[2:] for place in places])
     needs = np.array([pulse_reach(moved[k], *place) for k, *place in places])
-    least, n_whole = most_whole(rooms[:, 0], np.maximum(needs[:, 0], FEWEST))
+    least, n_whole = most_whole(rooms[:, 0], np.maximum(needs[:, 0], FEWEST + GUARD))
     least = least if 2 * n_whole > len(places) else most_whole(rooms[:, 0], needs[:, 0])[0]
     lead = min(round(wanted * rate), least if before is None else 10**9)
     tail = most_whole(rooms[:, 1], needs[:, 1])[0] if length is None else max(1, round(longest * rate) - lead)
@@ -209,7 +209,7 @@ def cut(
         notes.append(f"offsets before the taps were removed, of the force up to {abs(largest):.2g} N")
     if drift > 0.2 * limit:  # less moves no tap
         notes.append(f"drift of the force was removed, up to {drift:.2g} N within a record")
-    if lead < FEWEST:
+    if quiet < FEWEST:
         notes.append(f"only {lead} samples before the taps: offsets are not removed")
     top = ceiling([row for row, _ in segments])
     return np.array(rows), np.array(responses), np.array(tops) >= top * (1.0 - SAME), labels, notes

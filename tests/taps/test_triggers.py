@@ -117,12 +117,14 @@ def drift(share):
 
 @pytest.mark.parametrize(("record", "said", "told"), [
     (drift(0.15), "drift", False), (drift(0.3), "drift", True),  # from a fifth of the trigger on
-    # fewer than eight samples before a tap give no offset
-    ({"places": slice(6, 11)}, "offsets are not removed", True),
-    ({"places": slice(10, 15)}, "offsets are not removed", False),
+    # eight samples before a tap, and the three before it that are no rest, give an offset
+    ({"places": slice(10, 15), "added": 3.0}, "offsets are not removed", True),
+    ({"places": slice(11, 16), "added": 3.0}, "offsets are not removed", False),
 ])  # fmt: skip
 def test_drift_is_told_and_a_missing_rest(record, said, told):
-    assert told == (said in cut(**record)[1])
+    rows, notes = cut(**record)
+    assert told == (said in notes)
+    assert rows[0, 0] == pytest.approx(3.0 if told and said != "drift" else 0.0, abs=0.1)
 
 
 def test_a_short_record_holds_its_tap_and_not_only_what_was_before():
