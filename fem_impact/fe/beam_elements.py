@@ -129,10 +129,7 @@ def nodes(points: np.ndarray, marked: np.ndarray, held: np.ndarray) -> np.ndarra
 
 def domain(make_space: Callable[[Cells], Any], body: Subject, names: tuple[str, ...]) -> Domain:
     """The elements of a beam in its frame, with shape functions and the section's fields ``names``."""
-    mesh, section = body.mesh, body.section
-    low, high = mesh.points.min(axis=0), mesh.points.max(axis=0)
-    box = 0.5 * (low + high), float((high - low).max())
-    bare = Frame(*box, 1.0, 1.0)
+    mesh, section, bare = body.mesh, body.section, Frame.around(body.mesh)
 
     def fields(x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         places = bare.to_metres(x)
@@ -143,7 +140,7 @@ def domain(make_space: Callable[[Cells], Any], body: Subject, names: tuple[str, 
     line = divided(fields, nodes(points, marked, points[mesh.facets[held, 0]]))
     space = make_space(line)
     x, dx = quadrature(space)
-    return Domain.of(names, section, box, line, space, Points(np.zeros((1, x.shape[1])), x[..., None], dx))
+    return Domain.of(names, section, bare, line, space, Points(np.zeros((1, x.shape[1])), x[..., None], dx))
 
 
 def hold(body: Subject, domain: Domain) -> Held:

@@ -12,22 +12,20 @@ from .elements import Bent, on_true_edge, triangles
 from .section import PLANE
 from .springs import at_facets, edge_stiffness
 from .supports import SupportedRim, cells_of_facets, support_of_facets
-from .theory import Domain, Subject, blocks, gram, scatter
+from .theory import Domain, Frame, Subject, blocks, gram, scatter
 
 
 def domain(make_space: Callable[[Cells, Bent | None], Any], body: Subject, names: tuple[str, ...]) -> Domain:
     """The triangles of a plate in its frame, with shape functions and the section's fields ``names``."""
     mesh = body.mesh
-    low, high = mesh.points.min(axis=0), mesh.points.max(axis=0)
-    box = 0.5 * (low + high), float((high - low).max())
-    cells = triangles((mesh.points - box[0]) / box[1], mesh.cells)
-    bent, curved = None, mesh.curved
+    bare, curved = Frame.around(mesh), mesh.curved
+    cells, bent = triangles(bare.local(mesh.points), mesh.cells), None
     if curved.any():  # triangles there are bent onto the true edge
-        facets, middles = mesh.facets[curved], (mesh.middles[curved] - box[0]) / box[1]
-        curves = Curves(cells.p.T[facets], middles, mesh.tangents[curved], mesh.curvatures[curved] * box[1])
+        facets, middles = mesh.facets[curved], bare.local(mesh.middles[curved])
+        curves = Curves(cells.p.T[facets], middles, mesh.tangents[curved], mesh.curvatures[curved] * bare.length)
         bent = Bent(curves, facets, *cells_of_facets(facets, cells.t.T), cells.t.T)
     space = make_space(cells, bent)
-    return Domain.of(names, body.section, box, cells, space, on_true_edge(space, *space.rule()))
+    return Domain.of(names, body.section, bare, cells, space, on_true_edge(space, *space.rule()))
 
 
 def rim(body: Subject, found: Domain, kinds: list[str]) -> SupportedRim:

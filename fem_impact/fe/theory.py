@@ -10,7 +10,7 @@ and errors by a second mesh where the theory has no estimate of its own (`no_est
 """
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -37,6 +37,12 @@ class Frame:
     length: float  # [m]
     stiffness: float  # [N m] on a plate, [N m^2] on a beam
     inertia: float  # [kg/m^2] on a plate, [kg/m] on a beam
+
+    @classmethod
+    def around(cls, mesh: Mesh) -> "Frame":
+        """Around the middle of a body, its largest side long; stiffness and inertia are still in SI units."""
+        low, high = mesh.points.min(axis=0), mesh.points.max(axis=0)
+        return cls(0.5 * (low + high), float((high - low).max()), 1.0, 1.0)
 
     @property
     def rate(self) -> float:
@@ -117,13 +123,10 @@ class Domain:
     softness: float  # [-] largest inertia over stiffness in any direction, in the frame
 
     @classmethod
-    def of(
-        cls, names: Sequence[str], section: Any, box: tuple[np.ndarray, float], cells: Cells, space: Any, points: Points
-    ) -> "Domain":
-        """That of a section, by its fields ``names``; ``box`` are the centre [m] and largest side [m] of the body."""
-        bare = Frame(*box, 1.0, 1.0)
+    def of(cls, names: Sequence[str], section: Any, bare: Frame, cells: Cells, space: Any, points: Points) -> "Domain":
+        """That of a section, by its fields ``names``; ``bare`` is the frame around the body."""
         fields = {name: bare.field(section, name, points.x) for name in names}
-        frame = Frame(*box, float(fields["stiffness"].max()), float(fields["inertia"].max()))
+        frame = replace(bare, stiffness=float(fields["stiffness"].max()), inertia=float(fields["inertia"].max()))
         for name, values in fields.items():
             fields[name] = values / frame.unit(name)
         stiffness, inertia, soft = fields["stiffness"], fields["inertia"], 1.0
