@@ -225,18 +225,7 @@ def measure(
     if at is not None:
         points = hit.target.points("at", at)
         moved = np.zeros((len(points), n_fine))
-        ringing = hit._motion(-1)
-        softness = ringing.softness(points)[:, 0]
-        if quantity == "acceleration":
-            rows_at = ringing.modes.shape_at(points)
-            moved[:, begun] = accelerations(ringing.history, ringing.part, rows_at, pushed, times[begun], softness).T
-        elif (
-            quantity == "velocity"
-        ):  # what follows the force jumps with its rate: between samples, as in `accelerations`
-            rate_of_force = np.gradient(np.append(0.0, pushed), times[1] - times[0])[1:]
-            moved[:, begun] = hit.velocity(points, times[begun], residual=False).T + np.outer(softness, rate_of_force)
-        else:
-            moved[:, begun] = hit.displacement(points, times[begun]).T
+        moved[:, begun] = _moved(hit, points, quantity, pushed, times[begun])
         rows += list(sample(moved, rig, force=False, shift=onset))
     found, overload = _digitised(np.array(rows)[:, MARGIN : MARGIN + n_times], rig, rng)
     unit = {"acceleration": "m/s^2", "velocity": "m/s", "displacement": "m"}[quantity]
@@ -244,6 +233,20 @@ def measure(
     return Taps.from_arrays(
         found[0], found[1:].T[None], rate=rig.rate, names=names, units=[unit] * len(names), overload=overload[None]
     )
+
+
+def _moved(hit: Response, points: np.ndarray, quantity: str, pushed: np.ndarray, times: np.ndarray) -> np.ndarray:
+    """A quantity (n_points, n_times) at points of the struck body, pushed by forces (n_times,) [N]."""
+    if quantity == "displacement":
+        return hit.displacement(points, times).T
+    ringing = hit._motion(-1)
+    softness = ringing.softness(points)[:, 0]
+    if quantity == "acceleration":
+        rows = ringing.modes.shape_at(points)
+        return accelerations(ringing.history, ringing.part, rows, pushed, times, softness).T
+    # what follows the force jumps with its rate: between samples, as in `accelerations`
+    rate = np.gradient(np.append(0.0, pushed), times[1] - times[0])[1:]
+    return hit.velocity(points, times, residual=False).T + np.outer(softness, rate)
 
 
 def _digitised(records: np.ndarray, rig: Rig, rng: Any) -> tuple[np.ndarray, np.ndarray]:
