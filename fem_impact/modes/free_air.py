@@ -38,6 +38,8 @@ LOG = logging.getLogger(__name__)
 PER_WAVE = 8.0
 # [-] cells across a square as large as the plate, in the lattices to choose of: next ones are 1.8 to 2.3 times as large
 ACROSS = 48.0, 64.0, 96.0, 128.0
+LARGER = 2.0**0.5  # [-] of the cells that tell the error: half as many
+ROOM = 3.0  # [-] half the width of an estimate over what tells its error
 # [-] relative, of the solved equations: a thirtieth of what a bound states at least; smaller parts of the operator are
 # not inverted either, which only speeds up the solution
 RESIDUAL = 3e-3
@@ -51,42 +53,43 @@ class Jumps(NamedTuple):
     size: float  # [m] side of a cell
     inner: np.ndarray  # (n_cells, n) [m kg**-0.5] of the plate without the cells along its edge
     outer: np.ndarray  # (n_cells, n) of the plate and the space to the next centres around it
+    larger: "Jumps | None" = None  # the same on larger cells, by `LARGER`
 
     @property
     def mean(self) -> np.ndarray:
         """Half way between both, (n_cells, n) [m kg**-0.5], as the plate's edge lies between theirs."""
         return 0.5 * (self.inner + self.outer)
 
-    @property
-    def doubt(self) -> np.ndarray:
-        """Half width of an estimate by `mean`: three times half the difference of both, (n_cells, n) [m kg**-0.5]."""
-        return 1.5 * (self.outer - self.inner)
-
     def bounds(self, place: np.ndarray, omega: np.ndarray, speed: float) -> tuple[np.ndarray, np.ndarray]:
         """Pressure of every mode at a place (3,) [m], by `mean`, and the half width of the estimate, (n,) each.
 
         In m kg**-0.5 Pa per kg/m^3 and m/s^2: for a density of 1 kg/m^3 and unit modal acceleration at the frequencies
-        omega (n,) [rad/s]. The half width is that by `doubt`, where the listener is and over the half space in front,
-        since one place may agree by chance; it is at least a tenth of the mode's mean sound over all directions, as
-        where that nearly cancels (test_free_air.py).
+        omega (n,) [rad/s]. The half width is `ROOM` times the difference from the larger cells, where the listener is and
+        over the half space in front, since one place may agree by chance; it is at least a tenth of the mode's mean
+        sound over all directions, as where that nearly cancels (test_free_air.py). Half the difference of `inner` and
+        `outer` would be none at sharp corners and notches, where both err alike.
         """
+        assert self.larger is not None
         middle = np.append(0.5 * (self.points.min(axis=0) + self.points.max(axis=0)), 0.0)
         far = max(float(np.linalg.norm(place - middle)), float(np.linalg.norm(np.ptp(self.points, axis=0))))
         number = np.arange(12) + 0.5
         up, angle = number / 12, np.pi * (1.0 + np.sqrt(5.0)) * number  # a spiral of the golden ratio, evenly spread
         across = np.sqrt(1.0 - up**2)
         places = [place, *(middle + far * np.stack([across * np.cos(angle), across * np.sin(angle), up], axis=1))]
-        fields = []  # pressure for unit jumps on cells, (n_cells, n) [-]
+        own, other = (each._pressures(places, omega, speed) for each in (self, self.larger))
+        half = np.abs(own - other)
+        apart = np.maximum(half[0], np.sqrt((half[1:] ** 2).mean(axis=0)))
+        return own[0], ROOM * apart + 0.1 * np.sqrt((np.abs(own[1:]) ** 2).mean(axis=0))
+
+    def _pressures(self, places: list[np.ndarray], omega: np.ndarray, speed: float) -> np.ndarray:
+        """Pressure of every mode at places (3,) [m] each, (n_places, n), in the units of `bounds`."""
+        found = []
         for each in places:
             way = np.sqrt(((self.points - each[:2]) ** 2).sum(axis=1) + each[2] ** 2)
             turn = 1j * np.outer(way, omega / speed)
             near = each[2] * self.size**2 / (4.0 * np.pi * way**3)
-            fields.append(near[:, None] * (1.0 - turn) * np.exp(turn))
-        own, half = np.array([
-            [np.einsum("cn,cn->n", field, each) for each in (self.mean, self.doubt)] for field in fields
-        ]).transpose(1, 0, 2)  # (n_places, n) each  # fmt: skip
-        apart = np.maximum(np.abs(half[0]), np.sqrt((np.abs(half[1:]) ** 2).mean(axis=0)))
-        return own[0], apart + 0.1 * np.sqrt((np.abs(own[1:]) ** 2).mean(axis=0))
+            found.append(np.einsum("cn,cn->n", near[:, None] * (1.0 - turn) * np.exp(turn), self.mean))
+        return np.array(found)
 
 
 def reach(modes: Modes, speed: float) -> np.ndarray:
@@ -106,31 +109,45 @@ def jumps(modes: Modes, wanted: np.ndarray, speed: float) -> Iterator[Jumps]:
         if some.size:
             size = float(side / across)
             LOG.info("the air around %d modes, on cells of %.3g m", some.size, size)
-            points, inside = lattice(modes.shapes, size)
-            shapes = modes.shapes.take(int(some[-1]) + 1).at(points[inside])[:, some]
-            core = binary_erosion(inside)
-            sheets = AirSheet(core, size), AirSheet(inside, size)
-            solved = [
-                np.stack([sheet.jump(shape, omega / speed) for shape, omega in zip(rows.T, modes.omega[some])], axis=1)
-                for sheet, rows in zip(sheets, (shapes[core[inside]], shapes))
-            ]
-            inner = np.zeros(solved[1].shape, complex)
-            inner[core[inside]] = solved[0]
-            yield Jumps(some, points[inside], size, inner, solved[1])
+            yield _solved(modes, some, size, speed)._replace(larger=_solved(modes, some, LARGER * size, speed))
+
+
+def _solved(modes: Modes, some: np.ndarray, size: float, speed: float) -> Jumps:
+    """The jumps of some modes (n,), in ascending order, on cells of a size [m]."""
+    points, inside = lattice(modes.shapes, size)
+    shapes = modes.shapes.take(int(some[-1]) + 1).at(points[inside])[:, some]
+    core = binary_erosion(inside)
+    sheets = AirSheet(core, size), AirSheet(inside, size)
+    solved = [
+        np.stack([sheet.jump(shape, omega / speed) for shape, omega in zip(rows.T, modes.omega[some])], axis=1)
+        for sheet, rows in zip(sheets, (shapes[core[inside]], shapes))
+    ]
+    inner = np.zeros(solved[1].shape, complex)
+    inner[core[inside]] = solved[0]
+    return Jumps(some, points[inside], size, inner, solved[1])
 
 
 def loads(modes: Modes, speed: float) -> tuple[np.ndarray, np.ndarray]:
     """Mass that air of 1 kg/m^3 adds to each mode, and damping ratio by its sound: (n_modes, 2) and half the width.
 
-    The half width is that by `Jumps.doubt`. Both are zero of modes that no lattice is fine enough for.
+    The half width is `ROOM` times half the difference of `Jumps.inner` and `Jumps.outer` or, where that is more, of the
+    cells and larger ones. Both are zero of modes that no lattice is fine enough for.
     """
     middle, half = np.zeros((2, modes.n_modes, 2))
     for part in jumps(modes, reach(modes, speed) <= ACROSS[-1], speed):
-        shapes = modes.shapes.take(int(part.modes[-1]) + 1).at(part.points)[:, part.modes]
-        for found, jump in ((middle, part.mean), (half, part.doubt)):
-            pressed = part.size**2 * (shapes * jump).sum(axis=0)
-            found[part.modes] = np.column_stack([pressed.real, 0.5 * pressed.imag])
-    return middle, np.abs(half)
+        assert part.larger is not None
+        (own, apart), (other, _) = (_pressed(modes, each) for each in (part, part.larger))
+        middle[part.modes] = own
+        half[part.modes] = ROOM * np.maximum(np.abs(apart), np.abs(own - other))
+    return middle, half
+
+
+def _pressed(modes: Modes, part: Jumps) -> tuple[np.ndarray, np.ndarray]:
+    """What `loads` finds by the mean of the lattices, and half their difference, (n, 2) each."""
+    shapes = modes.shapes.take(int(part.modes[-1]) + 1).at(part.points)[:, part.modes]
+    both = [part.size**2 * (shapes * jump).sum(axis=0) for jump in (part.mean, 0.5 * (part.outer - part.inner))]
+    mean, apart = (np.column_stack([each.real, 0.5 * each.imag]) for each in both)
+    return mean, apart
 
 
 class AirSheet:

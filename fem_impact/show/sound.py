@@ -447,17 +447,17 @@ def radiate_free(
     Returns
     -------
     low, high : Sound
-        For equal motion the pressure of each mode lies between them; of free plates whose edges run across the lattice,
-        3 of 100 lay beyond, most by less than a sixth of the width. Where a mode is hardly heard, beside its lobes, it
-        may be silent in ``low``.
+        For equal motion the pressure of each mode lies between them: so it did at three places beside 46 free plates
+        whose edges run across the lattice. Where a mode is hardly heard, beside its lobes, it may be silent in ``low``.
 
     Notes
     -----
     The plate is a sheet of dipoles, whose strength is the jump of the pressure across it. Every mode has that at its
-    own frequency, between the jumps of a plate that is too small and one that is too large by up to a cell of a
-    lattice (`modes.free_air`), for any wavelength. In time it follows the mode's acceleration with its part in phase
-    and the velocity with the rest, which is exact as the mode rings. Left out are rigid motions, modes after about the
-    800th, and those whose sound has a wavelength below a sixteenth of the side of a square as large as the plate.
+    own frequency, half way between the jumps of a plate that is too small and one that is too large by up to a cell of
+    a lattice (`modes.free_air`), for any wavelength; larger cells tell its error. In time it follows the mode's
+    acceleration with its part in phase and the velocity with the rest, which is exact as the mode rings. Left out are
+    rigid motions, modes after about the 800th, and those whose sound has a wavelength below a sixteenth of the side of
+    a square as large as the plate.
 
     Unlike a rigid disk, whose low sound in free air is far below that in a wall, a plate of many lobes may be louder
     without the wall: `radiate` bounds neither from above nor from below. A curved plate radiates as if it were flat,

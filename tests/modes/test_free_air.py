@@ -44,9 +44,8 @@ def exact(m, wave, profile, n=12):
     return 2.0 * np.pi * (-1j) ** m * np.array(far) * np.sqrt(1.0 - SINES**2)
 
 
-def of_disk(m, profile, wave, across):
-    """The same of a unit disk by `Jumps`, in each direction: pressure and half width."""
-    size = np.sqrt(np.pi) / across
+def on_disk(m, profile, wave, size):
+    """`Jumps` of a unit disk on cells of a size."""
     n = int(np.ceil(2.0 / size))
     x = (np.arange(n) - 0.5 * (n - 1)) * size
     points = np.stack(np.meshgrid(x, x, indexing="ij"), axis=-1)
@@ -57,7 +56,13 @@ def of_disk(m, profile, wave, across):
     inner = np.zeros((inside.sum(), 1), complex)
     inner[core[inside], 0] = AirSheet(core, size).jump(shape[core], wave)
     outer = AirSheet(inside, size).jump(shape[inside], wave)[:, None]
-    both = free_air.Jumps(np.array([0]), points[inside], size, inner, outer)
+    return free_air.Jumps(np.array([0]), points[inside], size, inner, outer)
+
+
+def of_disk(m, profile, wave, across):
+    """The same of a unit disk by `Jumps`, in each direction: pressure and half width."""
+    both = on_disk(m, profile, wave, np.sqrt(np.pi) / across)
+    both = both._replace(larger=on_disk(m, profile, wave, free_air.LARGER * both.size))
     far = 1e4  # [m] so that phases across the disk err by k / 2e4
     places = far * np.stack([SINES, 0.0 * SINES, np.sqrt(1.0 - SINES**2)], axis=1)
     found = [both.bounds(place, np.array([wave]), 1.0) for place in places]
@@ -97,9 +102,11 @@ def test_the_sound_of_a_disk_lies_within_the_bounds_in_every_direction(name, wav
 def test_a_disk_at_low_and_high_frequencies_is_lambs_dipole_and_as_in_a_wall():
     """8/3 rho a**3 of air moves with a slow disk; a fast one presses with 2 rho c times its speed, as in a baffle."""
     slow = of_disk(0, np.ones_like, 1e-3, 48)
-    assert abs(slow[0][0] - 8.0 / 3.0) < slow[1][0] < 0.25 * 8.0 / 3.0
+    # 10 / k away is not quite far: the near field turns the phase by a tenth
+    assert abs(slow[0][0].real - 8.0 / 3.0) < slow[1][0] < 0.25 * 8.0 / 3.0
     fast, half = of_disk(0, np.ones_like, 30.0, 96)
-    assert abs(fast[0] - 2.0j * np.pi / 30.0) < half[0] < 0.35 * 2.0 * np.pi / 30.0
+    # sound from the edge turns its phase by 0.04, as in `exact`
+    assert abs(abs(fast[0]) - 2.0 * np.pi / 30.0) < half[0] < 0.35 * 2.0 * np.pi / 30.0
 
 
 @pytest.mark.parametrize(("a", "b"), [(1.0, 1.0), (1.0, 0.4)])
@@ -139,7 +146,18 @@ def test_a_mode_of_a_free_triangle_that_nearly_cancels_lies_within_the_bounds():
     place = np.append(mesh.points.max(axis=0) / 2.0, 0.5 * np.hypot(0.4, 0.35))
     (part,) = free_air.jumps(modes, np.arange(5) == 4, 343.2)
     own, half = part.bounds(place, modes.omega[[4]], 343.2)
-    assert abs(own[0]) < 3.67e-4 < abs(own[0]) + half[0] < 1.1 * 3.67e-4  # below it with a half width of 2.5 times
+    assert abs(own[0]) < 3.67e-4 < abs(own[0]) + half[0] < 1.2 * 3.67e-4  # 2.8e-4 with a half width of 1.5e-4
+
+
+def test_where_both_lattices_err_alike_larger_cells_tell_the_error():
+    """A free plate of five oblique edges. On 160 and 240 cells across it is 1.40e-4 and 1.33e-4 m/kg**0.5 Pa."""
+    corners = [(0.124, 0.027), (0.036, 0.091), (-0.146, 0.046), (-0.126, -0.091), (0.096, -0.092)]
+    plate = fi.Plate(fi.Material(E=70e9, nu=0.33, rho=2700.0), 3e-3)
+    modes = fi.find_modes(fi.assemble(fi.mesh.polygon(corners), plate, {}), n_modes=5)
+    (part,) = free_air.jumps(modes, np.arange(5) == 4, 343.2)
+    own, half = part.bounds(np.array([0.0, 0.0, 1.0]), modes.omega[[4]], 343.2)
+    assert abs(own[0]) - half[0] < 1.33e-4 < 1.40e-4 < abs(own[0]) + half[0]  # 1.69e-4; half widths were 1.4e-5
+    assert half[0] < abs(own[0])
 
 
 def test_every_mode_gets_a_lattice_fine_enough_for_itself_and_its_sound():
