@@ -367,7 +367,7 @@ def _rate(path: Path, time: np.ndarray) -> float:
 
 def _columns(path: Path, found: dict[str, np.ndarray]) -> Recording:
     """Named arrays as channels: (n_samples,), or (n_taps, n_samples) with the longer axis in time."""
-    rates, notes, channels, unit, n_times = [], [], {}, {}, None
+    rates, notes, clock, channels, unit, n_times = [], [], [], {}, {}, None
     for name, value in found.items():
         low = name.rsplit(".", 1)[-1].lower()
         if value.dtype.kind == "c":
@@ -384,6 +384,7 @@ def _columns(path: Path, found: dict[str, np.ndarray]) -> Recording:
             times = np.asarray(value, float).reshape(-1, value.shape[-1])
             times = times[0] if len(times) < times.shape[1] else times[:, 0]
             rates.append(_rate(path, times))
+            clock = [f"{name}: no unit stated, s assumed, so that the rate is {rates[-1]:g} Hz"]
             n_times = len(times)
         elif value.size:
             channels[name] = np.squeeze(np.asarray(value, float))
@@ -417,7 +418,7 @@ def _columns(path: Path, found: dict[str, np.ndarray]) -> Recording:
     for name in [name for name, value in kept.items() if len(value) != n_taps]:
         notes.append(f"{name} has {len(kept.pop(name))} rows instead of {n_taps} and was left out")
     segments = tuple(np.column_stack([value[i] for value in kept.values()]) for i in range(n_taps))
-    return Recording(segments, tuple(kept), tuple(unit[name] for name in kept), rate, tuple(notes))
+    return Recording(segments, tuple(kept), tuple(unit[name] for name in kept), rate, (*notes, *clock))
 
 
 def numpy_file(path: Path) -> Recording:
