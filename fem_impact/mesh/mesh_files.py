@@ -223,9 +223,14 @@ def _mend(
             x, y = points[used[a]]
             raise ValueError(f"{name} has two surfaces, one over the other at ({x:g}, {y:g}) m; export one of them")
         leader[used[b]] = min(leader[used[b]], leader[used[a]])
-    doubles = int((leader != np.arange(len(points))).sum())
-    if doubles:
-        notes.append(f"{doubles} duplicate nodes were merged")
+    doubles = np.flatnonzero(leader != np.arange(len(points)))
+    if doubles.size:
+        (a, b, c), ones, square = cells.T, np.ones(2 * len(cells)), (len(points), len(points))
+        sides = coo_matrix((ones, (np.append(a, b), np.append(b, c))), square)
+        piece = connected_components(sides, directed=False)[1]
+        slit = (piece[doubles] == piece[leader[doubles]]).any()
+        why = "; some lie in one piece: if that is a slit, it is closed, so give it a width" if slit else ""
+        notes.append(f"{doubles.size} duplicate nodes were merged{why}")
     cells = leader[cells]
     collapsed = (cells[:, 0] == cells[:, 1]) | (cells[:, 1] == cells[:, 2]) | (cells[:, 0] == cells[:, 2])
     if collapsed.any():

@@ -90,6 +90,21 @@ def test_lines_with_nodes_of_their_own_name_edges_and_those_beside_all_triangles
     assert any(said in note for note in loaded(lines).notes)
 
 
+def test_a_slit_of_no_width_is_told_as_closed(tmp_path):
+    """Its nodes stood twice in a mesh that was one piece; pieces that only touch are joined as before."""
+    n, (x, y) = len(GOOD.points), GOOD.points.T
+    cut = np.flatnonzero(np.isclose(x, np.median(np.unique(x.round(9)))) & (y < 0.6 * y.max()))
+    cells = GOOD.cells.copy()
+    beyond = GOOD.points[cells][:, :, 0].mean(axis=1) > x[cut[0]]
+    for k, vertex in enumerate(cut):
+        cells[beyond] = np.where(cells[beyond] == vertex, n + k, cells[beyond])
+    points = np.column_stack([np.vstack([GOOD.points, GOOD.points[cut]]), np.zeros(n + len(cut))])
+    meshio.Mesh(points, [("triangle", cells)]).write(tmp_path / "slit.vtk")
+    assert any(
+        "merged; some lie in one piece: if that is a slit" in x for x in fi.mesh.load(tmp_path / "slit.vtk").notes
+    )
+
+
 def test_any_name_of_an_edge_comes_back(tmp_path):
     names = {name: np.array([i]) for i, name in enumerate(['3/4" rim', '"', "a\\b", "\\", 'a\\"b', " ä "])}
     fi.mesh.save(tmp_path / "plate.msh", replace(GOOD, edges=GOOD.edges | names))
