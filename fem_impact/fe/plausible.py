@@ -105,7 +105,7 @@ def damping(ratios: np.ndarray, omega: np.ndarray | None = None) -> tuple[str, .
 
 
 def elsewhere(nodes: np.ndarray, shapes: np.ndarray, mass: float) -> tuple[str, ...]:
-    """Notes on nodes (n_nodes, 3) [m] and mass-normalised shapes (n_nodes, 3, n_modes) [kg**-0.5] of another program.
+    """Notes on nodes (n_nodes, 1 to 3) [m] and mass-normalised shapes (n_nodes, same or 1, n_modes) of another program.
 
     Over the mass, the mean of their squares is one over the mass.
     """

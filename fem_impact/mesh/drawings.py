@@ -34,8 +34,12 @@ from .loops import (
 )
 from .smooth_edges import smooth_runs
 
-DXF_UNITS = {1: 0.0254, 2: 0.3048, 4: 1e-3, 5: 1e-2, 6: 1.0, 13: 1e-6, 14: 0.1}  # $INSUNITS code -> [m]
-SVG_UNITS = UNITS | {"px": 0.0254 / 96.0, "pt": 0.0254 / 72.0, "pc": 0.0254 / 6.0}  # by the CSS standard -> [m]
+DXF_UNITS = {  # $INSUNITS code -> [m]
+    1: 0.0254, 2: 0.3048, 4: 1e-3, 5: 1e-2, 6: 1.0, 7: 1e3, 8: 2.54e-8, 9: 2.54e-5, 10: 0.9144, 12: 1e-9, 13: 1e-6,
+    14: 0.1, 15: 10.0, 16: 100.0,
+}  # fmt: skip
+# by the CSS standard -> [m]
+SVG_UNITS = UNITS | {"px": 0.0254 / 96.0, "pt": 0.0254 / 72.0, "pc": 0.0254 / 6.0, "q": 0.25e-3}
 # [-] gaps below this fraction of the extent are closed and noted: a line's width on paper, no hole anybody means
 BRIDGED = 1e-3
 MOST_NUMBERS = 100 * MOST_PIECES  # [-] most digit groups in the shapes of a drawing; an arc of long decimals has 12

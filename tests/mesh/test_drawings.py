@@ -134,6 +134,21 @@ def test_an_edge_beside_a_gap_that_is_closed_stays_straight(tmp_path):
     assert any("gap of 1e-07 m was closed" in note for note in shape.notes) and not shape.curved.any()
 
 
+@pytest.mark.parametrize(("code", "metres"), [(7, 1e3), (9, 2.54e-5), (10, 0.9144), (15, 10.0)])
+def test_a_unit_that_a_dxf_file_states_is_not_taken_as_none(tmp_path, code, metres):
+    corners = np.array([(0.0, 0.0), (0.4, 0.0), (0.4, 0.3), (0.0, 0.3)]) / metres
+    shape = fi.mesh.outline(dxf(tmp_path, lambda space: space.add_lwpolyline(corners, close=True), units=code))
+    assert shape.notes == () and shape.area == pytest.approx(0.12)
+
+
+def test_quarter_millimetres_of_an_svg_file_are_read(tmp_path):
+    path = (
+        '<svg xmlns="http://www.w3.org/2000/svg" width="1600Q" height="1200Q" viewBox="0 0 400 300"><path d="M0 0H400V'
+    )
+    (tmp_path / "q.svg").write_text(path + '300H0Z"/></svg>')
+    assert fi.mesh.outline(tmp_path / "q.svg").area == pytest.approx(0.12)
+
+
 def test_dxf_polyline_with_a_bulge_is_an_arc(tmp_path):
     corners = [(0, 0, 0, 0, 0), (1, 0, 0, 0, 1), (1, 1, 0, 0, 0), (0, 1, 0, 0, 0)]
     shape = fi.mesh.outline(dxf(tmp_path, lambda space: space.add_lwpolyline(corners, close=True)))

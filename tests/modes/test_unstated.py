@@ -139,3 +139,10 @@ def test_a_universal_file_loses_the_compliance_and_says_so(tmp_path, read_here):
     points = again.shapes.grid()[0]
     known = fi.Modes.from_uff(tmp_path / "bar.uff", mass=modes.mass, compliance=modes.shapes.compliance(points))
     assert "not stated" not in struck(known).verdict
+
+
+@pytest.mark.parametrize(("scale", "told"), [(1.0, False), (0.03, True), (31.6, True)])
+def test_shapes_that_do_not_fit_the_mass_are_told(scale, told):
+    made = bar(8)
+    other = fi.Modes.from_arrays(made.frequencies, scale * made.shape_at(POINTS), points=POINTS, mass=made.mass)
+    assert any("are expected mass-normalised" in note for note in other.notes) == told
