@@ -30,7 +30,7 @@ from typing import Any
 
 import numpy as np
 
-from ..modes.modal import Modes
+from ..modes.modal import Modes, carried
 from ..modes.shapes import SampledShapes
 
 # [rad] its sine is the damping ratio above the frequency; modes fade over so much: half takes twice the oscillators
@@ -96,9 +96,7 @@ def _mixed(modes: Modes, point: np.ndarray, mobility: float, frequency: float, h
     ratio = np.append(modes.damping_ratio, np.full(len(above), np.sin(ANGLE)))
     error = None if modes.frequency_error is None else np.append(modes.frequency_error, np.zeros(len(above)))
     order = np.argsort(omega, kind="stable")
-    moving = omega > 0.0
-    static = float(((rows[moving] / omega[moving]) ** 2).sum()) + rest
-    shapes = SampledShapes(point, rows[order][None], np.array([[static]]))
+    shapes = SampledShapes(point, rows[order][None], carried(omega, rows[None], rows[None]) + rest)
     return Modes(
         omega[order], ratio[order], shapes, modes.mass, None if error is None else error[order], notes=modes.notes,
         poorer=poorer,

@@ -417,7 +417,7 @@ class Modes(check.Brief):
     def modal_compliance(self, points: Any) -> np.ndarray:
         """Static compliance of the kept modes between points, (n_points, n_points) [m/N]."""
         rows = self.shape_at(points)
-        return _carried(self.omega, rows, rows)
+        return carried(self.omega, rows, rows)
 
     def residual_compliance(self, points: Any) -> np.ndarray:
         """Static compliance of the modes left out, (n_points, n_points) [m/N].
@@ -506,7 +506,7 @@ def at_rest(modes: "Modes", point: np.ndarray) -> tuple[str, ...]:
     return (f"the point struck, ({where}) m, cannot move: it lies on a support, and the blow is that on a wall",)
 
 
-def _carried(omega: np.ndarray, moved: np.ndarray, pushed: np.ndarray, weight: Any = 1.0) -> np.ndarray:
+def carried(omega: np.ndarray, moved: np.ndarray, pushed: np.ndarray, weight: Any = 1.0) -> np.ndarray:
     """Static compliance (n_points, n_loads) [m/N] of modes, times their weights, by shapes at points and at loads."""
     flexible = omega > 0.0
     at_points, at_loads = (rows[:, flexible] / omega[flexible] for rows in (moved, pushed))
@@ -532,7 +532,7 @@ def left_out_between(modes: "Modes", loads: np.ndarray, points: np.ndarray) -> n
     if not len(points):
         return np.zeros((0, len(loads)))
     moved, pushed = (modes.shapes.at(place) for place in (points, loads))
-    return np.asarray(modes.shapes.deflection(loads, points) - _carried(modes.omega, moved, pushed))
+    return np.asarray(modes.shapes.deflection(loads, points) - carried(modes.omega, moved, pushed))
 
 
 def left_out(modes: "Modes", place: np.ndarray, rows: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -541,11 +541,11 @@ def left_out(modes: "Modes", place: np.ndarray, rows: np.ndarray) -> tuple[np.nd
     The error is (n_points,) [m/N].
     """
     whole = modes.shapes.compliance(place)
-    rest = whole - _carried(modes.omega, rows, rows)
+    rest = whole - carried(modes.omega, rows, rows)
     doubt = np.abs(np.diag(whole)) * (modes.shapes.compliance_error(place) + ROUNDING)
     if modes.frequency_error is not None:
         # cautious, of a mode's compliance over its frequency's: 2 by omega**-2, the rest for its shape
-        doubt = doubt + np.diag(_carried(modes.omega, rows, rows, 10.0 * modes.frequency_error[modes.omega > 0.0]))
+        doubt = doubt + np.diag(carried(modes.omega, rows, rows, 10.0 * modes.frequency_error[modes.omega > 0.0]))
     allowed = doubt.copy()
     dent = modes.shapes.dent(place)[:, 0]
     if dent.any():  # short waves dent a solid, too: modes may hold more of the dent than was left of the compliance

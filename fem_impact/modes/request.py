@@ -7,7 +7,7 @@ import numpy as np
 
 from .._base import check
 from ..fe.section import Beam
-from .modal import Damping, Modes, damping_ratios
+from .modal import Damping, Modes
 
 
 @dataclass(frozen=True)
@@ -50,7 +50,7 @@ class Request:
             )
         unit = Modes(omega, np.zeros(len(omega)), shapes, mass=1.0, notes=notes)
         scaled = unit.scaled(mass=self.mass, first_frequency=factor * unit.frequencies[omega > 0.0][0])
-        return replace(scaled.damped(damping_ratios(self.damping_ratio, scaled.omega)), section=self.section)
+        return replace(scaled.damped(self.damping_ratio), section=self.section)
 
 
 def request(

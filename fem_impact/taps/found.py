@@ -15,7 +15,7 @@ from ..impact.contact import Contact
 from ..impact.measured import Comparison
 from ..impact.response import Response
 from ..impact.striker import Striker
-from ..modes.modal import Modes
+from ..modes.modal import Modes, carried
 from . import predictions, profiles, solver, windows
 from .predictions import Prediction
 from .profiles import Profile, Scatter
@@ -271,11 +271,11 @@ class Found(check.Brief):
         if not len(body.omega):
             return None
         order = np.argsort(body.omega, kind="stable")
-        carried = float(np.square(body.rows[0, body.omega > 0.0] / body.omega[body.omega > 0.0]).sum())
         return Modes.from_arrays(
             body.omega[order] / (2.0 * np.pi), body.rows[:, order], points=[[0.0]],
             mass=body.mass if np.isfinite(body.mass) else float(1.0 / np.square(body.rows).max()),
-            damping_ratio=body.zeta[order], compliance=[[carried + body.rest[0, 0]]], free=False,
+            compliance=carried(body.omega, body.rows, body.rows) + body.rest, damping_ratio=body.zeta[order],
+            free=False,
         )  # fmt: skip
 
     @check.typed
