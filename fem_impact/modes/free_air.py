@@ -64,8 +64,8 @@ class Jumps(NamedTuple):
         """Pressure of every mode at a place (3,) [m], by `mean`, and the half width of the estimate, (n,) each.
 
         In m kg**-0.5 Pa per kg/m^3 and m/s^2: for a density of 1 kg/m^3 and unit modal acceleration at the frequencies
-        omega (n,) [rad/s]. The half width is `ROOM` times the difference from the larger cells, where the listener is and
-        over the half space in front, since one place may agree by chance; it is at least a tenth of the mode's mean
+        omega (n,) [rad/s]. The half width is `ROOM` times the difference from the larger cells, where the listener is
+        and over the half space in front, since one place may agree by chance; it is at least a tenth of the mode's mean
         sound over all directions, as where that nearly cancels (test_free_air.py). Half the difference of `inner` and
         `outer` would be none at sharp corners and notches, where both err alike.
         """
