@@ -373,9 +373,9 @@ def _refuse_overlap(path: Path, points: np.ndarray, cells: np.ndarray) -> None:
         raise ValueError(f"{name} is connected only by the node at ({x:g}, {y:g}) m; connect it along a side")
     # all triangles are anticlockwise, so they overlap exactly if the rim crosses itself
     loops = [shapely.LinearRing(points[loop]) for loop in loops_of(rim)]
-    cross_product = [a for i, a in enumerate(loops) if not a.is_simple or any(a.intersects(b) for b in loops[:i])]
-    if cross_product:
-        x, y = cross_product[0].coords[0]
+    crossed = [a for i, a in enumerate(loops) if not a.is_simple or any(a.intersects(b) for b in loops[:i])]
+    if crossed:
+        x, y = crossed[0].coords[0]
         raise ValueError(f"{name} has triangles that overlap at the rim through ({x:g}, {y:g}) m; mesh it again")
 
 
