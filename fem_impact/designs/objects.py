@@ -27,7 +27,7 @@ from ..scenes.scene import SECTIONS, Scene, load_scene
 
 BODY = "mesh", "section", "supports", "theory", "point_masses", "point_supports"  # a body that is not assembled yet
 CONTACT = ("gap", *LAW)  # numbers of a contact that a gradient follows
-BODY_TABLES = "mesh", "material", "section", "supports", "target"  # of a scene
+BODY_TABLES = "mesh", "material", "section", "layer", "rib", "rise", "supports", "in_plane", "target"  # of a scene
 Build = Callable[[dict[str, float]], Any]
 
 

@@ -45,6 +45,22 @@ def test_a_scene_and_a_function_make_the_same_pieces():
     assert one.key == two.key  # the body is the same, and found once
 
 
+def test_a_scene_whose_ribs_change_is_another_body(tmp_path):
+    scene = """
+        mesh = {shape = "rectangle", length = 0.4, width = 0.3, size = 0.15}
+        material = {E = 10e9, nu = 0.3, rho = 450.0}
+        section = {kind = "plate", thickness = 3e-3}
+        supports = {boundary = "hinged"}
+        striker = {kind = "rigid", mass = 0.02}
+        contact = {kind = "linear", stiffness = 1e5}
+        strike = {at = [0.13, 0.1], speed = 0.5}
+        rib = [{path = [[0.1, 0.0], [0.1, 0.3]], width = 8e-3, height = 10e-3}]
+    """
+    (tmp_path / "ribbed.toml").write_text(scene)
+    found = fi.design(tmp_path / "ribbed.toml", {"mode1.frequency": 140.0}, {"rib.0.height": (4e-3, 2e-2)})
+    assert found.met and found.verify().values["mode1.frequency"] == pytest.approx(140.0, rel=1e-3)
+
+
 @pytest.mark.parametrize("objects, words", [
     (3, "objects must be a scene, the path of one, or a function"),
     (lambda values: 3, "must return a System, Modes, a dict of arguments"),
