@@ -367,7 +367,10 @@ class Body(check.Brief):
         made = dents.settled(made, seen, self.solid)
         odd = (*plausible.elsewhere(self.nodes, self.shapes, self.mass), *[NOTE] * bool(made.omega.any()))
         sideways = free_body.sideways(self.shapes[kept], ways[kept], made.n_modes)
-        return replace(made, shapes=replace(made.shapes, sideways=sideways), notes=(*made.notes, *odd))
+        notes = [
+            note for note in made.notes if not note.startswith("shapes are")
+        ]  # along one direction they may be small
+        return replace(made, shapes=replace(made.shapes, sideways=sideways), notes=plausible.together(notes, odd))
 
     def way(self, where: Any, direction: Any = "normal") -> np.ndarray:
         """Unit vector (3,) of a direction, as of `modes`, at a node."""
