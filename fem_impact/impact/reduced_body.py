@@ -263,7 +263,7 @@ def rest_mode(dimension: int, omega: float, zeta: float, loss: float | None, pus
     A lossy force depends on the approach rate, in which an undamped mode just above the last one would ring. A
     critically damped mode far above, at 30 times its frequency, acts like a series spring and takes almost no energy.
     A sticky contact would hold the little mass of that one within nanoseconds, and feels no difference: against three
-    times as many modes, 40 random blows on a body erred no more with the nearer one, and took a quarter of the time.
+    times as many modes, 33 random blows on a body erred no more with the nearer one, and took a quarter of the time.
     """
     omega = omega or np.sqrt(pushed)
     if loss is None:

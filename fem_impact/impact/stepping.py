@@ -153,6 +153,11 @@ class _Control:
     stretched: Stretched | None
     ringing: tuple[np.ndarray, list[np.ndarray], list[np.ndarray]]  # see `_ringing`
 
+    @property
+    def stickiness(self) -> float:
+        """Largest loss factor of a contact times the speed [-]."""
+        return self.pace.speed * max(self.system.law["loss"].tolist())
+
     def follow_blow(self, size: float, chosen_by: str = "tolerance", within: float = 0.0) -> History:
         """One run, see `engine.run_system`."""
         how = self.options.scheme, size, self.pace, self.options.last, self.stretched
@@ -170,7 +175,7 @@ class _Control:
         """Two runs of a finer and a coarser size, and the errors of the finer one."""
         scheme, quantities, n = self.options.scheme, self.options.quantities, self.options.n_quantities
         over = RICHARDSON[scheme]  # a strong loss reacts to the rates of modes faster than the step
-        over = over[0], over[1] / (1.0 + 2.0 * self.pace.speed * max(self.system.law["loss"].tolist()))
+        over = over[0], over[1] / (1.0 + 2.0 * self.stickiness)
         if scheme == "A4" and len(felt := self.system.law[self.system.law["relaxation"] > 0.0]):
             order = 1.0 + felt["exponent"].min()  # what it remembers sets in like the force
             over = min(over[0], 2.0**order - 1.0), min(over[1], 2.0**order - 1.0)
@@ -252,8 +257,7 @@ class _Control:
             if heard < len(omega):
                 longest = min(longest, RESOLVED / float(omega[heard]))
         first = min(2.0 * shortest / count, longest)
-        sticky = self.pace.speed * max(self.system.law["loss"].tolist()) > STICKY
-        within = 0.5 * count * first if sticky and options.scheme == "A4" else 0.0
+        within = 0.5 * count * first if self.stickiness > STICKY and options.scheme == "A4" else 0.0
         return [first * 0.5**n for n in range(8)], aim, within  # A4 errs 2**28 times less at last
 
     def explain_failure(self, best: float, coarse: History, fine: History) -> str:
