@@ -82,9 +82,12 @@ def run_system(
         stretched = replace(stretched, base=float(size), ramp=scheme == "A4")
         stretch = stretched.kernel
     for _ in range(RECOUNTS):
+        if build.ALLOWED.get() <= 0.0:
+            raise build.Uncompiled
         result = run_energy(system, stretch, int(scheme == "A4"), float(size), limits)
         history = History(*system, *(*result, stretched))
         time, status = result[5], result[6]
+        build.ALLOWED.set(build.ALLOWED.get() - len(history.steps) / most)
         # kernels count every release, of pushes by rounding or for less than a step, too
         missing = last[1] - history.n_ended if status == record.IMPACTS else 0
         if missing <= 0:

@@ -1,9 +1,7 @@
 """Time steps short enough: runs of ever shorter steps until two agree to the tolerance."""
 
 import inspect
-from collections.abc import Callable, Iterator, Mapping
-from contextlib import contextmanager
-from contextvars import ContextVar
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from functools import partial
 from itertools import pairwise
@@ -14,7 +12,7 @@ import numpy as np
 from .._base import check
 from .._base.check import SimulationError
 from . import distance, engine
-from .compiled import build, law
+from .compiled import law
 from .compiled.bundles import KernelSystem
 from .contact import STICKY
 from .engine import STEP_SHARE, TOLERANCE
@@ -43,8 +41,6 @@ UNRESOLVED = 0.1, 0.25
 RINGING = 0.5  # [-] modes with a damping ratio above this do not ring: a swing is down to 3 % of the one before
 # [rad] largest phase of a ringing mode in a step of the coarser run: a third of a period, seen before it comes again
 RESOLVED = 2.0
-# [-] of the steps of a run that gives up: how many all runs of an answer may still take as plain Python
-ALLOWED: ContextVar[float] = ContextVar("ALLOWED", default=np.inf)
 
 
 @dataclass(frozen=True)
@@ -100,16 +96,6 @@ def takes_options(*but: str) -> Callable[[Function], Function]:
     return shown
 
 
-@contextmanager
-def allowance(runs: float) -> Iterator[None]:
-    """Raise `build.Uncompiled` before a run once those before took as long as so many ``runs`` that give up."""
-    token = ALLOWED.set(runs)
-    try:
-        yield
-    finally:
-        ALLOWED.reset(token)
-
-
 def first_count(scheme: str, tolerance: float, quantities: Mapping[str, float | None]) -> float:
     """Steps per contact in the first run: for averages half of the usual, as errors of single instants cancel there."""
     count = engine.steps_per_contact(tolerance, 0.5 if scheme == "A" else 0.25)
@@ -161,15 +147,7 @@ class _Control:
     def follow_blow(self, size: float, chosen_by: str = "tolerance", within: float = 0.0) -> History:
         """One run, see `engine.run_system`."""
         how = self.options.scheme, size, self.pace, self.options.last, self.stretched
-        if ALLOWED.get() <= 0.0:
-            raise build.Uncompiled
-        share = 1.0  # of one that gives up
-        try:
-            history = engine.run_system(self.system, *how, chosen_by, within)
-            share = len(history.steps) / engine.most_steps(self.system, self.stretched)
-        finally:
-            ALLOWED.set(ALLOWED.get() - share)
-        return history
+        return engine.run_system(self.system, *how, chosen_by, within)
 
     def judge_runs(self, sizes: tuple[float, float], coarse: History, fine: History) -> Converged:
         """Two runs of a finer and a coarser size, and the errors of the finer one."""

@@ -19,7 +19,6 @@ from typing import Any, TypeVar
 import numpy as np
 
 from .._base import check, child
-from ..impact import stepping
 from ..impact.compiled import build, energy, places
 from ..impact.response import Response
 
@@ -51,7 +50,7 @@ def soon(compute: Callable[[], Answer], most: float = np.inf, holds: Callable[[A
     except build.Uncompiled as error:
         lacking = error.args
     if SWITCH not in os.environ and places.lasting(os.environ) and _under_way(lacking):
-        with suppress(check.SimulationError, build.Uncompiled), build.uncompiled(most), stepping.allowance(TOGETHER):
+        with suppress(check.SimulationError, build.Uncompiled), build.uncompiled(most, TOGETHER):
             found = compute()
             if holds(found):
                 return found

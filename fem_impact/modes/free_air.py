@@ -53,30 +53,30 @@ class Jumps(NamedTuple):
     size: float  # [m] side of a cell
     inner: np.ndarray  # (n_cells, n) [m kg**-0.5] of the plate without the cells along its edge
     outer: np.ndarray  # (n_cells, n) of the plate and the space to the next centres around it
-    larger: "Jumps | None" = None  # the same on larger cells, by `LARGER`
 
     @property
     def mean(self) -> np.ndarray:
         """Half way between both, (n_cells, n) [m kg**-0.5], as the plate's edge lies between theirs."""
         return 0.5 * (self.inner + self.outer)
 
-    def bounds(self, place: np.ndarray, omega: np.ndarray, speed: float) -> tuple[np.ndarray, np.ndarray]:
+    def bounds(
+        self, larger: "Jumps", place: np.ndarray, omega: np.ndarray, speed: float
+    ) -> tuple[np.ndarray, np.ndarray]:
         """Pressure of every mode at a place (3,) [m], by `mean`, and the half width of the estimate, (n,) each.
 
         In m kg**-0.5 Pa per kg/m^3 and m/s^2: for a density of 1 kg/m^3 and unit modal acceleration at the frequencies
-        omega (n,) [rad/s]. The half width is `ROOM` times the difference from the larger cells, where the listener is
-        and over the half space in front, since one place may agree by chance; it is at least a tenth of the mode's mean
+        omega (n,) [rad/s]. The half width is `ROOM` times the difference from the ``larger`` cells, where the listener
+        is and over the half space in front, as one place may agree by chance; it is at least a tenth of the mode's mean
         sound over all directions, as where that nearly cancels (test_free_air.py). Half the difference of `inner` and
         `outer` would be none at sharp corners and notches, where both err alike.
         """
-        assert self.larger is not None
         middle = np.append(0.5 * (self.points.min(axis=0) + self.points.max(axis=0)), 0.0)
         far = max(float(np.linalg.norm(place - middle)), float(np.linalg.norm(np.ptp(self.points, axis=0))))
         number = np.arange(12) + 0.5
         up, angle = number / 12, np.pi * (1.0 + np.sqrt(5.0)) * number  # a spiral of the golden ratio, evenly spread
         across = np.sqrt(1.0 - up**2)
         places = [place, *(middle + far * np.stack([across * np.cos(angle), across * np.sin(angle), up], axis=1))]
-        own, other = (each._pressures(places, omega, speed) for each in (self, self.larger))
+        own, other = (each._pressures(places, omega, speed) for each in (self, larger))
         half = np.abs(own - other)
         apart = np.maximum(half[0], np.sqrt((half[1:] ** 2).mean(axis=0)))
         return own[0], ROOM * apart + 0.1 * np.sqrt((np.abs(own[1:]) ** 2).mean(axis=0))
@@ -100,8 +100,11 @@ def reach(modes: Modes, speed: float) -> np.ndarray:
     return np.where(modes.omega > 0.0, np.maximum(PER_WAVE * wave * side / (2.0 * np.pi), ACROSS[0]), 0.0)
 
 
-def jumps(modes: Modes, wanted: np.ndarray, speed: float) -> Iterator[Jumps]:
-    """The jumps of the wanted modes, each at its own frequency, on lattices as fine as they need."""
+def jumps(modes: Modes, wanted: np.ndarray, speed: float) -> Iterator[tuple[Jumps, Jumps]]:
+    """The jumps of the wanted modes, each at its own frequency, on lattices as fine as they need, and on larger cells.
+
+    These are `LARGER`; the difference tells the error.
+    """
     needed = reach(modes, speed)
     side = np.sqrt(sizes(*modes.shapes.grid()).sum())
     for coarser, across in zip((0.0, *ACROSS), ACROSS):
@@ -109,7 +112,7 @@ def jumps(modes: Modes, wanted: np.ndarray, speed: float) -> Iterator[Jumps]:
         if some.size:
             size = float(side / across)
             LOG.info("the air around %d modes, on cells of %.3g m", some.size, size)
-            yield _solved(modes, some, size, speed)._replace(larger=_solved(modes, some, LARGER * size, speed))
+            yield _solved(modes, some, size, speed), _solved(modes, some, LARGER * size, speed)
 
 
 def _solved(modes: Modes, some: np.ndarray, size: float, speed: float) -> Jumps:
@@ -134,9 +137,8 @@ def loads(modes: Modes, speed: float) -> tuple[np.ndarray, np.ndarray]:
     cells and larger ones. Both are zero of modes that no lattice is fine enough for.
     """
     middle, half = np.zeros((2, modes.n_modes, 2))
-    for part in jumps(modes, reach(modes, speed) <= ACROSS[-1], speed):
-        assert part.larger is not None
-        (own, apart), (other, _) = (_pressed(modes, each) for each in (part, part.larger))
+    for part, larger in jumps(modes, reach(modes, speed) <= ACROSS[-1], speed):
+        (own, apart), (other, _) = (_pressed(modes, each) for each in (part, larger))
         middle[part.modes] = own
         half[part.modes] = ROOM * np.maximum(np.abs(apart), np.abs(own - other))
     return middle, half
@@ -224,7 +226,7 @@ def fields(
     n_ways = int((middle + across) / step) + 2 - shortest if count else 1
     own = {order: np.zeros((n_ways, count)) for order in (1, 2, 3)}
     bounds = [{order: np.zeros((1, count)) for order in (1, 2)} for _ in range(2)]
-    for part in jumps(modes, wanted, speed):
+    for part, larger in jumps(modes, wanted, speed):
         omega, here = modes.omega[part.modes], column[part.modes]
         way = np.sqrt(((part.points - place[:2]) ** 2).sum(axis=1) + place[2] ** 2)
         share, first = np.modf(way / step)
@@ -235,7 +237,7 @@ def fields(
         steady, turned = part.mean.real, omega * part.mean.imag
         for order, weights in ((1, near * turned), (2, near * steady + far * turned), (3, far * steady)):
             own[order][:, here] = gather @ weights
-        pressure, half = part.bounds(place, omega, speed)
+        pressure, half = part.bounds(larger, place, omega, speed)
         for bound, size in zip(bounds, (np.minimum(half, np.abs(pressure)), half)):
             strength = size * np.exp(1j * (np.angle(pressure) - omega * middle / speed))
             bound[1][0, here], bound[2][0, here] = omega * strength.imag, strength.real

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 import fem_impact as fi
-from fem_impact.impact import collision, engine, stepping
+from fem_impact.impact import collision, engine
 from fem_impact.impact.compiled import build, places
 from fem_impact.model import audit, fresh
 
@@ -152,9 +152,9 @@ def test_blows_of_many_runs_are_compiled(compiler, monkeypatch):
 def test_a_run_that_gives_up_takes_its_whole_share():
     plate = fi.analytic.rectangle(1.55, 1.0, mass=0.2, first_frequency=100.0, n_modes=30)
     blow = {"at": (0.45, 0.3), "speed": 1.0}
-    with build.uncompiled(50), stepping.allowance(1.0), pytest.raises(build.Uncompiled):
+    with build.uncompiled(50, 1.0), pytest.raises(build.Uncompiled):
         collision.strike(plate, fi.Striker.rigid(1e9), fi.Contact.hertz(695e3), **blow)
-    assert stepping.ALLOWED.get() == np.inf
+    assert build.ALLOWED.get() == np.inf
 
 
 def test_only_plans_that_take_long_are_compiled_at_once(monkeypatch):

@@ -236,8 +236,8 @@ def test_modes_without_a_baffle_ring_with_the_bounds_of_their_pressures(disk_hit
         told = np.linalg.lstsq(np.hstack([swing.real, -swing.imag]), part, rcond=None)[0]
         found.append(told[: len(single)] + 1j * told[len(single) :])
     wanted = np.zeros((2, len(single)), complex)
-    for part in free_air.jumps(modes, modes.omega > 0.0, c):
-        own, half = part.bounds(place, modes.omega[part.modes], c)
+    for part, larger in free_air.jumps(modes, modes.omega > 0.0, c):
+        own, half = part.bounds(larger, place, modes.omega[part.modes], c)
         turned = rho * np.exp(-1j * np.angle(own)) * acceleration[part.modes]  # the jumps are for exp(-i omega t)
         np.add.at(wanted[0], alike[part.modes], np.maximum(np.abs(own) - half, 0.0) * turned)
         np.add.at(wanted[1], alike[part.modes], (np.abs(own) + half) * turned)

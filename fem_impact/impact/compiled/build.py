@@ -35,6 +35,8 @@ COMPILED &= not __name__.endswith(f".{PLAIN}.build")
 # [-] most steps of a run as plain Python; 0 where kernels may be compiled, REFUSED where none may that takes LONG
 QUICK: ContextVar[float] = ContextVar("QUICK", default=0.0)
 REFUSED = -1.0
+# [-] runs in plain Python that give up: as many steps all that are still to come may take
+ALLOWED: ContextVar[float] = ContextVar("ALLOWED", default=np.inf)
 if COMPILED:
     READ_BEFORE = "numba" in sys.modules
     from numba import config, njit
@@ -77,13 +79,17 @@ class Uncompiled(Exception):
 
 
 @contextmanager
-def uncompiled(most: float = np.inf) -> Iterator[None]:
-    """Compile nothing meanwhile, and let runs give up after ``most`` steps; if REFUSED, raise `Uncompiled`."""
-    token = QUICK.set(most)
+def uncompiled(most: float = np.inf, together: float = np.inf) -> Iterator[None]:
+    """Compile nothing meanwhile, and let runs give up after ``most`` steps; if REFUSED, raise `Uncompiled`.
+
+    It is raised, too, before a run once those before took as many steps as so many ``together`` that give up.
+    """
+    tokens = (QUICK, QUICK.set(most)), (ALLOWED, ALLOWED.set(together))
     try:
         yield
     finally:
-        QUICK.reset(token)
+        for variable, token in tokens:
+            variable.reset(token)
 
 
 def limited() -> bool:
