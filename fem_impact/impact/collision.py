@@ -195,9 +195,9 @@ def _follow(bodies, laws, parts, speed, options, striker=None, at=None, other=No
         raise ValueError(
             "duration or max_impacts must be given, because a constant force keeps pressing the bodies together"
         )
-    firsts = accumulate((len(part.omega) for part in parts), initial=0)
+    *firsts, n_kept = accumulate((len(part.omega) for part in parts), initial=0)
     held = [first + i for first, part in zip(firsts, parts) for i in range(part.held)]
-    pace, own = engine.pace_of(system, held), parts[0]
+    pace, own = engine.pace_of(system, held, n_kept), parts[0]
     if speed and own.touched:
         rigid = own.rows[0, : own.held] if own.held else own.rows[0, own.omega == 0.0]
         pace = pace._replace(rebound=tuple((rigid / speed).tolist()))

@@ -122,12 +122,19 @@ def again(history: History, step: float | None = None, **changed: Any) -> Histor
 
 
 @np.errstate(over="ignore", divide="ignore")  # laws steeper than any number
-def pace_of(system: KernelSystem, held: Sequence[int] = ()) -> Pace:
-    """How fast its contacts pass; modes numbered ``held`` count as masses, though a hand makes them swing."""
+def pace_of(system: KernelSystem, held: Sequence[int] = (), n_kept: int | None = None) -> Pace:
+    """How fast its contacts pass; modes numbered ``held`` count as masses, though a hand makes them swing.
+
+    Critically damped modes after the first ``n_kept`` stand for those left out, whose little mass is no body's: on a
+    stiff contact it rattles in steps a hundredth of what the blow needs, and 200 random blows differ by their stated
+    errors at most.
+    """
     swings = tuple(float(system.omega[i]) for i in held)
     rate = system.omega * np.maximum(1.0, 2.0 * system.zeta)  # an overdamped mode acts as a dashpot, not as a mass
     if held:
         rate[held] = 0.0
+    if n_kept is not None:
+        rate[n_kept:][system.zeta[n_kept:] == 1.0] = np.inf
     order = rate.argsort(kind="stable")
     beyond = rate[order]
     beyond[:-1] = beyond[1:]
