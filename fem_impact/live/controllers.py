@@ -102,11 +102,11 @@ def port(name: str, hands: Hands, n_points: int, fastest: float) -> Iterator[str
         known = ", ".join(names) or "none"
         raise ValueError(f"port must be a MIDI input of this machine, got {name!r}; there are: {known}")
 
-    def heard(message: Any) -> None:
+    def receive(message: Any) -> None:
         if message.type == "note_on" and message.velocity > 0:
             hands.add_stroke(*of_note(message.note, message.velocity, n_points, fastest))
 
-    with mido.open_input(found[0], callback=heard):
+    with mido.open_input(found[0], callback=receive):
         yield found[0]
 
 
@@ -142,7 +142,7 @@ def of_key(key: str, n_points: int, fastest: float) -> tuple[int, float] | None:
 
 
 def _pressed(hands: Hands, patience: float = 0.05) -> Iterator[str]:
-    """Keys as they are pressed, until the input or, as is seen after some patience [s], the playing ends."""
+    """Keys as they are pressed, until the input or, as is noticed within some patience [s], the playing ends."""
     if os.name == "nt" and sys.stdin.isatty():
         import msvcrt
 

@@ -111,7 +111,7 @@ def perform(player: Player, source: Source, longest: float, device: Device | Non
     try:
         end = most
         while feed.written < end:
-            # four blocks ahead are 5 ms at 48 kHz, which nobody hears; fewer are late on a busy machine
+            # four blocks ahead are 5 ms at 48 kHz, an inaudible delay; fewer are late on a busy machine
             while device is not None and feed.written - feed.played >= 4:
                 time.sleep(look)
             first = feed.written * player.block
