@@ -53,7 +53,7 @@ def run_strike(options: argparse.Namespace) -> Answer:
         check.extra("imageio_ffmpeg", "film", "an MP4 file")
     if scene.stroke:
         return _strike_in_turn(options, scene)
-    folder, display = folder_of(options), progress_of(options, tells=True)
+    folder, display = folder_of(options), progress_of(options, announces=True)
     with staged(folder, "strike") as staging, Painter() if options.pictures else nullcontext() as painter:
         place = folder.resolve()  # "." has no name of its own
         keep = place.parent / f"{place.name}.modes.npz"  # not in the folder: an interrupted run leaves that alone
@@ -88,7 +88,7 @@ def run_strike(options: argparse.Namespace) -> Answer:
 
 
 def _announce(options: argparse.Namespace, display: Display, verify: bool, files: bool, plan: Any) -> None:
-    """Warn of a long run before it starts, and let its prediction tell the time left; ``files`` may take modes."""
+    """Warn of a long run before it starts, and let its prediction set the time left; ``files`` may take modes."""
     display.predict(None if verify else plan.seconds)  # the plan of the second, finer run is not known yet
     more = f", and {plan.ringing:.0f} s for the modes of its files" if files and plan.ringing > ANNOUNCED else ""
     if plan.costly or more:
@@ -112,12 +112,12 @@ def _write(
     drawn = painter is not None and run.rings
     if drawn:
         painter.begin(folder, response, options.format)
-    files, sounds = _write_heard(folder, scene, response, options, stages, rings=run.rings)
+    files, sounds = _write_force_and_sounds(folder, scene, response, options, stages, rings=run.rings)
     extra: dict[str, Any] = {}
     if run.rings:
         first = {"at": "sound", "listener": "radiated"}  # the keys of the first point and listener
-        for heard in reversed(sounds):
-            extra.update({first[name]: heard for name in first if name in heard})
+        for sound in reversed(sounds):
+            extra.update({first[name]: sound for name in first if name in sound})
         extra["sounds"] = sounds
         if options.vtk:
             end = sampling.end_of(response)
@@ -146,7 +146,7 @@ def _write(
     return data
 
 
-def _write_heard(
+def _write_force_and_sounds(
     folder: Path, scene: Any, response: Any, options: argparse.Namespace, stages: Any, rings: bool = True
 ) -> tuple[list[str], list[dict[str, Any]]]:
     """Write the force and, of modes that ring, shapes and sounds; returns the names of all files, and the sounds."""
@@ -162,7 +162,7 @@ def _write_heard(
         return files, []
     with stages("sound"):
         sounds = hearing.write_sounds(folder, scene, response, duration=options.duration, normalise=options.normalise)
-    return [*files, "modes.pvd", *(heard["file"] for heard in sounds)], sounds
+    return [*files, "modes.pvd", *(each["file"] for each in sounds)], sounds
 
 
 def _strike_in_turn(options: argparse.Namespace, scene: Any) -> Answer:
@@ -180,7 +180,7 @@ def _strike_in_turn(options: argparse.Namespace, scene: Any) -> Answer:
         warnings.simplefilter("ignore", fi.ToleranceWarning)  # the first line of the summary says it
         stages = Stages(display)
         found = scene.play(watch=display, strict=options.strict, **_choices(options))
-        files, sounds = _write_heard(staging, scene, found, options, stages)
+        files, sounds = _write_force_and_sounds(staging, scene, found, options, stages)
         tables, copies = scene.kept(staging, tolerance=found.tolerance)
         seconds = {**stages.seconds, "total": time.perf_counter() - began}
         data = {**sequence.sequence_numbers(found, tables, seconds), "sounds": sounds, "files": files + copies}
@@ -194,7 +194,7 @@ def describe_sounds(sounds: Sequence[dict[str, Any]]) -> list[str]:
     lines = []
     for each in sounds:
         where = "Point" if "at" in each else "Listener" if "listener" in each else "Both listeners"
-        if each.get("bound") == "low":  # the other one's line tells both
+        if each.get("bound") == "low":  # the other one's line states both
             continue
         level = each["stated"] if "bound" in each else f"audible peak {each['stated']}"
         if each["level"] is None or each["level"] == -math.inf:
@@ -306,7 +306,7 @@ def run_report(options: argparse.Namespace) -> Answer:
     path = page_of(options, "report.html")
     changes = {} if options.tolerance is None else {"tolerance": options.tolerance}
     with staged(path.parent) as staging:
-        display = progress_of(options, tells=True)
+        display = progress_of(options, announces=True)
         before = partial(_announce, options, display, False, False)
         if scene.stroke:
             with warnings.catch_warnings():
@@ -356,11 +356,11 @@ def run_play(options: argparse.Namespace) -> Answer:
             modes = scene.modes(options.n_modes)
         with progress_of(options)("preparing, and compiling if not yet done"):
             player = command.player_of(scene, modes, options)
-        with command.source_of(options, player, notes) as (source, told):
+        with command.source_of(options, player, notes) as (source, hint):
             device, missing = command.device_of(options, source.live)
             if missing:
                 remark(options, missing)
-            remark(options, told)
+            remark(options, hint)
             played = devices.perform(player, source, options.duration, device)
         (staging / path.name).write_bytes(played.sound.wav())
     counted = player.struck.counted
@@ -489,8 +489,8 @@ def run_verify(options: argparse.Namespace) -> Answer:
 
     if options.list:
         known = [{"name": case.name, **case.about} for case in references.select(options.names or "all")]
-        told = [(case["name"], case["title"], case["source"]) for case in known]
-        return answer({"cases": known}, as_table(told, ("case", "what it is", "source")))
+        listed = [(case["name"], case["title"], case["source"]) for case in known]
+        return answer({"cases": known}, as_table(listed, ("case", "what it is", "source")))
     display = progress_of(options)
     with display("cases"):
         found = references.verify(options.names or "all", watch=partial(display.report, "cases"))

@@ -16,9 +16,9 @@ from rich.text import Text
 
 from ._base.explained import pointed, printable
 from ._base.files import undoable
-from ._base.progress import heard
+from ._base.progress import observed
 
-ANNOUNCED = 10.0  # [s] time left that is announced even if nobody sees the line
+ANNOUNCED = 10.0  # [s] time left that is announced even without a terminal that shows the line
 WIDE = 60  # columns of a terminal from which on there is room for a bar
 LONGER = 2.0  # [-] over the time announced last, from which on a longer one is announced, too
 
@@ -35,7 +35,7 @@ def wrapped(text: str) -> str:
     return "\n".join(line for wrapped in lines for line in wrapped)
 
 
-def tell(text: str) -> None:
+def announce(text: str) -> None:
     """Print one sentence to stderr."""
     print(wrapped(f"fem-impact: {text}"), file=sys.stderr, flush=True)
 
@@ -75,55 +75,55 @@ class Display:
     """One line on the terminal, shown while a stage runs; without a terminal nothing is written.
 
     A stage may run within another. Counts come from `_base.progress`, times from them or from a prediction. With or
-    without a terminal, ``tell`` is called with a sentence as soon as a command turns out to take long, and again each
-    time that it turns out to take twice as long as was told.
+    without a terminal, ``announce`` is called with a sentence as soon as a command turns out to take long, and again
+    each time that it turns out to take twice as long as was announced.
     """
 
-    def __init__(self, tell: Callable[[str], object] | None = None, shown: bool = True) -> None:
+    def __init__(self, announce: Callable[[str], object] | None = None, shown: bool = True) -> None:
         self.console: Console = Console(stderr=True)
         self.shown = shown
-        self.tell = tell
+        self.announce = announce
         self.task: bars.TaskID
         self.running: list[tuple[str, float]] = []  # name and start [s] of each stage, the innermost last
         self.count: Count | None = None
         self.end: float | None = None  # [s] predicted end of the command, on the monotonic clock
         self.began = time.process_time()  # [s] of what was predicted or counted; a busy machine makes nothing longer
-        self.told: float | None = None  # [s] that it takes in all, as told last
+        self.last: float | None = None  # [s] that it takes in all, as announced last
         self.alarm: threading.Timer | None = None
         self.bar: bars.Progress | None = None
 
     def predict(self, seconds: float | None) -> None:
         """Say how long the following stages take together; None if that is not known."""
-        self.began, self.told = time.process_time(), seconds
+        self.began, self.last = time.process_time(), seconds
         self.end = None if seconds is None else time.monotonic() + seconds
         if self.running:
             self._arm()
 
-    def foresee(self, seconds: float) -> None:
+    def revise(self, seconds: float) -> None:
         """Note that the rest takes so long, whatever was predicted."""
         if self.end is not None:
             self.end = time.monotonic() + seconds
             self._warn(seconds, f"about {seconds:.0f} s more")
 
     def _warn(self, left: float, said: str) -> None:
-        """Tell what is left [s] if it is long and makes the whole LONGER than was told."""
+        """Announce what is left [s] if it is long and makes the whole LONGER than was announced."""
         whole = self.spent + left
-        if self.tell is not None and left > ANNOUNCED and (self.told is None or whole > LONGER * self.told):
-            self.tell(f"{'' if self.told is None else 'longer than predicted: '}{said}; Ctrl-C stops it")
-            self.told = whole
+        if self.announce is not None and left > ANNOUNCED and (self.last is None or whole > LONGER * self.last):
+            self.announce(f"{'' if self.last is None else 'longer than predicted: '}{said}; Ctrl-C stops it")
+            self.last = whole
 
     def _overdue(self) -> None:
-        """Tell that what was to end long ago still runs, and look again later."""
-        if self.tell is not None and self.told is not None and self.spent >= max(ANNOUNCED, LONGER * self.told):
-            self.tell(f"longer than predicted: {self.spent:.0f} s so far; Ctrl-C stops it")
-            self.told = self.spent
+        """Announce that what was to end long ago still runs, and look again later."""
+        if self.announce is not None and self.last is not None and self.spent >= max(ANNOUNCED, LONGER * self.last):
+            self.announce(f"longer than predicted: {self.spent:.0f} s so far; Ctrl-C stops it")
+            self.last = self.spent
         self._arm()
 
     def _arm(self) -> None:
         """Look at the clock when the command is overdue, whatever stage runs then."""
         self._disarm()
-        if self.tell is not None and self.told is not None:
-            self.alarm = threading.Timer(max(ANNOUNCED, LONGER * self.told) - self.spent, self._overdue)
+        if self.announce is not None and self.last is not None:
+            self.alarm = threading.Timer(max(ANNOUNCED, LONGER * self.last) - self.spent, self._overdue)
             self.alarm.daemon = True
             self.alarm.start()
 
@@ -145,7 +145,7 @@ class Display:
         try:
             if len(self.running) == 1:
                 self._arm()
-            with heard(self.report, self.foresee):
+            with observed(self.report, self.revise):
                 if self.bar is None and self.shown and self.console.is_terminal:
                     with undoable(lambda: os.write(2, b"\r\x1b[2K\x1b[?25h")), self._opened():
                         yield
@@ -179,7 +179,7 @@ class Display:
         name, began = self.running[-1]
         spent, count, parts = time.monotonic() - began, self.count, []
         left = count.left() if count is not None else None if self.end is None else self.end - time.monotonic()
-        late = self.told is not None and self.spent > LONGER * self.told
+        late = self.last is not None and self.spent > LONGER * self.last
         last = "longer than predicted" if late else "soon done"
         # before two seconds, the first counts are no guide
         ends = [] if left is None or spent <= 2.0 else [f"{_clock(left)} left" if left > 0.0 else last]

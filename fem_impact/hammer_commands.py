@@ -28,7 +28,7 @@ def run_hammer(options: argparse.Namespace) -> replies.Answer:
     if options.rove is not None:
         return _rove(options, scene, masses, notes)
     drawn = replies.picture_of(options, "hammers.png")
-    with replies.progress_of(options, tells=True)("hammers"):
+    with replies.progress_of(options, announces=True)("hammers"):
         body, at = scene.built.target, scene.blow.values["at"]  # its own striker and contact are ignored
         hammers = fi.hammers.choose_on(body, at, options.bandwidth, masses, drop=options.drop, between=True)
         if drawn is not None:
@@ -68,7 +68,7 @@ def _rove(options: argparse.Namespace, scene: Any, masses: Sequence[float], note
     from .taps import roving  # imported only when needed
 
     number, drawn = check.count("--rove", options.rove), replies.picture_of(options, "rove.png")
-    with replies.progress_of(options, tells=True)("points"):
+    with replies.progress_of(options, announces=True)("points"):
         plan = roving.of_scene(scene, masses, options.bandwidth, options.drop, number)
         if drawn is not None:
             with staged(drawn.parent) as staging:
@@ -93,7 +93,7 @@ def _sheets(options: argparse.Namespace, scene: Any, notes: Sequence[str]) -> re
         raise ValueError("--masses must be left out beside --catalogue, whose hammers have their own")
     number = None if options.rove is None else check.count("--rove", options.rove)
     path = replies.page_of(options, "hammers.html")
-    with replies.progress_of(options, tells=True)("points"):
+    with replies.progress_of(options, announces=True)("points"):
         heaviest = scene.built.target.mass  # heavier ones load a panel so that its modes are others
         kit = roving.catalogued(options.catalogue, options.bandwidth, options.drop, heaviest)
         plan = roving.of_scene(scene, kit, options.bandwidth, options.drop, number)
@@ -112,8 +112,8 @@ def run_frf(options: argparse.Namespace) -> replies.Answer:
     if options.against is not None and not any(path.suffix.lower() == ".html" for path in files):
         raise ValueError("--against is for the page: give --out a folder, or a name that ends in .html")
     with replies.progress_of(options)("frequency responses"):
-        heard = prompt.frf(options)
-    peaks = prompt.peaks(heard.found)
+        measured = prompt.frf(options)
+    peaks = prompt.peaks(measured.found)
     rows = [
         (each["response"], f"{each['frequency']:.5g} Hz", f"{each['magnitude']:.4g} {each['unit']}",
          "" if each["coherence"] is None else f"{each['coherence']:.3f}",
@@ -121,59 +121,59 @@ def run_frf(options: argparse.Namespace) -> replies.Answer:
         for each in peaks
     ]  # fmt: skip
     said = [
-        *noted(heard.notes),
+        *noted(measured.notes),
         replies.as_table(rows, ("response", "peak at", "magnitude", "coherence", "within")),
     ]
-    data = {"peaks": peaks, "notes": heard.notes}
+    data = {"peaks": peaks, "notes": measured.notes}
     if not files:
         return replies.answer(data, *said)
     with staged(files[0].parent) as staging:
         for path in files:
             if path.suffix.lower() == ".html":
-                _write_page(staging / path.name, options, heard)
+                _write_page(staging / path.name, options, measured)
             else:
-                prompt.write_frf(staging / path.name, heard.found)
+                prompt.write_frf(staging / path.name, measured.found)
     return replies.answer(data, *said, folder=files[0].parent, files=[path.name for path in files])
 
 
-def _write_page(path: Path, options: argparse.Namespace, heard: Any) -> None:
+def _write_page(path: Path, options: argparse.Namespace, measured: Any) -> None:
     """The page about frequency responses, beside the modes of the scene measured or of the one to compare with."""
     from .pages import frf_page  # imported only when needed
 
-    scene = heard.scene if options.against is None else fi.load_scene(options.against)
+    scene = measured.scene if options.against is None else fi.load_scene(options.against)
     with replies.progress_of(options)("page"):
-        computed = points = None
-        if scene is not None and len(scene.points) == heard.found.sizes["channel"]:
+        found, computed, points = measured.found, None, None
+        if scene is not None and len(scene.points) == found.sizes["channel"]:
             points, computed = np.array(scene.points, float), scene.modes(frf_page.COMPARED)
         elif options.against is not None:
             raise ValueError(
-                f"--against must be a scene with one observation point for each of {heard.found.sizes['channel']} "
+                f"--against must be a scene with one observation point for each of {found.sizes['channel']} "
                 f"responses, got {len(scene.points)}; list them in [observe]"
             )
         title = f"Taps of {options.scene.name}"
-        frf_page.write_responses(path, heard.found, title=title, taps=heard.taps, computed=computed, points=points)
+        frf_page.write_responses(path, found, title=title, taps=measured.taps, computed=computed, points=points)
 
 
 def run_watch(options: argparse.Namespace) -> replies.Answer | None:
     from .taps.watch import Folder  # imported only when needed
 
-    folder, seen = Folder(options.scene), _Watched(options)
+    folder, watched = Folder(options.scene), _Watched(options)
     if not options.once:
         replies.remark(options, f"watching {folder.path}; Ctrl-C stops it")
     while True:
-        new = seen.judged(folder.look())
-        told = [one for each in seen.every.values() for one in each]
-        n_good = sum(one.good for one in told)
-        options.last = f"stopped; {n_good} of {len(told)} taps in {len(seen.every)} files were good"
+        new = watched.judged(folder.look())
+        taps = [one for each in watched.every.values() for one in each]
+        n_good = sum(one.good for one in taps)
+        options.last = f"stopped; {n_good} of {len(taps)} taps in {len(watched.every)} files were good"
         if new and not options.once:
-            options.show(seen.report_on(new))
+            options.show(watched.report_on(new))
         if options.once and not folder.waiting:
-            return seen.report_on(told)
+            return watched.report_on(taps)
         time.sleep(0.5)  # a file that nobody wrote to for so long is complete
 
 
 class _Watched:
-    """What the records of a folder have told so far."""
+    """The advice on every record of a folder so far."""
 
     def __init__(self, options: argparse.Namespace) -> None:
         self.options = options
@@ -206,7 +206,7 @@ class _Watched:
             self._draw(*last)
         return new
 
-    def _draw(self, last: Any, told: Any) -> None:
+    def _draw(self, last: Any, advice: Any) -> None:
         """Write the picture; of good taps those count that are sampled as the last ones are."""
         from .pages import tap_pictures  # imported only when needed
         from .taps.windows import joined
@@ -214,11 +214,11 @@ class _Watched:
         alike = [each for each in self.good.values() if (each.rate, each.units) == (last.rate, last.units)]
         good = joined(alike) if alike else None
         self.path.parent.mkdir(parents=True, exist_ok=True)
-        said = f"{told.file}, {told.tap}: {told.said}"
+        said = f"{advice.file}, {advice.tap}: {advice.said}"
         fi.figures.save(self.path, tap_pictures.watched(last, good, self.bandwidth, self.drop, said))
 
     def report_on(self, records: Sequence[Any]) -> replies.Answer:
-        """The answer that tells some records."""
+        """The answer that lists some records."""
         lines = [f"{one.file}{', ' * bool(one.tap)}{one.tap}: {one.said}" for one in records]
         n_good = sum(each.n_taps for each in self.good.values())
         data = {"records": [each._asdict() for each in records], "n_good": n_good}

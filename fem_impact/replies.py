@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from .display import Display, tell, width
+from .display import Display, announce, width
 
 
 class Answer(NamedTuple):
@@ -36,14 +36,14 @@ def answer(
     return Answer({**data, "folder": where, "files": list(files)}, lines, **ends)
 
 
-def progress_of(options: argparse.Namespace, tells: bool = False) -> Display:
-    """The progress of a command; `tells` for one that announces long work. Quiet commands show nothing."""
-    return Display(tell if tells and not options.quiet else None, shown=not options.quiet)
+def progress_of(options: argparse.Namespace, announces: bool = False) -> Display:
+    """The progress of a command; ``announces`` for one that warns of long work. Quiet commands show nothing."""
+    return Display(announce if announces and not options.quiet else None, shown=not options.quiet)
 
 
 def remark(options: argparse.Namespace, text: str) -> None:
     if not options.quiet:
-        tell(text)
+        announce(text)
 
 
 def folder_of(options: argparse.Namespace) -> Path:

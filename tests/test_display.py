@@ -9,7 +9,7 @@ from scenes import SMALL
 
 import fem_impact as fi
 from fem_impact import display
-from fem_impact._base.progress import foresee, heard, report
+from fem_impact._base.progress import observed, report, revise
 from fem_impact.display import Display
 
 
@@ -115,11 +115,11 @@ def test_a_command_that_takes_twice_as_long_as_predicted_says_so_at_once_and_aga
     shown.predict(12.0)
     with shown("vectors"):
         clock.now += 6.0
-        foresee(15.0)  # less than twice as long
+        revise(15.0)  # less than twice as long
         assert not said and shown.end == clock.now + 15.0
-        foresee(30.0)
+        revise(30.0)
         assert said == ["longer than predicted: about 30 s more; Ctrl-C stops it"]
-        foresee(40.0)  # nor is 46 s twice as long as 36
+        revise(40.0)  # nor is 46 s twice as long as 36
         clock.now += 67.0
         shown._overdue()  # by the alarm
         assert said[1:] == ["longer than predicted: 73 s so far; Ctrl-C stops it"]
@@ -151,7 +151,7 @@ def test_modes_hammers_and_maps_report_their_counts(tmp_path):
     section = fi.Plate(fi.Material(70e9, 0.3, 2700.0), 2e-3)
     system = fi.assemble(fi.mesh.rectangle(0.465, 0.3), section, supports={"boundary": "hinged"})
     beam = fi.assemble(fi.mesh.line(0.5), fi.Beam.rectangular(section.material, width=0.02, height=0.01), {})
-    with heard(lambda *each: told.append(each)):
+    with observed(lambda *each: told.append(each)):
         fi.find_modes(system, n_modes=40)
         fi.find_modes(beam, n_modes=100)
         fi.hammers.choose(plate, (0.1, 0.1), 300.0, masses=[0.01, 0.02])

@@ -282,7 +282,7 @@ def places(name: str, value: Any, dimension: int) -> np.ndarray:
 
 
 def on_body(name: str, points: np.ndarray, inside: np.ndarray, corners: np.ndarray) -> None:
-    """Raise ValueError unless every point (n_points, dimension) [m] is inside; the corners tell how far the body is."""
+    """Raise ValueError unless every point (n_points, dimension) [m] is inside the body, whose corners these are."""
     if not inside.all():
         lost = ", ".join(f"{x:g}" for x in points[~inside][0])
         low, high = corners.min(axis=0), corners.max(axis=0)
@@ -369,7 +369,7 @@ def ending(value: Any, *allowed: str) -> str:
 
 
 def nearest(word: Any, known: Iterable[str]) -> str:
-    """Return '; did you mean ...?' for a near miss, else an empty string; an ending that all share tells nothing."""
+    """Return '; did you mean ...?' for a near miss, else an empty string; an ending that all share is ignored."""
     ending, known = Path(str(word)).suffix, list(known)
     ending = ending if all(name.endswith(ending) for name in known) else ""
     names = {name.removesuffix(ending): name for name in known}

@@ -1,8 +1,8 @@
-"""Tells programs, functions and objects apart by what their results depend on, so that no result is taken for another.
+"""Distinguishes programs, functions and objects by what their results depend on, so that none is taken for another.
 
 A function is its code, its defaults and what it uses of closures and globals, whatever its name and place in a file.
 What belongs to Python, to an installed package or to this program is its name and version. What a function reads from
-files or finds by names made at run time is not seen.
+files or finds by names made at run time does not count.
 """
 
 import dis
@@ -45,7 +45,7 @@ def identify(thing: Any) -> str:
     Raises
     ------
     ValueError
-        If it uses something that cannot be told from others of its kind, such as an open file; says what.
+        If it uses something that cannot be distinguished from others of its kind, such as an open file; says what.
     """
     known: dict[int, tuple[Any, bytes]] = {}  # the objects, too: only of living ones is the number unique
     path: list[int] = []  # numbers of the objects that are being looked into

@@ -23,7 +23,7 @@ from . import check, child
 PATIENCE = 8.0
 WAITING = 20.0  # [-] limit on the time by the clock over that: ends what only waits, not what a busy machine delays
 MEMORY = 2 << 30  # [byte] limit on the reader's address space; Python and numpy alone use 0.2 GB
-REFUSED, TOLD = 1, 3  # exit statuses besides 0; any other means the reader crashed
+REFUSED, EXPLAINED = 1, 3  # exit statuses besides 0; any other means the reader crashed
 
 
 def read_apart(path: Path, kind: str, reader: str, *arguments: str) -> dict[str, np.ndarray]:
@@ -58,7 +58,7 @@ def read_apart(path: Path, kind: str, reader: str, *arguments: str) -> dict[str,
         said = f"reading took longer than {patience:.0f} s; export it again or in another format".encode()
     if status:
         reason = check.line(said.decode("utf-8", "replace"))
-        if status == TOLD:
+        if status == EXPLAINED:
             raise ValueError(reason)
         reason = reason if status == REFUSED else f"its reader crashed or exceeded {MEMORY >> 30} GB"
         raise ValueError(f"{path.name} cannot be read as {kind} ({reason})")
@@ -99,7 +99,7 @@ def main(path: Path, reader: str, arguments: list[str]) -> tuple[int, bytes]:
     except (Exception, SystemExit) as error:  # parsers raise anything, even SystemExit
         text = str(error)
         if isinstance(error, ValueError) and text.startswith(path.name):  # our own message, already complete
-            return TOLD, text.encode("utf-8", "replace")
+            return EXPLAINED, text.encode("utf-8", "replace")
         return REFUSED, (said.getvalue().strip() or text or type(error).__name__).encode("utf-8", "replace")
 
 

@@ -28,8 +28,8 @@ def kinds(*classes: type, left_out: Collection[str] = ()) -> Kinds:
 def pack(path: Path, key: str, known: Kinds, **things: Any) -> None:
     """Write objects found for a key: known classes, mappings, sequences, slices, arrays, texts and numbers in them."""
     arrays: dict[str, np.ndarray] = {}
-    told = {name: _packed(thing, known, arrays) for name, thing in things.items()}
-    write_arrays(path, key, {**arrays, "told": np.array(json.dumps(told))})
+    packed = {name: _packed(thing, known, arrays) for name, thing in things.items()}
+    write_arrays(path, key, {**arrays, "told": np.array(json.dumps(packed))})
 
 
 def unpack(path: Path, key: str, known: Kinds) -> dict[str, Any] | None:
@@ -37,7 +37,7 @@ def unpack(path: Path, key: str, known: Kinds) -> dict[str, Any] | None:
     arrays = read_arrays(path, key)
     if arrays is None:
         return None
-    return {name: _unpacked(told, known, arrays) for name, told in json.loads(str(arrays["told"])).items()}
+    return {name: _unpacked(packed, known, arrays) for name, packed in json.loads(str(arrays["told"])).items()}
 
 
 def _packed(value: object, known: Kinds, arrays: dict[str, np.ndarray]) -> Any:
@@ -57,19 +57,19 @@ def _packed(value: object, known: Kinds, arrays: dict[str, np.ndarray]) -> Any:
     return value.item() if isinstance(value, np.generic) else value
 
 
-def _unpacked(told: Any, known: Kinds, arrays: Mapping[str, np.ndarray]) -> Any:
-    if isinstance(told, list):
-        return tuple(_unpacked(each, known, arrays) for each in told)
-    if not isinstance(told, dict):
-        return told
-    if "kind" in told:
-        kind, names = known[told["kind"]]
-        return kind(**{name: _unpacked(told["fields"][name], known, arrays) for name in names})
-    if "array" in told:
-        return arrays[told["array"]]
-    if "slice" in told:
-        return slice(*told["slice"])
-    return dict(_unpacked(told["mapping"], known, arrays))
+def _unpacked(packed: Any, known: Kinds, arrays: Mapping[str, np.ndarray]) -> Any:
+    if isinstance(packed, list):
+        return tuple(_unpacked(each, known, arrays) for each in packed)
+    if not isinstance(packed, dict):
+        return packed
+    if "kind" in packed:
+        kind, names = known[packed["kind"]]
+        return kind(**{name: _unpacked(packed["fields"][name], known, arrays) for name in names})
+    if "array" in packed:
+        return arrays[packed["array"]]
+    if "slice" in packed:
+        return slice(*packed["slice"])
+    return dict(_unpacked(packed["mapping"], known, arrays))
 
 
 def write_arrays(path: Path, key: str, arrays: dict[str, Any]) -> None:

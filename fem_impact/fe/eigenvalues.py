@@ -216,7 +216,7 @@ def by_slices(flexibility: Flexibility, n: int) -> tuple[np.ndarray, np.ndarray]
             continue
         shift = 0.5 * (low + high)
         lu = factorise(K - shift * M)
-        with progress.heard(None):  # this counts modes, not the vectors of a slice
+        with progress.observed(None):  # this counts modes, not the vectors of a slice
             found = _ritz(flexibility, _krylov(lu.solve, M, inside, K.shape[0], RESIDUAL, NARROW))
         kept = (found[0] > low) & (found[0] < high)
         if np.count_nonzero(kept) != inside:

@@ -136,11 +136,11 @@ class Mixed(Description):
             with suppress(check.SimulationError):
                 other = Vectors.of(asked, stages)
                 if other is not None and other.forecast.seconds < more:
-                    progress.foresee(other.forecast.seconds)
+                    progress.revise(other.forecast.seconds)
                     return replace(other, otherwise=None if many else replace(higher, compared=True))
         if many:
             return None
-        progress.foresee(more)
+        progress.revise(more)
         return higher
 
 

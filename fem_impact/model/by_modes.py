@@ -128,7 +128,7 @@ class Modal(Description):
         budget = replace(budget, margin=budget.margin * margin, fineness=budget.fineness * fineness)
         first = None if coarse else self.forecast.first
         better = Modal.of(replace(asked, budget=budget), stages, first, self.more * more, self.attempt + 1)
-        progress.foresee(better.forecast.seconds)
+        progress.revise(better.forecast.seconds)
         return better
 
 

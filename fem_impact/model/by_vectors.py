@@ -129,7 +129,7 @@ class Vectors(Description):
         assert seen is not None
         before = seen.count
         if seen.improved(hit.error, budget.total - hit.error.step):
-            progress.foresee(seen.work(before).seconds)
+            progress.revise(seen.work(before).seconds)
             return self
         if "target" in asked.pieces or not budget.missed(hit.error, not asked.values["dt"]):
             return None

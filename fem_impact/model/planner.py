@@ -238,7 +238,7 @@ def carry_out(plan: Plan, stages: Stages, keep: Any = None) -> Run:
         before = sum(stages.seconds.values())
         try:
             plan = make(replace(plan.blow, target=target), plan.changes, stages)
-            progress.foresee(plan.seconds)
+            progress.revise(plan.seconds)
             again = strike_as_planned(plan, stages, None)
         except (check.SimulationError, ValueError, MemoryError) as error:
             return replace(run, notes=(*told, *run.notes, f"{why}; that was not computed: {error}"))

@@ -70,7 +70,7 @@ def main() -> None:
     """The process: reads folder, film and shapes, writes the pictures, and prints the progress."""
     probe()  # takes seconds, during which the response is computed
     folder, film, shapes, form = pickle.load(sys.stdin.buffer)
-    with progress.heard(lambda _, done, total: print(f"{done}/{total}", flush=True)):
+    with progress.observed(lambda _, done, total: print(f"{done}/{total}", flush=True)):
         draw(folder, film, shapes, form)
 
 

@@ -12,11 +12,11 @@ from fem_impact._base import progress
 def test_reports_go_to_the_innermost_listener_until_its_block_ends_or_fails():
     heard = []
     progress.report("modes", 1, 2)  # nobody listens
-    with suppress(RuntimeError), progress.heard(lambda *told: heard.append(("outer", *told))):
+    with suppress(RuntimeError), progress.observed(lambda *told: heard.append(("outer", *told))):
         progress.report("modes", 1, 2)
-        with progress.heard(lambda *told: heard.append(("inner", *told))):
+        with progress.observed(lambda *told: heard.append(("inner", *told))):
             progress.report("vectors", 3, 4)
-        with progress.heard(None):
+        with progress.observed(None):
             progress.report("vectors", 4, 4)
         progress.report("modes", 2, 2)
         raise RuntimeError

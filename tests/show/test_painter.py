@@ -19,7 +19,7 @@ from fem_impact.show.painter import Painter
 def test_it_draws_what_this_process_would_and_counts_the_frames(hit, tmp_path, monkeypatch):
     monkeypatch.setattr(pictures, "FRAMES", 3)
     told = []
-    with Painter() as other, progress.heard(lambda *each: told.append(each)):
+    with Painter() as other, progress.observed(lambda *each: told.append(each)):
         other.begin(tmp_path, hit)
         missing = other.finish()
     assert sorted(path.name for path in tmp_path.iterdir()) == ["modes.png", "wave.gif", "wave.png"]
