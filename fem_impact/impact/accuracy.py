@@ -35,7 +35,7 @@ def contact_resonance(contact: Contact, mass: float, speed: float) -> float:
 
 
 def number_of_modes(modes: Modes, frequency: float) -> float:
-    """About how many modes a body has up to a frequency [Hz]; Weyl's law tells that on average, so a tenth is added."""
+    """About how many modes a body has up to a frequency [Hz]; Weyl's law gives that on average, so a tenth is added."""
     return 1.1 * modes.n_modes * (frequency / modes.frequencies[-1]) ** (0.5 * modes.dimension)
 
 

@@ -74,7 +74,7 @@ class Assumption:
 
     @property
     def beyond(self) -> bool:
-        """Whether the effect is larger than a first-order estimate can tell."""
+        """Whether the effect is larger than a first-order estimate holds for."""
         return self.worst > BEYOND
 
     @property
@@ -154,8 +154,8 @@ def negligible_effect(tolerance: float) -> float:
 
 def lines(assumptions: Sequence[Assumption], tolerance: float) -> list[str]:
     """The examination in words: whether the model holds, and a line for each assumption that matters."""
-    telling = [each for each in assumptions if each.worst > negligible_effect(tolerance) or each.doubtful]
-    return [head(assumptions, tolerance), *(each.sentence for each in sorted(telling, key=lambda each: -each.worst))]
+    relevant = [each for each in assumptions if each.worst > negligible_effect(tolerance) or each.doubtful]
+    return [head(assumptions, tolerance), *(each.sentence for each in sorted(relevant, key=lambda each: -each.worst))]
 
 
 def head(assumptions: Sequence[Assumption], tolerance: float) -> str:

@@ -85,8 +85,8 @@ class Entry:
     def table(self) -> dict[str, Any]:
         """The table [material] or [striker] of a scene, its numbers with their intervals."""
         keys = OF_STRIKER[self.kind] if self.kind else OF_MATERIAL
-        told = {key: self.facts[key] for key in keys if key in self.facts}
-        found = {key: fact.value if key in SINGLE else fact.table for key, fact in told.items()}
+        stated = {key: self.facts[key] for key in keys if key in self.facts}
+        found = {key: fact.value if key in SINGLE else fact.table for key, fact in stated.items()}
         return {"kind": self.kind, **found} if self.kind else found
 
     def vary(self, table: str) -> dict[str, Any]:
@@ -220,14 +220,14 @@ def _entries(section: str) -> Mapping[str, Entry]:
     found: dict[str, Entry] = {}
     every = sources()
     for group, items in _file()[section].items():
-        for name, told in items.items():
-            words, facts = {key: value for key, value in told.items() if key in ("kind", "note")}, {}
-            for key in (key for key in told if key not in (*words, "tips")):
+        for name, given in items.items():
+            words, facts = {key: value for key, value in given.items() if key in ("kind", "note")}, {}
+            for key in (key for key in given if key not in (*words, "tips")):
                 # [value, source], [value, about, source] or [value, low, high, source]
-                value, *ends, source = told[key]
+                value, *ends, source = given[key]
                 interval = zip(((), ("about",), ("low", "high"))[len(ends)], map(float, ends))
                 facts[key] = Fact(float(value), MappingProxyType(dict(interval)), UNITS[key], *every[source])
-            tips = tuple(told.get("tips", ()))
+            tips = tuple(given.get("tips", ()))
             for cut, names in CUTS.items() if "E_L" in facts else [("", {})]:
                 own = {key: facts[wood] for key, wood in names.items() if wood in facts}
                 entry = Entry(name + cut, group, MappingProxyType({**facts, **own}), tips=tips, **words)
@@ -237,7 +237,7 @@ def _entries(section: str) -> Mapping[str, Entry]:
 
 def sources() -> Mapping[str, tuple[str, bool]]:
     """The sources of the catalogue by their keys in the file: in words, and whether they could be read."""
-    return {key: (told["words"], told["read"]) for key, told in _file()["sources"].items()}
+    return {key: (each["words"], each["read"]) for key, each in _file()["sources"].items()}
 
 
 def _material(entry: Entry) -> Material:

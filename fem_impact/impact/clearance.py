@@ -19,14 +19,14 @@ from .history import History
 from .parameters import Parameters
 from .response import Response
 
-FAR = 1.0  # [-] clearance of bodies that never approach again, and the largest told
+FAR = 1.0  # [-] clearance of bodies that never approach again, and the largest stated
 
 
 def nearest(hit: Response) -> tuple[float, float | None]:
     """Clearance [-] and when it is smallest [s]; None if it is larger than `FAR`.
 
     The clearance is the smallest gap after the first impact over the way that the striker goes in the time of that
-    impact at the speed of its arrival; below zero the bodies would touch again, and below -1 its logarithm is told.
+    impact at the speed of its arrival; below zero the bodies would touch again, and below -1 its logarithm is given.
     """
     if hit.n_impacts != 1 or hit.history.status == record.HORIZON:
         raise SimulationError("no clearance: the blow must end with its first impact; give max_impacts = 1")

@@ -113,7 +113,7 @@ def collide(
     Parameters
     ----------
     bodies : sequence of Modes or Striker
-        A striker arrives as it is made to, turning or straight, and touches with its own point unless told otherwise;
+        A striker arrives as it is made to, turning or straight, and touches with its own point unless stated otherwise;
         neither a hand nor its weight may bring it back.
     contacts : sequence of Touch
         Two bodies may touch at several points.

@@ -51,6 +51,6 @@ def dataset(hit: "Response", points: Any = None, times: Any = None, max_frequenc
         frequencies, spectrum = hit.band_spectrum(highest)
         places["frequency"] = "frequency", frequencies, {"units": "Hz", "long_name": "frequency"}
         data["spectrum"] = "frequency", abs(spectrum), {"units": "N s", "long_name": "spectrum of the force"}
-    told: dict[str, Any] = {"tolerance": hit.tolerance, "tolerance_met": int(hit.tolerance_met), "verdict": hit.verdict}
-    told |= {"trusted": int(hit.trusted), "outcome": hit.outcome, "in_contact": int(hit.in_contact)}
-    return xarray.Dataset(data, places, told | {"notes": "\n".join(hit.notes)})
+    head: dict[str, Any] = {"tolerance": hit.tolerance, "tolerance_met": int(hit.tolerance_met), "verdict": hit.verdict}
+    head |= {"trusted": int(hit.trusted), "outcome": hit.outcome, "in_contact": int(hit.in_contact)}
+    return xarray.Dataset(data, places, head | {"notes": "\n".join(hit.notes)})

@@ -61,7 +61,7 @@ def of_runs(
 
     (n_quantities + 1 + n_impacts,), impacts in the order of `History.contacts`. All are 1 if the runs ended
     differently. The restitution counts by the speed of every body that moves rigidly, over the momentum of all, and by
-    that of the first alone; ``pace`` tells which strikers in hands move so, too, and what the first rebounds with.
+    that of the first alone; ``pace`` states which strikers in hands move so, too, and what the first rebounds with.
     ``over`` divides the distances in quantities that depend on the whole blow, and those in contact time and peak
     force, which depend on an instant; not those of impacts, as points part as fast as the bodies ring there, also in
     modes faster than the step.

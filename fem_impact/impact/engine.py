@@ -23,7 +23,7 @@ STEP_SHARE = 0.1
 # runs may both take the whole of an unloading in one step, and agree: contact times erred by 3e-3 and said 1e-5
 STEEP = 8.0
 # [-] speed that a step's force may miss of its law there, over that of approach times the cube of the step's share of
-# the contact: of 300 random blows without it 44 were told out of reach, with it none; of 1 600 one missed in silence
+# the contact: of 300 random blows without it 44 were out of reach, with it none; of 1 600 one missed in silence
 COARSE = 4.0
 # [-] a contact's highest frequency over its lowest from which a body rattles on it; below, steps for the lowest resolve
 # both, and a plate's many modes make neighbours of one frequency
@@ -178,7 +178,7 @@ def _masses(frequency: np.ndarray, slower: np.ndarray, faster: np.ndarray) -> tu
     """Up to which number modes are masses to a contact, of those that have its ``frequency`` [rad/s] if they are.
 
     It must lie above that of the last such mode, at ``slower``, and below the next, at ``faster``. The lowest such is
-    how the bodies press each other; the second one told is another only where a light body that bends rattles on a
+    how the bodies press each other; the second one returned is another only where a light body that bends rattles on a
     heavy one meanwhile, with the highest.
     """
     below = frequency < faster

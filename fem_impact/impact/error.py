@@ -32,7 +32,7 @@ class Error:
     def of_causes(
         cls, found: Mapping[str, np.ndarray], quantities: Sequence[str], resolvable: bool, sensitivity: float
     ) -> "Error":
-        """The errors that distances, as of `distance.of_runs`, tell by cause: of each the largest in any quantity."""
+        """The errors by cause, from distances as of `distance.of_runs`: of each the largest in any quantity."""
         whole, table = {"step": 0.0, "truncation": 0.0, "mesh": 0.0}, {}
         for cause, apart in found.items():
             table[cause] = dict(zip(quantities, apart.tolist()))

@@ -125,10 +125,10 @@ def gradients(
     span = max(impact.end for impact in hit.impacts)
     bands = [band for name, band in wanted if band is not None and name == "spectral_centroid"]
     frequencies = {band: force_spectrum.dense_frequencies(band, span) for band in bands}
-    told = partial(read_quantities, wanted=wanted, frequencies=frequencies)
+    read = partial(read_quantities, wanted=wanted, frequencies=frequencies)
     found = {}
     values = [value_of(hit, name, band) for name, band in wanted]
-    for (name, band), value, (slopes, error) in zip(wanted, values, differences(parameters, names, told)):
+    for (name, band), value, (slopes, error) in zip(wanted, values, differences(parameters, names, read)):
         label = name if band is None else f"{name}={band:g}"
         if name == "peak_time":  # the top of a force is flat, and ripples move it
             error = 5.0 * error
@@ -137,9 +137,9 @@ def gradients(
 
 
 def differences(
-    parameters: Parameters, names: tuple[str, ...], told: Callable[["Response"], list[Any]]
+    parameters: Parameters, names: tuple[str, ...], read: Callable[["Response"], list[Any]]
 ) -> list[tuple[np.ndarray, np.ndarray]]:
-    """Slopes in numbers (n,) of each quantity that ``told`` reads from a blow, and their errors: (n,), (n, m)."""
+    """Slopes in numbers (n,) of each quantity that ``read`` reads from a blow, and their errors: (n,), (n, m)."""
     hit, numbers = parameters.hit, parameters.numbers(names)
     change, faster, whole = parameters.change(names), parameters.faster(names), step_of(hit)
     sizes = np.array([abs(number) or parameters.size(name) for name, number in zip(names, numbers)])
@@ -157,7 +157,7 @@ def differences(
                 f"no gradient: runs of different steps find {len(history.contacts)} and {len(h.contacts)} impacts; "
                 "give a smaller tolerance and no dt, or max_impacts"
             )
-        return told(replace(hit, history=history, speed=hit.speed + by * faster[i]))
+        return read(replace(hit, history=history, speed=hit.speed + by * faster[i]))
 
     runs = [_slopes(partial(again, whole / finer), sizes, one_sided, nudge) for finer, nudge in RUNS]
     found = []

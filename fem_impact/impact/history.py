@@ -22,7 +22,7 @@ FAINT = 1e-9
 TOUCH = 1e-6
 CUBIC = 3.0**0.5 / 216.0  # [-] error of the rate of a cubic through both ends of a step, over a fourth derivative h**3
 SLOWEST = 0.1  # [-] of a force, what a loss that takes more of it leaves
-CLEAR = 0.05  # [-] margins are told up to this: no error that meets a tolerance moves a blow across more
+CLEAR = 0.05  # [-] margins are stated up to this: no error that meets a tolerance moves a blow across more
 
 
 @dataclass(frozen=True)
@@ -47,7 +47,7 @@ class Impact:
         """Speed with which the points of the contact parted over that with which they met [-].
 
         Both are relative speeds, so what the struck surface does counts. None while the bodies still press each other,
-        and where they touched already when the force began. `Response.restitution_errors` tells how exact it is.
+        and where they touched already when the force began. `Response.restitution_errors` states how exact it is.
         """
         if self.separation_speed is None or not self.approach_speed:
             return None
@@ -210,13 +210,13 @@ class History(check.Locked):
         if min(found[:, 7].tolist(), default=np.inf) < np.inf:
             # bodies that touch at rest press each other as soon as a force acts on one of them: a constant one, or that
             # of a push at another contact
-            which, seen, end, since = found[:, 4].astype(int), found[:, 0], found[:, 1], found[:, 7]
+            which, begun, end, since = found[:, 4].astype(int), found[:, 0], found[:, 1], found[:, 7]
             driven = np.abs(self.shape @ self.bias) > ROUNDING * (size @ np.abs(self.bias))
-            start = np.where(since == np.inf, seen, np.where(driven[which], since, np.inf))
-            acts = (size @ size.T > 0.0)[np.ix_(which, which)] & (end >= seen[:, None])
+            start = np.where(since == np.inf, begun, np.where(driven[which], since, np.inf))
+            acts = (size @ size.T > 0.0)[np.ix_(which, which)] & (end >= begun[:, None])
             for _ in start:  # a force reaches one more contact at a time
                 start = np.minimum(start, np.maximum(np.where(acts, start, np.inf).min(axis=1), since))
-            found[:, 0] = np.where(start < end, start, seen)
+            found[:, 0] = np.where(start < end, start, begun)
         met = found[:, 5].copy()
         met[met == 0.0] = np.nan
         found[:, 7] = found[:, 6] / met

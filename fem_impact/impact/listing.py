@@ -82,5 +82,5 @@ def record(section: str, entry: Entry) -> dict[str, Any]:
               "source": fact.source, "read": fact.read}
         for key, fact in entry.facts.items()
     }  # fmt: skip
-    told = {"section": section, "group": entry.group, "name": entry.name, "note": entry.note, "tips": list(entry.tips)}
-    return {**told, "kind": entry.kind, "numbers": numbers}
+    head = {"section": section, "group": entry.group, "name": entry.name, "note": entry.note, "tips": list(entry.tips)}
+    return {**head, "kind": entry.kind, "numbers": numbers}

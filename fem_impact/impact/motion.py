@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 # [-] two descriptions of one body may differ by this in mass and compliance: meshes do by less, other bodies by more
 ONE_BODY = 1e-2
-# [-] largest difference of descriptions up to which Ritz vectors tell a motion: as much as modes err that are found
+# [-] largest difference of descriptions up to which Ritz vectors give a motion: as much as modes err that are found
 # as far as the force reaches
 MOVED = {"displacement": 1e-2, "velocity": 3e-2}
 LOOKED_AT = 200  # [-] times at which this error is estimated, evenly among those asked for; more only cost time
@@ -87,7 +87,7 @@ def constant_force(hit: "Response") -> float:
 
 
 def check_same_body(hit: "Response", modes: Modes) -> None:
-    """Raise ValueError unless modes may tell the motion of the target of a blow."""
+    """Raise ValueError unless modes may describe the motion of the target of a blow."""
     if hit.at is None:
         raise ValueError("on needs a blow of `strike`, with one strike point")
     if hit.moving:
@@ -108,7 +108,7 @@ def check_same_body(hit: "Response", modes: Modes) -> None:
 def largest_difference(
     descriptions: Sequence[BodyMotion], points: Any, times: np.ndarray, rate: bool, until: float
 ) -> float:
-    """Largest difference [-] of the motion that other descriptions of a body tell from the first's, over the largest.
+    """Largest difference [-] of the motion by other descriptions of a body from that by the first, over the largest.
 
     Infinite for a single description, where it exceeds `MOVED`, and long after the end of the run, ``until`` [s].
     """

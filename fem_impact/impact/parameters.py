@@ -192,7 +192,7 @@ class Parameters(check.Brief):
         return ROD if isinstance(section, Beam) and section.round else BAR
 
     def checked(self, wrt: Any) -> tuple[str, ...]:
-        """Names as a tuple; all that there are if None. ValueError tells which there are, and why one is not."""
+        """Names as a tuple; all that there are if None. ValueError names those there are, and why one is not."""
         if wrt is None:
             return (*self.values, *(name for name in self.sections if name not in self.values))
         names = (wrt,) if isinstance(wrt, str) else check.several("wrt", wrt, str)
@@ -315,15 +315,15 @@ class Parameters(check.Brief):
             raise check.SimulationError(
                 f"no gradient in the section: {self.why_no_target or 'the target moved before the blow'}"
             )
-        seen = varied.changed_modes(target, change, hit.at)
-        found.omega[i, part] = seen.omega
-        found.shape[i, 0, part] = -seen.shape
-        found.bias[i, part] = motion.constant_force(hit) * seen.shape
-        self._raise(found, i, 1, seen.omega[-1] / max(target.omega[-1], np.finfo(float).tiny))
+        changed = varied.changed_modes(target, change, hit.at)
+        found.omega[i, part] = changed.omega
+        found.shape[i, 0, part] = -changed.shape
+        found.bias[i, part] = motion.constant_force(hit) * changed.shape
+        self._raise(found, i, 1, changed.omega[-1] / max(target.omega[-1], np.finfo(float).tiny))
         flexible = target.omega > 0.0
         row, omega = target.shapes.at(hit.at[None])[0, flexible], target.omega[flexible]
-        carried = 2.0 * row / omega**2 @ (seen.shape[flexible] - row * seen.omega[flexible] / omega)
-        self._soften(found, i, 1, np.array([[seen.compliance - float(carried)]]))
+        carried = 2.0 * row / omega**2 @ (changed.shape[flexible] - row * changed.omega[flexible] / omega)
+        self._soften(found, i, 1, np.array([[changed.compliance - float(carried)]]))
 
     def _shift(self, found: KernelSystem, axes: Mapping[int, int]) -> None:
         """The target struck further along an axis, for each parameter its own."""

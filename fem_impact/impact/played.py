@@ -22,7 +22,7 @@ AT_ONCE = 64  # [-] strokes in one block, far more than hands or a keyboard make
 
 
 class StruckBody:
-    """A body with sticks, at rest at first; `fill` computes what is heard, block by block."""
+    """A body with sticks, at rest at first; `fill` computes its sound, block by block."""
 
     def __init__(
         self, modes: Modes, striker: Striker, contact: Contact, *, points: np.ndarray, listen: np.ndarray,
@@ -48,9 +48,9 @@ class StruckBody:
         motion[:n_stick], push[:n_stick] = striker.motion, striker.push
         period = 1.0 / rate
         level = _halvings(period, duration, omega[zeta < stepping.RINGING].max(initial=0.0), fastest)
-        heard = (modes.omega > 0.0) & (modes.omega < np.pi * rate)
+        audible = (modes.omega > 0.0) & (modes.omega < np.pi * rate)
         listening = np.zeros(omega.size)
-        listening[-n_body:] = np.where(heard, modes.shape_at(listen)[0], 0.0)
+        listening[-n_body:] = np.where(audible, modes.shape_at(listen)[0], 0.0)
         self.step = float(period * 0.5**level)  # [s] longest in contact
         self.body = live.PlayedBody(omega, zeta, 2.0 * zeta * omega, _tables(omega, zeta, period), listening)
         laws, offsets = (np.array([getattr(system, name)[0] for system in systems]) for name in ("law", "offset"))
@@ -72,7 +72,7 @@ class StruckBody:
             array[:] = 0
 
     def fill(self, strokes: Sequence[tuple[int, int, float]], gain: float, out: np.ndarray) -> None:
-        """Compute the next block into ``out`` (n_frames,) float32: ``gain`` times the velocity heard.
+        """Compute the next block into ``out`` (n_frames,) float32: ``gain`` times the velocity at the listener's point.
 
         Of each stroke in it, in the order of time: the frame of the block, the point, and the speed [m/s].
         """

@@ -64,7 +64,7 @@ def remedy(hit: "Response") -> str:
         advice += [f"make {name} with free = True or False, as it is" for name in loose] or more
         advice += [f"{ADVICE[each]} of {name}" for name, missing in unstated for each in ADVICE if each in missing]
     if error.measurement > allowed:
-        advice += [f"measure longer or cleaner responses of {name}" for name, told in unstated if "shapes" in told]
+        advice += [f"measure longer or cleaner responses of {name}" for name, lacks in unstated if "shapes" in lacks]
     if error.idealisation > allowed:
         advice.append("give target = 'modal'")
     if error.mesh > allowed:
@@ -93,7 +93,7 @@ def kept(hit: Any, strict: bool = False) -> Any:
 
 
 def warn(text: str) -> None:
-    """Tell the user that a tolerance was missed, at the line that called this program."""
+    """Warn the user that a tolerance was missed, at the line that called this program."""
     level, frame = 1, sys._getframe()
     while frame.f_back is not None and frame.f_code.co_filename.startswith(PACKAGE):
         level, frame = level + 1, frame.f_back
@@ -132,7 +132,7 @@ def _modes_needed(hit: "Response", body: int) -> float:
     own = np.zeros(len(h.omega), bool)
     own[hit.body_slice(body)] = True
     if not modes.omega[-1]:
-        return 0.0  # a body that only moves rigidly: nothing tells how close its other modes are
+        return 0.0  # a body that only moves rigidly: nothing shows how close its other modes are
     needed = 0.0
     for point, (i, _) in zip(ends.points, ends.touched):
         law = hit.contacts[i]

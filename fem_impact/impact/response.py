@@ -110,7 +110,7 @@ class Response(Totals, check.Locked):
         """How near the number of impacts is to another [-].
 
         Over the deepest approach: how far the bodies at least come apart between contacts, press each other in one, or
-        stay apart where they nearly touch once more. Told up to 0.05; that much, too, for blows under constant forces.
+        stay apart where they nearly touch once more. Given up to 0.05; that much, too, for blows under constant forces.
         A margin below its error counts as a missed tolerance.
         """
         return float(self.history.margin)
@@ -345,7 +345,7 @@ class Response(Totals, check.Locked):
         Notes
         -----
         The blow is run again with each number a hundred-thousandth larger and smaller, in steps of its own; runs in
-        other steps tell the error.
+        other steps estimate the error.
 
         Examples
         --------
@@ -439,7 +439,7 @@ class Response(Totals, check.Locked):
         return self._moved(points, times, body, residual, "velocity")
 
     def _moved(self, points: Any, times: Any, body: int, residual: bool, name: str) -> np.ndarray:
-        """A motion by Ritz vectors, if they tell it well enough, or else by modes."""
+        """A motion by Ritz vectors, if they give it well enough, or else by modes."""
         rate, asked, mine = name == "velocity", _times(times), self._is_target(body)
         if residual and mine and self.vectors is not None and np.isfinite(self._apart(points, asked, rate)):
             return self._descriptions[0].at(points, asked, rate)
@@ -450,10 +450,10 @@ class Response(Totals, check.Locked):
 
     @check.typed
     def motion_error(self, points: Any, times: Any, *, velocity: bool = False) -> float:
-        """Estimated error [-] of the target's motion as its Ritz vectors tell it, over the largest motion asked for.
+        """Estimated error [-] of the target's motion as its Ritz vectors give it, over the largest motion asked for.
 
-        The error of the blow, and the difference from the motion told by fewer vectors and by those of a coarser mesh
-        under the same force. Infinite where vectors do not tell the motion: after a blow by modes, later than twice the
+        The error of the blow, and the difference from the motion by fewer vectors and by those of a coarser mesh
+        under the same force. Infinite where vectors do not give the motion: after a blow by modes, later than twice the
         duration of the run, and where that difference exceeds 1e-2 (3e-2 in the velocity).
 
         Parameters

@@ -163,26 +163,26 @@ def _doubts(
 ) -> tuple[Any, np.ndarray, float]:
     """How far all bodies may be from a state of a blow, ``own`` that of its run: `State.doubts`, `memory` and `late`.
 
-    Its runs tell what its steps and the blow before it do to them, which of other causes are as wrong as the numbers of
+    Its runs show what its steps and the blow before it do to them, which of other causes are as wrong as the numbers of
     the blow. Where the run was cut as an impact ended while other contacts last, each run counts as it was cut itself.
     """
     error, bodies = hit.error, (*hit.bodies[:-1], hit.target)
-    told = error.step + error.inherited  # of 1 and more, where there may be other impacts, runs tell nothing
-    runs = hit.runs if told < 1.0 and hit.target is hit.bodies[-1] else ()
-    other = min(1.0, error.total - (told if runs else 0.0))
+    shown = error.step + error.inherited  # of 1 and more, where there may be other impacts, runs show nothing
+    runs = hit.runs if shown < 1.0 and hit.target is hit.bodies[-1] else ()
+    other = min(1.0, error.total - (shown if runs else 0.0))
     memory = hit.history.remembered(time, own)
     found, lost = [other * motion(modes, *state) for modes, state in zip(bodies, states)], other * np.abs(memory)
     cut, late = touching and time == hit.history.end_time and hit.history.status == record.IMPACTS, 0.0
 
-    def told_by(fine: Any, coarse: Any, *moved: Any) -> Any:
+    def extrapolated(fine: Any, coarse: Any, *moved: Any) -> Any:
         return (coarse - fine) / RICHARDSON[hit.scheme][0] + (moved[0] - coarse if moved else 0.0)
 
     if runs:
         times = [run.end_time if cut else max(0.0, time - begun) for run, begun in zip(runs, (0.0, hit.late))]
-        late = told_by(time, times[0], *(end + hit.late for end in times[1:])) if cut else 0.0
+        late = extrapolated(time, times[0], *(end + hit.late for end in times[1:])) if cut else 0.0
         ends = [run.state(each) for run, each in zip(runs, times)]
-        whole = told_by(own, *ends)
+        whole = extrapolated(own, *ends)
         found = [doubt + whole[:, hit.body_slice(i)] for i, doubt in enumerate(found)]
         kept = [np.abs(run.remembered(each, end)) for run, each, end in zip(runs, times, ends)]
-        lost += told_by(np.abs(memory), *kept)
+        lost += extrapolated(np.abs(memory), *kept)
     return tuple(found), np.array([memory, lost]), late

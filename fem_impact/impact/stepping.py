@@ -39,7 +39,7 @@ COARSER = 4.0  # [-] steps over those that are right, with which a blow is tried
 # of the tolerance: of 280 random blows 51 stated less than they erred, up to 34 times; with it 14 of 600, up to 4 times
 UNRESOLVED = 0.1, 0.25
 RINGING = 0.5  # [-] modes with a damping ratio above this do not ring: a swing is down to 3 % of the one before
-# [rad] largest phase of a ringing mode in a step of the coarser run: a third of a period, seen before it comes again
+# [rad] largest phase of a ringing mode in a step of the coarser run: a third of a period, resolved before it repeats
 RESOLVED = 2.0
 
 
@@ -120,7 +120,7 @@ def refine_steps(
     """Refine until two successive runs agree to the tolerance."""
     most, span = engine.most_steps(system, stretched), min(pace.duration, options.last[0])
     if options.dt is None and span > COARSER * most * pace.longest_step:
-        rise = f"within {engine.STEEP * pace.longest_step:.2g} s" if pace.longest_step else "faster than numbers tell"
+        rise = f"within {engine.STEEP * pace.longest_step:.2g} s" if pace.longest_step else "at once"
         raise SimulationError(
             f"{most} steps cannot follow a force that acts for {span:.2g} s and changes {rise} where it is steepest; "
             "take a law of a lower exponent, that yields later or that rises less steeply"
@@ -157,13 +157,13 @@ class _Control:
         if scheme == "A4" and len(felt := self.system.law[self.system.law["relaxation"] > 0.0]):
             order = 1.0 + felt["exponent"].min()  # what it remembers sets in like the force
             over = min(over[0], 2.0**order - 1.0), min(over[1], 2.0**order - 1.0)
-            if felt["relaxation"].min() < sizes[0]:  # it lets go within its relaxation: contact times at first order
+            if felt["relaxation"].min() < sizes[0]:  # it releases within its relaxation: contact times at first order
                 over = over[0], 1.0
         error = distance.of_runs(coarse, fine, quantities, over, self.pace)
         if "force" in quantities:
             i = [*quantities].index("force")
             error[i] = max(error[i], fine.force_missed)
-        error[:n] = np.maximum(error[:n], _unseen(coarse, fine, sizes[0]))
+        error[:n] = np.maximum(error[:n], _missed_impulse(coarse, fine, sizes[0]))
         # in one quantity alone two runs agree by chance: with its own difference only, 4 % of the errors of contact
         # times lay below the truth, one by a factor of five
         error[:n] = np.maximum(error[:n], 0.2 * max(error[:n].tolist()))
@@ -231,9 +231,9 @@ class _Control:
         count = first_count(options.scheme, min(aim, TOLERANCE), options.quantities)
         longest, (omega, shown, _) = self.pace.longest_step, self.ringing
         for shares in shown:
-            heard = np.searchsorted(shares, options.tolerance, side="right")
-            if heard < len(omega):
-                longest = min(longest, RESOLVED / float(omega[heard]))
+            significant = np.searchsorted(shares, options.tolerance, side="right")
+            if significant < len(omega):
+                longest = min(longest, RESOLVED / float(omega[significant]))
         first = min(2.0 * shortest / count, longest)
         within = 0.5 * count * first if self.stickiness > STICKY and options.scheme == "A4" else 0.0
         return [first * 0.5**n for n in range(8)], aim, within  # A4 errs 2**28 times less at last
@@ -265,7 +265,7 @@ def missed_by_ringing(share: Any, tolerance: float) -> Any:
     return np.minimum(part * share, most * tolerance)
 
 
-def _unseen(coarse: History, fine: History, size: float) -> float:
+def _missed_impulse(coarse: History, fine: History, size: float) -> float:
     """Share [-] of the impulse that may be wrong in impacts too short for steps of that ``size`` [s].
 
     What ends each step there is an event rather than its length. Two runs that take an impact in as many steps agree on

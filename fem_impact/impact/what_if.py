@@ -1,4 +1,4 @@
-"""What if: a blow struck again with something changed tells what an error of that size does to it."""
+"""What if: a blow struck again with something changed shows what an error of that size does to it."""
 
 import functools
 from collections.abc import Callable, Mapping, Sequence
@@ -66,7 +66,7 @@ class Followed:
 
     @functools.cached_property
     def stiffness(self) -> list[float]:
-        """Of every contact, as its duration tells it, and the modes that are slower [N/m]."""
+        """Of every contact, as its duration determines it, and the modes that are slower [N/m]."""
         omega = np.pi / self.pace.duration
         mobility = np.maximum((self.system.shape**2) @ (self.system.omega <= omega), 1e-300)
         return (omega**2 / mobility).tolist()
@@ -74,7 +74,7 @@ class Followed:
 
 @dataclass(frozen=True)
 class Variation:
-    """Changes of the bodies whose effect on the blow tells an error."""
+    """Changes of the bodies whose effect on the blow estimates an error."""
 
     cause: str  # a field of `Error`
     # the bodies as changed, and the error over the effect, in quantities and in restitutions of impacts: of ways to
@@ -82,7 +82,7 @@ class Variation:
     changes: Sequence[Sequence[tuple[Sequence[ReducedBody], float, float]]]
     least: float = 0.0  # [-] error at least, because two runs can agree by chance
     most_by_chance: float = np.inf  # [-] but in quantities at most this many times the error
-    untold: float = 0.0  # [-] and in quantities at least this, of what no two runs tell
+    unchecked: float = 0.0  # [-] and in quantities at least this, of what no two runs check
 
 
 def what_if(blow: Followed, variations: Sequence[Variation]) -> dict[str, np.ndarray]:
@@ -102,7 +102,7 @@ def what_if(blow: Followed, variations: Sequence[Variation]) -> dict[str, np.nda
         if each.least:
             found = errors.get(each.cause, none)
             least = none + each.least
-            least[:n] = max(each.untold, min(each.least, each.most_by_chance * max(found[:n].tolist())))
+            least[:n] = max(each.unchecked, min(each.least, each.most_by_chance * max(found[:n].tolist())))
             errors[each.cause] = np.maximum(least, found)
     return errors
 
@@ -113,7 +113,7 @@ def left_out_weight(ratio: float, damping_ratio: float) -> float:
 
 
 def modes_left_out(blow: Followed, bodies: Sequence[Modes]) -> tuple[Variation, bool]:
-    """Upper modes replaced by their compliance, and whether what that does tells the error.
+    """Upper modes replaced by their compliance, and whether what that does estimates the error.
 
     The error falls at least with the square of the highest kept frequency, with its first power if modes are
     overdamped, so the change bounds the error of the modes already left out. That in the restitution of an impact falls
@@ -124,12 +124,12 @@ def modes_left_out(blow: Followed, bodies: Sequence[Modes]) -> tuple[Variation, 
     over many blows, but at most ten times what the runs found. Where both differ by less, the prediction does not
     apply, as to contacts that outlast many periods of the modes left out; the truth was more in 2 of 715 random blows.
     Of bodies with so few modes that there are no two such runs the whole prediction counts in quantities: with 30 % of
-    it 45 of 150 blows on beams known by two modes and their compliance erred by 1.3 to 3 times what was told, with all
-    of it none.
-    The blow with a poorer description of a body that has modes above those of its own tells the error, too.
+    it 45 of 150 blows on beams known by two modes and their compliance erred by 1.3 to 3 times what was stated, with
+    all of it none.
+    The blow with a poorer description of a body that has modes above those of its own estimates the error, too.
     """
     omega_0, softness, looked = np.pi / blow.pace.duration, [0.0] * len(blow.laws), True
-    predicted, untold = 0.0, 0.0  # of all bodies, and of those that no two runs tell of
+    predicted, unchecked = 0.0, 0.0  # of all bodies, and of those that no two runs check
     changes: list[list[tuple[Sequence[ReducedBody], float, float]]] = []
     for i, (part, modes) in enumerate(zip(blow.parts, bodies)):
         if not part.yields:
@@ -145,9 +145,9 @@ def modes_left_out(blow: Followed, bodies: Sequence[Modes]) -> tuple[Variation, 
             weight = left_out_weight(ratio, part.zeta[-1])
             changes[-1].append((blow.changed(i, thin), weight, 1.0 / (ratio**0.5 - 1.0)))
         both = len(changes[-1]) == len(THINNED)
-        predicted, untold = predicted + expected, untold + expected * (not both and not known)
+        predicted, unchecked = predicted + expected, unchecked + expected * (not both and not known)
         looked &= both
-    found = Variation("truncation", changes, 0.3 * predicted, 10.0 if looked else np.inf, untold)
+    found = Variation("truncation", changes, 0.3 * predicted, 10.0 if looked else np.inf, unchecked)
     return found, max(softness) <= RESOLVABLE
 
 
@@ -198,9 +198,9 @@ def mesh(blow: Followed, bodies: Sequence[Modes]) -> Variation:
 
 
 def add_poorer_descriptions(blow: Followed, bodies: Sequence[Modes], errors: dict[str, np.ndarray]) -> None:
-    """Add the errors that poorer descriptions of a body tell: of each two blows that differ by one cause.
+    """Add the errors that poorer descriptions of a body show: of each two blows that differ by one cause.
 
-    For each cause the worst counts, because two descriptions can agree by chance; but only the first of each tells
+    For each cause the worst counts, because two descriptions can agree by chance; but only the first of each shows
     whether there may be other impacts. They run in fine steps, because the fastest modes of two descriptions differ,
     and so do their step errors.
     """
@@ -211,7 +211,7 @@ def add_poorer_descriptions(blow: Followed, bodies: Sequence[Modes], errors: dic
             runs[lacking] = None
             with suppress(SimulationError):
                 runs[lacking] = blow.again(blow.changed(i, blow.parts[i].described_by(other)), finely=True)
-        for cause, found in worst_differences(runs, functools.partial(_told_by, blow)).items():
+        for cause, found in worst_differences(runs, functools.partial(_description_error, blow)).items():
             errors[cause] = errors.get(cause, 0.0) + found
 
 
@@ -220,7 +220,7 @@ def worst_differences(
 ) -> dict[str, np.ndarray]:
     """The largest difference by cause of any two runs, kept by what they lack, of which one lacks nothing else.
 
-    ``difference`` of the better and the poorer run is told, too, whether they are the first for their cause.
+    ``difference`` of the better and the poorer run is given, too, whether they are the first for their cause.
     """
     worst: dict[str, np.ndarray] = {}
     for lacking, run in runs.items():
@@ -231,8 +231,8 @@ def worst_differences(
     return worst
 
 
-def _told_by(blow: Followed, better: History | None, poorer: History | None, first: bool) -> np.ndarray:
-    """What two descriptions of a body tell of the error of one; those that cannot be followed tell nothing."""
+def _description_error(blow: Followed, better: History | None, poorer: History | None, first: bool) -> np.ndarray:
+    """The error of a description of a body as another shows it; those that cannot be followed show nothing."""
     n, one_more = blow.options.n_quantities, np.ones(len(blow.runs.error))
     if better is None or poorer is None:
         return one_more * first

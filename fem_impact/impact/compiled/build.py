@@ -227,7 +227,7 @@ if COMPILED:
                 (function, "get_call_type", _looked_up_once({}, function.get_call_type)),
                 (PostProcessor, "run", _without_lives),
                 (compiler.Compiler, "define_pipelines", _Parts.define_pipelines),
-                (event, "broadcast", lambda told: None if told.kind == "numba:llvm_lock" else broadcast(told)),
+                (event, "broadcast", lambda this: None if this.kind == "numba:llvm_lock" else broadcast(this)),
             )
             before = [getattr(owner, name) for owner, name, _ in swaps]
             gc.disable()

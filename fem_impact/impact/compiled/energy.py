@@ -18,7 +18,7 @@ from .law import point_at, special_of, spring_of
 from .propagation import any_of, commit, restore
 from .record import EXHAUSTED, FAILED, FINISHED, FULL, SETTLED
 from .rounding import OVERFLOW
-from .stretched import Stretch, attempt, finish, flown, made_room, stretching_energy, unseen
+from .stretched import Stretch, attempt, finish, flown, made_room, overlooked, stretching_energy
 
 from .frame import (  # isort: skip
     LEVELS, LOST, NOTHING, TAKEN, at_rest, begin, course_of, fly, followed, locate_event, made_run, moving, over,
@@ -58,7 +58,7 @@ def fly_if_free(bodies, contacts, course, flights, room, limits, row):
 
 @inner(part=True, fastmath=False)
 def solved(bodies, contacts, room, tables, slot, h, blind):
-    """Whether the forces of a step were found, and what `solve_step` tells of them."""
+    """Whether the forces of a step were found, and what `solve_step` returns of them."""
     if room is None:
         return True, solve_step(contacts, tables, slot, h, blind)
     return attempt(bodies, contacts, room, tables, slot, h, blind, FALSE)
@@ -132,7 +132,7 @@ def shortened(bodies, contacts, course, room, special, h, limits):
     if course.counts[LEVEL] < MOST_HALVINGS and missed(contacts, h) > limits.misfit:
         shorter = max(shorter, 1)
     if room is not None:
-        shorter = max(shorter, unseen(bodies, contacts, h, course.counts[LEVEL]))
+        shorter = max(shorter, overlooked(bodies, contacts, h, course.counts[LEVEL]))
     course.counts[LEVEL] += shorter
     if course.counts[LEVEL] >= LEVELS:
         course.counts[LEVEL] = course.counts[LEAST]

@@ -1,10 +1,10 @@
-"""Onset, release and letting go within a step: how they are found and located.
+"""Onset, release and loss of force within a step: how they are found and located.
 
 The cubic through approach and rate at both ends of a step shows whether a contact opened, closed or did both. The step
 is then repeated with a length that ends at the event: Newton's method on the approach at the step's end, corrected by
-the change the last two lengths really made, and kept inside a bracket by bisection. A contact with loss lets go before
-it opens, where ``1 + loss d'`` passes zero; felt stays behind and is met again; a head of two layers changes its law
-where the hard one is reached; a contact that yields does so where it turns back and where it is pressed deeper than
+the change the last two lengths really made, and kept inside a bracket by bisection. A contact with loss stops pushing
+before it opens, where ``1 + loss d'`` passes zero; felt stays behind and is met again; a head of two layers changes its
+law where the hard one is reached; a contact that yields does so where it turns back and where it is pressed deeper than
 ever before. These corners of the force are located by secants. Events that pile up within the time of one step
 (chatter) are passed with full steps that need no location, because scheme A conserves energy across them.
 """
@@ -23,10 +23,10 @@ from .layout import (  # isort: skip
 
 LOCATED = 1e-11  # [-] of the approach about an event: a stored energy of 1e-22 of the step's is left out there
 SUMMED = 500.0  # [-] over the rounding of an approach: what a sum of a few thousand modes leaves of one that is zero
-LET_GO = 1e-7  # [-] of the force's factor 1 + loss * rate: about zero up to this
-# kinds of corners: it lets go or pushes again by its rate, the bend, the turn, it parts from its felt or meets it, and
+NO_FORCE = 1e-7  # [-] of the force's factor 1 + loss * rate: about zero up to this
+# kinds of corners: it stops or starts pushing by its rate, the bend, the turn, it parts from its felt or meets it, and
 # meets it again at once, so that the step is to be taken pressed
-LETS_GO, BENDS, TURNS, PARTS, AGAIN = range(5)
+RELEASES, BENDS, TURNS, PARTS, AGAIN = range(5)
 AT_ONCE = 1e-6  # [-] of a step in which felt is met: sooner it is met at its start, a contact that much too early
 HALVED = 8  # [-] halvings of a step before a body parts from felt; with them contact times err by 1e-6 instead of 1e-4
 EVENT_LIMIT = 64  # [-] events within one step's time: chatter, passed with unlocated steps, each time for twice as long
@@ -136,7 +136,7 @@ def enclose(contacts, h, target, bracket):
 
 
 @inner()
-def letting_go(loss, d0, v0, d1, v1, h):
+def releasing(loss, d0, v0, d1, v1, h):
     """Fraction of a step at which the factor 1 + loss * rate changes its sign, by the cubic through both ends."""
     slope, turn = 6.0 * (d1 - d0) / h, 2.0 * (v0 + v1)
     start, end = loss * (slope - turn - 2.0 * v0), loss * (turn + 2.0 * v1 - slope)
@@ -146,7 +146,7 @@ def letting_go(loss, d0, v0, d1, v1, h):
 @inner()
 def corner_value(law, i, which, d, v, memory):
     """What changes its sign at a corner of contact i's force of this kind."""
-    if which == LETS_GO:
+    if which == RELEASES:
         return 1.0 + law["loss"][i] * v
     if which == PARTS:
         return parting(law, i, d, memory)
@@ -164,24 +164,24 @@ def last_try(length, value, slope, out_bracket):
 
 @inner()
 def first_corner(contacts, h, depth, out_bracket):
-    """The first corner within a step: contact, its kind, and when; -1, LETS_GO and h where there is none.
+    """The first corner within a step: contact, its kind, and when; -1, RELEASES and h where there is none.
 
     Felt pressed by less than ``depth`` [m] has none: its marks are rounding. ``out_bracket`` receives two times with
     the corner in between and, for secants, a third time and the value there and at the start. ``after`` (n_contacts,)
     is what they remember at the end.
     """
     law, now, y, rate, after = contacts.law, contacts.now, contacts.end, contacts.rate, contacts.after
-    target, kind, at = -1, LETS_GO, h
+    target, kind, at = -1, RELEASES, h
     for i in range(y.size):
         d0, v0, d1, v1 = now[APPROACH, i], now[RATE, i], y[i], rate[i]
         loss = law["loss"][i]
         if loss > 0.0 and d0 > 0.0:
             start = 1.0 + loss * v0
             end = 1.0 + loss * v1
-            if end < -LET_GO < LET_GO < start or start < -LET_GO < LET_GO < end:
-                root = h * letting_go(loss, d0, v0, d1, v1, h)
+            if end < -NO_FORCE < NO_FORCE < start or start < -NO_FORCE < NO_FORCE < end:
+                root = h * releasing(loss, d0, v0, d1, v1, h)
                 if 0.0 < root < at:
-                    at, target, kind = root, i, LETS_GO
+                    at, target, kind = root, i, RELEASES
                     last_try(h, end, start, out_bracket)
         if relaxes(law, i):
             if max(d0, d1) <= depth:
@@ -288,7 +288,7 @@ def nearer(contacts, i, which, h, bracket):
     """
     law, memory = contacts.law, contacts.after[i]
     miss = corner_value(law, i, which, contacts.end[i], contacts.rate[i], memory)
-    good = 0.1 * LET_GO
+    good = 0.1 * NO_FORCE
     if which == BENDS:
         good = 0.1 * NEAR * corner_approach(spring_of(law, i))
     elif which == PARTS:

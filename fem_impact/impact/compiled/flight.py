@@ -103,7 +103,7 @@ def safe_wait(bounds, i, d, v):
 
 @inner()
 def safe_look(bounds, i, d, v):
-    """The same, but short enough to see where a contact that cannot touch turns back near enough to be told."""
+    """The same, but short enough to find where a contact that cannot touch turns back near enough to count."""
     wait = safe_wait(bounds, i, d, v)
     apart = bounds[i, RIGID_ACCELERATION] <= 0.0 and bounds[i, RIGID] + bounds[i, REACH] <= 0.0
     if apart and bounds[i, HARDEST] > 0.0:

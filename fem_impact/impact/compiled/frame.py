@@ -20,7 +20,7 @@ from .record import EXHAUSTED, FULL, HORIZON, IMPACTS, total_energy
 from .rounding import ITERATIONS, NEAR
 
 from .events import (  # isort: skip
-    AGAIN, EVENT_LIMIT, LETS_GO, LOCATED, PARTS, SUMMED, enclose, first_corner, first_crossing, narrow, nearer,
+    AGAIN, EVENT_LIMIT, LOCATED, PARTS, RELEASES, SUMMED, enclose, first_corner, first_crossing, narrow, nearer,
 )  # fmt: skip
 from .layout import (  # isort: skip
     APPROACH, BEGUN, BLINDS, CLOCKS, CONTACT_ROWS, CORNERED, COUNTERS, EVENTS, FAINT, FALLBACKS, FLYING, FRESH, HEAD,
@@ -120,7 +120,7 @@ def over(course, limits, steps):
 def remember(contacts, i, row):
     """Write approach, rate and memory of contact i to a row of the steps; the approach counts from no dent.
 
-    Returns the column where what the row tells of the contact begins.
+    Returns the first column of the row that describes the contact.
     """
     law = contacts.law
     memory = law["memory"][i]
@@ -272,7 +272,7 @@ def take_over(contacts, course, limits, h, base, special):
             law["memory"][i] = contacts.after[i]
     clock[TIME] += h
     corner = count[CORNERED]
-    if corner >= 0 and contacts.force[corner] > 0.0 and (count[WHICH] == PARTS or count[WHICH] == LETS_GO):
+    if corner >= 0 and contacts.force[corner] > 0.0 and (count[WHICH] == PARTS or count[WHICH] == RELEASES):
         count[RELEASED] += 1
     count[RELEASED] += settle(contacts, count[TARGET], limits, base)
     if clock[TIME] - clock[RESET] > base:

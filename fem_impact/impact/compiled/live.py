@@ -35,7 +35,7 @@ class PlayedBody(NamedTuple):
     zeta: np.ndarray  # (n_modes,) [-]
     twice: np.ndarray  # (n_modes,) [rad/s] 2 zeta omega
     tables: np.ndarray  # (LEVELS, N_LANE, n_modes) of the steps
-    listen: np.ndarray  # (n_modes,) what is heard of each velocity
+    listen: np.ndarray  # (n_modes,) factor of each velocity in the sound
 
 
 class Pads(NamedTuple):
@@ -324,7 +324,7 @@ def tidied(body, pads, state):
 
 @outer()
 def play_block(body, pads, limits, state, strokes, gain, out):
-    """Fill a block of sound (n_frames,), and leave the state at its end; ``gain`` multiplies what is heard."""
+    """Fill a block of sound (n_frames,), and leave the state at its end; ``gain`` multiplies all of it."""
     event = 0
     for k in range(out.size):
         while event < strokes.when.size and strokes.when[event] <= k:

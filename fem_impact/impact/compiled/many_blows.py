@@ -388,7 +388,7 @@ def opening(d0, free, own, spring, loss):
 
 
 @inner(part=True)
-def let_go(blow, track, n, free, y, rate):
+def release(blow, track, n, free, y, rate):
     """End a contact within step n, which ends at the approach y with that rate."""
     state, counts, h = track.state, track.counts, blow.h
     d0, v0 = state[APPROACH], state[RATE]
@@ -438,7 +438,7 @@ def press(blow, track, n, free):
     if blow.spring.loss * track.rates[n + 1] < -0.9:  # at -1 it stops pushing, which is not followed here
         return False
     if y <= 0.0:
-        let_go(blow, track, n, free, y, rate)
+        release(blow, track, n, free, y, rate)
     state[APPROACH], state[COMPRESSION], state[FORCE], state[ENERGY] = y, point.compression, point.force, point.energy
     state[RATE] = rate
     return True

@@ -11,7 +11,7 @@ import numpy as np
 
 from .build import ZERO, inner, outer
 from .cubics import crossing, cubic, turning
-from .events import LET_GO, letting_go
+from .events import NO_FORCE, releasing
 from .law import dent, point_at, relaxes, spring_of, spring_with, stored
 from .laws.felt import above_felt
 from .misfit import force_on, misfit
@@ -101,11 +101,11 @@ def pushing(steps, now, law, row, i):
     loss = law["loss"][i]
     start = 1.0 + loss * v0
     end = 1.0 + loss * v1
-    if start > -LET_GO and end > -LET_GO:
+    if start > -NO_FORCE and end > -NO_FORCE:
         return lower, upper
     if start <= 0.0 and end <= 0.0:
         return 0.0, 0.0
-    at = letting_go(loss, d0, v0, d1, v1, h)
+    at = releasing(loss, d0, v0, d1, v1, h)
     if start < 0.0:
         lower = max(lower, at)
     else:
@@ -249,12 +249,12 @@ def stays(steps, row, first, slack):
 def still_pressed(now, law, i, d):
     """Whether contact i presses at the end of a run, where the approach from its dent is d.
 
-    Felt lets go while the body is still in its dent, where its force ends; a contact with loss may, where the bodies
+    Felt releases a body that is still in its dent, where its force ends; a contact with loss may, where the bodies
     part as fast as 1 / loss.
     """
     if relaxes(law, i):
         return now[REMEMBERED, i] >= 0.0
-    return d > NEAR * abs(now[APPROACH, i]) and 1.0 + law["loss"][i] * now[RATE, i] > LET_GO
+    return d > NEAR * abs(now[APPROACH, i]) and 1.0 + law["loss"][i] * now[RATE, i] > NO_FORCE
 
 
 @outer()

@@ -317,7 +317,7 @@ def flown(bodies, contacts, course, room, limits):
 
 
 @inner()
-def unseen(bodies, contacts, h, level):
+def overlooked(bodies, contacts, h, level):
     """1 if modes too fast for the step may close a contact that the cubic through its ends leaves open, else 0."""
     if level >= 8:
         return 0

@@ -211,7 +211,7 @@ def parting_rate(law, i, approach, rate, memory):
 
 @inner()
 def above_felt(law, i, d, v, memory, parted):
-    """Approach over that at which felt i lets go or is met, and its rate; the body may have ``parted`` from it."""
+    """Approach over that at which felt i releases the body or is met, and its rate; it may have ``parted`` from it."""
     z = abs(memory)
     if z == 0.0:
         return d, v

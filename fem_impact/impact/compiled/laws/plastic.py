@@ -152,8 +152,8 @@ class PlasticLaw(Law):
         deepest = self.deepest(row, energy)
         force, _, _, wide = _course(row, deepest)
         hard = row.stiffness * wide ** (row.exponent - 1.0)
-        told = force > LEAST_BACK * deepest * hard  # else rounding hides whether it has turned back
-        return np.where(told, row.exponent * hard, np.inf)  # as it unloads
+        certain = force > LEAST_BACK * deepest * hard  # else rounding hides whether it has turned back
+        return np.where(certain, row.exponent * hard, np.inf)  # as it unloads
 
     def sentence(self, contact: Any, si: Any) -> str:
         return f" Beyond {si(contact.yield_approach, 'm')} it yields and keeps a dent."

@@ -64,7 +64,7 @@ class TableNumbers(PowerNumbers):
         """A law of your own: any force over the approach that starts from zero and only grows.
 
         It is asked for a few hundred forces when the contact is made, and kept as cubics between at most 96 knots, so
-        blows are as fast as with any other law, and energies exact. ``misfit`` tells how far the two differ.
+        blows are as fast as with any other law, and energies exact. ``misfit`` states how far the two differ.
 
         Parameters
         ----------
