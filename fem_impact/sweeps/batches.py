@@ -71,7 +71,7 @@ class Family:
         omega = self.omega[body][fastest]
         return omega, np.cumsum(self.squared[body][fastest] / omega**2)
 
-    def heard(self, body: int, compliance: np.ndarray) -> np.ndarray:
+    def cutoff(self, body: int, compliance: np.ndarray) -> np.ndarray:
         """Frequency [rad/s] above which all modes together stay below each compliance; 0 if the whole body does."""
         omega, above = self.upper(body)
         return np.append(omega, 0.0)[np.searchsorted(above, compliance)]
@@ -118,8 +118,8 @@ def kernel_rows(
         one, many, part = np.empty((3, propagation.N_TABLE, len(w)))
         propagation.step_table(w, z, h, one)
         propagation.step_table(w, z, stride * h, many)
-        seen = np.empty((looks, stride, 2, len(w)))
-        for look, (q, p) in zip(seen, ((u, 0.0 * u), (0.0 * u, u), (u * one[8], u * one[9]))):
+        weights = np.empty((looks, stride, 2, len(w)))
+        for look, (q, p) in zip(weights, ((u, 0.0 * u), (0.0 * u, u), (u * one[8], u * one[9]))):
             convolution.orbit(one[[0, 2, 1, 3]], q, p, look)
         states = np.empty((len(rows), 2, n_strides, 2, len(w)))
         for i, places in enumerate(states):
@@ -129,7 +129,7 @@ def kernel_rows(
                 if parts is not None:
                     q, p = part[0] * q + part[1] * p, part[2] * q + part[3] * p
                 convolution.orbit(many, q, p, place)
-        product = seen.reshape(looks * stride, -1) @ states.reshape(-1, 2 * len(w)).T
+        product = weights.reshape(looks * stride, -1) @ states.reshape(-1, 2 * len(w)).T
         product = product.reshape(looks, stride, len(rows), 2, n_strides).transpose(2, 0, 3, 4, 1)
         if parts is None:
             rows[0, 2, :, 0] += one[10:12] @ u
@@ -317,12 +317,12 @@ class _Engine:
         loss, count = self.law["loss"], 12.0 * (1e-3 / tolerance) ** (1.0 / STEP_ORDER)
         step = np.ceil(2.0 * np.log2(np.maximum(count / self.duration, 2.0 * self.band))).astype(int)
         for body in (0, 1) if loss.any() else ():
-            heard = np.zeros(len(step))
+            cutoff = np.zeros(len(step))
             for i, key in enumerate(self.keys):
                 cells = (self.which == i) & (loss > 0.0)
-                heard[cells] = self.blows.families[int(key)].heard(body, 3.0 * tolerance / self.rung[body, cells])
-            ringing = heard > 0.0
-            needed = np.ceil(2.0 * np.log2(2.0 * heard[ringing] / RESOLVED)).astype(int)
+                cutoff[cells] = self.blows.families[int(key)].cutoff(body, 3.0 * tolerance / self.rung[body, cells])
+            ringing = cutoff > 0.0
+            needed = np.ceil(2.0 * np.log2(2.0 * cutoff[ringing] / RESOLVED)).astype(int)
             step[ringing] = np.maximum(step[ringing], needed)
         return step
 

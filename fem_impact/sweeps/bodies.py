@@ -63,9 +63,9 @@ def body_of(
     if alone and vectors.usable(target):
         case = started(outline(target, stages))
         axes = checked_axes(case, over)
-        seen = by_vectors(target, case, axes, tolerance=tolerance, stages=stages, keep=keep)
-        if seen is not None:
-            return seen, axes
+        reduced = by_vectors(target, case, axes, tolerance=tolerance, stages=stages, keep=keep)
+        if reduced is not None:
+            return reduced, axes
     with stages("modes"):
         first = target.find(2 * FIRST_LOOK, tolerance=tolerance, stages=stages)  # a map has harder blows than one
     case = started(target.surrounded(first))
@@ -191,7 +191,7 @@ class Sized:
     tolerance: float  # [-]
     max_impacts: int | None = None  # what follows does not matter
     blows: Sequence[Mapping[str, float]] = ()  # values of the axes of those that are struck
-    seen: Seen | None = None
+    reduced: Seen | None = None
     tried: dict[tuple[int, int], list[float]] = field(default_factory=dict)  # truncation errors of each point and blow
 
     def at(self, modes: Modes, point: np.ndarray, values: Mapping[str, float]) -> Case:
@@ -204,7 +204,7 @@ class Sized:
         return 1.0 if wanted is None or self.case.first is None else wanted / self.case.first
 
     def views(self, points: np.ndarray, stages: Stages) -> Views | None:
-        """The target as seen from each point (n_points, 2) [m], reduced to it; None if that is impossible."""
+        """The target as excited at each point (n_points, 2) [m], reduced to it; None if that is impossible."""
         resonance = [self.case.with_values(values).resonance / self.raised(values) for values in self.ends]
         size, mesh = vectors.size_for(self.target, max(resonance), self.tolerance), self.target.mesh
         assert mesh is not None
@@ -216,18 +216,18 @@ class Sized:
         for start in range(0, len(points), 8):
             some = points[start : start + 8]
             elements, fixed = Elements(size), self.target.size_stated
-            seen = Seen(self.target, some, max(resonance), self.tolerance, elements, fixed, stages)
-            if seen.at_rest:
+            reduced = Seen(self.target, some, max(resonance), self.tolerance, elements, fixed, stages)
+            if reduced.at_rest:
                 return None
-            one = replace(self, seen=seen, tried={})
+            one = replace(self, reduced=reduced, tried={})
             for blows in (extreme, [*extreme, *self.chance]):
                 _, _, found = refine(replace(one, blows=blows), Sized._judged, stages)
             views |= {tuple(point.tolist()): sampled(modes, point[None]) for point, modes in zip(some, found)}
         return views
 
     def found(self, stages: Stages, keep: Any = None) -> "tuple[Sized, list[Modes]]":
-        """The same, and the target as seen from each point."""
-        assert self.seen is not None
+        """The same, and the target as excited at each point."""
+        assert self.reduced is not None
 
         def cutoff(point: np.ndarray, modes: Modes, margin: float) -> float:
             """Highest frequency [Hz] that any blow at a point needs of some modes, with a safety factor."""
@@ -240,26 +240,26 @@ class Sized:
                 needed.append(limit / self.raised(values))
             return max(needed)
 
-        return self, [self.seen.needed_modes(partial(cutoff, point), i) for i, point in enumerate(self.seen.at)]
+        return self, [self.reduced.needed_modes(partial(cutoff, point), i) for i, point in enumerate(self.reduced.at)]
 
     def refined(self, error: Error, stages: Stages) -> "Sized | None":
         """The same with more vectors or a finer mesh, whichever the errors of its blows require."""
-        assert self.seen is not None
-        return self if self.seen.improved(error, self.tolerance - allowed(self.tolerance)) else None
+        assert self.reduced is not None
+        return self if self.reduced.improved(error, self.tolerance - allowed(self.tolerance)) else None
 
     def _judged(self, found: list[Modes], stages: Stages) -> tuple[Error, list[Modes]]:
-        """The errors of the blows at all points, and the target as seen from each.
+        """The errors of the blows at all points, and the target as excited at each.
 
         A blow that more vectors do not make any better is given up, as it would be alone, and does not stop the others.
         """
-        assert self.seen is not None
+        assert self.reduced is not None
         errors, lost = [], False
         with stages("strike"):
             for (i, modes), (n, values) in product(enumerate(found), enumerate(self.blows)):
                 before = self.tried.setdefault((i, n), [])
                 if vectors.hopeless(before):
                     continue
-                case, close = self.at(modes, self.seen.at[i], values), max(FINEST, Budget(self.tolerance).cheap)
+                case, close = self.at(modes, self.reduced.at[i], values), max(FINEST, Budget(self.tolerance).cheap)
                 try:
                     error = case.blow(tolerance=close, max_impacts=self.max_impacts).error
                     errors.append((error.truncation, error.mesh))
@@ -268,7 +268,7 @@ class Sized:
                 before.append(errors[-1][0])
                 lost |= vectors.hopeless(before)
         if lost:
-            self.seen.tried.clear()  # the others have not been tried as often
+            self.reduced.tried.clear()  # the others have not been tried as often
         worst = np.sort(np.array(errors or [(0.0, 0.0)]), axis=0)  # (n_struck, 2)
         # but for two of ten, as beside a cell with another number of impacts no error is small
         return Error(0.0, *worst[len(worst) - 1 - int(0.2 * len(worst))].tolist()), found

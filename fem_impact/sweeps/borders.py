@@ -18,7 +18,7 @@ from .refined import beside_change
 
 WIDTH = 1.5e-3  # [-] widest bracket of a border, a share of the axis: half of it and FINER together stay below 1e-3
 FINER = 0.3  # [-] of the map's tolerance: that of blows beside a border; 0.01 moved those of 400 x 400 cells by 2.4e-4
-# [-] beside borders, to limit work to some 20 s: where the motion is chaotic, borders are told to the cell
+# [-] beside borders, to limit work to some 20 s: where the motion is chaotic, borders are known to the cell
 MOST_BLOWS = 200_000
 PREFIX = "border"  # of the dimension and the variables in a map
 MEANINGS = {
@@ -133,7 +133,7 @@ def find_borders(grid: Cases, count: np.ndarray, solve: Solve) -> tuple[tuple[Bo
 def _joined(count: np.ndarray) -> tuple[list[tuple[int, int]], np.ndarray]:
     """Curves along the borders: their numbers of impacts and of points; and all points (n, 3) as level and edge.
 
-    An edge is told by its middle, in halves of a cell.
+    An edge is given by its middle, in halves of a cell.
     """
     known = count[count >= 0]
     curves, vertices = [], [np.empty((0, 3), int)]

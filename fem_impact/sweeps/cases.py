@@ -118,7 +118,7 @@ class Cases:
         )
         return distance(second, first)
 
-    def told(self, numbers: np.ndarray) -> dict[str, tuple[np.ndarray, dict[str, Any]]]:
+    def labelled(self, numbers: np.ndarray) -> dict[str, tuple[np.ndarray, dict[str, Any]]]:
         """Values and attributes of each layer of a result (n_layers, ...); n_impacts is -1 where a blow failed."""
         found = {}
         for name, values in zip(self.layers, numbers):
@@ -283,7 +283,7 @@ def solve_all(
     LOG.info("%d blows at the tolerance %g", cases.n_cases, cases.tolerance)
     if client is not None:
         return by_cluster(cases, client, store, partial(solve_cases, workers=1), watch)
-    often = cases.lossy or cases.extra  # slow ones are told more often
+    often = cases.lossy or cases.extra  # slow ones report more often
     size = max(batches.FEW, block_size(cases.n_cases)) if often else LARGEST_BLOCK
     return by_blocks(cases, partial(solve_cases, workers=workers), watch, size, store)
 

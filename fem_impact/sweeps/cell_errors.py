@@ -23,7 +23,7 @@ def estimate_left_out(cases: Cases) -> np.ndarray:
     if not cases.residual:
         return np.zeros(cases.shape)
     base, places = cases.base, cases.axes.get("at", cases.base.at[None])
-    seen = [base.changed("at", place).modes for place in places] if base.views else [base.modes] * len(places)
+    excited = [base.changed("at", place).modes for place in places] if base.views else [base.modes] * len(places)
 
     def shaped(name: str, values: Any) -> np.ndarray:
         """Values of an axis, or one that all cells share, shaped to broadcast over the map."""
@@ -38,8 +38,8 @@ def estimate_left_out(cases: Cases) -> np.ndarray:
     felt = striker.felt_mass * (value("mass", striker.mass) / striker.mass)
     omega = np.pi / wall_time(stiffness, exponent, 1.0 / felt, value("speed", base.speed))
     yielding = base.modes.dimension > 0
-    left = [modes.residual_compliance(place)[0, 0] if yielding else 0.0 for modes, place in zip(seen, places)]
-    last = shaped("at", [modes.omega[-1] for modes in seen])
+    left = [modes.residual_compliance(place)[0, 0] if yielding else 0.0 for modes, place in zip(excited, places)]
+    last = shaped("at", [modes.omega[-1] for modes in excited])
     sides = [
         (base.modes, shaped("at", left), last, base.first, "target_mass", "target_frequency"),
         (striker.modes, striker.left_out[0][0, 0], striker.modes.omega[-1], None, "mass", "striker_frequency"),
@@ -84,7 +84,7 @@ def model_error(cases: Cases) -> tuple[np.ndarray, str]:
 
 
 def described(cases: Cases, numbers: np.ndarray, workers: int | None = None) -> np.ndarray:
-    """Error [-] of the bodies' description in each cell, in the shape of a map, as blows on poorer ones tell it.
+    """Error [-] of the bodies' description in each cell, in the shape of a map, as blows on poorer ones show it.
 
     Evenly spaced cells, at most DOUBTED, are struck again on bodies described less well: by `Modes.poorer`, or where
     modes left out may matter `thinner`. Any other cell has the error of the nearest. Too few vectors may agree on a

@@ -108,7 +108,7 @@ class Case:
     contact: Contact
     at: np.ndarray  # (dimension,) [m]
     speed: float  # [m/s]
-    # The body as seen from each strike point, if it is described by Ritz vectors, which differ from point to point
+    # The body as excited at each strike point, if it is described by Ritz vectors, which differ from point to point
     views: Mapping[tuple[float, ...], Modes] = field(default_factory=dict)
     first: float | None = None  # [Hz] first flexible mode of the body, if the first of its vectors may be another
 
@@ -125,8 +125,8 @@ class Case:
     def changed(self, name: str, value: Any) -> "Case":
         """The same blow with one parameter of `AXES` replaced."""
         if name == "at":
-            seen = self.views.get(tuple(np.atleast_1d(np.asarray(value, float)).tolist()), self.modes)
-            return replace(self, at=seen.point("at", value)[0], modes=seen)
+            modes = self.views.get(tuple(np.atleast_1d(np.asarray(value, float)).tolist()), self.modes)
+            return replace(self, at=modes.point("at", value)[0], modes=modes)
         if name == "speed":
             return replace(self, speed=check.positive("speed", value, "m/s", reach=REACH))
         if name in LAW:
@@ -152,7 +152,7 @@ class Case:
         return case
 
     def _with(self, change: Callable[[Modes], Modes]) -> "Case":
-        """The same blow on a body changed alike wherever it is seen from."""
+        """The same blow on a body changed alike wherever it is struck."""
         return replace(
             self, modes=change(self.modes), views={place: change(modes) for place, modes in self.views.items()}
         )

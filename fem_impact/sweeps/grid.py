@@ -33,12 +33,12 @@ MOST_CELLS = 10**8  # [-] default limit of a map: half an hour to two hours of w
 SECONDS = {True: 1e-5, False: 2e-3}
 # [s] a map with default axes that takes less is computed in all its cells: refining it would gain nothing to notice
 DENSE = 1.0
-Tell = Callable[[str], Any]
+Announce = Callable[[str], Any]
 
 
 @dataclass(frozen=True)
 class Job:
-    """What to compute of a map, where, where it is kept and who is told: arguments of `sweep`, checked."""
+    """What to compute of a map, where, where it is kept and who is informed: arguments of `sweep`, checked."""
 
     tolerance: float  # [-]
     max_frequency: float | None = None  # [Hz]
@@ -48,7 +48,7 @@ class Job:
     client: Any = None
     store: Any = None  # path
     watch: Watch | None = None
-    tell: Tell | None = None
+    tell: Announce | None = None
     audit: bool = False
     borders: bool | None = None
     refine: bool | None = None
@@ -132,7 +132,7 @@ def sweep(
     store: str | Path | None = None,
     watch: Watch | None = None,
     max_cells: float = MOST_CELLS,
-    tell: Tell | None = None,
+    tell: Announce | None = None,
     audit: bool = False,
     borders: bool | None = None,
     cells: int | None = None,
@@ -260,8 +260,8 @@ def compute_map(cases: Cases, job: Job) -> xarray.Dataset:
         table.attrs["cells"] = f"all {cases.n_cases} cells computed"
     if computed is not None:
         known = computed.computed.reshape(cases.shape)
-        told = f"{int(known.sum())} of {known.size} cells computed ({known.mean():.0%})"
-        table.attrs["cells"] = f"{told}, the others interpolated between them"
+        share = f"{int(known.sum())} of {known.size} cells computed ({known.mean():.0%})"
+        table.attrs["cells"] = f"{share}, the others interpolated between them"
         for name, weight in refined.ROUGH.items():
             if name in table:
                 left = job.tolerance - batches.allowed(job.tolerance)
@@ -283,7 +283,7 @@ def listed(texts: Texts, n_cases: int) -> np.ndarray:
     return failures
 
 
-def admit(n_cells: int, n_layers: int, max_cells: float, *, quick: bool = True, tell: Tell | None = None) -> None:
+def admit(n_cells: int, n_layers: int, max_cells: float, *, quick: bool = True, tell: Announce | None = None) -> None:
     """Refuse a map with too many cells; announce the cost of a large one."""
     seconds = n_cells * SECONDS[quick] / (os.cpu_count() or 1)
     memory = 8.0 * n_cells * (n_layers + 2.0)  # [byte]
@@ -298,7 +298,7 @@ def _dataset(cases: Cases, numbers: np.ndarray, failures: np.ndarray, left_out: 
     """The map as a Dataset, with units on layers and axes; ``own`` is the model's error and what is not known of it."""
     dims = tuple(cases.axes)
     data: dict[str, Any] = {
-        name: (dims, values.reshape(cases.shape), about) for name, (values, about) in cases.told(numbers).items()
+        name: (dims, values.reshape(cases.shape), about) for name, (values, about) in cases.labelled(numbers).items()
     }
     meaning = "expected error of the body's description; infinite where modes left out govern the contact"
     data["truncation"] = (dims, left_out, {"units": "1", "long_name": meaning})

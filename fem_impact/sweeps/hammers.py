@@ -22,7 +22,7 @@ from ..model.target import Stages, Target
 from ..modes.modal import Damping, Modes
 from . import batches, bodies
 
-# [-] error limit of the blows that are looked at first: only to find where ranges end, which DECIDED then tells
+# [-] error limit of the blows that are looked at first: only to find where ranges end, which DECIDED then settles
 TOLERANCE = 1e-2
 DECIDED = 1e-4  # [-] error limit of the blows that decide where a range of tips ends, a tenth of its WIDTH
 WIDTH = 1e-3  # [-] relative width to which the ends of a range are found: finer than any tip is known
@@ -221,7 +221,7 @@ def choose_on(
 
 
 def _mixed(masses: np.ndarray) -> np.ndarray:
-    """An order of the masses whose first ones have the mean of all: heavy ones take longer, and the time left is told.
+    """An order of the masses whose first ones have the mean of all: heavy ones take longer, and the time left is shown.
 
     Ranks follow each other as multiples of the golden section do round a circle, which halve the widest gap each time.
     """
@@ -261,7 +261,7 @@ def _hammer(
     whole = partial(hit, body=modes)
 
     def once(tip: float) -> bool:
-        """Whether a tip hits once, as told by all descriptions of the body."""
+        """Whether a tip hits once by all descriptions of the body."""
         if not modes.poorer or hit(tip).n_impacts != 1:
             return hit(tip).n_impacts == 1
         error = whole(tip).error

@@ -43,8 +43,8 @@ class Input:
             middle = np.asarray(given.ppf([0.25, 0.5, 0.75]), float)
             if middle.shape != (3,) or not np.isfinite(middle).all():
                 raise ValueError(f"vary[{name!r}] must be a distribution of one continuous number")
-            told = [f"{value:g}" for value in given.args] + [f"{key}={value:g}" for key, value in given.kwds.items()]
-            return cls(name, f"{given.dist.name}({', '.join(told)})", given)
+            words = [f"{value:g}" for value in given.args] + [f"{key}={value:g}" for key, value in given.kwds.items()]
+            return cls(name, f"{given.dist.name}({', '.join(words)})", given)
         if isinstance(given, str):
             found = re.fullmatch(r"\s*([a-z]+)\s*\(([^()]*)\)\s*", given)
             if found is None:

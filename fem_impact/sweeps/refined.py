@@ -13,7 +13,7 @@ ROUGH = {"centroid": 0.1}  # [-] weight of what is missed: its lobes change it b
 COUNTED = ("n_impacts", "error")  # layers that are not interpolated
 
 Compute = Callable[[np.ndarray, str], tuple[np.ndarray, Texts]]  # cells, name of the round: numbers, error texts
-Tell = Callable[[int], Any]  # takes the number of cells that are settled
+Report = Callable[[int], Any]  # takes the number of cells that are settled
 
 
 def with_middles(along: np.ndarray) -> np.ndarray:
@@ -148,12 +148,12 @@ class MapSheet:
 
 
 def refine(
-    shape: tuple[int, int], layers: list[str], tolerance: float, compute: Compute, tell: Tell | None = None
+    shape: tuple[int, int], layers: list[str], tolerance: float, compute: Compute, report: Report | None = None
 ) -> MapSheet:
     """Compute a map (n, n) where its answer changes, and interpolate elsewhere to within the tolerance of each cell.
 
     ``layers`` as of `cases.LAYERS`; ``compute`` computes cells, numbered with the last axis fastest, and takes a name
-    for the round, after which ``tell`` hears how many cells are computed or interpolated so far.
+    for the round, after which ``report`` receives how many cells are computed or interpolated so far.
 
     Each block of cells has parabolas through its 3 x 3 nodes. Its quarters are computed at theirs; where these differ
     from the parabolas by more than the time steps leave of the tolerance, have another number of impacts or failed, the
@@ -176,8 +176,8 @@ def refine(
         sheet.fill(quarters[~split[of]], off[~split[of]])
         blocks = quarters[split[of]]
         blocks = blocks[(blocks[:, :, 2] - blocks[:, :, 0] > 1).any(axis=1)]
-        if tell is not None:
-            tell(int(sheet.settled.sum()))
+        if report is not None:
+            report(int(sheet.settled.sum()))
     while True:
         beside = beside_change(np.nan_to_num(sheet.numbers[sheet.count], nan=-1.0).reshape(shape))
         left = np.flatnonzero(beside.ravel() & ~sheet.computed)

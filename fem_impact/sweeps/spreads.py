@@ -15,10 +15,10 @@ from .._base.rounding import SAME
 from .cases import LAYERS
 from .inputs import Input
 
-LEVELS = (0.05, 0.25, 0.5, 0.75, 0.95)  # [-] quantiles told: median, quartiles and the ends of nine tenths of all
+LEVELS = (0.05, 0.25, 0.5, 0.75, 0.95)  # [-] quantiles stated: median, quartiles and the ends of nine tenths of all
 DOUBLE = "double_hit"
 QUANTITIES: dict[str, tuple[str, str]] = {
-    **{name: told for name, told in LAYERS.items() if name != "error"},
+    **{name: about for name, about in LAYERS.items() if name != "error"},
     DOUBLE: ("", "whether the striker touches more than once"),
 }
 
@@ -164,7 +164,7 @@ class Spread(check.Brief):
             groups = groups[whole][:4096]  # to limit the memory: their bootstrap keeps 100 copies
             if not len(groups) or np.ptp(groups[:, [0, -1]]) == 0.0:
                 continue
-            # 100 bootstrap samples tell a standard deviation to 7 %
+            # 100 bootstrap samples estimate a standard deviation to 7 %
             how: dict[str, Any] = {"num_resamples": 100, "conf_level": self.confidence, "seed": self.seed + 1}
             found = sobol.analyze(problem, groups.ravel(), calc_second_order=False, **how)
             first, total = (

@@ -26,7 +26,7 @@ Texts = dict[int, str]  # failed cell: error text
 Solve = Callable[[Any, int, int], tuple[np.ndarray, Texts]]  # grid, start, stop: numbers (n_layers, n_cells), texts
 Watch = Callable[[int, int], Any]
 Mark = dict[str, str]  # digests, from `fingerprint`
-OTHERS = {  # what is told of a store whose digests are others
+OTHERS = {  # what is said of a store whose digests are others
     "program": "made by another version of this program or its libraries",
     "map": "other bodies, axes or tolerance",
     "functions": "other functions in layers",
@@ -164,16 +164,16 @@ def _made(zarr: Any, place: Any, mark: Mark, n_layers: int, n_cases: int) -> Any
 def fingerprint(grid: Any) -> Mark:
     """Digests of everything that determines the results of a map: the blow, the functions and the program."""
     striker, views = grid.base.striker, grid.base.views
-    seen = [(modes, np.array([place])) for place, modes in views.items()]
-    told = [
+    bodies = [(modes, np.array([place])) for place, modes in views.items()]
+    blow = [
         grid.scene(), dict(grid.axes), grid.chosen, grid.tolerance, grid.residual, grid.band, grid.layers,
         striker.hand, striker.motion, grid.base.first,
     ]  # fmt: skip
-    for modes, places in seen or [(grid.base.modes, grid.axes.get("at", grid.base.at[None]))]:
+    for modes, places in bodies or [(grid.base.modes, grid.axes.get("at", grid.base.at[None]))]:
         for each in modes.descriptions().values():
             yields = [float(each.shapes.compliance(place[None])[0, 0]) for place in places]
-            told += [each.stretches, each.thick, each.air, each.unstated, yields]
-            told += [each.omega, each.shape_at(places), each.shapes.spread(places)]
+            blow += [each.stretches, each.thick, each.air, each.unstated, yields]
+            blow += [each.omega, each.shape_at(places), each.shapes.spread(places)]
     functions = {}
     for name, function in grid.extra.items():
         try:
@@ -183,7 +183,7 @@ def fingerprint(grid: Any) -> Mark:
                 f"layers: {name!r} cannot be distinguished from other functions ({error}), so a store may mix "
                 "them up; leave out store, or pass a function that does not use it"
             ) from None
-    return {"map": identity.identify(told), "functions": identity.identify(functions), "program": identity.program()}
+    return {"map": identity.identify(blow), "functions": identity.identify(functions), "program": identity.program()}
 
 
 def by_blocks(
