@@ -19,7 +19,7 @@ from .striker import Striker
 # [-] by dimension: frequency of the replacement mode over the last, fact: sqrt(sum u**2/w**2 / sum u**2/w**4) of those
 # above is sqrt(7/3) on a beam, whose n-th frequency goes as n**2, and sqrt(3) on a plate, where it goes as n
 REST_ABOVE = {1: 1.53, 2: 1.73}
-# [-] two extra runs divide the highest kept frequency by these: near enough to foretell, far enough to differ
+# [-] two extra runs divide the highest kept frequency by these: near enough to predict, far enough to differ
 THINNED = 1.4, 2.0
 Touched = tuple[tuple[int, float], ...]  # contact, and sign: 1 for its first body, -1 for its second
 

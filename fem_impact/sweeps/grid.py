@@ -29,7 +29,7 @@ from .store import Texts, Watch, not_free
 
 TOLERANCE = 1e-3  # [-] default error limit of a map
 MOST_CELLS = 10**8  # [-] default limit of a map: half an hour to two hours of work, 8 GB
-# [s] per blow, in a batch or alone, that foretell the time: the plates of studies/benchmarks/map_speed.py on one core
+# [s] per blow, in a batch or alone, that predict the time: the plates of studies/benchmarks/map_speed.py on one core
 SECONDS = {True: 1e-5, False: 2e-3}
 # [s] a map with default axes that takes less is computed in all its cells: refining it would gain nothing to notice
 DENSE = 1.0
