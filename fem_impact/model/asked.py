@@ -1,4 +1,4 @@
-"""What is asked of a blow, checked, and what is foretold of it before anything is computed."""
+"""What is asked of a blow, checked, and what is predicted of it before anything is computed."""
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping
@@ -18,7 +18,7 @@ from ..modes.modal import Modes
 from . import audit, cost, idealisation
 from .budget import Budget
 from .target import MODELS, Stages, Target
-from .vectors import Seen
+from .vectors import RitzTarget
 
 if TYPE_CHECKING:
     from .planner import Blow
@@ -59,7 +59,7 @@ class Forecast:
     mobility: float = 0.0  # [m/(N s)] of an infinite plate
     notes: tuple[str, ...] = ()  # what was assumed, and numbers that are probably a slip of a unit
     first: Modes | None = field(default=None, repr=False, compare=False)  # first modes of the target, if needed
-    ringing: float = 0.0  # [s] predicted besides, of the modes that tell motion and sound, once these are asked for
+    ringing: float = 0.0  # [s] predicted besides, of the modes that give motion and sound, once these are asked for
 
     @property
     def error(self) -> float:
@@ -151,9 +151,9 @@ class Asked:
         return *self.blow.striker.notes, *plausible.note_number("speed", self.values["speed"])
 
     @cached_property
-    def seen(self) -> idealisation.Outside | None:
+    def estimates(self) -> idealisation.Estimates | None:
         """What is known of the target without finite elements."""
-        return idealisation.from_outside(self.blow.target, self.values["at"], self.mass, self.duration)
+        return idealisation.estimate(self.blow.target, self.values["at"], self.mass, self.duration)
 
     @property
     def pressed(self) -> float:
@@ -210,7 +210,7 @@ class Asked:
             kept = max(modes.n_rigid, min(kept or modes.n_modes, modes.n_modes))
         return kept, collision.striker_error(self.blow.striker, kept, **self.law)
 
-    def from_outside(self, kind: str, mass: float) -> audit.Simplified | None:
+    def simplified(self, kind: str, mass: float) -> audit.Simplified | None:
         """The target as its mesh and section describe it, without modes; None if there is only modes."""
         target = self.blow.target
         if target.mesh is None:
@@ -258,11 +258,11 @@ class Asked:
 
 @dataclass(frozen=True, eq=False)
 class Description(ABC):
-    """A way to describe the target; those of its kind have ``of``, which tells when it applies."""
+    """A way to describe the target; those of its kind have ``of``, which decides when it applies."""
 
     asked: Asked
     forecast: Forecast
-    seen: Seen | None = field(default=None, kw_only=True)  # the vectors that a run has computed so far
+    ritz: RitzTarget | None = field(default=None, kw_only=True)  # the vectors that a run has computed so far
     rings: ClassVar[bool] = False  # whether the motion of the target is known, not only the numbers of the blow
 
     @property
@@ -280,15 +280,15 @@ class Description(ABC):
 
     def completed(self, hit: Response, stages: Stages, keep: Any = None) -> Response:
         """The last response with all that belongs to it, its examiner among that."""
-        told = self.forecast
-        kind = "infinite" if told.mobility else "rigid"
-        return audit.audited(hit, None if self.rings else self.asked.from_outside(kind, told.mass))
+        forecast = self.forecast
+        kind = "infinite" if forecast.mobility else "rigid"
+        return audit.audited(hit, None if self.rings else self.asked.simplified(kind, forecast.mass))
 
 
 def refine(description: Any, strike: Callable[..., tuple[Any, Any]], stages: Stages, keep: Any = None) -> Any:
     """Strike one description after another until the errors require no better one.
 
-    ``strike`` takes a description, its modes and the stages, and returns what tells the errors, and more. Returns the
+    ``strike`` takes a description, its modes and the stages, and returns what holds the errors, and more. Returns the
     last description that could be struck, with both. What is too much for a better one has missed the tolerance.
     """
     struck = None
@@ -320,7 +320,7 @@ def placed(target: Target, name: str, given: Any, blame: Callable[[], Any]) -> A
     if mesh.dimension == 1:
         far = ((place < mesh.points.min()) | (place > mesh.points.max()))[:, 0]
     else:
-        far = np.array([idealisation.Surroundings.seen(mesh, point) is None for point in place])
+        far = np.array([idealisation.Surroundings.of(mesh, point) is None for point in place])
     if far.any():
         inside = target.assembled(Stages()).contains(place[far])  # perhaps between a curved edge and its chord
         with blame():

@@ -1,4 +1,4 @@
-"""Is the model itself right? Examines every assumption of a blow after it, and what can be foreseen before it.
+"""Is the model itself right? Examines every assumption of a blow after it, and what can be predicted before it.
 
 Nothing is examined until somebody asks: a response carries the examiner along (`Response.assumptions`).
 """
@@ -30,7 +30,7 @@ from .idealisation import Surroundings, unyielding
 from .restrike import Doubt, Struck
 from .target import BOTH, Target
 
-# [-] tolerance of blows that only tell what can be foreseen, on a wall or for the cost: estimates err more
+# [-] tolerance of blows that only predict, on a wall or for the cost: estimates err more
 ROUGH = 1e-2
 # [-] damping ratio tried, on the side of caution: bare metal has a hundredth of it, wood as much, felt more
 PLAUSIBLE = 0.01
@@ -42,15 +42,15 @@ def examine_damping(struck: Struck) -> Assumption:
     hit, zeta, unstated = struck.hit, struck.hit.history.zeta.copy(), []
     for name, body, modes in zip(("striker", "struck body"), (0, len(hit.bodies) - 1), struck.bodies):
         flexible = modes.omega > 0.0
-        simple = body and struck.ideal and not struck.foreseen
+        simple = body and struck.ideal and not struck.planned
         if modes.dimension and flexible.any() and not modes.damping_ratio[flexible].any() and not simple:
             unstated.append(name)
-            if not struck.foreseen:
+            if not struck.planned:
                 zeta[hit.body_slice(body)] = np.where(flexible, PLAUSIBLE, 0.0)
     if not unstated:
         return DAMPING.holds(struck)
     remedy = f"state the damping ratio of the {' and of the '.join(unstated)}"
-    if struck.foreseen:
+    if struck.planned:
         return DAMPING.unknown(struck, "what a damping that nobody stated would change", remedy, PLAUSIBLE)
     effect = struck.changes(zeta=zeta)
     if "sound" in effect and "struck body" in unstated:
@@ -118,7 +118,7 @@ def required(target: Target, hit: Response) -> tuple[Target, str] | None:
     return None
 
 
-def foresee(
+def examine_plan(
     target: Target, body: Modes | Simplified, striker: Striker, contact: Contact, at: Any, **how: Any
 ) -> tuple[Assumption, ...]:
     """What is known of every assumption before a blow, from one on a wall; effects are not.
@@ -182,5 +182,5 @@ def _clearance(modes: Modes, known: bending.Known | None, mesh: Mesh | None, at:
         return float(np.min([at, np.array([shapes.length, shapes.width]) - at]))
     if isinstance(shapes, DiskShapes):
         return shapes.radius - float(np.hypot(*at))
-    view = None if mesh is None else Surroundings.seen(mesh, at)
+    view = None if mesh is None else Surroundings.of(mesh, at)
     return None if view is None else view.clearance

@@ -1,4 +1,4 @@
-"""Integrals of a body's bending shapes that tell how thick, how stretched and how loaded by air it is.
+"""Integrals of a body's bending shapes that show how thick, how stretched and how loaded by air it is.
 
 A mode of deflection w has the slopes grad w, the shear forces Q = div M of its bending moments, and at free edges a
 twisting moment M_nt that Kirchhoff's theory leaves there and the true plate cannot carry. To first order, rotary
@@ -113,7 +113,7 @@ class Known:
 
 
 def known_of(modes: Modes) -> Known | None:
-    """What the modes of a plate or beam tell of it; None if its shapes are known at points only, or it is rigid."""
+    """What is known of a plate or beam by its modes; None if its shapes are known at points only, or it is rigid."""
     shapes = unwrapped(modes.shapes)[0]
     if isinstance(shapes, ElementShapes):
         system = shapes.system
@@ -184,7 +184,7 @@ def integrate_shapes(body: Known) -> Bending:
     every = np.zeros((5, modes.n_modes))
     every[:, low] = found
     if low.stop < modes.n_modes:
-        top = slice(low.stop - max(1, (low.stop - low.start) // 4), low.stop)  # tells how those above go on
+        top = slice(low.stop - max(1, (low.stop - low.start) // 4), low.stop)  # shows how those above go on
         for row in (0, 2, 3):
             every[row, low.stop :] = np.median(every[row, top] / modes.omega[top]) * modes.omega[low.stop :]
         every[4, low.stop :] = np.median(found[4])

@@ -22,7 +22,7 @@ class Budget:
     """A tolerance and its shares."""
 
     total: float  # [-]
-    lossy: bool = False  # whether the contact is: left-out modes then err more than their compliance tells
+    lossy: bool = False  # whether the contact is: left-out modes then err more than their compliance indicates
     margin: float = 1.0  # [-] divides what left-out modes may err
     fineness: float = 1.0  # [-] divides what frequencies may err
 

@@ -34,15 +34,15 @@ class Idealised(Description):
         if not named and (asked.moving or pushed or exact):
             return None
         with stages("modes"):
-            seen = asked.seen
-        if seen is None:
+            estimates = asked.estimates
+        if estimates is None:
             asked.refuse(asked.unfit)
             return None
         if kind == "rigid":
-            error, mobility, cause = seen.rigid, 0.0, "rigid target"
-            kept = f"the target, {seen.mass:.3g} kg, is treated as rigid: that changes the blow by {error:.1e}"
+            error, mobility, cause = estimates.rigid, 0.0, "rigid target"
+            kept = f"the target, {estimates.mass:.3g} kg, is treated as rigid: that changes the blow by {error:.1e}"
         else:
-            error, mobility, cause = seen.endless, seen.mobility, "infinite plate"
+            error, mobility, cause = estimates.endless, estimates.mobility, "infinite plate"
             kept = (
                 f"the target is treated as an infinite plate of mobility {mobility:.3g} m/(N s): the striker leaves "
                 f"before an echo returns from the edge; that changes the blow by {error:.1e}"
@@ -53,18 +53,18 @@ class Idealised(Description):
             return None
         dropped = "no mesh and no modes are needed; the target's sound is not computed"
         forecast = asked.foretell(
-            kind, errors={cause: error}, reasons=(kept, dropped), mass=seen.mass, mobility=mobility,
-            notes=plausible.together(blow.target.assumed, seen.notes),
+            kind, errors={cause: error}, reasons=(kept, dropped), mass=estimates.mass, mobility=mobility,
+            notes=plausible.together(blow.target.assumed, estimates.notes),
         )  # fmt: skip
         return cls(asked, forecast, error)
 
     def found(self, stages: Stages, keep: Any = None) -> "tuple[Idealised, Modes]":
         """The same, and its modes."""
-        at, told = self.asked.values["at"], self.forecast
-        modes = idealisation.unyielding(at, told.mass)
-        if told.mobility:
-            modes = idealisation.endless(at, told.mass, told.mobility, told.duration)
-        return self, replace(modes, notes=told.notes)
+        at, forecast = self.asked.values["at"], self.forecast
+        modes = idealisation.unyielding(at, forecast.mass)
+        if forecast.mobility:
+            modes = idealisation.endless(at, forecast.mass, forecast.mobility, forecast.duration)
+        return self, replace(modes, notes=forecast.notes)
 
     def completed(self, hit: Response, stages: Stages, keep: Any = None) -> Response:
         """The response with the error of the simplification."""

@@ -33,30 +33,30 @@ class Mixed(Description):
         """The plate as infinite above a frequency; None if its mobility is not known.
 
         Or, without ``anyway`` and unless the user asks for it, where vectors or few modes do: the infinite plate damps
-        the contact less than critically, or few modes tell the blow.
+        the contact less than critically, or few modes describe the blow.
         """
         blow, target, named = asked.blow, asked.blow.target, "target" in asked.pieces
         pressed = asked.values["striker_force"] or asked.values["target_force"] or blow.contact.gap < 0.0
         stated = pressed or asked.counted or blow.striker.returns or not asked.values["residual"]
         fits = asked.plain and not (stated or asked.moving)
         with stages("modes"):
-            seen = asked.seen if fits else None
+            estimates = asked.estimates if fits else None
         resolved = target.kind == "analytic" or vectors.usable(target)
-        if not resolved or seen is None or not np.isfinite(seen.mobility) or not seen.echo:
+        if not resolved or estimates is None or not np.isfinite(estimates.mobility) or not estimates.echo:
             why = asked.unfit if fits else "is only for thin plates in a vacuum, and for the blow alone"
             asked.refuse(why)
             return None
-        slow, highest = asked.mass * seen.mobility, asked.highest(seen.mobility)
+        slow, highest = asked.mass * estimates.mobility, asked.highest(estimates.mobility)
         if not named and mixed.LASTING * slow > 1e4 * asked.duration:  # too many steps, some 24 for each contact time
             return None
-        few = not asked.stopped(seen.mobility) or target.count_below(highest / target.stretch) < MANY_MODES
+        few = not asked.stopped(estimates.mobility) or target.count_below(highest / target.stretch) < MANY_MODES
         if few and not (named or anyway):
             return None
-        frequency = mixed.first_frequency(asked.mass, seen.mobility, seen.echo, asked.duration)
+        frequency = mixed.first_frequency(asked.mass, estimates.mobility, estimates.echo, asked.duration)
         kept = (
             f"the target keeps its modes up to about {frequency:.3g} Hz, or higher if the echoes left out matter; "
-            f"above, it is treated as an infinite plate of mobility {seen.mobility:.3g} m/(N s), from {highest:.3g} Hz "
-            "on as a spring"
+            f"above, it is treated as an infinite plate of mobility {estimates.mobility:.3g} m/(N s), from "
+            f"{highest:.3g} Hz on as a spring"
         )
         why = (
             f"the contact lasts about {asked.duration:.3g} s on a wall, and the striker slows down within {slow:.3g} s"
@@ -79,52 +79,52 @@ class Mixed(Description):
                     work, higher = replace(work + twice[3], memory=work.memory), 2.0 * higher
             chosen = {"element": target.element, "size": elements.size, "n_dofs": n_dofs, "work": work}
         forecast = asked.foretell(
-            "mixed", errors={"echoes left out": asked.budget.half}, reasons=(why, kept), mass=seen.mass,
-            mobility=seen.mobility, n_modes=number, max_frequency=frequency,
-            notes=plausible.together(target.assumed, seen.notes), **chosen,
+            "mixed", errors={"echoes left out": asked.budget.half}, reasons=(why, kept), mass=estimates.mass,
+            mobility=estimates.mobility, n_modes=number, max_frequency=frequency,
+            notes=plausible.together(target.assumed, estimates.notes), **chosen,
         )  # fmt: skip
         return cls(asked, forecast, frequency, highest)
 
     def found(self, stages: Stages, keep: Any = None) -> "tuple[Mixed, Modes]":
         """The same, and its modes or vectors."""
-        asked, target, told, frequency = self.asked, self.asked.blow.target, self.forecast, self.frequency
-        seen, at = self.seen, asked.values["at"]
-        if told.first is not None:
+        asked, target, forecast, frequency = self.asked, self.asked.blow.target, self.forecast, self.frequency
+        ritz, at = self.ritz, asked.values["at"]
+        if forecast.first is not None:
             with stages("modes"):
                 reach = mixed.REACH * frequency / target.stretch
-                modes = target.finished(asked.find(FIRST_LOOK, reach, first=told.first, stages=stages))
+                modes = target.finished(asked.find(FIRST_LOOK, reach, first=forecast.first, stages=stages))
         else:
-            if seen is None:
+            if ritz is None:
                 elements, count, _, _ = _by_elements(asked, frequency, stages)
                 shift, resolved = 2.0 * np.pi * mixed.REACH * frequency, mixed.RESOLVED * frequency
-                seen = vectors.Seen(
+                ritz = vectors.RitzTarget(
                     target, at, resolved, asked.budget.total, elements, target.size_stated, stages, shift, count
                 )
-            seen.needed_modes(lambda found, _: float(found.frequencies[-1]))
-            assert seen.whole is not None
-            modes = seen.whole
-        body = mixed.mixed(modes, at, told.mobility, frequency, self.highest)
-        forecast = replace(told, n_modes=body.n_modes, max_frequency=frequency)
-        return replace(self, forecast=forecast, seen=seen), body
+            ritz.needed_modes(lambda found, _: float(found.frequencies[-1]))
+            assert ritz.whole is not None
+            modes = ritz.whole
+        body = mixed.mixed(modes, at, forecast.mobility, frequency, self.highest)
+        forecast = replace(forecast, n_modes=body.n_modes, max_frequency=frequency)
+        return replace(self, forecast=forecast, ritz=ritz), body
 
     def refined(self, hit: Response, stages: Stages) -> "Mixed | Vectors | None":
         """More vectors, a finer mesh or twice the frequency; vectors for all frequencies if they cost less."""
-        asked, error, allowed, seen = self.asked, hit.error, self.asked.budget.half, self.seen
+        asked, error, allowed, ritz = self.asked, hit.error, self.asked.budget.half, self.ritz
         # a higher frequency, which it may take, begins with vectors and a mesh of its own
         simple = error.idealisation > max(allowed, error.truncation, error.mesh)
-        if seen is not None and seen.count < MOST and not simple:
+        if ritz is not None and ritz.count < MOST and not simple:
             if error.truncation > 0.5 * allowed:
-                seen.count = min(MOST, 2 * seen.count)  # it lasts longer than expected
+                ritz.count = min(MOST, 2 * ritz.count)  # it lasts longer than expected
                 return self
-            if seen.improved(error, allowed):
+            if ritz.improved(error, allowed):
                 return self
         twice = 2.0 * hit.bodies[-1].n_modes
         # modes times steps of one run: 2e8 take ten seconds
-        many = hit.history.steps.shape[0] * twice > 2e8 or (seen is not None and twice > MOST)
-        if error.idealisation <= allowed or (many and seen is None):
+        many = hit.history.steps.shape[0] * twice > 2e8 or (ritz is not None and twice > MOST)
+        if error.idealisation <= allowed or (many and ritz is None):
             return None
-        higher = replace(self, frequency=2.0 * self.frequency, seen=None)
-        if seen is None:
+        higher = replace(self, frequency=2.0 * self.frequency, ritz=None)
+        if ritz is None:
             return higher
         try:
             more = _by_elements(asked, higher.frequency, stages)[3].seconds
@@ -147,12 +147,12 @@ class Mixed(Description):
 def _by_elements(asked: Asked, frequency: float, stages: Stages) -> tuple[Elements, int, int, cost.Work]:
     """Elements and vectors for the infinite plate above a frequency [Hz], with the number of unknowns and the work."""
     target, reach, tolerance = asked.blow.target, mixed.RESOLVED * frequency, asked.budget.total
-    assert target.mesh is not None and asked.seen is not None
+    assert target.mesh is not None and asked.estimates is not None
     size = vectors.size_for(target, reach, tolerance)
     if size < refinement.smallest_size(target.element, target.mesh):
         raise check.SimulationError(f"{asked.blow.name}{NO_MESH}")
     elements = vectors.elements_for(target, size, asked.mass, reach, tolerance)
-    lasts = max(asked.duration, mixed.LASTING * asked.mass * asked.seen.mobility)
+    lasts = max(asked.duration, mixed.LASTING * asked.mass * asked.estimates.mobility)
     phase = 2.0 * np.pi * mixed.REACH * frequency * lasts
     number = target.count_below(mixed.REACH * frequency / target.stretch)
     count = vectors.FEWEST + min(round(number), round(2.5 * phase))  # eight for each half turn

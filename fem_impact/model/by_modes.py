@@ -44,7 +44,7 @@ class Modal(Description):
     def of(
         cls, asked: Asked, stages: Stages, first: Modes | None = None, more: float = 1.0, attempt: int = 1
     ) -> "Modal":
-        """The target with as many modes as the blow needs; finds the first ones, because they tell how many."""
+        """The target with as many modes as the blow needs; finds the first ones, because they show how many."""
         target, at, mass = asked.blow.target, asked.values["at"], asked.mass
         band, mesh = max((band for band in asked.quantities.values() if band), default=0.0), target.mesh
         # ten times the first modes crowd between one and two half waves across a strip: to find them takes minutes
@@ -92,22 +92,22 @@ class Modal(Description):
 
     def found(self, stages: Stages, keep: Any = None) -> "tuple[Modal, Modes]":
         """The same, and its modes; ``keep`` is a file that stores those of a costly plan."""
-        told, asked, target = self.forecast, self.asked, self.asked.blow.target
-        keep = keep if told.costly and told.n_dofs else None
-        assert told.first is not None and told.max_frequency is not None
+        forecast, asked, target = self.forecast, self.asked, self.asked.blow.target
+        keep = keep if forecast.costly and forecast.n_dofs else None
+        assert forecast.first is not None and forecast.max_frequency is not None
         with stages("modes"):
-            first, modes, number = told.first, told.first, asked.pieces.get("n_modes")
+            first, modes, number = forecast.first, forecast.first, asked.pieces.get("n_modes")
             ratio = target.finished(first).frequencies[-1] / first.frequencies[-1]
             if number is not None and number > first.n_modes:
                 modes = asked.find(number, first=first, stages=stages, keep=keep)
-            elif told.max_frequency > ratio * first.frequencies[-1] * (1.0 + 1e-9):
-                modes = asked.find(FIRST_LOOK, told.max_frequency / ratio, first=first, stages=stages, keep=keep)
+            elif forecast.max_frequency > ratio * first.frequencies[-1] * (1.0 + 1e-9):
+                modes = asked.find(FIRST_LOOK, forecast.max_frequency / ratio, first=first, stages=stages, keep=keep)
             if number is not None:
                 modes = modes.truncated(n_modes=number)
             elif "max_frequency" in asked.pieces:
-                modes = modes.truncated(max_frequency=told.max_frequency / ratio)
+                modes = modes.truncated(max_frequency=forecast.max_frequency / ratio)
             modes = target.surrounded(modes)
-        return replace(self, forecast=replace(told, n_modes=modes.n_modes)), modes
+        return replace(self, forecast=replace(forecast, n_modes=modes.n_modes)), modes
 
     def refined(self, hit: Response, stages: Stages) -> "Modal | None":
         """More modes if those left out turn out to matter, more for the air's sake, or a finer mesh; twice at most."""
@@ -132,32 +132,32 @@ class Modal(Description):
         return better
 
 
-def _with_mesh(asked: Asked, told: Forecast, shapes: FieldShapes, limit: float) -> Forecast:
+def _with_mesh(asked: Asked, forecast: Forecast, shapes: FieldShapes, limit: float) -> Forecast:
     """The forecast with a mesh that resolves a frequency [Hz] of the body as assembled."""
-    first, system = told.first, shapes.system
+    first, system, mesh = forecast.first, shapes.system, shapes.system.mesh
     assert first is not None and first.frequency_error is not None
-    mesh = system.mesh
     stated = asked.meshed or refinement.resolves(system, limit)
     size = mesh.size if stated else min(mesh.size, refinement.size_for(system, None, limit, None))
     n_dofs = round(refinement.unknowns(system.element, mesh, size))
     error = max(float(first.frequency_error.max()), SHORT_WAVES[system.element])
     reason = f"{system.element} elements of {size:.3g} m, about {n_dofs} unknowns, resolve the shortest wave"
     work = cost.NOTHING  # if the plan has found all modes, and their compliance
-    if told.n_modes > first.n_modes:
-        compared, each = system.rules.compared, _solved(system.rules, n_dofs, told.n_modes)
+    if forecast.n_modes > first.n_modes:
+        compared, each = system.rules.compared, _solved(system.rules, n_dofs, forecast.n_modes)
         if mesh.dimension == 2:
             finer = [n_dofs * refinement.COARSER**2] if compared else []
             at_blow = cost.AT_BLOW[system.element]
             each += [cost.compliance(n + at_blow) for n in [n_dofs, *finer]]
         work = replace(sum(each, cost.NOTHING), memory=max(part.memory for part in each))  # one mesh after another
     return replace(
-        told, element=system.element, size=size, n_dofs=n_dofs, errors={**told.errors, "mesh": error},
-        reasons=(*told.reasons, reason), seconds=told.seconds + work.seconds, memory=told.memory + work.memory,
+        forecast, element=system.element, size=size, n_dofs=n_dofs, reasons=(*forecast.reasons, reason),
+        errors={**forecast.errors, "mesh": error}, seconds=forecast.seconds + work.seconds,
+        memory=forecast.memory + work.memory,
     )  # fmt: skip
 
 
 def _solved(rules: Theory, n_dofs: float, n_modes: int) -> list[cost.Work]:
-    """Modes on one mesh, and on the coarser one by which their errors are told, if they are."""
+    """Modes on one mesh, and on the coarser one from which their errors are estimated, if they are."""
     coarser = [n_dofs / refinement.COARSER**2] if rules.compared else []
     return [cost.by_modes(n, n_modes) for n in [n_dofs, *coarser]]
 

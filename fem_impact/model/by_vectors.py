@@ -42,7 +42,7 @@ class Vectors(Description):
     @property
     def margin(self) -> float:
         """Divides what left-out modes of the striker may err [-]."""
-        return 1.0 if self.seen is None else self.seen.margin
+        return 1.0 if self.ritz is None else self.ritz.margin
 
     @classmethod
     def of(cls, asked: Asked, stages: Stages) -> "Vectors | None":
@@ -75,7 +75,7 @@ class Vectors(Description):
         wanted, at = (0.5 / asked.duration, asked.budget.total), asked.values["at"][None]
         elements = vectors.elements_for(target, size, asked.mass, *wanted)
         n_dofs, first = target.unknowns(at, elements, stages), vectors.first_count(target, *wanted)
-        lasts, impacts, stopped = _length_foreseen(asked)
+        lasts, impacts, stopped = _predicted_length(asked)
         meshes = list(vectors.compared(target, elements, stages))
         if impacts > 2 and not asked.meshed:  # each multiplies the error that a mesh makes before it
             meshes.append(vectors.finer(target, meshes[0], stages))
@@ -107,29 +107,29 @@ class Vectors(Description):
 
     def found(self, stages: Stages, keep: Any = None) -> "tuple[Vectors | Modal, Modes]":
         """The same, and its vectors; modes, if the point struck is at rest, where no vector can start."""
-        asked, seen = self.asked, self.seen
-        if seen is None:
+        asked, ritz, at = self.asked, self.ritz, self.asked.values["at"]
+        if ritz is None:
             wanted = 0.5 / asked.duration, asked.budget.total, self.elements, asked.meshed
-            seen = vectors.Seen(asked.blow.target, asked.values["at"], *wanted, stages, count=self.forecast.n_modes)
-        if seen.at_rest:
+            ritz = vectors.RitzTarget(asked.blow.target, at, *wanted, stages, count=self.forecast.n_modes)
+        if ritz.at_rest:
             return Modal.of(asked, stages).found(stages, keep)
 
         def cutoff(modes: Modes, margin: float) -> float:
             allowed = replace(asked.budget, margin=margin).for_left_out
-            return accuracy.tail_cutoff(modes, seen.at, mass=asked.mass, tolerance=allowed, **asked.law)
+            return accuracy.tail_cutoff(modes, ritz.at, mass=asked.mass, tolerance=allowed, **asked.law)
 
-        modes = seen.needed_modes(cutoff)
-        elements, n_dofs = seen.elements, seen.n_dofs
-        forecast = replace(self.forecast, n_modes=seen.count, size=elements.size, n_dofs=n_dofs)
-        return replace(self, forecast=forecast, elements=elements, seen=seen, whole=seen.whole), modes
+        modes = ritz.needed_modes(cutoff)
+        elements, n_dofs = ritz.elements, ritz.n_dofs
+        forecast = replace(self.forecast, n_modes=ritz.count, size=elements.size, n_dofs=n_dofs)
+        return replace(self, forecast=forecast, elements=elements, ritz=ritz, whole=ritz.whole), modes
 
     def refined(self, hit: Response, stages: Stages) -> Description | None:
         """More vectors or a finer mesh, whichever the errors demand; if neither helps, an infinite plate that may."""
-        asked, budget, seen = self.asked, self.asked.budget, self.seen
-        assert seen is not None
-        before = seen.count
-        if seen.improved(hit.error, budget.total - hit.error.step):
-            progress.revise(seen.work(before).seconds)
+        asked, budget, ritz = self.asked, self.asked.budget, self.ritz
+        assert ritz is not None
+        before = ritz.count
+        if ritz.improved(hit.error, budget.total - hit.error.step):
+            progress.revise(ritz.work(before).seconds)
             return self
         if "target" in asked.pieces or not budget.missed(hit.error, not asked.values["dt"]):
             return None
@@ -149,24 +149,24 @@ class Vectors(Description):
         return super().completed(hit, stages)
 
 
-def _length_foreseen(asked: Asked) -> tuple[float, int, bool]:
+def _predicted_length(asked: Asked) -> tuple[float, int, bool]:
     """How long the blow lasts on an infinite plate, in undisturbed contacts, its impacts, and whether it stops there.
 
     Where such a plate, with the edges nearby, stops the striker, only echoes throw it off: until the first has turned
     once, the blow goes on. (1, 1, False) if not known.
     """
-    at, seen = asked.values["at"], asked.seen
-    if seen is None or not np.isfinite(seen.mobility):
+    at, estimates = asked.values["at"], asked.estimates
+    if estimates is None or not np.isfinite(estimates.mobility):
         return 1.0, 1, False
-    mobility, echo = seen.local
+    mobility, echo = estimates.local
     try:
-        hit = _roughly(asked, idealisation.endless(at, seen.mass, mobility, asked.duration), fresh.STEPS)
+        hit = _roughly(asked, idealisation.endless(at, estimates.mass, mobility, asked.duration), fresh.STEPS)
     except check.SimulationError:
         return 1.0, 1, False
     lasts, echo = max((touch.end for touch in hit.impacts), default=0.0) / asked.duration, echo / asked.duration
     if not asked.stopped(mobility):
         return lasts, hit.n_impacts, False
-    if mobility > seen.mobility:  # echoes find it pressing on an edge, until 3e-4 of its speed are left
+    if mobility > estimates.mobility:  # echoes find it pressing on an edge, until 3e-4 of its speed are left
         return max(echo, min(lasts, 8.0 * asked.mass * mobility / asked.duration)), SEVERAL, True
     return max(1.0, echo), SEVERAL if echo > lasts else 1, True  # still pressing, it is thrown off for good
 
@@ -178,7 +178,7 @@ def _roughly(asked: Asked, body: Any, most: float, **how: Any) -> Response:
     with build.uncompiled(most):
         return collision.strike(
             body, striker, asked.blow.contact, at=at, speed=speed, tolerance=audit.ROUGH,
-            duration=100.0 * asked.duration, **how,  # the cost of longer blows is told too low
+            duration=100.0 * asked.duration, **how,  # the cost of longer blows is estimated too low
         )  # fmt: skip
 
 
@@ -189,22 +189,22 @@ def _rattling(asked: Asked, first: int) -> int:
     long as it lasts. Errors grow 200-fold on the way at most, and fall with the third power of the number: six times
     the ``first``. Within a factor of two in 11 of 11 scenes of studies/verification/effectivity.py.
     """
-    target, seen, mass, contact = asked.blow.target, asked.seen, asked.mass, asked.blow.contact
+    target, estimates, mass, contact = asked.blow.target, asked.estimates, asked.mass, asked.blow.contact
     lost = contact.loss * asked.values["speed"]
     quicker = (1.0 + lost) ** (1.0 / (contact.exponent + 1.0))  # than without loss, as a stiffer contact
-    if seen is None or not np.isfinite(seen.mobility):
+    if estimates is None or not np.isfinite(estimates.mobility):
         return 0
-    if lost < STICKY and not asked.stopped(seen.mobility, quicker):
+    if lost < STICKY and not asked.stopped(estimates.mobility, quicker):
         return 0
     # half a period of a heavy one on a hinged square as a spring; the first echo throws off a light one
-    lasts = np.pi * seen.mobility * (0.74 * mass * seen.mass) ** 0.5 if mass > LIGHT * seen.mass else 0.0
-    heard = target.count_below(accuracy.BAND * 0.5 / asked.duration / target.stretch)
-    if target.closed is not None and heard < 1000.0:
+    lasts = np.pi * estimates.mobility * (0.74 * mass * estimates.mass) ** 0.5 if mass > LIGHT * estimates.mass else 0.0
+    excited = target.count_below(accuracy.BAND * 0.5 / asked.duration / target.stretch)
+    if target.closed is not None and excited < 1000.0:
         with suppress(check.SimulationError):
-            body = target.finished(target.closed(n_modes=FIRST_LOOK + round(heard)))
+            body = target.finished(target.closed(n_modes=FIRST_LOOK + round(excited)))
             hit = _roughly(asked, body, 1000.0, residual=False, max_impacts=asked.values.get("max_impacts"))
             lasts = max((touch.end for touch in hit.impacts), default=lasts)
-    highest = quicker * asked.highest(seen.mobility)
+    highest = quicker * asked.highest(estimates.mobility)
     needed = min(1.6 * target.count_below(highest / target.stretch), 3.0 * highest * lasts, 6.0 * first)
     return round(min(needed, vectors.MOST_VECTORS))
 
@@ -227,7 +227,7 @@ def _ringing(asked: Asked, keep: Any, response: Response) -> Modes:
     target, band = asked.blow.target, asked.quantities.get("sound")
     frequencies = np.arange(0.0, AUDIBLE + 1.0, 10.0)
     force = np.abs(response.spectrum(frequencies))
-    limit = band or float(frequencies[np.flatnonzero(force >= 1e-3 * force[0])[-1]])  # -60 dB are not heard
+    limit = band or float(frequencies[np.flatnonzero(force >= 1e-3 * force[0])[-1]])  # -60 dB are inaudible
     first = asked.find(FIRST_LOOK)
     number = round(target.number_below(target.finished(first), limit))
     most = MOST_MODES["fe"] if band else MOST_RINGING

@@ -170,7 +170,7 @@ def whose() -> str:
 def installed() -> float:
     """Memory [byte] that this process can have: the machine's, or its own limit; infinite if not known."""
     found = math.inf
-    with suppress(AttributeError, ValueError, OSError):  # Windows tells neither
+    with suppress(AttributeError, ValueError, OSError):  # Windows knows neither
         found = float(os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES"))
     if resource is not None:
         limit = resource.getrlimit(resource.RLIMIT_AS)[0]

@@ -60,7 +60,7 @@ def examine_deflection(struck: Struck) -> Assumption:
     if modes.dimension == 0:
         return SMALL.holds(struck)
     if body is None or body.thickness is None:
-        if struck.ideal != "rigid" or struck.foreseen:
+        if struck.ideal != "rigid" or struck.planned:
             return SMALL.unknown(struck, "the thickness of the body")
         # if it stretched as much as it bends
         return SMALL.judged(struck, None, dict.fromkeys(struck.quantities, hit.error.idealisation), REMEDY)
@@ -68,7 +68,7 @@ def examine_deflection(struck: Struck) -> Assumption:
         return _simplified(struck, body)
     integrals = struck.bending
     assert integrals is not None
-    if struck.foreseen:
+    if struck.planned:
         value = _impulse_deflection(struck, body, integrals)
         if modes.stretches:
             return STRETCHED.judged(struck, value, {}, LOCAL)
@@ -151,7 +151,7 @@ def _impulse_deflection(struck: Struck, body: Known, integrals: Bending) -> floa
 def _curved(struck: Struck, body: Known, integrals: Bending) -> Assumption:
     """A blow without stretching on a body whose plane answers: it is struck again with that of its lowest modes.
 
-    The lowest of a free shell hardly stretch it: sixteen of them tell 2 000 times too little on a cymbal.
+    The lowest of a free shell hardly stretch it: sixteen of them give 2 000 times too little on a cymbal.
     """
     assert body.thickness is not None
     if body.modes.n_modes == body.modes.n_rigid:
@@ -262,11 +262,11 @@ def _stretched(struck: Struck, body: Known, integrals: Bending) -> Assumption:
     fewer = history.stretched.part(len(forms) // 2, n)
     effect = struck.changes(stretched=fewer)
     if "sound" in effect:
-        effect["sound"] = _fewer_heard(struck, body, integrals, (history.stretched, fewer), states[TIMES:])
+        effect["sound"] = _ringing_shift(struck, body, integrals, (history.stretched, fewer), states[TIMES:])
     return STRETCHED.judged(struck, value, effect, remedy)
 
 
-def _fewer_heard(
+def _ringing_shift(
     struck: Struck, body: Known, integrals: Bending, both: tuple[Stretched, Stretched], states: np.ndarray
 ) -> float:
     """Relative shift [-] of the frequencies that ring in states (n_times, n_all) by another stretching."""

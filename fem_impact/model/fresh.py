@@ -76,9 +76,9 @@ def _begun(mark: Path, lacking: tuple[Any, ...]) -> "subprocess.Popen[bytes]":
     with mark.open("xb") as file:
         pickle.dump(lacking, file)
     words, environment = child.python("doctor:compile_kernels", str(mark), **{SWITCH: "0", "OMP_NUM_THREADS": "1"})
-    unheard: dict[str, Any] = dict.fromkeys(("stdin", "stdout", "stderr"), subprocess.DEVNULL)
+    silent: dict[str, Any] = dict.fromkeys(("stdin", "stdout", "stderr"), subprocess.DEVNULL)
     try:
-        process = subprocess.Popen(words, env=environment, start_new_session=True, **unheard)
+        process = subprocess.Popen(words, env=environment, start_new_session=True, **silent)
     except OSError:
         mark.unlink()
         raise

@@ -24,7 +24,7 @@ NEAREST = 2.0  # [-] least clearance**2 / (rate contact time); below it, the ech
 
 
 @dataclass(frozen=True)
-class Outside:
+class Estimates:
     """What is known of a target without finite elements, and the errors of simplifying it."""
 
     mass: float  # [kg] of the whole body
@@ -41,7 +41,7 @@ class Outside:
 class Waves:
     """Bending waves of a plate of constant thickness: ``omega = rate(direction) k**2``, rates in m**2/s.
 
-    An orthotropic plate is seen in a plane that is shrunk along the stiff direction and stretched by as much across it.
+    An orthotropic plate is mapped to a plane that is shrunk along the stiff direction and stretched by as much across.
     There both directions are equally stiff, and a round ripple stays nearly round.
     """
 
@@ -95,7 +95,7 @@ class Waves:
 
 @dataclass(frozen=True)
 class Surroundings:
-    """A plate as seen from the strike point."""
+    """Area and edges of a plate around the strike point."""
 
     area: float  # [m**2]
     perimeter: float  # [m]
@@ -104,7 +104,7 @@ class Surroundings:
     sectors: np.ndarray  # (n, 2) twice the area [m**2] and angle [rad] between the point and every piece, with signs
 
     @classmethod
-    def seen(cls, mesh: Mesh, at: np.ndarray, stretch: np.ndarray | None = None) -> "Surroundings | None":
+    def of(cls, mesh: Mesh, at: np.ndarray, stretch: np.ndarray | None = None) -> "Surroundings | None":
         """The view from a point (2,) [m]; None if the point is not clearly on the body.
 
         ``stretch`` (2, 2) maps the plate to the plane of `Waves`; it keeps areas.
@@ -134,7 +134,7 @@ class Surroundings:
     def local(self, reach: float, free: np.ndarray) -> tuple[float, float]:
         """Factor [-] of the mobility by edges within a squared ``reach`` [m**2], and the squared distance of others.
 
-        ``free`` (n_facets,) tells which edges are. The waves have the mass that they meet to move, which is half at a
+        ``free`` (n_facets,) marks those that are. The waves have the mass that they meet to move, which is half at a
         free edge and a quarter at a corner. A power of 1.2 makes this the 2.3 of a free edge: Cremer, Heckl and
         Petersson, section 5.3.
         """
@@ -245,7 +245,7 @@ def endless_error(
     return 1.2 * view.mirrors(nearness) * ratio / nearness**2
 
 
-def from_outside(target: Target, at: Any, mass: float, duration: float) -> Outside | None:
+def estimate(target: Target, at: Any, mass: float, duration: float) -> Estimates | None:
     """What is known of a target struck at a point on it without finite elements; None if that is not enough.
 
     Mass and duration as in `rigid_error`.
@@ -269,13 +269,13 @@ def from_outside(target: Target, at: Any, mass: float, duration: float) -> Outsi
                 modes = target.finished(find(max_frequency=limit / stretch))
         rigid = rigid_error(modes, at, mass, duration)
         if modes.dimension == 1:
-            return Outside(modes.mass, rigid, np.inf, np.inf, notes=notes)
+            return Estimates(modes.mass, rigid, np.inf, np.inf, notes=notes)
     attached = target.point_masses or target.point_supports
     if not isinstance(section, Plate) or callable(section.thickness) or not section.uniform or attached:
         return None
     kinds = support_of_facets(mesh, dict(target.supports))
     free = np.array([kind not in ("clamped", "hinged") for kind in kinds])
-    view = Surroundings.seen(mesh, at)
+    view = Surroundings.of(mesh, at)
     if view is None:
         return None
     waves = Waves.of(section.material, section.thickness)
@@ -285,11 +285,11 @@ def from_outside(target: Target, at: Any, mass: float, duration: float) -> Outsi
         low = waves.least if first_frequency is None else slowest_rate(view, first_frequency)
         rigid = rigid_bound(view, whole, low, bool(free.any()), mass, duration)
         if first_frequency is not None or section.tension:
-            return Outside(whole, rigid, np.inf, np.inf, notes=notes)
+            return Estimates(whole, rigid, np.inf, np.inf, notes=notes)
     mobility = waves.mobility(stretch * whole / view.area)
-    round_view = Surroundings.seen(mesh, at, waves.stretch)
+    round_view = Surroundings.of(mesh, at, waves.stretch)
     assert round_view is not None
     far = endless_error(round_view, mobility, stretch * waves.fastest, mass, duration, slowest=stretch * waves.slowest)
     echo = round_view.clearance**2 / (stretch * waves.fastest)
-    factor, distance = round_view.local(NEAREST * stretch * waves.fastest * duration, free)
-    return Outside(whole, rigid, far, mobility, echo, (factor * mobility, distance / (stretch * waves.fastest)), notes)
+    factor, away = round_view.local(NEAREST * stretch * waves.fastest * duration, free)
+    return Estimates(whole, rigid, far, mobility, echo, (factor * mobility, away / (stretch * waves.fastest)), notes)

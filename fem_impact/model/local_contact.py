@@ -111,7 +111,7 @@ def examine_size(struck: Struck) -> Assumption:
         ratios[EDGE] = a / away
     history, integrals = hit.history, struck.bending
     changed, wave = softer(history, compliance), None
-    if struck.foreseen:
+    if struck.planned:
         wave = wavenumber(body, integrals, struck.omega)
     elif integrals is not None and struck.target_energy.any():
         x = np.maximum(integrals.wave * a, 1e-3)  # Hertz's pressure is smooth: it hardly drives shorter waves

@@ -17,7 +17,7 @@ which a sum over frequencies in a geometric sequence gives up to a ripple of ``2
 a sequence from a frequency upwards absorbs what enters it. The real part of its mobility rises from zero to ``Y`` near
 that frequency, and the modes of the plate keep the rest of their squared shapes, one minus that part over ``Y``. Causal
 responses with the same real part are the same: until the first echo, both together are the infinite plate exactly, and
-of every echo only that fraction is lost. A blow with half the frequency (`Modes.poorer`) tells what this costs.
+of every echo only that fraction is lost. A blow with half the frequency (`Modes.poorer`) shows what this costs.
 
 References
 ----------
@@ -75,7 +75,7 @@ def kept_share(omega: np.ndarray, mobility: float, above: np.ndarray, shape: np.
 
 
 def mixed(modes: Modes, at: Any, mobility: float, frequency: float, highest: float) -> Modes:
-    """A plate by its modes below a frequency [Hz] and as an infinite one above it, as seen from a point (2,) [m].
+    """A plate by its modes below a frequency [Hz] and as an infinite one above it, as struck at a point (2,) [m].
 
     ``modes`` are all up to `REACH` times the frequency, ``mobility`` [m/(N s)] is that of the infinite plate, which
     acts as a spring above a ``highest`` frequency [Hz]; echoes are left out above the first one. `Modes.poorer` holds

@@ -88,10 +88,10 @@ class Plan(Forecast, check.Brief):
         target = replace(blow.target, stretching=asked.values["stretching"])
         striker = collision.shortened(blow.striker, self.n_striker_modes)
         modes = target.modes if self.first is None else self.first
-        body = asked.from_outside("infinite", self.mass) if modes is None else target.finished(modes)
+        body = asked.simplified("infinite", self.mass) if modes is None else target.finished(modes)
         assert body is not None
         how = {"speed": asked.values["speed"], "quantity": asked.quantities, "rings": self.description.rings}
-        return audit.foresee(target, body, striker, blow.contact, asked.values["at"], **how)
+        return audit.examine_plan(target, body, striker, blow.contact, asked.values["at"], **how)
 
     def but(self, **changes: Any) -> "Plan":
         """The plan with some pieces or arguments overridden, and new predictions.
@@ -232,7 +232,7 @@ def carry_out(plan: Plan, stages: Stages, keep: Any = None) -> Run:
     with _noted(plan.description.asked):
         run = strike_as_planned(plan, stages, keep)
     chooses = plan.changes.get("model", plan.blow.target.model) == "auto"
-    told: tuple[str, ...] = ()
+    added: tuple[str, ...] = ()
     while chooses and (better := audit.required(plan.blow.target, run.response)) is not None:
         target, why = better
         before = sum(stages.seconds.values())
@@ -241,9 +241,9 @@ def carry_out(plan: Plan, stages: Stages, keep: Any = None) -> Run:
             progress.revise(plan.seconds)
             again = strike_as_planned(plan, stages, None)
         except (check.SimulationError, ValueError, MemoryError) as error:
-            return replace(run, notes=(*told, *run.notes, f"{why}; that was not computed: {error}"))
-        told, run = (*told, f"{why}; that took {sum(stages.seconds.values()) - before:.1g} s more"), again
-    return replace(run, notes=(*told, *run.notes))
+            return replace(run, notes=(*added, *run.notes, f"{why}; that was not computed: {error}"))
+        added, run = (*added, f"{why}; that took {sum(stages.seconds.values()) - before:.1g} s more"), again
+    return replace(run, notes=(*added, *run.notes))
 
 
 def strike_as_planned(plan: Plan, stages: Stages, keep: Any = None) -> Run:
@@ -254,22 +254,22 @@ def strike_as_planned(plan: Plan, stages: Stages, keep: Any = None) -> Run:
     if plan.memory > (here := cost.installed()):
         advice = "take a larger tolerance or a softer contact"
         if plan.blow.target.thick:
-            advice += ", or the thin theory, which tells what shear changes of the blow (`thin target`)"
+            advice += ", or the thin theory, which estimates what shear changes of the blow (`thin target`)"
         raise check.SimulationError(
             f"{plan.blow.name}this blow needs about {plan.memory / 1e9:.2g} GB of memory for {plan.n_modes} modes or "
             f"vectors of {plan.n_dofs} unknowns, more than the {here / 1e9:.2g} GB of this machine; {advice}"
         )
     last, response, run = refine(plan.description, _strike, stages, keep)
     response = last.completed(meet_tolerance(plan.tolerance, response, run, last.asked.values), stages, keep)
-    told = last.forecast
+    forecast = last.forecast
     if response.ringing is not None:
-        told = replace(told, max_frequency=float(response.target.frequencies[-1]))
-    plan = _planned(replace(last, forecast=told, seen=None))
+        forecast = replace(forecast, max_frequency=float(response.target.frequencies[-1]))
+    plan = _planned(replace(last, forecast=forecast, ritz=None))
     return Run(response, MappingProxyType(stages.seconds), plan, plausible.together(plan.notes, response.notes))
 
 
 def _strike(found: Description, modes: Modes, stages: Stages) -> tuple[Response, Callable[..., Response]]:
-    """A blow with the time steps foretold, or coarser ones if that takes too many, and how to repeat it."""
+    """A blow with the predicted time steps, or coarser ones if that takes too many, and how to repeat it."""
     asked, blow = found.asked, found.asked.blow
     striker = collision.shortened(blow.striker, asked.striker_modes(found.margin)[0])
     run = partial(collision.strike, modes, striker, blow.contact)

@@ -101,7 +101,7 @@ class Strokes(Totals, check.Locked):
         return np.einsum("hf,hf->f", turns, np.array([hit.spectrum(asked) for hit in self.hits]))
 
     def parts(self, times: np.ndarray) -> list[tuple[Response, slice, np.ndarray]]:
-        """The blow that tells the motion at each of ascending times: it, its times, and these from its start."""
+        """The blow that determines the motion at each of ascending times: it, its times, and these from its start."""
         edges = np.append(np.searchsorted(times, self.starts[1:]), len(times))
         first, found = 0, []
         for start, hit, last in zip(self.starts, self.hits, edges.tolist()):
@@ -215,11 +215,11 @@ class Strokes(Totals, check.Locked):
         ]
         if self.n_impacts > LISTED:
             lines.append(f"  ... and {self.n_impacts - LISTED} more")
-        told = ", ".join(f"{name} {value:.4g} J" for name, value in self.energies.items())
+        energies = ", ".join(f"{name} {value:.4g} J" for name, value in self.energies.items())
         lines += [
             f"contact time {self.contact_time * 1e3:.5g} ms, peak force {self.peak_force:.5g} N, impulse "
             f"{self.impulse:.5g} N s",
-            f"energy {told}",
+            f"energy {energies}",
             f"after the last blow: {self.hits[-1].outcome}",
         ]
         return "\n".join([*lines, *noted(self.notes)])

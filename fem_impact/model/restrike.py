@@ -36,7 +36,7 @@ class Struck:
     place: np.ndarray | None = None  # (1, dimension) [m] strike point on the target, before the blow
 
     @property
-    def foreseen(self) -> bool:
+    def planned(self) -> bool:
         """Whether the blow is yet to come: nothing is struck again."""
         return self.place is not None
 
@@ -99,7 +99,7 @@ class Struck:
             name != "stretched" and np.allclose(columns(x), columns(getattr(system, name)), rtol=SAME, atol=0.0)
             for name, x in end.items()
         )
-        if self.foreseen or (not start and all(same)):
+        if self.planned or (not start and all(same)):
             return dict.fromkeys(self.quantities, 0.0)
         try:
             before = replace(self.before, history=again(h, **start)) if start else self.before
@@ -117,7 +117,7 @@ class Struck:
     def add_sound(
         self, effect: dict[str, float | None], shift: Callable[[Known, Bending], np.ndarray | None]
     ) -> dict[str, float | None]:
-        """The effect with that on the sound: the relative shift of the frequencies heard, weighted by their energy.
+        """The effect with that on the sound: the relative shift of the audible frequencies, weighted by their energy.
 
         ``shift`` returns it, (n_modes,) [-], for a body and the integrals of its shapes; None if it is not known.
         """
@@ -155,7 +155,7 @@ class Doubt:
     ) -> Assumption:
         """The number that decides, what the better model changes, and the remedy; ``more`` as of `Assumption`."""
         if effect.get("sound", 0.0) is None and not more:
-            remedy, more = self.missing or remedy, {"unknown": "the section of the modes that are heard"}
+            remedy, more = self.missing or remedy, {"unknown": "the section of the audible modes"}
         return Assumption(self.name, value, self.limit, effect, struck.quantities, remedy, self.number, **more)
 
     def unknown(

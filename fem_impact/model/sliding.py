@@ -44,7 +44,7 @@ def examine_friction(struck: Struck) -> Assumption:
         if place is None or not place.size or not hit.impulse:
             continue
         columns, p = hit.body_slice(body), np.zeros(0)
-        if not struck.foreseen:
+        if not struck.planned:
             p = history.start_p[columns]
         elif body == 0 and hit.striker is not None:
             p = hit.speed * hit.striker.motion
@@ -60,7 +60,7 @@ def examine_friction(struck: Struck) -> Assumption:
     doubt = SLIDES if worst.slides else STICKS
     if min(each.squares.min() for _, each in found) <= 0.0:
         return doubt.unknown(struck, "whether friction jams the contact", SQUARE, worst.needed)
-    if struck.foreseen:
+    if struck.planned:
         return doubt.judged(struck, worst.needed, {}, SQUARE)
     changed = {name: getattr(history.system, name).copy() for name in ("shape", "q", "p")}
     for columns, each in found:
@@ -100,7 +100,7 @@ def _dragged(
     jams = slowing.min() <= 0.0
     product, square = along * (along + pull @ aside), along**2
     rigid, squares = modes.omega == 0.0, np.ones(len(along))
-    if square[rigid].any():  # of rigid motions only their sum tells, whatever they are split into
+    if square[rigid].any():  # of rigid motions only their sum is defined, whatever they are split into
         squares[rigid] = 0.0 if jams else product[rigid].sum() / square[rigid].sum()
     bends = ~rigid & (square > SAME * square.max(initial=0.0))
     squares[bends] = np.maximum(product[bends] / square[bends], SAME)
@@ -126,6 +126,6 @@ def _parting(slowing: np.ndarray) -> float:
     """
     speeds = 1.0 - 2.0 * np.append(0.0, np.cumsum(slowing)) / STEPS
     held = 2.0 * np.cumsum(speeds[:-1] + speeds[1:]) / STEPS  # in the spring, over the energy on arrival
-    let_go = np.flatnonzero((held <= 0.0) & (speeds[1:] < 0.0))
-    last = int(let_go[0]) if len(let_go) else STEPS - 1
+    released = np.flatnonzero((held <= 0.0) & (speeds[1:] < 0.0))
+    last = int(released[0]) if len(released) else STEPS - 1
     return float(np.sqrt(max(0.0, speeds[last + 1] ** 2 + slowing[last] * held[last])))

@@ -38,7 +38,7 @@ def examine_air(struck: Struck) -> Assumption:
         return CARRIED.holds(struck)
     remedy = IN_AIR if modes.dimension == 2 else "the air around beams is not modelled"
     history, mine, integrals = struck.hit.history, struck.mine, struck.bending
-    if struck.foreseen or struck.ideal:  # the air along the waves of the contact's own frequency
+    if struck.planned or struck.ideal:  # the air along the waves of the contact's own frequency
         wave = None if body is None else wavenumber(body, integrals, struck.omega)
         if body is None or wave is None:
             return CARRIED.unknown(struck, "the waves of the body")

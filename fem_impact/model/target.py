@@ -68,7 +68,7 @@ def _nobody(*_: Any) -> AbstractContextManager[Any]:
 
 
 class Stages:
-    """Wall time of each stage; ``watch`` may display the stages, and the log of the package tells them."""
+    """Wall time of each stage; ``watch`` may display the stages, and the log of the package reports them."""
 
     def __init__(self, watch: Watch | None = None) -> None:
         self.watch: Watch = watch or (lambda name: nullcontext())

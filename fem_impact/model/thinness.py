@@ -53,14 +53,14 @@ def examine_target(struck: Struck) -> Assumption:
     if modes.dimension == 0 or modes.thick:
         return TARGET.holds(struck)
     if body is None or body.thickness is None:
-        if struck.ideal != "rigid" or struck.foreseen:
+        if struck.ideal != "rigid" or struck.planned:
             return TARGET.unknown(struck, "the thickness of the body")
         # what it gives by shear is at most ten times what it gives by bending: it is thinner than half its side
         most = min(1.0, 10.0 * struck.hit.error.idealisation)
         return TARGET.judged(struck, None, dict.fromkeys(struck.quantities, most), NO_SECTION)
     shaped = body.plate is not None and not body.plate.plain  # no thick theory of curved and ribbed plates
     remedy = SLENDER if modes.dimension == 1 else SOFTER if shaped else THICKER
-    if struck.foreseen:
+    if struck.planned:
         return _judged_by_wave(TARGET, struck, body, struck.bending, remedy)
     if struck.ideal:
         return _simplified(struck, body)
@@ -151,14 +151,14 @@ def examine_striker(struck: Struck) -> Assumption:
     body, integrals = struck.striker, None if struck.striker is None else integrate_shapes(struck.striker)
     columns, omega, shape = hit.body_slice(0), history.omega.copy(), history.shape.copy()
     if body is None or body.thickness is None or integrals is None or integrals.thick is None:
-        if struck.foreseen:
+        if struck.planned:
             return STRIKER.unknown(struck, "the thickness of the striker")
         omega[columns] *= 0.8  # as those of a stout one, a choice
         effect = struck.changes(omega=omega)
         if max(np.inf if x is None else x for x in effect.values()) <= allowed(hit.tolerance):  # at most so much
             return STRIKER.judged(struck, None, effect, NO_SLENDERNESS)
         return STRIKER.unknown(struck, "the thickness of the striker, and the blow depends on its bending modes")
-    if struck.foreseen:
+    if struck.planned:
         return _judged_by_wave(STRIKER, struck, body, integrals, SLENDER)
     omega[columns] *= lowered(integrals.thick)
     shape[:, columns] = integrals.heavier(shape[:, columns])
@@ -175,7 +175,7 @@ def examine_shallowness(struck: Struck) -> Assumption:
         return SHALLOW.holds(struck)
     curved = system.section.rise is not None
     value, remedy = (shallow.steepest(system), FLATTER) if curved else (None, FLAT)
-    if struck.foreseen:
+    if struck.planned:
         return SHALLOW.judged(struck, value, {}, remedy)
     n_rigid, n = modes.n_rigid, min(LOW, modes.n_modes - modes.n_rigid)
     vectors = flexible_vectors(shapes, n_rigid, n)

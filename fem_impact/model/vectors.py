@@ -1,7 +1,7 @@
 """A struck plate described by Ritz vectors started from the blow itself, on a mesh and in a number that the blow needs.
 
 No mode is found. The tolerance sets the shift of the vectors and the first mesh; blows with fewer vectors and on a
-coarser mesh (`Modes.poorer`) tell what either costs, and `Seen.improved` answers the larger of the two.
+coarser mesh (`Modes.poorer`) show what either costs, and `RitzTarget.improved` reduces the larger of the two.
 """
 
 from collections.abc import Callable
@@ -29,7 +29,7 @@ FEWEST = 30
 # a blow on a hinged plate then errs by 2 % of it, whatever its other elements; test_vectors.py
 DIP = 60.0
 MET = 0.9  # [-] of the allowed error, up to which an estimate suffices: some are a tenth too small (effectivity.py)
-# [-] of their number, modes below the shift of many vectors: with 0.5, those that `FEWER` leaves tell errors too large
+# [-] of their number, modes below the shift of many vectors: with 0.5, those that `FEWER` leaves overestimate errors
 SPANNED = 0.35
 MOST_VECTORS = 2000  # [-] to limit the memory: a mesh of 20 000 unknowns takes some 0.3 GB for so many
 
@@ -118,10 +118,10 @@ def hopeless(tried: list[float], patience: int = 3) -> bool:
 
 
 def folded(found: Modes, cutoff: Callable[[Modes, float], float], margin: float) -> Modes:
-    """The Ritz pairs up to ``cutoff``, as in `Seen.needed_modes`; those above act as a spring.
+    """The Ritz pairs up to ``cutoff``, as in `RitzTarget.needed_modes`; those above act as a spring.
 
     The poorer descriptions keep more pairs, whose spring errs 16 times less, so that the difference of their blows is
-    the error of the poorer one and tells what the spring costs, too.
+    the error of the poorer one and includes what the spring costs.
     """
     low, high = (cutoff(found, factor * margin) * (1.0 + 1e-9) for factor in (1.0, 16.0))
 
@@ -133,8 +133,8 @@ def folded(found: Modes, cutoff: Callable[[Modes, float], float], margin: float)
     return up_to(low, found)
 
 
-class Seen:
-    """A target as a blow at a point sees it, or blows at several, whose contact has a resonance [Hz] on a rigid wall.
+class RitzTarget:
+    """A target by Ritz vectors for a blow at a point, or at several; on a rigid wall the contact has a resonance [Hz].
 
     The resonance and the tolerance decide on shift and first number of vectors, unless these are given. Every mesh is
     factorised once for all its points, and the vectors of each point then cost one solution each.
@@ -150,7 +150,7 @@ class Seen:
     ) -> None:  # fmt: skip
         self.target, self.at, self.stages = target, np.atleast_2d(at), stages  # (n_points, 2) [m]
         self.fixed = fixed  # whether the user insists on the size of the elements
-        # [rad/s] before scaling, see `Krylov`; half or twice this shift tells blows as well
+        # [rad/s] before scaling, see `Krylov`; half or twice this shift describes blows as well
         self.shift = (shift or 2.0 * np.pi * resonance * _strict(6.0, 1.0 / 6.0, tolerance)) / target.stretch
         self.count = count or first_count(target, resonance, tolerance)  # of vectors
         # [-] over the cutoff, up to which Ritz pairs are kept: what acts as a spring errs in every blow

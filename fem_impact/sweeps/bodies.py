@@ -23,7 +23,7 @@ from ..model.budget import FINEST, Budget
 from ..model.by_modes import MOST_MODES
 from ..model.planner import Blow
 from ..model.target import CLOSE, FIRST_FLEXIBLE, FIRST_LOOK, Elements, Stages, Target
-from ..model.vectors import Seen
+from ..model.vectors import RitzTarget
 from ..modes.modal import Modes, damping_ratios
 from ..modes.shapes import FieldShapes, SampledShapes
 from .batches import allowed
@@ -191,7 +191,7 @@ class Sized:
     tolerance: float  # [-]
     max_impacts: int | None = None  # what follows does not matter
     blows: Sequence[Mapping[str, float]] = ()  # values of the axes of those that are struck
-    reduced: Seen | None = None
+    reduced: RitzTarget | None = None
     tried: dict[tuple[int, int], list[float]] = field(default_factory=dict)  # truncation errors of each point and blow
 
     def at(self, modes: Modes, point: np.ndarray, values: Mapping[str, float]) -> Case:
@@ -216,7 +216,7 @@ class Sized:
         for start in range(0, len(points), 8):
             some = points[start : start + 8]
             elements, fixed = Elements(size), self.target.size_stated
-            reduced = Seen(self.target, some, max(resonance), self.tolerance, elements, fixed, stages)
+            reduced = RitzTarget(self.target, some, max(resonance), self.tolerance, elements, fixed, stages)
             if reduced.at_rest:
                 return None
             one = replace(self, reduced=reduced, tried={})

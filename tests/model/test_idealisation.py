@@ -62,12 +62,12 @@ def plate(ratio, rate, shape):
 def test_error_of_an_endless_plate_is_bounded_and_not_by_far(shape, at, rate, ratio, law):
     modes, body, mobility = plate(ratio, rate, shape)
     true = error_of_endless(modes, mobility, at, law)
-    stated = idealisation.endless_error(Surroundings.seen(body, np.array(at)), mobility, rate, MASS, DURATION)
+    stated = idealisation.endless_error(Surroundings.of(body, np.array(at)), mobility, rate, MASS, DURATION)
     assert true <= stated <= 60.0 * true + 1e-5  # 1.4 to 60 times measured, on 88 random plates; 1e-5 of the reference
 
 
 def test_endless_plate_is_refused_where_an_echo_or_a_second_blow_may_come():
-    view = Surroundings.seen(fi.mesh.rectangle(1.5, 1.0), np.array([0.7, 0.2]))
+    view = Surroundings.of(fi.mesh.rectangle(1.5, 1.0), np.array([0.7, 0.2]))
     assert idealisation.endless_error(view, 1e-6, 40.0, MASS, DURATION) == np.inf  # echo within the contact
     assert idealisation.endless_error(view, 1e-3, 1.0, MASS, DURATION) == np.inf  # the striker hardly comes back
     assert np.isfinite(idealisation.endless_error(view, 1e-6, 1.0, MASS, DURATION))
@@ -93,19 +93,19 @@ def test_bound_without_modes_lies_above_the_error_with_them(shape, first):
         modes, body = fi.analytic.rectangle(*sides, **make), fi.mesh.rectangle(*sides)
     else:
         modes, body = fi.analytic.disk(1.0, edge=shape, **make), fi.mesh.disk(1.0)
-    view = Surroundings.seen(body, at)
+    view = Surroundings.of(body, at)
     slowest = idealisation.slowest_rate(view, first)
     bound = idealisation.rigid_bound(view, 1e5, slowest, shape == "free", MASS, DURATION)
     assert bound >= idealisation.rigid_error(modes, at, MASS, DURATION)
 
 
 def test_surroundings_of_a_point_on_a_disk():
-    view = Surroundings.seen(fi.mesh.disk(2.0), np.array([0.5, 0.0]))
+    view = Surroundings.of(fi.mesh.disk(2.0), np.array([0.5, 0.0]))
     assert_allclose(view.area, 4.0 * np.pi, rtol=1e-4)  # parabolas through the middles of arcs of an eighth of the span
     assert_allclose(view.perimeter, 4.0 * np.pi, rtol=1e-2)  # two chords an arc
     assert_allclose(view.clearance, 1.5, rtol=1e-2)
     assert view.mirrors(4.0) >= 1.0
-    assert Surroundings.seen(fi.mesh.disk(2.0), np.array([2.1, 0.0])) is None
+    assert Surroundings.of(fi.mesh.disk(2.0), np.array([2.1, 0.0])) is None
 
 
 STEEL = fi.Material(E=210e9, nu=0.3, rho=7850.0)
@@ -146,7 +146,7 @@ def test_orthotropic_plate_without_a_direction_is_the_isotropic_one():
 def test_clearance_counts_for_less_along_the_grain():
     wood = fi.Material.orthotropic(E_along=16e9, E_across=1e9, nu=0.0, G=1e9, rho=500.0)
     body, at = fi.mesh.rectangle(2.0, 1.0), np.array([0.9, 0.6])
-    view = Surroundings.seen(body, at, Waves.of(wood, THICKNESS).stretch)
+    view = Surroundings.of(body, at, Waves.of(wood, THICKNESS).stretch)
     root = 16.0**0.125  # the plane is this much shorter along the grain
     assert_allclose(view.clearance, min(0.9 / root, 0.4 * root), rtol=1e-12)
     assert_allclose([view.area, view.perimeter], [2.0, 4.0 / root + 2.0 * root], rtol=1e-12)
@@ -158,7 +158,7 @@ def grained(material, at, ratio, nearness, law):
     Its rigidity and mass are such that it damps the contact by a ratio and its edges are as near as stated.
     """
     waves, at = Waves.of(material, THICKNESS), np.asarray(at)
-    view = Surroundings.seen(fi.mesh.rectangle(1.5, 1.0), at, waves.stretch)
+    view = Surroundings.of(fi.mesh.rectangle(1.5, 1.0), at, waves.stretch)
     faster = view.clearance**2 / (nearness * DURATION * (1.0 + ratio)) / waves.fastest
     mobility = 2.0 * ratio * DURATION / (MASS * np.pi)
     per_area = 1.0 / (8.0 * mobility * waves.rate * faster)
@@ -216,15 +216,15 @@ def test_a_spruce_top_counts_as_endless_and_is_struck_as_by_its_modes():
     endless = plan(0.1)
     assert endless.target == "infinite"
     assert_allclose(endless.mobility, Waves.of(SPRUCE, THICKNESS).mobility(SPRUCE.rho * THICKNESS), rtol=1e-12)
-    seen = idealisation.from_outside(Target.of(system), at, mass, duration)
+    estimates = idealisation.estimate(Target.of(system), at, mass, duration)
     true = difference(endless.strike(), plan(2e-3, target="modal").strike())
-    assert true <= seen.endless <= 60.0 * true  # as above
+    assert true <= estimates.endless <= 60.0 * true  # as above
 
 
 def test_what_an_orthotropic_plate_under_tension_answers_is_not_known():
     plate = fi.Plate(SPRUCE, THICKNESS, tension=100.0)
     target = Target(fi.mesh.rectangle(0.4, 0.3), plate, {"boundary": "clamped"})
-    assert idealisation.from_outside(target, (0.2, 0.15), 1e-3, 1e-4).mobility == np.inf
+    assert idealisation.estimate(target, (0.2, 0.15), 1e-3, 1e-4).mobility == np.inf
 
 
 def test_an_oscillator_answers_a_half_sine_at_most_as_stated():

@@ -126,7 +126,7 @@ def test_vectors_do_not_grow_where_a_higher_frequency_must_come_first(truncation
         error=Error(1e-5, truncation, 1e-3, idealisation=0.1), bodies=[SimpleNamespace(n_modes=100)],
         history=SimpleNamespace(steps=np.zeros((10, 1))),
     )  # fmt: skip
-    better = replace(described, seen=seen, compared=True).refined(hit, Stages())
+    better = replace(described, ritz=seen, compared=True).refined(hit, Stages())
     assert seen.count == (800 if more else 400)
     assert better.frequency == described.frequency * (1.0 if more else 2.0)
 

@@ -90,7 +90,7 @@ def test_damping_over_frequency_acts_on_vectors_as_on_modes():
 
 def seen_at_a_point():
     how = np.array([0.2, 0.11]), 200.0, 1e-3, Elements(0.06)
-    return vectors.Seen(Target.of(plate(), None), *how, False, Stages(None))
+    return vectors.RitzTarget(Target.of(plate(), None), *how, False, Stages(None))
 
 
 @pytest.mark.parametrize(("truncation", "mesh", "more", "finer"), [
@@ -331,7 +331,7 @@ def test_each_point_has_the_vectors_that_it_would_have_alone(monkeypatch):
 def test_views_of_a_body_are_as_soft_as_the_body_is_there():
     """Vectors start with the static deflection under the load, so that the compliance is that of the mesh."""
     target = Target.of(plate(near=POINTS))
-    seen = vectors.Seen(target, POINTS, 300.0, 1e-2, Elements(0.03), False, Stages())
+    seen = vectors.RitzTarget(target, POINTS, 300.0, 1e-2, Elements(0.03), False, Stages())
     closed = fi.analytic.closed_form(target.mesh, target.section, {"boundary": "hinged"})(n_modes=20)
     assert not seen.at_rest
     for i, point in enumerate(POINTS):

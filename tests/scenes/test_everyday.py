@@ -49,7 +49,7 @@ def test_scene_loads_and_strikes_its_body_at_the_tolerance_of_all(name):
     if built.target.mesh.dimension == 1:
         assert 0.0 <= at[0] <= built.target.mesh.points.max()
     else:
-        assert Surroundings.seen(built.target.mesh, at) is not None
+        assert Surroundings.of(built.target.mesh, at) is not None
 
 
 STATED = re.compile(r"^stiffness = (\S+) .*E across (\S+) GPa, R = (\S+) mm$", re.MULTILINE)
