@@ -46,10 +46,10 @@ def profiles(found: Found) -> Any:
             axes.plot(profile.values, profile.rise, "o", color=BLUE, ms=3)
             axes.plot(*profile.curve(), color=BLUE, lw=1.2)
             axes.axhline(level, color=VERMILION, ls="--", lw=1.0)
-            if profile.told != "open":
+            if profile.kind != "open":
                 axes.axvspan(*profile.interval(), color=SKY, alpha=0.2, lw=0)
             low, high = profile.values[0], profile.values[-1]
-            if profile.told == "told":  # the interval and 80 % of it on either side
+            if profile.kind == "closed":  # the interval and 80 % of it on either side
                 low, high = profile.interval()
                 wide = (high / low) ** 0.8 if profile.log else 0.8 * (high - low)
                 low, high = (low / wide, high * wide) if profile.log else (low - wide, high + wide)
@@ -59,7 +59,7 @@ def profiles(found: Found) -> Any:
             axes.set_ylim(0.0, 12.0)
             unit = unit_of(name)
             axes.set_title(f"{name}{f' [{unit}]' if unit else ''}")
-            said = {"open": "not determined", "limited": "one limit only"}.get(profile.told)
+            said = {"open": "not determined", "limited": "one limit only"}.get(profile.kind)
             if said:
                 axes.text(0.5, 0.85, said, transform=axes.transAxes, ha="center", color=VERMILION)
         all_axes[0].set_ylabel("rise over noise variance")

@@ -25,7 +25,7 @@ STEPS = 40.0  # [-] steps of a contact: the force is then exact to 1e-5 of its p
 class TappedBody(ReducedBody):
     """A body of a tap: at its contact, with the modal velocities of unit speed, and where its response is measured."""
 
-    seen: np.ndarray = field(kw_only=True)  # (n_points, n_modes) [kg**-0.5] shapes where the response is measured
+    measured: np.ndarray = field(kw_only=True)  # (n_points, n_modes) [kg**-0.5] shapes where the response is measured
     mass: float = field(kw_only=True)  # [kg]
     # (n_points,) [m/N] static deflection of its modes left out there, under a unit force at its contact
     softness: np.ndarray = field(kw_only=True)
@@ -45,7 +45,7 @@ class TappedBody(ReducedBody):
         ratio = 1.0 if first_frequency is None else 2.0 * np.pi * first_frequency / self.omega[flexible][0]
         return replace(
             self, omega=self.omega * ratio, zeta=self.zeta if damping is None else np.where(flexible, damping, 0.0),
-            rows=self.rows * amplitude, p=self.p / amplitude, seen=self.seen * amplitude,
+            rows=self.rows * amplitude, p=self.p / amplitude, measured=self.measured * amplitude,
             rest=self.rest * (amplitude / ratio) ** 2, softness=self.softness * (amplitude / ratio) ** 2,
             mass=self.mass if mass is None else mass,
         )  # fmt: skip
@@ -56,15 +56,15 @@ class TappedBody(ReducedBody):
         u, still = mass**-0.5, np.append(self.q, 0.0)
         return replace(
             self, omega=np.append(self.omega, 2.0 * np.pi * frequency), zeta=np.append(self.zeta, damping),
-            rows=np.append(self.rows, [[u]], axis=1), seen=np.column_stack([self.seen, u * gains]),
+            rows=np.append(self.rows, [[u]], axis=1), measured=np.column_stack([self.measured, u * gains]),
             p=np.append(self.p, 0.0), q=still, bias=still,
         )  # fmt: skip
 
 
-def tapped(part: ReducedBody, seen: np.ndarray, mass: float, softness: np.ndarray | None = None) -> TappedBody:
+def tapped(part: ReducedBody, measured: np.ndarray, mass: float, softness: np.ndarray | float = 0.0) -> TappedBody:
     """A body of a blow as one of a tap."""
     same = {each.name: getattr(part, each.name) for each in fields(part)}
-    return TappedBody(**same, seen=seen, mass=mass, softness=np.zeros(len(seen)) if softness is None else softness)
+    return TappedBody(**same, measured=measured, mass=mass, softness=np.zeros(len(measured)) + softness)
 
 
 def wall(n_points: int = 0) -> TappedBody:
@@ -89,7 +89,7 @@ def of_target(modes: Modes, at: Any, points: Any = None, compliance: float | Non
     place, asked = modes.point("at", at), np.zeros((0, modes.dimension))
     if points is not None:
         asked = modes.points("points", points)
-    rows, seen, rest, softness = modes.shape_at(place), modes.shape_at(asked), None, np.zeros(len(asked))
+    rows, measured, rest, softness = modes.shape_at(place), modes.shape_at(asked), None, np.zeros(len(asked))
     if compliance is not None:
         rest = np.maximum(0.0, compliance - modes.modal_compliance(place)), np.zeros(1)
     elif modes.dimension:
@@ -99,7 +99,7 @@ def of_target(modes: Modes, at: Any, points: Any = None, compliance: float | Non
             softness = left_out_between(modes, place, asked)[:, 0]
         else:  # of many places: a force here deflects there as one there does here, so that one solution serves all
             softness = left_out_between(modes, asked, place)[0]
-    return tapped(reduce_body(modes, ((0, -1.0),), place, rows, rest), seen, modes.mass, softness)
+    return tapped(reduce_body(modes, ((0, -1.0),), place, rows, rest), measured, modes.mass, softness)
 
 
 def follow_blow(system: engine.KernelSystem, speed: float, step: float, horizon: float) -> History:
@@ -118,7 +118,7 @@ def longest_step(system: engine.KernelSystem, contact: Contact, duration: float)
     share = (system.shape[0, flexible] / system.omega[flexible]) ** 2
     whole = share.sum() + (duration**2) * float((system.shape[0, ~flexible] ** 2).sum()) / 10.0
     fast = system.omega[flexible][share > 1e-6 * whole]  # others change the force by as little
-    # six steps per period of the fastest mode that the contact sees: the force errs by 4e-6 of its peak
+    # six steps per period of the fastest mode that moves the contact: the force errs by 4e-6 of its peak
     return min(step, 2.0 * np.pi / (6.0 * fast.max())) if fast.size else step
 
 
@@ -134,16 +134,16 @@ def records(
     times = np.arange(n_fine - first) / (FINE * rig.rate)
     system = joined((striker, target), [contact])
     step = longest_step(system, contact, duration)
-    out = np.zeros((len(speeds), 1 + len(target.seen), n_fine))
+    out = np.zeros((len(speeds), 1 + len(target.measured), n_fine))
     for one, speed in zip(out, speeds):
         history = follow_blow(system, float(speed), step, times[-1])
         until = int(np.searchsorted(times, history.end_time, side="right"))
         pushed = one[0, first:]
         with np.errstate(all="ignore"):  # the rate of the force, not used here, is infinite at the onset of soft laws
             pushed[:until] = history.force_at(times[:until], 0)[0]
-        if len(target.seen):
+        if len(target.measured):
             struck = slice(n_own, n_own + len(target.omega))
-            one[1:, first:] = accelerations(history, struck, target.seen, pushed, times, target.softness).T
+            one[1:, first:] = accelerations(history, struck, target.measured, pushed, times, target.softness).T
         if tip_mass:
             until = len(times) if striker.omega.any() else until
             pushed[:until] = behind_tip(history, slice(n_own), tip_mass, pushed[:until], times[:until])

@@ -23,7 +23,7 @@ from .unknowns import TIME, Setting, Unknown, checked
 
 
 class Starts(NamedTuple):
-    """Where the searches of a fit begin, and who is told."""
+    """Where the searches of a fit begin, and who watches them."""
 
     most: int
     rng: np.random.Generator
@@ -234,9 +234,9 @@ def _fit(
     # of two taps that disagree, either may be wrong
     while robust and len(used) > max(3, (1.0 - solver.MOST_OUTLIERS) * cut.n_taps):
         alone = predictions.predict_left_out(problem, best.x, cut.pick(used))
-        each, told = np.array([(one.error, one.error_of_peak) for one in alone]).T
+        each, of_peak = np.array([(one.error, one.error_of_peak) for one in alone]).T
         # what a tap's own noise, known to about a half, explains is no fault of the others
-        beyond = each * np.sqrt(np.maximum(0.0, 1.0 - (1.5 * noise[used] / told) ** 2))
+        beyond = each * np.sqrt(np.maximum(0.0, 1.0 - (1.5 * noise[used] / of_peak) ** 2))
         worst = int(beyond.argmax())
         others = [i for i in range(len(used)) if i != worst]
         without, begun = problem.among(others, best.x)

@@ -1,4 +1,4 @@
-"""What a fit found, how far the data tell it, and what it predicts."""
+"""What a fit found, how far the data determine it, and what it predicts."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
@@ -28,7 +28,7 @@ Watch = Callable[[int, int], Any]
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Found(check.Brief):
-    """What `fit` found. Values that the data do not tell are in `unidentifiable` and not in `values`."""
+    """What `fit` found. Values that the data do not determine are in `unidentifiable` and not in `values`."""
 
     taps: Taps  # those compared, cut to the window
     used: tuple[int, ...]  # taps that the fit used
@@ -61,7 +61,7 @@ class Found(check.Brief):
 
     @cached_property
     def point(self) -> dict[str, float]:
-        """The best values of all unknowns and speeds, told by the data or not: one of many that fit as well.
+        """The best values of all unknowns and speeds, determined by the data or not: one of many that fit as well.
 
         Of an unknown freed for each tap: the mean by its name, and each tap's by ``"contact.stiffness[0]"``.
         """
@@ -115,26 +115,26 @@ class Found(check.Brief):
 
     @cached_property
     def unidentifiable(self) -> tuple[str, ...]:
-        """The unknowns that the data do not tell."""
-        return tuple(name for name in self.names if self.profiles[name].told == "open")
+        """The unknowns that the data do not determine."""
+        return tuple(name for name in self.names if self.profiles[name].kind == "open")
 
     @cached_property
     def limited(self) -> tuple[str, ...]:
         """The unknowns for which the data set only a lower or an upper limit."""
-        return tuple(name for name in self.names if self.profiles[name].told == "limited")
+        return tuple(name for name in self.names if self.profiles[name].kind == "limited")
 
     @cached_property
     def ridges(self) -> dict[str, dict[str, float]]:
-        """Of every unknown that the data do not tell: how the others go along with it, as exponents."""
+        """Of every unknown that the data do not determine: how the others go along with it, as exponents."""
         return {name: self.profiles[name].ridge for name in self.unidentifiable}
 
     @property
     def values(self) -> dict[str, float]:
-        """The values that the data tell, in SI units; those with a limit only are among them."""
+        """The values that the data determine, in SI units; those with a limit only are among them."""
         hidden = set(self.unidentifiable) | {
             f"{name}[{i}]" for name in self.unidentifiable if name in self.per_tap for i in range(len(self.used))
         }
-        if self.unidentifiable:  # a speed that moves along a ridge is not told either
+        if self.unidentifiable:  # a speed that moves along a ridge is not determined either
             hidden |= {name for ridge in self.ridges.values() for name in ridge if name.startswith("speed")}
         return {name: value for name, value in self.point.items() if name not in hidden}
 
@@ -324,8 +324,8 @@ class Found(check.Brief):
 
     @property
     def verdict(self) -> tuple[str, ...]:
-        """What stands against trusting the values: what the data do not tell, and what the model lacks; else none."""
-        said = [f"The data do not tell {', '.join(self.unidentifiable)}"] if self.unidentifiable else []
+        """What stands against trusting the values: what the data do not determine, what the model lacks; else none."""
+        said = [f"The data do not determine {', '.join(self.unidentifiable)}"] if self.unidentifiable else []
         if self.whiteness < profiles.DOUBTED:
             own = "contact.stiffness" in self.names and not self.per_tap and len(self.used) > 1
             lacks = "something, such as a stiffness for each tap (per_tap)" if own else "something"
@@ -333,7 +333,7 @@ class Found(check.Brief):
         return tuple(said)
 
     def summary(self) -> str:
-        """What was found in a few readable lines; what the data do not tell is said first."""
+        """What was found in a few readable lines; what the data do not determine comes first."""
         lines = [
             f"{len(self.used)} taps explained to {100.0 * self.error:.2g} % rms of their force, with "
             f"{len(self.names)} unknowns besides speed and onset of each"
@@ -382,9 +382,9 @@ class Found(check.Brief):
 def stated(profile: Profile) -> tuple[str, str]:
     """A value and its 90 % interval in words, with no more digits than the interval leaves sure."""
     low, high = profile.interval()
-    if profile.told == "open":
-        return "not told", ""
-    if profile.told == "limited":
+    if profile.kind == "open":
+        return "not determined", ""
+    if profile.kind == "limited":
         return (f"at least {low:.2g}" if profile.open[1] else f"at most {high:.2g}"), ""
     size = max(abs(low), abs(high))
     digits = int(np.clip(1 + np.ceil(-np.log10(max((high - low) / (2.0 * size), SAME))), 1, 6)) if size else 1
@@ -393,7 +393,7 @@ def stated(profile: Profile) -> tuple[str, str]:
 
 
 def along(ridge: Mapping[str, float]) -> str:
-    """How other values go along with one that the data do not tell, from their exponents, in words."""
+    """How other values go along with one that the data do not determine, from their exponents, in words."""
     said = []
     for name, power in ridge.items():
         way = "grows" if power > 0.0 else "falls"

@@ -68,11 +68,11 @@ def predicted(problem: Problem, best: Solution, tap: Taps, rise_only: bool = Fal
         fixed={name: value for name, value in values.items() if name not in names},
     )  # fmt: skip
     until = int(tap.force[0].argmax()) + 1 if rise_only else None
-    seen = replace(single, data=replace(single.data, values=single.data.values[..., :until]))
+    compared = replace(single, data=replace(single.data, values=single.data.values[..., :until]))
     own = [float(each.inside(values[each.name])) for each in free]
     momentum = np.log(HALF_LOST * tap.impulse[0])
-    x = seen.aligned(np.array([*own, momentum, tap.onset[0] * tap.rate - data.lead - 1.0]))
-    x = solver.solve(seen, x, solver.QUICK).x
+    x = compared.aligned(np.array([*own, momentum, tap.onset[0] * tap.rate - data.lead - 1.0]))
+    x = solver.solve(compared, x, solver.QUICK).x
     made = single.sampled(single.spectra(x), single.onsets(x))[0, 0] * data.scale[0, 0]
     onset = (data.lead + float(single.onsets(x)[0])) / tap.rate
     found = single.values(x)

@@ -1,5 +1,5 @@
-"""How well the data tell a value: profiles of the likelihood over it, with all others readjusted, and its scatter over
-taps that have values of their own."""
+"""How well the data determine a value: profiles of the likelihood over it, with all others readjusted, and its scatter
+over taps that have values of their own."""
 
 from collections.abc import Mapping
 from contextlib import suppress
@@ -73,15 +73,15 @@ class Profile(check.Brief):
         return (np.exp(fine) if self.log else fine), found**2
 
     @property
-    def told(self) -> str:
-        """ "told" if both ends are closed, "limited" if one is, "open" if the data do not tell the value."""
+    def kind(self) -> str:
+        """ "closed" if both ends are, "limited" if one is, "open" if the data do not determine the value."""
         if all(self.open):
             return "open"
         if not any(self.open):
-            return "told"
+            return "closed"
         low, high = self._coordinate(np.array(self.interval()))
         whole = self._coordinate(self.high) - self._coordinate(self.low)
-        return "open" if high - low > 0.5 * whole else "limited"  # a choice: wider ones tell nothing
+        return "open" if high - low > 0.5 * whole else "limited"  # a choice: wider ones limit nothing
 
     @property
     def ridge(self) -> dict[str, float]:
@@ -165,7 +165,7 @@ class _Climb:
         found: list[Solution] = []
         root, steep, ended, x = 0.0, 0.0, False, self.best.x
         slope, spread = self.tangent
-        # a little short of the target by curvature, as the second step tells the rest; four steps see all of the range
+        # a little short of the target by curvature, as the second step finds the rest; four steps cover the range
         step = min(0.8 * self.target * spread, 0.25 * (high - low))
         for _ in range(HALVINGS):  # most profiles end after two steps
             here = float(x[self.j])

@@ -35,7 +35,7 @@ def taps_of(options: Any, path: Path | None = None) -> Taps:
     return read_taps(path or options.scene, force=force, response=names, rate=options.rate, scale=options.scale)
 
 
-class Heard(NamedTuple):
+class Responses(NamedTuple):
     """Frequency responses, and what they come from."""
 
     found: xr.Dataset
@@ -44,7 +44,7 @@ class Heard(NamedTuple):
     scene: Scene | None = None  # that was measured
 
 
-def frf(options: Any) -> Heard:
+def frf(options: Any) -> Responses:
     """Frequency responses of a file of taps, or of a scene measured at its observation points."""
     scene = None
     if options.scene.suffix.lower() == ".toml":
@@ -57,12 +57,12 @@ def frf(options: Any) -> Heard:
             taps = taps_of(options)
         except ValueError:  # a universal file may hold frequency responses already
             with suppress(ValueError):
-                return Heard(transfer.frf(options.scene))
+                return Responses(transfer.frf(options.scene))
             raise
     found = transfer.frf(
         taps, method=options.method, force_window=options.force_window, response_window=options.response_window
     )
-    return Heard(found, taps.notes, taps, scene)
+    return Responses(found, taps.notes, taps, scene)
 
 
 def peaks(found: xr.Dataset) -> list[dict[str, Any]]:
@@ -140,7 +140,7 @@ def fit(options: Any, watch: Watch | None) -> tuple[Found, Scene | None, Proposa
 def write_scene(path: str | Path, found: Found, scene: Scene | None = None) -> tuple[str, ...]:
     """Write the scene file; the body struck is that of ``scene`` or, for taps on a wall, a plate as heavy as one.
 
-    Returns what could not be kept. The file says in its first lines which values the data did not tell.
+    Returns what could not be kept. The file says in its first lines which values the data did not determine.
     """
     hammer, law = found.striker, found.contact
     notes = []

@@ -70,8 +70,8 @@ def propose(
     only if it predicts the taps left out with less than 0.9 of the error. A larger model whose search ends above the
     smaller one inside it goes on from there, so that it never fits worse.
 
-    The force alone cannot tell a mode of the hammer from one of the structure: a springy head, tried first, may stand
-    for either.
+    The force alone cannot distinguish a mode of the hammer from one of the structure: a springy head, tried first, may
+    stand for either.
 
     Parameters
     ----------
@@ -128,7 +128,7 @@ def propose(
         ("exponent", {"contact.exponent": (1.0, 4.0)}), ("loss", {"contact.loss": (0.0, 20.0)}),
         ("springy head", {"striker.first_frequency": band, "striker.mode_ratio": (1e-4, 10.0)}), (PER_TAP, {}),
         *((f"mode {i}", {f"mode{i}.frequency": band, f"mode{i}.mass": heavy, f"mode{i}.damping": (0.0, 0.5)})
-          for i in (1, 2)),  # a pulse of few samples tells no more
+          for i in (1, 2)),  # a pulse of few samples determines no more
     ]  # fmt: skip
     while True:  # what one addition hid may show after another
         done = {one.name for one in tried}

@@ -76,8 +76,8 @@ class Roving(check.Locked):
     @property
     def best(self) -> np.ndarray:
         """The tip with the best expected coherence, (n_points,); -1 where none works."""
-        told = np.where(self.works, np.nan_to_num(self.coherence), -1.0)
-        return np.where(self.works.any(axis=1), told.argmax(axis=1), -1)
+        expected = np.where(self.works, np.nan_to_num(self.coherence), -1.0)
+        return np.where(self.works.any(axis=1), expected.argmax(axis=1), -1)
 
     @cached_property
     def verdicts(self) -> tuple[str, ...]:
@@ -147,8 +147,8 @@ class Roving(check.Locked):
         for verdict in (DOUBLE, NO_BAND, UNKNOWN):
             where = [place for place, each in zip(self.points, self.verdicts) if each == verdict]
             if where:
-                told = ", ".join(f"({', '.join(f'{x:.3g}' for x in place)})" for place in where[:8])
-                lines.append(f"  {verdict} with every tip: {len(where)} points, at {told} m"[:400])
+                listed = ", ".join(f"({', '.join(f'{x:.3g}' for x in place)})" for place in where[:8])
+                lines.append(f"  {verdict} with every tip: {len(where)} points, at {listed} m"[:400])
         sharp = "" if self.lines is None else f", {self.lines:.2g} lines in the half-power width of the sharpest mode"
         lines.append(f"records of {self.duration:.3g} s resolve {self.resolution:.3g} Hz{sharp}")
         return "\n".join([*lines, *noted(self.notes)])
@@ -238,7 +238,7 @@ def planned(
         )
     pairs, alike = np.unique(np.column_stack([masses, stiffnesses]), axis=0, return_inverse=True)
     blows = [{"mass": float(mass), "stiffness": float(tip)} for mass, tip in pairs]
-    seen, _ = bodies.of_hammers(target, places, blows, blows[:2], chooser.TOLERANCE, chooser.MOST_MODES, Stages())
+    views, _ = bodies.of_hammers(target, places, blows, blows[:2], chooser.TOLERANCE, chooser.MOST_MODES, Stages())
     if duration is None:  # lines at most 10 Hz apart, to part modes
         duration = sampling.ringing(modes, inside_band(modes, bandwidth), (0.1, triggers.LONGEST))
     n_times = round(check.positive("duration", duration, "s") * RATE * bandwidth)
@@ -249,7 +249,7 @@ def planned(
     lines = np.fft.rfftfreq(n_times, 1.0 / (RATE * bandwidth))[1:]  # [Hz] of a record, without 0 Hz
     shape = len(places), len(masses)
     counts, reach, coherence, at_modes, peaks = np.zeros(shape, int), *(np.full(shape, np.nan) for _ in range(4))
-    for i, (place, body) in enumerate(zip(places, seen)):
+    for i, (place, body) in enumerate(zip(places, views)):
         progress.report("points", i, len(places))
         answer = None
         for j, (mass, tip) in enumerate(pairs):
@@ -263,8 +263,8 @@ def planned(
             if reach[i, same[0]] >= bandwidth:
                 if answer is None:  # acceleration at the sensor per force here, (n_lines,) complex [1/kg]
                     answer = spectra.mobility(modes, place, at_sensor, lines, "accelerance")
-                told = _coherence(hit, answer, lines, n_times, noise, modes, bandwidth)
-                coherence[i, same], at_modes[i, same] = np.array(told)[:, None]
+                expected = _coherence(hit, answer, lines, n_times, noise, modes, bandwidth)
+                coherence[i, same], at_modes[i, same] = np.array(expected)[:, None]
     progress.report("points", len(places), len(places))
     return Roving(
         modes, places, at_sensor, bandwidth, drop, names, tips, masses, stiffnesses, counts, reach, coherence, at_modes,
@@ -286,14 +286,14 @@ def _modes(target: Target, bandwidth: float) -> Modes:
     return target.surrounded(found)
 
 
-def _kit(told: Any, centre: float) -> tuple[tuple[str, ...], tuple[str, ...], np.ndarray, np.ndarray]:
+def _kit(hammers: Any, centre: float) -> tuple[tuple[str, ...], tuple[str, ...], np.ndarray, np.ndarray]:
     """Hammer, tip, mass [kg] and stiffness [N/m] of every blow at a point.
 
     ``centre`` is the contact resonance [Hz] whose half sine has the bandwidth.
     """
     rows: list[tuple[str, str, float, float]] = []
-    if isinstance(told, Mapping):
-        for name, entry in told.items():
+    if isinstance(hammers, Mapping):
+        for name, entry in hammers.items():
             if not isinstance(entry, Sequence) or len(entry) != 2 or not isinstance(entry[1], Mapping) or not entry[1]:
                 raise ValueError(
                     f"hammers[{check.shown(name)}] must be (mass in kg, tips as name -> stiffness in N/m), got "
@@ -304,7 +304,7 @@ def _kit(told: Any, centre: float) -> tuple[tuple[str, ...], tuple[str, ...], np
                 where = f"stiffness of tip {check.shown(tip)} of hammers[{check.shown(name)}]"
                 rows.append((str(name), str(tip), mass, check.positive(where, stiffness, "N/m")))
     else:
-        for mass in check.array("hammers", told, (None,), "kg", lift=True):
+        for mass in check.array("hammers", hammers, (None,), "kg", lift=True):
             mass = check.between("hammers", mass, *chooser.MASSES, "kg")
             for stiffness in TIPS * accuracy.resonant_stiffness(mass, centre):
                 rows.append((f"{1e3 * mass:.4g} g", f"{stiffness:.3g} N/m", mass, float(stiffness)))

@@ -303,7 +303,7 @@ def promised(problem: Problem, found: Solution) -> float:
 def pseudo_inverse(jacobian: np.ndarray) -> np.ndarray:
     """What moves the residuals by one, (n_coordinates, n_residuals), apart from ridges, whose ways move nothing."""
     columns = np.maximum(np.linalg.norm(jacobian, axis=0), np.finfo(float).tiny)
-    # differences of steps cannot tell flatter directions from ridges
+    # differences of steps cannot distinguish flatter directions from ridges
     return np.linalg.pinv(jacobian / columns, rcond=3e-5) / columns[:, None]
 
 

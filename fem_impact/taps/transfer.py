@@ -36,7 +36,7 @@ def frf(
     """Frequency responses of a structure from taps, averaged, or as a universal file holds them.
 
     Every tap counts by the spectrum of its whole force. A double hit serves as well as a single one: only where its
-    spectrum nearly vanishes it tells little, and there another tap, of another delay, tells more. It costs where the
+    spectrum nearly vanishes it adds little, and there another tap, of another delay, adds more. It costs where the
     noise of the force fills these holes, and where the record ends before what the second pulse excites has died.
 
     Parameters
@@ -150,7 +150,7 @@ def _force_window(taps: Taps, length: float) -> np.ndarray:
     for row, onset, pulses in zip(found, taps.onset, taps.pulses):
         for start in (onset, *(first / taps.rate for first, _ in pulses if first > onset * taps.rate)):
             x = (taps.time - start) / length
-            fall = np.clip((x - 0.75) / 0.25, 0.0, 1.0)  # its last quarter falls as a cosine, so that no edge is heard
+            fall = np.clip((x - 0.75) / 0.25, 0.0, 1.0)  # its last quarter falls as a cosine: it ends smoothly
             np.maximum(row, np.where(x < -0.1, 0.0, 0.5 + 0.5 * np.cos(np.pi * fall)), out=row)
     return found
 
@@ -274,7 +274,7 @@ def frequencies(name: str, value: Any) -> np.ndarray:
 def in_order(gap: np.ndarray) -> np.ndarray:
     """Ascending columns that make the sum of gaps (n_rows, n_columns) between ascending numbers smallest.
 
-    Pairs that cross are never nearer than those in order, so that any assignment tells the columns.
+    Pairs that cross are never nearer than those in order, so that any assignment gives the columns.
     """
     return np.sort(linear_sum_assignment(gap)[1])
 

@@ -171,7 +171,7 @@ def cut(
         raise ValueError(f"no tap was found in {name}: its force {reached}; check scale and trigger")
     if len(places) > 10_000:  # they are noise
         raise ValueError(f"{name} has {len(places)} places above {limit:.3g} N; give trigger= and together=")
-    # 20 ms tell the offset, more may reach back to the last tap's ringing
+    # 20 ms determine the offset, more may reach back to the last tap's ringing
     longest = np.inf if length is None else check.positive("length", length, "s")
     wanted = min(0.02, 0.25 * longest) if before is None else check.positive("before", before, "s")
     if wanted >= longest:
@@ -183,7 +183,7 @@ def cut(
     lead = min(round(wanted * rate), least if before is None else 10**9)
     tail = most_whole(rooms[:, 1], needs[:, 1])[0] if length is None else max(1, round(longest * rate) - lead)
     tail = min(tail, round(LONGEST * rate))
-    quiet = lead - max(GUARD, lead // 4)  # samples of each record that tell its offset
+    quiet = lead - max(GUARD, lead // 4)  # samples of each record that determine its offset
     rows, responses, labels, notes, offsets, tops, drift = [], [], [], [], [], [], 0.0
     if without := [str(k + 1) for k in range(len(segments)) if k not in {place[0] for place in places}]:
         notes.append(f"no tap above {limit:.3g} N in record {', '.join(without[:20])}{', ...' * (len(without) > 20)}")

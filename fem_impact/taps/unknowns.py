@@ -22,7 +22,7 @@ from .rig import Rig
 STRIKER = ("mass", "first_frequency", "mode_ratio", "damping", "tip_mass")
 TARGET = ("mass", "first_frequency", "damping", "x", "y")
 MODE = ("frequency", "mass", "damping", "gain")
-MOST_MODES = 6  # [-] of an unknown target: a pulse tells few, and each has several unknowns
+MOST_MODES = 6  # [-] of an unknown target: a pulse determines few, and each has several unknowns
 DAMPING = 0.02  # [-] of unknown modes, unless it is unknown too: takes an eighth of each swing; a choice
 # [-] along each unknown coordinate of the strike point at which the compliance is computed: a quartic between
 PLACES = 5

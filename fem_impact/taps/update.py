@@ -45,7 +45,7 @@ class Updated(check.Brief):
 
     @property
     def uncertain(self) -> tuple[str, ...]:
-        """Constants that the frequencies tell to no better than 10 %."""
+        """Constants that the frequencies determine to no better than 10 %."""
         return tuple(name for name, spread in self.spread.items() if spread > 0.1)
 
     def summary(self) -> str:
@@ -53,8 +53,8 @@ class Updated(check.Brief):
         lines = []
         for name, value in self.values.items():
             spread = self.spread[name]
-            told = " (not told by these frequencies)" if spread > 1.0 else f" (± {100 * spread:.2g} %)"
-            lines.append(f"{name} = {value:.4g}{told}")
+            width = " (not determined by these frequencies)" if spread > 1.0 else f" (± {100 * spread:.2g} %)"
+            lines.append(f"{name} = {value:.4g}{width}")
         left = ", ".join(f"{frequency:.5g} Hz" for frequency in self.unpaired)
         alone = [f"without a mode of the body, left out: {left}"] if left else []
         rows = [
@@ -85,8 +85,8 @@ def update(
         function takes a dict of values and returns the assembled `System` or its `Modes`.
     measured : array_like, (n_modes,) [Hz], Modes, or xarray.Dataset of fi.frf
         Ascending frequencies, or frequency responses whose peaks are picked; `Modes` of a measurement are paired with
-        the computed ones by their shapes too. Up to two that belong to no mode of the body are left out and told, if as
-        many frequencies as unknowns are spare without them and chance hardly meets the others so well.
+        the computed ones by their shapes too. Up to two that belong to no mode of the body are left out and named, if
+        as many frequencies as unknowns are spare without them and chance hardly meets the others so well.
     unknown : mapping of name to (low, high), both positive
     start : mapping of name to value, optional
         By default the middle of each range.
@@ -115,7 +115,7 @@ def update(
     205.0
     >>> ranges = {"material.E": (100e9, 300e9), "section.thickness": (5e-3, 20e-3)}
     >>> found = fi.update("studies/scenes/disk.toml", [2500.0, 5200.0, 8530.0], ranges)
-    >>> found.uncertain  # a thin disk's frequencies tell thickness times the root of the modulus only
+    >>> found.uncertain  # a thin disk's frequencies determine thickness times the root of the modulus only
     ('material.E', 'section.thickness')
     """
     if isinstance(build, (str, Path)):
@@ -157,13 +157,13 @@ def update(
             found, used = again, rest
             break
     spare, sizes = len(used) - n, np.linalg.svd(found.jacobian, compute_uv=False)
-    half = np.full(n, np.inf)  # widths of the 90 % intervals of logarithms: frequencies may not tell them
+    half = np.full(n, np.inf)  # widths of the 90 % intervals of logarithms: frequencies may not limit them
     if spare >= 1 and sizes[-1] > 1e-6 * sizes[0]:
         variance = np.diag(np.linalg.pinv(found.jacobian.T @ found.jacobian)) * found.cost / spare
         half = float(t.ppf(0.95, spare)) * np.sqrt(variance)
     unpaired = tuple(target[np.setdiff1d(every, used)].tolist())
-    told = dict(zip(box.names, half)), search.pairs(found.x, used), search.modes(found.x)
-    return Updated(box.values(found.x), *told, len(search.solved), unpaired)
+    fitted = dict(zip(box.names, half)), search.pairs(found.x, used), search.modes(found.x)
+    return Updated(box.values(found.x), *fitted, len(search.solved), unpaired)
 
 
 @dataclass(eq=False)

@@ -92,7 +92,7 @@ class Folder:
 
     path: Path
     last: dict[str, tuple[int, int]] = field(default_factory=dict)  # size and time of each file at the last look
-    told: dict[str, tuple[int, int]] = field(default_factory=dict)  # the same, when it was handed out
+    handed_out: dict[str, tuple[int, int]] = field(default_factory=dict)  # the same, when it was
 
     def __post_init__(self) -> None:
         if not self.path.is_dir():
@@ -107,12 +107,12 @@ class Folder:
                     stat = path.stat()
                     if path.is_file() and stat.st_size:
                         now[path.name] = stat.st_size, stat.st_mtime_ns
-        settled = [name for name, state in now.items() if state == self.last.get(name) != self.told.get(name)]
+        settled = [name for name, state in now.items() if state == self.last.get(name) != self.handed_out.get(name)]
         self.last = now
-        self.told |= {name: now[name] for name in settled}
+        self.handed_out |= {name: now[name] for name in settled}
         return [self.path / name for name in sorted(settled, key=lambda name: (now[name][1], name))]
 
     @property
     def waiting(self) -> bool:
         """Whether records are there that were not handed out."""
-        return any(self.told.get(name) != state for name, state in self.last.items())
+        return any(self.handed_out.get(name) != state for name, state in self.last.items())

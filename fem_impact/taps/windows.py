@@ -76,7 +76,7 @@ def cut(taps: Taps, window: Any) -> Taps:
             large = max(triggers.PULSE * float(row.max()), triggers.CLEAR * noise)  # a small one is no reason to wait
             later = triggers.pulses(row[begin:], noise, large)
             ends.append(later[-1][1] if later else 1)
-        # 1.5 times the length of the pulses after them, where the body's answer is still heard
+        # 1.5 times the length of the pulses after them, where the body's answer still shows
         last = 2.5 * max(max(ends), BEFORE) / taps.rate
     starts = np.round(taps.onset * taps.rate).astype(int)
     before, after = round(float(first) * taps.rate), round(float(last) * taps.rate)

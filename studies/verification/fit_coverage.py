@@ -1,12 +1,12 @@
-"""Do the intervals of `fi.fit` hold the truth as often as they say, and does it name what the data do not tell?
+"""Do the intervals of `fi.fit` hold the truth as often as they say, and does it name what the data do not determine?
 
     python studies/verification/fit_coverage.py [--sets 0] [--first 0] [--file fit_coverage.csv] [--out DIR]
     python studies/verification/fit_coverage.py --timed 3
 
 Makes that many sets of taps of a random hammer through a random contact law on a wall, a known plate or a structure of
 one unknown mode, measured with 0.5 % of noise at 25.6 or 51.2 kHz (3 to 10 taps), fits each, and appends one line for
-each unknown to the file; a set whose records all end within a pulse is refused, and told. Then prints what all lines of
-the file say and draws fit_coverage.png; without --sets it only does this. What no data can tell is known beforehand:
+each unknown to the file; a set whose records all end within a pulse is refused and named. Then prints what all lines of
+the file say and draws fit_coverage.png; without --sets it only does this. What no data can say is known beforehand:
 from force alone, a hammer's mass, the stiffness and the loss of a tip on a wall go together, and so do the masses of a
 hammer and of an unknown structure.
 
@@ -31,16 +31,16 @@ import shared
 
 NOISE = 0.005  # [-] of the peak
 LEVEL = 0.9  # [-] of the intervals
-WEAK = 0.25  # [-] of its range: an interval by curvature wider than this is not expected to be told
+WEAK = 0.25  # [-] of its range: an interval by curvature wider than this is not expected to be closed
 KINDS = ("wall", "plate", "mode", "mode and hammer")
-HIDDEN = {  # what the force alone cannot tell
+HIDDEN = {  # what the force alone cannot determine
     "wall": ("contact.stiffness", "contact.loss", "striker.mass"),
     "plate": (),
     "mode": (),
     "mode and hammer": ("contact.stiffness", "contact.loss", "striker.mass", "mode1.mass"),
 }
 COLOURS = ("#0072B2", "#E69F00", "#009E73", "#CC79A7")
-COLUMNS = ("set", "kind", "rate", "taps", "name", "truth", "value", "low", "high", "told", "hidden", "weak", "seconds")
+COLUMNS = ("set", "kind", "rate", "taps", "name", "truth", "value", "low", "high", "ends", "hidden", "weak", "seconds")
 
 
 def random_case(rng: np.random.Generator):
@@ -111,7 +111,7 @@ def row(number: int, kind: str, rate: float, n_taps: int, name: str, truth: floa
     profile = found.profiles[name]
     low, high = profile.interval(LEVEL)
     values = (
-        number, kind, rate, n_taps, name, truth, profile.value, low, high, profile.told, name in HIDDEN[kind],
+        number, kind, rate, n_taps, name, truth, profile.value, low, high, profile.kind, name in HIDDEN[kind],
         weak(found, name), round(seconds, 2),
     )  # fmt: skip
     return dict(zip(COLUMNS, values))
@@ -160,13 +160,13 @@ def timed(count: int) -> dict[str, tuple[float, float]]:
             start = time.perf_counter()
             made = fi.fit(taps, profiles=False, **given)
             searched = time.perf_counter() - start
-            told = sum(profile.told == "told" for profile in made.profiles.values())
+            closed = sum(profile.kind == "closed" for profile in made.profiles.values())
             seconds.append((searched, time.perf_counter() - start))
         search, whole = map(min, zip(*seconds))
         found[kind] = search, whole
         print(
-            f"{kind}: five taps, {len(made.names)} unknowns ({told} told): {search:.2g} s, with profiles {whole:.2g} s "
-            f"(one process, best of {count})"
+            f"{kind}: five taps, {len(made.names)} unknowns ({closed} closed): {search:.2g} s, with profiles "
+            f"{whole:.2g} s (one process, best of {count})"
         )
     return found
 
@@ -187,15 +187,15 @@ def share(good: int, count: int) -> str:
 
 
 def judge(rows: list[dict]) -> dict[str, tuple[int, int]]:
-    """How often the intervals hold the truth, what cannot be told is called so, and what can be told is denied."""
-    told = [each for each in rows if not each["hidden"] and each["told"] != "open"]
+    """How often the intervals hold the truth, what cannot be determined is called so, and what can be is denied."""
+    bounded = [each for each in rows if not each["hidden"] and each["ends"] != "open"]
     hidden = [each for each in rows if each["hidden"]]
     plain = [each for each in rows if not each["hidden"] and not each["weak"]]
-    held = sum(each["low"] <= each["truth"] <= each["high"] for each in told)
+    held = sum(each["low"] <= each["truth"] <= each["high"] for each in bounded)
     return {
-        "90 % intervals that hold the truth": (held, len(told)),
-        "unidentifiable, called so": (sum(each["told"] == "open" for each in hidden), len(hidden)),
-        "identifiable, called unidentifiable": (sum(each["told"] == "open" for each in plain), len(plain)),
+        "90 % intervals that hold the truth": (held, len(bounded)),
+        "unidentifiable, called so": (sum(each["ends"] == "open" for each in hidden), len(hidden)),
+        "identifiable, called unidentifiable": (sum(each["ends"] == "open" for each in plain), len(plain)),
     }  # fmt: skip
 
 
@@ -215,12 +215,12 @@ def report(rows: list[dict]) -> str:
 
 
 def draw(rows: list[dict], path: Path) -> None:
-    """Where the truth lies in its interval, for all that is told; and the three shares."""
+    """Where the truth lies in its interval, for all that is determined; and the three shares."""
     figure, (left, right) = plt.subplots(1, 2, figsize=(9.0, 3.8), layout="constrained")
     places = []
     for kind in KINDS:
-        told = [each for each in rows if each["kind"] == kind and each["told"] == "told" and not each["hidden"]]
-        ends = [(each["truth"] - each["low"], each["high"] - each["low"]) for each in told]
+        bounded = [each for each in rows if each["kind"] == kind and each["ends"] == "closed" and not each["hidden"]]
+        ends = [(each["truth"] - each["low"], each["high"] - each["low"]) for each in bounded]
         places.append([above / wide for above, wide in ends if wide > 0.0])
     names = [f"{kind} ({len(where)})" for kind, where in zip(KINDS, places)]
     left.hist(places, bins=np.linspace(-1.0, 2.0, 31), stacked=True, label=names, color=COLOURS)

@@ -26,7 +26,7 @@ def test_a_page_with_values_ridges_pictures_and_double_hits(found, tmp_path):
     page = (tmp_path / "fit.html").read_text()
     assert "A &lt;hammer&gt; &amp; a bar" in page
     assert page.count("data:image/png;base64,") == 3
-    assert "do not tell contact.stiffness" in page and "and the taps are explained as well" in page
+    assert "do not determine contact.stiffness" in page and "and the taps are explained as well" in page
     assert "^-" not in found.summary() and 'class="badge good"' not in page
     assert "tip x 10" in page and not re.search("https?:", page)
 

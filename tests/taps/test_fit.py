@@ -20,7 +20,7 @@ def found(taps):
 def test_on_a_known_structure_everything_is_told(found):
     assert found.unidentifiable == () and found.limited == () and found.data()["unidentifiable"] == []
     said = found.summary()
-    assert "90 % interval" in said and "striker.mass" in said and "do not tell" not in said
+    assert "90 % interval" in said and "striker.mass" in said and "do not determine" not in said
     for name, truth in (("contact.stiffness", 5e8), ("contact.exponent", 1.7), ("striker.mass", MASS)):
         low, high = found.interval(name, 0.95)
         assert low < truth < high  # this seed's noise; `studies/verification/fit_coverage.py` counts how often

@@ -63,8 +63,8 @@ def test_a_best_fit_at_the_end_of_its_range_is_followed_one_way_only():
 
 def test_open_ends_are_the_ends_of_the_range():
     flat = parabola(open_=(True, True), width=100.0)
-    assert flat.interval() == (1.0, 3.0) and flat.told == "open"
-    assert parabola().told == "told" and parabola(open_=(False, True)).told == "limited"
+    assert flat.interval() == (1.0, 3.0) and flat.kind == "open"
+    assert parabola().kind == "closed" and parabola(open_=(False, True)).kind == "limited"
 
 
 def test_white_residuals_are_white_and_coloured_or_ringing_ones_are_not():
@@ -119,9 +119,9 @@ def test_another_unknown_at_its_bound_is_named_where_it_ends_the_profile():
 
 def test_an_interval_open_at_one_end_and_wide_tells_nothing():
     values = np.linspace(1.0, 3.0, 201)
-    for width, told in ((0.7, "open"), (0.3, "limited")):
+    for width, kind in ((0.7, "open"), (0.3, "limited")):
         rise = 100.0 * (values < 1.0 + 2.0 * (1.0 - width))  # closed at this place of the range from 1 to 3
-        assert profiles.Profile("a", 3.0, values, rise, (False, True), ("", ""), {}, 99, 1.0, 3.0, False).told == told
+        assert profiles.Profile("a", 3.0, values, rise, (False, True), ("", ""), {}, 99, 1.0, 3.0, False).kind == kind
 
 
 def test_the_ridge_of_a_flat_profile_is_the_power_of_those_that_move_by_some_per_cent_for_twice_the_value():

@@ -69,7 +69,7 @@ def test_constants_that_only_act_together_are_called_untold():
         return fi.Modes.from_arrays(frequencies, np.ones((1, 3)), points=[[0.0]], mass=1.0, complete=True)
 
     found = fi.update(body, [110.0, 330.0, 770.0], {"E": (0.1, 10.0), "rho": (0.1, 10.0)})
-    assert set(found.uncertain) == {"E", "rho"} and "not told" in found.summary()
+    assert set(found.uncertain) == {"E", "rho"} and "not determined" in found.summary()
     assert found.values["E"] / found.values["rho"] == pytest.approx(1.21, rel=1e-3)
 
 
