@@ -50,11 +50,11 @@ class Goal:
 
     @property
     def scale(self) -> float:
-        """What a miss is told relative to: the wanted value, 1 for a restitution."""
+        """What a miss is relative to: the wanted value, 1 for a restitution."""
         if self.name in ("restitution", "clearance"):
             return 1.0
         if self.name.startswith("spectral_level"):
-            return 20.0 / math.log(10.0)  # dB: a miss of a level is told as that of the force
+            return 20.0 / math.log(10.0)  # dB: a miss of a level counts as that of the force
         return max(abs(end) for end in (self.low, self.high) if math.isfinite(end)) or 1.0
 
     def miss(self, value: float) -> float:
@@ -72,7 +72,7 @@ class Goal:
 
 
 def read_goals(wanted: Any, blows: tuple[str, ...]) -> tuple[Goal, ...]:
-    """All goals from what a user wants; those not told for one blow hold for each. ValueError says what is wrong."""
+    """All goals from what a user wants; those not given for one blow hold for each. ValueError says what is wrong."""
     example = f", as in {EXAMPLE}"
     table = check.table("wanted", wanted, example)
     if not table:

@@ -232,7 +232,7 @@ def design(
         except (SimulationError, ValueError):
             continue
         found = min(found, other, key=search.rank)
-    found = replace(found, n_evaluations=len(search.seen))
+    found = replace(found, n_evaluations=len(search.known))
     if not found.met:
         promise.warn(found.verdict)
     return found
@@ -259,7 +259,7 @@ class _Search:
     least: str | None  # free number to be made small
     sign: float  # -1.0 if it is to be made large
     n_modes: int | None
-    seen: dict[bytes, Any] = field(default_factory=dict)  # point -> _State, or the error that it met
+    known: dict[bytes, Any] = field(default_factory=dict)  # point -> _State, or the error that it met
     slopes: dict[bytes, np.ndarray] = field(default_factory=dict)
     bodies: dict[Any, Modes] = field(default_factory=dict)  # by key of the piece and number of modes
     counts: dict[str, int] = field(default_factory=dict)  # modes of each blow
@@ -267,14 +267,14 @@ class _Search:
     def state(self, x: np.ndarray) -> _State:
         """What a point makes; raises again the error that it met before."""
         key = x.tobytes()
-        if key not in self.seen:
+        if key not in self.known:
             try:
-                self.seen[key] = self._made(self.box.values(x))
+                self.known[key] = self._made(self.box.values(x))
             except (SimulationError, ValueError) as error:
-                self.seen[key] = error
-        if isinstance(self.seen[key], Exception):
-            raise self.seen[key]
-        found: _State = self.seen[key]
+                self.known[key] = error
+        if isinstance(self.known[key], Exception):
+            raise self.known[key]
+        found: _State = self.known[key]
         return found
 
     def _made(self, values: dict[str, float]) -> _State:
@@ -345,7 +345,7 @@ class _Search:
         part = (x - low) / (high - low)
         ends = tuple(each.name for each, p in zip(self.box.unknowns, part) if min(p, 1.0 - p) < SAME)
         return Design(
-            MappingProxyType(state.values), reached, tolerance, ends, len(self.seen), self.maker,
+            MappingProxyType(state.values), reached, tolerance, ends, len(self.known), self.maker,
             MappingProxyType(state.hits),
         )  # fmt: skip
 
@@ -369,7 +369,7 @@ class _Search:
         return self.slope(x) / scale[:, None] / np.array(per_value)
 
     def _least(self, first: np.ndarray, tolerance: float) -> np.ndarray:
-        """Where one number is smallest or largest of all points seen that meet the goals; else where it ends."""
+        """Where one number is smallest or largest of all points tried that meet the goals; else where it ends."""
         which = self.maker.names.index(self.least or "")
         unit = np.eye(len(first))[which]
         low, high = self.box.bounds
@@ -395,7 +395,7 @@ class _Search:
             constraints=constraints, method="SLSQP", options={"maxiter": solver.ENOUGH, "ftol": CLOSE},
         )  # fmt: skip
         last = np.clip(found.x, low, high)
-        points = [np.frombuffer(key) for key, state in self.seen.items() if isinstance(state, _State)]
+        points = [np.frombuffer(key) for key, state in self.known.items() if isinstance(state, _State)]
         met = [x for x in [last, *points] if np.abs(self._misses(x)).max() <= tolerance]
         return min(met, key=lambda x: self.sign * x[which]) if met else first
 
@@ -447,8 +447,8 @@ def _hit_slopes(hit: Response, labels: list[str], values: Mapping[str, float], r
         return np.zeros((len(labels), len(rates)))
     marked = {f"free {name}": each for name, each in sections.items()}  # apart from numbers of the blow
     names = (*numbers, *marked)
-    told = tuple(dict.fromkeys(label for label in labels if label != "clearance"))
-    found = {name: each.slopes for name, each in gradient.gradients(hit, told, names, marked).items()} if told else {}
+    asked = tuple(dict.fromkeys(label for label in labels if label != "clearance"))
+    found = {name: each.slopes for name, each in gradient.gradients(hit, asked, names, marked).items()} if asked else {}
     if "clearance" in labels:
         found["clearance"] = clearance.slopes(hit, names, marked)
     chain = np.zeros((len(names), len(rates)))

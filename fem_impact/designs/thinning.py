@@ -130,7 +130,7 @@ class Blank(check.Brief):
         if cosines.max(axis=1).min() < 0.5 or len(set(which)) < len(which):
             lost = int(cosines.max(axis=1).argmin())
             raise SimulationError(
-                f"mode {self.numbers[lost]} is no longer to be told from others after this removal; take less depth"
+                f"mode {self.numbers[lost]} can no longer be identified after this removal; take less depth"
             )
         return Solved(modes, which)
 
@@ -206,8 +206,8 @@ class Thinning:
         now = self.misses(solved)
         for _ in range(40):  # bodies: those of a bar cut to a third of its height take 25
             tried = _cheapest(cost, slopes * self.depth, now, share, overlaps, room, trust)
-            told = merit(share, now) - merit(tried, now + slopes @ (self.depth * (tried - share)))
-            if told <= 0.01 * max(float(cost @ share), 0.01):  # of what is taken off
+            predicted = merit(share, now) - merit(tried, now + slopes @ (self.depth * (tried - share)))
+            if predicted <= 0.01 * max(float(cost @ share), 0.01):  # of what is taken off
                 break
             try:
                 other = self.after(places, tried, solved)
@@ -218,7 +218,7 @@ class Thinning:
             if gained > 0.0:
                 share, solved, now = tried, other, self.misses(other)
                 slopes, _ = self.miss_slopes(solved, places)
-            trust *= 2.0 if gained > 0.75 * told else 1.0 if gained > 0.25 * told else 0.4
+            trust *= 2.0 if gained > 0.75 * predicted else 1.0 if gained > 0.25 * predicted else 0.4
         return share, solved
 
 

@@ -70,7 +70,7 @@ class Tuning(check.Brief):
     """What `tune` found."""
 
     tones: tuple[Tone, ...]
-    patches: tuple[Patch, ...]  # in the order in which their effects are told
+    patches: tuple[Patch, ...]  # in the order in which their effects are computed
     tolerance: float  # [cents]
     depth: float  # [m] greatest
     radius: float  # [m]
@@ -298,12 +298,12 @@ def given(words: Sequence[str]) -> Any:
 def _finish(body: Blank, search: Thinning, found: Sequence[tuple[np.ndarray, float]]) -> Tuning:
     """The result, with every patch solved after those before it."""
     before = last = search.before
-    told, slopes = [], before.sensitivity
+    patches, slopes = [], before.sensitivity
     for k, (middles, deep) in enumerate(found, 1):
         now = body.after(Dishes.of_places(found[:k], search.radius), last)
         linear = deep * slopes.of_dishes(middles, search.radius)[0].sum(axis=0)
         moved = cents(now.frequencies, last.frequencies)
-        told.append(Patch(middles, search.radius, deep, body.numbers, moved, linear))
+        patches.append(Patch(middles, search.radius, deep, body.numbers, moved, linear))
         last = now
     tones = []
     for pitch in body.pitches:
@@ -313,6 +313,6 @@ def _finish(body: Blank, search: Thinning, found: Sequence[tuple[np.ndarray, flo
         tones.append(Tone(pitch, sides[0][0], sides[1][0], goal, sides[0][1], sides[1][1]))
     volume = (before.system.mass - last.system.mass) / before.system.section.material.rho
     return Tuning(
-        tuple(tones), tuple(told), search.tolerance, search.depth, search.radius, search.mirror,
-        search.n_solved + len(told), float(volume), before, last, body,
+        tuple(tones), tuple(patches), search.tolerance, search.depth, search.radius, search.mirror,
+        search.n_solved + len(patches), float(volume), before, last, body,
     )  # fmt: skip

@@ -54,5 +54,5 @@ def test_pairs_are_refused():
 
 def test_a_removal_after_which_a_mode_is_another_is_refused():
     bar = body_of(fi.assemble(fi.mesh.line(0.35), BAR), {3: None})
-    with pytest.raises(fi.SimulationError, match=r"mode 3 is no longer to be told .*; take less depth"):
+    with pytest.raises(fi.SimulationError, match=r"mode 3 can no longer be identified .*; take less depth"):
         bar.after(Dishes(np.array([[0.03]]), np.array([0.0118]), 0.03), bar.first())
