@@ -197,9 +197,9 @@ def dxf_arrays(path: Path) -> dict[str, np.ndarray]:
     left: set[str] = set()
     kept: list[Any] = []
     for entity in drawing.modelspace():
-        seen = not entity.dxf.get("invisible", 0) and entity.dxf.layer.lower() not in hidden
-        pieces = _dxf_pieces(entity) if seen else []
-        left |= set() if pieces else {entity.dxftype() if seen else f"hidden {entity.dxftype()}"}
+        visible = not entity.dxf.get("invisible", 0) and entity.dxf.layer.lower() not in hidden
+        pieces = _dxf_pieces(entity) if visible else []
+        left |= set() if pieces else {entity.dxftype() if visible else f"hidden {entity.dxftype()}"}
         kept += [entity] if pieces else []
         found += pieces
         _check_number(path.name, found)

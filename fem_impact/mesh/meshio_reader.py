@@ -96,7 +96,7 @@ def deck_labels(path: Path) -> list[str]:
 
     It keeps those of the last block, the last of one number, and neither generates nodes nor turns them.
     """
-    seen: dict[str, None] = {}
+    labels: dict[str, None] = {}
     within = False
     for line in path.read_text("utf-8", "replace").splitlines():
         words = [word.strip().upper() for word in line.lstrip("*").split(",")]
@@ -104,13 +104,13 @@ def deck_labels(path: Path) -> list[str]:
             within = words[0] == "NODE"
             if words[0] in ("NGEN", "NCOPY", "NFILL", "SYSTEM") or (within and {"SYSTEM=C", "SYSTEM=S"} & set(words)):
                 raise ValueError(f"{path.name} has {line.strip()}, which is not read; write all nodes by x, y and z")
-            if within and seen:
+            if within and labels:
                 raise ValueError(f"{path.name} has several blocks of nodes, as of several parts; write all into one")
         elif within and not line.startswith("**") and words[0]:
-            if words[0] in seen:
+            if words[0] in labels:
                 raise ValueError(f"{path.name} has node {words[0]} twice; export it again")
-            seen[words[0]] = None
-    return list(seen)
+            labels[words[0]] = None
+    return list(labels)
 
 
 @contextmanager

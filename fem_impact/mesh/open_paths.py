@@ -1,4 +1,4 @@
-"""Named open paths of a drawing, such as lines of ribs: told from pieces of an outline, and flattened."""
+"""Named open paths of a drawing, such as lines of ribs: separated from pieces of an outline, and flattened."""
 
 import numpy as np
 import shapely

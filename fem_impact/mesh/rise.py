@@ -49,7 +49,7 @@ def _cymbal(points: np.ndarray, radius: float, bow: float, cup_radius: float, cu
 
 @dataclass(frozen=True, eq=False)
 class _Heights:
-    """A smooth surface through points; it is told from others by these alone."""
+    """A smooth surface through points; it differs from others by these alone."""
 
     points: np.ndarray  # (n, 2) [m]
     heights: np.ndarray  # (n,) [m]
