@@ -230,7 +230,7 @@ def _breaks(fields: Callable, nodes: np.ndarray, most: int = 2000) -> np.ndarray
 def _misfit(fields: Callable, low: np.ndarray, high: np.ndarray, span: float) -> np.ndarray:
     """Relative misfit (n,) of stiffness, its inverse and inertia to polynomials of degree SMOOTH, beyond rounding.
 
-    With 4000 looks along the beam, saw cuts wider than pi / 2 / 4000 of it are seen.
+    With 4000 samples along the beam, saw cuts wider than pi / 2 / 4000 of it are found.
     """
     count = 2 * SMOOTH + 1 + int(4000 * (high - low).max() / span)
     node = np.cos(np.pi * np.arange(count) / (count - 1))  # Chebyshev, with both ends

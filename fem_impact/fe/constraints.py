@@ -1,4 +1,4 @@
-"""Attach point masses and point supports to the matrices of a body, apply its supports and tell its rigid motions."""
+"""Attach point masses and point supports to the matrices of a body, apply its supports and find its rigid motions."""
 
 from typing import Any, NamedTuple
 

@@ -139,8 +139,8 @@ def around_corners(mesh: Mesh, kinds: list[str], material: Material) -> tuple[di
     for vertex, before, facet in meetings(mesh, kinds):
         (x, y), (u, v) = mesh.tangents[before, 1], mesh.tangents[facet, 0]
         angle, pair = float(np.pi - np.arctan2(x * v - y * u, x * u + y * v)), (kinds[facet], kinds[before])
-        seen = turned(stiffness, -np.arctan2(v, u)) if material.E_across is not None else stiffness
-        z = exponent(round(angle, 9), pair, tuple(seen.ravel().round(9).tolist()))
+        along_edge = turned(stiffness, -np.arctan2(v, u)) if material.E_across is not None else stiffness
+        z = exponent(round(angle, 9), pair, tuple(along_edge.ravel().round(9).tolist()))
         share = float(length[[before, facet]].max() / extent)
         n = rings(z, pair, share)
         power = 2.0 * (z - 1.0)

@@ -23,7 +23,7 @@ RESIDUAL = 1e-7
 STRICT = 1e-11  # [-] relative residual allowed when the first search missed modes: rounding leaves 1e-12
 FIRST_SLICE = 24  # [-] modes found with shift zero; their eigenvalues span five decades and keep ten digits
 SLICE = 50  # [-] modes found with each further shift: 30 were 10 % slower, 80 were 40 % slower
-# [-] eigenvalues with a smaller relative distance count as equal: far above their errors, below what meshes tell apart
+# [-] eigenvalues with a smaller relative distance count as equal: far above their errors, below what meshes resolve
 CLUSTER = 1e-6
 
 
@@ -185,7 +185,7 @@ def _ritz(flexibility: Flexibility, vectors: np.ndarray) -> tuple[np.ndarray, np
     M = flexibility.M
     gram = vectors.T @ (M @ vectors)
     vectors = solve_triangular(np.linalg.cholesky(gram), vectors.T, lower=True).T
-    # eigh's error scales with the largest eigenvalue; so those of sprung motions, far smaller, are told apart again
+    # eigh's error scales with the largest eigenvalue; so those of sprung motions, far smaller, are separated again
     for some in (slice(None), slice(min(flexibility.sprung.shape[1], vectors.shape[1]))):
         vectors[:, some] = vectors[:, some] @ eigh(flexibility.products(vectors[:, some]))[1]
     # Rayleigh quotients make small eigenvalues accurate too
@@ -199,7 +199,7 @@ def by_slices(flexibility: Flexibility, n: int) -> tuple[np.ndarray, np.ndarray]
     """Do the same as `lowest` for the simple, evenly spaced modes of a beam, a few dozen at a time.
 
     The eigenvalues of a thousand modes span twelve decades, too many for one search. So each slice has its own shift,
-    and the pivots at both ends of a slice tell how many eigenvalues it must contain.
+    and the pivots at both ends of a slice show how many eigenvalues it must contain.
     """
     K, M, n_rigid = flexibility.K, flexibility.M, flexibility.rigid.shape[1]
     values, vectors = lowest(flexibility, min(n, FIRST_SLICE))

@@ -57,7 +57,7 @@ def spread_forces(space: Any, points: np.ndarray, radius: np.ndarray) -> tuple[n
     """Places (n, 2) over which forces at points (n_points, 2) are spread, and their weights (n_points, n).
 
     Each disk, of its ``radius`` (n_points,), is cut at the edge of the body. A weight linear in the place moves its
-    centre back to the point, so that a rigid motion is seen exactly.
+    centre back to the point, so that a rigid motion is followed exactly.
     """
     # points on a disk, radial and around: these err by 3e-5 of a compliance at h/L = 0.2; at many points, as for a
     # picture, fewer do, which err by 1e-6 of a mode of h k = 1

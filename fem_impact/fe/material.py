@@ -61,7 +61,7 @@ class Material:
     angle : float [rad]
         Direction of the grain, anticlockwise from the x axis.
     yield_strength : float [Pa], optional
-        Stress at which it yields in tension; tells whether a contact dents it (`Response.assumptions`).
+        Stress at which it yields in tension; decides whether a contact dents it (`Response.assumptions`).
     G_xz, G_yz : float [Pa], optional
         Shear moduli of an orthotropic material through the thickness, along and across the grain; only thick plates
         and beams use them, and the estimate of what a thin one lacks. By default both are G.

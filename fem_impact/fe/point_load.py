@@ -81,8 +81,8 @@ def _coarse(mesh: Mesh) -> Mesh:
 
 
 def _solved(system: System, mesh: Mesh, loads: np.ndarray) -> Deflection:
-    """Deflections on a mesh; where a second one tells their errors, these are still only those by rounding."""
-    morley = system.element == "morley"  # its moments are constant in each triangle: no error could be told
+    """Deflections on a mesh; where a second one shows their errors, these are still only those by rounding."""
+    morley = system.element == "morley"  # its moments are constant in each triangle: no error could be estimated
     fine = reassemble(system, mesh, loads, element="argyris" if morley else None)
     rows = fine.interpolate(loads)
     flexibility = Flexibility.of(fine)

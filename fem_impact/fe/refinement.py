@@ -168,8 +168,8 @@ def solve_or_read(
 def _missed_at_corners(system: System, vectors: np.ndarray, values: np.ndarray) -> np.ndarray | float:
     """Estimated relative errors (n_modes,) of frequencies by what the triangles at singular corners cannot follow.
 
-    The energy within a distance r grows as a power of r that the corner's exponent tells. So the energy in the second
-    ring tells what the innermost triangles, half as far, would hold, and that they hold little of. Frequencies are too
+    The energy within a distance r grows as a power of r that the corner's exponent gives. So the energy in the second
+    ring shows what the innermost triangles, half as far, would hold, and that they hold little of. Frequencies are too
     high by it, so that an error near one over the frequency found is more over the true one.
     """
     if system.strain is None or not system.graded:
@@ -180,7 +180,7 @@ def _missed_at_corners(system: System, vectors: np.ndarray, values: np.ndarray) 
         if corner.free:
             own = np.minimum(own, corner.left / CLAIMED) if corner.left > SAY else 0.0
         missed += own
-    return CLAIMED * missed / (1.0 - np.minimum(missed, 0.99))  # more would state errors above 200, which tell nothing
+    return CLAIMED * missed / (1.0 - np.minimum(missed, 0.99))  # more would state errors above 200, which say nothing
 
 
 def _compared(system: System, omega: np.ndarray) -> np.ndarray:
@@ -205,7 +205,7 @@ def _compared(system: System, omega: np.ndarray) -> np.ndarray:
     again = _pairs(body, n_modes, None)[1]
     ends = ribs.singular(system.mesh, getattr(system.section, "ribs", ()))[0].values()
     order = 1.5 if any(1 in each for each in ends) else 4.0
-    # where triangles at masses, springs and ends of ribs are most, as many of both meshes, only the others tell
+    # where triangles at masses, springs and ends of ribs are most, as many of both meshes, only the others differ
     return np.abs(again - omega) / max(abs(ratio**-order - 1.0), 1.0 - COARSER ** (-0.25 * order))
 
 
@@ -317,9 +317,9 @@ def refine(system: System, n_modes: int | None, max_frequency: float | None, tol
 
     The shortest wave sets the size of the first mesh. If edges or corners need a finer one, the estimated errors set
     the size of the next, which aims at 60 % of the tolerance. Where eight more do not suffice, rounding or corners hold
-    the error; nor does anybody wait for more than four times the unknowns allowed, as foretold from how errors fell:
+    the error; nor does anybody wait for more than four times the unknowns allowed, as predicted from how errors fell:
     rates grow as meshes resolve, and a rate half as large asks for the square of that. Of curved or ribbed plates,
-    whose estimates scatter by a factor of two or three, meshes foretell nothing, and each is finer by a fifth at least.
+    whose estimates scatter by a factor of two or three, meshes predict nothing, and each is finer by a fifth at least.
     """
     if system.mesh.recipe is None:
         raise ValueError(
@@ -327,18 +327,18 @@ def refine(system: System, n_modes: int | None, max_frequency: float | None, tol
         )
     first = fine_enough(system, n_modes, max_frequency, tolerance)
     found, size = solve_on_mesh(first, n_modes, max_frequency), np.inf
-    seen: list[tuple[float, float]] = []
+    tried: list[tuple[float, float]] = []  # size and error of each mesh
     bent = found.system.rules.compared and not found.system.rules.thick
     for left in reversed(range(9)):
         if float(found.error.max()) <= tolerance:
             return found
         mesh = found.system.mesh
         step = max(_needed(found.parts, 0.6 * tolerance), 1.2 if bent else 0.0)
-        seen.append((mesh.size, float(found.error.max())))
-        foreseen = 1.0 if bent else _foreseen(seen, tolerance)
+        tried.append((mesh.size, float(found.error.max())))
+        predicted = 1.0 if bent else _predicted_step(tried, tolerance)
         if (
             not left
-            or found.system.n_dofs * foreseen**mesh.dimension > 4.0 * MOST_UNKNOWNS
+            or found.system.n_dofs * predicted**mesh.dimension > 4.0 * MOST_UNKNOWNS
             or not step < np.inf
             or found.system.n_dofs * step**mesh.dimension > MOST_UNKNOWNS
             or mesh.size >= size
@@ -362,14 +362,14 @@ def refine(system: System, n_modes: int | None, max_frequency: float | None, tol
     )
 
 
-def _foreseen(seen: list[tuple[float, float]], goal: float) -> float:
-    """Factor [-] to divide the last size by, as errors fell on meshes of sizes and errors ``seen``; 1 if on one only.
+def _predicted_step(tried: list[tuple[float, float]], goal: float) -> float:
+    """Factor [-] to divide the last size by, as errors fell on meshes of sizes and errors ``tried``; 1 if on one only.
 
     The faster of the rates since the first mesh and since the last but one counts; infinity if neither fell.
     """
-    if len(seen) < 2:
+    if len(tried) < 2:
         return 1.0
-    sizes, errors = np.log(seen).T
+    sizes, errors = np.log(tried).T
     falls, shrinks = errors[[0, -2]] - errors[-1], sizes[[0, -2]] - sizes[-1]
     rate = float(np.max(np.divide(falls, shrinks, out=np.zeros(2), where=shrinks > 0.0)))
     with np.errstate(over="ignore"):

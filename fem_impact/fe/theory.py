@@ -186,7 +186,7 @@ class Theory:
 
 
 def no_estimate(system: Any, vectors: np.ndarray, loads: np.ndarray, forced: Any = None) -> np.ndarray:
-    """``errors`` (3, n) of a theory that is ``compared``: none, as a second mesh tells all of it."""
+    """``errors`` (3, n) of a theory that is ``compared``: none, as a second mesh shows all of it."""
     return np.zeros((3, vectors.shape[1]))
 
 

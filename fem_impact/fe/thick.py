@@ -29,7 +29,7 @@ L-shaped plate is 33 % above that of Kirchhoff's plate by the membrane, and 13 %
 its shorter side (Sapondzhyan's paradox). Modes that are at rest there follow the relation.
 
 Free and soft edges let beta_t relax within a layer of width h / sqrt(12 kappa), about h/3. `layered` makes the
-triangles shrink to a thickness there. If that takes too many, `errors_by_layers` tells what an unresolved layer misses:
+triangles shrink to a thickness there. If that takes too many, `errors_by_layers` estimates what a coarser layer misses:
 the twisting moment M_nt of the thin plate does work on the relaxation, to first order M_nt^2 width / (2 G h^3/12) per
 length.
 
@@ -241,7 +241,7 @@ def layered(mesh: Mesh, section: Plate, kinds: list[str], coarser: float) -> Mes
 def errors_by_layers(system: Any, vectors: np.ndarray, loads: np.ndarray, forced: Any = None) -> np.ndarray:
     """Errors (3, n) of the squared energy norm that vectors keep where triangles are too large for the edge layers.
 
-    The rest is told by a second mesh.
+    The rest is estimated from a second mesh.
     """
     space, rim, frame = system.space, system.rim, system.frame
     loose = np.flatnonzero(np.isin(rim.kinds, LOOSE))

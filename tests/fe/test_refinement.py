@@ -171,11 +171,11 @@ def test_errors_fall_as_the_step_of_refinement_assumes(mesh):
 
 
 def test_what_is_to_come_is_foretold_by_the_faster_of_the_rates_seen():
-    assert refinement._foreseen([(1.0, 1e-3)], 1e-9) == 1.0  # one mesh tells nothing
-    assert_allclose(refinement._foreseen([(1.0, 1e-2), (0.5, 1e-2 / 16)], 1e-2 / 256), 2.0)  # fourth order
+    assert refinement._predicted_step([(1.0, 1e-3)], 1e-9) == 1.0  # one mesh shows no rate
+    assert_allclose(refinement._predicted_step([(1.0, 1e-2), (0.5, 1e-2 / 16)], 1e-2 / 256), 2.0)  # fourth order
     slow = [(1.0, 1e-2), (0.5, 5e-3), (0.25, 2.5e-3 / 8)]  # first order, then fourth
-    assert_allclose(refinement._foreseen(slow, slow[-1][1] / 16.0), 2.0)
-    assert refinement._foreseen([(1.0, 1e-6), (0.5, 2e-6)], 1e-7) == np.inf
+    assert_allclose(refinement._predicted_step(slow, slow[-1][1] / 16.0), 2.0)
+    assert refinement._predicted_step([(1.0, 1e-6), (0.5, 2e-6)], 1e-7) == np.inf
 
 
 def test_a_tolerance_that_corners_do_not_allow_is_refused_after_few_meshes(monkeypatch):
