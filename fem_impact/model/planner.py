@@ -1,6 +1,6 @@
 """Choose the smallest model of a blow that meets its tolerance, and run it.
 
-A description of the target, one of `DESCRIPTIONS`, knows when it applies, foretells its errors and cost (``of``), finds
+A description of the target, one of `DESCRIPTIONS`, knows when it applies, predicts its errors and cost (``of``), finds
 the modes that are struck (``found``) and says which other one the errors of a blow require (``refined``).
 """
 
