@@ -36,7 +36,7 @@ HEADINGS: dict[str, tuple[str, ...]] = {
     "rolling-shear": ("G_yz is not stated",),
     "modes-from-elsewhere": (
         "the static compliance is not given", "no rigid motion is given", "dent the mesh as they would a solid",
-        "dent the mesh, whose elements are solid", "too few nodes of a smooth surface tell their dent",
+        "dent the mesh, whose elements are solid", "too few nodes of a smooth surface show their dent",
     ),
     "air": ("with a rigid wall around",),
     "too-many-modes-or-unknowns": ("more than the limit of", "GB of memory for"),

@@ -68,7 +68,7 @@ class Body(check.Brief):
     damping_ratio: Any = 0.0  # (n_modes,) [-]
     numbers: Any = None  # (n_nodes,)
     cells: Any = None  # (n_cells, 3 or 2)
-    normals: Any = None  # (n_nodes, 3) [-], or None if nothing tells them
+    normals: Any = None  # (n_nodes, 3) [-], or None if they are not known
     names: Mapping[str, int] = field(default_factory=dict)
     static: Any = None  # (n_nodes, 3, n_loads) [m]
     loads: Any = ()  # (n_loads, 4) node number and force [N]
@@ -133,7 +133,7 @@ class Body(check.Brief):
           ``{"nodes": ..., "direction": "z"}`` of what was measured
 
         Matrices make `from_matrices` of it; their names, or those of their files, begin with K, M and R or hold STIF
-        and MASS. Elements tell whether a mesh is ``solid``.
+        and MASS. Elements show whether a mesh is ``solid``.
 
         Parameters
         ----------
@@ -157,34 +157,34 @@ class Body(check.Brief):
         Raises
         ------
         ValueError
-            If a file cannot be read or a library is missing; if nothing tells the mass, the modes or the loads; or if
+            If a file cannot be read or a library is missing; if no file states the mass, modes or loads; or if
             two files are about different nodes.
         """
-        told: dict[str, Any] = {}
+        fields: dict[str, Any] = {}
         for found in imported.read_bodies(files):
-            numbers = [each["numbers"] for each in (told, found) if "numbers" in each]
+            numbers = [each["numbers"] for each in (fields, found) if "numbers" in each]
             if len(numbers) == 2 and not np.array_equal(numbers[0], numbers[1]):
                 raise ValueError("files must be about the same nodes; export all results of one model")
-            for name in told.keys() & found.keys():
+            for name in fields.keys() & found.keys():
                 if name == "recovery" or name.endswith(("_matrix", "_entries")):
                     kind = name.partition("_")[0]
                     raise ValueError(f"files must hold the matrix of {kind} once, but two of them do; leave out one")
-            static = [each["static"] for each in (told, found) if "static" in each]
-            found = {name: value for name, value in found.items() if np.size(value) or name not in told}
-            told |= found | ({"static": np.concatenate(static, axis=2)} if static else {})
-        if "names" in told and not isinstance(told["names"], Mapping):
-            told["names"] = dict(zip(told["names"].tolist(), told.pop("named").tolist()))
-        if "cells" not in told:
-            told["cells"] = told.get("triangles") if len(told.get("triangles", ())) else told.get("lines")
+            static = [each["static"] for each in (fields, found) if "static" in each]
+            found = {name: value for name, value in found.items() if np.size(value) or name not in fields}
+            fields |= found | ({"static": np.concatenate(static, axis=2)} if static else {})
+        if "names" in fields and not isinstance(fields["names"], Mapping):
+            fields["names"] = dict(zip(fields["names"].tolist(), fields.pop("named").tolist()))
+        if "cells" not in fields:
+            fields["cells"] = fields.get("triangles") if len(fields.get("triangles", ())) else fields.get("lines")
         loads = None if loads is None else _forces(loads)
         given = {"mass": mass, "loads": loads, "damping_ratio": damping_ratio, "names": names, "normals": normals}
         given |= {"solid": solid, "modal_mass": modal_mass}
-        if damping_ratio is None and "stated_in" in told:
-            told["damping_ratio"] = universal_files.damping_of(
-                told["stated_in"], told["frequencies"], told["damping_ratio"]
+        if damping_ratio is None and "stated_in" in fields:
+            fields["damping_ratio"] = universal_files.damping_of(
+                fields["stated_in"], fields["frequencies"], fields["damping_ratio"]
             )
-        told |= {name: value for name, value in given.items() if value is not None}
-        return cls(**imported.complete(told, n_modes))
+        fields |= {name: value for name, value in given.items() if value is not None}
+        return cls(**imported.complete(fields, n_modes))
 
     @classmethod
     def from_matrices(
@@ -233,11 +233,11 @@ class Body(check.Brief):
         allowed = "numbers", "damping_ratio", "cells", "normals", "names", "solid"
         for name in fields:
             check.one_of("fields", name, allowed)
-        told = fields | {"mass_matrix": mass, "stiffness_matrix": stiffness, "nodes": nodes, "dofs": dofs}
-        told |= {"recovery": recovery}
+        given = fields | {"mass_matrix": mass, "stiffness_matrix": stiffness, "nodes": nodes, "dofs": dofs}
+        given |= {"recovery": recovery}
         if total_mass is not None:
-            told["mass"] = check.positive("total_mass", total_mass, "kg")
-        found = told | matrices.solved(told, None if loads is None else _forces(loads), n_modes)
+            given["mass"] = check.positive("total_mass", total_mass, "kg")
+        found = given | matrices.solved(given, None if loads is None else _forces(loads), n_modes)
         return cls(**{name: found[name] for name in imported.OWN if found.get(name) is not None})
 
     @classmethod
@@ -289,9 +289,9 @@ class Body(check.Brief):
     def save(self, path: Any) -> Path:
         """Write a ``.npz`` file that `load` reads."""
         path = check.path("path", path).with_suffix(".npz")
-        told = {name: getattr(self, name) for name in imported.FIELDS if getattr(self, name) is not None}
+        fields = {name: getattr(self, name) for name in imported.FIELDS if getattr(self, name) is not None}
         names = np.array(list(self.names), str), np.array(list(self.names.values()), int)
-        np.savez_compressed(path, **told, names=names[0], named=names[1])
+        np.savez_compressed(path, **fields, names=names[0], named=names[1])
         return path
 
     @cached_property
@@ -330,7 +330,7 @@ class Body(check.Brief):
         return tuple(self.nodes[self.node(where), self.axes].tolist())
 
     def modes(self, direction: Any = "normal", *, free: bool | None = None) -> Modes:
-        """The body as it is struck and heard along a direction.
+        """The body as it is struck and observed along a direction.
 
         Parameters
         ----------
@@ -348,7 +348,7 @@ class Body(check.Brief):
         ways = self._ways(direction)
         if free and ways[:, self.axes].any():
             raise ValueError(
-                "free must be False or left out: nothing but a flat body struck across tells its rigid motions; give "
+                "free must be False or left out: rigid motions are known only of a flat body struck across; give "
                 "them as modes of 0 Hz instead"
             )
         kept = np.flatnonzero(ways.any(axis=1))
@@ -356,7 +356,7 @@ class Body(check.Brief):
         place[kept] = np.arange(len(kept))
         cells = place[self.cells]
         cells = cells[(cells >= 0).all(axis=1)]
-        columns, loads, seen = self._unit_loads(ways, place)
+        columns, loads, unit_loads = self._unit_loads(ways, place)
         points, flat = self.nodes[kept][:, self.axes], len(self.axes) + 1 == cells.shape[1]
         made = Modes.from_arrays(
             self.frequencies, np.einsum("ndm,nd->nm", self.shapes[kept], ways[kept]), points=points, mass=self.mass,
@@ -364,7 +364,7 @@ class Body(check.Brief):
             loads=loads if len(loads) else None, cells=cells if flat and len(cells) else None, free=free,
             solid=False,
         )  # fmt: skip
-        made = dents.settled(made, seen, self.solid)
+        made = dents.settled(made, unit_loads, self.solid)
         odd = (*plausible.elsewhere(self.nodes, self.shapes, self.mass), *[NOTE] * bool(made.omega.any()))
         sideways = free_body.sideways(self.shapes[kept], ways[kept], made.n_modes)
         notes = [
@@ -384,7 +384,7 @@ class Body(check.Brief):
         """Unit vector (n_nodes, 3) along which each node is struck; zero where it cannot be."""
         if isinstance(direction, str) and check.one_of("direction", direction, ("normal", *"xyz")) == "normal":
             if self.normals is None:
-                raise ValueError("direction must be x, y, z or a vector: neither cells nor a plane tell the normals")
+                raise ValueError("direction must be x, y, z or a vector: neither cells nor a plane define the normals")
             size = np.linalg.norm(self.normals, axis=1, keepdims=True)
             return np.divide(self.normals, size, out=np.zeros_like(self.normals), where=size > 0.0)
         vector = np.eye(3)["xyz".index(direction)] if isinstance(direction, str) else direction
@@ -398,7 +398,7 @@ class Body(check.Brief):
 
         Several loads on a node are added up to one along its way.
         """
-        columns, points, seen = [], [], []
+        columns, points, unit_loads = [], [], []
         for number in dict.fromkeys(self.loads[:, 0].astype(int).tolist()):
             row, given = self._row[number], np.flatnonzero(self.loads[:, 0] == number)
             force = self.loads[given, 1:]
@@ -411,8 +411,8 @@ class Body(check.Brief):
                 square = abs(normal @ ways[row]) >= dents.SQUARE * np.linalg.norm(normal)
                 axes, under = np.linalg.svd(ways[[row]])[2], static @ ways[row]
                 apart = (self.nodes[others] - self.nodes[row]) @ axes[[1, 2, 0]].T  # the third axis along the load
-                seen.append(dents.Load(points[-1], apart, under[others], float(under[row]), square))
-        return np.column_stack(columns) if columns else np.zeros((len(ways), 0)), points, seen
+                unit_loads.append(dents.Load(points[-1], apart, under[others], float(under[row]), square))
+        return np.column_stack(columns) if columns else np.zeros((len(ways), 0)), points, unit_loads
 
     def along(self, where: Any, direction: Any = "normal") -> np.ndarray:
         """Shapes (n_modes,) [kg**-0.5] of a node along a direction, both as `node` and `modes` take them."""
@@ -453,7 +453,7 @@ def _forces(loads: Any) -> np.ndarray:
 
 
 def _normals(nodes: np.ndarray, cells: np.ndarray) -> np.ndarray | None:
-    """Unit normals (n_nodes, 3) of triangles, by their areas, or of a flat body; None if nothing tells them."""
+    """Unit normals (n_nodes, 3) of triangles, by their areas, or of a flat body; None of other bodies."""
     result = np.zeros(nodes.shape)
     if cells.shape[1] == 3 and len(cells):
         corners = nodes[cells]

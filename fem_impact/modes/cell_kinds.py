@@ -1,4 +1,4 @@
-"""What the elements of another program's mesh tell: its surface, and whether it is solid; and names of its matrices."""
+"""What the elements of another program's mesh show: its surface, and whether it is solid; and names of its matrices."""
 
 import math
 import re
@@ -21,7 +21,7 @@ NAMES = (("stiffness", r"^K(?!4[A-Z])|STIF"), ("mass", r"^M|MASS"), ("recovery",
 
 
 def surface_and_kind(points: np.ndarray, blocks: dict[int, np.ndarray]) -> dict[str, np.ndarray]:
-    """Cells of the surface of elements by vtk's codes, and `Body.solid`, as far as they tell it.
+    """Cells of the surface of elements by vtk's codes, and `Body.solid`, as far as they show it.
 
     A mesh with any solid element is taken as solid, because it may be struck there.
     """
@@ -93,15 +93,15 @@ def settled(frequencies: np.ndarray) -> np.ndarray:
 
 
 def refuse_twice(frequencies: np.ndarray, shapes: np.ndarray, holder: str = "files") -> None:
-    """ValueError if a mode is told twice, as in two subcases; two of one frequency may look alike at three nodes."""
+    """ValueError if a mode occurs twice, as in two subcases; two of one frequency may look alike at three nodes."""
     flat = shapes.reshape(math.prod(shapes.shape[:-1]), len(frequencies))  # which may be none
-    seen: set[tuple[float, int]] = set()
+    marks: set[tuple[float, int]] = set()
     for frequency, mode in zip(frequencies.tolist(), flat.T):
         first = mode[mode.nonzero()[0][:1]].sum()
         mark = frequency, hash((np.sign(first) * mode + 0.0).tobytes())  # of either sign it is the same mode
-        if mark in seen and len(shapes) > 3 and mode.any():
+        if mark in marks and len(shapes) > 3 and mode.any():
             raise ValueError(f"{holder} must hold each mode once, but that at {frequency:g} Hz is there twice")
-        seen.add(mark)
+        marks.add(mark)
 
 
 def rows_of(numbers: np.ndarray, wanted: Any) -> np.ndarray:

@@ -32,7 +32,7 @@ SOLID = (
     "{} unit loads dent the mesh, whose elements are solid, and a contact law has that dent already: give solid=, the "
     "material; until then the dent counts as an error"
 )
-UNTOLD = "around {} unit loads too few nodes of a smooth surface tell their dent: all that yields there is an error"
+TOO_FEW = "around {} unit loads too few nodes of a smooth surface show their dent: all that yields there is an error"
 
 
 @dataclass(frozen=True)
@@ -40,13 +40,13 @@ class Load:
     """A unit load and the static deflection along it around it."""
 
     point: int  # of the modes
-    apart: np.ndarray  # (n, 3) [m] nodes seen from it, the third coordinate along it
+    apart: np.ndarray  # (n, 3) [m] places of nodes relative to it, the third coordinate along it
     deflection: np.ndarray  # (n,) [m/N]
     own: float  # [m/N] at the load
     square: bool = True  # whether it acts along the normal
 
     def on_surface(self) -> "Load":
-        """The same, seen by nodes of the surface around it alone, if it acts along the normal."""
+        """The same with the nodes of the surface around it alone, if it acts along the normal."""
         near = np.abs(self.apart[:, 2]) <= 0.2 * np.linalg.norm(self.apart, axis=1)  # not deep beside their distance
         return replace(self, apart=self.apart[near], deflection=self.deflection[near]) if self.square else self
 
@@ -81,11 +81,11 @@ def settled(modes: Any, loads: list[Load], solid: Any) -> Any:
         return modes
     shapes = modes.shapes
     static, dent = shapes.static.copy(), np.zeros((len(shapes.points), 2))
-    counts, flat = dict.fromkeys((KNOWN, UNKNOWN, SOLID, UNTOLD), 0), unfolded(shapes.points).shape[1] < 3
+    counts, flat = dict.fromkeys((KNOWN, UNKNOWN, SOLID, TOO_FEW), 0), unfolded(shapes.points).shape[1] < 3
     for column, load in enumerate(loads):
         if solid is True:
             found = largest(load.on_surface())
-            counts[UNTOLD if found is None else SOLID] += 1
+            counts[TOO_FEW if found is None else SOLID] += 1
             dent[load.point, 1] = abs(load.own) if found is None else found
             continue
         if solid is None:
@@ -96,11 +96,11 @@ def settled(modes: Any, loads: list[Load], solid: Any) -> Any:
             surrounded = np.linalg.norm(nearest.sum(axis=0)) < 0.12 * len(nearest) * farthest
             found = 0.0 if flat and not surrounded else hidden(load.on_surface())
             size = (0.0 if flat else abs(load.own)) if found is None else found
-            counts[UNTOLD if found is None else UNKNOWN] += size > 0.0
+            counts[TOO_FEW if found is None else UNKNOWN] += size > 0.0
             dent[load.point, 1] = size
             continue
         bare = rest(load.on_surface(), *solid) if load.square else None
-        counts[UNTOLD if bare is None else KNOWN] += 1
+        counts[TOO_FEW if bare is None else KNOWN] += 1
         dent[load.point] = (0.0, abs(load.own)) if bare is None else (load.own - bare[0], bare[1])
         static[load.point, column] -= dent[load.point, 0]
     notes = tuple(text.format(f"{n} of {len(loads)}") for text, n in counts.items() if n)
@@ -127,7 +127,7 @@ def of_points(points: np.ndarray, static: np.ndarray, known: np.ndarray) -> list
 
 
 def rest(load: Load, E: float, nu: float) -> tuple[float, float] | None:
-    """What a body yields at a load without the dent of a half space, and its error [m/N]; None if too few nodes tell.
+    """What a body yields at a load without the dent of a half space, and its error [m/N]; None of too few nodes.
 
     The error is the difference of four fits, with few and many nodes, nearer to the load and farther off.
     """
@@ -140,7 +140,7 @@ def rest(load: Load, E: float, nu: float) -> tuple[float, float] | None:
 
 
 def largest(load: Load) -> float | None:
-    """How large [m/N] the dent of a solid of unknown material may be; None if too few nodes tell.
+    """How large [m/N] the dent of a solid of unknown material may be; None of too few nodes.
 
     The largest of fits with ``1 / r`` of unknown size, one beyond the elements over which a load may be spread. Solids
     of three meshes each had 1.02 to 2.11 times their dent.
@@ -151,7 +151,7 @@ def largest(load: Load) -> float | None:
 
 
 def _fitted(apart: np.ndarray, values: np.ndarray, rings: Any, dent: bool = False) -> list[float]:
-    """What values (n,) at nodes around a load tell at it, by fits to the nearest beyond each ring, of enough nodes.
+    """Values (n,) at nodes around a load continued to it, by fits to the nearest beyond each ring, of enough nodes.
 
     They are those of a smooth field, with ``1 / r`` if there is a ``dent``.
     """
@@ -167,12 +167,12 @@ def _fitted(apart: np.ndarray, values: np.ndarray, rings: Any, dent: bool = Fals
 
 
 def hidden(load: Load) -> float | None:
-    """How large [m/N] the dent in a deflection may be, by the deflections around; None if too few nodes tell.
+    """How large [m/N] the dent in a deflection may be, by the deflections around; None of too few nodes.
 
     Zero if the load sinks no deeper than on a thin plate, ``r**2 log r``, or on a beam, ``r**3``; or if the others are
     rather those of a membrane, ``log r``, than of a solid, ``1 / r``. It counts as deeper from 8 standard errors on:
     solids of three meshes each had 15 to 40, closed forms of plates and beams at most 5. The whole dent is taken as 2.5
-    times what is seen of it so, 1.3 to 1.82 of tetrahedra, as its rest reaches the others.
+    times what is found of it so, 1.3 to 1.82 of tetrahedra, as its rest reaches the others.
     """
     few = load.nearest()
     around = load.deflection[few]

@@ -2,7 +2,7 @@
 
 The accelerance at the point struck is taken as ``H(s) = 1 / m + sum of A s**2 / (s**2 + 2 zeta omega s + omega**2) +
 R s**2`` with no A, 1 / m or R below zero. Any such sum is causal and passive: what it cannot follow of the measured
-response is either noise or not that of a passive body. Poles are added where they tell most (a conditional gradient)
+response is either noise or not that of a passive body. Poles are added where they explain most (a conditional gradient)
 and then moved to fit together; the amplitudes are those of least squares above zero.
 """
 
@@ -59,8 +59,8 @@ def fitted(lines: MeasuredLines, poles: np.ndarray) -> Passive:
     size = np.linalg.norm(basis, axis=0)
     basis /= size
     triangle = _triangle(basis)
-    seen = solve_triangular(triangle, basis.T @ lines.data, trans="T")
-    found = nnls(triangle, seen, maxiter=30 * len(size))[0]
+    projected = solve_triangular(triangle, basis.T @ lines.data, trans="T")
+    found = nnls(triangle, projected, maxiter=30 * len(size))[0]
     used = found[2:] > 0.0
     rest, found = lines.data - basis @ found, found / size
     return Passive(poles[:, used], np.append(found[:2], found[2:][used]), rest)
@@ -97,14 +97,14 @@ def follow_response(lines: MeasuredLines) -> Passive:
     for _ in range(25):
         before = np.square(kept.rest).sum()
         noise = before / max(1, len(kept.rest) - 3 * kept.poles.shape[1])
-        told = np.maximum(matrix.T @ kept.rest.astype(np.float32), 0.0) ** 2
+        gains = np.maximum(matrix.T @ kept.rest.astype(np.float32), 0.0) ** 2
         more: list[int] = []
         near = np.exp(offered[0])
-        while len(more) < 12 and told.max() > GAIN * noise:
-            best = int(told.argmax())
+        while len(more) < 12 and gains.max() > GAIN * noise:
+            best = int(gains.argmax())
             more.append(best)
             width = 2.0 * np.exp(offered[:, best]).prod() + 2.0 * lines.s.real[0] + 2.0 * low
-            told[np.abs(near - near[best]) <= width] = 0.0
+            gains[np.abs(near - near[best]) <= width] = 0.0
         if not more:
             break
         kept = _moved(lines, fitted(lines, np.hstack([kept.poles, offered[:, more]])))
@@ -158,7 +158,7 @@ def body_of(found: Any, driving: Any, points: Any) -> Following:
     if len(s) < 2 * AROUND:
         raise ValueError(f"frf must have at least {2 * AROUND} lines where its force has power, got {len(s)}")
     noise = _noise(found, lines_used, used, np.abs(values))
-    weight = 1.0 / np.hypot(noise, 1e-3 * np.abs(values))  # a line tells no more, however little the taps differ
+    weight = 1.0 / np.hypot(noise, 1e-3 * np.abs(values))  # no line weighs more, however little the taps differ
     rows = [(values[:, k] * weight[:, k]).view(float).reshape(-1, 2).T.ravel() for k in range(len(used))]
     lines = MeasuredLines(s, rows[own], weight[:, own])
     kept = follow_response(lines)
@@ -199,19 +199,19 @@ def body_of(found: Any, driving: Any, points: Any) -> Following:
 
 
 def _noise(found: Any, lines: np.ndarray, used: list[int], size: np.ndarray) -> np.ndarray:
-    """Standard deviation of complex accelerances (n, n_used) [1/kg], as errors or the coherence tell."""
-    told = np.full(size.shape, np.nan)
+    """Standard deviation of complex accelerances (n, n_used) [1/kg], estimated from errors or the coherence."""
+    deviation = np.full(size.shape, np.nan)
     if "error" in found:
         values = np.abs(found["H"].values)[lines][:, used]
-        told = found["error"].values[lines][:, used] / np.maximum(values, 1e-300) * size / np.sqrt(-np.log(0.1))
-    if not np.isfinite(told).all() and "coherence" in found:
+        deviation = found["error"].values[lines][:, used] / np.maximum(values, 1e-300) * size / np.sqrt(-np.log(0.1))
+    if not np.isfinite(deviation).all() and "coherence" in found:
         part = np.clip(found["coherence"].values[lines][:, used], 1e-6, 1.0)
-        told = size * np.sqrt((1.0 - part) / (part * max(1, int(found.attrs.get("averages", 1)))))
-    return told if np.isfinite(told).all() else np.broadcast_to(1e-2 * np.median(size, axis=0), size.shape)
+        deviation = size * np.sqrt((1.0 - part) / (part * max(1, int(found.attrs.get("averages", 1)))))
+    return deviation if np.isfinite(deviation).all() else np.broadcast_to(1e-2 * np.median(size, axis=0), size.shape)
 
 
 def _drawn(found: Any, lines: MeasuredLines, noise: np.ndarray, used: np.ndarray) -> np.ndarray:
-    """Samples (2 n, DRAWS) of the weighted noise, alike in lines closer than the windows tell apart."""
+    """Samples (2 n, DRAWS) of the weighted noise, alike in lines closer than the windows resolve."""
     omega, rng = lines.s.imag, np.random.default_rng(0)
     spacing = np.diff(omega).min()
     index = np.rint(omega / spacing).astype(int)

@@ -38,8 +38,8 @@ LOG = logging.getLogger(__name__)
 PER_WAVE = 8.0
 # [-] cells across a square as large as the plate, in the lattices to choose of: next ones are 1.8 to 2.3 times as large
 ACROSS = 48.0, 64.0, 96.0, 128.0
-LARGER = 2.0**0.5  # [-] of the cells that tell the error: half as many
-ROOM = 3.0  # [-] half the width of an estimate over what tells its error
+LARGER = 2.0**0.5  # [-] of the cells of a second solution that estimates the error: half as many
+ROOM = 3.0  # [-] half the width of an estimate over the difference that estimates its error
 # [-] relative, of the solved equations: a thirtieth of what a bound states at least; smaller parts of the operator are
 # not inverted either, which only speeds up the solution
 RESIDUAL = 3e-3
@@ -103,7 +103,7 @@ def reach(modes: Modes, speed: float) -> np.ndarray:
 def jumps(modes: Modes, wanted: np.ndarray, speed: float) -> Iterator[tuple[Jumps, Jumps]]:
     """The jumps of the wanted modes, each at its own frequency, on lattices as fine as they need, and on larger cells.
 
-    These are `LARGER`; the difference tells the error.
+    These are `LARGER`; the difference estimates the error.
     """
     needed = reach(modes, speed)
     side = np.sqrt(sizes(*modes.shapes.grid()).sum())
@@ -197,7 +197,7 @@ class AirSheet:
 
 
 class Field(NamedTuple):
-    """What a listener gets of the modes heard: derivatives of their amplitudes, delayed by a way through the air."""
+    """What reaches a listener from modes: derivatives of their amplitudes, delayed by a way through the air."""
 
     orders: dict[int, np.ndarray]  # order of derivative -> (n_ways, n) weights, for 1 kg/m^3
     way: np.ndarray  # (n_ways,) [m]
@@ -210,8 +210,8 @@ def fields(
 
     Ways are rounded to multiples of ``step`` [m] by shares of their two neighbours. As a mode rings, the field has its
     pressure by `Jumps.mean`, and the others in phase with it the half width of that estimate, taken away at most to
-    silence. An acceleration tells the part of a jump in phase with it, a velocity the rest. Nearer than two of the
-    coarsest cells, a listener could tell them.
+    silence. An acceleration gives the part of a jump in phase with it, a velocity the rest. Nearer than two of the
+    coarsest cells, single cells would be audible.
     """
     grid = modes.shapes.grid()[0]
     low, high = grid.min(axis=0), grid.max(axis=0)

@@ -44,7 +44,7 @@ def six(nodes: np.ndarray, mass: float, inertia: Any, centre: Any) -> np.ndarray
 def motions(apart: np.ndarray, axes: Iterable[np.ndarray]) -> np.ndarray:
     """Displacements (n_nodes, 3, 3 + n) of shifts along x, y and z, and of turns about axes (n, 3) through the origin.
 
-    ``apart`` (n_nodes, 3) [m] are the nodes seen from it.
+    ``apart`` (n_nodes, 3) [m] are places of nodes relative to it.
     """
     shifts = np.broadcast_to(np.eye(3), (len(apart), 3, 3))
     return np.concatenate([shifts, *(np.cross(axis, apart)[..., None] for axis in axes)], axis=2)

@@ -83,22 +83,22 @@ def _one(path: Path, decks: Sequence[Path] | set[Path]) -> dict[str, Any]:
     return found
 
 
-def complete(told: dict[str, Any], n_modes: int | None) -> dict[str, Any]:
+def complete(fields: dict[str, Any], n_modes: int | None) -> dict[str, Any]:
     """Fields of a `Body` from what files hold of it."""
-    told = matrices.labelled(told)
-    if "mass_matrix" in told or "stiffness_matrix" in told:
-        told |= matrices.solved(told, told.get("loads"), n_modes) | {"own": True}
-        told.pop("modal_mass", None)
-    found = check.array("frequencies", told.get("frequencies", ()), (None,), "Hz")
+    fields = matrices.labelled(fields)
+    if "mass_matrix" in fields or "stiffness_matrix" in fields:
+        fields |= matrices.solved(fields, fields.get("loads"), n_modes) | {"own": True}
+        fields.pop("modal_mass", None)
+    found = check.array("frequencies", fields.get("frequencies", ()), (None,), "Hz")
     if not len(found):
         raise ValueError("files must hold modes; ask the other program for its eigenvectors, too, or for its matrices")
-    if told.get("mass") is None:
+    if fields.get("mass") is None:
         raise ValueError("mass must be given in kg: these files do not hold it")
-    shapes = np.asarray(told.get("shapes", ()))
+    shapes = np.asarray(fields.get("shapes", ()))
     if shapes.shape[-1:] != found.shape:
         raise ValueError(f"shapes must be as many as the {len(found)} frequencies, got them in shape {shapes.shape}")
     if shapes.ndim == 2:
-        way = told.get("direction")
+        way = fields.get("direction")
         if way is None:
             raise ValueError("files must hold the direction of what was measured: add {'direction': 'z'} to them")
         way = np.eye(3)["xyz".index(check.one_of("direction", str(way), "xyz"))] if np.ndim(way) == 0 else way
@@ -106,7 +106,7 @@ def complete(told: dict[str, Any], n_modes: int | None) -> dict[str, Any]:
         if not way.any(axis=1).all():
             raise ValueError("direction must not be zero")
         shapes = np.einsum("nm,nd->ndm", shapes, way / np.linalg.norm(way, axis=1, keepdims=True))
-    scale = told.get("modal_mass")
+    scale = fields.get("modal_mass")
     if scale is not None:
         scale = check.array("modal_mass", scale, found.shape, "kg")
         if scale.min() <= 0.0:
@@ -114,12 +114,12 @@ def complete(told: dict[str, Any], n_modes: int | None) -> dict[str, Any]:
         shapes = shapes / np.sqrt(scale)
     cell_kinds.refuse_twice(found, shapes)
     order = np.argsort(np.abs(found), kind="stable")  # our own solver, and what it saved, has zeros
-    settled = found[order] if "own" in told else cell_kinds.settled(found[order])
-    told |= {"frequencies": settled, "shapes": shapes[..., order]}
-    damping = told.get("damping_ratio", 0.0)
+    settled = found[order] if "own" in fields else cell_kinds.settled(found[order])
+    fields |= {"frequencies": settled, "shapes": shapes[..., order]}
+    damping = fields.get("damping_ratio", 0.0)
     if np.ndim(damping):
-        told["damping_ratio"] = check.array("damping_ratio", damping, order.shape)[order]
-    return {name: told[name] for name in OWN if told.get(name) is not None}
+        fields["damping_ratio"] = check.array("damping_ratio", damping, order.shape)[order]
+    return {name: fields[name] for name in OWN if fields.get(name) is not None}
 
 
 def _object(given: Any) -> dict[str, Any] | None:

@@ -30,23 +30,23 @@ INDEFINITE = (
 )
 
 
-def solved(told: Mapping[str, Any], loads: Any = None, n_modes: int | None = None) -> dict[str, Any]:
-    """Fields of a `Body` of which ``mass_matrix``, ``stiffness_matrix`` and ``nodes`` are told.
+def solved(fields: Mapping[str, Any], loads: Any = None, n_modes: int | None = None) -> dict[str, Any]:
+    """Fields of a `Body` of which ``mass_matrix``, ``stiffness_matrix`` and ``nodes`` are given.
 
     Parameters
     ----------
-    told : dict
+    fields : dict
         With ``dofs``, ``recovery``, ``numbers`` and ``mass`` as of `Body.from_matrices`. ``frames`` (n_nodes, 3, 3) are
         axes of nodes, by rows, where directions are along others than x, y and z.
     loads : as of `Body`
     n_modes : int, optional
     """
-    M, K = _symmetric(told)
-    nodes = check.array("nodes", told.get("nodes", ()), (None, 3), "m")
-    given = np.arange(1, len(nodes) + 1) if told.get("numbers") is None else told["numbers"]
+    M, K = _symmetric(fields)
+    nodes = check.array("nodes", fields.get("nodes", ()), (None, 3), "m")
+    given = np.arange(1, len(nodes) + 1) if fields.get("numbers") is None else fields["numbers"]
     numbers = check.array("numbers", given, (len(nodes),)).astype(int)
-    turned = _directions(told, numbers, M.shape[0])
-    R = _recovery(told, turned, len(nodes), M.shape[0])
+    turned = _directions(fields, numbers, M.shape[0])
+    R = _recovery(fields, turned, len(nodes), M.shape[0])
     kept = np.flatnonzero(np.asarray(abs(R).sum(axis=1)).reshape(-1, 3).any(axis=1))
     used = np.flatnonzero(np.asarray(abs(M).sum(axis=0) + abs(K).sum(axis=0)))  # nothing resists or moves the others
     M, K, R = M[used][:, used], K[used][:, used], R[(3 * kept[:, None] + np.arange(3)).ravel()][:, used].tocsc()
@@ -60,7 +60,7 @@ def solved(told: Mapping[str, Any], loads: Any = None, n_modes: int | None = Non
     try:
         values, vectors = lowest(flexibility, min(max(wanted, 0), most))
         forces = R.T @ pushed
-        if len(values) + rigid.shape[1] == len(used):  # then modes tell it, with the rounding of what they carry
+        if len(values) + rigid.shape[1] == len(used):  # then modes give it, with the rounding of what they carry
             static = (vectors / values) @ (vectors.T @ forces)
         else:
             static = flexibility.solve(forces) if len(loads) else forces
@@ -80,24 +80,24 @@ def solved(told: Mapping[str, Any], loads: Any = None, n_modes: int | None = Non
     shifts = np.abs(moved @ share - wanted_shifts).max(axis=0) < 1e-3
     masses = np.square(share[:, shifts]).sum(axis=0)
     own = float(masses.mean()) if shifts.any() and np.ptp(masses) <= 1e-3 * masses.max() else None
-    given = told.get("mass")
+    given = fields.get("mass")
     if own is None and given is None:
         raise ValueError(
-            "total_mass (of files: mass) must be given in kg: the matrices of a body that is held do not tell the mass "
+            "total_mass (of files: mass) must be given in kg: the matrices of a body that is held do not hold the mass "
             "of its supports"
         )
     if own is not None and given is not None and abs(given - own) > FITS * own:
         raise ValueError(f"total_mass (of files: mass) must be that of the matrices, {own:g} kg, got {given:g} kg")
     found["mass"] = own if given is None else given
-    return found | _at_kept(told, kept, len(nodes))
+    return found | _at_kept(fields, kept, len(nodes))
 
 
-def labelled(told: dict[str, Any]) -> dict[str, Any]:
+def labelled(fields: dict[str, Any]) -> dict[str, Any]:
     """The same with matrices for their ``..._entries``, (n, 5) node, direction, node, direction and value."""
-    names = [f"{kind}_entries" for kind in KINDS if f"{kind}_entries" in told]
+    names = [f"{kind}_entries" for kind in KINDS if f"{kind}_entries" in fields]
     if not names:
-        return told
-    entries = [np.asarray(told[name], float) for name in names]
+        return fields
+    entries = [np.asarray(fields[name], float) for name in names]
     every = np.vstack([each[:, k : k + 2] for each in entries for k in (0, 2)]).astype(int)
     dofs, place = np.unique(every, axis=0, return_inverse=True)
     places, start, found = place.ravel(), 0, {}
@@ -105,7 +105,7 @@ def labelled(told: dict[str, Any]) -> dict[str, Any]:
         rows, columns = places[start : start + len(each)], places[start + len(each) : start + 2 * len(each)]
         found[name.replace("entries", "matrix")] = whole(rows, columns, each[:, 4], len(dofs))
         start += 2 * len(each)
-    return {name: value for name, value in told.items() if name not in names} | found | {"dofs": dofs}
+    return {name: value for name, value in fields.items() if name not in names} | found | {"dofs": dofs}
 
 
 def whole(rows: np.ndarray, columns: np.ndarray, values: np.ndarray, size: int) -> Any:
@@ -117,11 +117,11 @@ def whole(rows: np.ndarray, columns: np.ndarray, values: np.ndarray, size: int) 
     return csc_array(coo_array((values, (rows, columns)), shape=(size, size)))
 
 
-def _symmetric(told: Mapping[str, Any]) -> list[Any]:
+def _symmetric(fields: Mapping[str, Any]) -> list[Any]:
     """Mass and stiffness, checked."""
     found = []
     for kind in KINDS:
-        matrix: Any = told.get(f"{kind}_matrix")
+        matrix: Any = fields.get(f"{kind}_matrix")
         if matrix is None:
             raise ValueError(f"{kind} must be given as a matrix, too; modes need both mass and stiffness")
         if hasattr(matrix, "dtype") and np.iscomplexobj(matrix):
@@ -140,11 +140,11 @@ def _symmetric(told: Mapping[str, Any]) -> list[Any]:
     return found
 
 
-def _directions(told: Mapping[str, Any], numbers: np.ndarray, size: int) -> Any:
-    """Shifts and turns of nodes by unknowns, (6 n_nodes, size); None if nothing tells them."""
-    dofs, n = told.get("dofs"), len(numbers)
+def _directions(fields: Mapping[str, Any], numbers: np.ndarray, size: int) -> Any:
+    """Shifts and turns of nodes by unknowns, (6 n_nodes, size); None if only ``recovery`` is given."""
+    dofs, n = fields.get("dofs"), len(numbers)
     if dofs is None:
-        if told.get("recovery") is not None:
+        if fields.get("recovery") is not None:
             return None
         each = size // n if n and size % n == 0 else 0
         if each not in (3, 6):
@@ -162,15 +162,15 @@ def _directions(told: Mapping[str, Any], numbers: np.ndarray, size: int) -> Any:
     if lost.size:
         raise ValueError(f"dofs must be of the nodes given, got node {lost[0]}, which has no coordinates")
     rows, way = cell_kinds.rows_of(numbers, dofs[moving, 0]), dofs[moving, 1] - 1
-    frames = np.tile(np.eye(3), (n, 1, 1)) if told.get("frames") is None else np.asarray(told["frames"], float)
+    frames = np.tile(np.eye(3), (n, 1, 1)) if fields.get("frames") is None else np.asarray(fields["frames"], float)
     into = 6 * rows[:, None] + 3 * (way[:, None] // 3) + np.arange(3)
     axes = frames[rows, way % 3]  # (n_moving, 3)
     return csc_matrix((axes.ravel(), (into.ravel(), np.repeat(moving, 3))), shape=(6 * n, size))
 
 
-def _recovery(told: Mapping[str, Any], turned: Any, n: int, size: int) -> Any:
+def _recovery(fields: Mapping[str, Any], turned: Any, n: int, size: int) -> Any:
     """Displacements of nodes by unknowns, (3 n_nodes, size)."""
-    given = told.get("recovery")
+    given = fields.get("recovery")
     if given is None:
         return turned[(6 * np.arange(n)[:, None] + np.arange(3)).ravel()]
     given = given if issparse(given) else check.array("recovery", given, (None, None))
@@ -257,17 +257,17 @@ def _loaded(numbers: np.ndarray, loads: Any, turned: Any) -> tuple[Any, np.ndarr
     return loads, found.reshape(3 * len(numbers), len(loads))
 
 
-def _at_kept(told: Mapping[str, Any], kept: np.ndarray, n: int) -> dict[str, Any]:
+def _at_kept(fields: Mapping[str, Any], kept: np.ndarray, n: int) -> dict[str, Any]:
     """Cells and normals of the nodes kept."""
     if len(kept) == n:
         return {}
     place = np.full(n, -1)
     place[kept] = np.arange(len(kept))
     found: dict[str, Any] = {}
-    if told.get("cells") is not None and len(told["cells"]):
-        given = check.array("cells", told["cells"], (None, None)).astype(int)
+    if fields.get("cells") is not None and len(fields["cells"]):
+        given = check.array("cells", fields["cells"], (None, None)).astype(int)
         cells = place[given[(given >= 0).all(axis=1) & (given < n).all(axis=1)]]
         found["cells"] = cells[(cells >= 0).all(axis=1)]
-    if told.get("normals") is not None:
-        found["normals"] = check.array("normals", told["normals"], (n, 3))[kept]
+    if fields.get("normals") is not None:
+        found["normals"] = check.array("normals", fields["normals"], (n, 3))[kept]
     return found

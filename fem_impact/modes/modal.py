@@ -123,7 +123,7 @@ class Modes(check.Brief):
         ------
         ValueError
             If lengths disagree, a number is not finite or frequencies do not ascend; or if a free body has a mode that
-            carries its mass along, or points that do not tell its rigid motions.
+            carries its mass along, or points that do not determine its rigid motions.
 
         Examples
         --------
@@ -245,7 +245,7 @@ class Modes(check.Brief):
             Where each channel is measured (with a roving hammer, struck); by default as the file states it. Channels
             across the direction of the blow are left out.
         driving : int or str, optional
-            The channel at the point struck; by default as the nodes of the file tell.
+            The channel at the point struck; by default as the nodes of the file state.
         frequencies : array_like, shape (n_modes,) [Hz], optional
             About where modes are; by default at the peaks.
         compliance, free : optional
@@ -262,7 +262,7 @@ class Modes(check.Brief):
         -------
         Modes
             Known only at the points, with frequencies and damping ratios refined together with the shapes; its notes
-            tell what share of the responses they leave unexplained.
+            state what share of the responses they leave unexplained.
 
         Raises
         ------
@@ -288,7 +288,7 @@ class Modes(check.Brief):
         if not check.flag("pick", pick):
             if frequencies is not None or compliance is not None:
                 raise ValueError(
-                    "frequencies and compliance must be left out if pick is False: the responses tell them"
+                    "frequencies and compliance must be left out if pick is False: the responses give them"
                 )
             body = followed.body_of(frf, driving, points)
             made = cls.from_arrays(**body.arrays, mass=mass, free=False)
@@ -300,8 +300,8 @@ class Modes(check.Brief):
             known = replace(sampled, rest=rest, doubt=body.doubt, rigid=rigid)
             said = ("shapes", *(("free",) if loose else ()))
             return replace(made, shapes=known, notes=tuple(body.notes), unstated=said)
-        told, errors, notes = picked.modes_of(frf, driving, points, frequencies)
-        made = cls.from_arrays(**told, mass=mass, compliance=compliance, free=free)
+        arrays, errors, notes = picked.modes_of(frf, driving, points, frequencies)
+        made = cls.from_arrays(**arrays, mass=mass, compliance=compliance, free=free)
         sure = np.zeros((len(errors), made.n_modes - errors.shape[1]))
         sampled = made.shapes
         shapes = replace(sampled, doubt=np.hstack([sure, errors])[None])
@@ -409,7 +409,7 @@ class Modes(check.Brief):
             if self.n_rigid > 1 and self.dimension > 2:
                 raise ValueError(
                     "speed needs a body whose points all move along one direction, as of `Body.modes` with a vector; "
-                    "along normals nothing tells how it arrives: give `Striker.of`"
+                    "along normals its motion before the blow is not defined: give `Striker.of`"
                 )
             row = rigid.at(point)[0]
             straight = row / (row @ row)

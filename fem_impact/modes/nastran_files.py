@@ -35,11 +35,11 @@ def results(path: Path, deck: str = "") -> dict[str, np.ndarray]:
                 f"{path.name} holds no nodes; give the deck (.bdf) beside it: files=[{path.name!r}, 'it.bdf']"
             )
         model.cross_reference(xref=False, xref_nodes=True)
-        told, (moved, frames) = _nodes(model)
+        fields, (moved, frames) = _nodes(model)
         if frames.any():
-            found.transform_displacements_to_global(moved, model.coords, xyz_cid0=told["nodes"])
-        told |= _elements(model.elements, told)
-        numbers, table, cases = told["numbers"], list(found.eigenvectors.values()), list[list[np.ndarray]]()
+            found.transform_displacements_to_global(moved, model.coords, xyz_cid0=fields["nodes"])
+        fields |= _elements(model.elements, fields)
+        numbers, table, cases = fields["numbers"], list(found.eigenvectors.values()), list[list[np.ndarray]]()
         for tables in (table, found.displacements.values()):  # modes and static displacements
             cases.append([])
             for one in tables:
@@ -49,40 +49,40 @@ def results(path: Path, deck: str = "") -> dict[str, np.ndarray]:
         cycles = [np.asarray(one.mode_cycles if hasattr(one, "mode_cycles") else one.freqs, float) for one in table]
         signs = [np.where(np.asarray(getattr(one, "eigns", 0.0)) < 0.0, -1.0, 1.0) for one in table]
         frequencies = np.concatenate([np.zeros(0), *(sign * np.abs(each) for sign, each in zip(signs, cycles))])
-        told |= cell_kinds.steps(len(numbers), *cases) | {"frequencies": frequencies}
+        fields |= cell_kinds.steps(len(numbers), *cases) | {"frequencies": frequencies}
         masses = [np.asarray(one.generalized_mass, float) for one in found.eigenvalues.values()]
         if masses and sum(map(len, masses)) >= len(frequencies):
-            told["modal_mass"] = np.concatenate(masses)[: len(frequencies)]
-    return told
+            fields["modal_mass"] = np.concatenate(masses)[: len(frequencies)]
+    return fields
 
 
 def deck(path: Path) -> dict[str, np.ndarray]:
     """Nodes, elements and matrices (DMIG) of a deck, and the unknowns of a reduction that it names."""
     with _quiet() as quiet:
         model = _deck(path, quiet)
-        told: dict[str, np.ndarray] = {}
+        fields: dict[str, np.ndarray] = {}
         if model.nodes:
             model.cross_reference(xref=False, xref_nodes=True)
-            told, (_, frames) = _nodes(model)
-            told |= _elements(model.elements, told)
+            fields, (_, frames) = _nodes(model)
+            fields |= _elements(model.elements, fields)
             if frames.any():
                 wrong = [number for number in set(frames.tolist()) if model.coords[number].type[-1:] != "R"]
                 if wrong:
                     raise ValueError(f"{path.name} has displacements in frame {wrong[0]}, which is not rectangular")
-                told["frames"] = np.array([model.coords[number].beta() for number in frames.tolist()])
+                fields["frames"] = np.array([model.coords[number].beta() for number in frames.tolist()])
     for kind, name in cell_kinds.matrices_by_kind(path.name, model.dmig).items():
         matrix = model.dmig[name]
         if matrix.is_complex:
             raise ValueError(f"{kind} must be real; give damping as damping_ratio")
         if kind != "recovery":
             pair = np.asarray(matrix.GCj), np.asarray(matrix.GCi)
-            told[f"{kind}_entries"] = np.column_stack([*pair, np.asarray(matrix.Real, float)])
+            fields[f"{kind}_entries"] = np.column_stack([*pair, np.asarray(matrix.Real, float)])
     kept = [card for cards in (model.asets, model.bsets, model.csets) for card in cards]
     dofs = [(int(node), int(way)) for card in kept for node, ways in _components(card) for way in ways]
     dofs += [(int(node), 0) for card in model.qsets for node, _ in _components(card)]
     if dofs:
-        told["dofs"] = np.array(sorted(set(dofs)), int)  # as Nastran orders the rows of matrices of its a-set
-    return told
+        fields["dofs"] = np.array(sorted(set(dofs)), int)  # as Nastran orders the rows of matrices of its a-set
+    return fields
 
 
 def matrices(path: Path) -> dict[str, np.ndarray]:
@@ -91,13 +91,13 @@ def matrices(path: Path) -> dict[str, np.ndarray]:
         from pyNastran.op4.op4 import read_op4
 
         found = read_op4(str(path), **quiet)
-    told: dict[str, np.ndarray] = {}
+    fields: dict[str, np.ndarray] = {}
     for kind, name in cell_kinds.matrices_by_kind(path.name, found).items():
         matrix = found[name]
-        told |= cell_kinds.triplets(kind, matrix[1] if isinstance(matrix, tuple) else matrix.data)
-    if not told:
+        fields |= cell_kinds.triplets(kind, matrix[1] if isinstance(matrix, tuple) else matrix.data)
+    if not fields:
         raise ValueError(f"{path.name} must hold matrices named K... and M..., got {', '.join(found) or 'none'}")
-    return told
+    return fields
 
 
 @contextlib.contextmanager
@@ -131,11 +131,11 @@ def _nodes(read: Any) -> tuple[dict[str, np.ndarray], tuple[Any, np.ndarray]]:
     return {"numbers": at, "nodes": read.transform_xyzcp_to_xyz_cid(places, at, placed, cid=0)}, (moved, numbers[:, 2])
 
 
-def _elements(cards: Any, told: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
+def _elements(cards: Any, fields: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
     blocks: dict[int, list[list[int]]] = {}
     for element in cards.values():
         code, corners = ELEMENTS.get(element.type, (0, 0))
         if code:
             blocks.setdefault(code, []).append(element.node_ids[:corners])
-    rows = {code: cell_kinds.rows_of(told["numbers"], each) for code, each in blocks.items()}
-    return cell_kinds.surface_and_kind(told["nodes"], rows)
+    rows = {code: cell_kinds.rows_of(fields["numbers"], each) for code, each in blocks.items()}
+    return cell_kinds.surface_and_kind(fields["nodes"], rows)

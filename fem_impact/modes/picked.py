@@ -16,12 +16,12 @@ from .._base.rounding import ROUNDING
 from . import cell_kinds
 
 PER_FORCE = {"m/s^2/N": 2, "m/s/N": 1, "m/N": 0}  # unit of a response -> times that it was differentiated
-FELT = 0.1  # [-] of the largest force spectrum: 20 dB below it a hammer tells little (ISO 7626-5)
+FELT = 0.1  # [-] of the largest force spectrum: 20 dB below it a hammer excites too little (ISO 7626-5)
 PROMINENCE = 1.5  # [-] of logarithms: peaks of less than a factor of 4.5 over their surroundings may be noise
 DAMPING = 1e-6, 0.5  # [-] damping ratios of a peak that is sought
 GAIN = 10.0  # [-] of the noise variance: what each value of one more mode must explain, where luck explains one
-LINES = 9  # [-] whose mean tells what a line weighs: a third of the noise; 5 and 21 do as well (test_picked.py)
-ABOUT = 20  # [-] lines on either side of a peak that tell the noise there, to a tenth
+LINES = 9  # [-] whose mean sets the weight of a line: a third of the noise; 5 and 21 do as well (test_picked.py)
+ABOUT = 20  # [-] lines on either side of a peak that give the noise there, to a tenth
 ENDS = ("node", "direction"), ("reference", "reference_direction")
 
 
@@ -181,7 +181,7 @@ def _fit(omega: np.ndarray, data: np.ndarray, weight: np.ndarray, start: np.ndar
 
 
 def _with_one_more(omega: np.ndarray, data: np.ndarray, weight: np.ndarray, before: _Modes) -> _Modes | None:
-    """The modes and one where they leave most; None if that is noise, or a peak too near another to be told apart."""
+    """The modes and one where they leave most; None if that is noise, or too near another peak."""
     n = before.poles.shape[1]
     size = np.linalg.norm(before.rest.reshape(2, len(omega), -1), axis=(0, 2))
     natural, damping = np.exp(before.poles)
@@ -277,18 +277,18 @@ def modes_of(found: Any, driving: Any, points: Any, about: Any) -> tuple[dict[st
             f"frf has a response at the point struck, {label(found, drive)}, that moves against the force; change the "
             "sign of its direction"
         )
-    told = own > 3.0 * doubt  # standard errors
-    if not told.any():
+    moved = own > 3.0 * doubt  # standard errors
+    if not moved.any():
         raise ValueError(f"frf must have a response {label(found, drive)} at the point struck that moves in its modes")
     notes = [f"picked from frequency responses, of which {100.0 * picked.left:.2g} % rms are left unexplained"]
-    if not told.all():
-        lost = ", ".join(f"{one:.5g} Hz" for one in picked.frequencies[~told])
+    if not moved.all():
+        lost = ", ".join(f"{one:.5g} Hz" for one in picked.frequencies[~moved])
         notes.append(f"modes at {lost} are left out: the point struck hardly moves in them, so that they have no scale")
     errors = np.hypot(picked.errors[used] / np.maximum(np.abs(products), 1e-300), picked.misfit[used])
     return {
-        "frequencies": picked.frequencies[told], "damping_ratio": picked.damping_ratio[told],
-        "shapes": products[:, told] / np.sqrt(own[told]), "points": response_points(found, points, used, end),
-    }, errors[:, told], notes  # fmt: skip
+        "frequencies": picked.frequencies[moved], "damping_ratio": picked.damping_ratio[moved],
+        "shapes": products[:, moved] / np.sqrt(own[moved]), "points": response_points(found, points, used, end),
+    }, errors[:, moved], notes  # fmt: skip
 
 
 def label(found: Any, i: int) -> str:

@@ -1,8 +1,8 @@
-"""Ritz vectors started from point loads: a body as seen from the points where it is struck.
+"""Ritz vectors started from point loads: a body as it is excited at the points where it is struck.
 
 The vectors span the Krylov space of (K + s**2 M)**-1 M that starts with the static deflection under the loads. Their
 Ritz pairs are a Gauss quadrature of the body's response at those points: modes that the loads do not excite never
-appear, and modes closer together than a blow can tell apart become one. One factorisation and one solution per vector
+appear, and modes closer together than a blow can distinguish become one. One factorisation and one solution per vector
 replace the search for eigenvalues, and the first vectors of a longer run are the vectors of a shorter one.
 
 References
@@ -27,7 +27,7 @@ from ..fe.refinement import heavier
 from .modal import Damping, Modes, damping_ratios
 from .shapes import ElementShapes
 
-# [-] part of the vectors with which a second blow tells the error: at the third power it errs 2.9 times more
+# [-] part of the vectors with which a second blow estimates the error: at the third power it errs 2.9 times more
 FEWER = 0.7
 
 
@@ -35,7 +35,7 @@ FEWER = 0.7
 def ritz_modes(
     system: System, points: Any, *, max_frequency: float, n_vectors: int = 100, damping_ratio: Damping = 0.0
 ) -> Modes:
-    """Describe a body as forces at given points see it, by Ritz vectors instead of modes.
+    """Describe a body as forces at given points excite it, by Ritz vectors instead of modes.
 
     Parameters
     ----------
@@ -59,8 +59,8 @@ def ritz_modes(
     --------
     >>> plate = fi.Plate(fi.Material(E=10e9, nu=0.3, rho=450.0), thickness=3e-3)
     >>> system = fi.assemble(fi.mesh.rectangle(0.465, 0.3), plate, {"boundary": "hinged"}, near=[(0.1, 0.1)])
-    >>> seen = fi.ritz_modes(system, [(0.1, 0.1)], max_frequency=5e3, n_vectors=40)
-    >>> seen.n_modes, round(float(seen.frequencies[0]), 2)
+    >>> body = fi.ritz_modes(system, [(0.1, 0.1)], max_frequency=5e3, n_vectors=40)
+    >>> body.n_modes, round(float(body.frequencies[0]), 2)
     (40, 105.78)
     """
     place = check.places("points", points, system.mesh.dimension)

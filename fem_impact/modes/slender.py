@@ -153,7 +153,7 @@ def beam(
 def _stoutness(
     theory: str, section: Any, length: float, slenderness: float | None, shear_ratio: float
 ) -> timoshenko.Stoutness | None:
-    """What tells a Timoshenko beam from a slender one; None for the latter."""
+    """What distinguishes a Timoshenko beam from a slender one; None for the latter."""
     if check.one_of("theory", theory, ("euler", "timoshenko")) == "euler":
         if slenderness is not None:
             raise ValueError("slenderness needs theory = 'timoshenko'")

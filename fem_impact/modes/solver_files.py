@@ -96,9 +96,9 @@ def med(path: Path) -> dict[str, np.ndarray]:
     groups = getattr(read, "point_tags", {}) if "point_tags" in read.point_data else {}
     names = {name: np.flatnonzero(read.point_data["point_tags"] == tag) for tag, own in groups.items() for name in own}
     numbers = np.arange(1, len(nodes) + 1)
-    told = {"nodes": nodes, "numbers": numbers, "frequencies": np.array(frequencies)}
-    told |= cell_kinds.steps(len(nodes), shapes, static)
-    return told | _names(names, numbers) | cell_kinds.surface_and_kind(nodes, cell_kinds.of_meshio(read.cells))
+    mesh = {"nodes": nodes, "numbers": numbers} | cell_kinds.surface_and_kind(nodes, cell_kinds.of_meshio(read.cells))
+    motions = cell_kinds.steps(len(nodes), shapes, static) | {"frequencies": np.array(frequencies)}
+    return mesh | motions | _names(names, numbers)
 
 
 def ansys(path: Path) -> dict[str, np.ndarray]:
@@ -138,7 +138,7 @@ def ansys(path: Path) -> dict[str, np.ndarray]:
 
 
 def matrix(path: Path) -> dict[str, np.ndarray]:
-    """A matrix of text: of MatrixMarket, or Abaqus's by nodes and directions; its name tells which."""
+    """A matrix of text: of MatrixMarket, or Abaqus's by nodes and directions; its name says which."""
     kind = cell_kinds.kind_of_matrix(path.stem)
     if not kind:
         raise ValueError(f"{path.name} must say what it is: name it K... or ...STIF..., M... or ...MASS..., or R...")

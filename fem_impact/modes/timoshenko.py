@@ -1,6 +1,6 @@
 """Modes of a uniform Timoshenko beam in closed form, for all ends, none missed.
 
-In units of its length, mass and bending stiffness the beam is told by R = (radius of gyration / length)^2 and
+In units of its length, mass and bending stiffness the beam is described by R = (radius of gyration / length)^2 and
 S = E I / (kappa G A length^2). At p = omega^2, with k^2 and -q^2 the roots of K^2 - p (R + S) K + p (p R S - 1) = 0,
 
     w = a cos kx + b sin kx + c exp(-qx) + d exp(q (x - 1)),     rotation beta' = w'' + p S w.

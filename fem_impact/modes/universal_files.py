@@ -192,9 +192,9 @@ def _result(one: dict) -> dict:
     if one.get("dataset_location") != 1 or one.get("result_type") != DISPLACEMENT:
         return {}
     values = np.array([row[:3] for row in one["data_at_node"]])
-    told = {"freq": one.get("record12_field2"), "modal_m": one.get("record12_field4")}
-    told |= {"modal_damp_vis": one.get("record12_field5"), "modal_damp_his": one.get("record12_field6")}
-    return one | told | dict(zip(COMPONENTS, values.T))
+    renamed = {"freq": one.get("record12_field2"), "modal_m": one.get("record12_field4")}
+    renamed |= {"modal_damp_vis": one.get("record12_field5"), "modal_damp_his": one.get("record12_field6")}
+    return one | renamed | dict(zip(COMPONENTS, values.T))
 
 
 def _moved(name: str, i: int, one: dict, measured: np.ndarray) -> np.ndarray:

@@ -1,4 +1,4 @@
-"""What modes from elsewhere leave unsaid, as far as they tell it themselves: modes left out, and rigid motions.
+"""What modes from elsewhere leave unstated, as far as they determine it themselves: modes left out, and rigid motions.
 
 The squared shapes of all modes up to omega at one point add up to ``S = A omega**p``, rigid motions included: p is 1 on
 a plate and 1/2 on a beam, in their middle without any correction for the edge; a body in three dimensions may be

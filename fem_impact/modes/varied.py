@@ -17,7 +17,7 @@ from .shapes import FieldShapes
 
 @dataclass(frozen=True, eq=False, repr=False)
 class ModesChange(check.Locked):
-    """Changes per unit of a number, of modes as seen from one point."""
+    """Changes per unit of a number, of modes as they are excited at one point."""
 
     omega: np.ndarray  # (n_modes,) [rad/s]
     shape: np.ndarray  # (n_modes,) [kg**-0.5] at the point
@@ -60,38 +60,38 @@ def frequency_slopes(modes: Modes, change: SectionChange, which: np.ndarray) -> 
 
 
 def sharing(modes: Modes) -> np.ndarray:
-    """Whether each two modes share one frequency, as far as the elements tell, (n_modes, n_modes)."""
+    """Whether each two modes share one frequency, as far as the elements resolve, (n_modes, n_modes)."""
     omega, doubt = modes.omega, CLUSTER if modes.frequency_error is None else CLUSTER + modes.frequency_error
     unsure = doubt * omega
     return np.abs(omega - omega[:, None]) <= np.maximum(unsure, np.reshape(unsure, (-1, 1)))
 
 
 def changed_modes(modes: Modes, change: SectionChange, at: np.ndarray) -> ModesChange:
-    """Changes of modes as seen from a point ``at`` (dimension,) [m], exact but for the elements and the plane of ribs.
+    """Changes of modes as excited at a point ``at`` (dimension,) [m], exact but for the elements and the plane of ribs.
 
-    Modes that share a frequency are changed together: only what the point sees of them counts, and that is smooth.
+    Modes that share a frequency are changed together: only their motion at the point counts, and that is smooth.
     """
     shapes = solution(modes)
     system, n = shapes.system, modes.n_modes
     frame, n_rigid = system.frame, modes.n_rigid
     load = np.asarray(system.interpolate(at[None]).todense()).T  # (n_dofs, 1)
-    seen = (load.T @ shapes.vectors)[0]  # (n_modes,) in the frame
+    shape_at = (load.T @ shapes.vectors)[0]  # (n_modes,) in the frame
     square = (modes.omega / frame.rate) ** 2
-    rest = _rest_vectors(shapes, seen, square, load)
+    rest = _rest_vectors(shapes, shape_at, square, load)
     stiffer, heavier = _changes(modes, change, np.arange(n), rest)
     force = stiffer[:, :n] - heavier[:, :n] * square  # (n + n_rest, n) what a change of each mode is pushed with
     slope = np.diag(force[:n]).copy()  # of the eigenvalues
     apart, alike = square - square[:, None], sharing(modes)
     mix = np.where(alike, -0.5 * heavier[:n, :n], force[:n] / np.where(alike, 1.0, apart))
-    shape = seen @ mix
+    shape = shape_at @ mix
     growth = np.array([square**k for k in range(len(rest))])
     growth[-1] *= _tail(shapes, rest, square)
     shape -= np.einsum("ki,ki->i", growth, force[n:])
     for i in np.flatnonzero(alike.sum(axis=0) > 1):
         group = alike[i]
-        size = float(seen[group] @ seen[group])
+        size = float(shape_at[group] @ shape_at[group])
         if i >= n_rigid and size:
-            slope[i] = float(seen[group] @ force[:n][np.ix_(group, group)] @ seen[group]) / size
+            slope[i] = float(shape_at[group] @ force[:n][np.ix_(group, group)] @ shape_at[group]) / size
     omega = np.zeros(n)
     omega[n_rigid:] = slope[n_rigid:] * frame.rate**2 / (2.0 * modes.omega[n_rigid:])
     found = shapes._deflection(at[None])
@@ -123,7 +123,7 @@ def _changes(modes: Modes, change: SectionChange, which: np.ndarray, rest: Any) 
     return stiffer[:-n, :-n], heavier[:-n, :-n]
 
 
-def _rest_vectors(shapes: FieldShapes, seen: np.ndarray, square: np.ndarray, load: np.ndarray) -> list[np.ndarray]:
+def _rest_vectors(shapes: FieldShapes, shape_at: np.ndarray, square: np.ndarray, load: np.ndarray) -> list[np.ndarray]:
     """Vectors r_k (n_dofs,): the sum over all modes left out of their shape at the load over square**(k+1), times them.
 
     Their series in powers of a square frequency is how the modes left out answer at that frequency. The error of these
@@ -133,7 +133,7 @@ def _rest_vectors(shapes: FieldShapes, seen: np.ndarray, square: np.ndarray, loa
     M = shapes.system.M
     kept = shapes.vectors
     light = M @ kept
-    found = [shapes.flexibility.solve(load)[:, 0] - kept[:, flexible] @ (seen[flexible] / square[flexible])]
+    found = [shapes.flexibility.solve(load)[:, 0] - kept[:, flexible] @ (shape_at[flexible] / square[flexible])]
     for _ in range(9):
         heavy = M @ found[-1]
         heavy -= light @ np.linalg.solve(kept.T @ light, kept.T @ heavy)  # rounding of the kept modes would grow

@@ -240,7 +240,7 @@ def test_a_striker_that_turns_is_mapped():
     (lambda: onto(fi.Striker.turning(1.0, 1e-3, (0.02, 0.0), pivot=(-0.2, 0.0)), -0.2),
      "first_at of body 0 must come towards"),
     (lambda: onto(fi.Striker.rigid(1.0).falling()), "striker must not fall in a collision"),
-    (lambda: onto(curved().modes("normal"), curved().at(1)), "along normals nothing tells how it arrives"),
+    (lambda: onto(curved().modes("normal"), curved().at(1)), "along normals its motion before the blow is not defined"),
 ])  # fmt: skip
 def test_what_no_motion_allows_is_refused(make, said):
     with pytest.raises(ValueError, match=said):

@@ -55,7 +55,7 @@ def test_what_files_lack_is_said(tmp_path):
     for call, said in (
         (lambda: body.modes("up"), "direction must be one of normal, x, y, z"),
         (lambda: body.modes((0.0, 0.0, 0.0)), "direction must not be zero"),
-        (line.modes, "neither cells nor a plane tell the normals"),
+        (line.modes, "neither cells nor a plane define the normals"),
         (
             lambda: fi.Body.load(tmp_path / "body.odb", mass=1.0),
             r"files must be one of \.uff, .* 'body.odb'; convert it",
