@@ -266,7 +266,7 @@ def _sounds(scene: Scene, response: Response | Strokes) -> list[dict[str, str]]:
             where = f" to {place(listener)}" if scene.listeners else ", 1 m in front of the strike point"
             sounds = hearing.radiated(scene, response, listener, _duration(response))
             for bound, pressure in zip(hearing.BOUNDS[len(sounds)], sounds):
-                told = f" without a baffle, {BOUND[bound]}; {hearing.tell_level(sounds)}" if bound else ""
+                told = f" without a baffle, {BOUND[bound]}; {hearing.stated_level(sounds)}" if bound else ""
                 heard.append((f"Sound radiated{where}{told}", pressure))
     players = []
     for name, samples in heard:

@@ -99,7 +99,7 @@ def _drawn(whole: str, drawing: Path, unit: str | None, folder: Path) -> tuple[s
 def _listed_as(table: str, name: str) -> str:
     """A table of the scene with a name of the catalogue."""
     line = f"name = {json.dumps(name)}".ljust(26)
-    return f"[{table}]\n{line}# `fem-impact catalogue` tells its numbers; other keys here replace them\n"
+    return f"[{table}]\n{line}# `fem-impact catalogue` lists its numbers; other keys here replace them\n"
 
 
 def _with(whole: str, head: str, block: str) -> str:

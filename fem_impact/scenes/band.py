@@ -141,9 +141,9 @@ def band(scene: Scene | str | Path, *, n: int | None = None, seed: int = 0, **ch
     >>> found["contact_time"].low < found.hit.contact_time < found["contact_time"].high
     True
     """
-    told = scene if isinstance(scene, Scene) else load_scene(scene)
-    check_known(told)
-    return around(told, told.strike(**changes), n=n, seed=seed)
+    known = scene if isinstance(scene, Scene) else load_scene(scene)
+    check_known(known)
+    return around(known, known.strike(**changes), n=n, seed=seed)
 
 
 def check_known(scene: Scene) -> None:

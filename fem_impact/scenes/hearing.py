@@ -1,4 +1,4 @@
-"""Writes what a scene lets hear: the motion of every observed point and the pressure at every listener."""
+"""Writes the sounds of a scene: the motion of every observed point and the pressure at every listener."""
 
 import math
 from collections.abc import Callable
@@ -27,10 +27,10 @@ def radiated(
     return sound.radiate_bar(response, listener, width=width, height=height, duration=duration)
 
 
-def tell_level(heard: tuple[sound.Sound, ...]) -> str:
+def stated_level(sounds: tuple[sound.Sound, ...]) -> str:
     """The peak level at a listener in words, with its reference; of two sounds the levels between which it lies."""
-    low, high = sorted((heard[0], heard[-1]), key=lambda each: each.level)
-    if len(heard) == 1 or high.level == -math.inf:
+    low, high = sorted((sounds[0], sounds[-1]), key=lambda each: each.level)
+    if len(sounds) == 1 or high.level == -math.inf:
         return high.said
     least = "silence" if low.level == -math.inf else low.said.partition(" dB")[0]
     return f"bounded: between {least} and {high.said}"
@@ -48,8 +48,8 @@ def write_sounds(
     wanted: dict[str, Any] = {"duration": duration, "normalise": normalise}
     found = []
     for i, point in enumerate(scene.points):
-        heard = export.write_wav(folder / _name("strike", i), response, at=point, **wanted)
-        found.append({"file": _name("strike", i), "at": point, **_levels((heard,), heard)})
+        written = export.write_wav(folder / _name("strike", i), response, at=point, **wanted)
+        found.append({"file": _name("strike", i), "at": point, **_levels((written,), written)})
     ears = [radiated(scene, response, listener, duration) for listener in scene.listeners]
     for i, (listener, sounds) in enumerate(zip(scene.listeners, ears)):
         found += _written(folder, partial(_name, "radiated", i), sounds, normalise, listener=listener)
@@ -62,7 +62,7 @@ def write_sounds(
 def _written(
     folder: Path, named: Callable[[str], str], sounds: tuple[sound.Sound, ...], normalise: bool, **place: Any
 ) -> list[dict[str, Any]]:
-    """Write the sounds at one place, or the bounds of one, on the scale of the last; what to tell of each."""
+    """Write the sounds at one place, or the bounds of one, on the scale of the last; file, place and levels of each."""
     last = sounds[-1].normalised() if normalise else sounds[-1].audible()
     found = []
     for bound, each in zip(BOUNDS[len(sounds)], sounds):
@@ -76,6 +76,6 @@ def _name(kind: str, i: int, bound: str = "") -> str:
     return "_".join([kind, *([str(i + 1)] if i else []), *([bound] if bound else [])]) + ".wav"
 
 
-def _levels(sounds: tuple[sound.Sound, ...], heard: sound.Sound) -> dict[str, Any]:
-    levels = {"full_scale": heard.full_scale, "unit": heard.unit, "peak_level": heard.peak_level, "level": heard.level}
-    return {**levels, "stated": tell_level(sounds), "reference": sound.REFERENCE[heard.unit][0]}
+def _levels(sounds: tuple[sound.Sound, ...], own: sound.Sound) -> dict[str, Any]:
+    levels = {"full_scale": own.full_scale, "unit": own.unit, "peak_level": own.peak_level, "level": own.level}
+    return {**levels, "stated": stated_level(sounds), "reference": sound.REFERENCE[own.unit][0]}

@@ -54,13 +54,13 @@ def _entry(called: str, names: Catalogue[Any], name: Any) -> Entry:
 
 def _striker(called: str, table: Mapping[str, Any], scene: Mapping[str, Any]) -> dict[str, Any]:
     """A table with those of the striker and the contact that the striker's name stands for, if it has one."""
-    told = table.get("striker")
-    if not isinstance(told, Mapping) or "name" not in told:
+    given = table.get("striker")
+    if not isinstance(given, Mapping) or "name" not in given:
         return dict(table)
-    if "kind" in told:
+    if "kind" in given:
         raise ValueError(f"{called} kind must be left out beside name, which has one")
-    entry = _entry(called, strikers, told["name"])
-    own = {key: value for key, value in told.items() if key != "name"}
+    entry = _entry(called, strikers, given["name"])
+    own = {key: value for key, value in given.items() if key != "name"}
     found = {**table, "striker": {**entry.table, **own}}
     return found if "contact" in table else {**found, "contact": entry.contact_table(_struck(called, entry, scene))}
 

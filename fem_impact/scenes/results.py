@@ -144,8 +144,8 @@ def load_response(folder: str | Path) -> Response | Strokes:
     if not (folder / SAVED).is_file():
         raise fault(folder / SAVED, f"there is no such file, which a blow is read from; {again}")
     try:
-        told = kept.unpack(folder / SAVED, key, KINDS) or {}
-        found, assumptions = told["response"], told["assumptions"]
+        saved = kept.unpack(folder / SAVED, key, KINDS) or {}
+        found, assumptions = saved["response"], saved["assumptions"]
         if not isinstance(found, Strokes):
             return _checked(found, assumptions)
         judged = [assumptions if i == found.hardest else None for i in range(len(found.hits))]
@@ -225,17 +225,17 @@ def _of_strike(path: Path) -> tuple[dict[str, Any], list[str]]:
     kept_there = {name: data[name] for name in ("response", "sequence") if isinstance(data.get(name), dict)}
     if not kept_there:
         raise fault(path, "it is damaged: it has neither response nor sequence")
-    told = next(iter(kept_there.values()))
-    count = told.get("n_impacts")
-    rebound = told.get("restitution")
+    blow = next(iter(kept_there.values()))
+    count = blow.get("n_impacts")
+    rebound = blow.get("restitution")
     numbers = [f"{count} impact{'s' if count != 1 else ''}"]
-    numbers += [f"{name} {si(told[key], unit)}" for key, (name, unit) in NUMBERS.items()
-                if isinstance(told.get(key), float)]  # fmt: skip
+    numbers += [f"{name} {si(blow[key], unit)}" for key, (name, unit) in NUMBERS.items()
+                if isinstance(blow.get(key), float)]  # fmt: skip
     numbers += [f"restitution {rebound:.5g}"] if isinstance(rebound, float) else []
     readable = [f"`fi.load_response({str(path.parent)!r})` reads it"] if path.with_name(SAVED).is_file() else []
     scene = data.get("scene")
     title = scene.get("title") if isinstance(scene, dict) else None
-    said = [str(title or "a scene without title"), str(told.get("verdict", "")), ", ".join(numbers), *readable]
+    said = [str(title or "a scene without title"), str(blow.get("verdict", "")), ", ".join(numbers), *readable]
     return kept_there, [line for line in said if line]
 
 
@@ -265,7 +265,7 @@ def _of_fit(path: Path) -> tuple[dict[str, Any], list[str]]:
 
 NUMBERS = {"contact_time": ("contact time", "s"), "peak_force": ("peak force", "N"), "impulse": ("impulse", "N s")}
 Reader = Callable[[Path], tuple[dict[str, Any], list[str]]]
-READERS: dict[str, tuple[str, Reader]] = {  # file: the command that wrote it, and what tells what is in it
+READERS: dict[str, tuple[str, Reader]] = {  # file: the command that wrote it, and the function that says what is in it
     "response.json": ("strike", _of_strike), "map.nc": ("map", _of_map), "map.zarr": ("map", _of_map),
     "spread.json": ("spread", _of_spread), "fit.json": ("fit", _of_fit),
     "report.html": ("report", lambda path: ({}, [f"{path} is a page to open in a browser"])),

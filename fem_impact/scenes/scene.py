@@ -221,8 +221,8 @@ class Scene(check.Brief):
     @property
     def listeners(self) -> list[Any]:
         """Positions of the listeners to the sound radiated, (n_listeners, 3) [m]; empty if [observe] has none."""
-        told = {} if self.observe is None else self.observe.values
-        return [told["listener"]] if "listener" in told else list(told.get("listeners", []))
+        given = {} if self.observe is None else self.observe.values
+        return [given["listener"]] if "listener" in given else list(given.get("listeners", []))
 
     @property
     def baffled(self) -> bool:
@@ -231,7 +231,7 @@ class Scene(check.Brief):
 
     @property
     def girth(self) -> tuple[float, float]:
-        """Largest width and height [m] of a beam, as the air around it sees them."""
+        """Largest width and height [m] of a beam, which set how much air it moves."""
         section, points = self.make_section("beam"), self.body().points
         x = np.linspace(points.min(axis=0), points.max(axis=0), SECTIONS)
         assert isinstance(section, Beam)
@@ -245,10 +245,10 @@ class Scene(check.Brief):
 
     def heard_from(self, *listeners: Any) -> "Scene":
         """The same scene with listeners at (3,) [m]; the third coordinate is the distance from the plate's plane."""
-        told = dict((NOTHING if self.observe is None else self.observe).values)
-        told = {key: value for key, value in told.items() if key not in ("listener", "listeners")}
-        heard = {"listener": listeners[0]} if len(listeners) == 1 else {"listeners": list(listeners)}
-        part = Part("", {**told, **heard})
+        given = dict((NOTHING if self.observe is None else self.observe).values)
+        others = {key: value for key, value in given.items() if key not in ("listener", "listeners")}
+        places = {"listener": listeners[0]} if len(listeners) == 1 else {"listeners": list(listeners)}
+        part = Part("", {**others, **places})
         scene = replace(self, observe=part)
         check_whole(scene)
         return scene
@@ -375,14 +375,14 @@ class Scene(check.Brief):
         for edge in self.in_plane.values:
             with self.blame("in_plane"):
                 check.one_of("edge", edge, mesh.edges)
-        told = {name: value for name, value in self._target.items() if name != "nu"}
-        told["point_supports"] = tuple(entry for entry in told["point_supports"] if entry[1] != "clamped")
+        options = {name: value for name, value in self._target.items() if name != "nu"}
+        options["point_supports"] = tuple(entry for entry in options["point_supports"] if entry[1] != "clamped")
         with self.blame("target"):
-            if isinstance(section, Plate) and not section.plain and told["theory"] not in (None, "shallow"):
+            if isinstance(section, Plate) and not section.plain and options["theory"] not in (None, "shallow"):
                 raise ValueError(
-                    f"theory must be left out for a curved, ribbed or coupled plate, got {told['theory']!r}"
+                    f"theory must be left out for a curved, ribbed or coupled plate, got {options['theory']!r}"
                 )
-            target = Target(mesh, section, supports, **told, blame=self.blame)
+            target = Target(mesh, section, supports, **options, blame=self.blame)
         points = tuple(self.points)
         moving = self.observe is not None
         return Blow(target, self._striker, self.make_contact(), self.blow.values, points, moving, f"{self.path}: ")

@@ -424,8 +424,8 @@ def _check_keys(selector: str, kind: str, values: dict[str, Any], maker: Callabl
     known = [selector, *arguments] if selector else list(arguments)
     for key in values:
         if key not in arguments:
-            told = check.nearest(key, known) or f"; it has {', '.join(known)}"
-            raise ValueError(f"{key} is not a key of this table{told}")
+            hint = check.nearest(key, known) or f"; it has {', '.join(known)}"
+            raise ValueError(f"{key} is not a key of this table{hint}")
     for key, argument in arguments.items():
         if argument.default is inspect.Parameter.empty and key not in values:
             raise ValueError(f"{key} is missing" + (f" for {selector} = {kind!r}" if selector else ""))

@@ -71,13 +71,13 @@ def words(scene: Scene, response: Response) -> list[str]:
     limit = threshold.threshold_frequency(response.target, response.at, striker.felt_mass)
     wall = f"contact resonance, {si(resonance, 'Hz', 3)}"
     if limit is None:
-        told = f"No rebound expected, whatever the {wall}: the body is no heavier than the striker."
+        hits = f"No rebound expected, whatever the {wall}: the body is no heavier than the striker."
     elif math.isinf(limit):
-        told = f"Single hit expected, whatever the {wall}: the striker always rebounds."
+        hits = f"Single hit expected, whatever the {wall}: the striker always rebounds."
     else:
         number, side = ("Single hit", "below") if resonance < limit else ("Several hits", "above")
-        told = f"{number} expected: the {wall}, is {side} the limit of {si(limit, 'Hz', 3)} (kinetic-energy criterion)."
-    return [body(scene, response.target), blow, contact(law), told]
+        hits = f"{number} expected: the {wall}, is {side} the limit of {si(limit, 'Hz', 3)} (kinetic-energy criterion)."
+    return [body(scene, response.target), blow, contact(law), hits]
 
 
 def body(scene: Scene, modes: Modes) -> str:
@@ -90,8 +90,8 @@ def body(scene: Scene, modes: Modes) -> str:
     kind = f"curved {kind}" if getattr(modes.section, "rise", None) else kind
     ribs = f", with {len(scene.rib)} rib{'s' * (len(scene.rib) > 1)}" if scene.rib else ""
     flexible = modes.frequencies[modes.omega > 0.0]
-    told = scene.held or {"boundary": "free"}
-    held = {edge: how if isinstance(how, str) else "held by springs" for edge, how in told.items()}
+    given = scene.held or {"boundary": "free"}
+    held = {edge: how if isinstance(how, str) else "held by springs" for edge, how in given.items()}
     if len(set(held.values())) == 1 and ("boundary" in held or len(held) == len(scene.body().edges) - 1):
         edges = next(iter(held.values())) + (" all round" if modes.dimension == 2 else " at both ends")
     else:
@@ -128,9 +128,9 @@ def contact(law: Contact) -> str:
     """A contact law in a few sentences."""
     raised = "" if law.exponent == 1.0 else f"{law.exponent:g}".translate(RAISED)
     stiffness = si(law.stiffness, "N/m") + raised
-    told = f"The contact is a spring that only pushes, with a force of {stiffness} × indentation{raised}"
-    told += f", with loss {law.loss:.3g} s/m." if law.loss else "."
-    return told + law.law.sentence(law, si)
+    sentence = f"The contact is a spring that only pushes, with a force of {stiffness} × indentation{raised}"
+    sentence += f", with loss {law.loss:.3g} s/m." if law.loss else "."
+    return sentence + law.law.sentence(law, si)
 
 
 def tip_notes(scene: Scene) -> tuple[str, ...]:

@@ -1,4 +1,4 @@
-"""A scene of several strokes: rolls, flams and two sticks at once, played on one body and told as one."""
+"""A scene of several strokes: rolls, flams and two sticks at once, played on one body and reported as one."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
@@ -85,8 +85,8 @@ class SequencePlan(check.Brief):
         ]  # fmt: skip
         head = "stroke", "when", "speed", "predicted error", "modes needed to"
         more = [f"... and {count - playing.LISTED} more"] if count > playing.LISTED else []
-        told = (*markup.columns(rows[: playing.LISTED], head), *more, *reasons)
-        lines = [shared, *below(shared), *(f"  {line}" for line in told)]
+        table = (*markup.columns(rows[: playing.LISTED], head), *more, *reasons)
+        lines = [shared, *below(shared), *(f"  {line}" for line in table)]
         if body.assumptions:
             said = assumption.lines(body.assumptions, self.tolerance)
             lines += [f"Model of stroke {self.needed}: {pointed(line)}" for line in said]
@@ -109,14 +109,14 @@ def run_sequence(
     strict: bool = False,
     **changes: Any,
 ) -> Played:
-    """As `Scene.run_strokes`: with the plan, which ``before`` sees first, and the time of every stage."""
+    """As `Scene.run_strokes`: with the plan, which ``before`` gets first, and the time of every stage."""
     stages = Stages(watch)
     planned = plan_sequence(scene, watch, **changes)
     if before is not None:
         before(planned.body)
     _, modes = planned.body.description.found(stages)
-    told = {name: scene.blow.values[name] for name in OF_SEQUENCE if name in scene.blow.values}
-    told |= {name: value for name, value in changes.items() if name in OF_SEQUENCE and value is not None}
+    options = {name: scene.blow.values[name] for name in OF_SEQUENCE if name in scene.blow.values}
+    options |= {name: value for name, value in changes.items() if name in OF_SEQUENCE and value is not None}
     strokes: list[tuple[Any, ...]] = []
     for i, part in enumerate(scene.stroke):
         single, own = scene.alone(i), part.values
@@ -124,7 +124,7 @@ def run_sequence(
         stroke = own["when"], striker, single.make_contact(), single.blow.values["at"], single.blow.values["speed"]
         strokes.append((*stroke, own["lasts"]) if "lasts" in own else stroke)
     with stages("strike"):
-        found = playing.strokes(modes, strokes, strict=strict, **told)
+        found = playing.strokes(modes, strokes, strict=strict, **options)
     found = replace(found, notes=tuple(dict.fromkeys((*modes.notes, *found.notes))))
     return Played(planned, found, dict(stages.seconds))
 
@@ -149,11 +149,11 @@ def plan_sequence(scene: "Scene", watch: Watch | None = None, **changes: Any) ->
         other = fastest.get(keys[-1], single)
         fastest[keys[-1]] = single if blow["speed"] >= other.blow.values["speed"] else other
     plans = {key: single.plan(watch=watch, **wanted) for key, single in fastest.items()}
-    told = tuple(
+    strokes = tuple(
         {"when": part.values["when"], "at": single.blow.values["at"], "speed": single.blow.values["speed"]}
         for part, single in zip(parts, alone)
     )
-    return SequencePlan(tolerance, told, tuple(plans[key] for key in keys))
+    return SequencePlan(tolerance, strokes, tuple(plans[key] for key in keys))
 
 
 def played_order(scene: "Scene") -> list[int]:
@@ -162,7 +162,7 @@ def played_order(scene: "Scene") -> list[int]:
 
 
 def sequence_numbers(found: Strokes, scene: Mapping[str, Any], seconds: Mapping[str, float]) -> dict[str, Any]:
-    """Everything a sequence told, as plain data: its numbers, strokes and impacts, and the tables of its scene."""
+    """Everything found of a sequence, as plain data: its numbers, strokes and impacts, and the tables of its scene."""
     data = {name: getattr(found, name) for name in SCALARS}
     strokes = [
         {

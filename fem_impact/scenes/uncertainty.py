@@ -125,17 +125,17 @@ def spread(
     if isinstance(scene, (System, Modes)):
         given = check.instance("striker", striker, Striker), check.instance("contact", contact, Contact)
         arguments = {"at": at, "speed": check.positive("speed", speed, "m/s", reach=REACH)}
-        told: Scene | None = None
+        loaded: Scene | None = None
         blow = Blow(Target.of(scene, damping_ratio), *given, arguments)
     else:
         own: dict[str, Any] = {"striker": striker, "contact": contact, "at": at, "speed": speed}
         for name, value in {**own, "damping_ratio": damping_ratio}.items():
             if value is not None:
                 raise ValueError(f"{name} must be left out for a scene, which has its own")
-        told = scene if isinstance(scene, Scene) else load_scene(scene)
-        told.check_single()
-        told.check_unpushed()
-        blow = told.built
+        loaded = scene if isinstance(scene, Scene) else load_scene(scene)
+        loaded.check_single()
+        loaded.check_unpushed()
+        blow = loaded.built
     inputs = read_inputs(vary)
     n = check.count("n", n)
     if n > (most := check.number("max_blows", max_blows)):
@@ -151,14 +151,14 @@ def spread(
     values = drawn(inputs, points, mixer)
     if not np.isfinite(values).all() or np.abs(values).max() > REACH:
         raise ValueError(f"vary must stay finite and below {REACH:g}; choose distributions with shorter tails")
-    asked = _SpreadAsked(blow, told, inputs, values, limit, store)
+    asked = _SpreadAsked(blow, loaded, inputs, values, limit, store)
     exact = replace(asked.cases(), band=band)
     base, rough = exact.base, few(exact)
     numbers, texts = solve_all(rough, workers, client, store, watch)
     checks, rescaled = _checked(exact, numbers, workers), asked.rescaled(base)
     notes = plausible.together(base.modes.notes, base.striker.notes)
     table = _table(inputs, values, rough, numbers, texts, d + 2 if groups else 1)
-    title = told.title or told.path.name if told is not None else ""
+    title = loaded.title or loaded.path.name if loaded is not None else ""
     return Spread(inputs, table, limit, groups, mixer, seed, checks=checks, rescaled=rescaled, title=title, notes=notes,
                   why_no_shares=why)  # fmt: skip
 
@@ -282,7 +282,7 @@ class _SpreadAsked:
                 blow, ends or {"speed": np.array([speed])}, tolerance=self.tolerance, store=self.store,
                 alone=residual and not self.places,
             )  # fmt: skip
-        except ValueError as error:  # what is wrong with an axis is told of the inputs
+        except ValueError as error:  # a fault of an axis is reported as one of the inputs
             if re.split(r"[ \[]", str(error))[0] not in (*AXES, "over", "first_frequency"):
                 raise
             said = str(error).replace("over['at']", "the strike point")

@@ -93,7 +93,7 @@ def check_axes(scene: "Scene", over: Mapping[str, Any]) -> list[str]:
 def _check_blow(scene: "Scene") -> None:
     """Check the numbers of [strike], and that places are points of a body of this dimension."""
     options = {name: value for name, value in scene.blow.values.items() if name not in ("tolerance", "quantity")}
-    at, speed = options.pop("at"), options.pop("speed")  # and those two may be told otherwise at the prompt
+    at, speed = options.pop("at"), options.pop("speed")  # and those two may be given otherwise at the prompt
     with scene.blame("strike"):
         _check_place(scene, "at", at)
         # strokes have speeds of their own

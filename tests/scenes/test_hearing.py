@@ -74,8 +74,8 @@ def test_the_air_around_a_plate_sees_no_wall_either(tmp_path):
 
 def test_silence_is_said():
     quiet, tone = (sound.Sound(value * np.ones(10), 48000, 1.0, "Pa") for value in (0.0, 0.2))
-    assert hearing.tell_level((quiet, tone)) == "bounded: between silence and 80.0 dB re 20 µPa"
-    assert hearing.tell_level((tone,)) == "80.0 dB re 20 µPa" and "inf" in hearing.tell_level((quiet, quiet))
+    assert hearing.stated_level((quiet, tone)) == "bounded: between silence and 80.0 dB re 20 µPa"
+    assert hearing.stated_level((tone,)) == "80.0 dB re 20 µPa" and "inf" in hearing.stated_level((quiet, quiet))
 
 
 @pytest.mark.parametrize(("text", "said"), [
