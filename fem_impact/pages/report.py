@@ -369,7 +369,7 @@ def _view(response: Response | Strokes, end: float) -> dict[str, Any]:
     }  # fmt: skip
     first = int(np.abs(wave).max(axis=1).argmax())
     if isinstance(response, Response):  # several strikers would hide the wave
-        first = sampling.telling(response, times)
+        first = sampling.clearest(response, times)
         columns["surface"] = response.displacement(response.at[None], times)[:, 0]
         columns["gap"] = sampling.gap(response, times)
     return {name: _short(values) for name, values in columns.items()} | {

@@ -1,6 +1,6 @@
 """Draws pictures in 3D from arrays alone, without a screen; as a process of its own it starts while a blow is computed.
 
-Nothing of the package is imported here but how files appear and how progress is told, and pyvista only to draw.
+Nothing of the package is imported here but how files appear and how progress is reported, and pyvista only to draw.
 """
 
 import base64
@@ -39,7 +39,7 @@ class Film(NamedTuple):
     motion: np.ndarray  # (n_times, n_points) [-] deflection over the largest
     gap: np.ndarray  # (n_times,) [-] distance of the striker over the largest deflection
     titles: list[str]
-    telling: int  # number of the frame that shows the wave best
+    clearest: int  # number of the frame that shows the wave best
     rise: Any = 0.0  # (n_points,) [m] of a curved plate
     ribs: Any = ()  # (n_sides, 2) sides along ribs
 
@@ -78,7 +78,7 @@ def draw(folder: Path, film: Film, shapes: Gallery, form: str = "png") -> None:
     """Draw all pictures of a blow into a folder, in a format of `show.FORMATS`."""
     pictures = list(frames(film))
     write_gif(folder / "wave.gif", pictures)
-    write_picture(folder / f"wave.{form}", pictures[film.telling])
+    write_picture(folder / f"wave.{form}", pictures[film.clearest])
     write_picture(folder / f"modes.{form}", gallery(shapes))
 
 

@@ -165,7 +165,7 @@ def write_wav(
 ) -> sound.Sound:
     """Write the sound of a blow as 32-bit float WAV, with a fade at its end, and return it.
 
-    A sample of 1 means the power of ten [m/s] or [Pa] just above the peak, so that every blow can be heard; with
+    A sample of 1 means the power of ten [m/s] or [Pa] just above the peak, so that every blow is audible; with
     ``normalise=True`` it means the peak. The true level stays in the comment of the file and in `Sound.stated`.
 
     The sound is the velocity of the point ``at`` (see `sound.synthesise`) or, with a ``listener``, the pressure near a

@@ -111,7 +111,7 @@ def wave(path: str | Path, response: Response, *, time: float | None = None) -> 
     """
     check.ending(path, *STILL)
     times = np.linspace(0.0, sampling.end_of(response), FRAMES)
-    instant = times[sampling.telling(response, times)] if time is None else check.non_negative("time", time, "s")
+    instant = times[sampling.clearest(response, times)] if time is None else check.non_negative("time", time, "s")
     (frame,) = frames_at(response, np.array([instant]))
     canvas.write_picture(path, frame)
     return "" if can_render() else REMEDY
@@ -168,9 +168,9 @@ def film(response: Response, times: np.ndarray | None = None) -> canvas.Film:
     gap = sampling.gap(response, times)
     titles = [f"{1e3 * time:.3f} ms, deflection up to {1e3 * largest:.3g} mm" for time in times]
     at = np.append(np.atleast_1d(np.asarray(response.at)), [0.0])[:2]
-    telling = sampling.telling(response, times)
+    clearest = sampling.clearest(response, times)
     shape = _shape(modes, points, cells)
-    return canvas.Film(plane, cells, boundary(cells), at, motion / largest, gap / largest, titles, telling, *shape)
+    return canvas.Film(plane, cells, boundary(cells), at, motion / largest, gap / largest, titles, clearest, *shape)
 
 
 def frames_at(response: Response, times: np.ndarray) -> Iterator[Image.Image]:

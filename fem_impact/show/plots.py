@@ -86,7 +86,7 @@ def curves(
     panels = list(dict.fromkeys(curve.panel for curve in drawn))
     with styled(6.4, 3.8 if len(panels) == 1 else 2.2 * len(panels)) as figure:
         called = {tuple(curve.label for curve in drawn if curve.panel == panel and curve.label) for panel in panels}
-        same = len(panels) > 1 and len(called) == 1  # then one legend below tells the curves of all panels
+        same = len(panels) > 1 and len(called) == 1  # then one legend below names the curves of all panels
         all_axes = figure.subplots(len(panels), sharex=True, squeeze=False)[:, 0]
         for axes, panel in zip(all_axes, panels):
             if filled is not None:
@@ -148,7 +148,7 @@ def colour_map(
             shown = np.ma.masked_equal(np.asarray(mask, float), 0.0)
             axes.pcolormesh(*edges, shown, cmap=ListedColormap([paint]), vmin=0.0, vmax=1.0, rasterized=True)
             handles.append(Patch(facecolor=paint, edgecolor=GREY, label=name))
-        if borders:  # in a colour that is seen on all of the palette
+        if borders:  # in a colour that is visible on all of the palette
             paths = [np.column_stack(line) for line in borders]
             axes.add_collection(LineCollection(paths, colors=VERMILION, linewidths=0.8, label="borders"))
             handles.append(Line2D([], [], color=VERMILION, lw=0.8, label="the number of impacts changes"))
@@ -162,7 +162,7 @@ def colour_map(
             handles.append(Line2D([], [], color="white", ls=style, lw=1.0, label=name, path_effects=[HALO]))
         for mark in marks:
             ring: dict[str, Any] = {"ls": "", "marker": "o", "ms": 10, "mfc": "none", "mec": mark.color, "mew": 2.2}
-            ring["path_effects"] = [withStroke(linewidth=4.0, foreground="white")]  # seen on dark colours
+            ring["path_effects"] = [withStroke(linewidth=4.0, foreground="white")]  # visible on dark colours
             axes.plot([mark.x], [mark.y], clip_on=False, **ring)
             handles.append(Line2D([], [], label=mark.label, **ring))
         axes.set_title(title)

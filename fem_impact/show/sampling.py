@@ -75,7 +75,7 @@ def end_of(response: Response | Strokes) -> float:
     return first + AFTER * (last - first) or 1.0
 
 
-def telling(response: Response, times: np.ndarray) -> int:
+def clearest(response: Response, times: np.ndarray) -> int:
     """Index of the time [s] that shows the wave best: the first with half the largest deflection under the striker."""
     deflection = np.abs(response.displacement(_struck(response)[1][None], times)[:, 0])
     return int(np.argmax(deflection >= 0.5 * deflection.max()))

@@ -119,8 +119,8 @@ def _force(response: Response, end: float) -> tuple[Image.Image, Any]:
     dpi = 100.0  # sets the size of its letters
     with figures.styled(SIDE[0] / dpi, SIDE[1] / dpi) as figure:
         axes = figure.subplots()
-        seen = response.time <= end
-        axes.plot(1e3 * response.time[seen], response.force[seen], color=BLUE, lw=1.6)
+        shown = response.time <= end
+        axes.plot(1e3 * response.time[shown], response.force[shown], color=BLUE, lw=1.6)
         axes.set(xlabel="time [ms]", ylabel="force [N]", xlim=(0.0, 1e3 * end))
         axes.set_ylim(bottom=0.0)
         axes.set_title(" ")  # room for how slow the film is

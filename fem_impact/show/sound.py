@@ -235,22 +235,22 @@ def _moving(
     response: Response | Strokes, shape: np.ndarray, duration: float | None, rate: int, normalise: bool
 ) -> Sound:
     """Sound of the velocity of a point at which modes have these values (n_modes,) [kg**-0.5]."""
-    rate, heard = _audible(response, rate)
-    times = _times(response, heard, duration, rate)
-    velocity = np.concatenate([_velocity(hit, heard, shape, part) for hit, _, part in _parts(response, times)])
+    rate, audible = _audible(response, rate)
+    times = _times(response, audible, duration, rate)
+    velocity = np.concatenate([_velocity(hit, audible, shape, part) for hit, _, part in _parts(response, times)])
     return _scaled(velocity, rate, FULL_SCALE, "m/s", normalise)
 
 
 def _parts(response: Response | Strokes, times: np.ndarray) -> list[tuple[Response, slice, np.ndarray]]:
-    """The blow that tells the motion at each of ascending times: it, its times, and these from its start."""
+    """The blow that gives the motion at each of ascending times: it, its times, and these from its start."""
     return [(response, slice(0, len(times)), times)] if isinstance(response, Response) else response.parts(times)
 
 
-def _velocity(response: Response, heard: np.ndarray, shape: np.ndarray, times: np.ndarray) -> np.ndarray:
+def _velocity(response: Response, audible: np.ndarray, shape: np.ndarray, times: np.ndarray) -> np.ndarray:
     """Velocity [m/s] of a point at equally spaced times of one blow, (n_times,)."""
     if response.history.stretched is not None:  # the modes pull on each other: none rings on its own
         blocks = [response.modal_state(times[i : i + BLOCK])[1] for i in range(0, len(times), BLOCK)]
-        return np.concatenate([p @ np.where(heard, shape, 0.0) for p in blocks])
+        return np.concatenate([p @ np.where(audible, shape, 0.0) for p in blocks])
     history = response.history
     busy = np.flatnonzero(history.pressed.any(axis=1))
     ends = history.steps[:, layout.START] + history.steps[:, layout.LENGTH]
@@ -265,11 +265,11 @@ def _velocity(response: Response, heard: np.ndarray, shape: np.ndarray, times: n
         alone[start + 1 : end] = False
     q, p = response.modal_state(times[alone])  # (n_alone, n_modes)
     velocity = np.empty(len(times))
-    velocity[alone] = p @ np.where(heard, shape, 0.0)
+    velocity[alone] = p @ np.where(audible, shape, 0.0)
     row = np.cumsum(alone) - 1
     for start, end in flights:
-        state = q[row[start], heard], p[row[start], heard]
-        velocity[start:end] = _ring(response, times[start:end], state, heard, shape[None, heard] + 0j, 1)
+        state = q[row[start], audible], p[row[start], audible]
+        velocity[start:end] = _ring(response, times[start:end], state, audible, shape[None, audible] + 0j, 1)
     return velocity
 
 
@@ -325,16 +325,16 @@ def radiate(
         raise ValueError(f"response must be that of a plate, got one of dimension {modes.dimension}; use radiate_bar")
     place = beside(listener)
     density, speed = _air(air)
-    rate, heard = _audible(response, rate)
+    rate, audible = _audible(response, rate)
     points, cells = sampling.grid(modes)
     thirds = np.repeat(sizes(points, cells) / 3.0, 3)  # of a triangle, which belong to each corner
     areas = np.bincount(cells.reshape(-1), thirds, minlength=len(points))
     weights = density / (2.0 * np.pi) * np.sign(place[2]) * areas
     way = np.sqrt(((points - place[:2]) ** 2).sum(axis=1) + place[2] ** 2)  # (n_points,) [m]
     # a point stands for a disk of its area, whose mean of 1 / R in its middle is 2 over its radius
-    shapes = modes.shapes.at(points)[:, heard] * (weights / np.hypot(way, np.sqrt(areas / (4.0 * np.pi))))[:, None]
-    times = _times(response, heard, duration, rate)
-    pressure = _pressure(response, times, heard, {2: shapes}, way / speed, 1.0 / rate)
+    shapes = modes.shapes.at(points)[:, audible] * (weights / np.hypot(way, np.sqrt(areas / (4.0 * np.pi))))[:, None]
+    times = _times(response, audible, duration, rate)
+    pressure = _pressure(response, times, audible, {2: shapes}, way / speed, 1.0 / rate)
     return _scaled(pressure, rate, LOUDEST, "Pa", normalise)
 
 
@@ -367,14 +367,14 @@ def radiate_bar(
     low, high : Sound
         For equal motion the pressure of each mode that is slow enough lies between them: a flat strip of the width, and
         a section that drags the air of a square one and its own volume of air besides. They keep their ratio. Where a
-        mode is hardly heard, and around thick ends nearer than three widths, neither holds.
+        mode is hardly audible, and around thick ends nearer than three widths, neither holds.
 
     Notes
     -----
     Every piece of a bar that is narrow beside the sound's wave pushes the air by its mass per length m times the
     acceleration a, and is a dipole: ``p = z / (4 pi R**2) int m (a'(t - R/c) / c + a(t - R/c) / R) dx``. A flat strip
     has ``m = rho pi width**2 / 4``, a square of that width 1.51 times as much. Air flows around the ends, too: at a
-    distance of d widths from each, m is less by ``sqrt(1 - (1 + d)**-3.2)``. What is heard of a free bar is mostly
+    distance of d widths from each, m is less by ``sqrt(1 - (1 + d)**-3.2)``. The sound of a free bar is mostly
     that, as its motion sums to nothing. This holds while half the width times the wavenumber is below 0.5, where it
     errs by a tenth at most; modes above are left out of both sounds, as are rigid motions.
 
@@ -400,25 +400,25 @@ def radiate_bar(
     if check.positive("height", height, "m") > width:
         raise ValueError(f"height must be at most the width, {width:g} m, got {height:g} m")
     density, speed = _air(air)
-    rate, heard = _audible(response, rate)
-    heard &= modes.omega * 0.5 * width <= COMPACT * speed
+    rate, audible = _audible(response, rate)
+    audible &= modes.omega * 0.5 * width <= COMPACT * speed
     x = np.sort(modes.shapes.grid()[0][:, 0])
     gap = float(np.hypot(place[0] - np.clip(place[0], x[0], x[-1]), np.hypot(place[1], place[2])))
     length = x[-1] - x[0]
     least = max(width, 2e-4 * length)  # nearer to a wire, its pieces would take long
     if not gap > least:
         raise ValueError(f"listener must be farther than {least:g} m from the bar, got {gap:g} m")
-    count = max(len(x), 8 * int(heard.sum()) + 64, int(2.0 * length / gap))  # [-] pieces, at most as long as the gap
+    count = max(len(x), 8 * int(audible.sum()) + 64, int(2.0 * length / gap))  # [-] pieces, at most as long as the gap
     turn = np.pi * (np.arange(count) + 0.5) / count  # shortest at the ends, where the mass is as a root
     ends = length * np.stack([np.sin(0.5 * turn), np.cos(0.5 * turn)]) ** 2  # (2, n_pieces) [m] how far away they are
     x = x[0] + ends[0]
     way = np.sqrt((x - place[0]) ** 2 + place[1] ** 2 + place[2] ** 2)  # (n_pieces,) [m]
     mass = np.sqrt(1.0 - (1.0 + ends / width) ** -ENDS).prod(axis=0)  # [-] over that of a piece far from both ends
     share = 0.5 * np.pi * length / count * np.sin(turn) * mass * place[2] / (4.0 * np.pi * way**2)
-    shapes = modes.shapes.at(x[:, None])[:, heard] * share[:, None]
-    times = _times(response, heard, duration, rate)
+    shapes = modes.shapes.at(x[:, None])[:, audible] * share[:, None]
+    times = _times(response, audible, duration, rate)
     orders = {3: shapes / speed, 2: shapes / way[:, None]}
-    pressure = _pressure(response, times, heard, orders, way / speed, 1.0 / rate)  # of 1 kg/m
+    pressure = _pressure(response, times, audible, orders, way / speed, 1.0 / rate)  # of 1 kg/m
     flat = density * np.pi * width**2 / 4.0  # [kg/m]
     masses = flat, SQUARE * flat + density * width * height
     low, high = (Sound(mass * pressure / LOUDEST, rate, LOUDEST, "Pa") for mass in masses)
@@ -448,13 +448,13 @@ def radiate_free(
     -------
     low, high : Sound
         For equal motion the pressure of each mode lies between them: so it did at three places beside 46 free plates
-        whose edges run across the lattice. Where a mode is hardly heard, beside its lobes, it may be silent in ``low``.
+        whose edges run across the lattice. Where a mode is hardly audible, beside its lobes, ``low`` may be silent.
 
     Notes
     -----
     The plate is a sheet of dipoles, whose strength is the jump of the pressure across it. Every mode has that at its
     own frequency, half way between the jumps of a plate that is too small and one that is too large by up to a cell of
-    a lattice (`modes.free_air`), for any wavelength; larger cells tell its error. In time it follows the mode's
+    a lattice (`modes.free_air`), for any wavelength; larger cells estimate its error. In time it follows the mode's
     acceleration with its part in phase and the velocity with the rest, which is exact as the mode rings. Left out are
     rigid motions, modes after about the 800th, and those whose sound has a wavelength below a sixteenth of the side of
     a square as large as the plate.
@@ -482,23 +482,23 @@ def radiate_free(
         )
     place = beside(listener)
     density, speed = _air(air)
-    rate, heard = _audible(response, rate)
-    heard &= free_air.reach(modes, speed) <= free_air.ACROSS[-1]
-    field, doubt = free_air.fields(modes, heard, place, speed, speed / (OVERSAMPLING * rate))
-    times = _times(response, heard, duration, rate)
+    rate, audible = _audible(response, rate)
+    audible &= free_air.reach(modes, speed) <= free_air.ACROSS[-1]
+    field, doubt = free_air.fields(modes, audible, place, speed, speed / (OVERSAMPLING * rate))
+    times = _times(response, audible, duration, rate)
     own, less, more = (
-        density / LOUDEST * _pressure(response, times, heard, orders, way / speed, 1.0 / rate)
+        density / LOUDEST * _pressure(response, times, audible, orders, way / speed, 1.0 / rate)
         for orders, way in (field, *doubt)
     )
     return Sound(own - less, rate, LOUDEST, "Pa"), Sound(own + more, rate, LOUDEST, "Pa")
 
 
 def _pressure(
-    response: Response | Strokes, times: np.ndarray, heard: np.ndarray, orders: Mapping[int, np.ndarray],
+    response: Response | Strokes, times: np.ndarray, audible: np.ndarray, orders: Mapping[int, np.ndarray],
     delay: np.ndarray, sample: float,
 ) -> np.ndarray:  # fmt: skip
-    """Sum (n_times,) over points of delayed motion; ``orders``: order of derivative -> weights (n_points, n_heard)."""
-    roots = free_motion.roots(response.target.omega[heard], response.target.damping_ratio[heard])
+    """Sum (n_times,) over points of delayed motion; ``orders``: derivative -> weights (n_points, n_audible)."""
+    roots = free_motion.roots(response.target.omega[audible], response.target.damping_ratio[audible])
     last = delay.max()
     early = last - delay  # [s] how much sooner it arrives than the last: over a long way decays cannot be undone
     delayed = {
@@ -509,12 +509,12 @@ def _pressure(
     for hit, part, local in _parts(response, times):
         n_first = int(np.searchsorted(local, hit.time[-1] + last, side="right"))
         n_first = n_first if hit.history.stretched is None else len(local)
-        first = [_arrival(response, times[part][:n_first], heard, *each, delay, sample) for each in orders.items()]
+        first = [_arrival(response, times[part][:n_first], audible, *each, delay, sample) for each in orders.items()]
         found.append(np.sum(first, axis=0))
         if n_first < len(local):
             since = local[n_first:] - last
-            q, p = (state[0, heard] for state in hit.modal_state(since[:1]))
-            rest = [_ring(hit, since, (q, p), heard, weights, order) for order, weights in delayed.items()]
+            q, p = (state[0, audible] for state in hit.modal_state(since[:1]))
+            rest = [_ring(hit, since, (q, p), audible, weights, order) for order, weights in delayed.items()]
             found.append(np.sum(rest, axis=0))
     return np.concatenate(found)
 
@@ -540,10 +540,10 @@ def _air(air: Any) -> tuple[float, float]:
     return density, speed
 
 
-def _times(response: Response | Strokes, heard: np.ndarray, duration: float | None, rate: int) -> np.ndarray:
+def _times(response: Response | Strokes, audible: np.ndarray, duration: float | None, rate: int) -> np.ndarray:
     """Times [s] of all samples in a duration [s]; without one, chosen from the decay after the last stroke."""
     if duration is None:
-        duration = sampling.ringing(response.target, heard, (SHORTEST, LONGEST))
+        duration = sampling.ringing(response.target, audible, (SHORTEST, LONGEST))
         duration += 0.0 if isinstance(response, Response) else float(response.starts[-1] - response.starts[0])
     # so many samples take about ten seconds to compute
     duration = check.between("duration", check.positive("duration", duration, "s"), 0.0, 1e7 / rate, "s")
@@ -556,16 +556,16 @@ def _scaled(signal: np.ndarray, rate: int, full_scale: float, unit: str, normali
 
 
 def _ring(
-    response: Response, times: np.ndarray, state: tuple, heard: np.ndarray, weights: np.ndarray, order: int
+    response: Response, times: np.ndarray, state: tuple, audible: np.ndarray, weights: np.ndarray, order: int
 ) -> np.ndarray:
-    """`free_motion.swing` of the modes heard, (n_times,)."""
+    """`free_motion.swing` of the audible modes, (n_times,)."""
     modes = response.target
-    bias = response.constant_forces[heard]
-    return free_motion.swing(modes.omega[heard], modes.damping_ratio[heard], bias, state, times, weights, order)
+    bias = response.constant_forces[audible]
+    return free_motion.swing(modes.omega[audible], modes.damping_ratio[audible], bias, state, times, weights, order)
 
 
 def _arrival(
-    response: Response | Strokes, times: np.ndarray, heard: np.ndarray, order: int, shapes: np.ndarray,
+    response: Response | Strokes, times: np.ndarray, audible: np.ndarray, order: int, shapes: np.ndarray,
     delay: np.ndarray, sample: float,
 ) -> np.ndarray:  # fmt: skip
     """`_pressure` (n_times,) while sound from the blow still arrives, of one order: 2 is the acceleration."""
@@ -578,7 +578,7 @@ def _arrival(
         room = (order - 1) * step
         first, last = max(began, times[start] - delay.max() - room), times[part][-1] - delay.min() + room
         fine = np.linspace(first, last, int(np.ceil((last - first) / step)) + 1)
-        momentum = response.modal_state(fine)[1][:, heard]  # (n_fine, n_heard)
+        momentum = response.modal_state(fine)[1][:, audible]  # (n_fine, n_audible)
         acceleration = momentum
         for _ in range(order - 1):
             acceleration = np.gradient(acceleration, fine[1] - fine[0], axis=0)

@@ -143,8 +143,8 @@ def test_beams_and_rigid_masses_are_left_as_they_are():
             np.testing.assert_array_equal(drawn, own)
 
 
-def test_the_telling_instant_is_when_the_plate_has_begun_to_yield(hit):
+def test_the_clearest_instant_is_when_the_plate_has_begun_to_yield(hit):
     times = np.linspace(0.0, sampling.end_of(hit), 50)
     depth = np.abs(hit.displacement([hit.at], times)[:, 0])
-    first = sampling.telling(hit, times)
+    first = sampling.clearest(hit, times)
     assert depth[first] >= 0.5 * depth.max() > depth[:first].max()
