@@ -58,8 +58,8 @@ class Setup:
     def of(cls, scene: Scene, loose: bool = False, before: "Setup | None" = None) -> "Setup":
         """The setup of a scene, with enough modes for its shortest blow, but at most a hundred.
 
-        If vectors can tell the blows, the first few modes do: they bridge the seconds until the vectors of a new strike
-        point are found. ``before`` is a setup of the same body, whose modes are taken as far as they reach.
+        If vectors can represent the body, the first few modes suffice: they bridge the seconds until the vectors of a
+        new strike point are found. ``before`` is a setup of the same body, whose modes are taken as far as they reach.
         """
         plan = None
         if before is not None:
@@ -120,7 +120,7 @@ class Setup:
         """The arguments of `strike`; raises ValueError if the strike point is not on the body.
 
         ``rest`` [m/N] replaces the residual compliance at the strike point: its static solution would take too long
-        while a slider moves. ``body`` is that of `body_seen` from that point, which replaces its modes.
+        while a slider moves. ``body`` is that of `excited_at` this point, which replaces its modes.
         """
         case = replace(self.base.changed("mass", settings.mass), contact=self.law(settings))
         if settings.bending is not None:
@@ -141,11 +141,11 @@ class Setup:
 
     @property
     def by_vectors(self) -> bool:
-        """Whether Ritz vectors can tell the blows, as far as is known without finding them."""
+        """Whether Ritz vectors can represent the body, as far as is known without finding them."""
         return vectors.usable(self.scene.built.target) and bool(self.scene.blow.values.get("residual", True))
 
-    def body_seen(self, at: tuple[float, ...]) -> Modes | None:
-        """The body as blows at a point see it, by Ritz vectors; None if only modes can tell them.
+    def excited_at(self, at: tuple[float, ...]) -> Modes | None:
+        """The body as blows at a point excite it, by Ritz vectors; None if only modes can represent it.
 
         Made for blows between the softest and the hardest of the sliders, unless these ask for too fine a mesh.
         """

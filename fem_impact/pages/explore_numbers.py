@@ -37,10 +37,10 @@ Message = dict[str, Any]
 
 @dataclass(frozen=True, eq=False)
 class View:
-    """The body as blows at one strike point see it."""
+    """The body as blows at one strike point excite it."""
 
     rest: float  # [m/N] residual compliance of the modes
-    body: Modes | None  # Ritz vectors, where these tell the blows
+    body: Modes | None  # Ritz vectors, where these can represent it
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,7 +51,7 @@ class Kept:
     settings: Settings
     where: Point  # [m] of the listener
     height: float  # [m] of the listener
-    told: Message  # what pages show of it
+    shown: Message  # what pages show of it
 
 
 class Explorer:
@@ -79,9 +79,9 @@ class Explorer:
         self.answer(setup.start)
         return setup
 
-    def keep(self, letter: str, settings: Settings, where: Point, height: float, told: Message) -> None:
+    def keep(self, letter: str, settings: Settings, where: Point, height: float, shown: Message) -> None:
         """Keep a blow on the present body under a letter."""
-        self.kept = {**self.kept, letter: Kept(self.setup, settings, where, height, told)}
+        self.kept = {**self.kept, letter: Kept(self.setup, settings, where, height, shown)}
 
     def forget(self, letter: str) -> None:
         """Keep a blow no longer."""
@@ -94,9 +94,9 @@ class Explorer:
         self.rest = view.rest
 
     def look(self, at: Point) -> View:
-        """Find out what blows at a point see: seconds, if these are Ritz vectors."""
+        """Find the body as blows at a point excite it: seconds, if by Ritz vectors."""
         if at not in self.views:
-            self.learn(at, View(self.setup.residual_at(at), self.setup.body_seen(at)))
+            self.learn(at, View(self.setup.residual_at(at), self.setup.excited_at(at)))
         return self.views[at]
 
     def case(self, settings: Settings) -> Case:
@@ -193,7 +193,7 @@ class Explorer:
             "scale": heard.full_scale * 10.0 ** (-raised / 20.0), "peak": heard.full_scale * 10.0 ** (level / 20.0),
         }  # fmt: skip
 
-    def tell_sliders(self, settings: Settings, height: float, rate: float) -> dict[str, str]:
+    def describe_sliders(self, settings: Settings, height: float, rate: float) -> dict[str, str]:
         """What each slider stands at, in words."""
         law = self.setup.law(settings)
         raised = "" if settings.exponent == 1.0 else f"{settings.exponent:.3g}".translate(RAISED)

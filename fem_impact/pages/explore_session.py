@@ -55,7 +55,7 @@ class Session:
         self.setup: Setup = self.explorer.setup
         self.settings: Settings = self.setup.start
         self.ends = ends(self.setup)
-        self.heard_at: Point = tuple(float(x) for x in self.setup.scene.points[0])
+        self.listener: Point = tuple(float(x) for x in self.setup.scene.points[0])
         self.window = Window.of(self.setup, None, None)
         self.number = self.last = 0  # of the last request that was answered, and of the last one
         self.turned: dict[str, float] = {}  # sliders moved since the last answer
@@ -66,21 +66,21 @@ class Session:
         self.mapped: Any = None  # what the map on the page was drawn for
 
     def show(self) -> None:
-        """Tell the page what lies on the bench."""
+        """Send the page what lies on the bench."""
         explorer = self.explorer
         picks = pickable(explorer.first, explorer.order, self.setup.scene)
-        points = {"at": self.settings.at, "ear": self.heard_at}
+        points = {"at": self.settings.at, "ear": self.listener}
         self.send({"kind": "setup", **laid_out(self.setup), "picks": picks, **points})
         for kept in explorer.kept.values():
-            self.send(kept.told)
+            self.send(kept.shown)
 
     def _restart(self) -> None:
         """Show another body, or another mallet; what was computed for the one before is not wanted any more."""
         self._cancel(*(task for name, task in self.tasks.items() if name != "open"))
-        heard_at = self.heard_at
+        listener = self.listener
         self._begin()
         if self.explorer.order.at is not None:
-            self.heard_at = self.setup.place(*heard_at) or self.heard_at
+            self.listener = self.setup.place(*listener) or self.listener
         self.show()
 
     def close(self) -> None:
@@ -113,11 +113,11 @@ class Session:
                 for page in self.pages:
                     page.send({"kind": "forgotten", "letter": letter})
         elif "hit" in message:
-            told = message["hit"]
-            if not isinstance(told, dict) or not isinstance(told.get("letter"), str):
+            wanted = message["hit"]
+            if not isinstance(wanted, dict) or not isinstance(wanted.get("letter"), str):
                 raise ValueError("hit must be a table of letter and share")
-            share = min(max(check.number("share", told.get("share")), 0.1), 10.0)  # of the speed
-            self.hits.append((told["letter"][:1], share))
+            share = min(max(check.number("share", wanted.get("share")), 0.1), 10.0)  # of the speed
+            self.hits.append((wanted["letter"][:1], share))
             self._start("hit", self._hit)
         elif "open" in message:
             self._order(message["open"])
@@ -142,10 +142,10 @@ class Session:
         before, turned, notes = self.settings, self.turned, []
         self.turned = {}
         if self.ear is not None:
-            heard_at = self.setup.place(*self.ear)
-            if heard_at is None:
+            listener = self.setup.place(*self.ear)
+            if listener is None:
                 notes.append(f"{place(self.ear[: len(before.at)])} is beside the body: the listening point stays.")
-            self.heard_at, self.ear = heard_at or self.heard_at, None
+            self.listener, self.ear = listener or self.listener, None
         self.height = turned.pop("height", self.height)
         self.rate = turned.pop("rate", self.rate)
         at = [turned.pop(letter, None) for letter in "xy"]
@@ -167,8 +167,8 @@ class Session:
         again, notes = self._turn()
         self.number = number = self.last
         explorer, settings = self.explorer, self.settings
-        said = explorer.tell_sliders(settings, self.height, self.rate)
-        about = {"number": number, "said": said, "at": settings.at, "ear": self.heard_at, "note": " ".join(notes)}
+        said = explorer.describe_sliders(settings, self.height, self.rate)
+        about = {"number": number, "said": said, "at": settings.at, "ear": self.listener, "note": " ".join(notes)}
         about |= {"mass": settings.mass, "stiffness": settings.stiffness}
         if not again:
             self.send({"kind": "blow", **about})
@@ -204,7 +204,7 @@ class Session:
             self.send({"kind": "note", "text": f"{error}."})
 
     async def _ask(self, worker: Worker, function: Callable[..., Any], *arguments: Any) -> Any:
-        """The answer of a process; the page is told if that had to be replaced."""
+        """The answer of a process; the page is informed if that had to be replaced."""
         ended = worker.ended
         answer = await asyncio.wrap_future(worker.ask(function, *arguments))
         if worker.ended > ended:
@@ -268,8 +268,8 @@ class Session:
         sent(picture, exact=True)
 
     async def _keep(self) -> None:
-        """Keep the present blow, judged and heard, under the first letter that is free."""
-        explorer, settings, where, height = self.explorer, self.settings, self.heard_at, self.height
+        """Keep the present blow, judged and with its sound, under the first letter that is free."""
+        explorer, settings, where, height = self.explorer, self.settings, self.listener, self.height
         found = await self._ask(self.judge, Explorer.judge, settings)
         sound = await self._ask(self.mapper, Explorer.listen, settings, where, height, None)
         letter = next((each for each in LETTERS if each not in explorer.kept), None)
@@ -278,28 +278,28 @@ class Session:
             self.send({"kind": "note", "text": f"{found['failed']}." if "failed" in found else many})
             return
         order = explorer.order
-        told = {
+        shown = {
             "kind": "kept", "letter": letter, "heading": self.setup.scene.title or self.setup.scene.path.stem,
             "words": f"{si(settings.mass, 'kg', 3)} with {si(settings.speed, 'm/s', 3)} at {place(settings.at)}",
-            # what tells bodies apart whose points can be shown in one picture
+            # the same for bodies whose points can be shown in one picture
             "body": f"{order.drawing.name if order.drawing else ''} {order.unit or ''}",
             "at": settings.at, "sound": sound, **found,
         }  # fmt: skip
-        explorer.keep(letter, settings, where, height, told)
+        explorer.keep(letter, settings, where, height, shown)
         self.mapper.ask(Explorer.keep, letter, settings, where, height, {})
         for page in self.pages:
-            page.send(told)
+            page.send(shown)
 
     async def _hit(self) -> None:
         """The sounds of keys, one after another."""
         while self.hits:
             letter, share = self.hits.popleft()
-            about = self.settings, self.heard_at, self.height, None, letter, share
+            about = self.settings, self.listener, self.height, None, letter, share
             sound = await self._ask(self.mapper, Explorer.listen, *about)
             self.send({"kind": "hit", "letter": letter, "share": share, "number": self.number, **sound})
 
     def _order(self, wanted: Any) -> None:
-        """Put on the bench what the page wants; what it may not have is told there."""
+        """Put on the bench what the page wants; what it may not have is reported there."""
         try:
             self.order = order_of(wanted, self.folder, self.order or self.explorer.order, self.settings.at)
         except ValueError as error:
@@ -327,7 +327,7 @@ class Session:
         while self.roll is not None:
             rate, self.roll = self.rate if self.roll else None, None
             try:
-                sound = await self._ask(self.mapper, Explorer.listen, self.settings, self.heard_at, self.height, rate)
+                sound = await self._ask(self.mapper, Explorer.listen, self.settings, self.listener, self.height, rate)
             except SimulationError as error:
                 sound = {"uri": "", "note": f"{error}."}
             if self.roll is None:

@@ -49,7 +49,7 @@ def ends(setup: Setup) -> Ends:
 
 
 def page() -> str:
-    """The page as HTML, before it is told what it shows."""
+    """The page as HTML, before it gets what it shows."""
     facts = {**SPECTRUM_FACTS, "steps": STEPS, "narrowest": NARROWEST, "largest": LARGEST_DRAWING}
     return str(template("explore.html").render(facts=facts, cards=list(CARDS)))
 

@@ -101,14 +101,14 @@ def write_fit(
 ) -> None:
     """Write the page; needs the extra ``web``. Double hits are predicted for ``target`` or the structure found."""
     struck = target is not None or found.target is not None
-    told = [(name, *stated(found.profiles[name]), unit_of(name)) for name in found.names]
+    values = [(name, *stated(found.profiles[name]), unit_of(name)) for name in found.names]
     left_out = [f"{100 * one.error:.2g} %" for one in found.left_out()] if len(found.used) > 1 else []
     write_page(
         path,
         "fit.html",
         title=title,
         summary=found.summary().splitlines(),
-        told=told,
+        values=values,
         verdict=found.verdict,
         spreads={name: differ(each) for name, each in found.spreads.items()},
         ridges={name: along(found.ridges[name]) for name in found.unidentifiable},

@@ -18,7 +18,7 @@ from .html_page import picture_uri, write_page
 def tip_verdict(plan: Roving, i: int, j: int) -> str:
     """What one hammer and tip do at one point."""
     if plan.n_impacts[i, j] == 0:
-        return "too hard to tell"
+        return "too hard for the modes"
     if plan.n_impacts[i, j] > 1:
         return "double hit"
     return "works" if plan.works[i, j] else f"too soft for {in_hertz(plan.bandwidth, 3)}"

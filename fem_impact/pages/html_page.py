@@ -32,11 +32,11 @@ def web_text(*names: str) -> str:
 
 
 def write_page(
-    path: str | Path, name: str, styles: tuple[str, ...] = ("report.css",), scripts: tuple[str, ...] = (), **told: Any
+    path: str | Path, name: str, styles: tuple[str, ...] = ("report.css",), scripts: tuple[str, ...] = (), **values: Any
 ) -> int:
-    """Fill a template with what is told, styles and scripts, and write it; return its size [byte]."""
+    """Fill a template with values, styles and scripts, and write it; return its size [byte]."""
     parts = {"style": web_text(*styles), "script": web_text(*scripts), "versions": export.versions()}
-    return write_whole(path, template(name).render(parts, **told))
+    return write_whole(path, template(name).render(parts, **values))
 
 
 def script_data(data: Any) -> str:

@@ -132,7 +132,7 @@ def places_of(setup: Setup) -> tuple[Point, ...]:
 
 
 def made(setup: Setup, watch: Callable[[int, int], None]) -> Lesson:
-    """Strike all blows of a page; ``watch`` is told how many are done, and of how many."""
+    """Strike all blows of a page; ``watch`` is called with how many are done, and of how many."""
     explorer, tolerance = Explorer(setup), max(3e-3, setup.tolerance)  # the page shows three digits
     start, places = setup.start, places_of(setup)
     axes = {
@@ -178,8 +178,8 @@ def shown(case: Case, tolerance: float) -> Shown:
         none = np.zeros(2)
         return Shown((math.nan,) * len(NAMES), False, none, none, 1.0, 0.0, 0.0, 0.0)
     end = 1.05 * hit.impacts[-1].end if hit.impacts else float(hit.time[-1])
-    seen = hit.time <= end
-    time, force = hit.time[seen], hit.force[seen]
+    during = hit.time <= end
+    time, force = hit.time[during], hit.force[during]
     last, top = float(time[-1]), float(force.max()) or 1.0
     points = kept_points(time, force, 1e-3 * top)  # a quarter of a pixel
     kept = np.rint(STEPS * time[points] / last), np.rint(STEPS * force[points] / top)

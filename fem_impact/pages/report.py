@@ -93,7 +93,7 @@ def write(path: str | Path, scene: Scene, run: Run | Played) -> None:
     _, plotly = _tools()
     if isinstance(run, Run) and not run.rings:
         raise ValueError("run must have modes, because a report shows motion; strike with motion=True")
-    response, told = run.response, _of_blow(scene, run) if isinstance(run, Run) else _of_strokes(scene, run)
+    response, facts = run.response, _of_blow(scene, run) if isinstance(run, Run) else _of_strokes(scene, run)
     judged = response.hits[response.hardest] if isinstance(response, Strokes) else response
     if isinstance(response, Strokes):
         total, own = power(response.error), ("strokes", str(len(response.strokes)))
@@ -106,7 +106,7 @@ def write(path: str | Path, scene: Scene, run: Run | Played) -> None:
         path,
         "report.html",
         scripts=("report.js",),
-        **told,
+        **facts,
         trust=tuple(judged.trust),
         assumptions=[_assumption(each) for each in judged.assumptions],
         reasons=[tidy(line) for line in run.plan.reasons],
@@ -137,7 +137,7 @@ def write(path: str | Path, scene: Scene, run: Run | Played) -> None:
 
 
 def _of_blow(scene: Scene, run: Run) -> dict[str, Any]:
-    """What the page tells of a single blow only."""
+    """What the page states of a single blow only."""
     response, error = run.response, run.response.error
     parts = [
         ("time step", "from a second run of the same blow", error.step),
@@ -161,7 +161,7 @@ def _of_blow(scene: Scene, run: Run) -> dict[str, Any]:
 
 
 def _of_strokes(scene: Scene, run: Played) -> dict[str, Any]:
-    """What the page tells of a sequence only."""
+    """What the page states of a sequence only."""
     found = run.response
     kinds = [scene.alone(i).striker.kind for i in sequence.played_order(scene)]
     each = [[impact.impulse for impact in found.impacts if impact.contact == i] for i in range(len(kinds))]
@@ -257,7 +257,7 @@ def _shares(energies: Mapping[str, float], called: Mapping[str, str]) -> list[di
 
 def _sounds(scene: Scene, response: Response | Strokes) -> list[dict[str, str]]:
     """Players of the sound at each observation point and, for a plate, each listener, by default 1 m in front of it."""
-    heard = [
+    found = [
         (f"Motion at {place(point)}", sound.synthesise(response, point, duration=_duration(response)))
         for point in scene.points[:MOST_POINTS]
     ]
@@ -266,10 +266,10 @@ def _sounds(scene: Scene, response: Response | Strokes) -> list[dict[str, str]]:
             where = f" to {place(listener)}" if scene.listeners else ", 1 m in front of the strike point"
             sounds = hearing.radiated(scene, response, listener, _duration(response))
             for bound, pressure in zip(hearing.BOUNDS[len(sounds)], sounds):
-                told = f" without a baffle, {BOUND[bound]}; {hearing.stated_level(sounds)}" if bound else ""
-                heard.append((f"Sound radiated{where}{told}", pressure))
+                air = f" without a baffle, {BOUND[bound]}; {hearing.stated_level(sounds)}" if bound else ""
+                found.append((f"Sound radiated{where}{air}", pressure))
     players = []
-    for name, samples in heard:
+    for name, samples in found:
         level = samples.peak_level
         stated = f"peak {samples.said}; full scale {samples.full_scale:g} {samples.unit}, as in every report"
         players.append({"name": name, "note": stated, "uri": audio(samples.samples, samples.rate)})

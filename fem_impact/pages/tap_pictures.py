@@ -84,7 +84,7 @@ def draw_coherence(axes: Any, found: xr.Dataset, channels: Sequence[int]) -> Non
 
 
 def watched(last: Taps, good: Taps | None, bandwidth: float, drop: float, said: str) -> Any:
-    """The last record beside what the good ones tell so far: a matplotlib figure."""
+    """The last record beside what the good ones give so far: a matplotlib figure."""
     found = frf(good) if good is not None and good.response.shape[2] else None
     parts: list[Part] = [
         lambda axes: draw_pulses(axes, last, range(min(SHOWN, last.n_taps))),

@@ -26,10 +26,10 @@ class Question:
 def questions(lesson: Lesson) -> list[Question]:
     """All questions that the blows of a page can answer."""
     speeds, stiffnesses = _single(lesson, 1), _single(lesson, 2)
-    told = _phrases(lesson, lesson.start)
+    phrases = _phrases(lesson, lesson.start)
     first = Question(
         "Strike as the scene does. How many impacts are there, how long are they together, and how large is the force?",
-        f"{told['impacts']}, {told['time']} in contact, at most {told['force']}.", lesson.start,
+        f"{phrases['impacts']}, {phrases['time']} in contact, at most {phrases['force']}.", lesson.start,
     )  # fmt: skip
     asked = [first, _impulse(lesson), stiffnesses and _stiffer(lesson, *stiffnesses)]
     asked += [speeds and _faster(lesson, *speeds), _heavier(lesson), _harder(lesson)]

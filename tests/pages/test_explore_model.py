@@ -16,7 +16,7 @@ from fem_impact.scenes.schema import written
 
 
 def test_start_is_the_scene(stand):
-    assert not stand.by_vectors and stand.body_seen(stand.start.at) is None  # a body in closed form keeps its modes
+    assert not stand.by_vectors and stand.excited_at(stand.start.at) is None  # a body in closed form keeps its modes
     hit, scene = stand.case(stand.start).blow(), stand.scene.strike(target="modal")
     # both promise 1e-2 or better
     assert hit.n_impacts == scene.n_impacts and hit.impulse == pytest.approx(scene.impulse, rel=1e-2)
@@ -84,7 +84,7 @@ ELEMENTS = TITLED.replace('source = "analytic"', 'source = "fe"').replace("stiff
 def test_hard_blows_on_elements_are_resolved_by_vectors(tmp_path):
     """Where the first modes leave the contact unresolved; against a thousand modes in closed form."""
     setup = explore_model.Setup.of(load_text(tmp_path, ELEMENTS))
-    seen = setup.body_seen(setup.start.at)
+    seen = setup.excited_at(setup.start.at)
     assert setup.by_vectors and seen.poorer and setup.base.modes.n_modes == explore_model.FIRST_LOOK
     body = fi.analytic.rectangle(0.465, 0.3, mass=0.2, first_frequency=100.0, n_modes=1000, damping_ratio=0.01)
     assert setup.mesh.points.max() == pytest.approx(0.465)

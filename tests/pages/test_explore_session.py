@@ -120,7 +120,7 @@ def test_way_back_is_drawn_even_if_the_map_in_between_was_not_finished(explorer,
 def test_listener_moves_without_another_blow(explorer, monkeypatch):
     moves = [{"number": 1, "turn": {}}, {"number": 2, "ear": [0.2, 0.1]}, {"number": 3, "turn": {"height": 1.0}}]
     said, session, _ = follow(explorer, monkeypatch, *moves, rest=60.0, apart=True)
-    assert session.heard_at == (0.2, 0.1) and session.height == 1.0
+    assert session.listener == (0.2, 0.1) and session.height == 1.0
     assert ["force" in one for one in said if one["kind"] == "blow"] == [True, False, False]
     assert said[-2]["said"]["height"] == f"{si(1.0, 'm', 3)}, in the air"
 
@@ -146,7 +146,7 @@ def test_values_beyond_a_slider_become_its_end(explorer, monkeypatch):
 def test_a_click_beside_the_body_moves_nothing_and_says_so(explorer, monkeypatch, message, stays):
     said, session, _ = follow(explorer, monkeypatch, {"number": 1, **message}, **ANSWERED)
     assert re.fullmatch(rf"\(.*\)\sm is beside the body: the {stays} point stays\.", said[0]["note"])
-    assert session.settings.at == explorer.setup.start.at == session.heard_at
+    assert session.settings.at == explorer.setup.start.at == session.listener
 
 
 def test_where_the_body_does_not_move_nothing_is_heard(explorer, monkeypatch):
@@ -286,7 +286,7 @@ def test_all_pages_show_what_one_puts_on_the_bench(explorer, monkeypatch):
     (who, busy), *shown = [(who, told) for who, told in said if told["kind"] in ("bench", "setup")]
     assert (who, busy) == ("a", {"kind": "bench"}) and {who for who, _ in shown} == {"a", "b"}
     assert all(told["heading"] == "Scene struck by yarn, medium" for _, told in shown)
-    assert other.setup.base.striker.mass == 0.03 and other.heard_at == (0.2, 0.1)
+    assert other.setup.base.striker.mass == 0.03 and other.listener == (0.2, 0.1)
     assert other.settings.at == explorer.setup.start.at and not pages
 
 
