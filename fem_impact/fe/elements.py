@@ -160,18 +160,23 @@ class Triangles:
 
     def locate(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """The cell that holds each point (n, 2), or else the nearest one, and whether the point lies in it."""
-        count = min(8, len(self.origin))  # about those around a vertex; if none holds the point, all are searched
+        count = min(8, len(self.origin))  # about those around a vertex; if none holds the point, all near are searched
         near = self.tree.query(points, k=count)[1].reshape(len(points), count)
         cell, depth = self._deepest(points, near)
         margin = np.full(len(self.origin), -SAME)
         if self.curved.any():
             size = np.sqrt(np.abs(np.linalg.det(self.jacobian)))
             margin = np.minimum(margin, -1e-5 * size[self.curved].max() / size)  # the mesh is as close to the curve
-        lost = depth < margin[cell]
-        if lost.any():
-            every = np.broadcast_to(np.arange(len(self.origin)), (1, len(self.origin)))
-            for i in np.flatnonzero(lost):
-                cell[i], depth[i] = (a[0] for a in self._deepest(points[i : i + 1], every))
+        lost = np.flatnonzero(depth < margin[cell])
+        if lost.size:
+            reach = 1.25 * np.linalg.norm(self.corners - self.origin[:, None], axis=2).max(axis=1)  # with its bulge
+            around = cKDTree(points[lost]).query_ball_point(self.origin, reach)
+            held = np.repeat(np.arange(len(reach)), [len(each) for each in around])
+            who = lost[np.concatenate(around).astype(int)]
+            deep = self._deepest(points[who], held[:, None])[1]
+            order = np.flatnonzero(deep > depth[who])
+            order = order[np.argsort(deep[order])]  # the deepest comes last, and counts
+            cell[who[order]], depth[who[order]] = held[order], deep[order]
         return cell, depth >= margin[cell]
 
     def _deepest(self, points: np.ndarray, cells: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -97,3 +97,17 @@ def test_compliance_errs_by_the_square_of_the_coarseness_at_the_load(at):
 def test_refuses_supports_and_sections_that_do_not_fit(body, section, more, words):
     with pytest.raises(ValueError, match=words):
         fi.assemble(body, section, **more)
+
+
+def test_points_beside_a_body_are_sought_together(monkeypatch):
+    """One by one, those of a lattice around a disk took `fi.in_air` minutes."""
+    system = fi.assemble(fi.mesh.disk(0.2, hole=0.05), fi.Plate(fi.Material(70e9, 0.33, 2700.0), 1e-3), {})
+    points, space, calls = np.random.default_rng(0).uniform(-0.25, 0.25, (2000, 2)), system.space, []
+    deepest = space._deepest
+    monkeypatch.setattr(type(space), "_deepest", lambda self, *given: calls.append(0) or deepest(*given))
+    inside, radius = system.contains(points), np.hypot(*points.T)
+    assert np.array_equal(inside, (radius < 0.2) & (radius > 0.05)) and len(calls) == 2
+    where, every = system.frame.local(points[inside][:200]), np.arange(len(space.origin))
+    near, far = (np.array([deepest(x[None], each[None])[1][0] for x, each in zip(where, cells)])
+                 for cells in (space.locate(where)[0][:, None], np.broadcast_to(every, (200, len(every)))))  # fmt: skip
+    assert (near == far).all()
