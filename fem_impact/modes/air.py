@@ -66,8 +66,9 @@ def in_air(
         Sides of the plate that face open air; a box behind one of them is not modelled.
     baffled : bool
         Whether the plate fills a hole in a large rigid wall. Without the wall air flows around the edge. Half the
-        added mass is taken and no damping is added: the shift and the damping with the wall become the errors or, with
-        air on both sides, those of a sheet of dipoles (see `sound.radiate_free`) where they are larger.
+        added mass is taken and no damping is added: the shift and the damping with the wall become the errors or, where
+        they are larger, those of a sheet of dipoles (see `sound.radiate_free`) or, with air on one side, in front of a
+        flat box.
 
     Returns
     -------
@@ -117,12 +118,15 @@ def in_air(
     side = "both sides" if sides == 2 else "one side"
     note = f"air of {density:g} kg/m^3 on {side}, with a rigid wall around the plate"
     if not baffled:
+        own, part = np.zeros((2, len(omega))), 1.0
+        if sides == 1:  # in front of a flat box, half as in a wall and half as a sheet that moves half as fast
+            own, part = np.stack([heavier * (2.0 + heavier), radiated]), 0.25
         doubt, unsure, radiated = doubt + heavier, unsure + radiated / share, np.zeros(len(omega))
-        if sides == 2:  # a free edge may radiate more than in a wall, and fast modes be heavier
-            middle, half = (density * each[modes.n_rigid :].T for each in loads(modes, speed))  # (2, n) each
-            for mass, lost in (middle - half, middle + half):
-                bare = omega / modes.omega[modes.n_rigid :] * np.sqrt(np.maximum(0.0, 1.0 + mass))
-                doubt, unsure = np.maximum(doubt, np.abs(bare - 1.0)), np.maximum(unsure, lost)
+        # a free edge may radiate more than in a wall, and fast modes be heavier
+        middle, half = (density * part * each[modes.n_rigid :].T for each in loads(modes, speed))  # (2, n) each
+        for mass, lost in (own + middle - half, own + middle + half):
+            bare = omega / modes.omega[modes.n_rigid :] * np.sqrt(np.maximum(0.0, 1.0 + mass))
+            doubt, unsure = np.maximum(doubt, np.abs(bare - 1.0)), np.maximum(unsure, lost)
         note = f"air of {density:g} kg/m^3 on {side} adds half the mass that it would with a rigid wall around"
     order = np.argsort(omega, kind="stable")
     whole = block_diag(np.eye(modes.n_rigid), mix[:, order])
