@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from scipy.spatial import KDTree
 
 
 @dataclass(frozen=True)
@@ -51,6 +52,10 @@ NAMES = {"rho": "density", "damping_ratio": "damping_ratio =", "speed": "speed",
 # [-] shapes over those expected from the mass, beyond which a remark is made: at measured points 0.3 to 3 are
 # usual, and another unit of mass gives 30
 ODD = 10.0
+# [-] half the mean square of a shape's differences between neighbours, over its variance: it is 1 in random order; of
+# 400 sets of modes of beams, plates and disks at random points the smoothest mode had at most 0.52
+ROUGH = 0.6
+FEWEST = 8  # [-] points: of fewer, neighbours may be far apart
 TURN = 2.0 * np.pi  # [rad] fact: a full one
 # [-] thickness over the shortest side above which a remark is made: thin theory then errs by tens of per cent
 THICK = 0.3
@@ -118,6 +123,17 @@ def elsewhere(nodes: np.ndarray, shapes: np.ndarray, mass: float) -> tuple[str, 
                 "expected mass-normalised, and 1 t**-0.5 is 0.0316 kg**-0.5"
             )
     return tuple(notes)
+
+
+def disordered(nodes: np.ndarray, shapes: np.ndarray) -> tuple[str, ...]:
+    """A note on nodes (n_nodes, 1 to 3) [m] next to which no shape (n_nodes, n_modes) is as at the nodes themselves."""
+    moves = shapes[:, np.ptp(shapes, axis=0) > 0.0]
+    if len(nodes) < FEWEST or not moves.size:
+        return ()
+    nearest = KDTree(nodes).query(nodes, k=2)[1][:, 1]
+    if (0.5 * ((moves - moves[nearest]) ** 2).mean(axis=0) < ROUGH * moves.var(axis=0)).any():
+        return ()
+    return ("shapes are as different at neighbouring points as at any two; they are expected in their order",)
 
 
 def together(*several: Sequence[str]) -> tuple[str, ...]:

@@ -186,19 +186,23 @@ def _planned(description: Description) -> Plan:
 def make(blow: Blow, changes: Mapping[str, Any], stages: Stages) -> Plan:
     """Choose the model of a blow; see `fi.plan`."""
     asked = Asked.checked(blow, changes)
-    with _noted(asked):
+    with _noted(*slips_of(asked)):
         return _planned(choose(asked, stages))
 
 
+def slips_of(asked: Asked) -> tuple[str, ...]:
+    """Notes on numbers that are probably a slip of a unit, without those on the mesh."""
+    target = asked.blow.target
+    assumed = () if target.mesh is None else target.mesh.notes
+    return tuple(note for note in (*target.assumed, *asked.slips) if note not in assumed)
+
+
 @contextmanager
-def _noted(asked: Asked) -> Iterator[None]:
+def _noted(*slips: str) -> Iterator[None]:
     """Put numbers that are probably a slip of a unit in front of an error, which is then hardly about anything else."""
     try:
         yield
     except check.SimulationError as error:
-        target = asked.blow.target
-        assumed = () if target.mesh is None else target.mesh.notes
-        slips = [note for note in (*target.assumed, *asked.slips) if note not in assumed]
         if not slips or str(error).startswith(slips[0]):
             raise
         raise check.SimulationError(f"{'; '.join(slips)}: {error}") from None
@@ -229,7 +233,7 @@ def choose(asked: Asked, stages: Stages) -> Description:
 
 def carry_out(plan: Plan, stages: Stages, keep: Any = None) -> Run:
     """Run the plan, and then with the better models of the target that the tolerance requires, if it may choose."""
-    with _noted(plan.description.asked):
+    with _noted(*slips_of(plan.description.asked)):
         run = strike_as_planned(plan, stages, keep)
     chooses = plan.changes.get("model", plan.blow.target.model) == "auto"
     added: tuple[str, ...] = ()
@@ -406,7 +410,9 @@ def strike(
     if isinstance(modes, Modes) and damping_ratio is None and not set(options) & set(PIECES):
         run = partial(collision.strike, modes, striker, contact, at=at, speed=speed)
         stretches = bool(options.get("stretching")) or modes.stretches
-        return promise.kept(fresh.answer(lambda: audit.audited(struck(run, options)), stretches), strict)
+        odd = [note for note in (*modes.notes, *striker.notes) if "are expected" in note]
+        with _noted(*odd):
+            return promise.kept(fresh.answer(lambda: audit.audited(struck(run, options)), stretches), strict)
     if options.pop("start", None) is not None:
         raise ValueError(
             "start needs modes, taken as they are: give those of the blow before, hit.target, and no part of a plan"

@@ -173,7 +173,10 @@ class Modes(check.Brief):
         missing = tuple(name for name, what in gaps.items() if what is not None)
         strength = np.where(flexible, (values**2).mean(axis=0), 0.0)
         along = strength > 0.01 * strength.max()  # others move across
-        odd = plausible.elsewhere(points, values[:, None, along], mass) if points.shape[1] and not complete else ()
+        odd: tuple[str, ...] = ()
+        if points.shape[1] and not complete:
+            odd = plausible.elsewhere(points, values[:, None, along], mass)
+            odd = (*odd, *plausible.disordered(points, values[:, flexible]))
         notes = (*odd, *plausible.damping(damping, omega), *(UNSTATED[name] for name in missing))
         made, said = cls(omega, damping, sampled, mass, notes=notes, unstated=missing), dents.stated(solid)
         return made if said == () else dents.settled(made, dents.of_points(points, static, known), said)

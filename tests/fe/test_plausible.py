@@ -128,3 +128,20 @@ def test_a_slip_in_a_rib_is_noted(slip, words):
     ribs = [rib(y=0.1), rib(**slip)]
     notes = fi.assemble(fi.mesh.rectangle(0.4, 0.3), plate(2e-3), {"boundary": "hinged"}, ribs=ribs).notes
     assert len(notes) == (words is not None) and all(re.search(words, note) for note in notes)
+
+
+def sampled(scale=1.0, order=slice(None)):
+    plate = fi.analytic.rectangle(0.4, 0.3, mass=0.5, first_frequency=100.0, n_modes=30)
+    points = np.stack(np.meshgrid(np.linspace(0.0, 0.4, 13), np.linspace(0.0, 0.3, 10)), axis=-1).reshape(-1, 2)
+    return fi.Modes.from_arrays(plate.frequencies, scale * plate.shape_at(points)[order], points=points, mass=0.5)
+
+
+def test_shapes_in_another_order_than_their_points_are_noted():
+    (note,) = set(sampled(order=np.random.default_rng(0).permutation(130)).notes) - set(sampled().notes)
+    assert "different at neighbouring points as at any two; they are expected in their order" in note
+
+
+def test_a_blow_that_fails_says_first_that_shapes_are_of_another_scale(monkeypatch):
+    monkeypatch.setattr("fem_impact.impact.engine.MAX_STEPS", 4000)
+    with pytest.raises(fi.SimulationError, match=r"^shapes are 9\.1e\+02 times as large .*: no final separation"):
+        fi.strike(sampled(1e3), fi.Striker.rigid(0.02), fi.Contact.linear(1e5), at=(0.2, 0.1), speed=1.0)
