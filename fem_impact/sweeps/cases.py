@@ -127,7 +127,7 @@ class Cases:
             if name == "n_impacts":
                 values = np.where(np.isnan(values), -1, values).astype(np.int32)
             if name == "centroid":
-                about["max_frequency"] = self.band
+                about |= {"max_frequency": self.band, "sum_error": batches.SUMMED}
             found[name] = values, about
         return found
 

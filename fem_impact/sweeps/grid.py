@@ -204,7 +204,8 @@ def sweep(
         returns: points in the units of the axes, ``border_impacts``, ``border_curve`` and ``border_error``.
         ``attrs["borders"]`` sums them up. With cells left to this function, ``attrs["cells"]`` says how many were
         computed, and ``interpolated`` which were not; ``error`` counts the error of interpolation, but for that of the
-        centroid, which its attribute ``interpolation_error`` bounds.
+        centroid, which its attribute ``interpolation_error`` bounds. What sums for the centroid err by, whatever the
+        steps, is in its attribute ``sum_error``.
         ``attrs["scene"]`` holds the blow all cells share, as JSON; ``attrs["notes"]`` what was assumed, one note per
         line.
 
