@@ -81,7 +81,7 @@ def loading(body: Known, integrals: Bending) -> tuple[np.ndarray, np.ndarray] | 
     """Mass of the air over that of the body, and damping ratio by sound, (n_modes,) [-] each; None if not known.
 
     For a plate in a baffle; without one it moves less air, its lowest modes up to half as much. Free edges radiate less
-    than this tells, by a factor of 10 and more below coincidence, where that is little beside the mass.
+    than this estimates, by a factor of 10 and more below coincidence, where that is little beside the mass.
     """
     rho, c = DENSITY, SPEED
     omega, per_extent = body.modes.omega, body.per_extent

@@ -422,7 +422,7 @@ def _table(
     for each, column in zip(inputs, values.T):
         unit = AXES.get(ALIASES.get(each.name, each.name), ("",))[0].replace("exponent", f"{power:g}")
         data[each.name] = ("blow", column, {"units": unit or "1", "distribution": each.said})
-    data |= {name: ("blow", *told) for name, told in cases.labelled(numbers).items()}
+    data |= {name: ("blow", *column) for name, column in cases.labelled(numbers).items()}
     counts = data["n_impacts"][1]
     data[DOUBLE] = ("blow", (counts > 1).astype(np.int8), {"units": "1", "long_name": QUANTITIES[DOUBLE][1]})
     part = np.arange(len(counts)) % n_parts
