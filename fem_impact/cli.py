@@ -17,7 +17,7 @@ from typing import Any
 import fem_impact as fi
 
 from . import answers
-from ._base.explained import named
+from ._base.explained import named_headings
 from ._base.files import signalled, undo_all
 from .answers import Status
 from .arguments import parser
@@ -78,7 +78,7 @@ def _print(options: argparse.Namespace, found: Answer) -> None:
         data = found.data
         if found.said is not None:
             said = ("\n".join([part] if isinstance(part, str) else part) for part in found.said)
-            rest = {"notes": [], "see": named(said), "versions": fi.export.versions()}
+            rest = {"notes": [], "see": named_headings(said), "versions": fi.export.versions()}
             data = {"command": options.command, "format": answers.FORMAT} | data
             data |= {name: value for name, value in rest.items() if name not in data}
         print(json.dumps(fi.export.plain(data), indent=2, allow_nan=False))

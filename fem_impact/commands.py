@@ -18,8 +18,8 @@ from typing import Any
 import fem_impact as fi
 
 from . import answers
-from ._base.explained import noted
-from ._base.files import staged
+from ._base.explained import lines_of_notes
+from ._base.files import staged_folder
 from .display import ANNOUNCED, Display
 from .replies import (
     Answer,
@@ -54,7 +54,7 @@ def run_strike(options: argparse.Namespace) -> Answer:
     if scene.stroke:
         return _strike_in_turn(options, scene)
     folder, display = folder_of(options), progress_of(options, announces=True)
-    with staged(folder, "strike") as staging, Painter() if options.pictures else nullcontext() as painter:
+    with staged_folder(folder, "strike") as staging, Painter() if options.pictures else nullcontext() as painter:
         place = folder.resolve()  # "." has no name of its own
         keep = place.parent / f"{place.name}.modes.npz"  # not in the folder: an interrupted run leaves that alone
         motion = options.pictures or options.vtk or options.film
@@ -62,13 +62,13 @@ def run_strike(options: argparse.Namespace) -> Answer:
         run = scene.run(display, before=before, verify=options.verify, motion=motion, keep=keep, **_choices(options))
         display.predict(run.plan.ringing or None)
         if options.strict:
-            promise.kept(run.response, strict=True)
+            promise.warn_if_missed(run.response, strict=True)
         stages = Stages(display)
         data = _write(staging, scene, run, options, stages, painter)
     keep.unlink(missing_ok=True)
     if options.band:
         with display("blows"):
-            found = band.around(scene, run.response)
+            found = band.band_around(scene, run.response)
     seconds = {**run.seconds, **stages.seconds, "total": time.perf_counter() - began}
     said: list[str | Sequence[str]] = [title_of(scene), run.response.summary()]
     if options.band:
@@ -176,7 +176,7 @@ def _strike_in_turn(options: argparse.Namespace, scene: Any) -> Answer:
         raise ValueError(f"--{wrong} must be left out for a scene with strokes")
     began = time.perf_counter()
     folder, display = folder_of(options), progress_of(options)
-    with staged(folder, "strike") as staging, warnings.catch_warnings():
+    with staged_folder(folder, "strike") as staging, warnings.catch_warnings():
         warnings.simplefilter("ignore", fi.ToleranceWarning)  # the first line of the summary says it
         stages = Stages(display)
         found = scene.play(watch=display, strict=options.strict, **_choices(options))
@@ -218,7 +218,7 @@ def run_map(options: argparse.Namespace) -> Answer:
     form, picture = maps.can_write(chosen.get(False, "nc"), options.out), chosen.get(True, FORMATS[0])
     scene = fi.load_scene(options.scene)
     folder = folder_of(options)
-    with staged(folder, "map") as staging:
+    with staged_folder(folder, "map") as staging:
         display = progress_of(options)
         with display("cells"):
             table = maps.map_scene(
@@ -246,7 +246,7 @@ def run_map(options: argparse.Namespace) -> Answer:
         not_known = f"; not known: {unknown}" if unknown else ""
         said.append(f"Model error: {low:.1g} to {high:.1g}{not_known}")
     data |= {"notes": table.attrs["notes"].splitlines(), "seconds": {"total": time.perf_counter() - began}}
-    said += [*noted(data["notes"]), f"Time: {data['seconds']['total']:.2f} s"]
+    said += [*lines_of_notes(data["notes"]), f"Time: {data['seconds']['total']:.2f} s"]
     return answer(data, *said, folder=folder, files=names)
 
 
@@ -262,7 +262,7 @@ def run_spread(options: argparse.Namespace) -> Answer:
         correlation = {tuple(name.strip() for name in names.split(",")): float(value) for names, value in pairs}
     except ValueError:
         raise ValueError("--correlate must look like contact.stiffness,striker.mass=0.5") from None
-    with staged(folder, "spread") as staging:
+    with staged_folder(folder, "spread") as staging:
         display = progress_of(options)
         with display("blows"):
             found = uncertainty.spread(
@@ -289,13 +289,13 @@ def _split(option: str, text: str) -> tuple[str, str]:
 def run_tune(options: argparse.Namespace) -> Answer:
     from .designs import tuning  # imported only when needed
 
-    picture, wanted = picture_of(options, "tuning.png"), tuning.given(options.pitch)
+    picture, wanted = picture_of(options, "tuning.png"), tuning.parse_pitches(options.pitch)
     names = ("match", "depth", "radius", "mirror", "patches", "tolerance")
     with progress_of(options)("modes"), warnings.catch_warnings():
         warnings.simplefilter("ignore", fi.ToleranceWarning)  # the first line of the summary says it
         found = fi.tune(options.scene, wanted, **{name: getattr(options, name) for name in names})
     if picture is not None:
-        with staged(picture.parent, "tune") as staging:
+        with staged_folder(picture.parent, "tune") as staging:
             fi.figures.save(staging / picture.name, found.figure())
     verdict, *lines = found.summary().splitlines()
     return answer(found.data(), verdict, lines, path=picture, missed=not found.met)
@@ -305,7 +305,7 @@ def run_report(options: argparse.Namespace) -> Answer:
     scene = fi.report.read(options.scene)
     path = page_of(options, "report.html")
     changes = {} if options.tolerance is None else {"tolerance": options.tolerance}
-    with staged(path.parent) as staging:
+    with staged_folder(path.parent) as staging:
         display = progress_of(options, announces=True)
         before = partial(_announce, options, display, False, False)
         if scene.stroke:
@@ -324,7 +324,7 @@ def run_report(options: argparse.Namespace) -> Answer:
 def run_page(options: argparse.Namespace) -> Answer:
     scene, display = fi.load_scene(options.scene), progress_of(options)
     path = page_of(options, "page.html")
-    with staged(path.parent) as staging:
+    with staged_folder(path.parent) as staging:
         found = fi.lesson.write(staging / path.name, scene, watch=display, told=partial(display.report, "blows"))
     return answer(vars(found), title_of(scene), f"{found.summary()}.", path=path)
 
@@ -350,8 +350,8 @@ def run_play(options: argparse.Namespace) -> Answer:
     check.positive("--duration", options.duration, "s")
     notes = [] if options.midi is None else controllers.read_midi(options.midi)
     if options.at:
-        asked.placed(scene.built.target, "--at", options.at, nullcontext)
-    with staged(path.parent) as staging:
+        asked.checked_places(scene.built.target, "--at", options.at, nullcontext)
+    with staged_folder(path.parent) as staging:
         with progress_of(options)("modes"):
             modes = scene.modes(options.n_modes)
         with progress_of(options)("preparing, and compiling if not yet done"):
@@ -367,7 +367,7 @@ def run_play(options: argparse.Namespace) -> Answer:
     happened = ", ".join(f"{count} {name}" for name, count in counted.items())
     said = [
         title_of(scene),
-        *noted(modes.notes),
+        *lines_of_notes(modes.notes),
         f"Played: {happened} of at most {1e6 * player.step:.3g} us, {modes.n_modes} modes",
         f"Blocks: {len(played.seconds)} of {1e3 * player.block / player.rate:.3g} ms; the 99th percentile of their "
         f"computing time is {1e3 * played.slowest:.3g} ms; {played.missed} missed their deadline",
@@ -386,7 +386,7 @@ def run_modes(options: argparse.Namespace) -> Answer:
     scene, display = fi.load_scene(options.scene), progress_of(options)
     if options.vtk is not None:
         fi.export.vtk_ending(options.vtk)
-    with nullcontext() if options.vtk is None else staged(options.vtk.parent) as staging:  # or fails early
+    with nullcontext() if options.vtk is None else staged_folder(options.vtk.parent) as staging:  # or fails early
         with display("modes"):
             modes = scene.modes(options.n_modes, elastic=True)
         if staging is not None:
@@ -397,7 +397,7 @@ def run_modes(options: argparse.Namespace) -> Answer:
         if i > modes.n_rigid
     ]
     rigid = f"Modes 1 to {modes.n_rigid} are rigid motions: nothing holds the body there"
-    said: list[str | Sequence[str]] = [title_of(scene), *noted(modes.notes)]
+    said: list[str | Sequence[str]] = [title_of(scene), *lines_of_notes(modes.notes)]
     said += [rigid if modes.n_rigid > 1 else "Mode 1 is a rigid motion"] if modes.n_rigid else []
     said.append(as_table(rows, ("mode", "frequency", "damping ratio")))
     data = {"frequencies": modes.frequencies, "damping_ratios": modes.damping_ratio, "n_rigid": modes.n_rigid}
@@ -415,7 +415,7 @@ def run_new(options: argparse.Namespace) -> Answer:
     )  # fmt: skip
     templates.write_scene(path, options.kind, whole)
     verb = "map" if options.kind == "map" else "strike"
-    found = answer({"notes": notes}, *noted(notes), path=path)
+    found = answer({"notes": notes}, *lines_of_notes(notes), path=path)
     return found._replace(said=[*(found.said or ()), f"Next: fem-impact {verb} {path}"])
 
 
@@ -449,7 +449,7 @@ def run_mesh(options: argparse.Namespace) -> Answer:
         for edge in edges
     ]  # fmt: skip
     heads = ("edge", "length", "facets", "form", "half way at", "the same as")
-    said = [str(options.scene), *noted(mesh.notes), [*as_table(facts), "", *as_table(rows, heads)]]
+    said = [str(options.scene), *lines_of_notes(mesh.notes), [*as_table(facts), "", *as_table(rows, heads)]]
     data = {"mesh": dict(facts), "edges": [vars(edge) for edge in edges], "notes": mesh.notes}
     return answer(data, *said, path=drawn)
 
@@ -507,7 +507,7 @@ def run_verify(options: argparse.Namespace) -> Answer:
     fault = f"{', '.join(failed)}: ours differs by more than both errors allow; see above" if failed else ""
     picture = picture_of(options, "verify.png")
     if picture is not None:
-        with staged(picture.parent, "verify") as staging:
+        with staged_folder(picture.parent, "verify") as staging:
             figures.save(staging / picture.name, plots.verdicts(found))
     data = {"cases": [each.data for each in found], "n_failed": len(failed)}
     head = ("case", "quantity", "reference", "ours", "allowed", "so it")
@@ -524,7 +524,7 @@ def run_fit(options: argparse.Namespace) -> Answer:
     from .taps import prompt  # imported only when needed
 
     folder, display = folder_of(options), progress_of(options)
-    with staged(folder, "fit") as staging:
+    with staged_folder(folder, "fit") as staging:
         with display("fit"):
             found, scene, proposal = prompt.fit(options, partial(display.report, "fits"))
         data, files = prompt.write(staging, found, scene, proposal)

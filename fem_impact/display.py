@@ -14,7 +14,7 @@ from rich.console import Console
 from rich.table import Column
 from rich.text import Text
 
-from ._base.explained import pointed, printable
+from ._base.explained import printable, with_headings
 from ._base.files import undoable
 from ._base.progress import observed
 
@@ -43,7 +43,7 @@ def announce(text: str) -> None:
 def complain(error: object, status: int) -> int:
     """Print an error on one line of stderr; return the exit status."""
     with suppress(OSError):  # if stderr is closed, the exit status must suffice
-        print(f"fem-impact: {printable(pointed(str(error)))}", file=sys.stderr, flush=True)
+        print(f"fem-impact: {printable(with_headings(str(error)))}", file=sys.stderr, flush=True)
     return status
 
 

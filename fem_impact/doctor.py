@@ -16,7 +16,7 @@ import numpy as np
 from . import mesh
 from ._base import progress
 from ._base.check import EXTRAS
-from ._base.files import scratch
+from ._base.files import scratch_folder
 from .fe.assembly import assemble
 from .fe.section import Material, Plate
 from .impact.collision import strike
@@ -120,12 +120,12 @@ def compile_map() -> None:
 
 
 def _picture() -> bool:
-    with scratch() as folder:
+    with scratch_folder() as folder:
         figures.save(folder / "picture.png", figures.force(_blow()))
         return (folder / "picture.png").stat().st_size > 1000
 
 
 def _vtk() -> bool:
-    with scratch() as folder:
+    with scratch_folder() as folder:
         export.write_vtk(folder / "rigid.vtu", Modes.rigid(1.0))
         return bool(list(folder.iterdir()))

@@ -12,8 +12,8 @@ import fem_impact as fi
 
 from . import replies
 from ._base import check
-from ._base.explained import noted
-from ._base.files import staged
+from ._base.explained import lines_of_notes
+from ._base.files import staged_folder
 from .scenes.sentences import tip_notes
 
 MASSES = [m * 10.0**e for e in (-3, -2, -1) for m in (1.0, 2.0, 5.0)] + [1.0]  # [kg] of hammers from 1 g to 1 kg
@@ -45,7 +45,7 @@ def run_hammer(options: argparse.Namespace) -> replies.Answer:
     ]  # fmt: skip
     said: list[str | Sequence[str]] = [
         replies.title_of(scene),
-        *noted(notes),
+        *lines_of_notes(notes),
         f"Linear tips that reach {options.bandwidth:g} Hz (spectrum at most {options.drop:g} dB down) and hit once:",
         replies.as_table(rows, ("mass", "softest tip", "hardest tip", "its reach")),
     ]
@@ -71,7 +71,7 @@ def _rove(options: argparse.Namespace, scene: Any, masses: Sequence[float], note
     with replies.progress_of(options, announces=True)("points"):
         plan = roving.of_scene(scene, masses, options.bandwidth, options.drop, number)
         if drawn is not None:
-            with staged(drawn.parent) as staging:
+            with staged_folder(drawn.parent) as staging:
                 fi.figures.save(staging / drawn.name, plan.figure())
                 plan.write_csv((staging / drawn.name).with_suffix(".csv"))
     files = [] if drawn is None else [drawn.name, drawn.with_suffix(".csv").name]
@@ -80,7 +80,7 @@ def _rove(options: argparse.Namespace, scene: Any, masses: Sequence[float], note
 
 def _answer_of_plan(scene: Any, plan: Any, notes: Sequence[str], **files: Any) -> replies.Answer:
     data = {"table": plan.table(), "verdicts": plan.verdicts, "resolution": plan.resolution}
-    said = [replies.title_of(scene), *noted(notes), plan.summary()]
+    said = [replies.title_of(scene), *lines_of_notes(notes), plan.summary()]
     return replies.answer({**data, "notes": [*notes, *plan.notes]}, *said, **files)
 
 
@@ -95,9 +95,9 @@ def _sheets(options: argparse.Namespace, scene: Any, notes: Sequence[str]) -> re
     path = replies.page_of(options, "hammers.html")
     with replies.progress_of(options, announces=True)("points"):
         heaviest = scene.built.target.mass  # heavier ones load a panel so that its modes are others
-        kit = roving.catalogued(options.catalogue, options.bandwidth, options.drop, heaviest)
+        kit = roving.hammers_known(options.catalogue, options.bandwidth, options.drop, heaviest)
         plan = roving.of_scene(scene, kit, options.bandwidth, options.drop, number)
-    with staged(path.parent) as staging:
+    with staged_folder(path.parent) as staging:
         hammer_sheet.write_sheets(staging / path.name, plan, title=replies.title_of(scene), notes=tuple(notes))
     return _answer_of_plan(scene, plan, notes, path=path)
 
@@ -121,13 +121,13 @@ def run_frf(options: argparse.Namespace) -> replies.Answer:
         for each in peaks
     ]  # fmt: skip
     said = [
-        *noted(measured.notes),
+        *lines_of_notes(measured.notes),
         replies.as_table(rows, ("response", "peak at", "magnitude", "coherence", "within")),
     ]
     data = {"peaks": peaks, "notes": measured.notes}
     if not files:
         return replies.answer(data, *said)
-    with staged(files[0].parent) as staging:
+    with staged_folder(files[0].parent) as staging:
         for path in files:
             if path.suffix.lower() == ".html":
                 _write_page(staging / path.name, options, measured)
@@ -209,13 +209,13 @@ class _Watched:
     def _draw(self, last: Any, advice: Any) -> None:
         """Write the picture; of good taps those count that are sampled as the last ones are."""
         from .pages import tap_pictures  # imported only when needed
-        from .taps.windows import joined
+        from .taps.windows import join_tables
 
         alike = [each for each in self.good.values() if (each.rate, each.units) == (last.rate, last.units)]
-        good = joined(alike) if alike else None
+        good = join_tables(alike) if alike else None
         self.path.parent.mkdir(parents=True, exist_ok=True)
         said = f"{advice.file}, {advice.tap}: {advice.said}"
-        fi.figures.save(self.path, tap_pictures.watched(last, good, self.bandwidth, self.drop, said))
+        fi.figures.save(self.path, tap_pictures.figure_of_record(last, good, self.bandwidth, self.drop, said))
 
     def report_on(self, records: Sequence[Any]) -> replies.Answer:
         """The answer that lists some records."""

@@ -155,7 +155,7 @@ def test_undoing_takes_back_the_newest_first_and_nothing_that_is_appearing(tmp_p
         monkeypatch.setattr(files, "FINISHING", [tmp_path])
         assert not files.undo_all() and len(seen) == 2
     assert not files.UNDONE
-    with files.staged(tmp_path / "new" / "deep") as staging:
+    with files.staged_folder(tmp_path / "new" / "deep") as staging:
         (staging / "half.txt").write_text("half")
         monkeypatch.setattr(files, "FINISHING", [])
         assert files.undo_all() and not (tmp_path / "new").exists()

@@ -16,7 +16,7 @@ from typing import Any, TypeVar, get_args, get_origin
 
 import numpy as np
 
-from .explained import pointed, printable
+from .explained import printable, with_headings
 
 REACH = 1e75  # [-] largest number accepted; 1 / REACH is the smallest: the fourth power of both still fits a float
 MOST = 10**9  # [-] largest count accepted: more items would not fit into memory
@@ -66,7 +66,7 @@ class SimulationError(RuntimeError):
     """A run missed its accuracy or failed; the text says what went wrong and what to change."""
 
     def __str__(self) -> str:
-        return pointed(super().__str__())
+        return with_headings(super().__str__())
 
 
 class ToleranceWarning(UserWarning):
@@ -159,7 +159,7 @@ def instance(name: str, value: Any, *kinds: type) -> Any:
     return value
 
 
-def several(name: str, value: Any, *kinds: type) -> tuple:
+def tuple_of(name: str, value: Any, *kinds: type) -> tuple:
     """Return ``value`` as a tuple, or raise ValueError unless it is a non-empty list or tuple of these types."""
     if not isinstance(value, (list, tuple)) or not value:
         raise ValueError(f"{name} must be a list of {' or '.join(kind.__name__ for kind in kinds)}, got {shown(value)}")
@@ -287,7 +287,9 @@ def on_body(name: str, points: np.ndarray, inside: np.ndarray, corners: np.ndarr
         lost = ", ".join(f"{x:g}" for x in points[~inside][0])
         low, high = corners.min(axis=0), corners.max(axis=0)
         extent = " x ".join(f"[{a:g}, {b:g}]" for a, b in zip(low, high))
-        raise ValueError(pointed(f"{name} must lie on the body, got ({lost}) m; the body extends over {extent} m"))
+        raise ValueError(
+            with_headings(f"{name} must lie on the body, got ({lost}) m; the body extends over {extent} m")
+        )
 
 
 def band(name: str, value: Any, unit: str) -> tuple[float, float]:
@@ -429,4 +431,4 @@ def extra(module: str, name: str, purpose: str) -> Any:
         return importlib.import_module(module)
     except ImportError:
         package = module.partition(".")[0]
-        raise ValueError(pointed(f"{purpose} needs {package}: pip install 'fem-impact[{name}]'")) from None
+        raise ValueError(with_headings(f"{purpose} needs {package}: pip install 'fem-impact[{name}]'")) from None

@@ -49,16 +49,16 @@ HEADINGS: dict[str, tuple[str, ...]] = {
 POINTER = re.compile(r" \((notes\.md#[^()]+)\)")
 
 
-def where(text: str) -> str:
+def headings_of(text: str) -> str:
     """The headings that explain a message, such as "notes.md#air, #not-known"; "" if none does."""
     found = [f"#{heading}" for heading, said in HEADINGS.items() if any(each in text for each in said)]
     return f"notes.md{', '.join(found)}" if found else ""
 
 
-def pointed(text: str) -> str:
+def with_headings(text: str) -> str:
     """The message, ending with the headings that explain it in brackets."""
     bare = POINTER.sub("", text)  # it may hold a message that has its own already
-    place = where(bare)
+    place = headings_of(bare)
     return f"{bare} ({place})" if place else bare
 
 
@@ -67,18 +67,18 @@ def printable(text: str) -> str:
     return "".join(c if c.isprintable() else repr(c)[1:-1] for c in " ".join(text.split()))
 
 
-def below(first: str) -> list[str]:
+def heading_line(first: str) -> list[str]:
     """The line that follows the first line of a summary, which itself stays short; none if nothing explains it."""
-    place = where(first)
+    place = headings_of(first)
     return [f"See {place}"] if place else []
 
 
-def noted(notes: Iterable[str]) -> list[str]:
+def lines_of_notes(notes: Iterable[str]) -> list[str]:
     """Notes as lines of text, each with the headings that explain it."""
-    return [f"Note: {pointed(note)}" for note in notes]
+    return [f"Note: {with_headings(note)}" for note in notes]
 
 
-def named(lines: Iterable[str]) -> list[str]:
+def named_headings(lines: Iterable[str]) -> list[str]:
     """Every heading that lines of text name, each as notes.md#heading."""
     found = (each for line in lines for each in re.findall(r"(?:notes\.md|, )(#[a-z-]+)", line))
     return [f"notes.md{each}" for each in dict.fromkeys(found) if each[1:] in HEADINGS]

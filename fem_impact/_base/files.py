@@ -65,9 +65,9 @@ def signalled(act: Callable[[int, Any], object], *numbers: int) -> Iterator[None
 def replacing(path: str | Path) -> Iterator[Path]:
     """Yield a temporary path beside ``path`` (same suffix); rename it if the block succeeds, otherwise delete it."""
     path = Path(path)
-    _placed(path)
-    _tidy(path.parent)
-    with _named() as name, undoable(lambda: temporary.unlink(missing_ok=True)):
+    _refuse_special(path)
+    _remove_leftovers(path.parent)
+    with _temporary_name() as name, undoable(lambda: temporary.unlink(missing_ok=True)):
         temporary = path.with_name(f"{name}-{path.name}")
         try:
             yield temporary
@@ -88,7 +88,7 @@ def no_folder(path: Path) -> str:
 
 
 @contextmanager
-def staged(folder: str | Path, command: str | None = None) -> Iterator[Path]:
+def staged_folder(folder: str | Path, command: str | None = None) -> Iterator[Path]:
     """Yield an empty folder; move all its files into ``folder`` if the block succeeds, none if it fails.
 
     ``folder`` and its parents are created first, so a location without write access fails before the work starts. If
@@ -104,18 +104,18 @@ def staged(folder: str | Path, command: str | None = None) -> Iterator[Path]:
             if path.is_dir() and not any(path.iterdir()):
                 path.rmdir()
 
-    with _named() as name, undoable(undo):
+    with _temporary_name() as name, undoable(undo):
         staging = folder / name
         try:
             if folder.exists() and not folder.is_dir():
                 raise NotADirectoryError(20, f"{no_folder(folder)}; name another", str(folder))
             folder.mkdir(parents=True, exist_ok=True)
-            _tidy(folder)
+            _remove_leftovers(folder)
             staging.mkdir()
             yield staging
             FINISHING.append(folder)
             try:
-                _move(staging, folder, [] if command is None else _stale(staging, folder, command))
+                _move(staging, folder, [] if command is None else _stale_files(staging, folder, command))
             finally:
                 FINISHING.remove(folder)
             shutil.rmtree(staging, ignore_errors=True)
@@ -125,14 +125,14 @@ def staged(folder: str | Path, command: str | None = None) -> Iterator[Path]:
 
 
 @contextmanager
-def created(folder: Path) -> Iterator[Path]:
+def new_folder(folder: Path) -> Iterator[Path]:
     """Yield an empty folder that becomes ``folder`` if the block succeeds, unless another process was first.
 
     ``folder`` must not exist or be empty; afterwards it is complete, made here or there.
     """
     folder.parent.mkdir(parents=True, exist_ok=True)
-    _tidy(folder.parent)
-    with _named() as name, undoable(lambda: shutil.rmtree(new, ignore_errors=True)):
+    _remove_leftovers(folder.parent)
+    with _temporary_name() as name, undoable(lambda: shutil.rmtree(new, ignore_errors=True)):
         new = folder.with_name(f"{name}-{folder.name}")
         try:
             new.mkdir()
@@ -149,14 +149,14 @@ def created(folder: Path) -> Iterator[Path]:
 
 
 @contextmanager
-def scratch() -> Iterator[Path]:
+def scratch_folder() -> Iterator[Path]:
     """Yield a temporary folder and delete it when the block ends."""
     with tempfile.TemporaryDirectory() as name, undoable(lambda: shutil.rmtree(name, ignore_errors=True)):
         yield Path(name)
 
 
 @contextmanager
-def _named() -> Iterator[str]:
+def _temporary_name() -> Iterator[str]:
     """A temporary name that says whose it is."""
     name = f"{PARTIAL}{MACHINE}-{os.getpid()}-{secrets.token_hex(4)}"
     OURS.add(name)
@@ -166,12 +166,12 @@ def _named() -> Iterator[str]:
         OURS.remove(name)
 
 
-def _tidy(folder: Path) -> None:
+def _remove_leftovers(folder: Path) -> None:
     """Remove what a process that was killed left in a folder; other machines' files are left alone."""
     with suppress(OSError):  # the folder does not exist or cannot be read, which its user will notice
         for path in [Path(entry.path) for entry in os.scandir(folder) if entry.name.startswith(PARTIAL)]:
             owner = re.match(rf"{re.escape(PARTIAL + MACHINE)}-(\d+)-[0-9a-f]{{8}}", path.name)
-            if owner is None or owner[0] in OURS or _runs(int(owner[1])):
+            if owner is None or owner[0] in OURS or _is_running(int(owner[1])):
                 continue
             if path.is_dir() and not path.is_symlink():
                 shutil.rmtree(path, ignore_errors=True)
@@ -179,7 +179,7 @@ def _tidy(folder: Path) -> None:
                 path.unlink(missing_ok=True)
 
 
-def _runs(process: int) -> bool:
+def _is_running(process: int) -> bool:
     """Whether another process of this number runs, or may run."""
     if os.name != "posix":  # elsewhere, to ask would end it
         return True
@@ -194,7 +194,7 @@ def _runs(process: int) -> bool:
     return True
 
 
-def _placed(path: Path) -> None:
+def _refuse_special(path: Path) -> None:
     """Refuse to overwrite anything that is not a regular file: the rename would replace a device or a pipe."""
     if path.is_dir():
         raise IsADirectoryError(21, "Is a directory", str(path))
@@ -207,7 +207,7 @@ def _files(folder: Path) -> list[Path]:
     return sorted(path.relative_to(folder) for path in folder.rglob("*") if path.is_file())
 
 
-def _stale(staging: Path, folder: Path, command: str) -> list[Path]:
+def _stale_files(staging: Path, folder: Path, command: str) -> list[Path]:
     """The files in ``folder`` that this command wrote last time and not now; writes the new list into ``staging``."""
     try:
         lists = json.loads((folder / LIST).read_text("utf-8"))
@@ -241,7 +241,7 @@ def _move(staging: Path, folder: Path, stale: list[Path]) -> None:
         if not (folder / name).is_dir() and folder / name not in made:
             raise NotADirectoryError(20, "Not a directory", str(folder / name))
     for name in files:
-        _placed(folder / name)
+        _refuse_special(folder / name)
     moved: list[Path] = []
     try:
         for name in [*stale, *files]:

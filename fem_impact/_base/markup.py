@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from .explained import noted
+from .explained import lines_of_notes
 
 WIDTH = 360.0  # [px] of a picture; narrow pages shrink it
 MARGIN = 16.0  # [px] empty border, so that markers on the edge are not cut off
@@ -45,7 +45,7 @@ def columns(rows: Iterable[Sequence[Any]], head: Sequence[str] = ()) -> list[str
 
 def note_list(lines: Iterable[str]) -> str:
     """Notes, each a paragraph; all text is escaped."""
-    return "".join(f"<p>{html.escape(line)}</p>" for line in noted(lines))
+    return "".join(f"<p>{html.escape(line)}</p>" for line in lines_of_notes(lines))
 
 
 def data_uri(kind: str, raw: bytes) -> str:

@@ -143,13 +143,13 @@ class Rate(check.Brief):
         for side in sides:
             _check_alike(name, now, side)
         section = None
-        if now.section is not None and any(_differ(now, side) for side in sides):
+        if now.section is not None and any(_sections_differ(now, side) for side in sides):
             sections = tuple(side.section for side in sides if side.section is not None)
             section = SectionChange(sections, tuple(weights.tolist()))
         return cls(found, section)
 
 
-def _differ(one: Piece, two: Piece) -> bool:
+def _sections_differ(one: Piece, two: Piece) -> bool:
     """Whether the sections of two bodies differ at any of many places; functions of place are new each time."""
     mesh = one.target.mesh
     if one.section is two.section or mesh is None or one.section is None or two.section is None:

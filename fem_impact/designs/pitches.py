@@ -82,7 +82,7 @@ def _interval(name: str, text: Any) -> float:
 
 
 def read_pitches(pitches: Any, match: str) -> tuple[Pitch, ...]:
-    """All pitches, in the order of their modes; those to be matched by nearness have mode 0 until `settled`."""
+    """All pitches, in the order of their modes; those to be matched by nearness have mode 0 until `match_pitches`."""
     check.one_of("match", match, MATCHES)
     if isinstance(pitches, Mapping):
         if match != "order":
@@ -100,7 +100,7 @@ def read_pitches(pitches: Any, match: str) -> tuple[Pitch, ...]:
     return found
 
 
-def settled(pitches: tuple[Pitch, ...], frequencies: np.ndarray) -> tuple[Pitch, ...]:
+def match_pitches(pitches: tuple[Pitch, ...], frequencies: np.ndarray) -> tuple[Pitch, ...]:
     """The pitches with the flexible modes nearest to them, of frequencies (n,) [Hz]; ValueError if in doubt."""
     taken: dict[int, Pitch] = {}
     for each in pitches:

@@ -19,7 +19,7 @@ FINER = 3  # [-] odd: points to look at how deep dishes are together, for each p
 PER_CENT = CENTS / np.log(2.0)  # [-] fact: cents of a relative change
 
 
-def bell(square: np.ndarray) -> np.ndarray:
+def dish_profile(square: np.ndarray) -> np.ndarray:
     """Depth of a dish over that in its middle, at squared distances over its squared radius: smooth everywhere."""
     return np.asarray(np.exp(-3.0 * square))
 
@@ -45,10 +45,12 @@ class Dishes:
         """Depth [m] taken off at points (n_points, dimension) [m], (n_points,)."""
         if not len(self.middles):
             return np.zeros(len(points))
-        return np.asarray(bell(((points[:, None] - self.middles) ** 2).sum(axis=2) / self.radius**2) @ self.depths)
+        return np.asarray(
+            dish_profile(((points[:, None] - self.middles) ** 2).sum(axis=2) / self.radius**2) @ self.depths
+        )
 
 
-def thinner(section: Any, depth: Any) -> Any:
+def thinned_section(section: Any, depth: Any) -> Any:
     """The section after a depth, a function of points (n, dimension) [m] returning (n,) [m], was taken off.
 
     The thickness of a plate and the height of a bar are less by it; a round bar is turned down, by it all round. The
@@ -65,7 +67,7 @@ def thinner(section: Any, depth: Any) -> Any:
     return replace(section, height=less("height", 1.0))
 
 
-def across(section: Any, points: np.ndarray) -> np.ndarray:
+def surface_width(section: Any, points: np.ndarray) -> np.ndarray:
     """Width (n,) [m] of the surface of a bar that dishes are cut into, its girth if round; 1 of a plate."""
     if isinstance(section, Plate):
         return np.ones(len(points))
@@ -107,12 +109,14 @@ class Sensitivity:
         unit = float(thickness(section, places).min())
 
         change = SectionChange.by_differences(
-            "depth", 1.0, lambda share: thinner(section, lambda at: np.full(len(at), (share - 1.0) * unit))
+            "depth", 1.0, lambda share: thinned_section(section, lambda at: np.full(len(at), (share - 1.0) * unit))
         )
         found = frequency_densities(system, change, vectors, (omega / frame.rate) ** 2)
         dx = points.dx.ravel() * frame.length ** places.shape[1]
         own = PER_CENT / unit * dx[:, None] * found.reshape(len(dx), -1)
-        return cls(cKDTree(places), places, dx * across(section, places), own, float(np.ptp(places, axis=0).max()))
+        return cls(
+            cKDTree(places), places, dx * surface_width(section, places), own, float(np.ptp(places, axis=0).max())
+        )
 
     def of_dishes(self, middles: np.ndarray, radius: float) -> tuple[np.ndarray, np.ndarray]:
         """Cents (n, n_modes) per depth [1/m] of dishes around middles (n, dimension) [m], and volumes (n,) per depth.
@@ -121,12 +125,12 @@ class Sensitivity:
         """
         found, areas = np.zeros((len(middles), self.cents.shape[1])), np.zeros(len(middles))
         for i, near in enumerate(self.tree.query_ball_point(middles, 2.5 * radius)):  # 1e-8 of the depth is left there
-            dish = bell(((self.places[near] - middles[i]) ** 2).sum(axis=1) / radius**2)
+            dish = dish_profile(((self.places[near] - middles[i]) ** 2).sum(axis=1) / radius**2)
             found[i], areas[i] = dish @ self.cents[near], dish @ self.areas[near]
         return found, areas
 
 
-def images(middle: np.ndarray, axes: str, system: System) -> np.ndarray:
+def mirror_images(middle: np.ndarray, axes: str, system: System) -> np.ndarray:
     """A middle (dimension,) and its images in the middle of the body along x, y or both, each once: (n, dimension)."""
     points = system.mesh.points
     low, size = points.min(axis=0), np.ptp(points, axis=0)
@@ -161,7 +165,7 @@ class Places:
             np.stack(np.meshgrid(*(line[::step] for line in lines), indexing="ij"), axis=-1).reshape(-1, len(low))
             for step in (1, FINER)
         )
-        groups = [images(middle, axes, system) for middle in middles]
+        groups = [mirror_images(middle, axes, system) for middle in middles]
         groups = [each for each in groups if system.contains(each).all()]
         owners = np.repeat(np.arange(len(groups)), [len(each) for each in groups])
         return cls(np.concatenate(groups), owners, radius, between, float(np.linalg.norm(0.5 * size / counts)))
@@ -192,8 +196,8 @@ class Places:
     def overlaps(self) -> np.ndarray:
         """Greatest depth about each point of `between` by a dish of depth 1 at each place, (n_between, n_places) [-].
 
-        Where dishes are deepest together, their slopes cancel: at a distance from there, they are less by `bell` at
-        most.
+        Where dishes are deepest together, their slopes cancel: at a distance from there, they are less by at most
+        `dish_profile`.
         """
-        found = self.summed(bell(((self.middles[:, None] - self.between) ** 2).sum(axis=2) / self.radius**2)).T
-        return found / bell(np.square(self.gap / self.radius))
+        found = self.summed(dish_profile(((self.middles[:, None] - self.between) ** 2).sum(axis=2) / self.radius**2)).T
+        return found / dish_profile(np.square(self.gap / self.radius))

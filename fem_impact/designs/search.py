@@ -420,7 +420,7 @@ def _of_hit(hit: Response, goal: Goal) -> float:
     """The quantity of a blow."""
     name, _, band = goal.name.partition("=")
     if name == "clearance":
-        return clearance.nearest(hit)[0]
+        return clearance.nearest_clearance(hit)[0]
     return float(gradient.value_of(hit, name, float(band) if band else None))
 
 

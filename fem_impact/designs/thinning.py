@@ -15,16 +15,16 @@ from ..fe.system import System
 from ..model.target import RIGID_MOTIONS, Target
 from ..modes import finding
 from ..modes.modal import Modes
-from ..modes.varied import sharing
+from ..modes.varied import share_frequency
 from ..modes.viewing import grid
 from . import pitches as wishes
 from .pitches import CENTS, Pitch, cents
-from .removal import Dishes, Places, Sensitivity, thickness, thinner
+from .removal import Dishes, Places, Sensitivity, thickness, thinned_section
 
 PENALTY = 100.0  # [-] places taken down to the greatest depth that a miss of a cent weighs: more than any pitch costs
 
 
-def drawn(modes: Modes) -> tuple[np.ndarray, np.ndarray]:
+def drawing_grid(modes: Modes) -> tuple[np.ndarray, np.ndarray]:
     """Points (n_points, dimension) [m] and cells (n_cells, dimension + 1) all over a body, to draw and compare shapes.
 
     The elements of a bar are too few for that.
@@ -95,9 +95,9 @@ class Blank(check.Brief):
         while unsettled and modes.frequencies[-1] < 2.0 * max(each.frequency or 0.0 for each in pitches):
             modes = target.find(2 * modes.n_modes, tolerance=close)
         if unsettled:
-            pitches = wishes.settled(pitches, modes.frequencies[modes.n_rigid :])
+            pitches = wishes.match_pitches(pitches, modes.frequencies[modes.n_rigid :])
         numbers = sorted({each.mode for each in pitches} | {1 for each in pitches if each.ratio is not None})
-        shared = sharing(modes).sum(axis=0) > 1
+        shared = share_frequency(modes).sum(axis=0) > 1
         for number in numbers:
             if shared[modes.n_rigid + number - 1]:
                 raise SimulationError(
@@ -110,7 +110,7 @@ class Blank(check.Brief):
     @cached_property
     def spots(self) -> np.ndarray:
         """Places (n, dimension) [m] all over the body."""
-        return drawn(self.start)[0]
+        return drawing_grid(self.start)[0]
 
     def first(self) -> Solved:
         """As it stands."""
@@ -119,7 +119,7 @@ class Blank(check.Brief):
     def after(self, dishes: Dishes, before: Solved) -> Solved:
         """With dishes, its modes followed by their shapes from a body much like it."""
         system, whole = before.system, self.first().system.section
-        body = reassemble(replace(system, section=thinner(whole, dishes.depth)), system.mesh)
+        body = reassemble(replace(system, section=thinned_section(whole, dishes.depth)), system.mesh)
         wanted = None if self.target.size_stated else self.close
         modes = finding.find_modes(body, n_modes=self.start.n_modes, tolerance=wanted)
         old, new = (each.shapes.at(self.spots) for each in (before.modes, modes))
@@ -205,7 +205,7 @@ class Thinning:
 
         now = self.misses(solved)
         for _ in range(40):  # bodies: those of a bar cut to a third of its height take 25
-            tried = _cheapest(cost, slopes * self.depth, now, share, overlaps, room, trust)
+            tried = _cheapest_shares(cost, slopes * self.depth, now, share, overlaps, room, trust)
             predicted = merit(share, now) - merit(tried, now + slopes @ (self.depth * (tried - share)))
             if predicted <= 0.01 * max(float(cost @ share), 0.01):  # of what is taken off
                 break
@@ -222,7 +222,7 @@ class Thinning:
         return share, solved
 
 
-def _cheapest(
+def _cheapest_shares(
     cost: np.ndarray, slopes: np.ndarray, now: np.ndarray, share: np.ndarray, overlaps: np.ndarray, room: float,
     trust: float,
 ) -> np.ndarray:  # fmt: skip

@@ -18,8 +18,8 @@ from ..scenes.scene import Scene, load_scene
 from ..show import outlined
 from . import pitches as wishes
 from .pitches import Pitch, cents, note
-from .removal import Dishes, check_body, images
-from .thinning import Blank, Solved, Thinning, drawn
+from .removal import Dishes, check_body, mirror_images
+from .thinning import Blank, Solved, Thinning, drawing_grid
 
 MIRRORS = "x", "y", "xy"  # a bar has the first
 
@@ -112,7 +112,7 @@ class Tuning(check.Brief):
 
     def figure(self) -> Any:
         """A matplotlib figure: the map of each mode on the outline, and the patches with their numbers and depths."""
-        points, cells = drawn(self.before.modes)
+        points, cells = drawing_grid(self.before.modes)
         titles = [
             f"mode {each.pitch.mode}: {each.before:.5g} Hz, wanted {each.pitch.words}, off by {each.off:+.1f} cents"
             if each.pitch.words else f"mode {each.pitch.mode}: {each.before:.5g} Hz"
@@ -144,7 +144,7 @@ class Tuning(check.Brief):
         place = self.before.modes.point("at", at)[0]
         depth = check.positive("depth", depth, "m")
         radius = check.positive("radius", self.radius if radius is None else radius, "m")
-        middles = images(place, self.mirror, self.before.system)
+        middles = mirror_images(place, self.mirror, self.before.system)
         solved = self.body.after(Dishes.of_places([(middles, depth)], radius), self.before)
         slopes = depth * self.before.sensitivity.of_dishes(middles, radius)[0].sum(axis=0)
         moved = cents(solved.frequencies, self.before.frequencies)
@@ -279,13 +279,13 @@ def tune(
         raise ValueError(f"depth must be less than the {whole}, {most * before.thinnest:g} m, got {depth:g} m")
     search = Thinning(start, before, depth, radius, mirror or "", tolerance)
     found = search.choose_places(check.count("patches", patches, high=100))
-    made = _finish(start, search, found)
+    made = _solve_and_report(start, search, found)
     if not made.met:
         promise.warn(made.verdict)
     return made
 
 
-def given(words: Sequence[str]) -> Any:
+def parse_pitches(words: Sequence[str]) -> Any:
     """Pitches as the prompt has them: each "MODE=PITCH", or none of them with a mode."""
     split = [text.partition("=") for text in words]
     if not any(equals for _, equals, _ in split):
@@ -295,7 +295,7 @@ def given(words: Sequence[str]) -> Any:
     return {int(mode): pitch.strip() or None for mode, _, pitch in split}
 
 
-def _finish(body: Blank, search: Thinning, found: Sequence[tuple[np.ndarray, float]]) -> Tuning:
+def _solve_and_report(body: Blank, search: Thinning, found: Sequence[tuple[np.ndarray, float]]) -> Tuning:
     """The result, with every patch solved after those before it."""
     before = last = search.before
     patches, slopes = [], before.sensitivity

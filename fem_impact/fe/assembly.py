@@ -8,13 +8,13 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from .._base import check
-from ..mesh.meshes import Mesh, aligned, pierced
+from ..mesh.meshes import Mesh, aligned, mesh_with_holes
 from .constraints import Attached, load_and_release
 from .corners import Singular, around_corners
 from .euler import EULER
 from .interpolation import Interpolation
 from .kirchhoff import ARGYRIS, MORLEY
-from .ribs import Rib, ribbed
+from .ribs import Rib, mesh_along_ribs
 from .section import KINDS, Beam, Elastic, Plate, size_at
 from .shallow import SHALLOW
 from .shear_beam import TIMOSHENKO
@@ -146,15 +146,15 @@ def assemble(
         mesh = aligned(mesh)
     posts, clamps = check_posts(point_supports, mesh.dimension)
     if clamps:
-        mesh, supports = pierced(mesh, clamps), clamped(supports, len(clamps))
-    mesh = ribbed(mesh, section)
+        mesh, supports = mesh_with_holes(mesh, clamps), clamped(supports, len(clamps))
+    mesh = mesh_along_ribs(mesh, section)
     attached = Attached(check_masses(point_masses, mesh.dimension), posts)
     near = None if near is None else check.places("near", near, mesh.dimension)
     near, coarseness = None if near is None or not len(near) else near, check.number("coarseness", coarseness)
     if coarseness < 1.0:
         raise ValueError(f"coarseness must be at least 1, got {coarseness:g}")
     layer = check.positive("layer", layer)
-    return _assembled(rules, mesh, section, supports, attached, near, graded, layer, coarseness)
+    return _assemble_checked(rules, mesh, section, supports, attached, near, graded, layer, coarseness)
 
 
 def usual_theory(section: Any, dimension: int) -> Theory:
@@ -164,7 +164,7 @@ def usual_theory(section: Any, dimension: int) -> Theory:
     return ARGYRIS if dimension == 2 else EULER
 
 
-def _assembled(
+def _assemble_checked(
     rules: Theory, mesh: Mesh, section: Any, supports: Any, attached: Attached, near: np.ndarray | None, graded: bool,
     layer: float = 1.0, coarseness: float = 1.0,
 ) -> System:  # fmt: skip
@@ -178,7 +178,7 @@ def _assembled(
     held_at = [point for point, _ in (*attached.masses, *attached.posts)]
     marked = np.reshape([*given, *held_at], (-1, mesh.dimension))  # forces act here
     size = np.append(np.full(len(given), coarseness), np.ones(len(held_at)))
-    corners, fine = _graded(rules, mesh, section, supports, marked, graded, layer, size)
+    corners, fine = _graded_mesh(rules, mesh, section, supports, marked, graded, layer, size)
     body = Subject(fine, section, support_of_facets(fine, supports, rules.words), marked)
     domain = rules.domain(body, rules.fields)
     held = rules.hold(body, domain)
@@ -204,7 +204,7 @@ def _assembled(
     )  # fmt: skip
 
 
-def _graded(
+def _graded_mesh(
     rules: Theory, mesh: Mesh, section: Any, supports: Any, points: np.ndarray, graded: bool, layer: float,
     coarseness: Any,
 ) -> tuple[dict[int, Singular], Mesh]:  # fmt: skip
@@ -232,7 +232,7 @@ def unknowns_near(
 ) -> int:  # fmt: skip
     """About how many unknowns `assemble` makes of a thin plate with elements that shrink towards points; 1 % more."""
     rules = usual_theory(section, 2)
-    fine = _graded(rules, mesh, section, supports, points, graded, layer, coarseness)[1]
+    fine = _graded_mesh(rules, mesh, section, supports, points, graded, layer, coarseness)[1]
     held = [HOLDS.get(kind, 0) for kind in plain_kinds(support_of_facets(fine, supports))]
     sides = (3 * len(fine.cells) + len(fine.facets)) // 2
     within = 2 * (len(fine.points) + 3 * sides + 3 * len(fine.cells)) if rules is SHALLOW else 0
@@ -251,11 +251,11 @@ def reassemble(
     near, layer = system.near if near is None else near, system.layer if layer is None else layer
     attached = Attached(list(system.point_masses), list(system.point_supports))
     rest = attached, near, system.graded, layer, coarseness
-    return _assembled(rules, mesh, system.section, system.supports, *rest)
+    return _assemble_checked(rules, mesh, system.section, system.supports, *rest)
 
 
 def clamped(supports: Any, n_clamps: int) -> dict[str, Any]:
-    """Supports of the edges, with those of clamps by `pierced`."""
+    """Supports of the edges, with those of clamps by `mesh_with_holes`."""
     if not isinstance(supports, dict):
         raise ValueError(f"supports must be a dict of edge name -> support, got {check.shown(supports)}")
     return {**supports, **{f"clamp{i}": "clamped" for i in range(n_clamps)}}

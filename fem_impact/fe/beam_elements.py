@@ -137,13 +137,13 @@ def domain(make_space: Callable[[Cells], Any], body: Subject, names: tuple[str, 
 
     points, marked = (bare.local(each)[:, 0] for each in (mesh.points, body.marked))
     held = [kind in ("clamped", "hinged") for kind in body.held]
-    line = divided(fields, nodes(points, marked, points[mesh.facets[held, 0]]))
+    line = divide_lines(fields, nodes(points, marked, points[mesh.facets[held, 0]]))
     space = make_space(line)
     x, dx = quadrature(space)
     return Domain.of(names, section, bare, line, space, Points(np.zeros((1, x.shape[1])), x[..., None], dx))
 
 
-def hold(body: Subject, domain: Domain) -> Held:
+def support_ends(body: Subject, domain: Domain) -> Held:
     """The supports of both ends of a beam, on its deflection and its rotation by bending.
 
     A deflection by shear is zero at the left end, as only the sum of both counts, and takes all of it away from a held
@@ -178,27 +178,27 @@ def quadrature(space: Any) -> tuple[np.ndarray, np.ndarray]:
     return space.start[:, None] + 0.5 * (node + 1.0) * space.length[:, None], 0.5 * weight * space.length[:, None]
 
 
-def divided(fields: Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]], nodes: np.ndarray) -> Cells:
+def divide_lines(fields: Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]], nodes: np.ndarray) -> Cells:
     """Line elements between nodes, with more nodes until a polynomial fits the section between any two neighbours.
 
     Steps and kinks of stiffness and inertia are found by halving every interval that no polynomial fits. An interval
     that still has a bad fit when it is as narrow as SAME contains a step or kink and gets a node, a step at its place.
     """
     span = nodes[-1] - nodes[0]
-    breaks = _breaks(fields, nodes)
+    breaks = _section_breaks(fields, nodes)
     breaks = breaks[np.abs(breaks[:, None] - nodes).min(axis=1, initial=np.inf) > 4.0 * SAME * span]
     every = np.sort(np.append(nodes, breaks))
     low, high, margin = every[:-1], every[1:], SAME * span  # skip the inexactly located kink at a node
     while low.size:
         # none is halved below a millionth of the beam: a jump is then pinned to that
-        rough = (_misfit(fields, low + margin, high - margin, span) > SAME) & (high - low > 1e-6 * span)
+        rough = (_section_misfit(fields, low + margin, high - margin, span) > SAME) & (high - low > 1e-6 * span)
         middle = 0.5 * (low + high)[rough]
         every = np.append(every, middle)
         low, high = np.append(low[rough], middle), np.append(middle, high[rough])
     return MeshLine(np.sort(every))
 
 
-def _breaks(fields: Callable, nodes: np.ndarray, most: int = 2000) -> np.ndarray:
+def _section_breaks(fields: Callable, nodes: np.ndarray, most: int = 2000) -> np.ndarray:
     """Places (n,) where the section jumps, to rounding, or kinks, to within SAME times the length of the beam."""
     span, low, high = nodes[-1] - nodes[0], nodes[:-1], nodes[1:]
     found: list[float] = []
@@ -206,7 +206,7 @@ def _breaks(fields: Callable, nodes: np.ndarray, most: int = 2000) -> np.ndarray
         # at a kink the misfit falls only in proportion to the interval; for a smooth section it falls much faster, to
         # rounding; neighbours look a little beyond their common end, so that a step there is within one of them
         over = 0.01 * SAME * span
-        rough = _misfit(fields, low - over, high + over, span) > np.maximum(SAME * (high - low) / span, 1e-14)
+        rough = _section_misfit(fields, low - over, high + over, span) > np.maximum(SAME * (high - low) / span, 1e-14)
         low, high = low[rough], high[rough]
         found += (0.5 * (low + high)[high - low < SAME * span]).tolist()
         low, high = low[high - low >= SAME * span], high[high - low >= SAME * span]
@@ -227,7 +227,7 @@ def _breaks(fields: Callable, nodes: np.ndarray, most: int = 2000) -> np.ndarray
     return places[np.append(True, np.diff(places) > 4.0 * SAME * span)[: len(places)]]  # drop doubles
 
 
-def _misfit(fields: Callable, low: np.ndarray, high: np.ndarray, span: float) -> np.ndarray:
+def _section_misfit(fields: Callable, low: np.ndarray, high: np.ndarray, span: float) -> np.ndarray:
     """Relative misfit (n,) of stiffness, its inverse and inertia to polynomials of degree SMOOTH, beyond rounding.
 
     With 4000 samples along the beam, saw cuts wider than pi / 2 / 4000 of it are found.

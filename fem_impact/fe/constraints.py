@@ -8,7 +8,7 @@ from scipy.sparse import csr_matrix, diags
 
 from .._base.rounding import ROUNDING, SAME
 from .interpolation import Interpolation
-from .theory import Domain, Held, unresisted
+from .theory import Domain, Held, unresisted_motions
 
 
 class Attached(NamedTuple):
@@ -42,7 +42,7 @@ def load_and_release(
     shares = np.asarray(used.sum(axis=0)).ravel()
     order = np.argsort((used.T @ (place / np.maximum(weight, 1.0))) / shares, kind="stable")
     every = domain.space.rigid_unknowns(held.dofs, expand.shape[0])
-    moving = (project @ every @ unresisted(every, expand, project))[order]
+    moving = (project @ every @ unresisted_motions(every, expand, project))[order]
     expand = expand[:, order].tocsr()
     K, M = (expand.T @ (K + springs) @ expand).tocsc(), (expand.T @ M @ expand).tocsc()
     rigid = sprung = moving  # mass-normalised, those that springs do not resist, and weakly

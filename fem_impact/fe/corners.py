@@ -8,8 +8,8 @@ import numpy as np
 
 from .._base.rounding import HALVINGS, SAME
 from ..mesh.meshes import Mesh
-from .material import Material, turned
-from .splitting import Rim, strip
+from .material import Material, rotated_stiffness
+from .splitting import Rim, split_quadrilateral
 
 # [-] size of each ring of triangles over that of the ring around it: 0.7 takes twice the rings, 0.35 slimmer cells
 SHRINK = 0.5
@@ -91,7 +91,7 @@ def exponent(angle: float, kinds: tuple[str, str], stiffness: tuple[float, ...])
     return float(z.real[settled].min()) if settled.any() else MILD
 
 
-def rings(z: float, kinds: tuple[str, str], share: float = 1.0) -> int:
+def number_of_rings(z: float, kinds: tuple[str, str], share: float = 1.0) -> int:
     """Number of rings of triangles needed at a corner of exponent z to miss less than CORNER_ERROR of the energy.
 
     ``share`` is the length of the facets there divided by the extent of the body.
@@ -103,7 +103,7 @@ def rings(z: float, kinds: tuple[str, str], share: float = 1.0) -> int:
     return max(0, int(np.ceil(min(wanted, np.log(smallest / share) / np.log(SHRINK)))))
 
 
-def meetings(mesh: Mesh, kinds: Sequence) -> list[tuple[int, int, int]]:
+def edge_meetings(mesh: Mesh, kinds: Sequence) -> list[tuple[int, int, int]]:
     """Vertices at which edges meet at an angle or supports (n_facets,) change, and the facets before and after each."""
     into: dict[int, int] = {}
     out_of: dict[int, int] = {}
@@ -136,20 +136,20 @@ def around_corners(mesh: Mesh, kinds: list[str], material: Material) -> tuple[di
     stiffness = material.plane_stress / material.plane_stress.max()
     length = mesh.chords
     extent = float(np.ptp(mesh.points, axis=0).max())
-    for vertex, before, facet in meetings(mesh, kinds):
+    for vertex, before, facet in edge_meetings(mesh, kinds):
         (x, y), (u, v) = mesh.tangents[before, 1], mesh.tangents[facet, 0]
         angle, pair = float(np.pi - np.arctan2(x * v - y * u, x * u + y * v)), (kinds[facet], kinds[before])
-        along_edge = turned(stiffness, -np.arctan2(v, u)) if material.E_across is not None else stiffness
+        along_edge = rotated_stiffness(stiffness, -np.arctan2(v, u)) if material.E_across is not None else stiffness
         z = exponent(round(angle, 9), pair, tuple(along_edge.ravel().round(9).tolist()))
         share = float(length[[before, facet]].max() / extent)
-        n = rings(z, pair, share)
+        n = number_of_rings(z, pair, share)
         power = 2.0 * (z - 1.0)
         if n:
             found[vertex] = Singular(power, n, float((share * SHRINK**n) ** power), pair == ("free", "free"))
-    return found, towards(mesh, {vertex: each.n_rings for vertex, each in found.items()})
+    return found, graded_towards(mesh, {vertex: each.n_rings for vertex, each in found.items()})
 
 
-def towards(mesh: Mesh, wanted: dict[int, int]) -> Mesh:
+def graded_towards(mesh: Mesh, wanted: dict[int, int]) -> Mesh:
     """The mesh with rings of triangles that shrink towards the ``wanted`` vertices (vertex -> number of rings)."""
     if not wanted:
         return mesh
@@ -180,7 +180,7 @@ def towards(mesh: Mesh, wanted: dict[int, int]) -> Mesh:
                         nearer[p] = len(points)
                         points.append(rim.split(vertex, p, len(points), points, SHRINK))
                 cells[c] = [vertex, nearer[a], nearer[b]]
-                cells += strip(points, nearer[a], a, b, nearer[b])
+                cells += split_quadrilateral(points, nearer[a], a, b, nearer[b])
     return rim.finish(mesh, np.array(points), np.array(cells))
 
 

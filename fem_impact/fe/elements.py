@@ -112,7 +112,7 @@ class Triangles:
         local = self.local(cells, points)
         raw = np.stack([monomials(local, order - k, k, degree) for k in range(order + 1)], axis=1)
         flat = raw.reshape(*raw.shape[:2], raw.shape[2] * raw.shape[3])  # not -1: there may be no cells
-        return (chained(self.inverse[cells], order) @ flat).reshape(raw.shape)
+        return (chain_rule(self.inverse[cells], order) @ flat).reshape(raw.shape)
 
     def bending_functions(self, cells: np.ndarray, points: np.ndarray, orders: tuple[int, ...]) -> list[np.ndarray]:
         """Derivatives of the shape functions of cells (n,) at points (n, n_q, 2), one array for each order.
@@ -228,7 +228,7 @@ class ArgyrisSpace(Triangles):
             for row, (dx, dy) in enumerate(((0, 0), (1, 0), (0, 1), (2, 0), (1, 1), (0, 2))):  # unknowns at a vertex
                 functionals[:, 6 * k + row] = monomials(at, dx, dy)
             for order, own in enumerate((slice(1), slice(1, 3), slice(3, 6))):
-                turn[:, 6 * k : 6 * k + 6, 6 * k : 6 * k + 6][:, own, own] = chained(self.jacobian, order)
+                turn[:, 6 * k : 6 * k + 6, 6 * k : 6 * k + 6][:, own, own] = chain_rule(self.jacobian, order)
         for side in range(3):
             weight = np.einsum("eij,ej->ei", self.inverse, self.normals[:, side])  # in local coordinates
             size = np.linalg.norm(weight, axis=1)
@@ -250,7 +250,7 @@ class ArgyrisSpace(Triangles):
         products = np.einsum("iqa,q,jqb->ijab", bends, weight, bends).reshape(9, 441)
         determinant = np.abs(np.linalg.det(self.jacobian[cells]))
         engineering = np.array([[1.0, 0, 0], [0, 0, 1.0], [0, 2.0, 0]])  # (xx, xy, yy) -> (xx, yy, 2 xy)
-        turn = engineering @ chained(self.inverse[cells], 2)
+        turn = engineering @ chain_rule(self.inverse[cells], 2)
         metric = turn.transpose(0, 2, 1) @ stiffness @ turn * determinant[:, None, None]
         C = self.coefficients[cells]
         bending = C.transpose(0, 2, 1) @ (metric.reshape(-1, 9) @ products).reshape(-1, 21, 21) @ C
@@ -282,7 +282,7 @@ class MorleySpace(Triangles):
         self.coefficients = np.linalg.inv(functionals)
 
 
-def chained(matrix: np.ndarray, order: int) -> np.ndarray:
+def chain_rule(matrix: np.ndarray, order: int) -> np.ndarray:
     """Matrices (n, order + 1, order + 1) that turn derivatives of an order by coordinates into those by others.
 
     ``matrix`` (n, 2, 2) is how those change with these: the inverse Jacobian from local coordinates to x and y.
@@ -301,7 +301,7 @@ def triangles(points: np.ndarray, cells: np.ndarray) -> Cells:
     return MeshTri(np.ascontiguousarray(points.T), np.ascontiguousarray(cells.T))
 
 
-def collapsed(n: int) -> tuple[np.ndarray, np.ndarray]:
+def triangle_gauss_points(n: int) -> tuple[np.ndarray, np.ndarray]:
     """Gauss points (n**2, 2) of the reference triangle, so many in each direction, and their weights (n**2,)."""
     node, weight = np.polynomial.legendre.leggauss(n)
     a, b = (x.ravel() for x in np.meshgrid(0.5 * (node + 1.0), 0.5 * (node + 1.0), indexing="ij"))

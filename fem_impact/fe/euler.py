@@ -4,7 +4,7 @@ from functools import partial
 
 import numpy as np
 
-from .beam_elements import DEGREE, HermiteSpace, balanced_errors, domain, hold
+from .beam_elements import DEGREE, HermiteSpace, balanced_errors, domain, support_ends
 from .theory import Domain, Points, Subject, Term, Theory, integrals
 
 
@@ -21,6 +21,6 @@ def _matrices(body: Subject, found: Domain) -> tuple[np.ndarray, np.ndarray]:
 
 
 EULER = Theory(
-    "euler", "hermite", 1, partial(domain, HermiteSpace), terms, hold, balanced_errors, wave=30.0,
+    "euler", "hermite", 1, partial(domain, HermiteSpace), terms, support_ends, balanced_errors, wave=30.0,
     unknowns=DEGREE - 1, matrices=_matrices,
 )  # fmt: skip

@@ -26,7 +26,7 @@ class Interpolation:
         inside = self.space.locate(self.frame.local(points))[1]
         if not inside.all():
             where = ", ".join(f"{x:g}" for x in points[int(np.argmin(inside))])
-            raise ValueError(explained.pointed(f"{name} must lie on the body, got ({where}) m"))
+            raise ValueError(explained.with_headings(f"{name} must lie on the body, got ({where}) m"))
 
     def rows(self, points: np.ndarray, expand: Any) -> Any:
         """Matrix (n_points, n_all) from all unknowns to the deflection at points (n_points, dimension) [m]."""

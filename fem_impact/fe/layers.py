@@ -40,7 +40,7 @@ def moments(layers: Sequence[Layer]) -> np.ndarray:
     return result
 
 
-def sheared(layers: Sequence[Layer], i: int) -> float:
+def layered_shear_stiffness(layers: Sequence[Layer], i: int) -> float:
     """Shear stiffness [N/m] of layers along x (i = 0) or y (1), from the shear stress that bending along it needs.
 
     The stress is in equilibrium with the bending stress at each height, about the neutral axis.
@@ -58,7 +58,7 @@ def sheared(layers: Sequence[Layer], i: int) -> float:
     return float(rigidity**2 / ((soft * 0.5 * h) @ (moment**2 @ weight)))
 
 
-def stacked(layers: Any) -> tuple[Layer, ...]:
+def checked_layers(layers: Any) -> tuple[Layer, ...]:
     """Checked layers from (material, thickness [m], angle [rad]), the first on the struck side."""
     if not isinstance(layers, Sequence) or not layers:
         raise ValueError(f"layers must be a list of (material, thickness, angle), got {check.shown(layers)}")
@@ -81,7 +81,7 @@ def merge_layers(layers: Sequence[Layer]) -> Laminated:
     whole = sum(layer.thickness for layer in layers)
     bending = 12.0 / whole**3 * moments(layers)[3:, 3:]
     soft = np.linalg.inv(bending)
-    shear = [sheared(layers, i) / (SHEAR * whole) for i in range(2)]
+    shear = [layered_shear_stiffness(layers, i) / (SHEAR * whole) for i in range(2)]
     return Laminated(
         E=1.0 / soft[0, 0], nu=-soft[0, 1] / soft[0, 0], E_across=1.0 / soft[1, 1], G=1.0 / soft[2, 2],
         rho=sum(each.material.rho * each.thickness for each in layers) / whole, G_xz=shear[0], G_yz=shear[1],

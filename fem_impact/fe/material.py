@@ -12,14 +12,14 @@ VICKERS = float(9.80665e6 / np.sin(np.radians(68.0)))
 TABOR = 2.8  # [-] mean pressure under a deep dent over the yield strength (Tabor 1951)
 
 
-def turned(stiffness: np.ndarray, angle: float) -> np.ndarray:
+def rotated_stiffness(stiffness: np.ndarray, angle: float) -> np.ndarray:
     """The stiffness (3, 3) on strains (xx, yy, 2 xy) of a material turned anticlockwise by an angle [rad]."""
     c, s = np.cos(angle), np.sin(angle)
     turn = np.array([[c * c, s * s, c * s], [s * s, c * c, -c * s], [-2 * c * s, 2 * c * s, c * c - s * s]])
     return turn.T @ stiffness @ turn
 
 
-def directional(stiffness: np.ndarray) -> np.ndarray:
+def stiffness_by_way(stiffness: np.ndarray) -> np.ndarray:
     """What a stiffness (3, 3) on strains (xx, yy, 2 xy) opposes to a wave every 5 degrees: the least to a hundredth."""
     angle = np.pi * np.arange(36) / 36
     wave = np.stack([np.cos(angle) ** 2, np.sin(angle) ** 2, np.sin(2.0 * angle)])
@@ -169,7 +169,7 @@ class Material:
         local = np.array([[E, nu * across, 0.0], [nu * across, across, 0.0], [0.0, 0.0, G * inner]]) / inner
         if self.E_across is None:
             return local
-        return turned(local, self.angle)
+        return rotated_stiffness(local, self.angle)
 
     @property
     def transverse(self) -> tuple[float, float]:

@@ -71,7 +71,7 @@ class Sheet:
         gradient = plane.gradients(space, np.arange(len(x)), area_coordinates(X.T)[None])
         h = size_at(section, "thickness", frame.to_metres(x)).reshape(dx.shape)
         moduli = (frame.length**2 * h * dx)[..., None, None] * section.stretched
-        own = plane.numbered(triangles(rim.points, space.vertices))
+        own = plane.numbered_unknowns(triangles(rim.points, space.vertices))
         dofs = np.vstack([own.element_dofs, own.N + own.element_dofs]).T
         area = np.broadcast_to(area_coordinates(X.T), (*dx.shape, 3))
         neutral = np.zeros((*dx.shape, 3, 3))
@@ -79,9 +79,9 @@ class Sheet:
             walls = section.walls(frame.centre[None])[0]
             neutral[:] = np.linalg.solve(walls[:3, :3], walls[:3, 3:]) / frame.length
         plate = np.arange(len(x)), area, x, moduli, gradient, neutral
-        parts = [plate, *(_along(space, rib, frame.length, x.shape[1]) for rib in getattr(space, "ribs", ()))]
+        parts = [plate, *(_pieces_along(space, rib, frame.length, x.shape[1]) for rib in getattr(space, "ribs", ()))]
         cells, area, x, moduli, gradient, neutral = (np.concatenate(each) for each in zip(*parts))
-        return cls(cells, area, x, moduli, gradient, dofs[cells], plane.loosened(space, rim, own)[0], neutral)
+        return cls(cells, area, x, moduli, gradient, dofs[cells], plane.free_displacements(space, rim, own)[0], neutral)
 
     def strains(self, pieces: np.ndarray) -> np.ndarray:
         """Strains (n, n_q, 3, 30) of the unknowns of pieces (n,)."""
@@ -102,12 +102,14 @@ class Sheet:
         return result
 
 
-def most(n_modes: int) -> int:
+def most_fields(n_modes: int) -> int:
     """How many fields are kept at most."""
     return max(1, min(MOST, WORK // n_modes**2))
 
 
-def forms(sheet: Sheet, steep: Steep, omega: np.ndarray, taut: Taut | None = None) -> tuple[np.ndarray, np.ndarray]:
+def stretching_forms(
+    sheet: Sheet, steep: Steep, omega: np.ndarray, taut: Taut | None = None
+) -> tuple[np.ndarray, np.ndarray]:
     """Forms S (n_forms, n_modes, n_modes) and rows l (n_forms, n_modes) of the energy of modes q.
 
     It is ``V = 1/2 sum_k ((l_k q + q' S_k q)**2 - (l_k q)**2)``; without ``taut``, there are no rows l.
@@ -139,9 +141,9 @@ def forms(sheet: Sheet, steep: Steep, omega: np.ndarray, taut: Taut | None = Non
     products, load = np.zeros((width, width)), np.zeros((sheet.dofs.max() + 1, width))
     for pieces in sheet.blocks(width):
         strain = strained(pieces, i, j)
-        stress = _flat(sheet.moduli[pieces] @ strain)
-        products += _flat(strain).reshape(-1, width).T @ stress.reshape(-1, width)
-        pushed = _flat(sheet.strains(pieces)).transpose(0, 2, 1) @ stress  # (n_pieces, 30, width)
+        stress = _flattened_values(sheet.moduli[pieces] @ strain)
+        products += _flattened_values(strain).reshape(-1, width).T @ stress.reshape(-1, width)
+        pushed = _flattened_values(sheet.strains(pieces)).transpose(0, 2, 1) @ stress  # (n_pieces, 30, width)
         np.add.at(load, sheet.dofs[pieces], pushed)
     loose: Any = sheet.loose
     settled = -loose @ factorise(loose.T @ sheet.stiffness @ loose).solve(loose.T @ load)
@@ -154,7 +156,7 @@ def forms(sheet: Sheet, steep: Steep, omega: np.ndarray, taut: Taut | None = Non
         weight = np.append(weight, np.sqrt(pairs / max(1.0, motions)) / omega)
     size, kept = (each[..., ::-1] for each in np.linalg.eigh(products * weight[:, None] * weight))
     missing = 1.0 - np.cumsum(size) / size.sum()  # without a millionth a body is stiffer by less than any tolerance
-    count = min(most(n), 1 + int(np.count_nonzero(missing > 1e-6)))
+    count = min(most_fields(n), 1 + int(np.count_nonzero(missing > 1e-6)))
     mixed = weight[:, None] * kept[:, :count] / np.sqrt(size[:count])
     moved = settled @ mixed
     every = np.triu_indices(n)
@@ -170,7 +172,7 @@ def forms(sheet: Sheet, steep: Steep, omega: np.ndarray, taut: Taut | None = Non
     return result + upper.transpose(0, 2, 1), work[:, len(every[0]) :]
 
 
-def _along(space: Any, rib: Any, length: float, n_q: int) -> tuple[np.ndarray, ...]:
+def _pieces_along(space: Any, rib: Any, length: float, n_q: int) -> tuple[np.ndarray, ...]:
     """Pieces of `Sheet` along a rib, with points without weight up to n_q, in a frame of a length [m]."""
     cells, area, x, ds, along = rib.cells, rib.area, rib.x, rib.ds, rib.along
     stretch, bent = (rib.stiffness[..., 0, i] for i in (0, 1))
@@ -184,6 +186,6 @@ def _along(space: Any, rib: Any, length: float, n_q: int) -> tuple[np.ndarray, .
     return cells, padded(area), padded(x), padded(moduli, "constant"), padded(gradient), padded(neutral)
 
 
-def _flat(values: np.ndarray) -> np.ndarray:
+def _flattened_values(values: np.ndarray) -> np.ndarray:
     """Values (n, n_q, 3, k) as (n, 3 n_q, k)."""
     return values.reshape(len(values), -1, values.shape[-1])

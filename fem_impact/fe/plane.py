@@ -11,7 +11,7 @@ from skfem import Dofs, ElementTriP4
 from .._base.untyped import Cells
 from . import supports
 from .elements import ArgyrisSpace, Triangles, area_coordinates
-from .theory import unresisted
+from .theory import unresisted_motions
 
 QUARTIC = 15  # shape functions of one component on a triangle
 FIRST, SECOND = slice(21, 21 + QUARTIC), slice(21 + QUARTIC, 21 + 2 * QUARTIC)  # unknowns of both components
@@ -19,7 +19,7 @@ NODES = ElementTriP4.doflocs  # (15, 2) where those of a component lie in the un
 LOCAL = 21 + 2 * QUARTIC  # unknowns of a triangle, those of the deflection first
 
 
-def numbered(mesh: Cells) -> Dofs:
+def numbered_unknowns(mesh: Cells) -> Dofs:
     """Numbers of the unknowns of one component on a mesh."""
     return Dofs(mesh, ElementTriP4())
 
@@ -118,7 +118,7 @@ def plane_motions(places: np.ndarray) -> np.ndarray:
     return np.vstack([np.column_stack([one, none, -places[:, 1]]), np.column_stack([none, one, places[:, 0]])])
 
 
-def loosened(inner: Triangles, rim: supports.SupportedRim, own: Dofs) -> tuple[csr_matrix, np.ndarray]:
+def free_displacements(inner: Triangles, rim: supports.SupportedRim, own: Dofs) -> tuple[csr_matrix, np.ndarray]:
     """The map (2 n, n_left) that the edges leave of the displacements in a plane, and that cannot move rigidly.
 
     If no edge prevents a rigid motion, some unknowns are left out that, when fixed, just do. The second result are
@@ -127,7 +127,7 @@ def loosened(inner: Triangles, rim: supports.SupportedRim, own: Dofs) -> tuple[c
     loose, places = held_at(inner, rim.facets, list(rim.plane), own)[0], np.zeros((own.N, 2))
     places[own.element_dofs.T] = nodes(inner)
     motions = plane_motions(places)
-    free = unresisted(motions, loose, loose.T)  # the columns of the map are orthonormal
+    free = unresisted_motions(motions, loose, loose.T)  # the columns of the map are orthonormal
     still = loose.T @ motions @ free
     pinned = qr(still.T, pivoting=True, mode="economic")[2][: still.shape[1]] if still.size else []
     return loose[:, np.setdiff1d(np.arange(loose.shape[1]), pinned)], motions @ free

@@ -89,7 +89,7 @@ def doubted_sizes(sides: Sequence[float], section: Any = None) -> tuple[str, ...
     return tuple(notes)
 
 
-def ribs(given: Sequence[Any], sides: Sequence[float]) -> Iterator[str]:
+def notes_on_ribs(given: Sequence[Any], sides: Sequence[float]) -> Iterator[str]:
     """Notes on ribs of a plate with sides [m]: sizes that are probably a slip of a unit, and a rib that comes twice."""
     for i, rib in enumerate(given):
         for name, size in (("width", rib.section.width), ("height", rib.section.height), ("offset", rib.offset or 0.0)):
@@ -103,13 +103,13 @@ def ribs(given: Sequence[Any], sides: Sequence[float]) -> Iterator[str]:
                 yield f"ribs[{i}] lies where ribs[{j}] does, and both count"
 
 
-def damping(ratios: np.ndarray, omega: np.ndarray | None = None) -> tuple[str, ...]:
+def notes_on_damping(ratios: np.ndarray, omega: np.ndarray | None = None) -> tuple[str, ...]:
     """Notes on damping ratios (n_modes,) [-], but for those of rigid motions, where omega (n_modes,) is zero."""
     ratios = ratios if omega is None else ratios[omega > 0.0]
     return tuple(note_number("damping_ratio", float(np.median(ratios)))) if len(ratios) else ()
 
 
-def elsewhere(nodes: np.ndarray, shapes: np.ndarray, mass: float) -> tuple[str, ...]:
+def imported_notes(nodes: np.ndarray, shapes: np.ndarray, mass: float) -> tuple[str, ...]:
     """Notes on nodes (n_nodes, 1 to 3) [m] and mass-normalised shapes (n_nodes, same or 1, n_modes) of another program.
 
     Over the mass, the mean of their squares is one over the mass.

@@ -44,7 +44,7 @@ def static_deflection(system: System, loads: np.ndarray) -> Deflection:
     """
     if system.rules.compared:
         return _compared(system, loads)
-    mesh = _coarse(system.mesh)
+    mesh = _coarser_system(system.mesh)
     best: Any = None
     for _ in range(3):  # 700, 2 800 and 11 200 triangles; a fourth mesh is slow
         found = _solved(system, mesh, loads)
@@ -58,7 +58,7 @@ def static_deflection(system: System, loads: np.ndarray) -> Deflection:
 
 def _compared(system: System, loads: np.ndarray) -> Deflection:
     """`static_deflection` of a thick plate or a shell; its error comes from a second mesh."""
-    mesh = _coarse(system.mesh)
+    mesh = _coarser_system(system.mesh)
     finer = mesh.refined(COARSER)
     if len(mesh.cells) > CHEAP_CELLS and len(mesh.refined(1.0 / COARSER).cells) < len(mesh.cells):
         mesh, finer = mesh.refined(1.0 / COARSER), mesh
@@ -72,7 +72,7 @@ def _compared(system: System, loads: np.ndarray) -> Deflection:
     return replace(found, error=np.where(moves, error / np.where(moves, diagonal, 1.0), 0.0) + found.error)
 
 
-def _coarse(mesh: Mesh) -> Mesh:
+def _coarser_system(mesh: Mesh) -> Mesh:
     """The same body with fewer triangles, or unchanged if it cannot be meshed again."""
     if mesh.recipe is None or mesh.dimension == 1 or len(mesh.cells) <= 2 * CHEAP_CELLS:
         return mesh

@@ -20,7 +20,7 @@ from . import plausible, ribs, shallow
 from .assembly import BY_ELEMENT, assemble, reassemble
 from .corners import SAY
 from .eigenvalues import BLOCK, FIRST_SLICE, RESIDUAL, STRICT, Flexibility, by_slices, count_below, lowest
-from .material import directional
+from .material import stiffness_by_way
 from .section import Plate
 from .system import System
 
@@ -91,7 +91,9 @@ def _wave(system: System, n_modes: int | None, max_frequency: float | None) -> f
         edge = float(length @ [EDGE_TERM[kind] for kind in system.rim.kinds])
     mean = float((edge + np.sqrt(edge**2 + 16.0 * np.pi * mesh.area * n_modes)) / (2.0 * mesh.area))
     assert isinstance(system.section, Plate)
-    stiffness = directional(system.section.material.plane_stress)  # waves across the grain are shorter than the mean
+    stiffness = stiffness_by_way(
+        system.section.material.plane_stress
+    )  # waves across the grain are shorter than the mean
     return mean * float((np.mean(stiffness**-0.5) ** -2 / stiffness.min()) ** 0.25)
 
 
@@ -132,12 +134,12 @@ def _pairs(
     else:
         n = n_modes - n_rigid
         many = system.mesh.dimension == 1 and n > FIRST_SLICE
-        values, vectors = by_slices(flexibility, n) if many else _counted(system, flexibility, n, limit)
+        values, vectors = by_slices(flexibility, n) if many else _complete_eigenpairs(system, flexibility, n, limit)
         if system.strain is not None:  # more accurate than K if there are tiny triangles
             values = system.strain.energy(system, vectors) / np.einsum("ij,ij->j", vectors, system.M @ vectors)
             order = np.argsort(values, kind="stable")
             values, vectors = values[order], vectors[:, order]
-        values, turn = heavier(system, values, lambda: vectors)
+        values, turn = with_mass_in_plane(system, values, lambda: vectors)
         vectors = vectors if turn is None else vectors @ turn
     omega = np.concatenate([np.zeros(n_rigid), np.sqrt(values) * rate])[:n_modes]
     vectors = np.column_stack([system.rigid, vectors])[:, :n_modes]
@@ -203,13 +205,15 @@ def _compared(system: System, omega: np.ndarray) -> np.ndarray:
     if bent:  # the rise divides triangles, too
         ratio = (len(body.space.origin) / len(system.space.origin)) ** 0.5
     again = _pairs(body, n_modes, None)[1]
-    ends = ribs.singular(system.mesh, getattr(system.section, "ribs", ()))[0].values()
+    ends = ribs.singular_vertices(system.mesh, getattr(system.section, "ribs", ()))[0].values()
     order = 1.5 if any(1 in each for each in ends) else 4.0
     # where triangles at masses, springs and ends of ribs are most, as many of both meshes, only the others differ
     return np.abs(again - omega) / max(abs(ratio**-order - 1.0), 1.0 - COARSER ** (-0.25 * order))
 
 
-def _counted(system: System, flexibility: Flexibility, n: int, limit: float | None) -> tuple[np.ndarray, np.ndarray]:
+def _complete_eigenpairs(
+    system: System, flexibility: Flexibility, n: int, limit: float | None
+) -> tuple[np.ndarray, np.ndarray]:
     """Find the n lowest flexible eigenpairs without missing any.
 
     If a limit is given, n is the number of modes below it. Otherwise inertia confirms the number below a gap after the
@@ -248,7 +252,7 @@ def _counted(system: System, flexibility: Flexibility, n: int, limit: float | No
     )
 
 
-def heavier(
+def with_mass_in_plane(
     system: System, values: np.ndarray, shapes: Callable[[], np.ndarray]
 ) -> tuple[np.ndarray, np.ndarray | None]:
     """Eigenvalues (n,) with the mass in the plane of a ribbed plate, and how vectors (n_dofs, n) combine, if not as is.
@@ -333,7 +337,7 @@ def refine(system: System, n_modes: int | None, max_frequency: float | None, tol
         if float(found.error.max()) <= tolerance:
             return found
         mesh = found.system.mesh
-        step = max(_needed(found.parts, 0.6 * tolerance), 1.2 if bent else 0.0)
+        step = max(_needed_factor(found.parts, 0.6 * tolerance), 1.2 if bent else 0.0)
         tried.append((mesh.size, float(found.error.max())))
         predicted = 1.0 if bent else _predicted_step(tried, tolerance)
         if (
@@ -376,7 +380,7 @@ def _predicted_step(tried: list[tuple[float, float]], goal: float) -> float:
         return float(np.exp((errors[-1] - np.log(goal)) / rate)) if rate > 0.0 else np.inf
 
 
-def _needed(parts: np.ndarray, goal: float) -> float:
+def _needed_factor(parts: np.ndarray, goal: float) -> float:
     """Factor [-] to divide the element size by so that errors (4, n_modes) meet a goal; infinity if no mesh can."""
     if float(parts[3].max()) >= goal:
         return np.inf

@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 
 from ..mesh.mesh_files import sides_of
-from .elements import EXPONENTS, collapsed, curvatures, monomials
+from .elements import EXPONENTS, curvatures, monomials, triangle_gauss_points
 from .springs import at_facets
 from .supports import SIDES
 from .system import System
@@ -68,7 +68,7 @@ class Moments:
         return np.einsum("ei,eij,ej->e", bend, self.stiffness[cells].mean(axis=1), bend)
 
 
-def _looks() -> np.ndarray:
+def _look_points() -> np.ndarray:
     """Local coordinates (n, 2) of the centres of the 4**HALVED equal parts of a triangle."""
     n = 2**HALVED
     i, j = (x.ravel() for x in np.meshgrid(np.arange(n), np.arange(n), indexing="ij"))
@@ -90,7 +90,7 @@ class Residual:
     def _set_cells(self) -> None:
         space, frame = self.moments.space, self.system.frame
         cells = np.arange(self.moments.n_cells)
-        local, share = collapsed(POINTS)
+        local, share = triangle_gauss_points(POINTS)
         x = space.straight(cells, local - 1.0 / 3.0)
         second = self.moments.derivatives(cells, x, 2)
         double = np.abs(np.linalg.det(space.jacobian))  # twice the area
@@ -154,7 +154,7 @@ class Residual:
 
         Nor does the quadrature of the matrices place a step exactly.
         """
-        space, looks = self.moments.space, _looks()
+        space, looks = self.moments.space, _look_points()
         places, weight = space.rule()
         places = places - 1.0 / 3.0
         self.stepped = np.zeros(0, int)  # (n,) cells across which the thickness jumps

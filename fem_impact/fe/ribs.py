@@ -19,8 +19,8 @@ import numpy as np
 
 from .._base import check
 from ..mesh.mesh_files import side_lengths, sides_of
-from ..mesh.meshes import Mesh, lined, sizes
-from .corners import towards
+from ..mesh.meshes import Mesh, mesh_along_lines, sizes
+from .corners import graded_towards
 from .section import Beam, Plate, Varying, size_at
 from .splitting import distance
 from .springs import at_facets
@@ -125,13 +125,13 @@ def sides_on(mesh: Mesh, path: Any) -> np.ndarray:
     return sides[on]
 
 
-def ribbed(mesh: Mesh, section: Any) -> Mesh:
+def mesh_along_ribs(mesh: Mesh, section: Any) -> Mesh:
     """The mesh, of whose triangles sides follow the ribs of a plate.
 
     ValueError if a rib makes triangles so small that the digits of the stiffness are lost.
     """
     paths = [rib.path for rib in getattr(section, "ribs", ()) if not isinstance(rib.path, str)]
-    mesh, extent = lined(mesh, paths) if paths else mesh, float(np.ptp(mesh.points, axis=0).max())
+    mesh, extent = mesh_along_lines(mesh, paths) if paths else mesh, float(np.ptp(mesh.points, axis=0).max())
     for path in paths:
         cells = mesh.cells[np.isin(mesh.cells, sides_on(mesh, path)).any(axis=1)]
         twice, longest = 2.0 * sizes(mesh.points, cells), side_lengths(mesh.points, cells).max(axis=1)
@@ -144,7 +144,7 @@ def ribbed(mesh: Mesh, section: Any) -> Mesh:
     return mesh
 
 
-def singular(mesh: Mesh, ribs: Sequence[Rib]) -> tuple[dict[int, list[int]], dict[int, float]]:
+def singular_vertices(mesh: Mesh, ribs: Sequence[Rib]) -> tuple[dict[int, list[int]], dict[int, float]]:
     """Vertices inside a plate where ribs end or cross, with how many sides each has there, and widths [m]."""
     counts: dict[int, list[int]] = {}
     width: dict[int, float] = {}
@@ -164,13 +164,13 @@ def around_ends(mesh: Mesh, ribs: Sequence[Rib]) -> Mesh:
     At its end a rib acts like a point, which would turn endlessly: triangles shrink to twice its width. Around a
     crossing three rings leave as much error as there is between crossings.
     """
-    rings, (counts, width) = {}, singular(mesh, ribs)
+    rings, (counts, width) = {}, singular_vertices(mesh, ribs)
     for vertex in counts:
         around = mesh.points[mesh.cells[(mesh.cells == vertex).any(axis=1)]]
         longest = float(np.linalg.norm(around - mesh.points[vertex], axis=2).max())
         ends = max(0, int(np.ceil(np.log2(longest / (2.0 * width[vertex])))))
         rings[vertex] = ends if 1 in counts[vertex] else 3
-    return towards(mesh, {vertex: number for vertex, number in rings.items() if number})
+    return graded_towards(mesh, {vertex: number for vertex, number in rings.items() if number})
 
 
 class RibLine(NamedTuple):
@@ -199,7 +199,7 @@ class RibLine(NamedTuple):
         return cls(rib, facets, cells, area, x, ds, along, twist, *shaped)
 
 
-def attached(
+def matrices_of_ribs(
     space: Any, frame: Frame, strained: Callable[..., np.ndarray]
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Stiffness and mass (n, n_local, n_local) that the ribs of a plate add to cells, and these cells (n,).

@@ -69,7 +69,7 @@ class Plate:
             check.settle(self, thickness=check.positive("thickness", self.thickness, "m"))
         check.settle(self, tension=check.non_negative("tension", self.tension, "N/m"))
         bare = isinstance(self.layers, Sequence) and not len(self.layers)
-        layers = () if bare else check.several("layers", self.layers, layering.Layer)
+        layers = () if bare else check.tuple_of("layers", self.layers, layering.Layer)
         if layers and self.material != layering.merge_layers(layers):
             raise ValueError("material must be that of the layers; make a plate of layers by Plate.laminate")
         if layers and self.thickness != sum(layer.thickness for layer in layers):
@@ -105,7 +105,7 @@ class Plate:
         >>> round(plywood.thickness, 6), plywood.stiffness(np.zeros((1, 2)))[0].diagonal().round(2).tolist()
         (0.003, [28.47, 2.62, 1.8])
         """
-        found = layering.stacked(layers)
+        found = layering.checked_layers(layers)
         return cls(layering.merge_layers(found), sum(layer.thickness for layer in found), tension, found)
 
     @property

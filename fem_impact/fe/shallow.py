@@ -128,15 +128,15 @@ def _hold_shell(body: Subject, domain: Domain) -> Held:
     space.ribs = [RibLine.of(rib, ribs.sides_on(body.mesh, rib.path), *known) for rib in body.section.ribs]
     creased = np.unique(np.concatenate([np.zeros(0, int), *(rib.facets.ravel() for rib in space.ribs)]))
     expand, project, dofs = constrain(rim, space.vertices, *numbering(domain.cells, space), creased)
-    n_flat, own = expand.shape[0], plane.numbered(domain.cells)
-    loose, drifts = plane.loosened(space, rim, own)
+    n_flat, own = expand.shape[0], plane.numbered_unknowns(domain.cells)
+    loose, drifts = plane.free_displacements(space, rim, own)
     space.drifts = np.vstack([np.zeros((n_flat, drifts.shape[1])), drifts])
     dofs = np.vstack([dofs, n_flat + own.element_dofs, n_flat + own.N + own.element_dofs])
     expand, project = (block_diag(pair, format="csr") for pair in ((expand, loose), (project, loose.T)))
     n_all = expand.shape[0]
     held = None
     if space.ribs:
-        K, M, cells = ribs.attached(space, domain.frame, strained)
+        K, M, cells = ribs.matrices_of_ribs(space, domain.frame, strained)
         held = scatter(K, dofs[:, cells], n_all), scatter(M, dofs[:, cells], n_all)
     return Held(expand, project, dofs, plates.springs(body, domain, dofs, n_all), rim, held)
 
@@ -219,7 +219,7 @@ def shell_energies(system: Any, section: Any, vectors: np.ndarray) -> tuple[np.n
     whole = unknowns_of_cells(system, vectors)
     K, M = slopes.section_energies(system, space, partial(frame.field, section), vectors)
     if space.ribs:
-        *each, cells = ribs.attached(space, frame, strained)
+        *each, cells = ribs.matrices_of_ribs(space, frame, strained)
         for part, total in zip(each, (K, M)):
             total += np.einsum("nki,nkl,nlj->ij", whole[cells], part, whole[cells], optimize=True)
         M += vectors.T @ plane_mass(replace(system, space=space, section=section), vectors)

@@ -19,7 +19,7 @@ from functools import partial
 import numpy as np
 
 from .._base.untyped import Cells
-from .beam_elements import DEGREE, HermiteSpace, balanced_errors, domain, hold
+from .beam_elements import DEGREE, HermiteSpace, balanced_errors, domain, support_ends
 from .theory import Points, Term, Theory
 
 BENT = DEGREE + 1  # shape functions of W on an element
@@ -69,6 +69,6 @@ def terms(space: TimoshenkoSpace, points: Points, cells: np.ndarray) -> list[Ter
 
 
 TIMOSHENKO = Theory(
-    "timoshenko", "hermite and shear", 1, partial(domain, TimoshenkoSpace), terms, hold, balanced_errors, wave=30.0,
-    unknowns=2 * DEGREE - 1, fields=("stiffness", "inertia", "shear", "rotary"),
+    "timoshenko", "hermite and shear", 1, partial(domain, TimoshenkoSpace), terms, support_ends, balanced_errors,
+    wave=30.0, unknowns=2 * DEGREE - 1, fields=("stiffness", "inertia", "shear", "rotary"),
 )  # fmt: skip

@@ -6,12 +6,12 @@ from typing import Any
 import numpy as np
 
 from . import beam_elements
-from .elements import collapsed, on_true_edge
+from .elements import on_true_edge, triangle_gauss_points
 from .system import System
-from .theory import Points, blocks, unknowns_of_cells, weighted
+from .theory import Points, blocks, unknowns_of_cells, weighted_parts
 
 
-def lengthened(system: System, vectors: np.ndarray) -> tuple[np.ndarray, float]:
+def lengthening_of_beam(system: System, vectors: np.ndarray) -> tuple[np.ndarray, float]:
     """Integrals (n, n) [1/(kg m)] of ``w_i' w_j'`` along a beam, and of one over its E A [1/N].
 
     ``vectors`` (n_dofs, n) are in the frame; the shapes are those [kg**-0.5] of `Modes`.
@@ -23,7 +23,7 @@ def lengthened(system: System, vectors: np.ndarray) -> tuple[np.ndarray, float]:
     return steep.T @ steep / (frame.length * frame.mass), float((dx.ravel() / stiff).sum() * frame.length)
 
 
-def pulled(system: System, vectors: np.ndarray) -> np.ndarray:
+def slope_products(system: System, vectors: np.ndarray) -> np.ndarray:
     """Integrals (n, n) of ``grad w_i . grad w_j`` over a plate of vectors (n_dofs, n), in the frame."""
     points, whole = quadrature(system), unknowns_of_cells(system, vectors)
     found = np.zeros((vectors.shape[1],) * 2)
@@ -42,13 +42,13 @@ def section_energies(
     """
     points, n = quadrature(system), vectors.shape[1]
     found = {"K": np.zeros((n, n)), "M": np.zeros((n, n))}
-    for matrix, cells, moved, pushed in stressed(system, space, field, vectors, points):
+    for matrix, cells, moved, pushed in stress_terms(system, space, field, vectors, points):
         pushed = pushed * points.dx[cells][..., None, None]
         found[matrix] += moved.reshape(-1, n).T @ pushed.reshape(-1, n)
     return found["K"], found["M"]
 
 
-def stressed(
+def stress_terms(
     system: System, space: Any, field: Callable[[str, np.ndarray], np.ndarray], vectors: np.ndarray, points: Points
 ) -> Iterator[tuple[str, np.ndarray, np.ndarray, np.ndarray]]:
     """Of every term of the energies and block of cells: "K" or "M", cells, strains or motions, and stresses by these.
@@ -60,7 +60,7 @@ def stressed(
         own = whole[cells][:, None]  # (n_cells, 1, n_local, n)
         for matrix, name, parts in system.rules.terms(space, points, cells):
             weight, moved = field(name, points.x[cells]), parts @ own
-            yield matrix, cells, moved, weighted(weight, moved)
+            yield matrix, cells, moved, weighted_parts(weight, moved)
 
 
 def quadrature(system: System, nodes: int = 6) -> Points:
@@ -72,4 +72,4 @@ def quadrature(system: System, nodes: int = 6) -> Points:
     if system.mesh.dimension == 1:
         x, dx = beam_elements.quadrature(space)
         return Points(np.zeros((1, x.shape[1])), x[..., None], dx)
-    return on_true_edge(space, *collapsed(nodes))
+    return on_true_edge(space, *triangle_gauss_points(nodes))

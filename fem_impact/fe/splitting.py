@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 
 from .._base.rounding import SAME
-from ..mesh.facets import cross_product, divided
+from ..mesh.facets import cross_product, divide_facets
 from ..mesh.mesh_files import sides_of
 from ..mesh.meshes import Mesh
 
@@ -79,7 +79,7 @@ def divided_across(mesh: Mesh, tall: np.ndarray) -> tuple[Mesh, np.ndarray]:
     return finer, np.array(rim.parent)
 
 
-def bisected(points: list[np.ndarray], cell: list[int], middle: dict[tuple[int, int], int]) -> list[list[int]]:
+def bisect_triangle(points: list[np.ndarray], cell: list[int], middle: dict[tuple[int, int], int]) -> list[list[int]]:
     """Divide a triangle at those midpoints of its sides that ``middle`` holds."""
     a, b, c = cell
     found = [middle.get((a, b), -1), middle.get((b, c), -1), middle.get((c, a), -1)]
@@ -93,10 +93,10 @@ def bisected(points: list[np.ndarray], cell: list[int], middle: dict[tuple[int, 
         return [[a, ab, c], [ab, b, c]]
     if count == 3:
         return [[a, ab, ca], [ab, b, bc], [ca, bc, c], [ab, bc, ca]]
-    return [[a, ab, ca], *strip(points, ab, b, c, ca)]
+    return [[a, ab, ca], *split_quadrilateral(points, ab, b, c, ca)]
 
 
-def strip(points: list[np.ndarray], a: int, b: int, c: int, d: int) -> list[list[int]]:
+def split_quadrilateral(points: list[np.ndarray], a: int, b: int, c: int, d: int) -> list[list[int]]:
     """Divide the quadrilateral a, b, c, d along its shorter diagonal, or along a-c if both are equal."""
     ac, bd = np.linalg.norm(points[a] - points[c]), np.linalg.norm(points[b] - points[d])
     return [[a, b, d], [b, c, d]] if bd < ac * (1.0 - 1e-6) else [[a, b, c], [a, c, d]]
@@ -122,7 +122,7 @@ class Rim:
         ends = np.array([[points[pair[0]], points[pair[1]]]])
         share = ratio if forward else 1.0 - ratio
         middle, tangent, bend = (np.array([a[facet]]) for a in (self.middles, self.tangents, self.curvatures))
-        place, tangent, curvature, *halves = (a[0] for a in divided(ends, middle, tangent, bend, share))
+        place, tangent, curvature, *halves = (a[0] for a in divide_facets(ends, middle, tangent, bend, share))
         first, last = self.tangents[facet], self.curvatures[facet]
         self.facets[facet], self.number[pair[0], new] = [pair[0], new], facet
         self.middles[facet] = halves[0]
@@ -141,7 +141,7 @@ class Rim:
         for a, b in sides:
             middle[a, b] = middle[b, a] = len(points)
             points.append(self.split(a, b, len(points), points, 0.5))
-        return [piece for cell in cells for piece in bisected(points, cell, middle)]
+        return [piece for cell in cells for piece in bisect_triangle(points, cell, middle)]
 
     def finish(self, mesh: Mesh, points: np.ndarray, cells: np.ndarray) -> Mesh:
         parent = np.array(self.parent)

@@ -94,7 +94,7 @@ def _conditions(kind: str, tangent: np.ndarray, curvature: float) -> np.ndarray:
     return np.array([deflection, slope, [0, nx, ny, 0, 0, 0], along, across])
 
 
-def _left(conditions: np.ndarray, length: float) -> tuple[np.ndarray, np.ndarray]:
+def _null_space(conditions: np.ndarray, length: float) -> tuple[np.ndarray, np.ndarray]:
     """Null space (n_unknowns, n_left) of conditions (n, n_unknowns), and its left inverse (n_left, n_unknowns).
 
     The unknowns are scaled by the length of the local triangles; otherwise slopes and curvatures mix in one column,
@@ -108,7 +108,7 @@ def _left(conditions: np.ndarray, length: float) -> tuple[np.ndarray, np.ndarray
     return weight[:, None] * kept, kept.T / weight
 
 
-def _split(
+def _split_conditions(
     vertex: int, at: list, around: np.ndarray, rim: SupportedRim, cells: np.ndarray, facet_cell: np.ndarray
 ) -> np.ndarray:
     """Conditions (n_rows, 3 + 3 n) at a vertex where each of its triangles (n,) has its own second derivatives."""
@@ -190,7 +190,7 @@ def constrain(
         if not special:
             facet, end = at[0]
             conditions = _conditions(rim.kinds[facet], rim.tangents[facet, end], rim.curvatures[facet, end])
-            blocks.append((first, *_left(conditions, length)))
+            blocks.append((first, *_null_space(conditions, length)))
             continue
         numbers = [first[:3]]
         for i, (c, k) in enumerate(zip(around, corner)):
@@ -198,7 +198,9 @@ def constrain(
             n_all += 0 if i == 0 else 3
             dofs[6 * k + 3 : 6 * k + 6, c] = own
             numbers.append(own)
-        blocks.append((np.concatenate(numbers), *_left(_split(vertex, at, around, rim, cells, cell), length)))
+        blocks.append(
+            (np.concatenate(numbers), *_null_space(_split_conditions(vertex, at, around, rim, cells, cell), length))
+        )
     clamped = np.array([kind == "clamped" for kind in rim.kinds])
     none = np.zeros((int(clamped.sum()), 0))
     blocks.append((dofs[18 + side[clamped], cell[clamped]], none, none.T))

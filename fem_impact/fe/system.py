@@ -113,5 +113,5 @@ class System(check.Brief):
 def notes_on(mesh: Mesh, section: Plate | Beam) -> tuple[str, ...]:
     """What a mesh assumed, and numbers of the body that are probably a slip of a unit."""
     sides = np.ptp(mesh.points, axis=0)
-    ribs = plausible.ribs(getattr(section, "ribs", ()), sides)
+    ribs = plausible.notes_on_ribs(getattr(section, "ribs", ()), sides)
     return plausible.together(mesh.notes, plausible.doubted_sizes(sides, section), tuple(ribs))

@@ -20,7 +20,7 @@ from .._base import check
 from .._base.rounding import SAME
 from .._base.untyped import Cells, Sparse
 from ..mesh.meshes import Mesh
-from .material import directional
+from .material import stiffness_by_way
 from .section import KINDS, Elastic
 from .supports import SupportedRim
 
@@ -132,7 +132,7 @@ class Domain:
         stiffness, inertia, soft = fields["stiffness"], fields["inertia"], 1.0
         if stiffness.ndim > 2:
             plane = section.material.plane_stress
-            stiffness, soft = stiffness[..., 0, 0], plane[0, 0] / directional(plane).min()
+            stiffness, soft = stiffness[..., 0, 0], plane[0, 0] / stiffness_by_way(plane).min()
         softness = float((inertia / stiffness).max() * soft)
         dx = points.dx
         weighted = {name: each * dx.reshape(*dx.shape, *[1] * (each.ndim - 2)) for name, each in fields.items()}
@@ -195,15 +195,15 @@ def plain_kinds(supports: Sequence[str | Elastic]) -> list[str]:
     return ["free" if isinstance(kind, Elastic) else kind for kind in supports]
 
 
-def weighted(weight: np.ndarray, parts: np.ndarray) -> np.ndarray:
+def weighted_parts(weight: np.ndarray, parts: np.ndarray) -> np.ndarray:
     """Parts (n, n_q, m, k) times a weight, which is a number at each point, (n, n_q), or a matrix, (n, n_q, m, m)."""
     return weight @ parts if weight.ndim == parts.ndim else weight[..., None, None] * parts
 
 
 def gram(parts: np.ndarray, weight: np.ndarray) -> np.ndarray:
-    """Sum (n, k, k) over the points of a quadrature of ``parts.T @ weight @ parts``, as of `weighted`."""
+    """Sum (n, k, k) over the points of a quadrature of ``parts.T @ weight @ parts``, as of `weighted_parts`."""
     n, k = len(parts), parts.shape[-1]
-    return parts.reshape(n, -1, k).transpose(0, 2, 1) @ weighted(weight, parts).reshape(n, -1, k)
+    return parts.reshape(n, -1, k).transpose(0, 2, 1) @ weighted_parts(weight, parts).reshape(n, -1, k)
 
 
 def kept_unknowns(fixed: np.ndarray) -> tuple[csr_matrix, csr_matrix]:
@@ -212,7 +212,7 @@ def kept_unknowns(fixed: np.ndarray) -> tuple[csr_matrix, csr_matrix]:
     return csr_matrix(expand), csr_matrix(expand.T)
 
 
-def unresisted(motions: np.ndarray, expand: Any, project: Any) -> np.ndarray:
+def unresisted_motions(motions: np.ndarray, expand: Any, project: Any) -> np.ndarray:
     """Combinations (n_motions, n) of motions (n_all, n_motions) that maps of `Held` leave as they are."""
     lost = (motions - expand @ (project @ motions)) / np.abs(motions).max()
     lengths, turn = np.linalg.svd(lost, full_matrices=False)[1:]  # of its square, half the digits would be lost
@@ -300,5 +300,5 @@ class Strain(check.Brief):
         for matrix, name, parts in system.rules.terms(self.domain.space, self.domain.points, cells):
             if matrix == "K":
                 strained = parts @ own
-                total = total + np.einsum(pairs, weighted(self.domain.fields[name][cells], strained), strained)
+                total = total + np.einsum(pairs, weighted_parts(self.domain.fields[name][cells], strained), strained)
         return total

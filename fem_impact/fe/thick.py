@@ -28,7 +28,7 @@ r**(pi / angle) have slopes of infinite bending energy, so they are no modes of 
 L-shaped plate is 33 % above that of Kirchhoff's plate by the membrane, and 13 % below Wang's at h = a / 5, where a is
 its shorter side (Sapondzhyan's paradox). Modes that are at rest there follow the relation.
 
-Free and soft edges let beta_t relax within a layer of width h / sqrt(12 kappa), about h/3. `layered` makes the
+Free and soft edges let beta_t relax within a layer of width h / sqrt(12 kappa), about h/3. `mesh_with_layer` makes the
 triangles shrink to a thickness there. If that takes too many, `errors_by_layers` estimates what a coarser layer misses:
 the twisting moment M_nt of the thin plate does work on the relaxation, to first order M_nt^2 width / (2 G h^3/12) per
 length.
@@ -146,7 +146,7 @@ def _domain(body: Subject, fields: tuple[str, ...]) -> Domain:
     space, frame = found.space, found.frame
     h = size_at(body.section, "thickness", frame.to_metres(space.origin)) / frame.length
     longest = side_lengths(found.cells.p.T, space.vertices).max(axis=1)
-    dofs = plane.numbered(found.cells).element_dofs.T  # (n_cells, 15)
+    dofs = plane.numbered_unknowns(found.cells).element_dofs.T  # (n_cells, 15)
     # nodes of straight triangles much smaller than their thickness
     small = np.setdiff1d(dofs[(longest < SMALL * h) & ~space.curved], dofs[space.curved])
     space.turned = np.isin(dofs, small)
@@ -154,7 +154,7 @@ def _domain(body: Subject, fields: tuple[str, ...]) -> Domain:
 
 
 def _hold(body: Subject, domain: Domain) -> Held:
-    space, kinds, own = domain.space, body.kinds, plane.numbered(domain.cells)
+    space, kinds, own = domain.space, body.kinds, plane.numbered_unknowns(domain.cells)
     # supports of a thin plate that hold the deflection as these do: rotations are held apart
     rim = plates.rim(body, domain, ["free" if kind == "free" else "hinged" for kind in kinds])
     expand, project, dofs = supports.constrain(rim, space.vertices, *numbering(domain.cells, space))
@@ -215,7 +215,7 @@ def _without_slip(
     return (expand + place @ solved).tocsr(), project.tocsr()
 
 
-def layered(mesh: Mesh, section: Plate, kinds: list[str], coarser: float) -> Mesh:
+def mesh_with_layer(mesh: Mesh, section: Plate, kinds: list[str], coarser: float) -> Mesh:
     """The mesh with triangles that resolve the layer along free and soft edges, if `MOST_LAYER` of them suffice.
 
     ``kinds`` (n_facets,) are the supports; ``coarser`` [-] multiplies the size of the triangles there.
@@ -268,5 +268,5 @@ def errors_by_layers(system: Any, vectors: np.ndarray, loads: np.ndarray, forced
 MINDLIN = Theory(
     "mindlin", "argyris and shear", 2, _domain, terms, _hold, errors_by_layers, wave=1.8, unknowns=47.0,
     fields=("stiffness", "inertia", "shear", "rotary"), words=(*KINDS, SOFT), graded=True, compared=True,
-    patch=PATCH, sharp=plates.is_tiny, layered=layered,
+    patch=PATCH, sharp=plates.is_tiny, layered=mesh_with_layer,
 )  # fmt: skip

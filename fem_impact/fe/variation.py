@@ -63,7 +63,7 @@ def energy_changes(system: System, change: SectionChange, vectors: np.ndarray) -
         K, M = slopes.section_energies(system, system.space, partial(_rate, system, change), vectors)
     pull = sum(weight * getattr(each, "tension", 0.0) for weight, each in zip(change.weights, change.sections))
     if pull:
-        K = K + pull * system.frame.length**2 / system.frame.stiffness * slopes.pulled(system, vectors)
+        K = K + pull * system.frame.length**2 / system.frame.stiffness * slopes.slope_products(system, vectors)
     return np.asarray(K), np.asarray(M)
 
 
@@ -82,7 +82,7 @@ def frequency_densities(system: System, change: SectionChange, vectors: np.ndarr
     points = slopes.quadrature(system)
     found = np.zeros((*points.dx.shape, vectors.shape[1]))
     rate = partial(_rate, system, change)
-    for matrix, cells, moved, pushed in slopes.stressed(system, system.space, rate, vectors, points):
+    for matrix, cells, moved, pushed in slopes.stress_terms(system, system.space, rate, vectors, points):
         found[cells] += (moved * pushed).sum(axis=2) / square if matrix == "K" else -(moved * pushed).sum(axis=2)
     return 0.5 * found / system.frame.length ** points.x.shape[-1]
 

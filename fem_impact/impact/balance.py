@@ -31,8 +31,8 @@ class Balance:
     @classmethod
     def of(cls, h: History, contacts: Sequence[Contact]) -> "Balance":
         """The balance of a run."""
-        start_contact = float(law.stored(h.offset + h.shape @ h.start_q - law.dents(h.law), h.law))
-        end_contact = float(law.stored(h.now[layout.APPROACH] - law.dents(h.end_law), h.end_law))
+        start_contact = float(law.stored_energies(h.offset + h.shape @ h.start_q - law.dents(h.law), h.law))
+        end_contact = float(law.stored_energies(h.now[layout.APPROACH] - law.dents(h.end_law), h.end_law))
         start, end = h.energy(h.start_q, h.start_p), h.energy(h.end_q, h.end_p)
         work = float(h.work.sum())
         lost = work - (end_contact - start_contact)
@@ -40,7 +40,7 @@ class Balance:
         kinetic = max(0.5 * float(p @ p) for p in (h.start_p, h.end_p))
         return cls(
             start=start + start_contact, end=end + end_contact, contact=end_contact, modal_loss=-(end - start) - work,
-            contact_loss=lost, yielded=lost if rated else law.yielded(h.end_law) - law.yielded(h.law),
+            contact_loss=lost, yielded=lost if rated else law.yielded_energy(h.end_law) - law.yielded_energy(h.law),
             largest=max(kinetic, start_contact, abs(start), abs(end)),
             damped=bool(((h.zeta > 0.0) & (h.omega > 0.0)).any()),
             lossy=any(contact.lossy for contact in contacts),
@@ -84,7 +84,7 @@ def loss_in_words(hit: "Response") -> str:
     return "carried off by waves or dissipated" if (hit.history.zeta > 1.0).any() else "dissipated"
 
 
-def touched(hit: "Response", body: int) -> list[int]:
+def contacts_of_body(hit: "Response", body: int) -> list[int]:
     """The contacts of a body."""
     shape = hit.history.shape[:, hit.body_slice(body)]
     return np.flatnonzero((shape != 0.0).any(axis=1)).tolist()
@@ -92,16 +92,16 @@ def touched(hit: "Response", body: int) -> list[int]:
 
 def rigid_row(hit: "Response", body: int) -> np.ndarray:
     """Shape (n_modes,) of a body's rigid motion at its first contact point, zero in all other modes."""
-    shape, found, contacts = hit.history.shape, np.zeros(len(hit.history.omega)), touched(hit, body)
+    shape, found, contacts = hit.history.shape, np.zeros(len(hit.history.omega)), contacts_of_body(hit, body)
     if contacts:
         first = hit.body_slice(body).start
-        rigid = slice(first, first + (1 if body == 0 and _held(hit) else hit.bodies[body].n_rigid))
+        rigid = slice(first, first + (1 if body == 0 and _held_by_hand(hit) else hit.bodies[body].n_rigid))
         second = shape[contacts[0], :first].any()  # an earlier body is the first of that contact
         found[rigid] = (-1.0 if second else 1.0) * shape[contacts[0], rigid]
     return found
 
 
-def _held(hit: "Response") -> bool:
+def _held_by_hand(hit: "Response") -> bool:
     return hit.striker is not None and hit.striker.hand is not None
 
 
@@ -111,8 +111,8 @@ def restitution(hit: "Response") -> float | None:
         return None
     row, history = rigid_row(hit, 0), hit.history
     before, after = hit.speed, float(row @ history.end_p)
-    if _held(hit) or (row * history.bias).any():  # a constant force or a hand changes its speed in flight
-        contacts = touched(hit, 0)
+    if _held_by_hand(hit) or (row * history.bias).any():  # a constant force or a hand changes its speed in flight
+        contacts = contacts_of_body(hit, 0)
         mine = [each for each in hit.impacts if each.contact in contacts]
         if not mine:
             return -1.0 if before else None

@@ -22,7 +22,7 @@ from .response import Response
 FAR = 1.0  # [-] clearance of bodies that never approach again, and the largest stated
 
 
-def nearest(hit: Response) -> tuple[float, float | None]:
+def nearest_clearance(hit: Response) -> tuple[float, float | None]:
     """Clearance [-] and when it is smallest [s]; None if it is larger than `FAR`.
 
     The clearance is the smallest gap after the first impact over the way that the striker goes in the time of that
@@ -55,9 +55,9 @@ def nearest(hit: Response) -> tuple[float, float | None]:
 
 def slopes(hit: Response, names: tuple[str, ...], sections: Mapping[str, tuple[float, SectionChange]]) -> np.ndarray:
     """Derivatives (n,) of the clearance in numbers of the blow."""
-    if nearest(hit)[1] is None:
+    if nearest_clearance(hit)[1] is None:
         return np.zeros(len(names))
-    return differences(Parameters(hit, sections), names, lambda blow: [nearest(blow)[0]])[0][0]
+    return differences(Parameters(hit, sections), names, lambda blow: [nearest_clearance(blow)[0]])[0][0]
 
 
 def _approach(free: History, times: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -16,7 +16,7 @@ from .compiled.bundles import KernelSystem
 from .contact import Contact
 from .engine import TOLERANCE as TOLERANCE
 from .error import Error
-from .reduced_body import ReducedBody, ends_of, joined, part_of, part_of_striker, stretched_in
+from .reduced_body import ReducedBody, ends_of, join_bodies, part_of, part_of_striker, stretched_in
 from .response import Response
 from .state import State
 from .stepping import Options, refine_steps, takes_options
@@ -80,7 +80,7 @@ def strike(
 
         other = None if before is None else start_bodies(before.otherwise)
         late = 0.0 if before is None else before.late
-        return _follow(
+        return _follow_refined(
             (striker.body, modes), (contact,), start_bodies(before), speed, asked, striker, point[0], other, late
         )
 
@@ -97,7 +97,7 @@ def strike(
     if striker.fixed or not asked.residual or speed == 0.0:
         return blow(striker, speed)
     needed = striker_modes(striker, contact=contact, speed=speed, tolerance=asked.tolerance)[0]
-    hit = blow(shortened(striker, needed), speed)
+    hit = blow(shortened_striker(striker, needed), speed)
     return hit if hit.error.truncation <= 0.5 * asked.tolerance else blow(striker, speed)
 
 
@@ -146,17 +146,17 @@ def collide(
             each.let_go("a collision")
     if foreign := [name for name in OF_STRIKE if name in options]:
         raise TypeError(f"collide() got an unexpected keyword argument {foreign[0]!r}")
-    hit = met(bodies, contacts, speeds=speeds, states=states, forces=forces, start=start, **options)
-    return promise.kept(hit, strict)
+    hit = collide_unjudged(bodies, contacts, speeds=speeds, states=states, forces=forces, start=start, **options)
+    return promise.warn_if_missed(hit, strict)
 
 
-def met(
+def collide_unjudged(
     bodies: Sequence[Any], contacts: Sequence[Touch], *, speeds: Any = None, states: Any = None, forces: Any = None,
     start: State | Response | None = None, **options: Any,
 ) -> Response:  # fmt: skip
     """`collide` without a word on its tolerance; hands and their weight push strikers on."""
     asked = Options(**options)
-    given, contacts = check.several("bodies", bodies, Modes, Striker), check.several("contacts", contacts, Touch)
+    given, contacts = check.tuple_of("bodies", bodies, Modes, Striker), check.tuple_of("contacts", contacts, Touch)
     strikers = {i: each for i, each in enumerate(given) if isinstance(each, Striker)}
     bodies = tuple(strikers[i].body if i in strikers else each for i, each in enumerate(given))
     if any(body.stretches for body in bodies):
@@ -166,7 +166,7 @@ def met(
         if states is not None:
             raise ValueError("states must be left out if start is given, which has the states of all bodies")
         states = before.states(bodies, [touch.law for touch in contacts])
-    parts, arriving = _parts(bodies, contacts, speeds, states, forces, asked.residual, strikers)
+    parts, arriving = _reduced_bodies(bodies, contacts, speeds, states, forces, asked.residual, strikers)
     for i, each in strikers.items():
         parts[i] = replace(parts[i], bias=parts[i].bias + each.push, held=int(each.hand is not None))
     other, late = None, 0.0
@@ -174,23 +174,23 @@ def met(
         state, late = before.otherwise, before.late
         moved = [replace(*each, q=q, p=p) for *each, q, p in zip(parts, state.displacements, state.velocities)]
         parts, other = [before.go_on(part) for part in parts], [state.go_on(part) for part in moved]
-    return _follow(bodies, [touch.law for touch in contacts], parts, arriving, asked, other=other, late=late)
+    return _follow_refined(bodies, [touch.law for touch in contacts], parts, arriving, asked, other=other, late=late)
 
 
-def touching(bodies: Sequence[Modes], touch: Touch, speed: float, residual: bool) -> tuple[KernelSystem, float]:
+def touching_system(bodies: Sequence[Modes], touch: Touch, speed: float, residual: bool) -> tuple[KernelSystem, float]:
     """Two bodies that are to touch, the first moving, as the kernels take them, and how long the contact may last."""
-    parts, _ = _parts(bodies, [touch], [speed, 0.0], None, None, residual, {})
-    system = joined(parts, [touch.law])
+    parts, _ = _reduced_bodies(bodies, [touch], [speed, 0.0], None, None, residual, {})
+    system = join_bodies(parts, [touch.law])
     return system, engine.pace_of(system).duration
 
 
-def _follow(bodies, laws, parts, speed, options, striker=None, at=None, other=None, late=0.0) -> Response:
+def _follow_refined(bodies, laws, parts, speed, options, striker=None, at=None, other=None, late=0.0) -> Response:
     """Run the blow to the required tolerance and estimate the remaining errors.
 
     ``other`` are the parts as they would move at the start, ``late`` [s], if the blow before erred, see
     `State.otherwise`.
     """
-    system, stretched = joined(parts, laws), stretched_in(parts)
+    system, stretched = join_bodies(parts, laws), stretched_in(parts)
     if options.last == (np.inf, 0) and max((system.bias @ system.shape.T).tolist()) > 0.0:
         raise ValueError(
             "duration or max_impacts must be given, because a constant force keeps pressing the bodies together"
@@ -215,7 +215,7 @@ def _follow(bodies, laws, parts, speed, options, striker=None, at=None, other=No
         found = replace(found, coarse=found.fine, steps=(found.steps[0],) * 2)
     blow = what_if.Followed(parts, laws, system, options, pace, found)
     left_out, resolvable = what_if.modes_left_out(blow, bodies)
-    variations = left_out, *what_if.unstated(blow, bodies), what_if.mesh(blow, bodies)
+    variations = left_out, *what_if.unstated_variations(blow, bodies), what_if.mesh_variation(blow, bodies)
     errors = {"step": found.error, **what_if.what_if(blow, variations)}
     moved = [blow.again(other, late=late)] if other else []
     for run in moved:
@@ -234,7 +234,7 @@ def _follow(bodies, laws, parts, speed, options, striker=None, at=None, other=No
     )  # fmt: skip
 
 
-def _parts(bodies, contacts, speeds, states, forces, residual, strikers) -> tuple[list[ReducedBody], float]:
+def _reduced_bodies(bodies, contacts, speeds, states, forces, residual, strikers) -> tuple[list[ReducedBody], float]:
     """Every body as a `ReducedBody`, and the speed of the first body that moves; ``strikers`` by their number."""
     if states is not None:
         wrong = not isinstance(states, (list, tuple)) or len(states) != len(bodies)
@@ -310,7 +310,7 @@ def striker_error(striker: Striker, n_modes: int, *, contact: Contact, speed: fl
     return LOSSY_STRIKER * error if contact.rated else error
 
 
-def shortened(striker: Striker, n_modes: int) -> Striker:
+def shortened_striker(striker: Striker, n_modes: int) -> Striker:
     """The striker with its first modes only; the others act as a spring."""
     if n_modes >= striker.modes.n_modes:
         return striker

@@ -201,7 +201,7 @@ def hertz_stiffness(compliance: float, radius: float) -> float:
     return 4.0 / 3.0 / compliance * float(np.sqrt(radius))
 
 
-def sunk(law: np.ndarray, memory: np.ndarray, left: np.ndarray) -> np.ndarray:
+def depths_of_surfaces(law: np.ndarray, memory: np.ndarray, left: np.ndarray) -> np.ndarray:
     """How much lower than at first the surface of each contact lies [m]: its dent, or how far felt is still pressed.
 
     ``law`` (n_contacts,) is that of the compiled loops, ``memory`` (..., n_contacts) what its contacts remember, and

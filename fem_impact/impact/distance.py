@@ -99,7 +99,7 @@ def of_runs(
 
 
 def _spectrum(history: History, band: float) -> np.ndarray:
-    pieces = force_spectrum.pieces(*history.samples(1.0))
+    pieces = force_spectrum.straight_pieces(*history.samples(1.0))
     return np.asarray(force_spectrum.of_pieces(pieces, np.linspace(0.0, band, BAND_POINTS)))
 
 

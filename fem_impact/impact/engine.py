@@ -106,7 +106,7 @@ def run_system(
     return history
 
 
-def again(history: History, step: float | None = None, **changed: Any) -> History:
+def follow_again(history: History, step: float | None = None, **changed: Any) -> History:
     """The same blow with other modes or contacts, by A4 in steps [s] of its own, to compare with another such run.
 
     ``changed`` are fields of the system; without any, it is the blow to compare with. Steps are by default those of a
@@ -161,11 +161,11 @@ def pace_of(system: KernelSystem, held: Sequence[int] = (), n_kept: int | None =
         if speed == 0.0:
             continue
         free = wall_time(acting_stiffness(law, mobile, speed), exponent, mobile, speed, compliance)
-        whole, lightest = _masses(np.pi / free, *between)
+        whole, lightest = _modes_as_masses(np.pi / free, *between)
         shortest = min(shortest, float(free[lightest]))
         if law.kind:
             swing = np.sqrt(law_of(law).steepest(law, 0.5 * speed**2 / mobile) * mobile)  # [rad/s]
-            steep = float(max(swing[_masses(swing, *between)[1]], swing[whole]))
+            steep = float(max(swing[_modes_as_masses(swing, *between)[1]], swing[whole]))
             longest = min(longest, np.pi / (STEEP * steep)) if steep else longest
         fastest = max(fastest, float(speed))
     if not np.isfinite(shortest):
@@ -174,7 +174,7 @@ def pace_of(system: KernelSystem, held: Sequence[int] = (), n_kept: int | None =
     return Pace(shortest, fastest, longest, swings)
 
 
-def _masses(frequency: np.ndarray, slower: np.ndarray, faster: np.ndarray) -> tuple[int, int]:
+def _modes_as_masses(frequency: np.ndarray, slower: np.ndarray, faster: np.ndarray) -> tuple[int, int]:
     """Up to which number modes are masses to a contact, of those that have its ``frequency`` [rad/s] if they are.
 
     It must lie above that of the last such mode, at ``slower``, and below the next, at ``faster``. The lowest such is
@@ -189,7 +189,7 @@ def _masses(frequency: np.ndarray, slower: np.ndarray, faster: np.ndarray) -> tu
 
 def most_steps(system: KernelSystem, stretched: Stretched | None) -> int:
     """Steps after which a run gives up."""
-    if build.limited():  # the same time limit in plain Python, which is 3 000 times slower than the kernels
+    if build.is_limited():  # the same time limit in plain Python, which is 3 000 times slower than the kernels
         return build.most_steps(max(100, 300_000 // len(system.omega)))
     work = len(system.omega) if stretched is None else stretched.forms.size
     return min(MAX_STEPS, max(1000, MAX_WORK // work))

@@ -25,7 +25,7 @@ REACH = {
 Pieces = tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]
 
 
-def pieces(time: np.ndarray, force: np.ndarray) -> Pieces:
+def straight_pieces(time: np.ndarray, force: np.ndarray) -> Pieces:
     """Start [s], length [s], first and last force [N] of all straight pieces that carry force.
 
     Parameters
@@ -46,7 +46,7 @@ def of_pieces(pieces: Pieces, frequencies: np.ndarray) -> np.ndarray:
     t, h, _, _ = pieces
     n, n_terms = len(frequencies), len(t) * len(frequencies)
     if n_terms <= 2**12:  # the direct sum is faster
-        return directly(pieces, frequencies)
+        return spectrum_in_closed_form(pieces, frequencies)
     step = frequencies[1] if n > 1 else 0.0
     # but for their rounding, from zero on
     evenly = step > 0.0 and np.abs(frequencies - step * np.arange(n)).max() <= 1e-15 * frequencies[-1]
@@ -59,14 +59,14 @@ def of_pieces(pieces: Pieces, frequencies: np.ndarray) -> np.ndarray:
     parts = np.maximum(np.ceil(half_phase / REACH[rule]), 1.0)  # into which a long piece is cut
     # as many nodes or cells as the direct sum has terms cost more, and beyond 2**24 more than two gigabytes
     if not max(rule * parts.sum(), 2.0 * np.pi * count) <= min(n_terms, 2**24):
-        return directly(pieces, frequencies)
+        return spectrum_in_closed_form(pieces, frequencies)
     time, impulse = _impulses(pieces, rule, parts.astype(int))
     if evenly:
         return transform_impulses(time, impulse, step, n)
     return _interpolated(time, impulse, span, int(count), frequencies)
 
 
-def directly(pieces: Pieces, frequencies: np.ndarray) -> np.ndarray:
+def spectrum_in_closed_form(pieces: Pieces, frequencies: np.ndarray) -> np.ndarray:
     """The same, summed over the closed forms of all pieces: for few of them, and for very high frequencies.
 
     About its middle a piece has the mean force times sinc and half its rise times the first spherical Bessel function.
@@ -163,4 +163,4 @@ def centroid(frequencies: np.ndarray, spectrum: np.ndarray) -> float:
 
 def magnitude(time: np.ndarray, force: np.ndarray, frequencies: np.ndarray) -> np.ndarray:
     """Magnitude of the spectrum [N s] of one force (n_times,) [N]."""
-    return np.abs(of_pieces(pieces(time, force[:, None]), frequencies))
+    return np.abs(of_pieces(straight_pieces(time, force[:, None]), frequencies))

@@ -15,7 +15,7 @@ def roots(omega: np.ndarray, zeta: np.ndarray) -> np.ndarray:
     return np.stack([-zeta * omega + split, -zeta * omega - split])
 
 
-def swing(
+def flexible_motion(
     omega: np.ndarray, zeta: np.ndarray, bias: np.ndarray, state: tuple[np.ndarray, np.ndarray], times: np.ndarray,
     weights: np.ndarray, order: int = 0,
 ) -> np.ndarray:  # fmt: skip

@@ -112,7 +112,7 @@ def gradients(
 
     ``sections`` are further numbers, each with its value and with how the target's section changes with it.
     """
-    several = (quantity,) if isinstance(quantity, str) else check.several("quantity", quantity, str)
+    several = (quantity,) if isinstance(quantity, str) else check.tuple_of("quantity", quantity, str)
     wanted = []
     for item in several:
         name, band = name_and_band(item)
@@ -151,7 +151,7 @@ def differences(
         for name, each, slopes in zip(change._fields, h.system, change) if by else ():
             more = columns(each) + by * columns(slopes[i])
             changed[name] = more.view(each.dtype).reshape(each.shape)
-        history = engine.again(h, step, **changed)
+        history = engine.follow_again(h, step, **changed)
         if len(history.contacts) != len(h.contacts):
             raise SimulationError(
                 f"no gradient: runs of different steps find {len(history.contacts)} and {len(h.contacts)} impacts; "
@@ -195,7 +195,7 @@ def _check_possible(hit: "Response", wanted: list[tuple[str, float | None]], sec
             f"no gradient next to a grazing contact: {h.nearest_turn:.1g} of the deepest approach more or less, and "
             "the bodies touch once more or less often; take a slightly heavier or lighter striker, or strike elsewhere"
         )
-    if any(name.startswith("peak") for name in asked) and (apart := _apart(h)) < 1e-4:
+    if any(name.startswith("peak") for name in asked) and (apart := _lead_of_peak(h)) < 1e-4:
         raise SimulationError(
             f"no gradient of the peak force: two maxima differ by {apart:.1e} of it, and a small change may make "
             "the other the largest"
@@ -259,22 +259,22 @@ def read_quantities(
                 low, high = np.abs(np.exp(-2j * np.pi * np.array([[0.0], [band]]) * time) @ impulse)
                 found.append(20.0 * float(np.log10(high / low)))
         elif name.startswith("peak"):
-            found.append(largest(blow.history)[name == "peak_force"])
+            found.append(peak_of_force(blow.history)[name == "peak_force"])
         else:
             found.append(getattr(blow, name))
     return found
 
 
-def _looks(history: History, c: int, count: int) -> np.ndarray:
+def _forces_in_steps(history: History, c: int, count: int) -> np.ndarray:
     """Force [N] of contact c at so many equal fractions of every step, in order of time; zero where it is open."""
     rows = np.arange(len(history.steps)).repeat(count)
     force = history.force_of(rows, c, np.resize(np.arange(count) / count, len(rows)))[0]
     return np.where(history.pressed[rows, c], force, 0.0)
 
 
-def largest(history: History) -> tuple[float, float]:
+def peak_of_force(history: History) -> tuple[float, float]:
     """When a force is largest [s], and that force [N]."""
-    looks = [_looks(history, c, FEW) for c in range(history.n_contacts)]
+    looks = [_forces_in_steps(history, c, FEW) for c in range(history.n_contacts)]
     c = int(np.argmax([each.max(initial=0.0) for each in looks]))
     row, part = divmod(int(looks[c].argmax()), FEW)
     length = history.steps[:, layout.LENGTH]
@@ -291,11 +291,11 @@ def largest(history: History) -> tuple[float, float]:
     return float(time), float(history.force_at(np.array([time]), c)[0][0])
 
 
-def _apart(history: History) -> float:
+def _lead_of_peak(history: History) -> float:
     """By how much the largest force exceeds the next of the maxima [-]."""
     maxima = []
     for c in range(history.n_contacts):
-        force = np.pad(_looks(history, c, 16), 1)
+        force = np.pad(_forces_in_steps(history, c, 16), 1)
         maxima.append(force[1:-1][(force[1:-1] > force[:-2]) & (force[1:-1] >= force[2:])])
     rival, top = np.sort(np.concatenate([[0.0, 0.0], *maxima]))[-2:]
     return float((top - rival) / top) if top > 0.0 else np.inf

@@ -11,8 +11,8 @@ from .._base.rounding import ROUNDING, SAME
 from .compiled import layout, propagation, record
 from .compiled.bundles import KernelSystem
 from .compiled.law import Row, law_of
-from .contact import sunk
-from .free_motion import swing
+from .contact import depths_of_surfaces
+from .free_motion import flexible_motion
 from .stretched import Stretched
 
 # [-] of the largest force and of the deepest approach of a blow: a push that stays below both is an error of steps
@@ -180,7 +180,7 @@ class History(check.Locked):
         q, p = (state[0, ~rigid] for state in self.ended.states(after[:1]))
         bodies = self.omega[~rigid], self.zeta[~rigid], self.bias[~rigid]
         for i, row in enumerate(self.shape[:, ~rigid]):
-            found[n:, i] += swing(*bodies, (q, p), after, row[None]) + row @ (bodies[2] / bodies[0] ** 2)
+            found[n:, i] += flexible_motion(*bodies, (q, p), after, row[None]) + row @ (bodies[2] / bodies[0] ** 2)
         return found
 
     def surfaces(self, times: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -191,7 +191,7 @@ class History(check.Locked):
         since = np.where(ended, times - self.end_time, times - self.steps[rows, layout.START])
         memory = np.where(ended[:, None], self.now[layout.REMEMBERED], self.steps[rows, -self.n_contacts :])
         closed &= memory >= 0.0  # felt from which the body has parted
-        return sunk(self.law, memory, np.where(closed, 0.0, since[:, None])), ~closed
+        return depths_of_surfaces(self.law, memory, np.where(closed, 0.0, since[:, None])), ~closed
 
     @cached_property
     def contacts(self) -> np.ndarray:

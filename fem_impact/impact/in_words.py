@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from .._base import markup
-from .._base.explained import below, noted, pointed
+from .._base.explained import heading_line, lines_of_notes, with_headings
 from . import balance
 from .compiled import record
 from .history import CLEAR
@@ -68,8 +68,11 @@ def lines(hit: "Response") -> str:
             "trust the number of impacts and averages, not single values"
         )
     if hit.audit is not None:
-        lines += [f"Model: {pointed(line)}" for line in hit.model_verdict[1:]]
-    lines[1:1] = [*below(hit.verdict), *noted(hit.notes)]  # a slip of a unit makes all that follows wrong
+        lines += [f"Model: {with_headings(line)}" for line in hit.model_verdict[1:]]
+    lines[1:1] = [
+        *heading_line(hit.verdict),
+        *lines_of_notes(hit.notes),
+    ]  # a slip of a unit makes all that follows wrong
     return "\n".join(lines)
 
 

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from .._base import check, markup
-from .._base.explained import noted
+from .._base.explained import lines_of_notes
 from .quantities import UNITS
 from .trust import Trust
 
@@ -143,7 +143,7 @@ class Comparison(check.Brief):
         lines = [f"{self.n_inside} of {len(self.verdicts)} measured numbers lie inside the band of 90 %"]
         lines += markup.columns([each.row() for each in self.verdicts], self.HEAD)
         lines += [f"{each.name}: {100.0 * each.inside.mean():.0f} % of the samples inside" for each in self.traces]
-        return "\n".join(lines + noted(self.notes))
+        return "\n".join(lines + lines_of_notes(self.notes))
 
     __str__ = summary
 

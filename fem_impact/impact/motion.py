@@ -64,7 +64,7 @@ def of_run(hit: "Response", body: int) -> BodyMotion:
     return BodyMotion(hit.bodies[body], hit.history, hit.body_slice(body), ends)
 
 
-def driven(hit: "Response", modes: Modes) -> BodyMotion:
+def driven_motion(hit: "Response", modes: Modes) -> BodyMotion:
     """The motion of the target, at rest before the blow, by other modes under the force found."""
     assert hit.at is not None
     still, push, history = np.zeros(modes.n_modes), constant_force(hit), hit.history

@@ -195,7 +195,7 @@ class Parameters(check.Brief):
         """Names as a tuple; all that there are if None. ValueError names those there are, and why one is not."""
         if wrt is None:
             return (*self.values, *(name for name in self.sections if name not in self.values))
-        names = (wrt,) if isinstance(wrt, str) else check.several("wrt", wrt, str)
+        names = (wrt,) if isinstance(wrt, str) else check.tuple_of("wrt", wrt, str)
         for name in names:
             if name in self.sections or name in self.values:
                 continue

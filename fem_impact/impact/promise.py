@@ -11,7 +11,7 @@ import numpy as np
 
 from .._base import explained
 from .._base.check import REACH, SimulationError, ToleranceWarning
-from ..modes.shapes import FieldShapes, estimated
+from ..modes.shapes import FieldShapes, compliance_errors
 from . import accuracy
 from .quantities import words
 
@@ -42,7 +42,7 @@ def sentence(hit: "Response") -> str:
     return f"tolerance {hit.tolerance:g} MISSED: {why}; {remedy(hit)}"
 
 
-def met(hit: "Response") -> str:
+def met_in_words(hit: "Response") -> str:
     """The same in short, of a tolerance that is met."""
     return f"tolerance {hit.tolerance:g} met{_missing(hit)}"
 
@@ -82,13 +82,13 @@ def remedy(hit: "Response") -> str:
     return "; ".join(advice) or f"take a tolerance of {float(f'{1.06 * error.total:.1e}'):g}"  # just above it
 
 
-def kept(hit: Any, strict: bool = False) -> Any:
+def warn_if_missed(hit: Any, strict: bool = False) -> Any:
     """A response or a sequence; if it missed its tolerance, warn, or raise SimulationError if ``strict``."""
     if not hit.tolerance_met:
         said = hit.promise
         if strict:
             raise SimulationError(said)
-        warn(explained.pointed(said))
+        warn(explained.with_headings(said))
     return hit
 
 
@@ -109,7 +109,7 @@ def _unstated(hit: "Response") -> list[tuple[str, tuple[str, ...]]]:
     found = []
     for name, modes, ends in zip(_names(hit), hit.bodies, hit.ends):
         if modes.unstated and ends.doubtful:
-            idle = {each for each, error in estimated(modes.shapes, ends.points).items() if not error.any()}
+            idle = {each for each, error in compliance_errors(modes.shapes, ends.points).items() if not error.any()}
             found.append((name, tuple(each for each in modes.unstated if each not in idle)))
     return [(name, missing) for name, missing in found if missing]
 

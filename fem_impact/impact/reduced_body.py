@@ -208,19 +208,19 @@ def stretched_in(parts: Sequence[ReducedBody]) -> Stretched | None:
 
 
 @lru_cache(maxsize=64)
-def _tabled(laws: tuple[Contact, ...]) -> tuple[np.ndarray, np.ndarray, list[bool]]:
+def _table_of_laws(laws: tuple[Contact, ...]) -> tuple[np.ndarray, np.ndarray, list[bool]]:
     """Contacts as the kernels read them, the approach at first [m], and whether rates count, (n_contacts,) each."""
     numbers, gaps, rated = zip(*((each.numbers, each.gap, each.rated) for each in laws))
     return table(list(numbers)), -np.array(gaps), list(rated)
 
 
-def joined(parts: Sequence[ReducedBody], laws: Sequence[Contact]) -> KernelSystem:
+def join_bodies(parts: Sequence[ReducedBody], laws: Sequence[Contact]) -> KernelSystem:
     """Join the modes of all bodies; series springs or replacement modes stand in for the left-out modes.
 
     A series spring is exact only for a body with one lossless contact. Otherwise each eigenvector of the residual
     compliance becomes a mode above the last kept one, so that loss and other contacts act on it too.
     """
-    law, offset, rated = _tabled(tuple(laws))
+    law, offset, rated = _table_of_laws(tuple(laws))
     law, offset, forms, n = law.copy(), offset.copy(), [], 0
     for part in parts:
         forms.append(part.forms(rated) if part.yields else np.zeros((0, 0)))
@@ -273,7 +273,7 @@ def rest_mode(dimension: int, omega: float, zeta: float, loss: float | None, pus
 
 def ends_of(parts: Sequence[ReducedBody], laws: Sequence[Contact]) -> tuple[Ends, ...]:
     """Where every body is touched; a constant force makes left-out modes dip only if a series spring replaces them."""
-    found, last, rated = [], 0, _tabled(tuple(laws))[2]
+    found, last, rated = [], 0, _table_of_laws(tuple(laws))[2]
     for part in parts:
         last += len(part.omega)
     for part in parts:

@@ -215,13 +215,13 @@ class Response(Totals, check.Locked):
     def _target(self) -> BodyMotion:
         if self.ringing is None and self.rings is None:
             return motion.of_run(self, len(self.bodies) - 1)
-        return motion.driven(self, self.target)
+        return motion.driven_motion(self, self.target)
 
     @cached_property
     def _descriptions(self) -> tuple[BodyMotion, ...]:
         """The motion of the target by its own Ritz vectors, and by each poorer description."""
         each = () if self.vectors is None else self.vectors.descriptions().values()
-        return tuple(motion.driven(self, modes) for modes in each)
+        return tuple(motion.driven_motion(self, modes) for modes in each)
 
     def _is_target(self, body: int) -> bool:
         n = len(self.bodies)
@@ -291,7 +291,7 @@ class Response(Totals, check.Locked):
         Exact to rounding for a force that is linear between the samples.
         """
         asked = check.array("frequencies", frequencies, (None,), "Hz", lift=True)
-        return force_spectrum.of_pieces(force_spectrum.pieces(*self._samples), asked)
+        return force_spectrum.of_pieces(force_spectrum.straight_pieces(*self._samples), asked)
 
     def spectral_centroid(self, max_frequency: float) -> float:
         """Mean frequency [Hz] of the force spectrum's magnitude from zero to ``max_frequency`` [Hz]."""
@@ -472,7 +472,7 @@ class Response(Totals, check.Locked):
     @property
     def in_contact(self) -> bool:
         """Whether the striker, or the first body, still presses another at the end of the run."""
-        mine = balance.touched(self, 0)
+        mine = balance.contacts_of_body(self, 0)
         return any(each.separation_speed is None for each in self.impacts if each.contact in mine)
 
     @property

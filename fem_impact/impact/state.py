@@ -47,7 +47,7 @@ class State(check.Brief):
             check.settle(self, memory=np.zeros((2, len(self.force))))
         if not self.doubts:
             each = zip(self.bodies, self.displacements, self.velocities)
-            check.settle(self, doubts=tuple(self.error * motion(*body) for body in each))
+            check.settle(self, doubts=tuple(self.error * flexible_part(*body) for body in each))
         check.lock_arrays(self)
         for array in (*self.displacements, *self.velocities, *self.doubts):
             array.setflags(write=False)
@@ -64,7 +64,7 @@ class State(check.Brief):
     def of(self, body: int, name: str, modes: Modes) -> tuple[np.ndarray, np.ndarray]:
         """Modal displacements and velocities (n_modes,) of a body; ValueError unless ``modes`` are its own."""
         mine = self.bodies[body]
-        if modes is not mine and not (_alike(modes, mine) and modes.n_modes == mine.n_modes):
+        if modes is not mine and not (_same_body(modes, mine) and modes.n_modes == mine.n_modes):
             raise ValueError(
                 f"{name} must be those of the body that moves at the start, {mine.n_modes} modes of {mine.mass:g} kg, "
                 f"got {modes.n_modes} modes of {modes.mass:g} kg; after a blow on a System give hit.target"
@@ -91,7 +91,7 @@ class State(check.Brief):
         mine = self.striker
         same = (
             mine is not None
-            and _alike(mine.modes, striker.modes)
+            and _same_body(mine.modes, striker.modes)
             and (mine.hand, mine.gravity) == (striker.hand, striker.gravity)
         )
         if mine is None or not same or not np.array_equal(mine.at, striker.at):
@@ -121,12 +121,12 @@ class State(check.Brief):
         return f"{self.time * 1e3:.4g} ms after the start, {touch}; energies of {len(self.bodies)} bodies: {each}"
 
 
-def motion(modes: Modes, q: np.ndarray, p: np.ndarray) -> np.ndarray:
+def flexible_part(modes: Modes, q: np.ndarray, p: np.ndarray) -> np.ndarray:
     """How a body moves, (2, n_modes), its rigid position left out."""
     return np.array([np.where(modes.omega == 0.0, 0.0, q), p])
 
 
-def _alike(one: Modes, other: Modes) -> bool:
+def _same_body(one: Modes, other: Modes) -> bool:
     """Whether both describe the same body, perhaps with another number of modes."""
     n = min(one.n_modes, other.n_modes)
     return bool(np.isclose(one.mass, other.mass, rtol=SAME) and np.allclose(one.omega[:n], other.omega[:n], rtol=SAME))
@@ -171,7 +171,7 @@ def _doubts(
     runs = hit.runs if shown < 1.0 and hit.target is hit.bodies[-1] else ()
     other = min(1.0, error.total - (shown if runs else 0.0))
     memory = hit.history.remembered(time, own)
-    found, lost = [other * motion(modes, *state) for modes, state in zip(bodies, states)], other * np.abs(memory)
+    found, lost = [other * flexible_part(modes, *state) for modes, state in zip(bodies, states)], other * np.abs(memory)
     cut, late = touching and time == hit.history.end_time and hit.history.status == record.IMPACTS, 0.0
 
     def extrapolated(fine: Any, coarse: Any, *moved: Any) -> Any:

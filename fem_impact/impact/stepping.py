@@ -313,7 +313,10 @@ def _static(system: KernelSystem) -> np.ndarray:
     found, rates = system.bias.copy(), system.shape @ system.p
     for i, approach in enumerate(system.offset + system.shape @ system.q - law.dents(system.law)):
         if approach > 0.0:  # the slope of what the contact stores, of any law and memory: only kernels call its force
-            stored = [law.stored(np.array([(1.0 + part) * approach]), system.law[i : i + 1]) for part in (-1e-3, 1e-3)]
+            stored = [
+                law.stored_energies(np.array([(1.0 + part) * approach]), system.law[i : i + 1])
+                for part in (-1e-3, 1e-3)
+            ]
             factor = max(0.0, 1.0 + system.law["loss"][i] * rates[i])
             found -= (stored[1] - stored[0]) / (2e-3 * approach) * factor * system.shape[i]
     return found

@@ -274,7 +274,7 @@ class Striker(check.Brief):
         """
         check.instance("body", body, Body)
         way, row = body.way(where, direction), body.node(where)
-        coming = free_body.arrival(body, row, way, along, pivot)
+        coming = free_body.arrival_velocities(body, row, way, along, pivot)
         aslant = along is not None or pivot is not None
         return cls(body.modes(way), body.nodes[row, body.axes], material, radius, arrival=coming, aslant=aslant)
 

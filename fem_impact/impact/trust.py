@@ -143,7 +143,7 @@ def in_one_line(hit: "Response") -> str:
     clause = assumption.head(hit.assumptions, hit.tolerance)
     holds = all(each.holds for each in hit.trust)
     if hit.tolerance_met:
-        computed = f"{answer}, computed to {first.computation:.1g} ({promise.met(hit)})"
+        computed = f"{answer}, computed to {first.computation:.1g} ({promise.met_in_words(hit)})"
         return f"{computed}{'; ' if holds else ', but '}{clause}"
     return f"{answer}: {promise.sentence(hit)}" + ("" if holds else f"; besides, {clause}")
 

@@ -16,7 +16,7 @@ from .compiled import law, record
 from .compiled.bundles import KernelSystem
 from .contact import Contact
 from .history import History
-from .reduced_body import THINNED, ReducedBody, joined, stretched_in
+from .reduced_body import THINNED, ReducedBody, join_bodies, stretched_in
 from .stepping import RINGING, Converged, Options
 
 RESOLVABLE = 0.3  # [-] largest contact stiffness times residual compliance for which the error estimate holds
@@ -40,7 +40,7 @@ class Followed:
         """
         last = max(0.0, self.options.last[0] - (late or 0.0)), self.options.last[1]
         how = self.runs.scheme, self.runs.steps[0 if finely else 1], self.pace, last
-        system = joined(parts, self.laws)
+        system = join_bodies(parts, self.laws)
         if self.system.q.any():
             system = system._replace(offset=system.offset + self._apart(system, late is not None))
         return engine.run_system(system, *how, stretched_in(parts), within=self.runs.within)
@@ -151,7 +151,7 @@ def modes_left_out(blow: Followed, bodies: Sequence[Modes]) -> tuple[Variation, 
     return found, max(softness) <= RESOLVABLE
 
 
-def unstated(blow: Followed, bodies: Sequence[Modes]) -> tuple[Variation, Variation]:
+def unstated_variations(blow: Followed, bodies: Sequence[Modes]) -> tuple[Variation, Variation]:
     """What nobody said of the bodies, see `Modes.unstated`.
 
     That is the most and the least that the modes left out of a body may yield, and the rigid motions that it may have,
@@ -176,7 +176,7 @@ def unstated(blow: Followed, bodies: Sequence[Modes]) -> tuple[Variation, Variat
     return Variation("truncation", changes), Variation("measurement", measured)
 
 
-def mesh(blow: Followed, bodies: Sequence[Modes]) -> Variation:
+def mesh_variation(blow: Followed, bodies: Sequence[Modes]) -> Variation:
     """Every frequency lowered and every compliance raised by its error due to the mesh, if any of them matters.
 
     Those below 1e-4 of the tolerance do not: the blow errs by as little. Being struck again, the estimate grows over

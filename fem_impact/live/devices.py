@@ -105,7 +105,7 @@ def perform(player: Player, source: Source, longest: float, device: Device | Non
     most = max(1, round(check.positive("longest", longest, "s") / period))
     look = 0.2 * period  # for room: more often costs time, less often uses up what is ahead
     feed, seconds = Feed(most, player.block), np.zeros(most)
-    rings = sampling.ringing(player.modes, player.modes.omega > 0.0, (SHORTEST, LONGEST))
+    rings = sampling.ringing_time(player.modes, player.modes.omega > 0.0, (SHORTEST, LONGEST))
     if device is not None:
         device.play_feed(feed, player.rate)
     try:

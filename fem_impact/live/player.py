@@ -95,7 +95,7 @@ class Player:
         self.block, self.fastest = check.count("block", block), check.positive("fastest", fastest, "m/s")
         self.sticks = check.count("sticks", sticks, high=16)
         needed = collision.striker_modes(striker, contact=contact, speed=fastest, tolerance=collision.TOLERANCE)[0]
-        self.striker = striker if striker.fixed else collision.shortened(striker, needed)
+        self.striker = striker if striker.fixed else collision.shortened_striker(striker, needed)
         place = modes.point("listen", self.points[0] if listen is None else listen)
         self.struck = StruckBody(
             modes, self.striker, contact, points=self.points, listen=place, fastest=self.fastest, rate=self.rate,

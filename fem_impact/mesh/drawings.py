@@ -23,7 +23,6 @@ from .loops import (
     Loop,
     Outline,
     Piece,
-    crossed,
     extent,
     polyline,
     refuse_millimetres,
@@ -31,6 +30,7 @@ from .loops import (
     segment,
     signed_area,
     tangent,
+    why_crossed,
 )
 from .smooth_edges import smooth_runs
 
@@ -62,7 +62,7 @@ def read_outline(source: Any, unit: str | None) -> tuple[Outline, dict[str, np.n
         if path.suffix.lower() not in readers:
             raise ValueError(f"source must be an .svg or .dxf file, got {path.name!r}; meshes are read by fi.mesh.load")
         found, lines = readers[path.suffix.lower()](path, unit, notes)
-        return _nested(path.name, found), lines, notes
+        return _outline_with_holes(path.name, found), lines, notes
     scale = 1.0 if unit is None else UNITS[check.one_of("unit", unit, UNITS)]
     if hasattr(source, "geom_type"):
         if source.geom_type != "Polygon":
@@ -71,11 +71,11 @@ def read_outline(source: Any, unit: str | None) -> tuple[Outline, dict[str, np.n
     else:
         rings = [source]
     rings = [check.array("source", ring, (None, None), "m") for ring in rings]
-    loops = [_smoothed(ring[:, :2] * scale, notes) for ring in rings]
-    return _nested("source", loops), {}, notes
+    loops = [_smooth_loop(ring[:, :2] * scale, notes) for ring in rings]
+    return _outline_with_holes("source", loops), {}, notes
 
 
-def _smoothed(points: np.ndarray, notes: list[str]) -> Loop:
+def _smooth_loop(points: np.ndarray, notes: list[str]) -> Loop:
     """Loop through points (n, 2): a smooth curve where the turns are small, straight lines elsewhere."""
     points = ring("source", points, "points")
     if np.linalg.norm(np.roll(points, -1, axis=0) - points, axis=1).min() == 0.0:
@@ -183,7 +183,7 @@ def _svg(path: Path, unit: str | None, notes: list[str]) -> Drawn:
     scale = size / np.where(pixels, pixels, np.nan)
     if not (np.isfinite(scale) & (scale > 0.0)).all():
         raise ValueError(f"{path.name} has no usable width and viewBox; set both to positive numbers")
-    return _chained(path.name, _unpacked(path.name, drawn, scale * [1.0, -1.0]), notes)
+    return _join_pieces(path.name, _unpacked(path.name, drawn, scale * [1.0, -1.0]), notes)
 
 
 def dxf_arrays(path: Path) -> dict[str, np.ndarray]:
@@ -221,7 +221,7 @@ def _dxf(path: Path, unit: str | None, notes: list[str]) -> Drawn:
         if not scale:
             scale = 1.0
             notes.append(f"{path.name} states no unit; assumed metres, pass unit= to change that")
-    loops, lines = _chained(path.name, _unpacked(path.name, drawn, scale), notes)
+    loops, lines = _join_pieces(path.name, _unpacked(path.name, drawn, scale), notes)
     if drawn["size"][2] > 1e-3 * drawn["size"].max():  # less is rounding
         notes.append(f"{path.name}: its z, which goes over {scale * drawn['size'][2]:.3g} m, is left out")
     if unit is None:
@@ -300,7 +300,7 @@ def _unpacked(name: str, drawn: dict[str, np.ndarray], scale: Any) -> list[Piece
     return pieces
 
 
-def _chained(name: str, pieces: list[Piece], notes: list[str]) -> Drawn:
+def _join_pieces(name: str, pieces: list[Piece], notes: list[str]) -> Drawn:
     """Join pieces end to end into closed loops; what has a name and cannot belong to one is a line."""
     corners = np.array([piece.at(np.linspace(0.0, 1.0, 5)) for piece in pieces]).reshape(-1, 2)
     if not (np.abs(corners) < FARTHEST).all():
@@ -317,10 +317,10 @@ def _chained(name: str, pieces: list[Piece], notes: list[str]) -> Drawn:
     largest = max(extent(loop) for loop in loops)
     for chain in lines:
         if extent(tuple(left[i] for i in chain)) > (1.0 + BRIDGED) * largest:
-            raise _open(name, *open_paths.flattened([left[i] for i in chain], np.inf)[[0, -1]])
+            raise _why_open(name, *open_paths.flatten_chain([left[i] for i in chain], np.inf)[[0, -1]])
     size = span / 20.0  # parts of a curve are no longer: a quarter circle errs by 3e-4 of it
-    paths = [(left[chain[0]].name, open_paths.flattened([left[i] for i in chain], size)) for chain in lines]
-    named = open_paths.named(paths, {piece.name for loop in loops for piece in loop})
+    paths = [(left[chain[0]].name, open_paths.flatten_chain([left[i] for i in chain], size)) for chain in lines]
+    named = open_paths.name_paths(paths, {piece.name for loop in loops for piece in loop})
     if named:
         beside = max(open_paths.sag(left[i], size) for chain in lines for i in chain)
         curved = f"; their curves become straight parts, at most {beside:.1g} m beside them" if beside else ""
@@ -328,7 +328,7 @@ def _chained(name: str, pieces: list[Piece], notes: list[str]) -> Drawn:
     return loops, named
 
 
-def _open(name: str, start: np.ndarray, stop: np.ndarray) -> ValueError:
+def _why_open(name: str, start: np.ndarray, stop: np.ndarray) -> ValueError:
     """What to say of an outline that is not closed."""
     return ValueError(
         f"{name} has an open outline: it ends at ({stop[0]:g}, {stop[1]:g}) m, "
@@ -362,18 +362,18 @@ def _loops(name: str, left: list[Piece], span: float, notes: list[str]) -> list[
                 notes.append(f"{name}: a gap of {home:g} m was closed")
                 break
             else:
-                raise _open(name, start, stop)
+                raise _why_open(name, start, stop)
         loops.append(tuple(chain))
     return loops
 
 
-def _nested(name: str, loops: list[Loop]) -> Outline:
+def _outline_with_holes(name: str, loops: list[Loop]) -> Outline:
     """The largest loop becomes the outline, the others its holes; unnamed edges get names."""
     areas = [abs(signed_area(polyline(loop, extent(loop) / 50.0))) for loop in loops]
     order = np.argsort(areas)[::-1]
     outer = loops[order[0]]
     outline = Outline.around(outer, tuple(loops[i] for i in order[1:]))
-    problem = crossed(outline)
+    problem = why_crossed(outline)
     if problem:
         raise ValueError(f"{name}: {problem}")
     holes = tuple(tuple(replace(p, name=p.name or f"hole{i}") for p in loop) for i, loop in enumerate(outline.holes))

@@ -105,7 +105,7 @@ class Curves:
         return self.at(share)[0]
 
 
-def divided(
+def divide_facets(
     ends: np.ndarray, middles: np.ndarray, tangents: np.ndarray, curvatures: np.ndarray, share: float
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
     """Cut facets in two at the chord parameter s = ``share``.

@@ -20,7 +20,7 @@ class Lines(NamedTuple):
     cuts: dict[int, list[float]]  # id of a piece of the outline -> parameters where lines end on it
 
 
-def inside(outline: Outline, paths: Sequence[np.ndarray]) -> Lines:
+def lines_inside(outline: Outline, paths: Sequence[np.ndarray]) -> Lines:
     """The lines of paths (n_points, 2) [m] within an outline; what sticks out or runs along it is left out."""
     span = extent(outline.outer)
     pieces = [piece for loop in outline.loops for piece in loop]

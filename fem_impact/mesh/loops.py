@@ -218,7 +218,7 @@ def straight_loop(name: str, corners: Any, label: str) -> Loop:
     return tuple(segment(a, b, label.format(i)) for i, (a, b) in enumerate(zip(points, after)))
 
 
-def crossed(outline: Outline) -> str:
+def why_crossed(outline: Outline) -> str:
     """Why an outline cannot be meshed, as an error text; an empty string if it can."""
     size = extent(outline.outer) / 30.0
     outer = shapely.Polygon(polyline(outline.outer, size))

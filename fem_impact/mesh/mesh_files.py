@@ -58,7 +58,7 @@ def read_mesh(path: Any, unit: str | None) -> tuple[
             f"and {second}, whose middle is node {node}; correct it, or export linear cells"
         )
     if height is not None:
-        notes.append(_sloping(path, raw, height, cells))
+        notes.append(_note_on_slope(path, raw, height, cells))
         used = np.unique(np.append(cells, list(nodes.values())).astype(int))
     heights = None if height is None else (raw[used], height[used])
     names = _named_pairs(path, data)
@@ -72,7 +72,7 @@ def read_mesh(path: Any, unit: str | None) -> tuple[
         on = sides[np.isin(sides, number[group]).all(axis=1)]
         if len(on) or (number[group] < 0).all():  # a node of a triangle alone is for a force
             pairs.setdefault(name, set()).update(map(tuple, on.tolist()))
-    cells = _hanging(points, cells, pairs, notes)
+    cells = _split_at_hanging(points, cells, pairs, notes)
     _refuse_overlap(path, points, cells)
     return points, cells, middles, pairs, notes, heights
 
@@ -100,7 +100,7 @@ def _plane_points(
             raise ValueError(f"{name} has a coordinate {what} at node {bad[0]}: {points[bad[0]]}; correct that node")
     height = None
     if points.shape[1] == 3:
-        points, flat = _levelled(points, used, notes)
+        points, flat = _turned_level(points, used, notes)
         spread = np.ptp(points[used], axis=0) if used.size else np.zeros(3)
         if spread[flat] > FLAT * spread.max():
             height = points[:, flat] - points[used, flat].mean()
@@ -117,7 +117,7 @@ def _plane_points(
     return points, height, notes
 
 
-def _levelled(points: np.ndarray, used: np.ndarray, notes: list[str]) -> tuple[np.ndarray, int]:
+def _turned_level(points: np.ndarray, used: np.ndarray, notes: list[str]) -> tuple[np.ndarray, int]:
     """Points (n_points, 3) turned so that their mean plane is that of two axes, and the number of the third axis."""
     if not used.size:
         return points, 2
@@ -137,7 +137,7 @@ def _levelled(points: np.ndarray, used: np.ndarray, notes: list[str]) -> tuple[n
     return (points - centre) @ (turns[0] @ turns[1]).T + centre, axis
 
 
-def _sloping(path: Path, points: np.ndarray, height: np.ndarray, cells: np.ndarray) -> str:
+def _note_on_slope(path: Path, points: np.ndarray, height: np.ndarray, cells: np.ndarray) -> str:
     """What to say of a curved surface; ValueError if it is too steep."""
     corner = np.column_stack([points, height])[cells]
     across = np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0])
@@ -294,7 +294,7 @@ def boundary(cells: np.ndarray) -> np.ndarray:
     return np.column_stack([cells[cell, side], cells[cell, (side + 1) % 3]])
 
 
-def quartered(cells: np.ndarray, n: int) -> tuple[np.ndarray, np.ndarray]:
+def quarter_triangles(cells: np.ndarray, n: int) -> tuple[np.ndarray, np.ndarray]:
     """Each triangle split in four, (4 n_cells, 3); the new points, from number n on, halve the sides (n_new, 2)."""
     sides, number, _ = sides_of(cells)
     (a, b, c), (ab, bc, ca) = cells.T, n + number.T
@@ -302,7 +302,7 @@ def quartered(cells: np.ndarray, n: int) -> tuple[np.ndarray, np.ndarray]:
     return np.concatenate([np.column_stack(part) for part in quarters]), sides
 
 
-def _hanging(points: np.ndarray, cells: np.ndarray, names: dict, notes: list[str]) -> np.ndarray:
+def _split_at_hanging(points: np.ndarray, cells: np.ndarray, names: dict, notes: list[str]) -> np.ndarray:
     """Split triangles at hanging nodes, the vertices of neighbours that lie on their sides, until none is left."""
     count = 0
     for _ in range(64):

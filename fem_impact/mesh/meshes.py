@@ -11,8 +11,8 @@ import numpy as np
 
 from .._base import check, markup
 from . import drawings, lines, mesh_files, sketch, smooth_edges
-from .facets import Curves, divided, is_curved
-from .loops import Bezier, Outline, circle, crossed, extent, polyline, segment, signed_area, straight_loop
+from .facets import Curves, divide_facets, is_curved
+from .loops import Bezier, Outline, circle, extent, polyline, segment, signed_area, straight_loop, why_crossed
 from .rise import table
 from .triangulation import triangulate
 
@@ -186,7 +186,7 @@ def line(length: float, *, size: float | None = None) -> Mesh:
 
 def fill(outline: Outline, *, size: float | None = None) -> Mesh:
     """Mesh any outline; without ``size``, `find_modes` chooses one."""
-    problem = crossed(outline)
+    problem = why_crossed(outline)
     if problem:
         raise ValueError(problem)
     size, stated = _element_size(size, extent(outline.outer) / DEFAULT_DIVISIONS)
@@ -348,7 +348,7 @@ def load(path: Any, *, unit: str | None = None) -> Mesh:
         notes=tuple(f"{Path(path).name}: {note}" for note in notes),
         rise=None if heights is None else table(*heights),
     )  # fmt: skip
-    return replace(made, recipe=partial(_resized, made))
+    return replace(made, recipe=partial(_resize_mesh, made))
 
 
 def sizes(points: np.ndarray, cells: np.ndarray) -> np.ndarray:
@@ -361,8 +361,8 @@ def sizes(points: np.ndarray, cells: np.ndarray) -> np.ndarray:
 def aligned(mesh: Mesh) -> Mesh:
     """The mesh, set to be refined only by splitting: the triangles of a file may follow steps of the thickness."""
     recipe = mesh.recipe
-    refilled = isinstance(recipe, partial) and recipe.func is _resized
-    return replace(mesh, recipe=partial(_divided, mesh)) if refilled else mesh
+    refilled = isinstance(recipe, partial) and recipe.func is _resize_mesh
+    return replace(mesh, recipe=partial(_divide_mesh, mesh)) if refilled else mesh
 
 
 @check.typed
@@ -380,7 +380,7 @@ def save(path: Any, mesh: Mesh) -> None:
     mesh_files.write_mesh(path, mesh)
 
 
-def pierced(mesh: Mesh, holes: Sequence[tuple[np.ndarray, float]], *, size: float | None = None) -> Mesh:
+def mesh_with_holes(mesh: Mesh, holes: Sequence[tuple[np.ndarray, float]], *, size: float | None = None) -> Mesh:
     """The mesh of a plate with round holes, each a centre (2,) [m] and a radius [m]; their edges are "clamp0" ...
 
     Edges keep their names and curves; a mesh from a file keeps its own vertices on the rim, not inside.
@@ -398,25 +398,27 @@ def pierced(mesh: Mesh, holes: Sequence[tuple[np.ndarray, float]], *, size: floa
     inner = tuple(circle(centre, radius, f"clamp{i}") for i, (centre, radius) in enumerate(holes))
     around = _outline(mesh) or _facets_outline(mesh)
     whole = Outline.around(around.outer, (*around.holes, *inner))
-    problem = crossed(whole)
+    problem = why_crossed(whole)
     if problem:
         raise ValueError(f"point_supports must leave room for each clamp, inside the body and apart: {problem}")
-    return _filled(mesh, whole, size, recipe=partial(pierced, mesh, holes))
+    return _fill_outline(mesh, whole, size, recipe=partial(mesh_with_holes, mesh, holes))
 
 
-def lined(mesh: Mesh, paths: Sequence[np.ndarray], *, size: float | None = None) -> Mesh:
+def mesh_along_lines(mesh: Mesh, paths: Sequence[np.ndarray], *, size: float | None = None) -> Mesh:
     """The mesh of a plate in which sides of triangles follow paths (n_points, 2) [m], straight between their points.
 
     Edges keep their names and curves; a mesh from a file keeps its own vertices on the rim, not inside.
     """
-    before = mesh.recipe.args[1] if isinstance(mesh.recipe, partial) and mesh.recipe.func is lined else ()
+    before = mesh.recipe.args[1] if isinstance(mesh.recipe, partial) and mesh.recipe.func is mesh_along_lines else ()
     if size is None and all(any(np.array_equal(path, other) for other in before) for path in paths):
         return mesh  # it follows them already
     around = _outline(mesh) or _facets_outline(mesh)
-    return _filled(mesh, around, size, lines.inside(around, paths), recipe=partial(lined, mesh, paths))
+    return _fill_outline(
+        mesh, around, size, lines.lines_inside(around, paths), recipe=partial(mesh_along_lines, mesh, paths)
+    )
 
 
-def _filled(
+def _fill_outline(
     mesh: Mesh, whole: Outline, size: float | None, within: lines.Lines | None = None, *, recipe: Callable[..., Mesh]
 ) -> Mesh:
     """A new mesh of an outline made of that of another mesh, whose edges keep their names."""
@@ -459,30 +461,30 @@ def _facets_outline(mesh: Mesh) -> Outline:
     return Outline(loops[0], tuple(loops[1:]))
 
 
-def _resized(mesh: Mesh, *, size: float) -> Mesh:
+def _resize_mesh(mesh: Mesh, *, size: float) -> Mesh:
     """A mesh from a file with triangles of about ``size`` [m]: split in four, or new ones inside the same rim."""
-    ratio, recipe = mesh.size / size, partial(_resized, mesh)
+    ratio, recipe = mesh.size / size, partial(_resize_mesh, mesh)
     # split, unless triangles end up smaller by 1.45 than asked for, which are twice as many
     if ratio >= 1.0 - 1e-9 and 2.0 ** np.ceil(np.log2(ratio) - 1e-9) < 1.45 * ratio:
-        return replace(_divided(mesh, size=size), recipe=recipe)
+        return replace(_divide_mesh(mesh, size=size), recipe=recipe)
     around = _facets_outline(mesh)
-    if not crossed(around):
+    if not why_crossed(around):
         with suppress(check.SimulationError):  # of the mesher; splitting only costs more
-            return _filled(mesh, around, size, recipe=recipe)
-    return _divided(mesh, size=size)
+            return _fill_outline(mesh, around, size, recipe=recipe)
+    return _divide_mesh(mesh, size=size)
 
 
-def _divided(mesh: Mesh, *, size: float) -> Mesh:
+def _divide_mesh(mesh: Mesh, *, size: float) -> Mesh:
     """The mesh with its triangles split in four until their size is at most ``size`` [m]."""
     _check_affordable(len(mesh.cells) * (mesh.size / size) ** 2, size, MOST_CELLS)
-    recipe = partial(_divided, mesh)
+    recipe = partial(_divide_mesh, mesh)
     for _ in range(max(0, int(np.ceil(np.log2(mesh.size / size) - 1e-9)))):
         n = len(mesh.points)
-        cells, unique = mesh_files.quartered(mesh.cells, n)
+        cells, unique = mesh_files.quarter_triangles(mesh.cells, n)
         points = np.concatenate([mesh.points, mesh.points[unique].mean(axis=1)])
         middle = n + mesh_files.numbers_of(unique, mesh.facets)
         known = mesh.points[mesh.facets], mesh.middles, mesh.tangents, mesh.curvatures
-        points[middle], tangent, bend, first, second = divided(*known, 0.5)  # on the curve of their facet
+        points[middle], tangent, bend, first, second = divide_facets(*known, 0.5)  # on the curve of their facet
         both = np.arange(2 * len(mesh.facets)).reshape(-1, 2)
         halves: dict[str, tuple[np.ndarray, ...]] = {  # of each facet
             "facets": (mesh.facets[:, 0], middle, middle, mesh.facets[:, 1]), "middles": (first, second),

@@ -39,7 +39,7 @@ def chains(pieces: list[Piece], span: float) -> list[list[int]]:
 def lines(pieces: list[Piece], span: float, close: float) -> list[list[int]]:
     """Those chains with a name that cannot belong to an outline: no other open one is near one of their ends."""
     open_ones = chains(pieces, span)
-    ends = [flattened([pieces[i] for i in chain], np.inf)[[0, -1]] for chain in open_ones]
+    ends = [flatten_chain([pieces[i] for i in chain], np.inf)[[0, -1]] for chain in open_ones]
     found: list[list[int]] = []
     left = list(range(len(open_ones)))
     while True:
@@ -55,7 +55,7 @@ def lines(pieces: list[Piece], span: float, close: float) -> list[list[int]]:
         left = [k for k in left if k not in lone]
 
 
-def flattened(chain: list[Piece], size: float) -> np.ndarray:
+def flatten_chain(chain: list[Piece], size: float) -> np.ndarray:
     """Points (n, 2) [m] along a chain; straight in between, at most ``size`` [m] where it is curved."""
     parts = [piece.at(np.array([0.0, 1.0]) if is_straight(piece) else divide(piece, size)) for piece in chain]
     path, rest = parts[0], parts[1:]
@@ -78,7 +78,7 @@ def sag(piece: Piece, size: float) -> float:
     return float(np.linalg.norm(beside, axis=1).max())
 
 
-def named(found: list[tuple[str, np.ndarray]], taken: set[str]) -> dict[str, np.ndarray]:
+def name_paths(found: list[tuple[str, np.ndarray]], taken: set[str]) -> dict[str, np.ndarray]:
     """Paths by name; where several have one name, or an edge has it, a number follows."""
     names = [name for name, _ in found]
     result: dict[str, np.ndarray] = {}

@@ -37,7 +37,7 @@ def _cap(points: np.ndarray, radius: float, centre: np.ndarray) -> np.ndarray:
     return _round(np.hypot(*_local(points, centre)), radius)
 
 
-def _bent(points: np.ndarray, radius: float, angle: float, centre: np.ndarray, saddle: bool) -> np.ndarray:
+def _bent_height(points: np.ndarray, radius: float, angle: float, centre: np.ndarray, saddle: bool) -> np.ndarray:
     along, across = map(np.abs, _local(points, centre, angle))
     return _round(along, radius) - _round(across, radius) if saddle else _round(across, radius)
 
@@ -88,13 +88,13 @@ def cap(radius: float, *, centre: "ArrayLike" = (0.0, 0.0)) -> Rise:
 def cylinder(radius: float, *, angle: float = 0.0, centre: "ArrayLike" = (0.0, 0.0)) -> Rise:
     """A cylinder of a radius [m] whose straight top runs through ``centre`` at an angle [rad] from the x axis."""
     angle, place = check.number("angle", angle, "rad"), check.array("centre", centre, (2,), "m")
-    return partial(_bent, radius=_radius(radius), angle=angle, centre=place, saddle=False)
+    return partial(_bent_height, radius=_radius(radius), angle=angle, centre=place, saddle=False)
 
 
 def saddle(radius: float, *, angle: float = 0.0, centre: "ArrayLike" = (0.0, 0.0)) -> Rise:
     """A saddle that falls with a radius [m] along a direction ``angle`` [rad] and rises as much across it."""
     angle, place = check.number("angle", angle, "rad"), check.array("centre", centre, (2,), "m")
-    return partial(_bent, radius=_radius(radius), angle=angle, centre=place, saddle=True)
+    return partial(_bent_height, radius=_radius(radius), angle=angle, centre=place, saddle=True)
 
 
 def cymbal(radius: float, bow: float, cup_radius: float, cup: float) -> Rise:

@@ -49,12 +49,12 @@ def recover_rim(points: np.ndarray, loops: list[np.ndarray], given: dict[int, np
             place = points[np.append(loop[run, 0], loop[run[-1], 1])]
             known = np.array([given[f] for f in facets]) if all(f in given for f in facets) else None
             middles[facets], tangents[facets], curvatures[facets] = _fit(place, closed, known)
-        join(np.column_stack([np.roll(numbers, 1), numbers]), tangents, curvatures)
+        join_smoothly(np.column_stack([np.roll(numbers, 1), numbers]), tangents, curvatures)
     curved = is_curved(points[np.concatenate(loops)], middles)
     return SmoothRim(middles, tangents, curvatures, int(curved.sum()))
 
 
-def join(pairs: np.ndarray, tangents: np.ndarray, curvatures: np.ndarray) -> None:
+def join_smoothly(pairs: np.ndarray, tangents: np.ndarray, curvatures: np.ndarray) -> None:
     """Give both facets at a vertex the same tangent where a curve meets its neighbour smoothly; works in place.
 
     ``pairs`` (n, 2) holds the facets before and after each vertex.

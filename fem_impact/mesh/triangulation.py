@@ -9,7 +9,7 @@ from .._base import check
 from .._base.rounding import SAME
 from .lines import Lines
 from .loops import Outline, Piece, crossing, curvature, divide, extent, is_straight, tangent
-from .smooth_edges import join
+from .smooth_edges import join_smoothly
 
 SPREAD = 1.3  # [-] inner sides may be this much longer than the requested size before the mesher divides them
 REMEDY = "remove very thin necks or spikes, or pass another size"
@@ -21,7 +21,7 @@ def triangulate(outline: Outline, size: float, lines: Lines | None = None) -> di
     Parameters
     ----------
     outline : Outline
-        Must have passed `loops.crossed`.
+        Must have passed `loops.why_crossed`.
     size : float [m]
         Approximate longest side of a triangle; triangles are smaller where the outline turns quickly.
     lines : Lines, optional
@@ -110,7 +110,7 @@ def _follow(
     middles[straight] = place[facets[straight]].mean(axis=1)
     follower = {int(a): i for i, a in enumerate(facets[:, 0])}
     leader = {int(b): i for i, b in enumerate(facets[:, 1])}
-    join(np.array([[leader[v], follower[v]] for v in follower]), tangents, curvatures)
+    join_smoothly(np.array([[leader[v], follower[v]] for v in follower]), tangents, curvatures)
     named = {name: np.array(sorted(numbers)) for name, numbers in edges.items() if name}
     if "outer" not in named:
         named["outer"] = np.flatnonzero([any(chords[j][0] is piece for piece in outer) for j in owner])

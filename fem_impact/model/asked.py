@@ -107,10 +107,10 @@ class Asked:
                 values[name] = getattr(options, name)
             values["stretching"] = options.stretching or blow.target.stretching
             speed = check.positive("speed", values["speed"], "m/s")
-        values["at"] = placed(blow.target, "at", values["at"], partial(blow.target.blame, "strike", changes))[0]
+        values["at"] = checked_places(blow.target, "at", values["at"], partial(blow.target.blame, "strike", changes))[0]
         watched = [point for point in blow.points if blow.moving and point is not blow.arguments.get("at")]
         if watched:
-            placed(blow.target, "points", watched, partial(blow.target.blame, "observe"))
+            checked_places(blow.target, "points", watched, partial(blow.target.blame, "observe"))
         duration = accuracy.contact_duration(blow.contact, blow.striker.felt_mass, speed)
         budget = Budget(options.tolerance, blow.contact.rated)
         return cls(blow, changes, values, pieces, budget, options.quantities, duration)
@@ -282,7 +282,7 @@ class Description(ABC):
         """The last response with all that belongs to it, its examiner among that."""
         forecast = self.forecast
         kind = "infinite" if forecast.mobility else "rigid"
-        return audit.audited(hit, None if self.rings else self.asked.simplified(kind, forecast.mass))
+        return audit.with_examiner(hit, None if self.rings else self.asked.simplified(kind, forecast.mass))
 
 
 def refine(description: Any, strike: Callable[..., tuple[Any, Any]], stages: Stages, keep: Any = None) -> Any:
@@ -304,7 +304,7 @@ def refine(description: Any, strike: Callable[..., tuple[Any, Any]], stages: Sta
     return struck
 
 
-def placed(target: Target, name: str, given: Any, blame: Callable[[], Any]) -> Any:
+def checked_places(target: Target, name: str, given: Any, blame: Callable[[], Any]) -> Any:
     """Points (n_points, dimension) [m], checked to lie on the body; one if they are those of ``at``."""
     mesh = target.mesh
     with blame():

@@ -24,9 +24,9 @@ from ..mesh.meshes import Mesh
 from ..modes.disk import DiskShapes
 from ..modes.modal import Modes
 from ..modes.rectangle import RectangleShapes
-from ..modes.shapes import ElementShapes, unwrapped
+from ..modes.shapes import ElementShapes, unwrap_shapes
 from . import bending, deflection, fresh, local_contact, sliding, still_air, thinness
-from .idealisation import Surroundings, unyielding
+from .idealisation import Surroundings, rigid_plate
 from .restrike import Doubt, Struck
 from .target import BOTH, Target
 
@@ -76,7 +76,7 @@ class Simplified:
     supports: Mapping[str, Any]
 
 
-def audited(hit: Response, simplified: Simplified | None = None) -> Response:
+def with_examiner(hit: Response, simplified: Simplified | None = None) -> Response:
     """The response of a blow that was just struck, given its examiner."""
     check.settle(hit, audit=partial(examine, simplified=simplified))
     return hit
@@ -91,10 +91,10 @@ def examine(hit: Response, simplified: Simplified | None = None) -> tuple[Assump
 
     steps = len(EXAMINERS) * len(hit.history.steps)  # about, as each may strike again
     short = hit.history.stretched is None and steps <= fresh.TOGETHER * fresh.STEPS
-    return fresh.soon(examined) if short else examined()
+    return fresh.answer_soon(examined) if short else examined()
 
 
-def required(target: Target, hit: Response) -> tuple[Target, str] | None:
+def required_model(target: Target, hit: Response) -> tuple[Target, str] | None:
     """The target with the better model that the tolerance of a blow requires, and why; None if it requires none."""
     if target.mesh is None:
         return None
@@ -135,11 +135,11 @@ def examine_plan(
         ratio = target.damping_ratio
         damped = not how["rings"] or (ratio is not None and (callable(ratio) or bool(np.any(ratio))))
         modes = replace(
-            unyielding(place[0], body.mass), damping_ratio=np.full(1, float(damped)), thick=target.thick,
+            rigid_plate(place[0], body.mass), damping_ratio=np.full(1, float(damped)), thick=target.thick,
             air=target.air is not None, stretches=target.stretching,
         )  # fmt: skip
-    stiff = replace(collision.shortened(striker, striker.modes.n_rigid), hand=None)
-    bare, wall = replace(contact, loss=0.0, gap=0.0), unyielding(np.zeros(1), 1.0)
+    stiff = replace(collision.shortened_striker(striker, striker.modes.n_rigid), hand=None)
+    bare, wall = replace(contact, loss=0.0, gap=0.0), rigid_plate(np.zeros(1), 1.0)
     try:
         with build.uncompiled():
             hit = collision.strike(wall, stiff, bare, at=np.zeros(1), speed=how["speed"], tolerance=ROUGH)
@@ -157,7 +157,7 @@ def _struck(hit: Response, bodies: tuple[Modes, Modes], simplified: Simplified |
         target = bending.known_of(modes)
     else:
         mesh, ideal, whole = simplified.mesh, simplified.kind, replace(modes, mass=simplified.mass)
-        target = bending.around(whole, simplified.section, mesh, simplified.supports)
+        target = bending.bending_around(whole, simplified.section, mesh, simplified.supports)
     striker = None if hit.striker is None else bending.known_of(bodies[0])
     return Struck(hit, bodies, target, striker, ideal, _clearance(modes, target, mesh, at))
 
@@ -167,7 +167,7 @@ def _clearance(modes: Modes, known: bending.Known | None, mesh: Mesh | None, at:
 
     A beam is struck on its centre line.
     """
-    shapes = unwrapped(modes.shapes)[0]
+    shapes = unwrap_shapes(modes.shapes)[0]
     if at is None or not modes.dimension:
         return None
     if isinstance(shapes, ElementShapes):

@@ -24,8 +24,8 @@ from scipy.spatial import KDTree
 
 from ..fe import beam_elements
 from ..fe.assembly import System, support_of_facets
-from ..fe.corners import meetings
-from ..fe.elements import collapsed
+from ..fe.corners import edge_meetings
+from ..fe.elements import triangle_gauss_points
 from ..fe.residual import Moments
 from ..fe.section import KINDS, PLANE, SHEAR, Beam, Plate, size_at
 from ..fe.springs import at_facets
@@ -35,10 +35,10 @@ from ..modes.disk import DiskShapes, bessel
 from ..modes.modal import Modes
 from ..modes.rectangle import RectangleShapes
 from ..modes.ritz import RitzShapes
-from ..modes.shapes import ElementShapes, FieldShapes, unwrapped
+from ..modes.shapes import ElementShapes, FieldShapes, unwrap_shapes
 from ..modes.slender import BeamShapes
 from ..modes.timoshenko import BeamlikeShapes, TimoshenkoShapes
-from ..modes.unstated import lumps
+from ..modes.unstated import lumped_mass
 
 # [-] flexible modes that are integrated: a blow depends on few others one by one, which follow from the upper ten
 LOW = 40
@@ -114,10 +114,10 @@ class Known:
 
 def known_of(modes: Modes) -> Known | None:
     """What is known of a plate or beam by its modes; None if its shapes are known at points only, or it is rigid."""
-    shapes = unwrapped(modes.shapes)[0]
+    shapes = unwrap_shapes(modes.shapes)[0]
     if isinstance(shapes, ElementShapes):
         system = shapes.system
-        return around(modes, modes.section, system.mesh, system.supports, system.rules.words)
+        return bending_around(modes, modes.section, system.mesh, system.supports, system.rules.words)
     if isinstance(shapes, RectangleShapes):
         sides = shapes.length, shapes.width
         return Known(modes, modes.section, sides[0] * sides[1], 1.0, 2.0 * sum(sides))
@@ -129,13 +129,13 @@ def known_of(modes: Modes) -> Known | None:
     return None
 
 
-def quadratic(modes: Modes) -> bool:
+def has_quadratic_shapes(modes: Modes) -> bool:
     """Whether the shapes are those of Morley's element, whose quadratics have no shear force."""
-    shapes = unwrapped(modes.shapes)[0]
+    shapes = unwrap_shapes(modes.shapes)[0]
     return isinstance(shapes, ElementShapes) and shapes.system.element == "morley"
 
 
-def around(
+def bending_around(
     modes: Modes, section: Plate | Beam | None, mesh: Mesh, supports: Any, words: tuple[str, ...] = KINDS
 ) -> Known:
     """What is known of a body with a mesh; ``words`` are those of its theory for supports."""
@@ -160,12 +160,12 @@ def flexible_vectors(shapes: FieldShapes | RitzShapes, n_rigid: int, number: int
 def integrate_shapes(body: Known) -> Bending:
     """The integrals of a body's shapes; those of high modes follow from the low ones."""
     modes = body.modes
-    shapes, amplitude, mix = unwrapped(modes.shapes)
+    shapes, amplitude, mix = unwrap_shapes(modes.shapes)
     n_rigid = modes.n_rigid
     # of four Ritz pairs the lowest one is a mode: those above are packets, whose shear is singular
     few = (modes.n_modes - n_rigid) // 4 if isinstance(shapes, RitzShapes) else LOW
     low = slice(n_rigid, min(n_rigid + max(1, min(LOW, few)), modes.n_modes))
-    thick = body.section is not None and not quadratic(modes)
+    thick = body.section is not None and not has_quadratic_shapes(modes)
     if isinstance(shapes, (FieldShapes, RitzShapes)):
         vectors = flexible_vectors(shapes, n_rigid, low.stop - n_rigid)
         found = (_plate if modes.dimension == 2 else _beam)(shapes.system, vectors, thick)
@@ -193,7 +193,7 @@ def integrate_shapes(body: Known) -> Bending:
     turning = None
     if thick and n_rigid and body.section is not None:
         points, cells = modes.shapes.grid()
-        if (masses := lumps(points, cells)) is not None:
+        if (masses := lumped_mass(points, cells)) is not None:
             pairs, weight = masses
             rotary = body.extent * float(weight @ body.section.rotary(points[pairs].mean(axis=1)))
             level = np.column_stack([np.ones(len(points)), points])
@@ -208,7 +208,7 @@ def _plate(system: System, vectors: np.ndarray, thick: bool) -> np.ndarray:
     frame, section = system.frame, system.section
     assert isinstance(section, Plate)
     cells = np.arange(len(space.origin))
-    local, share = collapsed(3)  # slopes to 1e-3, as the wave of a mode spans several triangles
+    local, share = triangle_gauss_points(3)  # slopes to 1e-3, as the wave of a mode spans several triangles
     x = space.straight(cells, local - 1.0 / 3.0)
     area = np.abs(np.linalg.det(space.jacobian))[:, None] * share  # (n_cells, n_q)
     moved, flat = unknowns_of_cells(system, vectors), frame.to_metres(x)  # (n_cells, 21, n), (n_cells n_q, 2)
@@ -228,7 +228,7 @@ def _plate(system: System, vectors: np.ndarray, thick: bool) -> np.ndarray:
     soft = np.linalg.inv(section.shear(flat)).reshape(*area.shape, 2, 2) * frame.stiffness / frame.length**2
     energy = (vectors * (system.K @ vectors)).sum(axis=0)
     kinds = support_of_facets(system.mesh, system.supports, system.rules.words)
-    places = [vertex for vertex, *_ in meetings(system.mesh, kinds)]
+    places = [vertex for vertex, *_ in edge_meetings(system.mesh, kinds)]
     away = KDTree(system.mesh.points[places]).query(flat)[0] if places else np.full(len(flat), np.inf)
     plane = np.where(away.reshape(area.shape) > h * FADES, area, 0.0)
     result[3] = np.einsum("eq,aeqk,eqab,beqk->k", plane, Q, soft, Q, optimize=True) / energy

@@ -61,9 +61,9 @@ class Idealised(Description):
     def found(self, stages: Stages, keep: Any = None) -> "tuple[Idealised, Modes]":
         """The same, and its modes."""
         at, forecast = self.asked.values["at"], self.forecast
-        modes = idealisation.unyielding(at, forecast.mass)
+        modes = idealisation.rigid_plate(at, forecast.mass)
         if forecast.mobility:
-            modes = idealisation.endless(at, forecast.mass, forecast.mobility, forecast.duration)
+            modes = idealisation.infinite_plate(at, forecast.mass, forecast.mobility, forecast.duration)
         return self, replace(modes, notes=forecast.notes)
 
     def completed(self, hit: Response, stages: Stages, keep: Any = None) -> Response:

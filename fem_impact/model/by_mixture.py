@@ -41,7 +41,7 @@ class Mixed(Description):
         fits = asked.plain and not (stated or asked.moving)
         with stages("modes"):
             estimates = asked.estimates if fits else None
-        resolved = target.kind == "analytic" or vectors.usable(target)
+        resolved = target.kind == "analytic" or vectors.vectors_usable(target)
         if not resolved or estimates is None or not np.isfinite(estimates.mobility) or not estimates.echo:
             why = asked.unfit if fits else "is only for thin plates in a vacuum, and for the blow alone"
             asked.refuse(why)
@@ -103,7 +103,7 @@ class Mixed(Description):
             ritz.needed_modes(lambda found, _: float(found.frequencies[-1]))
             assert ritz.whole is not None
             modes = ritz.whole
-        body = mixed.mixed(modes, at, forecast.mobility, frequency, self.highest)
+        body = mixed.mixed_plate(modes, at, forecast.mobility, frequency, self.highest)
         forecast = replace(forecast, n_modes=body.n_modes, max_frequency=frequency)
         return replace(self, forecast=forecast, ritz=ritz), body
 

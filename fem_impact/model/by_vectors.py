@@ -48,7 +48,7 @@ class Vectors(Description):
     def of(cls, asked: Asked, stages: Stages) -> "Vectors | None":
         """The plate by vectors, if these can describe it and its own modes are not asked for."""
         blow, target = asked.blow, asked.blow.target
-        if not (vectors.usable(target) and asked.values["residual"] and asked.plain) or asked.counted:
+        if not (vectors.vectors_usable(target) and asked.values["residual"] and asked.plain) or asked.counted:
             asked.refuse(
                 "needs a thin plate in a vacuum by elements that can be meshed again, its residual, no stretching, no "
                 "n_modes or max_frequency, and no damping ratios mode by mode"
@@ -76,17 +76,17 @@ class Vectors(Description):
         elements = vectors.elements_for(target, size, asked.mass, *wanted)
         n_dofs, first = target.unknowns(at, elements, stages), vectors.first_count(target, *wanted)
         lasts, impacts, stopped = _predicted_length(asked)
-        meshes = list(vectors.compared(target, elements, stages))
+        meshes = list(vectors.compared_elements(target, elements, stages))
         if impacts > 2 and not asked.meshed:  # each multiplies the error that a mesh makes before it
-            meshes.append(vectors.finer(target, meshes[0], stages))
+            meshes.append(vectors.finer_elements(target, meshes[0], stages))
         # echoes fade by damping; without, many blows soon disagree
         ratio = float(damping_ratios(target.damping_ratio or 0.0, np.array([np.pi / asked.duration]))[0])
         lasts = max(lasts, min(asked.pressed, 1.0 / (np.pi * max(ratio, 0.01))))
-        grown = round(min(cost.grown(first, lasts), vectors.MOST_VECTORS, n_dofs))
+        grown = round(min(cost.grown_number(first, lasts), vectors.MOST_VECTORS, n_dofs))
         # vectors that end before the echo throw the striker off by one of their own
         count = max(first, round(0.5 * grown)) if stopped else first
         unknowns = [target.unknowns(at, each, stages) for each in meshes]
-        if (rattling := _rattling(asked, first)) > grown:
+        if (rattling := _vectors_if_rattling(asked, first)) > grown:
             grown, finest = rattling, max(*unknowns, RESOLVING * rattling)
             unknowns = [finest, max(unknowns[0], round(finest / refinement.COARSER**2))]
         work = cost.by_vectors(unknowns, grown)
@@ -160,7 +160,9 @@ def _predicted_length(asked: Asked) -> tuple[float, int, bool]:
         return 1.0, 1, False
     mobility, echo = estimates.local
     try:
-        hit = _roughly(asked, idealisation.endless(at, estimates.mass, mobility, asked.duration), fresh.STEPS)
+        hit = _strike_roughly(
+            asked, idealisation.infinite_plate(at, estimates.mass, mobility, asked.duration), fresh.STEPS
+        )
     except check.SimulationError:
         return 1.0, 1, False
     lasts, echo = max((touch.end for touch in hit.impacts), default=0.0) / asked.duration, echo / asked.duration
@@ -171,9 +173,9 @@ def _predicted_length(asked: Asked) -> tuple[float, int, bool]:
     return max(1.0, echo), SEVERAL if echo > lasts else 1, True  # still pressing, it is thrown off for good
 
 
-def _roughly(asked: Asked, body: Any, most: float, **how: Any) -> Response:
+def _strike_roughly(asked: Asked, body: Any, most: float, **how: Any) -> Response:
     """The blow on a body that stands for the target, in the time of a plan; gives up after ``most`` steps."""
-    striker = collision.shortened(asked.blow.striker, asked.striker_modes(1.0)[0])
+    striker = collision.shortened_striker(asked.blow.striker, asked.striker_modes(1.0)[0])
     at, speed = asked.values["at"], asked.values["speed"]
     with build.uncompiled(most):
         return collision.strike(
@@ -182,7 +184,7 @@ def _roughly(asked: Asked, body: Any, most: float, **how: Any) -> Response:
         )  # fmt: skip
 
 
-def _rattling(asked: Asked, first: int) -> int:
+def _vectors_if_rattling(asked: Asked, first: int) -> int:
     """Number of vectors for a striker that an infinite plate or a loss stops, so that the edges throw it off; else 0.
 
     It takes 1.6 vectors for each mode up to the highest frequency that matters, or three for each period of that as
@@ -202,7 +204,7 @@ def _rattling(asked: Asked, first: int) -> int:
     if target.closed is not None and excited < 1000.0:
         with suppress(check.SimulationError):
             body = target.finished(target.closed(n_modes=FIRST_LOOK + round(excited)))
-            hit = _roughly(asked, body, 1000.0, residual=False, max_impacts=asked.values.get("max_impacts"))
+            hit = _strike_roughly(asked, body, 1000.0, residual=False, max_impacts=asked.values.get("max_impacts"))
             lasts = max((touch.end for touch in hit.impacts), default=lasts)
     highest = quicker * asked.highest(estimates.mobility)
     needed = min(1.6 * target.count_below(highest / target.stretch), 3.0 * highest * lasts, 6.0 * first)

@@ -105,7 +105,7 @@ def compliance(n_dofs: float) -> Work:
     return on_mesh(n_dofs, 2.0, 2.0) + Work(memory=ELEMENTS)
 
 
-def grown(n_vectors: float, lasts: float) -> float:
+def grown_number(n_vectors: float, lasts: float) -> float:
     """Number of Ritz vectors that a blow needs which begins with ``n_vectors`` and ``lasts`` so many contacts.
 
     First vectors up to 120 suffice for a blow of up to four undisturbed contacts: later echoes need more. As the runs
@@ -115,7 +115,7 @@ def grown(n_vectors: float, lasts: float) -> float:
 
 
 def by_vectors(n_dofs: Sequence[float], n_vectors: float) -> Work:
-    """Ritz vectors on several meshes of ``n_dofs`` unknowns, for a blow that ends with ``n_vectors``; see `grown`.
+    """Ritz vectors on several meshes of ``n_dofs`` unknowns, for a blow that ends with ``n_vectors``: `grown_number`.
 
     Each vector must be made orthogonal to all before, so that the work grows with the square of their number.
     """
@@ -162,12 +162,12 @@ def benchmark() -> Machine:
     return Machine(*found)
 
 
-def whose() -> str:
+def machine_in_words() -> str:
     """The machine that predicted seconds belong to, in words."""
     return "a typical machine (`fem-impact doctor` measures yours)" if this_machine() is None else "this machine"
 
 
-def installed() -> float:
+def memory_installed() -> float:
     """Memory [byte] that this process can have: the machine's, or its own limit; infinite if not known."""
     found = math.inf
     with suppress(AttributeError, ValueError, OSError):  # Windows knows neither
@@ -180,15 +180,15 @@ def installed() -> float:
 
 def calibrate() -> bool:
     """Measure this machine anew; return whether the result is credible and could be kept, or the kernels are not."""
-    if place() is None:
+    if machine_file() is None:
         return True
     found = benchmark()
-    return found.credible and keep(found)
+    return found.credible and keep_machine(found)
 
 
 def read_machine() -> Machine | None:
     """What was kept of this machine; None if there is nothing, or nothing credible."""
-    path = place()
+    path = machine_file()
     if path is None:
         return None
     try:
@@ -202,9 +202,9 @@ def read_machine() -> Machine | None:
 this_machine = cache(read_machine)  # the same as long as the process lives
 
 
-def keep(machine: Machine) -> bool:
+def keep_machine(machine: Machine) -> bool:
     """Write a machine beside the compiled kernels; return whether that was possible."""
-    path = place()
+    path = machine_file()
     if path is None:
         return False
     with suppress(OSError):
@@ -214,7 +214,7 @@ def keep(machine: Machine) -> bool:
     return False
 
 
-def place() -> Path | None:
+def machine_file() -> Path | None:
     """File beside the compiled kernels; one for each machine and Python that share them. None if none are kept."""
     folder, user = build.folder(follow), f"{platform.node()} {platform.python_version()}"
     return None if folder is None else folder / f"speed-{hashlib.sha256(user.encode()).hexdigest()[:12]}.json"

@@ -28,11 +28,11 @@ from ..fe import membrane
 from ..fe.section import Plate
 from ..impact import distance
 from ..impact.assumption import Assumption
-from ..impact.engine import again
+from ..impact.engine import follow_again
 from ..impact.stretched import Stretched
 from ..modes.modal import Modes
 from ..modes.stretching import MOST, Stretching, stretch
-from .bending import Bending, Known, quadratic
+from .bending import Bending, Known, has_quadratic_shapes
 from .idealisation import Waves
 from .restrike import Doubt, Struck
 
@@ -75,23 +75,23 @@ def examine_deflection(struck: Struck) -> Assumption:
         return SMALL.judged(struck, value, {}, _remedy(body, value))
     if hit.history.stretched is not None:
         return _stretched(struck, body, integrals)
-    if _answers(body):
+    if _plane_answers(body):
         return _curved(struck, body, integrals)
     history, mine = hit.history, struck.mine
     times = np.linspace(0.0, struck.end, TIMES + 1)[1:]
-    rocks, pulled = _bends(body, integrals, history.omega[mine])
+    rocks, pulled = _share_of_bending(body, integrals, history.omega[mine])
     moved = history.states(times)[0][:, mine] * rocks
     row = np.abs(history.shape[0, mine])
     largest = float(np.abs(moved @ (pulled * history.shape[0, mine])).max(initial=0.0))
     swing = np.divide(rocks * pulled * row, history.omega[mine], out=np.zeros(len(row)), where=rocks > 0.0)
     value = max(largest, float(np.sqrt(2.0 * struck.target_energy @ swing**2))) / body.thickness
     # free edges are not looked at closely where a plate stiffens by less than 1e-3
-    share = _share(body, integrals, moved) if value > 0.03 else _crude(body)
+    share = _share(body, integrals, moved) if value > 0.03 else _crude_share(body)
     slopes = moved**2 @ integrals.slope  # (n_times,) int |grad w|**2
     area = _bent_area(body, integrals, times)
     local = 1.0 + (share - 1.0) * area / body.extent  # before its waves reach the edges, they do not matter
     # power of the slopes' share within the bent region: 2 on an endless plate, least errors on others
-    tension = _tension(body, slopes, area, local) * _within(body, area) ** 1.5
+    tension = _tension(body, slopes, area, local) * _share_within(body, area) ** 1.5
     held = float(tension @ slopes / slopes.sum()) if slopes.any() else 0.0
     omega = np.sqrt(history.omega[mine] ** 2 + held * rocks**2 * integrals.slope)
 
@@ -111,18 +111,18 @@ def examine_deflection(struck: Struck) -> Assumption:
     return SMALL.judged(struck, value, effect, _remedy(body, value * _held_back(pulling / bending if bending else 0.0)))
 
 
-def _answers(body: Known) -> bool:
+def _plane_answers(body: Known) -> bool:
     """Whether the plane of a body answers to its linear motion."""
     return body.plate is not None and not body.plate.plain
 
 
 def _remedy(body: Known, deflection: float) -> str:
     """What makes the answer right, for the deflection over the thickness [-] of a body that stretches."""
-    if body.held < 1.0 and (body.plate is None or body.sprung) and not _answers(body):
+    if body.held < 1.0 and (body.plate is None or body.sprung) and not _plane_answers(body):
         return REMEDY
     # estimated on six plates to 0.74 to 1.07 of that deflection where it nears the thickness
     better = DARING if 1.1 * deflection > GONG else BETTER
-    return f"{OTHER} and {better}" if quadratic(body.modes) else better
+    return f"{OTHER} and {better}" if has_quadratic_shapes(body.modes) else better
 
 
 def _held_back(share: float) -> float:
@@ -139,7 +139,7 @@ def _impulse_deflection(struck: Struck, body: Known, integrals: Bending) -> floa
     modes, hit = body.modes, struck.hit
     assert struck.place is not None
     row = modes.shapes.at(struck.place)[0]
-    rocks, pulled = _bends(body, integrals, modes.omega)
+    rocks, pulled = _share_of_bending(body, integrals, modes.omega)
     swing = np.divide(rocks * pulled * row**2, modes.omega, out=np.zeros(len(row)), where=modes.omega > 0.0)
     found, plate = float(np.sqrt(swing @ swing)), body.plate
     if plate is not None and not callable(plate.thickness) and not plate.tension:
@@ -158,7 +158,7 @@ def _curved(struck: Struck, body: Known, integrals: Bending) -> Assumption:
         return SMALL.holds(struck)
     history, mine, found = struck.hit.history, struck.mine, _forms(body.modes, MOST)
     omega, n = history.omega[mine], found.forms.shape[1]
-    rocks, _ = _bends(body, integrals, omega)
+    rocks, _ = _share_of_bending(body, integrals, omega)
     row = rocks * history.shape[0, mine] / body.thickness
     value = float(np.abs(history.states(_times(struck))[0][:, mine] @ row).max(initial=0.0))
 
@@ -170,7 +170,7 @@ def _curved(struck: Struck, body: Known, integrals: Bending) -> Assumption:
         return np.pad(shift_frequencies(own, of.modes.omega[:m], energy[:m]), (0, of.modes.n_modes - m))
 
     try:
-        better = again(history, stretched=Stretched(found.forms, found.linear, mine.start))
+        better = follow_again(history, stretched=Stretched(found.forms, found.linear, mine.start))
         moved = better.states(_times(struck))[0][:, mine]
     except SimulationError:
         return SMALL.judged(struck, value, dict.fromkeys(struck.quantities), _remedy(body, value))
@@ -181,7 +181,7 @@ def _curved(struck: Struck, body: Known, integrals: Bending) -> Assumption:
     return SMALL.judged(struck, value, struck.add_sound({**effect}, shift), remedy)
 
 
-def stiffen(found: Stretching, q: np.ndarray) -> np.ndarray:
+def stiffness_by_stretching(found: Stretching, q: np.ndarray) -> np.ndarray:
     """Stiffness (n_times, n, n) [s**-2] that stretching adds to the modes in states q (n_times, n)."""
     bent = np.einsum("kij,tj->tki", found.forms, q)
     pull = np.einsum("tki,ti->tk", bent, q)
@@ -196,7 +196,7 @@ def stiffen(found: Stretching, q: np.ndarray) -> np.ndarray:
 def may_snap(found: Stretching, omega: np.ndarray, q: np.ndarray) -> bool:
     """Whether the tangent stiffness of modes (n,) turns negative in one of some states (n_times, n)."""
     flexible = omega > 0.0
-    added = stiffen(found, q)[:, flexible][:, :, flexible] / np.outer(omega[flexible], omega[flexible])
+    added = stiffness_by_stretching(found, q)[:, flexible][:, :, flexible] / np.outer(omega[flexible], omega[flexible])
     return bool(np.linalg.eigvalsh(added)[:, 0].min(initial=0.0) < -1.0)
 
 
@@ -256,7 +256,7 @@ def _stretched(struck: Struck, body: Known, integrals: Bending) -> Assumption:
     if value > GONG:
         return STRETCHED.unknown(struck, "this is a gong: large deflections are not modelled", remedy, value)
     forms = history.stretched.forms
-    if len(forms) < membrane.most(forms.shape[1]):
+    if len(forms) < membrane.most_fields(forms.shape[1]):
         return STRETCHED.judged(struck, value, dict.fromkeys(struck.quantities, 0.0), remedy)
     n = forms.shape[1] if forms.shape[1] == moved.shape[1] else forms.shape[1] // 2
     fewer = history.stretched.part(len(forms) // 2, n)
@@ -299,7 +299,7 @@ def _tension(body: Known, slopes: np.ndarray, extent: np.ndarray, share: Any) ->
     return section.material.E * area / (2.0 * extent) * slopes * share
 
 
-def _crude(body: Known) -> float:
+def _crude_share(body: Known) -> float:
     """Share [-] of Berger's tension that is left, by the share of the edges that supports hold."""
     return body.held if body.plate is None else SLIPS + (1.0 - SLIPS) * body.held
 
@@ -310,15 +310,15 @@ def _share(body: Known, integrals: Bending, moved: np.ndarray) -> float:
     What bends to a cylinder or a cone between free edges does not stretch at all.
     """
     still = body.modes.n_modes == body.modes.n_rigid
-    if body.plate is None or body.held == 1.0 or body.sprung or quadratic(body.modes) or still:
-        return _crude(body)
+    if body.plate is None or body.held == 1.0 or body.sprung or has_quadratic_shapes(body.modes) or still:
+        return _crude_share(body)
     forms = _forms(body.modes).forms
     n = forms.shape[1]
     q = moved[:, :n]
     energy = 0.25 * (np.einsum("ti,kij,tj->tk", q, forms, q, optimize=True) ** 2).sum()
     slope = q**2 @ integrals.slope[:n]
     berger = 0.25 * (_tension(body, slope, np.array([body.extent]), 1.0) @ slope)
-    return float(energy / berger) if berger else _crude(body)
+    return float(energy / berger) if berger else _crude_share(body)
 
 
 @lru_cache(maxsize=4)
@@ -327,7 +327,7 @@ def _forms(modes: Modes, most: int = membrane.SWINGING) -> Stretching:
     return stretch(modes.truncated(n_modes=min(modes.n_modes, modes.n_rigid + most)))
 
 
-def _bends(body: Known, integrals: Bending, omega: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def _share_of_bending(body: Known, integrals: Bending, omega: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Share (n_modes,) of each mode's motion that bends the body, and of its stiffness that is not from tension.
 
     A body that rocks on soft supports, or turns about its hinges, is slower than its bending waves of that length; one
@@ -343,7 +343,7 @@ def _bends(body: Known, integrals: Bending, omega: np.ndarray) -> tuple[np.ndarr
     ratio = np.divide(omega, waves, out=np.zeros(len(omega)), where=waves > 0.0)
     # what is slower or faster than bending waves by three rocks or is pulled; wood differs by less
     pulled = np.minimum(1.0, np.divide(3.0, ratio, out=np.ones(len(omega)), where=ratio > 0.0))
-    if _answers(body):  # whose modes are faster without being pulled
+    if _plane_answers(body):  # whose modes are faster without being pulled
         pulled = np.ones(len(omega))
     return np.minimum(1.0, 3.0 * ratio), pulled
 
@@ -357,7 +357,7 @@ def _bent_area(body: Known, integrals: Bending, times: np.ndarray) -> np.ndarray
     return np.minimum(body.extent, np.pi * FRONT * rate * times)
 
 
-def _within(body: Known, area: np.ndarray) -> np.ndarray:
+def _share_within(body: Known, area: np.ndarray) -> np.ndarray:
     """Share (n,) [-] of int |grad w|**2 that is within the bent area (n,) [m**2]: ahead of it small waves run.
 
     Under a knock on a wide plate grad w goes as sin(x) / x with x = r**2 / (4 rate t), `FRONT` / 4 at its rim.

@@ -33,10 +33,10 @@ Answer = TypeVar("Answer")
 
 def answer(compute: Callable[[], Response], stretches: bool) -> Response:
     """What a function finds that strikes once, soon; a step of a body that stretches takes as long as fifty."""
-    return soon(compute, STEPS / 50 if stretches else STEPS, lambda found: found.tolerance_met)
+    return answer_soon(compute, STEPS / 50 if stretches else STEPS, lambda found: found.tolerance_met)
 
 
-def soon(compute: Callable[[], Answer], most: float = np.inf, holds: Callable[[Answer], bool] = bool) -> Answer:
+def answer_soon(compute: Callable[[], Answer], most: float = np.inf, holds: Callable[[Answer], bool] = bool) -> Answer:
     """What a function finds: where kernels are not compiled yet, as plain Python, if that ``holds``.
 
     Runs as plain Python give up after ``most`` steps, and all of them together when they took as long as TOGETHER.
@@ -49,7 +49,7 @@ def soon(compute: Callable[[], Answer], most: float = np.inf, holds: Callable[[A
             return compute()
     except build.Uncompiled as error:
         lacking = error.args
-    if SWITCH not in os.environ and places.lasting(os.environ) and _under_way(lacking):
+    if SWITCH not in os.environ and places.is_lasting(os.environ) and _under_way(lacking):
         with suppress(check.SimulationError, build.Uncompiled), build.uncompiled(most, TOGETHER):
             found = compute()
             if holds(found):
@@ -65,12 +65,12 @@ def _under_way(lacking: tuple[Any, ...]) -> bool:
     with suppress(OSError):
         if mark.exists() and time.time() - mark.stat().st_mtime > PATIENCE:
             mark.unlink()
-        return mark.exists() or _begun(mark, lacking).poll() is None
+        return mark.exists() or _begin_compiling(mark, lacking).poll() is None
     return mark.exists()  # another process was quicker
 
 
 @cache
-def _begun(mark: Path, lacking: tuple[Any, ...]) -> "subprocess.Popen[bytes]":
+def _begin_compiling(mark: Path, lacking: tuple[Any, ...]) -> "subprocess.Popen[bytes]":
     """Begin to compile in a process that outlives this one, at most once for each kernel; the mark says which."""
     mark.parent.mkdir(parents=True, exist_ok=True)
     with mark.open("xb") as file:
@@ -83,11 +83,11 @@ def _begun(mark: Path, lacking: tuple[Any, ...]) -> "subprocess.Popen[bytes]":
         mark.unlink()
         raise
     build.LOG.info("compiling the inner loops in another process, once; until then short blows are plain Python")
-    threading.Thread(target=_finish, args=(process, mark), daemon=True).start()
+    threading.Thread(target=_end_compiling, args=(process, mark), daemon=True).start()
     return process
 
 
-def _finish(process: "subprocess.Popen[bytes]", mark: Path) -> None:
+def _end_compiling(process: "subprocess.Popen[bytes]", mark: Path) -> None:
     """Leave neither a zombie nor a mark behind, even if the process is killed."""
     process.wait()
     with suppress(OSError):

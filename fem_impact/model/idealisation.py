@@ -153,13 +153,13 @@ class Surroundings:
         return max(1.0, float(self.edges[self.edges[:, 0] <= zone, 1].sum()) / straight)
 
 
-def unyielding(point: np.ndarray, mass: float) -> Modes:
+def rigid_plate(point: np.ndarray, mass: float) -> Modes:
     """A rigid, fixed body of a mass [kg], struck at a point (dimension,) [m]: one mode that is zero there."""
     nothing = np.zeros((1, 1))
     return Modes(np.ones(1), np.zeros(1), SampledShapes(point[None], nothing, nothing), mass)
 
 
-def endless(point: np.ndarray, mass: float, mobility: float, duration: float) -> Modes:
+def infinite_plate(point: np.ndarray, mass: float, mobility: float, duration: float) -> Modes:
     """An infinite plate struck at a point (2,) [m]: the velocity there is mobility [m/(N s)] times force.
 
     One strongly overdamped mode, which follows the force at once and does not spring back. The displacement of an

@@ -20,7 +20,7 @@ from ..impact.compiled.laws.plastic import PlasticLaw
 from ..impact.contact import YIELDS, Contact, loss_number
 from ..impact.history import History
 from ..modes.shapes import SampledShapes
-from .restrike import Doubt, Struck, softer
+from .restrike import Doubt, Struck, softened_system
 from .thinness import wavenumber
 
 LAMB = 2.64  # [-] fact: lowest spheroidal mode of a sphere, omega R / c_s, for nu = 0.25; 2.65 for 0.33
@@ -110,7 +110,7 @@ def examine_size(struck: Struck) -> Assumption:
         compliance += (1.0 - nu**2) / (2.0 * np.pi * E * away)  # of the image beyond the edge
         ratios[EDGE] = a / away
     history, integrals = hit.history, struck.bending
-    changed, wave = softer(history, compliance), None
+    changed, wave = softened_system(history, compliance), None
     if struck.planned:
         wave = wavenumber(body, integrals, struck.omega)
     elif integrals is not None and struck.target_energy.any():

@@ -30,7 +30,7 @@ from typing import Any
 
 import numpy as np
 
-from ..modes.modal import Modes, carried
+from ..modes.modal import Modes, carried_compliance
 from ..modes.shapes import SampledShapes
 
 # [rad] its sine is the damping ratio above the frequency; modes fade over so much: half takes twice the oscillators
@@ -53,7 +53,7 @@ def first_frequency(mass: float, mobility: float, echo: float, duration: float) 
     return max(5.0 / max(mass * mobility, duration), 10.0 / echo) / (2.0 * np.pi)
 
 
-def absorbing(mobility: float, frequency: float, highest: float) -> tuple[np.ndarray, np.ndarray, float]:
+def absorbing_oscillators(mobility: float, frequency: float, highest: float) -> tuple[np.ndarray, np.ndarray, float]:
     """Oscillators that stand for an infinite plate between two frequencies [Hz].
 
     Returns their angular frequencies (n,) [rad/s], shapes (n,) [kg**-0.5] and the compliance [m/N] of what lies above.
@@ -74,7 +74,7 @@ def kept_share(omega: np.ndarray, mobility: float, above: np.ndarray, shape: np.
     return np.clip(1.0 - np.concatenate(taken), 0.0, 1.0)
 
 
-def mixed(modes: Modes, at: Any, mobility: float, frequency: float, highest: float) -> Modes:
+def mixed_plate(modes: Modes, at: Any, mobility: float, frequency: float, highest: float) -> Modes:
     """A plate by its modes below a frequency [Hz] and as an infinite one above it, as struck at a point (2,) [m].
 
     ``modes`` are all up to `REACH` times the frequency, ``mobility`` [m/(N s)] is that of the infinite plate, which
@@ -90,13 +90,13 @@ def mixed(modes: Modes, at: Any, mobility: float, frequency: float, highest: flo
 def _mixed(modes: Modes, point: np.ndarray, mobility: float, frequency: float, highest: float) -> Modes:
     poorer = {cause: _mixed(other, point, mobility, frequency, highest) for cause, other in modes.poorer.items()}
     modes = replace(modes, poorer={}).truncated(max_frequency=max(REACH * frequency, float(modes.frequencies[0])))
-    above, shape, rest = absorbing(mobility, frequency, highest)
+    above, shape, rest = absorbing_oscillators(mobility, frequency, highest)
     rows = modes.shapes.at(point)[0] * np.sqrt(kept_share(modes.omega, mobility, above, shape))
     omega, rows = np.append(modes.omega, above), np.append(rows, shape)
     ratio = np.append(modes.damping_ratio, np.full(len(above), np.sin(ANGLE)))
     error = None if modes.frequency_error is None else np.append(modes.frequency_error, np.zeros(len(above)))
     order = np.argsort(omega, kind="stable")
-    shapes = SampledShapes(point, rows[order][None], carried(omega, rows[None], rows[None]) + rest)
+    shapes = SampledShapes(point, rows[order][None], carried_compliance(omega, rows[None], rows[None]) + rest)
     return Modes(
         omega[order], ratio[order], shapes, modes.mass, None if error is None else error[order], notes=modes.notes,
         poorer=poorer,

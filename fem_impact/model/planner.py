@@ -12,7 +12,7 @@ from types import MappingProxyType
 from typing import Any
 
 from .._base import check, markup, progress
-from .._base.explained import below, noted, pointed
+from .._base.explained import heading_line, lines_of_notes, with_headings
 from ..fe import plausible
 from ..fe.assembly import System
 from ..impact import assumption, collision, distance, promise
@@ -54,12 +54,12 @@ class Blow:
     @check.typed
     def plan(self, watch: Watch | None = None, **changes: Any) -> "Plan":
         """Decide how to model the blow, without striking; ``changes`` as in `fi.plan`."""
-        return make(self, changes, Stages(watch))
+        return make_plan(self, changes, Stages(watch))
 
     def run(self, watch: Watch | None = None, *, plan: "Plan | None" = None, keep: Any = None, **changes: Any) -> "Run":
         """Strike, and time every stage; with a plan or by a new one."""
         stages = Stages(watch)
-        return carry_out(make(self, changes, stages) if plan is None else plan, stages, keep)
+        return carry_out(make_plan(self, changes, stages) if plan is None else plan, stages, keep)
 
 
 @dataclass(frozen=True, repr=False)
@@ -86,7 +86,7 @@ class Plan(Forecast, check.Brief):
         """
         asked, blow = self.description.asked, self.blow
         target = replace(blow.target, stretching=asked.values["stretching"])
-        striker = collision.shortened(blow.striker, self.n_striker_modes)
+        striker = collision.shortened_striker(blow.striker, self.n_striker_modes)
         modes = target.modes if self.first is None else self.first
         body = asked.simplified("infinite", self.mass) if modes is None else target.finished(modes)
         assert body is not None
@@ -110,16 +110,16 @@ class Plan(Forecast, check.Brief):
     def strike(self, strict: bool = False) -> Response:
         """Run the plan and return the response only; ``strict`` as in `fi.strike`."""
         if self.seconds > progress.LONG:
-            return promise.kept(self.run().response, strict)
+            return promise.warn_if_missed(self.run().response, strict)
         stretches = self.description.asked.values["stretching"]
-        return promise.kept(fresh.answer(lambda: self.run().response, stretches), strict)
+        return promise.warn_if_missed(fresh.answer(lambda: self.run().response, stretches), strict)
 
     @property
     def cost(self) -> str:
         """Predicted time and memory, in words."""
         time = f"{self.seconds:.1g} s" if self.seconds < 10.0 else f"{self.seconds:.0f} s"
         memory = float(f"{self.memory / 1e6:.2g}")
-        return f"about {time} and {memory:.0f} MB predicted for {cost.whose()}"
+        return f"about {time} and {memory:.0f} MB predicted for {cost.machine_in_words()}"
 
     def data(self) -> dict[str, Any]:
         """All decisions and predictions by name, in SI units."""
@@ -133,18 +133,18 @@ class Plan(Forecast, check.Brief):
         kept = "met" if self.meets else "MISSED"
         model, *doubts = assumption.lines(self.assumptions, self.tolerance)
         first = f"tolerance {self.tolerance:g} of {wanted} will be {kept}: predicted error {self.error:.1e}; {model}"
-        lines = [first, *below(first), *noted(self.notes), *(f"  {line}" for line in self.reasons)]
+        lines = [first, *heading_line(first), *lines_of_notes(self.notes), *(f"  {line}" for line in self.reasons)]
         lines.append("Predicted errors:")
         errors = [*self.errors.items(), ("total", self.error)]
         lines += [f"  {line}" for line in markup.columns([(name, f"{error:.1e}") for name, error in errors])]
-        lines += [f"Model: {pointed(line)}" for line in doubts]
+        lines += [f"Model: {with_headings(line)}" for line in doubts]
         lines.append(f"Cost: {self.cost}")
         if self.ringing > progress.LONG:
             lines.append(f"  motion, sound and pictures take about {self.ringing:.0f} s more once they are asked for")
         if self.costly:
             lines.append("  a larger tolerance, a softer contact or fewer quantities would cost less")
-        if self.memory > cost.installed():
-            lines.append(f"  the {cost.installed() / 1e9:.2g} GB of memory of this machine do not suffice")
+        if self.memory > cost.memory_installed():
+            lines.append(f"  the {cost.memory_installed() / 1e9:.2g} GB of memory of this machine do not suffice")
         return "\n".join(lines)
 
 
@@ -183,10 +183,10 @@ def _planned(description: Description) -> Plan:
     return Plan(blow=asked.blow, changes=asked.changes, description=description, **vars(description.forecast))
 
 
-def make(blow: Blow, changes: Mapping[str, Any], stages: Stages) -> Plan:
+def make_plan(blow: Blow, changes: Mapping[str, Any], stages: Stages) -> Plan:
     """Choose the model of a blow; see `fi.plan`."""
     asked = Asked.checked(blow, changes)
-    with _noted(*slips_of(asked)):
+    with _note_slips(*slips_of(asked)):
         return _planned(choose(asked, stages))
 
 
@@ -198,7 +198,7 @@ def slips_of(asked: Asked) -> tuple[str, ...]:
 
 
 @contextmanager
-def _noted(*slips: str) -> Iterator[None]:
+def _note_slips(*slips: str) -> Iterator[None]:
     """Put numbers that are probably a slip of a unit in front of an error, which is then hardly about anything else."""
     try:
         yield
@@ -233,15 +233,15 @@ def choose(asked: Asked, stages: Stages) -> Description:
 
 def carry_out(plan: Plan, stages: Stages, keep: Any = None) -> Run:
     """Run the plan, and then with the better models of the target that the tolerance requires, if it may choose."""
-    with _noted(*slips_of(plan.description.asked)):
+    with _note_slips(*slips_of(plan.description.asked)):
         run = strike_as_planned(plan, stages, keep)
     chooses = plan.changes.get("model", plan.blow.target.model) == "auto"
     added: tuple[str, ...] = ()
-    while chooses and (better := audit.required(plan.blow.target, run.response)) is not None:
+    while chooses and (better := audit.required_model(plan.blow.target, run.response)) is not None:
         target, why = better
         before = sum(stages.seconds.values())
         try:
-            plan = make(replace(plan.blow, target=target), plan.changes, stages)
+            plan = make_plan(replace(plan.blow, target=target), plan.changes, stages)
             progress.revise(plan.seconds)
             again = strike_as_planned(plan, stages, None)
         except (check.SimulationError, ValueError, MemoryError) as error:
@@ -255,7 +255,7 @@ def strike_as_planned(plan: Plan, stages: Stages, keep: Any = None) -> Run:
 
     ``keep`` is a file that stores the modes of a costly plan.
     """
-    if plan.memory > (here := cost.installed()):
+    if plan.memory > (here := cost.memory_installed()):
         advice = "take a larger tolerance or a softer contact"
         if plan.blow.target.thick:
             advice += ", or the thin theory, which estimates what shear changes of the blow (`thin target`)"
@@ -275,7 +275,7 @@ def strike_as_planned(plan: Plan, stages: Stages, keep: Any = None) -> Run:
 def _strike(found: Description, modes: Modes, stages: Stages) -> tuple[Response, Callable[..., Response]]:
     """A blow with the predicted time steps, or coarser ones if that takes too many, and how to repeat it."""
     asked, blow = found.asked, found.asked.blow
-    striker = collision.shortened(blow.striker, asked.striker_modes(found.margin)[0])
+    striker = collision.shortened_striker(blow.striker, asked.striker_modes(found.margin)[0])
     run = partial(collision.strike, modes, striker, blow.contact)
     with stages("strike"), blow.target.blame("strike"):
         if (steps := found.forecast.errors["steps"]) < asked.budget.half:
@@ -284,7 +284,7 @@ def _strike(found: Description, modes: Modes, stages: Stages) -> tuple[Response,
         return run(**{**asked.values, "tolerance": asked.budget.half}), run
 
 
-def struck(run: Callable[..., Response], values: Mapping[str, Any]) -> Response:
+def strike_by_plan(run: Callable[..., Response], values: Mapping[str, Any]) -> Response:
     """What a function strikes with some arguments, again with finer time steps where the other errors leave less."""
     hit = run(**values)
     return meet_tolerance(hit.tolerance, hit, run, values)
@@ -411,8 +411,10 @@ def strike(
         run = partial(collision.strike, modes, striker, contact, at=at, speed=speed)
         stretches = bool(options.get("stretching")) or modes.stretches
         odd = [note for note in (*modes.notes, *striker.notes) if "are expected" in note]
-        with _noted(*odd):
-            return promise.kept(fresh.answer(lambda: audit.audited(struck(run, options)), stretches), strict)
+        with _note_slips(*odd):
+            return promise.warn_if_missed(
+                fresh.answer(lambda: audit.with_examiner(strike_by_plan(run, options)), stretches), strict
+            )
     if options.pop("start", None) is not None:
         raise ValueError(
             "start needs modes, taken as they are: give those of the blow before, hit.target, and no part of a plan"

@@ -11,7 +11,7 @@ import numpy as np
 
 from .._base import check
 from .._base.check import SimulationError
-from .._base.explained import below, noted
+from .._base.explained import heading_line, lines_of_notes
 from ..impact import collision, promise
 from ..impact.collision import Touch
 from ..impact.compiled import layout, record
@@ -207,7 +207,7 @@ class Strokes(Totals, check.Locked):
         within = "no impact"
         if self.impacts:
             within = f"{self.n_impacts} impacts in {self.impacts[-1].end - self.starts[0]:.4g} s"
-        lines = [self.verdict, *below(self.verdict), f"{len(self.strokes)} strokes, {within}"]
+        lines = [self.verdict, *heading_line(self.verdict), f"{len(self.strokes)} strokes, {within}"]
         lines += [
             f"  {each.start * 1e3:10.4f} to {each.end * 1e3:10.4f} ms: stroke {each.contact}, peak "
             f"{each.peak_force:.5g} N, impulse {each.impulse:.5g} N s"
@@ -222,7 +222,7 @@ class Strokes(Totals, check.Locked):
             f"energy {energies}",
             f"after the last blow: {self.hits[-1].outcome}",
         ]
-        return "\n".join([*lines, *noted(self.notes)])
+        return "\n".join([*lines, *lines_of_notes(self.notes)])
 
 
 @dataclass(eq=False)
@@ -316,7 +316,7 @@ def strokes(
     notes = tuple(dict.fromkeys(note for hit in game.hits for note in hit.notes))
     hits = tuple(replace(hit, tolerance=tolerance) for hit in game.hits)
     found = Strokes(modes, played, np.array(game.starts), hits, tuple(game.who), tolerance, notes)
-    return promise.kept(found, strict)
+    return promise.warn_if_missed(found, strict)
 
 
 @dataclass(eq=False)
@@ -391,7 +391,7 @@ class _Game:
             blow = partial(
                 collision.strike, self.modes, one.striker, one.contact, at=one.at, speed=one.speed, start=start
             )
-            hit = audit.audited(planner.struck(blow, rule))
+            hit = audit.with_examiner(planner.strike_by_plan(blow, rule))
             assert hit.striker is not None
             none = np.zeros(0)
             self.sticks = [_Stick(fresh[0], hit.striker, none, none, none)]
@@ -410,7 +410,7 @@ class _Game:
             memory = np.array([stick.memory for stick in sticks]).T
             start = State(0.0, bodies, q, p, forces, 0.0, None, laws, None, pressed, doubts, memory, self.late)
             movers = (*(stick.striker for stick in sticks), self.modes)
-            hit = planner.struck(partial(collision.met, movers, touches, start=start), rule)
+            hit = planner.strike_by_plan(partial(collision.collide_unjudged, movers, touches, start=start), rule)
             self.sticks = sticks
         return hit
 
@@ -421,7 +421,7 @@ class _Game:
         if not striker.fixed and rule["residual"]:
             tolerance = Budget(rule["tolerance"]).cheap
             needed = collision.striker_modes(striker, contact=one.contact, speed=one.speed, tolerance=tolerance)[0]
-            striker = collision.shortened(striker, needed)
+            striker = collision.shortened_striker(striker, needed)
         row, doubt = self.modes.shape_at(one.at[None])[0], np.zeros((2, len(striker.motion)))
         surface, doubt[0] = float(row @ self.q), (row @ self.doubt[0]) * striker.motion
         if self.hits:  # with the static deflection under those that press now

@@ -16,7 +16,7 @@ from .._base.rounding import SAME
 from ..impact import accuracy, distance
 from ..impact.assumption import Assumption
 from ..impact.compiled.law import columns
-from ..impact.engine import again
+from ..impact.engine import follow_again
 from ..impact.history import History, mode_energy
 from ..impact.response import Response
 from ..modes.modal import Modes
@@ -83,7 +83,7 @@ class Struck:
     @cached_property
     def before(self) -> Response:
         """The blow to compare with: as found, in the steps of a first run."""
-        return replace(self.hit, history=again(self.hit.history), audit=None)
+        return replace(self.hit, history=follow_again(self.hit.history), audit=None)
 
     def changes(self, **changed: Any) -> dict[str, float | None]:
         """Change of each quantity, as `distance.of_blows`; None if that blow fails. Of the sound see `add_sound`, too.
@@ -102,8 +102,8 @@ class Struck:
         if self.planned or (not start and all(same)):
             return dict.fromkeys(self.quantities, 0.0)
         try:
-            before = replace(self.before, history=again(h, **start)) if start else self.before
-            after = replace(self.before, history=again(h, **end))
+            before = replace(self.before, history=follow_again(h, **start)) if start else self.before
+            after = replace(self.before, history=follow_again(h, **end))
         except SimulationError:
             return dict.fromkeys(self.quantities)
         return {**distance.of_blows(after, before, self.hit.quantities)}
@@ -166,7 +166,7 @@ class Doubt:
         return self.judged(struck, value, effect, remedy or self.missing, unknown=why, stated=stated)
 
 
-def softer(history: History, compliance: float) -> dict[str, np.ndarray]:
+def softened_system(history: History, compliance: float) -> dict[str, np.ndarray]:
     """The fields of the system that change if the contact gets more compliance [m/N] in series."""
     law = history.law.copy()
     law["compliance"] = np.maximum(0.0, law["compliance"] + compliance)

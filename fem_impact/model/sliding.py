@@ -51,7 +51,7 @@ def examine_friction(struck: Struck) -> Assumption:
         slow = history.omega <= struck.omega
         slow[columns] = False
         others = float(np.square(history.shape[0, slow]).sum())
-        dragged = _dragged(struck.bodies[min(body, 1)], place[None], p, sign * hit.impulse, struck.omega, others)
+        dragged = _drag_of_body(struck.bodies[min(body, 1)], place[None], p, sign * hit.impulse, struck.omega, others)
         if dragged is not None and dragged.needed > SAME:
             found.append((columns, dragged))
     if not found:
@@ -76,7 +76,7 @@ def examine_friction(struck: Struck) -> Assumption:
     return doubt.judged(struck, worst.needed, effect, SQUARE)
 
 
-def _dragged(
+def _drag_of_body(
     modes: Modes, place: np.ndarray, p: np.ndarray, impulse: float, omega: float, others: float
 ) -> Dragged | None:
     """What friction does to a body that moves with modal velocities p (n,) as the contact pushes it with an impulse.

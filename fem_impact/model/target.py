@@ -27,7 +27,7 @@ from ..fe.assembly import (
     unknowns_near,
     usual_theory,
 )  # fmt: skip
-from ..fe.ribs import ribbed
+from ..fe.ribs import mesh_along_ribs
 from ..fe.section import Beam, Plate
 from ..mesh.meshes import Mesh, sizes
 from ..modes import analytic, finding
@@ -111,7 +111,7 @@ class Target:
         if self.theory is not None and self.mesh is not None:
             check.one_of("theory", self.theory, THEORIES[self.mesh.dimension])
         if self.mesh is not None:
-            check.settle(self, mesh=ribbed(self.mesh, self.section))
+            check.settle(self, mesh=mesh_along_ribs(self.mesh, self.section))
         if self.air is not None and self.mesh is not None and self.mesh.dimension != 2:
             raise ValueError("air is known around plates only; leave it out")
         if self.source == "analytic" and self.closed is None:
@@ -184,7 +184,7 @@ class Target:
         if self.mesh is None or self.section is None:
             return () if self.modes is None else self.modes.notes
         ratio = self.damping_ratio
-        damping = () if ratio is None or callable(ratio) else plausible.damping(np.atleast_1d(ratio))
+        damping = () if ratio is None or callable(ratio) else plausible.notes_on_damping(np.atleast_1d(ratio))
         return plausible.together(notes_on(self.mesh, self.section), damping)
 
     def finished(self, modes: Modes) -> Modes:

@@ -25,10 +25,10 @@ import numpy as np
 from ..fe import shallow
 from ..fe.section import SHEAR, Beam, Plate
 from ..impact.assumption import Assumption, allowed
-from ..modes.shapes import unwrapped
+from ..modes.shapes import unwrap_shapes
 from .bending import LOW, Bending, Known, flexible_vectors, integrate_shapes
 from .deflection import OTHER
-from .restrike import Doubt, Struck, softer
+from .restrike import Doubt, Struck, softened_system
 
 THICKER = 'take a thick plate, theory = "mindlin", or a softer contact'
 SOFTER = "take a softer contact, or modes of a program for thick shells or solids, `fi.Modes.from_arrays`"
@@ -42,7 +42,7 @@ FLATTER = "the body is too steep for shallow theory; take its modes from a progr
 FLAT = "ribs and layers move in the plane, too; take modes of a program for shells or solids, `fi.Modes.from_arrays`"
 
 
-def lowered(thick: np.ndarray) -> np.ndarray:
+def lowered_by(thick: np.ndarray) -> np.ndarray:
     """Frequencies of a thick body over those of the thin one, from the relative drop of omega**2 to first order."""
     return 1.0 / np.sqrt(1.0 + thick)
 
@@ -70,15 +70,15 @@ def examine_target(struck: Struck) -> Assumption:
         return TARGET.unknown(struck, "the shear forces of element 'morley'", OTHER)
     row = integrals.heavier(history.shape[:, struck.mine] / np.sqrt(1.0 + integrals.rotary))
     changed = {
-        "omega": struck.with_target(history.omega[struck.mine] * lowered(integrals.thick)),
+        "omega": struck.with_target(history.omega[struck.mine] * lowered_by(integrals.thick)),
         "shape": struck.with_target(row, "shape"),
     }
     if body.plate is not None and history.law["compliance"][0] > 0.0:
         # the residual compliance of the modes left out lacks their shear
-        changed |= softer(history, _shear_give(body.plate, body.thickness, float(integrals.wave[-1])))
+        changed |= softened_system(history, _shear_give(body.plate, body.thickness, float(integrals.wave[-1])))
 
     def drop(_: Known, found: Bending) -> np.ndarray | None:
-        return None if found.thick is None else 1.0 - lowered(found.thick)
+        return None if found.thick is None else 1.0 - lowered_by(found.thick)
 
     effect = struck.add_sound(struck.changes(**changed), drop)
     return TARGET.judged(struck, body.thickness * integrals.mean_wave(struck.target_energy), effect, remedy)
@@ -134,7 +134,7 @@ def _simplified(struck: Struck, body: Known) -> Assumption:
         return TARGET.unknown(struck, "the waves of this body, without its modes")
     wave = plane_wave(plate, struck.omega)
     value = body.thickness * wave
-    changed = softer(history, _shear_give(plate, body.thickness, wave))
+    changed = softened_system(history, _shear_give(plate, body.thickness, wave))
     if struck.ideal == "infinite":
         D = plate.stiffness(np.zeros((1, 2)))[0]
         drop = value**2 / 12.0 + float(np.sqrt(D[0, 0] * D[1, 1])) * wave**2 / _shear(plate, body.thickness)
@@ -160,7 +160,7 @@ def examine_striker(struck: Struck) -> Assumption:
         return STRIKER.unknown(struck, "the thickness of the striker, and the blow depends on its bending modes")
     if struck.planned:
         return _judged_by_wave(STRIKER, struck, body, integrals, SLENDER)
-    omega[columns] *= lowered(integrals.thick)
+    omega[columns] *= lowered_by(integrals.thick)
     shape[:, columns] = integrals.heavier(shape[:, columns])
     value = body.thickness * integrals.mean_wave(struck.energy_in(columns))
     return STRIKER.judged(struck, value, struck.changes(omega=omega, shape=shape), SLENDER)
@@ -169,7 +169,7 @@ def examine_striker(struck: Struck) -> Assumption:
 def examine_shallowness(struck: Struck) -> Assumption:
     """The struck body."""
     modes = struck.bodies[1]
-    shapes: Any = unwrapped(modes.shapes)[0]
+    shapes: Any = unwrap_shapes(modes.shapes)[0]
     system = getattr(shapes, "system", None)
     if system is None or system.rules is not shallow.SHALLOW:
         return SHALLOW.holds(struck)
@@ -183,4 +183,4 @@ def examine_shallowness(struck: Struck) -> Assumption:
     drop = np.full(modes.n_modes, np.median(found[-max(1, n // 4) :]))  # of modes above: that of the last of these
     drop[:n_rigid], drop[n_rigid : n_rigid + n] = 0.0, found
     omega = struck.hit.history.omega[struck.mine]
-    return SHALLOW.judged(struck, value, struck.changes(omega=struck.with_target(omega * lowered(drop))), remedy)
+    return SHALLOW.judged(struck, value, struck.changes(omega=struck.with_target(omega * lowered_by(drop))), remedy)

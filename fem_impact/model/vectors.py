@@ -34,7 +34,7 @@ SPANNED = 0.35
 MOST_VECTORS = 2000  # [-] to limit the memory: a mesh of 20 000 unknowns takes some 0.3 GB for so many
 
 
-def usable(target: Target) -> bool:
+def vectors_usable(target: Target) -> bool:
     """Whether vectors can describe the target: a thin plate in a vacuum, not stretched, that can be meshed again."""
     if target.kind != "fe" or target.mesh is None or target.mesh.dimension != 2 or target.mesh.recipe is None:
         return False
@@ -45,7 +45,7 @@ def usable(target: Target) -> bool:
     return not by_mode and (target.system is None or target.system.rules is usual_theory(target.section, 2))
 
 
-def _strict(loose: float, power: float, tolerance: float) -> float:
+def _stricter(loose: float, power: float, tolerance: float) -> float:
     """What is ``loose`` at a tolerance of 1e-2 or more, and grows with a power of 1e-2 / tolerance."""
     return loose * max(1.0, 1e-2 / tolerance) ** power
 
@@ -55,8 +55,8 @@ def first_count(target: Target, resonance: float, tolerance: float) -> int:
 
     A half sine has 1 / 143 of its impulse at 12 times the frequency of the contact.
     """
-    modes = target.count_below(_strict(12.0, 0.25, tolerance) * resonance / target.stretch)
-    return round(min(_strict(84, 0.22, tolerance), FEWEST + modes))
+    modes = target.count_below(_stricter(12.0, 0.25, tolerance) * resonance / target.stretch)
+    return round(min(_stricter(84, 0.22, tolerance), FEWEST + modes))
 
 
 def size_for(target: Target, resonance: float, tolerance: float) -> float:
@@ -65,7 +65,7 @@ def size_for(target: Target, resonance: float, tolerance: float) -> float:
     assert mesh is not None and isinstance(section, Plate)
     if target.size_stated:
         return mesh.size
-    highest = resonance * _strict(1.6, 0.37, tolerance) / target.stretch
+    highest = resonance * _stricter(1.6, 0.37, tolerance) / target.stretch
     size = min(mesh.size, ARGYRIS.wave / target.wave(highest))
     if section.tension:
         stiffness = float(section.stiffness(mesh.points[mesh.cells].mean(axis=1))[:, 0, 0].max())
@@ -91,7 +91,7 @@ def elements_for(target: Target, size: float, mass: float, resonance: float, tol
 ALIKE = 0.85
 
 
-def finer(target: Target, elements: Elements, stages: Stages) -> Elements:
+def finer_elements(target: Target, elements: Elements, stages: Stages) -> Elements:
     """The next smaller elements: more of them, and smaller at the blow; at most five times smaller."""
     size, before = elements.size, target.n_cells(elements.size, stages)
     for _ in range(4):
@@ -101,15 +101,15 @@ def finer(target: Target, elements: Elements, stages: Stages) -> Elements:
     return Elements(size, elements.coarseness / FLATTER, elements.layer / FLATTER)
 
 
-def compared(target: Target, elements: Elements, stages: Stages) -> tuple[Elements, Elements]:
+def compared_elements(target: Target, elements: Elements, stages: Stages) -> tuple[Elements, Elements]:
     """Elements of the first two meshes that are compared: finer ones if the outline allows no larger ones."""
     coarser = Elements(refinement.COARSER * elements.size, FLATTER * elements.coarseness, FLATTER * elements.layer)
     if target.n_cells(coarser.size, stages) <= ALIKE * target.n_cells(elements.size, stages):
         return elements, coarser
-    return finer(target, elements, stages), elements
+    return finer_elements(target, elements, stages), elements
 
 
-def hopeless(tried: list[float], patience: int = 3) -> bool:
+def is_hopeless(tried: list[float], patience: int = 3) -> bool:
     """Whether the last ``patience`` steps towards more vectors, of the errors of all, did not divide them by 1 / 0.7.
 
     One or two may fail by chance.
@@ -117,7 +117,7 @@ def hopeless(tried: list[float], patience: int = 3) -> bool:
     return len(tried) > patience and min(tried[-patience:]) > 0.7 * min(tried[:-patience])
 
 
-def folded(found: Modes, cutoff: Callable[[Modes, float], float], margin: float) -> Modes:
+def fold_upper_pairs(found: Modes, cutoff: Callable[[Modes, float], float], margin: float) -> Modes:
     """The Ritz pairs up to ``cutoff``, as in `RitzTarget.needed_modes`; those above act as a spring.
 
     The poorer descriptions keep more pairs, whose spring errs 16 times less, so that the difference of their blows is
@@ -151,15 +151,15 @@ class RitzTarget:
         self.target, self.at, self.stages = target, np.atleast_2d(at), stages  # (n_points, 2) [m]
         self.fixed = fixed  # whether the user insists on the size of the elements
         # [rad/s] before scaling, see `Krylov`; half or twice this shift describes blows as well
-        self.shift = (shift or 2.0 * np.pi * resonance * _strict(6.0, 1.0 / 6.0, tolerance)) / target.stretch
+        self.shift = (shift or 2.0 * np.pi * resonance * _stricter(6.0, 1.0 / 6.0, tolerance)) / target.stretch
         self.count = count or first_count(target, resonance, tolerance)  # of vectors
         # [-] over the cutoff, up to which Ritz pairs are kept: what acts as a spring errs in every blow
-        self.margin = _strict(4.0, 0.6, tolerance)
+        self.margin = _stricter(4.0, 0.6, tolerance)
         self.whole: Modes | None = None  # all Ritz pairs of the last `needed_modes`
         self.tried: list[float] = []  # [-] truncation errors of the blows so far
         self.spent = False  # whether more vectors no longer help
         self.unmended = np.inf  # [-] error of these meshes with fewer vectors
-        self.elements, other = compared(target, elements, stages)
+        self.elements, other = compared_elements(target, elements, stages)
         if fixed and self.elements != elements:  # there are no larger elements to compare with
             self.elements, other = other, self.elements
         self.fine, self.coarse = self._krylov(self.elements), self._krylov(other)
@@ -193,7 +193,7 @@ class RitzTarget:
         # scaled and damped like modes, although their first is no mode
         found = found.stretched(target.scale.get("mass", found.mass) / found.mass, target.stretch)
         self.whole = found if target.damping_ratio is None else found.damped(target.damping_ratio)
-        return folded(self.whole, cutoff, self.margin)
+        return fold_upper_pairs(self.whole, cutoff, self.margin)
 
     def improved(self, error: Error, allowed: float) -> bool:
         """Take more vectors or a finer mesh, whichever the error of a blow calls for; False if neither is possible."""
@@ -210,7 +210,7 @@ class RitzTarget:
             self.tried += [error.truncation] * (self.count < MOST_VECTORS)
             # it is 1 until two descriptions agree on the impacts of the blow, which may take twice as many steps
             patience = 3 if error.truncation < 1.0 else 6
-            self.spent = self.count >= MOST_VECTORS or hopeless(self.tried, patience)
+            self.spent = self.count >= MOST_VECTORS or is_hopeless(self.tried, patience)
         if not coarse and not self.spent:
             # less than 1.4 times as many gain too little for a run, more may overshoot
             self.count, self.margin = min(MOST_VECTORS, round(1.4 * self.count)), NOTCH * self.margin
@@ -219,7 +219,7 @@ class RitzTarget:
         useless = self.spent and error.truncation > allowed
         if error.mesh <= 0.5 * allowed or self.fixed or useless or more > refinement.MOST_UNKNOWNS:
             return False
-        self.elements = finer(self.target, self.elements, self.stages)
+        self.elements = finer_elements(self.target, self.elements, self.stages)
         # many vectors reach as many modes from any lower shift, but rounding then grows a hundredfold with each vector
         self.shift = max(self.shift, 2.0 * np.pi * self.target.frequency_below(SPANNED * self.count))
         self.fine, self.coarse, self.unmended = self._krylov(self.elements), self.fine, np.inf

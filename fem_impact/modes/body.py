@@ -93,7 +93,7 @@ class Body(check.Brief):
             self, frequencies=frequencies, nodes=nodes, numbers=numbers, cells=cells.astype(int),
             shapes=check.array("shapes", self.shapes, (n, 3, len(frequencies)), "kg**-0.5"),
             mass=check.positive("mass", self.mass, "kg"), damping_ratio=damping_ratios(self.damping_ratio, omega),
-            loads=_forces(self.loads), solid=dents.stated(self.solid), names={
+            loads=_forces(self.loads), solid=dents.stated_material(self.solid), names={
                 name: check.count(f"names[{name!r}]", number, low=-(10**9)) for name, number in self.names.items()
             },
             normals=None if self.normals is None else check.array("normals", self.normals, (n, 3)),
@@ -184,7 +184,7 @@ class Body(check.Brief):
                 fields["stated_in"], fields["frequencies"], fields["damping_ratio"]
             )
         fields |= {name: value for name, value in given.items() if value is not None}
-        return cls(**imported.complete(fields, n_modes))
+        return cls(**imported.fields_of_body(fields, n_modes))
 
     @classmethod
     def from_matrices(
@@ -237,7 +237,7 @@ class Body(check.Brief):
         given |= {"recovery": recovery}
         if total_mass is not None:
             given["mass"] = check.positive("total_mass", total_mass, "kg")
-        found = given | matrices.solved(given, None if loads is None else _forces(loads), n_modes)
+        found = given | matrices.solve_matrices(given, None if loads is None else _forces(loads), n_modes)
         return cls(**{name: found[name] for name in imported.OWN if found.get(name) is not None})
 
     @classmethod
@@ -266,7 +266,7 @@ class Body(check.Brief):
         (0.25531914893617025, 0.25531914893617025)
         """
         mass, nodes = check.positive("mass", mass, "kg"), check.array("nodes", nodes, (None, 3), "m")
-        shapes = free_body.six(nodes, mass, inertia, centre)
+        shapes = free_body.rigid_shapes(nodes, mass, inertia, centre)
         return cls(np.zeros(shapes.shape[2]), shapes, nodes, mass, **more)
 
     def freed(self, inertia: Any, centre: "ArrayLike") -> "Body":
@@ -279,7 +279,7 @@ class Body(check.Brief):
         """
         if not self.frequencies.all():
             raise ValueError("body must have no rigid motions yet, but its first modes are at 0 Hz; it is free already")
-        moving = free_body.six(self.nodes, self.mass, inertia, centre)
+        moving = free_body.rigid_shapes(self.nodes, self.mass, inertia, centre)
         still = np.zeros(moving.shape[2])
         return replace(
             self, frequencies=np.append(still, self.frequencies), shapes=np.concatenate([moving, self.shapes], axis=2),
@@ -364,9 +364,9 @@ class Body(check.Brief):
             loads=loads if len(loads) else None, cells=cells if flat and len(cells) else None, free=free,
             solid=False,
         )  # fmt: skip
-        made = dents.settled(made, unit_loads, self.solid)
-        odd = (*plausible.elsewhere(self.nodes, self.shapes, self.mass), *[NOTE] * bool(made.omega.any()))
-        sideways = free_body.sideways(self.shapes[kept], ways[kept], made.n_modes)
+        made = dents.settle_dents(made, unit_loads, self.solid)
+        odd = (*plausible.imported_notes(self.nodes, self.shapes, self.mass), *[NOTE] * bool(made.omega.any()))
+        sideways = free_body.shapes_sideways(self.shapes[kept], ways[kept], made.n_modes)
         notes = [
             note for note in made.notes if not note.startswith("shapes are")
         ]  # along one direction they may be small

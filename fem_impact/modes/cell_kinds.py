@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from .._base import check
 from .._base.rounding import SAME
 
 LINES, SHELLS = {3, 21, 35}, {5, 7, 9, 22, 23, 28, 34}  # codes of vtk
@@ -63,7 +64,7 @@ def steps(n: int, shapes: Sequence[Any], static: Sequence[Any]) -> dict[str, np.
     return {name: np.stack(each, axis=2) if len(each) else np.zeros((n, 3, 0)) for name, each in named.items()}
 
 
-def spatial(points: np.ndarray) -> np.ndarray:
+def points_in_space(points: np.ndarray) -> np.ndarray:
     """Points (n, 3) of those with fewer coordinates."""
     return np.column_stack([points, np.zeros((len(points), 3 - points.shape[1]))])
 
@@ -80,7 +81,7 @@ def count_rigid(size: np.ndarray, far: float = 0.01) -> int:
     return max((k for k in range(1, min(7, len(size))) if size[k - 1] < far * size[k]), default=0)
 
 
-def settled(frequencies: np.ndarray) -> np.ndarray:
+def settle_frequencies(frequencies: np.ndarray) -> np.ndarray:
     """Frequencies [Hz], ascending in size and below zero where eigenvalues are, with zeros for rigid motions."""
     n_rigid = count_rigid(np.abs(frequencies))
     found = np.append(np.zeros(n_rigid), frequencies[n_rigid:])
@@ -137,3 +138,13 @@ def triplets(kind: str, matrix: Any) -> dict[str, np.ndarray]:
     if np.iscomplexobj(values):
         raise ValueError(f"{kind} must be real")
     return {f"{kind}_triplets": np.column_stack([rows, columns, values]), f"{kind}_shape": np.array(matrix.shape)}
+
+
+def numbered_cells(cells: Any, points: np.ndarray) -> np.ndarray | None:
+    """Cells (n_cells, dimension + 1) by numbers of points (n_points, dimension), checked; None if there are none."""
+    if cells is None:
+        return None
+    given = check.array("cells", cells, (None, points.shape[1] + 1))
+    if (given % 1.0).any() or given.min() < 0 or given.max() >= len(points):
+        raise ValueError(f"cells must be numbers of points from 0 to {len(points) - 1}, got {check.shown(cells)}")
+    return given.astype(int)

@@ -17,7 +17,7 @@ import numpy as np
 
 from .._base import check
 from ..fe.material import Material
-from .unstated import unfolded
+from .unstated import unfold_points
 
 RINGS = (1.5, 24), (1.5, 48), (2.5, 24), (2.5, 48)  # [-] first distance over that of the nearest node, and nodes: fits
 FEWEST = 12  # [-] nodes of a fit, which finds at most seven numbers
@@ -55,7 +55,7 @@ class Load:
         return np.argsort(np.linalg.norm(self.apart, axis=1), kind="stable")[: RINGS[0][1]]
 
 
-def stated(solid: Any) -> Any:
+def stated_material(solid: Any) -> Any:
     """What was said of the mesh: (E, nu) of a solid, True if its material was not, () of a shell, None if nothing."""
     truth = isinstance(solid, (bool, np.bool_)) or (isinstance(solid, np.ndarray) and solid.shape == ())
     if solid is None or (truth and np.asarray(solid).dtype == bool):
@@ -72,19 +72,19 @@ def stated(solid: Any) -> Any:
     return check.positive("solid", solid[0], "Pa"), check.between("solid", solid[1], -1.0, 0.5)
 
 
-def settled(modes: Any, loads: list[Load], solid: Any) -> Any:
+def settle_dents(modes: Any, loads: list[Load], solid: Any) -> Any:
     """Modes known at points whose unit loads leave no dent, or whose dent is an error; they say so in their notes.
 
-    ``solid`` is as of `stated`.
+    ``solid`` is as of `stated_material`.
     """
     if solid == () or not loads:
         return modes
     shapes = modes.shapes
     static, dent = shapes.static.copy(), np.zeros((len(shapes.points), 2))
-    counts, flat = dict.fromkeys((KNOWN, UNKNOWN, SOLID, TOO_FEW), 0), unfolded(shapes.points).shape[1] < 3
+    counts, flat = dict.fromkeys((KNOWN, UNKNOWN, SOLID, TOO_FEW), 0), unfold_points(shapes.points).shape[1] < 3
     for column, load in enumerate(loads):
         if solid is True:
-            found = largest(load.on_surface())
+            found = largest_dent(load.on_surface())
             counts[TOO_FEW if found is None else SOLID] += 1
             dent[load.point, 1] = abs(load.own) if found is None else found
             continue
@@ -94,12 +94,12 @@ def settled(modes: Any, loads: list[Load], solid: Any) -> Any:
             nearest = load.apart[load.nearest()]
             farthest = np.linalg.norm(nearest, axis=1).max(initial=0.0)
             surrounded = np.linalg.norm(nearest.sum(axis=0)) < 0.12 * len(nearest) * farthest
-            found = 0.0 if flat and not surrounded else hidden(load.on_surface())
+            found = 0.0 if flat and not surrounded else hidden_dent(load.on_surface())
             size = (0.0 if flat else abs(load.own)) if found is None else found
             counts[TOO_FEW if found is None else UNKNOWN] += size > 0.0
             dent[load.point, 1] = size
             continue
-        bare = rest(load.on_surface(), *solid) if load.square else None
+        bare = rest_without_dent(load.on_surface(), *solid) if load.square else None
         counts[TOO_FEW if bare is None else KNOWN] += 1
         dent[load.point] = (0.0, abs(load.own)) if bare is None else (load.own - bare[0], bare[1])
         static[load.point, column] -= dent[load.point, 0]
@@ -126,7 +126,7 @@ def of_points(points: np.ndarray, static: np.ndarray, known: np.ndarray) -> list
     return found
 
 
-def rest(load: Load, E: float, nu: float) -> tuple[float, float] | None:
+def rest_without_dent(load: Load, E: float, nu: float) -> tuple[float, float] | None:
     """What a body yields at a load without the dent of a half space, and its error [m/N]; None of too few nodes.
 
     The error is the difference of four fits, with few and many nodes, nearer to the load and farther off.
@@ -139,7 +139,7 @@ def rest(load: Load, E: float, nu: float) -> tuple[float, float] | None:
     return float(np.mean(values)), float(np.ptp(values) + SINGLE * abs(load.own))
 
 
-def largest(load: Load) -> float | None:
+def largest_dent(load: Load) -> float | None:
     """How large [m/N] the dent of a solid of unknown material may be; None of too few nodes.
 
     The largest of fits with ``1 / r`` of unknown size, one beyond the elements over which a load may be spread. Solids
@@ -166,7 +166,7 @@ def _fitted(apart: np.ndarray, values: np.ndarray, rings: Any, dent: bool = Fals
     return found
 
 
-def hidden(load: Load) -> float | None:
+def hidden_dent(load: Load) -> float | None:
     """How large [m/N] the dent in a deflection may be, by the deflections around; None of too few nodes.
 
     Zero if the load sinks no deeper than on a thin plate, ``r**2 log r``, or on a beam, ``r**3``; or if the others are

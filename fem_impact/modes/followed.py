@@ -43,13 +43,13 @@ class Passive(NamedTuple):
 def columns(lines: MeasuredLines, poles: np.ndarray) -> np.ndarray:
     """Weighted accelerances of a mass, a spring and unit modes, real over imaginary parts, (2 n, 2 + n_modes)."""
     rest = lines.weight[:, None] * np.stack([np.ones_like(lines.s), lines.s**2], axis=1)
-    found = np.hstack([rest, picked.swinging(lines.s, lines.weight, poles)[0]])
+    found = np.hstack([rest, picked.unit_responses(lines.s, lines.weight, poles)[0]])
     return np.vstack([found.real, found.imag])
 
 
 def column_slopes(lines: MeasuredLines, poles: np.ndarray) -> np.ndarray:
     """By logarithms of frequencies and then of damping ratios, of the columns of modes, (2 n, 2 n_modes)."""
-    found = np.hstack(list(picked.swinging(lines.s, lines.weight, poles)[1]))
+    found = np.hstack(list(picked.unit_responses(lines.s, lines.weight, poles)[1]))
     return np.vstack([found.real, found.imag])
 
 
@@ -152,7 +152,7 @@ class Following(NamedTuple):
 def body_of(found: Any, driving: Any, points: Any) -> Following:
     """Modes, what is left out of them, and their errors, that follow frequency responses from or to one point."""
     s, values, _, lines_used = picked.responses("frf", found)
-    drive, used, sign, end = picked.ends(found, driving)
+    drive, used, sign, end = picked.find_driving_point(found, driving)
     values = values[:, used] * sign
     own = used.index(drive)
     if len(s) < 2 * AROUND:

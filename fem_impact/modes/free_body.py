@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 FITS = 1e-2  # [-] misfit of a rigid motion, or of the mass it moves: as many digits as programs and tests agree to
 
 
-def six(nodes: np.ndarray, mass: float, inertia: Any, centre: Any) -> np.ndarray:
+def rigid_shapes(nodes: np.ndarray, mass: float, inertia: Any, centre: Any) -> np.ndarray:
     """Mass-normalised shapes (n_nodes, 3, 6) [kg**-0.5] of the rigid motions; five of a rod.
 
     Parameters
@@ -50,7 +50,7 @@ def motions(apart: np.ndarray, axes: Iterable[np.ndarray]) -> np.ndarray:
     return np.concatenate([shifts, *(np.cross(axis, apart)[..., None] for axis in axes)], axis=2)
 
 
-def arrival(body: "Body", row: int, way: np.ndarray, along: Any, pivot: Any) -> np.ndarray | None:
+def arrival_velocities(body: "Body", row: int, way: np.ndarray, along: Any, pivot: Any) -> np.ndarray | None:
     """Modal velocities (n_rigid,) [kg**0.5] with which the node of a row comes at unit speed along ``way``.
 
     ``along`` (3,) is the direction of a straight motion, by default ``way``; about a ``pivot`` (3,) [m] the body turns
@@ -103,7 +103,7 @@ def _fitted(shapes: np.ndarray, field: np.ndarray) -> tuple[np.ndarray, float]:
     return found, float(np.abs(shapes @ found - field).max() / np.abs(field).max())
 
 
-def sideways(shapes: np.ndarray, ways: np.ndarray, n_modes: int) -> np.ndarray:
+def shapes_sideways(shapes: np.ndarray, ways: np.ndarray, n_modes: int) -> np.ndarray:
     """Shapes (n_nodes, 2, n_modes) along two directions at right angles to the ways (n_nodes, 3) and to each other.
 
     Modes that come before those of ``shapes`` (n_nodes, 3, n) move along the ways alone.

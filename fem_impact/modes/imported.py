@@ -78,16 +78,16 @@ def _one(path: Path, decks: Sequence[Path] | set[Path]) -> dict[str, Any]:
         shape, at = found.pop(f"{kind}_shape"), (rows.astype(int), columns.astype(int))
         square = kind != "recovery"
         found[f"{kind}_matrix" if square else kind] = (
-            matrices.whole(*at, values, int(shape[0])) if square else csc_array((values, at), shape=tuple(shape))
+            matrices.whole_matrix(*at, values, int(shape[0])) if square else csc_array((values, at), shape=tuple(shape))
         )
     return found
 
 
-def complete(fields: dict[str, Any], n_modes: int | None) -> dict[str, Any]:
+def fields_of_body(fields: dict[str, Any], n_modes: int | None) -> dict[str, Any]:
     """Fields of a `Body` from what files hold of it."""
-    fields = matrices.labelled(fields)
+    fields = matrices.label_matrices(fields)
     if "mass_matrix" in fields or "stiffness_matrix" in fields:
-        fields |= matrices.solved(fields, fields.get("loads"), n_modes) | {"own": True}
+        fields |= matrices.solve_matrices(fields, fields.get("loads"), n_modes) | {"own": True}
         fields.pop("modal_mass", None)
     found = check.array("frequencies", fields.get("frequencies", ()), (None,), "Hz")
     if not len(found):
@@ -114,7 +114,7 @@ def complete(fields: dict[str, Any], n_modes: int | None) -> dict[str, Any]:
         shapes = shapes / np.sqrt(scale)
     cell_kinds.refuse_twice(found, shapes)
     order = np.argsort(np.abs(found), kind="stable")  # our own solver, and what it saved, has zeros
-    settled = found[order] if "own" in fields else cell_kinds.settled(found[order])
+    settled = found[order] if "own" in fields else cell_kinds.settle_frequencies(found[order])
     fields |= {"frequencies": settled, "shapes": shapes[..., order]}
     damping = fields.get("damping_ratio", 0.0)
     if np.ndim(damping):

@@ -30,7 +30,7 @@ INDEFINITE = (
 )
 
 
-def solved(fields: Mapping[str, Any], loads: Any = None, n_modes: int | None = None) -> dict[str, Any]:
+def solve_matrices(fields: Mapping[str, Any], loads: Any = None, n_modes: int | None = None) -> dict[str, Any]:
     """Fields of a `Body` of which ``mass_matrix``, ``stiffness_matrix`` and ``nodes`` are given.
 
     Parameters
@@ -92,7 +92,7 @@ def solved(fields: Mapping[str, Any], loads: Any = None, n_modes: int | None = N
     return found | _at_kept(fields, kept, len(nodes))
 
 
-def labelled(fields: dict[str, Any]) -> dict[str, Any]:
+def label_matrices(fields: dict[str, Any]) -> dict[str, Any]:
     """The same with matrices for their ``..._entries``, (n, 5) node, direction, node, direction and value."""
     names = [f"{kind}_entries" for kind in KINDS if f"{kind}_entries" in fields]
     if not names:
@@ -103,12 +103,12 @@ def labelled(fields: dict[str, Any]) -> dict[str, Any]:
     places, start, found = place.ravel(), 0, {}
     for name, each in zip(names, entries):
         rows, columns = places[start : start + len(each)], places[start + len(each) : start + 2 * len(each)]
-        found[name.replace("entries", "matrix")] = whole(rows, columns, each[:, 4], len(dofs))
+        found[name.replace("entries", "matrix")] = whole_matrix(rows, columns, each[:, 4], len(dofs))
         start += 2 * len(each)
     return {name: value for name, value in fields.items() if name not in names} | found | {"dofs": dofs}
 
 
-def whole(rows: np.ndarray, columns: np.ndarray, values: np.ndarray, size: int) -> Any:
+def whole_matrix(rows: np.ndarray, columns: np.ndarray, values: np.ndarray, size: int) -> Any:
     """A symmetric matrix of which all entries or those of one triangle are given."""
     if (rows > columns).any() != (rows < columns).any():
         off = rows != columns
@@ -212,7 +212,7 @@ def _flexibility(M: Any, K: Any, turned: Any, nodes: np.ndarray) -> Flexibility:
         forces = np.divide(K @ basis, size, out=np.zeros(basis.shape), where=size > 0.0)
         _, resisted, way = np.linalg.svd(forces, full_matrices=len(basis) < basis.shape[1])
         rigid = basis @ way[int((resisted > KEPT * len(moved) ** 0.5).sum()) :].T
-        K, rigid = (K, rigid) if turned is not None else _released(M, K, moved, rigid)
+        K, rigid = (K, rigid) if turned is not None else _release_rigid(M, K, moved, rigid)
     except np.linalg.LinAlgError as error:
         raise ValueError(INDEFINITE.format(error)) from None
     held = qr(rigid.T, pivoting=True, mode="r")[1][: rigid.shape[1]] if rigid.shape[1] else np.zeros(0, int)
@@ -220,7 +220,7 @@ def _flexibility(M: Any, K: Any, turned: Any, nodes: np.ndarray) -> Flexibility:
     return Flexibility(K, M, rigid, none, none, np.sort(held))
 
 
-def _released(M: Any, K: Any, slowest: np.ndarray, rigid: np.ndarray) -> tuple[Any, np.ndarray]:
+def _release_rigid(M: Any, K: Any, slowest: np.ndarray, rigid: np.ndarray) -> tuple[Any, np.ndarray]:
     """Stiffness without the rounding that resists rigid motions, and these (n, n_rigid), if it hid some of them.
 
     No spring has a negative eigenvalue: the rounding is then as large. Without any, springs are as soft only where

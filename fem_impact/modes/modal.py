@@ -137,18 +137,11 @@ class Modes(check.Brief):
             raise ValueError("frequencies must not be empty")
         points = check.array("points", points, (None, None), "m")
         values = check.array("shapes", shapes, (len(points), len(omega)), "kg**-0.5")
-        mass, connected = check.positive("mass", mass, "kg"), None
-        if cells is not None:
-            given = check.array("cells", cells, (None, points.shape[1] + 1))
-            if (given % 1.0).any() or given.min() < 0 or given.max() >= len(points):
-                raise ValueError(
-                    f"cells must be numbers of points from 0 to {len(points) - 1}, got {check.shown(cells)}"
-                )
-            connected = given.astype(int)
+        mass, connected = check.positive("mass", mass, "kg"), cell_kinds.numbered_cells(cells, points)
         damping = damping_ratios(damping_ratio, omega)
         if not values.any():
             raise ValueError("shapes must move at least one point in one mode, got zeros only")
-        if unstated.unfolded(points).shape[1] >= min(points.shape[1], 2):  # along a line, two modes may look alike
+        if unstated.unfold_points(points).shape[1] >= min(points.shape[1], 2):  # along a line, two modes may look alike
             cell_kinds.refuse_twice(omega / (2.0 * np.pi), values, "shapes")
         complete, free = check.flag("complete", complete), None if free is None else check.flag("free", free)
         if complete and (compliance is not None or free):
@@ -159,12 +152,14 @@ class Modes(check.Brief):
         if free and loose is not None:
             omega, damping = (np.append(np.zeros(loose.shape[1]), each) for each in (omega, damping))
             values, loose = np.hstack([loose, values]), None
-        rest, known = None, _numbers_of_points(loads, len(points), compliance is not None)
+        rest, known = None, unstated.numbers_of_points(loads, len(points), compliance is not None)
         static = np.zeros((len(points), 0))
         if compliance is not None:
             static = check.array("compliance", compliance, (len(points), len(known)), "m/N")
         if len(known) < len(points) and not complete and omega[-1] > 0.0:
-            rest = np.column_stack(unstated.estimate_left_out(omega, values, mass, unstated.unfolded(points).shape[1]))
+            rest = np.column_stack(
+                unstated.estimate_left_out(omega, values, mass, unstated.unfold_points(points).shape[1])
+            )
             rest[known] = 0.0
         flexible = omega > 0.0
         yields = values[:, flexible] / omega[flexible]
@@ -175,11 +170,11 @@ class Modes(check.Brief):
         along = strength > 0.01 * strength.max()  # others move across
         odd: tuple[str, ...] = ()
         if points.shape[1] and not complete:
-            odd = plausible.elsewhere(points, values[:, None, along], mass)
+            odd = plausible.imported_notes(points, values[:, None, along], mass)
             odd = (*odd, *plausible.disordered(points, values[:, flexible]))
-        notes = (*odd, *plausible.damping(damping, omega), *(UNSTATED[name] for name in missing))
-        made, said = cls(omega, damping, sampled, mass, notes=notes, unstated=missing), dents.stated(solid)
-        return made if said == () else dents.settled(made, dents.of_points(points, static, known), said)
+        notes = (*odd, *plausible.notes_on_damping(damping, omega), *(UNSTATED[name] for name in missing))
+        made, said = cls(omega, damping, sampled, mass, notes=notes, unstated=missing), dents.stated_material(solid)
+        return made if said == () else dents.settle_dents(made, dents.of_points(points, static, known), said)
 
     @classmethod
     def from_uff(
@@ -221,7 +216,7 @@ class Modes(check.Brief):
             found["frequencies"], shapes, points=found["nodes"][:, keep], mass=mass,
             damping_ratio=damping, compliance=compliance, cells=cells if len(cells) else None, free=free,
         )  # fmt: skip
-        return replace(made, notes=(*made.notes, *plausible.elsewhere(found["nodes"], found["shapes"], made.mass)))
+        return replace(made, notes=(*made.notes, *plausible.imported_notes(found["nodes"], found["shapes"], made.mass)))
 
     @classmethod
     def from_frf(
@@ -360,7 +355,7 @@ class Modes(check.Brief):
 
         points, cells = viewing.grid(self)
         kind = {1: pyvista.CellType.VERTEX, 2: pyvista.CellType.LINE, 3: pyvista.CellType.TRIANGLE}[cells.shape[1]]
-        made = pyvista.UnstructuredGrid({kind: cells}, viewing.placed(self, points))
+        made = pyvista.UnstructuredGrid({kind: cells}, viewing.places_in_space(self, points))
         for i, shape in enumerate(self.shapes.at(points).T, 1):
             made.point_data[f"mode_{i:03d}"] = shape
         made.field_data["frequency"], made.field_data["damping_ratio"] = self.frequencies, self.damping_ratio
@@ -422,7 +417,7 @@ class Modes(check.Brief):
     def modal_compliance(self, points: Any) -> np.ndarray:
         """Static compliance of the kept modes between points, (n_points, n_points) [m/N]."""
         rows = self.shape_at(points)
-        return carried(self.omega, rows, rows)
+        return carried_compliance(self.omega, rows, rows)
 
     def residual_compliance(self, points: Any) -> np.ndarray:
         """Static compliance of the modes left out, (n_points, n_points) [m/N].
@@ -491,9 +486,9 @@ class Modes(check.Brief):
     def damped(self, damping_ratio: Damping) -> "Modes":
         """The same modes with other damping ratios: a number, an array (n_modes,) or a function of frequency [Hz]."""
         ratios = damping_ratios(damping_ratio, self.omega)
-        before = plausible.damping(self.damping_ratio, self.omega)
+        before = plausible.notes_on_damping(self.damping_ratio, self.omega)
         others = [note for note in self.notes if note not in before]
-        notes = plausible.together(others, plausible.damping(ratios, self.omega))
+        notes = plausible.together(others, plausible.notes_on_damping(ratios, self.omega))
         poorer = {cause: modes.damped(damping_ratio) for cause, modes in self.poorer.items()}
         return replace(self, damping_ratio=ratios, notes=notes, poorer=poorer, damping_error=None)
 
@@ -511,25 +506,11 @@ def at_rest(modes: "Modes", point: np.ndarray) -> tuple[str, ...]:
     return (f"the point struck, ({where}) m, cannot move: it lies on a support, and the blow is that on a wall",)
 
 
-def carried(omega: np.ndarray, moved: np.ndarray, pushed: np.ndarray, weight: Any = 1.0) -> np.ndarray:
+def carried_compliance(omega: np.ndarray, moved: np.ndarray, pushed: np.ndarray, weight: Any = 1.0) -> np.ndarray:
     """Static compliance (n_points, n_loads) [m/N] of modes, times their weights, by shapes at points and at loads."""
     flexible = omega > 0.0
     at_points, at_loads = (rows[:, flexible] / omega[flexible] for rows in (moved, pushed))
     return (weight * at_points) @ at_loads.T
-
-
-def _numbers_of_points(loads: Any, n_points: int, given: bool) -> np.ndarray:
-    """Numbers of the points under the loads of a given compliance."""
-    if loads is None:
-        return np.arange(n_points if given else 0)
-    numbers = check.array("loads", loads, (None,)).astype(int)
-    wrong = not len(numbers) or (numbers < 0).any() or (numbers >= n_points).any() or (numbers != np.ravel(loads)).any()
-    if wrong or not given or len(np.unique(numbers)) < len(numbers):
-        raise ValueError(
-            f"loads must be different numbers of points from 0 to {n_points - 1} with a column of compliance each, got "
-            f"{check.shown(loads)}"
-        )
-    return numbers
 
 
 def left_out_between(modes: "Modes", loads: np.ndarray, points: np.ndarray) -> np.ndarray:
@@ -537,7 +518,7 @@ def left_out_between(modes: "Modes", loads: np.ndarray, points: np.ndarray) -> n
     if not len(points):
         return np.zeros((0, len(loads)))
     moved, pushed = (modes.shapes.at(place) for place in (points, loads))
-    return np.asarray(modes.shapes.deflection(loads, points) - carried(modes.omega, moved, pushed))
+    return np.asarray(modes.shapes.deflection(loads, points) - carried_compliance(modes.omega, moved, pushed))
 
 
 def left_out(modes: "Modes", place: np.ndarray, rows: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -546,11 +527,13 @@ def left_out(modes: "Modes", place: np.ndarray, rows: np.ndarray) -> tuple[np.nd
     The error is (n_points,) [m/N].
     """
     whole = modes.shapes.compliance(place)
-    rest = whole - carried(modes.omega, rows, rows)
+    rest = whole - carried_compliance(modes.omega, rows, rows)
     doubt = np.abs(np.diag(whole)) * (modes.shapes.compliance_error(place) + ROUNDING)
     if modes.frequency_error is not None:
         # cautious, of a mode's compliance over its frequency's: 2 by omega**-2, the rest for its shape
-        doubt = doubt + np.diag(carried(modes.omega, rows, rows, 10.0 * modes.frequency_error[modes.omega > 0.0]))
+        doubt = doubt + np.diag(
+            carried_compliance(modes.omega, rows, rows, 10.0 * modes.frequency_error[modes.omega > 0.0])
+        )
     allowed = doubt.copy()
     dent = modes.shapes.dent(place)[:, 0]
     if dent.any():  # short waves dent a solid, too: modes may hold more of the dent than was left of the compliance

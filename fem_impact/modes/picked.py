@@ -202,7 +202,7 @@ def _with_one_more(omega: np.ndarray, data: np.ndarray, weight: np.ndarray, befo
     return None if near.any() or gain < GAIN * (2 + data.shape[1]) * noise else after
 
 
-def swinging(s: np.ndarray, weight: np.ndarray, poles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def unit_responses(s: np.ndarray, weight: np.ndarray, poles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Weighted accelerances (n, n_modes) of unit modes at s (n,) [rad/s], and their slopes (2, n, n_modes).
 
     These are by the logarithms of natural frequencies and of damping ratios, ``poles`` (2, n_modes).
@@ -217,7 +217,7 @@ def swinging(s: np.ndarray, weight: np.ndarray, poles: np.ndarray) -> tuple[np.n
 def _basis(omega: np.ndarray, weight: np.ndarray, poles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Weighted columns of modes, of those below and of those above, real over imaginary parts, (2 n, n_modes + 2); and
     slopes (2, 2 n, n_modes) of the first by logarithms of frequencies and damping ratios, ``poles`` (2, n_modes)."""
-    modes, slopes = swinging(1j * omega, weight, poles)
+    modes, slopes = unit_responses(1j * omega, weight, poles)
     columns = np.hstack([modes, np.column_stack([weight, -weight * (omega / omega[-1]) ** 2])])
     return np.vstack([columns.real, columns.imag]), np.concatenate([slopes.real, slopes.imag], axis=1)
 
@@ -269,7 +269,7 @@ def modes_of(found: Any, driving: Any, points: Any, about: Any) -> tuple[dict[st
     The errors (n_points, n_modes) are relative, of squared shapes.
     """
     picked = pick("frf", found, about)
-    drive, used, sign, end = ends(found, driving)
+    drive, used, sign, end = find_driving_point(found, driving)
     products = sign[:, None] * picked.products[used]
     own, doubt = products[used.index(drive)], picked.errors[drive]
     if (own < 0.0).sum() > (own > 0.0).sum():
@@ -295,7 +295,7 @@ def label(found: Any, i: int) -> str:
     return repr(str(found["channel"].values[i]))
 
 
-def ends(found: Any, driving: Any) -> tuple[int, list[int], np.ndarray, str]:
+def find_driving_point(found: Any, driving: Any) -> tuple[int, list[int], np.ndarray, str]:
     """The channel at the point struck, the channels along its direction, their signs, and which end moves."""
     count, names = found.sizes["channel"], [str(name) for name in found["channel"].values]
     if driving is not None:

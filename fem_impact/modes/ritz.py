@@ -23,7 +23,7 @@ from .._base.rounding import SAME
 from ..fe import plausible, point_load
 from ..fe.assembly import System
 from ..fe.eigenvalues import Flexibility, factorise, one_thread
-from ..fe.refinement import heavier
+from ..fe.refinement import with_mass_in_plane
 from .modal import Damping, Modes, damping_ratios
 from .shapes import ElementShapes
 
@@ -236,14 +236,14 @@ class Krylov:
         count = min(count, self.count)
         frame, rigid = self.system.frame, self.system.rigid
         value, turn = self._eigenpairs(count)
-        value, mix = heavier(self.system, value, lambda: self.vectors[:count].T @ turn)
+        value, mix = with_mass_in_plane(self.system, value, lambda: self.vectors[:count].T @ turn)
         turn = turn if mix is None else turn @ mix
         omega = np.concatenate([np.zeros(rigid.shape[1]), np.sqrt(np.maximum(value, 0.0)) * frame.rate])
         basis = self.vectors[:count]
         rows = np.hstack([self.loads.T @ rigid, (basis @ self.loads).T @ turn]) * frame.mass**-0.5
         damping = damping_ratios(damping_ratio, omega)
         shapes = RitzShapes(self.system, self.points, omega, rows, basis, turn)
-        notes = (*self.system.notes, *plausible.damping(damping, omega))
+        notes = (*self.system.notes, *plausible.notes_on_damping(damping, omega))
         no_error = np.zeros(len(omega))
         return Modes(omega, damping, shapes, self.system.mass, no_error, notes=notes, section=self.system.section)
 

@@ -140,7 +140,7 @@ class ScaledShapes(WrappedShapes):
         return super().take(n_modes)
 
 
-def unwrapped(shapes: Shapes) -> tuple[Shapes, float, np.ndarray | None]:
+def unwrap_shapes(shapes: Shapes) -> tuple[Shapes, float, np.ndarray | None]:
     """The shapes inside `ScaledShapes`, the factor [-] of their amplitude, and their mixture."""
     amplitude, mix = 1.0, None
     while isinstance(shapes, ScaledShapes):
@@ -253,7 +253,7 @@ class SampledShapes(Shapes, check.Locked):
         return self.points, np.arange(len(self.points))[:, None] if self.cells is None else self.cells
 
 
-def estimated(shapes: Shapes, points: np.ndarray) -> dict[str, np.ndarray]:
+def compliance_errors(shapes: Shapes, points: np.ndarray) -> dict[str, np.ndarray]:
     """Errors (n_points,) [m/N] of the compliance at points, by what was not stated or had to be found, see `Modes`."""
     whole, dent = np.abs(shapes.compliance(points).diagonal()), shapes.dent(points)[:, 1]
     other = shapes.compliance_error(points) * whole - dent

@@ -56,7 +56,7 @@ def mesh(path: Path) -> dict[str, np.ndarray]:
     points = np.asarray(read.points, float)
     if len(numbers) != len(points):
         raise ValueError(f"{path.name} must hold its nodes itself, not in files that it includes")
-    found = {"nodes": cell_kinds.spatial(points), "numbers": numbers}
+    found = {"nodes": cell_kinds.points_in_space(points), "numbers": numbers}
     found |= cell_kinds.surface_and_kind(found["nodes"], cell_kinds.of_meshio(read.cells))
     return found | _names(read.point_sets, numbers)
 
@@ -68,7 +68,7 @@ def med(path: Path) -> dict[str, np.ndarray]:
 
     with closed_hdf5(path):
         read = meshio.read(path)
-    nodes = cell_kinds.spatial(np.asarray(read.points, float))
+    nodes = cell_kinds.points_in_space(np.asarray(read.points, float))
     shapes: list[np.ndarray] = []
     static: list[np.ndarray] = []
     frequencies: list[float] = []

@@ -33,7 +33,7 @@ from .disk import DiskShapes
 from .modal import Modes
 from .rectangle import RectangleShapes
 from .ritz import RitzShapes
-from .shapes import FieldShapes, Shapes, unwrapped
+from .shapes import FieldShapes, Shapes, unwrap_shapes
 from .slender import BeamShapes
 from .timoshenko import TimoshenkoShapes
 
@@ -67,7 +67,7 @@ def stretch(modes: Modes) -> Stretching:
     if section is None or not modes.dimension:
         why = "its section is not known" if modes.dimension else "a mass has none"
         raise ValueError(f"{CANNOT}, but {why}; leave it out")
-    base, amplitude, mix = unwrapped(modes.shapes)
+    base, amplitude, mix = unwrap_shapes(modes.shapes)
     if isinstance(section, Plate):
         n = min(MOST + rigid, modes.n_modes)
         if n == rigid:
@@ -78,7 +78,7 @@ def stretch(modes: Modes) -> Stretching:
             values = amplitude * values
             return (values if mix is None else values @ mix[:, :n])[..., rigid:]
 
-        found, linear = membrane.forms(
+        found, linear = membrane.stretching_forms(
             sheet, lambda cells, x: mixed(steep(cells, x)), modes.omega[rigid:n],
             None if taut is None else lambda pieces: mixed(taut(pieces)),
         )  # fmt: skip
@@ -143,7 +143,7 @@ def _tension(shapes: Shapes, section: Beam) -> tuple[np.ndarray, float]:
     """``int w_i' w_j'`` (n, n) of a beam, and its length over E A."""
     if isinstance(shapes, (FieldShapes, RitzShapes)):
         _check_supports(shapes.system)
-        return slopes.lengthened(shapes.system, shapes.vectors)
+        return slopes.lengthening_of_beam(shapes.system, shapes.vectors)
     if isinstance(shapes, (BeamShapes, TimoshenkoShapes)):
         if not set(shapes.ends) <= set(HELD):
             raise ValueError(f"{CANNOT}, but an end is free; hold it, or leave stretching out")

@@ -43,7 +43,7 @@ def write_modes(
     """
     pyuff, path = check.extra("pyuff", "uff", "a universal file"), check.path("path", path)
     n_points = len(points)
-    place = cell_kinds.spatial(points)
+    place = cell_kinds.points_in_space(points)
     node = np.arange(1, n_points + 1)
     zero, one = np.zeros(n_points, int), np.ones(n_points, int)
     x, y, z = place.T
@@ -111,7 +111,7 @@ def arrays(path: Path) -> dict[str, np.ndarray]:
     table = [_mode(path.name, i, mode, measured) for i, mode in enumerate(modes)]
     frequencies, damping, shapes = zip(*sorted(table, key=lambda entry: abs(entry[0]))) if table else ((), (), ())
     found = np.array(frequencies)
-    found = cell_kinds.settled(found) if (found < 0.0).any() else found
+    found = cell_kinds.settle_frequencies(found) if (found < 0.0).any() else found
     result = {"frequencies": found, "damping_ratio": np.array(damping), "nodes": nodes}
     still = [_moved(path.name, i, one, measured) / length for i, one in enumerate(static)]
     result |= cell_kinds.steps(len(nodes), shapes, still)

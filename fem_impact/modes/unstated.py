@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 from scipy.spatial import Delaunay, QhullError
 
+from .._base import check
 from .._base.rounding import SAME
 from ..mesh.meshes import sizes
 
@@ -58,7 +59,7 @@ def estimate_left_out(
     return 0.5 * (low + high), 0.5 * (high - low)
 
 
-def unfolded(points: np.ndarray) -> np.ndarray:
+def unfold_points(points: np.ndarray) -> np.ndarray:
     """Coordinates of points along the line or in the plane on which they lie; the points themselves if on none."""
     if points.shape[1] < 2 or len(points) < 2:
         return points
@@ -73,8 +74,8 @@ def loose_motions(points: np.ndarray, cells: np.ndarray | None, values: np.ndarr
     They are those of a uniform body over its points, or all points alike if these span no line or area. Of elastic
     modes, those of a free body carry none of its mass along; only the lower count, whose waves the points can show.
     """
-    flat = unfolded(points)
-    own, whole = lumps(flat, cells if flat is points else None), lumps(points, cells)
+    flat = unfold_points(points)
+    own, whole = lumped_mass(flat, cells if flat is points else None), lumped_mass(points, cells)
     share, rigid = np.nan, None
     if own is not None:
         pairs, weight = own
@@ -99,7 +100,7 @@ def loose_motions(points: np.ndarray, cells: np.ndarray | None, values: np.ndarr
     return np.full((len(points), 1), mass**-0.5) if rigid is None else rigid
 
 
-def lumps(points: np.ndarray, cells: np.ndarray | None) -> tuple[np.ndarray, np.ndarray] | None:
+def lumped_mass(points: np.ndarray, cells: np.ndarray | None) -> tuple[np.ndarray, np.ndarray] | None:
     """Pairs of points (n, 2), in the middle of which quadratics are integrated, and shares (n,) of the body."""
     dimension = points.shape[1]
     if dimension == 1:
@@ -119,3 +120,17 @@ def lumps(points: np.ndarray, cells: np.ndarray | None) -> tuple[np.ndarray, np.
         return None
     whole = weight.sum()
     return (pairs, weight / whole) if whole > 0.0 else None
+
+
+def numbers_of_points(loads: Any, n_points: int, given: bool) -> np.ndarray:
+    """Numbers of the points under the loads of a given compliance."""
+    if loads is None:
+        return np.arange(n_points if given else 0)
+    numbers = check.array("loads", loads, (None,)).astype(int)
+    wrong = not len(numbers) or (numbers < 0).any() or (numbers >= n_points).any() or (numbers != np.ravel(loads)).any()
+    if wrong or not given or len(np.unique(numbers)) < len(numbers):
+        raise ValueError(
+            f"loads must be different numbers of points from 0 to {n_points - 1} with a column of compliance each, got "
+            f"{check.shown(loads)}"
+        )
+    return numbers

@@ -41,7 +41,7 @@ def frequency_slopes(modes: Modes, change: SectionChange, which: np.ndarray) -> 
     """
     shapes, omega = solution(modes), modes.omega
     rate = shapes.system.frame.rate
-    groups = [np.flatnonzero(sharing(modes)[i]) for i in which]
+    groups = [np.flatnonzero(share_frequency(modes)[i]) for i in which]
     used = np.unique(np.concatenate(groups)) if len(groups) else np.zeros(0, int)
     stiffer, heavier = _changes(modes, change, used, [])
     found = np.zeros(len(which))
@@ -59,7 +59,7 @@ def frequency_slopes(modes: Modes, change: SectionChange, which: np.ndarray) -> 
     return found
 
 
-def sharing(modes: Modes) -> np.ndarray:
+def share_frequency(modes: Modes) -> np.ndarray:
     """Whether each two modes share one frequency, as far as the elements resolve, (n_modes, n_modes)."""
     omega, doubt = modes.omega, CLUSTER if modes.frequency_error is None else CLUSTER + modes.frequency_error
     unsure = doubt * omega
@@ -81,7 +81,7 @@ def changed_modes(modes: Modes, change: SectionChange, at: np.ndarray) -> ModesC
     stiffer, heavier = _changes(modes, change, np.arange(n), rest)
     force = stiffer[:, :n] - heavier[:, :n] * square  # (n + n_rest, n) what a change of each mode is pushed with
     slope = np.diag(force[:n]).copy()  # of the eigenvalues
-    apart, alike = square - square[:, None], sharing(modes)
+    apart, alike = square - square[:, None], share_frequency(modes)
     mix = np.where(alike, -0.5 * heavier[:n, :n], force[:n] / np.where(alike, 1.0, apart))
     shape = shape_at @ mix
     growth = np.array([square**k for k in range(len(rest))])

@@ -8,7 +8,7 @@ from .._base import check
 from ..fe.ribs import ON
 from ..fe.splitting import distance
 from ..fe.system import System
-from ..mesh.mesh_files import quartered, sides_of
+from ..mesh.mesh_files import quarter_triangles, sides_of
 
 if TYPE_CHECKING:
     from .modal import Modes
@@ -24,7 +24,7 @@ def grid(modes: "Modes") -> tuple[np.ndarray, np.ndarray]:
     """
     points, cells = modes.shapes.grid()
     while modes.continuous and modes.dimension == 2 and cells.shape[1] == 3 and len(points) < ENOUGH:
-        cells, sides = quartered(cells, len(points))
+        cells, sides = quarter_triangles(cells, len(points))
         points = np.vstack([points, points[sides].mean(axis=1)])
     return points, cells
 
@@ -44,7 +44,7 @@ def heights(modes: "Modes", points: np.ndarray) -> np.ndarray | None:
     return None if rise is None else check.field("rise", rise, points, "m")
 
 
-def placed(modes: "Modes", points: np.ndarray) -> np.ndarray:
+def places_in_space(modes: "Modes", points: np.ndarray) -> np.ndarray:
     """Places (n_points, 3) [m] of points (n_points, dimension) [m] of the unloaded body, z towards the striker."""
     rise = heights(modes, points)
     places = np.zeros((len(points), 3))

@@ -10,7 +10,7 @@ from pathlib import Path
 from .._base import check
 from ..model.planner import Watch
 from ..scenes.scene import Scene
-from .explore_bench import built, first_scene
+from .explore_bench import first_scene, scene_of_order
 from .explore_model import Setup
 from .explore_numbers import Explorer
 from .explore_worker import Worker
@@ -59,7 +59,7 @@ def serve(
     with ExitStack() as ended, tempfile.TemporaryDirectory(prefix="fem_impact_") as folder:
         ended.callback(gc.unfreeze)
         with (watch or nullcontext)("modes"):
-            explorer = Explorer(Setup.of(built(first, order)), first, order)
+            explorer = Explorer(Setup.of(scene_of_order(first, order)), first, order)
             for _ in range(2):  # one judges blows while the other draws a map or a sound
                 workers.append(Worker(explorer))
                 ended.callback(workers[-1].stop)

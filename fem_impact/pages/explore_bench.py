@@ -30,7 +30,7 @@ class Order:
 
 
 def first_scene(what: Scene | str | Path | None) -> tuple[Scene, Order]:
-    """The scene that a server begins with, and what lies on the bench then: a drawing's scene is made by `built`."""
+    """The scene that a server begins with, and what lies on the bench then: `scene_of_order` makes a drawing's."""
     if isinstance(what, Scene):
         return what, Order()
     path = None if what is None else check.path("scene", what)
@@ -40,7 +40,7 @@ def first_scene(what: Scene | str | Path | None) -> tuple[Scene, Order]:
     return plate, Order(path)
 
 
-def built(first: Scene, order: Order) -> Scene:
+def scene_of_order(first: Scene, order: Order) -> Scene:
     """The scene of an order; ``first`` is the one that the server began with.
 
     A drawing makes the scene that ``fem-impact new --from`` writes for it; names replace tables as they do there.
@@ -67,7 +67,7 @@ def built(first: Scene, order: Order) -> Scene:
     if order.at is not None:
         tables["strike"] = {**tables["strike"], "at": list(order.at)}
     if order.drawing is not None or order.material is not None or order.mallet is not None:
-        tables["title"] = adapted.titled(body, order.material, order.mallet)
+        tables["title"] = adapted.title_of_body(body, order.material, order.mallet)
     return scene_of(tables, scene.path, folder=Path())
 
 

@@ -12,7 +12,7 @@ from ..impact import threshold
 from ..modes.modal import Modes
 from ..sweeps import batches, cases, refined
 from ..sweeps.cells import law_numbers
-from .explore_model import MAP_TOLERANCE, Settings, Setup, quick
+from .explore_model import MAP_TOLERANCE, Settings, Setup, strike_quickly
 
 FIRST = {False: (25, 17), True: (13, 9)}  # [-] points of mass and stiffness at first, with True where blows take longer
 FINEST = 385  # [-] points of mass at most: about one per pixel of the picture
@@ -167,7 +167,7 @@ class Mapper:
     def batched(self) -> bool:
         """Whether blows of these settings are struck many at once."""
         laws = {name: np.array([value]) for name, value in law_numbers(self.case.contact).items()}
-        return bool(cases.batchable(laws).all()) and not self.case.modes.stretches
+        return bool(cases.can_be_batched(laws).all()) and not self.case.modes.stretches
 
     def _begin(self, settings: Settings, body: Modes | None) -> None:
         """Forget what is kept if the settings, but for their place on the map, or the body are others."""
@@ -207,5 +207,5 @@ class Mapper:
         for i in np.flatnonzero(np.isnan(counts)):  # those that take long; the rest of "more" does not matter
             one = replace(case.changed("mass", mass[i]), contact=replace(law, stiffness=float(hard[i])))
             with suppress(SimulationError):
-                counts[i] = quick(one, most=MORE).n_impacts
+                counts[i] = strike_quickly(one, most=MORE).n_impacts
         return np.where(np.isnan(counts), -1, np.minimum(counts, MORE)).astype(np.int8)

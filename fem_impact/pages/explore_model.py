@@ -142,7 +142,7 @@ class Setup:
     @property
     def by_vectors(self) -> bool:
         """Whether Ritz vectors can represent the body, as far as is known without finding them."""
-        return vectors.usable(self.scene.built.target) and bool(self.scene.blow.values.get("residual", True))
+        return vectors.vectors_usable(self.scene.built.target) and bool(self.scene.blow.values.get("residual", True))
 
     def excited_at(self, at: tuple[float, ...]) -> Modes | None:
         """The body as blows at a point excite it, by Ritz vectors; None if only modes can represent it.
@@ -214,7 +214,7 @@ class Setup:
             return None
 
 
-def quick(case: grid.Case, most: int = 6) -> Response:
+def strike_quickly(case: grid.Case, most: int = 6) -> Response:
     """The same in a few milliseconds, whatever the case: in coarse steps, with few impacts and no mesh error."""
     wall = accuracy.contact_duration(case.contact, case.striker.felt_mass, case.speed)
     alone = replace(case, modes=replace(case.modes, poorer={}))

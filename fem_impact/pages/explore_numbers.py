@@ -16,14 +16,14 @@ from ..impact.response import Response
 from ..model.playing import Strokes, strokes
 from ..modes.modal import Modes
 from ..scenes.scene import Scene
-from ..scenes.schema import written
+from ..scenes.schema import toml_text
 from ..scenes.sentences import RAISED, place, power, si
 from ..show import sound
 from ..show.figures import SPECTRUM_DEPTH
 from ..sweeps.grid import Case
-from .explore_bench import Order, built
+from .explore_bench import Order, scene_of_order
 from .explore_map import Mapper, Picture, Window
-from .explore_model import MAP_TOLERANCE, Settings, Setup, limit_of, quick
+from .explore_model import MAP_TOLERANCE, Settings, Setup, limit_of, strike_quickly
 from .html_page import QUIET, audio, packed
 
 BAND = (20.0, 20e3)  # [Hz] of the spectrum: the audible range
@@ -74,7 +74,7 @@ class Explorer:
     def open(self, order: Order) -> Setup:
         """Find the setup of an order: seconds, unless only the mallet is another one; kernels are compiled."""
         same = replace(self.order, mallet=order.mallet, at=order.at) == order and order.at is not None
-        setup = Setup.of(built(self.first, order), order.dropped, self.setup if same else None)
+        setup = Setup.of(scene_of_order(self.first, order), order.dropped, self.setup if same else None)
         self.become(setup, order)
         self.answer(setup.start)
         return setup
@@ -108,7 +108,7 @@ class Explorer:
         """The blow in coarse steps: some 10 ms."""
         case = self.case(settings)
         try:
-            hit = quick(case)
+            hit = strike_quickly(case)
         except SimulationError as error:
             return {"failed": str(error)}, None
         return {**_force(hit), "cells": _numbers(hit, False), "what": _described(case.modes)}, hit
@@ -127,7 +127,7 @@ class Explorer:
         message = {
             "resonance": resonance, "limit": limit,
             "resonates": f"{si(resonance, 'Hz', 3)}, {ratio}",
-            "scene": markup.data_uri("application/toml", written(self.setup.saved(settings)).encode()),
+            "scene": markup.data_uri("application/toml", toml_text(self.setup.saved(settings)).encode()),
         }  # fmt: skip
         return message | ({} if hit is None else _spectrum(hit))
 
@@ -212,7 +212,7 @@ class Explorer:
         return said | {letter: si(value, "m", 3) for letter, value in zip("xy", settings.at)}
 
 
-def drawn(picture: Picture, pack: Callable[[Any, str], str] = packed) -> Message:
+def drawn_map(picture: Picture, pack: Callable[[Any, str], str] = packed) -> Message:
     """A map as the page draws it; ``pack`` makes texts of its numbers."""
     return {
         "columns": len(picture.mass), "rows": len(picture.stiffness), "counts": pack(picture.n_impacts, "i1"),

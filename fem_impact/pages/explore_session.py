@@ -13,7 +13,7 @@ from ..scenes.sentences import place, si
 from .explore_bench import Order, order_of, pickable
 from .explore_map import Mapper, Picture, Window
 from .explore_model import Settings, Setup
-from .explore_numbers import Explorer, Message, Point, View, drawn
+from .explore_numbers import Explorer, Message, Point, View, drawn_map
 from .explore_view import RATES, check_sliders, ends, laid_out, pair
 from .explore_worker import Worker
 
@@ -257,7 +257,7 @@ class Session:
             return found
 
         def sent(picture: Picture, exact: bool = False) -> Picture:
-            self.send({"kind": "map", "computing": not exact, "exact": exact, **drawn(picture)})
+            self.send({"kind": "map", "computing": not exact, "exact": exact, **drawn_map(picture)})
             return picture
 
         picture = sent(await made(Mapper.finer, sent(await made(Mapper.first, window))))

@@ -11,7 +11,7 @@ from .._base.check import SimulationError
 from ..scenes.sentences import si
 from ..show import figures, plots
 from ..show.style import BLUE, GREEN, SKY, VERMILION, panels
-from ..taps.found import Found, along, differ, stated
+from ..taps.found import Found, covariation_in_words, scatter_in_words, stated
 from ..taps.unknowns import unit_of
 from .html_page import picture_uri, write_page
 
@@ -110,8 +110,8 @@ def write_fit(
         summary=found.summary().splitlines(),
         values=values,
         verdict=found.verdict,
-        spreads={name: differ(each) for name, each in found.spreads.items()},
-        ridges={name: along(found.ridges[name]) for name in found.unidentifiable},
+        spreads={name: scatter_in_words(each) for name, each in found.spreads.items()},
+        ridges={name: covariation_in_words(found.ridges[name]) for name in found.unidentifiable},
         tiles=[
             ("taps used", str(len(found.used))), ("rms residual", f"{100 * found.error:.2g} %"),
             ("left-out taps, worst", max(left_out, key=lambda text: float(text[:-2])) if left_out else "one tap only"),

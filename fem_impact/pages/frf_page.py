@@ -9,7 +9,7 @@ import xarray as xr
 from scipy.spatial import Delaunay, QhullError
 
 from .._base import check
-from .._base.explained import noted
+from .._base.explained import lines_of_notes
 from .._base.known import NINETY
 from ..mesh.mesh_files import sides_of
 from ..modes import picked, stabilisation
@@ -25,7 +25,7 @@ COMPARED = 40  # [-] computed modes that measured ones may belong to: twice as m
 CHANNELS = 6  # [-] channels that have a picture and a column of residues: more do not fit a screen
 
 
-def stabilised(chart: stabilisation.Chart, found: xr.Dataset, modes: picked.Picked) -> Any:
+def figure_of_poles(chart: stabilisation.Chart, found: xr.Dataset, modes: picked.Picked) -> Any:
     """Poles over frequency and order of the model, the mean response behind them: a matplotlib figure."""
     with panels(1, 1, 7.2, 3.8) as (figure, (axes,)):
         for some, colour, label in ((~chart.stable, GREY, "new"), (chart.stable, BLUE, "stable")):
@@ -45,7 +45,7 @@ def stabilised(chart: stabilisation.Chart, found: xr.Dataset, modes: picked.Pick
     return figure
 
 
-def likeness(values: np.ndarray, measured: np.ndarray, computed: np.ndarray) -> Any:
+def figure_of_mac(values: np.ndarray, measured: np.ndarray, computed: np.ndarray) -> Any:
     """MAC (n_measured, n_computed) of measured and computed shapes as a table of colours: a matplotlib figure."""
     with panels(1, 1, 1.8 + 0.42 * len(computed), 1.4 + 0.36 * len(measured)) as (figure, (axes,)):
         shown = axes.imshow(values, vmin=0.0, vmax=1.0, cmap="Blues", aspect="auto")
@@ -134,7 +134,7 @@ def write_responses(
     write_page(
         path, "frf.html", scripts=("shapes.js",), title=title, trouble=trouble, pictures=pictures,
         channels=names[:shown], n_channels=len(names), double=double,
-        taps=rows, notes=noted(() if taps is None else taps.notes),
+        taps=rows, notes=lines_of_notes(() if taps is None else taps.notes),
         poles=poles, pairs=compared.get("pairs", []),
         moving=_moving(modes, place) if modes is not None and place is not None and len(names) > 1 else "",
         tiles=[
@@ -167,7 +167,7 @@ def _pictures(found: xr.Dataset, taps: Taps | None, modes: picked.Picked | None,
         pictures["pulses"] = drawn(3.0, lambda axes: tap_pictures.draw_pulses(axes, taps, some))
         pictures["spectra"] = drawn(3.0, lambda axes: tap_pictures.draw_spectra(axes, taps, some, None, 10.0))
     if modes is not None:
-        pictures["stable"] = picture_uri(stabilised(stabilisation.chart(found), found, modes))
+        pictures["stable"] = picture_uri(figure_of_poles(stabilisation.chart(found), found, modes))
     return pictures
 
 
@@ -186,4 +186,4 @@ def _compared(modes: picked.Picked, computed: Modes, points: np.ndarray) -> dict
     some = modes.frequencies[:14]  # of the picture, so few that its numbers can be read, and 18 computed ones
     near = near[computed.frequencies[near] <= 1.1 * some[-1]][:18]
     values = transfer.mac(modes.products[:, : len(some)], computed.shape_at(points)[:, near])
-    return {"pairs": rows, "picture": picture_uri(likeness(values, some, computed.frequencies[near]))}
+    return {"pairs": rows, "picture": picture_uri(figure_of_mac(values, some, computed.frequencies[near]))}

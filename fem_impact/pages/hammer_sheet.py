@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from .._base import check
-from .._base.explained import noted
+from .._base.explained import lines_of_notes
 from ..show import plots
 from ..show.figures import in_hertz
 from ..sweeps.hammers import catalogue
@@ -31,7 +31,7 @@ def overload(plan: Roving, i: int, j: int) -> float | None:
     return None if force is None or peak is None or not peak > 0.0 else force / peak
 
 
-def order(plan: Roving, i: int) -> np.ndarray:
+def order_of_blows(plan: Roving, i: int) -> np.ndarray:
     """The blows at one point: those that work by their coherence, then single hits by reach, then the others."""
     works, single = plan.works[i], plan.n_impacts[i] == 1
     value = np.nan_to_num(np.where(works, plan.coherence[i], plan.reach[i] / plan.bandwidth - 1.0))
@@ -42,7 +42,7 @@ def _sheet(plan: Roving, i: int) -> dict[str, Any]:
     """One point: what to take, the table and the picture."""
     place = f"({', '.join(f'{x:.4g}' for x in plan.points[i])}) m"
     best, rows = int(plan.best[i]), []
-    for j in order(plan, i)[:18]:  # more do not fit a page
+    for j in order_of_blows(plan, i)[:18]:  # more do not fit a page
         limit, sure = overload(plan, i, j), plan.coherence[i, j]
         rows.append((
             plan.hammers[j], plan.tips[j], f"{1e3 * plan.masses[j]:.4g} g",
@@ -74,6 +74,6 @@ def write_sheets(path: str | Path, plan: Roving, *, title: str, notes: tuple[str
         "points that work": str(sum(each >= 0 for each in plan.best)), "pairs tried": str(len(plan.tips)),
     }  # fmt: skip
     write_page(
-        path, "sheet.html", title=title, notes=noted((*notes, *plan.notes)), tiles=list(tiles.items()),
+        path, "sheet.html", title=title, notes=lines_of_notes((*notes, *plan.notes)), tiles=list(tiles.items()),
         sheets=[_sheet(plan, i) for i in range(len(plan.points))],
     )  # fmt: skip

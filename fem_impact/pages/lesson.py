@@ -16,7 +16,7 @@ from ..scenes.sentences import RAISED, place, power, si, tidy, words
 from ..show import sound
 from . import lesson_grid, worksheet
 from .explore_model import Setup
-from .explore_numbers import PLAYED, SPECTRUM_FACTS, drawn
+from .explore_numbers import PLAYED, SPECTRUM_FACTS, drawn_map
 from .explore_view import drawn_body
 from .html_page import packed, script_data, write_page
 from .lesson_grid import NAMES, STEPS, Lesson
@@ -81,7 +81,7 @@ def write(
     with watch("modes"):
         setup = Setup.of(scene)
     with watch("blows"):
-        lesson = lesson_grid.made(setup, told or (lambda done, total: None))
+        lesson = lesson_grid.strike_grid(setup, told or (lambda done, total: None))
         first = scene.run().response
     asked = worksheet.questions(lesson)
     about = Written(
@@ -153,5 +153,5 @@ def _facts(lesson: Lesson) -> dict[str, Any]:
         # differences of times, which deflate better
         "time": _squeezed(np.concatenate([np.diff(blow.time, prepend=0.0) for blow in lesson.blows]), "<u2"),
         "force": _squeezed(np.concatenate([blow.force for blow in lesson.blows]), "<u2"),
-        "maps": [drawn(picture, _squeezed) for picture in lesson.maps],
+        "maps": [drawn_map(picture, _squeezed) for picture in lesson.maps],
     }  # fmt: skip

@@ -131,7 +131,7 @@ def places_of(setup: Setup) -> tuple[Point, ...]:
     return tuple(dict.fromkeys(point for point in points if point is not None and not setup.at_rest(point)))
 
 
-def made(setup: Setup, watch: Callable[[int, int], None]) -> Lesson:
+def strike_grid(setup: Setup, watch: Callable[[int, int], None]) -> Lesson:
     """Strike all blows of a page; ``watch`` is called with how many are done, and of how many."""
     explorer, tolerance = Explorer(setup), max(3e-3, setup.tolerance)  # the page shows three digits
     start, places = setup.start, places_of(setup)
@@ -165,12 +165,12 @@ def made(setup: Setup, watch: Callable[[int, int], None]) -> Lesson:
             for stiffness in range(COUNTS["stiffness"]):
                 for mass in range(COUNTS["mass"]):
                     settings = settings_at(setup, axes, place, speed, stiffness, mass)
-                    blows.append(shown(setup.case(settings, body=body), tolerance))
+                    blows.append(shown_blow(setup.case(settings, body=body), tolerance))
                 watch(len(blows), total)
     return Lesson(setup, places, axes, tuple(blows), tuple(maps), np.array(limits), tolerance)
 
 
-def shown(case: Case, tolerance: float) -> Shown:
+def shown_blow(case: Case, tolerance: float) -> Shown:
     """A blow as the page holds it."""
     try:
         hit = case.blow(tolerance=tolerance)

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from .._base import check, markup
-from .._base.explained import noted
+from .._base.explained import lines_of_notes
 from ..impact import balance, spectra
 from ..impact.assumption import SILENT, Assumption
 from ..impact.quantities import NAMES as QUANTITY_NAMES
@@ -22,7 +22,7 @@ from ..model.playing import Strokes
 from ..modes import viewing
 from ..scenes import hearing, sequence
 from ..scenes.scene import Run, Scene, load_scene, scene_of
-from ..scenes.schema import PATHS, fault, read_bytes
+from ..scenes.schema import PATHS, read_bytes, scene_error
 from ..scenes.sentences import arriving, body, contact, place, power, si, tidy, words
 from ..scenes.sequence import Played
 from ..show import export, sampling, sound
@@ -59,10 +59,10 @@ def read(path: str | Path) -> Scene:
     except (json.JSONDecodeError, RecursionError):  # RecursionError: lists nested too deeply
         pass
     if scene is None:
-        raise fault(path, "not a result of `fem-impact strike`; give its response.json, or the scene's TOML file")
+        raise scene_error(path, "not a result of `fem-impact strike`; give its response.json, or the scene's TOML file")
     for source in (scene.mesh.values[key] for key in PATHS if key in scene.mesh.values):
         if not os.path.isfile(source):  # unlike Path.is_file, returns False for invalid file names too
-            raise fault(
+            raise scene_error(
                 path, f"the file of the struck body is missing: restore {source}, or give the scene's TOML file"
             )
     return scene
@@ -148,7 +148,7 @@ def _of_blow(scene: Scene, run: Run) -> dict[str, Any]:
         parts.append(("measured responses", "from runs with shapes changed by their errors", error.measurement))
     scale = max(response.tolerance, *(value for _, _, value in parts))
     return {
-        "words": (*noted(run.notes), *words(scene, response)),
+        "words": (*lines_of_notes(run.notes), *words(scene, response)),
         "strokes": (), "outcome": response.outcome, "error": error.total,
         "energy_error": response.energy_error,
         "budget": [(name, how, value, max(0.0, min(1.0, value / scale))) for name, how, value in parts],
@@ -183,7 +183,7 @@ def _of_strokes(scene: Scene, run: Played) -> dict[str, Any]:
     played = f"It is struck {len(strokes)} times in {si(found.strokes[-1].when - found.strokes[0].when, 's')}."
     energies = {name: found.energies[name] for name in ("target", "dissipated", "taken away")}
     return {
-        "words": (*noted(found.notes), body(scene, found.target), played, *laws),
+        "words": (*lines_of_notes(found.notes), body(scene, found.target), played, *laws),
         "strokes": strokes, "outcome": found.hits[-1].outcome, "error": found.error,
         "energy_error": max(hit.energy_error for hit in found.hits),
         "budget": budget[:40],
@@ -282,7 +282,7 @@ def _sounds(scene: Scene, response: Response | Strokes) -> list[dict[str, str]]:
 
 def _duration(response: Response | Strokes) -> float:
     """Length of its sounds [s], at most three seconds to keep the page small; of a sequence, twelve."""
-    rings = sampling.ringing(response.target, response.target.omega > 0.0, (sound.SHORTEST, 3.0))
+    rings = sampling.ringing_time(response.target, response.target.omega > 0.0, (sound.SHORTEST, 3.0))
     return rings if isinstance(response, Response) else min(rings + float(np.ptp(response.starts)), 12.0)
 
 
@@ -362,7 +362,7 @@ def _view(response: Response | Strokes, end: float) -> dict[str, Any]:
     shapes = rows[:, :count].T / np.maximum(np.abs(rows[:, :count]).max(axis=0), 1e-300)[:, None]
     rise, ribs = viewing.heights(modes, points), viewing.rib_sides(modes, points, cells)
     place = np.column_stack([surface, np.zeros(len(surface)) if rise is None else rise])
-    under = viewing.placed(modes, np.atleast_2d(response.at))[0, 2]
+    under = viewing.places_in_space(modes, np.atleast_2d(response.at))[0, 2]
     columns = {
         "x": surface[:, 0], "y": surface[:, 1], "times": times, "frequencies": modes.frequencies[:count],
         "damping": modes.damping_ratio[:count],

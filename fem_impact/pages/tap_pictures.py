@@ -58,13 +58,13 @@ def draw_responses(axes: Any, found: Mapping[str, xr.Dataset], channel: int) -> 
         error = each.error.values[1:, channel]
         low, high = np.maximum(size - error, 0.03 * size), size + error
         axes.fill_between(frequency, low, high, color=SKY, alpha=0.3, lw=0, label="90 % of the last")
-    axes.set(xlabel="frequency", ylabel=f"response [{each.units.values[channel]}]", xlim=(0.0, felt(each)))
+    axes.set(xlabel="frequency", ylabel=f"response [{each.units.values[channel]}]", xlim=(0.0, highest_drawn(each)))
     axes.set_title(str(each.channel.values[channel]))
     set_units(axes, "Hz")
     axes.legend(fontsize=8)
 
 
-def felt(found: xr.Dataset) -> float:
+def highest_drawn(found: xr.Dataset) -> float:
     """Frequency [Hz] up to which responses are drawn: a little beyond where the force is felt."""
     last = float(found.frequency.values[-1])
     if "force" not in found:
@@ -78,12 +78,12 @@ def draw_coherence(axes: Any, found: xr.Dataset, channels: Sequence[int]) -> Non
     for n, k in enumerate(channels):
         axes.plot(found.frequency.values, found.coherence.values[:, k], color=PALETTE[n % len(PALETTE)], lw=0.9,
                   label=str(found.channel.values[k]))  # fmt: skip
-    axes.set(xlabel="frequency", ylabel="coherence", xlim=(0.0, felt(found)), ylim=(0.0, 1.03))
+    axes.set(xlabel="frequency", ylabel="coherence", xlim=(0.0, highest_drawn(found)), ylim=(0.0, 1.03))
     set_units(axes, "Hz")
     axes.legend(fontsize=8)
 
 
-def watched(last: Taps, good: Taps | None, bandwidth: float, drop: float, said: str) -> Any:
+def figure_of_record(last: Taps, good: Taps | None, bandwidth: float, drop: float, said: str) -> Any:
     """The last record beside what the good ones give so far: a matplotlib figure."""
     found = frf(good) if good is not None and good.response.shape[2] else None
     parts: list[Part] = [

@@ -24,7 +24,7 @@ def select(names: str | Sequence[str] = "all") -> list[Reference]:
     """
     if isinstance(names, str) and names == "all":
         return list(CASES.values())
-    words = check.several("names", [names] if isinstance(names, str) else names, str)
+    words = check.tuple_of("names", [names] if isinstance(names, str) else names, str)
     for word in words:
         if not word or not any(name.startswith(word) for name in CASES):
             kinds = dict.fromkeys(name.partition("-")[0] for name in CASES)

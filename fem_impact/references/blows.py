@@ -88,7 +88,7 @@ def _timoshenko() -> list[ReferenceLine]:
     return of_blow(hit, about["values"], {name: 0.5 * digit for name, digit in about["digit"].items()})
 
 
-def followed(hit: Response, end: float) -> dict[str, float]:
+def follow_by_dop853(hit: Response, end: float) -> dict[str, float]:
     """The same blow of a rigid striker up to ``end`` [s] by SciPy's DOP853; each change of contact ends a run."""
     modes, contact, mass = hit.bodies[-1], hit.contacts[0], hit.bodies[0].mass
     u, omega, n = modes.shape_at([hit.at])[0], modes.omega, modes.n_modes
@@ -140,7 +140,7 @@ def _followed(contact: Contact, mass: float) -> list[ReferenceLine]:
         complete=True,
     )  # fmt: skip
     hit = strike(alone, Striker.rigid(mass), contact, at=at, speed=1.0, tolerance=1e-7, duration=end)
-    wanted = followed(hit, end)
+    wanted = follow_by_dop853(hit, end)
     return of_blow(hit, wanted, {name: 1e-8 * value for name, value in wanted.items()})  # 1e-11 a step, over some 1e3
 
 

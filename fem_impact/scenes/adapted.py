@@ -59,7 +59,7 @@ def text(
         whole = _with(whole, "[striker]", _listed_as("striker", mallet))
         whole = _with(whole, "[contact]", "# [contact]               # left out: the name of the striker says it\n")
     if (drawing, material, mallet) != (None, None, None):
-        title = titled(kind if drawing is None else drawing.stem, material, mallet or "a steel ball")
+        title = title_of_body(kind if drawing is None else drawing.stem, material, mallet or "a steel ball")
         whole = whole.replace(whole.splitlines()[0], f"title = {json.dumps(title)}", 1)
     return whole, notes
 
@@ -70,7 +70,7 @@ def damping_of(material: str) -> float | None:
     return float(f"{0.5 * facts['loss_factor'].value:.2g}") if "loss_factor" in facts else None
 
 
-def titled(body: str, material: str | None, mallet: str | None) -> str:
+def title_of_body(body: str, material: str | None, mallet: str | None) -> str:
     """What a body of a material and what strikes it are called together."""
     struck = f" struck by {mallet}" if mallet else ""
     return f"{body[0].upper()}{body[1:]}{f' of {material}' if material else ''}{struck}"

@@ -12,7 +12,7 @@ from scipy import stats
 from .._base import check, markup, progress
 from ..impact.measured import ENDS, Comparison, of_blow
 from ..impact.response import Response
-from ..sweeps.inputs import drawn, read_inputs, shares
+from ..sweeps.inputs import drawn_inputs, read_inputs, shares
 from .scene import Scene, load_scene
 from .uncertainty import MOST_BLOWS, spread
 
@@ -143,7 +143,7 @@ def band(scene: Scene | str | Path, *, n: int | None = None, seed: int = 0, **ch
     """
     known = scene if isinstance(scene, Scene) else load_scene(scene)
     check_known(known)
-    return around(known, known.strike(**changes), n=n, seed=seed)
+    return band_around(known, known.strike(**changes), n=n, seed=seed)
 
 
 def check_known(scene: Scene) -> None:
@@ -155,7 +155,7 @@ def check_known(scene: Scene) -> None:
         )
 
 
-def around(scene: Scene, hit: Response, *, n: int | None = None, seed: int = 0) -> Band:
+def band_around(scene: Scene, hit: Response, *, n: int | None = None, seed: int = 0) -> Band:
     """The band around a blow of a scene; where inputs need another body, with a scene of its own for each blow."""
     count, seed = (None if n is None else check.count("n", n, high=MOST_BLOWS)), check.count("seed", seed, low=0)
     inputs = read_inputs(scene.known)
@@ -168,7 +168,7 @@ def around(scene: Scene, hit: Response, *, n: int | None = None, seed: int = 0) 
         values = {name: found.values(name) for name in (*said, *NAMES.values())}
         return Band(hit, said, values, found.n_failed, anew=False)
     n, rows, failed = count or ANEW, [], 0
-    for done, row in enumerate(drawn(inputs, shares(n, len(inputs), seed), None)):
+    for done, row in enumerate(drawn_inputs(inputs, shares(n, len(inputs), seed), None)):
         given = {each.name: float(value) for each, value in zip(inputs, row)}
         try:
             one = scene.changed(given).strike(tolerance=hit.tolerance)

@@ -14,7 +14,7 @@ AXES = ("x", "y")
 SHAPES = ({"value", "centre", "radius"}, {"value", "from", "to"})
 
 
-def varying(name: str, value: Any, dimension: int) -> Any:
+def varying_field(name: str, value: Any, dimension: int) -> Any:
     """A number, or a function of points (n_points, dimension) [m], from what a scene says.
 
     That is a number; a table ``{x = [...], values = [...]}``, on a plate ``{x = [...], y = [...], values = [[...],
@@ -77,7 +77,7 @@ def _cases(name: str, value: dict, dimension: int) -> Callable[[np.ndarray], np.
     return value_at
 
 
-def tapered(name: str, value: Any) -> Any:
+def tapered_size(name: str, value: Any) -> Any:
     """A size, or a function of the distance (n, 1) [m] along a rib from ``[[distance, size], ...]``, linear between."""
     if not isinstance(value, list):
         return value

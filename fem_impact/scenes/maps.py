@@ -19,7 +19,7 @@ from ..model.target import Stages
 from ..show import export, figures, plots
 from ..sweeps import cases, grid
 from ..sweeps.borders import PREFIX, read_borders
-from ..sweeps.cells import LAW, Case, computed_together, laid_out, logarithmic
+from ..sweeps.cells import LAW, Case, computed_together, is_logarithmic, laid_out
 from .scene import Scene
 from .schema import Part
 from .whole import check_axes
@@ -88,7 +88,7 @@ def map_scene(
                 raise ValueError(f"{name} must be left out for axes that need another body, got {', '.join(slow)}")
         wanted, ours = {**wanted, "borders": False}, False
     tell = wanted.pop("tell", None)
-    grid.admit(
+    grid.admit_size(
         math.prod(len(values) for values in over.values()), len(cases.LAYERS),
         wanted.pop("max_cells", grid.MOST_CELLS),
         quick=computed_together(law, over) and not (law.lossy or stretches or {"loss", "contact.loss"} & set(over)),
@@ -258,7 +258,7 @@ def _axis(table: xarray.Dataset, name: Any) -> plots.Axis:
         return plots.Axis("strike point [m]", names=tuple(names or map(str, range(table.sizes[name]))))
     place = table[name]
     values = np.asarray(place, float)
-    return plots.Axis(str(place.attrs.get("long_name", name)), _unit(place), log=logarithmic(values))
+    return plots.Axis(str(place.attrs.get("long_name", name)), _unit(place), log=is_logarithmic(values))
 
 
 def _unit(values: xarray.DataArray) -> str:

@@ -8,7 +8,7 @@ from ..fe.material import Material
 from ..impact.catalogue import Catalogue, Entry, materials, strikers
 
 
-def filled(tables: Mapping[str, Any]) -> dict[str, Any]:
+def fill_names(tables: Mapping[str, Any]) -> dict[str, Any]:
     """The tables of a scene with the numbers, and their intervals, that its names stand for.
 
     Other keys beside a name replace what it says. Without a table [contact], the striker's name says how it strikes the

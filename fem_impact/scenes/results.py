@@ -25,10 +25,10 @@ from ..impact.striker import Hand, Striker
 from ..model.playing import Stroke, Strokes
 from ..modes import unstated
 from ..modes.modal import Modes
-from ..modes.shapes import RigidShapes, SampledShapes, estimated
+from ..modes.shapes import RigidShapes, SampledShapes, compliance_errors
 from ..show import export
 from ..sweeps import store
-from .schema import fault
+from .schema import scene_error
 from .sentences import si
 
 SAVED = "response.npz"  # beside response.json, whose text is its key: one of them alone, or changed, is refused
@@ -51,7 +51,7 @@ def save_response(folder: Path, found: Response | Strokes, points: Any, data: di
         # its body is known at the points and where it was struck
         struck = np.array([np.atleast_1d(each.at) for each in found.strokes])
         places = np.unique(np.vstack([struck, *([points] if len(points) else [])]), axis=0)
-        strokes = tuple(each._replace(striker=_alone(each.striker)) for each in found.strokes)
+        strokes = tuple(each._replace(striker=_striker_alone(each.striker)) for each in found.strokes)
         hits, target = tuple(_known_at(hit, places) for hit in found.hits), _at_points(found.target, struck[:1], places)
         judged, whole = found.hits[found.hardest], replace(found, target=target, strokes=strokes, hits=hits)
     else:
@@ -59,7 +59,7 @@ def save_response(folder: Path, found: Response | Strokes, points: Any, data: di
     kept.pack(folder / SAVED, _key(folder), KINDS, response=whole, assumptions=judged.assumptions)
 
 
-def _alone(striker: Striker) -> Striker:
+def _striker_alone(striker: Striker) -> Striker:
     """A striker known at its contact point only, by itself: among the bodies of a blow a hand may hold it."""
     return replace(striker, modes=_at_points(striker.modes, striker.at[None], ()))
 
@@ -76,7 +76,7 @@ def _known_at(response: Response, points: Any) -> Response:
     return replace(
         response, bodies=bodies, rings=None, vectors=None,
         ringing=None if rung is response.bodies[last] else _at_points(rung, touched[last], points),
-        striker=None if striker is None else _alone(striker),
+        striker=None if striker is None else _striker_alone(striker),
     )  # fmt: skip
 
 
@@ -89,7 +89,7 @@ def _at_points(modes: Modes, touched: np.ndarray, points: Any) -> Modes:
     places, n = np.vstack([touched, more[new]]), len(touched)
     values = modes.shapes.at(places)
     rest = np.column_stack(unstated.estimate_left_out(modes.omega, values, modes.mass, modes.dimension))
-    known_errors, dents = estimated(modes.shapes, touched), np.zeros((len(places), 2))
+    known_errors, dents = compliance_errors(modes.shapes, touched), np.zeros((len(places), 2))
     rest[:n], rest[:n, 1], dents[:n] = 0.0, known_errors["compliance"], modes.shapes.dent(touched)
     static, flexible = modes.shapes.deflection(touched, places), modes.omega > 0.0
     known: dict[str, Any] = {"loads": np.arange(n), "carried": values[:, flexible] / modes.omega[flexible]}
@@ -101,7 +101,7 @@ def _key(folder: Path) -> str:
     """The text of response.json, of any length."""
     path = folder / "response.json"
     if not path.is_file():
-        raise fault(path, f"{check.absent(path)}; give the folder that `fem-impact strike` wrote")
+        raise scene_error(path, f"{check.absent(path)}; give the folder that `fem-impact strike` wrote")
     return path.read_text(encoding="utf-8", errors="replace")
 
 
@@ -138,11 +138,11 @@ def load_response(folder: str | Path) -> Response | Strokes:
     folder = check.path("folder", folder)
     folder = folder.parent if folder.suffix == ".json" else folder
     if not folder.is_dir():
-        raise fault(folder, f"{files.no_folder(folder)}; give the one that `fem-impact strike` wrote")
+        raise scene_error(folder, f"{files.no_folder(folder)}; give the one that `fem-impact strike` wrote")
     key = _key(folder)
     again = "strike the scene again"
     if not (folder / SAVED).is_file():
-        raise fault(folder / SAVED, f"there is no such file, which a blow is read from; {again}")
+        raise scene_error(folder / SAVED, f"there is no such file, which a blow is read from; {again}")
     try:
         saved = kept.unpack(folder / SAVED, key, KINDS) or {}
         found, assumptions = saved["response"], saved["assumptions"]
@@ -152,7 +152,7 @@ def load_response(folder: str | Path) -> Response | Strokes:
         return replace(found, hits=tuple(map(_checked, found.hits, judged)))
     except Exception:  # what somebody else packed may raise anything
         pass
-    raise fault(folder / SAVED, f"it is damaged, or not of the response.json beside it; {again}")
+    raise scene_error(folder / SAVED, f"it is damaged, or not of the response.json beside it; {again}")
 
 
 def _checked(response: Any, assumptions: Any) -> Response:
@@ -183,7 +183,7 @@ def describe(folder: Path) -> tuple[dict[str, Any], list[str]]:
     """What a folder of results or a store holds: as data, and in a few lines."""
     if not folder.is_dir():
         near = [] if folder.exists() else _names(folder.parent)
-        raise fault(folder, files.no_folder(folder) + check.nearest(folder.name, near))
+        raise scene_error(folder, files.no_folder(folder) + check.nearest(folder.name, near))
     names = _names(folder)
     if "zarr.json" in names and not (folder / "map.csv").exists():
         done, total = store.finished(folder)
@@ -199,7 +199,7 @@ def describe(folder: Path) -> tuple[dict[str, Any], list[str]]:
     if not data["holds"]:
         inner = next((name for name in names if set(READERS) & set(_names(folder / name))), None)
         hint = "the folder that --out named" if inner is None else f"one in it, such as {folder / inner}"
-        raise fault(folder, f"no results of fem-impact are in it; give {hint}")
+        raise scene_error(folder, f"no results of fem-impact are in it; give {hint}")
     return data, data["summary"]
 
 
@@ -216,7 +216,7 @@ def _json(path: Path) -> dict[str, Any]:
             return data
     except (ValueError, RecursionError):  # ValueError: no JSON, or an integer of thousands of digits
         pass
-    raise fault(path, "it is damaged: not the JSON that fem-impact wrote")
+    raise scene_error(path, "it is damaged: not the JSON that fem-impact wrote")
 
 
 def _of_strike(path: Path) -> tuple[dict[str, Any], list[str]]:
@@ -224,7 +224,7 @@ def _of_strike(path: Path) -> tuple[dict[str, Any], list[str]]:
     data = _json(path)
     kept_there = {name: data[name] for name in ("response", "sequence") if isinstance(data.get(name), dict)}
     if not kept_there:
-        raise fault(path, "it is damaged: it has neither response nor sequence")
+        raise scene_error(path, "it is damaged: it has neither response nor sequence")
     blow = next(iter(kept_there.values()))
     count = blow.get("n_impacts")
     rebound = blow.get("restitution")
@@ -245,7 +245,7 @@ def _of_map(path: Path) -> tuple[dict[str, Any], list[str]]:
             counts = table["n_impacts"].load()
             title = str(table.attrs.get("title", ""))
     except Exception:  # what cannot be read raises many kinds of error
-        raise fault(path, "it is damaged: not the map that fem-impact wrote") from None
+        raise scene_error(path, "it is damaged: not the map that fem-impact wrote") from None
     axes = ", ".join(f"{name} ({size})" for name, size in counts.sizes.items())
     single, failed = int((counts == 1).sum()), int((counts < 0).sum())
     lines = [f"{counts.size} blow{'s' * (counts.size != 1)} over {axes}: {single} hit once, {failed} failed"]

@@ -21,7 +21,7 @@ from ..impact.engine import TOLERANCE
 from ..impact.response import Response
 from ..impact.striker import Striker
 from ..mesh import sketch
-from ..mesh.meshes import Mesh, lined, pierced
+from ..mesh.meshes import Mesh, mesh_along_lines, mesh_with_holes
 from ..model import planner
 from ..model.by_modes import MOST_MODES
 from ..model.planner import Blow, Plan, Run
@@ -29,11 +29,11 @@ from ..model.playing import Strokes
 from ..model.target import FIRST_LOOK, Stages, Target, Watch
 from ..modes.modal import Modes
 from . import sequence
-from .named import filled
+from .named import fill_names
 from .whole import check_whole
 
 from .schema import (  # isort: skip
-    MAKERS, NESTED, PARTS, PATHS, REPEATED, REQUIRED, TABLES, Part, fault, read_list, read_part, read_strokes,
+    MAKERS, NESTED, PARTS, PATHS, REPEATED, REQUIRED, TABLES, Part, scene_error, read_list, read_part, read_strokes,
     read_tables,
 )  # fmt: skip
 
@@ -69,7 +69,7 @@ class Scene(check.Brief):
 
         ``strict`` as in `fi.strike`, ``changes`` as in `plan`. A ValueError names the wrong file, table and key.
         """
-        return promise.kept(self.run(**changes).response, strict)
+        return promise.warn_if_missed(self.run(**changes).response, strict)
 
     @check.typed
     def play(self, *, watch: Watch | None = None, strict: bool = False, **changes: Any) -> Strokes:
@@ -169,7 +169,7 @@ class Scene(check.Brief):
             If the target needs modes, this finds the first twenty to estimate how many.
         """
         stages = Stages(watch)
-        return planner.make(self._staged(stages), changes, stages)
+        return planner.make_plan(self._staged(stages), changes, stages)
 
     @check.typed
     def run(
@@ -207,7 +207,7 @@ class Scene(check.Brief):
         stages = Stages(watch)
         if plan is None:
             blow = self._staged(stages)
-            plan = planner.make(replace(blow, moving=True) if motion else blow, changes, stages)
+            plan = planner.make_plan(replace(blow, moving=True) if motion else blow, changes, stages)
         if before is not None:
             before(plan)
         run = planner.carry_out(plan, stages, keep)
@@ -396,11 +396,11 @@ class Scene(check.Brief):
         mesh = self._make("mesh", self.mesh)
         with self.blame("target"):
             clamps = check_posts(self._target["point_supports"], mesh.dimension)[1]
-            mesh = pierced(mesh, clamps) if clamps else mesh
+            mesh = mesh_with_holes(mesh, clamps) if clamps else mesh
         ribs = list(self._listed("rib", within=mesh))
         paths = [rib.path for rib in ribs if not isinstance(rib.path, str)]
         with self.blame("rib"):
-            mesh = lined(mesh, paths) if paths else mesh
+            mesh = mesh_along_lines(mesh, paths) if paths else mesh
         for i, rib in enumerate(ribs):
             with self.blame(f"[[rib]] {i}"):
                 sides_on(mesh, rib.path)
@@ -462,7 +462,7 @@ class Scene(check.Brief):
 
     def fault(self, text: str) -> ValueError:
         """A ValueError that names the file."""
-        return fault(self.path, text)
+        return scene_error(self.path, text)
 
     @contextmanager
     def blame(self, table: str, changes: Iterable[str] = ()) -> Iterator[None]:
@@ -521,28 +521,28 @@ def scene_of(tables: Mapping[str, Any], path: Path, *, folder: Path) -> Scene:
     tables = dict(tables)
     title = tables.pop("title", "")
     if not isinstance(title, str):
-        raise fault(path, f"title must be text, got {check.shown(title)}")
+        raise scene_error(path, f"title must be text, got {check.shown(title)}")
     title = "".join(c if c.isprintable() else " " for c in title)  # terminals obey control characters
     for name, table in tables.items():
         if name not in TABLES:
             what = f"[{name}] is not a table" if isinstance(table, dict | list) else f"{name} is not a key"
-            raise fault(path, f"{what} of a scene{check.nearest(name, (*TABLES, 'title'))}")
+            raise scene_error(path, f"{what} of a scene{check.nearest(name, (*TABLES, 'title'))}")
         if not isinstance(table, dict) and name not in (REPEATED, *PARTS):
-            raise fault(path, f"{name} must be a table, written [{name}]")
+            raise scene_error(path, f"{name} must be a table, written [{name}]")
     try:
-        tables = filled(tables)
+        tables = fill_names(tables)
     except ValueError as error:
-        raise fault(path, str(error)) from None
+        raise scene_error(path, str(error)) from None
     for name in REQUIRED:
         if name not in tables:
-            raise fault(path, f"[{name}] is missing")
+            raise scene_error(path, f"[{name}] is missing")
     strokes = read_strokes(path, tables.pop(REPEATED, []), folder)
     intervals: dict[str, Any] = {}
     for name, table in tables.items():
         try:
             tables[name], found = known.taken(name, table)
         except ValueError as error:
-            raise fault(path, f"[{name}] {error}") from None
+            raise scene_error(path, f"[{name}] {error}") from None
         intervals |= found
     parts: dict[str, Any] = {name: read_list(path, name, tables.pop(name)) for name in PARTS if name in tables}
     parts |= {name: read_part(path, name, table, folder) for name, table in tables.items()}

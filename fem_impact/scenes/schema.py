@@ -27,7 +27,7 @@ from ..modes.finding import find_modes
 from ..show import sound
 from ..sweeps.cells import read_axis
 from . import keys
-from .fields import heights, over_frequency, tapered, varying
+from .fields import heights, over_frequency, tapered_size, varying_field
 
 WORD = r"""(?:[\w-]++|"[^"\\\n]*+(?:\\.[^"\\\n]*+)*+"?|'[^'\n]*+'?)"""  # unclosed, too: each is passed once
 DOTTED = re.compile(rf"{WORD}(?:[ \t]*+\.[ \t]*+{WORD}){{0,15}}+(?P<more>[ \t]*+\.[ \t]*+{WORD})?")  # a scene has two
@@ -50,10 +50,10 @@ def _plate(material: Material, layers: Sequence[Any] = (), *, thickness: Any = N
         return Plate.laminate(layers, tension=tension)
     if thickness is None:
         raise ValueError("thickness is missing; give it here, or write the plate's layers as [[layer]] tables")
-    return Plate(material, varying("thickness", thickness, 2), tension)
+    return Plate(material, varying_field("thickness", thickness, 2), tension)
 
 
-def _within(name: str, value: Any, maker: Callable[..., Any]) -> Any:
+def _made_within(name: str, value: Any, maker: Callable[..., Any]) -> Any:
     """What a table within another table makes; errors name it."""
     if not isinstance(value, Mapping):
         raise ValueError(f"{name} must be a table {{ {', '.join(keys_of(maker))} }}, got {check.shown(value)}")
@@ -72,11 +72,11 @@ def rise_of(value: Any) -> Callable[..., Any]:
     key = "table" if "table" in value else "shape"
     rest = {name: item for name, item in value.items() if name != key}
     if key == "table":
-        return _within("rise", value, heights)
-    return _within("rise", rest, RISES[check.one_of("rise.shape", value[key], RISES)])
+        return _made_within("rise", value, heights)
+    return _made_within("rise", rest, RISES[check.one_of("rise.shape", value[key], RISES)])
 
 
-def _risen(maker: Callable[..., Any]) -> Callable[..., Any]:
+def _with_rise(maker: Callable[..., Any]) -> Callable[..., Any]:
     """The same maker of meshes, with the rise of the unloaded surface as another argument."""
 
     def make(*, rise: Any = None, **values: Any) -> mesh.Mesh:
@@ -93,7 +93,7 @@ def _risen(maker: Callable[..., Any]) -> Callable[..., Any]:
 def _own_material(material: Any, base: Material | None) -> Material:
     if material is None and base is None:
         raise ValueError("material is missing: give it here or as [material]")
-    return base if material is None else _within("material", material, Material)  # type: ignore[return-value]
+    return base if material is None else _made_within("material", material, Material)  # type: ignore[return-value]
 
 
 def _rib(
@@ -112,7 +112,7 @@ def _rib(
         raise ValueError(f"path must be a list of points, got {path!r}; an edge or a line has a key of its own")
     if line is not None:
         path = [[0.0, 0.0], [1.0, 0.0]] if within is None else within.lines[line]  # a stand-in, until there is a mesh
-    section = _beam(_own_material(material, base), **{name: tapered(name, value) for name, value in size.items()})
+    section = _beam(_own_material(material, base), **{name: tapered_size(name, value) for name, value in size.items()})
     return Rib(path if edge is None else edge, section, offset)
 
 
@@ -126,8 +126,8 @@ def _layer(
 
 def _beam(material: Material, *, width: Any = None, height: Any = None, diameter: Any = None) -> Beam:
     """A beam of rectangular section, or of a round one."""
-    width, height = varying("width", width, 1), varying("height", height, 1)
-    diameter = varying("diameter", diameter, 1)
+    width, height = varying_field("width", width, 1), varying_field("height", height, 1)
+    diameter = varying_field("diameter", diameter, 1)
     if diameter is not None and width is None and height is None:
         return Beam.circular(material, diameter=diameter)
     if diameter is not None or width is None or height is None:
@@ -160,14 +160,14 @@ def _bar(
     return replace(Striker.flexible(find(n_modes=STICK_MODES, damping_ratio=damping_ratio), at=at), fixed=False)
 
 
-def _held(maker: Any) -> Callable[..., Striker]:
+def _with_hand(maker: Any) -> Callable[..., Striker]:
     """The same maker of strikers, with gravity and a table {stiffness, damping, force} of the hand as arguments."""
 
     def make(*, hand: Any = None, gravity: float = 0.0, **values: Any) -> Striker:
         striker = maker(**values).falling(gravity)
         if hand is None:
             return striker
-        return striker.held(_within("hand", hand, Hand))
+        return striker.held(_made_within("hand", hand, Hand))
 
     return _with_keys(make, maker, {"hand": None, "gravity": 0.0})
 
@@ -253,8 +253,8 @@ SIZES = dict.fromkeys(("width", "height", "diameter"))
 # The first entry is the key that selects the function, '' if there is only one.
 MAKERS: dict[str, tuple[str, dict[str, Callable[..., Any]]]] = {
     "mesh": ("shape", {
-        "rectangle": _risen(mesh.rectangle), "disk": _risen(mesh.disk), "polygon": _risen(mesh.polygon),
-        "outline": _risen(mesh.outline), "line": mesh.line, "file": _risen(mesh.load),
+        "rectangle": _with_rise(mesh.rectangle), "disk": _with_rise(mesh.disk), "polygon": _with_rise(mesh.polygon),
+        "outline": _with_rise(mesh.outline), "line": mesh.line, "file": _with_rise(mesh.load),
     }),
     "material": ("", {"": Material}),
     "section": ("kind", {"plate": _plate, "beam": _beam}),
@@ -262,7 +262,7 @@ MAKERS: dict[str, tuple[str, dict[str, Callable[..., Any]]]] = {
     "rib": ("", {"": _with_keys(_rib, _rib, SIZES)}),
     "target": ("", {"": _with_keys(target_values, target_values, TARGET)}),
     "striker": ("kind", {
-        name: _held(maker) for name, maker in {
+        name: _with_hand(maker) for name, maker in {
             "rigid": Striker.rigid, "sphere": _sphere, "stick": Striker.stick, "hammer": Striker.hammer,
             "turning": Striker.turning,
             "bar": _with_keys(_bar, _bar, SIZES),
@@ -292,7 +292,7 @@ OF_TARGET = {"stretching"}  # arguments of the strike that are keys of the table
 PATHS = ("source", "path")  # keys that name a file, relative to the scene file
 
 
-def fault(path: Path, text: str) -> ValueError:
+def scene_error(path: Path, text: str) -> ValueError:
     """A ValueError of one line that names the file; cleans the text, as a scene may come from an untrusted source."""
     return ValueError(f"{check.line(str(path))}: {check.line(text)}")
 
@@ -304,16 +304,18 @@ def read_tables(path: Path) -> dict[str, Any]:
         text = raw.decode("utf-8-sig")
         for key in DOTTED.finditer(text):
             if key["more"]:  # the time to parse it grows with the square of its length
-                raise fault(path, f"a key must have at most 16 parts between dots, got {check.shown(key[0])} and more")
+                raise scene_error(
+                    path, f"a key must have at most 16 parts between dots, got {check.shown(key[0])} and more"
+                )
         return tomllib.loads(text)
     except UnicodeDecodeError:
-        raise fault(path, "a scene must be UTF-8 text; save it in that encoding") from None
+        raise scene_error(path, "a scene must be UTF-8 text; save it in that encoding") from None
     except (tomllib.TOMLDecodeError, RecursionError) as error:
         said = str(error).replace("Cannot overwrite a value", "the same key is given twice in one table")
-        raise fault(path, f"not valid TOML: {said}") from None
+        raise scene_error(path, f"not valid TOML: {said}") from None
 
 
-def written(tables: Mapping[str, Any]) -> str:
+def toml_text(tables: Mapping[str, Any]) -> str:
     """The text of a TOML file with these tables."""
     lines = [f"{key} = {_toml(value)}" for key, value in tables.items() if not isinstance(value, Mapping)]
     for name, table in tables.items():
@@ -336,18 +338,18 @@ def read_bytes(path: Path) -> bytes:
     if not path.is_file():  # refuses folders, and pipes that may never end
         folder = path.parent
         near = [name.name for name in islice(folder.iterdir(), 1000)] if folder.is_dir() and not path.exists() else []
-        raise fault(path, check.absent(path) + check.nearest(path.name, near))
+        raise scene_error(path, check.absent(path) + check.nearest(path.name, near))
     with open(path, "rb") as file:
         raw = file.read(LARGEST_FILE + 1)
     if len(raw) > LARGEST_FILE:
-        raise fault(path, f"the file must be smaller than {LARGEST_FILE} bytes; check that it is a scene")
+        raise scene_error(path, f"the file must be smaller than {LARGEST_FILE} bytes; check that it is a scene")
     return raw
 
 
 def read_list(path: Path, name: str, tables: Any) -> tuple[Part, ...]:
     """Read tables that may stand several times."""
     if not isinstance(tables, list) or not all(isinstance(table, dict) for table in tables):
-        raise fault(path, f"{name} must be tables, each written [[{name}]]")
+        raise scene_error(path, f"{name} must be tables, each written [[{name}]]")
     return tuple(read_part(path, name, table, Path(), f"[[{name}]] {i}") for i, table in enumerate(tables))
 
 
@@ -359,7 +361,7 @@ def read_strokes(path: Path, tables: Any, folder: Path) -> tuple[Part, ...]:
         try:
             stroke_values(**part.values)
         except ValueError as error:
-            raise fault(path, f"{called} {error}") from None
+            raise scene_error(path, f"{called} {error}") from None
         for name in NESTED:
             if name in table:
                 read_part(path, name, table[name], folder, f"{called} {name}:")
@@ -373,7 +375,7 @@ def read_part(path: Path, table: str, values: dict[str, Any], folder: Path, call
     """
 
     def wrong(text: str) -> ValueError:
-        return fault(path, f"{called or f'[{table}]'} {text}")
+        return scene_error(path, f"{called or f'[{table}]'} {text}")
 
     try:
         bad = _not_finite(values)

@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from .._base import check, markup
-from .._base.explained import below, noted, pointed
+from .._base.explained import heading_line, lines_of_notes, with_headings
 from ..impact import assumption, quantities
 from ..impact.engine import TOLERANCE
 from ..model import cost, playing
@@ -86,11 +86,11 @@ class SequencePlan(check.Brief):
         head = "stroke", "when", "speed", "predicted error", "modes needed to"
         more = [f"... and {count - playing.LISTED} more"] if count > playing.LISTED else []
         table = (*markup.columns(rows[: playing.LISTED], head), *more, *reasons)
-        lines = [shared, *below(shared), *(f"  {line}" for line in table)]
+        lines = [shared, *heading_line(shared), *(f"  {line}" for line in table)]
         if body.assumptions:
             said = assumption.lines(body.assumptions, self.tolerance)
-            lines += [f"Model of stroke {self.needed}: {pointed(line)}" for line in said]
-        return "\n".join([*lines, f"Cost: {body.cost}", *noted(body.notes)])
+            lines += [f"Model of stroke {self.needed}: {with_headings(line)}" for line in said]
+        return "\n".join([*lines, f"Cost: {body.cost}", *lines_of_notes(body.notes)])
 
 
 class Played(NamedTuple):

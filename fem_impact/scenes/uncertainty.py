@@ -22,9 +22,9 @@ from ..model.target import CLOSE, FIRST_FLEXIBLE, Target
 from ..modes.modal import Damping, Modes
 from ..show import export, figures
 from ..sweeps import bodies, grid
-from ..sweeps.cases import Cases, few, solve_all, try_each
+from ..sweeps.cases import Cases, fewer_values, solve_all, try_each
 from ..sweeps.cells import ALIASES, AXES, LAW, Case
-from ..sweeps.inputs import REACH, Input, crossed, drawn, mixing, read_inputs, shares
+from ..sweeps.inputs import REACH, Input, correlating_matrix, drawn_inputs, read_inputs, shares, sobol_points
 from ..sweeps.spreads import DOUBLE, QUANTITIES, Checks, Spread
 from ..sweeps.store import Texts
 from .maps import MOST_ROWS, changed_scene
@@ -140,20 +140,20 @@ def spread(
     n = check.count("n", n)
     if n > (most := check.number("max_blows", max_blows)):
         raise ValueError(f"n must be at most {most:g} blows, got {n}; raise max_blows")
-    mixer = mixing(inputs, correlation)
+    mixer = correlating_matrix(inputs, correlation)
     seed = check.count("seed", seed, low=0)
     workers = None if workers is None else check.count("workers", workers)
     groups, why = _grouped(sobol, mixer, n, len(inputs))
     band = None if max_frequency is None else check.positive("max_frequency", max_frequency, "Hz")
     limit = check.tolerance(blow.arguments.get("tolerance", grid.TOLERANCE) if tolerance is None else tolerance)
     d = len(inputs)
-    points = crossed(shares(n // (d + 2), 2 * d, seed)) if groups else shares(n, d, seed)
-    values = drawn(inputs, points, mixer)
+    points = sobol_points(shares(n // (d + 2), 2 * d, seed)) if groups else shares(n, d, seed)
+    values = drawn_inputs(inputs, points, mixer)
     if not np.isfinite(values).all() or np.abs(values).max() > REACH:
         raise ValueError(f"vary must stay finite and below {REACH:g}; choose distributions with shorter tails")
     asked = _SpreadAsked(blow, loaded, inputs, values, limit, store)
     exact = replace(asked.cases(), band=band)
-    base, rough = exact.base, few(exact)
+    base, rough = exact.base, fewer_values(exact)
     numbers, texts = solve_all(rough, workers, client, store, watch)
     checks, rescaled = _checked(exact, numbers, workers), asked.rescaled(base)
     notes = plausible.together(base.modes.notes, base.striker.notes)
@@ -428,7 +428,7 @@ def _table(
     part = np.arange(len(counts)) % n_parts
     meaning = "0: all inputs from A, the last: all from B, others: one from B"
     data["part"] = ("blow", part.astype(np.int32), {"long_name": meaning})
-    data["failure"] = ("blow", grid.listed(texts, len(counts)), {"long_name": "error text of a failed blow"})
+    data["failure"] = ("blow", grid.error_texts(texts, len(counts)), {"long_name": "error text of a failed blow"})
     return xarray.Dataset(data)
 
 

@@ -76,7 +76,7 @@ def write_vtk(path: str | Path, modes: Modes | Body, response: Response | None =
         cells = modes.cells if len(modes.cells) else np.arange(len(points))[:, None]
     else:
         points, cells = viewing.grid(modes)
-        places = viewing.placed(modes, points)
+        places = viewing.places_in_space(modes, points)
     if response is None:
         parts = _mode_parts(modes, points)
         stamps = np.array(modes.frequencies, float)
@@ -128,7 +128,7 @@ def write_animation(path: str | Path, modes: Modes, mode: int, *, frames: int = 
     points, cells = viewing.grid(modes)
     arrays, fields = _mode_parts(modes, points)[mode - 1]
     parts = [({"warp": np.cos(2.0 * np.pi * turn) * arrays["warp"]}, fields) for turn in turns]
-    _write_collection(path, viewing.placed(modes, points), cells, parts, turns / frequency)
+    _write_collection(path, viewing.places_in_space(modes, points), cells, parts, turns / frequency)
 
 
 def vtk_ending(path: str | Path) -> str:
@@ -155,7 +155,7 @@ def write_uff(path: str | Path, modes: Modes) -> None:
         raise ValueError("modes must be those of a plate or beam, got a rigid mass, which has no shape to write")
     points, cells = modes.shapes.grid()
     with replacing(path) as temporary:
-        shapes, places = modes.shape_at(points), viewing.placed(modes, points)
+        shapes, places = modes.shape_at(points), viewing.places_in_space(modes, points)
         universal_files.write_modes(temporary, modes.frequencies, modes.damping_ratio, shapes, places, cells)
 
 
@@ -343,7 +343,7 @@ def _motion_parts(
             vector[:, :, 2] = along * state @ rows.T  # (n_times, n_points)
             moves.append(vector)
         if response.striker is not None and response.at is not None:
-            at = viewing.placed(response.target, np.atleast_2d(response.at))
+            at = viewing.places_in_space(response.target, np.atleast_2d(response.at))
             tip = response.displacement(response.striker.at[None], times, body=0)[:, 0]
             for field, way in zip(fields, tip):
                 field["striker"] = at + np.array([0.0, 0.0, along * way])

@@ -18,7 +18,7 @@ from ..impact import spectra
 from ..impact.measured import Comparison
 from ..impact.response import Response
 from ..mesh import edge_table
-from ..mesh.mesh_files import quartered
+from ..mesh.mesh_files import quarter_triangles
 from ..mesh.meshes import Mesh
 from ..model.playing import Strokes
 from ..modes.modal import Modes
@@ -26,7 +26,7 @@ from ..modes.viewing import rib_sides
 from ..sweeps.spreads import DOUBLE, QUANTITIES, Spread, double_hits
 from . import sampling
 from .canvas import COLOURS, VERMILION
-from .style import BLUE, ENDINGS, GREEN, GREY, PALETTE, SKY, STYLE, draw_rim, opened, panels, set_units
+from .style import BLUE, ENDINGS, GREEN, GREY, PALETTE, SKY, STYLE, draw_rim, open_figure, panels, set_units
 
 SPECTRUM_BAND = (10.0, 20e3)  # [Hz] default band: about what people hear
 SPECTRUM_POINTS = 1200  # [-] frequencies in a spectrum: about one per pixel
@@ -45,7 +45,7 @@ MARGIN = 0.1  # [-] time shown before and after the blow, over its duration
 
 def styled(width: float, height: float) -> AbstractContextManager[Figure]:
     """A figure of a size [inch], drawn in `STYLE` inside the block."""
-    return opened(width, height)
+    return open_figure(width, height)
 
 
 @check.typed
@@ -199,7 +199,7 @@ def mode_shapes(modes: Modes, *, count: int = 12, columns: int = 4) -> Figure:
                 axes.set(ylim=(-1.1, 1.1), yticks=[], xlabel="x [m]" if i >= len(all_axes) - columns else "")
             else:
                 axes.tripcolor(*points.T, cells, shape, cmap=COLOURS, vmin=-1, vmax=1, shading="gouraud")
-                nodal = _unflattened(shape, cells)
+                nodal = _without_zeros(shape, cells)
                 axes.tricontour(*points.T, cells, nodal, levels=[0.0], colors="black", linewidths=0.8)
                 _draw_edges(axes, modes, points, cells)
             axes.set_title(f"{i + 1}   {in_hertz(modes.frequencies[i])}")
@@ -212,7 +212,7 @@ def chladni(modes: Modes, count: int, columns: int) -> Figure:
     if modes.n_rigid == modes.n_modes:
         raise ValueError("modes must have a flexible mode: a rigid motion has no Chladni figure")
     points, cells = sampling.grid(modes)
-    cells, sides = quartered(cells, len(points))  # finer triangles make smooth lines
+    cells, sides = quarter_triangles(cells, len(points))  # finer triangles make smooth lines
     points = np.concatenate([points, points[sides].mean(axis=1)])
     shapes, columns = sampling.gallery(modes, points, count, columns, first=modes.n_rigid)
     tall = min(1.6, max(0.4, float(np.ptp(points[:, 1]) / np.ptp(points[:, 0]))))
@@ -220,7 +220,7 @@ def chladni(modes: Modes, count: int, columns: int) -> Figure:
     with panels(shapes.shape[1], columns, 2.0, 2.0 * tall + 0.35) as (figure, all_axes):
         for i, (axes, shape) in enumerate(zip(all_axes, shapes.T), modes.n_rigid):
             mesh = Triangulation(points[:, 0], points[:, 1], cells, np.abs(shape[cells]).max(axis=1) < sand)
-            axes.tricontour(mesh, _unflattened(shape, cells, sand), levels=[0.0], colors="black")
+            axes.tricontour(mesh, _without_zeros(shape, cells, sand), levels=[0.0], colors="black")
             _draw_edges(axes, modes, points, cells)
             axes.autoscale_view()
             axes.set_title(f"{i + 1}   {in_hertz(modes.frequencies[i])}")
@@ -260,7 +260,7 @@ def in_hertz(value: float, digits: int = 4) -> str:
     return f"{value:.{digits}g} Hz" if value < 10.0**digits else f"{value * 1e-3:.{digits}g} kHz"
 
 
-def _unflattened(shape: np.ndarray, cells: np.ndarray, flat: float = SAME) -> np.ndarray:
+def _without_zeros(shape: np.ndarray, cells: np.ndarray, flat: float = SAME) -> np.ndarray:
     """The shape (n_points,), with zeros replaced by a tiny share of the values around them.
 
     A supported edge is zero up to rounding; without this, parts of it would be drawn as nodal lines.
@@ -335,7 +335,7 @@ def spread(found: Spread) -> Figure:
         panels = figure.subplots(len(rows), 3, squeeze=False, width_ratios=(1.1, 1.1, 1.0))
         for (left, middle, right), name in zip(panels, rows):
             _histogram(left, found, name)
-            _leading(middle, found, name)
+            _leading_input(middle, found, name)
             _bars(right, found, name)
         kind = "variance explained (Sobol)" if found.shares else "squared rank correlation"
         for panel, title in zip(panels[0], ("distribution, median, 90 %", "against the leading input, 90 %", kind)):
@@ -370,7 +370,7 @@ def _histogram(axes: Any, found: Spread, name: str) -> None:
     set_units(axes, QUANTITIES[name][0])
 
 
-def _leading(axes: Any, found: Spread, name: str) -> None:
+def _leading_input(axes: Any, found: Spread, name: str) -> None:
     """The quantity over the input with the largest share."""
     order = found.ranking(name)
     if not order:

@@ -81,7 +81,7 @@ def clearest(response: Response, times: np.ndarray) -> int:
     return int(np.argmax(deflection >= 0.5 * deflection.max()))
 
 
-def ringing(modes: Modes, some: np.ndarray, limits: tuple[float, float]) -> float:
+def ringing_time(modes: Modes, some: np.ndarray, limits: tuple[float, float]) -> float:
     """How long it takes until the slowest of some modes has lost 60 dB [s], within limits."""
     slowest = float((modes.damping_ratio * modes.omega)[some].min(initial=np.inf))
     return float(np.clip(np.log(1e3) / slowest, *limits)) if slowest > 0.0 else limits[1]

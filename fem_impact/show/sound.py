@@ -269,7 +269,7 @@ def _velocity(response: Response, audible: np.ndarray, shape: np.ndarray, times:
     row = np.cumsum(alone) - 1
     for start, end in flights:
         state = q[row[start], audible], p[row[start], audible]
-        velocity[start:end] = _ring(response, times[start:end], state, audible, shape[None, audible] + 0j, 1)
+        velocity[start:end] = _ringing_motion(response, times[start:end], state, audible, shape[None, audible] + 0j, 1)
     return velocity
 
 
@@ -514,7 +514,7 @@ def _pressure(
         if n_first < len(local):
             since = local[n_first:] - last
             q, p = (state[0, audible] for state in hit.modal_state(since[:1]))
-            rest = [_ring(hit, since, (q, p), audible, weights, order) for order, weights in delayed.items()]
+            rest = [_ringing_motion(hit, since, (q, p), audible, weights, order) for order, weights in delayed.items()]
             found.append(np.sum(rest, axis=0))
     return np.concatenate(found)
 
@@ -543,7 +543,7 @@ def _air(air: Any) -> tuple[float, float]:
 def _times(response: Response | Strokes, audible: np.ndarray, duration: float | None, rate: int) -> np.ndarray:
     """Times [s] of all samples in a duration [s]; without one, chosen from the decay after the last stroke."""
     if duration is None:
-        duration = sampling.ringing(response.target, audible, (SHORTEST, LONGEST))
+        duration = sampling.ringing_time(response.target, audible, (SHORTEST, LONGEST))
         duration += 0.0 if isinstance(response, Response) else float(response.starts[-1] - response.starts[0])
     # so many samples take about ten seconds to compute
     duration = check.between("duration", check.positive("duration", duration, "s"), 0.0, 1e7 / rate, "s")
@@ -555,13 +555,15 @@ def _scaled(signal: np.ndarray, rate: int, full_scale: float, unit: str, normali
     return sound.normalised() if normalise else sound
 
 
-def _ring(
+def _ringing_motion(
     response: Response, times: np.ndarray, state: tuple, audible: np.ndarray, weights: np.ndarray, order: int
 ) -> np.ndarray:
-    """`free_motion.swing` of the audible modes, (n_times,)."""
+    """`free_motion.flexible_motion` of the audible modes, (n_times,)."""
     modes = response.target
     bias = response.constant_forces[audible]
-    return free_motion.swing(modes.omega[audible], modes.damping_ratio[audible], bias, state, times, weights, order)
+    return free_motion.flexible_motion(
+        modes.omega[audible], modes.damping_ratio[audible], bias, state, times, weights, order
+    )
 
 
 def _arrival(

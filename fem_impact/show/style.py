@@ -55,7 +55,7 @@ class StyledFigure(Figure):
 
 
 @contextmanager
-def opened(width: float, height: float) -> Iterator[Figure]:
+def open_figure(width: float, height: float) -> Iterator[Figure]:
     """A figure of a size [inch], drawn in `STYLE` inside the block."""
     with matplotlib.rc_context(STYLE):
         yield StyledFigure(figsize=(width, height), layout="constrained")
@@ -65,7 +65,7 @@ def opened(width: float, height: float) -> Iterator[Figure]:
 def panels(count: int, columns: int, width: float, height: float, **shared: Any) -> Iterator[tuple[Figure, list[Any]]]:
     """A figure of ``count`` panels of a size [inch] in rows, drawn in `STYLE` inside the block, and their axes."""
     rows = -(-count // columns)
-    with opened(width * columns, height * rows) as figure:
+    with open_figure(width * columns, height * rows) as figure:
         all_axes = figure.subplots(rows, columns, squeeze=False, **shared).ravel()
         for axes in all_axes[count:]:
             axes.set_visible(False)

@@ -32,7 +32,7 @@ LENGTHS = (48, 192, 768, 3072)  # [-] kernel lengths in steps, tried in turn unt
 SLACK = 2.0  # [-] a touch or gap counts only above this many times tolerance times deepest approach
 # [-] what is stated, as two runs may agree by chance: of their difference, over what the order leaves of it; of the
 # misfit of a smooth force; of that of a lossy one, per loss; of the change of the rates at which contacts begin and end
-SAFE, SMOOTH, LOSSY, INSTANT = 5.0, 2.5, 10.0, 0.2
+SAFE, SMOOTH, LOSSY, INSTANT, RATTLE = 5.0, 2.5, 10.0, 0.2, 0.5
 FALLS = 2.5  # [-] power of the ratio of steps by which an error found falls at most
 SUMMED = 2.5e-3  # [-] what sums for a centroid err by at most, whatever the steps; 90 % of 1 111 less than 1e-4
 FEW = 1024  # [-] blows that are too few to split between threads: one alone is faster
@@ -189,7 +189,7 @@ Kernels = dict[tuple[int, int, int, bool], tuple[np.ndarray, ...]]  # keys: fami
 NO_KERNELS = (np.empty((0, 4, 0)),) * 2
 
 
-def bounce(
+def follow_blows(
     blows: Blows, *, tolerance: float, band: float = 0.0, workers: int | None = None, kernels: Kernels | None = None
 ) -> Bounces:
     """Compute blows in kernel form at unit speed, with shorter steps until each meets the tolerance, as in `strike`.
@@ -202,7 +202,7 @@ def bounce(
     return Bounces(*_in_pieces(blows, partial(_follow, tolerance=tolerance, band=band), workers, kernels))
 
 
-def allowed(tolerance: float) -> float:
+def allowed_error(tolerance: float) -> float:
     """Largest estimated error [-] of the time steps that a tolerance accepts.
 
     A tenth of it, as with half of it two runs agreed by chance in 8 of 7 000 cells; or half of a tolerance so small
@@ -214,10 +214,10 @@ def allowed(tolerance: float) -> float:
 def count_impacts(blows: Blows, *, tolerance: float, most: int, kernels: Kernels | None = None) -> np.ndarray:
     """Only how often each blow touches (n_cases,), at most ``most``; NaN where the modal engine must count.
 
-    Two runs of different steps agree on each number. ``tolerance`` and ``kernels`` as in `bounce`, but errors of forces
-    and times ask for no shorter steps, and a touch in flight is missed where the two agree on that.
+    Two runs of different steps agree on each number. ``tolerance`` and ``kernels`` as in `follow_blows`, but errors of
+    forces and times ask for no shorter steps, and a touch in flight is missed where the two agree on that.
     """
-    return _in_pieces(blows, partial(_counted, tolerance=tolerance, most=most), None, kernels)[0]
+    return _in_pieces(blows, partial(_count_by_two_runs, tolerance=tolerance, most=most), None, kernels)[0]
 
 
 @one_thread
@@ -262,16 +262,17 @@ def _follow(blows: Blows, tolerance: float, band: float, kernels: Kernels) -> tu
         slack = SLACK * tolerance * 2.0 ** (0.5 * STEP_ORDER * (first[todo] - step))
         fine = engine.run_all(todo, step, slack, ratio * coarse[FOUND_STEPS])
         found, stated = engine.compare_runs(coarse, fine, todo, step, ratio)
-        rung = engine.law["loss"][todo] * engine.softness(todo, step, RESOLVED)
+        loss = engine.law["loss"][todo]
+        rung = loss * engine.softness(todo, step, RESOLVED) if loss.any() else loss
         by_chance = np.minimum(before / ratio**FALLS, tolerance)
         stated = np.fmax.reduce([stated, by_chance, missed_by_ringing(rung, tolerance)])
-        met = (found <= allowed(tolerance)) & (stated <= tolerance)
+        met = (found <= allowed_error(tolerance)) & (stated <= tolerance)
         final[:, todo[met]] = fine[:, met]
         error[todo[met]] = stated[met]
         coarse, todo = fine[:, ~met], todo[~met]
         before = np.nan_to_num(found[~met], posinf=0.0)
         # halving always leaves 13 % of stiff blows at 3e-5 undone instead of 8 %, never a third of those with loss
-        finer = np.where(found[~met] < 8.0 * allowed(tolerance), 1, 2)
+        finer = np.where(found[~met] < 8.0 * allowed_error(tolerance), 1, 2)
         step = step[~met] + finer
     v = blows.speed
     return (
@@ -280,7 +281,7 @@ def _follow(blows: Blows, tolerance: float, band: float, kernels: Kernels) -> tu
     )  # fmt: skip
 
 
-def _counted(blows: Blows, tolerance: float, most: int, kernels: Kernels) -> tuple[np.ndarray]:
+def _count_by_two_runs(blows: Blows, tolerance: float, most: int, kernels: Kernels) -> tuple[np.ndarray]:
     """Numbers of impacts on which two runs agree, the finer one with half the step."""
     engine = _Engine(blows, 0.0, kernels)
     tolerance = min(tolerance, COUNTED)
@@ -421,6 +422,6 @@ class _Engine:
         peak = np.where(loss > 0.0, lossy, SMOOTH * misfit)
         turned = abs(coarse[FOUND_SWING] / fine[FOUND_SWING] - 1.0)
         share = 2.0 ** (-0.5 * step) * fine[FOUND_IMPACTS] / fine[FOUND_TIME]  # of a step in a contact
-        rattles = np.minimum(1.0, self.softness(cells, step, 1.0)) / ratio
+        rattles = RATTLE * np.minimum(1.0, self.softness(cells, step, 1.0)) / ratio
         turns = np.maximum(INSTANT * (share + loss), rattles) * turned
         return found, np.fmax.reduce([found, SAFE * change / (ratio**STEP_ORDER - 1.0), peak, turns])

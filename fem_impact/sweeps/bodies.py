@@ -26,8 +26,8 @@ from ..model.target import CLOSE, FIRST_FLEXIBLE, FIRST_LOOK, Elements, Stages, 
 from ..model.vectors import RitzTarget
 from ..modes.modal import Modes, damping_ratios
 from ..modes.shapes import FieldShapes, SampledShapes
-from .batches import allowed
-from .cells import Case, checked_axes, sampled
+from .batches import allowed_error
+from .cells import Case, checked_axes, sample_modes
 from .inputs import REACH
 
 Axes = Mapping[str, np.ndarray]
@@ -60,7 +60,7 @@ def body_of(
     if target.modes is not None:
         case = started(target.finished(target.modes))
         return case, checked_axes(case, over)
-    if alone and vectors.usable(target):
+    if alone and vectors.vectors_usable(target):
         case = started(outline(target, stages))
         axes = checked_axes(case, over)
         reduced = by_vectors(target, case, axes, tolerance=tolerance, stages=stages, keep=keep)
@@ -123,11 +123,11 @@ def by_vectors(
 ) -> Case | None:
     """The blow on Ritz vectors that carry every cell of a map; None if no mesh allowed or a point struck forbids it.
 
-    ``target`` as of `vectors.usable`, ``case`` on any modes of it, ``axes`` as of `cells.checked_axes`, ``keep`` a
-    file. Vectors and mesh may take what the time steps leave of the tolerance of every cell. The shortest contact
-    of all cells chooses shift and first mesh. A few cells, those of the shortest and the longest contact among them,
-    are struck with all vectors, with fewer and on a coarser mesh; the errors decide on more vectors or a finer mesh, as
-    that of a single blow does.
+    ``target`` as of `vectors.vectors_usable`, ``case`` on any modes of it, ``axes`` as of `cells.checked_axes`,
+    ``keep`` a file. Vectors and mesh may take what the time steps leave of the tolerance of every cell. The shortest
+    contact of all cells chooses shift and first mesh. A few cells, those of the shortest and the longest contact among
+    them, are struck with all vectors, with fewer and on a coarser mesh; the errors decide on more vectors or a finer
+    mesh, as that of a single blow does.
     """
     if "target_frequency" in axes:
         first = target.finished(target.find(FIRST_FLEXIBLE, tolerance=CLOSE))
@@ -166,7 +166,7 @@ def of_hammers(
 
     ``ends`` and ``chance`` as in `Sized`, of "mass" and "stiffness"; only whether a second impact follows matters.
     """
-    if target.modes is None and vectors.usable(target):
+    if target.modes is None and vectors.vectors_usable(target):
         shape = outline(target, stages)
         points = shape.points("at", at)
         case = Case(shape, Striker.rigid(ends[0]["mass"]), Contact.linear(1.0), points[0], 1.0)
@@ -222,7 +222,7 @@ class Sized:
             one = replace(self, reduced=reduced, tried={})
             for blows in (extreme, [*extreme, *self.chance]):
                 _, _, found = refine(replace(one, blows=blows), Sized._judged, stages)
-            views |= {tuple(point.tolist()): sampled(modes, point[None]) for point, modes in zip(some, found)}
+            views |= {tuple(point.tolist()): sample_modes(modes, point[None]) for point, modes in zip(some, found)}
         return views
 
     def found(self, stages: Stages, keep: Any = None) -> "tuple[Sized, list[Modes]]":
@@ -245,7 +245,7 @@ class Sized:
     def refined(self, error: Error, stages: Stages) -> "Sized | None":
         """The same with more vectors or a finer mesh, whichever the errors of its blows require."""
         assert self.reduced is not None
-        return self if self.reduced.improved(error, self.tolerance - allowed(self.tolerance)) else None
+        return self if self.reduced.improved(error, self.tolerance - allowed_error(self.tolerance)) else None
 
     def _judged(self, found: list[Modes], stages: Stages) -> tuple[Error, list[Modes]]:
         """The errors of the blows at all points, and the target as excited at each.
@@ -257,7 +257,7 @@ class Sized:
         with stages("strike"):
             for (i, modes), (n, values) in product(enumerate(found), enumerate(self.blows)):
                 before = self.tried.setdefault((i, n), [])
-                if vectors.hopeless(before):
+                if vectors.is_hopeless(before):
                     continue
                 case, close = self.at(modes, self.reduced.at[i], values), max(FINEST, Budget(self.tolerance).cheap)
                 try:
@@ -266,7 +266,7 @@ class Sized:
                 except check.SimulationError:  # nothing is known of a blow that fails
                     errors.append((0.0, 0.0))
                 before.append(errors[-1][0])
-                lost |= vectors.hopeless(before)
+                lost |= vectors.is_hopeless(before)
         if lost:
             self.reduced.tried.clear()  # the others have not been tried as often
         worst = np.sort(np.array(errors or [(0.0, 0.0)]), axis=0)  # (n_struck, 2)

@@ -13,7 +13,7 @@ from .._base import check
 from ..model.budget import FINEST
 from . import batches
 from .cases import Cases
-from .cells import AXES, FAMILY_AXES, logarithmic
+from .cells import AXES, FAMILY_AXES, is_logarithmic
 from .refined import beside_change
 
 WIDTH = 1.5e-3  # [-] widest bracket of a border, a share of the axis: half of it and FINER together stay below 1e-3
@@ -52,7 +52,7 @@ class Plane:
     def columns(self) -> list[tuple[np.ndarray, np.ndarray, bool]]:
         """Of both axes the values (n,), these or their logarithms, which are evenly spaced, and which of the two."""
         axes = [np.asarray(values, float).reshape(-1) for values in self.grid.axes.values()]
-        logs = [logarithmic(values) for values in axes]
+        logs = [is_logarithmic(values) for values in axes]
         return [(values, np.log(values) if log else values, log) for values, log in zip(axes, logs)]
 
     def values_at(self, places: np.ndarray) -> np.ndarray:

@@ -40,9 +40,9 @@ class Cases:
     """The blow that all cases share, and what is different in each: every combination of values, or row by row.
 
     Of rows, the numbers that need kernels of their own (strike point, damping, and the frequency of a flexible striker
-    over that of the body) must take few values, see `few`. The body's frequency is free there: with time in units of
-    its period the blow on a body r times as high is that on the body itself, of stiffness over r squared and speed
-    over r.
+    over that of the body) must take few values, see `fewer_values`. The body's frequency is free there: with time in
+    units of its period the blow on a body r times as high is that on the body itself, of stiffness over r squared and
+    speed over r.
     """
 
     base: Case
@@ -240,7 +240,7 @@ def _ranks(column: np.ndarray) -> np.ndarray:
     return ranks
 
 
-def few(cases: Cases) -> Cases:
+def fewer_values(cases: Cases) -> Cases:
     """The same rows with few values of what needs kernels of its own: each value becomes the nearest level.
 
     All dimensions that need kernels get equally many levels, each for as many rows as any other, at most `FAMILIES`
@@ -268,7 +268,7 @@ def few(cases: Cases) -> Cases:
     return replace(cases, axes=found, kernels={})
 
 
-def batchable(column: Mapping[str, np.ndarray]) -> np.ndarray:
+def can_be_batched(column: Mapping[str, np.ndarray]) -> np.ndarray:
     """Which blows (n_cells,) can be followed together, by their parameters, (n_cells,) each."""
     found = (column["exponent"] >= 1.0) & (column["gap"] >= 0.0)
     for name in ALONE:
@@ -305,7 +305,7 @@ def solve_cases(cases: Cases, start: int, stop: int, *, workers: int | None = No
         name: cases.axes[name][numbered[name]] if name in numbered else np.full(count, value)
         for name, value in shared.items()
     }
-    quick = batchable(column) & (not cases.extra) & (not base.modes.stretches)
+    quick = can_be_batched(column) & (not cases.extra) & (not base.modes.stretches)
     ratio = cases.ratio[cases.cells(start, stop)] if cases.by_row else np.ones(count)
     bands = cases.bands(ratio)
     for band in np.unique(bands[quick]):
@@ -316,7 +316,7 @@ def solve_cases(cases: Cases, start: int, stop: int, *, workers: int | None = No
             families, kind, column["target_mass"][cells], column["mass"][cells], column["stiffness"][cells] / r**2,
             column["exponent"][cells], column["speed"][cells] / r, column["loss"][cells] * r,
         )  # fmt: skip
-        found = batches.bounce(
+        found = batches.follow_blows(
             blows, tolerance=cases.tolerance, band=float(band), workers=workers, kernels=cases.kernels
         )
         for row, name in enumerate(names):

@@ -83,19 +83,19 @@ def model_error(cases: Cases) -> tuple[np.ndarray, str]:
     return np.exp(logs), ", ".join(unknown)
 
 
-def described(cases: Cases, numbers: np.ndarray, workers: int | None = None) -> np.ndarray:
+def errors_of_description(cases: Cases, numbers: np.ndarray, workers: int | None = None) -> np.ndarray:
     """Error [-] of the bodies' description in each cell, in the shape of a map, as blows on poorer ones show it.
 
     Evenly spaced cells, at most DOUBTED, are struck again on bodies described less well: by `Modes.poorer`, or where
-    modes left out may matter `thinner`. Any other cell has the error of the nearest. Too few vectors may agree on a
-    final separation that is none; therefore cells with several impacts are also struck alone, because `strike` looks
-    for that; so are the cells of a body of which something is not stated (`Modes.unstated`).
+    modes left out may matter `blow_when_thinned`. Any other cell has the error of the nearest. Too few vectors may
+    agree on a final separation that is none; therefore cells with several impacts are also struck alone, because
+    `strike` looks for that; so are the cells of a body of which something is not stated (`Modes.unstated`).
     """
     base = cases.base
     descriptions = dict.fromkeys(lacking for modes in base.views.values() for lacking in modes.descriptions())
     by_vectors, bodies = len(descriptions) > 1, (base.modes, base.striker.modes)
     unstated = cases.residual and any(each.unstated or each.shapes.dent(each.shapes.grid()[0]).any() for each in bodies)
-    thin = thinner(base) if cases.residual and not base.views else []
+    thin = blow_when_thinned(base) if cases.residual and not base.views else []
     if not by_vectors and not unstated and not thin:
         return np.zeros(cases.shape)
     most = DOUBTED["alone" if unstated or not cases.quick else "vectors" if by_vectors else "modes"]
@@ -133,7 +133,7 @@ def described(cases: Cases, numbers: np.ndarray, workers: int | None = None) -> 
     return total.reshape(few.shape)[np.ix_(*nearest)]
 
 
-def thinner(base: Case) -> list[tuple[Case, float]]:
+def blow_when_thinned(base: Case) -> list[tuple[Case, float]]:
     """The blow on bodies with their upper modes replaced by compliance, and the error over what this changes.
 
     For each of THINNED that leaves modes out, as of a single blow (`what_if.modes_left_out`).

@@ -14,9 +14,9 @@ from ..impact.collision import strike
 from ..impact.contact import MARKS, NUMBERS, Contact
 from ..impact.response import Response
 from ..impact.striker import Striker
-from ..model.audit import audited
+from ..model.audit import with_examiner
 from ..modes.modal import Modes
-from ..modes.shapes import SampledShapes, estimated
+from ..modes.shapes import SampledShapes, compliance_errors
 from .inputs import REACH
 
 AXES = {  # name: unit, what it is, its name in a scene file
@@ -160,7 +160,7 @@ class Case:
     def blow(self, **options: Any) -> Response:
         """The blow by the modal engine; ``options`` as of `strike`."""
         hit = strike(self.modes, self.striker, self.contact, at=self.at, speed=self.speed, **options)
-        return audited(hit)
+        return with_examiner(hit)
 
     def lacking(self, causes: Iterable[str]) -> "Case":
         """The same blow on the body described less well in these respects (`Modes.descriptions`), where it can be."""
@@ -170,21 +170,21 @@ class Case:
         """The same blow on bodies reduced to their contact points, (n_points, dimension) [m] of the one struck."""
         striker = self.striker
         if striker.modes.dimension:
-            striker = replace(striker, modes=sampled(striker.modes, striker.at[None]))
+            striker = replace(striker, modes=sample_modes(striker.modes, striker.at[None]))
         if self.views:
-            views = {place: sampled(modes, np.array([place])) for place, modes in self.views.items()}
-            return replace(self, modes=sampled(self.modes, self.at[None]), striker=striker, views=views)
+            views = {place: sample_modes(modes, np.array([place])) for place, modes in self.views.items()}
+            return replace(self, modes=sample_modes(self.modes, self.at[None]), striker=striker, views=views)
         places = np.unique(np.vstack([places, self.at[None]]), axis=0)
-        return replace(self, modes=sampled(self.modes, places), striker=striker)
+        return replace(self, modes=sample_modes(self.modes, places), striker=striker)
 
 
-def sampled(modes: Modes, points: np.ndarray) -> Modes:
+def sample_modes(modes: Modes, points: np.ndarray) -> Modes:
     """Modes at the given points only; leaves out the compliance between different points, which no blow needs."""
     static = np.array([float(modes.shapes.compliance(point[None])[0, 0]) for point in points])
-    poorer = {cause: sampled(other, points) for cause, other in modes.poorer.items()}
+    poorer = {cause: sample_modes(other, points) for cause, other in modes.poorer.items()}
     rest, dents = None, modes.shapes.dent(points)
     if modes.unstated:
-        error = np.concatenate([estimated(modes.shapes, point[None])["compliance"] for point in points])
+        error = np.concatenate([compliance_errors(modes.shapes, point[None])["compliance"] for point in points])
         rest = np.column_stack([np.zeros(len(points)), error])  # nothing between the points, as in the compliance
     known = SampledShapes(
         points, modes.shape_at(points), np.diag(static), rest=rest, rigid=modes.shapes.loose(points),
@@ -221,7 +221,7 @@ def checked_axes(base: Case, over: Mapping[str, Any]) -> dict[str, np.ndarray]:
     return axes
 
 
-def logarithmic(values: np.ndarray) -> bool:
+def is_logarithmic(values: np.ndarray) -> bool:
     """Whether values along an axis (n,) are evenly spaced in the logarithm."""
     if len(values) < 3 or not (values > 0.0).all():
         return False

@@ -233,7 +233,7 @@ def sweep(
     blow = Blow(Target.of(modes, damping_ratio), striker, contact, {"at": at, "speed": speed})
     base, axes = job.described(blow, over)
     cases, max_cells = job.cases(base, axes), check.number("max_cells", max_cells)
-    admit(cases.n_cases, len(LAYERS) + len(job.layers), max_cells, quick=cases.quick, tell=tell)
+    admit_size(cases.n_cases, len(LAYERS) + len(job.layers), max_cells, quick=cases.quick, tell=tell)
     return compute_map(cases, job)
 
 
@@ -246,8 +246,8 @@ def compute_map(cases: Cases, job: Job) -> xarray.Dataset:
     drawn = job.ours and not job.layers and not why_none(some)
     computed = job.compute_refined(some) if job.refine or (drawn and job.refine is None) else None
     numbers, texts = job.solved(some) if computed is None else (computed.numbers, computed.texts)
-    failures = listed(texts, some.n_cases)
-    doubt = np.broadcast_to(cell_errors.described(some, numbers, job.workers), cases.shape)
+    failures = error_texts(texts, some.n_cases)
+    doubt = np.broadcast_to(cell_errors.errors_of_description(some, numbers, job.workers), cases.shape)
     if some is not cases:  # impulse and peak force scale with the speed, all else is unchanged
         ratio = cases.axes["speed"] / cases.axes["speed"][0]
         ratio = np.reshape(ratio, [-1 if name == "speed" else 1 for name in cases.axes])
@@ -265,7 +265,7 @@ def compute_map(cases: Cases, job: Job) -> xarray.Dataset:
         table.attrs["cells"] = f"{share}, the others interpolated between them"
         for name, weight in refined.ROUGH.items():
             if name in table:
-                left = job.tolerance - batches.allowed(job.tolerance)
+                left = job.tolerance - batches.allowed_error(job.tolerance)
                 table[name].attrs["interpolation_error"] = left / weight
         meaning = "whether the cell was interpolated between others, to within the tolerance"
         table["interpolated"] = (table.n_impacts.dims, ~known, {"units": "1", "long_name": meaning})
@@ -277,14 +277,16 @@ def compute_map(cases: Cases, job: Job) -> xarray.Dataset:
     return table
 
 
-def listed(texts: Texts, n_cases: int) -> np.ndarray:
+def error_texts(texts: Texts, n_cases: int) -> np.ndarray:
     """Error texts (n_cases,), '' where there is none."""
     failures = np.full(n_cases, "", dtype=f"<U{max(map(len, texts.values()), default=1)}")
     failures[list(texts)] = list(texts.values())
     return failures
 
 
-def admit(n_cells: int, n_layers: int, max_cells: float, *, quick: bool = True, tell: Announce | None = None) -> None:
+def admit_size(
+    n_cells: int, n_layers: int, max_cells: float, *, quick: bool = True, tell: Announce | None = None
+) -> None:
     """Refuse a map with too many cells; announce the cost of a large one."""
     seconds = n_cells * SECONDS[quick] / (os.cpu_count() or 1)
     memory = 8.0 * n_cells * (n_layers + 2.0)  # [byte]

@@ -85,7 +85,7 @@ def read_inputs(vary: Any) -> tuple[Input, ...]:
     return tuple(Input.of(name, given) for name, given in vary.items())
 
 
-def mixing(inputs: Sequence[Input], correlation: Any) -> np.ndarray | None:
+def correlating_matrix(inputs: Sequence[Input], correlation: Any) -> np.ndarray | None:
     """Lower triangular matrix (n_inputs, n_inputs) that correlates independent normal numbers; None if none are.
 
     ``correlation`` has those of the inputs' normal scores (a Gaussian copula), as such a matrix or by pairs of names;
@@ -125,14 +125,14 @@ def shares(n_points: int, n_inputs: int, seed: int) -> np.ndarray:
     return points + 0.5 / engine.maxn  # the middle of each smallest cell: never 0, where a tail would be infinite
 
 
-def drawn(inputs: Sequence[Input], points: np.ndarray, mixer: np.ndarray | None) -> np.ndarray:
-    """Values (n_points, n_inputs) of the inputs at points of the unit cube, correlated by `mixing`."""
+def drawn_inputs(inputs: Sequence[Input], points: np.ndarray, mixer: np.ndarray | None) -> np.ndarray:
+    """Values (n_points, n_inputs) of the inputs at points of the unit cube, correlated by `correlating_matrix`."""
     if mixer is not None:
         points = stats.norm.cdf(stats.norm.ppf(points) @ mixer.T)
     return np.column_stack([each.distribution.ppf(column) for each, column in zip(inputs, points.T)])
 
 
-def crossed(points: np.ndarray) -> np.ndarray:
+def sobol_points(points: np.ndarray) -> np.ndarray:
     """Points for Sobol indices, (n * (d + 2), d), from n points of the cube of 2 d coordinates.
 
     Each of the n groups has a point A, the d points that have one coordinate from B and the others from A, and B.

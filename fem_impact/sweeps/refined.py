@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from .batches import allowed
+from .batches import allowed_error
 from .store import Texts
 
 LINEAR = ("restitution",)  # layers whose errors are absolute; those of the others are relative
@@ -171,7 +171,7 @@ def refine(
         sheet.add(cells_of(quarters, shape[1]), compute, f"round-{turn}")
         off = sheet.missed(blocks, quarters, of)
         spent = sheet.numbers[sheet.error][cells_of(quarters, shape[1])].max(axis=(1, 2))
-        spent = np.fmax(allowed(tolerance), np.where(spent > tolerance, 0.0, spent))  # no more cells help those
+        spent = np.fmax(allowed_error(tolerance), np.where(spent > tolerance, 0.0, spent))  # no more cells help those
         split = np.bincount(of, off > tolerance - spent, len(blocks)) > 0.0
         sheet.fill(quarters[~split[of]], off[~split[of]])
         blocks = quarters[split[of]]

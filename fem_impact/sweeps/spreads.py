@@ -10,7 +10,7 @@ import xarray
 from scipy import stats
 
 from .._base import check, markup
-from .._base.explained import noted
+from .._base.explained import lines_of_notes
 from .._base.rounding import SAME
 from .cases import LAYERS
 from .inputs import Input
@@ -62,7 +62,7 @@ class Spread(check.Brief):
     table: xarray.Dataset  # one dimension, ``blow``: inputs, quantities, ``part``, ``failure``
     tolerance: float  # [-] of every blow
     crossed: bool  # whether the blows are groups for Sobol indices
-    mixer: np.ndarray | None = None  # what correlates the inputs, see `inputs.mixing`
+    mixer: np.ndarray | None = None  # what correlates the inputs, see `inputs.correlating_matrix`
     seed: int = 0
     confidence: float = 0.9  # [-] with which every interval covers the truth
     checks: Checks | None = None
@@ -233,7 +233,7 @@ class Spread(check.Brief):
             )
         for name, error in self.rescaled.items():
             lines.append(f"{name}: modes were rescaled; a rebuilt body differs by at most {error:.1e}")
-        return "\n".join([*lines, *noted(self.notes)])
+        return "\n".join([*lines, *lines_of_notes(self.notes)])
 
     def _advice(self) -> list[str]:
         """What to measure better, quantity by quantity."""

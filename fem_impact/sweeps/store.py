@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from .._base import check, identity
-from .._base.files import created
+from .._base.files import new_folder
 
 LOG = logging.getLogger(__name__)
 LARGEST_BLOCK = 2**17  # [-] cells computed together at most, to limit the memory to 30 MB: half a second of work
@@ -86,7 +86,7 @@ class Store:
         zarr = _zarr()
         mark = fingerprint(grid)
         if not path.exists() or (path.is_dir() and not any(path.iterdir())):
-            with created(path) as new:
+            with new_folder(path) as new:
                 _made(zarr, str(new), mark, len(grid.layers), grid.n_cases)
         if not (path / "zarr.json").exists():
             raise not_free(path)

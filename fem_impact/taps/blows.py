@@ -13,7 +13,7 @@ import numpy as np
 from ..impact import engine
 from ..impact.contact import Contact
 from ..impact.history import History
-from ..impact.reduced_body import ReducedBody, joined, reduce_body
+from ..impact.reduced_body import ReducedBody, join_bodies, reduce_body
 from ..impact.striker import Striker
 from ..modes.modal import Modes, left_out, left_out_between
 from .rig import FINE, MARGIN, Rig, accelerations, behind_tip
@@ -61,7 +61,7 @@ class TappedBody(ReducedBody):
         )  # fmt: skip
 
 
-def tapped(part: ReducedBody, measured: np.ndarray, mass: float, softness: np.ndarray | float = 0.0) -> TappedBody:
+def tapped_body(part: ReducedBody, measured: np.ndarray, mass: float, softness: np.ndarray | float = 0.0) -> TappedBody:
     """A body of a blow as one of a tap."""
     same = {each.name: getattr(part, each.name) for each in fields(part)}
     return TappedBody(**same, measured=measured, mass=mass, softness=np.zeros(len(measured)) + softness)
@@ -71,14 +71,14 @@ def wall(n_points: int = 0) -> TappedBody:
     """A body that cannot move."""
     part = reduce_body(Modes.rigid(1.0), ((0, -1.0),), np.zeros((1, 0)), np.zeros((1, 1)), None)
     none = {name: getattr(part, name)[..., :0] for name in ("omega", "zeta", "rows", "q", "p", "bias")}
-    return tapped(replace(part, **none), np.zeros((n_points, 0)), np.inf)
+    return tapped_body(replace(part, **none), np.zeros((n_points, 0)), np.inf)
 
 
 def of_striker(striker: Striker) -> TappedBody:
     """A striker at its contact point."""
     modes, rest = striker.modes, striker.left_out if striker.modes.dimension else None
     part = reduce_body(modes, ((0, 1.0),), striker.at[None], striker.shape[None], rest)
-    return tapped(replace(part, p=striker.motion), np.zeros((0, modes.n_modes)), modes.mass)
+    return tapped_body(replace(part, p=striker.motion), np.zeros((0, modes.n_modes)), modes.mass)
 
 
 def of_target(modes: Modes, at: Any, points: Any = None, compliance: float | None = None) -> TappedBody:
@@ -99,7 +99,7 @@ def of_target(modes: Modes, at: Any, points: Any = None, compliance: float | Non
             softness = left_out_between(modes, place, asked)[:, 0]
         else:  # of many places: a force here deflects there as one there does here, so that one solution serves all
             softness = left_out_between(modes, asked, place)[0]
-    return tapped(reduce_body(modes, ((0, -1.0),), place, rows, rest), measured, modes.mass, softness)
+    return tapped_body(reduce_body(modes, ((0, -1.0),), place, rows, rest), measured, modes.mass, softness)
 
 
 def follow_blow(system: engine.KernelSystem, speed: float, step: float, horizon: float) -> History:
@@ -132,7 +132,7 @@ def records(
     """
     n_fine, first, n_own = FINE * (n_times + 2 * MARGIN), FINE * (lead + MARGIN), len(striker.omega)
     times = np.arange(n_fine - first) / (FINE * rig.rate)
-    system = joined((striker, target), [contact])
+    system = join_bodies((striker, target), [contact])
     step = longest_step(system, contact, duration)
     out = np.zeros((len(speeds), 1 + len(target.measured), n_fine))
     for one, speed in zip(out, speeds):

@@ -26,7 +26,7 @@ def in_si(
     kinds: list[str] = []
     notes: list[str] = []
     for i in (struck, *others):
-        known = units.known(unit[i])
+        known = units.si_unit(unit[i])
         kinds.append("N" if i == struck and not kinds else known[0] if known and known[0] != "N" else "m/s^2")
         value, said = factor(found.names[i], unit[i], kinds[-1], stated.get(i), file)
         factors.append(value)
@@ -45,7 +45,7 @@ def in_si(
 def stated_units(found: readers.Recording, given: Mapping[str, str] | None) -> list[str]:
     unit = [stated or units.label(name)[1] for name, stated in zip(found.names, found.units)]
     for name, text in check.table("units", given).items():
-        if not isinstance(text, str) or units.known(text) is None:
+        if not isinstance(text, str) or units.si_unit(text) is None:
             words = ", ".join(word for factors in units.KINDS.values() for word in factors)
             raise ValueError(f"units must be one of {words}, got {check.shown(text)} for {name!r}")
         unit[find_channel("units", name, found)] = text
@@ -77,7 +77,7 @@ def find_channel(argument: str, which: Any, found: readers.Recording) -> int:
 def force_channel(found: readers.Recording, force: Any, unit: list[str], name: str) -> int:
     if force is not None:
         return find_channel("force", force, found)
-    hits = [i for i, text in enumerate(unit) if (units.known(text) or "")[:1] == ("N",)]
+    hits = [i for i, text in enumerate(unit) if (units.si_unit(text) or "")[:1] == ("N",)]
     hits = hits or [i for i, text in enumerate(found.names) if units.FORCE_NAMES.search(text)]
     if len(hits) != 1 and len(found.names) == 1 and not units.RESPONSE_NAMES.search(found.names[0]):
         hits = [0]
@@ -99,14 +99,14 @@ def response_channels(found: readers.Recording, response: Any, unit: list[str], 
         return others
     return [
         i
-        for i, (kind, text) in enumerate(zip(map(units.known, unit), found.names))
+        for i, (kind, text) in enumerate(zip(map(units.si_unit, unit), found.names))
         if i != struck and ((kind and kind[0] != "N") or (not unit[i] and units.RESPONSE_NAMES.search(text)))
     ]
 
 
 def factor(name: str, unit: str, wanted: str, scale: float | None, file: str) -> tuple[float, list[str]]:
     """What a channel is multiplied with to be in SI, and what was assumed for that."""
-    kind = units.known(unit)
+    kind = units.si_unit(unit)
     if kind and kind[0] == wanted:
         return kind[1] * (1.0 if scale is None else scale), []
     if scale is not None:

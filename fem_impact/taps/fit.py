@@ -14,7 +14,7 @@ from ..impact.contact import Contact
 from ..impact.striker import Striker
 from ..modes.modal import Modes
 from . import nested, predictions, solver, windows
-from .found import Found, Watch, profiled
+from .found import Found, Watch, with_profiles
 from .nested import Inner
 from .records import Taps
 from .rig import Rig
@@ -127,9 +127,9 @@ def fit(
     (True, 1.0)
     """
     striker.let_go("a fit")
-    given = windows.joined(taps)
-    levelled = windows.levelled(given)
-    laws = [contact] if isinstance(contact, Contact) else list(check.several("contact", contact, Contact))
+    given = windows.join_tables(taps)
+    levelled = windows.level_offsets(given)
+    laws = [contact] if isinstance(contact, Contact) else list(check.tuple_of("contact", contact, Contact))
     held = {name: check.number(name, value) for name, value in check.table("known", known).items()}
     names = [checked(unknown, target, striker, law, held) for law in laws]
     if both := [name for name in held if name in unknown]:
@@ -138,7 +138,7 @@ def fit(
     for name in each:
         check.one_of("per_tap", name, unknown)
     n_points, points = _measured_at(levelled, target, response_at)
-    cut, noise, notes = _usable(levelled, window)
+    cut, noise, notes = _usable_taps(levelled, window)
     if target is None and at is not None:
         raise ValueError("at must be left out without a target, which is then a wall or its unknown modes")
     place = None if target is None else target.point("at", at)[0]
@@ -163,7 +163,7 @@ def fit(
             for law, score in zip(laws, scores)
         }
         found = [replace(found[int(np.argmin(scores))], compared=named)]
-    return profiled(found[0]) if profiles else found[0]
+    return with_profiles(found[0]) if profiles else found[0]
 
 
 def _measured_at(taps: Taps, target: Modes | None, response_at: Any) -> tuple[int, Any]:
@@ -179,7 +179,7 @@ def _measured_at(taps: Taps, target: Modes | None, response_at: Any) -> tuple[in
     return n_points, points
 
 
-def _usable(taps: Taps, window: Any) -> tuple[Taps, np.ndarray, list[str]]:
+def _usable_taps(taps: Taps, window: Any) -> tuple[Taps, np.ndarray, list[str]]:
     """The taps that can be compared, cut to the window; their noise over the peak; and why others are left out."""
     notes = []
 
@@ -197,7 +197,7 @@ def _usable(taps: Taps, window: Any) -> tuple[Taps, np.ndarray, list[str]]:
         taps, taps.cut_short, "record begins or ends within a pulse", "record holds its whole pulse; trigger earlier"
     )  # fmt: skip
     taps = taps.pick(good)
-    cut, noise = windows.cut(taps, window), taps.noise / taps.peak
+    cut, noise = windows.cut_to_window(taps, window), taps.noise / taps.peak
     whole = without(cut, cut.overload, "force is cut off", "force is not cut off")
     return cut.pick(whole), noise[whole], notes
 
@@ -251,7 +251,7 @@ def _fit(
     if inner is not None:
         problem, best, stuck = nested.never_worse(problem, best, inner.among(used, problem.data), notes)
     # ridges promise up to a hundredth of the sum of squares
-    if not best.ended and solver.promised(problem, best) > 0.01 * best.cost:
+    if not best.ended and solver.promised_fall(problem, best) > 0.01 * best.cost:
         notes.append(f"the search had not ended after {solver.ENOUGH} steps: narrow the ranges, or raise starts")
     return Found(cut, tuple(used), outliers, problem, best, minima, tuple(notes), {}, begin.watch, stuck)
 
@@ -293,10 +293,10 @@ def _search(
                 begin.watch(min(i + 1, begin.most), begin.most)
     apart = np.zeros(len(problem.own) * taps.n_taps)
     found = [replace(one, x=np.append(one.x, apart)) for one in found]
-    inner, less = begin.inner, nested.without(common) if begin.inner is None else None
+    inner, less = begin.inner, nested.smaller_problem(common) if begin.inner is None else None
     if less is not None:
         inner = Inner(*less, _search(less[1], taps, length, Starts(1, begin.rng, None, None))[0].x)
-    for x in [] if inner is None else nested.embedded(problem, inner):
+    for x in [] if inner is None else nested.embed_fit(problem, inner):
         with suppress(SimulationError):
             found.append(solver.solve(problem, x, solver.QUICK, solver.NEARLY))
     if not found:

@@ -8,20 +8,20 @@ from typing import Any
 import numpy as np
 
 from .._base import check, markup
-from .._base.explained import noted
+from .._base.explained import lines_of_notes
 from .._base.rounding import SAME
 from ..impact.collision import strike
 from ..impact.contact import Contact
 from ..impact.measured import Comparison
 from ..impact.response import Response
 from ..impact.striker import Striker
-from ..modes.modal import Modes, carried
+from ..modes.modal import Modes, carried_compliance
 from . import predictions, profiles, solver, windows
 from .predictions import Prediction
 from .profiles import Profile, Scatter
 from .records import Taps
 from .solver import Problem, Solution
-from .unknowns import UNITS, changed, unit_of
+from .unknowns import UNITS, changed_contact, unit_of
 
 Watch = Callable[[int, int], Any]
 
@@ -190,7 +190,7 @@ class Found(check.Brief):
         else:
             check.count("tap", tap, low=0, high=self.taps.n_taps - 1)
             cut = self.taps.pick(int(tap))
-        return predictions.predicted(self.problem, self.best, cut)
+        return predictions.predict_tap(self.problem, self.best, cut)
 
     @check.typed
     def left_out(self, *, rise_only: bool = False) -> tuple[Prediction, ...]:
@@ -246,7 +246,7 @@ class Found(check.Brief):
     @property
     def contact(self) -> Contact:
         """The contact law found."""
-        return changed(self.problem.setting.contact, self.problem.values(self.best.x))
+        return changed_contact(self.problem.setting.contact, self.problem.values(self.best.x))
 
     @property
     def striker(self) -> Striker:
@@ -274,7 +274,7 @@ class Found(check.Brief):
         return Modes.from_arrays(
             body.omega[order] / (2.0 * np.pi), body.rows[:, order], points=[[0.0]],
             mass=body.mass if np.isfinite(body.mass) else float(1.0 / np.square(body.rows).max()),
-            compliance=carried(body.omega, body.rows, body.rows) + body.rest, damping_ratio=body.zeta[order],
+            compliance=carried_compliance(body.omega, body.rows, body.rows) + body.rest, damping_ratio=body.zeta[order],
             free=False,
         )  # fmt: skip
 
@@ -344,16 +344,18 @@ class Found(check.Brief):
         lines += self.verdict
         for name in self.unidentifiable:
             if self.ridges[name]:
-                lines.append(f"If {name} grows, {along(self.ridges[name])}, and the taps are explained as well")
+                lines.append(
+                    f"If {name} grows, {covariation_in_words(self.ridges[name])}, and the taps are explained as well"
+                )
         rows = [(name, *stated(self.profiles[name]), unit_of(name)) for name in self.names]
         lines += markup.columns(rows, ("", "value", "90 % interval", "unit"))
         for spread in self.spreads.values():
-            lines.append(f"{spread.name} is the mean of the taps, which {differ(spread)}")
+            lines.append(f"{spread.name} is the mean of the taps, which {scatter_in_words(spread)}")
         for name in self.names:
             for end, other in zip(("below", "above"), self.profiles[name].held_by):
                 if other:
                     lines.append(f"Note: {name} is limited {end} only by the range given for {other}")
-        lines += noted(self.notes)
+        lines += lines_of_notes(self.notes)
         return "\n".join(lines)
 
     def data(self) -> dict[str, Any]:
@@ -392,7 +394,7 @@ def stated(profile: Profile) -> tuple[str, str]:
     return f"{profile.value:.{digits}g}", f"{low:.{ends}g} to {high:.{ends}g}"
 
 
-def along(ridge: Mapping[str, float]) -> str:
+def covariation_in_words(ridge: Mapping[str, float]) -> str:
     """How other values go along with one that the data do not determine, from their exponents, in words."""
     said = []
     for name, power in ridge.items():
@@ -404,7 +406,7 @@ def along(ridge: Mapping[str, float]) -> str:
     return ", ".join(said)
 
 
-def differ(each: Scatter) -> str:
+def scatter_in_words(each: Scatter) -> str:
     """How much the taps differ in an unknown, in words."""
     size, noise = (
         (f"{100.0 * each.deviation:.2g} %", f"{100.0 * each.by_noise:.2g} %") if each.relative
@@ -428,7 +430,7 @@ def _coordinate(problem: Problem, x: np.ndarray, name: str) -> tuple[Problem, np
     return other, problem.moved(x, other), j
 
 
-def profiled(found: Found) -> Found:
+def with_profiles(found: Found) -> Found:
     """The fit with its profiles; a better fit that a profile meets becomes the fit."""
     for _ in range(3):  # times that profiles may find a better fit and begin again; a sound fit needs none
         for i, name in enumerate(found.names):

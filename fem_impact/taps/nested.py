@@ -30,7 +30,7 @@ class Inner(NamedTuple):
         return self._replace(problem=replace(fewer, data=data), x=x)
 
 
-def without(problem: Problem) -> tuple[str, Problem] | None:
+def smaller_problem(problem: Problem) -> tuple[str, Problem] | None:
     """The problem without its last unknown mode or, if there is none, without the mode of a rigid hammer; its name."""
     modes = [each.name.partition(".")[0] for each in problem.setting.unknown if each.name.startswith("mode")]
     springy = any(each.name == "striker.first_frequency" for each in problem.setting.unknown)
@@ -50,7 +50,7 @@ def without(problem: Problem) -> tuple[str, Problem] | None:
     return last, replace(problem, setting=replace(problem.setting, unknown=names), free=free, fixed=fixed, own=own)
 
 
-def embedded(problem: Problem, inner: Inner) -> list[np.ndarray]:
+def embed_fit(problem: Problem, inner: Inner) -> list[np.ndarray]:
     """Coordinates of a larger problem for the same taps at the best fit of a smaller one; several if a mode is new."""
     small, x, n_taps = inner.problem, inner.x, problem.data.n_taps
     values = {}
@@ -87,7 +87,7 @@ def never_worse(problem: Problem, best: Solution, inner: Inner, notes: list[str]
     cost = (1.0 + NEARLY) * float(np.square(inner.problem.residual(inner.x)).sum())
     if best.cost <= cost:
         return problem, best, False
-    for begun in embedded(problem, inner):
+    for begun in embed_fit(problem, inner):
         with suppress(SimulationError):
             best = min(best, solver.solve(problem, begun), key=lambda one: one.cost)
         if best.cost <= cost:

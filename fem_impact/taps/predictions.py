@@ -52,7 +52,7 @@ class Prediction(check.Brief):
         return float(np.sqrt(np.mean(self.residual**2)) / np.abs(self.measured).max())
 
 
-def predicted(problem: Problem, best: Solution, tap: Taps, rise_only: bool = False) -> Prediction:
+def predict_tap(problem: Problem, best: Solution, tap: Taps, rise_only: bool = False) -> Prediction:
     """One tap with all unknowns held as a fit found them, but those that each tap has of its own.
 
     They, its speed and its onset are found from the whole record or, with ``rise_only``, until the largest force.
@@ -107,7 +107,7 @@ def predict_left_out(problem: Problem, x: np.ndarray, taps: Taps, rise_only: boo
         others = [i for i in range(n_taps) if i != tap]
         part, begun = problem.among(others, x)
         without = solver.solve(part, begun, close=solver.NEARLY)
-        found.append(predicted(part, without, taps.pick(tap), rise_only))
+        found.append(predict_tap(part, without, taps.pick(tap), rise_only))
     return tuple(found)
 
 

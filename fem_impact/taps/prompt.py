@@ -9,12 +9,12 @@ import numpy as np
 import xarray as xr
 
 from .._base import check
-from .._base.files import staged, write_whole
+from .._base.files import staged_folder, write_whole
 from ..impact.contact import Contact
 from ..impact.striker import Striker
 from ..modes import picked
 from ..scenes.scene import Scene, load_scene
-from ..scenes.schema import written
+from ..scenes.schema import toml_text
 from ..show import export
 from . import transfer
 from .fit import fit as fit_taps
@@ -85,7 +85,7 @@ def peaks(found: xr.Dataset) -> list[dict[str, Any]]:
 def write_frf(path: Path, found: xr.Dataset) -> None:
     """Write frequency responses as .csv (real and imaginary parts, coherence) or .uff (data set 58)."""
     ending = check.ending(path, ".csv", ".uff")
-    with staged(path.parent) as staging:
+    with staged_folder(path.parent) as staging:
         if ending == ".uff":
             transfer.write_uff(staging / path.name, found)
             return
@@ -167,7 +167,7 @@ def write_scene(path: str | Path, found: Found, scene: Scene | None = None) -> t
     made["contact"] = law.table
     made["strike"] = strike
     lines = [f"# {line}" for line in (*found.summary().splitlines(), *notes)]
-    write_whole(path, "\n".join(lines) + "\n\n" + written(made))
+    write_whole(path, "\n".join(lines) + "\n\n" + toml_text(made))
     return tuple(notes)
 
 

@@ -10,7 +10,7 @@ from ..impact.contact import Contact
 from ..impact.striker import Striker
 from . import solver, windows
 from .fit import fit
-from .found import Found, Watch, profiled
+from .found import Found, Watch, with_profiles
 from .predictions import rms_error
 from .records import Taps
 
@@ -103,7 +103,7 @@ def propose(
     >>> [trial.name for trial in found.tried if trial.taken][-1]
     'Hertz'
     """
-    joined = windows.joined(taps)
+    joined = windows.join_tables(taps)
     if joined.n_taps < 2:
         raise ValueError("taps must be two at least, to predict one from the others")
     if striker.modes.n_modes > 1:
@@ -149,7 +149,7 @@ def propose(
         if len(tried) == len(done):
             break
     whole = replace(best, compared={one.name: one.left_out for one in tried}, watch=watch)
-    return Proposal(profiled(whole) if profiles else whole, tuple(tried))
+    return Proposal(with_profiles(whole) if profiles else whole, tuple(tried))
 
 
 def _fitted(taps: Taps, law: Contact, ranges: Ranges, given: Mapping[str, Any]) -> Found | None:

@@ -278,10 +278,10 @@ def table(path: Path) -> Recording:
     if heads:
         names, unit = map(list, zip(*map(units.label, heads[-1])))
         last = [cell.strip("[]() ") for cell in heads[-1]]
-        if len(heads) > 1 and (any(map(units.known, last)) or all(map(units.stated, filter(None, last)))):
+        if len(heads) > 1 and (any(map(units.si_unit, last)) or all(map(units.is_unit, filter(None, last)))):
             (names, before), unit = map(list, zip(*map(units.label, heads[-2]))), last
             for name, one, other in zip(names, before, unit):
-                if one and other and units.known(one) != units.known(other):
+                if one and other and units.si_unit(one) != units.si_unit(other):
                     raise ValueError(f"{path.name} states two units for {name!r}, {one!r} and {other!r}")
     values = _numbers(lines[start:], separator, use, comma, path)
     long = next((line for line in lines[start:] if any(map(str.strip, line.split(separator)[width:]))), None)
@@ -572,7 +572,7 @@ def uff_name(one: dict) -> str:
 
 def uff_unit(path: Path, name: str, label: str, code: int) -> tuple[tuple[str, float] | None, str | None, list[str]]:
     """What the label of a unit in data set 58 is known as, the unit of its code, and a note if the code decides."""
-    known, kind = units.known(label), UFF_UNITS.get(code)
+    known, kind = units.si_unit(label), UFF_UNITS.get(code)
     if known and kind and known[0] != kind:
         raise ValueError(
             f"{path.name} states the unit {label!r} for {name!r}, whose code {code} means {kind}; export it again"

@@ -11,7 +11,7 @@ import numpy as np
 import xarray as xr
 
 from .._base import check, markup
-from .._base.explained import noted
+from .._base.explained import lines_of_notes
 from . import channels, readers, triggers
 
 RATES = (1.0, 1e9)  # [Hz] sampling rates allowed: beyond, the unit is a mistake
@@ -86,7 +86,7 @@ class Taps(check.Brief):
         tags = [f"tap {i + 1}" for i in range(n_taps)] if labels is None else labels
         tags = check.texts("labels", tags, n_taps, "tap of force")
         if overload is None:
-            cut = [[triggers.clipped(f), *(triggers.clipped(r) for r in each.T)] for f, each in zip(rows, others)]
+            cut = [[triggers.is_clipped(f), *(triggers.is_clipped(r) for r in each.T)] for f, each in zip(rows, others)]
         else:
             flags = np.asarray(None)
             with suppress(ValueError):  # rows of several lengths
@@ -230,7 +230,7 @@ class Taps(check.Brief):
             for i, (name, peak, impulse, pulses) in enumerate(zip(self.labels, self.peak, self.impulse, self.n_pulses))
         ]
         lines += markup.columns(rows, ("", "peak", "impulse", "pulses", "cut off"))
-        return "\n".join(lines + noted(self.notes))
+        return "\n".join(lines + lines_of_notes(self.notes))
 
     def cut_off(self, tap: int) -> list[str]:
         """Names of the sensors that are cut off in a tap."""
@@ -326,14 +326,14 @@ def read_taps(
         full_scale = check.positive("full_scale", full_scale, "N")
     segments, names, kinds, more = channels.in_si(found, name, force, response, scale, units)
     options = {"trigger": trigger, "before": before, "length": length, "together": together}
-    rows, responses, full, labels, said = triggers.cut(segments, stated, name, **options)
+    rows, responses, full, labels, said = triggers.cut_taps(segments, stated, name, **options)
     if rows.shape[1] < readers.LEAST:
         raise ValueError(
             f"a tap in {name} has {rows.shape[1]} samples at a rate of {stated:g} Hz, {readers.LEAST} at least are "
             "needed; check the unit of its times, rate, before and length"
         )
     cut = [
-        [bool(top) or triggers.clipped(row, full_scale), *(triggers.clipped(column) for column in other.T)]
+        [bool(top) or triggers.is_clipped(row, full_scale), *(triggers.is_clipped(column) for column in other.T)]
         for row, other, top in zip(rows, responses, full)
     ]
     taps = Taps.from_arrays(

@@ -10,7 +10,7 @@ import numpy as np
 
 from .._base import check, progress
 from .._base.check import SimulationError
-from .._base.explained import noted
+from .._base.explained import lines_of_notes
 from .._base.files import write_whole
 from ..fe.assembly import System
 from ..impact import accuracy, spectra
@@ -151,7 +151,7 @@ class Roving(check.Locked):
                 lines.append(f"  {verdict} with every tip: {len(where)} points, at {listed} m"[:400])
         sharp = "" if self.lines is None else f", {self.lines:.2g} lines in the half-power width of the sharpest mode"
         lines.append(f"records of {self.duration:.3g} s resolve {self.resolution:.3g} Hz{sharp}")
-        return "\n".join([*lines, *noted(self.notes)])
+        return "\n".join([*lines, *lines_of_notes(self.notes)])
 
 
 def inside_band(modes: Modes, bandwidth: float) -> np.ndarray:
@@ -219,10 +219,12 @@ def plan_test(
     """
     target = Target.of(system, damping_ratio)
     modes = _modes(target, bandwidth)
-    return planned(target, modes, hammers, points, bandwidth, sensor=sensor, drop=drop, noise=noise, duration=duration)
+    return plan_on_body(
+        target, modes, hammers, points, bandwidth, sensor=sensor, drop=drop, noise=noise, duration=duration
+    )
 
 
-def planned(
+def plan_on_body(
     target: Target, modes: Modes, hammers: Any, points: Any, bandwidth: float, *, sensor: Any, drop: float,
     noise: float = NOISE, duration: float | None = None,
 ) -> Roving:  # fmt: skip
@@ -240,7 +242,7 @@ def planned(
     blows = [{"mass": float(mass), "stiffness": float(tip)} for mass, tip in pairs]
     views, _ = bodies.of_hammers(target, places, blows, blows[:2], chooser.TOLERANCE, chooser.MOST_MODES, Stages())
     if duration is None:  # lines at most 10 Hz apart, to part modes
-        duration = sampling.ringing(modes, inside_band(modes, bandwidth), (0.1, triggers.LONGEST))
+        duration = sampling.ringing_time(modes, inside_band(modes, bandwidth), (0.1, triggers.LONGEST))
     n_times = round(check.positive("duration", duration, "s") * RATE * bandwidth)
     if not 8 <= n_times <= 2 * MOST_LINES:
         raise ValueError(
@@ -254,7 +256,7 @@ def planned(
         answer = None
         for j, (mass, tip) in enumerate(pairs):
             same = np.flatnonzero(alike.reshape(-1) == j)  # hammers of one mass, with one tip
-            counts[i, same], hit = _hit(body, place, float(mass), float(tip))
+            counts[i, same], hit = _try_tip(body, place, float(mass), float(tip))
             if hit is not None:
                 peaks[i, same] = hit.peak_force
             if counts[i, same[0]] != 1:
@@ -314,7 +316,7 @@ def _kit(hammers: Any, centre: float) -> tuple[tuple[str, ...], tuple[str, ...],
     return names, tips, np.array(masses), np.array(stiffnesses)
 
 
-def _hit(body: Modes, point: np.ndarray, mass: float, tip: float) -> tuple[int, Any]:
+def _try_tip(body: Modes, point: np.ndarray, mass: float, tip: float) -> tuple[int, Any]:
     """Number of impacts of one tip, 2 for several and 0 if it is too hard for the modes, and the blow."""
     try:
         hit = strike(
@@ -364,7 +366,9 @@ def spread_points(modes: Modes, number: int) -> np.ndarray:
     return lattice[modes.shapes.contains(lattice)]
 
 
-def catalogued(words: str, bandwidth: float, drop: float, heaviest: float) -> dict[str, tuple[float, dict[str, float]]]:
+def hammers_known(
+    words: str, bandwidth: float, drop: float, heaviest: float
+) -> dict[str, tuple[float, dict[str, float]]]:
     """Hammers of the catalogue whose names contain some words, up to a mass [kg], with tips that may suit a bandwidth.
 
     Those are from the softest that could reach it, on the lightest body, to the hardest of `TIPS`, or the next one
@@ -397,4 +401,4 @@ def of_scene(scene: Scene, hammers: Any, bandwidth: float, drop: float, number: 
     target, at = scene.built.target, scene.blow.values["at"]
     modes = _modes(target, bandwidth)
     points = [at] if number is None else spread_points(modes, number)
-    return planned(target, modes, hammers, points, bandwidth, sensor=at, drop=drop)
+    return plan_on_body(target, modes, hammers, points, bandwidth, sensor=at, drop=drop)

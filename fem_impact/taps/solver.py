@@ -292,7 +292,7 @@ def least(
     return Solution(low + found.x * size, 2.0 * float(found.cost), found.jac / size, found.status > 0)
 
 
-def promised(problem: Problem, found: Solution) -> float:
+def promised_fall(problem: Problem, found: Solution) -> float:
     """By how much the sum of squares would fall by its derivatives, within the bounds and apart from ridges."""
     low, high = problem.bounds
     inside = (found.x > low + STEP) & (found.x < high - STEP)

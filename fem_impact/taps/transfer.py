@@ -15,8 +15,8 @@ from ..modes import picked, universal_files
 from ..modes.modal import Modes
 from . import readers, triggers
 from .records import Taps
-from .units import known as known_unit
-from .windows import joined
+from .units import si_unit as known_unit
+from .windows import join_tables
 
 METHODS = ("H1", "H2", "Hv")
 SURE = 0.9  # [-] probability that the true response lies within the error stated
@@ -92,7 +92,7 @@ def frf(
     """
     if isinstance(records, (str, Path)):
         return read_frf(check.path("records", records))
-    taps = joined(records, "records")
+    taps = join_tables(records, "records")
     check.one_of("method", method, METHODS)
     if not taps.response.shape[2]:
         raise ValueError("records must have a response channel; read them with response=")

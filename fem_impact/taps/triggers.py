@@ -129,7 +129,7 @@ def level_of_rest(force: np.ndarray, block: int) -> np.ndarray:
     return np.interp(np.arange(len(force)), [0, *middle, len(force) - 1], [ends[0], *values, ends[1]])
 
 
-def clipped(values: np.ndarray, full_scale: float | None = None) -> bool:
+def is_clipped(values: np.ndarray, full_scale: float | None = None) -> bool:
     """Whether a channel (n_times,) is cut off at its largest magnitude."""
     top = float(np.abs(values).max(initial=0.0))
     if top == 0.0:
@@ -152,7 +152,7 @@ def ceiling(rows: list[np.ndarray]) -> float:
     return top if count >= CLIPPED and any((each[1:] & each[:-1]).any() for each in reached) else np.inf
 
 
-def cut(
+def cut_taps(
     segments: Sequence[tuple[np.ndarray, Any]], rate: float, name: str, *, trigger: float | None,
     before: float | None, length: float | None, together: float | None,
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray, list[str], list[str]]:  # fmt: skip

@@ -15,7 +15,7 @@ DISPLACEMENT = {"m": 1.0, "mm": 1e-3, "um": 1e-6, "µm": 1e-6, "in": 0.0254}
 KINDS = {"N": FORCE, "m/s^2": ACCELERATION, "m/s": VELOCITY, "m": DISPLACEMENT}  # SI unit -> factors
 FORCE_NAMES = re.compile(r"force|hammer|kraft|excit|\bexc\b|input|^f$", re.IGNORECASE)
 RESPONSE_NAMES = re.compile(r"accel|resp|veloc|displ|vibro|^a\d*$|^acc", re.IGNORECASE)
-OTHERS = (  # not known by `known`: such a channel needs a scale
+OTHERS = (  # not known by `si_unit`: such a channel needs a scale
     "V", "mV", "uV", "µV", "kV", "pC", "A", "mA", "counts", "count", "LSB", "bits", "digits", "%", "dB", "Hz", "kHz",
     "s", "ms", "us", "µs", "ns", "min", "h", "-", "a.u.", "kg",
 )  # fmt: skip
@@ -26,7 +26,7 @@ LABEL = re.compile(r"^(.*?)(?:\s*[\[(]|\s+(?:/|in)\s+|,\s+|(?<=^\w)/\(?)([^\])]*
 SUFFIX = re.compile(r"_(g|m?N|kN|lbf|mV)$")
 
 
-def known(unit: str) -> tuple[str, float] | None:
+def si_unit(unit: str) -> tuple[str, float] | None:
     """The SI unit of a unit's kind, and the factor to it; None for a unit that is not known."""
     text = re.sub(r"(?<=/s)(²|\*\*2|2)$", "^2", unit.strip("() ").replace("μ", "µ"))
     every = [(name, si, factor) for si, factors in KINDS.items() for name, factor in factors.items()]
@@ -34,15 +34,15 @@ def known(unit: str) -> tuple[str, float] | None:
     return next(((si, factor) for fold in folds for name, si, factor in every if fold(name) == fold(text)), None)
 
 
-def stated(text: str) -> bool:
+def is_unit(text: str) -> bool:
     """Whether a text is a unit, known or not."""
-    return known(text) is not None or text in OTHERS
+    return si_unit(text) is not None or text in OTHERS
 
 
 def label(text: str) -> tuple[str, str]:
     """Name and unit of a heading such as "Force [N]"; what holds no unit, or is one word as "acc_g", is the name."""
     found = LABEL.match(text.strip())
-    if found and stated(found[2].strip()) and not stated(text):
+    if found and is_unit(found[2].strip()) and not is_unit(text):
         return found[1].rstrip(" /"), found[2].strip()
     last = SUFFIX.search(text.strip())
     return text.strip(), last[1] if last else ""

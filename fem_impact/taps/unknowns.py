@@ -146,7 +146,7 @@ def checked(
     own = [each for each in found if each.name.startswith("contact.")]
     for ends in product(*((each.low, each.high) for each in own)):
         try:
-            changed(contact, {**held, **{each.name: end for each, end in zip(own, ends)}})
+            changed_contact(contact, {**held, **{each.name: end for each, end in zip(own, ends)}})
         except ValueError as error:
             raise ValueError(f"unknown and known must make a contact within all ranges: {error}") from None
     for i in modes:
@@ -169,7 +169,7 @@ def _check_name(label: str, name: str, names: list[str]) -> None:
         check.one_of(label, name, [each for each in names if not re.match(r"mode[2-9]", each)])
 
 
-def changed(contact: Contact, values: Mapping[str, float]) -> Contact:
+def changed_contact(contact: Contact, values: Mapping[str, float]) -> Contact:
     """The contact with the values whose names begin with ``contact.``; others do not matter."""
     given: dict[str, Any] = {
         name.removeprefix("contact."): float(x) for name, x in values.items() if name.startswith("contact.")
@@ -202,7 +202,7 @@ class Setting(check.Brief):
 
     def records(self, values: Mapping[str, float], speeds: np.ndarray, n_times: int, lead: int) -> np.ndarray:
         """Fine records of the blows that the values make, see `blows.records`."""
-        law, mass = changed(self.contact, values), self.felt_mass(values)
+        law, mass = changed_contact(self.contact, values), self.felt_mass(values)
         met = replace(law, gap=0.0) if law.gap else law  # the record begins where the bodies touch
         return blows.records(
             self.hammer(values), self.structure(values), met, speeds, lead=lead, rig=self.rig, n_times=n_times,

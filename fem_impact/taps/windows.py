@@ -13,11 +13,11 @@ from .solver import Data
 BEFORE = 12  # [samples] before the tap that are compared: the filter rings there
 
 
-def joined(taps: Any, name: str = "taps") -> Taps:
+def join_tables(taps: Any, name: str = "taps") -> Taps:
     """One table of taps from one or several."""
     if isinstance(taps, Taps):
         return taps
-    several = check.several(name, taps, Taps)
+    several = check.tuple_of(name, taps, Taps)
     n_times = min(len(each.time) for each in several)
     for each in several:
         same_rate(each, several[0])
@@ -35,7 +35,7 @@ def joined(taps: Any, name: str = "taps") -> Taps:
     )
 
 
-def levelled(taps: Taps) -> Taps:
+def level_offsets(taps: Taps) -> Taps:
     """The taps without offsets of their force that are more than noise, each with a note of what was done."""
     rates, moved = taps.rate, np.zeros(taps.n_taps)
     for i, (row, onset) in enumerate(zip(taps.force, taps.onset)):
@@ -63,7 +63,7 @@ def same_rate(tap: Taps, taps: Taps) -> None:
         raise ValueError(f"tap must be sampled at {taps.rate:g} Hz as the taps fitted, got {tap.rate:g} Hz")
 
 
-def cut(taps: Taps, window: Any) -> Taps:
+def cut_to_window(taps: Taps, window: Any) -> Taps:
     """The taps cut to the samples compared, all with the same place of the onset."""
     if window is not None:
         before, after = (check.non_negative("window", end, "s") for end in check.array("window", window, (2,), "s"))

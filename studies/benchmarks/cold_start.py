@@ -89,11 +89,11 @@ def after_a_blow(repeats: int) -> None:
     for name, striker in {"hammer": fi.Striker.rigid(0.1), "stick": fi.Striker.stick(0.1, 10e3)}.items():
         blow = partial(fi.strike, plate, striker, law, at=at, speed=1.0, tolerance=1e-3, residual=False)
         hit, struck = blow(), shortest(blow, repeats)
-        pieces = force_spectrum.pieces(hit.time, hit.force[:, None])
+        pieces = force_spectrum.straight_pieces(hit.time, hit.force[:, None])
         print(f"{name}: strike {1e3 * struck:.2f} ms; the force has {len(pieces[0])} pieces")
         for spacing, frequencies in FREQUENCIES.items():
             taken = shortest(partial(hit.spectrum, frequencies), repeats)
-            direct = force_spectrum.directly(pieces, frequencies)
+            direct = force_spectrum.spectrum_in_closed_form(pieces, frequencies)
             miss = np.abs(hit.spectrum(frequencies) - direct).max() / hit.impulse
             print(f"  spectrum {spacing}: {1e3 * taken:.2f} ms, {taken / struck:.2f} strikes, errs by {miss:.0e}")
         for duration in (1.0, 5.0):

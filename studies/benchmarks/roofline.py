@@ -115,7 +115,7 @@ def batch_time(n_blows: int) -> float:
     blows = batches.Blows(
         {0: family}, np.zeros(n_blows, int), 2.0 * spread[0], 0.02 * spread[1], 1e5 * spread[2], one, one, 0.0 * one
     )
-    return best(lambda: batches.bounce(blows, tolerance=1e-3, workers=1), 5)
+    return best(lambda: batches.follow_blows(blows, tolerance=1e-3, workers=1), 5)
 
 
 def power(counts: np.ndarray, seconds: np.ndarray) -> float:

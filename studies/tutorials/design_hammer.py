@@ -77,7 +77,7 @@ def surveyed(modes, count=MAP):
             sizes = [np.abs(hit.spectrum(np.array([0.0, tutorial.BANDWIDTH]))) for hit in hits]
             levels = [20.0 * np.log10(size[1] / size[0]) for size in sizes]
             found[:, i, j] = (
-                min(clearance.nearest(hit)[0] for hit in hits), min(levels), min(hit.impulse for hit in hits)
+                min(clearance.nearest_clearance(hit)[0] for hit in hits), min(levels), min(hit.impulse for hit in hits)
             )  # fmt: skip
     return masses, tips, found
 

@@ -49,7 +49,7 @@ def stand_in(modes: fi.Modes, at: np.ndarray, folder: Path) -> tuple[list[Path],
 
     points, cells = modes.shapes.grid()
     loaded = int(np.linalg.norm(points - at, axis=1).argmin())
-    places = viewing.placed(modes, points)
+    places = viewing.places_in_space(modes, points)
     lines = [f"GRID*   {i:16d}{'':16}{x:16.9e}{y:16.9e}\n*       {z:16.9e}" for i, (x, y, z) in enumerate(
         places.tolist(), 1)]  # fmt: skip
     lines += [f"CTRIA3,{i},1,{a},{b},{c}" for i, (a, b, c) in enumerate((cells + 1).tolist(), 1)]

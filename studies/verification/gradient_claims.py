@@ -74,7 +74,7 @@ def told(hit, frequencies):
     """
     size = np.abs(hit.spectrum(frequencies))
     centroid = np.trapezoid(frequencies * size, frequencies) / np.trapezoid(size, frequencies)
-    when, force = gradient.largest(engine.again(hit.history, gradient.step_of(hit) / 4.0))
+    when, force = gradient.peak_of_force(engine.follow_again(hit.history, gradient.step_of(hit) / 4.0))
     return np.array([hit.restitution, hit.impulse, hit.contact_time, force, when, centroid])
 
 

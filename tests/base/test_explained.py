@@ -11,10 +11,15 @@ ONE = " (notes.md#not-resolvable)"
 
 
 def test_a_message_ends_with_what_explains_it_once_however_it_is_passed_on():
-    said = explained.pointed("tolerance 0.01 is not resolvable")
-    assert said.endswith(ONE) and explained.pointed(said) == said
-    assert explained.pointed(f"stroke 3: {said}; over") == f"stroke 3: tolerance 0.01 is not resolvable; over{ONE}"
-    assert explained.pointed("nothing is wrong") == "nothing is wrong" and explained.below("nothing is wrong") == []
+    said = explained.with_headings("tolerance 0.01 is not resolvable")
+    assert said.endswith(ONE) and explained.with_headings(said) == said
+    assert (
+        explained.with_headings(f"stroke 3: {said}; over") == f"stroke 3: tolerance 0.01 is not resolvable; over{ONE}"
+    )
+    assert (
+        explained.with_headings("nothing is wrong") == "nothing is wrong"
+        and explained.heading_line("nothing is wrong") == []
+    )
 
 
 def test_errors_and_warnings_of_python_name_their_headings():

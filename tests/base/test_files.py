@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 
 import fem_impact
-from fem_impact._base.files import LIST, MACHINE, PARTIAL, replacing, staged
+from fem_impact._base.files import LIST, MACHINE, PARTIAL, replacing, staged_folder
 
 
 def names(folder):
@@ -19,7 +19,7 @@ def names(folder):
 
 
 def write(folder, command, **files):
-    with staged(folder, command) as staging:
+    with staged_folder(folder, command) as staging:
         for name, text in files.items():
             (staging / name).parent.mkdir(exist_ok=True)
             (staging / name).write_text(text)
@@ -42,7 +42,7 @@ def test_staged_moves_everything_in_and_leaves_other_files_alone(tmp_path):
     (tmp_path / "out").mkdir()
     (tmp_path / "out" / "mine.txt").write_text("mine")
     (tmp_path / "out" / "a.txt").write_text("old")
-    with staged(tmp_path / "out") as staging:
+    with staged_folder(tmp_path / "out") as staging:
         (staging / "modes").mkdir()
         for name in ("a.txt", "modes/b.txt"):
             (staging / name).write_text("new")
@@ -53,7 +53,7 @@ def test_staged_moves_everything_in_and_leaves_other_files_alone(tmp_path):
 
 @pytest.mark.parametrize("failure", [ValueError, KeyboardInterrupt])
 def test_staged_leaves_nothing_when_the_block_fails(tmp_path, failure):
-    with pytest.raises(failure), staged(tmp_path / "new" / "deep") as staging:
+    with pytest.raises(failure), staged_folder(tmp_path / "new" / "deep") as staging:
         (staging / "a.txt").write_text("half")
         raise failure
     assert names(tmp_path) == []
@@ -67,7 +67,7 @@ def test_staged_moves_nothing_where_a_folder_is_in_the_way_of_a_file_or_a_file_o
     with pytest.raises(NotADirectoryError, match="modes"):
         write(tmp_path, None, **{"a.txt": "a", "modes/b.txt": "b"})
     assert names(tmp_path) == ["b.txt", "modes"]
-    with pytest.raises(NotADirectoryError), staged(tmp_path / "modes" / "out"):
+    with pytest.raises(NotADirectoryError), staged_folder(tmp_path / "modes" / "out"):
         pytest.fail("the block must not run where nothing can be written")
 
 
@@ -143,8 +143,8 @@ def test_anything_but_a_regular_file_is_not_replaced(tmp_path):
 KILLED = """
 import os, signal, sys
 from pathlib import Path
-from fem_impact._base.files import replacing, staged
-with staged(sys.argv[1]) as staging, replacing(Path(sys.argv[1]) / "a.txt") as temporary:
+from fem_impact._base.files import replacing, staged_folder
+with staged_folder(sys.argv[1]) as staging, replacing(Path(sys.argv[1]) / "a.txt") as temporary:
     (staging / "modes").mkdir()
     (staging / "modes" / "b.txt").write_text("half")
     temporary.write_text("half")
@@ -160,7 +160,7 @@ def test_what_a_killed_process_left_is_removed_by_the_next(tmp_path):
     done = subprocess.run([sys.executable, "-c", KILLED, str(one)], env=environment, check=False)
     assert done.returncode == -signal.SIGKILL and len(list(one.glob(f"{PARTIAL}*"))) == 2
     shutil.copytree(one, two)
-    with staged(one) as staging:
+    with staged_folder(one) as staging:
         assert names(one) == [staging.name]
     with replacing(two / "b.txt") as temporary:
         temporary.write_text("whole")
@@ -174,7 +174,7 @@ def test_what_others_are_writing_is_left_alone(tmp_path):
     theirs = [f"{PARTIAL}{MACHINE}-{os.getppid()}-0123abcd", f"{PARTIAL}elsewhere-1-0123abcd", f"{PARTIAL}notes"]
     for name in theirs:
         (tmp_path / name).write_text("busy")
-    with staged(tmp_path) as outer, replacing(tmp_path / "a.txt") as temporary, staged(tmp_path):
+    with staged_folder(tmp_path) as outer, replacing(tmp_path / "a.txt") as temporary, staged_folder(tmp_path):
         assert outer.is_dir()
         temporary.write_text("a")
     assert names(tmp_path) == sorted([*theirs, "a.txt"])

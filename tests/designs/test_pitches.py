@@ -34,13 +34,13 @@ def test_intervals_are_from_now_and_ratios_to_the_first_mode():
 
 def test_each_pitch_is_that_of_the_nearest_mode_if_there_is_no_doubt():
     given = pitches.read_pitches(["A4", 800.0], "nearest")
-    assert [each.mode for each in pitches.settled(given, np.array([200.0, 430.0, 830.0, 1500.0]))] == [2, 3]
+    assert [each.mode for each in pitches.match_pitches(given, np.array([200.0, 430.0, 830.0, 1500.0]))] == [2, 3]
     with pytest.raises(
         ValueError, match=r"A4 is 386 cents from mode 3 and 498 cents from mode 2.*name the mode, as in"
     ):
-        pitches.settled(given[:1], np.array([100.0, 330.0, 550.0]))
+        pitches.match_pitches(given[:1], np.array([100.0, 330.0, 550.0]))
     with pytest.raises(ValueError, match="so it is not clear which is meant; name the mode"):
-        pitches.settled(pitches.read_pitches([440.0, 441.0], "nearest"), np.array([100.0, 441.0, 900.0]))
+        pitches.match_pitches(pitches.read_pitches([440.0, 441.0], "nearest"), np.array([100.0, 441.0, 900.0]))
 
 
 @pytest.mark.parametrize(

@@ -55,7 +55,7 @@ def test_slopes_of_a_dish_are_differences_of_solved_modes(name):
     slopes, areas = found.of_dishes(middles, radius)
 
     def solved(depth):
-        less = removal.thinner(section, Dishes(middles, np.array([depth]), radius).depth)
+        less = removal.thinned_section(section, Dishes(middles, np.array([depth]), radius).depth)
         return fi.find_modes(fi.assemble(mesh, less, supports, theory=theory), n_modes=4).frequencies
 
     below, above = solved(-step), solved(step)
@@ -75,15 +75,17 @@ def test_a_dish_within_a_plate_has_the_area_of_its_formula():
 
 def test_images_stand_once_and_places_lie_on_the_body():
     system = fi.assemble(fi.mesh.rectangle(0.4, 0.3, size=0.1), PLATE)
-    assert removal.images(np.array([0.1, 0.1]), "xy", system).tolist() == pytest.approx(
+    assert removal.mirror_images(np.array([0.1, 0.1]), "xy", system).tolist() == pytest.approx(
         np.array([[0.1, 0.1], [0.3, 0.1], [0.1, 0.2], [0.3, 0.2]])
     )
-    assert len(removal.images(np.array([0.2, 0.1]), "xy", system)) == 2
+    assert len(removal.mirror_images(np.array([0.2, 0.1]), "xy", system)) == 2
     places = Places.over(system, 0.1, "x")
     depths = np.zeros(len(places.first))
     depths[[0, -1]] = 1e-3, 2e-3
     assert places.dishes(depths).depths.tolist() == [1e-3, 1e-3, 2e-3]  # the last lies in the middle
-    nearby = removal.bell((places.gap / places.radius) ** 2)  # what a dish keeps where no point looked at is nearer
+    nearby = removal.dish_profile(
+        (places.gap / places.radius) ** 2
+    )  # what a dish keeps where no point looked at is nearer
     assert_allclose(nearby * (places.overlaps @ depths), places.dishes(depths).depth(places.between), atol=1e-15)
     some = places.some(np.array([len(depths) - 1, 0]))
     assert_allclose(some.first, places.first[[-1, 0]])

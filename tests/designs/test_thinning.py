@@ -20,10 +20,10 @@ def body_of(system, wanted, tolerance=1.0):
 
 def test_the_place_that_costs_least_for_a_cent_is_taken():
     cost, slopes = np.array([1.0, 0.5, 0.1]), np.array([[-40.0, -30.0, -1.0]])
-    found = thinning._cheapest(cost, slopes, np.array([12.0]), np.zeros(3), np.eye(3), 0.5, 1.0)
+    found = thinning._cheapest_shares(cost, slopes, np.array([12.0]), np.zeros(3), np.eye(3), 0.5, 1.0)
     # 2.5, 1.7 and 10 % of a place per cent: the second, until 0.5 of 12 cents are left
     assert_allclose(found, [0.0, 11.5 / 30.0, 0.0], atol=1e-9)
-    held = thinning._cheapest(cost, slopes, np.array([12.0]), np.zeros(3), np.eye(3), 0.5, 0.1)
+    held = thinning._cheapest_shares(cost, slopes, np.array([12.0]), np.zeros(3), np.eye(3), 0.5, 0.1)
     assert_allclose(held, 0.1, atol=1e-9)  # all that the step allows, and the rest is missed
 
 

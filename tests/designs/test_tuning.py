@@ -20,7 +20,7 @@ ON_LINE = fi.assemble(LINE, BAR)
 def again(found, mesh, whole, modes, **held):
     """Frequencies (n,) [Hz] of modes numbers (n,) of a body made anew from what is told of the patches."""
     patches = [(patch.at, patch.depth) for patch in found.patches]
-    less = removal.thinner(whole, Dishes.of_places(patches, found.radius).depth)
+    less = removal.thinned_section(whole, Dishes.of_places(patches, found.radius).depth)
     solved = fi.find_modes(fi.assemble(mesh, less, **held), n_modes=max(modes) + 3, tolerance=2e-5)
     return solved.frequencies[solved.n_rigid + np.array(modes) - 1]
 
@@ -44,7 +44,7 @@ def test_the_map_adds_up_to_a_uniform_removal_and_a_single_patch_tells_what_it_d
     volume = 0.05 * np.trapezoid(found.map[:, 0], found.points[:, 0])  # dishes overlap to a constant, but at the ends
     assert_allclose(volume, -PER_CENT / 0.012, rtol=0.02)
     patch = found.patch((0.02,), 0.1e-3, radius=0.03)
-    less = removal.thinner(BAR, Dishes(np.array([[0.02]]), np.array([0.1e-3]), 0.03).depth)
+    less = removal.thinned_section(BAR, Dishes(np.array([[0.02]]), np.array([0.1e-3]), 0.03).depth)
     exact = fi.find_modes(fi.assemble(LINE, less), n_modes=4).frequencies[2:]
     assert_allclose(patch.cents, 1200.0 * np.log2(exact / [each.before for each in found.tones]), rtol=1e-6)
     assert (patch.cents > 0.0).all()  # the end is lighter
@@ -115,9 +115,12 @@ def test_something_must_be_wanted():
 
 
 def test_pitches_of_the_command_are_in_order_or_by_mode():
-    assert tuning.given(["A4", "A5"]) == ["A4", "A5"] and tuning.given(["2=A5", "3="]) == {2: "A5", 3: None}
+    assert tuning.parse_pitches(["A4", "A5"]) == ["A4", "A5"] and tuning.parse_pitches(["2=A5", "3="]) == {
+        2: "A5",
+        3: None,
+    }
     with pytest.raises(ValueError, match="--pitch must be MODE=PITCH, as in 2=A5"):
-        tuning.given(["A4", "2=A5"])
+        tuning.parse_pitches(["A4", "2=A5"])
 
 
 def outline(rng):

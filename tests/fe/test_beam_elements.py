@@ -10,7 +10,7 @@ from skfem import MeshLine
 
 import fem_impact as fi
 from fem_impact.fe import beam_elements
-from fem_impact.fe.beam_elements import HermiteSpace, divided, nodes
+from fem_impact.fe.beam_elements import HermiteSpace, divide_lines, nodes
 
 
 def test_points_are_found_in_their_element_and_beyond_the_ends_in_none():
@@ -22,7 +22,7 @@ def test_points_are_found_in_their_element_and_beyond_the_ends_in_none():
 
 def divisions(stiffness, inertia=np.ones_like, places=(0.0, 1.0)):
     """Nodes of a beam of unit length whose section is a function of the place."""
-    return divided(lambda x: (stiffness(x), inertia(x)), np.array(places)).p[0]
+    return divide_lines(lambda x: (stiffness(x), inertia(x)), np.array(places)).p[0]
 
 
 def test_steps_and_kinks_of_the_section_become_nodes():

@@ -9,7 +9,7 @@ from scipy.special import ivp, jvp
 import fem_impact as fi
 from fem_impact.fe import corners
 from fem_impact.fe.corners import around_corners
-from fem_impact.fe.material import turned
+from fem_impact.fe.material import rotated_stiffness
 from fem_impact.mesh.loops import Arc, Outline, segment
 from fem_impact.mesh.meshes import fill
 
@@ -36,8 +36,8 @@ def test_exponent_of_the_deflection_at_a_corner(degrees, kinds, expected):
 def test_exponents_of_wood_are_those_of_its_mirror_image_and_not_of_steel(kinds):
     """The grain is 0.5 rad off the first edge of a corner of 100 degrees, and in the mirror as far off its last."""
     wood = fi.Material.orthotropic(E_along=12e9, E_across=0.8e9, nu=0.35, G=0.7e9, rho=430.0).plane_stress
-    found = exponent(100.0, kinds, turned(wood, 0.5))
-    assert_allclose(exponent(100.0, kinds[::-1], turned(wood, np.radians(100.0) - 0.5)), found, atol=1e-9)
+    found = exponent(100.0, kinds, rotated_stiffness(wood, 0.5))
+    assert_allclose(exponent(100.0, kinds[::-1], rotated_stiffness(wood, np.radians(100.0) - 0.5)), found, atol=1e-9)
     assert found < exponent(100.0, kinds) - 0.1
 
 
@@ -63,13 +63,13 @@ def test_only_the_notch_of_an_l_is_graded():
 def test_the_innermost_ring_misses_a_ten_millionth_of_the_energy(degrees, kind):
     """The energy within r goes as r**(2 z - 2); half as large a ring would miss less than it may."""
     power = 2.0 * (exponent(degrees, (kind, kind)) - 1.0)
-    n = corners.rings(exponent(degrees, (kind, kind)), (kind, kind))
+    n = corners.number_of_rings(exponent(degrees, (kind, kind)), (kind, kind))
     assert 0.5 ** (power * n) <= 1e-7 < 0.5 ** (power * (n - 1))
 
 
 def test_rings_stop_where_rounding_takes_over():
     """Coordinates keep six digits of a ring of 1e-10; at a free corner, rounding goes as its size to the -2: 1e-11."""
-    hinged, free = (corners.rings(exponent(172.5, (kind, kind)), (kind, kind)) for kind in ("hinged", "free"))
+    hinged, free = (corners.number_of_rings(exponent(172.5, (kind, kind)), (kind, kind)) for kind in ("hinged", "free"))
     assert 0.5**hinged <= 1e-10 < 0.5 ** (hinged - 1)
     assert 0.5**free <= 3e-3 < 0.5 ** (free - 1)
 
@@ -80,7 +80,7 @@ def test_rings_stop_where_rounding_takes_over():
 )
 def test_corners_that_quintics_resolve_get_no_rings(degrees, kind, rings):
     """Exponents of 2.96, 2.89, 2.54 and 2.48: what is left of the first and third is below 1e-6."""
-    assert bool(corners.rings(exponent(degrees, (kind, kind)), (kind, kind))) == rings
+    assert bool(corners.number_of_rings(exponent(degrees, (kind, kind)), (kind, kind))) == rings
 
 
 def test_triangles_at_a_singular_corner_are_narrow_and_not_narrower():

@@ -50,7 +50,7 @@ def test_a_square_whose_edges_slide_along_themselves_is_that_of_chu_and_herrmann
 
 def stretched(sheet, slopes):
     """Energy of one mode of unit amplitude."""
-    return energies(membrane.forms(sheet, slopes, np.ones(1))[0], np.ones(1)).sum()
+    return energies(membrane.stretching_forms(sheet, slopes, np.ones(1))[0], np.ones(1)).sum()
 
 
 def test_a_square_held_all_round_is_a_little_stiffer():
@@ -74,7 +74,7 @@ def test_a_square_that_may_move_in_its_plane_is_that_of_airys_function(numbers):
 def test_fields_of_stress_are_kept_in_order_and_each_adds_energy():
     numbers = [(1, 1), (1, 2), (2, 1), (2, 2), (1, 3), (3, 1)]
     omega = np.square(numbers).sum(axis=1).astype(float)
-    found = membrane.forms(sheet(), sines(numbers), omega)[0]
+    found = membrane.stretching_forms(sheet(), sines(numbers), omega)[0]
     assert len(found) == 21  # every pair of modes
     mean = sum(energies(found, q / omega) for q in np.random.default_rng(1).normal(size=(2000, 6)))
     assert (mean[:3] > mean[3:].max()).all()

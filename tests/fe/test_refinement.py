@@ -57,15 +57,15 @@ def test_the_shortest_wave_in_wood_runs_across_the_grain_whatever_its_angle(angl
 def test_the_step_of_refinement_solves_the_law_of_the_error():
     parts, (smooth, curved, step_of_thickness) = np.zeros((4, 4)), refinement.ORDERS
     parts[0] = [1e-7, 1e-6, 1e-5, 1e-4]
-    assert_allclose(refinement._needed(parts, 1e-6), 100.0 ** (1.0 / smooth), rtol=1e-9)
+    assert_allclose(refinement._needed_factor(parts, 1e-6), 100.0 ** (1.0 / smooth), rtol=1e-9)
     parts[1] = parts[0] * 100.0
-    step = refinement._needed(parts, 1e-6)
+    step = refinement._needed_factor(parts, 1e-6)
     assert_allclose(1e-4 * step**-smooth + 1e-2 * step**-curved, 1e-6, rtol=1e-9)
-    assert refinement._needed(parts, 1.0) == refinement.LEAST_STEP
+    assert refinement._needed_factor(parts, 1.0) == refinement.LEAST_STEP
     parts[2, 0] = 1e-5
-    assert refinement._needed(parts[:, :1], 1e-6) > 10.0**step_of_thickness
+    assert refinement._needed_factor(parts[:, :1], 1e-6) > 10.0**step_of_thickness
     parts[3, 0] = 2e-6  # no mesh cures that
-    assert refinement._needed(parts, 1e-6) == np.inf
+    assert refinement._needed_factor(parts, 1e-6) == np.inf
 
 
 def test_a_frequency_limit_counts_by_inertia_and_below_the_first_mode_is_told():
@@ -165,7 +165,7 @@ def test_errors_fall_as_the_step_of_refinement_assumes(mesh):
     """A mesh made to have a fiftieth of the error has that, or up to three times as much: then a third one follows."""
     found = refinement.solve_on_mesh(fi.assemble(mesh, PLATE, {"boundary": "hinged"}), 12, None)
     goal = found.error.max() / 50.0
-    step = refinement._needed(found.parts, goal)
+    step = refinement._needed_factor(found.parts, goal)
     finer = refinement.solve_on_mesh(refinement.reassemble(found.system, mesh.refined(step)), 12, None)
     assert 0.3 * goal < finer.error.max() < 3.0 * goal
 

@@ -59,7 +59,7 @@ def test_a_beam_too_coarse_for_its_modes_says_so():
 
 
 def test_looks_into_a_triangle_are_the_centres_of_its_equal_parts():
-    looks = residual._looks() + 1.0 / 3.0  # from the corner
+    looks = residual._look_points() + 1.0 / 3.0  # from the corner
     assert len(looks) == 4**residual.HALVED
     assert (looks > 0.0).all() and (looks.sum(axis=1) < 1.0).all()
     np.testing.assert_allclose(looks.mean(axis=0), 1.0 / 3.0, rtol=1e-12)

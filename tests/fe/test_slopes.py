@@ -21,13 +21,13 @@ def test_softness_of_a_tapered_beam():
     bar = fi.Beam.rectangular(STEEL, width=width, height=lambda x: h0 + h1 * x[:, 0])
     system = fi.assemble(fi.mesh.line(length), bar, {"left": "hinged", "right": "hinged"})
     whole = np.log1p(h1 * length / h0) / h1
-    found = slopes.lengthened(system, np.zeros((system.n_dofs, 1)))[1]
+    found = slopes.lengthening_of_beam(system, np.zeros((system.n_dofs, 1)))[1]
     assert found == pytest.approx(whole / (STEEL.E * width), rel=1e-10)
 
 
 def test_a_beam_is_lengthened_as_its_sines_are():
     bar, length = fi.Beam.rectangular(STEEL, width=0.02, height=4e-3), 0.3
     modes = fi.find_modes(fi.assemble(fi.mesh.line(length), bar, {"left": "hinged", "right": "hinged"}), n_modes=4)
-    found = slopes.lengthened(modes.shapes.system, modes.shapes.vectors)[0]
+    found = slopes.lengthening_of_beam(modes.shapes.system, modes.shapes.vectors)[0]
     wanted = np.diag((np.pi * np.arange(1, 5) / length) ** 2 / (modes.mass / length))
     assert found == pytest.approx(wanted, rel=1e-10, abs=1e-10 * wanted.max())

@@ -41,7 +41,7 @@ system = fi.assemble(fi.mesh.rectangle(0.465, 0.3), plate, supports={"boundary":
 stick, touch = fi.Striker.stick(mass=0.1, first_frequency=10e3), fi.Contact.hertz(695e3)
 plan = fi.plan(system, stick, touch, at=(0.1395, 0.09), speed=2.0, tolerance=1e-3, damping_ratio=0.005)
 print(plan)
-for kernel in (energy.follow, record.find_impacts, law.stored):
+for kernel in (energy.follow, record.find_impacts, law.stored_energies):
     assert not kernel.overloads
 """
 
@@ -56,11 +56,11 @@ def test_a_plan_compiles_nothing(tmp_path):
 @compiled_only
 def test_what_is_not_compiled_runs_as_plain_python_and_says_the_same():
     table, approach = law.table([[1e6, 1.5, 0.1]]), np.array([1e-3], np.float32)  # a type nothing is compiled for
-    known = len(law.stored.overloads)
+    known = len(law.stored_energies.overloads)
     with build.uncompiled():
-        found = law.stored(approach, table)
-    assert found == pytest.approx(law.stored(approach.astype(float), table), rel=1e-6)
-    assert len(law.stored.overloads) <= known + 1
+        found = law.stored_energies(approach, table)
+    assert found == pytest.approx(law.stored_energies(approach.astype(float), table), rel=1e-6)
+    assert len(law.stored_energies.overloads) <= known + 1
 
 
 TWICE = """

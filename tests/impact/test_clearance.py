@@ -23,7 +23,7 @@ def test_it_is_below_zero_where_a_second_impact_follows():
         for stiffness in (1e4, 1e5):
             numbers = NUMBERS | {"striker.mass": mass, "contact.stiffness": stiffness}
             again = struck(numbers, tolerance=1e-3).n_impacts > 1
-            assert (clearance.nearest(struck(numbers, tolerance=1e-4, max_impacts=1))[0] < 0.0) == again
+            assert (clearance.nearest_clearance(struck(numbers, tolerance=1e-4, max_impacts=1))[0] < 0.0) == again
             signs.add(again)
     assert signs == {True, False}
 
@@ -31,7 +31,7 @@ def test_it_is_below_zero_where_a_second_impact_follows():
 def test_a_ball_leaves_a_wall_for_good():
     law = fi.Contact.linear(1e5)
     hit = fi.strike(fi.Modes.rigid(1e6), fi.Striker.rigid(0.1), law, at=None, speed=1.0, max_impacts=1)
-    assert clearance.nearest(hit) == (clearance.FAR, None)
+    assert clearance.nearest_clearance(hit) == (clearance.FAR, None)
     assert not clearance.slopes(hit, ("striker.mass",), {}).any()
 
 
@@ -40,15 +40,15 @@ def test_its_derivatives_are_differences(stiffness):
     numbers, names = NUMBERS | {"contact.stiffness": stiffness}, tuple(NUMBERS)
     hit = struck(numbers, tolerance=1e-8, max_impacts=1)
     found = clearance.slopes(hit, names, {})
-    assert clearance.nearest(hit)[1] is not None
+    assert clearance.nearest_clearance(hit)[1] is not None
     for name, slope in zip(names, found):
         sides = [numbers | {name: numbers[name] * (1.0 + side * 1e-4)} for side in (-1.0, 1.0)]
-        low, high = (clearance.nearest(struck(side, tolerance=1e-8, max_impacts=1))[0] for side in sides)
+        low, high = (clearance.nearest_clearance(struck(side, tolerance=1e-8, max_impacts=1))[0] for side in sides)
         # differences of second order of blows told to 1e-8
         assert_allclose(slope * numbers[name], (high - low) / 2e-4, rtol=1e-5, atol=2e-4, err_msg=name)
 
 
 def test_a_run_that_goes_on_has_none():
     with pytest.raises(fi.SimulationError, match=r"must end with its first impact; give max_impacts = 1$"):
-        clearance.nearest(struck(NUMBERS, tolerance=1e-3))
-    clearance.nearest(struck(NUMBERS, tolerance=1e-3, max_impacts=1))
+        clearance.nearest_clearance(struck(NUMBERS, tolerance=1e-3))
+    clearance.nearest_clearance(struck(NUMBERS, tolerance=1e-3, max_impacts=1))

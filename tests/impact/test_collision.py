@@ -534,7 +534,7 @@ def test_the_modes_that_a_striker_keeps_err_by_less_than_told_and_leave_the_tole
     where = {"at": tuple(rng.uniform(0.2, 0.8, 2)), "speed": 1.0, "tolerance": 1e-6}
     kept, _ = collision.striker_modes(stick, contact=law, speed=1.0, tolerance=1e-3)
     told = collision.striker_error(stick, kept, contact=law, speed=1.0)
-    few, all_but_one = (fi.strike(body, collision.shortened(stick, n), law, **where) for n in (kept, 95))
+    few, all_but_one = (fi.strike(body, collision.shortened_striker(stick, n), law, **where) for n in (kept, 95))
     assert worst(few, all_but_one) < min(told, 0.1e-3)  # a tenth of the tolerance; 0.04 of it were measured at most
 
 

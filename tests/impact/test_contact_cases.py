@@ -229,12 +229,12 @@ def test_a_blow_does_not_know_its_neighbours():
     """Alone, in any order, in batches of any size, on any number of threads: bit for bit the same."""
     n = 2 * batches.FEW  # fewer are not split between threads
     blows = many(n)
-    whole = batches.bounce(blows, tolerance=1e-3, workers=1)
+    whole = batches.follow_blows(blows, tolerance=1e-3, workers=1)
     order = np.random.default_rng(1).permutation(n)
     alone = [(np.array([i]), 1) for i in range(0, n, n // 10)]
     for cells, workers in ((order, 1), (order, 2), (np.arange(70, 137), 3), *alone):
         chosen = batches.Blows(blows.families, *(np.array(getattr(blows, name)[cells]) for name in COLUMNS))
-        part = batches.bounce(chosen, tolerance=1e-3, workers=workers)
+        part = batches.follow_blows(chosen, tolerance=1e-3, workers=workers)
         for name in RESULTS:
             assert np.array_equal(getattr(part, name), getattr(whole, name)[cells], equal_nan=True), name
 
@@ -250,7 +250,7 @@ def test_inputs_in_single_precision_count_the_same_impacts():
     arrays = (tuple(single(x) for x in getattr(family, name)) for name in ("omega", "zeta", "squared"))
     rounded = batches.Family(*arrays, tuple(float(np.float32(x)) for x in family.rest))
     other = batches.Blows({0: rounded}, blows.family, *(single(getattr(blows, name)) for name in COLUMNS[1:]))
-    double, coarse = (batches.bounce(scene, tolerance=1e-3) for scene in (blows, other))
+    double, coarse = (batches.follow_blows(scene, tolerance=1e-3) for scene in (blows, other))
     both = double.done & coarse.done
     assert both.mean() > 0.9  # the others belong to the modal engine
     same = double.n_impacts[both] == coarse.n_impacts[both]

@@ -94,4 +94,4 @@ def test_a_mode_that_stretches_may_swing_as_far_as_its_energy(phase, reach, over
     bodies = SimpleNamespace(omega=omega, shape=shape, q=q, p=p, bias=np.zeros(2))
     contacts, still = SimpleNamespace(end=np.zeros(1), offset=np.zeros(1)), SimpleNamespace(still=0.0, depth=0.0)
     room = stretched.made_room(stretched.Stretch(np.zeros((1, 1, 1)), np.zeros((0, 1)), 1), omega, 1)
-    assert build.plain(stretched.parted)(bodies, contacts, room, still) == over
+    assert build.plain(stretched.surely_apart)(bodies, contacts, room, still) == over

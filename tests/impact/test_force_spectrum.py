@@ -20,13 +20,13 @@ def triangles(frequencies):
 
 @pytest.mark.parametrize("scale", [1.0, 1e-6])  # the second takes the series for short pieces
 def test_triangles_have_their_closed_form(scale):
-    found = force_spectrum.of_pieces(force_spectrum.pieces(scale * TIME, FORCE), FREQUENCIES)
+    found = force_spectrum.of_pieces(force_spectrum.straight_pieces(scale * TIME, FORCE), FREQUENCIES)
     # 1e-15 of the integral of the force, 3e-3 N s, and the rounding of phases of up to 180 rad
     assert_allclose(found, scale * triangles(scale * FREQUENCIES), rtol=0.0, atol=1e-16 * scale)
 
 
 def test_pieces_without_force_are_left_out_and_forces_of_all_contacts_add():
-    start, length, first, last = force_spectrum.pieces(TIME, np.hstack([FORCE, 2.0 * FORCE]))
+    start, length, first, last = force_spectrum.straight_pieces(TIME, np.hstack([FORCE, 2.0 * FORCE]))
     assert_allclose(start, [0.0, 1e-3, 5e-3, 6e-3])
     assert_allclose(length, 1e-3)
     assert_allclose(first + last, [6.0, 6.0, 3.0, 3.0])
@@ -38,7 +38,7 @@ def rough(n_pieces, seed):
     time = 3e-3 + np.cumsum(10.0 ** rng.uniform(-9.0, -5.0, n_pieces + 1))
     force = rng.uniform(-1.0, 3.0, (n_pieces + 1, 1))
     force[n_pieces // 3 : n_pieces // 2] = 0.0
-    found = force_spectrum.pieces(time, force)
+    found = force_spectrum.straight_pieces(time, force)
     return found, float(np.abs(found[1] * (found[2] + found[3])).sum() / 2.0)
 
 
@@ -64,7 +64,7 @@ def allowed(pieces, highest, rounding):
 @pytest.mark.parametrize("highest", [1e-3, 1e3, 1e5])  # Hz: phases over the whole blow of 2e-5, 20 and 2 000 rad
 def test_the_transform_is_exact_to_rounding(highest, monkeypatch):
     """Frequencies evenly from zero, which folds the time; from below zero; over seven decades."""
-    monkeypatch.setattr(force_spectrum, "directly", None)
+    monkeypatch.setattr(force_spectrum, "spectrum_in_closed_form", None)
     pieces, whole = rough(300, seed=1)
     evenly, below = np.linspace(0.0, highest, 64), np.append(np.linspace(-highest, 0.7 * highest, 40), 0.0)
     for frequencies in (evenly, below, np.geomspace(1e-7 * highest, highest, 60)):
@@ -88,17 +88,20 @@ def test_many_pieces_and_frequencies_too_high_for_the_transform_agree(n_pieces):
     pieces, whole = rough(n_pieces, seed=3)
     for highest in (1e4, 1e9):
         frequencies = np.array([-1.0, -0.11, 0.0, 1e-9, 0.003, 0.5, 1.0]) * highest
-        found, direct = force_spectrum.of_pieces(pieces, frequencies), force_spectrum.directly(pieces, frequencies)
+        found, direct = (
+            force_spectrum.of_pieces(pieces, frequencies),
+            force_spectrum.spectrum_in_closed_form(pieces, frequencies),
+        )
         assert_allclose(found, direct, rtol=0.0, atol=allowed(pieces, highest, 2e-14) * whole)
 
 
 def test_what_rounding_hides_is_zero_and_takes_no_time():
     """Touches of days, in pieces that no transform of seconds resolves."""
     time = np.linspace(0.0, 1e7, 100_001)
-    pieces = force_spectrum.pieces(time, np.maximum(np.sin(3e-6 * np.pi * time), 0.0)[:, None])
+    pieces = force_spectrum.straight_pieces(time, np.maximum(np.sin(3e-6 * np.pi * time), 0.0)[:, None])
     frequencies = np.concatenate([[0.0, 1.5e-6], np.full(100_000, 1e3)])  # would take a quarter of an hour
     found = force_spectrum.of_pieces(pieces, frequencies)
-    assert_allclose(found[:2], force_spectrum.directly(pieces, frequencies[:2]), rtol=1e-12)
+    assert_allclose(found[:2], force_spectrum.spectrum_in_closed_form(pieces, frequencies[:2]), rtol=1e-12)
     assert np.abs(found[:2]).min() > 1e5 and not found[2:].any()
 
 
@@ -109,7 +112,7 @@ def test_one_frequency_zeros_and_no_pieces_have_a_spectrum():
     alone = force_spectrum.of_pieces(pieces, np.array([123.4]))
     beside = force_spectrum.of_pieces(pieces, np.array([123.4, -123.4, 60.0]))
     assert_allclose([alone[0], alone[0].conj()], beside[:2], rtol=0.0, atol=2e-14 * whole)
-    nothing = force_spectrum.pieces(TIME, np.zeros((6, 1)))
+    nothing = force_spectrum.straight_pieces(TIME, np.zeros((6, 1)))
     assert not force_spectrum.of_pieces(nothing, FREQUENCIES).any()
 
 

@@ -23,6 +23,6 @@ def test_every_mode_moves_as_its_equations_say():
         states = np.array(states)
         expected += weights[0, n] * np.stack([states[:, 0], states[:, 1], (states @ pull.T)[:, 1]])
     for order, wanted in enumerate(expected):
-        found = free_motion.swing(omega, zeta, bias, (q, p), times, weights, order)
+        found = free_motion.flexible_motion(omega, zeta, bias, (q, p), times, weights, order)
         # critical damping is moved aside by 1e-6
         assert_allclose(found, wanted, rtol=0.0, atol=1e-6 * np.abs(wanted).max())

@@ -250,7 +250,7 @@ def test_the_largest_force_is_the_largest_of_many_samples(loss, tolerance):
     law = fi.Contact.hertz(695e3, loss=loss)
     blow = {"at": (0.45, 0.3), "speed": 1.0, "tolerance": tolerance, "max_impacts": 2, "residual": False}
     history = fi.strike(plate, fi.Striker.rigid(0.1), law, **blow).history
-    time, force = gradient.largest(history)
+    time, force = gradient.peak_of_force(history)
     times = np.linspace(0.0, history.end_time, 200_001)
     forces = history.force_at(times, 0)[0]
     assert_allclose(time, times[forces.argmax()], atol=2.0 * times[1])
@@ -265,7 +265,7 @@ def test_a_peak_just_before_the_end_of_a_long_step_is_found(before):
     steps[:, 0], steps[:, 1], steps[:, 5], now[4] = ends[:-1], np.diff(ends), 1.0, -1.0
     steps[:, 3], steps[:, 4] = np.sin(ends[:-1]), np.cos(ends[:-1])
     run = ball(fi.Contact.linear(1e3)).history
-    found = gradient.largest(replace(run, steps=steps, now=now, law=law, end_time=np.pi))
+    found = gradient.peak_of_force(replace(run, steps=steps, now=now, law=law, end_time=np.pi))
     assert_allclose(found, [0.5 * np.pi, 1e3], rtol=1e-3)  # of the cubics
 
 

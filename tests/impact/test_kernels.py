@@ -44,7 +44,7 @@ def run(
     steps, q1, p1, now, done, time, status, n_fallback, n_blind, _ = out
 
     def stored(d):
-        return laws.stored(np.atleast_1d(d).astype(float), law)
+        return laws.stored_energies(np.atleast_1d(d).astype(float), law)
 
     def modal(q, p):
         return 0.5 * (p @ p + (omega * q) @ (omega * q)) - bias @ q

@@ -7,7 +7,7 @@ from numpy.testing import assert_allclose
 
 import fem_impact as fi
 from fem_impact.impact.compiled import build, law, misfit
-from fem_impact.impact.contact import acting_stiffness, sunk
+from fem_impact.impact.contact import acting_stiffness, depths_of_surfaces
 from fem_impact.scenes.keys import form
 
 MADE = {  # one of each, its own course within the approaches below
@@ -135,11 +135,11 @@ def test_an_approach_is_found_from_its_force_and_the_law_that_stands_for_it_stor
 def test_a_new_surface_lies_where_it_is_and_a_fresh_dent_where_kernels_have_it(contact):
     """A dent does not recover, and kernels know how deep it is; of felt no dent but what is still pressed in."""
     rows = law.table([contact.numbers])
-    assert_allclose(sunk(rows, np.zeros((1, 1)), np.zeros((1, 1))), 0.0, atol=1e-18)
+    assert_allclose(depths_of_surfaces(rows, np.zeros((1, 1)), np.zeros((1, 1))), 0.0, atol=1e-18)
     if law.row_of(contact).yield_approach:
         dent = build.plain(law.dent)(rows, 0, 3e-4)
         assert dent > 0.0
-        assert_allclose(sunk(rows, np.full((2, 1), 3e-4), np.array([[0.0], [9.0]])), dent, rtol=1e-13)
+        assert_allclose(depths_of_surfaces(rows, np.full((2, 1), 3e-4), np.array([[0.0], [9.0]])), dent, rtol=1e-13)
 
 
 @each_law

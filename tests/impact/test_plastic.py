@@ -104,7 +104,7 @@ def test_no_contact_that_yields_is_stiffer_than_one_that_does_not_or_gives_energ
     yields = fi.Contact.elastic_plastic(1e8, exponent, yield_approach=1e-4)
     x = 1e-4 * np.geomspace(1.0001, 1e3, 400)
     assert (yields.force(x) <= 1e8 * x**exponent * (1.0 + 1e-12)).all()
-    lost = np.array([build.plain(law.yielded)(dented(yields, deepest)) for deepest in x])
+    lost = np.array([build.plain(law.yielded_energy)(dented(yields, deepest)) for deepest in x])
     assert (np.diff(lost[x > 1.01e-4]) > 0.0).all()
     assert (lost / (1e8 * 1e-4 ** (exponent + 1.0)) > -1e-13).all()  # rounding
 

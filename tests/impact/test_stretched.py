@@ -230,7 +230,7 @@ def test_scheme_a_converges_to_the_same_blow_and_a_blow_again_is_the_same():
     one, two = (blow(plate(8), law, 2.0, scheme=scheme, tolerance=1e-4) for scheme in ("A", "A4"))
     assert one.restitution == pytest.approx(two.restitution, abs=3e-4)
     assert one.energy_error < 1e-12 and not one.history.stretched.ramp
-    again = engine.again(two.history)
+    again = engine.follow_again(two.history)
     assert again.end_p[0] == pytest.approx(two.history.end_p[0], rel=1e-3)
     assert again.stretched.forms is two.history.stretched.forms
 

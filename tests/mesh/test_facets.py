@@ -3,7 +3,7 @@
 import numpy as np
 from numpy.testing import assert_allclose
 
-from fem_impact.mesh.facets import Curves, divided
+from fem_impact.mesh.facets import Curves, divide_facets
 
 
 def arcs(radius, angle, start=0.3):
@@ -57,7 +57,7 @@ def test_a_facet_is_the_curve_of_degree_six_that_it_was_taken_from():
 def test_parts_of_a_divided_arc_lie_on_it_and_of_a_straight_facet_beside_it_on_the_line():
     straight, unit = np.array([[[0.0, 0.0], [1.0, 2.0]]]), np.tile([1.0, 2.0], (1, 2, 1)) / np.sqrt(5.0)
     both = [np.concatenate(x) for x in zip(arcs(2.0, 0.2), (straight, straight.mean(axis=1), unit, np.zeros((1, 2))))]
-    points, tangents, curvatures, firsts, seconds = divided(*both, 0.25)
+    points, tangents, curvatures, firsts, seconds = divide_facets(*both, 0.25)
     # the facet itself, over 0.2 rad, leaves the circle by 5e-11 of its radius, and its tangent by 8e-10
     assert_allclose(np.linalg.norm([points[0], firsts[0], seconds[0]], axis=1), 2.0, rtol=1e-10)
     assert_allclose(points[0] @ tangents[0], 0.0, atol=4e-9)

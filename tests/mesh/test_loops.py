@@ -78,7 +78,7 @@ def test_the_body_lies_on_the_left_of_every_loop_however_it_was_drawn():
     drawn = Outline.around((ELLIPSE.reversed(),), (hole,))
     area = [loops.signed_area(loops.polyline(loop, 0.01)) for loop in drawn.loops]
     assert_allclose(area, [3.0 * np.pi, -0.25 * np.pi], rtol=2e-3)  # the turn within a facet: TURN**2 / 24
-    assert loops.crossed(drawn) == ""
+    assert loops.why_crossed(drawn) == ""
     assert_allclose(loops.extent(drawn.outer), 6.0, rtol=1e-12)
 
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from fem_impact.mesh.smooth_edges import _corners, join, recover_rim, smooth_runs
+from fem_impact.mesh.smooth_edges import _corners, join_smoothly, recover_rim, smooth_runs
 
 
 def loop_of(place):
@@ -118,5 +118,5 @@ def test_a_turn_far_larger_than_its_neighbours_is_a_corner(ratio, corner):
 def test_curves_that_nearly_share_a_tangent_are_joined(angle, smooth):
     tangents = np.tile([1.0, 0.0], (2, 2, 1))
     tangents[1] = np.cos(angle), np.sin(angle)
-    join(np.array([[0, 1]]), tangents, np.full((2, 2), 0.5))
+    join_smoothly(np.array([[0, 1]]), tangents, np.full((2, 2), 0.5))
     assert np.array_equal(tangents[0, 1], tangents[1, 0]) == smooth

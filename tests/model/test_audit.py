@@ -146,7 +146,7 @@ def test_contacts_that_lose_are_examined_and_struck_again_as_they_are(law):
     for name in ("thin target", "small deflections", "still air", "stated damping", "quasi-static contact"):
         assert found[name].known and found[name].worst < 0.05, found[name].sentence
     assert found["thin target"].worst > 0.0
-    again = engine.again(hit.history)  # the blow to compare with is the one found
+    again = engine.follow_again(hit.history)  # the blow to compare with is the one found
     before = restrike.Struck(replace(hit, audit=None), hit.bodies, None, None).before
     assert before.peak_force == pytest.approx(hit.peak_force, rel=2e-2)  # a coarse first run
     assert len(again.contacts) == len(hit.history.contacts)

@@ -6,7 +6,7 @@ from thick_plates import ritz
 
 import fem_impact as fi
 from fem_impact.model import bending as module
-from fem_impact.model.thinness import lowered
+from fem_impact.model.thinness import lowered_by
 
 E, NU, RHO = 210e9, 0.3, 7850.0
 STEEL = fi.Material(E=E, nu=NU, rho=RHO)
@@ -25,7 +25,7 @@ def by_elements(mesh, section, supports, **how):
 def drops(modes, exact):
     """Relative drops of the flexible frequencies of a thick body: estimated, and exact."""
     flexible = modes.omega > 0.0
-    told = 1.0 - lowered(integrals(modes).thick)
+    told = 1.0 - lowered_by(integrals(modes).thick)
     return told[flexible][: len(exact)], 1.0 - exact / modes.omega[flexible][: len(exact)]
 
 

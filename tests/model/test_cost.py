@@ -23,7 +23,7 @@ MUCH = cost.Work(sparse=10.0, dense=1.0, steps=1.0)
 def place(tmp_path, monkeypatch):
     """A file of its own for every test; what the process has read is forgotten before and after."""
     path = tmp_path / "kernels" / "speed.json"
-    monkeypatch.setattr(cost, "place", lambda: path)
+    monkeypatch.setattr(cost, "machine_file", lambda: path)
     cost.this_machine.cache_clear()
     yield path
     cost.this_machine.cache_clear()
@@ -44,7 +44,10 @@ def benchmarks(monkeypatch):
         (cost.by_modes, ((3e3, 20), (6e3, 20), (6e3, 40))),
         (lambda n, _: cost.compliance(n), ((4e3, 0), (8e3, 0), (9e3, 0))),
         (lambda n, k: cost.by_vectors([n, 3e3], k), ((4e3, 80), (8e3, 80), (8e3, 160))),
-        (lambda n, lasts: cost.by_vectors([n, 3e3], cost.grown(80, lasts)), ((4e3, 1.0), (8e3, 1.0), (8e3, 20.0))),
+        (
+            lambda n, lasts: cost.by_vectors([n, 3e3], cost.grown_number(80, lasts)),
+            ((4e3, 1.0), (8e3, 1.0), (8e3, 20.0)),
+        ),
     ],
 )
 def test_more_of_anything_costs_more_time_and_no_less_memory(work, sizes):
@@ -63,9 +66,11 @@ def test_the_time_of_a_finer_mesh_grows_faster_than_its_unknowns():
 def test_many_first_vectors_become_more_and_each_costs_more():
     """The plate of `frontier.py` at 1e-6 begins with 302 vectors, ends with 592 and takes four times as long."""
     meshes = [6676, 4591]
-    few, many = (cost.by_vectors(meshes, cost.grown(n, 1.0)).on(cost.REFERENCE) for n in (120, 302))
+    few, many = (cost.by_vectors(meshes, cost.grown_number(n, 1.0)).on(cost.REFERENCE) for n in (120, 302))
     assert many > 2.5 * few  # 302 vectors that do not grow would cost 2.1 times as much as 120
-    assert cost.by_vectors(meshes, cost.grown(60, 1.0)).on(cost.REFERENCE) > 0.5 * few  # those that are enough stay
+    assert (
+        cost.by_vectors(meshes, cost.grown_number(60, 1.0)).on(cost.REFERENCE) > 0.5 * few
+    )  # those that are enough stay
 
 
 @pytest.fixture
@@ -179,11 +184,13 @@ def test_a_plan_of_both_ways_counts_all_frequencies_that_echoes_may_ask_for(coun
 
 
 def test_what_doctor_kept_of_this_machine_serves_every_later_process(place, benchmarks):
-    assert MUCH.seconds == pytest.approx(12.0) and "typical" in cost.whose()  # without a file nothing is measured
+    assert (
+        MUCH.seconds == pytest.approx(12.0) and "typical" in cost.machine_in_words()
+    )  # without a file nothing is measured
     assert not benchmarks and not place.exists()
     cost.this_machine.cache_clear()
     assert cost.calibrate() and len(benchmarks) == 1
-    assert MUCH.seconds == pytest.approx(24.0) and cost.whose() == "this machine" and len(benchmarks) == 1
+    assert MUCH.seconds == pytest.approx(24.0) and cost.machine_in_words() == "this machine" and len(benchmarks) == 1
 
 
 DAMAGED = {
@@ -195,7 +202,7 @@ DAMAGED = {
 
 @pytest.mark.parametrize("damage", DAMAGED.values(), ids=DAMAGED)
 def test_a_damaged_file_other_kernels_and_impossible_numbers_do_not_count_and_are_replaced(place, benchmarks, damage):
-    assert cost.keep(SLOW) and cost.read_machine() == SLOW
+    assert cost.keep_machine(SLOW) and cost.read_machine() == SLOW
     place.write_bytes(
         damage if isinstance(damage, bytes) else json.dumps(json.loads(place.read_text()) | damage).encode()
     )
@@ -207,9 +214,9 @@ def test_doctor_says_where_nothing_can_be_kept(place, benchmarks, monkeypatch):
     place.parent.write_text("a file where the folder should be")
     assert not cost.calibrate()
     del benchmarks[:]
-    monkeypatch.setattr(cost, "place", lambda: None)  # without compiled kernels nothing is measured either
+    monkeypatch.setattr(cost, "machine_file", lambda: None)  # without compiled kernels nothing is measured either
     assert pytest.approx(12.0) == MUCH.seconds and cost.calibrate()
-    assert cost.read_machine() is None and not cost.keep(SLOW) and not benchmarks
+    assert cost.read_machine() is None and not cost.keep_machine(SLOW) and not benchmarks
 
 
 def test_a_disturbed_benchmark_is_not_believed(place, monkeypatch):
@@ -233,9 +240,9 @@ def test_a_thick_plate_is_counted_on_the_second_meshes_that_tell_its_errors():
 def test_the_result_lies_beside_the_kernels(monkeypatch):
     monkeypatch.undo()
     if not build.COMPILED:
-        assert cost.place() is None
+        assert cost.machine_file() is None
         return
-    assert cost.place().parent == build.folder(cost.follow)
+    assert cost.machine_file().parent == build.folder(cost.follow)
 
 
 @pytest.mark.skipif(not build.COMPILED, reason="the benchmark is for compiled kernels")
@@ -260,6 +267,6 @@ def test_predicted_time_is_of_the_right_size(name):
 def test_the_memory_of_this_machine_is_no_more_than_the_limit_of_this_process(monkeypatch):
     if cost.resource is None:
         pytest.skip("Windows tells neither")
-    free = cost.installed()
+    free = cost.memory_installed()
     monkeypatch.setattr(cost.resource, "getrlimit", lambda _: (2**30, 2**30))
-    assert cost.installed() == 2**30 < free
+    assert cost.memory_installed() == 2**30 < free

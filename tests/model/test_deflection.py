@@ -11,7 +11,17 @@ from scipy.special import sici
 import fem_impact as fi
 from fem_impact.fe import membrane
 from fem_impact.model import bending, deflection
-from fem_impact.model.deflection import FRONT, RINGING, SLIPS, SMALL, _bends, _crude, _held_back, _tension, _within
+from fem_impact.model.deflection import (
+    FRONT,
+    RINGING,
+    SLIPS,
+    SMALL,
+    _crude_share,
+    _held_back,
+    _share_of_bending,
+    _share_within,
+    _tension,
+)
 from fem_impact.modes.stretching import Stretching
 
 E, NU, RHO, H, SIDE = 210e9, 0.3, 7850.0, 1e-3, 0.2
@@ -33,7 +43,11 @@ def rise(body, amplitude):
     middle = float(np.abs(body.shape_at(body.shapes.grid()[0])[:, 0]).max())
     mean = 0.5 * slope * (amplitude / middle) ** 2  # of int |grad w|**2 over a period
     return np.sqrt(
-        1.0 + RINGING * _tension(known, np.array([mean]), np.array([known.extent]), _crude(known))[0] * slope / omega**2
+        1.0
+        + RINGING
+        * _tension(known, np.array([mean]), np.array([known.extent]), _crude_share(known))[0]
+        * slope
+        / omega**2
     )
 
 
@@ -68,10 +82,10 @@ def test_early_stretching_is_that_of_an_endless_plate():
     for edge in (1e3, 1e5):  # x at the edge of the plate; the slopes ahead of the bent region grow without end
         slopes = 8.0 / np.pi * (np.euler_gamma + np.log(2.0 * edge))  # int |grad w|**2
         area = body.extent * np.pi / (2.0 * edge)
-        within = slopes * _within(body, np.array([area]))[0]
+        within = slopes * _share_within(body, np.array([area]))[0]
         # Berger's over the bent area, 13 % too stiff at most as on a square, and less sharply bounded than the true one
         assert within**2 / (8.0 * (1.0 - NU**2) * np.pi * FRONT) == pytest.approx(energy, rel=0.25)
-    assert _within(body, np.array([body.extent]))[0] == pytest.approx(1.0, abs=1e-12)
+    assert _share_within(body, np.array([body.extent]))[0] == pytest.approx(1.0, abs=1e-12)
 
 
 def bar(**ends):
@@ -227,7 +241,7 @@ def shares(mesh, section, supports, n_modes):
     """Shares of the motion that bend the body and of the stiffness that is not from tension, of its flexible modes."""
     modes = fi.find_modes(fi.assemble(mesh, section, supports), n_modes=n_modes)
     known = bending.known_of(modes)
-    return _bends(known, bending.integrate_shapes(known), modes.omega)
+    return _share_of_bending(known, bending.integrate_shapes(known), modes.omega)
 
 
 def test_a_plate_that_rocks_on_soft_springs_does_not_bend():
@@ -367,6 +381,6 @@ def test_tones_of_one_mode_shift_as_its_potential_says():
 def test_a_mode_snaps_where_its_potential_bends_down(line, snaps):
     """The least of w**2 + 3 l B q + 3 B**2 q**2 is w**2 - 3/4 l**2."""
     own, q = Stretching(np.array([[[0.3]]]), np.array([[-line]])), np.linspace(0.0, 5.0, 1001)[:, None]
-    stiffness = deflection.stiffen(own, q)[:, 0, 0] + 1.2
+    stiffness = deflection.stiffness_by_stretching(own, q)[:, 0, 0] + 1.2
     assert stiffness.min() == pytest.approx(1.2 - 0.75 * line**2, rel=1e-5)
     assert deflection.may_snap(own, np.array([np.sqrt(1.2)]), q) == (stiffness.min() < 0.0) == snaps

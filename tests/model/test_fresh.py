@@ -37,7 +37,7 @@ class Compiler:
 
     def stop(self, name="follow"):
         """Kill it, and wait until its mark is gone."""
-        process = fresh._begun(self.mark, ("energy", name, ()))
+        process = fresh._begin_compiling(self.mark, ("energy", name, ()))
         process.kill()
         until = time.monotonic() + 60.0
         while self.mark.exists() and time.monotonic() < until:
@@ -52,18 +52,18 @@ def compiler(monkeypatch, tmp_path):
     monkeypatch.delenv(fresh.SWITCH, raising=False)
     monkeypatch.setattr(build, "folder", lambda _: one.mark.parent)
     monkeypatch.setattr(fresh, "child", one)
-    fresh._begun.cache_clear()
+    fresh._begin_compiling.cache_clear()
     yield one
     if one.begun:
         one.stop()
-    fresh._begun.cache_clear()
+    fresh._begin_compiling.cache_clear()
 
 
 def lacking(name="follow"):
     """Do as a kernel that is not on disk; whether it runs as plain Python."""
     if build.QUICK.get() == build.REFUSED:
         raise build.Uncompiled("energy", name, ())
-    return build.limited()
+    return build.is_limited()
 
 
 def limited(name="follow", **outcome):
@@ -105,7 +105,7 @@ def test_a_process_of_others_that_compiles_is_enough(compiler):
 
 
 def test_what_is_compiled_already_is_used(compiler):
-    assert not fresh.answer(lambda: SimpleNamespace(plain=build.limited()), False).plain and compiler.begun == 0
+    assert not fresh.answer(lambda: SimpleNamespace(plain=build.is_limited()), False).plain and compiler.begun == 0
 
 
 def test_whether_the_model_holds_is_examined_as_plain_python_too(compiler, monkeypatch):
@@ -177,7 +177,7 @@ def test_nothing_is_begun_where_nothing_can_be_kept(compiler, monkeypatch, tmp_p
     assert not limited()
     environment: dict[str, str] = {"XDG_CACHE_HOME": str(compiler.mark.parent)}
     places.find(environment, compiler.mark.parent)
-    assert not places.lasting(environment)
+    assert not places.is_lasting(environment)
     monkeypatch.setenv(places.GIVEN, environment[places.GIVEN])
     monkeypatch.setattr(build, "folder", lambda _: tmp_path)
     assert not limited() and compiler.begun == 0
@@ -185,8 +185,8 @@ def test_nothing_is_begun_where_nothing_can_be_kept(compiler, monkeypatch, tmp_p
 
 def test_runs_of_a_first_blow_give_up_early():
     with build.uncompiled(7):
-        assert build.limited() and build.most_steps(100) == 7 and build.most_steps(3) == 3
-    assert not build.limited() and build.most_steps(100) == 100
+        assert build.is_limited() and build.most_steps(100) == 7 and build.most_steps(3) == 3
+    assert not build.is_limited() and build.most_steps(100) == 100
 
 
 KINDS = {"plain": "", "stretching": ", stretching=True"}

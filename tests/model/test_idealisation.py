@@ -27,14 +27,14 @@ def struck(modes, law, at, tolerance=1e-6):
 
 def error_of_endless(modes, mobility, at, law):
     """How far a blow on an infinite plate of that mobility is from one on all modes."""
-    endless = idealisation.endless(np.array(at), 1.0, mobility, DURATION)
+    endless = idealisation.infinite_plate(np.array(at), 1.0, mobility, DURATION)
     return difference(struck(endless, law, at), struck(modes, law, at))
 
 
 @pytest.mark.parametrize("ratio", [0.01, 0.1, 0.3])
 def test_endless_plate_damps_a_linear_contact_as_a_dashpot(ratio):
     """Closed form: restitution exp(-pi z / sqrt(1 - z**2)) after pi / (omega sqrt(1 - z**2)), z the damping ratio."""
-    body = idealisation.endless(np.zeros(2), 1.0, 2.0 * ratio * DURATION / (MASS * np.pi), DURATION)
+    body = idealisation.infinite_plate(np.zeros(2), 1.0, 2.0 * ratio * DURATION / (MASS * np.pi), DURATION)
     hit = struck(body, "linear", (0.0, 0.0), tolerance=1e-8)
     root = np.sqrt(1.0 - ratio**2)
     # the tolerance, and a third of the inverse of INSTANT for the mode that stands for the dashpot
@@ -79,7 +79,7 @@ def test_endless_plate_is_refused_where_an_echo_or_a_second_blow_may_come():
 def test_error_of_a_rigid_body_is_bounded_and_not_by_far(mass, first, law):
     at = np.array([0.4, 0.3])
     modes = fi.analytic.rectangle(1.5, 1.0, mass=mass, first_frequency=first, max_frequency=max(3.0 * first, 1e4))
-    true = difference(struck(idealisation.unyielding(at, mass), law, at, 1e-8), struck(modes, law, at, 1e-8))
+    true = difference(struck(idealisation.rigid_plate(at, mass), law, at, 1e-8), struck(modes, law, at, 1e-8))
     stated = idealisation.rigid_error(modes, at, MASS, DURATION)
     assert 0.9 * true <= stated <= 6.0 * true + 1e-8  # measured 0.95 to 3; the runs' own error
 

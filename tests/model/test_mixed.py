@@ -44,7 +44,7 @@ def system(thickness, size=1.0):
 def test_modes_and_what_stands_above_them_are_the_infinite_plate():
     """Before any echo: with modes as dense as those of a wide plate, the mobility is real and that of the plate."""
     wanted, frequency, density = 0.04, 1e4, 400
-    above, shape, rest = mixed.absorbing(wanted, frequency, 1e8)
+    above, shape, rest = mixed.absorbing_oscillators(wanted, frequency, 1e8)
     edges = 2.0 * np.pi * frequency * np.geomspace(1e-6, 1e3, 9 * density + 1)
     low = np.sqrt(edges[1:] * edges[:-1])
     squared = 2.0 * wanted / np.pi * np.diff(edges) * mixed.kept_share(low, wanted, above, shape)
@@ -58,7 +58,7 @@ def test_modes_and_what_stands_above_them_are_the_infinite_plate():
 
 
 def test_share_that_modes_keep_falls_from_one_to_zero():
-    above, shape, _ = mixed.absorbing(0.04, 1e4, 1e9)
+    above, shape, _ = mixed.absorbing_oscillators(0.04, 1e4, 1e9)
     ratio = np.array([0.0, 0.01, 0.1, 0.5, 1.0, 2.0, 10.0])
     share = mixed.kept_share(2e4 * np.pi * ratio, 0.04, above, shape)
     assert (np.diff(share) < 0.0).all() and share[0] == 1.0
@@ -67,7 +67,7 @@ def test_share_that_modes_keep_falls_from_one_to_zero():
 
 def test_what_lies_above_the_oscillators_gives_as_more_of_them_would():
     static = [(shape**2 / omega**2).sum() + rest for omega, shape, rest in
-              (mixed.absorbing(0.04, 1e4, highest) for highest in (2e4, 1e5, 1e8))]  # fmt: skip
+              (mixed.absorbing_oscillators(0.04, 1e4, highest) for highest in (2e4, 1e5, 1e8))]  # fmt: skip
     assert_allclose(static, static[-1], rtol=1e-4)  # a sum in place of an integral: RATIO**2 / 24 = 5e-5
 
 
@@ -76,7 +76,7 @@ def test_blow_errs_by_no_more_than_it_states(frequency):
     """A plate of 1 mm, of which 15 190 modes tell everything: a ball that stops dead and is thrown back by echoes."""
     whole = modes(1e-3, 4e5)
     true = strike(whole)
-    hit = strike(mixed.mixed(whole, AT, mobility(1e-3), frequency, 4e5))
+    hit = strike(mixed.mixed_plate(whole, AT, mobility(1e-3), frequency, 4e5))
     assert hit.bodies[-1].n_modes < 0.5 * whole.n_modes
     # until the echo the plate is infinite: the modes err by 1e-3 there themselves
     assert_allclose(hit.peak_force, true.peak_force, rtol=3e-3)
@@ -86,7 +86,7 @@ def test_blow_errs_by_no_more_than_it_states(frequency):
 
 
 def test_half_the_frequency_is_the_poorer_description():
-    body = mixed.mixed(modes(1e-3, 1e5), AT, mobility(1e-3), 4e4, 4e5)
+    body = mixed.mixed_plate(modes(1e-3, 1e5), AT, mobility(1e-3), 4e4, 4e5)
     assert list(body.poorer) == ["idealisation"]
     assert body.poorer["idealisation"].omega[-1] > 0.9 * body.omega[-1]
     hit = strike(body)

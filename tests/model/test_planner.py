@@ -290,7 +290,7 @@ def test_a_blow_that_needs_more_memory_than_there_is_is_refused_before_it_is_com
 
     plan = planned()
     assert plan.memory > 8e8 and "do not suffice" not in str(plan)
-    monkeypatch.setattr(cost, "installed", lambda: 8e8)
+    monkeypatch.setattr(cost, "memory_installed", lambda: 8e8)
     assert "the 0.8 GB of memory of this machine do not suffice" in str(plan)
     with pytest.raises(fi.SimulationError, match=r"GB of memory for .* more than the 0.8 GB .* or the thin theory"):
         plan.run()
@@ -357,7 +357,7 @@ def test_the_modes_that_only_files_take_are_told_besides():
     """The command says 5 s of this guitar and then takes a minute, most of it for the sound at the point struck."""
     scene = fi.load_scene(SCENES / "everyday" / "guitar_fingernail.toml")
     plan = scene.plan()
-    moving = planner.make(replace(plan.blow, moving=True), {}, planner.Stages())
+    moving = planner.make_plan(replace(plan.blow, moving=True), {}, planner.Stages())
     assert_allclose(plan.seconds + plan.ringing, moving.seconds, rtol=1e-12)
     assert moving.ringing == 0.0 < plan.ringing and "once they are asked for" in str(plan)
     heavy = fi.plan(SCENES / "heavy_plate.toml", tolerance=1e-2)

@@ -49,9 +49,9 @@ def test_sound_is_the_shift_of_what_rings():
 
 def test_a_limit_of_the_blow_stays():
     hit = fi.strike(PLATE, HAMMER, LAW, duration=5e-4, **BLOW)
-    assert engine.again(hit.history).end_time == pytest.approx(hit.history.end_time, rel=1e-12)
+    assert engine.follow_again(hit.history).end_time == pytest.approx(hit.history.end_time, rel=1e-12)
     first = fi.strike(PLATE, fi.Striker.rigid(0.2), LAW, max_impacts=1, **BLOW)
-    assert len(engine.again(first.history).contacts) == 1
+    assert len(engine.follow_again(first.history).contacts) == 1
 
 
 def test_a_blow_that_cannot_be_struck_again_is_not_known(monkeypatch):
@@ -60,7 +60,7 @@ def test_a_blow_that_cannot_be_struck_again_is_not_known(monkeypatch):
     def fails(history, **changed):
         raise fi.SimulationError("no final separation was reached")
 
-    monkeypatch.setattr(restrike, "again", fails)
+    monkeypatch.setattr(restrike, "follow_again", fails)
     assert set(case.changes(omega=0.9 * case.hit.history.omega).values()) == {None}
 
 

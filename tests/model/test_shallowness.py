@@ -68,5 +68,5 @@ def test_advice_on_bodies_without_thick_theory_is_not_to_take_it():
         assert ("too steep" in steep.remedy) == curved == (steep.value is not None)
         assert curved or "ribs and layers move in the plane" in steep.sentence
         target = Target.of(system)
-        better = audit.required(target, replace(hit, tolerance=1e-9))
+        better = audit.required_model(target, replace(hit, tolerance=1e-9))
         assert better is not None and better[0].theory == target.theory  # air or stretching are next

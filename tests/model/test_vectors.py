@@ -165,7 +165,7 @@ def test_a_soft_blow_takes_no_more_vectors_than_modes_that_it_may_excite():
     ],
 )
 def test_more_vectors_are_given_up_when_three_attempts_gain_nothing(errors, stuck):
-    assert vectors.hopeless(errors) == stuck
+    assert vectors.is_hopeless(errors) == stuck
 
 
 def test_a_finer_mesh_has_more_triangles_even_where_small_features_of_the_outline_set_them():
@@ -173,7 +173,7 @@ def test_a_finer_mesh_has_more_triangles_even_where_small_features_of_the_outlin
         def n_cells(self, size, stages):
             return 1000 if size > 0.5 else 1100 if size > 0.25 else 4000
 
-    assert vectors.finer(Rough(), Elements(1.0), Stages()).size < 0.25
+    assert vectors.finer_elements(Rough(), Elements(1.0), Stages()).size < 0.25
 
 
 @pytest.mark.parametrize(
@@ -251,7 +251,7 @@ def test_a_mesh_whose_outline_forbids_larger_triangles_is_compared_with_a_finer_
     for body, forbids in ((target, True), (Target.of(plate(), None), False)):
         assert body.mesh is not None
         first = vectors.Elements(2.0 * body.mesh.size if forbids else 0.5 * body.mesh.size, 8.0)
-        fine, coarse = vectors.compared(body, first, stages)
+        fine, coarse = vectors.compared_elements(body, first, stages)
         assert (coarse if forbids else fine) == first and fine.coarseness < coarse.coarseness
         assert body.n_cells(fine.size, stages) >= 1.15 * body.n_cells(coarse.size, stages)
 

@@ -78,7 +78,7 @@ def test_a_shell_of_our_own_comes_back_with_its_blow(shell):
     """The truth is the blow on the shell itself, which finds its own modes and compliance."""
     (system, many), law = shell, fi.Contact.linear(5e5)
     points, cells = many.shapes.grid()
-    nodes = viewing.placed(many, points)
+    nodes = viewing.places_in_space(many, points)
     row = int(np.linalg.norm(points - (0.13, 0.11), axis=1).argmin())
     how = {"at": points[row], "speed": 1.0, "tolerance": 1e-3, "damping_ratio": 0.01}
     truth = fi.strike(system, fi.Striker.rigid(0.05), law, **how)

@@ -58,7 +58,7 @@ def test_plates_and_beams_have_no_dent():
     bar = fi.analytic.beam(0.4, ends=("clamped", "free"), section=beam, n_modes=8)
     for modes, points in ((plate, np.column_stack([x.ravel(), y.ravel()])), (bar, np.linspace(0.0, 0.4, 41)[:, None])):
         loads = dents.of_points(points, modes.shapes.compliance(points), np.arange(len(points)))
-        assert all(dents.hidden(each.on_surface()) == 0.0 for each in loads)
+        assert all(dents.hidden_dent(each.on_surface()) == 0.0 for each in loads)
 
 
 def test_where_nothing_tells_the_dent_all_is_an_error():
@@ -128,7 +128,7 @@ def test_the_solid_is_kept_in_files(tmp_path):
     body = solids.known("bar", 0, solids.STEEL)
     for solid in (solids.STEEL, True, False, None):
         path = fi.Body.load(body.save(tmp_path / "bar"), solid=solid).save(tmp_path / "again")
-        assert fi.Body.load(path).solid == dents.stated(solid) or solid is None  # None: as the file says
+        assert fi.Body.load(path).solid == dents.stated_material(solid) or solid is None  # None: as the file says
 
 
 @pytest.mark.slow

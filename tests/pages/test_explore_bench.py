@@ -28,24 +28,24 @@ def leaf(tmp_path, read_here):
 
 def test_a_drawing_becomes_the_scene_of_new(scene, leaf):
     names = {"material": "brass", "mallet": "yarn, medium"}
-    made = explore_bench.built(scene, Order(leaf, **names))
+    made = explore_bench.scene_of_order(scene, Order(leaf, **names))
     whole, _ = adapted.text("plate", leaf.parent, drawing=leaf, **names)
     assert made.data() == scene_of(tomllib.loads(whole), leaf, folder=leaf.parent).data()
-    inches = explore_bench.built(scene, Order(leaf, unit="in", thickness=2e-3))
+    inches = explore_bench.scene_of_order(scene, Order(leaf, unit="in", thickness=2e-3))
     assert inches.body().points.max() == pytest.approx(85 * 0.0254, rel=1e-9)  # a reader's rounding
     assert inches.data()["section"]["thickness"] == 2e-3
 
 
 def test_names_replace_tables_of_a_scene_and_nothing_is_left_of_them(scene):
     at = (0.1, 0.08)
-    made = explore_bench.built(scene, Order(material="steel, mild", mallet="steel, 10 mm", at=at))
+    made = explore_bench.scene_of_order(scene, Order(material="steel, mild", mallet="steel, 10 mm", at=at))
     assert made.make_section("plate").material == fi.materials["steel, mild"]
     assert made.make_contact() == fi.strikers.entry("steel, 10 mm").contact(on=fi.materials["steel, mild"])
     assert tuple(made.blow.values["at"]) == at and made.body().points.tolist() == scene.body().points.tolist()
-    assert explore_bench.built(scene, Order()).data() == scene.data()
+    assert explore_bench.scene_of_order(scene, Order()).data() == scene.data()
     tables = scene.data() | {"target": {"mass": 3.0, "damping_ratio": 0.1}}
     rescaled = scene_of(tables, scene.path, folder=scene.path.parent)
-    assert explore_bench.built(rescaled, Order(material="brass")).target.values.get("mass") is None
+    assert explore_bench.scene_of_order(rescaled, Order(material="brass")).target.values.get("mass") is None
 
 
 def test_what_the_scene_says_in_another_way_cannot_be_picked(scene):
@@ -53,7 +53,7 @@ def test_what_the_scene_says_in_another_way_cannot_be_picked(scene):
     tables["target"] = {"mass": 0.2, "first_frequency": 100.0, "damping_ratio": 0.01, "source": "analytic"}
     stated = scene_of(tables, Path("a.toml"), folder=Path())
     with pytest.raises(ValueError, match="material must be left to this scene"):
-        explore_bench.built(stated, Order(material="brass"))
+        explore_bench.scene_of_order(stated, Order(material="brass"))
     offered = explore_bench.pickable(stated, Order(), stated)
     assert offered["materials"] == [] and offered["thickness"] is None and offered["mallets"]
 
@@ -86,7 +86,7 @@ def test_points_stay_where_the_body_stays(tmp_path):
 
 
 def test_a_saved_scene_names_a_dropped_file_without_the_folder_that_ends(scene, leaf):
-    made = explore_bench.built(scene, Order(leaf))
+    made = explore_bench.scene_of_order(scene, Order(leaf))
     base = explore_model.Setup.of(scene).base
     for loose, named in ((True, "leaf.svg"), (False, str(leaf))):
         setup = explore_model.Setup(made, made.body(), base, loose)

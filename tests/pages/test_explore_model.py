@@ -12,7 +12,7 @@ import fem_impact as fi
 from fem_impact.impact import accuracy
 from fem_impact.pages import explore_model, explore_numbers
 from fem_impact.scenes.scene import scene_of
-from fem_impact.scenes.schema import written
+from fem_impact.scenes.schema import toml_text
 
 
 def test_start_is_the_scene(stand):
@@ -71,7 +71,7 @@ def test_damping_loss_and_thickness_change_the_blow_as_a_new_body_would(stand):
 
 def test_a_saved_scene_strikes_as_the_page_does(stand, tmp_path):
     settings = replace(stand.start, mass=1.2 * stand.start.mass, damping=0.02, thickness=1.1, exponent=1.3)
-    saved = load_text(tmp_path, written(stand.saved(settings))).strike(target="modal", tolerance=1e-3)
+    saved = load_text(tmp_path, toml_text(stand.saved(settings))).strike(target="modal", tolerance=1e-3)
     shown = stand.case(settings).blow()
     assert saved.n_impacts == shown.n_impacts
     assert saved.impulse == pytest.approx(shown.impulse, rel=5e-3)  # both promise 1e-3
@@ -109,7 +109,7 @@ def test_the_first_answer_to_a_slider_is_the_blow_but_for_small_errors(stand):
             name: float(np.exp(rng.uniform(*np.log(stand.range(name))))) for name in ("mass", "stiffness", "speed")
         }, loss=float(rng.choice([0.0, 0.3]) / stand.start.speed))  # fmt: skip
         case = stand.case(settings)
-        fast = explore_model.quick(case)
+        fast = explore_model.strike_quickly(case)
         assert len(fast.history.steps) < 5_000  # some 5 ms
         slow = case.blow()
         if slow.n_impacts <= 2:  # more of them are sensitive to everything

@@ -9,7 +9,7 @@ from scenes import SHIPPED
 
 import fem_impact as fi
 from fem_impact.pages import frf_page, tap_pictures
-from fem_impact.taps.windows import joined
+from fem_impact.taps.windows import join_tables
 
 DRUMSTICK = SHIPPED / "drumstick.toml"
 PLATE = fi.analytic.rectangle(0.4, 0.3, mass=1.0, first_frequency=100.0, n_modes=12, damping_ratio=0.01)
@@ -20,7 +20,7 @@ POINTS = np.array([(x, y) for x in (0.06, 0.2, 0.34) for y in (0.05, 0.15)])
 def taps():
     hits = [fi.strike(PLATE, fi.Striker.rigid(0.01), fi.Contact.linear(1e5), at=POINTS[0], speed=v, tolerance=0.1)
             for v in (0.5, 1.0)]  # fmt: skip
-    made = joined([fi.measure(hit, rate=4096.0, at=POINTS, duration=1.0, noise=1e-3, rng=i, before=5e-3)
+    made = join_tables([fi.measure(hit, rate=4096.0, at=POINTS, duration=1.0, noise=1e-3, rng=i, before=5e-3)
                    for i, hit in enumerate(hits)])  # fmt: skip
     force = made.force.copy()
     force[1] += 0.3 * np.roll(force[1], 100)  # a second pulse
@@ -91,7 +91,7 @@ def test_the_prompt_writes_table_and_page_and_compares_with_a_scene(taps, prompt
 
 
 def test_the_picture_of_a_watched_folder_marks_double_hits_and_has_responses_of_good_taps(taps):
-    figure = tap_pictures.watched(taps, taps, 2000.0, 10.0, "b.npz: double hit, repeat")
+    figure = tap_pictures.figure_of_record(taps, taps, 2000.0, 10.0, "b.npz: double hit, repeat")
     pulses, spectra, responses, coherence = figure.axes
     assert [text.get_text() for text in pulses.get_legend().get_texts()] == ["tap 1", "tap 2: double hit"]
     marks = [line for line in pulses.lines if line.get_marker() == "v"]

@@ -14,7 +14,7 @@ POINTS = [(0.1, 0.1), (0.2, 0.15)]
 
 @pytest.fixture(scope="module")
 def kit():
-    return roving.catalogued("PCB 086", 600.0, 10.0, 0.12)
+    return roving.hammers_known("PCB 086", 600.0, 10.0, 0.12)
 
 
 @pytest.fixture(scope="module")
@@ -38,7 +38,7 @@ def test_the_kit_has_hammers_up_to_a_mass_with_tips_that_are_not_far_too_soft_or
 )
 def test_hammers_that_are_not_there_are_told(words, said):
     with pytest.raises(ValueError, match=said):
-        roving.catalogued(words, 600.0, 10.0, 1.0)
+        roving.hammers_known(words, 600.0, 10.0, 1.0)
 
 
 def test_the_speed_of_overload_is_that_at_which_a_blow_reaches_the_range(plan):
@@ -51,11 +51,11 @@ def test_the_speed_of_overload_is_that_at_which_a_blow_reaches_the_range(plan):
 
 def test_what_works_comes_first_and_double_hits_last(plan):
     for i in range(2):
-        verdicts = [hammer_sheet.tip_verdict(plan, i, j) for j in hammer_sheet.order(plan, i)]
+        verdicts = [hammer_sheet.tip_verdict(plan, i, j) for j in hammer_sheet.order_of_blows(plan, i)]
         ranks = [{"works": 0, "double hit": 2}.get(each, 1) for each in verdicts]
         assert ranks == sorted(ranks)
         if plan.best[i] >= 0:
-            assert hammer_sheet.order(plan, i)[0] == plan.best[i]
+            assert hammer_sheet.order_of_blows(plan, i)[0] == plan.best[i]
 
 
 @pytest.mark.slow

@@ -27,8 +27,8 @@ def held(scene):
     """The blows of a coarser grid, and the file with them."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(lesson_grid, "COUNTS", COUNTS)
-        kept, made = [], lesson_grid.made
-        patch.setattr(lesson_grid, "made", lambda *given: kept.append(made(*given)) or kept[0])
+        kept, made = [], lesson_grid.strike_grid
+        patch.setattr(lesson_grid, "strike_grid", lambda *given: kept.append(made(*given)) or kept[0])
         path = scene.path.parent / "page.html"
         return lesson.write(path, scene), kept[0], path
 

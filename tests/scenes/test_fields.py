@@ -8,7 +8,7 @@ from numpy.testing import assert_allclose
 from scenes import edited, load_text
 
 import fem_impact as fi
-from fem_impact.scenes.fields import over_frequency, varying
+from fem_impact.scenes.fields import over_frequency, varying_field
 
 HEAD = """
 material = { E = 70e9, nu = 0.33, rho = 2700.0 }
@@ -81,14 +81,14 @@ def test_stepped_bar_equals_its_objects(tmp_path):
 
 
 def test_table_is_linear_inside_and_constant_beyond():
-    field = varying("thickness", {"x": [0.0, 1.0], "y": [0.0, 2.0], "values": [[1.0, 2.0], [3.0, 4.0]]}, 2)
+    field = varying_field("thickness", {"x": [0.0, 1.0], "y": [0.0, 2.0], "values": [[1.0, 2.0], [3.0, 4.0]]}, 2)
     assert_allclose(field(np.array([[0.5, 1.0], [-3.0, -1.0], [9.0, 9.0], [1.0, 0.5]])), [2.5, 1.0, 4.0, 3.25])
-    assert varying("thickness", 3e-3, 2) == 3e-3
+    assert varying_field("thickness", 3e-3, 2) == 3e-3
 
 
 def test_first_case_that_holds_counts():
     cases = [{"value": 1.0, "centre": [0.0, 0.0], "radius": 1.0}, {"value": 2.0, "from": [2.0, 1.0], "to": [0.0, 0.0]}]
-    field = varying("thickness", {"cases": cases, "otherwise": 3.0}, 2)
+    field = varying_field("thickness", {"cases": cases, "otherwise": 3.0}, 2)
     assert_allclose(field(np.array([[0.5, 0.5], [1.5, 0.5], [1.5, -0.5]])), [1.0, 2.0, 3.0])
 
 

@@ -151,8 +151,8 @@ def test_too_large_a_map_is_refused_and_a_costly_one_says_so(tmp_path, prompt):
         told = prompt("map large.toml --out out")
         assert told.status == 2 and all(each in " ".join(told.err.split()) for each in words)
     said = []
-    grid.admit(10**8, 6, 1e9, tell=said.append)
-    grid.admit(10**4, 6, 1e9, tell=said.append)
+    grid.admit_size(10**8, 6, 1e9, tell=said.append)
+    grid.admit_size(10**4, 6, 1e9, tell=said.append)
     assert len(said) == 1 and "6.4 GB of memory" in said[0]
 
 

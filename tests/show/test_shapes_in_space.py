@@ -33,9 +33,9 @@ def hit(modes):
 def test_places_have_the_rise_whatever_the_modes_went_through(modes):
     points = np.array([[0.2, 0.15], AT])
     for each in (modes, modes.truncated(n_modes=2), modes.scaled(mass=0.5), fi.in_air(modes)):
-        assert_allclose(viewing.placed(each, points), np.column_stack([points, RISE(points)]), atol=1e-15)
+        assert_allclose(viewing.places_in_space(each, points), np.column_stack([points, RISE(points)]), atol=1e-15)
     flat = fi.analytic.rectangle(0.4, 0.3, mass=0.2, first_frequency=100.0, n_modes=4)
-    assert viewing.heights(flat, points) is None and not viewing.placed(flat, points)[:, 2].any()
+    assert viewing.heights(flat, points) is None and not viewing.places_in_space(flat, points)[:, 2].any()
 
 
 def test_sides_along_ribs_are_as_long_as_the_ribs(modes):

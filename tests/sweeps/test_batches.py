@@ -23,7 +23,7 @@ def cubic(d0, v0, d1, v1, t):
 
 @njit
 def parted(d0, v0, d1, v1, error, rate_error):
-    return cubics.parted(d0, v0, d1, v1, error, rate_error)
+    return cubics.surely_parted(d0, v0, d1, v1, error, rate_error)
 
 
 def plate(mass=0.2, n_modes=120, **wanted):
@@ -81,7 +81,7 @@ def test_kernel_is_the_modal_propagation(damping_ratio):
 def test_two_masses_share_speed_whatever_the_law(exponent):
     target, striker, reduced = fi.Modes.rigid(0.3), fi.Striker.rigid(0.1), 0.1 * 0.3 / 0.4
     blows = many(target, striker, np.logspace(3, 7, 9), at=np.zeros(0), exponent=exponent, speed=2.0)
-    found = batches.bounce(blows, tolerance=1e-3)
+    found = batches.follow_blows(blows, tolerance=1e-3)
     assert found.done.all() and (found.n_impacts == 1).all()
     assert_allclose(found.restitution, (0.3 - 0.1) / (0.3 + 0.1), atol=1e-9)  # energy exact at every step
     expected = [accuracy.contact_duration(fi.Contact.power(k, exponent), reduced, 2.0) for k in blows.stiffness]
@@ -108,7 +108,7 @@ def test_every_bounce_is_the_single_blow_within_the_tolerance(case, exponent):
     make, strike, at = CASES[case]
     modes, striker = make(), strike()
     stiffness = np.logspace(4, 6, 4) * 10.0 ** (2.0 * (exponent - 1.0))
-    found = batches.bounce(many(modes, striker, stiffness, at=at, exponent=exponent, speed=3.0), tolerance=1e-3)
+    found = batches.follow_blows(many(modes, striker, stiffness, at=at, exponent=exponent, speed=3.0), tolerance=1e-3)
     assert found.done.mean() > 0.7  # the others belong to the modal engine
     for i in np.flatnonzero(found.done):
         hit = fi.strike(modes, striker, fi.Contact.power(stiffness[i], exponent), at=at, speed=3.0, tolerance=1e-5)
@@ -120,7 +120,7 @@ def test_estimate_covers_the_error(loss):
     """Effectivity over many random blows: the estimate is no less than a third of the error, and not wildly more."""
     rng = np.random.default_rng(7)
     blows = many(plate(2.0), fi.Striker.stick(0.1, 10e3), 10.0 ** rng.uniform(4, 6, 400), loss=loss)
-    rough, fine = (batches.bounce(blows, tolerance=each) for each in (1e-2, 1e-4 if loss else 1e-6))
+    rough, fine = (batches.follow_blows(blows, tolerance=each) for each in (1e-2, 1e-4 if loss else 1e-6))
     both = rough.done & fine.done
     relative = [np.abs(getattr(rough, name) / getattr(fine, name) - 1.0)[both] for name in QUANTITIES]
     effectivity = rough.error[both] / np.max(relative, axis=0)
@@ -138,9 +138,9 @@ def test_cells_err_by_no_more_than_they_state(loss):
         k, mass = 10.0 ** (rng.uniform(4.0, 6.5, 80) + 2.0 * (exponent - 1.0)), 10.0 ** rng.uniform(-2.0, 0.0, 80)
         law = {"exponent": exponent, "loss": loss}
         blows = many(plate(n_modes=n_modes), fi.Striker.rigid(0.1), k, mass=mass, residual=False, **law)
-        fine = batches.bounce(blows, tolerance=1e-6)
+        fine = batches.follow_blows(blows, tolerance=1e-6)
         for tolerance in (1e-2, 1e-3, 1e-4):
-            rough = batches.bounce(blows, tolerance=tolerance)
+            rough = batches.follow_blows(blows, tolerance=tolerance)
             both = rough.done & fine.done & (rough.n_impacts == fine.n_impacts)
             ratios += ((apart(rough, fine) - fine.error) / rough.error)[both].tolist()
     assert len(ratios) > 550 and max(ratios) < 1.5
@@ -153,7 +153,7 @@ def test_the_peak_of_a_lossy_force_may_lie_beside_the_end_of_a_step(tolerance):
     rng = np.random.default_rng(3)
     k, mass, loss = 10.0 ** rng.uniform(4, 6, 60), rng.uniform(0.02, 0.2, 60), 10.0 ** rng.uniform(-2.5, -1.0, 60)
     blows = many(plate(0.5, 8), fi.Striker.rigid(0.1), k, mass=mass, loss=loss, residual=False)
-    rough, fine = (batches.bounce(blows, tolerance=each) for each in (tolerance, 1e-7))
+    rough, fine = (batches.follow_blows(blows, tolerance=each) for each in (tolerance, 1e-7))
     both = rough.done & fine.done & (rough.n_impacts == fine.n_impacts)
     off = np.abs(rough.peak_force / fine.peak_force - 1.0)[both]
     assert both.sum() > 50 and (off <= rough.error[both] + fine.error[both]).all()
@@ -166,7 +166,7 @@ def test_the_peak_of_a_force_that_loses_much_is_covered():
     for n_modes in (8, 30):
         k, mass, loss = 10.0 ** rng.uniform(4, 6, 60), rng.uniform(0.02, 0.2, 60), rng.uniform(0.3, 1.5, 60)
         blows = many(plate(0.5, n_modes), fi.Striker.rigid(0.1), k, mass=mass, loss=loss, residual=False)
-        rough, fine = (batches.bounce(blows, tolerance=each) for each in (1e-3, 1e-5))
+        rough, fine = (batches.follow_blows(blows, tolerance=each) for each in (1e-3, 1e-5))
         both = rough.done & fine.done & (rough.n_impacts == fine.n_impacts)
         off = np.abs(rough.peak_force / fine.peak_force - 1.0)[both] - fine.error[both]
         n_cells, n_beyond = n_cells + both.sum(), n_beyond + (off > rough.error[both]).sum()
@@ -181,7 +181,7 @@ def test_time_steps_leave_most_of_the_tolerance(striker, n_modes, residual):
     rng = np.random.default_rng(5)
     stiffness, mass = 10.0 ** rng.uniform(4, 6 if residual else 7, 400), rng.uniform(0.01, 0.2, 400)
     blows = many(plate(n_modes=n_modes), striker, stiffness, mass=mass, residual=residual)
-    found, fine = batches.bounce(blows, tolerance=1e-3), batches.bounce(blows, tolerance=3e-5)
+    found, fine = batches.follow_blows(blows, tolerance=1e-3), batches.follow_blows(blows, tolerance=3e-5)
     both = found.done & fine.done
     # 89.5 % of the second family, 1.5 % fewer than where runs need not agree on the margin to another number
     assert both.mean() > 0.88 and (found.n_impacts == fine.n_impacts)[both].all()
@@ -194,7 +194,7 @@ def test_centroids_of_wide_bands_are_those_of_the_half_sine(width):
     """Two masses with a linear contact, against its spectrum in closed form."""
     resonance = np.sqrt(1e5 / (0.1 * 0.3 / 0.4)) / (2.0 * np.pi)
     blows = many(fi.Modes.rigid(0.3), fi.Striker.rigid(0.1), [1e5], at=np.zeros(0))
-    found = batches.bounce(blows, tolerance=1e-3, band=width * resonance)
+    found = batches.follow_blows(blows, tolerance=1e-3, band=width * resonance)
     f = np.linspace(0.0, width * resonance, 400_001)
     size = fi.spectra.half_sine_spectrum(f, resonance)
     # a symmetric pulse has true zeros, where the magnitude has kinks: 4.4e-5 is the most measured
@@ -233,7 +233,7 @@ def test_a_blow_too_long_for_every_kernel_is_left_at_once(monkeypatch):
         return run(cells, *rest)
 
     monkeypatch.setattr(many_blows, "run", counted)
-    assert not batches.bounce(blows, tolerance=1e-3).done.any()
+    assert not batches.follow_blows(blows, tolerance=1e-3).done.any()
     assert np.isnan(batches.count_impacts(blows, tolerance=1e-3, most=3)).all()
     assert len(tried) == 2 * len(batches.LENGTHS)  # the first step of each, with kernels ever longer
 
@@ -241,7 +241,7 @@ def test_a_blow_too_long_for_every_kernel_is_left_at_once(monkeypatch):
 def test_only_stiffness_times_speed_to_the_power_matters():
     speed = np.array([0.1, 1.0, 10.0])
     blows = many(plate(), fi.Striker.stick(0.1, 10e3), 1e6 / np.sqrt(speed), exponent=1.5, speed=1.0)
-    found = batches.bounce(batches.Blows(**{**vars(blows), "speed": speed}), tolerance=1e-3)
+    found = batches.follow_blows(batches.Blows(**{**vars(blows), "speed": speed}), tolerance=1e-3)
     assert_allclose(found.contact_time, found.contact_time[0], rtol=1e-9)  # rounding of k v**0.5
     assert_allclose(found.impulse / speed, found.impulse[0] / speed[0], rtol=1e-9)
 
@@ -308,7 +308,7 @@ def test_moments_between_the_steps_are_not_lost():
     rng = np.random.default_rng(11)
     mass, stiffness = np.array([*ADVERSARIAL, *zip(rng.uniform(0.05, 0.2, 6), 10.0 ** rng.uniform(5.3, 6.0, 6))]).T
     modes = plate(n_modes=300)
-    found = batches.bounce(many(modes, fi.Striker.stick(0.1, 10e3), stiffness, mass=mass), tolerance=1e-3)
+    found = batches.follow_blows(many(modes, fi.Striker.stick(0.1, 10e3), stiffness, mass=mass), tolerance=1e-3)
     assert found.done.mean() > 0.9
     for i in np.flatnonzero(found.done):
         striker, law = fi.Striker.stick(mass[i], 10e3), fi.Contact.linear(stiffness[i])
@@ -336,7 +336,7 @@ def test_a_count_that_a_change_as_large_as_its_error_alters_is_not_told(
     body = {"mass": mass, "first_frequency": 100.0, "n_modes": n_modes, "damping_ratio": damping}
     modes = fi.analytic.rectangle(length, 1.0, **body)
     striker = fi.Striker.stick(moving, first) if first else fi.Striker.rigid(moving)
-    found = batches.bounce(many(modes, striker, stiffness, at=np.array(at), residual=False), tolerance=1e-2)
+    found = batches.follow_blows(many(modes, striker, stiffness, at=np.array(at), residual=False), tolerance=1e-2)
     hit = fi.strike(modes, striker, fi.Contact.linear(stiffness), at=at, speed=1.0, tolerance=1e-6, residual=False)
     assert not found.done[0] or found.n_impacts[0] == hit.n_impacts
 
@@ -347,7 +347,7 @@ def test_impacts_alone_are_counted_as_with_everything_else(stiffness, exponent):
     mass, column = np.geomspace(0.01, 1.0, 400), np.ones(400)
     striker = fi.Striker.stick(mass=0.1, first_frequency=10e3)
     blows = many(plate(), striker, stiffness * column, exponent=exponent, mass=mass)
-    whole = np.minimum(batches.bounce(blows, tolerance=1e-4).n_impacts, 4)
+    whole = np.minimum(batches.follow_blows(blows, tolerance=1e-4).n_impacts, 4)
     off = []
     for tolerance in (1e-2, 1e-4):
         found = batches.count_impacts(blows, tolerance=tolerance, most=4)

@@ -87,7 +87,7 @@ def test_a_block_is_the_same_from_any_start():
 
 def test_few_values_need_kernels_and_means_are_kept():
     many = rows(STICK, fi.Contact.linear(1e5), drawn(5000, "target_frequency", "damping_ratio", "at"))
-    blows = cases.few(many)
+    blows = cases.fewer_values(many)
     found, given = blows.axes, many.axes
     assert len(blows.pairs[1]) <= cases.FAMILIES
     assert_array_equal(found["target_frequency"], given["target_frequency"])  # free, see Cases
@@ -98,13 +98,13 @@ def test_few_values_need_kernels_and_means_are_kept():
 
 
 def test_a_rigid_striker_on_bodies_of_many_frequencies_needs_one_family():
-    blows = cases.few(rows(RIGID, fi.Contact.linear(1e5), drawn(5000, "target_frequency")))
+    blows = cases.fewer_values(rows(RIGID, fi.Contact.linear(1e5), drawn(5000, "target_frequency")))
     assert len(blows.pairs[1]) == 1 and np.unique(blows.pairs[0]).tolist() == [0]
 
 
 def test_values_that_are_few_already_stay():
     some = np.array([0.0, 0.01, 0.02, 0.01])
-    few = cases.few(rows(STICK, fi.Contact.linear(1e5), {"damping_ratio": some}))
+    few = cases.fewer_values(rows(STICK, fi.Contact.linear(1e5), {"damping_ratio": some}))
     assert_array_equal(few.axes["damping_ratio"], some)
 
 

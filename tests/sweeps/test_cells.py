@@ -9,14 +9,15 @@ from numpy.testing import assert_allclose
 import fem_impact as fi
 from fem_impact.modes.shapes import SampledShapes
 from fem_impact.sweeps import cells
-from fem_impact.sweeps.cells import Case, sampled
+from fem_impact.sweeps.cells import Case, sample_modes
 
 HERE, THERE = (0.3, 0.2), (0.7, 0.45)
 PLATE = fi.analytic.rectangle(1.55, 1.0, mass=0.2, first_frequency=100.0, n_modes=40)
 
 
 def case(**more):
-    views = {place: sampled(PLATE.truncated(n_modes=n), np.array([place])) for place, n in ((HERE, 30), (THERE, 20))}
+    few = ((HERE, 30), (THERE, 20))
+    views = {place: sample_modes(PLATE.truncated(n_modes=n), np.array([place])) for place, n in few}
     return Case(views[HERE], fi.Striker.rigid(0.1), fi.Contact.linear(1e5), np.array(HERE), 1.0, views=views, **more)
 
 
@@ -52,7 +53,7 @@ def test_reduced_bodies_give_the_same_blow_and_keep_what_is_poorer():
     wood = fi.Plate(fi.Material(10e9, 0.3, 450.0), 3e-3)
     system = fi.assemble(fi.mesh.rectangle(0.4, 0.3), wood, {"boundary": "hinged"})
     seen = fi.ritz_modes(system, [(0.1, 0.1)], max_frequency=1e3, n_vectors=30)
-    small = sampled(seen, np.array([(0.1, 0.1)]))
+    small = sample_modes(seen, np.array([(0.1, 0.1)]))
     assert small.poorer["truncation"].n_modes == seen.poorer["truncation"].n_modes == 21  # seven tenths
     assert isinstance(small.poorer["truncation"].shapes, SampledShapes)
 
@@ -99,6 +100,6 @@ def test_a_number_of_cells_of_no_sense_is_told_beside_values_too():
 
 def test_values_typed_with_four_digits_are_evenly_spaced_in_the_logarithm():
     values = np.geomspace(0.01, 10.0, 40)
-    assert cells.logarithmic(np.array([float(f"{value:.4g}") for value in values]))
-    assert not cells.logarithmic(values * (1.0 + 3e-3 * (np.arange(40) % 2)))
-    assert not cells.logarithmic(np.linspace(1.0, 1.02, 5))  # nearly even in the logarithm, too
+    assert cells.is_logarithmic(np.array([float(f"{value:.4g}") for value in values]))
+    assert not cells.is_logarithmic(values * (1.0 + 3e-3 * (np.arange(40) % 2)))
+    assert not cells.is_logarithmic(np.linspace(1.0, 1.02, 5))  # nearly even in the logarithm, too

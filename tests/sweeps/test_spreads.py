@@ -83,7 +83,7 @@ def test_questions_name_what_is_known(question, words, text):
 def grouped(function, n=2**12):
     """A spread of a function of three lognormal inputs, in groups for Sobol indices."""
     told = inputs.read_inputs({name: ("lognormal", 1.0, sigma) for name, sigma in SIGMAS.items()})
-    values = inputs.drawn(told, inputs.crossed(inputs.shares(n, 6, 0)), None)
+    values = inputs.drawn_inputs(told, inputs.sobol_points(inputs.shares(n, 6, 0)), None)
     return spread(function(*values.T), values=values, n_parts=5, names=tuple(SIGMAS))
 
 
@@ -166,7 +166,7 @@ def test_a_distribution_has_the_quantiles_of_its_closed_form(given, median, uppe
 
 
 PAIR = inputs.read_inputs({"a": ("normal", 0.0, 1.0), "b": ("uniform", 0.0, 1.0)})
-DISTRIBUTION, CORRELATION = partial(inputs.Input.of, "a"), partial(inputs.mixing, PAIR)
+DISTRIBUTION, CORRELATION = partial(inputs.Input.of, "a"), partial(inputs.correlating_matrix, PAIR)
 
 
 @pytest.mark.parametrize(
@@ -203,7 +203,7 @@ def test_inputs_that_are_none_are_refused(read, given, text):
 
 @pytest.mark.parametrize("given", [{("a", "b"): 0.6}, {("b", "a"): 0.6}, [[1.0, 0.6], [0.6, 1.0]]])
 def test_a_gaussian_copula_has_its_rank_correlation(given):
-    values = inputs.drawn(PAIR, inputs.shares(2**14, 2, 0), inputs.mixing(PAIR, given))
+    values = inputs.drawn_inputs(PAIR, inputs.shares(2**14, 2, 0), inputs.correlating_matrix(PAIR, given))
     rank = stats.spearmanr(*values.T).statistic
     assert_allclose(rank, 6.0 / np.pi * np.arcsin(0.3), atol=5e-3)  # Pearson's formula; even points beat 1/sqrt(n)
     assert_allclose(np.quantile(values[:, 1], [0.1, 0.9]), [0.1, 0.9], atol=2e-3)  # margins stay as they were

@@ -5,7 +5,7 @@ import pytest
 
 import fem_impact as fi
 from fem_impact.impact import accuracy
-from fem_impact.impact.reduced_body import joined
+from fem_impact.impact.reduced_body import join_bodies
 from fem_impact.taps import blows, rig, unknowns
 
 AT = (0.17, 0.11)
@@ -15,7 +15,7 @@ BALL = fi.Striker.rigid(0.02)
 
 def blow(striker, target, law, speed, duration, horizon, finer=1.0):
     """A quick blow by its longest step, or a finer one."""
-    system = joined((striker, target), [law])
+    system = join_bodies((striker, target), [law])
     return blows.follow_blow(system, speed, blows.longest_step(system, law, duration) / finer, horizon)
 
 
@@ -70,10 +70,10 @@ def test_what_a_body_yields_is_known_at_every_place():
 def test_fast_modes_that_matter_shorten_the_step_and_are_followed():
     """The force with the step chosen, against steps of a sixteenth: 2e-6 of its peak, 1e-5 with steps twice as long."""
     law, ball = fi.Contact.linear(1e6), blows.of_striker(BALL)
-    assert blows.longest_step(joined((ball, blows.wall()), [law]), law, 4e-4) == pytest.approx(1e-5)
+    assert blows.longest_step(join_bodies((ball, blows.wall()), [law]), law, 4e-4) == pytest.approx(1e-5)
     fast = blows.wall().with_mode(25e3, 0.003, 0.0, np.zeros(0))
     times, bodies = np.linspace(0.0, 4e-4, 500), (ball, fast, law)
     rough, exact = (blow(*bodies, 1.0, 4e-4, 1e-3, finer).force_at(times, 0)[0] for finer in (1.0, 16.0))
     assert np.abs(rough - exact).max() < 5e-6 * exact.max()
-    faint = joined((ball, blows.wall().with_mode(25e3, 4e3, 0.0, np.zeros(0))), [law])
+    faint = join_bodies((ball, blows.wall().with_mode(25e3, 4e3, 0.0, np.zeros(0))), [law])
     assert blows.longest_step(faint, law, 4e-4) == pytest.approx(1e-5)

@@ -18,7 +18,7 @@ def recording(names, units):
      ("μm", ("m", 1e-6)), ("mV", None), ("furlong", None)],
 )  # fmt: skip
 def test_known_units(text, wanted):
-    assert units.known(text) == wanted
+    assert units.si_unit(text) == wanted
 
 
 @pytest.mark.parametrize(

@@ -5,7 +5,7 @@ import pytest
 from hammer_taps import LAW, MASS, RANGES, fitted, taps_of
 
 import fem_impact as fi
-from fem_impact.taps.found import differ
+from fem_impact.taps.found import scatter_in_words
 
 FACTORS = (0.85, 1.1, 1.0, 1.25)  # stiffness of each tap over their typical one: no spot is struck twice
 SPEEDS = (0.5, 0.7, 0.9, 1.1)
@@ -57,8 +57,8 @@ def test_intervals_of_the_mean_and_of_a_single_tap_hold_the_truth(each):
 
 def test_words_and_numbers_tell_the_spread(each):
     spread = each.spreads["contact.stiffness"]
-    assert differ(spread).startswith("differ by 16 % (standard deviation); noise alone")
-    assert f"contact.stiffness is the mean of the taps, which {differ(spread)}" in each.summary()
+    assert scatter_in_words(spread).startswith("differ by 16 % (standard deviation); noise alone")
+    assert f"contact.stiffness is the mean of the taps, which {scatter_in_words(spread)}" in each.summary()
     data = each.data()["per_tap"]["contact.stiffness"]
     assert len(data["values"]) == 4 and data["by_noise"] < 0.1 * data["deviation"]
 
@@ -67,7 +67,7 @@ def test_equal_taps_do_not_differ_beyond_the_noise():
     made = hertz(taps_of(speeds=SPEEDS), "contact.stiffness")
     spread = made.spreads["contact.stiffness"]
     assert spread.chance > 0.05 and 0.3 < spread.deviation / spread.by_noise < 3.0  # this seed's noise
-    assert "one value for all would do" in differ(spread)
+    assert "one value for all would do" in scatter_in_words(spread)
 
 
 @pytest.mark.slow

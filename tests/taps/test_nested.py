@@ -41,7 +41,7 @@ def test_at_the_best_fit_of_the_smaller_model_a_larger_one_is_the_same_blow(taps
     """A mode of 2 tonnes, or one of a ten-thousandth at 100 kHz, moves the force by less than a thousandth."""
     large = fitted(taps, STIFFNESS | EXPONENT | more, smaller=small)
     inner = Inner("", small.problem, small.best.x)
-    for x in nested.embedded(large.problem, inner):
+    for x in nested.embed_fit(large.problem, inner):
         assert np.square(large.problem.residual(x)).sum() == pytest.approx(cost(small), rel=0.02)
     assert cost(large) <= cost(small) * (1.0 + 1e-5) and not large.stuck
 
@@ -49,24 +49,24 @@ def test_at_the_best_fit_of_the_smaller_model_a_larger_one_is_the_same_blow(taps
 def test_what_one_tap_has_of_its_own_goes_along(taps):
     small = fitted(taps, STIFFNESS, per_tap="contact.stiffness")
     large = fitted(taps, STIFFNESS | LOSS, per_tap="contact.stiffness", smaller=small)
-    (x,) = nested.embedded(large.problem, Inner("", small.problem, small.best.x))
+    (x,) = nested.embed_fit(large.problem, Inner("", small.problem, small.best.x))
     assert np.square(large.problem.residual(x)).sum() == pytest.approx(cost(small), rel=1e-6)
 
 
 def test_a_fit_whose_own_searches_stick_says_so(taps, monkeypatch):
     """Searches with two modes that do not leave their start: the model with one is not lost."""
     one = fitted(taps, STIFFNESS | EXPONENT | MODE)
-    real, starts = solver.solve, nested.embedded
+    real, starts = solver.solve, nested.embed_fit
 
     def lame(problem, x, iterations=solver.ENOUGH, *rest, **more):
         return real(problem, x, 1 if problem.n_shared == 6 else iterations, *rest, **more)
 
     def later(problem, inner):  # not in the first searches
-        monkeypatch.setattr(nested, "embedded", starts)
+        monkeypatch.setattr(nested, "embed_fit", starts)
         return []
 
     monkeypatch.setattr(solver, "solve", lame)
-    monkeypatch.setattr(nested, "embedded", later)
+    monkeypatch.setattr(nested, "embed_fit", later)
     two = fitted(taps, STIFFNESS | EXPONENT | MODES, smaller=one)
     assert two.stuck and any("the searches stuck above the model without" in note for note in two.notes)
     assert cost(two) <= cost(one) * (1.0 + 1e-4)
@@ -94,8 +94,8 @@ def test_a_search_that_did_not_end_says_so_where_it_would_gain(taps, small, monk
     cut = fitted(taps, STIFFNESS | EXPONENT | MODE)
     monkeypatch.undo()
     assert any(note.startswith("the search had not ended") for note in cut.notes) and not small.notes
-    assert solver.promised(cut.problem, cut.best) > 0.01 * cut.best.cost
-    assert solver.promised(small.problem, small.best) < 1e-3 * small.best.cost
+    assert solver.promised_fall(cut.problem, cut.best) > 0.01 * cut.best.cost
+    assert solver.promised_fall(small.problem, small.best) < 1e-3 * small.best.cost
 
 
 def test_a_lossy_law_is_found_and_nothing_more():

@@ -7,7 +7,7 @@ import pytest
 from hammer_taps import LAW, RATE, fitted, taps_of
 
 import fem_impact as fi
-from fem_impact.taps.predictions import predicted, widths
+from fem_impact.taps.predictions import predict_tap, widths
 from fem_impact.taps.solver import solve
 
 
@@ -63,7 +63,7 @@ def test_a_band_holds_what_the_values_leave_open(banded):
     for _ in range(10):
         values = made + 0.005 * rng.standard_normal(made.shape)
         again = replace(problem, data=replace(problem.data, values=values))
-        forces.append(predicted(again, solve(again, best.x), tap).force)
+        forces.append(predict_tap(again, solve(again, best.x), tap).force)
     spread = np.linalg.norm(banded.predict(0).spread)
     # ten tell it to a quarter, the noise found to a sixth
     assert spread == pytest.approx(np.linalg.norm(np.std(forces, axis=0, ddof=1)), rel=0.4)

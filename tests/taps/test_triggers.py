@@ -77,9 +77,9 @@ def test_a_ceiling_is_reached_by_several_samples_two_of_them_neighbours():
 
 def test_a_flat_top_is_clipping_and_a_round_one_is_not():
     pulse = half_sine(101)
-    assert not triggers.clipped(pulse) and not triggers.clipped(np.zeros(9))
-    assert triggers.clipped(np.minimum(pulse, 0.9)) and triggers.clipped(-np.minimum(pulse, 0.9))
-    assert triggers.clipped(pulse, full_scale=1.0)
+    assert not triggers.is_clipped(pulse) and not triggers.is_clipped(np.zeros(9))
+    assert triggers.is_clipped(np.minimum(pulse, 0.9)) and triggers.is_clipped(-np.minimum(pulse, 0.9))
+    assert triggers.is_clipped(pulse, full_scale=1.0)
 
 
 def test_a_tap_begins_at_a_twentieth_of_its_peak_whatever_its_offset():
@@ -93,7 +93,7 @@ def cut(places, n_times=4000, added=0.0, **options):
     force = np.zeros(n_times)
     force[places] = 10.0
     given = dict.fromkeys(("trigger", "before", "length")) | {"together": 0.05} | options
-    rows, *_, notes = triggers.cut([(force + added, np.zeros((n_times, 0)))], 1000.0, "here", **given)
+    rows, *_, notes = triggers.cut_taps([(force + added, np.zeros((n_times, 0)))], 1000.0, "here", **given)
     return rows, " ".join(notes)
 
 
@@ -153,8 +153,8 @@ def test_a_record_that_ends_early_cuts_no_other_one_short(places, widths, kept):
     for row, at, width in zip(force, places, widths):
         row[100 + at : 100 + at + width] = 50.0 * half_sine(width + 2)[1:-1]
     given = dict.fromkeys(("trigger", "before", "length")) | {"together": 0.05}
-    rows, *_, labels, _ = triggers.cut([(row[100:300], np.zeros((200, 0))) for row in force], 1e4, "here", **given)
+    rows, *_, labels, _ = triggers.cut_taps([(row[100:300], np.zeros((200, 0))) for row in force], 1e4, "here", **given)
     assert labels == [f"tap {i + 1}" for i in kept]
-    *_, notes = triggers.cut([(row, np.zeros((400, 0))) for row in (force[0], -force[0])], 1e4, "here", **given)
+    *_, notes = triggers.cut_taps([(row, np.zeros((400, 0))) for row in (force[0], -force[0])], 1e4, "here", **given)
     assert any(note.startswith("no tap above") and note.endswith("N in record 2") for note in notes)
     assert triggers.cut_short(rows).tolist() == [places[i] < 0 for i in kept]

@@ -16,22 +16,22 @@ def tap(place, n_times=400, rate=25600.0, added=0.0):
 
 
 def test_records_of_unequal_length_are_joined_to_the_shortest():
-    both = windows.joined([tap(50), tap(80, 300)])
+    both = windows.join_tables([tap(50), tap(80, 300)])
     assert both.n_taps == 2 and len(both.time) == 300 and both.labels == ("tap 1", "tap 2")
     with pytest.raises(ValueError, match="sampled at 25600 Hz"):
-        windows.joined([tap(50), tap(50, rate=51200.0)])
+        windows.join_tables([tap(50), tap(50, rate=51200.0)])
 
 
 def test_all_onsets_come_to_the_same_place():
-    cut = windows.cut(windows.joined([tap(50), tap(83)]), None)
+    cut = windows.cut_to_window(windows.join_tables([tap(50), tap(83)]), None)
     assert np.array_equal(cut.force[0], cut.force[1])
     assert cut.onset[0] * cut.rate == pytest.approx(windows.BEFORE) and np.ptp(cut.onset) == 0.0
     assert len(cut.time) >= windows.BEFORE + 2 * len(PULSE)
-    assert len(windows.cut(tap(50), (1e-4, 5e-4)).time) == round(1e-4 * 25600) + round(5e-4 * 25600)
+    assert len(windows.cut_to_window(tap(50), (1e-4, 5e-4)).time) == round(1e-4 * 25600) + round(5e-4 * 25600)
 
 
 def test_records_are_scaled_to_their_peaks_over_the_weights():
-    data = windows.data(windows.joined([tap(50), tap(83)]), 0, np.array([2.0]))
+    data = windows.data(windows.join_tables([tap(50), tap(83)]), 0, np.array([2.0]))
     assert np.allclose(data.scale, PULSE.max() / 2.0) and np.allclose(np.abs(data.values).max(axis=2), 2.0)
 
 
@@ -41,11 +41,11 @@ def test_offsets_beyond_the_noise_are_removed_and_said():
     rows = np.array([pulse, pulse + 20.0, pulse - 7.0, np.roll(pulse, -37) + 5.0])  # the last begins with its pulse
     taps = fi.Taps.from_arrays(rows, rate=25600.0, notes=["as given"])
     assert (np.abs(taps.onset * 25600.0 - [42, 42, 42, 5]) <= 1.0).all()  # an offset moves no onset
-    made = windows.levelled(taps)
+    made = windows.level_offsets(taps)
     assert np.allclose(made.peak, taps.peak[0], atol=0.3)
     assert np.array_equal(made.force[0], taps.force[0])  # noise is no offset
     assert made.notes == ("as given", "offsets of the force were removed, up to 20 N: tap 2, tap 3, tap 4")
-    assert windows.levelled(taps.pick([0])).notes == ("as given",)
+    assert windows.level_offsets(taps.pick([0])).notes == ("as given",)
 
 
 NOISE = 2.0 * np.random.default_rng(3).standard_normal(400)
@@ -60,4 +60,4 @@ SURE = triggers.noise(tap(50).force[0] + NOISE) / np.sqrt(REST.stop)  # standard
     ids=["0.001 of the peak", "0.004 of the peak", "4 standard deviations", "9 standard deviations"],
 )  # fmt: skip
 def test_an_offset_below_0_002_of_the_peak_or_six_deviations_of_its_mean_is_left(added, removed):
-    assert bool(windows.levelled(tap(50, added=added)).notes) == removed
+    assert bool(windows.level_offsets(tap(50, added=added)).notes) == removed

@@ -92,7 +92,7 @@ def uncompiled(most: float = np.inf, together: float = np.inf) -> Iterator[None]
             variable.reset(token)
 
 
-def limited() -> bool:
+def is_limited() -> bool:
     """Whether a run may be plain Python, and therefore must be short."""
     return not COMPILED or QUICK.get() > 0.0
 
@@ -242,7 +242,7 @@ if COMPILED:
                     gc.enable()
 
 
-def _tolerant(cache: Any, call: Callable[..., Any]) -> Callable[..., Any]:
+def _forgiving_call(cache: Any, call: Callable[..., Any]) -> Callable[..., Any]:
     """A call of a cache that forgets what is there, and does nothing, where files are spoilt or forbidden."""
 
     def tried(*arguments: Any) -> Any:
@@ -273,8 +273,8 @@ def outer(allocates: bool = True, seconds: float = 0.0, **options: Any) -> Any:
         # numba has no public ways to do the following; test_build.py tests all in fresh processes
         kernel._cache._cache_file._source_stamp = STAMP
         kernel.__class__ = _Kernel
-        kernel._cache.load_overload = _tolerant(kernel._cache, kernel._cache.load_overload)
-        kernel._cache.save_overload = _tolerant(kernel._cache, kernel._cache.save_overload)
+        kernel._cache.load_overload = _forgiving_call(kernel._cache, kernel._cache.load_overload)
+        kernel._cache.save_overload = _forgiving_call(kernel._cache, kernel._cache.save_overload)
         compile_it = kernel._compiler.compile
 
         def compile_unless_quick(*signature: Any) -> Any:

@@ -117,7 +117,7 @@ class Kernels(NamedTuple):
 
     rows: tuple[np.ndarray, np.ndarray]  # (6, n_steps) each, see `convolution`
     # (SPLITS + LEVELS, 2, 2) what a unit of the force's jumps and of its bends adds at most to the errors of
-    # `cubics.parted` for looks of 1/4, 1/2, 1, 2, 4, ... steps
+    # `cubics.surely_parted` for looks of 1/4, 1/2, 1, 2, 4, ... steps
     bounds: tuple[np.ndarray, np.ndarray]
     # (2**SPLITS - 1, 4, n_steps) the kernels without means 1/4, 2/4, ... of a step later; or without steps, where a
     # doubt in flight ends a blow as if it were too long

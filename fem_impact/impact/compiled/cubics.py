@@ -52,7 +52,7 @@ def turning(d0, v0, d1, v1):
 
 
 @inner()
-def parted(d0, v0, d1, v1, error, rate_error):
+def surely_parted(d0, v0, d1, v1, error, rate_error):
     """Whether an approach, known at both ends of a look ahead, surely has no touch in between but one that lasts.
 
     The cubic through both ends errs by at most ``error``, its slope by ``rate_error``. Falling from the start, rising

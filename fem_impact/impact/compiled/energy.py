@@ -11,18 +11,18 @@ import numpy as np
 
 from .build import FALSE, inner, outer
 from .bundles import Flights, KernelSystem, Limits
-from .events import EVENT_LIMIT, dipped, lags_behind, strayed
+from .events import EVENT_LIMIT, has_dipped, has_strayed, lags_behind
 from .exact import advance, freshen, keep_in_mind, made_tables, predict, record, solve_step, tabulate
 from .flight import NEVER, SLOW, UNPROVED
 from .law import point_at, special_of, spring_of
 from .propagation import any_of, commit, restore
 from .record import EXHAUSTED, FAILED, FINISHED, FULL, SETTLED
 from .rounding import OVERFLOW
-from .stretched import Stretch, attempt, finish, flown, made_room, overlooked, stretching_energy
+from .stretched import Stretch, attempt, finish, fly_in_steps, made_room, overlooked, stretching_energy
 
 from .frame import (  # isort: skip
-    LEVELS, LOST, NOTHING, TAKEN, at_rest, begin, course_of, fly, followed, locate_event, made_run, moving, over,
-    remembered, step_length, take_over, touching,
+    LEVELS, LOST, NOTHING, TAKEN, at_rest, begin_run, course_of, finish_memory, follow_run, locate_event, made_run,
+    moving, status_if_over, step_length, take_over, touching, write_flight,
 )  # fmt: skip
 from .layout import (  # isort: skip
     APPROACH, BEGUN, BLINDS, CORNERED, EVENTS, FAINT, FALLBACKS, FORCE, FRESH, LEAST, LEVEL, PAUSE, RATE,
@@ -50,14 +50,14 @@ def pass_events(course):
 def fly_if_free(bodies, contacts, course, flights, room, limits, row):
     """How a flight ends, see `find_onset`; SLOW where there is none, or bodies that stretch fly in steps."""
     if room is not None:
-        return NEVER if flown(bodies, contacts, course, room, limits) else SLOW
+        return NEVER if fly_in_steps(bodies, contacts, course, room, limits) else SLOW
     if course.clock[TIME] < course.clock[PAUSE] or any_of(contacts.pressed):
         return SLOW
-    return fly(bodies, contacts, course, flights, limits, row)
+    return write_flight(bodies, contacts, course, flights, limits, row)
 
 
 @inner(part=True, fastmath=False)
-def solved(bodies, contacts, room, tables, slot, h, blind):
+def solve_forces(bodies, contacts, room, tables, slot, h, blind):
     """Whether the forces of a step were found, and what `solve_step` returns of them."""
     if room is None:
         return True, solve_step(contacts, tables, slot, h, blind)
@@ -65,7 +65,7 @@ def solved(bodies, contacts, room, tables, slot, h, blind):
 
 
 @inner(part=True)
-def located(bodies, contacts, course, limits, h, cornered, blind):
+def locate_end(bodies, contacts, course, limits, h, cornered, blind):
     """Whether to take a step of length h, and the next length to try; one whose event was not found is passed blind."""
     if blind:
         course.counts[TARGET] = -1
@@ -104,15 +104,15 @@ def too_long(contacts, special, level, h, still):
         if pressed[i] and contacts.end[i] <= 0.0 and now[APPROACH, i] == 0.0:
             if now[RATE, i] > still:
                 shorter = max(shorter, 3 if level == 0 else 1)
-        elif dipped(contacts, h, i):
+        elif has_dipped(contacts, h, i):
             shorter = max(shorter, 1)
-        if special and pressed[i] and (strayed(contacts, h, i) or lags_behind(contacts, level, h, i)):
+        if special and pressed[i] and (has_strayed(contacts, h, i) or lags_behind(contacts, level, h, i)):
             shorter = max(shorter, 1)
     return shorter
 
 
 @inner()
-def missed(contacts, h):
+def missed_impulse(contacts, h):
     """Impulse [N s] that a step's lossy forces miss of their laws, from what the laws say at its ends; the largest."""
     now, law = contacts.now, contacts.law
     worst = 0.0
@@ -126,10 +126,10 @@ def missed(contacts, h):
 
 
 @inner(part=True, fastmath=False)
-def shortened(bodies, contacts, course, room, special, h, limits):
+def halve_if_needed(bodies, contacts, course, room, special, h, limits):
     """Whether to take a step again, halved; steps that cannot be halved any more pass the events."""
     shorter = too_long(contacts, special, course.counts[LEVEL], h, limits.still)
-    if course.counts[LEVEL] < MOST_HALVINGS and missed(contacts, h) > limits.misfit:
+    if course.counts[LEVEL] < MOST_HALVINGS and missed_impulse(contacts, h) > limits.misfit:
         shorter = max(shorter, 1)
     if room is not None:
         shorter = max(shorter, overlooked(bodies, contacts, h, course.counts[LEVEL]))
@@ -141,7 +141,7 @@ def shortened(bodies, contacts, course, room, special, h, limits):
 
 
 @inner(part=True)
-def finite(contacts):
+def is_finite(contacts):
     """Whether a step ends with numbers."""
     total = 0.0
     for i in range(contacts.end.size):
@@ -174,7 +174,7 @@ def follow(scene, tables, room, limits, run, steps):
     bodies, contacts, course = moving(scene, run), touching(run), course_of(run)
     flights = Flights(tables.lanes[LEVELS + 1 :], tables.known[LEVELS + 1 :], tables.base, 1e-3 * tables.base)
     if course.counts[BEGUN] == 0:
-        begin(scene, bodies, contacts, course, tables.base)
+        begin_run(scene, bodies, contacts, course, tables.base)
         if room is not None:
             course.clock[FAINT] += 1e-24 * stretching_energy(room, bodies.q)
     count = course.counts
@@ -185,7 +185,7 @@ def follow(scene, tables, room, limits, run, steps):
     status = EXHAUSTED
     while count[STEPS] < limits.max_steps:
         if count[SEEKS] == NOTHING:
-            status = over(course, limits, steps)
+            status = status_if_over(course, limits, steps)
             if status != EXHAUSTED:
                 break
             found = fly_if_free(bodies, contacts, course, flights, room, limits, steps[count[STEPS]])
@@ -199,7 +199,7 @@ def follow(scene, tables, room, limits, run, steps):
         else:
             h, slot = guess, LEVELS
         make_ready(bodies, contacts, course, tables, slot, h, special)
-        good, fine = solved(bodies, contacts, room, tables, slot, h, blind)
+        good, fine = solve_forces(bodies, contacts, room, tables, slot, h, blind)
         if not good:
             count[SEEKS] = NOTHING
             count[LEAST] = count[LEVEL] + 1
@@ -210,12 +210,12 @@ def follow(scene, tables, room, limits, run, steps):
         if special:
             keep_in_mind(contacts, h, tables.ramp and fine)
         fresh = not blind and count[SEEKS] == NOTHING
-        if fresh and shortened(bodies, contacts, course, room, special, h, limits):
+        if fresh and halve_if_needed(bodies, contacts, course, room, special, h, limits):
             continue
-        taken, guess = located(bodies, contacts, course, limits, h, cornered, blind)
+        taken, guess = locate_end(bodies, contacts, course, limits, h, cornered, blind)
         if not taken:
             continue
-        if not finite(contacts):
+        if not is_finite(contacts):
             status = FAILED
             break
         record(contacts, course, steps[count[STEPS]], tables.sums[slot], h, blind)
@@ -227,7 +227,7 @@ def follow(scene, tables, room, limits, run, steps):
             status = SETTLED
             break
     if status != FULL:
-        remembered(contacts)
+        finish_memory(contacts)
     return status
 
 
@@ -244,4 +244,4 @@ def run_energy(scene: KernelSystem, stretch: Stretch | None, ramp: int, base: fl
     m, n_modes = scene.shape.shape
     run, tables = made_run(scene), made_tables(n_modes, m, base, ramp)
     room = None if stretch is None else made_room(stretch, scene.omega, m)
-    return followed(follow, (scene, tables, room, limits), run)
+    return follow_run(follow, (scene, tables, room, limits), run)

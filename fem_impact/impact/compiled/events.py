@@ -33,7 +33,7 @@ EVENT_LIMIT = 64  # [-] events within one step's time: chatter, passed with unlo
 
 
 @inner(part=True)
-def crossed(pressed, d0, v0, y, depth, still):
+def has_crossed(pressed, d0, v0, y, depth, still):
     """Whether a contact opened (was pressed and ends apart) or closed (was apart and ends pressed) within a step."""
     if pressed:
         return y < -depth
@@ -64,7 +64,9 @@ def first_crossing(bodies, contacts, h, limits, first):
     for i in range(y.size):
         d0, v0, pressed = now[APPROACH, i], now[RATE, i], contacts.pressed[i]
         closes_later = first and not pressed and d0 == 0.0 and abs(v0) <= still and y[i] > limits.depth
-        if crossed(pressed, d0, v0, y[i], limits.depth, still) or (closes_later and drawn_apart(bodies, contacts, i)):
+        if has_crossed(pressed, d0, v0, y[i], limits.depth, still) or (
+            closes_later and drawn_apart(bodies, contacts, i)
+        ):
             root = h * crossing(d0, h * v0, y[i], h * rate[i])
             if root <= at:
                 at = root
@@ -73,7 +75,7 @@ def first_crossing(bodies, contacts, h, limits, first):
 
 
 @inner(part=True)
-def dipped(contacts, h, i):
+def has_dipped(contacts, h, i):
     """Whether contact i opened and closed again, or the other way round, within a step, by its cubic."""
     d0, v0 = contacts.now[APPROACH, i], contacts.now[RATE, i]
     d1, v1, pressed = contacts.end[i], contacts.rate[i], contacts.pressed[i]
@@ -84,7 +86,7 @@ def dipped(contacts, h, i):
 
 
 @inner()
-def narrow(contacts, h, limits, target, bracket):
+def narrow_crossing(contacts, h, limits, target, bracket):
     """Next length of a step that is to end where a contact opens or closes, from a try of length h.
 
     Returns (target, length), the length zero where the try was good; the target is an earlier crossing if the try
@@ -97,7 +99,7 @@ def narrow(contacts, h, limits, target, bracket):
         slack = max(
             limits.depth, LOCATED * (abs(now[APPROACH, i]) + abs(y[i]))
         )  # or contacts that open together take turns for ever
-        if i != target and crossed(pressed[i], now[APPROACH, i], now[RATE, i], y[i], slack, limits.still):
+        if i != target and has_crossed(pressed[i], now[APPROACH, i], now[RATE, i], y[i], slack, limits.still):
             enclose(contacts, h, i, bracket)
             part = crossing(now[APPROACH, i], h * now[RATE, i], y[i], h * rate[i])
             return i, part * h if part < 1.0 else 0.5 * h
@@ -129,7 +131,7 @@ def narrow(contacts, h, limits, target, bracket):
 
 @inner()
 def enclose(contacts, h, target, bracket):
-    """Set the bracket of `narrow` to a whole step."""
+    """Set the bracket of `narrow_crossing` to a whole step."""
     bracket[LOW] = 0.0
     bracket[SIZE] = abs(contacts.now[APPROACH, target]) + abs(contacts.end[target])
     last_try(h, contacts.end[target], contacts.rate[target], bracket)
@@ -155,7 +157,7 @@ def corner_value(law, i, which, d, v, memory):
 
 @inner()
 def last_try(length, value, slope, out_bracket):
-    """The upper end of a bracket, with what `narrow` and `nearer` ask of it."""
+    """The upper end of a bracket, with what `narrow_crossing` and `narrow_corner` ask of it."""
     out_bracket[HIGH] = length
     out_bracket[TRIED] = length
     out_bracket[MISSED] = value
@@ -262,7 +264,7 @@ def lags_behind(contacts, level, h, i):
 
 
 @inner()
-def strayed(contacts, h, i):
+def has_strayed(contacts, h, i):
     """Whether contact i left the corner of its law, at which its step began, and came back within the step."""
     law, now, y, rate = contacts.law, contacts.now, contacts.end, contacts.rate
     if relaxes(law, i):
@@ -281,7 +283,7 @@ def strayed(contacts, h, i):
 
 
 @inner()
-def nearer(contacts, i, which, h, bracket):
+def narrow_corner(contacts, i, which, h, bracket):
     """Next length of a step that is to end at a corner, from a try of length h; 0 where the try was good.
 
     By secants inside a bracket as from `first_corner`.

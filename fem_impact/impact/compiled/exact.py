@@ -12,9 +12,9 @@ from .bundles import Tables
 from .flight import GLIDES
 from .frame import LEVELS, remember
 from .law import harden, point_at, relaxes, spring_of
-from .laws.felt import faded, meet
+from .laws.felt import faded_memory, meet
 from .propagation import any_of, lane_table
-from .schemes import Free, Own, left_of, linear_guess, point_of, remembers, solve_constants, solve_ramp, solve_ramps
+from .schemes import Free, Own, left_of, linear_guess, memory_after, point_of, solve_constants, solve_ramp, solve_ramps
 
 from .layout import (  # isort: skip
     A11, A12, A21, A22, APPROACH, BLIND, CLOSED, COMPRESSION, ENERGY, FORCE, FREE_END, FREE_MEAN, FREE_RATE,
@@ -192,11 +192,11 @@ def keep_in_mind(contacts, h, ramped):
         contacts.after[i] = law["memory"][i]
         if relaxes(law, i):
             if law["memory"][i] < 0.0:
-                contacts.after[i] = faded(law, i, h)
+                contacts.after[i] = faded_memory(law, i, h)
             else:
                 spring, start = spring_of(law, i), point_of(contacts.now, i)
                 smooth = ramped and (f[i] != 0.0 or s[i] != 0.0)
-                contacts.after[i] = remembers(
+                contacts.after[i] = memory_after(
                     h, start, point_at(contacts.end[i], spring), contacts.now[RATE, i], contacts.rate[i], smooth, spring
                 )
 

@@ -76,7 +76,7 @@ def quadratic_wait(d, v, a):
 
 
 @inner()
-def watched(bodies, offset, i, before, h, out_miss):
+def approach_watched(bodies, offset, i, before, h, out_miss):
     """Approach of contact i and its rate; ``before`` (n_contacts, 2) has those of a time h ago, zero at first.
 
     ``out_miss`` (1,) is raised to where it turned back meanwhile, by the cubic through both ends.
@@ -120,14 +120,14 @@ def carry_rigid(bounds, i, time):
 
 
 @inner()
-def recedes(bounds, i, limits, look):
+def surely_recedes(bounds, i, limits, look):
     """Whether contact i surely never touches again, by its bounds; first only if it stays well away, see `AWAY`."""
     still = bounds[i, RIGID_RATE] <= limits.still and bounds[i, RIGID_ACCELERATION] <= 0.0
     return still and bounds[i, RIGID] + bounds[i, REACH] <= (limits.depth if look > LASTING else -AWAY * limits.depth)
 
 
 @inner()
-def meets(bounds, offset, i, d, v, elapsed, still):
+def closes_now(bounds, offset, i, d, v, elapsed, still):
     """Whether contact i closes now, at an approach d <= 0 and its rate v."""
     pull = bounds[i, RIGID_ACCELERATION]
     driven = bounds[i, HARDEST] > 0.0 or pull > 0.0
@@ -183,17 +183,17 @@ def find_onset(bodies, offset, flights, limits, limit, out_miss):
         for i in range(m):
             if look % 64 == 0:
                 motion_bounds(bodies, offset, i, bounds)
-            parted = recedes(bounds, i, limits, look)
+            parted = surely_recedes(bounds, i, limits, look)
             if parted and (look == 0 or before[i, 1] <= 0.0):
                 continue
-            d, v = watched(bodies, offset, i, before, last, out_miss)
+            d, v = approach_watched(bodies, offset, i, before, last, out_miss)
             if parted:
                 beyond = bounds[i, RIGID] + bounds[i, REACH]
                 if v > 0.0 and beyond > -AWAY * limits.depth:  # it turns back later, at most from there
                     out_miss[0] = max(out_miss[0], beyond)
                 continue
             d = min(d, 0.0)
-            if meets(bounds, offset, i, d, v, elapsed, limits.still):
+            if closes_now(bounds, offset, i, d, v, elapsed, limits.still):
                 return elapsed, i, ONSET
             bound = safe_look(bounds, i, d, v)
             if bound < wait:
@@ -221,7 +221,7 @@ def find_onset(bodies, offset, flights, limits, limit, out_miss):
         fly_on(bodies, flights, slot, wait, pushed, bounds)
         if over:
             for i in range(m):
-                watched(bodies, offset, i, before, wait, out_miss)
+                approach_watched(bodies, offset, i, before, wait, out_miss)
             return limit, -1, LATER
         elapsed += wait
     return elapsed, -1, UNPROVED

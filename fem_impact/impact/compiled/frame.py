@@ -20,7 +20,8 @@ from .record import EXHAUSTED, FULL, HORIZON, IMPACTS, total_energy
 from .rounding import ITERATIONS, NEAR
 
 from .events import (  # isort: skip
-    AGAIN, EVENT_LIMIT, LOCATED, PARTS, RELEASES, SUMMED, enclose, first_corner, first_crossing, narrow, nearer,
+    AGAIN, EVENT_LIMIT, LOCATED, PARTS, RELEASES, SUMMED, enclose, first_corner, first_crossing, narrow_corner,
+    narrow_crossing,
 )  # fmt: skip
 from .layout import (  # isort: skip
     APPROACH, BEGUN, BLINDS, CLOCKS, CONTACT_ROWS, CORNERED, COUNTERS, EVENTS, FAINT, FALLBACKS, FLYING, FRESH, HEAD,
@@ -43,7 +44,7 @@ def made_run(scene: KernelSystem) -> KernelRun:
     )  # fmt: skip
 
 
-def followed(follow: Callable[..., int], arguments: tuple[Any, ...], run: KernelRun) -> tuple[Any, ...]:
+def follow_run(follow: Callable[..., int], arguments: tuple[Any, ...], run: KernelRun) -> tuple[Any, ...]:
     """What a run found, see `energy.run_energy`, with as many rows of its record as it needs."""
     width = HEAD + (WIDTH + 1) * run.contacts.shape[1]
     steps = np.empty((FIRST_ROWS, width))
@@ -76,7 +77,7 @@ def course_of(run):
 
 
 @inner()
-def begin(scene, bodies, contacts, course, base):
+def begin_run(scene, bodies, contacts, course, base):
     """Where all contacts stand at the start of a run, whether they are pressed, and what counts as rest.
 
     Events are first passed for the time ``base``. A run may start where the one before located a release, or with a
@@ -104,7 +105,7 @@ def begin(scene, bodies, contacts, course, base):
 
 
 @inner(part=True)
-def over(course, limits, steps):
+def status_if_over(course, limits, steps):
     """Why a run ends before its next step; EXHAUSTED, which it will be after the last one, where it goes on.
 
     FULL where the record of its steps is.
@@ -132,7 +133,7 @@ def remember(contacts, i, row):
 
 
 @inner()
-def remembered(contacts):
+def finish_memory(contacts):
     """Count the approaches at the end of a run from no dent, and add the memory to where the contacts stand."""
     law, now = contacts.law, contacts.now
     for i in range(now.shape[1]):
@@ -144,7 +145,7 @@ def remembered(contacts):
 
 
 @inner(part=True)
-def fly(bodies, contacts, course, flights, limits, row):
+def write_flight(bodies, contacts, course, flights, limits, row):
     """A flight, written to a row of the steps; how it ended, see `find_onset`."""
     now, count, time = contacts.now, course.counts, course.clock[TIME]
     miss, left = course.clock[MISS : MISS + 1], limits.horizon - time
@@ -206,9 +207,9 @@ def locate_event(bodies, contacts, course, limits, h, cornered):
             return TRY, guess
     else:
         if sought == CROSSING:
-            count[TARGET], guess = narrow(contacts, h, limits, count[TARGET], bracket)
+            count[TARGET], guess = narrow_crossing(contacts, h, limits, count[TARGET], bracket)
         else:
-            guess = nearer(contacts, count[CORNERED], count[WHICH], h, bracket)
+            guess = narrow_corner(contacts, count[CORNERED], count[WHICH], h, bracket)
         count[TRIES] += 1
         if guess != 0.0 and count[TRIES] < ITERATIONS:
             count[SEEKS] = sought
@@ -236,7 +237,7 @@ def at_rest(bodies, contacts, course):
 
 
 @inner(part=True)
-def settle(contacts, target, limits, base):
+def settle_contacts(contacts, target, limits, base):
     """Take over approaches and rates at a step's end; the number of contacts that opened, but for those without force.
 
     Contacts open or close together if they do within a tiny part of the longest step ``base``, or rounding decides.
@@ -274,7 +275,7 @@ def take_over(contacts, course, limits, h, base, special):
     corner = count[CORNERED]
     if corner >= 0 and contacts.force[corner] > 0.0 and (count[WHICH] == PARTS or count[WHICH] == RELEASES):
         count[RELEASED] += 1
-    count[RELEASED] += settle(contacts, count[TARGET], limits, base)
+    count[RELEASED] += settle_contacts(contacts, count[TARGET], limits, base)
     if clock[TIME] - clock[RESET] > base:
         clock[RESET] = clock[TIME]
         count[EVENTS] = 0

@@ -153,7 +153,7 @@ def compression(d, spring):
 
 
 @inner()
-def compressed(x, spring):
+def point_when_compressed(x, spring):
     """The spring at a given compression."""
     if x <= 0.0:
         return Point(x, x, 0.0, 0.0)
@@ -166,7 +166,7 @@ def point_at(d, spring):
     """The spring at a given approach."""
     if d <= 0.0:
         return Point(d, d, 0.0, 0.0)
-    point = compressed(compression(d, spring), spring)
+    point = point_when_compressed(compression(d, spring), spring)
     return Point(d, point.compression, point.force, point.energy)
 
 
@@ -226,7 +226,7 @@ def harden(law, i, approach):
 
 
 @outer()
-def stored(approach, law):
+def stored_energies(approach, law):
     """Energy that contacts store at approaches from their dents (n_contacts,) [m]; felt never less than by itself."""
     total = 0.0
     for i in range(law.shape[0]):
@@ -250,7 +250,7 @@ def dents(law):
 
 
 @outer()
-def yielded(law):
+def yielded_energy(law):
     """Energy that yielding took from all contacts so far [J]: what it cost to press them, less what comes back."""
     total = 0.0
     for i in range(law.shape[0]):

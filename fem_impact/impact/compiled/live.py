@@ -3,7 +3,7 @@
 All modes are in one list: those of each stick, slot after slot, then those of the body. Between frames the state goes
 ahead by exact steps ``period / 2**level``, whose tables are made beforehand. In contact a step is no longer than that
 of ``limits.contact``; a step in which a contact opens or closes is halved, until it ends there to ``limits.closing`` or
-``limits.opening``. In flight a step is as long as the bounds of `flight` allow, but never below ``limits.flight``.
+``limits.opening``. In flight a step is as long as `level_of_flight` allows, but never below ``limits.flight``.
 Here nothing allocates: what does could not be compiled as part of `follow`.
 """
 
@@ -13,9 +13,9 @@ import numpy as np
 
 from .build import ONE, TRUE, inner, outer
 from .bundles import Bodies, Contacts, Tables
-from .events import dipped
+from .events import has_dipped
 from .exact import contact_sums, freshen, keep_in_mind, predict, solve_step
-from .flight import LASTING, approach_of, carry_rigid, motion_bounds, recedes, safe_wait
+from .flight import LASTING, approach_of, carry_rigid, motion_bounds, safe_wait, surely_recedes
 from .law import point_at, special_of, spring_of
 from .laws.felt import rest_of
 from .layout import APPROACH, FREE_END, FREE_RATE, RATE
@@ -118,11 +118,11 @@ def take_off(pads, state, i):
         state.pad[k] = state.pad[k + 1]
         state.until[k] = state.until[k + 1]
         state.pressed[k] = state.pressed[k + 1]
-    renewed(state, m)
+    note_sticks(state, m)
 
 
 @inner()
-def renewed(state, m):
+def note_sticks(state, m):
     """Note that there are other sticks on the body than before, m now."""
     state.place[N_ON] = m
     state.place[FORCED] = 1
@@ -178,7 +178,7 @@ def put_on(body, pads, limits, state, pad, speed):
     state.now[APPROACH, m] = state.offset[m]
     state.pressed[m] = state.offset[m] >= 0.0 and state.now[RATE, m] > 0.0
     state.counted[STRUCK] += 1
-    renewed(state, m + 1)
+    note_sticks(state, m + 1)
 
 
 @inner()
@@ -201,7 +201,7 @@ def touched(state):
 
 
 @inner()
-def flight(body, pads, limits, state, level):
+def level_of_flight(body, pads, limits, state, level):
     """Level of a step, no longer than the given, in which surely nothing touches; -1 if a stick left for good."""
     m = state.place[N_ON]
     bodies = moving(body, state)
@@ -210,7 +210,7 @@ def flight(body, pads, limits, state, level):
         state.place[FORCED] = 0
         for i in range(m - 1, -1, -1):
             motion_bounds(bodies, state.offset, i, state.bounds)
-            if recedes(state.bounds, i, limits, LASTING + 1):
+            if surely_recedes(state.bounds, i, limits, LASTING + 1):
                 take_off(pads, state, i)
                 return -1
     state.place[N_LOOKS] += 1
@@ -223,7 +223,7 @@ def flight(body, pads, limits, state, level):
 
 
 @inner()
-def glided(state, h, end):
+def take_over_flight(state, h, end):
     """Take over a step in which nothing touched."""
     restore(state.free_q, state.free_p, state.q, state.p)
     for i in range(state.place[N_ON]):
@@ -234,7 +234,7 @@ def glided(state, h, end):
 
 
 @inner()
-def noted(state, time, h, force):
+def note_forces(state, time, h, force):
     """Write a step of the contacts that push to the trace."""
     for i in range(state.place[N_ON]):
         if force[i] > 0.0 and state.counted[TRACED] < state.trace.shape[0]:
@@ -266,7 +266,7 @@ def step(body, limits, state, level, time):
             for i in range(contacts.end.size):
                 meets = meets or contacts.free[FREE_END, i] > 0.0
             if not meets:
-                glided(state, h, contacts.free)
+                take_over_flight(state, h, contacts.free)
                 return level
             if level < limits.closing:
                 level += 1
@@ -283,7 +283,7 @@ def step(body, limits, state, level, time):
         for i in range(contacts.end.size):
             finest = limits.opening if contacts.pressed[i] else limits.closing
             ends = (contacts.end[i] > 0.0) != contacts.pressed[i]
-            shorter = shorter or (ends and level < finest) or (level < limits.opening and dipped(contacts, h, i))
+            shorter = shorter or (ends and level < finest) or (level < limits.opening and has_dipped(contacts, h, i))
         if not shorter:
             break
         level += 1
@@ -299,12 +299,12 @@ def step(body, limits, state, level, time):
         contacts.pressed[i] = contacts.end[i] > 0.0
     state.place[FORCED] = 1
     state.counted[STEPS] += 1
-    noted(state, time + h, h, contacts.force)
+    note_forces(state, time + h, h, contacts.force)
     return level
 
 
 @inner()
-def tidied(body, pads, state):
+def tidy_modes(body, pads, state):
     """Put modes at rest that hardly move; if a number is no longer one, lift all sticks and still the body."""
     lost = False
     for n in range(state.q.size):
@@ -344,9 +344,9 @@ def play_block(body, pads, limits, state, strokes, gain, out):
                 tick += TICKS >> level
                 continue
             touching = any_of(state.pressed[: state.place[N_ON]])
-            level = max(level, limits.contact) if touching else flight(body, pads, limits, state, level)
+            level = max(level, limits.contact) if touching else level_of_flight(body, pads, limits, state, level)
             if level >= 0:
                 tick += TICKS >> step(body, limits, state, level, (state.place[FRAME] + tick / TICKS) * limits.period)
         state.place[FRAME] += 1
         if state.place[FRAME] % 1024 == 0:
-            tidied(body, pads, state)
+            tidy_modes(body, pads, state)

@@ -14,7 +14,7 @@ import numpy as np
 from .build import ZERO, inner, outer
 from .bundles import Track
 from .centroids import centroid
-from .cubics import LOOKS, crossing, cubic, parted, turning
+from .cubics import LOOKS, crossing, cubic, surely_parted, turning
 from .law import Point, point_at, simple, spring_of
 from .laws.base import Spring
 from .misfit import misfit
@@ -62,7 +62,7 @@ class MapBlow(NamedTuple):
 
 
 @inner(part=True)
-def begin(track):
+def begin_blow(track):
     """A blow at unit speed that is about to touch."""
     track.state[:] = 0.0
     track.state[NEAREST] = np.inf
@@ -141,7 +141,7 @@ def longest_look(kernels, blow, track, n):
 
 
 @inner()
-def cleared(kernels, blow, track, n, end, end_rate):
+def is_cleared(kernels, blow, track, n, end, end_rate):
     """Whether step n of a flight surely has no touch but one that lasts, looked at in halves and then in quarters."""
     h, state = blow.h, track.state
     for split in range(1, SPLITS + 1):
@@ -161,7 +161,7 @@ def cleared(kernels, blow, track, n, end, end_rate):
                     )
                     right -= share * y
                     steep -= share * rate
-            sure = sure and parted(left, slope * dt, right, steep * dt, error + state[MARGIN], rate_error)
+            sure = sure and surely_parted(left, slope * dt, right, steep * dt, error + state[MARGIN], rate_error)
             if right > 0.0:
                 sure = sure and end > 0.0
                 break
@@ -182,12 +182,12 @@ def look(kernels, blow, track, n, level):
         return NEARER, end, rate
     span = jump * blow.h
     error, rate_error = doubt(SPLITS + level, state, blow.shares, kernels.bounds)
-    if not parted(state[APPROACH], state[RATE] * span, end, rate * span, error + state[MARGIN], rate_error):
+    if not surely_parted(state[APPROACH], state[RATE] * span, end, rate * span, error + state[MARGIN], rate_error):
         if level > 0:
             return NEARER, end, rate
         if blow.certify and kernels.later[0].shape[2] == 0:
             return UNPROVED, end, rate
-        if not blow.certify or not cleared(kernels, blow, track, n, end, rate):
+        if not blow.certify or not is_cleared(kernels, blow, track, n, end, rate):
             counts[ENDING] = DOUBTFUL
     if end <= 0.0 and state[RATE] > 0.0 > rate:
         state[NEAREST] = min(state[NEAREST], -turning(state[APPROACH], state[RATE] * span, end, rate * span)[1])
@@ -236,7 +236,7 @@ def touch(blow, track, n, end, rate):
 
 
 @inner(part=True)
-def expected(blow, track, n):
+def free_end_of(blow, track, n):
     """Where step n of a contact would end if nothing pushed: all but the last force is summed up already."""
     state, once, h = track.state, blow.once, blow.h
     end = mean = turned = 0.0
@@ -284,7 +284,7 @@ def push(blow, track, n, f, s):
 
 
 @inner(part=True)
-def mend(blow, track, n, point, rate):
+def mend_end(blow, track, n, point, rate):
     """Write the end of step n to the record, mended by what the scheme's straight force misses there."""
     spring, y, missed = blow.spring, point.approach, 0.0
     if y > 0.0:
@@ -433,7 +433,7 @@ def press(blow, track, n, free):
         state[NEAREST] = min(state[NEAREST], low)
         if low < max(0.2 * min(d0, y), state[MARGIN]):
             track.counts[ENDING] = DOUBTFUL
-    mend(blow, track, n, point, rate)
+    mend_end(blow, track, n, point, rate)
     mark_peak(blow, track, n)
     if blow.spring.loss * track.rates[n + 1] < -0.9:  # at -1 it stops pushing, which is not followed here
         return False
@@ -453,7 +453,7 @@ def follow_blow(kernels, blow, track):
     while n < track.force.size:
         if counts[PRESSED]:
             extend(kernels, blow.shares, track, n + 2)
-            free = expected(blow, track, n)
+            free = free_end_of(blow, track, n)
         else:
             if level < 0:
                 level = longest_look(kernels, blow, track, n)
@@ -525,7 +525,7 @@ def run(cells, pairs, kernels, h, certify, band, track, out_found):
     out_found (N_FOUND, n_cells), see `layout`.
     """
     for cell in cells:
-        begin(track)
+        begin_blow(track)
         extend(kernels, (pairs.shares[0, cell], pairs.shares[1, cell]), track, ZERO + 2)
         blow = blow_of(pairs, cell, h, certify, track.rows)
         status, n = follow_blow(kernels, blow, track)

@@ -3,7 +3,7 @@
 from .build import inner
 from .cubics import cubic
 from .law import POWER, point_at, steepness
-from .laws.felt import growth, soaked
+from .laws.felt import growth, memory_within_step
 
 # [-] nodes and weights of Gauss and Legendre for a step: a spring that sets in like x**1.5 is integrated 13 times as
 # well as by Simpson's rule
@@ -29,7 +29,7 @@ def force_on(d0, v0, d1, v1, h, part, spring):
     if spring.relaxation > 0.0:
         g0, r0, _ = growth(point_at(d0, spring), v0, spring)
         g1, r1, _ = growth(point_at(d1, spring), v1, spring)
-        z = soaked(h, part, g0, g1, r0, r1, spring)[0]
+        z = memory_within_step(h, part, g0, g1, r0, r1, spring)[0]
         fade = (point.force / spring.stiffness - z) / spring.relaxation
         return max(0.0, point.force - spring.hard * z), steep * rate - spring.hard * fade
     return point.force * factor, steep / (

@@ -29,6 +29,6 @@ def find(environment: MutableMapping[str, str], kernels: Path = Path(__file__).p
     return Path(folder)
 
 
-def lasting(environment: MutableMapping[str, str]) -> bool:
+def is_lasting(environment: MutableMapping[str, str]) -> bool:
     """Whether what is kept outlives this process."""
     return not environment.get(GIVEN, "").startswith(os.path.join(tempfile.gettempdir(), PASSING))

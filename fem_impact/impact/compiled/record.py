@@ -12,7 +12,7 @@ import numpy as np
 from .build import ZERO, inner, outer
 from .cubics import crossing, cubic, turning
 from .events import NO_FORCE, releasing
-from .law import dent, point_at, relaxes, spring_of, spring_with, stored
+from .law import dent, point_at, relaxes, spring_of, spring_with, stored_energies
 from .laws.felt import above_felt
 from .misfit import force_on, misfit
 from .rounding import NEAR
@@ -33,7 +33,7 @@ def total_energy(bodies, contacts):
     total = 0.0
     for n in range(q.size):
         total += 0.5 * (p[n] * p[n] + (omega[n] * q[n]) ** 2) - bias[n] * q[n]
-    return total + stored(contacts.now[APPROACH], contacts.law)
+    return total + stored_energies(contacts.now[APPROACH], contacts.law)
 
 
 @inner()
@@ -240,7 +240,7 @@ def peak_between(steps, now, law, begin, end, i):
 
 
 @inner()
-def stays(steps, row, first, slack):
+def stays_in_touch(steps, row, first, slack):
     """Whether two bodies touch at the start of a step, within ``slack`` [m], and stay there."""
     return abs(steps[row, first]) <= slack and abs(steps[row, first + SPEED]) * steps[row, LENGTH] <= slack
 
@@ -290,7 +290,7 @@ def find_impacts(steps, now, law, rounding, way, touch):
             since = np.inf
             if abs(steps[row, first]) <= slack:
                 back = row
-                while back >= 0 and (back == row or stays(steps, back, first, slack)):
+                while back >= 0 and (back == row or stays_in_touch(steps, back, first, slack)):
                     if abs(steps[back, first + SPEED]) <= still:
                         since = steps[back, START]
                     back -= 1

@@ -20,8 +20,8 @@ from typing import NamedTuple
 import numpy as np
 
 from .build import inner
-from .law import Point, compressed, mean_slopes, memory_energy, point_at, power, spring_of, steepness
-from .laws.felt import growth, soaked
+from .law import Point, mean_slopes, memory_energy, point_at, point_when_compressed, power, spring_of, steepness
+from .laws.felt import growth, memory_within_step
 from .rounding import CHORD, ITERATIONS, NEAR, OVERFLOW, REPEATED, SOLVED, STALLED
 
 from .layout import (  # isort: skip
@@ -121,7 +121,7 @@ def lossy_terms(h, start, end, rate0, free_rate, spring):
     if spring.relaxation > 0.0:
         g0, r0, _ = growth(start, rate0, spring)
         g1, r1, per = growth(end, free_rate, spring)
-        z, mean, per_end, per_mean = soaked(h, 1.0, g0, g1, r0, r1, spring)
+        z, mean, per_end, per_mean = memory_within_step(h, 1.0, g0, g1, r0, r1, spring)
         k = spring.hard
         return -k * mean, -k * (z - spring.memory), -k * per_mean * per, -k * per_end * per
     loss = spring.loss
@@ -130,7 +130,7 @@ def lossy_terms(h, start, end, rate0, free_rate, spring):
 
 
 @inner()
-def remembers(h, start, end, rate0, rate1, ramped, spring):
+def memory_after(h, start, end, rate0, rate1, ramped, spring):
     """What felt remembers after a step of scheme A4 or A; 0 of another contact."""
     if spring.relaxation == 0.0:
         return 0.0
@@ -138,11 +138,11 @@ def remembers(h, start, end, rate0, rate1, ramped, spring):
         return mean_force(start, end.approach, h, spring)[3]
     g0, r0, _ = growth(start, rate0, spring)
     g1, r1, _ = growth(end, rate1, spring)
-    return max(0.0, soaked(h, 1.0, g0, g1, r0, r1, spring)[0])
+    return max(0.0, memory_within_step(h, 1.0, g0, g1, r0, r1, spring)[0])
 
 
 @inner()
-def fair(start, end, f, s, mean, memory, spring):
+def is_fair(start, end, f, s, mean, memory, spring):
     """Whether a step of scheme A4 loses neither less than nothing nor, without loss, more than its rounding.
 
     ``mean`` is its mean approach, ``memory`` what is remembered at its end.
@@ -186,7 +186,7 @@ def solve_ramp(guess, h, start, rate0, free, own, spring):
     end = start
     close = last = False
     for iteration in range(ITERATIONS):
-        end = compressed(x, spring)
+        end = point_when_compressed(x, spring)
         y = end.approach
         g, d = mean_slopes(start, end, spring)
         middle = 0.5 * (d0 + y)
@@ -208,8 +208,8 @@ def solve_ramp(guess, h, start, rate0, free, own, spring):
         if last or r == 0.0 or (close and abs(r) <= SOLVED * max(scale, abs(y))):
             mean = free.mean - own.mean * f - own.mean_ramp * s
             rate1 = free.rate - own.rate * f - own.rate_ramp * s
-            memory = remembers(h, start, end, rate0, rate1, True, spring)
-            return f >= 0.0 and fair(start, end, f, s, mean, memory, spring), end, f, s
+            memory = memory_after(h, start, end, rate0, rate1, True, spring)
+            return f >= 0.0 and is_fair(start, end, f, s, mean, memory, spring), end, f, s
         if not lossy or iteration == 0:
             steep = steepness(x, end.force, spring) if x > 0.0 else 0.0  # dF/dx; over the approach it is less
             tangent = steep / (1.0 + c * steep)
@@ -446,7 +446,7 @@ def solve_ramps(h, contacts, sums, work, blind):
         start, end = point_of(now, i), point_at(out_y[i], spring)
         mean = left_of(contacts.free[FREE_MEAN, i], sums, OWN_MEAN, i, out_f, out_s)
         v1 = left_of(contacts.free[FREE_RATE, i], sums, OWN_RATE, i, out_f, out_s)
-        memory = remembers(h, start, end, now[RATE, i], v1, True, spring)
-        if not fair(start, end, out_f[i], out_s[i], mean, memory, spring):
+        memory = memory_after(h, start, end, now[RATE, i], v1, True, spring)
+        if not is_fair(start, end, out_f[i], out_s[i], mean, memory, spring):
             return False
     return True

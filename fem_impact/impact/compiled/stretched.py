@@ -28,7 +28,7 @@ import numpy as np
 from .build import LOOSE, TRUE, ZERO, inner, outer
 from .bundles import KernelSystem
 from .exact import made_tables, predict, solve_step
-from .frame import LEVELS, begin, course_of, made_run, moving, touching
+from .frame import LEVELS, begin_run, course_of, made_run, moving, touching
 from .propagation import any_of, commit, glide, lane_table, restore
 from .rounding import ITERATIONS, OVERFLOW, SOLVED, STALLED
 
@@ -64,7 +64,7 @@ class StretchRoom(NamedTuple):
 
 
 @inner(arrays=np.matmul, fastmath=LOOSE)
-def bend(forms, q, out):
+def products_with_forms(forms, q, out):
     """Every form times a state, (n_forms, count)."""
     for k in range(forms.shape[0]):
         for i in range(q.size):
@@ -75,7 +75,7 @@ def bend(forms, q, out):
 
 
 @inner()
-def led(linear, k, q, first):
+def linear_part(linear, k, q, first):
     """Row k of the linear part times some modes, zero without one."""
     total = 0.0
     if linear.shape[0] > 0:
@@ -96,12 +96,12 @@ def stretching_energy(stretch, q):
             for j in range(forms.shape[1]):
                 bent += forms[k, i, j] * q[first + j]
             s += bent * q[first + i]
-        total += 0.25 * s * (s + 2.0 * led(stretch.linear, k, q, first))
+        total += 0.25 * s * (s + 2.0 * linear_part(stretch.linear, k, q, first))
     return total
 
 
 @inner()
-def pulls(room, q, ramp):
+def stretching_forces(room, q, ramp):
     """Mean and slope of the stretching forces over a step, from both ends and the mean of its motion."""
     first, ends, bent, out = room.first, room.ends, room.bent, room.pull
     for i in range(out.shape[1]):
@@ -117,10 +117,10 @@ def pulls(room, q, ramp):
             b += middle * more
             c += (ends[1, i] - q[first + i]) * more
             d += whole * (ends[2, i] - middle)
-        start = led(room.linear, k, q, first)
-        end = led(room.linear, k, ends[1], 0)
+        start = linear_part(room.linear, k, q, first)
+        end = linear_part(room.linear, k, ends[1], 0)
         middle = 0.5 * (start + end)
-        mean = led(room.linear, k, ends[2], 0) - middle
+        mean = linear_part(room.linear, k, ends[2], 0) - middle
         for i in range(out.shape[1]):
             whole = 0.5 * (bent[0, k, i] + bent[1, k, i])
             more = bent[1, k, i] - bent[0, k, i]
@@ -145,13 +145,13 @@ def prepare(bodies, contacts, room, lanes, h):
         for c in range(contacts.end.size):
             room.free[row, c] = contacts.free[row, c]
     for end in range(2):  # as if it stayed
-        bend(forms, q[first : first + count], room.bent[end])
+        products_with_forms(forms, q[first : first + count], room.bent[end])
     for i in range(count):
         n = first + i
         drift = lanes[M1, n] * (bodies.p[n] + bodies.twice[n] * q[n]) + h * lanes[M2, n] * bodies.bias[n]
         room.ends[0, i] = lanes[A12, n] * q[n] / h + drift
         room.ends[1, i] = q[n]
-    pulls(room, q, ZERO)
+    stretching_forces(room, q, ZERO)
     for i in range(count):
         room.pull[1, i] = h * room.hint[i]
         room.pull[0, i] += 0.5 * room.pull[1, i]
@@ -209,10 +209,10 @@ def attempt(bodies, contacts, room, tables, slot, h, blind, given):
             room.ends[2, i] = mean
             room.pull[2, i] = room.pull[0, i]
             room.pull[3, i] = room.pull[1, i]
-        bend(room.forms, room.ends[1], room.bent[1])
+        products_with_forms(room.forms, room.ends[1], room.bent[1])
         if tables.ramp:
-            bend(room.forms, room.ends[2], room.bent[2])
-        pulls(room, bodies.q, tables.ramp)
+            products_with_forms(room.forms, room.ends[2], room.bent[2])
+        stretching_forces(room, bodies.q, tables.ramp)
         change = size = 0.0
         for i in range(room.pull.shape[1]):
             change += abs(room.pull[0, i] - room.pull[2, i]) + abs(room.pull[1, i] - room.pull[3, i])
@@ -260,7 +260,7 @@ def stretches(room, n):
 
 
 @inner()
-def parted(bodies, contacts, room, limits):
+def surely_apart(bodies, contacts, room, limits):
     """Whether no contact ever closes again: the rigid parts recede, and the energy left cannot bring them back."""
     q, p, first, soft = bodies.q, bodies.p, room.first, room.soft
     energy = stretching_energy(room, q)
@@ -295,7 +295,7 @@ def parted(bodies, contacts, room, limits):
 
 
 @inner()
-def flown(bodies, contacts, course, room, limits):
+def fly_in_steps(bodies, contacts, course, room, limits):
     """Whether a flight, which takes steps, too, never ends; all is then as it was when it began."""
     clock, count = course.clock, course.counts
     approach, rate = contacts.now[APPROACH], contacts.now[RATE]
@@ -307,7 +307,7 @@ def flown(bodies, contacts, course, room, limits):
         restore(approach, rate, room.apart[0], room.apart[1])
         count[FLYING] = count[STEPS]
         clock[TAKEOFF] = clock[TIME]
-    if not parted(bodies, contacts, room, limits):
+    if not surely_apart(bodies, contacts, room, limits):
         return False
     restore(room.before[0], room.before[1], bodies.q, bodies.p)
     restore(room.apart[0], room.apart[1], approach, rate)
@@ -375,7 +375,7 @@ def follow_record(scene, run, room, tables, steps, start, times, out):
     See `replay_stretched`.
     """
     bodies, contacts, course = moving(scene, run), touching(run), course_of(run)
-    begin(scene, bodies, contacts, course, tables.base)
+    begin_run(scene, bodies, contacts, course, tables.base)
     time, j = start
     known = 0.0
     k = halved = 0

@@ -112,7 +112,7 @@ def relaxes(law, i):
 
 
 @inner()
-def lags(x):
+def memory_weights(x):
     """Weights J_k, k = 0 .. 4, of time**k in a memory after x of its times: ``x int_0^1 s**k exp(-x (1-s)) ds``."""
     if x > 4.0:
         j0 = -np.expm1(-x)
@@ -134,13 +134,13 @@ def lags(x):
 
 
 @inner()
-def soaked(h, part, g0, g1, r0, r1, spring):
+def memory_within_step(h, part, g0, g1, r0, r1, spring):
     """What felt remembers at a part of a step in which ``x**a`` is the cubic with these ends and rates.
 
     Returns it at that time and in the mean until then, each with what a unit of r1 adds.
     """
     x = part * h / spring.relaxation
-    j0, j1, j2, j3, j4 = lags(x)
+    j0, j1, j2, j3, j4 = memory_weights(x)
     z0 = spring.memory
     b = part * h * r0
     c = part * part * (3.0 * (g1 - g0) - 2.0 * h * r0)
@@ -175,7 +175,7 @@ def memory_energy(x, z, spring):
 
 
 @inner()
-def faded(law, i, time):
+def faded_memory(law, i, time):
     """What felt i remembers after a time without force."""
     share = law["hysteresis"][i]
     return -abs(law["memory"][i]) * np.exp(-(1.0 - share) * time / law["relaxation"][i])
@@ -185,7 +185,7 @@ def faded(law, i, time):
 def rest_of(law, i, time):
     """Let the memory of felt fade for a time without force."""
     if relaxes(law, i):
-        law["memory"][i] = faded(law, i, time)
+        law["memory"][i] = faded_memory(law, i, time)
 
 
 @inner()
