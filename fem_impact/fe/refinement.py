@@ -22,6 +22,7 @@ from .corners import SAY
 from .eigenvalues import BLOCK, FIRST_SLICE, RESIDUAL, STRICT, Flexibility, by_slices, count_below, lowest
 from .material import stiffness_by_way
 from .section import Plate
+from .supports import support_of_facets
 from .system import System
 
 COARSER = 1.5  # [-] ratio of element sizes whose frequencies are compared: less than half the unknowns
@@ -189,7 +190,7 @@ def _compared(system: System, omega: np.ndarray) -> np.ndarray:
     """Estimated errors (n_modes,) [rad/s] of frequencies of a thick or curved plate, from those on other triangles.
 
     The order assumed, four, is less than that of smooth plates, whose errors are stated some three times too large. It
-    is 1.5 if ribs end inside, where stresses in the plane are singular; 1 to 2 were measured.
+    is 1.5 if ribs end inside or at a free edge, where stresses in the plane are singular; 1 to 2 were measured.
     """
     mesh, n_modes = system.mesh, len(omega)
     if mesh.recipe is None:
@@ -205,7 +206,8 @@ def _compared(system: System, omega: np.ndarray) -> np.ndarray:
     if bent:  # the rise divides triangles, too
         ratio = (len(body.space.origin) / len(system.space.origin)) ** 0.5
     again = _pairs(body, n_modes, None)[1]
-    ends = ribs.singular_vertices(system.mesh, getattr(system.section, "ribs", ()))[0].values()
+    kinds = support_of_facets(mesh, system.supports, system.rules.words)
+    ends = ribs.singular_vertices(mesh, getattr(system.section, "ribs", ()), kinds)[0].values()
     order = 1.5 if any(1 in each for each in ends) else 4.0
     # where triangles at masses, springs and ends of ribs are most, as many of both meshes, only the others differ
     return np.abs(again - omega) / max(abs(ratio**-order - 1.0), 1.0 - COARSER ** (-0.25 * order))

@@ -144,8 +144,13 @@ def mesh_along_ribs(mesh: Mesh, section: Any) -> Mesh:
     return mesh
 
 
-def singular_vertices(mesh: Mesh, ribs: Sequence[Rib]) -> tuple[dict[int, list[int]], dict[int, float]]:
-    """Vertices inside a plate where ribs end or cross, with how many sides each has there, and widths [m]."""
+def singular_vertices(
+    mesh: Mesh, ribs: Sequence[Rib], kinds: Sequence[Any]
+) -> tuple[dict[int, list[int]], dict[int, float]]:
+    """Vertices where ribs end or cross, with how many sides each has there, and widths [m].
+
+    Those at an edge count where it is free, by the supports ``kinds`` of the facets.
+    """
     counts: dict[int, list[int]] = {}
     width: dict[int, float] = {}
     for rib in ribs:
@@ -154,17 +159,17 @@ def singular_vertices(mesh: Mesh, ribs: Sequence[Rib]) -> tuple[dict[int, list[i
                 counts.setdefault(int(vertex), []).append(int(count))
                 place = rib.distances(mesh.points[[vertex]])
                 width[int(vertex)] = float(size_at(rib.section, "width", place)[0])
-    rim = set(np.unique(mesh.facets).tolist())
-    return {vertex: each for vertex, each in counts.items() if each != [2] and vertex not in rim}, width
+    held = set(np.unique(mesh.facets[[kind != "free" for kind in kinds]]).tolist())
+    return {vertex: each for vertex, each in counts.items() if each != [2] and vertex not in held}, width
 
 
-def around_ends(mesh: Mesh, ribs: Sequence[Rib]) -> Mesh:
-    """The mesh with rings of triangles that shrink to ends and crossings of ribs inside the plate.
+def around_ends(mesh: Mesh, ribs: Sequence[Rib], kinds: Sequence[Any]) -> Mesh:
+    """The mesh with rings of triangles that shrink to ends and crossings of ribs, at an edge if it is free.
 
     At its end a rib acts like a point, which would turn endlessly: triangles shrink to twice its width. Around a
     crossing three rings leave as much error as there is between crossings.
     """
-    rings, (counts, width) = {}, singular_vertices(mesh, ribs)
+    rings, (counts, width) = {}, singular_vertices(mesh, ribs, kinds)
     for vertex in counts:
         around = mesh.points[mesh.cells[(mesh.cells == vertex).any(axis=1)]]
         longest = float(np.linalg.norm(around - mesh.points[vertex], axis=2).max())

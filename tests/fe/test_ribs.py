@@ -109,3 +109,16 @@ def test_a_mesh_fine_at_masses_and_at_the_end_of_a_rib_only_tells_its_error():
     mesh, plate = fi.mesh.rectangle(0.3, 0.2, size=0.03), fi.Plate(wood, 3e-3)
     system = fi.assemble(mesh, plate, {"boundary": "hinged"}, ribs=[rib], point_masses=masses)
     assert 4e-4 < fi.find_modes(system, n_modes=3).frequency_error[0] < 5e-3
+
+
+@pytest.mark.parametrize("side", [1.0, -1.0])
+def test_a_rib_that_ends_at_a_free_edge_states_its_error(side):
+    """Against 3400 triangles: without smaller ones there 1.8e-3, 3 times what was stated."""
+    wood = {"E_along": 11e9, "E_across": 0.8e9, "nu": 0.35, "G": 0.7e9, "rho": 430.0}
+    grain, across = (fi.Material.orthotropic(**wood, angle=angle) for angle in (0.0, 0.5 * side))
+    corners = np.array([[0.2, 0.0], [0.05, 0.25], [-0.2, 0.12], [-0.15, -0.15], [0.08, -0.22]]) * [1.0, side]
+    rib = fi.Rib([(-0.5, 0.03 * side), (0.5, -0.02 * side)], fi.Beam.rectangular(grain, width=6e-3, height=10e-3))
+    system = fi.assemble(fi.mesh.polygon(corners, size=0.03), fi.Plate(across, 2e-3), {}, ribs=[rib])
+    found = fi.find_modes(system, n_modes=7)
+    error = np.abs(found.frequencies[3:] / [20.7095, 42.9995, 50.472, 68.318] - 1.0)
+    assert (error < found.frequency_error[3:] + 3e-5).all() and error.max() < 1e-4
