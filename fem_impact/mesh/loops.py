@@ -236,7 +236,9 @@ def why_crossed(outline: Outline) -> str:
                 return f"holes[{i}] must not overlap or touch holes[{j}]"
         holes.append(hole)
     whole = outer.difference(shapely.union_all(holes)) if holes else outer
-    span = max(np.ptp(np.reshape(whole.bounds, (2, 2)), axis=0))
+    low, high = np.reshape(whole.bounds, (2, 2))
+    whole = shapely.transform(whole, lambda points: points - low)  # far away, rounding would look like strips
+    span = max(high - low)
     if whole.area * SLENDER < span**2:  # far too slender to fill with triangles
         return "outline must not be a thousand times longer than wide; widen it"
     for k in range(1, math.ceil(-math.log(SAME, 4.0)) + 1):  # down to rounding
@@ -246,6 +248,7 @@ def why_crossed(outline: Outline) -> str:
         body = whole.simplify(0.05 * width)  # finer detail does not matter at this width
         rest = body.difference(body.buffer(-width, quad_segs=1).buffer(1.001 * width, quad_segs=2))
         if rest.area > SLENDER * width**2:  # a strip SLENDER / 2 half widths long
-            x, y = max(getattr(rest, "geoms", [rest]), key=lambda part: part.area).representative_point().coords[0]
+            place = max(getattr(rest, "geoms", [rest]), key=lambda part: part.area).representative_point().coords[0]
+            x, y = place + low
             return f"outline must not be a thousand times longer than wide near ({x:g}, {y:g}) m; widen it there"
     return ""

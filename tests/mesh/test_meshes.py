@@ -64,3 +64,11 @@ ROUND = np.linspace(0.0, 2.0 * np.pi, 10**6, endpoint=False)
 def test_what_is_no_body_or_would_take_for_ever_is_refused(make, text):
     with pytest.raises(ValueError, match=text):
         make()
+
+
+def test_a_polygon_may_lie_far_from_the_origin():
+    """Where it was refused as too slender."""
+    corners = np.array([[0.2, 0.0], [0.05, 0.25], [-0.2, 0.12], [-0.15, -0.15], [0.08, -0.22]])
+    assert mesh.polygon(corners + 4e5).area == pytest.approx(0.1215, rel=1e-9)
+    with pytest.raises(ValueError, match=r"longer than wide near \(4\d{5}, 4\d{5}\) m; widen it there"):
+        mesh.polygon(np.add([(0, 0), (1, 0), (1, 1), (0.5, 1), (0.5, 2), (0.49999, 2), (0.49999, 1), (0, 1)], 4e5))
