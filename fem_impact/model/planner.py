@@ -186,7 +186,7 @@ def _planned(description: Description) -> Plan:
 def make_plan(blow: Blow, changes: Mapping[str, Any], stages: Stages) -> Plan:
     """Choose the model of a blow; see `fi.plan`."""
     asked = Asked.checked(blow, changes)
-    with _note_slips(*slips_of(asked)):
+    with _note_slips(partial(slips_of, asked)):
         return _planned(choose(asked, stages))
 
 
@@ -198,12 +198,12 @@ def slips_of(asked: Asked) -> tuple[str, ...]:
 
 
 @contextmanager
-def _note_slips(*slips: str) -> Iterator[None]:
+def _note_slips(find: Callable[[], tuple[str, ...]]) -> Iterator[None]:
     """Put numbers that are probably a slip of a unit in front of an error, which is then hardly about anything else."""
     try:
         yield
     except check.SimulationError as error:
-        if not slips or str(error).startswith(slips[0]):
+        if not (slips := find()) or str(error).startswith(slips[0]):
             raise
         raise check.SimulationError(f"{'; '.join(slips)}: {error}") from None
 
@@ -233,7 +233,7 @@ def choose(asked: Asked, stages: Stages) -> Description:
 
 def carry_out(plan: Plan, stages: Stages, keep: Any = None) -> Run:
     """Run the plan, and then with the better models of the target that the tolerance requires, if it may choose."""
-    with _note_slips(*slips_of(plan.description.asked)):
+    with _note_slips(partial(slips_of, plan.description.asked)):
         run = strike_as_planned(plan, stages, keep)
     chooses = plan.changes.get("model", plan.blow.target.model) == "auto"
     added: tuple[str, ...] = ()
@@ -410,8 +410,7 @@ def strike(
     if isinstance(modes, Modes) and damping_ratio is None and not set(options) & set(PIECES):
         run = partial(collision.strike, modes, striker, contact, at=at, speed=speed)
         stretches = bool(options.get("stretching")) or modes.stretches
-        odd = [note for note in (*modes.notes, *striker.notes) if "are expected" in note]
-        with _note_slips(*odd):
+        with _note_slips(lambda: tuple(note for note in (*modes.notes, *striker.notes) if "are expected" in note)):
             return promise.warn_if_missed(
                 fresh.answer(lambda: audit.with_examiner(strike_by_plan(run, options)), stretches), strict
             )
