@@ -14,7 +14,10 @@ from .frame import LEVELS, remember
 from .law import harden, point_at, relaxes, spring_of
 from .laws.felt import faded_memory, meet
 from .propagation import any_of, lane_table
-from .schemes import Free, Own, left_of, linear_guess, memory_after, point_of, solve_constants, solve_ramp, solve_ramps
+
+from .schemes import (  # isort: skip
+    Free, Own, guess_ends, left_of, linear_guess, memory_after, point_of, solve_constants, solve_ramp, solve_ramps,
+)  # fmt: skip
 
 from .layout import (  # isort: skip
     A11, A12, A21, A22, APPROACH, BLIND, CLOSED, COMPRESSION, ENERGY, FORCE, FREE_END, FREE_MEAN, FREE_RATE,
@@ -27,7 +30,7 @@ def made_tables(n_modes: int, n_contacts: int, base: float, ramp: int) -> Tables
     """Room for the tables of steps and flights, none known."""
     n_levels, n_tables, wide = LEVELS + 1, LEVELS + GLIDES + 2, max(4, 2 * n_contacts)
     lanes, sums = np.empty((n_tables, N_LANE, n_modes)), np.empty((n_levels, 6, n_contacts, n_contacts))
-    return Tables(lanes, sums, np.zeros(n_tables), np.zeros((5, wide, wide)), base, ramp)
+    return Tables(lanes, sums, np.zeros(n_tables), np.zeros((4, wide, wide)), base, ramp)
 
 
 @inner(part=True)
@@ -136,27 +139,17 @@ def freshen(contacts, fresh):
 @inner()
 def solve_all(contacts, tables, slot, h, blind):
     """Solve one step of several contacts, or by scheme A; 0 where a contact pushes by A (asked for or fallen to)."""
-    law, now, end = contacts.law, contacts.now, contacts.free
+    now, end = contacts.now, contacts.free
     y, f, s = contacts.end, contacts.force, contacts.slope
     sums, work = tables.sums[slot], tables.work
     m = y.size
-    solve_constants(h, now, law, end[FREE_END], sums, work, y, f)
-    pressed = any_of(f)
-    fine = 0 if pressed else 1
-    for i in range(m):
-        s[i] = 0.0
-    if tables.ramp and pressed and m > 1:
-        keep = work[4, 1]
+    fine = 1
+    ramped = tables.ramp and m > 1 and guess_ends(contacts, sums, work, y, f)
+    if not (ramped and solve_ramps(h, contacts, sums, work, blind)):
+        solve_constants(h, now, contacts.law, end[FREE_END], sums, work, y, f)
+        fine = 0 if any_of(f) else 1
         for i in range(m):
-            keep[i] = y[i]
-            keep[m + i] = f[i]
-        if solve_ramps(h, contacts, sums, work, blind):
-            fine = 1
-        else:
-            for i in range(m):
-                y[i] = keep[i]
-                f[i] = keep[m + i]
-                s[i] = 0.0
+            s[i] = 0.0
     for i in range(m):
         contacts.rate[i] = left_of(end[FREE_RATE, i], sums, OWN_RATE, i, f, s)
     return fine
