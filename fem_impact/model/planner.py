@@ -12,7 +12,7 @@ from types import MappingProxyType
 from typing import Any
 
 from .._base import check, markup, progress
-from .._base.explained import heading_line, lines_of_notes, with_headings
+from .._base.explained import heading_line, headings_of, lines_of_notes, with_headings
 from ..fe import plausible
 from ..fe.assembly import System
 from ..impact import assumption, collision, distance, promise
@@ -410,7 +410,8 @@ def strike(
     if isinstance(modes, Modes) and damping_ratio is None and not set(options) & set(PIECES):
         run = partial(collision.strike, modes, striker, contact, at=at, speed=speed)
         stretches = bool(options.get("stretching")) or modes.stretches
-        with _note_slips(lambda: tuple(note for note in (*modes.notes, *striker.notes) if "are expected" in note)):
+        notes = *modes.notes, *striker.notes
+        with _note_slips(lambda: tuple(each for each in notes if "slips-of-units" in headings_of(each))):
             return promise.warn_if_missed(
                 fresh.answer(lambda: audit.with_examiner(strike_by_plan(run, options)), stretches), strict
             )
