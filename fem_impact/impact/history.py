@@ -287,21 +287,22 @@ class History(check.Locked):
         """Error [-] of the peak force within steps, on which two runs may agree by chance.
 
         Steps may be too long for its ripples or, with loss, for the rate in them: that of a cubic errs by nothing at
-        three places in a step, and in both directions between them.
+        three places in a step, and in both directions between them. It is twice what a step shows: with once, 14 of
+        1 000 random blows erred by more, up to 2.7 times.
         """
         if not len(self.contacts):
             return 0.0
         peak = float(self.contacts[:, 2].max())
         if not peak:  # pressed by less than rounding
             return 1.0
-        missed = min(1.0, float(record.force_missed(self.steps, self.now, self.law, peak)))
+        missed = float(record.force_missed(self.steps, self.now, self.law, peak))
         for i in np.flatnonzero(self.law["loss"]):
             pushes, speeds = self.impulses[:, i] / self.steps[:, layout.LENGTH], self._column(layout.SPEED)[:, i]
             row, loss = int(pushes.argmax()), float(self.law["loss"][i])
             bends = np.abs(np.diff(speeds[max(0, row - 3) : row + 4], 3))  # fourth derivatives times h**3
             share = loss / max(1.0 + loss * speeds[row], SLOWEST)
             missed = max(missed, CUBIC * share * float(bends.max(initial=0.0)) * float(pushes[row]) / peak)
-        return missed
+        return min(1.0, 2.0 * missed)
 
     def samples(self, tolerance: float) -> tuple[np.ndarray, np.ndarray]:
         """Times [s], (n_times,), dense enough for a tolerance, and the forces [N] there, (n_times, n_contacts)."""

@@ -47,6 +47,27 @@ def test_a_touch_shorter_than_a_step_is_judged_by_runs_of_different_steps(freque
     assert hit.impulse == pytest.approx(exact.impulse, rel=claimed)
 
 
+# law, mass [kg], place [m], speed [m/s], tolerance, damping ratio, and the quantity that erred by up to 1.7 times what
+# was stated of it
+@pytest.mark.parametrize(
+    ("law", "mass", "at", "speed", "tolerance", "damping_ratio", "attribute"),
+    [
+        (fi.Contact.power(5.9025e5, 1.0705), 0.133, 0.7992, 0.7618, 1e-1, 0.005, "peak_force"),
+        (fi.Contact.linear(1888.75, loss=0.02954), 6.544e-3, 0.41866, 3.6144, 1e-4, 0.0, "peak_force"),
+        (fi.Contact.linear(1.102685e6), 0.035797, 0.127645, 0.62013, 1e-3, 0.0, "contact_time"),
+    ],
+)
+def test_each_quantity_errs_by_no_more_than_its_own_step_error(
+    law, mass, at, speed, tolerance, damping_ratio, attribute
+):
+    shape = {"mass": 0.2, "first_frequency": 100.0, "n_modes": 40, "damping_ratio": damping_ratio}
+    beam, striker = fi.analytic.beam(1.0, ends=("free", "free"), **shape), fi.Striker.rigid(mass)
+    hit, exact = (fi.strike(beam, striker, law, at=[at], speed=speed, tolerance=each) for each in (tolerance, 1e-8))
+    name = "force" if attribute == "peak_force" else attribute
+    error = abs(getattr(hit, attribute) / getattr(exact, attribute) - 1.0)
+    assert 1e-7 < error < hit.error.table["step"][name]  # well above what the exact one may err by
+
+
 def test_an_earlier_name_of_a_scheme_is_understood():
     """As A4, number for number, with exponents below one, too."""
     blow = fi.Modes.rigid(1.0), fi.Striker.rigid(0.1), fi.Contact.power(1e6, 0.8)
