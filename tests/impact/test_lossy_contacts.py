@@ -233,6 +233,27 @@ def test_margin_tells_how_nearly_felt_lets_go_or_holds():
             assert far.margin / near.margin == pytest.approx(10.0, rel=0.3)  # in a straight line at first
 
 
+# ends, damping ratio, place [m], mass [kg], law, speed [m/s], and the impacts: of both, rates within the first press
+# reach 1 / loss for three quarters of a step
+@pytest.mark.parametrize(
+    ("ends", "damping_ratio", "at", "mass", "law", "speed", "n_impacts"),
+    [
+        (("hinged", "hinged"), 0.01218, 0.24622, 3.529e-3, (9.8516e4, 1.5, 33.646), 0.15042, 2),
+        (("free", "free"), 0.005, 0.1978, 1.3944e-2, (1.10042e8, 1.935, 120.45), 0.036885, 3),
+    ],
+)
+def test_a_lossy_contact_that_pauses_for_less_than_a_step_is_two_impacts(
+    ends, damping_ratio, at, mass, law, speed, n_impacts
+):
+    shape = {"mass": 0.2, "first_frequency": 100.0, "n_modes": 60 - 20 * (ends[0] == "free")}
+    body = fi.analytic.beam(1.0, ends=ends, damping_ratio=damping_ratio, **shape), fi.Striker.rigid(mass)
+    hit, exact = (
+        fi.strike(*body, fi.Contact(*law), at=[at], speed=speed, tolerance=each, max_impacts=12) for each in (0.1, 1e-6)
+    )
+    assert hit.n_impacts == exact.n_impacts == n_impacts
+    assert hit.contact_time == pytest.approx(exact.contact_time, rel=hit.error.of_quantity("contact_time"))
+
+
 @pytest.mark.parametrize("steps", [{"tolerance": 0.1}, {"tolerance": 1e-3}, {"dt": 2.5e-5}, {"dt": 1e-5}])
 def test_felt_that_lets_go_for_less_than_a_step_is_two_impacts(steps):
     """It is met again seven microseconds later, within the step that began when it let go."""

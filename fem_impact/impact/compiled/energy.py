@@ -11,7 +11,7 @@ import numpy as np
 
 from .build import FALSE, inner, outer
 from .bundles import Flights, KernelSystem, Limits
-from .events import EVENT_LIMIT, has_dipped, has_strayed, lags_behind
+from .events import EVENT_LIMIT, has_dipped, has_paused, has_strayed, lags_behind
 from .exact import advance, freshen, keep_in_mind, made_tables, predict, record, solve_step, tabulate
 from .flight import NEVER, SLOW, UNPROVED
 from .law import point_at, special_of, spring_of
@@ -104,7 +104,7 @@ def too_long(contacts, special, level, h, still):
         if pressed[i] and contacts.end[i] <= 0.0 and now[APPROACH, i] == 0.0:
             if now[RATE, i] > still:
                 shorter = max(shorter, 3 if level == 0 else 1)
-        elif has_dipped(contacts, h, i):
+        elif has_dipped(contacts, h, i) or (pressed[i] and has_paused(contacts, h, i)):
             shorter = max(shorter, 1)
         if special and pressed[i] and (has_strayed(contacts, h, i) or lags_behind(contacts, level, h, i)):
             shorter = max(shorter, 1)

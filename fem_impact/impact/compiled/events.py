@@ -24,6 +24,7 @@ from .layout import (  # isort: skip
 LOCATED = 1e-11  # [-] of the approach about an event: a stored energy of 1e-22 of the step's is left out there
 SUMMED = 500.0  # [-] over the rounding of an approach: what a sum of a few thousand modes leaves of one that is zero
 NO_FORCE = 1e-7  # [-] of the force's factor 1 + loss * rate: about zero up to this
+NO_PAUSE = 1e-5  # [-] of that factor: a force that is by less beyond zero within a step does not stop
 # kinds of corners: it stops or starts pushing by its rate, the bend, the turn, it parts from its felt or meets it, and
 # meets it again at once, so that the step is to be taken pressed
 RELEASES, BENDS, TURNS, PARTS, AGAIN = range(5)
@@ -138,11 +139,32 @@ def enclose(contacts, h, target, bracket):
 
 
 @inner()
-def releasing(loss, d0, v0, d1, v1, h):
-    """Fraction of a step at which the factor 1 + loss * rate changes its sign, by the cubic through both ends."""
+def loss_factor(loss, d0, v0, d1, v1, h):
+    """The factor 1 + loss * rate of a force and its slope at both ends of a step, as `cubics.cubic` takes them."""
     slope, turn = 6.0 * (d1 - d0) / h, 2.0 * (v0 + v1)
     start, end = loss * (slope - turn - 2.0 * v0), loss * (turn + 2.0 * v1 - slope)
-    return crossing(1.0 + loss * v0, start, 1.0 + loss * v1, end)
+    return 1.0 + loss * v0, start, 1.0 + loss * v1, end
+
+
+@inner()
+def releasing(loss, d0, v0, d1, v1, h):
+    """Fraction of a step at which that factor changes its sign."""
+    return crossing(*loss_factor(loss, d0, v0, d1, v1, h))
+
+
+@inner()
+def has_paused(contacts, h, i):
+    """Whether lossy contact i stopped and started to push again, or the other way round, within a step."""
+    loss = contacts.law["loss"][i]
+    if loss == 0.0:
+        return False
+    f0, s0, f1, s1 = loss_factor(
+        loss, contacts.now[APPROACH, i], contacts.now[RATE, i], contacts.end[i], contacts.rate[i], h
+    )
+    side = 1.0 if f1 > 0.0 else -1.0
+    if side * f0 > -NO_FORCE and side * f1 > NO_FORCE and side * s0 < 0.0 < side * s1:
+        return side * turning(f0, s0, f1, s1)[1] < -NO_PAUSE
+    return False
 
 
 @inner()
