@@ -52,6 +52,18 @@ def examined(hit, name):
     return next(each for each in hit.assumptions if each.name == name.partition(",")[0])
 
 
+def refusing(cases, call=lambda make: make(), error=ValueError):
+    """A test that each case, arguments of ``call`` and a pattern of the message, is refused in these words."""
+
+    @pytest.mark.parametrize("case", cases, ids=lambda case: str(case[-1]))
+    def refused(case):
+        *given, words = case
+        with pytest.raises(error, match=words):
+            call(*given)
+
+    return refused
+
+
 def follow_advice(advised, *given):
     """What is refused in some words, of which a pattern to their end may go on to the page of notes, then works."""
     wrong, words, right = advised

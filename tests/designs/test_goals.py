@@ -1,7 +1,7 @@
 """What can be wanted, and what is refused with the rule and the value."""
 
 import numpy as np
-import pytest
+from comparing import refusing
 from numpy.testing import assert_allclose
 
 from fem_impact.designs import goals
@@ -34,22 +34,16 @@ def test_one_impact_is_wanted_as_a_clearance():
     assert found.miss(0.5) == 0.0 and found.miss(-0.5) == -0.5 - goals.CLEAR
 
 
-@pytest.mark.parametrize(
-    "wanted, words",
-    [
-        ({}, "wanted must name at least one quantity"),
-        ([("impulse", 1.0)], "wanted must be a dict of names"),
-        ({"impuls": 1.0}, "wanted must be one of .*'impuls'"),
-        ({"impulse": (2.0, 1.0)}, r"wanted\['impulse'\] must be a range \(low, high\), got \(2, 1\)"),
-        ({"contact_time": -1.0}, r"wanted\['contact_time'\] must not be negative, got -1; nothing could meet it"),
-        ({"impulse": (None, None)}, "must be a number or a range .* None leaves an end open"),
-        ({"impulse": np.nan}, r"wanted\['impulse'\]"),
-        ({"impulse=5": 1.0}, "impulse has no frequency, write 'impulse'"),
-        ({"spectral_centroid": 1.0}, "needs a frequency, such as 'spectral_centroid=5000'"),
-        ({"loud": {"impulse": 1.0}}, "the blow in wanted must be one of"),
-        ({"n_impacts": 2}, r"wanted\['n_impacts'\] must be 1, the only count"),
-    ],
-)
-def test_what_cannot_be_wanted_is_said(wanted, words):
-    with pytest.raises(ValueError, match=words):
-        goals.read_goals(wanted, ("",))
+test_what_cannot_be_wanted_is_said = refusing([
+    ({}, "wanted must name at least one quantity"),
+    ([("impulse", 1.0)], "wanted must be a dict of names"),
+    ({"impuls": 1.0}, "wanted must be one of .*'impuls'"),
+    ({"impulse": (2.0, 1.0)}, r"wanted\['impulse'\] must be a range \(low, high\), got \(2, 1\)"),
+    ({"contact_time": -1.0}, r"wanted\['contact_time'\] must not be negative, got -1; nothing could meet it"),
+    ({"impulse": (None, None)}, "must be a number or a range .* None leaves an end open"),
+    ({"impulse": np.nan}, r"wanted\['impulse'\]"),
+    ({"impulse=5": 1.0}, "impulse has no frequency, write 'impulse'"),
+    ({"spectral_centroid": 1.0}, "needs a frequency, such as 'spectral_centroid=5000'"),
+    ({"loud": {"impulse": 1.0}}, "the blow in wanted must be one of"),
+    ({"n_impacts": 2}, r"wanted\['n_impacts'\] must be 1, the only count"),
+], lambda wanted: goals.read_goals(wanted, ("",)))  # fmt: skip

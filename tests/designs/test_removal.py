@@ -4,6 +4,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from comparing import refusing
 from numpy.testing import assert_allclose
 
 import fem_impact as fi
@@ -95,13 +96,7 @@ TWO_LAYERS = fi.Plate.laminate([(WOOD, 1e-3, 0.0), (WOOD, 1e-3, np.pi / 2)])
 RIBBED = fi.Plate(WOOD, 4e-3, ribs=(SimpleNamespace(rigidity=None),))
 
 
-@pytest.mark.parametrize(
-    ("take", "words"),
-    [
-        (lambda: removal.check_body(TWO_LAYERS), r"section must not have layers: .*; take a plate of one material"),
-        (lambda: removal.check_body(RIBBED), r"section must not have ribs here; use fi\.design"),
-    ],
-)
-def test_bodies_that_nothing_is_taken_off_are_refused(take, words):
-    with pytest.raises(ValueError, match=words):
-        take()
+test_bodies_that_nothing_is_taken_off_are_refused = refusing([
+    (lambda: removal.check_body(TWO_LAYERS), r"section must not have layers: .*; take a plate of one material"),
+    (lambda: removal.check_body(RIBBED), r"section must not have ribs here; use fi\.design"),
+])  # fmt: skip

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from comparing import refusing
 
 import fem_impact as fi
 from fem_impact.impact.measured import Measured, Predicted, compare
@@ -56,17 +57,11 @@ def test_what_is_not_known_of_the_model_is_said():
     assert len(said) == bool(unknown) and all(name in "".join(said) for name in unknown)
 
 
-@pytest.mark.parametrize(
-    ("measured", "what"),
-    [
-        ({}, "must map one or more of restitution, impulse"),
-        (3.0, "must map one or more of restitution, impulse"),
-        ({"length": 1.0}, "measured must be one of"),
-        ({"force": (1.0, 2.0, 3.0)}, r"must be a value, or \(value, half width"),
-        ({"force": 0.0}, r"must be a value, or \(value, half width"),
-        ({"force": (1.0, -1.0)}, "error of measured force must not be negative"),
-    ],
-)
-def test_measured_numbers_are_checked(measured, what):
-    with pytest.raises(ValueError, match=what):
-        fi.strike(WALL, BALL, SPRING, at=None, speed=1.0).against(measured)
+test_measured_numbers_are_checked = refusing([
+    ({}, "must map one or more of restitution, impulse"),
+    (3.0, "must map one or more of restitution, impulse"),
+    ({"length": 1.0}, "measured must be one of"),
+    ({"force": (1.0, 2.0, 3.0)}, r"must be a value, or \(value, half width"),
+    ({"force": 0.0}, r"must be a value, or \(value, half width"),
+    ({"force": (1.0, -1.0)}, "error of measured force must not be negative"),
+], lambda measured: fi.strike(WALL, BALL, SPRING, at=None, speed=1.0).against(measured))  # fmt: skip

@@ -5,6 +5,7 @@ import pickle
 
 import numpy as np
 import pytest
+from comparing import refusing
 from numpy.testing import assert_allclose
 from scipy.integrate import quad
 from scipy.optimize import brentq
@@ -104,7 +105,7 @@ def test_it_is_a_law_as_any_other_also_in_a_map():
         HERTZ.misfit = 0.0
 
 
-@pytest.mark.parametrize(("force", "said"), [
+test_what_is_no_contact_law_is_refused_in_words = refusing([
     (3.0, "force must be a function of the approach, got 3.0"),
     (lambda d: 1.0 - d, "force must grow with the approach, got 0.999999 N at 1e-06 m and"),
     (lambda d: -1e3 * d, "force must be positive, as a contact only pushes, got"),
@@ -112,19 +113,13 @@ def test_it_is_a_law_as_any_other_also_in_a_map():
     (lambda d: np.zeros((2, 2)), r"force must return a force for each approach, \(24,\), got \(2, 2\)"),
     (lambda d: 1e4 * d + np.round(d / 1e-4), "within 1e-05, but near .*; give a larger tolerance or a smaller dee"),
     (lambda d: 1e4 * d * (1.5 + np.sin(3e5 * d)), "force must grow with the approach"),
-])  # fmt: skip
-def test_what_is_no_contact_law_is_refused_in_words(force, said):
-    with pytest.raises(ValueError, match=said):
-        fi.Contact.of(force, deepest=1e-3)
+], lambda force: fi.Contact.of(force, deepest=1e-3))  # fmt: skip
 
 
-@pytest.mark.parametrize(("make", "said"), [
+test_numbers_that_are_no_law_are_refused_in_words = refusing([
     (lambda: dataclasses.replace(HERTZ, stiffness=2e6), "stiffness and exponent must be those of the knots"),
     (lambda: fi.Contact(1e4, knots=((1e-3, 1.0, 1e3), (2e-3, 0.5, 1e3))),
      r"knots must be 2 to 96 rows .* that grow; use Contact.of"),
     (lambda: fi.strike(WALL, BALL, HERTZ, at=None, speed=5.0),  # deeper than the law is known
      r"deepest must be at .*, got 0.002 m; give Contact.of a larger one"),
 ])  # fmt: skip
-def test_numbers_that_are_no_law_are_refused_in_words(make, said):
-    with pytest.raises(ValueError, match=said):
-        make()

@@ -4,6 +4,7 @@ import pickle
 
 import numpy as np
 import pytest
+from comparing import refusing
 from numpy.testing import assert_allclose
 
 import fem_impact as fi
@@ -53,11 +54,8 @@ def test_a_table_is_told_by_its_numbers_whenever_it_was_made():
     assert_allclose(pickle.loads(pickle.dumps(one))(PLACES), PLACES[:, 0], atol=1e-15)
 
 
-@pytest.mark.parametrize(("points", "heights", "match"), [
+test_tables_that_are_no_surface_are_refused = refusing([
     (PLACES[:3], np.zeros(3), "points must be four or more, got 3"),
     (np.outer(np.arange(5.0), [1.0, 2.0]), np.zeros(5), "points must not all lie on one line"),
     (PLACES, np.zeros(3), "heights must have shape"),
-])  # fmt: skip
-def test_tables_that_are_no_surface_are_refused(points, heights, match):
-    with pytest.raises(ValueError, match=match):
-        fi.rise.table(points, heights)
+], fi.rise.table)  # fmt: skip

@@ -4,6 +4,7 @@ import itertools
 
 import numpy as np
 import pytest
+from comparing import refusing
 from numpy.testing import assert_allclose
 from scipy.special import roots_legendre
 
@@ -131,7 +132,7 @@ def test_inertia_relief_leaves_no_rigid_motion():
 DISK = analytic.disk(0.2, mass=1.0, first_frequency=1.0, n_modes=3)
 
 
-@pytest.mark.parametrize("call, text", [
+test_bad_input_names_argument_and_rule = refusing([
     (lambda: analytic.rectangle(-1.0, 1.0, mass=1.0, first_frequency=1.0, n_modes=3), "length must be positive"),
     (lambda: analytic.beam(1.0, ends=("free", "fre"), mass=1.0, first_frequency=1.0, n_modes=3), "mean 'free'"),
     (lambda: analytic.beam(1.0, ends="free", mass=1.0, first_frequency=1.0, n_modes=3), "two words"),
@@ -145,9 +146,6 @@ DISK = analytic.disk(0.2, mass=1.0, first_frequency=1.0, n_modes=3)
     (lambda: DISK.shape_at([[0.3, 0.0]]), r"points must lie on the body, got \(0.3, 0\) m"),
     (lambda: DISK.points("at", (0.2, 0.1)), r"at must lie on the body, got \(0.2, 0.1\) m"),
 ])  # fmt: skip
-def test_bad_input_names_argument_and_rule(call, text):
-    with pytest.raises(ValueError, match=text):
-        call()
 
 
 def test_rigid_motions_of_a_free_disk_are_those_of_its_mass_and_inertia():

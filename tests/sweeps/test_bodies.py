@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from comparing import QUANTITIES
+from comparing import QUANTITIES, refusing
 from numpy.testing import assert_allclose
 
 import fem_impact as fi
@@ -95,17 +95,11 @@ def test_what_vectors_cannot_tell_is_told_by_modes():
     assert abs(float(layered.far[0])) > 1e-6  # of a body that is known everywhere
 
 
-@pytest.mark.parametrize(
-    ("at", "over", "text"),
-    [
-        ((9.0, 9.0), {"mass": [0.1]}, "at must lie on the body, got"),
-        (AT, {"at": [(9.0, 9.0)]}, r"over\['at'\] must lie on the body"),
-        (AT, {"weight": [0.1]}, "over"),
-    ],
-)
-def test_points_off_the_body_and_wrong_axes_are_told_before_the_work(at, over, text):
-    with pytest.raises(ValueError, match=text):
-        fi.sweep(plate(), BALL, fi.Contact.hertz(1e6), at=at, over=over, speed=1.0, tolerance=1e-2)
+test_points_off_the_body_and_wrong_axes_are_told_before_the_work = refusing([
+    ((9.0, 9.0), {"mass": [0.1]}, "at must lie on the body, got"),
+    (AT, {"at": [(9.0, 9.0)]}, r"over\['at'\] must lie on the body"),
+    (AT, {"weight": [0.1]}, "over"),
+], lambda at, over: fi.sweep(plate(), BALL, fi.Contact.hertz(1e6), at=at, over=over, speed=1.0))  # fmt: skip
 
 
 @pytest.mark.slow

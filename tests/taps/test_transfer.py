@@ -4,6 +4,7 @@ from functools import cache
 
 import numpy as np
 import pytest
+from comparing import refusing
 
 import fem_impact as fi
 
@@ -156,14 +157,8 @@ def test_modes_chosen_in_any_order_are_paired_in_that_of_their_frequencies():
     assert [(pair.measured, pair.computed) for pair in pairs] == [(0, 0), (2, 2)]
 
 
-@pytest.mark.parametrize(
-    ("call", "said"),
-    [
-        (lambda: fi.frf(records(double=False), method="H3"), "method must be one of"),
-        (lambda: fi.mac(np.zeros((2, 2)), np.zeros((3, 2))), "at the same points"),
-        (lambda: fi.matched([1.0, 2.0, 3.0], [1.0, 2.0]), "at least the 3 modes of"),
-    ],
-)
-def test_wrong_records_and_modes_are_refused(call, said):
-    with pytest.raises(ValueError, match=said):
-        call()
+test_wrong_records_and_modes_are_refused = refusing([
+    (lambda: fi.frf(records(double=False), method="H3"), "method must be one of"),
+    (lambda: fi.mac(np.zeros((2, 2)), np.zeros((3, 2))), "at the same points"),
+    (lambda: fi.matched([1.0, 2.0, 3.0], [1.0, 2.0]), "at least the 3 modes of"),
+])  # fmt: skip

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from comparing import refusing
 
 import fem_impact as fi
 from fem_impact.taps import unknowns
@@ -14,18 +15,14 @@ def setting(target=None, at=None, ranges=()):
     return unknowns.Setting(target, at, HAMMER, LAW, Rig(25600.0), ranges, None, 0, 0.2)
 
 
-@pytest.mark.parametrize(
-    "ranges, said",
-    [({}, "at least one range"), ({"contact.stifness": (1, 2)}, "did you mean 'contact.stiffness'"),
-     ({"contact.stiffness": (2.0, 1.0)}, "must be a range"), ({"contact.stiffness": 3.0}, "must be a range"),
-     ({"contact.stiffness": (0.0, 1.0)}, "must begin above zero"), ({"striker.mass": (-1.0, 1.0)}, "below zero"),
-     ({"mode1.frequency": (1.0, 2.0)}, "mode1.mass too"), ({"striker.damping": (0.01, 0.1)}, "first_frequency too"),
-     ({"mode2.frequency": (1.0, 2.0), "mode2.mass": (1.0, 2.0)}, "number its modes from 1"),
-     ({"target.x": (0.0, 1.0)}, "unknown must be one of")],
-)  # fmt: skip
-def test_wrong_ranges_are_refused(ranges, said):
-    with pytest.raises(ValueError, match=said):
-        unknowns.checked(ranges, None, HAMMER, LAW)
+test_wrong_ranges_are_refused = refusing([
+    ({}, "at least one range"), ({"contact.stifness": (1, 2)}, "did you mean 'contact.stiffness'"),
+    ({"contact.stiffness": (2.0, 1.0)}, "must be a range"), ({"contact.stiffness": 3.0}, "must be a range"),
+    ({"contact.stiffness": (0.0, 1.0)}, "must begin above zero"), ({"striker.mass": (-1.0, 1.0)}, "below zero"),
+    ({"mode1.frequency": (1.0, 2.0)}, "mode1.mass too"), ({"striker.damping": (0.01, 0.1)}, "first_frequency too"),
+    ({"mode2.frequency": (1.0, 2.0), "mode2.mass": (1.0, 2.0)}, "number its modes from 1"),
+    ({"target.x": (0.0, 1.0)}, "unknown must be one of"),
+], lambda ranges: unknowns.checked(ranges, None, HAMMER, LAW))  # fmt: skip
 
 
 def test_coordinates_go_there_and_back():

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from comparing import refusing
 from scenes import SHIPPED
 
 import fem_impact as fi
@@ -73,21 +74,15 @@ def test_constants_that_only_act_together_are_called_untold():
     assert found.values["E"] / found.values["rho"] == pytest.approx(1.21, rel=1e-3)
 
 
-@pytest.mark.parametrize(
-    ("build", "ranges", "said"),
-    [
-        (plate, {"E": (1.0, 2.0), "G": (1.0, 2.0)}, "at least 2 frequencies"),
-        (lambda values: 3, {"E": (1.0, 2.0)}, "must return a System"),
-        (plate, {"E": (0.0, 2.0)}, "must begin above zero"),
-        (3, {"E": (1.0, 2.0)}, "must be a function"),
-        (DISK, {"material.E_long": (1.0, 2.0)}, "E_long is not a key"),
-        (DISK, {"striker.mass": (1.0, 2.0)}, "must be one of mesh, material, section, target, supports"),
-        (DISK, {"supports.boundary": (1.0, 2.0)}, "must name numbers in tables of the scene"),
-    ],
-)
-def test_wrong_arguments_are_refused(build, ranges, said):
-    with pytest.raises(ValueError, match=said):
-        fi.update(build, [100.0], ranges)
+test_wrong_arguments_are_refused = refusing([
+    (plate, {"E": (1.0, 2.0), "G": (1.0, 2.0)}, "at least 2 frequencies"),
+    (lambda values: 3, {"E": (1.0, 2.0)}, "must return a System"),
+    (plate, {"E": (0.0, 2.0)}, "must begin above zero"),
+    (3, {"E": (1.0, 2.0)}, "must be a function"),
+    (DISK, {"material.E_long": (1.0, 2.0)}, "E_long is not a key"),
+    (DISK, {"striker.mass": (1.0, 2.0)}, "must be one of mesh, material, section, target, supports"),
+    (DISK, {"supports.boundary": (1.0, 2.0)}, "must name numbers in tables of the scene"),
+], lambda build, ranges: fi.update(build, [100.0], ranges))  # fmt: skip
 
 
 @pytest.mark.parametrize("extra", [[], [230.0], [230.0, 700.0]])
