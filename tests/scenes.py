@@ -5,6 +5,7 @@ from pathlib import Path
 import fem_impact as fi
 
 ROOT = Path(__file__).parents[1]
+BODIES = ROOT / "tests" / "bodies"
 MESHES, MEASURED, SHIPPED = ROOT / "meshes", ROOT / "studies" / "measured", ROOT / "studies" / "scenes"
 
 QUICK = """

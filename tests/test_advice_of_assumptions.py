@@ -172,7 +172,6 @@ MARKS = pytest.mark.slow, pytest.mark.xdist_group("stretched")
 
 
 @pytest.mark.parametrize("name", [pytest.param(name, marks=MARKS if name in STRETCH else ()) for name in REMEDIES])
-@pytest.mark.filterwarnings("ignore::fem_impact.ToleranceWarning")  # of few modes
 def test_following_the_remedy_mends_the_assumption(name):
     wrong, words, right = REMEDIES[name]
     before = examined(wrong(), name)

@@ -105,7 +105,6 @@ GRADIENTS = {  # what fails, the message, and what it advises
 
 
 @pytest.mark.parametrize("name", GRADIENTS)
-@pytest.mark.filterwarnings("ignore::fem_impact.ToleranceWarning")  # of steps given and of few modes
 def test_following_the_advice_gives_a_gradient(name):
     follow_advice(GRADIENTS[name])
 

@@ -571,7 +571,6 @@ def test_a_plate_that_draws_back_within_a_long_step_is_seen_to_let_go(tolerance)
     assert hit.margin == pytest.approx(3.02e-5, rel=0.1)  # in steps of 1e-7 s and by an integrator of its own
 
 
-@pytest.mark.filterwarnings("ignore::fem_impact.ToleranceWarning")
 def test_a_contact_opens_where_its_approach_is_zero_to_rounding():
     """The sum of 120 modes leaves some 1e-15 of it, which was taken for an approach that jumps and passed unseen."""
     body = fi.analytic.rectangle(

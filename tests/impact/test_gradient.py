@@ -121,7 +121,6 @@ BEAM = {
 
 
 @pytest.mark.parametrize("blow, numbers", [(chain_of_balls, CRADLE), (resting_beam, BEAM)], ids=["cradle", "beam"])
-@pytest.mark.filterwarnings("ignore::fem_impact.ToleranceWarning")  # of six modes
 def test_gradients_of_bodies_that_touch_at_the_start_are_differences(blow, numbers):
     quantities = ("impulse", "contact_time", "peak_force", "restitution")
     found = blow(numbers).gradient(quantities, tuple(numbers))
@@ -378,7 +377,6 @@ def yielding(numbers, tolerance, push=0.0):
     return fi.strike(plate, striker, law, tolerance=tolerance, target_force=push, **blow)
 
 
-@pytest.mark.filterwarnings("ignore::fem_impact.ToleranceWarning")  # of 20 modes
 def test_gradients_of_contacts_that_yield_are_differences():
     """They unload from a dent, as deep as the force made it, and at the second impact they meet that dent."""
     quantities = "restitution", "impulse", "contact_time", "peak_force", "peak_time"

@@ -48,7 +48,6 @@ def first_touches(hit, count):
 
 
 @pytest.mark.parametrize("tolerance", [1e-2, 1e-3, 1e-6])
-@pytest.mark.filterwarnings("ignore::fem_impact.ToleranceWarning")
 def test_bodies_that_touch_are_in_contact_from_when_force_acts_on_them(tolerance):
     """Those beyond the gap touch from the start, and press each other when the gap is closed at 0.756 ms."""
     hit = slow_chain(tolerance)
@@ -90,7 +89,6 @@ def test_how_small_a_force_or_gap_counts_as_none_does_not_matter(monkeypatch):
 @pytest.mark.slow
 @pytest.mark.thin(20)
 @pytest.mark.parametrize("seed", range(40))
-@pytest.mark.filterwarnings("ignore::fem_impact.ToleranceWarning")
 def test_impacts_of_random_chains_do_not_depend_on_the_tolerance(seed):
     truth = random_chain(seed, 1e-7)  # errs by some 1e-8; three of these chains are refused below
     for tolerance in (1e-2, 1e-3, 1e-4, 1e-5, 1e-6):

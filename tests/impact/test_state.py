@@ -92,7 +92,6 @@ def test_a_collision_at_two_contacts_goes_on_from_its_middle(where):
     assert_allclose(rest.velocity(LISTEN, LATER), wanted, atol=1e-5 * np.abs(wanted).max())
 
 
-@pytest.mark.filterwarnings("ignore::fem_impact.ToleranceWarning")
 def test_a_state_holds_the_swing_of_the_modes_left_out():
     """Of 20 modes a collision at two points went on from their static deflection: speeds were off by 0.1 m/s."""
     plate = fi.analytic.rectangle(1.55, 1.0, mass=0.2, first_frequency=100.0, n_modes=20, damping_ratio=0.002)

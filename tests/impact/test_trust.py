@@ -59,7 +59,6 @@ def test_every_quantity_has_an_error_of_its_own(seed):
     }  # fmt: skip
 
 
-@pytest.mark.filterwarnings("ignore::fem_impact.ToleranceWarning")
 def test_both_misses_are_said_and_the_larger_one_dominates():
     hit = blow(speed=2.0, n_modes=40)
     assert not hit.tolerance_met and not hit.trusted

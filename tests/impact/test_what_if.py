@@ -69,7 +69,6 @@ def test_contact_the_modes_cannot_resolve_says_so():
     assert not hit.error.resolvable and hit.error.total == np.inf and "not resolvable" in hit.summary()
 
 
-@pytest.mark.filterwarnings("ignore::fem_impact.ToleranceWarning")
 def test_a_contact_that_outlasts_the_modes_left_out_is_not_told_the_error_of_a_short_one():
     """A mass twice that of its plate rests on it for 600 periods of the last mode kept, with hardly any ripple."""
     plate = fi.analytic.rectangle(0.63, 0.61, mass=0.2, first_frequency=100.0, n_modes=3000, damping_ratio=0.005)
@@ -79,7 +78,6 @@ def test_a_contact_that_outlasts_the_modes_left_out_is_not_told_the_error_of_a_s
     assert true < few.error.truncation < 50.0 * true  # 26 was measured, and 148 where a forecast alone decided
 
 
-@pytest.mark.filterwarnings("ignore::fem_impact.ToleranceWarning")
 @pytest.mark.parametrize("seed", [0, 2, 3, 6, 7, 9, 12])
 def test_restitutions_of_impacts_tell_their_errors(seed):
     """Points part as fast as the bodies ring there: modes left out count for more than in other quantities."""

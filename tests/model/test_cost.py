@@ -3,10 +3,10 @@
 import json
 import time
 from dataclasses import replace
-from pathlib import Path
 
 import pytest
 from numpy.testing import assert_allclose
+from scenes import SHIPPED
 
 import fem_impact as fi
 from fem_impact.impact import engine
@@ -14,7 +14,6 @@ from fem_impact.impact.compiled import build
 from fem_impact.model import cost, planner
 from fem_impact.model.target import Target
 
-SCENES = Path(__file__).parents[2] / "studies" / "scenes"
 SLOW = cost.Machine(*(2.0 * value for value in (cost.REFERENCE.sparse, cost.REFERENCE.dense, cost.REFERENCE.steps)))
 MUCH = cost.Work(sparse=10.0, dense=1.0, steps=1.0)
 
@@ -91,7 +90,7 @@ def counted(monkeypatch):
 ])  # fmt: skip
 def test_the_plan_counts_the_unknowns_and_vectors_that_its_run_has(name, meshes, vectors, counted):
     """Those of the runs are written down, as counted there; a longer blow may need two steps of 1.4 more, or none."""
-    fi.load_scene(next(SCENES.rglob(f"{name}.toml"))).plan()
+    fi.load_scene(next(SHIPPED.rglob(f"{name}.toml"))).plan()
     unknowns, most = counted[0]
     assert_allclose(unknowns, meshes, rtol=0.02)  # 1 %, and what splitting at ribs adds
     assert vectors / 2.0 <= most <= 1.7 * vectors  # two steps of growth, rounded
@@ -254,7 +253,7 @@ def test_the_benchmark_finds_a_machine_that_people_use():
 @pytest.mark.slow
 def test_predicted_time_is_of_the_right_size(name):
     """Within four, and not two as in `cost_predictions.py`: a busy machine doubles even the processor time."""
-    scene = fi.load_scene(SCENES / f"{name}.toml")
+    scene = fi.load_scene(SHIPPED / f"{name}.toml")
     plan = scene.plan(tolerance=1e-2)
     start = time.process_time()
     run = plan.run()

@@ -1,12 +1,13 @@
 """Tolerance in, smallest model out: what is modelled, that it meets the tolerance, and that each piece can be set."""
 
 from dataclasses import replace
-from pathlib import Path
+from functools import partial
 
 import numpy as np
 import pytest
 from comparing import difference, refusing
 from numpy.testing import assert_allclose
+from scenes import SHIPPED, load_text
 
 import fem_impact as fi
 from fem_impact._base import check
@@ -15,7 +16,6 @@ from fem_impact.impact import collision
 from fem_impact.model import asked, by_modes, by_vectors, cost, planner
 from fem_impact.modes import analytic
 
-SCENES = Path(__file__).parents[2] / "studies" / "scenes"
 STEEL = "E = 210e9, nu = 0.3, rho = 7850.0"
 
 
@@ -49,11 +49,7 @@ def plate(mass):
 
 @pytest.fixture
 def scene(tmp_path):
-    def write(text):
-        (tmp_path / "scene.toml").write_text(text)
-        return fi.load_scene(tmp_path / "scene.toml")
-
-    return write
+    return partial(load_text, tmp_path)
 
 
 @pytest.fixture
@@ -69,7 +65,7 @@ def no_elements(monkeypatch):
 
 
 def test_plate_of_500_t_is_rigid_and_costs_no_elements(scene, no_elements):
-    plan = fi.plan(SCENES / "heavy_plate.toml")
+    plan = fi.plan(SHIPPED / "heavy_plate.toml")
     assert (plan.target, plan.element, plan.n_dofs, plan.n_modes) == ("rigid", None, 0, 0)
     hit = plan.strike()
     assert hit.error.idealisation == plan.errors["rigid target"] < 0.45e-4  # its share of the tolerance
@@ -87,7 +83,7 @@ def test_a_light_plate_and_one_whose_motion_is_observed_are_not_rigid(scene):
 @pytest.mark.parametrize("name", ["rigid", "modal"])
 def test_verifying_run_finds_what_the_estimate_promises(scene, name):
     """A target taken as rigid by a modal one; another by more modes."""
-    run = (scene(plate(500e3)) if name == "rigid" else fi.load_scene(SCENES / "drumstick_map.toml")).run(verify=True)
+    run = (scene(plate(500e3)) if name == "rigid" else fi.load_scene(SHIPPED / "drumstick_map.toml")).run(verify=True)
     assert 0.0 < max(run.verified.values()) < 1e-3  # the tolerance
     assert run.finer.target == "modal" and (run.plan.target == "rigid") == (name == "rigid")
     if name == "modal":
@@ -161,7 +157,7 @@ def test_modes_of_a_costly_plan_are_kept_and_taken_up_again(tmp_path, monkeypatc
     """Broken off after the modes were found, the next run starts with them; other modes are found anew."""
     monkeypatch.setattr(asked, "COSTLY", (0.0, 0.0))
     scene, keep, solved, solve = (
-        fi.load_scene(SCENES / "marked_linear.toml"), tmp_path / "modes.npz", [], refinement.solve_on_mesh,
+        fi.load_scene(SHIPPED / "marked_linear.toml"), tmp_path / "modes.npz", [], refinement.solve_on_mesh,
     )  # fmt: skip
     monkeypatch.setattr(refinement, "solve_on_mesh", lambda *args: solved.append(args[2]) or solve(*args))
 
@@ -183,16 +179,16 @@ def test_modes_of_a_costly_plan_are_kept_and_taken_up_again(tmp_path, monkeypatc
 
 
 def test_sound_and_spectrum_bring_the_modes_they_need(scene):
-    plan = fi.plan(SCENES / "heavy_plate.toml", quantity="sound=2000")
+    plan = fi.plan(SHIPPED / "heavy_plate.toml", quantity="sound=2000")
     assert plan.target == "modal" and plan.max_frequency >= 2000.0
     hit = plan.strike()
     assert hit.target.frequencies[-1] > 0.8 * 2000.0 and hit.target.n_modes > 20
-    assert fi.plan(SCENES / "heavy_plate.toml", quantity={"spectrum": 5e3}).target == "rigid"
+    assert fi.plan(SHIPPED / "heavy_plate.toml", quantity={"spectrum": 5e3}).target == "rigid"
 
 
 @pytest.fixture(scope="module")
 def drum():
-    return fi.plan(SCENES / "drumstick_map.toml")
+    return fi.plan(SHIPPED / "drumstick_map.toml")
 
 
 def test_plan_says_what_it_keeps_and_drops_and_what_that_costs(drum):
@@ -202,7 +198,7 @@ def test_plan_says_what_it_keeps_and_drops_and_what_that_costs(drum):
         assert word in text
     assert drum.error == pytest.approx(sum(drum.errors.values()))
     assert 0.0 < drum.error <= 1.1e-3  # the tolerance of the scene; the mesh's share is extra
-    assert drum == fi.plan(SCENES / "drumstick_map.toml") and drum.data() == drum.but().data()
+    assert drum == fi.plan(SHIPPED / "drumstick_map.toml") and drum.data() == drum.but().data()
 
 
 def test_every_piece_can_be_set_and_taken_back_and_a_smaller_tolerance_takes_a_larger_model(drum):
@@ -218,7 +214,7 @@ def test_every_piece_can_be_set_and_taken_back_and_a_smaller_tolerance_takes_a_l
     assert drum.but(scheme="A", dt=1e-5).strike().scheme == "A"
     assert (fewer.but(scheme="A").n_modes, fewer.but(scheme="A").scheme) == (30, "A")
     assert fewer.but(n_modes=None) == drum
-    usual, sized = (fi.plan(SCENES / "marked_linear.toml", tolerance=1e-2, size=size) for size in (None, 0.1))
+    usual, sized = (fi.plan(SHIPPED / "marked_linear.toml", tolerance=1e-2, size=size) for size in (None, 0.1))
     assert sized.size == 0.1 and sized.n_dofs < usual.n_dofs
 
 
@@ -226,7 +222,7 @@ test_wrong_pieces_are_named = refusing([
 ({"target": "wall"}, "target must be one of rigid, infinite, vectors, mixed, modal, got 'wall'"),
 ({"n_modes": 0}, "n_modes"),
 ({"size": -1.0}, "size must be positive"),
-], lambda changes: fi.plan(SCENES / "drumstick_map.toml", **changes))  # fmt: skip
+], lambda changes: fi.plan(SHIPPED / "drumstick_map.toml", **changes))  # fmt: skip
 
 
 WOOD, MALLET = fi.Material(10e9, 0.3, 450.0), (fi.Striker.rigid(0.02), fi.Contact.hertz(1e7))
@@ -296,9 +292,9 @@ def test_a_blow_that_needs_more_memory_than_there_is_is_refused_before_it_is_com
 
 
 def test_costly_plan_says_so():
-    plan = fi.plan(SCENES / "marked_linear.toml", tolerance=1e-2, n_modes=2000)
+    plan = fi.plan(SHIPPED / "marked_linear.toml", tolerance=1e-2, n_modes=2000)
     assert plan.costly and "would cost less" in str(plan)
-    assert not fi.plan(SCENES / "drumstick_map.toml").costly
+    assert not fi.plan(SHIPPED / "drumstick_map.toml").costly
 
 
 def test_the_modes_that_ring_reach_to_where_the_force_is_sixty_decibels_down(scene):
@@ -352,12 +348,12 @@ def test_a_better_description_that_fails_leaves_what_there_is(scene, monkeypatch
 
 def test_the_modes_that_only_files_take_are_told_besides():
     """The command says 5 s of this guitar and then takes a minute, most of it for the sound at the point struck."""
-    scene = fi.load_scene(SCENES / "everyday" / "guitar_fingernail.toml")
+    scene = fi.load_scene(SHIPPED / "everyday" / "guitar_fingernail.toml")
     plan = scene.plan()
     moving = planner.make_plan(replace(plan.blow, moving=True), {}, planner.Stages())
     assert_allclose(plan.seconds + plan.ringing, moving.seconds, rtol=1e-12)
     assert moving.ringing == 0.0 < plan.ringing and "once they are asked for" in str(plan)
-    heavy = fi.plan(SCENES / "heavy_plate.toml", tolerance=1e-2)
+    heavy = fi.plan(SHIPPED / "heavy_plate.toml", tolerance=1e-2)
     assert heavy.target in ("rigid", "infinite") and heavy.ringing == 0.0
 
 
@@ -369,7 +365,7 @@ def test_a_blow_whose_modes_turn_out_too_few_is_struck_again_with_more(monkeypat
         hit = truly(modes, *given, **options)
         return replace(hit, error=replace(hit.error, truncation=1.0)) if len(set(kept)) == 1 else hit
 
-    scene = fi.load_scene(SCENES / "drumstick.toml")
+    scene = fi.load_scene(SHIPPED / "drumstick.toml")
     monkeypatch.setattr(collision, "strike", strike)
     hit = scene.strike(target="modal")
     assert hit.tolerance_met and len(set(kept)) == 2 and kept[-1] > kept[0]

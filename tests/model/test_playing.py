@@ -128,7 +128,6 @@ def test_a_single_stroke_is_a_strike():
     assert_allclose(one.spectrum([0.0, 500.0]), hit.spectrum([0.0, 500.0]), rtol=1e-12)
 
 
-@pytest.mark.filterwarnings("ignore::fem_impact.ToleranceWarning")  # of the restitution with few modes
 @pytest.mark.parametrize(("seed", "lifted"), [
     (64, False), (76, False), (221, False), (275, False), (288, False), (84, True), (124, True),
 ])  # fmt: skip

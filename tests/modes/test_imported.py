@@ -1,17 +1,16 @@
 """Files of other programs are read as bodies, and what they lack is said."""
 
-from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
 import xarray as xr
 from numpy.testing import assert_allclose
+from scenes import BODIES
 from test_body import STEEL, body_of, hinged
 
 import fem_impact as fi
 
-FILES = Path(__file__).parents[1] / "bodies"
 pytestmark = pytest.mark.usefixtures("read_here")
 
 
@@ -60,7 +59,7 @@ def test_what_files_lack_is_said(tmp_path):
             lambda: fi.Body.load(tmp_path / "body.odb", mass=1.0),
             r"files must be one of \.uff, .* 'body.odb'; convert it",
         ),
-        (lambda: fi.Body.load(FILES / "plate.inp", mass=1.0), "files must hold modes"),
+        (lambda: fi.Body.load(BODIES / "plate.inp", mass=1.0), "files must hold modes"),
         (lambda: fi.Body.load(paths), "files must be about the same nodes; export all results of one"),
         (lambda: fi.Body.load(xr.Dataset(told), mass=1.0), "files must hold modes"),
         (lambda: fi.Body.load(moved), "mass must be given in kg"),

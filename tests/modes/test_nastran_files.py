@@ -1,16 +1,15 @@
 """Results, decks and matrices of Nastran."""
 
 from contextlib import contextmanager
-from pathlib import Path
 
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
+from scenes import BODIES
 from test_matrices import KEPT, LENGTH, N, assert_the_same_bar, reduced
 
 import fem_impact as fi
 
-FILES = Path(__file__).parents[1] / "bodies"
 pytest.importorskip("pyNastran", reason="the nastran extra is not installed")
 pytestmark = pytest.mark.usefixtures("read_here")
 
@@ -27,7 +26,7 @@ def test_a_rod_of_nastran():
     """Ten bars with lumped masses, and a mass at the tip; along the rod there is a closed form: k tan k = m / M."""
     area, length, E, rho, tip = np.pi, 10.0, 3e7, 7.4851e-4, 2.59e-3
     mass = rho * area * length
-    body = fi.Body.load(FILES / "beam.op2", mass=mass + tip)
+    body = fi.Body.load(BODIES / "beam.op2", mass=mass + tip)
     along = body.modes("x")
     i = int(np.abs(along.shape_at([body.at(11)])).argmax())
     k = 1.4166

@@ -1,23 +1,21 @@
 """Files of CalculiX, Code_Aster, Ansys and Abaqus."""
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
+from scenes import BODIES
 from test_body import struck
 from test_matrices import N, assert_the_same_bar, bar
 
 import fem_impact as fi
 
-FILES = Path(__file__).parents[1] / "bodies"
 pytestmark = pytest.mark.usefixtures("read_here")
 
 
 def test_a_plate_of_calculix():
     """Six shells by four are 1 to 6 % too soft or stiff, by comparison with our own elements."""
     pytest.importorskip("pyvista_frd", reason="the calculix extra is not installed")
-    paths, mass = [FILES / "plate.frd", FILES / "plate.inp"], 0.3 * 0.2 * 3e-3 * 2700.0
+    paths, mass = [BODIES / "plate.frd", BODIES / "plate.inp"], 0.3 * 0.2 * 3e-3 * 2700.0
     with pytest.raises(ValueError, match=r"loads must be given .* for each of 1 static solutions, got 0"):
         fi.Body.load(paths, mass=mass)
     body = fi.Body.load(paths, mass=mass, loads=[(89, (0.0, 0.0, 1.0))])
@@ -36,7 +34,7 @@ def test_a_plate_of_calculix():
 
 def test_steps_of_calculix_that_cannot_be_told_apart_are_refused(tmp_path):
     pytest.importorskip("pyvista_frd", reason="the calculix extra is not installed")
-    text = (FILES / "plate.frd").read_bytes().replace(b" 95.76123372", b" 29.12784664")  # the second step as the first
+    text = (BODIES / "plate.frd").read_bytes().replace(b" 95.76123372", b" 29.12784664")  # the second step as the first
     (tmp_path / "plate.frd").write_bytes(text)
     with pytest.raises(ValueError, match="steps of different times or frequencies; write each load to its own file"):
         fi.Body.load(tmp_path / "plate.frd", mass=1.0)

@@ -34,10 +34,7 @@ def wall(vary, **wanted):
 
 @pytest.fixture
 def scene(tmp_path):
-    def make(text=RIGID):
-        return load_text(tmp_path, text)
-
-    return make
+    return lambda text=RIGID: load_text(tmp_path, text)
 
 
 def test_contact_times_on_a_wall_are_lognormal():

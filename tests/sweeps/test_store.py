@@ -13,6 +13,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import xarray
+from scenes import SHIPPED
 
 import fem_impact as fi
 from fem_impact._base import identity
@@ -203,15 +204,13 @@ def test_damaged_store_is_told_not_trusted(tmp_path, old, new):
         sweep(over={"mass": [0.1]}, store=tmp_path / "map")
 
 
-SCENE = Path(__file__).parents[2] / "studies" / "scenes" / "drumstick_map.toml"
-
-
 @pytest.mark.slow
 @pytest.mark.filterwarnings("default")
 def test_a_map_at_the_prompt_survives_its_own_end(tmp_path, cluster):
     """As a user would: scheduler and workers in their own processes, the run killed in the middle, then once more."""
     address, running = cluster
-    text = SCENE.read_text().replace("count = 20", "count = 12").replace('kind = "linear"', 'kind = "power"')
+    text = (SHIPPED / "drumstick_map.toml").read_text().replace("count = 20", "count = 12")
+    text = text.replace('kind = "linear"', 'kind = "power"')
     # below exponent 1 every cell is a single blow
     (tmp_path / "map.toml").write_text(text.replace("88.6e3", "88.6e3\nexponent = 0.95"))
     command = [sys.executable, "-m", "fem_impact.cli", "map", "map.toml", "--out", "out", "--store", "kept"]

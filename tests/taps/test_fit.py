@@ -147,7 +147,6 @@ def test_wrong_arguments_are_refused(taps, changes, said):
 
 
 @pytest.mark.slow
-@pytest.mark.filterwarnings("ignore::fem_impact.ToleranceWarning")
 def test_a_search_goes_on_where_all_starts_end_in_a_poor_minimum():
     plate = fi.analytic.rectangle(0.5, 0.4, mass=1.5, first_frequency=90.0, n_modes=30, damping_ratio=0.01)
     law = fi.Contact.power(3e8, 1.6, loss=0.2)

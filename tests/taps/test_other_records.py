@@ -191,7 +191,6 @@ speed = 0.5
 
 
 @pytest.mark.slow
-@pytest.mark.filterwarnings("ignore::fem_impact.ToleranceWarning")
 def test_double_hits_on_a_known_wooden_plate_tell_the_hammer(tmp_path, read):
     plate, place = load_text(tmp_path, WOODEN).modes(60), (0.17, 0.12)
     law = fi.Contact.power(4e8, 1.5, loss=0.2)
