@@ -30,8 +30,6 @@ from fem_impact.scenes import results
 PATIENCE = 30.0  # [s] per call: thrice what is promised, as other work may run beside
 LONGEST = 700  # [-] characters of a message
 
-# --- what is public --------------------------------------------------------------------------------------------------
-
 # Called by the package with what it has checked or made, not by users: plumbing, and results.
 INNER = {
     "Response", "Impact", "Scene", "Plan", "SimulationError",  # made by strike, load_scene and plan
@@ -91,9 +89,6 @@ def everything() -> dict[str, Callable[..., Any]]:
 def public() -> dict[str, Callable[..., Any]]:
     """Those that users call."""
     return {name: item for name, item in everything().items() if name not in INNER}
-
-
-# --- one valid call of each ------------------------------------------------------------------------------------------
 
 
 @cache
@@ -422,8 +417,6 @@ def stated() -> dict[str, dict[str, Any]]:
     }  # fmt: skip
 
 
-# --- what spoils an argument -----------------------------------------------------------------------------------------
-
 SPOILS: dict[str, Any] = {
     "None": None, "True": True, "word": "word", "empty": "", "list": [], "dict": {}, "object": object(), "1j": 1j,
     "nan": math.nan, "inf": math.inf, "-inf": -math.inf, "-1": -1.0, "int -1": -1, "0": 0.0, "int 0": 0,
@@ -453,8 +446,6 @@ def cases() -> Iterator[tuple[str, str, str]]:
             spoils = [spoil for spoil in SPOILS if parameter not in CALLED or spoil not in FUNCTIONS]
             yield from ((name, parameter, spoil) for spoil in spoils)
 
-
-# --- the judge -------------------------------------------------------------------------------------------------------
 
 INFINITE = {"threshold_frequency", "threshold.thresholds", "mobility", "Response.motion_error"}  # documented to
 ENDLESS = {"order", "point_supports", "sensitivity"}  # fields documented to be infinite now and then

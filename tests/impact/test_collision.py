@@ -87,9 +87,6 @@ def test_sixty_modes_meet_the_eigen_solution(scheme, slope, stiffness):
         assert_allclose(hits[-1].contact_time, truth.contact_time, rtol=1e-8)  # 4e-10 was measured
 
 
-# --- independent integration -----------------------------------------------------------------------------------------
-
-
 def integrate(bodies, touches, duration, speeds=None, forces=None, states=None):
     """Final modal displacements and velocities of each body by the same equations, as `restarted` follows them.
 
@@ -194,9 +191,6 @@ def test_of_five_balls_apart_exactly_the_last_one_leaves(exponent, tolerance):
     assert_allclose([(each.approach_speed, each.restitution) for each in hit.impacts], 1.0, rtol=1e-9)
 
 
-# --- orders, references, limits --------------------------------------------------------------------------------------
-
-
 def target_of(n_modes):
     """Evenly spaced modes, all alike at the point: what a struck plate looks like from there."""
     frequencies = 1500.0 * 59.0 / n_modes * np.arange(1, n_modes + 1) / (2.0 * np.pi)
@@ -263,9 +257,6 @@ def test_restituting_contact_gives_the_restitution_asked_for(restitution):
     hit = collide([fi.Modes.rigid(0.1)], [Touch(law, 0, None)], speeds=[2.0], tolerance=1e-6)
     assert_allclose(hit.restitution, restitution, atol=1e-6)
     assert_allclose(hit.dissipated["contact"], 0.5 * 0.1 * 4.0 * (1.0 - restitution**2), rtol=1e-5)
-
-
-# --- ends, flags, errors ---------------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("tolerance", [1e-3, 1e-4])
@@ -419,9 +410,6 @@ def test_a_body_that_cannot_press_itself_is_refused(body, at):
     assert fi.collide([BAR], [fi.Touch(fi.Contact.linear(1e5, gap=1.0), 0, 0, 0.2, 0.7)], duration=1e-3).n_impacts == 0
 
 
-# --- loss, layers, several contacts ----------------------------------------------------------------------------------
-
-
 def test_a_push_that_ends_while_the_bodies_overlap_counts_for_max_impacts():
     """A ringing bar is let go and pushed again before it is out of reach: one impact gave six."""
     bar = fi.analytic.beam(1.0, ends=("hinged", "hinged"), mass=0.2, first_frequency=1500.0, n_modes=1)
@@ -500,9 +488,6 @@ def test_contacts_that_open_and_close_together_stay_together(frequency, gap, mas
     assert_allclose(two.speeds, one.speeds, atol=2e-8)  # the tolerance of both
     assert_allclose(two.impulse, one.impulse, rtol=2e-8)
     assert_allclose(two.touching_time, one.contact_time, rtol=2e-8)
-
-
-# --- random blows, also of other files --------------------------------------------------------------------------------
 
 
 def thinned_blow(seed, lossy=False):

@@ -24,9 +24,6 @@ def struck(n_modes=20, u_striker=10.0, u_plate=2.0):
     return omega, np.append(u_striker, -rng.normal(0.0, u_plate, n_modes))
 
 
-# --- bounces, limits of mass and stiffness ---------------------------------------------------------------------------
-
-
 @pytest.mark.parametrize("exponent", [1.0, 1.5])
 def test_a_thousand_bounces_keep_their_height(exponent):
     fall = {"p": [0.0], "bias": [9.81], "offset": -0.05, "h": 3e-3, "max_steps": 400_000}
@@ -82,8 +79,6 @@ def test_ever_heavier_striker_drives_the_plate_at_its_own_speed(mass):
     assert_allclose(hit.displacement([0.0], t)[:, 0], wanted, atol=2.0 * loss * end + 1e-8 * wanted[-1])
     assert_allclose(hit.speeds[0], v - loss, rtol=1e-12)
 
-
-# --- endless plate, endless beam -------------------------------------------------------------------------------------
 
 LENGTH, WIDTH, MASS, FIRST = 3.1, 2.0, 2.0, 10.0
 STIFF = 2.0 * FIRST / (np.pi * (LENGTH**-2 + WIDTH**-2))  # [m2/s] sqrt(D/m'') of a hinged plate, from its frequency
@@ -143,9 +138,6 @@ def test_endless_beam_kernel_grows_with_the_root_of_time():
     wanted = factor * 2.0 / 3.0 * (t**1.5 - (t - h) ** 1.5)  # of a unit force held over the step
     # modes beyond the last: their compliance mu**(-3/4) (E I)**(-1/4) wc**(-3/2) / (3 pi) is 1e-7 of it; echo 1e-4
     assert_allclose(batches.kernel_rows(*modal, h, n)[0][0], wanted, rtol=3e-4)
-
-
-# --- batches ---------------------------------------------------------------------------------------------------------
 
 
 def modal_blow(omega, zeta, squared, mass, stiffness, exponent, h, n_steps):
@@ -263,9 +255,6 @@ def test_inputs_in_single_precision_count_the_same_impacts():
     assert (coarse.restitution[both] <= 1.0 + 1e-6).all()  # energy: no rebound faster than the blow
 
 
-# --- chaos ------------------------------------------------------------------------------------------------------------
-
-
 def chaotic(nudge=0.0):
     """A striker pressed by a constant force onto a plate in motion: it comes back a hundred times."""
     p = np.random.default_rng(5).normal(0.0, 0.1, 31)
@@ -310,8 +299,6 @@ def test_chaotic_runs_do_not_depend_on_threads():
         for one, two in zip(alone, together):
             assert np.array_equal(one.steps, two.steps) and np.array_equal(one.p, two.p)
 
-
-# --- motion under the force ------------------------------------------------------------------------------------------
 
 LAWS = {
     "linear": fi.Contact.linear(2e4),

@@ -61,9 +61,6 @@ def test_steps_run_backwards(scheme, h, horizon, least):
     assert_allclose(-back.p, np.append(0.1, np.zeros(12)), atol=1e-13)
 
 
-# --- rest, nodes, chatter --------------------------------------------------------------------------------------------
-
-
 @pytest.mark.parametrize("stiffness", [1e2, 1e6, 1e10])
 def test_rest_stays_for_a_million_steps(stiffness):
     """k h**2 / m up to 1e8 on the weight's own indentation."""
@@ -98,9 +95,6 @@ def test_lossy_chatter_is_passed_in_ever_longer_rests():
     assert r.status == record.HORIZON and (r.force >= 0.0).all()
     assert 0 < r.n_blind < len(r.steps) < 9000
     assert r.after < r.before + 1e-12 * r.scale
-
-
-# --- giving up, preload ----------------------------------------------------------------------------------------------
 
 
 @pytest.fixture
@@ -162,9 +156,6 @@ def test_preload_held_by_a_force_stays(exponent):
     hit = collide([fi.Modes.rigid(0.1), fi.Modes.rigid(0.3)], [touch], forces=[hold, -hold], duration=1.0)
     assert np.abs(hit.speeds).max() < 1e-9 * hold / 0.1  # [m/s] of a second of free motion under that force
     assert_allclose(hit.force, hold, rtol=1e-9)
-
-
-# --- flights, grazes -------------------------------------------------------------------------------------------------
 
 
 FLIGHTS = """

@@ -38,9 +38,6 @@ def assert_differences(blow, numbers, found, bound, told, turns):
         assert (off <= np.multiply(bound, scale) + np.abs(near - far)).all(), (turn, off / scale)
 
 
-# --- random blows ----------------------------------------------------------------------------------------------------
-
-
 def check(found, within, times):
     """Slopes are differences ``within`` so much and some ``times`` the doubt of these, whose blows have own steps."""
     # a lossy force rings with every mode, so that steps move its peak; the error stated was 5e-2 where 1e-2 was off
@@ -77,9 +74,6 @@ def test_gradients_with_several_contacts_are_central_differences(all_cases):
         check(found, 1e-6, 3.0)
         wrong = np.abs(found.usual - found.slopes)[:4]
         assert (found.stated[:4] >= wrong / 3.0 - 1e-9).all()  # at least so in 96 % of 54 blows, see the study
-
-
-# --- several contacts ------------------------------------------------------------------------------------------------
 
 
 def chain_of_balls(numbers):
@@ -169,9 +163,6 @@ def test_what_has_no_gradient_with_several_contacts_says_where():
             beam_and_stop(factor * swing).gradient("impulse")
 
 
-# --- closed forms on a wall ------------------------------------------------------------------------------------------
-
-
 def ball(law, *, mass=0.2, speed=1.3, tolerance=1e-8, **blow):
     """A mass on a target so heavy that it is a wall."""
     wall, striker = fi.Modes.rigid(1e12), fi.Striker.rigid(mass)
@@ -239,9 +230,6 @@ def test_a_gradient_reads_as_a_table():
     assert list(found) == ["striker.mass", "contact.stiffness"]
 
 
-# --- the largest force -----------------------------------------------------------------------------------------------
-
-
 @pytest.mark.parametrize("loss, tolerance", [(0.0, 1e-4), (0.3, 1e-4), (0.0, 1e-8)])
 def test_the_largest_force_is_the_largest_of_many_samples(loss, tolerance):
     """Its time is that of the largest of 200 000 samples, with loss, where the force rings, as without."""
@@ -287,9 +275,6 @@ def test_two_maxima_alike_are_refused_though_a_step_holds_both():
         strike(random_numbers(np.random.default_rng(2)), 1e-3).gradient("peak_force")
 
 
-# --- stated errors ----------------------------------------------------------------------------------------------------
-
-
 def test_errors_of_slopes_are_of_the_size_they_say():
     numbers = random_numbers(np.random.default_rng(12)) | {"contact.loss": 0.0}
     names = ("striker.mass", "contact.stiffness", "strike.x", "target.mass", "strike.speed")
@@ -330,8 +315,6 @@ def test_slopes_err_by_no_more_than_they_say(seeds):
     assert len(found) > 12 * len(seeds)
     assert np.mean(found < 1.0) <= 0.02 and found.min() > 0.1
 
-
-# --- contacts that are felt, layered or yield; bodies ----------------------------------------------------------------
 
 FELT = {"contact.stiffness": 1e10, "contact.exponent": 2.5}
 LAYERS = {  # a soft layer over a hard one, pressed beyond its depth
@@ -444,9 +427,6 @@ def test_body_numbers_are_those_of_a_rebuilt_body():
         for found, change in zip(slopes.values(), changes(blow, numbers, name, slopes)):
             # differences of second order: 1e-8 times the third derivative
             assert_allclose(found[name] * value, change, rtol=1e-5, err_msg=f"{found.quantity} in {name}")
-
-
-# --- where there is none ---------------------------------------------------------------------------------------------
 
 
 @pytest.mark.slow

@@ -44,9 +44,6 @@ def first_touches(hit, count):
     return [min(each.start for each in hit.impacts if each.contact == c) for c in range(count)]
 
 
-# --- what is in contact ----------------------------------------------------------------------------------------------
-
-
 @pytest.mark.parametrize("tolerance", [1e-2, 1e-3, 1e-6])
 def test_bodies_that_touch_are_in_contact_from_when_force_acts_on_them(tolerance):
     """Those beyond the gap touch from the start, and press each other when the gap is closed at 0.756 ms."""
@@ -98,17 +95,11 @@ def test_impacts_of_random_chains_do_not_depend_on_the_tolerance(seed):
             assert_allclose(getattr(found, name), getattr(truth, name), rtol=tolerance, err_msg=name)
 
 
-# --- speeds of meeting and parting -----------------------------------------------------------------------------------
-
-
 def test_bodies_that_touched_before_have_no_restitution_of_an_impact():
     hit = chain([0.1] * 3, 1.5, [1e9] * 2, [0.0, 0.0], 1.0, tolerance=1e-4)
     found = {each.contact: each for each in hit.impacts[:2]}
     assert found[0].restitution > 0.0 and found[1].separation_speed > 0.0
     assert found[1].restitution is None and found[1].approach_speed == 0.0
-
-
-# --- restitution of the blow -----------------------------------------------------------------------------------------
 
 
 def falling(duration, mass=0.5, force=GRAVITY * 0.5, **options):

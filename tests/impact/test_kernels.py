@@ -77,9 +77,6 @@ def step_table(omega, zeta, h):
     return table
 
 
-# --- exact propagation -----------------------------------------------------------------------------------------------
-
-
 def exact_moments(w, z, h, count):
     """Moments of the impulse response by their recursion, in 400 digits."""
     with mp.workdps(400):
@@ -162,9 +159,6 @@ def test_waves_and_decays_are_within_two_units_in_the_last_place():
     assert_allclose(decay, np.exp(-exponent) * (exponent < 700.0), rtol=2.0 * EPS)
 
 
-# --- any step, any stiffness, any modes ------------------------------------------------------------------------------
-
-
 @each_scheme
 @pytest.mark.parametrize("k", [1e3, 1e6, 1e10])
 @pytest.mark.parametrize("h", [1e-8, 1e-4, 1e-1])
@@ -218,9 +212,6 @@ def test_order_in_pressed_contact(scheme, order, loss, k, exponent):
     assert len(r.steps) == 16 and abs(np.log2(errors[0] / errors[1]) - order) < 0.35
 
 
-# --- free flight, scaling ---------------------------------------------------------------------------------------------
-
-
 def moved(omega, q, p, t):
     """Displacements of undamped modes without forces."""
     return q * np.cos(omega * t) + p * np.where(omega > 0.0, np.sin(omega * t) / np.maximum(omega, 1.0), t)
@@ -259,9 +250,6 @@ def test_units_of_length_and_time_do_not_matter(exponent, speed, slower, roundin
     assert_allclose(other.time / slower, one.time, rtol=1e-14 if slower == 1.0 else 1e-12)
 
 
-# --- damping and loss ------------------------------------------------------------------------------------------------
-
-
 @each_scheme
 @pytest.mark.parametrize("zeta", [1e-3, 0.1, 0.999, 1.0, 1.5, 1e3])
 def test_damping_never_gives_energy(zeta, scheme):
@@ -298,9 +286,6 @@ def test_loss_never_pulls(loss):
     assert r.after <= r.before * (1.0 + 1e-12) + 1e-15
 
 
-# --- grazing, release, rest ------------------------------------------------------------------------------------------
-
-
 @each_scheme
 @pytest.mark.parametrize("depth", [1e-12, 1e-9, 1e-6, 1e-3])
 def test_grazing_touch_is_continuous_and_keeps_energy(depth, scheme):
@@ -325,9 +310,6 @@ def test_lossy_ball_comes_to_rest_in_finite_steps():
     r = run([0.0], [[1.0]], k=1e5, exponent=1.5, loss=0.5, offset=-0.05, p=[0.0], bias=[9.81], h=3e-3, horizon=20.0)
     assert r.status == record.HORIZON and r.after < r.before and len(r.steps) < 20000
     assert abs(r.p[0]) < 1e-3  # from 1 m/s at the first touch
-
-
-# --- several contacts, events, extremes ------------------------------------------------------------------------------
 
 
 @each_scheme
@@ -429,9 +411,6 @@ def test_restart_and_change_of_step_keep_energy():
         r = run(*plate(12), k=1e6, exponent=1.5, scheme=scheme, h=h, max_steps=n, **state)
         start, state = start or r.before, {"q": r.q, "p": r.p}
         assert_allclose(r.after, start, rtol=1e-13)
-
-
-# --- properties over random scenes -----------------------------------------------------------------------------------
 
 
 @st.composite

@@ -33,9 +33,6 @@ def spring_of(contact, compliance=0.0):
     return build.plain(law.spring_of)(TABLES[-1], 0)
 
 
-# --- power laws, as kernels have them --------------------------------------------------------------------------------
-
-
 @pytest.mark.parametrize(
     "k, a, c", [(1e5, 1.0, 0.0), (1e7, 1.5, 0.0), (3e6, 1.3, 0.0), (1e5, 1.0, 3e-6), (1e7, 1.5, 1e-7), (1e4, 0.7, 1e-5)]
 )
@@ -76,9 +73,6 @@ def test_a_step_near_the_peak_is_judged_by_how_far_its_mean_force_is_from_the_la
     assert suggested(mean, mean) < 1e-4 * mean  # what Gauss's rule of three nodes misses
     assert_allclose(suggested(1.01 * mean, mean), factor * 0.01 * mean, rtol=0.02)
     assert suggested(mean, 4.0 * mean) == suggested(0.0, mean) == 0.0  # too far from the peak to count
-
-
-# --- every law -------------------------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("loss", [0.0, 0.1])

@@ -71,9 +71,6 @@ def test_a_hammer_of_two_masses_moves_as_its_two_equations_say():
     assert hit.energy_error < 1e-9
 
 
-# --- a hand at the fulcrum -------------------------------------------------------------------------------------------
-
-
 @pytest.mark.parametrize("force", [0.981, 5.0])
 @pytest.mark.parametrize("stiffness", [1e-3, 10.0, 200.0])
 def test_a_held_mass_is_back_when_its_swing_says(stiffness, force):

@@ -304,8 +304,6 @@ def test_observed_points_need_no_modes_if_vectors_tell_their_motion():
     assert run.response.target.omega[0] == pytest.approx(2.0 * np.pi * 105.78, rel=1e-3)  # found when asked for
 
 
-# --- seen from several points ---------------------------------------------------------------------------------------
-
 POINTS = np.array([(0.2, 0.11), (0.1, 0.2), (0.33, 0.08)])
 
 

@@ -121,9 +121,6 @@ def test_a_soft_contact_feels_a_body_that_bends_as_rigid():
     assert_allclose(-hit.restitution, (striker.felt_mass - 0.3) / (striker.felt_mass + 0.3), atol=2e-3)
 
 
-# --- independent integration in space --------------------------------------------------------------------------------
-
-
 def by_dop853(one, other, way, pairs, stiffness, pivot, speed, duration):
     """Centres, rotations and elastic modes of both by DOP853: velocities at the end, and the impulses of contacts."""
 
