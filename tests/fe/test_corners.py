@@ -45,18 +45,18 @@ def test_a_clamped_right_angle_is_smooth_enough():
     assert exponent(90.0, ("clamped", "clamped")) > 2.5  # bounded bending moments
 
 
-def cells_of_an_l():
-    """Corners (n_cells, 3, 2) of the triangles of a clamped L with its notch at (1, 1)."""
+def test_only_the_notch_of_an_l_is_graded_by_triangles_that_are_narrow_and_not_narrower():
     mesh = fi.mesh.polygon([(0, 0), (2, 0), (2, 1), (1, 1), (1, 2), (0, 2)])
     fine = around_corners(mesh, ["clamped"] * len(mesh.facets), STEEL)[-1]
-    return fine.points[fine.cells]
-
-
-def test_only_the_notch_of_an_l_is_graded():
-    corner = cells_of_an_l()
+    corner = fine.points[fine.cells]  # (n_cells, 3, 2)
     side = np.linalg.norm(corner - np.roll(corner, 1, axis=1), axis=2).max(axis=1)
     near = np.linalg.norm(corner - [1.0, 1.0], axis=2).min(axis=1) < 1e-12
     assert side[near].max() < 1e-3 < 0.05 < side[~near].max()
+    first = np.linalg.norm(corner - [1.0, 1.0], axis=2).argmin(axis=1)
+    at, a, b = (corner[np.arange(len(corner)), (first + i) % 3] for i in range(3))
+    there = np.linalg.norm(at - [1.0, 1.0], axis=1) < 1e-12
+    u, v = (side[there] / np.linalg.norm(side[there], axis=1, keepdims=True) for side in (a - at, b - at))
+    assert 0.4 < np.arccos((u * v).sum(axis=1)).max() < 0.7
 
 
 @pytest.mark.parametrize(("degrees", "kind"), [(270.0, "clamped"), (300.0, "clamped"), (110.0, "hinged")])
@@ -81,15 +81,6 @@ def test_rings_stop_where_rounding_takes_over():
 def test_corners_that_quintics_resolve_get_no_rings(degrees, kind, rings):
     """Exponents of 2.96, 2.89, 2.54 and 2.48: what is left of the first and third is below 1e-6."""
     assert bool(corners.number_of_rings(exponent(degrees, (kind, kind)), (kind, kind))) == rings
-
-
-def test_triangles_at_a_singular_corner_are_narrow_and_not_narrower():
-    corner = cells_of_an_l()
-    first = np.linalg.norm(corner - [1.0, 1.0], axis=2).argmin(axis=1)
-    at, a, b = (corner[np.arange(len(corner)), (first + i) % 3] for i in range(3))
-    there = np.linalg.norm(at - [1.0, 1.0], axis=1) < 1e-12
-    u, v = (side[there] / np.linalg.norm(side[there], axis=1, keepdims=True) for side in (a - at, b - at))
-    assert 0.4 < np.arccos((u * v).sum(axis=1)).max() < 0.7
 
 
 @pytest.mark.slow

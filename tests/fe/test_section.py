@@ -12,12 +12,10 @@ STEEL = Material(E=210e9, nu=0.3, rho=7850.0)
 POINT = np.zeros((1, 2))
 
 
-def test_orthotropic_with_equal_moduli_is_isotropic_at_any_angle():
+def test_equal_moduli_are_isotropic_at_any_angle_and_grain_turned_by_a_right_angle_swaps_the_axes():
     same = Material.orthotropic(E_along=210e9, E_across=210e9, nu=0.3, G=210e9 / 2.6, rho=7850.0, angle=0.7)
     assert_allclose(same.plane_stress, STEEL.plane_stress, rtol=1e-13, atol=1e-3)  # rounding of 1e11 Pa
 
-
-def test_grain_turned_by_a_right_angle_swaps_the_axes():
     wood = {"E_along": 11e9, "E_across": 0.8e9, "nu": 0.3, "G": 0.7e9, "rho": 450.0}
     along = Material.orthotropic(**wood).plane_stress
     turned = Material.orthotropic(**wood, angle=np.pi / 2).plane_stress

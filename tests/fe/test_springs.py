@@ -115,16 +115,14 @@ def test_a_body_on_weak_springs_moves_as_a_rigid_one(stiffness):
     assert modes.omega[3] == pytest.approx(free.omega[3], rel=1e-6) and modes.frequency_error.max() < 1e-6
 
 
-def test_an_edge_on_weak_springs_is_found():
+def test_a_plate_and_a_beam_on_weak_springs_move_rigidly_first():
     shape, weak = mesh.rectangle(0.3, 0.3), 1e-6 * D / 0.3**3
     modes = find_modes(assemble(shape, PLATE, {"boundary": Elastic(weak)}), n_modes=4)
     heave = np.sqrt(4.0 * 0.3 * weak / modes.mass)
     tilt = heave * np.sqrt(2.0)  # k (2 a (a / 2)**2 + 2 a**3 / 12) over m a**2 / 12
     assert_allclose(modes.omega[:3], [heave, tilt, tilt], rtol=1e-6)
 
-
-def test_a_beam_on_a_weak_spring_is_found():
-    """Hinged at the left, a spring k at the right: it turns rigidly, omega^2 = 3 k / m."""
+    # Hinged at the left, a spring k at the right: it turns rigidly, omega^2 = 3 k / m.
     modes = find_modes(assemble(mesh.line(1.0), BAR, {"left": "hinged", "right": Elastic(1e-3)}), n_modes=2)
     assert modes.omega[0] == pytest.approx(np.sqrt(3.0 * 1e-3 / modes.mass), rel=1e-6)
     assert modes.omega[1] == pytest.approx(3.9266023**2 * np.sqrt(EI / PER_LENGTH), rel=1e-6)

@@ -47,11 +47,8 @@ def test_a_large_effect_is_beyond_the_estimate():
     assert "restitution by about 0.4, beyond this estimate" in line
 
 
-def test_a_number_beyond_its_limit_is_said_even_if_it_changes_little():
+def test_a_number_beyond_its_limit_is_said_even_if_it_changes_little_and_before_the_blow_nothing_else_is_known():
     assert len(assumption.lines([make({"restitution": 1e-7, "force": 0.0}, 2.0)], 1e-4)) == 2
-
-
-def test_before_the_blow_only_numbers_are_known():
     foreseen = [make({}, 0.5), make({}, 0.1, name="still air")]
     head, line = assumption.lines(foreseen, 1e-4)
     assert head == "the model is doubtful here: thin target"

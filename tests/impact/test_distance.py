@@ -22,15 +22,14 @@ def test_it_is_absolute_for_the_restitution_and_relative_to_the_second_for_the_o
     assert found == {"restitution": 0.25, "n_impacts": 0.5, "impulse": 1.75, "force": 0.0, "contact_time": 1e-3}
 
 
-def test_a_spectrum_counts_by_its_largest_value():
-    one, two = np.array([1.0, 2j, 0.0]), np.array([1.0, 4j, 1.0])
-    assert distance.distance({"spectrum": one}, {"spectrum": two}) == {"spectrum": 0.5}
-    assert distance.distance({"spectrum": 0.0 * one}, {"spectrum": 0.0 * two}) == {"spectrum": 0.0}
-
-
-@pytest.mark.parametrize(("one", "two", "apart"), [(None, None, 0.0), (0.3, None, 1.0), (None, 0.3, 1.0)])
-def test_blows_of_which_only_one_has_a_restitution_are_one_apart(one, two, apart):
-    assert distance.distance({"restitution": one}, {"restitution": two}) == {"restitution": apart}
+@pytest.mark.parametrize(("name", "one", "two", "apart"), [
+    # a spectrum counts by its largest value; blows of which only one has a restitution are one apart
+    ("spectrum", np.array([1.0, 2j, 0.0]), np.array([1.0, 4j, 1.0]), 0.5),
+    ("spectrum", np.zeros(3, complex), np.zeros(3, complex), 0.0),
+    ("restitution", None, None, 0.0), ("restitution", 0.3, None, 1.0), ("restitution", None, 0.3, 1.0),
+])  # fmt: skip
+def test_spectra_and_restitutions_that_may_be_none_have_a_distance(name, one, two, apart):
+    assert distance.distance({name: one}, {name: two}) == {name: apart}
 
 
 def test_many_blows_are_as_far_apart_as_each():

@@ -202,10 +202,7 @@ def test_restitution_falls_with_loss_as_hunt_and_crossley_have_it():
     assert_allclose(found["strike.speed"], -by_number / by_e * loss, rtol=1e-6)
     for name in ("striker.mass", "contact.stiffness", "contact.exponent"):
         assert abs(found.relative[found.names.index(name)]) < 1e-6
-
-
-def test_slopes_on_one_side_start_as_hunt_and_crossley_have_it():
-    """Of a number that cannot be negative there are differences to one side only: ``1 - e = 2 / 3 loss speed``."""
+    # Of a number that cannot be negative there are differences to one side only: ``1 - e = 2 / 3 loss speed``.
     found = ball(fi.Contact.hertz(1e6), speed=1.3).gradient("restitution", ("contact.loss",))
     assert_allclose(found["contact.loss"], -2.0 / 3.0 * 1.3, rtol=1e-5)
 

@@ -313,17 +313,14 @@ def test_lossy_ball_comes_to_rest_in_finite_steps():
 
 
 @each_scheme
-def test_compliance_in_series_softens_a_linear_contact(scheme):
+def test_compliance_in_series_softens_a_linear_contact_and_keeps_energy_of_a_hertz_one(scheme):
     omega, shape = plate(12)
     series = run(omega, shape, k=1e6, compliance=1e-6, scheme=scheme, h=2e-5)
     single = run(omega, shape, k=1e6 / (1.0 + 1e6 * 1e-6), scheme=scheme, h=2e-5)
     assert_allclose(series.p, single.p, atol=1e-13)
     assert_allclose(series.time, single.time, rtol=1e-12)
-
-
-def test_compliance_in_series_keeps_energy_of_a_hertz_contact():
-    r = run(*plate(12), k=1e9, exponent=1.5, compliance=1e-7, h=1e-5)
-    assert drift(r) < 1e-14 * np.sqrt(len(r.steps))
+    hertz = run(omega, shape, k=1e9, exponent=1.5, compliance=1e-7, scheme=scheme, h=1e-5)
+    assert drift(hertz) < 1e-14 * np.sqrt(len(hertz.steps))
 
 
 @each_scheme
@@ -460,17 +457,9 @@ def check_invariants(scene):
     assert np.abs(r.momentum[scene["omega"] == 0.0]).max() <= 100.0 * EPS * slack * impulse
 
 
-@settings(max_examples=20, deadline=None)
-@given(scenes())
-def test_any_scene_keeps_the_invariants(scene):
-    check_invariants(scene)
-
-
-@pytest.mark.slow
-@settings(max_examples=600, deadline=None)
-@given(scenes())
-def test_many_scenes_keep_the_invariants(scene):
-    check_invariants(scene)
+@pytest.mark.parametrize("examples", [20, pytest.param(600, marks=pytest.mark.slow)])
+def test_any_scene_keeps_the_invariants(examples):
+    settings(max_examples=examples, deadline=None)(given(scenes())(check_invariants))()
 
 
 PLAIN = """

@@ -83,7 +83,8 @@ def test_quantities_are_judged_one_by_one_with_units_and_bands():
 def test_blows_of_several_bodies_say_that_nobody_examined_the_model():
     balls, touch = [fi.Modes.rigid(0.1), fi.Modes.rigid(0.2)], fi.Touch(fi.Contact.hertz(1e8), 0, 1)
     hit = fi.collide(balls, [touch], speeds=(1.0, 0.0))
-    assert hit.tolerance_met and not hit.trusted
+    assert hit.tolerance_met and not hit.trusted and hit.model_error == 0.0
+    assert {each.state for each in hit.assumptions} == {"not known"} and "Model" not in hit.summary()
     assert hit.verdict.endswith(
         "but the model is not examined, as several bodies meet: examine each pair by `fi.strike`"
     )

@@ -101,6 +101,7 @@ def test_svg_keeps_size_names_and_holes_and_turns_y_upward(tmp_path):
     ('height="100mm" viewBox="0 0 300 200"', None, (0.025, 0.02)),
     ('width="10CM" height="10CM" viewBox="0 0 100 100"', None, (0.05, 0.04)),
     ('width="72pt" height="72pt" viewBox="0 0 100 100"', None, (0.0127, 0.01016)),
+    ('width="1600Q" height="1200Q" viewBox="0 0 400 300"', None, (0.05, 0.04)),  # quarters of millimetres
     ('width="100mm" height="100mm"', None, (50 * 0.0254 / 96, 40 * 0.0254 / 96)),
 ])  # fmt: skip
 def test_svg_has_the_size_of_its_page_or_of_the_unit_given(tmp_path, head, unit, size):
@@ -139,14 +140,6 @@ def test_a_unit_that_a_dxf_file_states_is_not_taken_as_none(tmp_path, code, metr
     corners = np.array([(0.0, 0.0), (0.4, 0.0), (0.4, 0.3), (0.0, 0.3)]) / metres
     shape = fi.mesh.outline(dxf(tmp_path, lambda space: space.add_lwpolyline(corners, close=True), units=code))
     assert shape.notes == () and shape.area == pytest.approx(0.12)
-
-
-def test_quarter_millimetres_of_an_svg_file_are_read(tmp_path):
-    path = (
-        '<svg xmlns="http://www.w3.org/2000/svg" width="1600Q" height="1200Q" viewBox="0 0 400 300"><path d="M0 0H400V'
-    )
-    (tmp_path / "q.svg").write_text(path + '300H0Z"/></svg>')
-    assert fi.mesh.outline(tmp_path / "q.svg").area == pytest.approx(0.12)
 
 
 def test_dxf_polyline_with_a_bulge_is_an_arc(tmp_path):

@@ -15,12 +15,14 @@ def found(mesh):
     return {edge.name: edge for edge in edge_table.edges(mesh)}
 
 
-def test_edges_of_a_rectangle():
+def test_edges_of_a_rectangle_have_lengths_and_ends_of_a_beam_a_place():
     edges = found(fi.mesh.rectangle(0.4, 0.3, size=0.05))
     assert set(edges) == {"left", "right", "bottom", "top", "boundary"}
     assert_allclose([edges[n].length for n in ("left", "bottom", "boundary")], [0.3, 0.4, 1.4], rtol=1e-12)
     assert_allclose(edges["top"].middle, (0.2, 0.3), atol=0.026)  # the middle of a facet, half a size off at most
     assert edges["left"].n_facets == 6 and not edges["left"].curved and edges["left"].twins == ()
+    edges = found(fi.mesh.line(0.5))
+    assert edges["left"].middle == (0.0,) and edges["right"].middle == (0.5,) and edges["right"].length == 0.0
 
 
 @pytest.mark.parametrize("size", [0.2, 0.1])
@@ -31,11 +33,6 @@ def test_length_of_a_circle_converges_at_fourth_order(size):
     angle = 2.0 * np.pi / edges[name].n_facets
     assert abs(edges[name].length / np.pi - 1.0) < 1.1 * angle**4 / 480 / 4
     assert edges[name].curved and "boundary" in edges[name].twins
-
-
-def test_ends_of_a_beam_have_no_length_but_a_place():
-    edges = found(fi.mesh.line(0.5))
-    assert edges["left"].middle == (0.0,) and edges["right"].middle == (0.5,) and edges["right"].length == 0.0
 
 
 def test_rows_tell_extent_and_elements():

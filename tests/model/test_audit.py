@@ -229,13 +229,6 @@ def test_what_measured_modes_cannot_tell_is_not_known_before_the_blow():
     assert "not known before the blow: thin target, thin striker, small deflections, still air" in str(plan)
 
 
-def test_collisions_of_several_bodies_are_not_examined():
-    law = fi.Contact.linear(1e6)
-    hit = fi.collide([fi.Modes.rigid(0.1)] * 2, [fi.Touch(law, 0, 1)], speeds=[1.0, 0.0])
-    assert {each.state for each in hit.assumptions} == {"not known"} and hit.model_error == 0.0
-    assert "Model" not in hit.summary()
-
-
 @pytest.mark.slow
 def test_a_response_with_its_examiner_can_be_copied_and_pickled():
     hit = fi.strike(modal(20), BALL, LAW, at=(0.12, 0.1), speed=0.1)

@@ -147,13 +147,11 @@ def test_where_sound_damps_more_than_air_weighs_its_damping_is_named():
     assert told.number.startswith("damping ratio by the sound radiated") and told.doubtful and told.worst > 0.01
 
 
-def test_a_beam_of_unknown_width_is_not_known():
+def test_a_bar_moves_the_air_around_its_width_and_a_beam_of_unknown_width_is_not_known():
     beam = fi.analytic.beam(0.4, ends=("free", "free"), mass=0.1, first_frequency=500.0, n_modes=8)
     told = found(blow(beam, at=0.2))
     assert told.state == "not known" and "width" in told.sentence
 
-
-def test_a_bar_moves_the_air_around_its_width():
     bar = fi.Beam.rectangular(SPRUCE, width=0.05, height=0.01)
     modes = fi.analytic.beam(0.4, ends=("free", "free"), section=bar, n_modes=5)
     mass, _ = loading(modes)

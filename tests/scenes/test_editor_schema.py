@@ -67,14 +67,11 @@ def test_what_a_scene_may_not_say_violates_the_schema_and_is_refused(tmp_path, o
         fi.load_scene(tmp_path / "scene.toml").strike()
 
 
-def test_the_schema_is_one_and_knows_every_table_and_kind():
+def test_the_schema_is_one_knows_every_table_and_kind_and_is_printed_by_the_prompt(capsys):
     Draft7Validator.check_schema(SCHEMA)
     assert set(SCHEMA["properties"]) == {"title", *TABLES}
     for name, (selector, makers) in MAKERS.items():
         if selector:
             assert SCHEMA["properties"][name]["properties"][selector]["enum"] == list(makers)
-
-
-def test_the_prompt_prints_the_schema(capsys):
     assert cli.main(["schema"]) == 0
     assert json.loads(capsys.readouterr().out) == SCHEMA

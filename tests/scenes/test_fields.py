@@ -80,13 +80,10 @@ def test_stepped_bar_equals_its_objects(tmp_path):
     assert_allclose(found.frequencies, fi.find_modes(system, n_modes=6, tolerance=1e-3).frequencies, rtol=2e-3)
 
 
-def test_table_is_linear_inside_and_constant_beyond():
+def test_table_is_linear_inside_and_constant_beyond_and_of_cases_the_first_that_holds_counts():
     field = varying_field("thickness", {"x": [0.0, 1.0], "y": [0.0, 2.0], "values": [[1.0, 2.0], [3.0, 4.0]]}, 2)
     assert_allclose(field(np.array([[0.5, 1.0], [-3.0, -1.0], [9.0, 9.0], [1.0, 0.5]])), [2.5, 1.0, 4.0, 3.25])
     assert varying_field("thickness", 3e-3, 2) == 3e-3
-
-
-def test_first_case_that_holds_counts():
     cases = [{"value": 1.0, "centre": [0.0, 0.0], "radius": 1.0}, {"value": 2.0, "from": [2.0, 1.0], "to": [0.0, 0.0]}]
     field = varying_field("thickness", {"cases": cases, "otherwise": 3.0}, 2)
     assert_allclose(field(np.array([[0.5, 0.5], [1.5, 0.5], [1.5, -0.5]])), [1.0, 2.0, 3.0])

@@ -107,7 +107,7 @@ def test_tolerance_or_count_decides_how_many_modes_are_used(tmp_path):
     assert loose.modes(7).n_modes == 7
 
 
-def test_material_and_section_give_the_plate_its_own_mass(tmp_path):
+def test_material_and_section_give_the_plate_its_own_mass_unless_mass_and_frequency_rescale_it(tmp_path):
     text = edited("[target]\nmass = 0.2\nfirst_frequency = 100.0", PLATE).replace('"analytic"', '"fe"')
     modes = load_text(tmp_path, text).modes(4)
     plate = fi.Plate(fi.Material(E=10e9, nu=0.3, rho=450.0), 3e-3)
@@ -115,20 +115,14 @@ def test_material_and_section_give_the_plate_its_own_mass(tmp_path):
     assert_allclose(modes.mass, 0.465 * 0.3 * 450.0 * 3e-3, rtol=1e-12)
     # the scene refines to 1e-2, the default mesh is at least that good on the first four
     assert_allclose(modes.frequencies, finding.find_modes(system, n_modes=4).frequencies, rtol=2e-2)
-
-
-def test_mass_and_frequency_rescale_a_material(tmp_path):
     modes = load_text(tmp_path, edited("[target]", PLATE)).modes(4)
     assert_allclose([modes.mass, modes.frequencies[0]], [0.2, 100.0], rtol=1e-12)
 
 
-def test_arguments_of_the_strike_can_be_replaced(tmp_path):
+def test_scene_is_frozen_and_tells_its_data_in_which_arguments_of_the_strike_can_be_replaced(tmp_path):
     loaded = load_text(tmp_path, TITLED)
     assert loaded.run(speed=1.0).response.speed == 1.0
     assert loaded.data(speed=1.0)["strike"] == {"at": [0.1395, 0.09], "speed": 1.0, "tolerance": 1e-2}
-
-
-def test_scene_is_frozen_and_tells_its_data(tmp_path):
     loaded = load_text(tmp_path, TITLED)
     with pytest.raises(FrozenInstanceError):
         loaded.title = "other"

@@ -167,10 +167,15 @@ def test_inputs_that_make_no_sense_are_refused(scene, vary, text):
         fi.spread(scene(), vary, n=64, sobol=False)
 
 
-def test_size_is_refused_where_modes_do_not_scale(scene):
+def test_size_is_refused_where_modes_do_not_scale_and_so_are_arguments_of_others(scene):
     held = scene(RIGID.replace('boundary = "hinged"', "boundary = { stiffness = 1e4 }"))
     with pytest.raises(ValueError, match=r"target.size needs a thin body"):
         fi.spread(held, {"target.size": "uniform(0.9, 1.1)"}, n=8)
+    vary = {"striker.mass": "lognormal(0.1, 0.1)"}
+    with pytest.raises(ValueError, match="speed must be left out for a scene"):
+        fi.spread(scene(), vary, speed=1.0)
+    with pytest.raises(ValueError, match="striker must be a Striker"):
+        fi.spread(WALL, vary, at=None, speed=1.0)
 
 
 def test_sobol_indices_are_refused_for_correlated_inputs_and_without_their_library(monkeypatch):
@@ -185,14 +190,6 @@ def test_sobol_indices_are_refused_for_correlated_inputs_and_without_their_libra
     with pytest.raises(ValueError, match=r"pip install 'fem-impact\[spread\]'"):
         wall(vary, n=64, sobol=True)
     assert "pip install 'fem-impact[spread]'" in wall(vary, n=64, sobol=None).summary()
-
-
-def test_a_scene_and_a_body_take_their_own_arguments(scene):
-    vary = {"striker.mass": "lognormal(0.1, 0.1)"}
-    with pytest.raises(ValueError, match="speed must be left out for a scene"):
-        fi.spread(scene(), vary, speed=1.0)
-    with pytest.raises(ValueError, match="striker must be a Striker"):
-        fi.spread(WALL, vary, at=None, speed=1.0)
 
 
 def test_the_centroid_is_one_of_the_quantities():

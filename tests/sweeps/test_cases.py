@@ -97,12 +97,9 @@ def test_few_values_need_kernels_and_means_are_kept():
     assert np.abs(found["damping_ratio"] - given["damping_ratio"]).max() < 1.1 * 0.02 / 4 / 2
 
 
-def test_a_rigid_striker_on_bodies_of_many_frequencies_needs_one_family():
+def test_a_rigid_striker_on_bodies_of_many_frequencies_needs_one_family_and_few_values_stay():
     blows = cases.fewer_values(rows(RIGID, fi.Contact.linear(1e5), drawn(5000, "target_frequency")))
     assert len(blows.pairs[1]) == 1 and np.unique(blows.pairs[0]).tolist() == [0]
-
-
-def test_values_that_are_few_already_stay():
     some = np.array([0.0, 0.01, 0.02, 0.01])
     few = cases.fewer_values(rows(STICK, fi.Contact.linear(1e5), {"damping_ratio": some}))
     assert_array_equal(few.axes["damping_ratio"], some)

@@ -54,13 +54,10 @@ def test_the_chance_of_a_double_hit_has_wilsons_interval():
     assert none.value == none.low == 0.0 and none.high == pytest.approx(z**2 / (n + z**2))
 
 
-def test_failed_blows_are_left_out_and_counted():
+def test_failed_blows_are_left_out_and_counted_and_without_a_result_there_is_no_distribution():
     found = spread([1.0, 2.0, np.nan, 3.0], counts=np.array([1, 1, -1, 1]))
     assert found.n_failed == 1 and found.quantile("restitution", 0.5).value == 2.0
     assert "4 blows, 3 of them independent, 1 failed" in found.summary()
-
-
-def test_without_a_single_result_there_is_no_distribution():
     found = spread([np.nan, np.nan], counts=np.array([-1, -1]))
     for ask in (found.chance, lambda: found.quantile("restitution", 0.5)):
         with pytest.raises(SimulationError, match="no blow succeeded"):
@@ -126,14 +123,11 @@ def test_without_sobol_indices_rank_correlations_order_the_inputs():
     assert "square of the rank correlation" in found.summary() and "No Sobol indices: no luck" in found.summary()
 
 
-def test_impacts_that_vary_are_called_chaotic():
+def test_impacts_that_vary_are_called_chaotic_and_what_never_changes_needs_no_measurement():
     values = np.linspace(0.1, 0.9, 40)
     found = spread(values, counts=np.array([1, 2, 5, 1] * 10))
     assert found.chaotic and "from 1 to 5: such blows are chaotic" in found.summary()
     assert not spread(values).chaotic
-
-
-def test_what_never_changes_needs_no_measurement():
     found = spread(np.full(50, 0.5))
     assert found.varying == () and "Nothing varies" in found.summary()
 

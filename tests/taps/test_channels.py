@@ -33,12 +33,15 @@ def test_a_heading_ends_with_its_unit_if_it_holds_one(heading, wanted):
     assert units.label(heading) == wanted
 
 
-def test_the_force_is_found_by_its_unit_before_its_name():
+def test_the_force_is_found_by_its_unit_before_its_name_and_is_no_response():
     found = recording(["Voltage", "Force head", "cell"], ["V", "", "lbf"])
     unit = channels.stated_units(found, None)
     assert channels.force_channel(found, None, unit, "a.csv") == 2
     assert channels.force_channel(found, "head", unit, "a.csv") == 1
     assert channels.response_channels(recording(["F", "a1", "x"], ["N", "", "mm"]), None, ["N", "", "mm"], 0) == [1, 2]
+    found = recording(["Force", "a"], ["N", "g"])
+    with pytest.raises(ValueError, match=r"response must name other channels than the force, got \['a', 'Force'\]"):
+        channels.response_channels(found, ["a", "Force"], ["N", "g"], 0)
 
 
 @pytest.mark.parametrize("sign", [1.0, -1.0])
@@ -47,12 +50,6 @@ def test_forces_are_turned_around_by_their_taps_and_not_by_their_offset(sign):
     found = Recording((sign * force,), ("Force",), ("N",), 1e3)
     ((pushed, _),), *_, notes = channels.in_si(found, "a.csv", None, None, None, None)
     assert pushed.tolist() == force[:, 0].tolist() and bool(notes) == (sign < 0.0)
-
-
-def test_the_force_is_no_response():
-    found = recording(["Force", "a"], ["N", "g"])
-    with pytest.raises(ValueError, match=r"response must name other channels than the force, got \['a', 'Force'\]"):
-        channels.response_channels(found, ["a", "Force"], ["N", "g"], 0)
 
 
 def test_factors_are_to_si_times_the_scale():

@@ -82,10 +82,14 @@ def test_a_mode_that_its_range_forces_to_move_is_left_out(taps):
     assert "mode2: left out, as its ranges allow no better fit than without; widen them" in two.notes
 
 
-def test_a_smaller_fit_of_other_taps_is_refused(taps, small):
+def test_a_smaller_fit_of_other_taps_and_what_cannot_be_tried_are_refused(taps, small):
     for others in (taps[:2], taps[::-1]):
         with pytest.raises(ValueError, match=f"smaller must be a fit to the same {len(others)} taps"):
             fitted(others, STIFFNESS | LOSS, smaller=small)
+    with pytest.raises(ValueError, match="taps must be two at least"):
+        fi.propose(taps[:1], striker=HAMMER)
+    with pytest.raises(ValueError, match="striker must be rigid"):
+        fi.propose(taps, striker=fi.Striker.stick(mass=0.1, first_frequency=1e4))
 
 
 def test_a_search_that_did_not_end_says_so_where_it_would_gain(taps, small, monkeypatch):
@@ -110,10 +114,3 @@ def test_a_lossy_law_is_found_and_nothing_more():
     errors = {one.name: one.error for one in got.tried}
     assert all(one.error <= errors[one.inside] * (1.0 + 1e-3) for one in got.tried if one.inside)
     assert "left out" in got.summary() and set(got.found.compared) == set(errors)
-
-
-def test_what_cannot_be_tried_is_refused(taps):
-    with pytest.raises(ValueError, match="taps must be two at least"):
-        fi.propose(taps[:1], striker=HAMMER)
-    with pytest.raises(ValueError, match="striker must be rigid"):
-        fi.propose(taps, striker=fi.Striker.stick(mass=0.1, first_frequency=1e4))

@@ -36,12 +36,9 @@ def test_frf_of_a_file_lists_peaks_and_writes_a_table(prompt):
     assert rows.shape[1] == 5 and rows[-1, 0] == pytest.approx(12800.0, rel=0.01)
 
 
-def test_a_scene_to_compare_with_needs_a_page(prompt):
+def test_a_scene_to_compare_with_needs_a_page_and_responses_a_known_ending(prompt):
     ran = prompt("frf", TAPS, "--against", "no.toml", "--out", "frf.csv")
     assert ran.status == 2 and "give --out a folder, or a name that ends in .html" in ran.err
-
-
-def test_an_ending_of_no_file_of_responses_is_refused_before_taps_are_read(prompt):
     ran = prompt("frf", "no.lvm", "--out", "frf.xyz")
     assert ran.status == 2 and "must be one of .csv, .uff, .html, got '.xyz'" in ran.err
 
