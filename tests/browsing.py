@@ -23,6 +23,12 @@ class Page:
             assert time.monotonic() < end, f"not within {seconds} s: {expression}"
             self.tab.wait_for_timeout(20)
 
+    def box(self, plot):
+        """Place and size of a picture that is scrolled into view."""
+        canvas = self.tab.locator(f"#{plot}-plot")
+        canvas.scroll_into_view_if_needed()
+        return canvas.bounding_box()
+
     def assert_fits(self, width):
         """Nothing is wider than the page, and no text is cut off."""
         assert self.tab.evaluate("document.documentElement.scrollWidth") == width

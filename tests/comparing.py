@@ -52,6 +52,11 @@ def examined(hit, name):
     return next(each for each in hit.assumptions if each.name == name.partition(",")[0])
 
 
+def stretched(test):
+    """A slow test of bodies that stretch: one worker compiles their kernels."""
+    return pytest.mark.slow(pytest.mark.xdist_group("stretched")(test))
+
+
 def refusing(cases, call=lambda make: make(), error=ValueError):
     """A test that each case, arguments of ``call`` and a pattern of the message, is refused in these words."""
 

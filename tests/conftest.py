@@ -171,14 +171,14 @@ def chromium():
 
 @pytest.fixture
 def visit(chromium):
-    """Open pages of given size and colours; all are closed at the end."""
+    """Open pages of given size and colours, until an expression holds; all are closed at the end."""
     pages = []
 
-    def visit(address, **options):
-        page = Page(chromium, **options)
-        pages.append(page)
-        page.tab.goto(address)
-        return page
+    def visit(address, until="true", **options):
+        pages.append(Page(chromium, **options))
+        pages[-1].tab.goto(address)
+        pages[-1].until(until)
+        return pages[-1]
 
     yield visit
     for page in pages:

@@ -5,6 +5,7 @@ from functools import partial
 
 import numpy as np
 import pytest
+from comparing import stretched
 
 import fem_impact as fi
 
@@ -103,8 +104,7 @@ def test_bodies_and_schemes_that_cannot_stretch_are_refused(name):
         wrong()
 
 
-@pytest.mark.slow
-@pytest.mark.xdist_group("stretched")  # one worker compiles its kernels
+@stretched
 @pytest.mark.parametrize("name", STRETCHING)
 def test_following_the_advice_works(name):
     _, words, right = STRETCHING[name]
@@ -114,8 +114,7 @@ def test_following_the_advice_works(name):
     assert any(hit.history.stretched is not None for hit in hits) == ("leave it out" not in words)
 
 
-@pytest.mark.slow
-@pytest.mark.xdist_group("stretched")
+@stretched
 def test_steps_too_long_to_settle_are_shortened():
     """A run halves them; the motion splits those in which only the contact let the stretching forces settle."""
 

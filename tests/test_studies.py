@@ -23,6 +23,7 @@ import pytest
 import roll
 import scene_speed as speed
 import shared
+from comparing import stretched
 from numpy.testing import assert_allclose
 from scenes import ROOT
 
@@ -38,8 +39,7 @@ def test_measured_bodies_answer_within_their_stated_errors():
     assert np.median([row["force_stated"] for row in rows]) < 1e-2  # and these are not large
 
 
-@pytest.mark.slow
-@pytest.mark.xdist_group("stretched")  # one worker compiles its kernels
+@stretched
 @pytest.mark.parametrize("kind", ["stretching", "air", "quasi-static contact", "damping"])
 def test_the_models_own_error_is_told_in_random_scenes(kind):
     chatter = [37, 72] if kind == "stretching" else []  # a first touch so short that few waves have left it
@@ -168,8 +168,7 @@ def test_the_model_of_a_wooden_bar_struck_fast_fails_first_as_it_yields(tmp_path
     assert (tmp_path / "is_the_model_right.csv").read_text().count("\n") == 5
 
 
-@pytest.mark.slow
-@pytest.mark.xdist_group("stretched")
+@stretched
 def test_a_plate_with_and_without_stretching_is_drawn(tmp_path, capsys):
     right.stretched(tmp_path / "stretching.png")
     rows = [[float(x) for x in line.split()] for line in capsys.readouterr().out.splitlines()[2:]]

@@ -7,7 +7,7 @@ import gradient_contacts as several
 import gradient_grazing as grazing
 import numpy as np
 import pytest
-from comparing import changes
+from comparing import changes, stretched
 from numpy.testing import assert_allclose
 from test_history import beam_and_stop
 
@@ -17,7 +17,6 @@ from fem_impact.impact.compiled.law import table
 
 STEP, BAND, QUANTITIES = claims.STEP, claims.BAND, claims.QUANTITIES
 random_numbers, strike = claims.random_numbers, claims.strike
-GRAZING = 1.20025666  # [-] times the target's mass of the first family of `gradient_grazing`: where its impact is lost
 
 
 def assert_differences(blow, numbers, found, bound, told, turns):
@@ -440,13 +439,6 @@ def test_gradients_are_right_on_both_sides_until_they_are_refused(family):
         assert found.off < 1e-5 and found.error < 1e-5 * max(1.0, abs(found.slope)), distance
 
 
-def test_a_grazing_contact_has_no_gradient():
-    """An impact a hair deep, a push a hair short of a second one: where the bisection of `gradient_grazing` ends."""
-    for factor in (GRAZING * (1.0 - 1e-5), GRAZING * (1.0 + 1e-5)):
-        with pytest.raises(fi.SimulationError, match="no gradient next to a grazing contact"):
-            grazing.FAMILIES[0].strike(factor).gradient("contact_time")
-
-
 def test_what_has_no_gradient_says_why():
     hit, missed = ball(fi.Contact.hertz(1e6)), ball(fi.Contact.hertz(1e6, gap=1.0), mass=0.1, speed=1.0, duration=0.1)
     with pytest.raises(fi.SimulationError, match="never touched"):
@@ -460,8 +452,7 @@ def test_what_has_no_gradient_says_why():
             hit.gradient(*asked)
 
 
-@pytest.mark.slow
-@pytest.mark.xdist_group("stretched")
+@stretched
 def test_a_target_that_stretches_has_no_gradient():
     plate = fi.Plate(fi.Material(E=70e9, nu=0.3, rho=2700.0), 1e-3)
     modes = fi.find_modes(fi.assemble(fi.mesh.rectangle(0.4, 0.3), plate, {"boundary": "hinged"}), n_modes=8)

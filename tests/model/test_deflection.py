@@ -2,7 +2,7 @@ from functools import partial
 
 import numpy as np
 import pytest
-from comparing import difference, examined
+from comparing import difference, examined, stretched
 from numpy.testing import assert_allclose
 from scipy.integrate import quad, solve_ivp
 from scipy.optimize import brentq
@@ -148,8 +148,7 @@ def test_effect_on_a_blow_is_that_of_a_direct_integration(speed):
         assert 0.33 * min(each, 0.2) < told.effect[name] < 3.0 * max(each, 0.1 * max(size.values()))
 
 
-@pytest.mark.slow
-@pytest.mark.xdist_group("stretched")
+@stretched
 @pytest.mark.parametrize("speed", [0.1, 0.6])
 def test_effect_on_many_modes_is_that_of_a_blow_with_stretching(speed):
     plain, better = both(square(20), mass=0.3, at=(0.08, 0.09), speed=speed)
@@ -160,8 +159,7 @@ def test_effect_on_many_modes_is_that_of_a_blow_with_stretching(speed):
         assert size > 0.2 or told.effect[name] < 3.0 * max(size, 0.3 * told.worst)  # where the mean tension is cautious
 
 
-@pytest.mark.slow
-@pytest.mark.xdist_group("stretched")
+@stretched
 def test_what_stress_fields_left_out_change_is_less_than_what_those_kept_do():
     for speed, gong in ((0.5, False), (3.0, True)):
         how = {"mass": 0.1, "at": (0.08, 0.09), "tolerance": 1e-3, "max_impacts": None}
@@ -174,8 +172,7 @@ def test_what_stress_fields_left_out_change_is_less_than_what_those_kept_do():
         assert told.state == "not known" if gong else 0.0 < told.worst < 0.5 * found(plain).worst
 
 
-@pytest.mark.slow
-@pytest.mark.xdist_group("stretched")
+@stretched
 def test_a_sheet_that_swings_far_is_examined_in_steps_that_settle():
     """One of its slowest mode overflowed and counted as settled: nothing was to be had of the model."""
     section, at = fi.Plate(fi.Material(E=2e9, nu=0.3, rho=1400.0), 2e-4), (0.1, 0.08)
@@ -187,8 +184,7 @@ def test_a_sheet_that_swings_far_is_examined_in_steps_that_settle():
     assert told.value == pytest.approx(np.abs(hit.displacement([at], times)).max() / section.thickness, rel=0.1)
 
 
-@pytest.mark.slow
-@pytest.mark.xdist_group("stretched")
+@stretched
 def test_a_beam_between_walls_has_all_its_stretching():
     section = fi.Beam.rectangular(STEEL, width=0.02, height=H)
     beam = fi.analytic.beam(0.3, ends=("hinged", "clamped"), section=section, n_modes=10)
@@ -219,8 +215,7 @@ def test_the_sound_of_a_gong_rises():
     assert told.remedy.endswith("stretching = true holds up to deflections of the thickness")
 
 
-@pytest.mark.slow
-@pytest.mark.xdist_group("stretched")
+@stretched
 def test_a_plate_that_stretches_within_its_thickness_is_advised_to():
     """By its linear deflection it would be a gong; stretching holds it back. Struck harder, it is one even so."""
     for speed in (1.3, 4.0):
@@ -300,8 +295,7 @@ CURVED = {
 }
 
 
-@pytest.mark.slow
-@pytest.mark.xdist_group("stretched")
+@stretched
 @pytest.mark.parametrize("name", CURVED)
 def test_effect_on_curved_and_ribbed_bodies_is_that_of_a_blow_with_stretching(name):
     body, speed = CURVED[name]
@@ -318,8 +312,7 @@ def test_effect_on_curved_and_ribbed_bodies_is_that_of_a_blow_with_stretching(na
 EDGES = {"free": {}, "cantilever": {"left": "clamped"}, "between walls": {"left": "hinged", "right": "clamped"}}
 
 
-@pytest.mark.slow
-@pytest.mark.xdist_group("stretched")  # one worker compiles its kernels
+@stretched
 @pytest.mark.parametrize("name", EDGES)
 def test_effect_on_a_plate_with_free_edges_is_that_of_a_blow_with_stretching(name):
     """By the share of its edges that is held, a cantilever would stretch two fifths as much as if held all round."""
@@ -331,8 +324,7 @@ def test_effect_on_a_plate_with_free_edges_is_that_of_a_blow_with_stretching(nam
     assert told.remedy == "let it stretch, stretching = true, or take a softer blow or a thicker body"
 
 
-@pytest.mark.slow
-@pytest.mark.xdist_group("stretched")
+@stretched
 def test_too_few_stress_fields_of_a_free_cymbal_are_said(monkeypatch):
     """Twice as many and more change the restitution no further than is told."""
     how = {"stiffness": 1e5, "at": (0.14, 0.09), "speed": 0.8, "stretching": True}
@@ -344,8 +336,7 @@ def test_too_few_stress_fields_of_a_free_cymbal_are_said(monkeypatch):
     assert 1e-4 < apart < told < 5.0 * apart
 
 
-@pytest.mark.slow
-@pytest.mark.xdist_group("stretched")
+@stretched
 @pytest.mark.parametrize(("radius", "speed", "snaps"), [(4.0, 4.0, True), (4.0, 0.5, False), (-4.0, 0.5, False)])
 def test_the_snap_of_a_pressed_dome_is_said(radius, speed, snaps):
     """Pressed by its rise a dome snaps; by a tenth of it, or from below as gently, it does not."""

@@ -8,6 +8,7 @@ import signal
 import socket
 import subprocess
 import sys
+from functools import partial
 from importlib import import_module
 
 import pytest
@@ -57,12 +58,7 @@ def address(scene):
 
 @pytest.fixture
 def opened(address, visit):
-    def opened(**options):
-        shown = visit(address, **options)
-        shown.until(READY)
-        return shown
-
-    return opened
+    return partial(visit, address, until=READY)
 
 
 def ask(address, host=None, path="/", method="GET", **headers):
@@ -135,6 +131,7 @@ def test_nothing_is_asked_for_elsewhere_and_sliders_change_the_pictures(opened, 
 @pytest.mark.slow
 def test_click_moves_the_strike_point_and_the_verdict_follows(opened):
     shown = opened()
+    shown.until(MAP)  # what comes later moves the pictures
     click(shown, "body", 0.6, 0.4)
     shown.until("document.getElementById('x').value !== document.getElementById('x').defaultValue")  # sliders follow
     shown.until("document.getElementById('verdict').textContent.includes('(tolerance 0.01 met)')")
@@ -184,9 +181,7 @@ def test_quick_hand_does_not_queue_up_blows(opened):
 
 def click(shown, plot, x, y):
     """Click somewhere on a picture: shares of its width and height."""
-    canvas = shown.tab.locator(f"#{plot}-plot")
-    canvas.scroll_into_view_if_needed()
-    box = canvas.bounding_box()
+    box = shown.box(plot)
     shown.tab.mouse.click(box["x"] + x * box["width"], box["y"] + y * box["height"])
 
 
@@ -194,9 +189,7 @@ def click(shown, plot, x, y):
 def test_map_is_zoomed_by_rectangle_and_wheel_and_there_is_a_way_back(opened):
     shown = opened()
     shown.until(MAP)
-    canvas = shown.tab.locator("#map-plot")
-    canvas.scroll_into_view_if_needed()
-    box = canvas.bounding_box()
+    canvas, box = shown.tab.locator("#map-plot"), shown.box("map")
     place = [(box["x"] + a * box["width"], box["y"] + b * box["height"]) for a, b in ((0.5, 0.2), (0.8, 0.6))]
     window = "JSON.parse(document.documentElement.dataset.map)"
     mass, stiffness = shown.tab.evaluate(window)[:2]
@@ -288,8 +281,7 @@ def test_keyboard_turns_every_slider(opened):
 @pytest.mark.slow
 def test_page_says_that_the_server_has_ended(scene, visit):
     with served(scene) as (address, end):
-        shown = visit(address)
-        shown.until(READY)
+        shown = visit(address, until=READY)
         end()
         shown.until("document.getElementById('verdict').textContent.includes('has ended')")
 
@@ -310,8 +302,7 @@ def test_a_dropped_drawing_is_struck_with_yarn_and_compared(visit, tmp_path):
     leaf = tmp_path / "leaf.svg"
     leaf.write_text(LEAF)
     with served() as (address, _):
-        shown = visit(address)
-        shown.until(READY)
+        shown = visit(address, until=READY)
         root = "document.documentElement.dataset"
         shown.tab.set_input_files("#file", {"name": "bad.svg", "mimeType": "image/svg+xml", "buffer": b"<svg/>"})
         shown.until(f"{root}.bench === 'failed'")

@@ -35,9 +35,7 @@ def held(scene):
 
 @pytest.fixture
 def shown(held, visit):
-    page = visit(held[2].as_uri())
-    page.until(READY)
-    return page
+    return visit(held[2].as_uri(), until=READY)
 
 
 def positions(grid):
@@ -123,9 +121,7 @@ def test_sliders_clicks_and_questions_set_the_blow(held, shown):
     tab.evaluate("const s = document.getElementById('mass'); s.value = 0; s.dispatchEvent(new Event('input'))")
     assert tab.inner_text("#mass-said") == lesson.si(float(grid.axes["mass"][0]), "kg", 3)
     before = tab.inner_text("#numbers")
-    canvas = tab.locator("#map-plot")
-    canvas.scroll_into_view_if_needed()
-    box = canvas.bounding_box()
+    box = shown.box("map")
     tab.mouse.click(box["x"] + box["width"] - 20, box["y"] + 15)  # heavy and hard
     shown_now = "document.documentElement.dataset.shown"
     assert tab.evaluate(shown_now) == str(number(grid, (*grid.start[:2], 4, 4)))

@@ -4,6 +4,7 @@ import base64
 import html
 import json
 import re
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -46,12 +47,7 @@ def hit(scene):
 
 @pytest.fixture
 def opened(page, visit):
-    def opened(**options):
-        shown = visit(page.as_uri(), **options)
-        shown.tab.wait_for_selector("html[data-ready]")
-        return shown
-
-    return opened
+    return partial(visit, page.as_uri(), until="'ready' in document.documentElement.dataset")
 
 
 @pytest.fixture(scope="module")

@@ -1,6 +1,7 @@
 """Shipped scenes have answers to trust, but for one that shows what is said of the others, and its cure."""
 
 import pytest
+from comparing import stretched
 from scenes import SHIPPED
 
 import fem_impact as fi
@@ -17,8 +18,7 @@ def test_a_shipped_scene_has_an_answer_to_trust(name):
     assert hit.trusted, hit.verdict
 
 
-@pytest.mark.slow
-@pytest.mark.xdist_group("stretched")
+@stretched
 def test_the_scene_that_is_not_trusted_names_its_cure(tmp_path):
     text = (SHIPPED / SHOWN).read_text(encoding="utf-8")
     wrong = fi.load_scene(SHIPPED / SHOWN).strike()
