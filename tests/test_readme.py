@@ -6,6 +6,8 @@ import re
 import shlex
 import subprocess
 import sys
+from functools import partial
+from pathlib import Path
 
 import hats
 import numpy as np
@@ -72,43 +74,27 @@ def test_python_example_of_curved_plates_has_bodies_that_vibrate(monkeypatch):
     assert first == pytest.approx(28.44, rel=1e-3)  # as the scene's, in the picture of studies/README.md
 
 
-def test_python_example_of_a_plan_runs(monkeypatch, capsys):
-    monkeypatch.chdir(ROOT)
-    run_block(GUIDE, 2, fi=fi)
-    printed = capsys.readouterr().out
-    assert "tolerance 0.001 of restitution will be met" in printed
-    assert 0.2 < float(printed.splitlines()[-1]) < 0.4  # 0.314 on modes enough for 1e-4; fifty err by a few per cent
+slow = partial(pytest.param, marks=pytest.mark.slow)
 
 
-@pytest.mark.slow
-def test_python_example_of_uncertain_inputs_runs(monkeypatch, tmp_path, capsys):
-    monkeypatch.chdir(ROOT)
-    names = run_block(GUIDE.replace("spread.png", str(tmp_path / "spread.png")), 3, fi=fi)
-    assert "What to measure better" in capsys.readouterr().out
-    assert names["found"].n_failed == 0 and (tmp_path / "spread.png").is_file()
-
-
-@pytest.mark.slow
-def test_python_example_of_a_scene_as_known_runs(monkeypatch, capsys):
-    monkeypatch.chdir(ROOT)
-    names = run_block(GUIDE, 4, fi=fi)
-    assert "inputs leave open" in capsys.readouterr().out
-    assert names["known"]["restitution"].mostly == "section.thickness"
-
-
-def test_python_example_of_a_design_runs(capsys):
-    names = run_block(GUIDE, 5, fi=fi)
-    assert "design found" in capsys.readouterr().out
-    assert abs(names["found"].verify().values["mode1.frequency"] / 440.0 - 1.0) < 1e-3  # its tolerance
-
-
-@pytest.mark.slow
-def test_python_example_of_a_fit_runs(monkeypatch, capsys):
-    monkeypatch.chdir(ROOT)
-    names = run_block(GUIDE, next(i for i, each in enumerate(blocks(GUIDE, "python")) if "fi.fit(" in each), fi=fi)
-    assert "4 taps explained to 2.5 % rms" in capsys.readouterr().out
-    low, high = names["found"].interval("contact.exponent")
-    assert 1.5 < low < high < 1.9
+@pytest.mark.parametrize(("call", "words", "holds"), [  # what a block calls and prints, and what then holds
+    # 0.314 on modes enough for 1e-4; fifty err by a few per cent
+    ("plan.but(", "tolerance 0.001 of restitution will be met", lambda _, said: 0.2 < float(said.split()[-1]) < 0.4),
+    slow("fi.spread(", "What to measure better",
+         lambda names, _: names["found"].n_failed == 0 and Path("spread.png").is_file()),
+    slow("fi.band(", "inputs leave open",
+         lambda names, _: names["known"]["restitution"].mostly == "section.thickness"),
+    ("fi.design(", "design found",  # to its tolerance
+     lambda names, _: abs(names["found"].verify().values["mode1.frequency"] / 440.0 - 1.0) < 1e-3),
+    slow("fi.fit(", "4 taps explained to 2.5 % rms",
+         lambda names, _: (np.diff([1.5, *names["found"].interval("contact.exponent"), 1.9]) > 0.0).all()),
+])  # fmt: skip
+def test_python_examples_of_the_guide_run(call, words, holds, tmp_path, monkeypatch, capsys):
+    (tmp_path / "studies").symlink_to(ROOT / "studies")
+    monkeypatch.chdir(tmp_path)
+    names = run_block(GUIDE, next(i for i, each in enumerate(blocks(GUIDE, "python")) if call in each), fi=fi)
+    said = capsys.readouterr().out
+    assert words in said and holds(names, said)
 
 
 def test_first_two_commands_are_single_lines_that_install_then_run_and_test():
