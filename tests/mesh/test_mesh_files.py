@@ -249,7 +249,7 @@ def test_hanging_nodes_are_tied_in(tmp_path):
     assert_allclose(held(plate), np.pi**2 * np.array([1.25, 2.0]), rtol=1e-5)
 
 
-def test_groups_of_med_are_edges_which_may_overlap(tmp_path, read_here):
+def test_groups_of_med_are_edges_which_may_overlap(tmp_path):
     sides = GOOD.facets[np.concatenate([GOOD.edges["left"], GOOD.edges["right"]])]
     tags = [np.repeat([-6, -8], len(sides) // 2), np.full(len(GOOD.cells), -7)]
     points = np.column_stack([GOOD.points, np.zeros(len(GOOD.points))])
@@ -261,34 +261,30 @@ def test_groups_of_med_are_edges_which_may_overlap(tmp_path, read_here):
     assert [len(plate.edges[name]) for name in ("left", "ends")] == [len(sides) // 2, len(sides)]
 
 
+ABAQUS = "{}\n*Element, type=S3\n1,1,2,3\n"
+NASTRAN = "BEGIN BULK\nGRID,1,,0.,0.,0.\nGRID,2,,1.,0.,0.\n{}\nCTRIA3,1,1,1,2,3\nENDDATA\n"
+
+
 @pytest.mark.parametrize(("nodes", "said"), [
     ("*Node\n1,0,0,0\n2,1,0,0\n3,0,1,0\n2,3,0,0", "a.inp has node 2 twice; export it again"),
     ("*NODE, NSET=a\n1,0,0,0\n2,1,0,0\n** parts\n*Node\n1,5,5,0\n2,6,5,0", "several blocks of nodes"),
     ("*Node, system=C\n1,1,0,0\n2,1,90,0\n3,1,180,0", r"a.inp has \*Node, system=C, which is not read"),
     ("*Node\n1,0,0,0\n2,1,0,0\n3,0,1,0\n*Ngen\n1,3,1", r"has \*Ngen, which is not read; write all nodes by x, y"),
-])  # fmt: skip
-def test_decks_of_abaqus_whose_nodes_would_be_lost_are_refused(tmp_path, read_here, nodes, said):
-    (tmp_path / "a.inp").write_text(f"{nodes}\n*Element, type=S3\n1,1,2,3\n")
-    with pytest.raises(ValueError, match=said):
-        fi.mesh.load(tmp_path / "a.inp")
-
-
-@pytest.mark.parametrize(("grid", "said"), [
     ("GRID,3,7,1.,1.,0.", "a.bdf has nodes in coordinate system 7; export all in the global one"),
     ("GRID           3       7      1.      1.      0.", "a.bdf has nodes in coordinate system 7; export all"),
     ("GRID*                  3               7              1.              1.*\n*                     0.",
      "a.bdf has nodes in coordinate system 7; export all"),
     ("GRID,3,0,1.,1.,0.\ninclude 'b.bdf'", "a.bdf includes other files; write all into one"),
     ("GRID           3       0      1.      1.      0.", None),
-], ids=["free", "small", "large", "include", "global"])  # fmt: skip
-def test_decks_of_nastran_with_what_is_not_read_are_refused(tmp_path, read_here, grid, said):
-    text = f"BEGIN BULK\nGRID,1,,0.,0.,0.\nGRID,2,,1.,0.,0.\n{grid}\nCTRIA3,1,1,1,2,3\nENDDATA\n"
-    (tmp_path / "a.bdf").write_text(text)
+])  # fmt: skip
+def test_decks_of_abaqus_and_nastran_with_what_is_not_read_are_refused(tmp_path, nodes, said):
+    path = tmp_path / ("a.inp" if nodes[0] == "*" else "a.bdf")
+    path.write_text((ABAQUS if nodes[0] == "*" else NASTRAN).format(nodes))
     if said is None:
-        assert fi.mesh.load(tmp_path / "a.bdf").area == pytest.approx(0.5)
-        return
-    with pytest.raises(ValueError, match=said):
-        fi.mesh.load(tmp_path / "a.bdf")
+        assert fi.mesh.load(path).area == pytest.approx(0.5)
+    else:
+        with pytest.raises(ValueError, match=said):
+            fi.mesh.load(path)
 
 
 def test_quadrilaterals_are_divided(tmp_path):

@@ -90,13 +90,10 @@ def test_pages_elsewhere_can_neither_speak_to_it_nor_send_a_file(address):
     assert ask(address, None, "/drop?name=..%2Fa.svg", "POST", **own) == 200
 
 
-def test_large_requests_are_cut_off(address):
+def test_large_requests_are_cut_off_and_only_this_machine_is_served(address):
     assert ask(address, None, "/", "POST", Content_Length="100000000") in (400, 405)
     with contextlib.suppress(http.client.HTTPException, ConnectionError):  # or the line is simply cut
         assert ask(address, None, "/", Cookie="x" * 100_000) in (400, 431)
-
-
-def test_only_this_machine_is_served(address):
     port = int(address.rstrip("/").rpartition(":")[2])
     with pytest.raises(OSError):  # another address of this machine: refused unless bound to all
         socket.create_connection(("127.0.0.2", port), timeout=60).close()

@@ -88,11 +88,16 @@ def test_page_tells_whether_the_model_is_right(text):
     assert told["model_error"] >= max(each["effect"]["force"] or 0.0 for each in told["assumptions"])
 
 
-def test_downloads_hold_every_number(text, hit):
+def test_downloads_hold_every_number_and_the_page_says_where_the_mobility_ends(text, hit):
     data = json.loads(download(text, "response.json"))
     assert data["response"]["peak_force"] == hit.peak_force and len(data["impacts"]) == hit.n_impacts
     time, force = table(text, "force.csv").T
     assert (time == hit.time).all() and (force == hit.force).all()
+    data = json.loads(re.search(r'<script type="application/json" id="data">(.*?)</script>', text, re.DOTALL)[1])
+    last = table(text, "modes.csv")[-1, 0]
+    assert last < data["spectrum"]["x"][-1]  # the spectrum goes on
+    assert data["mobility"]["x"][-1] == pytest.approx(last, rel=1e-5) == data["natural"][-1]
+    assert f"modes of the struck body end at {sentences.si(last, 'Hz')}" in text
 
 
 def test_result_of_a_strike_gives_the_same_blow(scene, hit, tmp_path):
@@ -119,14 +124,6 @@ def test_a_change_that_no_option_names_is_reproduced_from_python(tmp_path):
     run = scene.run(motion=True, speed=1.0)
     told = report._command(scene, run)
     assert told.startswith("fi.load_scene(") and eval(told, {"fi": fi}).impulse == run.response.impulse
-
-
-def test_the_mobility_ends_where_the_modes_end_and_the_page_says_where(text):
-    data = json.loads(re.search(r'<script type="application/json" id="data">(.*?)</script>', text, re.DOTALL)[1])
-    last = table(text, "modes.csv")[-1, 0]
-    assert last < data["spectrum"]["x"][-1]  # the spectrum goes on
-    assert data["mobility"]["x"][-1] == pytest.approx(last, rel=1e-5) == data["natural"][-1]
-    assert f"modes of the struck body end at {sentences.si(last, 'Hz')}" in text
 
 
 @pytest.mark.slow
@@ -208,11 +205,14 @@ def test_small_numbers_have_powers(value, text):
     assert sentences.power(value) == text
 
 
-def test_nothing_fails_and_nothing_is_asked_for(desktop):
+def test_nothing_fails_or_is_asked_for_and_sounds_load(desktop):
     desktop.tab.wait_for_timeout(300)
     asked = [url for url in desktop.requests if not url.startswith(("data:", "blob:"))]
     assert desktop.errors == [] and asked == desktop.requests[:1]
     assert asked[0].startswith("file:") and desktop.tab.title() == SCRIPT
+    desktop.until("[...document.querySelectorAll('audio')].every(a => a.readyState >= 1)")
+    lengths = desktop.tab.evaluate("[...document.querySelectorAll('audio')].map(a => a.duration)")
+    assert len(lengths) >= 2 and all(0.4 < length < 4.0 for length in lengths)
 
 
 @pytest.mark.slow
@@ -266,12 +266,6 @@ def test_paper_is_light_and_shows_the_views(opened):
     assert shown.errors == []
 
 
-def test_sounds_load(desktop):
-    desktop.until("[...document.querySelectorAll('audio')].every(a => a.readyState >= 1)")
-    lengths = desktop.tab.evaluate("[...document.querySelectorAll('audio')].map(a => a.duration)")
-    assert len(lengths) >= 2 and all(0.4 < length < 4.0 for length in lengths)
-
-
 @pytest.mark.slow
 @pytest.mark.parametrize("scheme", ["light", "dark"])
 def test_page_fits_a_phone(opened, scheme):
@@ -286,14 +280,11 @@ def test_page_fits_a_phone(opened, scheme):
     assert (ink < 0.2 and paper > 0.9) if scheme == "light" else (ink > 0.8 and paper < 0.2)
 
 
-def test_keyboard_reaches_everything_and_shows_where_it_is(desktop):
+def test_keyboard_reaches_everything_and_pictures_have_a_text_for_those_who_cannot_see_them(desktop):
     tags, names, seen = zip(*desktop.tabbed_to())
     assert {"A", "BUTTON", "INPUT", "SELECT", "AUDIO"} <= set(tags)
     assert {"plot-wave", "wave-play", "wave-time", "plot-mode", "mode-pick"} <= set(names)
     assert names[0] == "Skip to the report" and all(seen)
-
-
-def test_pictures_have_a_text_for_those_who_cannot_see_them(desktop):
     tab = desktop.tab
     pictures = "[...document.querySelectorAll('[role=img], audio, [role=application]')]"
     bare = "e => !e.getAttribute('aria-label') && !e.getAttribute('aria-labelledby')"
