@@ -6,7 +6,7 @@ import re
 
 import numpy as np
 import pytest
-from scenes import SMALL
+from scenes import load_text
 
 import fem_impact as fi
 from fem_impact.model.planner import Run
@@ -25,8 +25,7 @@ def cradle():
 
 
 def test_every_object_is_short_as_text(hit, cradle, tmp_path):
-    (tmp_path / "s.toml").write_text(SMALL)
-    scene = fi.load_scene(tmp_path / "s.toml")
+    scene = load_text(tmp_path)
     run = scene.run(target="modal")
     wood = fi.Material.orthotropic(E_along=1e10, E_across=1e9, nu=0.3, G=1e9, rho=400.0)
     plate = fi.Plate(wood, 3e-3)
@@ -59,8 +58,7 @@ def test_a_figure_shows_itself_as_a_picture(hit):
 
 
 def test_a_plan_is_shown_in_words_and_a_sound_by_a_player(hit, tmp_path):
-    (tmp_path / "s.toml").write_text(SMALL)
-    plan = fi.plan(tmp_path / "s.toml")
+    plan = load_text(tmp_path).plan()
     assert html.escape(plan.reasons[0]) in plan._repr_html_()
     shown = fi.sound.synthesise(hit, duration=0.1)._repr_html_()
     assert "<audio controls" in shown and "m/s" in shown

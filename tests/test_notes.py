@@ -3,7 +3,7 @@
 from dataclasses import replace
 
 import pytest
-from scenes import SMALL
+from scenes import SMALL, load_text
 
 import fem_impact as fi
 
@@ -80,6 +80,5 @@ def test_the_report_says_the_notes(scene, tmp_path):
 
 
 def test_a_scene_without_a_material_says_nothing_about_one(tmp_path):
-    (tmp_path / "scene.toml").write_text(SMALL)
-    scene = fi.load_scene(tmp_path / "scene.toml")
+    scene = load_text(tmp_path)
     assert scene.run().notes == scene.modes(5).notes == scene.plan(target="rigid").notes == ()

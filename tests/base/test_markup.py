@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from comparing import parsed
-from scenes import TITLED
+from scenes import TITLED, load_text
 
 import fem_impact as fi
 from fem_impact._base import markup
@@ -14,8 +14,7 @@ PLATE = {"mass": 1.0, "first_frequency": 200.0}
 
 @pytest.fixture
 def scene(tmp_path):
-    (tmp_path / "small.toml").write_text(TITLED.replace("A small test", "<b>&") + "[observe]\npoints = [[0.3, 0.2]]\n")
-    return fi.load_scene(tmp_path / "small.toml")
+    return load_text(tmp_path, TITLED.replace("A small test", "<b>&") + "[observe]\npoints = [[0.3, 0.2]]\n")
 
 
 def test_scene_shows_where_it_is_struck(scene):

@@ -5,7 +5,7 @@ import re
 from dataclasses import replace
 
 import pytest
-from scenes import QUICK
+from scenes import QUICK, load_text
 
 import fem_impact as fi
 from fem_impact.cli import main
@@ -62,18 +62,13 @@ def test_a_miss_warns_and_strict_raises():
     assert issubclass(fi.ToleranceWarning, UserWarning)
 
 
-def missed_by_a_scene(tmp_path):
-    (tmp_path / "scene.toml").write_text(QUICK)
-    return fi.load_scene(tmp_path / "scene.toml")
-
-
 WAYS = {  # every way to strike; each lambda is the user's line
     "strike modes": lambda _: fi.strike(plate(10), HAMMER, SOFT, **BLOW),
     "strike with a piece of the plan": lambda _: fi.strike(plate(100), HAMMER, SOFT, n_modes=10, **BLOW),
     "strike a system": lambda _: fi.strike(meshed("hinged"), HAMMER, SOFT, n_modes=10, **BLOW),
     "plan": lambda _: fi.plan(plate(10), HAMMER, SOFT, **BLOW).strike(),
-    "scene": lambda folder: missed_by_a_scene(folder).strike(tolerance=1e-6, n_modes=5),
-    "plan of a scene": lambda folder: fi.plan(missed_by_a_scene(folder), tolerance=1e-6, n_modes=5).strike(),
+    "scene": lambda folder: load_text(folder, QUICK).strike(tolerance=1e-6, n_modes=5),
+    "plan of a scene": lambda folder: fi.plan(load_text(folder, QUICK), tolerance=1e-6, n_modes=5).strike(),
     "collide": collided,
 }
 

@@ -5,11 +5,11 @@ import subprocess
 import sys
 import time
 from dataclasses import replace
-from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from scenes import SHIPPED
 
 import fem_impact as fi
 from fem_impact.impact import collision, engine
@@ -160,7 +160,7 @@ def test_a_run_that_gives_up_takes_its_whole_share():
 def test_only_plans_that_take_long_are_compiled_at_once(monkeypatch):
     stretches: list[bool] = []
     monkeypatch.setattr(fresh, "answer", lambda compute, stretched: stretches.append(stretched) or compute())
-    plan = fi.plan(Path(__file__).parents[2] / "studies" / "scenes" / "heavy_plate.toml")
+    plan = fi.plan(SHIPPED / "heavy_plate.toml")
     for seconds in (plan.seconds, 1e3):
         replace(plan, seconds=seconds).strike()
     assert stretches == [False]
