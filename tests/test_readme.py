@@ -33,12 +33,6 @@ def run_block(page, number, **known):
     return known
 
 
-def words_of(line):
-    """The words after `fem-impact` in a command."""
-    words = shlex.split(line)
-    return words[next(i for i, word in enumerate(words) if word.endswith("fem-impact")) + 1 :]
-
-
 SIX = re.findall(r"^`((?:fem-impact|python) [^`]+)`$", README, flags=re.MULTILINE)
 LINES = [line for page in (README, GUIDE) for block in blocks(page, "sh") for line in block.splitlines()]
 OURS = [line for line in LINES + SIX if "fem-impact " in line]
@@ -86,6 +80,7 @@ slow = partial(pytest.param, marks=pytest.mark.slow)
          lambda names, _: names["known"]["restitution"].mostly == "section.thickness"),
     ("fi.design(", "design found",  # to its tolerance
      lambda names, _: abs(names["found"].verify().values["mode1.frequency"] / 440.0 - 1.0) < 1e-3),
+    slow("fi.tune(", "0.3 mm at (0.05) and (0.3) m, radius 60 mm", lambda names, _: names["found"].met),
     slow("fi.fit(", "4 taps explained to 2.5 % rms",
          lambda names, _: (np.diff([1.5, *names["found"].interval("contact.exponent"), 1.9]) > 0.0).all()),
 ])  # fmt: skip
@@ -114,7 +109,8 @@ def test_commands_shown_name_scenes_that_exist_and_load():
 
 @pytest.mark.parametrize("line", sorted(set(OURS)))
 def test_shown_commands_are_ones_the_parser_takes(line):
-    options = arguments.parser().parse_args(words_of(line))  # exits with status 2 where an option does not exist
+    words = shlex.split(re.split(r"fem-impact(?= )", line, maxsplit=1)[1])
+    options = arguments.parser().parse_args(words)  # exits with status 2 where an option does not exist
     assert "scene" not in options or options.command == "show" or options.scene.suffix in (".toml", ".lvm", ".msh")
 
 

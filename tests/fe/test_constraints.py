@@ -170,20 +170,16 @@ def test_a_clamped_disk_of_a_plate_is_a_clamped_hole(tmp_path, source):
     assert (modes.frequencies > 1.02 * post).all()  # stiffer than the point alone
 
 
-def bar_on_cords():
-    return fi.assemble(fi.mesh.line(1.0), BAR, point_supports=[((0.224,), "hinged"), ((0.776,), "hinged")])
+CORDS = [((0.224,), "hinged"), ((0.776,), "hinged")]
+FEET = [((x, y), 1e6) for x in (0.05, 0.35) for y in (0.05, 0.25)]
 
 
-def plate_on_feet():
-    feet = [((x, y), 1e6) for x in (0.05, 0.35) for y in (0.05, 0.25)]
-    return fi.assemble(fi.mesh.rectangle(0.4, 0.3), SHEET, point_supports=feet)
-
-
-@pytest.mark.parametrize(
-    ("body", "at"), [(bar_on_cords, (0.5,)), pytest.param(plate_on_feet, (0.2, 0.1), marks=pytest.mark.slow)]
-)
-def test_a_blow_on_a_body_on_posts_by_the_plan_and_by_its_modes(body, at):
-    system = body()
+@pytest.mark.parametrize(("mesh", "section", "supports", "at"), [
+    pytest.param(fi.mesh.line(1.0), BAR, CORDS, (0.5,), id="bar on cords"),
+    pytest.param(fi.mesh.rectangle(0.4, 0.3), SHEET, FEET, (0.2, 0.1), marks=pytest.mark.slow, id="plate on feet"),
+])  # fmt: skip
+def test_a_blow_on_a_body_on_posts_by_the_plan_and_by_its_modes(mesh, section, supports, at):
+    system = fi.assemble(mesh, section, point_supports=supports)
     mallet, law = fi.Striker.rigid(0.03), fi.Contact.linear(1e4)
     blow = {"at": at, "speed": 1.0, "tolerance": 1e-3}
     planned = fi.strike(system, mallet, law, **blow)

@@ -54,14 +54,11 @@ def on_foundation(space, points, cells):
     return [*kirchhoff.terms(space, points, cells), Term("K", "foundation", value)]
 
 
-def bedded():
+def test_a_theory_may_ask_its_own_section_for_another_field():
     fields = ("stiffness", "inertia", "foundation")
     made = replace(kirchhoff.ARGYRIS, name="bedded", element="on a bed", terms=on_foundation, fields=fields, **OWN)
-    return fi.assemble(fi.mesh.rectangle(*SIDES), Bedded(STEEL, THICKNESS), {"boundary": "hinged"}, theory=made)
-
-
-def test_a_theory_may_ask_its_own_section_for_another_field():
-    modes = fi.find_modes(bedded(), n_modes=6)
+    plate, held = Bedded(STEEL, THICKNESS), {"boundary": "hinged"}
+    modes = fi.find_modes(fi.assemble(fi.mesh.rectangle(*SIDES), plate, held, theory=made), n_modes=6)
     stiffness, inertia = modes.section.stiffness(np.zeros((1, 2)))[0, 0, 0], STEEL.rho * THICKNESS
     exact = np.sqrt((square_waves() ** 2 * stiffness + 3e8) / inertia)
     assert_allclose(modes.omega, exact, rtol=1e-6)  # as Kirchhoff's plate on this mesh

@@ -170,20 +170,16 @@ class Bomb:
         return Bomb.ran.append, (1,)
 
 
-def repacked(folder, **changes):
-    """Response.npz with other arrays, and a digest that fits: by somebody who knows the format."""
-    key = results._key(folder)
-    arrays = results.kept.read_arrays(folder / results.SAVED, key)
-    results.kept.write_arrays(folder / results.SAVED, key, {**arrays, **changes})
-
-
 def test_nothing_planted_runs_and_arrays_that_do_not_fit_are_refused(small, tmp_path):
-    told = json.loads(str(results.kept.read_arrays(small / results.SAVED, results._key(small))["told"]))
+    key = results._key(small)
+    arrays = results.kept.read_arrays(small / results.SAVED, key)
+    told = json.loads(str(arrays["told"]))
     steps = told["response"]["fields"]["history"]["fields"]["steps"]["array"]
 
     def planted(**changes):
         shutil.copytree(small, tmp_path / "bad", dirs_exist_ok=True)
-        repacked(tmp_path / "bad", **changes)
+        # by somebody who knows the format: a digest that fits
+        results.kept.write_arrays(tmp_path / "bad" / results.SAVED, key, {**arrays, **changes})
         return tmp_path / "bad"
 
     def spoilt(change):
