@@ -87,9 +87,10 @@ BLOWS = {f"impact.{name}" for name in ("collision", "contact", "response", "stri
 DOORS = {  # what these packages may use of those above: what a user does, and modules that hide how a blow is computed
     "live": MODELS | BLOWS | {"impact.played", "modes.viewing", "show.sampling", "show.sound"},
     "taps": MODELS | BLOWS | {
-        "fe.assembly", "impact.accuracy", "impact.engine", "impact.history", "impact.measured", "impact.quantities",
-        "impact.reduced_body", "impact.spectra", "modes.picked", "modes.universal_files", "scenes.schema",
-        "show.export", "show.figures", "show.plots", "show.sampling", "sweeps.bodies", "sweeps.hammers",
+        "fe.assembly", "fe.plausible", "impact.accuracy", "impact.engine", "impact.history", "impact.measured",
+        "impact.quantities", "impact.reduced_body", "impact.spectra", "modes.picked", "modes.universal_files",
+        "scenes.schema", "show.export", "show.figures", "show.plots", "show.sampling", "sweeps.bodies",
+        "sweeps.hammers",
     },
     "designs": MODELS | BLOWS | {
         "fe.assembly", "fe.refinement", "fe.section", "fe.slopes", "fe.system", "fe.variation", "impact.clearance",

@@ -47,8 +47,18 @@ RANGES = {
         1e-3, "smaller than a grain of rice", 50.0, "larger than anything usually struck", "m",
         "m are expected, and 465 mm is 0.465",
     ),
+    "tap": PlausibleRange(
+        5e-3, "slower than a hammer taps", 30.0, "faster than a hammer taps", "m/s",
+        "check the unit of the force and the mass of the hammer",
+    ),
+    "pulse": PlausibleRange(
+        2e-6, "shorter than a tap", 0.1, "longer than a tap", "s", "check rate, or the unit of the times, which is s",
+    ),
 }  # fmt: skip
-NAMES = {"rho": "density", "damping_ratio": "damping_ratio =", "speed": "speed", "length": "a length of"}
+NAMES = {
+    "rho": "density", "damping_ratio": "damping_ratio =", "speed": "speed", "length": "a length of",
+    "tap": "a speed of", "pulse": "a pulse of",
+}  # fmt: skip
 # [-] shapes over those expected from the mass, beyond which a remark is made: at measured points 0.3 to 3 are
 # usual, and another unit of mass gives 30
 ODD = 10.0

@@ -22,6 +22,8 @@ def in_si(
         stated = {find_channel("scale", name, found): check.number(f"scale of {name}", x) for name, x in table.items()}
     else:
         stated = {} if scale is None else {struck: check.number("scale", scale)}
+    if 0.0 in stated.values():
+        raise ValueError("scale must not be zero: it is what the numbers of a channel are multiplied with")
     factors: list[float] = []
     kinds: list[str] = []
     notes: list[str] = []

@@ -10,10 +10,11 @@ import numpy as np
 from .._base import check
 from .._base.check import SimulationError
 from .._base.rounding import SAME
+from ..fe import plausible
 from ..impact.contact import Contact
 from ..impact.striker import Striker
 from ..modes.modal import Modes
-from . import nested, predictions, solver, windows
+from . import nested, predictions, solver, triggers, windows
 from .found import Found, Watch, with_profiles
 from .nested import Inner
 from .records import Taps
@@ -194,6 +195,10 @@ def _usable_taps(taps: Taps, window: Any) -> tuple[Taps, np.ndarray, list[str]]:
         taps, taps.impulse <= 0.0, "force never pushes", "force pushes; a negative one has the wrong sign"
     )  # fmt: skip
     good &= without(
+        taps, triggers.pulls(taps.force), "force pulls as it pushes, which no contact does",
+        "force pushes more than it pulls; name the channel of the force, force="
+    )  # fmt: skip
+    good &= without(
         taps, taps.cut_short, "record begins or ends within a pulse", "record holds its whole pulse; trigger earlier"
     )  # fmt: skip
     taps = taps.pick(good)
@@ -253,6 +258,7 @@ def _fit(
     # ridges promise up to a hundredth of the sum of squares
     if not best.ended and solver.promised_fall(problem, best) > 0.01 * best.cost:
         notes.append(f"the search had not ended after {solver.ENOUGH} steps: narrow the ranges, or raise starts")
+    notes += plausible.note_number("tap", float(np.mean(problem.speeds(best.x))))
     return Found(cut, tuple(used), outliers, problem, best, minima, tuple(notes), {}, begin.watch, stuck)
 
 

@@ -326,6 +326,8 @@ class Found(check.Brief):
     def verdict(self) -> tuple[str, ...]:
         """What stands against trusting the values: what the data do not determine, what the model lacks; else none."""
         said = [f"The data do not determine {', '.join(self.unidentifiable)}"] if self.unidentifiable else []
+        if self.error > 0.5:  # sharing nothing with the taps makes it 1
+            said.append("The model does not explain the taps: check the channels, their signs and units, and the rate")
         if self.whiteness < profiles.DOUBTED:
             own = "contact.stiffness" in self.names and not self.per_tap and len(self.used) > 1
             lacks = "something, such as a stiffness for each tap (per_tap)" if own else "something"

@@ -12,6 +12,7 @@ import xarray as xr
 
 from .._base import check, markup
 from .._base.explained import lines_of_notes
+from ..fe import plausible
 from . import channels, readers, triggers
 
 RATES = (1.0, 1e9)  # [Hz] sampling rates allowed: beyond, the unit is a mistake
@@ -339,12 +340,18 @@ def read_taps(
     taps = Taps.from_arrays(
         rows, responses, rate=stated, names=names, units=kinds, overload=cut, labels=labels, pulse=pulse
     )  # fmt: skip
+    widths = [triggers.width(row) for row in taps.force]
     flat = [f"{label} ({', '.join(taps.cut_off(i))})" for i, label in enumerate(taps.labels) if any(cut[i])]
     for which, what in (
         ([label for label, n in zip(taps.labels, taps.n_pulses) if n > 1], "{}: more than one pulse, kept as one tap"),
         ([label for label, late in zip(taps.labels, taps.cut_short) if late],
          "{}: the record begins or ends within a pulse"),
         (flat, "cut off by the range of the channel: {}"),
+        ([label for label, back in zip(taps.labels, triggers.pulls(taps.force)) if back],
+         "{}: the force pulls as it pushes, which no contact does; name its channel, force="),
+        ([label for label, n in zip(taps.labels, widths) if n < 2],
+         "{}: a pulse of a single sample, which is a spike, or the rate is too low for it"),
     ):  # fmt: skip
         said += [what.format(", ".join(which))] if which else []
+    said += plausible.note_number("pulse", float(np.median(widths)) / stated)
     return Taps(taps.table, (*notes, *more, *said))

@@ -65,6 +65,18 @@ def cut_short(force: np.ndarray) -> np.ndarray:
     return np.maximum(force[..., 0], force[..., -1]) > EDGE * force.max(axis=-1)
 
 
+def width(force: np.ndarray) -> int:
+    """Samples of the largest pulse of a tap (n_times,) above half of its peak."""
+    low = np.flatnonzero(np.append(force, -np.inf) <= 0.5 * force.max())
+    after = int(np.searchsorted(low, force.argmax()))
+    return int(low[after] - (low[after - 1] if after else -1)) - 1
+
+
+def pulls(force: np.ndarray) -> np.ndarray:
+    """Whether records (..., n_times) pull more than half as hard as they push: no contact does, a filter rings less."""
+    return -force.min(axis=-1) > 0.5 * force.max(axis=-1)
+
+
 def pulse_reach(force: np.ndarray, start: int, before: int, after: int) -> tuple[int, int]:
     """Samples before and after the first one of a tap with which its record is not `cut_short`."""
     room = force[start - before : start + after]
@@ -136,20 +148,37 @@ def is_clipped(values: np.ndarray, full_scale: float | None = None) -> bool:
         return False
     if full_scale is not None and top >= full_scale * (1.0 - SAME):
         return True
-    at_top = (np.abs(values) >= top * (1.0 - SAME)).astype(int)
-    runs = np.convolve(at_top, np.ones(CLIPPED, int), mode="valid")
-    return bool(runs.max(initial=0) >= CLIPPED)
+    at_top = np.abs(values) >= top * (1.0 - SAME)
+    runs = np.convolve(at_top.astype(int), np.ones(CLIPPED, int), mode="valid")
+    return bool(runs.max(initial=0) >= CLIPPED) and has_edges(values, at_top)
+
+
+def has_edges(values: np.ndarray, at_top: np.ndarray) -> bool:
+    """Whether the samples at the top of a channel (n_times,) are cut off rather than round in steps of the converter.
+
+    A parabola in steps whose top step holds n samples has fallen by nine steps n samples later.
+    """
+    ends = np.flatnonzero(np.diff(at_top.astype(int), prepend=0, append=0)).reshape(-1, 2)
+    first, end = ends[np.diff(ends)[:, 0].argmax()]
+    beside = [max(0, 2 * first - end), min(len(values), 2 * end - first) - 1]
+    steps = np.diff(np.unique(values))
+    step = float(steps[steps > SAME * np.ptp(values)].min(initial=np.inf))
+    counts = (values[first] - values) / step
+    if np.median(np.abs(counts - np.round(counts))) > 0.1:  # they have no common step
+        return True
+    return float(np.abs(counts[beside]).max()) > 16.0  # a pulse is no parabola all the way down
 
 
 def ceiling(rows: list[np.ndarray]) -> float:
     """Largest value that a channel can show, if its segments (n_samples,) reach it; else infinity.
 
-    That is a largest value which `CLIPPED` samples share, two of them neighbours.
+    That is a largest value which `CLIPPED` samples share, two of them neighbours, beside which the channel falls.
     """
     top = max(float(row.max()) for row in rows)
-    reached = [row >= top * (1.0 - SAME) for row in rows]
-    count = sum(int(each.sum()) for each in reached)
-    return top if count >= CLIPPED and any((each[1:] & each[:-1]).any() for each in reached) else np.inf
+    reached = [(row, row >= top * (1.0 - SAME)) for row in rows]
+    count = sum(int(each.sum()) for _, each in reached)
+    sure = any((each[1:] & each[:-1]).any() and has_edges(row, each) for row, each in reached)
+    return top if count >= CLIPPED and sure else np.inf
 
 
 def cut_taps(

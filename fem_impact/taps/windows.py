@@ -78,6 +78,11 @@ def cut_to_window(taps: Taps, window: Any) -> Taps:
             ends.append(later[-1][1] if later else 1)
         # 1.5 times the length of the pulses after them, where the body's answer still shows
         last = 2.5 * max(max(ends), BEFORE) / taps.rate
+        if max(ends) > 10_000:  # a second hit comes within 50 ms; searches would take minutes
+            raise ValueError(
+                f"window must be given: the force is above a tenth of its peak again {max(ends) / taps.rate:.2g} s "
+                "after its onset, by hum or noise; check the channel and the rate, or give window=(before, after)"
+            )
     starts = np.round(taps.onset * taps.rate).astype(int)
     before, after = round(float(first) * taps.rate), round(float(last) * taps.rate)
     before, after = min(before, int(starts.min())), min(after, int(len(taps.time) - starts.max()))

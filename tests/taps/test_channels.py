@@ -55,3 +55,8 @@ def test_forces_are_turned_around_by_their_taps_and_not_by_their_offset(sign):
 def test_factors_are_to_si_times_the_scale():
     assert channels.factor("F", "kN", "N", 2.0, "a") == (2e3, [])
     assert channels.factor("F", "", "N", None, "a") == (1.0, ["F: no unit stated, N assumed"])
+
+
+def test_a_scale_of_zero_is_refused():
+    with pytest.raises(ValueError, match="scale must not be zero"):
+        channels.in_si(recording(["Force"], ["N"]), "a.csv", None, None, 0.0, None)

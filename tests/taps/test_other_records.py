@@ -218,3 +218,43 @@ def test_taps_of_the_wrong_sign_and_empty_ones_are_left_out(force):
     assert said(made, "offsets of the force were removed")
     with pytest.raises(ValueError, match="a negative one has the wrong sign"):
         fitted(fi.Taps.from_arrays(-rows[:1], rate=RATE))
+
+
+STIFFNESS = {"unknown": {"contact.stiffness": RANGES["contact.stiffness"]}, "contact": LAW, "starts": 1}
+
+
+def test_an_acceleration_in_place_of_the_force_is_told_and_refused(force, read):
+    ringing = np.convolve(force, np.cos(np.arange(200) / 2.0) * np.exp(-np.arange(200) / 40.0))[: len(force)]
+    taps = read(ringing)
+    assert said(taps, "the force pulls as it pushes, which no contact does; name its channel, force=")
+    with pytest.raises(ValueError, match="force pushes more than it pulls; name the channel of the force"):
+        fitted(taps, **STIFFNESS)
+
+
+def test_hum_is_refused_before_searches_that_take_minutes(force, read):
+    hum = 0.2 * force.max() * np.sin(2.0 * np.pi * 50.0 * np.arange(len(force)) / RATE)
+    said = r"window must be given: .* again .* s after its onset, by hum or noise; check the"
+    with pytest.raises(ValueError, match=said):
+        fitted(read(force + hum), **STIFFNESS)
+
+
+@pytest.mark.parametrize(("factor", "doubted"), [(1e-3, "slower"), (1.0, None), (1e3, "faster")])
+def test_a_slip_in_the_unit_of_the_force_shows_in_the_speed(force, read, factor, doubted):
+    made = fitted(read(factor * force, "Kraft [N]"), **STIFFNESS)
+    assert said(made, "m/s is") == bool(doubted) == said(made, f"m/s is {doubted} than a hammer taps; check the unit")
+
+
+def test_what_the_model_does_not_explain_is_said(force):
+    pulses = [np.pad(np.sin(np.linspace(0.0, np.pi, n)), (50, 250 - n)) for n in (8, 80, 200)]  # of three rates
+    made = fitted(fi.Taps.from_arrays(force.max() * np.array(pulses), rate=RATE), **STIFFNESS)
+    assert made.error > 0.5 and "The model does not explain the taps: check the channels" in made.summary()
+
+
+def test_pulses_that_no_hammer_makes_are_told(force, read, tmp_path):
+    plain, spike = force.copy(), force.copy()
+    spike[1000] = 50.0 * force.max()  # every tap is below the trigger
+    assert said(read(spike), "tap 1: a pulse of a single sample, which is a spike")
+    assert not any("a pulse of" in note for note in read(plain).notes)
+    for rate, what in ((1e3 * RATE, "shorter"), (1e-3 * RATE, "longer")):  # times in other units
+        np.savez(tmp_path / "a.npz", force=force[int(RATE * BEFORE) - 50 :][:150], rate=rate)
+        assert said(fi.read_taps(tmp_path / "a.npz"), f"s is {what} than a tap; check rate, or the unit of the times")

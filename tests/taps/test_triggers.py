@@ -82,6 +82,15 @@ def test_a_flat_top_is_clipping_and_a_round_one_is_not():
     assert triggers.is_clipped(pulse, full_scale=1.0)
 
 
+@pytest.mark.parametrize("bits", [8, 12, 16])
+def test_a_round_top_in_steps_of_a_fast_converter_is_no_clipping(bits):
+    pulse = np.concatenate([np.zeros(50), 0.97 * half_sine(4001) ** 1.3, np.zeros(50)])
+    steps = np.round(pulse * 2**bits) / 2**bits  # a hundred and more samples at the top with 8 bits, six with 16
+    cut = np.minimum(steps, steps[1500])
+    assert not triggers.is_clipped(steps) and triggers.ceiling([steps, 0.5 * steps]) == np.inf
+    assert triggers.is_clipped(cut) and triggers.ceiling([cut, 0.5 * steps]) == steps[1500]
+
+
 def test_a_tap_begins_at_a_twentieth_of_its_peak_whatever_its_offset():
     assert triggers.onset(np.repeat([0.0, 0.03, 0.08, 1.0, 0.0, 0.0], 100)) == 200
     wide = np.pad(half_sine(701), (290, 10))  # over seven tenths of the record
