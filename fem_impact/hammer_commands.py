@@ -123,6 +123,7 @@ def run_frf(options: argparse.Namespace) -> replies.Answer:
     said = [
         *lines_of_notes(measured.notes),
         replies.as_table(rows, ("response", "peak at", "magnitude", "coherence", "within")),
+        *([] if rows else ["No peak is larger than its error"]),
     ]
     data = {"peaks": peaks, "notes": measured.notes}
     if not files:

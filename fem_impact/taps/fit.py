@@ -259,6 +259,12 @@ def _fit(
     if not best.ended and solver.promised_fall(problem, best) > 0.01 * best.cost:
         notes.append(f"the search had not ended after {solver.ENOUGH} steps: narrow the ranges, or raise starts")
     notes += plausible.note_number("tap", float(np.mean(problem.speeds(best.x))))
+    values = problem.values(best.x)
+    notes += [
+        f"{each.name} is {values[each.name]:.3g} in the best fit, outside its range of {each.low:g} to {each.high:g}"
+        for each in setting.unknown
+        if not each.low * (1.0 - SAME) <= values[each.name] <= each.high * (1.0 + SAME)
+    ]
     return Found(cut, tuple(used), outliers, problem, best, minima, tuple(notes), {}, begin.watch, stuck)
 
 

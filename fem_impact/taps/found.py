@@ -21,7 +21,7 @@ from .predictions import Prediction
 from .profiles import Profile, Scatter
 from .records import Taps
 from .solver import Problem, Solution
-from .unknowns import UNITS, changed_contact, unit_of
+from .unknowns import UNITS, Unknown, changed_contact, unit_of
 
 Watch = Callable[[int, int], Any]
 
@@ -426,7 +426,11 @@ def _coordinate(problem: Problem, x: np.ndarray, name: str) -> tuple[Problem, np
         other = replace(problem, momentum=False)
         return other, problem.moved(x, other), problem.n_shared + i
     j = [each.name for each in problem.setting.unknown].index(shared)
-    free = tuple(problem.setting.unknown[j] if k == j else each for k, each in enumerate(problem.free))
+    given = problem.setting.unknown[j]
+    value = problem.values(x)[shared]
+    if not given.low <= value <= given.high:  # a stiffness, as its contact time is what is sought
+        given = Unknown(shared, min(given.low, value / 30.0), max(given.high, 30.0 * value))
+    free = tuple(given if k == j else each for k, each in enumerate(problem.free))
     own = tuple(each.name for each, before in zip(free, problem.free) if before.name in problem.own)
     other = replace(problem, free=free, own=own, centre=i if number else None)
     return other, problem.moved(x, other), j

@@ -66,11 +66,16 @@ def frf(options: Any) -> Responses:
 
 
 def peaks(found: xr.Dataset) -> list[dict[str, Any]]:
-    """The largest peaks of each response: frequency [Hz], magnitude, unit; coherence and error, None if not known."""
+    """The largest peaks of each response: frequency [Hz], magnitude, unit; coherence and error, None if not known.
+
+    Peaks smaller than their error are left out.
+    """
     rows = []
     for k, name in enumerate(found["channel"].values):
         size = np.abs(found["H"].values[1:, k])
         places = picked.peaks(size)
+        if "error" in found:
+            places = places[~(found["error"].values[1 + places, k] >= size[places])]
         largest = np.sort(places[np.argsort(-size[places])][:20])  # more do not fit a screen
         for i in largest:
             sure = [float(found[x].values[1 + i, k]) if x in found else None for x in ("coherence", "error")]

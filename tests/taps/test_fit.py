@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from hammer_taps import LAW, MASS, RANGES, RATE, STRUCTURE, fitted, taps_of
+from hammer_taps import LAW, MASS, RANGES, RATE, STRUCTURE, fitted, said, taps_of
 
 import fem_impact as fi
 
@@ -182,3 +182,12 @@ def test_a_second_mode_is_found_from_the_best_fit_without_it():
     ]  # fmt: skip
     assert made[0].best.cost == pytest.approx(made[1].best.cost, rel=1e-3)
     assert made[0].best.cost < made[0].minima[-1] and not made[0].notes
+
+
+def test_a_stiffness_beyond_its_range_is_said_and_has_its_interval():
+    taps = taps_of(noise=0.002)
+    made = fitted(taps, striker=fi.Striker.rigid(MASS), unknown={"contact.stiffness": (1.0, 1e3)})  # in other units
+    assert said(made, "in the best fit, outside its range of 1 to 1000")
+    low, high = made.interval("contact.stiffness")
+    assert low < 5e8 < high < 1.1 * low
+    assert not said(fitted(taps, unknown={"contact.stiffness": (1e6, 1e11)}), "outside its range")

@@ -92,6 +92,8 @@ def test_peaks_of_five_times_their_surroundings_are_listed_and_lower_ones_are_no
         {"frequency": frequency, "channel": ["a"]},
     )  # fmt: skip
     assert [each["frequency"] for each in prompt.peaks(found)] == [100.0]
+    unsure = [found.assign(error=(("frequency", "channel"), np.full((400, 1), error))) for error in (7.0, 9.0, np.nan)]
+    assert [len(prompt.peaks(each)) for each in unsure] == [1, 0, 1]  # a peak smaller than its error is none
 
 
 @pytest.fixture(scope="module")
