@@ -205,6 +205,8 @@ def measure(
         raise ValueError(f"hit must have one contact, between hammer and structure, got {len(hit.contacts)}")
     if hit.history.stretched is not None:
         raise ValueError("hit must be on a structure that does not stretch; strike it with stretching=False")
+    if rig.tip_mass >= hit.bodies[0].mass:
+        raise ValueError(f"tip_mass must be less than the striker's {hit.bodies[0].mass:g} kg, got {rig.tip_mass:g} kg")
     last = max((impact.end for impact in hit.impacts), default=0.0)
     span = last + 0.02 if duration is None else check.positive("duration", duration, "s") - before
     if span <= 0.0:

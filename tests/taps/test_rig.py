@@ -144,5 +144,5 @@ test_wrong_rigs_are_refused = refusing([
     ({"duration": 1e-4}, "longer than before"), ({"duration": 1e4}, "duration must be shorter"), ({"bits": 1}, "bits"),
     ({"anti_alias": (0, 1e3)}, "order"), ({"quantity": "jerk"}, "quantity must be one of"),
     ({"noise": 0.01}, "rng must be given"), ({"noise": 0.01, "rng": -1}, "a seed of whole numbers"),
-    ({"noise": 0.01, "rng": 0.5}, "rng must be"),
+    ({"noise": 0.01, "rng": 0.5}, "rng must be"), ({"tip_mass": 2.0}, "tip_mass must be less than the striker's"),
 ], lambda wrong: measured(**wrong))  # fmt: skip
