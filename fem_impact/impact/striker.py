@@ -381,7 +381,7 @@ class Striker(check.Brief):
     def _check_free(self, what: str) -> None:
         """Raise ValueError if the striker does not fall freely."""
         if self.hand is not None:
-            raise ValueError(f"striker must fall freely to {what}, but a hand holds this one; leave it free")
+            raise ValueError(f"striker must fall freely to {what}, a hand holds this one; leave gravity or hand out")
         if self.aslant or (self.modes.n_rigid == 1 and self.felt_mass < (1.0 - 1e-9) * self.mass):
             raise ValueError(f"striker must fall freely to {what}, but this one turns or comes aslant; give its speed")
 

@@ -31,6 +31,17 @@ from .fields import heights, over_frequency, tapered_size, varying_field
 
 WORD = r"""(?:[\w-]++|"[^"\\\n]*+(?:\\.[^"\\\n]*+)*+"?|'[^'\n]*+'?)"""  # unclosed, too: each is passed once
 DOTTED = re.compile(rf"{WORD}(?:[ \t]*+\.[ \t]*+{WORD}){{0,15}}+(?P<more>[ \t]*+\.[ \t]*+{WORD})?")  # a scene has two
+# the last character of what is valid in a line, and what follows -> how it is written
+SLIPS = (
+    (r".[+-]?\.\d", "numbers begin with a digit, as 0.5 does"),
+    (r"\d\.", "numbers end with a digit, as 5.0 does"),
+    (r"\d,\d", "decimals stand behind a point"),
+    (r"\d([eE]|\d)", "numbers are written as 3, 0.3 or 3e-3"),
+    (r"\d[-+*/^]", "numbers are written out, not computed"),
+    (r"\d[^],}]", "numbers stand alone, in SI units"),
+    (r".(?i:true|false)\b", "true and false are written small"),
+    (r".([^\W\d]|[“”„‘’«])", 'text stands between straight quotes, "so"'),
+)
 LARGEST_FILE = 1_000_000  # [byte] a scene is written by hand, so a larger file is a mistake
 
 
@@ -312,7 +323,23 @@ def read_tables(path: Path) -> dict[str, Any]:
         raise scene_error(path, "a scene must be UTF-8 text; save it in that encoding") from None
     except (tomllib.TOMLDecodeError, RecursionError) as error:
         said = str(error).replace("Cannot overwrite a value", "the same key is given twice in one table")
-        raise scene_error(path, f"not valid TOML: {said}") from None
+        said = re.sub(r"Cannot declare \('(.*?)',?\) twice", r"the table [\1] stands twice", said)
+        raise scene_error(path, f"not valid TOML: {said}{_slip(text, said)}") from None
+
+
+def _slip(text: str, said: str) -> str:
+    """The line at which a TOML file is not valid, and how what stands there is written, for the error that says so."""
+    place = re.search(r"line (\d+), column (\d+)", said)
+    if place is None:
+        return ""
+    line, column = text.replace("\r\n", "\n").split("\n")[int(place[1]) - 1], int(place[2]) - 1
+    around = line[:column].rstrip()[-1:] + line[column:].lstrip()
+    advice = [words for pattern, words in SLIPS if re.match(pattern, around)]
+    if "Unclosed" in said:
+        advice = ["a comma or a bracket is missing, or a number has a unit"]
+    elif "after a statement" not in said and "Invalid value" not in said:
+        advice = []
+    return f" {check.shown(line.strip())}" + "".join(f"; {words}" for words in advice[:1])
 
 
 def toml_text(tables: Mapping[str, Any]) -> str:

@@ -40,7 +40,7 @@ test_errors_name_argument_rule_and_value = refusing([
     (lambda: fi.Striker.hammer(0.0, 0.1, stiffness=1e3), "head"),
     (lambda: fi.Striker.hammer(0.1, 0.1, stiffness=-1.0), "stiffness"),
     (lambda: fi.Striker.stick(mass=0.1, first_frequency=1e3).dropped(0.3), "turns or comes aslant; give its speed"),
-    (lambda: fi.Striker.rigid(0.1).held(fi.Hand(stiffness=100.0)).dropped(0.3), "but a hand holds this one"),
+    (lambda: fi.Striker.rigid(0.1).held(fi.Hand(stiffness=100.0)).dropped(0.3), "a hand holds this one; leave"),
     (lambda: fi.Striker.stick(0.06, 500.0).held(fi.Hand(1e6)),
      "stiffness of the hand must keep the striker below 0.3 of its bending"),
     (lambda: fi.Striker.rigid(0.1).held(3.0), "hand must be a Hand of fi.Hand"),

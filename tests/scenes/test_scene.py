@@ -218,11 +218,23 @@ def test_points_beside_the_body_are_refused_before_anything_is_computed(tmp_path
         (b"", r"\[mesh\] is missing"),
         (b"mesh = 3", r"mesh must be a table, written \[mesh\]"),
         (b"a = " + b"[" * 50_000, "not valid TOML"),
+        (b"a = 1.0\r\nb = [-.3]\r\n", r"line 2, column 6\) 'b = \[-.3\]'; numbers begin with a digit, as 0.5 does"),
+        (b"a = 5.", r"'a = 5.'; numbers end with a digit, as 5.0 does"),
+        (b"a = 0,4", r"'a = 0,4'; decimals stand behind a point"),
+        (b"a = 03", r"'a = 03'; numbers are written as 3, 0.3 or 3e-3"),
+        (b"a = 1 / 3", r"'a = 1 / 3'; numbers are written out, not computed"),
+        (b"a = 400 mm", r"'a = 400 mm'; numbers stand alone, in SI units"),
+        (b"a = [1 2]", r"'a = \[1 2\]'; a comma or a bracket is missing, or a number has a unit"),
+        (b"[mesh]\n[mesh]", r"the table \[mesh\] stands twice \(at line 2, column 6\)"),
+        (b"a = True", r"'a = True'; true and false are written small"),
+        (b"a = steel", """'a = steel'; text stands between straight quotes, "so"$"""),
+        (b"a 3", r"Expected '=' after a key in a key/value pair \(at line 1, column 3\) 'a 3'$"),
         (b"a" + b".a" * 50_000 + b" = 1", "a key must have at most 16 parts between dots, got 'a.a.*' and more"),
         (b"[" + b'"."."\\"" . ' * 9 + b"a]", "a key must have at most 16 parts between dots"),
     ],
-    ids=["marked", "nothing", "no table", "nested", "dotted", "quoted"],
-)
+    ids=["marked", "nothing", "no table", "nested", "point first", "point last", "comma", "zero", "ratio", "unit",
+         "no comma", "twice", "True", "bare", "no equals", "dotted", "quoted"],
+)  # fmt: skip
 def test_file_that_is_no_scene_is_told_so(tmp_path, raw, text):
     (tmp_path / "scene.toml").write_bytes(raw)
     with pytest.raises(ValueError, match=text):
