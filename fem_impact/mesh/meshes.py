@@ -325,8 +325,9 @@ def load(path: Any, *, unit: str | None = None) -> Mesh:
     facets = np.concatenate(loops)
     number = {(min(a, b), max(a, b)): i for i, (a, b) in enumerate(facets.tolist())}
     curve = smooth_edges.recover_rim(points, loops, {number[pair]: at for pair, at in given.items() if pair in number})
-    if curve.n_curved and not given:
-        notes.append(f"{curve.n_curved} sides of the rim were replaced by smooth curves through their ends")
+    n_curved = np.count_nonzero(is_curved(points[facets], curve[0]))
+    if n_curved and not given:
+        notes.append(f"{n_curved} sides of the rim were replaced by smooth curves through their ends")
     edges = {name: np.array(sorted(number[p] for p in found if p in number), int) for name, found in pairs.items()}
     edges = {name: found for name, found in edges.items() if len(found)}
     inside = sorted(set(pairs) - set(edges))
@@ -343,7 +344,7 @@ def load(path: Any, *, unit: str | None = None) -> Mesh:
         start += len(loop)
     edges["boundary"] = np.arange(len(facets))
     made = Mesh(
-        points, cells, facets, edges, curve.middles, curve.tangents, curve.curvatures,
+        points, cells, facets, edges, *curve,
         size=float(mesh_files.side_lengths(points, cells).max()) / LONGEST, size_stated=False,
         notes=tuple(f"{Path(path).name}: {note}" for note in notes),
         rise=None if heights is None else table(*heights),

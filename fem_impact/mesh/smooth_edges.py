@@ -1,10 +1,8 @@
 """Fit tangents and curvatures to a rim known only by its points, as in a mesh file."""
 
-from dataclasses import dataclass
-
 import numpy as np
 
-from .facets import angles, cross_product, is_curved, slopes_and_bends
+from .facets import angles, cross_product, slopes_and_bends
 
 # [rad] a vertex where the rim turns by more is a corner: ten facets of a circle turn by 36 degrees each
 CORNER = np.radians(35.0)
@@ -17,18 +15,11 @@ JOINT = 0.05
 ARM = 2  # [-] points used on each side of a vertex to fit curves other than circles: a quartic through five, order 4
 
 
-@dataclass(frozen=True, eq=False)
-class SmoothRim:
-    """The fitted curve, facet by facet."""
-
-    middles: np.ndarray  # (n_facets, 2) [m]
-    tangents: np.ndarray  # (n_facets, 2, 2) unit tangent at both ends
-    curvatures: np.ndarray  # (n_facets, 2) [1/m] at both ends
-    n_curved: int  # number of curved facets
-
-
-def recover_rim(points: np.ndarray, loops: list[np.ndarray], given: dict[int, np.ndarray]) -> SmoothRim:
-    """Recover the curve that a rim was drawn with.
+def recover_rim(
+    points: np.ndarray, loops: list[np.ndarray], given: dict[int, np.ndarray]
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Recover the curve that a rim was drawn with: of each facet its middle (n_facets, 2) [m], and the unit tangents
+    (n_facets, 2, 2) and curvatures (n_facets, 2) [1/m] at both ends.
 
     Parameters
     ----------
@@ -50,8 +41,7 @@ def recover_rim(points: np.ndarray, loops: list[np.ndarray], given: dict[int, np
             known = np.array([given[f] for f in facets]) if all(f in given for f in facets) else None
             middles[facets], tangents[facets], curvatures[facets] = _fit(place, closed, known)
         join_smoothly(np.column_stack([np.roll(numbers, 1), numbers]), tangents, curvatures)
-    curved = is_curved(points[np.concatenate(loops)], middles)
-    return SmoothRim(middles, tangents, curvatures, int(curved.sum()))
+    return middles, tangents, curvatures
 
 
 def join_smoothly(pairs: np.ndarray, tangents: np.ndarray, curvatures: np.ndarray) -> None:

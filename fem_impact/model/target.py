@@ -71,7 +71,7 @@ class Stages:
     """Wall time of each stage; ``watch`` may display the stages, and the log of the package reports them."""
 
     def __init__(self, watch: Watch | None = None) -> None:
-        self.watch: Watch = watch or (lambda name: nullcontext())
+        self.watch: Watch = watch or nullcontext
         self.seconds: dict[str, float] = {}
 
     @contextmanager

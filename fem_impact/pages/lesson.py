@@ -77,7 +77,7 @@ def write(
     check.extra("jinja2", "web", "a page")
     if scene.stroke:
         raise ValueError("scene must have a single blow: the page changes one; leave its strokes out")
-    watch = watch or (lambda name: nullcontext())
+    watch = watch or nullcontext
     with watch("modes"):
         setup = Setup.of(scene)
     with watch("blows"):

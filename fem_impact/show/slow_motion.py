@@ -6,13 +6,14 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from matplotlib import font_manager
 from PIL import Image, ImageDraw, ImageFont
 
 from .._base import check
 from .._base.files import replacing, write_whole
 from ..impact.response import Response
 from . import canvas, figures, pictures, sampling
-from .style import BLUE, VERMILION, font_file, pixels
+from .style import BLUE, STYLE, VERMILION, pixels
 
 SIDE, STRIP = (540, 480), 60  # [px] size of the force's picture, and height of the strip with the caption
 LETTERS = 20  # [px] height of the caption's letters: legible at half the size
@@ -96,7 +97,7 @@ def _clock(seconds: float) -> str:
 
 def _composed(response: Response, times: np.ndarray, said: list[Caption]) -> Iterator[Image.Image]:
     """Pictures of the body, the force and the caption, at the given times [s]."""
-    face = ImageFont.truetype(font_file(), LETTERS)
+    face = ImageFont.truetype(str(font_manager.findfont(STYLE["font.family"])), LETTERS)
     force, spot = _force(response, times[-1])
     slower = float(f"{len(times) / canvas.RATE / times[-1]:.2g}")
     for time, picture in zip(times, pictures.frames_at(response, times)):

@@ -8,7 +8,6 @@ from typing import Any
 import matplotlib
 import numpy as np
 from cycler import cycler
-from matplotlib import font_manager
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
@@ -91,8 +90,3 @@ def pixels(figure: Figure, dpi: float) -> np.ndarray:
     canvas = FigureCanvasAgg(figure)
     canvas.draw()
     return np.asarray(canvas.buffer_rgba())[..., :3].copy()
-
-
-def font_file() -> str:
-    """The file of the letters of all figures, for text in pictures by other means."""
-    return str(font_manager.findfont("DejaVu Sans"))
