@@ -367,9 +367,8 @@ class Body(check.Brief):
         made = dents.settle_dents(made, unit_loads, self.solid)
         odd = (*plausible.imported_notes(self.nodes, self.shapes, self.mass), *[NOTE] * bool(made.omega.any()))
         sideways = free_body.shapes_sideways(self.shapes[kept], ways[kept], made.n_modes)
-        notes = [
-            note for note in made.notes if not note.startswith("shapes are")
-        ]  # along one direction they may be small
+        # along one direction they may be small
+        notes = [note for note in made.notes if not note.startswith("shapes are")]
         return replace(made, shapes=replace(made.shapes, sideways=sideways), notes=plausible.together(notes, odd))
 
     def way(self, where: Any, direction: Any = "normal") -> np.ndarray:

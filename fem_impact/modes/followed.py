@@ -47,12 +47,6 @@ def columns(lines: MeasuredLines, poles: np.ndarray) -> np.ndarray:
     return np.vstack([found.real, found.imag])
 
 
-def column_slopes(lines: MeasuredLines, poles: np.ndarray) -> np.ndarray:
-    """By logarithms of frequencies and then of damping ratios, of the columns of modes, (2 n, 2 n_modes)."""
-    found = np.hstack(list(picked.unit_responses(lines.s, lines.weight, poles)[1]))
-    return np.vstack([found.real, found.imag])
-
-
 def fitted(lines: MeasuredLines, poles: np.ndarray) -> Passive:
     """Amplitudes above zero of given poles; poles without any are left out."""
     basis = columns(lines, poles)
@@ -120,7 +114,8 @@ def _moved(lines: MeasuredLines, kept: Passive) -> Passive:
         n = kept.poles.shape[1]
         basis = columns(lines, kept.poles)[:, np.append(kept.amplitudes[:2] > 0.0, np.ones(n, bool))]
         basis /= np.linalg.norm(basis, axis=0)
-        steep = column_slopes(lines, kept.poles) * np.tile(kept.amplitudes[2:], 2)
+        slopes = np.hstack(list(picked.unit_responses(lines.s, lines.weight, kept.poles)[1]))
+        steep = np.vstack([slopes.real, slopes.imag]) * np.tile(kept.amplitudes[2:], 2)  # (2 n_lines, 2 n)
         steep -= basis @ cho_solve((_triangle(basis), False), basis.T @ steep)
         square, slope = steep.T @ steep, steep.T @ kept.rest
         cost = np.square(kept.rest).sum()

@@ -1,7 +1,7 @@
 """What other programs' files and objects hold of a body, as `Body` takes it."""
 
 import zipfile
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -53,7 +53,7 @@ def read_bodies(files: Any) -> list[dict[str, Any]]:
     return [each for each in found if each is not None] + [_one(path, decks) for path in paths if path not in decks]
 
 
-def _one(path: Path, decks: Sequence[Path] | set[Path]) -> dict[str, Any]:
+def _one(path: Path, decks: set[Path]) -> dict[str, Any]:
     ending = path.suffix.lower()
     kind, reader = KINDS[ending]
     if not reader:  # saved by `Body.save`, arrays under the names of fields, or a sparse matrix of SciPy

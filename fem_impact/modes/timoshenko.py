@@ -55,13 +55,9 @@ class Stoutness:
         q = np.sqrt(np.maximum(square, steep**2))
         turn = (q**2 + p * self.S) / q
         down, up = np.exp(-q * x), np.exp(q * (x - 1.0))
-        exponential = np.stack(
-            [
-                np.stack([down, -turn * down, turn * q * down, p / q * down], axis=-1),
-                np.stack([up, turn * up, turn * q * up, -p / q * up], axis=-1),
-            ],
-            axis=-1,
-        )
+        exponential = np.array([
+            [down, -turn * down, turn * q * down, p / q * down], [up, turn * up, turn * q * up, -p / q * up],
+        ])  # fmt: skip
         mild = np.minimum(square, steep**2)
         root = np.sqrt(np.abs(mild))
         low = np.minimum(root, steep) * x
@@ -69,14 +65,8 @@ class Stoutness:
         safe = np.where(root * x > 1e-8, root, 1.0)
         s = np.where(root * x > 1e-8, np.where(mild > 0.0, np.sinh(low), np.sin(root * x)) / safe, x)
         turn = mild + p * self.S  # the second is scaled by its rotation, which remains at q = 0
-        bounded = np.stack(
-            [
-                np.stack([c, turn * s, turn * c, -p * s], axis=-1),
-                np.stack([mild * s, turn * c, turn * mild * s, -p * c], axis=-1),
-            ],
-            axis=-1,
-        )
-        result[..., 2:] = np.where((square > steep**2)[..., None, None], exponential, bounded)
+        bounded = np.array([[c, turn * s, turn * c, -p * s], [mild * s, turn * c, turn * mild * s, -p * c]])
+        result[..., 2:] = np.where(square > steep**2, exponential, bounded).transpose(2, 3, 1, 0)
         return result
 
     def hinged(self, n: int) -> np.ndarray:

@@ -120,7 +120,12 @@ class Session:
             self.hits.append((wanted["letter"][:1], share))
             self._start("hit", self._hit)
         elif "open" in message:
-            self._order(message["open"])
+            try:
+                self.order = order_of(message["open"], self.folder, self.order or self.explorer.order, self.settings.at)
+            except ValueError as error:
+                self.send({"kind": "bench", "failed": str(error)})
+            else:
+                self._start("open", self._open)
         elif "view" in message:
             view = message["view"]
             if view is not None and not isinstance(view, dict):
@@ -297,15 +302,6 @@ class Session:
             about = self.settings, self.listener, self.height, None, letter, share
             sound = await self._ask(self.mapper, Explorer.listen, *about)
             self.send({"kind": "hit", "letter": letter, "share": share, "number": self.number, **sound})
-
-    def _order(self, wanted: Any) -> None:
-        """Put on the bench what the page wants; what it may not have is reported there."""
-        try:
-            self.order = order_of(wanted, self.folder, self.order or self.explorer.order, self.settings.at)
-        except ValueError as error:
-            self.send({"kind": "bench", "failed": str(error)})
-        else:
-            self._start("open", self._open)
 
     async def _open(self) -> None:
         """What was ordered last."""

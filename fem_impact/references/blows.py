@@ -33,20 +33,22 @@ def wall(contact: Contact, mass: float, speed: float) -> dict[str, float]:
     return {"contact_time": float(duration), "peak_force": k * deepest**contact.exponent, "restitution": 1.0}
 
 
-def _wall(contact: Contact, mass: float = 0.1, speed: float = 1.0) -> list[ReferenceLine]:
+def _wall(contact: Contact) -> list[ReferenceLine]:
+    mass, speed = 0.1, 1.0
     touch = Touch(contact, first=0, second=None)
     hit = collide([Modes.rigid(mass)], [touch], speeds=[speed], tolerance=1e-6)
     return of_blow(hit, wall(contact, mass, speed), {})
 
 
-def _masses(one: float = 0.1, other: float = 0.3, speed: float = 1.0) -> list[ReferenceLine]:
-    hit = strike(Modes.rigid(other), Striker.rigid(one), Contact.hertz(1e7), at=None, speed=speed, tolerance=1e-6)
+def _masses() -> list[ReferenceLine]:
+    one, other = 0.1, 0.3
+    hit = strike(Modes.rigid(other), Striker.rigid(one), Contact.hertz(1e7), at=None, speed=1.0, tolerance=1e-6)
     both = one + other
-    return of_blow(hit, {"restitution": (other - one) / both, "impulse": 2.0 * speed * one * other / both}, {})
+    return of_blow(hit, {"restitution": (other - one) / both, "impulse": 2.0 * one * other / both}, {})
 
 
-def _endless(stiffness: float, mass: float = 0.002) -> list[ReferenceLine]:
-    sides, total, first = (3.1, 2.0), 2.0, 10.0  # so large that the echo of the edges comes after the blow
+def _endless(stiffness: float) -> list[ReferenceLine]:
+    mass, sides, total, first = 0.002, (3.1, 2.0), 2.0, 10.0  # so large that the echo of the edges comes after the blow
     plate = analytic.rectangle(*sides, mass=total, first_frequency=first, n_modes=6000)
     root = 2.0 * first / (np.pi * (sides[0] ** -2 + sides[1] ** -2))  # [m**2/s] sqrt(D / m''), of a hinged plate
     mobility = sides[0] * sides[1] / (8.0 * root * total)

@@ -110,7 +110,7 @@ def wave(path: str | Path, response: Response, *, time: float | None = None) -> 
         Empty, or what to install for a 3D picture if only a flat one could be drawn.
     """
     check.ending(path, *STILL)
-    times = np.linspace(0.0, sampling.end_of(response), FRAMES)
+    times = sampling.frame_times(response, FRAMES)
     instant = times[sampling.clearest(response, times)] if time is None else check.non_negative("time", time, "s")
     (frame,) = frames_at(response, np.array([instant]))
     canvas.write_picture(path, frame)
@@ -134,7 +134,7 @@ def animation(path: str | Path, response: Response, *, frames: int = FRAMES) -> 
     """
     film = check.ending(path, ".gif", ".mp4") == ".mp4"
     encoder = check.extra("imageio_ffmpeg", "film", "an MP4 file") if film else None
-    times = np.linspace(0.0, sampling.end_of(response), check.count("frames", frames, low=2, high=sampling.MOST_FRAMES))
+    times = sampling.frame_times(response, frames)
     if film:
         with replacing(path) as temporary:
             encode(encoder, temporary, frames_at(response, times))
@@ -160,7 +160,7 @@ def film(response: Response, times: np.ndarray | None = None) -> canvas.Film:
     check.between("dimension of the struck body", modes.dimension, 1, 2)
     points, cells, plane = sampling.surface(modes)
     rows = modes.shapes.at(points)
-    usual = np.linspace(0.0, sampling.end_of(response), FRAMES)
+    usual = sampling.frame_times(response, FRAMES)
     times = usual if times is None else times
     motion = response.modal_state(times)[0] @ rows.T  # (n_times, n_points)
     whole = response.modal_state(usual)[0] @ rows.T

@@ -75,6 +75,11 @@ def end_of(response: Response | Strokes) -> float:
     return first + AFTER * (last - first) or 1.0
 
 
+def frame_times(response: Response, frames: int) -> np.ndarray:
+    """Times (frames,) [s] from the first touch to the end of the pictures; ValueError for too few or too many."""
+    return np.linspace(0.0, end_of(response), check.count("frames", frames, low=2, high=MOST_FRAMES))
+
+
 def clearest(response: Response, times: np.ndarray) -> int:
     """Index of the time [s] that shows the wave best: the first with half the largest deflection under the striker."""
     deflection = np.abs(response.displacement(_struck(response)[1][None], times)[:, 0])

@@ -6,14 +6,13 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from matplotlib import font_manager
 from PIL import Image, ImageDraw, ImageFont
 
 from .._base import check
 from .._base.files import replacing, write_whole
 from ..impact.response import Response
 from . import canvas, figures, pictures, sampling
-from .style import BLUE, STYLE, VERMILION, pixels
+from .style import BLUE, VERMILION, font_file, pixels
 
 SIDE, STRIP = (540, 480), 60  # [px] size of the force's picture, and height of the strip with the caption
 LETTERS = 20  # [px] height of the caption's letters: legible at half the size
@@ -74,7 +73,7 @@ def write(path: str | Path, response: Response, *, frames: int = 144) -> str:
     """
     check.ending(path, ".mp4")
     encoder = check.extra("imageio_ffmpeg", "film", "an MP4 file")
-    times = np.linspace(0.0, sampling.end_of(response), check.count("frames", frames, low=2, high=sampling.MOST_FRAMES))
+    times = sampling.frame_times(response, frames)
     said = captions(response)
     with replacing(path) as temporary:
         pictures.encode(encoder, temporary, _composed(response, times, said))
@@ -97,7 +96,7 @@ def _clock(seconds: float) -> str:
 
 def _composed(response: Response, times: np.ndarray, said: list[Caption]) -> Iterator[Image.Image]:
     """Pictures of the body, the force and the caption, at the given times [s]."""
-    face = ImageFont.truetype(str(font_manager.findfont(STYLE["font.family"])), LETTERS)
+    face = ImageFont.truetype(font_file(), LETTERS)
     force, spot = _force(response, times[-1])
     slower = float(f"{len(times) / canvas.RATE / times[-1]:.2g}")
     for time, picture in zip(times, pictures.frames_at(response, times)):

@@ -8,6 +8,7 @@ from typing import Any
 import matplotlib
 import numpy as np
 from cycler import cycler
+from matplotlib import font_manager
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
@@ -90,3 +91,8 @@ def pixels(figure: Figure, dpi: float) -> np.ndarray:
     canvas = FigureCanvasAgg(figure)
     canvas.draw()
     return np.asarray(canvas.buffer_rgba())[..., :3].copy()
+
+
+def font_file() -> str:
+    """The file of the letters of all figures, for text in pictures by other means."""
+    return str(font_manager.findfont("DejaVu Sans"))
