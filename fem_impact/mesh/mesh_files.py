@@ -43,8 +43,8 @@ def read_mesh(path: Any, unit: str | None) -> tuple[
     """
     path = check.path("path", path)
     data = meshio_reader.read_raw(path)
-    raw, height, notes = _plane_points(path, data, unit)
     cells, nodes = _triangles(path, data)
+    raw, height, notes = _plane_points(path, data, unit)
     rows = np.array([[*pair, node] for pair, node in nodes.items()], int).reshape(-1, 3)
     a, b, middle = raw[rows].transpose(1, 0, 2)
     side, away = b - a, middle - 0.5 * (a + b)
@@ -89,7 +89,7 @@ def _plane_points(
     notes: list[str] = []
     if points.ndim != 2 or points.shape[1] not in (2, 3):
         raise ValueError(f"{name} must have points with two or three coordinates, got shape {points.shape}")
-    used = np.unique(np.concatenate([np.zeros(0, int), *(nodes.ravel() for _, nodes, _ in data.blocks)]))
+    used = np.unique(np.concatenate([nodes.ravel() for _, nodes, _ in data.blocks]))
     lost = used[(used < 0) | (used >= len(points))]
     if lost.size:
         raise ValueError(f"{name} has a cell with node {lost[0]} but only {len(points)} nodes; export it again")
@@ -101,7 +101,7 @@ def _plane_points(
     height = None
     if points.shape[1] == 3:
         points, flat = _turned_level(points, used, notes)
-        spread = np.ptp(points[used], axis=0) if used.size else np.zeros(3)
+        spread = np.ptp(points[used], axis=0)
         if spread[flat] > FLAT * spread.max():
             height = points[:, flat] - points[used, flat].mean()
         elif spread[flat] > SAME * spread.max():
@@ -112,15 +112,13 @@ def _plane_points(
     if unit is not None:
         scale = UNITS[check.one_of("unit", unit, UNITS)]
         points, height = points * scale, None if height is None else height * scale
-    elif used.size:
+    else:
         refuse_millimetres(name, *np.ptp(points[used], axis=0))
     return points, height, notes
 
 
 def _turned_level(points: np.ndarray, used: np.ndarray, notes: list[str]) -> tuple[np.ndarray, int]:
     """Points (n_points, 3) turned so that their mean plane is that of two axes, and the number of the third axis."""
-    if not used.size:
-        return points, 2
     centre = points[used].mean(axis=0)
     _, size, axes = np.linalg.svd(points[used] - centre, full_matrices=False)
     normal = axes[-1]

@@ -9,6 +9,7 @@ from ..fe.ribs import ON
 from ..fe.splitting import distance
 from ..fe.system import System
 from ..mesh.mesh_files import quarter_triangles, sides_of
+from . import cell_kinds
 
 if TYPE_CHECKING:
     from .modal import Modes
@@ -47,8 +48,7 @@ def heights(modes: "Modes", points: np.ndarray) -> np.ndarray | None:
 def places_in_space(modes: "Modes", points: np.ndarray) -> np.ndarray:
     """Places (n_points, 3) [m] of points (n_points, dimension) [m] of the unloaded body, z towards the striker."""
     rise = heights(modes, points)
-    places = np.zeros((len(points), 3))
-    places[:, : points.shape[1]] = points
+    places = cell_kinds.points_in_space(points)
     places[:, 2] = 0.0 if rise is None else rise
     return places
 
