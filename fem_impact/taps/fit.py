@@ -262,7 +262,7 @@ def _fit(
     values = problem.values(best.x)
     notes += [
         f"{each.name} is {values[each.name]:.3g} in the best fit, outside its range of {each.low:g} to {each.high:g}"
-        for each in setting.unknown
+        for each in problem.setting.unknown
         if not each.low * (1.0 - SAME) <= values[each.name] <= each.high * (1.0 + SAME)
     ]
     return Found(cut, tuple(used), outliers, problem, best, minima, tuple(notes), {}, begin.watch, stuck)
