@@ -18,8 +18,10 @@ ARM = 2  # [-] points used on each side of a vertex to fit curves other than cir
 def recover_rim(
     points: np.ndarray, loops: list[np.ndarray], given: dict[int, np.ndarray]
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Recover the curve that a rim was drawn with: of each facet its middle (n_facets, 2) [m], and the unit tangents
-    (n_facets, 2, 2) and curvatures (n_facets, 2) [1/m] at both ends.
+    """Recover the curve that a rim was drawn with.
+
+    Returns of each facet the middle (n_facets, 2) [m], and at both ends the unit tangents (n_facets, 2, 2) and the
+    curvatures (n_facets, 2) [1/m].
 
     Parameters
     ----------

@@ -313,16 +313,18 @@ def read_tables(path: Path) -> dict[str, Any]:
     raw = read_bytes(path)
     try:
         text = raw.decode("utf-8-sig")
-        for key in DOTTED.finditer(text):
-            if key["more"]:  # the time to parse it grows with the square of its length
-                raise scene_error(
-                    path, f"a key must have at most 16 parts between dots, got {check.shown(key[0])} and more"
-                )
-        return tomllib.loads(text)
     except UnicodeDecodeError:
         raise scene_error(path, "a scene must be UTF-8 text; save it in that encoding") from None
-    except (tomllib.TOMLDecodeError, RecursionError) as error:
-        said = str(error).replace("Cannot overwrite a value", "the same key is given twice in one table")
+    for key in DOTTED.finditer(text):
+        if key["more"]:  # the time to parse it grows with the square of its length
+            raise scene_error(
+                path, f"a key must have at most 16 parts between dots, got {check.shown(key[0])} and more"
+            )
+    try:
+        return tomllib.loads(text)
+    except (ValueError, RecursionError) as error:  # also integers of thousands of digits
+        said = str(error).partition("; ")[0]
+        said = said.replace("Cannot overwrite a value", "the same key is given twice in one table")
         said = re.sub(r"Cannot declare \('(.*?)',?\) twice", r"the table [\1] stands twice", said)
         raise scene_error(path, f"not valid TOML: {said}{_slip(text, said)}") from None
 

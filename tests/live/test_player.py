@@ -135,7 +135,7 @@ def test_a_free_body_does_not_fly_away():
 def test_a_block_allocates_nothing_and_leaves_other_threads_alone():
     code = f"""
 import numpy as np, sys
-sys.path.insert(0, {os.path.dirname(__file__)!r})
+sys.path[:0] = {sys.path!r}
 from test_player import player, PlayedStroke
 from numba.core.runtime import rtsys
 game = player(n_modes=30)

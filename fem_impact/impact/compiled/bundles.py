@@ -88,7 +88,7 @@ class Tables(NamedTuple):
     lanes: np.ndarray  # (n_tables, N_LANE, n_modes), see `propagation.lane_table`
     sums: np.ndarray  # (n_levels, 6, n_contacts, n_contacts), see `exact.contact_sums`
     known: np.ndarray  # (n_tables,) whether they are there
-    work: np.ndarray  # (4, n, n)
+    work: np.ndarray  # (5, n, n)
     base: float  # [s] longest step
     ramp: int | np.int64  # 1 for scheme A4, 0 for A
 

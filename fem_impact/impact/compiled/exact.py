@@ -17,6 +17,7 @@ from .propagation import any_of, lane_table
 
 from .schemes import (  # isort: skip
     Free, Own, guess_ends, left_of, linear_guess, memory_after, point_of, solve_constants, solve_ramp, solve_ramps,
+    stays,
 )  # fmt: skip
 
 from .layout import (  # isort: skip
@@ -30,7 +31,7 @@ def made_tables(n_modes: int, n_contacts: int, base: float, ramp: int) -> Tables
     """Room for the tables of steps and flights, none known."""
     n_levels, n_tables, wide = LEVELS + 1, LEVELS + GLIDES + 2, max(4, 2 * n_contacts)
     lanes, sums = np.empty((n_tables, N_LANE, n_modes)), np.empty((n_levels, 6, n_contacts, n_contacts))
-    return Tables(lanes, sums, np.zeros(n_tables), np.zeros((4, wide, wide)), base, ramp)
+    return Tables(lanes, sums, np.zeros(n_tables), np.zeros((5, wide, wide)), base, ramp)
 
 
 @inner(part=True)
@@ -139,17 +140,30 @@ def freshen(contacts, fresh):
 @inner()
 def solve_all(contacts, tables, slot, h, blind):
     """Solve one step of several contacts, or by scheme A; 0 where a contact pushes by A (asked for or fallen to)."""
-    now, end = contacts.now, contacts.free
+    law, now, end = contacts.law, contacts.now, contacts.free
     y, f, s = contacts.end, contacts.force, contacts.slope
     sums, work = tables.sums[slot], tables.work
     m = y.size
-    fine = 1
-    ramped = tables.ramp and m > 1 and guess_ends(contacts, sums, work, y, f)
-    if not (ramped and solve_ramps(h, contacts, sums, work, blind)):
-        solve_constants(h, now, contacts.law, end[FREE_END], sums, work, y, f)
+    fine = 0
+    if tables.ramp and m > 1 and guess_ends(contacts, sums, work, y, f):
+        fine = 1 if solve_ramps(h, contacts, sums, work, blind) and stays(now[APPROACH], y) else 0
+    if fine == 0:
+        solve_constants(h, now, law, end[FREE_END], sums, work, y, f)
         fine = 0 if any_of(f) else 1
         for i in range(m):
             s[i] = 0.0
+    if tables.ramp and fine == 0 and m > 1:
+        keep = work[4, 1]
+        for i in range(m):
+            keep[i] = y[i]
+            keep[m + i] = f[i]
+        if solve_ramps(h, contacts, sums, work, blind):
+            fine = 1
+        else:
+            for i in range(m):
+                y[i] = keep[i]
+                f[i] = keep[m + i]
+                s[i] = 0.0
     for i in range(m):
         contacts.rate[i] = left_of(end[FREE_RATE, i], sums, OWN_RATE, i, f, s)
     return fine

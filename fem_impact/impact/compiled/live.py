@@ -91,7 +91,7 @@ class PlayState(NamedTuple):
     bounds: np.ndarray  # (n_sticks, 6) see `flight.motion_bounds`
     sums: np.ndarray  # (LEVELS, 6, n_sticks, n_sticks)
     known: np.ndarray  # (LEVELS,) whether those are of the present sticks
-    work: np.ndarray  # (4, n, n)
+    work: np.ndarray  # (5, n, n)
     place: np.ndarray  # (4,) sticks on the body, looks since the bounds were drawn, frames so far, whether forces act
     counted: np.ndarray  # (COUNTERS,)
     trace: np.ndarray  # (n, 6) [s], [s], [-], [N], [m], [N]: end of a step in contact, length, pad, mean, approach, end

@@ -25,7 +25,7 @@ from .laws.felt import growth, memory_within_step
 from .rounding import CHORD, ITERATIONS, NEAR, OVERFLOW, REPEATED, SOLVED, STALLED
 
 from .layout import (  # isort: skip
-    APPROACH, COMPRESSION, ENERGY, FORCE, FREE_END, FREE_MEAN, FREE_RATE, OWN_END, OWN_END_RAMP, OWN_MEAN,
+    APPROACH, COMPRESSION, ENERGY, FORCE, FREE_END, FREE_MEAN, FREE_RATE, OWN_END, OWN_MEAN,
     OWN_MEAN_RAMP, OWN_RATE, OWN_RATE_RAMP, RATE,
 )  # fmt: skip
 
@@ -358,68 +358,88 @@ def left_of(free, sums, row, i, force, slope):
 
 @inner()
 def guess_ends(contacts, sums, work, out_y, out_f):
-    """Approaches at the end of a step and mean forces, if every spring were linear from the step's start on."""
-    now, matrix, vector = contacts.now, work[0], work[2, 0]
+    """Approaches at the end of a step and mean forces, if every spring were linear from the step's start on.
+
+    False if some contact begins or ends then: scheme A4 may have a root with it and one without.
+    """
+    now, matrix, vector, half = contacts.now, work[0], work[2, 0], work[2, 1]  # half of the stiffness [N/m]
     m = out_y.size
     for i in range(m):
-        out_y[i] = out_f[i] = 0.0
+        half[i] = out_f[i] = 0.0
         if now[APPROACH, i] > 0.0:
             spring = spring_of(contacts.law, i)
             steep = steepness(now[COMPRESSION, i], now[FORCE, i], spring)
-            out_y[i] = 0.5 * steep / (1.0 + spring.compliance * steep)
+            half[i] = 0.5 * steep / (1.0 + spring.compliance * steep)
             out_f[i] = now[FORCE, i]
     for i in range(m):
         vector[i] = contacts.free[FREE_END, i] - now[APPROACH, i]
         for j in range(m):
             vector[i] -= sums[OWN_END, i, j] * out_f[j]
-            matrix[i, j] = sums[OWN_END, i, j] * out_y[j]
+            matrix[i, j] = sums[OWN_END, i, j] * half[j]
         matrix[i, i] += 1.0
     if not solve_linear(matrix, vector, m):
         return False
     for i in range(m):
-        out_f[i] = max(0.0, out_f[i] + out_y[i] * vector[i])
+        out_f[i] = max(0.0, out_f[i] + half[i] * vector[i])
         out_y[i] = now[APPROACH, i] + vector[i]
-        if now[APPROACH, i] <= 0.0 and out_y[i] > 0.0:
-            out_y[i] *= 0.5  # it closes within the step
-    return True
+    return stays(now[APPROACH], out_y)
 
 
 @inner()
-def ramp_equations(h, y, contacts, sums, out_matrix, out_vector):
-    """Scheme A4's linear equations for means and slopes of the forces, if the step ended at approaches y."""
-    now, free = contacts.now, contacts.free
-    m = contacts.end.size
+def stays(start, end):
+    """Whether no contact begins or ends between these approaches."""
+    same = True
+    for i in range(end.size):
+        same = same and start[i] * end[i] > 0.0
+    return same
+
+
+@inner()
+def ramp_forces(h, y, contacts, sums, work, out_f, out_s, out_r):
+    """Mean and slope of the forces of scheme A4 if the step ended at approaches y, and the residual in y."""
+    law, now = contacts.law, contacts.now
+    e, ea, vf = contacts.free[FREE_END], contacts.free[FREE_MEAN], contacts.free[FREE_RATE]
+    m = e.size
+    matrix = work[0]
+    vector = work[2, 2]
     for i in range(m):
-        spring = spring_of(contacts.law, i)
+        spring = spring_of(law, i)
         start, end = point_of(now, i), point_at(y[i], spring)
         g, d = mean_slopes(start, end, spring)
-        add, tilt, held_back, part = lossy_terms(h, start, end, now[RATE, i], free[FREE_RATE, i], spring)
+        add, tilt, held_back, part = lossy_terms(h, start, end, now[RATE, i], vf[i], spring)
         for j in range(m):
-            out_matrix[i, j] = d * sums[OWN_MEAN, i, j] + held_back * sums[OWN_RATE, i, j]
-            out_matrix[i, m + j] = d * sums[OWN_MEAN_RAMP, i, j] + held_back * sums[OWN_RATE_RAMP, i, j]
-            out_matrix[m + i, j] = part * sums[OWN_RATE, i, j]
-            out_matrix[m + i, m + j] = part * sums[OWN_RATE_RAMP, i, j]
-        out_matrix[i, i] += 1.0
-        out_matrix[m + i, m + i] += 1.0
-        out_vector[i] = g + d * (free[FREE_MEAN, i] - 0.5 * (start.approach + y[i])) + add
-        out_vector[m + i] = end.force - start.force + tilt
+            matrix[i, j] = d * sums[OWN_MEAN, i, j] + held_back * sums[OWN_RATE, i, j]
+            matrix[i, m + j] = d * sums[OWN_MEAN_RAMP, i, j] + held_back * sums[OWN_RATE_RAMP, i, j]
+            matrix[m + i, j] = part * sums[OWN_RATE, i, j]
+            matrix[m + i, m + j] = part * sums[OWN_RATE_RAMP, i, j]
+        matrix[i, i] += 1.0
+        matrix[m + i, m + i] += 1.0
+        vector[i] = g + d * (ea[i] - 0.5 * (start.approach + y[i])) + add
+        vector[m + i] = end.force - start.force + tilt
+    if not solve_linear(matrix, vector, 2 * m):
+        return False
+    for i in range(m):
+        out_f[i] = vector[i]
+        out_s[i] = vector[m + i]
+    for i in range(m):
+        out_r[i] = -left_of(e[i] - y[i], sums, OWN_END, i, out_f, out_s)
+    return True
 
 
 @inner()
 def solve_ramps(h, contacts, sums, work, blind):
     """Scheme A4: mean and slope of the forces of one step, starting from a guess of the approaches at its end.
 
-    Newton's method: the equations ``M (f, s) = v`` depend on approaches ``y = e - W (f, s)``, each row on its own, so
-    that one more set of equations, of approaches a little larger, shows how they turn. Returns False where it does not
-    settle or a force would pull; the step then belongs to scheme A. Only in a try, repeated until it ends where a
-    contact closes, may that contact pull: a ``blind`` step is none.
+    Returns False where the iteration does not settle or a force would pull; the step then belongs to scheme A. Only in
+    a try, repeated until it ends where a contact closes, may that contact pull: a ``blind`` step is none.
     """
-    now, out_y, out_f, out_s = contacts.now, contacts.end, contacts.force, contacts.slope
+    law, now, out_y, out_f, out_s = contacts.law, contacts.now, contacts.end, contacts.force, contacts.slope
     m = out_y.size
-    matrix, steered = work[0], work[1]
-    y2, r, found, turn, scale = work[2, 0], work[2, 1], work[2, 2], work[2, 3], work[3, 0]
+    r, r2, f2, s2 = work[3, 0], work[3, 1], work[3, 2, :m], work[3, 3, :m]
+    y2, jacobian = work[4, 0], work[1]
+    scale = work[2, 3]  # of an approach: what rounding counts from, though it ends at zero
     widest = 0.0
-    for i in range(m):  # of an approach, what rounding counts from, though it ends at zero
+    for i in range(m):
         scale[i] = max(abs(now[APPROACH, i]), abs(contacts.free[FREE_END, i]))
         for j in range(m):
             scale[i] = max(scale[i], abs(sums[OWN_END, i, j] * out_f[j]))
@@ -428,39 +448,27 @@ def solve_ramps(h, contacts, sums, work, blind):
         scale[i] = max(scale[i], NEAR * widest)
     settled = False
     for _ in range(20):
-        ramp_equations(h, out_y, contacts, sums, matrix, found)
-        for i in range(2 * m):
-            for j in range(2 * m):
-                steered[i, j] = matrix[i, j]
-        if not solve_linear(matrix, found, 2 * m):
+        if not ramp_forces(h, out_y, contacts, sums, work, out_f, out_s, r):
             return False
-        for i in range(m):
-            out_f[i] = found[i]
-            out_s[i] = found[m + i]
         if settled:
             break
-        for i in range(m):
-            y2[i] = out_y[i] + 1e-7 * max(abs(out_y[i]), 1e-3 * scale[i])
-            r[i] = -left_of(contacts.free[FREE_END, i] - out_y[i], sums, OWN_END, i, out_f, out_s)
-        ramp_equations(h, y2, contacts, sums, matrix, turn)
-        for i in range(2 * m):
-            k = i % m
-            for j in range(2 * m):
-                turn[i] -= matrix[i, j] * found[j]
-            turn[i] /= y2[k] - out_y[k]
-            for j in range(m):
-                steered[i, j] += turn[i] * sums[OWN_END, k, j]
-                steered[i, m + j] += turn[i] * sums[OWN_END_RAMP, k, j]
-            turn[i] *= r[k]
-        if not solve_linear(steered, turn, 2 * m):
+        for j in range(m):
+            for i in range(m):
+                y2[i] = out_y[i]
+            y2[j] += 1e-7 * max(abs(out_y[j]), 1e-3 * scale[j])
+            shift = y2[j] - out_y[j]
+            if not ramp_forces(h, y2, contacts, sums, work, f2, s2, r2):
+                return False
+            for i in range(m):
+                jacobian[i, j] = (r2[i] - r[i]) / shift
+        if not solve_linear(jacobian, r, m):
             return False
         settled = True
         for i in range(m):
-            step = left_of(r[i], sums, OWN_END, i, turn[:m], turn[m:])
-            out_y[i] -= step
-            if not abs(step) < OVERFLOW:
+            out_y[i] -= r[i]
+            if not abs(r[i]) < OVERFLOW:
                 return False
-            if abs(step) > SOLVED * max(4.0 * abs(out_y[i]), scale[i]):
+            if abs(r[i]) > SOLVED * max(4.0 * abs(out_y[i]), scale[i]):
                 settled = False
     if not settled:
         return False
@@ -472,7 +480,7 @@ def solve_ramps(h, contacts, sums, work, blind):
             continue
         if not out_f[i] >= 0.0:
             return False
-        spring = spring_of(contacts.law, i)
+        spring = spring_of(law, i)
         start, end = point_of(now, i), point_at(out_y[i], spring)
         mean = left_of(contacts.free[FREE_MEAN, i], sums, OWN_MEAN, i, out_f, out_s)
         v1 = left_of(contacts.free[FREE_RATE, i], sums, OWN_RATE, i, out_f, out_s)
