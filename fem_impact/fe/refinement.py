@@ -92,9 +92,8 @@ def _wave(system: System, n_modes: int | None, max_frequency: float | None) -> f
         edge = float(length @ [EDGE_TERM[kind] for kind in system.rim.kinds])
     mean = float((edge + np.sqrt(edge**2 + 16.0 * np.pi * mesh.area * n_modes)) / (2.0 * mesh.area))
     assert isinstance(system.section, Plate)
-    stiffness = stiffness_by_way(
-        system.section.material.plane_stress
-    )  # waves across the grain are shorter than the mean
+    # waves across the grain are shorter than the mean
+    stiffness = stiffness_by_way(system.section.material.plane_stress)
     return mean * float((np.mean(stiffness**-0.5) ** -2 / stiffness.min()) ** 0.25)
 
 

@@ -323,7 +323,7 @@ def read_tables(path: Path) -> dict[str, Any]:
     try:
         return tomllib.loads(text)
     except (ValueError, RecursionError) as error:  # also integers of thousands of digits
-        said = str(error).partition("; ")[0]
+        said = str(error).partition("; use sys.")[0]
         said = said.replace("Cannot overwrite a value", "the same key is given twice in one table")
         said = re.sub(r"Cannot declare \('(.*?)',?\) twice", r"the table [\1] stands twice", said)
         raise scene_error(path, f"not valid TOML: {said}{_slip(text, said)}") from None
@@ -336,11 +336,11 @@ def _slip(text: str, said: str) -> str:
         return ""
     line, column = text.replace("\r\n", "\n").split("\n")[int(place[1]) - 1], int(place[2]) - 1
     around = line[:column].rstrip()[-1:] + line[column:].lstrip()
-    advice = [words for pattern, words in SLIPS if re.match(pattern, around)]
+    advice = []
     if "Unclosed" in said:
         advice = ["a comma or a bracket is missing, or a number has a unit"]
-    elif "after a statement" not in said and "Invalid value" not in said:
-        advice = []
+    elif "after a statement" in said or "Invalid value" in said:
+        advice = [words for pattern, words in SLIPS if re.match(pattern, around)]
     return f" {check.shown(line.strip())}" + "".join(f"; {words}" for words in advice[:1])
 
 

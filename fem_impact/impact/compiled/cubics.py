@@ -52,6 +52,12 @@ def turning(d0, v0, d1, v1):
 
 
 @inner()
+def lowest_between(d0, v0, d1, v1):
+    """Least value of that cubic between its ends; infinity unless it falls at the first and rises at the last."""
+    return turning(d0, v0, d1, v1)[1] if v0 < 0.0 < v1 else np.inf
+
+
+@inner()
 def surely_parted(d0, v0, d1, v1, error, rate_error):
     """Whether an approach, known at both ends of a look ahead, surely has no touch in between but one that lasts.
 

@@ -12,7 +12,7 @@ ever before. These corners of the force are located by secants. Events that pile
 import numpy as np
 
 from .build import inner
-from .cubics import crossing, turning
+from .cubics import crossing, lowest_between, turning
 from .law import corner_approach, relaxes, spring_of, yields
 from .laws.felt import above_felt, parting, parting_rate
 from .rounding import NEAR, REPEATED
@@ -78,12 +78,12 @@ def first_crossing(bodies, contacts, h, limits, first):
 @inner(part=True)
 def has_dipped(contacts, h, i):
     """Whether contact i opened and closed again, or the other way round, within a step, by its cubic."""
-    d0, v0 = contacts.now[APPROACH, i], contacts.now[RATE, i]
-    d1, v1, pressed = contacts.end[i], contacts.rate[i], contacts.pressed[i]
+    pressed = contacts.pressed[i]
     side = 1.0 if pressed else -1.0
-    if side * v0 < 0.0 < side * v1 and (d1 > 0.0 if pressed else d1 <= 0.0):
-        return side * turning(d0, h * v0, d1, h * v1)[1] < -NEAR * max(side * d0, side * d1)
-    return False
+    d0, v0 = side * contacts.now[APPROACH, i], side * contacts.now[RATE, i]
+    d1, v1 = side * contacts.end[i], side * contacts.rate[i]
+    ends = d1 <= 0.0 if pressed else d1 < 0.0
+    return not ends and lowest_between(d0, h * v0, d1, h * v1) < -NEAR * max(d0, d1)
 
 
 @inner()
@@ -162,9 +162,8 @@ def has_paused(contacts, h, i):
         loss, contacts.now[APPROACH, i], contacts.now[RATE, i], contacts.end[i], contacts.rate[i], h
     )
     side = 1.0 if f1 > 0.0 else -1.0
-    if side * f0 > -NO_FORCE and side * f1 > NO_FORCE and side * s0 < 0.0 < side * s1:
-        return side * turning(f0, s0, f1, s1)[1] < -NO_PAUSE
-    return False
+    lowest = lowest_between(side * f0, side * s0, side * f1, side * s1)
+    return side * f0 > -NO_FORCE and side * f1 > NO_FORCE and lowest < -NO_PAUSE
 
 
 @inner()
@@ -265,9 +264,8 @@ def dipped_felt(contacts, h, i):
     g0, g1 = parting(law, i, now[APPROACH, i], z0), parting(law, i, y[i], z1)
     r0 = parting_rate(law, i, now[APPROACH, i], now[RATE, i], z0)
     r1 = parting_rate(law, i, y[i], rate[i], z1)
-    if not (r0 < 0.0 < r1 and g0 > 0.0 and g1 > 0.0):
-        return False
-    return turning(g0, h * r0, g1, h * r1)[1] < -1e-6 * max(g0, g1)  # by less it has not left
+    lowest = lowest_between(g0, h * r0, g1, h * r1)
+    return g0 > 0.0 and g1 > 0.0 and lowest < -1e-6 * max(g0, g1)  # by less it has not left
 
 
 @inner()

@@ -126,6 +126,12 @@ def steepness(x, f, spring):
 
 
 @inner()
+def with_compliance(steep, spring):
+    """Slope of the force over the approach [N/m], from that over the compression."""
+    return steep / (1.0 + spring.compliance * steep)
+
+
+@inner()
 def compression(d, spring):
     """Compression of the spring at approach d > 0: Newton's method on ``x + c F = d``, kept between bounds."""
     k, a, c = spring.stiffness, spring.exponent, spring.compliance

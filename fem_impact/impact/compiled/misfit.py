@@ -2,7 +2,7 @@
 
 from .build import inner
 from .cubics import cubic
-from .law import POWER, point_at, steepness
+from .law import POWER, point_at, steepness, with_compliance
 from .laws.felt import growth, memory_within_step
 
 # [-] nodes and weights of Gauss and Legendre for a step: a spring that sets in like x**1.5 is integrated 13 times as
@@ -32,9 +32,7 @@ def force_on(d0, v0, d1, v1, h, part, spring):
         z = memory_within_step(h, part, g0, g1, r0, r1, spring)[0]
         fade = (point.force / spring.stiffness - z) / spring.relaxation
         return max(0.0, point.force - spring.hard * z), steep * rate - spring.hard * fade
-    return point.force * factor, steep / (
-        1.0 + spring.compliance * steep
-    ) * rate * factor + point.force * spring.loss * turn
+    return point.force * factor, with_compliance(steep, spring) * rate * factor + point.force * spring.loss * turn
 
 
 @inner()

@@ -20,9 +20,12 @@ from typing import NamedTuple
 import numpy as np
 
 from .build import inner
-from .law import Point, mean_slopes, memory_energy, point_at, point_when_compressed, power, spring_of, steepness
 from .laws.felt import growth, memory_within_step
 from .rounding import CHORD, ITERATIONS, NEAR, OVERFLOW, REPEATED, SOLVED, STALLED
+
+from .law import (  # isort: skip
+    Point, mean_slopes, memory_energy, point_at, point_when_compressed, power, spring_of, steepness, with_compliance,
+)  # fmt: skip
 
 from .layout import (  # isort: skip
     APPROACH, COMPRESSION, ENERGY, FORCE, FREE_END, FREE_MEAN, FREE_RATE, OWN_END, OWN_MEAN,
@@ -163,8 +166,7 @@ def linear_guess(start, free, own, spring):
     if start.approach <= 0.0:
         return 0.5 * free.end
     steep = steepness(start.compression, start.force, spring)
-    tangent = steep / (1.0 + spring.compliance * steep)
-    half = 0.5 * own.end * tangent
+    half = 0.5 * own.end * with_compliance(steep, spring)
     y = (free.end - own.end * start.force + half * start.approach) / (1.0 + half)
     if spring.compliance == 0.0:
         return y
@@ -212,7 +214,7 @@ def solve_ramp(guess, h, start, rate0, free, own, spring):
             return f >= 0.0 and is_fair(start, end, f, s, mean, memory, spring), end, f, s
         if not lossy or iteration == 0:
             steep = steepness(x, end.force, spring) if x > 0.0 else 0.0  # dF/dx; over the approach it is less
-            tangent = steep / (1.0 + c * steep)
+            tangent = with_compliance(steep, spring)
             span = y - d0
             turn = 0.5 * d
             bend = 0.0
@@ -368,8 +370,7 @@ def guess_ends(contacts, sums, work, out_y, out_f):
         half[i] = out_f[i] = 0.0
         if now[APPROACH, i] > 0.0:
             spring = spring_of(contacts.law, i)
-            steep = steepness(now[COMPRESSION, i], now[FORCE, i], spring)
-            half[i] = 0.5 * steep / (1.0 + spring.compliance * steep)
+            half[i] = 0.5 * with_compliance(steepness(now[COMPRESSION, i], now[FORCE, i], spring), spring)
             out_f[i] = now[FORCE, i]
     for i in range(m):
         vector[i] = contacts.free[FREE_END, i] - now[APPROACH, i]
