@@ -19,6 +19,7 @@ import fem_impact as fi
 from . import answers
 from ._base.explained import named_headings
 from ._base.files import signalled, undo_all
+from ._base.progress import observed
 from .answers import Status
 from .arguments import parser
 from .commands import Answer
@@ -37,7 +38,7 @@ def main(arguments: list[str] | None = None) -> int:
     options.show = partial(_print, options)
     plain = _prepare(os.environ, once=options.command in ("strike", "modes", "report"))
     try:
-        with _interruptible(options), warnings.catch_warnings():
+        with _interruptible(options), observed(None), warnings.catch_warnings():
             if options.quiet:
                 warnings.simplefilter("ignore")
             found: Answer | None = options.run(options)

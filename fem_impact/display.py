@@ -16,7 +16,7 @@ from rich.text import Text
 
 from ._base.explained import printable, with_headings
 from ._base.files import undoable
-from ._base.progress import observed
+from ._base.progress import Count, observed
 
 ANNOUNCED = 10.0  # [s] time left that is announced even without a terminal that shows the line
 WIDE = 60  # columns of a terminal from which on there is room for a bar
@@ -45,30 +45,6 @@ def complain(error: object, status: int) -> int:
     with suppress(OSError):  # if stderr is closed, the exit status must suffice
         print(f"fem-impact: {printable(with_headings(str(error)))}", file=sys.stderr, flush=True)
     return status
-
-
-class Count:
-    """How many of something are done, since when."""
-
-    def __init__(self, what: str, done: int, total: int) -> None:
-        self.what, self.first = what, done  # already done when it began
-        self.began = time.monotonic()  # [s]
-        self.update(done, total)
-
-    def update(self, done: int, total: int) -> None:
-        self.done, self.total, self.now = done, total, time.monotonic()  # [s] of the last change
-
-    @property
-    def rate(self) -> float:
-        """Number per second [1/s]; 0 if not yet known."""
-        seconds = self.now - self.began
-        return (self.done - self.first) / seconds if seconds > 0.0 else 0.0
-
-    def left(self) -> float | None:
-        """Seconds left, judged by the progress so far, once that is two per cent."""
-        if not self.rate or self.done - self.first < 0.02 * (self.total - self.first):
-            return None
-        return max(0.0, (self.total - self.done) / self.rate - (time.monotonic() - self.now))
 
 
 class Display:

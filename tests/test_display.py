@@ -9,6 +9,7 @@ from scenes import SMALL
 
 import fem_impact as fi
 from fem_impact import display
+from fem_impact._base import progress
 from fem_impact._base.progress import observed, report, revise
 from fem_impact.display import Display
 
@@ -27,7 +28,8 @@ class Clock:
 @pytest.fixture
 def clock(monkeypatch):
     clock = Clock()
-    monkeypatch.setattr(display, "time", clock)
+    for module in (display, progress):
+        monkeypatch.setattr(module, "time", clock)
     return clock
 
 

@@ -423,5 +423,5 @@ def strike(
         raise ValueError("speed must be given in m/s")
     plan = plan_of(modes, striker, contact, at=at, speed=speed, damping_ratio=damping_ratio, **options)
     if plan.seconds > progress.LONG:
-        progress.SLOW.info("striking takes %s", plan.cost)
+        progress.ANNOUNCER.announce(f"striking takes {plan.cost}", plan.seconds)
     return plan.strike(strict)

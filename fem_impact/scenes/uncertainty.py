@@ -4,13 +4,14 @@ import math
 import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import xarray
 
-from .._base import check
+from .._base import check, progress
 from ..fe import plausible
 from ..fe.assembly import System, reassemble
 from ..fe.section import Beam, Elastic, Plate
@@ -154,7 +155,7 @@ def spread(
     asked = _SpreadAsked(blow, loaded, inputs, values, limit, store)
     exact = replace(asked.cases(), band=band)
     base, rough = exact.base, fewer_values(exact)
-    numbers, texts = solve_all(rough, workers, client, store, watch)
+    numbers, texts = solve_all(rough, workers, client, store, watch or partial(progress.report, "blows"))
     checks, rescaled = _checked(exact, numbers, workers), asked.rescaled(base)
     notes = plausible.together(base.modes.notes, base.striker.notes)
     table = _table(inputs, values, rough, numbers, texts, d + 2 if groups else 1)

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from .._base import check, identity, kept
+from .._base import check, identity, kept, progress
 from ..fe import refinement
 from ..fe.eigenvalues import Flexibility
 from ..impact import accuracy
@@ -214,6 +214,7 @@ class Sized:
         views: dict[tuple[float, ...], Modes] = {}
         # of more points on a mesh, each adds elements that shrink towards it; fewer make more meshes
         for start in range(0, len(points), 8):
+            progress.report("points", start, len(points))
             some = points[start : start + 8]
             elements, fixed = Elements(size), self.target.size_stated
             reduced = RitzTarget(self.target, some, max(resonance), self.tolerance, elements, fixed, stages)

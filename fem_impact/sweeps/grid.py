@@ -4,13 +4,14 @@ import json
 import os
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import xarray
 
-from .._base import check
+from .._base import check, progress
 from .._base.files import PARTIAL
 from ..fe import plausible
 from ..fe.assembly import System
@@ -81,10 +82,15 @@ class Job:
         """All cells of a map."""
         return Cases(base, axes, self.tolerance, self.residual, self.max_frequency, self.layers)
 
+    @property
+    def watched(self) -> Watch:
+        """What is called with the number of cells done and of all."""
+        return self.watch or partial(progress.report, "cells")
+
     def solved(self, cases: Cases, turn: str = "") -> tuple[np.ndarray, Texts]:
         """Compute all cases; those of a round with a name are kept in a folder of the store."""
         place = self.store / turn if self.store is not None and turn else self.store
-        return solve_all(cases, self.workers, self.client, place, None if turn else self.watch)
+        return solve_all(cases, self.workers, self.client, place, None if turn else self.watched)
 
     def compute_refined(self, cases: Cases) -> refined.MapSheet | None:
         """Compute a map where its answer changes; None if it has few cells, unless asked for."""
@@ -107,8 +113,7 @@ class Job:
             return self.solved(replace(cases, chosen=cells), turn)
 
         def settled(done: int) -> None:
-            if self.watch is not None:
-                self.watch(done, cases.n_cases)
+            self.watched(done, cases.n_cases)
 
         return refined.refine((cases.shape[0], cases.shape[1]), cases.layers, cases.tolerance, compute, settled)
 

@@ -3,7 +3,11 @@
 import io
 import logging
 import sys
+import threading
 from contextlib import suppress
+
+import numpy as np
+import pytest
 
 import fem_impact as fi
 from fem_impact._base import progress
@@ -60,3 +64,53 @@ def test_a_long_strike_is_announced_with_its_cost(monkeypatch, caplog):
     with caplog.at_level(logging.INFO, logger="fem_impact.slow"):
         fi.strike(body, fi.Striker.rigid(0.1), fi.Contact.linear(1e5), at=(0.1, 0.1), speed=0.1, tolerance=0.1)
     assert any(text.startswith("striking takes about ") for text in caplog.messages)
+
+
+@pytest.fixture
+def second(monkeypatch):
+    """A clock that passes when told to."""
+    now = [0.0]
+    monkeypatch.setattr(progress.time, "monotonic", lambda: now[0])
+    monkeypatch.setattr(progress, "ANNOUNCER", progress.Announcer())
+
+    def passes(seconds):
+        now[0] += seconds
+
+    return passes
+
+
+def count_slowly(second, seconds):
+    for done, each in enumerate(seconds):
+        progress.report("cells", done, len(seconds))
+        second(each)
+    progress.report("cells", len(seconds), len(seconds))
+
+
+def test_a_long_loop_that_nobody_observes_is_announced_and_again_if_it_takes_twice_as_long(second, caplog):
+    with caplog.at_level(logging.INFO, logger="fem_impact.slow"):
+        count_slowly(second, [0.1] * 20)
+        assert caplog.messages == []  # two seconds are not long
+        count_slowly(second, [1.0] * 10)
+        assert caplog.messages == ["10 cells: about 9 s more"]
+        second(60.0)
+        count_slowly(second, [1.0, 30.0, *[1.0] * 8])
+        assert caplog.messages[1:] == ["10 cells: about 9 s more", "10 cells: about 124 s more"]
+
+
+def test_a_loop_that_somebody_observes_or_in_a_thread_of_its_own_is_not_announced(second, caplog):
+    with caplog.at_level(logging.INFO, logger="fem_impact.slow"):
+        with progress.observed(None):
+            count_slowly(second, [1.0] * 10)
+        thread = threading.Thread(target=count_slowly, args=(second, [1.0] * 10))
+        thread.start()
+        thread.join()
+    assert caplog.messages == []
+
+
+def test_maps_and_points_count_what_is_done_for_whoever_waits(monkeypatch):
+    told = []
+    monkeypatch.setattr(progress.ANNOUNCER, "follow", lambda *each: told.append(each))
+    plate = fi.analytic.rectangle(1.55, 1.0, mass=0.2, first_frequency=100.0, n_modes=20)
+    over = {"striker.mass": np.geomspace(0.02, 0.2, 3)}
+    fi.sweep(plate, fi.Striker.rigid(0.1), fi.Contact.linear(1e5), at=(0.45, 0.3), speed=1.0, over=over)
+    assert told == [("cells", 3, 3)]
