@@ -92,12 +92,13 @@ def contacts_of_body(hit: "Response", body: int) -> list[int]:
 
 def rigid_row(hit: "Response", body: int) -> np.ndarray:
     """Shape (n_modes,) of a body's rigid motion at its first contact point, zero in all other modes."""
-    shape, found, contacts = hit.history.shape, np.zeros(len(hit.history.omega)), contacts_of_body(hit, body)
-    if contacts:
-        first = hit.body_slice(body).start
+    found, touched = np.zeros(len(hit.history.omega)), hit.ends[body].touched if hit.ends else ((0, 1.0),)
+    if touched:
+        (contact, sign), first = touched[0], hit.body_slice(body).start
         rigid = slice(first, first + (1 if body == 0 and _held_by_hand(hit) else hit.bodies[body].n_rigid))
-        second = shape[contacts[0], :first].any()  # an earlier body is the first of that contact
-        found[rigid] = (-1.0 if second else 1.0) * shape[contacts[0], rigid]
+        found[rigid] = sign * hit.history.shape[contact, rigid]
+        if contact in [i for i, _ in touched[1:]]:  # with itself, which its rigid motion does not press
+            found[rigid] = hit.bodies[body].shape_at(hit.ends[body].points[:1])[0, : rigid.stop - first]
     return found
 
 
@@ -110,7 +111,8 @@ def restitution(hit: "Response") -> float | None:
     if hit.in_contact:
         return None
     row, history = rigid_row(hit, 0), hit.history
-    before, after = hit.speed, float(row @ history.end_p)
+    arrives = hit.striker is not None or not hit.ends or hit.ends[0].speed != 0.0
+    before, after = hit.speed if arrives else 0.0, float(row @ history.end_p)
     if _held_by_hand(hit) or (row * history.bias).any():  # a constant force or a hand changes its speed in flight
         contacts = contacts_of_body(hit, 0)
         mine = [each for each in hit.impacts if each.contact in contacts]

@@ -86,7 +86,7 @@ def page(hit: "Response") -> str:
         ("restitution", rebound(hit, 5)),
         ("estimated error", f"{hit.error.total:.1e} of {hit.tolerance:g} accepted"),
     ]
-    end = hit.impacts[-1].end if hit.impacts else np.inf
+    end = max((impact.end for impact in hit.impacts), default=np.inf)
     shown = hit.time <= end
     force = hit.force if hit.force.ndim == 1 else hit.force.sum(axis=1)
     said = f"Contact force over time: {hit.n_impacts} impacts, peak {hit.peak_force:.4g} N"

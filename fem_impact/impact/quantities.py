@@ -55,7 +55,8 @@ def asked_for(quantity: Any) -> Mapping[str, float | None]:
 def rebound(hit: Any, digits: int) -> str:
     """The restitution of a response with so many digits, or why there is none."""
     if hit.restitution is None:
-        return "none, still in contact" if hit.in_contact else "none, nothing arrived"
+        still = "none, the first body did not arrive" if hit.speed else "none, nothing arrived"
+        return "none, still in contact" if hit.in_contact else still
     return f"{round(hit.restitution, digits) + 0.0:.{digits}f}"
 
 

@@ -75,7 +75,7 @@ def force(response: Response | Strokes, *, band: tuple[float, float] = SPECTRUM_
         above, below = figure.subplots(2, 1)
         start, end = response.time[0], response.time[-1]
         if response.impacts:
-            start, end = response.impacts[0].start, response.impacts[-1].end
+            start, end = response.impacts[0].start, sampling.last_release(response)
         room, several, most = MARGIN * (end - start), response.force.ndim == 2, 20  # numbers that do not overlap
         names = [f"contact {i}" for i in range(response.force.shape[1])] if several else None
         above.plot(response.time, response.force, label=names)
@@ -105,15 +105,16 @@ def force(response: Response | Strokes, *, band: tuple[float, float] = SPECTRUM_
 
 @check.typed
 def energies(response: Response) -> Figure:
-    """Plot the energy of striker and struck body during the blow, and the rest: in the contact or lost."""
-    end = (response.impacts[-1].end if response.impacts else float(response.time[-1])) or 1.0
+    """Plot the energy of striker and struck body, or of each body, during the blow, and the rest: stored or lost."""
+    end, n = sampling.last_release(response) or 1.0, len(response.bodies)
     times = np.linspace(0.0, (1.0 + MARGIN) * end, 800)
-    parts = [response.modal_energy(times, body=body).sum(axis=1) for body in (0, -1)]
+    names = ["striker", "struck body"] if n == 2 else [f"body {i}" for i in range(n)]
+    parts = [response.modal_energy(times, body=body).sum(axis=1) for body in range(n)]
     with styled(7.0, 3.6) as figure:
         axes = figure.subplots()
-        axes.plot(times, parts[0], label="striker")
-        axes.plot(times, parts[1], label="struck body")
-        axes.plot(times, parts[0][0] - parts[0] - parts[1], label="contact and losses")
+        for name, part in zip(names, parts):
+            axes.plot(times, part, label=name)
+        axes.plot(times, sum(response.start_energies.values()) - sum(parts), label="contact and losses")
         axes.set(xlim=(0.0, times[-1]), xlabel="time", ylabel="energy", title="Energy during the blow")
         set_units(axes, "s", "J")
         axes.legend(loc="best")
@@ -123,8 +124,7 @@ def energies(response: Response) -> Figure:
 @check.typed
 def mode_energies(response: Response) -> Figure:
     """Plot the energy of each mode of the struck body when the striker leaves, over its frequency."""
-    end = response.impacts[-1].end if response.impacts else 0.0
-    energy = response.modal_energy([end])[0]
+    energy = response.modal_energy([sampling.last_release(response)])[0]
     shown = (response.target.omega > 0.0) & (energy > 0.0)
     top = float(energy[shown].max(initial=0.0)) or 1.0
     with styled(7.0, 3.6) as figure:

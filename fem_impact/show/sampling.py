@@ -71,8 +71,12 @@ def _struck(response: Response) -> tuple[Striker, np.ndarray]:
 def end_of(response: Response | Strokes) -> float:
     """When the pictures of a blow, or of a sequence of strokes, end [s]."""
     first = 0.0 if isinstance(response, Response) else float(response.starts[0])
-    last = response.impacts[-1].end if response.impacts else float(response.time[-1])
-    return first + AFTER * (last - first) or 1.0
+    return first + AFTER * (last_release(response) - first) or 1.0
+
+
+def last_release(response: Response | Strokes) -> float:
+    """When bodies part for the last time [s]; at the end of the run if they do not touch."""
+    return max((impact.end for impact in response.impacts), default=float(response.time[-1]))
 
 
 def frame_times(response: Response, frames: int) -> np.ndarray:

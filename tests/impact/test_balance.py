@@ -55,3 +55,37 @@ def test_what_waves_carry_into_an_infinite_plate_is_not_called_lost():
                   target="infinite").strike()  # fmt: skip
     assert "target 0.00%, contact 0.00%, carried off by waves or dissipated " in hit.summary()
     assert "contact 0.00%, dissipated 0.00%" in blow().summary()
+
+
+HEAVIER, FREE = (
+    fi.Modes.rigid(0.3),
+    fi.analytic.beam(0.3, ends=("free", "free"), mass=0.1, n_modes=6, first_frequency=800.0),
+)
+LINEAR = fi.Contact.linear(1e5)
+
+
+def test_speeds_count_from_the_first_body_of_a_touch_also_if_it_is_the_later_one():
+    """They had the other sign, and the restitution with them: -0.5."""
+    first, second = ([fi.Touch(LINEAR, *bodies)] for bodies in ((0, 1), (1, 0)))
+    hits = [
+        fi.collide([fi.Modes.rigid(0.1), HEAVIER], touch, speeds=[speed, 0.0])
+        for touch, speed in ((first, 1.0), (second, -1.0))
+    ]
+    assert_allclose([hit.restitution for hit in hits], 0.5, rtol=1e-12)  # (0.3 - 0.1) / (0.3 + 0.1)
+    assert_allclose(hits[1].speeds, [0.5, -0.5], rtol=1e-12)
+    assert_allclose(hits[1].striker_speeds, [[-1.0, 0.5]], rtol=1e-12)
+
+
+def test_a_body_whose_first_contact_is_with_itself_has_a_speed():
+    """Its rigid motion does not press that contact: speed and restitution were zero."""
+    own, wall = fi.Touch(fi.Contact.linear(1e5, gap=0.1), 0, 0, 0.1, 0.25), fi.Touch(LINEAR, 0, None, 0.15)
+    hit, other = (fi.collide([FREE], touches, speeds=[1.0], residual=False) for touches in ([own, wall], [wall, own]))
+    assert_allclose([hit.restitution, -hit.speeds[0]], other.restitution, rtol=1e-12)
+    assert other.restitution > 0.9
+
+
+def test_a_first_body_that_stands_has_no_restitution():
+    """It was given the speed it gets over that of the body that hits it."""
+    hit = fi.collide([HEAVIER, fi.Modes.rigid(0.1)], [fi.Touch(LINEAR, 0, 1)], speeds=[0.0, -1.0])
+    assert_allclose(hit.speeds, [-0.5, 0.5], rtol=1e-12)
+    assert hit.restitution is None and "restitution none, the first body did not arrive at -1 m/s" in hit.summary()

@@ -65,6 +65,18 @@ def test_energies_add_up_at_every_instant(hit):
     assert lines[2].get_ydata().min() > -1e-3 * 0.06
 
 
+@pytest.mark.parametrize("speeds", [[1.0, 0.0, 0.0], [0.5, 0.0, -0.5]])
+def test_a_chain_is_drawn_whole(speeds):
+    """The middle body's energy, and that of others that arrive, counted as lost; the last touch to begin ends first."""
+    laws = fi.Contact.linear(1e4), fi.Contact.linear(1e6, gap=1e-3)
+    touches = [fi.Touch(law, i, i + 1) for i, law in enumerate(laws)]
+    hit = fi.collide([fi.Modes.rigid(mass) for mass in (1.0, 0.5, 0.3)], touches, speeds=speeds)
+    lines = figures.energies(hit).axes[0].lines
+    assert [line.get_label() for line in lines] == ["body 0", "body 1", "body 2", "contact and losses"]
+    assert_allclose(lines[-1].get_ydata()[[0, -1]], 0.0, atol=1e-9)  # elastic contacts, open again
+    assert hit.impacts[-1].end < hit.impacts[0].end < figures.force(hit).axes[0].get_xlim()[1]
+
+
 def test_mode_energies_are_those_at_the_last_release(hit):
     (bars,) = figures.mode_energies(hit).axes[0].collections
     tops = np.array([segment[1] for segment in bars.get_segments()])
