@@ -18,7 +18,8 @@ from .stretched import Stretched
 # [-] of the largest force and of the deepest approach of a blow: a push that stays below both is an error of steps
 FAINT = 1e-9
 # [-] of the largest approach: bodies nearer than this touch, an atom's width in most blows; errors of the first step
-# part bodies that are pressed from rest by less
+# part bodies that are pressed from rest by less, and coarse steps do not see that, so that it is no impact where they
+# touched before, unless its force exceeds this share of the largest
 TOUCH = 1e-6
 CUBIC = 3.0**0.5 / 216.0  # [-] error of the rate of a cubic through both ends of a step, over a fourth derivative h**3
 SLOWEST = 0.1  # [-] of a force, what a loss that takes more of it leaves
@@ -206,7 +207,8 @@ class History(check.Locked):
         if len(found) > 1:
             peak, pressed = found[:, 2], self.law[found[:, 4].astype(int)]
             depth = (peak / pressed["stiffness"]) ** (1.0 / pressed["exponent"])
-            found = found[(peak > FAINT * peak.max()) | (depth > FAINT * self._column(0).max(initial=0.0))]
+            least = np.where(found[:, 5] > 0.0, FAINT, TOUCH)
+            found = found[(peak > least * peak.max()) | (depth > least * self._column(0).max(initial=0.0))]
         if min(found[:, 7].tolist(), default=np.inf) < np.inf:
             # bodies that touch at rest press each other as soon as a force acts on one of them: a constant one, or that
             # of a push at another contact

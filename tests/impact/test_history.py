@@ -208,3 +208,17 @@ def test_felt_that_ends_a_run_has_let_go():
     assert first.restitution == pytest.approx(whole.restitution, abs=1e-5)
     held = fi.strike(plate, ball, felt, **blow, duration=0.5 * whole.contact_time)
     assert held.restitution is None and held.in_contact
+
+
+def test_a_push_of_less_than_a_touch_is_no_impact_where_bodies_touched_before():
+    """With 2e-11 of the largest force for 15 microseconds: it counted from 1e-6 on, and three impacts were others."""
+    law, u = fi.Contact.hertz(1e7), 0.1**-0.5
+    shapes = [[u, -1.6 * u], [u, 1.6 * u]]
+    bar = fi.Modes.from_arrays([0.0, 3e3], shapes, points=[[0.0], [1.0]], mass=0.1, complete=True)
+    bodies = [fi.Modes.rigid(0.03), bar, fi.Modes.rigid(0.05)]
+    touches = [fi.Touch(law, 0, 1, None, [0.0]), fi.Touch(law, 1, 2, [1.0], None)]
+    blow = {"speeds": [1.0, 0.0, 0.0], "forces": [0.0, 0.0, -0.1], "max_impacts": 3}
+    coarse, fine = (fi.collide(bodies, touches, tolerance=each, **blow) for each in (1e-4, 1e-6))
+    claimed = coarse.error.of_quantity("contact_time") + fine.error.of_quantity("contact_time")
+    assert coarse.contact_time == pytest.approx(fine.contact_time, rel=claimed)
+    assert len(fine.history.steps) < 1000  # 442; 2027 to find that push
