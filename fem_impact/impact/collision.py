@@ -264,6 +264,8 @@ def _reduced_bodies(bodies, contacts, speeds, states, forces, residual, strikers
     for body, modes in enumerate(bodies):
         points = np.vstack([point for _, _, point in ends[body]] or [np.zeros((0, modes.dimension))])
         touched = tuple((i, sign) for i, sign, _ in ends[body])
+        if not touched and (speeds[body] or forces[body]):
+            raise ValueError(f"speeds and forces must be zero for a body without contacts, of body {body} they are not")
         part = part_of(modes, touched, points, residual).push_body(float(forces[body]))
         if states is not None:
             q, p = (check.array(f"states[{body}]", value, (modes.n_modes,)) for value in states[body])
@@ -276,7 +278,7 @@ def _reduced_bodies(bodies, contacts, speeds, states, forces, residual, strikers
             own = own / comes if comes > 0.0 else None
             part = replace(part, coming=own)
         if speed != 0.0:
-            if not touched or not part.rows[0, modes.omega == 0.0].any():
+            if not part.rows[0, modes.omega == 0.0].any():
                 raise ValueError(f"speeds must be zero for a body that cannot move rigidly, got {speed:g} m/s")
             own = modes.rigid_motion(points[:1]) if own is None else own
             part = replace(part, p=part.p + speed * own, speed=speed)

@@ -403,6 +403,13 @@ def test_a_point_that_is_missing_is_named():
         collide([LIGHT, BAR], [Touch(fi.Contact.linear(1e5), 0, 1)], speeds=[1.0, 0.0])
 
 
+@pytest.mark.parametrize("moved", [{"speeds": [1.0, 0.0, 1.0]}, {"speeds": [1.0, 0.0, 0.0], "forces": [0.0, 0.0, 1.0]}])
+def test_a_body_without_contacts_that_is_to_move_is_refused(moved):
+    """A force raised an IndexError; a free body could not move rigidly, it said."""
+    with pytest.raises(ValueError, match="speeds and forces must be zero for a body without contacts, of body 2 they"):
+        collide([LIGHT] * 3, [Touch(fi.Contact.linear(1e5), 0, 1)], duration=1e-3, **moved)
+
+
 @pytest.mark.parametrize(("body", "at"), [(fi.Modes.rigid(0.1), ()), (BAR, (0.2, 0.2))])
 def test_a_body_that_cannot_press_itself_is_refused(body, at):
     with pytest.raises(ValueError, match=r"second of contact 0 must be another body.* body 0 does not move towards"):
