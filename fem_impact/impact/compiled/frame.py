@@ -180,10 +180,13 @@ def write_flight(bodies, contacts, course, flights, limits, row):
 
 @inner(part=True)
 def step_length(course, base, horizon):
-    """Length of the next step, no farther than to the horizon, and where its table is kept."""
+    """Length of the next step, no farther than to the horizon, and where its table is kept.
+
+    The last one is longer by rounding rather than followed by one as short as that, which holds nothing but rounding.
+    """
     left = horizon - course.clock[TIME]
     h = base * 0.5 ** course.counts[LEVEL]
-    return (left, LEVELS) if h > left else (h, course.counts[LEVEL])
+    return (left, LEVELS) if h > (1.0 - NEAR) * left else (h, course.counts[LEVEL])
 
 
 @inner(part=True)
