@@ -74,12 +74,14 @@ def of_runs(
         (np.isin(run.omega, (0.0, *pace.swings)) if pace and pace.swings else run.omega == 0.0).nonzero()[0]
         for run in (two, one)
     ]
-    start, end = two.start_p[rigid], two.end_p[rigid]
+    start, end, other_end = two.start_p[rigid], two.end_p[rigid], one.end_p[other]
+    if not n_impacts:  # bodies that constant forces part: a run ends with its first step, however long that is
+        other_end = other_end + (one.omega[other] == 0.0) * one.bias[other] * (two.end_time - one.end_time)
     momentum = sqrt(max(start.dot(start), end.dot(end)))
     momentum = momentum or sqrt(two.start_p.dot(two.start_p)) or sqrt(two.end_p.dot(two.end_p)) or 1.0
     # bodies that a force holds pressed rest but for the rounding of what it gave them
     given = float(two.contacts[:, 3].sum()) * np.abs(two.shape[:, rigid]).max(initial=0.0)
-    speeds = np.maximum(np.abs(one.end_p[other] - end) - ROUNDING * given, 0.0)
+    speeds = np.maximum(np.abs(other_end - end) - ROUNDING * given, 0.0)
     own = sum([abs(part) * speed for part, speed in zip(pace.rebound if pace else (), speeds.tolist())])
     found: dict[str, float] = {"restitution": max(max(speeds.tolist(), default=0.0) / momentum, own)}
     totals = []
