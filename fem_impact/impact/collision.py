@@ -59,7 +59,7 @@ def strike(
     before = start.state() if isinstance(start, Response) else start
     if before is not None:
         before.of(-1, "modes", modes)
-    point, asked = modes.point("at", at), Options(**options)
+    point, asked = modes.point("at", at), Options.read(options)
     struck = part_of(modes, ((0, -1.0),), point, asked.residual).push_body(asked.target_force)
     if asked.stretching or modes.stretches:
         struck = replace(struck, stretching=stretch(modes))
@@ -155,7 +155,7 @@ def collide_unjudged(
     start: State | Response | None = None, **options: Any,
 ) -> Response:  # fmt: skip
     """`collide` without a word on its tolerance; hands and their weight push strikers on."""
-    asked = Options(**options)
+    asked = Options.read(options)
     given, contacts = check.tuple_of("bodies", bodies, Modes, Striker), check.tuple_of("contacts", contacts, Touch)
     strikers = {i: each for i, each in enumerate(given) if isinstance(each, Striker)}
     bodies = tuple(strikers[i].body if i in strikers else each for i, each in enumerate(given))

@@ -68,6 +68,14 @@ class Options:
     n_quantities: int = field(init=False)
     last: tuple[float, int] = field(init=False)  # [s] time, and number of impacts, 0 for any, up to which to follow
 
+    @classmethod
+    def read(cls, given: Mapping[str, Any]) -> "Options":
+        """Options by name, all of them known."""
+        for name in given:
+            if name not in cls.__match_args__:
+                raise ValueError(f"{name} is not an argument of a blow{check.nearest(name, cls.__match_args__)}")
+        return cls(**given)
+
     def __post_init__(self) -> None:
         check.flag("residual", self.residual)
         check.flag("stretching", self.stretching)

@@ -403,6 +403,16 @@ def test_a_point_that_is_missing_is_named():
         collide([LIGHT, BAR], [Touch(fi.Contact.linear(1e5), 0, 1)], speeds=[1.0, 0.0])
 
 
+def test_an_argument_that_a_blow_does_not_have_is_named_with_the_nearest():
+    ball, law = fi.Modes.rigid(0.1), fi.Contact.linear(1e5)
+    for blow in (
+        lambda: fi.strike(ball, fi.Striker.rigid(0.1), law, at=(), speed=1.0, tolerence=1e-3),
+        lambda: fi.collide([ball, ball], law, speeds=[1.0, 0.0], tolerence=1e-3),
+    ):
+        with pytest.raises(ValueError, match="tolerence is not an argument of a blow; did you mean 'tolerance'"):
+            blow()
+
+
 @pytest.mark.parametrize("moved", [{"speeds": [1.0, 0.0, 1.0]}, {"speeds": [1.0, 0.0, 0.0], "forces": [0.0, 0.0, 1.0]}])
 def test_a_body_without_contacts_that_is_to_move_is_refused(moved):
     """A force raised an IndexError; a free body could not move rigidly, it said."""
