@@ -65,9 +65,12 @@ class Announcer:
             self.counts[what] = Count(what, done, total)
             return
         count.update(done, total)
-        left = count.left()
-        if left is not None and left > LONG and time.monotonic() > self.until:
-            self.announce(f"{total} {what}: about {left:.0f} s more", left)
+        self.revise(count.left(), f"{total} {what}: ")
+
+    def revise(self, seconds: float | None, what: str = "") -> None:
+        """Announce what turns out to take so much longer, if that is known."""
+        if seconds is not None and seconds > LONG and time.monotonic() > self.until:
+            self.announce(f"{what}about {seconds:.0f} s more", seconds)
 
 
 ANNOUNCER = Announcer()
@@ -75,19 +78,25 @@ ANNOUNCER = Announcer()
 
 def report(what: str, done: int, total: int) -> None:
     """Report how many of something are done, to the listener if there is one."""
-    observers = OBSERVERS.get()
-    if observers is None:
-        if threading.current_thread() is threading.main_thread():
-            ANNOUNCER.follow(what, done, total)
-    elif observers[0] is not None:
-        observers[0](what, done, total)
+    listener, _ = observers()
+    if listener is not None:
+        listener(what, done, total)
 
 
 def revise(seconds: float) -> None:
     """Report how many more seconds work takes that was not planned, or was planned otherwise."""
-    _, oracle = OBSERVERS.get() or (None, None)
+    _, oracle = observers()
     if oracle is not None:
         oracle(seconds)
+
+
+def observers() -> Observers:
+    """Who observes the work in this thread; in the main one by default whoever waits for it."""
+    found = OBSERVERS.get()
+    if found is not None:
+        return found
+    main = threading.current_thread() is threading.main_thread()
+    return (ANNOUNCER.follow, ANNOUNCER.revise) if main else (None, None)
 
 
 @contextmanager

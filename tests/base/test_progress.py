@@ -97,6 +97,17 @@ def test_a_long_loop_that_nobody_observes_is_announced_and_again_if_it_takes_twi
         assert caplog.messages[1:] == ["10 cells: about 9 s more", "10 cells: about 124 s more"]
 
 
+def test_a_strike_that_takes_longer_than_announced_says_so(second, caplog):
+    with caplog.at_level(logging.INFO, logger="fem_impact.slow"):
+        progress.ANNOUNCER.announce("striking takes about 10 s", 10.0)
+        second(15.0)
+        progress.revise(8.0)
+        second(10.0)
+        progress.revise(30.0)
+        progress.revise(40.0)
+    assert caplog.messages == ["striking takes about 10 s", "about 30 s more"]
+
+
 def test_a_loop_that_somebody_observes_or_in_a_thread_of_its_own_is_not_announced(second, caplog):
     with caplog.at_level(logging.INFO, logger="fem_impact.slow"):
         with progress.observed(None):
