@@ -24,6 +24,7 @@ from .loops import (
     Outline,
     Piece,
     extent,
+    is_straight,
     polyline,
     refuse_millimetres,
     ring,
@@ -32,7 +33,7 @@ from .loops import (
     tangent,
     why_crossed,
 )
-from .smooth_edges import smooth_runs
+from .smooth_edges import DENSE, smooth_runs
 
 DXF_UNITS = {  # $INSUNITS code -> [m]
     1: 0.0254, 2: 0.3048, 4: 1e-3, 5: 1e-2, 6: 1.0, 7: 1e3, 8: 2.54e-8, 9: 2.54e-5, 10: 0.9144, 12: 1e-9, 13: 1e-6,
@@ -77,34 +78,60 @@ def read_outline(source: Any, unit: str | None) -> tuple[Outline, dict[str, np.n
 
 def _smooth_loop(points: np.ndarray, notes: list[str]) -> Loop:
     """Loop through points (n, 2): a smooth curve where the turns are small, straight lines elsewhere."""
-    points = ring("source", points, "points")
+    points = ring("source", points, "points", MOST_NUMBERS)
     if np.linalg.norm(np.roll(points, -1, axis=0) - points, axis=1).min() == 0.0:
         raise ValueError("source has the same point twice in a row; remove one")
     if signed_area(points) < 0.0:
         points = points[::-1]
+    pieces = _smooth_pieces(points, True, "source", notes)
+    if len(pieces) > MOST_PIECES:
+        raise ValueError(f"source must have at most {MOST_PIECES} corners, got {len(pieces)}")
+    return pieces
+
+
+def _smooth_pieces(points: np.ndarray, closed: bool, source: str, notes: list[str], name: str = "") -> Loop:
+    """Pieces through the points (n, 2) of a loop or line."""
     pieces: list[Piece] = []
-    for place, tangents, curvatures, circle in smooth_runs(points):
-        if circle is not None:
+    runs, scatter = smooth_runs(points, closed)
+    for place, controls, circle in runs:
+        if circle is None:
+            pieces += [Bezier(control, name) for control in controls]
+        else:
             centre, radius = circle
             start = math.atan2(*(place[0] - centre)[::-1])
             turns = np.unwrap(np.arctan2(*(place - centre).T[::-1]))
             axes = np.array([radius, 0.0]), np.array([0.0, radius])
-            pieces.append(Arc(centre, *axes, start, float(turns[-1] - turns[0])))
-        elif not curvatures.any():
-            pieces += [segment(a, b) for a, b in pairwise(place)]
-        else:
-            for a, b, (t0, t1), (k0, k1) in zip(place[:-1], place[1:], tangents, curvatures):  # quintics
-                length = float(np.linalg.norm(b - a))
-                normal = np.array([[-t0[1], t0[0]], [-t1[1], t1[0]]])
-                c1, c4 = a + length / 5.0 * t0, b - length / 5.0 * t1
-                c2 = 2.0 * c1 - a + length**2 / 20.0 * k0 * normal[0]
-                c3 = 2.0 * c4 - b + length**2 / 20.0 * k1 * normal[1]
-                pieces.append(Bezier(np.array([a, c1, c2, c3, c4, b])))
-    if any(not isinstance(piece, Bezier) or len(piece.control) > 2 for piece in pieces):
+            pieces.append(Arc(centre, *axes, start, float(turns[-1] - turns[0]), name))
+    if any(not is_straight(piece) for piece in pieces):
         notes.append(
-            "points along gentle bends were joined by smooth curves; fi.mesh.polygon joins points by straight lines"
+            f"{source}: points along gentle bends were joined by smooth curves; fi.mesh.polygon joins points by "
+            "straight lines"
         )
+    if scatter:
+        notes.append(f"{source}: points scatter by {scatter:.1g} m; the outline passes between them")
     return tuple(pieces)
+
+
+def _smooth_lines(name: str, pieces: list[Piece], notes: list[str]) -> list[Piece]:
+    """Pieces in which many straight ones in a row, as of traced curves, are replaced by smooth ones."""
+    ends = np.array([piece.at(np.array([0.0, 1.0])) for piece in pieces]).reshape(-1, 2, 2)
+    breaks = [
+        i for i in range(1, len(pieces))
+        if not (is_straight(pieces[i - 1]) and is_straight(pieces[i]) and np.array_equal(ends[i - 1, 1], ends[i, 0]))
+        or pieces[i - 1].name != pieces[i].name
+    ]  # fmt: skip
+    result: list[Piece] = []
+    noted: list[str] = []
+    for a, b in pairwise([0, *breaks, len(pieces)]):
+        points = np.concatenate([ends[a:b, 0], ends[b - 1 : b, 1]])
+        points = points[np.append(np.diff(points, axis=0).any(axis=1), True)] if b > a + DENSE else points
+        closed = b > a and np.array_equal(points[0], points[-1])
+        if len(points) - closed > DENSE:
+            result += _smooth_pieces(points[: len(points) - closed], closed, name, noted, pieces[a].name)
+        else:
+            result += pieces[a:b]
+    notes += dict.fromkeys(noted)
+    return result
 
 
 def svg_arrays(path: Path) -> dict[str, np.ndarray]:
@@ -269,9 +296,9 @@ def _clamped(curve: Any) -> Any:
     return type(curve)(curve.control_points[used], order, knots, curve.weights()[used] or None)
 
 
-def _check_number(name: str, pieces: list[Piece]) -> None:
-    if len(pieces) > MOST_PIECES:
-        raise ValueError(f"{name} has more than {MOST_PIECES} lines and curves; simplify the drawing")
+def _check_number(name: str, pieces: list[Piece], most: int = 10 * MOST_PIECES) -> None:
+    if len(pieces) > most:
+        raise ValueError(f"{name} has more than {most} lines and curves; simplify the drawing")
 
 
 def _packed(pieces: list[Piece]) -> dict[str, np.ndarray]:
@@ -302,6 +329,8 @@ def _unpacked(name: str, drawn: dict[str, np.ndarray], scale: Any) -> list[Piece
 
 def _join_pieces(name: str, pieces: list[Piece], notes: list[str]) -> Drawn:
     """Join pieces end to end into closed loops; what has a name and cannot belong to one is a line."""
+    pieces = _smooth_lines(name, pieces, notes)
+    _check_number(name, pieces, MOST_PIECES)
     corners = np.array([piece.at(np.linspace(0.0, 1.0, 5)) for piece in pieces]).reshape(-1, 2)
     if not (np.abs(corners) < FARTHEST).all():
         raise ValueError(f"{name} has coordinates beyond {FARTHEST:g} m; correct the drawing")

@@ -197,13 +197,13 @@ def refuse_millimetres(name: str, *sides: float) -> None:
         )
 
 
-def ring(name: str, given: Any, what: str) -> np.ndarray:
+def ring(name: str, given: Any, what: str, most: int = MOST_PIECES) -> np.ndarray:
     """Points (n, 2) [m] of a closed polygon, checked; the first is not repeated at the end."""
     points = check.array(name, given, (None, 2), "m")
     if len(points) > 1 and np.array_equal(points[0], points[-1]):
         points = points[:-1]
-    if not 3 <= len(points) <= MOST_PIECES:
-        raise ValueError(f"{name} must have 3 to {MOST_PIECES} {what}, got {len(points)}")
+    if not 3 <= len(points) <= most:
+        raise ValueError(f"{name} must have 3 to {most} {what}, got {len(points)}")
     return points
 
 

@@ -254,7 +254,8 @@ def outline(source: Any, *, size: float | None = None, unit: str | None = None) 
     ----------
     source : str, Path, shapely Polygon or array_like (n, 2) [m]
         An .svg or .dxf file (needs ``pip install 'fem-impact[cad]'``), or geometry. The largest closed loop is the
-        outline, loops inside it are holes. Points along gentle bends are joined by smooth curves.
+        outline, loops inside it are holes. Points along gentle bends are joined by smooth curves, in drawings from 65
+        in a row on; points that scatter, as traced ones do, lie beside these curves. Corners stay.
     size : float [m], optional
         Element size; by default `find_modes` chooses one fine enough for the requested modes.
     unit : str, optional

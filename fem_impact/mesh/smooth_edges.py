@@ -1,7 +1,10 @@
 """Fit tangents and curvatures to a rim known only by its points, as in a mesh file."""
 
 import numpy as np
+import shapely
+from scipy.interpolate import BSpline, splprep
 
+from .._base.rounding import SAME
 from .facets import angles, cross_product, slopes_and_bends
 
 # [rad] a vertex where the rim turns by more is a corner: ten facets of a circle turn by 36 degrees each
@@ -12,6 +15,9 @@ ALIKE = 4.0
 ROUND = 2e-6  # [-] points closer to a circle than this fraction of its radius lie on it: files write six digits
 # [rad] a curve meets its neighbour smoothly if their tangents differ by less, some 3 degrees, as fits leave
 JOINT = 0.05
+DENSE = 64  # [-] a curve through more points is a spline, of as few pieces as follow them: 26 facets make a circle
+SCATTER = 2e-3  # [-] points further than this fraction of the extent from smooth curves are no noise, but what is meant
+ALTERNATING = 0.05  # [-] with a larger share of turns in other directions than the ones before, points scatter
 ARM = 2  # [-] points used on each side of a vertex to fit curves other than circles: a quartic through five, order 4
 
 
@@ -60,33 +66,131 @@ def join_smoothly(pairs: np.ndarray, tangents: np.ndarray, curvatures: np.ndarra
     tangents[pairs[near, 1], 0] = mean
 
 
-Run = tuple[np.ndarray, np.ndarray, np.ndarray, tuple[np.ndarray, float] | None]
+Run = tuple[np.ndarray, np.ndarray, tuple[np.ndarray, float] | None]
 
 
-def smooth_runs(place: np.ndarray) -> list[Run]:
-    """Split a closed loop of points (n, 2) at its corners into smooth runs.
+def smooth_runs(place: np.ndarray, closed: bool = True) -> tuple[list[Run], float]:
+    """Split a closed loop, or a line, of points (n, 2) [m] at its corners into smooth runs.
 
     Returns
     -------
-    list of (points (m + 1, 2), tangents (m, 2, 2), curvatures (m, 2), circle); circle is None or (centre, radius)
+    runs : list of (points (m + 1, 2) [m], controls (n_pieces, degree + 1, 2) [m] of Bezier pieces, circle)
+        circle is None or (centre, radius).
+    scatter : float [m]
+        Standard deviation of points that scatter about the runs; zero if the runs pass through the points.
     """
-    runs = []
-    for run, closed in _runs(_corners(place)):
-        points = place[np.append(run, (run[-1] + 1) % len(place))]
-        _, tangents, curvatures = _fit(points, closed, None)
-        circle = None
-        if curvatures.any():
-            origin, radius = _circle(points)
-            if np.abs(np.linalg.norm(points - origin, axis=1) - radius).max() < ROUND * radius:
-                circle = origin, radius
-        runs.append((points, tangents, curvatures, circle))
-    return runs
+    around = place if closed else np.concatenate([place, place[-2:0:-1]])  # there and back
+    noise, scattered = _noise(around)
+    corner = _corners_in_noise(around, noise) if scattered else _corners(around)
+    if not closed:
+        corner[[0, len(place) - 1]] = True
+        corner[len(place) :] = False
+    runs = _runs(corner) if closed else _runs(corner)[:-1]
+    fitted: list[Run] = []
+    for run, whole in runs:
+        points = around[np.append(run, (run[-1] + 1) % len(around))]
+        fitted.append((points, *_pieces(points, whole, noise, 5.0 * noise * scattered)))
+    return fitted, noise * scattered
+
+
+def _noise(place: np.ndarray) -> tuple[float, bool]:
+    """Standard deviation [m] of points (n, 2) of a loop across cubics through seven neighbours, and if they scatter."""
+    n = len(place)
+    if n <= DENSE:
+        return 0.0, False
+    near = place[(np.arange(n)[:, None] + np.arange(-3, 4)) % n]  # (n, 7, 2)
+    steps = np.linalg.norm(np.diff(near, axis=1), axis=2)
+    along = np.cumsum(np.pad(steps, ((0, 0), (1, 0))), axis=1)
+    base, _ = np.linalg.qr((along / along[:, -1:] - 0.5)[..., None] ** np.arange(4))
+    local = near - near[:, 3:4]
+    chord = near[:, -1] - near[:, 0]
+    chord = chord / np.maximum(np.linalg.norm(chord, axis=1), 1e-3 * along[:, -1])[:, None]
+    across = cross_product(chord[:, None], local - base @ (base.swapaxes(1, 2) @ local))
+    squares, extent = (across**2).sum(axis=1), float(np.ptp(place, axis=0).max())
+    turn = _turns(place)
+    alternate = bool(np.count_nonzero(turn * np.roll(turn, 1) < -(STRAIGHT**2)) > ALTERNATING * n)
+    if alternate:
+        squares = squares[squares > (SAME * extent) ** 2]  # sides along rows of pixels are straight
+    noise = float(np.sqrt(np.median(squares) / 2.366))  # the median of chi-square of three, for corners count little
+    return noise, alternate and noise < SCATTER * extent
+
+
+def _corners_in_noise(place: np.ndarray, noise: float) -> np.ndarray:
+    """Which points (n, 2) [m] of a closed loop, which scatter by ``noise`` [m], are corners, (n,) bool."""
+    first = int(np.linalg.norm(place - place.mean(axis=0), axis=1).argmax())  # the simplified loop keeps it
+    turned = np.roll(place, -first, axis=0)
+    line = shapely.LineString(np.concatenate([turned, turned[:1]])).simplify(5.0 * noise, preserve_topology=False)
+    simple = shapely.get_coordinates(line)[:-1]
+    lengths = np.linalg.norm(np.roll(simple, -1, axis=0) - simple, axis=1)
+    total, reach = lengths.sum(), 20.0 * noise
+    at = np.cumsum(lengths) - lengths
+    behind, ahead = (
+        shapely.get_coordinates(shapely.line_interpolate_point(line, (at + side * reach) % total)) for side in (-1, 1)
+    )
+    wide = np.abs(angles(simple - behind, ahead - simple))
+    apart = np.abs((at[:, None] - at + 0.5 * total) % total - 0.5 * total)
+    sharp = (wide > CORNER) & (wide >= np.where(apart < reach, wide, 0.0).max(axis=1))
+    lone = _corners(simple) & (np.abs(_turns(simple)) > 10.0 * noise * (1.0 / lengths + 1.0 / np.roll(lengths, 1)))
+    return np.isin(place @ [1.0, 1j], simple[sharp | lone] @ [1.0, 1j])
+
+
+def _pieces(
+    points: np.ndarray, closed: bool, noise: float, off: float
+) -> tuple[np.ndarray, tuple[np.ndarray, float] | None]:
+    """Controls of the Bezier pieces of a run (n + 1, 2) [m] whose points may lie ``off`` [m], and its circle if any."""
+    line = np.linalg.svd(points - points.mean(axis=0), full_matrices=False)[2][1]  # normal to the nearest line
+    if not closed and np.abs((points - points.mean(axis=0)) @ line).max() <= max(off, SAME * np.ptp(points)):
+        return points[[0, -1]][None], None
+    turn = _turns(points)[1:-1]
+    origin, radius = _circle(points)
+    away = np.abs(np.linalg.norm(points - origin, axis=1) - radius).max()
+    straight = np.abs(turn).max(initial=0.0) <= STRAIGHT or len(points) < 4
+    if not straight and away < max(ROUND * radius, off if closed else 0.0):
+        return points[:, None], (origin, radius)
+    if not straight and len(points) > (12 if off else DENSE):
+        return _spline(points, closed, noise), None
+    if straight or off:
+        return np.stack([points[:-1], points[1:]], axis=1), None
+    _, tangents, curvatures = _fit(points, closed, None)
+    ahead = np.linalg.norm(np.diff(points, axis=0), axis=1)[:, None, None] / 5.0 * tangents  # (n, 2, 2)
+    bend = np.stack([-ahead[..., 1], ahead[..., 0]], axis=-1) * np.linalg.norm(ahead, axis=2, keepdims=True)
+    bend *= 1.25 * curvatures[..., None]
+    a, b, before, after = points[:-1], points[1:], ahead[:, 0], ahead[:, 1]
+    return np.stack([a, a + before, a + 2.0 * before + bend[:, 0], b - 2.0 * after + bend[:, 1], b - after, b], 1), None
+
+
+def _spline(points: np.ndarray, closed: bool, noise: float) -> np.ndarray:
+    """Controls (n_pieces, 6, 2) [m] of a spline between points (n + 1, 2) [m] that scatter by ``noise`` [m]."""
+    n = len(points) - 1
+    arm = int(np.ceil(5.0 * noise / np.median(np.linalg.norm(np.diff(points, axis=0), axis=1))))
+    low, high = np.arange(n) - arm, np.arange(n) + 1 + arm  # over so many, noise makes no way longer
+    if not closed:
+        low, high = np.maximum(low, 0), np.minimum(high, n)
+    ways = np.linalg.norm(points[high % n if closed else high] - points[low % n if closed else low], axis=1)
+    along = np.concatenate([[0.0], np.cumsum(ways / (high - low))])
+    weights = np.ones(n + 1)
+    weights[[0, -1]] = 1.0 if closed else 1e3
+    goal = 2.2 * n * max(noise, 1e-8 * float(np.ptp(points, axis=0).max())) ** 2  # 1.1 for few knots
+    (knots, values, _), _ = splprep(points.T, w=weights, u=along / along[-1], k=5, s=goal, per=closed, quiet=1)
+    edges = np.unique(knots[5:-5])
+    share = 0.5 - 0.5 * np.cos(np.linspace(0.0, np.pi, 6))
+    places = BSpline(knots, np.transpose(values), 5)(edges[:-1, None] + np.diff(edges)[:, None] * share)
+    powers = share[:, None] ** np.arange(6) * (1.0 - share[:, None]) ** np.arange(5, -1, -1)
+    controls = np.linalg.solve(powers * [1.0, 5.0, 10.0, 10.0, 5.0, 1.0], places)
+    controls[-1, -1] = controls[0, 0] if closed else points[-1]
+    controls[0, 0] = controls[0, 0] if closed else points[0]
+    return controls
+
+
+def _turns(place: np.ndarray) -> np.ndarray:
+    """Turn [rad] at each point (n, 2) of a closed loop, positive to the left."""
+    ahead = np.roll(place, -1, axis=0) - place
+    return angles(np.roll(ahead, 1, axis=0), ahead)
 
 
 def _corners(place: np.ndarray) -> np.ndarray:
     """Which vertices of a closed loop are corners, or where a straight side runs into a curve, (n,) bool."""
-    ahead = np.roll(place, -1, axis=0) - place
-    turn = angles(np.roll(ahead, 1, axis=0), ahead)
+    turn = _turns(place)
     sharp = np.abs(turn) > CORNER
     company = np.zeros(len(turn), bool)
     for step in (1, -1):

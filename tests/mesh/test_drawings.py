@@ -193,6 +193,61 @@ def test_dxf_spline_whose_end_knots_are_not_repeated(tmp_path, weights):
     assert away.max() < 1e-4  # half the distance of the 100 001 points, around a curve of length 10
 
 
+def traced(corners, n, scatter):
+    """Points (n, 2) [m] along a polygon through ``corners``, which scatter by ``scatter`` [m]."""
+    rim = shapely.LinearRing(corners)
+    along = shapely.line_interpolate_point(rim, np.linspace(0.0, rim.length, n, endpoint=False))
+    return shapely.get_coordinates(along) + scatter * np.random.default_rng(1).standard_normal((n, 2))
+
+
+ELLIPSE = np.array([0.2, 0.15]) * np.exp(2j * np.pi * np.arange(5000) / 5000)[:, None].view(float).reshape(-1, 2)
+
+
+@pytest.mark.parametrize(("scatter", "error"), [(0.0, 1e-5), (1e-5, 1e-4)])
+def test_a_curve_of_many_points_takes_as_few_facets_as_a_drawn_one(scatter, error, tmp_path):
+    """Hinged, where a polygon of many sides has other frequencies; points scatter by 7e-5 of the half axis."""
+    drawn = svg(tmp_path, '<ellipse cx="1" cy="1" rx="0.2" ry="0.15"/>')
+    shape = fi.mesh.outline(ELLIPSE + scatter * np.random.default_rng(1).standard_normal(ELLIPSE.shape))
+    assert len(shape.facets) < 60 and shape.curved.all()
+    assert any(f"scatter by {scatter:.1g} m" in note for note in shape.notes) == bool(scatter)
+    assert_allclose(first(shape, "hinged"), first(fi.mesh.outline(drawn), "hinged"), rtol=error)
+
+
+@pytest.mark.parametrize(
+    "source",
+    [
+        lambda folder: in_mm(folder, f'<polygon points="{" ".join(f"{x} {y}" for x, y in 1e3 * ELLIPSE[::10])}"/>'),
+        lambda folder: dxf(folder, lambda space: space.add_lwpolyline(ELLIPSE, close=True)),
+    ],
+    ids=["svg", "dxf"],
+)
+def test_a_polyline_of_many_points_is_a_curve(source, tmp_path):
+    shape = fi.mesh.outline(source(tmp_path))
+    assert shape.curved.all() and len(shape.facets) < 80
+    assert "joined by smooth curves" in shape.notes[-1]
+
+
+@pytest.mark.parametrize("scatter", [0.0, 1e-7, 1e-4])
+@pytest.mark.parametrize("n", [420, 4200])
+def test_traced_polygons_keep_their_corners_and_straight_sides(n, scatter):
+    corners = np.array([(0.0, 0.0), (0.4, 0.0), (0.4, 0.15), (0.15, 0.15), (0.15, 0.3), (0.0, 0.3)])
+    outer = drawings.read_outline(traced(corners, n, scatter), None)[0].outer
+    starts = np.array([piece.at(np.zeros(1))[0] for piece in outer])
+    assert len(outer) == 6 and not any(len(piece.control) > 2 for piece in outer)
+    assert cKDTree(starts).query(corners)[0].max() <= 5.0 * scatter + 1e-12
+
+
+def test_a_disk_traced_in_pixels_is_round():
+    """Steps of one pixel of 500 along the rim; the area is that of the pixels inside."""
+    rows = np.arange(-249.5, 250.0)
+    half = np.round(np.sqrt(250.0**2 - rows**2) - 0.5) + 0.5
+    right = np.column_stack([np.repeat(half, 2), (rows[:, None] + [-0.5, 0.5]).ravel()])
+    rim = shapely.segmentize(shapely.Polygon(np.concatenate([right, -right])).exterior, 1.0)
+    shape = fi.mesh.outline(1e-3 * shapely.get_coordinates(rim))
+    assert len(shape.facets) < 60
+    assert_allclose(np.linalg.norm(shape.middles, axis=1), 0.25, rtol=4e-3)  # a pixel
+
+
 def test_a_dxf_spline_through_points_is_a_curve(tmp_path):
     points = [(0.0, 0.0), (1.0, 0.0), (1.2, 0.8), (0.0, 1.0), (0.0, 0.0)]
     assert fi.mesh.outline(dxf(tmp_path, lambda space: space.add_spline(points))).curved.all()
@@ -203,7 +258,7 @@ def test_a_dxf_spline_through_points_is_a_curve(tmp_path):
     (lambda t: in_mm(t, RIM + '<path d="M50 20 L200 20"/>'), "has an open outline"),
     (lambda t: in_mm(t, '<path d="M0 0 H1000 V600 H0 V5"/>'), "has an open outline"),  # by 5 mm of a metre
     (lambda t: t / "none.svg", "there is no such file"),
-    (lambda _: [(0, 0), (1, 0)], "must have 3 to 2000 points, got 2"),
+    (lambda _: [(0, 0), (1, 0)], "must have 3 to 200000 points, got 2"),
     (lambda _: [(0, 0), (1, 1), (1, 0), (0, 1)], "must not cross or touch itself"),
     (lambda _: shapely.Point(0, 0), "one shapely Polygon, got a Point"),
     (lambda t: dxf(t, lambda s: s.add_circle((0, 0), 15.0), units=0), "looks like millimetres"),  # 30 m, no unit

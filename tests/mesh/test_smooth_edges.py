@@ -82,7 +82,7 @@ def test_half_circles_and_straight_sides_meet_smoothly():
     centre = np.where(middles[curved, :1] > 0.0, 1.0, -1.0) * [1.0, 0.0]
     assert_allclose(np.linalg.norm(middles[curved] - centre, axis=1), 1.0, rtol=1e-12)
     assert_allclose(tangents[:, 1], np.roll(tangents[:, 0], -1, axis=0), atol=1e-9)  # no kink anywhere
-    runs = smooth_runs(place)
+    runs, _ = smooth_runs(place)
     assert sorted(circle is not None for *_, circle in runs) == [False, False, True, True]
     assert sorted(len(points) for points, *_ in runs) == [5, 5, 21, 21]
 
@@ -106,7 +106,7 @@ def test_points_within_two_millionths_of_a_circle_lie_on_it(off, found):
     """Six digits of a file keep points that near; an ellipse of this flatness is followed as well by its fit."""
     angle = np.linspace(0.0, 2.0 * np.pi, 60, endpoint=False)
     radius = 2.0 * (1.0 + off * np.cos(2.0 * angle))
-    (_, _, _, circle), *others = smooth_runs(radius[:, None] * np.column_stack([np.cos(angle), np.sin(angle)]))
+    ((_, _, circle), *others), _ = smooth_runs(radius[:, None] * np.column_stack([np.cos(angle), np.sin(angle)]))
     assert not others and (circle is not None) == found
 
 
