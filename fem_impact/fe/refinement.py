@@ -359,8 +359,9 @@ def refine(system: System, n_modes: int | None, max_frequency: float | None, tol
     none = f"no tolerance is: check the units, as {slips[0]}" if slips else f"no tolerance up to {LOOSEST:g} is"
     advice = f"a tolerance of {least:g} is met" if least <= LOOSEST else none
     advice += ", or ask for fewer modes"
-    if least > LOOSEST and found.system.unresolved > SAY:
-        advice = "no tolerance is, as corners hold that error on any mesh"
+    if found.system.unresolved > SAY:
+        held = "no tolerance is, as corners hold that error on any mesh" if least > LOOSEST else advice
+        advice = "; ".join([held, *found.system.mesh.notes])
     raise check.SimulationError(
         f"tolerance = {tolerance:g} is not met: mode {mode + 1} is uncertain by {found.error[mode]:.1e} with "
         f"{found.system.n_dofs} unknowns; {advice}"

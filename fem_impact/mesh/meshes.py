@@ -12,7 +12,7 @@ import numpy as np
 from .._base import check, markup
 from . import drawings, lines, mesh_files, sketch, smooth_edges
 from .facets import Curves, divide_facets, is_curved
-from .loops import Bezier, Outline, circle, extent, polyline, segment, signed_area, straight_loop, why_crossed
+from .loops import TURN, Bezier, Outline, circle, extent, polyline, segment, signed_area, straight_loop, why_crossed
 from .rise import table
 from .triangulation import triangulate
 
@@ -244,7 +244,18 @@ def polygon(corners: Any, holes: Sequence[Any] = (), *, size: float | None = Non
     if not isinstance(holes, (list, tuple, np.ndarray)):
         raise ValueError(f"holes must be a list with the corners of each hole, got {check.shown(holes)}")
     inner = [straight_loop(f"holes[{i}]", hole, f"hole{i}") for i, hole in enumerate(holes)]
-    return fill(Outline.around(outer, tuple(inner)), size=size)
+    gentle = 0
+    for loop in (outer, *inner):
+        for run in smooth_edges.smooth_runs(np.array([side.at(np.zeros(1))[0] for side in loop]))[0]:
+            gentle = max(gentle, len(run[0]) - 1 if run[2] or run[1].shape[1] > 2 else 0)
+    made = fill(Outline.around(outer, tuple(inner)), size=size)
+    if gentle < 2.0 * np.pi / TURN:  # a circle takes more facets
+        return made
+    note = (
+        f"{gentle} corners turn as gently as points of a curve; if they are, fi.mesh.outline joins them by a smooth "
+        "curve: hinged sides have other frequencies, however short they are"
+    )
+    return replace(made, notes=(note,))
 
 
 def outline(source: Any, *, size: float | None = None, unit: str | None = None) -> Mesh:

@@ -167,7 +167,7 @@ def _spline(points: np.ndarray, closed: bool, noise: float) -> np.ndarray:
     if not closed:
         low, high = np.maximum(low, 0), np.minimum(high, n)
     ways = np.linalg.norm(points[high % n if closed else high] - points[low % n if closed else low], axis=1)
-    along = np.concatenate([[0.0], np.cumsum(ways / (high - low))])
+    along = np.concatenate([[0.0], np.cumsum(np.maximum(ways / (high - low), SAME * np.ptp(points)))])
     weights = np.ones(n + 1)
     weights[[0, -1]] = 1.0 if closed else 1e3
     goal = 2.2 * n * max(noise, 1e-8 * float(np.ptp(points, axis=0).max())) ** 2  # 1.1 for few knots

@@ -95,6 +95,18 @@ def test_hinged_edges_in_line_are_told():
         fi.find_modes(body, n_modes=1, tolerance=1e-2)
 
 
+@pytest.mark.slow
+def test_hinged_sides_of_a_circle_of_points_lead_to_its_curve():
+    points = 0.2 * np.exp(2j * np.pi * np.arange(30) / 30)[:, None].view(float)
+    sides, curve = (
+        fi.assemble(shape(points), fi.Plate(STEEL, 2e-3), {"boundary": "hinged"})
+        for shape in (fi.mesh.polygon, fi.mesh.outline)
+    )
+    with pytest.raises(fi.SimulationError, match=r"fewer modes; 30 corners turn .* fi\.mesh\.outline joins them"):
+        fi.find_modes(sides, n_modes=1, tolerance=1e-2)
+    assert fi.find_modes(curve, n_modes=1, tolerance=1e-2).omega[0] > 0.0
+
+
 def sector(degrees):
     """Unit sector with edges side0, arc and side1."""
     angle, origin = np.radians(degrees), np.zeros(2)

@@ -20,6 +20,16 @@ def test_rectangle_is_covered_once_and_its_edges_lie_where_their_names_say():
     assert len(plate.edges["boundary"]) == len(plate.facets)
 
 
+@pytest.mark.parametrize(("n", "noted"), [(24, False), (48, True), (480, True)])
+def test_a_polygon_like_points_of_a_curve_says_so_and_stays_one(n, noted):
+    """An advice that `find_modes` repeats where corners of held sides meet no tolerance; outline follows it."""
+    corners = np.exp(2j * np.pi * np.arange(n) / n)[:, None].view(float) * [0.2, 0.15]
+    shape = mesh.polygon(corners)
+    assert len(shape.edges) == n + 2 and not shape.curved.any()
+    assert [note.startswith(f"{n} corners") and "fi.mesh.outline" in note for note in shape.notes] == [True] * noted
+    assert mesh.outline(corners).curved.all()
+
+
 def test_refined_mesh_keeps_shape_and_edge_names():
     coarse = mesh.rectangle(1.0, 0.5, size=0.25)
     fine = coarse.refined(2.0)
