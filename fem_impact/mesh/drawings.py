@@ -79,8 +79,10 @@ def read_outline(source: Any, unit: str | None) -> tuple[Outline, dict[str, np.n
 def _smooth_loop(points: np.ndarray, notes: list[str]) -> Loop:
     """Loop through points (n, 2): a smooth curve where the turns are small, straight lines elsewhere."""
     points = ring("source", points, "points", MOST_NUMBERS)
-    if np.linalg.norm(np.roll(points, -1, axis=0) - points, axis=1).min() == 0.0:
+    gaps = np.linalg.norm(np.roll(points, -1, axis=0) - points, axis=1)
+    if gaps.min() == 0.0:
         raise ValueError("source has the same point twice in a row; remove one")
+    points = points[gaps > SAME * np.ptp(points)]  # rounding leaves the last beside the first
     if signed_area(points) < 0.0:
         points = points[::-1]
     pieces = _smooth_pieces(points, True, "source", notes)

@@ -237,6 +237,12 @@ def test_traced_polygons_keep_their_corners_and_straight_sides(n, scatter):
     assert cKDTree(starts).query(corners)[0].max() <= 5.0 * scatter + 1e-12
 
 
+def test_a_last_point_that_rounding_left_beside_the_first_is_none():
+    place = np.concatenate([ELLIPSE[::10], ELLIPSE[:1] + 1e-12])
+    shape = fi.mesh.outline(place)
+    assert shape.curved.all() and len(shape.facets) < 80
+
+
 def test_a_disk_traced_in_pixels_is_round():
     """Steps of one pixel of 500 along the rim; the area is that of the pixels inside."""
     rows = np.arange(-249.5, 250.0)
