@@ -1,5 +1,7 @@
 """Fit tangents and curvatures to a rim known only by its points, as in a mesh file."""
 
+import warnings
+
 import numpy as np
 import shapely
 from scipy.interpolate import BSpline, splprep
@@ -171,12 +173,15 @@ def _spline(points: np.ndarray, closed: bool, noise: float) -> np.ndarray:
     weights = np.ones(n + 1)
     weights[[0, -1]] = 1.0 if closed else 1e3
     goal = 2.2 * n * max(noise, 1e-8 * float(np.ptp(points, axis=0).max())) ** 2  # 1.1 for few knots
-    (knots, values, _), _ = splprep(points.T, w=weights, u=along / along[-1], k=5, s=goal, per=closed, quiet=1)
+    local, along = (points - points[0]).T, along / along[-1]
+    with warnings.catch_warnings():  # where rounding keeps a spline further from the points than asked
+        warnings.simplefilter("ignore", RuntimeWarning)
+        (knots, values, _), _ = splprep(local, w=weights, u=along, k=5, s=goal, per=closed, quiet=1)
     edges = np.unique(knots[5:-5])
     share = 0.5 - 0.5 * np.cos(np.linspace(0.0, np.pi, 6))
     places = BSpline(knots, np.transpose(values), 5)(edges[:-1, None] + np.diff(edges)[:, None] * share)
     powers = share[:, None] ** np.arange(6) * (1.0 - share[:, None]) ** np.arange(5, -1, -1)
-    controls = np.linalg.solve(powers * [1.0, 5.0, 10.0, 10.0, 5.0, 1.0], places)
+    controls = points[0] + np.linalg.solve(powers * [1.0, 5.0, 10.0, 10.0, 5.0, 1.0], places)
     controls[-1, -1] = controls[0, 0] if closed else points[-1]
     controls[0, 0] = controls[0, 0] if closed else points[0]
     return controls

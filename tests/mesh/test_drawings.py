@@ -243,6 +243,12 @@ def test_a_last_point_that_rounding_left_beside_the_first_is_none():
     assert shape.curved.all() and len(shape.facets) < 80
 
 
+@pytest.mark.filterwarnings("error")
+@pytest.mark.parametrize("away", [0.0, 1e5])
+def test_a_curve_of_many_points_may_lie_far_away(away):
+    assert_allclose(fi.mesh.outline(ELLIPSE + away, size=0.01).area, np.pi * 0.2 * 0.15, rtol=1e-3)  # chords
+
+
 def test_a_disk_traced_in_pixels_is_round():
     """Steps of one pixel of 500 along the rim; the area is that of the pixels inside."""
     rows = np.arange(-249.5, 250.0)
