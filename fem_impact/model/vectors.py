@@ -207,9 +207,8 @@ class RitzTarget:
         coarse |= lasting and error.truncation < allowed
         self.unmended = error.mesh
         if not self.spent and not coarse:
-            # from 1 on, descriptions differ in impacts, by more or fewer of them by chance; to agree on these may take
-            # twice as many steps
-            self.tried += [min(error.truncation, 1.0)] * (self.count < MOST_VECTORS)
+            self.tried += [error.truncation] * (self.count < MOST_VECTORS)
+            # it is 1 until two descriptions agree on the impacts of the blow, which may take twice as many steps
             patience = 3 if error.truncation < 1.0 else 6
             self.spent = self.count >= MOST_VECTORS or is_hopeless(self.tried, patience)
         if not coarse and not self.spent:
