@@ -5,7 +5,8 @@ from typing import Any
 
 from . import check
 
-NINETY = 1.6448536269514722  # [-] deviations of a normal distribution between which nine tenths lie
+# [-] standard deviations from the middle within which nine tenths of a normal distribution lie
+NINETY = 1.6448536269514722
 WITHIN = ("rise", "hand", "material")  # tables within others whose numbers may have intervals, too
 FORMS = ({"value", "about"}, {"value", "low", "high"})
 

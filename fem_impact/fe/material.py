@@ -1,5 +1,6 @@
 """Elastic materials: isotropic, and orthotropic such as wood."""
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -152,9 +153,9 @@ class Material:
         """Numbers that are allowed but probably a slip of a unit, in plain words."""
         named = ("E", "E_across", "G", "rho")
         notes = [note for name in named for note in plausible.note_number(name, getattr(self, name))]
-        if abs(self.angle) > plausible.TURN:
+        if abs(self.angle) > math.tau:
             notes.append(
-                f"angle = {self.angle:g} rad is {abs(self.angle) / plausible.TURN:.3g} turns; rad are expected, and "
+                f"angle = {self.angle:g} rad is {abs(self.angle) / math.tau:.3g} turns; rad are expected, and "
                 f"{self.angle:g} degrees are {np.radians(self.angle):.4g}"
             )
         return tuple(notes)

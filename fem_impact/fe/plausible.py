@@ -66,7 +66,6 @@ ODD = 10.0
 # 400 sets of modes of beams, plates and disks at random points the smoothest mode had at most 0.52
 ROUGH = 0.6
 FEWEST = 8  # [-] points: of fewer, neighbours may be far apart
-TURN = 2.0 * np.pi  # [rad] fact: a full one
 # [-] thickness over the shortest side above which a remark is made: thin theory then errs by tens of per cent
 THICK = 0.3
 

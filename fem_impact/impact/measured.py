@@ -12,11 +12,11 @@ import numpy as np
 
 from .._base import check, markup
 from .._base.explained import lines_of_notes
+from .._base.known import NINETY
 from .quantities import UNITS
 from .trust import Trust
 
 ENDS = (0.05, 0.95)  # [-] nine tenths of all lie between them
-SURE = 1.645  # [-] standard deviations from the middle to these ends
 SEED, DRAWS = 0, 20_000  # of the errors drawn, and how many at least: ends good to 0.01 of the width
 
 
@@ -45,7 +45,7 @@ class Predicted:
         values = np.tile(self.values, (-(-DRAWS // len(self.values)), 1))
         shape, size = values.shape, np.abs(values) if self.size is None else self.size
         off = self.computation * rng.uniform(-1.0, 1.0, shape) + self.model * rng.standard_normal(shape)
-        return np.quantile(values + size * off + errors / SURE * rng.standard_normal(shape), ENDS, axis=0)
+        return np.quantile(values + size * off + errors / NINETY * rng.standard_normal(shape), ENDS, axis=0)
 
 
 @dataclass(frozen=True)

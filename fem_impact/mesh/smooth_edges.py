@@ -4,7 +4,6 @@ import warnings
 
 import numpy as np
 import shapely
-from scipy.interpolate import BSpline, splprep
 
 from .._base.rounding import SAME
 from .facets import angles, cross_product, slopes_and_bends
@@ -163,6 +162,8 @@ def _pieces(
 
 def _spline(points: np.ndarray, closed: bool, noise: float) -> np.ndarray:
     """Controls (n_pieces, 6, 2) [m] of a spline between points (n + 1, 2) [m] that scatter by ``noise`` [m]."""
+    from scipy.interpolate import BSpline, splprep  # imported only when needed: the process that reads needs none
+
     n = len(points) - 1
     arm = int(np.ceil(5.0 * noise / np.median(np.linalg.norm(np.diff(points, axis=0), axis=1))))
     low, high = np.arange(n) - arm, np.arange(n) + 1 + arm  # over so many, noise makes no way longer

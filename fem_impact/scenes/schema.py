@@ -323,7 +323,7 @@ def read_tables(path: Path) -> dict[str, Any]:
     try:
         return tomllib.loads(text)
     except (ValueError, RecursionError) as error:  # also integers of thousands of digits
-        said = str(error).partition("; use sys.")[0]
+        said = str(error).partition(" use sys.")[0].removesuffix(";")
         said = said.replace("Cannot overwrite a value", "the same key is given twice in one table")
         said = re.sub(r"Cannot declare \('(.*?)',?\) twice", r"the table [\1] stands twice", said)
         raise scene_error(path, f"not valid TOML: {said}{_slip(text, said)}") from None

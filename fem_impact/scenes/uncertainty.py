@@ -16,6 +16,7 @@ from ..fe import plausible
 from ..fe.assembly import System, reassemble
 from ..fe.section import Beam, Elastic, Plate
 from ..impact.contact import Contact
+from ..impact.measured import ENDS
 from ..impact.parameters import BAR, PLATE, ROD
 from ..impact.striker import Striker
 from ..model.planner import Blow
@@ -31,8 +32,6 @@ from ..sweeps.store import Texts
 from .maps import MOST_ROWS, changed_scene
 from .scene import Scene, load_scene
 
-# [-] levels of an input of the body at which the body is made anew: nine tenths of its values lie between
-TAILS = (0.05, 0.95)
 # [-] default limit of a spread, to limit the work to some minutes and 1 GB of numbers
 MOST_BLOWS = 10**7
 PLACES = ("strike.x", "strike.y")  # inputs that move the strike point
@@ -351,7 +350,7 @@ class _SpreadAsked:
             if each.name not in self.body or each.name == SIZE:
                 continue
             found[each.name] = 0.0
-            for ratio in (each.distribution.ppf(np.array(TAILS)) / self._of_body(each.name)).tolist():
+            for ratio in (each.distribution.ppf(np.array(ENDS)) / self._of_body(each.name)).tolist():
                 mass, frequency = self._factors({each.name: ratio})
                 changes = {
                     "target_mass": base.modes.mass * mass, "target_frequency": base.first_frequency * frequency,

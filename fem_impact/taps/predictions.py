@@ -9,7 +9,8 @@ import numpy as np
 from scipy.signal import resample
 
 from .._base import check
-from ..impact.measured import SEED, SURE, Comparison, Measured, Predicted, Trace, compare
+from .._base.known import NINETY
+from ..impact.measured import SEED, Comparison, Measured, Predicted, Trace, compare
 from . import profiles, solver, windows
 from .records import Taps
 from .rig import FINE
@@ -137,15 +138,15 @@ def compare_taps(taps: Taps, several: tuple[Prediction, ...], lacking: float, ca
         drawn = one.force + rng.standard_normal((DRAWS, one.spread.shape[1])) @ one.spread.T
         shaken = one.measured + noise * rng.standard_normal((DRAWS, len(one.measured)))
         peak, width = float(one.measured.max()), float(widths(one.measured[None], rate)[0])
-        reading = SURE * float(np.hypot(noise, calibration * peak)), SURE * float(widths(shaken, rate).std())
+        reading = NINETY * float(np.hypot(noise, calibration * peak)), NINETY * float(widths(shaken, rate).std())
         points += [
             Measured(f"{label}, peak", peak, reading[0], "N"),
             Measured(f"{label}, width", width, reading[1], "s"),
         ]
         columns += [drawn.max(axis=1), widths(drawn, rate)]
         rms = float(np.sqrt(np.mean(one.force**2)))  # what the model lacks is spread over the record as the residual
-        own = SURE * np.hypot(noise, calibration * one.force)
-        band = np.hypot(own, SURE * np.sqrt(np.square(one.spread).sum(axis=1) + (lacking * rms) ** 2))
+        own = NINETY * np.hypot(noise, calibration * one.force)
+        band = np.hypot(own, NINETY * np.sqrt(np.square(one.spread).sum(axis=1) + (lacking * rms) ** 2))
         traces.append(Trace(label, one.time, -one.residual, own, band))
     # fixed steps and aliasing err by a hundredth of 1e-3, see `blows`
     bands = Predicted(np.column_stack(columns), computation=1e-3, model=lacking)
