@@ -7,6 +7,7 @@ import shapely
 
 from .._base.rounding import SAME
 from .facets import angles, cross_product, slopes_and_bends
+from .loops import SAMPLES
 
 # [rad] a vertex where the rim turns by more is a corner: ten facets of a circle turn by 36 degrees each
 CORNER = np.radians(35.0)
@@ -80,9 +81,11 @@ def smooth_runs(place: np.ndarray, closed: bool = True) -> tuple[list[Run], floa
     scatter : float [m]
         Standard deviation of points that scatter about the runs; zero if the runs pass through the points.
     """
-    around = place if closed else np.concatenate([place, place[-2:0:-1]])  # there and back
-    noise, scattered = _noise(around)
+    noise, scattered = _noise(place if closed else np.concatenate([place, place[-2:0:-1]]))  # there and back
+    place, fixed = _with_points_along(place, closed, noise * scattered)
+    around = place if closed else np.concatenate([place, place[-2:0:-1]])
     corner = _corners_in_noise(around, noise) if scattered else _corners(around)
+    corner[: len(place)] |= fixed
     if not closed:
         corner[[0, len(place) - 1]] = True
         corner[len(place) :] = False
@@ -92,6 +95,27 @@ def smooth_runs(place: np.ndarray, closed: bool = True) -> tuple[list[Run], floa
         points = around[np.append(run, (run[-1] + 1) % len(around))]
         fitted.append((points, *_pieces(points, whole, noise, 5.0 * noise * scattered)))
     return fitted, noise * scattered
+
+
+def _with_points_along(place: np.ndarray, closed: bool, scatter: float) -> tuple[np.ndarray, np.ndarray]:
+    """Points (n, 2) of a loop, or a line, with more along long sides that are straight, and whether these end there.
+
+    A curve would turn at the end of a long side by more than between two short ones; where a straight side runs into
+    it, it turns by half of that. Where points ``scatter`` [m], any side much longer than both beside it is straight.
+    """
+    length, turn = np.linalg.norm(np.roll(place, -1, axis=0) - place, axis=1), np.abs(_turns(place))
+    before, after = np.roll(length, 1), np.roll(length, -1)
+    straight = (length > ALIKE * np.maximum(before, after)) & (scatter > 0.0)
+    for step, beside, end in ((1, before, turn), (-1, after, np.roll(turn, -1))):
+        per_side = np.roll(end, step) * 2.0 * beside / (beside + np.roll(beside, step))
+        straight |= (length > ALIKE * beside) & (end < 0.75 * per_side)
+    straight[-1] &= closed
+    straight &= length > 20.0 * scatter
+    parts = np.where(straight, np.minimum(np.ceil(length / np.minimum(before, after)), SAMPLES), 1.0).astype(int)
+    share = np.concatenate([np.arange(n) / n for n in parts])[:, None]
+    start, end = (np.repeat(each, parts, axis=0) for each in (place, np.roll(place, -1, axis=0)))
+    ends = np.repeat(straight | np.roll(straight, 1), parts) & (share[:, 0] == 0.0)
+    return start * (1.0 - share) + end * share, ends
 
 
 def _noise(place: np.ndarray) -> tuple[float, bool]:
@@ -165,7 +189,7 @@ def _spline(points: np.ndarray, closed: bool, noise: float) -> np.ndarray:
     from scipy.interpolate import BSpline, splprep  # imported only when needed: the process that reads needs none
 
     n = len(points) - 1
-    arm = int(np.ceil(5.0 * noise / np.median(np.linalg.norm(np.diff(points, axis=0), axis=1))))
+    arm = int(5.0 * noise / np.median(np.linalg.norm(np.diff(points, axis=0), axis=1)))
     low, high = np.arange(n) - arm, np.arange(n) + 1 + arm  # over so many, noise makes no way longer
     if not closed:
         low, high = np.maximum(low, 0), np.minimum(high, n)
