@@ -1,5 +1,6 @@
 """Without the optional extras every core command works, and one that needs an extra names it; the doctor knows all."""
 
+import re
 import subprocess
 import sys
 import tomllib
@@ -82,6 +83,8 @@ def test_doctor_knows_the_extras_there_are(monkeypatch):
     known = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]["optional-dependencies"]
     assert set(doctor.EXTRAS) == set(known) - {"all", "test", "peers", "site"}  # peers are for one study
     assert known["all"] == [f"fem-impact[{','.join(sorted(doctor.EXTRAS))}]"]
+    guide = (ROOT / "studies" / "guide.md").read_text(encoding="utf-8")
+    assert re.findall(r"^\| `(\w+)` \|", guide, re.MULTILINE) == sorted([*doctor.EXTRAS, "site"])
     monkeypatch.setattr(doctor.importlib.util, "find_spec", lambda name: None)
     finding = doctor._extra("web", "report and explore", ["plotly"])
     assert not finding.works and not finding.vital and finding.remedy == "pip install 'fem-impact[web]' (plotly)"

@@ -66,6 +66,12 @@ def test_files_named_in_sentences_exist(name):
     assert [each for each in [*named, *(f"studies/{each}" for each in within)] if not (ROOT / each).exists()] == []
 
 
+def test_tests_named_on_pages_exist():
+    code = "".join(path.read_text(encoding="utf-8") for path in (ROOT / "tests").rglob("test_*.py"))
+    named = re.findall(r"`(test_\w+)`", "".join(prose(path) for path in PAGES))
+    assert len(named) > 50 and [each for each in named if f"def {each}(" not in code] == []
+
+
 @pytest.mark.parametrize("script", [api, catalogue, commands, scene_keys], ids=lambda script: script.__name__)
 def test_pages_made_by_scripts_are_current(script):
     assert script.PAGE.read_text(encoding="utf-8") == script.page(), f"run python studies/{script.__name__}.py"
