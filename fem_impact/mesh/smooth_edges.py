@@ -82,9 +82,11 @@ def smooth_runs(place: np.ndarray, closed: bool = True) -> tuple[list[Run], floa
         Standard deviation of points that scatter about the runs; zero if the runs pass through the points.
     """
     noise, scattered = _noise(place if closed else np.concatenate([place, place[-2:0:-1]]))  # there and back
-    place, fixed = _with_points_along(place, closed, noise * scattered)
+    few = len(place) <= DENSE  # too few to tell: files write five digits
+    off = 5.0 * (5.0 * ROUND * float(np.ptp(place, axis=0).max()) if few else noise)
+    place, fixed = _with_points_along(place, closed, noise * scattered, off)
     around = place if closed else np.concatenate([place, place[-2:0:-1]])
-    corner = _corners_in_noise(around, noise) if scattered else _corners(around)
+    corner = _corners_in_noise(around, noise) if scattered else _corners(around, off * few)
     corner[: len(place)] |= fixed
     if not closed:
         corner[[0, len(place) - 1]] = True
@@ -93,28 +95,30 @@ def smooth_runs(place: np.ndarray, closed: bool = True) -> tuple[list[Run], floa
     fitted: list[Run] = []
     for run, whole in runs:
         points = around[np.append(run, (run[-1] + 1) % len(around))]
-        fitted.append((points, *_pieces(points, whole, noise, 5.0 * noise * scattered)))
+        fitted.append((points, *_pieces(points, whole, noise, 5.0 * noise * scattered, off)))
     return fitted, noise * scattered
 
 
-def _with_points_along(place: np.ndarray, closed: bool, scatter: float) -> tuple[np.ndarray, np.ndarray]:
+def _with_points_along(place: np.ndarray, closed: bool, scatter: float, off: float) -> tuple[np.ndarray, np.ndarray]:
     """Points (n, 2) of a loop, or a line, with more along long sides that are straight, and whether these end there.
 
     A curve would turn at the end of a long side by more than between two short ones; where a straight side runs into
-    it, it turns by half of that. Where points ``scatter`` [m], any side much longer than both beside it is straight.
+    it, it turns by half of that, but for what points that lie ``off`` [m] change. Where points ``scatter`` [m], any
+    side much longer than both beside it is straight.
     """
     length, turn = np.linalg.norm(np.roll(place, -1, axis=0) - place, axis=1), np.abs(_turns(place))
     before, after = np.roll(length, 1), np.roll(length, -1)
     straight = (length > ALIKE * np.maximum(before, after)) & (scatter > 0.0)
     for step, beside, end in ((1, before, turn), (-1, after, np.roll(turn, -1))):
         per_side = np.roll(end, step) * 2.0 * beside / (beside + np.roll(beside, step))
-        straight |= (length > ALIKE * beside) & (end < 0.75 * per_side)
+        straight |= (length > (ALIKE if scatter else 1.5) * beside) & (end < 0.65 * per_side + off / beside)
     straight[-1] &= closed
     straight &= length > 20.0 * scatter
     parts = np.where(straight, np.minimum(np.ceil(length / np.minimum(before, after)), SAMPLES), 1.0).astype(int)
     share = np.concatenate([np.arange(n) / n for n in parts])[:, None]
     start, end = (np.repeat(each, parts, axis=0) for each in (place, np.roll(place, -1, axis=0)))
-    ends = np.repeat(straight | np.roll(straight, 1), parts) & (share[:, 0] == 0.0)
+    bent = turn > np.maximum(STRAIGHT, (len(place) <= DENSE) * off * (1.0 / length + 1.0 / before))
+    ends = np.repeat((straight | np.roll(straight, 1)) & bent, parts) & (share[:, 0] == 0.0)
     return start * (1.0 - share) + end * share, ends
 
 
@@ -160,11 +164,14 @@ def _corners_in_noise(place: np.ndarray, noise: float) -> np.ndarray:
 
 
 def _pieces(
-    points: np.ndarray, closed: bool, noise: float, off: float
+    points: np.ndarray, closed: bool, noise: float, off: float, flat: float
 ) -> tuple[np.ndarray, tuple[np.ndarray, float] | None]:
-    """Controls of the Bezier pieces of a run (n + 1, 2) [m] whose points may lie ``off`` [m], and its circle if any."""
+    """Controls of the Bezier pieces of a run (n + 1, 2) [m] whose points may lie ``off`` [m], and its circle if any.
+
+    Points that lie ``flat`` [m] beside a line are on it.
+    """
     line = np.linalg.svd(points - points.mean(axis=0), full_matrices=False)[2][1]  # normal to the nearest line
-    if not closed and np.abs((points - points.mean(axis=0)) @ line).max() <= max(off, SAME * np.ptp(points)):
+    if not closed and np.abs((points - points.mean(axis=0)) @ line).max() <= max(off, flat, SAME * np.ptp(points)):
         return points[[0, -1]][None], None
     turn = _turns(points)[1:-1]
     origin, radius = _circle(points)
@@ -218,15 +225,19 @@ def _turns(place: np.ndarray) -> np.ndarray:
     return angles(np.roll(ahead, 1, axis=0), ahead)
 
 
-def _corners(place: np.ndarray) -> np.ndarray:
-    """Which vertices of a closed loop are corners, or where a straight side runs into a curve, (n,) bool."""
+def _corners(place: np.ndarray, off: float = 0.0) -> np.ndarray:
+    """Which vertices of a closed loop are corners, or where a straight side runs into a curve, (n,) bool.
+
+    Along a straight side, vertices may lie ``off`` [m].
+    """
     turn = _turns(place)
     sharp = np.abs(turn) > CORNER
     company = np.zeros(len(turn), bool)
     for step in (1, -1):
         other = np.roll(turn, step)
         company |= (np.sign(other) == np.sign(turn)) & (np.abs(other) >= np.abs(turn) / ALIKE) & ~np.roll(sharp, step)
-    still = np.abs(turn) <= STRAIGHT
+    length = np.linalg.norm(np.roll(place, -1, axis=0) - place, axis=1)
+    still = np.abs(turn) <= np.maximum(STRAIGHT, off * (1.0 / length + 1.0 / np.roll(length, 1)))
     # the rim turns on one side of a joint only, and at the joint itself by half as much as along the curve
     beside = np.maximum(np.abs(np.roll(turn, 1)), np.abs(np.roll(turn, -1)))
     joint = (np.roll(still, 1) ^ np.roll(still, -1)) & (np.abs(turn) < 0.75 * beside)
