@@ -13,7 +13,7 @@ from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
 from .._base import check
-from .._base.rounding import SAME
+from .._base.rounding import SAME, rounded_by
 from . import meshio_reader
 from .facets import cross_product
 from .loops import FARTHEST, UNITS, refuse_millimetres
@@ -28,7 +28,7 @@ NODES = PLANE | {"line": 2, "line3": 3}
 
 def read_mesh(path: Any, unit: str | None) -> tuple[
     np.ndarray, np.ndarray, dict[tuple[int, int], np.ndarray], dict[str, set[tuple[int, int]]], list[str],
-    tuple[np.ndarray, np.ndarray] | None,
+    tuple[np.ndarray, np.ndarray] | None, float,
 ]:  # fmt: skip
     """Read and repair a mesh file.
 
@@ -40,11 +40,12 @@ def read_mesh(path: Any, unit: str | None) -> tuple[
     names : dict, edge name -> set of sorted pairs of vertices
     notes : list of str, what was repaired
     heights : None if it is flat, else all its points (n, 2) [m] in its mean plane, and their heights (n,) [m] over it
+    rounding : float [m], how far the coordinates may be off by the digits that the file writes
     """
     path = check.path("path", path)
     data = meshio_reader.read_raw(path)
     cells, nodes = _triangles(path, data)
-    raw, height, notes = _plane_points(path, data, unit)
+    raw, height, rounding, notes = _plane_points(path, data, unit)
     rows = np.array([[*pair, node] for pair, node in nodes.items()], int).reshape(-1, 3)
     a, b, middle = raw[rows].transpose(1, 0, 2)
     side, away = b - a, middle - 0.5 * (a + b)
@@ -64,7 +65,7 @@ def read_mesh(path: Any, unit: str | None) -> tuple[
     names = _named_pairs(path, data)
     named = [node for found in names.values() for pair in found for node in pair]  # lines may have nodes of their own
     level = np.zeros(len(raw)) if height is None else height
-    points, cells, number = _mend(path, raw, level, cells, named, notes)
+    points, cells, number = _mend(path, raw, level, cells, named, 3.0 * rounding, notes)
     middles = {_pair(number[a], number[b]): raw[node] for (a, b), node in nodes.items()}
     pairs = {name: {_pair(number[a], number[b]) for a, b in found} for name, found in names.items()}
     sides = sides_of(cells)[0]
@@ -72,9 +73,9 @@ def read_mesh(path: Any, unit: str | None) -> tuple[
         on = sides[np.isin(sides, number[group]).all(axis=1)]
         if len(on) or (number[group] < 0).all():  # a node of a triangle alone is for a force
             pairs.setdefault(name, set()).update(map(tuple, on.tolist()))
-    cells = _split_at_hanging(points, cells, pairs, notes)
+    cells = _split_at_hanging(points, cells, pairs, 3.0 * rounding, notes)
     _refuse_overlap(path, points, cells)
-    return points, cells, middles, pairs, notes, heights
+    return points, cells, middles, pairs, notes, heights, rounding
 
 
 def _pair(a: int, b: int) -> tuple[int, int]:
@@ -83,8 +84,11 @@ def _pair(a: int, b: int) -> tuple[int, int]:
 
 def _plane_points(
     path: Path, data: meshio_reader.Raw, unit: str | None
-) -> tuple[np.ndarray, np.ndarray | None, list[str]]:
-    """Coordinates (n_points, 2) [m] in the plane of the mesh, heights (n_points,) [m] if it is curved, and notes."""
+) -> tuple[np.ndarray, np.ndarray | None, float, list[str]]:
+    """Coordinates (n_points, 2) [m] in the plane of the mesh, and heights (n_points,) [m] if it is curved.
+
+    The third is how far [m] the digits that the file writes may have moved each coordinate; then come notes.
+    """
     name, points = path.name, data.points
     notes: list[str] = []
     if points.ndim != 2 or points.shape[1] not in (2, 3):
@@ -98,11 +102,11 @@ def _plane_points(
         bad = used[where.any(axis=1)]
         if bad.size:
             raise ValueError(f"{name} has a coordinate {what} at node {bad[0]}: {points[bad[0]]}; correct that node")
-    height = None
+    height, rounding = None, rounded_by(points[used])
     if points.shape[1] == 3:
         points, flat = _turned_level(points, used, notes)
         spread = np.ptp(points[used], axis=0)
-        if spread[flat] > FLAT * spread.max():
+        if spread[flat] > max(FLAT * spread.max(), 4.0 * rounding):
             height = points[:, flat] - points[used, flat].mean()
         elif spread[flat] > SAME * spread.max():
             notes.append(f"the nodes lie up to {spread[flat]:.1g} apart across the plane of the mesh, which is ignored")
@@ -111,10 +115,13 @@ def _plane_points(
         points = np.delete(points, flat, axis=1)
     if unit is not None:
         scale = UNITS[check.one_of("unit", unit, UNITS)]
-        points, height = points * scale, None if height is None else height * scale
+        points, height, rounding = points * scale, None if height is None else height * scale, rounding * scale
     else:
         refuse_millimetres(name, *np.ptp(points[used], axis=0))
-    return points, height, notes
+    share = 3.0 * rounding / float(np.ptp(points[used], axis=0).max() or 1.0)
+    if share > 1e-4:
+        notes.append(f"the digits of the file move nodes by up to {share:.1g} of its extent; write more of them")
+    return points, height, rounding, notes
 
 
 def _turned_level(points: np.ndarray, used: np.ndarray, notes: list[str]) -> tuple[np.ndarray, int]:
@@ -203,9 +210,10 @@ def _named_pairs(path: Path, data: meshio_reader.Raw) -> dict[str, set[tuple[int
 
 
 def _mend(
-    path: Path, points: np.ndarray, height: np.ndarray, cells: np.ndarray, named: list[int], notes: list[str]
+    path: Path, points: np.ndarray, height: np.ndarray, cells: np.ndarray, named: list[int], off: float,
+    notes: list[str],
 ):  # fmt: skip
-    """Merge duplicate nodes, drop degenerate and duplicate triangles, flip inverted ones and renumber the nodes."""
+    """Merge nodes up to ``off`` [m] apart, drop degenerate and duplicate triangles, flip inverted ones; renumber."""
     name = path.name
     used = np.unique(cells)
     span = float(np.ptp(points[used], axis=0).max())
@@ -214,9 +222,10 @@ def _mend(
     leader, used = np.arange(len(points)), np.unique(np.append(used, named).astype(int))
     tree = cKDTree(points[used])
     # each node is its own neighbour; parts that touch share a point by few, not by sixteen on average
-    if tree.count_neighbors(tree, SAME * span) > 16 * len(used):
+    apart = max(off, SAME * span)
+    if tree.count_neighbors(tree, apart) > 16 * len(used):
         raise ValueError(f"{name} has most of its nodes at a few points; export it again")
-    for a, b in sorted(map(tuple, tree.query_pairs(SAME * span))):
+    for a, b in sorted(map(tuple, tree.query_pairs(apart))):
         if abs(height[used[a]] - height[used[b]]) > FLAT * span:
             x, y = points[used[a]]
             raise ValueError(f"{name} has two surfaces, one over the other at ({x:g}, {y:g}) m; export one of them")
@@ -300,8 +309,8 @@ def quarter_triangles(cells: np.ndarray, n: int) -> tuple[np.ndarray, np.ndarray
     return np.concatenate([np.column_stack(part) for part in quarters]), sides
 
 
-def _split_at_hanging(points: np.ndarray, cells: np.ndarray, names: dict, notes: list[str]) -> np.ndarray:
-    """Split triangles at hanging nodes, the vertices of neighbours that lie on their sides, until none is left."""
+def _split_at_hanging(points: np.ndarray, cells: np.ndarray, names: dict, off: float, notes: list[str]) -> np.ndarray:
+    """Split triangles at hanging nodes, vertices of neighbours ``off`` [m] beside their sides, until none is left."""
     count = 0
     for _ in range(64):
         rim = boundary(cells)
@@ -315,8 +324,8 @@ def _split_at_hanging(points: np.ndarray, cells: np.ndarray, names: dict, notes:
             others = [corners[c] for c in candidates if corners[c] not in rim[i]]
             for node in others:
                 along = (points[node] - a[i]) @ (b[i] - a[i]) / length[i] ** 2
-                off = abs(np.linalg.det(np.array([b[i] - a[i], points[node] - a[i]]))) / length[i]
-                if 1e-9 < along < 1.0 - 1e-9 and off <= 1e-8 * length[i]:
+                away = abs(np.linalg.det(np.array([b[i] - a[i], points[node] - a[i]]))) / length[i]
+                if 1e-9 < along < 1.0 - 1e-9 and away <= max(off, 1e-8 * length[i]):
                     split[_pair(*rim[i])] = int(node)
                     break
         if not split:

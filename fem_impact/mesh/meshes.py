@@ -244,10 +244,8 @@ def polygon(corners: Any, holes: Sequence[Any] = (), *, size: float | None = Non
     if not isinstance(holes, (list, tuple, np.ndarray)):
         raise ValueError(f"holes must be a list with the corners of each hole, got {check.shown(holes)}")
     inner = [straight_loop(f"holes[{i}]", hole, f"hole{i}") for i, hole in enumerate(holes)]
-    gentle = 0
-    for loop in (outer, *inner):
-        for run in smooth_edges.smooth_runs(np.array([side.at(np.zeros(1))[0] for side in loop]))[0]:
-            gentle = max(gentle, len(run[0]) - 1 if run[2] or run[1].shape[1] > 2 else 0)
+    loops = [np.concatenate([side.at(np.zeros(1)) for side in loop]) for loop in (outer, *inner)]
+    gentle = max(map(smooth_edges.n_gentle_corners, loops))
     made = fill(Outline.around(outer, tuple(inner)), size=size)
     if gentle < 2.0 * np.pi / TURN:  # a circle takes more facets
         return made
@@ -329,15 +327,16 @@ def load(path: Any, *, unit: str | None = None) -> Mesh:
     >>> round(fi.mesh.load("plate.msh").area, 6)  # m^2
     0.12
     """
-    points, cells, given, pairs, notes, heights = mesh_files.read_mesh(path, unit)
+    points, cells, given, pairs, notes, heights, rounding = mesh_files.read_mesh(path, unit)
     rim = mesh_files.boundary(cells)
     follower = {int(a): int(b) for a, b in rim}
     loops = [np.array([(a, follower[a]) for a in loop]) for loop in mesh_files.loops_of(rim)]
     loops.sort(key=lambda loop: -float(np.ptp(points[loop[:, 0]], axis=0).max()))
     facets = np.concatenate(loops)
     number = {(min(a, b), max(a, b)): i for i, (a, b) in enumerate(facets.tolist())}
-    curve = smooth_edges.recover_rim(points, loops, {number[pair]: at for pair, at in given.items() if pair in number})
-    n_curved = np.count_nonzero(is_curved(points[facets], curve[0]))
+    known = {number[pair]: at for pair, at in given.items() if pair in number}
+    points, middles, tangents, curvatures = smooth_edges.recover_rim(points, loops, known, rounding)
+    n_curved = np.count_nonzero(is_curved(points[facets], middles))
     if n_curved and not given:
         notes.append(f"{n_curved} sides of the rim were replaced by smooth curves through their ends")
     edges = {name: np.array(sorted(number[p] for p in found if p in number), int) for name, found in pairs.items()}
@@ -356,7 +355,7 @@ def load(path: Any, *, unit: str | None = None) -> Mesh:
         start += len(loop)
     edges["boundary"] = np.arange(len(facets))
     made = Mesh(
-        points, cells, facets, edges, *curve,
+        points, cells, facets, edges, middles, tangents, curvatures,
         size=float(mesh_files.side_lengths(points, cells).max()) / LONGEST, size_stated=False,
         notes=tuple(f"{Path(path).name}: {note}" for note in notes),
         rise=None if heights is None else table(*heights),

@@ -1,11 +1,12 @@
 """Fit tangents and curvatures to a rim known only by its points, as in a mesh file."""
 
 import warnings
+from typing import NamedTuple
 
 import numpy as np
 import shapely
 
-from .._base.rounding import SAME
+from .._base.rounding import SAME, rounded_by
 from .facets import angles, cross_product, slopes_and_bends
 from .loops import SAMPLES
 
@@ -23,13 +24,22 @@ ALTERNATING = 0.05  # [-] with a larger share of turns in other directions than 
 ARM = 2  # [-] points used on each side of a vertex to fit curves other than circles: a quartic through five, order 4
 
 
+class Blur(NamedTuple):
+    """How well the points of a rim are known."""
+
+    noise: float  # [m] standard deviation across cubics through seven neighbours; 0 for few points
+    scattered: bool  # if that is scatter, as of traced points
+    off: float  # [m] how far a single point may lie beside the rim
+    written: float  # [m] the same by the digits of its coordinates alone
+
+
 def recover_rim(
-    points: np.ndarray, loops: list[np.ndarray], given: dict[int, np.ndarray]
-) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    points: np.ndarray, loops: list[np.ndarray], given: dict[int, np.ndarray], rounding: float = 0.0
+) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
     """Recover the curve that a rim was drawn with.
 
-    Returns of each facet the middle (n_facets, 2) [m], and at both ends the unit tangents (n_facets, 2, 2) and the
-    curvatures (n_facets, 2) [1/m].
+    Returns the points, those beside straight sides moved onto them, and of each facet the middle (n_facets, 2) [m],
+    and at both ends the unit tangents (n_facets, 2, 2) and the curvatures (n_facets, 2) [1/m].
 
     Parameters
     ----------
@@ -37,21 +47,28 @@ def recover_rim(
     loops : list of ndarray, shape (n, 2)
         Facets of each closed loop in order, body on the left; facet numbers run on from loop to loop.
     given : dict, facet number -> its middle (2,) [m], where the file has quadratic triangles
+    rounding : float [m]
+        How far rounding may have moved each coordinate.
     """
-    n = sum(len(loop) for loop in loops)
+    points, n = points.copy(), sum(len(loop) for loop in loops)
     middles, tangents, curvatures = np.zeros((n, 2)), np.zeros((n, 2, 2)), np.zeros((n, 2))
     start = 0
     for loop in loops:
         numbers = np.arange(start, start + len(loop))
         start += len(loop)
-        corner = _corners(points[loop[:, 0]])
-        for run, closed in _runs(corner):
-            facets = numbers[run]
-            place = points[np.append(loop[run, 0], loop[run[-1], 1])]
+        rim = points[loop[:, 0]]
+        off = _blur(rim, 3.0 * rounding).off
+        for run, closed in _runs(_corners(rim, off)):
+            facets, ends = numbers[run], np.append(loop[run, 0], loop[run[-1], 1])
             known = np.array([given[f] for f in facets]) if all(f in given for f in facets) else None
-            middles[facets], tangents[facets], curvatures[facets] = _fit(place, closed, known)
+            place = points[ends]
+            if not closed and _lie_on_a_line(place if known is None else np.concatenate([place, known]), off):
+                along = (place[-1] - place[0]) / np.linalg.norm(place[-1] - place[0])
+                points[ends[1:-1]] = place[0] + ((place[1:-1] - place[0]) @ along)[:, None] * along
+                known = None
+            middles[facets], tangents[facets], curvatures[facets] = _fit(points[ends], closed, known, off)
         join_smoothly(np.column_stack([np.roll(numbers, 1), numbers]), tangents, curvatures)
-    return middles, tangents, curvatures
+    return points, middles, tangents, curvatures
 
 
 def join_smoothly(pairs: np.ndarray, tangents: np.ndarray, curvatures: np.ndarray) -> None:
@@ -68,6 +85,12 @@ def join_smoothly(pairs: np.ndarray, tangents: np.ndarray, curvatures: np.ndarra
     tangents[pairs[near, 1], 0] = mean
 
 
+def n_gentle_corners(place: np.ndarray) -> int:
+    """How many corners in a row of a closed polygon (n, 2) [m] turn as the points of a curve do."""
+    bent = place[np.abs(_turns(place)) > STRAIGHT]
+    return max(len(run) - (not closed) for run, closed in _runs(_corners(bent)))
+
+
 Run = tuple[np.ndarray, np.ndarray, tuple[np.ndarray, float] | None]
 
 
@@ -81,12 +104,13 @@ def smooth_runs(place: np.ndarray, closed: bool = True) -> tuple[list[Run], floa
     scatter : float [m]
         Standard deviation of points that scatter about the runs; zero if the runs pass through the points.
     """
-    noise, scattered = _noise(place if closed else np.concatenate([place, place[-2:0:-1]]))  # there and back
-    few = len(place) <= DENSE  # too few to tell: files write five digits
-    off = 5.0 * (5.0 * ROUND * float(np.ptp(place, axis=0).max()) if few else noise)
-    place, fixed = _with_points_along(place, closed, noise * scattered, off)
+    around = place if closed else np.concatenate([place, place[-2:0:-1]])  # there and back
+    # few points may have been turned after they were written with five digits
+    few = 25.0 * ROUND * float(np.ptp(place, axis=0).max()) * (len(place) <= DENSE)
+    blur = _blur(around, 3.0 * rounded_by(place), few)
+    place, fixed = _with_points_along(place, closed, blur)
     around = place if closed else np.concatenate([place, place[-2:0:-1]])
-    corner = _corners_in_noise(around, noise) if scattered else _corners(around, off * few)
+    corner = _corners_in_noise(around, blur.noise) if blur.scattered else _corners(around, blur.off)
     corner[: len(place)] |= fixed
     if not closed:
         corner[[0, len(place) - 1]] = True
@@ -95,39 +119,46 @@ def smooth_runs(place: np.ndarray, closed: bool = True) -> tuple[list[Run], floa
     fitted: list[Run] = []
     for run, whole in runs:
         points = around[np.append(run, (run[-1] + 1) % len(around))]
-        fitted.append((points, *_pieces(points, whole, noise, 5.0 * noise * scattered, off)))
-    return fitted, noise * scattered
+        fitted.append((points, *_pieces(points, whole, blur)))
+    return fitted, blur.noise * blur.scattered
 
 
-def _with_points_along(place: np.ndarray, closed: bool, scatter: float, off: float) -> tuple[np.ndarray, np.ndarray]:
+def _lie_on_a_line(points: np.ndarray, off: float) -> bool:
+    """Whether all points (n, 2) [m] lie within ``off`` [m] of a line."""
+    normal = np.linalg.svd(points - points.mean(axis=0), full_matrices=False)[2][1]
+    return bool(np.abs((points - points.mean(axis=0)) @ normal).max() <= max(off, SAME * np.ptp(points)))
+
+
+def _with_points_along(place: np.ndarray, closed: bool, blur: Blur) -> tuple[np.ndarray, np.ndarray]:
     """Points (n, 2) of a loop, or a line, with more along long sides that are straight, and whether these end there.
 
     A curve would turn at the end of a long side by more than between two short ones; where a straight side runs into
-    it, it turns by half of that, but for what points that lie ``off`` [m] change. Where points ``scatter`` [m], any
-    side much longer than both beside it is straight.
+    it, it turns by half of that, but for what points that are off change. Where points scatter, any side much longer
+    than both beside it is straight.
     """
     length, turn = np.linalg.norm(np.roll(place, -1, axis=0) - place, axis=1), np.abs(_turns(place))
     before, after = np.roll(length, 1), np.roll(length, -1)
-    straight = (length > ALIKE * np.maximum(before, after)) & (scatter > 0.0)
+    straight = (length > ALIKE * np.maximum(before, after)) & blur.scattered
     for step, beside, end in ((1, before, turn), (-1, after, np.roll(turn, -1))):
         per_side = np.roll(end, step) * 2.0 * beside / (beside + np.roll(beside, step))
-        straight |= (length > (ALIKE if scatter else 1.5) * beside) & (end < 0.65 * per_side + off / beside)
+        straight |= (length > (ALIKE if blur.scattered else 1.5) * beside) & (end < 0.65 * per_side + blur.off / beside)
     straight[-1] &= closed
-    straight &= length > 20.0 * scatter
+    straight &= length > 20.0 * blur.noise * blur.scattered
     parts = np.where(straight, np.minimum(np.ceil(length / np.minimum(before, after)), SAMPLES), 1.0).astype(int)
     share = np.concatenate([np.arange(n) / n for n in parts])[:, None]
     start, end = (np.repeat(each, parts, axis=0) for each in (place, np.roll(place, -1, axis=0)))
-    bent = turn > np.maximum(STRAIGHT, (len(place) <= DENSE) * off * (1.0 / length + 1.0 / before))
+    bent = turn > _turns_by_rounding(place, 0.0 if blur.scattered else blur.off)
     ends = np.repeat((straight | np.roll(straight, 1)) & bent, parts) & (share[:, 0] == 0.0)
     return start * (1.0 - share) + end * share, ends
 
 
-def _noise(place: np.ndarray) -> tuple[float, bool]:
-    """Standard deviation [m] of points (n, 2) of a loop across cubics through seven neighbours, and if they scatter."""
-    n = len(place)
+def _blur(place: np.ndarray, written: float, few: float = 0.0) -> Blur:
+    """How well points (n, 2) of a loop are known, each ``written`` to [m], or to ``few`` if they are few."""
+    n, off = len(place), max(written, few)
     if n <= DENSE:
-        return 0.0, False
-    near = place[(np.arange(n)[:, None] + np.arange(-3, 4)) % n]  # (n, 7, 2)
+        return Blur(0.0, False, off, written)
+    seven = (np.arange(n)[:, None] + np.arange(-3, 4)) % n
+    near = place[seven]  # (n, 7, 2)
     steps = np.linalg.norm(np.diff(near, axis=1), axis=2)
     along = np.cumsum(np.pad(steps, ((0, 0), (1, 0))), axis=1)
     base, _ = np.linalg.qr((along / along[:, -1:] - 0.5)[..., None] ** np.arange(4))
@@ -137,11 +168,20 @@ def _noise(place: np.ndarray) -> tuple[float, bool]:
     across = cross_product(chord[:, None], local - base @ (base.swapaxes(1, 2) @ local))
     squares, extent = (across**2).sum(axis=1), float(np.ptp(place, axis=0).max())
     turn = _turns(place)
-    alternate = bool(np.count_nonzero(turn * np.roll(turn, 1) < -(STRAIGHT**2)) > ALTERNATING * n)
-    if alternate:
-        squares = squares[squares > (SAME * extent) ** 2]  # sides along rows of pixels are straight
-    noise = float(np.sqrt(np.median(squares) / 2.366))  # the median of chi-square of three, for corners count little
-    return noise, alternate and noise < SCATTER * extent
+    least = np.minimum(np.abs(turn), np.abs(np.roll(turn, 1)))
+    other = (turn * np.roll(turn, 1) < 0.0) & (least > STRAIGHT)
+    alternate = bool(np.count_nonzero(other) > ALTERNATING * n)
+    if alternate:  # scatter shows where no corner is near, nor a curve of few points
+        small = np.abs(turn) < 4.0 * np.median(np.abs(turn[other]))
+        smooth = small[seven].all(axis=1)
+        squares = squares[smooth & (squares > (SAME * extent) ** 2)]  # sides along rows of pixels are straight
+        alternate = squares.size > 0
+    # the median of chi-square of three: corners count little
+    noise = float(np.sqrt(np.median(squares) / 2.366)) if squares.size else 0.0
+    still = np.abs(turn) <= _turns_by_rounding(place, off)
+    lost = max(abs(turn[run[1:]].sum()) for run, _ in _runs(~still))  # of what rounding may hide, in a row
+    scattered = alternate and noise < SCATTER * extent and (noise > off or lost > JOINT)
+    return Blur(noise, scattered, max(off, 5.0 * noise * scattered), written)
 
 
 def _corners_in_noise(place: np.ndarray, noise: float) -> np.ndarray:
@@ -159,31 +199,25 @@ def _corners_in_noise(place: np.ndarray, noise: float) -> np.ndarray:
     wide = np.abs(angles(simple - behind, ahead - simple))
     apart = np.abs((at[:, None] - at + 0.5 * total) % total - 0.5 * total)
     sharp = (wide > CORNER) & (wide >= np.where(apart < reach, wide, 0.0).max(axis=1))
-    lone = _corners(simple) & (np.abs(_turns(simple)) > 10.0 * noise * (1.0 / lengths + 1.0 / np.roll(lengths, 1)))
+    lone = _corners(simple) & (np.abs(_turns(simple)) > _turns_by_rounding(simple, 10.0 * noise))
     return np.isin(place @ [1.0, 1j], simple[sharp | lone] @ [1.0, 1j])
 
 
-def _pieces(
-    points: np.ndarray, closed: bool, noise: float, off: float, flat: float
-) -> tuple[np.ndarray, tuple[np.ndarray, float] | None]:
-    """Controls of the Bezier pieces of a run (n + 1, 2) [m] whose points may lie ``off`` [m], and its circle if any.
-
-    Points that lie ``flat`` [m] beside a line are on it.
-    """
-    line = np.linalg.svd(points - points.mean(axis=0), full_matrices=False)[2][1]  # normal to the nearest line
-    if not closed and np.abs((points - points.mean(axis=0)) @ line).max() <= max(off, flat, SAME * np.ptp(points)):
+def _pieces(points: np.ndarray, closed: bool, blur: Blur) -> tuple[np.ndarray, tuple[np.ndarray, float] | None]:
+    """Controls of the Bezier pieces of a run (n + 1, 2) [m] of points, and its circle if it is one."""
+    if not closed and _lie_on_a_line(points, blur.off):
         return points[[0, -1]][None], None
     turn = _turns(points)[1:-1]
     origin, radius = _circle(points)
     away = np.abs(np.linalg.norm(points - origin, axis=1) - radius).max()
     straight = np.abs(turn).max(initial=0.0) <= STRAIGHT or len(points) < 4
-    if not straight and away < max(ROUND * radius, off if closed else 0.0):
+    if not straight and away < max(ROUND * radius, blur.off if closed and blur.scattered else blur.written):
         return points[:, None], (origin, radius)
-    if not straight and len(points) > (12 if off else DENSE):
-        return _spline(points, closed, noise), None
-    if straight or off:
+    if not straight and len(points) > (12 if blur.scattered else DENSE):
+        return _spline(points, closed, blur.noise), None
+    if straight or blur.scattered:
         return np.stack([points[:-1], points[1:]], axis=1), None
-    _, tangents, curvatures = _fit(points, closed, None)
+    _, tangents, curvatures = _fit(points, closed, None, blur.written)
     ahead = np.linalg.norm(np.diff(points, axis=0), axis=1)[:, None, None] / 5.0 * tangents  # (n, 2, 2)
     bend = np.stack([-ahead[..., 1], ahead[..., 0]], axis=-1) * np.linalg.norm(ahead, axis=2, keepdims=True)
     bend *= 1.25 * curvatures[..., None]
@@ -225,6 +259,12 @@ def _turns(place: np.ndarray) -> np.ndarray:
     return angles(np.roll(ahead, 1, axis=0), ahead)
 
 
+def _turns_by_rounding(place: np.ndarray, off: float) -> np.ndarray:
+    """How far [rad] a closed loop turns at each of its points (n, 2) if they lie ``off`` [m] beside a straight side."""
+    length = np.linalg.norm(np.roll(place, -1, axis=0) - place, axis=1)
+    return np.maximum(STRAIGHT, off * (1.0 / length + 1.0 / np.roll(length, 1)))
+
+
 def _corners(place: np.ndarray, off: float = 0.0) -> np.ndarray:
     """Which vertices of a closed loop are corners, or where a straight side runs into a curve, (n,) bool.
 
@@ -236,12 +276,34 @@ def _corners(place: np.ndarray, off: float = 0.0) -> np.ndarray:
     for step in (1, -1):
         other = np.roll(turn, step)
         company |= (np.sign(other) == np.sign(turn)) & (np.abs(other) >= np.abs(turn) / ALIKE) & ~np.roll(sharp, step)
-    length = np.linalg.norm(np.roll(place, -1, axis=0) - place, axis=1)
-    still = np.abs(turn) <= np.maximum(STRAIGHT, off * (1.0 / length + 1.0 / np.roll(length, 1)))
+    still = np.abs(turn) <= _turns_by_rounding(place, off)
     # the rim turns on one side of a joint only, and at the joint itself by half as much as along the curve
     beside = np.maximum(np.abs(np.roll(turn, 1)), np.abs(np.roll(turn, -1)))
     joint = (np.roll(still, 1) ^ np.roll(still, -1)) & (np.abs(turn) < 0.75 * beside)
-    return sharp | (~still & (~company | joint))
+    return sharp | (~still & (~company | joint)) | _arc_ends(place, turn, off)
+
+
+def _arc_ends(place: np.ndarray, turn: np.ndarray, off: float) -> np.ndarray:
+    """Which points (n, 2) [m] of a closed loop, each ``off`` [m] at most, are ends of an arc of a circle, (n,) bool.
+
+    An arc joins five points at least, as any three lie on a circle, and turns by more than `CORNER`.
+    """
+    ends, bent = np.zeros(len(place), bool), np.abs(turn) > _turns_by_rounding(place, off)
+    a, b, c, d = (np.roll(place @ [1.0, 1j], k) for k in (1, 0, -1, -2))
+    ab, bc, ac, bd, ad = (np.abs(one - two) for one, two in ((a, b), (b, c), (a, c), (b, d), (a, d)))
+    with np.errstate(divide="ignore", invalid="ignore"):
+        radius = ab * bc * ac / (2.0 * np.abs(((b - a).conj() * (c - a)).imag))
+        ratio = (a - c) * (b - d) / ((a - d) * (b - c))  # real if the four lie on a circle
+        near = np.abs(ratio.imag / ratio) < (ROUND * radius + off) * (1.0 / ac + 1.0 / bd + 1.0 / ad + 1.0 / bc)
+    for run, closed in _runs(~(near & bent & np.roll(bent, -1) & (turn * np.roll(turn, -1) > 0.0))):
+        for first, last in ((-1, 2), (0, 2), (-1, 1), (0, 1)) if not closed and len(run) > 2 else ():
+            arc = np.arange(run[1] + first, run[1] + len(run) - 2 + last + 1) % len(place)
+            origin, radius = _circle(place[arc])
+            away = np.abs(np.linalg.norm(place[arc] - origin, axis=1) - radius).max()
+            if len(arc) > 4 and np.abs(turn[arc[1:-1]].sum()) > CORNER and away < max(ROUND * radius, off):
+                ends[arc[[0, -1]]] = True
+                break
+    return ends
 
 
 def _runs(corner: np.ndarray) -> list[tuple[np.ndarray, bool]]:
@@ -254,8 +316,13 @@ def _runs(corner: np.ndarray) -> list[tuple[np.ndarray, bool]]:
     return [(np.arange(a, b) % n, False) for a, b in zip(at, stops)]
 
 
-def _fit(place: np.ndarray, closed: bool, known: np.ndarray | None) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Middles (n, 2), tangents (n, 2, 2) and curvatures (n, 2) of a smooth curve through points (n + 1, 2)."""
+def _fit(
+    place: np.ndarray, closed: bool, known: np.ndarray | None, off: float
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Middles (n, 2), tangents (n, 2, 2) and curvatures (n, 2) of a smooth curve through points (n + 1, 2) [m].
+
+    Points may lie ``off`` [m] beside it.
+    """
     chord = np.diff(place, axis=0)
     length = np.linalg.norm(chord, axis=1)
     unit = chord / length[:, None]
@@ -266,7 +333,7 @@ def _fit(place: np.ndarray, closed: bool, known: np.ndarray | None) -> tuple[np.
         return centre, np.stack([unit, unit], axis=1), np.zeros((len(chord), 2))
     on_it = place if known is None else np.concatenate([place, known])
     origin, radius = _circle(on_it)
-    if np.abs(np.linalg.norm(on_it - origin, axis=1) - radius).max() < ROUND * radius:
+    if np.abs(np.linalg.norm(on_it - origin, axis=1) - radius).max() < max(ROUND * radius, off):
         out = (place - origin) / np.linalg.norm(place - origin, axis=1)[:, None]
         left = np.sign(cross_product(out[0], out[1]))  # 1 if the rim turns left (convex), else -1
         tangent = left * np.column_stack([-out[:, 1], out[:, 0]])

@@ -242,11 +242,46 @@ def test_what_is_safe_to_mend_is_mended_and_said(tmp_path, points, cells, note):
     assert_same_as_good(plate)
 
 
-def test_hanging_nodes_are_tied_in(tmp_path):
-    points = [(0, 0), (1, 0), (2, 0), (2, 1), (1, 1), (0, 1), (1, 0.5)]
-    plate = fi.mesh.load(written(tmp_path, points, [[0, 1, 4], [0, 4, 5], [1, 2, 6], [2, 3, 6], [3, 4, 6]]))
+def rounded(points, digits):
+    return np.array([[float(f"{value:.{digits - 1}e}") for value in point] for point in points])
+
+
+def turned(points, digits=17):
+    """Points (n, 2) turned by 0.7, with so many digits."""
+    z = np.exp(0.7j) * (np.asarray(points) @ [1.0, 1j])
+    return rounded(np.column_stack([z.real, z.imag]), digits)
+
+
+@pytest.mark.parametrize("digits", [17, 6])
+def test_hanging_nodes_are_tied_in(tmp_path, digits):
+    points = turned([(0, 0), (1, 0), (2, 0), (2, 1), (1, 1), (0, 1), (1, 0.3), (1, 0.6)], digits)
+    cells = [[0, 1, 4], [0, 4, 5], [1, 2, 6], [2, 7, 6], [2, 3, 7], [3, 4, 7]]
+    plate = fi.mesh.load(written(tmp_path, points, cells))
     assert "hanging nodes" in plate.notes[0]
     assert_allclose(held(plate), np.pi**2 * np.array([1.25, 2.0]), rtol=1e-5)
+
+
+@pytest.mark.parametrize("out_of_plane", [False, True])
+@pytest.mark.parametrize("digits", [5, 6, 8, "single"])
+def test_hinged_sides_are_straight_with_few_digits(tmp_path, digits, out_of_plane):
+    """Each vertex beside its side would be held like a corner: frequencies 20 to 50 % off."""
+    plate = fi.mesh.rectangle(1.55, 1.0, size=0.1)
+    points = turned(plate.points)
+    if out_of_plane:
+        points = points @ np.array([[0.8, 0.0, 0.6], [0.0, 1.0, 0.0]])
+    exact = written(tmp_path, points, plate.cells)
+    points = points.astype(np.float32).astype(float) if digits == "single" else rounded(points, digits)
+    shape = fi.mesh.load(written(tmp_path, points, plate.cells))
+    assert not shape.curved.any() and shape.rise is None and fi.mesh.load(exact).rise is None
+    error = 1e-7 if digits == "single" else 10.0 ** (1 - digits)  # of the last digit
+    assert_allclose(held(shape), HINGED, rtol=1e-6 + 2.0 * error)  # refined by find_modes: 1e-6
+
+
+def test_digits_that_move_nodes_are_noted(tmp_path):
+    points = turned(GOOD.points) + 800.0
+    for digits, noted in ((9, False), (6, True)):
+        shape = fi.mesh.load(written(tmp_path, rounded(points, digits), GOOD.cells))
+        assert any("digits of the file move nodes" in note for note in shape.notes) == noted
 
 
 def test_groups_of_med_are_edges_which_may_overlap(tmp_path):

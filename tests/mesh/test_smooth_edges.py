@@ -25,7 +25,7 @@ def n_curved_of(place, middles):
 def test_points_of_a_circle_are_a_circle_wherever_they_lie(turn):
     angle = turn * np.sort(np.random.default_rng(2).uniform(0.0, 2.0 * np.pi, 60))
     place = np.array([5.0, -3.0]) + 2.0 * np.column_stack([np.cos(angle), np.sin(angle)])
-    middles, tangents, curvatures = recover_rim(place, loop_of(place), {})
+    _, middles, tangents, curvatures = recover_rim(place, loop_of(place), {})
     assert (n_curved_of(place, middles), n_corners_of(place)) == (60, 0)
     assert_allclose(np.linalg.norm(middles - [5.0, -3.0], axis=1), 2.0, rtol=1e-12)
     assert_allclose(curvatures, turn / 2.0, rtol=1e-10)
@@ -45,7 +45,7 @@ def test_fit_to_an_ellipse_converges():
     errors = []
     for n in (40, 80):
         place, tangent, curvature = ellipse(n)
-        middles, tangents, curvatures = recover_rim(place, loop_of(place), {})
+        _, middles, tangents, curvatures = recover_rim(place, loop_of(place), {})
         assert (n_curved_of(place, middles), n_corners_of(place)) == (n, 0)
         off = np.abs((middles / [2.0, 1.0]) ** 2 @ [1.0, 1.0] - 1.0)
         bend = np.abs(curvatures[:, 0] - curvature)
@@ -58,8 +58,8 @@ def test_middles_from_the_file_are_kept_and_make_the_fit_finer():
     place, tangent, _ = ellipse(40)
     t = np.linspace(0.0, 2.0 * np.pi, 40, endpoint=False) + np.pi / 40
     known = np.column_stack([2.0 * np.cos(t), np.sin(t)])
-    _, coarse, _ = recover_rim(place, loop_of(place), {})
-    middles, fine, _ = recover_rim(place, loop_of(place), dict(enumerate(known)))
+    _, _, coarse, _ = recover_rim(place, loop_of(place), {})
+    _, middles, fine, _ = recover_rim(place, loop_of(place), dict(enumerate(known)))
     assert_allclose(middles, known, atol=0.0)
     missed = [np.abs(tangents[:, 0] - tangent).max() for tangents in (coarse, fine)]
     assert missed[1] < missed[0] / 8.0  # half the distance between points: a sixteenth
@@ -75,7 +75,7 @@ def stadium(n):
 
 def test_half_circles_and_straight_sides_meet_smoothly():
     place = stadium(20)
-    middles, tangents, curvatures = recover_rim(place, loop_of(place), {})
+    _, middles, tangents, curvatures = recover_rim(place, loop_of(place), {})
     assert (n_curved_of(place, middles), n_corners_of(place)) == (40, 4)
     curved = curvatures[:, 0] > 0.0
     assert_allclose(curvatures[curved], 1.0, rtol=1e-9)
@@ -90,7 +90,7 @@ def test_half_circles_and_straight_sides_meet_smoothly():
 def test_a_square_has_four_corners_and_no_curve():
     half = np.array([(0, 0), (1, 0), (2, 0), (3, 0), (4, 0), (4, 1), (4, 2), (4, 3)]) / 4.0
     place = np.concatenate([half, 1.0 - half])
-    middles, _, curvatures = recover_rim(place, loop_of(place), {})
+    _, middles, _, curvatures = recover_rim(place, loop_of(place), {})
     assert (n_curved_of(place, middles), n_corners_of(place)) == (0, 4)
     assert_allclose(curvatures, 0.0, atol=0.0)
 
@@ -125,3 +125,48 @@ def test_curves_that_nearly_share_a_tangent_are_joined(angle, smooth):
     tangents[1] = np.cos(angle), np.sin(angle)
     join_smoothly(np.array([[0, 1]]), tangents, np.full((2, 2), 0.5))
     assert np.array_equal(tangents[0, 1], tangents[1, 0]) == smooth
+
+
+def arc(centre, radius, start, stop, n):
+    """Points (n, 2) of an arc between two angles [degrees], without its last."""
+    angle = np.radians(start + (stop - start) * np.arange(n) / n)
+    return np.asarray(centre) + radius * np.column_stack([np.cos(angle), np.sin(angle)])
+
+
+def radii_of(place):
+    return sorted(round(circle[1], 6) for *_, circle in smooth_runs(place)[0] if circle)
+
+
+@pytest.mark.parametrize("digits", [17, 7, 5])
+def test_small_fillets_between_sides_of_many_points_are_arcs(digits):
+    """Ten points along each side, four facets in each fillet: more points than count as few, and no scatter."""
+    radii, fillets = [0.004, 0.01, 0.02, 0.035], []
+    for i, (x, y) in enumerate([(0.3, 0.0), (0.3, 0.2), (0.0, 0.2), (0.0, 0.0)]):
+        r = radii[i]
+        fillets.append(arc((abs(x - r), abs(y - r)), r, 90.0 * i - 90.0, 90.0 * i + 22.5, 5))
+    share = np.arange(13)[:, None] / 13
+    place = np.concatenate([
+        part for one, two in zip(fillets, fillets[1:] + fillets[:1])
+        for part in (one[:-1], one[-1] + share * (two[0] - one[-1]))
+    ])  # fmt: skip
+    z = np.exp(0.7j) * (place @ [1.0, 1j])
+    place = np.array([[float(f"{value:.{digits - 1}e}") for value in pair] for pair in zip(z.real, z.imag)])
+    assert len(place) > 64
+    runs, _ = smooth_runs(place)
+    straight = [points for points, controls, circle in runs if circle is None and controls.shape[:2] == (1, 2)]
+    assert len(runs) == 8 and len(straight) == 4
+    if digits > 5:
+        assert_allclose(radii_of(place), radii, rtol=1e-4)
+
+
+def test_an_oval_is_four_arcs():
+    """Arcs of radii 1 and 3 that meet smoothly: the centres of the larger lie 2 apart from those of the smaller."""
+    h = 2.0 / np.sqrt(2.0)
+    place = np.concatenate([
+        arc((h, 0.0), 1.0, -45.0, 45.0, 12), arc((0.0, -h), 3.0, 45.0, 135.0, 20),
+        arc((-h, 0.0), 1.0, 135.0, 225.0, 12), arc((0.0, h), 3.0, 225.0, 315.0, 20),
+    ])  # fmt: skip
+    assert radii_of(place) == [1.0, 1.0, 3.0, 3.0]
+    _, _, tangents, curvatures = recover_rim(place, loop_of(place), {})
+    assert_allclose(np.sort(curvatures[:, 0]), [1.0 / 3.0] * 40 + [1.0] * 24, rtol=1e-6)
+    assert_allclose(tangents[:, 1], np.roll(tangents[:, 0], -1, axis=0), atol=1e-6)
