@@ -358,7 +358,7 @@ def load(path: Any, *, unit: str | None = None) -> Mesh:
         points, cells, facets, edges, middles, tangents, curvatures,
         size=float(mesh_files.side_lengths(points, cells).max()) / LONGEST, size_stated=False,
         notes=tuple(f"{Path(path).name}: {note}" for note in notes),
-        rise=None if heights is None else table(*heights),
+        rise=None if heights is None else table(mesh_files.moved_onto(heights[0], points, 3.0 * rounding), heights[1]),
     )  # fmt: skip
     return replace(made, recipe=partial(_resize_mesh, made))
 

@@ -80,3 +80,11 @@ def test_a_polygon_may_lie_far_from_the_origin():
     assert mesh.polygon(corners + 4e5).area == pytest.approx(0.1215, rel=1e-9)
     with pytest.raises(ValueError, match=r"longer than wide near \(4\d{5}, 4\d{5}\) m; widen it there"):
         mesh.polygon(np.add([(0, 0), (1, 0), (1, 1), (0.5, 1), (0.5, 2), (0.49999, 2), (0.49999, 1), (0, 1)], 4e5))
+
+
+@pytest.mark.parametrize(("n", "noted"), [(24, False), (40, True)])
+def test_corners_of_a_polygon_that_turn_like_points_of_a_curve_are_noted(n, noted):
+    """With points along its sides, too; a circle of facets that `fi.mesh.outline` draws takes 26."""
+    corners = 0.2 * np.exp(2j * np.pi * np.arange(n) / n)
+    points = np.column_stack([corners, 0.5 * (corners + np.roll(corners, -1))]).reshape(-1, 1).view(float)
+    assert any(f"{n} corners turn as gently" in note for note in mesh.polygon(points).notes) == noted
