@@ -3,6 +3,7 @@
 import numpy as np
 
 from .._base import check
+from ..impact import free_motion
 from ..impact.response import Response
 from ..impact.striker import Striker
 from ..model.playing import Strokes
@@ -92,5 +93,5 @@ def clearest(response: Response, times: np.ndarray) -> int:
 
 def ringing_time(modes: Modes, some: np.ndarray, limits: tuple[float, float]) -> float:
     """How long it takes until the slowest of some modes has lost 60 dB [s], within limits."""
-    slowest = float((modes.damping_ratio * modes.omega)[some].min(initial=np.inf))
+    slowest = -float(free_motion.roots(modes.omega[some], modes.damping_ratio[some]).real.max(initial=-np.inf))
     return float(np.clip(np.log(1e3) / slowest, *limits)) if slowest > 0.0 else limits[1]

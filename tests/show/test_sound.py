@@ -70,6 +70,9 @@ def test_length_follows_the_decay_within_bounds():
     assert_allclose(len(sound.synthesise(blow()).samples) / sound.RATE, np.log(1e3) / slow, atol=1 / sound.RATE)
     assert len(sound.synthesise(blow(0.0)).samples) == sound.LONGEST * sound.RATE
     assert len(sound.synthesise(blow(0.5)).samples) == sound.SHORTEST * sound.RATE
+    creeping = (100.0 - np.sqrt(100.0**2 - 1.0)) * 2 * np.pi * FREQUENCIES[1]  # the slow root
+    length = len(sound.synthesise(blow(100.0)).samples)
+    assert_allclose(length / sound.RATE, np.log(1e3) / creeping, atol=1 / sound.RATE)
 
 
 def test_rigid_target_is_silent():
