@@ -4,6 +4,7 @@ import mpmath
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
+from scipy import special
 
 from fem_impact.impact import force_spectrum
 
@@ -119,3 +120,25 @@ def test_one_frequency_zeros_and_no_pieces_have_a_spectrum():
 def test_magnitude_is_that_of_the_spectrum():
     found = force_spectrum.magnitude(TIME, FORCE[:, 0], FREQUENCIES)
     assert_allclose(found, np.abs(triangles(FREQUENCIES)), rtol=0.0, atol=1e-16)
+
+
+def test_centroids_and_their_slopes_hold_over_many_lobes():
+    """A steady force of length T from T on; between its zeros, |sin(pi x)| / x over x = f T has known integrals."""
+    band = 20.3  # lobes
+
+    def centroid(length):
+        frequencies = force_spectrum.dense_frequencies(band, 2.0 * length)
+        spectrum = length * np.sinc(frequencies * length) * np.exp(-3j * np.pi * frequencies * length)
+        return force_spectrum.centroid(frequencies, spectrum)
+
+    def exact(length):
+        zeros = np.append(np.arange(np.floor(band * length) + 1.0), band * length)
+        areas = np.abs(np.diff(special.sici(np.pi * zeros)[0]))
+        return np.abs(np.diff(np.cos(np.pi * zeros))).sum() / areas.sum() / np.pi / length
+
+    lengths = np.linspace(0.95, 1.05, 41)
+    found, known = np.array([[centroid(x), exact(x)] for x in lengths]).T
+    assert_allclose(found, known, rtol=5e-6)  # 1e-6
+    slopes = np.array([centroid(x + 1e-4) - centroid(x - 1e-4) for x in lengths]) / 2e-4
+    known = np.array([exact(x + 1e-4) - exact(x - 1e-4) for x in lengths]) / 2e-4
+    assert_allclose(slopes, known, atol=1e-4 * np.abs(known).max(), rtol=0.0)  # 2e-5; 7e-2 with corners cut
