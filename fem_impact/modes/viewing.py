@@ -14,7 +14,8 @@ from . import cell_kinds
 if TYPE_CHECKING:
     from .modal import Modes
 
-ENOUGH = 2500  # [-] points on a plate: several per half wave in the first hundred modes, 5 across each of ten
+# [-] points on a plate, on a beam its root: several per half wave in the first hundred modes, 5 across each of ten
+ENOUGH = 2500
 
 
 def grid(modes: "Modes") -> tuple[np.ndarray, np.ndarray]:
@@ -24,9 +25,14 @@ def grid(modes: "Modes") -> tuple[np.ndarray, np.ndarray]:
     points only are not refined.
     """
     points, cells = modes.shapes.grid()
-    while modes.continuous and modes.dimension == 2 and cells.shape[1] == 3 and len(points) < ENOUGH:
-        cells, sides = quarter_triangles(cells, len(points))
-        points = np.vstack([points, points[sides].mean(axis=1)])
+    corners = modes.dimension + 1
+    while modes.continuous and cells.shape[1] == corners > 1 and len(points) < ENOUGH ** (0.5 * modes.dimension):
+        ends, middle = cells, len(points) + np.arange(len(cells))
+        if corners == 2:
+            cells = np.vstack([np.column_stack(half) for half in ((ends[:, 0], middle), (middle, ends[:, 1]))])
+        else:
+            cells, ends = quarter_triangles(cells, len(points))
+        points = np.vstack([points, points[ends].mean(axis=1)])
     return points, cells
 
 

@@ -33,6 +33,16 @@ def test_a_plate_is_refined_until_it_is_smooth():
     assert_allclose(0.5 * np.abs(a * d - b * c).sum(), 0.12, rtol=1e-12)
 
 
+def test_a_beam_of_few_elements_shows_every_half_wave():
+    rod = fi.Beam.circular(fi.Material(E=10e9, nu=0.3, rho=700.0), diameter=0.01)
+    modes = fi.find_modes(fi.assemble(fi.mesh.line(0.4), rod, {"boundary": "hinged"}), n_modes=8)
+    points, cells = viewing.grid(modes)
+    assert_allclose(np.abs(np.diff(points[cells][:, :, 0])).sum(), 0.4, rtol=1e-12)
+    shape = modes.shapes.at(np.sort(points, axis=0))[1:-1, 7]
+    assert (np.diff(np.sign(shape[shape != 0.0])) != 0.0).sum() == 7
+    assert_allclose(np.abs(shape).max(), np.sqrt(2.0 / modes.mass), rtol=0.02)  # that of a sine; 6 points a half wave
+
+
 def test_shapes_known_at_points_only_are_not_refined():
     modes = fi.Modes.from_arrays(
         [100.0], [[1.0], [0.5], [0.2]], points=[[0.0, 0.0], [0.1, 0.0], [0.0, 0.1]], mass=1.0, complete=True
