@@ -358,8 +358,8 @@ def _toml(value: Any) -> str:
         return "{ " + ", ".join(f"{_toml(key)} = {_toml(item)}" for key, item in value.items()) + " }"
     if isinstance(value, (list, tuple)):
         return "[" + ", ".join(map(_toml, value)) + "]"
-    # the escapes of a JSON string are those of TOML
-    return repr(value) if isinstance(value, float) else json.dumps(value, ensure_ascii=True)
+    # the escapes of a JSON string are those of TOML, but for pairs of them, which make one sign
+    return repr(float(value)) if isinstance(value, float) else json.dumps(value, ensure_ascii=False)
 
 
 def read_bytes(path: Path) -> bytes:

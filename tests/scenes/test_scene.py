@@ -15,6 +15,7 @@ from fem_impact.impact import collision
 from fem_impact.model.budget import Budget
 from fem_impact.modes import finding
 from fem_impact.scenes import scene, sentences
+from fem_impact.scenes.schema import toml_text
 from fem_impact.scenes.sentences import words
 
 SOURCE = 'source = "analytic"'
@@ -288,3 +289,9 @@ def test_a_hertz_contact_acts_as_long_as_the_tip_that_is_told(tmp_path):
     duration = 2.9432 * (5.0 / 4.0) ** 0.4 * (m**2 / (k**2 * v)) ** 0.2
     assert_allclose(told, m * (np.pi / duration) ** 2, rtol=6e-3)  # three digits are printed
     assert sentences.tip_notes(load_text(tmp_path, SMALL.replace('"hertz"', '"linear"'))) == ()  # that is a tip
+
+
+def test_a_scene_written_again_keeps_its_words_and_numbers(tmp_path):
+    """Signs beyond the first plane, which JSON writes as pairs, and a number of numpy."""
+    tables = load_text(tmp_path, TITLED).data(speed=np.float64(0.1) * 3.0) | {"title": 'µ "drum" \\ \U0001f941 −'}
+    assert load_text(tmp_path, toml_text(tables)).data() == tables
