@@ -236,8 +236,12 @@ def test_nastran_loads_a_node_with_the_force(tmp_path, hit, force):
     assert load.load_ids == [10] and deck.dload_entries[10][0].tid == 100
     assert way.node == 17 and way.mag * way.xyz[1] == -1.0
     table = deck.tables_d[100]
-    assert_allclose(table.x, TIMES, rtol=1e-9)
-    assert_allclose(table.y, force, rtol=1e-9)
+    assert_allclose(table.x[:-2], TIMES, rtol=1e-9)
+    assert_allclose(table.y[:-2], force, rtol=1e-9)
+    assert (np.diff(table.x[-3:]) > 0.0).all() and not table.y[-2:].any()  # goes on straight through its last points
+    export.write_history(tmp_path / "own.bdf", hit)
+    table = bdf.read_bdf(str(tmp_path / "own.bdf"), xref=False, validate=False, punch=True, debug=False).tables_d[100]
+    assert (np.diff(table.x) > 0.0).all() and not table.y[-2:].any() and table.y.max() > 0.99 * hit.peak_force
 
 
 def test_abaqus_loads_a_node_with_the_force(tmp_path, hit, force):
@@ -247,4 +251,5 @@ def test_abaqus_loads_a_node_with_the_force(tmp_path, hit, force):
     rows, load = rest.split("*CLOAD, AMPLITUDE=BLOW1\n")
     assert head.startswith("**") and load == "17, 3, -1.\n"
     table = np.array([line.split(",") for line in rows.splitlines()], float)
-    assert_allclose(table, np.column_stack([TIMES, force]), rtol=1e-9)
+    assert_allclose(table[:-2], np.column_stack([TIMES, force]), rtol=1e-9)
+    assert not table[-2:, 1].any()
