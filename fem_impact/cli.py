@@ -1,6 +1,7 @@
 """The command line: runs one command, prints its answer and decides the exit status; contains no physics."""
 
 import argparse
+import codecs
 import io
 import json
 import logging
@@ -23,7 +24,7 @@ from ._base.progress import observed
 from .answers import Status
 from .arguments import parser
 from .commands import Answer
-from .display import complain, wrapped
+from .display import complain, in_plain_signs, wrapped
 
 
 def main(arguments: list[str] | None = None) -> int:
@@ -31,9 +32,10 @@ def main(arguments: list[str] | None = None) -> int:
 
     2 for bad input, 1 for a run that failed, 3 for one that missed its tolerance, 130 after Ctrl-C.
     """
+    codecs.register_error("fem-impact", in_plain_signs)
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, io.TextIOWrapper):
-            stream.reconfigure(errors="backslashreplace")  # a title may hold characters that this terminal lacks
+            stream.reconfigure(errors="fem-impact")  # titles and units may hold characters that this terminal lacks
     options = parser().parse_args(arguments)
     options.show = partial(_print, options)
     plain = _prepare(os.environ, once=options.command in ("strike", "modes", "report"))

@@ -1,6 +1,7 @@
 """Shows on a terminal which stage is running, how far it is and how long it still takes."""
 
 import os
+import re
 import shutil
 import sys
 import textwrap
@@ -20,6 +21,7 @@ from ._base.progress import Count, observed
 
 ANNOUNCED = 10.0  # [s] time left that is announced even without a terminal that shows the line
 WIDE = 60  # columns of a terminal from which on there is room for a bar
+SIGNS = str.maketrans("\N{NO-BREAK SPACE}µ−·×⁻⁰¹²³⁴⁵⁶⁷⁸⁹", " u-*x-0123456789") | {ord("±"): "+-", ord("∞"): "inf"}
 LONGER = 2.0  # [-] over the time announced last, from which on a longer one is announced, too
 
 
@@ -33,6 +35,13 @@ def wrapped(text: str) -> str:
     filled = textwrap.TextWrapper(width(), subsequent_indent="    ", break_on_hyphens=False, break_long_words=False)
     lines = (filled.wrap(line) or [""] for line in text.splitlines())
     return "\n".join(line for wrapped in lines for line in wrapped)
+
+
+def in_plain_signs(error: UnicodeError) -> tuple[str, int]:
+    """What a stream gets for signs that it lacks: u for µ, ^-3 for a raised -3, escapes for letters; see `codecs`."""
+    assert isinstance(error, UnicodeEncodeError)
+    plain = re.sub("[⁻⁰¹²³⁴-⁹]+", r"^\g<0>", error.object[error.start : error.end]).translate(SIGNS)
+    return plain.encode("ascii", "backslashreplace").decode("ascii"), error.end
 
 
 def announce(text: str) -> None:

@@ -49,11 +49,12 @@ def test_streams_and_places_that_fail_are_a_sentence(tmp_path, command, status, 
 
 
 def test_text_that_a_terminal_cannot_show_is_escaped(tmp_path):
-    poor = {"LANG": "C", "LC_ALL": "C", "PYTHONIOENCODING": "ascii", "COLUMNS": "20", "TERM": "dumb", "NO_COLOR": "1"}
-    (tmp_path / "title.toml").write_text('title = "Plaque frappée ☃"\n' + SCENE, encoding="utf-8")
+    poor = {"LANG": "C", "LC_ALL": "C", "PYTHONIOENCODING": "ascii", "COLUMNS": "40", "TERM": "dumb", "NO_COLOR": "1"}
+    (tmp_path / "title.toml").write_text('title = "Plaque frappée ☃ 5 µs − 2 · 10⁻³"\n' + SCENE, encoding="utf-8")
     done = run(tmp_path, "$FEM modes title.toml", **poor)
     assert (done.returncode, done.stderr) == (0, "")
     assert "frapp\\xe9e" in done.stdout and "\x1b" not in done.stdout
+    assert "5 us - 2 * 10^-3" in " ".join(done.stdout.split())
 
 
 @pytest.mark.parametrize("limit", [1, 64])  # blocks of 512 or 1024 bytes a file may have
