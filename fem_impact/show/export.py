@@ -207,12 +207,16 @@ def write_sound(path: str | Path, heard: sound.Sound) -> sound.Sound:
 def write_force(path: str | Path, response: Response | Strokes) -> None:
     """Write the force history as CSV in full precision: a header with units, then one row per instant.
 
+    Of several contacts each has a column: ``force_1 [N]``, ``force_2 [N]`` and so on.
+
     Examples
     --------
     >>> hit = fi.strike(fi.Modes.rigid(1.0), fi.Striker.rigid(0.1), fi.Contact.linear(1e5), at=None, speed=1.0)
     >>> fi.export.write_force("force.csv", hit)
     """
-    write_whole(path, csv_text(**{"time [s]": response.time, "force [N]": response.force}))
+    forces = np.atleast_2d(response.force.T)  # (n_contacts, n_times)
+    names = ["force [N]"] if len(forces) == 1 else [f"force_{i} [N]" for i in range(1, len(forces) + 1)]
+    write_whole(path, csv_text(**{"time [s]": response.time, **dict(zip(names, forces))}))
 
 
 @check.typed

@@ -126,6 +126,15 @@ def test_force_table_keeps_every_digit(tmp_path, hit):
     np.testing.assert_array_equal(table, np.column_stack([hit.time, hit.force]))
 
 
+def test_force_table_has_a_column_for_each_contact(tmp_path):
+    law = fi.Contact.linear(1e6)
+    hit = fi.collide([fi.Modes.rigid(0.1)] * 3, [fi.Touch(law, 0, 1), fi.Touch(law, 1, 2)], speeds=[1.0, 0.0, 0.0])
+    export.write_force(tmp_path / "force.csv", hit)
+    assert (tmp_path / "force.csv").read_text().splitlines()[0] == "time [s],force_1 [N],force_2 [N]"
+    table = np.loadtxt(tmp_path / "force.csv", delimiter=",", skiprows=1)
+    np.testing.assert_array_equal(table, np.column_stack([hit.time, hit.force]))
+
+
 def test_a_sound_file_can_be_heard_ends_softly_and_keeps_its_true_level(tmp_path):
     plate = fi.analytic.rectangle(0.3, 0.2, mass=0.2, first_frequency=100.0, n_modes=20)  # rings for ever
     for speed in (1.0, 1e-3, 30.0):
