@@ -29,8 +29,8 @@ def write_history(
         ``.op4``, Nastran's matrices TIME (n_times, 1) [s], FORCE (n_times, n_contacts) [N] and, with ``at``, MOVE and
         VELO (n_times, n_points) [m, m/s]; ``.uff`` or ``.unv``, functions over time (data set 58; needs pyuff) of the
         same, for programs of modal testing; ``.bdf``, Nastran's TABLED1, TLOAD1 and FORCE; ``.inp``, Abaqus's
-        \\*AMPLITUDE and \\*CLOAD. The last two hold the force alone, times [s] and values [N], and none
-        after the last time.
+        \\*AMPLITUDE and \\*CLOAD. The last two hold the forces on the struck body alone, times [s] and
+        values [N], and none after the last time.
     response : Response
     times : array_like, shape (n_times,) [s], optional
         By default those of ``response.time``; universal files need even ones.
@@ -78,7 +78,8 @@ def write_history(
             # beyond its last two points a table goes on straight in Nastran, and stays at the last in Abaqus
             step = float(np.diff(stamps)[-1:].sum()) or 1.0
             stamps = np.append(stamps, stamps[-1:].sum() + np.array([step, 2.0 * step]))
-            force = np.vstack([force, np.zeros((2, force.shape[1]))])
+            mine = dict(response.ends[-1].touched) if response.ends else dict.fromkeys(range(force.shape[1]), -1.0)
+            force = np.vstack([force, np.zeros((2, force.shape[1]))])[:, list(mine)] * -np.array(list(mine.values()))
             temporary.write_text(write(stamps, force, node, way), encoding="ascii")
 
 

@@ -262,3 +262,21 @@ def test_abaqus_loads_a_node_with_the_force(tmp_path, hit, force):
     table = np.array([line.split(",") for line in rows.splitlines()], float)
     assert_allclose(table[:-2], np.column_stack([TIMES, force]), rtol=1e-9)
     assert not table[-2:, 1].any()
+
+
+@pytest.mark.parametrize(("touch", "speeds", "sign"), [((1, 2), [1.0, 0.0, 0.0], 1.0), ((2, 1), [0.0, 1.0, 0.0], -1.0)])
+def test_a_node_is_loaded_by_the_contacts_of_the_struck_body_alone(tmp_path, touch, speeds, sign):
+    """Of three balls the last is struck; where a touch names it first, the force pushes it back."""
+    law = fi.Contact.linear(1e6)
+    gap = fi.Contact.linear(1e6, gap=1e-3 if touch[0] == 1 else -1e-4)
+    balls = [fi.Modes.rigid(0.1)] * 3
+    hit = fi.collide(balls, [fi.Touch(law, 0, 1), fi.Touch(gap, *touch)], speeds=speeds, tolerance=1e-3)
+    export.write_history(tmp_path / "blow.inp", hit)
+    text = (tmp_path / "blow.inp").read_text()
+    assert text.count("*AMPLITUDE") == text.count("*CLOAD") == 1
+    table = np.array(
+        [line.split(",") for line in text.splitlines() if "E" in line and "," in line and "*" not in line], float
+    )
+    moved = hit.velocity(None, [hit.time[-1]], body=2)[0, 0] - speeds[2]
+    assert np.sign(moved) == sign
+    assert_allclose(np.trapezoid(table[:, 1], table[:, 0]), 0.1 * moved, rtol=1e-3)
