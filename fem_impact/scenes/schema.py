@@ -358,8 +358,10 @@ def _toml(value: Any) -> str:
         return "{ " + ", ".join(f"{_toml(key)} = {_toml(item)}" for key, item in value.items()) + " }"
     if isinstance(value, (list, tuple)):
         return "[" + ", ".join(map(_toml, value)) + "]"
-    # the escapes of a JSON string are those of TOML, but for pairs of them, which make one sign
-    return repr(float(value)) if isinstance(value, float) else json.dumps(value, ensure_ascii=False)
+    if isinstance(value, float):
+        return repr(float(value))
+    # the escapes of a JSON string are those of TOML, but for pairs of them, which make one sign, and for DEL
+    return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")
 
 
 def read_bytes(path: Path) -> bytes:

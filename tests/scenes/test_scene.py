@@ -1,5 +1,6 @@
 """A scene file builds what the public functions build, and says in one line what is wrong with it."""
 
+import tomllib
 from contextlib import nullcontext
 from dataclasses import FrozenInstanceError
 
@@ -295,3 +296,4 @@ def test_a_scene_written_again_keeps_its_words_and_numbers(tmp_path):
     """Signs beyond the first plane, which JSON writes as pairs, and a number of numpy."""
     tables = load_text(tmp_path, TITLED).data(speed=np.float64(0.1) * 3.0) | {"title": 'µ "drum" \\ \U0001f941 −'}
     assert load_text(tmp_path, toml_text(tables)).data() == tables
+    assert tomllib.loads(toml_text({"title": "\x7f"})) == {"title": "\x7f"}
