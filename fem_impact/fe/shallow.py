@@ -9,8 +9,8 @@ rise z(x, y) of the unloaded surface, the strains are Marguerre's:
 where A, B and D are the moments of the stiffness over the thickness, and both z and the height in a layer count towards
 the striker. The inertia of what moves in the plane (`plane_mass`) is left out, as in Reissner's formulas, so that the
 plane follows at once and has no modes of its own. With ribs, which hang far below the middle, it counts in the space of
-the modes found. Rigid motions are exact: a tilt w = x comes with u = -z, which the quartic elements hold, as the rise
-is quartic itself in each triangle; their inertia is that of the deflection.
+the modes found, and from the first Ritz vector on. Rigid motions are exact: a tilt w = x comes with u = -z, which the
+quartic elements hold, as the rise is quartic itself in each triangle; their inertia is that of the deflection.
 
 Shallow means slopes of the rise below a tenth or so: the area of the surface, and so its mass, is larger than that of
 its outline by half the square of the slope.
@@ -28,7 +28,7 @@ from functools import partial
 from typing import Any
 
 import numpy as np
-from scipy.sparse import block_diag
+from scipy.sparse import block_diag, csc_matrix
 
 from .._base import check
 from ..mesh.meshes import Mesh
@@ -172,10 +172,17 @@ def towards_bends(mesh: Mesh, section: Any, kinds: list[str], coarser: float) ->
 
 
 def plane_mass(system: Any, vectors: np.ndarray) -> np.ndarray:
-    """What moves besides the deflection in vectors (n_dofs, n), times its mass (n_dofs, n), in the frame.
+    """What moves besides the deflection in vectors (n_dofs, n), times its mass (n_dofs, n), in the frame."""
+    heavy, spared = mass_in_plane(system)
+    return heavy @ vectors - spared @ (spared.T @ vectors)
+
+
+def mass_in_plane(system: Any) -> tuple[csc_matrix, np.ndarray]:
+    """The mass (n_dofs, n_dofs) of what moves besides the deflection, in the frame.
 
     It is that of the displacements in the plane, of ribs at the height of their centroids and as they turn, and of what
-    the slope of the rise makes the surface larger.
+    the slope of the rise makes the surface larger. A free body stays where it is in its plane: that spares it the
+    square of the second result (n_dofs, n_drifts).
     """
     space, frame, dofs = system.space, system.frame, system.element_dofs
     X, x, dx = slopes.quadrature(system)
@@ -198,12 +205,9 @@ def plane_mass(system: Any, vectors: np.ndarray) -> np.ndarray:
         local.append(each / (frame.inertia * frame.length))
         where.append(piece.cells)
     whole = scatter(np.concatenate(local), dofs[:, np.concatenate(where)], system.expand.shape[0])
-    moved = system.expand @ vectors
-    heavy = whole @ moved
-    if space.drifts.size:  # a free body stays where it is in its plane
-        drifting = whole @ space.drifts
-        heavy -= drifting @ np.linalg.solve(space.drifts.T @ drifting, space.drifts.T @ heavy)
-    return system.expand.T @ heavy
+    drifting = whole @ space.drifts
+    square = np.linalg.cholesky(space.drifts.T @ drifting)
+    return system.expand.T @ whole @ system.expand, system.expand.T @ np.linalg.solve(square, drifting.T).T
 
 
 def shell_energies(system: Any, section: Any, vectors: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -5,6 +5,9 @@ Ritz pairs are a Gauss quadrature of the body's response at those points: modes 
 appear, and modes closer together than a blow can distinguish become one. One factorisation and one solution per vector
 replace the search for eigenvalues, and the first vectors of a longer run are the vectors of a shorter one.
 
+The mass M of a ribbed plate has that of what moves in the plane: in the space of vectors made without it, frequencies
+would converge only as fast as the number of vectors grows, because bending along the rib is not among the first.
+
 References
 ----------
 Wilson, Yuan and Dickens (1982), Earthquake Eng. Struct. Dyn. 10, 813-821 (load-dependent Ritz vectors); Golub and
@@ -23,7 +26,8 @@ from .._base.rounding import SAME
 from ..fe import plausible, point_load
 from ..fe.assembly import System
 from ..fe.eigenvalues import Flexibility, factorise, one_thread
-from ..fe.refinement import with_mass_in_plane
+from ..fe.section import Plate
+from ..fe.shallow import mass_in_plane
 from .modal import Damping, Modes, damping_ratios
 from .shapes import ElementShapes
 
@@ -86,11 +90,34 @@ class Krylov:
     def __init__(self, system: System, points: np.ndarray, shift: float) -> None:
         self.system = system
         self.shift = (shift / system.frame.rate) ** 2  # s**2 in the frame
-        self._shifted = system.K + self.shift * system.M
-        self._solve = factorise(self._shifted).solve
         self._moving = system.M @ system.rigid
+        self._heavy, self._spared = system.M, np.zeros((system.n_dofs, 0))  # the mass, less the square of the second
+        self._eased, self._pushed = self._spared, system.rigid
+        if ribbed := isinstance(system.section, Plate) and bool(system.section.ribs):  # they hang far below the middle
+            more, self._spared = mass_in_plane(system)
+            self._heavy = system.M + more
+        self._factors = factorise(system.K + self.shift * self._heavy)
+        if ribbed:
+            yields, pushed = self._factors.solve(self._spared), self._factors.solve(self._moving)
+            left = np.eye(yields.shape[1]) / self.shift - self._spared.T @ yields
+            self._eased = yields @ np.linalg.inv(left)  # (n_dofs, n_drifts)
+            pushed += self._eased @ (self._spared.T @ pushed)
+            self._pushed = pushed @ np.linalg.inv(self._moving.T @ pushed)  # (n_dofs, n_rigid)
         self._flexibility = Flexibility.of(system)
         self._begin(points)
+
+    def _weigh(self, vectors: np.ndarray) -> np.ndarray:
+        """Vectors (n_dofs, n) times the mass, with that in the plane of a ribbed plate."""
+        return self._heavy @ vectors - self._spared @ (self._spared.T @ vectors)
+
+    def _solve(self, loads: np.ndarray) -> np.ndarray:
+        """The inverse of K + s**2 M times loads (n_dofs, n), among motions that are not rigid."""
+        found = self._factors.solve(loads)
+        return self._flexible(found + self._eased @ (self._spared.T @ found))
+
+    def _flexible(self, vectors: np.ndarray) -> np.ndarray:
+        """Vectors (n_dofs, n) without rigid motions."""
+        return vectors - self._pushed @ (self._moving.T @ vectors)
 
     def _begin(self, points: np.ndarray) -> None:
         system = self.system
@@ -118,7 +145,6 @@ class Krylov:
     @one_thread
     def grow(self, count: int) -> None:
         """Make vectors until there are at least ``count``, or all that the loads can reach."""
-        M = self.system.M
         most = min(count, self.system.n_dofs - self.system.rigid.shape[1])
         if most + self.width - 1 > len(self.vectors):  # memory for more to come is not used until they do
             room = 2 * (most + self.width - 1)
@@ -131,15 +157,14 @@ class Krylov:
             overlap = self._carried.T @ self._next  # in exact arithmetic only the two latest blocks overlap
             self.projected[before:end, start:end] = overlap[:, : end - start]
             new = self._next - self.vectors[before:end].T @ overlap
-            if self._moving.shape[1]:
-                new = new - self.system.rigid @ (self._moving.T @ new)
+            new = self._flexible(new)
             self._due -= 1
             if end and self._due <= 0:
                 cleared = self._cleared(new)
                 if cleared is None:
                     continue
                 new = cleared
-            heavy = M @ new
+            heavy = self._weigh(new)
             gram = new.T @ heavy
             length = np.sqrt((overlap**2).sum(axis=0) + gram.diagonal())  # before `overlap` was removed
             scaled = gram / np.outer(length, length)
@@ -169,7 +194,7 @@ class Krylov:
         start, end = self._latest[1:]
         latest = end - start
         both = np.vstack([self.vectors[start:end], new.T])
-        heavy = np.vstack([self._carried[:, -latest:].T, (self.system.M @ new).T])
+        heavy = np.vstack([self._carried[:, -latest:].T, self._weigh(new).T])
         rows, worst = max(1, 2**20 // (8 * both.shape[1])), 0.0  # a piece that fits into the cache of a core
         for i in range(0, start, rows):  # a few rows at a time: memory is read once for both products
             known = self.vectors[i : min(i + rows, start)]
@@ -181,7 +206,7 @@ class Krylov:
             self._period = self._due = max(1, self._period // 4)
             return None
         self.vectors[start:end] = both[:latest]
-        self._carried[:, -latest:] = self.system.M @ both[:latest].T
+        self._carried[:, -latest:] = self._weigh(both[:latest].T)
         new = both[latest:] - (both[latest:] @ self._carried[:, -latest:]) @ both[:latest]
         self._period = max(1, self._period // 2) if worst > 1e-11 else self._period + 1
         self._due = self._period
@@ -199,7 +224,8 @@ class Krylov:
         last, band = min(reach, count), slice(max(0, count - 2 * reach), count)
         inverse = self.projected[:count, :count].copy()
         inverse = 0.5 * (inverse + inverse.T)
-        pushed = self._shifted @ self.vectors[count - last : count].T  # (n_dofs, last)
+        latest = self.vectors[count - last : count].T
+        pushed = self.system.K @ latest + self.shift * self._weigh(latest)  # (n_dofs, last)
         stiff = self.vectors[band] @ pushed
         rest = inverse[count - last :, band] @ stiff - np.eye(last)
         excess = np.linalg.solve(stiff[-last:].T, rest.T)  # rest = excess @ stiff[-last:]
@@ -236,8 +262,6 @@ class Krylov:
         count = min(count, self.count)
         frame, rigid = self.system.frame, self.system.rigid
         value, turn = self._eigenpairs(count)
-        value, mix = with_mass_in_plane(self.system, value, lambda: self.vectors[:count].T @ turn)
-        turn = turn if mix is None else turn @ mix
         omega = np.concatenate([np.zeros(rigid.shape[1]), np.sqrt(np.maximum(value, 0.0)) * frame.rate])
         basis = self.vectors[:count]
         rows = np.hstack([self.loads.T @ rigid, (basis @ self.loads).T @ turn]) * frame.mass**-0.5

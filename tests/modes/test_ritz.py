@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 import fem_impact as fi
+from fem_impact.fe.shallow import plane_mass
 from fem_impact.modes.ritz import Krylov
 
 SPRUCE = fi.Plate(fi.Material(E=10e9, nu=0.3, rho=450.0), thickness=3e-3)
@@ -175,3 +176,19 @@ def test_weak_springs_leave_bending_to_the_vectors(stiffness):
         found.append(modes.omega[modes.omega > 100.0][:8])
     assert found[0] == pytest.approx(found[1], rel=1e-5)
     assert modes.n_rigid == 3
+
+
+@pytest.mark.parametrize("supports", [{"boundary": "hinged"}, {}])
+def test_vectors_of_a_ribbed_plate_end_at_the_modes_with_its_mass_in_the_plane(supports):
+    """Projected onto vectors made without that mass, frequencies still fell by 1e-4 between 220 and 400 of them."""
+    bar = fi.Beam.rectangular(fi.Material(E=10e9, nu=0.3, rho=450.0), width=5e-3, height=15e-3)
+    mesh, rib = fi.mesh.rectangle(0.465, 0.3, size=0.15), fi.Rib([(0.05, 0.2), (0.4, 0.1)], bar)
+    system = fi.assemble(mesh, SPRUCE, supports, near=AT, ribs=[rib])
+    grown, true = Krylov(system, AT, 3e4), fi.find_modes(system, n_modes=30)
+    few, many = (grown.pairs(count).omega[:30] for count in (220, 400))
+    assert few == pytest.approx(many, rel=1e-8)
+    # modes have it in their own space only, which lacks the bending of the others along the rib: 1.1e-3 at the 23rd
+    assert many == pytest.approx(true.omega, rel=2e-3) and (many <= true.omega).all()
+    assert many[:10] == pytest.approx(true.omega[:10], rel=1e-4)
+    vectors = grown.vectors[:400]
+    np.testing.assert_allclose(vectors @ (system.M @ vectors.T + plane_mass(system, vectors.T)), np.eye(400), atol=1e-8)
