@@ -1,8 +1,8 @@
 """Find the lowest modes of a system without missing any, and refine the mesh until their estimated error is small."""
 
 import hashlib
-from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -134,13 +134,16 @@ def _pairs(
     else:
         n = n_modes - n_rigid
         many = system.mesh.dimension == 1 and n > FIRST_SLICE
+        if (
+            isinstance(system.section, Plate) and system.section.ribs
+        ):  # with the mass in the plane others may be among them
+            n, limit = max(n, min(n + 2 * BLOCK, len(flexibility.inertial) - n_rigid)), None
         values, vectors = by_slices(flexibility, n) if many else _complete_eigenpairs(system, flexibility, n, limit)
         if system.strain is not None:  # more accurate than K if there are tiny triangles
             values = system.strain.energy(system, vectors) / np.einsum("ij,ij->j", vectors, system.M @ vectors)
             order = np.argsort(values, kind="stable")
             values, vectors = values[order], vectors[:, order]
-        values, turn = with_mass_in_plane(system, values, lambda: vectors)
-        vectors = vectors if turn is None else vectors @ turn
+        values, vectors = with_mass_in_plane(system, flexibility, values, vectors)
     omega = np.concatenate([np.zeros(n_rigid), np.sqrt(values) * rate])[:n_modes]
     vectors = np.column_stack([system.rigid, vectors])[:, :n_modes]
     return flexibility, omega, vectors
@@ -254,20 +257,29 @@ def _complete_eigenpairs(
 
 
 def with_mass_in_plane(
-    system: System, values: np.ndarray, shapes: Callable[[], np.ndarray]
-) -> tuple[np.ndarray, np.ndarray | None]:
-    """Eigenvalues (n,) with the mass in the plane of a ribbed plate, and how vectors (n_dofs, n) combine, if not as is.
+    system: System, flexibility: Flexibility, values: np.ndarray, vectors: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Eigenvalues (n,) and vectors (n_dofs, n), with the mass in the plane of a ribbed plate.
 
-    The vectors come from ``shapes`` only where they matter: those of many Ritz pairs cost as much as their solutions.
-    Ribs hang far below the middle; without them it is left out, as formulas of shells do. The inverse problem keeps the
+    Ribs hang far below the middle; without them it is left out, as formulas of shells do. The space is that of the
+    vectors, of what their mass in the plane bends, and of what the mass of that bends. The inverse problem keeps the
     digits of the lowest.
     """
     if not (isinstance(system.section, Plate) and system.section.ribs and len(values)):
-        return values, None
-    vectors, soft = shapes(), values**-0.5
-    more = vectors.T @ shallow.plane_mass(system, vectors)
-    size, turn = eigh(soft[:, None] * (np.eye(len(values)) + 0.5 * (more + more.T)) * soft)
-    return 1.0 / size[::-1], (soft[:, None] * turn / np.sqrt(size))[:, ::-1]
+        return values, vectors
+    n = len(values)
+    basis = fresh = vectors * values**-0.5
+    for mass in (partial(shallow.plane_mass, system), system.M.__matmul__):
+        fresh = flexibility.solve(mass(fresh))
+        energy = flexibility.products(np.column_stack([basis, fresh]))
+        cross = energy[: -fresh.shape[1], -fresh.shape[1] :]
+        size, turn = eigh(energy[-fresh.shape[1] :, -fresh.shape[1] :] - cross.T @ cross)
+        some = size > SAME * size[-1]
+        fresh = (fresh - basis @ cross) @ (turn[:, some] / np.sqrt(size[some]))
+        basis = np.column_stack([basis, fresh])
+    kinetic = basis.T @ (system.M @ basis + shallow.plane_mass(system, basis))
+    size, turn = (part[..., : -n - 1 : -1] for part in eigh(0.5 * (kinetic + kinetic.T)))
+    return 1.0 / size, basis @ (turn / np.sqrt(size))
 
 
 def fine_enough(system: System, n_modes: int | None, max_frequency: float | None, tolerance: float | None) -> System:

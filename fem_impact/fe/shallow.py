@@ -8,9 +8,9 @@ rise z(x, y) of the unloaded surface, the strains are Marguerre's:
 
 where A, B and D are the moments of the stiffness over the thickness, and both z and the height in a layer count towards
 the striker. The inertia of what moves in the plane (`plane_mass`) is left out, as in Reissner's formulas, so that the
-plane follows at once and has no modes of its own. With ribs, which hang far below the middle, it counts in the space of
-the modes found, and from the first Ritz vector on. Rigid motions are exact: a tilt w = x comes with u = -z, which the
-quartic elements hold, as the rise is quartic itself in each triangle; their inertia is that of the deflection.
+plane follows at once and has no modes of its own. With ribs, which hang far below the middle, it counts. Rigid motions
+are exact: a tilt w = x comes with u = -z, which the quartic elements hold, as the rise is quartic itself in each
+triangle; their inertia is that of the deflection.
 
 Shallow means slopes of the rise below a tenth or so: the area of the surface, and so its mass, is larger than that of
 its outline by half the square of the slope.

@@ -1,15 +1,12 @@
 """What a small change of a body's section changes in its modes: frequencies, shapes at a point, and its compliance."""
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
 from .._base import check
 from .._base.check import SimulationError
 from ..fe.eigenvalues import CLUSTER
-from ..fe.section import Plate
-from ..fe.shallow import plane_mass
 from ..fe.variation import SectionChange, energy_changes
 from .modal import Modes
 from .shapes import FieldShapes
@@ -43,7 +40,7 @@ def frequency_slopes(modes: Modes, change: SectionChange, which: np.ndarray) -> 
     rate = shapes.system.frame.rate
     groups = [np.flatnonzero(share_frequency(modes)[i]) for i in which]
     used = np.unique(np.concatenate(groups)) if len(groups) else np.zeros(0, int)
-    stiffer, heavier = _changes(modes, change, used, [])
+    stiffer, heavier = energy_changes(shapes.system, change, shapes.vectors[:, used])
     found = np.zeros(len(which))
     for k, (i, group) in enumerate(zip(which, groups)):
         own = np.searchsorted(used, group)
@@ -67,7 +64,7 @@ def share_frequency(modes: Modes) -> np.ndarray:
 
 
 def changed_modes(modes: Modes, change: SectionChange, at: np.ndarray) -> ModesChange:
-    """Changes of modes as excited at a point ``at`` (dimension,) [m], exact but for the elements and the plane of ribs.
+    """Changes of modes as excited at a point ``at`` (dimension,) [m], exact but for the elements.
 
     Modes that share a frequency are changed together: only their motion at the point counts, and that is smooth.
     """
@@ -78,7 +75,7 @@ def changed_modes(modes: Modes, change: SectionChange, at: np.ndarray) -> ModesC
     shape_at = (load.T @ shapes.vectors)[0]  # (n_modes,) in the frame
     square = (modes.omega / frame.rate) ** 2
     rest = _rest_vectors(shapes, shape_at, square, load)
-    stiffer, heavier = _changes(modes, change, np.arange(n), rest)
+    stiffer, heavier = energy_changes(system, change, np.column_stack([shapes.vectors, *rest]))
     force = stiffer[:, :n] - heavier[:, :n] * square  # (n + n_rest, n) what a change of each mode is pushed with
     slope = np.diag(force[:n]).copy()  # of the eigenvalues
     apart, alike = square - square[:, None], share_frequency(modes)
@@ -101,26 +98,6 @@ def changed_modes(modes: Modes, change: SectionChange, at: np.ndarray) -> ModesC
     stiffer, heavier = energy_changes(system, change, np.column_stack([dip, drift]))
     softer = -float(stiffer[0, 0] + 2.0 * heavier[0, 1]) / (system.frame.mass * system.frame.rate**2)
     return ModesChange(omega, shape * frame.mass**-0.5, softer)
-
-
-def _changes(modes: Modes, change: SectionChange, which: np.ndarray, rest: Any) -> tuple[np.ndarray, np.ndarray]:
-    """Changes of the energies of some modes and of vectors after them, as `energy_changes`.
-
-    The modes of a ribbed plate are combinations of those without the mass in its plane. A change takes them to modes
-    left out of these, most of all to what moves in the plane only, whose mass then moves with them. Slopes of the lower
-    half of the modes then err by less than 2e-3, of the highest by 2e-2.
-    """
-    shapes, n = solution(modes), len(which)
-    system, kept, square = shapes.system, shapes.vectors, (modes.omega / shapes.system.frame.rate) ** 2
-    if not (isinstance(system.section, Plate) and system.section.ribs):
-        return energy_changes(system, change, np.column_stack([kept[:, which], *rest]))
-    heavy, flexible = plane_mass(system, kept[:, which]), square > 0.0
-    own = kept[:, flexible]
-    drawn = shapes.flexibility.solve(heavy) - own @ ((own.T @ heavy) / square[flexible, None])
-    stiffer, heavier = energy_changes(system, change, np.column_stack([kept[:, which], *rest, drawn]))
-    moved = stiffer[-n:, :n] - heavier[-n:, :n] * square[which]
-    heavier[:n, :n] -= moved + moved.T
-    return stiffer[:-n, :-n], heavier[:-n, :-n]
 
 
 def _rest_vectors(shapes: FieldShapes, shape_at: np.ndarray, square: np.ndarray, load: np.ndarray) -> list[np.ndarray]:

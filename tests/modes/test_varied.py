@@ -170,7 +170,7 @@ def barred():
 @pytest.mark.parametrize(("name", "value"), {"height": 12e-3, "width": 8e-3, "radius": 3.0}.items())
 @pytest.mark.thin(2)
 def test_ribs_have_slopes_in_their_sizes(barred, name, value):
-    """The mass in the plane is that of a projection on the modes, whose space changes as well: least for low modes."""
+    """The plane of ribs moves with 2e-2 of the kinetic energy at most, which changes as well."""
     plate, modes, at_rest = barred
     at, step, which = np.array([0.13, 0.1]), 2e-4 * value, np.arange(20)
     change = SectionChange.by_differences(name, value, lambda number: plate(**{name: number}))
@@ -185,13 +185,12 @@ def test_ribs_have_slopes_in_their_sizes(barred, name, value):
         return row * np.sign(row * at_rest.shapes.at(at[None])[0])
 
     frequencies = difference(lambda modes: modes.frequencies)
-    # the plane has 2e-2 of the kinetic energy at most; its square, and what mixes at the upper end, are left out
-    rtol = np.where(which < 7, 2e-3, 2e-2)
+    rtol = np.where(which < 7, 2e-5, 5e-4)  # 1e-5 and 2e-4 were measured: the last modes lack some of those above
     slopes = varied.frequency_slopes(at_rest, change, which)
     assert (np.abs(slopes - frequencies) < rtol * np.maximum.accumulate(np.abs(frequencies))).all()
     assert_allclose(found.omega / (2.0 * np.pi), slopes, rtol=1e-8)
     shapes = difference(shape)
-    assert_allclose(found.shape, shapes, atol=1e-2 * np.abs(shapes).max())
+    assert_allclose(found.shape, shapes, atol=6e-3 * np.abs(shapes).max())
     assert_allclose(found.compliance, difference(lambda modes: modes.shapes.compliance(at[None])[0, 0]), rtol=1e-5)
 
 
