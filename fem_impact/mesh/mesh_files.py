@@ -119,7 +119,7 @@ def _plane_points(
     else:
         refuse_millimetres(name, *np.ptp(points[used], axis=0))
     share = 3.0 * rounding / float(np.ptp(points[used], axis=0).max() or 1.0)
-    if share > 1e-4:
+    if share > 2e-4:  # five digits make it 1.5e-4 at most, if the origin is near
         notes.append(f"the digits of the file move nodes by up to {share:.1g} of its extent; write more of them")
     return points, height, rounding, notes
 

@@ -282,6 +282,8 @@ def test_digits_that_move_nodes_are_noted(tmp_path):
     for digits, noted in ((9, False), (6, True)):
         shape = fi.mesh.load(written(tmp_path, rounded(points, digits), GOOD.cells))
         assert any("digits of the file move nodes" in note for note in shape.notes) == noted
+    plate = fi.mesh.rectangle(1.0, 0.8, size=0.25)  # coordinates of one digit
+    assert not fi.mesh.load(written(tmp_path, plate.points.round(1), plate.cells)).notes
 
 
 def test_groups_of_med_are_edges_which_may_overlap(tmp_path):
