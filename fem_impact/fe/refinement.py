@@ -2,7 +2,6 @@
 
 import hashlib
 from dataclasses import dataclass, replace
-from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -134,9 +133,7 @@ def _pairs(
     else:
         n = n_modes - n_rigid
         many = system.mesh.dimension == 1 and n > FIRST_SLICE
-        if (
-            isinstance(system.section, Plate) and system.section.ribs
-        ):  # with the mass in the plane others may be among them
+        if system.ribbed:  # with the mass in the plane others may be among them
             n, limit = max(n, min(n + 2 * BLOCK, len(flexibility.inertial) - n_rigid)), None
         values, vectors = by_slices(flexibility, n) if many else _complete_eigenpairs(system, flexibility, n, limit)
         if system.strain is not None:  # more accurate than K if there are tiny triangles
@@ -261,15 +258,16 @@ def with_mass_in_plane(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Eigenvalues (n,) and vectors (n_dofs, n), with the mass in the plane of a ribbed plate.
 
-    Ribs hang far below the middle; without them it is left out, as formulas of shells do. The space is that of the
+    Without ribs it is left out, as formulas of shells do. The space is that of the
     vectors, of what their mass in the plane bends, and of what the mass of that bends. The inverse problem keeps the
     digits of the lowest.
     """
-    if not (isinstance(system.section, Plate) and system.section.ribs and len(values)):
+    if not system.ribbed or not len(values):
         return values, vectors
+    weigh = shallow.mass_in_plane(system)
     n = len(values)
     basis = fresh = vectors * values**-0.5
-    for mass in (partial(shallow.plane_mass, system), system.M.__matmul__):
+    for mass in (weigh, system.M.__matmul__):
         fresh = flexibility.solve(mass(fresh))
         energy = flexibility.products(np.column_stack([basis, fresh]))
         cross = energy[: -fresh.shape[1], -fresh.shape[1] :]
@@ -277,7 +275,7 @@ def with_mass_in_plane(
         some = size > SAME * size[-1]
         fresh = (fresh - basis @ cross) @ (turn[:, some] / np.sqrt(size[some]))
         basis = np.column_stack([basis, fresh])
-    kinetic = basis.T @ (system.M @ basis + shallow.plane_mass(system, basis))
+    kinetic = basis.T @ (system.M @ basis + weigh(basis))
     size, turn = (part[..., : -n - 1 : -1] for part in eigh(0.5 * (kinetic + kinetic.T)))
     return 1.0 / size, basis @ (turn / np.sqrt(size))
 

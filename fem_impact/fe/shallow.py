@@ -25,7 +25,7 @@ from collections.abc import Sequence
 from copy import copy
 from dataclasses import replace
 from functools import partial
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from scipy.sparse import block_diag, csc_matrix
@@ -171,18 +171,27 @@ def towards_bends(mesh: Mesh, section: Any, kinds: list[str], coarser: float) ->
     return mesh
 
 
+class PlaneMass(NamedTuple):
+    """The mass of what moves besides the deflection, in the frame: a matrix, less the square of another."""
+
+    whole: csc_matrix  # (n_dofs, n_dofs)
+    spared: np.ndarray  # (n_dofs, n_drifts)
+
+    def __call__(self, vectors: np.ndarray) -> np.ndarray:
+        """The mass times vectors (n_dofs, n)."""
+        return self.whole @ vectors - self.spared @ (self.spared.T @ vectors)
+
+
 def plane_mass(system: Any, vectors: np.ndarray) -> np.ndarray:
     """What moves besides the deflection in vectors (n_dofs, n), times its mass (n_dofs, n), in the frame."""
-    heavy, spared = mass_in_plane(system)
-    return heavy @ vectors - spared @ (spared.T @ vectors)
+    return mass_in_plane(system)(vectors)
 
 
-def mass_in_plane(system: Any) -> tuple[csc_matrix, np.ndarray]:
-    """The mass (n_dofs, n_dofs) of what moves besides the deflection, in the frame.
+def mass_in_plane(system: Any) -> PlaneMass:
+    """The mass of what moves besides the deflection.
 
     It is that of the displacements in the plane, of ribs at the height of their centroids and as they turn, and of what
-    the slope of the rise makes the surface larger. A free body stays where it is in its plane: that spares it the
-    square of the second result (n_dofs, n_drifts).
+    the slope of the rise makes the surface larger. A free body stays where it is in its plane, which spares it a part.
     """
     space, frame, dofs = system.space, system.frame, system.element_dofs
     X, x, dx = slopes.quadrature(system)
@@ -207,7 +216,7 @@ def mass_in_plane(system: Any) -> tuple[csc_matrix, np.ndarray]:
     whole = scatter(np.concatenate(local), dofs[:, np.concatenate(where)], system.expand.shape[0])
     drifting = whole @ space.drifts
     square = np.linalg.cholesky(space.drifts.T @ drifting)
-    return system.expand.T @ whole @ system.expand, system.expand.T @ np.linalg.solve(square, drifting.T).T
+    return PlaneMass(system.expand.T @ whole @ system.expand, system.expand.T @ np.linalg.solve(square, drifting.T).T)
 
 
 def shell_energies(system: Any, section: Any, vectors: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -71,6 +71,11 @@ class System(check.Brief):
         return self.rules.element
 
     @property
+    def ribbed(self) -> bool:
+        """Whether ribs stiffen it, which hang far below the middle and move along the plane as it bends."""
+        return isinstance(self.section, Plate) and bool(self.section.ribs)
+
+    @property
     def unresolved(self) -> float:
         """Approximate relative error [-] that singular corners leave on any mesh."""
         return max((corner.left for corner in self.corners.values()), default=0.0)

@@ -40,12 +40,12 @@ def read_mesh(path: Any, unit: str | None) -> tuple[
     names : dict, edge name -> set of sorted pairs of vertices
     notes : list of str, what was repaired
     heights : None if it is flat, else all its points (n, 2) [m] in its mean plane, and their heights (n,) [m] over it
-    rounding : float [m], how far the coordinates may be off by the digits that the file writes
+    off : float [m], how far nodes may lie beside where they are meant by the digits that the file writes
     """
     path = check.path("path", path)
     data = meshio_reader.read_raw(path)
     cells, nodes = _triangles(path, data)
-    raw, height, rounding, notes = _plane_points(path, data, unit)
+    raw, height, off, notes = _plane_points(path, data, unit)
     rows = np.array([[*pair, node] for pair, node in nodes.items()], int).reshape(-1, 3)
     a, b, middle = raw[rows].transpose(1, 0, 2)
     side, away = b - a, middle - 0.5 * (a + b)
@@ -65,7 +65,7 @@ def read_mesh(path: Any, unit: str | None) -> tuple[
     names = _named_pairs(path, data)
     named = [node for found in names.values() for pair in found for node in pair]  # lines may have nodes of their own
     level = np.zeros(len(raw)) if height is None else height
-    points, cells, number = _mend(path, raw, level, cells, named, 3.0 * rounding, notes)
+    points, cells, number = _mend(path, raw, level, cells, named, off, notes)
     middles = {_pair(number[a], number[b]): raw[node] for (a, b), node in nodes.items()}
     pairs = {name: {_pair(number[a], number[b]) for a, b in found} for name, found in names.items()}
     sides = sides_of(cells)[0]
@@ -73,9 +73,9 @@ def read_mesh(path: Any, unit: str | None) -> tuple[
         on = sides[np.isin(sides, number[group]).all(axis=1)]
         if len(on) or (number[group] < 0).all():  # a node of a triangle alone is for a force
             pairs.setdefault(name, set()).update(map(tuple, on.tolist()))
-    cells = _split_at_hanging(points, cells, pairs, 3.0 * rounding, notes)
+    cells = _split_at_hanging(points, cells, pairs, off, notes)
     _refuse_overlap(path, points, cells)
-    return points, cells, middles, pairs, notes, heights, rounding
+    return points, cells, middles, pairs, notes, heights, off
 
 
 def _pair(a: int, b: int) -> tuple[int, int]:
@@ -87,7 +87,7 @@ def _plane_points(
 ) -> tuple[np.ndarray, np.ndarray | None, float, list[str]]:
     """Coordinates (n_points, 2) [m] in the plane of the mesh, and heights (n_points,) [m] if it is curved.
 
-    The third is how far [m] the digits that the file writes may have moved each coordinate; then come notes.
+    The third is how far [m] nodes may be off by the digits that the file writes; then come notes.
     """
     name, points = path.name, data.points
     notes: list[str] = []
@@ -102,11 +102,11 @@ def _plane_points(
         bad = used[where.any(axis=1)]
         if bad.size:
             raise ValueError(f"{name} has a coordinate {what} at node {bad[0]}: {points[bad[0]]}; correct that node")
-    height, rounding = None, rounded_by(points[used])
+    height, off = None, 3.0 * rounded_by(points[used])  # what a sum of coordinates may be, not of one alone
     if points.shape[1] == 3:
         points, flat = _turned_level(points, used, notes)
         spread = np.ptp(points[used], axis=0)
-        if spread[flat] > max(FLAT * spread.max(), 4.0 * rounding):
+        if spread[flat] > max(FLAT * spread.max(), 2.0 * off):
             height = points[:, flat] - points[used, flat].mean()
         elif spread[flat] > SAME * spread.max():
             notes.append(f"the nodes lie up to {spread[flat]:.1g} apart across the plane of the mesh, which is ignored")
@@ -115,13 +115,13 @@ def _plane_points(
         points = np.delete(points, flat, axis=1)
     if unit is not None:
         scale = UNITS[check.one_of("unit", unit, UNITS)]
-        points, height, rounding = points * scale, None if height is None else height * scale, rounding * scale
+        points, height, off = points * scale, None if height is None else height * scale, off * scale
     else:
         refuse_millimetres(name, *np.ptp(points[used], axis=0))
-    share = 3.0 * rounding / float(np.ptp(points[used], axis=0).max() or 1.0)
+    share = off / float(np.ptp(points[used], axis=0).max() or 1.0)
     if share > 2e-4:  # five digits make it 1.5e-4 at most, if the origin is near
         notes.append(f"the digits of the file move nodes by up to {share:.1g} of its extent; write more of them")
-    return points, height, rounding, notes
+    return points, height, off, notes
 
 
 def _turned_level(points: np.ndarray, used: np.ndarray, notes: list[str]) -> tuple[np.ndarray, int]:

@@ -327,7 +327,7 @@ def load(path: Any, *, unit: str | None = None) -> Mesh:
     >>> round(fi.mesh.load("plate.msh").area, 6)  # m^2
     0.12
     """
-    points, cells, given, pairs, notes, heights, rounding = mesh_files.read_mesh(path, unit)
+    points, cells, given, pairs, notes, heights, off = mesh_files.read_mesh(path, unit)
     rim = mesh_files.boundary(cells)
     follower = {int(a): int(b) for a, b in rim}
     loops = [np.array([(a, follower[a]) for a in loop]) for loop in mesh_files.loops_of(rim)]
@@ -335,7 +335,7 @@ def load(path: Any, *, unit: str | None = None) -> Mesh:
     facets = np.concatenate(loops)
     number = {(min(a, b), max(a, b)): i for i, (a, b) in enumerate(facets.tolist())}
     known = {number[pair]: at for pair, at in given.items() if pair in number}
-    points, middles, tangents, curvatures = smooth_edges.recover_rim(points, loops, known, rounding)
+    points, middles, tangents, curvatures = smooth_edges.recover_rim(points, loops, known, off)
     n_curved = np.count_nonzero(is_curved(points[facets], middles))
     if n_curved and not given:
         notes.append(f"{n_curved} sides of the rim were replaced by smooth curves through their ends")
@@ -358,7 +358,7 @@ def load(path: Any, *, unit: str | None = None) -> Mesh:
         points, cells, facets, edges, middles, tangents, curvatures,
         size=float(mesh_files.side_lengths(points, cells).max()) / LONGEST, size_stated=False,
         notes=tuple(f"{Path(path).name}: {note}" for note in notes),
-        rise=None if heights is None else table(mesh_files.moved_onto(heights[0], points, 3.0 * rounding), heights[1]),
+        rise=None if heights is None else table(mesh_files.moved_onto(heights[0], points, off), heights[1]),
     )  # fmt: skip
     return replace(made, recipe=partial(_resize_mesh, made))
 

@@ -34,7 +34,7 @@ class Blur(NamedTuple):
 
 
 def recover_rim(
-    points: np.ndarray, loops: list[np.ndarray], given: dict[int, np.ndarray], rounding: float = 0.0
+    points: np.ndarray, loops: list[np.ndarray], given: dict[int, np.ndarray], written: float = 0.0
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
     """Recover the curve that a rim was drawn with.
 
@@ -47,8 +47,8 @@ def recover_rim(
     loops : list of ndarray, shape (n, 2)
         Facets of each closed loop in order, body on the left; facet numbers run on from loop to loop.
     given : dict, facet number -> its middle (2,) [m], where the file has quadratic triangles
-    rounding : float [m]
-        How far rounding may have moved each coordinate.
+    written : float [m]
+        How far points may lie beside the rim by the digits of their coordinates.
     """
     points, n = points.copy(), sum(len(loop) for loop in loops)
     middles, tangents, curvatures = np.zeros((n, 2)), np.zeros((n, 2, 2)), np.zeros((n, 2))
@@ -57,7 +57,7 @@ def recover_rim(
         numbers = np.arange(start, start + len(loop))
         start += len(loop)
         rim = points[loop[:, 0]]
-        off = _blur(rim, 3.0 * rounding).off
+        off = _blur(rim, written).off
         for run, closed in _runs(_corners(rim, off)):
             facets, ends = numbers[run], np.append(loop[run, 0], loop[run[-1], 1])
             known = np.array([given[f] for f in facets]) if all(f in given for f in facets) else None
@@ -208,8 +208,7 @@ def _pieces(points: np.ndarray, closed: bool, blur: Blur) -> tuple[np.ndarray, t
     if not closed and _lie_on_a_line(points, blur.off):
         return points[[0, -1]][None], None
     turn = _turns(points)[1:-1]
-    origin, radius = _circle(points)
-    away = np.abs(np.linalg.norm(points - origin, axis=1) - radius).max()
+    origin, radius, away = _circle(points)
     straight = np.abs(turn).max(initial=0.0) <= STRAIGHT or len(points) < 4
     if not straight and away < max(ROUND * radius, blur.off if closed and blur.scattered else blur.written):
         return points[:, None], (origin, radius)
@@ -298,8 +297,7 @@ def _arc_ends(place: np.ndarray, turn: np.ndarray, off: float) -> np.ndarray:
     for run, closed in _runs(~(near & bent & np.roll(bent, -1) & (turn * np.roll(turn, -1) > 0.0))):
         for first, last in ((-1, 2), (0, 2), (-1, 1), (0, 1)) if not closed and len(run) > 2 else ():
             arc = np.arange(run[1] + first, run[1] + len(run) - 2 + last + 1) % len(place)
-            origin, radius = _circle(place[arc])
-            away = np.abs(np.linalg.norm(place[arc] - origin, axis=1) - radius).max()
+            _, radius, away = _circle(place[arc])
             if len(arc) > 4 and np.abs(turn[arc[1:-1]].sum()) > CORNER and away < max(ROUND * radius, off):
                 ends[arc[[0, -1]]] = True
                 break
@@ -331,9 +329,8 @@ def _fit(
     bent = np.abs(cross_product(unit[:-1], unit[1:])).max(initial=0.0) > STRAIGHT
     if (not bent and bulge < STRAIGHT) or (known is None and len(chord) < 3):
         return centre, np.stack([unit, unit], axis=1), np.zeros((len(chord), 2))
-    on_it = place if known is None else np.concatenate([place, known])
-    origin, radius = _circle(on_it)
-    if np.abs(np.linalg.norm(on_it - origin, axis=1) - radius).max() < max(ROUND * radius, off):
+    origin, radius, away = _circle(place if known is None else np.concatenate([place, known]))
+    if away < max(ROUND * radius, off):
         out = (place - origin) / np.linalg.norm(place - origin, axis=1)[:, None]
         left = np.sign(cross_product(out[0], out[1]))  # 1 if the rim turns left (convex), else -1
         tangent = left * np.column_stack([-out[:, 1], out[:, 0]])
@@ -359,15 +356,17 @@ def _fit(
     return known, tangents, curvatures
 
 
-def _circle(place: np.ndarray) -> tuple[np.ndarray, float]:
-    """Centre (2,) and radius of the least-squares circle through points (n, 2)."""
+def _circle(place: np.ndarray) -> tuple[np.ndarray, float, float]:
+    """Centre (2,) and radius of the least-squares circle through points (n, 2), and how far they lie beside it."""
     middle = place.mean(axis=0)
     local = place - middle
     scale = np.abs(local).max()
     local = local / scale
     rows = np.column_stack([2.0 * local, np.ones(len(local))])
     solution = np.linalg.lstsq(rows, (local**2).sum(axis=1), rcond=None)[0]
-    return middle + scale * solution[:2], float(scale * np.sqrt(max(solution[2] + solution[:2] @ solution[:2], 0.0)))
+    radius = float(np.sqrt(max(solution[2] + solution[:2] @ solution[:2], 0.0)))
+    away = float(np.abs(np.linalg.norm(local - solution[:2], axis=1) - radius).max())
+    return middle + scale * solution[:2], scale * radius, scale * away
 
 
 def _polynomials(place: np.ndarray, closed: bool) -> tuple[np.ndarray, np.ndarray]:

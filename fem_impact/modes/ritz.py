@@ -26,7 +26,6 @@ from .._base.rounding import SAME
 from ..fe import plausible, point_load
 from ..fe.assembly import System
 from ..fe.eigenvalues import Flexibility, factorise, one_thread
-from ..fe.section import Plate
 from ..fe.shallow import mass_in_plane
 from .modal import Damping, Modes, damping_ratios
 from .shapes import ElementShapes
@@ -93,11 +92,11 @@ class Krylov:
         self._moving = system.M @ system.rigid
         self._heavy, self._spared = system.M, np.zeros((system.n_dofs, 0))  # the mass, less the square of the second
         self._eased, self._pushed = self._spared, system.rigid
-        if ribbed := isinstance(system.section, Plate) and bool(system.section.ribs):  # they hang far below the middle
-            more, self._spared = mass_in_plane(system)
-            self._heavy = system.M + more
+        if system.ribbed:
+            inert = mass_in_plane(system)
+            self._heavy, self._spared = system.M + inert.whole, inert.spared
         self._factors = factorise(system.K + self.shift * self._heavy)
-        if ribbed:
+        if system.ribbed:
             yields, pushed = self._factors.solve(self._spared), self._factors.solve(self._moving)
             left = np.eye(yields.shape[1]) / self.shift - self._spared.T @ yields
             self._eased = yields @ np.linalg.inv(left)  # (n_dofs, n_drifts)
