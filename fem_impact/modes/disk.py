@@ -1,5 +1,6 @@
 """Modes of a circular plate: Bessel functions, with the static deflection by Boggio's formula and what edges add."""
 
+import math
 from dataclasses import dataclass
 from typing import Any
 
@@ -13,7 +14,7 @@ from ..fe import plausible
 from ..fe.section import KINDS, Plate
 from .modal import Damping, Modes
 from .request import check_beyond_rigid, check_number, request
-from .shapes import ClosedShapes
+from .shapes import ClosedShapes, gauss
 
 MOST_OF_DISK = 50_000  # [-] largest number of modes of a disk; each needs a root search
 
@@ -118,6 +119,13 @@ class DiskShapes(ClosedShapes, check.Brief):
             a, b = 1 + ring * spokes + here, 1 + ring * spokes + there
             cells += [np.column_stack([a, a + spokes, b + spokes]), np.column_stack([a, b + spokes, b])]
         return points, np.vstack(cells)
+
+    def quadrature(self, wave: float) -> tuple[np.ndarray, np.ndarray]:
+        r, dr = gauss(self.radius, wave)
+        spokes = 16 + math.ceil(1.2 * wave * self.radius)
+        angle = 2.0 * np.pi * np.arange(spokes) / spokes
+        places = np.stack([np.outer(r, np.cos(angle)), np.outer(r, np.sin(angle))], axis=-1)
+        return places.reshape(-1, 2), np.repeat(2.0 * np.pi / spokes * r * dr, spokes)
 
 
 def _green(edge: str, nu: float, place: np.ndarray, load: np.ndarray) -> float:

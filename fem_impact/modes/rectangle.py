@@ -14,7 +14,7 @@ from ..fe import plausible
 from ..fe.section import Plate
 from .modal import Damping, Modes
 from .request import check_number, request
-from .shapes import ClosedShapes
+from .shapes import ClosedShapes, gauss
 
 # [-] fact: image forces beyond each shorter side of a hinged plate until rounding, as the n-th gives exp(-2 pi n)
 IMAGES = math.ceil(-math.log(EPSILON) / (2.0 * np.pi))
@@ -75,6 +75,10 @@ class RectangleShapes(ClosedShapes, check.Brief):
 
     def grid(self) -> tuple[np.ndarray, np.ndarray]:
         return _rectangle_grid(self.length, self.width)
+
+    def quadrature(self, wave: float) -> tuple[np.ndarray, np.ndarray]:
+        (x, dx), (y, dy) = gauss(self.length, wave), gauss(self.width, wave)
+        return np.column_stack([np.repeat(x, len(y)), np.tile(y, len(x))]), np.outer(dx, dy).reshape(-1)
 
 
 @lru_cache(maxsize=4)  # [-] rectangles; a gradient asks for one several times

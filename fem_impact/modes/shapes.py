@@ -1,5 +1,6 @@
 """Shapes of modes: where a body is, how it deflects under a force, and the rest of it that moves on its own."""
 
+import math
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any, Protocol
@@ -13,6 +14,8 @@ from .._base.rounding import SAME
 from ..fe import point_load
 from ..fe.assembly import System
 from ..fe.eigenvalues import Flexibility
+from ..fe.slopes import quadrature
+from ..mesh.meshes import sizes
 
 REMEMBERED = 16  # [-] points whose shapes and static deflections a body keeps, because one blow needs them many times
 
@@ -67,6 +70,15 @@ class Shapes(Protocol):
     def grid(self) -> tuple[np.ndarray, np.ndarray]:
         """Points (n_points, dimension) [m] and cells (n_cells, dimension + 1) for drawing the body."""
 
+    def quadrature(self, wave: float) -> tuple[np.ndarray, np.ndarray]:
+        """Points (n, dimension) [m] and sizes (n,) to sum over the body what has waves of up to so many rad/m.
+
+        Of shapes known at points only, those points.
+        """
+        points, cells = self.grid()
+        shares = np.repeat(sizes(points, cells) / cells.shape[1], cells.shape[1])  # of a cell, one for each corner
+        return points, np.bincount(cells.reshape(-1), shares, minlength=len(points))
+
 
 class ClosedShapes(Shapes, Protocol):
     """What closed forms share: each of their arrays has one row per mode."""
@@ -101,6 +113,9 @@ class WrappedShapes(Shapes, check.Brief):
 
     def grid(self) -> tuple[np.ndarray, np.ndarray]:
         return self.base.grid()
+
+    def quadrature(self, wave: float) -> tuple[np.ndarray, np.ndarray]:
+        return self.base.quadrature(wave)
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -253,6 +268,12 @@ class SampledShapes(Shapes, check.Locked):
         return self.points, np.arange(len(self.points))[:, None] if self.cells is None else self.cells
 
 
+def gauss(length: float, wave: float) -> tuple[np.ndarray, np.ndarray]:
+    """Gauss points (n,) [m] from 0 to a length [m] and weights (n,) [m], for waves of up to so many rad/m."""
+    node, weight = np.polynomial.legendre.leggauss(8 + math.ceil(0.3 * wave * length))
+    return 0.5 * length * (node + 1.0), 0.5 * length * weight
+
+
 def compliance_errors(shapes: Shapes, points: np.ndarray) -> dict[str, np.ndarray]:
     """Errors (n_points,) [m/N] of the compliance at points, by what was not stated or had to be found, see `Modes`."""
     whole, dent = np.abs(shapes.compliance(points).diagonal()), shapes.dent(points)[:, 1]
@@ -271,6 +292,12 @@ class ElementShapes(Shapes):
 
     def grid(self) -> tuple[np.ndarray, np.ndarray]:
         return self.system.mesh.points, self.system.mesh.cells
+
+    def quadrature(self, wave: float) -> tuple[np.ndarray, np.ndarray]:
+        length = self.system.frame.length
+        side = length * float(2.0 * quadrature(self.system, 1).dx.max()) ** 0.5  # of the largest triangle
+        found = quadrature(self.system, 1 + math.ceil(0.6 * wave * side))
+        return self.system.frame.to_metres(found.x.reshape(-1, 2)), length**2 * found.dx.reshape(-1)
 
 
 @dataclass(frozen=True, eq=False, repr=False)

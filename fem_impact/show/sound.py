@@ -301,9 +301,10 @@ def radiate(
 
     Notes
     -----
-    Rayleigh's integral ``p = rho/(2 pi) int a(x, t - R/c) / R dS`` over the whole plate. After the blow each mode is
-    exact in time; while the first waves arrive, acceleration is a finite difference of velocity. The air does not
-    act back on the plate, and rigid motions are left out.
+    Rayleigh's integral ``p = rho/(2 pi) int a(x, t - R/c) / R dS`` over the whole plate, to 1e-3 of each mode but for
+    those whose lobes cancel until nobody hears them. After the blow each mode is exact in time; while the first waves
+    arrive, acceleration is a finite difference of velocity. The air does not act back on the plate, and rigid motions
+    are left out.
 
     A curved plate radiates as if it lay flat in the wall. Of domes that rise by h, up to a fifth of their radius, this
     changes the pressure by at most 2 pi h / wavelength of what all parts would give in step: 0.18 at 1 kHz for 1 cm.
@@ -326,13 +327,15 @@ def radiate(
     place = beside(listener)
     density, speed = _air(air)
     rate, audible = _audible(response, rate)
-    points, cells = sampling.grid(modes)
-    thirds = np.repeat(sizes(points, cells) / 3.0, 3)  # of a triangle, which belong to each corner
-    areas = np.bincount(cells.reshape(-1), thirds, minlength=len(points))
+    # waves of the modes, by Weyl's law, and of the air multiply; near the plate what is below is louder, and to limit
+    # the cost that counts as far as 80 points across the plate resolve it
+    side = sizes(*sampling.grid(modes)).sum() ** 0.5
+    wave = np.sqrt(4.0 * np.pi * np.count_nonzero(audible)) / side + modes.omega[audible].max(initial=0.0) / speed
+    points, areas = modes.shapes.quadrature(wave + min(5.0 / abs(place[2]), 160.0 / side))
     weights = density / (2.0 * np.pi) * np.sign(place[2]) * areas
     way = np.sqrt(((points - place[:2]) ** 2).sum(axis=1) + place[2] ** 2)  # (n_points,) [m]
     # a point stands for a disk of its area, whose mean of 1 / R in its middle is 2 over its radius
-    shapes = modes.shapes.at(points)[:, audible] * (weights / np.hypot(way, np.sqrt(areas / (4.0 * np.pi))))[:, None]
+    shapes = modes.shapes.at(points)[:, audible] * (weights / np.maximum(way, np.sqrt(areas / (4.0 * np.pi))))[:, None]
     times = _times(response, audible, duration, rate)
     pressure = _pressure(response, times, audible, {2: shapes}, way / speed, 1.0 / rate)
     return _scaled(pressure, rate, LOUDEST, "Pa", normalise)
@@ -584,6 +587,7 @@ def _arrival(
         acceleration = momentum
         for _ in range(order - 1):
             acceleration = np.gradient(acceleration, fine[1] - fine[0], axis=0)
-        for shape, late in zip(shapes, delay):
-            pressure[part] += np.interp(times[part] - late, fine, acceleration @ shape, left=0.0)
+        for some in np.array_split(np.arange(len(delay)), 1 + len(delay) // 64):  # to limit the memory
+            for moved, late in zip(shapes[some] @ acceleration.T, delay[some]):
+                pressure[part] += np.interp(times[part] - late, fine, moved, left=0.0)
     return pressure
