@@ -24,10 +24,7 @@ class Edge:
 
 def edges(mesh: Mesh) -> list[Edge]:
     """The named edges of a mesh, in its order; `WHOLE` comes last."""
-    ends = mesh.points[mesh.facets]  # (n_facets, 2, 2), or (2, 1, 1) on a beam
-    # the chord errs by length cubed, the two chords through the middle by a quarter of that: the difference cancels it
-    halves = np.linalg.norm(ends - mesh.middles[:, None], axis=2).sum(axis=1)
-    lengths = (4.0 * halves - mesh.chords) / 3.0
+    lengths = mesh.lengths
     names = [*(name for name in mesh.edges if name != WHOLE), WHOLE]
     sets = {name: frozenset(np.asarray(mesh.edges[name]).tolist()) for name in names}
     found = []

@@ -11,7 +11,7 @@ import numpy as np
 
 from .._base import check, markup
 from . import drawings, lines, mesh_files, sketch, smooth_edges
-from .facets import Curves, divide_facets, is_curved
+from .facets import Curves, cross_product, divide_facets, is_curved
 from .loops import TURN, Bezier, Outline, circle, extent, polyline, segment, signed_area, straight_loop, why_crossed
 from .rise import table
 from .triangulation import triangulate
@@ -67,14 +67,25 @@ class Mesh(check.Locked):
         return np.linalg.norm(ends[:, -1] - ends[:, 0], axis=1)
 
     @property
+    def lengths(self) -> np.ndarray:
+        """Lengths (n_facets,) [m] of the facets along curved edges; zero on a line."""
+        # the chord errs by length cubed, the two chords through the middle by a quarter of that: the difference cancels
+        halves = np.linalg.norm(self.points[self.facets] - self.middles[:, None], axis=2).sum(axis=1)
+        return (4.0 * halves - self.chords) / 3.0
+
+    @property
     def perimeter(self) -> float:
-        """Length of the boundary [m], measured along the chords of curved edges."""
-        return float(self.chords.sum())
+        """Length of the boundary [m]."""
+        return float(self.lengths.sum())
 
     @property
     def area(self) -> float:
-        """Area [m^2] of a plate, up to the chords of curved edges; length [m] of a beam."""
-        return float(sizes(self.points, self.cells).sum())
+        """Area [m^2] of a plate, within curved edges to 1e-4 at worst; length [m] of a beam."""
+        inside = float(sizes(self.points, self.cells).sum())
+        if self.dimension == 1:
+            return inside
+        a, b = self.points[self.facets].swapaxes(0, 1)  # a parabola through the middle lies beside each chord
+        return inside + 2.0 / 3.0 * float(cross_product(self.middles - 0.5 * (a + b), b - a).sum())
 
     def pieces(self, path: Any) -> np.ndarray:
         """Straight pieces (n, 2, 2) [m] of a path (n_points, 2) [m] or, given a name, of that edge."""

@@ -122,14 +122,9 @@ class Surroundings:
         start, along = ends[:, :-1].reshape(-1, 2), np.diff(ends, axis=1).reshape(-1, 2)
         length = np.linalg.norm(along, axis=1)
         away = distance(at, start, start + along)
-        chord = ends[:, 2] - ends[:, 0]
-        bulge = ends[:, 1] - 0.5 * (ends[:, 0] + ends[:, 2])
-        segments = 2.0 / 3.0 * float(cross_product(bulge, chord).sum())  # body on the left
         one, two = start - at, start + along - at
         sectors = np.column_stack([cross_product(one, two), angles(one, two)])
-        return cls(
-            mesh.area + segments, float(length.sum()), float(away.min()), np.column_stack([away, length]), sectors
-        )
+        return cls(mesh.area, float(length.sum()), float(away.min()), np.column_stack([away, length]), sectors)
 
     def local(self, reach: float, free: np.ndarray) -> tuple[float, float]:
         """Factor [-] of the mobility by edges within a squared ``reach`` [m**2], and the squared distance of others.

@@ -228,10 +228,11 @@ class Target:
 
     @property
     def mass(self) -> float:
-        """Mass [kg] of the body as struck, with straight edges between the vertices of its mesh."""
+        """Mass [kg] of the body as struck."""
         assert self.mesh is not None and self.section is not None
         points, cells = self.mesh.points, self.mesh.cells
-        own = float(sizes(points, cells) @ self.section.inertia(points[cells].mean(axis=1)))
+        within = sizes(points, cells)
+        own = self.mesh.area * float(within @ self.section.inertia(points[cells].mean(axis=1)) / within.sum())
         return self.scale.get("mass", own + sum(mass for _, mass in self.point_masses))
 
     def count_below(self, frequency: float) -> float:

@@ -120,7 +120,7 @@ def test_dxf_lines_and_arcs_in_any_order_make_a_stadium(tmp_path):
 
     shape = fi.mesh.outline(dxf(tmp_path, draw, units=4))
     exact = 1.0 + 0.25 * np.pi - 0.01 * np.pi
-    assert_allclose(fi.mesh.outline(dxf(tmp_path, draw, units=4), size=0.02).area, exact, rtol=1e-3)  # chords
+    assert_allclose(fi.mesh.outline(dxf(tmp_path, draw, units=4), size=0.02).area, exact, rtol=1e-5)  # parabolas
     assert set(shape.edges) == {"edge0", "hole0", "outer", "boundary"}  # smooth all round: one edge
 
 
@@ -294,7 +294,7 @@ def test_a_last_point_that_rounding_left_beside_the_first_is_none():
 @pytest.mark.filterwarnings("error")
 @pytest.mark.parametrize("away", [0.0, 1e5])
 def test_a_curve_of_many_points_may_lie_far_away(away):
-    assert_allclose(fi.mesh.outline(ELLIPSE + away, size=0.01).area, np.pi * 0.2 * 0.15, rtol=1e-3)  # chords
+    assert_allclose(fi.mesh.outline(ELLIPSE + away, size=0.01).area, np.pi * 0.2 * 0.15, rtol=1e-5)  # parabolas
 
 
 def test_a_disk_traced_in_pixels_is_round():
