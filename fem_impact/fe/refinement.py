@@ -311,11 +311,15 @@ def size_for(system: System, n_modes: int | None, max_frequency: float | None, t
         excess = lambda log: np.log(factor / tolerance) + 8.0 * log - np.log1p((np.exp(log) / bend) ** 3)  # noqa: E731
         size = float(np.exp(brentq(excess, -10.0, 10.0))) / wave
     elif system.rules.graded:  # a few modes cost little, so find them more accurately
-        affordable = (2.3 * system.mesh.area / CHEAP_CELLS) ** 0.5
-        size = min(size, max(affordable, 1.1 / wave))  # errors of 2e-7, clamped 1e-5
+        size = min(size, max(affordable_size(system.mesh), 1.1 / wave))  # errors of 2e-7, clamped 1e-5
     if isinstance(system.section, Plate) and system.section.tension:
         size = min(size, layer_size(system.frame.stiffness, system.section.tension, system.frame.length))
     return size
+
+
+def affordable_size(mesh: Mesh) -> float:
+    """Size [m] of triangles that are so few on a plate that larger ones save nothing."""
+    return (2.3 * mesh.area / CHEAP_CELLS) ** 0.5
 
 
 def layer_size(stiffness: float, tension: float, extent: float) -> float:

@@ -149,7 +149,7 @@ def towards_bends(mesh: Mesh, section: Any, kinds: list[str], coarser: float) ->
     mesh = ribs.around_ends(mesh, section.ribs, kinds) if section.ribs else mesh
     share = np.linspace(0.0, 1.0, 9)[:, None, None, None]
     between = np.vander(share[1::2].ravel(), 5) @ np.linalg.inv(np.vander(share[::2].ravel(), 5))  # of a quartic
-    while section.rise is not None and len(mesh.cells) < MOST_BENT:
+    while section.rise is not None:
         corner = mesh.points[mesh.cells]
         places = corner + share * (np.roll(corner, -1, axis=1) - corner)
         z = check.field("rise", section.rise, places.reshape(-1, 2), "m").reshape(9, -1, 3)
@@ -161,6 +161,8 @@ def towards_bends(mesh: Mesh, section: Any, kinds: list[str], coarser: float) ->
         uneven = (sag > 0.5 * least) | (kink > KINK * least)
         if not uneven.any():
             return mesh
+        if len(mesh.cells) >= MOST_BENT:
+            break
         mesh = splitting.divided_across(mesh, uneven)[0]
     if section.rise is not None and coarser >= 1.0:
         where = ", ".join(f"{x:.3g}" for x in corner.mean(axis=1)[uneven][0])

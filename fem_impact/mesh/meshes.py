@@ -11,7 +11,7 @@ import numpy as np
 
 from .._base import check, markup
 from . import drawings, lines, mesh_files, sketch, smooth_edges
-from .facets import Curves, cross_product, divide_facets, is_curved
+from .facets import Curves, angles, cross_product, divide_facets, is_curved
 from .loops import TURN, Bezier, Outline, circle, extent, polyline, segment, signed_area, straight_loop, why_crossed
 from .rise import table
 from .triangulation import triangulate
@@ -406,7 +406,7 @@ def save(path: Any, mesh: Mesh) -> None:
 def mesh_with_holes(mesh: Mesh, holes: Sequence[tuple[np.ndarray, float]], *, size: float | None = None) -> Mesh:
     """The mesh of a plate with round holes, each a centre (2,) [m] and a radius [m]; their edges are "clamp0" ...
 
-    Edges keep their names and curves; a mesh from a file keeps its own vertices on the rim, not inside.
+    Edges keep their names and curves; a mesh from a file keeps its own vertices on curved edges only.
     """
     extent = float(np.ptp(mesh.points, axis=0).max())
     least = SMALLEST_HOLE * extent
@@ -430,7 +430,7 @@ def mesh_with_holes(mesh: Mesh, holes: Sequence[tuple[np.ndarray, float]], *, si
 def mesh_along_lines(mesh: Mesh, paths: Sequence[np.ndarray], *, size: float | None = None) -> Mesh:
     """The mesh of a plate in which sides of triangles follow paths (n_points, 2) [m], straight between their points.
 
-    Edges keep their names and curves; a mesh from a file keeps its own vertices on the rim, not inside.
+    Edges keep their names and curves; a mesh from a file keeps its own vertices on curved edges only.
     """
     before = mesh.recipe.args[1] if isinstance(mesh.recipe, partial) and mesh.recipe.func is mesh_along_lines else ()
     if size is None and all(any(np.array_equal(path, other) for other in before) for path in paths):
@@ -450,7 +450,10 @@ def _fill_outline(
     arrays = triangulate(whole, size, within)
     parts = arrays["edges"]
     if _outline(mesh) is None:
-        rim = {name: np.concatenate([parts[str(i)] for i in numbers]) for name, numbers in mesh.edges.items()}
+        rim = {
+            name: np.concatenate([parts[str(i)] for i in numbers if str(i) in parts])
+            for name, numbers in mesh.edges.items()
+        }
         added = {name: numbers for name, numbers in parts.items() if not name.isdigit() and name not in rim}
         arrays["edges"] = added | rim
     arrays["edges"]["boundary"] = np.arange(len(arrays["facets"]))
@@ -473,14 +476,22 @@ def _outline(mesh: Mesh) -> Outline | None:
 
 
 def _facets_outline(mesh: Mesh) -> Outline:
-    """The rim of a mesh, each facet a piece that is called by its number."""
-    ends = mesh.points[mesh.facets]
+    """The rim of a mesh: curved facets, and straight lines of them with the same names, each called by a number."""
+    ends, curved = mesh.points[mesh.facets], mesh.curved
     control = Curves(ends, mesh.middles, mesh.tangents, mesh.curvatures).controls()
-    pieces = [
-        Bezier(curve if bent else end, str(i)) for i, (curve, bent, end) in enumerate(zip(control, mesh.curved, ends))
-    ]
-    start = {int(facet[0]): piece for facet, piece in zip(mesh.facets, pieces)}
-    loops = [tuple(start[vertex] for vertex in loop) for loop in mesh_files.loops_of(mesh.facets)]
+    named = np.array([np.isin(np.arange(len(ends)), facets) for facets in mesh.edges.values()])
+    number, along = {int(facet[0]): i for i, facet in enumerate(mesh.facets)}, ends[:, 1] - ends[:, 0]
+    loops = []
+    for vertices in mesh_files.loops_of(mesh.facets):
+        loop = np.array([number[vertex] for vertex in vertices])
+        before = np.roll(loop, 1)
+        straight = ~curved[loop] & (np.abs(angles(along[before], along[loop])) <= smooth_edges.STRAIGHT)
+        starts = np.flatnonzero(~straight | curved[before] | (named[:, loop] != named[:, before]).any(axis=0))
+        pieces = [
+            Bezier(control[i], str(i)) if curved[i] else segment(ends[i, 0], ends[last, 1], str(i))
+            for i, last in zip(loop[starts], loop[np.roll(starts, -1) - 1])
+        ]
+        loops.append(tuple(pieces))
     return Outline(loops[0], tuple(loops[1:]))
 
 

@@ -60,13 +60,16 @@ def first_count(target: Target, resonance: float, tolerance: float) -> int:
 
 
 def size_for(target: Target, resonance: float, tolerance: float) -> float:
-    """Element size [m] of the first mesh for a contact with this resonance [Hz]; that of the user's mesh if stated."""
+    """Element size [m] of the first mesh for a contact with this resonance [Hz]; that of the user's mesh if stated.
+
+    A mesh file much finer than needed gives way to a coarser mesh.
+    """
     mesh, section = target.mesh, target.section
     assert mesh is not None and isinstance(section, Plate)
     if target.size_stated:
         return mesh.size
     highest = resonance * _stricter(1.6, 0.37, tolerance) / target.stretch
-    size = min(mesh.size, ARGYRIS.wave / target.wave(highest))
+    size = min(max(mesh.size, refinement.affordable_size(mesh)), ARGYRIS.wave / target.wave(highest))
     if section.tension:
         stiffness = float(section.stiffness(mesh.points[mesh.cells].mean(axis=1))[:, 0, 0].max())
         size = min(size, refinement.layer_size(stiffness, section.tension, float(np.ptp(mesh.points, axis=0).max())))

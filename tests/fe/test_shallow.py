@@ -9,6 +9,7 @@ from comparing import refusing
 from references_panels import BLADE, Order, Panel, levy_omegas
 
 import fem_impact as fi
+from fem_impact.fe import shallow
 
 E, NU, RHO = 70e9, 0.3, 2700.0
 ALUMINIUM = fi.Material(E=E, nu=NU, rho=RHO)
@@ -166,6 +167,18 @@ def test_bodies_that_no_rise_fits_are_refused_by_name():
         fi.find_modes(bare, n_modes=4)
     with pytest.raises(ValueError, match="section must be a Plate for rise"):
         fi.assemble(fi.mesh.line(1.0), fi.Beam.circular(ALUMINIUM, diameter=0.01), rise=CAP)
+
+
+def test_a_mesh_that_is_fine_enough_already_may_have_any_number_of_triangles(monkeypatch):
+    """Beyond the number up to which a rise divides triangles, none was even looked at."""
+    mesh, plate = fi.mesh.rectangle(0.4, 0.3), fi.Plate(fi.Material(E=7e10, nu=0.3, rho=2700.0), 1e-3, rise=gentle)
+    monkeypatch.setattr(shallow, "MOST_BENT", len(mesh.cells))
+    assert fi.assemble(mesh, plate).n_dofs > 0
+    refusing(lambda: fi.assemble(mesh, replace(plate, rise=lambda x: 1e3 * gentle(x))), "rise must be smoother")
+
+
+def gentle(points):
+    return 1e-4 * np.sin(5.0 * points[:, 0])
 
 
 def test_a_curved_plate_states_what_its_corners_miss_as_a_flat_one_does():

@@ -223,6 +223,19 @@ def test_smaller_triangles_fill_the_same_rim(factor):
     assert_allclose(fine.area, plate.area, rtol=1e-4)  # parabolas follow the curve
 
 
+def test_larger_triangles_have_longer_sides_on_straight_edges(tmp_path):
+    """Sides of a file on a straight edge are one line, as far as they have the same names; curves keep their facets."""
+    made = fi.mesh.rectangle(1.2, 0.8, size=0.05)
+    half = made.edges["bottom"][made.points[made.facets[made.edges["bottom"]]].max(axis=(1, 2)) < 0.61]
+    fi.mesh.save(tmp_path / "fine.msh", replace(made, edges=made.edges | {"half": half}))
+    fine = fi.mesh.load(tmp_path / "fine.msh")
+    coarse = fine.refined(0.25)
+    assert len(coarse.facets) < 0.35 * len(fine.facets)
+    assert set(coarse.edges) == set(fine.edges) and "half" in fine.edges
+    for name, facets in coarse.edges.items():
+        assert coarse.lengths[facets].sum() == pytest.approx(fine.lengths[fine.edges[name]].sum(), rel=1e-12), name
+
+
 ORDER = np.random.default_rng(3).permutation(len(GOOD.points))
 N, HALF = len(GOOD.points), len(GOOD.cells) // 2
 

@@ -333,3 +333,16 @@ def test_views_of_a_body_are_as_soft_as_the_body_is_there():
         # 1e-5 by the elements that shrink towards the blow
         np.testing.assert_allclose(modes.modal_compliance([point]), closed.shapes.compliance(point[None]), rtol=1e-4)
         assert list(modes.poorer) == ["mesh", "truncation"]
+
+
+def test_a_mesh_file_much_finer_than_needed_costs_no_more_than_a_mesh_made_here(tmp_path):
+    """Its own triangles were kept, or those that its many sides on the rim force, and blows refused as too large."""
+    plate, law = fi.Plate(fi.Material(E=2e11, nu=0.3, rho=7850.0), 1e-3), fi.Contact.hertz(1e6)
+    fi.mesh.save(tmp_path / "fine.msh", fi.mesh.rectangle(1.2, 0.8, size=0.03))
+    planned = []
+    for mesh in (fi.mesh.load(tmp_path / "fine.msh"), fi.mesh.rectangle(1.2, 0.8)):
+        system = fi.assemble(mesh, plate, {"boundary": "hinged"})
+        planned.append(fi.plan(system, fi.Striker.rigid(0.1), law, at=(0.4, 0.3), speed=1.0, tolerance=1e-2))
+    # one has elements of a size that 700 triangles allow, the other of a twelfth of its length
+    assert planned[0].n_dofs < 2.0 * planned[1].n_dofs
+    assert planned[0].run().response.restitution == pytest.approx(planned[1].run().response.restitution, abs=1e-3)
