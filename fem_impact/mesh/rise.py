@@ -12,10 +12,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 from scipy.interpolate import CloughTocher2DInterpolator
-from scipy.spatial import cKDTree
+from scipy.sparse import bsr_array, diags_array
+from scipy.sparse.linalg import cg
+from scipy.spatial import Delaunay, cKDTree
 
 from .._base import check
-from .._base.rounding import SAME
+from .._base.rounding import ROUNDING, SAME
 
 Rise = partial[np.ndarray]
 
@@ -56,16 +58,58 @@ class _Heights:
 
     @cached_property
     def _smooth(self) -> Any:
-        return CloughTocher2DInterpolator(self.points, self.heights)
+        place, which = np.unique(self.points, axis=0, return_index=True)
+        triangles, height = Delaunay(place), self.heights[which]
+        smooth = CloughTocher2DInterpolator(triangles, height, tol=np.inf)  # its own slopes have no bend at the rim
+        smooth.grad[:, 0] = _spline_slopes(triangles, height, _fitted_polynomials(place, height, 2)[:, 2:])
+        return smooth
 
     def __call__(self, points: np.ndarray) -> np.ndarray:
         found = self._smooth(points)
         beyond = np.isnan(found)
         if beyond.any():
-            nearest = cKDTree(self.points).query(points[beyond])[1]
-            step = points[beyond] - self.points[nearest]
-            found[beyond] = self.heights[nearest] + (self._smooth.grad[nearest, 0] * step).sum(axis=1)
+            known, height = self._smooth.tri.points, self._smooth.values[:, 0]
+            nearest = cKDTree(known).query(points[beyond])[1]
+            step = points[beyond] - known[nearest]
+            found[beyond] = height[nearest] + (self._smooth.grad[nearest, 0] * step).sum(axis=1)
         return found
+
+
+def _fitted_polynomials(points: np.ndarray, heights: np.ndarray, degree: int) -> np.ndarray:
+    """Coefficients (n, n_terms), of x, y, x**2, x y, y**2 ..., of polynomials about n points, through each.
+
+    They are fitted to twice as many points around as they have terms.
+    """
+    powers = np.array([(k - i, i) for k in range(1, degree + 1) for i in range(k + 1)])
+    away, near = cKDTree(points).query(points, min(2 * len(powers) + 1, len(points)))
+    reach = away[:, -1:]
+    step, weight = (points[near] - points[:, None]) / reach[..., None], np.maximum(1.0 - (away / reach) ** 2, 0.01)
+    terms = (step[:, :, None] ** powers).prod(axis=-1) * weight[..., None]
+    rest = weight * (heights[near] - heights[:, None])
+    found = np.linalg.pinv(terms, rcond=1e-6) @ rest[..., None]
+    return np.asarray(found[..., 0] / reach ** powers.sum(axis=1))
+
+
+def _spline_slopes(triangles: Delaunay, heights: np.ndarray, bend: np.ndarray) -> np.ndarray:
+    """Slopes (n, 2) with which cubics along all sides bend least, in squares, beside 2 ``bend`` (n, 3): xx, xy, yy.
+
+    Without that they would be natural splines: exact for no quadratic, and straight at the rim.
+    """
+    start, other = triangles.vertex_neighbor_vertices
+    count, n = np.diff(start), len(heights)
+    own = np.repeat(np.arange(n), count)
+    side = triangles.points[other] - triangles.points[own]
+    length = np.linalg.norm(side, axis=1)
+    x, y = along = side.T / length
+    pull = 6.0 * (heights[other] - heights[own]) / length**2
+    pull -= 2.0 * (bend[own] * np.column_stack([x**2, x * y, y**2])).sum(axis=1)
+    pair, shape = np.einsum("in,jn->nij", along, along / length), (2 * n, 2 * n)
+    near, far = (bsr_array(each, shape=shape) for each in ((4.0 * pair, own, start), (2.0 * pair, other, start)))
+    alone = diags_array(np.repeat(1.0 * (count == 0), 2))  # points too near others to be corners
+    stiff = near.tocsr() + far.tocsr() + alone
+    force = np.column_stack([np.bincount(own, pull * each, n) for each in along]).ravel()
+    found = cg(stiff, force, rtol=ROUNDING, M=diags_array(1.0 / stiff.diagonal()))[0]  # 50 to 200 steps
+    return np.asarray(found).reshape(-1, 2)
 
 
 def _radius(radius: float) -> float:
