@@ -51,13 +51,29 @@ class Spectrum:
     flexibility: Flexibility
     omega: np.ndarray  # (n_modes,) [rad/s]
     vectors: np.ndarray  # (n_dofs, n_modes) [-] mass-normalised in the frame of the system
-    # (4, n_modes) [-] relative error of omega from elements, curved edges, steps of the thickness, causes no mesh cures
+    # (5, n_modes) [-] relative error of omega from elements, curved edges, steps of the thickness, and what no mesh
+    # cures: corners and rounding, and a rise that is known at points only
     parts: np.ndarray
 
     @property
     def error(self) -> np.ndarray:
         """Estimated relative error of omega, (n_modes,) [-]."""
         return self.parts.sum(axis=0)
+
+
+def with_other_rise(system: System) -> System | None:
+    """The system with its rise off by as much as it may be, on the same triangles; None if the rise is a function."""
+    rise = getattr(getattr(system.section, "rise", None), "otherwise", None)
+    return rise and reassemble(replace(system, section=replace(system.section, rise=rise)), system.mesh)
+
+
+def note_on_rise(parts: np.ndarray) -> tuple[str, ...]:
+    """How uncertain the rise between its points leaves frequencies, by the parts of their errors."""
+    unsure = 100.0 * float(parts[4].max(initial=0.0))
+    if unsure <= 100.0 * SAY:
+        return ()
+    said = f"the rise between the points where it is known leaves frequencies uncertain by {unsure:.2g} % at most"
+    return (f"{said}, whatever the mesh, each by its `frequency_error`",)
 
 
 def unknowns(element: str, mesh: Mesh, size: float) -> float:
@@ -99,16 +115,17 @@ def _wave(system: System, n_modes: int | None, max_frequency: float | None) -> f
 def solve_on_mesh(system: System, n_modes: int | None, max_frequency: float | None) -> Spectrum:
     """Find the lowest modes on the mesh as it is: a given number, or all below a frequency [Hz], counted by inertia.
 
-    The last of their errors are rounding and unresolved corners.
+    The last of their errors are rounding and unresolved corners, and the rise between points.
     """
     flexibility, omega, whole = _pairs(system, n_modes, max_frequency)
-    parts, flexible = np.zeros((4, len(omega))), omega > 0.0
+    parts, flexible = np.zeros((5, len(omega))), omega > 0.0
     if flexible.any():
         values, vectors = (omega[flexible] / system.frame.rate) ** 2, whole[:, flexible]
         parts[:3, flexible] = CLAIMED * 0.5 * system.rules.errors(system, vectors, vectors * values) / values
         if system.rules.compared:
             # each mode of five in a row is stated to have the largest error of them: two meshes may agree by chance
-            parts[0, flexible] += maximum_filter1d(_compared(system, omega)[flexible] / omega[flexible], 5)
+            different = _compared(system, omega)[:, flexible] / omega[flexible]
+            parts[::4, flexible] += maximum_filter1d(different, 5, axis=1)
         vectors, squares = flexibility.bent(vectors)[0], system.K.multiply(system.K)
         rounding = 0.5 * EPSILON * np.sqrt(np.einsum("ij,ij->j", vectors**2, squares @ vectors**2)) / values
         # three standard deviations of a random walk, and what the eigensolver leaves
@@ -186,8 +203,9 @@ def _missed_at_corners(system: System, vectors: np.ndarray, values: np.ndarray) 
 
 
 def _compared(system: System, omega: np.ndarray) -> np.ndarray:
-    """Estimated errors (n_modes,) [rad/s] of frequencies of a thick or curved plate, from those on other triangles.
+    """Estimated errors (2, n_modes) [rad/s] of frequencies of a thick or curved plate, from those on other triangles.
 
+    The second is that of a rise that is known at points only, from another one through them on the same triangles.
     The order assumed, four, is less than that of smooth plates, whose errors are stated some three times too large. It
     is 1.5 if ribs end inside or at a free edge, where stresses in the plane are singular; 1 to 2 were measured.
     """
@@ -209,7 +227,12 @@ def _compared(system: System, omega: np.ndarray) -> np.ndarray:
     ends = ribs.singular_vertices(mesh, getattr(system.section, "ribs", ()), kinds)[0].values()
     order = 1.5 if any(1 in each for each in ends) else 4.0
     # where triangles at masses, springs and ends of ribs are most, as many of both meshes, only the others differ
-    return np.abs(again - omega) / max(abs(ratio**-order - 1.0), 1.0 - COARSER ** (-0.25 * order))
+    found = np.zeros((2, n_modes))
+    found[0] = np.abs(again - omega) / max(abs(ratio**-order - 1.0), 1.0 - COARSER ** (-0.25 * order))
+    raised = with_other_rise(body)
+    if raised is not None:
+        found[1] = np.abs(_pairs(raised, n_modes, None)[1] - again)
+    return found
 
 
 def _complete_eigenpairs(
@@ -376,6 +399,7 @@ def refine(system: System, n_modes: int | None, max_frequency: float | None, tol
     if found.system.unresolved > SAY:
         held = "no tolerance is, as corners hold that error on any mesh" if least > LOOSEST else advice
         advice = "; ".join([held, *found.system.mesh.notes])
+    advice = "; ".join([advice, *note_on_rise(found.parts)])
     raise check.SimulationError(
         f"tolerance = {tolerance:g} is not met: mode {mode + 1} is uncertain by {found.error[mode]:.1e} with "
         f"{found.system.n_dofs} unknowns; {advice}"
@@ -397,12 +421,13 @@ def _predicted_step(tried: list[tuple[float, float]], goal: float) -> float:
 
 
 def _needed_factor(parts: np.ndarray, goal: float) -> float:
-    """Factor [-] to divide the element size by so that errors (4, n_modes) meet a goal; infinity if no mesh can."""
-    if float(parts[3].max()) >= goal:
+    """Factor [-] to divide the element size by so that errors (5, n_modes) meet a goal; infinity if no mesh can."""
+    rest = parts[3:].sum(axis=0)
+    if float(rest.max()) >= goal:
         return np.inf
 
     def excess(log: float) -> float:
-        return float((np.exp(-log * np.array(ORDERS)) @ parts[:3] + parts[3]).max()) - goal
+        return float((np.exp(-log * np.array(ORDERS)) @ parts[:3] + rest).max()) - goal
 
     return max(LEAST_STEP, float(np.exp(brentq(excess, 0.0, -np.log(EPSILON))))) if excess(0.0) > 0.0 else LEAST_STEP
 

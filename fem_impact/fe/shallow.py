@@ -149,10 +149,11 @@ def towards_bends(mesh: Mesh, section: Any, kinds: list[str], coarser: float) ->
     mesh = ribs.around_ends(mesh, section.ribs, kinds) if section.ribs else mesh
     share = np.linspace(0.0, 1.0, 9)[:, None, None, None]
     between = np.vander(share[1::2].ravel(), 5) @ np.linalg.inv(np.vander(share[::2].ravel(), 5))  # of a quartic
-    while section.rise is not None:
+    rise = getattr(section.rise, "first", None) or section.rise  # the same triangles for `otherwise`
+    while rise is not None:
         corner = mesh.points[mesh.cells]
         places = corner + share * (np.roll(corner, -1, axis=1) - corner)
-        z = check.field("rise", section.rise, places.reshape(-1, 2), "m").reshape(9, -1, 3)
+        z = check.field("rise", rise, places.reshape(-1, 2), "m").reshape(9, -1, 3)
         sag = np.abs(z[4] - 0.5 * (z[0] + z[8])).max(axis=1)
         kink = np.abs(z[1::2] - np.tensordot(between, z[::2], 1)).max(axis=(0, 2))
         least = size_at(section, "thickness", corner.mean(axis=1)) * coarser**2
@@ -164,7 +165,7 @@ def towards_bends(mesh: Mesh, section: Any, kinds: list[str], coarser: float) ->
         if len(mesh.cells) >= MOST_BENT:
             break
         mesh = splitting.divided_across(mesh, uneven)[0]
-    if section.rise is not None and coarser >= 1.0:
+    if rise is not None and coarser >= 1.0:
         where = ", ".join(f"{x:.3g}" for x in corner.mean(axis=1)[uneven][0])
         raise ValueError(
             f"rise must be smoother, or the plate thicker: triangles that follow it are more than {MOST_BENT}, as at "

@@ -5,7 +5,7 @@ may be any such function.
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property, partial
 from typing import Any
 
@@ -55,13 +55,26 @@ class _Heights:
 
     points: np.ndarray  # (n, 2) [m]
     heights: np.ndarray  # (n,) [m]
+    first: "_Heights | None" = None  # the surface of which this is `otherwise`
+
+    @cached_property
+    def otherwise(self) -> "_Heights":
+        """A surface through the same points that is as far from this as this may be from the true one.
+
+        Three times as far as with slopes of cubics: frequencies with that were 0.1 to 2.5 times as far as from true
+        ones, of domes, waves and bumps through 60 points or more.
+        """
+        return replace(self, first=self)
 
     @cached_property
     def _smooth(self) -> Any:
         place, which = np.unique(self.points, axis=0, return_index=True)
         triangles, height = Delaunay(place), self.heights[which]
         smooth = CloughTocher2DInterpolator(triangles, height, tol=np.inf)  # its own slopes have no bend at the rim
-        smooth.grad[:, 0] = _spline_slopes(triangles, height, _fitted_polynomials(place, height, 2)[:, 2:])
+        slope = _spline_slopes(triangles, height, _fitted_polynomials(place, height, 2)[:, 2:])
+        if self.first is not None:
+            slope += 3.0 * (_fitted_polynomials(place, height, 3)[:, :2] - slope)
+        smooth.grad[:, 0] = slope
         return smooth
 
     def __call__(self, points: np.ndarray) -> np.ndarray:
@@ -158,7 +171,10 @@ def cymbal(radius: float, bow: float, cup_radius: float, cup: float) -> Rise:
 
 
 def table(points: "ArrayLike", heights: "ArrayLike") -> Callable[[np.ndarray], np.ndarray]:
-    """A smooth surface through heights (n,) [m] at points (n, 2) [m]; beyond them, it goes on straight."""
+    """A smooth surface through heights (n,) [m] at points (n, 2) [m]; beyond them, it goes on straight.
+
+    What few points leave open between them is in `Modes.frequency_error` and in the errors of blows.
+    """
     place = check.array("points", points, (None, 2), "m")
     height = check.array("heights", heights, (len(place),), "m")
     if len(place) < 4:

@@ -84,7 +84,9 @@ def find_modes(
             "give a tolerance instead, which works for any body"
         )
     in_hertz = None if enclosed is None else enclosed / (2.0 * np.pi)
-    notes = plausible.together(system.notes, plausible.notes_on_damping(damping, found.omega))
+    notes = plausible.together(
+        system.notes, refinement.note_on_rise(found.parts), plausible.notes_on_damping(damping, found.omega)
+    )
     LOG.info("%d modes up to %.5g Hz", len(found.omega), found.omega[-1] / (2.0 * np.pi))
     return Modes(
         found.omega, damping, shapes, system.mass, found.error, in_hertz, notes, section=system.section,
