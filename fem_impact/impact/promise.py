@@ -72,7 +72,9 @@ def remedy(hit: "Response") -> str:
             meshed = isinstance(getattr(modes.shapes, "base", modes.shapes), FieldShapes)
             if meshed and modes.frequency_error is not None and modes.frequency_error.any():
                 limit = max(1e-9, 0.5 * allowed / error.mesh * float(modes.frequency_error.max()))
-                advice.append(f"find the modes of {name} with tolerance = {limit:.1g}, or on a finer mesh")
+                remedy = f"find the modes of {name} with tolerance = {limit:.1g}, or on a finer mesh"
+                rough = any("the rise between the points" in note for note in modes.notes)
+                advice.append(f"give the rise of {name} at more points, or as a function" if rough else remedy)
     if error.inherited > allowed:
         advice.append("give the blow before a smaller tolerance")
     if error.step > allowed:

@@ -322,10 +322,13 @@ class Target:
             enough = insisted or (max_frequency is not None and refinement.resolves(body, max_frequency))
             body = replace(body, mesh=replace(body.mesh, size_stated=enough))
         with self.blame("mesh"), np.errstate(all="ignore"):  # an overflow becomes inf, which the checks refuse
-            if body is not None:
-                return finding.find_modes(body, **reach, tolerance=wanted, keep=keep)
-            assert self.closed is not None
-            return self.closed(**reach)
+            if body is None:
+                assert self.closed is not None
+                return self.closed(**reach)
+            if wanted is None:
+                return finding.find_modes(body, **reach, keep=keep)
+            number = None if max_frequency is not None else n_modes
+            return finding.modes_of(refinement.refine(body, number, max_frequency, wanted, of_mesh=True))
 
     def number_below(self, modes: Modes, limit: float) -> float:
         """About how many modes there are below a frequency [Hz], by Weyl's law from the first ones, all as struck.

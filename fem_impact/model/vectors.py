@@ -162,13 +162,17 @@ class RitzTarget:
         self.tried: list[float] = []  # [-] truncation errors of the blows so far
         self.spent = False  # whether more vectors no longer help
         self.unmended = np.inf  # [-] error of these meshes with fewer vectors
+        self.larger = np.inf  # [-] error of the meshes before
         self.elements, other = compared_elements(target, elements, stages)
         if fixed and self.elements != elements:  # there are no larger elements to compare with
             self.elements, other = other, self.elements
-        self.fine, self.coarse = self._krylov(self.elements), self._krylov(other)
+        self.unsure = hasattr(getattr(target.section, "rise", None), "otherwise")  # known at points only
+        self.fine, self.coarse = self._krylov(self.elements), self._krylov(other, off=True)
 
-    def _krylov(self, elements: Elements) -> list[Krylov]:
+    def _krylov(self, elements: Elements, off: bool = False) -> list[Krylov]:
+        """Vectors of each point; with the rise ``off`` by as much as it may be, if it is unsure."""
         system = self.target.near(self.at, elements, self.stages)
+        system = (refinement.with_other_rise(system) if off else None) or system
         with self.stages("vectors"):
             first = Krylov(system, self.at[:1], self.shift)
             return [first, *(first.beside(point[None]) for point in self.at[1:])]
@@ -222,10 +226,13 @@ class RitzTarget:
         useless = self.spent and error.truncation > allowed
         if error.mesh <= 0.5 * allowed or self.fixed or useless or more > refinement.MOST_UNKNOWNS:
             return False
-        self.elements = finer_elements(self.target, self.elements, self.stages)
+        if self.unsure and error.mesh > 0.7 * self.larger:  # no mesh makes the rise any surer
+            return False
+        before, self.elements = self.elements, finer_elements(self.target, self.elements, self.stages)
         # many vectors reach as many modes from any lower shift, but rounding then grows a hundredfold with each vector
         self.shift = max(self.shift, 2.0 * np.pi * self.target.frequency_below(SPANNED * self.count))
-        self.fine, self.coarse, self.unmended = self._krylov(self.elements), self.fine, np.inf
+        self.coarse = self._krylov(before, off=True) if self.unsure else self.fine
+        self.fine, self.unmended, self.larger = self._krylov(self.elements), np.inf, error.mesh
         return True
 
     def work(self, before: int) -> cost.Work:

@@ -75,6 +75,11 @@ def find_modes(
     else:
         fine = refinement.fine_enough(system, n_modes, max_frequency, None)
         found = refinement.solve_or_read(fine, n_modes, max_frequency, keep)
+    return modes_of(found, damping_ratio, bounds)
+
+
+def modes_of(found: refinement.Spectrum, damping_ratio: Damping = 0.0, bounds: bool = False) -> Modes:
+    """The modes of a spectrum, with the arguments of `find_modes`."""
     shapes = FieldShapes(found.system, found.vectors.copy(), found.flexibility)
     damping = damping_ratios(damping_ratio, found.omega)
     enclosed = refinement.enclosure(found) if bounds else None
@@ -85,10 +90,10 @@ def find_modes(
         )
     in_hertz = None if enclosed is None else enclosed / (2.0 * np.pi)
     notes = plausible.together(
-        system.notes, refinement.note_on_rise(found.parts), plausible.notes_on_damping(damping, found.omega)
+        found.system.notes, refinement.note_on_rise(found.parts), plausible.notes_on_damping(damping, found.omega)
     )
     LOG.info("%d modes up to %.5g Hz", len(found.omega), found.omega[-1] / (2.0 * np.pi))
     return Modes(
-        found.omega, damping, shapes, system.mass, found.error, in_hertz, notes, section=system.section,
-        thick=system.rules.thick,
+        found.omega, damping, shapes, found.system.mass, found.error, in_hertz, notes, section=found.system.section,
+        thick=found.system.rules.thick,
     )  # fmt: skip
