@@ -134,6 +134,23 @@ def imported_notes(nodes: np.ndarray, shapes: np.ndarray, mass: float) -> tuple[
     return tuple(notes)
 
 
+def notes_on_rigid(shapes: np.ndarray, mass: float) -> Iterator[str]:
+    """A note on rigid motions (n_points, n) [kg**-0.5] that shift another mass, by more than a hundredth.
+
+    Of several that move the points alike the one that moves least counts: a true one moves no more than the mass. A
+    single motion may be a turn, of points at one distance from a hinge.
+    """
+    if not shapes.size:
+        return
+    shift, _, rank, _ = np.linalg.lstsq(shapes, np.ones(len(shapes)), rcond=1e-6)
+    moved, whole = float(shift @ shift), rank > 1 and np.abs(shapes @ shift - 1.0).max() < 0.01
+    if whole and (moved > 1.01 * mass or (rank == shapes.shape[1] and moved < 0.99 * mass)):
+        yield (
+            f"the rigid motions shift {moved:.4g} kg by their shapes, but the mass is {mass:.4g} kg; check it, and "
+            "that shapes are mass-normalised"
+        )
+
+
 def disordered(nodes: np.ndarray, shapes: np.ndarray) -> tuple[str, ...]:
     """A note on nodes (n_nodes, 1 to 3) [m] next to which no shape (n_nodes, n_modes) is as at the nodes themselves."""
     moves = shapes[:, np.ptp(shapes, axis=0) > 0.0]

@@ -24,7 +24,7 @@ SHARE = 0.4
 # see `Modes.unstated`
 UNSTATED = {
     "compliance": "static compliance", "free": "whether it moves freely", "shapes": "shapes but as measured",
-    "dent": "whether unit loads dent it",
+    "dent": "whether unit loads dent it", "inertia": "moments of inertia",
 }  # fmt: skip
 ADVICE = {"compliance": "give the compliance", "dent": "give solid = the material, or False for a shell,"}
 
@@ -64,7 +64,9 @@ def remedy(hit: "Response") -> str:
         advice += [f"make {name} with free = True or False, as it is" for name in loose] or more
         advice += [f"{ADVICE[each]} of {name}" for name, missing in unstated for each in ADVICE if each in missing]
     if error.measurement > allowed:
-        advice += [f"measure longer or cleaner responses of {name}" for name, lacks in unstated if "shapes" in lacks]
+        for name, lacks in unstated:
+            advice += [f"measure longer or cleaner responses of {name}"] * ("shapes" in lacks)
+            advice += [f"give the rigid motions of {name} as modes of 0 Hz"] * ("inertia" in lacks)
     if error.idealisation > allowed:
         advice.append("give target = 'modal'")
     if error.mesh > allowed:

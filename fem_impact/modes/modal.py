@@ -20,6 +20,7 @@ HIGHEST = 0.1 * check.REACH  # [Hz] highest frequency that scaling may produce; 
 UNSTATED = {  # by argument of `Modes.from_arrays`
     "compliance": "the static compliance is not given: what the modes left out yield is estimated from those given",
     "free": "no rigid motion is given, and no mode shows that the body is held: it is taken as held",
+    "inertia": "its rigid motions are those of a uniform body over its points, of which the modes say that it is not",
 }
 
 
@@ -109,8 +110,9 @@ class Modes(check.Brief):
             Numbers of the points that lines or triangles connect, from 0; pictures need them.
         free : bool, optional
             Whether nothing holds the body. True adds its rigid motions if none are among the modes: those of a uniform
-            body over its points. Without it, a body without rigid motions is taken as held if one of its modes carries
-            along a quarter of its mass; otherwise a blow counts what rigid motions would change as an error.
+            body over its points; if its modes say that it is not uniform, a blow counts the error. Without it, a body
+            without rigid motions is taken as held if one of its low modes carries along a quarter of its mass, more
+            at fewer than 8 points; otherwise a blow counts what rigid motions would change as an error.
         complete : bool
             Whether these modes are all there is, as of masses on springs: nothing is left out, nothing else is free.
         solid : Material, (E [Pa], nu), True or False, optional
@@ -146,12 +148,14 @@ class Modes(check.Brief):
         complete, free = check.flag("complete", complete), None if free is None else check.flag("free", free)
         if complete and (compliance is not None or free):
             raise ValueError("complete must be False if compliance is given or free is True; leave it out")
-        loose = None
+        loose: Any = None
+        error, doubt = 0.0, None
         if not complete and omega[0] > 0.0 and points.shape[1] and free is not False:
-            loose = unstated.loose_motions(points, connected, values, mass, free)
+            loose, error = unstated.loose_motions(points, connected, values, mass, free)
         if free and loose is not None:
-            omega, damping = (np.append(np.zeros(loose.shape[1]), each) for each in (omega, damping))
-            values, loose = np.hstack([loose, values]), None
+            still = np.zeros(loose.shape[1])
+            omega, damping, values = np.append(still, omega), np.append(still, damping), np.hstack([loose, values])
+            loose, doubt = None, np.where(omega > 0.0, 0.0, np.full(values.shape, error))[None] if error else None
         rest, known = None, unstated.numbers_of_points(loads, len(points), compliance is not None)
         static = np.zeros((len(points), 0))
         if compliance is not None:
@@ -163,8 +167,8 @@ class Modes(check.Brief):
             rest[known] = 0.0
         flexible = omega > 0.0
         yields = values[:, flexible] / omega[flexible]
-        sampled = SampledShapes(points, values, static, connected, rest, loose, known, yields)
-        gaps = {"compliance": rest, "free": loose}
+        sampled = SampledShapes(points, values, static, connected, rest, loose, known, yields, doubt)
+        gaps = {"compliance": rest, "free": loose, "inertia": doubt}
         missing = tuple(name for name, what in gaps.items() if what is not None)
         strength = np.where(flexible, (values**2).mean(axis=0), 0.0)
         along = strength > 0.01 * strength.max()  # others move across
@@ -172,6 +176,7 @@ class Modes(check.Brief):
         if points.shape[1] and not complete:
             odd = plausible.imported_notes(points, values[:, None, along], mass)
             odd = (*odd, *plausible.disordered(points, values[:, flexible]))
+            odd = (*odd, *plausible.notes_on_rigid(values[:, ~flexible], mass))
         notes = (*odd, *plausible.notes_on_damping(damping, omega), *(UNSTATED[name] for name in missing))
         made, said = cls(omega, damping, sampled, mass, notes=notes, unstated=missing), dents.stated_material(solid)
         return made if said == () else dents.settle_dents(made, dents.of_points(points, static, known), said)
@@ -302,7 +307,8 @@ class Modes(check.Brief):
         made = cls.from_arrays(**arrays, mass=mass, compliance=compliance, free=free)
         sure = np.zeros((len(errors), made.n_modes - errors.shape[1]))
         sampled = made.shapes
-        shapes = replace(sampled, doubt=np.hstack([sure, errors])[None])
+        ways = [np.hstack([sure, errors])[None], *([] if sampled.doubt is None else [sampled.doubt])]
+        shapes = replace(sampled, doubt=np.concatenate(ways))
         return replace(made, shapes=shapes, notes=(*made.notes, *notes), unstated=(*made.unstated, "shapes"))
 
     @cached_property

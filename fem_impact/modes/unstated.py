@@ -68,19 +68,18 @@ def unfold_points(points: np.ndarray) -> np.ndarray:
     return points if n == points.shape[1] else points @ axes[:n].T
 
 
-def loose_motions(points: np.ndarray, cells: np.ndarray | None, values: np.ndarray, mass: float, free: Any) -> Any:
+def loose_motions(
+    points: np.ndarray, cells: np.ndarray | None, values: np.ndarray, mass: float, free: Any
+) -> tuple[np.ndarray | None, float]:
     """Rigid motions (n_points, n) that modes without any may lack; None if these are the modes of a held body.
 
     They are those of a uniform body over its points, or all points alike if these span no line or area. Of elastic
-    modes, those of a free body carry none of its mass along; only the lower count, whose waves the points can show.
+    modes, those of a free body carry none of its mass along. Beside them the relative error [-] of their squares: twice
+    the largest product, over that body, of one with a low mode, which is zero if the body is as it is taken.
     """
     flat = unfold_points(points)
     own, whole = lumped_mass(flat, cells if flat is points else None), lumped_mass(points, cells)
-    share, rigid = np.nan, None
-    if own is not None:
-        pairs, weight = own
-        mean = weight @ values[pairs, : max(1, len(points) // 2)].mean(axis=1)
-        share = float(mass * (mean**2).max())
+    share, rigid, error = 0.0 if own is None else _mass_carried(*own, values, mass), None, 0.0
     if free and share >= HELD:
         raise ValueError(
             f"free must be False: one of the modes carries {share:.0%} of the mass along, as only those of a held "
@@ -91,13 +90,36 @@ def loose_motions(points: np.ndarray, cells: np.ndarray | None, values: np.ndarr
         motions = np.column_stack([np.ones(len(points)), (points - points.mean(axis=0)) / np.ptp(points, axis=0).max()])
         at = motions[pairs].mean(axis=1)
         rigid = np.linalg.solve(np.linalg.cholesky(mass * at.T @ (weight[:, None] * at)), motions.T).T
+        low = values[:, _low_modes(mass * weight @ values[pairs].mean(axis=1) ** 2, len(points))]
+        error = 2.0 * mass * float(np.abs((rigid[pairs].mean(axis=1).T * weight) @ low[pairs].mean(axis=1)).max())
+        error = error if error > 0.1 else 0.0  # less comes of even grids: of 11 points on a bar, of 16 on a plate
     if free and rigid is None:
         raise ValueError(
             "free needs points that span the body, to find its rigid motions; give these as modes of 0 Hz instead"
         )
     if not free and share >= HELD:
-        return None
-    return np.full((len(points), 1), mass**-0.5) if rigid is None else rigid
+        return None, 0.0
+    rigid = np.full((len(points), 1), mass**-0.5) if rigid is None else rigid
+    return rigid if free else rigid * (1.0 + error) ** 0.5, error  # what may be moves as much as it may
+
+
+def _low_modes(squares: np.ndarray, n_points: int) -> np.ndarray:
+    """The lowest modes that move along, whose waves so many points can show, by their mean squares over the body."""
+    return np.flatnonzero(squares >= 0.1 * squares.max())[: max(1, int((0.1 * n_points) ** 0.5))]
+
+
+def _mass_carried(pairs: np.ndarray, weight: np.ndarray, values: np.ndarray, mass: float) -> float:
+    """Largest share of its mass that a uniform body carries along in a low mode.
+
+    Zero where a mode says that the body is not uniform, or that the points do not show it, as its mean square is not
+    one over the mass, or more if few points lie where it moves most; and for shares that these may show by chance.
+    """
+    at, n_points = values[pairs].mean(axis=1), len(np.unique(pairs))
+    squares = mass * weight @ at**2
+    low = _low_modes(squares, n_points)
+    shares = mass * (weight @ at[:, low]) ** 2
+    shown = (squares[low] > 0.5) & (squares[low] < 1.0 + max(0.5, 8.0 / n_points)) & (n_points * shares >= 2.0)
+    return float(shares[shown].max(initial=0.0))
 
 
 def lumped_mass(points: np.ndarray, cells: np.ndarray | None) -> tuple[np.ndarray, np.ndarray] | None:

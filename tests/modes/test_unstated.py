@@ -146,3 +146,55 @@ def test_shapes_that_do_not_fit_the_mass_are_told(scale, told):
     made = bar(8)
     other = fi.Modes.from_arrays(made.frequencies, scale * made.shape_at(POINTS), points=POINTS, mass=made.mass)
     assert any("are expected mass-normalised" in note for note in other.notes) == told
+
+
+def weighted(**stated):
+    """A free bar of 0.94 kg with 2 kg at its end, by twelve of its modes at 41 points, and the whole of it."""
+    system = fi.assemble(fi.mesh.line(0.4), BAR, point_masses=[((0.4,), 2.0)])
+    whole = fi.find_modes(system, n_modes=14)
+    shapes = whole.shape_at(POINTS)
+    values = {"compliance": whole.shapes.compliance(POINTS)} | stated
+    first = values.pop("first", 2)
+    return fi.Modes.from_arrays(
+        whole.frequencies[first:], shapes[:, first:], points=POINTS, mass=whole.mass, **values
+    ), whole
+
+
+def test_a_free_body_that_is_not_uniform_is_not_taken_as_held():
+    """A free bar with a mass at its end swings as if it were held there."""
+    modes, whole = weighted()
+    truth = struck(whole).restitution
+    assert abs(struck(modes, residual=False).restitution - truth) > 0.1  # what was said without a word
+    found = struck(modes)
+    assert "whether it moves freely" in found.verdict and abs(found.restitution - truth) <= found.error.total
+
+
+def test_rigid_motions_of_a_body_that_is_not_uniform_count_as_an_error():
+    modes, whole = weighted(free=True)
+    found, truth = struck(modes), struck(whole).restitution
+    assert modes.n_rigid == 2 and abs(found.restitution - truth) > 0.05
+    assert "moments of inertia" in found.verdict and abs(found.restitution - truth) <= found.error.measurement
+    assert "give the rigid motions of the target as modes of 0 Hz" in found.verdict
+    assert struck(weighted(first=0)[0]).tolerance_met
+    assert bar(12, rigid=False, free=True).unstated == ("compliance",)
+
+
+def test_few_points_do_not_show_that_a_body_is_held():
+    """At five places on one side of a free disk two of its modes move all alike."""
+    disk = fi.analytic.disk(0.2, edge="free", mass=1.0, first_frequency=100.0, n_modes=12)
+    x = 0.2 * np.array([(0.9, 0.1), (0.95, -0.1), (0.8, 0.0), (0.85, 0.2), (0.9, -0.25)])
+    made = fi.Modes.from_arrays(disk.frequencies[3:], disk.shape_at(x)[:, 3:], points=x, mass=1.0)
+    assert "free" in made.unstated
+
+
+@pytest.mark.parametrize(("scale", "mass", "told"), [(1.0, 1.0, False), (3.0, 1.0, True), (1.0, 8.0, True)])
+def test_rigid_motions_that_do_not_move_the_mass_are_told(scale, mass, told):
+    made = bar(8)
+    shapes = scale * made.shape_at(POINTS)
+    other = fi.Modes.from_arrays(made.frequencies, shapes, points=POINTS, mass=mass * made.mass)
+    moved = f"the rigid motions shift {made.mass / scale**2:.4g} kg by their shapes, but the mass is"
+    assert any(moved in note for note in other.notes) == told
+    hinged = fi.analytic.beam(0.4, ends=("hinged", "free"), section=BAR, n_modes=6)  # a turn alone, seen at one place
+    there = hinged.shape_at([[0.4]]) * np.ones((2, 1))
+    odd = fi.Modes.from_arrays(hinged.frequencies, there, points=[[0.0, 0.4], [0.1, 0.4]], mass=hinged.mass)
+    assert not any("rigid motions shift" in note for note in odd.notes)
