@@ -86,7 +86,10 @@ class Variation:
 
 
 def what_if(blow: Followed, variations: Sequence[Variation]) -> dict[str, np.ndarray]:
-    """Estimated errors of a blow by cause, as of `distance.of_runs`: what each variation does to it."""
+    """Estimated errors of a blow by cause, as of `distance.of_runs`: what each variation does to it.
+
+    Of one that cannot be followed, as its bodies do not part, nothing is known, and it counts in full.
+    """
     quantities, n = blow.options.quantities, blow.options.n_quantities
     none = np.zeros(len(blow.runs.error))
     errors: dict[str, np.ndarray] = {}
@@ -94,9 +97,10 @@ def what_if(blow: Followed, variations: Sequence[Variation]) -> dict[str, np.nda
         for ways in each.changes:
             effects = []
             for parts, weight, parting in ways:
-                effects.append(distance.of_runs(blow.again(parts), blow.runs.coarse, quantities, pace=blow.pace))
-                effects[-1][: n + 1] *= weight
-                effects[-1][n + 1 :] *= parting
+                effects.append(none + 1.0)
+                with suppress(SimulationError):
+                    found = distance.of_runs(blow.again(parts), blow.runs.coarse, quantities, pace=blow.pace)
+                    effects[-1] = found * np.repeat([weight, parting], [n + 1, len(found) - n - 1])
             if effects:
                 errors[each.cause] = errors.get(each.cause, none) + np.maximum.reduce(effects)
         if each.least:

@@ -1,6 +1,7 @@
 """What a change of the bodies does to a blow tells the errors of its modes."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -8,6 +9,7 @@ from comparing import worst
 from test_collision import thinned_blow
 
 import fem_impact as fi
+from fem_impact.impact import what_if
 
 
 @pytest.mark.parametrize(
@@ -98,3 +100,17 @@ def test_impacts_without_a_restitution_have_no_error_of_it():
     assert whole.restitution_errors[0] > 0.0
     simplified = replace(whole, error=replace(whole.error, idealisation=1e-3))  # of a target that does not ring
     assert simplified.restitution_errors == (None,)
+
+
+def test_a_change_whose_bodies_do_not_part_counts_in_full():
+    """It is no reason to refuse the blow itself."""
+
+    def again(parts):
+        raise fi.SimulationError("no final separation was reached")
+
+    blow = SimpleNamespace(
+        options=SimpleNamespace(quantities={}, n_quantities=5), runs=SimpleNamespace(error=np.zeros(8), coarse=None),
+        pace=None, again=again,
+    )  # fmt: skip
+    found = what_if.what_if(blow, [what_if.Variation("truncation", [[((), 0.1, 0.1)]])])
+    np.testing.assert_allclose(found["truncation"], np.ones(8), rtol=0.0)
