@@ -551,7 +551,8 @@ def left_out(modes: "Modes", place: np.ndarray, rows: np.ndarray) -> tuple[np.nd
         where = ", ".join(f"{x:g}" for x in place[i])
         raise check.SimulationError(
             f"the modes are softer at ({where}) m than the whole body, {whole[i, i]:.4g} m/N, by "
-            f"{-rest[i, i]:.2g} m/N, which is more than their errors allow; find the modes on a finer mesh"
+            f"{-rest[i, i]:.2g} m/N, which is more than their errors allow; find the modes on a finer mesh, "
+            "or give the compliance of the whole body"
         )
     return rest, doubt
 
