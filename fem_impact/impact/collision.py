@@ -197,7 +197,7 @@ def _follow_refined(bodies, laws, parts, speed, options, striker=None, at=None, 
         )
     *firsts, n_kept = accumulate((len(part.omega) for part in parts), initial=0)
     held = [first + i for first, part in zip(firsts, parts) for i in range(part.held)]
-    pace, own = engine.pace_of(system, held, n_kept), parts[0]
+    pace, own = engine.pace_of(system, held, n_kept)._replace(struck=slice(firsts[-1], None)), parts[0]
     if speed and own.touched:
         rigid = own.rows[0, : own.held] if own.held else own.rows[0, own.omega == 0.0]
         pace = pace._replace(rebound=tuple((rigid / speed).tolist()))

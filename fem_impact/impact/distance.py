@@ -1,6 +1,7 @@
 """The distance between two blows: every error that the program states is one."""
 
 from collections.abc import Mapping
+from dataclasses import replace
 from math import sqrt
 from operator import sub
 from typing import TYPE_CHECKING, Any
@@ -13,17 +14,20 @@ from .history import History
 from .quantities import BAND_POINTS, BANDED
 
 if TYPE_CHECKING:
+    from .compiled.bundles import KernelSystem
     from .engine import Pace
     from .response import Response
 
-INSTANTS = ("contact_time", "force")  # quantities that depend on single instants
+# quantities that depend on single instants, or on modes whose period is no longer than a step
+INSTANTS = ("contact_time", "force", "sound")
 
 
 def distance(one: Mapping[str, Any], two: Mapping[str, Any]) -> dict[str, Any]:
     """How far one blow is from another in every number of the other [-]; also of many blows, as arrays of equal shape.
 
     Absolute for the restitution, relative to the second for all others; 1 if only one of the blows has a restitution.
-    Of a spectrum (n_frequencies,), named as its quantity, it is the largest difference over the second's largest value.
+    Of a spectrum (n_frequencies,), named as its quantity, it is the largest difference over the second's largest value;
+    of a sound, what modes ring with (n_modes,), that of the root of the energy.
     """
     found: dict[str, Any] = {}
     for name, value in two.items():
@@ -33,7 +37,8 @@ def distance(one: Mapping[str, Any], two: Mapping[str, Any]) -> dict[str, Any]:
         elif name == "restitution":
             found[name] = abs(other - value)
         elif name in BANDED:
-            found[name] = float(abs(other - value).max() / (abs(value).max() or 1.0))
+            order = 2 if name == "sound" else np.inf
+            found[name] = float(np.linalg.norm(other - value, order) / (np.linalg.norm(value, order) or 1.0))
         elif isinstance(value, np.ndarray):
             found[name] = abs(other - value) / np.where(value == 0.0, 1.0, abs(value))
         else:
@@ -42,8 +47,12 @@ def distance(one: Mapping[str, Any], two: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def of_blows(one: "Response", two: "Response", quantities: Mapping[str, float | None]) -> dict[str, float]:
-    """How far one blow is from another in each quantity; the sound counts by the spectrum of the force."""
-    return distance(*({name: value_of(hit, name, band) for name, band in quantities.items()} for hit in (one, two)))
+    """How far one blow is from another in each quantity."""
+    values = [{name: value_of(hit, name, band) for name, band in quantities.items()} for hit in (one, two)]
+    if band := quantities.get("sound"):
+        sounds = _sounds(one.history, two.history, two.body_slice(len(two.bodies) - 1), band)
+        values = [value | {"sound": sound} for value, sound in zip(values, sounds)]
+    return distance(*values)
 
 
 def value_of(hit: "Response", name: str, band: float | None) -> Any:
@@ -51,6 +60,29 @@ def value_of(hit: "Response", name: str, band: float | None) -> Any:
     if band is not None:
         return hit.spectrum(np.linspace(0.0, band, BAND_POINTS))
     return getattr(hit, "peak_force" if name == "force" else name)
+
+
+def _sounds(one: History, two: History, struck: slice, band: float) -> list[np.ndarray]:
+    """What the struck body's modes ring with after each of two runs, (n_modes,) complex [m/s kg**0.5].
+
+    They are those of the second run up to the band [Hz], with what the forces of each make of them. Without any the
+    sound counts by the spectrum of the force.
+    """
+    if not np.array_equal(one.omega, two.omega):
+        bodies = "omega", "zeta", "shape", "bias", "start_q", "start_p", "stretched"
+        one = replace(one, **{name: getattr(two, name) for name in bodies})
+    rings, end = heard(two, struck, band), np.array([max(one.end_time, two.end_time)])
+    if not len(rings):
+        return [_spectrum(run, band) for run in (one, two)]
+    states = [[state[0, rings] for state in run.states(end)] for run in (one, two)]
+    return [p + 1j * two.omega[rings] * q for q, p in states]
+
+
+def heard(system: "History | KernelSystem", struck: slice, band: float) -> np.ndarray:
+    """Numbers of the struck body's modes that ring up to a frequency [Hz]."""
+    omega, zeta = system.omega[struck], system.zeta[struck]
+    rings = (omega > 0.0) & (omega <= 2.0 * np.pi * band) & (zeta < 1.0)
+    return np.arange(len(system.omega))[struck][rings]
 
 
 def of_runs(
@@ -91,7 +123,9 @@ def of_runs(
     apart = []
     for name, band in quantities.items():
         if band is not None:
-            found |= distance({name: _spectrum(one, band)}, {name: _spectrum(two, band)})
+            struck = pace.struck if pace else slice(None)
+            pair = _sounds(one, two, struck, band) if name == "sound" else [_spectrum(run, band) for run in (one, two)]
+            found |= distance(*({name: each} for each in pair))
         apart.append(max(ROUNDING, found.get(name, ROUNDING) / over[name in INSTANTS]))
     apart.append(abs(one.margin - two.margin))
     for rebound, other in zip(each[0][7], each[1][7]):

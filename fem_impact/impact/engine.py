@@ -50,6 +50,7 @@ class Pace(NamedTuple):
     # [kg**-0.5 s/m] speed of the first body's first contact by the speeds of its rigid motions (n_rigid,), over that of
     # arrival
     rebound: tuple[float, ...] = ()
+    struck: slice = slice(None)  # the modes of the last body, and those that stand for the ones left out
 
 
 def steps_per_contact(tolerance: float, power: float = 0.25) -> float:

@@ -166,6 +166,7 @@ def synthesise(
     -----
     The motion of each mode is exact at every sample, during and after the blow. Leaves out rigid modes (inaudible) and
     modes at or above ``rate / 2`` (they would alias). This is the motion of the surface, not the radiated pressure.
+    It is known as well as the numbers of the blow if "sound=.." is among the quantities asked for, see `strike`.
 
     Examples
     --------
