@@ -36,7 +36,6 @@ from scipy.special import jv
 from .._base import check
 from .._base.rounding import HALVINGS, SAME
 from ..fe import plausible
-from ..mesh.meshes import sizes
 from .free_air import PER_WAVE, between_cells, lattice, loads
 from .modal import Modes
 from .shapes import ScaledShapes, Shapes
@@ -87,14 +86,13 @@ def in_air(
     density, speed = check.positive("density", density, "kg/m^3"), check.positive("speed", speed, "m/s")
     if check.count("sides", sides) > 2:
         raise ValueError(f"sides must be 1 or 2, got {sides}")
-    points, cells = modes.shapes.grid()
     if modes.dimension != 2 or not modes.continuous:
         raise ValueError("in_air needs the modes of a plate whose shapes are known everywhere")
     if modes.n_modes == modes.n_rigid:
         return modes
     how: dict[str, Any] = {"density": density, "speed": speed, "sides": sides, "baffled": baffled}
     poorer = {cause: in_air(other, **how) for cause, other in modes.poorer.items()}
-    share, spacing = 1.0 if baffled else 0.5, _spacing(modes, float(sizes(points, cells).sum()), speed)
+    share, spacing = 1.0 if baffled else 0.5, _spacing(modes, float(modes.shapes.quadrature(0.0)[1].sum()), speed)
     samples, missed = _sampled(modes.shapes, spacing)
     weight = density * sides * share / (2.0 * np.pi)
     found, other = (_Air(modes, _strengths(samples, spacing, n), n * spacing, weight, speed) for n in SAMPLES)
@@ -114,7 +112,7 @@ def in_air(
     # the two grids agree by chance where the shift changes its sign, so that no mode is surer than those below it
     heavier = modes.omega[modes.n_rigid :] / omega - 1.0
     doubt = np.maximum.accumulate(np.abs(shift)) + missed[modes.n_rigid :] * np.abs(heavier)
-    unsure = unsure + _mistaken(found, own, omega, doubt)
+    unsure = unsure + _mistaken(found, mix, omega, doubt)  # of a pair at one frequency both of `own` may be one
     side = "both sides" if sides == 2 else "one side"
     note = f"air of {density:g} kg/m^3 on {side}, with a rigid wall around the plate"
     if not baffled:
@@ -309,7 +307,7 @@ def _sampled(shapes: Shapes, spacing: float, finer: int = 4) -> tuple[np.ndarray
     samples[:, rim] = values.reshape(rim.sum(), finer**2, -1).mean(axis=1).T
     area = (inside & ~rim).sum() + covered.mean() * rim.sum()
     energy = (samples**2).sum(axis=(1, 2)) * covered.sum()
-    missed = abs(area - sizes(*shapes.grid()).sum() / spacing**2)
+    missed = abs(area - shapes.quadrature(0.0)[1].sum() / spacing**2)
     return samples, missed * (at_rim**2).sum(axis=0) / energy
 
 
