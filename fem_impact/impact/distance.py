@@ -48,11 +48,10 @@ def distance(one: Mapping[str, Any], two: Mapping[str, Any]) -> dict[str, Any]:
 
 def of_blows(one: "Response", two: "Response", quantities: Mapping[str, float | None]) -> dict[str, float]:
     """How far one blow is from another in each quantity."""
-    values = [{name: value_of(hit, name, band) for name, band in quantities.items()} for hit in (one, two)]
+    found = distance(*({name: value_of(hit, name, band) for name, band in quantities.items()} for hit in (one, two)))
     if band := quantities.get("sound"):
-        sounds = _sounds(one.history, two.history, two.body_slice(len(two.bodies) - 1), band)
-        values = [value | {"sound": sound} for value, sound in zip(values, sounds)]
-    return distance(*values)
+        found["sound"] = of_sounds(one.history, two.history, two.body_slice(len(two.bodies) - 1), band)
+    return found
 
 
 def value_of(hit: "Response", name: str, band: float | None) -> Any:
@@ -62,20 +61,20 @@ def value_of(hit: "Response", name: str, band: float | None) -> Any:
     return getattr(hit, "peak_force" if name == "force" else name)
 
 
-def _sounds(one: History, two: History, struck: slice, band: float) -> list[np.ndarray]:
-    """What the struck body's modes ring with after each of two runs, (n_modes,) complex [m/s kg**0.5].
+def of_sounds(one: History, two: History, struck: slice, band: float) -> float:
+    """How far what the struck body's modes ring with after one run is from that after another [-].
 
-    They are those of the second run up to the band [Hz], with what the forces of each make of them. Without any the
-    sound counts by the spectrum of the force.
+    The modes are those of the second run up to the band [Hz], with what the forces of each make of them. Without any
+    the sound counts by the spectrum of the force.
     """
     if not np.array_equal(one.omega, two.omega):
         bodies = "omega", "zeta", "shape", "bias", "start_q", "start_p", "stretched"
         one = replace(one, **{name: getattr(two, name) for name in bodies})
     rings, end = heard(two, struck, band), np.array([max(one.end_time, two.end_time)])
     if not len(rings):
-        return [_spectrum(run, band) for run in (one, two)]
+        return distance(*({"spectrum": _spectrum(run, band)} for run in (one, two)))["spectrum"]
     states = [[state[0, rings] for state in run.states(end)] for run in (one, two)]
-    return [p + 1j * two.omega[rings] * q for q, p in states]
+    return distance(*({"sound": p + 1j * two.omega[rings] * q} for q, p in states))["sound"]
 
 
 def heard(system: "History | KernelSystem", struck: slice, band: float) -> np.ndarray:
@@ -122,10 +121,10 @@ def of_runs(
     found |= distance(*totals) if n_impacts else {}
     apart = []
     for name, band in quantities.items():
-        if band is not None:
-            struck = pace.struck if pace else slice(None)
-            pair = _sounds(one, two, struck, band) if name == "sound" else [_spectrum(run, band) for run in (one, two)]
-            found |= distance(*({name: each} for each in pair))
+        if band is not None and name == "sound":
+            found[name] = of_sounds(one, two, pace.struck if pace else slice(None), band)
+        elif band is not None:
+            found |= distance(*({name: _spectrum(run, band)} for run in (one, two)))
         apart.append(max(ROUNDING, found.get(name, ROUNDING) / over[name in INSTANTS]))
     apart.append(abs(one.margin - two.margin))
     for rebound, other in zip(each[0][7], each[1][7]):

@@ -12,8 +12,9 @@ import numpy as np
 from .._base import explained
 from .._base.check import REACH, SimulationError, ToleranceWarning
 from ..modes.shapes import FieldShapes, compliance_errors
-from . import accuracy
+from . import accuracy, distance
 from .quantities import words
+from .stepping import RICHARDSON
 
 if TYPE_CHECKING:
     from .response import Response
@@ -94,6 +95,17 @@ def warn_if_missed(hit: Any, strict: bool = False) -> Any:
             raise SimulationError(said)
         warn(explained.with_headings(said))
     return hit
+
+
+def warn_of_sound(hit: "Response", band: float) -> None:
+    """Warn where a sound up to a frequency [Hz] was not asked for and errs by over 5 %, as two runs in steps show."""
+    if "sound" not in hit.quantities and hit.runs:
+        band = min(band, float(hit.target.frequencies[-1]))
+        apart = distance.of_sounds(hit.runs[0], hit.history, hit.body_slice(len(hit.bodies) - 1), band)
+        apart /= RICHARDSON[hit.scheme][1]
+        if apart > 0.05:
+            so = f"may err by {apart:.1g} of itself, as so soft a blow makes little"
+            warn(f"sound {so}; add 'sound={np.ceil(band):.0f}' to the quantities")
 
 
 def warn(text: str) -> None:
