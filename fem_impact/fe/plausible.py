@@ -134,21 +134,30 @@ def imported_notes(nodes: np.ndarray, shapes: np.ndarray, mass: float) -> tuple[
     return tuple(notes)
 
 
-def notes_on_rigid(shapes: np.ndarray, mass: float) -> Iterator[str]:
-    """A note on rigid motions (n_points, n) [kg**-0.5] that shift another mass, by more than a hundredth.
+def notes_on_rigid(shapes: np.ndarray, mass: float, span: int) -> tuple[str, ...]:
+    """Notes on rigid motions (n_points, n) [kg**-0.5] of points that span a line (1), a plane (2) or neither (0).
 
-    Of several that move the points alike the one that moves least counts: a true one moves no more than the mass. A
-    single motion may be a turn, of points at one distance from a hinge.
+    They tell of a shift of another mass, by more than a hundredth, and of turns that are missing beside a shift. Of
+    several that move the points alike the one that moves least counts: a true one moves no more than the mass. A single
+    motion may be a turn, of points at one distance from a hinge.
     """
     if not shapes.size:
-        return
+        return ()
     shift, _, rank, _ = np.linalg.lstsq(shapes, np.ones(len(shapes)), rcond=1e-6)
-    moved, whole = float(shift @ shift), rank > 1 and np.abs(shapes @ shift - 1.0).max() < 0.01
-    if whole and (moved > 1.01 * mass or (rank == shapes.shape[1] and moved < 0.99 * mass)):
-        yield (
+    moved, notes = float(shift @ shift), []
+    if np.abs(shapes @ shift - 1.0).max() > 0.01:
+        return ()
+    if rank <= span < 3:
+        notes.append(
+            f"the rigid motions given are {rank} of the {span + 1} of a body that nothing holds; give the others, "
+            "which turn it, as modes of 0 Hz, or free = False"
+        )
+    if rank > 1 and (moved > 1.01 * mass or (rank == shapes.shape[1] and moved < 0.99 * mass)):
+        notes.append(
             f"the rigid motions shift {moved:.4g} kg by their shapes, but the mass is {mass:.4g} kg; check it, and "
             "that shapes are mass-normalised"
         )
+    return tuple(notes)
 
 
 def disordered(nodes: np.ndarray, shapes: np.ndarray) -> tuple[str, ...]:

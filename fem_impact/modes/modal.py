@@ -143,7 +143,8 @@ class Modes(check.Brief):
         damping = damping_ratios(damping_ratio, omega)
         if not values.any():
             raise ValueError("shapes must move at least one point in one mode, got zeros only")
-        if unstated.unfold_points(points).shape[1] >= min(points.shape[1], 2):  # along a line, two modes may look alike
+        span = unstated.unfold_points(points).shape[1]
+        if span >= min(points.shape[1], 2):  # along a line, two modes may look alike
             cell_kinds.refuse_twice(omega / (2.0 * np.pi), values, "shapes")
         complete, free = check.flag("complete", complete), None if free is None else check.flag("free", free)
         if complete and (compliance is not None or free):
@@ -161,9 +162,7 @@ class Modes(check.Brief):
         if compliance is not None:
             static = check.array("compliance", compliance, (len(points), len(known)), "m/N")
         if len(known) < len(points) and not complete and omega[-1] > 0.0:
-            rest = np.column_stack(
-                unstated.estimate_left_out(omega, values, mass, unstated.unfold_points(points).shape[1])
-            )
+            rest = np.column_stack(unstated.estimate_left_out(omega, values, mass, span))
             rest[known] = 0.0
         flexible = omega > 0.0
         yields = values[:, flexible] / omega[flexible]
@@ -176,7 +175,7 @@ class Modes(check.Brief):
         if points.shape[1] and not complete:
             odd = plausible.imported_notes(points, values[:, None, along], mass)
             odd = (*odd, *plausible.disordered(points, values[:, flexible]))
-            odd = (*odd, *plausible.notes_on_rigid(values[:, ~flexible], mass))
+            odd = (*odd, *plausible.notes_on_rigid(values[:, ~flexible], mass, 0 if free is False else span))
         notes = (*odd, *plausible.notes_on_damping(damping, omega), *(UNSTATED[name] for name in missing))
         made, said = cls(omega, damping, sampled, mass, notes=notes, unstated=missing), dents.stated_material(solid)
         return made if said == () else dents.settle_dents(made, dents.of_points(points, static, known), said)

@@ -187,6 +187,18 @@ def test_few_points_do_not_show_that_a_body_is_held():
     assert "free" in made.unstated
 
 
+def test_a_shift_without_the_turns_of_a_free_body_has_a_note_until_these_are_given_or_it_is_held():
+    """A bar that slides without turning rebounds its striker by half as much again at one end, with no error told."""
+    made = bar(12)
+    kept = [0, *range(2, made.n_modes)]
+    shapes, told = made.shape_at(POINTS), []
+    for which, stated in ((kept, {}), (range(made.n_modes), {}), (kept, {"free": False})):
+        given = {"points": POINTS, "mass": made.mass} | stated
+        other = fi.Modes.from_arrays(made.frequencies[which], shapes[:, which], **given)
+        told.append([note for note in other.notes if "as modes of 0 Hz, or free = False" in note])
+    assert len(told[0]) == 1 and "are 1 of the 2 of a body that nothing holds" in told[0][0] and not told[1] + told[2]
+
+
 @pytest.mark.parametrize(("scale", "mass", "told"), [(1.0, 1.0, False), (3.0, 1.0, True), (1.0, 8.0, True)])
 def test_rigid_motions_that_do_not_move_the_mass_are_told(scale, mass, told):
     made = bar(8)
