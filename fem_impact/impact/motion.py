@@ -105,20 +105,38 @@ def check_same_body(hit: "Response", modes: Modes) -> None:
         )
 
 
-def largest_difference(
-    descriptions: Sequence[BodyMotion], points: Any, times: np.ndarray, rate: bool, until: float
-) -> float:
-    """Largest difference [-] of the motion by other descriptions of a body from that by the first, over the largest.
+def by_other_modes(hit: "Response") -> tuple[BodyMotion, ...]:
+    """The motion of the target by its modes, in the coarser run, by half of the modes and by softer ones.
 
-    Infinite for a single description, where it exceeds `MOVED`, and long after the end of the run, ``until`` [s].
+    Empty where these do not show how far it is known: of a body that moved already, and of `collide`.
     """
-    # after twice the run, later echoes may be missing from all of them
-    if len(descriptions) < 2 or (times.size and times.max() > 2.0 * until):
+    if hit.at is None or hit.moving or not hit.runs:
+        return ()
+    modes, other = hit.target, replace(hit, history=hit.runs[0])
+    found = [driven_motion(hit, modes), driven_motion(other, modes)]
+    if hit.ends[-1].rest.any():
+        found.append(driven_motion(hit, modes.truncated(n_modes=max(1, modes.n_modes // 2))))
+    if modes.frequency_error is not None:
+        found.append(driven_motion(hit, replace(modes, omega=modes.omega / (1.0 + modes.frequency_error))))
+    return tuple(found)
+
+
+def largest_difference(
+    descriptions: Sequence[BodyMotion], points: Any, times: np.ndarray, rate: bool, until: float | None
+) -> float:
+    """How far the motion by other descriptions of a body is from that by the first [-], over the largest asked for.
+
+    Of modes all differences add up. Of vectors, which describe a run ``until`` its end [s], the largest counts; it is
+    infinite where it exceeds `MOVED`, and long after the end. Infinite for a single description.
+    """
+    # after twice the run, later echoes may be missing from all vectors
+    if len(descriptions) < 2 or (until is not None and times.size and times.max() > 2.0 * until):
         return float("inf")
     if len(times) > LOOKED_AT:
         times = times[np.linspace(0, len(times) - 1, LOOKED_AT).astype(int)]
-    motions = [each.at(points, times, rate) for each in descriptions]
-    largest = float(np.abs(motions[0]).max(initial=0.0))
-    apart = max(float(np.abs(other - motions[0]).max(initial=0.0)) for other in motions[1:])
-    apart = apart / largest if largest else 0.0
-    return apart if apart <= MOVED["velocity" if rate else "displacement"] else float("inf")
+    first, *others = (each.at(points, times, rate) for each in descriptions)
+    largest = float(np.abs(first).max(initial=0.0)) or 1.0
+    apart = [float(np.abs(other - first).max(initial=0.0)) / largest for other in others]
+    if until is None:
+        return sum(apart)
+    return max(apart) if max(apart) <= MOVED["velocity" if rate else "displacement"] else float("inf")

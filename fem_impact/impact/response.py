@@ -219,9 +219,10 @@ class Response(Totals, check.Locked):
 
     @cached_property
     def _descriptions(self) -> tuple[BodyMotion, ...]:
-        """The motion of the target by its own Ritz vectors, and by each poorer description."""
-        each = () if self.vectors is None else self.vectors.descriptions().values()
-        return tuple(motion.driven_motion(self, modes) for modes in each)
+        """The motion of the target by its own Ritz vectors or modes, and by each poorer description."""
+        if self.vectors is None:
+            return motion.by_other_modes(self)
+        return tuple(motion.driven_motion(self, modes) for modes in self.vectors.descriptions().values())
 
     def _is_target(self, body: int) -> bool:
         n = len(self.bodies)
@@ -446,15 +447,18 @@ class Response(Totals, check.Locked):
         return self._motion(body).at(points, asked, rate, residual)
 
     def _apart(self, points: Any, times: np.ndarray, rate: bool) -> float:
-        return motion.largest_difference(self._descriptions, points, times, rate, self.history.end_time)
+        until = None if self.vectors is None else self.history.end_time
+        return motion.largest_difference(self._descriptions, points, times, rate, until)
 
     @check.typed
     def motion_error(self, points: Any, times: Any, *, velocity: bool = False) -> float:
-        """Estimated error [-] of the target's motion as its Ritz vectors give it, over the largest motion asked for.
+        """Estimated error [-] of the target's motion at points, over the largest motion asked for.
 
-        The error of the blow, and the difference from the motion by fewer vectors and by those of a coarser mesh
-        under the same force. Infinite where vectors do not give the motion: after a blow by modes, later than twice the
-        duration of the run, and where that difference exceeds 1e-2 (3e-2 in the velocity).
+        The error of the blow, and the difference from the motion by fewer Ritz vectors and by those of a coarser mesh
+        under the same force. After a blow by modes, that from the motion by half of them, by modes softer by their
+        errors and in coarser steps, all added up; infinite then if the body moved before, and after `collide`.
+        Infinite, too, where vectors do not give the motion, but modes found later do: after twice the duration of the
+        run, and where that difference exceeds 1e-2 (3e-2 in the velocity).
 
         Parameters
         ----------
