@@ -245,7 +245,8 @@ class _Control:
                 longest = min(longest, RESOLVED / float(omega[significant]))
         if band := options.quantities.get("sound"):  # both runs push modes with their steps' rhythm alike
             heard = self.system.omega[distance.heard(self.system, self.pace.struck, band)]
-            longest = min(longest, RESOLVED / float(heard.max(initial=1e-300)))
+            least = 8.0 * shortest / engine.most_steps(self.system, self.stretched)
+            longest = min(longest, max(RESOLVED / float(heard.max(initial=1e-300)), least))
         first = min(2.0 * shortest / count, longest)
         within = 0.5 * count * first if self.stickiness > STICKY and options.scheme == "A4" else 0.0
         return [first * 0.5**n for n in range(8)], aim, within  # A4 errs 2**28 times less at last
