@@ -281,9 +281,8 @@ def with_mass_in_plane(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Eigenvalues (n,) and vectors (n_dofs, n), with the mass in the plane of a ribbed plate.
 
-    Without ribs it is left out, as formulas of shells do. The space is that of the
-    vectors, of what their mass in the plane bends, and of what the mass of that bends. The inverse problem keeps the
-    digits of the lowest.
+    Without ribs it is left out, as formulas of shells do. The space is that of the vectors, of what their mass in the
+    plane bends, and of what the mass of that bends. The inverse problem keeps the digits of the lowest.
     """
     if not system.ribbed or not len(values):
         return values, vectors

@@ -175,7 +175,7 @@ def towards_bends(mesh: Mesh, section: Any, kinds: list[str], coarser: float) ->
 
 
 class PlaneMass(NamedTuple):
-    """The mass of what moves besides the deflection, in the frame: a matrix, less the square of another."""
+    """The mass of what moves besides the deflection, or all of it, in the frame: a matrix, less a square of another."""
 
     whole: csc_matrix  # (n_dofs, n_dofs)
     spared: np.ndarray  # (n_dofs, n_drifts)

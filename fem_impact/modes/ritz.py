@@ -26,7 +26,7 @@ from .._base.rounding import SAME
 from ..fe import plausible, point_load
 from ..fe.assembly import System
 from ..fe.eigenvalues import Flexibility, factorise, one_thread
-from ..fe.shallow import mass_in_plane
+from ..fe.shallow import PlaneMass, mass_in_plane
 from .modal import Damping, Modes, damping_ratios
 from .shapes import ElementShapes
 
@@ -90,29 +90,26 @@ class Krylov:
         self.system = system
         self.shift = (shift / system.frame.rate) ** 2  # s**2 in the frame
         self._moving = system.M @ system.rigid
-        self._heavy, self._spared = system.M, np.zeros((system.n_dofs, 0))  # the mass, less the square of the second
-        self._eased, self._pushed = self._spared, system.rigid
+        self._mass = PlaneMass(system.M, np.zeros((system.n_dofs, 0)))
+        self._eased, self._pushed = self._mass.spared, system.rigid
         if system.ribbed:
             inert = mass_in_plane(system)
-            self._heavy, self._spared = system.M + inert.whole, inert.spared
-        self._factors = factorise(system.K + self.shift * self._heavy)
+            self._mass = PlaneMass(system.M + inert.whole, inert.spared)
+        self._factors = factorise(system.K + self.shift * self._mass.whole)
         if system.ribbed:
-            yields, pushed = self._factors.solve(self._spared), self._factors.solve(self._moving)
-            left = np.eye(yields.shape[1]) / self.shift - self._spared.T @ yields
+            spared = self._mass.spared
+            yields, pushed = self._factors.solve(spared), self._factors.solve(self._moving)
+            left = np.eye(yields.shape[1]) / self.shift - spared.T @ yields
             self._eased = yields @ np.linalg.inv(left)  # (n_dofs, n_drifts)
-            pushed += self._eased @ (self._spared.T @ pushed)
+            pushed += self._eased @ (spared.T @ pushed)
             self._pushed = pushed @ np.linalg.inv(self._moving.T @ pushed)  # (n_dofs, n_rigid)
         self._flexibility = Flexibility.of(system)
         self._begin(points)
 
-    def _weigh(self, vectors: np.ndarray) -> np.ndarray:
-        """Vectors (n_dofs, n) times the mass, with that in the plane of a ribbed plate."""
-        return self._heavy @ vectors - self._spared @ (self._spared.T @ vectors)
-
     def _solve(self, loads: np.ndarray) -> np.ndarray:
         """The inverse of K + s**2 M times loads (n_dofs, n), among motions that are not rigid."""
         found = self._factors.solve(loads)
-        return self._flexible(found + self._eased @ (self._spared.T @ found))
+        return self._flexible(found + self._eased @ (self._mass.spared.T @ found))
 
     def _flexible(self, vectors: np.ndarray) -> np.ndarray:
         """Vectors (n_dofs, n) without rigid motions."""
@@ -163,7 +160,7 @@ class Krylov:
                 if cleared is None:
                     continue
                 new = cleared
-            heavy = self._weigh(new)
+            heavy = self._mass(new)
             gram = new.T @ heavy
             length = np.sqrt((overlap**2).sum(axis=0) + gram.diagonal())  # before `overlap` was removed
             scaled = gram / np.outer(length, length)
@@ -193,7 +190,7 @@ class Krylov:
         start, end = self._latest[1:]
         latest = end - start
         both = np.vstack([self.vectors[start:end], new.T])
-        heavy = np.vstack([self._carried[:, -latest:].T, self._weigh(new).T])
+        heavy = np.vstack([self._carried[:, -latest:].T, self._mass(new).T])
         rows, worst = max(1, 2**20 // (8 * both.shape[1])), 0.0  # a piece that fits into the cache of a core
         for i in range(0, start, rows):  # a few rows at a time: memory is read once for both products
             known = self.vectors[i : min(i + rows, start)]
@@ -205,7 +202,7 @@ class Krylov:
             self._period = self._due = max(1, self._period // 4)
             return None
         self.vectors[start:end] = both[:latest]
-        self._carried[:, -latest:] = self._weigh(both[:latest].T)
+        self._carried[:, -latest:] = self._mass(both[:latest].T)
         new = both[latest:] - (both[latest:] @ self._carried[:, -latest:]) @ both[:latest]
         self._period = max(1, self._period // 2) if worst > 1e-11 else self._period + 1
         self._due = self._period
@@ -224,7 +221,7 @@ class Krylov:
         inverse = self.projected[:count, :count].copy()
         inverse = 0.5 * (inverse + inverse.T)
         latest = self.vectors[count - last : count].T
-        pushed = self.system.K @ latest + self.shift * self._weigh(latest)  # (n_dofs, last)
+        pushed = self.system.K @ latest + self.shift * self._mass(latest)  # (n_dofs, last)
         stiff = self.vectors[band] @ pushed
         rest = inverse[count - last :, band] @ stiff - np.eye(last)
         excess = np.linalg.solve(stiff[-last:].T, rest.T)  # rest = excess @ stiff[-last:]
