@@ -147,10 +147,10 @@ def notes_on_rigid(shapes: np.ndarray, mass: float, span: int) -> tuple[str, ...
     moved, notes = float(shift @ shift), []
     if np.abs(shapes @ shift - 1.0).max() > 0.01:
         return ()
-    if rank <= span < 3:
+    if shapes.shape[1] <= span < 3:
         notes.append(
-            f"the rigid motions given are {rank} of the {span + 1} of a body that nothing holds; give the others, "
-            "which turn it, as modes of 0 Hz, or free = False"
+            f"the rigid motions given are {shapes.shape[1]} of the {span + 1} of a body that nothing holds; give the "
+            "others, which turn it, as modes of 0 Hz, or free = False"
         )
     if rank > 1 and (moved > 1.01 * mass or (rank == shapes.shape[1] and moved < 0.99 * mass)):
         notes.append(
