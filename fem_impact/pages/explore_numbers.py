@@ -13,7 +13,7 @@ from .._base.check import SimulationError, ToleranceWarning
 from ..impact import force_spectrum
 from ..impact.quantities import rebound
 from ..impact.response import Response
-from ..model.playing import Strokes, strokes
+from ..model.playing import strokes
 from ..modes.modal import Modes
 from ..scenes.scene import Scene
 from ..scenes.schema import toml_text
@@ -167,15 +167,15 @@ class Explorer:
         for point in (settings.at, where)[: 1 if height > 0.0 else 2]:
             if setup.at_rest(point):
                 return {"uri": "", "note": f"Silent: the body does not move at {place(point)}."}
+        # a roll is the blow again and again on the body as it then moves
+        when = np.zeros(1) if rate is None else np.arange(max(1, round(0.75 * PLAYED * rate))) / rate
+        each = [(time, case.striker, case.contact, case.at, case.speed) for time in when.tolist()]
+        tolerance = setup.tolerance if rate is None else MAP_TOLERANCE
         try:
-            if rate is None:
-                rung: Response | Strokes = case.blow(tolerance=setup.tolerance)
-            else:  # a roll, which then rings: the blow again and again on the body as it then moves
-                when = np.arange(max(1, round(0.75 * PLAYED * rate))) / rate
-                each = [(float(time), case.striker, case.contact, case.at, case.speed) for time in when]
-                with warnings.catch_warnings():
-                    warnings.simplefilter("ignore", ToleranceWarning)
-                    rung = strokes(case.modes, each, tolerance=MAP_TOLERANCE)
+            with warnings.catch_warnings():
+                warnings.simplefilter("ignore", ToleranceWarning)  # the note says it
+                # of itself: a soft blow's sound may be less than what its force errs by
+                rung = strokes(case.modes, each, tolerance=tolerance, quantity=f"sound={sound.RATE // 2}")
             if height > 0.0:
                 heard = sound.radiate(rung, (*where, height), duration=PLAYED)
             else:
@@ -185,7 +185,8 @@ class Explorer:
         level = heard.peak_level
         raised = max(0.0, QUIET - level) if math.isfinite(level) else 0.0  # of a sound that is quiet
         note = f"Peak {heard.said}; full scale {heard.full_scale:g} {heard.unit}"
-        note = (note + (f", raised here by {raised:.1f} dB." if raised else ".")).replace("-", "−")
+        missed = "" if rung.tolerance_met else f"; it may err by {power(rung.error)} of itself"
+        note = (note + (f", raised here by {raised:.1f} dB" if raised else "") + missed + ".").replace("-", "−")
         uri = audio(heard.samples * 10.0 ** (raised / 20.0), heard.rate)
         place_of = f"{si(height, 'm', 3)} above {place(where)}" if height > 0.0 else f"the surface at {place(where)}"
         return {

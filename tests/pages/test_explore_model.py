@@ -13,6 +13,7 @@ from fem_impact.impact import accuracy
 from fem_impact.pages import explore_model, explore_numbers
 from fem_impact.scenes.scene import scene_of
 from fem_impact.scenes.schema import toml_text
+from fem_impact.show import sound
 
 
 def test_start_is_the_scene(stand):
@@ -162,3 +163,9 @@ def test_blows_and_rolls_are_heard_on_the_surface_and_above_it(explorer):
     assert "the surface at" in on["note"] and " above (" in above["note"] and "Pa; full scale" in above["note"]
     assert len({on["uri"], above["uri"], roll["uri"]}) == 3
     assert all(each["uri"].startswith("data:audio/wav;base64,") for each in (on, above, roll))
+    soft = replace(start, stiffness=1e-4 * start.stiffness)  # contact lasts 40 times as long: next to nothing rings
+    case, asked = explorer.setup.case(soft), f"sound={sound.RATE // 2}"
+    right = sound.synthesise(case.blow(tolerance=1e-6, quantity=asked), where, duration=1.0)
+    for rate in (None, 3.0):  # far apart, the blows of a roll are alike
+        heard = explorer.listen(soft, where, 0.0, rate)
+        assert heard["peak"] == pytest.approx(right.full_scale * 10.0 ** (right.peak_level / 20.0), rel=0.02)
