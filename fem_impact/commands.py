@@ -40,7 +40,6 @@ def run_strike(options: argparse.Namespace) -> Answer:
     from ._base import check  # imported only when needed
     from .impact import promise
     from .model.target import Stages
-    from .scenes import band
     from .show.painter import Painter
 
     began = time.perf_counter()
@@ -48,6 +47,8 @@ def run_strike(options: argparse.Namespace) -> Answer:
     if options.listener is not None:
         scene = scene.heard_from(*options.listener)
     if options.band:
+        from .scenes import band  # loads libraries that no other strike needs
+
         band.check_known(scene)
     if options.film:
         check.extra("imageio_ffmpeg", "film", "an MP4 file")

@@ -178,17 +178,28 @@ def test_summary_keeps_to_the_width_of_the_terminal(scene, prompt, monkeypatch, 
     assert ran.status == 0 and all(len(line.split()) == 1 for line in long)  # a path is never cut
 
 
-def test_help_and_version_load_nothing_heavy():
+HEAVY = {"numpy", "scipy", "skfem", "numba", "matplotlib", "vtk", "pyvista", "meshio", "netgen", "shapely"}
+TABLES = {"xarray", "pandas", "scipy.stats"}  # of maps, spreads and fits: as long to load as a small blow takes
+
+
+@pytest.mark.parametrize(
+    ("words", "said", "heavy"),
+    [
+        ("--help", "strike", HEAVY),
+        ("--version", fi.__version__, HEAVY),
+        pytest.param("strike small.toml", "restitution", TABLES, marks=pytest.mark.slow),
+    ],
+)
+def test_commands_load_nothing_that_they_do_not_need(scene, words, said, heavy):
     code = (
         "import sys; from fem_impact import cli\n"
-        "try: cli.main(sys.argv[1:])\nexcept SystemExit as end: assert not end.code\n"
-        "heavy = {'numpy', 'scipy', 'skfem', 'numba', 'matplotlib', 'vtk', 'pyvista', 'meshio', 'netgen', 'shapely'}\n"
-        "assert not heavy & set(sys.modules), heavy & set(sys.modules)"
+        "try: assert not cli.main(sys.argv[1:])\nexcept SystemExit as end: assert not end.code\n"
+        f"assert not {heavy} & set(sys.modules), {heavy} & set(sys.modules)"
     )
-    for option, word in (("--help", "strike"), ("--version", fi.__version__)):
-        run = subprocess.run([sys.executable, "-c", code, option], capture_output=True, text=True)
-        assert run.returncode == 0, run.stderr
-        assert word in run.stdout
+    command = [sys.executable, "-c", code, *words.split()]
+    run = subprocess.run(command, capture_output=True, text=True, cwd=scene.parent)
+    assert run.returncode == 0, run.stderr
+    assert said in run.stdout
 
 
 def test_closed_pipe_is_no_error(scene, tmp_path):

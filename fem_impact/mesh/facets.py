@@ -1,6 +1,6 @@
 """Curved boundary facets, written as a height above the chord."""
 
-from math import comb
+from math import comb, perm
 from typing import Any
 
 import numpy as np
@@ -31,8 +31,7 @@ def powers(x: np.ndarray, highest: int, order: int) -> np.ndarray:
     """The ``order``-th derivative of x**0 ... x**highest, (..., highest + 1)."""
     result = np.zeros((*x.shape, highest + 1))
     for k in range(order, highest + 1):
-        factor = float(np.prod(np.arange(k - order + 1, k + 1))) if order else 1.0
-        result[..., k] = factor * x ** (k - order)
+        result[..., k] = perm(k, order) * x ** (k - order)
     return result
 
 
@@ -71,17 +70,22 @@ class Curves:
         point, tangent, _ = self.at(np.full(len(self.p), 0.5))
         return point, np.column_stack([tangent[:, 1], -tangent[:, 0]])
 
+    def point(self, share: np.ndarray) -> np.ndarray:
+        """Points (n, 2) at chord parameters s = ``share`` (n,)."""
+        s = np.asarray(share, float)[:, None]
+        rise = s * (1.0 - s) * (self.p[:, None] * powers(s, 4, 0)).sum(axis=2)
+        return self.centre + (s - 0.5) * self.length[:, None] * self.along + rise * self.out
+
     def at(self, share: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Points (n, 2), unit tangents (n, 2) and curvatures (n,) at chord parameters s = ``share`` (n,)."""
         s = np.asarray(share, float)[:, None]
         p, dp, d2p = ((self.p[:, None] * powers(s, 4, k)).sum(axis=2) for k in range(3))
         bump, slope = s * (1.0 - s), 1.0 - 2.0 * s
         length = self.length[:, None]
-        point = self.centre + (s - 0.5) * length * self.along + bump * p * self.out
         lean = (slope * p + bump * dp) / length
         second = (-2.0 * p + 2.0 * slope * dp + bump * d2p) / length**2
         stretch = np.hypot(1.0, lean)
-        return point, (self.along + lean * self.out) / stretch, (-second / stretch**3)[:, 0]
+        return self.point(share), (self.along + lean * self.out) / stretch, (-second / stretch**3)[:, 0]
 
     def controls(self) -> np.ndarray:
         """Control points (n, 7, 2) of the curves as Bezier pieces of degree six."""
@@ -96,13 +100,13 @@ class Curves:
 
     def halfway(self, low: np.ndarray, high: np.ndarray) -> np.ndarray:
         """Point (n, 2) of each part from s = ``low`` to ``high`` that lies equally far from both ends of the part."""
-        a, b = self.at(low)[0], self.at(high)[0]
+        a, b = self.point(low), self.point(high)
         chord = b - a
         share = 0.5 * (low + high)
         for _ in range(CURVE_STEPS):
-            short = ((self.at(share)[0] - 0.5 * (a + b)) * chord).sum(axis=1) / (chord**2).sum(axis=1)
+            short = ((self.point(share) - 0.5 * (a + b)) * chord).sum(axis=1) / (chord**2).sum(axis=1)
             share = share - (high - low) * short
-        return self.at(share)[0]
+        return self.point(share)
 
 
 def divide_facets(

@@ -8,7 +8,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import xarray
 
 from .._base import check, files, kept
 from ..fe.section import Material
@@ -240,6 +239,8 @@ def _of_strike(path: Path) -> tuple[dict[str, Any], list[str]]:
 
 
 def _of_map(path: Path) -> tuple[dict[str, Any], list[str]]:
+    import xarray  # no other folder of results needs it
+
     try:
         with xarray.open_dataset(path, engine="scipy" if path.suffix == ".nc" else "zarr") as table:
             counts = table["n_impacts"].load()

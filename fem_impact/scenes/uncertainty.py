@@ -25,8 +25,8 @@ from ..modes.modal import Damping, Modes
 from ..show import export, figures
 from ..sweeps import bodies, grid
 from ..sweeps.cases import Cases, fewer_values, solve_all, try_each
-from ..sweeps.cells import ALIASES, AXES, LAW, Case
-from ..sweeps.inputs import REACH, Input, correlating_matrix, drawn_inputs, read_inputs, shares, sobol_points
+from ..sweeps.cells import ALIASES, AXES, LAW, REACH, Case
+from ..sweeps.inputs import Input, correlating_matrix, drawn_inputs, read_inputs, shares, sobol_points
 from ..sweeps.spreads import DOUBLE, QUANTITIES, Checks, Spread
 from ..sweeps.store import Texts
 from .maps import MOST_ROWS, changed_scene

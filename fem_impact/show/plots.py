@@ -15,12 +15,14 @@ from matplotlib.patheffects import withStroke
 from matplotlib.ticker import EngFormatter, LogLocator, MaxNLocator, NullFormatter
 from scipy.interpolate import RegularGridInterpolator
 
+from .._base import check, markup
 from ..impact import accuracy
 from ..modes.modal import Modes
 from ..references.case import ReferenceVerdict
 from ..sweeps.hammers import Hammer, half_sine_reach
+from ..sweeps.spreads import DOUBLE, QUANTITIES, Spread, double_hits
 from . import sampling
-from .figures import TICKS, styled
+from .figures import NAMES, TICKS, styled
 from .style import BLUE, GREEN, GREY, ORANGE, PALETTE, PURPLE, SKY, VERMILION, draw_rim, set_units
 
 BLACK = "#222222"
@@ -317,3 +319,86 @@ def set_ticks(axes: Any, low: float, high: float, log: bool) -> None:
     axes.xaxis.set_major_locator(LogLocator(numticks=TICKS, subs=(1.0, 3.0) if high < 100.0 * low else (1.0,)))
     axes.xaxis.set_major_formatter("{x:.0e}")
     axes.xaxis.set_minor_formatter("")
+
+
+@check.typed
+def spread(found: Spread) -> Figure:
+    """A row for each quantity that varies: its distribution, the input that matters most, and shares of inputs."""
+    rows = [name for name in found.varying if name != DOUBLE] or ["restitution"]
+    with styled(11.0, 0.9 + 1.95 * len(rows)) as figure:
+        panels = figure.subplots(len(rows), 3, squeeze=False, width_ratios=(1.1, 1.1, 1.0))
+        for (left, middle, right), name in zip(panels, rows):
+            _histogram(left, found, name)
+            _leading_input(middle, found, name)
+            _bars(right, found, name)
+        kind = "variance explained (Sobol)" if found.shares else "squared rank correlation"
+        for panel, title in zip(panels[0], ("distribution, median, 90 %", "against the leading input, 90 %", kind)):
+            panel.set_title(title)
+        keys = next((named for panel in panels[:, 2] if (named := panel.get_legend_handles_labels())[0]), None)
+        if keys is not None:
+            figure.legend(*keys, loc="outside lower right", ncols=2, fontsize=8)  # beside the bars of the same colours
+        figure.suptitle(
+            f"{markup.literal(found.title or 'Spread')}: {len(found.own)} independent blows; "
+            f"double hits: {double_hits(found)}",
+            fontsize=11,
+        )
+    return figure
+
+
+def _histogram(axes: Any, found: Spread, name: str) -> None:
+    values = found.values(name)
+    if name == "n_impacts":
+        counts = np.arange(values.min(), values.max() + 1.0)
+        axes.bar(counts, [100.0 * (values == count).mean() for count in counts], 0.8, color=BLUE)
+        axes.xaxis.set_major_locator(MaxNLocator(TICKS, integer=True))
+    else:
+        low, high = np.quantile(values, (0.001, 0.999))
+        weights = np.full(len(values), 100.0 / len(values))
+        axes.hist(values, 60, range=(low, high) if low < high else None, color=BLUE, weights=weights)
+        for level, style in ((0.05, ":"), (0.5, "-"), (0.95, ":")):
+            each = found.quantile(name, level)
+            axes.axvline(each.value, color=VERMILION, ls=style, lw=1.2)
+            axes.axvspan(each.low, each.high, color=VERMILION, alpha=0.25, lw=0)
+        axes.xaxis.set_major_locator(MaxNLocator(TICKS))
+    axes.set(xlabel=NAMES[name], ylabel="blows [%]")
+    set_units(axes, QUANTITIES[name][0])
+
+
+def _leading_input(axes: Any, found: Spread, name: str) -> None:
+    """The quantity over the input with the largest share."""
+    order = found.ranking(name)
+    if not order:
+        axes.set_axis_off()
+        return
+    first = order[0][0]
+    x, y = found.values(first), found.values(name)
+    parts = np.array_split(np.argsort(x, kind="stable"), min(16, max(1, len(x) // 4)))  # of equally many blows
+    low, middle, high = np.array([np.quantile(y[part], (0.05, 0.5, 0.95)) for part in parts]).T
+    if name == "n_impacts":
+        middle = np.array([y[part].mean() for part in parts])
+    place = [np.median(x[part]) for part in parts]
+    axes.fill_between(place, low, high, color=GREEN, alpha=0.25, lw=0)
+    axes.plot(place, middle, color=GREEN)
+    unit = found.table[first].attrs["units"]
+    axes.set(xlabel=first if unit == "1" else f"{first} [{unit}]", ylabel=NAMES[name])
+    axes.xaxis.set_major_locator(MaxNLocator(TICKS))
+    axes.xaxis.set_major_formatter(EngFormatter(sep=" ") if np.abs(x).max() >= 1e4 else "{x:g}")
+    set_units(axes, y=QUANTITIES[name][0])
+
+
+def _bars(axes: Any, found: Spread, name: str) -> None:
+    """Shares of the inputs, the largest on top."""
+    order = found.ranking(name)
+    place, shares = np.arange(len(order))[::-1], found.shares.get(name)
+    if shares:
+        for kind, height, colour in (("total", 0.72, "#BBBBBB"), ("first", 0.4, BLUE)):
+            each = [getattr(shares[key], kind) for key, _ in order]
+            value, high = 100.0 * np.array([(one.value, one.high) for one in each]).T
+            bars: dict[str, Any] = {"xerr": high - value, "ecolor": "#555555", "error_kw": {"lw": 1.0}}
+            axes.barh(place, value, height, color=colour, label=f"{kind} order", **bars)
+    else:
+        axes.barh(place, [100.0 * share for _, share in order], 0.6, color=BLUE)
+    names = [key if len(key) <= 26 else f"{key[:26]}..." for key, _ in order]  # so long a name fits beside its bar
+    axes.set_yticks(place, names, fontsize=8)
+    axes.set(xlim=(0.0, 105.0), xlabel="[%]")
+    axes.grid(False, axis="y")

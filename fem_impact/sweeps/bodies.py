@@ -27,8 +27,7 @@ from ..model.vectors import RitzTarget
 from ..modes.modal import Modes, damping_ratios
 from ..modes.shapes import FieldShapes, SampledShapes
 from .batches import allowed_error
-from .cells import Case, checked_axes, sample_modes
-from .inputs import REACH
+from .cells import REACH, Case, checked_axes, sample_modes
 
 Axes = Mapping[str, np.ndarray]
 Views = Mapping[tuple[float, ...], Modes]

@@ -17,7 +17,6 @@ from ..impact.striker import Striker
 from ..model.audit import with_examiner
 from ..modes.modal import Modes
 from ..modes.shapes import SampledShapes, compliance_errors
-from .inputs import REACH
 
 AXES = {  # name: unit, what it is, its name in a scene file
     "mass": ("kg", "mass of the striker", "striker.mass"),
@@ -42,6 +41,7 @@ FAMILY_AXES = ("at", "target_frequency", "striker_frequency", "damping_ratio")  
 # [-] values along an axis that has no count: 160 000 cells together take some 2 s, 10 000 alone some 20 s
 SIDE = {True: 400, False: 100}
 MOST_VALUES = 10**6  # [-] most values along one axis of a map
+REACH = 1e30  # [SI] numbers of a blow lie between 1/REACH and REACH: beyond, the kernels never finish
 
 
 def read_axis(name: str, values: Any) -> Any:

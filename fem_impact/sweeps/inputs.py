@@ -10,8 +10,7 @@ from scipy import stats
 from scipy.stats import qmc
 
 from .._base import check
-
-REACH = 1e30  # [SI] numbers of a blow lie between 1/REACH and REACH: beyond, the kernels never finish
+from .cells import REACH
 
 # kind: the names of its numbers, and the distribution they make
 KINDS: dict[str, tuple[tuple[str, ...], Callable[..., Any]]] = {
