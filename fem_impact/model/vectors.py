@@ -18,7 +18,7 @@ from ..fe.section import Plate
 from ..fe.splitting import DEPTH
 from ..impact.error import Error
 from ..modes.modal import Modes
-from ..modes.ritz import Krylov
+from ..modes.ritz import Krylov, grow_together
 from . import cost
 from .budget import NOTCH
 from .target import Elements, Stages, Target
@@ -140,7 +140,7 @@ class RitzTarget:
     """A target by Ritz vectors for a blow at a point, or at several; on a rigid wall the contact has a resonance [Hz].
 
     The resonance and the tolerance decide on shift and first number of vectors, unless these are given. Every mesh is
-    factorised once for all its points, and the vectors of each point then cost one solution each.
+    factorised once for all its points, and one solution then gives a vector of each.
     """
 
     fine: list[Krylov]  # of each point
@@ -194,8 +194,11 @@ class RitzTarget:
         """
         fine, coarse = self.fine[point], self.coarse[point]
         with self.stages("vectors"):
+            grow_together(self.fine, self.count)
             found = fine.modes(self.count)
-            other = coarse.modes(found.n_modes - fine.system.rigid.shape[1])  # as many vectors on either mesh
+            count = found.n_modes - fine.system.rigid.shape[1]  # as many vectors on either mesh
+            grow_together(self.coarse, count)
+            other = coarse.modes(count)
         found, target = replace(found, poorer={"mesh": other, **found.poorer}), self.target
         # scaled and damped like modes, although their first is no mode
         found = found.stretched(target.scale.get("mass", found.mass) / found.mass, target.stretch)

@@ -14,6 +14,7 @@ Wilson, Yuan and Dickens (1982), Earthquake Eng. Struct. Dyn. 10, 813-821 (load-
 Meurant (2010), Matrices, Moments and Quadrature, ch. 6 (Lanczos and Gauss quadrature).
 """
 
+from collections.abc import Sequence
 from copy import copy
 from dataclasses import dataclass, replace
 from typing import Any
@@ -130,7 +131,6 @@ class Krylov:
         self._carried = np.zeros((system.n_dofs, 0))  # M times the two latest blocks of vectors
         self._latest = 0, 0, 0  # where the two latest blocks of vectors begin, and where they end
         self._period, self._due = 1, 1  # [-] blocks between two looks at all vectors, and blocks until the next one
-        self._sound = self.count, self._latest, self._carried, self._next  # at the last that are known to be orthogonal
 
     def beside(self, points: np.ndarray) -> "Krylov":
         """Vectors started from other points, with the same factorisations."""
@@ -138,48 +138,52 @@ class Krylov:
         other._begin(points)
         return other
 
-    @one_thread
     def grow(self, count: int) -> None:
         """Make vectors until there are at least ``count``, or all that the loads can reach."""
+        grow_together([self], count)
+
+    def _extended(self, count: int) -> bool:
+        """Whether vectors were too few and ``_next`` gave more; it is now the load whose solution gives those after."""
         most = min(count, self.system.n_dofs - self.system.rigid.shape[1])
+        if self.count >= most or self.full:
+            return False
         if most + self.width - 1 > len(self.vectors):  # memory for more to come is not used until they do
             room = 2 * (most + self.width - 1)
             vectors = np.empty((room, self.system.n_dofs))
             vectors[: self.count] = self.vectors[: self.count]
             self.projected = np.pad(self.projected, (0, room - len(self.projected)))
             self.vectors = vectors
-        while self.count < most and not self.full:
-            before, start, end = self._latest
-            overlap = self._carried.T @ self._next  # in exact arithmetic only the two latest blocks overlap
-            self.projected[before:end, start:end] = overlap[:, : end - start]
-            new = self._next - self.vectors[before:end].T @ overlap
-            new = self._flexible(new)
-            self._due -= 1
-            if end and self._due <= 0:
-                cleared = self._cleared(new)
-                if cleared is None:
-                    continue
-                new = cleared
-            heavy = self._mass(new)
-            gram = new.T @ heavy
-            length = np.sqrt((overlap**2).sum(axis=0) + gram.diagonal())  # before `overlap` was removed
-            scaled = gram / np.outer(length, length)
-            value, turn = np.linalg.eigh(scaled) if self.width > 1 else (scaled[0], np.ones((1, 1)))
-            kept = value > SAME**2  # shorter parts of a vector before orthogonalisation add nothing
-            if not kept.any():
-                self.full = True
-                return
-            unit = (turn[:, kept] / np.sqrt(value[kept])) / length[:, None]
-            stop = end + unit.shape[1]
-            self.vectors[end:stop] = (new @ unit).T
-            self.projected[end:stop, start:end] = (unit.T @ gram)[:, : end - start]
-            self.projected[start:end, end:stop] = self.projected[end:stop, start:end].T
-            latest = np.ascontiguousarray(heavy @ unit)
-            self._carried = np.hstack([self._carried[:, start - before :], latest])
-            self.count, self._latest = stop, (start, end, stop)
-            self._next = self._solve(latest)
-            if self._due == self._period:  # all vectors have just been looked at
-                self._sound = self.count, self._latest, self._carried, self._next
+        if self._due == self._period:  # all vectors have just been looked at
+            self._sound = self.count, self._latest, self._carried, self._next  # at the last that are orthogonal
+        before, start, end = self._latest
+        overlap = self._carried.T @ self._next  # in exact arithmetic only the two latest blocks overlap
+        self.projected[before:end, start:end] = overlap[:, : end - start]
+        new = self._next - self.vectors[before:end].T @ overlap
+        new = self._flexible(new)
+        self._due -= 1
+        if end and self._due <= 0:
+            cleared = self._cleared(new)
+            if cleared is None:
+                return self._extended(count)
+            new = cleared
+        heavy = self._mass(new)
+        gram = new.T @ heavy
+        length = np.sqrt((overlap**2).sum(axis=0) + gram.diagonal())  # before `overlap` was removed
+        scaled = gram / np.outer(length, length)
+        value, turn = np.linalg.eigh(scaled) if self.width > 1 else (scaled[0], np.ones((1, 1)))
+        kept = value > SAME**2  # shorter parts of a vector before orthogonalisation add nothing
+        if not kept.any():
+            self.full = True
+            return False
+        unit = (turn[:, kept] / np.sqrt(value[kept])) / length[:, None]
+        stop = end + unit.shape[1]
+        self.vectors[end:stop] = (new @ unit).T
+        self.projected[end:stop, start:end] = (unit.T @ gram)[:, : end - start]
+        self.projected[start:end, end:stop] = self.projected[end:stop, start:end].T
+        self._next = np.ascontiguousarray(heavy @ unit)
+        self._carried = np.hstack([self._carried[:, start - before :], self._next])
+        self.count, self._latest = stop, (start, end, stop)
+        return True
 
     def _cleared(self, new: np.ndarray) -> np.ndarray | None:
         """New vectors without the parts along earlier ones that rounding brought back; clears the latest block alike.
@@ -266,6 +270,18 @@ class Krylov:
         notes = (*self.system.notes, *plausible.notes_on_damping(damping, omega))
         no_error = np.zeros(len(omega))
         return Modes(omega, damping, shapes, self.system.mass, no_error, notes=notes, section=self.system.section)
+
+
+@one_thread
+def grow_together(several: Sequence[Krylov], count: int) -> None:
+    """Make vectors of `Krylov.beside` each other until each has ``count``, or all that its loads can reach.
+
+    A solution mostly waits for the factors from memory: side by side, eight take half as long each.
+    """
+    while growing := [one for one in several if one._extended(count)]:
+        found = growing[0]._solve(np.hstack([one._next for one in growing]))
+        for one in growing:
+            one._next, found = np.hsplit(found, [one._next.shape[1]])
 
 
 @dataclass(frozen=True, eq=False, repr=False)

@@ -314,15 +314,18 @@ def test_each_point_has_the_vectors_that_it_would_have_alone(monkeypatch):
     first = Krylov(system, POINTS[:1], shift)
     shared = [first, *(first.beside(point[None]) for point in POINTS[1:])]
     assert len(made) == 1
+    ritz.grow_together(shared, 30)
     for point, found in zip(POINTS, shared):
         alone = Krylov(system, point[None], shift).modes(30, 0.01)
-        np.testing.assert_allclose(found.modes(30, 0.01).omega, alone.omega, rtol=1e-12)  # the same operations
+        np.testing.assert_allclose(found.modes(30, 0.01).omega, alone.omega, rtol=1e-10)  # rounding of several loads
         np.testing.assert_allclose(found.modes(30, 0.01).shape_at([point]), alone.shape_at([point]), rtol=1e-9)
 
 
 @pytest.mark.slow
-def test_views_of_a_body_are_as_soft_as_the_body_is_there():
+def test_views_of_a_body_are_as_soft_as_the_body_is_there(monkeypatch):
     """Vectors start with the static deflection under the load, so that the compliance is that of the mesh."""
+    solved, solve = [], Krylov._solve
+    monkeypatch.setattr(Krylov, "_solve", lambda one, loads: solved.append(loads.shape[1]) or solve(one, loads))
     target = Target.of(plate(near=POINTS))
     seen = vectors.RitzTarget(target, POINTS, 300.0, 1e-2, Elements(0.03), False, Stages())
     closed = fi.analytic.closed_form(target.mesh, target.section, {"boundary": "hinged"})(n_modes=20)
@@ -332,6 +335,7 @@ def test_views_of_a_body_are_as_soft_as_the_body_is_there():
         # 1e-5 by the elements that shrink towards the blow
         np.testing.assert_allclose(modes.modal_compliance([point]), closed.shapes.compliance(point[None]), rtol=1e-4)
         assert list(modes.poorer) == ["mesh", "truncation"]
+    assert solved == [len(POINTS)] * (2 * seen.count)  # on either mesh one solution gives a vector of each point
 
 
 def test_a_mesh_file_much_finer_than_needed_costs_no_more_than_a_mesh_made_here(tmp_path):
