@@ -12,7 +12,7 @@ import numpy as np
 
 from .._base import check, markup
 from .._base.explained import lines_of_notes
-from ..impact import balance, spectra
+from ..impact import balance, promise, spectra
 from ..impact.assumption import SILENT, Assumption
 from ..impact.quantities import NAMES as QUANTITY_NAMES
 from ..impact.quantities import rebound
@@ -268,10 +268,11 @@ def _sounds(scene: Scene, response: Response | Strokes) -> list[dict[str, str]]:
             for bound, pressure in zip(hearing.BOUNDS[len(sounds)], sounds):
                 air = f" without a baffle, {BOUND[bound]}; {hearing.stated_level(sounds)}" if bound else ""
                 found.append((f"Sound radiated{where}{air}", pressure))
-    players = []
+    players, doubt = [], promise.doubt_of_sound(response, 0.5 * sound.RATE)
     for name, samples in found:
         level = samples.peak_level
         stated = f"peak {samples.said}; full scale {samples.full_scale:g} {samples.unit}, as in every report"
+        stated += f"; this {doubt}" if doubt else ""
         players.append({"name": name, "note": stated, "uri": audio(samples.samples, samples.rate)})
         if -math.inf < level < QUIET:
             raised = audio(samples.samples * 10.0 ** (-level / 20.0), samples.rate)

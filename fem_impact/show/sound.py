@@ -535,8 +535,8 @@ def beside(listener: Any) -> np.ndarray:
 
 def _audible(response: Response | Strokes, rate: int) -> tuple[int, np.ndarray]:
     rate = check.count("rate", rate, high=HIGHEST_RATE)
-    for hit in (response,) if isinstance(response, Response) else response.hits:
-        promise.warn_of_sound(hit, 0.5 * rate)
+    if doubt := promise.doubt_of_sound(response, 0.5 * rate):
+        promise.warn(doubt)
     return rate, (response.target.omega > 0.0) & (response.target.omega < np.pi * rate)
 
 

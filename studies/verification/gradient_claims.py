@@ -20,7 +20,7 @@ from pathlib import Path
 import numpy as np
 
 import fem_impact as fi
-from fem_impact.impact import engine, gradient
+from fem_impact.impact import engine, force_spectrum, gradient
 from fem_impact.show import plots
 from fem_impact.show.figures import styled
 
@@ -72,8 +72,7 @@ def told(hit, frequencies):
 
     The largest force and its time are those of finer steps.
     """
-    size = np.abs(hit.spectrum(frequencies))
-    centroid = np.trapezoid(frequencies * size, frequencies) / np.trapezoid(size, frequencies)
+    centroid = force_spectrum.centroid(frequencies, hit.spectrum(frequencies))
     when, force = gradient.peak_of_force(engine.follow_again(hit.history, gradient.step_of(hit) / 4.0))
     return np.array([hit.restitution, hit.impulse, hit.contact_time, force, when, centroid])
 

@@ -4,6 +4,7 @@ import base64
 import html
 import json
 import re
+import warnings
 from functools import partial
 from pathlib import Path
 
@@ -299,6 +300,15 @@ def test_a_report_begins_with_what_was_missed_and_what_would_meet_it(tmp_path):
     page = (tmp_path / "report.html").read_text()
     head = page[page.index("<header>") : page.index("</header>")]
     assert 'class="badge bad"' in head and "MISSED" in head and "modes of the target instead of 5" in head
+
+
+def test_page_says_of_a_soft_blow_that_its_sound_was_not_asked_for(tmp_path):
+    soft = load_text(tmp_path, TITLED.replace("695e3", "70"))
+    for quantity, doubt in ((None, True), ("sound=24000", False)):
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", fi.ToleranceWarning)
+            fi.report.write(tmp_path / "soft.html", soft, soft.run(quantity=quantity, motion=True))
+        assert ("may err by" in (tmp_path / "soft.html").read_text()) == doubt
 
 
 def test_data_cannot_close_the_script_around_them_and_are_json():
