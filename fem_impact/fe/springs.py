@@ -1,6 +1,6 @@
 """Springs along the edges of a body, and checks of its point masses."""
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -31,6 +31,12 @@ def edge_stiffness(supports: Sequence[Any], frame: Any) -> np.ndarray:
     """Stiffness (n_facets, 2) of supports against deflection and slope of each facet, in the frame's units."""
     pairs = [(kind.stiffness, kind.rotation) if isinstance(kind, Elastic) else (0.0, 0.0) for kind in supports]
     return np.array(pairs).reshape(-1, 2) * [frame.length**3, frame.length] / frame.stiffness
+
+
+def is_sprung(supports: Mapping[str, Any], posts: Iterable[Any]) -> bool:
+    """Whether edges or points, of pairs of place and "hinged" or stiffness [N/m], are held by springs."""
+    stiff = [stiffness for _, stiffness in posts if not isinstance(stiffness, str)]
+    return any(isinstance(held, Elastic) for held in supports.values()) or bool(np.isfinite(stiff).any())
 
 
 def _listed(name: str, given: Any, pairs: str) -> Sequence[Any]:

@@ -9,9 +9,10 @@ import numpy as np
 
 from .._base import check
 from .._base.rounding import ROUNDING
-from ..fe.section import Beam, Elastic, Plate
+from ..fe.section import Beam, Plate
+from ..fe.springs import is_sprung
 from ..fe.variation import DIFFERENCES, SectionChange
-from ..modes import varied
+from ..modes import varied, viewing
 from ..modes.modal import Modes
 from . import motion
 from .compiled.bundles import KernelSystem
@@ -167,8 +168,7 @@ class Parameters(check.Brief):
         if not self.struck:
             return "only the target of `strike` has one; take the mass and first frequency of the body"
         target = self.hit.bodies[-1]
-        section = target.section
-        system = getattr(target.shapes, "system", None)
+        section, system = target.section, viewing.body_of(target)
         if self.why_no_target:
             return self.why_no_target
         if section is None:
@@ -179,8 +179,7 @@ class Parameters(check.Brief):
             return "a curved, ribbed or unevenly layered plate does not scale by powers of its numbers; give sections"
         if isinstance(section, Plate) and (section.tension or section.material.E_across is not None):
             return "the effect of E cannot be separated from that of tension or grain; rescale modes instead"
-        held = () if system is None else system.supports.values()
-        if any(isinstance(each, Elastic) for each in held) or (system is not None and system.point_masses):
+        if system is not None and (is_sprung(system.supports, system.point_supports) or system.point_masses):
             return "springs and point masses on the target do not scale with it"
         return ""
 

@@ -14,7 +14,8 @@ import xarray
 from .._base import check, progress
 from ..fe import plausible
 from ..fe.assembly import System, reassemble
-from ..fe.section import Beam, Elastic, Plate
+from ..fe.section import Beam, Plate
+from ..fe.springs import is_sprung
 from ..impact.contact import Contact
 from ..impact.measured import ENDS
 from ..impact.parameters import BAR, PLATE, ROD
@@ -234,7 +235,7 @@ class _SpreadAsked:
         """The body's own value of an input, which must be one number."""
         target, section = self.blow.target, self.blow.target.section
         if name == SIZE:
-            springs = any(isinstance(held, Elastic) for held in target.supports.values())
+            springs = is_sprung(target.supports, target.point_supports)
             pulled = isinstance(section, Plate) and (section.tension or not section.plain)
             stiff = springs or pulled or target.thick or target.air
             if target.mesh is None or stiff or target.point_masses or target.scale:  # lengths do not scale exactly

@@ -171,6 +171,11 @@ def test_size_is_refused_where_modes_do_not_scale_and_so_are_arguments_of_others
     held = scene(RIGID.replace('boundary = "hinged"', "boundary = { stiffness = 1e4 }"))
     with pytest.raises(ValueError, match=r"target.size needs a thin body"):
         fi.spread(held, {"target.size": "uniform(0.9, 1.1)"}, n=8)
+    section = fi.Beam.rectangular(fi.Material(E=210e9, nu=0.3, rho=7850.0), width=0.02, height=0.005)
+    bar = fi.assemble(fi.mesh.line(0.5), section, point_supports=[(0.11, 3e4), (0.39, 3e4)])  # as in soft cords
+    blow = fi.Striker.rigid(0.02), fi.Contact.linear(3e4)
+    with pytest.raises(ValueError, match=r"target.size needs a thin body"):
+        fi.spread(bar, {"target.size": "uniform(0.9, 1.1)"}, *blow, at=0.25, speed=1.0, n=8)
     vary = {"striker.mass": "lognormal(0.1, 0.1)"}
     with pytest.raises(ValueError, match="speed must be left out for a scene"):
         fi.spread(scene(), vary, speed=1.0)
