@@ -10,10 +10,11 @@ from numpy.typing import ArrayLike
 from .._base import check
 from ..mesh.meshes import Mesh, aligned, mesh_with_holes
 from .constraints import Attached, load_and_release
-from .corners import Singular, around_corners
+from .corners import Singular, around_corners, around_plane_corners
 from .euler import EULER
 from .interpolation import Interpolation
 from .kirchhoff import ARGYRIS, MORLEY
+from .plates import words_in_plane
 from .ribs import Rib, mesh_along_ribs
 from .section import KINDS, Beam, Elastic, Plate, size_at
 from .shallow import SHALLOW
@@ -217,6 +218,8 @@ def _graded_mesh(
 
     corners, fine = around_corners(mesh, kinds(mesh), section.material)
     fine = fine if graded else mesh
+    if graded and rules is SHALLOW:
+        fine = around_plane_corners(fine, words_in_plane(fine, section, kinds(fine)), section, layer)
     if rules.layered is not None:
         fine = rules.layered(fine, section, kinds(fine), layer)
     if len(points):

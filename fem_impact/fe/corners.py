@@ -1,14 +1,15 @@
-"""Find how singular a plate is at its corners, and put triangles there that shrink geometrically."""
+"""Find how singular a plate and its plane are at corners, and put triangles there that shrink geometrically."""
 
 from collections.abc import Sequence
 from functools import lru_cache
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from .._base.rounding import HALVINGS, SAME
 from ..mesh.meshes import Mesh
 from .material import Material, rotated_stiffness
+from .section import Plate
 from .splitting import Rim, split_quadrilateral
 
 # [-] size of each ring of triangles over that of the ring around it: 0.7 takes twice the rings, 0.35 slimmer cells
@@ -18,7 +19,8 @@ WIDE = 0.7
 # [-] share of the energy that the innermost ring may miss; twice the frequency error, far below usual tolerances
 CORNER_ERROR = 1e-7
 SMALLEST = 1e-10  # [-] smallest ring as a fraction of the extent; rounding of the coordinates spoils smaller ones
-SMALLEST_FREE = 3e-3  # [-] the same at a free corner, which moves: rounding grows with the ring's size to the -2
+# [-] the same at a free corner, which moves: rounding grows with the ring's size to the -2; and in the plane
+SMALLEST_FREE = 3e-3
 MILD = 2.95  # [-] corners with a larger exponent get no rings: there rings cost quintic triangles more than they gain
 MILD_FREE = 2.5  # [-] the same between free edges, where the singular part is small, so that rings pay off later
 # [-] roots mu that lie closer, over their imaginary part, are taken apart: those of an isotropic plate are equal, and
@@ -51,6 +53,31 @@ def _determinant(z: np.ndarray, angle: float, kinds: tuple[str, str], mu: np.nda
     return np.linalg.det(matrix) / ((z - 1.0) * (z - 2.0))  # the basis alone causes these two zeros
 
 
+def _four_roots(equation: list[float]) -> np.ndarray:
+    """The four numbers mu (4,) for which any function of x + mu y solves an equation without load."""
+    upper = sorted(np.roots(equation), key=lambda root: root.imag)[2:]  # above the real axis, which rounding may hide
+    one, other = (complex(root.real, max(root.imag, SAME)) for root in upper)
+    if abs(one - other) < APART * one.imag:
+        middle, half = 0.5 * (one + other), 0.5j * APART * one.imag
+        one, other = middle + half, middle - half
+    return np.array([one, other, np.conj(one), np.conj(other)])
+
+
+def _secant(function: Any, z: np.ndarray, most: float, least: float) -> tuple[np.ndarray, np.ndarray]:
+    """Where secant steps end that start at points z (n,) all at once, with real parts within bounds, and one before."""
+    before = z + 1e-3
+    value_before = function(before)
+    for _ in range(40):
+        value = function(z)
+        change = value - value_before
+        step = np.where(change == 0.0, 0.0, value * (z - before) / np.where(change == 0.0, 1.0, change))
+        step = step * np.minimum(1.0, 0.3 / np.maximum(np.abs(step), 1e-300))
+        before, value_before, z = z, value, z - step
+        z = np.clip(z.real, least + 1e-6, most) + 1j * np.clip(z.imag, -3.0, 3.0)
+        z = np.where(np.abs(z - 2.0) < 1e-12, 2.0 + 1e-7, z)
+    return z, before
+
+
 @lru_cache(maxsize=256)
 def exponent(angle: float, kinds: tuple[str, str], stiffness: tuple[float, ...]) -> float:
     """Smallest real part above 1 of the exponents z for which r**z solves the plate equation in a corner.
@@ -67,28 +94,55 @@ def exponent(angle: float, kinds: tuple[str, str], stiffness: tuple[float, ...])
     plates, ch. 9, for the roots mu.
     """
     D = np.reshape(stiffness, (3, 3))
-    # the four numbers mu for which any function of x + mu y bends such a plate without load
-    equation = [D[1, 1], 4.0 * D[1, 2], 2.0 * D[0, 1] + 4.0 * D[2, 2], 4.0 * D[0, 2], D[0, 0]]
-    upper = sorted(np.roots(equation), key=lambda root: root.imag)[2:]  # above the real axis, which rounding may hide
-    one, other = (complex(root.real, max(root.imag, SAME)) for root in upper)
-    if abs(one - other) < APART * one.imag:
-        middle, half = 0.5 * (one + other), 0.5j * APART * one.imag
-        one, other = middle + half, middle - half
-    mu = np.array([one, other, np.conj(one), np.conj(other)])
+    mu = _four_roots([D[1, 1], 4.0 * D[1, 2], 2.0 * D[0, 1] + 4.0 * D[2, 2], 4.0 * D[0, 2], D[0, 0]])
     real, imaginary = np.meshgrid(np.arange(1.02, MILD + 0.1, 0.06), [0.0, 0.15, 0.4, 0.8])
     z = (real + 1j * imaginary).ravel()
-    before = z + 1e-3
-    value_before = _determinant(before, angle, kinds, mu, D)
-    for _ in range(40):  # secant steps from all starting points at once
-        value = _determinant(z, angle, kinds, mu, D)
-        change = value - value_before
-        step = np.where(change == 0.0, 0.0, value * (z - before) / np.where(change == 0.0, 1.0, change))
-        step = step * np.minimum(1.0, 0.3 / np.maximum(np.abs(step), 1e-300))
-        before, value_before, z = z, value, z - step
-        z = np.clip(z.real, 1.0 + 1e-6, MILD + 1.0) + 1j * np.clip(z.imag, -3.0, 3.0)
-        z = np.where(np.abs(z - 2.0) < 1e-12, 2.0 + 1e-7, z)
+    z, before = _secant(lambda z: _determinant(z, angle, kinds, mu, D), z, MILD + 1.0, 1.0)
     settled = (np.abs(z - before) < 1e-9) & (z.real > 1.0 + 1e-4) & (np.abs(z - 2.0) > 1e-4) & (z.real < MILD)
     return float(z.real[settled].min()) if settled.any() else MILD
+
+
+@lru_cache(maxsize=256)
+def plane_exponent(angle: float, words: tuple[str, str], stiffness: tuple[float, ...]) -> float:
+    """Smallest real part of the exponents z, 1 at most, for which displacements r**z in the plane rest in a corner.
+
+    Parameters
+    ----------
+    angle, stiffness
+        As of `exponent`, the stiffness that on strains xx, yy and 2 xy.
+    words : how both edges are held in the plane, of `section.PLANE`
+
+    References
+    ----------
+    Williams (1952), J. Appl. Mech. 19, 526-528; Lekhnitskii (1968), Anisotropic plates, ch. 2 and 3.
+    """
+    S = np.linalg.inv(np.reshape(stiffness, (3, 3)))
+    mu = _four_roots([S[0, 0], -2.0 * S[0, 2], 2.0 * S[0, 1] + S[2, 2], -2.0 * S[1, 2], S[1, 1]])
+    u, v = S[0, 0] * mu**2 + S[0, 1] - S[0, 2] * mu, S[0, 1] * mu + S[1, 1] / mu - S[1, 2]
+    u, v = u / np.abs(S).max(), v / np.abs(S).max()
+
+    def rows(word: str, z: np.ndarray, turn: float) -> list[np.ndarray]:
+        c, s, way = np.cos(turn), np.sin(turn), 1j * np.sign(mu.imag)
+        log = np.log((c + mu * s) * np.exp(-way * turn)) + way * turn  # continuous from edge to edge
+        along, across = c * u + s * v, c * v - s * u  # the edge; then the forces on it
+        pulled, pushed = c * mu - s, s * mu + c
+        held = {"held": (along, across), "sliding": (along, pushed), "across": (pulled, across)}
+        return [np.exp(z[:, None] * log) * part for part in held.get(word, (pulled, pushed))]
+
+    def determinant(z: np.ndarray) -> np.ndarray:
+        matrix = np.stack(rows(words[0], z, 0.0) + rows(words[1], z, angle), axis=1)
+        return np.linalg.det(matrix / np.abs(matrix).max(axis=2, keepdims=True)) / z
+
+    real, imaginary = np.meshgrid(np.arange(0.07, 1.1, 0.06), [0.0, 0.03, 0.15, 0.4])
+    z, before = _secant(determinant, (real + 1j * imaginary).ravel(), 2.0, 0.0)
+    settled = (np.abs(z - before) < 1e-9) & (z.real > 1e-2) & (z.real < 1.0 - 1e-4)
+    return float(z.real[settled].min()) if settled.any() else 1.0
+
+
+def _turned(mesh: Mesh, before: int, facet: int) -> tuple[float, float]:
+    """Interior angle [rad] between two facets at their corner, and the direction [rad] of the second."""
+    (x, y), (u, v) = mesh.tangents[before, 1], mesh.tangents[facet, 0]
+    return round(float(np.pi - np.arctan2(x * v - y * u, x * u + y * v)), 9), float(np.arctan2(v, u))
 
 
 def number_of_rings(z: float, kinds: tuple[str, str], share: float = 1.0) -> int:
@@ -137,16 +191,33 @@ def around_corners(mesh: Mesh, kinds: list[str], material: Material) -> tuple[di
     length = mesh.chords
     extent = float(np.ptp(mesh.points, axis=0).max())
     for vertex, before, facet in edge_meetings(mesh, kinds):
-        (x, y), (u, v) = mesh.tangents[before, 1], mesh.tangents[facet, 0]
-        angle, pair = float(np.pi - np.arctan2(x * v - y * u, x * u + y * v)), (kinds[facet], kinds[before])
-        along_edge = rotated_stiffness(stiffness, -np.arctan2(v, u)) if material.E_across is not None else stiffness
-        z = exponent(round(angle, 9), pair, tuple(along_edge.ravel().round(9).tolist()))
+        (angle, way), pair = _turned(mesh, before, facet), (kinds[facet], kinds[before])
+        along_edge = rotated_stiffness(stiffness, -way) if material.E_across is not None else stiffness
+        z = exponent(angle, pair, tuple(along_edge.ravel().round(9).tolist()))
         share = float(length[[before, facet]].max() / extent)
         n = number_of_rings(z, pair, share)
         power = 2.0 * (z - 1.0)
         if n:
             found[vertex] = Singular(power, n, float((share * SHRINK**n) ** power), pair == ("free", "free"))
     return found, graded_towards(mesh, {vertex: each.n_rings for vertex, each in found.items()})
+
+
+def around_plane_corners(mesh: Mesh, words: Sequence[str], plate: Plate, coarser: float) -> Mesh:
+    """The mesh with rings of triangles at every corner that makes stresses in the plane singular.
+
+    Facets are held in the plane as ``words`` (n_facets,) say. If layers couple bending and the plane, corners between
+    edges held differently count, too. Little of the energy is singular, so that rings end at a size, times ``coarser``.
+    """
+    rings, extent = {}, float(np.ptp(mesh.points, axis=0).max())
+    stiffness, coupled = plate.stretched / plate.stretched.max(), plate.coupled
+    for vertex, before, facet in edge_meetings(mesh, words):
+        angle, way = _turned(mesh, before, facet)
+        pair, own = (words[facet], words[before]), rotated_stiffness(stiffness, -way)
+        differ = coupled and pair[0] != pair[1]
+        smallest = SMALLEST_FREE * coarser * extent / mesh.chords[[before, facet]].max()
+        if smallest < 1.0 and (differ or plane_exponent(angle, pair, tuple(own.ravel().round(9).tolist())) < 1.0):
+            rings[vertex] = int(np.ceil(np.log(smallest) / np.log(SHRINK)))
+    return graded_towards(mesh, rings)
 
 
 def graded_towards(mesh: Mesh, wanted: dict[int, int]) -> Mesh:

@@ -1,6 +1,6 @@
 """What all theories of plates share: triangles that follow the true edge, springs along edges, and tension."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
@@ -8,6 +8,7 @@ from scipy.sparse import csc_matrix
 
 from .._base.untyped import Cells, Sparse
 from ..mesh.facets import Curves
+from ..mesh.meshes import Mesh
 from .elements import Bent, on_true_edge, triangles
 from .section import PLANE
 from .springs import at_facets, edge_stiffness
@@ -33,9 +34,13 @@ def rim(body: Subject, found: Domain, kinds: list[str]) -> SupportedRim:
     mesh, length = body.mesh, found.frame.length
     springs = edge_stiffness(body.held, found.frame)
     curves = mesh.facets, mesh.tangents, mesh.curvatures * length
-    held = ["free" if kind == "free" else "held" for kind in body.kinds]
-    plane = support_of_facets(mesh, dict(body.section.in_plane), PLANE, "in_plane", held)
-    return SupportedRim(*curves, found.cells.p.T, kinds, springs, [str(word) for word in plane])
+    return SupportedRim(*curves, found.cells.p.T, kinds, springs, words_in_plane(mesh, body.section, body.kinds))
+
+
+def words_in_plane(mesh: Mesh, section: Any, kinds: Sequence[str]) -> list[str]:
+    """How each facet is held in the plane, of `section.PLANE`, by its support in bending (n_facets,)."""
+    held = ["free" if kind == "free" else "held" for kind in kinds]
+    return [str(word) for word in support_of_facets(mesh, dict(section.in_plane), PLANE, "in_plane", held)]
 
 
 def springs(
