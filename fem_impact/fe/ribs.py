@@ -20,7 +20,7 @@ import numpy as np
 from .._base import check
 from ..mesh.mesh_files import side_lengths, sides_of
 from ..mesh.meshes import Mesh, mesh_along_lines, sizes
-from .corners import graded_towards
+from .corners import SMALLEST_FREE, graded_towards
 from .section import Beam, Plate, Varying, size_at
 from .splitting import distance
 from .springs import at_facets
@@ -146,35 +146,38 @@ def mesh_along_ribs(mesh: Mesh, section: Any) -> Mesh:
 
 def singular_vertices(
     mesh: Mesh, ribs: Sequence[Rib], kinds: Sequence[Any]
-) -> tuple[dict[int, list[int]], dict[int, float]]:
-    """Vertices where ribs end or cross, with how many sides each has there, and widths [m].
+) -> tuple[dict[int, list[int]], dict[int, list[int]], dict[int, float]]:
+    """Vertices where ribs end or cross, free ones and held ones, with how many sides each has there, and widths [m].
 
-    Those at an edge count where it is free, by the supports ``kinds`` of the facets.
+    Held ones lie on edges that are not free, by the supports ``kinds`` of the facets. A rib along an edge ends at them
+    only.
     """
     counts: dict[int, list[int]] = {}
     width: dict[int, float] = {}
+    held = set(np.unique(mesh.facets[[kind != "free" for kind in kinds]]).tolist())
     for rib in ribs:
-        if not isinstance(rib.path, str):
-            for vertex, count in zip(*np.unique(sides_on(mesh, rib.path), return_counts=True)):
+        for vertex, count in zip(*np.unique(sides_on(mesh, rib.path), return_counts=True)):
+            if vertex in held or not isinstance(rib.path, str):
                 counts.setdefault(int(vertex), []).append(int(count))
                 place = rib.distances(mesh.points[[vertex]])
                 width[int(vertex)] = float(size_at(rib.section, "width", place)[0])
-    held = set(np.unique(mesh.facets[[kind != "free" for kind in kinds]]).tolist())
-    return {vertex: each for vertex, each in counts.items() if each != [2] and vertex not in held}, width
+    free, fixed = ({v: each for v, each in counts.items() if each != [2] and (v in held) == at} for at in (False, True))
+    return free, fixed, width
 
 
-def around_ends(mesh: Mesh, ribs: Sequence[Rib], kinds: Sequence[Any]) -> Mesh:
-    """The mesh with rings of triangles that shrink to ends and crossings of ribs, at an edge if it is free.
+def around_ends(mesh: Mesh, ribs: Sequence[Rib], kinds: Sequence[Any], coarser: float) -> Mesh:
+    """The mesh with rings of triangles that shrink to ends and crossings of ribs.
 
-    At its end a rib acts like a point, which would turn endlessly: triangles shrink to twice its width. Around a
-    crossing three rings leave as much error as there is between crossings.
+    At a free end a rib acts like a point, which would turn endlessly: triangles shrink to twice its width, at a held
+    end to half of it times ``coarser``. Around a crossing three rings leave as much error as between crossings.
     """
-    rings, (counts, width) = {}, singular_vertices(mesh, ribs, kinds)
-    for vertex in counts:
+    rings, (free, held, width) = {}, singular_vertices(mesh, ribs, kinds)
+    narrow = 2.0 * SMALLEST_FREE * float(np.ptp(mesh.points, axis=0).max())
+    for vertex, counts in (free | held).items():
         around = mesh.points[mesh.cells[(mesh.cells == vertex).any(axis=1)]]
         longest = float(np.linalg.norm(around - mesh.points[vertex], axis=2).max())
-        ends = max(0, int(np.ceil(np.log2(longest / (2.0 * width[vertex])))))
-        rings[vertex] = ends if 1 in counts[vertex] else 3
+        least = 2.0 * width[vertex] if vertex in free else 0.5 * coarser * max(width[vertex], narrow)
+        rings[vertex] = max(0, int(np.ceil(np.log2(longest / least)))) if 1 in counts else 3
     return graded_towards(mesh, {vertex: number for vertex, number in rings.items() if number})
 
 

@@ -146,7 +146,7 @@ def towards_bends(mesh: Mesh, section: Any, kinds: list[str], coarser: float) ->
 
     ``coarser`` multiplies their size.
     """
-    mesh = ribs.around_ends(mesh, section.ribs, kinds) if section.ribs else mesh
+    mesh = ribs.around_ends(mesh, section.ribs, kinds, coarser) if section.ribs else mesh
     share = np.linspace(0.0, 1.0, 9)[:, None, None, None]
     between = np.vander(share[1::2].ravel(), 5) @ np.linalg.inv(np.vander(share[::2].ravel(), 5))  # of a quartic
     rise = getattr(section.rise, "first", None) or section.rise  # the same triangles for `otherwise`
