@@ -99,13 +99,12 @@ def warn_if_missed(hit: Any, strict: bool = False) -> Any:
 
 def doubt_of_sound(found: Any, band: float) -> str:
     """By how much a sound up to a frequency [Hz] may err where it was not asked for: over 5 %, as two runs show."""
-    worst = 0.05
+    band, worst = min(band, float(found.target.frequencies[-1])), 0.0
     for hit in getattr(found, "hits", [found]):
         if "sound" not in hit.quantities and hit.runs:
-            band = min(band, float(hit.target.frequencies[-1]))
             apart = distance.of_sounds(hit.runs[0], hit.history, hit.body_slice(len(hit.bodies) - 1), band)
             worst = max(worst, apart / RICHARDSON[hit.scheme][1])
-    if worst == 0.05:
+    if worst <= 0.05:
         return ""
     so = f"may err by {worst:.1g} of itself, as so soft a blow makes little"
     return f"sound {so}; add 'sound={np.ceil(band):.0f}' to the quantities"

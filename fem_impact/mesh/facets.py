@@ -73,8 +73,11 @@ class Curves:
     def point(self, share: np.ndarray) -> np.ndarray:
         """Points (n, 2) at chord parameters s = ``share`` (n,)."""
         s = np.asarray(share, float)[:, None]
-        rise = s * (1.0 - s) * (self.p[:, None] * powers(s, 4, 0)).sum(axis=2)
-        return self.centre + (s - 0.5) * self.length[:, None] * self.along + rise * self.out
+        return self._above(s, (self.p[:, None] * powers(s, 4, 0)).sum(axis=2))
+
+    def _above(self, s: np.ndarray, p: np.ndarray) -> np.ndarray:
+        """Points (n, 2) at s (n, 1), with the values p(s) (n, 1)."""
+        return self.centre + (s - 0.5) * self.length[:, None] * self.along + s * (1.0 - s) * p * self.out
 
     def at(self, share: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Points (n, 2), unit tangents (n, 2) and curvatures (n,) at chord parameters s = ``share`` (n,)."""
@@ -85,7 +88,7 @@ class Curves:
         lean = (slope * p + bump * dp) / length
         second = (-2.0 * p + 2.0 * slope * dp + bump * d2p) / length**2
         stretch = np.hypot(1.0, lean)
-        return self.point(share), (self.along + lean * self.out) / stretch, (-second / stretch**3)[:, 0]
+        return self._above(s, p), (self.along + lean * self.out) / stretch, (-second / stretch**3)[:, 0]
 
     def controls(self) -> np.ndarray:
         """Control points (n, 7, 2) of the curves as Bezier pieces of degree six."""
