@@ -26,17 +26,25 @@ def kinds(*classes: type, left_out: Collection[str] = ()) -> Kinds:
 
 
 def pack(path: Path, key: str, known: Kinds, **things: Any) -> None:
-    """Write objects found for a key: known classes, mappings, sequences, slices, arrays, texts and numbers in them."""
-    arrays: dict[str, np.ndarray] = {}
-    packed = {name: _packed(thing, known, arrays) for name, thing in things.items()}
-    write_arrays(path, key, {**arrays, "told": np.array(json.dumps(packed))})
+    """Write objects found for a key, as `flatten` takes them."""
+    write_arrays(path, key, flatten(known, **things))
 
 
 def unpack(path: Path, key: str, known: Kinds) -> dict[str, Any] | None:
-    """What `pack` wrote for this key, by name, sequences as tuples; or None. No other class is ever made."""
+    """What `pack` wrote for this key, as `restore` returns it; or None."""
     arrays = read_arrays(path, key)
-    if arrays is None:
-        return None
+    return None if arrays is None else restore(known, arrays)
+
+
+def flatten(known: Kinds, **things: Any) -> dict[str, np.ndarray]:
+    """Objects as arrays alone: known classes, mappings, sequences, slices, arrays, texts and numbers in them."""
+    arrays: dict[str, np.ndarray] = {}
+    packed = {name: _packed(thing, known, arrays) for name, thing in things.items()}
+    return {**arrays, "told": np.array(json.dumps(packed))}
+
+
+def restore(known: Kinds, arrays: Mapping[str, np.ndarray]) -> dict[str, Any]:
+    """What `flatten` was given, by name, sequences as tuples. No other class is ever made."""
     return {name: _unpacked(packed, known, arrays) for name, packed in json.loads(str(arrays["told"])).items()}
 
 

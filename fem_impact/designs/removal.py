@@ -67,13 +67,6 @@ def thinned_section(section: Any, depth: Any) -> Any:
     return replace(section, height=less("height", 1.0))
 
 
-def surface_width(section: Any, points: np.ndarray) -> np.ndarray:
-    """Width (n,) [m] of the surface of a bar that dishes are cut into, its girth if round; 1 of a plate."""
-    if isinstance(section, Plate):
-        return np.ones(len(points))
-    return size_at(section, "width", points) * (np.pi if section.round else 1.0)
-
-
 def thickness(section: Any, points: np.ndarray) -> np.ndarray:
     """Thickness of a plate or height of a bar, (n,) [m]."""
     name = "thickness" if isinstance(section, Plate) else "height"
@@ -99,7 +92,6 @@ class Sensitivity:
     places: np.ndarray  # (n, dimension) [m]
     areas: np.ndarray  # (n,) [m^2] of the surface
     cents: np.ndarray  # (n, n_modes) [cents/m] of depth, each with its area
-    extent: float  # [m]
 
     @classmethod
     def of(cls, system: System, vectors: np.ndarray, omega: np.ndarray) -> "Sensitivity":
@@ -107,16 +99,16 @@ class Sensitivity:
         section, frame, points = system.section, system.frame, quadrature(system)
         places = frame.to_metres(points.x)
         unit = float(thickness(section, places).min())
-
+        wide: Any = 1.0  # of a plate; of a bar its width, or girth, that dishes are cut into
+        if isinstance(section, Beam):
+            wide = size_at(section, "width", places) * (np.pi if section.round else 1.0)
         change = SectionChange.by_differences(
             "depth", 1.0, lambda share: thinned_section(section, lambda at: np.full(len(at), (share - 1.0) * unit))
         )
         found = frequency_densities(system, change, vectors, (omega / frame.rate) ** 2)
         dx = points.dx.ravel() * frame.length ** places.shape[1]
         own = PER_CENT / unit * dx[:, None] * found.reshape(len(dx), -1)
-        return cls(
-            cKDTree(places), places, dx * surface_width(section, places), own, float(np.ptp(places, axis=0).max())
-        )
+        return cls(cKDTree(places), places, dx * wide, own)
 
     def of_dishes(self, middles: np.ndarray, radius: float) -> tuple[np.ndarray, np.ndarray]:
         """Cents (n, n_modes) per depth [1/m] of dishes around middles (n, dimension) [m], and volumes (n,) per depth.

@@ -270,12 +270,6 @@ def _mend(
     return points[used], number[cells], number[leader]
 
 
-def moved_onto(place: np.ndarray, points: np.ndarray, off: float) -> np.ndarray:
-    """Place (n, 2) [m], moved to the nearest of points (m, 2) [m] where one is within ``off`` [m]."""
-    away, nearest = cKDTree(points).query(place)
-    return np.where((away <= off)[:, None], points[nearest], place)
-
-
 def sides_of(cells: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Sides (n_sides, 2) of triangles, each once and sorted; those of each cell, (n_cells, 3); how many cells share it.
 

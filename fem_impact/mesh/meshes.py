@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from scipy.spatial import cKDTree
 
 from .._base import check, markup
 from . import drawings, lines, mesh_files, sketch, smooth_edges
@@ -365,11 +366,15 @@ def load(path: Any, *, unit: str | None = None) -> Mesh:
         edges.setdefault("outer" if i == 0 else f"hole{i - 1}", np.arange(start, start + len(loop)))
         start += len(loop)
     edges["boundary"] = np.arange(len(facets))
+    rise = None
+    if heights is not None:
+        away, nearest = cKDTree(points).query(heights[0])  # what lies on a point of the mesh stays there
+        rise = table(np.where((away <= off)[:, None], points[nearest], heights[0]), heights[1])
     made = Mesh(
         points, cells, facets, edges, middles, tangents, curvatures,
         size=float(mesh_files.side_lengths(points, cells).max()) / LONGEST, size_stated=False,
         notes=tuple(f"{Path(path).name}: {note}" for note in notes),
-        rise=None if heights is None else table(mesh_files.moved_onto(heights[0], points, off), heights[1]),
+        rise=rise,
     )  # fmt: skip
     return replace(made, recipe=partial(_resize_mesh, made))
 

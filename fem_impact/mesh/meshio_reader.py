@@ -1,7 +1,6 @@
 """Read nodes, cells and names of a mesh file with meshio, in a separate process (see `isolated`)."""
 
-import json
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -9,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from .._base import isolated
+from .._base import isolated, kept
 
 # meshio's keys for the numbers of cells, preferred first
 TAGS = ("gmsh:physical", "medit:ref", "edge", "cell_tags", "su2:tag", "nastran:ref")
@@ -23,24 +22,23 @@ class Raw:
     """Contents of a mesh file, unchecked."""
 
     points: np.ndarray  # (n_points, 2 or 3)
-    blocks: list[tuple[str, np.ndarray, np.ndarray | None]]  # cell type, nodes (n_cells, n), tags (n_cells,)
+    blocks: Sequence[tuple[str, np.ndarray, np.ndarray | None]]  # cell type, nodes (n_cells, n), tags (n_cells,)
     labels: dict[int, str]  # tag of line cells -> name
-    sets: dict[str, list[np.ndarray | None]]  # name -> cell numbers in each block
+    sets: dict[str, Sequence[np.ndarray | None]]  # name -> cell numbers in each block
     nodes: dict[str, np.ndarray] = field(default_factory=dict)  # name -> numbers of nodes
+
+
+KINDS = kept.kinds(Raw)
 
 
 def read_raw(path: Path) -> Raw:
     """Read a mesh file; ValueError names the file and the fault."""
-    arrays = isolated.read_apart(path, "a mesh", "mesh.meshio_reader:arrays")
-    index = json.loads(arrays["index"].tobytes())
-    blocks = [(kind, arrays[f"cells{i}"], arrays.get(f"tags{i}")) for i, kind in enumerate(index["kinds"])]
-    sets = {name: [arrays.get(f"set{s}_{i}") for i in range(len(blocks))] for s, name in enumerate(index["sets"])}
-    nodes = {name: arrays[f"nodes{i}"] for i, name in enumerate(index["nodes"])}
-    return Raw(arrays["points"], blocks, {int(number): name for number, name in index["labels"]}, sets, nodes)
+    found: Raw = kept.restore(KINDS, isolated.read_apart(path, "a mesh", "mesh.meshio_reader:arrays"))["mesh"]
+    return found
 
 
 def arrays(path: Path) -> dict[str, np.ndarray]:
-    """The parts of a `Raw`, as arrays; runs in the reader process."""
+    """A `Raw`, as arrays; runs in the reader process."""
     import meshio
 
     known = sorted(meshio.extension_to_filetypes)
@@ -52,29 +50,23 @@ def arrays(path: Path) -> dict[str, np.ndarray]:
         deck_labels(path)
     with closed_hdf5(path):
         mesh = meshio.read(path)
-    found: dict[str, np.ndarray] = {"points": np.asarray(mesh.points, float)}
-    tags = next((key for key in TAGS if key in mesh.cell_data), None)
-    for i, block in enumerate(mesh.cells):
-        found[f"cells{i}"] = np.asarray(block.data, np.int64)
-        if tags is not None:
-            found[f"tags{i}"] = np.asarray(mesh.cell_data[tags][i], np.int64).ravel()
+
+    def whole_numbers(values: Any) -> Any:
+        return None if values is None else np.asarray(values, np.int64).ravel()
+
+    key = next((key for key in TAGS if key in mesh.cell_data), None)
+    tags = [None] * len(mesh.cells) if key is None else mesh.cell_data[key]
+    blocks = [(each.type, np.asarray(each.data, np.int64), whole_numbers(tag)) for each, tag in zip(mesh.cells, tags)]
     sets = {name: members for name, members in mesh.cell_sets.items() if not name.startswith("gmsh:")}
     families = {int(tag): own for tag, own in getattr(mesh, "cell_tags", {}).items() if own}  # groups of MED
     for name in sorted({name for own in families.values() for name in own[1:]}):
         held = [tag for tag, own in families.items() if name in own]
         sets[name] = [np.flatnonzero(np.isin(tags, held)) for tags in mesh.cell_data["cell_tags"]]
-    for s, name in enumerate(sets):
-        for i, members in enumerate(sets[name]):
-            if members is not None:
-                found[f"set{s}_{i}"] = np.asarray(members, np.int64).ravel()
-    for i, members in enumerate(mesh.point_sets.values()):
-        found[f"nodes{i}"] = np.asarray(members, np.int64).ravel()
-    labels = [(int(v[0]), name) for name, v in mesh.field_data.items() if len(v) == 2 and int(v[1]) == 1]
-    labels += [(tag, own[0]) for tag, own in families.items()]
-    kinds = [block.type for block in mesh.cells]
-    index = {"kinds": kinds, "sets": list(sets), "labels": labels, "nodes": list(mesh.point_sets)}
-    found["index"] = np.frombuffer(json.dumps(index).encode(), np.uint8)
-    return found
+    labels = {int(v[0]): name for name, v in mesh.field_data.items() if len(v) == 2 and int(v[1]) == 1}
+    labels |= {tag: own[0] for tag, own in families.items()}
+    chosen: dict[str, Any] = {name: list(map(whole_numbers, each)) for name, each in sets.items()}
+    nodes = {name: whole_numbers(members) for name, members in mesh.point_sets.items()}
+    return kept.flatten(KINDS, mesh=Raw(np.asarray(mesh.points, float), blocks, labels, chosen, nodes))
 
 
 def _refuse_left_out(path: Path) -> None:

@@ -3,14 +3,14 @@
 import re
 import warnings
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from .._base import check, isolated
+from .._base import check, isolated, kept
 from ..modes import universal_files
 from . import units
 
@@ -49,6 +49,9 @@ class Recording(check.Brief):
             segment.setflags(write=False)
 
 
+KINDS = kept.kinds(Recording)
+
+
 def read(path: Any) -> Recording:
     """Read a LabVIEW, text, NumPy, WAV, MATLAB or universal file (data set 58), in a separate process.
 
@@ -57,17 +60,9 @@ def read(path: Any) -> Recording:
     ValueError
         If the file holds no channels, or channels that are uneven in time or not finite.
     """
-    place = check.path("path", path)
-    found = isolated.read_apart(place, "a measurement", "taps.readers:arrays")
-    count = sum(name.startswith("segment") for name in found)
-    rate = float(found["rate"])
-    return Recording(
-        tuple(found[f"segment{i}"] for i in range(count)),
-        tuple(map(str, found["names"])),
-        tuple(map(str, found["units"])),
-        rate if np.isfinite(rate) else None,
-        tuple(map(str, found["notes"])),
-    )
+    found = isolated.read_apart(check.path("path", path), "a measurement", "taps.readers:arrays")
+    recording: Recording = kept.restore(KINDS, found)["recording"]
+    return recording
 
 
 def arrays(path: Path) -> dict[str, np.ndarray]:
@@ -95,10 +90,8 @@ def arrays(path: Path) -> dict[str, np.ndarray]:
         raise ValueError(f"{path.name} holds no channels")
     if found.rate is not None and not 0.0 < found.rate <= 1e12:
         raise ValueError(f"{path.name} states a rate of {found.rate:g} Hz")
-    result = {f"segment{i}": segment for i, segment in enumerate(found.segments)}
-    texts = {"names": found.names, "units": found.units, "notes": found.notes}
-    result |= {name: np.array([check.line(text) for text in lines], dtype=str) for name, lines in texts.items()}
-    return result | {"rate": np.array(np.nan if found.rate is None else found.rate)}
+    names, unit, notes = (tuple(map(check.line, texts)) for texts in (found.names, found.units, found.notes))
+    return kept.flatten(KINDS, recording=replace(found, names=names, units=unit, notes=notes))
 
 
 def _text(path: Path) -> list[str]:

@@ -115,8 +115,10 @@ def frf(
     H2 = np.divide(H1, coherence, out=np.array(H1), where=coherence > np.finfo(float).eps ** 2)  # below it is rounding
     H = {"H1": H1, "H2": H2, "Hv": np.sqrt(np.abs(H1) * np.abs(H2)) * np.exp(1j * np.angle(xf))}[method]
     rests = taps.noise[:, None], _rest(taps)
-    shares = [_power(rest, window) / taps.rate**2 / np.maximum(whole, tiny)  # of noise in force and response
-              for rest, window, whole in zip(rests, windows, (ff, xx))]  # fmt: skip
+    # of white noise in every line of force and response, from its deviations before the taps
+    powers = [(rest**2 * np.square(window).sum(axis=1, keepdims=True)).mean(axis=0) / taps.rate**2
+              for rest, window in zip(rests, windows)]  # fmt: skip
+    shares = [power / np.maximum(whole, tiny) for power, whole in zip(powers, (ff, xx))]
     bias = {"H1": shares[0], "H2": shares[1], "Hv": 0.5 * np.abs(shares[0] - shares[1])}[method]
     if taps.n_taps == 1:
         scatter = np.sqrt(-np.log(1.0 - SURE) * (shares[0] + shares[1]))
@@ -160,11 +162,6 @@ def _rest(taps: Taps) -> np.ndarray:
     ends = (taps.onset * taps.rate).astype(int) - triggers.GUARD
     short = np.full(taps.response.shape[2], np.nan)
     return np.array([rows[:n].std(axis=0) if n >= triggers.FEWEST else short for rows, n in zip(taps.response, ends)])
-
-
-def _power(rest: np.ndarray, window: np.ndarray) -> np.ndarray:
-    """Of white noise in every line of its transform, mean over taps, (n_channels,), from its deviations before them."""
-    return np.asarray((rest**2 * np.square(window).sum(axis=1, keepdims=True)).mean(axis=0))
 
 
 def _scatter(force: np.ndarray, left: np.ndarray) -> np.ndarray:

@@ -35,8 +35,8 @@ def table(path, head, columns, separator=","):
 
 def recording(path):
     """Units, rate, notes and the first segment of a file."""
-    found = readers.arrays(path)
-    return found["units"].tolist(), float(found["rate"]), " ".join(found["notes"]), found["segment0"]
+    found = readers.read(path)
+    return list(found.units), np.nan if found.rate is None else found.rate, " ".join(found.notes), found.segments[0]
 
 
 @pytest.mark.parametrize("separator, comma", [(",", False), (";", True), ("\t", False), ("\t", True), (" ", False)])
@@ -242,8 +242,8 @@ def test_structures_and_cells_of_matlab(tmp_path):
     cell = np.empty(2, object)
     cell[:] = [FORCE[:1000], FORCE[1500:2500]]
     savemat(tmp_path / "t.mat", {"run": {"data": {"force": cell}, "fs": RATE}, "who": "nobody"})
-    found = readers.arrays(tmp_path / "t.mat")
-    assert found["names"].tolist() == ["run.data.force"] and {"segment0", "segment1"} <= set(found)
+    found = readers.read(tmp_path / "t.mat")
+    assert found.names == ("run.data.force",) and len(found.segments) == 2
 
 
 def test_a_wav_that_is_cut_off_or_beyond_full_scale_says_so(tmp_path):
