@@ -1,7 +1,7 @@
 """Bodies and blows made from numbers, and how they change with these: the chain rule from a design to its blow."""
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, fields
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -36,34 +36,27 @@ class Piece(check.Brief):
     """A body and, if there is one, the blow on it."""
 
     target: Target
-    striker: Striker | None = None
-    contact: Contact | None = None
-    arguments: Mapping[str, Any] = field(default_factory=dict)  # of `strike`
+    blow: Blow | None = None
     key: Any = None  # bodies of the same key are the same
-
-    @property
-    def blow(self) -> Blow:
-        """The blow, to be planned and run."""
-        assert self.striker is not None and self.contact is not None
-        return Blow(self.target, self.striker, self.contact, self.arguments)
 
     def strike(self, modes: Modes, tolerance: float, once: bool = False) -> Response:
         """The blow on these modes of the body, or only its first impact; a tolerance of its own counts if smaller."""
-        given = {**self.arguments, "tolerance": min(tolerance, self.arguments.get("tolerance", tolerance))}
+        assert self.blow is not None
+        given = {**self.blow.arguments, "tolerance": min(tolerance, self.blow.arguments.get("tolerance", tolerance))}
         given |= {"max_impacts": 1} if once else {}
         return collision.strike(modes, self.blow.striker, self.blow.contact, **given)
 
     @cached_property
     def numbers(self) -> dict[str, float]:
         """The numbers of the blow that a gradient can be taken in, but for those of an assembled body."""
-        found, target = {}, self.target
-        if self.striker is not None and self.contact is not None:
-            found = {f"contact.{name}": float(getattr(self.contact, name)) for name in CONTACT}
-            found["strike.speed"] = float(self.arguments["speed"])
-            at = self.arguments["at"]
+        found, target, blow = {}, self.target, self.blow
+        if blow is not None:
+            found = {f"contact.{name}": float(getattr(blow.contact, name)) for name in CONTACT}
+            found["strike.speed"] = float(blow.arguments["speed"])
+            at = blow.arguments["at"]
             place = np.atleast_1d(np.asarray([] if at is None else at, float))
             found |= {f"strike.{name}": float(x) for name, x in zip("xy", place)}
-            found |= numbers_of("striker", self.striker.modes)
+            found |= numbers_of("striker", blow.striker.modes)
         if isinstance(target.damping_ratio, (int, float)):
             found["target.damping_ratio"] = float(target.damping_ratio)
         if target.modes is not None:
@@ -104,7 +97,7 @@ class Maker(check.Brief):
         if isinstance(made, Scene):
             blow = made.built
             key = repr([made.data().get(table) for table in BODY_TABLES])
-            return {"": Piece(blow.target, blow.striker, blow.contact, blow.arguments, key)}
+            return {"": Piece(blow.target, blow, key)}
         if isinstance(made, Mapping) and made and not {"target", "mesh"} & set(made):
             return {str(name): _piece(each, f"{name}: ") for name, each in made.items()}
         return {"": _piece(made, "")}
@@ -188,11 +181,11 @@ def _check_alike(name: str, now: Piece, side: Piece) -> None:
     modes = [each.modes for each in (one, two)]
     if modes[0] is not None and modes[1] is not None:
         _check_scaled(name, "target", modes[0], modes[1])
-    if now.striker is not None and side.striker is not None:
-        _check_scaled(name, "striker", now.striker.modes, side.striker.modes)
-    if now.contact is not None and side.contact is not None:
-        for each in fields(now.contact):
-            if each.name not in CONTACT and getattr(now.contact, each.name) != getattr(side.contact, each.name):
+    if now.blow is not None and side.blow is not None:
+        _check_scaled(name, "striker", now.blow.striker.modes, side.blow.striker.modes)
+        law, other = now.blow.contact, side.blow.contact
+        for each in fields(law):
+            if each.name not in CONTACT and getattr(law, each.name) != getattr(other, each.name):
                 raise SimulationError(f"no derivative in {name}: it changes the contact's {each.name}; keep that")
 
 
@@ -241,4 +234,4 @@ def _piece(made: Any, where: str) -> Piece:
     for name in ("at", "speed"):
         if name not in values:
             raise ValueError(f"objects: {where}needs {name}, an argument of strike")
-    return Piece(target, striker, contact, values, key)
+    return Piece(target, Blow(target, striker, contact, values), key)

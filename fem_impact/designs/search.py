@@ -116,9 +116,9 @@ class Design(check.Brief):
         apart: dict[str, Mapping[str, float]] = {}
         for name, piece in self.maker.pieces(self.values).items():
             own = [each.goal for each in self.reached if each.goal.blow == name and not each.goal.mode]
-            if own:
+            if own and piece.blow is not None:
                 if piece.target.modes is None:  # by a plan of its own
-                    most = min(self.tolerance, piece.arguments.get("tolerance", self.tolerance))
+                    most = min(self.tolerance, piece.blow.arguments.get("tolerance", self.tolerance))
                     run = planner.verify(piece.blow.run(tolerance=most))
                     assert run.verified is not None
                     hits[name], apart[name] = run.response, run.verified
@@ -284,7 +284,7 @@ class _Search:
         hits: dict[str, Response] = {}
         for name, piece in pieces.items():
             struck = any(goal.blow == name and not goal.mode for goal in self.goals)
-            if struck and piece.striker is None:
+            if struck and piece.blow is None:
                 raise ValueError("wanted: a quantity of a blow needs striker, contact, at and speed; objects has none")
             if struck or name == next(iter(pieces)):
                 count = max(self._count(name, piece) if struck else 0, highest + target.RIGID_MOTIONS if highest else 0)
@@ -305,6 +305,7 @@ class _Search:
         if self.n_modes is not None:
             return self.n_modes
         if name not in self.counts:
+            assert piece.blow is not None
             self.counts[name] = piece.blow.plan(target="modal").n_modes
         return self.counts[name]
 
