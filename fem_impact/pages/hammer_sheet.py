@@ -11,17 +11,17 @@ from .._base.explained import lines_of_notes
 from ..show import plots
 from ..show.figures import in_hertz
 from ..sweeps.hammers import catalogue
-from ..taps.roving import Roving
+from ..taps.roving import DOUBLE, UNKNOWN, WORKS, Roving
 from .html_page import picture_uri, write_page
 
 
 def tip_verdict(plan: Roving, i: int, j: int) -> str:
     """What one hammer and tip do at one point."""
     if plan.n_impacts[i, j] == 0:
-        return "too hard for the modes"
+        return UNKNOWN
     if plan.n_impacts[i, j] > 1:
-        return "double hit"
-    return "works" if plan.works[i, j] else f"too soft for {in_hertz(plan.bandwidth, 3)}"
+        return DOUBLE
+    return WORKS if plan.works[i, j] else f"too soft for {in_hertz(plan.bandwidth, 3)}"
 
 
 def overload(plan: Roving, i: int, j: int) -> float | None:
