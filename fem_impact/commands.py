@@ -528,7 +528,7 @@ def run_fit(options: argparse.Namespace) -> Answer:
     with staged_folder(folder, "fit") as staging:
         with display("fit"):
             found, scene, proposal = prompt.fit(options, partial(display.report, "fits"))
-        data, files = prompt.write(staging, found, scene, proposal)
+        data, files = prompt.write_files(staging, found, scene, proposal)
         with display("page"):
             target, at = (None, None) if scene is None else (scene.modes(), scene.blow.values["at"])
             fit_page.write_fit(staging / "fit.html", found, title=f"Taps of {options.scene.name}", target=target, at=at)

@@ -217,7 +217,7 @@ def design(
         raise ValueError("most must be left out where least is given")
     tolerance = check.between("tolerance", tolerance, 1e-9, 0.5)
     maker, first = Maker.of(objects, box.names), box.start_at(start)
-    wishes = goals.read_goals(wanted, tuple(maker.pieces(box.values(first))))
+    wishes = goals.read_goals(wanted, tuple(maker.pieces(box.values_at(first))))
     count = None if n_modes is None else check.count("n_modes", n_modes, high=10_000)  # of a body in a blow
     search = _Search(maker, box, wishes, least or most, -1.0 if most else 1.0, count)
     found = search.search_from(first, tolerance)
@@ -264,12 +264,12 @@ class _Search:
     bodies: dict[Any, Modes] = field(default_factory=dict)  # by key of the piece and number of modes
     counts: dict[str, int] = field(default_factory=dict)  # modes of each blow
 
-    def state(self, x: np.ndarray) -> _State:
+    def state_at(self, x: np.ndarray) -> _State:
         """What a point makes; raises again the error that it met before."""
         key = x.tobytes()
         if key not in self.known:
             try:
-                self.known[key] = self._made(self.box.values(x))
+                self.known[key] = self._made(self.box.values_at(x))
             except (SimulationError, ValueError) as error:
                 self.known[key] = error
         if isinstance(self.known[key], Exception):
@@ -314,7 +314,7 @@ class _Search:
         key = x.tobytes()
         if key in self.slopes:
             return self.slopes[key]
-        state = self.state(x)
+        state = self.state_at(x)
         found = np.zeros((len(self.goals), len(self.box.unknowns)))
         scales = [state.values[each.name] if each.log else each.high - each.low for each in self.box.unknowns]
         rates = {name: self.maker.rates(state.values, name, scale) for name, scale in zip(self.maker.names, scales)}
@@ -338,7 +338,7 @@ class _Search:
         ).x  # fmt: skip
         if self.least is not None:
             x = self._least(x, tolerance)
-        state, slopes = self.state(x), self.slope(x)
+        state, slopes = self.state_at(x), self.slope(x)
         reached = tuple(
             Reached(goal, float(value), dict(zip(self.maker.names, row.tolist())))
             for goal, value, row in zip(self.goals, state.found, slopes)
@@ -357,7 +357,7 @@ class _Search:
 
     def _misses(self, x: np.ndarray) -> np.ndarray:
         try:
-            found = self.state(x).found
+            found = self.state_at(x).found
         except (SimulationError, ValueError):
             return np.full(len(self.goals), LOST)
         return np.array([goal.miss(value) for goal, value in zip(self.goals, found)])
@@ -380,7 +380,7 @@ class _Search:
 
         def value(x: np.ndarray) -> np.ndarray:
             try:
-                return self.state(x).found / scale
+                return self.state_at(x).found / scale
             except (SimulationError, ValueError):
                 return np.where(np.isfinite(ends[0]), ends[0] - LOST, ends[1] + LOST)
 

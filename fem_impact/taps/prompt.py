@@ -176,7 +176,7 @@ def write_scene(path: str | Path, found: Found, scene: Scene | None = None) -> t
     return tuple(notes)
 
 
-def write(
+def write_files(
     folder: Path, found: Found, scene: Scene | None, proposal: Proposal | None
 ) -> tuple[dict[str, Any], list[str]]:
     """Write fit.json and, if the body struck is known, scene.toml; return the data and the names of the files."""

@@ -227,7 +227,7 @@ def measure(
     if at is not None:
         points = hit.target.points("at", at)
         moved = np.zeros((len(points), n_fine))
-        moved[:, begun] = _moved(hit, points, quantity, pushed, times[begun])
+        moved[:, begun] = _moved_points(hit, points, quantity, pushed, times[begun])
         rows += list(sample(moved, rig, force=False, shift=onset))
     found, overload = _digitised(np.array(rows)[:, MARGIN : MARGIN + n_times], rig, rng)
     unit = {"acceleration": "m/s^2", "velocity": "m/s", "displacement": "m"}[quantity]
@@ -237,7 +237,9 @@ def measure(
     )
 
 
-def _moved(hit: Response, points: np.ndarray, quantity: str, pushed: np.ndarray, times: np.ndarray) -> np.ndarray:
+def _moved_points(
+    hit: Response, points: np.ndarray, quantity: str, pushed: np.ndarray, times: np.ndarray
+) -> np.ndarray:
     """A quantity (n_points, n_times) at points of the struck body, pushed by forces (n_times,) [N]."""
     if quantity == "displacement":
         return hit.displacement(points, times).T

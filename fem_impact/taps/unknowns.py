@@ -103,7 +103,7 @@ class Box:
         low, high = np.array([each.bounds for each in self.unknowns]).reshape(-1, 2).T
         return low, high
 
-    def values(self, x: np.ndarray) -> dict[str, float]:
+    def values_at(self, x: np.ndarray) -> dict[str, float]:
         """The unknowns by name at coordinates (n_unknowns,)."""
         return {each.name: float(np.clip(each.outside(z), each.low, each.high)) for each, z in zip(self.unknowns, x)}
 

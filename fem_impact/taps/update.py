@@ -162,8 +162,8 @@ def update(
         variance = np.diag(np.linalg.pinv(found.jacobian.T @ found.jacobian)) * found.cost / spare
         half = float(t.ppf(0.95, spare)) * np.sqrt(variance)
     unpaired = tuple(target[np.setdiff1d(every, used)].tolist())
-    fitted = dict(zip(box.names, half)), search.pairs(found.x, used), search.modes(found.x)
-    return Updated(box.values(found.x), *fitted, len(search.solved), unpaired)
+    fitted = dict(zip(box.names, half)), search.pairs(found.x, used), search.modes_at(found.x)
+    return Updated(box.values_at(found.x), *fitted, len(search.solved), unpaired)
 
 
 @dataclass(eq=False)
@@ -178,13 +178,13 @@ class _Misfit:
     n_rigid: int = 0  # motions of the body, which the measurement does not have
     solved: dict[bytes, Modes] = field(default_factory=dict)
 
-    def modes(self, x: np.ndarray) -> Modes:
+    def modes_at(self, x: np.ndarray) -> Modes:
         """The modes of the body, two beyond those measured, so that as many may be missed in the measurement."""
         key = x.tobytes()
         while key not in self.solved:
             if len(self.solved) >= MOST_SOLVES:
                 raise SimulationError(f"the search did not end within {MOST_SOLVES} solves; narrow the ranges")
-            values, count = self.box.values(x), len(self.target) + 2 + self.n_rigid
+            values, count = self.box.values_at(x), len(self.target) + 2 + self.n_rigid
             modes = self.build.changed(values).modes(count) if isinstance(self.build, Scene) else self.build(values)
             if isinstance(modes, System):
                 modes = find_modes(modes, n_modes=count)
@@ -197,13 +197,13 @@ class _Misfit:
 
     def pairs(self, x: np.ndarray, used: np.ndarray) -> tuple[Pair, ...]:
         """Measured modes of some numbers with computed ones."""
-        modes = self.modes(x)
+        modes = self.modes_at(x)
         if isinstance(self.measured, Modes):
             return transfer.matched(self.measured, modes, points=self.points, which=used)
         return transfer.matched(self.target, modes.frequencies[modes.omega > 0.0], which=used)
 
     def _logs(self, x: np.ndarray) -> np.ndarray:
-        modes = self.modes(x)
+        modes = self.modes_at(x)
         return np.log(modes.frequencies[modes.omega > 0.0])
 
     def fit(self, x: np.ndarray, used: np.ndarray) -> Solution:

@@ -90,9 +90,9 @@ def test_all_slopes_are_differences():
     slopes = run.slope(x)
     for j, each in enumerate(box.unknowns):
         step = 1e-3 * np.eye(len(x))[j]
-        low, high = run.state(x - step), run.state(x + step)
+        low, high = run.state_at(x - step), run.state_at(x + step)
         exact = (high.found - low.found) / (high.values[each.name] - low.values[each.name])
-        scale = np.abs(run.state(x).found) / run.state(x).values[each.name]
+        scale = np.abs(run.state_at(x).found) / run.state_at(x).values[each.name]
         # differences of second order, 1e-6; of blows told to 1e-7 with a step of 1e-3: 1e-4 of their quantities
         assert_allclose(slopes[:, j] / scale, exact / scale, rtol=1e-5, atol=1e-4, err_msg=each.name)
 
