@@ -316,9 +316,8 @@ def shortened_striker(striker: Striker, n_modes: int) -> Striker:
     """The striker with its first modes only; the others act as a spring."""
     if n_modes >= striker.modes.n_modes:
         return striker
-
-    def short() -> Striker:
-        return replace(striker, modes=striker.modes.truncated(n_modes=n_modes), fixed=True)
-
-    found: Striker = striker.known.recall(("shortened", n_modes), short)
+    found: Striker = striker.known.recall(
+        ("shortened", n_modes),
+        lambda: replace(striker, modes=striker.modes.truncated(n_modes=n_modes), fixed=True),
+    )
     return found

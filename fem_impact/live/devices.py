@@ -44,12 +44,10 @@ class Speaker:
             raise ValueError(f"no loudspeaker can be used here ({error}), only the file is written") from None
 
     def play_feed(self, feed: Feed, rate: int) -> None:
-        def callback(out: np.ndarray, *_: Any) -> None:
-            feed.copy(out[:, 0])
-
         block = feed.blocks.shape[1]
         options: dict[str, Any] = {"samplerate": rate, "blocksize": block, "channels": 1, "dtype": "float32"}
-        self._stream = self._library.OutputStream(callback=callback, latency="low", **options)
+        options["callback"] = lambda out, *_: feed.copy(out[:, 0])
+        self._stream = self._library.OutputStream(latency="low", **options)
         self._stream.start()
 
     def stop(self) -> None:

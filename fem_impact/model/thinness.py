@@ -76,11 +76,10 @@ def examine_target(struck: Struck) -> Assumption:
     if body.plate is not None and history.law["compliance"][0] > 0.0:
         # the residual compliance of the modes left out lacks their shear
         changed |= softened_system(history, _shear_give(body.plate, body.thickness, float(integrals.wave[-1])))
-
-    def drop(_: Known, found: Bending) -> np.ndarray | None:
-        return None if found.thick is None else 1.0 - lowered_by(found.thick)
-
-    effect = struck.add_sound(struck.changes(**changed), drop)
+    effect = struck.add_sound(
+        struck.changes(**changed),
+        lambda _, found: None if found.thick is None else 1.0 - lowered_by(found.thick),
+    )
     return TARGET.judged(struck, body.thickness * integrals.mean_wave(struck.target_energy), effect, remedy)
 
 

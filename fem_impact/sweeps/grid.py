@@ -107,15 +107,11 @@ class Job:
                 self.tell(f"all {cases.n_cases} cells are expected to take {seconds:.2g} s: {done}")
             if seconds <= DENSE:
                 return None
-
-        def compute(cells: np.ndarray, turn: str) -> tuple[np.ndarray, Texts]:
-            """Cells of one round."""
-            return self.solved(replace(cases, chosen=cells), turn)
-
-        def settled(done: int) -> None:
-            self.watched(done, cases.n_cases)
-
-        return refined.refine((cases.shape[0], cases.shape[1]), cases.layers, cases.tolerance, compute, settled)
+        return refined.refine(
+            (cases.shape[0], cases.shape[1]), cases.layers, cases.tolerance,
+            lambda cells, turn: self.solved(replace(cases, chosen=cells), turn),
+            lambda done: self.watched(done, cases.n_cases),
+        )  # fmt: skip
 
 
 @check.typed
