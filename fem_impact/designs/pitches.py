@@ -31,14 +31,16 @@ class Pitch:
     cents: float | None = None  # from now
     ratio: float | None = None  # [-] to the first mode
 
-    def wanted(self, now: np.ndarray, modes: Sequence[int]) -> float:
-        """The frequency [Hz] wanted, of a ratio beside that of the first mode; ``now`` (n,) [Hz] are those of modes."""
+    def wanted(self, first: np.ndarray, now: np.ndarray, modes: Sequence[int]) -> float:
+        """The frequency [Hz] wanted: of a ratio beside the first mode as it is now, else beside its own at first.
+
+        ``first`` and ``now`` (n,) [Hz] are the frequencies of modes of these numbers.
+        """
+        if self.frequency is not None:
+            return self.frequency
         if self.ratio is not None:
             return float(now[list(modes).index(1)]) * self.ratio
-        if self.cents is not None:
-            return float(now[list(modes).index(self.mode)]) * 2.0 ** (self.cents / CENTS)
-        assert self.frequency is not None
-        return self.frequency
+        return float(first[list(modes).index(self.mode)]) * 2.0 ** ((self.cents or 0.0) / CENTS)
 
 
 def cents(frequency: Any, beside: Any = 1.0) -> Any:

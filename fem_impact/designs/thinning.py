@@ -134,12 +134,6 @@ class Blank(check.Brief):
             )
         return Solved(modes, which)
 
-    def wanted(self, first: np.ndarray, now: np.ndarray, pitch: Pitch) -> float:
-        """The frequency [Hz] wanted of a mode, from those (n,) [Hz] of all looked at at first and now."""
-        if not pitch.words:
-            return float(first[self.numbers.index(pitch.mode)])
-        return pitch.wanted(now if pitch.ratio is not None else first, self.numbers)
-
 
 @dataclass(eq=False)
 class Thinning:
@@ -162,7 +156,7 @@ class Thinning:
         """How far each pitch is missed, (n_pitches,) [cents]."""
         first, now = self.before.frequencies, solved.frequencies
         own = now[[self.body.numbers.index(each.mode) for each in self.sought]]
-        return np.asarray(cents(own, [self.body.wanted(first, now, each) for each in self.sought]))
+        return np.asarray(cents(own, [each.wanted(first, now, self.body.numbers) for each in self.sought]))
 
     def miss_slopes(self, solved: Solved, places: Places) -> tuple[np.ndarray, np.ndarray]:
         """Changes of the misses (n_pitches, n_places) [cents/m] with depths, and areas (n_places,) [m^2]."""

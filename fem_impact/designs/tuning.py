@@ -309,7 +309,7 @@ def _solve_and_report(body: Blank, search: Thinning, found: Sequence[tuple[np.nd
     for pitch in body.pitches:
         place = body.numbers.index(pitch.mode)
         sides = [(float(each.frequencies[place]), float(each.errors[place])) for each in (before, last)]
-        goal = body.wanted(before.frequencies, last.frequencies, pitch)
+        goal = pitch.wanted(before.frequencies, last.frequencies, body.numbers)
         tones.append(Tone(pitch, sides[0][0], sides[1][0], goal, sides[0][1], sides[1][1]))
     volume = (before.system.mass - last.system.mass) / before.system.section.material.rho
     return Tuning(
