@@ -86,7 +86,7 @@ def strike(
 
     if speed is None:
         assert before is not None
-        striker = before.same_striker(striker, contact, modes, point)
+        striker = before.same_striker(striker, contact, point)
         _, p = before.of(0, "striker", striker.body)
         return blow(striker, float(striker.shape @ np.where(striker.modes.omega == 0.0, p, 0.0)), True)
     if before is not None and before.force.any():

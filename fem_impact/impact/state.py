@@ -86,7 +86,7 @@ class State(check.Brief):
         pressed = self.pressed[ends, [int(sign < 0.0) for _, sign in part.touched]]
         return replace(part, pressed=pressed, memory=self.memory[0, ends])
 
-    def same_striker(self, striker: Striker, law: Contact, modes: Modes, at: Any) -> Striker:
+    def same_striker(self, striker: Striker, law: Contact, at: Any) -> Striker:
         """The striker that goes on; ValueError if it, its contact or the strike point is another than before."""
         mine = self.striker
         same = (

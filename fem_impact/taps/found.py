@@ -177,7 +177,7 @@ class Found(check.Brief):
         return np.fft.rfftfreq(self.residual.shape[1], 1.0 / rate), spectra[0], spectra[1]
 
     def predict(self, tap: Any = 0) -> Prediction:
-        """A tap as the values found have it: a number of those given, or other `Taps`.
+        """A tap as the values found have it: a number of those given, or the first of other `Taps`.
 
         Its speed and onset, and its own values of the unknowns freed for each tap, are fitted to it.
         """

@@ -103,6 +103,7 @@ class Taps(check.Brief):
                 "response": (("tap", "time", "channel"), others),
                 "onset": ("tap", np.array([triggers.onset(f) for f in rows]) / rate, {"units": "s"}),
                 "overload": (("tap", "sensor"), np.array(cut, bool)),
+                "pulse": ("tap", np.full(n_taps, np.nan if pulse is None else check.positive("pulse", pulse, "N"))),
             },
             {
                 "tap": tags,
@@ -111,7 +112,7 @@ class Taps(check.Brief):
                 "units": ("channel", unit),
                 "sensor": ["force", *names],
             },
-            {"rate": rate} | ({} if pulse is None else {"pulse": check.positive("pulse", pulse, "N")}),
+            {"rate": rate},
         )
         return cls(table, tuple(check.texts("notes", notes)))
 
@@ -167,8 +168,11 @@ class Taps(check.Brief):
     @cached_property
     def pulses(self) -> list[list[tuple[int, int]]]:
         """First sample of every pulse of each tap, and the one after its last."""
-        least = self.table.attrs.get("pulse")
-        return [triggers.pulses(row, noise, least) for row, noise in zip(self.force, self.noise)]
+        stated = self.table["pulse"].values
+        return [
+            triggers.pulses(row, noise, None if np.isnan(least) else least)
+            for row, noise, least in zip(self.force, self.noise, stated)
+        ]
 
     @property
     def peak(self) -> np.ndarray:
@@ -242,7 +246,7 @@ class Taps(check.Brief):
         return f"Taps({self.n_taps} taps, {len(self.time)} samples at {self.rate:g} Hz)"
 
     def save(self, path: str | Path) -> None:
-        """Write the taps to an .npz file that `read_taps` reads again."""
+        """Write the samples to an .npz file that `read_taps` reads again; it judges anew which are cut off."""
         arrays = {"force [N]": self.force, "rate": np.array(self.rate), "time": self.time}
         names = [str(name) for name in self.table["channel"].values]
         for i, (name, unit) in enumerate(zip(names, self.units)):

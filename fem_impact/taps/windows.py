@@ -23,16 +23,19 @@ def join_tables(taps: Any, name: str = "taps") -> Taps:
         same_rate(each, several[0])
         if each.units != several[0].units:
             raise ValueError(f"taps must have the same responses, got units {each.units} and {several[0].units}")
-    return Taps.from_arrays(
+    labels = [label for each in several for label in each.labels]
+    joined = Taps.from_arrays(
         np.concatenate([each.force[:, :n_times] for each in several]),
         np.concatenate([each.response[:, :n_times] for each in several]),
         rate=several[0].rate,
         names=several[0].table["channel"].values.tolist(),
         units=several[0].units,
         overload=np.concatenate([each.table["overload"].values for each in several]),
-        pulse=several[0].table.attrs.get("pulse"),
+        labels=labels if len(set(labels)) == len(labels) else None,
         notes=[note for each in several for note in each.notes],
     )
+    joined.table["pulse"] = ("tap", np.concatenate([each.table["pulse"].values for each in several]))
+    return joined
 
 
 def level_offsets(taps: Taps) -> Taps:

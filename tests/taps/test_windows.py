@@ -22,6 +22,20 @@ def test_records_of_unequal_length_are_joined_to_the_shortest():
         windows.join_tables([tap(50), tap(50, rate=51200.0)])
 
 
+def test_joined_taps_keep_their_labels_and_what_counts_as_a_pulse():
+    """Each table's own threshold; a threshold of 5 N sees the small second pulse, one of 20 N does not."""
+    rows = np.pad(100.0 * np.sin(np.linspace(0.0, np.pi, 20)) ** 2, (60, 400))
+    rows[120:126] += 8.0 * np.sin(np.linspace(0.0, np.pi, 6))
+    blind, keen = (
+        fi.Taps.from_arrays(rows, rate=25600.0, pulse=least, labels=[name]) for least, name in ((20.0, "a"), (5.0, "b"))
+    )
+    for several in ([blind, keen], [keen, blind]):
+        both = windows.join_tables(several)
+        assert both.n_pulses.tolist() == [int(each.n_pulses[0]) for each in several]
+        assert both.labels == tuple(each.labels[0] for each in several)
+    assert windows.join_tables([blind, blind]).labels == ("tap 1", "tap 2")
+
+
 def test_all_onsets_come_to_the_same_place():
     cut = windows.cut_to_window(windows.join_tables([tap(50), tap(83)]), None)
     assert np.array_equal(cut.force[0], cut.force[1])
