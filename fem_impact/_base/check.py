@@ -151,11 +151,11 @@ def flag(name: str, value: Any) -> bool:
     return bool(value)
 
 
-def instance(name: str, value: Any, *kinds: type) -> Any:
-    """Return ``value`` if it has one of these types; ValueError says how to make one."""
+def instance(name: str, value: Any, *kinds: type, other: str = "") -> Any:
+    """Return ``value`` if it has one of these types; ValueError says how to make one, or ``other`` things."""
     if not isinstance(value, kinds):
         wanted = " or ".join(f"a {kind.__name__} of {SOURCES.get(kind.__name__, 'fem_impact')}" for kind in kinds)
-        raise ValueError(f"{name} must be {wanted}, got {shown(value)}")
+        raise ValueError(f"{name} must be {wanted}{other}, got {shown(value)}")
     return value
 
 
@@ -240,10 +240,10 @@ def typed(function: Function) -> Function:
             kinds, ours = checked[name]
             if value is None and NoneType in kinds:
                 continue
-            if Path in kinds:
+            if Path in kinds and (isinstance(value, (str, os.PathLike)) or not ours):
                 path(name, value)
             elif ours:
-                instance(name, value, *ours)
+                instance(name, value, *ours, other=" or the path of a file" if Path in kinds else "")
             elif bool in kinds:
                 flag(name, value)
             elif not callable(value):

@@ -1,5 +1,6 @@
 """Bodies and blows made from numbers, and how they change with these: the chain rule from a design to its blow."""
 
+import inspect
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, fields
 from functools import cached_property
@@ -26,6 +27,7 @@ from ..modes.modal import Modes
 from ..scenes.scene import SECTIONS, Scene, load_scene
 
 BODY = "mesh", "section", "supports", "theory", "point_masses", "point_supports"  # a body that is not assembled yet
+BLOW = "damping_ratio", *list(inspect.signature(collision.strike).parameters)[1:]  # arguments of a blow on it
 CONTACT = ("gap", *LAW)  # numbers of a contact that a gradient follows
 BODY_TABLES = "mesh", "material", "section", "layer", "rib", "rise", "supports", "in_plane", "target"  # of a scene
 Build = Callable[[dict[str, float]], Any]
@@ -69,6 +71,14 @@ class Piece(check.Brief):
         return self.target.section if self.target.modes is None else None
 
 
+class _Values(dict[str, float]):
+    """Free numbers by name, which say so where a function asks for another."""
+
+    def __missing__(self, name: Any) -> float:
+        here = ", ".join(map(repr, self)) or "nothing"
+        raise ValueError(f"objects asks for {check.shown(name)}, but free has {here}{check.nearest(name, self)}")
+
+
 @dataclass(frozen=True, eq=False, repr=False)
 class Maker(check.Brief):
     """Makes the pieces of a design from the values of its free numbers."""
@@ -93,7 +103,7 @@ class Maker(check.Brief):
 
     def pieces(self, values: Mapping[str, float]) -> dict[str, Piece]:
         """Body and blow by the name of the blow, "" if there is only one."""
-        made = self.build({name: float(values[name]) for name in self.names})
+        made = self.build(_Values({name: float(values[name]) for name in self.names}))
         if isinstance(made, Scene):
             blow = made.built
             key = repr([made.data().get(table) for table in BODY_TABLES])
@@ -215,6 +225,8 @@ def _piece(made: Any, where: str) -> Piece:
             f"such dicts; got {check.shown(made)}"
         )
     values = dict(made)
+    for name in values:
+        check.one_of(f"objects: {where}each argument", name, ("target", *BODY, *BLOW))
     damping = values.pop("damping_ratio", None)
     if "target" in values:
         body = values.pop("target")
@@ -222,7 +234,7 @@ def _piece(made: Any, where: str) -> Piece:
         target, key = Target.of(body, damping), id(body)
     else:
         given = {name: values.pop(name) for name in BODY if name in values}
-        check.instance("mesh", given["mesh"], Mesh)
+        check.instance("mesh", given.get("mesh"), Mesh)
         check.instance("section", given.get("section"), Plate, Beam)
         target = Target(**given, damping_ratio=damping, source="fe")
         key = None

@@ -68,4 +68,7 @@ test_what_makes_no_blow_is_said = refusing([
     (lambda values: {"target": fi.Modes.rigid(1.0), "striker": fi.Striker.rigid(1.0)}, "contact must be"),
     (lambda values: {"target": fi.Modes.rigid(1.0), "striker": fi.Striker.rigid(1.0), "at": None,
                      "contact": fi.Contact.hertz(1e6)}, "needs speed, an argument of strike"),
+    (lambda values: {}, "mesh must be a Mesh of fi.mesh, got None"),
+    (lambda values: {"mesh": fi.mesh.line(0.3), "suports": {}}, "each argument must be one of .*mean 'supports'"),
+    (lambda values: values["height"], "objects asks for 'height', but free has nothing"),
 ], lambda objects: Maker.of(objects, ()).pieces({}))  # fmt: skip

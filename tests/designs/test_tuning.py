@@ -101,6 +101,7 @@ test_arguments_are_checked = refusing([
     (ON_LINE, {"mirror": "y"}, "mirror must be one of x, got 'y'"),
     (ON_LINE, {"radius": 1e-3}, r"radius must lie between 0\.0233333 and 0\.35 m"),
     ("studies/scenes/heavy_plate.toml", {}, r"\[target\] must not state mass, .*; leave them out"),
+    (BAR, {}, r"body must be a System of fi\.assemble or a Scene of fi\.load_scene or the path of a file, got Beam"),
 ], lambda body, how: fi.tune(body, {1: "-5 cents"}, **how))  # fmt: skip
 
 
