@@ -129,14 +129,18 @@ def of_points(points: np.ndarray, static: np.ndarray, known: np.ndarray) -> list
 def rest_without_dent(load: Load, E: float, nu: float) -> tuple[float, float] | None:
     """What a body yields at a load without the dent of a half space, and its error [m/N]; None of too few nodes.
 
-    The error is the difference of four fits, with few and many nodes, nearer to the load and farther off.
+    The error is the difference of four fits, with few and many nodes, nearer to the load and farther off. Where
+    elements are half as large as the body is thick, all fits err to one side: it is at least how far their mean lies
+    from the nearest and smallest one, and this from the truth, if both ways to it change the fits as much again.
     """
     distance = np.linalg.norm(load.apart, axis=1)
     space = (1.0 + nu) / (2.0 * np.pi * E) * (load.apart[:, 2] ** 2 / distance**3 + 2.0 * (1.0 - nu) / distance)
     values = _fitted(load.apart, load.deflection - space, RINGS)
     if len(values) < len(RINGS):
         return None
-    return float(np.mean(values)), float(np.ptp(values) + SINGLE * abs(load.own))
+    mean, best = float(np.mean(values)), values[0]
+    onward = abs(mean - best) + abs(values[1] - best) + abs(values[2] - best)
+    return mean, max(float(np.ptp(values)), onward) + SINGLE * abs(load.own)
 
 
 def largest_dent(load: Load) -> float | None:
