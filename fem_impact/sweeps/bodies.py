@@ -140,8 +140,8 @@ def by_vectors(
         key = identity.identify([  # everything that determines the vectors
             striker.modes.omega, striker.felt_mass, striker.shape, vars(case.contact), case.speed, tolerance, case.at,
             case.first, target.mass, dict(target.scale), target.size_stated,
-            damping_ratios(0.0 if ratio is None else ratio, np.geomspace(1.0, 1e7, 50)), dict(axes), identity.program(),
-            system.K.data, system.M.data, [frame.length, frame.stiffness, frame.inertia],
+            damping_ratios(0.0 if ratio is None else ratio, np.geomspace(1.0, 1e7, 50)), list(axes.items()),
+            identity.program(), system.K.data, system.M.data, [frame.length, frame.stiffness, frame.inertia],
         ])  # fmt: skip
         views = (kept.unpack(keep, key, KINDS) or {}).get("views")
     if views is None:

@@ -166,7 +166,7 @@ def fingerprint(grid: Any) -> Mark:
     striker, views = grid.base.striker, grid.base.views
     bodies = [(modes, np.array([place])) for place, modes in views.items()]
     blow = [
-        grid.scene(), dict(grid.axes), grid.chosen, grid.tolerance, grid.residual, grid.band, grid.layers,
+        grid.scene(), list(grid.axes.items()), grid.chosen, grid.tolerance, grid.residual, grid.band, grid.layers,
         striker.hand, striker.motion, grid.base.first,
     ]  # fmt: skip
     for modes, places in bodies or [(grid.base.modes, grid.axes.get("at", grid.base.at[None]))]:

@@ -63,6 +63,16 @@ def test_a_store_of_another_map_or_version_is_refused(tmp_path, monkeypatch):
         Store(tmp_path / "map", mark, 6, 1)
 
 
+def test_maps_whose_axes_come_in_another_order_have_stores_of_their_own():
+    """Their cells, numbered along the axes, are others; both have as many."""
+    axes = {"mass": np.array([0.1, 0.2]), "speed": np.array([0.5, 1.0])}
+    body = fi.analytic.beam(1.0, ends=("hinged", "hinged"), mass=1.0, first_frequency=50.0, n_modes=3)
+    case = cells.Case(body, fi.Striker.rigid(0.1), fi.Contact.linear(1e5), np.array([0.3]), 1.0)
+    orders = axes, dict(reversed(axes.items())), axes
+    one, other, again = (store.fingerprint(cases.Cases(case, each, 1e-3))["map"] for each in orders)
+    assert one == again != other
+
+
 def test_bodies_that_differ_at_another_strike_point_have_maps_of_their_own():
     places, marks = np.array([[0.0], [1.0]]), []
     for at_its_end, yields in product((1.0, 2.0, 1.0), (3e-4, 4e-4)):
