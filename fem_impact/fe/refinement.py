@@ -169,6 +169,8 @@ def solve_or_read(
     """Call `solve_on_mesh` and save the result in a file, if any; a later call for the same modes of it reads that."""
     if path is None:
         return solve_on_mesh(system, n_modes, max_frequency)
+    if Path(path).is_dir() or not Path(path).parent.is_dir():
+        raise ValueError(f"keep must be a file in a folder that exists, got {check.shown(path)}")
     frame = system.frame  # the matrices are the same for every size, thickness and material
     sizes = frame.length, frame.stiffness, frame.inertia
     asked = repr((n_modes, max_frequency, system.element, *sizes, identity.program())).encode()

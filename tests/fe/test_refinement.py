@@ -118,6 +118,14 @@ def test_the_kept_spectrum_of_a_body_of_another_size_is_not_taken(tmp_path):
         assert_allclose(omega(**other), factor * first, rtol=1e-9)  # by the law of thin plates; rounding
 
 
+def test_a_place_where_no_file_can_be_is_refused_before_modes_are_solved(tmp_path, monkeypatch):
+    monkeypatch.setattr(refinement, "solve_on_mesh", None)
+    plate = fi.assemble(fi.mesh.rectangle(0.5, 0.3, size=0.1), PLATE, {"left": "clamped"})
+    for path in (tmp_path, tmp_path / "none" / "modes.npz"):
+        with pytest.raises(ValueError, match="keep must be a file in a folder that exists, got "):
+            refinement.solve_or_read(plate, 3, None, path)
+
+
 @pytest.mark.parametrize(("element", "size", "median"), [("argyris", 0.06, (0.8, 2.0)), ("morley", 0.02, (1.7, 4.0))])
 def test_stated_errors_are_those_of_a_smooth_plate_within_a_factor(element, size, median):
     """Stated over true: 0.8 to 2.5 for quintics, 2.4 to 3.3 for Morley elements, whose clamped plates err more."""
