@@ -26,7 +26,11 @@ def in_si(
         raise ValueError("scale must not be zero: it is what the numbers of a channel are multiplied with")
     factors: list[float] = []
     kinds: list[str] = []
-    notes: list[str] = []
+    unread = [i for i in set(range(len(unit))) - {struck, *others} if units.RESPONSE_NAMES.search(found.names[i])]
+    notes = [
+        f"{found.names[i]}: not read, as {unit[i]!r} is no known unit of motion; give units, or response and scale"
+        for i in unread if response is None and unit[i]
+    ]  # fmt: skip
     for i in (struck, *others):
         known = units.si_unit(unit[i])
         kinds.append("N" if i == struck and not kinds else known[0] if known and known[0] != "N" else "m/s^2")
@@ -114,7 +118,8 @@ def factor(name: str, unit: str, wanted: str, scale: float | None, file: str) ->
     if scale is not None:
         return scale, []
     if not unit:
-        return 1.0, [f"{name}: no unit stated, {wanted} assumed"]
+        known = " known" if name.rstrip().endswith("]") else ""  # "acc [furlong]"
+        return 1.0, [f"{name}: no{known} unit stated, {wanted} assumed"]
     raise ValueError(
         f"scale must be given for {name!r} of {file}, which is in {unit!r} and not in a unit of the kind {wanted}: "
         f"scale={{{name!r}: ... }} in {wanted} per {unit}"

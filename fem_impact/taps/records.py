@@ -346,11 +346,13 @@ def read_taps(
     )  # fmt: skip
     widths = [triggers.width(row) for row in taps.force]
     flat = [f"{label} ({', '.join(taps.cut_off(i))})" for i, label in enumerate(taps.labels) if any(cut[i])]
+    dead = [text for text, still in zip(names, (np.ptp(taps.response, axis=1) == 0.0).any(axis=0)) if still]
     for which, what in (
         ([label for label, n in zip(taps.labels, taps.n_pulses) if n > 1], "{}: more than one pulse, kept as one tap"),
         ([label for label, late in zip(taps.labels, taps.cut_short) if late],
          "{}: the record begins or ends within a pulse"),
         (flat, "cut off by the range of the channel: {}"),
+        (dead, "{}: does not change during a tap, as a dead channel; leave it out, response="),
         ([label for label, back in zip(taps.labels, triggers.pulls(taps.force)) if back],
          "{}: the force pulls as it pushes, which no contact does; name its channel, force="),
         ([label for label, n in zip(taps.labels, widths) if n < 2],

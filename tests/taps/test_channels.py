@@ -57,6 +57,18 @@ def test_factors_are_to_si_times_the_scale():
     assert channels.factor("F", "", "N", None, "a") == (1.0, ["F: no unit stated, N assumed"])
 
 
+def test_what_is_not_read_or_has_an_unknown_unit_is_said():
+    force = np.pad([[20.0], [80.0], [30.0]], ((20, 20), (0, 0)))
+    found = Recording((np.tile(force, 4),), ("F", "accel", "acc [furlong]", "Voltage"), ("N", "Foos", "", "V"), 1e3)
+    _, names, kinds, notes = channels.in_si(found, "a.csv", None, None, None, None)
+    assert (names, kinds) == (["acc [furlong]"], ["m/s^2"])
+    assert notes == [
+        "accel: not read, as 'Foos' is no known unit of motion; give units, or response and scale",
+        "acc [furlong]: no known unit stated, m/s^2 assumed",
+    ]
+    assert not channels.in_si(found, "a.csv", None, (), None, None)[3]
+
+
 def test_a_scale_of_zero_is_refused():
     with pytest.raises(ValueError, match="scale must not be zero"):
         channels.in_si(recording(["Force"], ["N"]), "a.csv", None, None, 0.0, None)

@@ -95,6 +95,14 @@ def test_a_force_of_nothing_is_told_as_that(read, sign):
         read(sign * np.zeros(5000))
 
 
+def test_a_response_that_does_not_change_is_told(tmp_path):
+    force = np.pad(80.0 * np.sin(np.linspace(0.0, np.pi, 9)), 40)
+    table = np.column_stack([force, np.full(len(force), 5.0), np.cumsum(force)])
+    np.savetxt(tmp_path / "a.csv", table, delimiter=",", header="Force [N],a1 [g],a2 [g]", comments="")
+    (note,) = (note for note in fi.read_taps(tmp_path / "a.csv", rate=1e4).notes if "dead" in note)
+    assert note.startswith("a1: does not change during a tap, as a dead channel; leave it out")
+
+
 @pytest.mark.parametrize(("options", "text"), [
     ({}, "no tap was found"), ({"force": "forse"}, r"'forse' is no channel.*did you mean 'force'"),
     ({"force": 7}, "channel from 0 to 1"), ({"units": {"force": "pounds"}}, "units must be one of"),
