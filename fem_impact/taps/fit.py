@@ -139,7 +139,7 @@ def fit(
     for name in each:
         check.one_of("per_tap", name, unknown)
     n_points, points = _measured_at(levelled, target, response_at)
-    cut, noise, notes = _usable_taps(levelled, window)
+    cut, noise, notes = _usable_taps(levelled, window, n_points)
     if target is None and at is not None:
         raise ValueError("at must be left out without a target, which is then a wall or its unknown modes")
     place = None if target is None else target.point("at", at)[0]
@@ -180,8 +180,11 @@ def _measured_at(taps: Taps, target: Modes | None, response_at: Any) -> tuple[in
     return n_points, points
 
 
-def _usable_taps(taps: Taps, window: Any) -> tuple[Taps, np.ndarray, list[str]]:
-    """The taps that can be compared, cut to the window; their noise over the peak; and why others are left out."""
+def _usable_taps(taps: Taps, window: Any, n_points: int) -> tuple[Taps, np.ndarray, list[str]]:
+    """The taps that can be compared, cut to the window; their noise over the peak; and why others are left out.
+
+    Of each, ``n_points`` responses are compared.
+    """
     notes = []
 
     def without(taps: Taps, bad: np.ndarray, why: str, advice: str) -> np.ndarray:
@@ -190,6 +193,11 @@ def _usable_taps(taps: Taps, window: Any) -> tuple[Taps, np.ndarray, list[str]]:
         if bad.all():
             raise ValueError(f"taps must hold one at least whose {advice}")
         return ~bad
+
+    def some(good: np.ndarray) -> np.ndarray:
+        if not good.any():
+            raise ValueError(f"taps must hold one at least that can be compared; {'; '.join(notes)}")
+        return good
 
     good = without(
         taps, taps.impulse <= 0.0, "force never pushes", "force pushes; a negative one has the wrong sign"
@@ -201,10 +209,12 @@ def _usable_taps(taps: Taps, window: Any) -> tuple[Taps, np.ndarray, list[str]]:
     good &= without(
         taps, taps.cut_short, "record begins or ends within a pulse", "record holds its whole pulse; trigger earlier"
     )  # fmt: skip
-    taps = taps.pick(good)
+    taps = taps.pick(some(good))
     cut, noise = windows.cut_to_window(taps, window), taps.noise / taps.peak
     whole = without(cut, cut.overload, "force is cut off", "force is not cut off")
-    return cut.pick(whole), noise[whole], notes
+    still = (np.ptp(cut.response[:, :, :n_points], axis=1) == 0.0).any(axis=1)
+    whole &= without(cut, still, "response does not change", "responses all change; leave out dead channels, response=")
+    return cut.pick(some(whole)), noise[whole], notes
 
 
 def _fit(

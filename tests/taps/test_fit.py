@@ -39,6 +39,19 @@ def test_taps_are_predicted_and_so_are_new_ones(found):
     assert found.predict(2).error == pytest.approx(found.errors[2], rel=0.05)
 
 
+def test_taps_whose_response_is_dead_are_left_out_and_some_must_stay():
+    taps = taps_of(at=[[0.0]], duration=0.01)
+    force, moved = (np.concatenate([getattr(each, name) for each in taps]) for name in ("force", "response"))
+    moved[1] = 5.0
+    made = fitted(fi.Taps.from_arrays(force, moved, rate=RATE), response_at=[[0.0]])
+    assert said(made, "left out, because their response does not change: tap 2") and made.used == (0, 1)
+    moved[1:], force[0] = 5.0, np.minimum(force[0], 0.5 * force[0].max())
+    for first, words in ((moved[0].copy(), "that can be compared; left out"), (5.0, "whose responses all change")):
+        moved[0] = first
+        with pytest.raises(ValueError, match=f"taps must hold one at least {words}"):
+            fitted(fi.Taps.from_arrays(force, moved, rate=RATE), response_at=[[0.0]])
+
+
 def test_what_was_found_strikes_again(found):
     hit = fi.strike(STRUCTURE, found.striker, found.contact, at=[0.0], speed=1.0)
     wanted = fi.strike(STRUCTURE, fi.Striker.rigid(MASS), LAW, at=[0.0], speed=1.0)
