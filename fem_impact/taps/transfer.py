@@ -64,16 +64,16 @@ def frf(
         (what all taps share, such as a record that ends too early, is not in it; NaN if the noise is not known);
         ``force`` (frequency), the mean amplitude spectrum [N s], and ``force_error`` (frequency), the part of the
         relative error that is noise of the force, which a force window makes alike in neighbouring lines; attributes
-        ``averages``, ``method``, ``rate``. Of a file ``H``, and ``coherence`` if it holds one for each; of each channel
-        ``node`` and ``direction``, ``reference`` and ``reference_direction`` (where it is struck), and, if the file has
-        nodes, ``place`` and ``struck`` (channel, axis) [m]; attribute ``notes``. `fi.Modes.from_frf`, `fi.update` and
-        `fi.matched` take it.
+        ``averages``, ``method``, ``rate`` and ``notes`` (taps left out, as a channel is cut off or dead). Of a file
+        ``H``, and ``coherence`` if it holds one for each; of each channel ``node`` and ``direction``, ``reference`` and
+        ``reference_direction`` (where it is struck), and, if the file has nodes, ``place`` and ``struck`` (channel,
+        axis) [m]; attribute ``notes``. `fi.Modes.from_frf`, `fi.update` and `fi.matched` take it.
 
     Raises
     ------
     ValueError
-        If taps have no response, or a file is cut off, holds no complex responses of a motion to a force at the same
-        ascending frequencies, values that are no finite numbers, or units that contradict its codes.
+        If taps have no response or none is whole, or a file is cut off, holds no complex responses of a motion to a
+        force at the same ascending frequencies, values that are no finite numbers, or units that contradict its codes.
 
     References
     ----------
@@ -96,6 +96,7 @@ def frf(
     check.one_of("method", method, METHODS)
     if not taps.response.shape[2]:
         raise ValueError("records must have a response channel; read them with response=")
+    taps, notes = _whole_taps(taps)
     # (n_taps, n_times), of the force
     shade = 1.0 if force_window is None else _force_window(taps, check.positive("force_window", force_window, "s"))
     fade = np.ones(taps.force.shape)
@@ -141,9 +142,23 @@ def frf(
         {
             "averages": taps.n_taps, "method": method, "rate": taps.rate,
             "added_damping": 0.0 if response_window is None else 1.0 / response_window,
-            "force_window": 0.0 if force_window is None else force_window,
+            "force_window": 0.0 if force_window is None else force_window, "notes": notes,
         },
     )  # fmt: skip
+
+
+def _whole_taps(taps: Taps) -> tuple[Taps, list[str]]:
+    """Those whose channels are neither cut off nor dead; and which are left out."""
+    dead = (np.ptp(taps.force, axis=1) == 0.0) | (np.ptp(taps.response, axis=1) == 0.0).any(axis=1)
+    causes = {"is cut off": taps.table["overload"].values.any(axis=1), "does not change": dead}
+    bad = np.any([*causes.values()], axis=0)
+    notes = [
+        f"left out, because a channel {why}: {', '.join(np.array(taps.labels)[which])}"
+        for why, which in causes.items() if which.any()
+    ]  # fmt: skip
+    if bad.all():
+        raise ValueError(f"records must hold one tap at least whose channels are whole; {'; '.join(notes)}")
+    return taps.pick(~bad) if bad.any() else taps, notes
 
 
 def _force_window(taps: Taps, length: float) -> np.ndarray:

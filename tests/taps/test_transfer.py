@@ -5,6 +5,7 @@ from functools import cache
 import numpy as np
 import pytest
 from comparing import refusing
+from numpy.testing import assert_allclose
 
 import fem_impact as fi
 
@@ -36,6 +37,22 @@ def test_taps_give_the_accelerance_of_the_modes(method):
     assert np.abs(found.H.values[band, 0] - exact).max() < 2e-3 * np.abs(exact).max()  # its tail beyond the record
     assert found.coherence.values[band].min() > 0.999 and found.attrs["averages"] == 4
     assert str(found.units.values[0]) == "m/s^2/N"
+
+
+def test_taps_that_are_cut_off_or_dead_are_left_out():
+    """Two cut to half their force would tell twice the response, and agree on it."""
+    taps = taps_of(0.0)
+    force, moved = (np.concatenate([getattr(each, name) for each in taps]) for name in ("force", "response"))
+    cut = np.minimum(force, 0.5 * force.max(axis=1, keepdims=True))
+    spoiled, silent = np.vstack([cut[:2], force[2:]]), moved.copy()
+    silent[2] = 0.0
+    found = fi.frf(fi.Taps.from_arrays(spoiled, silent, rate=RATE))
+    assert_allclose(found.H.values, fi.frf(taps[3]).H.values, rtol=1e-12)
+    cut_off, dead = found.attrs["notes"]
+    assert cut_off == "left out, because a channel is cut off: tap 1, tap 2" and dead.endswith("does not change: tap 3")
+    for told in ((cut, moved), (0.0 * force, moved), (force, 0.0 * moved)):
+        with pytest.raises(ValueError, match="records must hold one tap at least whose channels are whole; left out"):
+            fi.frf(fi.Taps.from_arrays(*told, rate=RATE))
 
 
 def test_noise_lowers_the_coherence_and_biases_h1_and_h2_apart():
