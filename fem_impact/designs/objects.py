@@ -25,6 +25,7 @@ from ..model.planner import Blow
 from ..model.target import Target
 from ..modes.modal import Modes
 from ..scenes.scene import SECTIONS, Scene, load_scene
+from ..taps.unknowns import Values
 
 BODY = "mesh", "section", "supports", "theory", "point_masses", "point_supports"  # a body that is not assembled yet
 BLOW = "damping_ratio", *list(inspect.signature(collision.strike).parameters)[1:]  # arguments of a blow on it
@@ -71,14 +72,6 @@ class Piece(check.Brief):
         return self.target.section if self.target.modes is None else None
 
 
-class _Values(dict[str, float]):
-    """Free numbers by name, which say so where a function asks for another."""
-
-    def __missing__(self, name: Any) -> float:
-        here = ", ".join(map(repr, self)) or "nothing"
-        raise ValueError(f"objects asks for {check.shown(name)}, but free has {here}{check.nearest(name, self)}")
-
-
 @dataclass(frozen=True, eq=False, repr=False)
 class Maker(check.Brief):
     """Makes the pieces of a design from the values of its free numbers."""
@@ -103,7 +96,7 @@ class Maker(check.Brief):
 
     def pieces(self, values: Mapping[str, float]) -> dict[str, Piece]:
         """Body and blow by the name of the blow, "" if there is only one."""
-        made = self.build(_Values({name: float(values[name]) for name in self.names}))
+        made = self.build(Values({name: float(values[name]) for name in self.names}))
         if isinstance(made, Scene):
             blow = made.built
             key = repr([made.data().get(table) for table in BODY_TABLES])

@@ -39,6 +39,14 @@ def unit_of(name: str) -> str:
     return "m/s" if name.startswith("speed") else UNITS.get(name.rpartition(".")[2], "s" if name == TIME else "")
 
 
+class Values(dict[str, float]):
+    """Numbers by name for a function of the user's, which say so if it asks for another."""
+
+    def __missing__(self, name: Any) -> float:
+        here = ", ".join(map(repr, self)) or "nothing"
+        raise ValueError(f"the function asks for {check.shown(name)}, but gets {here}{check.nearest(name, self)}")
+
+
 @dataclass(frozen=True)
 class Unknown:
     """A number to be found between two bounds; by its logarithm if both are positive."""
@@ -105,7 +113,8 @@ class Box:
 
     def values_at(self, x: np.ndarray) -> dict[str, float]:
         """The unknowns by name at coordinates (n_unknowns,)."""
-        return {each.name: float(np.clip(each.outside(z), each.low, each.high)) for each, z in zip(self.unknowns, x)}
+        pairs = zip(self.unknowns, x)
+        return Values({each.name: float(np.clip(each.outside(z), each.low, each.high)) for each, z in pairs})
 
     def start_at(self, given: Any) -> np.ndarray:
         """Coordinates (n_unknowns,) of the values given by name; of others the middle of the range."""

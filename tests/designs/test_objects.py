@@ -70,5 +70,5 @@ test_what_makes_no_blow_is_said = refusing([
                      "contact": fi.Contact.hertz(1e6)}, "needs speed, an argument of strike"),
     (lambda values: {}, "mesh must be a Mesh of fi.mesh, got None"),
     (lambda values: {"mesh": fi.mesh.line(0.3), "suports": {}}, "each argument must be one of .*mean 'supports'"),
-    (lambda values: values["height"], "objects asks for 'height', but free has nothing"),
+    (lambda values: values["height"], "the function asks for 'height', but gets nothing"),
 ], lambda objects: Maker.of(objects, ()).pieces({}))  # fmt: skip

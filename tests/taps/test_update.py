@@ -78,6 +78,7 @@ test_wrong_arguments_are_refused = refusing([
     (plate, {"E": (1.0, 2.0), "G": (1.0, 2.0)}, "at least 2 frequencies"),
     (lambda values: 3, {"E": (1.0, 2.0)}, "must return a System"),
     (plate, {"E": (0.0, 2.0)}, "must begin above zero"),
+    (lambda values: values["rho"], {"rh": (1.0, 2.0)}, "the function asks for 'rho', but gets 'rh'; did you mean 'rh'"),
     (3, {"E": (1.0, 2.0)}, "must be a function"),
     (DISK, {"material.E_long": (1.0, 2.0)}, "E_long is not a key"),
     (DISK, {"striker.mass": (1.0, 2.0)}, "must be one of mesh, material, section, target, supports"),
