@@ -64,7 +64,7 @@ def frf(
         (what all taps share, such as a record that ends too early, is not in it; NaN if the noise is not known);
         ``force`` (frequency), the mean amplitude spectrum [N s], and ``force_error`` (frequency), the part of the
         relative error that is noise of the force, which a force window makes alike in neighbouring lines; attributes
-        ``averages``, ``method``, ``rate`` and ``notes`` (taps left out, as a channel is cut off or dead). Of a file
+        ``averages``, ``method``, ``rate`` and ``notes`` (of taps of which a channel is cut off or dead). Of a file
         ``H``, and ``coherence`` if it holds one for each; of each channel ``node`` and ``direction``, ``reference`` and
         ``reference_direction`` (where it is struck), and, if the file has nodes, ``place`` and ``struck`` (channel,
         axis) [m]; attribute ``notes``. `fi.Modes.from_frf`, `fi.update` and `fi.matched` take it.
@@ -72,8 +72,9 @@ def frf(
     Raises
     ------
     ValueError
-        If taps have no response or none is whole, or a file is cut off, holds no complex responses of a motion to a
-        force at the same ascending frequencies, values that are no finite numbers, or units that contradict its codes.
+        If taps have no response, or the force of all is cut off or dead, or a file is cut off, holds no complex
+        responses of a motion to a force at the same ascending frequencies, values that are no finite numbers, or units
+        that contradict its codes.
 
     References
     ----------
@@ -148,17 +149,23 @@ def frf(
 
 
 def _whole_taps(taps: Taps) -> tuple[Taps, list[str]]:
-    """Those whose channels are neither cut off nor dead; and which are left out."""
-    dead = (np.ptp(taps.force, axis=1) == 0.0) | (np.ptp(taps.response, axis=1) == 0.0).any(axis=1)
-    causes = {"is cut off": taps.table["overload"].values.any(axis=1), "does not change": dead}
-    bad = np.any([*causes.values()], axis=0)
-    notes = [
-        f"left out, because a channel {why}: {', '.join(np.array(taps.labels)[which])}"
-        for why, which in causes.items() if which.any()
-    ]  # fmt: skip
-    if bad.all():
-        raise ValueError(f"records must hold one tap at least whose channels are whole; {'; '.join(notes)}")
-    return taps.pick(~bad) if bad.any() else taps, notes
+    """Those whose channels are neither cut off nor dead, as far as there are any; and what else there is."""
+    still = (
+        np.ptp(np.concatenate([taps.force[:, :, None], taps.response], axis=2), axis=1) == 0.0
+    )  # (n_taps, n_sensors)
+    good, notes = ~(taps.overload | still[:, 0] | still[:, 1:].all(axis=1)), []
+    if not good.any():
+        raise ValueError(
+            "records must hold one tap at least whose force is not cut off, and changes as a response does"
+        )
+    causes = {"does not change": still.any(axis=1), "is cut off": taps.table["overload"].values.any(axis=1)}
+    for why, which in causes.items():
+        if which.any():
+            some = (good & ~which).any()
+            good = good & ~which if some else good
+            said = "left out, because" if some else "used, although"
+            notes.append(f"{said} a channel {why}: {', '.join(np.array(taps.labels)[which])}")
+    return taps.pick(good), notes
 
 
 def _force_window(taps: Taps, length: float) -> np.ndarray:

@@ -48,10 +48,13 @@ def test_taps_that_are_cut_off_or_dead_are_left_out():
     silent[2] = 0.0
     found = fi.frf(fi.Taps.from_arrays(spoiled, silent, rate=RATE))
     assert_allclose(found.H.values, fi.frf(taps[3]).H.values, rtol=1e-12)
-    cut_off, dead = found.attrs["notes"]
+    dead, cut_off = found.attrs["notes"]
     assert cut_off == "left out, because a channel is cut off: tap 1, tap 2" and dead.endswith("does not change: tap 3")
+    overload = np.tile([False, True], (len(force), 1))  # of the response in all taps: there is nothing better
+    (said,) = fi.frf(fi.Taps.from_arrays(force, moved, rate=RATE, overload=overload)).attrs["notes"]
+    assert said.startswith("used, although a channel is cut off: tap 1, tap 2")
     for told in ((cut, moved), (0.0 * force, moved), (force, 0.0 * moved)):
-        with pytest.raises(ValueError, match="records must hold one tap at least whose channels are whole; left out"):
+        with pytest.raises(ValueError, match="records must hold one tap at least whose force is not cut off, and chan"):
             fi.frf(fi.Taps.from_arrays(*told, rate=RATE))
 
 
