@@ -91,9 +91,8 @@ def modes_of(folder, change=None, written=True):
 def functions_of(folder, first="   0.00000000000e+00"):
     """Frequency responses from a universal file, the first of their numbers replaced."""
     (folder / "h.uff").unlink(missing_ok=True)
-    transfer.write_uff(
-        folder / "h.uff", fi.frf(fi.Taps.from_arrays(np.eye(1, 256, 9), np.zeros((1, 256, 1)), rate=1e3))
-    )
+    pulse = np.eye(1, 256, 9)
+    transfer.write_uff(folder / "h.uff", fi.frf(fi.Taps.from_arrays(pulse, pulse, rate=1e3)))
     text = (folder / "h.uff").read_text().replace("   0.00000000000e+00", first, 1)
     (folder / "h.uff").write_text(text)
     return transfer.read_frf(folder / "h.uff")
