@@ -1,8 +1,8 @@
 """Find how singular a plate and its plane are at corners, and put triangles there that shrink geometrically."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Iterator, Sequence
 from functools import lru_cache
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -63,7 +63,9 @@ def _four_roots(equation: list[float]) -> np.ndarray:
     return np.array([one, other, np.conj(one), np.conj(other)])
 
 
-def _secant(function: Any, z: np.ndarray, most: float, least: float) -> tuple[np.ndarray, np.ndarray]:
+def _secant(
+    function: Callable[[np.ndarray], np.ndarray], z: np.ndarray, most: float, least: float
+) -> tuple[np.ndarray, np.ndarray]:
     """Where secant steps end that start at points z (n,) all at once, with real parts within bounds, and one before."""
     before = z + 1e-3
     value_before = function(before)
@@ -139,12 +141,6 @@ def plane_exponent(angle: float, words: tuple[str, str], stiffness: tuple[float,
     return float(z.real[settled].min()) if settled.any() else 1.0
 
 
-def _turned(mesh: Mesh, before: int, facet: int) -> tuple[float, float]:
-    """Interior angle [rad] between two facets at their corner, and the direction [rad] of the second."""
-    (x, y), (u, v) = mesh.tangents[before, 1], mesh.tangents[facet, 0]
-    return round(float(np.pi - np.arctan2(x * v - y * u, x * u + y * v)), 9), float(np.arctan2(v, u))
-
-
 def number_of_rings(z: float, kinds: tuple[str, str], share: float = 1.0) -> int:
     """Number of rings of triangles needed at a corner of exponent z to miss less than CORNER_ERROR of the energy.
 
@@ -171,6 +167,19 @@ def edge_meetings(mesh: Mesh, kinds: Sequence) -> list[tuple[int, int, int]]:
     ]
 
 
+def _corners(
+    mesh: Mesh, kinds: Sequence[str], stiffness: np.ndarray
+) -> Iterator[tuple[int, float, tuple[float, tuple[str, str], tuple[float, ...]]]]:
+    """Vertices of `edge_meetings`, the length of their facets over the body's, and the arguments of their exponents."""
+    share = mesh.chords / float(np.ptp(mesh.points, axis=0).max())
+    for vertex, before, facet in edge_meetings(mesh, kinds):
+        (x, y), (u, v) = mesh.tangents[before, 1], mesh.tangents[facet, 0]
+        angle = round(float(np.pi - np.arctan2(x * v - y * u, x * u + y * v)), 9)
+        own = rotated_stiffness(stiffness / stiffness.max(), -np.arctan2(v, u))
+        corner = angle, (kinds[facet], kinds[before]), tuple(own.ravel().round(9).tolist())
+        yield vertex, float(share[[before, facet]].max()), corner
+
+
 class Singular(NamedTuple):
     """A corner that gets rings of triangles."""
 
@@ -187,14 +196,8 @@ def around_corners(mesh: Mesh, kinds: list[str], material: Material) -> tuple[di
     exponent is 1.04, and rounding of the coordinates leaves an error of 13 % (9 % measured on a 48-sided polygon).
     """
     found: dict[int, Singular] = {}
-    stiffness = material.plane_stress / material.plane_stress.max()
-    length = mesh.chords
-    extent = float(np.ptp(mesh.points, axis=0).max())
-    for vertex, before, facet in edge_meetings(mesh, kinds):
-        (angle, way), pair = _turned(mesh, before, facet), (kinds[facet], kinds[before])
-        along_edge = rotated_stiffness(stiffness, -way) if material.E_across is not None else stiffness
-        z = exponent(angle, pair, tuple(along_edge.ravel().round(9).tolist()))
-        share = float(length[[before, facet]].max() / extent)
+    for vertex, share, corner in _corners(mesh, kinds, material.plane_stress):
+        z, pair = exponent(*corner), corner[1]
         n = number_of_rings(z, pair, share)
         power = 2.0 * (z - 1.0)
         if n:
@@ -208,14 +211,10 @@ def around_plane_corners(mesh: Mesh, words: Sequence[str], plate: Plate, coarser
     Facets are held in the plane as ``words`` (n_facets,) say. If layers couple bending and the plane, corners between
     edges held differently count, too. Little of the energy is singular, so that rings end at a size, times ``coarser``.
     """
-    rings, extent = {}, float(np.ptp(mesh.points, axis=0).max())
-    stiffness, coupled = plate.stretched / plate.stretched.max(), plate.coupled
-    for vertex, before, facet in edge_meetings(mesh, words):
-        angle, way = _turned(mesh, before, facet)
-        pair, own = (words[facet], words[before]), rotated_stiffness(stiffness, -way)
-        differ = coupled and pair[0] != pair[1]
-        smallest = SMALLEST_FREE * coarser * extent / mesh.chords[[before, facet]].max()
-        if smallest < 1.0 and (differ or plane_exponent(angle, pair, tuple(own.ravel().round(9).tolist())) < 1.0):
+    rings, coupled = {}, plate.coupled
+    for vertex, share, corner in _corners(mesh, words, plate.stretched):
+        smallest, (one, other) = SMALLEST_FREE * coarser / share, corner[1]
+        if smallest < 1.0 and ((coupled and one != other) or plane_exponent(*corner) < 1.0):
             rings[vertex] = int(np.ceil(np.log(smallest) / np.log(SHRINK)))
     return graded_towards(mesh, rings)
 
