@@ -39,13 +39,19 @@ def in_si(
         notes += said
     pushed = [segment[:, struck] * factors[0] for segment in found.segments]
     rested = [row - np.median(row) for row in pushed]  # an offset may exceed the taps
-    if max(row.max() for row in rested) < -min(row.min() for row in rested):
+    if max(map(_push, rested)) < max(_push(-row) for row in rested):
         notes.append("the force is mostly negative and was turned around")
         pushed = [-row for row in pushed]
     moved = [segment[:, others] * np.array(factors[1:]) for segment in found.segments]
     short = [units.label(found.names[i])[0] for i in others]
     short = short if len(set(short)) == len(short) else [found.names[i] for i in others]
     return list(zip(pushed, moved)), short, kinds[1:], notes
+
+
+def _push(force: np.ndarray) -> tuple[float, float]:
+    """How hard a record (n_samples,) pushes: the largest product of two neighbours, so of no spike; and its top."""
+    both = np.maximum(force, 0.0)
+    return float((both[1:] * both[:-1]).max(initial=0.0)), float(both.max())
 
 
 def stated_units(found: readers.Recording, given: Mapping[str, str] | None) -> list[str]:

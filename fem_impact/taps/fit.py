@@ -212,7 +212,7 @@ def _usable_taps(taps: Taps, window: Any, n_points: int) -> tuple[Taps, np.ndarr
     taps = taps.pick(some(good))
     cut, noise = windows.cut_to_window(taps, window), taps.noise / taps.peak
     whole = without(cut, cut.overload, "force is cut off", "force is not cut off")
-    still = (np.ptp(cut.response[:, :, :n_points], axis=1) == 0.0).any(axis=1)
+    still = np.count_nonzero(triggers.is_still(cut.response[:, :, :n_points]), axis=1) > 0
     whole &= without(cut, still, "response does not change", "responses all change; leave out dead channels, response=")
     return cut.pick(some(whole)), noise[whole], notes
 

@@ -86,23 +86,12 @@ class Taps(check.Brief):
             check.one_of("units", text, [si for si in channels.units.KINDS if si != "N"])
         tags = [f"tap {i + 1}" for i in range(n_taps)] if labels is None else labels
         tags = check.texts("labels", tags, n_taps, "tap of force")
-        if overload is None:
-            cut = [[triggers.is_clipped(f), *(triggers.is_clipped(r) for r in each.T)] for f, each in zip(rows, others)]
-        else:
-            flags = np.asarray(None)
-            with suppress(ValueError):  # rows of several lengths
-                flags = np.asarray(overload)
-            if flags.dtype != bool or flags.shape not in ((), (n_taps, 1 + n_channels)):
-                raise ValueError(
-                    f"overload must be bools of shape ({n_taps}, {1 + n_channels}), got {check.shown(overload)}"
-                )
-            cut = np.broadcast_to(flags, (n_taps, 1 + n_channels)).tolist()
         table = xr.Dataset(
             {
                 "force": (("tap", "time"), rows, {"units": "N"}),
                 "response": (("tap", "time", "channel"), others),
                 "onset": ("tap", np.array([triggers.onset(f) for f in rows]) / rate, {"units": "s"}),
-                "overload": (("tap", "sensor"), np.array(cut, bool)),
+                "overload": (("tap", "sensor"), _cut_off(rows, others, overload)),
                 "pulse": ("tap", np.full(n_taps, np.nan if pulse is None else check.positive("pulse", pulse, "N"))),
             },
             {
@@ -255,6 +244,19 @@ class Taps(check.Brief):
             np.savez_compressed(file, **arrays)  # type: ignore[arg-type]
 
 
+def _cut_off(force: np.ndarray, response: np.ndarray, stated: Any) -> np.ndarray:
+    """Whether the channels (n_taps, n_times[, n_channels]) are, as ``stated`` or as they look, (n_taps, n_sensors)."""
+    if stated is None:
+        records = np.concatenate([force[:, :, None], response], axis=2)
+        return np.array([[triggers.is_clipped(channel) for channel in record.T] for record in records])
+    shape, flags = (len(force), 1 + response.shape[2]), np.asarray(None)
+    with suppress(ValueError):  # rows of several lengths
+        flags = np.asarray(stated)
+    if flags.dtype != bool or flags.shape not in ((), shape):
+        raise ValueError(f"overload must be bools of shape {shape}, got {check.shown(stated)}")
+    return np.broadcast_to(flags, shape).copy()
+
+
 def read_taps(
     path: Any,
     *,
@@ -346,7 +348,7 @@ def read_taps(
     )  # fmt: skip
     widths = [triggers.width(row) for row in taps.force]
     flat = [f"{label} ({', '.join(taps.cut_off(i))})" for i, label in enumerate(taps.labels) if any(cut[i])]
-    dead = [text for text, still in zip(names, (np.ptp(taps.response, axis=1) == 0.0).any(axis=0)) if still]
+    dead = [text for text, still in zip(names, triggers.is_still(taps.response).T) if still.any()]
     for which, what in (
         ([label for label, n in zip(taps.labels, taps.n_pulses) if n > 1], "{}: more than one pulse, kept as one tap"),
         ([label for label, late in zip(taps.labels, taps.cut_short) if late],

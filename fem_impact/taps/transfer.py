@@ -93,11 +93,8 @@ def frf(
     """
     if isinstance(records, (str, Path)):
         return read_frf(check.path("records", records))
-    taps = join_tables(records, "records")
     check.one_of("method", method, METHODS)
-    if not taps.response.shape[2]:
-        raise ValueError("records must have a response channel; read them with response=")
-    taps, notes = _whole_taps(taps)
+    taps, notes = _whole_taps(join_tables(records, "records"))
     # (n_taps, n_times), of the force
     shade = 1.0 if force_window is None else _force_window(taps, check.positive("force_window", force_window, "s"))
     fade = np.ones(taps.force.shape)
@@ -150,9 +147,9 @@ def frf(
 
 def _whole_taps(taps: Taps) -> tuple[Taps, list[str]]:
     """Those whose channels are neither cut off nor dead, as far as there are any; and what else there is."""
-    still = (
-        np.ptp(np.concatenate([taps.force[:, :, None], taps.response], axis=2), axis=1) == 0.0
-    )  # (n_taps, n_sensors)
+    if not taps.response.shape[2]:
+        raise ValueError("records must have a response channel; read them with response=")
+    still = triggers.is_still(np.concatenate([taps.force[:, :, None], taps.response], axis=2))
     good, notes = ~(taps.overload | still[:, 0] | still[:, 1:].all(axis=1)), []
     if not good.any():
         raise ValueError(

@@ -153,6 +153,11 @@ def is_clipped(values: np.ndarray, full_scale: float | None = None) -> bool:
     return bool(runs.max(initial=0) >= CLIPPED) and has_edges(values, at_top)
 
 
+def is_still(records: np.ndarray) -> np.ndarray:
+    """Whether channels (n_taps, n_times, n_channels) do not change during a tap, as dead ones, (n_taps, n_channels)."""
+    return np.ptp(records, axis=1) == 0.0
+
+
 def has_edges(values: np.ndarray, at_top: np.ndarray) -> bool:
     """Whether the samples at the top of a channel (n_times,) are cut off rather than round in steps of the converter.
 

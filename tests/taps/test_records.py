@@ -83,6 +83,14 @@ def test_a_force_that_pulls_is_turned_around(read):
     assert taps.peak[0] > 99.0 and said(taps, "turned around")
 
 
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_a_spike_larger_than_the_tap_does_not_turn_its_force_around(read, sign):
+    force = record(5000, noise=0.02, offset=0.0)
+    force[4000] = -1.5 * force.max()
+    taps = read(sign * force)
+    assert taps.peak[0] == pytest.approx(force.max(), rel=1e-2) and said(taps, "turned around") == (sign < 0.0)
+
+
 @pytest.mark.parametrize(("top", "options", "cut"), [(80.0, {}, True), (200.0, {}, False),
                                                      (200.0, {"full_scale": 90.0}, True)])  # fmt: skip
 def test_clipping_and_full_scale_are_seen(read, top, options, cut):
