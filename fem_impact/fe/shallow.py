@@ -62,7 +62,8 @@ MOST_BENT = 20_000  # [-] triangles from which on a rise is refused, as one that
 class ShallowSpace(PlaneSpace):
     """Shape functions of one mesh: 21 of the deflection, then 15 for each displacement in the plane."""
 
-    heights: np.ndarray  # (n_cells, 15) rise at the nodes of the plane, in the frame
+    heights: np.ndarray  # (n_cells, 15) rise over its mean plane at the nodes of the plane, in the frame
+    tilt: np.ndarray  # (2,) slope of that plane
     ribs: Sequence[RibLine] = ()
     drifts: np.ndarray  # (n_all, n) rigid motions in the plane that no edge prevents
 
@@ -106,20 +107,26 @@ def strains_and_motion(space: ShallowSpace, points: Points, cells: np.ndarray) -
 
 def _curved_domain(body: Subject, fields: tuple[str, ...]) -> Domain:
     found = plates.domain(ShallowSpace, body, fields)
-    found.space.heights = _heights(found.space, body.section, found.frame)
+    _raise(found.space, body.section, found.frame)
     return found
 
 
-def _heights(space: ShallowSpace, section: Any, frame: Frame) -> np.ndarray:
-    """Rise (n_cells, 15) at the nodes of the plane over the mean plane, in the frame."""
+def _raise(space: ShallowSpace, section: Any, frame: Frame) -> None:
+    """Give a space the rise of its section and, apart from it, the tilt, which stretches nothing but costs digits."""
     local = plane.nodes(space).reshape(-1, 2)
-    if section.rise is None:
-        return np.zeros((len(space.origin), plane.QUARTIC))
-    heights = check.field("rise", section.rise, frame.to_metres(local), "m") / frame.length
-    tilt = np.column_stack([np.ones(len(local)), local])  # it stretches nothing, but would cost digits
+    heights = np.zeros(len(local))
+    if section.rise is not None:
+        heights = check.field("rise", section.rise, frame.to_metres(local), "m") / frame.length
     weight = np.repeat(np.sqrt(np.abs(np.linalg.det(space.jacobian))), plane.QUARTIC)
-    heights -= tilt @ np.linalg.lstsq(weight[:, None] * tilt, weight * heights, rcond=None)[0]
-    return heights.reshape(-1, plane.QUARTIC)
+    level, space.tilt = over_mean_plane(local, heights, weight)
+    space.heights = level.reshape(-1, plane.QUARTIC)
+
+
+def over_mean_plane(points: np.ndarray, heights: np.ndarray, weight: Any = 1.0) -> tuple[np.ndarray, np.ndarray]:
+    """Heights (n,) at points (n, 2) over the plane closest to them by their weights (n,), and its slope (2,)."""
+    flat = np.column_stack([np.ones(len(points)), points])
+    found = np.linalg.lstsq(flat * np.reshape(weight, (-1, 1)), weight * heights, rcond=None)[0]
+    return heights - flat @ found, found[1:]
 
 
 def _hold_shell(body: Subject, domain: Domain) -> Held:
@@ -203,7 +210,7 @@ def mass_in_plane(system: Any) -> PlaneMass:
     for cells in blocks(len(x)):
         moved = np.zeros((*dx[cells].shape, 3, LOCAL))
         moved[:, :, 0, FIRST] = moved[:, :, 1, SECOND] = shape
-        steep = space.sloping(cells, plane.gradients(space, cells, area))
+        steep = space.sloping(cells, plane.gradients(space, cells, area)) + space.tilt
         larger = np.sqrt(0.5 * (steep**2).sum(axis=2))
         moved[:, :, 2, :21] = larger[..., None] * space.bending_functions(cells, x[cells], (0,))[0]
         local.append(gram(moved, frame.field(system.section, "inertia", x[cells]) * dx[cells]))
@@ -230,7 +237,7 @@ def shell_energies(system: Any, section: Any, vectors: np.ndarray) -> tuple[np.n
     space, frame = copy(system.space), system.frame
     if len(section.ribs) != len(space.ribs):
         raise ValueError(f"a section must keep the {len(space.ribs)} ribs of the body, got {len(section.ribs)}")
-    space.heights = _heights(space, section, frame)
+    _raise(space, section, frame)
     space.ribs = [RibLine.of(rib, line.facets, section, space, frame) for rib, line in zip(section.ribs, space.ribs)]
     whole = unknowns_of_cells(system, vectors)
     K, M = slopes.section_energies(system, space, partial(frame.field, section), vectors)
@@ -246,7 +253,7 @@ def steepest(system: Any) -> float:
     """The steepest slope [-] of the rise of a shell."""
     space = system.space
     cells, area = np.arange(len(space.origin)), area_coordinates(plane.NODES)[None]
-    return float(np.linalg.norm(space.sloping(cells, plane.gradients(space, cells, area)), axis=2).max())
+    return float(np.linalg.norm(space.sloping(cells, plane.gradients(space, cells, area)) + space.tilt, axis=2).max())
 
 
 SHALLOW = Theory(

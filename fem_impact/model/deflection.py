@@ -24,7 +24,7 @@ from scipy import special
 
 from .._base.check import SimulationError
 from .._base.rounding import ROUNDING
-from ..fe import membrane
+from ..fe import membrane, shallow
 from ..fe.section import Plate
 from ..impact import distance
 from ..impact.assumption import Assumption
@@ -225,7 +225,8 @@ def _of_rise(body: Known, value: float) -> str:
     """The deflection, over the thickness [-], as a share of the rise, in words; "" of flat bodies."""
     if body.plate is None or body.plate.rise is None:
         return ""
-    height, thickness = float(np.ptp(body.plate.rise(body.modes.shapes.grid()[0]))), body.thickness
+    points, thickness = body.modes.shapes.grid()[0], body.thickness
+    height = float(np.ptp(shallow.over_mean_plane(points, body.plate.rise(points))[0]))
     return f" (the deflection is {value * thickness / height:.2g} times the rise)" if height and thickness else ""
 
 

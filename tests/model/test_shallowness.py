@@ -55,6 +55,17 @@ def test_a_blow_says_how_steep_its_target_is_and_a_flat_one_does_not():
     assert flat.value is None and flat.worst == 0.0
 
 
+def test_a_tilt_of_the_rise_counts_as_slope_and_leaves_the_modes():
+    mesh, edges = fi.mesh.rectangle(*SIDES), {"boundary": "hinged"}
+    tilted = fi.assemble(mesh, replace(PLATE, rise=lambda points: 0.3 * points[:, 0]), edges)
+    flat, modes = (fi.find_modes(body, n_modes=3) for body in (fi.assemble(mesh, PLATE, edges), tilted))
+    assert np.allclose(modes.frequencies, flat.frequencies, rtol=1e-6)  # to which both are found
+    assert shallow.steepest(tilted) == pytest.approx(0.3, rel=1e-9)
+    shape = modes.shapes.vectors[:, 0]
+    # the surface is larger by half the square of the slope; nothing moves in the plane
+    assert shape @ shallow.plane_mass(tilted, shape[:, None])[:, 0] == pytest.approx(0.5 * 0.3**2, rel=1e-6)
+
+
 @pytest.mark.slow
 def test_advice_on_bodies_without_thick_theory_is_not_to_take_it():
     """Blows on curved and ribbed plates named theory = "mindlin", which is refused, and called flat ones too steep."""
