@@ -66,6 +66,19 @@ class Solved(check.Brief):
         """Least thickness [m]."""
         return float(thickness(self.system.section, self.system.mesh.points).min())
 
+    def reach(self, depth: float) -> tuple[float, float]:
+        """Factors between which frequencies stay, whatever is taken off up to a depth [m].
+
+        They are those if only stiffness, or only mass, went where that is thinnest.
+        """
+        section, points = self.system.section, self.system.mesh.points
+        less = thinned_section(section, lambda at: np.full(len(at), depth))
+        stiff, heavy = (
+            float((getattr(less, name)(points) / getattr(section, name)(points)).reshape(len(points), -1)[:, 0].min())
+            for name in ("stiffness", "rotary" if self.modes.thick else "inertia")
+        )
+        return stiff**0.5, heavy**-0.5
+
     @cached_property
     def sensitivity(self) -> Sensitivity:
         """What taking material off does."""
@@ -176,8 +189,11 @@ class Thinning:
         keep = order[share[order] > 0.02 * share.max()][:most] if share.any() else order[:0]  # others are negligible
         if len(keep) < np.count_nonzero(share) and len(keep):
             places = places.some(keep)
-            begun = self.after(places, share[keep], solved)
-            share, _ = self.settle(places, share[keep], begun)
+            try:
+                start = share[keep], self.after(places, share[keep], solved)
+            except SimulationError:  # modes that cannot be followed to there at once
+                start = np.zeros(len(keep)), self.before
+            share, _ = self.settle(places, *start)
             order = np.argsort(-share, kind="stable")
             keep = order[share[order] > 0.0]
         return [(places.middles[places.owners == k], float(share[k] * self.depth)) for k in keep]
@@ -197,11 +213,11 @@ class Thinning:
         def merit(share: np.ndarray, misses: np.ndarray) -> float:
             return float(cost @ share + PENALTY * np.maximum(np.abs(misses) - room, 0.0).sum())
 
-        now = self.misses(solved)
+        now, stalled = self.misses(solved), 0
         for _ in range(40):  # bodies: those of a bar cut to a third of its height take 25
             tried = _cheapest_shares(cost, slopes * self.depth, now, share, overlaps, room, trust)
             predicted = merit(share, now) - merit(tried, now + slopes @ (self.depth * (tried - share)))
-            if predicted <= 0.01 * max(float(cost @ share), 0.01):  # of what is taken off
+            if stalled == 6 or predicted <= 0.01 * max(float(cost @ share), 0.01):  # of what is taken off
                 break
             try:
                 other = self.after(places, tried, solved)
@@ -209,6 +225,9 @@ class Thinning:
                 trust *= 0.5
                 continue
             gained = merit(share, now) - merit(tried, self.misses(other))
+            # so many bodies that each make up for less than a hundredth of the misses, and do not gain speed
+            quick = gained > 0.01 * merit(0.0 * share, now)
+            stalled = 0 if quick else stalled + (gained <= 0.75 * predicted)
             if gained > 0.0:
                 share, solved, now = tried, other, self.misses(other)
                 slopes, _ = self.miss_slopes(solved, places)
@@ -234,8 +253,11 @@ def _cheapest_shares(
     while True:
         matrix = np.block([[slopes, beyond], [-slopes, beyond], [overlaps[close], np.zeros((close.sum(), rows))]])
         sides = np.concatenate([room + held, room - held, limits[close]])
-        found = linprog(np.append(cost, np.full(rows, PENALTY)), matrix, sides, bounds=bounds, method="highs")
-        if found.x is None:
+        for method in ("highs", "highs-ipm"):  # the simplex method fails at times, and is better where it does not
+            found = linprog(np.append(cost, np.full(rows, PENALTY)), matrix, sides, bounds=bounds, method=method)
+            if found.x is not None:
+                break
+        else:
             raise SimulationError(f"the linear program of a step failed: {found.message}")
         best = np.clip(np.asarray(found.x[:n]), 0.0, 1.0)
         passed = (overlaps @ best > limits + 1e-6) & ~close
