@@ -335,7 +335,8 @@ class Body(check.Brief):
         Parameters
         ----------
         direction : "normal", "x", "y", "z" or a vector (3,)
-            Of the blow and of all responses; along normals, nodes inside the body are left out.
+            Of the blow and of all responses; along normals, nodes inside the body are left out, and always nodes at
+            the place of others that move otherwise.
         free : bool, optional
             As in `Modes.from_arrays`.
 
@@ -352,6 +353,9 @@ class Body(check.Brief):
                 "them as modes of 0 Hz instead"
             )
         kept = np.flatnonzero(ways.any(axis=1))
+        moved = np.einsum("ndm,nd->nm", self.shapes[kept], ways[kept])
+        unclear = cell_kinds.contradicting(self.nodes[kept][:, self.axes], moved)
+        kept, moved = (np.delete(each, unclear, axis=0) for each in (kept, moved))
         place = np.full(len(self.nodes), -1)
         place[kept] = np.arange(len(kept))
         cells = place[self.cells]
@@ -359,10 +363,9 @@ class Body(check.Brief):
         columns, loads, unit_loads = self._unit_loads(ways, place)
         points, flat = self.nodes[kept][:, self.axes], len(self.axes) + 1 == cells.shape[1]
         made = Modes.from_arrays(
-            self.frequencies, np.einsum("ndm,nd->nm", self.shapes[kept], ways[kept]), points=points, mass=self.mass,
-            damping_ratio=self.damping_ratio, compliance=columns[kept] if len(loads) else None,
-            loads=loads if len(loads) else None, cells=cells if flat and len(cells) else None, free=free,
-            solid=False,
+            self.frequencies, moved, points=points, mass=self.mass, damping_ratio=self.damping_ratio,
+            compliance=columns[kept] if len(loads) else None, loads=loads if len(loads) else None,
+            cells=cells if flat and len(cells) else None, free=free, solid=False,
         )  # fmt: skip
         made = dents.settle_dents(made, unit_loads, self.solid)
         odd = (*plausible.imported_notes(self.nodes, self.shapes, self.mass), *[NOTE] * bool(made.omega.any()))

@@ -6,6 +6,7 @@ from collections.abc import Iterable, Sequence
 from typing import Any
 
 import numpy as np
+from scipy.spatial import KDTree
 
 from .._base import check
 from .._base.rounding import SAME
@@ -103,6 +104,13 @@ def refuse_twice(frequencies: np.ndarray, shapes: np.ndarray, holder: str = "fil
         if mark in marks and len(shapes) > 3 and mode.any():
             raise ValueError(f"{holder} must hold each mode once, but that at {frequency:g} Hz is there twice")
         marks.add(mark)
+
+
+def contradicting(points: np.ndarray, shapes: np.ndarray) -> np.ndarray:
+    """Pairs (n, 2) of points that lie at one place and have different shapes (n_points, n_modes)."""
+    pairs = KDTree(points).query_pairs(1e-6 * float(np.ptp(points, axis=0).max(initial=0.0)), output_type="ndarray")
+    apart = np.abs(shapes[pairs[:, 0]] - shapes[pairs[:, 1]]).max(axis=1, initial=0.0)
+    return pairs[apart > 1e-4 * np.abs(shapes).max(initial=0.0)]  # files in single precision round to less
 
 
 def rows_of(numbers: np.ndarray, wanted: Any) -> np.ndarray:

@@ -150,10 +150,13 @@ def body_of(found: Any, driving: Any, points: Any) -> Following:
     drive, used, sign, end = picked.find_driving_point(found, driving)
     values = values[:, used] * sign
     own = used.index(drive)
+    power = (values[:, own] / s * np.abs(s)).real  # goes into a passive body
+    picked.check_driving(found, drive, np.array([power.sum()]), values[:, own] != 0.0)
     if len(s) < 2 * AROUND:
         raise ValueError(f"frf must have at least {2 * AROUND} lines where its force has power, got {len(s)}")
     noise = _noise(found, lines_used, used, np.abs(values))
-    weight = 1.0 / np.hypot(noise, 1e-3 * np.abs(values))  # no line weighs more, however little the taps differ
+    # no line weighs more, however little the taps differ
+    weight = 1.0 / np.maximum(np.hypot(noise, 1e-3 * np.abs(values)), ROUNDING * np.abs(values).max())
     rows = [(values[:, k] * weight[:, k]).view(float).reshape(-1, 2).T.ravel() for k in range(len(used))]
     lines = MeasuredLines(s, rows[own], weight[:, own])
     kept = follow_response(lines)
@@ -174,7 +177,9 @@ def body_of(found: Any, driving: Any, points: Any) -> Following:
     squares, own_modes = kept.amplitudes[inside], np.delete(inside, 1)  # without the spring
     drawn = changed[inside, :WAYS].T / squares
     step = _in_step(lines, kept, noise[:, own], natural, damping)
-    doubt = np.clip(drawn, -1.0, None)[:, None] + np.append(step[:1] * inside[0], step)[None, None][..., own_modes]
+    doubt = (
+        np.clip(drawn, -1.0, None)[:, None] + np.append(step[:1].sum() * inside[0], step)[None, None][..., own_modes]
+    )
     shapes = []
     for k, row in enumerate(rows):  # amplitudes [1/kg] of the same modes in all responses, of either sign
         each = columns(MeasuredLines(s, row, weight[:, k]), kept.poles)

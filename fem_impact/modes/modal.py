@@ -138,11 +138,15 @@ class Modes(check.Brief):
         if not len(omega):
             raise ValueError("frequencies must not be empty")
         points = check.array("points", points, (None, None), "m")
+        if not 1 <= points.shape[1] <= 3:
+            raise ValueError(f"points must have 1, 2 or 3 coordinates, got {points.shape[1]}")
         values = check.array("shapes", shapes, (len(points), len(omega)), "kg**-0.5")
         mass, connected = check.positive("mass", mass, "kg"), cell_kinds.numbered_cells(cells, points)
         damping = damping_ratios(damping_ratio, omega)
         if not values.any():
             raise ValueError("shapes must move at least one point in one mode, got zeros only")
+        for i, j in cell_kinds.contradicting(points, values)[:1]:
+            raise ValueError(f"points {i} and {j} must not lie at one place, as their shapes differ; leave one out")
         span = unstated.unfold_points(points).shape[1]
         if span >= min(points.shape[1], 2):  # along a line, two modes may look alike
             cell_kinds.refuse_twice(omega / (2.0 * np.pi), values, "shapes")

@@ -68,15 +68,19 @@ def responses(name: str, found: Any) -> tuple[np.ndarray, np.ndarray, np.ndarray
     used = omega > 0.0
     if "force" in found:
         used &= found["force"].values >= FELT * found["force"].values.max()
-    sure = found["coherence"].values.mean(axis=1)[used] if "coherence" in found else np.ones(int(used.sum()))
+    sure = np.nan_to_num(found["coherence"].values).mean(axis=1)[used] if "coherence" in found else np.ones(used.sum())
     omega = omega[used]
-    s = 1j * omega + float(found.attrs.get("added_damping", 0.0))
+    s = 1j * omega + check.non_negative(f"{name}.added_damping", found.attrs.get("added_damping", 0.0), "1/s")
     values = values[used] * s[:, None] ** (2 - np.array([PER_FORCE[unit] for unit in units]))
     size = np.sqrt(np.square(np.abs(values)).mean(axis=1))
     # errors go with the response where it is large, and are noise where it is small; by the noise of its own line, one
     # that rises above its neighbours would count less than one that falls below them
+    if not (size * sure).any():
+        raise ValueError(
+            f"{name} must hold responses that are not zero, nor of no coherence, where its force has power"
+        )
     size, sure = (uniform_filter1d(each, LINES, mode="nearest") for each in (size, sure))
-    return s, values, sure / np.hypot(size, max(np.median(size) if size.size else 0.0, 1e-300)), used
+    return s, values, sure / np.hypot(size, max(np.median(size), ROUNDING * size.max())), used
 
 
 def pick(name: str, found: Any, about: Any = None) -> Picked:
@@ -263,6 +267,17 @@ def _damping(omega: np.ndarray, size: np.ndarray, i: int) -> float:
     return float(np.clip(0.5 * (omega[right] - omega[left]) / omega[i], 10.0 * DAMPING[0], 0.1 * DAMPING[1]))
 
 
+def check_driving(found: Any, drive: int, own: np.ndarray, moved: np.ndarray) -> None:
+    """ValueError if most of what the point struck does, (n,), is against the force, or if it does not move."""
+    if (own < 0.0).sum() > (own > 0.0).sum():
+        raise ValueError(
+            f"frf has a response at the point struck, {label(found, drive)}, that moves against the force; change the "
+            "sign of its direction"
+        )
+    if not moved.any():
+        raise ValueError(f"frf must have a response {label(found, drive)} at the point struck that moves in its modes")
+
+
 def modes_of(found: Any, driving: Any, points: Any, about: Any) -> tuple[dict[str, Any], np.ndarray, list[str]]:
     """Frequencies, damping ratios, mass-normalised shapes and points of `Modes.from_frf`; errors of shapes; notes.
 
@@ -272,14 +287,8 @@ def modes_of(found: Any, driving: Any, points: Any, about: Any) -> tuple[dict[st
     drive, used, sign, end = find_driving_point(found, driving)
     products = sign[:, None] * picked.products[used]
     own, doubt = products[used.index(drive)], picked.errors[drive]
-    if (own < 0.0).sum() > (own > 0.0).sum():
-        raise ValueError(
-            f"frf has a response at the point struck, {label(found, drive)}, that moves against the force; change the "
-            "sign of its direction"
-        )
     moved = own > 3.0 * doubt  # standard errors
-    if not moved.any():
-        raise ValueError(f"frf must have a response {label(found, drive)} at the point struck that moves in its modes")
+    check_driving(found, drive, own, moved)
     notes = [f"picked from frequency responses, of which {100.0 * picked.left:.2g} % rms are left unexplained"]
     if not moved.all():
         lost = ", ".join(f"{one:.5g} Hz" for one in picked.frequencies[~moved])

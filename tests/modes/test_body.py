@@ -196,3 +196,15 @@ def test_what_is_no_body_is_refused(change, text):
     told = {"frequencies": body.frequencies, "shapes": body.shapes, "nodes": body.nodes, "mass": 1.0} | change
     with pytest.raises(ValueError, match=text):
         fi.Body(**told)
+
+
+def test_nodes_at_one_place_that_move_otherwise_cannot_be_struck():
+    """A blow at either was one at whichever came first."""
+    nodes = [(0.0, 0.0, 0.0), (0.3, 0.0, 0.0), (0.3, 0.0, 0.0), (0.0, 0.2, 0.0), (0.0, 0.2, 0.0)]
+    shapes = np.zeros((5, 3, 1))
+    shapes[:, 2, 0] = [1.2, -0.9, 0.4, 0.3, 0.3]
+    body = fi.Body([110.0], shapes, nodes, mass=0.5)
+    modes = body.modes("z")
+    assert modes.shape_at([body.at(1), body.at(5)]).ravel().tolist() == [1.2, 0.3]
+    with pytest.raises(ValueError, match="at must lie on the body"):
+        struck(modes, body.at(2))

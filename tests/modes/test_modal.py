@@ -41,3 +41,29 @@ def test_a_mode_given_twice_and_shapes_of_zeros_are_refused():
     # both modes of a square at 250 Hz are the same along its diagonal
     along = np.linspace(0.05, 0.25, 7)[:, None] * np.ones(2)
     assert fi.Modes.from_arrays(plate.frequencies, plate.shape_at(along), points=along, mass=0.2).n_modes == 6
+
+
+@pytest.mark.parametrize(
+    ("points", "text"),
+    [
+        (
+            [(0.1, 0.2), (0.1, 0.2), (0.3, 0.1)],
+            r"points .+ and .+ must not lie at one place, as their shapes differ; leave one out",
+        ),
+        ([(0.0,) * 4, (1.0,) * 4, (2.0,) * 4], "points must have 1, 2 or 3 coordinates, got 4"),
+        ([(), (), ()], "points must have 1, 2 or 3 coordinates, got 0"),
+    ],
+)
+def test_points_that_are_none_or_contradict_each_other_are_refused(points, text):
+    with pytest.raises(ValueError, match=text):
+        fi.Modes.from_arrays([100.0], [[1.0], [0.5], [0.2]], points=points, mass=1.0)
+
+
+def test_a_point_measured_twice_alike_is_known():
+    modes = fi.Modes.from_arrays([100.0], [[1.0], [1.0], [0.2]], points=[[0.1], [0.1], [0.3]], mass=1.0)
+    assert modes.shape_at([[0.1]]).tolist() == [[1.0]]
+
+
+def test_frequencies_whose_squares_are_no_numbers_are_refused():
+    with pytest.raises(ValueError, match="frequencies must be zero or at least 1e-75 Hz, got 1e-300 Hz"):
+        fi.Modes.from_arrays([1e-300, 10.0], np.eye(2), points=[[0.0], [1.0]], mass=1.0)

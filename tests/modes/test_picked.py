@@ -166,3 +166,20 @@ def test_noise_widens_no_peaks_and_standard_errors_hold_at_one_sigma():
     assert np.median(ratio) == pytest.approx(1.0, abs=0.03)  # 0.01 of luck; it was 1.1
     errors = np.array([one.damping_errors for one in found]) / damping
     assert np.mean(np.abs(ratio - 1.0) < errors) == pytest.approx(0.68, abs=0.09)  # two sigma of 120
+
+
+@pytest.mark.parametrize("pick", [True, False])
+@pytest.mark.parametrize(
+    ("change", "text"),
+    [
+        (lambda frf: frf * 0.0, "frf must hold responses that are not zero"),
+        (lambda frf: frf.assign(coherence=(("frequency", "channel"), np.zeros(frf["H"].shape))), "of no coherence"),
+        (lambda frf: frf.assign(H=frf["H"] * xr.DataArray([0.0, 1.0], dims="channel")), "at the point struck"),
+        (lambda frf: frf.assign(H=-frf["H"]), "moves against the force"),
+    ],
+)
+def test_responses_without_power_are_refused(change, text, pick):
+    """These were failures of linear algebra."""
+    frf = responses().isel(channel=[0, 1])
+    with pytest.raises(ValueError, match=text):
+        fi.Modes.from_frf(change(frf), mass=1.0, points=[[0.0], [1.0]], driving=0, pick=pick)
