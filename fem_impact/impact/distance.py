@@ -84,6 +84,30 @@ def heard(system: "History | KernelSystem", struck: slice, band: float) -> np.nd
     return np.arange(len(system.omega))[struck][rings]
 
 
+def of_whole_runs(one: History, two: History, pace: "Pace | None" = None) -> dict[str, float]:
+    """How far one run is from another in quantities without a band [-], whatever impacts they had; see `of_runs`."""
+    # other bodies that swing have much momentum, of which the striker's error is no share
+    rigid, other = [
+        (np.isin(run.omega, (0.0, *pace.swings)) if pace and pace.swings else run.omega == 0.0).nonzero()[0]
+        for run in (two, one)
+    ]
+    start, end, other_end = two.start_p[rigid], two.end_p[rigid], one.end_p[other]
+    n_impacts = min(len(one.contacts), len(two.contacts))
+    if not n_impacts:  # bodies that constant forces part: a run ends with its first step, however long that is
+        other_end = other_end + (one.omega[other] == 0.0) * one.bias[other] * (two.end_time - one.end_time)
+    momentum = sqrt(max(start.dot(start), end.dot(end)))
+    momentum = momentum or sqrt(two.start_p.dot(two.start_p)) or sqrt(two.end_p.dot(two.end_p)) or 1.0
+    # bodies that a force holds pressed rest but for the rounding of what it gave them
+    given = float(two.contacts[:, 3].sum()) * np.abs(two.shape[:, rigid]).max(initial=0.0)
+    speeds = np.maximum(np.abs(other_end - end) - ROUNDING * given, 0.0)
+    own = sum([abs(part) * speed for part, speed in zip(pace.rebound if pace else (), speeds.tolist())])
+    found: dict[str, float] = {"restitution": max(max(speeds.tolist(), default=0.0) / momentum, own)}
+    totals = []
+    for start, end, peak, impulse, *_ in [run.contacts.T.tolist() for run in (one, two)] if n_impacts else ():
+        totals.append({"impulse": sum(impulse), "contact_time": sum(map(sub, end, start)), "force": max(peak)})
+    return found | (distance(*totals) if n_impacts else {})
+
+
 def of_runs(
     one: History, two: History, quantities: Mapping[str, float | None], over: tuple[float, float] = (1.0, 1.0),
     pace: "Pace | None" = None,
@@ -97,28 +121,9 @@ def of_runs(
     force, which depend on an instant; not those of impacts, as points part as fast as the bodies ring there, also in
     modes faster than the step.
     """
-    each, n_impacts = (one.contacts.T.tolist(), two.contacts.T.tolist()), len(two.contacts)
-    if len(one.contacts) != n_impacts or one.status != two.status:
-        return np.ones(len(quantities) + 1 + n_impacts)
-    # other bodies that swing have much momentum, of which the striker's error is no share
-    rigid, other = [
-        (np.isin(run.omega, (0.0, *pace.swings)) if pace and pace.swings else run.omega == 0.0).nonzero()[0]
-        for run in (two, one)
-    ]
-    start, end, other_end = two.start_p[rigid], two.end_p[rigid], one.end_p[other]
-    if not n_impacts:  # bodies that constant forces part: a run ends with its first step, however long that is
-        other_end = other_end + (one.omega[other] == 0.0) * one.bias[other] * (two.end_time - one.end_time)
-    momentum = sqrt(max(start.dot(start), end.dot(end)))
-    momentum = momentum or sqrt(two.start_p.dot(two.start_p)) or sqrt(two.end_p.dot(two.end_p)) or 1.0
-    # bodies that a force holds pressed rest but for the rounding of what it gave them
-    given = float(two.contacts[:, 3].sum()) * np.abs(two.shape[:, rigid]).max(initial=0.0)
-    speeds = np.maximum(np.abs(other_end - end) - ROUNDING * given, 0.0)
-    own = sum([abs(part) * speed for part, speed in zip(pace.rebound if pace else (), speeds.tolist())])
-    found: dict[str, float] = {"restitution": max(max(speeds.tolist(), default=0.0) / momentum, own)}
-    totals = []
-    for start, end, peak, impulse, *_ in each if n_impacts else ():
-        totals.append({"impulse": sum(impulse), "contact_time": sum(map(sub, end, start)), "force": max(peak)})
-    found |= distance(*totals) if n_impacts else {}
+    if len(one.contacts) != len(two.contacts) or one.status != two.status:
+        return np.ones(len(quantities) + 1 + len(two.contacts))
+    found = of_whole_runs(one, two, pace)
     apart = []
     for name, band in quantities.items():
         if band is not None and name == "sound":
@@ -127,7 +132,7 @@ def of_runs(
             found |= distance(*({name: _spectrum(run, band)} for run in (one, two)))
         apart.append(max(ROUNDING, found.get(name, ROUNDING) / over[name in INSTANTS]))
     apart.append(abs(one.margin - two.margin))
-    for rebound, other in zip(each[0][7], each[1][7]):
+    for rebound, other in zip(*(run.contacts[:, 7].tolist() for run in (one, two))):
         none, no_other = rebound != rebound, other != other  # NaN: no restitution
         apart.append(float(none != no_other) if none or no_other else abs(rebound - other))
     return np.array(apart)

@@ -13,7 +13,7 @@ from .._base import explained
 from .._base.check import REACH, SimulationError, ToleranceWarning
 from ..modes.shapes import FieldShapes, compliance_errors
 from . import accuracy, distance
-from .quantities import words
+from .quantities import USUAL, words
 from .stepping import RICHARDSON
 
 if TYPE_CHECKING:
@@ -37,6 +37,11 @@ def sentence(hit: "Response") -> str:
         return f"tolerance {hit.tolerance:g} met: estimated error {error.total:.1e} of {what}"
     if not error.resolvable:
         why = f"not resolvable: the modes left out govern the contact itself, and no error of {what} can be estimated"
+    elif max(error.truncation, error.mesh) >= 1.0 and hit.bodies[-1].poorer and not hit.bodies[0].dimension:
+        rest = sum(size % 1.0 for size in error.parts().values())
+        others = [name for name in USUAL if name in hit.quantities and name != "n_impacts"]
+        why = "models of the target as fine as this one differ in the number of impacts"
+        why += f", and by {rest:.1e} in {words(dict.fromkeys(others))}" if others else ""
     else:
         cause, size = error.dominant
         why = f"estimated error {error.total:.1e} of {what}, mostly from {cause} ({size:.1e})"

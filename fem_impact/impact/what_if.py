@@ -236,18 +236,27 @@ def worst_differences(
 
 
 def _description_error(blow: Followed, better: History | None, poorer: History | None, first: bool) -> np.ndarray:
-    """The error of a description of a body as another shows it; those that cannot be followed show nothing."""
+    """The error of a description of a body as another shows it; those that cannot be followed show nothing.
+
+    One for every doubt about the number of impacts, and what else differs, is the part below a whole number.
+    """
     n, one_more = blow.options.n_quantities, np.ones(len(blow.runs.error))
     if better is None or poorer is None:
-        return one_more * first
+        return 1.99 * one_more * first
     found = distance.of_runs(poorer, better, blow.options.quantities, pace=blow.pace)
     number = len(blow.runs.fine.contacts)
     if not first:
         same = len(better.contacts) == len(poorer.contacts) == number
         return np.append(found[:n] if same else np.zeros(n), np.zeros(len(one_more) - n))
+    if len(better.contacts) != len(poorer.contacts):
+        whole = distance.of_whole_runs(poorer, better, blow.pace)
+        found[:n] += min(0.99, max((whole.get(name, 0.0) for name in blow.options.quantities), default=0.0))
     if len(better.contacts) != number:  # other impacts, of which nothing is known
         found = np.append(found[: n + 1], one_more[n + 1 :])
-    return found + one_more if _may_touch(better, poorer, blow.pace.duration) else found
+    if _may_touch(better, poorer, blow.pace.duration):
+        found[:n] = 1.0 + max(found[:n].tolist())
+        found[n:] += 1.0
+    return found
 
 
 def _may_touch(history: History, other: History, duration: float) -> bool:

@@ -86,7 +86,8 @@ class Vectors(Description):
         # vectors that end before the echo throw the striker off by one of their own
         count = max(first, round(0.5 * grown)) if stopped else first
         unknowns = [target.unknowns(at, each, stages) for each in meshes]
-        if (rattling := _vectors_if_rattling(asked, first)) > grown:
+        rattling = _vectors_if_rattling(asked, first)
+        if rattling > grown:
             grown, finest = rattling, max(*unknowns, RESOLVING * rattling)
             unknowns = [finest, max(unknowns[0], round(finest / refinement.COARSER**2))]
         work = cost.by_vectors(unknowns, grown)
@@ -94,6 +95,8 @@ class Vectors(Description):
         why = f"the contact lasts about {asked.duration:.3g} s"
         kept = f"the target is described by about {count} Ritz vectors, more if the error demands it"
         reason = f"{target.element} elements of {size:.3g} m, smaller towards the blow, about {n_dofs} unknowns"
+        if rattling or impacts > 2:
+            kept += "; while the impacts of a blow that rattles are in doubt, up to four times as long as predicted"
         if asked.moving:
             reason += "; the vectors give the early motion, modes driven by the computed force the rest and the sound"
             work, ringing = work + ringing, cost.NOTHING
@@ -127,9 +130,11 @@ class Vectors(Description):
         """More vectors or a finer mesh, whichever the errors demand; if neither helps, an infinite plate that may."""
         asked, budget, ritz = self.asked, self.asked.budget, self.ritz
         assert ritz is not None
-        before = ritz.count
-        if ritz.improved(hit.error, budget.total - hit.error.step):
-            progress.revise(ritz.work(before).seconds)
+        # all runs of one blow take some eight times as long as the last
+        ritz.done += cost.strikes(8.0 / 20.0 * len(hit.history.steps), len(hit.history.omega))
+        most = 4.0 * (1.0 + self.forecast.seconds)  # [s]
+        if ritz.improved(hit.error, budget.total - hit.error.step, most):
+            progress.revise(ritz.work.seconds)
             return self
         if "target" in asked.pieces or not budget.missed(hit.error, not asked.values["dt"]):
             return None

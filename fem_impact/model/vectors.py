@@ -168,6 +168,8 @@ class RitzTarget:
             self.elements, other = other, self.elements
         self.unsure = hasattr(getattr(target.section, "rise", None), "otherwise")  # known at points only
         self.fine, self.coarse = self._krylov(self.elements), self._krylov(other, off=True)
+        both = (cost.on_mesh(one[0].system.n_dofs, self.count, self.count) for one in (self.fine, self.coarse))
+        self.work = self.done = sum(both, cost.NOTHING)  # for the next blow, and for all so far with it
 
     def _krylov(self, elements: Elements, off: bool = False) -> list[Krylov]:
         """Vectors of each point; with the rise ``off`` by as much as it may be, if it is unsure."""
@@ -205,28 +207,46 @@ class RitzTarget:
         self.whole = found if target.damping_ratio is None else found.damped(target.damping_ratio)
         return fold_upper_pairs(self.whole, cutoff, self.margin)
 
-    def improved(self, error: Error, allowed: float) -> bool:
-        """Take more vectors or a finer mesh, whichever the error of a blow calls for; False if neither is possible."""
-        much = (error.truncation + error.mesh) / allowed if allowed > 0.0 else np.inf
+    def improved(self, error: Error, allowed: float, most: float = np.inf) -> bool:
+        """Take more vectors or a finer mesh, whichever the error of a blow calls for; False if neither is possible.
+
+        While the number of impacts is in doubt, what descriptions differ by in all else calls for either, and a blow
+        that would take more than ``most`` seconds in all is given up: it rattles or is chaotic.
+        """
+        truncation, mesh, doubted = error.truncation, error.mesh, max(error.truncation, error.mesh) >= 1.0
+        much = (truncation + mesh) / allowed if allowed > 0.0 else np.inf
         if much <= MET:
             return False
+        if min(truncation, mesh) >= 1.0 and not self.fixed:
+            truncation, mesh = truncation % 1.0, mesh % 1.0
         # the error of the mesh contains that of too few vectors: it is at fault if it is three times as large
-        coarse = error.mesh > max(3.0 * error.truncation, 0.5 * allowed)
+        coarse = mesh > max(3.0 * truncation, 0.5 * allowed)
         # or if more vectors did not mend it, and are nearly enough
-        lasting = error.mesh > max(0.7 * self.unmended, error.truncation, 0.5 * allowed)
-        coarse |= lasting and error.truncation < allowed
-        self.unmended = error.mesh
+        lasting = mesh > max(0.7 * self.unmended, truncation, 0.5 * allowed)
+        coarse |= lasting and truncation < allowed
+        self.unmended = mesh
         if not self.spent and not coarse:
             self.tried += [error.truncation] * (self.count < MOST_VECTORS)
             # it is 1 until two descriptions agree on the impacts of the blow, which may take twice as many steps
             patience = 3 if error.truncation < 1.0 else 6
             self.spent = self.count >= MOST_VECTORS or is_hopeless(self.tried, patience)
-        if not coarse and not self.spent:
-            # less than 1.4 times as many gain too little for a run, more may overshoot
-            self.count, self.margin = min(MOST_VECTORS, round(1.4 * self.count)), NOTCH * self.margin
-            return True
-        more = self.n_dofs * refinement.COARSER**2
+        finer = coarse or self.spent
+        # less than 1.4 times as many gain too little for a run, more may overshoot
+        count = self.count if finer else min(MOST_VECTORS, round(1.4 * self.count))
+        work = self._work(count, finer)
+        if doubted and (self.done + work).seconds > most:
+            return False
+        if finer and not self._refined(error, allowed):
+            return False
+        if not finer:
+            self.count, self.margin = count, NOTCH * self.margin
+        self.work, self.done = work, self.done + work
+        return True
+
+    def _refined(self, error: Error, allowed: float) -> bool:
+        """Take a finer mesh; False if that is of no use or not possible."""
         useless = self.spent and error.truncation > allowed
+        more = self.n_dofs * refinement.COARSER**2
         if error.mesh <= 0.5 * allowed or self.fixed or useless or more > refinement.MOST_UNKNOWNS:
             return False
         if self.unsure and error.mesh > 0.7 * self.larger:  # no mesh makes the rise any surer
@@ -238,9 +258,9 @@ class RitzTarget:
         self.fine, self.unmended, self.larger = self._krylov(self.elements), np.inf, error.mesh
         return True
 
-    def work(self, before: int) -> cost.Work:
-        """Work for the next blow, of which ``before`` vectors are known: of all of them on a new mesh."""
-        fine, new = self.n_dofs, self.count - before
-        if not new:
-            return cost.on_mesh(fine, self.count, self.count)
-        return cost.on_mesh(fine, new, self.count) + cost.on_mesh(self.coarse[0].system.n_dofs, new, self.count)
+    def _work(self, count: int, finer: bool) -> cost.Work:
+        """Work for the next blow, by so many vectors: of those that are new, or of all on a finer mesh."""
+        fine, coarse = self.n_dofs, self.coarse[0].system.n_dofs
+        if finer:
+            return cost.on_mesh(fine * refinement.COARSER**2, count, count)
+        return sum((cost.on_mesh(n, count - self.count, count) for n in (fine, coarse)), cost.NOTHING)
