@@ -86,8 +86,7 @@ class Vectors(Description):
         # vectors that end before the echo throw the striker off by one of their own
         count = max(first, round(0.5 * grown)) if stopped else first
         unknowns = [target.unknowns(at, each, stages) for each in meshes]
-        rattling = _vectors_if_rattling(asked, first)
-        if rattling > grown:
+        if (rattling := _vectors_if_rattling(asked, first)) > grown:
             grown, finest = rattling, max(*unknowns, RESOLVING * rattling)
             unknowns = [finest, max(unknowns[0], round(finest / refinement.COARSER**2))]
         work = cost.by_vectors(unknowns, grown)

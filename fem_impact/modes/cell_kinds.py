@@ -106,11 +106,25 @@ def refuse_twice(frequencies: np.ndarray, shapes: np.ndarray, holder: str = "fil
         marks.add(mark)
 
 
+def places(points: Any) -> np.ndarray:
+    """Points (n_points, 1 to 3) [m], checked."""
+    found = check.array("points", points, (None, None), "m")
+    if not 1 <= found.shape[1] <= 3:
+        raise ValueError(f"points must have 1, 2 or 3 coordinates, got {found.shape[1]}")
+    return found
+
+
 def contradicting(points: np.ndarray, shapes: np.ndarray) -> np.ndarray:
     """Pairs (n, 2) of points that lie at one place and have different shapes (n_points, n_modes)."""
     pairs = KDTree(points).query_pairs(1e-6 * float(np.ptp(points, axis=0).max(initial=0.0)), output_type="ndarray")
     apart = np.abs(shapes[pairs[:, 0]] - shapes[pairs[:, 1]]).max(axis=1, initial=0.0)
     return pairs[apart > 1e-4 * np.abs(shapes).max(initial=0.0)]  # files in single precision round to less
+
+
+def refuse_contradicting(points: np.ndarray, shapes: np.ndarray) -> None:
+    """ValueError where points lie at one place and have different shapes."""
+    for i, j in contradicting(points, shapes)[:1]:
+        raise ValueError(f"points {i} and {j} must not lie at one place, as their shapes differ; leave one out")
 
 
 def rows_of(numbers: np.ndarray, wanted: Any) -> np.ndarray:

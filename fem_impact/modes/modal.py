@@ -137,25 +137,21 @@ class Modes(check.Brief):
         omega = 2.0 * np.pi * check.ascending("frequencies", frequencies, "Hz")
         if not len(omega):
             raise ValueError("frequencies must not be empty")
-        points = check.array("points", points, (None, None), "m")
-        if not 1 <= points.shape[1] <= 3:
-            raise ValueError(f"points must have 1, 2 or 3 coordinates, got {points.shape[1]}")
+        points = cell_kinds.places(points)
         values = check.array("shapes", shapes, (len(points), len(omega)), "kg**-0.5")
         mass, connected = check.positive("mass", mass, "kg"), cell_kinds.numbered_cells(cells, points)
         damping = damping_ratios(damping_ratio, omega)
         if not values.any():
             raise ValueError("shapes must move at least one point in one mode, got zeros only")
-        for i, j in cell_kinds.contradicting(points, values)[:1]:
-            raise ValueError(f"points {i} and {j} must not lie at one place, as their shapes differ; leave one out")
+        cell_kinds.refuse_contradicting(points, values)
         span = unstated.unfold_points(points).shape[1]
         if span >= min(points.shape[1], 2):  # along a line, two modes may look alike
             cell_kinds.refuse_twice(omega / (2.0 * np.pi), values, "shapes")
         complete, free = check.flag("complete", complete), None if free is None else check.flag("free", free)
         if complete and (compliance is not None or free):
             raise ValueError("complete must be False if compliance is given or free is True; leave it out")
-        loose: Any = None
-        error, doubt = 0.0, None
-        if not complete and omega[0] > 0.0 and points.shape[1] and free is not False:
+        loose, error, doubt = None, 0.0, None
+        if not complete and omega[0] > 0.0 and free is not False:
             loose, error = unstated.loose_motions(points, connected, values, mass, free)
         if free and loose is not None:
             still = np.zeros(loose.shape[1])
@@ -176,7 +172,7 @@ class Modes(check.Brief):
         strength = np.where(flexible, (values**2).mean(axis=0), 0.0)
         along = strength > 0.01 * strength.max()  # others move across
         odd: tuple[str, ...] = ()
-        if points.shape[1] and not complete:
+        if not complete:
             odd = plausible.imported_notes(points, values[:, None, along], mass)
             odd = (*odd, *plausible.disordered(points, values[:, flexible]))
             odd = (*odd, *plausible.notes_on_rigid(values[:, ~flexible], mass, 0 if free is False else span))
