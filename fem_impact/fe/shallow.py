@@ -113,10 +113,11 @@ def _curved_domain(body: Subject, fields: tuple[str, ...]) -> Domain:
 
 def _raise(space: ShallowSpace, section: Any, frame: Frame) -> None:
     """Give a space the rise of its section and, apart from it, the tilt, which stretches nothing but costs digits."""
+    space.heights, space.tilt = np.zeros((len(space.origin), plane.QUARTIC)), np.zeros(2)
+    if section.rise is None:
+        return
     local = plane.nodes(space).reshape(-1, 2)
-    heights = np.zeros(len(local))
-    if section.rise is not None:
-        heights = check.field("rise", section.rise, frame.to_metres(local), "m") / frame.length
+    heights = check.field("rise", section.rise, frame.to_metres(local), "m") / frame.length
     weight = np.repeat(np.sqrt(np.abs(np.linalg.det(space.jacobian))), plane.QUARTIC)
     level, space.tilt = over_mean_plane(local, heights, weight)
     space.heights = level.reshape(-1, plane.QUARTIC)

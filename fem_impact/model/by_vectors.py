@@ -129,7 +129,7 @@ class Vectors(Description):
         """More vectors or a finer mesh, whichever the errors demand; if neither helps, an infinite plate that may."""
         asked, budget, ritz = self.asked, self.asked.budget, self.ritz
         assert ritz is not None
-        # all runs of one blow take some eight times as long as the last
+        # `cost.strikes` takes all runs as 20 of an undisturbed contact; those of a blow take some eight of its last
         ritz.done += cost.strikes(8.0 / 20.0 * len(hit.history.steps), len(hit.history.omega))
         most = 4.0 * (1.0 + self.forecast.seconds)  # [s]
         if ritz.improved(hit.error, budget.total - hit.error.step, most):

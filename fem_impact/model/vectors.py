@@ -236,10 +236,10 @@ class RitzTarget:
         work = self._work(count, finer)
         if doubted and (self.done + work).seconds > most:
             return False
-        if finer and not self._refined(error, allowed):
-            return False
         if not finer:
             self.count, self.margin = count, NOTCH * self.margin
+        elif not self._refined(error, allowed):
+            return False
         self.work, self.done = work, self.done + work
         return True
 

@@ -177,9 +177,8 @@ def body_of(found: Any, driving: Any, points: Any) -> Following:
     squares, own_modes = kept.amplitudes[inside], np.delete(inside, 1)  # without the spring
     drawn = changed[inside, :WAYS].T / squares
     step = _in_step(lines, kept, noise[:, own], natural, damping)
-    doubt = (
-        np.clip(drawn, -1.0, None)[:, None] + np.append(step[:1].sum() * inside[0], step)[None, None][..., own_modes]
-    )
+    steps = np.append(step[:1].sum() * inside[0], step)[own_modes]
+    doubt = np.clip(drawn, -1.0, None)[:, None] + steps
     shapes = []
     for k, row in enumerate(rows):  # amplitudes [1/kg] of the same modes in all responses, of either sign
         each = columns(MeasuredLines(s, row, weight[:, k]), kept.poles)

@@ -583,7 +583,9 @@ def _arrival(
     lag, first = delay / step, int(delay.min() / step)
     row, n_lags = lag.astype(int) - first, int(lag.max()) - first + 2
     where = np.append(row, row + 1), np.tile(np.arange(len(delay)), 2)
-    heard = csr_array((np.append(1.0 - lag % 1.0, lag % 1.0), where), shape=(n_lags, len(delay))) @ shapes
+    heard = csr_array((np.append(1.0 - lag % 1.0, lag % 1.0), where), shape=(n_lags, len(delay)))
+    size = next_fast_len(OVERSAMPLING * min(BLOCK, len(times) - silent) + n_lags, real=True)
+    spectra = rfft(heard @ shapes, size, axis=0)
     for start in range(silent, len(times), BLOCK):
         part = slice(start, start + BLOCK)
         # instants whose sound arrives in this block, with one more on each side for every difference
@@ -594,7 +596,5 @@ def _arrival(
         for _ in range(room):
             motion = np.gradient(motion, step, axis=0)
         motion = np.vstack([np.zeros((moves[0], motion.shape[1])), motion])[room : n + room]
-        size = next_fast_len(n, real=True)
-        both = (rfft(motion, size, axis=0) * rfft(heard, size, axis=0)).sum(axis=1)
-        pressure[part] = irfft(both, size)[n_lags - 1 : n : OVERSAMPLING]
+        pressure[part] = irfft((rfft(motion, size, axis=0) * spectra).sum(axis=1), size)[n_lags - 1 : n : OVERSAMPLING]
     return pressure
