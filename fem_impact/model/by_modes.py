@@ -75,7 +75,8 @@ class Modal(Description):
         spring = float(modes.modal_compliance(point)[0, 0])
         lasts = np.pi * (mass * spring * (mass + modes.mass) / modes.mass) ** 0.5 / asked.duration
         left = accuracy.truncation_error(modes, at, limit, mass=mass, **asked.law)
-        kept = f"the target keeps its modes up to {limit:.4g} Hz, about {number}; the others act as a spring"
+        others = "act as a spring" if asked.values["residual"] else "count for nothing, which no error covers"
+        kept = f"the target keeps its modes up to {limit:.4g} Hz, about {number}; the others {others}"
         why = f"the contact lasts about {asked.duration:.3g} s"
         if band > needed:
             kept += f" ({band:g} Hz requested, {needed:.4g} Hz needed for the blow)"

@@ -29,6 +29,7 @@ from ..fe.assembly import (
 )  # fmt: skip
 from ..fe.ribs import mesh_along_ribs
 from ..fe.section import Beam, Plate
+from ..fe.springs import is_sprung
 from ..mesh.meshes import Mesh, sizes
 from ..modes import analytic, finding
 from ..modes.air import in_air
@@ -155,6 +156,14 @@ class Target:
         return usual_theory(self.section, 2).element
 
     @property
+    def similar(self) -> bool:
+        """Whether other lengths, or another thickness, rescale all its modes alike."""
+        section = self.section
+        pulled = isinstance(section, Plate) and (section.tension or not section.plain)
+        held = is_sprung(self.supports, self.point_supports) or bool(self.point_masses)
+        return self.mesh is not None and not (pulled or held or self.thick or self.air)
+
+    @property
     def can_stretch(self) -> bool:
         """Whether it is known how it stretches: material and section are stated, and what holds it in its plane."""
         if self.mesh is None or self.section is None or self.scale:
@@ -187,10 +196,13 @@ class Target:
         damping = () if ratio is None or callable(ratio) else plausible.notes_on_damping(np.atleast_1d(ratio))
         return plausible.together(notes_on(self.mesh, self.section), damping)
 
+    def damped(self, modes: Modes) -> Modes:
+        """The modes with the damping of this body, if it has its own."""
+        return modes if self.damping_ratio is None else modes.damped(self.damping_ratio)
+
     def finished(self, modes: Modes) -> Modes:
         """The modes scaled and damped."""
-        modes = modes.scaled(**self.scale) if self.scale else modes
-        return modes if self.damping_ratio is None else modes.damped(self.damping_ratio)
+        return self.damped(modes.scaled(**self.scale) if self.scale else modes)
 
     def surrounded(self, modes: Modes) -> Modes:
         """The modes as struck: scaled, damped and in the air around."""

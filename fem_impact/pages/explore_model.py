@@ -21,12 +21,18 @@ from ..modes.modal import Modes
 from ..modes.shapes import SampledShapes
 from ..scenes.scene import Scene
 from ..scenes.schema import PATHS
+from ..scenes.whole import for_many
 from ..sweeps import bodies, grid
 
 MAP_TOLERANCE = 1e-2  # [-] of the blows on the map, which only counts impacts, and of vectors: seconds for each point
 FIRST_LOOK = 30  # [-] modes found first, to estimate the number needed
 SPANS = {  # [-] slider end over the scene's value
     "thickness": 2.0, "mass": 20.0, "stiffness": 1000.0, "speed": 10.0, "bending": 20.0
+}  # fmt: skip
+SIZES = "thickness", "height"  # of a section
+WEIGHTS = {  # keys of a striker that grow with its mass where its frequencies stay, by kind
+    "rigid": {"mass"}, "sphere": {"rho"}, "stick": {"mass"}, "hammer": {"head", "handle", "stiffness", "damping"},
+    "turning": {"mass", "inertia"}, "bar": {"E", "rho"},
 }  # fmt: skip
 
 
@@ -58,10 +64,12 @@ class Setup:
     def of(cls, scene: Scene, loose: bool = False, before: "Setup | None" = None) -> "Setup":
         """The setup of a scene, with enough modes for its shortest blow, but at most a hundred.
 
+        ValueError if it has several strokes, or forces, which the page does not follow.
+
         If vectors can represent the body, the first few modes suffice: they bridge the seconds until the vectors of a
         new strike point are found. ``before`` is a setup of the same body, whose modes are taken as far as they reach.
         """
-        plan = None
+        plan, (scene, _) = None, for_many(scene)
         if before is not None:
             first, mesh = before.base.modes, before.mesh
         else:
@@ -132,17 +140,26 @@ class Setup:
             shapes = SampledShapes(point, known.shape_at(point), known.modal_compliance(point) + rest)
             case = replace(case, modes=replace(known, shapes=shapes))
         modes, ratio = case.modes, settings.thickness
+        if ratio != 1.0:  # mass and all frequencies grow with the thickness, and damping may depend on these
+            modes = self.scene.built.target.damped(modes.stretched(ratio, ratio))
         if settings.damping != self.start.damping:
             modes = modes.damped(settings.damping)
-        if ratio != 1.0:  # mass and all frequencies grow with the thickness
-            modes = modes.stretched(ratio, ratio)
         case = replace(case, modes=modes)
         return case.changed("speed", settings.speed).changed("at", settings.at)
 
     @property
+    def barred(self) -> set[str]:
+        """Numbers that no slider can change: the page would show other blows than the scene that it saves."""
+        target, table = self.scene.built.target, self.scene.section
+        sizes = [1.0] if table is None else [table.values.get(key) for key in SIZES]
+        known = any(isinstance(size, (int, float)) for size in sizes) and not getattr(target.section, "layers", ())
+        alike = known and target.similar and not target.stretching
+        return {name for name, bars in (("thickness", not alike), ("damping", target.air is not None)) if bars}
+
+    @property
     def by_vectors(self) -> bool:
         """Whether Ritz vectors can represent the body, as far as is known without finding them."""
-        return vectors.vectors_usable(self.scene.built.target) and bool(self.scene.blow.values.get("residual", True))
+        return vectors.vectors_usable(self.scene.built.target)
 
     def excited_at(self, at: tuple[float, ...]) -> Modes | None:
         """The body as blows at a point excite it, by Ritz vectors; None if only modes can represent it.
@@ -187,16 +204,18 @@ class Setup:
         law = self.law(settings)
         tables["contact"] = law.table
         tables["contact"]["gap"] = law.gap
-        stick = {"first_frequency": settings.bending} if settings.bending is not None else {}
-        tables["striker"] = {"kind": "stick" if stick else "rigid", "mass": settings.mass, **stick}
+        striker, heavier = self.scene.striker, settings.mass / self.start.mass
+        grown = {key: heavier * value for key, value in striker.values.items() if key in WEIGHTS[striker.kind]}
+        tables["striker"] |= grown | ({} if settings.bending is None else {"first_frequency": settings.bending})
+        tables["strike"].pop("residual", None)  # on the page what modes left out yield acts in any case
         tables["strike"] |= {"at": list(settings.at), "speed": settings.speed}
         target = tables.setdefault("target", {})
         if settings.damping != self.start.damping:
             target |= {"damping_ratio": settings.damping}
         target |= {key: settings.thickness * target[key] for key in ("mass", "first_frequency") if key in target}
         if "section" in tables:
-            for key in ("thickness", "height"):
-                if isinstance(tables["section"].get(key), float):
+            for key in SIZES:
+                if key in tables["section"] and settings.thickness != 1.0:
                     tables["section"] = {**tables["section"], key: settings.thickness * tables["section"][key]}
         return tables
 

@@ -6,7 +6,6 @@ import numpy as np
 
 from .._base import check
 from .._base.rounding import SAME
-from ..fe.section import Plate
 from ..mesh.mesh_files import loops_of
 from .explore_bench import LARGEST_DRAWING
 from .explore_map import NARROWEST
@@ -37,13 +36,9 @@ def ends(setup: Setup) -> Ends:
         found[letter] = (float(three[0]), float(three[1]), float(three[2]))
     if setup.mesh.dimension == 2:
         found["height"] = (0.0, 3.0, 0.0)  # [m] of the listener; at zero the sound is the motion of the surface
-    section = setup.scene.built.target.section
-    shaped = isinstance(section, Plate) and bool(section.rise or section.ribs or section.layers)
     for name in SLIDERS:
         value = getattr(setup.start, name, None)
-        if name == "thickness" and shaped:  # only of a flat plate it rescales all frequencies alike
-            continue
-        if name not in found and value is not None:
+        if name not in found and value is not None and name not in setup.barred:
             found[name] = (*setup.range(name), value)
     return found
 

@@ -22,7 +22,7 @@ from ..sweeps.borders import PREFIX, read_borders
 from ..sweeps.cells import LAW, Case, computed_together, is_logarithmic, laid_out
 from .scene import Scene
 from .schema import Part
-from .whole import check_axes
+from .whole import check_axes, for_many
 
 FORMATS = ("nc", "zarr")
 FILES = (".nc", ".zarr", ".csv", ".png", ".pdf", ".svg")  # a folder name must not end like this
@@ -63,8 +63,6 @@ def map_scene(
         striker on a rigid wall; and ``threshold`` [Hz], the contact resonance above which the body stops the striker
         by the kinetic-energy criterion (NaN if the striker never rebounds or is never stopped).
     """
-    scene.check_single()
-    scene.check_unpushed()
     table = {} if scene.map is None else scene._make("map", scene.map)
     over = table.get("over", {}) if over is None else over
     if not isinstance(over, Mapping) or not all(isinstance(name, str) for name in over):
@@ -75,6 +73,7 @@ def map_scene(
         raise ValueError(
             f'{scene.path}: [map] is missing; add it and name the axes, as in over = {{ "striker.mass" = [0.01, 0.1] }}'
         )
+    scene, model = for_many(scene, limit, wanted.get("stage"))
     law, stretches = scene.make_contact(), bool(scene.target.values.get("stretching"))
     anew = check_axes(scene, over)
     over, ours = laid_out(over, law, alone=stretches, cells=wanted.pop("cells", None))
@@ -106,7 +105,8 @@ def map_scene(
     result.attrs["scene"] = json.dumps(
         {**scene.data(), "map": {name: list(map(export.plain, v)) for name, v in over.items()}}
     )
-    result.attrs["notes"] = "\n".join(plausible.together(*(piece.attrs["notes"].splitlines() for piece in pieces)))
+    notes = (piece.attrs["notes"].splitlines() for piece in pieces)
+    result.attrs["notes"] = "\n".join(plausible.together(model, *notes))
     result.attrs["title"] = scene.title or str(scene.path.name)
     return result
 

@@ -349,12 +349,12 @@ class Scene(check.Brief):
             )
 
     def check_unpushed(self) -> None:
-        """Raise ValueError if a force or an early end is given, which maps and spreads do not follow."""
-        self.make_striker().let_go("a map or spread")
+        """Raise ValueError if a force or an early end is given, which maps, spreads and the live page do not follow."""
+        self.make_striker().let_go("a map, a spread or the live page")
         for name in ("striker_force", "target_force", "duration", "max_impacts"):
             if self.blow.values.get(name):
                 raise self.fault(
-                    f"[strike] {name} must be left out here: maps and spreads follow whole blows without it"
+                    f"[strike] {name} must be left out here: maps, spreads and live pages follow whole blows without it"
                 )
 
     def _staged(self, stages: Stages) -> Blow:

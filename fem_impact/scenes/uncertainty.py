@@ -15,7 +15,6 @@ from .._base import check, progress
 from ..fe import plausible
 from ..fe.assembly import System, reassemble
 from ..fe.section import Beam, Plate
-from ..fe.springs import is_sprung
 from ..impact.contact import Contact
 from ..impact.measured import ENDS
 from ..impact.parameters import BAR, PLATE, ROD
@@ -32,6 +31,7 @@ from ..sweeps.spreads import DOUBLE, QUANTITIES, Checks, Spread
 from ..sweeps.store import Texts
 from .maps import MOST_ROWS, changed_scene
 from .scene import Scene, load_scene
+from .whole import for_many
 
 # [-] default limit of a spread, to limit the work to some minutes and 1 GB of numbers
 MOST_BLOWS = 10**7
@@ -123,6 +123,8 @@ def spread(
     >>> abs(found.quantile("contact_time", 0.5).value / (3.14159 * (0.1 / 1e5) ** 0.5) - 1.0) < 1e-2
     True
     """
+    inputs = read_inputs(vary)
+    model: tuple[str, ...] = ()
     if isinstance(scene, (System, Modes)):
         given = check.instance("striker", striker, Striker), check.instance("contact", contact, Contact)
         arguments = {"at": at, "speed": check.positive("speed", speed, "m/s", reach=REACH)}
@@ -133,11 +135,8 @@ def spread(
         for name, value in {**own, "damping_ratio": damping_ratio}.items():
             if value is not None:
                 raise ValueError(f"{name} must be left out for a scene, which has its own")
-        loaded = scene if isinstance(scene, Scene) else load_scene(scene)
-        loaded.check_single()
-        loaded.check_unpushed()
+        loaded, model = for_many(scene if isinstance(scene, Scene) else load_scene(scene), tolerance)
         blow = loaded.built
-    inputs = read_inputs(vary)
     n = check.count("n", n)
     if n > (most := check.number("max_blows", max_blows)):
         raise ValueError(f"n must be at most {most:g} blows, got {n}; raise max_blows")
@@ -157,7 +156,7 @@ def spread(
     base, rough = exact.base, fewer_values(exact)
     numbers, texts = solve_all(rough, workers, client, store, watch or partial(progress.report, "blows"))
     checks, rescaled = _checked(exact, numbers, workers), asked.rescaled(base)
-    notes = plausible.together(base.modes.notes, base.striker.notes)
+    notes = plausible.together(model, base.modes.notes, base.striker.notes)
     table = _table(inputs, values, rough, numbers, texts, d + 2 if groups else 1)
     title = loaded.title or loaded.path.name if loaded is not None else ""
     return Spread(inputs, table, limit, groups, mixer, seed, checks=checks, rescaled=rescaled, title=title, notes=notes,
@@ -235,10 +234,7 @@ class _SpreadAsked:
         """The body's own value of an input, which must be one number."""
         target, section = self.blow.target, self.blow.target.section
         if name == SIZE:
-            springs = is_sprung(target.supports, target.point_supports)
-            pulled = isinstance(section, Plate) and (section.tension or not section.plain)
-            stiff = springs or pulled or target.thick or target.air
-            if target.mesh is None or stiff or target.point_masses or target.scale:  # lengths do not scale exactly
+            if not target.similar or target.scale:
                 raise ValueError(
                     f"vary: {SIZE} needs a thin body of stated size, flat, without springs, tension, ribs, point "
                     "masses or air; vary target.mass and target.first_frequency"

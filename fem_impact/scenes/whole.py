@@ -1,6 +1,7 @@
 """A scene as a whole: its tables fit together, and what is cheap to build can be built."""
 
 from collections.abc import Mapping
+from dataclasses import replace
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
@@ -9,9 +10,10 @@ from ..fe.assembly import THICK
 from ..impact.stepping import Options
 from ..sweeps.cells import ALIASES, AXES
 from .keys import checked, form
-from .schema import MAKERS, NESTED, REPEATED, rise_of
+from .schema import MAKERS, NESTED, REPEATED, Part, rise_of
 
 if TYPE_CHECKING:
+    from ..model.target import Watch
     from .scene import Scene
 
 
@@ -71,6 +73,25 @@ def check_whole(scene: "Scene") -> None:
             except ValueError as error:
                 said = str(error).removeprefix(f"{check.line(str(scene.path))}: ")
                 raise scene.fault(f"[[{REPEATED}]] {i} {said}") from None
+
+
+def for_many(
+    scene: "Scene", tolerance: float | None = None, watch: "Watch | None" = None
+) -> tuple["Scene", tuple[str, ...]]:
+    """The scene as many blows on one body share it, and notes on that; ValueError if they cannot.
+
+    Where the model of the target is to be chosen, it is the one that the scene's own blow requires.
+    """
+    scene.check_single()
+    scene.check_unpushed()
+    if scene.target.values.get("model") != "auto":
+        return scene, ()
+    changes: dict[str, Any] = {} if tolerance is None else {"tolerance": tolerance}
+    found = scene.run(watch, **changes).plan.blow.target
+    chosen = {name: value for name in ("theory", "air", "stretching") if (value := getattr(found, name))}
+    said = ", ".join(f"{name} = {value}" for name, value in chosen.items()) or "nothing beyond what is stated"
+    target = Part(scene.target.kind, {**scene.target.values, **chosen, "model": "stated"})
+    return replace(scene, target=target), (f"the model of the target is what the scene's own blow requires: {said}",)
 
 
 def check_axes(scene: "Scene", over: Mapping[str, Any]) -> list[str]:

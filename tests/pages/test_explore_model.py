@@ -6,11 +6,11 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from scenes import TITLED, load_text
+from scenes import TITLED, edited, load_text
 
 import fem_impact as fi
 from fem_impact.impact import accuracy
-from fem_impact.pages import explore_model, explore_numbers
+from fem_impact.pages import explore_model, explore_numbers, explore_view
 from fem_impact.scenes.scene import scene_of
 from fem_impact.scenes.schema import toml_text
 from fem_impact.show import sound
@@ -68,6 +68,75 @@ def test_damping_loss_and_thickness_change_the_blow_as_a_new_body_would(stand):
     lossy = stand.case(replace(stand.start, loss=1.0))
     assert lossy.contact.loss == 1.0
     assert lossy.blow().restitution != stand.case(stand.start).blow().restitution
+
+
+STRIKERS = {
+    "hammer": "head = 0.02\nhandle = 0.1\nstiffness = 1e4\ndamping = 0.5",
+    "turning": "mass = 0.03\ninertia = 1e-5\narm = [0.01, 0.02]",
+    "bar": "E = 1e10\nrho = 700.0\nlength = 0.3\nat = 0.25\ndiameter = 0.014",
+    "stick": "mass = 0.04\nfirst_frequency = 300.0\nslenderness = 20.0",
+    "sphere": "radius = 0.01\nE = 2e11\nnu = 0.3\nrho = 7800.0",
+}
+
+
+@pytest.mark.parametrize("kind", STRIKERS)
+def test_a_saved_striker_is_the_one_on_the_page(kind, tmp_path):
+    text = edited('kind = "rigid"\nmass = 0.03', f'kind = "{kind}"\n{STRIKERS[kind]}')
+    setup = explore_model.Setup.of(load_text(tmp_path, text))
+    bending = setup.start.bending and 1.5 * setup.start.bending
+    settings = replace(setup.start, mass=1.4 * setup.start.mass, bending=bending)
+    shown = setup.case(settings).striker
+    saved = scene_of(setup.saved(settings), setup.scene.path, folder=tmp_path).make_striker()
+    # to the rounding of its modes; their numbers are closed formulas or the same meshes
+    assert saved.mass == pytest.approx(shown.mass, rel=1e-9)
+    np.testing.assert_allclose(saved.modes.frequencies, shown.modes.frequencies, rtol=1e-6, atol=1e-6)
+    np.testing.assert_allclose(
+        saved.modes.shape_at(saved.at[None]) ** 2, shown.modes.shape_at(shown.at[None]) ** 2, rtol=1e-6, atol=1e-9
+    )
+
+
+SECTION = '[material]\nE = 1e10\nnu = 0.3\nrho = 450.0\n[section]\nkind = "plate"\nthickness = 3e-3\n[supports]'
+OWN = (
+    edited("mass = 0.2\nfirst_frequency = 100.0\n", "")
+    .replace('source = "analytic"\n', "")
+    .replace("[supports]", SECTION)
+)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "barred"),
+    [
+        ("[section]", "[section]", set()),
+        ("[section]", "[section]\ntension = 1e4", {"thickness"}),
+        ("[target]", '[target]\ntheory = "mindlin"', {"thickness"}),
+        ("[target]", "[target]\nstretching = true", {"thickness"}),
+        ("[target]", "[target]\npoint_masses = [{ at = [0.2, 0.1], mass = 0.1 }]", {"thickness"}),
+        ("[target]", "[target]\npoint_supports = [{ at = [0.2, 0.1], stiffness = 1e4 }]", {"thickness"}),
+        ('boundary = "hinged"', "boundary = { stiffness = 1e5 }", {"thickness"}),
+        ("3e-3", "{ x = [0.0, 0.4], y = [0.0, 0.3], values = [[2e-3, 3e-3], [3e-3, 4e-3]] }", {"thickness"}),
+        ("[target]", '[target]\nair = "both sides"', {"thickness", "damping"}),
+    ],
+)
+def test_numbers_that_do_not_rescale_the_body_have_no_slider(stand, old, new, barred, tmp_path):
+    """Bodies of which thickness, or damping beside that of the air, make modes that the page does not know."""
+    setup = replace(stand, scene=load_text(tmp_path, edited(old, new, OWN)))
+    assert setup.barred == barred and not barred & set(explore_view.ends(setup))
+
+
+@pytest.mark.parametrize(
+    ("table", "line", "words"),
+    [
+        ("[striker]", "gravity = 9.8", "striker must not fall in .* live page"),
+        ("[strike]", "max_impacts = 1", "max_impacts must be left out"),
+        ("[strike]", "duration = 0.1\ntarget_force = 1.0", "target_force must be left out"),
+        ("[striker]", "hand = { stiffness = 100.0 }", "striker must not be held"),
+        ("[strike]", "", r"\[\[stroke\]\] must be left out"),
+    ],
+)
+def test_blows_that_the_page_does_not_follow_are_refused(table, line, words, tmp_path):
+    text = edited(table, f"{table}\n{line}") + ("" if line else "[[stroke]]\nwhen = 0.0\n[[stroke]]\nwhen = 0.1\n")
+    with pytest.raises(ValueError, match=words):
+        explore_model.Setup.of(load_text(tmp_path, text))
 
 
 def test_a_saved_scene_strikes_as_the_page_does(stand, tmp_path):
