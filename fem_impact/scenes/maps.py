@@ -19,7 +19,7 @@ from ..model.target import Stages
 from ..show import export, figures, plots
 from ..sweeps import cases, grid
 from ..sweeps.borders import PREFIX, read_borders
-from ..sweeps.cells import LAW, Case, computed_together, is_logarithmic, laid_out
+from ..sweeps.cells import ALIASES, AXES, LAW, Case, computed_together, is_logarithmic, laid_out
 from .scene import Scene
 from .schema import Part
 from .whole import check_axes, for_many
@@ -79,8 +79,7 @@ def map_scene(
     over, ours = laid_out(over, law, alone=stretches, cells=wanted.pop("cells", None))
     slow = {name: list(over[name]) for name in anew}
     quick = {name: values for name, values in over.items() if name not in slow}
-    if not quick:
-        quick = {"strike.speed": [scene.blow.values["speed"]]}
+    shared = quick or {"strike.speed": [scene.blow.values["speed"]]}
     if slow:
         for name in ("borders", "refine"):
             if wanted.get(name):
@@ -98,10 +97,11 @@ def map_scene(
     for number, chosen in enumerate(product(*slow.values())):
         changed = scene
         for name, value in zip(slow, chosen):
-            changed = changed_scene(changed, name, value)
+            changed = changed_scene(changed, AXES.get(name, ("", "", name))[2], value)
         own = store if store is None or not slow else Path(store).with_name(f"{Path(store).name}-{number}")
-        pieces.append(_quick_map(changed, quick, band, limit, {**wanted, "store": own, "ours": ours, "tell": tell}))
+        pieces.append(_quick_map(changed, shared, band, limit, {**wanted, "store": own, "ours": ours, "tell": tell}))
     result = _joined(pieces, slow)
+    result = result if quick else result.isel(speed=0, drop=True)
     result.attrs["scene"] = json.dumps(
         {**scene.data(), "map": {name: list(map(export.plain, v)) for name, v in over.items()}}
     )
@@ -172,7 +172,8 @@ def _joined(pieces: Sequence[xarray.Dataset], slow: Mapping[str, Sequence[Any]])
     rows = list(pieces)
     for name, values in reversed(list(slow.items())):
         numeric = all(isinstance(value, (int, float, np.number)) for value in values)
-        index = xarray.IndexVariable(name, np.asarray(values, float) if numeric else np.arange(len(values)))
+        axis, found = ALIASES.get(name, name), np.asarray(values, float) if numeric else np.arange(len(values))
+        index = xarray.IndexVariable(axis, found, grid.axis_attributes(axis) if axis in AXES else {})
         count = len(values)
         rows = [
             xarray.concat(

@@ -25,7 +25,7 @@ from ..modes.modal import Damping, Modes
 from ..show import export, figures
 from ..sweeps import bodies, grid
 from ..sweeps.cases import Cases, fewer_values, solve_all, try_each
-from ..sweeps.cells import ALIASES, AXES, LAW, REACH, Case
+from ..sweeps.cells import ALIASES, AXES, LAW, REACH, Case, rescales
 from ..sweeps.inputs import Input, correlating_matrix, drawn_inputs, read_inputs, shares, sobol_points
 from ..sweeps.spreads import DOUBLE, QUANTITIES, Checks, Spread
 from ..sweeps.store import Texts
@@ -213,6 +213,12 @@ class _SpreadAsked:
             if not (self.body[name] > 0.0).all():
                 raise _below(name, column)
         elif axis in AXES and axis != "at":
+            target = self.blow.target
+            if not rescales(axis, target.air or (target.modes and target.modes.air), target.damping_ratio):
+                raise ValueError(
+                    f"vary: {name} does not rescale air, nor damping that depends on frequency; write it in the scene "
+                    "as { value, about } for `fi.band`"
+                )
             if axis in self.own:
                 raise ValueError(f"vary names {axis} twice")
             self.own[axis] = column

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 from .._base import check
 from ..fe.assembly import THICK
 from ..impact.stepping import Options
-from ..sweeps.cells import ALIASES, AXES
+from ..sweeps.cells import ALIASES, AXES, rescales
 from .keys import checked, form
 from .schema import MAKERS, NESTED, REPEATED, Part, rise_of
 
@@ -95,15 +95,16 @@ def for_many(
 
 
 def check_axes(scene: "Scene", over: Mapping[str, Any]) -> list[str]:
-    """The axes of a map that `sweep` does not have, each of whose values needs another body.
+    """The axes of a map each of whose values needs another body: that `sweep` does not have, or that do not rescale.
 
     Raises ValueError unless these are numbers of the scene, with values or a range with a count.
     """
     tables = [name for name in MAKERS if name not in ("observe", "map")]  # those two change no blow
     known = [f"{name}.{key}" for name in tables for key in getattr(getattr(scene, name), "values", {})]
-    anew = [name for name in over if ALIASES.get(name, name) not in AXES]
+    air, ratio = (scene._target[name] for name in ("air", "damping_ratio"))
+    anew = [name for name in over if ALIASES.get(name, name) not in AXES or not rescales(name, air, ratio)]
     for name in anew:
-        if name not in known:
+        if name not in known and ALIASES.get(name, name) not in AXES:
             near = check.nearest(name, [*AXES, *ALIASES, *known])
             raise scene.fault(f"[map] over: {name} is not an axis{near}")
         if isinstance(over[name], partial) or (isinstance(over[name], Mapping) and "count" not in over[name]):

@@ -64,6 +64,14 @@ def read_axis(name: str, values: Any) -> Any:
     return found
 
 
+def rescales(name: str, air: Any, damping_ratio: Any) -> bool:
+    """Whether an axis that changes the body rescales its modes: not the ``air`` in them, nor damping by frequency."""
+    axis = ALIASES.get(name, name)
+    if air and axis in ("target_mass", "target_frequency", "damping_ratio"):
+        return False
+    return axis != "target_frequency" or not callable(damping_ratio)
+
+
 def laid_out(
     over: Mapping[str, Any], contact: Contact, *, alone: bool = False, cells: int | None = None
 ) -> tuple[dict[str, Any], bool]:

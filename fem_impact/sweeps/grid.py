@@ -25,7 +25,7 @@ from ..modes.modal import Damping, Modes
 from . import batches, bodies, cell_errors, refined
 from .borders import add_borders, find_borders, why_none
 from .cases import LAYERS, Cases, solve_all
-from .cells import AXES, Case, laid_out
+from .cells import AXES, Case, laid_out, rescales
 from .store import Texts, Watch, not_free
 
 TOLERANCE = 1e-3  # [-] default error limit of a map
@@ -112,6 +112,11 @@ class Job:
             lambda cells, turn: self.solved(replace(cases, chosen=cells), turn),
             lambda done: self.watched(done, cases.n_cases),
         )  # fmt: skip
+
+
+def axis_attributes(name: str) -> dict[str, str]:
+    """Unit and meaning of an axis of `AXES`, as attributes."""
+    return {"units": AXES[name][0] or "1", "long_name": AXES[name][1]}
 
 
 @check.typed
@@ -229,6 +234,12 @@ def sweep(
     )
     if isinstance(over, Mapping):
         alone = bool(job.layers) or (isinstance(modes, Modes) and modes.stretches)
+        for name in over:
+            if isinstance(modes, Modes) and not rescales(name, modes.air and name != "damping_ratio", None):
+                raise ValueError(
+                    f"over must not name {name} for modes in air, which does not scale with them; rescale them before "
+                    "`in_air`"
+                )
         over, ours = laid_out(over, contact, alone=alone, cells=cells)
         job = replace(job, ours=ours)
     blow = Blow(Target.of(modes, damping_ratio), striker, contact, {"at": at, "speed": speed})
@@ -314,7 +325,7 @@ def _dataset(cases: Cases, numbers: np.ndarray, failures: np.ndarray, left_out: 
     data["failure"] = (dims, failures.reshape(cases.shape), {"long_name": "error text of a failed cell"})
     places: dict[str, Any] = {}
     for name, values in cases.axes.items():
-        attributes = {"units": AXES[name][0] or "1", "long_name": AXES[name][1]}
+        attributes = axis_attributes(name)
         if name == "stiffness" and "exponent" not in cases.axes:
             power = cases.base.contact.exponent
             attributes["units"] = "N/m" if power == 1.0 else f"N/m**{power:g}"

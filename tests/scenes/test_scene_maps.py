@@ -51,6 +51,35 @@ def test_theory_stands_beside_the_blows(table):
     assert json.loads(table.attrs["scene"])["map"]["striker.mass"] == OVER["striker.mass"]
 
 
+@pytest.mark.parametrize(
+    ("line", "axes"),
+    [
+        ('air = "both sides"', {"target.first_frequency": 150.0, "target.damping_ratio": 0.03, "target_mass": 0.3}),
+        ("damping_ratio = { frequency = [10.0, 1e4], ratio = [1e-3, 0.1] }", {"target.first_frequency": 200.0}),
+    ],
+)
+def test_axes_that_do_not_rescale_the_body_make_it_anew(line, axes, tmp_path):
+    """Air does not weigh or radiate more where the plate does: rescaled modes were 2e-3 off, 4e-5 stated."""
+    scene = load_text(tmp_path, edited("[target]", f"[target]\n{line}", QUICK))
+    for name, value in axes.items():
+        table = maps.map_scene(scene, over={name: [value]}, tolerance=1e-3)
+        key = name.replace("_mass", ".mass")
+        dimension = key.replace(".", "_").replace("first_", "").replace("target_damping", "damping")
+        assert table.n_impacts.dims == (dimension,) and "units" in table[dimension].attrs
+        hit = maps.changed_scene(scene, key, value).strike(tolerance=1e-3)
+        assert worst(table.isel({dimension: 0}), hit) < 2e-3  # 1e-3 each
+        with pytest.raises(ValueError, match=f"vary: {name} does not rescale air"):
+            fi.spread(scene, {name: f"lognormal({value}, 0.1)"}, n=8)
+
+
+def test_modes_in_air_are_not_rescaled():
+    plate = fi.in_air(fi.analytic.rectangle(0.465, 0.3, mass=0.2, first_frequency=100.0, n_modes=6))
+    blow = fi.Striker.rigid(0.03), fi.Contact.linear(1e4)
+    for over, words in (({"target_mass": [0.3]}, "must not name target_mass for modes in air"), ({}, "")):
+        with pytest.raises(ValueError, match=words or "over must name"):
+            fi.sweep(plate, *blow, at=(0.14, 0.09), speed=1.0, over=over)
+
+
 def test_many_blows_have_the_model_that_the_scene_requires(tmp_path):
     """A hard blow on a thick bar: shear changes its peak force by 4e-3, which "auto" takes in at 1e-3."""
     text = edited("{ x = [0.0, 0.175], values = [0.05, 0.04] }", "0.05", BAR).replace("1e5", "1e6")
