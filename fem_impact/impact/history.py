@@ -244,13 +244,22 @@ class History(check.Locked):
         """How near to zero an approach turns back, over the farthest it ever turns [-]; infinity where none does.
 
         A near one counts by the motion of the modes, from which the cubics of long steps differ; as zero where it
-        passes zero although the steps say that it does not.
+        passes zero although the steps say that it does not. Where the run is cut off, it turns as far as it came.
         """
         miss = -np.inf if self.miss is None else self.miss
-        near, far, row, i = record.nearest_turn(self.steps, self.now, self.law, miss)
+        touch = TOUCH * float(self._column(0).max(initial=0.0))
+        near, far, row, i = record.nearest_turn(self.steps, self.now, self.law, miss, touch)
         if row >= 0 and abs(near) < CLEAR * far:
             near = max(0.0, self._turn_in(row, i) * (1.0 if self.pressed[row, i] else -1.0))
-        return abs(near) / far if far else np.inf
+        return min(abs(near), self._cut_off) / far if far else np.inf
+
+    @property
+    def _cut_off(self) -> float:
+        """How near to zero [m] a contact is that closes as the run is cut off: a bit later, or sooner, it counts."""
+        if self.status not in (record.HORIZON, record.IMPACTS):
+            return np.inf
+        apart = self.now[layout.APPROACH] - self.surfaces(np.array([self.end_time]))[0][0]
+        return float(np.abs(apart[(self.now[layout.RATE] > 0.0) & (apart != 0.0)]).min(initial=np.inf))
 
     def _turn_in(self, row: int, i: int) -> float:
         """Approach [m] from its dent at which contact i turns within a step, by the motion of the modes."""
@@ -282,7 +291,7 @@ class History(check.Locked):
     @cached_property
     def margin(self) -> float:
         """How near the run is to one impact more or fewer; see `Response.margin`."""
-        return CLEAR if len(self.bias.nonzero()[0]) else min(CLEAR, self.nearest_turn)
+        return min(CLEAR, self.nearest_turn)
 
     @cached_property
     def force_missed(self) -> float:

@@ -110,8 +110,8 @@ class Response(Totals, check.Locked):
         """How near the number of impacts is to another [-].
 
         Over the deepest approach: how far the bodies at least come apart between contacts, press each other in one, or
-        stay apart where they nearly touch once more. Given up to 0.05; that much, too, for blows under constant forces.
-        A margin below its error counts as a missed tolerance.
+        stay apart where they nearly touch once more or where the run is cut off as they close. Given up to 0.05. A
+        margin below its error counts as a missed tolerance.
         """
         return float(self.history.margin)
 

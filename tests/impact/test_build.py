@@ -29,7 +29,7 @@ from fem_impact.impact.compiled.record import nearest_turn
 steps = np.zeros((2, 9))
 steps[:, 1] = 1.0  # two steps of a second: down and up again, then up and down again
 steps[:, 3:5] = [[1.0, -3.0], [1.0, 5.0]]
-print(nearest_turn(steps, np.array([[1.0], [0.0], [0.0], [0.0], [-5.0]]), table([[1.0, 1.0]]), -np.inf)[0])
+print(nearest_turn(steps, np.array([[1.0], [0.0], [0.0], [0.0], [-5.0]]), table([[1.0, 1.0]]), -np.inf, 0.0)[0])
 """
 
 PLAN = """

@@ -176,21 +176,34 @@ def test_gradients_of_falling_bodies_and_of_contacts_behind_a_gap_are_difference
         assert_allclose(found[name], change / value, rtol=1e-4, atol=1e-7)
 
 
-def beam_and_stop(gap):
+def beam_and_stop(gap, force=0.0):
     """A hinged beam of one mode, struck in the middle, swings towards a stop; the run ends with the duration."""
     beam = fi.analytic.beam(1.0, ends=("hinged", "hinged"), mass=0.3, first_frequency=40.0, n_modes=1)
     laws = fi.Contact.linear(1e6, gap=1e-4), fi.Contact.linear(1e6, gap=gap)
     touches = [fi.Touch(laws[0], 0, 1, None, [0.5]), fi.Touch(laws[1], 1, None, [0.5])]
-    return fi.collide([fi.Modes.rigid(0.05), beam], touches, speeds=[1.0, 0.0], duration=8e-3, residual=False)
+    how = {"speeds": [1.0, 0.0], "forces": [force, 0.0], "duration": 8e-3, "residual": False}
+    return fi.collide([fi.Modes.rigid(0.05), beam], touches, **how)
 
 
-def test_a_near_miss_in_the_flight_that_a_duration_cuts_is_in_the_margin():
-    swing = float(beam_and_stop(1.0).displacement([[0.5]], np.linspace(0.0, 8e-3, 4001), body=1).max())
+@pytest.mark.parametrize("force", [0.0, -5.0])
+def test_a_near_miss_in_the_flight_that_a_duration_cuts_is_in_the_margin(force):
+    swing = float(beam_and_stop(1.0, force).displacement([[0.5]], np.linspace(0.0, 8e-3, 4001), body=1).max())
     for factor in (1.0 + 1e-5, 1.0 + 1e-3):
-        hit = beam_and_stop(factor * swing)
+        hit = beam_and_stop(factor * swing, force)
         deepest = float(hit.history._column(0).max())
         # cubics over a quarter of a radian miss the turn by some 1e-5 of the swing
         assert hit.margin == pytest.approx((factor - 1.0) * swing / deepest, abs=2e-4)
+
+
+@pytest.mark.parametrize("late", [-1e-6, 1e-6])
+def test_an_impact_that_begins_as_a_duration_ends_is_counted_or_not(late):
+    """By a microsecond: five were told, "met", of a tolerance that leaves ten times that."""
+    blow = {"at": None, "speed": 1.0, "striker_force": 0.1 * GRAVITY}
+    how = FLOOR, fi.Striker.rigid(0.1), fi.Contact.hertz(1e7, loss=0.1)
+    begins = fi.strike(*how, **blow, duration=1.0, tolerance=1e-9).impacts[-1].start
+    hit = fi.strike(*how, **blow, duration=begins * (1.0 + late), tolerance=1e-1)
+    assert hit.n_impacts == (6 if late > 0.0 else 5) and hit.tolerance_met
+    assert hit.margin == pytest.approx(1e-3, rel=0.1)
 
 
 def test_contacts_that_part_for_good_at_once_leave_no_margin_behind():

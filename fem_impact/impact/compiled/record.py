@@ -114,11 +114,12 @@ def pushing(steps, now, law, row, i):
 
 
 @outer()
-def nearest_turn(steps, now, law, miss):
+def nearest_turn(steps, now, law, miss, touch):
     """Approach, by the cubic from the dent, that turns back nearest to zero, the farthest, and the nearest's place.
 
     The place is its step and its contact; of felt, where it counts from where the force ends, and of ``miss``, the
-    approach where it turned in flight or -infinity, the step is -1. The farthest is zero where none turns.
+    approach where it turned in flight or -infinity, the step is -1. The farthest is zero where none turns. Bodies that
+    touch as the run begins and move by no more than ``touch`` [m] since, have not turned back.
     """
     nearest = miss
     farthest = 0.0
@@ -126,9 +127,13 @@ def nearest_turn(steps, now, law, miss):
     which = 0
     for i in range(now.shape[1]):
         felt = relaxes(law, i)
+        rests = True
         for row in range(steps.shape[0]):
             h = steps[row, LENGTH]
             d0, v0, d1, v1 = ends_of(steps, now, law, row, i)
+            rests = rests and abs(d0) <= touch and abs(d1) <= touch
+            if rests:
+                continue
             turns = v0 < 0.0 < v1 or v1 < 0.0 < v0
             if turns:
                 farthest = max(farthest, turning(d0, h * v0, d1, h * v1)[1])
