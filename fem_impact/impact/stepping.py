@@ -222,7 +222,9 @@ class _Control:
             if error <= tolerance:
                 met = found
             if error <= aim:
-                if grazes == GRAZES or found.fine.margin > found.error[options.n_quantities]:
+                clear = grazes >= GRAZES or found.fine.margin > found.error[options.n_quantities]
+                # a step of scheme A in the finer run alone errs as the coarser run does, and both may agree on that
+                if clear and runs[1].n_fallback <= runs[0].n_fallback:
                     break
                 grazes += 1
             if 2 * len(found.fine.steps) > engine.most_steps(self.system, self.stretched):
