@@ -339,11 +339,8 @@ def ascending(name: str, value: Any, unit: str = "") -> np.ndarray:
     if (np.diff(result) < 0.0).any():
         i = int(np.argmax(np.diff(result) < 0.0))
         raise ValueError(f"{name} must be ascending, got {result[i]:g} before {result[i + 1]:g}{_suffix(unit)}")
-    small = result[(result > 0.0) & (result * REACH < 0.999)]
-    if small.size:
-        raise ValueError(
-            f"{name} must be zero or at least {1.0 / REACH:g}{_suffix(unit)}, got {small[0]:g}{_suffix(unit)}"
-        )
+    for least in result[result > 0.0][:1]:
+        positive(f"{name} above zero", least, unit)
     return result
 
 

@@ -157,16 +157,15 @@ class Tuning(check.Brief):
         if self.met:
             doubt = max(each.error_after for each in self.tones)
             return f"tuned: every pitch within {self.tolerance:g} cents; frequencies are known to {doubt:.2g} cents"
-        advice = "allow more depth or patches, another radius, or want less"
         low, high = (factor * worst.before for factor in self.before.reach(self.depth))
         if worst.pitch.ratio is None and not low <= worst.wanted <= high:
-            advice = (
-                f"so much off leaves it between {low:.4g} and {high:.4g} Hz, wherever: allow more depth, or want less"
-            )
+            why = f"so much off leaves it between {low:.4g} and {high:.4g} Hz, wherever: allow more depth, or want less"
+        else:
+            why = "allow more depth or patches, another radius, or want less"
         return (
             f"tuning MISSED: mode {worst.pitch.mode} stays {worst.left:+.3g} cents from {worst.pitch.words}, the best "
             f"that a search from the body as it stands found with {len(self.patches)} patches of "
-            f"{1e3 * self.radius:.3g} mm radius and at most {1e3 * self.depth:.3g} mm depth; {advice}"
+            f"{1e3 * self.radius:.3g} mm radius and at most {1e3 * self.depth:.3g} mm depth; {why}"
         )
 
     def summary(self) -> str:
