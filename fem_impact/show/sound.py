@@ -2,39 +2,30 @@
 
 import html
 import io
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
 import numpy as np
-from scipy.fft import irfft, next_fast_len, rfft
 from scipy.io import wavfile
-from scipy.sparse import csr_array
 
 from .._base import check, markup
-from ..impact import force_spectrum, free_motion, promise
-from ..impact.compiled import layout
+from ..impact import force_spectrum, promise
 from ..impact.response import Response
 from ..mesh.meshes import sizes
 from ..model.playing import Strokes
 from ..modes import free_air
 from ..modes.air import DENSITY, SPEED
 from ..modes.body import Body
-from . import sampling
+from . import arrivals, sampling
 
 RATE = 48_000  # [Hz] sample rate: all audible modes are below half of it
 FULL_SCALE = 10.0  # [m/s] velocity of sample value 1.0: above that of any plate struck at a few m/s
 LOUDEST = 200.0  # [Pa] pressure of sample value 1.0: 140 dB, far louder than any struck plate at a distance
 REFERENCE = {"m/s": (1e-9, "1 nm/s"), "Pa": (20e-6, "20 µPa")}  # unit: value of 0 dB (ISO 1683) and its name
-OVERSAMPLING = 8  # [-] instants per sample as the first waves arrive: the finite differences err by 0.5 % at 10 kHz
 HIGHEST_RATE = 1_000_000  # [Hz] highest sample rate: far above what any device plays
 SHORTEST, LONGEST = 0.5, 5.0  # [s] limits of the default duration: long enough to hear a pitch, short enough to compare
-BLOCK = 2048  # [-] samples computed at a time as the first waves arrive: limits the memory, does not change the result
-COMPACT = 0.5  # [-] half the width of a bar times the wavenumber, up to which a piece of it is a dipole; test_sound.py
-SQUARE = 1.51  # [-] mass of air that a square section drags, over that of a flat strip of its width
-# [-] ends of a flat strip drag the less air the nearer, by this power of the distance in widths; test_sound.py
-ENDS = 3.2
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -240,41 +231,15 @@ def _moving(
     """Sound of the velocity of a point at which modes have these values (n_modes,) [kg**-0.5]."""
     rate, audible = _audible(response, rate)
     times = _times(response, audible, duration, rate)
-    velocity = np.concatenate([_velocity(hit, audible, shape, part) for hit, _, part in _parts(response, times)])
-    sound = Sound(velocity / FULL_SCALE, rate, FULL_SCALE)
+    parts = arrivals.parts(response, times)
+    velocity = np.concatenate([arrivals.velocity(hit, audible, shape, part) for hit, _, part in parts])
+    return _scaled(velocity, rate, FULL_SCALE, "m/s", normalise)
+
+
+def _scaled(values: np.ndarray, rate: int, full_scale: float, unit: str, normalise: bool = False) -> Sound:
+    """Values (n_times,) in a unit as sound."""
+    sound = Sound(values / full_scale, rate, full_scale, unit)
     return sound.normalised() if normalise else sound
-
-
-def _parts(response: Response | Strokes, times: np.ndarray) -> list[tuple[Response, slice, np.ndarray]]:
-    """The blow that gives the motion at each of ascending times: it, its times, and these from its start."""
-    return [(response, slice(0, len(times)), times)] if isinstance(response, Response) else response.parts(times)
-
-
-def _velocity(response: Response, audible: np.ndarray, shape: np.ndarray, times: np.ndarray) -> np.ndarray:
-    """Velocity [m/s] of a point at equally spaced times of one blow, (n_times,)."""
-    if response.history.stretched is not None:  # the modes pull on each other: none rings on its own
-        blocks = [response.modal_state(times[i : i + BLOCK])[1] for i in range(0, len(times), BLOCK)]
-        return np.concatenate([p @ np.where(audible, shape, 0.0) for p in blocks])
-    history = response.history
-    busy = np.flatnonzero(history.pressed.any(axis=1))
-    ends = history.steps[:, layout.START] + history.steps[:, layout.LENGTH]
-    # the first sample of every long free flight and of what follows it; the last begins when the blow is over
-    first = np.searchsorted(times, np.append(0.0, ends[busy]))
-    after = np.append(np.searchsorted(times, history.steps[busy, layout.START]), len(times))
-    long = after - first >= free_motion.BLOCK[0]
-    long[-1] = after[-1] > first[-1]
-    flights = list(zip(first[long].tolist(), after[long].tolist()))
-    alone = np.ones(len(times), bool)  # samples whose states are asked for: all but those within the flights
-    for start, end in flights:
-        alone[start + 1 : end] = False
-    q, p = response.modal_state(times[alone])  # (n_alone, n_modes)
-    velocity = np.empty(len(times))
-    velocity[alone] = p @ np.where(audible, shape, 0.0)
-    row = np.cumsum(alone) - 1
-    for start, end in flights:
-        state = q[row[start], audible], p[row[start], audible]
-        velocity[start:end] = _ringing_motion(response, times[start:end], state, audible, shape[None, audible] + 0j, 1)
-    return velocity
 
 
 @check.typed
@@ -342,9 +307,8 @@ def radiate(
     # a point stands for a disk of its area, whose mean of 1 / R in its middle is 2 over its radius
     shapes = modes.shapes.at(points)[:, audible] * (weights / np.maximum(way, np.sqrt(areas / (4.0 * np.pi))))[:, None]
     times = _times(response, audible, duration, rate)
-    pressure = _pressure(response, times, audible, {2: shapes}, way / speed, 1.0 / rate)
-    sound = Sound(pressure / LOUDEST, rate, LOUDEST, "Pa")
-    return sound.normalised() if normalise else sound
+    pressure = arrivals.pressure(response, times, audible, {2: shapes}, way / speed, 1.0 / rate)
+    return _scaled(pressure, rate, LOUDEST, "Pa", normalise)
 
 
 @check.typed
@@ -410,28 +374,13 @@ def radiate_bar(
         raise ValueError(f"height must be at most the width, {width:g} m, got {height:g} m")
     density, speed = _air(air)
     rate, audible = _audible(response, rate)
-    audible &= modes.omega * 0.5 * width <= COMPACT * speed
-    x = np.sort(modes.shapes.grid()[0][:, 0])
-    gap = float(np.hypot(place[0] - np.clip(place[0], x[0], x[-1]), np.hypot(place[1], place[2])))
-    length = x[-1] - x[0]
-    least = max(width, 2e-4 * length)  # nearer to a wire, its pieces would take long
-    if not gap > least:
-        raise ValueError(f"listener must be farther than {least:g} m from the bar, got {gap:g} m")
-    waves = 8.0 * audible.sum() + force_spectrum.fastest(response, rate) / speed * length
-    count = max(len(x), 64 + int(waves), int(2.0 * length / gap))  # [-] pieces, at most as long as the gap
-    turn = np.pi * (np.arange(count) + 0.5) / count  # shortest at the ends, where the mass is as a root
-    ends = length * np.stack([np.sin(0.5 * turn), np.cos(0.5 * turn)]) ** 2  # (2, n_pieces) [m] how far away they are
-    x = x[0] + ends[0]
-    way = np.sqrt((x - place[0]) ** 2 + place[1] ** 2 + place[2] ** 2)  # (n_pieces,) [m]
-    mass = np.sqrt(1.0 - (1.0 + ends / width) ** -ENDS).prod(axis=0)  # [-] over that of a piece far from both ends
-    share = 0.5 * np.pi * length / count * np.sin(turn) * mass * place[2] / (4.0 * np.pi * way**2)
-    shapes = modes.shapes.at(x[:, None])[:, audible] * share[:, None]
+    audible &= modes.omega * 0.5 * width <= arrivals.COMPACT * speed
+    orders, way = arrivals.dipoles(response, audible, place, width, speed, rate)
     times = _times(response, audible, duration, rate)
-    orders = {3: shapes / speed, 2: shapes / way[:, None]}
-    pressure = _pressure(response, times, audible, orders, way / speed, 1.0 / rate)  # of 1 kg/m
+    pressure = arrivals.pressure(response, times, audible, orders, way / speed, 1.0 / rate)  # of 1 kg/m
     flat = density * np.pi * width**2 / 4.0  # [kg/m]
-    masses = flat, SQUARE * flat + density * width * height
-    low, high = (Sound(mass * pressure / LOUDEST, rate, LOUDEST, "Pa") for mass in masses)
+    masses = flat, arrivals.SQUARE * flat + density * width * height
+    low, high = (_scaled(mass * pressure, rate, LOUDEST, "Pa") for mass in masses)
     return low, high
 
 
@@ -494,40 +443,13 @@ def radiate_free(
     density, speed = _air(air)
     rate, audible = _audible(response, rate)
     audible &= free_air.reach(modes, speed) <= free_air.ACROSS[-1]
-    field, doubt = free_air.fields(modes, audible, place, speed, speed / (OVERSAMPLING * rate))
+    field, doubt = free_air.fields(modes, audible, place, speed, speed / (arrivals.OVERSAMPLING * rate))
     times = _times(response, audible, duration, rate)
     own, less, more = (
-        density / LOUDEST * _pressure(response, times, audible, orders, way / speed, 1.0 / rate)
+        density / LOUDEST * arrivals.pressure(response, times, audible, orders, way / speed, 1.0 / rate)
         for orders, way in (field, *doubt)
     )
     return Sound(own - less, rate, LOUDEST, "Pa"), Sound(own + more, rate, LOUDEST, "Pa")
-
-
-def _pressure(
-    response: Response | Strokes, times: np.ndarray, audible: np.ndarray, orders: Mapping[int, np.ndarray],
-    delay: np.ndarray, sample: float,
-) -> np.ndarray:  # fmt: skip
-    """Sum (n_times,) over points of delayed motion; ``orders``: derivative -> weights (n_points, n_audible)."""
-    roots = free_motion.roots(response.target.omega[audible], response.target.damping_ratio[audible])
-    last = delay.max()
-    early = last - delay  # [s] how much sooner it arrives than the last: over a long way decays cannot be undone
-    some = np.array_split(np.arange(len(early)), 1 + len(early) // BLOCK)  # to limit the memory
-    delayed = {
-        order: np.array([sum(np.einsum("km,km->m", w[i], np.exp(np.outer(early[i], r))) for i in some) for r in roots])
-        for order, w in orders.items()
-    }
-    found = []
-    for hit, part, local in _parts(response, times):
-        n_first = int(np.searchsorted(local, hit.time[-1] + last, side="right"))
-        n_first = n_first if hit.history.stretched is None else len(local)
-        first = [_arrival(response, times[part][:n_first], audible, *each, delay, sample) for each in orders.items()]
-        found.append(np.sum(first, axis=0))
-        if n_first < len(local):
-            since = local[n_first:] - last
-            q, p = (state[0, audible] for state in hit.modal_state(since[:1]))
-            rest = [_ringing_motion(hit, since, (q, p), audible, weights, order) for order, weights in delayed.items()]
-            found.append(np.sum(rest, axis=0))
-    return np.concatenate(found)
 
 
 def beside(listener: Any) -> np.ndarray:
@@ -561,40 +483,3 @@ def _times(response: Response | Strokes, audible: np.ndarray, duration: float | 
     # so many samples take about ten seconds to compute
     duration = check.between("duration", check.positive("duration", duration, "s"), 0.0, 1e7 / rate, "s")
     return response.time[0] + np.arange(max(1, round(duration * rate))) / rate
-
-
-def _ringing_motion(
-    response: Response, times: np.ndarray, state: tuple, audible: np.ndarray, weights: np.ndarray, order: int
-) -> np.ndarray:
-    """`free_motion.flexible_motion` of the audible modes, (n_times,)."""
-    modes, bias = response.target, response.constant_forces[audible]
-    known = modes.omega[audible], modes.damping_ratio[audible], bias, state
-    return free_motion.flexible_motion(*known, times, weights, order)
-
-
-def _arrival(
-    response: Response | Strokes, times: np.ndarray, audible: np.ndarray, order: int, shapes: np.ndarray,
-    delay: np.ndarray, sample: float,
-) -> np.ndarray:  # fmt: skip
-    """`_pressure` (n_times,) while sound from the blow still arrives, of one order: 2 is the acceleration."""
-    pressure, began, step = np.zeros(len(times)), response.time[0], sample / OVERSAMPLING
-    silent = int(np.searchsorted(times, began + delay.min(), side="right"))
-    # every point is heard with the two delays, whole numbers of steps, between which its own lies
-    lag, first = delay / step, int(delay.min() / step)
-    row, n_lags = lag.astype(int) - first, int(lag.max()) - first + 2
-    where = np.append(row, row + 1), np.tile(np.arange(len(delay)), 2)
-    heard = csr_array((np.append(1.0 - lag % 1.0, lag % 1.0), where), shape=(n_lags, len(delay)))
-    size = next_fast_len(OVERSAMPLING * min(BLOCK, len(times) - silent) + n_lags, real=True)
-    spectra = rfft(heard @ shapes, size, axis=0)
-    for start in range(silent, len(times), BLOCK):
-        part = slice(start, start + BLOCK)
-        # instants whose sound arrives in this block, with one more on each side for every difference
-        n, room = OVERSAMPLING * (len(times[part]) - 1) + n_lags, order - 1
-        fine = times[start] + step * (np.arange(-room, n + room) - (n_lags - 1 + first))
-        moves = np.flatnonzero(fine >= began)
-        motion = response.modal_state(fine[moves])[1][:, audible]
-        for _ in range(room):
-            motion = np.gradient(motion, step, axis=0)
-        motion = np.vstack([np.zeros((moves[0], motion.shape[1])), motion])[room : n + room]
-        pressure[part] = irfft((rfft(motion, size, axis=0) * spectra).sum(axis=1), size)[n_lags - 1 : n : OVERSAMPLING]
-    return pressure
