@@ -61,9 +61,14 @@ class Spectrum:
         return self.parts.sum(axis=0)
 
 
+def other_rise(section: Any) -> Any:
+    """Another rise of a section through the points at which its own is known; None if that is a function."""
+    return getattr(getattr(section, "rise", None), "otherwise", None)
+
+
 def with_other_rise(system: System) -> System | None:
     """The system with its rise off by as much as it may be, on the same triangles; None if the rise is a function."""
-    rise = getattr(getattr(system.section, "rise", None), "otherwise", None)
+    rise = other_rise(system.section)
     return rise and reassemble(replace(system, section=replace(system.section, rise=rise)), system.mesh)
 
 

@@ -166,7 +166,7 @@ class RitzTarget:
         self.elements, other = compared_elements(target, elements, stages)
         if fixed and self.elements != elements:  # there are no larger elements to compare with
             self.elements, other = other, self.elements
-        self.unsure = hasattr(getattr(target.section, "rise", None), "otherwise")  # known at points only
+        self.unsure = refinement.other_rise(target.section) is not None
         self.fine, self.coarse = self._krylov(self.elements), self._krylov(other, off=True)
         both = (cost.on_mesh(one[0].system.n_dofs, self.count, self.count) for one in (self.fine, self.coarse))
         self.work = self.done = sum(both, cost.NOTHING)  # for the next blow, and for all so far with it
