@@ -1,7 +1,7 @@
 """Time steps short enough: runs of ever shorter steps until two agree to the tolerance."""
 
 import inspect
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
 from itertools import pairwise
@@ -69,11 +69,12 @@ class Options:
     last: tuple[float, int] = field(init=False)  # [s] time, and number of impacts, 0 for any, up to which to follow
 
     @classmethod
-    def read(cls, given: Mapping[str, Any]) -> "Options":
-        """Options by name, all of them known."""
+    def read(cls, given: Mapping[str, Any], others: Sequence[str] = ()) -> "Options":
+        """Options by name, all of them known; ``others`` are what else a name that is not may have been meant for."""
         for name in given:
             if name not in cls.__match_args__:
-                raise ValueError(f"{name} is not an argument of a blow{check.nearest(name, cls.__match_args__)}")
+                known = *cls.__match_args__, *others
+                raise ValueError(f"{name} is not an argument of a blow{check.nearest(name, known)}")
         return cls(**given)
 
     def __post_init__(self) -> None:

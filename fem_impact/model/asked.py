@@ -4,7 +4,6 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property, partial
-from inspect import signature
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, ClassVar
 
@@ -25,8 +24,7 @@ if TYPE_CHECKING:
 
 # that a user may set
 PIECES = {"target": "", "model": "", "size": "m", "n_modes": "", "max_frequency": "Hz", "n_striker_modes": ""}
-# after modes, striker and contact; a plan is for a body at rest
-ARGUMENTS = tuple(name for name in tuple(signature(collision.strike).parameters)[3:] if name != "start")
+BLOW = "at", "speed"  # arguments of `strike` besides its bodies, their contact and its options
 CHOICES = {"target": ("rigid", "infinite", "vectors", "mixed", "modal"), "model": MODELS}
 COSTLY = 10.0, 2e9  # [s], [byte] a plan or map that costs more of either is announced: longer than one likes to wait
 
@@ -99,10 +97,8 @@ class Asked:
             else:
                 check.count(name, value)
         with blow.target.blame("strike", changes):
-            for name in values:
-                if name not in ARGUMENTS:
-                    raise ValueError(f"{name} is not an argument of a blow{check.nearest(name, [*ARGUMENTS, *PIECES])}")
-            options = stepping.Options(**{name: values[name] for name in values if name not in ("at", "speed")})
+            given = {name: value for name, value in values.items() if name not in BLOW}
+            options = stepping.Options.read(given, (*BLOW, *PIECES))
             for name in ("scheme", "dt", "duration", "residual", "striker_force", "target_force"):
                 values[name] = getattr(options, name)
             values["stretching"] = options.stretching or blow.target.stretching
