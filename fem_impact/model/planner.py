@@ -110,6 +110,7 @@ class Plan(Forecast, check.Brief):
     def strike(self, strict: bool = False) -> Response:
         """Run the plan and return the response only; ``strict`` as in `fi.strike`."""
         if self.seconds > progress.LONG:
+            progress.ANNOUNCER.announce(f"striking takes {self.cost}", self.seconds)
             return promise.warn_if_missed(self.run().response, strict)
         stretches = self.description.asked.values["stretching"]
         return promise.warn_if_missed(fresh.answer(lambda: self.run().response, stretches), strict)
@@ -422,7 +423,4 @@ def strike(
         )
     if speed is None:
         raise ValueError("speed must be given in m/s")
-    plan = plan_of(modes, striker, contact, at=at, speed=speed, damping_ratio=damping_ratio, **options)
-    if plan.seconds > progress.LONG:
-        progress.ANNOUNCER.announce(f"striking takes {plan.cost}", plan.seconds)
-    return plan.strike(strict)
+    return plan_of(modes, striker, contact, at=at, speed=speed, damping_ratio=damping_ratio, **options).strike(strict)
