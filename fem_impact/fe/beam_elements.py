@@ -198,7 +198,7 @@ def divide_lines(fields: Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]], 
     return MeshLine(np.sort(every))
 
 
-def _section_breaks(fields: Callable, nodes: np.ndarray, most: int = 2000) -> np.ndarray:
+def _section_breaks(fields: Callable, nodes: np.ndarray) -> np.ndarray:
     """Places (n,) where the section jumps, to rounding, or kinks, to within SAME times the length of the beam."""
     span, low, high = nodes[-1] - nodes[0], nodes[:-1], nodes[1:]
     found: list[float] = []
@@ -210,8 +210,8 @@ def _section_breaks(fields: Callable, nodes: np.ndarray, most: int = 2000) -> np
         low, high = low[rough], high[rough]
         found += (0.5 * (low + high)[high - low < SAME * span]).tolist()
         low, high = low[high - low >= SAME * span], high[high - low >= SAME * span]
-        if len(low) + len(found) > most:
-            raise ValueError(f"section must have at most {most} steps and kinks, got more; make it smoother")
+        if len(low) + len(found) > 2000:
+            raise ValueError("section must have at most 2000 steps and kinks, got more; make it smoother")
         middle = 0.5 * (low + high)
         low, high = np.append(low, middle), np.append(middle, high)
     # a frequency moves with a step, which is halved to rounding; a kink, at which nothing jumps, ends anywhere so near:

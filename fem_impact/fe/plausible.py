@@ -80,7 +80,7 @@ def note_number(name: str, value: Any) -> Iterator[str]:
     yield f"{NAMES.get(name, name + ' =')} {value:g}{unit} is {meaning}; {known.slip}"
 
 
-def doubted_sizes(sides: Sequence[float], section: Any = None) -> tuple[str, ...]:
+def doubted_sizes(sides: Sequence[float], section: Any) -> tuple[str, ...]:
     """Notes on a body with sides [m] in its plane, or along its line, and a section."""
     notes = list(note_number("length", max(sides)))
     if section is None:

@@ -84,9 +84,9 @@ def loss_in_words(hit: "Response") -> str:
     return "carried off by waves or dissipated" if (hit.history.zeta > 1.0).any() else "dissipated"
 
 
-def contacts_of_body(hit: "Response", body: int) -> list[int]:
-    """The contacts of a body."""
-    shape = hit.history.shape[:, hit.body_slice(body)]
+def contacts_of_striker(hit: "Response") -> list[int]:
+    """The contacts of the first body."""
+    shape = hit.history.shape[:, hit.body_slice(0)]
     return np.flatnonzero((shape != 0.0).any(axis=1)).tolist()
 
 
@@ -114,7 +114,7 @@ def restitution(hit: "Response") -> float | None:
     arrives = hit.striker is not None or not hit.ends or hit.ends[0].speed != 0.0
     before, after = hit.speed if arrives else 0.0, float(row @ history.end_p)
     if _held_by_hand(hit) or (row * history.bias).any():  # a constant force or a hand changes its speed in flight
-        contacts = contacts_of_body(hit, 0)
+        contacts = contacts_of_striker(hit)
         mine = [each for each in hit.impacts if each.contact in contacts]
         if not mine:
             return -1.0 if before else None

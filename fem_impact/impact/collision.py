@@ -177,9 +177,9 @@ def collide_unjudged(
     return _follow_refined(bodies, [touch.law for touch in contacts], parts, arriving, asked, other=other, late=late)
 
 
-def touching_system(bodies: Sequence[Modes], touch: Touch, speed: float, residual: bool) -> tuple[KernelSystem, float]:
+def touching_system(bodies: Sequence[Modes], touch: Touch, speed: float) -> tuple[KernelSystem, float]:
     """Two bodies that are to touch, the first moving, as the kernels take them, and how long the contact may last."""
-    parts, _ = _reduced_bodies(bodies, [touch], [speed, 0.0], None, None, residual, {})
+    parts, _ = _reduced_bodies(bodies, [touch], [speed, 0.0], None, None, True, {})
     system = join_bodies(parts, [touch.law])
     return system, engine.pace_of(system).duration
 

@@ -30,7 +30,7 @@ class StruckBody:
     ) -> None:  # fmt: skip
         """Make all arrays of a body struck at points (n_points, dimension) [m] by up to ``sticks`` sticks at once."""
         bodies = striker.modes, modes
-        found = [touching_system(bodies, Touch(contact, 0, 1, striker.at, point), fastest, True) for point in points]
+        found = [touching_system(bodies, Touch(contact, 0, 1, striker.at, point), fastest) for point in points]
         systems, duration = [system for system, _ in found], min(duration for _, duration in found)
         n_stick, n_body = striker.modes.n_modes, modes.n_modes
         most = max(systems, key=lambda system: system.omega.size)

@@ -476,7 +476,7 @@ class Response(Totals, check.Locked):
     @property
     def in_contact(self) -> bool:
         """Whether the striker, or the first body, still presses another at the end of the run."""
-        mine = balance.contacts_of_body(self, 0)
+        mine = balance.contacts_of_striker(self)
         return any(each.separation_speed is None for each in self.impacts if each.contact in mine)
 
     @property

@@ -138,20 +138,19 @@ def in_air(
     )  # fmt: skip
 
 
-def _spacing(modes: Modes, area: float, speed: float, most: float = 1e9) -> float:
+def _spacing(modes: Modes, area: float, speed: float) -> float:
     """Distance [m] of the points at which shapes are sampled on a plate of an area [m^2].
 
-    The shapes take up to ``most`` numbers of memory. At least 24 cells lie across a square as large as the plate: those
-    at the rim then cover a sixth of it.
+    At least 24 cells lie across a square as large as the plate: those at the rim then cover a sixth of it.
     """
     # [1/m] of the highest mode, by Weyl's law, or of its sound
     wave = max(np.sqrt(4.0 * np.pi * modes.n_modes / area), modes.omega[-1] / speed)
     spacing = min(2.0 * np.pi / wave / PER_WAVE, np.sqrt(area) / 24.0) / SAMPLES[0]
-    if not modes.n_modes * area / spacing**2 <= most:
+    if not modes.n_modes * area / spacing**2 <= 1e9:  # [-] numbers in memory
         raise ValueError(
             f"speed of sound in the air must be higher or modes fewer, got {speed:g} m/s: {modes.n_modes} modes on a "
-            f"grid for waves of {2.0 * np.pi / wave:.2g} m, the shortest of plate or sound, take more than "
-            f"{most:.0e} numbers"
+            f"grid for waves of {2.0 * np.pi / wave:.2g} m, the shortest of plate or sound, take more than 1e+09 "
+            "numbers"
         )
     return float(spacing)
 
@@ -287,16 +286,16 @@ class _Air:
             vectors[window, i] = own if own[np.abs(own).argmax()] > 0.0 else -own
 
 
-def _sampled(shapes: Shapes, spacing: float, finer: int = 4) -> tuple[np.ndarray, np.ndarray]:
+def _sampled(shapes: Shapes, spacing: float) -> tuple[np.ndarray, np.ndarray]:
     """Every shape at points on a square lattice around the body, (n_modes, nx, ny) [kg**-0.5]; zero beside it.
 
-    Squares cut by the rim count by the part of them on the body, in pieces ``finer`` in each direction: with one, the
-    added masses of free plates err ten times as much. Also returned is how much of each mode's energy (n_modes,) [-]
-    the area so missed holds.
+    Squares cut by the rim count by the part of them on the body, in four pieces each way: undivided, the added masses
+    of free plates err ten times as much. Also returned is how much of each mode's energy (n_modes,) [-] the area so
+    missed holds.
     """
     places, inside = lattice(shapes, spacing, SAMPLES[0] * SAMPLES[1])
     rim = binary_dilation(inside, np.ones((3, 3))) & ~binary_erosion(inside, np.ones((3, 3)))
-    parts = spacing * ((np.arange(finer) + 0.5) / finer - 0.5)
+    parts = spacing * (0.25 * np.arange(4) - 0.375)
     pieces = (places[rim][:, None] + np.stack(np.meshgrid(parts, parts), axis=-1).reshape(-1, 2)).reshape(-1, 2)
     covered = shapes.contains(pieces)
     at_rim = shapes.at(pieces[covered])
@@ -304,7 +303,7 @@ def _sampled(shapes: Shapes, spacing: float, finer: int = 4) -> tuple[np.ndarray
     values[covered] = at_rim
     samples = np.zeros((at_rim.shape[1], *inside.shape))
     samples[:, inside & ~rim] = shapes.at(places[inside & ~rim]).T
-    samples[:, rim] = values.reshape(rim.sum(), finer**2, -1).mean(axis=1).T
+    samples[:, rim] = values.reshape(rim.sum(), 16, -1).mean(axis=1).T
     area = (inside & ~rim).sum() + covered.mean() * rim.sum()
     energy = (samples**2).sum(axis=(1, 2)) * covered.sum()
     missed = abs(area - shapes.quadrature(0.0)[1].sum() / spacing**2)
