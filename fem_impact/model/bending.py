@@ -98,6 +98,11 @@ class Known:
         return self.section if isinstance(self.section, Plate) else None
 
     @property
+    def shaped(self) -> bool:
+        """Whether it is curved, ribbed or unevenly layered, so that its plane answers to its linear motion."""
+        return self.plate is not None and not self.plate.plain
+
+    @property
     def per_extent(self) -> float:
         """Mean mass per area [kg/m**2] or length [kg/m]."""
         return self.modes.mass / self.extent

@@ -75,7 +75,7 @@ def examine_deflection(struck: Struck) -> Assumption:
         return SMALL.judged(struck, value, {}, _remedy(body, value))
     if hit.history.stretched is not None:
         return _stretched(struck, body, integrals)
-    if _plane_answers(body):
+    if body.shaped:
         return _curved(struck, body, integrals)
     history, mine = hit.history, struck.mine
     times = np.linspace(0.0, struck.end, TIMES + 1)[1:]
@@ -111,14 +111,9 @@ def examine_deflection(struck: Struck) -> Assumption:
     return SMALL.judged(struck, value, effect, _remedy(body, value * _held_back(pulling / bending if bending else 0.0)))
 
 
-def _plane_answers(body: Known) -> bool:
-    """Whether the plane of a body answers to its linear motion."""
-    return body.plate is not None and not body.plate.plain
-
-
 def _remedy(body: Known, deflection: float) -> str:
     """What makes the answer right, for the deflection over the thickness [-] of a body that stretches."""
-    if body.held < 1.0 and (body.plate is None or body.sprung) and not _plane_answers(body):
+    if body.held < 1.0 and (body.plate is None or body.sprung) and not body.shaped:
         return REMEDY
     # estimated on six plates to 0.74 to 1.07 of that deflection where it nears the thickness
     better = DARING if 1.1 * deflection > GONG else BETTER
@@ -344,7 +339,7 @@ def _share_of_bending(body: Known, integrals: Bending, omega: np.ndarray) -> tup
     ratio = np.divide(omega, waves, out=np.zeros(len(omega)), where=waves > 0.0)
     # what is slower or faster than bending waves by three rocks or is pulled; wood differs by less
     pulled = np.minimum(1.0, np.divide(3.0, ratio, out=np.ones(len(omega)), where=ratio > 0.0))
-    if _plane_answers(body):  # whose modes are faster without being pulled
+    if body.shaped:  # whose modes are faster without being pulled
         pulled = np.ones(len(omega))
     return np.minimum(1.0, 3.0 * ratio), pulled
 

@@ -58,8 +58,7 @@ def examine_target(struck: Struck) -> Assumption:
         # what it gives by shear is at most ten times what it gives by bending: it is thinner than half its side
         most = min(1.0, 10.0 * struck.hit.error.idealisation)
         return TARGET.judged(struck, None, dict.fromkeys(struck.quantities, most), NO_SECTION)
-    shaped = body.plate is not None and not body.plate.plain  # no thick theory of curved and ribbed plates
-    remedy = SLENDER if modes.dimension == 1 else SOFTER if shaped else THICKER
+    remedy = SLENDER if modes.dimension == 1 else SOFTER if body.shaped else THICKER  # no thick theory of shaped plates
     if struck.planned:
         return _judged_by_wave(TARGET, struck, body, struck.bending, remedy)
     if struck.ideal:
