@@ -218,7 +218,7 @@ def _graded_mesh(
 
     corners, fine = around_corners(mesh, kinds(mesh), section.material)
     fine = fine if graded else mesh
-    if graded and rules is SHALLOW:
+    if graded and rules.has_plane:
         fine = around_plane_corners(fine, words_in_plane(fine, section, kinds(fine)), section, layer)
     if rules.layered is not None:
         fine = rules.layered(fine, section, kinds(fine), layer)
@@ -238,7 +238,7 @@ def unknowns_near(
     fine = _graded_mesh(rules, mesh, section, supports, points, graded, layer, coarseness)[1]
     held = [HOLDS.get(kind, 0) for kind in plain_kinds(support_of_facets(fine, supports))]
     sides = (3 * len(fine.cells) + len(fine.facets)) // 2
-    within = 2 * (len(fine.points) + 3 * sides + 3 * len(fine.cells)) if rules is SHALLOW else 0
+    within = 2 * (len(fine.points) + 3 * sides + 3 * len(fine.cells)) if rules.has_plane else 0
     return 6 * len(fine.points) + sides - sum(held) + within
 
 

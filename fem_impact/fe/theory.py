@@ -184,6 +184,11 @@ class Theory:
         """Whether shear and rotary inertia count."""
         return "shear" in self.fields
 
+    @property
+    def has_plane(self) -> bool:
+        """Whether displacements in the plane are among the unknowns of a plate."""
+        return "walls" in self.fields
+
 
 def no_estimate(system: Any, vectors: np.ndarray, loads: np.ndarray, forced: Any = None) -> np.ndarray:
     """``errors`` (3, n) of a theory that is ``compared``: none, as a second mesh shows all of it."""

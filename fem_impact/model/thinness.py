@@ -169,7 +169,7 @@ def examine_shallowness(struck: Struck) -> Assumption:
     modes = struck.bodies[1]
     shapes: Any = unwrap_shapes(modes.shapes)[0]
     system = getattr(shapes, "system", None)
-    if system is None or system.rules is not shallow.SHALLOW:
+    if system is None or not system.rules.has_plane:
         return SHALLOW.holds(struck)
     curved = system.section.rise is not None
     value, remedy = (shallow.steepest(system), FLATTER) if curved else (None, FLAT)

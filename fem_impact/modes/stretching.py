@@ -27,7 +27,7 @@ from .._base import check
 from ..fe import membrane, slopes
 from ..fe.assembly import System, assemble, support_of_facets
 from ..fe.section import PLANE, SOFT, Beam, Plate
-from ..fe.shallow import SHALLOW, strained
+from ..fe.shallow import strained
 from ..mesh import meshes
 from .disk import DiskShapes
 from .modal import Modes
@@ -94,9 +94,9 @@ def stretch(modes: Modes) -> Stretching:
 def _check_supports(system: System) -> None:
     """Raise ValueError unless it is known what holds the plane of a body of elements, and its slopes are known."""
     kinds: Any = support_of_facets(system.mesh, dict(system.supports), system.rules.words)
-    if isinstance(system.section, Plate) and system.theory != SHALLOW.name:  # whose linear motion has the same plane
+    if isinstance(system.section, Plate) and not system.rules.has_plane:  # whose linear motion has the same plane
         kinds = support_of_facets(system.mesh, dict(system.section.in_plane), PLANE, "in_plane", kinds)
-    if system.theory != SHALLOW.name and not all(isinstance(kind, str) for kind in kinds):
+    if not system.rules.has_plane and not all(isinstance(kind, str) for kind in kinds):
         raise ValueError(f"{CANNOT}, but {ELASTIC}; say so with in_plane, hold it, or leave stretching out")
     if system.mesh.dimension == 1 and not set(kinds) <= set(HELD):
         raise ValueError(f"{CANNOT}, but an end is free; hold it, or leave stretching out")
@@ -123,7 +123,7 @@ def _sheet(shapes: Shapes, section: Plate) -> tuple[membrane.Sheet, membrane.Ste
             found = unit * (parts @ moved[system.element_dofs.T[cells]][:, None])  # (n, n_q, 6, n_modes)
             return np.asarray(found[:, :, :3] + sheet.neutral[pieces] @ found[:, :, 3:])
 
-        return sheet, by_elements, taut if system.theory == SHALLOW.name else None
+        return sheet, by_elements, taut if system.rules.has_plane else None
     coarsest = 0.25  # [-] triangles over the shorter side: 1e-4 too stiff in the first mode
     if isinstance(shapes, RectangleShapes):
         shortest = np.pi / (np.pi * shapes.numbers / (shapes.length, shapes.width)).max()

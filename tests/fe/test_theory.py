@@ -7,8 +7,9 @@ import pytest
 from numpy.testing import assert_allclose
 
 import fem_impact as fi
-from fem_impact.fe import assembly, euler, kirchhoff
+from fem_impact.fe import assembly, euler, kirchhoff, shallow
 from fem_impact.fe.theory import Term, no_estimate
+from fem_impact.modes.stretching import stretch
 
 STEEL = fi.Material(E=210e9, nu=0.3, rho=7850.0)
 SIDES, THICKNESS = np.array([0.5, 0.3]), 0.03
@@ -42,6 +43,18 @@ def test_a_new_theory_gets_modes_with_errors_and_static_deflections():
     assert (np.abs(modes.omega / exact - 1.0) < modes.frequency_error).all()
     point = np.array([[0.2, 0.1]])  # at rest nothing turns
     assert_allclose(modes.shapes.compliance(point), thin.shapes.compliance(point), rtol=1e-5)
+
+
+def test_a_theory_made_of_that_of_shells_keeps_what_their_plane_needs():
+    """It had no rings of triangles at corners of the plane, and as it stretched, no stresses by its linear motion."""
+    plate, kinds = fi.Plate(STEEL, 2e-3), dict.fromkeys(("left", "right"), "hinged")
+    theories = shallow.SHALLOW, replace(shallow.SHALLOW, name="mine")
+    made = [
+        fi.assemble(fi.mesh.rectangle(*SIDES), plate, kinds, rise=fi.rise.cap(2.0), theory=each) for each in theories
+    ]
+    known, own = (stretch(fi.find_modes(each, n_modes=2)) for each in made)
+    assert made[0].n_dofs == made[1].n_dofs
+    assert own.linear.any() and np.array_equal(own.linear, known.linear) and np.array_equal(own.forms, known.forms)
 
 
 class Bedded(fi.Plate):
