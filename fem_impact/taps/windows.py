@@ -34,8 +34,8 @@ def join_tables(taps: Any, name: str = "taps") -> Taps:
         labels=labels if len(set(labels)) == len(labels) else None,
         notes=[note for each in several for note in each.notes],
     )
-    joined.table["pulse"] = ("tap", np.concatenate([each.table["pulse"].values for each in several]))
-    return joined
+    pulse = np.concatenate([each.table["pulse"].values for each in several])
+    return Taps(joined.table.assign(pulse=("tap", pulse)), joined.notes)
 
 
 def level_offsets(taps: Taps) -> Taps:
