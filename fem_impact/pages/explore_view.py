@@ -36,9 +36,10 @@ def ends(setup: Setup) -> Ends:
         found[letter] = (float(three[0]), float(three[1]), float(three[2]))
     if setup.mesh.dimension == 2:
         found["height"] = (0.0, 3.0, 0.0)  # [m] of the listener; at zero the sound is the motion of the surface
+    barred = setup.barred
     for name in SLIDERS:
         value = getattr(setup.start, name, None)
-        if name not in found and value is not None and name not in setup.barred:
+        if name not in found and value is not None and name not in barred:
             found[name] = (*setup.range(name), value)
     return found
 

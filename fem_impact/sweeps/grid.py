@@ -25,7 +25,7 @@ from ..modes.modal import Damping, Modes
 from . import batches, bodies, cell_errors, refined
 from .borders import add_borders, find_borders, why_none
 from .cases import LAYERS, Cases, solve_all
-from .cells import AXES, Case, laid_out, rescales
+from .cells import ALIASES, AXES, Case, laid_out
 from .store import Texts, Watch, not_free
 
 TOLERANCE = 1e-3  # [-] default error limit of a map
@@ -235,7 +235,11 @@ def sweep(
     if isinstance(over, Mapping):
         alone = bool(job.layers) or (isinstance(modes, Modes) and modes.stretches)
         for name in over:
-            if isinstance(modes, Modes) and not rescales(name, modes.air and name != "damping_ratio", None):
+            if (
+                isinstance(modes, Modes)
+                and modes.air
+                and ALIASES.get(name, name) in ("target_mass", "target_frequency")
+            ):
                 raise ValueError(
                     f"over must not name {name} for modes in air, which does not scale with them; rescale them before "
                     "`in_air`"

@@ -75,9 +75,11 @@ def test_axes_that_do_not_rescale_the_body_make_it_anew(line, axes, tmp_path):
 def test_modes_in_air_are_not_rescaled():
     plate = fi.in_air(fi.analytic.rectangle(0.465, 0.3, mass=0.2, first_frequency=100.0, n_modes=6))
     blow = fi.Striker.rigid(0.03), fi.Contact.linear(1e4)
-    for over, words in (({"target_mass": [0.3]}, "must not name target_mass for modes in air"), ({}, "")):
-        with pytest.raises(ValueError, match=words or "over must name"):
-            fi.sweep(plate, *blow, at=(0.14, 0.09), speed=1.0, over=over)
+    for name in ("target_mass", "target.first_frequency"):
+        with pytest.raises(ValueError, match=f"must not name {name} for modes in air"):
+            fi.sweep(plate, *blow, at=(0.14, 0.09), speed=1.0, over={name: [0.3]})
+    damped = fi.sweep(plate, *blow, at=(0.14, 0.09), speed=1.0, over={"target.damping_ratio": [0.3]})
+    assert worst(damped.isel(damping_ratio=0), fi.strike(plate.damped(0.3), *blow, at=(0.14, 0.09), speed=1.0)) < 2e-3
 
 
 def test_many_blows_have_the_model_that_the_scene_requires(tmp_path):
