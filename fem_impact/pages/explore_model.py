@@ -70,7 +70,7 @@ class Setup:
         new strike point are found. ``before`` is a setup of the same body, whose modes are taken as far as they reach.
         """
         plan, (scene, _) = None, for_many(scene)
-        if before is not None:
+        if before is not None and before.scene.target == scene.target:  # another mallet may require another model
             first, mesh = before.base.modes, before.mesh
         else:
             plan = scene.plan(target="modal", n_modes=FIRST_LOOK)

@@ -215,10 +215,10 @@ class _SpreadAsked:
         elif axis in AXES and axis != "at":
             target = self.blow.target
             if not rescales(axis, target.air or (target.modes and target.modes.air), target.damping_ratio):
-                raise ValueError(
-                    f"vary: {name} does not rescale air, nor damping that depends on frequency; write it in the scene "
-                    "as { value, about } for `fi.band`"
+                advice = (
+                    "leave it out" if self.scene is None else "write it in the scene as { value, about } for `fi.band`"
                 )
+                raise ValueError(f"vary: {name} does not rescale air, nor damping that depends on frequency; {advice}")
             if axis in self.own:
                 raise ValueError(f"vary names {axis} twice")
             self.own[axis] = column

@@ -101,6 +101,10 @@ def check_axes(scene: "Scene", over: Mapping[str, Any]) -> list[str]:
     """
     tables = [name for name in MAKERS if name not in ("observe", "map")]  # those two change no blow
     known = [f"{name}.{key}" for name in tables for key in getattr(getattr(scene, name), "values", {})]
+    axes = [ALIASES.get(name, name) for name in over]
+    for axis in axes:
+        if axes.count(axis) > 1:
+            raise scene.fault(f"[map] over names the axis {axis} twice")
     air, ratio = (scene._target[name] for name in ("air", "damping_ratio"))
     anew = [name for name in over if ALIASES.get(name, name) not in AXES or not rescales(name, air, ratio)]
     for name in anew:

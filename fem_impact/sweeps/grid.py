@@ -234,16 +234,12 @@ def sweep(
     )
     if isinstance(over, Mapping):
         alone = bool(job.layers) or (isinstance(modes, Modes) and modes.stretches)
-        for name in over:
-            if (
-                isinstance(modes, Modes)
-                and modes.air
-                and ALIASES.get(name, name) in ("target_mass", "target_frequency")
-            ):
-                raise ValueError(
-                    f"over must not name {name} for modes in air, which does not scale with them; rescale them before "
-                    "`in_air`"
-                )
+        scaled = [name for name in over if ALIASES.get(name, name) in ("target_mass", "target_frequency")]
+        if scaled and isinstance(modes, Modes) and modes.air:
+            raise ValueError(
+                f"over must not name {scaled[0]} for modes in air, which does not scale with them; rescale them before "
+                "`in_air`"
+            )
         over, ours = laid_out(over, contact, alone=alone, cells=cells)
         job = replace(job, ours=ours)
     blow = Blow(Target.of(modes, damping_ratio), striker, contact, {"at": at, "speed": speed})

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from scenes import TITLED, edited, load_text
+from scenes import BAR, TITLED, edited, load_text
 
 import fem_impact as fi
 from fem_impact.impact import accuracy
@@ -93,6 +93,16 @@ def test_a_saved_striker_is_the_one_on_the_page(kind, tmp_path):
     np.testing.assert_allclose(
         saved.modes.shape_at(saved.at[None]) ** 2, shown.modes.shape_at(shown.at[None]) ** 2, rtol=1e-6, atol=1e-9
     )
+
+
+def test_another_mallet_that_requires_another_model_finds_other_modes(tmp_path):
+    """A hard one needs shear at 1e-3, a soft one does not; the page had the modes of the one before."""
+    bar = edited("{ x = [0.0, 0.175], values = [0.05, 0.04] }", "0.05", BAR)
+    text = bar.replace("[target]", '[target]\nmodel = "auto"').replace("1e-2", "1e-3")
+    hard = explore_model.Setup.of(load_text(tmp_path, text.replace("1e5", "1e6")))
+    soft = explore_model.Setup.of(load_text(tmp_path, text.replace("1e5", "1e3")), before=hard)
+    assert hard.base.modes.thick and not soft.base.modes.thick
+    assert soft.scene.target.values.get("theory") is None
 
 
 SECTION = '[material]\nE = 1e10\nnu = 0.3\nrho = 450.0\n[section]\nkind = "plate"\nthickness = 3e-3\n[supports]'

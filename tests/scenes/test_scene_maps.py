@@ -21,6 +21,7 @@ from fem_impact.scenes.scene import scene_of
 from fem_impact.scenes.schema import Part
 from fem_impact.show import plots
 from fem_impact.sweeps import grid
+from fem_impact.sweeps.cells import ALIASES, AXES
 
 OVER = {"contact.stiffness": [2e4, 1e5, 4e5], "striker.mass": [0.02, 0.06, 0.1]}
 
@@ -63,13 +64,19 @@ def test_axes_that_do_not_rescale_the_body_make_it_anew(line, axes, tmp_path):
     scene = load_text(tmp_path, edited("[target]", f"[target]\n{line}", QUICK))
     for name, value in axes.items():
         table = maps.map_scene(scene, over={name: [value]}, tolerance=1e-3)
-        key = name.replace("_mass", ".mass")
-        dimension = key.replace(".", "_").replace("first_", "").replace("target_damping", "damping")
+        dimension = ALIASES.get(name, name)
         assert table.n_impacts.dims == (dimension,) and "units" in table[dimension].attrs
-        hit = maps.changed_scene(scene, key, value).strike(tolerance=1e-3)
+        hit = maps.changed_scene(scene, AXES[dimension][2], value).strike(tolerance=1e-3)
         assert worst(table.isel({dimension: 0}), hit) < 2e-3  # 1e-3 each
         with pytest.raises(ValueError, match=f"vary: {name} does not rescale air"):
             fi.spread(scene, {name: f"lognormal({value}, 0.1)"}, n=8)
+
+
+@pytest.mark.parametrize("line", ["", 'air = "both sides"'])
+def test_an_axis_by_two_names_is_refused(line, tmp_path):
+    scene = load_text(tmp_path, edited("[target]", f"[target]\n{line}", QUICK))
+    with pytest.raises(ValueError, match="over names the axis target_mass twice"):
+        maps.map_scene(scene, over={"target.mass": [0.2], "target_mass": [0.3]})
 
 
 def test_modes_in_air_are_not_rescaled():
