@@ -160,12 +160,12 @@ class Asked:
         flight = 2.0 * self.mass * self.values["speed"] / force if force > 0.0 else 0.0  # of the first rebound, at most
         return max(1.0, (end - flight) / self.duration)
 
-    def stopped(self, mobility: float, quicker: float = 1.0) -> bool:
-        """Whether a plate of a mobility [m/(N s)] damps the contact, or one so much ``quicker``, beyond critically.
+    def damped_by(self, mobility: float) -> float:
+        """How much a plate of a mobility [m/(N s)] damps the contact, over what would be critical [-].
 
-        Then it does not throw the striker off: its edges do.
+        From 1 on it does not throw the striker off: its edges do. The force rises within 1 / (2 pi n) of the contact.
         """
-        return 0.5 * np.pi * self.mass * mobility * quicker >= self.duration
+        return float(0.5 * np.pi * self.mass * mobility / self.duration)
 
     def highest(self, mobility: float) -> float:
         """Frequency [Hz] above which a plate of a mobility [m/(N s)] acts as a spring."""

@@ -49,7 +49,7 @@ class Mixed(Description):
         slow, highest = asked.mass * estimates.mobility, asked.highest(estimates.mobility)
         if not named and mixed.LASTING * slow > 1e4 * asked.duration:  # too many steps, some 24 for each contact time
             return None
-        few = not asked.stopped(estimates.mobility) or target.count_below(highest / target.stretch) < MANY_MODES
+        few = asked.damped_by(estimates.mobility) < 1.0 or target.count_below(highest / target.stretch) < MANY_MODES
         if few and not (named or anyway):
             return None
         frequency = mixed.first_frequency(asked.mass, estimates.mobility, estimates.echo, asked.duration)

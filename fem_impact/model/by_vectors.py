@@ -111,8 +111,10 @@ class Vectors(Description):
         """The same, and its vectors; modes, if the point struck is at rest, where no vector can start."""
         asked, ritz, at = self.asked, self.ritz, self.asked.values["at"]
         if ritz is None:
-            wanted = 0.5 / asked.duration, asked.budget.total, self.elements, asked.meshed
-            ritz = vectors.RitzTarget(asked.blow.target, at, *wanted, stages, count=self.forecast.n_modes)
+            wanted, how = (0.5 / asked.duration, asked.budget.total), (self.elements, asked.meshed, stages)
+            damping = 0.0 if asked.estimates is None else asked.damped_by(asked.estimates.mobility)
+            shift = vectors.shift_for(*wanted, damping if np.isfinite(damping) else 0.0)
+            ritz = vectors.RitzTarget(asked.blow.target, at, *wanted, *how, shift, self.forecast.n_modes)
         if ritz.at_rest:
             return Modal.of(asked, stages).found(stages, keep)
 
@@ -170,7 +172,7 @@ def _predicted_length(asked: Asked) -> tuple[float, int, bool]:
     except check.SimulationError:
         return 1.0, 1, False
     lasts, echo = max((touch.end for touch in hit.impacts), default=0.0) / asked.duration, echo / asked.duration
-    if not asked.stopped(mobility):
+    if asked.damped_by(mobility) < 1.0:
         return lasts, hit.n_impacts, False
     if mobility > estimates.mobility:  # echoes find it pressing on an edge, until 3e-4 of its speed are left
         return max(echo, min(lasts, 8.0 * asked.mass * mobility / asked.duration)), SEVERAL, True
@@ -200,7 +202,7 @@ def _vectors_if_rattling(asked: Asked, first: int) -> int:
     quicker = (1.0 + lost) ** (1.0 / (contact.exponent + 1.0))  # than without loss, as a stiffer contact
     if estimates is None or not np.isfinite(estimates.mobility):
         return 0
-    if lost < STICKY and not asked.stopped(estimates.mobility, quicker):
+    if lost < STICKY and quicker * asked.damped_by(estimates.mobility) < 1.0:
         return 0
     # half a period of a heavy one on a hinged square as a spring; the first echo throws off a light one
     lasts = np.pi * estimates.mobility * (0.74 * mass * estimates.mass) ** 0.5 if mass > LIGHT * estimates.mass else 0.0

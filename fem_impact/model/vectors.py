@@ -59,6 +59,14 @@ def first_count(target: Target, resonance: float, tolerance: float) -> int:
     return round(min(_stricter(84, 0.22, tolerance), FEWEST + modes))
 
 
+def shift_for(resonance: float, tolerance: float, damping: float = 0.0) -> float:
+    """Shift [rad/s] of the vectors for a contact with this resonance [Hz], see `Krylov`; half or twice it serves, too.
+
+    A plate whose ``damping`` is above critical [-] makes the force rise so much faster.
+    """
+    return 2.0 * np.pi * resonance * max(1.0, 0.5 * damping) * _stricter(6.0, 1.0 / 6.0, tolerance)
+
+
 def size_for(target: Target, resonance: float, tolerance: float) -> float:
     """Element size [m] of the first mesh for a contact with this resonance [Hz]; that of the user's mesh if stated.
 
@@ -153,8 +161,7 @@ class RitzTarget:
     ) -> None:  # fmt: skip
         self.target, self.at, self.stages = target, np.atleast_2d(at), stages  # (n_points, 2) [m]
         self.fixed = fixed  # whether the user insists on the size of the elements
-        # [rad/s] before scaling, see `Krylov`; half or twice this shift describes blows as well
-        self.shift = (shift or 2.0 * np.pi * resonance * _stricter(6.0, 1.0 / 6.0, tolerance)) / target.stretch
+        self.shift = (shift or shift_for(resonance, tolerance)) / target.stretch  # [rad/s] before scaling
         self.count = count or first_count(target, resonance, tolerance)  # of vectors
         # [-] over the cutoff, up to which Ritz pairs are kept: what acts as a spring errs in every blow
         self.margin = _stricter(4.0, 0.6, tolerance)
