@@ -69,7 +69,7 @@ def run_strike(options: argparse.Namespace) -> Answer:
     keep.unlink(missing_ok=True)
     if options.band:
         with display("blows"):
-            found = band.band_around(scene, run.response)
+            found = band.band_around(scene, run)
     seconds = {**run.seconds, **stages.seconds, "total": time.perf_counter() - began}
     said: list[str | Sequence[str]] = [title_of(scene), run.response.summary()]
     if options.band:

@@ -1,7 +1,8 @@
 """A blow as well as its inputs are known: beside the errors of computation and model, what the inputs leave open."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from contextlib import suppress
+from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -10,9 +11,13 @@ import numpy as np
 from scipy import stats
 
 from .._base import check, markup, progress
+from ..impact import promise
 from ..impact.measured import ENDS, Comparison, of_blow
 from ..impact.response import Response
+from ..model.asked import PIECES
+from ..model.planner import Run
 from ..sweeps.inputs import drawn_inputs, read_inputs, shares
+from .maps import changed_scene
 from .scene import Scene, load_scene
 from .uncertainty import MOST_BLOWS, spread
 
@@ -143,7 +148,10 @@ def band(scene: Scene | str | Path, *, n: int | None = None, seed: int = 0, **ch
     """
     known = scene if isinstance(scene, Scene) else load_scene(scene)
     check_known(known)
-    return band_around(known, known.strike(**changes), n=n, seed=seed)
+    strict = changes.pop("strict", False)
+    run = known.run(**changes)
+    promise.warn_if_missed(run.response, strict)
+    return band_around(known, run, n=n, seed=seed)
 
 
 def check_known(scene: Scene) -> None:
@@ -155,23 +163,34 @@ def check_known(scene: Scene) -> None:
         )
 
 
-def band_around(scene: Scene, hit: Response, *, n: int | None = None, seed: int = 0) -> Band:
-    """The band around a blow of a scene; where inputs need another body, with a scene of its own for each blow."""
+def band_around(scene: Scene, run: Run, *, n: int | None = None, seed: int = 0) -> Band:
+    """The band around a blow of a scene; where inputs need another body, with a scene of its own for each blow.
+
+    Its blows differ from the scene as the one of ``run`` does.
+    """
     count, seed = (None if n is None else check.count("n", n, high=MOST_BLOWS)), check.count("seed", seed, low=0)
+    hit = run.response
+    pieces = {**run.plan.changes, "tolerance": hit.tolerance}
+    for name in set(pieces) - {*PIECES, "tolerance", "quantity"} | {"model"} & set(pieces):
+        key = f"{'target' if name in ('model', 'stretching') else 'strike'}.{name}"
+        scene = changed_scene(scene, key, pieces.pop(name))
+        scene = replace(scene, known={other: how for other, how in scene.known.items() if other != key})
+    check_known(scene)
     inputs = read_inputs(scene.known)
     said = {each.name: each.said for each in inputs}
-    try:
-        found = spread(scene, scene.known, n=count or BLOWS, sobol=False, seed=seed, tolerance=hit.tolerance)
-    except ValueError:  # an input that needs a body of its own, or a wrong one, which the scenes below refuse
-        pass
-    else:
+    found = None
+    if not set(PIECES) & set(pieces):  # which say how the body of one blow is described
+        # an input may need a body of its own; a wrong one is refused by the scenes below
+        with suppress(ValueError):
+            found = spread(scene, scene.known, n=count or BLOWS, sobol=False, seed=seed, tolerance=hit.tolerance)
+    if found is not None and max(found.rescaled.values(), default=0.0) <= hit.tolerance:
         values = {name: found.values(name) for name in (*said, *NAMES.values())}
         return Band(hit, said, values, found.n_failed, anew=False)
     n, rows, failed = count or ANEW, [], 0
     for done, row in enumerate(drawn_inputs(inputs, shares(n, len(inputs), seed), None)):
         given = {each.name: float(value) for each, value in zip(inputs, row)}
         try:
-            one = scene.changed(given).strike(tolerance=hit.tolerance)
+            one = scene.changed(given).strike(**pieces)
             numbers = np.array([getattr(one, name) for name in NAMES.values()], float)  # None becomes NaN
             rows.append(given | dict(zip(NAMES.values(), numbers.tolist())))
         except check.SimulationError:
