@@ -31,7 +31,7 @@ from ..sweeps.spreads import DOUBLE, QUANTITIES, Checks, Spread
 from ..sweeps.store import Texts
 from .maps import MOST_ROWS, changed_scene
 from .scene import Scene, load_scene
-from .whole import for_many
+from .whole import for_many, is_tied
 
 # [-] default limit of a spread, to limit the work to some minutes and 1 GB of numbers
 MOST_BLOWS = 10**7
@@ -206,7 +206,9 @@ class _SpreadAsked:
     def _sort(self, name: str, axis: str, column: np.ndarray) -> None:
         dimension, (table, _, key) = self.dimension, name.partition(".")
         part = getattr(self.scene, table, None) if table in ("striker", "contact") else None
-        if name in PLACES[:dimension]:
+        if self.scene is not None and axis in AXES and is_tied(self.scene, axis):
+            self.parts[AXES[axis][2]] = column
+        elif name in PLACES[:dimension]:
             self.places[PLACES.index(name)] = column
         elif name in BODY.get(dimension, {}):
             self.body[name] = column / self._of_body(name)
@@ -329,10 +331,11 @@ class _SpreadAsked:
             for name, value in zip(self.parts, row):
                 scene = changed_scene(scene, name, float(value))
             striker, law = scene.make_striker(), scene.make_contact()
-            if striker.modes.omega.any() and any(name.startswith("striker.") for name in self.parts):
+            other = next((name for name in self.parts if name.startswith("striker.")), None)
+            if striker.modes.dimension and other:
                 raise ValueError(
-                    f"vary: {next(n for n in self.parts if n.startswith('striker.'))} needs a rigid striker; "
-                    f"vary striker.mass and striker.first_frequency"
+                    f"vary: {other} needs a rigid striker that does not turn; write it in the scene as "
+                    "{ value, about } for `fi.band`, or vary striker.mass and striker.first_frequency of one that bends"
                 )
             laws[i], masses[i] = [getattr(law, name) for name in LAW], striker.mass
         for name, column in zip(LAW, laws.T):

@@ -94,6 +94,14 @@ def for_many(
     return replace(scene, target=target), (f"the model of the target is what the scene's own blow requires: {said}",)
 
 
+def is_tied(scene: "Scene", name: str) -> bool:
+    """Whether an axis is a number of the scene by which another acts, too, so that more changes than the axis would."""
+    key, law = AXES[name][2] if name in AXES else name, scene.contact
+    yields = law.kind == "elastic_plastic" and "yield_speed" in law.values
+    turns = scene.striker.kind == "turning"
+    return (turns and key == "striker.mass") or (yields and key in ("contact.stiffness", "contact.exponent"))
+
+
 def check_axes(scene: "Scene", over: Mapping[str, Any]) -> list[str]:
     """The axes of a map each of whose values needs another body: that `sweep` does not have, or that do not rescale.
 
@@ -106,7 +114,10 @@ def check_axes(scene: "Scene", over: Mapping[str, Any]) -> list[str]:
         if axes.count(axis) > 1:
             raise scene.fault(f"[map] over names the axis {axis} twice")
     air, ratio = (scene._target[name] for name in ("air", "damping_ratio"))
-    anew = [name for name in over if ALIASES.get(name, name) not in AXES or not rescales(name, air, ratio)]
+    anew = [
+        name for name in over
+        if ALIASES.get(name, name) not in AXES or not rescales(name, air, ratio) or is_tied(scene, name)
+    ]  # fmt: skip
     for name in anew:
         if name not in known and ALIASES.get(name, name) not in AXES:
             near = check.nearest(name, [*AXES, *ALIASES, *known])
