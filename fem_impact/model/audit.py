@@ -138,7 +138,7 @@ def examine_plan(
             rigid_plate(place[0], body.mass), damping_ratio=np.full(1, float(damped)), thick=target.thick,
             air=target.air is not None, stretches=target.stretching,
         )  # fmt: skip
-    stiff = replace(collision.shortened_striker(striker, striker.modes.n_rigid), hand=None)
+    stiff = replace(collision.shortened_striker(striker, striker.modes.n_rigid), hand=None, gravity=0.0)
     bare, wall = replace(contact, loss=0.0, gap=0.0), rigid_plate(np.zeros(1), 1.0)
     try:
         with build.uncompiled():
