@@ -269,10 +269,12 @@ def _sounds(scene: Scene, response: Response | Strokes) -> list[dict[str, str]]:
                 air = f" without a baffle, {BOUND[bound]}; {hearing.stated_level(sounds)}" if bound else ""
                 found.append((f"Sound radiated{where}{air}", pressure))
     players, doubt = [], promise.doubt_of_sound(response, 0.5 * sound.RATE)
+    pressed = isinstance(response, Response) and response.in_contact
     for name, samples in found:
         level = samples.peak_level
         stated = f"peak {samples.said}; full scale {samples.full_scale:g} {samples.unit}, as in every report"
         stated += f"; this {doubt}" if doubt else ""
+        stated += "; the run ends in contact, after which the body rings as if let go" if pressed else ""
         players.append({"name": name, "note": stated, "uri": audio(samples.samples, samples.rate)})
         if -math.inf < level < QUIET:
             raised = audio(samples.samples * 10.0 ** (-level / 20.0), samples.rate)
@@ -329,8 +331,7 @@ def _plots(response: Response | Strokes) -> dict[str, Any]:
     if isinstance(response, Response):
         last, times = response.impacts[-1].end if response.impacts else 0.0, np.linspace(0.0, end, 400)
         rings = response.modal_energy([last])
-        striker, body = (response.modal_energy(times, body=body).sum(axis=1) for body in (0, -1))
-        parts = {"x": times, "striker": striker, "body": body, "rest": striker[0] - striker - body}
+        parts = {"x": times, **dict(zip(("striker", "body", "rest"), sampling.energies(response, times)))}
         own["energy"] = {name: _short(part) for name, part in parts.items()}
     else:
         rings = response.hits[-1].modal_energy([response.hits[-1].history.end_time])

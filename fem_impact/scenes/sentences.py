@@ -77,7 +77,19 @@ def words(scene: Scene, response: Response) -> list[str]:
     else:
         number, side = ("Single hit", "below") if resonance < limit else ("Several hits", "above")
         hits = f"{number} expected: the {wall}, is {side} the limit of {si(limit, 'Hz', 3)} (kinetic-energy criterion)."
-    return [body(scene, response.target), blow, contact(law), hits]
+    return [body(scene, response.target), blow, contact(law), *_besides(scene), hits]
+
+
+def _besides(scene: Scene) -> list[str]:
+    """What else acts in a blow, and what ends it, in sentences."""
+    given, found = scene.blow.values, []
+    for name, pushed in (("striker_force", "striker"), ("target_force", "body")):
+        if force := given.get(name):
+            way = "along" if force > 0.0 else "against"
+            found.append(f"A constant force of {si(abs(force), 'N')} pushes the {pushed} {way} the blow.")
+    ends = [f"after {si(given['duration'], 's')}"] if given.get("duration") else []
+    ends += [f"with impact {given['max_impacts']}"] if given.get("max_impacts") else []
+    return found + ([f"It is followed no further than {' or '.join(ends)}."] if ends else [])
 
 
 def body(scene: Scene, modes: Modes) -> str:
@@ -130,16 +142,27 @@ def contact(law: Contact) -> str:
     stiffness = si(law.stiffness, "N/m") + raised
     sentence = f"The contact is a spring that only pushes, with a force of {stiffness} × indentation{raised}"
     sentence += f", with loss {law.loss:.3g} s/m." if law.loss else "."
+    if law.gap:
+        way = "apart" if law.gap > 0.0 else "pressed in"
+        sentence += f" At the start the bodies are {si(abs(law.gap), 'm')} {way}."
     return sentence + law.law.sentence(law, si)
 
 
 def tip_notes(scene: Scene) -> tuple[str, ...]:
-    """A note if the scene's own contact is not a linear spring, as the tips of hammers are: what it amounts to."""
+    """What a choice of hammers does not follow: a model to be chosen, and a contact that is no linear spring, as tips
+    are, with what it amounts to."""
+    found: tuple[str, ...] = ()
+    if scene.target.values.get("model") == "auto":
+        found = (
+            'hammers are chosen on the body as stated: model = "auto" is not followed; state the theory and the air '
+            "that `fem-impact strike` says the blow requires",
+        )
     if scene.contact.kind == "linear":
-        return ()
+        return found
     law, mass, speed = scene.make_contact(), scene.make_striker().felt_mass, float(scene.blow.values["speed"])
     alike = accuracy.resonant_stiffness(mass, accuracy.contact_resonance(law, mass, speed))
     return (
+        *found,
         f"tips are linear springs [N/m]; the scene's contact is of another kind ({scene.contact.kind}) and not used: "
         f"under {1e3 * mass:.4g} g at {speed:g} m/s it acts as long as a tip of {alike:.3g} N/m",
     )

@@ -111,12 +111,10 @@ def energies(response: Response) -> Figure:
     end, n = sampling.last_release(response) or 1.0, len(response.bodies)
     times = np.linspace(0.0, (1.0 + MARGIN) * end, 800)
     names = ["striker", "struck body"] if n == 2 else [f"body {i}" for i in range(n)]
-    parts = [response.modal_energy(times, body=body).sum(axis=1) for body in range(n)]
     with styled(7.0, 3.6) as figure:
         axes = figure.subplots()
-        for name, part in zip(names, parts):
+        for name, part in zip([*names, "contact and losses"], sampling.energies(response, times)):
             axes.plot(times, part, label=name)
-        axes.plot(times, sum(response.start_energies.values()) - sum(parts), label="contact and losses")
         axes.set(xlim=(0.0, times[-1]), xlabel="time", ylabel="energy", title="Energy during the blow")
         set_units(axes, "s", "J")
         axes.legend(loc="best")

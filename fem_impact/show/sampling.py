@@ -62,6 +62,14 @@ def gap(response: Response, times: np.ndarray) -> np.ndarray:
     return np.maximum(response.displacement(at[None], times) - tip, 0.0)[:, 0]
 
 
+def energies(response: Response, times: np.ndarray) -> list[np.ndarray]:
+    """Energy [J] of each body as in `Response.energies`, and at last that in the contacts and lost, (n_times,) each."""
+    history, states = response.history, list(zip(*response.history.states(times)))
+    spans = [response.body_slice(i) for i in range(len(response.bodies))]
+    parts = [np.array([history.energy(q, p, span) for q, p in states]) for span in spans]
+    return [*parts, sum(response.start_energies.values()) - np.sum(parts, axis=0)]
+
+
 def _struck(response: Response) -> tuple[Striker, np.ndarray]:
     """Striker and strike point of a blow."""
     if response.striker is None or response.at is None:

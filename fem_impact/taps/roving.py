@@ -1,7 +1,7 @@
 """A plan of a test with a roving hammer: what hits once at every point and reaches the band; how well it measures."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -229,6 +229,7 @@ def plan_on_body(
     noise: float = NOISE, duration: float | None = None,
 ) -> Roving:  # fmt: skip
     """As `plan_test`, on a body however it is known, and its modes up to beyond the band."""
+    target = replace(target, stretching=False)  # hammers are chosen for small blows
     centre = bandwidth / chooser.half_sine_reach(check.between("drop", drop, 1.0, 40.0, "dB"))
     names, tips, masses, stiffnesses = _kit(hammers, centre)
     noise = check.between("noise", noise, 0.0, 10.0)

@@ -311,6 +311,20 @@ def test_page_says_of_a_soft_blow_that_its_sound_was_not_asked_for(tmp_path):
         assert ("may err by" in (tmp_path / "soft.html").read_text()) == doubt
 
 
+def test_page_and_result_tell_what_pushes_a_blow_and_ends_it(tmp_path, prompt):
+    """Blows of a striker that falls ended in an error as soon as their plan was written down."""
+    falls = TITLED.replace("0.03", "0.03\ngravity = 9.81").replace("695e3", "695e3\ngap = 2e-3")
+    load_text(tmp_path, falls + "target_force = -0.5\nmax_impacts = 2\nduration = 4e-3\n")
+    assert prompt("report scene.toml --out page.html").status in (0, 3)
+    page = Path("page.html").read_text(encoding="utf-8").replace("\N{NO-BREAK SPACE}", " ")
+    for said in ("falls back at 9.81 m/s²", "At the start the bodies are 2 mm apart.",
+                 "A constant force of 500 mN pushes the body against the blow.",
+                 "It is followed no further than after 4 ms or with impact 2.",
+                 "the run ends in contact, after which the body rings as if let go"):  # fmt: skip
+        assert said in page
+    assert json.loads(download(page, "response.json"))["plan"]["assumptions"]
+
+
 def test_data_cannot_close_the_script_around_them_and_are_json():
     data = {"title": "</script><b>", "numbers": [1.5, float("nan")]}
     assert html_page.script_data(data) == '{"title":"\\u003c/script>\\u003cb>","numbers":[1.5,null]}'

@@ -9,7 +9,7 @@ import pytest
 from numpy.testing import assert_allclose
 
 import fem_impact as fi
-from fem_impact.show import figures, outlined, plots
+from fem_impact.show import figures, outlined, plots, sampling
 from fem_impact.sweeps.hammers import Hammer
 
 
@@ -63,6 +63,21 @@ def test_energies_add_up_at_every_instant(hit):
     assert_allclose(total, 0.5 * 0.03 * 2.0**2, rtol=1e-12)  # what the striker brought
     # a contact stores and never lends; between the ends of steps the energy holds to their tolerance of 1e-3
     assert lines[2].get_ydata().min() > -1e-3 * 0.06
+
+
+@pytest.mark.parametrize("given", [
+    {"striker_force": 20.0, "duration": 0.02}, {"target_force": -30.0, "duration": 0.02}, {"stretching": True},
+    {"contact": fi.Contact.linear(1e5, gap=-3e-4)},
+], ids=["a force on the striker", "a force on the body", "stretching", "pressed at the start"])  # fmt: skip
+def test_energies_drawn_end_as_those_of_the_blow(given):
+    """The work of forces, and what stretching or the contact stored from the start, counted as contact and losses."""
+    sheet = fi.Plate(fi.Material(E=70e9, nu=0.33, rho=2700.0), thickness=5e-4)
+    plate = fi.analytic.rectangle(0.4, 0.3, section=sheet, n_modes=6, damping_ratio=0.01)
+    how = {"contact": fi.Contact.linear(1e5), "at": (0.13, 0.1), "speed": 2.0, "tolerance": 1.0, "residual": False}
+    hit = fi.strike(plate, fi.Striker.rigid(0.05), **how | given)
+    *bodies, rest = (part[0] for part in sampling.energies(hit, np.array([hit.history.end_time])))
+    assert_allclose(bodies, [hit.energies[name] for name in ("striker", "target")], rtol=1e-9)
+    assert rest == pytest.approx(hit.energies["contact"] + hit.energies["dissipated"], abs=1e-4 * 0.1)
 
 
 @pytest.mark.parametrize("speeds", [[1.0, 0.0, 0.0], [0.5, 0.0, -0.5]])

@@ -134,6 +134,27 @@ def test_the_prompt_plans_points_over_the_body(prompt):
     assert Path("plan.svg").read_text().startswith("<?xml") and len({row["point"] for row in rows}) in range(6, 13)
 
 
+SHEET = """mesh = { shape = "rectangle", length = 0.4, width = 0.3 }
+material = { E = 70e9, nu = 0.33, rho = 2700.0 }
+section = { kind = "plate", thickness = 2e-4 }
+supports = { boundary = "hinged" }
+striker = { kind = "rigid", mass = 0.03 }
+contact = { kind = "linear", stiffness = 1e4 }
+strike = { at = [0.13, 0.1], speed = 1.0 }
+"""
+
+
+def test_a_plan_says_that_it_follows_no_model_to_be_chosen_and_taps_lightly(tmp_path, prompt):
+    text = SMALL.replace("damping_ratio = 0.01", 'damping_ratio = 0.01\nmodel = "auto"')
+    load_text(tmp_path, text)
+    words = "hammer scene.toml --bandwidth 400 --masses 0.002"
+    for more in ("", "--rove 4"):
+        assert 'model = "auto" is not followed' in prompt(f"{words} {more}").out
+    scenes = [load_text(tmp_path, SHEET + more) for more in ("", "target = { stretching = true }\n")]
+    plans = [roving.of_scene(each, {"a": (0.005, {"b": 1e4})}, 200.0, 10.0, None) for each in scenes]
+    assert_allclose(*(plan.peaks for plan in plans), rtol=1e-4)
+
+
 def test_modes_of_a_scaled_scene_reach_a_little_beyond_the_band(tmp_path):
     scene = load_text(tmp_path, SMALL.replace('source = "analytic"', 'source = "fe"'))
     found = roving._modes(scene.built.target, BAND)
