@@ -150,7 +150,7 @@ def strike_grid(setup: Setup, watch: Callable[[int, int], None]) -> Lesson:
         cells = [setup.case(replace(start, at=place, mass=float(mass)), body=body) for mass in axes["mass"]]
         limits.append([limit_of(case) for case in cells])
         law = cells[0].contact  # whether faster blows are the same: with linear contacts and bodies
-        alike = law.exponent == 1.0 and not (law.lossy or law.special or cells[0].modes.stretches)
+        alike = law.exponent == 1.0 and not (law.gap or law.lossy or law.special or cells[0].modes.stretches)
         for speed in range(COUNTS["speed"]):
             about, mapper = settings_at(setup, axes, place, speed, 0, 0), explorer.mapper
             picture = mapper.finer(about, mapper.first(about, window, body), body)

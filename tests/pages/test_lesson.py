@@ -10,6 +10,8 @@ from scenes import SMALL, load_text
 
 import fem_impact as fi
 from fem_impact.pages import explore_model, explore_numbers, lesson, lesson_grid, worksheet
+from fem_impact.pages.explore_model import Setup
+from fem_impact.pages.lesson_grid import STEPS
 from fem_impact.scenes.sentences import si
 
 COUNTS = {"mass": 5, "stiffness": 5, "speed": 3}
@@ -149,6 +151,17 @@ def test_it_fits_the_screen(held, visit, width, scheme):
 def test_scenes_with_strokes_are_refused(tmp_path):
     with pytest.raises(ValueError, match="scene must have a single blow"):
         lesson.write(tmp_path / "page.html", load_text(tmp_path, SMALL + "[[stroke]]\nwhen = 0.0\n"))
+
+
+def test_a_gap_is_travelled_at_each_speed(tmp_path, monkeypatch):
+    """Blows through a linear spring at other speeds were those at the lowest, and began when that does."""
+    monkeypatch.setattr(lesson_grid, "COUNTS", {"mass": 1, "stiffness": 1, "speed": 3})
+    monkeypatch.setattr(lesson_grid, "places_of", lambda setup: (setup.start.at,))
+    text = SMALL.replace('"hertz"\nstiffness = 695e3', '"linear"\nstiffness = 1e4\ngap = 1e-3')
+    grid = lesson_grid.strike_grid(Setup.of(load_text(tmp_path, text)), lambda done, total: None)
+    for speed, blow in zip(grid.axes["speed"], grid.blows):
+        begins = blow.end / STEPS * blow.time[np.flatnonzero(blow.force)[0] - 1]
+        assert begins == pytest.approx(1e-3 / speed, rel=1e-3)
 
 
 def test_lines_between_kept_points_miss_a_curve_by_no_more_than_allowed():
