@@ -368,6 +368,11 @@ def radiate_bar(
     modes = response.target
     if modes.dimension != 1:
         raise ValueError(f"response must be that of a beam, got a body of dimension {modes.dimension}; use radiate")
+    if not modes.continuous:
+        raise ValueError(
+            "response must be that of a beam whose shapes are known everywhere, not at points only; strike it again if "
+            "the blow was read from a folder"
+        )
     place = check.array("listener", listener, (3,), "m")
     width = check.positive("width", width, "m")
     if check.positive("height", height, "m") > width:

@@ -172,6 +172,17 @@ def test_far_away_the_sound_is_what_it_was_nearby(bar_hit):
     assert_allclose(levels(4_000.0) + 40.0, levels(40.0), atol=0.5)
 
 
+def test_the_sound_of_a_bar_known_at_points_only_is_refused(bar_hit):
+    """As of a blow that was read from its folder: the whole bar moved as the nearest point, 0.6 of the loudest off."""
+    known = fi.Modes.from_arrays(
+        bar_hit.target.frequencies, bar_hit.target.shape_at([[0.1], [0.2]]), points=[[0.1], [0.2]],
+        mass=bar_hit.target.mass,
+    )  # fmt: skip
+    hit = fi.strike(known, fi.Striker.rigid(0.03), fi.Contact.linear(1e5), at=0.1, speed=1.0, tolerance=1.0)
+    with pytest.raises(ValueError, match="whose shapes are known everywhere, not at points only; strike it again if"):
+        sound.radiate_bar(hit, (0.1, 0.0, 1.0), **BAR)
+
+
 BAR = {"width": 0.02, "height": 0.01, "duration": 0.01}
 
 
