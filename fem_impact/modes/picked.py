@@ -1,9 +1,9 @@
 """Modes picked from measured frequency responses: a pole at each peak, all refined together, and what moves with it.
 
 The accelerance of channel k is ``H_k = L_k - omega**2 (R_k + sum over r of A_kr / (omega_r**2 - omega**2 + 2 i zeta_r
-omega_r omega))``: L and R stand for the modes below and above the band, and ``A_kr`` is the product of the
-mass-normalised deflections [kg**-0.5] at both ends. With real A, those of normal modes, the sum is linear in all but
-the poles (least squares frequency domain; Ewins, Modal Testing, chapter 4).
+omega_r omega))``: L and R stand for the modes far below and above the band, poles up to half beyond its ends for nearer
+ones, and ``A_kr`` is the product of the mass-normalised deflections [kg**-0.5] at both ends. With real A, those of
+normal modes, the sum is linear in all but the poles (least squares frequency domain; Ewins, Modal Testing, chapter 4).
 """
 
 from typing import Any, NamedTuple
@@ -101,23 +101,49 @@ def pick(name: str, found: Any, about: Any = None) -> Picked:
     data = np.vstack([(values * weight[:, None]).real, (values * weight[:, None]).imag])
     start = np.log(np.stack([omega[summits], [_damping(omega, size, i) for i in summits]])).reshape(2, -1)
     found_modes = _fit(omega, data, weight, start)
-    while about is None:  # peaks hidden beside others show in what is left
-        more = _with_one_more(omega, data, weight, found_modes)
+    begun = found_modes.poles[0]
+    # peaks hidden beside others show in what is left, and so do modes above and below the band
+    places = [None, 1.2 * omega[-1], omega[0] / 1.2]
+    while places:
+        more = _with_one_more(omega, data, weight, found_modes, places[0])
         if more is None:
-            break
-        found_modes = more
+            places = places[1:]
+        else:
+            found_modes = more
     poles, basis, constants, rest = _fit(omega, data, weight, found_modes.poles)
-    n = poles.shape[1]
-    if not n:
+    n, inside = poles.shape[1], _inside(omega, poles)
+    if about is not None:  # what else there is helps to find them
+        inside &= np.isin(np.arange(n), np.abs(poles[0] - begun[:, None]).argmin(axis=1)) if n else False
+    if not inside.any():
         raise ValueError(f"{name} has no peaks that are modes; give frequencies= near which they are sought")
     spare = max(1, len(basis) - basis.shape[1])
-    spread = np.sqrt(np.diag(np.linalg.pinv(basis.T @ basis))[:, None] * np.square(rest).sum(axis=0) / spare)
+    wide = _alike(rest)
+    spread = np.sqrt(wide * np.diag(np.linalg.pinv(basis.T @ basis))[:, None] * np.square(rest).sum(axis=0) / spare)
     natural, damping = np.exp(poles)
     doubt = _pole_errors(omega, weight, poles, constants[:n], rest) * np.stack([natural / (2.0 * np.pi), damping])
+    doubt *= np.sqrt(wide)
     damping = np.maximum(damping - float(found.attrs.get("added_damping", 0.0)) / natural, 0.0)  # that of a window
     left = float(np.linalg.norm(rest) / max(float(np.linalg.norm(data)), 1e-300))
     misfit = _misfit(omega, np.exp(poles), basis[:, :n], constants[:n], rest)
-    return Picked(natural / (2.0 * np.pi), damping, constants[:n].T, spread[:n].T, misfit, left, *doubt)
+    whole = natural / (2.0 * np.pi), damping, constants[:n].T, spread[:n].T, misfit, *doubt
+    kept = [each[..., inside] for each in whole]
+    return Picked(kept[0], kept[1], kept[2], kept[3], kept[4], left, kept[5], kept[6])
+
+
+def _alike(rest: np.ndarray) -> float:
+    """How many neighbouring lines of what is left, (2 n_frequencies, n_channels), say the same: one of white noise.
+
+    More of spectra padded with zeros or windowed, and where modes out of the band are not quite followed.
+    """
+    left = rest[: len(rest) // 2] + 1j * rest[len(rest) // 2 :]
+    left = left / np.maximum(np.sqrt(uniform_filter1d(np.square(np.abs(left)), 2 * ABOUT, axis=0)), 1e-300)
+    found, whole = 1.0, float(np.square(np.abs(left)).sum())
+    for lag in range(1, len(left) // 4):
+        share = abs((left[lag:] * left[:-lag].conj()).sum()) / max(whole, 1e-300)
+        if share < 3.0 / np.sqrt(left.size):
+            break
+        found += 2.0 * share
+    return found
 
 
 def _pole_errors(
@@ -137,8 +163,9 @@ def _pole_errors(
         lever = np.square(q).sum(axis=1) + np.square(np.linalg.qr(moved)[0]).sum(axis=1) / rest.shape[1]
         felt = moved * (left / np.sqrt(np.maximum(1.0 - lever, 1e-3)))[:, None]
         inner += felt.T @ felt
-    back = np.linalg.pinv(square)
-    return np.sqrt(np.diag(back @ inner @ back)).reshape(2, -1)
+    size = np.sqrt(np.maximum(np.diag(square), 1e-300))  # of modes that hardly move, too
+    back = np.linalg.pinv(square / np.outer(size, size), hermitian=True)
+    return np.sqrt(np.maximum(np.diag(back @ (inner / np.outer(size, size)) @ back), 0.0) / size**2).reshape(2, -1)
 
 
 def _curvature(q: np.ndarray, slopes: np.ndarray, products: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -166,6 +193,11 @@ def _misfit(
     return found
 
 
+def _inside(omega: np.ndarray, poles: np.ndarray) -> np.ndarray:
+    """Which poles (2, n_modes) lie within the band, (n_modes,) bool."""
+    return (poles[0] >= np.log(omega[0])) & (poles[0] <= np.log(omega[-1]))
+
+
 class _Modes(NamedTuple):
     poles: np.ndarray  # (2, n_modes) logarithms of natural frequencies [rad/s] and damping ratios
     basis: np.ndarray  # (2 n_frequencies, n_modes + 2)
@@ -184,19 +216,23 @@ def _fit(omega: np.ndarray, data: np.ndarray, weight: np.ndarray, start: np.ndar
     return _Modes(poles, basis, constants, data - basis @ constants)
 
 
-def _with_one_more(omega: np.ndarray, data: np.ndarray, weight: np.ndarray, before: _Modes) -> _Modes | None:
-    """The modes and one where they leave most; None if that is noise, or too near another peak."""
+def _with_one_more(
+    omega: np.ndarray, data: np.ndarray, weight: np.ndarray, before: _Modes, at: float | None
+) -> _Modes | None:
+    """The modes and one at ``at`` [rad/s], or where they leave most; None if that is noise, or too near another."""
     n = before.poles.shape[1]
     size = np.linalg.norm(before.rest.reshape(2, len(omega), -1), axis=(0, 2))
     natural, damping = np.exp(before.poles)
     apart = (np.abs(omega[:, None] - natural) > damping * natural).all(axis=1)  # half a half-power width
     place = int(np.where(apart, size, 0.0).argmax())
     width = np.median(before.poles[1]) if n else np.log(_damping(omega, size, place))
-    start = np.column_stack([before.poles, [np.log(omega[place]), width]])
+    start = np.column_stack([before.poles, [np.log(omega[place] if at is None else at), width]])
     after = _fit(omega, data, weight, start[:, np.argsort(start[0])], 5)
     if after.poles.shape[1] != n + 1:
         return None
     natural, damping = np.exp(after.poles)
+    if at is not None and _inside(omega, after.poles).sum() > _inside(omega, before.poles).sum():
+        return None  # it went into the band, where peaks are
     gain = np.square(before.rest).sum() - np.square(after.rest).sum()
     noise = np.square(after.rest).sum() / (max(1, len(data) - after.basis.shape[1]) * data.shape[1])
     about = after.rest.reshape(2, len(omega), -1)[:, max(0, place - ABOUT) : place + ABOUT + 1]
@@ -234,8 +270,8 @@ def _refined(omega: np.ndarray, data: np.ndarray, weight: np.ndarray, start: np.
     """
     n = start.shape[1]
     middle = 0.5 * (start[0, 1:] + start[0, :-1])
-    low = np.concatenate([[np.log(omega[0])], middle, np.full(n, np.log(DAMPING[0]))])[: 2 * n]
-    high = np.concatenate([middle, [np.log(omega[-1])], np.full(n, np.log(DAMPING[1]))])[-2 * n :]
+    low = np.concatenate([[np.log(omega[0] / 1.5)], middle, np.full(n, np.log(DAMPING[0]))])[: 2 * n]
+    high = np.concatenate([middle, [np.log(1.5 * omega[-1])], np.full(n, np.log(DAMPING[1]))])[-2 * n :]
     edge = 1e-3 * (high - low)
     x, caution, cost = np.clip(start.ravel(), low + edge, high - edge), 1e-3, np.inf
     best = x

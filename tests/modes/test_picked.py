@@ -168,6 +168,50 @@ def test_noise_widens_no_peaks_and_standard_errors_hold_at_one_sigma():
     assert np.mean(np.abs(ratio - 1.0) < errors) == pytest.approx(0.68, abs=0.09)  # two sigma of 120
 
 
+def of_sum(modes, frequency, rng, noise):
+    """Accelerances by a sum over modes (frequency, damping ratio, deflections), the first point struck."""
+    w, H = 2.0 * np.pi * frequency[:, None], 0.0
+    for natural, damping, shape in modes:
+        H = H - w**2 * shape[0] * shape / ((2.0 * np.pi * natural) ** 2 - w**2 + 4j * np.pi * damping * natural * w)
+    H = H + noise * np.median(np.abs(H)) * (rng.standard_normal(H.shape) + 1j * rng.standard_normal(H.shape))
+    known = {"frequency": frequency, "channel": list("abc"), "units": ("channel", ["m/s^2/N"] * 3)}
+    return xr.Dataset({"H": (("frequency", "channel"), H)}, known)
+
+
+def test_modes_beyond_the_band_change_none_within_it_by_more_than_the_errors_stated():
+    """Two terms stood for them: damping ratios were 5 % off in the middle, of errors of a tenth of that."""
+    off, over = [], []
+    for seed in range(8):
+        rng = np.random.default_rng(seed)
+        natural = np.concatenate([150.0 * np.arange(1, 6) + rng.uniform(-40.0, 40.0, 5), [rng.uniform(1010.0, 1040.0)],
+                                  np.sort(rng.uniform(1100.0, 2500.0, 5))])  # fmt: skip
+        damping, shapes = 10.0 ** rng.uniform(-2.5, -1.8, 11), rng.uniform(0.5, 1.5, (11, 3))
+        given = of_sum(list(zip(natural, damping, shapes)), np.arange(1.0, 1001.0), rng, 1e-3)
+        found = picked.pick("frf", given, natural[:5])
+        assert found.frequencies == pytest.approx(natural[:5], rel=1e-3)
+        products = (shapes[:5, :1] * shapes[:5]).T
+        off.append(found.damping_ratio / damping[:5] - 1.0)
+        over.append(np.vstack([
+            (found.frequencies - natural[:5]) / found.frequency_errors,
+            (found.damping_ratio - damping[:5]) / found.damping_errors, (found.products - products) / found.errors,
+        ]))  # fmt: skip
+    assert np.median(np.abs(off)) < 2e-3
+    assert np.mean(np.abs(over) < 1.645) > 0.7  # 0.85 of more bodies; it was 0.2
+
+
+def test_lines_that_say_the_same_count_once():
+    """A spectrum padded to four times its length has no more to say: errors were half as large."""
+    rng, rate, n = np.random.default_rng(5), 2048.0, 2048
+    pulse = 50.0 * np.sin(np.pi * np.clip((np.arange(n) - 40) / 5.0, 0.0, 1.0))
+    s = -0.02 * 2.0 * np.pi * 300.0 + 2j * np.pi * 300.0 * np.sqrt(1.0 - 0.02**2)
+    answer = np.imag(s**2 * np.exp(s * np.arange(n) / rate)) / s.imag / rate  # of a mode to an impulse, but its jump
+    clean = np.convolve(pulse, answer)[:n] + pulse
+    noise = 0.1 * clean.max() * rng.standard_normal((4, n))
+    taps = fi.Taps.from_arrays(np.tile(pulse, (4, 1)), clean + noise, rate=rate)
+    plain, padded = (picked.pick("frf", fi.frf(taps, n_times=k * n), [300.0]) for k in (1, 4))
+    assert padded.damping_errors / plain.damping_errors == pytest.approx([1.0], abs=0.25)
+
+
 @pytest.mark.parametrize("pick", [True, False])
 @pytest.mark.parametrize(
     ("change", "text"),
