@@ -24,7 +24,9 @@ MOST_CHANNELS = 256  # [-] of a file; an array with more rows holds something el
 RATE_NAMES = ("rate", "fs", "sampling_rate", "samplerate", "sample_rate", "sampling_frequency", "frequency")
 STEP_NAMES = ("dt", "delta_x", "delta_t", "tsample", "sampling_interval")
 TIME_NAMES = ("time", "t", "times", "x_value", "zeit", "time_s")
-TIME_UNITS = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "µs": 1e-6, "ns": 1e-9, "min": 60.0, "h": 3600.0}
+TIME_UNITS = {
+    "s": 1.0, "sec": 1.0, "ms": 1e-3, "msec": 1e-3, "us": 1e-6, "µs": 1e-6, "ns": 1e-9, "min": 60.0, "h": 3600.0,
+}  # fmt: skip
 UFF_UNITS = {13: "N", 9: "N", 12: "m/s^2", 11: "m/s", 8: "m"}  # codes of quantities in data set 58
 TIME_RESPONSE, FREQUENCY_RESPONSE, COHERENCE = 1, 4, 6  # function types of data set 58
 UFF_TYPES = {  # function types of data set 58 -> what it holds
@@ -159,11 +161,19 @@ def labview(path: Path) -> Recording:
         first = first or (channel, unit)
         segments.append(values)
         rates += _labview_rates([cell for cell in head.get("Delta_X") or [] if cell], time, path)
+        begun = [float(cell.replace(",", ".")) for cell in head.get("X0") or [] if _number(cell, True)]
+        _refuse_apart(path, begun, rates[-1] if rates else np.inf)
     if first is None:
         raise ValueError(f"{path.name} holds a header but no samples")
     if rates and not np.allclose(rates, rates[0], rtol=1e-6):
         raise ValueError(f"{path.name} has channels of different rates, {min(rates):g} and {max(rates):g} Hz")
     return Recording(tuple(segments), *first, _round_rate(rates[0]) if rates else None, tuple(dict.fromkeys(notes)))
+
+
+def _refuse_apart(path: Path, begun: list[float], rate: float) -> None:
+    """ValueError if channels begin at different times [s], by a tenth of a sample or more."""
+    if begun and rate * np.ptp(begun) > 0.1:
+        raise ValueError(f"{path.name} has channels that begin {np.ptp(begun):.3g} s apart; export all from one on")
 
 
 def _labview_rates(steps: list[str], time: np.ndarray | None, path: Path) -> list[float]:
@@ -473,7 +483,7 @@ def universal(path: Path) -> Recording:
     instead = "; export those, or give the path of frequency responses to fi.frf"
     factors = universal_files.factors(file.sets(164))
     channels: dict[tuple[Any, ...], list[np.ndarray]] = {}
-    rates, unit, notes = [], {}, []
+    rates, unit, notes, begun = [], {}, [], dict[tuple[Any, ...], list[float]]()
     for one in file.of_type(TIME_RESPONSE, "time records", instead):
         data = np.real(np.asarray(one["data"])).astype(float)
         code = int(one.get("ordinate_spec_data_type", 0))
@@ -487,7 +497,11 @@ def universal(path: Path) -> Recording:
             notes.append(f"{key[0]}: brought to {kind} by data set 164")
         unit[key] = stated if known or not kind else kind
         channels.setdefault(key, []).append(data)
-        second = TIME_UNITS.get(str(one.get("abscissa_axis_units_lab") or "").strip(), 1.0)
+        label = str(one.get("abscissa_axis_units_lab") or "").strip()
+        second = TIME_UNITS.get(label.casefold(), 1.0)
+        if label.casefold() not in ("", "none", *TIME_UNITS):
+            notes.append(f"{key[0]}: the unit {label!r} of its times is not known, s assumed")
+        begun.setdefault(key, []).append(second * float(one.get("abscissa_min") or 0.0))
         step = second * float(one.get("abscissa_inc") or 0.0)
         rates.append(1.0 / step if step > 0.0 else _rate(path, second * np.asarray(one["x"], float)))
     if not np.allclose(rates, rates[0], rtol=1e-6):
@@ -495,12 +509,22 @@ def universal(path: Path) -> Recording:
     count = min(len(records) for records in channels.values())
     if any(len(records) > count for records in channels.values()):
         notes.append(f"only {count} records of each channel were used, as many as all have")
-    length = [min(len(records[i]) for records in channels.values()) for i in range(count)]
-    segments = tuple(np.column_stack([records[i][: length[i]] for records in channels.values()]) for i in range(count))
+    # signs of the directions, 0 if not stated
+    pushed = {np.sign(key[2]) for key in channels if (units.si_unit(unit[key]) or "")[:1] == ("N",)}
+    turned = [key for key in channels if pushed == {-np.sign(key[2])} != {0}]
+    notes += [f"{name}: turned around, as it counts against the direction of the force" for name, *_ in turned]
+    segments = []
+    for i in range(count):
+        _refuse_apart(path, [each[i] for each in begun.values()], rates[0])
+        rows = [-records[i] if key in turned else records[i] for key, records in channels.items()]
+        least, most = min(map(len, rows)), max(map(len, rows))
+        notes += [f"channels of {least} to {most} samples were cut to the shortest"] if least < most else []
+        segments.append(np.column_stack([row[:least] for row in rows]))
     names = [name for name, *_ in channels]
     names = [f"{name} ({unit[key]})" if names.count(name) > 1 else name for name, key in zip(names, channels)]
+    notes = list(dict.fromkeys(notes))
     return Recording(
-        segments, tuple(names), tuple(unit[key] for key in channels), _round_rate(rates[0]), tuple(dict.fromkeys(notes))
+        tuple(segments), tuple(names), tuple(unit[key] for key in channels), _round_rate(rates[0]), tuple(notes)
     )
 
 

@@ -331,7 +331,7 @@ def arrays(path: Path) -> dict[str, np.ndarray]:
     file = readers.Universal(path)
     factors = universal_files.factors(file.sets(164))
     sets = file.of_type(readers.FREQUENCY_RESPONSE, "frequency responses")
-    frequency = np.asarray(sets[0]["x"], float)
+    frequency = np.zeros(0)
     names: list[str] = []
     units: list[str] = []
     columns: list[np.ndarray] = []
@@ -342,9 +342,11 @@ def arrays(path: Path) -> dict[str, np.ndarray]:
             raise ValueError(f"{path.name} has magnitudes only of {name!r}; export complex responses")
         if int(one.get("abscissa_spec_data_type") or 0) not in (0, 18):  # not stated, or frequency
             raise ValueError(f"{path.name} has a response {name!r} over something else than frequency; export it again")
-        x = np.asarray(one["x"], float)
+        hertz, said = _hertz(name, str(one.get("abscissa_axis_units_lab") or "").strip())
+        x, notes = hertz * np.asarray(one["x"], float), notes + said
         if not (len(x) and x[0] >= 0.0 and (np.diff(x) > 0.0).all() and x[-1] <= check.REACH):
             raise ValueError(f"{path.name} has frequencies of {name!r} that do not ascend from zero; export it again")
+        frequency = frequency if names else x
         if len(x) != len(frequency) or not np.allclose(x, frequency, rtol=1e-5, atol=0.0):
             raise ValueError(f"{path.name} has responses at other frequencies for {name!r} than for {names[0]!r}")
         unit, factor, note = _per_force(path, name, one, factors)
@@ -369,6 +371,13 @@ def arrays(path: Path) -> dict[str, np.ndarray]:
     if not (np.abs(found["H"]) <= check.REACH).all():
         raise ValueError(f"{path.name} holds values that are no finite numbers; export it again")
     return found
+
+
+def _hertz(name: str, label: str) -> tuple[float, list[str]]:
+    """The factor to Hz of a unit in data set 58, and a note if it is not known."""
+    known = {"": 1.0, "none": 1.0, "hz": 1.0, "khz": 1e3, "rad/s": 0.5 / np.pi, "rpm": 1.0 / 60.0}
+    factor = known.get(label.casefold())
+    return factor or 1.0, [f"{name}: the unit {label!r} of its frequencies is not known, Hz assumed"] * (factor is None)
 
 
 def _per_force(path: Path, name: str, one: dict[str, Any], factors: dict[str, float]) -> tuple[str, float, list[str]]:

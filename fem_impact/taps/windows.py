@@ -18,6 +18,7 @@ def join_tables(taps: Any, name: str = "taps") -> Taps:
     if isinstance(taps, Taps):
         return taps
     several = check.tuple_of(name, taps, Taps)
+    several = tuple(_in_order(each, several[0].table["channel"].values.tolist()) for each in several)
     n_times = min(len(each.time) for each in several)
     for each in several:
         same_rate(each, several[0])
@@ -36,6 +37,17 @@ def join_tables(taps: Any, name: str = "taps") -> Taps:
     )
     pulse = np.concatenate([each.table["pulse"].values for each in several])
     return Taps(joined.table.assign(pulse=("tap", pulse)), joined.notes)
+
+
+def _in_order(taps: Taps, names: list[str]) -> Taps:
+    """The taps with their responses in the order of some names; ValueError if they have others."""
+    own = taps.table["channel"].values.tolist()
+    if own == names:
+        return taps
+    if sorted(own) != sorted(names) or len(set(names)) < len(names):
+        raise ValueError(f"taps must have the same responses, got {', '.join(own)} and {', '.join(names)}")
+    order = [own.index(name) for name in names]
+    return Taps(taps.table.isel(channel=order, sensor=[0, *(k + 1 for k in order)]), taps.notes)
 
 
 def level_offsets(taps: Taps) -> Taps:

@@ -96,6 +96,16 @@ def test_units_of_a_response_are_followed_or_told(written, over, under, factor, 
     assert any("is not known" in note for note in found["notes"].tolist()) == told
 
 
+@pytest.mark.parametrize(("label", "factor", "told"), [
+    ("Hz", 1.0, False), ("kHz", 1e3, False), ("rad/s", 0.5 / np.pi, False), ("RPM", 1.0 / 60.0, False),
+    ("bananas", 1.0, True),
+])  # fmt: skip
+def test_units_of_the_frequencies_are_followed_or_told(written, label, factor, told):
+    found = transfer.arrays(written(response(1, abscissa_axis_units_lab=label)))
+    assert np.allclose(found["frequency"], factor * X, rtol=1e-6)
+    assert any("of its frequencies is not known" in note for note in found["notes"].tolist()) == told
+
+
 def test_without_a_code_of_the_denominator_force_is_assumed_and_told(written):
     found = transfer.arrays(written(response(1, orddenom_spec_data_type=0)))
     assert found["notes"].tolist() == ["point 1: what it is divided by is not stated, N assumed"]

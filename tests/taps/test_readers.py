@@ -296,6 +296,37 @@ def test_universal_files_in_other_units_or_with_unknown_ones(tmp_path):
     assert "'bananas' is not known" in notes
 
 
+def test_directions_times_and_lengths_of_a_universal_file_are_heeded(tmp_path):
+    """A sensor against the hammer moved the other way, and one that began later moved too early, without a word."""
+    path = tmp_path / "t.uff"
+    *_, notes, values = recording(universal(path, {"id1": "force"}, MOVES | {"id1": "a", "rsp_dir": -3}))
+    assert (
+        values[10].tolist() == [10.0, -20.0]
+        and notes == "a: turned around, as it counts against the direction of the force"
+    )
+    for force, moves in ((-3, -3), (0, -3), (-3, 0)):
+        assert recording(universal(path, {"rsp_dir": force}, MOVES | {"rsp_dir": moves}))[3][10].tolist() == [
+            10.0,
+            20.0,
+        ]
+    late = MOVES | {"x": RECORD["x"] + 3.0 / RATE, "abscissa_min": 3.0 / RATE}
+    with pytest.raises(ValueError, match=r"channels that begin .* s apart; export all"):
+        readers.arrays(universal(path, {}, late))
+    short = MOVES | {"x": RECORD["x"][:30], "data": MOVES["data"][:30], "num_pts": 30}
+    assert "channels of 30 to 40 samples were cut to the shortest" in recording(universal(path, {}, short))[2]
+    fast, slow = ({"abscissa_axis_units_lab": unit} for unit in ("msec", "bananas"))
+    assert recording(universal(path, fast, MOVES | fast))[1] == 1e3 * RATE
+    assert (
+        "the unit 'bananas' of its times is not known, s assumed" in recording(universal(path, slow, MOVES | slow))[2]
+    )
+
+
+def test_channels_of_a_labview_file_begin_together(tmp_path):
+    (tmp_path / "t.lvm").write_bytes(labview(seg="X0\t0,0\t0,002"))
+    with pytest.raises(ValueError, match=r"channels that begin 0\.002 s apart"):
+        readers.arrays(tmp_path / "t.lvm")
+
+
 @UNCLOSED
 @pytest.mark.parametrize(
     ("change", "spoil", "said"),

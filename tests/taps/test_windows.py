@@ -36,6 +36,20 @@ def test_joined_taps_keep_their_labels_and_what_counts_as_a_pulse():
     assert windows.join_tables([blind, blind]).labels == ("tap 1", "tap 2")
 
 
+def test_responses_are_joined_by_their_names_whatever_their_order():
+    rows, moved = np.pad(PULSE, 60), np.arange(2.0) + np.ones((len(PULSE) + 120, 1))
+    first, second = (
+        fi.Taps.from_arrays(rows, moved[None][..., way], rate=25600.0, names=[f"a{k}" for k in way],
+                            overload=[[False, way[0] == 0, way[1] == 0]])
+        for way in ([0, 1], [1, 0])
+    )  # fmt: skip
+    both = windows.join_tables([first, second])
+    assert (both.response == [1.0, 2.0]).all() and both.table["overload"].values.tolist() == 2 * [[False, True, False]]
+    other = fi.Taps.from_arrays(rows, moved[None], rate=25600.0, names=["a0", "a2"])
+    with pytest.raises(ValueError, match="the same responses, got a0, a2 and a0, a1"):
+        windows.join_tables([first, other])
+
+
 def test_all_onsets_come_to_the_same_place():
     cut = windows.cut_to_window(windows.join_tables([tap(50), tap(83)]), None)
     assert np.array_equal(cut.force[0], cut.force[1])
