@@ -36,6 +36,7 @@ class Picked(NamedTuple):
     left: float  # [-] root mean square that they leave of the responses, each frequency by its weight
     frequency_errors: np.ndarray  # (n_modes,) [Hz] standard errors
     damping_errors: np.ndarray  # (n_modes,) [-] the same
+    alike: float  # [-] neighbouring lines that say the same, for which all errors are widened by its root
 
 
 def peaks(size: np.ndarray) -> np.ndarray:
@@ -127,7 +128,7 @@ def pick(name: str, found: Any, about: Any = None) -> Picked:
     misfit = _misfit(omega, np.exp(poles), basis[:, :n], constants[:n], rest)
     whole = natural / (2.0 * np.pi), damping, constants[:n].T, spread[:n].T, misfit, *doubt
     kept = [each[..., inside] for each in whole]
-    return Picked(kept[0], kept[1], kept[2], kept[3], kept[4], left, kept[5], kept[6])
+    return Picked(kept[0], kept[1], kept[2], kept[3], kept[4], left, kept[5], kept[6], wide)
 
 
 def _alike(rest: np.ndarray) -> float:
@@ -323,9 +324,11 @@ def modes_of(found: Any, driving: Any, points: Any, about: Any) -> tuple[dict[st
     drive, used, sign, end = find_driving_point(found, driving)
     products = sign[:, None] * picked.products[used]
     own, doubt = products[used.index(drive)], picked.errors[drive]
-    moved = own > 3.0 * doubt  # standard errors
+    moved = own * picked.alike**0.5 > 3.0 * doubt  # standard errors of noise alone: others count as errors of shapes
     check_driving(found, drive, own, moved)
-    notes = [f"picked from frequency responses, of which {100.0 * picked.left:.2g} % rms are left unexplained"]
+    rest = f"of which {100.0 * picked.left:.2g} % rms are left unexplained"
+    rest += "; check their units, signs and delays" * (picked.left > 0.5)  # sharing nothing makes it 1
+    notes = [f"picked from frequency responses, {rest}"]
     if not moved.all():
         lost = ", ".join(f"{one:.5g} Hz" for one in picked.frequencies[~moved])
         notes.append(f"modes at {lost} are left out: the point struck hardly moves in them, so that they have no scale")

@@ -199,6 +199,22 @@ def test_modes_beyond_the_band_change_none_within_it_by_more_than_the_errors_sta
     assert np.mean(np.abs(over) < 1.645) > 0.7  # 0.85 of more bodies; it was 0.2
 
 
+def test_responses_that_modes_do_not_explain_are_told_and_keep_their_modes():
+    """A force that comes 0.2 ms late turns all phases: errors grow, but no mode is lost for it."""
+    natural = np.array([60.0, 180.0, 333.0, 520.0, 700.0])
+    shapes = np.random.default_rng(7).uniform(0.5, 1.5, (5, 3))
+    modes = list(zip(natural, np.full(5, 0.01), shapes))
+    given = of_sum(modes, np.arange(1.0, 801.0), np.random.default_rng(1), 1e-3)
+    late = given.assign(H=given["H"] * np.exp(-2j * np.pi * 2e-4 * given["frequency"]))
+    known = {"mass": 1.0, "points": [[0.0], [0.4], [1.0]], "driving": 0}
+    true, found = fi.Modes.from_frf(given, **known), fi.Modes.from_frf(late, **known)
+    assert found.frequencies == pytest.approx(natural, rel=0.03)
+    assert any(note.endswith("left unexplained; check their units, signs and delays") for note in found.notes)
+    assert not any("check their units" in note for note in true.notes)
+    errors, before = picked.pick("frf", late).frequency_errors, picked.pick("frf", given).frequency_errors
+    assert (errors > 100.0 * before).all()
+
+
 def test_lines_that_say_the_same_count_once():
     """A spectrum padded to four times its length has no more to say: errors were half as large."""
     rng, rate, n = np.random.default_rng(5), 2048.0, 2048
