@@ -3,6 +3,7 @@
 import os
 import re
 
+import numpy as np
 import pytest
 from scenes import QUICK, SMALL
 
@@ -74,6 +75,13 @@ def test_checked_numbers_are_floats_whatever_was_given():
     for thing in made:
         assert all(type(value) is float for value in vars(thing).values() if value not in (None, ()))
     assert type(fi.Plate(made[0], 1).thickness) is float
+
+
+def test_masked_numbers_are_not_what_is_under_the_mask():
+    samples = np.ma.masked_greater(np.arange(100.0), 98.0)
+    with pytest.raises(ValueError, match="force must be finite, got nan at index 0, 99"):
+        fi.Taps.from_arrays(samples, rate=1e3)
+    assert fi.Taps.from_arrays(np.ma.masked_greater(np.arange(100.0), 99.0), rate=1e3).peak == 99.0
 
 
 @pytest.mark.parametrize(

@@ -316,7 +316,7 @@ def numbers(name: str, value: Any, unit: str = "") -> np.ndarray:
     try:
         raw = np.asarray(value)
         if raw.dtype.kind in "iufO":
-            return np.array(raw, dtype=float)
+            return np.where(np.ma.getmask(value), np.nan, np.array(raw, dtype=float))  # masked: not known
     except (TypeError, ValueError, OverflowError):
         pass
     raise ValueError(f"{name} must be numbers{f' in {unit}' if unit else ''}, got {shown(value)}")

@@ -209,7 +209,10 @@ class _Modes(NamedTuple):
 def _fit(omega: np.ndarray, data: np.ndarray, weight: np.ndarray, start: np.ndarray, steps: int = 60) -> _Modes:
     """The modes near poles (2, n_modes); those whose pole runs away are none."""
     poles, ran = start, np.ones(start.shape[1], bool)
-    while ran.any() and len(data) > 4 * poles.shape[1] + 4:
+    while ran.any():
+        if len(data) <= 4 * poles.shape[1] + 4:  # too few lines for any
+            poles = poles[:, :0]
+            break
         poles, ran = _refined(omega, data, weight, poles, steps)
         poles = poles[:, ~ran]
     basis = _basis(omega, weight, poles)[0]

@@ -133,8 +133,9 @@ def write_responses(
         poles = [list(map(_within, *each)) for each in zip(values.T.tolist(), (NINETY * errors).T.tolist())]
     write_page(
         path, "frf.html", scripts=("shapes.js",), title=title, trouble=trouble, pictures=pictures,
+        unexplained=f"{100.0 * modes.left:.2g} % rms" if modes is not None and modes.left > 0.5 else "",
         channels=names[:shown], n_channels=len(names), double=double,
-        taps=rows, notes=lines_of_notes(() if taps is None else taps.notes),
+        taps=rows, notes=lines_of_notes((*(() if taps is None else taps.notes), *found.attrs.get("notes", ()))),
         poles=poles, pairs=compared.get("pairs", []),
         moving=_moving(modes, place) if modes is not None and place is not None and len(names) > 1 else "",
         tiles=[

@@ -64,7 +64,8 @@ def frf(
         (what all taps share, such as a record that ends too early, is not in it; NaN if the noise is not known);
         ``force`` (frequency), the mean amplitude spectrum [N s], and ``force_error`` (frequency), the part of the
         relative error that is noise of the force, which a force window makes alike in neighbouring lines; attributes
-        ``averages``, ``method``, ``rate`` and ``notes`` (of taps of which a channel is cut off or dead). Of a file
+        ``averages``, ``method``, ``rate`` and ``notes`` (of taps of which a channel is cut off or dead, and of
+        windows that cut off more). Of a file
         ``H``, and ``coherence`` if it holds one for each; of each channel ``node`` and ``direction``, ``reference`` and
         ``reference_direction`` (where it is struck), and, if the file has nodes, ``place`` and ``struck`` (channel,
         axis) [m]; attribute ``notes``. `fi.Modes.from_frf`, `fi.update` and `fi.matched` take it.
@@ -95,13 +96,16 @@ def frf(
         return read_frf(check.path("records", records))
     check.one_of("method", method, METHODS)
     taps, notes = _whole_taps(join_tables(records, "records"))
-    # (n_taps, n_times), of the force
-    shade = 1.0 if force_window is None else _force_window(taps, check.positive("force_window", force_window, "s"))
-    fade = np.ones(taps.force.shape)
+    shade, fade = np.ones((taps.n_taps, 1)), np.ones(taps.force.shape)
     if response_window is not None:
         tau = check.positive("response_window", response_window, "s")
         fade = np.exp(-np.maximum(taps.time - taps.onset[:, None], 0.0) / tau)
     count = len(taps.time) if n_times is None else check.count("n_times", n_times, low=2, high=2**24)
+    if count < len(taps.time):
+        notes.append(f"only the first {count} of {len(taps.time)} samples are used")
+    if force_window is not None:
+        shade = _force_window(taps, check.positive("force_window", force_window, "s"))
+        notes += _lost(taps, shade)
     windows = shade * fade, fade
     F, X = (
         np.fft.rfft(rows * window[:, :, None], count, axis=1) / taps.rate  # (n_taps, n_frequencies, 1 or n_channels)
@@ -174,6 +178,18 @@ def _force_window(taps: Taps, length: float) -> np.ndarray:
             fall = np.clip((x - 0.75) / 0.25, 0.0, 1.0)  # its last quarter falls as a cosine: it ends smoothly
             np.maximum(row, np.where(x < -0.1, 0.0, 0.5 + 0.5 * np.cos(np.pi * fall)), out=row)
     return found
+
+
+def _lost(taps: Taps, shade: np.ndarray) -> list[str]:
+    """A note if a window of the force (n_taps, n_times) cuts off more than a hundredth of the pulses of a tap."""
+    inside = np.zeros(taps.force.shape)
+    for row, pulses in zip(inside, taps.pulses):
+        for first, end in pulses:
+            row[first:end] = 1.0
+    lost = 1.0 - (shade * inside * taps.force).sum(axis=1) / np.maximum((inside * taps.force).sum(axis=1), 1e-300)
+    if lost.max() <= 0.01 or not inside.any():
+        return []
+    return [f"force_window cuts off up to {100.0 * lost.max():.2g} % of the force of a tap; make it longer"]
 
 
 def _rest(taps: Taps) -> np.ndarray:

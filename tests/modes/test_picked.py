@@ -215,6 +215,13 @@ def test_responses_that_modes_do_not_explain_are_told_and_keep_their_modes():
     assert (errors > 100.0 * before).all()
 
 
+def test_too_few_lines_have_no_modes():
+    given = responses()
+    for few in ([100], range(99, 102)):
+        with pytest.raises(ValueError, match="frf has no peaks that are modes"):
+            fi.Modes.from_frf(given.isel(frequency=few), mass=0.188, points=POINTS, driving=0, frequencies=[100.0])
+
+
 def test_lines_that_say_the_same_count_once():
     """A spectrum padded to four times its length has no more to say: errors were half as large."""
     rng, rate, n = np.random.default_rng(5), 2048.0, 2048

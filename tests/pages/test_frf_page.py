@@ -5,6 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import xarray as xr
 from scenes import SHIPPED
 
 import fem_impact as fi
@@ -52,6 +53,21 @@ def test_without_points_nothing_moves_and_without_peaks_it_says_so(taps, tmp_pat
     flat = found.assign(H=found.H * 0.0 + 1.0)
     frf_page.write_responses(tmp_path / "b.html", flat)
     assert "No modes were picked: found has no peaks that are modes" in (tmp_path / "b.html").read_text()
+
+
+def test_the_page_tells_notes_of_its_responses_and_what_modes_leave(tmp_path, monkeypatch):
+    """It said in green how many modes were picked, whatever they left, and no word of taps left out of the average."""
+    shown = {}
+    monkeypatch.setattr(frf_page, "write_page", lambda *_, **what: shown.update(what))
+    monkeypatch.setattr(frf_page, "_pictures", lambda *_: {})
+    f = np.arange(1.0, 400.0)
+    H = 1.0 / (1.0 - (100.0 / f) ** 2 - 2j * 100.0 / f * 0.01)
+    late = H * np.exp(-2j * np.pi * f * 1e-3)
+    for each, left in ((H, False), (late, True)):
+        coords = {"frequency": f, "channel": ["a"], "units": ("channel", ["m/s^2/N"])}
+        found = xr.Dataset({"H": (("frequency", "channel"), each[:, None])}, coords, {"notes": ["left out: tap 3"]})
+        frf_page.write_responses(tmp_path / "a.html", found)
+        assert shown["notes"] == ["Note: left out: tap 3"] and bool(shown["unexplained"]) == left
 
 
 def test_points_are_joined_in_triangles_or_along_a_line():

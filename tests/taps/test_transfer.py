@@ -149,6 +149,16 @@ def test_the_window_of_the_force_keeps_every_pulse():
     assert np.linalg.norm(*in_band(windowed, "H") - EXACT) < 1e-2 * np.linalg.norm(EXACT)
 
 
+def test_what_windows_and_short_transforms_cut_off_is_told():
+    """A window of a tenth of the pulse left no more of H than of the force, and its error did not tell."""
+    taps = taps_of(0.0)
+    length = 0.5 * float(taps[0].impulse[0] / taps[0].peak[0])  # less than half of the pulse
+    (said,) = fi.frf(taps, force_window=length).attrs["notes"]
+    assert said.startswith("force_window cuts off up to") and said.endswith("% of the force of a tap; make it longer")
+    assert not fi.frf(taps, force_window=20.0 * length, n_times=40000).attrs["notes"]
+    assert fi.frf(taps, n_times=5000).attrs["notes"] == ["only the first 5000 of 10240 samples are used"]
+
+
 def test_the_error_of_one_tap_is_not_known_without_a_rest_before_it():
     taps = records(double=True, noise=(0.0, 0.01)).between(9.6e-3, 0.5)
     assert np.isnan(fi.frf(taps.pick(0)).error.values).all() and np.isfinite(fi.frf(taps).error.values).all()
