@@ -54,7 +54,8 @@ class Taps(check.Brief):
         names, units : sequence of str, optional
             Of the responses; by default accelerations in m/s^2.
         overload : array_like of bool, (n_taps, 1 + n_channels), optional
-            Of the force and the responses; by default, a channel with three equal largest samples in a row is cut off.
+            Of the force and the responses; by default, a channel with three equal largest samples in a row is cut off,
+            and a force whose top is flat within its noise.
         labels : sequence of str, optional
             Of the taps; by default "tap 1" and so on.
         pulse : float [N], optional
@@ -248,7 +249,9 @@ def _cut_off(force: np.ndarray, response: np.ndarray, stated: Any) -> np.ndarray
     """Whether the channels (n_taps, n_times[, n_channels]) are, as ``stated`` or as they look, (n_taps, n_sensors)."""
     if stated is None:
         records = np.concatenate([force[:, :, None], response], axis=2)
-        return np.array([[triggers.is_clipped(channel) for channel in record.T] for record in records])
+        found = np.array([[triggers.is_clipped(channel) for channel in record.T] for record in records])
+        found[:, 0] |= [triggers.is_saturated(row) for row in force]
+        return found
     shape, flags = (len(force), 1 + response.shape[2]), np.asarray(None)
     with suppress(ValueError):  # rows of several lengths
         flags = np.asarray(stated)
@@ -340,8 +343,8 @@ def read_taps(
             "needed; check the unit of its times, rate, before and length"
         )
     cut = [
-        [bool(top) or triggers.is_clipped(row, full_scale), *(triggers.is_clipped(column) for column in other.T)]
-        for row, other, top in zip(rows, responses, full)
+        [top or triggers.is_clipped(row, full_scale) or triggers.is_saturated(row), *map(triggers.is_clipped, other.T)]
+        for row, other, top in zip(rows, responses, full.tolist())
     ]
     taps = Taps.from_arrays(
         rows, responses, rate=stated, names=names, units=kinds, overload=cut, labels=labels, pulse=pulse

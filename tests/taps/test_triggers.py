@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+import fem_impact as fi
 from fem_impact.taps import triggers
 
 
@@ -80,6 +81,19 @@ def test_a_flat_top_is_clipping_and_a_round_one_is_not():
     assert not triggers.is_clipped(pulse) and not triggers.is_clipped(np.zeros(9))
     assert triggers.is_clipped(np.minimum(pulse, 0.9)) and triggers.is_clipped(-np.minimum(pulse, 0.9))
     assert triggers.is_clipped(pulse, full_scale=1.0)
+
+
+def test_a_force_cut_off_before_its_noise_is_told(tmp_path):
+    """Cut to 0.6 of its peak, it told responses 1.4 times as large, with a coherence of 0.95 and without a word."""
+    rng = np.random.default_rng(0)
+    pulses = 100.0 * np.array([np.pad(half_sine(n), (200, 800 - n)) for n in (20, 31, 60)])
+    noise = 0.05 * rng.standard_normal((3, 1000))
+    for force, cut in ((pulses, False), (np.minimum(pulses, 60.0), True), (np.minimum(pulses, 97.0), None)):
+        taps = fi.Taps.from_arrays(force + noise, rate=25600.0)
+        assert cut is None or (taps.overload == cut).all()
+        taps.save(tmp_path / "t.npz")
+        assert (fi.read_taps(tmp_path / "t.npz").overload == taps.overload).all()
+    assert not any(triggers.is_saturated(row) for row in (0.0 * pulses[0], np.ones(1000), pulses[0][190:]))
 
 
 @pytest.mark.parametrize("bits", [8, 12, 16])
