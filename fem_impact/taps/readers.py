@@ -355,8 +355,9 @@ def _rate(path: Path, time: np.ndarray) -> float:
     """The rate [Hz] of evenly spaced times; rounding of the written digits is allowed."""
     if len(time) < 2 or not np.isfinite(time).all() or time[-1] <= time[0]:
         raise ValueError(f"{path.name} has times that do not ascend; give the channels without them, and rate=")
-    step = (time[-1] - time[0]) / (len(time) - 1)
-    away = np.abs(time - time[0] - step * np.arange(len(time)))
+    place = np.arange(len(time)) - 0.5 * (len(time) - 1)
+    step = float(place @ time / (place @ place))  # the ends alone may both be rounded
+    away = np.abs(time - time.mean() - step * place)
     spread = float(np.ptp(np.diff(time)))  # times written with few digits differ by one unit of the last
     # a gap is a whole step; rounded times may be 0.3 off an even grid, others 0.02
     if away.max() > np.clip(0.6 * spread / step, 0.02, 0.3) * step:

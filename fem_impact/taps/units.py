@@ -41,6 +41,7 @@ def is_unit(text: str) -> bool:
 
 def label(text: str) -> tuple[str, str]:
     """Name and unit of a heading such as "Force [N]"; what holds no unit, or is one word as "acc_g", is the name."""
+    text = text.replace("μ", "µ")  # the letter and the sign
     found = LABEL.match(text.strip())
     if found and is_unit(found[2].strip()) and not is_unit(text):
         return found[1].rstrip(" /"), found[2].strip()

@@ -321,6 +321,15 @@ def test_directions_times_and_lengths_of_a_universal_file_are_heeded(tmp_path):
     )
 
 
+@pytest.mark.parametrize("digits", [4, 5])
+def test_times_of_few_digits_in_microseconds_are_even(tmp_path, digits):
+    """Rounding moved the last time, which set the step, as well as those compared with it."""
+    n = 1000 if digits == 4 else 10000
+    rows = "".join(f"{1e6 * k / 12800.0:.{digits}g},{k % 7}\n" for k in range(n))
+    (tmp_path / "t.csv").write_text("Time [\u03bcs],Force [N]\n" + rows, encoding="utf-8")
+    assert readers.read(tmp_path / "t.csv").rate == pytest.approx(12800.0, rel=1e-3)
+
+
 def test_channels_of_a_labview_file_begin_together(tmp_path):
     (tmp_path / "t.lvm").write_bytes(labview(seg="X0\t0,0\t0,002"))
     with pytest.raises(ValueError, match=r"channels that begin 0\.002 s apart"):
