@@ -111,10 +111,11 @@ class Vectors(Description):
         """The same, and its vectors; modes, if the point struck is at rest, where no vector can start."""
         asked, ritz, at = self.asked, self.ritz, self.asked.values["at"]
         if ritz is None:
-            wanted, how = (0.5 / asked.duration, asked.budget.total), (self.elements, asked.meshed, stages)
+            wanted = 0.5 / asked.duration, asked.budget.total
             damping = 0.0 if asked.estimates is None else asked.damped_by(asked.estimates.mobility)
             shift = vectors.shift_for(*wanted, damping if np.isfinite(damping) else 0.0)
-            ritz = vectors.RitzTarget(asked.blow.target, at, *wanted, *how, shift, self.forecast.n_modes)
+            how = *wanted, self.elements, asked.meshed, stages, shift, self.forecast.n_modes
+            ritz = vectors.RitzTarget(asked.blow.target, at, *how)
         if ritz.at_rest:
             return Modal.of(asked, stages).found(stages, keep)
 
