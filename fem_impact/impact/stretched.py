@@ -44,19 +44,26 @@ class Stretched(check.Locked):
         return float(energies_of_stretching(self.kernel, np.array(q, float)[None])[0])
 
     def states(self, history: Any, times: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Modal displacements and velocities (n_times, n_all) of a `History` at ascending times."""
-        states = np.empty((2, len(times), len(history.omega)))
-        if not len(times):
-            return states[0], states[1]
-        begin = history.reached.get("last", (np.inf,))
-        if times[0] < begin[0]:
-            begin = 0.0, 0, np.zeros(self.forms.shape[1]), history.start_q, history.start_p
-        for array in begin[2:]:
-            array.setflags(write=False)  # as the others; numba would compile the kernel again for writable ones
-        system = history.system._replace(q=begin[3], p=begin[4])
-        how = self.kernel, history.steps, int(self.ramp), self.base, begin[:3]
-        failed, *begin = replay_stretched(system, *how, np.array(times, float), states)
-        history.reached["last"] = tuple(begin)
-        if failed:
-            raise SimulationError(f"the stretching of the motion did not settle at {begin[0]:.4g} s in any step")
+        """Modal displacements and velocities (n_times, n_all) of a `History` at ascending times.
+
+        Goes on from the first or the last of the times before, as blocks of them may overlap.
+        """
+        start = 0.0, 0, np.zeros(self.forms.shape[1]), history.start_q, history.start_p
+        found, times = [np.empty((2, 0, len(history.omega)))], np.array(times, float)
+        for name, part in (("first", times[:1]), ("last", times[1:])):
+            if not len(part):
+                continue
+            known = [each for each in history.reached.values() if each[0] <= part[0]]
+            begin = max(known, key=lambda each: each[0], default=start)
+            for array in begin[2:]:
+                array.setflags(write=False)  # as the others; numba would compile the kernel again for writable ones
+            system = history.system._replace(q=begin[3], p=begin[4])
+            states = np.empty((2, len(part), len(history.omega)))
+            how = self.kernel, history.steps, int(self.ramp), self.base, begin[:3]
+            failed, *begin = replay_stretched(system, *how, part, states)
+            history.reached[name] = tuple(begin)
+            if failed:
+                raise SimulationError(f"the stretching of the motion did not settle at {begin[0]:.4g} s in any step")
+            found.append(states)
+        states = np.concatenate(found, axis=1)
         return states[0], states[1]

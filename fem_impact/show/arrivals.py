@@ -6,6 +6,7 @@ import numpy as np
 from scipy.fft import irfft, next_fast_len, rfft
 from scipy.sparse import csr_array
 
+from .._base import progress
 from ..impact import force_spectrum, free_motion
 from ..impact.compiled import layout
 from ..impact.response import Response
@@ -102,6 +103,7 @@ def _arrival(
     size = next_fast_len(OVERSAMPLING * min(BLOCK, len(times) - silent) + n_lags, real=True)
     spectra = rfft(heard @ shapes, size, axis=0)
     for start in range(silent, len(times), BLOCK):
+        progress.report("samples of sound", start, len(times))
         part = slice(start, start + BLOCK)
         # instants whose sound arrives in this block, with one more on each side for every difference
         n, room = OVERSAMPLING * (len(times[part]) - 1) + n_lags, order - 1

@@ -12,7 +12,7 @@ from scipy.special import ellipk
 from warming import locked
 
 import fem_impact as fi
-from fem_impact.impact import engine
+from fem_impact.impact import engine, stretched
 from fem_impact.impact.compiled import record
 from fem_impact.impact.compiled.bundles import KernelSystem, Limits
 from fem_impact.impact.compiled.energy import run_energy
@@ -39,6 +39,18 @@ def duffing(omega, cubic, amplitude):
     """Angular frequency of ``q'' + omega**2 q + cubic q**3 = 0`` (Abramowitz and Stegun, 17.3)."""
     stiff = omega**2 + cubic * amplitude**2
     return 0.5 * np.pi * np.sqrt(stiff) / ellipk(0.5 * cubic * amplitude**2 / stiff)
+
+
+def test_overlapping_blocks_of_the_motion_go_on_from_the_block_before(monkeypatch):
+    """As those of a sound do that arrives over several ways; each began again with the blow."""
+    hit, begun, replay = blow(plate(4), fi.Contact.linear(1e5), duration=0.05), [], stretched.replay_stretched
+    watched = lambda *those: begun.append(those[5][0]) or replay(*those)  # noqa: E731
+    monkeypatch.setattr(stretched, "replay_stretched", watched)
+    whole = np.linspace(0.0, 0.04, 401)
+    blocks = [np.array(hit.modal_state(whole[i : i + 150])) for i in range(0, 300, 100)]
+    assert begun[-2:] == pytest.approx([whole[100], whole[200]], abs=1e-3)
+    for i, block in enumerate(blocks):
+        np.testing.assert_allclose(block, np.array(hit.modal_state(whole))[:, 100 * i : 100 * i + 150], rtol=1e-9)
 
 
 @pytest.mark.parametrize("speed", [0.3, 1.0, 3.0])
