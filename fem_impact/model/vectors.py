@@ -62,9 +62,10 @@ def first_count(target: Target, resonance: float, tolerance: float) -> int:
 def shift_for(resonance: float, tolerance: float, damping: float = 0.0) -> float:
     """Shift [rad/s] of the vectors for a contact with this resonance [Hz], see `Krylov`; half or twice it serves, too.
 
-    A plate whose ``damping`` is above critical [-] makes the force rise so much faster.
+    A plate whose ``damping`` is above critical [-] makes the force rise so much faster, while the blow lasts as long:
+    far higher shifts would take more vectors to reach its end.
     """
-    return 2.0 * np.pi * resonance * max(1.0, 0.5 * damping) * _stricter(6.0, 1.0 / 6.0, tolerance)
+    return 2.0 * np.pi * resonance * min(max(1.0, 0.5 * damping), 4.0) * _stricter(6.0, 1.0 / 6.0, tolerance)
 
 
 def size_for(target: Target, resonance: float, tolerance: float) -> float:
