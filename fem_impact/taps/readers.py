@@ -499,9 +499,9 @@ def universal(path: Path) -> Recording:
         unit[key] = stated if known or not kind else kind
         channels.setdefault(key, []).append(data)
         label = str(one.get("abscissa_axis_units_lab") or "").strip()
-        second = TIME_UNITS.get(label.casefold(), 1.0)
-        if label.casefold() not in ("", "none", *TIME_UNITS):
-            notes.append(f"{key[0]}: the unit {label!r} of its times is not known, s assumed")
+        known_second = units.axis_factor(label, TIME_UNITS)
+        notes += [f"{key[0]}: the unit {label!r} of its times is not known, s assumed"] * (known_second is None)
+        second = known_second or 1.0
         begun.setdefault(key, []).append(second * float(one.get("abscissa_min") or 0.0))
         step = second * float(one.get("abscissa_inc") or 0.0)
         rates.append(1.0 / step if step > 0.0 else _rate(path, second * np.asarray(one["x"], float)))

@@ -15,6 +15,7 @@ from ..modes import picked, universal_files
 from ..modes.modal import Modes
 from . import readers, triggers
 from .records import Taps
+from .units import axis_factor
 from .units import si_unit as known_unit
 from .windows import join_tables
 
@@ -358,8 +359,10 @@ def arrays(path: Path) -> dict[str, np.ndarray]:
             raise ValueError(f"{path.name} has magnitudes only of {name!r}; export complex responses")
         if int(one.get("abscissa_spec_data_type") or 0) not in (0, 18):  # not stated, or frequency
             raise ValueError(f"{path.name} has a response {name!r} over something else than frequency; export it again")
-        hertz, said = _hertz(name, str(one.get("abscissa_axis_units_lab") or "").strip())
-        x, notes = hertz * np.asarray(one["x"], float), notes + said
+        label = str(one.get("abscissa_axis_units_lab") or "").strip()
+        hertz = axis_factor(label, {"hz": 1.0, "khz": 1e3, "rad/s": 0.5 / np.pi, "rpm": 1.0 / 60.0})
+        notes += [f"{name}: the unit {label!r} of its frequencies is not known, Hz assumed"] * (hertz is None)
+        x = (hertz or 1.0) * np.asarray(one["x"], float)
         if not (len(x) and x[0] >= 0.0 and (np.diff(x) > 0.0).all() and x[-1] <= check.REACH):
             raise ValueError(f"{path.name} has frequencies of {name!r} that do not ascend from zero; export it again")
         frequency = frequency if names else x
@@ -387,13 +390,6 @@ def arrays(path: Path) -> dict[str, np.ndarray]:
     if not (np.abs(found["H"]) <= check.REACH).all():
         raise ValueError(f"{path.name} holds values that are no finite numbers; export it again")
     return found
-
-
-def _hertz(name: str, label: str) -> tuple[float, list[str]]:
-    """The factor to Hz of a unit in data set 58, and a note if it is not known."""
-    known = {"": 1.0, "none": 1.0, "hz": 1.0, "khz": 1e3, "rad/s": 0.5 / np.pi, "rpm": 1.0 / 60.0}
-    factor = known.get(label.casefold())
-    return factor or 1.0, [f"{name}: the unit {label!r} of its frequencies is not known, Hz assumed"] * (factor is None)
 
 
 def _per_force(path: Path, name: str, one: dict[str, Any], factors: dict[str, float]) -> tuple[str, float, list[str]]:

@@ -1,6 +1,7 @@
 """Units of measured channels, and what they are in SI."""
 
 import re
+from collections.abc import Mapping
 
 FORCE = {
     "N": 1.0, "newton": 1.0, "newtons": 1.0, "kN": 1e3, "mN": 1e-3, "MN": 1e6, "daN": 10.0, "lbf": 4.4482216152605,
@@ -32,6 +33,12 @@ def si_unit(unit: str) -> tuple[str, float] | None:
     every = [(name, si, factor) for si, factors in KINDS.items() for name, factor in factors.items()]
     folds = str, str.casefold  # "mN" and "MN" differ, so the exact spelling comes first
     return next(((si, factor) for fold in folds for name, si, factor in every if fold(name) == fold(text)), None)
+
+
+def axis_factor(unit: str, factors: Mapping[str, float]) -> float | None:
+    """The factor of an axis's unit in data set 58, 1 where none is stated; None for a unit that is not known."""
+    unit = unit.lower().replace("μ", "µ")
+    return factors.get(unit, 1.0 if unit in ("", "none") else None)
 
 
 def is_unit(text: str) -> bool:

@@ -7,7 +7,7 @@ from scipy.io import savemat, wavfile
 
 import fem_impact as fi
 from fem_impact.modes import universal_files
-from fem_impact.taps import readers
+from fem_impact.taps import readers, units
 
 pytestmark = pytest.mark.usefixtures("read_here")
 UNCLOSED = pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionWarning")  # pyuff leaves files open
@@ -319,6 +319,11 @@ def test_directions_times_and_lengths_of_a_universal_file_are_heeded(tmp_path):
     assert (
         "the unit 'bananas' of its times is not known, s assumed" in recording(universal(path, slow, MOVES | slow))[2]
     )
+
+
+@pytest.mark.parametrize(("unit", "factor"), [("µs", 1e-6), ("μs", 1e-6), ("MSEC", 1e-3), ("", 1.0), ("ft", None)])
+def test_units_of_an_axis_are_known_in_any_letters(unit, factor):
+    assert units.axis_factor(unit, readers.TIME_UNITS) == factor
 
 
 @pytest.mark.parametrize("digits", [4, 5])
