@@ -28,7 +28,7 @@ from ..impact.compiled.layout import (  # isort: skip
 STEP_ORDER = 3.5  # [-] order of the error in the step: between 3 (linear contact) and 4 (Hertz)
 REFINEMENTS = 6  # [-] runs after the first one; a blow that then still misses the tolerance goes to the modal engine
 COUNTED = 1e-2  # [-] largest tolerance used: looser ones save no time and miscount impacts
-LENGTHS = (48, 192, 768, 3072)  # [-] kernel lengths in steps, tried in turn until the blow fits
+LENGTHS = (48, 192, 768, 3072, 12288)  # [-] kernel lengths in steps, tried in turn until the blow fits
 SLACK = 2.0  # [-] a touch or gap counts only above this many times tolerance times deepest approach
 # [-] what is stated, as two runs may agree by chance: of their difference, over what the order leaves of it; of the
 # misfit of a smooth force; of that of a lossy one, per loss; of the change of the rates at which contacts begin and end
@@ -164,11 +164,9 @@ class Blows:
     def n_cases(self) -> int:
         return len(self.family)
 
-    def pieces(self, size: int) -> "list[Blows]":
-        """The same blows in pieces of at most ``size``."""
-        columns = [getattr(self, field.name) for field in fields(self)[1:]]
-        starts = range(0, self.n_cases, size)
-        return [Blows(self.families, *(column[start : start + size] for column in columns)) for start in starts]
+    def some(self, cells: np.ndarray) -> "Blows":
+        """Those blows only."""
+        return Blows(self.families, *(getattr(self, field.name)[cells] for field in fields(self)[1:]))
 
 
 @dataclass(frozen=True, eq=False)
@@ -229,14 +227,15 @@ def _in_pieces(
     follow, workers = partial(following, kernels=kernels), workers or os.cpu_count() or 1
     piece = 2**14  # blows a thread follows at once at most: their data stay in the cache
     size = min(piece, max(FEW, -(-blows.n_cases // (4 * workers))))
+    # those of like kernels together, so that few are computed by several threads
+    order = np.lexsort([blows.stiffness * blows.speed ** (blows.exponent - 1.0) / blows.striker_mass, blows.family])
     if workers == 1 or blows.n_cases <= size:
-        found = [follow(part) for part in blows.pieces(piece)]
-    else:
-        with ThreadPoolExecutor(workers) as pool:
-            found = list(pool.map(follow, blows.pieces(size)))
-    if sum(part.nbytes for parts in kernels.values() for part in parts) > 128e6:  # to limit the memory
-        kernels.clear()
-    return [np.concatenate(columns) for columns in zip(*found)]
+        size = piece
+    parts = np.split(order, range(size, blows.n_cases, size))
+    with ThreadPoolExecutor(workers) as pool:
+        found = list(pool.map(follow, map(blows.some, parts)))
+    back = np.argsort(order)
+    return [np.concatenate(columns)[back] for columns in zip(*found)]
 
 
 def _follow(blows: Blows, tolerance: float, band: float, kernels: Kernels) -> tuple[np.ndarray, ...]:
@@ -384,10 +383,14 @@ class _Engine:
     def kernel(self, family: int, step: int, length: int, later: bool) -> tuple[np.ndarray, ...]:
         """Kernels of a family, one per length, so that no blow depends on the others in its batch."""
         key = family, step, length, later
-        if key not in self.kernels:
+        found = self.kernels.get(key)
+        if found is None:
             find = Family.later if later else Family.kernels
-            self.kernels[key] = find(self.blows.families[family], 2.0 ** (-0.5 * step), length)
-        return self.kernels[key]
+            found = find(self.blows.families[family], 2.0 ** (-0.5 * step), length)
+            if sum(part.nbytes for parts in list(self.kernels.values()) for part in parts) > 128e6:  # limits the memory
+                self.kernels.clear()
+            self.kernels[key] = found
+        return found
 
     @np.errstate(divide="ignore", invalid="ignore")  # of blows that ended before a touch
     def compare_runs(

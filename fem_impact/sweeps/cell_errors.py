@@ -1,6 +1,7 @@
 """How far the cells of a map may be off besides their time steps: the body's description, and the model itself."""
 
-from dataclasses import replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -86,51 +87,104 @@ def model_error(cases: Cases) -> tuple[np.ndarray, str]:
 def errors_of_description(cases: Cases, numbers: np.ndarray, workers: int | None = None) -> np.ndarray:
     """Error [-] of the bodies' description in each cell, in the shape of a map, as blows on poorer ones show it.
 
-    Evenly spaced cells, at most DOUBTED, are struck again on bodies described less well: by `Modes.poorer`, or where
-    modes left out may matter `blow_when_thinned`. Any other cell has the error of the nearest. Too few vectors may
-    agree on a final separation that is none; therefore cells with several impacts are also struck alone, because
-    `strike` looks for that; so are the cells of a body of which something is not stated (`Modes.unstated`).
+    Evenly spaced cells, at most DOUBTED, are struck again on bodies described less well, see `_Poorer`, and any other
+    has the largest error of those around it. Where by that one meets the tolerance beside a cell of another number of
+    impacts, or would by the least of those errors, it is struck again, too: at most four times DOUBTED.
     """
-    base = cases.base
-    descriptions = dict.fromkeys(lacking for modes in base.views.values() for lacking in modes.descriptions())
-    by_vectors, bodies = len(descriptions) > 1, (base.modes, base.striker.modes)
-    unstated = cases.residual and any(each.unstated or each.shapes.dent(each.shapes.grid()[0]).any() for each in bodies)
-    thin = blow_when_thinned(base) if cases.residual and not base.views else []
-    if not by_vectors and not unstated and not thin:
+    poorer = _Poorer.of(cases, numbers, workers)
+    if poorer is None:
         return np.zeros(cases.shape)
-    most = DOUBTED["alone" if unstated or not cases.quick else "vectors" if by_vectors else "modes"]
-    fewer = max(1.0, (cases.n_cases / most) ** (1.0 / len(cases.shape)))
+    fewer = max(1.0, (cases.n_cases / poorer.most) ** (1.0 / len(cases.shape)))
     chosen = [np.unique(np.round(np.linspace(0, n - 1, max(1, int(n / fewer)))).astype(int)) for n in cases.shape]
-    axes = {name: values[some] for (name, values), some in zip(cases.axes.items(), chosen)}
-    few = replace(cases, axes=axes, band=None, extra={}, kernels={})
-    names = [cases.layers.index(name) for name in few.layers]
-    mine = numbers.reshape(-1, *cases.shape)[np.ix_(np.array(names), *chosen)].reshape(len(names), -1)
-    count = few.layers.index("n_impacts")
+    every = np.arange(cases.n_cases).reshape(cases.shape)
+    struck = every[np.ix_(*chosen)]
+    least = most = poorer.errors(struck.reshape(-1)).reshape(struck.shape)
+    for axis, (n, some) in enumerate(zip(cases.shape, chosen)):
+        before = np.searchsorted(some, np.arange(n), side="right") - 1
+        after = np.minimum(np.searchsorted(some, np.arange(n)), len(some) - 1)
+        least = np.minimum(least.take(before, axis), least.take(after, axis))
+        most = np.maximum(most.take(before, axis), most.take(after, axis))
+    count, beside = poorer.mine[poorer.count].reshape(cases.shape), np.zeros(cases.shape, bool)
+    for axis in range(count.ndim):
+        one, two = (np.moveaxis(each, axis, 0) for each in (count, beside))
+        two[1:] |= one[1:] != one[:-1]
+        two[:-1] |= one[1:] != one[:-1]
+    beside[np.ix_(*chosen)] = False  # known
+    sides = every[beside & (most <= cases.tolerance)], every[(least <= cases.tolerance) & (most > cases.tolerance)]
+    found = np.concatenate(sides)[: 4 * poorer.most]
+    if found.size:
+        most.reshape(-1)[found] = poorer.errors(found)
+    return most
 
-    def struck(poorer: Case, some: np.ndarray) -> np.ndarray:
-        """The layers of some cells on bodies described less well."""
-        return solve_cases(replace(few, base=poorer, chosen=some, kernels={}), 0, len(some), workers=workers)[0]
 
-    def difference(one: np.ndarray, other: np.ndarray, first: bool = True) -> np.ndarray:
-        change = np.fmax.reduce(list(few.apart(one, other).values()))
-        return np.where(one[count] == other[count], change, 1.0 * first)
+@dataclass(frozen=True, eq=False)
+class _Poorer:
+    """Blows of a map on bodies described less well: by `Modes.poorer`, or by `blow_when_thinned` where modes left out
+    may matter.
 
-    every = np.arange(few.n_cases)
-    runs = {lacking: struck(base.lacking(lacking), every) if lacking else mine for lacking in descriptions}
-    total = sum(worst_differences(runs, difference).values(), np.zeros(few.n_cases))
-    expected = estimate_left_out(few).reshape(-1)
-    doubted = np.isfinite(expected) & (few.special | (expected > 1e-2 * cases.tolerance)) & (mine[count] > 0)
-    some = np.flatnonzero(doubted)
-    for poorer, weight in thin if some.size else ():
-        change = difference(mine[:, some], struck(poorer, some))
-        total[some] = np.maximum(total[some], np.where(change < 1.0, weight * change, 1.0))
-    several = np.flatnonzero(unstated | ((mine[count] > 1) & by_vectors))
-    several = several[:: max(1, -(-len(several) // DOUBTED["alone"]))]
-    for i, (hit, _) in zip(several, try_each(several, few.blow, workers)):
-        if hit is not None:
-            total[i] = max(total[i], hit.error.truncation + hit.error.mesh + hit.error.measurement)
-    nearest = [np.abs(np.arange(n)[:, None] - some).argmin(axis=1) for n, some in zip(cases.shape, chosen)]
-    return total.reshape(few.shape)[np.ix_(*nearest)]
+    Too few vectors may agree on a final separation that is none; therefore cells with several impacts are also struck
+    alone, because `strike` looks for that; so are the cells of a body of which something is not stated
+    (`Modes.unstated`).
+    """
+
+    cases: Cases
+    mine: np.ndarray  # (n_layers, n_cases) of the map itself
+    expected: np.ndarray  # (n_cases,) [-] see `estimate_left_out`
+    lacking: Mapping[frozenset[str], Cases]  # on bodies that lack something
+    thin: Sequence[tuple[Cases, float]]
+    unstated: bool
+    most: int  # cells to strike at once
+    workers: int | None
+
+    @classmethod
+    def of(cls, cases: Cases, numbers: np.ndarray, workers: int | None) -> "_Poorer | None":
+        """Those of a map of which the results are known; None where the bodies are described exactly."""
+        base = cases.base
+        descriptions = dict.fromkeys(lacking for modes in base.views.values() for lacking in modes.descriptions())
+        by_vectors, bodies = len(descriptions) > 1, (base.modes, base.striker.modes)
+        unstated = cases.residual and any(
+            each.unstated or each.shapes.dent(each.shapes.grid()[0]).any() for each in bodies
+        )
+        thin = blow_when_thinned(base) if cases.residual and not base.views else []
+        if not by_vectors and not unstated and not thin:
+            return None
+        plain = replace(cases, band=None, extra={})
+        return cls(
+            plain, numbers[[cases.layers.index(name) for name in plain.layers]], estimate_left_out(cases).reshape(-1),
+            {each: replace(plain, base=base.lacking(each), kernels={}) for each in descriptions if each},
+            [(replace(plain, base=poorer, kernels={}), weight) for poorer, weight in thin], unstated,
+            DOUBTED["alone" if unstated or not cases.quick else "vectors" if by_vectors else "modes"], workers,
+        )  # fmt: skip
+
+    @property
+    def count(self) -> int:
+        return self.cases.layers.index("n_impacts")
+
+    def errors(self, cells: np.ndarray) -> np.ndarray:
+        """Error [-] of the description in some cells, (n_cells,)."""
+        mine = self.mine[:, cells]
+        runs = {frozenset[str](): mine} | {each: self._struck(cases, cells) for each, cases in self.lacking.items()}
+        total = sum(worst_differences(runs, self._difference).values(), np.zeros(len(cells)))
+        doubted = np.isfinite(self.expected[cells]) & (mine[self.count] > 0)
+        doubted &= self.cases.special | (self.expected[cells] > 1e-2 * self.cases.tolerance)
+        some = np.flatnonzero(doubted)
+        for cases, weight in self.thin if some.size else ():
+            change = self._difference(mine[:, some], self._struck(cases, cells[some]))
+            total[some] = np.maximum(total[some], np.where(change < 1.0, weight * change, 1.0))
+        several = np.flatnonzero(self.unstated | ((mine[self.count] > 1) & (len(self.lacking) > 0)))
+        several = several[:: max(1, -(-len(several) // DOUBTED["alone"]))]
+        for i, (hit, _) in zip(several, try_each(cells[several], self.cases.blow, self.workers)):
+            if hit is not None:
+                total[i] = max(total[i], hit.error.truncation + hit.error.mesh + hit.error.measurement)
+        return total
+
+    def _struck(self, cases: Cases, cells: np.ndarray) -> np.ndarray:
+        """The layers of some cells on other bodies."""
+        return solve_cases(replace(cases, chosen=cells), 0, len(cells), workers=self.workers)[0]
+
+    def _difference(self, one: np.ndarray, other: np.ndarray, first: bool = True) -> np.ndarray:
+        change = np.fmax.reduce(list(self.cases.apart(one, other).values()))
+        return np.where(one[self.count] == other[self.count], change, 1.0 * first)
 
 
 def blow_when_thinned(base: Case) -> list[tuple[Case, float]]:

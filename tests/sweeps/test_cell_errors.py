@@ -8,6 +8,7 @@ from comparing import QUANTITIES
 from numpy.testing import assert_allclose
 
 import fem_impact as fi
+from fem_impact.sweeps import cell_errors
 
 
 def test_every_cell_says_whether_it_met_the_tolerance():
@@ -47,6 +48,21 @@ def test_a_map_tells_the_models_own_error_between_a_few_blows():
     own = {"own": lambda hit: hit.model_error}
     asked = fi.sweep(plate, striker, law, over={"mass": [0.01]}, layers=own, **blow)
     assert asked.own.values[0] > 1e-6 and "model_error" not in asked
+
+
+def test_cells_between_those_examined_do_not_meet_the_tolerance_where_they_alone_would_not(monkeypatch):
+    """Fewer modes mean another number of impacts in some cells between others: they had the error of the nearest."""
+    plate = fi.analytic.rectangle(1.55, 1.0, mass=0.2, first_frequency=100.0, n_modes=300, damping_ratio=0.01)
+    over = {"mass": np.geomspace(3e-3, 0.2, 60), "stiffness": np.geomspace(1e4, 1e6, 60)}
+    maps = []
+    for most in (cell_errors.DOUBTED["modes"], 10_000):
+        monkeypatch.setitem(cell_errors.DOUBTED, "modes", most)
+        blow = {"at": (0.45, 0.3), "speed": 1.0, "tolerance": 1e-2}
+        maps.append(fi.sweep(plate, fi.Striker.stick(0.1, 10e3), fi.Contact.linear(1e5), over=over, **blow))
+    some, every = maps
+    assert not (some.tolerance_met & (every.truncation > 0.5)).any()
+    assert (some.tolerance_met & ~every.tolerance_met).mean() < 2e-3  # errors that are just above the tolerance
+    assert some.tolerance_met.mean() > 0.98 * every.tolerance_met.mean() > 0.5
 
 
 @pytest.mark.parametrize("many, few, law, blow, over, tolerance", [
