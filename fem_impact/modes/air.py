@@ -36,6 +36,7 @@ from scipy.special import jv
 from .._base import check
 from .._base.rounding import HALVINGS, SAME
 from ..fe import plausible
+from ..fe.eigenvalues import one_thread
 from .free_air import PER_WAVE, between_cells, lattice, loads
 from .modal import Modes
 from .shapes import ScaledShapes, Shapes
@@ -48,6 +49,7 @@ BLOCK = 24
 
 
 @check.typed
+@one_thread
 def in_air(
     modes: Modes, *, density: float = DENSITY, speed: float = SPEED, sides: int = 2, baffled: bool = True
 ) -> Modes:

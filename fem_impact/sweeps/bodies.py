@@ -175,6 +175,11 @@ def of_hammers(
     modes = target.modes
     if modes is None:
         with stages("modes"):
+            if target.air:  # each mode more costs much there: as many as the bandwidth needs
+                first = target.finished(target.find(FIRST_LOOK, tolerance=tolerance))
+                case = Case(first, Striker.rigid(1.0), Contact.linear(1.0), first.point("at", at), 1.0)
+                needed = max(needed_frequency(case.with_values(values), tolerance) for values in chance)
+                n_modes = min(n_modes, max(FIRST_LOOK, math.ceil(accuracy.number_of_modes(first, needed))))
             modes = target.find(n_modes, tolerance=tolerance, stages=stages)
     return [target.surrounded(modes)] * len(np.atleast_2d(at)), False
 

@@ -5,7 +5,8 @@ import pytest
 from numpy.testing import assert_allclose
 
 import fem_impact as fi
-from fem_impact.sweeps import hammers
+from fem_impact.model.target import Target
+from fem_impact.sweeps import bodies, hammers
 
 PLATE = fi.analytic.rectangle(1.55, 1.0, mass=0.2, first_frequency=100.0, n_modes=300)
 AT = (0.465, 0.3)
@@ -156,3 +157,24 @@ def test_hammers_on_elements_are_those_on_the_closed_form():
     assert light.unlimited is True and light.limit == pytest.approx(10.0 * 0.01 * (2.0 * np.pi * centre) ** 2)
     hit = fi.strike(truth, fi.Striker.rigid(0.01), fi.Contact.linear(light.softest), at=at, speed=1.0)
     assert hammers.bandwidth_of(hit, 10.0) == pytest.approx(500.0, rel=3e-3)
+
+
+def test_a_plate_in_air_has_no_more_modes_than_the_bandwidth_asks_for(monkeypatch):
+    """300 modes in air took ten minutes; twenty give the ranges of tips that sixty do."""
+    plate = fi.Plate(fi.Material(E=70e9, nu=0.33, rho=2700.0), thickness=4e-3)
+    edges = dict.fromkeys(("left", "right", "bottom", "top"), "hinged")
+    target = Target(fi.mesh.rectangle(0.4, 0.3), plate, edges, air="both sides")
+    found, chosen = bodies.of_hammers, []
+
+    def counted(*given):
+        chosen.append(found(*given))
+        return chosen[-1]
+
+    monkeypatch.setattr(bodies, "of_hammers", counted)
+    few = hammers.choose_on(target, (0.15, 0.11), 100.0, [0.05, 0.2])
+    monkeypatch.setattr(bodies, "needed_frequency", lambda case, tolerance: 7000.0)
+    many = hammers.choose_on(target, (0.15, 0.11), 100.0, [0.05, 0.2])
+    assert [each[0].n_modes for (each, _) in chosen] == [20, 59]
+    for one, other in zip(few, many):
+        assert_allclose(one.softest, other.softest, rtol=2.0 * hammers.WIDTH)
+    assert_allclose(few[1].hardest, many[1].hardest, rtol=2.0 * hammers.WIDTH)
