@@ -118,10 +118,10 @@ def notes_on_damping(ratios: np.ndarray, omega: np.ndarray | None = None) -> tup
     return tuple(note_number("damping_ratio", float(np.median(ratios)))) if len(ratios) else ()
 
 
-def imported_notes(nodes: np.ndarray, shapes: np.ndarray, mass: float) -> tuple[str, ...]:
+def imported_notes(nodes: np.ndarray, shapes: np.ndarray, mass: float, frequencies: np.ndarray) -> tuple[str, ...]:
     """Notes on nodes (n_nodes, 1 to 3) [m] and mass-normalised shapes (n_nodes, same or 1, n_modes) of another program.
 
-    Over the mass, the mean of their squares is one over the mass.
+    Over the mass, the mean of their squares is one over the mass. Frequencies (n_modes,) [Hz] ascend.
     """
     notes = list(note_number("length", float(np.ptp(nodes, axis=0).max(initial=0.0))))
     if shapes.size and shapes.any():
@@ -131,7 +131,46 @@ def imported_notes(nodes: np.ndarray, shapes: np.ndarray, mass: float) -> tuple[
                 f"shapes are {ratio:.2g} times as large as those of a body of {mass:g} kg are on average; they are "
                 "expected mass-normalised, and 1 t**-0.5 is 0.0316 kg**-0.5"
             )
+        moved, way = shapes.reshape(-1, len(frequencies)), np.linalg.norm(shapes, axis=1)
+        norms = {"longest deflection": way.max(axis=0), "length": np.linalg.norm(moved, axis=0)}
+        for name, norm in ({"largest deflection": np.abs(moved).max(axis=0)} | norms).items():
+            if len(norm) > 1 and np.abs(norm - 1.0).max() < 2e-5:  # files keep six digits
+                notes.append(f"shapes are all normalised to a {name} of 1; they are expected mass-normalised")
+                break
+        some = slice(None, None, 1 + len(nodes) // 1000)
+        notes += _told_again(nodes[some], shapes[some].reshape(-1, len(frequencies)), frequencies)
     return tuple(notes)
+
+
+def _told_again(nodes: np.ndarray, moved: np.ndarray, frequencies: np.ndarray) -> Iterator[str]:
+    """A note on pairs of modes (n, n_modes) that may be one that was found twice; on a line two may look alike."""
+    spread = np.linalg.svd(nodes - nodes.mean(axis=0), compute_uv=False)
+    if len(nodes) < 4 or (nodes.shape[1] > 1 and spread[1] <= 1e-6 * spread[0]):
+        return
+    ends, size = np.searchsorted(frequencies, 1.01 * frequencies, side="right"), np.linalg.norm(moved, axis=0)
+    near = [(i, j) for i in range(len(ends)) for j in range(i + 1, ends[i]) if frequencies[i] > 0.0]
+    apart = [min(np.linalg.norm(moved[:, i] - way * moved[:, j]) for way in (1.0, -1.0)) / size[i] for i, j in near]
+    alike = [pair for pair, distance in zip(near, apart) if distance < 0.1]
+    if alike:
+        first, second = frequencies[list(alike[0])]
+        yield (
+            f"{len(alike)} pairs of modes move all points alike, as those at {first:.5g} and {second:.5g} Hz; if they "
+            "are one mode that was found twice, leave one of them out"
+        )
+
+
+def notes_on_mass(squares: np.ndarray, mass: float) -> tuple[str, ...]:
+    """A note on mean squares (n_modes,) [1/kg] of elastic shapes over a body that all say the same other mass [kg]."""
+    squares = squares[squares > 0.01 * squares.max(initial=0.0)]  # others move across
+    if len(squares) < 3 or np.log(squares).std() > 0.15:
+        return ()
+    other = float(1.0 / np.median(squares))
+    if 0.5 * mass < other < 2.0 * mass:
+        return ()
+    return (
+        f"shapes are those of a uniform body of {other:.3g} kg, but the mass is {mass:.4g} kg; check it, and that "
+        "shapes are mass-normalised",
+    )
 
 
 def notes_on_rigid(shapes: np.ndarray, mass: float, span: int) -> tuple[str, ...]:

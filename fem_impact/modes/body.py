@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 
 from .._base import check
 from ..fe import plausible
-from . import cell_kinds, dents, free_body, imported, matrices, universal_files
+from . import cell_kinds, dents, free_body, imported, matrices, universal_files, unstated
 from .modal import Modes, damping_ratios
 
 NOTE = "the error of the mesh on which modes were found elsewhere is not known, and no blow counts it"
@@ -368,7 +368,9 @@ class Body(check.Brief):
             cells=cells if flat and len(cells) else None, free=free, solid=False,
         )  # fmt: skip
         made = dents.settle_dents(made, unit_loads, self.solid)
-        odd = (*plausible.imported_notes(self.nodes, self.shapes, self.mass), *[NOTE] * bool(made.omega.any()))
+        odd = plausible.imported_notes(self.nodes, self.shapes, self.mass, self.frequencies)
+        squares = unstated.mean_squares(self.nodes, None, self.shapes[..., self.frequencies > 0.0])
+        odd = (*odd, *plausible.notes_on_mass(squares, self.mass), *[NOTE] * bool(made.omega.any()))
         sideways = free_body.shapes_sideways(self.shapes[kept], ways[kept], made.n_modes)
         # along one direction they may be small
         notes = [note for note in made.notes if not note.startswith("shapes are")]

@@ -173,9 +173,11 @@ class Modes(check.Brief):
         along = strength > 0.01 * strength.max()  # others move across
         odd: tuple[str, ...] = ()
         if not complete:
-            odd = plausible.imported_notes(points, values[:, None, along], mass)
+            odd = plausible.imported_notes(points, values[:, None, along], mass, omega[along] / (2.0 * np.pi))
             odd = (*odd, *plausible.disordered(points, values[:, flexible]))
-            odd = (*odd, *plausible.notes_on_rigid(values[:, ~flexible], mass, 0 if free is False else span))
+            turned = plausible.notes_on_rigid(values[:, ~flexible], mass, 0 if free is False else span)
+            squares = unstated.mean_squares(points, connected, values[:, None, flexible])
+            odd = (*odd, *(turned or plausible.notes_on_mass(squares, mass)))
         notes = (*odd, *plausible.notes_on_damping(damping, omega), *(UNSTATED[name] for name in missing))
         made, said = cls(omega, damping, sampled, mass, notes=notes, unstated=missing), dents.stated_material(solid)
         return made if said == () else dents.settle_dents(made, dents.of_points(points, static, known), said)
@@ -220,7 +222,8 @@ class Modes(check.Brief):
             found["frequencies"], shapes, points=found["nodes"][:, keep], mass=mass,
             damping_ratio=damping, compliance=compliance, cells=cells if len(cells) else None, free=free,
         )  # fmt: skip
-        return replace(made, notes=(*made.notes, *plausible.imported_notes(found["nodes"], found["shapes"], made.mass)))
+        odd = plausible.imported_notes(found["nodes"], found["shapes"], made.mass, found["frequencies"])
+        return replace(made, notes=plausible.together(made.notes, odd))
 
     @classmethod
     def from_frf(

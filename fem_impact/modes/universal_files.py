@@ -81,10 +81,9 @@ def arrays(path: Path) -> dict[str, np.ndarray]:
     refuse_cut(path)
     file = pyuff.UFF(str(path))
     kinds = [int(kind) for kind in file.get_set_types()]
-    # nodes, shapes, units, nodes in double precision, results, frames
-    sets = [file.read_sets(i) for i, kind in enumerate(kinds) if kind in (15, 55, 164, 2411, 2414, 2420)]
-    rows = [zip(s["CS_sys_labels"], s["CS_types"], s["CS_matrices"]) for s in sets if s["type"] == 2420]
-    turned = {label for row in rows for label, kind, axes in row if kind or not np.allclose(axes, np.eye(4)[:, :3])}
+    # nodes, frames, shapes, units, nodes in double precision, results, frames
+    sets = [file.read_sets(i) for i, kind in enumerate(kinds) if kind in (15, 18, 55, 164, 2411, 2414, 2420)]
+    turned = _turned(sets)
     placed = [s[key] for s in sets if s["type"] in (15, 2411) for key in ("def_cs", "disp_cs")]
     used = turned & {int(frame) for frames in placed for frame in frames}  # axes of their own
     if used:
@@ -126,6 +125,21 @@ def arrays(path: Path) -> dict[str, np.ndarray]:
     codes = {int(element["fe_descriptor"]) for element in elements}
     solid = {} if not codes else {"solid": np.array(True) if codes & set(SOLIDS) else np.zeros(0)}
     return result | cells | {"numbers": measured} | solid
+
+
+def _turned(sets: list[dict]) -> set[int]:
+    """Labels of coordinate systems with other axes than the global ones, by data sets 18 and 2420."""
+    found: list[tuple[float, bool]] = []
+    for s in sets:
+        if s["type"] == 2420:
+            rows = zip(s["CS_sys_labels"], s["CS_types"], s["CS_matrices"])
+            found += [(label, kind == 0 and np.allclose(axes, np.eye(4)[:, :3])) for label, kind, axes in rows]
+        if s["type"] == 18:  # by their origin, a point on the axis x, and one in the plane of x and z
+            for i, kind in enumerate(s["cs_type"]):
+                origin, x, z = (s[name][i] for name in ("ref_o", "x_point", "xz_point"))
+                same = not (np.any(origin) or np.any(x[1:]) or z[1]) and x[0] > 0.0 < z[2]
+                found.append((s["cs_num"][i], same and kind == 0 and s["ref_cs_num"][i] in (0, 1)))
+    return {int(label) for label, same in found if not same}
 
 
 def refuse_cut(path: Path) -> None:
@@ -191,9 +205,11 @@ def _result(one: dict) -> dict:
         return one if one.get("spec_data_type", 0) in (0, DISPLACEMENT, 11, 12) else {}
     if one.get("dataset_location") != 1 or one.get("result_type") != DISPLACEMENT:
         return {}
-    values = np.array([row[:3] for row in one["data_at_node"]])
+    rows, last = one["data_at_node"], [one.get(f"record13_field{i}") or 0.0 for i in range(1, 5)]
+    values = np.array([row[:6:2] + 1j * row[1:6:2] if one["data_type"] in (5, 6) else row[:3] for row in rows])
     renamed = {"freq": one.get("record12_field2"), "modal_m": one.get("record12_field4")}
     renamed |= {"modal_damp_vis": one.get("record12_field5"), "modal_damp_his": one.get("record12_field6")}
+    renamed |= {"eig": complex(*last[:2]), "modal_a": complex(*last[2:])}
     return one | renamed | dict(zip(COMPONENTS, values.T))
 
 

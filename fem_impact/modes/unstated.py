@@ -144,6 +144,15 @@ def lumped_mass(points: np.ndarray, cells: np.ndarray | None) -> tuple[np.ndarra
     return (pairs, weight / whole) if whole > 0.0 else None
 
 
+def mean_squares(points: np.ndarray, cells: np.ndarray | None, shapes: np.ndarray) -> np.ndarray:
+    """Mean squares (n_modes,) [1/kg] of shapes (n_points, n, n_modes) over a body on a line or in a plane, or none."""
+    flat = unfold_points(points)
+    own = lumped_mass(flat, cells if flat is points else None)
+    if own is None:
+        return np.zeros(0)
+    return np.asarray(own[1] @ (shapes**2).sum(axis=1)[own[0]].mean(axis=1))
+
+
 def numbers_of_points(loads: Any, n_points: int, given: bool) -> np.ndarray:
     """Numbers of the points under the loads of a given compliance."""
     if loads is None:

@@ -136,6 +136,49 @@ def sampled(scale=1.0, order=slice(None)):
     return fi.Modes.from_arrays(plate.frequencies, scale * plate.shape_at(points)[order], points=points, mass=0.5)
 
 
+@pytest.mark.parametrize("make", [
+    fi.Modes.from_arrays, lambda f, s, points, mass: flat_body(f, s, points, mass).modes("z"),
+])  # fmt: skip
+def test_shapes_of_another_scale_than_by_mass_are_noted(make):
+    """Normalised to their maximum or to their length, or all as large as those of a quarter of the mass."""
+    plate = fi.analytic.rectangle(0.4, 0.3, mass=0.5, first_frequency=100.0, n_modes=8)
+    points = np.stack(np.meshgrid(np.linspace(0.0, 0.4, 13), np.linspace(0.0, 0.3, 10)), axis=-1).reshape(-1, 2)
+    shapes = plate.shape_at(points)
+
+    def noted(shapes, frequencies=plate.frequencies):
+        return "; ".join(make(frequencies, shapes, points=points, mass=0.5).notes)
+
+    assert "normalised" not in noted(shapes) and "alike" not in noted(shapes)
+    for size, said in (
+        (np.abs(shapes).max(axis=0), "normalised to a largest deflection of 1; they are expected mass-normalised"),
+        (np.linalg.norm(shapes, axis=0), "normalised to a length of 1"),
+        (0.5, "shapes are those of a uniform body of 0.125 kg, but the mass is 0.5 kg"),
+    ):
+        assert said in noted(shapes / size)
+    twice = np.argsort(np.append(plate.frequencies, 1.002 * plate.frequencies))
+    again = np.append(plate.frequencies, 1.002 * plate.frequencies)[twice]
+    said = "8 pairs of modes move all points alike, as those at 100 and 100.2 Hz"
+    assert said in noted(np.hstack([shapes, -1.02 * shapes])[:, twice], again)
+
+
+def flat_body(frequencies, shapes, points, mass):
+    vectors = np.zeros((len(points), 3, len(frequencies)))
+    vectors[:, 2] = shapes
+    return fi.Body(frequencies, vectors, np.column_stack([points, np.zeros(len(points))]), mass)
+
+
+@pytest.mark.parametrize("body", ["hinged", "free", "clamped"])
+def test_shapes_by_mass_at_random_points_are_not_noted(body):
+    section = fi.Plate(fi.Material(**STEEL), lambda points: 2e-3 + 5e-3 * points[:, 0])
+    modes = fi.find_modes(
+        fi.assemble(fi.mesh.rectangle(0.4, 0.3), section, {} if body == "free" else {"boundary": body}), n_modes=10
+    )
+    for seed in range(10):
+        points = np.random.default_rng(seed).uniform((0.0, 0.0), (0.4, 0.3), (12 + 4 * seed, 2))
+        made = fi.Modes.from_arrays(modes.frequencies, modes.shape_at(points), points=points, mass=modes.mass)
+        assert not [note for note in made.notes if note.startswith("shapes are") or "alike" in note]
+
+
 def test_shapes_in_another_order_than_their_points_are_noted():
     (note,) = set(sampled(order=np.random.default_rng(0).permutation(130)).notes) - set(sampled().notes)
     assert "different at neighbouring points as at any two; they are expected in their order" in note

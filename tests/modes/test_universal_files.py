@@ -139,6 +139,47 @@ def test_files_in_other_units_or_frames_and_of_other_quantities(written, plate, 
         framed(5)
 
 
+@pytest.mark.parametrize(
+    ("kind", "x", "z", "own"),
+    [(0, (2.0, 0.0, 0.0), (3.0, 0.0, 1.0), False), (1, (1.0, 0.0, 0.0), (0.0, 0.0, 1.0), True),
+     (0, (0.0, 1.0, 0.0), (0.0, 0.0, 1.0), True), (0, (1.0, 0.0, 0.0), (0.0, 0.0, -1.0), True)],
+)  # fmt: skip
+def test_older_frames_of_nodes(plate, read, kind, x, z, own):
+    """Data set 18 goes with nodes in 15: by an origin, a point on the axis x and one in the plane of x and z."""
+    _, sets, plain = plate
+    frame = {"type": 18, "cs_num": [4], "cs_type": [kind], "ref_cs_num": [0], "ref_o": [(0.0, 0.0, 0.0)]}
+    frame |= {"x_point": [x], "xz_point": [z]}
+    nodes = sets[0] | {"def_cs": np.full(len(sets[0]["x"]), 4)}
+    if not own:
+        assert read([nodes, frame, *sets[3:]]).n_modes == plain.n_modes
+        return
+    with pytest.raises(ValueError, match="nodes in coordinate system 4; export all in the global one"):
+        read([nodes, frame, *sets[3:]])
+
+
+@pytest.mark.parametrize("analysis", [2, 3])
+def test_complex_shapes_of_newer_data_sets(plate, read, tmp_path, analysis):
+    """Data set 2414 with real and imaginary parts in turn, all turned by one phase; by modal mass or modal A."""
+    points, sets, plain = plate
+    names = ("model_type", "analysis_type", "data_characteristic", "result_type", "data_type")
+    head = {"type": 2414, "analysis_dataset_label": 1, "analysis_dataset_name": "mode", "dataset_location": 1,
+            "number_of_data_values_for_the_data_component": 3} | dict(zip(names, (1, analysis, 2, 8, 5)))  # fmt: skip
+    head |= {f"id{i}": "NONE" for i in range(1, 6)}
+    head |= {f"record{k}_field{i}": 0 for k, n in ((10, 8), (11, 8), (12, 6), (13, 6)) for i in range(1, n + 1)}
+    moved = []
+    for one in sets[6:]:
+        turned = np.column_stack([0.3 * one["r3"], 0.0 * one["r3"], one["r3"]]) * np.exp(0.4j)
+        told = {"node_nums": one["node_nums"], "data_at_node": list(turned.view(float)), "record12_field2": one["freq"]}
+        omega = 2.0 * np.pi * one["freq"]
+        told |= (
+            {"record13_field2": omega, "record13_field4": 2.0 * omega} if analysis == 3 else {"record12_field4": 1.0}
+        )
+        moved.append(head | told)
+    found, wanted = read([*sets[:3], *moved], free=False), plain.shape_at(points)[:, 3:]
+    assert_allclose(found.frequencies, plain.frequencies[3:], rtol=1e-5)
+    assert_allclose(np.abs(found.shape_at(points)), np.abs(wanted), atol=2e-5 * np.abs(wanted).max())
+
+
 def test_what_a_file_lacks_is_said(written, plate, read, tmp_path):
     _, sets, _ = plate
     said = r"must hold nodes \(15 or 2411\) and mode shapes \(55\) of.*; its data sets are 15"
