@@ -32,7 +32,8 @@ class Updated(check.Brief):
     """What `update` found."""
 
     values: Mapping[str, float]
-    spread: Mapping[str, float]  # half width of the 90 % interval, relative; infinite if there is no spare frequency
+    # half width of the 90 % interval, relative, with another solution that fits as well; infinite without spare ones
+    spread: Mapping[str, float]
     pairs: tuple[Pair, ...]
     modes: Modes
     n_solves: int
@@ -86,7 +87,8 @@ def update(
     measured : array_like, (n_modes,) [Hz], Modes, or xarray.Dataset of fi.frf
         Ascending frequencies, or frequency responses whose peaks are picked; `Modes` of a measurement are paired with
         the computed ones by their shapes too. Up to two that belong to no mode of the body are left out and named, if
-        as many frequencies as unknowns are spare without them and chance hardly meets the others so well.
+        as many frequencies as unknowns are spare without them and chance hardly meets the others so well. Where other
+        constants fit as well, as frequencies alone cannot tell the directions of a plate, intervals reach to them.
     unknown : mapping of name to (low, high), both positive
     start : mapping of name to value, optional
         By default the middle of each range.
@@ -142,25 +144,33 @@ def update(
                 raise ValueError(f"unknown[{each.name!r}]: {error}") from None
     search = _Misfit(build, box, measured, target, points)
     used = every = np.arange(len(target))  # numbers of the measured modes that are paired
-    found = search.fit(box.start_at(start), every)
+    solutions = [search.fit(box.start_at(start), every)]
     for count in range(3):  # frequencies that belong to no mode: with more, nobody knows which ones are right
         spare = len(every) - count - n
-        if spare < n or count > MOST_OUTLIERS * len(every):
+        if spare < (n if count else 1) or count > MOST_OUTLIERS * len(every):
             break
         rests = [np.setdiff1d(every, out) for out in combinations(every, count)]
-        again, rest = search.look(found.x, rests)
+        again, rest = search.look(solutions[0].x, rests)[:2]
         if not count:  # of all frequencies, from starts all over the ranges
-            found = min(found, again, key=lambda one: one.cost)
+            solutions = sorted([*solutions, again], key=lambda one: one.cost)
             continue
-        ratio = (found.cost - again.cost) / count / max(again.cost / spare, 1e-300)
+        ratio = (solutions[0].cost - again.cost) / count / max(again.cost / spare, 1e-300)
         if len(rests) * float(f.sf(ratio, count, spare)) < DOUBTED:  # the best of so many choices by chance
-            found, used = again, rest
+            solutions, used = [again], rest
             break
+    if len(used) > n:
+        again, _, other = search.look(solutions[0].x, [used])
+        solutions += [again] if other is None else [again, search.fit(other, used)]
+    found = min(solutions, key=lambda one: one.cost)
     spare, sizes = len(used) - n, np.linalg.svd(found.jacobian, compute_uv=False)
     half = np.full(n, np.inf)  # widths of the 90 % intervals of logarithms: frequencies may not limit them
     if spare >= 1 and sizes[-1] > 1e-6 * sizes[0]:
         variance = np.diag(np.linalg.pinv(found.jacobian.T @ found.jacobian)) * found.cost / spare
-        half = float(t.ppf(0.95, spare)) * np.sqrt(variance)
+        wide = float(t.ppf(0.95, spare))
+        half = wide * np.sqrt(variance)
+        enough = max(wide**2 * found.cost / spare, 1e-10 * len(used))  # numbers have five digits
+        alike = [one.x for one in solutions if one.cost - found.cost <= enough]
+        half = half + np.abs(np.array(alike) - found.x).max(axis=0)  # as far as another solution that fits as well
     unpaired = tuple(target[np.setdiff1d(every, used)].tolist())
     fitted = dict(zip(box.names, half)), search.pairs(found.x, used), search.modes_at(found.x)
     return Updated(box.values_at(found.x), *fitted, len(search.solved), unpaired)
@@ -219,22 +229,45 @@ class _Misfit:
 
         return least(misfit, slopes, x, (low, high), close=CLOSE, iterations=ENOUGH)
 
-    def look(self, x: np.ndarray, rests: list[np.ndarray]) -> tuple[Solution, np.ndarray]:
-        """The fit of the best of some choices of frequencies, and that choice, by powers of the constants near ``x``;
-        each from 16 starts over the ranges, with four steps."""
+    def look(self, x: np.ndarray, rests: list[np.ndarray]) -> tuple[Solution, np.ndarray, np.ndarray | None]:
+        """The fit of the best of some choices of frequencies, that choice, and where another fit of it may begin.
+
+        They are found by Rayleigh quotients of the modes at ``x``, from 16 starts over the ranges with four steps each.
+        That other one is not worth a fit if it misses by more than ten times the best and 1 % of each frequency.
+        """
         table, bounds = self._logs(x), self.box.bounds
-        steep = np.column_stack([self._logs(x + step) - table for step in STEP * np.eye(len(x))]) / STEP
+        moved = np.column_stack([self._logs(x + step) - table for step in STEP * np.eye(len(x))]) / STEP
         starts = (x, *qmc.scale(qmc.Sobol(len(x), scramble=False).random(16), *bounds))
-        best = np.inf, x, rests[0]
+        ends = []
         for rest in rests:
             wanted = np.log(self.target[rest])
             for here in starts:
                 for _ in range(4):
-                    now = table + steep @ (here - x)
-                    order = np.argsort(now)
-                    columns = order[transfer.in_order(np.abs(now[order] - wanted[:, None]))]
-                    step = np.linalg.lstsq(steep[columns], wanted - table[columns], rcond=None)[0]
-                    here = np.clip(x + step, *bounds)
-                miss = float(np.square(table[columns] + steep[columns] @ (here - x) - wanted).sum())
-                best = min(best, (miss, here, rest), key=lambda one: one[0])
-        return self.fit(*best[1:]), best[2]
+                    now, steep = _rayleigh(moved, here - x)
+                    order = np.argsort(table + now)
+                    columns = order[transfer.in_order(np.abs((table + now)[order] - wanted[:, None]))]
+                    step = np.linalg.lstsq(steep[columns], wanted - (table + now)[columns], rcond=None)[0]
+                    here = np.clip(here + step, *bounds)
+                miss = float(np.square((table + _rayleigh(moved, here - x)[0])[columns] - wanted).sum())
+                ends.append((miss, here, rest))
+        least_miss, best, chosen = min(ends, key=lambda one: one[0])
+        enough = max(10.0 * least_miss, 1e-4 * len(chosen))
+        others = [end for end in ends if end[2] is chosen and end[0] < enough and np.abs(end[1] - best).max() > 0.05]
+        return self.fit(best, chosen), chosen, min(others, key=lambda one: one[0])[1] if others else None
+
+
+def _rayleigh(steep: np.ndarray, way: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Changes (n_modes,) of logarithms of frequencies, and their derivatives, along logarithms (n,) of constants.
+
+    Of each mode the derivatives (n_modes, n) at the start are half its shares of stiffness, of mass below zero; a share
+    goes with the constant, or with the power of it that the largest share shows.
+    """
+    powers = np.maximum(1.0, 2.0 * np.abs(steep).max(axis=0))
+    changes, slopes = np.zeros(len(steep)), np.zeros(steep.shape)
+    for sign in (1.0, -1.0):  # of stiffness, of mass
+        shares = np.maximum(sign * 2.0 * steep / powers, 0.0)
+        moved = shares * np.exp(powers * way)
+        whole = np.maximum(1.0 - shares.sum(axis=1) + moved.sum(axis=1), 1e-3)
+        changes += sign * 0.5 * np.log(whole)
+        slopes += sign * 0.5 * powers * moved / whole[:, None]
+    return changes, slopes

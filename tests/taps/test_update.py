@@ -99,3 +99,26 @@ def test_a_peak_that_is_no_mode_stays_unpaired_and_is_told(extra):
     assert found.unpaired == tuple(extra) and len(found.pairs) == 6
     assert found.values["E"] == pytest.approx(1.3, rel=5e-3) and found.values["G"] == pytest.approx(0.8, rel=5e-3)
     assert found.error < 3e-3 and ("left out: 230 Hz" in found.summary()) == bool(extra)
+
+
+@pytest.mark.parametrize(("n", "extra"), [(9, ()), (9, (95.0,)), (5, ())])
+@pytest.mark.parametrize("noise", [0.0, 5e-3])
+def test_constants_that_may_be_exchanged_are_told_as_uncertain(n, extra, noise):
+    """Frequencies of a square hinged plate do not tell which way it is stiffer, and its shapes do."""
+    ways = np.array([(i, j) for i in range(1, 8) for j in range(1, 8)])
+    points = np.stack(np.meshgrid(np.arange(1, 8) / 8.0, np.arange(1, 7) / 7.0), axis=-1).reshape(-1, 2)
+
+    def body(values):
+        squares = values["x"] * ways[:, 0] ** 4 + 3.0 * ways.prod(axis=1) ** 2 + values["y"] * ways[:, 1] ** 4
+        order = np.argsort(squares)[:20]
+        shapes = 2.0 * np.sin(np.pi * points[:, None] * ways[order]).prod(axis=2)
+        told = {"points": points, "mass": 1.0, "free": False}
+        return fi.Modes.from_arrays(10.0 * squares[order] ** 0.5, shapes, **told)
+
+    true, ranges = {"x": 3.0, "y": 1.2}, {"x": (0.4, 10.0), "y": (0.5, 9.0)}
+    measured = body(true).frequencies[:n] * (1.0 + noise * np.random.default_rng(n).standard_normal(n))
+    found = fi.update(body, np.sort([*measured, *extra]), ranges)
+    assert found.uncertain == ("x", "y") and found.unpaired == extra
+    assert all(abs(np.log(found.values[name] / true[name])) <= found.spread[name] + 1e-6 for name in true)
+    exact = body(true)
+    assert fi.update(body, exact, ranges).uncertain == ()
