@@ -36,10 +36,14 @@ def results(path: Path, deck: str = "") -> dict[str, np.ndarray]:
             )
         model.cross_reference(xref=False, xref_nodes=True)
         fields, (moved, frames) = _nodes(model)
+        table = list(found.eigenvectors.values())
+        given = [one.node_gridtype[:, 0] for one in (*table, *found.displacements.values())]
+        if frames.any() and any(len(each) < len(model.nodes) for each in given):
+            raise ValueError(f"{path.name} has results in frames of their own; export them at all nodes")
         if frames.any():
             found.transform_displacements_to_global(moved, model.coords, xyz_cid0=fields["nodes"])
         fields |= _elements(model.elements, fields)
-        numbers, table, cases = fields["numbers"], list(found.eigenvectors.values()), list[list[np.ndarray]]()
+        numbers, cases = fields["numbers"], list[list[np.ndarray]]()
         for tables in (table, found.displacements.values()):  # modes and static displacements
             cases.append([])
             for one in tables:
@@ -50,6 +54,10 @@ def results(path: Path, deck: str = "") -> dict[str, np.ndarray]:
         signs = [np.where(np.asarray(getattr(one, "eigns", 0.0)) < 0.0, -1.0, 1.0) for one in table]
         frequencies = np.concatenate([np.zeros(0), *(sign * np.abs(each) for sign, each in zip(signs, cycles))])
         fields |= cell_kinds.steps(len(numbers), *cases) | {"frequencies": frequencies}
+        told = np.all([np.isin(numbers, each) for each in (list(model.nodes), *given)], axis=0)  # no scalar points
+        place = np.where(told, np.cumsum(told) - 1, -1)
+        fields |= {name: fields[name][told] for name in ("numbers", "nodes", "shapes", "static")}
+        fields["cells"] = place[fields["cells"][told[fields["cells"]].all(axis=1)]]
         masses = [np.asarray(one.generalized_mass, float) for one in found.eigenvalues.values()]
         if masses and sum(map(len, masses)) >= len(frequencies):
             fields["modal_mass"] = np.concatenate(masses)[: len(frequencies)]

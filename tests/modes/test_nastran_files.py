@@ -72,6 +72,23 @@ def test_static_results_of_nastran_in_frames_of_their_own(tmp_path):
     assert body.frequencies[0] == pytest.approx(4.0 / (2.0 * np.pi), rel=1e-6) and body.cells.tolist() == [[0, 1]]
 
 
+@pytest.mark.parametrize("own", [False, True])
+def test_nodes_without_results_of_nastran_and_scalar_points_are_left_out(tmp_path, own):
+    op2, deck = tmp_path / "bar.op2", tmp_path / "bar.bdf"
+    deck.write_text(
+        f"GRID,1,,0.,0.,0.\nGRID,2,,1.,0.,0.\nGRID,3,,2.,0.,0.{',7' * own}\nCORD2R,7,,0.,0.,0.,0.,0.,1.\n,0.,1.,0.\n"
+        "SPOINT,9\nCBAR,1,1,1,2,0.,0.,1.\nCBAR,2,1,2,3,0.,0.,1.\nPBAR,1,1,1.,1.,1.,1.\nMAT1,1,1.,,.3,1.\n"
+    )
+    written_op2(op2, [16.0], np.ones((1, 2, 6), "float32"), [4.0 / (2.0 * np.pi)])
+    if own:
+        with pytest.raises(ValueError, match=r"results in frames of their own; export them at all nodes"):
+            fi.Body.load([op2, deck], mass=1.0)
+        return
+    body = fi.Body.load([op2, deck], mass=1.0)
+    assert body.numbers.tolist() == [1, 2] and body.cells.tolist() == [[0, 1]]
+    assert body.nodes[:, 0].tolist() == [0.0, 1.0] and (body.shapes == 1.0).all()
+
+
 def test_a_buckled_model_of_nastran_is_refused(tmp_path):
     files = [tmp_path / "bar.op2", written_deck(tmp_path / "bar.bdf", np.zeros((0, 2), int), sets=False)]
     for first in (-1e-9, -16.0):
