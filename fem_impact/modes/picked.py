@@ -87,7 +87,7 @@ def responses(name: str, found: Any) -> tuple[np.ndarray, np.ndarray, np.ndarray
 def pick(name: str, found: Any, about: Any = None) -> Picked:
     """The modes at the peaks of frequency responses, or near the frequencies ``about`` (n_modes,) [Hz].
 
-    Peaks whose pole runs away in the search are no modes and are left out.
+    Peaks whose pole runs away in the search, or that noise explains, are no modes and are left out.
     """
     s, values, weight, _ = responses(name, found)
     omega = s.imag
@@ -101,17 +101,14 @@ def pick(name: str, found: Any, about: Any = None) -> Picked:
         summits = np.unique([int(np.abs(omega - one).argmin()) for one in wanted]).astype(int)
     data = np.vstack([(values * weight[:, None]).real, (values * weight[:, None]).imag])
     start = np.log(np.stack([omega[summits], [_damping(omega, size, i) for i in summits]])).reshape(2, -1)
-    found_modes = _fit(omega, data, weight, start)
-    begun = found_modes.poles[0]
-    # peaks hidden beside others show in what is left, and so do modes above and below the band
-    places = [None, 1.2 * omega[-1], omega[0] / 1.2]
-    while places:
-        more = _with_one_more(omega, data, weight, found_modes, places[0])
-        if more is None:
-            places = places[1:]
-        else:
-            found_modes = more
-    poles, basis, constants, rest = _fit(omega, data, weight, found_modes.poles)
+    if about is None:
+        begun = np.zeros(0)
+        found_modes = _without_noise(omega, data, weight, _fit(omega, data, weight, start, 5), begun)
+    else:
+        found_modes = _fit(omega, data, weight, start)
+        begun = found_modes.poles[0]
+    found_modes = _fit(omega, data, weight, _with_more(omega, data, weight, found_modes).poles)
+    poles, basis, constants, rest = _without_noise(omega, data, weight, found_modes, begun, alike=True)
     n, inside = poles.shape[1], _inside(omega, poles)
     if about is not None:  # what else there is helps to find them
         inside &= np.isin(np.arange(n), np.abs(poles[0] - begun[:, None]).argmin(axis=1)) if n else False
@@ -220,6 +217,20 @@ def _fit(omega: np.ndarray, data: np.ndarray, weight: np.ndarray, start: np.ndar
     return _Modes(poles, basis, constants, data - basis @ constants)
 
 
+def _with_more(omega: np.ndarray, data: np.ndarray, weight: np.ndarray, found: _Modes) -> _Modes:
+    """The modes and those hidden beside them, which show in what is left; and some above and below the band."""
+    places = [None, 1.2 * omega[-1], omega[0] / 1.2]
+    while places:
+        more = _with_one_more(omega, data, weight, found, places[0])
+        if more is None and places[0] is None:
+            more = _with_one_split(omega, data, weight, found)
+        if more is None:
+            places = places[1:]
+        else:
+            found = more
+    return found
+
+
 def _with_one_more(
     omega: np.ndarray, data: np.ndarray, weight: np.ndarray, before: _Modes, at: float | None
 ) -> _Modes | None:
@@ -237,13 +248,77 @@ def _with_one_more(
     natural, damping = np.exp(after.poles)
     if at is not None and _inside(omega, after.poles).sum() > _inside(omega, before.poles).sum():
         return None  # it went into the band, where peaks are
+    near = np.diff(natural) < (damping * natural)[1:]
     gain = np.square(before.rest).sum() - np.square(after.rest).sum()
-    noise = np.square(after.rest).sum() / (max(1, len(data) - after.basis.shape[1]) * data.shape[1])
-    about = after.rest.reshape(2, len(omega), -1)[:, max(0, place - ABOUT) : place + ABOUT + 1]
+    return None if near.any() or gain < _luck(data, after, place) else after
+
+
+def _luck(data: np.ndarray, modes: _Modes, place: int) -> float:
+    """What one more mode at a line may explain of noise alone, from what all leave there, or everywhere."""
+    noise = np.square(modes.rest).sum() / (max(1, len(data) - modes.basis.shape[1]) * data.shape[1])
+    about = modes.rest.reshape(2, len(data) // 2, -1)[:, max(0, place - ABOUT) : place + ABOUT + 1]
     # larger where the hammer has little force; what is left of exact responses is rounding
     noise = max(noise, np.square(about).mean(), np.square(ROUNDING * data).mean())
-    near = np.diff(natural) < (damping * natural)[1:]
-    return None if near.any() or gain < GAIN * (2 + data.shape[1]) * noise else after
+    return GAIN * (2 + data.shape[1]) * float(noise)
+
+
+def _without_noise(
+    omega: np.ndarray, data: np.ndarray, weight: np.ndarray, found: _Modes, kept: np.ndarray, alike: bool = False
+) -> _Modes:
+    """The modes within the band that explain more than noise does, each beside the others, and those nearest ``kept``.
+
+    ``kept`` are logarithms of frequencies; ``alike`` tells whether what is left says how often it says the same.
+    """
+    while n := found.poles.shape[1]:
+        own = np.diag(np.linalg.pinv(found.basis.T @ found.basis))[:n]
+        gain = np.square(found.constants[:n]).sum(axis=1) / np.maximum(own, 1e-300)
+        places = np.abs(omega[:, None] - np.exp(found.poles[0])).argmin(axis=0)
+        share = gain / [_luck(data, found, place) for place in places]
+        if alike:  # lines that say the same add up, over the half-power width at most
+            width = 2.0 * np.exp(found.poles.sum(axis=0)) / np.gradient(omega)[places]
+            share /= np.clip(width, 1.0, _alike(found.rest))
+        share[~_inside(omega, found.poles)] = np.inf
+        share[np.abs(found.poles[0] - kept[:, None]).argmin(axis=1)] = np.inf
+        poor = share < 1.0
+        # of two beside each other either may do without the other: the poorer goes first
+        poor[1:] &= share[1:] <= np.where(poor[:-1], share[:-1], np.inf)
+        poor[:-1] &= share[:-1] < np.where(poor[1:], share[1:], np.inf)
+        if not poor.any():
+            break
+        found = _fit(omega, data, weight, found.poles[:, ~poor], 60 if alike else 5)
+    return found
+
+
+def _with_one_split(omega: np.ndarray, data: np.ndarray, weight: np.ndarray, before: _Modes) -> _Modes | None:
+    """The modes, of which one becomes two where what is left about it is no noise; None if none does.
+
+    Complex products, as of dampers at single places, delays or friction, leave something about a pole, too: two must
+    explain more.
+    """
+    n, (natural, damping) = before.poles.shape[1], np.exp(before.poles)
+    q = np.linalg.qr(before.basis)[0]
+
+    def explained(columns: np.ndarray) -> float:
+        moved = np.linalg.qr(columns - q @ (q.T @ columns))[0]
+        return float(np.square(moved.T @ before.rest).sum())
+
+    half = len(omega)
+    turned = np.vstack([-before.basis[half:, :n], before.basis[:half, :n]])  # i times each
+    shifts = 0.5 * np.stack([-damping, damping])  # a quarter of a half-power width to either side
+    beside = before.poles + np.stack([shifts, np.zeros(shifts.shape)], axis=1)  # (2 sides, 2, n_modes)
+    columns = [_basis(omega, weight, each)[0][:, :n] for each in beside]
+    places = np.abs(omega[:, None] - natural).argmin(axis=0)
+    gains = np.array([explained(np.stack([each[:, k] for each in columns], axis=1)) for k in range(n)])
+    least = [max(explained(turned[:, [k]]), 0.3 * _luck(data, before, places[k])) for k in range(n)]
+    for k in np.argsort(-gains):
+        if gains[k] > least[k]:
+            start = np.hstack([before.poles[:, :k], beside[:, :, k].T, before.poles[:, k + 1 :]])
+            after = _fit(omega, data, weight, start)
+            apart = np.diff(after.poles[0]) > 0.05 * np.exp(after.poles[1, 1:])
+            gain = np.square(before.rest).sum() - np.square(after.rest).sum() - explained(turned)
+            if after.poles.shape[1] == n + 1 and apart.all() and gain > _luck(data, after, places[k]):
+                return after
+    return None
 
 
 def unit_responses(s: np.ndarray, weight: np.ndarray, poles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -276,6 +351,12 @@ def _refined(omega: np.ndarray, data: np.ndarray, weight: np.ndarray, start: np.
     middle = 0.5 * (start[0, 1:] + start[0, :-1])
     low = np.concatenate([[np.log(omega[0] / 1.5)], middle, np.full(n, np.log(DAMPING[0]))])[: 2 * n]
     high = np.concatenate([middle, [np.log(1.5 * omega[-1])], np.full(n, np.log(DAMPING[1]))])[-2 * n :]
+    # poles within one peak share it: what was the middle between them need not stay between them
+    close = np.flatnonzero(np.diff(start[0]) < 1.5 * np.exp(np.maximum(start[1, 1:], start[1, :-1])))
+    for i in close:
+        low[i + 1] = low[i]
+    for i in close[::-1]:
+        high[i] = high[i + 1]
     edge = 1e-3 * (high - low)
     x, caution, cost = np.clip(start.ravel(), low + edge, high - edge), 1e-3, np.inf
     best = x
@@ -296,7 +377,8 @@ def _refined(omega: np.ndarray, data: np.ndarray, weight: np.ndarray, start: np.
         step = np.linalg.lstsq(square + caution * np.diag(np.diag(square)), slope, rcond=None)[0]
         x = np.clip(best + step, low, high)
     near = (best - low < edge) | (high - best < edge)
-    return best.reshape(2, n), near.reshape(2, n).any(axis=0)
+    order = np.argsort(best[:n], kind="stable")
+    return best.reshape(2, n)[:, order], near.reshape(2, n).any(axis=0)[order]
 
 
 def _damping(omega: np.ndarray, size: np.ndarray, i: int) -> float:

@@ -250,3 +250,32 @@ def test_responses_without_power_are_refused(change, text, pick):
     frf = responses().isel(channel=[0, 1])
     with pytest.raises(ValueError, match=text):
         fi.Modes.from_frf(change(frf), mass=1.0, points=[[0.0], [1.0]], driving=0, pick=pick)
+
+
+def of_random_body(seed, noise, split=None):
+    """Frequencies [Hz] and accelerances of modes; ``split``: two of them, in half-power widths apart."""
+    rng = np.random.default_rng(seed)
+    natural = 200.0 * np.arange(1, 5) + rng.uniform(-50.0, 50.0, 4)
+    damping, shapes = np.full(5, 0.01), rng.normal(size=(5, 3))
+    shapes[:, 0] = np.abs(shapes[:, 0]) + 0.3
+    natural = np.append(natural, [] if split is None else natural[2] * (1.0 + 2.0 * 0.01 * split))
+    given = of_sum(list(zip(natural, damping, shapes)), np.arange(50.0, 1001.0), rng, noise)
+    return np.sort(natural), given
+
+
+def test_two_modes_within_one_peak_are_two():
+    """They were picked as one, whose frequency was up to a hundred stated errors off."""
+    for seed in range(6):
+        natural, given = of_random_body(seed, 1e-3, split=0.5)
+        found = picked.pick("frf", given)
+        assert found.frequencies == pytest.approx(natural, rel=2e-3)
+        assert (np.abs(found.frequencies - natural) < 5.0 * found.frequency_errors).all()
+        natural, given = of_random_body(seed, 1e-3)
+        assert picked.pick("frf", given).frequencies == pytest.approx(natural, rel=1e-3)  # and one stays one
+
+
+def test_peaks_of_noise_are_no_modes():
+    """Half of the bodies had such modes, of tiny products."""
+    for seed in range(8):
+        natural, given = of_random_body(seed, 0.3)
+        assert len(picked.pick("frf", given.isel(channel=[0])).frequencies) <= len(natural)
