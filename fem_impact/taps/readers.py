@@ -508,6 +508,14 @@ def universal(path: Path) -> Recording:
     if not np.allclose(rates, rates[0], rtol=1e-6):
         raise ValueError(f"{path.name} has records of different rates, {min(rates):g} and {max(rates):g} Hz")
     count = min(len(records) for records in channels.values())
+    for key in [key for key in channels if len(channels[key]) % count == 0 and len(channels[key]) > count]:
+        if (units.si_unit(unit[key]) or "N")[0] != "N":  # sensors without names or nodes of their own
+            several, first = channels.pop(key), begun.pop(key)
+            n = len(several) // count
+            notes.append(f"{key[0]}: {n} channels of this name, told apart by their order")
+            for j in range(n):
+                new = (f"{key[0]} #{j + 1}", *key[1:])
+                channels[new], begun[new], unit[new] = several[j::n], first[j::n], unit[key]
     if any(len(records) > count for records in channels.values()):
         notes.append(f"only {count} records of each channel were used, as many as all have")
     # signs of the directions, 0 if not stated

@@ -49,6 +49,7 @@ class Taps(check.Brief):
         Parameters
         ----------
         force : array_like, (n_taps, n_times) or (n_times,) [N]
+            What its rest drifts from that at the onset, by more than noise, is taken off.
         response : array_like, (n_taps, n_times) or (n_taps, n_times, n_channels), optional
         rate : float [Hz]
         names, units : sequence of str, optional
@@ -87,12 +88,16 @@ class Taps(check.Brief):
             check.one_of("units", text, [si for si in channels.units.KINDS if si != "N"])
         tags = [f"tap {i + 1}" for i in range(n_taps)] if labels is None else labels
         tags = check.texts("labels", tags, n_taps, "tap of force")
+        cut = _cut_off(rows, others, overload)
+        moved = np.array([triggers.drift(row, rate) for row in rows])
+        rows = rows - moved
+        said = [f"drift of the force was removed, up to {np.ptp(moved, axis=1).max():.2g} N within a record"]
         table = xr.Dataset(
             {
                 "force": (("tap", "time"), rows, {"units": "N"}),
                 "response": (("tap", "time", "channel"), others),
                 "onset": ("tap", np.array([triggers.onset(f) for f in rows]) / rate, {"units": "s"}),
-                "overload": (("tap", "sensor"), _cut_off(rows, others, overload)),
+                "overload": (("tap", "sensor"), cut),
                 "pulse": ("tap", np.full(n_taps, np.nan if pulse is None else check.positive("pulse", pulse, "N"))),
             },
             {
@@ -104,7 +109,7 @@ class Taps(check.Brief):
             },
             {"rate": rate},
         )
-        return cls(table, tuple(check.texts("notes", notes)))
+        return cls(table, (*check.texts("notes", notes), *(said if moved.any() else ())))
 
     @property
     def rate(self) -> float:

@@ -101,6 +101,7 @@ def frf(
     if response_window is not None:
         tau = check.positive("response_window", response_window, "s")
         fade = np.exp(-np.maximum(taps.time - taps.onset[:, None], 0.0) / tau)
+        notes += _faded(taps, fade)
     count = len(taps.time) if n_times is None else check.count("n_times", n_times, low=2, high=2**24)
     if count < len(taps.time):
         notes.append(f"only the first {count} of {len(taps.time)} samples are used")
@@ -191,6 +192,19 @@ def _lost(taps: Taps, shade: np.ndarray) -> list[str]:
     if lost.max() <= 0.01 or not inside.any():
         return []
     return [f"force_window cuts off up to {100.0 * lost.max():.2g} % of the force of a tap; make it longer"]
+
+
+def _faded(taps: Taps, fade: np.ndarray) -> list[str]:
+    """A note if a window of the responses (n_taps, n_times) leaves less than a fiftieth of what they hold over noise.
+
+    One that is a fifth of a record leaves a tenth of a response that does not decay at all.
+    """
+    power = np.square(taps.response) - np.nan_to_num(_rest(taps))[:, None] ** 2
+    share = (power * fade[:, :, None] ** 2).sum(axis=(0, 1)) / np.maximum(power.sum(axis=(0, 1)), 1e-300)
+    least = float(np.min(share, initial=1.0, where=power.sum(axis=(0, 1)) > 0.0))
+    if least > 0.02:
+        return []
+    return [f"response_window leaves {100.0 * max(least, 0.0):.1g} % of the power of a response; make it longer"]
 
 
 def _rest(taps: Taps) -> np.ndarray:

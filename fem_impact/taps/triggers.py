@@ -141,6 +141,14 @@ def level_of_rest(force: np.ndarray, block: int) -> np.ndarray:
     return np.interp(np.arange(len(force)), [0, *middle, len(force) - 1], [ends[0], *values, ends[1]])
 
 
+def drift(force: np.ndarray, rate: float) -> np.ndarray:
+    """How far the rest of a tap's record (n_samples,) moves from where it is at the onset; zero if that is noise."""
+    block = max(0.2 * rate, 4.0 * width(force - np.median(force)))
+    rest = level_of_rest(force, round(block))
+    sure = max(CLEAR * noise(force) * np.sqrt(2.0 * np.pi / block), 1e-4 * float(np.ptp(force)))
+    return rest - rest[onset(force)] if np.ptp(rest) > sure else np.zeros(len(force))
+
+
 def is_clipped(values: np.ndarray, full_scale: float | None = None) -> bool:
     """Whether a channel (n_times,) is cut off at its largest magnitude."""
     top = float(np.abs(values).max(initial=0.0))

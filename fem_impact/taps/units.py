@@ -8,10 +8,10 @@ FORCE = {
     "lb": 4.4482216152605, "kgf": 9.80665, "kp": 9.80665, "dyn": 1e-5,
 }  # fmt: skip
 ACCELERATION = {
-    "m/s^2": 1.0, "m*s^-2": 1.0, "ms-2": 1.0, "g": 9.80665, "gn": 9.80665, "mm/s^2": 1e-3, "cm/s^2": 1e-2,
-    "in/s^2": 0.0254, "ft/s^2": 0.3048,
+    "m/s^2": 1.0, "m*s^-2": 1.0, "ms-2": 1.0, "g": 9.80665, "gn": 9.80665, "mg": 9.80665e-3,
+    "mm/s^2": 1e-3, "cm/s^2": 1e-2, "in/s^2": 0.0254, "ft/s^2": 0.3048,
 }  # fmt: skip
-VELOCITY = {"m/s": 1.0, "mm/s": 1e-3, "um/s": 1e-6, "µm/s": 1e-6, "in/s": 0.0254}
+VELOCITY = {"m/s": 1.0, "mm/s": 1e-3, "um/s": 1e-6, "µm/s": 1e-6, "in/s": 0.0254, "ips": 0.0254}
 DISPLACEMENT = {"m": 1.0, "mm": 1e-3, "um": 1e-6, "µm": 1e-6, "in": 0.0254}
 KINDS = {"N": FORCE, "m/s^2": ACCELERATION, "m/s": VELOCITY, "m": DISPLACEMENT}  # SI unit -> factors
 FORCE_NAMES = re.compile(r"force|hammer|kraft|excit|\bexc\b|input|^f$", re.IGNORECASE)
@@ -24,7 +24,7 @@ OTHERS = (  # not known by `si_unit`: such a channel needs a scale
 LABEL = re.compile(r"^(.*?)(?:\s*[\[(]|\s+(?:/|in)\s+|,\s+|(?<=^\w)/\(?)([^\])]*)[\])]?$")
 
 # "acc_g", as names in MATLAB and of columns hold no brackets; of units that begin no other word
-SUFFIX = re.compile(r"_(g|m?N|kN|lbf|mV)$")
+SUFFIX = re.compile(r"_(m?g|m?N|kN|lbf|ips|mV)$")
 
 
 def si_unit(unit: str) -> tuple[str, float] | None:

@@ -49,6 +49,11 @@ def assert_same(found, modes, points):
     assert_allclose(found.shape_at(points), shapes, atol=1e-5 * np.abs(shapes).max())
 
 
+def test_shapes_of_another_size_than_the_mass_are_noted_once(written):
+    notes = fi.Modes.from_uff(written[-1], mass=1e4).notes
+    assert sum("times as large as those of a body" in note for note in notes) == 1
+
+
 def test_modes_come_back_as_they_were_written_with_their_elements(written, tmp_path):
     modes, points, cells, path = written
     again = fi.Modes.from_uff(path, mass=modes.mass)

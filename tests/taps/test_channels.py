@@ -15,7 +15,7 @@ def recording(names, units):
     "text, wanted",
     [("N", ("N", 1.0)), ("Newtons", ("N", 1.0)), ("kN", ("N", 1e3)), ("mN", ("N", 1e-3)), ("MN", ("N", 1e6)),
      ("lbf", ("N", 4.4482216152605)), ("g", ("m/s^2", 9.80665)), ("m/s²", ("m/s^2", 1.0)), ("mm/s", ("m/s", 1e-3)),
-     ("μm", ("m", 1e-6)), ("mV", None), ("furlong", None)],
+     ("μm", ("m", 1e-6)), ("mg", ("m/s^2", 9.80665e-3)), ("mV", None), ("furlong", None)],
 )  # fmt: skip
 def test_known_units(text, wanted):
     assert units.si_unit(text) == wanted
@@ -27,7 +27,8 @@ def test_known_units(text, wanted):
      ("Force (Trigger)", ("Force (Trigger)", "")), ("Kraft / kN", ("Kraft", "kN")), ("F/kN", ("F", "kN")),
      ("a/(m/s²)", ("a", "m/s²")), ("Zeit in ms", ("Zeit", "ms")), ("Force, lbf", ("Force", "lbf")),
      ("load [kg]", ("load", "kg")), ("velocity m/s", ("velocity m/s", "")), ("m/s", ("m/s", "")),
-     ("acc_g", ("acc_g", "g")), ("F_kN", ("F_kN", "kN")), ("hammer_in", ("hammer_in", ""))],
+     ("acc_g", ("acc_g", "g")), ("acc_mg", ("acc_mg", "mg")), ("speed (ips)", ("speed", "ips")),
+     ("F_kN", ("F_kN", "kN")), ("hammer_in", ("hammer_in", ""))],
 )  # fmt: skip
 def test_a_heading_ends_with_its_unit_if_it_holds_one(heading, wanted):
     assert units.label(heading) == wanted

@@ -281,6 +281,15 @@ def test_force_and_acceleration_of_one_point_stay_apart_in_a_universal_file(tmp_
     assert recording(universal(tmp_path / "t.uff", milliseconds, MOVES | milliseconds))[1] == 1e3 * RATE
 
 
+def test_accelerometers_without_names_or_nodes_are_told_apart_by_their_order(tmp_path):
+    """The second one was taken as the first one's second record, and dropped."""
+    more = MOVES | {"data": 5.0 * np.arange(40)}
+    path = universal(tmp_path / "t.uff", {}, MOVES, more, {}, MOVES, more)
+    units, _, notes, values = recording(path)
+    assert units == ["N", "m/s^2", "m/s^2"] and values[10].tolist() == [10.0, 20.0, 50.0]
+    assert "2 channels of this name, told apart by their order" in notes
+
+
 @UNCLOSED
 def test_a_universal_file_agrees_with_them(tmp_path):
     long = {"x": TIME, "num_pts": len(TIME)}
