@@ -56,7 +56,7 @@ class Taps(check.Brief):
             Of the responses; by default accelerations in m/s^2.
         overload : array_like of bool, (n_taps, 1 + n_channels), optional
             Of the force and the responses; by default, a channel with three equal largest samples in a row is cut off,
-            and a force whose top is flat within its noise.
+            and one whose top is flat within its noise.
         labels : sequence of str, optional
             Of the taps; by default "tap 1" and so on.
         pulse : float [N], optional
@@ -256,6 +256,9 @@ def _cut_off(force: np.ndarray, response: np.ndarray, stated: Any) -> np.ndarray
         records = np.concatenate([force[:, :, None], response], axis=2)
         found = np.array([[triggers.is_clipped(channel) for channel in record.T] for record in records])
         found[:, 0] |= [triggers.is_saturated(row) for row in force]
+        for one, row, other in zip(found, force, response):
+            for k, channel in enumerate(other.T, 1):
+                one[k] |= triggers.is_flat(channel, triggers.onset(row) - triggers.GUARD)
         return found
     shape, flags = (len(force), 1 + response.shape[2]), np.asarray(None)
     with suppress(ValueError):  # rows of several lengths
@@ -347,10 +350,8 @@ def read_taps(
             f"a tap in {name} has {rows.shape[1]} samples at a rate of {stated:g} Hz, {readers.LEAST} at least are "
             "needed; check the unit of its times, rate, before and length"
         )
-    cut = [
-        [top or triggers.is_clipped(row, full_scale) or triggers.is_saturated(row), *map(triggers.is_clipped, other.T)]
-        for row, other, top in zip(rows, responses, full.tolist())
-    ]
+    cut = _cut_off(rows, responses, None)
+    cut[:, 0] |= [top or triggers.is_clipped(row, full_scale) for row, top in zip(rows, full.tolist())]
     taps = Taps.from_arrays(
         rows, responses, rate=stated, names=names, units=kinds, overload=cut, labels=labels, pulse=pulse
     )  # fmt: skip
@@ -362,6 +363,8 @@ def read_taps(
         ([label for label, late in zip(taps.labels, taps.cut_short) if late],
          "{}: the record begins or ends within a pulse"),
         (flat, "cut off by the range of the channel: {}"),
+        ([label for label, filled in zip(taps.labels, taps.response) if any(map(triggers.is_filled, filled.T))],
+         "{}: a response stands still amid its motion, as where lost samples were filled"),
         (dead, "{}: does not change during a tap, as a dead channel; leave it out, response="),
         ([label for label, back in zip(taps.labels, triggers.pulls(taps.force)) if back],
          "{}: the force pulls as it pushes, which no contact does; name its channel, force="),

@@ -58,6 +58,23 @@ def test_a_force_that_drifts_changes_no_response():
     assert (np.abs(two.H - one.H) < 0.5 * one.error).values[band].mean() > 0.95
 
 
+def test_responses_that_an_amplifier_ends_or_zeros_fill_are_left_out():
+    """Noise behind the amplifier hid the one, and nothing looked for the other."""
+    taps = taps_of(1e-4)
+    force, moved = (np.concatenate([getattr(each, name) for each in taps]) for name in ("force", "response"))
+    lead = np.zeros((len(force), 100))
+    force = np.hstack([lead, force])
+    moved = np.hstack([1e-4 * np.random.default_rng(1).standard_normal(lead.shape) * np.ptp(moved), moved[:, :, 0]])
+    good = fi.Taps.from_arrays(force, moved, rate=RATE)
+    assert not good.table["overload"].values.any() and not fi.frf(good).attrs["notes"]
+    spoiled, top = moved.copy(), 0.3 * np.abs(moved[0]).max()
+    spoiled[0] = np.clip(moved[0], -top, top) + 2e-4 * np.random.default_rng(2).standard_normal(moved.shape[1]) * top
+    spoiled[1, 300:330] = 0.0
+    cut_off, filled = fi.frf(fi.Taps.from_arrays(force, spoiled, rate=RATE)).attrs["notes"]
+    assert cut_off == "left out, because a channel is cut off: tap 1"
+    assert filled == "left out, because a channel stands still amid its motion: tap 2"
+
+
 def test_taps_that_are_cut_off_or_dead_are_left_out():
     """Two cut to half their force would tell twice the response, and agree on it."""
     taps = taps_of(0.0)
