@@ -27,7 +27,6 @@ TIME_NAMES = ("time", "t", "times", "x_value", "zeit", "time_s")
 TIME_UNITS = {
     "s": 1.0, "sec": 1.0, "ms": 1e-3, "msec": 1e-3, "us": 1e-6, "µs": 1e-6, "ns": 1e-9, "min": 60.0, "h": 3600.0,
 }  # fmt: skip
-UFF_UNITS = {13: "N", 9: "N", 12: "m/s^2", 11: "m/s", 8: "m"}  # codes of quantities in data set 58
 TIME_RESPONSE, FREQUENCY_RESPONSE, COHERENCE = 1, 4, 6  # function types of data set 58
 UFF_TYPES = {  # function types of data set 58 -> what it holds
     1: "time records", 2: "auto spectra", 3: "cross spectra", 4: "frequency responses", 5: "transmissibilities",
@@ -491,7 +490,7 @@ def universal(path: Path) -> Recording:
         stated = str(one.get("ordinate_axis_units_lab") or "").strip()
         stated = "" if stated == "NONE" else stated
         key = (uff_name(one), int(one.get("rsp_node", 0)), int(one.get("rsp_dir", 0)), code)
-        known, kind, doubts = uff_unit(path, key[0], stated, code)
+        known, kind, doubts = units.uff_unit(path, key[0], stated, code)
         notes += doubts
         if kind and not known and kind in factors:
             data = data / factors[kind]
@@ -594,14 +593,3 @@ class Universal:
 def uff_name(one: dict) -> str:
     name = str(one.get("id1", "")).strip()
     return name if name not in ("", "NONE") else f"node {one.get('rsp_node', 0)} direction {one.get('rsp_dir', 0)}"
-
-
-def uff_unit(path: Path, name: str, label: str, code: int) -> tuple[tuple[str, float] | None, str | None, list[str]]:
-    """What the label of a unit in data set 58 is known as, the unit of its code, and a note if the code decides."""
-    known, kind = units.si_unit(label), UFF_UNITS.get(code)
-    if known and kind and known[0] != kind:
-        raise ValueError(
-            f"{path.name} states the unit {label!r} for {name!r}, whose code {code} means {kind}; export it again"
-        )
-    doubtful = kind and not known and label not in ("", "NONE")
-    return known, kind, [f"{name}: the unit {label!r} is not known, {kind} assumed by its code {code}"] * bool(doubtful)

@@ -15,7 +15,7 @@ from ..modes import picked, universal_files
 from ..modes.modal import Modes
 from . import readers, triggers
 from .records import Taps
-from .units import axis_factor
+from .units import UFF_UNITS, axis_factor, uff_unit
 from .units import si_unit as known_unit
 from .windows import join_tables
 
@@ -23,7 +23,7 @@ METHODS = ("H1", "H2", "Hv")
 SURE = 0.9  # [-] probability that the true response lies within the error stated
 WAY = ("node", "direction", "reference", "reference_direction")  # of a response in data set 58
 ENDS = ("place", "struck")  # where it is measured and struck
-RESPONSE_CODE = {unit: code for code, unit in readers.UFF_UNITS.items() if unit != "N"}
+RESPONSE_CODE = {unit: code for code, unit in UFF_UNITS.items() if unit != "N"}
 
 
 def frf(
@@ -418,7 +418,7 @@ def _per_force(path: Path, name: str, one: dict[str, Any], factors: dict[str, fl
         ends = [over, ends[1] if known_unit(ends[1]) else under]
     for what, label, default in zip(("ordinate", "orddenom"), ends, ("", "N")):
         code = int(one.get(f"{what}_spec_data_type") or 0)
-        stated, kind, doubts = readers.uff_unit(path, name, label, code)
+        stated, kind, doubts = uff_unit(path, name, label, code)
         notes += doubts
         if stated is None and kind is None and not code and default:
             notes.append(f"{name}: what it is divided by is not stated, N assumed")

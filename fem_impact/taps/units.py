@@ -2,6 +2,7 @@
 
 import re
 from collections.abc import Mapping
+from pathlib import Path
 
 FORCE = {
     "N": 1.0, "newton": 1.0, "newtons": 1.0, "kN": 1e3, "mN": 1e-3, "MN": 1e6, "daN": 10.0, "lbf": 4.4482216152605,
@@ -14,6 +15,7 @@ ACCELERATION = {
 VELOCITY = {"m/s": 1.0, "mm/s": 1e-3, "um/s": 1e-6, "µm/s": 1e-6, "in/s": 0.0254, "ips": 0.0254}
 DISPLACEMENT = {"m": 1.0, "mm": 1e-3, "um": 1e-6, "µm": 1e-6, "in": 0.0254}
 KINDS = {"N": FORCE, "m/s^2": ACCELERATION, "m/s": VELOCITY, "m": DISPLACEMENT}  # SI unit -> factors
+UFF_UNITS = {13: "N", 9: "N", 12: "m/s^2", 11: "m/s", 8: "m"}  # codes of quantities in data set 58
 FORCE_NAMES = re.compile(r"force|hammer|kraft|excit|\bexc\b|input|^f$", re.IGNORECASE)
 RESPONSE_NAMES = re.compile(r"accel|resp|veloc|displ|vibro|^a\d*$|^acc", re.IGNORECASE)
 OTHERS = (  # not known by `si_unit`: such a channel needs a scale
@@ -54,3 +56,14 @@ def label(text: str) -> tuple[str, str]:
         return found[1].rstrip(" /"), found[2].strip()
     last = SUFFIX.search(text.strip())
     return text.strip(), last[1] if last else ""
+
+
+def uff_unit(path: Path, name: str, label: str, code: int) -> tuple[tuple[str, float] | None, str | None, list[str]]:
+    """What the label of a unit in data set 58 is known as, the unit of its code, and a note if the code decides."""
+    known, kind = si_unit(label), UFF_UNITS.get(code)
+    if known and kind and known[0] != kind:
+        raise ValueError(
+            f"{path.name} states the unit {label!r} for {name!r}, whose code {code} means {kind}; export it again"
+        )
+    doubtful = kind and not known and label not in ("", "NONE")
+    return known, kind, [f"{name}: the unit {label!r} is not known, {kind} assumed by its code {code}"] * bool(doubtful)
