@@ -37,6 +37,7 @@ class Picked(NamedTuple):
     frequency_errors: np.ndarray  # (n_modes,) [Hz] standard errors
     damping_errors: np.ndarray  # (n_modes,) [-] the same
     alike: float  # [-] neighbouring lines that say the same, for which all errors are widened by its root
+    late: np.ndarray  # (n_channels,) [s] that explain half of what is left of a response, and turn it; 0 of most
 
 
 def peaks(size: np.ndarray) -> np.ndarray:
@@ -125,7 +126,23 @@ def pick(name: str, found: Any, about: Any = None) -> Picked:
     misfit = _misfit(omega, np.exp(poles), basis[:, :n], constants[:n], rest)
     whole = natural / (2.0 * np.pi), damping, constants[:n].T, spread[:n].T, misfit, *doubt
     kept = [each[..., inside] for each in whole]
-    return Picked(kept[0], kept[1], kept[2], kept[3], kept[4], left, kept[5], kept[6], wide)
+    late = _late(omega, basis, basis[:, :n] @ constants[:n], rest)
+    return Picked(kept[0], kept[1], kept[2], kept[3], kept[4], left, kept[5], kept[6], wide, late)
+
+
+def _late(omega: np.ndarray, basis: np.ndarray, moved: np.ndarray, rest: np.ndarray) -> np.ndarray:
+    """How much later than the force each response comes, (n_channels,) [s], where that explains half of what is left.
+
+    What products and poles make up for is not in it.
+    Real products tell a delay from a wave's travel. One that turns the band by less than 0.3 may be the damping's form.
+    """
+    swing, half = omega[:, None], len(omega)
+    turned = np.vstack([swing * moved[half:], -swing * moved[:half]])  # slope by the delay
+    q = np.linalg.qr(basis)[0]
+    turned -= q @ (q.T @ turned)
+    along, size = (turned * rest).sum(axis=0), np.maximum(np.square(turned).sum(axis=0), 1e-300)
+    sure = along**2 > 0.5 * size * np.square(rest).sum(axis=0)
+    return np.where(sure & (np.abs(along / size) * omega[-1] > 0.3), along / size, 0.0)
 
 
 def _alike(rest: np.ndarray) -> float:
@@ -414,6 +431,9 @@ def modes_of(found: Any, driving: Any, points: Any, about: Any) -> tuple[dict[st
     rest = f"of which {100.0 * picked.left:.2g} % rms are left unexplained"
     rest += "; check their units, signs and delays" * (picked.left > 0.5)  # sharing nothing makes it 1
     notes = [f"picked from frequency responses, {rest}"]
+    for i in np.flatnonzero(picked.late):
+        way, size = "late" if picked.late[i] > 0.0 else "early", 1e3 * abs(picked.late[i])
+        notes.append(f"{label(found, int(i))} seems {way} against the force, by {size:.1g} ms or more; check its delay")
     if not moved.all():
         lost = ", ".join(f"{one:.5g} Hz" for one in picked.frequencies[~moved])
         notes.append(f"modes at {lost} are left out: the point struck hardly moves in them, so that they have no scale")

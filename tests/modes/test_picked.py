@@ -279,3 +279,14 @@ def test_peaks_of_noise_are_no_modes():
     for seed in range(8):
         natural, given = of_random_body(seed, 0.3)
         assert len(picked.pick("frf", given.isel(channel=[0])).frequencies) <= len(natural)
+
+
+def test_a_channel_that_comes_late_or_early_is_told():
+    """Its products, and the scale of all shapes where it is the one struck, were wrong without a word."""
+    for seed, late in ((0, 1e-4), (1, -6e-5), (2, 0.0)):
+        given = of_random_body(seed, 1e-3)[1]
+        delay = np.exp(-2j * np.pi * late * given["frequency"].values)[:, None] ** np.array([0.0, 1.0, 0.0])
+        known = {"mass": 1.0, "points": [[0.0], [0.4], [1.0]], "driving": 0}
+        notes = fi.Modes.from_frf(given.assign(H=given["H"] * delay), **known).notes
+        said = [note for note in notes if "against the force" in note]
+        assert len(said) == bool(late) and all("'b' seems " + ("late" if late > 0.0 else "early") in x for x in said)
