@@ -159,9 +159,14 @@ def _told_again(nodes: np.ndarray, moved: np.ndarray, frequencies: np.ndarray) -
         )
 
 
+def moved_along(squares: np.ndarray) -> np.ndarray:
+    """Which modes (n_modes,) move along the direction of these mean squares: others move across it."""
+    return squares > 0.01 * squares.max(initial=0.0)
+
+
 def notes_on_mass(squares: np.ndarray, mass: float) -> tuple[str, ...]:
     """A note on mean squares (n_modes,) [1/kg] of elastic shapes over a body that all say the same other mass [kg]."""
-    squares = squares[squares > 0.01 * squares.max(initial=0.0)]  # others move across
+    squares = squares[moved_along(squares)]
     if len(squares) < 3 or np.log(squares).std() > 0.15:
         return ()
     other = float(1.0 / np.median(squares))

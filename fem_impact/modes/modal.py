@@ -158,26 +158,24 @@ class Modes(check.Brief):
             omega, damping, values = np.append(still, omega), np.append(still, damping), np.hstack([loose, values])
             loose, doubt = None, np.where(omega > 0.0, 0.0, np.full(values.shape, error))[None] if error else None
         rest, known = None, unstated.numbers_of_points(loads, len(points), compliance is not None)
-        static = np.zeros((len(points), 0))
-        if compliance is not None:
-            static = check.array("compliance", compliance, (len(points), len(known)), "m/N")
+        given = np.zeros((len(points), len(known))) if compliance is None else compliance
+        static = check.array("compliance", given, (len(points), len(known)), "m/N")
         if len(known) < len(points) and not complete and omega[-1] > 0.0:
             rest = np.column_stack(unstated.estimate_left_out(omega, values, mass, span))
             rest[known] = 0.0
         flexible = omega > 0.0
         yields = values[:, flexible] / omega[flexible]
         sampled = SampledShapes(points, values, static, connected, rest, loose, known, yields, doubt)
-        gaps = {"compliance": rest, "free": loose, "inertia": doubt}
-        missing = tuple(name for name, what in gaps.items() if what is not None)
-        strength = np.where(flexible, (values**2).mean(axis=0), 0.0)
-        along = strength > 0.01 * strength.max()  # others move across
+        gaps = ("compliance", rest), ("free", loose), ("inertia", doubt)
+        missing = tuple(name for name, what in gaps if what is not None)
+        along = plausible.moved_along(np.where(flexible, (values**2).mean(axis=0), 0.0))
         odd: tuple[str, ...] = ()
         if not complete:
             odd = plausible.imported_notes(points, values[:, None, along], mass, omega[along] / (2.0 * np.pi))
-            odd = (*odd, *plausible.disordered(points, values[:, flexible]))
+            odd += plausible.disordered(points, values[:, flexible])
             turned = plausible.notes_on_rigid(values[:, ~flexible], mass, 0 if free is False else span)
             squares = unstated.mean_squares(points, connected, values[:, None, flexible])
-            odd = (*odd, *(turned or plausible.notes_on_mass(squares, mass)))
+            odd += turned or plausible.notes_on_mass(squares, mass)
         notes = (*odd, *plausible.notes_on_damping(damping, omega), *(UNSTATED[name] for name in missing))
         made, said = cls(omega, damping, sampled, mass, notes=notes, unstated=missing), dents.stated_material(solid)
         return made if said == () else dents.settle_dents(made, dents.of_points(points, static, known), said)
@@ -218,12 +216,10 @@ class Modes(check.Brief):
             raise ValueError(f"direction must be one along which {path.name} has motions, got {direction!r}")
         keep = cell_kinds.differing_axes(found["nodes"], direction)
         cells = found["lines" if len(keep) == 1 else "triangles"]
-        made = cls.from_arrays(
+        return cls.from_arrays(
             found["frequencies"], shapes, points=found["nodes"][:, keep], mass=mass,
             damping_ratio=damping, compliance=compliance, cells=cells if len(cells) else None, free=free,
         )  # fmt: skip
-        odd = plausible.imported_notes(found["nodes"], found["shapes"], made.mass, found["frequencies"])
-        return replace(made, notes=plausible.together(made.notes, odd))
 
     @classmethod
     def from_frf(

@@ -101,7 +101,9 @@ def pick(name: str, found: Any, about: Any = None) -> Picked:
             raise ValueError(f"frequencies must lie within those of {name}, where its force has power")
         summits = np.unique([int(np.abs(omega - one).argmin()) for one in wanted]).astype(int)
     data = np.vstack([(values * weight[:, None]).real, (values * weight[:, None]).imag])
-    start = np.log(np.stack([omega[summits], [_damping(omega, size, i) for i in summits]])).reshape(2, -1)
+    apart = np.diff(np.log(omega[summits]), prepend=-np.inf, append=np.inf)
+    widths = np.minimum([_damping(omega, size, i) for i in summits], 0.5 * np.minimum(apart[1:], apart[:-1]))
+    start = np.log(np.stack([omega[summits], widths])).reshape(2, -1)
     if about is None:
         begun = np.zeros(0)
         found_modes = _without_noise(omega, data, weight, _fit(omega, data, weight, start, 5), begun)

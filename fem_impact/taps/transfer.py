@@ -99,12 +99,10 @@ def frf(
     taps, notes = _whole_taps(join_tables(records, "records"))
     shade, fade = np.ones((taps.n_taps, 1)), np.ones(taps.force.shape)
     if response_window is not None:
-        tau = check.positive("response_window", response_window, "s")
-        fade = np.exp(-np.maximum(taps.time - taps.onset[:, None], 0.0) / tau)
+        fade = _response_window(taps, check.positive("response_window", response_window, "s"))
         notes += _faded(taps, fade)
     count = len(taps.time) if n_times is None else check.count("n_times", n_times, low=2, high=2**24)
-    if count < len(taps.time):
-        notes.append(f"only the first {count} of {len(taps.time)} samples are used")
+    notes += [f"only the first {count} of {len(taps.time)} samples are used"] * (count < len(taps.time))
     if force_window is not None:
         shade = _force_window(taps, check.positive("force_window", force_window, "s"))
         notes += _lost(taps, shade)
@@ -119,22 +117,20 @@ def frf(
     H1 = xf / np.maximum(ff, tiny)
     H2 = np.divide(H1, coherence, out=np.array(H1), where=coherence > np.finfo(float).eps ** 2)  # below it is rounding
     H = {"H1": H1, "H2": H2, "Hv": np.sqrt(np.abs(H1) * np.abs(H2)) * np.exp(1j * np.angle(xf))}[method]
-    rests = taps.noise[:, None], _rest(taps)
     # of white noise in every line of force and response, from its deviations before the taps
     powers = [(rest**2 * np.square(window).sum(axis=1, keepdims=True)).mean(axis=0) / taps.rate**2
-              for rest, window in zip(rests, windows)]  # fmt: skip
+              for rest, window in zip((taps.noise[:, None], _rest(taps)), windows)]  # fmt: skip
     shares = [power / np.maximum(whole, tiny) for power, whole in zip(powers, (ff, xx))]
     bias = {"H1": shares[0], "H2": shares[1], "Hv": 0.5 * np.abs(shares[0] - shares[1])}[method]
     if taps.n_taps == 1:
         scatter = np.sqrt(-np.log(1.0 - SURE) * (shares[0] + shares[1]))
     else:
         scatter = _scatter(F, X - H1 * F) / np.maximum(np.abs(H1), tiny)
-    error = np.abs(H) * (scatter + bias)
     return xr.Dataset(
         {
             "H": (("frequency", "channel"), H),
             "coherence": (("frequency", "channel"), coherence),
-            "error": (("frequency", "channel"), error),
+            "error": (("frequency", "channel"), np.abs(H) * (scatter + bias)),
             "force": ("frequency", np.sqrt(ff[:, 0]), {"units": "N s"}),
             "force_error": ("frequency", np.sqrt(shares[0][:, 0] / taps.n_taps)),
         },
@@ -182,6 +178,11 @@ def _force_window(taps: Taps, length: float) -> np.ndarray:
             fall = np.clip((x - 0.75) / 0.25, 0.0, 1.0)  # its last quarter falls as a cosine: it ends smoothly
             np.maximum(row, np.where(x < -0.1, 0.0, 0.5 + 0.5 * np.cos(np.pi * fall)), out=row)
     return found
+
+
+def _response_window(taps: Taps, tau: float) -> np.ndarray:
+    """One up to each tap, falling exponentially with a time constant [s] from there, (n_taps, n_times)."""
+    return np.exp(-np.maximum(taps.time - taps.onset[:, None], 0.0) / tau)
 
 
 def _lost(taps: Taps, shade: np.ndarray) -> list[str]:

@@ -1,6 +1,6 @@
 """`update`: material constants that give measured frequencies."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import combinations
 from pathlib import Path
@@ -162,18 +162,24 @@ def update(
         again, _, other = search.look(solutions[0].x, [used])
         solutions += [again] if other is None else [again, search.fit(other, used)]
     found = min(solutions, key=lambda one: one.cost)
-    spare, sizes = len(used) - n, np.linalg.svd(found.jacobian, compute_uv=False)
-    half = np.full(n, np.inf)  # widths of the 90 % intervals of logarithms: frequencies may not limit them
-    if spare >= 1 and sizes[-1] > 1e-6 * sizes[0]:
-        variance = np.diag(np.linalg.pinv(found.jacobian.T @ found.jacobian)) * found.cost / spare
-        wide = float(t.ppf(0.95, spare))
-        half = wide * np.sqrt(variance)
-        enough = max(wide**2 * found.cost / spare, 1e-10 * len(used))  # numbers have five digits
-        alike = [one.x for one in solutions if one.cost - found.cost <= enough]
-        half = half + np.abs(np.array(alike) - found.x).max(axis=0)  # as far as another solution that fits as well
-    unpaired = tuple(target[np.setdiff1d(every, used)].tolist())
+    unpaired, half = tuple(target[np.setdiff1d(every, used)].tolist()), _half_widths(found, solutions, len(used))
     fitted = dict(zip(box.names, half)), search.pairs(found.x, used), search.modes_at(found.x)
     return Updated(box.values_at(found.x), *fitted, len(search.solved), unpaired)
+
+
+def _half_widths(found: Solution, solutions: Sequence[Solution], n_used: int) -> np.ndarray:
+    """Half widths (n,) of the 90 % intervals of the constants' logarithms, up to any solution that fits as well.
+
+    Infinite where ``n_used`` frequencies do not limit them.
+    """
+    spare, sizes = n_used - len(found.x), np.linalg.svd(found.jacobian, compute_uv=False)
+    if spare < 1 or sizes[-1] <= 1e-6 * sizes[0]:
+        return np.full(len(found.x), np.inf)
+    wide, variance = float(t.ppf(0.95, spare)), found.cost / spare
+    own = wide * np.sqrt(np.diag(np.linalg.pinv(found.jacobian.T @ found.jacobian)) * variance)
+    enough = max(wide**2 * variance, 1e-10 * n_used)  # numbers have five digits
+    alike = [one.x for one in solutions if one.cost - found.cost <= enough]
+    return np.asarray(own + np.abs(np.array(alike) - found.x).max(axis=0))
 
 
 @dataclass(eq=False)
