@@ -14,6 +14,7 @@ from ..impact.reduced_body import THINNED
 from ..impact.what_if import RESOLVABLE, left_out_weight, worst_differences
 from .cases import Cases, solve_cases, try_each
 from .cells import RATED, Case
+from .refined import beside_change
 
 # [-] cells struck again on poorer bodies: of modes in a batch, a fifth of a large map's time; of vectors; or alone
 DOUBTED = {"modes": 400, "vectors": 10_000, "alone": 100}
@@ -104,11 +105,7 @@ def errors_of_description(cases: Cases, numbers: np.ndarray, workers: int | None
         after = np.minimum(np.searchsorted(some, np.arange(n)), len(some) - 1)
         least = np.minimum(least.take(before, axis), least.take(after, axis))
         most = np.maximum(most.take(before, axis), most.take(after, axis))
-    count, beside = poorer.mine[poorer.count].reshape(cases.shape), np.zeros(cases.shape, bool)
-    for axis in range(count.ndim):
-        one, two = (np.moveaxis(each, axis, 0) for each in (count, beside))
-        two[1:] |= one[1:] != one[:-1]
-        two[:-1] |= one[1:] != one[:-1]
+    beside = beside_change(poorer.mine[poorer.count].reshape(cases.shape))
     beside[np.ix_(*chosen)] = False  # known
     sides = every[beside & (most <= cases.tolerance)], every[(least <= cases.tolerance) & (most > cases.tolerance)]
     found = np.concatenate(sides)[: 4 * poorer.most]

@@ -72,9 +72,9 @@ def weights(nodes: np.ndarray, places: np.ndarray) -> np.ndarray:
 
 
 def beside_change(count: np.ndarray) -> np.ndarray:
-    """Cells (n, n) beside one with another number, along rows or columns."""
+    """Cells, in the shape of a map, beside one with another number along any axis."""
     found = np.zeros(count.shape, bool)
-    for axis in (0, 1):
+    for axis in range(count.ndim):
         mine, its = np.moveaxis(found, axis, 0), np.moveaxis(count, axis, 0)  # views
         change = its[:-1] != its[1:]
         mine[:-1] |= change

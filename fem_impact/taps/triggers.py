@@ -177,6 +177,12 @@ def is_saturated(force: np.ndarray) -> bool:
     return run >= max(CLIPPED, 0.2 * half) and run > 1.0 + 1.5 * half * np.sqrt(2.0 * spread / peak)
 
 
+def converter_step(values: np.ndarray) -> float:
+    """Smallest step between any two values of a channel (n_times,), infinite if there is none."""
+    steps = np.diff(np.unique(values))
+    return float(steps[steps > SAME * np.ptp(values)].min(initial=np.inf))
+
+
 def is_flat(values: np.ndarray, before: int) -> bool:
     """Whether a response (n_times,) ends at one level within its noise, by its first ``before`` samples.
 
@@ -186,9 +192,7 @@ def is_flat(values: np.ndarray, before: int) -> bool:
     """
     if before < FEWEST:
         return False
-    steps = np.diff(np.unique(values))
-    bit = float(steps[steps > SAME * np.ptp(values)].min(initial=np.inf))
-    band = 8.0 * max(float(values[:before].std()), bit)
+    band = 8.0 * max(float(values[:before].std()), converter_step(values))
     for turned in (values, -values):
         top = float(turned.max())
         count, beside = ((turned > top - k * band).sum() for k in (1.0, 2.0))
@@ -199,13 +203,11 @@ def is_flat(values: np.ndarray, before: int) -> bool:
 
 def is_filled(values: np.ndarray) -> bool:
     """Whether a response (n_times,) stands still for five samples amid its motion, as where lost ones were filled."""
-    steps = np.diff(np.unique(values))
-    bit = float(steps[steps > SAME * np.ptp(values)].min(initial=np.inf))
-    moved = np.abs(np.diff(values))
+    moved, step = np.abs(np.diff(values)), converter_step(values)
     runs = np.flatnonzero(np.diff(np.concatenate([[0], moved == 0.0, [0]]).astype(int))).reshape(-1, 2)
     runs = runs[(np.diff(runs)[:, 0] >= 4) & (runs[:, 0] > 0) & (runs[:, 1] < len(moved))]
     runs = runs[np.abs(values[runs[:, 0]]) < 0.999 * np.abs(values).max(initial=0.0)]  # others are cut off
-    return bool((np.minimum(moved[runs[:, 0] - 1], moved[np.minimum(runs[:, 1], len(moved) - 1)]) > 8.0 * bit).any())
+    return bool((np.minimum(moved[runs[:, 0] - 1], moved[np.minimum(runs[:, 1], len(moved) - 1)]) > 8.0 * step).any())
 
 
 def is_still(records: np.ndarray) -> np.ndarray:
@@ -221,9 +223,7 @@ def has_edges(values: np.ndarray, at_top: np.ndarray) -> bool:
     ends = np.flatnonzero(np.diff(at_top.astype(int), prepend=0, append=0)).reshape(-1, 2)
     first, end = ends[np.diff(ends)[:, 0].argmax()]
     beside = [max(0, 2 * first - end), min(len(values), 2 * end - first) - 1]
-    steps = np.diff(np.unique(values))
-    step = float(steps[steps > SAME * np.ptp(values)].min(initial=np.inf))
-    counts = (values[first] - values) / step
+    counts = (values[first] - values) / converter_step(values)
     if np.median(np.abs(counts - np.round(counts))) > 0.1:  # they have no common step
         return True
     return float(np.abs(counts[beside]).max()) > 16.0  # a pulse is no parabola all the way down
