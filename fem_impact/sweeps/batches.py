@@ -178,6 +178,7 @@ class Bounces:
     restitution: np.ndarray  # [-]
     impulse: np.ndarray  # [N s]
     peak_force: np.ndarray  # [N]
+    margin: np.ndarray  # [-] as of `Response`
     error: np.ndarray  # [-] estimated
     centroid: np.ndarray  # [Hz]
     done: np.ndarray  # bool: met the tolerance, and no touch in flight was missed
@@ -276,7 +277,8 @@ def _follow(blows: Blows, tolerance: float, band: float, kernels: Kernels) -> tu
     v = blows.speed
     return (
         final[FOUND_IMPACTS], final[FOUND_TIME], final[FOUND_IMPULSE] * engine.own_rigid - 1.0,
-        final[FOUND_IMPULSE] * v, final[FOUND_PEAK] * v, error, final[FOUND_CENTROID], ~np.isnan(error),
+        final[FOUND_IMPULSE] * v, final[FOUND_PEAK] * v, np.minimum(CLEAR, final[FOUND_MARGIN]), error,
+        final[FOUND_CENTROID], ~np.isnan(error),
     )  # fmt: skip
 
 

@@ -18,6 +18,7 @@ from ..impact.response import Response
 from ..modes.modal import Modes
 from . import batches
 from .cells import ALONE, FAMILY_AXES, LOSSY, Case, computed_together, law_numbers
+from .refined import COUNTED
 from .store import LARGEST_BLOCK, Texts, Watch, block_size, by_blocks, by_cluster
 
 LOG = logging.getLogger(__name__)
@@ -28,6 +29,7 @@ LAYERS: dict[str, tuple[str, str]] = {  # name: unit, what it is
     "restitution": ("", "minus the speed after the blow over the speed before, at the contact point; NaN in contact"),
     "impulse": ("N s", "total impulse of the contact force"),
     "peak_force": ("N", "largest contact force"),
+    "margin": ("", "how near the number of impacts is to another, over the deepest approach; given up to 0.05"),
     "error": ("", "estimated time-step error, of chaos all of it: absolute for restitution, relative for the others"),
     "centroid": ("Hz", "mean frequency, weighted by the magnitude of the force spectrum"),
 }
@@ -106,14 +108,14 @@ class Cases:
     def row(self, hit: Response) -> np.ndarray:
         """The layers (n_layers,) of one blow; one that misses its tolerance, as a chaotic one, has its whole error."""
         error = hit.error.step if hit.tolerance_met else hit.error.total
-        row = [hit.n_impacts, hit.contact_time, hit.restitution, hit.impulse, hit.peak_force, error]
+        row = [hit.n_impacts, hit.contact_time, hit.restitution, hit.impulse, hit.peak_force, hit.margin, error]
         row += [hit.spectral_centroid(self.band)] if self.band is not None else []
         return np.array(row + [function(hit) for function in self.extra.values()], float)
 
     def apart(self, one: np.ndarray, two: np.ndarray) -> dict[str, Any]:
         """Differences of two results (n_layers, ...) in each quantity, relative to the first where these are."""
         first, second = (
-            {name: x for name, x in zip(self.layers, rows) if name in LAYERS and name not in ("n_impacts", "error")}
+            {name: x for name, x in zip(self.layers, rows) if name in LAYERS and name not in COUNTED}
             for rows in (one, two)
         )
         return distance(second, first)

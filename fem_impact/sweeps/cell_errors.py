@@ -89,8 +89,9 @@ def errors_of_description(cases: Cases, numbers: np.ndarray, workers: int | None
     """Error [-] of the bodies' description in each cell, in the shape of a map, as blows on poorer ones show it.
 
     Evenly spaced cells, at most DOUBTED, are struck again on bodies described less well, see `_Poorer`, and any other
-    has the largest error of those around it. Where by that one meets the tolerance beside a cell of another number of
-    impacts, or would by the least of those errors, it is struck again, too: at most four times DOUBTED.
+    has the largest error of those around it; one as large as its margin leaves its number of impacts in doubt. Where by
+    that one meets the tolerance beside a cell of another number of impacts, or would by the least of those errors, it
+    is struck again, too: at most four times DOUBTED.
     """
     poorer = _Poorer.of(cases, numbers, workers)
     if poorer is None:
@@ -99,19 +100,26 @@ def errors_of_description(cases: Cases, numbers: np.ndarray, workers: int | None
     chosen = [np.unique(np.round(np.linspace(0, n - 1, max(1, int(n / fewer)))).astype(int)) for n in cases.shape]
     every = np.arange(cases.n_cases).reshape(cases.shape)
     struck = every[np.ix_(*chosen)]
-    least = most = poorer.errors(struck.reshape(-1)).reshape(struck.shape)
-    for axis, (n, some) in enumerate(zip(cases.shape, chosen)):
+    least = most = poorer.errors(struck.reshape(-1)).reshape(2, *struck.shape)
+    for axis, (n, some) in enumerate(zip(cases.shape, chosen), 1):
         before = np.searchsorted(some, np.arange(n), side="right") - 1
         after = np.minimum(np.searchsorted(some, np.arange(n)), len(some) - 1)
         least = np.minimum(least.take(before, axis), least.take(after, axis))
         most = np.maximum(most.take(before, axis), most.take(after, axis))
-    beside = beside_change(poorer.mine[poorer.count].reshape(cases.shape))
+    count, margin = (numbers[cases.layers.index(name)].reshape(cases.shape) for name in ("n_impacts", "margin"))
+    meets, surely = (found_in_doubt(errors, margin) <= cases.tolerance for errors in (least, most))
+    beside = beside_change(count)
     beside[np.ix_(*chosen)] = False  # known
-    sides = every[beside & (most <= cases.tolerance)], every[(least <= cases.tolerance) & (most > cases.tolerance)]
-    found = np.concatenate(sides)[: 4 * poorer.most]
+    found = np.concatenate([every[beside & surely], every[meets & ~surely]])[: 4 * poorer.most]
     if found.size:
-        most.reshape(-1)[found] = poorer.errors(found)
-    return most
+        most.reshape(2, -1)[:, found] = poorer.errors(found)
+    return found_in_doubt(most, margin)
+
+
+def found_in_doubt(errors: np.ndarray, margin: np.ndarray) -> np.ndarray:
+    """Error [-] of each cell, at least 1 where what shifts its margin is as much as that; both as `_Poorer.errors`."""
+    error, shift = errors
+    return np.where(shift >= margin, np.maximum(1.0, error), error)
 
 
 @dataclass(frozen=True, eq=False)
@@ -121,7 +129,7 @@ class _Poorer:
 
     Too few vectors may agree on a final separation that is none; therefore cells with several impacts are also struck
     alone, because `strike` looks for that; so are the cells of a body of which something is not stated
-    (`Modes.unstated`).
+    (`Modes.unstated`), and those of contacts whose cells are computed alone.
     """
 
     cases: Cases
@@ -129,7 +137,7 @@ class _Poorer:
     expected: np.ndarray  # (n_cases,) [-] see `estimate_left_out`
     lacking: Mapping[frozenset[str], Cases]  # on bodies that lack something
     thin: Sequence[tuple[Cases, float]]
-    unstated: bool
+    alone: bool
     most: int  # cells to strike at once
     workers: int | None
 
@@ -149,39 +157,45 @@ class _Poorer:
         return cls(
             plain, numbers[[cases.layers.index(name) for name in plain.layers]], estimate_left_out(cases).reshape(-1),
             {each: replace(plain, base=base.lacking(each), kernels={}) for each in descriptions if each},
-            [(replace(plain, base=poorer, kernels={}), weight) for poorer, weight in thin], unstated,
+            [(replace(plain, base=poorer, kernels={}), weight) for poorer, weight in thin], unstated or cases.special,
             DOUBTED["alone" if unstated or not cases.quick else "vectors" if by_vectors else "modes"], workers,
         )  # fmt: skip
 
-    @property
-    def count(self) -> int:
-        return self.cases.layers.index("n_impacts")
-
     def errors(self, cells: np.ndarray) -> np.ndarray:
-        """Error [-] of the description in some cells, (n_cells,)."""
+        """Error [-] of the description in some cells, and what it shifts their margins by [-], (2, n_cells)."""
+        if self.alone:
+            return self._errors_alone(cells)
+        count = self.cases.layers.index("n_impacts")
         mine = self.mine[:, cells]
         runs = {frozenset[str](): mine} | {each: self._struck(cases, cells) for each, cases in self.lacking.items()}
-        total = sum(worst_differences(runs, self._difference).values(), np.zeros(len(cells)))
-        doubted = np.isfinite(self.expected[cells]) & (mine[self.count] > 0)
-        doubted &= self.cases.special | (self.expected[cells] > 1e-2 * self.cases.tolerance)
+        total = sum(worst_differences(runs, self._difference).values(), np.zeros((2, len(cells))))
+        doubted = np.isfinite(self.expected[cells]) & (mine[count] > 0)
+        doubted &= self.expected[cells] > 1e-2 * self.cases.tolerance
         some = np.flatnonzero(doubted)
         for cases, weight in self.thin if some.size else ():
-            change = self._difference(mine[:, some], self._struck(cases, cells[some]))
-            total[some] = np.maximum(total[some], np.where(change < 1.0, weight * change, 1.0))
-        several = np.flatnonzero(self.unstated | ((mine[self.count] > 1) & (len(self.lacking) > 0)))
+            change, shift = self._difference(mine[:, some], self._struck(cases, cells[some]))
+            change = np.where(change < 1.0, weight * change, 1.0)
+            total[:, some] = np.maximum(total[:, some], [change, weight * shift])
+        several = np.flatnonzero((mine[count] > 1) & (len(self.lacking) > 0))
         several = several[:: max(1, -(-len(several) // DOUBTED["alone"]))]
-        for i, (hit, _) in zip(several, try_each(cells[several], self.cases.blow, self.workers)):
-            if hit is not None:
-                total[i] = max(total[i], hit.error.truncation + hit.error.mesh + hit.error.measurement)
+        total[:, several] = np.maximum(total[:, several], self._errors_alone(cells[several]))
         return total
+
+    def _errors_alone(self, cells: np.ndarray) -> np.ndarray:
+        """Both of cells struck again one by one, whose errors include those of margins; none where one fails."""
+        hits = [hit for hit, _ in try_each(cells, self.cases.blow, self.workers)]
+        each = [hit.error.truncation + hit.error.mesh + hit.error.measurement if hit else 0.0 for hit in hits]
+        return np.array([each, np.zeros(len(cells))])
 
     def _struck(self, cases: Cases, cells: np.ndarray) -> np.ndarray:
         """The layers of some cells on other bodies."""
         return solve_cases(replace(cases, chosen=cells), 0, len(cells), workers=self.workers)[0]
 
     def _difference(self, one: np.ndarray, other: np.ndarray, first: bool = True) -> np.ndarray:
+        count, margin = (self.cases.layers.index(name) for name in ("n_impacts", "margin"))
         change = np.fmax.reduce(list(self.cases.apart(one, other).values()))
-        return np.where(one[self.count] == other[self.count], change, 1.0 * first)
+        change = np.where(one[count] == other[count], change, 1.0 * first)
+        return np.array([change, np.abs(one[margin] - other[margin]) * first])
 
 
 def blow_when_thinned(base: Case) -> list[tuple[Case, float]]:
