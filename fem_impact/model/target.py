@@ -227,7 +227,10 @@ class Target:
         If not ``tense``, that without its tension, which does not act on lengths below that of the bending layer.
         """
         bending, tension, inertia = self._sections
-        return float(_squared_wave(bending, tension if tense else 0.0, inertia, frequency).max() ** 0.5)
+        tension, pull = tension if tense else 0.0, inertia * (2.0 * np.pi * frequency) ** 2
+        # omega**2 inertia = bending k**4 + tension k**2; k is zero at 0 Hz without tension, too, where both are
+        root = np.sqrt(tension**2 + 4.0 * bending * pull)
+        return float((2.0 * pull / np.maximum(root + tension, np.finfo(float).tiny)).max() ** 0.5)
 
     @property
     def _sections(self) -> tuple[np.ndarray, float, np.ndarray]:
@@ -367,10 +370,3 @@ class Target:
         if self.system is not None:
             return self.system if size is None else reassemble(self.system, mesh)
         return self._assembled(mesh, stages, theory=self.theory)
-
-
-def _squared_wave(bending: Any, tension: float, inertia: Any, frequency: float) -> Any:
-    """Square of the wavenumber k [rad/m] at a frequency [Hz]: omega**2 inertia = bending k**4 + tension k**2."""
-    pull = inertia * (2.0 * np.pi * frequency) ** 2
-    # zero at 0 Hz without tension, too, where both are
-    return 2.0 * pull / np.maximum(np.sqrt(tension**2 + 4.0 * bending * pull) + tension, np.finfo(float).tiny)
