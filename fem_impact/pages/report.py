@@ -257,14 +257,18 @@ def _shares(energies: Mapping[str, float], called: Mapping[str, str]) -> list[di
 
 def _sounds(scene: Scene, response: Response | Strokes) -> list[dict[str, str]]:
     """Players of the sound at each observation point and, for a plate, each listener, by default 1 m in front of it."""
+    # three seconds at most keep the page small; a sequence may take twelve
+    duration = sampling.ringing_time(response.target, response.target.omega > 0.0, (sound.SHORTEST, 3.0))
+    if not isinstance(response, Response):
+        duration = min(duration + float(np.ptp(response.starts)), 12.0)
     found = [
-        (f"Motion at {place(point)}", sound.synthesise(response, point, duration=_duration(response)))
+        (f"Motion at {place(point)}", sound.synthesise(response, point, duration=duration))
         for point in scene.points[:MOST_POINTS]
     ]
     if response.target.dimension == 2 or scene.listeners:
         for listener in scene.listeners[:MOST_POINTS] or [[*np.asarray(response.at).tolist(), 1.0]]:
             where = f" to {place(listener)}" if scene.listeners else ", 1 m in front of the strike point"
-            sounds = hearing.radiated(scene, response, listener, _duration(response))
+            sounds = hearing.radiated(scene, response, listener, duration)
             for bound, pressure in zip(hearing.BOUNDS[len(sounds)], sounds):
                 air = f" without a baffle, {BOUND[bound]}; {hearing.stated_level(sounds)}" if bound else ""
                 found.append((f"Sound radiated{where}{air}", pressure))
@@ -281,12 +285,6 @@ def _sounds(scene: Scene, response: Response | Strokes) -> list[dict[str, str]]:
             said = f"the same sound amplified by {-level:.1f} dB to full scale"
             players.append({"name": name, "note": said, "uri": raised})
     return players
-
-
-def _duration(response: Response | Strokes) -> float:
-    """Length of its sounds [s], at most three seconds to keep the page small; of a sequence, twelve."""
-    rings = sampling.ringing_time(response.target, response.target.omega > 0.0, (sound.SHORTEST, 3.0))
-    return rings if isinstance(response, Response) else min(rings + float(np.ptp(response.starts)), 12.0)
 
 
 @check.typed
