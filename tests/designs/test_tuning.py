@@ -101,13 +101,9 @@ test_arguments_are_checked = refusing([
     (ON_LINE, {"mirror": "y"}, "mirror must be one of x, got 'y'"),
     (ON_LINE, {"radius": 1e-3}, r"radius must lie between 0\.0233333 and 0\.35 m"),
     ("studies/scenes/heavy_plate.toml", {}, r"\[target\] must not state mass, .*; leave them out"),
+    (ON_LINE, {"pitches": {1: None, 2: None}}, r"pitches must want something of a mode: .*; name a pitch, too"),
     (BAR, {}, r"body must be a System of fi\.assemble or a Scene of fi\.load_scene or the path of a file, got Beam"),
-], lambda body, how: fi.tune(body, {1: "-5 cents"}, **how))  # fmt: skip
-
-
-def test_something_must_be_wanted():
-    with pytest.raises(ValueError, match=r"pitches must want something of a mode: .*; name a pitch, too"):
-        fi.tune(ON_LINE, {1: None, 2: None})
+], lambda body, how: fi.tune(body, **{"pitches": {1: "-5 cents"}} | how))  # fmt: skip
 
 
 def test_pitches_of_the_command_are_in_order_or_by_mode():

@@ -133,8 +133,3 @@ test_refuses_what_cannot_be_attached = refusing([
     ({}, {"point_masses": [((0.2, 0.5), -1.0)]}, "mass of .* must be positive, got -1 kg"),
     ({}, {"point_masses": [0.2]}, r"must be a pair \(point in m, mass in kg\)"),
 ], lambda held, more: assemble(mesh.rectangle(1, 1), **{"section": PLATE} | more, supports=held))  # fmt: skip
-
-
-def test_no_spring_pushes_on():
-    with pytest.raises(ValueError, match="stiffness must not be negative"):
-        Elastic(-1.0)
