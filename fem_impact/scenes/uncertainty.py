@@ -429,6 +429,8 @@ def _table(
         unit = AXES.get(ALIASES.get(each.name, each.name), ("",))[0].replace("exponent", f"{power:g}")
         data[each.name] = ("blow", column, {"units": unit or "1", "distribution": each.said})
     data |= {name: ("blow", *column) for name, column in cases.labelled(numbers).items()}
+    if np.isnan(data["truncation"][1]).all():  # known of blows struck alone only
+        del data["truncation"]
     counts = data["n_impacts"][1]
     data[DOUBLE] = ("blow", (counts > 1).astype(np.int8), {"units": "1", "long_name": QUANTITIES[DOUBLE][1]})
     part = np.arange(len(counts)) % n_parts

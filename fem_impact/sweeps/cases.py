@@ -30,7 +30,8 @@ LAYERS: dict[str, tuple[str, str]] = {  # name: unit, what it is
     "impulse": ("N s", "total impulse of the contact force"),
     "peak_force": ("N", "largest contact force"),
     "margin": ("", "how near the number of impacts is to another, over the deepest approach; given up to 0.05"),
-    "error": ("", "estimated time-step error, of chaos all of it: absolute for restitution, relative for the others"),
+    "error": ("", "estimated time-step error: absolute for restitution, relative for the others"),
+    "truncation": ("", "expected error of the body's description; infinite where modes left out govern the contact"),
     "centroid": ("Hz", "mean frequency, weighted by the magnitude of the force spectrum"),
 }
 POWERS = {"contact_time": -1.0, "impulse": 1.0, "peak_force": 2.0, "centroid": 1.0}  # of a unit of time, see `Cases`
@@ -106,9 +107,10 @@ class Cases:
         return case.blow(tolerance=self.tolerance, residual=self.residual)
 
     def row(self, hit: Response) -> np.ndarray:
-        """The layers (n_layers,) of one blow; one that misses its tolerance, as a chaotic one, has its whole error."""
-        error = hit.error.step if hit.tolerance_met else hit.error.total
-        row = [hit.n_impacts, hit.contact_time, hit.restitution, hit.impulse, hit.peak_force, hit.margin, error]
+        """The layers (n_layers,) of one blow."""
+        described = hit.error.truncation + hit.error.mesh + hit.error.measurement if hit.error.resolvable else np.inf
+        row = [hit.n_impacts, hit.contact_time, hit.restitution, hit.impulse, hit.peak_force]
+        row += [hit.margin, hit.error.step, described]
         row += [hit.spectral_centroid(self.band)] if self.band is not None else []
         return np.array(row + [function(hit) for function in self.extra.values()], float)
 
@@ -322,7 +324,8 @@ def solve_cases(cases: Cases, start: int, stop: int, *, workers: int | None = No
             blows, tolerance=cases.tolerance, band=float(band), workers=workers, kernels=cases.kernels
         )
         for row, name in enumerate(names):
-            numbers[row, cells] = getattr(found, name) * r ** POWERS.get(name, 0.0)
+            if name != "truncation":  # known of cells struck alone only
+                numbers[row, cells] = getattr(found, name) * r ** POWERS.get(name, 0.0)
         quick[cells] = found.done & ~(np.isnan(found.centroid) & (cases.band is not None))
     texts: Texts = {}
     alone = np.flatnonzero(~quick)

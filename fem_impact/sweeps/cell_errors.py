@@ -88,10 +88,11 @@ def model_error(cases: Cases) -> tuple[np.ndarray, str]:
 def errors_of_description(cases: Cases, numbers: np.ndarray, workers: int | None = None) -> np.ndarray:
     """Error [-] of the bodies' description in each cell, in the shape of a map, as blows on poorer ones show it.
 
-    Evenly spaced cells, at most DOUBTED, are struck again on bodies described less well, see `_Poorer`, and any other
-    has the largest error of those around it; one as large as its margin leaves its number of impacts in doubt. Where by
-    that one meets the tolerance beside a cell of another number of impacts, or would by the least of those errors, it
-    is struck again, too: at most four times DOUBTED.
+    Cells struck alone know theirs. Of the others, evenly spaced cells, at most DOUBTED, are struck again on bodies
+    described less well, see `_Poorer`, and any other has the largest error of those around it; one whose margin is
+    shifted by as much has its number of impacts in doubt. Where by that one meets the tolerance beside a cell of
+    another number of impacts, or would by the least of those errors, it is struck again, too: at most four times
+    DOUBTED.
     """
     poorer = _Poorer.of(cases, numbers, workers)
     if poorer is None:
@@ -113,7 +114,8 @@ def errors_of_description(cases: Cases, numbers: np.ndarray, workers: int | None
     found = np.concatenate([every[beside & surely], every[meets & ~surely]])[: 4 * poorer.most]
     if found.size:
         most.reshape(2, -1)[:, found] = poorer.errors(found)
-    return found_in_doubt(most, margin)
+    known = numbers[cases.layers.index("truncation")].reshape(cases.shape)
+    return np.where(np.isnan(known), found_in_doubt(most, margin), known)
 
 
 def found_in_doubt(errors: np.ndarray, margin: np.ndarray) -> np.ndarray:
@@ -129,7 +131,7 @@ class _Poorer:
 
     Too few vectors may agree on a final separation that is none; therefore cells with several impacts are also struck
     alone, because `strike` looks for that; so are the cells of a body of which something is not stated
-    (`Modes.unstated`), and those of contacts whose cells are computed alone.
+    (`Modes.unstated`).
     """
 
     cases: Cases
@@ -137,7 +139,7 @@ class _Poorer:
     expected: np.ndarray  # (n_cases,) [-] see `estimate_left_out`
     lacking: Mapping[frozenset[str], Cases]  # on bodies that lack something
     thin: Sequence[tuple[Cases, float]]
-    alone: bool
+    unstated: bool
     most: int  # cells to strike at once
     workers: int | None
 
@@ -157,14 +159,20 @@ class _Poorer:
         return cls(
             plain, numbers[[cases.layers.index(name) for name in plain.layers]], estimate_left_out(cases).reshape(-1),
             {each: replace(plain, base=base.lacking(each), kernels={}) for each in descriptions if each},
-            [(replace(plain, base=poorer, kernels={}), weight) for poorer, weight in thin], unstated or cases.special,
+            [(replace(plain, base=poorer, kernels={}), weight) for poorer, weight in thin], unstated,
             DOUBTED["alone" if unstated or not cases.quick else "vectors" if by_vectors else "modes"], workers,
         )  # fmt: skip
 
     def errors(self, cells: np.ndarray) -> np.ndarray:
         """Error [-] of the description in some cells, and what it shifts their margins by [-], (2, n_cells)."""
-        if self.alone:
-            return self._errors_alone(cells)
+        found = np.array([self.mine[self.cases.layers.index("truncation"), cells], np.zeros(len(cells))])
+        todo = np.isnan(found[0])
+        find = self._errors_alone if self.unstated else self._errors_by_descriptions
+        found[:, todo] = find(cells[todo])
+        return found
+
+    def _errors_by_descriptions(self, cells: np.ndarray) -> np.ndarray:
+        """Both of cells that do not know their own."""
         count = self.cases.layers.index("n_impacts")
         mine = self.mine[:, cells]
         runs = {frozenset[str](): mine} | {each: self._struck(cases, cells) for each, cases in self.lacking.items()}
@@ -182,10 +190,10 @@ class _Poorer:
         return total
 
     def _errors_alone(self, cells: np.ndarray) -> np.ndarray:
-        """Both of cells struck again one by one, whose errors include those of margins; none where one fails."""
-        hits = [hit for hit, _ in try_each(cells, self.cases.blow, self.workers)]
-        each = [hit.error.truncation + hit.error.mesh + hit.error.measurement if hit else 0.0 for hit in hits]
-        return np.array([each, np.zeros(len(cells))])
+        """Both of cells struck one by one, whose errors include those of margins; none where one fails."""
+        described = self.cases.layers.index("truncation")
+        found = try_each(cells, lambda cell: self.cases.row(self.cases.blow(cell))[described], self.workers)
+        return np.array([[error or 0.0 for error, _ in found], np.zeros(len(cells))])
 
     def _struck(self, cases: Cases, cells: np.ndarray) -> np.ndarray:
         """The layers of some cells on other bodies."""

@@ -202,8 +202,7 @@ def sweep(
     Returns
     -------
     xarray.Dataset
-        One dimension per axis, in the order given; variables as in `LAYERS` with their units; ``truncation``, the
-        expected error of modes left out, or of having no more vectors and no finer mesh; ``tolerance_met``; and
+        One dimension per axis, in the order given; variables as in `LAYERS` with their units; ``tolerance_met``; and
         ``failure``, the error text of a cell that failed (its numbers are then NaN and its n_impacts is -1).
         With borders, also ``doubtful``, cells whose number of impacts depends on the tolerance, on the body's
         description, or was refused; and along the dimension ``border`` the curves themselves, which `read_borders`
@@ -259,7 +258,9 @@ def compute_map(cases: Cases, job: Job) -> xarray.Dataset:
     computed = job.compute_refined(some) if job.refine or (drawn and job.refine is None) else None
     numbers, texts = job.solved(some) if computed is None else (computed.numbers, computed.texts)
     failures = error_texts(texts, some.n_cases)
-    doubt = np.broadcast_to(cell_errors.errors_of_description(some, numbers, job.workers), cases.shape)
+    doubt, described = cell_errors.errors_of_description(some, numbers, job.workers), some.layers.index("truncation")
+    expected = np.maximum(cell_errors.estimate_left_out(some), doubt).reshape(-1)
+    numbers[described] = np.where(np.isnan(numbers[described]), expected, numbers[described])
     if some is not cases:  # impulse and peak force scale with the speed, all else is unchanged
         ratio = cases.axes["speed"] / cases.axes["speed"][0]
         ratio = np.reshape(ratio, [-1 if name == "speed" else 1 for name in cases.axes])
@@ -267,7 +268,7 @@ def compute_map(cases: Cases, job: Job) -> xarray.Dataset:
         numbers = (numbers.reshape(-1, *some.shape) * np.stack(scales)).reshape(len(numbers), -1)
         failures = np.broadcast_to(failures.reshape(some.shape), cases.shape).reshape(-1)
     own = cell_errors.model_error(cases) if job.audit else None
-    table = _dataset(cases, numbers, failures, np.maximum(cell_errors.estimate_left_out(cases), doubt), own)
+    table = _dataset(cases, numbers, failures, own)
     gap = 1.0 / max(1, min(cases.shape) - 1)
     if job.ours:
         table.attrs["cells"] = f"all {cases.n_cases} cells computed"
@@ -284,7 +285,7 @@ def compute_map(cases: Cases, job: Job) -> xarray.Dataset:
         gap = refined.widest_gap(cases.shape)
     if job.borders or (job.borders is None and job.ours and not why_none(cases)):
         borders, doubtful = find_borders(cases, np.asarray(table.n_impacts), job.solved)
-        doubtful[doubt >= 1.0] = True
+        doubtful[np.broadcast_to(doubt >= 1.0, cases.shape)] = True
         add_borders(table, borders, doubtful, gap)
     return table
 
@@ -309,15 +310,13 @@ def admit_size(
         tell(cost)
 
 
-def _dataset(cases: Cases, numbers: np.ndarray, failures: np.ndarray, left_out: np.ndarray, own: Any) -> xarray.Dataset:
+def _dataset(cases: Cases, numbers: np.ndarray, failures: np.ndarray, own: Any) -> xarray.Dataset:
     """The map as a Dataset, with units on layers and axes; ``own`` is the model's error and what is not known of it."""
     dims = tuple(cases.axes)
     data: dict[str, Any] = {
         name: (dims, values.reshape(cases.shape), about) for name, (values, about) in cases.labelled(numbers).items()
     }
-    meaning = "expected error of the body's description; infinite where modes left out govern the contact"
-    data["truncation"] = (dims, left_out, {"units": "1", "long_name": meaning})
-    met = data["error"][1] + left_out <= cases.tolerance
+    met = data["error"][1] + data["truncation"][1] <= cases.tolerance
     data["tolerance_met"] = (dims, met, {"units": "1", "long_name": "whether both errors together meet the tolerance"})
     if own is not None:
         meaning = "error of the model itself, interpolated between a few blows"

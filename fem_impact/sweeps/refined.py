@@ -10,7 +10,7 @@ from .store import Texts
 
 LINEAR = ("restitution",)  # layers whose errors are absolute; those of the others are relative
 ROUGH = {"centroid": 0.1}  # [-] weight of what is missed: its lobes change it by 1e-3, which no picture shows
-COUNTED = ("n_impacts", "margin", "error")  # layers that are not interpolated
+COUNTED = ("n_impacts", "margin", "error", "truncation")  # layers that are not interpolated
 
 Compute = Callable[[np.ndarray, str], tuple[np.ndarray, Texts]]  # cells, name of the round: numbers, error texts
 Report = Callable[[int], Any]  # takes the number of cells that are settled
@@ -91,7 +91,7 @@ class MapSheet:
         self.texts: Texts = {}  # failed cell: error text
         self.computed = np.zeros(shape[0] * shape[1], bool)
         self.settled = np.zeros(shape[0] * shape[1], bool)  # computed or interpolated
-        self.count, self.margin, self.error = (layers.index(name) for name in COUNTED)
+        self.count, self.margin, self.error, self.truncation = (layers.index(name) for name in COUNTED)
         self.smooth = np.array([i for i, name in enumerate(layers) if name not in COUNTED])
         self.weight = np.array([ROUGH.get(layers[i], 1.0) for i in self.smooth])
         self.relative = np.array([layers[i] not in LINEAR for i in self.smooth])
@@ -142,8 +142,10 @@ class MapSheet:
             new = ~self.computed[cells]
             self.numbers[self.smooth[:, None], cells[new]] = found[:, new]
             margin = self.numbers[self.margin][nodes].min(axis=(1, 2))
+            truncation = self.numbers[self.truncation][nodes].max(axis=(1, 2))
             count = self.numbers[self.count][first]
-            for layer, value in ((self.error, error), (self.margin, margin), (self.count, count)):
+            layers = self.error, self.margin, self.truncation, self.count
+            for layer, value in zip(layers, (error, margin, truncation, count)):
                 self.numbers[layer, cells[new]] = np.broadcast_to(value[:, None, None], cells.shape)[new]
             self.settled[cells] = True
 

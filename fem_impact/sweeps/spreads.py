@@ -18,7 +18,7 @@ from .inputs import Input
 LEVELS = (0.05, 0.25, 0.5, 0.75, 0.95)  # [-] quantiles stated: median, quartiles and the ends of nine tenths of all
 DOUBLE = "double_hit"
 QUANTITIES: dict[str, tuple[str, str]] = {
-    **{name: about for name, about in LAYERS.items() if name not in ("margin", "error")},
+    **{name: about for name, about in LAYERS.items() if name not in ("margin", "error", "truncation")},
     DOUBLE: ("", "whether the striker touches more than once"),
 }
 

@@ -195,8 +195,8 @@ def test_too_large_a_map_is_refused_and_a_costly_one_says_so(tmp_path, prompt):
     text = (SHIPPED / "drumstick_map.toml").read_text()
     for count, words in (
         (10**6, ("over asks for 1e+12 cells: about",
-                 # eight layers and two more numbers of 8 byte
-                 "8e+04 GB of memory; give fewer values, or raise max_cells, now 1e+08")),
+                 # nine layers and two more numbers of 8 byte
+                 "8.8e+04 GB of memory; give fewer values, or raise max_cells, now 1e+08")),
         (10**12, ("stiffness.count must be at most 1000000, got",)),
     ):  # fmt: skip
         (tmp_path / "large.toml").write_text(text.replace("count = 20", f"count = {count}"))

@@ -42,7 +42,7 @@ def test_blows_on_bodies_of_other_frequencies_are_those_struck_alone(striker, lo
         assert numbers[0, i] == row[0]
         assert_allclose(numbers[2, i], row[2], atol=2e-4)  # restitution: either run is off by at most 1e-4
         assert_allclose(numbers[[1, 3, 4], i], row[[1, 3, 4]], rtol=2e-4)
-        assert_allclose(numbers[7:, i], row[7:], rtol=1e-3)  # the band of the centroid is met up to a 64th of its range
+        assert_allclose(numbers[8:, i], row[8:], rtol=1e-3)  # the band of the centroid is met up to a 64th of its range
 
 
 def test_blows_that_cannot_be_followed_together_are_struck_alone():

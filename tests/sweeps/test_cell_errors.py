@@ -81,6 +81,16 @@ def test_a_cell_whose_margin_is_less_than_what_modes_left_out_shift_it_by_is_in_
     assert clear.tolerance_met
 
 
+def test_cells_struck_alone_have_the_errors_of_single_blows():
+    plate = fi.analytic.rectangle(0.4, 0.3, mass=0.3, first_frequency=80.0, n_modes=40, damping_ratio=0.01)
+    law, blow = fi.Contact.layers(1e5, 1.3, depth=1e-4, hard_stiffness=3e6), {"at": (0.13, 0.11), "speed": 1.0}
+    table = fi.sweep(plate, fi.Striker.rigid(0.1), law, over={"mass": [0.02, 0.1, 0.5]}, tolerance=1e-2, **blow)
+    for mass, error, truncation in zip(table.mass.values, table.error.values, table.truncation.values):
+        own = fi.strike(plate, fi.Striker.rigid(mass), law, tolerance=1e-2, **blow).error
+        assert_allclose([error, truncation], [own.step, own.truncation], rtol=1e-6)  # the cell's striker is scaled
+        assert own.truncation > 1e-4
+
+
 def test_no_cell_of_a_body_with_something_unstated_goes_without_its_error(monkeypatch):
     """Those struck again in a second round were a fourth of them, and the others had an error of nearly zero."""
     monkeypatch.setitem(cell_errors.DOUBTED, "alone", 9)

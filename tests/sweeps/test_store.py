@@ -54,13 +54,13 @@ def test_a_store_of_another_map_or_version_is_refused(tmp_path, monkeypatch):
     with pytest.raises(ValueError, match="store must be a new folder"):
         sweep(store=tmp_path / "mine")
     mark = json.loads((tmp_path / "map" / "zarr.json").read_text())["attributes"]
-    assert Store(tmp_path / "map", mark, 7, 1).read(0) is not None
+    assert Store(tmp_path / "map", mark, 8, 1).read(0) is not None
     monkeypatch.setattr(identity, "program", lambda: "other")
     with pytest.raises(ValueError, match=r"store holds another map \(made by another version of this program"):
         sweep(over={"mass": [0.1]}, store=tmp_path / "map")
     told = "client: a worker runs another version of this program; install the same one everywhere"
     with pytest.raises(ValueError, match=told):
-        Store(tmp_path / "map", mark, 7, 1)
+        Store(tmp_path / "map", mark, 8, 1)
 
 
 def test_maps_whose_axes_come_in_another_order_have_stores_of_their_own():
@@ -202,7 +202,7 @@ def _wait_for_blocks(store, count, patience=600.0):
     ("old", "new"),
     [
         ('"codecs": [', '"codecs": [{"name": "zstd"},'),  # would unpack to any size
-        ('"shape": [\n    7,\n    1\n', '"shape": [\n    7,\n    1000000000000\n'),
+        ('"shape": [\n    8,\n    1\n', '"shape": [\n    8,\n    1000000000000\n'),
     ],
 )
 def test_damaged_store_is_told_not_trusted(tmp_path, old, new):
