@@ -167,8 +167,9 @@ class _Poorer:
         """Error [-] of the description in some cells, and what it shifts their margins by [-], (2, n_cells)."""
         found = np.array([self.mine[self.cases.layers.index("truncation"), cells], np.zeros(len(cells))])
         todo = np.isnan(found[0])
-        find = self._errors_alone if self.unstated else self._errors_by_descriptions
-        found[:, todo] = find(cells[todo])
+        if todo.any():
+            find = self._errors_alone if self.unstated else self._errors_by_descriptions
+            found[:, todo] = find(cells[todo])
         return found
 
     def _errors_by_descriptions(self, cells: np.ndarray) -> np.ndarray:
@@ -190,10 +191,10 @@ class _Poorer:
         return total
 
     def _errors_alone(self, cells: np.ndarray) -> np.ndarray:
-        """Both of cells struck one by one, whose errors include those of margins; none where one fails."""
+        """Both of cells struck one by one, whose errors include those of margins; 1 where one fails."""
         described = self.cases.layers.index("truncation")
         found = try_each(cells, lambda cell: self.cases.row(self.cases.blow(cell))[described], self.workers)
-        return np.array([[error or 0.0 for error, _ in found], np.zeros(len(cells))])
+        return np.array([[1.0 if error is None else error for error, _ in found], np.zeros(len(cells))])
 
     def _struck(self, cases: Cases, cells: np.ndarray) -> np.ndarray:
         """The layers of some cells on other bodies."""
