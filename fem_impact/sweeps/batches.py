@@ -90,13 +90,15 @@ class Family:
         return np.append(0.0, above)[np.searchsorted(-omega, -frequency)]
 
     def kernels(self, h: float, n_steps: int) -> tuple[np.ndarray, ...]:
-        """Kernels of both bodies at unit mass, (6, n_steps) each, and bounds of their motion in flight."""
+        """Kernels of both bodies at unit mass, (6, n_steps) each, bounds of their motion in flight, and their modes."""
         found = []
         for omega, zeta, squared in zip(self.omega, self.zeta, self.squared):
             bounds = np.empty((convolution.SPLITS + convolution.N_SPANS, 2, 2))
             convolution.flight_bounds(omega, zeta, squared, h, bounds)
-            found.append((kernel_rows(omega, zeta, squared, h, n_steps)[0], bounds))
-        return found[0][0], found[1][0], found[0][1], found[1][1]
+            table = np.empty((propagation.N_TABLE, len(omega)))
+            propagation.step_table(omega, zeta, h, table)
+            found.append((kernel_rows(omega, zeta, squared, h, n_steps)[0], bounds, [*table[:8], omega, zeta, squared]))
+        return tuple(np.array(each) for pair in zip(*found) for each in pair)
 
     def later(self, h: float, n_steps: int) -> tuple[np.ndarray, np.ndarray]:
         """The same kernels without the means, 1/4, 2/4, ... of a step later, (2**SPLITS - 1, 4, n_steps) each."""
@@ -310,6 +312,7 @@ class _Engine:
         self.keys, self.which = np.unique(blows.family, return_inverse=True)
         self.shares = np.array([1.0 / blows.target_mass, 1.0 / blows.striker_mass])
         families = [blows.families[int(key)] for key in self.keys]
+        self.n_modes = max(len(omega) for family in families for omega in family.omega)
         sums = np.array([[family.sums(body) for family in families] for body in (0, 1)])  # (2, n_families, 3)
         rigid, static, rest = np.moveaxis(sums[:, self.which], 2, 0) * self.shares
         self.own_rigid, self.rigid, self.static = rigid[1], rigid.sum(axis=0), static.sum(axis=0)
@@ -368,14 +371,14 @@ class _Engine:
         parts = np.split(order, edges)  # of one family and step each
         for limit in LENGTHS:
             now = todo if length is None or limit == LENGTHS[-1] else todo & (length < limit)
-            track = many_blows.made_track(limit)
+            track = many_blows.made_track(limit, self.n_modes)
             for part in (each[now[each]] for each in parts):
                 if not part.size:
                     continue
                 family, exponent = group[:, part[0]].tolist()
-                target, striker, *bounds = self.kernel(family, exponent, limit, False)
+                found = self.kernel(family, exponent, limit, False)
                 later = self.kernel(family, exponent, limit, True) if sure and limit > LENGTHS[0] else NO_KERNELS
-                of_bodies = bundles.Kernels((target, striker), (bounds[0], bounds[1]), (later[0], later[1]))
+                of_bodies = bundles.Kernels(found[:2], found[2:4], later, found[4:])
                 many_blows.run(cells[part], pairs, of_bodies, 2.0 ** (-0.5 * exponent), sure, self.band, track, out)
             todo &= ~(now & (out[FOUND_STATUS, cells] != many_blows.LONG))
             if not todo.any():

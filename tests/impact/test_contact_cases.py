@@ -194,9 +194,10 @@ def test_kernel_form_is_the_modal_form(exponent, stiffness, n_steps, damping_rat
     family, out = batches.Family.of(plate, at, fi.Striker.rigid(mass), False), np.empty((layout.N_FOUND, 1))
     shares, law = np.array([column / 2.0, column / mass]), laws.table([[stiffness, exponent]])
     pairs = bundles.Pairs(shares, law, column / mass, column * family.sums(0)[1] / 2.0, 0.0 * column)
-    target, striker, *bounds = family.kernels(h, 512)
-    kernels = bundles.Kernels((target, striker), (bounds[0], bounds[1]), family.later(h, 512))
-    many_blows.run(np.zeros(1, int), pairs, kernels, h, True, 0.0, many_blows.made_track(512), out)
+    found = family.kernels(h, 512)
+    kernels = bundles.Kernels(found[:2], found[2:4], family.later(h, 512), found[4:])
+    track = many_blows.made_track(512, plate.n_modes)
+    many_blows.run(np.zeros(1, int), pairs, kernels, h, True, 0.0, track, out)
     assert out[layout.FOUND_STATUS, 0] == many_blows.DONE and out[layout.FOUND_IMPACTS, 0] == 1
     # rounding of some 40 steps of 200 sums: 1e-15 was measured
     assert_allclose(out[layout.FOUND_IMPULSE, 0], impulse, rtol=1e-13)

@@ -115,13 +115,16 @@ class Pairs(NamedTuple):
 class Kernels(NamedTuple):
     """What forces do to target and striker of unit mass, for steps of one length."""
 
-    rows: tuple[np.ndarray, np.ndarray]  # (6, n_steps) each, see `convolution`
+    rows: tuple[np.ndarray, ...]  # (6, n_steps) each, see `convolution`
     # (SPLITS + LEVELS, 2, 2) what a unit of the force's jumps and of its bends adds at most to the errors of
     # `cubics.surely_parted` for looks of 1/4, 1/2, 1, 2, 4, ... steps
-    bounds: tuple[np.ndarray, np.ndarray]
+    bounds: tuple[np.ndarray, ...]
     # (2**SPLITS - 1, 4, n_steps) the kernels without means 1/4, 2/4, ... of a step later; or without steps, where a
     # doubt in flight ends a blow as if it were too long
-    later: tuple[np.ndarray, np.ndarray]
+    later: tuple[np.ndarray, ...]
+    # (11, n_modes) of both bodies: the first eight rows of `propagation.step_table`, then frequency [rad/s], damping
+    # ratio and squared shape at unit mass
+    modes: tuple[np.ndarray, ...]
 
 
 class Track(NamedTuple):
@@ -136,3 +139,5 @@ class Track(NamedTuple):
     contacts: np.ndarray  # (n_steps + 1, 2) [s] when each contact began and ended
     state: np.ndarray  # (BLOW_STATES,) the columns are named in `layout`
     counts: np.ndarray  # (BLOW_COUNTS,)
+    missed: np.ndarray  # (SPLITS + LEVELS, 2) errors of `cubics.surely_parted` in this flight
+    moved: np.ndarray  # (2, 2, n_modes or more) motion of both bodies' modes, by a unit of their shape

@@ -29,14 +29,24 @@ def orbit(table, q, p, out_states):
             out_states[m, 1, n] = table[2, n] * x[n] + table[3, n] * y[n]
 
 
+@inner()
+def missed_parts(angle, zeta):
+    """What the cubic through both ends of a look ahead misses at most of a mode's free motion, over its amplitude.
+
+    Of the motion and of its slope over the look H, in which the mode turns by that angle: H**4 / 384 and
+    sqrt(3) / 216 H**4 times the fourth derivative, or no more than the motion itself.
+    """
+    steep = (angle * (1.0 + 2.0 * zeta)) ** 4
+    return min(steep / 384.0, 2.0 + 0.25 * angle), min(np.sqrt(3.0) / 216.0 * steep, 3.0 + 2.0 * angle)
+
+
 @outer()
 def flight_bounds(omega, zeta, squared, h, out_bounds):
     """What cubics through both ends of a look ahead miss of a body's free motion, at unit mass.
 
     Parameters: out_bounds (SPLITS + N_SPANS, 2, 2), for looks of 1/4, 1/2, 1, 2, 4, ... steps: of the approach and of
-    its slope over the look H, after a force of unit jumps and one of unit bends (changes of its slope). A jump leaves
-    a mode with the velocity u**2 / omega at most, a bend with u**2 / omega**2. The cubic misses H**4 / 384 and
-    sqrt(3) / 216 H**4 times the fourth derivative, or no more than the motion itself.
+    its slope over the look, after a force of unit jumps and one of unit bends (changes of its slope). A jump leaves a
+    mode with the velocity u**2 / omega at most, a bend with u**2 / omega**2.
     """
     out_bounds[:] = 0.0
     for n in range(omega.size):
@@ -45,14 +55,31 @@ def flight_bounds(omega, zeta, squared, h, out_bounds):
             continue
         size = squared[n] * np.sqrt(1.0 + 4.0 * z * z) / (w * w)
         for level in range(SPLITS + N_SPANS):
-            angle = w * h * 2.0 ** (level - SPLITS)
-            steep = (angle * (1.0 + 2.0 * z)) ** 4
-            missed = size * min(steep / 384.0, 2.0 + 0.25 * angle)
-            missed_rate = size * min(np.sqrt(3.0) / 216.0 * steep, 3.0 + 2.0 * angle)
-            out_bounds[level, 0, 0] += missed
-            out_bounds[level, 0, 1] += missed / w
-            out_bounds[level, 1, 0] += missed_rate
-            out_bounds[level, 1, 1] += missed_rate / w
+            for i, missed in enumerate(missed_parts(w * h * 2.0 ** (level - SPLITS), z)):
+                out_bounds[level, i, 0] += size * missed
+                out_bounds[level, i, 1] += size * missed / w
+
+
+@inner(fastmath=LOOSE)
+def carry(modes, force, ramp, moved):
+    """Advance modes by a step under that force; both as of `bundles.Kernels.modes` and `bundles.Track.moved`."""
+    for n in range(modes.shape[1]):
+        q, p = moved[0, n], moved[1, n]
+        moved[0, n] = modes[0, n] * q + modes[1, n] * p + modes[4, n] * force + modes[6, n] * ramp
+        moved[1, n] = modes[2, n] * q + modes[3, n] * p + modes[5, n] * force + modes[7, n] * ramp
+
+
+@inner()
+def add_missed(modes, share, h, moved, out_missed):
+    """Add what looks ahead of every length miss at most of modes that move freely from there on, see `missed_parts`."""
+    for n in range(modes.shape[1]):
+        w, z = modes[8, n], modes[9, n]
+        if w == 0.0:
+            continue
+        size = share * modes[10, n] * np.hypot(moved[0, n], moved[1, n] / w)
+        for level in range(SPLITS + N_SPANS):
+            for i, missed in enumerate(missed_parts(w * h * 2.0 ** (level - SPLITS), z)):
+                out_missed[level, i] += size * missed
 
 
 @inner(fastmath=LOOSE)

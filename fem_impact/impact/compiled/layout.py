@@ -49,8 +49,9 @@ END_AHEAD, MEAN_AHEAD, RATE_AHEAD, BEGAN, TOUCHED, IMPULSE, MOMENT, PEAK, JUMPS,
 DEEPEST, HIGHEST, LOWEST, MARGIN, SWING, NEEDED, NEAREST, BLOW_STATES = range(17, 25)
 
 # and counters: whether it is in contact; how it would end now; contacts that have ended; runs of steps with a force;
-# steps of the kernel that are combined
-PRESSED, ENDING, N_CONTACTS, N_SEGMENTS, KNOWN, BLOW_COUNTS = range(6)
+# steps of the kernel that are combined; to which step the modes are carried; whether what looks ahead miss in this
+# flight is found by that
+PRESSED, ENDING, N_CONTACTS, N_SEGMENTS, KNOWN, CARRIED, SHARP, BLOW_COUNTS = range(8)
 
 # rows of what is found of many blows (N_FOUND, n_cells): impacts, time in contact, impulse, peak force, centroid, how
 # it ended, the relative error of the peak by `misfit` (of certified runs), steps needed, the relative change of the

@@ -21,14 +21,15 @@ from .misfit import misfit
 from .schemes import Free, Own, solve_constant, solve_ramp
 
 from .convolution import (  # isort: skip
-    END, END_RAMP, N_SPANS, MEAN, MEAN_RAMP, N_ROWS, RATE_RAMP, SPLITS, combine, convolve, convolve_flight,
+    END, END_RAMP, N_SPANS, MEAN, MEAN_RAMP, N_ROWS, RATE_RAMP, SPLITS, add_missed, carry, combine, convolve,
+    convolve_flight,
 )  # fmt: skip
 from .convolution import RATE as RATE_ROW  # isort: skip
 from .layout import (  # isort: skip
-    APPROACH, BEGAN, BENDS, BLOW_COUNTS, BLOW_STATES, COMPRESSION, DEEPEST, END_AHEAD, ENDING, ENERGY,
+    APPROACH, BEGAN, BENDS, BLOW_COUNTS, BLOW_STATES, CARRIED, COMPRESSION, DEEPEST, END_AHEAD, ENDING, ENERGY,
     FORCE, FOUND_CENTROID, FOUND_IMPACTS, FOUND_IMPULSE, FOUND_MARGIN, FOUND_MISFIT, FOUND_PEAK, FOUND_STATUS,
     FOUND_STEPS, FOUND_SWING, FOUND_TIME, HELD, HIGHEST, IMPULSE, JUMPS, KNOWN, LOWEST, MARGIN, MEAN_AHEAD, MOMENT,
-    N_CONTACTS, N_SEGMENTS, NEAREST, NEEDED, PEAK, PRESSED, RATE, RATE_AHEAD, SLOPED, SWING, TOUCHED,
+    N_CONTACTS, N_SEGMENTS, NEAREST, NEEDED, PEAK, PRESSED, RATE, RATE_AHEAD, SHARP, SLOPED, SWING, TOUCHED,
 )  # fmt: skip
 
 DONE, DOUBTFUL, AWKWARD, LONG = range(4)  # how a blow ended: proved apart; with something that the steps may have
@@ -117,22 +118,43 @@ def blow_of(pairs, cell, h, certify, rows):
 
 
 @inner()
-def doubt(level, state, shares, bounds):
-    """What a look ahead of that level misses at most of the approach and of its slope over the look."""
-    error = rate_error = 0.0
-    for share, bound in zip(shares, bounds):
-        error += share * (state[JUMPS] * bound[level, 0, 0] + state[BENDS] * bound[level, 0, 1])
-        rate_error += share * (state[JUMPS] * bound[level, 1, 0] + state[BENDS] * bound[level, 1, 1])
-    return error, rate_error
+def bound_missed(kernels, blow, track):
+    """What looks ahead miss at most in the flight that begins, if all modes met in phase after every jump and bend."""
+    state, missed = track.state, track.missed
+    missed[:] = 0.0
+    track.counts[SHARP] = 0
+    for level in range(missed.shape[0]):
+        for share, bound in zip(blow.shares, kernels.bounds):
+            for i in range(2):
+                missed[level, i] += share * (state[JUMPS] * bound[level, i, 0] + state[BENDS] * bound[level, i, 1])
+
+
+@inner()
+def sharpen(kernels, blow, track):
+    """What looks ahead miss at most in this flight, by the amplitude that the force has left in each mode."""
+    counts, moved = track.counts, track.moved
+    if counts[CARRIED] == 0:
+        moved[:] = 0.0
+    for i in range(counts[N_SEGMENTS]):
+        for m in range(counts[CARRIED], track.segments[i, 1]):
+            pressed = m >= track.segments[i, 0]
+            f, s = (track.force[m], track.ramp[m]) if pressed else (0.0, 0.0)
+            for body in range(2):
+                carry(kernels.modes[body], f, s, moved[body])
+        counts[CARRIED] = max(counts[CARRIED], track.segments[i, 1])
+    track.missed[:] = 0.0
+    counts[SHARP] = 1
+    for body in range(2):
+        add_missed(kernels.modes[body], blow.shares[body], blow.h, moved[body], track.missed)
 
 
 @inner(part=True)
-def longest_look(kernels, blow, track, n):
+def longest_look(blow, track, n):
     """Level of the longest look ahead from step n that might leave no doubt."""
     state = track.state
     for level in range(N_SPANS - 1, 0, -1):
         rise = state[RATE] * 2.0**level * blow.h
-        error, rate_error = doubt(SPLITS + level, state, blow.shares, kernels.bounds)
+        error, rate_error = track.missed[SPLITS + level]
         if n + 2**level <= track.force.size and (
             state[APPROACH] + max(0.0, rise) + error < 0.0 or rise + rate_error < 0.0
         ):
@@ -147,7 +169,7 @@ def is_cleared(kernels, blow, track, n, end, end_rate):
     for split in range(1, SPLITS + 1):
         parts = 2**split
         dt = h / parts
-        error, rate_error = doubt(SPLITS - split, state, blow.shares, kernels.bounds)
+        error, rate_error = track.missed[SPLITS - split]
         sure = True
         left, slope = state[APPROACH], state[RATE]
         for i in range(1, parts + 1):
@@ -181,13 +203,16 @@ def look(kernels, blow, track, n, level):
     if end > 0.0 and level > 0:
         return NEARER, end, rate
     span = jump * blow.h
-    error, rate_error = doubt(SPLITS + level, state, blow.shares, kernels.bounds)
+    error, rate_error = track.missed[SPLITS + level]
     if not surely_parted(state[APPROACH], state[RATE] * span, end, rate * span, error + state[MARGIN], rate_error):
         if level > 0:
             return NEARER, end, rate
         if blow.certify and kernels.later[0].shape[2] == 0:
             return UNPROVED, end, rate
         if not blow.certify or not is_cleared(kernels, blow, track, n, end, rate):
+            if blow.certify and counts[ENDING] == DONE and not counts[SHARP]:
+                sharpen(kernels, blow, track)
+                return NEARER, end, rate
             counts[ENDING] = DOUBTFUL
     if end <= 0.0 and state[RATE] > 0.0 > rate:
         state[NEAREST] = min(state[NEAREST], -turning(state[APPROACH], state[RATE] * span, end, rate * span)[1])
@@ -456,7 +481,7 @@ def follow_blow(kernels, blow, track):
             free = free_end_of(blow, track, n)
         else:
             if level < 0:
-                level = longest_look(kernels, blow, track, n)
+                level = longest_look(blow, track, n)
             found, end, rate = look(kernels, blow, track, n, level)
             if found == NEARER:
                 level -= 1
@@ -473,6 +498,8 @@ def follow_blow(kernels, blow, track):
             free = touch(blow, track, n, end, rate)
         if not press(blow, track, n, free):
             return AWKWARD, n
+        if not counts[PRESSED]:
+            bound_missed(kernels, blow, track)
         n += 1
     return LONG, n
 
@@ -507,12 +534,12 @@ def write_found(blow, track, status, n, cell, out_found):
     out_found[FOUND_SWING, cell] = deepest * state[SWING] / touched if touched > 0.0 else np.inf
 
 
-def made_track(n_steps: int) -> Track:
-    """Room for one blow of as many steps."""
+def made_track(n_steps: int, n_modes: int) -> Track:
+    """Room for one blow of as many steps, between bodies of at most as many modes."""
     return Track(
         np.empty((N_ROWS, n_steps)), np.zeros(n_steps), np.zeros(n_steps), np.zeros(n_steps + 1),
         np.zeros(n_steps + 1), np.zeros((n_steps + 1, 2), np.int64), np.zeros((n_steps + 1, 2)), np.zeros(BLOW_STATES),
-        np.zeros(BLOW_COUNTS, np.int64),
+        np.zeros(BLOW_COUNTS, np.int64), np.zeros((SPLITS + N_SPANS, 2)), np.zeros((2, 2, n_modes)),
     )  # fmt: skip
 
 
