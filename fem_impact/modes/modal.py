@@ -263,7 +263,7 @@ class Modes(check.Brief):
         -------
         Modes
             Known only at the points, with frequencies and damping ratios refined together with the shapes; its notes
-            state what share of the responses they leave unexplained.
+            state what share of the responses they leave unexplained, and the delays of channels that are taken off.
 
         Raises
         ------

@@ -37,7 +37,7 @@ class Picked(NamedTuple):
     frequency_errors: np.ndarray  # (n_modes,) [Hz] standard errors
     damping_errors: np.ndarray  # (n_modes,) [-] the same
     alike: float  # [-] neighbouring lines that say the same, for which all errors are widened by its root
-    late: np.ndarray  # (n_channels,) [s] that explain half of what is left of a response, and turn it; 0 of most
+    late: np.ndarray  # (n_channels,) [s] delays of the responses that were taken off; 0 of most
 
 
 def peaks(size: np.ndarray) -> np.ndarray:
@@ -88,7 +88,8 @@ def responses(name: str, found: Any) -> tuple[np.ndarray, np.ndarray, np.ndarray
 def pick(name: str, found: Any, about: Any = None) -> Picked:
     """The modes at the peaks of frequency responses, or near the frequencies ``about`` (n_modes,) [Hz].
 
-    Peaks whose pole runs away in the search, or that noise explains, are no modes and are left out.
+    Peaks whose pole runs away in the search, or that noise explains, are no modes and are left out. A delay of a
+    channel is taken off; a smaller turn of its phases, as sensors that block what is slow leave, is in the errors.
     """
     s, values, weight, _ = responses(name, found)
     omega = s.imag
@@ -100,18 +101,12 @@ def pick(name: str, found: Any, about: Any = None) -> Picked:
         if wanted.size and not (len(omega) and omega[0] <= wanted[0] and wanted[-1] <= omega[-1]):
             raise ValueError(f"frequencies must lie within those of {name}, where its force has power")
         summits = np.unique([int(np.abs(omega - one).argmin()) for one in wanted]).astype(int)
-    data = np.vstack([(values * weight[:, None]).real, (values * weight[:, None]).imag])
     apart = np.diff(np.log(omega[summits]), prepend=-np.inf, append=np.inf)
     widths = np.minimum([_damping(omega, size, i) for i in summits], 0.5 * np.minimum(apart[1:], apart[:-1]))
     start = np.log(np.stack([omega[summits], widths])).reshape(2, -1)
-    if about is None:
-        begun = np.zeros(0)
-        found_modes = _without_noise(omega, data, weight, _fit(omega, data, weight, start, 5), begun)
-    else:
-        found_modes = _fit(omega, data, weight, start)
-        begun = found_modes.poles[0]
-    found_modes = _fit(omega, data, weight, _with_more(omega, data, weight, found_modes).poles)
-    poles, basis, constants, rest = _without_noise(omega, data, weight, found_modes, begun, alike=True)
+    data = np.vstack([(values * weight[:, None]).real, (values * weight[:, None]).imag])
+    late, (found_modes, begun) = _in_time(omega, data, weight, start, about is not None)
+    poles, basis, constants, rest = found_modes
     n, inside = poles.shape[1], _inside(omega, poles)
     if about is not None:  # what else there is helps to find them
         inside &= np.isin(np.arange(n), np.abs(poles[0] - begun[:, None]).argmin(axis=1)) if n else False
@@ -121,30 +116,93 @@ def pick(name: str, found: Any, about: Any = None) -> Picked:
     wide = _alike(rest)
     spread = np.sqrt(wide * np.diag(np.linalg.pinv(basis.T @ basis))[:, None] * np.square(rest).sum(axis=0) / spare)
     natural, damping = np.exp(poles)
-    doubt = _pole_errors(omega, weight, poles, constants[:n], rest) * np.stack([natural / (2.0 * np.pi), damping])
-    doubt *= np.sqrt(wide)
+    doubt = np.sqrt(wide) * _pole_errors(omega, weight, poles, constants[:n], rest)
+    moved = _moved_by_phases(omega, weight, found_modes)
+    doubt, spread = np.hypot(doubt, moved[0]), np.hypot(spread[:n], moved[1])
+    doubt *= np.stack([natural / (2.0 * np.pi), damping])
     damping = np.maximum(damping - float(found.attrs.get("added_damping", 0.0)) / natural, 0.0)  # that of a window
     left = float(np.linalg.norm(rest) / max(float(np.linalg.norm(data)), 1e-300))
     misfit = _misfit(omega, np.exp(poles), basis[:, :n], constants[:n], rest)
-    whole = natural / (2.0 * np.pi), damping, constants[:n].T, spread[:n].T, misfit, *doubt
+    whole = natural / (2.0 * np.pi), damping, constants[:n].T, spread.T, misfit, *doubt
     kept = [each[..., inside] for each in whole]
-    late = _late(omega, basis, basis[:, :n] @ constants[:n], rest)
     return Picked(kept[0], kept[1], kept[2], kept[3], kept[4], left, kept[5], kept[6], wide, late)
 
 
-def _late(omega: np.ndarray, basis: np.ndarray, moved: np.ndarray, rest: np.ndarray) -> np.ndarray:
-    """How much later than the force each response comes, (n_channels,) [s], where that explains half of what is left.
+def _in_time(
+    omega: np.ndarray, data: np.ndarray, weight: np.ndarray, start: np.ndarray, given: bool
+) -> tuple[np.ndarray, tuple["_Modes", np.ndarray]]:
+    """How much later than the force each response comes, (n_channels,) [s], and what `_search` finds without that.
 
-    What products and poles make up for is not in it.
-    Real products tell a delay from a wave's travel. One that turns the band by less than 0.3 may be the damping's form.
+    A delay counts if modes leave less than half without it, and if it turns the band by more than 0.3: one that does
+    less may be the damping's form. Real products tell it from a wave's travel.
     """
-    swing, half = omega[:, None], len(omega)
-    turned = np.vstack([swing * moved[half:], -swing * moved[:half]])  # slope by the delay
-    q = np.linalg.qr(basis)[0]
-    turned -= q @ (q.T @ turned)
-    along, size = (turned * rest).sum(axis=0), np.maximum(np.square(turned).sum(axis=0), 1e-300)
-    sure = along**2 > 0.5 * size * np.square(rest).sum(axis=0)
-    return np.where(sure & (np.abs(along / size) * omega[-1] > 0.3), along / size, 0.0)
+    trials = np.linspace(-3.0, 3.0, 25) / omega[-1]
+    q, none = np.linalg.qr(_basis(omega, weight, start)[0])[0], np.zeros(data.shape[1])
+    explained = np.array([np.square(q.T @ _turned(data, one * omega[:, None])).sum(axis=0) for one in trials])
+    left = np.square(data).sum(axis=0) - explained  # (n_trials, n_channels)
+    left /= np.maximum(left[len(trials) // 2], 1e-300)
+    shared = int(left.mean(axis=1).argmin())
+    late = np.where(left[shared] < 1.0, trials[shared], 0.0) * (left[shared].mean() < 0.5)
+    late = np.where(left.min(axis=0) < 0.5, trials[left.argmin(axis=0)], late)
+    plain = found = _search(omega, data, weight, start, given)
+    for _ in range(4):
+        if late.any():
+            found = _search(omega, _turned(data, omega[:, None] * late), weight, start, given)
+        step, share = _phases(omega, found[0], (1.0,))
+        sure = (share > 0.5) & (np.abs(step[0] * omega[-1]) > np.where(late, 0.0, 0.3))
+        if not sure.any():
+            break
+        late = late + np.where(sure, step[0], 0.0)
+    less = np.square(found[0].rest).sum(axis=0) < 0.5 * np.square(plain[0].rest).sum(axis=0)
+    late = np.where(less & (np.abs(late) * omega[-1] > 0.3), late, none)
+    return late, _search(omega, _turned(data, omega[:, None] * late), weight, start, given) if late.any() else plain
+
+
+def _turned(data: np.ndarray, phases: np.ndarray) -> np.ndarray:
+    """Real over imaginary parts, (2 n_frequencies, n_channels), turned by phases."""
+    turned = (data[: len(data) // 2] + 1j * data[len(data) // 2 :]) * np.exp(1j * phases)
+    return np.vstack([turned.real, turned.imag])
+
+
+def _phases(omega: np.ndarray, found: "_Modes", powers: tuple[float, ...]) -> tuple[np.ndarray, np.ndarray]:
+    """Phases, as sums of powers of omega, that explain what is left of responses: (n_powers, n_channels), the share.
+
+    What products make up for is not in it.
+    """
+    n, q = found.poles.shape[1], np.linalg.qr(found.basis)[0]
+    ways = _turned(found.basis[:, :n] @ found.constants[:n], np.full((len(omega), 1), -0.5 * np.pi))
+    steps, shares = np.zeros((len(powers), ways.shape[1])), np.zeros(ways.shape[1])
+    for k, (way, rest) in enumerate(zip(ways.T, found.rest.T)):
+        columns = way[:, None] * np.tile(omega, 2)[:, None] ** np.array(powers)
+        columns -= q @ (q.T @ columns)
+        sizes = np.maximum(np.linalg.norm(columns, axis=0), 1e-300)
+        part = np.linalg.lstsq(columns / sizes, rest, rcond=None)[0]
+        steps[:, k] = part / sizes
+        shares[k] = np.square(columns / sizes @ part).sum() / max(float(np.square(rest).sum()), 1e-300)
+    return steps, shares
+
+
+def _moved_by_phases(omega: np.ndarray, weight: np.ndarray, found: "_Modes") -> tuple[np.ndarray, np.ndarray]:
+    """How far logarithms of poles (2, n_modes) and products (n_modes, n_channels) go without a delay of each channel,
+    whose phases go with omega, and without what blocks slow changes, as couplings do: these go with one over it."""
+    n, (delay, block) = found.poles.shape[1], _phases(omega, found, (1.0, -1.0))[0]
+    turned = _turned(found.basis @ found.constants + found.rest, omega[:, None] * delay + block / omega[:, None])
+    after = _fit(omega, turned, weight, found.poles, 5)
+    after = after if after.poles.shape[1] == n else found
+    return np.abs(after.poles - found.poles), np.abs(after.constants - found.constants)[:n]
+
+
+def _search(
+    omega: np.ndarray, data: np.ndarray, weight: np.ndarray, start: np.ndarray, given: bool
+) -> tuple["_Modes", np.ndarray]:
+    """The modes from poles on, those hidden beside them and without those of noise; where the ones ``given`` began."""
+    found, begun = _fit(omega, data, weight, start, 60 if given else 5), np.zeros(0)
+    if given:
+        begun = found.poles[0]
+    else:
+        found = _without_noise(omega, data, weight, found, begun)
+    found = _fit(omega, data, weight, _with_more(omega, data, weight, found).poles)
+    return _without_noise(omega, data, weight, found, begun, alike=True), begun
 
 
 def _alike(rest: np.ndarray) -> float:
@@ -435,10 +493,15 @@ def modes_of(found: Any, driving: Any, points: Any, about: Any) -> tuple[dict[st
     notes = [f"picked from frequency responses, {rest}"]
     for i in np.flatnonzero(picked.late):
         way, size = "late" if picked.late[i] > 0.0 else "early", 1e3 * abs(picked.late[i])
-        notes.append(f"{label(found, int(i))} seems {way} against the force, by {size:.1g} ms or more; check its delay")
-    if not moved.all():
-        lost = ", ".join(f"{one:.5g} Hz" for one in picked.frequencies[~moved])
-        notes.append(f"modes at {lost} are left out: the point struck hardly moves in them, so that they have no scale")
+        one = f"{label(found, int(i))} seems {way} against the force, by {size:.2g} ms, which are taken off"
+        notes.append(f"{one}; check its delay")
+    against = own * picked.alike**0.5 < -3.0 * doubt
+    for left, why in ((~moved & ~against, "hardly moves"), (against, "moves against the force")):
+        if left.any():
+            lost = ", ".join(f"{one:.5g} Hz" for one in picked.frequencies[left])
+            notes.append(f"modes at {lost} are left out: the point struck {why} in them, so that they have no scale")
+    if against.any():
+        notes[-1] += f"; check whether {label(found, drive)} is the response there, or exchanged with another"
     errors = np.hypot(picked.errors[used] / np.maximum(np.abs(products), 1e-300), picked.misfit[used])
     return {
         "frequencies": picked.frequencies[moved], "damping_ratio": picked.damping_ratio[moved],

@@ -200,12 +200,12 @@ def test_modes_beyond_the_band_change_none_within_it_by_more_than_the_errors_sta
 
 
 def test_responses_that_modes_do_not_explain_are_told_and_keep_their_modes():
-    """A force that comes 0.2 ms late turns all phases: errors grow, but no mode is lost for it."""
+    """A filter of the force that turns all phases to and fro: errors grow, but no mode is lost for it."""
     natural = np.array([60.0, 180.0, 333.0, 520.0, 700.0])
     shapes = np.random.default_rng(7).uniform(0.5, 1.5, (5, 3))
     modes = list(zip(natural, np.full(5, 0.01), shapes))
     given = of_sum(modes, np.arange(1.0, 801.0), np.random.default_rng(1), 1e-3)
-    late = given.assign(H=given["H"] * np.exp(-2j * np.pi * 2e-4 * given["frequency"]))
+    late = given.assign(H=given["H"] * np.exp(-1.2j * np.sin(given["frequency"] / 60.0)))
     known = {"mass": 1.0, "points": [[0.0], [0.4], [1.0]], "driving": 0}
     true, found = fi.Modes.from_frf(given, **known), fi.Modes.from_frf(late, **known)
     assert found.frequencies == pytest.approx(natural, rel=0.03)
@@ -290,3 +290,37 @@ def test_a_channel_that_comes_late_or_early_is_told():
         notes = fi.Modes.from_frf(given.assign(H=given["H"] * delay), **known).notes
         said = [note for note in notes if "against the force" in note]
         assert len(said) == bool(late) and all("'b' seems " + ("late" if late > 0.0 else "early") in x for x in said)
+
+
+def test_a_delay_of_all_channels_is_taken_off_and_couplings_are_in_the_errors():
+    """Of bodies whose responses came 0.02 to 0.5 ms late nine in ten said so, three in four frequencies were right."""
+    held = {"late": [], "blocked": []}
+    for seed in range(6):
+        natural, given = of_random_body(seed, 1e-3)
+        omega = 2.0 * np.pi * given["frequency"]
+        for name, turn in (("late", np.exp(-4e-4j * omega)), ("blocked", 1.0 / (1.0 - 1j / (0.1 * omega)))):
+            spoiled = given.assign(H=given["H"] * turn)
+            found = picked.pick("frf", spoiled, natural)
+            held[name] += (np.abs(found.frequencies - natural) < 2.0 * found.frequency_errors).tolist()
+            assert found.late == pytest.approx([4e-4 * (name == "late")] * 3, rel=0.05, abs=1e-12)
+        notes = fi.Modes.from_frf(given.assign(H=given["H"] * np.exp(-4e-4j * omega)), driving=0, mass=1.0,
+                                  points=[[0.0], [0.4], [1.0]]).notes  # fmt: skip
+        assert sum("late against the force, by 0.4 ms, which are taken off; check its delay" in x for x in notes) == 3
+    assert np.mean(held["late"]) > 0.85 and np.mean(held["blocked"]) > 0.85
+
+
+def test_modes_in_which_the_point_struck_moves_against_the_force_are_told():
+    """They were left out as if it hardly moved: channels exchanged left no trace."""
+    modes = [
+        (200.0, 0.01, np.array([1.0, 0.8])),
+        (450.0, 0.01, np.array([0.9, 0.7])),
+        (800.0, 0.01, np.array([1.0, -1.1])),
+    ]
+    given = of_sum(
+        [(a, b, np.append(c, 0.5)) for a, b, c in modes], np.arange(50.0, 1001.0), np.random.default_rng(0), 1e-3
+    )
+    known = {"mass": 1.0, "points": [[0.0], [0.4], [1.0]]}
+    assert not any("moves against" in note for note in fi.Modes.from_frf(given, driving=0, **known).notes)
+    (told,) = (note for note in fi.Modes.from_frf(given, driving=1, **known).notes if "moves against" in note)
+    assert told.startswith("modes at 800 Hz are left out")
+    assert told.endswith("; check whether 'b' is the response there, or exchanged with another")
