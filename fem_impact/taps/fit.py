@@ -209,6 +209,10 @@ def _usable_taps(taps: Taps, window: Any, n_points: int) -> tuple[Taps, np.ndarr
     good &= without(
         taps, taps.cut_short, "record begins or ends within a pulse", "record holds its whole pulse; trigger earlier"
     )  # fmt: skip
+    gaps = triggers.filled(taps.force, taps.response)[:, 0]
+    good &= without(
+        taps, gaps, "force stands still amid a pulse, as where lost samples were filled", "force has no gap"
+    )  # fmt: skip
     taps = taps.pick(some(good))
     cut, noise = windows.cut_to_window(taps, window), taps.noise / taps.peak
     whole = without(cut, cut.overload, "force is cut off", "force is not cut off")

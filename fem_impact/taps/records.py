@@ -358,19 +358,22 @@ def read_taps(
     widths = [triggers.width(row) for row in taps.force]
     flat = [f"{label} ({', '.join(taps.cut_off(i))})" for i, label in enumerate(taps.labels) if any(cut[i])]
     dead = [text for text, still in zip(names, triggers.is_still(taps.response).T) if still.any()]
+    gaps = triggers.filled(taps.force, taps.response)
     for which, what in (
         ([label for label, n in zip(taps.labels, taps.n_pulses) if n > 1], "{}: more than one pulse, kept as one tap"),
         ([label for label, late in zip(taps.labels, taps.cut_short) if late],
          "{}: the record begins or ends within a pulse"),
         (flat, "cut off by the range of the channel: {}"),
-        ([label for label, filled in zip(taps.labels, taps.response) if any(map(triggers.is_filled, filled.T))],
+        (np.array(taps.labels)[gaps[:, 1:].any(axis=1)],
          "{}: a response stands still amid its motion, as where lost samples were filled"),
+        (np.array(taps.labels)[gaps[:, 0]],
+         "{}: the force stands still amid a pulse, as where lost samples were filled"),
         (dead, "{}: does not change during a tap, as a dead channel; leave it out, response="),
         ([label for label, back in zip(taps.labels, triggers.pulls(taps.force)) if back],
          "{}: the force pulls as it pushes, which no contact does; name its channel, force="),
         ([label for label, n in zip(taps.labels, widths) if n < 2],
          "{}: a pulse of a single sample, which is a spike, or the rate is too low for it"),
     ):  # fmt: skip
-        said += [what.format(", ".join(which))] if which else []
+        said += [what.format(", ".join(which))] if len(which) else []
     said += plausible.note_number("pulse", float(np.median(widths)) / stated)
     return Taps(taps.table, (*notes, *more, *said))

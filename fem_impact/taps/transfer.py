@@ -157,9 +157,9 @@ def _whole_taps(taps: Taps) -> tuple[Taps, list[str]]:
         raise ValueError(
             "records must hold one tap at least whose force is not cut off, and changes as a response does"
         )
-    filled = np.array([any(map(triggers.is_filled, rows.T)) for rows in taps.response])
     causes = {"does not change": still.any(axis=1), "is cut off": taps.table["overload"].values.any(axis=1),
-              "stands still amid its motion": filled}  # fmt: skip
+              "stands still amid its motion": triggers.filled(taps.force, taps.response).any(axis=1),
+              "begins or ends within a pulse": taps.cut_short | (taps.onset <= 0.0)}  # fmt: skip
     for why, which in causes.items():
         if which.any():
             some = (good & ~which).any()

@@ -46,6 +46,23 @@ def test_taps_whose_response_is_dead_are_left_out_and_some_must_stay():
     assert fitted(fi.Taps.from_arrays(force, rate=RATE)).used == (0, 1)  # without them
 
 
+@pytest.mark.parametrize("level", [0.0, 0.5])
+def test_a_tap_with_a_gap_in_its_force_is_told_and_left_out(level, tmp_path):
+    """What lost samples leave was fitted as a pulse, without a word."""
+    force = np.concatenate([each.force for each in taps_of(duration=0.02)])
+    first = int(force[1].argmax()) + 3
+    force[1, first : first + 5] = level * force[1, first]
+    fi.Taps.from_arrays(force, rate=RATE).save(tmp_path / "t.npz")
+    read = fi.read_taps(tmp_path / "t.npz")
+    assert said(read, "tap 2: the force stands still amid a pulse, as where lost samples were filled")
+    made = fitted(read)
+    assert said(
+        made, "left out, because their force stands still amid a pulse, as where lost samples were filled: tap 2"
+    )
+    with pytest.raises(ValueError, match="taps must hold one at least whose force has no gap"):
+        fitted(read.pick([1]))
+
+
 def test_what_was_found_strikes_again(found):
     hit = fi.strike(STRUCTURE, found.striker, found.contact, at=[0.0], speed=1.0)
     wanted = fi.strike(STRUCTURE, fi.Striker.rigid(MASS), LAW, at=[0.0], speed=1.0)

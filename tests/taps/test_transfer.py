@@ -75,6 +75,19 @@ def test_responses_that_an_amplifier_ends_or_zeros_fill_are_left_out():
     assert filled == "left out, because a channel stands still amid its motion: tap 2"
 
 
+def test_forces_with_a_gap_or_without_their_begin_are_left_out():
+    """The first told responses twice as large, the second ones of less than the whole force."""
+    taps = taps_of(1e-4)
+    force, moved = (np.concatenate([getattr(each, name) for each in taps]) for name in ("force", "response"))
+    spoiled, top = force.copy(), int(force[1].argmax())
+    spoiled[1, top - 2 : top + 5] = 0.0
+    found = fi.frf(fi.Taps.from_arrays(spoiled, moved, rate=RATE))
+    assert found.attrs["notes"] == ["left out, because a channel stands still amid its motion: tap 2"]
+    first = int((force[0] > 0.2 * force[0].max()).argmax())
+    found = fi.frf(fi.Taps.from_arrays(force[:1, first:], moved[:1, first:], rate=RATE))
+    assert found.attrs["notes"] == ["used, although a channel begins or ends within a pulse: tap 1"]
+
+
 def test_taps_that_are_cut_off_or_dead_are_left_out():
     """Two cut to half their force would tell twice the response, and agree on it."""
     taps = taps_of(0.0)
