@@ -122,7 +122,7 @@ def cpu_time(parent, name):
 
 
 @pytest.mark.slow
-@pytest.mark.thin(3)
+@pytest.mark.thin(6)
 @pytest.mark.parametrize("name", COMMANDS)
 def test_every_command_at_any_moment(tmp_path, name, all_cases):
     chance, n = random.Random(name), 10 if all_cases else 3

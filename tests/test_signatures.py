@@ -52,8 +52,8 @@ def test_a_spoiled_argument_gives_a_result_or_one_error_that_names_it(quick, spo
 
 @pytest.mark.slow
 def test_spoiled_arguments_of_all_functions_give_a_result_or_one_error_that_names_them(quick, all_cases):
-    """Each argument in two ways, always the same ones, or in all."""
-    ways = None if all_cases else 2
+    """Each argument in one way, always the same, or in all."""
+    ways = None if all_cases else 1
     chosen = [case for _, same in groupby(signatures.cases(), itemgetter(0, 1))
               for case in sorted(same, key=lambda case: crc32(" ".join(case).encode()))[:ways]]  # fmt: skip
     assert {name for name, *_ in chosen} == set(signatures.table())

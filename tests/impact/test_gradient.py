@@ -55,7 +55,7 @@ def test_gradients_of_some_blows_are_central_differences(seed):
 
 @pytest.mark.slow
 def test_gradients_of_many_blows_are_central_differences(all_cases):
-    seeds = range(2, 602 if all_cases else 10)
+    seeds = range(2, 602 if all_cases else 7)
     found = [each for seed in seeds if (each := claims.examine(seed)) is not None and not each.why]
     assert len(found) >= 0.4 * len(seeds), len(found)
     for each in found:

@@ -168,7 +168,7 @@ def barred():
 
 @pytest.mark.slow
 @pytest.mark.parametrize(("name", "value"), {"height": 12e-3, "width": 8e-3, "radius": 3.0}.items())
-@pytest.mark.thin(2)
+@pytest.mark.thin(3)
 def test_ribs_have_slopes_in_their_sizes(barred, name, value):
     """The plane of ribs moves with 2e-2 of the kinetic energy at most, which changes as well."""
     plate, modes, at_rest = barred

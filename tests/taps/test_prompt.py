@@ -1,6 +1,7 @@
 """The commands for measured taps, and scene files that strike with what was found."""
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -53,13 +54,15 @@ def test_frf_of_a_scene_finds_its_modes(prompt):
 
 @pytest.mark.slow
 def test_fit_proposes_the_model_and_lists_what_was_tried(prompt):
-    ran = prompt("fit", TAPS, "--propose", "--mass", "0.15", "--out", "out", "--json")
+    taps = fi.read_taps(TAPS)
+    replace(taps, table=taps.table.isel(tap=slice(0, 2))).save("two.npz")  # of all four it takes four times as long
+    ran = prompt("fit", "two.npz", "--propose", "--mass", "0.15", "--out", "out", "--json")
     assert ran.status == 0
     data = ran.json
     assert {"linear", "Hertz"} < {each["name"] for each in data["tried"]} == set(data["compared"])
     best = [each for each in data["tried"] if each["taken"]][-1]
     errors = np.sqrt(np.mean(np.square(data["left_out"])))
-    # 0.73 and 0.72 % measured: the profiles met a better fit
+    # 0.68 % measured; the profiles may meet a better fit
     assert best["left_out"] == pytest.approx(errors, rel=0.05) and errors < 0.01
     assert data["summary"][0].split()[:2] == ["model", "unknowns"] and Path("out/fit.html").is_file()
 
