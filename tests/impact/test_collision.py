@@ -472,7 +472,7 @@ def test_the_peak_is_found_wherever_in_a_step_it_lies(mass, loss):
     """With loss the force peaks before the turn, anywhere in a step: at its end, or at a fifth that no search hits."""
     law = fi.Contact.layers(6e8, 2.1, depth=4e-5, hard_stiffness=2.5e7, loss=loss)
     bodies, touch = [fi.Modes.rigid(mass), fi.Modes.rigid(0.2)], Touch(law, 0, 1)
-    for tolerance in 10.0 ** np.arange(-5.0, -8.0, -0.25):
+    for tolerance in 10.0 ** np.arange(-5.0, -8.0, -0.5):
         hit = collide(bodies, [touch], speeds=[1.0, 0.0], tolerance=tolerance, residual=False)
         rows = np.flatnonzero(hit.history.pressed[:, 0])
         dense = hit.history.force_of(rows.repeat(2001), 0, np.tile(np.linspace(0.0, 1.0, 2001), len(rows)))[0].max()
