@@ -490,11 +490,7 @@ def modes_of(found: Any, driving: Any, points: Any, about: Any) -> tuple[dict[st
     check_driving(found, drive, own, moved)
     rest = f"of which {100.0 * picked.left:.2g} % rms are left unexplained"
     rest += "; check their units, signs and delays" * (picked.left > 0.5)  # sharing nothing makes it 1
-    notes = [f"picked from frequency responses, {rest}"]
-    for i in np.flatnonzero(picked.late):
-        way, size = "late" if picked.late[i] > 0.0 else "early", 1e3 * abs(picked.late[i])
-        one = f"{label(found, int(i))} seems {way} against the force, by {size:.2g} ms, which are taken off"
-        notes.append(f"{one}; check its delay")
+    notes = [f"picked from frequency responses, {rest}", *notes_of_delays(found, picked.late)]
     against = own * picked.alike**0.5 < -3.0 * doubt
     for left, why in ((~moved & ~against, "hardly moves"), (against, "moves against the force")):
         if left.any():
@@ -507,6 +503,16 @@ def modes_of(found: Any, driving: Any, points: Any, about: Any) -> tuple[dict[st
         "frequencies": picked.frequencies[moved], "damping_ratio": picked.damping_ratio[moved],
         "shapes": products[:, moved] / np.sqrt(own[moved]), "points": response_points(found, points, used, end),
     }, errors[:, moved], notes  # fmt: skip
+
+
+def notes_of_delays(found: Any, late: np.ndarray) -> list[str]:
+    """What is said of delays (n_channels,) [s] that were taken off the responses."""
+    notes = []
+    for i in np.flatnonzero(late):
+        way, size = "late" if late[i] > 0.0 else "early", 1e3 * abs(late[i])
+        one = f"{label(found, int(i))} seems {way} against the force, by {size:.2g} ms, which are taken off"
+        notes.append(f"{one}; check its delay")
+    return notes
 
 
 def label(found: Any, i: int) -> str:

@@ -119,8 +119,9 @@ def write_responses(
     if modes is not None and computed is not None and place is not None:
         compared = _compared(modes, computed, place)
         pictures["mac"] = compared.pop("picture")
-    rows, poles, double = [], [], []
+    rows, poles, double, notes = [], [], [], list(found.attrs.get("notes", ()))
     if taps is not None:
+        notes = [*taps.notes, *notes]
         double = [taps.labels[i] for i in np.flatnonzero(taps.n_pulses > 1)]
         for i, name in enumerate(taps.labels):
             reach, half = watch.reach_of(taps, i), figures.in_hertz(0.5 * taps.rate, 3)
@@ -131,11 +132,12 @@ def write_responses(
         values = np.vstack([modes.frequencies, 100.0 * modes.damping_ratio, modes.products[:shown]])
         errors = np.vstack([modes.frequency_errors, 100.0 * modes.damping_errors, modes.errors[:shown]])
         poles = [list(map(_within, *each)) for each in zip(values.T.tolist(), (NINETY * errors).T.tolist())]
+        notes += picked.notes_of_delays(found, modes.late)
     write_page(
         path, "frf.html", scripts=("shapes.js",), title=title, trouble=trouble, pictures=pictures,
         unexplained=f"{100.0 * modes.left:.2g} % rms" if modes is not None and modes.left > 0.5 else "",
         channels=names[:shown], n_channels=len(names), double=double,
-        taps=rows, notes=lines_of_notes((*(() if taps is None else taps.notes), *found.attrs.get("notes", ()))),
+        taps=rows, notes=lines_of_notes(notes),
         poles=poles, pairs=compared.get("pairs", []),
         moving=_moving(modes, place) if modes is not None and place is not None and len(names) > 1 else "",
         tiles=[
