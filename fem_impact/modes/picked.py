@@ -136,26 +136,32 @@ def _in_time(
     A delay counts if modes leave less than half without it, and if it turns the band by more than 0.3: one that does
     less may be the damping's form. Real products tell it from a wave's travel.
     """
+
+    def searched(late: np.ndarray) -> tuple["_Modes", np.ndarray]:
+        return _search(omega, _turned(data, omega[:, None] * late), weight, start, given)
+
     trials = np.linspace(-3.0, 3.0, 25) / omega[-1]
-    q, none = np.linalg.qr(_basis(omega, weight, start)[0])[0], np.zeros(data.shape[1])
+    q = np.linalg.qr(_basis(omega, weight, start)[0])[0]
     explained = np.array([np.square(q.T @ _turned(data, one * omega[:, None])).sum(axis=0) for one in trials])
     left = np.square(data).sum(axis=0) - explained  # (n_trials, n_channels)
     left /= np.maximum(left[len(trials) // 2], 1e-300)
     shared = int(left.mean(axis=1).argmin())
     late = np.where(left[shared] < 1.0, trials[shared], 0.0) * (left[shared].mean() < 0.5)
     late = np.where(left.min(axis=0) < 0.5, trials[left.argmin(axis=0)], late)
-    plain = found = _search(omega, data, weight, start, given)
+    plain = _search(omega, data, weight, start, given)
+    found = searched(late) if late.any() else plain
     for _ in range(4):
-        if late.any():
-            found = _search(omega, _turned(data, omega[:, None] * late), weight, start, given)
         step, share = _phases(omega, found[0], (1.0,))
         sure = (share > 0.5) & (np.abs(step[0] * omega[-1]) > np.where(late, 0.0, 0.3))
         if not sure.any():
             break
         late = late + np.where(sure, step[0], 0.0)
+        found = searched(late)
     less = np.square(found[0].rest).sum(axis=0) < 0.5 * np.square(plain[0].rest).sum(axis=0)
-    late = np.where(less & (np.abs(late) * omega[-1] > 0.3), late, none)
-    return late, _search(omega, _turned(data, omega[:, None] * late), weight, start, given) if late.any() else plain
+    kept = np.where(less & (np.abs(late) * omega[-1] > 0.3), late, 0.0)
+    if (kept != late).any():
+        found = searched(kept) if kept.any() else plain
+    return kept, found
 
 
 def _turned(data: np.ndarray, phases: np.ndarray) -> np.ndarray:

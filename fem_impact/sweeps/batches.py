@@ -98,7 +98,7 @@ class Family:
             table = np.empty((propagation.N_TABLE, len(omega)))
             propagation.step_table(omega, zeta, h, table)
             found.append((kernel_rows(omega, zeta, squared, h, n_steps)[0], bounds, [*table[:8], omega, zeta, squared]))
-        return tuple(np.array(each) for pair in zip(*found) for each in pair)
+        return tuple(np.asarray(each) for pair in zip(*found) for each in pair)
 
     def later(self, h: float, n_steps: int) -> tuple[np.ndarray, np.ndarray]:
         """The same kernels without the means, 1/4, 2/4, ... of a step later, (2**SPLITS - 1, 4, n_steps) each."""

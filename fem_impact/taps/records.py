@@ -364,9 +364,9 @@ def read_taps(
         ([label for label, late in zip(taps.labels, taps.cut_short) if late],
          "{}: the record begins or ends within a pulse"),
         (flat, "cut off by the range of the channel: {}"),
-        (np.array(taps.labels)[gaps[:, 1:].any(axis=1)],
+        ([label for label, gap in zip(taps.labels, gaps) if gap[1:].any()],
          "{}: a response stands still amid its motion, as where lost samples were filled"),
-        (np.array(taps.labels)[gaps[:, 0]],
+        ([label for label, gap in zip(taps.labels, gaps) if gap[0]],
          "{}: the force stands still amid a pulse, as where lost samples were filled"),
         (dead, "{}: does not change during a tap, as a dead channel; leave it out, response="),
         ([label for label, back in zip(taps.labels, triggers.pulls(taps.force)) if back],
@@ -374,6 +374,6 @@ def read_taps(
         ([label for label, n in zip(taps.labels, widths) if n < 2],
          "{}: a pulse of a single sample, which is a spike, or the rate is too low for it"),
     ):  # fmt: skip
-        said += [what.format(", ".join(which))] if len(which) else []
+        said += [what.format(", ".join(which))] if which else []
     said += plausible.note_number("pulse", float(np.median(widths)) / stated)
     return Taps(taps.table, (*notes, *more, *said))

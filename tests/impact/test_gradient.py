@@ -54,7 +54,7 @@ def test_gradients_of_a_blow_are_central_differences():
 
 @pytest.mark.slow
 def test_gradients_of_many_blows_are_central_differences(all_cases):
-    seeds = range(2, 602 if all_cases else 7)
+    seeds = range(1, 602) if all_cases else range(2, 7)
     found = [each for seed in seeds if (each := claims.examine(seed)) is not None and not each.why]
     assert len(found) >= 0.4 * len(seeds), len(found)
     for each in found:
