@@ -195,7 +195,7 @@ def design(
 
     Notes
     -----
-    Goals alone are met by least squares within bounds (``scipy.optimize.least_squares``), with ``least`` or ``most`` by
+    Goals alone are met by least squares within bounds (Levenberg and Marquardt), with ``least`` or ``most`` by
     sequential quadratic programming (SLSQP). Derivatives of a blow are those of `Response.gradient`, those of
     frequencies and shapes come from the derivatives of stiffness and mass along the modes. Modes that share a frequency
     answer a blow smoothly, but their single frequencies split, which is refused.
@@ -334,7 +334,7 @@ class _Search:
         low, high = self.box.bounds
         x = solver.least(  # with a number to make least, this finds where the goals are met at all
             self._misses, lambda x: self._turned(x) * (self._misses(x) != 0.0)[:, None],  # none of goals that are met
-            first, (low, high), close=CLOSE, iterations=solver.ENOUGH, method="dogbox",
+            first, (low, high), close=CLOSE, iterations=solver.ENOUGH,
         ).x  # fmt: skip
         if self.least is not None:
             x = self._least(x, tolerance)

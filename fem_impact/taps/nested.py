@@ -84,7 +84,7 @@ def embed_fit(problem: Problem, inner: Inner) -> list[np.ndarray]:
 def never_worse(problem: Problem, best: Solution, inner: Inner, notes: list[str]) -> tuple[Problem, Solution, bool]:
     """The larger model, from the best fit of the smaller one if its own searches ended above that; the smaller one if
     that is no better; and whether they did. ``notes`` say so."""
-    cost = (1.0 + NEARLY) * float(np.square(inner.problem.residual(inner.x)).sum())
+    cost = (1.0 + NEARLY / problem.data.values.size) * float(np.square(inner.problem.residual(inner.x)).sum())
     if best.cost <= cost:
         return problem, best, False
     for begun in embed_fit(problem, inner):

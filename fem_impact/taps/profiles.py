@@ -15,7 +15,7 @@ from scipy.stats import f as fisher
 from .._base import check
 from .._base.check import SimulationError
 from .._base.rounding import HALVINGS, ROUNDING, SAME
-from .solver import ENOUGH, NEARLY, QUICK, Problem, Solution, pseudo_inverse, solve
+from .solver import ENOUGH, NEARLY, Problem, Solution, pseudo_inverse, solve
 from .unknowns import Unknown
 
 SURE = 0.95  # [-] the widest interval that a profile is followed to
@@ -152,11 +152,8 @@ class _Climb:
         return way, float(np.sqrt(self.noise) / max(np.linalg.norm(jacobian @ way), 1e-300))
 
     def _solve(self, start: np.ndarray, held: tuple[int, ...]) -> Solution:
-        """The best fit with some coordinates held; a quick search is enough where it already ends below the target."""
-        moved = solve(self.problem, start, QUICK, NEARLY, held)
-        if not moved.ended and moved.cost - self.best.cost > self.target**2 * self.noise:
-            moved = solve(self.problem, moved.x, ENOUGH, NEARLY, held, "dogbox")  # quicker along a ridge
-        return moved
+        """The best fit with some coordinates held."""
+        return solve(self.problem, start, ENOUGH, NEARLY, held)
 
     def side(self, sign: float, floor: bool) -> tuple[list[Solution], bool, str]:
         """Fits up (sign 1) or down (-1) from the best, whether the data set no limit there, and what ended the way."""

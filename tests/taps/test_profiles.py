@@ -4,8 +4,9 @@ import numpy as np
 import pytest
 from scipy.stats import t
 
+import fem_impact as fi
 from fem_impact.taps import profiles
-from fem_impact.taps.solver import Solution
+from fem_impact.taps.solver import Solution, solve
 from fem_impact.taps.unknowns import Unknown
 
 FREEDOM = 200
@@ -172,3 +173,37 @@ def test_noise_makes_the_spread_of_independent_means():
     assert made.deviation == pytest.approx(np.std(apart, ddof=1)) and made.mean == 2.0 and made.chance < 1e-3
     none = profiles.Scatter("a", np.ones(5), 1.0, 0.1, 0.1, True, 200)  # a spread as noise makes it
     assert none.chance == pytest.approx(0.41, abs=0.01)  # F(1; 4, 200)
+
+
+@pytest.mark.slow
+def test_no_other_search_ends_below_a_point_of_a_profile(monkeypatch):
+    """A hammer on a body of one mode of low damping, whose profiles end at sides of the ranges: searches that stay away
+    from the sides stop up to a hundred times the noise too high.
+
+    Up to where profiles end, a fresh search of 300 steps may gain what `solver.NEARLY` leaves, several times over
+    along a valley.
+    """
+    k, mass, f = 5.9e6, 0.104, 815.0
+    known = {"points": [[0.0]], "mass": 0.67, "damping_ratio": 0.007, "complete": True, "free": False}
+    body = fi.Modes.from_arrays([f], [[0.67**-0.5]], **known)
+    hammer, law = fi.Striker.rigid(mass), fi.Contact.linear(k, loss=0.8)
+    hits = [fi.strike(body, hammer, law, at=[0.0], speed=v) for v in (0.6, 1.4)]
+    taps = [fi.measure(hit, rate=48000.0, noise=5e-3, rng=i, duration=0.01) for i, hit in enumerate(hits)]
+    ends, search = [], profiles._Climb._solve
+
+    def kept(climb, start, held):
+        ends.append((climb.problem, search(climb, start, held), held))
+        return ends[-1][1]
+
+    monkeypatch.setattr(profiles._Climb, "_solve", kept)
+    truth = dict(zip(("contact.stiffness", "contact.loss", "mode1.frequency", "mode1.mass", "mode1.damping"),
+                     (k, 0.8, f, 0.67, 7e-3)))  # fmt: skip
+    found = fi.fit(taps, striker=hammer, contact=law, starts=3, unknown={
+        "contact.stiffness": (1e5, 1e9), "contact.loss": (0.0, 5.0), "mode1.frequency": (270.0, 2400.0),
+        "mode1.mass": (0.067, 6.7), "mode1.damping": (0.0, 0.3),
+    })  # fmt: skip
+    assert all(low <= truth[name] <= high for name, (low, high) in ((name, found.interval(name)) for name in truth))
+    noise = found._noise[0]
+    near = [each for each in ends if each[1].cost - found.best.cost < 10.0 * noise]
+    gains = [(one.cost - solve(problem, one.x, 300, 1e-4, held).cost) / noise for problem, one, held in near]
+    assert len(gains) > 20 and max(gains) < 0.3

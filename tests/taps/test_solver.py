@@ -79,3 +79,32 @@ def test_speed_and_onset_are_found_alone_even_six_samples_away(found, off, near)
 def test_directions_that_steps_cannot_tell_from_ridges_move_nothing():
     inverse = solver.pseudo_inverse(np.array([[1.0, -1.0, 0.0], [1.0, -1.0, 1e-9], [0.0, 0.0, 3.0]]))
     assert inverse @ [1.0, 1.0, 3.0] == pytest.approx([0.5, -0.5, 1.0])  # the shortest way of those that do the same
+
+
+def test_the_least_at_a_side_of_a_box_is_found_in_few_steps():
+    """Along a bent valley that ends there. Methods that stay away from the sides take twice as many."""
+    begun, bounds = [], (np.array([0.1, 0.5]), np.array([10.0, 4.0]))
+
+    def valley(x):
+        begun.append(x)
+        return np.array([np.exp(x[0] * x[1]) - np.exp(3.0), 0.1 * (x[0] - 9.0)])
+
+    def slopes(x):
+        return np.array([x[::-1] * np.exp(x[0] * x[1]), [0.1, 0.0]])
+
+    found = solver.least(valley, slopes, np.array([2.0, 2.0]), bounds, close=1e-8, iterations=solver.ENOUGH)
+    x = np.linspace(5.9, 6.1, 200_001)  # at the side x[1] = 0.5
+    truth = ((np.exp(0.5 * x) - np.exp(3.0)) ** 2 + 0.01 * (x - 9.0) ** 2).min()
+    assert found.ended and found.x[1] == 0.5 and found.cost == pytest.approx(truth, rel=1e-6)
+    assert len(begun) < 50 and np.allclose(found.jacobian, slopes(found.x))
+
+
+def test_a_search_goes_round_blows_that_do_not_end():
+    def missed(x):
+        if x[0] > 1.5:
+            raise fi.SimulationError("no blow")
+        return np.array([np.exp(x[0]) - np.e])
+
+    found = solver.least(missed, lambda x: np.exp(x)[:, None], np.array([-3.0]), (np.full(1, -5.0), np.full(1, 9.0)),
+                         close=1e-8, iterations=solver.ENOUGH)  # fmt: skip
+    assert found.ended and found.x == pytest.approx([1.0])
