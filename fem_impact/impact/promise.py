@@ -14,7 +14,7 @@ from .._base.check import REACH, SimulationError, ToleranceWarning
 from ..modes.shapes import FieldShapes, compliance_errors
 from . import accuracy, distance
 from .quantities import USUAL, words
-from .stepping import RICHARDSON
+from .stepping import richardson
 
 if TYPE_CHECKING:
     from .response import Response
@@ -108,7 +108,7 @@ def doubt_of_sound(found: Any, band: float) -> str:
     for hit in getattr(found, "hits", [found]):
         if "sound" not in hit.quantities and hit.runs:
             apart = distance.of_sounds(hit.runs[0], hit.history, hit.body_slice(len(hit.bodies) - 1), band)
-            worst = max(worst, apart / RICHARDSON[hit.scheme][1])
+            worst = max(worst, apart / richardson(hit.scheme, hit.history.law)[1])
     if worst <= 0.05:
         return ""
     so = f"may err by {worst:.1g} of itself, as so soft a blow makes little"

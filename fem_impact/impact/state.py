@@ -12,7 +12,7 @@ from ..modes.modal import Modes
 from .compiled import record
 from .contact import Contact
 from .reduced_body import ReducedBody
-from .stepping import RICHARDSON
+from .stepping import richardson
 from .striker import Striker
 
 if TYPE_CHECKING:
@@ -172,10 +172,11 @@ def _doubts(
     other = min(1.0, error.total - (shown if runs else 0.0))
     memory = hit.history.remembered(time, own)
     found, lost = [other * flexible_part(modes, *state) for modes, state in zip(bodies, states)], other * np.abs(memory)
+    over = richardson(hit.scheme, hit.history.law)[0]
     cut, late = touching and time == hit.history.end_time and hit.history.status == record.IMPACTS, 0.0
 
     def extrapolated(fine: Any, coarse: Any, *moved: Any) -> Any:
-        return (coarse - fine) / RICHARDSON[hit.scheme][0] + (moved[0] - coarse if moved else 0.0)
+        return (coarse - fine) / over + (moved[0] - coarse if moved else 0.0)
 
     if runs:
         times = [run.end_time if cut else max(0.0, time - begun) for run, begun in zip(runs, (0.0, hit.late))]

@@ -164,13 +164,12 @@ class _Control:
     def judge_runs(self, sizes: tuple[float, float], coarse: History, fine: History) -> Converged:
         """Two runs of a finer and a coarser size, and the errors of the finer one."""
         scheme, quantities, n = self.options.scheme, self.options.quantities, self.options.n_quantities
-        over = RICHARDSON[scheme]  # a strong loss reacts to the rates of modes faster than the step
+        over = richardson(scheme, self.system.law)
+        # a strong loss reacts to the rates of modes faster than the step
         over = over[0], over[1] / (1.0 + 2.0 * self.stickiness)
-        if scheme == "A4" and len(felt := self.system.law[self.system.law["relaxation"] > 0.0]):
-            order = 1.0 + felt["exponent"].min()  # what it remembers sets in like the force
-            over = min(over[0], 2.0**order - 1.0), min(over[1], 2.0**order - 1.0)
-            if felt["relaxation"].min() < sizes[0]:  # it releases within its relaxation: contact times at first order
-                over = over[0], 1.0
+        fades = self.system.law["relaxation"]
+        if scheme == "A4" and fades[fades > 0.0].min(initial=np.inf) < sizes[0]:
+            over = over[0], 1.0  # felt releases within its relaxation: contact times at first order
         error = distance.of_runs(coarse, fine, quantities, over, self.pace)
         if "force" in quantities:
             i = [*quantities].index("force")
@@ -273,6 +272,15 @@ class _Control:
             f"the step error stays at {best:.1e}, above the tolerance {tolerance:.1e}, with {len(fine.steps)} "
             f"steps{hint}; {advice}"
         )
+
+
+def richardson(scheme: str, law: np.ndarray) -> tuple[float, float]:
+    """Difference of two runs over the error of the finer one, as `RICHARDSON`, with contacts of these laws."""
+    over, felt = RICHARDSON[scheme], law[law["relaxation"] > 0.0]
+    if scheme == "A4" and len(felt):  # what it remembers sets in like the force
+        slow = 2.0 ** (1.0 + felt["exponent"].min()) - 1.0
+        over = min(over[0], slow), min(over[1], slow)
+    return over
 
 
 def missed_by_ringing(share: Any, tolerance: float) -> Any:

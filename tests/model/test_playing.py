@@ -157,6 +157,17 @@ def test_what_a_stroke_inherits_is_what_the_steps_before_did_to_the_motion(seed,
             assert abs(found - wanted) <= (2.0 * hit.error.of_quantity(quantity) + 3e-7) * wanted, name
 
 
+def test_what_a_stroke_inherits_from_felt_is_of_the_order_of_felt():
+    """Runs in twice the steps differ by three times the error there, and by 15 times where nothing remembers."""
+    body = fi.Modes.from_arrays([60.0, 210.0, 900.0], [[2.0, -3.0, 4.0]], points=[[0.0]], mass=1.0, complete=True)
+    felt, ball = fi.Contact.felt(2e5, 1.0, hysteresis=0.4, relaxation=1e-3), fi.Striker.rigid(0.1)
+    roll = [(0.0, ball, felt, [0.0], 1.0), (1e-3, fi.Striker.rigid(0.02), LAW, [0.0], 0.4)]
+    told, exact = (fi.strokes(body, roll, tolerance=each, duration=2.5e-3).hits[1] for each in (2e-2, 1e-8))
+    missed = abs(told.impulse / exact.impulse - 1.0)
+    assert told.error.inherited > 3.0 * told.error.step  # or it is not this that is compared
+    assert missed < told.error.of_quantity("impulse") < 2.0 * missed
+
+
 def test_a_stick_is_lifted_when_its_time_is_up_and_it_does_not_touch():
     stay = (0.0, fi.Striker.rigid(0.5), LAW, (0.05, 0.0), 1.0)  # for many milliseconds
     long = fi.strokes(DRUM, [stay], tolerance=1e-3)
