@@ -227,7 +227,8 @@ class _Control:
                 if clear and runs[1].n_fallback <= runs[0].n_fallback:
                     break
                 grazes += 1
-            if 2 * len(found.fine.steps) > engine.most_steps(self.system, self.stretched):
+            enough = i > 5 and len(found.fine.steps) > FEW**2
+            if enough or 2 * len(found.fine.steps) > engine.most_steps(self.system, self.stretched):
                 break  # the next run would exceed the step limit
         if met is None:
             raise SimulationError(self.explain_failure(best, *runs))
@@ -251,7 +252,8 @@ class _Control:
             longest = min(longest, max(RESOLVED / float(heard.max(initial=1e-300)), least))
         first = min(2.0 * shortest / count, longest)
         within = 0.5 * count * first if self.stickiness > STICKY and options.scheme == "A4" else 0.0
-        return [first * 0.5**n for n in range(8)], aim, within  # A4 errs 2**28 times less at last
+        # after seven halvings A4 errs 2**28 times less; a run cut after a few steps has not been halved at all by then
+        return [first * 0.5**n for n in range(24)], aim, within
 
     def explain_failure(self, best: float, coarse: History, fine: History) -> str:
         """Why no two runs agreed, of which the best erred by ``best``, and what helps."""

@@ -73,6 +73,20 @@ def test_a_blow_of_several_impacts_goes_on_from_its_middle(law, residual, apart,
     assert rest.energy_error < 1e-12
 
 
+@pytest.mark.parametrize("left", [1e-3, 1e-6])
+@pytest.mark.parametrize(
+    "law", [fi.Contact.linear(2e5), fi.Contact.felt(2e5, 1.0, hysteresis=0.4, relaxation=1e-3)], ids=["linear", "felt"]
+)
+def test_a_blow_goes_on_just_before_it_parts(law, left):
+    """Steps halved from those of a whole contact were longer than what is left of it, and no tolerance was met."""
+    body = fi.Modes.from_arrays([60.0, 210.0, 900.0], [[2.0, -3.0, 4.0]], points=[[0.0]], mass=1.0, complete=True)
+    blow = {"modes": body, "striker": fi.Striker.rigid(0.1), "contact": law, "at": [0.0]}
+    hit = fi.strike(**blow, speed=1.0, tolerance=1e-8)
+    end = hit.impacts[0].end
+    rest = fi.strike(**blow, speed=None, start=hit.state((1.0 - left) * end), tolerance=1e-2, max_impacts=1)
+    assert_allclose(rest.contact_time, left * end, rtol=1e-5)
+
+
 @pytest.mark.parametrize("where", ["between", "pressed"])
 def test_a_collision_at_two_contacts_goes_on_from_its_middle(where):
     bodies = [fi.Modes.rigid(0.05), fi.Modes.rigid(0.02), PLATE]
