@@ -133,6 +133,18 @@ def test_a_contact_that_has_just_opened_does_not_open_again(left):
     assert rest.impacts[0].separation_speed > 0.0
 
 
+@pytest.mark.parametrize("left", [-1e-9, 0.0, 1e-9])
+def test_a_force_that_its_loss_has_just_ended_is_no_impact(left):
+    """Steps find that end to 1e-7 of the force's factor; a run that went on from there told one more impact."""
+    body = fi.Modes.from_arrays([150.0], [[3.0], [2.0]], points=[[0.0], [1.0]], mass=0.2, complete=True)
+    laws = fi.Contact.power(2e10, 2.3, loss=4.0), fi.Contact.linear(2e4)
+    touches = [fi.Touch(law, i, 2, None, [float(i)]) for i, law in enumerate(laws)]
+    still, states = np.zeros(1), [([0.2**0.5 * 1e-4], [-(0.2**0.5) * (1.0 - left) / 4.0]), ([1e-3], [-0.1])]
+    bodies = [fi.Modes.rigid(0.2), fi.Modes.rigid(0.5), body]
+    rest = fi.collide(bodies, touches, states=[*states, (still, still)], tolerance=1e-2, max_impacts=1)
+    assert [each.contact for each in rest.impacts] == [1]
+
+
 def test_the_energies_of_a_second_blow_count_from_its_start():
     law = fi.Contact.hertz(1e7)
     first = fi.strike(PLATE, STICK, law, at=AT, speed=1.0)

@@ -318,6 +318,7 @@ def find_impacts(steps, now, law, rounding, way, touch):
             if row == n_steps and part >= 1.0 and still_pressed(now, law, i, deep):
                 left = np.nan
             peak = peak_between(steps, now, law, begin, row, i)
-            result[count] = start, end, peak, impulse, float(i), met, left, since
-            count += 1
+            if impulse > 0.0:  # a loss that has just made the force vanish may not quite do so where a run goes on
+                result[count] = start, end, peak, impulse, float(i), met, left, since
+                count += 1
     return result[:count].copy()
