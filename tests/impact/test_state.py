@@ -1,5 +1,7 @@
 """Blows on a body that still moves: from the state that another blow left."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from comparing import difference
@@ -143,6 +145,22 @@ def test_a_force_that_its_loss_has_just_ended_is_no_impact(left):
     bodies = [fi.Modes.rigid(0.2), fi.Modes.rigid(0.5), body]
     rest = fi.collide(bodies, touches, states=[*states, (still, still)], tolerance=1e-2, max_impacts=1)
     assert [each.contact for each in rest.impacts] == [1]
+
+
+def test_felt_is_not_met_again_by_doubts_of_where_it_was_left():
+    """Doubts are linear: they moved body and felt into each other by the square of them, and the error became two."""
+    shapes = [[2.0, -3.0, 4.0], [1.0, 2.0, -1.0]]
+    body = fi.Modes.from_arrays([60.0, 210.0, 900.0], shapes, points=[[0.0], [1.0]], mass=1.0, complete=True)
+    laws = fi.Contact.felt(4e9, 2.3, hysteresis=0.5, relaxation=1e-3), fi.Contact.linear(3e3)
+    touches = [fi.Touch(law, i, 2, None, [float(i)]) for i, law in enumerate(laws)]
+    bodies = [fi.Modes.rigid(0.02), fi.Modes.rigid(0.1), body]
+    hit = fi.collide(bodies, touches, speeds=[1.0, 1.0, 0.0], tolerance=1e-3, max_impacts=1)
+    left = hit.state()
+    pressed_in = 0.5 * abs(left.memory[0, 0])
+    doubts = np.array([[-1e-4 * pressed_in ** (1.0 / 2.3) * 0.02**0.5], [0.0]]), np.zeros((2, 1)), np.zeros((2, 3))
+    lost = np.array([-2.3e-4 * 2.0 * pressed_in, 0.0])
+    moved = replace(left, doubts=doubts, memory=np.array([left.memory[0], lost]))
+    assert fi.collide(bodies, touches, start=moved, tolerance=1e-2, max_impacts=1).error.total < 1e-5
 
 
 def test_the_energies_of_a_second_blow_count_from_its_start():

@@ -15,7 +15,7 @@ from .build import inner
 from .bundles import Bodies, Contacts, Course, KernelRun, KernelSystem
 from .flight import NEVER, ONSET, SLOW, approach_of, find_onset
 from .law import dent, harden
-from .laws.felt import meet, rest_of
+from .laws.felt import meet, rest_of, stay_parted
 from .record import EXHAUSTED, FULL, HORIZON, IMPACTS, total_energy
 from .rounding import ITERATIONS, NEAR
 
@@ -95,6 +95,7 @@ def begin_run(scene, bodies, contacts, course, base):
         if abs(now[APPROACH, i]) <= LOCATED * way:
             now[APPROACH, i] = 0.0
         contacts.pressed[i] = now[APPROACH, i] > 0.0 or (now[APPROACH, i] == 0.0 and now[RATE, i] > 0.0)
+        stay_parted(contacts.law, i, now[APPROACH, i])
     course.clock[RESPITE] = base
     course.clock[MISS] = -np.inf
     course.clock[FAINT] = 1e-24 * total_energy(bodies, contacts)

@@ -189,6 +189,13 @@ def rest_of(law, i, time):
 
 
 @inner()
+def stay_parted(law, i, approach):
+    """Let felt that a body has parted from reach to the body at most, as a run starts where doubts have moved both."""
+    if relaxes(law, i) and law["memory"][i] < 0.0 and parting(law, i, approach, law["memory"][i]) > 0.0:
+        law["memory"][i] = -power(approach, law["exponent"][i]) / law["hysteresis"][i]
+
+
+@inner()
 def surface(law, i, memory):
     """Approach at which felt i pushes from, as far as it is still pressed in [m]."""
     return (law["hysteresis"][i] * memory) ** (1.0 / law["exponent"][i]) if memory > 0.0 else 0.0
