@@ -48,7 +48,7 @@ def arrays(path: Path) -> dict[str, np.ndarray]:
         _refuse_left_out(path)
     if path.suffix.lower() == ".inp":
         deck_labels(path)
-    with closed_hdf5(path):
+    with closed_hdf5(path), _whole_groups():
         mesh = meshio.read(path)
 
     def whole_numbers(values: Any) -> Any:
@@ -103,6 +103,31 @@ def deck_labels(path: Path) -> list[str]:
                 raise ValueError(f"{path.name} has node {words[0]} twice; export it again")
             labels[words[0]] = None
     return list(labels)
+
+
+@contextmanager
+def _whole_groups() -> Iterator[None]:
+    """Meanwhile, meshio knows Gmsh's curves in all of their groups, also those that run against them or have no name.
+
+    Without it, these curves would be missing from their edges, and curves of no group beside others an error.
+    """
+    from meshio.gmsh import _gmsh41
+
+    known = _gmsh41._read_elements
+
+    def read_elements(file: Any, points: Any, groups: Any, *rest: Any) -> Any:
+        named, names = {(int(kind), int(tag)) for tag, kind in rest[-1].values()}, rest[-1]
+        groups = tuple({own: [abs(tag) for tag in tags] or [0] for own, tags in each.items()} for each in groups or ())
+        for tag in {tag for tags in groups[1].values() for tag in tags} if groups else ():
+            if tag and (1, tag) not in named:
+                names[f"edge{tag}"] = np.array([tag, 1])
+        return known(file, points, groups, *rest)
+
+    _gmsh41._read_elements = read_elements
+    try:
+        yield
+    finally:
+        _gmsh41._read_elements = known
 
 
 @contextmanager

@@ -311,6 +311,57 @@ def test_groups_of_med_are_edges_which_may_overlap(tmp_path):
     assert [len(plate.edges[name]) for name in ("left", "ends")] == [len(sides) // 2, len(sides)]
 
 
+GMSH = """$MeshFormat
+4.1 0 8
+$EndMeshFormat
+{}$Entities
+0 4 1 0
+{}
+1 0 0 0 1 1 0 {} 4 1 2 3 4
+$EndEntities
+$Nodes
+1 4 1 4
+2 1 0 4
+1
+2
+3
+4
+0 0 0
+2 0 0
+2 1 0
+0 1 0
+$EndNodes
+$Elements
+5 6 1 6
+1 1 1 1
+1 1 2
+1 2 1 1
+2 2 3
+1 3 1 1
+3 3 4
+1 4 1 1
+4 4 1
+2 1 2 2
+5 1 2 3
+6 1 3 4
+$EndElements
+"""
+
+
+@pytest.mark.parametrize(("names", "groups", "surface", "lengths"), [
+    ('1 1 "rim"\n2 9 "plate"', ["1 1", "1 -1", "1 1", "1 -1"], "1 9", {"rim": 6.0}),  # Physical Curve = {1, -2, 3, -4}
+    ("", ["1 1", "1 1", "1 1", "2 2 1"], "1 9", {"edge1": 6.0, "edge2": 1.0}),
+    ('1 1 "rim"', ["1 1", "0", "0", "1 1"], "0", {"rim": 3.0}),
+])  # fmt: skip
+def test_a_curve_of_gmsh_is_in_each_of_its_groups_whichever_way_it_runs(tmp_path, names, groups, surface, lengths):
+    head = f"$PhysicalNames\n{names.count(chr(10)) + 1}\n{names}\n$EndPhysicalNames\n" if names else ""
+    curves = "\n".join(f"{i} 0 0 0 2 1 0 {own} 0" for i, own in enumerate(groups, 1))
+    (tmp_path / "a.msh").write_text(GMSH.format(head, curves, surface))
+    plate = fi.mesh.load(tmp_path / "a.msh")
+    found = {name: plate.lengths[own].sum() for name, own in plate.edges.items() if name not in ("outer", "boundary")}
+    assert found == pytest.approx(lengths)
+
+
 ABAQUS = "{}\n*Element, type=S3\n1,1,2,3\n"
 NASTRAN = "BEGIN BULK\nGRID,1,,0.,0.,0.\nGRID,2,,1.,0.,0.\n{}\nCTRIA3,1,1,1,2,3\nENDDATA\n"
 
