@@ -2,10 +2,13 @@
 
 import math
 import re
+from collections.abc import Iterator
 from dataclasses import replace
+from io import BytesIO
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
+from xml.etree import ElementTree
 from xml.parsers import expat
 
 import numpy as np
@@ -13,7 +16,7 @@ import numpy as np
 from .._base import check, isolated
 from .._base.rounding import SAME
 from . import open_paths
-from .facets import angles
+from .facets import angles, cross_product
 from .loops import (
     FARTHEST,
     MOST_PIECES,
@@ -36,8 +39,9 @@ from .loops import (
 from .smooth_edges import DENSE, smooth_runs
 
 DXF_UNITS = {  # $INSUNITS code -> [m]
-    1: 0.0254, 2: 0.3048, 4: 1e-3, 5: 1e-2, 6: 1.0, 7: 1e3, 8: 2.54e-8, 9: 2.54e-5, 10: 0.9144, 12: 1e-9, 13: 1e-6,
-    14: 0.1, 15: 10.0, 16: 100.0,
+    1: 0.0254, 2: 0.3048, 3: 1609.344, 4: 1e-3, 5: 1e-2, 6: 1.0, 7: 1e3, 8: 2.54e-8, 9: 2.54e-5, 10: 0.9144, 11: 1e-10,
+    12: 1e-9, 13: 1e-6, 14: 0.1, 15: 10.0, 16: 100.0, 21: 1200.0 / 3937.0, 22: 100.0 / 3937.0, 23: 3600.0 / 3937.0,
+    24: 6336000.0 / 3937.0,
 }  # fmt: skip
 # by the CSS standard -> [m]
 SVG_UNITS = UNITS | {"px": 0.0254 / 96.0, "pt": 0.0254 / 72.0, "pc": 0.0254 / 6.0, "q": 0.25e-3}
@@ -141,7 +145,7 @@ def svg_arrays(path: Path) -> dict[str, np.ndarray]:
     import svgelements
 
     _refuse_entities(path)
-    drawing = svgelements.SVG.parse(str(path))
+    drawing = svgelements.SVG.parse(_shown(path))
     if not isinstance(drawing, svgelements.SVG):
         raise ValueError("it contains no <svg> element")
     found: list[Piece] = []
@@ -152,9 +156,11 @@ def svg_arrays(path: Path) -> dict[str, np.ndarray]:
             name = str(shape.id) if shape.id else ""
             for part in whole:
                 if isinstance(part, svgelements.Arc):
-                    centre, a, b = (np.array([p.x, p.y]) for p in (part.center, part.prx, part.pry))
-                    turns = float(part.get_start_t()), float(part.sweep)
-                    found.append(Arc(centre, a - centre, b - centre, *turns, name))
+                    centre, *ends = (np.array([p.x, p.y]) for p in (part.center, part.prx, part.pry, part.start))
+                    a, b, first = (end - centre for end in ends)  # askew axes once the drawing is sheared
+                    sign = math.copysign(1.0, float(cross_product(a, b)))
+                    start = math.atan2(sign * float(cross_product(a, first)), sign * float(cross_product(first, b)))
+                    found.append(Arc(centre, a, b, start, sign * float(part.sweep), name))
                 elif not isinstance(part, svgelements.Move) and part.start is not None and part.end is not None:
                     control = [getattr(part, end, None) for end in ("start", "control", "control1", "control2", "end")]
                     found.append(Bezier(np.array([[p.x, p.y] for p in control if p is not None], float), name))
@@ -169,6 +175,24 @@ def svg_arrays(path: Path) -> dict[str, np.ndarray]:
     if not style.startswith("none") or np.isnan(each).any():
         each = np.full(2, (np.fmax if "slice" in style else np.fmin).reduce(each))
     return {**_packed(found), "pixels": np.array([shown.a, shown.d]), "size": each}
+
+
+def _shown(path: Path) -> BytesIO:
+    """An SVG file without shapes that only masks, markers and symbols hold; svgelements would draw them."""
+    tree = ElementTree.parse(path)
+    links = {link for each in tree.iter() for key, link in each.attrib.items() if key.rpartition("}")[2] == "href"}
+    for parent in list(tree.iter()):
+        for i, child in enumerate(parent):
+            start, brace, tag = str(child.tag).rpartition("}")
+            if tag == "symbol" and "viewBox" in child.attrib and f"#{child.get('id')}" in links:
+                raise ValueError(
+                    f"it uses symbol {child.get('id')!r:.99}, which has a viewBox; draw its shapes instead"
+                )
+            if tag in ("mask", "marker", "symbol"):
+                child.tag = start + brace + ("g" if tag == "symbol" else "defs")
+                parent[i] = apart = ElementTree.Element(f"{start}{brace}defs")
+                apart.append(child)
+    return BytesIO(ElementTree.tostring(tree.getroot()))
 
 
 def _refuse_entities(path: Path) -> None:
@@ -219,20 +243,21 @@ def dxf_arrays(path: Path) -> dict[str, np.ndarray]:
     """Pieces and unit of a DXF file; runs in the reader process (see `isolated`)."""
     import ezdxf
     from ezdxf import bbox
+    from ezdxf.math import BoundingBox, Matrix44
 
     drawing = ezdxf.readfile(path)
     hidden = {layer.dxf.name.lower() for layer in drawing.layers if layer.is_off() or layer.is_frozen()}
     found: list[Piece] = []
     left: set[str] = set()
-    kept: list[Any] = []
-    for entity in drawing.modelspace():
-        visible = not entity.dxf.get("invisible", 0) and entity.dxf.layer.lower() not in hidden
-        pieces = _dxf_pieces(entity) if visible else []
-        left |= set() if pieces else {entity.dxftype() if visible else f"hidden {entity.dxftype()}"}
-        kept += [entity] if pieces else []
-        found += pieces
-        _check_number(path.name, found)
-    box = bbox.extents(kept, fast=True)
+    box = BoundingBox()
+    for whole in drawing.modelspace():
+        for entity, place, layer in _dxf_visible(whole, hidden, left, Matrix44()):
+            pieces = _dxf_pieces(entity, "" if layer == "0" else layer)
+            left |= set() if pieces else {entity.dxftype()}
+            within = bbox.extents([entity] if pieces else [], fast=True)
+            box.extend(place.transform_vertices(within.cube_vertices()) if within.has_data else ())
+            found += [_moved(piece, place) for piece in pieces]
+            _check_number(path.name, found)
     size = np.array(box.size if box.has_data else (0.0, 0.0, 0.0))
     unit = np.array(int(drawing.header.get("$INSUNITS", 0)))
     return {**_packed(found), "unit": unit, "left": np.array(sorted(left), str), "size": size}
@@ -258,23 +283,51 @@ def _dxf(path: Path, unit: str | None, notes: list[str]) -> Drawn:
     return loops, lines
 
 
-def _dxf_pieces(entity: Any) -> list[Piece]:
-    kind, name = entity.dxftype(), "" if entity.dxf.get("layer", "0") == "0" else str(entity.dxf.layer)
+def _dxf_visible(
+    entity: Any, hidden: set[str], left: set[str], place: Any, layer: str = "0"
+) -> Iterator[tuple[Any, Any, str]]:
+    """The entity, or those of the block that it inserts, with their places and layers; ``left`` gets what is hidden.
 
+    The places are multiplied here because ezdxf loses the shear of a turned block in an unevenly scaled one.
+    """
+    layer = layer if entity.dxf.layer == "0" else str(entity.dxf.layer)  # in a block, 0 is that of its insert
+    if entity.dxf.get("invisible", 0) or layer.lower() in hidden:
+        left.add(f"hidden {entity.dxftype()}")
+    elif entity.dxftype() == "INSERT":
+        parts = list(entity.block() or ())
+        left |= set() if parts else {"INSERT"}
+        for each in entity.multi_insert():
+            for part in parts:
+                yield from _dxf_visible(part, hidden, left, each.matrix44() * place, layer)
+    else:
+        yield entity, place, layer
+
+
+def _moved(piece: Piece, place: Any) -> Piece:
+    """A piece under a matrix of ezdxf, by which points are multiplied from the left."""
+    turn, shift = np.split(np.array(list(place)).reshape(4, 4)[[0, 1, 3], :2], [2])
+    if isinstance(piece, Arc):
+        return replace(piece, centre=(piece.centre @ turn + shift)[0], a=piece.a @ turn, b=piece.b @ turn)
+    return replace(piece, control=piece.control @ turn + shift)
+
+
+def _dxf_pieces(entity: Any, name: str) -> list[Piece]:
+    kind = entity.dxftype()
     if kind == "LINE":
         return [segment(tuple(entity.dxf.start.vec2), tuple(entity.dxf.end.vec2), name)]
     if kind in ("ARC", "CIRCLE"):
         from ezdxf.entities import Ellipse
 
-        return _dxf_pieces(Ellipse.from_arc(entity))
+        return _dxf_pieces(Ellipse.from_arc(entity), name)
     if kind == "ELLIPSE":
         centre, a, b = (np.array([p.x, p.y]) for p in (entity.dxf.center, entity.dxf.major_axis, entity.minor_axis))
         start = float(entity.dxf.start_param)
         sweep = (float(entity.dxf.end_param) - start) % (2.0 * math.pi) or 2.0 * math.pi
         return [Arc(centre, a, b, start, sweep, name)]
-    if kind in ("LWPOLYLINE", "POLYLINE", "INSERT"):
-        whole = entity.multi_insert() if kind == "INSERT" else [entity]
-        return [piece for each in whole for part in each.virtual_entities() for piece in _dxf_pieces(part)]
+    if kind in ("LWPOLYLINE", "POLYLINE"):
+        if kind == "POLYLINE":  # the frame of a smoothed one is no part of it
+            entity.vertices[:] = [vertex for vertex in entity.vertices if not vertex.dxf.flags & 16]
+        return [piece for part in entity.virtual_entities() for piece in _dxf_pieces(part, name)]
     if kind == "SPLINE":
         curve = _clamped(entity.construction_tool())
         near = curve.cubic_bezier_approximation(level=8) if curve.is_rational else ()
@@ -373,6 +426,7 @@ def _loops(name: str, left: list[Piece], span: float, notes: list[str]) -> list[
     starts, stops = np.stack([piece.at(np.array([0.0, 1.0])) for piece in left], axis=1)
     free = np.ones(len(left), bool)
     loops: list[Loop] = []
+    closed: list[float] = []
     while free.any():
         last = int(free.argmax())
         chain, start, stop = [left[last]], starts[last], stops[last]
@@ -389,12 +443,17 @@ def _loops(name: str, left: list[Piece], span: float, notes: list[str]) -> list[
                 ahead = onward[best] <= gaps[best]
                 chain.append(left[best] if ahead else left[best].reversed())
                 stop, free[best] = stops[best] if ahead else starts[best], False
+                closed.append(float(gaps[best]))
             elif home <= BRIDGED * span:
-                notes.append(f"{name}: a gap of {home:g} m was closed")
+                closed.append(home)
                 break
             else:
                 raise _why_open(name, start, stop)
         loops.append(tuple(chain))
+    closed = [gap for gap in closed if gap > SAME * span]
+    if closed:
+        which = "a gap of" if len(closed) == 1 else f"each of {len(closed)} gaps of up to"
+        notes.append(f"{name}: {which} {max(closed):g} m was closed")
     return loops
 
 

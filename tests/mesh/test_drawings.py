@@ -133,9 +133,17 @@ def test_an_edge_beside_a_gap_that_is_closed_stays_straight(tmp_path):
 
     shape = fi.mesh.outline(dxf(tmp_path, draw))
     assert any("gap of 1e-07 m was closed" in note for note in shape.notes) and not shape.curved.any()
+    parts = [[(0, 0), (0.4, 0)], [(0.4, 2e-4), (0.4, 0.3)], [(0.4, 0.3), (0, 0.3)], [(0, 0.3), (0, 1e-4)]]
+
+    def lines(space):
+        for part in parts:
+            space.add_line(*part)
+
+    apart = fi.mesh.outline(dxf(tmp_path, lines))
+    assert apart.notes == ("plate.dxf: each of 2 gaps of up to 0.0002 m was closed",)
 
 
-@pytest.mark.parametrize(("code", "metres"), [(7, 1e3), (9, 2.54e-5), (10, 0.9144), (15, 10.0)])
+@pytest.mark.parametrize(("code", "metres"), [(7, 1e3), (9, 2.54e-5), (10, 0.9144), (15, 10.0), (21, 1200 / 3937)])
 def test_a_unit_that_a_dxf_file_states_is_not_taken_as_none(tmp_path, code, metres):
     corners = np.array([(0.0, 0.0), (0.4, 0.0), (0.4, 0.3), (0.0, 0.3)]) / metres
     shape = fi.mesh.outline(dxf(tmp_path, lambda space: space.add_lwpolyline(corners, close=True), units=code))
@@ -168,6 +176,65 @@ def test_dxf_blocks_are_drawn_and_what_is_hidden_or_no_line_is_told(tmp_path):
     centres = [0.5 * (hole.min(axis=0) + hole.max(axis=0)) for hole in holes]
     assert_allclose(sorted(y for _, y in centres), [0.5, 1.1, 1.5, 2.1], atol=2e-3)  # chords
     assert "hole4" not in shape.edges and "to see: TEXT, hidden CIRCLE" in shape.notes[0] and len(shape.notes) == 1
+
+
+def test_what_is_hidden_in_a_dxf_block_is_left_out_and_layer_0_is_that_of_the_insert(tmp_path):
+    def draw(space):
+        space.doc.layers.add("Plan").freeze()
+        block = space.doc.blocks.new("plate")
+        block.add_lwpolyline([(0, 0), (1, 0), (1, 3), (0, 3)], close=True)
+        block.add_circle((0.5, 0.5), 0.1, dxfattribs={"layer": "plan"})
+        block.add_circle((0.5, 1.5), 0.1, dxfattribs={"invisible": 1})
+        block.add_text("top")
+        space.add_blockref("plate", (0, 0), dxfattribs={"layer": "rim"})
+
+    shape = fi.mesh.outline(dxf(tmp_path, draw))
+    assert set(shape.edges) == {"rim", "outer", "boundary"} and shape.area == pytest.approx(3.0)
+    assert "to see: TEXT, hidden CIRCLE" in shape.notes[0]
+
+
+def test_a_turned_dxf_block_within_an_unevenly_scaled_one_is_sheared(tmp_path):
+    def draw(space):
+        space.doc.blocks.new("square").add_lwpolyline([(0, 0), (1, 0), (1, 1), (0, 1)], close=True)
+        space.doc.blocks.new("turned").add_blockref("square", (0, 0), dxfattribs={"rotation": 45.0})
+        space.add_blockref("turned", (0, 0), dxfattribs={"xscale": 2.0, "yscale": -1.0})
+
+    points = fi.mesh.outline(dxf(tmp_path, draw)).points  # a rhombus from the origin
+    assert_allclose([points.min(axis=0), points.max(axis=0)], np.sqrt([[2.0, 2.0], [2.0, 0.0]]) * [[-1, -1], [1, 1]])
+
+
+def test_the_frame_of_a_smoothed_dxf_polyline_is_no_part_of_it(tmp_path):
+    def draw(space):
+        line = space.add_polyline2d([], close=True)
+        line.dxf.flags |= 4
+        for flag, size in ((16, 1.0), (8, 0.7)):
+            for corner in np.array([(1, 0), (0, 1), (-1, 0), (0, -1)]) * size:
+                line.append_vertex(corner, dxfattribs={"flags": flag})
+
+    assert fi.mesh.outline(dxf(tmp_path, draw)).area == pytest.approx(2 * 0.7**2)
+
+
+@pytest.mark.parametrize("change", ["skewX(40)", "rotate(20) scale(-2 0.5) rotate(30)", "matrix(1 .3 -2 1.2 5 6)"])
+def test_arcs_of_a_sheared_svg_are_arcs_of_ellipses(tmp_path, change):
+    area = np.prod({"s": (1.0,), "r": (2.0, 0.5), "m": (1.8,)}[change[0]]) * 1e-6
+    half = '<path d="M-60 0 A60 20 0 0 1 60 0 z"/>'
+    shape = fi.mesh.outline(in_mm(tmp_path, f'<g transform="{change}">{half}</g>'), size=0.005)
+    assert shape.area == pytest.approx(600 * np.pi * area, rel=1e-5)
+    round_one = '<rect width="200" height="100" rx="40" ry="25"/>'
+    shape = fi.mesh.outline(in_mm(tmp_path, f'<g transform="{change}">{round_one}</g>'), size=0.01)
+    assert shape.area == pytest.approx((20000 - (4 - np.pi) * 1000) * area, rel=1e-5)
+
+
+def test_what_svg_masks_markers_and_symbols_hold_is_drawn_where_it_is_used(tmp_path):
+    hole = '<circle cx="100" cy="100" r="20"/>'
+    for name in ("mask", "marker", "symbol"):
+        shape = fi.mesh.outline(in_mm(tmp_path, f'{RIM}<{name} id="a">{hole}</{name}>'))
+        assert set(shape.edges) == {"rim", "outer", "boundary"}
+    body = f'{RIM}<symbol id="a">{hole}</symbol><use href="#a" x="30"/>'
+    shape = fi.mesh.outline(in_mm(tmp_path, body))
+    assert_allclose(shape.points[shape.facets[shape.edges["hole0"]].ravel()].max(axis=0), [0.15, -0.08], atol=1e-3)
+    with pytest.raises(ValueError, match="symbol 'a', which has a viewBox; draw its shapes instead"):
+        fi.mesh.outline(in_mm(tmp_path, body.replace('id="a"', 'id="a" viewBox="0 0 9 9"')))
 
 
 def test_the_third_coordinate_of_a_dxf_file_is_told(tmp_path):
