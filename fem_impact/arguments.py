@@ -298,7 +298,7 @@ COMMANDS = {
         _flag("--list", "list the cases, compute none"),
         _flag("--all", "show every number, not only the worst of each case"),
         _out("verify.png", "none", "picture"),
-        _format(),
+        _format(None),
     ), ""),
     "completion": Command(
         "print a script that completes commands; eval it in ~/.bashrc", lambda options: completion(options.shell),

@@ -492,7 +492,7 @@ def run_verify(options: argparse.Namespace) -> Answer:
         known = [{"name": case.name, **case.about} for case in references.select(options.names or "all")]
         listed = [(case["name"], case["title"], case["source"]) for case in known]
         return answer({"cases": known}, as_table(listed, ("case", "what it is", "source")))
-    display = progress_of(options)
+    display, picture = progress_of(options), picture_of(options, "verify.png")
     with display("cases"):
         found = references.verify(options.names or "all", watch=partial(display.report, "cases"))
     rows = [
@@ -506,7 +506,6 @@ def run_verify(options: argparse.Namespace) -> Answer:
     )
     said += "" if options.all else "; the one nearest to what errors allow is shown of each (--all: every one)"
     fault = f"{', '.join(failed)}: ours differs by more than both errors allow; see above" if failed else ""
-    picture = picture_of(options, "verify.png")
     if picture is not None:
         with staged_folder(picture.parent, "verify") as staging:
             figures.save(staging / picture.name, plots.verdicts(found))

@@ -67,7 +67,7 @@ def replacing(path: str | Path) -> Iterator[Path]:
     path = Path(path)
     _refuse_special(path)
     _remove_leftovers(path.parent)
-    with _temporary_name() as name, undoable(lambda: temporary.unlink(missing_ok=True)):
+    with _temporary_name(path) as name, undoable(lambda: temporary.unlink(missing_ok=True)):
         temporary = path.with_name(f"{name}-{path.name}")
         try:
             yield temporary
@@ -104,7 +104,7 @@ def staged_folder(folder: str | Path, command: str | None = None) -> Iterator[Pa
             if path.is_dir() and not any(path.iterdir()):
                 path.rmdir()
 
-    with _temporary_name() as name, undoable(undo):
+    with _temporary_name(folder) as name, undoable(undo):
         staging = folder / name
         try:
             if folder.exists() and not folder.is_dir():
@@ -132,7 +132,7 @@ def new_folder(folder: Path) -> Iterator[Path]:
     """
     folder.parent.mkdir(parents=True, exist_ok=True)
     _remove_leftovers(folder.parent)
-    with _temporary_name() as name, undoable(lambda: shutil.rmtree(new, ignore_errors=True)):
+    with _temporary_name(folder) as name, undoable(lambda: shutil.rmtree(new, ignore_errors=True)):
         new = folder.with_name(f"{name}-{folder.name}")
         try:
             new.mkdir()
@@ -156,12 +156,16 @@ def scratch_folder() -> Iterator[Path]:
 
 
 @contextmanager
-def _temporary_name() -> Iterator[str]:
-    """A temporary name that says whose it is."""
+def _temporary_name(place: Path) -> Iterator[str]:
+    """A temporary name that says whose it is; errors of what has it name ``place`` instead."""
     name = f"{PARTIAL}{MACHINE}-{os.getpid()}-{secrets.token_hex(4)}"
     OURS.add(name)
     try:
         yield name
+    except OSError as error:
+        if name in str(error.filename):
+            error.filename = str(place)
+        raise
     finally:
         OURS.remove(name)
 

@@ -86,6 +86,13 @@ def test_staged_puts_everything_back_if_a_file_cannot_be_moved(tmp_path, monkeyp
     assert "gone.txt" in (tmp_path / LIST).read_text()
 
 
+@pytest.mark.parametrize("write", [replacing, staged_folder])
+def test_what_cannot_be_written_is_named_as_the_user_does(tmp_path, write):
+    with pytest.raises(PermissionError) as caught, write(tmp_path / "mine") as place:
+        raise PermissionError(13, "Permission denied", str(place))
+    assert str(caught.value) == f"[Errno 13] Permission denied: {str(tmp_path / 'mine')!r}"
+
+
 def test_a_second_run_removes_what_the_first_alone_wrote(tmp_path):
     write(tmp_path, "map", e="map")
     write(tmp_path, "strike", **{"a": "1", "b": "1", "c": "1", "d/d": "1", "e": "strike"})

@@ -46,6 +46,9 @@ def test_a_few_by_their_beginnings_as_data_and_picture(tmp_path, prompt):
     assert [each["name"] for each in found["cases"]] == ["beam-hinged-free", "two-masses"]
     assert found["n_failed"] == 0 and found["cases"][0]["lines"][0]["holds"]
     assert (tmp_path / "new" / "verify.png").stat().st_size > 1000
+    assert prompt("verify two --out a.svg").status == 0 and "<svg" in (tmp_path / "a.svg").read_text()
+    refused = prompt("verify two --out a.foo")
+    assert refused.status == 2 and "path ending must be one of" in refused.err
     said = prompt("verify --list").out
     assert all(name in said for name in references.CASES)
 
