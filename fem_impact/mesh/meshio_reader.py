@@ -3,6 +3,7 @@
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
+from io import StringIO
 from pathlib import Path
 from typing import Any
 
@@ -48,8 +49,9 @@ def arrays(path: Path) -> dict[str, np.ndarray]:
         _refuse_left_out(path)
     if path.suffix.lower() == ".inp":
         deck_labels(path)
+        _refuse_split_sets(path)
     with closed_hdf5(path), _whole_groups():
-        mesh = meshio.read(path)
+        mesh = _read_obj(path) if path.suffix.lower() == ".obj" else meshio.read(path)
 
     def whole_numbers(values: Any) -> Any:
         return None if values is None else np.asarray(values, np.int64).ravel()
@@ -69,10 +71,32 @@ def arrays(path: Path) -> dict[str, np.ndarray]:
     return kept.flatten(KINDS, mesh=Raw(np.asarray(mesh.points, float), blocks, labels, chosen, nodes))
 
 
+def _read_obj(path: Path) -> Any:
+    """A mesh of an OBJ file; meshio takes textures for those of its nodes, and numbers from the end for none."""
+    from meshio.obj import _obj
+
+    lines: list[str] = []
+    n = 0
+    for line in path.read_text("utf-8", "replace").splitlines():
+        word, *rest = line.split() or [""]
+        if word == "v":
+            n, rest = n + 1, rest[:3]
+        elif word == "f":
+            numbers = [int(each.split("/")[0]) for each in rest]
+            rest = [str(number if number > 0 else n + 1 + number) for number in numbers]
+        lines += [" ".join([word, *rest])] if word in ("v", "f") else []
+    return _obj.read_buffer(StringIO("\n".join(lines)))
+
+
 def _refuse_left_out(path: Path) -> None:
-    """ValueError if a Nastran deck has what meshio ignores: files that it includes, and frames of its nodes."""
+    """ValueError if a Nastran deck has what meshio ignores: cells, files that it includes, and frames of its nodes."""
+    from meshio.nastran import _nastran
+
     for line in path.read_text("utf-8", "replace").splitlines():
         card = line[:8].upper()
+        own = line[:8].split(",")[0].strip(" *")
+        if card.startswith(("CTRIA", "CQUAD")) and own not in _nastran.nastran_to_meshio_type:
+            raise ValueError(f"{path.name} has {own}, which is not read; export CTRIA3 or CQUAD4")
         if card.lstrip().startswith("INCLUDE"):
             raise ValueError(f"{path.name} includes other files; write all into one")
         if card.startswith(("GRID", "GRDSET")):
@@ -103,6 +127,17 @@ def deck_labels(path: Path) -> list[str]:
                 raise ValueError(f"{path.name} has node {words[0]} twice; export it again")
             labels[words[0]] = None
     return list(labels)
+
+
+def _refuse_split_sets(path: Path) -> None:
+    """ValueError if an Abaqus deck adds nodes to a set in a second place; meshio keeps those of the last alone."""
+    sets: set[str] = set()
+    for line in path.read_text("utf-8", "replace").splitlines():
+        word, *rest = line.upper().replace(" ", "").split(",")
+        own = [each for each in rest if each.startswith("NSET=")] if word == "*NSET" else []
+        if sets & set(own):
+            raise ValueError(f"{path.name} has set {own[0][5:]} of nodes twice; write all its nodes into one")
+        sets = set() if word in ("*ENDPART", "*ASSEMBLY", "*INSTANCE") else sets.union(own)  # there names start anew
 
 
 @contextmanager

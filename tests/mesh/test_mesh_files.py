@@ -371,6 +371,10 @@ NASTRAN = "BEGIN BULK\nGRID,1,,0.,0.,0.\nGRID,2,,1.,0.,0.\n{}\nCTRIA3,1,1,1,2,3\
     ("*NODE, NSET=a\n1,0,0,0\n2,1,0,0\n** parts\n*Node\n1,5,5,0\n2,6,5,0", "several blocks of nodes"),
     ("*Node, system=C\n1,1,0,0\n2,1,90,0\n3,1,180,0", r"a.inp has \*Node, system=C, which is not read"),
     ("*Node\n1,0,0,0\n2,1,0,0\n3,0,1,0\n*Ngen\n1,3,1", r"has \*Ngen, which is not read; write all nodes by x, y"),
+    ("*Node\n1,0,0,0\n2,1,0,0\n3,0,1,0\n*Nset, nset=a\n1,2\n*NSET, NSET=A\n2,3", "has set A of nodes twice; write"),
+    ("*Node\n1,0,0,0\n2,1,0,0\n3,0,1,0\n*Nset, nset=a\n1,2\n*Assembly, name=b\n*Nset, nset=a\n2,3", None),
+    ("GRID,3,0,1.,1.,0.\nGRID,4,0,0.,1.,0.\nCQUAD,2,1,1,2,3,4", "a.bdf has CQUAD, which is not read; export CTRIA3"),
+    ("GRID,3,0,1.,1.,0.\nGRID,4,0,0.,1.,0.\nctria3,2,1,1,3,4", "a.bdf has ctria3, which is not read; export"),
     ("GRID,3,7,1.,1.,0.", "a.bdf has nodes in coordinate system 7; export all in the global one"),
     ("GRID           3       7      1.      1.      0.", "a.bdf has nodes in coordinate system 7; export all"),
     ("GRID*                  3               7              1.              1.*\n*                     0.",
@@ -386,6 +390,12 @@ def test_decks_of_abaqus_and_nastran_with_what_is_not_read_are_refused(tmp_path,
     else:
         with pytest.raises(ValueError, match=said):
             fi.mesh.load(path)
+
+
+def test_textures_and_numbers_from_the_end_of_an_obj_file_are_left_out_and_counted(tmp_path):
+    head = "o plate\nv 0 0 0\nv 1 0 0\nvt 0.5 0.5\nvn 0 0 1\nv 1 1 0 0.9 0.9 0.9\nv 0 1 0\n"
+    (tmp_path / "a.obj").write_text(head + "f 1/1/1 2/1/1 3/1/1\nf -4//1 -2//1 -1//1\n")
+    assert fi.mesh.load(tmp_path / "a.obj").area == pytest.approx(1.0)
 
 
 def test_quadrilaterals_are_divided(tmp_path):
