@@ -178,8 +178,19 @@ def svg_arrays(path: Path) -> dict[str, np.ndarray]:
 
 
 def _shown(path: Path) -> BytesIO:
-    """An SVG file without shapes that only masks, markers and symbols hold; svgelements would draw them."""
+    """An SVG file without shapes that only masks, markers and symbols hold; svgelements would draw them.
+
+    Views state what is by default: without viewBox svgelements exchanges their sides, without sides it takes others'.
+    """
     tree = ElementTree.parse(path)
+    for view in tree.iter():
+        if str(view.tag).rpartition("}")[2] == "svg":
+            for name in ("width", "height") if view is not tree.getroot() else ():
+                view.attrib.setdefault(name, "100%")
+            sides = [re.fullmatch(r"\s*([\d.]+)\s*([a-z]*)\s*", view.get(name, "")) for name in ("width", "height")]
+            if "viewBox" not in view.attrib and all(each and (each[2] or "px") in SVG_UNITS for each in sides):
+                pixels = [float(each[1]) * SVG_UNITS[each[2] or "px"] / SVG_UNITS["px"] for each in sides if each]
+                view.set("viewBox", f"0 0 {pixels[0]!r} {pixels[1]!r}")
     links = {link for each in tree.iter() for key, link in each.attrib.items() if key.rpartition("}")[2] == "href"}
     for parent in list(tree.iter()):
         for i, child in enumerate(parent):

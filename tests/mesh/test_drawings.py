@@ -225,6 +225,17 @@ def test_arcs_of_a_sheared_svg_are_arcs_of_ellipses(tmp_path, change):
     assert shape.area == pytest.approx((20000 - (4 - np.pi) * 1000) * area, rel=1e-5)
 
 
+@pytest.mark.parametrize(("head", "body", "size"), [
+    ('width="400mm" height="300mm"', '<rect width="100%" height="50%"/>', (0.4, 0.15)),
+    ('width="400" height="300"', '<rect width="100%" height="50%"/>', (400 * 0.0254 / 96, 150 * 0.0254 / 96)),
+    ('width="400mm" height="300mm" viewBox="0 0 400 300"', '<svg width="200" height="100">{}</svg>', (0.1, 0.05)),
+    ('width="400mm" height="300mm" viewBox="0 0 400 300"', '<svg viewBox="0 0 800 600">{}</svg>', (0.2, 0.15)),
+])  # fmt: skip
+def test_shares_of_a_view_are_of_its_own_sides(tmp_path, head, body, size):
+    drawn = svg(tmp_path, body.format('<rect width="50%" height="50%"/>'), head)
+    assert_allclose(np.ptp(fi.mesh.outline(drawn).points, axis=0), size, rtol=1e-6)
+
+
 def test_what_svg_masks_markers_and_symbols_hold_is_drawn_where_it_is_used(tmp_path):
     hole = '<circle cx="100" cy="100" r="20"/>'
     for name in ("mask", "marker", "symbol"):
