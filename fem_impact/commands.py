@@ -43,6 +43,8 @@ def run_strike(options: argparse.Namespace) -> Answer:
     from .show.painter import Painter
 
     began = time.perf_counter()
+    if options.duration is not None:
+        check.positive("--duration", options.duration, "s")
     scene = fi.load_scene(options.scene)
     if options.listener is not None:
         scene = scene.heard_from(*options.listener)

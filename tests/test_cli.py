@@ -114,6 +114,7 @@ def test_bad_scene_is_one_line_status_2_and_no_file(scene, tmp_path, prompt):
         ("modes small.toml --n-modes 0", 2, "n_modes must be at least 1"),
         ("modes small.toml --n-modes -3", 2, "n_modes must be at least 1"),
         ("strike small.toml --out small.toml/out", 1, "small.toml"),
+        ("strike small.toml --duration -1", 2, "--duration must be positive, got -1 s"),  # also where nothing rings
         ("strik small.toml", 2, "did you mean strike?"),
         ("strike small.toml --tolerence 1", 2, "did you mean --tolerance?"),
         ("frf small.toml --bandwith 1", 2, "see fem-impact frf --help"),
