@@ -62,7 +62,8 @@ def frf(
         ``H`` (frequency, channel), complex, in the response's unit per N; ``coherence`` (frequency, channel); ``error``
         (frequency, channel), the radius around ``H`` that holds the true response with a probability of 0.9, from how
         far the taps differ or, of one tap, from the noise before it, and from what noise takes off H1 or adds to H2
-        (what all taps share, such as a record that ends too early, is not in it; NaN if the noise is not known);
+        (what all taps share, such as a record that ends too early, or a channel that comes late, whose delay
+        `fi.Modes.from_frf` takes off, is not in it; NaN if the noise is not known);
         ``force`` (frequency), the mean amplitude spectrum [N s], and ``force_error`` (frequency), the part of the
         relative error that is noise of the force, which a force window makes alike in neighbouring lines; attributes
         ``averages``, ``method``, ``rate`` and ``notes`` (of taps of which a channel is cut off or dead, and of
