@@ -132,7 +132,8 @@ def deck_labels(path: Path) -> list[str]:
 def _refuse_split_sets(path: Path) -> None:
     """ValueError if an Abaqus deck adds nodes to a set in a second place; meshio keeps those of the last alone."""
     sets: set[str] = set()
-    for line in path.read_text("utf-8", "replace").splitlines():
+    keywords = (line for line in path.read_text("utf-8", "replace").splitlines() if "*" in line)
+    for line in keywords:
         word, *rest = line.upper().replace(" ", "").split(",")
         own = [each for each in rest if each.startswith("NSET=")] if word == "*NSET" else []
         if sets & set(own):
