@@ -407,13 +407,6 @@ class Brief:
         return f"{type(self).__name__}({line(', '.join(parts), 900)})"
 
 
-class Locked(Brief):
-    """A frozen dataclass whose arrays are read-only, too: ``frozen=True`` alone does not protect their contents."""
-
-    def __post_init__(self) -> None:
-        lock_arrays(self)
-
-
 def settle(instance: Any, **values: Any) -> None:
     """Set fields of a frozen dataclass to their checked values, which are floats whatever number the user passed."""
     for name, value in values.items():
@@ -425,6 +418,12 @@ def lock_arrays(instance: Any) -> None:
     for value in vars(instance).values():
         if isinstance(value, np.ndarray):
             value.setflags(write=False)
+
+
+class Locked(Brief):
+    """A frozen dataclass whose arrays are read-only, too: ``frozen=True`` alone does not protect their contents."""
+
+    __post_init__ = lock_arrays
 
 
 def extra(module: str, name: str, purpose: str) -> Any:

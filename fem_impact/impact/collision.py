@@ -195,7 +195,7 @@ def _follow_refined(bodies, laws, parts, speed, options, striker=None, at=None, 
         raise ValueError(
             "duration or max_impacts must be given, because a constant force keeps pressing the bodies together"
         )
-    *firsts, n_kept = accumulate((len(part.omega) for part in parts), initial=0)
+    *firsts, n_kept = accumulate([len(part.omega) for part in parts], initial=0)
     held = [first + i for first, part in zip(firsts, parts) for i in range(part.held)]
     pace, own = engine.pace_of(system, held, n_kept)._replace(struck=slice(firsts[-1], None)), parts[0]
     if speed and own.touched:

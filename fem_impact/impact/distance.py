@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 from dataclasses import replace
 from math import sqrt
-from operator import sub
+from operator import mul, sub
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -86,11 +86,9 @@ def heard(system: "History | KernelSystem", struck: slice, band: float) -> np.nd
 
 def of_whole_runs(one: History, two: History, pace: "Pace | None" = None) -> dict[str, float]:
     """How far one run is from another in quantities without a band [-], whatever impacts they had; see `of_runs`."""
-    # other bodies that swing have much momentum, of which the striker's error is no share
-    rigid, other = [
-        (np.isin(run.omega, (0.0, *pace.swings)) if pace and pace.swings else run.omega == 0.0).nonzero()[0]
-        for run in (two, one)
-    ]
+    rigid, other = two.omega == 0.0, one.omega == 0.0
+    if pace and pace.swings:  # other bodies that swing have much momentum, of which the striker's error is no share
+        rigid, other = rigid | np.isin(two.omega, pace.swings), other | np.isin(one.omega, pace.swings)
     start, end, other_end = two.start_p[rigid], two.end_p[rigid], one.end_p[other]
     n_impacts = min(len(one.contacts), len(two.contacts))
     if not n_impacts:  # bodies that constant forces part: a run ends with its first step, however long that is
@@ -98,12 +96,12 @@ def of_whole_runs(one: History, two: History, pace: "Pace | None" = None) -> dic
     momentum = sqrt(max(start.dot(start), end.dot(end)))
     momentum = momentum or sqrt(two.start_p.dot(two.start_p)) or sqrt(two.end_p.dot(two.end_p)) or 1.0
     # bodies that a force holds pressed rest but for the rounding of what it gave them
-    given = float(two.contacts[:, 3].sum()) * np.abs(two.shape[:, rigid]).max(initial=0.0)
+    given = sum(two.contacts[:, 3].tolist()) * np.abs(two.shape[:, rigid]).max(initial=0.0)
     speeds = np.maximum(np.abs(other_end - end) - ROUNDING * given, 0.0)
-    own = sum([abs(part) * speed for part, speed in zip(pace.rebound if pace else (), speeds.tolist())])
+    own = sum(map(abs, map(mul, pace.rebound if pace else (), speeds.tolist())))
     found: dict[str, float] = {"restitution": max(max(speeds.tolist(), default=0.0) / momentum, own)}
     totals = []
-    for start, end, peak, impulse, *_ in [run.contacts.T.tolist() for run in (one, two)] if n_impacts else ():
+    for start, end, peak, impulse, *_ in (one.contacts.T.tolist(), two.contacts.T.tolist()) if n_impacts else ():
         totals.append({"impulse": sum(impulse), "contact_time": sum(map(sub, end, start)), "force": max(peak)})
     return found | (distance(*totals) if n_impacts else {})
 
@@ -132,7 +130,7 @@ def of_runs(
             found |= distance(*({name: _spectrum(run, band)} for run in (one, two)))
         apart.append(max(ROUNDING, found.get(name, ROUNDING) / over[name in INSTANTS]))
     apart.append(abs(one.margin - two.margin))
-    for rebound, other in zip(*(run.contacts[:, 7].tolist() for run in (one, two))):
+    for rebound, other in zip(one.contacts[:, 7].tolist(), two.contacts[:, 7].tolist()):
         none, no_other = rebound != rebound, other != other  # NaN: no restitution
         apart.append(float(none != no_other) if none or no_other else abs(rebound - other))
     return np.array(apart)

@@ -91,7 +91,7 @@ class History(check.Locked):
         return KernelSystem(*bodies, self.law, self.start_q, self.start_p)
 
     def _column(self, first: int) -> np.ndarray:
-        return self.steps[:, layout.HEAD + first : layout.HEAD + layout.WIDTH * self.n_contacts : layout.WIDTH]
+        return self.steps[:, layout.HEAD + first : layout.HEAD + layout.WIDTH * len(self.offset) : layout.WIDTH]
 
     @cached_property
     def impulses(self) -> np.ndarray:
@@ -247,19 +247,13 @@ class History(check.Locked):
         passes zero although the steps say that it does not. Where the run is cut off, it turns as far as it came.
         """
         miss = -np.inf if self.miss is None else self.miss
-        touch = TOUCH * float(self._column(0).max(initial=0.0))
-        near, far, row, i = record.nearest_turn(self.steps, self.now, self.law, miss, touch)
+        near, far, row, i = record.nearest_turn(self.steps, self.now, self.law, miss, TOUCH)
         if row >= 0 and abs(near) < CLEAR * far:
             near = max(0.0, self._turn_in(row, i) * (1.0 if self.pressed[row, i] else -1.0))
-        return min(abs(near), self._cut_off) / far if far else np.inf
-
-    @property
-    def _cut_off(self) -> float:
-        """How near to zero [m] a contact is that closes as the run is cut off: a bit later, or sooner, it counts."""
-        if self.status not in (record.HORIZON, record.IMPACTS):
-            return np.inf
-        apart = self.now[layout.APPROACH] - self.surfaces(np.array([self.end_time]))[0][0]
-        return float(np.abs(apart[(self.now[layout.RATE] > 0.0) & (apart != 0.0)]).min(initial=np.inf))
+        if self.status in (record.HORIZON, record.IMPACTS):  # what closes as it is cut off would count a bit later
+            apart = self.now[layout.APPROACH] - self.surfaces(np.array([self.end_time]))[0][0]
+            near = np.abs(apart[(self.now[layout.RATE] > 0.0) & (apart != 0.0)]).min(initial=abs(near))
+        return float(abs(near) / far) if far else np.inf
 
     def _turn_in(self, row: int, i: int) -> float:
         """Approach [m] from its dent at which contact i turns within a step, by the motion of the modes."""
@@ -307,7 +301,7 @@ class History(check.Locked):
         if not peak:  # pressed by less than rounding
             return 1.0
         missed = float(record.force_missed(self.steps, self.now, self.law, peak))
-        for i in np.flatnonzero(self.law["loss"]):
+        for i in self.law["loss"].nonzero()[0]:
             pushes, speeds = self.impulses[:, i] / self.steps[:, layout.LENGTH], self._column(layout.SPEED)[:, i]
             row, loss = int(pushes.argmax()), float(self.law["loss"][i])
             bends = np.abs(np.diff(speeds[max(0, row - 3) : row + 4], 3))  # fourth derivatives times h**3

@@ -97,10 +97,13 @@ def what_if(blow: Followed, variations: Sequence[Variation]) -> dict[str, np.nda
         for ways in each.changes:
             effects = []
             for parts, weight, parting in ways:
-                effects.append(none + 1.0)
-                with suppress(SimulationError):
+                try:
                     found = distance.of_runs(blow.again(parts), blow.runs.coarse, quantities, pace=blow.pace)
-                    effects[-1] = found * np.repeat([weight, parting], [n + 1, len(found) - n - 1])
+                    found[: n + 1] *= weight
+                    found[n + 1 :] *= parting
+                except SimulationError:
+                    found = none + 1.0
+                effects.append(found)
             if effects:
                 errors[each.cause] = errors.get(each.cause, none) + np.maximum.reduce(effects)
         if each.least:

@@ -119,8 +119,13 @@ def nearest_turn(steps, now, law, miss, touch):
 
     The place is its step and its contact; of felt, where it counts from where the force ends, and of ``miss``, the
     approach where it turned in flight or -infinity, the step is -1. The farthest is zero where none turns. Bodies that
-    touch as the run begins and move by no more than ``touch`` [m] since, have not turned back.
+    touch as the run begins and move by no more than ``touch`` [-] of the deepest approach since, have not turned back.
     """
+    deepest = 0.0
+    for row in range(steps.shape[0]):
+        for i in range(now.shape[1]):
+            deepest = max(deepest, steps[row, HEAD + WIDTH * i])
+    touch *= deepest
     nearest = miss
     farthest = 0.0
     where = -1
