@@ -13,6 +13,7 @@ from scipy.stats import qmc
 from .._base import check, markup
 from .._base.check import SimulationError
 from .._base.rounding import SAME
+from .._base.threads import one_thread
 from ..fe.variation import SectionChange
 from ..impact import clearance, gradient, promise
 from ..impact.response import Response
@@ -138,6 +139,7 @@ class Design(check.Brief):
 
 
 @check.typed
+@one_thread
 def design(
     objects: Any,
     wanted: Mapping[str, Any],

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from .._base import check, markup
+from .._base.threads import one_thread
 from ..fe.section import Plate
 from ..fe.system import System
 from ..impact import promise
@@ -194,6 +195,7 @@ class Tuning(check.Brief):
 
 
 @check.typed
+@one_thread
 def tune(
     body: System | Scene | str | Path,
     pitches: Any,

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from .._base import check
+from .._base.threads import one_thread
 from ..mesh.meshes import Mesh, aligned, mesh_with_holes
 from .constraints import Attached, load_and_release
 from .corners import Singular, around_corners, around_plane_corners
@@ -41,6 +42,7 @@ HOLDS = {"hinged": 3, "clamped": 6}  # unknowns of a thin plate that a held face
 
 
 @check.typed
+@one_thread
 def assemble(
     mesh: Mesh,
     section: Plate | Beam,

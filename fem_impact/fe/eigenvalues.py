@@ -1,18 +1,17 @@
 """Solve K x = lambda M x with one factorisation, exact rigid motions and a check that no mode is missing."""
 
-from collections.abc import Callable
 from dataclasses import dataclass
-from functools import cache, cached_property, wraps
+from functools import cached_property
 from typing import Any
 
 import numpy as np
 from scipy.linalg import eigh, solve_triangular
 from scipy.sparse import csc_matrix, eye_array
 from scipy.sparse.linalg import splu
-from threadpoolctl import ThreadpoolController
 
 from .._base import check, progress
 from .._base.rounding import SAME
+from .._base.threads import one_thread
 from .._base.untyped import Sparse
 
 DENSE = 300  # [-] up to this many unknowns a dense solver is faster
@@ -25,20 +24,6 @@ FIRST_SLICE = 24  # [-] modes found with shift zero; their eigenvalues span five
 SLICE = 50  # [-] modes found with each further shift: 30 were 10 % slower, 80 were 40 % slower
 # [-] eigenvalues with a smaller relative distance count as equal: far above their errors, below what meshes resolve
 CLUSTER = 1e-6
-
-
-_threads = cache(ThreadpoolController)  # which takes a look at all libraries
-
-
-def one_thread(search: Callable) -> Callable:
-    """Make a function do its linear algebra on one thread: with two, narrow blocks take up to ten times as long."""
-
-    @wraps(search)
-    def alone(*arguments: Any, **options: Any) -> Any:
-        with _threads().limit(limits=1, user_api="blas"):
-            return search(*arguments, **options)
-
-    return alone
 
 
 @dataclass(frozen=True, eq=False)

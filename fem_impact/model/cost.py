@@ -23,7 +23,8 @@ import scipy
 import scipy.sparse as sp
 
 from .._base.files import write_whole
-from ..fe.eigenvalues import factorise, one_thread
+from .._base.threads import one_thread
+from ..fe.eigenvalues import factorise
 from ..impact import collision
 from ..impact.compiled import build
 from ..impact.compiled.energy import follow

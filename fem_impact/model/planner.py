@@ -13,6 +13,7 @@ from typing import Any
 
 from .._base import check, markup, progress
 from .._base.explained import heading_line, headings_of, lines_of_notes, with_headings
+from .._base.threads import one_thread
 from ..fe import plausible
 from ..fe.assembly import System
 from ..impact import assumption, collision, distance, promise
@@ -184,6 +185,7 @@ def _planned(description: Description) -> Plan:
     return Plan(blow=asked.blow, changes=asked.changes, description=description, **vars(description.forecast))
 
 
+@one_thread
 def make_plan(blow: Blow, changes: Mapping[str, Any], stages: Stages) -> Plan:
     """Choose the model of a blow; see `fi.plan`."""
     asked = Asked.checked(blow, changes)
@@ -232,6 +234,7 @@ def choose(asked: Asked, stages: Stages) -> Description:
     return found
 
 
+@one_thread
 def carry_out(plan: Plan, stages: Stages, keep: Any = None) -> Run:
     """Run the plan, and then with the better models of the target that the tolerance requires, if it may choose."""
     with _note_slips(partial(slips_of, plan.description.asked)):

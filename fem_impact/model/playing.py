@@ -12,6 +12,7 @@ import numpy as np
 from .._base import check
 from .._base.check import SimulationError
 from .._base.explained import heading_line, lines_of_notes
+from .._base.threads import one_thread
 from ..impact import collision, promise
 from ..impact.collision import Touch
 from ..impact.compiled import layout, record
@@ -240,6 +241,7 @@ class _Stick:
 
 
 @check.typed
+@one_thread
 def strokes(
     modes: Modes,
     strokes: Sequence[tuple[float, Striker, Contact, Any, float] | tuple[float, Striker, Contact, Any, float, float]],

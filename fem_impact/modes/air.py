@@ -35,8 +35,8 @@ from scipy.special import jv
 
 from .._base import check
 from .._base.rounding import HALVINGS, SAME
+from .._base.threads import one_thread
 from ..fe import plausible
-from ..fe.eigenvalues import one_thread
 from .free_air import PER_WAVE, between_cells, lattice, loads
 from .modal import Modes
 from .shapes import ScaledShapes, Shapes

@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 
 from .._base import check
+from .._base.threads import one_thread
 from ..fe import plausible, refinement
 from ..fe.assembly import System
 from .modal import Damping, Modes, damping_ratios
@@ -15,6 +16,7 @@ LOG = logging.getLogger(__name__)
 
 
 @check.typed
+@one_thread
 def find_modes(
     system: System,
     *,

@@ -13,6 +13,7 @@ from scipy.linalg import cho_solve, cholesky, solve_triangular
 from scipy.optimize import nnls
 
 from .._base.rounding import ROUNDING
+from .._base.threads import one_thread
 from . import picked
 from .picked import DAMPING, GAIN
 
@@ -144,6 +145,7 @@ class Following(NamedTuple):
     notes: list[str]
 
 
+@one_thread
 def body_of(found: Any, driving: Any, points: Any) -> Following:
     """Modes, what is left out of them, and their errors, that follow frequency responses from or to one point."""
     s, values, _, lines_used = picked.responses("frf", found)

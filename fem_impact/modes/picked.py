@@ -13,6 +13,7 @@ from scipy.ndimage import uniform_filter1d
 
 from .._base import check
 from .._base.rounding import ROUNDING
+from .._base.threads import one_thread
 from . import cell_kinds
 
 PER_FORCE = {"m/s^2/N": 2, "m/s/N": 1, "m/N": 0}  # unit of a response -> times that it was differentiated
@@ -85,6 +86,7 @@ def responses(name: str, found: Any) -> tuple[np.ndarray, np.ndarray, np.ndarray
     return s, values, sure / np.hypot(size, max(np.median(size), ROUNDING * size.max())), used
 
 
+@one_thread
 def pick(name: str, found: Any, about: Any = None) -> Picked:
     """The modes at the peaks of frequency responses, or near the frequencies ``about`` (n_modes,) [Hz].
 
@@ -483,6 +485,7 @@ def check_driving(found: Any, drive: int, own: np.ndarray, moved: np.ndarray) ->
         raise ValueError(f"frf must have a response {label(found, drive)} at the point struck that moves in its modes")
 
 
+@one_thread
 def modes_of(found: Any, driving: Any, points: Any, about: Any) -> tuple[dict[str, Any], np.ndarray, list[str]]:
     """Frequencies, damping ratios, mass-normalised shapes and points of `Modes.from_frf`; errors of shapes; notes.
 

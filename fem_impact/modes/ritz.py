@@ -24,9 +24,10 @@ from scipy.linalg import eigh_tridiagonal
 
 from .._base import check
 from .._base.rounding import SAME
+from .._base.threads import one_thread
 from ..fe import plausible, point_load
 from ..fe.assembly import System
-from ..fe.eigenvalues import Flexibility, factorise, one_thread
+from ..fe.eigenvalues import Flexibility, factorise
 from ..fe.shallow import PlaneMass, mass_in_plane
 from .modal import Damping, Modes, damping_ratios
 from .shapes import ElementShapes
@@ -36,6 +37,7 @@ FEWER = 0.7
 
 
 @check.typed
+@one_thread
 def ritz_modes(
     system: System, points: Any, *, max_frequency: float, n_vectors: int = 100, damping_ratio: Damping = 0.0
 ) -> Modes:

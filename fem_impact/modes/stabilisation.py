@@ -13,6 +13,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from .._base.threads import one_thread
 from . import picked
 
 
@@ -25,6 +26,7 @@ class Chart(NamedTuple):
     stable: np.ndarray  # bool: like one of the order below in both
 
 
+@one_thread
 def chart(found: Any, orders: int = 100) -> Chart:
     """The poles of frequency responses, as `fi.frf` returns them, by models of even orders up to ``orders``.
 

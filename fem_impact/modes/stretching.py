@@ -24,6 +24,7 @@ from typing import Any
 import numpy as np
 
 from .._base import check
+from .._base.threads import one_thread
 from ..fe import membrane, slopes
 from ..fe.assembly import System, assemble, support_of_facets
 from ..fe.section import PLANE, SOFT, Beam, Plate
@@ -61,6 +62,7 @@ class Stretching(check.Locked):
         return Stretching(np.ascontiguousarray(forms), np.ascontiguousarray(linear))
 
 
+@one_thread
 def stretch(modes: Modes) -> Stretching:
     """How the modes of a plate, or of a beam between held ends, stretch it; raise ValueError for other bodies."""
     section, rigid = modes.section, modes.n_rigid

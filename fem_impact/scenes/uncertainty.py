@@ -12,6 +12,7 @@ import numpy as np
 import xarray
 
 from .._base import check, progress
+from .._base.threads import one_thread
 from ..fe import plausible
 from ..fe.assembly import System, reassemble
 from ..fe.section import Beam, Plate
@@ -46,6 +47,7 @@ BODY = {
 
 
 @check.typed
+@one_thread
 def spread(
     scene: Scene | str | Path | System | Modes,
     vary: Mapping[str, Any],

@@ -9,7 +9,7 @@ from functools import cached_property, partial
 
 import numpy as np
 
-from ..fe.eigenvalues import one_thread
+from .._base.threads import one_thread
 from ..impact.compiled import bundles, convolution, many_blows, propagation
 from ..impact.compiled.law import LAW
 from ..impact.contact import wall_time

@@ -13,6 +13,7 @@ import xarray
 
 from .._base import check, progress
 from .._base.files import PARTIAL
+from .._base.threads import one_thread
 from ..fe import plausible
 from ..fe.assembly import System
 from ..impact.contact import Contact
@@ -120,6 +121,7 @@ def axis_attributes(name: str) -> dict[str, str]:
 
 
 @check.typed
+@one_thread
 def sweep(
     modes: Modes | System,
     striker: Striker,

@@ -10,6 +10,7 @@ import numpy as np
 from scipy.optimize import brentq
 
 from .._base import check, progress
+from .._base.threads import one_thread
 from ..fe.assembly import System
 from ..impact import accuracy
 from ..impact.catalogue import hammers as listed
@@ -139,6 +140,7 @@ def _centre(bandwidth: float, drop: float) -> float:
 
 
 @check.typed
+@one_thread
 def choose(
     modes: Modes | System,
     at: Any,

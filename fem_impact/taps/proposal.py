@@ -6,6 +6,7 @@ from typing import Any
 
 from .._base import check, markup
 from .._base.check import SimulationError
+from .._base.threads import one_thread
 from ..impact.contact import Contact
 from ..impact.striker import Striker
 from . import solver, windows
@@ -53,6 +54,7 @@ class Proposal(check.Brief):
 
 
 @check.typed
+@one_thread
 def propose(
     taps: Any,
     *,

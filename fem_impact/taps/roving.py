@@ -12,6 +12,7 @@ from .._base import check, progress
 from .._base.check import SimulationError
 from .._base.explained import lines_of_notes
 from .._base.files import write_whole
+from .._base.threads import one_thread
 from ..fe.assembly import System
 from ..impact import accuracy, spectra
 from ..impact.collision import strike
@@ -164,6 +165,7 @@ def _blank(values: np.ndarray) -> list[Any]:
 
 
 @check.typed
+@one_thread
 def plan_test(
     system: System | Modes,
     hammers: Any,

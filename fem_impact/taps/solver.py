@@ -12,6 +12,7 @@ from scipy.stats import qmc
 
 from .._base import check
 from .._base.check import SimulationError
+from .._base.threads import one_thread
 from .rig import FINE, MARGIN
 from .unknowns import TIME, Setting, Unknown
 
@@ -276,6 +277,7 @@ def solve(
     return replace(found, x=whole(found.x))
 
 
+@one_thread
 def least(
     residual: Function, slopes: Function, x: np.ndarray, bounds: tuple[np.ndarray, np.ndarray], *, close: float,
     iterations: int,
@@ -300,8 +302,9 @@ def least(
             jacobian = slopes(x)
             size = np.maximum(size, np.linalg.norm(jacobian, axis=0))
             scale = np.where(size > 0.0, size, 1.0)
-            turned, rows = np.linalg.qr(jacobian / scale)
-            wanted = -turned.T @ missed
+            both = np.column_stack([jacobian / scale, missed])
+            turned = np.asarray(np.linalg.qr(both, mode="r"))[: len(x)]
+            rows, wanted = turned[:, :-1], -turned[:, -1]
         lower = (low - x) * scale
         box = lower, np.maximum((high - x) * scale, np.nextafter(lower, np.inf))
         damped = np.vstack([rows, np.sqrt(damping) * np.eye(len(x))]), np.append(wanted, np.zeros(len(x)))

@@ -11,6 +11,7 @@ from scipy.stats import f
 
 from .._base import check, isolated
 from .._base.files import replacing
+from .._base.threads import one_thread
 from ..modes import picked, universal_files
 from ..modes.modal import Modes
 from . import readers, triggers
@@ -26,6 +27,7 @@ ENDS = ("place", "struck")  # where it is measured and struck
 RESPONSE_CODE = {unit: code for code, unit in UFF_UNITS.items() if unit != "N"}
 
 
+@one_thread
 def frf(
     records: Any,
     *,

@@ -11,6 +11,7 @@ from scipy.stats import f, qmc, t
 
 from .._base import check, markup
 from .._base.check import SimulationError
+from .._base.threads import one_thread
 from ..fe.assembly import System
 from ..modes.finding import find_modes
 from ..modes.modal import Modes
@@ -68,6 +69,7 @@ class Updated(check.Brief):
         return "\n".join([*lines, *table, *alone, f"{self.n_solves} solves"])
 
 
+@one_thread
 def update(
     build: Callable[[dict[str, float]], Any] | Scene | str | Path,
     measured: Any,
