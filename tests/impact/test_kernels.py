@@ -18,7 +18,7 @@ from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 from warming import locked
 
-from fem_impact.impact.compiled import arrays, build, energy, layout, propagation, record
+from fem_impact.impact.compiled import arrays, build, energy, exact, frame, layout, propagation, record
 from fem_impact.impact.compiled import law as laws
 from fem_impact.impact.compiled.bundles import KernelSystem, Limits
 
@@ -518,3 +518,14 @@ def test_a_run_leaves_other_threads_free():
         time.sleep(1e-3)
         ticks += 1
     assert ticks > 10  # with the lock held the first sleep lasts as long as the run: 1 or 2
+
+
+@pytest.mark.parametrize(("target", "closed"), [(0, 0.0), (-1, 1.0)], ids=["closes at the end", "presses on"])
+def test_a_contact_that_closes_as_a_step_ends_was_apart_in_it(target, closed):
+    """What rounding leaves of a force then made one impact of two while another stick pressed."""
+    scene = KernelSystem(np.zeros(1), *np.zeros((4, 1)), laws.table([[1e5, 1.0]]), np.zeros(1), np.ones(1))
+    begun, row = frame.made_run(scene), np.zeros(layout.HEAD + layout.WIDTH + 1)
+    contacts, course = build.plain(frame.touching)(begun), build.plain(frame.course_of)(begun)
+    contacts.force[0], course.counts[layout.TARGET] = 1e-14, target
+    build.plain(exact.record)(contacts, course, row, np.zeros((6, 1, 1)), 1e-6, False)
+    assert row[layout.HEAD + layout.CLOSED] == closed

@@ -23,7 +23,7 @@ from .schemes import (  # isort: skip
 from .layout import (  # isort: skip
     A11, A12, A21, A22, APPROACH, BLIND, CLOSED, COMPRESSION, ENERGY, FORCE, FREE_END, FREE_MEAN, FREE_RATE,
     GAIN, LENGTH, M1, M2, M3, N_LANE, OWN_END, OWN_END_RAMP, OWN_MEAN, OWN_MEAN_RAMP, OWN_RATE, OWN_RATE_RAMP, PUSH,
-    RATE, START, TIME,
+    RATE, START, TARGET, TIME,
 )  # fmt: skip
 
 
@@ -217,7 +217,8 @@ def record(contacts, course, row, sums, h, blind):
     row[BLIND] = 1.0 if blind else 0.0
     for i in range(y.size):
         first = remember(contacts, i, row)
-        closed = contacts.pressed[i] or (f[i] > 0.0 and (blind or start[i] >= 0.0))  # else it ends where they touch
+        apart = not blind and (start[i] < 0.0 or i == course.counts[TARGET])  # what closes does so where the step ends
+        closed = contacts.pressed[i] or (f[i] > 0.0 and not apart)
         row[first + CLOSED] = 1.0 if closed else 0.0
         row[first + PUSH] = f[i] - 0.5 * s[i]
         row[first + GAIN] = s[i]
