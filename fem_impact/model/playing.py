@@ -187,20 +187,22 @@ class Strokes(Totals, check.Locked):
 
     @property
     def energies(self) -> dict[str, float]:
-        """Energies [J]: of the body at the start, brought by the strikers, of the body as the last blow ends, lost to
-        damping and contacts until then, and what is left, which the strikers took away.
+        """Energies [J]: of the body at the start, brought by the strikers that arrived, of the body and of its contacts
+        as the last blow ends, lost to damping and contacts until then, and what is left, which the strikers have.
         """  # fmt: skip
         first, last = self.hits[0], self.hits[-1]
+        arrived = [self.strokes[i] for i in {i for strokes in self.strikers for i in strokes}]
         found = {
             "start": float(first.modal_energy([0.0])[0].sum()),
-            "brought": sum(0.5 * each.striker.felt_mass * each.speed**2 for each in self.strokes),
+            "brought": sum(0.5 * each.striker.felt_mass * each.speed**2 for each in arrived),
             "target": float(last.modal_energy([last.history.end_time])[0].sum()),
+            "contact": last.energies["contact"],
             "dissipated": sum(hit.energies["dissipated"] for hit in self.hits),
         }
         for hit, after in pairwise(self.hits):  # as it swings freely until the next blow
             ends = hit.modal_energy([hit.history.end_time])[0] - after.modal_energy([0.0])[0]
             found["dissipated"] += float(ends.sum())
-        rest = found["start"] + found["brought"] - found["target"] - found["dissipated"]
+        rest = found["start"] + found["brought"] - sum(found[name] for name in ("target", "contact", "dissipated"))
         return {**found, "taken away": rest}
 
     def summary(self) -> str:
@@ -298,8 +300,11 @@ def strokes(
         one = Stroke(*stroke)
         check.instance(f"{name} striker", one.striker, Striker)
         check.instance(f"{name} contact", one.contact, Contact)
-        when, speed = check.number(f"{name} when", one.when, "s"), check.positive(f"{name} speed", one.speed, "m/s")
+        when = check.between(f"{name} when", one.when, -1e5, 1e5, "s")  # a day, beside which a contact still counts
+        speed = check.positive(f"{name} speed", one.speed, "m/s")
         lasts = one.lasts if one.lasts is None else check.positive(f"{name} lasts", one.lasts, "s")
+        if duration is None and lasts is None and one.striker.push @ one.striker.shape > 0.0:
+            raise ValueError(f"{name} must have lasts, or duration be given: a hand or its weight keeps it pressing")
         given.append(Stroke(when, one.striker, one.contact, modes.point(f"{name} at", one.at)[0], speed, lasts))
     played = tuple(sorted(given, key=lambda stroke: stroke.when))
     tolerance = check.tolerance(tolerance)

@@ -181,7 +181,7 @@ def _of_strokes(scene: Scene, run: Played) -> dict[str, Any]:
     own, which = found.hits[found.hardest], " and ".join(map(str, found.strikers[found.hardest]))
     laws = dict.fromkeys(contact(stroke.contact) for stroke in found.strokes)
     played = f"It is struck {len(strokes)} times in {si(found.strokes[-1].when - found.strokes[0].when, 's')}."
-    energies = {name: found.energies[name] for name in ("target", "dissipated", "taken away")}
+    energies = {name: found.energies[name] for name in ("target", "contact", "dissipated", "taken away")}
     return {
         "words": (*lines_of_notes(found.notes), body(scene, found.target), played, *laws),
         "strokes": strokes, "outcome": found.hits[-1].outcome, "error": found.error,

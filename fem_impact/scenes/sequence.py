@@ -148,7 +148,15 @@ def plan_sequence(scene: "Scene", watch: Watch | None = None, **changes: Any) ->
         keys.append(repr([part.values.get("striker"), part.values.get("contact"), blow["at"]]))
         other = fastest.get(keys[-1], single)
         fastest[keys[-1]] = single if blow["speed"] >= other.blow.values["speed"] else other
-    plans = {key: single.plan(watch=watch, **wanted) for key, single in fastest.items()}
+    plans = {}
+    for key, single in fastest.items():
+        try:
+            plans[key] = single.plan(watch=watch, **wanted)
+        except ValueError as error:  # of a scene with one blow only
+            before, file, said = str(error).partition(f"{check.line(str(scene.path))}: [strike] ")
+            if before or not file:
+                raise
+            raise scene.fault(f"[[{REPEATED}]] {order[keys.index(key)]} {said}") from None
     strokes = tuple(
         {"when": part.values["when"], "at": single.blow.values["at"], "speed": single.blow.values["speed"]}
         for part, single in zip(parts, alone)

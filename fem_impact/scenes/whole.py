@@ -11,6 +11,7 @@ from ..impact.stepping import Options
 from ..sweeps.cells import ALIASES, AXES, rescales
 from .keys import checked, form
 from .schema import MAKERS, NESTED, REPEATED, Part, rise_of
+from .sequence import OF_SEQUENCE
 
 if TYPE_CHECKING:
     from ..model.target import Watch
@@ -33,6 +34,7 @@ def check_whole(scene: "Scene") -> None:
         missing, there = ("section", "material") if bare else ("material", "section")
         raise scene.fault(f"[{missing}] is missing; [{there}] needs it")
     thick, other = target.get("theory") in THICK, scene.striker.kind != "sphere" or bare
+    single = ", ".join(name for name in scene.blow.values if name not in ("at", "speed", *OF_SEQUENCE))
     wrong = {
         "[target] needs mass and first_frequency if there is no [material]": bare
         and not {"mass", "first_frequency"} <= set(target),
@@ -43,8 +45,8 @@ def check_whole(scene: "Scene") -> None:
         "[target] baffle must be left out for a beam, which is in free air": line and target.get("baffle") is True,
         "[contact] kind 'between' needs a striker of kind 'sphere' and a [section]": other
         and scene.contact.kind == "between",
-        f"[strike] max_impacts must be left out with [[{REPEATED}]]; give a stroke lasts instead": scene.stroke
-        and "max_impacts" in scene.blow.values,
+        f"[strike] {single} must be left out with [[{REPEATED}]], of which all take {', '.join(OF_SEQUENCE)}; each may "
+        "have lasts": scene.stroke and single,
         "[observe] listener of a beam needs [material] and [section], for its width": bare and line and scene.listeners,
     }
     for text, holds in wrong.items():

@@ -203,6 +203,17 @@ def test_a_pause_after_a_lift_and_a_start_from_before_carry_the_motion():
     assert len(short.hits) == 1
 
 
+def test_energies_of_a_sequence_cut_short_are_of_the_strokes_played_and_leave_out_what_contacts_store():
+    """The second stroke comes after the end, and the first still presses then."""
+    strokes = [(0.0, BALL, LAW, (0.05, 0.0), 1.0), (0.04, BALL, LAW, (0.0, 0.05), 1.0)]
+    cut = fi.strokes(DRUM, strokes, tolerance=1e-6, duration=1e-3, quantity="impulse", residual=False)
+    (hit,), given = cut.hits, cut.energies
+    ball = 0.5 * 0.02 * hit.velocity(None, [1e-3], body=0)[0, 0] ** 2
+    found, stored = [given[name] for name in ("brought", "contact", "taken away")], cut.force[-1] ** 2 / 2.0 / 2e4
+    assert_allclose(found, [0.5 * 0.02, stored, ball], rtol=1e-5)
+    assert given["contact"] > 0.1 * given["brought"]
+
+
 def test_the_summary_tells_the_sequence(roll):
     text = roll.summary().splitlines()
     assert text[0].startswith("tolerance 0.01 met by all: estimated error")
@@ -261,8 +272,17 @@ test_what_is_no_sequence_says_so = refusing([
     ([STROKE, (0.1, LAW, BALL, (0.0, 0.0), 1.0)], r"strokes\[1\] striker must be a Striker"),
     ([(0.0, BALL, LAW, (0.5, 0.0), 1.0)], r"strokes\[0\] at must lie on the body"),
     ([(*STROKE, -1.0)], r"strokes\[0\] lasts must be positive"),
-    ([(1e15, *STROKE[1:])], "duration must not vanish beside the time of the first stroke"),
-], lambda strokes: fi.strokes(DRUM, strokes, duration=1e-3, **LOOSE))  # fmt: skip
+    ([(1e6, *STROKE[1:])], r"strokes\[0\] when must lie between -100000 and 100000 s"),
+    ([(1e5, *STROKE[1:])], "duration must not vanish beside the time of the first stroke"),
+], lambda strokes: fi.strokes(DRUM, strokes, duration=1e-12, **LOOSE))  # fmt: skip
+
+
+def test_a_stroke_that_a_hand_keeps_pressing_needs_an_end():
+    held = BALL.held(fi.Hand(stiffness=100.0, damping=0.1, force=1.0))
+    stroke = (0.0, held, LAW, (0.05, 0.0), 1.0)
+    with pytest.raises(ValueError, match=r"strokes\[1\] must have lasts, or duration be given: a hand or its weight"):
+        fi.strokes(DRUM, [(*stroke, 0.01), stroke], **LOOSE)
+    assert fi.strokes(DRUM, [(*stroke, 0.01)], **LOOSE).n_impacts
 
 
 def test_a_stroke_without_end_says_which_it_is(monkeypatch):

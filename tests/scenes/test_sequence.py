@@ -88,6 +88,12 @@ def test_strokes_alike_share_the_plan_of_the_fastest(path):
     assert planned.plans[0].blow.arguments["speed"] == 3
 
 
+def test_a_stroke_beside_the_body_is_named(path):
+    path.write_text(TABLES.replace("at = [0.2, 0.1]", "at = [0.6, 0.1]"))
+    with pytest.raises(ValueError, match=r"flam.toml: \[\[stroke\]\] 1 at must lie on the body"):
+        scene.load_scene(path).play()
+
+
 def test_what_needs_a_single_blow_says_so(path):
     told = scene.load_scene(path)
     path.write_text(SMALL)
@@ -116,6 +122,7 @@ def test_what_needs_a_single_blow_says_so(path):
     ('"linear", stiff', '"between", stiff', r"\[\[stroke\]\] 1 contact: stiffness is not a key"),
     ('striker = { kind = "rigid", mass = 0.01 }', "striker = 3", r"striker must be a table with the keys of"),
     ("tolerance = 1e-2", "tolerance = 1e-2\nmax_impacts = 2", "max_impacts must be left out with"),
+    ("tolerance = 1e-2", "tolerance = 1e-2\nstriker_force = 1.0\ndt = 1e-5", "striker_force, dt must be left out with"),
     ("[[stroke]]\nwhen = 0.03\n[[stroke]]", "[stroke]", r"stroke must be tables, each written \[\[stroke\]\]"),
     ("listeners = [[0.1, 0.15, 0.5]", "listeners = [[0.1, 0.15, 0.0]", "listener must lie off the plate's plane"),
     ("listeners =", "listener = [0.1, 0.1, 1.0]\nlisteners =", "listener must be left out beside listeners"),
