@@ -9,13 +9,14 @@ import numpy as np
 from scipy.linalg import eigh
 from scipy.ndimage import maximum_filter1d
 from scipy.optimize import brentq
+from scipy.sparse.linalg import LinearOperator
 
 from .._base import check, identity
 from .._base import kept as keeping
 from .._base.rounding import EPSILON, SAME
 from ..mesh import mesh_files
 from ..mesh.meshes import MOST_CELLS, Mesh
-from . import plausible, ribs, shallow
+from . import eigenvalues, plausible, ribs, shallow
 from .assembly import BY_ELEMENT, assemble, reassemble
 from .corners import SAY
 from .eigenvalues import BLOCK, FIRST_SLICE, RESIDUAL, STRICT, Flexibility, by_slices, count_below, lowest
@@ -147,7 +148,9 @@ def _pairs(
     limit = None if max_frequency is None else (2.0 * np.pi * max_frequency / rate) ** 2
     if n_modes is None:
         assert limit is not None
-        n_modes = count_below(system.K, system.M, limit)
+        # with the mass in the plane of a ribbed plate, of which a drift spares some, there are no more below
+        heavy = system.M + shallow.mass_in_plane(system).whole if system.ribbed else system.M
+        n_modes = count_below(system.K, heavy, limit)
         if n_modes == 0:
             raise ValueError(f"max_frequency must reach the first mode; there is none below {max_frequency:g} Hz")
     if n_modes <= n_rigid:
@@ -164,7 +167,9 @@ def _pairs(
             values, vectors = values[order], vectors[:, order]
         values, vectors = with_mass_in_plane(system, flexibility, values, vectors)
     omega = np.concatenate([np.zeros(n_rigid), np.sqrt(values) * rate])[:n_modes]
-    vectors = np.column_stack([system.rigid, vectors])[:, :n_modes]
+    if max_frequency is not None:
+        omega = omega[omega <= 2.0 * np.pi * max_frequency]
+    vectors = np.column_stack([system.rigid, vectors])[:, : len(omega)]
     return flexibility, omega, vectors
 
 
@@ -283,28 +288,33 @@ def _complete_eigenpairs(
     )
 
 
+@eigenvalues.one_thread
 def with_mass_in_plane(
     system: System, flexibility: Flexibility, values: np.ndarray, vectors: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
     """Eigenvalues (n,) and vectors (n_dofs, n), with the mass in the plane of a ribbed plate.
 
-    Without ribs it is left out, as formulas of shells do. The space is that of the vectors, of what their mass in the
-    plane bends, and of what the mass of that bends. The inverse problem keeps the digits of the lowest.
+    Without ribs it is left out, as formulas of shells do. With it the plane has modes of its own, and the space is that
+    of the vectors and of the lowest of both. The inverse problem keeps the digits of the lowest.
     """
     if not system.ribbed or not len(values):
         return values, vectors
-    weigh = shallow.mass_in_plane(system)
-    n = len(values)
-    basis = fresh = vectors * values**-0.5
-    for mass in (weigh, system.M.__matmul__):
-        fresh = flexibility.solve(mass(fresh))
-        energy = flexibility.products(np.column_stack([basis, fresh]))
-        cross = energy[: -fresh.shape[1], -fresh.shape[1] :]
-        size, turn = eigh(energy[-fresh.shape[1] :, -fresh.shape[1] :] - cross.T @ cross)
-        some = size > SAME * size[-1]
-        fresh = (fresh - basis @ cross) @ (turn[:, some] / np.sqrt(size[some]))
-        basis = np.column_stack([basis, fresh])
-    kinetic = basis.T @ (system.M @ basis + weigh(basis))
+    weigh, sprung = shallow.mass_in_plane(system), flexibility.sprung
+    whole, n, pulled = weigh._replace(whole=weigh.whole + system.M), len(values), system.M @ sprung
+
+    def unsprung(loads: np.ndarray) -> np.ndarray:
+        return flexibility.bent(flexibility.solve(loads - pulled @ (sprung.T @ loads)))[0]
+
+    mass = LinearOperator(system.K.shape, matvec=whole, matmat=whole, dtype=float)
+    available = system.n_dofs - flexibility.rigid.shape[1] - sprung.shape[1]
+    fresh = eigenvalues.krylov(unsprung, mass, min(n + BLOCK, available), available, RESIDUAL)
+    basis = vectors * values**-0.5
+    energy = flexibility.products(np.column_stack([basis, fresh]))
+    cross = energy[:n, n:]
+    size, turn = eigh(energy[n:, n:] - cross.T @ cross)
+    some = size > SAME * size[-1]
+    basis = np.column_stack([basis, (fresh - basis @ cross) @ (turn[:, some] / np.sqrt(size[some]))])
+    kinetic = basis.T @ whole(basis)
     size, turn = (part[..., : -n - 1 : -1] for part in eigh(0.5 * (kinetic + kinetic.T)))
     return 1.0 / size, basis @ (turn / np.sqrt(size))
 

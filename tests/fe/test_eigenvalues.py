@@ -63,7 +63,7 @@ def test_memory_is_taken_for_the_vectors_that_are_needed_not_for_the_most_that_m
     heavier = body_of(system.K + system.M, system.M)
     assert system.n_dofs > 20 * n  # no dense solver
     tracemalloc.start()
-    eigenvalues._krylov(heavier._whole.solve, system.M, n, system.n_dofs, eigenvalues.RESIDUAL)
+    eigenvalues.krylov(heavier._whole.solve, system.M, n, system.n_dofs, eigenvalues.RESIDUAL)
     peak = tracemalloc.get_traced_memory()[1]
     tracemalloc.stop()
     assert peak < 7.0 * n * 8 * system.n_dofs  # measured 5.5: two and a half times as many, the result, the factors
@@ -83,7 +83,7 @@ def test_where_a_pivot_vanishes_another_number_of_modes_is_counted(monkeypatch):
 
 def test_a_beam_whose_slice_misses_modes_is_found_with_another_number(monkeypatch):
     """A search that loses a mode of the last slice is noticed; fewer modes need no such slice."""
-    whole = eigenvalues._krylov
+    whole = eigenvalues.krylov
     stiff = np.diag((1.0 + np.arange(400.0)) ** 4)
     body = body_of(csc_matrix(stiff), csc_matrix(np.eye(400)))
 
@@ -91,7 +91,7 @@ def test_a_beam_whose_slice_misses_modes_is_found_with_another_number(monkeypatc
         found = whole(solve, M, n, available, allowed, width)
         return found[:, 1:] if width == eigenvalues.NARROW else found
 
-    monkeypatch.setattr(eigenvalues, "_krylov", loses)
+    monkeypatch.setattr(eigenvalues, "krylov", loses)
     with pytest.raises(SimulationError, match=r"modes lie between eigenvalues .*; change the number of modes"):
         by_slices(body, 40)
     assert_allclose(by_slices(body, 20)[0][:20], np.diag(stiff)[:20], rtol=1e-9)
@@ -100,9 +100,9 @@ def test_a_beam_whose_slice_misses_modes_is_found_with_another_number(monkeypatc
 def test_modes_that_stay_missing_are_found_by_asking_for_more(monkeypatch):
     """A search that loses the same mode again and again is noticed; for all modes, the search is dense."""
     system = assemble(rectangle(0.4, 0.3, size=0.05), Plate(Material(E=210e9, nu=0.3, rho=7850.0), 1e-3))
-    whole = eigenvalues._krylov
+    whole = eigenvalues.krylov
     monkeypatch.setattr(eigenvalues, "DENSE", 10)
-    monkeypatch.setattr(eigenvalues, "_krylov", lambda *arguments: np.delete(whole(*arguments), 2, axis=1))
+    monkeypatch.setattr(eigenvalues, "krylov", lambda *arguments: np.delete(whole(*arguments), 2, axis=1))
     with pytest.raises(SimulationError, match=r"flexible modes lie below .* were found; ask for a few more modes"):
         refinement.solve_on_mesh(system, 12, None)
     many = system.n_dofs // 3

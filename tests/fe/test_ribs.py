@@ -53,6 +53,24 @@ def test_panels_with_a_rib_are_those_of_ritzs_method(width, monkeypatch):
     assert error.max() < 1e-5 and (error < np.maximum(found.frequency_error, 1e-7)).all()
 
 
+def test_a_plate_with_a_thread_for_a_rib_has_the_modes_of_its_plane_among_those_of_bending():
+    """On shear diaphragms both have closed forms: of bending, of shear in the plane and of longitudinal waves."""
+    length, width, thickness = 0.3, 0.2, 0.02
+    thread = fi.Rib([(0.1, 0.0), (0.1, width)], bar(1e-5, 1e-5), offset=0.0)
+    sheet, section = fi.mesh.rectangle(length, width), fi.Plate(ALUMINIUM, thickness)
+    system = fi.assemble(sheet, section, {"boundary": "hinged"}, ribs=[thread], in_plane=SLIDING)
+    m, n = np.mgrid[:12, :12]
+    k, stiff = np.pi * np.hypot(m / length, n / width), E / (1.0 - NU**2) / RHO
+    shear, both = np.sqrt(E / (2.0 * (1.0 + NU)) / RHO) * k.ravel()[1:], k[1:, 1:].ravel()
+    waves = np.sqrt(stiff) * both, np.sqrt(stiff / 12.0) * thickness * both**2
+    exact = np.sort(np.concatenate([shear, *waves]))[:20]
+    found = fi.find_modes(system, n_modes=20)
+    error = np.abs(found.omega / exact - 1.0)
+    assert (error < np.maximum(1.5 * found.frequency_error, 3e-8)).all()  # the thread weighs 2e-8 of the plate
+    below = fi.find_modes(system, max_frequency=1.001 * exact[-1] / (2.0 * np.pi))
+    np.testing.assert_allclose(below.omega, exact, rtol=1e-6)
+
+
 def test_the_offset_decides_and_its_sign_does_not_on_a_flat_plate():
     offsets = (None, lambda points: np.full(len(points), -7e-3), -7e-3, 7e-3, 0.0)
     ribs = [fi.Rib([(0.0, 0.12), (0.4, 0.12)], bar(), offset) for offset in offsets]
