@@ -113,15 +113,15 @@ def nodes(points: np.ndarray, marked: np.ndarray, held: np.ndarray) -> np.ndarra
     """Ascending nodes of a beam: its ends, the places ``marked`` where the shear force jumps, and points of the mesh.
 
     Rounding in the stiffness of a short element spoils that of the others. So a mesh point close to a marked place is
-    left out, and a marked place close to an end or to another marked place gets no node: over such a short distance
-    the jump matters little. Only near a held end are nodes allowed much closer.
+    left out, and a marked place a tenth as close to an end or to another marked place gets no node: over such a short
+    distance the jump matters little. Only near a held end are nodes allowed much closer.
     """
     points = np.sort(points)
     kept = [points[0], points[-1]]
     apart = min(APART * (points[-1] - points[0]), 0.5 * np.diff(points).min())
     for place in marked:
         off = np.abs(place - np.array(kept))
-        if off.min() > (SAME if kept[off.argmin()] in held else apart):
+        if off.min() > (SAME if kept[off.argmin()] in held else 0.1 * apart):
             kept.append(place)
     between = points[np.abs(points[:, None] - kept).min(axis=1) > apart]
     return np.unique(np.append(kept, between))

@@ -94,7 +94,7 @@ def _solved(system: System, mesh: Mesh, loads: np.ndarray) -> Deflection:
     unit = fine.frame.mass * fine.frame.rate**2
     relative = np.full(len(loads), 1e-7)  # of a plate's smallest triangles
     if mesh.dimension == 1:  # by rounding in the shortest element: 1e-15 in one as long as the beam
-        relative[:] = 1e-15 / max(np.abs(fine.space.length).min(), beam_elements.APART) ** 3
+        relative[:] = 1e-15 / max(np.abs(fine.space.length).min(), 0.1 * beam_elements.APART) ** 3
     if not fine.rules.compared:
         diagonal, inertia = compliance.diagonal(), -fine.rigid @ (fine.rigid.T @ forces)
         error, moves = fine.rules.errors(fine, vectors, inertia, loads).sum(axis=0), diagonal > RESTS

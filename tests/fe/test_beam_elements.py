@@ -62,8 +62,16 @@ def test_nodes_keep_ends_and_marks_and_no_points_close_to_them():
     assert nodes(points, np.array([0.6]), held).tolist() == [0.0, 0.25, 0.5, 0.6, 0.75, 1.0]
     taken = nodes(points, np.array([0.503]), held)
     assert taken.tolist() == [0.0, 0.25, 0.503, 0.75, 1.0]  # takes its neighbour's place
-    assert nodes(points, np.array([0.998]), held).tolist() == [0.0, 0.25, 0.5, 0.75, 1.0]  # close to a free end: none
+    assert nodes(points, np.array([0.9995]), held).tolist() == [0.0, 0.25, 0.5, 0.75, 1.0]  # close to a free end: none
     assert nodes(points, np.array([0.002]), held).tolist() == [0.0, 0.002, 0.25, 0.5, 0.75, 1.0]  # to a held end: one
+
+
+def test_a_mass_beside_a_post_has_a_node_of_its_own():
+    """0.6 % of the length away it had none, so that frequencies of a Timoshenko beam were uncertain by 1e-4."""
+    beam = fi.Beam.rectangular(fi.Material(E=1e10, nu=0.3, rho=500.0), width=0.02, height=0.01)
+    held = {"point_masses": [([0.4], 0.1)], "point_supports": [([0.406], "hinged")]}
+    system = fi.assemble(fi.mesh.line(1.0), beam, {"left": "clamped"}, theory="timoshenko", **held)
+    assert fi.find_modes(system, n_modes=6).frequency_error.max() < 1e-9
 
 
 @pytest.mark.parametrize("theory", ["euler", "timoshenko"])
