@@ -14,12 +14,13 @@ from scipy.sparse.linalg import LinearOperator
 from .._base import check, identity
 from .._base import kept as keeping
 from .._base.rounding import EPSILON, SAME
+from .._base.threads import one_thread
 from ..mesh import mesh_files
 from ..mesh.meshes import MOST_CELLS, Mesh
-from . import eigenvalues, plausible, ribs, shallow
+from . import plausible, ribs, shallow
 from .assembly import BY_ELEMENT, assemble, reassemble
 from .corners import SAY
-from .eigenvalues import BLOCK, FIRST_SLICE, RESIDUAL, STRICT, Flexibility, by_slices, count_below, lowest
+from .eigenvalues import BLOCK, FIRST_SLICE, RESIDUAL, STRICT, Flexibility, by_slices, count_below, krylov, lowest
 from .material import stiffness_by_way
 from .section import Plate
 from .supports import support_of_facets
@@ -288,7 +289,7 @@ def _complete_eigenpairs(
     )
 
 
-@eigenvalues.one_thread
+@one_thread
 def with_mass_in_plane(
     system: System, flexibility: Flexibility, values: np.ndarray, vectors: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
@@ -307,13 +308,16 @@ def with_mass_in_plane(
 
     mass = LinearOperator(system.K.shape, matvec=whole, matmat=whole, dtype=float)
     available = system.n_dofs - flexibility.rigid.shape[1] - sprung.shape[1]
-    fresh = eigenvalues.krylov(unsprung, mass, min(n + BLOCK, available), available, RESIDUAL)
     basis = vectors * values**-0.5
-    energy = flexibility.products(np.column_stack([basis, fresh]))
-    cross = energy[:n, n:]
-    size, turn = eigh(energy[n:, n:] - cross.T @ cross)
-    some = size > SAME * size[-1]
-    basis = np.column_stack([basis, (fresh - basis @ cross) @ (turn[:, some] / np.sqrt(size[some]))])
+    fresh = krylov(unsprung, mass, min(n + BLOCK, available), available, RESIDUAL)
+    for _ in range(2):  # what once leaves of the vectors in a direction that nearly is theirs is rounding
+        energy = flexibility.products(np.column_stack([basis, fresh]))
+        unit = np.diag(energy)[n:] ** -0.5
+        cross = energy[:n, n:] * unit
+        size, turn = eigh(energy[n:, n:] * np.outer(unit, unit) - cross.T @ cross)
+        some = size > SAME * size[-1]
+        fresh = (fresh * unit - basis @ cross) @ (turn[:, some] / np.sqrt(size[some]))
+    basis = np.column_stack([basis, fresh])
     kinetic = basis.T @ whole(basis)
     size, turn = (part[..., : -n - 1 : -1] for part in eigh(0.5 * (kinetic + kinetic.T)))
     return 1.0 / size, basis @ (turn / np.sqrt(size))
