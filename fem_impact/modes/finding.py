@@ -29,6 +29,8 @@ def find_modes(
 ) -> Modes:
     """Find the lowest modes of a body without missing any; rigid motions come first, with frequency exactly zero.
 
+    They are modes of bending; those of its plane are found of ribbed plates alone, among the others.
+
     Parameters
     ----------
     system : System
