@@ -209,8 +209,10 @@ class Strokes(Totals, check.Locked):
         """The sequence in a few readable lines."""
         within = "no impact"
         if self.impacts:
-            within = f"{self.n_impacts} impacts in {self.impacts[-1].end - self.starts[0]:.4g} s"
-        lines = [self.verdict, *heading_line(self.verdict), f"{len(self.strokes)} strokes, {within}"]
+            n, end = self.n_impacts, self.impacts[-1].end
+            within = f"{n} impact{'s' * (n != 1)} in {end - self.starts[0]:.4g} s"
+        n = len(self.strokes)
+        lines = [self.verdict, *heading_line(self.verdict), f"{n} stroke{'s' * (n != 1)}, {within}"]
         lines += [
             f"  {each.start * 1e3:10.4f} to {each.end * 1e3:10.4f} ms: stroke {each.contact}, peak "
             f"{each.peak_force:.5g} N, impulse {each.impulse:.5g} N s"
