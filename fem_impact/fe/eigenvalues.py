@@ -148,8 +148,8 @@ def lowest(flexibility: Flexibility, n: int, residual: float = RESIDUAL) -> tupl
     if size <= DENSE or 3 * (n + n_rigid) >= size:
         # solve M x = mu K x: K stays definite even if tiny triangles make M singular to rounding
         heavy = M @ flexibility.rigid
-        rest = heavy @ heavy.T
-        vectors = eigh(M.toarray() - rest, K.toarray() + rest, subset_by_index=[size - n, size - 1])[1][:, ::-1]
+        rest, stiff = heavy @ heavy.T, float(K.diagonal().sum() / M.diagonal().sum())  # lifts them above rounding
+        vectors = eigh(M.toarray() - rest, K.toarray() + stiff * rest, subset_by_index=[size - n, size - 1])[1][:, ::-1]
     elif len(moving) == size:
         vectors = krylov(solve, M, n, size - n_rigid, residual)
     else:  # the unknowns without inertia follow from the others

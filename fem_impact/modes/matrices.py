@@ -17,6 +17,7 @@ from scipy.linalg import eigh, qr
 from scipy.sparse import coo_array, csc_array, csc_matrix, issparse
 
 from .._base import check
+from .._base.rounding import ROUNDING, rounded_by
 from ..fe.eigenvalues import Flexibility, lowest
 from . import cell_kinds
 from .free_body import FITS, motions
@@ -48,7 +49,8 @@ def solve_matrices(fields: Mapping[str, Any], loads: Any = None, n_modes: int | 
     turned = _directions(fields, numbers, M.shape[0])
     R = _recovery(fields, turned, len(nodes), M.shape[0])
     kept = np.flatnonzero(np.asarray(abs(R).sum(axis=1)).reshape(-1, 3).any(axis=1))
-    used = np.flatnonzero(np.asarray(abs(M).sum(axis=0) + abs(K).sum(axis=0)))  # nothing resists or moves the others
+    # nothing resists or moves the others
+    used = np.flatnonzero(np.asarray(abs(M).sum(axis=0) + abs(K).sum(axis=0)) * ~_supported(M, K, turned))
     M, K, R = M[used][:, used], K[used][:, used], R[(3 * kept[:, None] + np.arange(3)).ravel()][:, used].tocsc()
     if turned is not None:
         turned = turned[(6 * kept[:, None] + np.arange(6)).ravel()][:, used]
@@ -76,7 +78,7 @@ def solve_matrices(fields: Mapping[str, Any], loads: Any = None, n_modes: int | 
     }  # fmt: skip
     # the mass that shifts move, the same along x, y and z to a thousandth: rigid motions are mass-normalised
     moved, wanted_shifts = R @ rigid, np.tile(np.eye(3), (len(kept), 1))
-    share = np.linalg.lstsq(moved, wanted_shifts, rcond=None)[0]
+    share = np.linalg.lstsq(moved, wanted_shifts, rcond=1e-5)[0]  # a bar turning about itself moves no node
     shifts = np.abs(moved @ share - wanted_shifts).max(axis=0) < 1e-3
     masses = np.square(share[:, shifts]).sum(axis=0)
     own = float(masses.mean()) if shifts.any() and np.ptp(masses) <= 1e-3 * masses.max() else None
@@ -109,9 +111,9 @@ def label_matrices(fields: dict[str, Any]) -> dict[str, Any]:
 
 
 def whole_matrix(rows: np.ndarray, columns: np.ndarray, values: np.ndarray, size: int) -> Any:
-    """A symmetric matrix of which all entries or those of one triangle are given."""
-    if (rows > columns).any() != (rows < columns).any():
-        off = rows != columns
+    """A symmetric matrix of which all entries are given, or each beside the diagonal on one side of it alone."""
+    off = rows != columns
+    if not np.isin(rows[off] * size + columns[off], columns[off] * size + rows[off]).any():
         rows, columns = np.concatenate([rows, columns[off]]), np.concatenate([columns, rows[off]])
         values = np.concatenate([values, values[off]])
     return csc_array(coo_array((values, (rows, columns)), shape=(size, size)))
@@ -138,6 +140,17 @@ def _symmetric(fields: Mapping[str, Any]) -> list[Any]:
     if found[0].shape != found[1].shape:
         raise ValueError(f"mass must be as large as stiffness, got {found[0].shape} and {found[1].shape}")
     return found
+
+
+def _supported(M: Any, K: Any, turned: Any) -> np.ndarray:
+    """Whether nodes' unknowns (n,) are on springs so stiff that nothing else moves them, as programs write supports."""
+    if turned is None:
+        return np.zeros(K.shape[0], bool)
+    stiff, heavy, known = K.diagonal(), M.diagonal(), np.diff(turned.tocsc().indptr) > 0
+    alone = known & (np.asarray(abs(K).sum(axis=0)).ravel() - stiff <= 1e-6 * stiff)
+    pace = np.divide(stiff, heavy, out=np.full(len(stiff), np.inf), where=heavy > 0.0)
+    fastest = pace[~alone & np.isfinite(pace)].max(initial=0.0)
+    return np.asarray(alone & (1e-4 * pace > fastest) & (fastest > 0.0))
 
 
 def _directions(fields: Mapping[str, Any], numbers: np.ndarray, size: int) -> Any:
@@ -215,9 +228,27 @@ def _flexibility(M: Any, K: Any, turned: Any, nodes: np.ndarray) -> Flexibility:
         K, rigid = (K, rigid) if turned is not None else _release_rigid(M, K, moved, rigid)
     except np.linalg.LinAlgError as error:
         raise ValueError(INDEFINITE.format(error)) from None
-    held = qr(rigid.T, pivoting=True, mode="r")[1][: rigid.shape[1]] if rigid.shape[1] else np.zeros(0, int)
-    none = np.zeros((M.shape[0], 0))
-    return Flexibility(K, M, rigid, none, none, np.sort(held))
+    springs = np.zeros(rigid.shape[1], bool)
+    if turned is not None:
+        springs = _resisted(K @ rigid, rigid, size, rounded_by(K.data) / float(abs(K).max() or 1.0))
+    loose = np.hstack([rigid[:, ~springs], rigid[:, springs]])
+    held = qr(loose.T, pivoting=True, mode="r")[1][: loose.shape[1]] if loose.shape[1] else np.zeros(0, int)
+    rigid, sprung = loose[:, : np.sum(~springs)], loose[:, np.sum(~springs) :]
+    return Flexibility(K, M, rigid, sprung, K @ sprung, np.sort(held))
+
+
+def _resisted(forces: np.ndarray, motions: np.ndarray, size: np.ndarray, rounded: float) -> np.ndarray:
+    """Whether forces (n_dofs, n) on motions are those of springs, not the rounding of terms of a size (n_dofs, 1).
+
+    Those of springs oppose the motion everywhere; they are on many unknowns, or on some alone. Where the largest term
+    is ``rounded`` by a part [-] to few digits, all others must be without any force.
+    """
+    work, part = motions * forces, np.abs(forces) / np.where(size > 0.0, size, 1.0)
+    most, top = work.max(axis=0, initial=0.0), part.max(axis=0, initial=0.0)
+    there = work > 1e-3 * most
+    rest = np.where(there, 0.0, part).max(axis=0, initial=0.0)
+    clear = rest <= ROUNDING if rounded else (rest <= 0.05 * top) | (there.sum(axis=0) >= 8)
+    return np.asarray((top > 2.0 * rounded + 10.0 * ROUNDING) & (work.min(axis=0, initial=0.0) >= -1e-3 * most) & clear)
 
 
 def _release_rigid(M: Any, K: Any, slowest: np.ndarray, rigid: np.ndarray) -> tuple[Any, np.ndarray]:

@@ -11,6 +11,7 @@ from test_body import STEEL, struck
 
 import fem_impact as fi
 from fem_impact.modes.free_body import motions
+from fem_impact.modes.matrices import whole_matrix
 
 pytestmark = pytest.mark.usefixtures("read_here")
 LENGTH, WIDTH, HEIGHT, N = 0.4, 0.03, 0.01, 20  # m, m, m, elements
@@ -205,3 +206,36 @@ def test_soft_springs_are_no_rounding(tmp_path):
     body = fi.Body.load(given, mass=3.0)
     for again in (body, fi.Body.load(body.save(tmp_path / "soft"))):
         assert_allclose(again.frequencies, [0.1, 100.0, 300.0], rtol=1e-9)
+
+
+@pytest.mark.parametrize("support", [1e16, 1e36])
+def test_supports_as_stiff_as_programs_write_them_hold(support):
+    """A bar on two hinges, one of 1e36 N/m: other modes were hidden in the rounding of such springs."""
+    M, K, nodes = bar()
+    held, free = np.array([0, 1, 2, 3, 6 * N + 1, 6 * N + 2]), K.copy()
+    free[held, held] += support
+    kept = np.setdiff1d(np.arange(len(K)), held)
+    wanted = np.sqrt(eigh(K[np.ix_(kept, kept)], M[np.ix_(kept, kept)])[0][:10]) / (2.0 * np.pi)
+    body = fi.Body.from_matrices(M, free, nodes, total_mass=MASS)
+    assert_allclose(body.frequencies[:10], wanted, rtol=1e-6)
+
+
+@pytest.mark.parametrize("spring", [1e2, 1e5])
+def test_soft_springs_under_stiff_bodies_are_none_of_their_rounding(spring):
+    """A steel bar along x on a spring at one end: taken as free, a blow as soft as the spring erred by a half."""
+    n = 50
+    unit = np.diff(np.eye(n + 1), axis=0)
+    K = STEEL.E * 0.01 * n / 0.1 * (1.0 + 1e-3 / np.pi) * unit.T @ unit
+    K[0, 0] += spring
+    M = STEEL.rho * 0.01 * 0.1 / n * np.diag(np.r_[0.5, np.ones(n - 1), 0.5])
+    nodes, dofs = np.linspace(0.0, 0.1, n + 1)[:, None] * np.eye(1, 3), [(i + 1, 1) for i in range(n + 1)]
+    body = fi.Body.from_matrices(M, K, nodes, dofs=dofs, total_mass=7.85, loads=[(n + 1, (1.0, 0.0, 0.0))])
+    assert body.frequencies[0] == pytest.approx(np.sqrt(spring / M.sum()) / (2.0 * np.pi), rel=1e-4)
+    K[0, 0] -= spring
+    assert fi.Body.from_matrices(M, K, nodes, dofs=dofs).frequencies[0] == 0.0
+
+
+def test_a_triangle_may_mix_both_sides_of_the_diagonal():
+    matrix = np.array([[4.0, 1.0, 2.0], [1.0, 5.0, 3.0], [2.0, 3.0, 6.0]])
+    rows, columns = np.array([0, 1, 2, 1, 0, 2]), np.array([0, 1, 2, 0, 2, 1])
+    assert_allclose(whole_matrix(rows, columns, matrix[rows, columns], 3).toarray(), matrix)
